@@ -1,0 +1,20 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# What every target of this project shares: the language, the warnings, and reproducible arithmetic.
+
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(HYBRID_SANITIZE "" CACHE STRING "Sanitizers for every target, e.g. address,undefined")
+
+# hybrid_target(NAME): C++20, warnings as errors, folder path is include path.
+# -ffp-contract=off: a product and a sum stay two roundings, so release and debug, and every
+# processor, compute the same bits. -ffast-math is never used for the same reason.
+function(hybrid_target name)
+  target_compile_features(${name} PUBLIC cxx_std_20)
+  set_target_properties(${name} PROPERTIES CXX_EXTENSIONS OFF)
+  target_include_directories(${name} PUBLIC "$<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>")
+  target_compile_options(${name} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Werror -ffp-contract=off)
+  if(HYBRID_SANITIZE)
+    target_compile_options(${name} PUBLIC -fsanitize=${HYBRID_SANITIZE} -fno-omit-frame-pointer
+                                          -fno-sanitize-recover=all)
+    target_link_options(${name} PUBLIC -fsanitize=${HYBRID_SANITIZE})
+  endif()
+endfunction()

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "device/force_limit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+namespace device {
+namespace {
+
+bool finite(const glm::dvec3& v) noexcept {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+// A limit that is not a number, or negative, lets nothing through.
+double usable_limit(double limit) noexcept {
+  return limit > 0.0 ? limit : 0.0;
+}
+
+// `v` no longer than `limit`; `cut` says whether it was. The length is taken of the vector divided by its
+// largest component, so that no command is large or small enough to overflow or vanish in a square. A cut
+// vector is made shorter by 5 ulp, because rounding must not put it above the limit.
+glm::dvec3 no_longer_than(const glm::dvec3& v, double limit, bool& cut) noexcept {
+  const double largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+  cut = false;
+  if (largest <= 0.0) return v;
+  const glm::dvec3 scaled = v / largest;
+  const double scaled_length = glm::length(scaled);
+  if (largest * scaled_length <= limit) return v;
+  cut = true;
+  return scaled * (limit / scaled_length * (1.0 - 1e-15));
+}
+
+}  // namespace
+
+glm::dvec3 limit_force(const ForceLimits& limits, ForceLimitState& state, const glm::dvec3& command_N,
+                       double dt_s) noexcept {
+  const double dt = std::isfinite(dt_s) && dt_s > 0.0 ? dt_s : 0.0;
+  const double fade = limits.soft_start_s > 0.0 ? std::min(1.0, state.elapsed_s / limits.soft_start_s) : 1.0;
+  state.elapsed_s += dt;
+
+  // Caught first: what is not finite must not reach the slew's memory. The motor is let go at once; the way
+  // back is slewed from zero.
+  if (!finite(command_N)) {
+    ++state.nonfinite;
+    state.last_N = glm::dvec3(0.0);
+    return state.last_N;
+  }
+
+  bool cut = false;
+  const glm::dvec3 wanted = command_N * fade;
+  const glm::dvec3 step =
+      no_longer_than(wanted - state.last_N, usable_limit(limits.max_slew_N_per_s) * dt, cut);
+  // Not slewed: the command itself, and not last + (command - last), which rounds.
+  glm::dvec3 force = cut ? state.last_N + step : wanted;
+  if (cut) ++state.slewed;
+
+  force = no_longer_than(force, usable_limit(limits.max_force_N), cut);
+  if (cut) ++state.clamped;
+
+  if (!finite(force))
+    force = glm::dvec3(0.0);  // two finite commands whose difference is not, with no clamp set
+  state.last_N = force;
+  return force;
+}
+
+}  // namespace device

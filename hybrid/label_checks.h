@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the functions of label_surface.h refuse alike.
+#pragma once
+
+#include <cmath>
+#include <sstream>
+#include <stdexcept>
+
+#include "voxel/volume.h"
+
+namespace hybrid {
+
+// Throws std::invalid_argument with the parts, one after another, as its text.
+template <typename... Parts>
+[[noreturn]] void refuse(const Parts&... parts) {
+  std::ostringstream text;
+  text.precision(9);
+  (text << ... << parts);
+  throw std::invalid_argument(text.str());
+}
+
+inline void check_volume(const voxel::LabelVolume& volume) {
+  const auto& n = volume.dims;
+  const bool negative = n[0] < 0 || n[1] < 0 || n[2] < 0;
+  const double expected = static_cast<double>(n[0]) * n[1] * n[2];
+  if (negative || static_cast<double>(volume.labels.size()) != expected) {
+    refuse("a volume of ", n[0], " x ", n[1], " x ", n[2], " voxels holds ", volume.labels.size(),
+           " labels; build it with as many labels as voxels");
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!(std::isfinite(volume.spacing_m[axis]) && volume.spacing_m[axis] > 0.0)) {
+      refuse("a volume's spacing is ", volume.spacing_m[axis], " m along axis ", axis,
+             "; it must be above 0");
+    }
+  }
+}
+
+}  // namespace hybrid

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The colours of pictures, window and legend, chosen once so that all three agree. Hue tells the object,
+// lightness tells it too, so that a colour-blind reader does not lose it (after Okabe & Ito 2008).
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <glm/common.hpp>
+#include <glm/vec3.hpp>
+
+#include "hybrid/snapshot.h"
+
+namespace hybrid::palette {
+
+// sRGB, 0 to 1.
+inline constexpr glm::vec3 background{0.945F, 0.953F, 0.962F};
+inline constexpr glm::vec3 tool{0.13F, 0.17F, 0.24F};
+inline constexpr glm::vec3 device{0.10F, 0.45F, 0.85F};
+inline constexpr glm::vec3 force{0.03F, 0.38F, 0.93F};
+// Displacement runs from the object's own colour over these two.
+inline constexpr glm::vec3 moved_half{1.00F, 0.84F, 0.25F};
+inline constexpr glm::vec3 moved_most{0.78F, 0.08F, 0.16F};
+
+inline constexpr std::array<glm::vec3, 4> rigid{
+    {{0.89F, 0.84F, 0.72F}, {0.78F, 0.77F, 0.74F}, {0.80F, 0.71F, 0.55F}, {0.66F, 0.68F, 0.72F}}};
+inline constexpr std::array<glm::vec3, 6> soft{{{0.86F, 0.58F, 0.62F},
+                                                {0.30F, 0.66F, 0.62F},
+                                                {0.58F, 0.53F, 0.82F},
+                                                {0.52F, 0.72F, 0.36F},
+                                                {0.36F, 0.62F, 0.85F},
+                                                {0.75F, 0.48F, 0.72F}}};
+
+// Colour of object `index`: the n-th rigid (or soft) object has the n-th colour of its kind.
+inline glm::vec3 of_object(const DrawnScene& scene, std::size_t index) {
+  std::size_t rank = 0;
+  const bool is_soft = scene.objects[index].soft;
+  for (std::size_t i = 0; i < index; ++i) rank += scene.objects[i].soft == is_soft ? 1U : 0U;
+  return is_soft ? soft[rank % soft.size()] : rigid[rank % rigid.size()];
+}
+
+// Colour of a point that moved by `share` (0 to 1) of the scale's end, on an object of colour `own`. The
+// renderer's shader computes the same.
+inline glm::vec3 of_displacement(const glm::vec3& own, float share) {
+  const float t = share < 0.0F ? 0.0F : (share > 1.0F ? 1.0F : share);
+  return t < 0.5F ? glm::mix(own, moved_half, t * 2.0F) : glm::mix(moved_half, moved_most, t * 2.0F - 1.0F);
+}
+
+}  // namespace hybrid::palette

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A scene as a person wrote it, converted to SI once, on load. Every default of the schema stands here, and
+// nowhere else; scenes/README.md describes the same keys in words.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/vec3.hpp>
+#include <map>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "device/force_limit.h"
+#include "device/path.h"
+#include "device/simulated.h"
+#include "voxel/formula.h"
+#include "voxel/volume_file.h"
+
+namespace hybrid {
+
+// Where in the scene file something was said (1-based; line 0: it was not said, a default holds).
+struct SourcePlace {
+  std::uint32_t line = 0, column = 0;
+};
+
+// A scene that is refused: "file:line:column: what is wrong; what to do".
+class SceneError : public std::runtime_error {
+ public:
+  SceneError(const std::filesystem::path& file, SourcePlace place, const std::string& what_and_remedy);
+};
+
+struct Pose {  // body frame to scene frame
+  glm::dvec3 position_m{0.0};
+  glm::dquat rotation{1.0, 0.0, 0.0, 0.0};
+};
+
+struct Material {
+  double young_Pa = 5e3;      // > 0
+  double poisson = 0.3;       // 0 <= ν < 0.5
+  double stretch_min = 0.4;   // shortest a link may become, of its rest length; 0 < min <= 1
+  double stretch_max = 1.6;   // longest, >= 1
+  double shear = 0.6;         // most a link's ends may slip across it, of its rest length; >= 0
+  SourcePlace place;
+};
+
+// ---- rigid -------------------------------------------------------------------------------------------------
+struct MeshSource {
+  std::filesystem::path file;  // resolved against the scene's folder
+  double unit_m = 1.0;         // length unit of the file; default: the scene's unit
+  bool repair = false;
+};
+struct BallPrimitive { double radius_m = 0.0; };
+struct BoxPrimitive { glm::dvec3 size_m{0.0}; };
+struct PlanePrimitive { double size_m = 0.0; };  // edge of the square sheet
+struct CapsulePrimitive { double radius_m = 0.0, length_m = 0.0; };  // length between the two centres
+struct CutPlane {  // what lies on the side the normal points to is cut away, in the scene frame
+  glm::dvec3 normal{0.0, 0.0, 1.0};
+  double offset_m = 0.0;
+};
+// The surface of some labels (or an intensity range) of a volume, as a mesh. With `cuts` it is an open sheet.
+struct VolumeSurfaceSource {
+  std::filesystem::path file;
+  std::vector<voxel::LabelRule> rules;   // which voxels are inside
+  std::optional<double> spacing_m;
+  double grow_m = 0.0;                   // the surface is moved outward by this much
+  int smooth = 10;                       // smoothing passes
+  bool largest = true;                   // keep only the largest connected piece, and fill its cavities
+  std::vector<CutPlane> cuts;
+  double unit_m = 1e-3;                  // length unit of the file (medical formats: mm)
+};
+using RigidSource = std::variant<MeshSource, BallPrimitive, BoxPrimitive, PlanePrimitive, CapsulePrimitive,
+                                 VolumeSurfaceSource>;
+struct RigidDescription {
+  std::string name;
+  RigidSource source;
+  Pose pose;
+  SourcePlace place;         // of the table
+  SourcePlace source_place;  // of the key that names the source
+};
+
+// ---- soft --------------------------------------------------------------------------------------------------
+struct VolumeSource {
+  std::filesystem::path file;
+  std::vector<voxel::LabelRule> rules;
+  std::optional<glm::dvec3> spacing_m;
+  bool largest = true;   // keep only the largest connected piece
+  double unit_m = 1e-3;  // length unit of the file (medical formats: mm)
+};
+struct ClosedMeshSource {
+  MeshSource mesh;
+  glm::dvec3 spacing_m{0.0};
+};
+using SoftSource = std::variant<VolumeSource, ClosedMeshSource, voxel::Formula>;
+
+struct Anchors {
+  // Any of "-x" "+x" "-y" "+y" "-z" "+z": the outermost layer of voxels on that side of the object's own lattice.
+  std::vector<std::string> faces{"-z"};
+  std::vector<std::uint8_t> labels;
+  double rigid_within_m = 0.0;  // voxels this near to a rigid surface are held by it; 0: none
+};
+struct SoftDescription {
+  std::string name;
+  SoftSource source;
+  Pose pose;  // applied after the volume's own frame
+  std::map<std::uint8_t, std::string> materials;  // label to material name; label absent: `material`
+  std::string material;                           // name; empty: the default Material
+  Anchors anchors;
+  std::uint32_t budget = 60'000;  // voxel updates of background relaxation a tick
+  SourcePlace place, source_place;
+};
+
+// ---- the rest ----------------------------------------------------------------------------------------------
+struct Tool {
+  enum class Shape : std::uint8_t { ball, punch } shape = Shape::ball;
+  double radius_m = 2e-3;
+  double stiffness_N_per_m = 1000.0;  // of the virtual coupling
+};
+
+enum class Overlap : std::uint8_t { carve, refuse };
+
+struct Scene {
+  std::filesystem::path file;
+  std::string title;
+  double unit_m = 1e-3;                  // length unit of the file's numbers
+  std::optional<double> occupancy_cell_m;  // default: chosen from the soft spacing, the rigid size and the tool
+  Overlap overlap = Overlap::carve;
+  std::vector<RigidDescription> rigid;
+  std::vector<SoftDescription> soft;
+  std::map<std::string, Material> materials;
+  Tool tool;
+  device::DeviceModel device_model = device::DeviceModel::premium_1_5;
+  double rate_hz = 1000.0;
+  device::HandModel hand;
+  device::PathDescription path;
+  SourcePlace path_place;
+  device::ForceLimits safety;
+  bool max_force_given = false;  // else the device's own limit holds
+};
+
+// The largest lattice that a soft object may have on this machine: what building it takes for each voxel of the
+// bounding box (labels, surface, the copies made on the way), within the physical memory.
+inline constexpr std::size_t lattice_bytes_per_voxel = 16;
+std::size_t max_lattice_voxels();
+
+// Reads and checks a scene file. Nothing outside the file is opened except to see that it exists.
+// Throws SceneError.
+Scene load_scene(const std::filesystem::path& file);
+
+}  // namespace hybrid

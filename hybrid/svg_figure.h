@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Figures as SVG: panels stacked under each other, those of a group with one x axis. Values that are not
+// finite leave a gap; names may contain anything. A file stays below 300 kB however many samples it was made
+// from.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace hybrid {
+
+struct Series {
+  std::string name;  // empty: not in the legend
+  std::vector<double> x, y;
+  std::string colour = "#000000";
+  double width = 1.5;  // (pixels)
+  bool dashed = false;
+};
+
+// Filled between two curves over the same x, which never falls.
+struct Area {
+  std::string name;
+  std::vector<double> x, low, high;
+  std::string colour = "#cccccc";
+};
+
+// Shaded stretches of the x axis.
+struct Bands {
+  std::string name;
+  std::vector<std::pair<double, double>> intervals;  // from, to; in order
+  std::string colour = "#eeeeee";
+};
+
+struct ReferenceLine {
+  double y = 0.0;
+  std::string label;
+  std::string colour = "#666666";
+};
+
+// A row of bars, with its name on the left and a note on the right.
+struct Lane {
+  std::string name, note;
+  std::vector<std::pair<double, double>> intervals;  // from, to; in order
+  std::string colour = "#000000";
+};
+
+struct Panel {
+  std::string title;
+  std::string y_label;     // with its unit
+  double height = 200.0;   // (pixels); with lanes: as many as they need
+  bool from_zero = false;  // the y axis contains 0
+  std::vector<Bands> bands;
+  std::vector<Area> areas;
+  std::vector<Series> series;
+  std::vector<ReferenceLine> lines;
+  std::vector<Lane> lanes;  // then nothing else is drawn but bands
+};
+
+struct PanelGroup {
+  std::string x_label;  // with its unit
+  std::vector<Panel> panels;
+};
+
+struct Figure {
+  std::string title;
+  std::vector<std::string> notes;  // lines below the title
+  std::vector<PanelGroup> groups;
+  double width = 960.0;  // (pixels)
+};
+
+// Colours that stay apart for colour-blind readers (Okabe & Ito 2008), on white; repeats after seven.
+std::string series_colour(std::size_t index);
+
+std::string to_svg(const Figure& figure);
+
+// Throws std::runtime_error: file not writable, disk full.
+void save_svg(const std::filesystem::path& file, const Figure& figure);
+
+// Round numbers (1, 2, 5 · 10^n apart) within [from, to], about `wanted` of them. At most 64.
+std::vector<double> nice_ticks(double from, double to, int wanted);
+
+// A tick's number, with as many decimals as its neighbours' distance needs.
+std::string tick_text(double value, double step);
+
+}  // namespace hybrid

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a rigid object tells the proxy about itself near a point: half-spaces that are safe to move in.
+//
+// For the closest point c of a *convex* element (a triangle, a ball, a box) to the ball's centre p, the
+// half-space {q : n·(q − c) ≥ r}, n = (p − c)/|p − c|, contains no point nearer to the element than r: a
+// straight step inside the intersection of such half-spaces never touches any element that was gathered. An
+// element that was not gathered is further than the gather radius, so a step shorter than
+// (gather radius − r) cannot reach it either. That is why the sweep cannot tunnel.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <span>
+
+namespace polygon {
+
+// Closest point of one convex element of an object, seen from a query point, both in the body frame.
+struct NearPoint {
+  glm::dvec3 point{0.0};      // (unit: meter)
+  double distance = 0.0;      // from the query point, >= 0 (unit: meter)
+  std::uint32_t element = 0;  // triangle index; 0 for a primitive
+};
+
+struct GatherResult {
+  std::uint32_t count = 0;  // entries written to the output, sorted by element
+  bool complete = true;     // false: the output was too small; ask again with a smaller radius
+};
+
+// An object that can be asked which of its elements lie within a radius. Queries are const, take no
+// lock, allocate nothing and never throw.
+class RigidSurface {
+ public:
+  RigidSurface() = default;
+  RigidSurface(const RigidSurface&) = delete;
+  RigidSurface& operator=(const RigidSurface&) = delete;
+  RigidSurface(RigidSurface&&) = delete;
+  RigidSurface& operator=(RigidSurface&&) = delete;
+  virtual ~RigidSurface() = default;
+
+  // Every element whose distance to `point` (body frame) is at most `radius` (unit: meter).
+  [[nodiscard]] virtual GatherResult gather(const glm::dvec3& point, double radius,
+                                            std::span<NearPoint> out) const noexcept = 0;
+
+  // The nearest element within `radius`; false when there is none.
+  [[nodiscard]] virtual bool nearest(const glm::dvec3& point, double radius,
+                                     NearPoint& out) const noexcept = 0;
+
+  // Is the point inside the solid? Always false for an open sheet.
+  [[nodiscard]] virtual bool inside(const glm::dvec3& point) const noexcept = 0;
+
+  // Body-frame bounds (unit: meter).
+  [[nodiscard]] virtual glm::dvec3 lower() const noexcept = 0;
+  [[nodiscard]] virtual glm::dvec3 upper() const noexcept = 0;
+
+  [[nodiscard]] virtual std::size_t memory_bytes() const noexcept = 0;
+};
+
+}  // namespace polygon

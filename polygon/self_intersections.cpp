@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "polygon/self_intersections.h"
+
+#include <CGAL/Box_intersection_d/Box_with_info_d.h>
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/box_intersection_d.h>
+
+#include <algorithm>
+#include <array>
+#include <utility>
+#include <vector>
+
+namespace polygon {
+namespace {
+
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using Point = Kernel::Point_3;
+using Box = CGAL::Box_intersection_d::Box_with_info_d<double, 3, std::uint32_t>;
+
+class PairTest {
+ public:
+  PairTest(std::span<const glm::dvec3> points, std::span<const TriangleIndices> triangles)
+      : points_(points), triangles_(triangles) {}
+
+  [[nodiscard]] bool intersect(std::uint32_t first, std::uint32_t second) const {
+    // Shared corners to the front of both, in the same order.
+    TriangleIndices a = triangles_[first];
+    TriangleIndices b = triangles_[second];
+    std::size_t shared = 0;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto found = std::find(b.begin() + static_cast<std::ptrdiff_t>(shared), b.end(), a[i]);
+      if (found == b.end()) continue;
+      std::swap(a[shared], a[i]);
+      std::iter_swap(b.begin() + static_cast<std::ptrdiff_t>(shared), found);
+      ++shared;
+    }
+    switch (shared) {
+      case 0:
+        return CGAL::do_intersect(triangle(a), triangle(b));
+      case 1:
+        return CGAL::do_intersect(triangle(a), Kernel::Segment_3(point(b[1]), point(b[2]))) ||
+               CGAL::do_intersect(triangle(b), Kernel::Segment_3(point(a[1]), point(a[2])));
+      case 2:
+        return CGAL::coplanar(point(a[0]), point(a[1]), point(a[2]), point(b[2])) &&
+               CGAL::coplanar_orientation(point(a[0]), point(a[1]), point(a[2]), point(b[2])) ==
+                   CGAL::POSITIVE;
+      default:
+        return false;
+    }
+  }
+
+ private:
+  [[nodiscard]] Point point(std::uint32_t i) const { return {points_[i].x, points_[i].y, points_[i].z}; }
+  [[nodiscard]] Kernel::Triangle_3 triangle(const TriangleIndices& t) const {
+    return {point(t[0]), point(t[1]), point(t[2])};
+  }
+
+  std::span<const glm::dvec3> points_;
+  std::span<const TriangleIndices> triangles_;
+};
+
+}  // namespace
+
+SelfIntersections find_self_intersections(std::span<const glm::dvec3> points,
+                                          std::span<const TriangleIndices> triangles) {
+  std::vector<Box> boxes;
+  boxes.reserve(triangles.size());
+  for (std::uint32_t i = 0; i < triangles.size(); ++i) {
+    CGAL::Bbox_3 bounds;
+    for (const std::uint32_t corner : triangles[i]) {
+      const glm::dvec3& p = points[corner];
+      bounds += CGAL::Bbox_3(p.x, p.y, p.z, p.x, p.y, p.z);
+    }
+    boxes.emplace_back(bounds, i);
+  }
+  const PairTest test(points, triangles);
+  SelfIntersections result;
+  CGAL::box_self_intersection_d(boxes.begin(), boxes.end(), [&](const Box& x, const Box& y) {
+    const auto [first, second] = std::minmax({x.info(), y.info()});
+    if (!test.intersect(first, second)) return;
+    // The lowest pair, so that the order of CGAL's search does not show.
+    if (result.pairs++ == 0 || std::pair(first, second) < std::pair(result.first, result.second)) {
+      result.first = first;
+      result.second = second;
+    }
+  });
+  return result;
+}
+
+}  // namespace polygon

@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Reads the source tree and holds the rules that keep its parts apart. A rule that is broken names file and
+// line.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <regex>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::array kParts{"polygon", "voxel", "device", "hybrid"};
+constexpr std::array kFolders{"polygon", "voxel", "device", "hybrid", "scenes", "tests"};
+
+struct SourceFile {
+  std::string path;  // from the root, with '/'
+  std::vector<std::string> lines;
+};
+
+std::vector<std::string> lines_of(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  return lines;
+}
+
+bool is_header(const SourceFile& file) {
+  return file.path.ends_with(".h") || file.path.ends_with(".hpp");
+}
+bool is_cpp(const SourceFile& file) {
+  return is_header(file) || file.path.ends_with(".cpp");
+}
+bool is_in(const SourceFile& file, std::string_view folder) {
+  return file.path.starts_with(std::string(folder).append("/"));
+}
+
+// Everything a person wrote: sources, build files, scripts, scenes and documents. Data are left out.
+bool is_text(const fs::path& file) {
+  static const std::set<std::string> kEndings{".cpp",  ".h",   ".hpp",  ".cmake", ".sh",  ".md",
+                                              ".toml", ".txt", ".json", ".yml",   ".yaml"};
+  const fs::path folder = file.parent_path().filename();
+  return kEndings.contains(file.extension().string()) || folder == ".ci" || file.filename() == ".clang-tidy";
+}
+
+std::vector<SourceFile> read_tree() {
+  const fs::path root = HYBRID_SOURCE_DIR;
+  std::vector<SourceFile> files;
+  const auto add = [&](const fs::directory_entry& entry) {
+    if (!entry.is_regular_file() || !is_text(entry.path())) return;
+    files.push_back({entry.path().lexically_relative(root).generic_string(), lines_of(entry.path())});
+  };
+  for (const fs::directory_entry& entry : fs::directory_iterator(root)) add(entry);
+  for (const char* folder : {"polygon", "voxel", "device", "hybrid", "scenes", "tests", "cmake", ".ci"}) {
+    if (!fs::is_directory(root / folder)) continue;
+    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(root / folder)) add(entry);
+  }
+  std::sort(files.begin(), files.end(), [](const auto& a, const auto& b) { return a.path < b.path; });
+  return files;
+}
+
+const std::vector<SourceFile>& tree() {
+  static const std::vector<SourceFile> files = read_tree();
+  return files;
+}
+
+std::string place(const SourceFile& file, std::size_t line) {
+  return file.path + ":" + std::to_string(line + 1) + ": ";
+}
+
+// Calls found(file, line index, what is included) for each #include.
+template <typename Found>
+void for_each_include(const Found& found) {
+  static const std::regex kInclude(R"re(^\s*#\s*include\s*[<"]([^>"]+)[>"])re");
+  for (const SourceFile& file : tree()) {
+    if (!is_cpp(file)) continue;
+    for (std::size_t i = 0; i < file.lines.size(); ++i) {
+      std::smatch match;
+      if (std::regex_search(file.lines[i], match, kInclude)) found(file, i, match[1].str());
+    }
+  }
+}
+
+TEST(HouseRules, TheTreeIsThere) {
+  for (const char* part : kParts) {
+    const bool some = std::any_of(tree().begin(), tree().end(),
+                                  [&](const auto& file) { return is_in(file, part) && is_cpp(file); });
+    EXPECT_TRUE(some) << "no sources in " << HYBRID_SOURCE_DIR << "/" << part;
+  }
+}
+
+TEST(HouseRules, PolygonVoxelAndDeviceKnowNothingOfOneAnotherNorOfHybrid) {
+  for_each_include([](const SourceFile& file, std::size_t line, const std::string& included) {
+    for (const char* part : {"polygon", "voxel", "device"}) {
+      if (!is_in(file, part)) continue;
+      for (const char* other : kParts) {
+        if (std::string_view(other) == part) continue;
+        EXPECT_FALSE(included.starts_with(std::string(other).append("/")))
+            << place(file, line) << part << "/ includes " << included
+            << ": what needs both belongs in hybrid/";
+      }
+      EXPECT_EQ(included.find("../"), std::string::npos)
+          << place(file, line) << included << ": name a header by its folder, as in \"" << part
+          << "/name.h\"";
+    }
+  });
+}
+
+TEST(HouseRules, NothingButTestsIncludesHybridFromOutside) {
+  for_each_include([](const SourceFile& file, std::size_t line, const std::string& included) {
+    if (!included.starts_with("hybrid/")) return;
+    EXPECT_TRUE(is_in(file, "hybrid") || is_in(file, "tests"))
+        << place(file, line) << "includes " << included;
+  });
+}
+
+TEST(HouseRules, NoPartIncludesATest) {
+  for_each_include([](const SourceFile& file, std::size_t line, const std::string& included) {
+    if (!included.starts_with("tests/")) return;
+    EXPECT_TRUE(is_in(file, "tests")) << place(file, line) << "includes " << included;
+  });
+}
+
+// A library that is seen in two files can be replaced; one that is seen in a header is everywhere.
+TEST(HouseRules, HeavyLibrariesStayInTwoFilesAndOutOfHeaders) {
+  const std::array<const char*, 7> kHeavy{"CGAL/", "embree3/", "OpenMesh/", "itk",
+                                          "GLFW/", "imgui",    "epoxy/"};
+  std::map<std::string, std::set<std::string>> users;
+  for_each_include([&](const SourceFile& file, std::size_t line, const std::string& included) {
+    for (const char* library : kHeavy) {
+      if (!included.starts_with(library)) continue;
+      EXPECT_FALSE(is_header(file)) << place(file, line) << "a header includes " << included
+                                    << ": keep it in the .cpp, behind the part's own types";
+      if (!is_in(file, "tests")) users[library].insert(file.path);
+    }
+  });
+  for (const auto& [library, files] : users) {
+    std::string list;
+    for (const std::string& file : files) list += "\n  " + file;
+    EXPECT_LE(files.size(), 2U) << library << " is included in more than two files:" << list;
+  }
+}
+
+TEST(HouseRules, EverySourceFileNamesItsLicence) {
+  constexpr std::string_view kLine = "SPDX-License-Identifier: GPL-3.0-or-later";
+  for (const SourceFile& file : tree()) {
+    const fs::path path = file.path;
+    const bool source = is_cpp(file) || path.extension() == ".cmake" || path.extension() == ".sh" ||
+                        path.filename() == "CMakeLists.txt" || path.parent_path() == ".ci";
+    if (!source) continue;
+    bool found = false;
+    for (std::size_t i = 0; i < std::min<std::size_t>(3, file.lines.size()); ++i) {
+      found = found || file.lines[i].find(kLine) != std::string::npos;
+    }
+    EXPECT_TRUE(found) << file.path << ":1: must begin with '" << kLine << "' in a comment";
+  }
+}
+
+TEST(HouseRules, NoTextNamesAPlaceOnSomeonesMachine) {
+  // Put together from halves, so that this file does not name them either.
+  const std::array<std::string, 3> kForbidden{
+      std::string("/wo").append("rk/"), std::string("/ho").append("me/"), std::string("/Use").append("rs/")};
+  for (const SourceFile& file : tree()) {
+    for (std::size_t i = 0; i < file.lines.size(); ++i) {
+      for (const std::string& word : kForbidden) {
+        EXPECT_EQ(file.lines[i].find(word), std::string::npos)
+            << place(file, i) << "names " << word << ": use a path from the project's root";
+      }
+    }
+  }
+}
+
+TEST(HouseRules, EveryFolderExplainsItself) {
+  for (const char* folder : kFolders) {
+    const fs::path readme = fs::path(HYBRID_SOURCE_DIR) / folder / "README.md";
+    EXPECT_TRUE(fs::is_regular_file(readme)) << folder << "/README.md is missing";
+  }
+}
+
+TEST(HouseRules, EverySceneBeginsWithWhatItShows) {
+  for (const SourceFile& file : tree()) {
+    if (!is_in(file, "scenes") || !file.path.ends_with(".toml")) continue;
+    EXPECT_TRUE(!file.lines.empty() && file.lines.front().starts_with("#"))
+        << file.path << ":1: must begin with a comment that says what the scene shows";
+  }
+}
+
+}  // namespace

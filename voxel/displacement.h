@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The moving half of a soft object: how far each voxel is from rest, and who is responsible for moving it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <vector>
+
+#include "voxel/lattice.h"
+
+namespace voxel {
+
+// Displacement, not position: at coordinate 100 a float position has lost the slack of the chain to rounding,
+// a displacement near zero has not.
+struct Displacement {
+  enum Role : std::uint8_t {
+    free = 0,
+    held = 1,      // near the tool or another soft object: moved by the contact solver only
+    obstacle = 2,  // near a rigid surface: also subject to n·u >= c
+  };
+
+  explicit Displacement(const Lattice& lattice)
+      : role(lattice.size(), free), row_roles(lattice.springs().row.size(), 0) {
+    for (auto& axis : u) axis.assign(lattice.size(), 0.0F);
+  }
+
+  std::array<std::vector<float>, 3> u;      // [axis][v] (unit: meter)
+  std::vector<std::uint8_t> role;           // [v]
+  std::vector<std::uint16_t> row_roles;     // [row]: voxels of the row whose role is not free
+
+  [[nodiscard]] glm::dvec3 at(VoxelId v) const { return {u[0][v], u[1][v], u[2][v]}; }
+  void set(VoxelId v, const glm::dvec3& value) {
+    for (int a = 0; a < 3; ++a) u[static_cast<std::size_t>(a)][v] = static_cast<float>(value[a]);
+  }
+  void set_role(VoxelId v, Role r, const Lattice& lattice) {
+    const std::size_t row = v / static_cast<std::size_t>(lattice.springs().dims[0]);
+    if (role[v] == free && r != free) ++row_roles[row];
+    if (role[v] != free && r == free) --row_roles[row];
+    role[v] = r;
+  }
+};
+
+// A half-space that one surface voxel may not leave: normal · u >= bound, u its displacement.
+struct Obstacle {
+  glm::vec3 normal{0.0F};
+  float bound = 0.0F;  // (unit: meter), <= 0 where the voxel is clear of it at rest
+};
+
+}  // namespace voxel

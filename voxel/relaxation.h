@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Relaxation of the six-link energy towards its equilibrium, under chain limits, anchors and obstacles.
+//
+// Per axis the energy is ½ Σ k (u(b) − u(a))² over the links: an anisotropic Laplace problem. One cycle is a multigrid V(1,1)
+// cycle (Briggs, Henson & McCormick, A Multigrid Tutorial, chapters 3 and 10): zebra sweeps over rows, residuals summed into cells of
+// 2×2×2, correction interpolated back trilinearly. The cycle is cut into planes, so that a tick does as many voxel
+// updates as its budget says and goes on where it stopped: counted work, never measured time.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "voxel/displacement.h"
+#include "voxel/lattice.h"
+
+namespace voxel {
+
+struct ObstacleView {
+  std::span<const Obstacle> obstacles;               // by surface number
+  std::span<const std::uint32_t> surface_number;     // [v]
+};
+
+// Moves voxels first..last (not included) of one row to the minimum of their energy given all other rows, without leaving their limits.
+// Within the row the update is simultaneous where no limit is near (so it vectorises, and lowers the energy all the same:
+// 2D − A is diagonally dominant on a row), one by one otherwise. Held voxels stay.
+void relax_row(const Lattice& lattice, Displacement& state, const ObstacleView& obstacles, std::size_t row, int first,
+               int last) noexcept;
+
+// Where voxel v would go if only its links pulled, and the interval its links allow it, per axis.
+glm::dvec3 link_minimum(const Lattice& lattice, const Displacement& state, VoxelId v) noexcept;
+glm::dvec3 clamp_to_links(const Lattice& lattice, const Displacement& state, VoxelId v, const glm::dvec3& wanted) noexcept;
+// Force of its links on voxel v (unit: newton).
+glm::dvec3 link_force(const Lattice& lattice, const Displacement& state, VoxelId v) noexcept;
+
+// Adds a correction to one axis of `count` voxels from `begin`, as far as their links allow it. Held and anchored voxels stay.
+void correct_row(const Lattice& lattice, Displacement& state, int axis, std::size_t begin, int count,
+                 const float* correction) noexcept;
+// Brings voxels that a correction pushed into an obstacle back to it, as far as their links allow it.
+void clear_obstacles(const Lattice& lattice, Displacement& state, const ObstacleView& obstacles, std::size_t begin,
+                     int count) noexcept;
+
+class Relaxation {
+ public:
+  explicit Relaxation(const Lattice& lattice);
+
+  // Spends `budget` voxel updates (a little more: planes are not cut), unless the object is at rest. Returns what it spent.
+  std::uint64_t run(Displacement& state, const ObstacleView& obstacles, std::span<const VoxelId> held,
+                    std::uint64_t budget) noexcept;
+
+  // Something moved: relax until the residual is below the tolerance again.
+  void wake() noexcept { asleep_ = false; }
+  [[nodiscard]] bool asleep() const { return asleep_; }
+  // Largest force that any free voxel still feels, as the last whole cycle found it (unit: newton).
+  [[nodiscard]] double residual_N() const { return residual_N_; }
+  // Cycles stop when the residual falls below this (unit: newton).
+  void set_tolerance(double tolerance_N) noexcept { tolerance_N_ = tolerance_N; }
+  [[nodiscard]] std::uint64_t cycles() const { return cycles_; }
+  [[nodiscard]] std::uint64_t cycle_cost() const { return cycle_cost_; }
+  [[nodiscard]] std::size_t memory_bytes() const;
+
+ private:
+  struct Level {  // level 0 stands for the lattice itself and keeps no arrays of its own
+    Springs springs;
+    std::array<std::vector<float>, 3> correction, residual;  // [axis][cell]
+    std::vector<float> filled;                               // [cell] 1 or 0
+    std::vector<std::uint64_t> plane_cost;                   // [plane] voxels in it
+  };
+  enum class Stage : std::uint8_t { smooth, restrict_residual, prolong };
+  struct Step {
+    Stage stage;
+    std::uint8_t level;
+    std::uint8_t colour;
+  };
+  struct HeldCell {
+    std::uint8_t level;
+    VoxelId cell;
+    std::array<float, 3> inverse_diagonal;
+  };
+
+  void build_level(const Springs& fine, const std::vector<float>& fine_filled, const std::vector<std::uint8_t>& fine_fixed,
+                   Level& coarse, std::vector<std::uint8_t>& fixed) const;
+  [[nodiscard]] const Springs& springs(std::size_t level) const {
+    return level == 0 ? lattice_.springs() : levels_[level].springs;
+  }
+  std::uint64_t do_plane(Displacement& state, const ObstacleView& obstacles, const Step& step, int plane) noexcept;
+  void begin_cycle(std::span<const VoxelId> held) noexcept;
+  void end_cycle() noexcept;
+  void smooth_coarse(Level& level, int colour, int plane) noexcept;
+  void restrict_from_lattice(const Displacement& state, int plane) noexcept;
+  void restrict_from_level(std::size_t fine, int plane) noexcept;
+  void prolong_to_lattice(Displacement& state, const ObstacleView& obstacles, int plane) noexcept;
+  void prolong_to_level(std::size_t fine, int plane) noexcept;
+  // Interpolates the correction of `coarse` along one fine row into scratch_.
+  void interpolate_row(const Level& coarse, int axis, int j, int k, int first, int last) noexcept;
+  [[nodiscard]] int planes(const Step& step) const;
+
+  const Lattice& lattice_;
+  std::vector<Level> levels_;
+  std::vector<Step> steps_;
+  std::vector<HeldCell> held_cells_;
+  std::vector<float> scratch_, coarse_value_, coarse_weight_;
+  std::size_t step_ = 0;
+  int plane_ = 1;
+  bool asleep_ = true;
+  double residual_N_ = 0.0, running_residual_N_ = 0.0, tolerance_N_ = 1e-7;
+  std::uint64_t cycles_ = 0, cycle_cost_ = 0;
+};
+
+}  // namespace voxel

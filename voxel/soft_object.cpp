@@ -1,0 +1,404 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "voxel/soft_object.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <limits>
+
+namespace voxel {
+namespace {
+
+constexpr int kNearMargin = 4;              // voxels around the contact that relax_near() works on
+constexpr std::size_t kMaxNear = 20'000;    // and at most this many
+constexpr std::size_t kMaxCarried = 20'000; // voxels that may hang on the pressed ones by tight links
+constexpr double kGiveWay = 0.01;           // of the voxel radius: less is left to the next push
+constexpr float kTight = 1e-4F;             // of the spacing: nearer to its limit than this a link is tight
+
+}  // namespace
+
+SoftObject::SoftObject(std::unique_ptr<const Lattice> lattice)
+    : lattice_(std::move(lattice)),
+      state_(*lattice_),
+      chain_(*lattice_),
+      relaxation_(*lattice_),
+      surface_number_(lattice_->size(), kNoSurface),
+      pair_held_(lattice_->surface().size(), 0),
+      carried_stamp_(lattice_->size(), 0),
+      carried_index_(lattice_->size(), 0) {
+  const auto surface = lattice_->surface();
+  for (std::size_t s = 0; s < surface.size(); ++s) surface_number_[surface[s]] = static_cast<std::uint32_t>(s);
+  touches_.reserve(kMaxTouched);
+  touched_voxels_.reserve(kMaxTouched);
+  sources_.reserve(surface.size());
+  moves_.reserve(surface.size());
+  held_voxels_.reserve(surface.size());
+  background_held_.reserve(surface.size() + kMaxTouched);
+  carried_.reserve(kMaxCarried + kMaxTouched);
+}
+
+double SoftObject::reach(double tool_radius) const {
+  // Half a cell's diagonal plus a little: smaller, and a ball could pass between four voxels of a face.
+  return std::max(tool_radius + voxel_radius(), 0.75 * lattice_->max_spacing_m());
+}
+
+SoftObject::Gap SoftObject::gap(const ToolInBody& tool, const glm::dvec3& position) const noexcept {
+  const glm::dvec3 d = position - tool.centre;
+  if (tool.shape == ToolInBody::Shape::punch) {
+    const double along = glm::dot(d, tool.axis);
+    const double across2 = glm::dot(d, d) - along * along;
+    // Only what lies under the face, and not behind it, is pressed by it.
+    const bool under = across2 <= tool.radius * tool.radius && along > -4.0 * lattice_->max_spacing_m();
+    return {under ? along - voxel_radius() : std::numeric_limits<double>::max(), tool.axis};
+  }
+  const double distance = glm::length(d);
+  // The tool's centre exactly on a voxel: any direction serves; back along the punch axis is one.
+  const glm::dvec3 normal = distance > 0.0 ? d / distance : tool.axis;
+  return {distance - reach(tool.radius), normal};
+}
+
+void SoftObject::touch(std::span<const VoxelId> near) noexcept {
+  ++stamp_;
+  for (const Touch& t : touches_) {
+    if (!t.pressed) continue;
+    carried_stamp_[t.v] = stamp_;
+  }
+  const auto resting_role = [this](VoxelId v) {
+    const std::uint32_t s = surface_number_[v];
+    if (pair_held_[s] != 0) return Displacement::held;
+    return obstacles_.empty() || obstacles_[s].normal == glm::vec3(0.0F) ? Displacement::free : Displacement::obstacle;
+  };
+  for (const VoxelId v : touched_voxels_) state_.set_role(v, resting_role(v), *lattice_);
+  touches_.clear();
+  touched_voxels_.clear();
+  for (const VoxelId v : near) {
+    if (touches_.size() == kMaxTouched) {
+      ++dropped_touches_;
+      break;
+    }
+    touches_.push_back({v, carried_stamp_[v] == stamp_, glm::dvec3(0.0), glm::dvec3(0.0)});
+    touched_voxels_.push_back(v);
+    state_.set_role(v, Displacement::held, *lattice_);
+  }
+}
+
+void SoftObject::settle_chain() noexcept {
+  moved_ever_ = true;
+  relaxation_.wake();
+  chain_.settle(state_, sources_, moves_, obstacles_, surface_number_);
+}
+
+bool SoftObject::push_out(const ToolInBody& tool) noexcept {
+  sources_.clear();
+  moves_.clear();
+  bool any = false;
+  for (Touch& t : touches_) {
+    const Gap g = gap(tool, position(t.v));
+    t.normal = g.normal;
+    if (g.distance >= 0.0) continue;
+    any = true;
+    t.pressed = true;
+    if (lattice_->anchored(t.v)) continue;
+    const glm::dvec3 before = state_.at(t.v);
+    state_.set(t.v, before - g.distance * g.normal);
+    sources_.push_back(t.v);
+    moves_.emplace_back(state_.at(t.v) - before);
+  }
+  if (!sources_.empty()) settle_chain();
+  return any;
+}
+
+void SoftObject::relax_touch(const ToolInBody& tool, Touch& t) noexcept {
+  if (lattice_->anchored(t.v)) return;
+  const glm::dvec3 rest = lattice_->rest(t.v);
+  glm::dvec3 wanted = link_minimum(*lattice_, state_, t.v);
+  Gap g = gap(tool, rest + wanted);
+  t.pressed = g.distance < 0.0;
+  if (t.pressed) {
+    // First along the springs' own metric, so that sliding round the tool is free of friction, then exactly onto it.
+    const auto& inverse = lattice_->springs().inverse_diagonal;
+    const glm::dvec3 w(inverse[0][t.v], inverse[1][t.v], inverse[2][t.v]);
+    const double denominator = glm::dot(g.normal, w * g.normal);
+    if (denominator > 0.0) wanted -= (g.distance / denominator) * w * g.normal;
+    g = gap(tool, rest + wanted);
+    if (g.distance < 0.0) wanted -= g.distance * g.normal;
+    t.normal = g.normal;
+  }
+  if (!obstacles_.empty()) {
+    const Obstacle& o = obstacles_[surface_number_[t.v]];
+    const glm::dvec3 n(o.normal);
+    const double depth = static_cast<double>(o.bound) - glm::dot(n, wanted);
+    if (depth > 0.0 && o.normal != glm::vec3(0.0F)) wanted += depth * n;
+  }
+  state_.set(t.v, clamp_to_links(*lattice_, state_, t.v, wanted));
+}
+
+void SoftObject::relax_near(const ToolInBody& tool, int sweeps) noexcept {
+  std::array<int, 3> low{std::numeric_limits<int>::max(), 0, 0}, high{0, 0, 0};
+  low.fill(std::numeric_limits<int>::max());
+  bool any = false;
+  for (const Touch& t : touches_) {
+    if (!t.pressed) continue;
+    any = true;
+    const auto c = lattice_->coordinates(t.v);
+    for (std::size_t d = 0; d < 3; ++d) {
+      low[d] = std::min(low[d], c[d]);
+      high[d] = std::max(high[d], c[d]);
+    }
+  }
+  if (!any) return;
+  const auto& dims = lattice_->springs().dims;
+  int margin = kNearMargin;
+  std::array<int, 3> from{}, to{};
+  for (; margin > 0; --margin) {
+    std::size_t count = 1;
+    for (std::size_t d = 0; d < 3; ++d) {
+      from[d] = std::max(1, low[d] - margin);
+      to[d] = std::min(dims[d] - 1, high[d] + margin + 1);
+      count *= static_cast<std::size_t>(to[d] - from[d]);
+    }
+    if (count <= kMaxNear) break;
+  }
+  const auto& rows = lattice_->springs().row;
+  for (int n = 0; n < sweeps; ++n) {
+    for (Touch& t : touches_) relax_touch(tool, t);
+    if (margin == 0) continue;  // a contact this wide is left to the background
+    for (int colour = 0; colour < 2; ++colour) {
+      for (int k = from[2]; k < to[2]; ++k) {
+        for (int j = from[1] + ((from[1] + k + colour) & 1); j < to[1]; j += 2) {
+          const std::size_t row = static_cast<std::size_t>(k) * static_cast<std::size_t>(dims[1]) + static_cast<std::size_t>(j);
+          relax_row(*lattice_, state_, obstacle_view(), row, std::max(from[0], rows[row][0]), std::min(to[0], rows[row][1]));
+        }
+      }
+    }
+  }
+  // Last, so that what the tool feels is measured with its voxels where they belong.
+  for (Touch& t : touches_) relax_touch(tool, t);
+}
+
+// What hangs on a pressed voxel by a tight link and pulls it back is felt through it: the multiplier of the chain's
+// limit. Without it the force would saturate as soon as the chain is tight. Per axis, breadth first; each voxel's load
+// goes to the pressed voxel that it was first reached from.
+void SoftObject::gather_load(int axis) noexcept {
+  ++stamp_;
+  carried_.clear();
+  const auto& u = state_.u[static_cast<std::size_t>(axis)];
+  const auto add = [this](VoxelId v, std::uint32_t touch_index) {
+    carried_stamp_[v] = stamp_;
+    carried_index_[v] = touch_index;
+    carried_.push_back({v, touch_index});
+  };
+  for (std::size_t i = 0; i < touches_.size(); ++i) {
+    if (touches_[i].pressed && !lattice_->anchored(touches_[i].v)) add(touches_[i].v, static_cast<std::uint32_t>(i));
+  }
+  for (std::size_t head = 0; head < carried_.size() && carried_.size() < kMaxCarried; ++head) {
+    const Carried c = carried_[head];
+    for (int d = 0; d < 3; ++d) {
+      const auto step = static_cast<VoxelId>(lattice_->stride(d));
+      const float tight = kTight * static_cast<float>(lattice_->spacing_m()[d]);
+      for (const bool up : {false, true}) {
+        const VoxelId w = up ? c.v + step : c.v - step;
+        if (!lattice_->filled(w) || lattice_->anchored(w) || carried_stamp_[w] == stamp_) continue;
+        auto b = lattice_->bounds(up ? c.v : w, d, axis);
+        if (!up) b = {-b[1], -b[0]};  // of u(w) − u(v), whichever way the link points
+        const float difference = u[w] - u[c.v];
+        const bool pushed_up = difference <= b[0] + tight, pushed_down = difference >= b[1] - tight;
+        if (!pushed_up && !pushed_down) continue;
+        const double pull = link_force(*lattice_, state_, w)[axis];
+        if (!((pushed_up && pull < 0.0) || (pushed_down && pull > 0.0))) continue;
+        touches_[c.touch].load[axis] += pull;
+        add(w, c.touch);
+      }
+    }
+  }
+}
+
+void SoftObject::add_stiffness(int axis, glm::dmat3& stiffness) const noexcept {
+  // A carried voxel moves by q = n_a·n per unit of tool motion, n its touch's normal; what a link stores then is
+  // ½ k (q_v·δ − q_w·δ)².
+  const auto along = [&](VoxelId v) {
+    if (carried_stamp_[v] != stamp_) return glm::dvec3(0.0);
+    const glm::dvec3& n = touches_[carried_index_[v]].normal;
+    return n[axis] * n;
+  };
+  for (const Carried& c : carried_) {
+    const glm::dvec3 q = along(c.v);
+    for (int d = 0; d < 3; ++d) {
+      const float* k = lattice_->springs().stiffness(axis, d);
+      const auto step = static_cast<VoxelId>(lattice_->stride(d));
+      for (const bool up : {false, true}) {
+        const VoxelId w = up ? c.v + step : c.v - step;
+        const double stiff = static_cast<double>(up ? k[c.v] : k[w]);
+        if (stiff == 0.0) continue;
+        const glm::dvec3 r = q - along(w);
+        const double share = carried_stamp_[w] == stamp_ ? 0.5 : 1.0;  // an inner link is met from both its ends
+        stiffness += share * stiff * glm::outerProduct(r, r);
+      }
+    }
+  }
+}
+
+Reaction SoftObject::reaction(const ToolInBody& tool) noexcept {
+  Reaction result;
+  for (Touch& t : touches_) {
+    t.normal = gap(tool, position(t.v)).normal;
+    t.load = t.pressed ? link_force(*lattice_, state_, t.v) : glm::dvec3(0.0);
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    gather_load(axis);
+    add_stiffness(axis, result.stiffness_N_per_m);
+  }
+  for (Touch& t : touches_) {
+    if (!t.pressed) continue;
+    // Frictionless: the tool feels what the voxel presses along the normal; what pulls is no contact.
+    const double load = glm::dot(t.load, t.normal);
+    if (load >= 0.0) continue;
+    result.force_N += load * t.normal;
+    ++result.pressed;
+  }
+  return result;
+}
+
+void SoftObject::follow(const glm::dvec3& delta) noexcept {
+  sources_.clear();
+  moves_.clear();
+  for (const Touch& t : touches_) {
+    if (!t.pressed || lattice_->anchored(t.v)) continue;
+    const glm::dvec3 before = state_.at(t.v);
+    state_.set(t.v, before + glm::dot(delta, t.normal) * t.normal);
+    sources_.push_back(t.v);
+    moves_.emplace_back(state_.at(t.v) - before);
+  }
+  if (!sources_.empty()) settle_chain();
+}
+
+std::size_t SoftObject::give_way(const ToolInBody& tool, std::span<ToolBound> out) const noexcept {
+  std::size_t count = 0;
+  for (const Touch& t : touches_) {
+    if (count == out.size()) break;
+    const glm::dvec3 p = position(t.v);
+    const Gap g = gap(tool, p);
+    if (g.distance >= -kGiveWay * voxel_radius()) continue;
+    const double away = tool.shape == ToolInBody::Shape::punch ? voxel_radius() : reach(tool.radius);
+    out[count++] = {-g.normal, glm::dot(-g.normal, p) + away};
+  }
+  return count;
+}
+
+std::uint64_t SoftObject::relax_background(std::uint64_t budget) noexcept {
+  if (relaxation_.asleep()) return 0;
+  background_held_.clear();
+  for (const Touch& t : touches_) {
+    if (t.pressed) background_held_.push_back(t.v);
+  }
+  for (const VoxelId v : held_voxels_) background_held_.push_back(v);
+  return relaxation_.run(state_, obstacle_view(), background_held_, budget);
+}
+
+void SoftObject::set_obstacle(std::size_t surface_number, const Obstacle& obstacle) noexcept {
+  const VoxelId v = lattice_->surface()[surface_number];
+  obstacles_[surface_number] = obstacle;
+  if (state_.role[v] == Displacement::held || lattice_->anchored(v)) return;
+  state_.set_role(v, obstacle.normal == glm::vec3(0.0F) ? Displacement::free : Displacement::obstacle, *lattice_);
+}
+
+void SoftObject::reserve_obstacles() { obstacles_.resize(lattice_->surface().size()); }
+
+void SoftObject::hold(VoxelId v) noexcept {
+  const std::uint32_t s = surface_number_[v];
+  if (pair_held_[s] != 0) return;
+  pair_held_[s] = 1;
+  held_voxels_.push_back(v);
+  state_.set_role(v, Displacement::held, *lattice_);
+}
+
+void SoftObject::release(VoxelId v) noexcept {
+  const std::uint32_t s = surface_number_[v];
+  if (pair_held_[s] == 0) return;
+  pair_held_[s] = 0;
+  const auto found = std::find(held_voxels_.begin(), held_voxels_.end(), v);
+  *found = held_voxels_.back();
+  held_voxels_.pop_back();
+  if (std::find(touched_voxels_.begin(), touched_voxels_.end(), v) != touched_voxels_.end()) return;
+  const bool near_rigid = !obstacles_.empty() && obstacles_[s].normal != glm::vec3(0.0F);
+  state_.set_role(v, near_rigid ? Displacement::obstacle : Displacement::free, *lattice_);
+}
+
+void SoftObject::move(VoxelId v, const glm::dvec3& displacement) noexcept {
+  if (lattice_->anchored(v)) return;
+  moved_ever_ = true;
+  relaxation_.wake();
+  state_.set(v, clamp_to_links(*lattice_, state_, v, displacement));
+}
+
+glm::dvec3 SoftObject::displacement_at(const glm::dvec3& rest_point) const noexcept {
+  if (!moved_ever_) return glm::dvec3(0.0);
+  const auto& dims = lattice_->springs().dims;
+  const glm::dvec3 cell = rest_point / lattice_->spacing_m() + 1.0;  // padded coordinates
+  std::array<int, 3> base{};
+  std::array<double, 3> part{};
+  for (std::size_t d = 0; d < 3; ++d) {
+    const double c = std::clamp(cell[static_cast<int>(d)], 0.0, static_cast<double>(dims[d] - 2));
+    base[d] = static_cast<int>(c);
+    part[d] = c - base[d];
+  }
+  glm::dvec3 sum(0.0);
+  double weight = 0.0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const int i = corner & 1, j = (corner >> 1) & 1, k = (corner >> 2) & 1;
+    const VoxelId v = lattice_->at(base[0] + i, base[1] + j, base[2] + k);
+    if (!lattice_->filled(v)) continue;
+    const double w = (i != 0 ? part[0] : 1.0 - part[0]) * (j != 0 ? part[1] : 1.0 - part[1]) *
+                         (k != 0 ? part[2] : 1.0 - part[2]) +
+                     1e-9;  // a corner that is just reached still counts when it is the only one
+    sum += w * state_.at(v);
+    weight += w;
+  }
+  return weight > 0.0 ? sum / weight : glm::dvec3(0.0);
+}
+
+double SoftObject::energy_J() const noexcept {
+  double energy = 0.0;
+  for (std::size_t i = 0; i < lattice_->size(); ++i) {
+    const auto v = static_cast<VoxelId>(i);
+    if (!lattice_->filled(v)) continue;
+    for (int d = 0; d < 3; ++d) {
+      const VoxelId w = v + static_cast<VoxelId>(lattice_->stride(d));
+      for (int axis = 0; axis < 3; ++axis) {
+        const auto& u = state_.u[static_cast<std::size_t>(axis)];
+        const double k = static_cast<double>(lattice_->springs().stiffness(axis, d)[v]);
+        const double stretch = static_cast<double>(u[w]) - static_cast<double>(u[v]);
+        energy += 0.5 * k * stretch * stretch;
+      }
+    }
+  }
+  return energy;
+}
+
+bool SoftObject::settle(const ToolInBody& tool, double tolerance_N, int max_cycles) noexcept {
+  for (int n = 0; n < max_cycles; ++n) {
+    push_out(tool);
+    relax_near(tool, 4);
+    relaxation_.wake();
+    const std::uint64_t cycles = relaxation_.cycles();
+    while (relaxation_.cycles() == cycles) relax_background(relaxation_.cycle_cost());
+    double worst = relaxation_.residual_N();
+    for (const Touch& t : touches_) {
+      if (lattice_->anchored(t.v)) continue;
+      glm::dvec3 left = link_force(*lattice_, state_, t.v);
+      if (t.pressed) left -= std::min(0.0, glm::dot(left, t.normal)) * t.normal;
+      worst = std::max(worst, glm::length(left));
+    }
+    if (worst < tolerance_N) return true;
+  }
+  return false;
+}
+
+std::size_t SoftObject::memory_bytes() const {
+  return lattice_->memory_bytes() + lattice_->size() * (3 * sizeof(float) + 1 + 3 * sizeof(std::uint32_t)) +
+         chain_.memory_bytes() + relaxation_.memory_bytes() + obstacles_.size() * sizeof(Obstacle) +
+         lattice_->surface().size() * 4 * sizeof(std::uint32_t);
+}
+
+}  // namespace voxel

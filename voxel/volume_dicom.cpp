@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A folder with one DICOM series: its slices put in order by their own positions, one slice in memory at a
+// time.
+#include <itkGDCMImageIO.h>
+#include <itkGDCMSeriesFileNames.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
+
+#include "voxel/volume_itk.h"
+
+namespace voxel {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Slice {
+  std::string file;
+  FileFrame frame;
+  Component component = Component::int16;
+  double height = 0.0;  // (unit: the file's) along the slice normal
+};
+
+std::string name_of(const Slice& slice) {
+  return fs::path(slice.file).filename().string();
+}
+
+// The files of the only series in the folder.
+std::vector<std::string> files_of_series(const fs::path& folder) {
+  return in_words(folder, "the folder cannot be read as a DICOM series", kDamaged, [&] {
+    const auto names = itk::GDCMSeriesFileNames::New();
+    names->SetUseSeriesDetails(false);
+    names->SetInputDirectory(folder.string());
+    const std::vector<std::string> series = names->GetSeriesUIDs();
+    if (series.empty()) {
+      refuse_volume(folder,
+                    "the folder holds no DICOM series; give the folder that directly holds the slices");
+    }
+    if (series.size() > 1) {
+      std::ostringstream text;
+      constexpr std::size_t kNamed = 8;
+      for (std::size_t n = 0; n < std::min(series.size(), kNamed); ++n) {
+        text << (n == 0 ? "" : ", ") << series[n] << " (" << names->GetFileNames(series[n]).size()
+             << " files)";
+      }
+      if (series.size() > kNamed) text << ", ...";
+      refuse_volume(folder, "the folder holds ", series.size(), " DICOM series: ", text.str(),
+                    "; put the files of one of them into a folder of their own");
+    }
+    return std::vector<std::string>(names->GetFileNames(series.front()));
+  });
+}
+
+Slice read_slice_header(const std::string& file) {
+  const fs::path path = file;
+  const auto io = itk::GDCMImageIO::New();
+  io->SetFileName(file);
+  in_words(path, "the slice cannot be read", kDamaged, [&] { io->ReadImageInformation(); });
+  const std::optional<Component> component = component_of(*io);
+  if (!component) {
+    refuse_volume(path, "each voxel holds ", io->GetNumberOfComponents(),
+                  " numbers; only slices of single intensities make a volume");
+  }
+  Slice slice;
+  slice.file = file;
+  slice.component = *component;
+  const unsigned axes = std::min(io->GetNumberOfDimensions(), 3U);
+  slice.frame.dims = {1.0, 1.0, 1.0};
+  for (unsigned axis = 0; axis < axes; ++axis) {
+    const auto a = static_cast<int>(axis);
+    slice.frame.dims[axis] = static_cast<double>(io->GetDimensions(axis));
+    slice.frame.spacing[a] = io->GetSpacing(axis);
+    slice.frame.origin[a] = io->GetOrigin(axis);
+    const std::vector<double> direction = io->GetDirection(axis);
+    for (unsigned row = 0; row < std::min<std::size_t>(direction.size(), 3); ++row) {
+      slice.frame.direction[a][static_cast<int>(row)] = direction[row];
+    }
+  }
+  return slice;
+}
+
+void check_alike(const fs::path& folder, const Slice& first, const Slice& slice) {
+  const auto same = [](double a, double b) { return std::abs(a - b) <= 1e-4 * std::max(std::abs(a), 1e-3); };
+  bool alike = first.frame.dims == slice.frame.dims && slice.frame.dims[2] == 1.0;
+  for (int axis = 0; axis < 2; ++axis) {
+    alike = alike && same(first.frame.spacing[axis], slice.frame.spacing[axis]) &&
+            glm::distance(first.frame.direction[axis], slice.frame.direction[axis]) < 1e-3;
+  }
+  if (alike) return;
+  const auto& a = first.frame;
+  const auto& b = slice.frame;
+  refuse_volume(folder, "slice ", name_of(slice), " (", b.dims[0], " x ", b.dims[1], " x ", b.dims[2],
+                " voxels of ", b.spacing.x, " x ", b.spacing.y,
+                ") differs in size, spacing or orientation from slice ", name_of(first), " (", a.dims[0],
+                " x ", a.dims[1], " x ", a.dims[2], " of ", a.spacing.x, " x ", a.spacing.y,
+                "); put the slices of one volume into a folder of their own");
+}
+
+// The step between slices along their normal, the same for all. (unit: the file's)
+double slice_step(const fs::path& folder, const std::vector<Slice>& slices) {
+  std::vector<double> steps;
+  for (std::size_t n = 1; n < slices.size(); ++n) steps.push_back(slices[n].height - slices[n - 1].height);
+  std::vector<double> sorted = steps;
+  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2),
+                   sorted.end());
+  const double usual = sorted[sorted.size() / 2];
+  for (std::size_t n = 0; n < steps.size(); ++n) {
+    const Slice& below = slices[n];
+    const Slice& above = slices[n + 1];
+    const double step = steps[n];
+    if (step <= 1e-3 * std::max(usual, 1e-3)) {
+      refuse_volume(folder, "slices ", name_of(below), " and ", name_of(above), " lie in the same place (at ",
+                    below.height,
+                    "); the folder holds more than one volume, or slices twice: keep one of each");
+    }
+    if (std::abs(step - usual) > 0.01 * usual + 1e-3) {
+      const double missing = std::round(step / usual) - 1.0;
+      refuse_volume(
+          folder, "between slices ", name_of(below), " (at ", below.height, ") and ", name_of(above), " (at ",
+          above.height, ") the step is ", step, ", elsewhere it is ", usual,
+          missing >= 1.0 ? ": slices are missing (about " + std::to_string(static_cast<long>(missing)) + ")"
+                         : std::string(": slices are uneven"),
+          "; add the missing files, or resample the series onto an even lattice");
+    }
+    const glm::dvec3 aside = above.frame.origin - below.frame.origin - below.frame.direction[2] * step;
+    if (glm::length(aside) > 0.01 * usual + 1e-3) {
+      refuse_volume(folder, "slice ", name_of(above), " is shifted sideways by ", glm::length(aside),
+                    " against the one before it, as with a tilted gantry; resample the series onto a "
+                    "rectangular lattice");
+    }
+  }
+  return (slices.back().height - slices.front().height) / (static_cast<double>(slices.size()) - 1.0);
+}
+
+}  // namespace
+
+DicomSeries read_dicom_header(const fs::path& folder, double unit_m) {
+  itk::Object::SetGlobalWarningDisplay(false);  // the findings that matter are said in our own words
+  std::vector<Slice> slices;
+  for (const std::string& file : files_of_series(folder)) slices.push_back(read_slice_header(file));
+  if (slices.empty()) refuse_volume(folder, "the folder's DICOM series has no images");
+  DicomSeries series;
+  series.data.header.format = "DICOM series";
+  Component component = slices.front().component;
+  for (Slice& slice : slices) {
+    slice.height = glm::dot(slice.frame.origin, slices.front().frame.direction[2]);
+    if (slices.size() > 1) check_alike(folder, slices.front(), slice);
+    // Each slice may carry a rescale of its own (PET), which decides its type.
+    if (slice.component != component) component = Component::float64;
+  }
+  std::stable_sort(slices.begin(), slices.end(),
+                   [](const Slice& a, const Slice& b) { return a.height < b.height; });
+  FileFrame frame = slices.front().frame;
+  if (slices.size() > 1) {
+    frame.spacing.z = slice_step(folder, slices);
+    frame.dims[2] = static_cast<double>(slices.size());
+  } else if (frame.dims[2] == 1.0) {
+    series.data.header.notes.emplace_back(
+        "the series has a single slice; its thickness is taken from its header");
+  }
+  set_frame(folder, frame, component, unit_m, series.data);
+  for (const Slice& slice : slices) series.files.push_back(slice.file);
+  return series;
+}
+
+void read_dicom_voxels(const fs::path& folder, DicomSeries& series) {
+  VolumeData& data = series.data;
+  data.bytes.reserve(data.header.bytes);
+  VolumeData slice;
+  for (const std::string& file : series.files) {
+    in_words(file, "the slice cannot be read", kDamaged, [&] {
+      const auto io = itk::GDCMImageIO::New();
+      io->SetFileName(file);
+      io->ReadImageInformation();
+      slice.component = component_of(*io).value();
+      const std::size_t voxels = data.header.bytes / size_of(data.component) / series.files.size();
+      slice.bytes.resize(voxels * size_of(slice.component));
+      read_voxels(*io, slice.bytes);
+    });
+    if (slice.component == data.component) {
+      data.bytes.insert(data.bytes.end(), slice.bytes.begin(), slice.bytes.end());
+    } else {
+      append_as_doubles(slice, data.bytes);
+    }
+  }
+  if (data.bytes.size() != data.header.bytes)
+    refuse_volume(folder, "the slices changed while they were read");
+}
+
+}  // namespace voxel

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What volume_file.cpp and volume_dicom.cpp share of ITK. No other file includes this one.
+#pragma once
+
+#include <itkImageIOBase.h>
+
+#include <filesystem>
+#include <new>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "voxel/volume_data.h"
+
+namespace voxel {
+
+// The component of what ITK is about to read, if it is one number a voxel of a type that we know.
+std::optional<Component> component_of(const itk::ImageIOBase& io);
+
+// ITK's and GDCM's words for what went wrong, without their source file, class and address.
+std::string words_of(const itk::ExceptionObject& error);
+
+// Reads the voxels that ReadImageInformation announced, and no more.
+void read_voxels(itk::ImageIOBase& io, std::vector<std::byte>& bytes);
+
+// Calls `call` and turns whatever the libraries throw into a VolumeError: "file: doing: what; remedy".
+template <typename Call>
+auto in_words(const std::filesystem::path& path, const char* doing, const char* remedy, Call call) {
+  try {
+    return call();
+  } catch (const VolumeError&) {
+    throw;
+  } catch (const itk::ExceptionObject& error) {
+    refuse_volume(path, doing, ": ", words_of(error), "; ", remedy);
+  } catch (const std::bad_alloc&) {
+    refuse_volume(path, doing,
+                  ": this machine has not enough memory; crop the volume or use a larger spacing");
+  } catch (const std::exception& error) {
+    refuse_volume(path, doing, ": ", error.what(), "; ", remedy);
+  }
+}
+
+inline constexpr const char* kDamaged =
+    "the file is damaged, incomplete or not what its name says: copy or export it again";
+
+// One DICOM series in a folder (volume_dicom.cpp), its files in order along the slice normal.
+struct DicomSeries {
+  std::vector<std::string> files;
+  VolumeData data;  // without voxels
+};
+DicomSeries read_dicom_header(const std::filesystem::path& folder, double unit_m);
+void read_dicom_voxels(const std::filesystem::path& folder, DicomSeries& series);
+
+}  // namespace voxel
