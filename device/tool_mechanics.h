@@ -19,7 +19,7 @@ struct ToolMotion {
   glm::dvec3 velocity_m_per_s{0.0};
 };
 
-// The longest substep (unit: second). A step of the hand's target by 10 mm is then followed within 10 µm.
+// The longest substep (unit: second). A step of the hand's target by 10 mm is then followed within 12 µm.
 inline constexpr double kToolSubstep_s = 2e-5;
 
 // Moves the tool by dt_s under a constant motor force, while the hand's target moves evenly from target_start

@@ -158,9 +158,9 @@ Camera frame_scene(const DrawnScene& scene, const Snapshot& snapshot, double asp
       force > 1e-6 && std::isfinite(force) ? snapshot.force_N / force : glm::dvec3(0.0, 0.0, 1.0);
   std::vector<Candidate> candidates;
   for (const double elevation : {-20.0, 12.0, 25.0, 40.0}) {
-    for (double azimuth = -180.0; azimuth < 179.0; azimuth += 30.0) {
+    for (int turn = -6; turn < 6; ++turn) {
       Camera at;
-      at.azimuth_rad = azimuth * degree;
+      at.azimuth_rad = 30.0 * turn * degree;
       at.elevation_rad = elevation * degree;
       candidates.push_back({at.azimuth_rad, at.elevation_rad, at.toward_eye()});
     }

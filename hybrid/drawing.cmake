@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # What people look at: picture, window and plots. Libraries of the screen stay inside this target.
+# Imported targets are GLOBAL, because tests in other folders link them through this one.
 find_package(PkgConfig REQUIRED)
-find_package(glfw3 3.3 REQUIRED)
-find_package(PNG REQUIRED)
-pkg_check_modules(EPOXY REQUIRED IMPORTED_TARGET epoxy)
-pkg_check_modules(IMGUI REQUIRED IMPORTED_TARGET imgui)
+find_package(glfw3 3.3 REQUIRED GLOBAL)
+find_package(PNG REQUIRED GLOBAL)
+pkg_check_modules(EPOXY REQUIRED IMPORTED_TARGET GLOBAL epoxy)
+pkg_check_modules(IMGUI REQUIRED IMPORTED_TARGET GLOBAL imgui)
 
 add_library(hybrid_drawing STATIC
   ${CMAKE_CURRENT_LIST_DIR}/camera.cpp
   ${CMAKE_CURRENT_LIST_DIR}/draw_geometry.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/felt_geometry.cpp
   ${CMAKE_CURRENT_LIST_DIR}/renderer.cpp
   ${CMAKE_CURRENT_LIST_DIR}/overlay.cpp
   ${CMAKE_CURRENT_LIST_DIR}/frame_painter.cpp

@@ -114,7 +114,7 @@ void keep_largest_piece(LabelVolume& volume, bool fill_cavities) {
 }
 
 // ---- Growing
-// --------------------------------------------------------------------------------------------------
+
 namespace {
 
 constexpr double kMostVoxels = 536'870'912.0;  // 2^29, about 3 GB while growing; four 512^3 volumes

@@ -19,13 +19,11 @@ namespace {
 
 using voxel::LabelVolume;
 
-// ---- Surface nets
-// --------------------------------------------------------------------------------------------- A cell is the
-// cube between eight voxel centres; corner bit c is x + 2y + 4z. Cell (i, j, k) has voxel (i, j, k) as its
-// corner 0 and runs from -1, because outside the lattice is empty. Plain surface nets (Gibson 1998) put one
-// vertex in each cell on the boundary and so pinch where solids touch along an edge or at a corner; here a
-// cell has one vertex for each sheet of surface that passes through it (dual marching cubes, Nielson 2004),
-// so that each edge of the result has exactly two triangles and each vertex one fan.
+// A cell is the cube between eight voxel centres; corner bit c is x + 2y + 4z. Cell (i, j, k) has voxel
+// (i, j, k) as its corner 0 and runs from -1, because outside the lattice is empty. Plain surface nets
+// (Gibson 1998) put one vertex in each cell on the boundary and so pinch where solids touch along an edge or
+// at a corner; here a cell has one vertex for each sheet of surface that passes through it (dual marching
+// cubes, Nielson 2004), so that each edge of the result has exactly two triangles and each vertex one fan.
 
 // Edge of a cell: along `axis`, at side u of axis + 1 and side v of axis + 2 (modulo 3).
 constexpr int edge_id(int axis, int u, int v) {

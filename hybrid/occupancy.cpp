@@ -120,8 +120,6 @@ std::uint32_t OccupancyMap::add_soft(std::uint32_t count) {
   const auto first = static_cast<std::uint32_t>(next_.size());
   next_.resize(next_.size() + count, kNone);
   soft_cell_.resize(soft_cell_.size() + count, kNone);
-  bricks_.reserve(bricks_.size() + count);  // at worst a brick a voxel until reserve_bricks() trims it
-  while (bricks_.capacity() * 2 > table_.size()) rehash(table_.size() * 2);
   return first;
 }
 
@@ -133,13 +131,17 @@ void OccupancyMap::reserve_bricks(std::size_t more) {
   rehash(capacity);
 }
 
-void OccupancyMap::move(std::uint32_t number, const glm::dvec3& position) noexcept {
+void OccupancyMap::place(std::uint32_t number, const glm::dvec3& position) { put(number, position, true); }
+
+void OccupancyMap::move(std::uint32_t number, const glm::dvec3& position) noexcept { put(number, position, false); }
+
+void OccupancyMap::put(std::uint32_t number, const glm::dvec3& position, bool may_allocate) {
   const Coordinates cell = cell_of(position);
   const Coordinates at{cell[0] >> kShift, cell[1] >> kShift, cell[2] >> kShift};
   const std::uint32_t old = soft_cell_[number];
   const std::uint32_t inner = index_in_brick(cell);
   if (old != kNone && old % kCells == inner && bricks_[old / kCells].at == at) return;
-  const std::uint32_t brick = find_or_add(at, false);
+  const std::uint32_t brick = find_or_add(at, may_allocate);
   if (brick == kNone) {
     ++overflows_;
     return;

@@ -26,8 +26,9 @@ class OccupancyMap {
   // ---- on load; these allocate ----
   // A triangle of rigid object number `object`: every cell it touches.
   void add_triangle(std::uint32_t object, const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c);
-  // `count` soft surface voxels get numbers of their own; returns the first. Place each with move().
+  // `count` soft surface voxels get numbers of their own; returns the first. Then place each.
   std::uint32_t add_soft(std::uint32_t count);
+  void place(std::uint32_t number, const glm::dvec3& position);
   // Room for motion: bricks may grow by this many without allocating. Call once, after everything is placed.
   void reserve_bricks(std::size_t more);
 
@@ -63,6 +64,7 @@ class OccupancyMap {
     std::array<std::uint8_t, kCells> rigid;       // 1: some rigid surface passes
   };
 
+  void put(std::uint32_t number, const glm::dvec3& position, bool may_allocate);
   [[nodiscard]] Coordinates cell_of(const glm::dvec3& p) const noexcept;
   [[nodiscard]] std::uint32_t find(const Coordinates& brick) const noexcept;
   std::uint32_t find_or_add(const Coordinates& brick, bool may_allocate);

@@ -11,6 +11,7 @@
 #include <glm/geometric.hpp>
 #include <system_error>
 
+#include "hybrid/felt_geometry.h"
 #include "hybrid/palette.h"
 
 namespace hybrid {

@@ -4,6 +4,7 @@
 #include <dlfcn.h>
 #include <epoxy/egl.h>
 
+#include <algorithm>
 #include <array>
 #include <stdexcept>
 #include <string>
@@ -26,53 +27,51 @@ bool library_exists(const char* name) {
   return true;
 }
 
+EGLDisplay initialised(EGLDisplay display) {
+  EGLint major = 0;
+  EGLint minor = 0;
+  return display != EGL_NO_DISPLAY && eglInitialize(display, &major, &minor) == EGL_TRUE ? display
+                                                                                         : EGL_NO_DISPLAY;
+}
+
+EGLDisplay open_display() {
+  // The function loader ends the program when these are missing; so look first.
+  if (!library_exists("libEGL.so.1"))
+    throw std::runtime_error(std::string("libEGL.so.1 is not here") + remedy);
+  if (!library_exists("libOpenGL.so.0") && !library_exists("libGL.so.1")) {
+    throw std::runtime_error(std::string("libGL.so.1 is not here") + remedy);
+  }
+  const char* const known = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
+  const std::string_view extensions = known != nullptr ? known : "";
+  const auto has = [&](std::string_view name) { return extensions.find(name) != std::string_view::npos; };
+  EGLDisplay display = EGL_NO_DISPLAY;
+  if (has("EGL_EXT_platform_base") && has("EGL_MESA_platform_surfaceless")) {
+    display =
+        initialised(eglGetPlatformDisplayEXT(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr));
+  }
+  if (display == EGL_NO_DISPLAY && has("EGL_EXT_platform_base") && has("EGL_EXT_platform_device") &&
+      has("EGL_EXT_device_enumeration")) {
+    // A vendor's driver without Mesa: the first device it names.
+    EGLDeviceEXT device = nullptr;
+    EGLint count = 0;
+    if (eglQueryDevicesEXT(1, &device, &count) == EGL_TRUE && count > 0) {
+      display = initialised(eglGetPlatformDisplayEXT(EGL_PLATFORM_DEVICE_EXT, device, nullptr));
+    }
+  }
+  if (display == EGL_NO_DISPLAY) display = initialised(eglGetDisplay(EGL_DEFAULT_DISPLAY));
+  if (display == EGL_NO_DISPLAY)
+    throw std::runtime_error(std::string("EGL finds nothing to draw with") + remedy);
+  return display;
+}
+
 // A context with no surface, current on this thread while it lives.
 class OffscreenContext {
  public:
   OffscreenContext() {
-    // The function loader ends the program when these are missing; so look first.
-    if (!library_exists("libEGL.so.1"))
-      throw std::runtime_error(std::string("libEGL.so.1 is not here") + remedy);
-    if (!library_exists("libOpenGL.so.0") && !library_exists("libGL.so.1")) {
-      throw std::runtime_error(std::string("libGL.so.1 is not here") + remedy);
-    }
-    try {
-      open();
-    } catch (...) {
-      close();
-      throw;
-    }
-  }
-  OffscreenContext(const OffscreenContext&) = delete;
-  OffscreenContext& operator=(const OffscreenContext&) = delete;
-  OffscreenContext(OffscreenContext&&) = delete;
-  OffscreenContext& operator=(OffscreenContext&&) = delete;
-  ~OffscreenContext() { close(); }
-
- private:
-  EGLDisplay display_ = EGL_NO_DISPLAY;
-  EGLContext context_ = EGL_NO_CONTEXT;
-
-  void open() {
-    const char* const known = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
-    const std::string_view extensions = known != nullptr ? known : "";
-    const auto has = [&](std::string_view name) { return extensions.find(name) != std::string_view::npos; };
-    if (has("EGL_EXT_platform_base") && has("EGL_MESA_platform_surfaceless")) {
-      start(eglGetPlatformDisplayEXT(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr));
-    }
-    if (display_ == EGL_NO_DISPLAY && has("EGL_EXT_platform_base") && has("EGL_EXT_platform_device") &&
-        has("EGL_EXT_device_enumeration")) {
-      // A vendor's driver without Mesa: the first device it names.
-      EGLDeviceEXT device = nullptr;
-      EGLint count = 0;
-      if (eglQueryDevicesEXT(1, &device, &count) == EGL_TRUE && count > 0) {
-        start(eglGetPlatformDisplayEXT(EGL_PLATFORM_DEVICE_EXT, device, nullptr));
-      }
-    }
-    if (display_ == EGL_NO_DISPLAY) start(eglGetDisplay(EGL_DEFAULT_DISPLAY));
-    if (display_ == EGL_NO_DISPLAY)
-      throw std::runtime_error(std::string("EGL finds nothing to draw with") + remedy);
-
+    // Opened once and never closed: the driver stays loaded, and a second picture starts at once. A failure
+    // is tried again.
+    static const EGLDisplay opened = open_display();
+    display_ = opened;
     if (eglBindAPI(EGL_OPENGL_API) != EGL_TRUE) {
       throw std::runtime_error(std::string("this EGL does not offer OpenGL") + remedy);
     }
@@ -94,23 +93,22 @@ class OffscreenContext {
       throw std::runtime_error(std::string("EGL makes no OpenGL 3.3 context") + remedy);
     }
     if (eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context_) != EGL_TRUE) {
+      eglDestroyContext(display_, context_);
       throw std::runtime_error(std::string("EGL cannot use a context without a surface") + remedy);
     }
   }
-
-  void start(EGLDisplay display) {
-    EGLint major = 0;
-    EGLint minor = 0;
-    if (display != EGL_NO_DISPLAY && eglInitialize(display, &major, &minor) == EGL_TRUE) display_ = display;
-  }
-
-  void close() {
-    if (display_ == EGL_NO_DISPLAY) return;
+  OffscreenContext(const OffscreenContext&) = delete;
+  OffscreenContext& operator=(const OffscreenContext&) = delete;
+  OffscreenContext(OffscreenContext&&) = delete;
+  OffscreenContext& operator=(OffscreenContext&&) = delete;
+  ~OffscreenContext() {
     eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
-    if (context_ != EGL_NO_CONTEXT) eglDestroyContext(display_, context_);
-    eglTerminate(display_);
-    display_ = EGL_NO_DISPLAY;
+    eglDestroyContext(display_, context_);
   }
+
+ private:
+  EGLDisplay display_ = EGL_NO_DISPLAY;
+  EGLContext context_ = EGL_NO_CONTEXT;
 };
 
 }  // namespace

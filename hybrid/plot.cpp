@@ -41,7 +41,9 @@ Intervals contact_intervals(std::span<const TraceRow> rows, std::uint32_t mask) 
 
 double duration(const Intervals& intervals) {
   double sum = 0.0;
-  for (const auto& [from, to] : intervals) sum += to - from;
+  for (const auto& [from, to] : intervals) {
+    if (std::isfinite(to - from)) sum += to - from;
+  }
   return sum;
 }
 
@@ -140,9 +142,16 @@ void save_session_plot(const std::filesystem::path& svg, std::span<const TraceRo
   const Intervals any = contact_intervals(rows, ~0U);
   Figure figure;
   figure.title = title;
+  double first = std::numeric_limits<double>::infinity();
+  double last = -first;
+  for (const double at : t) {
+    if (!std::isfinite(at)) continue;
+    first = std::min(first, at);
+    last = std::max(last, at);
+  }
   figure.notes.push_back(std::to_string(rows.size()) + " ticks" +
-                         (rows.empty() ? "" : ", " + text_of(t.back() - t.front(), "%.3f s")) +
-                         "; in contact " + text_of(duration(any), "%.3f s") + "; " + largest(rows));
+                         (first <= last ? ", " + text_of(last - first, "%.3f s") : "") + "; in contact " +
+                         text_of(duration(any), "%.3f s") + "; " + largest(rows));
 
   Panel force;
   force.title = "What the hand feels";

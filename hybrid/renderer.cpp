@@ -7,7 +7,6 @@
 #include <cmath>
 #include <cstddef>
 #include <glm/geometric.hpp>
-#include <glm/gtc/matrix_transform.hpp>
 #include <glm/gtc/type_ptr.hpp>
 #include <limits>
 #include <stdexcept>
@@ -15,6 +14,7 @@
 #include <string_view>
 
 #include "hybrid/draw_geometry.h"
+#include "hybrid/felt_geometry.h"
 #include "hybrid/palette.h"
 #include "hybrid/renderer_shaders.h"
 
@@ -116,30 +116,17 @@ struct Object {
   glm::vec3 colour{1.0F};
 };
 
-// Where the pieces of tool and arrow go; scale and place about the renderer's origin.
-glm::mat4 placed(const glm::dvec3& at, const glm::dmat3& axes) {
-  glm::dmat4 m(axes);
-  m[3] = glm::dvec4(at, 1.0);
-  return {m};
-}
-
-glm::dmat3 axes_along(const glm::dvec3& z) {
-  const glm::dvec3 side = std::abs(z.x) < 0.7 ? glm::dvec3(1.0, 0.0, 0.0) : glm::dvec3(0.0, 1.0, 0.0);
-  const glm::dvec3 x = glm::normalize(glm::cross(side, z));
-  return {x, glm::cross(z, x), z};
-}
-
 bool finite(const glm::dvec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
 constexpr int most_pixels = 8192;
-constexpr double punch_height = 3.0;  // of the body drawn above its face, in radii
 
 }  // namespace
 
 struct Renderer::State {
-  GLuint mesh_program = 0, overlay_program = 0;
+  GLuint mesh_program = 0, depth_program = 0, overlay_program = 0;
+  GLuint program = 0;  // the one in use, of mesh and depth
   std::vector<Object> objects;
   Mesh ball, cylinder, cone, disc;
   GLuint overlay_array = 0, overlay_vertices = 0, overlay_indices = 0, font = 0;
@@ -151,21 +138,25 @@ struct Renderer::State {
   glm::dvec3 origin_m{0.0};  // what the card's floats are relative to
   double most_moved_m = 0.0;
 
+  void use(GLuint which, const glm::mat4& clip) {
+    program = which;
+    glUseProgram(program);
+    glUniformMatrix4fv(glGetUniformLocation(program, "clip_from_scene"), 1, GL_FALSE, glm::value_ptr(clip));
+    uniform("shown_depth", 0);
+  }
   void uniform(const char* name, float value) const {
-    glUniform1f(glGetUniformLocation(mesh_program, name), value);
+    glUniform1f(glGetUniformLocation(program, name), value);
   }
-  void uniform(const char* name, int value) const {
-    glUniform1i(glGetUniformLocation(mesh_program, name), value);
-  }
+  void uniform(const char* name, int value) const { glUniform1i(glGetUniformLocation(program, name), value); }
   void uniform(const char* name, const glm::vec3& value) const {
-    glUniform3fv(glGetUniformLocation(mesh_program, name), 1, glm::value_ptr(value));
+    glUniform3fv(glGetUniformLocation(program, name), 1, glm::value_ptr(value));
   }
   void place(const glm::mat4& scene_from_mesh) const {
     // Normals of the unit shapes survive a transpose-inverse; the identity's is itself.
     const glm::mat3 normal = glm::transpose(glm::inverse(glm::mat3(scene_from_mesh)));
-    glUniformMatrix4fv(glGetUniformLocation(mesh_program, "scene_from_mesh"), 1, GL_FALSE,
+    glUniformMatrix4fv(glGetUniformLocation(program, "scene_from_mesh"), 1, GL_FALSE,
                        glm::value_ptr(scene_from_mesh));
-    glUniformMatrix3fv(glGetUniformLocation(mesh_program, "normal_from_mesh"), 1, GL_FALSE,
+    glUniformMatrix3fv(glGetUniformLocation(program, "normal_from_mesh"), 1, GL_FALSE,
                        glm::value_ptr(normal));
   }
   void build_targets();
@@ -233,51 +224,19 @@ void Renderer::State::draw_objects(bool soft, int pass) const {
   uniform("pass", 0);
 }
 
-// A flat punch touches with its lower face, the disc about `at`; its body stands above.
 void Renderer::State::draw_tool(const DrawnScene& scene, const glm::dvec3& at) const {
-  const double r = scene.tool_radius_m;
-  if (scene.tool_is_punch) {
-    place(placed(at - origin_m, glm::dmat3(r, 0, 0, 0, r, 0, 0, 0, punch_height * r)));
-    cylinder.draw();
-  } else {
-    place(placed(at - origin_m, glm::dmat3(r)));
-    ball.draw();
-  }
+  place(place_tool(scene, at, origin_m));
+  (scene.tool_is_punch ? cylinder : ball).draw();
 }
 
 void Renderer::State::draw_arrow(const DrawnScene& scene, const Snapshot& snapshot,
                                  const Camera& camera) const {
-  const glm::dvec3 along = arrow_tip(scene, snapshot, camera) - snapshot.proxy_m;
-  const double length = glm::length(along);
-  // Thinner than the tool it springs from, unless it would then not be seen.
-  const double thick =
-      std::clamp(0.4 * scene.tool_radius_m, 0.0035 * camera.view_height_m(), 0.007 * camera.view_height_m());
-  if (!(length > 0.0)) return;
-  const double head = std::min(0.5 * length, 5.0 * thick);
-  const glm::dmat3 axes = axes_along(along / length);
-  const double thin = std::min(thick, 0.4 * head);
-  place(placed(snapshot.proxy_m - origin_m,
-               glm::dmat3(axes[0] * thin, axes[1] * thin, axes[2] * (length - head))));
+  const ArrowPlacement arrow = place_arrow(scene, snapshot, camera, origin_m);
+  if (!arrow.visible) return;
+  place(arrow.shaft);
   cylinder.draw();
-  place(placed(snapshot.proxy_m - origin_m + axes[2] * (length - head),
-               glm::dmat3(axes[0] * 2.4 * thin, axes[1] * 2.4 * thin, axes[2] * head)));
+  place(arrow.head);
   cone.draw();
-}
-
-glm::dvec3 arrow_tip(const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera) {
-  const double force = glm::length(snapshot.force_N);
-  if (!(force > 1e-3) || !std::isfinite(force)) return snapshot.proxy_m;
-  const double full = scene.max_force_N > 0.0 ? scene.max_force_N : force;
-  const double length = arrow_share_of_view * camera.view_height_m() * std::min(force / full, 1.0);
-  // The part within the tool is not seen: the arrow's length counts from its surface.
-  const glm::dvec3 along = snapshot.force_N / force;
-  double inside = scene.tool_radius_m;
-  if (scene.tool_is_punch) {
-    const double to_side = scene.tool_radius_m / std::max(std::hypot(along.x, along.y), 1e-3);
-    const double to_end = along.z > 0.0 ? punch_height * scene.tool_radius_m / std::max(along.z, 1e-3) : 0.0;
-    inside = std::min(to_side, to_end);
-  }
-  return snapshot.proxy_m + along * (length + inside);
 }
 
 Renderer::Renderer(const DrawnScene& scene, Samples samples) : state_(std::make_unique<State>()) {
@@ -292,6 +251,7 @@ Renderer::Renderer(const DrawnScene& scene, Samples samples) : state_(std::make_
   const bool software = name != nullptr && std::string_view(name).find("llvmpipe") != std::string_view::npos;
   s.wanted_factor = software && samples == Samples::fast ? 1 : 2;
   s.mesh_program = link(shaders::mesh_vertex, shaders::mesh_fragment);
+  s.depth_program = link(shaders::mesh_vertex, shaders::depth_fragment);
   s.overlay_program = link(shaders::overlay_vertex, shaders::overlay_fragment);
   s.bounds = bounds_of(scene);
   s.origin_m = s.bounds.centre_m;
@@ -391,15 +351,12 @@ void Renderer::draw(const DrawnScene& scene, const Snapshot& snapshot, const Cam
   }
   const glm::mat4 clip(camera.clip_from_scene(static_cast<double>(where.width) / where.height, s.origin_m,
                                               s.bounds.centre_m, radius));
-  glUseProgram(s.mesh_program);
-  glUniformMatrix4fv(glGetUniformLocation(s.mesh_program, "clip_from_scene"), 1, GL_FALSE,
-                     glm::value_ptr(clip));
+  s.use(s.mesh_program, clip);
   s.uniform("eye", glm::vec3(camera.eye_m() - s.origin_m));
   s.uniform("light_right", glm::vec3(camera.right()));
   s.uniform("light_up", glm::vec3(camera.up()));
   s.uniform("moved_half", palette::moved_half);
   s.uniform("moved_most", palette::moved_most);
-  s.uniform("shown_depth", 0);
   glActiveTexture(GL_TEXTURE0);
   glBindTexture(GL_TEXTURE_2D, 0);
   const int bottom = s.height - where.y - where.height;
@@ -413,17 +370,17 @@ void Renderer::draw(const DrawnScene& scene, const Snapshot& snapshot, const Cam
   glDepthMask(GL_TRUE);
 
   // Depth of what must not be hidden: soft objects, and a disc about the tool a little larger than it.
+  s.use(s.depth_program, clip);
   glBindFramebuffer(GL_FRAMEBUFFER, s.shown_frame);
   glClear(GL_DEPTH_BUFFER_BIT);
   s.draw_objects(true, 0);
   if (tool_known) {
-    const double r = std::max(1.8 * scene.tool_radius_m, 0.015 * camera.view_height_m());
-    s.place(placed(snapshot.proxy_m - s.origin_m,
-                   glm::dmat3(camera.right() * r, camera.up() * r, camera.toward_eye() * r)));
+    s.place(place_tool_disc(scene, snapshot.proxy_m, camera, s.origin_m));
     s.disc.draw();
     s.draw_arrow(scene, snapshot, camera);
   }
 
+  s.use(s.mesh_program, clip);
   glBindFramebuffer(GL_FRAMEBUFFER, s.scene_frame);
   glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
   s.draw_objects(true, 0);
@@ -461,7 +418,9 @@ void Renderer::draw(const DrawnScene& scene, const Snapshot& snapshot, const Cam
   // Rigid surfaces before what must be seen: only the nearest of them is blended, found by depth alone first.
   glDepthMask(GL_TRUE);
   glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
+  s.use(s.depth_program, clip);
   s.draw_objects(false, 2);
+  s.use(s.mesh_program, clip);
   glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
   s.draw_objects(false, 2);
   glDisable(GL_BLEND);

@@ -36,12 +36,6 @@ struct FontAtlas {
   std::span<const std::uint8_t> alpha;  // width × height
 };
 
-// Length of the force arrow in a view: max_force_N (the scene's, or what is felt where it has none) spans
-// this share of the view's height.
-inline constexpr double arrow_share_of_view = 0.30;
-// Tip of the force arrow as it is drawn with this camera (scene frame, meters).
-glm::dvec3 arrow_tip(const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera);
-
 // Four samples a pixel always, or one where the context draws without a graphics card.
 enum class Samples : std::uint8_t { fine, fast };
 

@@ -14,6 +14,7 @@ uniform mat4 clip_from_scene;
 out vec3 scene_position;
 out vec3 scene_normal;
 out float moved;
+invariant gl_Position;  // equal depths in every program
 void main() {
   vec4 at = scene_from_mesh * vec4(position, 1.0);
   scene_position = at.xyz;
@@ -24,7 +25,8 @@ void main() {
 )";
 
 // pass 0: lit, opaque or with one alpha. pass 1: rigid, only where nothing to be shown lies behind.
-// pass 2: rigid, only where something does: dense at the rim, thin where it faces the eye. pass 3: like glass.
+// pass 2: rigid, only where something does: dense at the rim, thin where it faces the eye. pass 3: like
+// glass.
 inline constexpr const char* mesh_fragment = R"(#version 330 core
 in vec3 scene_position;
 in vec3 scene_normal;
@@ -83,6 +85,18 @@ void main() {
   // The silhouette is a little darker, as in a drawing.
   lit *= mix(0.78, 1.0, smoothstep(0.0, 0.30, facing));
   colour = vec4(lit, a);
+}
+)";
+
+// Depth alone, where lighting would be thrown away: all fragments (pass 0), or those of pass 2 above.
+inline constexpr const char* depth_fragment = R"(#version 330 core
+uniform int pass;
+uniform sampler2D shown_depth;
+void main() {
+  if (pass == 2) {
+    float kept = texelFetch(shown_depth, ivec2(gl_FragCoord.xy), 0).r;
+    if (!(gl_FragCoord.z < kept && kept < 1.0)) discard;
+  }
 }
 )";
 

@@ -92,14 +92,14 @@ VolumeSurfaceSource read_volume_surface(const TableReader& table) {
 TableReader object_table(const SceneSource& source, const TreeNode& table, const std::string& kind,
                          std::size_t number) {
   const std::string nameless = words(kind, " (number ", number, ")");
-  const TableReader reader(source, table, table.place, nameless);
+  TableReader reader(source, table, table.place, nameless);
   const TreeEntry* name = reader.find("name");
   if (name == nullptr || name->value.kind != TreeNode::Kind::string) return reader;
   return {source, table, table.place, words(kind, " '", printable(name->value.text, longest_name), "'")};
 }
 
 std::string read_name(const TableReader& table) {
-  const std::string name = table.text("name", "skull");
+  std::string name = table.text("name", "skull");
   if (!usable_name(name)) {
     table.refuse("name", words("'name' in ", table.what(), " is empty, too long or not printable"),
                  words("use 1 to ", longest_name, " letters, digits or signs"));

@@ -9,6 +9,8 @@
 #include <tuple>
 #include <utility>
 
+#include "hybrid/scene_screen.h"
+
 // toml++ 3.3 asserts on some malformed files where it should report (a header "[=" for one), and without
 // asserts takes the condition for granted, which is undefined behaviour. Here a failed one is an error of the
 // file.
@@ -20,7 +22,7 @@ struct ParserGaveUp {};
 }  // namespace
 #undef NDEBUG
 #define TOML_ASSERT(expr) (static_cast<bool>(expr) ? static_cast<void>(0) : give_up())
-// Together with longest_dotted_key this keeps the recursion of parser, conversion and destructors shallow
+// Together with most_key_parts this keeps the recursion of parser, conversion and destructors shallow
 // enough for any stack: at most this many values nested, each behind a dotted key of at most so many parts.
 #define TOML_MAX_NESTED_VALUES 32
 #define TOML_HEADER_ONLY 1
@@ -29,51 +31,6 @@ struct ParserGaveUp {};
 
 namespace hybrid {
 namespace {
-
-constexpr std::size_t most_bytes = 16U * 1024 * 1024;
-constexpr std::size_t most_values = 1'000'000;  // about 300 MB at worst while both trees exist
-constexpr std::size_t longest_dotted_key = 64;  // parts
-
-// Limits that hold before the parser sees the text, so that neither memory nor stack depends on what it says.
-// The counts are upper bounds made without understanding strings and comments.
-void check_size_of_contents(std::string_view text, const std::filesystem::path& file) {
-  std::size_t values = 0, parts = 0;
-  std::uint32_t line = 1, column = 0;
-  char last = '\0';  // last character that was no blank
-  for (const char c : text) {
-    ++column;
-    switch (c) {
-      case '\n':
-        ++line;
-        column = 0;
-        parts = 0;
-        break;
-      case ',':
-      case '=':
-      case '[':
-      case '{':
-        ++values;
-        parts = 0;
-        break;
-      case '.':
-        if (last != '.') ++parts;  // a row of dots is no key
-        break;
-      default:
-        break;
-    }
-    if (c != ' ' && c != '\t') last = c;
-    if (parts > longest_dotted_key) {
-      throw SceneError(file, {line, column},
-                       words("a name of more than ", longest_dotted_key,
-                             " parts between dots; no key of a scene has more than two, shorten the line"));
-    }
-    if (values > most_values) {
-      throw SceneError(file, {line, column},
-                       words("more than ", most_values,
-                             " values; put a long path into a CSV file and name that: path kind = \"csv\""));
-    }
-  }
-}
 
 SourcePlace place_of(const toml::source_region& region) {
   return {static_cast<std::uint32_t>(region.begin.line), static_cast<std::uint32_t>(region.begin.column)};
@@ -146,17 +103,6 @@ bool parser_gives_up(std::string_view text) {
   return false;
 }
 
-SourcePlace place_at(std::string_view text, std::size_t at) {
-  const std::string_view before = text.substr(0, at);
-  const std::size_t start = before.rfind('\n') == std::string_view::npos ? 0 : before.rfind('\n') + 1;
-  const auto is_start = [](char c) {
-    return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U;
-  };  // of a UTF-8 sequence
-  return {static_cast<std::uint32_t>(1 + std::count(before.begin(), before.end(), '\n')),
-          static_cast<std::uint32_t>(1 + std::count_if(before.begin() + static_cast<std::ptrdiff_t>(start),
-                                                       before.end(), is_start))};
-}
-
 // The parser reads from front to back, so the shortest beginning of the text on which it gives up ends with
 // the culprit.
 SourcePlace where_parser_gives_up(std::string_view text) {
@@ -165,11 +111,7 @@ SourcePlace where_parser_gives_up(std::string_view text) {
     const std::size_t middle = good + (bad - good) / 2;
     (parser_gives_up(text.substr(0, middle)) ? bad : good) = middle;
   }
-  return place_at(text, good);
-}
-
-bool starts_with_utf16_mark(std::string_view text) {
-  return text.size() >= 2 && (text.substr(0, 2) == "\xFF\xFE" || text.substr(0, 2) == "\xFE\xFF");
+  return place_in_text(text, good);
 }
 
 }  // namespace
@@ -234,23 +176,7 @@ std::string in_quotes(std::string_view name) {
 }
 
 TreeNode parse_tree(std::string_view text, const std::filesystem::path& file) {
-  if (text.empty()) {
-    throw SceneError(file, {1, 1},
-                     "the file is empty; a scene begins with format = 1 (see scenes/README.md)");
-  }
-  if (text.size() > most_bytes) {
-    throw SceneError(file, {},
-                     words("the file has ", text.size(), " bytes, and a scene at most ", most_bytes,
-                           "; name meshes and volumes by their file instead"));
-  }
-  if (starts_with_utf16_mark(text)) {
-    throw SceneError(file, {1, 1}, "the file is UTF-16 text; save it as UTF-8");
-  }
-  if (const std::size_t nul = text.find('\0'); nul != std::string_view::npos) {
-    throw SceneError(file, place_at(text, nul),
-                     "the file is not text (it has a zero byte here); give the .toml file of a scene");
-  }
-  check_size_of_contents(text, file);
+  screen_scene_text(text, file);
   try {
     const toml::table table = toml::parse(text);
     return convert(table);
@@ -282,9 +208,9 @@ TreeNode read_tree(const std::filesystem::path& file) {
   const auto bytes = std::filesystem::file_size(file, failed);
   if (failed)
     throw SceneError(file, {}, words("cannot be read: ", failed.message(), "; check its permissions"));
-  if (bytes > most_bytes) {
+  if (bytes > most_scene_bytes) {
     throw SceneError(file, {},
-                     words("the file has ", bytes, " bytes, and a scene at most ", most_bytes,
+                     words("the file has ", bytes, " bytes, and a scene at most ", most_scene_bytes,
                            "; name meshes and volumes by their file instead"));
   }
   std::ifstream in(file, std::ios::binary);

@@ -473,8 +473,12 @@ std::string tick_text(double value, double step) {
   if (size >= 1e6 || (step != 0.0 && std::abs(step) < 1e-5)) {
     std::snprintf(text.data(), text.size(), "%.4g", value);
   } else {
-    const int decimals =
-        step != 0.0 ? std::clamp(static_cast<int>(std::ceil(-std::log10(std::abs(step)) - 1e-9)), 0, 6) : 3;
+    int decimals = step != 0.0 ? 0 : 3;
+    for (double scaled = std::abs(step);
+         decimals < 6 && std::abs(scaled - std::round(scaled)) > 1e-6 * scaled;) {
+      scaled *= 10.0;
+      ++decimals;
+    }
     std::snprintf(text.data(), text.size(), "%.*f", decimals, value);
   }
   std::string out = text[0] == '-' ? "−" : "";

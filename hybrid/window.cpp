@@ -65,7 +65,10 @@ struct Window::State {
   Drag drag = Drag::none;
   double x = 0.0, y = 0.0;  // of the pointer (pixels of the framebuffer)
   glm::dvec3 grip_m{0.0};   // from the point under the pointer to the tool, when it was taken hold of
-  Snapshot tool;            // where the tool was last shown; no vertices
+  // Where the tool was then: the plane of the drag stays there. Were it to follow the device, contact could
+  // push the goal itself away.
+  glm::dvec3 held_m{0.0};
+  glm::dvec3 device_m{0.0};  // where the device was last shown
   WindowInput input;
   std::deque<ForceSample> history;
   int width = 0, height = 0;
@@ -99,7 +102,7 @@ struct Window::State {
         break;
       }
       case Drag::tool:
-        input.dragged_goal_m = camera.point_at({x, y}, width, height, tool.device_m) + grip_m;
+        input.dragged_goal_m = camera.point_at({x, y}, width, height, held_m) + grip_m;
         break;
       case Drag::none:
         break;
@@ -118,8 +121,9 @@ struct Window::State {
     } else if (which == GLFW_MOUSE_BUTTON_RIGHT || (which == GLFW_MOUSE_BUTTON_LEFT && shift)) {
       drag = Drag::tool;
       // Taken hold of where it is: the tool does not jump to the pointer.
-      grip_m = tool.device_m - camera.point_at({x, y}, width, height, tool.device_m);
-      input.dragged_goal_m = tool.device_m;
+      held_m = device_m;
+      grip_m = held_m - camera.point_at({x, y}, width, height, held_m);
+      input.dragged_goal_m = held_m;
     } else if (which == GLFW_MOUSE_BUTTON_LEFT) {
       drag = Drag::orbit;
     }
@@ -184,7 +188,7 @@ bool Window::frame(const Snapshot& snapshot) {
   GLFWwindow* const handle = s.window.get();
   glfwPollEvents();
   if (glfwWindowShouldClose(handle) == GLFW_TRUE) return false;
-  s.tool.device_m = snapshot.device_m;
+  s.device_m = snapshot.device_m;
   s.remember(snapshot);
   glfwGetFramebufferSize(handle, &s.width, &s.height);
   if (s.width < 1 || s.height < 1) return true;  // minimised: nothing to draw

@@ -57,7 +57,7 @@ std::string read_file_bytes(const std::filesystem::path& file, bool packed, std:
   const std::uintmax_t size = std::filesystem::file_size(file, error);
   if (error) refuse(file, "its size cannot be read (" + error.message() + "); check that you may read it");
   if (size > max_bytes) refuse(file, "has " + std::to_string(size) + " bytes, " + too_large(max_bytes));
-  if (size == 0) refuse(file, "is empty; export the mesh again");
+  if (size == 0) refuse(file, "is empty (0 bytes); export the mesh again, or copy it again");
   try {
     if (packed) return unpack(file, max_bytes);
     std::ifstream in(file, std::ios::binary);

@@ -242,7 +242,7 @@ void check_pieces(const Connected& c, MeshCheck& check) {
   }
   if (all.count > 1) add_finding(check, "M10-pieces", Severity::info, all, "pieces that share no vertex");
   const bool consistent = check.closed && check.oriented;
-  if (!check.closed) check.volume_m3 = 0.0;
+  if (!consistent) check.volume_m3 = 0.0;
   check.oriented = consistent && check.volume_m3 > 0.0;
   if (!consistent) return;
   if (check.volume_m3 < 0.0) {

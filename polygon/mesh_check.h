@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Numbered checks of a mesh and its repair, by CGAL's polygon mesh processing. The only part of the
-// project that knows CGAL.
+// Numbered checks of a mesh and its repair, by CGAL's polygon mesh processing; mesh_repair.cpp and
+// self_intersections.cpp are the only files of the project that know CGAL. README.md lists the findings.
 #pragma once
 
 #include "polygon/mesh.h"
@@ -9,9 +9,9 @@ namespace polygon {
 
 struct MeshCheck {
   std::vector<Finding> findings;  // cheap to dear, each with a count and a place
-  bool closed = false;            // every edge has exactly two triangles
+  bool closed = false;            // every edge has exactly two triangles, coincident vertices taken as one
   bool oriented = false;          // closed and consistently oriented, outward (positive volume)
-  double volume_m3 = 0.0;         // signed; 0 when not closed
+  double volume_m3 = 0.0;         // signed; 0 when not closed or not consistently oriented
 };
 
 // `deep` also looks for self-intersections (seconds at a million triangles).

@@ -7,12 +7,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <fstream>
 #include <istream>
 #include <mutex>
 #include <new>
-#include <sstream>
+#include <span>
 #include <streambuf>
 
 #include "polygon/file_bytes.h"
@@ -59,8 +58,8 @@ class SoupImporter final : public io::BaseImporter {
   [[nodiscard]] size_t n_faces() const override { return face_begin.size() - 1; }
   [[nodiscard]] size_t n_edges() const override { return 0; }
 
-  HH add_edge(VH, VH) override { return {}; }
-  FH add_face(HH) override { return {}; }
+  HH add_edge(VH, VH) override { return HH(); }
+  FH add_face(HH) override { return FH(); }
   void add_face_texcoords(FH, VH, const std::vector<OpenMesh::Vec2f>&) override {}
   void add_face_texcoords(FH, VH, const std::vector<OpenMesh::Vec3f>&) override {}
   void set_face_texindex(FH, int) override {}
@@ -121,19 +120,17 @@ SoupImporter read_by_openmesh(const std::filesystem::path& file, ScreenedFile& s
   // OpenMesh's readers are globals that keep what they learnt of a file while they read it.
   static std::mutex one_at_a_time;
   const std::lock_guard lock(one_at_a_time);
-  OpenMesh::omerr().disable();
-  OpenMesh::omlog().disable();
-  OpenMesh::omout().disable();
+  omerr().disable();
+  omlog().disable();
+  omout().disable();
   MemoryBuffer buffer(screened.dialect);
   std::istream in(&buffer);
   SoupImporter soup;
   io::Options options(screened.binary ? io::Options::Binary : io::Options::Default);
   const bool read = io::IOManager().read(in, screened.openmesh_extension, soup, options);
-  const bool vertices_agree =
-      screened.coordinates.empty() || (soup.n_vertices() >= screened.coordinates.size());
-  // Its STL reader leaves out facets with two equal corners; all others hand over every face.
+  const bool vertices_agree = soup.n_vertices() >= screened.coordinates.size();
   const bool faces_agree =
-      screened.binary ? soup.n_faces() <= screened.faces : soup.n_faces() == screened.faces;
+      screened.may_drop ? soup.n_faces() <= screened.faces : soup.n_faces() == screened.faces;
   if (!read || !vertices_agree || !faces_agree) {
     refuse_mesh(file, "OpenMesh reads " + std::to_string(soup.n_vertices()) + " vertices and " +
                           std::to_string(soup.n_faces()) + " faces where the file has " +
@@ -143,17 +140,16 @@ SoupImporter read_by_openmesh(const std::filesystem::path& file, ScreenedFile& s
   return soup;
 }
 
-// `text` continues with "at PLACE; REMEDY".
 void report(std::vector<Finding>& findings, const char* id, Severity severity, std::size_t count,
             const std::string& text) {
   if (count > 0) findings.push_back({id, severity, count, text});
 }
 
 // Fans of triangles from polygons, what cannot be used left out and reported.
-MeshFile assemble(const ScreenedFile& screened, SoupImporter& soup, double scale) {
+MeshFile assemble(ScreenedFile& screened, SoupImporter& soup, double scale) {
   MeshFile result;
   std::vector<glm::dvec3>& vertices = result.mesh.vertices;
-  vertices = screened.coordinates.empty() ? std::move(soup.points) : screened.coordinates;
+  vertices.swap(screened.binary ? soup.points : screened.coordinates);  // STL has welded vertices, and floats
   std::vector<bool> usable(vertices.size());
   std::size_t unusable_vertices = 0;
   std::size_t first_unusable = 0;
@@ -164,7 +160,7 @@ MeshFile assemble(const ScreenedFile& screened, SoupImporter& soup, double scale
   }
 
   std::size_t out_of_range = 0, first_out_of_range = 0, nonfinite = screened.nonfinite_facets;
-  std::size_t repeated = screened.binary ? screened.faces - soup.n_faces() : 0;
+  std::size_t repeated = screened.faces - soup.n_faces();
   std::size_t polygons = 0;
   for (std::size_t f = 0; f + 1 < soup.face_begin.size(); ++f) {
     const std::span<const std::uint32_t> face(soup.corners.data() + soup.face_begin[f],
@@ -207,7 +203,8 @@ MeshFile assemble(const ScreenedFile& screened, SoupImporter& soup, double scale
              ", and are left out, which leaves holes: export the mesh again, or close it elsewhere");
   report(findings, "F03-index-out-of-range", Severity::error, out_of_range,
          "faces use vertices that the file does not have (first: face " + std::to_string(first_out_of_range) +
-             ", counted from 0), and are left out, which leaves holes: export the mesh again");
+             ", counted from 0 without shorter ones), and are left out, which leaves holes: export the mesh "
+             "again");
   report(findings, "F04-short-faces", Severity::warning, screened.short_faces,
          "faces have fewer than three corners (first: " + screened.first_short_face +
              ") and are left out: points and lines cannot be touched");

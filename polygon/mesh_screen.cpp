@@ -26,10 +26,6 @@ bool is_space(char c) {
   return c == ' ' || c == '\t' || c == '\r' || c == '\n' || c == '\v' || c == '\f';
 }
 
-bool starts_with_word(std::string_view line, std::string_view word) {
-  return line.starts_with(word) && (line.size() == word.size() || is_space(line[word.size()]));
-}
-
 std::string at_line(std::size_t line) {
   return "line " + std::to_string(line);
 }
@@ -78,6 +74,7 @@ std::string_view logical_line(TextCursor& text, std::string& joined) {
 ScreenedFile screen_obj(const std::filesystem::path& file, std::string_view bytes) {
   ScreenedFile screened;
   screened.openmesh_extension = "obj";
+  screened.may_drop = true;
   screened.dialect = "v 0 0 0\n";  // the one more, see below
   std::string joined;
   // Vertices first: a face may use vertices that come after it. OpenMesh only counts them ("v 0 0 0"); the
@@ -239,6 +236,7 @@ constexpr std::size_t kStlFacet = 50;   // normal, three corners, two free bytes
 
 void begin_stl(ScreenedFile& screened) {
   screened.openmesh_extension = "stl";
+  screened.may_drop = true;
   screened.binary = true;
   screened.dialect.assign(kStlHeader, '\0');
 }
@@ -326,9 +324,7 @@ ScreenedFile screen_stl(const std::filesystem::path& file, std::string_view byte
   const std::string_view first_word = take_word(first_line);
   const bool says_solid = first_word == "solid" || first_word == "SOLID";
   // Many binary files begin with 'solid' too, so the size decides first.
-  if (bytes.size() >= kStlHeader && expected == bytes.size()) {
-    screen_stl_binary(bytes, count, screened);
-  } else if (says_solid) {
+  if (says_solid && expected != bytes.size()) {
     screen_stl_text(file, bytes, screened);
   } else if (bytes.size() < kStlHeader) {
     refuse_mesh(file,

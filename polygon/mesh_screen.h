@@ -24,6 +24,7 @@ struct ScreenedFile {
   bool binary = false;                  // for its STL reader, which has to be told
   std::vector<glm::dvec3> coordinates;  // (file units) one a vertex; empty for STL, which holds floats
   std::size_t faces = 0;                // that OpenMesh is to find
+  bool may_drop = false;                // its OBJ and STL readers leave out faces whose corners repeat
   std::size_t short_faces = 0;          // left out: fewer than three corners
   std::string first_short_face;         // where
   std::size_t nonfinite_facets = 0;     // STL, left out: a corner is not usable

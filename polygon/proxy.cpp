@@ -24,9 +24,10 @@ struct Candidate {
   double cost = 0.0;
 };
 
-// Equality-constrained minimum on a subset: q = t + A⁻¹ Nᵀ λ with N q = o. False when the planes are dependent.
-bool solve_subset(const glm::dvec3& target, const glm::dmat3& inverse_metric, std::span<const ContactPlane> planes,
-                  const Subset& subset, Candidate& out) noexcept {
+// Equality-constrained minimum on a subset: q = t + A⁻¹ Nᵀ λ with N q = o. False when the planes are
+// dependent.
+bool solve_subset(const glm::dvec3& target, const glm::dmat3& inverse_metric,
+                  std::span<const ContactPlane> planes, const Subset& subset, Candidate& out) noexcept {
   std::array<glm::dvec3, 3> pull;  // A⁻¹ n
   std::array<double, 3> missing{};
   glm::dmat3 gram(1.0);
@@ -44,7 +45,7 @@ bool solve_subset(const glm::dvec3& target, const glm::dmat3& inverse_metric, st
   }
   if (!(std::fabs(glm::determinant(gram)) > kSingular * diagonal)) return false;
   const glm::dvec3 lambda = glm::inverse(gram) * glm::dvec3(missing[0], subset.count > 1 ? missing[1] : 0.0,
-                                                           subset.count > 2 ? missing[2] : 0.0);
+                                                            subset.count > 2 ? missing[2] : 0.0);
   out.point = target;
   out.cost = 0.0;
   for (std::uint32_t i = 0; i < subset.count; ++i) {
@@ -57,8 +58,8 @@ bool solve_subset(const glm::dvec3& target, const glm::dmat3& inverse_metric, st
 
 }  // namespace
 
-PlaneMinimum minimise_on_planes(const glm::dvec3& target, const glm::dmat3& metric, std::span<const ContactPlane> planes,
-                                double tolerance) noexcept {
+PlaneMinimum minimise_on_planes(const glm::dvec3& target, const glm::dmat3& metric,
+                                std::span<const ContactPlane> planes, double tolerance) noexcept {
   PlaneMinimum result;
   result.point = target;
   if (planes.empty()) return result;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The proxy's constrained minimum: where a ball goes that wants to be elsewhere and may not enter anything rigid.
-// God-object (Zilles & Salisbury 1995) with a finite radius (Ruspini, Kolarov & Khatib 1997).
+// The proxy's constrained minimum: where a ball goes that wants to be elsewhere and may not enter anything
+// rigid. God-object (Zilles & Salisbury 1995) with a finite radius (Ruspini, Kolarov & Khatib 1997).
 #pragma once
 
 #include <array>
@@ -21,18 +21,18 @@ struct ContactPlane {
 
 struct PlaneMinimum {
   glm::dvec3 point{0.0};
-  std::uint32_t active_count = 0;             // planes that hold the point, at most three
-  std::array<std::uint32_t, 3> active{};      // their indices
-  std::array<double, 3> multiplier{};         // >= 0, in units of metric · meter
-  bool feasible = true;                       // false: the planes leave no room, `point` breaks the last one
+  std::uint32_t active_count = 0;         // planes that hold the point, at most three
+  std::array<std::uint32_t, 3> active{};  // their indices
+  std::array<double, 3> multiplier{};     // >= 0, in units of metric · meter
+  bool feasible = true;                   // false: the planes leave no room, `point` breaks the last one
 };
 
-// The point nearest to `target` in the metric (q − t)ᵀ A (q − t), A symmetric positive definite, in the intersection
-// of the planes' half-spaces. Exact: the most violated plane joins, and of the subsets of at most three planes that
-// contain it the one with non-negative multipliers is kept; the distance grows each time, so it ends (an LP-type
-// problem, Sharir & Welzl 1992). A plane counts as violated beyond `tolerance` (unit: meter).
-// Bounded, allocates nothing.
-PlaneMinimum minimise_on_planes(const glm::dvec3& target, const glm::dmat3& metric, std::span<const ContactPlane> planes,
-                                double tolerance) noexcept;
+// The point nearest to `target` in the metric (q − t)ᵀ A (q − t), A symmetric positive definite, in the
+// intersection of the planes' half-spaces. Exact: the most violated plane joins, and of the subsets of at
+// most three planes that contain it the one with non-negative multipliers is kept; the distance grows each
+// time, so it ends (an LP-type problem, Sharir & Welzl 1992). A plane counts as violated beyond `tolerance`
+// (unit: meter). Bounded, allocates nothing.
+PlaneMinimum minimise_on_planes(const glm::dvec3& target, const glm::dmat3& metric,
+                                std::span<const ContactPlane> planes, double tolerance) noexcept;
 
 }  // namespace polygon

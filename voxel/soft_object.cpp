@@ -18,7 +18,7 @@ constexpr float kTight = 1e-4F;             // of the spacing: nearer to its lim
 
 }  // namespace
 
-SoftObject::SoftObject(std::unique_ptr<const Lattice> lattice)
+SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice)
     : lattice_(std::move(lattice)),
       state_(*lattice_),
       chain_(*lattice_),
@@ -36,6 +36,19 @@ SoftObject::SoftObject(std::unique_ptr<const Lattice> lattice)
   held_voxels_.reserve(surface.size());
   background_held_.reserve(surface.size() + kMaxTouched);
   carried_.reserve(kMaxCarried + kMaxTouched);
+}
+
+std::unique_ptr<SoftObject> SoftObject::copy() const {
+  auto result = std::make_unique<SoftObject>(lattice_);
+  result->state_ = state_;
+  result->obstacles_ = obstacles_;
+  result->pair_held_ = pair_held_;
+  for (const VoxelId v : held_voxels_) result->held_voxels_.push_back(v);
+  for (const Touch& t : touches_) result->touches_.push_back(t);
+  for (const VoxelId v : touched_voxels_) result->touched_voxels_.push_back(v);
+  result->moved_ever_ = moved_ever_;
+  if (!relaxation_.asleep()) result->relaxation_.wake();
+  return result;
 }
 
 double SoftObject::reach(double tool_radius) const {

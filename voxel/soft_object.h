@@ -46,7 +46,9 @@ class SoftObject {
  public:
   static constexpr std::size_t kMaxTouched = 4096;  // surface voxels near the tool; more are left to the next tick
 
-  explicit SoftObject(std::unique_ptr<const Lattice> lattice);
+  explicit SoftObject(std::shared_ptr<const Lattice> lattice);
+  // The same object in the same state, sharing the lattice; for references found beside a running session.
+  [[nodiscard]] std::unique_ptr<SoftObject> copy() const;
 
   [[nodiscard]] const Lattice& lattice() const { return *lattice_; }
   [[nodiscard]] const Displacement& state() const { return state_; }
@@ -128,7 +130,7 @@ class SoftObject {
   void gather_load(int axis) noexcept;
   [[nodiscard]] ObstacleView obstacle_view() const { return {obstacles_, surface_number_}; }
 
-  std::unique_ptr<const Lattice> lattice_;
+  std::shared_ptr<const Lattice> lattice_;
   Displacement state_;
   ChainMail chain_;
   Relaxation relaxation_;

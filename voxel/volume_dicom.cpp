@@ -2,13 +2,14 @@
 // A folder with one DICOM series: its slices put in order by their own positions, one slice in memory at a
 // time.
 #include <itkGDCMImageIO.h>
-#include <itkGDCMSeriesFileNames.h>
 
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
+#include <map>
 
+#include "voxel/dicom_check.h"
 #include "voxel/volume_itk.h"
 
 namespace voxel {
@@ -18,6 +19,7 @@ namespace fs = std::filesystem;
 
 struct Slice {
   std::string file;
+  std::string series;  // its identifier
   FileFrame frame;
   Component component = Component::int16;
   double height = 0.0;  // (unit: the file's) along the slice normal
@@ -25,32 +27,6 @@ struct Slice {
 
 std::string name_of(const Slice& slice) {
   return fs::path(slice.file).filename().string();
-}
-
-// The files of the only series in the folder.
-std::vector<std::string> files_of_series(const fs::path& folder) {
-  return in_words(folder, "the folder cannot be read as a DICOM series", kDamaged, [&] {
-    const auto names = itk::GDCMSeriesFileNames::New();
-    names->SetUseSeriesDetails(false);
-    names->SetInputDirectory(folder.string());
-    const std::vector<std::string> series = names->GetSeriesUIDs();
-    if (series.empty()) {
-      refuse_volume(folder,
-                    "the folder holds no DICOM series; give the folder that directly holds the slices");
-    }
-    if (series.size() > 1) {
-      std::ostringstream text;
-      constexpr std::size_t kNamed = 8;
-      for (std::size_t n = 0; n < std::min(series.size(), kNamed); ++n) {
-        text << (n == 0 ? "" : ", ") << series[n] << " (" << names->GetFileNames(series[n]).size()
-             << " files)";
-      }
-      if (series.size() > kNamed) text << ", ...";
-      refuse_volume(folder, "the folder holds ", series.size(), " DICOM series: ", text.str(),
-                    "; put the files of one of them into a folder of their own");
-    }
-    return std::vector<std::string>(names->GetFileNames(series.front()));
-  });
 }
 
 Slice read_slice_header(const std::string& file) {
@@ -66,6 +42,7 @@ Slice read_slice_header(const std::string& file) {
   Slice slice;
   slice.file = file;
   slice.component = *component;
+  io->GetValueFromTag("0020|000e", slice.series);
   const unsigned axes = std::min(io->GetNumberOfDimensions(), 3U);
   slice.frame.dims = {1.0, 1.0, 1.0};
   for (unsigned axis = 0; axis < axes; ++axis) {
@@ -79,6 +56,45 @@ Slice read_slice_header(const std::string& file) {
     }
   }
   return slice;
+}
+
+// The slices of the only series in the folder, in no order. Not by GDCMSeriesFileNames, which reads every
+// file of the folder as it is.
+std::vector<Slice> read_slices(const fs::path& folder, std::vector<std::string>& notes) {
+  std::vector<fs::path> files;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+    if (entry->is_regular_file(error)) files.push_back(entry->path());
+  }
+  if (error)
+    refuse_volume(folder, "the folder cannot be read (", error.message(), "); check its permissions");
+  std::sort(files.begin(), files.end());
+  std::vector<Slice> slices;
+  std::size_t others = 0;
+  std::map<std::string, std::size_t> series;
+  for (const fs::path& file : files) {
+    if (check_dicom(file) != DicomKind::image) {
+      ++others;
+      continue;
+    }
+    slices.push_back(read_slice_header(file));
+    ++series[slices.back().series];
+  }
+  if (slices.empty()) {
+    refuse_volume(folder, "the folder holds no DICOM series; give the folder that directly holds the slices");
+  }
+  if (series.size() > 1) {
+    std::ostringstream text;
+    std::size_t named = 0;
+    for (const auto& [name, count] : series) {
+      if (named++ < 8) text << (named == 1 ? "" : ", ") << name << " (" << count << " files)";
+    }
+    refuse_volume(folder, "the folder holds ", series.size(), " DICOM series: ", text.str(),
+                  named > 8 ? ", ..." : "", "; put the files of one of them into a folder of their own");
+  }
+  if (others > 0)
+    notes.push_back(std::to_string(others) + " files of the folder are not DICOM images and were left out");
+  return slices;
 }
 
 void check_alike(const fs::path& folder, const Slice& first, const Slice& slice) {
@@ -138,10 +154,8 @@ double slice_step(const fs::path& folder, const std::vector<Slice>& slices) {
 
 DicomSeries read_dicom_header(const fs::path& folder, double unit_m) {
   itk::Object::SetGlobalWarningDisplay(false);  // the findings that matter are said in our own words
-  std::vector<Slice> slices;
-  for (const std::string& file : files_of_series(folder)) slices.push_back(read_slice_header(file));
-  if (slices.empty()) refuse_volume(folder, "the folder's DICOM series has no images");
   DicomSeries series;
+  std::vector<Slice> slices = read_slices(folder, series.data.header.notes);
   series.data.header.format = "DICOM series";
   Component component = slices.front().component;
   for (Slice& slice : slices) {

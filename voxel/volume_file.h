@@ -1,5 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Volumes in and out of files. The only part of the project that knows ITK.
+// Frame: whatever the format, positions come out in ITK's (and DICOM's) world frame, in which x points to the
+// patient's left, y to the back and z to the head (LPS). That frame is the scene's. NIfTI files state theirs
+// as RAS (x right, y front), so their x and y change sign here and again on saving: viewers see the same
+// place.
 #pragma once
 
 #include <cstdint>
@@ -41,9 +45,11 @@ struct LabelRule {
 struct VolumeFileOptions {
   double unit_m = 1e-3;          // length unit of the file (medical formats: mm)
   std::vector<LabelRule> rules;  // empty: the file holds labels 0..255, kept as they are
-  std::optional<glm::dvec3>
-      spacing_m;  // resample to this spacing (nearest neighbour); as in the file otherwise
-  std::uint64_t max_bytes = 8ULL * 1024 * 1024 * 1024;  // refused above, with the numbers, before allocation
+  // Resample to this spacing (nearest neighbour); as in the file otherwise.
+  std::optional<glm::dvec3> spacing_m;
+  // Most memory that loading may take: the voxels (NIfTI and NRRD: with the copies their libraries make) and
+  // the labels. Refused above, with the numbers, before allocation.
+  std::uint64_t max_bytes = 8ULL * 1024 * 1024 * 1024;
 };
 
 // `path` is a file, or a folder holding one DICOM series. Throws VolumeError.
@@ -53,17 +59,18 @@ VolumeHeader read_volume_header(const std::filesystem::path& path, double unit_m
 // is reversed, so that `rotation` is a proper rotation. Throws VolumeError.
 LabelVolume load_volume(const std::filesystem::path& path, const VolumeFileOptions& options);
 
-// The labels found and how many voxels each has, for `check` (and the range of intensities). Throws
+// The labels found and how many voxels each has, and the range of intensities, for `check`. Throws
 // VolumeError.
 struct VolumeStatistics {
   double minimum = 0.0, maximum = 0.0;
-  std::vector<std::pair<int, std::size_t>>
-      label_counts;  // only when the file is integral with values in 0..255
+  // Only when every value is a whole number in 0..255; in rising order, with 0 (empty) where it occurs.
+  std::vector<std::pair<int, std::size_t>> label_counts;
 };
 VolumeStatistics read_volume_statistics(const std::filesystem::path& path,
                                         std::uint64_t max_bytes = 8ULL << 30);
 
-// Writes labels with their frame as NIfTI/NRRD/MetaImage, by extension. Throws VolumeError.
+// Writes labels with their frame as NIfTI/NRRD/MetaImage, by extension. NRRD and MetaImage keep the frame to
+// double precision, NIfTI to single. Throws VolumeError.
 void save_volume(const std::filesystem::path& path, const LabelVolume& volume, double unit_m = 1e-3);
 
 }  // namespace voxel

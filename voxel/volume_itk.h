@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "voxel/volume_data.h"
+#include "voxel/volume_inspect.h"
 
 namespace voxel {
 
@@ -39,9 +40,6 @@ auto in_words(const std::filesystem::path& path, const char* doing, const char* 
     refuse_volume(path, doing, ": ", error.what(), "; ", remedy);
   }
 }
-
-inline constexpr const char* kDamaged =
-    "the file is damaged, incomplete or not what its name says: copy or export it again";
 
 // One DICOM series in a folder (volume_dicom.cpp), its files in order along the slice normal.
 struct DicomSeries {

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <fstream>
 #include <glm/geometric.hpp>
+#include <iostream>
 #include <iterator>
 #include <string>
 
@@ -27,11 +28,8 @@ using testing::IsEmpty;
 
 class PathFile : public testing::Test {
  protected:
-  PathFile()
-      : folder_(std::filesystem::temp_directory_path() / ("hybrid path file " + std::to_string(getpid()))) {
-    std::filesystem::create_directories(folder_);
-  }
-  ~PathFile() override {
+  void SetUp() override { std::filesystem::create_directories(folder_); }
+  void TearDown() override {
     std::error_code ignored;
     std::filesystem::remove_all(folder_, ignored);
   }
@@ -49,7 +47,8 @@ class PathFile : public testing::Test {
     }
     return {};
   }
-  std::filesystem::path folder_;
+  std::filesystem::path folder_ =
+      std::filesystem::temp_directory_path() / ("hybrid path file " + std::to_string(getpid()));
 };
 
 TEST_F(PathFile, UnitsComeFromTheHeader) {
@@ -206,7 +205,7 @@ TEST(PathFileData, RecordedTrajectoriesAreFollowed) {
     } else {
       EXPECT_THAT(path->notes(), IsEmpty());
     }
-    for (const std::string& note : path->notes()) RecordProperty("note", note);
+    for (const std::string& note : path->notes()) std::cout << "  note: " << note << "\n";
   }
 }
 

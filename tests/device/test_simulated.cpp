@@ -16,7 +16,6 @@ using device::device_limits;
 using device::DeviceModel;
 using device::DeviceState;
 using device::HandModel;
-using device::HapticDevice;
 using device::LissajousPath;
 using device::make_path;
 using device::make_simulated_device;
@@ -119,7 +118,8 @@ TEST(SimulatedDevice, TheVelocityEstimateIsTheMeanOfTheLastMillisecondsWithinAnE
 TEST(SimulatedDevice, TheVelocityEstimateHoldsAtAnyRateAndAfterStalls) {
   for (const double dt_s : {1e-5, 1e-4, 1e-3, 1e-2, 0.1}) {
     const auto device = make_simulated_device(DeviceModel::premium_1_5, {}, leg({0, 0, 0}, {1.0, 0, 0}, 0.1));
-    for (double t = 0.0; t < 2.0; t += dt_s) device->write({0, 0, 0}, dt_s);
+    const long ticks = std::lround(2.0 / dt_s);
+    for (long tick = 0; tick < ticks; ++tick) device->write({0, 0, 0}, dt_s);
     EXPECT_NEAR(device->read().velocity_m_per_s.x, 0.1, 0.03e-3 / 5e-3) << dt_s;
   }
 }

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <random>
 #include <string>
+#include <system_error>
 
 #include "hybrid/scene.h"
 
@@ -28,6 +29,8 @@ class SceneFile : public ::testing::Test {
   void TearDown() override { std::filesystem::remove_all(folder_); }
 
   std::filesystem::path write(const std::string& name, const std::string& text) const {
+    std::error_code none;
+    std::filesystem::remove(folder_ / name, none);  // some file systems wait for the disk when a file is overwritten
     std::ofstream(folder_ / name, std::ios::binary) << text;
     return folder_ / name;
   }

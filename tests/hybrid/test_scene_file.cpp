@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "hybrid/scene.h"
+#include "hybrid/scene_tree.h"
 #include "tests/hybrid/scene_file_fixture.h"
 
 namespace {
@@ -58,9 +59,9 @@ TEST_F(SceneFile, EveryUnitBecomesMeters) {
   const std::vector<std::pair<std::string, double>> units = {
       {"m", 1.0}, {"cm", 1e-2}, {"mm", 1e-3}, {"um", 1e-6}};
   for (const auto& [name, meters] : units) {
-    const Scene scene = load("format = 1\nunits = \"" + name +
-                             "\"\n[occupancy]\ncell = 3\n[tool]\nradius = 2\nstiffness = 700\n" + ball +
-                             "position = [1, 2, 3]\n" + block + path + "speed = 40\n");
+    const Scene scene = load(hybrid::words("format = 1\nunits = \"", name,
+                                           "\"\n[occupancy]\ncell = 3\n[tool]\nradius = 2\nstiffness = 700\n",
+                                           ball, "position = [1, 2, 3]\n", block, path, "speed = 40\n"));
     EXPECT_DOUBLE_EQ(scene.unit_m, meters);
     EXPECT_DOUBLE_EQ(scene.occupancy_cell_m.value_or(0.0), 3.0 * meters);
     EXPECT_DOUBLE_EQ(scene.tool.radius_m, 2.0 * meters);

@@ -45,6 +45,8 @@ const Broken broken[] = {
     {"utf16", "1:1", "UTF-16", "save it as UTF-8"},
     {"syntax", "2:9", "value", "quotes"},
     {"syntax-header", "2:2", "no key", "correct the TOML"},
+    {"not-ascii-key", "3:1", "outside of quotes", "quotes"},
+    {"not-ascii-escape", "3:1", "behind a backslash", "remove"},
     {"duplicate-key", "7:11", "'spacing'", "keep one"},
     {"deep-nesting", "2:41", "nested", "list of points"},
     {"long-dotted-key", "2:130", "64 parts", "shorten"},
@@ -167,6 +169,28 @@ TEST_F(SceneRefusal, ARefusalIsOnePrintableLine) {
       refusal("format = 1\n\"\\u0007\\n" + std::string(500, 'k') + "\" = 1\n" + block + path);
   EXPECT_LT(what.size(), 400U);
   for (const char c : what) EXPECT_TRUE(c == ' ' || std::isgraph(static_cast<unsigned char>(c)) != 0);
+}
+
+TEST(SceneScreen, LetsTextInQuotesAndCommentsPass) {
+  const std::vector<std::string> good = {
+      "title = \"é µ\" # é\n",  "title = 'é\\' # é\n",
+      "title = \"\\\"é\"\n",    "title = \"\"\"é\n\"\" \\\n  a é\"\"\"\"\"\nformat = 1\n",
+      "title = '''é\n\\é'''\n", "\"é\" = \"\"\n",
+      "a = \"\" # \"é\n",
+  };
+  for (const std::string& text : good) EXPECT_NO_THROW((void)hybrid::parse_tree(text, "scene.toml")) << text;
+  const std::vector<std::string> bad = {"é = 1\n",       "a = é\n",
+                                        "a = \"\" é\n",  "a = \"\"\"b\"\"\" é\n",
+                                        "a = 'b\\' é\n", "a = \"\"\"\\é\"\"\"\n"};
+  for (const std::string& text : bad) {
+    try {
+      (void)hybrid::parse_tree(text, "scene.toml");
+      ADD_FAILURE() << text;
+    } catch (const SceneError& error) {
+      EXPECT_NE(std::string(error.what()).find("the character 'é' stands"), std::string::npos)
+          << error.what();
+    }
+  }
 }
 
 TEST(SceneKeys, EditDistanceCountsEditsAndSwaps) {

@@ -1,0 +1,373 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/build.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include "hybrid/arbitration.h"
+#include "hybrid/build_objects.h"
+#include "hybrid/label_surface.h"
+#include "hybrid/soft_stage.h"
+
+namespace hybrid {
+namespace {
+
+constexpr int kSurfaceSmoothing = 6;           // of a soft object's drawn surface
+constexpr double kMostCells = 512.0;           // cells along the scene's longest side, at most, unless the scene says otherwise
+constexpr std::size_t kMapReserve = 2048;      // bricks that motion may add
+constexpr double kFarthestLook = 32.0;         // spacings that one distance query may clear of carving
+
+struct Box {
+  glm::dvec3 low{1e300}, high{-1e300};
+  void add(const glm::dvec3& p) {
+    low = glm::min(low, p);
+    high = glm::max(high, p);
+  }
+};
+
+[[noreturn]] void refuse(const Scene& scene, SourcePlace place, const std::string& text) {
+  throw SceneError(scene.file, place, text);
+}
+
+// Runs a step whose exceptions are about what stands at `place` in the scene file.
+template <class Step>
+auto at_place(const Scene& scene, SourcePlace place, const std::string& name, Step&& step) {
+  try {
+    return step();
+  } catch (const SceneError&) {
+    throw;
+  } catch (const std::bad_alloc&) {
+    refuse(scene, place, fmt::format("\"{}\" does not fit in memory; give it a coarser spacing or a smaller part", name));
+  } catch (const std::exception& e) {
+    refuse(scene, place, fmt::format("\"{}\": {}", name, e.what()));
+  }
+}
+
+double choose_cell(const Scene& scene, const Box& box, double soft_spacing) {
+  const glm::dvec3 size = box.high - box.low;
+  const double longest = std::max({size.x, size.y, size.z});
+  if (scene.occupancy_cell_m) {
+    // A flat sheet's worth of cells on each side is what surfaces take, a brick of 2.6 kB each in the worst case.
+    const double across = longest / *scene.occupancy_cell_m;
+    const double bytes = 6.0 * across * across / 64.0 * 2600.0;
+    if (bytes > 0.25 * static_cast<double>(usable_memory_bytes())) {
+      refuse(scene, {}, fmt::format("an occupancy cell of {:.3g} m over a scene of {:.3g} m needs about {:.1f} GB; "
+                                    "use a larger [occupancy] cell or leave it out",
+                                    *scene.occupancy_cell_m, longest, bytes / 1e9));
+    }
+    return *scene.occupancy_cell_m;
+  }
+  const double wanted = soft_spacing > 0.0 ? soft_spacing : 0.5 * scene.tool.radius_m;
+  return std::max(wanted, longest / kMostCells);
+}
+
+// Long triangles are halved until each spans few cells: else the box of an oblique one would be all there is to look at.
+void rasterise(OccupancyMap& map, std::uint32_t object, const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
+  const double ab = glm::length(b - a), bc = glm::length(c - b), ca = glm::length(a - c);
+  const double longest = std::max({ab, bc, ca});
+  if (longest <= 8.0 * map.cell_m()) {
+    map.add_triangle(object, a, b, c);
+  } else if (longest == ab) {
+    const glm::dvec3 m = 0.5 * (a + b);
+    rasterise(map, object, a, m, c);
+    rasterise(map, object, m, b, c);
+  } else if (longest == bc) {
+    rasterise(map, object, b, c, a);
+  } else {
+    rasterise(map, object, c, a, b);
+  }
+}
+
+// Distance to the nearest rigid surface within `range`, and whether the point is inside a rigid solid.
+struct RigidDistance {
+  double distance;
+  bool inside;
+};
+RigidDistance rigid_distance(const std::vector<RigidObject>& rigid, const glm::dvec3& p, double range) {
+  RigidDistance result{range, false};
+  for (const RigidObject& object : rigid) {
+    const glm::dvec3 in_body = object.to_body(p);
+    polygon::NearPoint near;
+    if (object.surface->nearest(in_body, result.distance, near)) result.distance = near.distance;
+    const glm::dvec3 low = object.surface->lower(), high = object.surface->upper();
+    const bool within = glm::all(glm::greaterThanEqual(in_body, low)) && glm::all(glm::lessThanEqual(in_body, high));
+    result.inside = result.inside || (within && object.surface->inside(in_body));
+  }
+  return result;
+}
+
+// Takes out voxels that lie in a rigid solid or nearer than half a spacing to a rigid surface, so that nothing is felt
+// before contact; and gathers those within `anchor_m`, which bone will hold. Returns how many were carved.
+std::size_t carve_by_rigid(const std::vector<RigidObject>& rigid, voxel::LabelVolume& volume, double anchor_m,
+                           std::vector<std::size_t>& anchored) {
+  const double h = std::min({volume.spacing_m.x, volume.spacing_m.y, volume.spacing_m.z});
+  const double clear = std::max(0.5 * h, anchor_m);
+  std::size_t carved = 0;
+  for (int k = 0; k < volume.dims[2]; ++k) {
+    for (int j = 0; j < volume.dims[1]; ++j) {
+      for (int i = 0; i < volume.dims[0]; ++i) {
+        if (volume.labels[volume.index(i, j, k)] == 0) continue;
+        const glm::dvec3 p = volume.origin_m + volume.rotation * (glm::dvec3(i, j, k) * volume.spacing_m);
+        const RigidDistance near = rigid_distance(rigid, p, clear + kFarthestLook * h);
+        // Everything nearer to p than the surface lies on the same side of it: voxels of the row that are further from
+        // it than `clear` need no look of their own.
+        const int run = std::max(0, static_cast<int>((near.distance - clear) / volume.spacing_m.x));
+        const int last = std::min(volume.dims[0] - 1, i + run);
+        for (; i <= last; ++i) {
+          std::uint8_t& label = volume.labels[volume.index(i, j, k)];
+          if (label == 0) continue;
+          if (near.inside || (run == 0 && near.distance < 0.5 * h)) {
+            label = 0;
+            ++carved;
+          } else if (run == 0 && near.distance <= anchor_m) {
+            anchored.push_back(volume.index(i, j, k));
+          }
+        }
+        --i;
+      }
+    }
+  }
+  return carved;
+}
+
+// Voxels of `first` that lie in filled voxels of `later` are taken out of it.
+std::size_t carve_by_soft(voxel::LabelVolume& first, const voxel::LabelVolume& later) {
+  std::size_t carved = 0;
+  const glm::dquat to_later = glm::inverse(later.rotation) * first.rotation;
+  const glm::dvec3 shift = glm::inverse(later.rotation) * (first.origin_m - later.origin_m);
+  for (int k = 0; k < first.dims[2]; ++k) {
+    for (int j = 0; j < first.dims[1]; ++j) {
+      for (int i = 0; i < first.dims[0]; ++i) {
+        std::uint8_t& label = first.labels[first.index(i, j, k)];
+        if (label == 0) continue;
+        const glm::dvec3 c = glm::round((shift + to_later * (glm::dvec3(i, j, k) * first.spacing_m)) / later.spacing_m);
+        bool within = true;
+        for (int d = 0; d < 3; ++d) within = within && c[d] >= 0.0 && c[d] < later.dims[static_cast<std::size_t>(d)];
+        if (!within) continue;
+        if (later.labels[later.index(static_cast<int>(c.x), static_cast<int>(c.y), static_cast<int>(c.z))] == 0) continue;
+        label = 0;
+        ++carved;
+      }
+    }
+  }
+  return carved;
+}
+
+class Builder {
+ public:
+  Builder(const Scene& scene, const Progress& progress) : scene_(scene), progress_(progress) {}
+
+  BuiltScene build() {
+    const auto start = std::chrono::steady_clock::now();
+    if (scene_.tool.shape == Tool::Shape::punch && !scene_.rigid.empty()) {
+      refuse(scene_, scene_.rigid.front().place, "a punch against rigid objects is not supported yet; use [tool] shape = \"ball\"");
+    }
+    for (const RigidDescription& d : scene_.rigid) add_rigid(d);
+    for (const SoftDescription& d : scene_.soft) read_soft(d);
+    settle_overlaps();
+    make_lattices();
+    fill_map();
+    finish_world();
+    for (std::size_t o = 0; o < soft_.size(); ++o) {
+      if (world_->rigid.empty()) break;
+      world_->soft[o].near_rigid = find_obstacles(*world_, *built_.state, o) > 0;
+    }
+    built_.world = std::move(world_);
+    built_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    return std::move(built_);
+  }
+
+ private:
+  void say(const std::string& text) const {
+    if (progress_) progress_(text);
+  }
+
+  void add_rigid(const RigidDescription& d) {
+    say(fmt::format("reading rigid \"{}\"", d.name));
+    at_place(scene_, d.source_place, d.name, [&] { world_->rigid.push_back(build_rigid(d, built_.notes)); });
+    const RigidObject& object = world_->rigid.back();
+    for (const glm::dvec3& v : object.drawn.vertices) box_.add(object.to_scene(v));
+  }
+
+  void read_soft(const SoftDescription& d) {
+    say(fmt::format("reading soft \"{}\"", d.name));
+    at_place(scene_, d.source_place, d.name, [&] {
+      volumes_.push_back(build_volume(d, built_.notes));
+      const std::uint64_t bytes = soft_volume_bytes(volumes_.back().dims);
+      if (bytes > usable_memory_bytes()) {
+        throw std::runtime_error(fmt::format("a lattice of {} x {} x {} voxels needs about {:.1f} GB and this machine has "
+                                             "{:.1f} GB; give it a coarser spacing",
+                                             volumes_.back().dims[0], volumes_.back().dims[1], volumes_.back().dims[2],
+                                             static_cast<double>(bytes) / 1e9,
+                                             static_cast<double>(usable_memory_bytes()) / 1e9));
+      }
+    });
+  }
+
+  void settle_overlaps() {
+    anchored_.resize(volumes_.size());
+    for (std::size_t o = 0; o < volumes_.size(); ++o) {
+      const SoftDescription& d = scene_.soft[o];
+      std::size_t carved = 0;
+      if (!world_->rigid.empty()) {
+        say(fmt::format("looking where \"{}\" meets rigid objects", d.name));
+        carved = carve_by_rigid(world_->rigid, volumes_[o], d.anchors.rigid_within_m, anchored_[o]);
+        note_carved(d, carved, "rigid objects");
+      }
+      for (std::size_t later = o + 1; later < volumes_.size(); ++later) {
+        note_carved(d, carve_by_soft(volumes_[o], volumes_[later]), "\"" + scene_.soft[later].name + "\"");
+      }
+    }
+  }
+
+  void note_carved(const SoftDescription& d, std::size_t carved, const std::string& by) {
+    if (carved == 0) return;
+    if (scene_.overlap == Overlap::refuse) {
+      refuse(scene_, d.place, fmt::format("\"{}\" overlaps {} in {} voxels; move one of them, or say overlap = \"carve\"",
+                                          d.name, by, carved));
+    }
+    built_.notes.push_back({d.name, polygon::Severity::info, fmt::format("{} voxels carved where {} lie", carved, by)});
+  }
+
+  void make_lattices() {
+    for (std::size_t o = 0; o < volumes_.size(); ++o) {
+      const SoftDescription& d = scene_.soft[o];
+      say(fmt::format("building the lattice of \"{}\"", d.name));
+      at_place(scene_, d.source_place, d.name, [&] {
+        voxel::LatticeOptions options = lattice_options(scene_, d);
+        options.anchor_voxels = anchored_[o];
+        soft_.push_back(std::make_unique<voxel::SoftObject>(std::make_unique<voxel::Lattice>(volumes_[o], options)));
+        SoftBody body{.name = d.name, .pose = {volumes_[o].origin_m, volumes_[o].rotation}, .budget = d.budget, .drawn = {}};
+        body.drawn = surface_from_labels(volumes_[o], kSurfaceSmoothing);
+        for (const glm::dvec3& v : body.drawn.vertices) box_.add(body.to_scene(v));
+        world_->soft.push_back(std::move(body));
+        volumes_[o] = {};  // the lattice has what it needs
+      });
+    }
+  }
+
+  void fill_map() {
+    say("filling the occupancy map");
+    double spacing = 0.0;
+    for (const auto& object : soft_) {
+      const double h = object->lattice().min_spacing_m();
+      spacing = spacing == 0.0 ? h : std::min(spacing, h);
+    }
+    const glm::dvec3 middle = 0.5 * (box_.low + box_.high);
+    map_ = std::make_unique<OccupancyMap>(choose_cell(scene_, box_, spacing), middle);
+    for (std::uint32_t o = 0; o < world_->rigid.size(); ++o) {
+      const RigidObject& object = world_->rigid[o];
+      for (const polygon::TriangleIndices& t : object.drawn.triangles) {
+        rasterise(*map_, o, object.to_scene(object.drawn.vertices[t[0]]), object.to_scene(object.drawn.vertices[t[1]]),
+                  object.to_scene(object.drawn.vertices[t[2]]));
+      }
+    }
+    for (std::size_t o = 0; o < soft_.size(); ++o) {
+      SoftBody& body = world_->soft[o];
+      const auto surface = soft_[o]->lattice().surface();
+      body.first_number = map_->add_soft(static_cast<std::uint32_t>(surface.size()));
+      for (std::uint32_t s = 0; s < surface.size(); ++s) {
+        map_->place(body.first_number + s, body.to_scene(soft_[o]->position(surface[s])));
+      }
+    }
+    map_->reserve_bricks(soft_.empty() ? 0 : kMapReserve);
+  }
+
+  void finish_world() {
+    world_->tool = scene_.tool;
+    world_->limits = scene_.safety;
+    if (!scene_.max_force_given) {
+      const double most = device::device_limits(scene_.device_model).max_force_N;
+      if (most > 0.0 && std::isfinite(most)) world_->limits.max_force_N = most;
+    }
+    for (std::uint32_t a = 0; a < world_->soft.size(); ++a) {
+      for (std::uint32_t b = a + 1; b < world_->soft.size(); ++b) world_->meeting.push_back({a, b});
+    }
+    built_.state = std::make_unique<WorldState>(*world_, std::move(*map_));
+    built_.state->soft = std::move(soft_);
+    built_.state->prepare(*world_);
+  }
+
+  const Scene& scene_;
+  const Progress& progress_;
+  BuiltScene built_;
+  std::unique_ptr<World> world_ = std::make_unique<World>();
+  std::vector<voxel::LabelVolume> volumes_;
+  std::vector<std::vector<std::size_t>> anchored_;
+  std::vector<std::unique_ptr<voxel::SoftObject>> soft_;
+  std::unique_ptr<OccupancyMap> map_;
+  Box box_;
+};
+
+}  // namespace
+
+WorldState::WorldState(const World& world, OccupancyMap occupancy) : map(std::move(occupancy)) {
+  feel.resize(world.object_count());
+  rigid_force_N.resize(world.rigid.size());
+  near.resize(world.rigid.empty() ? 0 : kMaxNear);
+  planes.reserve(kMaxPlanes);
+}
+
+void WorldState::prepare(const World& world) {
+  reactions.resize(soft.size());
+  obstacle_seen.resize(soft.size());
+  cursor.assign(soft.size(), 0);
+  touched.resize(soft.size());
+  for (auto& list : touched) list.reserve(voxel::SoftObject::kMaxTouched);
+  if (!soft.empty()) {
+    bounds.resize(kMaxPlanes / 2);
+    found.resize(kMaxFound);
+  }
+  pair_cursor.assign(world.meeting.size(), 0);
+  paired.resize(world.meeting.size());
+  for (std::size_t m = 0; m < world.meeting.size(); ++m) {
+    paired[m].assign(soft[world.meeting[m][0]]->lattice().surface().size(), 0);
+  }
+  pairs.reserve(world.meeting.empty() ? 0 : kMaxPairs);
+}
+
+BuiltScene build_scene(const Scene& scene, const Progress& progress) { return Builder(scene, progress).build(); }
+
+std::uint64_t usable_memory_bytes() {
+  const long pages = sysconf(_SC_PHYS_PAGES), size = sysconf(_SC_PAGE_SIZE);
+  return pages > 0 && size > 0 ? static_cast<std::uint64_t>(pages) * static_cast<std::uint64_t>(size) : 4ULL << 30;
+}
+
+DrawnScene drawn_scene(const World& world, const std::string& title) {
+  DrawnScene drawn{.title = title,
+                   .objects = {},
+                   .tool_is_punch = world.tool.shape == Tool::Shape::punch,
+                   .tool_radius_m = world.tool.radius_m,
+                   .max_force_N = world.limits.max_force_N};
+  for (const RigidObject& object : world.rigid) {
+    drawn.objects.push_back({object.name, false, object.drawn});
+    for (glm::dvec3& v : drawn.objects.back().surface.vertices) v = object.to_scene(v);
+  }
+  for (const SoftBody& body : world.soft) {
+    drawn.objects.push_back({body.name, true, body.drawn});
+    for (glm::dvec3& v : drawn.objects.back().surface.vertices) v = body.to_scene(v);
+  }
+  return drawn;
+}
+
+void fill_soft_vertices(const World& world, const WorldState& state, Snapshot& snapshot) {
+  snapshot.soft_vertices.resize(world.object_count());
+  for (std::size_t o = 0; o < world.soft.size(); ++o) {
+    const SoftBody& body = world.soft[o];
+    auto& vertices = snapshot.soft_vertices[world.rigid.size() + o];
+    vertices.resize(body.drawn.vertices.size());
+    for (std::size_t v = 0; v < vertices.size(); ++v) {
+      const glm::dvec3& rest = body.drawn.vertices[v];
+      vertices[v] = glm::vec3(body.to_scene(rest + state.soft[o]->displacement_at(rest)));
+    }
+  }
+}
+
+}  // namespace hybrid

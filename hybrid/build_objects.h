@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The two halves of build_scene(): one rigid object, one soft object's volume.
+#pragma once
+
+#include "hybrid/build.h"
+
+namespace hybrid {
+
+// Reads or makes the surface. Findings go to `notes`. Throws std::exception in words.
+RigidObject build_rigid(const RigidDescription& description, std::vector<BuildNote>& notes);
+
+// Reads or makes the label volume; its frame lies in the scene (the description's pose applied).
+// Throws std::exception in words.
+voxel::LabelVolume build_volume(const SoftDescription& description, std::vector<BuildNote>& notes);
+
+// The part of a mesh that none of the planes cuts away, clipped exactly; `to_scene` places the mesh.
+polygon::TriangleMesh cut_mesh(const polygon::TriangleMesh& mesh, const Pose& to_scene, const std::vector<CutPlane>& cuts);
+
+// Options of the lattice by the scene's materials and the object's own anchors.
+voxel::LatticeOptions lattice_options(const Scene& scene, const SoftDescription& description);
+
+}  // namespace hybrid

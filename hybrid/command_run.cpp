@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+#include <fstream>
+#include <sstream>
+
+#include "hybrid/commands.h"
+#include "hybrid/picture.h"
+#include "hybrid/plot.h"
+#include "hybrid/recording.h"
+#include "hybrid/report.h"
+#include "hybrid/session.h"
+#include "hybrid/trace_file.h"
+#include "polygon/mesh_file.h"
+
+namespace hybrid {
+namespace {
+
+bool& progress_shown() {
+  static bool shown = false;
+  return shown;
+}
+
+// Words for people go to standard output, unless the report does.
+std::FILE* words_for(const std::string& json) { return json == "-" ? stderr : stdout; }
+
+std::string read_text(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+// An output that cannot be written is better known before a long run than after it.
+void check_writable(const std::filesystem::path& file) {
+  if (file.empty()) return;
+  if (file.has_parent_path()) {
+    std::error_code error;
+    std::filesystem::create_directories(file.parent_path(), error);
+  }
+  const bool existed = std::filesystem::exists(file);
+  const bool writable = static_cast<bool>(std::ofstream(file, std::ios::app));
+  if (!writable) throw std::runtime_error(fmt::format("{}: cannot be written; check the folder", file.string()));
+  if (!existed) std::filesystem::remove(file);
+}
+
+void save_soft_surfaces(const std::filesystem::path& file, const BuiltScene& built) {
+  Snapshot now;
+  fill_soft_vertices(*built.world, *built.state, now);
+  polygon::TriangleMesh all;
+  for (std::size_t o = 0; o < built.world->soft.size(); ++o) {
+    const auto first = static_cast<std::uint32_t>(all.vertices.size());
+    for (const glm::vec3& v : now.soft_vertices[built.world->rigid.size() + o]) all.vertices.emplace_back(v);
+    for (const polygon::TriangleIndices& t : built.world->soft[o].drawn.triangles) {
+      all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+    }
+  }
+  if (all.empty()) throw std::runtime_error("--save-surface: the scene has no soft object, so there is no deformed surface to save");
+  polygon::save_ply(file, all);
+}
+
+}  // namespace
+
+Progress progress_on_terminal() {
+  const auto start = std::chrono::steady_clock::now();
+  const bool terminal = isatty(STDERR_FILENO) != 0;
+  return [start, terminal, last = start](const std::string& text) mutable {
+    const auto now = std::chrono::steady_clock::now();
+    if (terminal) {
+      std::fprintf(stderr, "\r\033[K%s", text.c_str());
+      std::fflush(stderr);
+      progress_shown() = true;
+    } else if (now - start > std::chrono::seconds(1) && now - last > std::chrono::seconds(2)) {
+      last = now;
+      std::fprintf(stderr, "%s\n", text.c_str());
+    }
+  };
+}
+
+void end_progress() {
+  if (!progress_shown()) return;
+  std::fprintf(stderr, "\r\033[K");
+  progress_shown() = false;
+}
+
+void print_notes(const BuiltScene& built) {
+  for (const BuildNote& note : built.notes) {
+    const char* mark = note.severity == polygon::Severity::info ? "note" : "warning";
+    std::fprintf(stderr, "%s: %s%s%s\n", mark, note.object.c_str(), note.object.empty() ? "" : ": ", note.text.c_str());
+  }
+}
+
+int run(const RunCommand& command) {
+  if (!command.save_volume.empty()) {
+    throw std::runtime_error("--save-volume: not supported yet; --save-surface writes the deformed surface");
+  }
+  const Scene scene = load_scene(command.scene);
+  for (const auto* file : {&command.trace, &command.plot, &command.picture, &command.record, &command.save_surface}) {
+    check_writable(*file);
+  }
+  if (command.json != "-") check_writable(command.json);
+  const Progress progress = progress_on_terminal();
+  BuiltScene built = build_scene(scene, progress);
+  end_progress();
+  print_notes(built);
+  SessionOptions options{.seconds = command.seconds,
+                         .realtime = command.realtime,
+                         .keep_rows = !command.trace.empty() || !command.plot.empty(),
+                         .keep_picture = !command.picture.empty(),
+                         .reference_samples = command.samples,
+                         .progress = progress};
+  SessionResult result = run_session(scene, built, options);
+  end_progress();
+
+  std::FILE* words = words_for(command.json);
+  if (!command.trace.empty()) save_trace(command.trace, result.rows);
+  const std::string title = scene.title.empty() ? command.scene.stem().string() : scene.title;
+  if (!command.plot.empty()) {
+    std::vector<PlottedObject> objects;
+    for (std::size_t o = 0; o < built.world->object_count(); ++o) {
+      const std::size_t rigid = built.world->rigid.size();
+      objects.push_back({o < rigid ? built.world->rigid[o].name : built.world->soft[o - rigid].name, o >= rigid,
+                         result.object_force_N[o]});
+    }
+    save_session_plot(command.plot, result.rows, objects, title);
+  }
+  if (!command.picture.empty()) save_picture(command.picture, drawn_scene(*built.world, title), *result.moment);
+  if (!command.record.empty()) {
+    save_recording(command.record, {std::filesystem::absolute(command.scene), read_text(command.scene), result.dt_s,
+                                    result.state_hash, result.recording});
+  }
+  if (!command.save_surface.empty()) save_soft_surfaces(command.save_surface, built);
+  if (!command.json.empty()) save_json(command.json, run_report(scene, built, result));
+  fmt::print(words, "{}", run_summary(built, result));
+  for (const auto& [what, file] : {std::pair{"trace", command.trace}, std::pair{"plot", command.plot},
+                                   std::pair{"picture", command.picture}, std::pair{"recording", command.record},
+                                   std::pair{"surface", command.save_surface}}) {
+    if (!file.empty()) fmt::print(words, "{}: {}\n", what, file.string());
+  }
+  return 0;
+}
+
+int replay(const ReplayCommand& command) {
+  const Recording recording = load_recording(command.recording);
+  const ReplayResult result = replay(recording, progress_on_terminal());
+  end_progress();
+  if (!command.json.empty()) {
+    nlohmann::ordered_json j = report_head("replay");
+    j["ticks"] = result.ticks;
+    j["state_hash"] = fmt::format("{:016x}", result.state_hash);
+    j["equal"] = result.equal;
+    if (!result.equal) j["parts_at_tick"] = result.parts_at;
+    save_json(command.json, j);
+  }
+  fmt::print(words_for(command.json), "{}\n",
+             result.equal ? fmt::format("equal: {} ticks, state hash {:016x}", result.ticks, result.state_hash)
+                          : fmt::format("parts at tick {} of {}: this build does not feel what was recorded", result.parts_at,
+                                        result.ticks));
+  return result.equal ? 0 : 1;
+}
+
+}  // namespace hybrid

@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The viewer: a window beside a session, each on its own thread. The session publishes snapshots and takes goals; neither
+// waits for the other.
+#include <fmt/format.h>
+
+#include <atomic>
+#include <cstdio>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <thread>
+
+#include "device/servo_timer.h"
+#include "device/simulated.h"
+#include "hybrid/commands.h"
+#include "hybrid/hand_over.h"
+#include "hybrid/session.h"
+#include "hybrid/window.h"
+
+namespace hybrid {
+namespace {
+
+constexpr double kSnapshotEvery_s = 1.0 / 60.0;
+constexpr double kScriptFrame_s = 1.0 / 30.0;   // session time that one frame of a scripted view stands for
+
+// What the window asks of the session.
+struct Wish {
+  bool dragging = false, paused = false;
+  std::uint32_t restarts = 0;
+  glm::dvec3 goal_m{0.0};
+};
+
+// The target of the simulated hand: the scene's path, or where the mouse pulls. Read by the device within a tick.
+class SteeredPath final : public device::Path {
+ public:
+  explicit SteeredPath(std::shared_ptr<const device::Path> path) : path_(std::move(path)) {}
+  [[nodiscard]] glm::dvec3 position(double t_s) const noexcept override {
+    return held_ ? goal_m_ : path_->position(std::fmod(t_s - start_s_, path_->duration_s() + 1.0));
+  }
+  [[nodiscard]] double duration_s() const noexcept override { return path_->duration_s(); }
+  [[nodiscard]] const std::vector<std::string>& notes() const noexcept override { return path_->notes(); }
+
+  void hold(const glm::dvec3& goal_m) {
+    held_ = true;
+    goal_m_ = goal_m;
+  }
+  void restart(double now_s) {
+    held_ = false;
+    start_s_ = now_s;
+  }
+
+ private:
+  std::shared_ptr<const device::Path> path_;
+  bool held_ = false;
+  glm::dvec3 goal_m_{0.0};
+  double start_s_ = 0.0;
+};
+
+// The session's side. Once the mouse has taken the tool it keeps it where it was let go, until a restart.
+class Player {
+ public:
+  Player(const Scene& scene, BuiltScene& built)
+      : scene_(scene), built_(built), path_(std::make_shared<SteeredPath>(scene_path(scene))), device_(scene_device(scene, path_)),
+        dt_(1.0 / scene.rate_hz) {
+    flush_denormals();
+    begin_session(scene, *built.world, *built.state, device_->read().position_m);
+  }
+
+  TickResult tick(const Wish& wish) {
+    if (wish.restarts != restarts_) {
+      restarts_ = wish.restarts;
+      path_->restart(t_s());
+    }
+    // The mouse pulls faster than a hand would: the goal follows it at no more than a brisk hand's speed.
+    if (wish.dragging) {
+      const glm::dvec3 way = wish.goal_m - goal_m_;
+      const double length = glm::length(way), most = kHandSpeed_m_per_s * dt_;
+      goal_m_ = length > most ? goal_m_ + way * (most / length) : wish.goal_m;
+      path_->hold(goal_m_);
+    }
+    const TickResult felt = haptic_tick(*built_.world, *built_.state, device_->read(), dt_);
+    device_->write(felt.force_N, dt_);
+    if (!wish.dragging) goal_m_ = felt.device_m;
+    ++ticks_;
+    return felt;
+  }
+  [[nodiscard]] double t_s() const { return static_cast<double>(ticks_) * dt_; }
+  [[nodiscard]] double dt_s() const { return dt_; }
+  void snapshot(const TickResult& felt, Snapshot& out) const {
+    out.tick = built_.state->tick;
+    out.t_s = t_s();
+    out.device_m = felt.device_m;
+    out.proxy_m = felt.proxy_m;
+    out.force_N = felt.force_N;
+    out.feel = built_.state->feel;
+    out.tick_us = felt.tick_us;
+    fill_soft_vertices(*built_.world, *built_.state, out);
+  }
+
+ private:
+  static constexpr double kHandSpeed_m_per_s = 0.5;
+  const Scene& scene_;
+  BuiltScene& built_;
+  std::shared_ptr<SteeredPath> path_;
+  std::unique_ptr<device::HapticDevice> device_;
+  double dt_;
+  std::uint64_t ticks_ = 0;
+  std::uint32_t restarts_ = 0;
+  glm::dvec3 goal_m_{0.0};
+};
+
+std::filesystem::path frame_file(const std::filesystem::path& folder, std::uint64_t n) {
+  return folder / fmt::format("frame-{:05}.png", n);
+}
+
+// Every frame stands for a fixed stretch of session time, whatever the machine: pictures that can be made again.
+void play_frames(const ViewCommand& command, Player& player, Window& window) {
+  std::shared_ptr<const device::Path> drag;
+  if (!command.drag.empty()) drag = device::make_path(device::CsvPath{.file = command.drag});
+  Snapshot snapshot;
+  for (std::uint64_t n = 0; n < *command.frames; ++n) {
+    Wish wish;
+    TickResult felt;
+    for (double end = player.t_s() + kScriptFrame_s; player.t_s() < end;) {
+      if (drag) {
+        wish.dragging = true;
+        wish.goal_m = drag->position(player.t_s());
+      }
+      felt = player.tick(wish);
+    }
+    player.snapshot(felt, snapshot);
+    if (!window.frame(snapshot)) return;
+    if (!command.out.empty()) window.save_frame(frame_file(command.out, n));
+  }
+  if (!command.out.empty()) fmt::print("{} frames in {}\n", *command.frames, command.out.string());
+}
+
+// The window on this thread, the session on another.
+void play_live(Player& player, Window& window) {
+  HandOver<Snapshot> snapshots;
+  HandOver<Wish> wishes;
+  std::atomic<bool> stop{false};
+  std::jthread session([&] {
+    flush_denormals();
+    device::ServoTimer timer(player.dt_s());
+    timer.raise_priority();
+    double next = 0.0;
+    while (!stop.load(std::memory_order_relaxed)) {
+      timer.wait();
+      const Wish& wish = wishes.take();
+      if (wish.paused) continue;
+      const TickResult felt = player.tick(wish);
+      if (player.t_s() < next) continue;
+      next = player.t_s() + kSnapshotEvery_s;
+      player.snapshot(felt, snapshots.back());
+      snapshots.publish();
+    }
+  });
+  Wish wish;
+  do {
+    const WindowInput input = window.take_input();
+    wish.dragging = input.dragged_goal_m.has_value();
+    if (input.dragged_goal_m) wish.goal_m = *input.dragged_goal_m;
+    wish.paused = input.paused;
+    if (input.restart) ++wish.restarts;
+    wishes.back() = wish;
+    wishes.publish();
+  } while (window.frame(snapshots.take()));
+  stop = true;
+}
+
+}  // namespace
+
+int view(const ViewCommand& command) {
+  const Scene scene = load_scene(command.scene);
+  if (!command.out.empty()) std::filesystem::create_directories(command.out);
+  BuiltScene built = build_scene(scene, progress_on_terminal());
+  end_progress();
+  print_notes(built);
+  const DrawnScene drawn = drawn_scene(*built.world, scene.title.empty() ? command.scene.stem().string() : scene.title);
+  Window window(drawn);
+  Player player(scene, built);
+  if (command.frames) {
+    play_frames(command, player, window);
+  } else {
+    play_live(player, window);
+  }
+  return 0;
+}
+
+}  // namespace hybrid

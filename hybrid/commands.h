@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the program's commands do, apart from how their options are spelled (main.cpp). Each returns the exit status, and
+// throws where an input is refused.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "hybrid/build.h"
+
+namespace hybrid {
+
+struct RunCommand {
+  std::filesystem::path scene;
+  std::optional<double> seconds;
+  bool realtime = false;
+  int samples = 6;
+  std::filesystem::path trace, plot, picture, record, save_surface, save_volume;  // empty: not written
+  std::string json;                                                               // "-": standard output
+};
+int run(const RunCommand& command);
+
+struct ReplayCommand {
+  std::filesystem::path recording;
+  std::string json;
+};
+int replay(const ReplayCommand& command);
+
+struct CheckCommand {
+  std::vector<std::filesystem::path> files;
+  bool deep = false;
+  double unit_m = 1.0;  // of mesh files
+  std::string json;
+};
+int check(const CheckCommand& command);
+
+struct CompareCommand {
+  std::filesystem::path scene;
+  std::string object;  // empty: the first that can be compared
+  std::filesystem::path plot;
+  std::string json;
+};
+int compare(const CompareCommand& command);
+
+struct ViewCommand {
+  std::filesystem::path scene;
+  std::optional<std::uint64_t> frames;  // then closes; each written to `out` when that is given
+  std::filesystem::path out;
+  std::filesystem::path drag;  // CSV of goals that stand for the mouse: t, x, y, z
+};
+int view(const ViewCommand& command);
+
+// Progress on standard error, one line that is overwritten on a terminal, and nothing when standard error is no terminal and
+// less than a second has passed.
+Progress progress_on_terminal();
+void end_progress();
+// What the build noticed, on standard error.
+void print_notes(const BuiltScene& built);
+
+}  // namespace hybrid

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/compare.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numbers>
+
+#include "hybrid/closed_form.h"
+
+namespace hybrid {
+namespace {
+
+constexpr double kMeshVoxelShare = 1.0 / 40.0;  // spacing of a voxelised rigid object, of its longest side
+
+// The scene with one object only, on an ideal device.
+Scene bare(const Scene& scene) {
+  Scene one = scene;
+  one.rigid.clear();
+  one.soft.clear();
+  one.device_model = device::DeviceModel::ideal;
+  one.max_force_given = true;  // the ideal device has no limit, and a comparison wants the whole force
+  one.safety.max_force_N = 1e6;
+  one.safety.max_slew_N_per_s = 1e12;
+  one.safety.soft_start_s = 0.0;
+  return one;
+}
+
+// A soft object as the rigid one of the same shape.
+RigidDescription as_rigid(const SoftDescription& soft) {
+  RigidDescription rigid{.name = soft.name, .source = {}, .pose = soft.pose, .place = soft.place, .source_place = soft.source_place};
+  if (const auto* formula = std::get_if<voxel::Formula>(&soft.source)) {
+    if (formula->shape == voxel::Formula::Shape::ball) {
+      rigid.source = BallPrimitive{0.5 * formula->size_m.x};
+    } else {
+      rigid.source = BoxPrimitive{formula->size_m};
+    }
+  } else if (const auto* mesh = std::get_if<ClosedMeshSource>(&soft.source)) {
+    rigid.source = mesh->mesh;
+  } else {
+    const auto& volume = std::get<VolumeSource>(soft.source);
+    VolumeSurfaceSource surface{.file = volume.file, .rules = volume.rules, .spacing_m = std::nullopt, .cuts = {}};
+    if (volume.spacing_m) surface.spacing_m = volume.spacing_m->x;
+    surface.largest = volume.largest;
+    surface.unit_m = volume.unit_m;
+    rigid.source = surface;
+  }
+  return rigid;
+}
+
+// A rigid object as the soft one of the same shape, of the default material.
+SoftDescription as_soft(const RigidDescription& rigid) {
+  SoftDescription soft{.name = rigid.name, .source = {}, .pose = rigid.pose, .materials = {}, .material = {}, .anchors = {},
+                       .place = rigid.place, .source_place = rigid.source_place};
+  if (const auto* ball = std::get_if<BallPrimitive>(&rigid.source)) {
+    const double size = 2.0 * ball->radius_m;
+    soft.source = voxel::Formula{.shape = voxel::Formula::Shape::ball, .size_m = glm::dvec3(size),
+                                 .spacing_m = glm::dvec3(size * kMeshVoxelShare), .layers = {}, .inclusions = {}};
+  } else if (const auto* box = std::get_if<BoxPrimitive>(&rigid.source)) {
+    const double longest = std::max({box->size_m.x, box->size_m.y, box->size_m.z});
+    soft.source = voxel::Formula{.size_m = box->size_m, .spacing_m = glm::dvec3(longest * kMeshVoxelShare), .layers = {}, .inclusions = {}};
+  } else {
+    throw std::runtime_error(fmt::format("\"{}\" cannot be compared as voxels: only a ball or box primitive, or a soft object, has a "
+                                         "material to be soft with; name one with --object", rigid.name));
+  }
+  return soft;
+}
+
+ModelResult run_model(const std::string& name, const Scene& scene, const Progress& progress) {
+  if (progress) progress(fmt::format("feeling it as {}", name));
+  BuiltScene built = build_scene(scene, {});
+  SessionResult session = run_session(scene, built, {.seconds = std::nullopt, .progress = {}});
+  ModelResult model{.name = name, .rows = std::move(session.rows), .depth_m = {}, .tick_us = percentiles(session.tick_us)};
+  return model;
+}
+
+ModelResult closed_model(const ClosedForm& form, const Tool& tool, const std::vector<TraceRow>& like) {
+  ModelResult model{.name = law_of(form, tool), .rows = {}, .depth_m = {}, .tick_us = {}};
+  for (const TraceRow& row : like) {
+    const Depth depth = depth_in(form, tool, row.device_m);
+    TraceRow felt{.t_s = row.t_s, .device_m = row.device_m};
+    felt.force_N = force_at(form, tool, depth.depth_m) * depth.out;
+    felt.proxy_m = row.device_m + felt.force_N / tool.stiffness_N_per_m;
+    felt.contacts = depth.depth_m > 0.0 ? 1U : 0U;
+    model.rows.push_back(felt);
+  }
+  return model;
+}
+
+double percentile(std::vector<double>& values, double share) {
+  if (values.empty()) return 0.0;
+  std::sort(values.begin(), values.end());
+  return values[std::min(values.size() - 1, static_cast<std::size_t>(share * static_cast<double>(values.size())))];
+}
+
+void measure(ModelResult& model, const ModelResult& reference, double floor_N) {
+  std::vector<double> jnd, angle;
+  double sum2 = 0.0;
+  const std::size_t count = std::min(model.rows.size(), reference.rows.size());
+  for (std::size_t i = 0; i < count; ++i) {
+    const glm::dvec3 &f = model.rows[i].force_N, &r = reference.rows[i].force_N;
+    if (i + 1 < count) {
+      model.work_J += 0.5 * glm::dot(f + model.rows[i + 1].force_N, model.rows[i + 1].device_m - model.rows[i].device_m);
+    }
+    if (f == glm::dvec3(0.0) && r == glm::dvec3(0.0)) continue;
+    const double error = glm::length(f - r);
+    sum2 += error * error;
+    model.max_N = std::max(model.max_N, error);
+    jnd.push_back(jnd_of(f, r, floor_N));
+    if (glm::length(f) <= floor_N || glm::length(r) <= floor_N) continue;
+    const double c = glm::dot(f, r) / (glm::length(f) * glm::length(r));
+    angle.push_back(std::acos(std::clamp(c, -1.0, 1.0)) * 180.0 / std::numbers::pi);
+  }
+  if (jnd.empty()) return;
+  model.rms_N = std::sqrt(sum2 / static_cast<double>(jnd.size()));
+  model.share_above_1_jnd = static_cast<double>(std::count_if(jnd.begin(), jnd.end(), [](double x) { return x > 1.0; })) /
+                            static_cast<double>(jnd.size());
+  model.jnd_p50 = percentile(jnd, 0.5);
+  model.jnd_p99 = percentile(jnd, 0.99);
+  model.direction_p50_deg = percentile(angle, 0.5);
+  model.direction_p99_deg = percentile(angle, 0.99);
+}
+
+}  // namespace
+
+Comparison compare_models(const Scene& scene, const std::string& object, const Progress& progress) {
+  const auto named = [&object](const auto& o) { return object.empty() || o.name == object; };
+  const auto soft = std::find_if(scene.soft.begin(), scene.soft.end(), named);
+  const auto rigid = std::find_if(scene.rigid.begin(), scene.rigid.end(), named);
+  if (soft == scene.soft.end() && rigid == scene.rigid.end()) {
+    std::string names;
+    for (const auto& o : scene.rigid) names += fmt::format(" \"{}\"", o.name);
+    for (const auto& o : scene.soft) names += fmt::format(" \"{}\"", o.name);
+    throw std::runtime_error(fmt::format("{}: no object \"{}\"; it has{}", scene.file.string(), object, names));
+  }
+  // The soft object comes first where the user did not choose: it is where the models differ.
+  const bool is_soft = soft != scene.soft.end();
+  Comparison result{.object = is_soft ? soft->name : rigid->name, .models = {}, .reference_text = {}};
+  result.jnd_floor_N = jnd_floor_N(scene);
+
+  const bool punch = scene.tool.shape == Tool::Shape::punch;
+  const std::optional<ClosedForm> form = is_soft ? closed_form_of(scene, *soft) : closed_form_of(*rigid);
+  if (!punch) {  // a punch feels nothing rigid
+    Scene as_proxy = bare(scene);
+    as_proxy.rigid.push_back(is_soft ? as_rigid(*soft) : *rigid);
+    result.models.push_back(run_model("proxy", as_proxy, progress));
+  }
+  Scene as_voxels = bare(scene);
+  as_voxels.soft.push_back(is_soft ? *soft : as_soft(*rigid));
+  as_voxels.soft.back().anchors.rigid_within_m = 0.0;  // nothing rigid is left to be held by
+  result.models.push_back(run_model("voxels", as_voxels, progress));
+  if (form) result.models.push_back(closed_model(*form, scene.tool, result.models.front().rows));
+
+  // A closed form is the reference where it is exact or nearly so; else what the object is in the scene.
+  const bool by_form = form && form->caveat.find("left out") == std::string::npos;
+  result.reference = by_form ? result.models.size() - 1 : (is_soft && !punch ? 1 : 0);
+  result.reference_text = by_form
+                              ? fmt::format("{}{}{}", law_of(*form, scene.tool), form->caveat.empty() ? "" : ", ", form->caveat)
+                              : fmt::format("{}, as the scene has it", result.models[result.reference].name);
+  for (ModelResult& model : result.models) {
+    measure(model, result.models[result.reference], result.jnd_floor_N);
+    if (!form) continue;
+    for (const TraceRow& row : model.rows) model.depth_m.push_back(depth_in(*form, scene.tool, row.device_m).depth_m);
+  }
+  return result;
+}
+
+}  // namespace hybrid

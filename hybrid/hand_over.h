@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Wait-free hand-over of the latest value from one thread to one other: a triple buffer.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+
+namespace hybrid {
+
+// The writer fills back() and publishes; the reader takes the latest. Neither waits, neither allocates here (values keep
+// what they own when a slot comes round again). std::atomic<std::shared_ptr> was rejected: not always lock-free.
+template <class T>
+class HandOver {
+ public:
+  // ---- writer ----
+  [[nodiscard]] T& back() { return slots_[back_]; }
+  void publish() noexcept {
+    back_ = middle_.exchange(static_cast<std::uint8_t>(back_ | kFresh), std::memory_order_acq_rel) & kIndex;
+  }
+
+  // ---- reader ----
+  // The latest published value; what was taken before when there is none newer.
+  [[nodiscard]] const T& take() noexcept {
+    if ((middle_.load(std::memory_order_relaxed) & kFresh) != 0) {
+      front_ = middle_.exchange(front_, std::memory_order_acq_rel) & kIndex;
+    }
+    return slots_[front_];
+  }
+
+ private:
+  static constexpr std::uint8_t kFresh = 4, kIndex = 3;
+  std::array<T, 3> slots_{};
+  std::atomic<std::uint8_t> middle_{1};
+  std::uint8_t back_ = 0, front_ = 2;
+};
+
+}  // namespace hybrid

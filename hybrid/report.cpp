@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/report.h"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <thread>
+
+namespace hybrid {
+namespace {
+
+std::string processor() {
+  std::ifstream in("/proc/cpuinfo");
+  for (std::string line; std::getline(in, line);) {
+    if (line.rfind("model name", 0) == 0 && line.find(':') != std::string::npos) return line.substr(line.find(':') + 2);
+  }
+  return "unknown processor";
+}
+
+Percentiles of_stage(const std::vector<float>& values) {
+  std::vector<double> copy(values.begin(), values.end());
+  return percentiles(copy);
+}
+
+struct ObjectRow {
+  std::string name, kind;
+  std::size_t triangles = 0, voxels = 0, surface_voxels = 0, memory_bytes = 0;
+  std::uint64_t contact_ticks = 0;
+  double max_force_N = 0.0;
+};
+
+std::vector<ObjectRow> object_rows(const BuiltScene& built, const SessionResult& result) {
+  std::vector<ObjectRow> rows;
+  for (const RigidObject& o : built.world->rigid) {
+    rows.push_back({.name = o.name, .kind = "rigid", .triangles = o.drawn.triangles.size(),
+                    .memory_bytes = o.surface->memory_bytes()});
+  }
+  for (std::size_t o = 0; o < built.world->soft.size(); ++o) {
+    const voxel::SoftObject& object = *built.state->soft[o];
+    rows.push_back({.name = built.world->soft[o].name, .kind = "soft", .voxels = object.lattice().voxel_count(),
+                    .surface_voxels = object.lattice().surface().size(), .memory_bytes = object.memory_bytes()});
+  }
+  for (std::size_t o = 0; o < rows.size(); ++o) {
+    rows[o].contact_ticks = result.object_contact_ticks[o];
+    rows[o].max_force_N = result.object_max_force_N[o];
+  }
+  return rows;
+}
+
+}  // namespace
+
+nlohmann::ordered_json report_head(const std::string& command) {
+  nlohmann::ordered_json j;
+  j["command"] = command;
+  j["version"] = HYBRID_VERSION;
+  j["machine"] = fmt::format("{}, {} threads", processor(), std::thread::hardware_concurrency());
+  return j;
+}
+
+nlohmann::ordered_json to_json(const Percentiles& p) {
+  return {{"p50", p.p50}, {"p99", p.p99}, {"p999", p.p999}, {"max", p.max}};
+}
+
+nlohmann::ordered_json run_report(const Scene& scene, const BuiltScene& built, SessionResult& result) {
+  nlohmann::ordered_json j = report_head("run");
+  j["scene"] = scene.file.string();
+  j["ticks"] = result.ticks;
+  j["dt_s"] = result.dt_s;
+  j["seconds"] = static_cast<double>(result.ticks) * result.dt_s;
+  j["state_hash"] = fmt::format("{:016x}", result.state_hash);
+  j["nonfinite"] = built.state->nonfinite;
+  j["deadline_misses"] = result.deadline_misses;
+  j["contact_ticks"] = result.contact_ticks;
+  std::vector<double> tick_us = result.tick_us;
+  j["tick_us"] = to_json(percentiles(tick_us));
+  for (std::size_t s = 0; s < kStages; ++s) j["stage_us"][kStageNames[s]] = to_json(of_stage(result.stage_us[s]));
+  j["force_N"] = {{"max", result.max_force_N}, {"rms", result.rms_force_N}};
+  j["objects"] = nlohmann::ordered_json::array();
+  for (const ObjectRow& row : object_rows(built, result)) {
+    nlohmann::ordered_json o{{"name", row.name}, {"kind", row.kind}};
+    if (row.kind == "rigid") {
+      o["triangles"] = row.triangles;
+    } else {
+      o["voxels"] = row.voxels;
+      o["surface_voxels"] = row.surface_voxels;
+    }
+    o["memory_bytes"] = row.memory_bytes;
+    o["contact_ticks"] = row.contact_ticks;
+    o["max_force_N"] = row.max_force_N;
+    j["objects"].push_back(o);
+  }
+  j["occupancy"] = {{"cells", built.state->map.occupied_cells()},
+                    {"bytes", built.state->map.memory_bytes()},
+                    {"cell_m", built.state->map.cell_m()}};
+  const bool measured = result.error.samples > 0;
+  const nlohmann::ordered_json none = nullptr;
+  j["budget"] = {{"truncated_ticks", built.state->truncated_ticks},
+                 {"force_error_N", measured ? nlohmann::ordered_json(result.error.max_N) : none},
+                 {"force_error_rms_N", measured ? nlohmann::ordered_json(result.error.rms_N) : none},
+                 {"force_error_jnd", measured ? nlohmann::ordered_json(result.error.max_jnd) : none},
+                 {"samples", result.error.samples},
+                 {"reference", measured ? "equilibrium lattice with its limits, at the sampled ticks"
+                                        : "not measured (no soft contact at a sampled tick, real time, or --samples 0)"}};
+  j["threads"] = nlohmann::ordered_json::array({{{"name", "main"}, {"share", 1.0}}});
+  if (!result.realtime_note.empty()) {
+    j["realtime"] = {{"priority", result.realtime_note}, {"late_us", to_json(result.late_us)}};
+  }
+  j["faults"] = fault_texts(built.state->faults);
+  j["build_s"] = built.seconds;
+  j["peak_memory_bytes"] = peak_memory_bytes();
+  return j;
+}
+
+std::string run_summary(const BuiltScene& built, SessionResult& result) {
+  std::vector<double> tick_us = result.tick_us;
+  const Percentiles tick = percentiles(tick_us);
+  std::string text = fmt::format("{} ticks of {:.3g} ms ({:.2f} s), {} in contact; force at most {:.3f} N\n", result.ticks,
+                                 result.dt_s * 1e3, static_cast<double>(result.ticks) * result.dt_s, result.contact_ticks,
+                                 result.max_force_N);
+  text += fmt::format("tick: p50 {:.1f}, p99 {:.1f}, p99.9 {:.1f}, max {:.1f} us\n", tick.p50, tick.p99, tick.p999, tick.max);
+  for (const ObjectRow& row : object_rows(built, result)) {
+    text += fmt::format("  {:<16} {:<5} {:>9} {:<9} felt in {} ticks, at most {:.3f} N\n", row.name, row.kind,
+                        row.kind == "rigid" ? row.triangles : row.voxels, row.kind == "rigid" ? "triangles" : "voxels",
+                        row.contact_ticks, row.max_force_N);
+  }
+  if (result.error.samples > 0) {
+    text += fmt::format("force error against the equilibrium lattice at {} sampled ticks: at most {:.4f} N ({:.2f} JND), rms {:.4f} N\n",
+                        result.error.samples, result.error.max_N, result.error.max_jnd, result.error.rms_N);
+  }
+  if (!result.realtime_note.empty()) {
+    text += fmt::format("real time: {}\n  woken late by p50 {:.0f}, p99 {:.0f}, max {:.0f} us; {} deadlines missed\n",
+                        result.realtime_note, result.late_us.p50, result.late_us.p99, result.late_us.max,
+                        result.deadline_misses);
+  }
+  for (const std::string& fault : fault_texts(built.state->faults)) text += fmt::format("fault: {}\n", fault);
+  text += fmt::format("state hash {:016x}\n", result.state_hash);
+  return text;
+}
+
+std::vector<std::string> fault_texts(std::uint32_t faults) {
+  std::vector<std::string> texts;
+  const auto say = [&](FaultBit bit, const char* text) {
+    if ((faults & bit) != 0) texts.emplace_back(text);
+  };
+  say(fault_nonfinite_input, "the device gave a position that is not finite; the last good one was held");
+  say(fault_touch_overflow, "more soft voxels near the tool than fit; use a smaller tool or a coarser spacing");
+  say(fault_triangle_overflow, "more triangles near the proxy than fit; repair the mesh (coincident triangles) or coarsen it");
+  say(fault_map_overflow, "the occupancy map had no room for a voxel that moved; use a larger [occupancy] cell");
+  say(fault_pair_overflow, "more soft voxels press on one another than fit; use a coarser spacing");
+  say(fault_infeasible, "rigid surfaces left the tool no room; use a smaller tool radius");
+  return texts;
+}
+
+void save_json(const std::string& file, const nlohmann::ordered_json& report) {
+  const std::string text = report.dump(2);
+  if (file == "-") {
+    fmt::print("{}\n", text);
+    std::fflush(stdout);
+    return;
+  }
+  std::ofstream out(file);
+  out << text << '\n';
+  out.flush();
+  if (!out) throw std::runtime_error(fmt::format("{}: cannot be written; check the folder and the space left", file));
+}
+
+std::uint64_t peak_memory_bytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024U;
+}
+
+}  // namespace hybrid

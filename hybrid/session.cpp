@@ -1,0 +1,276 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/session.h"
+
+#include <fmt/format.h>
+#include <xmmintrin.h>
+
+#include <algorithm>
+#include <bit>
+#include <chrono>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "device/servo_timer.h"
+#include "device/simulated.h"
+
+namespace hybrid {
+namespace {
+
+constexpr double kAfterPath_s = 0.5;
+constexpr double kJndFloor_N = 0.04;
+constexpr std::uint64_t kMomentEvery = 20;      // ticks between two looks for a more telling moment
+constexpr int kSettleTicks = 4000;              // of equilibrium_force()
+constexpr std::uint32_t kSettleBudget = 400'000;
+
+std::uint64_t mix(std::uint64_t hash, std::uint64_t bits) noexcept {  // FNV-1a, eight bytes at a time
+  return (hash ^ bits) * 0x100000001B3ULL;
+}
+std::uint64_t mix(std::uint64_t hash, const glm::dvec3& v) noexcept {
+  for (int d = 0; d < 3; ++d) hash = mix(hash, std::bit_cast<std::uint64_t>(v[d]));
+  return hash;
+}
+
+// The state again, sharing nothing that moves.
+std::unique_ptr<WorldState> copy_state(const World& world, const WorldState& state) {
+  auto copy = std::make_unique<WorldState>(world, OccupancyMap(state.map));
+  for (const auto& object : state.soft) copy->soft.push_back(object->copy());
+  copy->prepare(world);
+  copy->map.reserve_bricks(1024);
+  copy->proxy_m = state.proxy_m;
+  copy->device_m = state.device_m;
+  copy->started = state.started;
+  copy->gather_step_m = state.gather_step_m;
+  copy->obstacle_seen = state.obstacle_seen;
+  copy->paired = state.paired;
+  for (const VoxelPair& pair : state.pairs) copy->pairs.push_back(pair);
+  return copy;
+}
+
+// How much a moment says about the scene: different objects felt at once first, then force.
+double telling(const World& world, const WorldState& state) {
+  double score = 0.0;
+  bool rigid = false, soft = false;
+  for (std::size_t o = 0; o < state.feel.size(); ++o) {
+    if (!state.feel[o].contact) continue;
+    (o < world.rigid.size() ? rigid : soft) = true;
+    score += std::min(1.0, state.feel[o].force_N);
+  }
+  return score + (rigid && soft ? 10.0 : 0.0);
+}
+
+class Run {
+ public:
+  Run(const Scene& scene, BuiltScene& built, const SessionOptions& options)
+      : scene_(scene), world_(*built.world), state_(*built.state), options_(options), path_(scene_path(scene)),
+        device_(scene_device(scene, path_)), dt_(1.0 / scene.rate_hz) {
+    const double seconds = options.seconds.value_or(path_->duration_s() + kAfterPath_s);
+    ticks_ = static_cast<std::uint64_t>(std::llround(seconds * scene.rate_hz));
+    result_.dt_s = dt_;
+    result_.tick_us.reserve(ticks_);
+    for (auto& stage : result_.stage_us) stage.reserve(ticks_);
+    result_.recording.reserve(ticks_);
+    result_.object_contact_ticks.assign(world_.object_count(), 0);
+    result_.object_max_force_N.assign(world_.object_count(), 0.0);
+    if (!options.keep_rows) return;
+    result_.rows.reserve(ticks_);
+    result_.object_force_N.resize(world_.object_count());
+    for (auto& column : result_.object_force_N) column.reserve(ticks_);
+  }
+
+  SessionResult go() {
+    flush_denormals();
+    begin_session(scene_, world_, state_, device_->read().position_m);
+    std::optional<device::ServoTimer> timer;
+    std::vector<double> late;
+    if (options_.realtime) {
+      timer.emplace(dt_);
+      late.reserve(ticks_);
+      result_.realtime_note = timer->raise_priority();
+    }
+    const std::uint64_t sample_every =
+        options_.reference_samples > 0 && !options_.realtime
+            ? std::max<std::uint64_t>(1, ticks_ / static_cast<std::uint64_t>(options_.reference_samples + 1))
+            : 0;
+    auto said = std::chrono::steady_clock::now();
+    for (std::uint64_t tick = 0; tick < ticks_; ++tick) {
+      if (timer) late.push_back(timer->wait() * 1e6);
+      const TickResult felt = haptic_tick(world_, state_, device_->read(), dt_);
+      device_->write(felt.force_N, dt_);
+      keep(felt, tick);
+      if (sample_every != 0 && tick % sample_every == sample_every - 1) sample(felt);
+      if (timer) continue;  // nothing that could make the next tick late
+      if (options_.keep_picture && tick % kMomentEvery == 0) look(felt, tick);
+      if (options_.progress && tick % 64 == 0 && std::chrono::steady_clock::now() - said > std::chrono::milliseconds(500)) {
+        said = std::chrono::steady_clock::now();
+        options_.progress(fmt::format("tick {} of {} ({:.0f} %)", tick, ticks_,
+                                      100.0 * static_cast<double>(tick) / static_cast<double>(ticks_)));
+      }
+    }
+    device_->write(glm::dvec3(0.0), dt_);
+    if (options_.keep_picture && !result_.moment) {
+      TickResult last;
+      last.device_m = state_.device_m;
+      last.proxy_m = state_.proxy_m;
+      result_.moment = take_snapshot(world_, state_, last, static_cast<double>(ticks_) * dt_);
+    }
+    if (timer) {
+      result_.deadline_misses = timer->missed();
+      result_.late_us = percentiles(late);
+    }
+    result_.ticks = ticks_;
+    result_.state_hash = hash_state(hash_, state_);
+    if (ticks_ > 0) result_.rms_force_N = std::sqrt(sum_force2_ / static_cast<double>(ticks_));
+    if (result_.error.samples > 0) result_.error.rms_N = std::sqrt(result_.error.rms_N / result_.error.samples);
+    return std::move(result_);
+  }
+
+ private:
+  void keep(const TickResult& felt, std::uint64_t tick) {
+    hash_ = hash_tick(hash_, felt);
+    result_.recording.push_back({felt.device_m, hash_});
+    result_.tick_us.push_back(felt.tick_us);
+    for (std::size_t s = 0; s < kStages; ++s) result_.stage_us[s].push_back(felt.stage_us[s]);
+    const double force = glm::length(felt.force_N);
+    result_.max_force_N = std::max(result_.max_force_N, force);
+    sum_force2_ += force * force;
+    if (felt.contacts != 0) ++result_.contact_ticks;
+    for (std::size_t o = 0; o < state_.feel.size(); ++o) {
+      if (state_.feel[o].contact) ++result_.object_contact_ticks[o];
+      result_.object_max_force_N[o] = std::max(result_.object_max_force_N[o], state_.feel[o].force_N);
+      if (options_.keep_rows) result_.object_force_N[o].push_back(state_.feel[o].force_N);
+    }
+    if (!options_.keep_rows) return;
+    result_.rows.push_back({static_cast<double>(tick) * dt_, felt.device_m, felt.proxy_m, felt.force_N,
+                            glm::length(felt.rigid_N), glm::length(felt.soft_N), felt.contacts, felt.tick_us});
+  }
+
+  void sample(const TickResult& felt) {
+    bool soft = false;
+    for (const voxel::Reaction& r : state_.reactions) soft = soft || r.pressed > 0;
+    if (!soft) return;
+    if (options_.progress) options_.progress(fmt::format("comparing the force at tick {} with its equilibrium", state_.tick));
+    const auto reference = equilibrium_force(world_, state_);
+    if (!reference) return;
+    const glm::dvec3 raw = world_.tool.stiffness_N_per_m * (felt.proxy_m - felt.device_m);
+    const double error = glm::length(raw - *reference);
+    ++result_.error.samples;
+    result_.error.max_N = std::max(result_.error.max_N, error);
+    result_.error.rms_N += error * error;
+    result_.error.max_jnd = std::max(result_.error.max_jnd, jnd_of(raw, *reference, jnd_floor_N(scene_)));
+  }
+
+  void look(const TickResult& felt, std::uint64_t tick) {
+    const double score = telling(world_, state_);
+    if (score <= best_ * 1.02) return;
+    best_ = score;
+    result_.moment = take_snapshot(world_, state_, felt, static_cast<double>(tick) * dt_);
+  }
+
+  const Scene& scene_;
+  const World& world_;
+  WorldState& state_;
+  const SessionOptions& options_;
+  std::shared_ptr<const device::Path> path_;
+  std::unique_ptr<device::HapticDevice> device_;
+  double dt_;
+  std::uint64_t ticks_ = 0, hash_ = 0xCBF29CE484222325ULL;
+  double sum_force2_ = 0.0, best_ = 0.0;
+  SessionResult result_;
+};
+
+}  // namespace
+
+Percentiles percentiles(std::vector<double>& values) {
+  if (values.empty()) return {};
+  std::sort(values.begin(), values.end());
+  const auto at = [&values](double share) {
+    const auto i = static_cast<std::size_t>(share * static_cast<double>(values.size()));
+    return values[std::min(i, values.size() - 1)];
+  };
+  return {at(0.5), at(0.99), at(0.999), values.back()};
+}
+
+std::shared_ptr<const device::Path> scene_path(const Scene& scene) {
+  try {
+    return device::make_path(scene.path);
+  } catch (const device::PathError& e) {
+    throw SceneError(scene.file, scene.path_place, e.what());
+  }
+}
+
+std::unique_ptr<device::HapticDevice> scene_device(const Scene& scene, std::shared_ptr<const device::Path> path) {
+  return device::make_simulated_device(scene.device_model, scene.hand, std::move(path));
+}
+
+void begin_session(const Scene& scene, const World& world, WorldState& state, const glm::dvec3& device_m) {
+  if (start_proxy(world, state, device_m)) return;
+  throw SceneError(scene.file, scene.path_place,
+                   fmt::format("the path starts at ({:.4g}, {:.4g}, {:.4g}) m, inside something rigid; start it in free space",
+                               device_m.x, device_m.y, device_m.z));
+}
+
+SessionResult run_session(const Scene& scene, BuiltScene& built, const SessionOptions& options) {
+  return Run(scene, built, options).go();
+}
+
+std::uint64_t hash_tick(std::uint64_t before, const TickResult& tick) noexcept {
+  return mix(mix(mix(before, tick.proxy_m), tick.force_N), tick.contacts);
+}
+
+std::uint64_t hash_state(std::uint64_t before, const WorldState& state) noexcept {
+  std::uint64_t hash = before;
+  for (const auto& object : state.soft) {
+    for (const auto& axis : object->state().u) {
+      for (const float u : axis) hash = mix(hash, std::bit_cast<std::uint32_t>(u));
+    }
+  }
+  return hash;
+}
+
+Snapshot take_snapshot(const World& world, const WorldState& state, const TickResult& tick, double t_s) {
+  Snapshot snapshot{.tick = state.tick, .t_s = t_s, .device_m = tick.device_m, .proxy_m = tick.proxy_m,
+                    .force_N = tick.force_N, .feel = state.feel, .soft_vertices = {}, .tick_us = tick.tick_us};
+  fill_soft_vertices(world, state, snapshot);
+  return snapshot;
+}
+
+std::optional<glm::dvec3> equilibrium_force(const World& world, const WorldState& state, double tolerance_N) {
+  const std::unique_ptr<WorldState> copy = copy_state(world, state);
+  // The same physics with a generous budget: only how soon it settles may differ, not where.
+  World patient;
+  patient.tool = world.tool;
+  patient.limits = world.limits;
+  patient.meeting = world.meeting;
+  for (const SoftBody& body : world.soft) {
+    SoftBody slow = body;
+    slow.drawn = {};
+    slow.budget = kSettleBudget;
+    patient.soft.push_back(std::move(slow));
+  }
+  for (const RigidObject& object : world.rigid) patient.rigid.push_back(object.shared());
+  const device::DeviceState still{.position_m = state.device_m};
+  glm::dvec3 before(0.0);
+  int calm = 0;
+  for (int n = 0; n < kSettleTicks; ++n) {
+    const TickResult felt = haptic_tick(patient, *copy, still, 1e-3);
+    const glm::dvec3 force = world.tool.stiffness_N_per_m * (felt.proxy_m - felt.device_m);
+    calm = glm::length(force - before) < 0.01 * tolerance_N ? calm + 1 : 0;
+    before = force;
+    if (calm >= 40) return force;
+  }
+  return std::nullopt;
+}
+
+double jnd_of(const glm::dvec3& force, const glm::dvec3& reference, double floor_N) {
+  return glm::length(force - reference) / std::max(kJndShare * glm::length(reference), floor_N);
+}
+
+double jnd_floor_N(const Scene& scene) {
+  return std::max(kJndFloor_N, device::device_limits(scene.device_model).friction_N);
+}
+
+void flush_denormals() noexcept {
+  _mm_setcsr(_mm_getcsr() | 0x8040U);  // FTZ and DAZ
+}
+
+}  // namespace hybrid

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/soft_stage.h"
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+namespace hybrid {
+namespace {
+
+constexpr std::uint32_t kMapSlice = 512;  // surface voxels of each object whose cell is looked at a tick
+
+const glm::dvec3 kPunchAxis(0.0, 0.0, -1.0);  // a punch presses downwards in the scene
+
+}  // namespace
+
+voxel::ToolInBody tool_in_body(const World& world, const SoftBody& body, const glm::dvec3& point) noexcept {
+  voxel::ToolInBody tool;
+  tool.shape = world.tool.shape == Tool::Shape::punch ? voxel::ToolInBody::Shape::punch : voxel::ToolInBody::Shape::ball;
+  tool.centre = body.to_body(point);
+  tool.axis = glm::inverse(body.pose.rotation) * kPunchAxis;
+  tool.radius = world.tool.radius_m;
+  return tool;
+}
+
+double soft_reach(const World& world, const WorldState& state) noexcept {
+  double reach = 0.0;
+  for (const auto& object : state.soft) reach = std::max(reach, object->reach(world.tool.radius_m));
+  return reach;
+}
+
+bool touch_soft(const World& world, WorldState& state, const glm::dvec3& point, double range) noexcept {
+  bool any = false;
+  for (auto& list : state.touched) list.clear();
+  // A voxel may have moved since the map last looked at it, by much less than a cell.
+  const glm::dvec3 box(soft_reach(world, state) + range + 0.5 * state.map.cell_m());
+  const std::size_t count = state.map.soft_in(point - box, point + box, state.found);
+  if (count == state.found.size()) state.faults |= fault_touch_overflow;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::uint32_t number = state.found[i];
+    std::size_t o = world.soft.size() - 1;
+    while (world.soft[o].first_number > number) --o;
+    const voxel::SoftObject& object = *state.soft[o];
+    const voxel::VoxelId v = object.lattice().surface()[number - world.soft[o].first_number];
+    const glm::dvec3 away = world.soft[o].to_scene(object.position(v)) - point;
+    const double reach = object.reach(world.tool.radius_m) + range;
+    if (glm::dot(away, away) > reach * reach || state.touched[o].size() == voxel::SoftObject::kMaxTouched) continue;
+    state.touched[o].push_back(v);
+  }
+  for (std::size_t o = 0; o < state.soft.size(); ++o) {
+    // The map's lists are in the order of motion; sorted, the result does not depend on history.
+    std::sort(state.touched[o].begin(), state.touched[o].end());
+    if (state.touched[o].empty() && state.soft[o]->touched().empty()) continue;
+    state.soft[o]->touch(state.touched[o]);
+    any = any || !state.touched[o].empty();
+  }
+  return any;
+}
+
+void press_soft(const World& world, WorldState& state, const glm::dvec3& point, const glm::dvec3& delta,
+                int sweeps) noexcept {
+  for (std::size_t o = 0; o < state.soft.size(); ++o) {
+    voxel::SoftObject& object = *state.soft[o];
+    state.reactions[o] = {};
+    if (object.touched().empty()) continue;
+    const SoftBody& body = world.soft[o];
+    const voxel::ToolInBody tool = tool_in_body(world, body, point);
+    if (delta != glm::dvec3(0.0)) object.follow(glm::inverse(body.pose.rotation) * delta);
+    object.push_out(tool);
+    object.relax_near(tool, sweeps);
+    const voxel::Reaction in_body = object.reaction(tool);
+    const glm::dmat3 to_scene = glm::mat3_cast(body.pose.rotation);
+    state.reactions[o].force_N = to_scene * in_body.force_N;
+    state.reactions[o].stiffness_N_per_m = to_scene * in_body.stiffness_N_per_m * glm::transpose(to_scene);
+    state.reactions[o].pressed = in_body.pressed;
+  }
+}
+
+std::size_t soft_bounds(const World& world, WorldState& state, const glm::dvec3& point) noexcept {
+  std::size_t added = 0;
+  for (std::uint32_t o = 0; o < state.soft.size(); ++o) {
+    if (state.soft[o]->touched().empty()) continue;
+    const SoftBody& body = world.soft[o];
+    const std::size_t count = state.soft[o]->give_way(tool_in_body(world, body, point), state.bounds);
+    for (std::size_t i = 0; i < count && state.planes.size() < state.planes.capacity(); ++i, ++added) {
+      const glm::dvec3 normal = body.pose.rotation * state.bounds[i].normal;
+      state.planes.push_back({normal, state.bounds[i].offset + glm::dot(normal, body.pose.origin),
+                              static_cast<std::uint32_t>(world.rigid.size()) + o, 0});
+    }
+  }
+  return added;
+}
+
+void refresh_map(const World& world, WorldState& state) noexcept {
+  const std::uint64_t before = state.map.overflows();
+  for (std::size_t o = 0; o < state.soft.size(); ++o) {
+    const voxel::SoftObject& object = *state.soft[o];
+    if (!object.moved_ever()) continue;
+    const SoftBody& body = world.soft[o];
+    const auto surface = object.lattice().surface();
+    const auto look = [&](voxel::VoxelId v) {
+      const std::uint32_t s = object.surface_number(v);
+      if (s != voxel::SoftObject::kNoSurface) state.map.move(body.first_number + s, body.to_scene(object.position(v)));
+    };
+    for (const voxel::VoxelId v : object.touched()) look(v);
+    if (object.asleep() && state.cursor[o] == 0) continue;  // a whole round since it came to rest
+    const auto count = static_cast<std::uint32_t>(surface.size());
+    for (std::uint32_t i = 0; i < std::min(kMapSlice, count); ++i) {
+      look(surface[state.cursor[o]]);
+      if (++state.cursor[o] == count) {
+        state.cursor[o] = 0;
+        if (object.asleep()) break;
+      }
+    }
+  }
+  if (state.map.overflows() != before) state.faults |= fault_map_overflow;
+}
+
+}  // namespace hybrid

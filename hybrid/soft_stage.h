@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The soft stage of the tick: which voxels are near the tool, and what they answer when it moves.
+#pragma once
+
+#include "hybrid/world.h"
+
+namespace hybrid {
+
+// Hands each soft object its surface voxels within `range` of the tool at `point` (scene frame) beyond its reach. True when any is near.
+bool touch_soft(const World& world, WorldState& state, const glm::dvec3& point, double range) noexcept;
+
+// Tool moved to `point` by `delta`: pressed voxels follow, the rest is pushed out, the neighbourhood relaxes by `sweeps`,
+// and state.reactions are what each object then answers (scene frame).
+void press_soft(const World& world, WorldState& state, const glm::dvec3& point, const glm::dvec3& delta,
+                int sweeps) noexcept;
+
+// Half-spaces of voxels that could not leave the tool's way, appended to state.planes; returns how many.
+std::size_t soft_bounds(const World& world, WorldState& state, const glm::dvec3& point) noexcept;
+
+// The tool in an object's volume frame.
+voxel::ToolInBody tool_in_body(const World& world, const SoftBody& body, const glm::dvec3& point) noexcept;
+
+// Largest distance from the tool's centre at which it can touch a voxel of any soft object (unit: meter).
+double soft_reach(const World& world, const WorldState& state) noexcept;
+
+// Tells the map where surface voxels are now: those near the tool, those the chain moved, and a slice of the rest.
+void refresh_map(const World& world, WorldState& state) noexcept;
+
+}  // namespace hybrid

@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/tick.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include "hybrid/arbitration.h"
+#include "hybrid/rigid_sweep.h"
+#include "hybrid/soft_stage.h"
+
+namespace hybrid {
+namespace {
+
+constexpr int kPasses = 4;            // proxy and tissue answer one another this often a tick
+constexpr int kSweeps = 1;            // of the contact's neighbourhood, a pass
+constexpr double kSoftStep = 0.25;    // of the tool's reach: the proxy moves no further against tissue in one pass
+constexpr double kStill = 1e-6;       // of the tool's radius: a pass that moves the proxy less is the last
+constexpr int kMaxFreePieces = 512;   // of the way through free space looked at in one tick
+
+class StageClock {
+ public:
+  explicit StageClock(TickResult& result) : result_(result), start_(Clock::now()), last_(start_) {}
+  void done(Stage stage) noexcept {
+    const auto now = Clock::now();
+    result_.stage_us[static_cast<std::size_t>(stage)] += std::chrono::duration<float, std::micro>(now - last_).count();
+    last_ = now;
+  }
+  void stop() noexcept { result_.tick_us = std::chrono::duration<double, std::micro>(Clock::now() - start_).count(); }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  TickResult& result_;
+  Clock::time_point start_, last_;
+};
+
+bool finite(const glm::dvec3& v) noexcept { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+
+glm::dvec3 check_input(WorldState& state, const device::DeviceState& input) noexcept {
+  if (finite(input.position_m)) {
+    state.device_m = input.position_m;
+  } else {
+    ++state.nonfinite;
+    state.faults |= fault_nonfinite_input;
+  }
+  return state.device_m;
+}
+
+// Moves the proxy towards the device as long as the map's bricks on the way are empty. True when it arrives.
+bool advance_through_free_space(const World& world, WorldState& state, const glm::dvec3& goal) noexcept {
+  const double margin = std::max(world.tool.radius_m, soft_reach(world, state)) + state.map.cell_m();
+  const double piece = 8.0 * state.map.cell_m();
+  for (int n = 0; n < kMaxFreePieces; ++n) {
+    const glm::dvec3 way = goal - state.proxy_m;
+    const double length = glm::length(way);
+    const bool last = length <= piece;
+    const glm::dvec3 next = last ? goal : state.proxy_m + way * (piece / length);
+    if (state.map.any_near(glm::min(state.proxy_m, next) - margin, glm::max(state.proxy_m, next) + margin)) return false;
+    state.proxy_m = next;
+    if (last) return true;
+  }
+  return false;
+}
+
+// One pass: the proxy goes to the minimum of ½K|q − x|² plus the tissue's quadratic model, outside everything
+// rigid; then the tissue answers. Returns how far the proxy went.
+double move_proxy(const World& world, WorldState& state, const glm::dvec3& device, bool near_soft, Sweep& sweep) noexcept {
+  const double k = world.tool.stiffness_N_per_m;
+  glm::dmat3 metric(k);
+  glm::dvec3 pull = k * (device - state.proxy_m);
+  for (const voxel::Reaction& reaction : state.reactions) {
+    metric += reaction.stiffness_N_per_m;
+    pull += reaction.force_N;
+  }
+  glm::dvec3 step = glm::inverse(metric) * pull;
+  if (near_soft) {
+    // Against tissue no further than part of its reach at a time, so that no voxel is jumped over.
+    const double length = glm::length(step), most = kSoftStep * soft_reach(world, state);
+    if (length > most) {
+      step *= most / length;
+      ++state.truncated_ticks;
+    }
+  }
+  sweep = sweep_proxy(world, state, state.proxy_m, state.proxy_m + step, metric);
+  const glm::dvec3 delta = sweep.point - state.proxy_m;
+  state.proxy_m = sweep.point;
+  if (near_soft) press_soft(world, state, state.proxy_m, delta, kSweeps);
+  return glm::length(delta);
+}
+
+// Tissue that anchors, bone or its own chain keep from leaving the tool's way: the tool leaves its way instead.
+void give_way(const World& world, WorldState& state, Sweep& sweep) noexcept {
+  const double radius = world.tool.radius_m;
+  if (!gather_planes(world, state, state.proxy_m, 2.0 * radius)) return;
+  if (soft_bounds(world, state, state.proxy_m) == 0) return;
+  const polygon::PlaneMinimum out =
+      polygon::minimise_on_planes(state.proxy_m, glm::dmat3(1.0), state.planes, 1e-9 * radius);
+  const glm::dvec3 move = out.point - state.proxy_m;
+  // Rigid half-spaces were gathered this far only; what is further out is done next tick.
+  if (!out.feasible || glm::length(move) > radius) return;
+  state.proxy_m = out.point;
+  sweep.point = out.point;
+}
+
+}  // namespace
+
+TickResult haptic_tick(const World& world, WorldState& state, const device::DeviceState& input, double dt_s) noexcept {
+  TickResult result;
+  StageClock clock(result);
+  const glm::dvec3 device = check_input(state, input);
+  std::fill(state.rigid_force_N.begin(), state.rigid_force_N.end(), glm::dvec3(0.0));
+  Sweep sweep;
+
+  bool near_soft = false;
+  const bool free = advance_through_free_space(world, state, device);
+  if (!free && !state.soft.empty()) {
+    near_soft = touch_soft(world, state, state.proxy_m, kPasses * kSoftStep * soft_reach(world, state));
+  } else {
+    for (auto& object : state.soft) {
+      if (!object->touched().empty()) object->touch({});
+    }
+  }
+  clock.done(Stage::broad_phase);
+
+  std::fill(state.reactions.begin(), state.reactions.end(), voxel::Reaction{});
+  if (near_soft) press_soft(world, state, state.proxy_m, glm::dvec3(0.0), 0);
+  for (int pass = 0; pass < kPasses && !free; ++pass) {
+    const double moved = move_proxy(world, state, device, near_soft, sweep);
+    if (!near_soft || (pass > 0 && moved < kStill * world.tool.radius_m)) break;
+  }
+  if (near_soft) give_way(world, state, sweep);
+  clock.done(Stage::contact);
+
+  refresh_obstacles(world, state);
+  if (!world.meeting.empty()) relax_pairs(world, state);
+  clock.done(Stage::arbitration);
+
+  for (std::size_t o = 0; o < state.soft.size(); ++o) state.soft[o]->relax_background(world.soft[o].budget);
+  clock.done(Stage::background);
+
+  refresh_map(world, state);
+  clock.done(Stage::map);
+
+  const glm::dvec3 coupling = world.tool.stiffness_N_per_m * (state.proxy_m - device);
+  result.device_m = device;
+  result.proxy_m = state.proxy_m;
+  result.rigid_N = sweep.force_N;
+  result.soft_N = coupling - sweep.force_N;
+  const std::uint64_t bad = state.limit.nonfinite;
+  result.force_N = device::limit_force(world.limits, state.limit, coupling, dt_s);
+  state.nonfinite += state.limit.nonfinite - bad;
+  for (std::size_t o = 0; o < world.object_count(); ++o) {
+    const std::size_t rigid = world.rigid.size();
+    const glm::dvec3 force = o < rigid ? state.rigid_force_N[o] : state.reactions[o - rigid].force_N;
+    state.feel[o].force_N = glm::length(force);
+    state.feel[o].contact = state.feel[o].force_N > 0.0;
+    if (state.feel[o].contact) result.contacts |= 1U << std::min<std::size_t>(o, 31);
+  }
+  ++state.tick;
+  clock.done(Stage::force);
+  clock.stop();
+  return result;
+}
+
+bool start_proxy(const World& world, WorldState& state, const glm::dvec3& device_m) noexcept {
+  const double radius = world.tool.radius_m;
+  state.device_m = device_m;
+  state.proxy_m = device_m;
+  state.gather_step_m = radius;
+  state.started = true;
+  for (int n = 0; n < 64; ++n) {
+    glm::dvec3 away(0.0);
+    double deepest = 0.0;
+    for (const RigidObject& object : world.rigid) {
+      const glm::dvec3 p = object.to_body(state.proxy_m);
+      if (object.surface->inside(p)) return false;
+      polygon::NearPoint near;
+      if (!object.surface->nearest(p, radius, near)) continue;
+      const double depth = radius - near.distance;
+      if (depth <= deepest) continue;
+      if (!(near.distance > 0.0)) return false;
+      deepest = depth;
+      away = object.pose.rotation * ((p - near.point) / near.distance);
+    }
+    if (deepest <= 0.0) return true;
+    state.proxy_m += (deepest * (1.0 + 1e-9)) * away;
+  }
+  return false;
+}
+
+}  // namespace hybrid

@@ -1,0 +1,362 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "voxel/volume_inspect.h"
+
+#include <zlib.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <map>
+
+namespace voxel {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Deflate packs at most 1,032 bytes into one.
+constexpr double kMostPacked = 1100.0;
+
+bool ends_with(const std::string& text, const std::string& end) {
+  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
+}
+
+bool starts_with(const std::string& text, const std::string& start) {
+  return text.rfind(start, 0) == 0;
+}
+
+std::string lower_case(std::string text) {
+  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return text;
+}
+
+// ---- Text headers: NRRD and MetaImage
+
+std::string trimmed(const std::string& text) {
+  const auto first = text.find_first_not_of(" \t\r");
+  return first == std::string::npos ? "" : text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
+}
+
+// The "key = value" or "key: value" lines, keys in lower case without blanks.
+struct TextHeader {
+  std::map<std::string, std::string> fields;
+  std::uint64_t bytes = 0;  // up to what follows it in the same file
+
+  [[nodiscard]] bool has(const std::string& key) const { return fields.count(key) != 0; }
+  [[nodiscard]] std::string text(const std::string& key) const {
+    const auto field = fields.find(key);
+    return field == fields.end() ? "" : field->second;
+  }
+  // NaN where the field is no number.
+  [[nodiscard]] double number(const std::string& key, double otherwise) const {
+    const auto field = fields.find(key);
+    if (field == fields.end()) return otherwise;
+    char* end = nullptr;
+    const double value = std::strtod(field->second.c_str(), &end);
+    return end == field->second.c_str() ? std::nan("") : value;
+  }
+};
+
+// Reads up to an empty line, which ends a NRRD header, or the line of `last_key`, which ends a MetaImage
+// header.
+TextHeader read_text_header(const fs::path& path, char separator, const std::string& last_key) {
+  constexpr std::size_t kLongestLine = 1000;  // MetaIO has room for 1,024 and does not look
+  constexpr std::size_t kMostLines = 1000;
+  std::ifstream file(path, std::ios::binary);
+  TextHeader header;
+  std::string line;
+  for (std::size_t lines = 1; lines <= kMostLines && file; ++lines) {
+    line.clear();
+    for (int c = file.get(); c != '\n' && c != EOF; c = file.get()) {
+      ++header.bytes;
+      const bool text = c >= 0x20 || c == '\t' || c == '\r';
+      if (!text || line.size() >= kLongestLine) {
+        refuse_volume(path, "line ", lines, " of the header is ",
+                      text ? "longer than 1,000 characters" : "not text", "; ", kDamaged);
+      }
+      line.push_back(static_cast<char>(c));
+    }
+    ++header.bytes;
+    if (trimmed(line).empty()) break;
+    const auto at = line.find(separator);
+    if (at == std::string::npos || line[0] == '#') continue;
+    std::string key = lower_case(line.substr(0, at));
+    key.erase(std::remove_if(key.begin(), key.end(), [](char c) { return c == ' ' || c == '\t'; }),
+              key.end());
+    if (!header.fields.emplace(key, trimmed(line.substr(at + 1))).second) {
+      refuse_volume(path, "the header gives '", key, "' twice; correct it");
+    }
+    if (key == last_key) break;
+  }
+  return header;
+}
+
+std::uint64_t size_of_file(const fs::path& path) {
+  std::error_code error;
+  const std::uintmax_t bytes = fs::file_size(path, error);
+  return error ? 0 : bytes;
+}
+
+// The voxels' file as the header names it.
+void find_data_file(const fs::path& header, const std::string& name, VoxelPlace& place) {
+  const std::string word = lower_case(name);
+  if (name.empty() || word == "local") return;
+  // LIST and printf patterns name several files, and the libraries hand patterns to printf as they are.
+  if (starts_with(word, "list") || name.find('%') != std::string::npos) {
+    refuse_volume(header, "the voxels are spread over several files ('", name,
+                  "'); save the volume as one file");
+  }
+  place.file = header.parent_path() / name;
+  place.offset = 0;
+  std::error_code error;
+  if (!fs::is_regular_file(place.file, error)) {
+    refuse_volume(header, "the voxels should be in '", place.file.string(),
+                  "', which is not there; put it back beside the header");
+  }
+  place.file_bytes = size_of_file(place.file);
+}
+
+void check_axes(const fs::path& path, double axes) {
+  if (axes >= 1.0 && axes <= 7.0 && axes == std::floor(axes))
+    return;  // whether it is one volume is seen later
+  refuse_volume(path, "the header says ", axes, " axes; a volume has three. ", kDamaged);
+}
+
+// A count of bytes in a header: absent, or a number that can be one. -1 means 'the voxels are at the file's
+// end'.
+std::uint64_t bytes_to_skip(const fs::path& path, const TextHeader& header, const std::string& key) {
+  const double bytes = header.number(key, 0.0);
+  if (!(bytes >= -1.0 && bytes <= 1e15)) {
+    refuse_volume(path, "the header's '", key, "' is ", header.text(key), "; ", kDamaged);
+  }
+  return bytes > 0.0 ? static_cast<std::uint64_t>(bytes) : 0;
+}
+
+void inspect_meta(const fs::path& path, VoxelPlace& place) {
+  const TextHeader header = read_text_header(path, '=', "elementdatafile");
+  if (!header.has("elementdatafile")) refuse_volume(path, "the header has no ElementDataFile; ", kDamaged);
+  check_axes(path, header.number("ndims", std::nan("")));
+  place.offset = header.bytes;
+  find_data_file(path, header.text("elementdatafile"), place);
+  const std::string compressed = lower_case(header.text("compresseddata"));
+  if (starts_with(compressed, "t") || starts_with(compressed, "1"))
+    place.packing = VoxelPlace::Packing::deflate;
+  const std::string binary = lower_case(header.text("binarydata"));
+  if (starts_with(binary, "f") || starts_with(binary, "0")) place.packing = VoxelPlace::Packing::text;
+  place.offset += bytes_to_skip(path, header, "headersize");
+  const double packed = header.number("compresseddatasize", 0.0);
+  if (!(packed >= 0.0 && packed <= static_cast<double>(place.file_bytes))) {
+    refuse_volume(path, "the header says ", header.text("compresseddatasize"),
+                  " bytes of compressed voxels, but '", place.file.string(), "' has ", place.file_bytes, "; ",
+                  kDamaged);
+  }
+}
+
+void inspect_nrrd(const fs::path& path, VoxelPlace& place) {
+  const TextHeader header = read_text_header(path, ':', "");
+  check_axes(path, header.number("dimension", std::nan("")));
+  place.offset = header.bytes;
+  find_data_file(path, header.has("datafile") ? header.text("datafile") : header.text("data file"), place);
+  using Packing = VoxelPlace::Packing;
+  const std::map<std::string, Packing> packings{
+      {"raw", Packing::raw},   {"gzip", Packing::deflate}, {"gz", Packing::deflate}, {"ascii", Packing::text},
+      {"text", Packing::text}, {"txt", Packing::text},     {"hex", Packing::text}};
+  const auto packing = packings.find(lower_case(header.text("encoding")));
+  place.packing = packing == packings.end() ? Packing::other : packing->second;
+  bytes_to_skip(path, header, "lineskip");
+  const std::uint64_t skipped = bytes_to_skip(path, header, "byteskip");
+  (place.packing == Packing::deflate ? place.skipped : place.offset) += skipped;
+  if (header.has("lineskip") && place.packing == Packing::deflate) place.packing = Packing::other;
+}
+
+// ---- NIfTI
+
+// The number at `at` of a header, in the file's byte order.
+template <typename T, std::size_t Bytes>
+T field_at(const std::array<unsigned char, Bytes>& header, std::size_t at, bool swapped) {
+  std::array<unsigned char, sizeof(T)> bytes{};
+  std::copy_n(header.begin() + static_cast<std::ptrdiff_t>(at), sizeof(T), bytes.begin());
+  if (swapped) std::reverse(bytes.begin(), bytes.end());
+  T value;
+  std::memcpy(&value, bytes.data(), sizeof(T));
+  return value;
+}
+
+// ITK ends the whole program over a frame that is not finite, or overflows while it is decomposed.
+template <std::size_t Bytes>
+void check_nifti_frame(const fs::path& path, const std::array<unsigned char, Bytes>& header, bool swapped) {
+  const auto check = [&](const char* what, std::size_t at, std::size_t count) {
+    for (std::size_t n = 0; n < count; ++n) {
+      const float value = field_at<float>(header, at + 4 * n, swapped);
+      if (std::isfinite(value) && std::abs(value) < 1e12F) continue;
+      refuse_volume(path, "the header's ", what, " has an entry of ", value, "; ", kDamaged);
+    }
+  };
+  check("voxel size", 80, 3);
+  if (field_at<std::int16_t>(header, 252, swapped) > 0) check("qform", 256, 6);
+  if (field_at<std::int16_t>(header, 254, swapped) > 0) check("sform", 280, 12);
+}
+
+void inspect_nifti(const fs::path& path, VoxelPlace& place) {
+  constexpr std::int32_t kHeaderBytes = 348;
+  std::array<unsigned char, kHeaderBytes> header{};
+  const gzFile file = gzopen(path.c_str(), "rb");  // reads what is not packed as it is
+  const int got = file == nullptr ? 0 : gzread(file, header.data(), header.size());
+  if (file != nullptr) gzclose(file);
+  const bool swapped = field_at<std::int32_t>(header, 0, true) == kHeaderBytes;
+  const bool magic = std::memcmp(&header[344], "n+1", 4) == 0;
+  if (got != kHeaderBytes || (!swapped && field_at<std::int32_t>(header, 0, false) != kHeaderBytes) ||
+      !magic) {
+    refuse_volume(path, "this is not a NIfTI-1 file with header and voxels together; ", kDamaged);
+  }
+  const int axes = field_at<std::int16_t>(header, 40, swapped);
+  check_axes(path, axes);
+  for (int axis = 1; axis <= axes; ++axis) {
+    const int voxels = field_at<std::int16_t>(header, 40 + 2 * static_cast<std::size_t>(axis), swapped);
+    if (voxels < 1)
+      refuse_volume(path, "the header says ", voxels, " voxels along axis ", axis, "; ", kDamaged);
+    const float spacing = field_at<float>(header, 76 + 4 * static_cast<std::size_t>(axis), swapped);
+    if (axis > 3 || spacing > 0.0F) continue;
+    std::ostringstream note;
+    note << "the header's voxel size along axis " << axis << " is " << spacing
+         << "; another was put in its place";
+    place.notes.push_back(note.str());
+  }
+  check_nifti_frame(path, header, swapped);
+  if (ends_with(lower_case(path.string()), ".gz")) place.packing = VoxelPlace::Packing::deflate;
+  const float offset = field_at<float>(header, 108, swapped);
+  const double most = place.packing == VoxelPlace::Packing::raw ? 1.0 : kMostPacked;
+  // 0 is common and means right after the header and its four bytes of extension flags.
+  if (!(offset >= 0.0F && offset <= most * static_cast<double>(place.file_bytes))) {
+    refuse_volume(path, "the header says the voxels begin at byte ", offset, "; ", kDamaged);
+  }
+  const std::map<int, std::uint64_t> type_bytes{{2, 1},   {4, 2},   {8, 4},   {16, 4},   {64, 8},
+                                                {256, 1}, {512, 2}, {768, 4}, {1024, 8}, {1280, 8}};
+  const auto type = type_bytes.find(field_at<std::int16_t>(header, 70, swapped));
+  if (type != type_bytes.end())
+    place.voxel_bytes = type->second;  // other types are refused once ITK names them
+  const auto begin = std::max<std::uint64_t>(static_cast<std::uint64_t>(offset), kHeaderBytes);
+  (place.packing == VoxelPlace::Packing::raw ? place.offset : place.skipped) = begin;
+}
+
+class Inflater {
+ public:
+  Inflater() {
+    ready_ = inflateInit2(&stream_, 15 + 32) == Z_OK;
+  }  // zlib or gzip, told apart by their headers
+  ~Inflater() {
+    if (ready_) inflateEnd(&stream_);
+  }
+  Inflater(const Inflater&) = delete;
+  Inflater& operator=(const Inflater&) = delete;
+
+  void feed(std::vector<unsigned char>& bytes, std::size_t count) {
+    stream_.next_in = bytes.data();
+    stream_.avail_in = static_cast<uInt>(count);
+  }
+  // Unpacks some of what was fed; false when there is nothing left, or at an error.
+  bool step() {
+    if (!ready_ || failed_ || (stream_.avail_in == 0 && !full_)) return false;
+    if (ended_) {  // gzip files may be several streams in a row
+      ended_ = false;
+      failed_ = inflateReset(&stream_) != Z_OK;
+    }
+    stream_.next_out = out_.data();
+    stream_.avail_out = static_cast<uInt>(out_.size());
+    const int status = inflate(&stream_, Z_NO_FLUSH);
+    full_ = stream_.avail_out == 0;
+    unpacked_ += out_.size() - stream_.avail_out;
+    ended_ = status == Z_STREAM_END;
+    failed_ = failed_ || (status != Z_OK && status != Z_STREAM_END && status != Z_BUF_ERROR);
+    return !failed_;
+  }
+  [[nodiscard]] std::uint64_t unpacked() const { return unpacked_; }
+  [[nodiscard]] bool ended() const { return ended_; }
+  [[nodiscard]] bool failed() const { return failed_ || !ready_; }
+
+ private:
+  z_stream stream_{};
+  std::vector<unsigned char> out_ = std::vector<unsigned char>(std::size_t{1} << 18U);
+  std::uint64_t unpacked_ = 0;
+  bool ready_ = false, failed_ = false, ended_ = false, full_ = false;
+};
+
+std::uint64_t bytes_in_file(const VoxelPlace& place, const VolumeHeader& header) {
+  if (place.voxel_bytes == 0) return header.bytes;
+  std::uint64_t bytes = place.voxel_bytes;
+  for (const int n : header.dims) bytes *= static_cast<std::uint64_t>(n);
+  return bytes;
+}
+
+}  // namespace
+
+VolumeFormat format_of(const fs::path& path) {
+  const std::string name = lower_case(path.filename().string());
+  if (ends_with(name, ".nii") || ends_with(name, ".nii.gz")) return VolumeFormat::nifti;
+  if (ends_with(name, ".nrrd") || ends_with(name, ".nhdr")) return VolumeFormat::nrrd;
+  if (ends_with(name, ".mha") || ends_with(name, ".mhd")) return VolumeFormat::meta;
+  if (ends_with(name, ".dcm") || ends_with(name, ".ima")) {
+    refuse_volume(path, "this is one slice of a DICOM series; give the folder that holds the series");
+  }
+  refuse_volume(path, "the name's ending is not one of a volume; ", kVolumeFormats);
+}
+
+VoxelPlace inspect_volume(const fs::path& path, VolumeFormat format) {
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  if (!fs::exists(status)) refuse_volume(path, "there is no such file; correct the path");
+  if (!fs::is_regular_file(status))
+    refuse_volume(path, "this is neither a file nor a folder; ", kVolumeFormats);
+  if (!std::ifstream(path)) refuse_volume(path, "the file cannot be opened; check its permissions");
+  VoxelPlace place;
+  place.file = path;
+  place.file_bytes = size_of_file(path);
+  if (place.file_bytes == 0) refuse_volume(path, "the file is empty; copy or export it again");
+  switch (format) {
+    case VolumeFormat::nifti:
+      inspect_nifti(path, place);
+      break;
+    case VolumeFormat::nrrd:
+      inspect_nrrd(path, place);
+      break;
+    case VolumeFormat::meta:
+      inspect_meta(path, place);
+      break;
+  }
+  return place;
+}
+
+void check_file_size(const fs::path& path, const VoxelPlace& place, const VolumeHeader& header) {
+  const std::uint64_t left = place.file_bytes > place.offset ? place.file_bytes - place.offset : 0;
+  // As text a voxel of up to eight bytes takes one digit and a blank at least.
+  const bool raw = place.packing == VoxelPlace::Packing::raw;
+  const double most = raw ? 1.0 : place.packing == VoxelPlace::Packing::text ? 8.0 : kMostPacked;
+  const std::uint64_t needed = bytes_in_file(place, header);
+  if (static_cast<double>(needed) <= most * static_cast<double>(left)) return;
+  refuse_volume(path, "the header says ", header.dims[0], " x ", header.dims[1], " x ", header.dims[2],
+                " voxels of ", header.component, ", ", needed, " bytes, but '", place.file.string(),
+                "' has only ", left, raw ? " bytes of them; " : " packed bytes; ", kDamaged);
+}
+
+void check_packed(const fs::path& path, const VoxelPlace& place, const VolumeHeader& header) {
+  if (place.packing != VoxelPlace::Packing::deflate) return;
+  std::ifstream file(place.file, std::ios::binary);
+  file.seekg(static_cast<std::streamoff>(place.offset));
+  std::vector<unsigned char> bytes(std::size_t{1} << 16U);
+  const std::uint64_t needed = bytes_in_file(place, header) + place.skipped;
+  Inflater inflater;
+  // To the end of the stream, where its checksum is; a file may go on after that.
+  while (file && !inflater.failed() && !(inflater.ended() && inflater.unpacked() >= needed)) {
+    file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+    inflater.feed(bytes, static_cast<std::size_t>(file.gcount()));
+    while (!(inflater.ended() && inflater.unpacked() >= needed) && inflater.step()) continue;
+  }
+  if (!inflater.failed() && inflater.ended() && inflater.unpacked() >= needed) return;
+  refuse_volume(path, "the packed voxels in '", place.file.string(), "' ",
+                inflater.failed() ? "are damaged after" : "end after", " ", inflater.unpacked(), " of ",
+                needed, " bytes; ", kDamaged);
+}
+
+}  // namespace voxel
