@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "hybrid/tick.h"
 
+#include <time.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -20,20 +22,29 @@ constexpr double kSoftStep = 0.25;    // of the tool's reach: the proxy moves no
 constexpr double kStill = 1e-6;       // of the tool's radius: a pass that moves the proxy less is the last
 constexpr int kMaxFreePieces = 512;   // of the way through free space looked at in one tick
 
+// Stages by the wall clock, which is cheap; the whole tick by the thread's own processor time, because on a shared machine a
+// tick that was put aside for another process is not a slow tick.
 class StageClock {
  public:
-  explicit StageClock(TickResult& result) : result_(result), start_(Clock::now()), last_(start_) {}
+  explicit StageClock(TickResult& result) : result_(result), start_us_(own_time_us()), last_(Clock::now()) {}
   void done(Stage stage) noexcept {
     const auto now = Clock::now();
     result_.stage_us[static_cast<std::size_t>(stage)] += std::chrono::duration<float, std::micro>(now - last_).count();
     last_ = now;
   }
-  void stop() noexcept { result_.tick_us = std::chrono::duration<double, std::micro>(Clock::now() - start_).count(); }
+  void stop() noexcept { result_.tick_us = own_time_us() - start_us_; }
 
  private:
   using Clock = std::chrono::steady_clock;
+  static double own_time_us() noexcept {
+    timespec now{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+    return static_cast<double>(now.tv_sec) * 1e6 + static_cast<double>(now.tv_nsec) * 1e-3;
+  }
+
   TickResult& result_;
-  Clock::time_point start_, last_;
+  double start_us_;
+  Clock::time_point last_;
 };
 
 bool finite(const glm::dvec3& v) noexcept { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }

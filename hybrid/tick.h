@@ -22,7 +22,7 @@ struct TickResult {
   glm::dvec3 rigid_N{0.0}, soft_N{0.0};  // its parts before the limits: rigid_N + soft_N = K (proxy − device)
   std::uint32_t contacts = 0; // bit per object, rigid ones first; objects beyond 31 share the last bit
   std::array<float, kStages> stage_us{};
-  double tick_us = 0.0;
+  double tick_us = 0.0;  // processor time of this thread; the stages are wall time
 };
 
 // One tick of dt_s. A pure function of (world, state, input, dt_s): the same inputs give the same bits (times apart).

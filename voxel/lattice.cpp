@@ -98,6 +98,7 @@ void Lattice::fill_springs(const LatticeOptions& options) {
     springs_.across[d].assign(size(), 0.0F);
   }
   for (std::size_t a = 0; a < 3; ++a) springs_.inverse_diagonal[a].assign(size(), 0.0F);
+  std::size_t links = 0;
   for (std::size_t v = 0; v < size(); ++v) {
     if (label_[v] == 0) continue;
     for (std::size_t d = 0; d < 3; ++d) {
@@ -106,8 +107,11 @@ void Lattice::fill_springs(const LatticeOptions& options) {
       const LinkModuli &a = moduli[label_[v]], &b = moduli[other];
       springs_.along[d][v] = static_cast<float>(in_series(a.along, b.along) * area_by_length[d]);
       springs_.across[d][v] = static_cast<float>(in_series(a.across, b.across) * area_by_length[d]);
+      force_scale_N_ += static_cast<double>(springs_.along[d][v]) * spacing_m_[static_cast<int>(d)];
+      ++links;
     }
   }
+  if (links > 0) force_scale_N_ /= static_cast<double>(links);
 }
 
 void Lattice::fill_anchors(const LabelVolume& volume, const LatticeOptions& options) {

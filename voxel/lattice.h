@@ -77,6 +77,8 @@ class Lattice {
   [[nodiscard]] const glm::dvec3& spacing_m() const { return spacing_m_; }
   [[nodiscard]] double min_spacing_m() const { return min_spacing_m_; }
   [[nodiscard]] double max_spacing_m() const { return max_spacing_m_; }
+  // Force that stretches an average link to twice its length (unit: newton): the scale by which residuals are small.
+  [[nodiscard]] double force_scale_N() const { return force_scale_N_; }
 
   // Centre of a voxel at rest, volume frame (unit: meter).
   [[nodiscard]] glm::dvec3 rest(VoxelId v) const {
@@ -117,6 +119,7 @@ class Lattice {
   Springs springs_;
   glm::dvec3 spacing_m_{1e-3};
   double min_spacing_m_ = 1e-3, max_spacing_m_ = 1e-3;
+  double force_scale_N_ = 0.0;
   std::size_t voxel_count_ = 0, anchored_count_ = 0, class_count_ = 1;
   std::vector<std::uint8_t> label_, anchored_;
   std::vector<VoxelId> surface_;

@@ -9,6 +9,8 @@ namespace {
 
 constexpr int kCoarsestSweeps = 8;
 constexpr std::size_t kMaxLevels = 10;
+constexpr int kPatience = 40;          // cycles without gain before an object counts as resting
+constexpr double kGain = 0.98;         // of the least residual so far: less is a gain
 
 VoxelId cell_at(const Springs& s, int i, int j, int k) {
   return static_cast<VoxelId>(static_cast<std::size_t>(i) + static_cast<std::size_t>(j) * s.stride[1] +
@@ -27,7 +29,8 @@ std::vector<std::uint64_t> costs_by_plane(const Springs& s) {
 
 }  // namespace
 
-Relaxation::Relaxation(const Lattice& lattice) : lattice_(lattice) {
+Relaxation::Relaxation(const Lattice& lattice)
+    : lattice_(lattice), tolerance_N_(kRestingResidual * lattice.force_scale_N()) {
   std::vector<float> filled(lattice.size());
   std::vector<std::uint8_t> fixed(lattice.size());
   for (std::size_t v = 0; v < lattice.size(); ++v) {
@@ -194,7 +197,12 @@ void Relaxation::end_cycle() noexcept {
   held_cells_.clear();
   residual_N_ = running_residual_N_;
   ++cycles_;
-  if (residual_N_ < tolerance_N_) asleep_ = true;
+  if (cycles_without_gain_ == 0 || residual_N_ < kGain * least_residual_N_) {
+    least_residual_N_ = residual_N_;
+    cycles_without_gain_ = 0;
+  }
+  ++cycles_without_gain_;
+  if (residual_N_ < tolerance_N_ || cycles_without_gain_ > kPatience) asleep_ = true;
 }
 
 std::uint64_t Relaxation::do_plane(Displacement& state, const ObstacleView& obstacles, const Step& step,

@@ -41,6 +41,10 @@ void correct_row(const Lattice& lattice, Displacement& state, int axis, std::siz
 void clear_obstacles(const Lattice& lattice, Displacement& state, const ObstacleView& obstacles, std::size_t begin,
                      int count) noexcept;
 
+// An object rests when no free voxel feels more than this part of Lattice::force_scale_N(): a hundred times the rounding of
+// floats at a displacement of ten spacings, and far below what a hand can feel.
+inline constexpr double kRestingResidual = 1e-5;
+
 class Relaxation {
  public:
   explicit Relaxation(const Lattice& lattice);
@@ -50,11 +54,15 @@ class Relaxation {
                     std::uint64_t budget) noexcept;
 
   // Something moved: relax until the residual is below the tolerance again.
-  void wake() noexcept { asleep_ = false; }
+  void wake() noexcept {
+    asleep_ = false;
+    cycles_without_gain_ = 0;
+  }
   [[nodiscard]] bool asleep() const { return asleep_; }
   // Largest force that any free voxel still feels, as the last whole cycle found it (unit: newton).
   [[nodiscard]] double residual_N() const { return residual_N_; }
-  // Cycles stop when the residual falls below this (unit: newton).
+  // Cycles stop when the residual falls below this (unit: newton), or has not fallen for a while: what chain limits hold has
+  // a residual that no relaxation removes. Default: kRestingResidual of the lattice's force scale.
   void set_tolerance(double tolerance_N) noexcept { tolerance_N_ = tolerance_N; }
   [[nodiscard]] std::uint64_t cycles() const { return cycles_; }
   [[nodiscard]] std::uint64_t cycle_cost() const { return cycle_cost_; }
@@ -104,7 +112,8 @@ class Relaxation {
   std::size_t step_ = 0;
   int plane_ = 1;
   bool asleep_ = true;
-  double residual_N_ = 0.0, running_residual_N_ = 0.0, tolerance_N_ = 1e-7;
+  double residual_N_ = 0.0, running_residual_N_ = 0.0, tolerance_N_ = 0.0, least_residual_N_ = 0.0;
+  int cycles_without_gain_ = 0;
   std::uint64_t cycles_ = 0, cycle_cost_ = 0;
 };
 

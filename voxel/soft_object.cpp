@@ -13,6 +13,7 @@ namespace {
 constexpr int kNearMargin = 4;              // voxels around the contact that relax_near() works on
 constexpr std::size_t kMaxNear = 20'000;    // and at most this many
 constexpr std::size_t kMaxCarried = 20'000; // voxels that may hang on the pressed ones by tight links
+constexpr double kStir = 1e-5;              // of the spacing: pressed voxels that moved less wake nobody
 constexpr double kGiveWay = 0.01;           // of the voxel radius: less is left to the next push
 constexpr float kTight = 1e-4F;             // of the spacing: nearer to its limit than this a link is tight
 
@@ -98,7 +99,13 @@ void SoftObject::touch(std::span<const VoxelId> near) noexcept {
 
 void SoftObject::settle_chain() noexcept {
   moved_ever_ = true;
-  relaxation_.wake();
+  float most = 0.0F;
+  for (const glm::vec3& move : moves_) most = std::max(most, glm::dot(move, move));
+  unrelaxed_m_ += std::sqrt(static_cast<double>(most));
+  if (unrelaxed_m_ > kStir * lattice_->min_spacing_m()) {
+    unrelaxed_m_ = 0.0;
+    relaxation_.wake();
+  }
   chain_.settle(state_, sources_, moves_, obstacles_, surface_number_);
 }
 

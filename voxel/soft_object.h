@@ -147,6 +147,7 @@ class SoftObject {
   std::vector<std::uint32_t> carried_stamp_;   // [v]
   std::vector<std::uint32_t> carried_index_;   // [v]
   std::uint32_t stamp_ = 0;
+  double unrelaxed_m_ = 0.0;                   // motion of pressed voxels since the background was last woken
   std::uint64_t dropped_touches_ = 0;
   bool moved_ever_ = false;
 };

@@ -87,7 +87,9 @@ std::vector<Slice> read_slices(const fs::path& folder, std::vector<std::string>&
     std::ostringstream text;
     std::size_t named = 0;
     for (const auto& [name, count] : series) {
-      if (named++ < 8) text << (named == 1 ? "" : ", ") << name << " (" << count << " files)";
+      if (named++ < 8)
+        text << (named == 1 ? "" : ", ") << (name.empty() ? "without identifier" : name) << " (" << count
+             << " files)";
     }
     refuse_volume(folder, "the folder holds ", series.size(), " DICOM series: ", text.str(),
                   named > 8 ? ", ..." : "", "; put the files of one of them into a folder of their own");

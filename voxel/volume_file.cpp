@@ -276,7 +276,6 @@ void save_volume(const fs::path& path, const LabelVolume& volume, double unit_m)
       region.SetSize(axis, n);
     }
     io->SetIORegion(region);
-    io->WriteImageInformation();
     io->Write(volume.labels.data());
   });
   // The NIfTI library reports a full disk to nobody; what was written must read back.

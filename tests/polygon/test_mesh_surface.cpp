@@ -212,6 +212,7 @@ TEST(MeshSurface, SameAnswersOnManyThreadsAndForEveryBuild) {
   std::mt19937_64 random(5);
   const TriangleMesh mesh = tests::random_soup(random, 20'000, 1.0);
   std::vector<glm::dvec3> points;
+  points.reserve(200);
   for (int i = 0; i < 200; ++i) points.push_back(tests::random_point(random, 1.0));
   const auto answers = [&points](const RigidSurface& surface) {
     std::vector<double> bits;
@@ -231,6 +232,7 @@ TEST(MeshSurface, SameAnswersOnManyThreadsAndForEveryBuild) {
   std::array<std::vector<double>, 4> seen;
   {
     std::vector<std::jthread> threads;
+    threads.reserve(seen.size());
     for (std::vector<double>& s : seen) threads.emplace_back([&] { s = answers(*first); });
   }
   for (const std::vector<double>& s : seen) EXPECT_EQ(s, expected);

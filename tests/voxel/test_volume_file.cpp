@@ -193,10 +193,11 @@ TEST_F(VolumeFile, LeftHandedFramesKeepEachVoxelInItsPlace) {
       }
     }
     for (int n = 0; n < 24; ++n) {  // MetaImage: three numbers of the matrix an axis
-      const glm::dvec3 at(n % 2 * 1.0, n / 2 % 3 * 2.0, n / 6 * 3.0);
+      const std::array<int, 3> index{n % 2, n / 2 % 3, n / 6};
+      const glm::dvec3 at(index[0] * 1.0, index[1] * 2.0, index[2] * 3.0);
       glm::dvec3 expected(10.0, 20.0, 30.0);
       for (int axis = 0; axis < 3; ++axis) {
-        const auto a = static_cast<std::size_t>(3 * axis);
+        const std::size_t a = 3 * static_cast<std::size_t>(axis);
         expected += at[axis] * glm::dvec3(m[a], m[a + 1], m[a + 2]);
       }
       EXPECT_LT(glm::distance(places[n], expected * 1e-3), 1e-12) << matrix << ' ' << n;
@@ -614,15 +615,17 @@ TEST_F(VolumeFile, DicomFoldersThatAreNotOneWholeSeriesAreRefused) {
   EXPECT_EQ(voxel::read_volume_header(copy("single", {3})).dims, (std::array{512, 512, 1}));
   EXPECT_EQ(voxel::read_volume_header(copy("some", {2, 3, 4})).dims[2], 3);
 
-  // Another series: a slice with a digit of its series' identifier changed.
+  // Another series: these slices have an empty identifier, the third gets one.
   const fs::path two = copy("two", {0, 1});
   std::string bytes = contents(slices[2]);
-  const std::string tag{"\x20\x00\x0e\x00UI", 6};
-  std::size_t found = 0;
-  for (auto at = bytes.find(tag); at != std::string::npos; at = bytes.find(tag, at + 1), ++found) {
-    bytes[at + 8] = bytes[at + 8] == '2' ? '1' : '2';
-  }
-  ASSERT_GT(found, 0U);
+  const std::string empty{"\x20\x00\x0e\x00UI\x00\x00", 8};
+  const std::string named{
+      "\x20\x00\x0e\x00UI\x04\x00"
+      "1.2\x00",
+      12};
+  const auto at = bytes.find(empty);
+  ASSERT_NE(at, std::string::npos);
+  bytes.replace(at, empty.size(), named);
   std::ofstream(two / "other", std::ios::binary) << bytes;
   EXPECT_SAYS(refusal([&] { voxel::read_volume_header(two); }), "2 DICOM series");
 
