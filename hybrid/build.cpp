@@ -177,7 +177,10 @@ class Builder {
     finish_world();
     for (std::size_t o = 0; o < soft_.size(); ++o) {
       if (world_->rigid.empty()) break;
-      world_->soft[o].near_rigid = find_obstacles(*world_, *built_.state, o) > 0;
+      const std::size_t near = find_obstacles(*world_, *built_.state, o);
+      if (near == 0) continue;
+      built_.notes.push_back({world_->soft[o].name, polygon::Severity::info,
+                              fmt::format("{} surface voxels lie near rigid objects, which will stop them", near)});
     }
     built_.world = std::move(world_);
     built_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -39,10 +39,11 @@ bool gather_planes(const World& world, WorldState& state, const glm::dvec3& poin
 }
 
 Sweep sweep_proxy(const World& world, WorldState& state, const glm::dvec3& from, const glm::dvec3& target,
-                  const glm::dmat3& metric) noexcept {
+                  const glm::dmat3& metric, double travel) noexcept {
   const double radius = world.tool.radius_m;
   Sweep sweep;
   sweep.point = from;
+  sweep.arrived = false;
   for (int n = 0; n < kMaxSteps; ++n) {
     // Look as far as the target is, but no further than what fits: what is gathered within radius + step makes a step of
     // that length safe.
@@ -72,9 +73,12 @@ Sweep sweep_proxy(const World& world, WorldState& state, const glm::dvec3& from,
     const glm::dvec3 move = minimum.point - sweep.point;
     const double length = glm::length(move);
     // The half-spaces are convex and hold the point before, so any part of the way is as safe as the whole.
-    const bool whole = length <= step;
-    sweep.point += whole ? move : move * (step / length);
-    if (whole && (length <= kConverged * radius || minimum.active_count == 0)) break;
+    const double most = std::min(step, travel);
+    const bool whole = length <= most;
+    sweep.point += whole ? move : move * (most / length);
+    travel -= std::min(length, most);
+    sweep.arrived = whole && (length <= kConverged * radius || minimum.active_count == 0);
+    if (sweep.arrived || travel <= 0.0) break;
   }
   return sweep;
 }

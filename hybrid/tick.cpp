@@ -8,6 +8,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <limits>
 
 #include "hybrid/arbitration.h"
 #include "hybrid/rigid_sweep.h"
@@ -85,16 +86,9 @@ double move_proxy(const World& world, WorldState& state, const glm::dvec3& devic
     metric += reaction.stiffness_N_per_m;
     pull += reaction.force_N;
   }
-  glm::dvec3 step = glm::inverse(metric) * pull;
-  if (near_soft) {
-    // Against tissue no further than part of its reach at a time, so that no voxel is jumped over.
-    const double length = glm::length(step), most = kSoftStep * soft_reach(world, state);
-    if (length > most) {
-      step *= most / length;
-      ++state.truncated_ticks;
-    }
-  }
-  sweep = sweep_proxy(world, state, state.proxy_m, state.proxy_m + step, metric);
+  // Against tissue no further than part of its reach at a time, so that no voxel is jumped over.
+  const double travel = near_soft ? kSoftStep * soft_reach(world, state) : std::numeric_limits<double>::max();
+  sweep = sweep_proxy(world, state, state.proxy_m, state.proxy_m + glm::inverse(metric) * pull, metric, travel);
   const glm::dvec3 delta = sweep.point - state.proxy_m;
   state.proxy_m = sweep.point;
   if (near_soft) press_soft(world, state, state.proxy_m, delta, kSweeps);
@@ -142,6 +136,7 @@ TickResult haptic_tick(const World& world, WorldState& state, const device::Devi
     if (!near_soft || (pass > 0 && moved < kStill * world.tool.radius_m)) break;
   }
   if (near_soft) give_way(world, state, sweep);
+  if (!sweep.arrived) ++state.truncated_ticks;
   clock.done(Stage::contact);
 
   refresh_obstacles(world, state);

@@ -41,7 +41,6 @@ struct SoftBody {  // the constant half of a soft object; the moving one is in W
   std::uint32_t first_number = 0;   // of its surface voxels in the occupancy map
   std::uint32_t budget = 0;         // background voxel updates a tick
   polygon::TriangleMesh drawn;      // volume frame, at rest
-  bool near_rigid = false;          // some voxels have a rigid surface near
 
   [[nodiscard]] glm::dvec3 to_body(const glm::dvec3& in_scene) const {
     return glm::inverse(pose.rotation) * (in_scene - pose.origin);
@@ -98,7 +97,7 @@ struct WorldState {
   std::uint64_t tick = 0;
   std::uint64_t nonfinite = 0;     // inputs or forces that were not finite
   std::uint32_t faults = 0;        // FaultBit, ever
-  std::uint64_t truncated_ticks = 0;  // ticks whose soft motion was cut by its step bound
+  std::uint64_t truncated_ticks = 0;  // ticks that ended before the proxy arrived, by a bound on its steps
   double gather_step_m = 0.0;      // how far the proxy may look, adapted to how crowded it is
 
   // ---- of arbitration ----

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "voxel/wide.h"
+
 namespace voxel {
 namespace {
 
@@ -246,7 +248,7 @@ std::uint64_t Relaxation::do_plane(Displacement& state, const ObstacleView& obst
   return cost;
 }
 
-void Relaxation::smooth_coarse(Level& level, int colour, int plane) noexcept {
+HYBRID_WIDE void Relaxation::smooth_coarse(Level& level, int colour, int plane) noexcept {
   const Springs& s = level.springs;
   const auto sy = static_cast<std::ptrdiff_t>(s.stride[1]), sz = static_cast<std::ptrdiff_t>(s.stride[2]);
   for (int j = 1 + ((plane + 1 + colour) & 1); j + 1 < s.dims[1]; j += 2) {
@@ -270,7 +272,7 @@ void Relaxation::smooth_coarse(Level& level, int colour, int plane) noexcept {
   }
 }
 
-void Relaxation::restrict_from_lattice(const Displacement& state, int plane) noexcept {
+HYBRID_WIDE void Relaxation::restrict_from_lattice(const Displacement& state, int plane) noexcept {
   const Springs& s = lattice_.springs();
   Level& coarse = levels_[1];
   const auto sy = static_cast<std::ptrdiff_t>(s.stride[1]), sz = static_cast<std::ptrdiff_t>(s.stride[2]);
@@ -301,7 +303,7 @@ void Relaxation::restrict_from_lattice(const Displacement& state, int plane) noe
                         cell_at(coarse.springs, 0, parent(j), plane);
         for (int i = 0; i < count; ++i) {
           worst = std::max(worst, std::fabs(r[i]));
-          target[parent(first + i)] += r[i];
+          target[parent(first + i)] += r[i];  // two neighbours share a cell
         }
       }
     }
@@ -336,7 +338,7 @@ void Relaxation::restrict_from_level(std::size_t fine, int plane) noexcept {
   }
 }
 
-void Relaxation::interpolate_row(const Level& coarse, int axis, int j, int k, int first, int last) noexcept {
+HYBRID_WIDE void Relaxation::interpolate_row(const Level& coarse, int axis, int j, int k, int first, int last) noexcept {
   // Cell-centred trilinear weights: 3/4 to the cell a voxel is in, 1/4 to the nearer neighbour, on each axis; an empty
   // neighbour's share goes to the others (a free surface).
   const Springs& s = coarse.springs;

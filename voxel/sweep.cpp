@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "voxel/relaxation.h"
+#include "voxel/wide.h"
 
 namespace voxel {
 namespace {
@@ -54,7 +55,7 @@ inline int leaves(float k, float difference, float low, float high) noexcept {
 }
 
 // One axis of a row at once. Returns false, with nothing written, when a limit is near.
-bool relax_row_at_once(const Lattice& lattice, Displacement& state, int axis, std::size_t begin, int count) noexcept {
+HYBRID_WIDE bool relax_row_at_once(const Lattice& lattice, Displacement& state, int axis, std::size_t begin, int count) noexcept {
   const Springs& s = lattice.springs();
   float* u = state.u[static_cast<std::size_t>(axis)].data() + begin;
   const float* inverse = s.inverse_diagonal[static_cast<std::size_t>(axis)].data() + begin;
@@ -115,7 +116,7 @@ void relax_row_one_by_one(const Lattice& lattice, Displacement& state, int axis,
 }
 
 // The same at-once attempt for a correction: false, with nothing written, when a limit is near.
-bool correct_row_at_once(const Lattice& lattice, Displacement& state, int axis, std::size_t begin, int count,
+HYBRID_WIDE bool correct_row_at_once(const Lattice& lattice, Displacement& state, int axis, std::size_t begin, int count,
                          const float* correction) noexcept {
   const Springs& s = lattice.springs();
   float* u = state.u[static_cast<std::size_t>(axis)].data() + begin;
