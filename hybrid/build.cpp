@@ -175,8 +175,7 @@ class Builder {
     make_lattices();
     fill_map();
     finish_world();
-    for (std::size_t o = 0; o < soft_.size(); ++o) {
-      if (world_->rigid.empty()) break;
+    for (std::size_t o = 0; o < built_.state->soft.size() && !world_->rigid.empty(); ++o) {
       const std::size_t near = find_obstacles(*world_, *built_.state, o);
       if (near == 0) continue;
       built_.notes.push_back({world_->soft[o].name, polygon::Severity::info,

@@ -21,13 +21,15 @@ struct Displacement {
   };
 
   explicit Displacement(const Lattice& lattice)
-      : role(lattice.size(), free), row_roles(lattice.springs().row.size(), 0) {
+      : role(lattice.size(), free),
+        row_held(lattice.springs().row.size(), 0),
+        row_obstacles(lattice.springs().row.size(), 0) {
     for (auto& axis : u) axis.assign(lattice.size(), 0.0F);
   }
 
   std::array<std::vector<float>, 3> u;      // [axis][v] (unit: meter)
   std::vector<std::uint8_t> role;           // [v]
-  std::vector<std::uint16_t> row_roles;     // [row]: voxels of the row whose role is not free
+  std::vector<std::uint16_t> row_held, row_obstacles;  // [row]: voxels of the row with that role
 
   [[nodiscard]] glm::dvec3 at(VoxelId v) const { return {u[0][v], u[1][v], u[2][v]}; }
   void set(VoxelId v, const glm::dvec3& value) {
@@ -35,8 +37,8 @@ struct Displacement {
   }
   void set_role(VoxelId v, Role r, const Lattice& lattice) {
     const std::size_t row = v / static_cast<std::size_t>(lattice.springs().dims[0]);
-    if (role[v] == free && r != free) ++row_roles[row];
-    if (role[v] != free && r == free) --row_roles[row];
+    row_held[row] = static_cast<std::uint16_t>(row_held[row] + (r == held) - (role[v] == held));
+    row_obstacles[row] = static_cast<std::uint16_t>(row_obstacles[row] + (r == obstacle) - (role[v] == obstacle));
     role[v] = r;
   }
 };

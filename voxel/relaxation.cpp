@@ -11,6 +11,7 @@ namespace {
 
 constexpr int kCoarsestSweeps = 8;
 constexpr std::size_t kMaxLevels = 10;
+constexpr double kTouching = 1e-6;      // of the spacing: nearer to its obstacle than this a voxel lies on it
 constexpr int kPatience = 40;          // cycles without gain before an object counts as resting
 constexpr double kGain = 0.98;         // of the least residual so far: less is a gain
 
@@ -232,7 +233,7 @@ std::uint64_t Relaxation::do_plane(Displacement& state, const ObstacleView& obst
     }
     case Stage::restrict_residual:
       if (level == 0) {
-        restrict_from_lattice(state, plane);
+        restrict_from_lattice(state, obstacles, plane);
       } else {
         restrict_from_level(level, plane);
       }
@@ -272,11 +273,13 @@ HYBRID_WIDE void Relaxation::smooth_coarse(Level& level, int colour, int plane) 
   }
 }
 
-HYBRID_WIDE void Relaxation::restrict_from_lattice(const Displacement& state, int plane) noexcept {
+HYBRID_WIDE void Relaxation::restrict_from_lattice(const Displacement& state, const ObstacleView& obstacles,
+                                                   int plane) noexcept {
   const Springs& s = lattice_.springs();
   Level& coarse = levels_[1];
   const auto sy = static_cast<std::ptrdiff_t>(s.stride[1]), sz = static_cast<std::ptrdiff_t>(s.stride[2]);
   const std::size_t coarse_plane = static_cast<std::size_t>(plane) * coarse.springs.stride[2];
+  const double touching = kTouching * lattice_.min_spacing_m();
   float worst = 0.0F;
   for (int axis = 0; axis < 3; ++axis) {
     const auto ua = static_cast<std::size_t>(axis);
@@ -297,7 +300,15 @@ HYBRID_WIDE void Relaxation::restrict_from_lattice(const Displacement& state, in
           const float pull = kx[i - 1] * (u[i - 1] - u[i]) + kx[i] * (u[i + 1] - u[i]) + ky[i - sy] * (u[i - sy] - u[i]) +
                              ky[i] * (u[i + sy] - u[i]) + kz[i - sz] * (u[i - sz] - u[i]) + kz[i] * (u[i + sz] - u[i]);
           // Only what may move passes its residual on.
-          r[i] = inverse[i] != 0.0F && role[i] == Displacement::free ? pull : 0.0F;
+          r[i] = inverse[i] != 0.0F && role[i] != Displacement::held ? pull : 0.0F;
+        }
+        if (state.row_obstacles[row] != 0) {
+          // What an obstacle holds is balanced by it.
+          for (int i = 0; i < count; ++i) {
+            const bool held_by_it = role[i] == Displacement::obstacle &&
+                                    blocked(obstacles, state, static_cast<VoxelId>(begin) + static_cast<VoxelId>(i), touching);
+            if (held_by_it) r[i] = 0.0F;
+          }
         }
         float* target = coarse.residual[ua].data() +
                         cell_at(coarse.springs, 0, parent(j), plane);
@@ -375,7 +386,7 @@ void Relaxation::prolong_to_lattice(Displacement& state, const ObstacleView& obs
       interpolate_row(levels_[1], axis, j, plane, first, last);
       correct_row(lattice_, state, axis, begin, last - first, scratch_.data());
     }
-    if (state.row_roles[row] != 0) clear_obstacles(lattice_, state, obstacles, begin, last - first);
+    if (state.row_obstacles[row] != 0) clear_obstacles(lattice_, state, obstacles, begin, last - first);
   }
 }
 

@@ -28,6 +28,9 @@ struct ObstacleView {
 void relax_row(const Lattice& lattice, Displacement& state, const ObstacleView& obstacles, std::size_t row, int first,
                int last) noexcept;
 
+// Is a voxel whose role is obstacle within `margin` of it, or in it (unit: meter)?
+bool blocked(const ObstacleView& view, const Displacement& state, VoxelId v, double margin) noexcept;
+
 // Where voxel v would go if only its links pulled, and the interval its links allow it, per axis.
 glm::dvec3 link_minimum(const Lattice& lattice, const Displacement& state, VoxelId v) noexcept;
 glm::dvec3 clamp_to_links(const Lattice& lattice, const Displacement& state, VoxelId v, const glm::dvec3& wanted) noexcept;
@@ -96,7 +99,7 @@ class Relaxation {
   void begin_cycle(std::span<const VoxelId> held) noexcept;
   void end_cycle() noexcept;
   void smooth_coarse(Level& level, int colour, int plane) noexcept;
-  void restrict_from_lattice(const Displacement& state, int plane) noexcept;
+  void restrict_from_lattice(const Displacement& state, const ObstacleView& obstacles, int plane) noexcept;
   void restrict_from_level(std::size_t fine, int plane) noexcept;
   void prolong_to_lattice(Displacement& state, const ObstacleView& obstacles, int plane) noexcept;
   void prolong_to_level(std::size_t fine, int plane) noexcept;

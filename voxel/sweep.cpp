@@ -90,7 +90,9 @@ HYBRID_WIDE bool relax_row_at_once(const Lattice& lattice, Displacement& state, 
   return true;
 }
 
+// After the links had their way with v: if that took it into its obstacle, where it goes with the obstacle there.
 void relax_obstacle(const Lattice& lattice, Displacement& state, const ObstacleView& view, VoxelId v) noexcept {
+  if (!blocked(view, state, v, 0.0)) return;
   glm::dvec3 wanted = link_minimum(lattice, state, v);
   const Obstacle& o = view.obstacles[view.surface_number[v]];
   const glm::dvec3 n(o.normal);
@@ -110,7 +112,7 @@ void relax_row_one_by_one(const Lattice& lattice, Displacement& state, int axis,
   const auto& inverse = lattice.springs().inverse_diagonal[static_cast<std::size_t>(axis)];
   for (std::size_t i = begin; i < begin + static_cast<std::size_t>(count); ++i) {
     const auto v = static_cast<VoxelId>(i);
-    if (inverse[v] == 0.0F || state.role[v] != Displacement::free) continue;
+    if (inverse[v] == 0.0F || state.role[v] == Displacement::held) continue;
     u[v] = clamp_interval(axis_minimum(lattice.springs(), u, v, axis), link_interval(lattice, u, v, axis), u[v]);
   }
 }
@@ -155,7 +157,7 @@ void correct_row(const Lattice& lattice, Displacement& state, int axis, std::siz
   for (int from = 0; from < count; from += kMaxRow) {
     const int piece = std::min(kMaxRow, count - from);
     const std::size_t start = begin + static_cast<std::size_t>(from);
-    if (state.row_roles[row] == 0 && correct_row_at_once(lattice, state, axis, start, piece, correction + from)) continue;
+    if (state.row_held[row] == 0 && correct_row_at_once(lattice, state, axis, start, piece, correction + from)) continue;
     for (int i = 0; i < piece; ++i) {
       const auto v = static_cast<VoxelId>(start + static_cast<std::size_t>(i));
       if (inverse[v] == 0.0F || state.role[v] == Displacement::held) continue;
@@ -174,6 +176,11 @@ void clear_obstacles(const Lattice& lattice, Displacement& state, const Obstacle
     const double depth = static_cast<double>(o.bound) - glm::dot(n, state.at(v));
     if (depth > 0.0) state.set(v, clamp_to_links(lattice, state, v, state.at(v) + depth * n));
   }
+}
+
+bool blocked(const ObstacleView& view, const Displacement& state, VoxelId v, double margin) noexcept {
+  const Obstacle& o = view.obstacles[view.surface_number[v]];
+  return glm::dot(glm::dvec3(o.normal), state.at(v)) < static_cast<double>(o.bound) + margin;
 }
 
 glm::dvec3 link_minimum(const Lattice& lattice, const Displacement& state, VoxelId v) noexcept {
@@ -218,11 +225,11 @@ void relax_row(const Lattice& lattice, Displacement& state, const ObstacleView& 
     const int count = std::min(kMaxRow, last - from);
     const std::size_t begin = base + static_cast<std::size_t>(from);
     for (int axis = 0; axis < 3; ++axis) {
-      if (state.row_roles[row] != 0 || !relax_row_at_once(lattice, state, axis, begin, count)) {
+      if (state.row_held[row] != 0 || !relax_row_at_once(lattice, state, axis, begin, count)) {
         relax_row_one_by_one(lattice, state, axis, begin, count);
       }
     }
-    if (state.row_roles[row] == 0) continue;
+    if (state.row_obstacles[row] == 0) continue;
     for (std::size_t v = begin; v < begin + static_cast<std::size_t>(count); ++v) {
       if (state.role[v] == Displacement::obstacle) relax_obstacle(lattice, state, obstacles, static_cast<VoxelId>(v));
     }

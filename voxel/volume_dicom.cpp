@@ -4,12 +4,16 @@
 #include <itkGDCMImageIO.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 #include <map>
+#include <new>
+#include <type_traits>
 
 #include "voxel/dicom_check.h"
+#include "voxel/run_apart.h"
 #include "voxel/volume_itk.h"
 
 namespace voxel {
@@ -29,7 +33,22 @@ std::string name_of(const Slice& slice) {
   return fs::path(slice.file).filename().string();
 }
 
-Slice read_slice_header(const std::string& file) {
+// What a process apart hands back of one slice: plain, because it lies in shared memory.
+struct SharedSlice {
+  bool done = false;
+  std::array<char, 1000> refusal{};
+  std::array<char, 100> series{};
+  Component component = Component::int16;
+  FileFrame frame;
+};
+static_assert(std::is_trivially_copyable_v<SharedSlice>);
+
+template <std::size_t Size>
+void copy_text(const std::string& text, std::array<char, Size>& to) {
+  text.copy(to.data(), Size - 1);
+}
+
+void read_slice_header(const std::string& file, SharedSlice& slice) {
   const fs::path path = file;
   const auto io = itk::GDCMImageIO::New();
   io->SetFileName(file);
@@ -39,10 +58,10 @@ Slice read_slice_header(const std::string& file) {
     refuse_volume(path, "each voxel holds ", io->GetNumberOfComponents(),
                   " numbers; only slices of single intensities make a volume");
   }
-  Slice slice;
-  slice.file = file;
   slice.component = *component;
-  io->GetValueFromTag("0020|000e", slice.series);
+  std::string series;
+  io->GetValueFromTag("0020|000e", series);
+  copy_text(series, slice.series);
   const unsigned axes = std::min(io->GetNumberOfDimensions(), 3U);
   slice.frame.dims = {1.0, 1.0, 1.0};
   for (unsigned axis = 0; axis < axes; ++axis) {
@@ -55,7 +74,37 @@ Slice read_slice_header(const std::string& file) {
       slice.frame.direction[a][static_cast<int>(row)] = direction[row];
     }
   }
-  return slice;
+}
+
+// Calls `call(n)` for each file in a process apart, and refuses the first file that it refuses or does not
+// survive.
+template <typename Call>
+void for_each_apart(const fs::path& folder, const std::vector<std::string>& files, SharedSlice* slices,
+                    Call call) {
+  for (std::size_t n = 0; n < files.size(); ++n) slices[n].done = false;
+  const auto seconds = static_cast<unsigned>(60 + 10 * files.size());
+  const int ended = run_apart(
+      [&] {
+        for (std::size_t n = 0; n < files.size(); ++n) {
+          try {
+            call(n);
+          } catch (const std::exception& error) {
+            copy_text(error.what(), slices[n].refusal);
+            return;
+          }
+          slices[n].done = true;
+        }
+      },
+      seconds);
+  if (ended < 0) {
+    refuse_volume(folder,
+                  "no process could be started to read the DICOM series; close other programs and try again");
+  }
+  for (std::size_t n = 0; n < files.size(); ++n) {
+    if (slices[n].done) continue;
+    if (slices[n].refusal[0] != '\0') throw VolumeError(slices[n].refusal.data());
+    refuse_volume(files[n], "the DICOM library gave up on this slice (signal ", ended, "); ", kDamaged);
+  }
 }
 
 // The slices of the only series in the folder, in no order. Not by GDCMSeriesFileNames, which reads every
@@ -69,15 +118,18 @@ std::vector<Slice> read_slices(const fs::path& folder, std::vector<std::string>&
   if (error)
     refuse_volume(folder, "the folder cannot be read (", error.message(), "); check its permissions");
   std::sort(files.begin(), files.end());
-  std::vector<Slice> slices;
-  std::size_t others = 0;
-  std::map<std::string, std::size_t> series;
+  std::vector<std::string> images;
   for (const fs::path& file : files) {
-    if (check_dicom(file) != DicomKind::image) {
-      ++others;
-      continue;
-    }
-    slices.push_back(read_slice_header(file));
+    if (check_dicom(file) == DicomKind::image) images.push_back(file.string());
+  }
+  const std::size_t others = files.size() - images.size();
+  const SharedMemory memory(images.size() * sizeof(SharedSlice));
+  auto* shared = new (memory.data()) SharedSlice[images.size()];
+  for_each_apart(folder, images, shared, [&](std::size_t n) { read_slice_header(images[n], shared[n]); });
+  std::vector<Slice> slices;
+  std::map<std::string, std::size_t> series;
+  for (std::size_t n = 0; n < images.size(); ++n) {
+    slices.push_back({images[n], shared[n].series.data(), shared[n].frame, shared[n].component, 0.0});
     ++series[slices.back().series];
   }
   if (slices.empty()) {
@@ -183,26 +235,29 @@ DicomSeries read_dicom_header(const fs::path& folder, double unit_m) {
 
 void read_dicom_voxels(const fs::path& folder, DicomSeries& series) {
   VolumeData& data = series.data;
-  data.bytes.reserve(data.header.bytes);
-  VolumeData slice;
-  for (const std::string& file : series.files) {
-    in_words(file, "the slice cannot be read", kDamaged, [&] {
+  const std::vector<std::string>& files = series.files;
+  const std::size_t voxels = data.header.bytes / size_of(data.component) / files.size();
+  const std::size_t slice_bytes = voxels * size_of(data.component);
+  const SharedMemory states(files.size() * sizeof(SharedSlice));
+  const SharedMemory memory(data.header.bytes);
+  auto* shared = new (states.data()) SharedSlice[files.size()];
+  for_each_apart(folder, files, shared, [&](std::size_t n) {
+    VolumeData slice;
+    std::vector<std::byte> doubles;
+    in_words(files[n], "the slice cannot be read", kDamaged, [&] {
       const auto io = itk::GDCMImageIO::New();
-      io->SetFileName(file);
+      io->SetFileName(files[n]);
       io->ReadImageInformation();
       slice.component = component_of(*io).value();
-      const std::size_t voxels = data.header.bytes / size_of(data.component) / series.files.size();
       slice.bytes.resize(voxels * size_of(slice.component));
       read_voxels(*io, slice.bytes);
     });
-    if (slice.component == data.component) {
-      data.bytes.insert(data.bytes.end(), slice.bytes.begin(), slice.bytes.end());
-    } else {
-      append_as_doubles(slice, data.bytes);
-    }
-  }
-  if (data.bytes.size() != data.header.bytes)
-    refuse_volume(folder, "the slices changed while they were read");
+    if (slice.component != data.component) append_as_doubles(slice, doubles);
+    const std::vector<std::byte>& bytes = doubles.empty() ? slice.bytes : doubles;
+    std::copy_n(bytes.begin(), std::min(bytes.size(), slice_bytes),
+                memory.data() + static_cast<std::ptrdiff_t>(n * slice_bytes));
+  });
+  data.bytes.assign(memory.data(), memory.data() + data.header.bytes);
 }
 
 }  // namespace voxel

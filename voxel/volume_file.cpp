@@ -138,7 +138,7 @@ VolumeData read_volume(const fs::path& path, double unit_m, const std::optional<
                        std::uint64_t max_bytes) {
   if (is_folder(path)) {
     DicomSeries series = read_dicom_header(path, unit_m);
-    check_memory(path, series.data, 1.0, spacing_m, max_bytes);
+    check_memory(path, series.data, 2.0, spacing_m, max_bytes);  // and what the process apart hands over
     in_words(path, "the voxels cannot be read", kDamaged, [&] { read_dicom_voxels(path, series); });
     return std::move(series.data);
   }

@@ -47,7 +47,7 @@ struct VolumeFileOptions {
   std::vector<LabelRule> rules;  // empty: the file holds labels 0..255, kept as they are
   // Resample to this spacing (nearest neighbour); as in the file otherwise.
   std::optional<glm::dvec3> spacing_m;
-  // Most memory that loading may take: the voxels (NIfTI and NRRD: with the copies their libraries make) and
+  // Most memory that loading may take: the voxels (with the copies that the libraries make) and
   // the labels. Refused above, with the numbers, before allocation.
   std::uint64_t max_bytes = 8ULL * 1024 * 1024 * 1024;
 };
