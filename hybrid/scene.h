@@ -109,7 +109,7 @@ struct SoftDescription {
   std::map<std::uint8_t, std::string> materials;  // label to material name; label absent: `material`
   std::string material;                           // name; empty: the default Material
   Anchors anchors;
-  std::uint32_t budget = 25'000;  // voxel updates of background relaxation a tick
+  std::uint32_t budget = 12'000;  // voxel updates of background relaxation a tick
   SourcePlace place, source_place;
 };
 

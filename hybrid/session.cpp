@@ -89,7 +89,7 @@ class Run {
     }
     const std::uint64_t sample_every =
         options_.reference_samples > 0 && !options_.realtime
-            ? std::max<std::uint64_t>(1, ticks_ / static_cast<std::uint64_t>(options_.reference_samples + 1))
+            ? std::max<std::uint64_t>(1, ticks_ / static_cast<std::uint64_t>(2 * options_.reference_samples))
             : 0;
     auto said = std::chrono::steady_clock::now();
     for (std::uint64_t tick = 0; tick < ticks_; ++tick) {
@@ -97,7 +97,7 @@ class Run {
       const TickResult felt = haptic_tick(world_, state_, device_->read(), dt_);
       device_->write(felt.force_N, dt_);
       keep(felt, tick);
-      if (sample_every != 0 && tick % sample_every == sample_every - 1) sample(felt);
+      if (sample_every != 0 && result_.error.samples < options_.reference_samples) sample(felt, sample_every);
       if (timer) continue;  // nothing that could make the next tick late
       if (options_.keep_picture && tick % kMomentEvery == 0) look(felt, tick);
       if (options_.progress && tick % 64 == 0 && std::chrono::steady_clock::now() - said > std::chrono::milliseconds(500)) {
@@ -144,10 +144,11 @@ class Run {
                             glm::length(felt.rigid_N), glm::length(felt.soft_N), felt.contacts, felt.tick_us});
   }
 
-  void sample(const TickResult& felt) {
+  // Evenly over the time in which something soft is felt.
+  void sample(const TickResult& felt, std::uint64_t every) {
     bool soft = false;
     for (const voxel::Reaction& r : state_.reactions) soft = soft || r.pressed > 0;
-    if (!soft) return;
+    if (!soft || ++soft_ticks_ % every != every / 2) return;
     if (options_.progress) options_.progress(fmt::format("comparing the force at tick {} with its equilibrium", state_.tick));
     const auto reference = equilibrium_force(world_, state_);
     if (!reference) return;
@@ -173,7 +174,7 @@ class Run {
   std::shared_ptr<const device::Path> path_;
   std::unique_ptr<device::HapticDevice> device_;
   double dt_;
-  std::uint64_t ticks_ = 0, hash_ = 0xCBF29CE484222325ULL;
+  std::uint64_t ticks_ = 0, soft_ticks_ = 0, hash_ = 0xCBF29CE484222325ULL;
   double sum_force2_ = 0.0, best_ = 0.0;
   SessionResult result_;
 };

@@ -17,10 +17,10 @@
 namespace hybrid {
 namespace {
 
-constexpr int kPasses = 4;            // proxy and tissue answer one another this often a tick
+constexpr int kPasses = 3;            // proxy and tissue answer one another this often a tick
 constexpr int kSweeps = 1;            // of the contact's neighbourhood, a pass
 constexpr double kSoftStep = 0.25;    // of the tool's reach: the proxy moves no further against tissue in one pass
-constexpr double kStill = 1e-6;       // of the tool's radius: a pass that moves the proxy less is the last
+constexpr double kStill = 1e-5;       // of the tool's radius: a pass that moves the proxy less is the last
 constexpr int kMaxFreePieces = 512;   // of the way through free space looked at in one tick
 
 // Stages by the wall clock, which is cheap; the whole tick by the thread's own processor time, because on a shared machine a

@@ -83,7 +83,17 @@ Relaxation::Relaxation(const Lattice& lattice)
   coarse_value_.assign(longest, 0.0F);
   coarse_weight_.assign(longest, 0.0F);
   held_cells_.reserve(16384);
+  unseen_.assign(lattice.springs().row.size(), 0);
+  row_residual_.assign(lattice.springs().row.size(), 0.0F);
 }
+
+void Relaxation::stir(std::size_t row) noexcept {
+  const auto across = static_cast<std::size_t>(lattice_.springs().dims[1]);
+  // A filled row has a border row on every side, so no index leaves the array.
+  unseen_[row] = unseen_[row - 1] = unseen_[row + 1] = unseen_[row - across] = unseen_[row + across] = 1;
+}
+
+void Relaxation::stir_all() noexcept { std::fill(unseen_.begin(), unseen_.end(), std::uint8_t{1}); }
 
 void Relaxation::build_level(const Springs& fine, const std::vector<float>& fine_filled,
                              const std::vector<std::uint8_t>& fine_fixed, Level& coarse,
@@ -211,42 +221,38 @@ void Relaxation::end_cycle() noexcept {
 std::uint64_t Relaxation::do_plane(Displacement& state, const ObstacleView& obstacles, const Step& step,
                                    int plane) noexcept {
   const std::size_t level = step.level;
-  const std::uint64_t cost =
-      step.stage == Stage::restrict_residual
-          ? levels_[level].plane_cost[static_cast<std::size_t>(std::min(2 * plane - 1, springs(level).dims[2] - 1))] +
-                levels_[level].plane_cost[static_cast<std::size_t>(std::min(2 * plane, springs(level).dims[2] - 1))]
-          : levels_[level].plane_cost[static_cast<std::size_t>(plane)];
-  if (cost == 0) return 0;
+  const std::size_t at = static_cast<std::size_t>(plane);
   switch (step.stage) {
-    case Stage::smooth: {
-      if (level > 0) {
-        smooth_coarse(levels_[level], step.colour, plane);
-      } else {
-        const Springs& s = lattice_.springs();
-        for (int j = 1 + ((plane + 1 + step.colour) & 1); j + 1 < s.dims[1]; j += 2) {
-          const std::size_t row =
-              static_cast<std::size_t>(plane) * static_cast<std::size_t>(s.dims[1]) + static_cast<std::size_t>(j);
-          relax_row(lattice_, state, obstacles, row, s.row[row][0], s.row[row][1]);
-        }
-      }
-      return (cost + 1) / 2;
-    }
+    case Stage::smooth:
+      if (level == 0) return smooth_lattice(state, obstacles, step.colour, plane);
+      smooth_coarse(levels_[level], step.colour, plane);
+      return (levels_[level].plane_cost[at] + 1) / 2;
     case Stage::restrict_residual:
-      if (level == 0) {
-        restrict_from_lattice(state, obstacles, plane);
-      } else {
-        restrict_from_level(level, plane);
-      }
-      return cost;
+      if (level == 0) return restrict_from_lattice(state, obstacles, plane);
+      restrict_from_level(level, plane);
+      return 4 * levels_[level + 1].plane_cost[at];
     case Stage::prolong:
-      if (level == 0) {
-        prolong_to_lattice(state, obstacles, plane);
-      } else {
-        prolong_to_level(level, plane);
-      }
-      return cost;
+      if (level == 0) return prolong_to_lattice(state, obstacles, plane);
+      prolong_to_level(level, plane);
+      return levels_[level].plane_cost[at];
   }
-  return cost;
+  return 0;
+}
+
+std::uint64_t Relaxation::smooth_lattice(Displacement& state, const ObstacleView& obstacles, int colour,
+                                         int plane) noexcept {
+  const Springs& s = lattice_.springs();
+  const auto tolerance = static_cast<float>(tolerance_N_);
+  std::uint64_t spent = 0;
+  for (int j = 1 + ((plane + 1 + colour) & 1); j + 1 < s.dims[1]; j += 2) {
+    const std::size_t row =
+        static_cast<std::size_t>(plane) * static_cast<std::size_t>(s.dims[1]) + static_cast<std::size_t>(j);
+    if (s.row[row][1] <= s.row[row][0] || (unseen_[row] == 0 && row_residual_[row] < tolerance)) continue;
+    relax_row(lattice_, state, obstacles, row, s.row[row][0], s.row[row][1]);
+    stir(row);
+    spent += static_cast<std::uint64_t>(s.row[row][1] - s.row[row][0]);
+  }
+  return spent;
 }
 
 HYBRID_WIDE void Relaxation::smooth_coarse(Level& level, int colour, int plane) noexcept {
@@ -273,28 +279,32 @@ HYBRID_WIDE void Relaxation::smooth_coarse(Level& level, int colour, int plane) 
   }
 }
 
-HYBRID_WIDE void Relaxation::restrict_from_lattice(const Displacement& state, const ObstacleView& obstacles,
-                                                   int plane) noexcept {
+HYBRID_WIDE std::uint64_t Relaxation::restrict_from_lattice(const Displacement& state, const ObstacleView& obstacles,
+                                                            int plane) noexcept {
   const Springs& s = lattice_.springs();
   Level& coarse = levels_[1];
   const auto sy = static_cast<std::ptrdiff_t>(s.stride[1]), sz = static_cast<std::ptrdiff_t>(s.stride[2]);
-  const std::size_t coarse_plane = static_cast<std::size_t>(plane) * coarse.springs.stride[2];
+  const auto coarse_plane = static_cast<std::ptrdiff_t>(static_cast<std::size_t>(plane) * coarse.springs.stride[2]);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::fill_n(coarse.residual[axis].begin() + coarse_plane, coarse.springs.stride[2], 0.0F);
+    std::fill_n(coarse.correction[axis].begin() + coarse_plane, coarse.springs.stride[2], 0.0F);
+  }
   const double touching = kTouching * lattice_.min_spacing_m();
-  float worst = 0.0F;
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto ua = static_cast<std::size_t>(axis);
-    std::fill_n(coarse.residual[ua].begin() + static_cast<std::ptrdiff_t>(coarse_plane), coarse.springs.stride[2], 0.0F);
-    std::fill_n(coarse.correction[ua].begin() + static_cast<std::ptrdiff_t>(coarse_plane), coarse.springs.stride[2], 0.0F);
-    for (int k = 2 * plane - 1; k <= std::min(2 * plane, s.dims[2] - 2); ++k) {
-      for (int j = 1; j + 1 < s.dims[1]; ++j) {
-        const std::size_t row = static_cast<std::size_t>(k) * static_cast<std::size_t>(s.dims[1]) + static_cast<std::size_t>(j);
-        const int first = s.row[row][0], count = s.row[row][1] - first;
-        if (count <= 0) continue;
-        const std::size_t begin = row * static_cast<std::size_t>(s.dims[0]) + static_cast<std::size_t>(first);
+  std::uint64_t spent = 0;
+  for (int k = 2 * plane - 1; k <= std::min(2 * plane, s.dims[2] - 2); ++k) {
+    for (int j = 1; j + 1 < s.dims[1]; ++j) {
+      const std::size_t row = static_cast<std::size_t>(k) * static_cast<std::size_t>(s.dims[1]) + static_cast<std::size_t>(j);
+      const int first = s.row[row][0], count = s.row[row][1] - first;
+      if (count <= 0 || unseen_[row] == 0) continue;  // unchanged, and small: nothing to pass on
+      unseen_[row] = 0;
+      float worst = 0.0F;
+      const std::size_t begin = row * static_cast<std::size_t>(s.dims[0]) + static_cast<std::size_t>(first);
+      const std::uint8_t* role = state.role.data() + begin;
+      for (int axis = 0; axis < 3; ++axis) {
+        const auto ua = static_cast<std::size_t>(axis);
         const float* u = state.u[ua].data() + begin;
         const float* inverse = s.inverse_diagonal[ua].data() + begin;
         const float *kx = s.stiffness(axis, 0) + begin, *ky = s.stiffness(axis, 1) + begin, *kz = s.stiffness(axis, 2) + begin;
-        const std::uint8_t* role = state.role.data() + begin;
         float* r = scratch_.data();
         for (int i = 0; i < count; ++i) {
           const float pull = kx[i - 1] * (u[i - 1] - u[i]) + kx[i] * (u[i + 1] - u[i]) + ky[i - sy] * (u[i - sy] - u[i]) +
@@ -310,16 +320,18 @@ HYBRID_WIDE void Relaxation::restrict_from_lattice(const Displacement& state, co
             if (held_by_it) r[i] = 0.0F;
           }
         }
-        float* target = coarse.residual[ua].data() +
-                        cell_at(coarse.springs, 0, parent(j), plane);
+        float* target = coarse.residual[ua].data() + cell_at(coarse.springs, 0, parent(j), plane);
         for (int i = 0; i < count; ++i) {
           worst = std::max(worst, std::fabs(r[i]));
           target[parent(first + i)] += r[i];  // two neighbours share a cell
         }
       }
+      row_residual_[row] = worst;
+      running_residual_N_ = std::max(running_residual_N_, static_cast<double>(worst));
+      spent += static_cast<std::uint64_t>(count);
     }
   }
-  running_residual_N_ = std::max(running_residual_N_, static_cast<double>(worst));
+  return spent;
 }
 
 void Relaxation::restrict_from_level(std::size_t fine, int plane) noexcept {
@@ -375,19 +387,44 @@ HYBRID_WIDE void Relaxation::interpolate_row(const Level& coarse, int axis, int 
   }
 }
 
-void Relaxation::prolong_to_lattice(Displacement& state, const ObstacleView& obstacles, int plane) noexcept {
+bool Relaxation::negligible(const Level& coarse, int j, int k) const noexcept {
+  const auto limit = static_cast<float>(tolerance_N_ / lattice_.force_scale_N() * lattice_.min_spacing_m());
+  const Springs& s = coarse.springs;
+  const int own_j = parent(j), own_k = parent(k);
+  const int near_j = (j & 1) != 0 ? own_j - 1 : own_j + 1, near_k = (k & 1) != 0 ? own_k - 1 : own_k + 1;
+  for (const int ck : {own_k, near_k}) {
+    for (const int cj : {own_j, near_j}) {
+      const auto& range = s.row[static_cast<std::size_t>(ck) * static_cast<std::size_t>(s.dims[1]) + static_cast<std::size_t>(cj)];
+      for (const auto& e : coarse.correction) {
+        const float* value = e.data() + cell_at(s, 0, cj, ck);
+        for (int i = range[0]; i < range[1]; ++i) {
+          if (std::fabs(value[i]) > limit) return false;
+        }
+      }
+    }
+  }
+  return true;
+}
+
+std::uint64_t Relaxation::prolong_to_lattice(Displacement& state, const ObstacleView& obstacles, int plane) noexcept {
   const Springs& s = lattice_.springs();
+  std::uint64_t spent = 0;
   for (int j = 1; j + 1 < s.dims[1]; ++j) {
     const std::size_t row = static_cast<std::size_t>(plane) * static_cast<std::size_t>(s.dims[1]) + static_cast<std::size_t>(j);
     const int first = s.row[row][0], last = s.row[row][1];
     if (last <= first) continue;
+    ++spent;
+    if (negligible(levels_[1], j, plane)) continue;
     const std::size_t begin = row * static_cast<std::size_t>(s.dims[0]) + static_cast<std::size_t>(first);
     for (int axis = 0; axis < 3; ++axis) {
       interpolate_row(levels_[1], axis, j, plane, first, last);
       correct_row(lattice_, state, axis, begin, last - first, scratch_.data());
     }
     if (state.row_obstacles[row] != 0) clear_obstacles(lattice_, state, obstacles, begin, last - first);
+    stir(row);
+    spent += static_cast<std::uint64_t>(last - first);
   }
+  return spent;
 }
 
 void Relaxation::prolong_to_level(std::size_t fine, int plane) noexcept {

@@ -4,7 +4,8 @@
 // Per axis the energy is ½ Σ k (u(b) − u(a))² over the links: an anisotropic Laplace problem. One cycle is a multigrid V(1,1)
 // cycle (Briggs, Henson & McCormick, A Multigrid Tutorial, chapters 3 and 10): zebra sweeps over rows, residuals summed into cells of
 // 2×2×2, correction interpolated back trilinearly. The cycle is cut into planes, so that a tick does as many voxel
-// updates as its budget says and goes on where it stopped: counted work, never measured time.
+// updates as its budget says and goes on where it stopped: counted work, never measured time. Rows that are at rest, in a
+// neighbourhood at rest, are not visited: work follows what moves, not the size of the object.
 #pragma once
 
 #include <array>
@@ -56,13 +57,17 @@ class Relaxation {
   std::uint64_t run(Displacement& state, const ObstacleView& obstacles, std::span<const VoxelId> held,
                     std::uint64_t budget) noexcept;
 
+  // Voxels of a row (v / dims[0]) were moved by somebody else: it and the rows beside it are to be looked at again.
+  void stir(std::size_t row) noexcept;
+  void stir_all() noexcept;
   // Something moved: relax until the residual is below the tolerance again.
   void wake() noexcept {
     asleep_ = false;
     cycles_without_gain_ = 0;
   }
   [[nodiscard]] bool asleep() const { return asleep_; }
-  // Largest force that any free voxel still feels, as the last whole cycle found it (unit: newton).
+  // Largest force that any free voxel still feels, as the last whole cycle found it (unit: newton); below the tolerance it is
+  // only known to be that.
   [[nodiscard]] double residual_N() const { return residual_N_; }
   // Cycles stop when the residual falls below this (unit: newton), or has not fallen for a while: what chain limits hold has
   // a residual that no relaxation removes. Default: kRestingResidual of the lattice's force scale.
@@ -95,23 +100,28 @@ class Relaxation {
   [[nodiscard]] const Springs& springs(std::size_t level) const {
     return level == 0 ? lattice_.springs() : levels_[level].springs;
   }
+  std::uint64_t smooth_lattice(Displacement& state, const ObstacleView& obstacles, int colour, int plane) noexcept;
   std::uint64_t do_plane(Displacement& state, const ObstacleView& obstacles, const Step& step, int plane) noexcept;
   void begin_cycle(std::span<const VoxelId> held) noexcept;
   void end_cycle() noexcept;
   void smooth_coarse(Level& level, int colour, int plane) noexcept;
-  void restrict_from_lattice(const Displacement& state, const ObstacleView& obstacles, int plane) noexcept;
+  std::uint64_t restrict_from_lattice(const Displacement& state, const ObstacleView& obstacles, int plane) noexcept;
   void restrict_from_level(std::size_t fine, int plane) noexcept;
-  void prolong_to_lattice(Displacement& state, const ObstacleView& obstacles, int plane) noexcept;
+  std::uint64_t prolong_to_lattice(Displacement& state, const ObstacleView& obstacles, int plane) noexcept;
   void prolong_to_level(std::size_t fine, int plane) noexcept;
   // Interpolates the correction of `coarse` along one fine row into scratch_.
   void interpolate_row(const Level& coarse, int axis, int j, int k, int first, int last) noexcept;
   [[nodiscard]] int planes(const Step& step) const;
+  // Is the correction that a fine row would get too small to matter?
+  [[nodiscard]] bool negligible(const Level& coarse, int j, int k) const noexcept;
 
   const Lattice& lattice_;
   std::vector<Level> levels_;
   std::vector<Step> steps_;
   std::vector<HeldCell> held_cells_;
   std::vector<float> scratch_, coarse_value_, coarse_weight_;
+  std::vector<std::uint8_t> unseen_;   // [row of the lattice] 1: its residual may have changed since it was last found
+  std::vector<float> row_residual_;    // [row] largest force on a free voxel when it was last found (N)
   std::size_t step_ = 0;
   int plane_ = 1;
   bool asleep_ = true;

@@ -48,7 +48,8 @@ std::unique_ptr<SoftObject> SoftObject::copy() const {
   for (const Touch& t : touches_) result->touches_.push_back(t);
   for (const VoxelId v : touched_voxels_) result->touched_voxels_.push_back(v);
   result->moved_ever_ = moved_ever_;
-  if (!relaxation_.asleep()) result->relaxation_.wake();
+  result->relaxation_.stir_all();
+  result->relaxation_.wake();
   return result;
 }
 
@@ -78,11 +79,6 @@ void SoftObject::touch(std::span<const VoxelId> near) noexcept {
     if (!t.pressed) continue;
     carried_stamp_[t.v] = stamp_;
   }
-  const auto resting_role = [this](VoxelId v) {
-    const std::uint32_t s = surface_number_[v];
-    if (pair_held_[s] != 0) return Displacement::held;
-    return obstacles_.empty() || obstacles_[s].normal == glm::vec3(0.0F) ? Displacement::free : Displacement::obstacle;
-  };
   for (const VoxelId v : touched_voxels_) state_.set_role(v, resting_role(v), *lattice_);
   touches_.clear();
   touched_voxels_.clear();
@@ -93,7 +89,21 @@ void SoftObject::touch(std::span<const VoxelId> near) noexcept {
     }
     touches_.push_back({v, carried_stamp_[v] == stamp_, glm::dvec3(0.0), glm::dvec3(0.0)});
     touched_voxels_.push_back(v);
-    state_.set_role(v, Displacement::held, *lattice_);
+  }
+  set_touch_roles();
+}
+
+Displacement::Role SoftObject::resting_role(VoxelId v) const noexcept {
+  const std::uint32_t s = surface_number_[v];
+  if (pair_held_[s] != 0) return Displacement::held;
+  return obstacles_.empty() || obstacles_[s].normal == glm::vec3(0.0F) ? Displacement::free : Displacement::obstacle;
+}
+
+// Only what carries load is kept from the background. A voxel that is merely near the tool must move with its
+// neighbours, or a correction of the coarse levels tears at it (which grew from cycle to cycle when all were held).
+void SoftObject::set_touch_roles() noexcept {
+  for (const Touch& t : touches_) {
+    state_.set_role(t.v, t.pressed ? Displacement::held : resting_role(t.v), *lattice_);
   }
 }
 
@@ -107,6 +117,7 @@ void SoftObject::settle_chain() noexcept {
     relaxation_.wake();
   }
   chain_.settle(state_, sources_, moves_, obstacles_, surface_number_);
+  for (const VoxelId v : chain_.moved()) relaxation_.stir(v / static_cast<std::size_t>(lattice_->springs().dims[0]));
 }
 
 bool SoftObject::push_out(const ToolInBody& tool) noexcept {
@@ -181,6 +192,7 @@ void SoftObject::relax_near(const ToolInBody& tool, int sweeps) noexcept {
     if (count <= kMaxNear) break;
   }
   const auto& rows = lattice_->springs().row;
+  for (const Touch& t : touches_) relaxation_.stir(t.v / static_cast<std::size_t>(dims[0]));
   for (int n = 0; n < sweeps; ++n) {
     for (Touch& t : touches_) relax_touch(tool, t);
     if (margin == 0) continue;  // a contact this wide is left to the background
@@ -188,13 +200,16 @@ void SoftObject::relax_near(const ToolInBody& tool, int sweeps) noexcept {
       for (int k = from[2]; k < to[2]; ++k) {
         for (int j = from[1] + ((from[1] + k + colour) & 1); j < to[1]; j += 2) {
           const std::size_t row = static_cast<std::size_t>(k) * static_cast<std::size_t>(dims[1]) + static_cast<std::size_t>(j);
+          if (rows[row][1] <= rows[row][0]) continue;
           relax_row(*lattice_, state_, obstacle_view(), row, std::max(from[0], rows[row][0]), std::min(to[0], rows[row][1]));
+          relaxation_.stir(row);
         }
       }
     }
   }
   // Last, so that what the tool feels is measured with its voxels where they belong.
   for (Touch& t : touches_) relax_touch(tool, t);
+  set_touch_roles();
 }
 
 // What hangs on a pressed voxel by a tight link and pulls it back is felt through it: the multiplier of the chain's
@@ -320,7 +335,7 @@ void SoftObject::set_obstacle(std::size_t surface_number, const Obstacle& obstac
   const VoxelId v = lattice_->surface()[surface_number];
   obstacles_[surface_number] = obstacle;
   if (state_.role[v] == Displacement::held || lattice_->anchored(v)) return;
-  state_.set_role(v, obstacle.normal == glm::vec3(0.0F) ? Displacement::free : Displacement::obstacle, *lattice_);
+  state_.set_role(v, resting_role(v), *lattice_);
 }
 
 void SoftObject::reserve_obstacles() { obstacles_.resize(lattice_->surface().size()); }
@@ -340,9 +355,8 @@ void SoftObject::release(VoxelId v) noexcept {
   const auto found = std::find(held_voxels_.begin(), held_voxels_.end(), v);
   *found = held_voxels_.back();
   held_voxels_.pop_back();
-  if (std::find(touched_voxels_.begin(), touched_voxels_.end(), v) != touched_voxels_.end()) return;
-  const bool near_rigid = !obstacles_.empty() && obstacles_[s].normal != glm::vec3(0.0F);
-  state_.set_role(v, near_rigid ? Displacement::obstacle : Displacement::free, *lattice_);
+  state_.set_role(v, resting_role(v), *lattice_);
+  set_touch_roles();
 }
 
 void SoftObject::move(VoxelId v, const glm::dvec3& displacement) noexcept {
@@ -350,6 +364,7 @@ void SoftObject::move(VoxelId v, const glm::dvec3& displacement) noexcept {
   moved_ever_ = true;
   relaxation_.wake();
   state_.set(v, clamp_to_links(*lattice_, state_, v, displacement));
+  relaxation_.stir(v / static_cast<std::size_t>(lattice_->springs().dims[0]));
 }
 
 glm::dvec3 SoftObject::displacement_at(const glm::dvec3& rest_point) const noexcept {

@@ -125,6 +125,8 @@ class SoftObject {
 
   [[nodiscard]] Gap gap(const ToolInBody& tool, const glm::dvec3& position) const noexcept;
   void settle_chain() noexcept;
+  [[nodiscard]] Displacement::Role resting_role(VoxelId v) const noexcept;  // when no tool presses it
+  void set_touch_roles() noexcept;
   void relax_touch(const ToolInBody& tool, Touch& touch) noexcept;
   void add_stiffness(int axis, glm::dmat3& stiffness) const noexcept;
   void gather_load(int axis) noexcept;
