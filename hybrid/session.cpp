@@ -19,7 +19,8 @@ namespace {
 constexpr double kAfterPath_s = 0.5;
 constexpr double kJndFloor_N = 0.04;
 constexpr std::uint64_t kMomentEvery = 20;      // ticks between two looks for a more telling moment
-constexpr int kSettleTicks = 4000;              // of equilibrium_force()
+constexpr int kSettleTicks = 1200;              // of equilibrium_force(), and
+constexpr int kCalmTicks = 40;                  // ticks over which its force may change by the tolerance
 constexpr std::uint32_t kSettleBudget = 400'000;
 
 std::uint64_t mix(std::uint64_t hash, std::uint64_t bits) noexcept {  // FNV-1a, eight bytes at a time
@@ -40,6 +41,7 @@ std::unique_ptr<WorldState> copy_state(const World& world, const WorldState& sta
   copy->device_m = state.device_m;
   copy->started = state.started;
   copy->gather_step_m = state.gather_step_m;
+  copy->hidden_stiffness_N_per_m = state.hidden_stiffness_N_per_m;
   copy->obstacle_seen = state.obstacle_seen;
   copy->paired = state.paired;
   for (const VoxelPair& pair : state.pairs) copy->pairs.push_back(pair);
@@ -251,13 +253,12 @@ std::optional<glm::dvec3> equilibrium_force(const World& world, const WorldState
   for (const RigidObject& object : world.rigid) patient.rigid.push_back(object.shared());
   const device::DeviceState still{.position_m = state.device_m};
   glm::dvec3 before(0.0);
-  int calm = 0;
-  for (int n = 0; n < kSettleTicks; ++n) {
+  for (int n = 1; n <= kSettleTicks; ++n) {
     const TickResult felt = haptic_tick(patient, *copy, still, 1e-3);
+    if (n % kCalmTicks != 0) continue;
     const glm::dvec3 force = world.tool.stiffness_N_per_m * (felt.proxy_m - felt.device_m);
-    calm = glm::length(force - before) < 0.01 * tolerance_N ? calm + 1 : 0;
+    if (glm::length(force - before) < tolerance_N) return force;
     before = force;
-    if (calm >= 40) return force;
   }
   return std::nullopt;
 }

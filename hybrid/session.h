@@ -77,7 +77,8 @@ std::uint64_t hash_state(std::uint64_t before, const WorldState& state) noexcept
 Snapshot take_snapshot(const World& world, const WorldState& state, const TickResult& tick, double t_s);
 
 // The force that the present device position would be answered with once everything soft has come to rest (N), found on
-// a copy of the state; the residual left is below `tolerance_N`. Empty when it does not settle.
+// a copy of the state, until it changes by less than `tolerance_N` over dozens of whole relaxation cycles. Empty when it
+// does not settle.
 std::optional<glm::dvec3> equilibrium_force(const World& world, const WorldState& state, double tolerance_N = 1e-4);
 
 // |a − b| in just noticeable differences: 7 % of the reference, and no less than the floor (N).

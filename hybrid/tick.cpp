@@ -21,6 +21,10 @@ constexpr int kPasses = 3;            // proxy and tissue answer one another thi
 constexpr int kSweeps = 1;            // of the contact's neighbourhood, a pass
 constexpr double kSoftStep = 0.25;    // of the tool's reach: the proxy moves no further against tissue in one pass
 constexpr double kStill = 1e-5;       // of the tool's radius: a pass that moves the proxy less is the last
+constexpr double kForget = 0.9;       // of the hidden stiffness is kept from pass to pass
+constexpr double kOvershoot = 0.25;   // of the pull before, turned round: a step that overshot
+constexpr double kMostOvershoot = 3.0;  // believed of one step
+constexpr double kMostHidden = 50.0;  // hidden stiffness at most, of the model's
 constexpr int kMaxFreePieces = 512;   // of the way through free space looked at in one tick
 
 // Stages by the wall clock, which is cheap; the whole tick by the thread's own processor time, because on a shared machine a
@@ -76,22 +80,47 @@ bool advance_through_free_space(const World& world, WorldState& state, const glm
   return false;
 }
 
+// What pulls the proxy, apart from rigid surfaces: coupling and tissue (N).
+glm::dvec3 pull_on_proxy(const World& world, const WorldState& state, const glm::dvec3& device) noexcept {
+  glm::dvec3 pull = world.tool.stiffness_N_per_m * (device - state.proxy_m);
+  for (const voxel::Reaction& reaction : state.reactions) pull += reaction.force_N;
+  return pull;
+}
+
+// The tissue's model is that of the voxels pressed now. Where a chain tightens as the proxy moves, or new voxels are met, it
+// answers stiffer than that, and a step by the model alone would jump to and fro for ever. When a step overshot, so
+// that the pull turned round, the stiffness that would have landed right is kept, and forgotten over some passes. (Taking the
+// secant of every step was rejected: tissue that relaxes meanwhile looks as stiff as one likes on a short step.)
+void learn_stiffness(const World& world, WorldState& state, const glm::dvec3& delta, const glm::dvec3& before,
+                     const glm::dvec3& after, const glm::dmat3& model, const glm::dmat3& used) noexcept {
+  state.hidden_stiffness_N_per_m *= kForget;
+  const double square = glm::dot(delta, delta), still = kStill * world.tool.radius_m;
+  const double wanted = glm::dot(before, delta);
+  if (square < still * still || wanted <= 0.0) return;
+  const double overshoot = std::min(-glm::dot(after, delta) / wanted, kMostOvershoot);
+  if (overshoot < kOvershoot) return;
+  const double along_model = glm::dot(delta, model * delta) / square, along_used = glm::dot(delta, used * delta) / square;
+  const double hidden = std::min(along_used * (1.0 + overshoot) - along_model, kMostHidden * along_model);
+  state.hidden_stiffness_N_per_m = std::max(state.hidden_stiffness_N_per_m, hidden);
+}
+
 // One pass: the proxy goes to the minimum of ½K|q − x|² plus the tissue's quadratic model, outside everything
 // rigid; then the tissue answers. Returns how far the proxy went.
 double move_proxy(const World& world, WorldState& state, const glm::dvec3& device, bool near_soft, Sweep& sweep) noexcept {
   const double k = world.tool.stiffness_N_per_m;
-  glm::dmat3 metric(k);
-  glm::dvec3 pull = k * (device - state.proxy_m);
-  for (const voxel::Reaction& reaction : state.reactions) {
-    metric += reaction.stiffness_N_per_m;
-    pull += reaction.force_N;
-  }
+  glm::dmat3 model(k);
+  for (const voxel::Reaction& reaction : state.reactions) model += reaction.stiffness_N_per_m;
+  const glm::dmat3 metric = model + glm::dmat3(state.hidden_stiffness_N_per_m);
+  const glm::dvec3 pull = pull_on_proxy(world, state, device);
   // Against tissue no further than part of its reach at a time, so that no voxel is jumped over.
   const double travel = near_soft ? kSoftStep * soft_reach(world, state) : std::numeric_limits<double>::max();
   sweep = sweep_proxy(world, state, state.proxy_m, state.proxy_m + glm::inverse(metric) * pull, metric, travel);
   const glm::dvec3 delta = sweep.point - state.proxy_m;
   state.proxy_m = sweep.point;
-  if (near_soft) press_soft(world, state, state.proxy_m, delta, kSweeps);
+  if (near_soft) {
+    press_soft(world, state, state.proxy_m, delta, kSweeps);
+    learn_stiffness(world, state, delta, pull, pull_on_proxy(world, state, device), model, metric);
+  }
   return glm::length(delta);
 }
 
@@ -130,6 +159,7 @@ TickResult haptic_tick(const World& world, WorldState& state, const device::Devi
   clock.done(Stage::broad_phase);
 
   std::fill(state.reactions.begin(), state.reactions.end(), voxel::Reaction{});
+  if (!near_soft) state.hidden_stiffness_N_per_m = 0.0;
   if (near_soft) press_soft(world, state, state.proxy_m, glm::dvec3(0.0), 0);
   for (int pass = 0; pass < kPasses && !free; ++pass) {
     const double moved = move_proxy(world, state, device, near_soft, sweep);

@@ -98,6 +98,7 @@ struct WorldState {
   std::uint64_t nonfinite = 0;     // inputs or forces that were not finite
   std::uint32_t faults = 0;        // FaultBit, ever
   std::uint64_t truncated_ticks = 0;  // ticks that ended before the proxy arrived, by a bound on its steps
+  double hidden_stiffness_N_per_m = 0.0;  // what tissue showed beyond the model of its pressed voxels
   double gather_step_m = 0.0;      // how far the proxy may look, adapted to how crowded it is
 
   // ---- of arbitration ----

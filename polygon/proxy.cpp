@@ -10,10 +10,11 @@ namespace polygon {
 namespace {
 
 constexpr int kMaxExchanges = 64;
-// Planes nearer to parallel than this (sine of the angle between one and the span of the others) are one plane: where two
-// such planes meet is rounding.
+// Planes nearer to parallel than this (sine of the angle between one and the span of the others) are one
+// plane: where two such planes meet is rounding.
 constexpr double kParallel = 1e-9;
-// Of the way from the target: a plane broken by less is met, as exactly as three planes at a blunt corner can be solved.
+// Of the way from the target: a plane broken by less is met, as exactly as three planes at a blunt corner can
+// be solved.
 constexpr double kRounding = 1e-12;
 
 // In coordinates y = Lᵀ(q − t), where A = L Lᵀ, the cost is |y|² and a plane says unit · y >= distance.
@@ -34,7 +35,8 @@ struct Candidate {
   double cost = 0.0;
 };
 
-// Lower triangle L of a symmetric positive definite matrix, A = L Lᵀ (Golub & Van Loan, Matrix Computations, 4.2), inverted.
+// Lower triangle L of a symmetric positive definite matrix, A = L Lᵀ (Golub & Van Loan, Matrix
+// Computations, 4.2), inverted.
 glm::dmat3 inverse_cholesky(const glm::dmat3& a) noexcept {
   const double l00 = std::sqrt(a[0][0]), l10 = a[0][1] / l00, l20 = a[0][2] / l00;
   const double l11 = std::sqrt(a[1][1] - l10 * l10), l21 = (a[1][2] - l20 * l10) / l11;
@@ -55,8 +57,9 @@ Whitened whiten(const glm::dmat3& inverse_l, const glm::dvec3& target, const Con
   return {m / length, (plane.offset - glm::dot(plane.normal, target)) / length, length};
 }
 
-// Shortest y with unit · y = distance on all planes of a subset, by Gram-Schmidt: solving for the multipliers first would
-// square the condition, and lose a micrometre where two triangles meet at a millionth of a radian. False: they are dependent.
+// Shortest y with unit · y = distance on all planes of a subset, by Gram-Schmidt: solving for the multipliers
+// first would square the condition, and lose a micrometre where two triangles meet at a millionth of a
+// radian. False: they are dependent.
 bool solve_subset(const glm::dmat3& inverse_l, const glm::dvec3& target, std::span<const ContactPlane> planes,
                   const Subset& subset, Candidate& out) noexcept {
   std::array<Whitened, 3> white;
@@ -84,7 +87,8 @@ bool solve_subset(const glm::dmat3& inverse_l, const glm::dvec3& target, std::sp
   out.cost = 0.0;
   for (std::uint32_t i = subset.count; i-- > 0;) {
     double lambda = z[i];
-    for (std::uint32_t j = i + 1; j < subset.count; ++j) lambda -= r[i][j] * out.multiplier[j] * white[j].length;
+    for (std::uint32_t j = i + 1; j < subset.count; ++j)
+      lambda -= r[i][j] * out.multiplier[j] * white[j].length;
     out.multiplier[i] = lambda / r[i][i] / white[i].length;
     y += z[i] * basis[i];
     out.cost += z[i] * z[i];
@@ -147,7 +151,8 @@ PlaneMinimum minimise_on_planes(const glm::dvec3& target, const glm::dmat3& metr
       }
     }
     if (best_subset.count == 0) {
-      // A plane that is parallel to those that hold the point, and broken by no more than their angle, is met by them.
+      // A plane that is parallel to those that hold the point, and broken by no more than their angle, is met
+      // by them.
       result.feasible = depth <= tolerance + kParallel * glm::length(way);
       return result;
     }

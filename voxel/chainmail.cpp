@@ -8,7 +8,7 @@
 namespace voxel {
 namespace {
 
-constexpr int kObstaclePasses = 3;
+constexpr int kObstaclePasses = 2;
 constexpr double kTouching = 1e-6;  // of the spacing: no deeper in its obstacle than this, a voxel lies on it
 
 }  // namespace

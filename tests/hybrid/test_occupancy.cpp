@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The occupancy map against brute force over everything that was put into it. A cell is the map's resolution: it may
+// report what lies within one cell of a box, and must report what lies in it.
+#include "hybrid/occupancy.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
+#include <random>
+#include <set>
+#include <vector>
+
+namespace {
+
+using glm::dvec3;
+using hybrid::OccupancyMap;
+using Triangle = std::array<dvec3, 3>;
+
+dvec3 random_point(std::mt19937_64& random, double half) {
+  std::uniform_real_distribution<double> u(-half, half);
+  const double x = u(random), y = u(random), z = u(random);
+  return {x, y, z};
+}
+
+bool within(const dvec3& p, const dvec3& low, const dvec3& high) {
+  return glm::all(glm::greaterThanEqual(p, low)) && glm::all(glm::lessThanEqual(p, high));
+}
+
+// Does the triangle meet the box? Clipped by its six planes (Sutherland & Hodgman 1974), and looked at what is left.
+bool meets(const Triangle& t, const dvec3& low, const dvec3& high) {
+  std::vector<dvec3> polygon(t.begin(), t.end());
+  for (int d = 0; d < 3; ++d) {
+    for (const double side : {1.0, -1.0}) {
+      const double bound = side > 0.0 ? low[d] : -high[d];
+      std::vector<dvec3> kept;
+      for (std::size_t i = 0; i < polygon.size(); ++i) {
+        const dvec3 &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
+        const double ha = side * a[d] - bound, hb = side * b[d] - bound;
+        if (ha >= 0.0) kept.push_back(a);
+        if ((ha < 0.0) != (hb < 0.0)) kept.push_back(a + (ha / (ha - hb)) * (b - a));
+      }
+      polygon = kept;
+      if (polygon.empty()) return false;
+    }
+  }
+  return true;
+}
+
+// The same questions in every test, at the scene's origin and far from it.
+class Occupancy : public ::testing::TestWithParam<double> {
+ protected:
+  static constexpr double kCell = 2e-3;
+  const dvec3 origin{GetParam(), -GetParam(), 0.5 * GetParam()};
+  // Coordinates this far out are rounded by so much.
+  const double rounding = 1e-15 + 4e-16 * GetParam();
+  std::mt19937_64 random{99};
+  OccupancyMap map{kCell, origin};
+
+  void expect_soft(const std::vector<dvec3>& points, const dvec3& low, const dvec3& high) {
+    std::vector<std::uint32_t> out(points.size());
+    const std::size_t count = map.soft_in(low, high, out);
+    const std::set<std::uint32_t> found(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(count));
+    ASSERT_EQ(found.size(), count) << "a voxel was reported twice";
+    const dvec3 cell(kCell + 4.0 * rounding);
+    for (std::uint32_t n = 0; n < points.size(); ++n) {
+      if (within(points[n], low, high)) { ASSERT_TRUE(found.contains(n)) << "voxel " << n << " was missed"; }
+      if (found.contains(n)) { ASSERT_TRUE(within(points[n], low - cell, high + cell)) << "voxel " << n << " is elsewhere"; }
+    }
+    if (count > 0) { ASSERT_TRUE(map.any_near(low, high)); }
+  }
+};
+
+TEST_P(Occupancy, FindsSoftVoxelsAsBruteForceDoesAfterManyMoves) {
+  std::vector<dvec3> points;
+  const std::uint32_t first = map.add_soft(500);
+  ASSERT_EQ(first, 0U);
+  for (std::uint32_t n = 0; n < 500; ++n) {
+    points.push_back(origin + random_point(random, 0.05));
+    map.place(n, points.back());
+  }
+  map.reserve_bricks(4096);
+  ASSERT_TRUE(map.validate());
+  std::uniform_int_distribution<std::size_t> any(0, points.size() - 1);
+  for (int round = 0; round < 60; ++round) {
+    for (int n = 0; n < 1000; ++n) {
+      const std::size_t i = any(random);
+      // Small steps mostly, as tissue moves; sometimes across the scene.
+      points[i] += n % 10 == 0 ? 0.5 * (origin - points[i]) + random_point(random, 0.04) : random_point(random, 1e-3);
+      map.move(static_cast<std::uint32_t>(i), points[i]);
+    }
+    ASSERT_TRUE(map.validate()) << "after " << (round + 1) * 1000 << " moves";
+    for (int n = 0; n < 20; ++n) {
+      const dvec3 centre = origin + random_point(random, 0.06), half = glm::abs(random_point(random, 0.02));
+      expect_soft(points, centre - half, centre + half);
+      if (HasFatalFailure()) return;
+    }
+  }
+  EXPECT_EQ(map.overflows(), 0U);
+}
+
+TEST_P(Occupancy, FindsRigidSurfacesAsBruteForceDoes) {
+  std::vector<Triangle> triangles;
+  for (std::uint32_t n = 0; n < 40; ++n) {
+    const dvec3 a = origin + random_point(random, 0.05);
+    // Fat ones, slivers, segments and points; some flat in the faces between cells.
+    Triangle t{a, a + random_point(random, 0.01), a + random_point(random, 0.01)};
+    if (n % 5 == 1) t[2] = t[0] + 0.5 * (t[1] - t[0]) + 1e-9;
+    if (n % 5 == 2) t[2] = t[1] = t[0];
+    if (n % 5 == 3) t[0].z = t[1].z = t[2].z = origin.z + 3 * kCell;
+    triangles.push_back(t);
+    map.add_triangle(n, t[0], t[1], t[2]);
+  }
+  for (int n = 0; n < 1500; ++n) {
+    const dvec3 centre = origin + random_point(random, 0.06), half = glm::abs(random_point(random, n % 2 == 0 ? 2e-3 : 0.02));
+    const dvec3 low = centre - half, high = centre + half;
+    const std::uint64_t mask = map.rigid_in(low, high);
+    bool near = false;
+    for (std::uint32_t o = 0; o < triangles.size(); ++o) {
+      if (meets(triangles[o], low, high)) { ASSERT_NE(mask & OccupancyMap::rigid_bit(o), 0U) << "object " << o << " was missed"; }
+      const dvec3 cell(kCell + 1e-9 + 8.0 * rounding);
+      near = near || meets(triangles[o], low - cell, high + cell);
+    }
+    if (!near) { ASSERT_EQ(mask, 0U) << "nothing rigid is within a cell of this box"; }
+    if (mask != 0) { ASSERT_TRUE(map.any_near(low, high)); }
+  }
+}
+
+TEST_P(Occupancy, NothingIsNearWhereNothingIs) {
+  map.add_soft(1);
+  map.place(0, origin);
+  map.add_triangle(0, origin, origin + dvec3(1e-3, 0, 0), origin + dvec3(0, 1e-3, 0));
+  // A brick has eight cells.
+  const double brick = 8.0 * kCell + 4.0 * rounding;
+  EXPECT_TRUE(map.any_near(origin - 1e-4, origin + 1e-4));
+  EXPECT_FALSE(map.any_near(origin + 2.0 * brick, origin + 3.0 * brick));
+  EXPECT_FALSE(map.any_near(origin - 3.0 * brick, origin - 2.0 * brick));
+  // What has left is not there any more.
+  map.reserve_bricks(64);
+  map.move(0, origin + dvec3(10.0 * brick));
+  std::vector<std::uint32_t> out(4);
+  EXPECT_EQ(map.soft_in(origin - 1e-3, origin + 1e-3, out), 0U);
+  EXPECT_EQ(map.soft_in(origin + 10.0 * brick - 1e-3, origin + 10.0 * brick + 1e-3, out), 1U);
+}
+
+TEST_P(Occupancy, AFullMapKeepsAVoxelWhereItWasLastKnown) {
+  map.add_soft(1);
+  map.place(0, origin);
+  map.reserve_bricks(3);
+  for (int n = 1; n <= 100; ++n) map.move(0, origin + dvec3(0.1 * n, 0, 0));
+  EXPECT_GT(map.overflows(), 0U);
+  EXPECT_TRUE(map.validate());
+  map.move(0, origin);
+  std::vector<std::uint32_t> out(4);
+  EXPECT_EQ(map.soft_in(origin - 1e-3, origin + 1e-3, out), 1U);
+}
+
+TEST_P(Occupancy, WritesNoMoreThanThereIsRoomFor) {
+  map.add_soft(100);
+  for (std::uint32_t n = 0; n < 100; ++n) map.place(n, origin);
+  std::vector<std::uint32_t> out(7);
+  EXPECT_EQ(map.soft_in(origin - 1e-3, origin + 1e-3, out), 7U);
+}
+
+INSTANTIATE_TEST_SUITE_P(AtAndFarFromTheOrigin, Occupancy, ::testing::Values(0.0, 1.0, 1e6));
+
+TEST(OccupancyMap, MemoryFollowsOccupiedCellsAndNotTheExtent) {
+  OccupancyMap map(1e-3, dvec3(0.0));
+  map.add_soft(2);
+  map.place(0, dvec3(-1000.0));
+  map.place(1, dvec3(1000.0));
+  EXPECT_EQ(map.occupied_cells(), 2U);
+  EXPECT_LT(map.memory_bytes(), 100'000U);
+}
+
+TEST(OccupancyMap, ManyObjectsShareTheLastBit) {
+  OccupancyMap map(1.0, dvec3(0.0));
+  for (std::uint32_t o = 0; o < 100; ++o) {
+    const dvec3 at(100.0 * o, 0.0, 0.0);
+    map.add_triangle(o, at, at + dvec3(0.5, 0, 0), at + dvec3(0, 0.5, 0));
+  }
+  for (std::uint32_t o = 0; o < 100; ++o) {
+    const dvec3 at(100.0 * o, 0.0, 0.0);
+    EXPECT_EQ(map.rigid_in(at - 0.1, at + 0.1), 1ULL << std::min(o, 63U));
+  }
+}
+
+TEST(OccupancyMap, RefusesACellThatIsNone) {
+  EXPECT_THROW(OccupancyMap(0.0, dvec3(0.0)), std::invalid_argument);
+  EXPECT_THROW(OccupancyMap(-1.0, dvec3(0.0)), std::invalid_argument);
+  EXPECT_THROW(OccupancyMap(std::nan(""), dvec3(0.0)), std::invalid_argument);
+}
+
+}  // namespace

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A session on file replays bit for bit, and a file that is not what it was is refused or found out.
+#include "hybrid/recording.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <fstream>
+#include <sstream>
+
+#include "scene_file_fixture.h"
+
+namespace {
+
+using hybrid::Recording;
+
+std::string read(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+Recording record(const std::filesystem::path& file, std::optional<double> seconds) {
+  const hybrid::Scene scene = hybrid::load_scene(file);
+  hybrid::BuiltScene built = hybrid::build_scene(scene);
+  hybrid::SessionOptions options;
+  options.seconds = seconds;
+  options.keep_rows = false;
+  const hybrid::SessionResult result = hybrid::run_session(scene, built, options);
+  EXPECT_GT(result.contact_ticks, 50U);
+  return {.scene_file = file, .scene_text = read(file), .dt_s = result.dt_s, .state_hash = result.state_hash, .ticks = result.recording};
+}
+
+class RecordingFile : public tests::SceneFile {
+ protected:
+  // A small scene that is quick to run: tissue and something rigid on it.
+  std::filesystem::path small_scene() const {
+    return write("small.toml", "format = 1\n" + tests::block +
+                                   "[[rigid]]\nname = \"ball\"\nprimitive = \"ball\"\nradius = 4\nposition = [9, 0, 8]\n"
+                                   "[path]\nkind = \"waypoints\"\nspeed = 100\npoints = [[0, 0, 20], [0, 0, 4, 0.2], [8, 0, 12, 0.1]]\n");
+  }
+  std::string refusal_of(const std::string& bytes) const {
+    const auto file = write("bad.rec", bytes);
+    try {
+      (void)hybrid::load_recording(file);
+    } catch (const std::runtime_error& error) {
+      EXPECT_NE(std::string(error.what()).find("bad.rec"), std::string::npos) << error.what();
+      return error.what();
+    }
+    return {};
+  }
+};
+
+class ShippedScene : public RecordingFile, public ::testing::WithParamInterface<const char*> {};
+
+TEST_P(ShippedScene, RunSavedLoadedAndReplayedIsTheSameToTheBit) {
+  const std::string name = GetParam();
+  const auto file = tests::source_folder / "scenes" / (name + ".toml");
+  Recording recorded;
+  try {
+    recorded = record(file, name == "head" ? std::optional<double>(1.2) : std::nullopt);
+  } catch (const hybrid::SceneError& error) {
+    if (name == "head") GTEST_SKIP() << "skipped: " << error.what();
+    throw;
+  }
+  hybrid::save_recording(folder_ / "a.rec", recorded);
+  const Recording loaded = hybrid::load_recording(folder_ / "a.rec");
+  ASSERT_EQ(loaded.ticks.size(), recorded.ticks.size());
+  EXPECT_EQ(loaded.scene_file, file);
+  const hybrid::ReplayResult result = hybrid::replay(loaded, {});
+  EXPECT_TRUE(result.equal) << "parts at tick " << result.parts_at;
+  EXPECT_EQ(result.ticks, recorded.ticks.size());
+  EXPECT_EQ(result.state_hash, recorded.state_hash);
+}
+INSTANTIATE_TEST_SUITE_P(Replays, ShippedScene, ::testing::Values("cube", "sheet", "two-soft", "head"),
+                         [](const auto& scene) { return std::string(scene.param == std::string("two-soft") ? "two_soft" : scene.param); });
+
+TEST_F(RecordingFile, TwoRunsOfASceneEndInTheSameState) {
+  const auto file = small_scene();
+  const Recording a = record(file, std::nullopt), b = record(file, std::nullopt);
+  EXPECT_EQ(a.state_hash, b.state_hash);
+  ASSERT_EQ(a.ticks.size(), b.ticks.size());
+  for (std::size_t n = 0; n < a.ticks.size(); ++n) ASSERT_EQ(a.ticks[n].hash, b.ticks[n].hash) << n;
+}
+
+TEST_F(RecordingFile, AFlippedBitOfAnInputIsNoticedAtItsTick) {
+  const Recording good = record(small_scene(), std::nullopt);
+  ASSERT_TRUE(hybrid::replay(good, {}).equal);
+  hybrid::save_recording(folder_ / "a.rec", good);
+  const std::string bytes = read(folder_ / "a.rec");
+  const std::size_t first = bytes.size() - 32 * good.ticks.size();
+  for (const std::size_t tick : {std::size_t{0}, std::size_t{50}, std::size_t{200}, good.ticks.size() - 1}) {
+    std::string flipped = bytes;
+    flipped[first + 32 * tick + 16 + 5] = static_cast<char>(flipped[first + 32 * tick + 16 + 5] ^ 0x10);  // z: a few micrometers
+    const auto result = hybrid::replay(hybrid::load_recording(write("b.rec", flipped)), {});
+    EXPECT_FALSE(result.equal);
+    EXPECT_EQ(result.parts_at, tick);
+  }
+}
+
+TEST_F(RecordingFile, AStateThatEndsElsewhereIsNoticedAtTheEnd) {
+  Recording recorded = record(small_scene(), std::nullopt);
+  recorded.state_hash ^= 1;
+  const auto result = hybrid::replay(recorded, {});
+  EXPECT_FALSE(result.equal);
+  EXPECT_EQ(result.parts_at, recorded.ticks.size());
+}
+
+TEST_F(RecordingFile, ASceneThatHasChangedSinceIsRefused) {
+  const auto file = small_scene();
+  const Recording recorded = record(file, 0.3);
+  std::ofstream(file, std::ios::app) << "# a comment\n";
+  EXPECT_THROW((void)hybrid::replay(recorded, {}), std::runtime_error);
+  std::filesystem::remove(file);
+  EXPECT_THROW((void)hybrid::replay(recorded, {}), std::runtime_error);
+}
+
+TEST_F(RecordingFile, TruncatedAndGarbageFilesAreRefusedInWords) {
+  hybrid::save_recording(folder_ / "a.rec", record(small_scene(), 0.3));
+  const std::string bytes = read(folder_ / "a.rec");
+  EXPECT_EQ(refusal_of(bytes), "");
+  for (const std::size_t size : {std::size_t{0}, std::size_t{1}, std::size_t{7}, std::size_t{8}, std::size_t{47}, std::size_t{48}, std::size_t{60},
+                                 bytes.size() / 2, bytes.size() - 1}) {
+    EXPECT_NE(refusal_of(bytes.substr(0, size)), "") << size << " bytes";
+  }
+  EXPECT_NE(refusal_of(bytes + "x"), "");
+  EXPECT_NE(refusal_of("this is no recording, though it is longer than the head of one is"), "");
+  EXPECT_NE(refusal_of(std::string(1000, '\0')), "");
+  EXPECT_THROW((void)hybrid::load_recording(folder_ / "missing.rec"), std::runtime_error);
+  EXPECT_THROW((void)hybrid::load_recording(folder_), std::runtime_error);
+  // Counts that no file could hold are no reason to ask for the memory.
+  for (const std::size_t field : {std::size_t{8}, std::size_t{16}, std::size_t{24}}) {
+    for (const std::uint64_t value : {std::uint64_t{1} << 63, ~std::uint64_t{0}, std::uint64_t{1} << 59, std::uint64_t{1'000'000'000}}) {
+      std::string wrong = bytes;
+      std::memcpy(wrong.data() + field, &value, sizeof value);
+      EXPECT_NE(refusal_of(wrong), "") << "field at " << field << " = " << value;
+    }
+  }
+  // A time step that is none.
+  for (const double dt : {0.0, -1e-3, std::nan(""), HUGE_VAL}) {
+    std::string wrong = bytes;
+    std::memcpy(wrong.data() + 32, &dt, sizeof dt);
+    EXPECT_NE(refusal_of(wrong), "") << dt;
+  }
+  EXPECT_THROW(hybrid::save_recording(folder_ / "no" / "folder" / "a.rec", {}), std::runtime_error);
+}
+
+}  // namespace
