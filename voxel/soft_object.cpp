@@ -75,11 +75,17 @@ SoftObject::Gap SoftObject::gap(const ToolInBody& tool, const glm::dvec3& positi
 
 void SoftObject::touch(std::span<const VoxelId> near) noexcept {
   ++stamp_;
+  std::size_t pressed = 0;
   for (const Touch& t : touches_) {
     if (!t.pressed) continue;
     carried_stamp_[t.v] = stamp_;
+    ++pressed;
   }
   for (const VoxelId v : touched_voxels_) state_.set_role(v, resting_role(v), *lattice_);
+  // What the tool leaves behind springs back, however long it was at rest.
+  for (const Touch& t : touches_) {
+    if (t.pressed) relaxation_.stir(t.v / static_cast<std::size_t>(lattice_->springs().dims[0]));
+  }
   touches_.clear();
   touched_voxels_.clear();
   for (const VoxelId v : near) {
@@ -87,9 +93,12 @@ void SoftObject::touch(std::span<const VoxelId> near) noexcept {
       ++dropped_touches_;
       break;
     }
-    touches_.push_back({v, carried_stamp_[v] == stamp_, glm::dvec3(0.0), glm::dvec3(0.0)});
+    const bool kept = carried_stamp_[v] == stamp_;
+    if (kept) --pressed;
+    touches_.push_back({v, kept, glm::dvec3(0.0), glm::dvec3(0.0)});
     touched_voxels_.push_back(v);
   }
+  if (pressed > 0) relaxation_.wake();
   set_touch_roles();
 }
 
@@ -142,7 +151,8 @@ bool SoftObject::push_out(const ToolInBody& tool) noexcept {
 
 void SoftObject::relax_touch(const ToolInBody& tool, Touch& t) noexcept {
   if (lattice_->anchored(t.v)) return;
-  const glm::dvec3 rest = lattice_->rest(t.v);
+  const glm::dvec3 rest = lattice_->rest(t.v), before = state_.at(t.v);
+  const bool was_pressed = t.pressed;
   glm::dvec3 wanted = link_minimum(*lattice_, state_, t.v);
   Gap g = gap(tool, rest + wanted);
   t.pressed = g.distance < 0.0;
@@ -163,6 +173,10 @@ void SoftObject::relax_touch(const ToolInBody& tool, Touch& t) noexcept {
     if (depth > 0.0 && o.normal != glm::vec3(0.0F)) wanted += depth * n;
   }
   state_.set(t.v, clamp_to_links(*lattice_, state_, t.v, wanted));
+  // A tool that jumped away moves no pressed voxel by follow(): what it let go of wakes the rest.
+  if (was_pressed && !t.pressed && glm::distance(before, state_.at(t.v)) > kStir * lattice_->min_spacing_m()) {
+    relaxation_.wake();
+  }
 }
 
 void SoftObject::relax_near(const ToolInBody& tool, int sweeps) noexcept {
@@ -355,6 +369,8 @@ void SoftObject::release(VoxelId v) noexcept {
   const auto found = std::find(held_voxels_.begin(), held_voxels_.end(), v);
   *found = held_voxels_.back();
   held_voxels_.pop_back();
+  relaxation_.stir(v / static_cast<std::size_t>(lattice_->springs().dims[0]));
+  relaxation_.wake();
   state_.set_role(v, resting_role(v), *lattice_);
   set_touch_roles();
 }

@@ -39,6 +39,7 @@ TEST(SoftObject, ReactionIsTheDerivativeOfTheMinimisedEnergy) {
   for (const double depth : {0.5, 1.0, 2.0, 3.0}) {
     const Reaction felt = soft.press(soft.ball(6 * kH, depth * kH), 9 * kH);
     EXPECT_TRUE(soft.settled);
+    std::cout << soft.object->relaxation().cycles() << " cycles so far; ";
     const double force = felt.force_N.z;
     const double slope = energy_slope(soft, 6 * kH, depth * kH, 0.02 * kH, 9 * kH);
     std::cout << "depth " << depth << " spacings: reaction " << force << " N, slope of the energy " << slope
@@ -152,31 +153,36 @@ TEST(SoftObject, WhatCannotGoFurtherPushesTheToolOut) {
   std::cout << "out by " << (tool.centre.z - deepest) / kH << " spacings in " << turns
             << " turns, to a depth of " << depth / kH << "\n";
   EXPECT_LE(depth, 0.51 * kH);  // and give_way() leaves a hundredth of a voxel to the next push
-  EXPECT_GE(depth, 0.3 * kH);
+  EXPECT_GE(depth, 0.1 * kH);
   EXPECT_LE(voxel::worst_violation(*soft.lattice, soft.object->state()), 1e-9);
 }
 
 TEST(SoftObject, NoToolSlipsBetweenVoxels) {
-  for (const double radius : {0.01, 0.2, 0.4}) {
+  for (const double radius : {0.01, 0.2, 0.4, 0.6, 0.8, 1.0}) {
     SoftBlock soft({11, 11, 8}, kH, {.young_Pa = 1e4});
     ToolInBody tool = soft.ball(radius * kH, 0.0);
     // Over the middle of four voxels, where the gap is widest.
     tool.centre.x += 0.5 * kH;
     tool.centre.y += 0.5 * kH;
     const double start = soft.top() + soft.object->reach(radius * kH);
-    double before = 0.0;
-    for (int step = 0; step <= 60; ++step) {
-      const double z = start - 0.05 * step * kH;
-      tool.centre.z = z;
+    double most = 0.0, depth = 0.0, lost = -1.0;
+    for (; depth <= 3.0 && lost < 0.0; depth += 0.05) {
+      tool.centre.z = start - depth * kH;
       soft.touch(tool, 4 * kH);
       soft.object->settle(tool, 1e-4 * soft.lattice->force_scale_N(), 100);
-      const Reaction felt = soft.object->reaction(tool);
-      // From where it stands in the plane of the four at the latest, it never lets go again.
-      if (z > soft.top() + 0.2 * kH) continue;
-      EXPECT_GE(felt.pressed, 1U) << "radius " << radius << ", z " << (z - soft.top()) / kH;
-      EXPECT_GT(felt.force_N.z, before) << "radius " << radius << ", z " << (z - soft.top()) / kH;
-      before = felt.force_N.z;
+      const double force = soft.object->reaction(tool).force_N.z;
+      // It never lets go again.
+      if (force < 0.8 * most) lost = depth;
+      most = std::max(most, force);
     }
+    std::cout << "radius " << radius << " spacings: " << most << " N at most, ";
+    if (lost < 0.0) {
+      std::cout << "held down to a depth of 3 spacings\n";
+    } else {
+      std::cout << "lost at a depth of " << lost << " spacings\n";
+    }
+    EXPECT_LT(lost, 0.0) << "radius " << radius;
+    EXPECT_GT(most, 0.0);
   }
 }
 
