@@ -110,7 +110,11 @@ struct VolumeBuilder {
 }  // namespace
 
 RigidObject build_rigid(const RigidDescription& description, std::vector<BuildNote>& notes) {
-  return std::visit(RigidBuilder{description, notes}, description.source);
+  RigidObject object = std::visit(RigidBuilder{description, notes}, description.source);
+  if (description.as_mesh && !std::holds_alternative<PlanePrimitive>(description.source)) {
+    object.surface = polygon::make_mesh_surface(object.drawn, true);
+  }
+  return object;
 }
 
 voxel::LabelVolume build_volume(const SoftDescription& description, std::vector<BuildNote>& notes) {

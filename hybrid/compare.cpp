@@ -14,6 +14,7 @@ namespace hybrid {
 namespace {
 
 constexpr double kMeshVoxelShare = 1.0 / 40.0;  // spacing of a voxelised rigid object, of its longest side
+constexpr double kHardYoung_Pa = 1e6;           // of a rigid object as voxels: about what a hand takes for hard with a tool of millimeters
 
 // The scene with one object only, on an ideal device.
 Scene bare(const Scene& scene) {
@@ -50,9 +51,9 @@ RigidDescription as_rigid(const SoftDescription& soft) {
   return rigid;
 }
 
-// A rigid object as the soft one of the same shape, of the default material.
+// A rigid object as the soft one of the same shape, of material "hard".
 SoftDescription as_soft(const RigidDescription& rigid) {
-  SoftDescription soft{.name = rigid.name, .source = {}, .pose = rigid.pose, .materials = {}, .material = {}, .anchors = {},
+  SoftDescription soft{.name = rigid.name, .source = {}, .pose = rigid.pose, .materials = {}, .material = "hard", .anchors = {},
                        .place = rigid.place, .source_place = rigid.source_place};
   if (const auto* ball = std::get_if<BallPrimitive>(&rigid.source)) {
     const double size = 2.0 * ball->radius_m;
@@ -145,10 +146,12 @@ Comparison compare_models(const Scene& scene, const std::string& object, const P
   if (!punch) {  // a punch feels nothing rigid
     Scene as_proxy = bare(scene);
     as_proxy.rigid.push_back(is_soft ? as_rigid(*soft) : *rigid);
-    result.models.push_back(run_model("proxy", as_proxy, progress));
+    as_proxy.rigid.back().as_mesh = true;
+    result.models.push_back(run_model("mesh and proxy", as_proxy, progress));
   }
   Scene as_voxels = bare(scene);
   as_voxels.soft.push_back(is_soft ? *soft : as_soft(*rigid));
+  if (!is_soft) as_voxels.materials["hard"] = Material{.young_Pa = kHardYoung_Pa, .place = {}};
   as_voxels.soft.back().anchors.rigid_within_m = 0.0;  // nothing rigid is left to be held by
   result.models.push_back(run_model("voxels", as_voxels, progress));
   if (form) result.models.push_back(closed_model(*form, scene.tool, result.models.front().rows));

@@ -11,7 +11,7 @@
 namespace hybrid {
 
 struct ModelResult {
-  std::string name;            // "proxy", "voxels", "hertz", "flat punch", "rigid closed form"
+  std::string name;            // "mesh and proxy", "voxels", "hertz", "flat punch", "rigid closed form"
   std::vector<TraceRow> rows;
   std::vector<double> depth_m; // of the device in the undeformed object, [row]; negative outside; empty where unknown
   Percentiles tick_us;         // all zero for a closed form

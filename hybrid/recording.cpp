@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <cmath>
 #include <cstring>
 #include <fstream>
 #include <sstream>
@@ -63,7 +64,7 @@ Recording load_recording(const std::filesystem::path& file) {
   // Each size is checked alone first, so that their sum cannot wrap.
   const bool sane = header.path_bytes <= size && header.text_bytes <= size && header.ticks <= size / sizeof(Tick) &&
                     sizeof header + header.path_bytes + header.text_bytes + header.ticks * sizeof(Tick) == size &&
-                    header.dt_s > 0.0;
+                    header.dt_s > 0.0 && std::isfinite(header.dt_s);
   if (!sane) throw std::runtime_error(fmt::format("{}: truncated or damaged ({} bytes); copy it again", file.string(), size));
   Recording recording;
   std::string path(header.path_bytes, '\0');

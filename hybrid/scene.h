@@ -78,6 +78,7 @@ struct RigidDescription {
   std::string name;
   RigidSource source;
   Pose pose;
+  bool as_mesh = false;      // feel a primitive as its tessellation: of compare, no key of a scene
   SourcePlace place;         // of the table
   SourcePlace source_place;  // of the key that names the source
 };

