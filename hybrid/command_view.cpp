@@ -62,7 +62,8 @@ class Player {
       : scene_(scene), built_(built), path_(std::make_shared<SteeredPath>(scene_path(scene))), device_(scene_device(scene, path_)),
         dt_(1.0 / scene.rate_hz) {
     flush_denormals();
-    begin_session(scene, *built.world, *built.state, device_->read().position_m);
+    goal_m_ = device_->read().position_m;
+    begin_session(scene, *built.world, *built.state, goal_m_);
   }
 
   TickResult tick(const Wish& wish) {

@@ -13,6 +13,7 @@ namespace {
 constexpr int kNearMargin = 4;              // voxels around the contact that relax_near() works on
 constexpr std::size_t kMaxNear = 20'000;    // and at most this many
 constexpr std::size_t kMaxCarried = 20'000; // voxels that may hang on the pressed ones by tight links
+constexpr int kProjections = 3;             // of a pressed voxel onto the tool, in search of its least energy
 constexpr double kStir = 1e-5;              // of the spacing: pressed voxels that moved less wake nobody
 constexpr double kGiveWay = 0.01;           // of the voxel radius: less is left to the next push
 constexpr float kTight = 1e-4F;             // of the spacing: nearer to its limit than this a link is tight
@@ -157,12 +158,16 @@ void SoftObject::relax_touch(const ToolInBody& tool, Touch& t) noexcept {
   Gap g = gap(tool, rest + wanted);
   t.pressed = g.distance < 0.0;
   if (t.pressed) {
-    // First along the springs' own metric, so that sliding round the tool is free of friction, then exactly onto it.
+    // Where the springs' energy is least on the tool's surface, so that sliding round the tool is free of friction: in their own
+    // metric, the surface straightened at the last place (one step left 3e-4 of the force scale of friction).
     const auto& inverse = lattice_->springs().inverse_diagonal;
-    const glm::dvec3 w(inverse[0][t.v], inverse[1][t.v], inverse[2][t.v]);
-    const double denominator = glm::dot(g.normal, w * g.normal);
-    if (denominator > 0.0) wanted -= (g.distance / denominator) * w * g.normal;
-    g = gap(tool, rest + wanted);
+    const glm::dvec3 w(inverse[0][t.v], inverse[1][t.v], inverse[2][t.v]), wished = wanted;
+    for (int n = 0; n < kProjections && g.distance < voxel_radius(); ++n) {
+      const double denominator = glm::dot(g.normal, w * g.normal);
+      if (denominator <= 0.0) break;
+      wanted = wished - ((g.distance + glm::dot(g.normal, wished - wanted)) / denominator) * w * g.normal;
+      g = gap(tool, rest + wanted);
+    }
     if (g.distance < 0.0) wanted -= g.distance * g.normal;
     t.normal = g.normal;
   }

@@ -187,7 +187,10 @@ std::optional<Component> component_of(const itk::ImageIOBase& io) {
   }
 }
 
-std::string words_of(const itk::ExceptionObject& error) {
+std::string words_of(const std::exception& any) {
+  const auto* itk_error = dynamic_cast<const itk::ExceptionObject*>(&any);
+  if (itk_error == nullptr) return any.what();
+  const itk::ExceptionObject& error = *itk_error;
   std::string text = error.GetDescription();
   const std::string prefix = "ITK ERROR: ";
   if (text.rfind(prefix, 0) == 0) text.erase(0, prefix.size());

@@ -2,8 +2,7 @@
 // What volume_file.cpp and volume_dicom.cpp share of ITK. No other file includes this one.
 #pragma once
 
-#include <itkImageIOBase.h>
-
+#include <exception>
 #include <filesystem>
 #include <new>
 #include <optional>
@@ -13,13 +12,17 @@
 #include "voxel/volume_data.h"
 #include "voxel/volume_inspect.h"
 
+namespace itk {
+class ImageIOBase;
+}
+
 namespace voxel {
 
 // The component of what ITK is about to read, if it is one number a voxel of a type that we know.
 std::optional<Component> component_of(const itk::ImageIOBase& io);
 
 // ITK's and GDCM's words for what went wrong, without their source file, class and address.
-std::string words_of(const itk::ExceptionObject& error);
+std::string words_of(const std::exception& error);
 
 // Reads the voxels that ReadImageInformation announced, and no more.
 void read_voxels(itk::ImageIOBase& io, std::vector<std::byte>& bytes);
@@ -31,13 +34,11 @@ auto in_words(const std::filesystem::path& path, const char* doing, const char* 
     return call();
   } catch (const VolumeError&) {
     throw;
-  } catch (const itk::ExceptionObject& error) {
-    refuse_volume(path, doing, ": ", words_of(error), "; ", remedy);
   } catch (const std::bad_alloc&) {
     refuse_volume(path, doing,
                   ": this machine has not enough memory; crop the volume or use a larger spacing");
   } catch (const std::exception& error) {
-    refuse_volume(path, doing, ": ", error.what(), "; ", remedy);
+    refuse_volume(path, doing, ": ", words_of(error), "; ", remedy);
   }
 }
 
