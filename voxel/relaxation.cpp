@@ -320,6 +320,14 @@ HYBRID_WIDE std::uint64_t Relaxation::restrict_from_lattice(const Displacement& 
             if (held_by_it) r[i] = 0.0F;
           }
         }
+        if (near_limits(lattice_, state, axis, begin, count)) {
+          // What the chain holds is balanced by it. Passed on, its residual would drive the coarse levels against links that do
+          // not give, and the sweeps after would undo it: a cycle that ends where it began, far from equilibrium.
+          for (int i = 0; i < count; ++i) {
+            const VoxelId v = static_cast<VoxelId>(begin) + static_cast<VoxelId>(i);
+            if (r[i] != 0.0F && resisted(lattice_, state, axis, v, r[i])) r[i] = 0.0F;
+          }
+        }
         float* target = coarse.residual[ua].data() + cell_at(coarse.springs, 0, parent(j), plane);
         for (int i = 0; i < count; ++i) {
           worst = std::max(worst, std::fabs(r[i]));

@@ -38,6 +38,10 @@ glm::dvec3 clamp_to_links(const Lattice& lattice, const Displacement& state, Vox
 // Force of its links on voxel v (unit: newton).
 glm::dvec3 link_force(const Lattice& lattice, const Displacement& state, VoxelId v) noexcept;
 
+// May any link of these voxels be at its limit? And is voxel v pulled against one that is, on this axis?
+bool near_limits(const Lattice& lattice, const Displacement& state, int axis, std::size_t begin, int count) noexcept;
+bool resisted(const Lattice& lattice, const Displacement& state, int axis, VoxelId v, float pull) noexcept;
+
 // Adds a correction to one axis of `count` voxels from `begin`, as far as their links allow it. Held and anchored voxels stay.
 void correct_row(const Lattice& lattice, Displacement& state, int axis, std::size_t begin, int count,
                  const float* correction) noexcept;

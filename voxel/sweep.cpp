@@ -11,6 +11,8 @@
 namespace voxel {
 namespace {
 
+constexpr float kNearLimit = 0.999F;  // of the tightest limit: a row that stays within this has no link at its limit
+constexpr float kTight = 1e-6F;       // of the spacing: nearer to its limit than this a link is at it
 constexpr int kMaxRow = 2048;  // rows longer than this are relaxed in pieces
 
 // Interval that the links of v allow its displacement on one axis.
@@ -52,6 +54,10 @@ float axis_minimum(const Springs& s, const std::vector<float>& u, VoxelId v, int
 // the row vectorises; an absent link (k = 0) cannot.
 inline int leaves(float k, float difference, float low, float high) noexcept {
   return static_cast<int>(k > 0.0F) & (static_cast<int>(difference > high) | static_cast<int>(difference < low));
+}
+
+inline int reaches(float k, float difference, float low, float high) noexcept {
+  return static_cast<int>(k > 0.0F) & (static_cast<int>(difference >= high) | static_cast<int>(difference <= low));
 }
 
 // One axis of a row at once. Returns false, with nothing written, when a limit is near.
@@ -148,6 +154,30 @@ HYBRID_WIDE bool correct_row_at_once(const Lattice& lattice, Displacement& state
 }
 
 }  // namespace
+
+HYBRID_WIDE bool near_limits(const Lattice& lattice, const Displacement& state, int axis, std::size_t begin, int count) noexcept {
+  const Springs& s = lattice.springs();
+  const float* u = state.u[static_cast<std::size_t>(axis)].data() + begin;
+  const std::ptrdiff_t sy = static_cast<std::ptrdiff_t>(s.stride[1]), sz = static_cast<std::ptrdiff_t>(s.stride[2]);
+  const float *kx = s.stiffness(axis, 0) + begin, *ky = s.stiffness(axis, 1) + begin, *kz = s.stiffness(axis, 2) + begin;
+  const auto low = [&](int d) { return kNearLimit * (axis == d ? lattice.tightest(d).along_low : -lattice.tightest(d).across); };
+  const auto high = [&](int d) { return kNearLimit * (axis == d ? lattice.tightest(d).along_high : lattice.tightest(d).across); };
+  const float lx = low(0), hx = high(0), ly = low(1), hy = high(1), lz = low(2), hz = high(2);
+  int near = 0;
+  for (int i = 0; i < count; ++i) {
+    near |= reaches(kx[i - 1], u[i] - u[i - 1], lx, hx) | reaches(kx[i], u[i + 1] - u[i], lx, hx) |
+            reaches(ky[i - sy], u[i] - u[i - sy], ly, hy) | reaches(ky[i], u[i + sy] - u[i], ly, hy) |
+            reaches(kz[i - sz], u[i] - u[i - sz], lz, hz) | reaches(kz[i], u[i + sz] - u[i], lz, hz);
+  }
+  return near != 0;
+}
+
+bool resisted(const Lattice& lattice, const Displacement& state, int axis, VoxelId v, float pull) noexcept {
+  const auto& u = state.u[static_cast<std::size_t>(axis)];
+  const auto interval = link_interval(lattice, u, v, axis);
+  const float tight = kTight * static_cast<float>(lattice.min_spacing_m());
+  return pull > 0.0F ? u[v] >= interval[1] - tight : u[v] <= interval[0] + tight;
+}
 
 void correct_row(const Lattice& lattice, Displacement& state, int axis, std::size_t begin, int count,
                  const float* correction) noexcept {
