@@ -21,8 +21,10 @@ namespace {
 constexpr int kBallSubdivisions = 4;  // 5,120 triangles: for drawing and the map only, contact is exact
 constexpr double kLatticeBytes = 130.0;  // a lattice cell with its springs, state and coarse levels
 
+std::string in_words(const polygon::Finding& f) { return fmt::format("{}: {} {}", f.id, f.count, f.text); }
+
 void add_findings(const std::string& object, const std::vector<polygon::Finding>& findings, std::vector<BuildNote>& notes) {
-  for (const polygon::Finding& f : findings) notes.push_back({object, f.severity, fmt::format("{}: {}", f.id, f.text)});
+  for (const polygon::Finding& f : findings) notes.push_back({object, f.severity, in_words(f)});
 }
 
 polygon::TriangleMesh read_mesh(const std::string& object, const MeshSource& source, std::vector<BuildNote>& notes) {
@@ -38,7 +40,7 @@ polygon::TriangleMesh read_mesh(const std::string& object, const MeshSource& sou
 RigidObject mesh_object(const RigidDescription& d, polygon::TriangleMesh mesh, std::vector<BuildNote>& notes) {
   const polygon::MeshCheck check = polygon::check_mesh(mesh);
   for (const polygon::Finding& f : check.findings) {
-    if (f.severity != polygon::Severity::info) notes.push_back({d.name, f.severity, fmt::format("{}: {}", f.id, f.text)});
+    if (f.severity != polygon::Severity::info) notes.push_back({d.name, f.severity, in_words(f)});
   }
   RigidObject object{.name = d.name, .surface = nullptr, .pose = d.pose, .drawn = std::move(mesh)};
   object.surface = polygon::make_mesh_surface(object.drawn, check.oriented);

@@ -32,12 +32,18 @@ void add_finding(Json& file, const polygon::Finding& f) {
   file["findings"].push_back({{"id", f.id}, {"severity", word(f.severity)}, {"count", f.count}, {"text", f.text}});
 }
 
+// A mesh's findings are worded to follow their count.
+void add_counted(Json& file, polygon::Finding f) {
+  f.text = fmt::format("{} {}", f.count, f.text);
+  add_finding(file, f);
+}
+
 void check_mesh_file(const std::filesystem::path& path, const CheckCommand& command, Json& file) {
   file["kind"] = "mesh";
   const polygon::MeshFile loaded = polygon::load_mesh(path, {.scale = command.unit_m, .max_bytes = usable_memory_bytes() / 4});
   const polygon::MeshCheck checked = polygon::check_mesh(loaded.mesh, command.deep);
-  for (const polygon::Finding& f : loaded.findings) add_finding(file, f);
-  for (const polygon::Finding& f : checked.findings) add_finding(file, f);
+  for (const polygon::Finding& f : loaded.findings) add_counted(file, f);
+  for (const polygon::Finding& f : checked.findings) add_counted(file, f);
   file["vertices"] = loaded.mesh.vertices.size();
   file["triangles"] = loaded.mesh.triangles.size();
   file["closed"] = checked.closed;

@@ -112,8 +112,10 @@ double move_proxy(const World& world, WorldState& state, const glm::dvec3& devic
   for (const voxel::Reaction& reaction : state.reactions) model += reaction.stiffness_N_per_m;
   const glm::dmat3 metric = model + glm::dmat3(state.hidden_stiffness_N_per_m);
   const glm::dvec3 pull = pull_on_proxy(world, state, device);
-  // Against tissue no further than part of its reach at a time, so that no voxel is jumped over.
-  const double travel = near_soft ? kSoftStep * soft_reach(world, state) : std::numeric_limits<double>::max();
+  // Against tissue no further than part of its reach at a time, so that no voxel is jumped over; and where none is near yet, no
+  // further than was looked.
+  const double step = kSoftStep * soft_reach(world, state);
+  const double travel = near_soft ? step : (state.soft.empty() ? std::numeric_limits<double>::max() : kPasses * step);
   sweep = sweep_proxy(world, state, state.proxy_m, state.proxy_m + glm::inverse(metric) * pull, metric, travel);
   const glm::dvec3 delta = sweep.point - state.proxy_m;
   state.proxy_m = sweep.point;
@@ -124,18 +126,18 @@ double move_proxy(const World& world, WorldState& state, const glm::dvec3& devic
   return glm::length(delta);
 }
 
-// Tissue that anchors, bone or its own chain keep from leaving the tool's way: the tool leaves its way instead.
-void give_way(const World& world, WorldState& state, Sweep& sweep) noexcept {
+// Tissue that anchors, bone or its own chain keep from leaving the tool's way: the tool leaves its way instead, if need be
+// back to `before`, where it was at the start of the tick.
+void give_way(const World& world, WorldState& state, const glm::dvec3& before, Sweep& sweep) noexcept {
   const double radius = world.tool.radius_m;
   if (!gather_planes(world, state, state.proxy_m, 2.0 * radius)) return;
   if (soft_bounds(world, state, state.proxy_m) == 0) return;
   const polygon::PlaneMinimum out =
       polygon::minimise_on_planes(state.proxy_m, glm::dmat3(1.0), state.planes, 1e-9 * radius);
-  const glm::dvec3 move = out.point - state.proxy_m;
-  // Rigid half-spaces were gathered this far only; what is further out is done next tick.
-  if (!out.feasible || glm::length(move) > radius) return;
-  state.proxy_m = out.point;
-  sweep.point = out.point;
+  // Rigid half-spaces were gathered this far only. Too deep in tissue to see a way out, the way back is one.
+  const bool found = out.feasible && glm::length(out.point - state.proxy_m) <= radius;
+  state.proxy_m = found ? out.point : before;
+  sweep.point = state.proxy_m;
 }
 
 }  // namespace
@@ -158,6 +160,7 @@ TickResult haptic_tick(const World& world, WorldState& state, const device::Devi
   }
   clock.done(Stage::broad_phase);
 
+  const glm::dvec3 before = state.proxy_m;
   std::fill(state.reactions.begin(), state.reactions.end(), voxel::Reaction{});
   if (!near_soft) state.hidden_stiffness_N_per_m = 0.0;
   if (near_soft) press_soft(world, state, state.proxy_m, glm::dvec3(0.0), 0);
@@ -165,7 +168,7 @@ TickResult haptic_tick(const World& world, WorldState& state, const device::Devi
     const double moved = move_proxy(world, state, device, near_soft, sweep);
     if (!near_soft || (pass > 0 && moved < kStill * world.tool.radius_m)) break;
   }
-  if (near_soft) give_way(world, state, sweep);
+  if (near_soft) give_way(world, state, before, sweep);
   if (!sweep.arrived) ++state.truncated_ticks;
   clock.done(Stage::contact);
 

@@ -82,6 +82,7 @@ Relaxation::Relaxation(const Lattice& lattice)
   scratch_.assign(longest, 0.0F);
   coarse_value_.assign(longest, 0.0F);
   coarse_weight_.assign(longest, 0.0F);
+  at_limit_.assign(lattice.size(), 0);
   held_cells_.reserve(16384);
   unseen_.assign(lattice.springs().row.size(), 0);
   row_residual_.assign(lattice.springs().row.size(), 0.0F);
@@ -201,10 +202,26 @@ void Relaxation::begin_cycle(std::span<const VoxelId> held) noexcept {
   }
 }
 
+// On one axis, the cells around v on all coarser levels do not move in this cycle.
+void Relaxation::hold_cells(VoxelId v, int axis) noexcept {
+  auto c = lattice_.coordinates(v);
+  for (std::size_t level = 1; level < levels_.size(); ++level) {
+    for (int& x : c) x = parent(x);
+    Springs& s = levels_[level].springs;
+    const VoxelId cell = cell_at(s, c[0], c[1], c[2]);
+    float& inverse = s.inverse_diagonal[static_cast<std::size_t>(axis)][cell];
+    if (inverse == 0.0F || held_cells_.size() == held_cells_.capacity()) return;
+    held_cells_.push_back({static_cast<std::uint8_t>(level), cell,
+                           {s.inverse_diagonal[0][cell], s.inverse_diagonal[1][cell], s.inverse_diagonal[2][cell]}});
+    inverse = 0.0F;
+  }
+}
+
 void Relaxation::end_cycle() noexcept {
-  for (const HeldCell& held : held_cells_) {
+  // Last first: a cell may have been held on one axis, then on another.
+  for (auto held = held_cells_.rbegin(); held != held_cells_.rend(); ++held) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      levels_[held.level].springs.inverse_diagonal[axis][held.cell] = held.inverse_diagonal[axis];
+      levels_[held->level].springs.inverse_diagonal[axis][held->cell] = held->inverse_diagonal[axis];
     }
   }
   held_cells_.clear();
@@ -300,6 +317,7 @@ HYBRID_WIDE std::uint64_t Relaxation::restrict_from_lattice(const Displacement& 
       float worst = 0.0F;
       const std::size_t begin = row * static_cast<std::size_t>(s.dims[0]) + static_cast<std::size_t>(first);
       const std::uint8_t* role = state.role.data() + begin;
+      std::fill_n(at_limit_.begin() + static_cast<std::ptrdiff_t>(begin), count, std::uint8_t{0});
       for (int axis = 0; axis < 3; ++axis) {
         const auto ua = static_cast<std::size_t>(axis);
         const float* u = state.u[ua].data() + begin;
@@ -325,7 +343,10 @@ HYBRID_WIDE std::uint64_t Relaxation::restrict_from_lattice(const Displacement& 
           // not give, and the sweeps after would undo it: a cycle that ends where it began, far from equilibrium.
           for (int i = 0; i < count; ++i) {
             const VoxelId v = static_cast<VoxelId>(begin) + static_cast<VoxelId>(i);
-            if (r[i] != 0.0F && resisted(lattice_, state, axis, v, r[i])) r[i] = 0.0F;
+            if (r[i] == 0.0F || !resisted(lattice_, state, axis, v, r[i])) continue;
+            r[i] = 0.0F;
+            at_limit_[v] |= static_cast<std::uint8_t>(1 << axis);
+            hold_cells(v, axis);
           }
         }
         float* target = coarse.residual[ua].data() + cell_at(coarse.springs, 0, parent(j), plane);
@@ -426,6 +447,9 @@ std::uint64_t Relaxation::prolong_to_lattice(Displacement& state, const Obstacle
     const std::size_t begin = row * static_cast<std::size_t>(s.dims[0]) + static_cast<std::size_t>(first);
     for (int axis = 0; axis < 3; ++axis) {
       interpolate_row(levels_[1], axis, j, plane, first, last);
+      for (int i = 0; i < last - first; ++i) {
+        if ((at_limit_[begin + static_cast<std::size_t>(i)] >> axis & 1) != 0) scratch_[static_cast<std::size_t>(i)] = 0.0F;
+      }
       correct_row(lattice_, state, axis, begin, last - first, scratch_.data());
     }
     if (state.row_obstacles[row] != 0) clear_obstacles(lattice_, state, obstacles, begin, last - first);

@@ -108,6 +108,7 @@ class Relaxation {
   std::uint64_t do_plane(Displacement& state, const ObstacleView& obstacles, const Step& step, int plane) noexcept;
   void begin_cycle(std::span<const VoxelId> held) noexcept;
   void end_cycle() noexcept;
+  void hold_cells(VoxelId v, int axis) noexcept;
   void smooth_coarse(Level& level, int colour, int plane) noexcept;
   std::uint64_t restrict_from_lattice(const Displacement& state, const ObstacleView& obstacles, int plane) noexcept;
   void restrict_from_level(std::size_t fine, int plane) noexcept;
@@ -124,6 +125,7 @@ class Relaxation {
   std::vector<Step> steps_;
   std::vector<HeldCell> held_cells_;
   std::vector<float> scratch_, coarse_value_, coarse_weight_;
+  std::vector<std::uint8_t> at_limit_; // [v] bit of each axis on which a link at its limit stands against v's pull
   std::vector<std::uint8_t> unseen_;   // [row of the lattice] 1: its residual may have changed since it was last found
   std::vector<float> row_residual_;    // [row] largest force on a free voxel when it was last found (N)
   std::size_t step_ = 0;

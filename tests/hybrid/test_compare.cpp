@@ -54,11 +54,11 @@ TEST_F(Compare, TheCubeAsProxyVoxelsAndHertz) {
   const Comparison c = hybrid::compare_models(scene, "", {});
   EXPECT_EQ(c.object, "block");
   expect_sane(c);
-  ASSERT_NE(named(c, "proxy"), nullptr);
+  ASSERT_NE(named(c, "mesh and proxy"), nullptr);
   ASSERT_NE(named(c, "voxels"), nullptr);
   ASSERT_NE(named(c, "hertz"), nullptr);
   EXPECT_EQ(c.models[c.reference].name, "voxels");  // Hertz leaves the core out
-  EXPECT_GT(max_force(*named(c, "proxy")), max_force(*named(c, "voxels")));
+  EXPECT_GT(max_force(*named(c, "mesh and proxy")), max_force(*named(c, "voxels")));
 }
 
 TEST_F(Compare, ABallsProxyIsItsClosedFormWithinOnePercent) {
@@ -66,7 +66,7 @@ TEST_F(Compare, ABallsProxyIsItsClosedFormWithinOnePercent) {
                           "[path]\nkind = \"waypoints\"\nspeed = 50\npoints = [[0, 0, 40], [0, 0, 22, 0.2], [10, 0, 20], [20, 5, 5], [40, 5, 0]]\n");
   const Comparison c = hybrid::compare_models(scene, "ball", {});
   expect_sane(c);
-  const ModelResult* const proxy = named(c, "proxy");
+  const ModelResult* const proxy = named(c, "mesh and proxy");
   ASSERT_NE(proxy, nullptr);
   EXPECT_EQ(c.models[c.reference].name, "rigid closed form");
   const double most = max_force(c.models[c.reference]);

@@ -367,7 +367,8 @@ TEST(Relaxation, EnergyNeverGrows) {
         ASSERT_LE(voxel::worst_violation(lattice, state), rounding) << "scene " << n << ", cycle " << cycle;
       }
       const double energy = energy_of(lattice, scene.options, state);
-      EXPECT_LE(energy, before * (1 + 1e-6) + 1e-9 * start) << "scene " << n << ", cycle " << cycle;
+      EXPECT_LE(energy, before * (1 + 1e-6) + 1e-9 * start)
+          << "scene " << n << ", cycle " << cycle << ", " << before / start << " of the first energy left";
       if (before > 1e-6 * start) worst = std::max(worst, energy / before);
       before = energy;
     }
