@@ -69,7 +69,8 @@ RigidObject volume_surface_object(const RigidDescription& d, const VolumeSurface
   placed.pose = frame;
   // An opened surface is a sheet by intent: that it is not closed is no news.
   if (s.cuts.empty()) return mesh_object(placed, std::move(mesh), notes);
-  RigidObject object{.name = d.name, .surface = polygon::make_mesh_surface(mesh, false), .pose = frame, .drawn = std::move(mesh)};
+  RigidObject object{.name = d.name, .surface = nullptr, .pose = frame, .drawn = std::move(mesh)};
+  object.surface = polygon::make_mesh_surface(object.drawn, false);
   return object;
 }
 

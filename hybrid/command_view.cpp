@@ -59,7 +59,7 @@ class SteeredPath final : public device::Path {
 class Player {
  public:
   Player(const Scene& scene, BuiltScene& built)
-      : scene_(scene), built_(built), path_(std::make_shared<SteeredPath>(scene_path(scene))), device_(scene_device(scene, path_)),
+      : built_(built), path_(std::make_shared<SteeredPath>(scene_path(scene))), device_(scene_device(scene, path_)),
         dt_(1.0 / scene.rate_hz) {
     flush_denormals();
     goal_m_ = device_->read().position_m;
@@ -99,7 +99,6 @@ class Player {
 
  private:
   static constexpr double kHandSpeed_m_per_s = 0.5;
-  const Scene& scene_;
   BuiltScene& built_;
   std::shared_ptr<SteeredPath> path_;
   std::unique_ptr<device::HapticDevice> device_;

@@ -8,6 +8,7 @@
 namespace hybrid {
 namespace {
 
+constexpr int kMaxHalvings = 6;           // of how far a crowded tool looks ahead
 constexpr std::uint32_t kMapSlice = 512;  // surface voxels of each object whose cell is looked at a tick
 
 const glm::dvec3 kPunchAxis(0.0, 0.0, -1.0);  // a punch presses downwards in the scene
@@ -29,13 +30,12 @@ double soft_reach(const World& world, const WorldState& state) noexcept {
   return reach;
 }
 
-bool touch_soft(const World& world, WorldState& state, const glm::dvec3& point, double range) noexcept {
-  bool any = false;
+namespace {
+
+// Of the first `count` voxels found, those within reach and `range` of the tool. False: an object has more than fit.
+bool list_touched(const World& world, WorldState& state, const glm::dvec3& point, double range, std::size_t count) noexcept {
   for (auto& list : state.touched) list.clear();
-  // A voxel may have moved since the map last looked at it, by much less than a cell.
-  const glm::dvec3 box(soft_reach(world, state) + range + 0.5 * state.map.cell_m());
-  const std::size_t count = state.map.soft_in(point - box, point + box, state.found);
-  if (count == state.found.size()) state.faults |= fault_touch_overflow;
+  bool fits = true;
   for (std::size_t i = 0; i < count; ++i) {
     const std::uint32_t number = state.found[i];
     std::size_t o = world.soft.size() - 1;
@@ -44,9 +44,30 @@ bool touch_soft(const World& world, WorldState& state, const glm::dvec3& point, 
     const voxel::VoxelId v = object.lattice().surface()[number - world.soft[o].first_number];
     const glm::dvec3 away = world.soft[o].to_scene(object.position(v)) - point;
     const double reach = object.reach(world.tool.radius_m) + range;
-    if (glm::dot(away, away) > reach * reach || state.touched[o].size() == voxel::SoftObject::kMaxTouched) continue;
+    if (glm::dot(away, away) > reach * reach) continue;
+    if (state.touched[o].size() == voxel::SoftObject::kMaxTouched) {
+      fits = false;
+      break;
+    }
     state.touched[o].push_back(v);
   }
+  return fits;
+}
+
+}  // namespace
+
+bool touch_soft(const World& world, WorldState& state, const glm::dvec3& point, double& range) noexcept {
+  bool any = false;
+  // A voxel may have moved since the map last looked at it, by much less than a cell.
+  const glm::dvec3 box(soft_reach(world, state) + range + 0.5 * state.map.cell_m());
+  const std::size_t count = state.map.soft_in(point - box, point + box, state.found);
+  bool fits = count < state.found.size() && list_touched(world, state, point, range, count);
+  // A tool of many spacings: it looks less far ahead, and so goes less far in a tick.
+  for (int n = 0; n < kMaxHalvings && !fits; ++n) {
+    range *= 0.5;
+    fits = list_touched(world, state, point, range, count);
+  }
+  if (!fits) state.faults |= fault_touch_overflow;
   for (std::size_t o = 0; o < state.soft.size(); ++o) {
     // The map's lists are in the order of motion; sorted, the result does not depend on history.
     std::sort(state.touched[o].begin(), state.touched[o].end());

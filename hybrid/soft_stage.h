@@ -6,8 +6,9 @@
 
 namespace hybrid {
 
-// Hands each soft object its surface voxels within `range` of the tool at `point` (scene frame) beyond its reach. True when any is near.
-bool touch_soft(const World& world, WorldState& state, const glm::dvec3& point, double range) noexcept;
+// Hands each soft object its surface voxels within `range` of the tool at `point` (scene frame) beyond its reach. True when any is
+// near. Where they are more than fit, `range` becomes smaller: the tool may not go further than that in this tick.
+bool touch_soft(const World& world, WorldState& state, const glm::dvec3& point, double& range) noexcept;
 
 // Tool moved to `point` by `delta`: pressed voxels follow, the rest is pushed out, the neighbourhood relaxes by `sweeps`,
 // and state.reactions are what each object then answers (scene frame).

@@ -106,16 +106,13 @@ void learn_stiffness(const World& world, WorldState& state, const glm::dvec3& de
 
 // One pass: the proxy goes to the minimum of ½K|q − x|² plus the tissue's quadratic model, outside everything
 // rigid; then the tissue answers. Returns how far the proxy went.
-double move_proxy(const World& world, WorldState& state, const glm::dvec3& device, bool near_soft, Sweep& sweep) noexcept {
+double move_proxy(const World& world, WorldState& state, const glm::dvec3& device, bool near_soft, double travel,
+                  Sweep& sweep) noexcept {
   const double k = world.tool.stiffness_N_per_m;
   glm::dmat3 model(k);
   for (const voxel::Reaction& reaction : state.reactions) model += reaction.stiffness_N_per_m;
   const glm::dmat3 metric = model + glm::dmat3(state.hidden_stiffness_N_per_m);
   const glm::dvec3 pull = pull_on_proxy(world, state, device);
-  // Against tissue no further than part of its reach at a time, so that no voxel is jumped over; and where none is near yet, no
-  // further than was looked.
-  const double step = kSoftStep * soft_reach(world, state);
-  const double travel = near_soft ? step : (state.soft.empty() ? std::numeric_limits<double>::max() : kPasses * step);
   sweep = sweep_proxy(world, state, state.proxy_m, state.proxy_m + glm::inverse(metric) * pull, metric, travel);
   const glm::dvec3 delta = sweep.point - state.proxy_m;
   state.proxy_m = sweep.point;
@@ -150,9 +147,11 @@ TickResult haptic_tick(const World& world, WorldState& state, const device::Devi
   Sweep sweep;
 
   bool near_soft = false;
+  // Against tissue no further in a tick than was looked, part of its reach at a time, so that no voxel is jumped over.
+  double range = state.soft.empty() ? std::numeric_limits<double>::max() : kPasses * kSoftStep * soft_reach(world, state);
   const bool free = advance_through_free_space(world, state, device);
   if (!free && !state.soft.empty()) {
-    near_soft = touch_soft(world, state, state.proxy_m, kPasses * kSoftStep * soft_reach(world, state));
+    near_soft = touch_soft(world, state, state.proxy_m, range);
   } else {
     for (auto& object : state.soft) {
       if (!object->touched().empty()) object->touch({});
@@ -165,7 +164,7 @@ TickResult haptic_tick(const World& world, WorldState& state, const device::Devi
   if (!near_soft) state.hidden_stiffness_N_per_m = 0.0;
   if (near_soft) press_soft(world, state, state.proxy_m, glm::dvec3(0.0), 0);
   for (int pass = 0; pass < kPasses && !free; ++pass) {
-    const double moved = move_proxy(world, state, device, near_soft, sweep);
+    const double moved = move_proxy(world, state, device, near_soft, near_soft ? range / kPasses : range, sweep);
     if (!near_soft || (pass > 0 && moved < kStill * world.tool.radius_m)) break;
   }
   if (near_soft) give_way(world, state, before, sweep);

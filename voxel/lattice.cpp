@@ -59,6 +59,9 @@ void Lattice::fill_labels(const LabelVolume& volume) {
     throw std::invalid_argument("a soft object of " + std::to_string(cells) +
                                 " lattice cells is too large; give it a coarser spacing");
   }
+  std::size_t expected = 1;
+  for (const int n : volume.dims) expected *= static_cast<std::size_t>(std::max(n, 0));
+  if (volume.labels.size() != expected) throw std::invalid_argument("a label volume must hold one label a voxel");
   springs_.stride = {1, static_cast<std::size_t>(springs_.dims[0]),
                      static_cast<std::size_t>(springs_.dims[0]) * static_cast<std::size_t>(springs_.dims[1])};
   label_.assign(cells, 0);
@@ -142,6 +145,7 @@ void Lattice::fill_anchors(const LabelVolume& volume, const LatticeOptions& opti
     if (held) anchored_[v] = 1;
   }
   for (const std::size_t index : options.anchor_voxels) {
+    if (index >= volume.labels.size()) throw std::invalid_argument("an anchored voxel lies outside the volume");
     const auto nx = static_cast<std::size_t>(volume.dims[0]), ny = static_cast<std::size_t>(volume.dims[1]);
     const VoxelId v = at(static_cast<int>(index % nx) + 1, static_cast<int>(index / nx % ny) + 1,
                          static_cast<int>(index / (nx * ny)) + 1);

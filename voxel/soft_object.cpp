@@ -55,8 +55,9 @@ std::unique_ptr<SoftObject> SoftObject::copy() const {
 }
 
 double SoftObject::reach(double tool_radius) const {
-  // Half a cell's diagonal plus a little: smaller, and a ball could pass between four voxels of a face.
-  return std::max(tool_radius + voxel_radius(), 0.75 * lattice_->max_spacing_m());
+  // Half a cell's diagonal would do for voxels at rest; pressed, they part. From a spacing and a half on none lets go (a test
+  // presses tools of a hundredth of a spacing three spacings deep).
+  return std::max(tool_radius + voxel_radius(), 1.5 * lattice_->max_spacing_m());
 }
 
 SoftObject::Gap SoftObject::gap(const ToolInBody& tool, const glm::dvec3& position) const noexcept {

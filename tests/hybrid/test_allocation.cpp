@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Once a scene is built, its ticks allocate nothing. This program counts every call of operator new and malloc that its
-// thread makes while it is watched.
+// Once a scene is built, its ticks allocate nothing. This program counts every call of operator new and
+// malloc that its thread makes while it is watched.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -54,8 +54,12 @@ void* realloc(void* memory, std::size_t size) noexcept {
   if (void* memory = std::malloc(size == 0 ? 1 : size)) return memory;
   throw std::bad_alloc();
 }
-[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
-[[gnu::noinline]] void operator delete(void* memory, std::size_t /*size*/) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory) noexcept {
+  std::free(memory);
+}
+[[gnu::noinline]] void operator delete(void* memory, std::size_t /*size*/) noexcept {
+  std::free(memory);
+}
 
 namespace {
 
@@ -106,7 +110,8 @@ TEST_P(AllocationOf, AllItsTicks) {
 }
 
 INSTANTIATE_TEST_SUITE_P(ShippedScenes, AllocationOf,
-                         ::testing::Values("cube.toml", "sheet.toml", "ball-and-block.toml", "two-soft.toml", "head.toml"),
+                         ::testing::Values("cube.toml", "sheet.toml", "ball-and-block.toml", "two-soft.toml",
+                                           "head.toml"),
                          [](const auto& scene) {
                            std::string name = scene.param;
                            name.resize(name.find('.'));
@@ -117,7 +122,8 @@ INSTANTIATE_TEST_SUITE_P(ShippedScenes, AllocationOf,
 // A scene that is shipped later is watched too.
 TEST(Allocation, KnowsEveryShippedScene) {
   std::size_t scenes = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(std::filesystem::path(HYBRID_SOURCE_DIR) / "scenes")) {
+  for (const auto& entry :
+       std::filesystem::directory_iterator(std::filesystem::path(HYBRID_SOURCE_DIR) / "scenes")) {
     scenes += entry.path().extension() == ".toml" ? 1 : 0;
   }
   EXPECT_EQ(scenes, 5U) << "add the new scene to the list above";

@@ -16,8 +16,10 @@ using hybrid::Tool;
 
 const Tool ball{.shape = Tool::Shape::ball, .radius_m = 5e-3, .stiffness_N_per_m = 1000.0};
 const Tool punch{.shape = Tool::Shape::punch, .radius_m = 5e-3, .stiffness_N_per_m = 1000.0};
-const ClosedForm rigid_ball{.shape = ClosedForm::Shape::ball, .pose = {}, .half_size_m = dvec3(0.02), .caveat = {}};
-const ClosedForm rigid_box{.shape = ClosedForm::Shape::box, .pose = {}, .half_size_m = {0.03, 0.02, 0.01}, .caveat = {}};
+const ClosedForm rigid_ball{
+    .shape = ClosedForm::Shape::ball, .pose = {}, .half_size_m = dvec3(0.02), .caveat = {}};
+const ClosedForm rigid_box{
+    .shape = ClosedForm::Shape::box, .pose = {}, .half_size_m = {0.03, 0.02, 0.01}, .caveat = {}};
 
 TEST(ClosedForm, DepthInABall) {
   const auto depth = depth_in(rigid_ball, ball, {0.0, 0.0, 0.022});  // touched at 25 mm
@@ -32,10 +34,11 @@ TEST(ClosedForm, DepthInABall) {
 TEST(ClosedForm, DepthInABoxAtFaceEdgeAndCorner) {
   EXPECT_NEAR(depth_in(rigid_box, ball, {0.0, 0.0, 0.012}).depth_m, 3e-3, 1e-15);
   EXPECT_NEAR(depth_in(rigid_box, ball, {0.0, 0.0, 0.008}).depth_m, 7e-3, 1e-15);  // its centre is inside
-  const auto edge = depth_in(rigid_box, ball, {0.033, 0.0, 0.014});                // 3 and 4 mm out: 5 mm from the edge
+  const auto edge = depth_in(rigid_box, ball, {0.033, 0.0, 0.014});  // 3 and 4 mm out: 5 mm from the edge
   EXPECT_NEAR(edge.depth_m, 0.0, 1e-15);
   EXPECT_NEAR(glm::length(edge.out - dvec3(0.6, 0.0, 0.8)), 0.0, 1e-12);
-  const auto corner = depth_in(rigid_box, ball, {0.031, 0.022, 0.012});  // 1, 2 and 2 mm out: 3 mm from the corner
+  const auto corner =
+      depth_in(rigid_box, ball, {0.031, 0.022, 0.012});  // 1, 2 and 2 mm out: 3 mm from the corner
   EXPECT_NEAR(corner.depth_m, 2e-3, 1e-15);
   EXPECT_NEAR(glm::length(corner.out - dvec3(1.0, 2.0, 2.0) / 3.0), 0.0, 1e-12);
 }
@@ -46,7 +49,8 @@ TEST(ClosedForm, AFlatPunchIsMeasuredAtItsFace) {
 
 TEST(ClosedForm, FollowsThePose) {
   ClosedForm turned = rigid_box;
-  turned.pose = {{1.0, 2.0, 3.0}, glm::angleAxis(glm::radians(90.0), dvec3(0, 1, 0))};  // its z looks along the scene's x
+  turned.pose = {{1.0, 2.0, 3.0},
+                 glm::angleAxis(glm::radians(90.0), dvec3(0, 1, 0))};  // its z looks along the scene's x
   const auto depth = depth_in(turned, ball, {1.012, 2.0, 3.0});
   EXPECT_NEAR(depth.depth_m, 3e-3, 1e-12);
   EXPECT_NEAR(glm::length(depth.out - dvec3(1, 0, 0)), 0.0, 1e-12);
@@ -103,7 +107,11 @@ TEST(ClosedForm, ForceGrowsWithDepthAndNeverPassesTheCoupling) {
 }
 
 TEST(ClosedForm, SaysWhichDescriptionsHaveOne) {
-  hybrid::RigidDescription rigid{.name = "b", .source = hybrid::BoxPrimitive{{0.02, 0.04, 0.06}}, .pose = {}, .place = {}, .source_place = {}};
+  hybrid::RigidDescription rigid{.name = "b",
+                                 .source = hybrid::BoxPrimitive{{0.02, 0.04, 0.06}},
+                                 .pose = {},
+                                 .place = {},
+                                 .source_place = {}};
   const auto box = closed_form_of(rigid);
   ASSERT_TRUE(box.has_value());
   EXPECT_EQ(box->half_size_m, dvec3(0.01, 0.02, 0.03));

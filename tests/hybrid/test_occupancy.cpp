@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The occupancy map against brute force over everything that was put into it. A cell is the map's resolution: it may
-// report what lies within one cell of a box, and must report what lies in it.
+// The occupancy map against brute force over everything that was put into it. A cell is the map's resolution:
+// it may report what lies within one cell of a box, and must report what lies in it.
 #include "hybrid/occupancy.h"
 
 #include <gtest/gtest.h>
@@ -30,7 +30,8 @@ bool within(const dvec3& p, const dvec3& low, const dvec3& high) {
   return glm::all(glm::greaterThanEqual(p, low)) && glm::all(glm::lessThanEqual(p, high));
 }
 
-// Does the triangle meet the box? Clipped by its six planes (Sutherland & Hodgman 1974), and looked at what is left.
+// Does the triangle meet the box? Clipped by its six planes (Sutherland & Hodgman 1974), and looked at what
+// is left.
 bool meets(const Triangle& t, const dvec3& low, const dvec3& high) {
   std::vector<dvec3> polygon(t.begin(), t.end());
   for (int d = 0; d < 3; ++d) {
@@ -67,10 +68,16 @@ class Occupancy : public ::testing::TestWithParam<double> {
     ASSERT_EQ(found.size(), count) << "a voxel was reported twice";
     const dvec3 cell(kCell + 4.0 * rounding);
     for (std::uint32_t n = 0; n < points.size(); ++n) {
-      if (within(points[n], low, high)) { ASSERT_TRUE(found.contains(n)) << "voxel " << n << " was missed"; }
-      if (found.contains(n)) { ASSERT_TRUE(within(points[n], low - cell, high + cell)) << "voxel " << n << " is elsewhere"; }
+      if (within(points[n], low, high)) {
+        ASSERT_TRUE(found.contains(n)) << "voxel " << n << " was missed";
+      }
+      if (found.contains(n)) {
+        ASSERT_TRUE(within(points[n], low - cell, high + cell)) << "voxel " << n << " is elsewhere";
+      }
     }
-    if (count > 0) { ASSERT_TRUE(map.any_near(low, high)); }
+    if (count > 0) {
+      ASSERT_TRUE(map.any_near(low, high));
+    }
   }
 };
 
@@ -89,7 +96,8 @@ TEST_P(Occupancy, FindsSoftVoxelsAsBruteForceDoesAfterManyMoves) {
     for (int n = 0; n < 1000; ++n) {
       const std::size_t i = any(random);
       // Small steps mostly, as tissue moves; sometimes across the scene.
-      points[i] += n % 10 == 0 ? 0.5 * (origin - points[i]) + random_point(random, 0.04) : random_point(random, 1e-3);
+      points[i] +=
+          n % 10 == 0 ? 0.5 * (origin - points[i]) + random_point(random, 0.04) : random_point(random, 1e-3);
       map.move(static_cast<std::uint32_t>(i), points[i]);
     }
     ASSERT_TRUE(map.validate()) << "after " << (round + 1) * 1000 << " moves";
@@ -115,17 +123,24 @@ TEST_P(Occupancy, FindsRigidSurfacesAsBruteForceDoes) {
     map.add_triangle(n, t[0], t[1], t[2]);
   }
   for (int n = 0; n < 1500; ++n) {
-    const dvec3 centre = origin + random_point(random, 0.06), half = glm::abs(random_point(random, n % 2 == 0 ? 2e-3 : 0.02));
+    const dvec3 centre = origin + random_point(random, 0.06),
+                half = glm::abs(random_point(random, n % 2 == 0 ? 2e-3 : 0.02));
     const dvec3 low = centre - half, high = centre + half;
     const std::uint64_t mask = map.rigid_in(low, high);
     bool near = false;
     for (std::uint32_t o = 0; o < triangles.size(); ++o) {
-      if (meets(triangles[o], low, high)) { ASSERT_NE(mask & OccupancyMap::rigid_bit(o), 0U) << "object " << o << " was missed"; }
+      if (meets(triangles[o], low, high)) {
+        ASSERT_NE(mask & OccupancyMap::rigid_bit(o), 0U) << "object " << o << " was missed";
+      }
       const dvec3 cell(kCell + 1e-9 + 8.0 * rounding);
       near = near || meets(triangles[o], low - cell, high + cell);
     }
-    if (!near) { ASSERT_EQ(mask, 0U) << "nothing rigid is within a cell of this box"; }
-    if (mask != 0) { ASSERT_TRUE(map.any_near(low, high)); }
+    if (!near) {
+      ASSERT_EQ(mask, 0U) << "nothing rigid is within a cell of this box";
+    }
+    if (mask != 0) {
+      ASSERT_TRUE(map.any_near(low, high));
+    }
   }
 }
 

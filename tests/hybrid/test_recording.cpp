@@ -29,16 +29,22 @@ Recording record(const std::filesystem::path& file, std::optional<double> second
   options.keep_rows = false;
   const hybrid::SessionResult result = hybrid::run_session(scene, built, options);
   EXPECT_GT(result.contact_ticks, 50U);
-  return {.scene_file = file, .scene_text = read(file), .dt_s = result.dt_s, .state_hash = result.state_hash, .ticks = result.recording};
+  return {.scene_file = file,
+          .scene_text = read(file),
+          .dt_s = result.dt_s,
+          .state_hash = result.state_hash,
+          .ticks = result.recording};
 }
 
 class RecordingFile : public tests::SceneFile {
  protected:
   // A small scene that is quick to run: tissue and something rigid on it.
   std::filesystem::path small_scene() const {
-    return write("small.toml", "format = 1\n" + tests::block +
-                                   "[[rigid]]\nname = \"ball\"\nprimitive = \"ball\"\nradius = 4\nposition = [9, 0, 8]\n"
-                                   "[path]\nkind = \"waypoints\"\nspeed = 100\npoints = [[0, 0, 20], [0, 0, 4, 0.2], [8, 0, 12, 0.1]]\n");
+    return write("small.toml",
+                 "format = 1\n" + tests::block +
+                     "[[rigid]]\nname = \"ball\"\nprimitive = \"ball\"\nradius = 4\nposition = [9, 0, 8]\n"
+                     "[path]\nkind = \"waypoints\"\nspeed = 100\npoints = [[0, 0, 20], [0, 0, 4, 0.2], [8, "
+                     "0, 12, 0.1]]\n");
   }
   std::string refusal_of(const std::string& bytes) const {
     const auto file = write("bad.rec", bytes);
@@ -74,7 +80,10 @@ TEST_P(ShippedScene, RunSavedLoadedAndReplayedIsTheSameToTheBit) {
   EXPECT_EQ(result.state_hash, recorded.state_hash);
 }
 INSTANTIATE_TEST_SUITE_P(Replays, ShippedScene, ::testing::Values("cube", "sheet", "two-soft", "head"),
-                         [](const auto& scene) { return std::string(scene.param == std::string("two-soft") ? "two_soft" : scene.param); });
+                         [](const auto& scene) {
+                           return std::string(scene.param == std::string("two-soft") ? "two_soft"
+                                                                                     : scene.param);
+                         });
 
 TEST_F(RecordingFile, TwoRunsOfASceneEndInTheSameState) {
   const auto file = small_scene();
@@ -92,7 +101,8 @@ TEST_F(RecordingFile, AFlippedBitOfAnInputIsNoticedAtItsTick) {
   const std::size_t first = bytes.size() - 32 * good.ticks.size();
   for (const std::size_t tick : {std::size_t{0}, std::size_t{50}, std::size_t{200}, good.ticks.size() - 1}) {
     std::string flipped = bytes;
-    flipped[first + 32 * tick + 16 + 5] = static_cast<char>(flipped[first + 32 * tick + 16 + 5] ^ 0x10);  // z: a few micrometers
+    flipped[first + 32 * tick + 16 + 5] =
+        static_cast<char>(flipped[first + 32 * tick + 16 + 5] ^ 0x10);  // z: a few micrometers
     const auto result = hybrid::replay(hybrid::load_recording(write("b.rec", flipped)), {});
     EXPECT_FALSE(result.equal);
     EXPECT_EQ(result.parts_at, tick);
@@ -120,8 +130,9 @@ TEST_F(RecordingFile, TruncatedAndGarbageFilesAreRefusedInWords) {
   hybrid::save_recording(folder_ / "a.rec", record(small_scene(), 0.3));
   const std::string bytes = read(folder_ / "a.rec");
   EXPECT_EQ(refusal_of(bytes), "");
-  for (const std::size_t size : {std::size_t{0}, std::size_t{1}, std::size_t{7}, std::size_t{8}, std::size_t{47}, std::size_t{48}, std::size_t{60},
-                                 bytes.size() / 2, bytes.size() - 1}) {
+  for (const std::size_t size :
+       {std::size_t{0}, std::size_t{1}, std::size_t{7}, std::size_t{8}, std::size_t{47}, std::size_t{48},
+        std::size_t{60}, bytes.size() / 2, bytes.size() - 1}) {
     EXPECT_NE(refusal_of(bytes.substr(0, size)), "") << size << " bytes";
   }
   EXPECT_NE(refusal_of(bytes + "x"), "");
@@ -131,7 +142,8 @@ TEST_F(RecordingFile, TruncatedAndGarbageFilesAreRefusedInWords) {
   EXPECT_THROW((void)hybrid::load_recording(folder_), std::runtime_error);
   // Counts that no file could hold are no reason to ask for the memory.
   for (const std::size_t field : {std::size_t{8}, std::size_t{16}, std::size_t{24}}) {
-    for (const std::uint64_t value : {std::uint64_t{1} << 63, ~std::uint64_t{0}, std::uint64_t{1} << 59, std::uint64_t{1'000'000'000}}) {
+    for (const std::uint64_t value :
+         {std::uint64_t{1} << 63, ~std::uint64_t{0}, std::uint64_t{1} << 59, std::uint64_t{1'000'000'000}}) {
       std::string wrong = bytes;
       std::memcpy(wrong.data() + field, &value, sizeof value);
       EXPECT_NE(refusal_of(wrong), "") << "field at " << field << " = " << value;

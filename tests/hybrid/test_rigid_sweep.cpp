@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The proxy on rigid objects alone: depth and direction against closed forms, first-order conditions against every
-// triangle of a mesh, and that nothing is ever passed through.
+// The proxy on rigid objects alone: depth and direction against closed forms, first-order conditions against
+// every triangle of a mesh, and that nothing is ever passed through.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -39,9 +39,14 @@ Scene scene_of(std::vector<hybrid::RigidDescription> rigid, double tool_radius) 
   return scene;
 }
 
-hybrid::RigidDescription object(const std::string& name, hybrid::RigidSource source, const dvec3& at = dvec3(0.0),
-                                const dvec3& axis = {0, 0, 1}, double degrees = 0.0) {
-  return {.name = name, .source = std::move(source), .pose = {at, glm::angleAxis(glm::radians(degrees), axis)}, .place = {}, .source_place = {}};
+hybrid::RigidDescription object(const std::string& name, hybrid::RigidSource source,
+                                const dvec3& at = dvec3(0.0), const dvec3& axis = {0, 0, 1},
+                                double degrees = 0.0) {
+  return {.name = name,
+          .source = std::move(source),
+          .pose = {at, glm::angleAxis(glm::radians(degrees), axis)},
+          .place = {},
+          .source_place = {}};
 }
 
 dvec3 random_direction(std::mt19937_64& random) {
@@ -75,7 +80,8 @@ TEST_F(RigidSweep, ABallPressesBackWithTheCouplingTimesTheDepth) {
   EXPECT_EQ(touch.state().faults, 0U);
 }
 
-// Every vertex lies on the sphere; a facet's middle lies deeper by at most edge²/(6R), which is the facets' allowance.
+// Every vertex lies on the sphere; a facet's middle lies deeper by at most edge²/(6R), which is the facets'
+// allowance.
 TEST_F(RigidSweep, ABallOfFacetsDoesSoWithinOnePercent) {
   const double radius = 0.02;
   const auto icosphere = polygon::make_ball_mesh(radius, 6);
@@ -102,7 +108,8 @@ class BoxContact : public RigidSweep, public ::testing::WithParamInterface<bool>
 TEST_P(BoxContact, FaceEdgeAndCorner) {
   const dvec3 half(0.03, 0.02, 0.01);
   const double r = 8e-3;
-  const auto box = GetParam() ? mesh("box", polygon::make_box_mesh(half, 8)) : object("box", hybrid::BoxPrimitive{2.0 * half});
+  const auto box = GetParam() ? mesh("box", polygon::make_box_mesh(half, 8))
+                              : object("box", hybrid::BoxPrimitive{2.0 * half});
   struct Case {
     dvec3 at, out;  // of the surface, and away from it
   };
@@ -117,9 +124,11 @@ TEST_P(BoxContact, FaceEdgeAndCorner) {
     touch.go({0, 0, 0.1}, 2e-3);
     touch.go(0.1 * glm::normalize(c.at + 0.05 * c.out), 2e-3);
     touch.go(c.at + 0.05 * c.out, 2e-3);
-    for (const double depth : {1e-3, 3e-3, 5e-3}) {  // less than r: the tool's centre stays outside, so the way out is c.out
+    for (const double depth :
+         {1e-3, 3e-3, 5e-3}) {  // less than r: the tool's centre stays outside, so the way out is c.out
       const TickResult felt = touch.go(c.at + (r - depth) * c.out, 1e-3, 2);
-      EXPECT_LE(glm::length(felt.force_N - kStiffness * depth * c.out), 1e-5 * kStiffness * depth) << c.at.x << ' ' << c.at.y << ' ' << c.at.z;
+      EXPECT_LE(glm::length(felt.force_N - kStiffness * depth * c.out), 1e-5 * kStiffness * depth)
+          << c.at.x << ' ' << c.at.y << ' ' << c.at.z;
     }
     touch.go(c.at + 0.05 * c.out, 2e-3);
     touch.go(0.1 * glm::normalize(c.at + 0.05 * c.out), 2e-3);
@@ -131,7 +140,8 @@ INSTANTIATE_TEST_SUITE_P(ExactAndOfTriangles, BoxContact, ::testing::Bool());
 class Sheet : public RigidSweep, public ::testing::WithParamInterface<bool> {
  protected:
   Scene sheet() const {
-    const auto plane = GetParam() ? mesh("sheet", polygon::make_plane_mesh(0.5, 40)) : object("sheet", hybrid::PlanePrimitive{1.0});
+    const auto plane = GetParam() ? mesh("sheet", polygon::make_plane_mesh(0.5, 40))
+                                  : object("sheet", hybrid::PlanePrimitive{1.0});
     return scene_of({plane}, 2e-3);
   }
 };
@@ -142,11 +152,13 @@ TEST_P(Sheet, StrokesAtTwoMetersASecondNeverGetThrough) {
   for (int n = 0; n < 40; ++n) {
     const double side = touch.state().proxy_m.z > 0.0 ? 1.0 : -1.0;
     const dvec3 to(place(random), place(random), -0.05 * side);
-    touch.go(to, 2e-3, 1, [&](const TickResult& felt) { ASSERT_GE(side * felt.proxy_m.z, 2e-3 * (1.0 - 1e-9)) << n; });
+    touch.go(to, 2e-3, 1,
+             [&](const TickResult& felt) { ASSERT_GE(side * felt.proxy_m.z, 2e-3 * (1.0 - 1e-9)) << n; });
     const TickResult pressed = touch.at(to);
     EXPECT_NEAR(pressed.force_N.z, side * kStiffness * 0.052, 1e-6);
     // Back up on its own side, and round the edge to the other one for the next stroke.
-    touch.go({place(random), place(random), 0.05 * side}, 2e-3, 1, [&](const TickResult& felt) { ASSERT_GT(side * felt.proxy_m.z, 0.0); });
+    touch.go({place(random), place(random), 0.05 * side}, 2e-3, 1,
+             [&](const TickResult& felt) { ASSERT_GT(side * felt.proxy_m.z, 0.0); });
     touch.go({0.6, 0.0, 0.05 * side}, 2e-3);
     touch.go({0.6, 0.0, -0.05 * side}, 2e-3);
     const TickResult other = touch.go({0.0, 0.0, -0.05 * side}, 2e-3);
@@ -224,14 +236,21 @@ TEST_F(RigidSweep, SizeAndPlaceOfTheSceneDoNotMatter) {
                                      {1e3, dvec3(0.0), 1e-12},
                                      {1.0, dvec3(1e6, -1e6, 1e6), 3e-8},
                                      {1e3, dvec3(1e6, 1e6, 1e6), 1e-10}}};
-  const std::array<dvec3, 8> path{{{0.03, 0.03, -3e-3}, {0.005, 0.03, -3e-3}, {-2e-3, -4e-3, -3e-3}, {-2e-3, 0.02, 0.01},
-                                   {0.05, 0.05, 0.05}, {-0.01, -0.01, -0.01}, {0.02, -1e-3, 0.03}, {0.03, 0.03, 0.03}}};
+  const std::array<dvec3, 8> path{{{0.03, 0.03, -3e-3},
+                                   {0.005, 0.03, -3e-3},
+                                   {-2e-3, -4e-3, -3e-3},
+                                   {-2e-3, 0.02, 0.01},
+                                   {0.05, 0.05, 0.05},
+                                   {-0.01, -0.01, -0.01},
+                                   {0.02, -1e-3, 0.03},
+                                   {0.03, 0.03, 0.03}}};
   for (const Where& w : places) {
     Touch touch(corner_scene(w.scale, w.offset), w.offset + w.scale * dvec3(0.03));
     for (const dvec3& to : path) {
       const TickResult felt = touch.go(w.offset + w.scale * to, 1e-3 * w.scale, 2);
       const dvec3 proxy = (felt.proxy_m - w.offset) / w.scale;
-      EXPECT_LE(glm::length(proxy - glm::max(to, dvec3(2e-3))), 1e-9 + 100.0 * w.rounding) << "scale " << w.scale << ", offset " << w.offset.x;
+      EXPECT_LE(glm::length(proxy - glm::max(to, dvec3(2e-3))), 1e-9 + 100.0 * w.rounding)
+          << "scale " << w.scale << ", offset " << w.offset.x;
     }
     EXPECT_EQ(touch.state().faults, 0U) << "scale " << w.scale << ", offset " << w.offset.x;
   }
@@ -250,9 +269,11 @@ TEST_F(RigidSweep, SizeAndPlaceOfTheSceneDoNotMatter) {
     EXPECT_EQ(touch.state().faults, 0U) << "scale " << w.scale << ", offset " << w.offset.x;
     if (!first) first = proxies;
     double worst = 0.0;
-    for (std::size_t n = 0; n < proxies.size(); ++n) worst = std::max(worst, glm::length(proxies[n] - (*first)[n]));
+    for (std::size_t n = 0; n < proxies.size(); ++n)
+      worst = std::max(worst, glm::length(proxies[n] - (*first)[n]));
     // A minimum in a shallow valley of facets moves by the root of what its planes moved by.
-    EXPECT_LE(worst, 1e-7 + std::sqrt(2.0 * 5e-3 * 100.0 * w.rounding)) << "scale " << w.scale << ", offset " << w.offset.x;
+    EXPECT_LE(worst, 1e-7 + std::sqrt(2.0 * 5e-3 * 100.0 * w.rounding))
+        << "scale " << w.scale << ", offset " << w.offset.x;
   }
 }
 
@@ -265,7 +286,8 @@ double unbalanced(const dvec3& pull, const std::vector<dvec3>& normals) {
     dvec3 right(0.0);
     for (std::size_t i = 0; i < s.size(); ++i) {
       right[static_cast<int>(i)] = glm::dot(normals[s[i]], pull);
-      for (std::size_t j = 0; j < s.size(); ++j) gram[static_cast<int>(j)][static_cast<int>(i)] = glm::dot(normals[s[i]], normals[s[j]]);
+      for (std::size_t j = 0; j < s.size(); ++j)
+        gram[static_cast<int>(j)][static_cast<int>(i)] = glm::dot(normals[s[i]], normals[s[j]]);
     }
     if (std::fabs(glm::determinant(gram)) < 1e-10) return;
     const dvec3 lambda = glm::inverse(gram) * right;
@@ -294,7 +316,8 @@ TEST_F(RigidSweep, FirstOrderConditionsHoldAgainstEveryTriangleAllAlongASlide) {
   double worst = 0.0, nearest = 1.0;
   for (int n = 0; n < 3000; ++n) {
     const double angle = 1e-3 * n;  // 23 mm/s, 2 mm deep; over faces, edges and corners
-    const dvec3 out(std::sin(angle) * std::cos(0.7 * angle), std::sin(angle) * std::sin(0.7 * angle), std::cos(angle));
+    const dvec3 out(std::sin(angle) * std::cos(0.7 * angle), std::sin(angle) * std::sin(0.7 * angle),
+                    std::cos(angle));
     const TickResult felt = touch.at(0.023 * out);
     std::vector<dvec3> normals;
     for (const auto& t : icosphere.triangles) {
@@ -304,16 +327,19 @@ TEST_F(RigidSweep, FirstOrderConditionsHoldAgainstEveryTriangleAllAlongASlide) {
       nearest = std::min(nearest, distance);
       if (distance > r + 1e-8) continue;
       const dvec3 normal = (felt.proxy_m - near.point) / distance;
-      const bool known = std::any_of(normals.begin(), normals.end(), [&](const dvec3& m) { return glm::length(m - normal) < 1e-9; });
+      const bool known = std::any_of(normals.begin(), normals.end(),
+                                     [&](const dvec3& m) { return glm::length(m - normal) < 1e-9; });
       if (!known) normals.push_back(normal);
     }
     worst = std::max(worst, unbalanced(felt.proxy_m - felt.device_m, normals));
   }
-  EXPECT_LE(worst, 1e-6);           // the proxy stands within a micrometer of its minimum
-  EXPECT_GE(nearest, r - 1e-11);    // and never nearer to any triangle
+  EXPECT_LE(worst, 1e-6);         // the proxy stands within a micrometer of its minimum
+  EXPECT_GE(nearest, r - 1e-11);  // and never nearer to any triangle
   EXPECT_EQ(touch.state().truncated_ticks, 0U);
   RecordProperty("worst_m", std::to_string(worst));
-  std::printf("first-order conditions: unbalanced by at most %.2e m, nearest triangle %.2e m inside the radius\n", worst, r - nearest);
+  std::printf(
+      "first-order conditions: unbalanced by at most %.2e m, nearest triangle %.2e m inside the radius\n",
+      worst, r - nearest);
 }
 
 TEST_F(RigidSweep, AFlatMeshIsFlatWhereverTheToolCrossesItsEdges) {

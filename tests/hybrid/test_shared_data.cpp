@@ -11,7 +11,8 @@
 #include <vector>
 
 #include "polygon/mesh_file.h"
-#include "shared_data.h"
+
+#include "tests/shared_data.h"
 #include "touch.h"
 
 namespace {
@@ -20,7 +21,8 @@ using glm::dvec3;
 using hybrid::TickResult;
 using tests::Touch;
 
-// ---- organs and bones --------------------------------------------------------------------------------------
+// ---- organs and bones
+// --------------------------------------------------------------------------------------
 
 class Abdomen : public tests::SceneFile {
  protected:
@@ -29,7 +31,8 @@ class Abdomen : public tests::SceneFile {
     const auto labels = (tests::shared_data("data/volumes") / "ts_ct_abdomen_3mm_labels.nii.gz").string();
     std::ostringstream text;
     text << "format = 1\n[tool]\nradius = 6\nstiffness = 800\n[material.organ]\nyoung = 4000\npoisson = 0.4\n"
-         << "[[rigid]]\nname = \"bones\"\nvolume = \"" << labels << "\"\nlabels = " << bones << "\nlargest = false\n"
+         << "[[rigid]]\nname = \"bones\"\nvolume = \"" << labels << "\"\nlabels = " << bones
+         << "\nlargest = false\n"
          << "[[soft]]\nname = \"organ\"\nvolume = \"" << labels << "\"\nlabels = " << organs
          << "\nmaterial = \"organ\"\nanchors = { faces = [\"-z\"], rigid_within = 5 }\n"
          << "[path]\nkind = \"press\"\nfrom = [0, 0, 5000]\nto = [0, 0, 4990]\n";
@@ -51,9 +54,10 @@ TEST_F(Abdomen, BonesAndOrgansOfACtAreFeltBoth) {
   struct Case {
     const char *name, *bones, *organs;
   };
-  for (const Case& c : {Case{"vertebrae L1 to L5 and the liver", "[27, 28, 29, 30, 31]", "[5]"},
-                        Case{"right ribs 8 to 12, liver and right kidney", "[111, 112, 113, 114, 115]", "[2, 5]"},
-                        Case{"sacrum and hips, and the bladder", "[25, 77, 78]", "[21]"}}) {
+  for (const Case& c :
+       {Case{"vertebrae L1 to L5 and the liver", "[27, 28, 29, 30, 31]", "[5]"},
+        Case{"right ribs 8 to 12, liver and right kidney", "[111, 112, 113, 114, 115]", "[2, 5]"},
+        Case{"sacrum and hips, and the bladder", "[25, 77, 78]", "[21]"}}) {
     SCOPED_TRACE(c.name);
     Touch touch(scene(c.bones, c.organs), {0, 0, 5});
     const auto& bone = touch.world().rigid.at(0);
@@ -72,8 +76,11 @@ TEST_F(Abdomen, BonesAndOrgansOfACtAreFeltBoth) {
     };
     // 150 ticks towards the outermost point of each, 4 mm deep and off again, from the left and the front.
     for (const dvec3& direction : {dvec3(1, 0, 0), dvec3(0, -1, 0)}) {
-      for (const dvec3& at : {outermost(bone.drawn, [&](const dvec3& v) { return bone.to_scene(v); }, direction),
-                              outermost(organ.drawn, [&](const dvec3& v) { return organ.to_scene(v); }, direction)}) {
+      for (const dvec3& at :
+           {outermost(
+                bone.drawn, [&](const dvec3& v) { return bone.to_scene(v); }, direction),
+            outermost(
+                organ.drawn, [&](const dvec3& v) { return organ.to_scene(v); }, direction)}) {
         touch.go({5, 5, 5}, 10.0);
         touch.go(at + 1.0 * direction, 10.0);
         touch.go(at + 0.02 * direction, 0.05, 40);  // in free space, however far it came
@@ -90,7 +97,8 @@ TEST_F(Abdomen, BonesAndOrgansOfACtAreFeltBoth) {
   }
 }
 
-// ---- meshes ------------------------------------------------------------------------------------------------
+// ---- meshes
+// ------------------------------------------------------------------------------------------------
 
 class Meshes : public tests::SceneFile {
  protected:
@@ -103,7 +111,8 @@ class Meshes : public tests::SceneFile {
     return all;
   }
 
-  // The mesh as a rigid object whose longest side is 0.2 m, and 200 ticks of a stroke to its middle, from above.
+  // The mesh as a rigid object whose longest side is 0.2 m, and 200 ticks of a stroke to its middle, from
+  // above.
   static void stroke(const std::filesystem::path& file) {
     const auto mesh = polygon::load_mesh(file).mesh;
     dvec3 low(1e300), high(-1e300);
@@ -117,7 +126,11 @@ class Meshes : public tests::SceneFile {
     const double unit = 0.2 / std::max({size.x, size.y, size.z});
     hybrid::Scene scene;
     scene.file = file;
-    scene.rigid.push_back({.name = "mesh", .source = hybrid::MeshSource{.file = file, .unit_m = unit}, .pose = {}, .place = {}, .source_place = {}});
+    scene.rigid.push_back({.name = "mesh",
+                           .source = hybrid::MeshSource{.file = file, .unit_m = unit},
+                           .pose = {},
+                           .place = {},
+                           .source_place = {}});
     const dvec3 middle = 0.5 * unit * (low + high);
     const dvec3 start(middle.x, middle.y, unit * high.z + 0.02);
     Touch touch(scene, start);
@@ -127,11 +140,14 @@ class Meshes : public tests::SceneFile {
       ASSERT_LE(glm::length(felt.force_N), touch.world().limits.max_force_N * (1.0 + 1e-12));
       // The proxy is where it can be nearest to the device: never further than where it started.
       ASSERT_LE(glm::length(felt.proxy_m - felt.device_m), glm::length(start - middle) + 1e-3);
-      if (felt.contacts == 0 && felt.proxy_m != felt.device_m) { ASSERT_LE(glm::length(felt.proxy_m - felt.device_m), 1e-9); }
+      if (felt.contacts == 0 && felt.proxy_m != felt.device_m) {
+        ASSERT_LE(glm::length(felt.proxy_m - felt.device_m), 1e-9);
+      }
     });
     EXPECT_EQ(touch.state().nonfinite, 0U);
     EXPECT_EQ(touch.state().faults & ~static_cast<std::uint32_t>(hybrid::fault_triangle_overflow), 0U);
-    if (touch.state().faults != 0) std::printf("faults of %s: %u\n", file.filename().c_str(), touch.state().faults);
+    if (touch.state().faults != 0)
+      std::printf("faults of %s: %u\n", file.filename().c_str(), touch.state().faults);
   }
 };
 
@@ -160,7 +176,11 @@ TEST_F(Meshes, ThatAreBadAreTouchedOrRefusedInWords) {
     // What the loader refuses the scene refuses too, and says where.
     hybrid::Scene scene;
     scene.file = "scene.toml";
-    scene.rigid.push_back({.name = "mesh", .source = hybrid::MeshSource{.file = file}, .pose = {}, .place = {}, .source_place = {7, 3}});
+    scene.rigid.push_back({.name = "mesh",
+                           .source = hybrid::MeshSource{.file = file},
+                           .pose = {},
+                           .place = {},
+                           .source_place = {7, 3}});
     try {
       (void)hybrid::build_scene(scene);
       ADD_FAILURE() << "not refused";

@@ -33,7 +33,8 @@ class Touch {
   hybrid::TickResult at(const glm::dvec3& device_m, double dt_s = 1e-3) {
     return hybrid::haptic_tick(world(), state(), {.position_m = device_m}, dt_s);
   }
-  // Straight from where the device is, one tick each `step_m`, then `hold` ticks there. `look` sees every tick.
+  // Straight from where the device is, one tick each `step_m`, then `hold` ticks there. `look` sees every
+  // tick.
   template <class Look>
   hybrid::TickResult go(const glm::dvec3& to_m, double step_m, int hold, Look&& look) {
     const glm::dvec3 from = state().device_m;
@@ -55,8 +56,12 @@ class Touch {
 };
 
 // What the coupling asks for before the limits.
-inline glm::dvec3 coupling(const hybrid::TickResult& tick) { return tick.rigid_N + tick.soft_N; }
+inline glm::dvec3 coupling(const hybrid::TickResult& tick) {
+  return tick.rigid_N + tick.soft_N;
+}
 
-inline bool finite(const glm::dvec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+inline bool finite(const glm::dvec3& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
 
 }  // namespace tests

@@ -20,7 +20,6 @@ using tests::made_of;
 using tests::voxel_at;
 using voxel::BodyPose;
 using voxel::Lattice;
-using voxel::PosedObject;
 using voxel::SoftObject;
 using voxel::VoxelId;
 

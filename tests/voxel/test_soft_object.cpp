@@ -14,10 +14,8 @@ namespace {
 
 using tests::elastic;
 using tests::SoftBlock;
-using tests::voxel_at;
 using voxel::LinkMaterial;
 using voxel::Reaction;
-using voxel::SoftObject;
 using voxel::ToolBound;
 using voxel::ToolInBody;
 using voxel::VoxelId;
