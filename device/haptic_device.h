@@ -9,9 +9,9 @@
 namespace device {
 
 struct DeviceState {
-  glm::dvec3 position_m{0.0};          // tool centre, scene frame, as the encoders tell it
-  glm::dvec3 velocity_m_per_s{0.0};    // the driver's own estimate
-  std::uint32_t buttons = 0;           // bit mask
+  glm::dvec3 position_m{0.0};        // tool centre, scene frame, as the encoders tell it
+  glm::dvec3 velocity_m_per_s{0.0};  // the driver's own estimate
+  std::uint32_t buttons = 0;         // bit mask
 };
 
 struct DeviceLimits {
@@ -32,7 +32,8 @@ class HapticDevice {
   virtual ~HapticDevice() = default;
 
   [[nodiscard]] virtual DeviceState read() noexcept = 0;
-  // The force on the hand (N, scene frame), held until the next write. A simulated device also advances by dt_s.
+  // The force on the hand (N, scene frame), held until the next write. A simulated device also advances by
+  // dt_s.
   virtual void write(const glm::dvec3& force_N, double dt_s) noexcept = 0;
   [[nodiscard]] virtual DeviceLimits limits() const noexcept = 0;
   [[nodiscard]] virtual std::string_view name() const noexcept = 0;

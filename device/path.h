@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Where a simulated hand wants the tool to be, over time: press, slide, waypoints, Lissajous or a CSV trajectory.
+// Where a simulated hand wants the tool to be, over time: press, slide, waypoints, Lissajous or a CSV
+// trajectory.
 #pragma once
 
 #include <filesystem>
@@ -48,9 +49,10 @@ struct LissajousPath {
   double duration_s = 10.0;
 };
 
-// Columns t, x, y, z of a CSV (also .gz), any rate, linear between samples; the first column of the header that begins
-// with "t", "x", "y", "z" (e.g. t_s, x_mm). The unit is taken from the header's suffix (_m, _cm, _mm, _um; time _s, _ms,
-// _us, _ns), else from `unit_m` (time: seconds). The first sample's time is taken as 0.
+// Columns t, x, y, z of a CSV (also .gz), any rate, linear between samples; the first column of the header
+// that begins with "t", "x", "y", "z" (e.g. t_s, x_mm). The unit is taken from the header's suffix (_m, _cm,
+// _mm, _um; time _s, _ms, _us, _ns), else from `unit_m` (time: seconds). The first sample's time is taken as
+// 0.
 struct CsvPath {
   std::filesystem::path file;
   double unit_m = 1.0;
@@ -59,7 +61,8 @@ struct CsvPath {
 
 using PathDescription = std::variant<PressPath, SlidePath, WaypointPath, LissajousPath, CsvPath>;
 
-// A path ready to be followed. position() is pure, allocates nothing and holds its ends before 0 and after duration.
+// A path ready to be followed. position() is pure, allocates nothing and holds its ends before 0 and after
+// duration.
 class Path {
  public:
   Path() = default;
@@ -74,8 +77,8 @@ class Path {
   [[nodiscard]] virtual const std::vector<std::string>& notes() const noexcept = 0;
 };
 
-// Throws PathError: speed not positive, no points, values not finite, CSV missing or malformed (file:line), time
-// running backwards.
+// Throws PathError: speed not positive, no points, values not finite, CSV missing or malformed (file:line),
+// time running backwards.
 std::unique_ptr<Path> make_path(const PathDescription& description);
 
 }  // namespace device

@@ -12,8 +12,8 @@ class ServoTimer {
   explicit ServoTimer(double period_s);
   // Asks for SCHED_FIFO and locked memory for the calling thread; says in words what was and was not granted.
   std::string raise_priority();
-  // Sleeps until the next period begins; returns how late this thread woke (unit: second). After a wake later than a whole
-  // period the missed periods are counted and skipped, not made up in a burst.
+  // Sleeps until the next period begins; returns how late this thread woke (unit: second). After a wake later
+  // than a whole period the missed periods are counted and skipped, not made up in a burst.
   double wait() noexcept;
   [[nodiscard]] std::uint64_t missed() const noexcept { return missed_; }
 

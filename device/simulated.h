@@ -17,15 +17,17 @@ enum class DeviceModel : std::uint8_t {
   touch,        // 3.3 N, 0.055 mm, 45 g, 0.26 N
 };
 
-struct HandModel {  // mass-damper-spring about the moving target; Hajian & Howe give 3.5–8.7 g, 4–7.4 N·s/m, 255–1255 N/m
+struct HandModel {  // mass-damper-spring about the moving target; Hajian & Howe give 3.5–8.7 g, 4–7.4 N·s/m,
+                    // 255–1255 N/m
   double mass_kg = 0.006;
   double damping_N_s_per_m = 5.0;
   double stiffness_N_per_m = 600.0;
 };
 
-// Apparent mass, viscous and Coulomb friction, encoder quantisation, force saturation. The mechanics are integrated
-// in fixed substeps of 0.02 ms, implicitly; Coulomb friction may stop but never reverse a motion. The tool starts at
-// rest at the path's first position. Throws std::invalid_argument: no path, a hand's figure below 0 or not finite.
+// Apparent mass, viscous and Coulomb friction, encoder quantisation, force saturation. The mechanics are
+// integrated in fixed substeps of 0.02 ms, implicitly; Coulomb friction may stop but never reverse a motion.
+// The tool starts at rest at the path's first position. Throws std::invalid_argument: no path, a hand's
+// figure below 0 or not finite.
 std::unique_ptr<HapticDevice> make_simulated_device(DeviceModel model, const HandModel& hand,
                                                     std::shared_ptr<const Path> path);
 

@@ -11,7 +11,7 @@ constexpr std::uint32_t kObstacleSlice = 256;  // surface voxels whose motion is
 constexpr int kObstacleQueries = 24;           // exact queries a tick
 constexpr float kMovedEnough = 0.25F;          // of the spacing: an obstacle is made anew beyond it
 constexpr std::uint32_t kPairSlice = 256;      // surface voxels looked up for a partner a tick
-constexpr double kPartAt = 1.25;               // a pair parts when further apart than this many touching distances
+constexpr double kPartAt = 1.25;  // a pair parts when further apart than this many touching distances
 constexpr int kPairSweeps = 2;
 
 struct NearestRigid {
@@ -20,7 +20,8 @@ struct NearestRigid {
   bool found = false;
 };
 
-NearestRigid nearest_rigid(const World& world, const WorldState& state, const glm::dvec3& point, double range) noexcept {
+NearestRigid nearest_rigid(const World& world, const WorldState& state, const glm::dvec3& point,
+                           double range) noexcept {
   NearestRigid best;
   const std::uint64_t mask = state.map.rigid_in(point - range, point + range);
   best.distance = range;
@@ -28,7 +29,8 @@ NearestRigid nearest_rigid(const World& world, const WorldState& state, const gl
     if ((mask & OccupancyMap::rigid_bit(o)) == 0) continue;
     const RigidObject& object = world.rigid[o];
     polygon::NearPoint near;
-    if (!object.surface->nearest(object.to_body(point), best.distance, near) || !(near.distance > 0.0)) continue;
+    if (!object.surface->nearest(object.to_body(point), best.distance, near) || !(near.distance > 0.0))
+      continue;
     best = {(point - object.to_scene(near.point)) / near.distance, near.distance, true};
   }
   return best;
@@ -88,7 +90,8 @@ void refresh_obstacles(const World& world, WorldState& state) noexcept {
       }
       voxel::Obstacle fresh = obstacle_of(body, object, v, near);
       const bool had = old.normal != glm::vec3(0.0F);
-      // A thin sheet seen from its other side: the voxel was squeezed through by rounding; its own side stands.
+      // A thin sheet seen from its other side: the voxel was squeezed through by rounding; its own side
+      // stands.
       if (had && glm::dot(old.normal, fresh.normal) < 0.0F) return;
       // A voxel that overlaps may not be thrown out at once: the depth it has stays.
       fresh.bound = std::min(fresh.bound, glm::dot(fresh.normal, u));
@@ -153,7 +156,8 @@ void relax_pairs(const World& world, WorldState& state) noexcept {
       const VoxelPair pair = state.pairs[i];
       const auto [ia, ib] = world.meeting[pair.meeting];
       voxel::SoftObject &a = *state.soft[ia], &b = *state.soft[ib];
-      const double gap = voxel::relax_pair({a, world.soft[ia].pose}, pair.a, {b, world.soft[ib].pose}, pair.b);
+      const double gap =
+          voxel::relax_pair({a, world.soft[ia].pose}, pair.a, {b, world.soft[ib].pose}, pair.b);
       if (sweep > 0 || gap < (kPartAt - 1.0) * (a.voxel_radius() + b.voxel_radius())) {
         ++i;
         continue;
@@ -163,8 +167,9 @@ void relax_pairs(const World& world, WorldState& state) noexcept {
       state.pairs.pop_back();
       a.release(pair.a);
       // The partner may be pressed by another voxel still.
-      const bool still = std::any_of(state.pairs.begin(), state.pairs.end(),
-                                     [&](const VoxelPair& p) { return p.meeting == pair.meeting && p.b == pair.b; });
+      const bool still = std::any_of(state.pairs.begin(), state.pairs.end(), [&](const VoxelPair& p) {
+        return p.meeting == pair.meeting && p.b == pair.b;
+      });
       if (!still) b.release(pair.b);
     }
   }

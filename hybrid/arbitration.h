@@ -9,15 +9,15 @@ namespace hybrid {
 // How near a rigid surface must be to a surface voxel, in spacings, to become its obstacle.
 inline constexpr double kObstacleRange = 4.0;
 
-// On load: gives every surface voxel near a rigid surface the half-space it may not leave. At rest nothing presses: a voxel that
-// already overlaps keeps the depth it has. Returns how many voxels have one.
+// On load: gives every surface voxel near a rigid surface the half-space it may not leave. At rest nothing
+// presses: a voxel that already overlaps keeps the depth it has. Returns how many voxels have one.
 std::size_t find_obstacles(const World& world, WorldState& state, std::size_t soft);
 
 // In the tick: looks again at the rigid surface near voxels that moved since; a bounded slice a tick.
 void refresh_obstacles(const World& world, WorldState& state) noexcept;
 
-// In the tick: finds pairs of voxels of different objects that meet (a slice of the surface a tick), relaxes all pairs,
-// and lets go of those that parted.
+// In the tick: finds pairs of voxels of different objects that meet (a slice of the surface a tick), relaxes
+// all pairs, and lets go of those that parted.
 void relax_pairs(const World& world, WorldState& state) noexcept;
 
 }  // namespace hybrid

@@ -19,10 +19,11 @@
 namespace hybrid {
 namespace {
 
-constexpr int kSurfaceSmoothing = 6;           // of a soft object's drawn surface
-constexpr double kMostCells = 512.0;           // cells along the scene's longest side, at most, unless the scene says otherwise
-constexpr std::size_t kMapReserve = 2048;      // bricks that motion may add
-constexpr double kFarthestLook = 32.0;         // spacings that one distance query may clear of carving
+constexpr int kSurfaceSmoothing = 6;  // of a soft object's drawn surface
+constexpr double kMostCells =
+    512.0;  // cells along the scene's longest side, at most, unless the scene says otherwise
+constexpr std::size_t kMapReserve = 2048;  // bricks that motion may add
+constexpr double kFarthestLook = 32.0;     // spacings that one distance query may clear of carving
 
 struct Box {
   glm::dvec3 low{1e300}, high{-1e300};
@@ -44,7 +45,8 @@ auto at_place(const Scene& scene, SourcePlace place, const std::string& name, St
   } catch (const SceneError&) {
     throw;
   } catch (const std::bad_alloc&) {
-    refuse(scene, place, fmt::format("\"{}\" does not fit in memory; give it a coarser spacing or a smaller part", name));
+    refuse(scene, place,
+           fmt::format("\"{}\" does not fit in memory; give it a coarser spacing or a smaller part", name));
   } catch (const std::exception& e) {
     refuse(scene, place, fmt::format("\"{}\": {}", name, e.what()));
   }
@@ -54,13 +56,15 @@ double choose_cell(const Scene& scene, const Box& box, double soft_spacing) {
   const glm::dvec3 size = box.high - box.low;
   const double longest = std::max({size.x, size.y, size.z});
   if (scene.occupancy_cell_m) {
-    // A flat sheet's worth of cells on each side is what surfaces take, a brick of 2.6 kB each in the worst case.
+    // A flat sheet's worth of cells on each side is what surfaces take, a brick of 2.6 kB each in the worst
+    // case.
     const double across = longest / *scene.occupancy_cell_m;
     const double bytes = 6.0 * across * across / 64.0 * 2600.0;
     if (bytes > 0.25 * static_cast<double>(usable_memory_bytes())) {
-      refuse(scene, {}, fmt::format("an occupancy cell of {:.3g} m over a scene of {:.3g} m needs about {:.1f} GB; "
-                                    "use a larger [occupancy] cell or leave it out",
-                                    *scene.occupancy_cell_m, longest, bytes / 1e9));
+      refuse(scene, {},
+             fmt::format("an occupancy cell of {:.3g} m over a scene of {:.3g} m needs about {:.1f} GB; "
+                         "use a larger [occupancy] cell or leave it out",
+                         *scene.occupancy_cell_m, longest, bytes / 1e9));
     }
     return *scene.occupancy_cell_m;
   }
@@ -68,8 +72,10 @@ double choose_cell(const Scene& scene, const Box& box, double soft_spacing) {
   return std::max(wanted, longest / kMostCells);
 }
 
-// Long triangles are halved until each spans few cells: else the box of an oblique one would be all there is to look at.
-void rasterise(OccupancyMap& map, std::uint32_t object, const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
+// Long triangles are halved until each spans few cells: else the box of an oblique one would be all there is
+// to look at.
+void rasterise(OccupancyMap& map, std::uint32_t object, const glm::dvec3& a, const glm::dvec3& b,
+               const glm::dvec3& c) {
   const double ab = glm::length(b - a), bc = glm::length(c - b), ca = glm::length(a - c);
   const double longest = std::max({ab, bc, ca});
   if (longest <= 8.0 * map.cell_m()) {
@@ -97,14 +103,16 @@ RigidDistance rigid_distance(const std::vector<RigidObject>& rigid, const glm::d
     polygon::NearPoint near;
     if (object.surface->nearest(in_body, result.distance, near)) result.distance = near.distance;
     const glm::dvec3 low = object.surface->lower(), high = object.surface->upper();
-    const bool within = glm::all(glm::greaterThanEqual(in_body, low)) && glm::all(glm::lessThanEqual(in_body, high));
+    const bool within =
+        glm::all(glm::greaterThanEqual(in_body, low)) && glm::all(glm::lessThanEqual(in_body, high));
     result.inside = result.inside || (within && object.surface->inside(in_body));
   }
   return result;
 }
 
-// Takes out voxels that lie in a rigid solid or nearer than half a spacing to a rigid surface, so that nothing is felt
-// before contact; and gathers those within `anchor_m`, which bone will hold. Returns how many were carved.
+// Takes out voxels that lie in a rigid solid or nearer than half a spacing to a rigid surface, so that
+// nothing is felt before contact; and gathers those within `anchor_m`, which bone will hold. Returns how many
+// were carved.
 std::size_t carve_by_rigid(const std::vector<RigidObject>& rigid, voxel::LabelVolume& volume, double anchor_m,
                            std::vector<std::size_t>& anchored) {
   const double h = std::min({volume.spacing_m.x, volume.spacing_m.y, volume.spacing_m.z});
@@ -116,8 +124,8 @@ std::size_t carve_by_rigid(const std::vector<RigidObject>& rigid, voxel::LabelVo
         if (volume.labels[volume.index(i, j, k)] == 0) continue;
         const glm::dvec3 p = volume.origin_m + volume.rotation * (glm::dvec3(i, j, k) * volume.spacing_m);
         const RigidDistance near = rigid_distance(rigid, p, clear + kFarthestLook * h);
-        // Everything nearer to p than the surface lies on the same side of it: voxels of the row that are further from
-        // it than `clear` need no look of their own.
+        // Everything nearer to p than the surface lies on the same side of it: voxels of the row that are
+        // further from it than `clear` need no look of their own.
         const int run = std::max(0, static_cast<int>((near.distance - clear) / volume.spacing_m.x));
         const int last = std::min(volume.dims[0] - 1, i + run);
         for (; i <= last; ++i) {
@@ -147,11 +155,15 @@ std::size_t carve_by_soft(voxel::LabelVolume& first, const voxel::LabelVolume& l
       for (int i = 0; i < first.dims[0]; ++i) {
         std::uint8_t& label = first.labels[first.index(i, j, k)];
         if (label == 0) continue;
-        const glm::dvec3 c = glm::round((shift + to_later * (glm::dvec3(i, j, k) * first.spacing_m)) / later.spacing_m);
+        const glm::dvec3 c =
+            glm::round((shift + to_later * (glm::dvec3(i, j, k) * first.spacing_m)) / later.spacing_m);
         bool within = true;
-        for (int d = 0; d < 3; ++d) within = within && c[d] >= 0.0 && c[d] < later.dims[static_cast<std::size_t>(d)];
+        for (int d = 0; d < 3; ++d)
+          within = within && c[d] >= 0.0 && c[d] < later.dims[static_cast<std::size_t>(d)];
         if (!within) continue;
-        if (later.labels[later.index(static_cast<int>(c.x), static_cast<int>(c.y), static_cast<int>(c.z))] == 0) continue;
+        if (later.labels[later.index(static_cast<int>(c.x), static_cast<int>(c.y), static_cast<int>(c.z))] ==
+            0)
+          continue;
         label = 0;
         ++carved;
       }
@@ -167,7 +179,8 @@ class Builder {
   BuiltScene build() {
     const auto start = std::chrono::steady_clock::now();
     if (scene_.tool.shape == Tool::Shape::punch && !scene_.rigid.empty()) {
-      refuse(scene_, scene_.rigid.front().place, "a punch against rigid objects is not supported yet; use [tool] shape = \"ball\"");
+      refuse(scene_, scene_.rigid.front().place,
+             "a punch against rigid objects is not supported yet; use [tool] shape = \"ball\"");
     }
     for (const RigidDescription& d : scene_.rigid) add_rigid(d);
     for (const SoftDescription& d : scene_.soft) read_soft(d);
@@ -178,8 +191,9 @@ class Builder {
     for (std::size_t o = 0; o < built_.state->soft.size() && !world_->rigid.empty(); ++o) {
       const std::size_t near = find_obstacles(*world_, *built_.state, o);
       if (near == 0) continue;
-      built_.notes.push_back({world_->soft[o].name, polygon::Severity::info,
-                              fmt::format("{} surface voxels lie near rigid objects, which will stop them", near)});
+      built_.notes.push_back(
+          {world_->soft[o].name, polygon::Severity::info,
+           fmt::format("{} surface voxels lie near rigid objects, which will stop them", near)});
     }
     built_.world = std::move(world_);
     built_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -204,11 +218,11 @@ class Builder {
       volumes_.push_back(build_volume(d, built_.notes));
       const std::uint64_t bytes = soft_volume_bytes(volumes_.back().dims);
       if (bytes > usable_memory_bytes()) {
-        throw std::runtime_error(fmt::format("a lattice of {} x {} x {} voxels needs about {:.1f} GB and this machine has "
-                                             "{:.1f} GB; give it a coarser spacing",
-                                             volumes_.back().dims[0], volumes_.back().dims[1], volumes_.back().dims[2],
-                                             static_cast<double>(bytes) / 1e9,
-                                             static_cast<double>(usable_memory_bytes()) / 1e9));
+        throw std::runtime_error(
+            fmt::format("a lattice of {} x {} x {} voxels needs about {:.1f} GB and this machine has "
+                        "{:.1f} GB; give it a coarser spacing",
+                        volumes_.back().dims[0], volumes_.back().dims[1], volumes_.back().dims[2],
+                        static_cast<double>(bytes) / 1e9, static_cast<double>(usable_memory_bytes()) / 1e9));
       }
     });
   }
@@ -232,10 +246,12 @@ class Builder {
   void note_carved(const SoftDescription& d, std::size_t carved, const std::string& by) {
     if (carved == 0) return;
     if (scene_.overlap == Overlap::refuse) {
-      refuse(scene_, d.place, fmt::format("\"{}\" overlaps {} in {} voxels; move one of them, or say overlap = \"carve\"",
-                                          d.name, by, carved));
+      refuse(scene_, d.place,
+             fmt::format("\"{}\" overlaps {} in {} voxels; move one of them, or say overlap = \"carve\"",
+                         d.name, by, carved));
     }
-    built_.notes.push_back({d.name, polygon::Severity::info, fmt::format("{} voxels carved where {} lie", carved, by)});
+    built_.notes.push_back(
+        {d.name, polygon::Severity::info, fmt::format("{} voxels carved where {} lie", carved, by)});
   }
 
   void make_lattices() {
@@ -245,8 +261,12 @@ class Builder {
       at_place(scene_, d.source_place, d.name, [&] {
         voxel::LatticeOptions options = lattice_options(scene_, d);
         options.anchor_voxels = anchored_[o];
-        soft_.push_back(std::make_unique<voxel::SoftObject>(std::make_unique<voxel::Lattice>(volumes_[o], options)));
-        SoftBody body{.name = d.name, .pose = {volumes_[o].origin_m, volumes_[o].rotation}, .budget = d.budget, .drawn = {}};
+        soft_.push_back(
+            std::make_unique<voxel::SoftObject>(std::make_unique<voxel::Lattice>(volumes_[o], options)));
+        SoftBody body{.name = d.name,
+                      .pose = {volumes_[o].origin_m, volumes_[o].rotation},
+                      .budget = d.budget,
+                      .drawn = {}};
         body.drawn = surface_from_labels(volumes_[o], kSurfaceSmoothing);
         for (const glm::dvec3& v : body.drawn.vertices) box_.add(body.to_scene(v));
         world_->soft.push_back(std::move(body));
@@ -267,8 +287,8 @@ class Builder {
     for (std::uint32_t o = 0; o < world_->rigid.size(); ++o) {
       const RigidObject& object = world_->rigid[o];
       for (const polygon::TriangleIndices& t : object.drawn.triangles) {
-        rasterise(*map_, o, object.to_scene(object.drawn.vertices[t[0]]), object.to_scene(object.drawn.vertices[t[1]]),
-                  object.to_scene(object.drawn.vertices[t[2]]));
+        rasterise(*map_, o, object.to_scene(object.drawn.vertices[t[0]]),
+                  object.to_scene(object.drawn.vertices[t[1]]), object.to_scene(object.drawn.vertices[t[2]]));
       }
     }
     for (std::size_t o = 0; o < soft_.size(); ++o) {
@@ -335,11 +355,14 @@ void WorldState::prepare(const World& world) {
   pairs.reserve(world.meeting.empty() ? 0 : kMaxPairs);
 }
 
-BuiltScene build_scene(const Scene& scene, const Progress& progress) { return Builder(scene, progress).build(); }
+BuiltScene build_scene(const Scene& scene, const Progress& progress) {
+  return Builder(scene, progress).build();
+}
 
 std::uint64_t usable_memory_bytes() {
   const long pages = sysconf(_SC_PHYS_PAGES), size = sysconf(_SC_PAGE_SIZE);
-  return pages > 0 && size > 0 ? static_cast<std::uint64_t>(pages) * static_cast<std::uint64_t>(size) : 4ULL << 30;
+  return pages > 0 && size > 0 ? static_cast<std::uint64_t>(pages) * static_cast<std::uint64_t>(size)
+                               : 4ULL << 30;
 }
 
 DrawnScene drawn_scene(const World& world, const std::string& title) {

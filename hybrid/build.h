@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// From a scene as written to a world that can be touched: files read, surfaces built, overlaps carved, map filled.
+// From a scene as written to a world that can be touched: files read, surfaces built, overlaps carved, map
+// filled.
 #pragma once
 
 #include <array>
@@ -22,19 +23,20 @@ struct BuildNote {
 
 struct BuiltScene {
   std::unique_ptr<const World> world;
-  std::unique_ptr<WorldState> state;   // at rest, not started: see start_proxy()
-  std::vector<BuildNote> notes;        // what a person should know: findings, repairs, voxels carved
+  std::unique_ptr<WorldState> state;  // at rest, not started: see start_proxy()
+  std::vector<BuildNote> notes;       // what a person should know: findings, repairs, voxels carved
   double seconds = 0.0;
 };
 
 // `progress` is told what begins, in words; may be empty.
 using Progress = std::function<void(const std::string&)>;
 
-// Throws SceneError: a file that cannot be used, nothing left after carving, too large for the memory (with the
-// numbers, before it is allocated), objects that overlap where the scene asks to refuse that.
+// Throws SceneError: a file that cannot be used, nothing left after carving, too large for the memory (with
+// the numbers, before it is allocated), objects that overlap where the scene asks to refuse that.
 BuiltScene build_scene(const Scene& scene, const Progress& progress = {});
 
-// Fixed surfaces for graphics; and what moves, filled in place (no allocation once its vectors have their size).
+// Fixed surfaces for graphics; and what moves, filled in place (no allocation once its vectors have their
+// size).
 DrawnScene drawn_scene(const World& world, const std::string& title);
 void fill_soft_vertices(const World& world, const WorldState& state, Snapshot& snapshot);
 

@@ -18,26 +18,33 @@
 namespace hybrid {
 namespace {
 
-constexpr int kBallSubdivisions = 4;  // 5,120 triangles: for drawing and the map only, contact is exact
+constexpr int kBallSubdivisions = 4;     // 5,120 triangles: for drawing and the map only, contact is exact
 constexpr double kLatticeBytes = 130.0;  // a lattice cell with its springs, state and coarse levels
 
-std::string in_words(const polygon::Finding& f) { return fmt::format("{}: {} {}", f.id, f.count, f.text); }
+std::string in_words(const polygon::Finding& f) {
+  return fmt::format("{}: {} {}", f.id, f.count, f.text);
+}
 
-void add_findings(const std::string& object, const std::vector<polygon::Finding>& findings, std::vector<BuildNote>& notes) {
+void add_findings(const std::string& object, const std::vector<polygon::Finding>& findings,
+                  std::vector<BuildNote>& notes) {
   for (const polygon::Finding& f : findings) notes.push_back({object, f.severity, in_words(f)});
 }
 
-polygon::TriangleMesh read_mesh(const std::string& object, const MeshSource& source, std::vector<BuildNote>& notes) {
-  polygon::MeshFile file = polygon::load_mesh(source.file, {.scale = source.unit_m, .max_bytes = usable_memory_bytes() / 4});
+polygon::TriangleMesh read_mesh(const std::string& object, const MeshSource& source,
+                                std::vector<BuildNote>& notes) {
+  polygon::MeshFile file =
+      polygon::load_mesh(source.file, {.scale = source.unit_m, .max_bytes = usable_memory_bytes() / 4});
   add_findings(object, file.findings, notes);
   if (!source.repair) return std::move(file.mesh);
   polygon::RepairedMesh repaired = polygon::repair_mesh(file.mesh);
   add_findings(object, repaired.changes, notes);
-  if (repaired.mesh.empty()) throw std::runtime_error("repair left no triangle of this mesh; look at it with `hybrid check`");
+  if (repaired.mesh.empty())
+    throw std::runtime_error("repair left no triangle of this mesh; look at it with `hybrid check`");
   return std::move(repaired.mesh);
 }
 
-RigidObject mesh_object(const RigidDescription& d, polygon::TriangleMesh mesh, std::vector<BuildNote>& notes) {
+RigidObject mesh_object(const RigidDescription& d, polygon::TriangleMesh mesh,
+                        std::vector<BuildNote>& notes) {
   const polygon::MeshCheck check = polygon::check_mesh(mesh);
   for (const polygon::Finding& f : check.findings) {
     if (f.severity != polygon::Severity::info) notes.push_back({d.name, f.severity, in_words(f)});
@@ -52,7 +59,8 @@ voxel::VolumeFileOptions volume_options(const std::vector<voxel::LabelRule>& rul
   return {.unit_m = unit_m, .rules = rules, .spacing_m = spacing, .max_bytes = usable_memory_bytes() / 4};
 }
 
-RigidObject volume_surface_object(const RigidDescription& d, const VolumeSurfaceSource& s, std::vector<BuildNote>& notes) {
+RigidObject volume_surface_object(const RigidDescription& d, const VolumeSurfaceSource& s,
+                                  std::vector<BuildNote>& notes) {
   const std::optional<glm::dvec3> spacing =
       s.spacing_m ? std::optional<glm::dvec3>(glm::dvec3(*s.spacing_m)) : std::nullopt;
   voxel::LabelVolume volume = voxel::load_volume(s.file, volume_options(s.rules, s.unit_m, spacing));
@@ -60,10 +68,14 @@ RigidObject volume_surface_object(const RigidDescription& d, const VolumeSurface
   if (s.grow_m > 0.0) volume = grow_labels(volume, s.grow_m);
   polygon::TriangleMesh mesh = surface_from_labels(volume, s.smooth);
   const Pose frame{d.pose.position_m + d.pose.rotation * volume.origin_m, d.pose.rotation * volume.rotation};
-  if (mesh.empty()) throw std::runtime_error("no voxel of the volume is in the given labels or range; `hybrid check` lists what it holds");
+  if (mesh.empty())
+    throw std::runtime_error(
+        "no voxel of the volume is in the given labels or range; `hybrid check` lists what it holds");
   if (!s.cuts.empty()) {
     mesh = cut_mesh(mesh, frame, s.cuts);
-    if (mesh.empty()) throw std::runtime_error("the cuts leave nothing of this surface; a cut removes the side its normal points to");
+    if (mesh.empty())
+      throw std::runtime_error(
+          "the cuts leave nothing of this surface; a cut removes the side its normal points to");
   }
   RigidDescription placed = d;
   placed.pose = frame;
@@ -78,15 +90,20 @@ struct RigidBuilder {
   const RigidDescription& d;
   std::vector<BuildNote>& notes;
 
-  RigidObject operator()(const MeshSource& s) const { return mesh_object(d, read_mesh(d.name, s, notes), notes); }
+  RigidObject operator()(const MeshSource& s) const {
+    return mesh_object(d, read_mesh(d.name, s, notes), notes);
+  }
   RigidObject operator()(const BallPrimitive& s) const {
-    return {d.name, polygon::make_ball_surface(s.radius_m), d.pose, polygon::make_ball_mesh(s.radius_m, kBallSubdivisions)};
+    return {d.name, polygon::make_ball_surface(s.radius_m), d.pose,
+            polygon::make_ball_mesh(s.radius_m, kBallSubdivisions)};
   }
   RigidObject operator()(const BoxPrimitive& s) const {
-    return {d.name, polygon::make_box_surface(0.5 * s.size_m), d.pose, polygon::make_box_mesh(0.5 * s.size_m, 8)};
+    return {d.name, polygon::make_box_surface(0.5 * s.size_m), d.pose,
+            polygon::make_box_mesh(0.5 * s.size_m, 8)};
   }
   RigidObject operator()(const PlanePrimitive& s) const {
-    return {d.name, polygon::make_plane_surface(0.5 * s.size_m), d.pose, polygon::make_plane_mesh(0.5 * s.size_m, 16)};
+    return {d.name, polygon::make_plane_surface(0.5 * s.size_m), d.pose,
+            polygon::make_plane_mesh(0.5 * s.size_m, 16)};
   }
   RigidObject operator()(const CapsulePrimitive& s) const {
     return {d.name, polygon::make_capsule_surface(s.radius_m, 0.5 * s.length_m), d.pose,
@@ -107,7 +124,9 @@ struct VolumeBuilder {
   voxel::LabelVolume operator()(const ClosedMeshSource& s) const {
     return voxelise_mesh(read_mesh(d.name, s.mesh, notes), s.spacing_m, 1, max_lattice_voxels());
   }
-  voxel::LabelVolume operator()(const voxel::Formula& s) const { return voxel::make_volume(s, max_lattice_voxels()); }
+  voxel::LabelVolume operator()(const voxel::Formula& s) const {
+    return voxel::make_volume(s, max_lattice_voxels());
+  }
 };
 
 }  // namespace
@@ -134,7 +153,8 @@ std::uint64_t soft_volume_bytes(const std::array<int, 3>& dims) {
   return static_cast<std::uint64_t>(cells * kLatticeBytes);
 }
 
-polygon::TriangleMesh cut_mesh(const polygon::TriangleMesh& mesh, const Pose& to_scene, const std::vector<CutPlane>& cuts) {
+polygon::TriangleMesh cut_mesh(const polygon::TriangleMesh& mesh, const Pose& to_scene,
+                               const std::vector<CutPlane>& cuts) {
   polygon::TriangleMesh result = mesh;
   for (const CutPlane& cut : cuts) {
     const glm::dvec3 normal = glm::normalize(cut.normal);
@@ -155,10 +175,12 @@ polygon::TriangleMesh cut_mesh(const polygon::TriangleMesh& mesh, const Pose& to
     };
     const auto cross = [&](std::uint32_t a, std::uint32_t b) {
       const auto key = std::minmax(a, b);
-      const auto [at, fresh] = crossings.try_emplace({key.first, key.second}, static_cast<std::uint32_t>(kept.vertices.size()));
+      const auto [at, fresh] =
+          crossings.try_emplace({key.first, key.second}, static_cast<std::uint32_t>(kept.vertices.size()));
       if (fresh) {
         const double t = heights[key.first] / (heights[key.first] - heights[key.second]);
-        kept.vertices.push_back(result.vertices[key.first] + t * (result.vertices[key.second] - result.vertices[key.first]));
+        kept.vertices.push_back(result.vertices[key.first] +
+                                t * (result.vertices[key.second] - result.vertices[key.first]));
       }
       return at->second;
     };
@@ -168,9 +190,11 @@ polygon::TriangleMesh cut_mesh(const polygon::TriangleMesh& mesh, const Pose& to
       for (std::size_t e = 0; e < 3; ++e) {
         const std::uint32_t a = t[e], b = t[(e + 1) % 3];
         if (heights[a] <= 0.0) corner[corners++] = keep(a);
-        if ((heights[a] < 0.0 && heights[b] > 0.0) || (heights[a] > 0.0 && heights[b] < 0.0)) corner[corners++] = cross(a, b);
+        if ((heights[a] < 0.0 && heights[b] > 0.0) || (heights[a] > 0.0 && heights[b] < 0.0))
+          corner[corners++] = cross(a, b);
       }
-      for (std::uint32_t c = 2; c < corners; ++c) kept.triangles.push_back({corner[0], corner[c - 1], corner[c]});
+      for (std::uint32_t c = 2; c < corners; ++c)
+        kept.triangles.push_back({corner[0], corner[c - 1], corner[c]});
     }
     result = std::move(kept);
   }

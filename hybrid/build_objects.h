@@ -14,7 +14,8 @@ RigidObject build_rigid(const RigidDescription& description, std::vector<BuildNo
 voxel::LabelVolume build_volume(const SoftDescription& description, std::vector<BuildNote>& notes);
 
 // The part of a mesh that none of the planes cuts away, clipped exactly; `to_scene` places the mesh.
-polygon::TriangleMesh cut_mesh(const polygon::TriangleMesh& mesh, const Pose& to_scene, const std::vector<CutPlane>& cuts);
+polygon::TriangleMesh cut_mesh(const polygon::TriangleMesh& mesh, const Pose& to_scene,
+                               const std::vector<CutPlane>& cuts);
 
 // Options of the lattice by the scene's materials and the object's own anchors.
 voxel::LatticeOptions lattice_options(const Scene& scene, const SoftDescription& description);

@@ -26,7 +26,8 @@ Depth depth_in_box(const glm::dvec3& p, const glm::dvec3& h) {
 double tissue_force(const ClosedForm& form, const Tool& tool, double indentation) {
   const double modulus = form.young_Pa / (1.0 - form.poisson * form.poisson);
   if (tool.shape == Tool::Shape::punch) return 2.0 * tool.radius_m * modulus * indentation;
-  const double curvature = 1.0 / tool.radius_m + (form.shape == ClosedForm::Shape::ball ? 1.0 / form.half_size_m.x : 0.0);
+  const double curvature =
+      1.0 / tool.radius_m + (form.shape == ClosedForm::Shape::ball ? 1.0 / form.half_size_m.x : 0.0);
   return 4.0 / 3.0 * modulus * std::sqrt(1.0 / curvature) * std::pow(indentation, 1.5);
 }
 
@@ -51,10 +52,16 @@ std::optional<ClosedForm> closed_form_of(const Scene& scene, const SoftDescripti
   if (formula == nullptr) return std::nullopt;
   const auto material = scene.materials.find(soft.material);
   const Material m = material == scene.materials.end() ? Material{} : material->second;
-  ClosedForm form{.pose = soft.pose, .half_size_m = 0.5 * formula->size_m, .young_Pa = m.young_Pa, .poisson = m.poisson,
-                  .caveat = "half-space: small strain, no chain limit, the object much larger than the contact"};
-  form.shape = formula->shape == voxel::Formula::Shape::ball ? ClosedForm::Shape::ball : ClosedForm::Shape::box;
-  if (!formula->layers.empty() || !formula->inclusions.empty()) form.caveat += "; layers and inclusions left out";
+  ClosedForm form{
+      .pose = soft.pose,
+      .half_size_m = 0.5 * formula->size_m,
+      .young_Pa = m.young_Pa,
+      .poisson = m.poisson,
+      .caveat = "half-space: small strain, no chain limit, the object much larger than the contact"};
+  form.shape =
+      formula->shape == voxel::Formula::Shape::ball ? ClosedForm::Shape::ball : ClosedForm::Shape::box;
+  if (!formula->layers.empty() || !formula->inclusions.empty())
+    form.caveat += "; layers and inclusions left out";
   return form;
 }
 

@@ -29,7 +29,8 @@ const char* word(polygon::Severity severity) {
 }
 
 void add_finding(Json& file, const polygon::Finding& f) {
-  file["findings"].push_back({{"id", f.id}, {"severity", word(f.severity)}, {"count", f.count}, {"text", f.text}});
+  file["findings"].push_back(
+      {{"id", f.id}, {"severity", word(f.severity)}, {"count", f.count}, {"text", f.text}});
 }
 
 // A mesh's findings are worded to follow their count.
@@ -40,7 +41,8 @@ void add_counted(Json& file, polygon::Finding f) {
 
 void check_mesh_file(const std::filesystem::path& path, const CheckCommand& command, Json& file) {
   file["kind"] = "mesh";
-  const polygon::MeshFile loaded = polygon::load_mesh(path, {.scale = command.unit_m, .max_bytes = usable_memory_bytes() / 4});
+  const polygon::MeshFile loaded =
+      polygon::load_mesh(path, {.scale = command.unit_m, .max_bytes = usable_memory_bytes() / 4});
   const polygon::MeshCheck checked = polygon::check_mesh(loaded.mesh, command.deep);
   for (const polygon::Finding& f : loaded.findings) add_counted(file, f);
   for (const polygon::Finding& f : checked.findings) add_counted(file, f);
@@ -54,9 +56,11 @@ void check_mesh_file(const std::filesystem::path& path, const CheckCommand& comm
   file["upper_m"] = {high.x, high.y, high.z};
   file["volume_m3"] = checked.volume_m3;
   file["touch_bytes"] = surface->memory_bytes();
-  file["summary"] = fmt::format("{} vertices, {} triangles, {:.4g} x {:.4g} x {:.4g} m, {}; {:.1f} MB to touch",
-                                loaded.mesh.vertices.size(), loaded.mesh.triangles.size(), high.x - low.x, high.y - low.y, high.z - low.z,
-                                checked.oriented ? "a closed solid" : "a two-sided sheet", static_cast<double>(surface->memory_bytes()) / 1e6);
+  file["summary"] =
+      fmt::format("{} vertices, {} triangles, {:.4g} x {:.4g} x {:.4g} m, {}; {:.1f} MB to touch",
+                  loaded.mesh.vertices.size(), loaded.mesh.triangles.size(), high.x - low.x, high.y - low.y,
+                  high.z - low.z, checked.oriented ? "a closed solid" : "a two-sided sheet",
+                  static_cast<double>(surface->memory_bytes()) / 1e6);
 }
 
 void check_volume_file(const std::filesystem::path& path, Json& file) {
@@ -75,11 +79,13 @@ void check_volume_file(const std::filesystem::path& path, Json& file) {
   if (!s.label_counts.empty()) file["labels"] = labels;
   const std::uint64_t bytes = soft_volume_bytes(h.dims);
   file["touch_bytes"] = bytes;
-  file["summary"] = fmt::format("{}, {} x {} x {} {}, {:.3g} x {:.3g} x {:.3g} mm, {:.6g} to {:.6g}{}; about {:.0f} MB to touch as it is",
-                                h.format, h.dims[0], h.dims[1], h.dims[2], h.component, h.spacing_m.x * 1e3, h.spacing_m.y * 1e3,
-                                h.spacing_m.z * 1e3, s.minimum, s.maximum,
-                                s.label_counts.empty() ? "" : fmt::format(", {} labels", s.label_counts.size()),
-                                static_cast<double>(bytes) / 1e6);
+  file["summary"] = fmt::format(
+      "{}, {} x {} x {} {}, {:.3g} x {:.3g} x {:.3g} mm, {:.6g} to {:.6g}{}; about {:.0f} MB to touch as it "
+      "is",
+      h.format, h.dims[0], h.dims[1], h.dims[2], h.component, h.spacing_m.x * 1e3, h.spacing_m.y * 1e3,
+      h.spacing_m.z * 1e3, s.minimum, s.maximum,
+      s.label_counts.empty() ? "" : fmt::format(", {} labels", s.label_counts.size()),
+      static_cast<double>(bytes) / 1e6);
 }
 
 void check_scene_file(const std::filesystem::path& path, Json& file) {
@@ -89,7 +95,8 @@ void check_scene_file(const std::filesystem::path& path, Json& file) {
   end_progress();
   std::uint64_t bytes = built.state->map.memory_bytes();
   for (const BuildNote& note : built.notes) {
-    add_finding(file, {"S01", note.severity, 1, fmt::format("{}{}{}", note.object, note.object.empty() ? "" : ": ", note.text)});
+    add_finding(file, {"S01", note.severity, 1,
+                       fmt::format("{}{}{}", note.object, note.object.empty() ? "" : ": ", note.text)});
   }
   file["objects"] = Json::array();
   for (const RigidObject& o : built.world->rigid) {
@@ -98,19 +105,25 @@ void check_scene_file(const std::filesystem::path& path, Json& file) {
   }
   for (std::size_t o = 0; o < built.state->soft.size(); ++o) {
     const voxel::SoftObject& object = *built.state->soft[o];
-    file["objects"].push_back({{"name", built.world->soft[o].name}, {"kind", "soft"}, {"voxels", object.lattice().voxel_count()},
-                               {"surface_voxels", object.lattice().surface().size()}, {"anchored", object.lattice().anchored_count()}});
+    file["objects"].push_back({{"name", built.world->soft[o].name},
+                               {"kind", "soft"},
+                               {"voxels", object.lattice().voxel_count()},
+                               {"surface_voxels", object.lattice().surface().size()},
+                               {"anchored", object.lattice().anchored_count()}});
     bytes += object.memory_bytes();
   }
   file["touch_bytes"] = bytes;
   file["build_s"] = built.seconds;
-  file["summary"] = fmt::format("{} rigid and {} soft objects, {} occupied cells of {:.3g} mm; {:.1f} MB to touch, built in {:.2f} s",
-                                built.world->rigid.size(), built.world->soft.size(), built.state->map.occupied_cells(),
-                                built.state->map.cell_m() * 1e3, static_cast<double>(bytes) / 1e6, built.seconds);
+  file["summary"] = fmt::format(
+      "{} rigid and {} soft objects, {} occupied cells of {:.3g} mm; {:.1f} MB to touch, built in {:.2f} s",
+      built.world->rigid.size(), built.world->soft.size(), built.state->map.occupied_cells(),
+      built.state->map.cell_m() * 1e3, static_cast<double>(bytes) / 1e6, built.seconds);
 }
 
 bool is_mesh(std::string extension, std::string stem_extension) {
-  const auto lower = [](std::string& s) { std::transform(s.begin(), s.end(), s.begin(), [](unsigned char c) { return std::tolower(c); }); };
+  const auto lower = [](std::string& s) {
+    std::transform(s.begin(), s.end(), s.begin(), [](unsigned char c) { return std::tolower(c); });
+  };
   lower(extension);
   lower(stem_extension);
   const std::string& e = extension == ".gz" ? stem_extension : extension;
@@ -142,7 +155,8 @@ int check(const CheckCommand& command) {
       fmt::print(words, "{}: refused\n", path.string());
     }
     for (const Json& f : file["findings"]) {
-      fmt::print(words, "  {} {}: {}\n", f["severity"].get<std::string>(), f["id"].get<std::string>(), f["text"].get<std::string>());
+      fmt::print(words, "  {} {}: {}\n", f["severity"].get<std::string>(), f["id"].get<std::string>(),
+                 f["text"].get<std::string>());
     }
     report["files"].push_back(file);
   }

@@ -19,7 +19,10 @@ nlohmann::ordered_json report(const Scene& scene, const Comparison& comparison) 
   j["models"] = nlohmann::ordered_json::array();
   for (const ModelResult& m : comparison.models) {
     nlohmann::ordered_json row{{"name", m.name}, {"reference", comparison.reference_text}};
-    row["force_error"] = {{"rms_N", m.rms_N}, {"max_N", m.max_N}, {"jnd_p50", m.jnd_p50}, {"jnd_p99", m.jnd_p99},
+    row["force_error"] = {{"rms_N", m.rms_N},
+                          {"max_N", m.max_N},
+                          {"jnd_p50", m.jnd_p50},
+                          {"jnd_p99", m.jnd_p99},
                           {"share_above_1_jnd", m.share_above_1_jnd}};
     row["direction_error_deg"] = {{"p50", m.direction_p50_deg}, {"p99", m.direction_p99_deg}};
     row["work_J"] = m.work_J;
@@ -37,12 +40,14 @@ int compare(const CompareCommand& command) {
   end_progress();
   std::FILE* words = command.json == "-" ? stderr : stdout;
   fmt::print(words, "\"{}\" along the path of {}\n", comparison.object, scene.file.filename().string());
-  fmt::print(words, "errors against: {}; 1 JND = max(7 %, {:.2f} N)\n\n", comparison.reference_text, comparison.jnd_floor_N);
-  fmt::print(words, "{:<18} {:>8} {:>8} {:>8} {:>8} {:>7} {:>9} {:>9} {:>9} {:>9} {:>9}\n", "model", "rms N", "max N", "JND p50",
-             "JND p99", ">1 JND", "dir p99", "work J", "p50 us", "p99 us", "max us");
+  fmt::print(words, "errors against: {}; 1 JND = max(7 %, {:.2f} N)\n\n", comparison.reference_text,
+             comparison.jnd_floor_N);
+  fmt::print(words, "{:<18} {:>8} {:>8} {:>8} {:>8} {:>7} {:>9} {:>9} {:>9} {:>9} {:>9}\n", "model", "rms N",
+             "max N", "JND p50", "JND p99", ">1 JND", "dir p99", "work J", "p50 us", "p99 us", "max us");
   for (const ModelResult& m : comparison.models) {
-    fmt::print(words, "{:<18} {:>8.4f} {:>8.4f} {:>8.2f} {:>8.2f} {:>6.1f}% {:>8.2f}° {:>9.2g} ", m.name, m.rms_N, m.max_N, m.jnd_p50,
-               m.jnd_p99, 100.0 * m.share_above_1_jnd, m.direction_p99_deg, m.work_J);
+    fmt::print(words, "{:<18} {:>8.4f} {:>8.4f} {:>8.2f} {:>8.2f} {:>6.1f}% {:>8.2f}° {:>9.2g} ", m.name,
+               m.rms_N, m.max_N, m.jnd_p50, m.jnd_p99, 100.0 * m.share_above_1_jnd, m.direction_p99_deg,
+               m.work_J);
     if (m.tick_us.max > 0.0) {
       fmt::print(words, "{:>9.1f} {:>9.1f} {:>9.1f}\n", m.tick_us.p50, m.tick_us.p99, m.tick_us.max);
     } else {
@@ -52,8 +57,11 @@ int compare(const CompareCommand& command) {
   if (!command.plot.empty()) {
     std::vector<ComparedModel> models;
     for (const ModelResult& m : comparison.models) models.push_back({m.name, m.rows, m.depth_m});
-    save_compare_plot(command.plot, models, {}, fmt::format("{}: {}", scene.title.empty() ? scene.file.stem().string() : scene.title, comparison.object),
-                      {.reference = comparison.reference, .jnd_share = kJndShare, .jnd_floor_N = comparison.jnd_floor_N});
+    save_compare_plot(
+        command.plot, models, {},
+        fmt::format("{}: {}", scene.title.empty() ? scene.file.stem().string() : scene.title,
+                    comparison.object),
+        {.reference = comparison.reference, .jnd_share = kJndShare, .jnd_floor_N = comparison.jnd_floor_N});
     fmt::print(words, "\nplot: {}\n", command.plot.string());
   }
   if (!command.json.empty()) save_json(command.json, report(scene, comparison));

@@ -25,7 +25,9 @@ bool& progress_shown() {
 }
 
 // Words for people go to standard output, unless the report does.
-std::FILE* words_for(const std::string& json) { return json == "-" ? stderr : stdout; }
+std::FILE* words_for(const std::string& json) {
+  return json == "-" ? stderr : stdout;
+}
 
 std::string read_text(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
@@ -43,7 +45,8 @@ void check_writable(const std::filesystem::path& file) {
   }
   const bool existed = std::filesystem::exists(file);
   const bool writable = static_cast<bool>(std::ofstream(file, std::ios::app));
-  if (!writable) throw std::runtime_error(fmt::format("{}: cannot be written; check the folder", file.string()));
+  if (!writable)
+    throw std::runtime_error(fmt::format("{}: cannot be written; check the folder", file.string()));
   if (!existed) std::filesystem::remove(file);
 }
 
@@ -58,7 +61,9 @@ void save_soft_surfaces(const std::filesystem::path& file, const BuiltScene& bui
       all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
     }
   }
-  if (all.empty()) throw std::runtime_error("--save-surface: the scene has no soft object, so there is no deformed surface to save");
+  if (all.empty())
+    throw std::runtime_error(
+        "--save-surface: the scene has no soft object, so there is no deformed surface to save");
   polygon::save_ply(file, all);
 }
 
@@ -89,7 +94,8 @@ void end_progress() {
 void print_notes(const BuiltScene& built) {
   for (const BuildNote& note : built.notes) {
     const char* mark = note.severity == polygon::Severity::info ? "note" : "warning";
-    std::fprintf(stderr, "%s: %s%s%s\n", mark, note.object.c_str(), note.object.empty() ? "" : ": ", note.text.c_str());
+    std::fprintf(stderr, "%s: %s%s%s\n", mark, note.object.c_str(), note.object.empty() ? "" : ": ",
+                 note.text.c_str());
   }
 }
 
@@ -98,7 +104,8 @@ int run(const RunCommand& command) {
     throw std::runtime_error("--save-volume: not supported yet; --save-surface writes the deformed surface");
   }
   const Scene scene = load_scene(command.scene);
-  for (const auto* file : {&command.trace, &command.plot, &command.picture, &command.record, &command.save_surface}) {
+  for (const auto* file :
+       {&command.trace, &command.plot, &command.picture, &command.record, &command.save_surface}) {
     check_writable(*file);
   }
   if (command.json != "-") check_writable(command.json);
@@ -122,22 +129,24 @@ int run(const RunCommand& command) {
     std::vector<PlottedObject> objects;
     for (std::size_t o = 0; o < built.world->object_count(); ++o) {
       const std::size_t rigid = built.world->rigid.size();
-      objects.push_back({o < rigid ? built.world->rigid[o].name : built.world->soft[o - rigid].name, o >= rigid,
-                         result.object_force_N[o]});
+      objects.push_back({o < rigid ? built.world->rigid[o].name : built.world->soft[o - rigid].name,
+                         o >= rigid, result.object_force_N[o]});
     }
     save_session_plot(command.plot, result.rows, objects, title);
   }
-  if (!command.picture.empty()) save_picture(command.picture, drawn_scene(*built.world, title), *result.moment);
+  if (!command.picture.empty())
+    save_picture(command.picture, drawn_scene(*built.world, title), *result.moment);
   if (!command.record.empty()) {
-    save_recording(command.record, {std::filesystem::absolute(command.scene), read_text(command.scene), result.dt_s,
-                                    result.state_hash, result.recording});
+    save_recording(command.record, {std::filesystem::absolute(command.scene), read_text(command.scene),
+                                    result.dt_s, result.state_hash, result.recording});
   }
   if (!command.save_surface.empty()) save_soft_surfaces(command.save_surface, built);
   if (!command.json.empty()) save_json(command.json, run_report(scene, built, result));
   fmt::print(words, "{}", run_summary(built, result));
-  for (const auto& [what, file] : {std::pair{"trace", command.trace}, std::pair{"plot", command.plot},
-                                   std::pair{"picture", command.picture}, std::pair{"recording", command.record},
-                                   std::pair{"surface", command.save_surface}}) {
+  for (const auto& [what, file] :
+       {std::pair{"trace", command.trace}, std::pair{"plot", command.plot},
+        std::pair{"picture", command.picture}, std::pair{"recording", command.record},
+        std::pair{"surface", command.save_surface}}) {
     if (!file.empty()) fmt::print(words, "{}: {}\n", what, file.string());
   }
   return 0;
@@ -156,9 +165,10 @@ int replay(const ReplayCommand& command) {
     save_json(command.json, j);
   }
   fmt::print(words_for(command.json), "{}\n",
-             result.equal ? fmt::format("equal: {} ticks, state hash {:016x}", result.ticks, result.state_hash)
-                          : fmt::format("parts at tick {} of {}: this build does not feel what was recorded", result.parts_at,
-                                        result.ticks));
+             result.equal
+                 ? fmt::format("equal: {} ticks, state hash {:016x}", result.ticks, result.state_hash)
+                 : fmt::format("parts at tick {} of {}: this build does not feel what was recorded",
+                               result.parts_at, result.ticks));
   return result.equal ? 0 : 1;
 }
 

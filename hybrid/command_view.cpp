@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The viewer: a window beside a session, each on its own thread. The session publishes snapshots and takes goals; neither
-// waits for the other.
+// The viewer: a window beside a session, each on its own thread. The session publishes snapshots and takes
+// goals; neither waits for the other.
 #include <fmt/format.h>
 
 #include <atomic>
-#include <cstdio>
 #include <cmath>
+#include <cstdio>
 #include <glm/geometric.hpp>
 #include <thread>
 
@@ -20,7 +20,7 @@ namespace hybrid {
 namespace {
 
 constexpr double kSnapshotEvery_s = 1.0 / 60.0;
-constexpr double kScriptFrame_s = 1.0 / 30.0;   // session time that one frame of a scripted view stands for
+constexpr double kScriptFrame_s = 1.0 / 30.0;  // session time that one frame of a scripted view stands for
 
 // What the window asks of the session.
 struct Wish {
@@ -29,7 +29,8 @@ struct Wish {
   glm::dvec3 goal_m{0.0};
 };
 
-// The target of the simulated hand: the scene's path, or where the mouse pulls. Read by the device within a tick.
+// The target of the simulated hand: the scene's path, or where the mouse pulls. Read by the device within a
+// tick.
 class SteeredPath final : public device::Path {
  public:
   explicit SteeredPath(std::shared_ptr<const device::Path> path) : path_(std::move(path)) {}
@@ -59,7 +60,9 @@ class SteeredPath final : public device::Path {
 class Player {
  public:
   Player(const Scene& scene, BuiltScene& built)
-      : built_(built), path_(std::make_shared<SteeredPath>(scene_path(scene))), device_(scene_device(scene, path_)),
+      : built_(built),
+        path_(std::make_shared<SteeredPath>(scene_path(scene))),
+        device_(scene_device(scene, path_)),
         dt_(1.0 / scene.rate_hz) {
     flush_denormals();
     goal_m_ = device_->read().position_m;
@@ -112,7 +115,8 @@ std::filesystem::path frame_file(const std::filesystem::path& folder, std::uint6
   return folder / fmt::format("frame-{:05}.png", n);
 }
 
-// Every frame stands for a fixed stretch of session time, whatever the machine: pictures that can be made again.
+// Every frame stands for a fixed stretch of session time, whatever the machine: pictures that can be made
+// again.
 void play_frames(const ViewCommand& command, Player& player, Window& window) {
   std::shared_ptr<const device::Path> drag;
   if (!command.drag.empty()) drag = device::make_path(device::CsvPath{.file = command.drag});
@@ -176,7 +180,8 @@ int view(const ViewCommand& command) {
   BuiltScene built = build_scene(scene, progress_on_terminal());
   end_progress();
   print_notes(built);
-  const DrawnScene drawn = drawn_scene(*built.world, scene.title.empty() ? command.scene.stem().string() : scene.title);
+  const DrawnScene drawn =
+      drawn_scene(*built.world, scene.title.empty() ? command.scene.stem().string() : scene.title);
   Window window(drawn);
   Player player(scene, built);
   if (command.frames) {

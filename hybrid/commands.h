@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the program's commands do, apart from how their options are spelled (main.cpp). Each returns the exit status, and
-// throws where an input is refused.
+// What the program's commands do, apart from how their options are spelled (main.cpp). Each returns the exit
+// status, and throws where an input is refused.
 #pragma once
 
 #include <filesystem>
@@ -52,8 +52,8 @@ struct ViewCommand {
 };
 int view(const ViewCommand& command);
 
-// Progress on standard error, one line that is overwritten on a terminal, and nothing when standard error is no terminal and
-// less than a second has passed.
+// Progress on standard error, one line that is overwritten on a terminal, and nothing when standard error is
+// no terminal and less than a second has passed.
 Progress progress_on_terminal();
 void end_progress();
 // What the build noticed, on standard error.

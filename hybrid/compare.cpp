@@ -14,7 +14,8 @@ namespace hybrid {
 namespace {
 
 constexpr double kMeshVoxelShare = 1.0 / 40.0;  // spacing of a voxelised rigid object, of its longest side
-constexpr double kHardYoung_Pa = 1e6;           // of a rigid object as voxels: about what a hand takes for hard with a tool of millimeters
+constexpr double kHardYoung_Pa =
+    1e6;  // of a rigid object as voxels: about what a hand takes for hard with a tool of millimeters
 
 // The scene with one object only, on an ideal device.
 Scene bare(const Scene& scene) {
@@ -31,7 +32,11 @@ Scene bare(const Scene& scene) {
 
 // A soft object as the rigid one of the same shape.
 RigidDescription as_rigid(const SoftDescription& soft) {
-  RigidDescription rigid{.name = soft.name, .source = {}, .pose = soft.pose, .place = soft.place, .source_place = soft.source_place};
+  RigidDescription rigid{.name = soft.name,
+                         .source = {},
+                         .pose = soft.pose,
+                         .place = soft.place,
+                         .source_place = soft.source_place};
   if (const auto* formula = std::get_if<voxel::Formula>(&soft.source)) {
     if (formula->shape == voxel::Formula::Shape::ball) {
       rigid.source = BallPrimitive{0.5 * formula->size_m.x};
@@ -42,7 +47,8 @@ RigidDescription as_rigid(const SoftDescription& soft) {
     rigid.source = mesh->mesh;
   } else {
     const auto& volume = std::get<VolumeSource>(soft.source);
-    VolumeSurfaceSource surface{.file = volume.file, .rules = volume.rules, .spacing_m = std::nullopt, .cuts = {}};
+    VolumeSurfaceSource surface{
+        .file = volume.file, .rules = volume.rules, .spacing_m = std::nullopt, .cuts = {}};
     if (volume.spacing_m) surface.spacing_m = volume.spacing_m->x;
     surface.largest = volume.largest;
     surface.unit_m = volume.unit_m;
@@ -53,18 +59,32 @@ RigidDescription as_rigid(const SoftDescription& soft) {
 
 // A rigid object as the soft one of the same shape, of material "hard".
 SoftDescription as_soft(const RigidDescription& rigid) {
-  SoftDescription soft{.name = rigid.name, .source = {}, .pose = rigid.pose, .materials = {}, .material = "hard", .anchors = {},
-                       .place = rigid.place, .source_place = rigid.source_place};
+  SoftDescription soft{.name = rigid.name,
+                       .source = {},
+                       .pose = rigid.pose,
+                       .materials = {},
+                       .material = "hard",
+                       .anchors = {},
+                       .place = rigid.place,
+                       .source_place = rigid.source_place};
   if (const auto* ball = std::get_if<BallPrimitive>(&rigid.source)) {
     const double size = 2.0 * ball->radius_m;
-    soft.source = voxel::Formula{.shape = voxel::Formula::Shape::ball, .size_m = glm::dvec3(size),
-                                 .spacing_m = glm::dvec3(size * kMeshVoxelShare), .layers = {}, .inclusions = {}};
+    soft.source = voxel::Formula{.shape = voxel::Formula::Shape::ball,
+                                 .size_m = glm::dvec3(size),
+                                 .spacing_m = glm::dvec3(size * kMeshVoxelShare),
+                                 .layers = {},
+                                 .inclusions = {}};
   } else if (const auto* box = std::get_if<BoxPrimitive>(&rigid.source)) {
     const double longest = std::max({box->size_m.x, box->size_m.y, box->size_m.z});
-    soft.source = voxel::Formula{.size_m = box->size_m, .spacing_m = glm::dvec3(longest * kMeshVoxelShare), .layers = {}, .inclusions = {}};
+    soft.source = voxel::Formula{.size_m = box->size_m,
+                                 .spacing_m = glm::dvec3(longest * kMeshVoxelShare),
+                                 .layers = {},
+                                 .inclusions = {}};
   } else {
-    throw std::runtime_error(fmt::format("\"{}\" cannot be compared as voxels: only a ball or box primitive, or a soft object, has a "
-                                         "material to be soft with; name one with --object", rigid.name));
+    throw std::runtime_error(fmt::format(
+        "\"{}\" cannot be compared as voxels: only a ball or box primitive, or a soft object, has a "
+        "material to be soft with; name one with --object",
+        rigid.name));
   }
   return soft;
 }
@@ -73,7 +93,8 @@ ModelResult run_model(const std::string& name, const Scene& scene, const Progres
   if (progress) progress(fmt::format("feeling it as {}", name));
   BuiltScene built = build_scene(scene, {});
   SessionResult session = run_session(scene, built, {.seconds = std::nullopt, .progress = {}});
-  ModelResult model{.name = name, .rows = std::move(session.rows), .depth_m = {}, .tick_us = percentiles(session.tick_us)};
+  ModelResult model{
+      .name = name, .rows = std::move(session.rows), .depth_m = {}, .tick_us = percentiles(session.tick_us)};
   return model;
 }
 
@@ -93,7 +114,8 @@ ModelResult closed_model(const ClosedForm& form, const Tool& tool, const std::ve
 double percentile(std::vector<double>& values, double share) {
   if (values.empty()) return 0.0;
   std::sort(values.begin(), values.end());
-  return values[std::min(values.size() - 1, static_cast<std::size_t>(share * static_cast<double>(values.size())))];
+  return values[std::min(values.size() - 1,
+                         static_cast<std::size_t>(share * static_cast<double>(values.size())))];
 }
 
 void measure(ModelResult& model, const ModelResult& reference, double floor_N) {
@@ -103,7 +125,8 @@ void measure(ModelResult& model, const ModelResult& reference, double floor_N) {
   for (std::size_t i = 0; i < count; ++i) {
     const glm::dvec3 &f = model.rows[i].force_N, &r = reference.rows[i].force_N;
     if (i + 1 < count) {
-      model.work_J += 0.5 * glm::dot(f + model.rows[i + 1].force_N, model.rows[i + 1].device_m - model.rows[i].device_m);
+      model.work_J +=
+          0.5 * glm::dot(f + model.rows[i + 1].force_N, model.rows[i + 1].device_m - model.rows[i].device_m);
     }
     if (f == glm::dvec3(0.0) && r == glm::dvec3(0.0)) continue;
     const double error = glm::length(f - r);
@@ -116,8 +139,9 @@ void measure(ModelResult& model, const ModelResult& reference, double floor_N) {
   }
   if (jnd.empty()) return;
   model.rms_N = std::sqrt(sum2 / static_cast<double>(jnd.size()));
-  model.share_above_1_jnd = static_cast<double>(std::count_if(jnd.begin(), jnd.end(), [](double x) { return x > 1.0; })) /
-                            static_cast<double>(jnd.size());
+  model.share_above_1_jnd =
+      static_cast<double>(std::count_if(jnd.begin(), jnd.end(), [](double x) { return x > 1.0; })) /
+      static_cast<double>(jnd.size());
   model.jnd_p50 = percentile(jnd, 0.5);
   model.jnd_p99 = percentile(jnd, 0.99);
   model.direction_p50_deg = percentile(angle, 0.5);
@@ -134,7 +158,8 @@ Comparison compare_models(const Scene& scene, const std::string& object, const P
     std::string names;
     for (const auto& o : scene.rigid) names += fmt::format(" \"{}\"", o.name);
     for (const auto& o : scene.soft) names += fmt::format(" \"{}\"", o.name);
-    throw std::runtime_error(fmt::format("{}: no object \"{}\"; it has{}", scene.file.string(), object, names));
+    throw std::runtime_error(
+        fmt::format("{}: no object \"{}\"; it has{}", scene.file.string(), object, names));
   }
   // The soft object comes first where the user did not choose: it is where the models differ.
   const bool is_soft = soft != scene.soft.end();
@@ -159,13 +184,15 @@ Comparison compare_models(const Scene& scene, const std::string& object, const P
   // A closed form is the reference where it is exact or nearly so; else what the object is in the scene.
   const bool by_form = form && form->caveat.find("left out") == std::string::npos;
   result.reference = by_form ? result.models.size() - 1 : (is_soft && !punch ? 1 : 0);
-  result.reference_text = by_form
-                              ? fmt::format("{}{}{}", law_of(*form, scene.tool), form->caveat.empty() ? "" : ", ", form->caveat)
-                              : fmt::format("{}, as the scene has it", result.models[result.reference].name);
+  result.reference_text =
+      by_form
+          ? fmt::format("{}{}{}", law_of(*form, scene.tool), form->caveat.empty() ? "" : ", ", form->caveat)
+          : fmt::format("{}, as the scene has it", result.models[result.reference].name);
   for (ModelResult& model : result.models) {
     measure(model, result.models[result.reference], result.jnd_floor_N);
     if (!form) continue;
-    for (const TraceRow& row : model.rows) model.depth_m.push_back(depth_in(*form, scene.tool, row.device_m).depth_m);
+    for (const TraceRow& row : model.rows)
+      model.depth_m.push_back(depth_in(*form, scene.tool, row.device_m).depth_m);
   }
   return result;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One object of a scene felt in several ways along the same motion: as mesh and proxy, as voxels, and in closed form where
-// one applies (ball, box or block, capsule, plane under a ball; flat punch on a block).
+// One object of a scene felt in several ways along the same motion: as mesh and proxy, as voxels, and in
+// closed form where one applies (ball, box or block, capsule, plane under a ball; flat punch on a block).
 #pragma once
 
 #include <string>
@@ -11,14 +11,15 @@
 namespace hybrid {
 
 struct ModelResult {
-  std::string name;            // "mesh and proxy", "voxels", "hertz", "flat punch", "rigid closed form"
+  std::string name;  // "mesh and proxy", "voxels", "hertz", "flat punch", "rigid closed form"
   std::vector<TraceRow> rows;
-  std::vector<double> depth_m; // of the device in the undeformed object, [row]; negative outside; empty where unknown
-  Percentiles tick_us;         // all zero for a closed form
+  std::vector<double>
+      depth_m;  // of the device in the undeformed object, [row]; negative outside; empty where unknown
+  Percentiles tick_us;  // all zero for a closed form
   // Against the reference, over the ticks in which either is in contact:
   double rms_N = 0.0, max_N = 0.0, jnd_p50 = 0.0, jnd_p99 = 0.0, share_above_1_jnd = 0.0;
   double direction_p50_deg = 0.0, direction_p99_deg = 0.0;  // where both press more than the JND floor
-  double work_J = 0.0;         // the hand's over the path, by the trapezoidal rule
+  double work_J = 0.0;  // the hand's over the path, by the trapezoidal rule
 };
 
 struct Comparison {
@@ -29,8 +30,8 @@ struct Comparison {
   double jnd_floor_N = 0.0;
 };
 
-// Runs each model on an ideal device along the scene's path. Throws SceneError, std::runtime_error: no such object, an
-// object that cannot be rendered both ways (with the reason).
+// Runs each model on an ideal device along the scene's path. Throws SceneError, std::runtime_error: no such
+// object, an object that cannot be rendered both ways (with the reason).
 Comparison compare_models(const Scene& scene, const std::string& object, const Progress& progress);
 
 }  // namespace hybrid

@@ -8,8 +8,9 @@
 
 namespace hybrid {
 
-// The writer fills back() and publishes; the reader takes the latest. Neither waits, neither allocates here (values keep
-// what they own when a slot comes round again). std::atomic<std::shared_ptr> was rejected: not always lock-free.
+// The writer fills back() and publishes; the reader takes the latest. Neither waits, neither allocates here
+// (values keep what they own when a slot comes round again). std::atomic<std::shared_ptr> was rejected: not
+// always lock-free.
 template <class T>
 class HandOver {
  public:

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The `hybrid` program: how its commands and options are spelled. Exit status 0 done, 1 refused input, 2 usage.
+// The `hybrid` program: how its commands and options are spelled. Exit status 0 done, 1 refused input, 2
+// usage.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
@@ -12,19 +13,26 @@ constexpr const char* kAbout =
     "Touch scenes of rigid and soft objects through a (simulated) force-feedback device.\n\n"
     "  hybrid run scenes/head.toml --plot head.svg --picture head.png   feel a scene, see what was felt\n"
     "  hybrid compare scenes/cube.toml --plot cube.svg                  proxy against voxels, same motion\n"
-    "  hybrid view scenes/head.toml                                     a window; drag the tool with the mouse\n"
-    "  hybrid check skull.stl ct.nii.gz my-scene.toml                   what a file is, and what is wrong with it\n\n"
+    "  hybrid view scenes/head.toml                                     a window; drag the tool with the "
+    "mouse\n"
+    "  hybrid check skull.stl ct.nii.gz my-scene.toml                   what a file is, and what is wrong "
+    "with it\n\n"
     "A scene is one small text file; scenes/README.md describes its keys.\n"
     "Exit status: 0 done, 1 input refused (with the place and the remedy), 2 wrong usage.";
 
 void add_run(CLI::App& app, int& status) {
-  auto* sub = app.add_subcommand("run", "A haptic session without a display: the scene's path, felt from end to end");
+  auto* sub =
+      app.add_subcommand("run", "A haptic session without a display: the scene's path, felt from end to end");
   auto c = std::make_shared<hybrid::RunCommand>();
   sub->add_option("SCENE", c->scene, "scene file (.toml)")->required();
-  sub->add_option("--seconds", c->seconds, "length of the session; default: the path and half a second")->check(CLI::PositiveNumber);
+  sub->add_option("--seconds", c->seconds, "length of the session; default: the path and half a second")
+      ->check(CLI::PositiveNumber);
   sub->add_flag("--realtime", c->realtime, "pace the loop with a real timer at the device's rate");
-  sub->add_option("--samples", c->samples, "how often the soft force is compared with its equilibrium (slow on large volumes); 0: never")
-      ->check(CLI::Range(0, 1000))->capture_default_str();
+  sub->add_option(
+         "--samples", c->samples,
+         "how often the soft force is compared with its equilibrium (slow on large volumes); 0: never")
+      ->check(CLI::Range(0, 1000))
+      ->capture_default_str();
   sub->add_option("--trace", c->trace, "write every tick as CSV");
   sub->add_option("--plot", c->plot, "write force over time with contacts as SVG");
   sub->add_option("--picture", c->picture, "write a picture of the most telling moment as PNG");
@@ -36,7 +44,8 @@ void add_run(CLI::App& app, int& status) {
 }
 
 void add_replay(CLI::App& app, int& status) {
-  auto* sub = app.add_subcommand("replay", "The same session again from a recording; says at which tick it parts, if it does");
+  auto* sub = app.add_subcommand(
+      "replay", "The same session again from a recording; says at which tick it parts, if it does");
   auto c = std::make_shared<hybrid::ReplayCommand>();
   sub->add_option("RECORDING", c->recording, "file written by `hybrid run --record`")->required();
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
@@ -44,17 +53,21 @@ void add_replay(CLI::App& app, int& status) {
 }
 
 void add_check(CLI::App& app, int& status) {
-  auto* sub = app.add_subcommand("check", "What a scene, mesh or volume is, what is wrong with it, and what it would cost");
+  auto* sub = app.add_subcommand(
+      "check", "What a scene, mesh or volume is, what is wrong with it, and what it would cost");
   auto c = std::make_shared<hybrid::CheckCommand>();
   sub->add_option("FILE", c->files, "scene (.toml), mesh, volume, or folder of a DICOM series")->required();
   sub->add_flag("--deep", c->deep, "also look for self-intersections (slow on large meshes)");
-  sub->add_option("--unit", c->unit_m, "length unit of mesh files in meters")->check(CLI::PositiveNumber)->capture_default_str();
+  sub->add_option("--unit", c->unit_m, "length unit of mesh files in meters")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
   sub->callback([c, &status] { status = hybrid::check(*c); });
 }
 
 void add_compare(CLI::App& app, int& status) {
-  auto* sub = app.add_subcommand("compare", "One object as mesh and proxy, as voxels, and in closed form, along the same path");
+  auto* sub = app.add_subcommand(
+      "compare", "One object as mesh and proxy, as voxels, and in closed form, along the same path");
   auto c = std::make_shared<hybrid::CompareCommand>();
   sub->add_option("SCENE", c->scene, "scene file (.toml)")->required();
   sub->add_option("--object", c->object, "name of the object; default: the first");
@@ -64,7 +77,8 @@ void add_compare(CLI::App& app, int& status) {
 }
 
 void add_view(CLI::App& app, int& status) {
-  auto* sub = app.add_subcommand("view", "A window: the simulated hand plays, or the mouse drags the tool (right button)");
+  auto* sub = app.add_subcommand(
+      "view", "A window: the simulated hand plays, or the mouse drags the tool (right button)");
   auto c = std::make_shared<hybrid::ViewCommand>();
   sub->add_option("SCENE", c->scene, "scene file (.toml)")->required();
   sub->add_option("--frames", c->frames, "close after this many frames")->check(CLI::PositiveNumber);

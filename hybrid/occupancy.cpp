@@ -9,11 +9,12 @@
 namespace hybrid {
 namespace {
 
-// Cells are numbered in 32 bits; what lies further out than this is clamped to the edge cells, where it is still found by
-// whatever else is out there.
+// Cells are numbered in 32 bits; what lies further out than this is clamped to the edge cells, where it is
+// still found by whatever else is out there.
 constexpr double kFarthestCell = 1e9;
 
-// Does the triangle touch the box? Separating axes (Akenine-Möller 2001): three box axes, the plane, nine edge products.
+// Does the triangle touch the box? Separating axes (Akenine-Möller 2001): three box axes, the plane, nine
+// edge products.
 bool triangle_touches_box(const std::array<glm::dvec3, 3>& t, const glm::dvec3& centre, double half) {
   const std::array<glm::dvec3, 3> v{t[0] - centre, t[1] - centre, t[2] - centre};
   const auto separates = [&v, half](const glm::dvec3& axis) {
@@ -36,7 +37,8 @@ bool triangle_touches_box(const std::array<glm::dvec3, 3>& t, const glm::dvec3& 
 }  // namespace
 
 OccupancyMap::OccupancyMap(double cell_m, const glm::dvec3& origin) : cell_m_(cell_m), origin_(origin) {
-  if (!(cell_m > 0.0) || !std::isfinite(cell_m)) throw std::invalid_argument("an occupancy cell must be positive");
+  if (!(cell_m > 0.0) || !std::isfinite(cell_m))
+    throw std::invalid_argument("an occupancy cell must be positive");
   rehash(1024);
 }
 
@@ -61,7 +63,8 @@ std::uint32_t OccupancyMap::hash(const Coordinates& c) noexcept {
 
 std::uint32_t OccupancyMap::index_in_brick(const Coordinates& cell) noexcept {
   constexpr std::int32_t mask = kEdge - 1;
-  return static_cast<std::uint32_t>((cell[0] & mask) + (cell[1] & mask) * kEdge + (cell[2] & mask) * kEdge * kEdge);
+  return static_cast<std::uint32_t>((cell[0] & mask) + (cell[1] & mask) * kEdge +
+                                    (cell[2] & mask) * kEdge * kEdge);
 }
 
 std::uint32_t OccupancyMap::find(const Coordinates& brick) const noexcept {
@@ -75,7 +78,8 @@ std::uint32_t OccupancyMap::find(const Coordinates& brick) const noexcept {
 std::uint32_t OccupancyMap::find_or_add(const Coordinates& brick, bool may_allocate) {
   const std::uint32_t found = find(brick);
   if (found != kNone) return found;
-  if (!may_allocate && (bricks_.size() == bricks_.capacity() || (bricks_.size() + 1) * 2 > table_.size())) return kNone;
+  if (!may_allocate && (bricks_.size() == bricks_.capacity() || (bricks_.size() + 1) * 2 > table_.size()))
+    return kNone;
   if (may_allocate && (bricks_.size() + 1) * 2 > table_.size()) rehash(table_.size() * 2);
   const auto added = static_cast<std::uint32_t>(bricks_.size());
   Brick& b = bricks_.emplace_back();
@@ -98,7 +102,8 @@ void OccupancyMap::rehash(std::size_t capacity) {
   }
 }
 
-void OccupancyMap::add_triangle(std::uint32_t object, const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
+void OccupancyMap::add_triangle(std::uint32_t object, const glm::dvec3& a, const glm::dvec3& b,
+                                const glm::dvec3& c) {
   const std::array<glm::dvec3, 3> t{a, b, c};
   const Coordinates low = cell_of(glm::min(a, glm::min(b, c))), high = cell_of(glm::max(a, glm::max(b, c)));
   // A little larger than the cell, so that a triangle in the face between two cells is in both.
@@ -131,9 +136,13 @@ void OccupancyMap::reserve_bricks(std::size_t more) {
   rehash(capacity);
 }
 
-void OccupancyMap::place(std::uint32_t number, const glm::dvec3& position) { put(number, position, true); }
+void OccupancyMap::place(std::uint32_t number, const glm::dvec3& position) {
+  put(number, position, true);
+}
 
-void OccupancyMap::move(std::uint32_t number, const glm::dvec3& position) noexcept { put(number, position, false); }
+void OccupancyMap::move(std::uint32_t number, const glm::dvec3& position) noexcept {
+  put(number, position, false);
+}
 
 void OccupancyMap::put(std::uint32_t number, const glm::dvec3& position, bool may_allocate) {
   const Coordinates cell = cell_of(position);
@@ -236,7 +245,8 @@ std::size_t OccupancyMap::occupied_cells() const noexcept {
 }
 
 std::size_t OccupancyMap::memory_bytes() const {
-  return bricks_.capacity() * sizeof(Brick) + (table_.size() + next_.size() + soft_cell_.size()) * sizeof(std::uint32_t);
+  return bricks_.capacity() * sizeof(Brick) +
+         (table_.size() + next_.size() + soft_cell_.size()) * sizeof(std::uint32_t);
 }
 
 bool OccupancyMap::validate() const {

@@ -2,9 +2,9 @@
 // The shared occupancy map: which surface voxels and which rigid surfaces lie in which cell of the scene.
 //
 // Sparse: bricks of 8×8×8 cells in a hash table; memory follows occupied cells, not the scene's extent.
-// A look-up is one hash probe and one index. Soft surface voxels are kept one by one (an intrusive list a cell), moved in O(1);
-// rigid surfaces are rasterised conservatively on load, and a cell says only that some of them pass: the exact question
-// goes to the surface itself.
+// A look-up is one hash probe and one index. Soft surface voxels are kept one by one (an intrusive list a
+// cell), moved in O(1); rigid surfaces are rasterised conservatively on load, and a cell says only that some
+// of them pass: the exact question goes to the surface itself.
 #pragma once
 
 #include <array>
@@ -51,13 +51,15 @@ class OccupancyMap {
   // For tests: every soft voxel stands in the list of the cell it says it is in, and nowhere else.
   [[nodiscard]] bool validate() const;
 
-  [[nodiscard]] static std::uint64_t rigid_bit(std::uint32_t object) { return 1ULL << (object < 63 ? object : 63); }
+  [[nodiscard]] static std::uint64_t rigid_bit(std::uint32_t object) {
+    return 1ULL << (object < 63 ? object : 63);
+  }
 
  private:
   static constexpr int kShift = 3, kEdge = 1 << kShift, kCells = kEdge * kEdge * kEdge;
   using Coordinates = std::array<std::int32_t, 3>;
   struct Brick {
-    Coordinates at{};                           // brick coordinates
+    Coordinates at{};  // brick coordinates
     std::uint64_t rigid_mask = 0;
     std::uint32_t soft_count = 0;
     std::array<std::uint32_t, kCells> soft_head;  // first soft voxel of the cell, or kNone
@@ -71,7 +73,8 @@ class OccupancyMap {
   void rehash(std::size_t capacity);
   [[nodiscard]] static std::uint32_t hash(const Coordinates& c) noexcept;
   [[nodiscard]] static std::uint32_t index_in_brick(const Coordinates& cell) noexcept;
-  // Calls visit(brick, lowest cell, highest cell) for each existing brick that the box touches, until it returns false.
+  // Calls visit(brick, lowest cell, highest cell) for each existing brick that the box touches, until it
+  // returns false.
   template <class Visit>
   void each_brick(const glm::dvec3& low, const glm::dvec3& high, Visit&& visit) const noexcept;
 

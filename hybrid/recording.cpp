@@ -12,7 +12,8 @@
 namespace hybrid {
 namespace {
 
-// Layout, little-endian: magic, sizes of path and text, tick count, dt, state hash, path, text, ticks of (x, y, z, hash).
+// Layout, little-endian: magic, sizes of path and text, tick count, dt, state hash, path, text, ticks of (x,
+// y, z, hash).
 constexpr std::array<char, 8> kMagic{'h', 'y', 'b', 'r', 'i', 'd', 'R', '1'};
 struct Header {
   std::array<char, 8> magic;
@@ -38,8 +39,9 @@ std::string read_text(const std::filesystem::path& file) {
 void save_recording(const std::filesystem::path& file, const Recording& recording) {
   std::ofstream out(file, std::ios::binary);
   const std::string path = recording.scene_file.string();
-  const Header header{kMagic,         path.size(),        recording.scene_text.size(), recording.ticks.size(),
-                      recording.dt_s, recording.state_hash};
+  const Header header{
+      kMagic,         path.size(),         recording.scene_text.size(), recording.ticks.size(),
+      recording.dt_s, recording.state_hash};
   out.write(reinterpret_cast<const char*>(&header), sizeof header);
   out.write(path.data(), static_cast<std::streamsize>(path.size()));
   out.write(recording.scene_text.data(), static_cast<std::streamsize>(recording.scene_text.size()));
@@ -48,24 +50,33 @@ void save_recording(const std::filesystem::path& file, const Recording& recordin
     out.write(reinterpret_cast<const char*>(&tick), sizeof tick);
   }
   out.flush();
-  if (!out) throw std::runtime_error(fmt::format("{}: cannot be written; check the folder and the space left", file.string()));
+  if (!out)
+    throw std::runtime_error(
+        fmt::format("{}: cannot be written; check the folder and the space left", file.string()));
 }
 
 Recording load_recording(const std::filesystem::path& file) {
   std::error_code error;
   const std::uint64_t size = std::filesystem::file_size(file, error);
   std::ifstream in(file, std::ios::binary);
-  if (error || !in) throw std::runtime_error(fmt::format("{}: cannot be read; give a file written by `hybrid run --record`", file.string()));
+  if (error || !in)
+    throw std::runtime_error(
+        fmt::format("{}: cannot be read; give a file written by `hybrid run --record`", file.string()));
   Header header{};
   in.read(reinterpret_cast<char*>(&header), sizeof header);
   if (!in || header.magic != kMagic) {
-    throw std::runtime_error(fmt::format("{}: not a recording of this version; record the session again with `hybrid run --record`", file.string()));
+    throw std::runtime_error(fmt::format(
+        "{}: not a recording of this version; record the session again with `hybrid run --record`",
+        file.string()));
   }
   // Each size is checked alone first, so that their sum cannot wrap.
-  const bool sane = header.path_bytes <= size && header.text_bytes <= size && header.ticks <= size / sizeof(Tick) &&
-                    sizeof header + header.path_bytes + header.text_bytes + header.ticks * sizeof(Tick) == size &&
-                    header.dt_s > 0.0 && std::isfinite(header.dt_s);
-  if (!sane) throw std::runtime_error(fmt::format("{}: truncated or damaged ({} bytes); copy it again", file.string(), size));
+  const bool sane =
+      header.path_bytes <= size && header.text_bytes <= size && header.ticks <= size / sizeof(Tick) &&
+      sizeof header + header.path_bytes + header.text_bytes + header.ticks * sizeof(Tick) == size &&
+      header.dt_s > 0.0 && std::isfinite(header.dt_s);
+  if (!sane)
+    throw std::runtime_error(
+        fmt::format("{}: truncated or damaged ({} bytes); copy it again", file.string(), size));
   Recording recording;
   std::string path(header.path_bytes, '\0');
   recording.scene_text.resize(header.text_bytes);
@@ -87,8 +98,10 @@ Recording load_recording(const std::filesystem::path& file) {
 ReplayResult replay(const Recording& recording, const Progress& progress) {
   flush_denormals();
   if (read_text(recording.scene_file) != recording.scene_text) {
-    throw std::runtime_error(fmt::format("{}: the scene is not what was recorded (changed or moved); put the recorded text back, or record again",
-                                         recording.scene_file.string()));
+    throw std::runtime_error(
+        fmt::format("{}: the scene is not what was recorded (changed or moved); put the recorded text back, "
+                    "or record again",
+                    recording.scene_file.string()));
   }
   const Scene scene = load_scene(recording.scene_file);
   const BuiltScene built = build_scene(scene, progress);

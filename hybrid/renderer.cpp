@@ -217,7 +217,7 @@ void Renderer::State::draw_objects(bool soft, int pass) const {
   for (const Object& object : objects) {
     if (object.soft != soft || object.mesh.count == 0) continue;
     uniform("own_colour", object.colour);
-    uniform("moved_scale", soft ? static_cast<float>(std::max(most_moved_m, 1e-30)) : 0.0F);
+    uniform("moved_scale", soft ? static_cast<float>(most_moved_m) : 0.0F);
     object.mesh.draw();
   }
   uniform("moved_scale", 0.0F);
@@ -323,7 +323,10 @@ void Renderer::begin(const DrawnScene& scene, const Snapshot& snapshot, int widt
       continue;
     const float moved = move_vertices(object.moving, rest, snapshot.soft_vertices[i], s.origin_m);
     object.mesh.stream(object.moving);
-    if (static_cast<double>(moved) > s.most_moved_m) {
+    // What moved by less than a thousandth of the tool has not moved to the eye: rounding is not to be a
+    // pattern.
+    const double least = 1e-3 * scene.tool_radius_m;
+    if (static_cast<double>(moved) > std::max(s.most_moved_m, least)) {
       // A round number at or above, never falling.
       const double power = std::pow(10.0, std::floor(std::log10(static_cast<double>(moved))));
       for (const double step : {1.0, 2.0, 5.0, 10.0}) {

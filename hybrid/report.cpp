@@ -16,7 +16,8 @@ namespace {
 std::string processor() {
   std::ifstream in("/proc/cpuinfo");
   for (std::string line; std::getline(in, line);) {
-    if (line.rfind("model name", 0) == 0 && line.find(':') != std::string::npos) return line.substr(line.find(':') + 2);
+    if (line.rfind("model name", 0) == 0 && line.find(':') != std::string::npos)
+      return line.substr(line.find(':') + 2);
   }
   return "unknown processor";
 }
@@ -36,13 +37,18 @@ struct ObjectRow {
 std::vector<ObjectRow> object_rows(const BuiltScene& built, const SessionResult& result) {
   std::vector<ObjectRow> rows;
   for (const RigidObject& o : built.world->rigid) {
-    rows.push_back({.name = o.name, .kind = "rigid", .triangles = o.drawn.triangles.size(),
+    rows.push_back({.name = o.name,
+                    .kind = "rigid",
+                    .triangles = o.drawn.triangles.size(),
                     .memory_bytes = o.surface->memory_bytes()});
   }
   for (std::size_t o = 0; o < built.world->soft.size(); ++o) {
     const voxel::SoftObject& object = *built.state->soft[o];
-    rows.push_back({.name = built.world->soft[o].name, .kind = "soft", .voxels = object.lattice().voxel_count(),
-                    .surface_voxels = object.lattice().surface().size(), .memory_bytes = object.memory_bytes()});
+    rows.push_back({.name = built.world->soft[o].name,
+                    .kind = "soft",
+                    .voxels = object.lattice().voxel_count(),
+                    .surface_voxels = object.lattice().surface().size(),
+                    .memory_bytes = object.memory_bytes()});
   }
   for (std::size_t o = 0; o < rows.size(); ++o) {
     rows[o].contact_ticks = result.object_contact_ticks[o];
@@ -77,7 +83,8 @@ nlohmann::ordered_json run_report(const Scene& scene, const BuiltScene& built, S
   j["contact_ticks"] = result.contact_ticks;
   std::vector<double> tick_us = result.tick_us;
   j["tick_us"] = to_json(percentiles(tick_us));
-  for (std::size_t s = 0; s < kStages; ++s) j["stage_us"][kStageNames[s]] = to_json(of_stage(result.stage_us[s]));
+  for (std::size_t s = 0; s < kStages; ++s)
+    j["stage_us"][kStageNames[s]] = to_json(of_stage(result.stage_us[s]));
   j["force_N"] = {{"max", result.max_force_N}, {"rms", result.rms_force_N}};
   j["objects"] = nlohmann::ordered_json::array();
   for (const ObjectRow& row : object_rows(built, result)) {
@@ -103,8 +110,9 @@ nlohmann::ordered_json run_report(const Scene& scene, const BuiltScene& built, S
                  {"force_error_rms_N", measured ? nlohmann::ordered_json(result.error.rms_N) : none},
                  {"force_error_jnd", measured ? nlohmann::ordered_json(result.error.max_jnd) : none},
                  {"samples", result.error.samples},
-                 {"reference", measured ? "equilibrium lattice with its limits, at the sampled ticks"
-                                        : "not measured (no soft contact at a sampled tick, real time, or --samples 0)"}};
+                 {"reference",
+                  measured ? "equilibrium lattice with its limits, at the sampled ticks"
+                           : "not measured (no soft contact at a sampled tick, real time, or --samples 0)"}};
   j["threads"] = nlohmann::ordered_json::array({{{"name", "main"}, {"share", 1.0}}});
   if (!result.realtime_note.empty()) {
     j["realtime"] = {{"priority", result.realtime_note}, {"late_us", to_json(result.late_us)}};
@@ -118,23 +126,28 @@ nlohmann::ordered_json run_report(const Scene& scene, const BuiltScene& built, S
 std::string run_summary(const BuiltScene& built, SessionResult& result) {
   std::vector<double> tick_us = result.tick_us;
   const Percentiles tick = percentiles(tick_us);
-  std::string text = fmt::format("{} ticks of {:.3g} ms ({:.2f} s), {} in contact; force at most {:.3f} N\n", result.ticks,
-                                 result.dt_s * 1e3, static_cast<double>(result.ticks) * result.dt_s, result.contact_ticks,
-                                 result.max_force_N);
-  text += fmt::format("tick: p50 {:.1f}, p99 {:.1f}, p99.9 {:.1f}, max {:.1f} us\n", tick.p50, tick.p99, tick.p999, tick.max);
+  std::string text =
+      fmt::format("{} ticks of {:.3g} ms ({:.2f} s), {} in contact; force at most {:.3f} N\n", result.ticks,
+                  result.dt_s * 1e3, static_cast<double>(result.ticks) * result.dt_s, result.contact_ticks,
+                  result.max_force_N);
+  text += fmt::format("tick: p50 {:.1f}, p99 {:.1f}, p99.9 {:.1f}, max {:.1f} us\n", tick.p50, tick.p99,
+                      tick.p999, tick.max);
   for (const ObjectRow& row : object_rows(built, result)) {
     text += fmt::format("  {:<16} {:<5} {:>9} {:<9} felt in {} ticks, at most {:.3f} N\n", row.name, row.kind,
-                        row.kind == "rigid" ? row.triangles : row.voxels, row.kind == "rigid" ? "triangles" : "voxels",
-                        row.contact_ticks, row.max_force_N);
+                        row.kind == "rigid" ? row.triangles : row.voxels,
+                        row.kind == "rigid" ? "triangles" : "voxels", row.contact_ticks, row.max_force_N);
   }
   if (result.error.samples > 0) {
-    text += fmt::format("force error against the equilibrium lattice at {} sampled ticks: at most {:.4f} N ({:.2f} JND), rms {:.4f} N\n",
-                        result.error.samples, result.error.max_N, result.error.max_jnd, result.error.rms_N);
+    text += fmt::format(
+        "force error against the equilibrium lattice at {} sampled ticks: at most {:.4f} N ({:.2f} JND), rms "
+        "{:.4f} N\n",
+        result.error.samples, result.error.max_N, result.error.max_jnd, result.error.rms_N);
   }
   if (!result.realtime_note.empty()) {
-    text += fmt::format("real time: {}\n  woken late by p50 {:.0f}, p99 {:.0f}, max {:.0f} us; {} deadlines missed\n",
-                        result.realtime_note, result.late_us.p50, result.late_us.p99, result.late_us.max,
-                        result.deadline_misses);
+    text += fmt::format(
+        "real time: {}\n  woken late by p50 {:.0f}, p99 {:.0f}, max {:.0f} us; {} deadlines missed\n",
+        result.realtime_note, result.late_us.p50, result.late_us.p99, result.late_us.max,
+        result.deadline_misses);
   }
   for (const std::string& fault : fault_texts(built.state->faults)) text += fmt::format("fault: {}\n", fault);
   text += fmt::format("state hash {:016x}\n", result.state_hash);
@@ -147,9 +160,12 @@ std::vector<std::string> fault_texts(std::uint32_t faults) {
     if ((faults & bit) != 0) texts.emplace_back(text);
   };
   say(fault_nonfinite_input, "the device gave a position that is not finite; the last good one was held");
-  say(fault_touch_overflow, "more soft voxels near the tool than fit; use a smaller tool or a coarser spacing");
-  say(fault_triangle_overflow, "more triangles near the proxy than fit; repair the mesh (coincident triangles) or coarsen it");
-  say(fault_map_overflow, "the occupancy map had no room for a voxel that moved; use a larger [occupancy] cell");
+  say(fault_touch_overflow,
+      "more soft voxels near the tool than fit; use a smaller tool or a coarser spacing");
+  say(fault_triangle_overflow,
+      "more triangles near the proxy than fit; repair the mesh (coincident triangles) or coarsen it");
+  say(fault_map_overflow,
+      "the occupancy map had no room for a voxel that moved; use a larger [occupancy] cell");
   say(fault_pair_overflow, "more soft voxels press on one another than fit; use a coarser spacing");
   say(fault_infeasible, "rigid surfaces left the tool no room; use a smaller tool radius");
   return texts;
@@ -165,7 +181,8 @@ void save_json(const std::string& file, const nlohmann::ordered_json& report) {
   std::ofstream out(file);
   out << text << '\n';
   out.flush();
-  if (!out) throw std::runtime_error(fmt::format("{}: cannot be written; check the folder and the space left", file));
+  if (!out)
+    throw std::runtime_error(fmt::format("{}: cannot be written; check the folder and the space left", file));
 }
 
 std::uint64_t peak_memory_bytes() {

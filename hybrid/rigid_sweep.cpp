@@ -8,8 +8,9 @@ namespace hybrid {
 namespace {
 
 constexpr int kMaxSteps = 32;
-constexpr double kConverged = 1e-7;   // of the tool's radius: a step shorter than this is the end
-constexpr double kSmallestStep = 1e-3;  // of the tool's radius: below it, crowding is a fault, not a reason to look nearer
+constexpr double kConverged = 1e-7;  // of the tool's radius: a step shorter than this is the end
+constexpr double kSmallestStep =
+    1e-3;  // of the tool's radius: below it, crowding is a fault, not a reason to look nearer
 constexpr double kTolerance = 1e-12;  // of the tool's radius: depth in a plane that is rounding
 
 }  // namespace
@@ -30,7 +31,8 @@ bool gather_planes(const World& world, WorldState& state, const glm::dvec3& poin
       const glm::dvec3 on_surface = object.to_scene(near.point);
       const glm::dvec3 away = point - on_surface;
       const double distance = glm::length(away);
-      if (!(distance > 0.0)) continue;  // on the surface itself, where no side is right: its neighbours decide
+      if (!(distance > 0.0))
+        continue;  // on the surface itself, where no side is right: its neighbours decide
       const glm::dvec3 normal = away / distance;
       state.planes.push_back({normal, glm::dot(normal, on_surface) + world.tool.radius_m, o, near.element});
     }
@@ -45,8 +47,8 @@ Sweep sweep_proxy(const World& world, WorldState& state, const glm::dvec3& from,
   sweep.point = from;
   sweep.arrived = false;
   for (int n = 0; n < kMaxSteps; ++n) {
-    // Look as far as the target is, but no further than what fits: what is gathered within radius + step makes a step of
-    // that length safe.
+    // Look as far as the target is, but no further than what fits: what is gathered within radius + step
+    // makes a step of that length safe.
     double step = std::min(glm::length(target - sweep.point) + kConverged * radius, state.gather_step_m);
     while (!gather_planes(world, state, sweep.point, radius + step)) {
       step *= 0.5;
@@ -55,7 +57,8 @@ Sweep sweep_proxy(const World& world, WorldState& state, const glm::dvec3& from,
       state.faults |= fault_triangle_overflow;
       break;
     }
-    if (state.planes.size() < kMaxNear / 4) state.gather_step_m = std::min(2.0 * state.gather_step_m, 8.0 * radius);
+    if (state.planes.size() < kMaxNear / 4)
+      state.gather_step_m = std::min(2.0 * state.gather_step_m, 8.0 * radius);
     const polygon::PlaneMinimum minimum =
         polygon::minimise_on_planes(target, metric, state.planes, kTolerance * radius);
     if (!minimum.feasible) {

@@ -39,24 +39,33 @@ struct Pose {  // body frame to scene frame
 };
 
 struct Material {
-  double young_Pa = 5e3;      // > 0
-  double poisson = 0.3;       // 0 <= ν < 0.5
-  double stretch_min = 0.4;   // shortest a link may become, of its rest length; 0 < min <= 1
-  double stretch_max = 1.6;   // longest, >= 1
-  double shear = 0.6;         // most a link's ends may slip across it, of its rest length; >= 0
+  double young_Pa = 5e3;     // > 0
+  double poisson = 0.3;      // 0 <= ν < 0.5
+  double stretch_min = 0.4;  // shortest a link may become, of its rest length; 0 < min <= 1
+  double stretch_max = 1.6;  // longest, >= 1
+  double shear = 0.6;        // most a link's ends may slip across it, of its rest length; >= 0
   SourcePlace place;
 };
 
-// ---- rigid -------------------------------------------------------------------------------------------------
+// ---- rigid
+// -------------------------------------------------------------------------------------------------
 struct MeshSource {
   std::filesystem::path file;  // resolved against the scene's folder
   double unit_m = 1.0;         // length unit of the file; default: the scene's unit
   bool repair = false;
 };
-struct BallPrimitive { double radius_m = 0.0; };
-struct BoxPrimitive { glm::dvec3 size_m{0.0}; };
-struct PlanePrimitive { double size_m = 0.0; };  // edge of the square sheet
-struct CapsulePrimitive { double radius_m = 0.0, length_m = 0.0; };  // length between the two centres
+struct BallPrimitive {
+  double radius_m = 0.0;
+};
+struct BoxPrimitive {
+  glm::dvec3 size_m{0.0};
+};
+struct PlanePrimitive {
+  double size_m = 0.0;
+};  // edge of the square sheet
+struct CapsulePrimitive {
+  double radius_m = 0.0, length_m = 0.0;
+};                 // length between the two centres
 struct CutPlane {  // what lies on the side the normal points to is cut away, in the scene frame
   glm::dvec3 normal{0.0, 0.0, 1.0};
   double offset_m = 0.0;
@@ -64,13 +73,13 @@ struct CutPlane {  // what lies on the side the normal points to is cut away, in
 // The surface of some labels (or an intensity range) of a volume, as a mesh. With `cuts` it is an open sheet.
 struct VolumeSurfaceSource {
   std::filesystem::path file;
-  std::vector<voxel::LabelRule> rules;   // which voxels are inside
+  std::vector<voxel::LabelRule> rules;  // which voxels are inside
   std::optional<double> spacing_m;
-  double grow_m = 0.0;                   // the surface is moved outward by this much
-  int smooth = 10;                       // smoothing passes
-  bool largest = true;                   // keep only the largest connected piece, and fill its cavities
+  double grow_m = 0.0;  // the surface is moved outward by this much
+  int smooth = 10;      // smoothing passes
+  bool largest = true;  // keep only the largest connected piece, and fill its cavities
   std::vector<CutPlane> cuts;
-  double unit_m = 1e-3;                  // length unit of the file (medical formats: mm)
+  double unit_m = 1e-3;  // length unit of the file (medical formats: mm)
 };
 using RigidSource = std::variant<MeshSource, BallPrimitive, BoxPrimitive, PlanePrimitive, CapsulePrimitive,
                                  VolumeSurfaceSource>;
@@ -83,7 +92,8 @@ struct RigidDescription {
   SourcePlace source_place;  // of the key that names the source
 };
 
-// ---- soft --------------------------------------------------------------------------------------------------
+// ---- soft
+// --------------------------------------------------------------------------------------------------
 struct VolumeSource {
   std::filesystem::path file;
   std::vector<voxel::LabelRule> rules;
@@ -98,7 +108,8 @@ struct ClosedMeshSource {
 using SoftSource = std::variant<VolumeSource, ClosedMeshSource, voxel::Formula>;
 
 struct Anchors {
-  // Any of "-x" "+x" "-y" "+y" "-z" "+z": the outermost layer of voxels on that side of the object's own lattice.
+  // Any of "-x" "+x" "-y" "+y" "-z" "+z": the outermost layer of voxels on that side of the object's own
+  // lattice.
   std::vector<std::string> faces{"-z"};
   std::vector<std::uint8_t> labels;
   double rigid_within_m = 0.0;  // voxels this near to a rigid surface are held by it; 0: none
@@ -106,7 +117,7 @@ struct Anchors {
 struct SoftDescription {
   std::string name;
   SoftSource source;
-  Pose pose;  // applied after the volume's own frame
+  Pose pose;                                      // applied after the volume's own frame
   std::map<std::uint8_t, std::string> materials;  // label to material name; label absent: `material`
   std::string material;                           // name; empty: the default Material
   Anchors anchors;
@@ -114,7 +125,8 @@ struct SoftDescription {
   SourcePlace place, source_place;
 };
 
-// ---- the rest ----------------------------------------------------------------------------------------------
+// ---- the rest
+// ----------------------------------------------------------------------------------------------
 struct Tool {
   enum class Shape : std::uint8_t { ball, punch } shape = Shape::ball;
   double radius_m = 2e-3;
@@ -126,8 +138,9 @@ enum class Overlap : std::uint8_t { carve, refuse };
 struct Scene {
   std::filesystem::path file;
   std::string title;
-  double unit_m = 1e-3;                  // length unit of the file's numbers
-  std::optional<double> occupancy_cell_m;  // default: chosen from the soft spacing, the rigid size and the tool
+  double unit_m = 1e-3;  // length unit of the file's numbers
+  std::optional<double>
+      occupancy_cell_m;  // default: chosen from the soft spacing, the rigid size and the tool
   Overlap overlap = Overlap::carve;
   std::vector<RigidDescription> rigid;
   std::vector<SoftDescription> soft;
@@ -142,8 +155,8 @@ struct Scene {
   bool max_force_given = false;  // else the device's own limit holds
 };
 
-// The largest lattice that a soft object may have on this machine: what building it takes for each voxel of the
-// bounding box (labels, surface, the copies made on the way), within the physical memory.
+// The largest lattice that a soft object may have on this machine: what building it takes for each voxel of
+// the bounding box (labels, surface, the copies made on the way), within the physical memory.
 inline constexpr std::size_t lattice_bytes_per_voxel = 16;
 std::size_t max_lattice_voxels();
 

@@ -18,9 +18,9 @@ namespace {
 
 constexpr double kAfterPath_s = 0.5;
 constexpr double kJndFloor_N = 0.04;
-constexpr std::uint64_t kMomentEvery = 20;      // ticks between two looks for a more telling moment
-constexpr int kSettleTicks = 1200;              // of equilibrium_force(), and
-constexpr int kCalmTicks = 40;                  // ticks over which its force may change by the tolerance
+constexpr std::uint64_t kMomentEvery = 20;  // ticks between two looks for a more telling moment
+constexpr int kSettleTicks = 1200;          // of equilibrium_force(), and
+constexpr int kCalmTicks = 40;              // ticks over which its force may change by the tolerance
 constexpr std::uint32_t kSettleBudget = 400'000;
 
 std::uint64_t mix(std::uint64_t hash, std::uint64_t bits) noexcept {  // FNV-1a, eight bytes at a time
@@ -63,8 +63,13 @@ double telling(const World& world, const WorldState& state) {
 class Run {
  public:
   Run(const Scene& scene, BuiltScene& built, const SessionOptions& options)
-      : scene_(scene), world_(*built.world), state_(*built.state), options_(options), path_(scene_path(scene)),
-        device_(scene_device(scene, path_)), dt_(1.0 / scene.rate_hz) {
+      : scene_(scene),
+        world_(*built.world),
+        state_(*built.state),
+        options_(options),
+        path_(scene_path(scene)),
+        device_(scene_device(scene, path_)),
+        dt_(1.0 / scene.rate_hz) {
     const double seconds = options.seconds.value_or(path_->duration_s() + kAfterPath_s);
     ticks_ = static_cast<std::uint64_t>(std::llround(seconds * scene.rate_hz));
     result_.dt_s = dt_;
@@ -102,7 +107,8 @@ class Run {
       if (sample_every != 0 && result_.error.samples < options_.reference_samples) sample(felt, sample_every);
       if (timer) continue;  // nothing that could make the next tick late
       if (options_.keep_picture && tick % kMomentEvery == 0) look(felt, tick);
-      if (options_.progress && tick % 64 == 0 && std::chrono::steady_clock::now() - said > std::chrono::milliseconds(500)) {
+      if (options_.progress && tick % 64 == 0 &&
+          std::chrono::steady_clock::now() - said > std::chrono::milliseconds(500)) {
         said = std::chrono::steady_clock::now();
         options_.progress(fmt::format("tick {} of {} ({:.0f} %)", tick, ticks_,
                                       100.0 * static_cast<double>(tick) / static_cast<double>(ticks_)));
@@ -122,7 +128,8 @@ class Run {
     result_.ticks = ticks_;
     result_.state_hash = hash_state(hash_, state_);
     if (ticks_ > 0) result_.rms_force_N = std::sqrt(sum_force2_ / static_cast<double>(ticks_));
-    if (result_.error.samples > 0) result_.error.rms_N = std::sqrt(result_.error.rms_N / result_.error.samples);
+    if (result_.error.samples > 0)
+      result_.error.rms_N = std::sqrt(result_.error.rms_N / result_.error.samples);
     return std::move(result_);
   }
 
@@ -143,7 +150,8 @@ class Run {
     }
     if (!options_.keep_rows) return;
     result_.rows.push_back({static_cast<double>(tick) * dt_, felt.device_m, felt.proxy_m, felt.force_N,
-                            glm::length(felt.rigid_N), glm::length(felt.soft_N), felt.contacts, felt.tick_us});
+                            glm::length(felt.rigid_N), glm::length(felt.soft_N), felt.contacts,
+                            felt.tick_us});
   }
 
   // Evenly over the time in which something soft is felt.
@@ -151,7 +159,8 @@ class Run {
     bool soft = false;
     for (const voxel::Reaction& r : state_.reactions) soft = soft || r.pressed > 0;
     if (!soft || ++soft_ticks_ % every != every / 2) return;
-    if (options_.progress) options_.progress(fmt::format("comparing the force at tick {} with its equilibrium", state_.tick));
+    if (options_.progress)
+      options_.progress(fmt::format("comparing the force at tick {} with its equilibrium", state_.tick));
     const auto reference = equilibrium_force(world_, state_);
     if (!reference) return;
     const glm::dvec3 raw = world_.tool.stiffness_N_per_m * (felt.proxy_m - felt.device_m);
@@ -201,15 +210,18 @@ std::shared_ptr<const device::Path> scene_path(const Scene& scene) {
   }
 }
 
-std::unique_ptr<device::HapticDevice> scene_device(const Scene& scene, std::shared_ptr<const device::Path> path) {
+std::unique_ptr<device::HapticDevice> scene_device(const Scene& scene,
+                                                   std::shared_ptr<const device::Path> path) {
   return device::make_simulated_device(scene.device_model, scene.hand, std::move(path));
 }
 
 void begin_session(const Scene& scene, const World& world, WorldState& state, const glm::dvec3& device_m) {
   if (start_proxy(world, state, device_m)) return;
-  throw SceneError(scene.file, scene.path_place,
-                   fmt::format("the path starts at ({:.4g}, {:.4g}, {:.4g}) m, inside something rigid; start it in free space",
-                               device_m.x, device_m.y, device_m.z));
+  throw SceneError(
+      scene.file, scene.path_place,
+      fmt::format(
+          "the path starts at ({:.4g}, {:.4g}, {:.4g}) m, inside something rigid; start it in free space",
+          device_m.x, device_m.y, device_m.z));
 }
 
 SessionResult run_session(const Scene& scene, BuiltScene& built, const SessionOptions& options) {
@@ -231,8 +243,14 @@ std::uint64_t hash_state(std::uint64_t before, const WorldState& state) noexcept
 }
 
 Snapshot take_snapshot(const World& world, const WorldState& state, const TickResult& tick, double t_s) {
-  Snapshot snapshot{.tick = state.tick, .t_s = t_s, .device_m = tick.device_m, .proxy_m = tick.proxy_m,
-                    .force_N = tick.force_N, .feel = state.feel, .soft_vertices = {}, .tick_us = tick.tick_us};
+  Snapshot snapshot{.tick = state.tick,
+                    .t_s = t_s,
+                    .device_m = tick.device_m,
+                    .proxy_m = tick.proxy_m,
+                    .force_N = tick.force_N,
+                    .feel = state.feel,
+                    .soft_vertices = {},
+                    .tick_us = tick.tick_us};
   fill_soft_vertices(world, state, snapshot);
   return snapshot;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A haptic session: a built scene, a device, and ticks until the path ends. One scene builder and one session serve the
-// program, the tests and the benchmarks.
+// A haptic session: a built scene, a device, and ticks until the path ends. One scene builder and one session
+// serve the program, the tests and the benchmarks.
 #pragma once
 
 #include <cstdint>
@@ -29,15 +29,16 @@ struct RecordedTick {
 };
 
 struct SessionOptions {
-  std::optional<double> seconds;   // default: the path's length and half a second
-  bool realtime = false;           // paced by a real timer; else fixed-step, as fast as it goes
-  bool keep_rows = true;           // trace rows and per-object forces
-  bool keep_picture = false;       // remember the most telling moment
-  int reference_samples = 0;       // how often the force is compared with its equilibrium; 0 in real time
+  std::optional<double> seconds;  // default: the path's length and half a second
+  bool realtime = false;          // paced by a real timer; else fixed-step, as fast as it goes
+  bool keep_rows = true;          // trace rows and per-object forces
+  bool keep_picture = false;      // remember the most telling moment
+  int reference_samples = 0;      // how often the force is compared with its equilibrium; 0 in real time
   Progress progress;
 };
 
-struct ForceError {  // of the tick's force against the equilibrium lattice with its limits, at the sampled ticks
+struct ForceError {  // of the tick's force against the equilibrium lattice with its limits, at the sampled
+                     // ticks
   int samples = 0;
   double max_N = 0.0, rms_N = 0.0, max_jnd = 0.0;
 };
@@ -47,17 +48,17 @@ struct SessionResult {
   double dt_s = 0.0;
   std::uint64_t state_hash = 0;
   std::vector<TraceRow> rows;
-  std::vector<std::vector<double>> object_force_N;     // [object][row]
-  std::vector<std::uint64_t> object_contact_ticks;     // [object]
-  std::vector<double> object_max_force_N;              // [object]
-  std::vector<double> tick_us;                         // [tick], in order
-  std::array<std::vector<float>, kStages> stage_us;    // [stage][tick]
+  std::vector<std::vector<double>> object_force_N;   // [object][row]
+  std::vector<std::uint64_t> object_contact_ticks;   // [object]
+  std::vector<double> object_max_force_N;            // [object]
+  std::vector<double> tick_us;                       // [tick], in order
+  std::array<std::vector<float>, kStages> stage_us;  // [stage][tick]
   double max_force_N = 0.0, rms_force_N = 0.0;
   ForceError error;
-  std::optional<Snapshot> moment;                      // of keep_picture
+  std::optional<Snapshot> moment;  // of keep_picture
   std::vector<RecordedTick> recording;
-  std::string realtime_note;                           // what priority was granted
-  Percentiles late_us;                                 // how late the machine woke the loop; not part of the tick
+  std::string realtime_note;  // what priority was granted
+  Percentiles late_us;        // how late the machine woke the loop; not part of the tick
 };
 
 // Runs the scene's path to its end on its device. Throws SceneError: the tool starts inside something rigid.
@@ -65,7 +66,8 @@ SessionResult run_session(const Scene& scene, BuiltScene& built, const SessionOp
 
 // The pieces, for callers that drive the loop themselves.
 std::shared_ptr<const device::Path> scene_path(const Scene& scene);
-std::unique_ptr<device::HapticDevice> scene_device(const Scene& scene, std::shared_ptr<const device::Path> path);
+std::unique_ptr<device::HapticDevice> scene_device(const Scene& scene,
+                                                   std::shared_ptr<const device::Path> path);
 // Starts the proxy or throws SceneError.
 void begin_session(const Scene& scene, const World& world, WorldState& state, const glm::dvec3& device_m);
 
@@ -76,10 +78,11 @@ std::uint64_t hash_state(std::uint64_t before, const WorldState& state) noexcept
 // A snapshot of now.
 Snapshot take_snapshot(const World& world, const WorldState& state, const TickResult& tick, double t_s);
 
-// The force that the present device position would be answered with once everything soft has come to rest (N), found on
-// a copy of the state, until it changes by less than `tolerance_N` over dozens of whole relaxation cycles. Empty when it
-// does not settle.
-std::optional<glm::dvec3> equilibrium_force(const World& world, const WorldState& state, double tolerance_N = 1e-4);
+// The force that the present device position would be answered with once everything soft has come to rest
+// (N), found on a copy of the state, until it changes by less than `tolerance_N` over dozens of whole
+// relaxation cycles. Empty when it does not settle.
+std::optional<glm::dvec3> equilibrium_force(const World& world, const WorldState& state,
+                                            double tolerance_N = 1e-4);
 
 // |a − b| in just noticeable differences: 7 % of the reference, and no less than the floor (N).
 inline constexpr double kJndShare = 0.07;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What graphics may know of a session: fixed surfaces once, and a snapshot of what moves. The core never opens a
-// window; picture and viewer read these and nothing else.
+// What graphics may know of a session: fixed surfaces once, and a snapshot of what moves. The core never
+// opens a window; picture and viewer read these and nothing else.
 #pragma once
 
 #include <cstdint>
@@ -35,8 +35,9 @@ struct Snapshot {
   std::uint64_t tick = 0;
   double t_s = 0.0;
   glm::dvec3 device_m{0.0}, proxy_m{0.0}, force_N{0.0};  // scene frame
-  std::vector<ObjectFeel> feel;                           // one an object
-  // One an object: empty for a rigid one; for a soft one the vertices of its surface as they are now (scene frame).
+  std::vector<ObjectFeel> feel;                          // one an object
+  // One an object: empty for a rigid one; for a soft one the vertices of its surface as they are now (scene
+  // frame).
   std::vector<std::vector<glm::vec3>> soft_vertices;
   double tick_us = 0.0;
 };
@@ -46,7 +47,7 @@ struct TraceRow {
   double t_s = 0.0;
   glm::dvec3 device_m{0.0}, proxy_m{0.0}, force_N{0.0};
   double rigid_N = 0.0, soft_N = 0.0;
-  std::uint32_t contacts = 0;        // bit per object (objects beyond 32 share the last bit)
+  std::uint32_t contacts = 0;  // bit per object (objects beyond 32 share the last bit)
   double tick_us = 0.0;
 };
 

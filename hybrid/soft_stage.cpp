@@ -17,7 +17,8 @@ const glm::dvec3 kPunchAxis(0.0, 0.0, -1.0);  // a punch presses downwards in th
 
 voxel::ToolInBody tool_in_body(const World& world, const SoftBody& body, const glm::dvec3& point) noexcept {
   voxel::ToolInBody tool;
-  tool.shape = world.tool.shape == Tool::Shape::punch ? voxel::ToolInBody::Shape::punch : voxel::ToolInBody::Shape::ball;
+  tool.shape = world.tool.shape == Tool::Shape::punch ? voxel::ToolInBody::Shape::punch
+                                                      : voxel::ToolInBody::Shape::ball;
   tool.centre = body.to_body(point);
   tool.axis = glm::inverse(body.pose.rotation) * kPunchAxis;
   tool.radius = world.tool.radius_m;
@@ -32,8 +33,10 @@ double soft_reach(const World& world, const WorldState& state) noexcept {
 
 namespace {
 
-// Of the first `count` voxels found, those within reach and `range` of the tool. False: an object has more than fit.
-bool list_touched(const World& world, WorldState& state, const glm::dvec3& point, double range, std::size_t count) noexcept {
+// Of the first `count` voxels found, those within reach and `range` of the tool. False: an object has more
+// than fit.
+bool list_touched(const World& world, WorldState& state, const glm::dvec3& point, double range,
+                  std::size_t count) noexcept {
   for (auto& list : state.touched) list.clear();
   bool fits = true;
   for (std::size_t i = 0; i < count; ++i) {
@@ -121,7 +124,8 @@ void refresh_map(const World& world, WorldState& state) noexcept {
     const auto surface = object.lattice().surface();
     const auto look = [&](voxel::VoxelId v) {
       const std::uint32_t s = object.surface_number(v);
-      if (s != voxel::SoftObject::kNoSurface) state.map.move(body.first_number + s, body.to_scene(object.position(v)));
+      if (s != voxel::SoftObject::kNoSurface)
+        state.map.move(body.first_number + s, body.to_scene(object.position(v)));
     };
     for (const voxel::VoxelId v : object.touched()) look(v);
     if (object.asleep() && state.cursor[o] == 0) continue;  // a whole round since it came to rest

@@ -6,12 +6,13 @@
 
 namespace hybrid {
 
-// Hands each soft object its surface voxels within `range` of the tool at `point` (scene frame) beyond its reach. True when any is
-// near. Where they are more than fit, `range` becomes smaller: the tool may not go further than that in this tick.
+// Hands each soft object its surface voxels within `range` of the tool at `point` (scene frame) beyond its
+// reach. True when any is near. Where they are more than fit, `range` becomes smaller: the tool may not go
+// further than that in this tick.
 bool touch_soft(const World& world, WorldState& state, const glm::dvec3& point, double& range) noexcept;
 
-// Tool moved to `point` by `delta`: pressed voxels follow, the rest is pushed out, the neighbourhood relaxes by `sweeps`,
-// and state.reactions are what each object then answers (scene frame).
+// Tool moved to `point` by `delta`: pressed voxels follow, the rest is pushed out, the neighbourhood relaxes
+// by `sweeps`, and state.reactions are what each object then answers (scene frame).
 void press_soft(const World& world, WorldState& state, const glm::dvec3& point, const glm::dvec3& delta,
                 int sweeps) noexcept;
 
@@ -24,7 +25,8 @@ voxel::ToolInBody tool_in_body(const World& world, const SoftBody& body, const g
 // Largest distance from the tool's centre at which it can touch a voxel of any soft object (unit: meter).
 double soft_reach(const World& world, const WorldState& state) noexcept;
 
-// Tells the map where surface voxels are now: those near the tool, those the chain moved, and a slice of the rest.
+// Tells the map where surface voxels are now: those near the tool, those the chain moved, and a slice of the
+// rest.
 void refresh_map(const World& world, WorldState& state) noexcept;
 
 }  // namespace hybrid

@@ -17,24 +17,26 @@
 namespace hybrid {
 namespace {
 
-constexpr int kPasses = 3;            // proxy and tissue answer one another this often a tick
-constexpr int kSweeps = 1;            // of the contact's neighbourhood, a pass
-constexpr double kSoftStep = 0.25;    // of the tool's reach: the proxy moves no further against tissue in one pass
-constexpr double kStill = 1e-5;       // of the tool's radius: a pass that moves the proxy less is the last
-constexpr double kForget = 0.9;       // of the hidden stiffness is kept from pass to pass
-constexpr double kOvershoot = 0.25;   // of the pull before, turned round: a step that overshot
+constexpr int kPasses = 3;  // proxy and tissue answer one another this often a tick
+constexpr int kSweeps = 1;  // of the contact's neighbourhood, a pass
+constexpr double kSoftStep =
+    0.25;                        // of the tool's reach: the proxy moves no further against tissue in one pass
+constexpr double kStill = 1e-5;  // of the tool's radius: a pass that moves the proxy less is the last
+constexpr double kForget = 0.9;  // of the hidden stiffness is kept from pass to pass
+constexpr double kOvershoot = 0.25;     // of the pull before, turned round: a step that overshot
 constexpr double kMostOvershoot = 3.0;  // believed of one step
-constexpr double kMostHidden = 50.0;  // hidden stiffness at most, of the model's
-constexpr int kMaxFreePieces = 512;   // of the way through free space looked at in one tick
+constexpr double kMostHidden = 50.0;    // hidden stiffness at most, of the model's
+constexpr int kMaxFreePieces = 512;     // of the way through free space looked at in one tick
 
-// Stages by the wall clock, which is cheap; the whole tick by the thread's own processor time, because on a shared machine a
-// tick that was put aside for another process is not a slow tick.
+// Stages by the wall clock, which is cheap; the whole tick by the thread's own processor time, because on a
+// shared machine a tick that was put aside for another process is not a slow tick.
 class StageClock {
  public:
   explicit StageClock(TickResult& result) : result_(result), start_us_(own_time_us()), last_(Clock::now()) {}
   void done(Stage stage) noexcept {
     const auto now = Clock::now();
-    result_.stage_us[static_cast<std::size_t>(stage)] += std::chrono::duration<float, std::micro>(now - last_).count();
+    result_.stage_us[static_cast<std::size_t>(stage)] +=
+        std::chrono::duration<float, std::micro>(now - last_).count();
     last_ = now;
   }
   void stop() noexcept { result_.tick_us = own_time_us() - start_us_; }
@@ -52,7 +54,9 @@ class StageClock {
   Clock::time_point last_;
 };
 
-bool finite(const glm::dvec3& v) noexcept { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+bool finite(const glm::dvec3& v) noexcept {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
 
 glm::dvec3 check_input(WorldState& state, const device::DeviceState& input) noexcept {
   if (finite(input.position_m)) {
@@ -73,7 +77,8 @@ bool advance_through_free_space(const World& world, WorldState& state, const glm
     const double length = glm::length(way);
     const bool last = length <= piece;
     const glm::dvec3 next = last ? goal : state.proxy_m + way * (piece / length);
-    if (state.map.any_near(glm::min(state.proxy_m, next) - margin, glm::max(state.proxy_m, next) + margin)) return false;
+    if (state.map.any_near(glm::min(state.proxy_m, next) - margin, glm::max(state.proxy_m, next) + margin))
+      return false;
     state.proxy_m = next;
     if (last) return true;
   }
@@ -87,10 +92,11 @@ glm::dvec3 pull_on_proxy(const World& world, const WorldState& state, const glm:
   return pull;
 }
 
-// The tissue's model is that of the voxels pressed now. Where a chain tightens as the proxy moves, or new voxels are met, it
-// answers stiffer than that, and a step by the model alone would jump to and fro for ever. When a step overshot, so
-// that the pull turned round, the stiffness that would have landed right is kept, and forgotten over some passes. (Taking the
-// secant of every step was rejected: tissue that relaxes meanwhile looks as stiff as one likes on a short step.)
+// The tissue's model is that of the voxels pressed now. Where a chain tightens as the proxy moves, or new
+// voxels are met, it answers stiffer than that, and a step by the model alone would jump to and fro for ever.
+// When a step overshot, so that the pull turned round, the stiffness that would have landed right is kept,
+// and forgotten over some passes. (Taking the secant of every step was rejected: tissue that relaxes
+// meanwhile looks as stiff as one likes on a short step.)
 void learn_stiffness(const World& world, WorldState& state, const glm::dvec3& delta, const glm::dvec3& before,
                      const glm::dvec3& after, const glm::dmat3& model, const glm::dmat3& used) noexcept {
   state.hidden_stiffness_N_per_m *= kForget;
@@ -99,21 +105,23 @@ void learn_stiffness(const World& world, WorldState& state, const glm::dvec3& de
   if (square < still * still || wanted <= 0.0) return;
   const double overshoot = std::min(-glm::dot(after, delta) / wanted, kMostOvershoot);
   if (overshoot < kOvershoot) return;
-  const double along_model = glm::dot(delta, model * delta) / square, along_used = glm::dot(delta, used * delta) / square;
+  const double along_model = glm::dot(delta, model * delta) / square,
+               along_used = glm::dot(delta, used * delta) / square;
   const double hidden = std::min(along_used * (1.0 + overshoot) - along_model, kMostHidden * along_model);
   state.hidden_stiffness_N_per_m = std::max(state.hidden_stiffness_N_per_m, hidden);
 }
 
 // One pass: the proxy goes to the minimum of ½K|q − x|² plus the tissue's quadratic model, outside everything
 // rigid; then the tissue answers. Returns how far the proxy went.
-double move_proxy(const World& world, WorldState& state, const glm::dvec3& device, bool near_soft, double travel,
-                  Sweep& sweep) noexcept {
+double move_proxy(const World& world, WorldState& state, const glm::dvec3& device, bool near_soft,
+                  double travel, Sweep& sweep) noexcept {
   const double k = world.tool.stiffness_N_per_m;
   glm::dmat3 model(k);
   for (const voxel::Reaction& reaction : state.reactions) model += reaction.stiffness_N_per_m;
   const glm::dmat3 metric = model + glm::dmat3(state.hidden_stiffness_N_per_m);
   const glm::dvec3 pull = pull_on_proxy(world, state, device);
-  sweep = sweep_proxy(world, state, state.proxy_m, state.proxy_m + glm::inverse(metric) * pull, metric, travel);
+  sweep =
+      sweep_proxy(world, state, state.proxy_m, state.proxy_m + glm::inverse(metric) * pull, metric, travel);
   const glm::dvec3 delta = sweep.point - state.proxy_m;
   state.proxy_m = sweep.point;
   if (near_soft) {
@@ -123,8 +131,8 @@ double move_proxy(const World& world, WorldState& state, const glm::dvec3& devic
   return glm::length(delta);
 }
 
-// Tissue that anchors, bone or its own chain keep from leaving the tool's way: the tool leaves its way instead, if need be
-// back to `before`, where it was at the start of the tick.
+// Tissue that anchors, bone or its own chain keep from leaving the tool's way: the tool leaves its way
+// instead, if need be back to `before`, where it was at the start of the tick.
 void give_way(const World& world, WorldState& state, const glm::dvec3& before, Sweep& sweep) noexcept {
   const double radius = world.tool.radius_m;
   if (!gather_planes(world, state, state.proxy_m, 2.0 * radius)) return;
@@ -139,7 +147,8 @@ void give_way(const World& world, WorldState& state, const glm::dvec3& before, S
 
 }  // namespace
 
-TickResult haptic_tick(const World& world, WorldState& state, const device::DeviceState& input, double dt_s) noexcept {
+TickResult haptic_tick(const World& world, WorldState& state, const device::DeviceState& input,
+                       double dt_s) noexcept {
   TickResult result;
   StageClock clock(result);
   const glm::dvec3 device = check_input(state, input);
@@ -147,8 +156,10 @@ TickResult haptic_tick(const World& world, WorldState& state, const device::Devi
   Sweep sweep;
 
   bool near_soft = false;
-  // Against tissue no further in a tick than was looked, part of its reach at a time, so that no voxel is jumped over.
-  double range = state.soft.empty() ? std::numeric_limits<double>::max() : kPasses * kSoftStep * soft_reach(world, state);
+  // Against tissue no further in a tick than was looked, part of its reach at a time, so that no voxel is
+  // jumped over.
+  double range = state.soft.empty() ? std::numeric_limits<double>::max()
+                                    : kPasses * kSoftStep * soft_reach(world, state);
   const bool free = advance_through_free_space(world, state, device);
   if (!free && !state.soft.empty()) {
     near_soft = touch_soft(world, state, state.proxy_m, range);
@@ -164,7 +175,8 @@ TickResult haptic_tick(const World& world, WorldState& state, const device::Devi
   if (!near_soft) state.hidden_stiffness_N_per_m = 0.0;
   if (near_soft) press_soft(world, state, state.proxy_m, glm::dvec3(0.0), 0);
   for (int pass = 0; pass < kPasses && !free; ++pass) {
-    const double moved = move_proxy(world, state, device, near_soft, near_soft ? range / kPasses : range, sweep);
+    const double moved =
+        move_proxy(world, state, device, near_soft, near_soft ? range / kPasses : range, sweep);
     if (!near_soft || (pass > 0 && moved < kStill * world.tool.radius_m)) break;
   }
   if (near_soft) give_way(world, state, before, sweep);

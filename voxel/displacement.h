@@ -27,8 +27,8 @@ struct Displacement {
     for (auto& axis : u) axis.assign(lattice.size(), 0.0F);
   }
 
-  std::array<std::vector<float>, 3> u;      // [axis][v] (unit: meter)
-  std::vector<std::uint8_t> role;           // [v]
+  std::array<std::vector<float>, 3> u;                 // [axis][v] (unit: meter)
+  std::vector<std::uint8_t> role;                      // [v]
   std::vector<std::uint16_t> row_held, row_obstacles;  // [row]: voxels of the row with that role
 
   [[nodiscard]] glm::dvec3 at(VoxelId v) const { return {u[0][v], u[1][v], u[2][v]}; }
@@ -38,7 +38,8 @@ struct Displacement {
   void set_role(VoxelId v, Role r, const Lattice& lattice) {
     const std::size_t row = v / static_cast<std::size_t>(lattice.springs().dims[0]);
     row_held[row] = static_cast<std::uint16_t>(row_held[row] + (r == held) - (role[v] == held));
-    row_obstacles[row] = static_cast<std::uint16_t>(row_obstacles[row] + (r == obstacle) - (role[v] == obstacle));
+    row_obstacles[row] =
+        static_cast<std::uint16_t>(row_obstacles[row] + (r == obstacle) - (role[v] == obstacle));
     role[v] = r;
   }
 };

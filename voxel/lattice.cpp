@@ -19,13 +19,16 @@ LinkModuli moduli_of(const LinkMaterial& material) {
 }
 
 // Two half links in series, each of its own material.
-double in_series(double a, double b) { return 2.0 * a * b / (a + b); }
+double in_series(double a, double b) {
+  return 2.0 * a * b / (a + b);
+}
 
 void check_material(std::size_t label, const LinkMaterial& m) {
   const auto say = [label](const std::string& what) {
     throw std::invalid_argument("the material of label " + std::to_string(label) + " has " + what);
   };
-  if (!std::isfinite(m.young_Pa) || m.young_Pa <= 0.0) say("a Young's modulus that is not positive; give Pa, e.g. 5000");
+  if (!std::isfinite(m.young_Pa) || m.young_Pa <= 0.0)
+    say("a Young's modulus that is not positive; give Pa, e.g. 5000");
   if (!(m.poisson >= 0.0 && m.poisson < 0.5)) say("a Poisson's ratio outside 0 <= nu < 0.5");
   if (!(m.stretch_min > 0.0 && m.stretch_min <= 1.0)) say("a least stretch outside 0 < min <= 1");
   if (!(m.stretch_max >= 1.0 && std::isfinite(m.stretch_max))) say("a greatest stretch below 1");
@@ -61,11 +64,13 @@ void Lattice::fill_labels(const LabelVolume& volume) {
   }
   std::size_t expected = 1;
   for (const int n : volume.dims) expected *= static_cast<std::size_t>(std::max(n, 0));
-  if (volume.labels.size() != expected) throw std::invalid_argument("a label volume must hold one label a voxel");
+  if (volume.labels.size() != expected)
+    throw std::invalid_argument("a label volume must hold one label a voxel");
   springs_.stride = {1, static_cast<std::size_t>(springs_.dims[0]),
                      static_cast<std::size_t>(springs_.dims[0]) * static_cast<std::size_t>(springs_.dims[1])};
   label_.assign(cells, 0);
-  springs_.row.assign(static_cast<std::size_t>(springs_.dims[1]) * static_cast<std::size_t>(springs_.dims[2]), {0, 0});
+  springs_.row.assign(static_cast<std::size_t>(springs_.dims[1]) * static_cast<std::size_t>(springs_.dims[2]),
+                      {0, 0});
   for (int k = 0; k < volume.dims[2]; ++k) {
     for (int j = 0; j < volume.dims[1]; ++j) {
       auto& row = springs_.row[static_cast<std::size_t>(k + 1) * static_cast<std::size_t>(springs_.dims[1]) +
@@ -145,7 +150,8 @@ void Lattice::fill_anchors(const LabelVolume& volume, const LatticeOptions& opti
     if (held) anchored_[v] = 1;
   }
   for (const std::size_t index : options.anchor_voxels) {
-    if (index >= volume.labels.size()) throw std::invalid_argument("an anchored voxel lies outside the volume");
+    if (index >= volume.labels.size())
+      throw std::invalid_argument("an anchored voxel lies outside the volume");
     const auto nx = static_cast<std::size_t>(volume.dims[0]), ny = static_cast<std::size_t>(volume.dims[1]);
     const VoxelId v = at(static_cast<int>(index % nx) + 1, static_cast<int>(index / nx % ny) + 1,
                          static_cast<int>(index / (nx * ny)) + 1);
@@ -165,7 +171,8 @@ void Lattice::fill_anchors(const LabelVolume& volume, const LatticeOptions& opti
         const float* k = springs_.stiffness(axis, d);
         sum += static_cast<double>(k[v]) + static_cast<double>(k[v - stride(d)]);
       }
-      if (sum > 0.0) springs_.inverse_diagonal[static_cast<std::size_t>(axis)][v] = static_cast<float>(1.0 / sum);
+      if (sum > 0.0)
+        springs_.inverse_diagonal[static_cast<std::size_t>(axis)][v] = static_cast<float>(1.0 / sum);
     }
   }
 }
@@ -190,7 +197,8 @@ void Lattice::fill_limits(const LatticeOptions& options) {
     const double h = spacing_m_[d];
     auto& table = limits_[static_cast<std::size_t>(d)];
     LinkLimit& tightest = tightest_[static_cast<std::size_t>(d)];
-    tightest = {-std::numeric_limits<float>::max(), std::numeric_limits<float>::max(), std::numeric_limits<float>::max()};
+    tightest = {-std::numeric_limits<float>::max(), std::numeric_limits<float>::max(),
+                std::numeric_limits<float>::max()};
     for (const LinkMaterial& a : classes) {
       for (const LinkMaterial& b : classes) {
         // A link of two materials is half of each, so its limits are their means.
@@ -217,7 +225,8 @@ void Lattice::find_surface() {
 }
 
 std::size_t Lattice::memory_bytes() const {
-  return size() * (2 + 9 * sizeof(float)) + surface_.size() * sizeof(VoxelId) + springs_.row.size() * sizeof(springs_.row[0]);
+  return size() * (2 + 9 * sizeof(float)) + surface_.size() * sizeof(VoxelId) +
+         springs_.row.size() * sizeof(springs_.row[0]);
 }
 
 }  // namespace voxel

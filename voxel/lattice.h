@@ -20,8 +20,9 @@ namespace voxel {
 
 using VoxelId = std::uint32_t;  // index into the padded grid
 
-// What a label is made of. Springs of E·A/h along a link and G·A/h across it (h its length, A the area a link stands
-// for), G = E / (4(1−ν²)): pressing a face then feels the contact modulus E/(1−ν²) of the elastic half-space.
+// What a label is made of. Springs of E·A/h along a link and G·A/h across it (h its length, A the area a link
+// stands for), G = E / (4(1−ν²)): pressing a face then feels the contact modulus E/(1−ν²) of the elastic
+// half-space.
 struct LinkMaterial {
   double young_Pa = 5e3;
   double poisson = 0.3;
@@ -40,17 +41,17 @@ struct LatticeOptions {
   std::array<LinkMaterial, 256> materials;  // by label; [0] unused
   std::vector<std::string> anchor_faces;    // "-x" … "+z": outermost voxels on that side of the lattice
   std::vector<std::uint8_t> anchor_labels;
-  std::vector<std::size_t> anchor_voxels;   // indices into the volume's labels
+  std::vector<std::size_t> anchor_voxels;  // indices into the volume's labels
 };
 
 // Springs of one level of the multigrid hierarchy; level 0 is the lattice itself.
 struct Springs {
-  std::array<int, 3> dims{0, 0, 0};                     // padded
+  std::array<int, 3> dims{0, 0, 0};  // padded
   std::array<std::size_t, 3> stride{1, 0, 0};
-  std::array<std::vector<float>, 3> along;              // [d][v]: stiffness along link v → v+stride(d) (N/m)
-  std::array<std::vector<float>, 3> across;             // [d][v]: across it
-  std::array<std::vector<float>, 3> inverse_diagonal;   // [axis][v]: 1 / Σ stiffness; 0 where nothing may move
-  std::vector<std::array<int, 2>> row;                  // [k·dims[1] + j]: first and one past last filled voxel
+  std::array<std::vector<float>, 3> along;             // [d][v]: stiffness along link v → v+stride(d) (N/m)
+  std::array<std::vector<float>, 3> across;            // [d][v]: across it
+  std::array<std::vector<float>, 3> inverse_diagonal;  // [axis][v]: 1 / Σ stiffness; 0 where nothing may move
+  std::vector<std::array<int, 2>> row;  // [k·dims[1] + j]: first and one past last filled voxel
 
   [[nodiscard]] std::size_t size() const { return row.size() * static_cast<std::size_t>(dims[0]); }
   [[nodiscard]] const float* stiffness(int axis, int d) const {
@@ -61,8 +62,8 @@ struct Springs {
 
 class Lattice {
  public:
-  // Throws std::invalid_argument in words: no voxel, no anchor (a free object has no equilibrium force), a material
-  // out of range, more than 2^31 cells.
+  // Throws std::invalid_argument in words: no voxel, no anchor (a free object has no equilibrium force), a
+  // material out of range, more than 2^31 cells.
   Lattice(const LabelVolume& volume, const LatticeOptions& options);
 
   [[nodiscard]] const Springs& springs() const { return springs_; }
@@ -77,7 +78,8 @@ class Lattice {
   [[nodiscard]] const glm::dvec3& spacing_m() const { return spacing_m_; }
   [[nodiscard]] double min_spacing_m() const { return min_spacing_m_; }
   [[nodiscard]] double max_spacing_m() const { return max_spacing_m_; }
-  // Force that stretches an average link to twice its length (unit: newton): the scale by which residuals are small.
+  // Force that stretches an average link to twice its length (unit: newton): the scale by which residuals are
+  // small.
   [[nodiscard]] double force_scale_N() const { return force_scale_N_; }
 
   // Centre of a voxel at rest, volume frame (unit: meter).
@@ -86,7 +88,8 @@ class Lattice {
     return {(c[0] - 1) * spacing_m_.x, (c[1] - 1) * spacing_m_.y, (c[2] - 1) * spacing_m_.z};
   }
   [[nodiscard]] std::array<int, 3> coordinates(VoxelId v) const {  // padded
-    const auto nx = static_cast<std::uint32_t>(springs_.dims[0]), ny = static_cast<std::uint32_t>(springs_.dims[1]);
+    const auto nx = static_cast<std::uint32_t>(springs_.dims[0]),
+               ny = static_cast<std::uint32_t>(springs_.dims[1]);
     return {static_cast<int>(v % nx), static_cast<int>((v / nx) % ny), static_cast<int>(v / (nx * ny))};
   }
   [[nodiscard]] VoxelId at(int i, int j, int k) const {  // padded coordinates
@@ -102,7 +105,8 @@ class Lattice {
   // Bounds of u(b) − u(a) on `axis` for the link v → v+stride(d).
   [[nodiscard]] std::array<float, 2> bounds(VoxelId v, int d, int axis) const {
     const LinkLimit& l = limit(v, d);
-    return axis == d ? std::array<float, 2>{l.along_low, l.along_high} : std::array<float, 2>{-l.across, l.across};
+    return axis == d ? std::array<float, 2>{l.along_low, l.along_high}
+                     : std::array<float, 2>{-l.across, l.across};
   }
   // No link in direction d is tighter than this: where it holds, no link needs to be looked at one by one.
   [[nodiscard]] const LinkLimit& tightest(int d) const { return tightest_[static_cast<std::size_t>(d)]; }
@@ -123,8 +127,8 @@ class Lattice {
   std::size_t voxel_count_ = 0, anchored_count_ = 0, class_count_ = 1;
   std::vector<std::uint8_t> label_, anchored_;
   std::vector<VoxelId> surface_;
-  std::array<std::size_t, 256> limit_class_{};           // label → class of equal limits
-  std::array<std::vector<LinkLimit>, 3> limits_;         // [d][class a · class_count + class b]
+  std::array<std::size_t, 256> limit_class_{};    // label → class of equal limits
+  std::array<std::vector<LinkLimit>, 3> limits_;  // [d][class a · class_count + class b]
   std::array<LinkLimit, 3> tightest_;
 };
 

@@ -7,8 +7,8 @@ namespace voxel {
 namespace {
 
 struct End {
-  glm::dvec3 free_place;   // where its links alone would have it, scene frame
-  glm::dvec3 compliance;   // per body axis (m/N); 0 where it is anchored
+  glm::dvec3 free_place;  // where its links alone would have it, scene frame
+  glm::dvec3 compliance;  // per body axis (m/N); 0 where it is anchored
 };
 
 End end_of(const PosedObject& o, VoxelId v) noexcept {
@@ -30,7 +30,8 @@ void place(const PosedObject& o, VoxelId v, const glm::dvec3& in_scene) noexcept
 double relax_pair(const PosedObject& a, VoxelId va, const PosedObject& b, VoxelId vb) noexcept {
   End ea = end_of(a, va), eb = end_of(b, vb);
   const double apart = a.object.voxel_radius() + b.object.voxel_radius();
-  // The direction is that of the voxels as they are: their free places may lie on the wrong side of one another.
+  // The direction is that of the voxels as they are: their free places may lie on the wrong side of one
+  // another.
   const glm::dvec3 now = (b.pose.origin + b.pose.rotation * b.object.position(vb)) -
                          (a.pose.origin + a.pose.rotation * a.object.position(va));
   const double length = glm::length(now);

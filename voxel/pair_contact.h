@@ -20,9 +20,10 @@ struct PosedObject {
   const BodyPose& pose;
 };
 
-// One step of block Gauss-Seidel on a pair: both voxels go to the joint minimum of their link energies subject to not
-// overlapping. Overlap is shared in inverse proportion to stiffness, and at rest the two press with equal and opposite
-// force. Returns the distance between the two surfaces afterwards (unit: meter; 0 in contact).
+// One step of block Gauss-Seidel on a pair: both voxels go to the joint minimum of their link energies
+// subject to not overlapping. Overlap is shared in inverse proportion to stiffness, and at rest the two press
+// with equal and opposite force. Returns the distance between the two surfaces afterwards (unit: meter; 0 in
+// contact).
 double relax_pair(const PosedObject& a, VoxelId va, const PosedObject& b, VoxelId vb) noexcept;
 
 }  // namespace voxel

@@ -11,21 +11,24 @@ namespace {
 
 constexpr int kCoarsestSweeps = 8;
 constexpr std::size_t kMaxLevels = 10;
-constexpr double kTouching = 1e-6;      // of the spacing: nearer to its obstacle than this a voxel lies on it
-constexpr int kPatience = 40;          // cycles without gain before an object counts as resting
-constexpr double kGain = 0.98;         // of the least residual so far: less is a gain
+constexpr double kTouching = 1e-6;  // of the spacing: nearer to its obstacle than this a voxel lies on it
+constexpr int kPatience = 40;       // cycles without gain before an object counts as resting
+constexpr double kGain = 0.98;      // of the least residual so far: less is a gain
 
 VoxelId cell_at(const Springs& s, int i, int j, int k) {
   return static_cast<VoxelId>(static_cast<std::size_t>(i) + static_cast<std::size_t>(j) * s.stride[1] +
                               static_cast<std::size_t>(k) * s.stride[2]);
 }
 // Padded index of the cell that holds padded index i of the next finer level.
-constexpr int parent(int i) { return (i + 1) / 2; }
+constexpr int parent(int i) {
+  return (i + 1) / 2;
+}
 
 std::vector<std::uint64_t> costs_by_plane(const Springs& s) {
   std::vector<std::uint64_t> cost(static_cast<std::size_t>(s.dims[2]), 0);
   for (std::size_t row = 0; row < s.row.size(); ++row) {
-    cost[row / static_cast<std::size_t>(s.dims[1])] += static_cast<std::uint64_t>(s.row[row][1] - s.row[row][0]);
+    cost[row / static_cast<std::size_t>(s.dims[1])] +=
+        static_cast<std::uint64_t>(s.row[row][1] - s.row[row][0]);
   }
   return cost;
 }
@@ -94,7 +97,9 @@ void Relaxation::stir(std::size_t row) noexcept {
   unseen_[row] = unseen_[row - 1] = unseen_[row + 1] = unseen_[row - across] = unseen_[row + across] = 1;
 }
 
-void Relaxation::stir_all() noexcept { std::fill(unseen_.begin(), unseen_.end(), std::uint8_t{1}); }
+void Relaxation::stir_all() noexcept {
+  std::fill(unseen_.begin(), unseen_.end(), std::uint8_t{1});
+}
 
 void Relaxation::build_level(const Springs& fine, const std::vector<float>& fine_filled,
                              const std::vector<std::uint8_t>& fine_fixed, Level& coarse,
@@ -124,7 +129,8 @@ void Relaxation::build_level(const Springs& fine, const std::vector<float>& fine
         if (fine_filled[v] == 0.0F) continue;
         const VoxelId cell = cell_at(s, parent(i), parent(j), parent(k));
         coarse.filled[cell] = 1.0F;
-        // A cell with any anchor is held: an underestimate of the correction beside an anchor, never a wrong one.
+        // A cell with any anchor is held: an underestimate of the correction beside an anchor, never a wrong
+        // one.
         if (fine_fixed[v] != 0) fixed[cell] = 1;
         const std::array<int, 3> c{i, j, k};
         for (std::size_t d = 0; d < 3; ++d) {
@@ -138,7 +144,8 @@ void Relaxation::build_level(const Springs& fine, const std::vector<float>& fine
   }
   for (int k = 1; k + 1 < s.dims[2]; ++k) {
     for (int j = 1; j + 1 < s.dims[1]; ++j) {
-      auto& row = s.row[static_cast<std::size_t>(k) * static_cast<std::size_t>(s.dims[1]) + static_cast<std::size_t>(j)];
+      auto& row = s.row[static_cast<std::size_t>(k) * static_cast<std::size_t>(s.dims[1]) +
+                        static_cast<std::size_t>(j)];
       for (int i = 1; i + 1 < s.dims[0]; ++i) {
         const VoxelId v = cell_at(s, i, j, k);
         if (coarse.filled[v] == 0.0F) continue;
@@ -165,8 +172,8 @@ int Relaxation::planes(const Step& step) const {
   return springs(level).dims[2];
 }
 
-std::uint64_t Relaxation::run(Displacement& state, const ObstacleView& obstacles, std::span<const VoxelId> held,
-                              std::uint64_t budget) noexcept {
+std::uint64_t Relaxation::run(Displacement& state, const ObstacleView& obstacles,
+                              std::span<const VoxelId> held, std::uint64_t budget) noexcept {
   std::uint64_t spent = 0;
   while (!asleep_ && spent < budget) {
     if (step_ == 0 && plane_ == 1) begin_cycle(held);
@@ -194,9 +201,12 @@ void Relaxation::begin_cycle(std::span<const VoxelId> held) noexcept {
           s.inverse_diagonal[2][cell] == 0.0F) {
         break;  // held already, and so are the cells above it
       }
-      if (held_cells_.size() == held_cells_.capacity()) return;  // the rest moves a little with the correction
-      held_cells_.push_back({static_cast<std::uint8_t>(level), cell,
-                             {s.inverse_diagonal[0][cell], s.inverse_diagonal[1][cell], s.inverse_diagonal[2][cell]}});
+      if (held_cells_.size() == held_cells_.capacity())
+        return;  // the rest moves a little with the correction
+      held_cells_.push_back(
+          {static_cast<std::uint8_t>(level),
+           cell,
+           {s.inverse_diagonal[0][cell], s.inverse_diagonal[1][cell], s.inverse_diagonal[2][cell]}});
       for (auto& inverse : s.inverse_diagonal) inverse[cell] = 0.0F;
     }
   }
@@ -211,8 +221,10 @@ void Relaxation::hold_cells(VoxelId v, int axis) noexcept {
     const VoxelId cell = cell_at(s, c[0], c[1], c[2]);
     float& inverse = s.inverse_diagonal[static_cast<std::size_t>(axis)][cell];
     if (inverse == 0.0F || held_cells_.size() == held_cells_.capacity()) return;
-    held_cells_.push_back({static_cast<std::uint8_t>(level), cell,
-                           {s.inverse_diagonal[0][cell], s.inverse_diagonal[1][cell], s.inverse_diagonal[2][cell]}});
+    held_cells_.push_back(
+        {static_cast<std::uint8_t>(level),
+         cell,
+         {s.inverse_diagonal[0][cell], s.inverse_diagonal[1][cell], s.inverse_diagonal[2][cell]}});
     inverse = 0.0F;
   }
 }
@@ -276,19 +288,22 @@ HYBRID_WIDE void Relaxation::smooth_coarse(Level& level, int colour, int plane) 
   const Springs& s = level.springs;
   const auto sy = static_cast<std::ptrdiff_t>(s.stride[1]), sz = static_cast<std::ptrdiff_t>(s.stride[2]);
   for (int j = 1 + ((plane + 1 + colour) & 1); j + 1 < s.dims[1]; j += 2) {
-    const std::size_t row = static_cast<std::size_t>(plane) * static_cast<std::size_t>(s.dims[1]) + static_cast<std::size_t>(j);
+    const std::size_t row =
+        static_cast<std::size_t>(plane) * static_cast<std::size_t>(s.dims[1]) + static_cast<std::size_t>(j);
     const int count = s.row[row][1] - s.row[row][0];
     if (count <= 0) continue;
-    const std::size_t begin = row * static_cast<std::size_t>(s.dims[0]) + static_cast<std::size_t>(s.row[row][0]);
+    const std::size_t begin =
+        row * static_cast<std::size_t>(s.dims[0]) + static_cast<std::size_t>(s.row[row][0]);
     for (int axis = 0; axis < 3; ++axis) {
       const auto ua = static_cast<std::size_t>(axis);
       float* e = level.correction[ua].data() + begin;
       const float *r = level.residual[ua].data() + begin, *inverse = s.inverse_diagonal[ua].data() + begin;
-      const float *kx = s.stiffness(axis, 0) + begin, *ky = s.stiffness(axis, 1) + begin, *kz = s.stiffness(axis, 2) + begin;
+      const float *kx = s.stiffness(axis, 0) + begin, *ky = s.stiffness(axis, 1) + begin,
+                  *kz = s.stiffness(axis, 2) + begin;
       float* next = scratch_.data();
       for (int i = 0; i < count; ++i) {
-        next[i] = (r[i] + kx[i - 1] * e[i - 1] + kx[i] * e[i + 1] + ky[i - sy] * e[i - sy] + ky[i] * e[i + sy] +
-                   kz[i - sz] * e[i - sz] + kz[i] * e[i + sz]) *
+        next[i] = (r[i] + kx[i - 1] * e[i - 1] + kx[i] * e[i + 1] + ky[i - sy] * e[i - sy] +
+                   ky[i] * e[i + sy] + kz[i - sz] * e[i - sz] + kz[i] * e[i + sz]) *
                   inverse[i];
       }
       std::copy_n(next, count, e);
@@ -296,12 +311,14 @@ HYBRID_WIDE void Relaxation::smooth_coarse(Level& level, int colour, int plane) 
   }
 }
 
-HYBRID_WIDE std::uint64_t Relaxation::restrict_from_lattice(const Displacement& state, const ObstacleView& obstacles,
+HYBRID_WIDE std::uint64_t Relaxation::restrict_from_lattice(const Displacement& state,
+                                                            const ObstacleView& obstacles,
                                                             int plane) noexcept {
   const Springs& s = lattice_.springs();
   Level& coarse = levels_[1];
   const auto sy = static_cast<std::ptrdiff_t>(s.stride[1]), sz = static_cast<std::ptrdiff_t>(s.stride[2]);
-  const auto coarse_plane = static_cast<std::ptrdiff_t>(static_cast<std::size_t>(plane) * coarse.springs.stride[2]);
+  const auto coarse_plane =
+      static_cast<std::ptrdiff_t>(static_cast<std::size_t>(plane) * coarse.springs.stride[2]);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     std::fill_n(coarse.residual[axis].begin() + coarse_plane, coarse.springs.stride[2], 0.0F);
     std::fill_n(coarse.correction[axis].begin() + coarse_plane, coarse.springs.stride[2], 0.0F);
@@ -310,7 +327,8 @@ HYBRID_WIDE std::uint64_t Relaxation::restrict_from_lattice(const Displacement& 
   std::uint64_t spent = 0;
   for (int k = 2 * plane - 1; k <= std::min(2 * plane, s.dims[2] - 2); ++k) {
     for (int j = 1; j + 1 < s.dims[1]; ++j) {
-      const std::size_t row = static_cast<std::size_t>(k) * static_cast<std::size_t>(s.dims[1]) + static_cast<std::size_t>(j);
+      const std::size_t row =
+          static_cast<std::size_t>(k) * static_cast<std::size_t>(s.dims[1]) + static_cast<std::size_t>(j);
       const int first = s.row[row][0], count = s.row[row][1] - first;
       if (count <= 0 || unseen_[row] == 0) continue;  // unchanged, and small: nothing to pass on
       unseen_[row] = 0;
@@ -322,25 +340,29 @@ HYBRID_WIDE std::uint64_t Relaxation::restrict_from_lattice(const Displacement& 
         const auto ua = static_cast<std::size_t>(axis);
         const float* u = state.u[ua].data() + begin;
         const float* inverse = s.inverse_diagonal[ua].data() + begin;
-        const float *kx = s.stiffness(axis, 0) + begin, *ky = s.stiffness(axis, 1) + begin, *kz = s.stiffness(axis, 2) + begin;
+        const float *kx = s.stiffness(axis, 0) + begin, *ky = s.stiffness(axis, 1) + begin,
+                    *kz = s.stiffness(axis, 2) + begin;
         float* r = scratch_.data();
         for (int i = 0; i < count; ++i) {
-          const float pull = kx[i - 1] * (u[i - 1] - u[i]) + kx[i] * (u[i + 1] - u[i]) + ky[i - sy] * (u[i - sy] - u[i]) +
-                             ky[i] * (u[i + sy] - u[i]) + kz[i - sz] * (u[i - sz] - u[i]) + kz[i] * (u[i + sz] - u[i]);
+          const float pull = kx[i - 1] * (u[i - 1] - u[i]) + kx[i] * (u[i + 1] - u[i]) +
+                             ky[i - sy] * (u[i - sy] - u[i]) + ky[i] * (u[i + sy] - u[i]) +
+                             kz[i - sz] * (u[i - sz] - u[i]) + kz[i] * (u[i + sz] - u[i]);
           // Only what may move passes its residual on.
           r[i] = inverse[i] != 0.0F && role[i] != Displacement::held ? pull : 0.0F;
         }
         if (state.row_obstacles[row] != 0) {
           // What an obstacle holds is balanced by it.
           for (int i = 0; i < count; ++i) {
-            const bool held_by_it = role[i] == Displacement::obstacle &&
-                                    blocked(obstacles, state, static_cast<VoxelId>(begin) + static_cast<VoxelId>(i), touching);
+            const bool held_by_it =
+                role[i] == Displacement::obstacle &&
+                blocked(obstacles, state, static_cast<VoxelId>(begin) + static_cast<VoxelId>(i), touching);
             if (held_by_it) r[i] = 0.0F;
           }
         }
         if (near_limits(lattice_, state, axis, begin, count)) {
-          // What the chain holds is balanced by it. Passed on, its residual would drive the coarse levels against links that do
-          // not give, and the sweeps after would undo it: a cycle that ends where it began, far from equilibrium.
+          // What the chain holds is balanced by it. Passed on, its residual would drive the coarse levels
+          // against links that do not give, and the sweeps after would undo it: a cycle that ends where it
+          // began, far from equilibrium.
           for (int i = 0; i < count; ++i) {
             const VoxelId v = static_cast<VoxelId>(begin) + static_cast<VoxelId>(i);
             if (r[i] == 0.0F || !resisted(lattice_, state, axis, v, r[i])) continue;
@@ -370,29 +392,35 @@ void Relaxation::restrict_from_level(std::size_t fine, int plane) noexcept {
   const std::size_t coarse_plane = static_cast<std::size_t>(plane) * coarse.springs.stride[2];
   for (int axis = 0; axis < 3; ++axis) {
     const auto ua = static_cast<std::size_t>(axis);
-    std::fill_n(coarse.residual[ua].begin() + static_cast<std::ptrdiff_t>(coarse_plane), coarse.springs.stride[2], 0.0F);
-    std::fill_n(coarse.correction[ua].begin() + static_cast<std::ptrdiff_t>(coarse_plane), coarse.springs.stride[2], 0.0F);
+    std::fill_n(coarse.residual[ua].begin() + static_cast<std::ptrdiff_t>(coarse_plane),
+                coarse.springs.stride[2], 0.0F);
+    std::fill_n(coarse.correction[ua].begin() + static_cast<std::ptrdiff_t>(coarse_plane),
+                coarse.springs.stride[2], 0.0F);
     const auto& e = level.correction[ua];
     const float *kx = s.stiffness(axis, 0), *ky = s.stiffness(axis, 1), *kz = s.stiffness(axis, 2);
     for (int k = 2 * plane - 1; k <= std::min(2 * plane, s.dims[2] - 2); ++k) {
       for (int j = 1; j + 1 < s.dims[1]; ++j) {
-        const std::size_t row = static_cast<std::size_t>(k) * static_cast<std::size_t>(s.dims[1]) + static_cast<std::size_t>(j);
+        const std::size_t row =
+            static_cast<std::size_t>(k) * static_cast<std::size_t>(s.dims[1]) + static_cast<std::size_t>(j);
         for (int i = s.row[row][0]; i < s.row[row][1]; ++i) {
           const std::size_t v = row * static_cast<std::size_t>(s.dims[0]) + static_cast<std::size_t>(i);
           if (s.inverse_diagonal[ua][v] == 0.0F) continue;
-          const float pull = kx[v - 1] * (e[v - 1] - e[v]) + kx[v] * (e[v + 1] - e[v]) +
-                             ky[v - s.stride[1]] * (e[v - s.stride[1]] - e[v]) + ky[v] * (e[v + s.stride[1]] - e[v]) +
-                             kz[v - s.stride[2]] * (e[v - s.stride[2]] - e[v]) + kz[v] * (e[v + s.stride[2]] - e[v]);
-          coarse.residual[ua][cell_at(coarse.springs, parent(i), parent(j), plane)] += level.residual[ua][v] + pull;
+          const float pull =
+              kx[v - 1] * (e[v - 1] - e[v]) + kx[v] * (e[v + 1] - e[v]) +
+              ky[v - s.stride[1]] * (e[v - s.stride[1]] - e[v]) + ky[v] * (e[v + s.stride[1]] - e[v]) +
+              kz[v - s.stride[2]] * (e[v - s.stride[2]] - e[v]) + kz[v] * (e[v + s.stride[2]] - e[v]);
+          coarse.residual[ua][cell_at(coarse.springs, parent(i), parent(j), plane)] +=
+              level.residual[ua][v] + pull;
         }
       }
     }
   }
 }
 
-HYBRID_WIDE void Relaxation::interpolate_row(const Level& coarse, int axis, int j, int k, int first, int last) noexcept {
-  // Cell-centred trilinear weights: 3/4 to the cell a voxel is in, 1/4 to the nearer neighbour, on each axis; an empty
-  // neighbour's share goes to the others (a free surface).
+HYBRID_WIDE void Relaxation::interpolate_row(const Level& coarse, int axis, int j, int k, int first,
+                                             int last) noexcept {
+  // Cell-centred trilinear weights: 3/4 to the cell a voxel is in, 1/4 to the nearer neighbour, on each axis;
+  // an empty neighbour's share goes to the others (a free surface).
   const Springs& s = coarse.springs;
   const auto& e = coarse.correction[static_cast<std::size_t>(axis)];
   const int own_j = parent(j), own_k = parent(k);
@@ -423,7 +451,8 @@ bool Relaxation::negligible(const Level& coarse, int j, int k) const noexcept {
   const int near_j = (j & 1) != 0 ? own_j - 1 : own_j + 1, near_k = (k & 1) != 0 ? own_k - 1 : own_k + 1;
   for (const int ck : {own_k, near_k}) {
     for (const int cj : {own_j, near_j}) {
-      const auto& range = s.row[static_cast<std::size_t>(ck) * static_cast<std::size_t>(s.dims[1]) + static_cast<std::size_t>(cj)];
+      const auto& range = s.row[static_cast<std::size_t>(ck) * static_cast<std::size_t>(s.dims[1]) +
+                                static_cast<std::size_t>(cj)];
       for (const auto& e : coarse.correction) {
         const float* value = e.data() + cell_at(s, 0, cj, ck);
         for (int i = range[0]; i < range[1]; ++i) {
@@ -435,11 +464,13 @@ bool Relaxation::negligible(const Level& coarse, int j, int k) const noexcept {
   return true;
 }
 
-std::uint64_t Relaxation::prolong_to_lattice(Displacement& state, const ObstacleView& obstacles, int plane) noexcept {
+std::uint64_t Relaxation::prolong_to_lattice(Displacement& state, const ObstacleView& obstacles,
+                                             int plane) noexcept {
   const Springs& s = lattice_.springs();
   std::uint64_t spent = 0;
   for (int j = 1; j + 1 < s.dims[1]; ++j) {
-    const std::size_t row = static_cast<std::size_t>(plane) * static_cast<std::size_t>(s.dims[1]) + static_cast<std::size_t>(j);
+    const std::size_t row =
+        static_cast<std::size_t>(plane) * static_cast<std::size_t>(s.dims[1]) + static_cast<std::size_t>(j);
     const int first = s.row[row][0], last = s.row[row][1];
     if (last <= first) continue;
     ++spent;
@@ -448,7 +479,8 @@ std::uint64_t Relaxation::prolong_to_lattice(Displacement& state, const Obstacle
     for (int axis = 0; axis < 3; ++axis) {
       interpolate_row(levels_[1], axis, j, plane, first, last);
       for (int i = 0; i < last - first; ++i) {
-        if ((at_limit_[begin + static_cast<std::size_t>(i)] >> axis & 1) != 0) scratch_[static_cast<std::size_t>(i)] = 0.0F;
+        if ((at_limit_[begin + static_cast<std::size_t>(i)] >> axis & 1) != 0)
+          scratch_[static_cast<std::size_t>(i)] = 0.0F;
       }
       correct_row(lattice_, state, axis, begin, last - first, scratch_.data());
     }
@@ -463,7 +495,8 @@ void Relaxation::prolong_to_level(std::size_t fine, int plane) noexcept {
   Level& level = levels_[fine];
   const Springs& s = level.springs;
   for (int j = 1; j + 1 < s.dims[1]; ++j) {
-    const std::size_t row = static_cast<std::size_t>(plane) * static_cast<std::size_t>(s.dims[1]) + static_cast<std::size_t>(j);
+    const std::size_t row =
+        static_cast<std::size_t>(plane) * static_cast<std::size_t>(s.dims[1]) + static_cast<std::size_t>(j);
     const int first = s.row[row][0], last = s.row[row][1];
     if (last <= first) continue;
     for (int axis = 0; axis < 3; ++axis) {
@@ -480,7 +513,8 @@ void Relaxation::prolong_to_level(std::size_t fine, int plane) noexcept {
 
 std::size_t Relaxation::memory_bytes() const {
   std::size_t bytes = 0;
-  for (std::size_t level = 1; level < levels_.size(); ++level) bytes += levels_[level].filled.size() * 16 * sizeof(float);
+  for (std::size_t level = 1; level < levels_.size(); ++level)
+    bytes += levels_[level].filled.size() * 16 * sizeof(float);
   return bytes + held_cells_.capacity() * sizeof(HeldCell);
 }
 

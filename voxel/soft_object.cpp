@@ -10,13 +10,13 @@
 namespace voxel {
 namespace {
 
-constexpr int kNearMargin = 4;              // voxels around the contact that relax_near() works on
-constexpr std::size_t kMaxNear = 20'000;    // and at most this many
-constexpr std::size_t kMaxCarried = 20'000; // voxels that may hang on the pressed ones by tight links
-constexpr int kProjections = 3;             // of a pressed voxel onto the tool, in search of its least energy
-constexpr double kStir = 1e-5;              // of the spacing: pressed voxels that moved less wake nobody
-constexpr double kGiveWay = 0.01;           // of the voxel radius: less is left to the next push
-constexpr float kTight = 1e-4F;             // of the spacing: nearer to its limit than this a link is tight
+constexpr int kNearMargin = 4;               // voxels around the contact that relax_near() works on
+constexpr std::size_t kMaxNear = 20'000;     // and at most this many
+constexpr std::size_t kMaxCarried = 20'000;  // voxels that may hang on the pressed ones by tight links
+constexpr int kProjections = 3;    // of a pressed voxel onto the tool, in search of its least energy
+constexpr double kStir = 1e-5;     // of the spacing: pressed voxels that moved less wake nobody
+constexpr double kGiveWay = 0.01;  // of the voxel radius: less is left to the next push
+constexpr float kTight = 1e-4F;    // of the spacing: nearer to its limit than this a link is tight
 
 }  // namespace
 
@@ -30,7 +30,8 @@ SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice)
       carried_stamp_(lattice_->size(), 0),
       carried_index_(lattice_->size(), 0) {
   const auto surface = lattice_->surface();
-  for (std::size_t s = 0; s < surface.size(); ++s) surface_number_[surface[s]] = static_cast<std::uint32_t>(s);
+  for (std::size_t s = 0; s < surface.size(); ++s)
+    surface_number_[surface[s]] = static_cast<std::uint32_t>(s);
   touches_.reserve(kMaxTouched);
   touched_voxels_.reserve(kMaxTouched);
   sources_.reserve(surface.size());
@@ -55,8 +56,8 @@ std::unique_ptr<SoftObject> SoftObject::copy() const {
 }
 
 double SoftObject::reach(double tool_radius) const {
-  // Half a cell's diagonal would do for voxels at rest; pressed, they part. From a spacing and a half on none lets go (a test
-  // presses tools of a hundredth of a spacing three spacings deep).
+  // Half a cell's diagonal would do for voxels at rest; pressed, they part. From a spacing and a half on none
+  // lets go (a test presses tools of a hundredth of a spacing three spacings deep).
   return std::max(tool_radius + voxel_radius(), 1.5 * lattice_->max_spacing_m());
 }
 
@@ -107,11 +108,13 @@ void SoftObject::touch(std::span<const VoxelId> near) noexcept {
 Displacement::Role SoftObject::resting_role(VoxelId v) const noexcept {
   const std::uint32_t s = surface_number_[v];
   if (pair_held_[s] != 0) return Displacement::held;
-  return obstacles_.empty() || obstacles_[s].normal == glm::vec3(0.0F) ? Displacement::free : Displacement::obstacle;
+  return obstacles_.empty() || obstacles_[s].normal == glm::vec3(0.0F) ? Displacement::free
+                                                                       : Displacement::obstacle;
 }
 
 // Only what carries load is kept from the background. A voxel that is merely near the tool must move with its
-// neighbours, or a correction of the coarse levels tears at it (which grew from cycle to cycle when all were held).
+// neighbours, or a correction of the coarse levels tears at it (which grew from cycle to cycle when all were
+// held).
 void SoftObject::set_touch_roles() noexcept {
   for (const Touch& t : touches_) {
     state_.set_role(t.v, t.pressed ? Displacement::held : resting_role(t.v), *lattice_);
@@ -128,7 +131,8 @@ void SoftObject::settle_chain() noexcept {
     relaxation_.wake();
   }
   chain_.settle(state_, sources_, moves_, obstacles_, surface_number_);
-  for (const VoxelId v : chain_.moved()) relaxation_.stir(v / static_cast<std::size_t>(lattice_->springs().dims[0]));
+  for (const VoxelId v : chain_.moved())
+    relaxation_.stir(v / static_cast<std::size_t>(lattice_->springs().dims[0]));
 }
 
 bool SoftObject::push_out(const ToolInBody& tool) noexcept {
@@ -159,8 +163,9 @@ void SoftObject::relax_touch(const ToolInBody& tool, Touch& t) noexcept {
   Gap g = gap(tool, rest + wanted);
   t.pressed = g.distance < 0.0;
   if (t.pressed) {
-    // Where the springs' energy is least on the tool's surface, so that sliding round the tool is free of friction: in their own
-    // metric, the surface straightened at the last place (one step left 3e-4 of the force scale of friction).
+    // Where the springs' energy is least on the tool's surface, so that sliding round the tool is free of
+    // friction: in their own metric, the surface straightened at the last place (one step left 3e-4 of the
+    // force scale of friction).
     const auto& inverse = lattice_->springs().inverse_diagonal;
     const glm::dvec3 w(inverse[0][t.v], inverse[1][t.v], inverse[2][t.v]), wished = wanted;
     for (int n = 0; n < kProjections && g.distance < voxel_radius(); ++n) {
@@ -180,7 +185,8 @@ void SoftObject::relax_touch(const ToolInBody& tool, Touch& t) noexcept {
   }
   state_.set(t.v, clamp_to_links(*lattice_, state_, t.v, wanted));
   // A tool that jumped away moves no pressed voxel by follow(): what it let go of wakes the rest.
-  if (was_pressed && !t.pressed && glm::distance(before, state_.at(t.v)) > kStir * lattice_->min_spacing_m()) {
+  if (was_pressed && !t.pressed &&
+      glm::distance(before, state_.at(t.v)) > kStir * lattice_->min_spacing_m()) {
     relaxation_.wake();
   }
 }
@@ -219,9 +225,11 @@ void SoftObject::relax_near(const ToolInBody& tool, int sweeps) noexcept {
     for (int colour = 0; colour < 2; ++colour) {
       for (int k = from[2]; k < to[2]; ++k) {
         for (int j = from[1] + ((from[1] + k + colour) & 1); j < to[1]; j += 2) {
-          const std::size_t row = static_cast<std::size_t>(k) * static_cast<std::size_t>(dims[1]) + static_cast<std::size_t>(j);
+          const std::size_t row =
+              static_cast<std::size_t>(k) * static_cast<std::size_t>(dims[1]) + static_cast<std::size_t>(j);
           if (rows[row][1] <= rows[row][0]) continue;
-          relax_row(*lattice_, state_, obstacle_view(), row, std::max(from[0], rows[row][0]), std::min(to[0], rows[row][1]));
+          relax_row(*lattice_, state_, obstacle_view(), row, std::max(from[0], rows[row][0]),
+                    std::min(to[0], rows[row][1]));
           relaxation_.stir(row);
         }
       }
@@ -232,9 +240,9 @@ void SoftObject::relax_near(const ToolInBody& tool, int sweeps) noexcept {
   set_touch_roles();
 }
 
-// What hangs on a pressed voxel by a tight link and pulls it back is felt through it: the multiplier of the chain's
-// limit. Without it the force would saturate as soon as the chain is tight. Per axis, breadth first; each voxel's load
-// goes to the pressed voxel that it was first reached from.
+// What hangs on a pressed voxel by a tight link and pulls it back is felt through it: the multiplier of the
+// chain's limit. Without it the force would saturate as soon as the chain is tight. Per axis, breadth first;
+// each voxel's load goes to the pressed voxel that it was first reached from.
 void SoftObject::gather_load(int axis) noexcept {
   ++stamp_;
   carried_.clear();
@@ -245,7 +253,8 @@ void SoftObject::gather_load(int axis) noexcept {
     carried_.push_back({v, touch_index});
   };
   for (std::size_t i = 0; i < touches_.size(); ++i) {
-    if (touches_[i].pressed && !lattice_->anchored(touches_[i].v)) add(touches_[i].v, static_cast<std::uint32_t>(i));
+    if (touches_[i].pressed && !lattice_->anchored(touches_[i].v))
+      add(touches_[i].v, static_cast<std::uint32_t>(i));
   }
   for (std::size_t head = 0; head < carried_.size() && carried_.size() < kMaxCarried; ++head) {
     const Carried c = carried_[head];
@@ -254,12 +263,14 @@ void SoftObject::gather_load(int axis) noexcept {
       const float tight = kTight * static_cast<float>(lattice_->spacing_m()[d]);
       for (const bool up : {false, true}) {
         const VoxelId w = up ? c.v + step : c.v - step;
-        if (!lattice_->filled(w) || lattice_->anchored(w) || carried_stamp_[w] == stamp_) continue;
+        if (!lattice_->filled(w) || lattice_->anchored(w)) continue;
         auto b = lattice_->bounds(up ? c.v : w, d, axis);
         if (!up) b = {-b[1], -b[0]};  // of u(w) − u(v), whichever way the link points
         const float difference = u[w] - u[c.v];
         const bool pushed_up = difference <= b[0] + tight, pushed_down = difference >= b[1] - tight;
         if (!pushed_up && !pushed_down) continue;
+        touches_[c.touch].tight = true;
+        if (carried_stamp_[w] == stamp_) continue;
         const double pull = link_force(*lattice_, state_, w)[axis];
         if (!((pushed_up && pull < 0.0) || (pushed_down && pull > 0.0))) continue;
         touches_[c.touch].load[axis] += pull;
@@ -270,8 +281,8 @@ void SoftObject::gather_load(int axis) noexcept {
 }
 
 void SoftObject::add_stiffness(int axis, glm::dmat3& stiffness) const noexcept {
-  // A carried voxel moves by q = n_a·n per unit of tool motion, n its touch's normal; what a link stores then is
-  // ½ k (q_v·δ − q_w·δ)².
+  // A carried voxel moves by q = n_a·n per unit of tool motion, n its touch's normal; what a link stores then
+  // is ½ k (q_v·δ − q_w·δ)².
   const auto along = [&](VoxelId v) {
     if (carried_stamp_[v] != stamp_) return glm::dvec3(0.0);
     const glm::dvec3& n = touches_[carried_index_[v]].normal;
@@ -287,7 +298,8 @@ void SoftObject::add_stiffness(int axis, glm::dmat3& stiffness) const noexcept {
         const double stiff = static_cast<double>(up ? k[c.v] : k[w]);
         if (stiff == 0.0) continue;
         const glm::dvec3 r = q - along(w);
-        const double share = carried_stamp_[w] == stamp_ ? 0.5 : 1.0;  // an inner link is met from both its ends
+        const double share =
+            carried_stamp_[w] == stamp_ ? 0.5 : 1.0;  // an inner link is met from both its ends
         stiffness += share * stiff * glm::outerProduct(r, r);
       }
     }
@@ -298,19 +310,25 @@ Reaction SoftObject::reaction(const ToolInBody& tool) noexcept {
   Reaction result;
   for (Touch& t : touches_) {
     t.normal = gap(tool, position(t.v)).normal;
+    t.tight = false;
     t.load = t.pressed ? link_force(*lattice_, state_, t.v) : glm::dvec3(0.0);
   }
   for (int axis = 0; axis < 3; ++axis) {
     gather_load(axis);
     add_stiffness(axis, result.stiffness_N_per_m);
   }
-  for (Touch& t : touches_) {
+  for (const Touch& t : touches_) {
     if (!t.pressed) continue;
-    // Frictionless: the tool feels what the voxel presses along the normal; what pulls is no contact.
     const double load = glm::dot(t.load, t.normal);
-    if (load >= 0.0) continue;
-    result.force_N += load * t.normal;
-    ++result.pressed;
+    if (t.tight) {
+      // Tight links pass load between voxels, along and across their normals, and the sum of all is what is
+      // left of it: within the sum the chain's own forces cancel, whichever voxel each is booked to.
+      result.force_N += t.load;
+    } else if (load < 0.0) {
+      // Frictionless: the tool feels what the voxel presses along the normal; what pulls is no contact.
+      result.force_N += load * t.normal;
+    }
+    if (load < 0.0) ++result.pressed;
   }
   return result;
 }
@@ -358,7 +376,9 @@ void SoftObject::set_obstacle(std::size_t surface_number, const Obstacle& obstac
   state_.set_role(v, resting_role(v), *lattice_);
 }
 
-void SoftObject::reserve_obstacles() { obstacles_.resize(lattice_->surface().size()); }
+void SoftObject::reserve_obstacles() {
+  obstacles_.resize(lattice_->surface().size());
+}
 
 void SoftObject::hold(VoxelId v) noexcept {
   const std::uint32_t s = surface_number_[v];

@@ -3,9 +3,10 @@
 // Everything here is in the volume frame ("body") of the object: meters, newtons.
 //
 // One haptic tick uses it so (see hybrid/tick.cpp):
-//   touch() names the surface voxels near the tool → push_out() moves what the tool overlaps, and the chain with
-//   it → relax_near() brings the neighbourhood of the contact near equilibrium → reaction() says what the tool feels and how stiff
-//   it is → the proxy moves by δ → follow() takes the pressed voxels along … a few times; relax_background() once.
+//   touch() names the surface voxels near the tool → push_out() moves what the tool overlaps, and the chain
+//   with it → relax_near() brings the neighbourhood of the contact near equilibrium → reaction() says what
+//   the tool feels and how stiff it is → the proxy moves by δ → follow() takes the pressed voxels along … a
+//   few times; relax_background() once.
 #pragma once
 
 #include <cstdint>
@@ -24,16 +25,18 @@ namespace voxel {
 // The tool as one soft object sees it.
 struct ToolInBody {
   enum class Shape : std::uint8_t { ball, punch } shape = Shape::ball;
-  glm::dvec3 centre{0.0};          // of the ball, or of the punch's flat face (unit: meter)
-  glm::dvec3 axis{0.0, 0.0, -1.0}; // punch: unit vector out of its face
-  double radius = 0.0;             // of ball or face (unit: meter)
+  glm::dvec3 centre{0.0};           // of the ball, or of the punch's flat face (unit: meter)
+  glm::dvec3 axis{0.0, 0.0, -1.0};  // punch: unit vector out of its face
+  double radius = 0.0;              // of ball or face (unit: meter)
 };
 
-// Force of the object on the tool, and how it grows when the tool moves: the quadratic model that the proxy minimises.
+// Force of the object on the tool, and how it grows when the tool moves: the quadratic model that the proxy
+// minimises.
 struct Reaction {
   glm::dvec3 force_N{0.0};
-  glm::dmat3 stiffness_N_per_m{0.0};  // symmetric, positive semi-definite; of the pressed voxels with all others still
-  std::uint32_t pressed = 0;          // voxels that carry load
+  glm::dmat3 stiffness_N_per_m{
+      0.0};  // symmetric, positive semi-definite; of the pressed voxels with all others still
+  std::uint32_t pressed = 0;  // voxels that carry load
 };
 
 // The tool's centre q must satisfy normal · q >= offset (body frame).
@@ -44,7 +47,8 @@ struct ToolBound {
 
 class SoftObject {
  public:
-  static constexpr std::size_t kMaxTouched = 4096;  // surface voxels near the tool; more are left to the next tick
+  static constexpr std::size_t kMaxTouched =
+      4096;  // surface voxels near the tool; more are left to the next tick
 
   explicit SoftObject(std::shared_ptr<const Lattice> lattice);
   // The same object in the same state, sharing the lattice; for references found beside a running session.
@@ -55,8 +59,8 @@ class SoftObject {
   [[nodiscard]] glm::dvec3 position(VoxelId v) const { return lattice_->rest(v) + state_.at(v); }
   // A voxel is a ball of half its smallest spacing: the tool's surface stays this far from its centre.
   [[nodiscard]] double voxel_radius() const { return 0.5 * lattice_->min_spacing_m(); }
-  // Distance of a ball tool's centre to the centre of a voxel it touches. A tool smaller than the gaps between voxels is
-  // felt as one that just cannot slip between them.
+  // Distance of a ball tool's centre to the centre of a voxel it touches. A tool smaller than the gaps
+  // between voxels is felt as one that just cannot slip between them.
   [[nodiscard]] double reach(double tool_radius) const;
 
   // ---- the tick; none of these allocates, locks or throws ----
@@ -68,13 +72,15 @@ class SoftObject {
   [[nodiscard]] Reaction reaction(const ToolInBody& tool) noexcept;
   // The tool moves by `delta`: pressed voxels go along, each by the part of it along its own normal.
   void follow(const glm::dvec3& delta) noexcept;
-  // Where the chain did not let voxels out of the tool's way, the tool has to give way. Returns how many bounds were written.
+  // Where the chain did not let voxels out of the tool's way, the tool has to give way. Returns how many
+  // bounds were written.
   std::size_t give_way(const ToolInBody& tool, std::span<ToolBound> out) const noexcept;
   std::uint64_t relax_background(std::uint64_t budget) noexcept;
 
   // Before the first set_obstacle(); allocates.
   void reserve_obstacles();
-  // A rigid surface near surface voxel number s (index into lattice().surface()); a zero normal: none any more.
+  // A rigid surface near surface voxel number s (index into lattice().surface()); a zero normal: none any
+  // more.
   void set_obstacle(std::size_t surface_number, const Obstacle& obstacle) noexcept;
   [[nodiscard]] std::span<const Obstacle> obstacles() const { return obstacles_; }
   // A voxel pressed by another soft object: moved by the caller, held meanwhile. See pair_contact.h.
@@ -90,19 +96,22 @@ class SoftObject {
   [[nodiscard]] const Relaxation& relaxation() const { return relaxation_; }
   [[nodiscard]] std::uint64_t dropped_touches() const { return dropped_touches_; }
   // Touched voxels of the last touch(), for the map to look at.
-  [[nodiscard]] std::span<const VoxelId> touched() const { return {touched_voxels_.data(), touched_voxels_.size()}; }
+  [[nodiscard]] std::span<const VoxelId> touched() const {
+    return {touched_voxels_.data(), touched_voxels_.size()};
+  }
   [[nodiscard]] std::span<const VoxelId> chain_moved() const { return chain_.moved(); }
   // Number of a surface voxel; kNoSurface for one inside.
   static constexpr std::uint32_t kNoSurface = 0xFFFFFFFFU;
   [[nodiscard]] std::uint32_t surface_number(VoxelId v) const { return surface_number_[v]; }
 
-  // Displacement at any rest point in the body, from the voxels around it (unit: meter); 0 where none is near.
+  // Displacement at any rest point in the body, from the voxels around it (unit: meter); 0 where none is
+  // near.
   [[nodiscard]] glm::dvec3 displacement_at(const glm::dvec3& rest_point) const noexcept;
 
   // Elastic energy (J); for tests and reports.
   [[nodiscard]] double energy_J() const noexcept;
-  // Relaxes with the tool still until the residual is below `tolerance_N` or `max_cycles` passed; true when it is.
-  // For references, not for the tick.
+  // Relaxes with the tool still until the residual is below `tolerance_N` or `max_cycles` passed; true when
+  // it is. For references, not for the tick.
   bool settle(const ToolInBody& tool, double tolerance_N, int max_cycles) noexcept;
 
   [[nodiscard]] std::size_t memory_bytes() const;
@@ -110,12 +119,13 @@ class SoftObject {
  private:
   struct Touch {
     VoxelId v;
-    bool pressed;        // carries load towards the tool
+    bool pressed;            // carries load towards the tool
     glm::dvec3 normal{0.0};  // from tool to voxel, unit
-    glm::dvec3 load{0.0};  // of its links, and of what hangs on it by tight links (unit: newton)
+    glm::dvec3 load{0.0};    // of its links, and of what hangs on it by tight links (unit: newton)
+    bool tight = false;      // some tight link hands part of its load to or from another voxel
   };
   struct Gap {
-    double distance;     // of the voxel from the tool's surface along normal; negative: overlap
+    double distance;  // of the voxel from the tool's surface along normal; negative: overlap
     glm::dvec3 normal;
   };
   struct Carried {
@@ -141,15 +151,15 @@ class SoftObject {
   std::vector<Obstacle> obstacles_;            // [surface number], empty when there is none
   std::vector<Touch> touches_;
   std::vector<VoxelId> touched_voxels_;
-  std::vector<VoxelId> held_voxels_;           // by pairs
+  std::vector<VoxelId> held_voxels_;  // by pairs
   std::vector<VoxelId> background_held_;
   std::vector<VoxelId> sources_;
   std::vector<glm::vec3> moves_;
-  std::vector<Carried> carried_;               // [pressed first, then what hangs on them by a tight link]
-  std::vector<std::uint32_t> carried_stamp_;   // [v]
-  std::vector<std::uint32_t> carried_index_;   // [v]
+  std::vector<Carried> carried_;              // [pressed first, then what hangs on them by a tight link]
+  std::vector<std::uint32_t> carried_stamp_;  // [v]
+  std::vector<std::uint32_t> carried_index_;  // [v]
   std::uint32_t stamp_ = 0;
-  double unrelaxed_m_ = 0.0;                   // motion of pressed voxels since the background was last woken
+  double unrelaxed_m_ = 0.0;  // motion of pressed voxels since the background was last woken
   std::uint64_t dropped_touches_ = 0;
   bool moved_ever_ = false;
 };

@@ -11,12 +11,14 @@
 namespace voxel {
 namespace {
 
-constexpr float kNearLimit = 0.999F;  // of the tightest limit: a row that stays within this has no link at its limit
-constexpr float kTight = 1e-6F;       // of the spacing: nearer to its limit than this a link is at it
-constexpr int kMaxRow = 2048;  // rows longer than this are relaxed in pieces
+constexpr float kNearLimit =
+    0.999F;  // of the tightest limit: a row that stays within this has no link at its limit
+constexpr float kTight = 1e-6F;  // of the spacing: nearer to its limit than this a link is at it
+constexpr int kMaxRow = 2048;    // rows longer than this are relaxed in pieces
 
 // Interval that the links of v allow its displacement on one axis.
-std::array<float, 2> link_interval(const Lattice& lattice, const std::vector<float>& u, VoxelId v, int axis) noexcept {
+std::array<float, 2> link_interval(const Lattice& lattice, const std::vector<float>& u, VoxelId v,
+                                   int axis) noexcept {
   float low = -std::numeric_limits<float>::max(), high = std::numeric_limits<float>::max();
   for (int d = 0; d < 3; ++d) {
     const auto step = static_cast<VoxelId>(lattice.stride(d));
@@ -53,20 +55,25 @@ float axis_minimum(const Springs& s, const std::vector<float>& u, VoxelId v, int
 // Could the link in direction d leave its limits, seen from the tightest limit there is? Branch-free, so that
 // the row vectorises; an absent link (k = 0) cannot.
 inline int leaves(float k, float difference, float low, float high) noexcept {
-  return static_cast<int>(k > 0.0F) & (static_cast<int>(difference > high) | static_cast<int>(difference < low));
+  return static_cast<int>(k > 0.0F) &
+         (static_cast<int>(difference > high) | static_cast<int>(difference < low));
 }
 
 inline int reaches(float k, float difference, float low, float high) noexcept {
-  return static_cast<int>(k > 0.0F) & (static_cast<int>(difference >= high) | static_cast<int>(difference <= low));
+  return static_cast<int>(k > 0.0F) &
+         (static_cast<int>(difference >= high) | static_cast<int>(difference <= low));
 }
 
 // One axis of a row at once. Returns false, with nothing written, when a limit is near.
-HYBRID_WIDE bool relax_row_at_once(const Lattice& lattice, Displacement& state, int axis, std::size_t begin, int count) noexcept {
+HYBRID_WIDE bool relax_row_at_once(const Lattice& lattice, Displacement& state, int axis, std::size_t begin,
+                                   int count) noexcept {
   const Springs& s = lattice.springs();
   float* u = state.u[static_cast<std::size_t>(axis)].data() + begin;
   const float* inverse = s.inverse_diagonal[static_cast<std::size_t>(axis)].data() + begin;
-  const std::ptrdiff_t sy = static_cast<std::ptrdiff_t>(s.stride[1]), sz = static_cast<std::ptrdiff_t>(s.stride[2]);
-  const float *kx = s.stiffness(axis, 0) + begin, *ky = s.stiffness(axis, 1) + begin, *kz = s.stiffness(axis, 2) + begin;
+  const std::ptrdiff_t sy = static_cast<std::ptrdiff_t>(s.stride[1]),
+                       sz = static_cast<std::ptrdiff_t>(s.stride[2]);
+  const float *kx = s.stiffness(axis, 0) + begin, *ky = s.stiffness(axis, 1) + begin,
+              *kz = s.stiffness(axis, 2) + begin;
   std::array<float, 3> low{}, high{};
   for (int d = 0; d < 3; ++d) {
     const LinkLimit& l = lattice.tightest(d);
@@ -96,8 +103,10 @@ HYBRID_WIDE bool relax_row_at_once(const Lattice& lattice, Displacement& state, 
   return true;
 }
 
-// After the links had their way with v: if that took it into its obstacle, where it goes with the obstacle there.
-void relax_obstacle(const Lattice& lattice, Displacement& state, const ObstacleView& view, VoxelId v) noexcept {
+// After the links had their way with v: if that took it into its obstacle, where it goes with the obstacle
+// there.
+void relax_obstacle(const Lattice& lattice, Displacement& state, const ObstacleView& view,
+                    VoxelId v) noexcept {
   if (!blocked(view, state, v, 0.0)) return;
   glm::dvec3 wanted = link_minimum(lattice, state, v);
   const Obstacle& o = view.obstacles[view.surface_number[v]];
@@ -113,26 +122,34 @@ void relax_obstacle(const Lattice& lattice, Displacement& state, const ObstacleV
   state.set(v, clamp_to_links(lattice, state, v, wanted));
 }
 
-void relax_row_one_by_one(const Lattice& lattice, Displacement& state, int axis, std::size_t begin, int count) noexcept {
+void relax_row_one_by_one(const Lattice& lattice, Displacement& state, int axis, std::size_t begin,
+                          int count) noexcept {
   auto& u = state.u[static_cast<std::size_t>(axis)];
   const auto& inverse = lattice.springs().inverse_diagonal[static_cast<std::size_t>(axis)];
   for (std::size_t i = begin; i < begin + static_cast<std::size_t>(count); ++i) {
     const auto v = static_cast<VoxelId>(i);
     if (inverse[v] == 0.0F || state.role[v] == Displacement::held) continue;
-    u[v] = clamp_interval(axis_minimum(lattice.springs(), u, v, axis), link_interval(lattice, u, v, axis), u[v]);
+    u[v] =
+        clamp_interval(axis_minimum(lattice.springs(), u, v, axis), link_interval(lattice, u, v, axis), u[v]);
   }
 }
 
 // The same at-once attempt for a correction: false, with nothing written, when a limit is near.
-HYBRID_WIDE bool correct_row_at_once(const Lattice& lattice, Displacement& state, int axis, std::size_t begin, int count,
-                         const float* correction) noexcept {
+HYBRID_WIDE bool correct_row_at_once(const Lattice& lattice, Displacement& state, int axis, std::size_t begin,
+                                     int count, const float* correction) noexcept {
   const Springs& s = lattice.springs();
   float* u = state.u[static_cast<std::size_t>(axis)].data() + begin;
   const float* inverse = s.inverse_diagonal[static_cast<std::size_t>(axis)].data() + begin;
-  const std::ptrdiff_t sy = static_cast<std::ptrdiff_t>(s.stride[1]), sz = static_cast<std::ptrdiff_t>(s.stride[2]);
-  const float *kx = s.stiffness(axis, 0) + begin, *ky = s.stiffness(axis, 1) + begin, *kz = s.stiffness(axis, 2) + begin;
-  const auto low = [&](int d) { return axis == d ? lattice.tightest(d).along_low : -lattice.tightest(d).across; };
-  const auto high = [&](int d) { return axis == d ? lattice.tightest(d).along_high : lattice.tightest(d).across; };
+  const std::ptrdiff_t sy = static_cast<std::ptrdiff_t>(s.stride[1]),
+                       sz = static_cast<std::ptrdiff_t>(s.stride[2]);
+  const float *kx = s.stiffness(axis, 0) + begin, *ky = s.stiffness(axis, 1) + begin,
+              *kz = s.stiffness(axis, 2) + begin;
+  const auto low = [&](int d) {
+    return axis == d ? lattice.tightest(d).along_low : -lattice.tightest(d).across;
+  };
+  const auto high = [&](int d) {
+    return axis == d ? lattice.tightest(d).along_high : lattice.tightest(d).across;
+  };
   const float lx = low(0), hx = high(0), ly = low(1), hy = high(1), lz = low(2), hz = high(2);
   std::array<float, kMaxRow> next;
   next[0] = 0.0F;
@@ -155,13 +172,20 @@ HYBRID_WIDE bool correct_row_at_once(const Lattice& lattice, Displacement& state
 
 }  // namespace
 
-HYBRID_WIDE bool near_limits(const Lattice& lattice, const Displacement& state, int axis, std::size_t begin, int count) noexcept {
+HYBRID_WIDE bool near_limits(const Lattice& lattice, const Displacement& state, int axis, std::size_t begin,
+                             int count) noexcept {
   const Springs& s = lattice.springs();
   const float* u = state.u[static_cast<std::size_t>(axis)].data() + begin;
-  const std::ptrdiff_t sy = static_cast<std::ptrdiff_t>(s.stride[1]), sz = static_cast<std::ptrdiff_t>(s.stride[2]);
-  const float *kx = s.stiffness(axis, 0) + begin, *ky = s.stiffness(axis, 1) + begin, *kz = s.stiffness(axis, 2) + begin;
-  const auto low = [&](int d) { return kNearLimit * (axis == d ? lattice.tightest(d).along_low : -lattice.tightest(d).across); };
-  const auto high = [&](int d) { return kNearLimit * (axis == d ? lattice.tightest(d).along_high : lattice.tightest(d).across); };
+  const std::ptrdiff_t sy = static_cast<std::ptrdiff_t>(s.stride[1]),
+                       sz = static_cast<std::ptrdiff_t>(s.stride[2]);
+  const float *kx = s.stiffness(axis, 0) + begin, *ky = s.stiffness(axis, 1) + begin,
+              *kz = s.stiffness(axis, 2) + begin;
+  const auto low = [&](int d) {
+    return kNearLimit * (axis == d ? lattice.tightest(d).along_low : -lattice.tightest(d).across);
+  };
+  const auto high = [&](int d) {
+    return kNearLimit * (axis == d ? lattice.tightest(d).along_high : lattice.tightest(d).across);
+  };
   const float lx = low(0), hx = high(0), ly = low(1), hy = high(1), lz = low(2), hz = high(2);
   int near = 0;
   for (int i = 0; i < count; ++i) {
@@ -187,7 +211,9 @@ void correct_row(const Lattice& lattice, Displacement& state, int axis, std::siz
   for (int from = 0; from < count; from += kMaxRow) {
     const int piece = std::min(kMaxRow, count - from);
     const std::size_t start = begin + static_cast<std::size_t>(from);
-    if (state.row_held[row] == 0 && correct_row_at_once(lattice, state, axis, start, piece, correction + from)) continue;
+    if (state.row_held[row] == 0 &&
+        correct_row_at_once(lattice, state, axis, start, piece, correction + from))
+      continue;
     for (int i = 0; i < piece; ++i) {
       const auto v = static_cast<VoxelId>(start + static_cast<std::size_t>(i));
       if (inverse[v] == 0.0F || state.role[v] == Displacement::held) continue;
@@ -216,7 +242,8 @@ bool blocked(const ObstacleView& view, const Displacement& state, VoxelId v, dou
 glm::dvec3 link_minimum(const Lattice& lattice, const Displacement& state, VoxelId v) noexcept {
   glm::dvec3 m(0.0);
   for (int axis = 0; axis < 3; ++axis) {
-    m[axis] = static_cast<double>(axis_minimum(lattice.springs(), state.u[static_cast<std::size_t>(axis)], v, axis));
+    m[axis] = static_cast<double>(
+        axis_minimum(lattice.springs(), state.u[static_cast<std::size_t>(axis)], v, axis));
   }
   return m;
 }
@@ -241,15 +268,16 @@ glm::dvec3 link_force(const Lattice& lattice, const Displacement& state, VoxelId
     for (int d = 0; d < 3; ++d) {
       const float* k = s.stiffness(axis, d);
       const auto step = static_cast<VoxelId>(s.stride[static_cast<std::size_t>(d)]);
-      sum += static_cast<double>(k[v] * (u[v + step] - u[v])) + static_cast<double>(k[v - step] * (u[v - step] - u[v]));
+      sum += static_cast<double>(k[v] * (u[v + step] - u[v])) +
+             static_cast<double>(k[v - step] * (u[v - step] - u[v]));
     }
     force[axis] = sum;
   }
   return force;
 }
 
-void relax_row(const Lattice& lattice, Displacement& state, const ObstacleView& obstacles, std::size_t row, int first,
-               int last) noexcept {
+void relax_row(const Lattice& lattice, Displacement& state, const ObstacleView& obstacles, std::size_t row,
+               int first, int last) noexcept {
   const std::size_t base = row * static_cast<std::size_t>(lattice.springs().dims[0]);
   for (int from = first; from < last; from += kMaxRow) {
     const int count = std::min(kMaxRow, last - from);
@@ -261,7 +289,8 @@ void relax_row(const Lattice& lattice, Displacement& state, const ObstacleView& 
     }
     if (state.row_obstacles[row] == 0) continue;
     for (std::size_t v = begin; v < begin + static_cast<std::size_t>(count); ++v) {
-      if (state.role[v] == Displacement::obstacle) relax_obstacle(lattice, state, obstacles, static_cast<VoxelId>(v));
+      if (state.role[v] == Displacement::obstacle)
+        relax_obstacle(lattice, state, obstacles, static_cast<VoxelId>(v));
     }
   }
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a soft object costs, by its size: one relaxation cycle of everything, the same once only a contact moves, and plain
-// Gauss-Seidel sweeps as the baseline that the multigrid has to beat at equal residual.
+// What a soft object costs, by its size: one relaxation cycle of everything, the same once only a contact
+// moves, and plain Gauss-Seidel sweeps as the baseline that the multigrid has to beat at equal residual.
 #include <benchmark/benchmark.h>
 
 #include <cmath>
@@ -20,7 +20,8 @@ struct Pressed {
 Pressed pressed_cube(int n) {
   voxel::LabelVolume volume;
   volume.dims = {n, n, n};
-  volume.labels.assign(static_cast<std::size_t>(n) * static_cast<std::size_t>(n) * static_cast<std::size_t>(n), 1);
+  volume.labels.assign(
+      static_cast<std::size_t>(n) * static_cast<std::size_t>(n) * static_cast<std::size_t>(n), 1);
   voxel::LatticeOptions options;
   options.anchor_faces = {"-z"};
   Pressed pressed{std::make_unique<voxel::SoftObject>(std::make_shared<voxel::Lattice>(volume, options)), {}};
@@ -49,7 +50,8 @@ void press_to_rest(benchmark::State& state) {
 }
 BENCHMARK(press_to_rest)->Arg(24)->Arg(48)->Arg(72)->Unit(benchmark::kMillisecond)->Iterations(3);
 
-// The baseline: sweeps of the finest level alone, as many as one would do in a second, and the residual they leave.
+// The baseline: sweeps of the finest level alone, as many as one would do in a second, and the residual they
+// leave.
 void sweeps_alone(benchmark::State& state) {
   const int n = static_cast<int>(state.range(0));
   for (auto _ : state) {
@@ -58,7 +60,8 @@ void sweeps_alone(benchmark::State& state) {
     voxel::Displacement copy = pressed.object->state();
     const voxel::Lattice& lattice = pressed.object->lattice();
     const auto& springs = lattice.springs();
-    for (const voxel::VoxelId v : pressed.object->touched()) copy.set_role(v, voxel::Displacement::held, lattice);
+    for (const voxel::VoxelId v : pressed.object->touched())
+      copy.set_role(v, voxel::Displacement::held, lattice);
     state.ResumeTiming();
     for (int sweep = 0; sweep < 500; ++sweep) {
       for (std::size_t row = 0; row < springs.row.size(); ++row) {

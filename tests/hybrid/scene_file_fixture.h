@@ -30,7 +30,8 @@ class SceneFile : public ::testing::Test {
 
   std::filesystem::path write(const std::string& name, const std::string& text) const {
     std::error_code none;
-    std::filesystem::remove(folder_ / name, none);  // some file systems wait for the disk when a file is overwritten
+    std::filesystem::remove(folder_ / name,
+                            none);  // some file systems wait for the disk when a file is overwritten
     std::ofstream(folder_ / name, std::ios::binary) << text;
     return folder_ / name;
   }
