@@ -8,6 +8,7 @@
 #include <cmath>
 #include <filesystem>
 #include <iterator>
+#include <ostream>
 #include <random>
 #include <string>
 #include <vector>
@@ -34,6 +35,10 @@ struct Broken {
   const char* wrong;   // a word of what is wrong
   const char* remedy;  // a word of what to do
 };
+// Else a case would be listed by the bytes of its pointers, another list each time.
+void PrintTo(const Broken& scene, std::ostream* out) {
+  *out << scene.file;
+}
 
 const Broken broken[] = {
     {"empty", "1:1", "empty", "format = 1"},
