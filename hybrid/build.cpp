@@ -382,15 +382,14 @@ DrawnScene drawn_scene(const World& world, const std::string& title) {
   return drawn;
 }
 
-void fill_soft_vertices(const World& world, const WorldState& state, Snapshot& snapshot) {
-  snapshot.soft_vertices.resize(world.object_count());
+void fill_soft_moved(const World& world, const WorldState& state, Snapshot& snapshot) {
+  snapshot.soft_moved_m.resize(world.object_count());
   for (std::size_t o = 0; o < world.soft.size(); ++o) {
     const SoftBody& body = world.soft[o];
-    auto& vertices = snapshot.soft_vertices[world.rigid.size() + o];
-    vertices.resize(body.drawn.vertices.size());
-    for (std::size_t v = 0; v < vertices.size(); ++v) {
-      const glm::dvec3& rest = body.drawn.vertices[v];
-      vertices[v] = glm::vec3(body.to_scene(rest + state.soft[o]->displacement_at(rest)));
+    auto& moved = snapshot.soft_moved_m[world.rigid.size() + o];
+    moved.resize(body.drawn.vertices.size());
+    for (std::size_t v = 0; v < moved.size(); ++v) {
+      moved[v] = glm::vec3(body.pose.rotation * state.soft[o]->displacement_at(body.drawn.vertices[v]));
     }
   }
 }

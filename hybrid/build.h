@@ -38,7 +38,7 @@ BuiltScene build_scene(const Scene& scene, const Progress& progress = {});
 // Fixed surfaces for graphics; and what moves, filled in place (no allocation once its vectors have their
 // size).
 DrawnScene drawn_scene(const World& world, const std::string& title);
-void fill_soft_vertices(const World& world, const WorldState& state, Snapshot& snapshot);
+void fill_soft_moved(const World& world, const WorldState& state, Snapshot& snapshot);
 
 // What a soft object of so many voxels takes, with its springs, state and coarse levels.
 std::uint64_t soft_volume_bytes(const std::array<int, 3>& dims);

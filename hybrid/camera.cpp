@@ -26,10 +26,10 @@ void for_some_vertices(const DrawnScene& scene, const Snapshot& snapshot, const 
   constexpr std::size_t at_most = 100'000;
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
     const auto& rest = scene.objects[i].surface.vertices;
-    const bool moved = i < snapshot.soft_vertices.size() && snapshot.soft_vertices[i].size() == rest.size();
+    const bool moved = i < snapshot.soft_moved_m.size() && snapshot.soft_moved_m[i].size() == rest.size();
     const std::size_t stride = rest.size() / at_most + 1;
     for (std::size_t v = 0; v < rest.size(); v += stride) {
-      const glm::dvec3 at = moved ? glm::dvec3(snapshot.soft_vertices[i][v]) : rest[v];
+      const glm::dvec3 at = moved ? rest[v] + glm::dvec3(snapshot.soft_moved_m[i][v]) : rest[v];
       if (finite(at)) visit(at);
     }
   }

@@ -52,11 +52,15 @@ void check_writable(const std::filesystem::path& file) {
 
 void save_soft_surfaces(const std::filesystem::path& file, const BuiltScene& built) {
   Snapshot now;
-  fill_soft_vertices(*built.world, *built.state, now);
+  fill_soft_moved(*built.world, *built.state, now);
   polygon::TriangleMesh all;
   for (std::size_t o = 0; o < built.world->soft.size(); ++o) {
     const auto first = static_cast<std::uint32_t>(all.vertices.size());
-    for (const glm::vec3& v : now.soft_vertices[built.world->rigid.size() + o]) all.vertices.emplace_back(v);
+    const SoftBody& body = built.world->soft[o];
+    const auto& moved = now.soft_moved_m[built.world->rigid.size() + o];
+    for (std::size_t v = 0; v < moved.size(); ++v) {
+      all.vertices.push_back(body.to_scene(body.drawn.vertices[v]) + glm::dvec3(moved[v]));
+    }
     for (const polygon::TriangleIndices& t : built.world->soft[o].drawn.triangles) {
       all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
     }

@@ -148,16 +148,16 @@ DrawMesh make_moving_mesh(const polygon::TriangleMesh& mesh, const glm::dvec3& o
   return shared_mesh(mesh, origin_m);
 }
 
-float move_vertices(DrawMesh& draw, std::span<const glm::dvec3> rest, std::span<const glm::vec3> now,
+float move_vertices(DrawMesh& draw, std::span<const glm::dvec3> rest, std::span<const glm::vec3> moved_m,
                     const glm::dvec3& origin_m) {
   float most = 0.0F;
   for (std::size_t v = 0; v < draw.vertices.size(); ++v) {
     DrawVertex& vertex = draw.vertices[v];
-    const glm::dvec3 at(now[v]);
+    const glm::dvec3 moved(moved_m[v]);
     if (!finite(rest[v])) continue;
-    const bool known = finite(at);
-    vertex.position = glm::vec3((known ? at : rest[v]) - origin_m);
-    vertex.displacement_m = known ? static_cast<float>(glm::length(at - rest[v])) : 0.0F;
+    const bool known = finite(moved);
+    vertex.position = glm::vec3(rest[v] - origin_m + (known ? moved : glm::dvec3(0.0)));
+    vertex.displacement_m = known ? static_cast<float>(glm::length(moved)) : 0.0F;
     most = std::max(most, vertex.displacement_m);
   }
   set_shared_normals(draw);

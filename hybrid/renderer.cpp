@@ -317,11 +317,11 @@ void Renderer::begin(const DrawnScene& scene, const Snapshot& snapshot, int widt
   s.build_targets();
   for (std::size_t i = 0; i < s.objects.size(); ++i) {
     Object& object = s.objects[i];
-    if (!object.soft || i >= snapshot.soft_vertices.size() || i >= scene.objects.size()) continue;
+    if (!object.soft || i >= snapshot.soft_moved_m.size() || i >= scene.objects.size()) continue;
     const auto& rest = scene.objects[i].surface.vertices;
-    if (snapshot.soft_vertices[i].size() != rest.size() || rest.size() != object.moving.vertices.size())
+    if (snapshot.soft_moved_m[i].size() != rest.size() || rest.size() != object.moving.vertices.size())
       continue;
-    const float moved = move_vertices(object.moving, rest, snapshot.soft_vertices[i], s.origin_m);
+    const float moved = move_vertices(object.moving, rest, snapshot.soft_moved_m[i], s.origin_m);
     object.mesh.stream(object.moving);
     // What moved by less than a thousandth of the tool has not moved to the eye: rounding is not to be a
     // pattern.

@@ -249,9 +249,9 @@ Snapshot take_snapshot(const World& world, const WorldState& state, const TickRe
                     .proxy_m = tick.proxy_m,
                     .force_N = tick.force_N,
                     .feel = state.feel,
-                    .soft_vertices = {},
+                    .soft_moved_m = {},
                     .tick_us = tick.tick_us};
-  fill_soft_vertices(world, state, snapshot);
+  fill_soft_moved(world, state, snapshot);
   return snapshot;
 }
 
