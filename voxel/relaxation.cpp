@@ -114,6 +114,7 @@ void Relaxation::build_level(const Springs& fine, const std::vector<float>& fine
               static_cast<std::size_t>(s.dims[0]) * static_cast<std::size_t>(s.dims[1])};
   s.row.assign(static_cast<std::size_t>(s.dims[1]) * static_cast<std::size_t>(s.dims[2]), {0, 0});
   coarse.filled.assign(cells, 0.0F);
+  coarse.loud.assign(s.row.size(), 0);
   fixed.assign(cells, 0);
   for (std::size_t d = 0; d < 3; ++d) {
     s.along[d].assign(cells, 0.0F);
@@ -287,6 +288,8 @@ std::uint64_t Relaxation::smooth_lattice(Displacement& state, const ObstacleView
 HYBRID_WIDE void Relaxation::smooth_coarse(Level& level, int colour, int plane) noexcept {
   const Springs& s = level.springs;
   const auto sy = static_cast<std::ptrdiff_t>(s.stride[1]), sz = static_cast<std::ptrdiff_t>(s.stride[2]);
+  // A correction below this changes no residual by more than the tolerance.
+  const auto quiet = static_cast<float>(tolerance_N_ / lattice_.force_scale_N() * lattice_.min_spacing_m());
   for (int j = 1 + ((plane + 1 + colour) & 1); j + 1 < s.dims[1]; j += 2) {
     const std::size_t row =
         static_cast<std::size_t>(plane) * static_cast<std::size_t>(s.dims[1]) + static_cast<std::size_t>(j);
@@ -294,6 +297,7 @@ HYBRID_WIDE void Relaxation::smooth_coarse(Level& level, int colour, int plane) 
     if (count <= 0) continue;
     const std::size_t begin =
         row * static_cast<std::size_t>(s.dims[0]) + static_cast<std::size_t>(s.row[row][0]);
+    int loud = 0;
     for (int axis = 0; axis < 3; ++axis) {
       const auto ua = static_cast<std::size_t>(axis);
       float* e = level.correction[ua].data() + begin;
@@ -305,9 +309,11 @@ HYBRID_WIDE void Relaxation::smooth_coarse(Level& level, int colour, int plane) 
         next[i] = (r[i] + kx[i - 1] * e[i - 1] + kx[i] * e[i + 1] + ky[i - sy] * e[i - sy] +
                    ky[i] * e[i + sy] + kz[i - sz] * e[i - sz] + kz[i] * e[i + sz]) *
                   inverse[i];
+        loud |= static_cast<int>(next[i] > quiet) | static_cast<int>(next[i] < -quiet);
       }
       std::copy_n(next, count, e);
     }
+    level.loud[row] = static_cast<std::uint8_t>(loud);
   }
 }
 
@@ -445,23 +451,12 @@ HYBRID_WIDE void Relaxation::interpolate_row(const Level& coarse, int axis, int 
 }
 
 bool Relaxation::negligible(const Level& coarse, int j, int k) const noexcept {
-  const auto limit = static_cast<float>(tolerance_N_ / lattice_.force_scale_N() * lattice_.min_spacing_m());
-  const Springs& s = coarse.springs;
-  const int own_j = parent(j), own_k = parent(k);
-  const int near_j = (j & 1) != 0 ? own_j - 1 : own_j + 1, near_k = (k & 1) != 0 ? own_k - 1 : own_k + 1;
-  for (const int ck : {own_k, near_k}) {
-    for (const int cj : {own_j, near_j}) {
-      const auto& range = s.row[static_cast<std::size_t>(ck) * static_cast<std::size_t>(s.dims[1]) +
-                                static_cast<std::size_t>(cj)];
-      for (const auto& e : coarse.correction) {
-        const float* value = e.data() + cell_at(s, 0, cj, ck);
-        for (int i = range[0]; i < range[1]; ++i) {
-          if (std::fabs(value[i]) > limit) return false;
-        }
-      }
-    }
-  }
-  return true;
+  const auto across = static_cast<std::size_t>(coarse.springs.dims[1]);
+  const auto own_j = static_cast<std::size_t>(parent(j)), own_k = static_cast<std::size_t>(parent(k));
+  const std::size_t near_j = (j & 1) != 0 ? own_j - 1 : own_j + 1,
+                    near_k = (k & 1) != 0 ? own_k - 1 : own_k + 1;
+  return (coarse.loud[own_k * across + own_j] | coarse.loud[own_k * across + near_j] |
+          coarse.loud[near_k * across + own_j] | coarse.loud[near_k * across + near_j]) == 0;
 }
 
 std::uint64_t Relaxation::prolong_to_lattice(Displacement& state, const ObstacleView& obstacles,

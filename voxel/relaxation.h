@@ -93,7 +93,8 @@ class Relaxation {
     Springs springs;
     std::array<std::vector<float>, 3> correction, residual;  // [axis][cell]
     std::vector<float> filled;                               // [cell] 1 or 0
-    std::vector<std::uint64_t> plane_cost;                   // [plane] voxels in it
+    std::vector<std::uint8_t> loud;         // [row] 1: its correction is too large to leave out
+    std::vector<std::uint64_t> plane_cost;  // [plane] voxels in it
   };
   enum class Stage : std::uint8_t { smooth, restrict_residual, prolong };
   struct Step {
