@@ -39,7 +39,7 @@ Pressed pressed_cube(int n) {
 }
 
 void press_to_rest(benchmark::State& state) {
-  for (auto _ : state) {
+  while (state.KeepRunning()) {
     state.PauseTiming();
     Pressed pressed = pressed_cube(static_cast<int>(state.range(0)));
     const double tolerance = 1e-4 * pressed.object->lattice().force_scale_N();
@@ -54,7 +54,7 @@ BENCHMARK(press_to_rest)->Arg(24)->Arg(48)->Arg(72)->Unit(benchmark::kMillisecon
 // leave.
 void sweeps_alone(benchmark::State& state) {
   const int n = static_cast<int>(state.range(0));
-  for (auto _ : state) {
+  while (state.KeepRunning()) {
     state.PauseTiming();
     Pressed pressed = pressed_cube(n);
     voxel::Displacement copy = pressed.object->state();
