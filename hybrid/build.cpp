@@ -382,6 +382,22 @@ DrawnScene drawn_scene(const World& world, const std::string& title) {
   return drawn;
 }
 
+ObjectBox object_box(const World& world, std::size_t object) {
+  const std::size_t rigid = world.rigid.size();
+  const polygon::TriangleMesh& mesh =
+      object < rigid ? world.rigid[object].drawn : world.soft[object - rigid].drawn;
+  Box box;
+  for (const glm::dvec3& v : mesh.vertices) {
+    box.add(object < rigid ? world.rigid[object].to_scene(v) : world.soft[object - rigid].to_scene(v));
+  }
+  return {box.low, box.high};
+}
+
+std::string in_words(const ObjectBox& box) {
+  return fmt::format("x {:.4g} to {:.4g}, y {:.4g} to {:.4g}, z {:.4g} to {:.4g} mm", 1e3 * box.low.x,
+                     1e3 * box.high.x, 1e3 * box.low.y, 1e3 * box.high.y, 1e3 * box.low.z, 1e3 * box.high.z);
+}
+
 void fill_soft_moved(const World& world, const WorldState& state, Snapshot& snapshot) {
   snapshot.soft_moved_m.resize(world.object_count());
   for (std::size_t o = 0; o < world.soft.size(); ++o) {

@@ -40,6 +40,14 @@ BuiltScene build_scene(const Scene& scene, const Progress& progress = {});
 DrawnScene drawn_scene(const World& world, const std::string& title);
 void fill_soft_moved(const World& world, const WorldState& state, Snapshot& snapshot);
 
+// Where an object lies at rest (scene frame, meters), rigid ones first; in words: "x 1.2 to 3.4, y …, z …
+// mm".
+struct ObjectBox {
+  glm::dvec3 low{0.0}, high{0.0};
+};
+ObjectBox object_box(const World& world, std::size_t object);
+std::string in_words(const ObjectBox& box);
+
 // What a soft object of so many voxels takes, with its springs, state and coarse levels.
 std::uint64_t soft_volume_bytes(const std::array<int, 3>& dims);
 

@@ -112,6 +112,13 @@ void check_scene_file(const std::filesystem::path& path, Json& file) {
                                {"anchored", object.lattice().anchored_count()}});
     bytes += object.memory_bytes();
   }
+  for (std::size_t o = 0; o < built.world->object_count(); ++o) {
+    const std::string place = in_words(object_box(*built.world, o));
+    file["objects"][o]["place"] = place;
+    add_finding(file,
+                {"S02", polygon::Severity::info, 1,
+                 fmt::format("\"{}\" lies in {}", file["objects"][o]["name"].get<std::string>(), place)});
+  }
   file["touch_bytes"] = bytes;
   file["build_s"] = built.seconds;
   file["summary"] = fmt::format(

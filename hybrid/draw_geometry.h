@@ -31,9 +31,9 @@ DrawMesh make_draw_mesh(const polygon::TriangleMesh& mesh, const glm::dvec3& ori
 // One vertex a mesh vertex, in the mesh's order, so that move_vertices() can follow.
 DrawMesh make_moving_mesh(const polygon::TriangleMesh& mesh, const glm::dvec3& origin_m);
 
-// Puts the vertices of a moving mesh where they are now, `moved_m` from rest; normals and displacements follow.
-// Vertices whose displacement is not finite stay at rest. Returns the largest displacement (unit: meter). `moved_m`
-// must have as many entries as `rest`.
+// Puts the vertices of a moving mesh where they are now, `moved_m` from rest; normals and displacements
+// follow. Vertices whose displacement is not finite stay at rest. Returns the largest displacement (unit:
+// meter). `moved_m` must have as many entries as `rest`.
 float move_vertices(DrawMesh& draw, std::span<const glm::dvec3> rest, std::span<const glm::vec3> moved_m,
                     const glm::dvec3& origin_m);
 

@@ -137,6 +137,15 @@ std::string run_summary(const BuiltScene& built, SessionResult& result) {
                         row.kind == "rigid" ? row.triangles : row.voxels,
                         row.kind == "rigid" ? "triangles" : "voxels", row.contact_ticks, row.max_force_N);
   }
+  if (result.contact_ticks == 0) {
+    text += "nothing was touched: does the [path] lead to an object? They lie in\n";
+    for (std::size_t o = 0; o < built.world->object_count(); ++o) {
+      const std::size_t rigid = built.world->rigid.size();
+      text += fmt::format("  {:<16} {}\n",
+                          o < rigid ? built.world->rigid[o].name : built.world->soft[o - rigid].name,
+                          in_words(object_box(*built.world, o)));
+    }
+  }
   if (result.error.samples > 0) {
     text += fmt::format(
         "force error against the equilibrium lattice at {} sampled ticks: at most {:.4f} N ({:.2f} JND), rms "
