@@ -39,7 +39,6 @@ std::unique_ptr<WorldState> copy_state(const World& world, const WorldState& sta
   copy->map.reserve_bricks(1024);
   copy->proxy_m = state.proxy_m;
   copy->device_m = state.device_m;
-  copy->started = state.started;
   copy->gather_step_m = state.gather_step_m;
   copy->hidden_stiffness_N_per_m = state.hidden_stiffness_N_per_m;
   copy->obstacle_seen = state.obstacle_seen;

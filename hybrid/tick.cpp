@@ -145,56 +145,52 @@ void give_way(const World& world, WorldState& state, const glm::dvec3& before, S
   sweep.point = state.proxy_m;
 }
 
-}  // namespace
+// What the map says of the neighbourhood.
+struct Surroundings {
+  bool free = false;       // the proxy reached the device through empty space: nothing can be felt
+  bool near_soft = false;  // some surface voxel is within `range_m` of the tool's reach
+  double range_m = std::numeric_limits<double>::max();  // how far the proxy may go in this tick
+};
 
-TickResult haptic_tick(const World& world, WorldState& state, const device::DeviceState& input,
-                       double dt_s) noexcept {
-  TickResult result;
-  StageClock clock(result);
-  const glm::dvec3 device = check_input(state, input);
-  std::fill(state.rigid_force_N.begin(), state.rigid_force_N.end(), glm::dvec3(0.0));
-  Sweep sweep;
-
-  bool near_soft = false;
-  // Against tissue no further in a tick than was looked, part of its reach at a time, so that no voxel is
-  // jumped over.
-  double range = state.soft.empty() ? std::numeric_limits<double>::max()
-                                    : kPasses * kSoftStep * soft_reach(world, state);
-  const bool free = advance_through_free_space(world, state, device);
-  if (!free && !state.soft.empty()) {
-    near_soft = touch_soft(world, state, state.proxy_m, range);
+Surroundings look_around(const World& world, WorldState& state, const glm::dvec3& device) noexcept {
+  Surroundings around;
+  // Against tissue no further in a tick than was looked, part of the tool's reach at a time, so that no voxel
+  // is jumped over.
+  if (!state.soft.empty()) around.range_m = kPasses * kSoftStep * soft_reach(world, state);
+  around.free = advance_through_free_space(world, state, device);
+  if (!around.free && !state.soft.empty()) {
+    around.near_soft = touch_soft(world, state, state.proxy_m, around.range_m);
   } else {
     for (auto& object : state.soft) {
       if (!object->touched().empty()) object->touch({});
     }
   }
-  clock.done(Stage::broad_phase);
+  return around;
+}
 
+// Rigid contact planes, soft wave and local equilibrium, proxy: in passes, because each answers the others.
+Sweep settle_contact(const World& world, WorldState& state, const glm::dvec3& device,
+                     const Surroundings& around) noexcept {
+  Sweep sweep;
   const glm::dvec3 before = state.proxy_m;
+  std::fill(state.rigid_force_N.begin(), state.rigid_force_N.end(), glm::dvec3(0.0));
   std::fill(state.reactions.begin(), state.reactions.end(), voxel::Reaction{});
-  if (!near_soft) state.hidden_stiffness_N_per_m = 0.0;
-  if (near_soft) press_soft(world, state, state.proxy_m, glm::dvec3(0.0), 0);
-  for (int pass = 0; pass < kPasses && !free; ++pass) {
-    const double moved =
-        move_proxy(world, state, device, near_soft, near_soft ? range / kPasses : range, sweep);
-    if (!near_soft || (pass > 0 && moved < kStill * world.tool.radius_m)) break;
+  if (!around.near_soft) state.hidden_stiffness_N_per_m = 0.0;
+  if (around.near_soft) press_soft(world, state, state.proxy_m, glm::dvec3(0.0), 0);
+  const double travel = around.near_soft ? around.range_m / kPasses : around.range_m;
+  for (int pass = 0; pass < kPasses && !around.free; ++pass) {
+    const double moved = move_proxy(world, state, device, around.near_soft, travel, sweep);
+    if (!around.near_soft || (pass > 0 && moved < kStill * world.tool.radius_m)) break;
   }
-  if (near_soft) give_way(world, state, before, sweep);
+  if (around.near_soft) give_way(world, state, before, sweep);
   if (!sweep.arrived) ++state.truncated_ticks;
-  clock.done(Stage::contact);
+  return sweep;
+}
 
-  refresh_obstacles(world, state);
-  if (!world.meeting.empty()) relax_pairs(world, state);
-  clock.done(Stage::arbitration);
-
-  for (std::size_t o = 0; o < state.soft.size(); ++o) state.soft[o]->relax_background(world.soft[o].budget);
-  clock.done(Stage::background);
-
-  refresh_map(world, state);
-  clock.done(Stage::map);
-
-  const glm::dvec3 coupling = world.tool.stiffness_N_per_m * (state.proxy_m - device);
-  result.device_m = device;
+// The hand feels the coupling and nothing else; its parts, and who is felt, are for the record.
+void publish_force(const World& world, WorldState& state, const Sweep& sweep, double dt_s,
+                   TickResult& result) noexcept {
+  const glm::dvec3 coupling = world.tool.stiffness_N_per_m * (state.proxy_m - result.device_m);
   result.proxy_m = state.proxy_m;
   result.rigid_N = sweep.force_N;
   result.soft_N = coupling - sweep.force_N;
@@ -208,6 +204,33 @@ TickResult haptic_tick(const World& world, WorldState& state, const device::Devi
     state.feel[o].contact = state.feel[o].force_N > 0.0;
     if (state.feel[o].contact) result.contacts |= 1U << std::min<std::size_t>(o, 31);
   }
+}
+
+}  // namespace
+
+TickResult haptic_tick(const World& world, WorldState& state, const device::DeviceState& input,
+                       double dt_s) noexcept {
+  TickResult result;
+  StageClock clock(result);
+  result.device_m = check_input(state, input);
+
+  const Surroundings around = look_around(world, state, result.device_m);
+  clock.done(Stage::broad_phase);
+
+  const Sweep sweep = settle_contact(world, state, result.device_m, around);
+  clock.done(Stage::contact);
+
+  refresh_obstacles(world, state);
+  if (!world.meeting.empty()) relax_pairs(world, state);
+  clock.done(Stage::arbitration);
+
+  for (std::size_t o = 0; o < state.soft.size(); ++o) state.soft[o]->relax_background(world.soft[o].budget);
+  clock.done(Stage::background);
+
+  refresh_map(world, state);
+  clock.done(Stage::map);
+
+  publish_force(world, state, sweep, dt_s, result);
   ++state.tick;
   clock.done(Stage::force);
   clock.stop();
@@ -219,7 +242,6 @@ bool start_proxy(const World& world, WorldState& state, const glm::dvec3& device
   state.device_m = device_m;
   state.proxy_m = device_m;
   state.gather_step_m = radius;
-  state.started = true;
   for (int n = 0; n < 64; ++n) {
     glm::dvec3 away(0.0);
     double deepest = 0.0;

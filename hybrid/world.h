@@ -99,7 +99,6 @@ struct WorldState {
   OccupancyMap map;
   glm::dvec3 proxy_m{0.0};   // scene frame
   glm::dvec3 device_m{0.0};  // last good input
-  bool started = false;
   device::ForceLimitState limit;
   std::uint64_t tick = 0;
   std::uint64_t nonfinite = 0;        // inputs or forces that were not finite

@@ -92,10 +92,7 @@ void SoftObject::touch(std::span<const VoxelId> near) noexcept {
   touches_.clear();
   touched_voxels_.clear();
   for (const VoxelId v : near) {
-    if (touches_.size() == kMaxTouched) {
-      ++dropped_touches_;
-      break;
-    }
+    if (touches_.size() == kMaxTouched) break;
     const bool kept = carried_stamp_[v] == stamp_;
     if (kept) --pressed;
     touches_.push_back({v, kept, glm::dvec3(0.0), glm::dvec3(0.0)});

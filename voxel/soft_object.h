@@ -94,12 +94,10 @@ class SoftObject {
   // Largest force left on any free voxel (N): what separates the state from equilibrium.
   [[nodiscard]] double residual_N() const { return relaxation_.residual_N(); }
   [[nodiscard]] const Relaxation& relaxation() const { return relaxation_; }
-  [[nodiscard]] std::uint64_t dropped_touches() const { return dropped_touches_; }
   // Touched voxels of the last touch(), for the map to look at.
   [[nodiscard]] std::span<const VoxelId> touched() const {
     return {touched_voxels_.data(), touched_voxels_.size()};
   }
-  [[nodiscard]] std::span<const VoxelId> chain_moved() const { return chain_.moved(); }
   // Number of a surface voxel; kNoSurface for one inside.
   static constexpr std::uint32_t kNoSurface = 0xFFFFFFFFU;
   [[nodiscard]] std::uint32_t surface_number(VoxelId v) const { return surface_number_[v]; }
@@ -160,7 +158,6 @@ class SoftObject {
   std::vector<std::uint32_t> carried_index_;  // [v]
   std::uint32_t stamp_ = 0;
   double unrelaxed_m_ = 0.0;  // motion of pressed voxels since the background was last woken
-  std::uint64_t dropped_touches_ = 0;
   bool moved_ever_ = false;
 };
 
