@@ -61,7 +61,7 @@ double choose_cell(const Scene& scene, const Box& box, double soft_spacing) {
     const double across = longest / *scene.occupancy_cell_m;
     const double bytes = 6.0 * across * across / 64.0 * 2600.0;
     if (bytes > 0.25 * static_cast<double>(usable_memory_bytes())) {
-      refuse(scene, {},
+      refuse(scene, scene.occupancy_place,
              fmt::format("an occupancy cell of {:.3g} m over a scene of {:.3g} m needs about {:.1f} GB; "
                          "use a larger [occupancy] cell or leave it out",
                          *scene.occupancy_cell_m, longest, bytes / 1e9));

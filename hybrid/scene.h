@@ -141,6 +141,7 @@ struct Scene {
   double unit_m = 1e-3;  // length unit of the file's numbers
   std::optional<double>
       occupancy_cell_m;  // default: chosen from the soft spacing, the rigid size and the tool
+  SourcePlace occupancy_place;
   Overlap overlap = Overlap::carve;
   std::vector<RigidDescription> rigid;
   std::vector<SoftDescription> soft;

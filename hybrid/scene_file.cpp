@@ -278,6 +278,7 @@ Scene read_scene(const std::filesystem::path& file) {
     static constexpr std::string_view occupancy_keys[] = {"cell"};
     table.allow(occupancy_keys);
     if (table.has("cell")) scene.occupancy_cell_m = table.number("cell", source.size());
+    scene.occupancy_place = table.place_of("cell");
   });
   read_once(root, "tool", [&](const TableReader& table) { scene.tool = read_tool(table); });
   read_once(root, "device", [&](const TableReader& table) { read_device(table, scene); });

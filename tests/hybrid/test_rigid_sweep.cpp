@@ -22,7 +22,6 @@ namespace {
 using glm::dvec3;
 using hybrid::Scene;
 using hybrid::TickResult;
-using tests::coupling;
 using tests::Touch;
 
 constexpr double kStiffness = 1000.0;
