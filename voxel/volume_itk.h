@@ -13,7 +13,8 @@
 #include "voxel/volume_inspect.h"
 
 namespace itk {
-class ImageIOBase;
+class ImageIOBase;  // NOLINT(cppcoreguidelines-virtual-class-destructor): ITK's own, reported where it is
+                    // first named
 }
 
 namespace voxel {
