@@ -286,6 +286,7 @@ TEST_F(MinimiseOnPlanes, AgreesWithBruteForceOnWhetherThereIsRoom) {
   std::uniform_real_distribution<double> offset(-1.0, 0.6);
   for (int n = 0; n < 3000; ++n) {
     std::vector<ContactPlane> planes;
+    planes.reserve(7);
     for (int i = 0; i < 7; ++i)
       planes.push_back({random_direction(random), offset(random), 0, static_cast<std::uint32_t>(i)});
     const dvec3 target = random_vector(random, 1.0);
