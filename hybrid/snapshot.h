@@ -36,8 +36,9 @@ struct Snapshot {
   double t_s = 0.0;
   glm::dvec3 device_m{0.0}, proxy_m{0.0}, force_N{0.0};  // scene frame
   std::vector<ObjectFeel> feel;                          // one an object
-  // One an object: empty for a rigid one; for a soft one how far each vertex of its surface is from rest (scene frame, meters).
-  // Displacements, because a float position 1,000 km from the origin is off by centimeters.
+  // One an object: empty for a rigid one; for a soft one how far each vertex of its surface is from rest
+  // (scene frame, meters). Displacements, because a float position 1,000 km from the origin is off by
+  // centimeters.
   std::vector<std::vector<glm::vec3>> soft_moved_m;
   double tick_us = 0.0;
 };
