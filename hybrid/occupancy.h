@@ -37,7 +37,8 @@ class OccupancyMap {
   void move(std::uint32_t number, const glm::dvec3& position) noexcept;
   // Does anything at all lie in a brick that this box touches? The cheapest question: no cell is looked at.
   [[nodiscard]] bool any_near(const glm::dvec3& low, const glm::dvec3& high) const noexcept;
-  // Bit per rigid object (objects beyond 62 share bit 63) with surface in a cell that the box touches.
+  // Bit per rigid object (objects beyond 62 share bit 63) with surface in a brick of which the box touches an
+  // occupied cell: never too few, perhaps too many; the exact question goes to the surface.
   [[nodiscard]] std::uint64_t rigid_in(const glm::dvec3& low, const glm::dvec3& high) const noexcept;
   // Soft voxel numbers in the cells that the box touches; returns how many were written, at most out.size().
   [[nodiscard]] std::size_t soft_in(const glm::dvec3& low, const glm::dvec3& high,
