@@ -14,14 +14,15 @@
 #include "hybrid/arbitration.h"
 #include "hybrid/build_objects.h"
 #include "hybrid/label_surface.h"
+#include "hybrid/process_memory.h"
 #include "hybrid/soft_stage.h"
 
 namespace hybrid {
 namespace {
 
 constexpr int kSurfaceSmoothing = 6;  // of a soft object's drawn surface
-constexpr double kMostCells =
-    512.0;  // cells along the scene's longest side, at most, unless the scene says otherwise
+// Cells along the scene's longest side, at most, unless the scene says otherwise: 64 bricks however they lie.
+constexpr double kMostCells = 504.0;
 constexpr std::size_t kMapReserve = 2048;  // bricks that motion may add
 constexpr double kFarthestLook = 32.0;     // spacings that one distance query may clear of carving
 
@@ -70,25 +71,6 @@ double choose_cell(const Scene& scene, const Box& box, double soft_spacing) {
   }
   const double wanted = soft_spacing > 0.0 ? soft_spacing : 0.5 * scene.tool.radius_m;
   return std::max(wanted, longest / kMostCells);
-}
-
-// Long triangles are halved until each spans few cells: else the box of an oblique one would be all there is
-// to look at.
-void rasterise(OccupancyMap& map, std::uint32_t object, const glm::dvec3& a, const glm::dvec3& b,
-               const glm::dvec3& c) {
-  const double ab = glm::length(b - a), bc = glm::length(c - b), ca = glm::length(a - c);
-  const double longest = std::max({ab, bc, ca});
-  if (longest <= 8.0 * map.cell_m()) {
-    map.add_triangle(object, a, b, c);
-  } else if (longest == ab) {
-    const glm::dvec3 m = 0.5 * (a + b);
-    rasterise(map, object, a, m, c);
-    rasterise(map, object, m, b, c);
-  } else if (longest == bc) {
-    rasterise(map, object, b, c, a);
-  } else {
-    rasterise(map, object, c, a, b);
-  }
 }
 
 // Distance to the nearest rigid surface within `range`, and whether the point is inside a rigid solid.
@@ -182,6 +164,7 @@ class Builder {
       refuse(scene_, scene_.rigid.front().place,
              "a punch against rigid objects is not supported yet; use [tool] shape = \"ball\"");
     }
+    refuse_motion_beside_soft();
     for (const RigidDescription& d : scene_.rigid) add_rigid(d);
     for (const SoftDescription& d : scene_.soft) read_soft(d);
     settle_overlaps();
@@ -196,7 +179,10 @@ class Builder {
            fmt::format("{} surface voxels lie near rigid objects, which will stop them", near)});
     }
     built_.world = std::move(world_);
+    give_back_freed_memory();
     built_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    built_.held_bytes = held_memory_bytes();
+    built_.peak_bytes = peak_memory_bytes();
     return std::move(built_);
   }
 
@@ -205,11 +191,24 @@ class Builder {
     if (progress_) progress_(text);
   }
 
+  void refuse_motion_beside_soft() const {
+    if (scene_.soft.empty()) return;
+    for (const RigidDescription& d : scene_.rigid) {
+      if (std::holds_alternative<std::monostate>(d.motion)) continue;
+      refuse(scene_, d.motion_place,
+             fmt::format(
+                 "\"{}\" moves, and moving rigid objects beside soft ones are not supported yet; remove its "
+                 "motion, or the [[soft]] objects",
+                 d.name));
+    }
+  }
+
   void add_rigid(const RigidDescription& d) {
     say(fmt::format("reading rigid \"{}\"", d.name));
     at_place(scene_, d.source_place, d.name, [&] { world_->rigid.push_back(build_rigid(d, built_.notes)); });
-    const RigidObject& object = world_->rigid.back();
-    for (const glm::dvec3& v : object.drawn.vertices) box_.add(object.to_scene(v));
+    RigidObject& object = world_->rigid.back();
+    at_place(scene_, d.motion_place, d.name, [&] { object.motion = build_motion(d, object); });
+    for (const glm::dvec3& v : object.drawn->vertices) box_.add(object.to_scene(v));
   }
 
   void read_soft(const SoftDescription& d) {
@@ -284,13 +283,7 @@ class Builder {
     }
     const glm::dvec3 middle = 0.5 * (box_.low + box_.high);
     map_ = std::make_unique<OccupancyMap>(choose_cell(scene_, box_, spacing), middle);
-    for (std::uint32_t o = 0; o < world_->rigid.size(); ++o) {
-      const RigidObject& object = world_->rigid[o];
-      for (const polygon::TriangleIndices& t : object.drawn.triangles) {
-        rasterise(*map_, o, object.to_scene(object.drawn.vertices[t[0]]),
-                  object.to_scene(object.drawn.vertices[t[1]]), object.to_scene(object.drawn.vertices[t[2]]));
-      }
-    }
+    for (std::uint32_t o = 0; o < world_->rigid.size(); ++o) put_rigid_in_map(o);
     for (std::size_t o = 0; o < soft_.size(); ++o) {
       SoftBody& body = world_->soft[o];
       const auto surface = soft_[o]->lattice().surface();
@@ -302,13 +295,36 @@ class Builder {
     map_->reserve_bricks(soft_.empty() ? 0 : kMapReserve);
   }
 
+  void put_rigid_in_map(std::uint32_t o) {
+    const RigidObject& object = world_->rigid[o];
+    const double margin = map_margin_m(scene_.rigid[o]);
+    const auto corner = [&object](const polygon::TriangleIndices& t, std::size_t c) {
+      return object.drawn->vertices[t[c]];
+    };
+    if (!object.motion.moves()) {
+      for (const polygon::TriangleIndices& t : object.drawn->triangles) {
+        map_->add_triangle(o, object.to_scene(corner(t, 0)), object.to_scene(corner(t, 1)),
+                           object.to_scene(corner(t, 2)), margin);
+      }
+      return;
+    }
+    const auto cells = std::make_shared<SurfaceCells>(
+        map_->cell_m(), 0.5 * (object.surface->lower() + object.surface->upper()));
+    for (const polygon::TriangleIndices& t : object.drawn->triangles)
+      cells->add_triangle(1, corner(t, 0), corner(t, 1), corner(t, 2), margin);
+    cells->seal();
+    map_->add_moving(o, cells, object.pose.position_m, object.pose.rotation);
+  }
+
   void finish_world() {
     world_->tool = scene_.tool;
+    world_->set_scale(box_.low, box_.high);
     world_->limits = scene_.safety;
     if (!scene_.max_force_given) {
       const double most = device::device_limits(scene_.device_model).max_force_N;
       if (most > 0.0 && std::isfinite(most)) world_->limits.max_force_N = most;
     }
+    world_->encoder_m = device::device_limits(scene_.device_model).resolution_m;
     for (std::uint32_t a = 0; a < world_->soft.size(); ++a) {
       for (std::uint32_t b = a + 1; b < world_->soft.size(); ++b) world_->meeting.push_back({a, b});
     }
@@ -330,31 +346,6 @@ class Builder {
 
 }  // namespace
 
-WorldState::WorldState(const World& world, OccupancyMap occupancy) : map(std::move(occupancy)) {
-  feel.resize(world.object_count());
-  rigid_force_N.resize(world.rigid.size());
-  near.resize(world.rigid.empty() ? 0 : kMaxNear);
-  planes.reserve(kMaxPlanes);
-}
-
-void WorldState::prepare(const World& world) {
-  reactions.resize(soft.size());
-  obstacle_seen.resize(soft.size());
-  cursor.assign(soft.size(), 0);
-  touched.resize(soft.size());
-  for (auto& list : touched) list.reserve(voxel::SoftObject::kMaxTouched);
-  if (!soft.empty()) {
-    bounds.resize(kMaxPlanes / 2);
-    found.resize(kMaxFound);
-  }
-  pair_cursor.assign(world.meeting.size(), 0);
-  paired.resize(world.meeting.size());
-  for (std::size_t m = 0; m < world.meeting.size(); ++m) {
-    paired[m].assign(soft[world.meeting[m][0]]->lattice().surface().size(), 0);
-  }
-  pairs.reserve(world.meeting.empty() ? 0 : kMaxPairs);
-}
-
 BuiltScene build_scene(const Scene& scene, const Progress& progress) {
   return Builder(scene, progress).build();
 }
@@ -372,7 +363,7 @@ DrawnScene drawn_scene(const World& world, const std::string& title) {
                    .tool_radius_m = world.tool.radius_m,
                    .max_force_N = world.limits.max_force_N};
   for (const RigidObject& object : world.rigid) {
-    drawn.objects.push_back({object.name, false, object.drawn});
+    drawn.objects.push_back({object.name, false, *object.drawn});
     for (glm::dvec3& v : drawn.objects.back().surface.vertices) v = object.to_scene(v);
   }
   for (const SoftBody& body : world.soft) {
@@ -385,7 +376,7 @@ DrawnScene drawn_scene(const World& world, const std::string& title) {
 ObjectBox object_box(const World& world, std::size_t object) {
   const std::size_t rigid = world.rigid.size();
   const polygon::TriangleMesh& mesh =
-      object < rigid ? world.rigid[object].drawn : world.soft[object - rigid].drawn;
+      object < rigid ? *world.rigid[object].drawn : world.soft[object - rigid].drawn;
   Box box;
   for (const glm::dvec3& v : mesh.vertices) {
     box.add(object < rigid ? world.rigid[object].to_scene(v) : world.soft[object - rigid].to_scene(v));

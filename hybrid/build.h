@@ -25,7 +25,9 @@ struct BuiltScene {
   std::unique_ptr<const World> world;
   std::unique_ptr<WorldState> state;  // at rest, not started: see start_proxy()
   std::vector<BuildNote> notes;       // what a person should know: findings, repairs, voxels carved
-  double seconds = 0.0;
+  double seconds = 0.0;           // from the files to ready to be touched
+  // Of the whole program, when that was done: resident, and the most that ever was.
+  std::uint64_t held_bytes = 0, peak_bytes = 0;
 };
 
 // `progress` is told what begins, in words; may be empty.

@@ -6,9 +6,11 @@
 #include <algorithm>
 #include <glm/geometric.hpp>
 #include <map>
+#include <memory>
 #include <stdexcept>
 
 #include "hybrid/label_surface.h"
+#include "hybrid/process_memory.h"
 #include "polygon/mesh_check.h"
 #include "polygon/mesh_file.h"
 #include "polygon/mesh_surface.h"
@@ -43,15 +45,28 @@ polygon::TriangleMesh read_mesh(const std::string& object, const MeshSource& sou
   return std::move(repaired.mesh);
 }
 
-RigidObject mesh_object(const RigidDescription& d, polygon::TriangleMesh mesh,
+std::shared_ptr<const polygon::TriangleMesh> kept(polygon::TriangleMesh mesh) {
+  return std::make_shared<const polygon::TriangleMesh>(std::move(mesh));
+}
+
+// What is felt and what is drawn share one mesh.
+RigidObject surface_object(const RigidDescription& d, const Pose& pose, polygon::TriangleMesh mesh,
+                           bool solid) {
+  RigidObject object{.name = d.name, .surface = nullptr, .pose = pose, .drawn = kept(std::move(mesh))};
+  give_back_freed_memory();
+  object.surface =
+      polygon::make_mesh_surface(object.drawn, {.solid = solid, .vertex_normals = d.feel.shading});
+  object.surface_is_drawn = true;
+  return object;
+}
+
+RigidObject mesh_object(const RigidDescription& d, const Pose& pose, polygon::TriangleMesh mesh,
                         std::vector<BuildNote>& notes) {
   const polygon::MeshCheck check = polygon::check_mesh(mesh);
   for (const polygon::Finding& f : check.findings) {
     if (f.severity != polygon::Severity::info) notes.push_back({d.name, f.severity, in_words(f)});
   }
-  RigidObject object{.name = d.name, .surface = nullptr, .pose = d.pose, .drawn = std::move(mesh)};
-  object.surface = polygon::make_mesh_surface(object.drawn, check.oriented);
-  return object;
+  return surface_object(d, pose, std::move(mesh), check.oriented);
 }
 
 voxel::VolumeFileOptions volume_options(const std::vector<voxel::LabelRule>& rules, double unit_m,
@@ -77,13 +92,9 @@ RigidObject volume_surface_object(const RigidDescription& d, const VolumeSurface
       throw std::runtime_error(
           "the cuts leave nothing of this surface; a cut removes the side its normal points to");
   }
-  RigidDescription placed = d;
-  placed.pose = frame;
   // An opened surface is a sheet by intent: that it is not closed is no news.
-  if (s.cuts.empty()) return mesh_object(placed, std::move(mesh), notes);
-  RigidObject object{.name = d.name, .surface = nullptr, .pose = frame, .drawn = std::move(mesh)};
-  object.surface = polygon::make_mesh_surface(object.drawn, false);
-  return object;
+  if (s.cuts.empty()) return mesh_object(d, frame, std::move(mesh), notes);
+  return surface_object(d, frame, std::move(mesh), false);
 }
 
 struct RigidBuilder {
@@ -91,23 +102,23 @@ struct RigidBuilder {
   std::vector<BuildNote>& notes;
 
   RigidObject operator()(const MeshSource& s) const {
-    return mesh_object(d, read_mesh(d.name, s, notes), notes);
+    return mesh_object(d, d.pose, read_mesh(d.name, s, notes), notes);
   }
   RigidObject operator()(const BallPrimitive& s) const {
     return {d.name, polygon::make_ball_surface(s.radius_m), d.pose,
-            polygon::make_ball_mesh(s.radius_m, kBallSubdivisions)};
+            kept(polygon::make_ball_mesh(s.radius_m, kBallSubdivisions))};
   }
   RigidObject operator()(const BoxPrimitive& s) const {
     return {d.name, polygon::make_box_surface(0.5 * s.size_m), d.pose,
-            polygon::make_box_mesh(0.5 * s.size_m, 8)};
+            kept(polygon::make_box_mesh(0.5 * s.size_m, 8))};
   }
   RigidObject operator()(const PlanePrimitive& s) const {
     return {d.name, polygon::make_plane_surface(0.5 * s.size_m), d.pose,
-            polygon::make_plane_mesh(0.5 * s.size_m, 16)};
+            kept(polygon::make_plane_mesh(0.5 * s.size_m, 16))};
   }
   RigidObject operator()(const CapsulePrimitive& s) const {
     return {d.name, polygon::make_capsule_surface(s.radius_m, 0.5 * s.length_m), d.pose,
-            polygon::make_capsule_mesh(s.radius_m, 0.5 * s.length_m, 32)};
+            kept(polygon::make_capsule_mesh(s.radius_m, 0.5 * s.length_m, 32))};
   }
   RigidObject operator()(const VolumeSurfaceSource& s) const { return volume_surface_object(d, s, notes); }
 };
@@ -134,9 +145,26 @@ struct VolumeBuilder {
 RigidObject build_rigid(const RigidDescription& description, std::vector<BuildNote>& notes) {
   RigidObject object = std::visit(RigidBuilder{description, notes}, description.source);
   if (description.as_mesh && !std::holds_alternative<PlanePrimitive>(description.source)) {
-    object.surface = polygon::make_mesh_surface(object.drawn, true);
+    object.surface =
+        polygon::make_mesh_surface(object.drawn, {.solid = true, .vertex_normals = description.feel.shading});
+    object.surface_is_drawn = true;
   }
   return object;
+}
+
+RigidMotion build_motion(const RigidDescription& description, const RigidObject& object) {
+  // Whether a mesh is closed matters to the mass of a free body alone.
+  const bool closed =
+      std::holds_alternative<FreeMotion>(description.motion) && polygon::check_mesh(*object.drawn).oriented;
+  return {description, object.pose, *object.drawn, closed};
+}
+
+double map_margin_m(const RigidDescription& description) {
+  // The chords of the tessellations below: a ball's triangles of 4 degrees, a capsule's of 11.
+  if (const auto* ball = std::get_if<BallPrimitive>(&description.source)) return 1.5e-3 * ball->radius_m;
+  if (const auto* capsule = std::get_if<CapsulePrimitive>(&description.source))
+    return 1.2e-2 * capsule->radius_m;
+  return 0.0;
 }
 
 voxel::LabelVolume build_volume(const SoftDescription& description, std::vector<BuildNote>& notes) {

@@ -9,6 +9,13 @@ namespace hybrid {
 // Reads or makes the surface. Findings go to `notes`. Throws std::exception in words.
 RigidObject build_rigid(const RigidDescription& description, std::vector<BuildNote>& notes);
 
+// How a built object moves. Throws std::exception in words.
+RigidMotion build_motion(const RigidDescription& description, const RigidObject& object);
+
+// How far the exact surface of a primitive may lie from the triangles that stand for it in the occupancy map
+// (m).
+double map_margin_m(const RigidDescription& description);
+
 // Reads or makes the label volume; its frame lies in the scene (the description's pose applied).
 // Throws std::exception in words.
 voxel::LabelVolume build_volume(const SoftDescription& description, std::vector<BuildNote>& notes);

@@ -35,6 +35,7 @@ double tissue_force(const ClosedForm& form, const Tool& tool, double indentation
 
 std::optional<ClosedForm> closed_form_of(const RigidDescription& rigid) {
   ClosedForm form{.pose = rigid.pose, .caveat = {}};
+  if (rigid.feel.any()) form.caveat = "friction, damping, shading and texture left out";
   if (const auto* ball = std::get_if<BallPrimitive>(&rigid.source)) {
     form.half_size_m = glm::dvec3(ball->radius_m);
     return form;

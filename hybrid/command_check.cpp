@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <memory>
+#include <utility>
 
 #include "hybrid/commands.h"
 #include "hybrid/report.h"
@@ -28,37 +30,79 @@ const char* word(polygon::Severity severity) {
   return "error";
 }
 
+Json to_json(const glm::dvec3& v) {
+  return {v.x, v.y, v.z};
+}
+
+Json to_json(const polygon::Finding& f) {
+  Json json{{"id", f.id}, {"severity", word(f.severity)}, {"count", f.count}, {"text", f.text}};
+  if (f.place) {
+    json["place"] = {{"first_m", to_json(f.place->first_m)},
+                     {"lower_m", to_json(f.place->lower_m)},
+                     {"upper_m", to_json(f.place->upper_m)}};
+    if (f.place->triangle) json["place"]["triangle"] = *f.place->triangle;
+  }
+  return json;
+}
+
 void add_finding(Json& file, const polygon::Finding& f) {
-  file["findings"].push_back(
-      {{"id", f.id}, {"severity", word(f.severity)}, {"count", f.count}, {"text", f.text}});
+  file["findings"].push_back(to_json(f));
 }
 
 // A mesh's findings are worded to follow their count.
-void add_counted(Json& file, polygon::Finding f) {
+Json counted(polygon::Finding f) {
   f.text = fmt::format("{} {}", f.count, f.text);
-  add_finding(file, f);
+  return to_json(f);
+}
+
+// What `repair = true` would change, and what a check finds after it.
+Json would_repair(const polygon::TriangleMesh& mesh, bool deep) {
+  const polygon::RepairedMesh repaired = polygon::repair_mesh(mesh);
+  const polygon::MeshCheck checked = polygon::check_mesh(repaired.mesh, deep);
+  Json json{{"changes", Json::array()},
+            {"after", Json::array()},
+            {"vertices", repaired.mesh.vertices.size()},
+            {"triangles", repaired.mesh.triangles.size()},
+            {"closed", checked.closed},
+            {"oriented", checked.oriented},
+            {"volume_m3", checked.volume_m3}};
+  for (const polygon::Finding& f : repaired.changes) json["changes"].push_back(counted(f));
+  for (const polygon::Finding& f : checked.findings) json["after"].push_back(counted(f));
+  json["summary"] =
+      fmt::format("{} vertices, {} triangles, {}", repaired.mesh.vertices.size(),
+                  repaired.mesh.triangles.size(), checked.oriented ? "a closed solid" : "a two-sided sheet");
+  return json;
+}
+
+void print_findings(std::FILE* out, const Json& findings, const char* indent) {
+  for (const Json& f : findings) {
+    fmt::print(out, "{}{} {}: {}\n", indent, f["severity"].get<std::string>(), f["id"].get<std::string>(),
+               f["text"].get<std::string>());
+  }
 }
 
 void check_mesh_file(const std::filesystem::path& path, const CheckCommand& command, Json& file) {
   file["kind"] = "mesh";
-  const polygon::MeshFile loaded =
+  polygon::MeshFile loaded =
       polygon::load_mesh(path, {.scale = command.unit_m, .max_bytes = usable_memory_bytes() / 4});
   const polygon::MeshCheck checked = polygon::check_mesh(loaded.mesh, command.deep);
-  for (const polygon::Finding& f : loaded.findings) add_counted(file, f);
-  for (const polygon::Finding& f : checked.findings) add_counted(file, f);
+  for (const polygon::Finding& f : loaded.findings) file["findings"].push_back(counted(f));
+  for (const polygon::Finding& f : checked.findings) file["findings"].push_back(counted(f));
+  if (command.repair) file["repair"] = would_repair(loaded.mesh, command.deep);
   file["vertices"] = loaded.mesh.vertices.size();
   file["triangles"] = loaded.mesh.triangles.size();
   file["closed"] = checked.closed;
   file["oriented"] = checked.oriented;
-  const auto surface = polygon::make_mesh_surface(loaded.mesh, checked.oriented);
+  const auto mesh = std::make_shared<const polygon::TriangleMesh>(std::move(loaded.mesh));
+  const auto surface = polygon::make_mesh_surface(mesh, {.solid = checked.oriented});
   const glm::dvec3 low = surface->lower(), high = surface->upper();
-  file["lower_m"] = {low.x, low.y, low.z};
-  file["upper_m"] = {high.x, high.y, high.z};
+  file["lower_m"] = to_json(low);
+  file["upper_m"] = to_json(high);
   file["volume_m3"] = checked.volume_m3;
   file["touch_bytes"] = surface->memory_bytes();
   file["summary"] =
       fmt::format("{} vertices, {} triangles, {:.4g} x {:.4g} x {:.4g} m, {}; {:.1f} MB to touch",
-                  loaded.mesh.vertices.size(), loaded.mesh.triangles.size(), high.x - low.x, high.y - low.y,
+                  mesh->vertices.size(), mesh->triangles.size(), high.x - low.x, high.y - low.y,
                   high.z - low.z, checked.oriented ? "a closed solid" : "a two-sided sheet",
                   static_cast<double>(surface->memory_bytes()) / 1e6);
 }
@@ -100,8 +144,9 @@ void check_scene_file(const std::filesystem::path& path, Json& file) {
   }
   file["objects"] = Json::array();
   for (const RigidObject& o : built.world->rigid) {
-    file["objects"].push_back({{"name", o.name}, {"kind", "rigid"}, {"triangles", o.drawn.triangles.size()}});
-    bytes += o.surface->memory_bytes();
+    file["objects"].push_back(
+        {{"name", o.name}, {"kind", "rigid"}, {"triangles", o.drawn->triangles.size()}});
+    bytes += o.memory_bytes();
   }
   for (std::size_t o = 0; o < built.state->soft.size(); ++o) {
     const voxel::SoftObject& object = *built.state->soft[o];
@@ -161,9 +206,12 @@ int check(const CheckCommand& command) {
       add_finding(file, {"E00", polygon::Severity::error, 1, e.what()});
       fmt::print(words, "{}: refused\n", path.string());
     }
-    for (const Json& f : file["findings"]) {
-      fmt::print(words, "  {} {}: {}\n", f["severity"].get<std::string>(), f["id"].get<std::string>(),
-                 f["text"].get<std::string>());
+    print_findings(words, file["findings"], "  ");
+    if (file.contains("repair")) {
+      fmt::print(words, "  repair would make it {}, by:\n", file["repair"]["summary"].get<std::string>());
+      print_findings(words, file["repair"]["changes"], "    ");
+      if (!file["repair"]["after"].empty()) fmt::print(words, "  and a check would then find:\n");
+      print_findings(words, file["repair"]["after"], "    ");
     }
     report["files"].push_back(file);
   }

@@ -31,6 +31,7 @@ int replay(const ReplayCommand& command);
 struct CheckCommand {
   std::vector<std::filesystem::path> files;
   bool deep = false;
+  bool repair = false;  // also say what `repair = true` would do to a mesh
   double unit_m = 1.0;  // of mesh files
   std::string json;
 };
@@ -43,6 +44,20 @@ struct CompareCommand {
   std::string json;
 };
 int compare(const CompareCommand& command);
+
+struct BenchCommand {
+  std::string suite;  // of bench_suites(), or "all"
+  bool quick = false, every_tick = false;
+  std::vector<std::string> paths, meshes, engines;  // empty: the suite's own choice
+  std::filesystem::path trace;                      // folder; empty: none
+  std::string json;
+};
+int run_bench(const BenchCommand& command);
+// What may be asked for, so that a wrong word is refused with the right ones.
+const std::vector<std::string>& bench_suites();
+const std::vector<std::string>& bench_paths();
+std::vector<std::string> bench_engines();
+std::string bench_mesh_error(const std::string& name);  // empty: there is such a mesh
 
 struct ViewCommand {
   std::filesystem::path scene;

@@ -8,6 +8,8 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "hybrid/build_objects.h"
+#include "hybrid/classic_surface.h"
 #include "hybrid/closed_form.h"
 
 namespace hybrid {
@@ -57,8 +59,9 @@ RigidDescription as_rigid(const SoftDescription& soft) {
   return rigid;
 }
 
-// A rigid object as the soft one of the same shape, of material "hard".
-SoftDescription as_soft(const RigidDescription& rigid) {
+// A rigid object as the soft one of the same shape, of material "hard"; empty where it has no voxels: a
+// sheet, what is thinner than two of them, and a mesh, which may be open.
+std::optional<SoftDescription> as_soft(const RigidDescription& rigid) {
   SoftDescription soft{.name = rigid.name,
                        .source = {},
                        .pose = rigid.pose,
@@ -74,18 +77,14 @@ SoftDescription as_soft(const RigidDescription& rigid) {
                                  .spacing_m = glm::dvec3(size * kMeshVoxelShare),
                                  .layers = {},
                                  .inclusions = {}};
-  } else if (const auto* box = std::get_if<BoxPrimitive>(&rigid.source)) {
-    const double longest = std::max({box->size_m.x, box->size_m.y, box->size_m.z});
-    soft.source = voxel::Formula{.size_m = box->size_m,
-                                 .spacing_m = glm::dvec3(longest * kMeshVoxelShare),
-                                 .layers = {},
-                                 .inclusions = {}};
-  } else {
-    throw std::runtime_error(fmt::format(
-        "\"{}\" cannot be compared as voxels: only a ball or box primitive, or a soft object, has a "
-        "material to be soft with; name one with --object",
-        rigid.name));
+    return soft;
   }
+  const auto* box = std::get_if<BoxPrimitive>(&rigid.source);
+  if (box == nullptr) return std::nullopt;
+  const double spacing = kMeshVoxelShare * std::max({box->size_m.x, box->size_m.y, box->size_m.z});
+  if (std::min({box->size_m.x, box->size_m.y, box->size_m.z}) < 2.0 * spacing) return std::nullopt;
+  soft.source =
+      voxel::Formula{.size_m = box->size_m, .spacing_m = glm::dvec3(spacing), .layers = {}, .inclusions = {}};
   return soft;
 }
 
@@ -109,6 +108,41 @@ ModelResult closed_model(const ClosedForm& form, const Tool& tool, const std::ve
     model.rows.push_back(felt);
   }
   return model;
+}
+
+// The surface of the proxy's own model, without the proxy.
+ModelResult classic_model(const RigidDescription& rigid, const Tool& tool,
+                          const std::vector<TraceRow>& like) {
+  std::vector<BuildNote> notes;
+  const RigidObject object = build_rigid(rigid, notes);
+  ModelResult model{.name = "nearest-surface", .rows = {}, .depth_m = {}, .tick_us = {}};
+  for (const TraceRow& row : like) {
+    const ClassicForce felt = nearest_surface_force(*object.surface, object.pose, row.device_m, tool.radius_m,
+                                                    tool.stiffness_N_per_m);
+    model.rows.push_back({.t_s = row.t_s,
+                          .device_m = row.device_m,
+                          .proxy_m = row.device_m + felt.force_N / tool.stiffness_N_per_m,
+                          .force_N = felt.force_N,
+                          .contacts = felt.contact ? 1U : 0U});
+  }
+  return model;
+}
+
+// A rigid closed form knows where the device is, and not where it came from: it holds as long as the place it
+// would have the tool at never jumps further than the device moves (the rest is rounding and rounded
+// corners).
+bool holds_along(const ClosedForm& form, const Tool& tool, const std::vector<TraceRow>& rows) {
+  if (form.young_Pa > 0.0) return true;
+  constexpr double most = 4.0;
+  glm::dvec3 before(0.0);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const Depth depth = depth_in(form, tool, rows[i].device_m);
+    const glm::dvec3 out = std::max(0.0, depth.depth_m) * depth.out;
+    const double moved = i > 0 ? glm::length(rows[i].device_m - rows[i - 1].device_m) : 0.0;
+    if (i > 0 && glm::length(out - before) > most * moved + 1e-3 * tool.radius_m) return false;
+    before = out;
+  }
+  return true;
 }
 
 double percentile(std::vector<double>& values, double share) {
@@ -167,18 +201,31 @@ Comparison compare_models(const Scene& scene, const std::string& object, const P
   result.jnd_floor_N = jnd_floor_N(scene);
 
   const bool punch = scene.tool.shape == Tool::Shape::punch;
-  const std::optional<ClosedForm> form = is_soft ? closed_form_of(scene, *soft) : closed_form_of(*rigid);
+  std::optional<ClosedForm> form = is_soft ? closed_form_of(scene, *soft) : closed_form_of(*rigid);
   if (!punch) {  // a punch feels nothing rigid
     Scene as_proxy = bare(scene);
     as_proxy.rigid.push_back(is_soft ? as_rigid(*soft) : *rigid);
     as_proxy.rigid.back().as_mesh = true;
+    as_proxy.rigid.back().motion = {};  // felt where it begins
     result.models.push_back(run_model("mesh and proxy", as_proxy, progress));
+    if (!is_soft) {
+      result.models.push_back(classic_model(as_proxy.rigid.back(), scene.tool, result.models.front().rows));
+    }
   }
-  Scene as_voxels = bare(scene);
-  as_voxels.soft.push_back(is_soft ? *soft : as_soft(*rigid));
-  if (!is_soft) as_voxels.materials["hard"] = Material{.young_Pa = kHardYoung_Pa, .place = {}};
-  as_voxels.soft.back().anchors.rigid_within_m = 0.0;  // nothing rigid is left to be held by
-  result.models.push_back(run_model("voxels", as_voxels, progress));
+  const std::optional<SoftDescription> voxels = is_soft ? *soft : as_soft(*rigid);
+  if (voxels) {
+    Scene as_voxels = bare(scene);
+    as_voxels.soft.push_back(*voxels);
+    if (!is_soft) as_voxels.materials["hard"] = Material{.young_Pa = kHardYoung_Pa, .place = {}};
+    as_voxels.soft.back().anchors.rigid_within_m = 0.0;  // nothing rigid is left to be held by
+    result.models.push_back(run_model("voxels", as_voxels, progress));
+  }
+  if (result.models.empty()) {
+    throw std::runtime_error(
+        fmt::format("{}: \"{}\" has no voxels, and a punch feels nothing else; use [tool] shape = \"ball\"",
+                    scene.file.string(), result.object));
+  }
+  if (form && !holds_along(*form, scene.tool, result.models.front().rows)) form.reset();
   if (form) result.models.push_back(closed_model(*form, scene.tool, result.models.front().rows));
 
   // A closed form is the reference where it is exact or nearly so; else what the object is in the scene.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One object of a scene felt in several ways along the same motion: as mesh and proxy, as voxels, and in
-// closed form where one applies (ball, box or block, capsule, plane under a ball; flat punch on a block).
+// One object of a scene felt in several ways along the same motion: as mesh and proxy, as voxels where it has
+// any, a rigid one by the surface nearest to the device (no proxy: thesis, Fig 18), and in closed form where
+// one applies (ball, box or block under a ball; flat punch on a block).
 #pragma once
 
 #include <string>
@@ -11,7 +12,8 @@
 namespace hybrid {
 
 struct ModelResult {
-  std::string name;  // "mesh and proxy", "voxels", "hertz", "flat punch", "rigid closed form"
+  std::string
+      name;  // "mesh and proxy", "nearest-surface", "voxels", "hertz", "flat punch", "rigid closed form"
   std::vector<TraceRow> rows;
   std::vector<double>
       depth_m;  // of the device in the undeformed object, [row]; negative outside; empty where unknown
@@ -30,8 +32,9 @@ struct Comparison {
   double jnd_floor_N = 0.0;
 };
 
-// Runs each model on an ideal device along the scene's path. Throws SceneError, std::runtime_error: no such
-// object, an object that cannot be rendered both ways (with the reason).
+// Runs each model on an ideal device along the scene's path; a moving object is felt where it begins. Throws
+// SceneError, std::runtime_error: no such object, an object that cannot be rendered both ways (with the
+// reason).
 Comparison compare_models(const Scene& scene, const std::string& object, const Progress& progress);
 
 }  // namespace hybrid

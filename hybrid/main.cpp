@@ -58,6 +58,9 @@ void add_check(CLI::App& app, int& status) {
   auto c = std::make_shared<hybrid::CheckCommand>();
   sub->add_option("FILE", c->files, "scene (.toml), mesh, volume, or folder of a DICOM series")->required();
   sub->add_flag("--deep", c->deep, "also look for self-intersections (slow on large meshes)");
+  sub->add_flag(
+      "--repair", c->repair,
+      "also say what `repair = true` would do to a mesh, and what is left; the file stays as it is");
   sub->add_option("--unit", c->unit_m, "length unit of mesh files in meters")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
@@ -74,6 +77,30 @@ void add_compare(CLI::App& app, int& status) {
   sub->add_option("--plot", c->plot, "write force over time and depth as SVG");
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
   sub->callback([c, &status] { status = hybrid::compare(*c); });
+}
+
+void add_bench(CLI::App& app, int& status) {
+  auto* sub = app.add_subcommand("bench", "Times and errors beside baselines, over meshes of all sizes");
+  auto c = std::make_shared<hybrid::BenchCommand>();
+  std::vector<std::string> suites = hybrid::bench_suites();
+  suites.emplace_back("all");
+  sub->add_option("SUITE", c->suite, "what to time")->required()->check(CLI::IsMember(suites));
+  sub->add_flag("--quick", c->quick, "a short piece of each path on small meshes; a few seconds");
+  sub->add_flag("--every-tick", c->every_tick, "ask the exact reference at every tick; slow");
+  sub->add_option("--only", c->paths, "of rigid: paths, with commas between")
+      ->delimiter(',')
+      ->check(CLI::IsMember(hybrid::bench_paths()));
+  sub->add_option("--meshes", c->meshes,
+                  "of rigid: meshes, with commas between: ico0 to ico9 (20 x 4^n triangles), geo1 to geo1024 "
+                  "(20 x n^2), cube1 to cube1024, corner1 to corner1024")
+      ->delimiter(',')
+      ->check(CLI::Validator(hybrid::bench_mesh_error, "MESH"));
+  sub->add_option("--engines", c->engines, "of rigid: engines, with commas between")
+      ->delimiter(',')
+      ->check(CLI::IsMember(hybrid::bench_engines()));
+  sub->add_option("--trace", c->trace, "write every run as CSV into this folder");
+  sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
+  sub->callback([c, &status] { status = hybrid::run_bench(*c); });
 }
 
 void add_view(CLI::App& app, int& status) {
@@ -98,6 +125,7 @@ int main(int argc, char** argv) {
   add_replay(app, status);
   add_check(app, status);
   add_compare(app, status);
+  add_bench(app, status);
   add_view(app, status);
   try {
     app.parse(argc, argv);

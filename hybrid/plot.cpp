@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <numbers>
 #include <stdexcept>
 
 #include "hybrid/svg_figure.h"
@@ -134,6 +135,51 @@ DepthFrame depth_frame(std::span<const ComparedModel> models, const ComparedMode
   return frame;
 }
 
+constexpr double kTurned_deg = 15.0;  // a model whose force turns further from the reference shows its angle
+
+// Angle between two forces (degrees); a gap where either is too small to have a direction.
+double angle_between(const glm::dvec3& a, const glm::dvec3& b, double floor_N) {
+  const double size = glm::length(a) * glm::length(b);
+  if (!(glm::length(a) > floor_N) || !(glm::length(b) > floor_N) || !std::isfinite(size)) return gap;
+  return std::acos(std::clamp(glm::dot(a, b) / size, -1.0, 1.0)) * 180.0 / std::numbers::pi;
+}
+
+// How far each model's force points away from the reference's, at the reference's ticks (those of models with
+// times of their own: the last before). Without series where none turns enough to be looked at.
+Panel direction_panel(std::span<const ComparedModel> models, const ComparedModel& reference, double floor_N) {
+  Panel panel;
+  panel.title = "Direction: angle to the force of " + reference.name;
+  panel.y_label = "angle (degrees)";
+  panel.height = 150.0;
+  panel.from_zero = true;
+  double most = 0.0;
+  for (std::size_t m = 0; m < models.size(); ++m) {
+    const std::span<const TraceRow> rows = models[m].rows;
+    if (&models[m] == &reference || rows.empty()) continue;
+    std::vector<double> angle;
+    std::size_t i = 0;
+    for (const TraceRow& row : reference.rows) {
+      while (i + 1 < rows.size() && rows[i + 1].t_s <= row.t_s) ++i;
+      angle.push_back(angle_between(rows[i].force_N, row.force_N, floor_N));
+      if (angle.back() > most) most = angle.back();
+    }
+    panel.series.push_back({models[m].name, times(reference.rows), angle, series_colour(m), 1.6, m >= 7});
+  }
+  if (most < kTurned_deg) panel.series.clear();
+  return panel;
+}
+
+// Does some model push against the reference's largest force, by more than a tenth of it?
+bool some_turn_round(std::span<const ComparedModel> models, const ComparedModel& reference,
+                     const glm::dvec3& into) {
+  double floor_N = 0.0;
+  for (const TraceRow& row : reference.rows) floor_N = std::max(floor_N, -0.1 * glm::dot(row.force_N, into));
+  return std::ranges::any_of(models, [&](const ComparedModel& model) {
+    return std::ranges::any_of(model.rows,
+                               [&](const TraceRow& row) { return glm::dot(row.force_N, into) > floor_N; });
+  });
+}
+
 }  // namespace
 
 void save_session_plot(const std::filesystem::path& svg, std::span<const TraceRow> rows,
@@ -218,14 +264,28 @@ void save_compare_plot(const std::filesystem::path& svg, std::span<const Compare
     throw std::invalid_argument("save_compare_plot: the reference is no model");
   const ComparedModel& reference = models[options.reference];
   const std::vector<double> t = times(reference.rows);
-  const std::vector<double> felt = forces(reference.rows);
   const DepthFrame frame = depth_frame(models, reference);
+  // A force that turns round is only seen with its sign: then the part along the reference's largest is
+  // drawn.
+  const bool with_sign = some_turn_round(models, reference, frame.into);
+  const auto drawn = [&](std::span<const TraceRow> rows) {
+    std::vector<double> out = forces(rows);
+    for (std::size_t i = 0; with_sign && i < out.size(); ++i) out[i] = -glm::dot(rows[i].force_N, frame.into);
+    return out;
+  };
+  const std::vector<double> felt = drawn(reference.rows);
 
   Figure figure;
   figure.title = title;
   figure.notes.push_back("reference: " + reference.name +
                          "; one JND: " + text_of(100.0 * options.jnd_share, "%.3g %%") +
                          " of its force, at least " + text_of(options.jnd_floor_N, "%.3g N"));
+  if (with_sign) {
+    figure.notes.emplace_back(
+        "some force turns round: drawn is the part along the largest force of the reference; below 0 it "
+        "pulls the "
+        "tool on");
+  }
 
   Panel over_time;
   over_time.title = "Force on the hand";
@@ -239,7 +299,8 @@ void save_compare_plot(const std::filesystem::path& svg, std::span<const Compare
   difference.from_zero = true;
   Area band{"not felt: within ±1 JND", t, {}, {}, "#dfe8f2"};
   for (const double force : felt) {
-    const double jnd = std::isfinite(force) ? std::max(options.jnd_share * force, options.jnd_floor_N) : gap;
+    const double jnd =
+        std::isfinite(force) ? std::max(options.jnd_share * std::fabs(force), options.jnd_floor_N) : gap;
     band.low.push_back(-jnd);
     band.high.push_back(jnd);
   }
@@ -256,7 +317,7 @@ void save_compare_plot(const std::filesystem::path& svg, std::span<const Compare
     const std::string colour = series_colour(m);
     const bool dashed = m >= 7;
     const std::vector<double> own_t = times(model.rows);
-    std::vector<double> own = forces(model.rows);
+    std::vector<double> own = drawn(model.rows);
     std::vector<double> depth_mm;
     for (std::size_t i = 0; i < model.rows.size(); ++i) {
       const double depth_m = i < model.depth_m.size()
@@ -283,6 +344,8 @@ void save_compare_plot(const std::filesystem::path& svg, std::span<const Compare
   PanelGroup time_group{"time (s)", {}};
   time_group.panels.push_back(std::move(over_time));
   time_group.panels.push_back(std::move(difference));
+  Panel direction = direction_panel(models, reference, options.jnd_floor_N);
+  if (!direction.series.empty()) time_group.panels.push_back(std::move(direction));
   PanelGroup depth_group{"depth of the device (mm)", {}};
   depth_group.panels.push_back(std::move(over_depth));
   figure.groups.push_back(std::move(time_group));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// PNG files out. The only part of the project that knows libpng.
+// PNG files out. With height_image.cpp, which reads them, the only part of the project that knows libpng.
 #pragma once
 
 #include <cstdint>

@@ -2,13 +2,14 @@
 #include "hybrid/report.h"
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <thread>
+
+#include "hybrid/process_memory.h"
 
 namespace hybrid {
 namespace {
@@ -39,8 +40,8 @@ std::vector<ObjectRow> object_rows(const BuiltScene& built, const SessionResult&
   for (const RigidObject& o : built.world->rigid) {
     rows.push_back({.name = o.name,
                     .kind = "rigid",
-                    .triangles = o.drawn.triangles.size(),
-                    .memory_bytes = o.surface->memory_bytes()});
+                    .triangles = o.drawn->triangles.size(),
+                    .memory_bytes = o.memory_bytes()});
   }
   for (std::size_t o = 0; o < built.world->soft.size(); ++o) {
     const voxel::SoftObject& object = *built.state->soft[o];
@@ -119,6 +120,9 @@ nlohmann::ordered_json run_report(const Scene& scene, const BuiltScene& built, S
   }
   j["faults"] = fault_texts(built.state->faults);
   j["build_s"] = built.seconds;
+  j["load"] = {{"seconds", built.seconds},
+               {"held_memory_bytes", built.held_bytes},
+               {"peak_memory_bytes", built.peak_bytes}};
   j["peak_memory_bytes"] = peak_memory_bytes();
   return j;
 }
@@ -176,6 +180,7 @@ std::vector<std::string> fault_texts(std::uint32_t faults) {
   say(fault_map_overflow,
       "the occupancy map had no room for a voxel that moved; use a larger [occupancy] cell");
   say(fault_pair_overflow, "more soft voxels press on one another than fit; use a coarser spacing");
+  say(fault_nonfinite_body, "a free body was pushed by a force that is not finite, and stood still for that tick");
   say(fault_infeasible, "rigid surfaces left the tool no room; use a smaller tool radius");
   return texts;
 }
@@ -192,12 +197,6 @@ void save_json(const std::string& file, const nlohmann::ordered_json& report) {
   out.flush();
   if (!out)
     throw std::runtime_error(fmt::format("{}: cannot be written; check the folder and the space left", file));
-}
-
-std::uint64_t peak_memory_bytes() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024U;
 }
 
 }  // namespace hybrid

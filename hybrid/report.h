@@ -24,6 +24,4 @@ std::vector<std::string> fault_texts(std::uint32_t faults);
 // Writes to a file, or to standard output for "-". Throws std::runtime_error: not writable.
 void save_json(const std::string& file, const nlohmann::ordered_json& report);
 
-std::uint64_t peak_memory_bytes();
-
 }  // namespace hybrid

@@ -2,18 +2,390 @@
 #include "hybrid/rigid_sweep.h"
 
 #include <algorithm>
+#include <cmath>
 #include <glm/geometric.hpp>
 
 namespace hybrid {
 namespace {
 
-constexpr int kMaxSteps = 32;
-constexpr double kConverged = 1e-7;  // of the tool's radius: a step shorter than this is the end
-constexpr double kSmallestStep =
-    1e-3;  // of the tool's radius: below it, crowding is a fault, not a reason to look nearer
-constexpr double kTolerance = 1e-12;  // of the tool's radius: depth in a plane that is rounding
+constexpr std::uint32_t kMaxSteps = 64;
+constexpr std::uint32_t kMaxExchanges = 64;  // planes that join or are made anew in one step
+constexpr std::uint32_t kMaxHeld = 32;       // planes of one step
+constexpr int kMaxShrinks = 60;              // of a survey that found too much
+constexpr int kMaxFreePieces = 512;          // of the way through free space looked at in one tick
+// A step shorter than this, of the way to the target and of the ball, is the end.
+constexpr double kConvergedWay = 1e-9, kConvergedBall = 1e-7;
+constexpr double kAhead = 0.6;  // of its margin a survey is made ahead of the proxy
+// A survey is good that finds as many elements as this: fewer are soon left, more are long to read.
+constexpr double kGoodCount = 128.0;
+constexpr double kLookCells = 8.0;  // how far the map is asked beyond the ball, in cells
+
+// One plane of the step's problem, and whose it is.
+struct Held {
+  std::uint32_t object = 0, element = 0;
+  polygon::SeparatingPlane in_body;
+  bool own_plane = true;  // the element's own plane may be used
+  bool flat = false;      // and it is what in_body says, from wherever it is seen
+};
+
+// Which objects a sweep minds.
+struct Scope {
+  enum class Kind : std::uint8_t { all, only, all_but };
+  Kind kind = Kind::all;
+  std::uint32_t object = 0;
+};
+
+class Sweeper {
+ public:
+  Sweeper(const World& world, WorldState& state, const glm::dvec3& target, const glm::dmat3& metric,
+          Scope scope = {})
+      : world_(world),
+        state_(state),
+        target_(target),
+        metric_(metric),
+        scope_(scope),
+        radius_(world.contact_radius_m()),
+        rounding_(world.rounding_m) {}
+
+  Sweep go(const glm::dvec3& from, double travel) noexcept {
+    Sweep sweep;
+    sweep.point = from;
+    sweep.arrived = false;
+    if (from != state_.swept_to_m) look_afresh(from);
+    for (std::uint32_t n = 0; n < state_.active_count && scope_.kind == Scope::Kind::all; ++n)
+      held_[held_count_++] = {state_.active[n].object, state_.active[n].element, {}, true};
+    for (; sweep.steps < kMaxSteps; ++sweep.steps) {
+      point_ = sweep.point;
+      if (!look()) break;
+      if (!solve()) break;
+      const glm::dvec3 move = minimum_.point - point_;
+      const double length = glm::length(move);
+      const double still =
+          kConvergedWay * glm::length(target_ - point_) + kConvergedBall * radius_ + rounding_;
+      if (length <= still && fraction_ == 1.0) {
+        if (loosen_false_contacts()) continue;
+        sweep.arrived = true;
+        break;
+      }
+      double part = fraction_;
+      if (part * length > travel) part = travel / length;
+      sweep.point = part == 1.0 ? minimum_.point : point_ + part * move;
+      travel -= part * length;
+      keep_active();
+      if (fraction_ == 1.0 && part == 1.0 && held_flatly(sweep.point)) {
+        sweep.arrived = true;
+        break;
+      }
+      if (travel <= 0.0) break;
+    }
+    sweep.surveys = surveys_;
+    state_.swept_to_m = sweep.point;
+    if (scope_.kind == Scope::Kind::all) publish(sweep);
+    return sweep;
+  }
+
+ private:
+  // The proxy came here by another way than the last sweep's: a plane between it and an element may have it on
+  // the wrong side.
+  void look_afresh(const glm::dvec3& from) noexcept {
+    for (std::uint32_t o = 0; o < world_.rigid.size(); ++o) {
+      if (scope_.kind != Scope::Kind::all && (scope_.kind == Scope::Kind::only) != (o == scope_.object)) continue;
+      RigidNear& near = state_.rigid[o];
+      near.near.see_from(*world_.rigid[o].surface, near.frame.to_body(from), radius_, rounding_);
+    }
+  }
+
+  // Which objects are near, and that what is known of them covers the proxy.
+  bool look() noexcept {
+    const double room = state_.look_m - radius_ - max_component(glm::abs(point_ - state_.look_at));
+    if (scope_.kind == Scope::Kind::only) {
+      state_.look_m = -1.0;  // what the map said of the scene is not what is asked
+    } else if (state_.look_m < 0.0 || room < 0.0 || look_ended_) {
+      state_.look_at = point_;
+      state_.look_m = radius_ + kLookCells * state_.map.cell_m();
+      state_.look_mask = world_.use_map ? state_.map.rigid_in(point_ - state_.look_m, point_ + state_.look_m)
+                                        : ~std::uint64_t{0};
+      look_ended_ = false;
+      // Unasked, a neighbourhood does not follow the proxy, which may come back on another side.
+      for (std::uint32_t o = 0; o < world_.rigid.size(); ++o) {
+        if (!asked(o) && !(scope_.kind == Scope::Kind::all_but && o == scope_.object))
+          state_.rigid[o].near.forget();
+      }
+    }
+    for (std::uint32_t o = 0; o < world_.rigid.size(); ++o) {
+      if (!asked(o)) continue;
+      const glm::dvec3 view = state_.rigid[o].frame.to_body(point_);
+      const bool ended = ended_ == o + 1;
+      if (!ended && state_.rigid[o].near.room(view) > 0.0) continue;
+      if (!survey(o, view, ended)) return false;
+    }
+    ended_ = 0;
+    return true;
+  }
+
+  bool survey(std::uint32_t o, const glm::dvec3& view, bool moving) noexcept {
+    RigidNear& near = state_.rigid[o];
+    const polygon::RigidSurface& surface = *world_.rigid[o].surface;
+    const double smallest = 1e-6 * radius_ + 1e2 * rounding_;
+    if (surveys_ > 1) near.margin_m *= 2.0;  // too short-sighted for this motion
+    near.margin_m = std::min(near.margin_m, glm::length(surface.upper() - surface.lower()) + radius_);
+    for (int n = 0; n < kMaxShrinks && near.margin_m > smallest; ++n) {
+      const glm::dvec3 ahead = glm::transpose(near.frame.rotation) * direction_ * (kAhead * near.margin_m);
+      ++surveys_;
+      if (near.near.survey(surface, moving ? view + ahead : view, near.margin_m, radius_, view)) {
+        const double count = std::max(1.0, static_cast<double>(near.near.size()));
+        near.margin_m *= std::clamp(std::sqrt(kGoodCount / count), 0.5, 1.5);
+        return true;
+      }
+      near.margin_m *= 0.5;
+    }
+    near.margin_m = radius_ + 1e3 * rounding_;
+    state_.faults |= fault_triangle_overflow;
+    return false;
+  }
+
+  // The minimum over the planes in the way, and how much of the way there is known to be clear.
+  bool solve() noexcept {
+    state_.planes.clear();
+    // Of those that held the proxy before, the ones that it still touches, and those found not to.
+    std::uint32_t kept = 0;
+    for (std::uint32_t i = 0; i < held_count_; ++i) {
+      if (!asked(held_[i].object) || (held_[i].own_plane && !touches(held_[i], point_))) continue;
+      held_[kept] = held_[i];
+      if (!held_[kept].flat) make_plane(held_[kept]);
+      ++kept;
+    }
+    held_count_ = kept;
+    for (std::uint32_t i = 0; i < held_count_; ++i) state_.planes.push_back(in_scene(held_[i]));
+    for (std::uint32_t n = 0; n < kMaxExchanges; ++n) {
+      minimum_ = polygon::minimise_on_planes(target_, metric_, state_.planes, rounding_);
+      if (!minimum_.feasible) {
+        state_.faults |= fault_infeasible;
+        return false;  // stay: the place before was outside everything
+      }
+      fraction_ = clear_part(minimum_.point);
+      const glm::dvec3 end =
+          fraction_ == 1.0 ? minimum_.point : point_ + fraction_ * (minimum_.point - point_);
+      Held first = first_in_the_way(end);
+      if (first.object == kNobody) return true;
+      if (held_count_ == kMaxHeld) return false;
+      // Found by the plane across its closest point, which says soonest what is really met; held by its own,
+      // which lets the proxy come up to it at once, not by halves.
+      make_plane(first);
+      held_[held_count_++] = first;
+      state_.planes.push_back(in_scene(first));
+    }
+    return false;
+  }
+
+  // Of the straight way to q, the part within everything that was looked at.
+  double clear_part(const glm::dvec3& q) noexcept {
+    double part = 1.0;
+    ended_ = 0;
+    look_ended_ = false;
+    direction_ = q - point_;
+    const double length = glm::length(direction_);
+    if (length > 0.0) direction_ /= length;
+    for (int d = 0; d < 3 && scope_.kind != Scope::Kind::only; ++d) {
+      const double to = q[d] - point_[d];
+      const double most = state_.look_m - radius_;
+      const double ahead =
+          to > 0.0 ? state_.look_at[d] + most - point_[d] : point_[d] - state_.look_at[d] + most;
+      if (std::abs(to) * part > ahead) {
+        part = std::max(0.0, ahead / std::abs(to));
+        look_ended_ = true;
+      }
+    }
+    for (std::uint32_t o = 0; o < world_.rigid.size(); ++o) {
+      if (!asked(o)) continue;
+      const RigidNear& near = state_.rigid[o];
+      const glm::dvec3 a = near.frame.to_body(point_) - near.near.centre();
+      const glm::dvec3 way = near.frame.to_body(q) - near.near.centre() - a;
+      const double margin = near.near.margin();
+      // |a + f way| = margin
+      const double aa = glm::dot(way, way), ab = glm::dot(a, way), bb = glm::dot(a, a) - margin * margin;
+      if (aa * part * part + 2.0 * ab * part + bb <= 0.0) continue;
+      const double root = std::sqrt(std::max(0.0, ab * ab - aa * bb));
+      const double f = std::max(0.0, (root - ab) / aa) * (1.0 - 1e-9);
+      if (f >= part) continue;
+      part = f;
+      ended_ = o + 1;
+      look_ended_ = false;
+    }
+    return part;
+  }
+
+  // The element that the way to q meets first; kNobody when the way is clear.
+  Held first_in_the_way(const glm::dvec3& q) noexcept {
+    Held first{kNobody, 0, {}, true};
+    double soonest = 2.0;
+    for (std::uint32_t o = 0; o < world_.rigid.size(); ++o) {
+      if (asked(o)) first_of(o, q, first, soonest);
+    }
+    return first;
+  }
+
+  // Planes seen from elsewhere say too soon rather than too late: so the soonest is seen from here instead,
+  // until the soonest is one that was.
+  void first_of(std::uint32_t o, const glm::dvec3& q, Held& first, double& soonest) noexcept {
+    using Broken = polygon::Neighbourhood::Broken;
+    RigidNear& near = state_.rigid[o];
+    const glm::dvec3 view = near.frame.to_body(point_), end = near.frame.to_body(q);
+    const double tolerance = 2.0 * rounding_;
+    std::span<Broken> broken = near.near.broken(view, end, tolerance);
+    while (!broken.empty()) {
+      std::size_t n = 0;
+      for (std::size_t i = 1; i < broken.size(); ++i) {
+        if (broken[i].part < broken[n].part ||
+            (broken[i].part == broken[n].part &&
+             near.near.element(broken[i].index) < near.near.element(broken[n].index)))
+          n = i;
+      }
+      if (broken[n].part >= soonest) return;
+      Held candidate{o, near.near.element(broken[n].index), {}, true};
+      if (broken[n].fresh) {
+        soonest = broken[n].part;
+        first = candidate;
+        return;
+      }
+      if (!covered(candidate))
+        candidate.in_body =
+            polygon::separate(*world_.rigid[o].surface, candidate.element, view, radius_);
+      near.near.set_plane(broken[n].index, candidate.in_body);
+      if (candidate.in_body.offset - glm::dot(candidate.in_body.normal, end) > tolerance) {
+        broken[n].fresh = true;
+        broken[n].part = polygon::Neighbourhood::part_before(candidate.in_body, view, end);
+      } else {
+        broken[n] = broken.back();
+        broken = broken.first(broken.size() - 1);
+      }
+    }
+  }
+
+  // Does a plane that holds already keep the proxy from this element as well? On a convex surface one plane
+  // covers everything, and the proxy need not stop at each edge.
+  bool covered(Held& candidate) const noexcept {
+    const polygon::RigidSurface& surface = *world_.rigid[candidate.object].surface;
+    for (std::uint32_t h = 0; h < held_count_; ++h) {
+      const Held& held = held_[h];
+      if (held.object != candidate.object) continue;
+      if (held.element != candidate.element && !(surface.support(candidate.element, held.in_body.normal) <=
+                                                 held.in_body.offset - radius_ + rounding_))
+        continue;
+      candidate.in_body = held.in_body;
+      return true;
+    }
+    return false;
+  }
+
+  void make_plane(Held& held) noexcept {
+    const glm::dvec3 view = state_.rigid[held.object].frame.to_body(point_);
+    const polygon::RigidSurface& surface = *world_.rigid[held.object].surface;
+    held.flat = held.own_plane &&
+                polygon::separate_flatly(surface, held.element, view, radius_, rounding_, held.in_body);
+    if (!held.flat) held.in_body = polygon::separate(surface, held.element, view, radius_);
+  }
+
+  // An element's own plane reaches beyond the element: a proxy that rests where the element is not rests on
+  // nothing. True when there was one, and the step must be done again.
+  bool loosen_false_contacts() noexcept {
+    bool any = false;
+    for (std::uint32_t n = 0; n < minimum_.active_count; ++n) {
+      Held& held = held_[minimum_.active[n]];
+      if (!held.own_plane || touches(held, point_)) continue;
+      held.own_plane = false;
+      held.flat = false;
+      any = true;
+    }
+    return any;
+  }
+
+  // Held by nothing, or by elements' own planes alone where the elements are: no plane would change if it
+  // were seen from `point`, so the minimum is the minimum.
+  [[nodiscard]] bool held_flatly(const glm::dvec3& point) const noexcept {
+    for (std::uint32_t n = 0; n < held_count_; ++n) {
+      if (!held_[n].flat || !touches(held_[n], point)) return false;
+    }
+    return true;
+  }
+
+  [[nodiscard]] bool touches(const Held& held, const glm::dvec3& point) const noexcept {
+    const glm::dvec3 view = state_.rigid[held.object].frame.to_body(point);
+    const double distance = world_.rigid[held.object].surface->closest(held.element, view).distance;
+    return distance <= radius_ * (1.0 + kConvergedBall) + 4.0 * rounding_;
+  }
+
+  // Only what holds the proxy goes on to the next step.
+  void keep_active() noexcept {
+    // In place: an active one may stand before or after where it goes.
+    std::array<std::uint32_t, 3> from = minimum_.active;
+    held_count_ = std::min<std::uint32_t>(minimum_.active_count, 3);
+    for (std::uint32_t n = 0; n < held_count_; ++n) {
+      std::swap(held_[n], held_[from[n]]);
+      for (std::uint32_t m = n + 1; m < held_count_; ++m) {
+        if (from[m] == n) from[m] = from[n];
+      }
+      held_[n].own_plane = true;
+    }
+  }
+
+  void publish(Sweep& sweep) noexcept {
+    std::fill(state_.rigid_force_N.begin(), state_.rigid_force_N.end(), glm::dvec3(0.0));
+    for (std::uint32_t n = 0; n < minimum_.active_count && n < held_count_; ++n) {
+      // After a whole step the held ones are the active ones, in their order; before, they are named by
+      // index.
+      const polygon::ContactPlane& plane = state_.planes[minimum_.active[n]];
+      const glm::dvec3 force = minimum_.multiplier[n] * plane.normal;
+      sweep.force_N += force;
+      state_.rigid_force_N[plane.object] += force;
+      state_.active[n] = {plane.object, plane.element, force};
+    }
+    state_.active_count = minimum_.active_count;
+  }
+
+  [[nodiscard]] bool asked(std::uint32_t o) const noexcept {
+    if (scope_.kind == Scope::Kind::only) return o == scope_.object;
+    if (scope_.kind == Scope::Kind::all_but && o == scope_.object) return false;
+    return (state_.look_mask & OccupancyMap::rigid_bit(o)) != 0;
+  }
+  [[nodiscard]] polygon::ContactPlane in_scene(const Held& held) const noexcept {
+    const BodyFrame& frame = state_.rigid[held.object].frame;
+    const glm::dvec3 normal = frame.rotation * held.in_body.normal;
+    return {normal, held.in_body.offset + glm::dot(normal, frame.position_m), held.object, held.element};
+  }
+  static double max_component(const glm::dvec3& v) noexcept { return std::max({v.x, v.y, v.z}); }
+
+  static constexpr std::uint32_t kNobody = 0xFFFFFFFFU;
+
+  const World& world_;
+  WorldState& state_;
+  const glm::dvec3 target_;
+  const glm::dmat3 metric_;
+  const Scope scope_;
+  const double radius_, rounding_;
+  glm::dvec3 point_{0.0};      // feasible; where everything is seen from
+  glm::dvec3 direction_{0.0};  // of the last way tried, unit
+  std::array<Held, kMaxHeld> held_;
+  std::uint32_t held_count_ = 0;
+  polygon::PlaneMinimum minimum_;
+  double fraction_ = 1.0;    // of the way to the minimum that is known to be clear
+  std::uint32_t ended_ = 0;  // 1 + the object whose neighbourhood ended the way
+  bool look_ended_ = false;  // the map's look ended it
+  std::uint32_t surveys_ = 0;
+};
 
 }  // namespace
+
+Sweep sweep_proxy(const World& world, WorldState& state, const glm::dvec3& from, const glm::dvec3& target,
+                  const glm::dmat3& metric, double travel) noexcept {
+  return Sweeper(world, state, target, metric).go(from, travel);
+}
+
+Sweep sweep_past(const World& world, WorldState& state, std::uint32_t object, bool but, const glm::dvec3& from,
+                 const glm::dvec3& target) noexcept {
+  const Scope scope{but ? Scope::Kind::all_but : Scope::Kind::only, object};
+  return Sweeper(world, state, target, glm::dmat3(1.0), scope).go(from, std::numeric_limits<double>::max());
+}
 
 bool gather_planes(const World& world, WorldState& state, const glm::dvec3& point, double radius) noexcept {
   state.planes.clear();
@@ -22,68 +394,109 @@ bool gather_planes(const World& world, WorldState& state, const glm::dvec3& poin
   bool complete = true;
   for (std::uint32_t o = 0; o < world.rigid.size(); ++o) {
     if ((mask & OccupancyMap::rigid_bit(o)) == 0) continue;
-    const RigidObject& object = world.rigid[o];
-    const polygon::GatherResult found = object.surface->gather(object.to_body(point), radius, state.near);
+    const BodyFrame& frame = state.rigid[o].frame;
+    const polygon::GatherResult found =
+        world.rigid[o].surface->gather(frame.to_body(point), radius, state.near);
     complete = complete && found.complete;
     for (std::uint32_t i = 0; i < found.count; ++i) {
       if (state.planes.size() == state.planes.capacity()) return false;
       const polygon::NearPoint& near = state.near[i];
-      const glm::dvec3 on_surface = object.to_scene(near.point);
+      const glm::dvec3 on_surface = frame.to_scene(near.point);
       const glm::dvec3 away = point - on_surface;
       const double distance = glm::length(away);
       if (!(distance > 0.0))
         continue;  // on the surface itself, where no side is right: its neighbours decide
       const glm::dvec3 normal = away / distance;
-      state.planes.push_back({normal, glm::dot(normal, on_surface) + world.tool.radius_m, o, near.element});
+      state.planes.push_back(
+          {normal, glm::dot(normal, on_surface) + world.contact_radius_m(), o, near.element});
     }
   }
   return complete;
 }
 
-Sweep sweep_proxy(const World& world, WorldState& state, const glm::dvec3& from, const glm::dvec3& target,
-                  const glm::dmat3& metric, double travel) noexcept {
-  const double radius = world.tool.radius_m;
-  Sweep sweep;
-  sweep.point = from;
-  sweep.arrived = false;
-  for (int n = 0; n < kMaxSteps; ++n) {
-    // Look as far as the target is, but no further than what fits: what is gathered within radius + step
-    // makes a step of that length safe.
-    double step = std::min(glm::length(target - sweep.point) + kConverged * radius, state.gather_step_m);
-    while (!gather_planes(world, state, sweep.point, radius + step)) {
-      step *= 0.5;
-      state.gather_step_m = step;
-      if (step > kSmallestStep * radius) continue;
-      state.faults |= fault_triangle_overflow;
-      break;
+bool advance_through_free_space(const World& world, WorldState& state, const glm::dvec3& goal,
+                                double soft_reach_m) noexcept {
+  const double radius = world.contact_radius_m();
+  if (world.soft.empty() && state.look_m > 0.0) {
+    if (state.active_count > 0) return false;
+    // Both ends lie in what the last look saw: nothing, or something that the proxy must be asked about.
+    const glm::dvec3 a = glm::abs(state.proxy_m - state.look_at), b = glm::abs(goal - state.look_at);
+    const double most = state.look_m - radius;
+    if (a.x <= most && a.y <= most && a.z <= most && b.x <= most && b.y <= most && b.z <= most) {
+      if (state.look_mask == 0) state.proxy_m = goal;
+      return state.look_mask == 0;
     }
-    if (state.planes.size() < kMaxNear / 4)
-      state.gather_step_m = std::min(2.0 * state.gather_step_m, 8.0 * radius);
-    const polygon::PlaneMinimum minimum =
-        polygon::minimise_on_planes(target, metric, state.planes, kTolerance * radius);
-    if (!minimum.feasible) {
-      state.faults |= fault_infeasible;
-      return sweep;  // stay: the place before was outside everything
-    }
-    sweep.force_N = glm::dvec3(0.0);
-    std::fill(state.rigid_force_N.begin(), state.rigid_force_N.end(), glm::dvec3(0.0));
-    for (std::uint32_t i = 0; i < minimum.active_count; ++i) {
-      const polygon::ContactPlane& plane = state.planes[minimum.active[i]];
-      const glm::dvec3 force = minimum.multiplier[i] * plane.normal;
-      sweep.force_N += force;
-      state.rigid_force_N[plane.object] += force;
-    }
-    const glm::dvec3 move = minimum.point - sweep.point;
-    const double length = glm::length(move);
-    // The half-spaces are convex and hold the point before, so any part of the way is as safe as the whole.
-    const double most = std::min(step, travel);
-    const bool whole = length <= most;
-    sweep.point += whole ? move : move * (most / length);
-    travel -= std::min(length, most);
-    sweep.arrived = whole && (length <= kConverged * radius || minimum.active_count == 0);
-    if (sweep.arrived || travel <= 0.0) break;
   }
-  return sweep;
+  if (!world.use_map) return false;
+  const double margin = std::max(radius, soft_reach_m) + state.map.cell_m();
+  const double piece = kLookCells * state.map.cell_m();
+  for (int n = 0; n < kMaxFreePieces; ++n) {
+    const glm::dvec3 way = goal - state.proxy_m;
+    const double length = glm::length(way);
+    const bool last = length <= piece;
+    const glm::dvec3 next = last ? goal : state.proxy_m + way * (piece / length);
+    if (state.map.any_near(glm::min(state.proxy_m, next) - margin, glm::max(state.proxy_m, next) + margin))
+      return false;
+    state.proxy_m = next;
+    if (last) {
+      if (world.soft.empty()) {  // for the ticks to come
+        state.look_at = goal;
+        state.look_m = radius + kLookCells * state.map.cell_m();
+        state.look_mask = state.map.rigid_in(goal - state.look_m, goal + state.look_m);
+      }
+      return true;
+    }
+  }
+  return false;
+}
+
+bool start_proxy(const World& world, WorldState& state, const glm::dvec3& device_m) noexcept {
+  const double radius = world.contact_radius_m();
+  state.device_m = device_m;
+  state.proxy_m = device_m;
+  state.active_count = 0;
+  state.stuck = state.sliding = false;
+  state.look_m = -1.0;
+  state.swept_to_m = glm::dvec3(std::numeric_limits<double>::quiet_NaN());
+  for (RigidNear& near : state.rigid) near.near.forget();
+  for (int n = 0; n < 64; ++n) {
+    glm::dvec3 away(0.0);
+    double deepest = 0.0;
+    for (std::size_t o = 0; o < world.rigid.size(); ++o) {
+      const RigidObject& object = world.rigid[o];
+      const glm::dvec3 p = state.rigid[o].frame.to_body(state.proxy_m);
+      if (object.surface->inside(p)) return false;
+      polygon::NearPoint near;
+      if (!object.surface->nearest(p, radius, near)) continue;
+      const double depth = radius - near.distance;
+      if (depth <= deepest) continue;
+      if (!(near.distance > 0.0)) return false;
+      deepest = depth;
+      away = state.rigid[o].frame.rotation * ((p - near.point) / near.distance);
+    }
+    if (deepest <= 0.0) return true;
+    state.proxy_m += (deepest * (1.0 + 1e-9)) * away;
+  }
+  return false;
+}
+
+RigidStep step_rigid(const World& world, WorldState& state, const glm::dvec3& device_m,
+                     double /*dt_s*/) noexcept {
+  RigidStep step;
+  step.free = advance_through_free_space(world, state, device_m, 0.0);
+  if (step.free) {
+    state.active_count = 0;
+  } else {
+    const Sweep sweep =
+        sweep_proxy(world, state, state.proxy_m, device_m, glm::dmat3(world.tool.stiffness_N_per_m),
+                    std::numeric_limits<double>::max());
+    state.proxy_m = sweep.point;
+    step.steps = sweep.steps;
+    step.surveys = sweep.surveys;
+  }
+  step.proxy_m = state.proxy_m;
+  step.force_N = world.tool.stiffness_N_per_m * (state.proxy_m - device_m);
+  return step;
 }
 
 }  // namespace hybrid

@@ -17,6 +17,7 @@
 #include "device/force_limit.h"
 #include "device/path.h"
 #include "device/simulated.h"
+#include "hybrid/height_texture.h"
 #include "voxel/formula.h"
 #include "voxel/volume_file.h"
 
@@ -83,13 +84,58 @@ struct VolumeSurfaceSource {
 };
 using RigidSource = std::variant<MeshSource, BallPrimitive, BoxPrimitive, PlanePrimitive, CapsulePrimitive,
                                  VolumeSurfaceSource>;
+// A rigid object that moves as the scene says, whatever touches it. `position` and `rotation` are where it
+// begins.
+struct SpinDescription {           // turns about an axis that is carried along with the path
+  glm::dvec3 axis{0.0, 0.0, 1.0};  // unit vector, scene frame
+  glm::dvec3 about_m{0.0};         // a point of the axis at the beginning, scene frame
+  double rate_rad_per_s = 0.0;     // for ever; or to and fro:
+  double amplitude_rad = 0.0, frequency_hz = 0.0;
+};
+struct PathMotion {
+  // Counted from its own first point: where it begins, the object is where its pose puts it.
+  std::optional<device::PathDescription> path;
+  std::optional<SpinDescription> spin;
+};
+// A rigid object that is pushed by what touches it.
+struct FreeMotion {
+  std::optional<double> mass_kg, density_kg_per_m3;  // one of them
+  // About the axes of the object through its centre of mass; default: of its closed shape, filled evenly.
+  std::optional<glm::dvec3> inertia_kg_m2;
+  std::optional<glm::dvec3> centre_m;  // of mass, in the object's own frame; default: of its closed shape
+  double drag_N_s_per_m = 0.0, angular_drag_N_m_s = 0.0;
+  glm::dvec3 gravity_m_per_s2{0.0};
+};
+using MotionDescription = std::variant<std::monostate, PathMotion, FreeMotion>;  // monostate: it stays
+
+// What its surface feels like; all of it off by default.
+struct TextureDescription {
+  std::filesystem::path image;  // a PNG; empty: the pattern
+  TexturePattern pattern = TexturePattern::waves;
+  TextureMapping mapping;
+  SourcePlace place;  // of the key that names the image
+};
+struct FeelDescription {
+  double damping_N_s_per_m = 0.0;                        // along the normal
+  double static_friction = 0.0, dynamic_friction = 0.0;  // Coulomb; 0 <= dynamic <= static
+  bool shading = false;
+  std::optional<TextureDescription> texture;
+
+  [[nodiscard]] bool any() const {
+    return damping_N_s_per_m > 0.0 || static_friction > 0.0 || shading || texture.has_value();
+  }
+};
+
 struct RigidDescription {
   std::string name;
   RigidSource source;
   Pose pose;
-  bool as_mesh = false;      // feel a primitive as its tessellation: of compare, no key of a scene
-  SourcePlace place;         // of the table
-  SourcePlace source_place;  // of the key that names the source
+  FeelDescription feel{};
+  MotionDescription motion{};
+  SourcePlace motion_place{};  // of what says how it moves
+  bool as_mesh = false;        // feel a primitive as its tessellation: of compare, no key of a scene
+  SourcePlace place;           // of the table
+  SourcePlace source_place;    // of the key that names the source
 };
 
 // ---- soft

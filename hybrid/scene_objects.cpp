@@ -10,6 +10,9 @@
 #include <limits>
 #include <set>
 
+#include "hybrid/scene_feel.h"
+#include "hybrid/scene_motion.h"
+
 namespace hybrid {
 namespace {
 
@@ -17,13 +20,7 @@ constexpr std::size_t longest_name = 64;
 constexpr std::size_t most_labels = 254;
 
 constexpr LaterKey rigid_later[] = {
-    {"motion", "remove it: a rigid object stays where position and rotation put it, and only the tool moves"},
-    {"mass", "remove it: a rigid object is fixed for now, nothing pushes it"},
     {"stiffness", "remove it: the stiffness of every rigid contact is [tool] stiffness for now"},
-    {"damping", "remove it: rigid contact has no damping of its own for now"},
-    {"friction", "remove it: rigid surfaces are smooth for now"},
-    {"shading", "remove it: the facets of a mesh are felt as they are; a finer mesh feels smoother"},
-    {"texture", "remove it: model the relief in the mesh for now"},
     {"model", "remove it: a [[rigid]] object is always felt through the proxy"},
 };
 
@@ -40,6 +37,16 @@ glm::dquat rotation_from_degrees(const glm::dvec3& degrees) {
   const glm::dquat about_y(std::cos(half.y), 0.0, std::sin(half.y), 0.0);
   const glm::dquat about_z(std::cos(half.z), 0.0, 0.0, std::sin(half.z));
   return about_z * about_y * about_x;
+}
+
+// The keys of one kind of source, and those that every rigid object may have.
+std::vector<std::string_view> with_common(std::span<const std::string_view> keys) {
+  std::vector<std::string_view> all(keys.begin(), keys.end());
+  const auto motion = motion_keys();
+  all.insert(all.end(), motion.begin(), motion.end());
+  const auto feel = feel_keys();
+  all.insert(all.end(), feel.begin(), feel.end());
+  return all;
 }
 
 RigidSource read_primitive(const TableReader& table, std::size_t shape) {
@@ -187,7 +194,7 @@ std::string_view source_key(const TableReader& table, std::span<const std::strin
 }
 
 RigidDescription read_rigid(const SceneSource& source, const TreeNode& table, std::size_t number) {
-  static constexpr std::string_view all[] = {
+  static constexpr std::string_view of_all[] = {
       "name", "mesh",   "primitive", "volume", "position", "rotation", "unit",   "repair",  "radius",
       "size", "length", "labels",    "range",  "spacing",  "grow",     "smooth", "largest", "cut"};
   static constexpr std::string_view of_mesh[] = {"name", "mesh", "unit", "repair", "position", "rotation"};
@@ -202,6 +209,7 @@ RigidDescription read_rigid(const SceneSource& source, const TreeNode& table, st
   static constexpr std::string_view shapes[] = {"ball", "box", "plane", "capsule"};
   static constexpr std::span<const std::string_view> of_shape[] = {of_ball, of_box, of_box, of_capsule};
 
+  const std::vector<std::string_view> all = with_common(of_all);
   const TableReader reader = object_table(source, table, "[[rigid]]", number);
   reader.allow(all, rigid_later);
   const std::string_view kind = source_key(reader, sources);
@@ -210,17 +218,20 @@ RigidDescription read_rigid(const SceneSource& source, const TreeNode& table, st
   out.source_place = reader.place_of(kind);
   out.name = read_name(reader);
   if (kind == "mesh") {
-    reader.allow(of_mesh, {}, all, "mesh");
+    reader.allow(with_common(of_mesh), {}, all, "mesh");
     out.source = read_mesh_source(reader);
   } else if (kind == "primitive") {
     const std::size_t shape = reader.choice("primitive", shapes);
-    reader.allow(of_shape[shape], {}, all, words("primitive = \"", shapes[shape], "\""));
+    reader.allow(with_common(of_shape[shape]), {}, all, words("primitive = \"", shapes[shape], "\""));
     out.source = read_primitive(reader, shape);
   } else {
-    reader.allow(of_volume, {}, all, "volume");
+    reader.allow(with_common(of_volume), {}, all, "volume");
     out.source = read_volume_surface(reader);
   }
   out.pose = read_pose(reader);
+  out.feel = read_feel(reader);
+  out.motion = read_motion(reader, out.pose);
+  out.motion_place = reader.place_of("motion");
   return out;
 }
 

@@ -12,6 +12,7 @@
 
 #include "device/servo_timer.h"
 #include "device/simulated.h"
+#include "hybrid/rigid_sweep.h"
 
 namespace hybrid {
 namespace {
@@ -39,7 +40,16 @@ std::unique_ptr<WorldState> copy_state(const World& world, const WorldState& sta
   copy->map.reserve_bricks(1024);
   copy->proxy_m = state.proxy_m;
   copy->device_m = state.device_m;
-  copy->gather_step_m = state.gather_step_m;
+  copy->rigid = state.rigid;
+  copy->active = state.active;
+  copy->active_count = state.active_count;
+  copy->look_at = state.look_at;
+  copy->look_m = state.look_m;
+  copy->look_mask = state.look_mask;
+  copy->swept_to_m = state.swept_to_m;
+  copy->time_s = state.time_s;
+  copy->stuck = state.stuck;
+  copy->sliding = state.sliding;
   copy->hidden_stiffness_N_per_m = state.hidden_stiffness_N_per_m;
   copy->obstacle_seen = state.obstacle_seen;
   copy->paired = state.paired;
@@ -260,6 +270,8 @@ std::optional<glm::dvec3> equilibrium_force(const World& world, const WorldState
   World patient;
   patient.tool = world.tool;
   patient.limits = world.limits;
+  patient.skin_m = world.skin_m;
+  patient.rounding_m = world.rounding_m;
   patient.meeting = world.meeting;
   for (const SoftBody& body : world.soft) {
     SoftBody slow = body;
@@ -267,7 +279,7 @@ std::optional<glm::dvec3> equilibrium_force(const World& world, const WorldState
     slow.budget = kSettleBudget;
     patient.soft.push_back(std::move(slow));
   }
-  for (const RigidObject& object : world.rigid) patient.rigid.push_back(object.shared());
+  patient.rigid = world.rigid;
   const device::DeviceState still{.position_m = state.device_m};
   glm::dvec3 before(0.0);
   for (int n = 1; n <= kSettleTicks; ++n) {

@@ -11,6 +11,8 @@
 #include <limits>
 
 #include "hybrid/arbitration.h"
+#include "hybrid/body_stage.h"
+#include "hybrid/feel_stage.h"
 #include "hybrid/rigid_sweep.h"
 #include "hybrid/soft_stage.h"
 
@@ -26,7 +28,6 @@ constexpr double kForget = 0.9;  // of the hidden stiffness is kept from pass to
 constexpr double kOvershoot = 0.25;     // of the pull before, turned round: a step that overshot
 constexpr double kMostOvershoot = 3.0;  // believed of one step
 constexpr double kMostHidden = 50.0;    // hidden stiffness at most, of the model's
-constexpr int kMaxFreePieces = 512;     // of the way through free space looked at in one tick
 
 // Stages by the wall clock, which is cheap; the whole tick by the thread's own processor time, because on a
 // shared machine a tick that was put aside for another process is not a slow tick.
@@ -68,23 +69,6 @@ glm::dvec3 check_input(WorldState& state, const device::DeviceState& input) noex
   return state.device_m;
 }
 
-// Moves the proxy towards the device as long as the map's bricks on the way are empty. True when it arrives.
-bool advance_through_free_space(const World& world, WorldState& state, const glm::dvec3& goal) noexcept {
-  const double margin = std::max(world.tool.radius_m, soft_reach(world, state)) + state.map.cell_m();
-  const double piece = 8.0 * state.map.cell_m();
-  for (int n = 0; n < kMaxFreePieces; ++n) {
-    const glm::dvec3 way = goal - state.proxy_m;
-    const double length = glm::length(way);
-    const bool last = length <= piece;
-    const glm::dvec3 next = last ? goal : state.proxy_m + way * (piece / length);
-    if (state.map.any_near(glm::min(state.proxy_m, next) - margin, glm::max(state.proxy_m, next) + margin))
-      return false;
-    state.proxy_m = next;
-    if (last) return true;
-  }
-  return false;
-}
-
 // What pulls the proxy, apart from rigid surfaces: coupling and tissue (N).
 glm::dvec3 pull_on_proxy(const World& world, const WorldState& state, const glm::dvec3& device) noexcept {
   glm::dvec3 pull = world.tool.stiffness_N_per_m * (device - state.proxy_m);
@@ -100,7 +84,7 @@ glm::dvec3 pull_on_proxy(const World& world, const WorldState& state, const glm:
 void learn_stiffness(const World& world, WorldState& state, const glm::dvec3& delta, const glm::dvec3& before,
                      const glm::dvec3& after, const glm::dmat3& model, const glm::dmat3& used) noexcept {
   state.hidden_stiffness_N_per_m *= kForget;
-  const double square = glm::dot(delta, delta), still = kStill * world.tool.radius_m;
+  const double square = glm::dot(delta, delta), still = kStill * world.contact_radius_m();
   const double wanted = glm::dot(before, delta);
   if (square < still * still || wanted <= 0.0) return;
   const double overshoot = std::min(-glm::dot(after, delta) / wanted, kMostOvershoot);
@@ -120,8 +104,9 @@ double move_proxy(const World& world, WorldState& state, const glm::dvec3& devic
   for (const voxel::Reaction& reaction : state.reactions) model += reaction.stiffness_N_per_m;
   const glm::dmat3 metric = model + glm::dmat3(state.hidden_stiffness_N_per_m);
   const glm::dvec3 pull = pull_on_proxy(world, state, device);
-  sweep =
-      sweep_proxy(world, state, state.proxy_m, state.proxy_m + glm::inverse(metric) * pull, metric, travel);
+  // Without tissue the target is the device, to the last bit.
+  const glm::dvec3 target = near_soft ? state.proxy_m + glm::inverse(metric) * pull : device;
+  sweep = sweep_with_feel(world, state, target, metric, travel);
   const glm::dvec3 delta = sweep.point - state.proxy_m;
   state.proxy_m = sweep.point;
   if (near_soft) {
@@ -157,7 +142,8 @@ Surroundings look_around(const World& world, WorldState& state, const glm::dvec3
   // Against tissue no further in a tick than was looked, part of the tool's reach at a time, so that no voxel
   // is jumped over.
   if (!state.soft.empty()) around.range_m = kPasses * kSoftStep * soft_reach(world, state);
-  around.free = advance_through_free_space(world, state, device);
+  around.free = advance_through_free_space(world, state, device, soft_reach(world, state));
+  if (around.free) state.active_count = 0;
   if (!around.free && !state.soft.empty()) {
     around.near_soft = touch_soft(world, state, state.proxy_m, around.range_m);
   } else {
@@ -180,7 +166,7 @@ Sweep settle_contact(const World& world, WorldState& state, const glm::dvec3& de
   const double travel = around.near_soft ? around.range_m / kPasses : around.range_m;
   for (int pass = 0; pass < kPasses && !around.free; ++pass) {
     const double moved = move_proxy(world, state, device, around.near_soft, travel, sweep);
-    if (!around.near_soft || (pass > 0 && moved < kStill * world.tool.radius_m)) break;
+    if (!around.near_soft || (pass > 0 && moved < kStill * world.contact_radius_m())) break;
   }
   if (around.near_soft) give_way(world, state, before, sweep);
   if (!sweep.arrived) ++state.truncated_ticks;
@@ -191,11 +177,12 @@ Sweep settle_contact(const World& world, WorldState& state, const glm::dvec3& de
 void publish_force(const World& world, WorldState& state, const Sweep& sweep, double dt_s,
                    TickResult& result) noexcept {
   const glm::dvec3 coupling = world.tool.stiffness_N_per_m * (state.proxy_m - result.device_m);
+  const glm::dvec3 added = added_force(world, state, result.device_m, dt_s);
   result.proxy_m = state.proxy_m;
-  result.rigid_N = sweep.force_N;
+  result.rigid_N = sweep.force_N + added;
   result.soft_N = coupling - sweep.force_N;
   const std::uint64_t bad = state.limit.nonfinite;
-  result.force_N = device::limit_force(world.limits, state.limit, coupling, dt_s);
+  result.force_N = device::limit_force(world.limits, state.limit, coupling + added, dt_s);
   state.nonfinite += state.limit.nonfinite - bad;
   for (std::size_t o = 0; o < world.object_count(); ++o) {
     const std::size_t rigid = world.rigid.size();
@@ -213,6 +200,9 @@ TickResult haptic_tick(const World& world, WorldState& state, const device::Devi
   TickResult result;
   StageClock clock(result);
   result.device_m = check_input(state, input);
+
+  move_bodies(world, state, dt_s);
+  clock.done(Stage::bodies);
 
   const Surroundings around = look_around(world, state, result.device_m);
   clock.done(Stage::broad_phase);
@@ -235,31 +225,6 @@ TickResult haptic_tick(const World& world, WorldState& state, const device::Devi
   clock.done(Stage::force);
   clock.stop();
   return result;
-}
-
-bool start_proxy(const World& world, WorldState& state, const glm::dvec3& device_m) noexcept {
-  const double radius = world.tool.radius_m;
-  state.device_m = device_m;
-  state.proxy_m = device_m;
-  state.gather_step_m = radius;
-  for (int n = 0; n < 64; ++n) {
-    glm::dvec3 away(0.0);
-    double deepest = 0.0;
-    for (const RigidObject& object : world.rigid) {
-      const glm::dvec3 p = object.to_body(state.proxy_m);
-      if (object.surface->inside(p)) return false;
-      polygon::NearPoint near;
-      if (!object.surface->nearest(p, radius, near)) continue;
-      const double depth = radius - near.distance;
-      if (depth <= deepest) continue;
-      if (!(near.distance > 0.0)) return false;
-      deepest = depth;
-      away = object.pose.rotation * ((p - near.point) / near.distance);
-    }
-    if (deepest <= 0.0) return true;
-    state.proxy_m += (deepest * (1.0 + 1e-9)) * away;
-  }
-  return false;
 }
 
 }  // namespace hybrid

@@ -10,16 +10,16 @@
 
 namespace hybrid {
 
-enum class Stage : std::uint8_t { broad_phase, contact, arbitration, background, map, force };
-inline constexpr std::size_t kStages = 6;
-inline constexpr std::array<const char*, kStages> kStageNames{"broad_phase", "contact", "arbitration",
-                                                              "background",  "map",     "force"};
+enum class Stage : std::uint8_t { bodies, broad_phase, contact, arbitration, background, map, force };
+inline constexpr std::size_t kStages = 7;
+inline constexpr std::array<const char*, kStages> kStageNames{
+    "bodies", "broad_phase", "contact", "arbitration", "background", "map", "force"};
 
 struct TickResult {
   glm::dvec3 device_m{0.0};  // scene frame, as used (the last good input)
   glm::dvec3 proxy_m{0.0};
   glm::dvec3 force_N{0.0};               // on the hand, after the limits
-  glm::dvec3 rigid_N{0.0}, soft_N{0.0};  // its parts before the limits: rigid_N + soft_N = K (proxy − device)
+  glm::dvec3 rigid_N{0.0}, soft_N{0.0};  // its parts before the limits: rigid_N + soft_N = K (proxy − device) and what damping and texture add
   std::uint32_t contacts = 0;  // bit per object, rigid ones first; objects beyond 31 share the last bit
   std::array<float, kStages> stage_us{};
   double tick_us = 0.0;  // processor time of this thread; the stages are wall time
@@ -29,9 +29,5 @@ struct TickResult {
 // apart). Never allocates, locks, throws or does I/O; every loop is bounded.
 TickResult haptic_tick(const World& world, WorldState& state, const device::DeviceState& input,
                        double dt_s) noexcept;
-
-// Puts the proxy where the device is, or where it can be nearest to it outside everything rigid. False when
-// there is no such place: the session must not start there.
-bool start_proxy(const World& world, WorldState& state, const glm::dvec3& device_m) noexcept;
 
 }  // namespace hybrid

@@ -3,18 +3,25 @@
 // takes the first as const and the second as its own.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "device/force_limit.h"
 #include "hybrid/occupancy.h"
+#include "hybrid/rigid_motion.h"
 #include "hybrid/scene.h"
 #include "hybrid/snapshot.h"
+#include "hybrid/surface_feel.h"
 #include "polygon/contact.h"
+#include "polygon/neighbourhood.h"
 #include "polygon/proxy.h"
 #include "voxel/pair_contact.h"
 #include "voxel/soft_object.h"
@@ -24,8 +31,11 @@ namespace hybrid {
 struct RigidObject {
   std::string name;
   std::shared_ptr<const polygon::RigidSurface> surface;  // body frame; never changes
-  Pose pose;                                             // body to scene
-  polygon::TriangleMesh drawn;                           // body frame; what is rasterised and drawn
+  Pose pose;                                             // body to scene; of a moving object, where it begins
+  std::shared_ptr<const polygon::TriangleMesh> drawn;    // body frame; what is rasterised and drawn
+  RigidMotion motion{};                                  // fixed unless the scene says otherwise
+  SurfaceFeel feel{};                                    // hard and smooth unless the scene says otherwise
+  bool surface_is_drawn = false;                         // the surface is of that very mesh, and shares it
 
   [[nodiscard]] glm::dvec3 to_body(const glm::dvec3& in_scene) const {
     return glm::inverse(pose.rotation) * (in_scene - pose.position_m);
@@ -33,9 +43,10 @@ struct RigidObject {
   [[nodiscard]] glm::dvec3 to_scene(const glm::dvec3& in_body) const {
     return pose.position_m + pose.rotation * in_body;
   }
-  // The same object for another world, without what is drawn.
-  [[nodiscard]] RigidObject shared() const {
-    return {.name = name, .surface = surface, .pose = pose, .drawn = {}};
+  [[nodiscard]] std::size_t memory_bytes() const {
+    if (drawn == nullptr || surface_is_drawn) return surface->memory_bytes();
+    return surface->memory_bytes() + drawn->vertices.capacity() * sizeof(glm::dvec3) +
+           drawn->triangles.capacity() * sizeof(polygon::TriangleIndices);
   }
 };
 
@@ -54,15 +65,45 @@ struct SoftBody {  // the constant half of a soft object; the moving one is in W
   }
 };
 
+// Where a rigid body is now: body to scene. As a matrix, because the tick turns many points.
+struct BodyFrame {
+  glm::dmat3 rotation{1.0};
+  glm::dvec3 position_m{0.0};
+
+  BodyFrame() = default;
+  explicit BodyFrame(const Pose& pose)
+      : rotation(glm::mat3_cast(pose.rotation)), position_m(pose.position_m) {}
+  [[nodiscard]] glm::dvec3 to_body(const glm::dvec3& in_scene) const {
+    return (in_scene - position_m) * rotation;  // v · R is Rᵀ v
+  }
+  [[nodiscard]] glm::dvec3 to_scene(const glm::dvec3& in_body) const {
+    return position_m + rotation * in_body;
+  }
+};
+
 struct World {
   std::vector<RigidObject> rigid;
   std::vector<SoftBody> soft;
   Tool tool;
   device::ForceLimits limits;
+  // A point is a ball too, of this radius: 1e-7 of the scene, far above rounding and far below anything felt.
+  double skin_m = 0.0;
+  double rounding_m = 0.0;  // what a coordinate of the scene may be off by
+  double encoder_m = 0.0;   // what the device's position is rounded to
+  bool use_map = true;      // false: every object is asked every time; a baseline to time the map against
   // Pairs of soft objects that may meet: {smaller index, larger index}.
   std::vector<std::array<std::uint32_t, 2>> meeting;
 
   [[nodiscard]] std::size_t object_count() const { return rigid.size() + soft.size(); }
+  // Of the ball that rigid surfaces keep out.
+  [[nodiscard]] double contact_radius_m() const { return std::max(tool.radius_m, skin_m); }
+  // Sets skin_m and rounding_m for rigid objects and soft ones within the box.
+  void set_scale(const glm::dvec3& low, const glm::dvec3& high) {
+    const double extent = glm::length(high - low);
+    const double furthest = glm::length(glm::max(glm::abs(low), glm::abs(high)));
+    rounding_m = 8.0 * std::numeric_limits<double>::epsilon() * std::max(furthest, extent);
+    skin_m = std::max(1e-7 * extent, 1e2 * rounding_m);
+  }
 };
 
 // A pair of surface voxels of two soft objects that press on one another.
@@ -81,12 +122,28 @@ enum FaultBit : std::uint32_t {
   fault_map_overflow = 8,       // a voxel moved where the map had no room for a brick
   fault_pair_overflow = 16,     // more pairs of soft voxels than fit: use coarser voxels
   fault_infeasible = 32,        // rigid planes left no room for the tool
+  fault_nonfinite_body = 64,    // a free body was pushed by something that is not finite: it stood still
 };
 
 inline constexpr std::size_t kMaxNear = 256;     // triangles considered at once
 inline constexpr std::size_t kMaxPlanes = 1024;  // rigid planes and give-way bounds
 inline constexpr std::size_t kMaxPairs = 8192;
 inline constexpr std::size_t kMaxFound = 32768;  // map entries read in one look-up
+
+// What the proxy knows of one rigid object, and where that is.
+struct RigidNear {
+  BodyFrame frame;     // now
+  Pose pose;           // the same
+  FreeBodyState free;  // of a free body
+  polygon::Neighbourhood near;
+  double margin_m = 0.0;  // of the next survey, adapted to how crowded the last one was
+};
+
+// An element that holds the proxy.
+struct ActiveElement {
+  std::uint32_t object = 0, element = 0;
+  glm::dvec3 force_N{0.0};  // on the proxy, scene frame
+};
 
 // Everything the tick writes. Buffers are sized when the world is built, and never after.
 struct WorldState {
@@ -101,11 +158,23 @@ struct WorldState {
   glm::dvec3 device_m{0.0};  // last good input
   device::ForceLimitState limit;
   std::uint64_t tick = 0;
+  double time_s = 0.0;  // simulated, of the bodies' paths
   std::uint64_t nonfinite = 0;        // inputs or forces that were not finite
   std::uint32_t faults = 0;           // FaultBit, ever
   std::uint64_t truncated_ticks = 0;  // ticks that ended before the proxy arrived, by a bound on its steps
   double hidden_stiffness_N_per_m = 0.0;  // what tissue showed beyond the model of its pressed voxels
-  double gather_step_m = 0.0;             // how far the proxy may look, adapted to how crowded it is
+  std::vector<RigidNear> rigid;           // [rigid]
+  glm::dvec3 swept_to_m{0.0};             // where the last sweep ended: what is known is known from there
+  std::array<ActiveElement, 3> active{};  // elements that held the proxy last
+  std::uint32_t active_count = 0;
+  bool stuck = false;           // friction holds the proxy on what is active
+  bool sliding = false;         // or lets it slide
+  glm::dvec3 friction_N{0.0};   // on the proxy: what friction and shading add to what presses
+  DampingState damping;
+  // The rigid objects with surface within `look_m` of `look_at`, along each axis, as the map said.
+  glm::dvec3 look_at{0.0};
+  double look_m = -1.0;
+  std::uint64_t look_mask = 0;
 
   // ---- of arbitration ----
   std::vector<VoxelPair> pairs;

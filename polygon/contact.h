@@ -21,6 +21,14 @@ struct NearPoint {
   std::uint32_t element = 0;  // triangle index; 0 for a primitive
 };
 
+// An element as seen from a point: it lies wholly behind a plane across some way to the point, not always the
+// shortest.
+struct SeenElement {
+  glm::dvec3 normal{0.0};  // unit, towards the point; zero when the point lies on the element
+  double reach = 0.0;      // max over the element of normal · x (unit: meter)
+  std::uint32_t element = 0;
+};
+
 struct GatherResult {
   std::uint32_t count = 0;  // entries written to the output, sorted by element
   bool complete = true;     // false: the output was too small; ask again with a smaller radius
@@ -44,6 +52,26 @@ class RigidSurface {
   // The nearest element within `radius`; false when there is none.
   [[nodiscard]] virtual bool nearest(const glm::dvec3& point, double radius,
                                      NearPoint& out) const noexcept = 0;
+
+  // What lies around a place: every element that comes within `radius` of `centre`, and perhaps others nearly
+  // so near, by geometry alone and not by how they are found. In no order. complete = false: the output was
+  // too small, and is worthless.
+  [[nodiscard]] virtual GatherResult survey(const glm::dvec3& centre, double radius,
+                                            std::span<SeenElement> out) const noexcept = 0;
+
+  // The closest point of one element.
+  [[nodiscard]] virtual NearPoint closest(std::uint32_t element, const glm::dvec3& point) const noexcept = 0;
+
+  // Unit normal of a flat element; zero where there is none to be had.
+  [[nodiscard]] virtual glm::dvec3 face_normal(std::uint32_t element) const noexcept = 0;
+
+  // max over the element of normal · x: an element is below a plane when this is at most the plane's offset.
+  [[nodiscard]] virtual double support(std::uint32_t element, const glm::dvec3& normal) const noexcept = 0;
+
+  // Unit normal interpolated over the mesh's vertex normals at a point of an element (Phong 1975; for touch:
+  // Morgenbesser & Srinivasan 1996), on the side where `away` points; exact for smooth primitives.
+  [[nodiscard]] virtual glm::dvec3 shaded_normal(std::uint32_t element, const glm::dvec3& point,
+                                                 const glm::dvec3& away) const noexcept = 0;
 
   // Is the point inside the solid? Always false for an open sheet.
   [[nodiscard]] virtual bool inside(const glm::dvec3& point) const noexcept = 0;

@@ -8,6 +8,7 @@
 #include <memory>
 #include <new>
 #include <system_error>
+#include <vector>
 
 #include "polygon/mesh_file.h"
 
@@ -23,16 +24,28 @@ std::string too_large(std::uint64_t max_bytes) {
          " bytes; simplify the mesh, or raise max_bytes when the memory is there";
 }
 
+// What a gzip file says of its unpacked size at its end (RFC 1952), as far as that can be: it is only a hint.
+std::uint64_t announced_size(const std::filesystem::path& file) {
+  constexpr std::uint64_t kMostPacked = 1032;  // times, by deflate
+  std::ifstream in(file, std::ios::binary | std::ios::ate);
+  const std::streamoff packed = in.tellg();
+  std::uint32_t size = 0;
+  if (packed < static_cast<std::streamoff>(sizeof(size))) return 0;
+  in.seekg(-static_cast<std::streamoff>(sizeof(size)), std::ios::end);
+  in.read(reinterpret_cast<char*>(&size), sizeof(size));
+  return in ? std::min<std::uint64_t>(size, static_cast<std::uint64_t>(packed) * kMostPacked) : 0;
+}
+
 std::string unpack(const std::filesystem::path& file, std::uint64_t max_bytes) {
   const std::unique_ptr<gzFile_s, int (*)(gzFile)> in(gzopen(file.c_str(), "rb"), gzclose);
   if (in == nullptr) refuse(file, "cannot be opened; check that you may read it");
   gzbuffer(in.get(), 1U << 17U);
   std::string bytes;
+  bytes.reserve(std::min(announced_size(file), max_bytes) + 1);
+  std::vector<char> chunk(1U << 18U);  // of a size that stays in the cache
   for (;;) {
-    constexpr std::size_t kChunk = 1U << 20U;
     const std::size_t before = bytes.size();
-    bytes.resize(before + kChunk);
-    const int got = gzread(in.get(), bytes.data() + before, kChunk);
+    const int got = gzread(in.get(), chunk.data(), static_cast<unsigned>(chunk.size()));
     int status = Z_OK;
     const char* message = gzerror(in.get(), &status);
     if (got < 0 || (status != Z_OK && status != Z_STREAM_END)) {
@@ -40,7 +53,7 @@ std::string unpack(const std::filesystem::path& file, std::uint64_t max_bytes) {
                        (status == Z_BUF_ERROR ? "the file ends too early" : message) + ", after " +
                        std::to_string(before) + " bytes unpacked); copy the file again");
     }
-    bytes.resize(before + static_cast<std::size_t>(got));
+    bytes.append(chunk.data(), static_cast<std::size_t>(got));
     if (gzdirect(in.get()) != 0) refuse(file, "is named .gz but is not gzip; rename it, or pack it again");
     if (bytes.size() > max_bytes) refuse(file, "unpacks to " + too_large(max_bytes));
     if (got == 0) return bytes;

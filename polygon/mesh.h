@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -24,12 +25,20 @@ struct TriangleMesh {
 
 enum class Severity : std::uint8_t { info, warning, error };
 
+// Where in the mesh something was found or done (body frame, unit: meter).
+struct FindingPlace {
+  glm::dvec3 first_m{0.0};                  // middle of the first triangle, edge, vertex or loop
+  glm::dvec3 lower_m{0.0}, upper_m{0.0};    // box of the middles of all of them
+  std::optional<std::uint32_t> triangle{};  // the first, counted from 0 in the mesh as it was given
+};
+
 // One numbered thing that a check or a loader found, in words a person can act on.
 struct Finding {
   std::string id;  // stable and short, e.g. "M04-nonmanifold-edges"
   Severity severity = Severity::info;
   std::size_t count = 0;
-  std::string text;  // what, where (a place in the file or in space) and what to do
+  std::string text;                     // what, where (a place in the file or in space) and what to do
+  std::optional<FindingPlace> place{};  // the same place as numbers, where there is one in space
 };
 
 }  // namespace polygon

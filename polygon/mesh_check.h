@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Numbered checks of a mesh and its repair, by CGAL's polygon mesh processing; mesh_repair.cpp and
-// self_intersections.cpp are the only files of the project that know CGAL. README.md lists the findings.
+// Numbered checks of a mesh and its repair. README.md lists the findings, and what is left for people to
+// mend. What takes more than counting is done by CGAL's exact predicates and its polygon mesh processing
+// (mesh_repair.cpp, self_intersections.cpp).
 #pragma once
 
 #include "polygon/mesh.h"
@@ -17,13 +18,25 @@ struct MeshCheck {
 // `deep` also looks for self-intersections (seconds at a million triangles).
 MeshCheck check_mesh(const TriangleMesh& mesh, bool deep = false);
 
-struct RepairedMesh {
-  TriangleMesh mesh;
-  std::vector<Finding> changes;  // what was changed, and how many
+struct RepairOptions {
+  // Vertices of borders this near to one another, as a share of the diagonal of the mesh's box, are merged
+  // where that joins two border edges and does nothing else. Exporters that round to six digits need 1e-6.
+  double crack_share = 1e-6;
+  // A hole is small, and filled, when its loop has at most this many edges and its box a diagonal of at most
+  // this share of that of its piece's box. The rim of a sheet is larger, and stays.
+  std::size_t hole_edges = 64;
+  double hole_share = 0.3;
 };
 
-// Merges coincident vertices, drops degenerate and duplicate triangles, orients the soup, stitches
-// borders and turns a closed mesh outward. Never called unless the user asks for it.
-RepairedMesh repair_mesh(const TriangleMesh& mesh);
+struct RepairedMesh {
+  TriangleMesh mesh;
+  std::vector<Finding> changes;  // what was changed, in that order: how many and where; and how it ended
+};
+
+// Merges vertices, drops repeated triangles and those without area, joins cracks, fills small holes, orients,
+// stitches, and turns closed pieces outward. Keeps everything that has an area: what it cannot mend (large
+// holes, triangles that cut one another) is left and reported. Ends on anything, in time that grows with the
+// triangles and not with how they lie. Never called unless the user asks for it.
+RepairedMesh repair_mesh(const TriangleMesh& mesh, const RepairOptions& options = {});
 
 }  // namespace polygon

@@ -26,6 +26,11 @@ namespace io = OpenMesh::IO;
 // the many things that a file may say, only points and faces concern us.
 class SoupImporter final : public io::BaseImporter {
  public:
+  // `keeps_points` = false: they are counted and no more, because the screen has them as doubles.
+  SoupImporter(bool keeps_points, std::size_t faces) : keeps_points_(keeps_points) {
+    corners.reserve(3 * faces);
+    face_begin.reserve(faces + 1);
+  }
   std::vector<glm::dvec3> points;
   std::vector<std::uint32_t> corners;        // of all faces, one after another
   std::vector<std::uint32_t> face_begin{0};  // where each face's corners begin, and the end
@@ -35,13 +40,10 @@ class SoupImporter final : public io::BaseImporter {
   using EH = OpenMesh::EdgeHandle;
   using FH = OpenMesh::FaceHandle;
 
-  VH add_vertex(const OpenMesh::Vec3f& p) override {
-    points.emplace_back(p[0], p[1], p[2]);
-    return VH(static_cast<int>(points.size()) - 1);
-  }
+  VH add_vertex(const OpenMesh::Vec3f& p) override { return add_vertex(OpenMesh::Vec3d(p[0], p[1], p[2])); }
   VH add_vertex(const OpenMesh::Vec3d& p) override {
-    points.emplace_back(p[0], p[1], p[2]);
-    return VH(static_cast<int>(points.size()) - 1);
+    if (keeps_points_) points.emplace_back(p[0], p[1], p[2]);
+    return VH(static_cast<int>(vertices_++));
   }
   VH add_vertex() override { return add_vertex(OpenMesh::Vec3f(0.0F, 0.0F, 0.0F)); }
   FH add_face(const VHandles& indices) override {
@@ -51,10 +53,10 @@ class SoupImporter final : public io::BaseImporter {
     return FH(static_cast<int>(face_begin.size()) - 2);
   }
   void set_point(VH v, const OpenMesh::Vec3f& p) override {
-    points.at(static_cast<std::size_t>(v.idx())) = {p[0], p[1], p[2]};
+    if (keeps_points_) points.at(static_cast<std::size_t>(v.idx())) = {p[0], p[1], p[2]};
   }
 
-  [[nodiscard]] size_t n_vertices() const override { return points.size(); }
+  [[nodiscard]] size_t n_vertices() const override { return vertices_; }
   [[nodiscard]] size_t n_faces() const override { return face_begin.size() - 1; }
   [[nodiscard]] size_t n_edges() const override { return 0; }
 
@@ -92,6 +94,10 @@ class SoupImporter final : public io::BaseImporter {
   void set_color(FH, const OpenMesh::Vec4f&) override {}
   void set_status(FH, const OpenMesh::Attributes::StatusInfo&) override {}
   void add_texture_information(int, std::string) override {}
+
+ private:
+  bool keeps_points_;
+  std::size_t vertices_ = 0;
 };
 
 // A stream over bytes in memory, without a copy of them; OpenMesh's OBJ reader goes back to the beginning
@@ -125,7 +131,7 @@ SoupImporter read_by_openmesh(const std::filesystem::path& file, ScreenedFile& s
   omout().disable();
   MemoryBuffer buffer(screened.dialect);
   std::istream in(&buffer);
-  SoupImporter soup;
+  SoupImporter soup(screened.binary, screened.faces);
   io::Options options(screened.binary ? io::Options::Binary : io::Options::Default);
   const bool read = io::IOManager().read(in, screened.openmesh_extension, soup, options);
   const bool vertices_agree = soup.n_vertices() >= screened.coordinates.size();
@@ -137,6 +143,7 @@ SoupImporter read_by_openmesh(const std::filesystem::path& file, ScreenedFile& s
                           std::to_string(screened.coordinates.size()) + " and " +
                           std::to_string(screened.faces) + "; export it as binary PLY");
   }
+  std::string().swap(screened.dialect);  // it has been read
   return soup;
 }
 
@@ -162,6 +169,8 @@ MeshFile assemble(ScreenedFile& screened, SoupImporter& soup, double scale) {
   std::size_t out_of_range = 0, first_out_of_range = 0, nonfinite = screened.nonfinite_facets;
   std::size_t repeated = screened.faces - soup.n_faces();
   std::size_t polygons = 0;
+  const std::size_t fewer = 2 * soup.n_faces();
+  result.mesh.triangles.reserve(soup.corners.size() > fewer ? soup.corners.size() - fewer : 0);
   for (std::size_t f = 0; f + 1 < soup.face_begin.size(); ++f) {
     const std::span<const std::uint32_t> face(soup.corners.data() + soup.face_begin[f],
                                               soup.face_begin[f + 1] - soup.face_begin[f]);

@@ -267,6 +267,10 @@ bool holds_corners(const Property& property) {
 }
 
 void read_faces(const Element& element, Body& body, std::string& faces, ScreenedFile& screened) {
+  // As triangles, which they mostly are; the count was checked, yet a text is trusted with no more than twice
+  // itself.
+  constexpr std::size_t kTriangle = 4 * sizeof(std::int32_t);
+  faces.reserve(std::min(element.count * kTriangle, 2 * body.remaining()));
   for (std::uint64_t i = 0; i < element.count; ++i) {
     for (const Property& property : element.properties) {
       if (!holds_corners(property)) {
@@ -353,13 +357,15 @@ ScreenedFile screen_ply(const std::filesystem::path& file, std::string_view byte
   if (header.encoding != Encoding::text) screened.trailing_bytes = body.remaining();
 
   // OpenMesh counts the vertices and reads the faces; the coordinates, which it would make floats, are kept
-  // here.
-  screened.dialect = "ply\nformat binary_little_endian 1.0\nelement vertex ";
+  // here, and what it passes over is as short as can be.
+  constexpr std::size_t kHeader = 256;
+  screened.dialect.reserve(kHeader + screened.coordinates.size() + faces.size());
+  screened.dialect += "ply\nformat binary_little_endian 1.0\nelement vertex ";
   append_integer(screened.dialect, static_cast<std::int64_t>(screened.coordinates.size()));
-  screened.dialect += "\nproperty float x\nproperty float y\nproperty float z\nelement face ";
+  screened.dialect += "\nproperty uchar nothing\nelement face ";
   append_integer(screened.dialect, static_cast<std::int64_t>(screened.faces));
   screened.dialect += "\nproperty list int int vertex_indices\nend_header\n";
-  screened.dialect.append(screened.coordinates.size() * 3 * sizeof(float), '\0');
+  screened.dialect.append(screened.coordinates.size(), '\0');
   screened.dialect += faces;
   return screened;
 }

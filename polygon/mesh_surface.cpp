@@ -11,20 +11,23 @@
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
 #include <limits>
-#include <numbers>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "polygon/mesh_bounds.h"
 #include "polygon/topology.h"
 #include "polygon/triangle.h"
+#include "polygon/vertex_normals.h"
 
 namespace polygon {
 namespace {
 
 constexpr std::uint32_t kNone = 0xffffffffU;
-constexpr double kFurthestVertex = 1e12;  // (unit: meter) keeps every square and product far from overflow
-constexpr double kFurthestQuery = 1e18;   // (unit: meter) its square still is a float
+constexpr double kFurthestQuery = 1e18;        // (unit: meter) its square still is a float
+constexpr std::size_t kLargeMesh = 1U << 18U;  // elements
+constexpr double kFarAway = 700.0;  // radii of the mesh: where the rounding of floats, and a lens, cost least
 constexpr double kRelativeSlack = 1e-6;  // of the few float roundings in Embree's box test, each at most 6e-8
 
 bool is_finite(const glm::dvec3& v) {
@@ -48,7 +51,7 @@ bool nearer(const NearPoint& a, const NearPoint& b) {
 
 class MeshSurface final : public RigidSurface {
  public:
-  MeshSurface(const TriangleMesh& mesh, bool solid);
+  MeshSurface(std::shared_ptr<const TriangleMesh> mesh, const SurfaceOptions& options);
   MeshSurface(const MeshSurface&) = delete;
   MeshSurface& operator=(const MeshSurface&) = delete;
   MeshSurface(MeshSurface&&) = delete;
@@ -58,6 +61,15 @@ class MeshSurface final : public RigidSurface {
   [[nodiscard]] GatherResult gather(const glm::dvec3& point, double radius,
                                     std::span<NearPoint> out) const noexcept override;
   [[nodiscard]] bool nearest(const glm::dvec3& point, double radius, NearPoint& out) const noexcept override;
+  [[nodiscard]] GatherResult survey(const glm::dvec3& centre, double radius,
+                                    std::span<SeenElement> out) const noexcept override;
+  [[nodiscard]] NearPoint closest(std::uint32_t element, const glm::dvec3& point) const noexcept override;
+  [[nodiscard]] glm::dvec3 face_normal(std::uint32_t element) const noexcept override {
+    return normal(element);
+  }
+  [[nodiscard]] double support(std::uint32_t element, const glm::dvec3& normal) const noexcept override;
+  [[nodiscard]] glm::dvec3 shaded_normal(std::uint32_t element, const glm::dvec3& point,
+                                         const glm::dvec3& away) const noexcept override;
   [[nodiscard]] bool inside(const glm::dvec3& point) const noexcept override;
   [[nodiscard]] glm::dvec3 lower() const noexcept override { return centre_ + lower_; }
   [[nodiscard]] glm::dvec3 upper() const noexcept override { return centre_ + upper_; }
@@ -72,6 +84,13 @@ class MeshSurface final : public RigidSurface {
     std::span<NearPoint> out;
     GatherResult result;
   };
+  struct SurveyQuery {
+    const MeshSurface* surface;
+    glm::dvec3 centre;  // from centre_
+    double radius;
+    std::span<SeenElement> out;
+    GatherResult result;
+  };
   struct NearestQuery {
     const MeshSurface* surface;
     glm::dvec3 point;
@@ -80,34 +99,49 @@ class MeshSurface final : public RigidSurface {
     NearPoint best;
     TriangleFeature feature;
     bool found;
+    glm::dvec3
+        asked_from;  // where the hierarchy is asked: `point`, or for a far one somewhere on the way to it
+    double lens;     // 0, or the share of the way that is left
+  };
+  // The sum of normals at a corner (from == to) or an edge, over the elements that have it.
+  struct PseudonormalQuery {
+    const MeshSurface* surface;
+    glm::dvec3 from, to;
+    glm::dvec3 sum{0.0};
+    std::uint32_t elements = 0, flat = 0;
   };
 
   static void bounds_of(const RTCBoundsFunctionArguments* args);
   static bool on_gather(RTCPointQueryFunctionArguments* args);
+  static bool on_survey(RTCPointQueryFunctionArguments* args);
   static bool on_nearest(RTCPointQueryFunctionArguments* args);
+  static bool on_pseudonormal(RTCPointQueryFunctionArguments* args);
   static bool on_memory(void* self, ssize_t bytes, bool post);
 
   [[nodiscard]] TrianglePoint closest(const glm::dvec3& local, std::uint32_t triangle) const {
     const TriangleIndices& t = triangles_[triangle];
-    return closest_on_triangle(local, vertices_[t[0]], vertices_[t[1]], vertices_[t[2]]);
+    return closest_on_triangle(local, vertex(t[0]), vertex(t[1]), vertex(t[2]));
+  }
+  [[nodiscard]] glm::dvec3 vertex(std::uint32_t i) const { return mesh_->vertices[i] - centre_; }
+  [[nodiscard]] std::uint32_t element_of(std::uint32_t primitive) const {
+    return elements_.empty() ? primitive : elements_[primitive];
   }
   [[nodiscard]] glm::dvec3 normal(std::uint32_t triangle) const;
   [[nodiscard]] bool prepare(const glm::dvec3& point, double radius, glm::dvec3& local, float& float_error,
                              RTCPointQuery& query) const;
+  [[nodiscard]] double lens_radius(const NearPoint& x, const NearestQuery& query) const;
   [[nodiscard]] bool find_nearest(const glm::dvec3& point, double radius, NearestQuery& query) const;
-  [[nodiscard]] bool inside_by_winding(const glm::dvec3& local) const;
+  [[nodiscard]] PseudonormalQuery pseudonormal(const glm::dvec3& from, const glm::dvec3& to) const;
   void build_hierarchy();
-  void build_normals(std::span<const TriangleIndices> welded, const WeldedVertices& points);
 
+  std::shared_ptr<const TriangleMesh> mesh_;
+  std::span<const TriangleIndices> triangles_;  // of mesh_
   bool solid_;
   glm::dvec3 centre_{0.0};
-  glm::dvec3 lower_{0.0}, upper_{0.0};  // from centre_
-  std::vector<glm::dvec3> vertices_;    // from centre_
-  std::vector<TriangleIndices> triangles_;
-  std::vector<std::uint32_t> elements_;                   // what the hierarchy holds: no duplicates
-  std::vector<std::array<std::uint32_t, 3>> neighbours_;  // solid only: across each edge, or kNone
-  std::vector<glm::dvec3> vertex_normals_;                // solid only: angle-weighted
-  double slack_ = 0.0;                                    // of taking coordinates from centre_ (unit: meter)
+  glm::dvec3 lower_{0.0}, upper_{0.0};     // from centre_
+  std::vector<std::uint32_t> elements_;    // what the hierarchy holds: no duplicates; empty: all triangles
+  std::vector<glm::vec3> vertex_normals_;  // only when asked for
+  double slack_ = 0.0;                     // of taking coordinates from centre_ (unit: meter)
   std::atomic<std::int64_t> embree_bytes_{0};
   RTCDevice device_ = nullptr;
   RTCScene scene_ = nullptr;
@@ -119,50 +153,28 @@ float conservative(double radius, float float_error) {
   return reach < kFurthestQuery ? rounded_up(reach) : std::numeric_limits<float>::infinity();
 }
 
-MeshSurface::MeshSurface(const TriangleMesh& mesh, bool solid) : solid_(solid), triangles_(mesh.triangles) {
-  if (mesh.triangles.empty()) {
-    throw std::invalid_argument("the mesh has no triangle; a surface needs at least one");
-  }
-  if (mesh.triangles.size() >= kNone || mesh.vertices.size() >= kNone) {
-    throw std::invalid_argument("the mesh has " + std::to_string(mesh.triangles.size()) +
-                                " triangles, more than 2^32 - 2; split it");
-  }
-  glm::dvec3 low(std::numeric_limits<double>::infinity());
-  glm::dvec3 high(-std::numeric_limits<double>::infinity());
-  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
-    for (const std::uint32_t corner : mesh.triangles[i]) {
-      if (corner >= mesh.vertices.size()) {
-        throw std::invalid_argument("triangle " + std::to_string(i) + " uses vertex " +
-                                    std::to_string(corner) + " of " + std::to_string(mesh.vertices.size()) +
-                                    "; leave it out");
-      }
-      const glm::dvec3& v = mesh.vertices[corner];
-      if (!is_finite(v) || glm::any(glm::greaterThan(glm::abs(v), glm::dvec3(kFurthestVertex)))) {
-        throw std::invalid_argument("vertex " + std::to_string(corner) +
-                                    " is not finite, or beyond 1e12 m; leave out the triangles that use it");
-      }
-      low = glm::min(low, v);
-      high = glm::max(high, v);
-    }
-  }
+// Points the query, and returns how far the float point lies from the true one, and the slack.
+float aim(const glm::dvec3& local, double radius, double slack, RTCPointQuery& query) {
+  query.x = static_cast<float>(local.x);
+  query.y = static_cast<float>(local.y);
+  query.z = static_cast<float>(local.z);
+  query.time = 0.0F;
+  const float float_error = rounded_up(glm::length(local - glm::dvec3(query.x, query.y, query.z)) + slack);
+  query.radius = conservative(radius, float_error);
+  return float_error;
+}
+
+MeshSurface::MeshSurface(std::shared_ptr<const TriangleMesh> mesh, const SurfaceOptions& options)
+    : mesh_(std::move(mesh)), solid_(options.solid) {
+  if (mesh_ == nullptr) throw std::invalid_argument("there is no mesh; a surface needs one");
+  const auto [low, high] = checked_bounds(*mesh_);
+  triangles_ = mesh_->triangles;
   centre_ = 0.5 * (low + high);
   lower_ = low - centre_;
   upper_ = high - centre_;
   slack_ = 1e-15 * (glm::length(glm::max(glm::abs(low), glm::abs(high))) + glm::length(high - low));
-  vertices_.reserve(mesh.vertices.size());
-  for (const glm::dvec3& v : mesh.vertices) vertices_.push_back(v - centre_);
-
-  {
-    const WeldedVertices points = weld_vertices(mesh.vertices);
-    const std::vector<TriangleIndices> welded = welded_triangles(mesh, points);
-    const std::vector<std::uint32_t> first = first_duplicates(welded, points.points);
-    elements_.reserve(first.size());
-    for (std::uint32_t i = 0; i < first.size(); ++i) {
-      if (first[i] == i) elements_.push_back(i);
-    }
-    elements_.shrink_to_fit();
-    if (solid_) build_normals(welded, points);
-  }
+  elements_ = distinct_triangles(*mesh_);
+  if (options.vertex_normals) vertex_normals_ = angle_weighted_normals(*mesh_);
   build_hierarchy();
 }
 
@@ -176,11 +188,14 @@ void MeshSurface::build_hierarchy() {
   rtcSetDeviceMemoryMonitorFunction(device_, &MeshSurface::on_memory, this);
   scene_ = rtcNewScene(device_);
   rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_ROBUST);
-  rtcSetSceneBuildQuality(scene_, RTC_BUILD_QUALITY_MEDIUM);
+  // Of a large mesh, queries wait for memory, and Embree's fast build is as quick to ask, takes a third of
+  // the memory and half of the time; of a small one its looser boxes would cost a fifth of a query.
+  const std::size_t elements = elements_.empty() ? triangles_.size() : elements_.size();
+  rtcSetSceneBuildQuality(scene_, elements > kLargeMesh ? RTC_BUILD_QUALITY_LOW : RTC_BUILD_QUALITY_MEDIUM);
   // User geometry, not Embree's triangles: its boxes are rounded outward here, which Embree's own float
   // vertices are not, and it holds no second copy of the vertices.
   RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_USER);
-  rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(elements_.size()));
+  rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(elements));
   rtcSetGeometryUserData(geometry, this);
   rtcSetGeometryBoundsFunction(geometry, &MeshSurface::bounds_of, nullptr);
   rtcCommitGeometry(geometry);
@@ -192,7 +207,7 @@ void MeshSurface::build_hierarchy() {
     rtcReleaseScene(scene_);
     rtcReleaseDevice(device_);
     throw std::runtime_error("Embree failed (error " + std::to_string(static_cast<int>(error)) +
-                             ") to build a hierarchy of " + std::to_string(elements_.size()) +
+                             ") to build a hierarchy of " + std::to_string(elements) +
                              " triangles; most likely memory ran out: use a coarser mesh");
   }
 }
@@ -202,49 +217,15 @@ MeshSurface::~MeshSurface() {
   rtcReleaseDevice(device_);
 }
 
-// Angle-weighted pseudonormals (Baerentzen and Aanaes, Signed distance computation using the angle weighted
-// pseudonormal, 2005): at an edge or a corner the sign of the distance must not depend on which of the
-// triangles there was found first.
-void MeshSurface::build_normals(std::span<const TriangleIndices> welded, const WeldedVertices& points) {
-  std::vector<glm::dvec3> point_normals(points.points, glm::dvec3(0.0));
-  for (std::uint32_t i = 0; i < welded.size(); ++i) {
-    const glm::dvec3 n = normal(i);
-    for (std::size_t c = 0; c < 3; ++c) {
-      const glm::dvec3& here = vertices_[triangles_[i][c]];
-      const glm::dvec3 to_next = vertices_[triangles_[i][(c + 1) % 3]] - here;
-      const glm::dvec3 to_last = vertices_[triangles_[i][(c + 2) % 3]] - here;
-      const double angle = std::atan2(glm::length(glm::cross(to_next, to_last)), glm::dot(to_next, to_last));
-      point_normals[welded[i][c]] += angle * n;
-    }
-  }
-  vertex_normals_.reserve(vertices_.size());
-  for (const std::uint32_t point : points.point_of) vertex_normals_.push_back(point_normals[point]);
-
-  neighbours_.assign(welded.size(), {kNone, kNone, kNone});
-  const std::vector<EdgeUse> edges = sorted_edges(welded, points.points);
-  for (std::size_t i = 0; i + 1 < edges.size(); ++i) {
-    const EdgeUse& a = edges[i];
-    const EdgeUse& b = edges[i + 1];
-    if (a.low != b.low || a.high != b.high) continue;
-    neighbours_[a.triangle][a.edge] = b.triangle;
-    neighbours_[b.triangle][b.edge] = a.triangle;
-  }
-}
-
-// Unit normal; zero for a degenerate triangle, whose normal would be rounding.
 glm::dvec3 MeshSurface::normal(std::uint32_t triangle) const {
   const TriangleIndices& t = triangles_[triangle];
-  const glm::dvec3 &a = vertices_[t[0]], &b = vertices_[t[1]], &c = vertices_[t[2]];
-  if (is_degenerate(a, b, c)) return glm::dvec3(0.0);
-  // Scaled first: the cross product of two nanometer edges would have a length whose square is denormal.
-  const glm::dvec3 n = glm::cross(glm::normalize(b - a), glm::normalize(c - a));
-  return glm::normalize(n);
+  return unit_normal(vertex(t[0]), vertex(t[1]), vertex(t[2]));
 }
 
 void MeshSurface::bounds_of(const RTCBoundsFunctionArguments* args) {
   const auto* self = static_cast<const MeshSurface*>(args->geometryUserPtr);
-  const TriangleIndices& t = self->triangles_[self->elements_[args->primID]];
-  const glm::dvec3 &a = self->vertices_[t[0]], &b = self->vertices_[t[1]], &c = self->vertices_[t[2]];
+  const TriangleIndices& t = self->triangles_[self->element_of(args->primID)];
+  const glm::dvec3 a = self->vertex(t[0]), b = self->vertex(t[1]), c = self->vertex(t[2]);
   const glm::dvec3 low = glm::min(glm::min(a, b), c);
   const glm::dvec3 high = glm::max(glm::max(a, b), c);
   args->bounds_o->lower_x = rounded_down(low.x);
@@ -269,18 +250,13 @@ bool MeshSurface::prepare(const glm::dvec3& point, double radius, glm::dvec3& lo
   const glm::dvec3 outside = glm::max(glm::max(lower_ - local, local - upper_), glm::dvec3(0.0));
   const double slack = slack_ + 1e-15 * glm::length(point);
   if (glm::length(outside) > radius * (1.0 + 1e-12) + slack) return false;
-  query.x = static_cast<float>(local.x);
-  query.y = static_cast<float>(local.y);
-  query.z = static_cast<float>(local.z);
-  query.time = 0.0F;
-  float_error = rounded_up(glm::length(local - glm::dvec3(query.x, query.y, query.z)) + slack);
-  query.radius = conservative(radius, float_error);
+  float_error = aim(local, radius, slack, query);
   return true;
 }
 
 bool MeshSurface::on_gather(RTCPointQueryFunctionArguments* args) {
   auto& q = *static_cast<GatherQuery*>(args->userPtr);
-  const std::uint32_t element = q.surface->elements_[args->primID];
+  const std::uint32_t element = q.surface->element_of(args->primID);
   const TrianglePoint closest = q.surface->closest(q.point, element);
   const NearPoint found{closest.point, std::sqrt(closest.squared_distance), element};
   if (!(found.distance <= q.radius)) return false;
@@ -319,23 +295,101 @@ GatherResult MeshSurface::gather(const glm::dvec3& point, double radius,
   return q.result;
 }
 
+bool MeshSurface::on_survey(RTCPointQueryFunctionArguments* args) {
+  auto& q = *static_cast<SurveyQuery*>(args->userPtr);
+  const MeshSurface& self = *q.surface;
+  const std::uint32_t element = self.element_of(args->primID);
+  const TriangleIndices& t = self.triangles_[element];
+  TriangleSight sight;
+  if (!see_triangle(q.centre, q.radius, self.vertex(t[0]), self.vertex(t[1]), self.vertex(t[2]), sight))
+    return false;
+  if (q.result.count == q.out.size()) {
+    q.result.complete = false;
+    args->query->radius = 0.0F;
+    return true;
+  }
+  q.out[q.result.count++] = {sight.normal, sight.reach + glm::dot(sight.normal, self.centre_), element};
+  return false;
+}
+
+GatherResult MeshSurface::survey(const glm::dvec3& centre, double radius,
+                                 std::span<SeenElement> out) const noexcept {
+  SurveyQuery q{this, {}, radius, out, {}};
+  RTCPointQuery query{};
+  float float_error = 0.0F;
+  if (!prepare(centre, radius, q.centre, float_error, query)) return {};
+  RTCPointQueryContext context{};
+  rtcInitPointQueryContext(&context);
+  rtcPointQuery(scene_, &query, &context, &MeshSurface::on_survey, &q);
+  return q.result;
+}
+
+NearPoint MeshSurface::closest(std::uint32_t element, const glm::dvec3& point) const noexcept {
+  const TrianglePoint found = closest(point - centre_, element);
+  return {found.point + centre_, std::sqrt(found.squared_distance), element};
+}
+
+double MeshSurface::support(std::uint32_t element, const glm::dvec3& normal) const noexcept {
+  const TriangleIndices& t = triangles_[element];
+  return glm::dot(normal, centre_) + std::max({glm::dot(normal, vertex(t[0])), glm::dot(normal, vertex(t[1])),
+                                               glm::dot(normal, vertex(t[2]))});
+}
+
+glm::dvec3 MeshSurface::shaded_normal(std::uint32_t element, const glm::dvec3& point,
+                                      const glm::dvec3& away) const noexcept {
+  const TriangleIndices& t = triangles_[element];
+  const glm::dvec3 face = normal(element);
+  glm::dvec3 shaded = face;
+  if (!vertex_normals_.empty() && face != glm::dvec3(0.0)) {
+    // Barycentric coordinates by areas seen along the face's normal (Ericson, Real-Time Collision Detection,
+    // 3.4).
+    const glm::dvec3 a = vertex(t[0]), b = vertex(t[1]), c = vertex(t[2]);
+    const glm::dvec3 p = point - centre_;
+    const double wa = std::max(0.0, glm::dot(face, glm::cross(c - b, p - b)));
+    const double wb = std::max(0.0, glm::dot(face, glm::cross(a - c, p - c)));
+    const double wc = std::max(0.0, glm::dot(face, glm::cross(b - a, p - a)));
+    const glm::dvec3 sum = wa * glm::dvec3(vertex_normals_[t[0]]) + wb * glm::dvec3(vertex_normals_[t[1]]) +
+                           wc * glm::dvec3(vertex_normals_[t[2]]);
+    if (glm::dot(sum, sum) > 0.0) shaded = glm::normalize(sum);
+  }
+  return glm::dot(shaded, away) < 0.0 ? -shaded : shaded;
+}
+
 bool MeshSurface::on_nearest(RTCPointQueryFunctionArguments* args) {
   auto& q = *static_cast<NearestQuery*>(args->userPtr);
-  const std::uint32_t element = q.surface->elements_[args->primID];
+  const std::uint32_t element = q.surface->element_of(args->primID);
   if (q.skip_degenerate) {
     const TriangleIndices& t = q.surface->triangles_[element];
-    const std::vector<glm::dvec3>& v = q.surface->vertices_;
-    if (is_degenerate(v[t[0]], v[t[1]], v[t[2]])) return false;
+    const MeshSurface& self = *q.surface;
+    if (is_degenerate(self.vertex(t[0]), self.vertex(t[1]), self.vertex(t[2]))) return false;
   }
   const TrianglePoint closest = q.surface->closest(q.point, element);
   const NearPoint found{closest.point, std::sqrt(closest.squared_distance), element};
+  if (q.lens > 0.0) {
+    // Whether or not it is near enough to be an answer, nothing beyond it needs to be looked at.
+    args->query->radius =
+        std::min(args->query->radius, conservative(q.surface->lens_radius(found, q), q.float_error));
+  }
   // best.distance starts as the radius, with an element above all others: the radius itself still counts.
-  if (!nearer(found, q.best)) return false;
+  if (!nearer(found, q.best)) return q.lens > 0.0;
   q.best = found;
   q.feature = closest.feature;
   q.found = true;
-  args->query->radius = std::min(args->query->radius, conservative(found.distance, q.float_error));
+  if (q.lens == 0.0) {
+    args->query->radius = std::min(args->query->radius, conservative(found.distance, q.float_error));
+  }
   return true;
+}
+
+// From far away the float distances of all triangles are equal, and the hierarchy would hand out every one of
+// them. So it is asked from a place on the way, s from the centre where the point is S. Of the ball B about
+// the mesh, of radius L, all that is as near to the point as x lies within
+// √(|x − place|² + (L² − |x|²)(1 − s/S)) of that place (the ball around the point, written in terms of x and
+// cut with B), which for s ≫ L is hardly more than x's own distance.
+double MeshSurface::lens_radius(const NearPoint& x, const NearestQuery& q) const {
+  const glm::dvec3 away = x.point - q.asked_from;
+  const double within = glm::dot(upper_, upper_) - glm::dot(x.point, x.point);
+  return std::sqrt(glm::dot(away, away) + std::max(0.0, within) * q.lens);
 }
 
 bool MeshSurface::find_nearest(const glm::dvec3& point, double radius, NearestQuery& q) const {
@@ -344,6 +398,14 @@ bool MeshSurface::find_nearest(const glm::dvec3& point, double radius, NearestQu
   q.found = false;
   RTCPointQuery query{};
   if (!prepare(point, radius, q.point, q.float_error, query)) return false;
+  q.asked_from = q.point;
+  q.lens = 0.0;
+  const double distance = glm::length(q.point), far = kFarAway * glm::length(upper_);
+  if (distance > far && far > 0.0) {
+    q.asked_from = q.point * (far / distance);
+    q.lens = 1.0 - far / distance;
+    q.float_error = aim(q.asked_from, std::numeric_limits<double>::infinity(), slack_, query);
+  }
   RTCPointQueryContext context{};
   rtcInitPointQueryContext(&context);
   rtcPointQuery(scene_, &query, &context, &MeshSurface::on_nearest, &q);
@@ -367,50 +429,80 @@ bool MeshSurface::inside(const glm::dvec3& point) const noexcept {
   if (!find_nearest(point, std::numeric_limits<double>::infinity(), q)) return false;
   if (q.best.distance == 0.0) return false;  // on the surface
 
-  glm::dvec3 pseudonormal(0.0);
+  glm::dvec3 normal_here(0.0);
   const auto feature = static_cast<std::size_t>(q.feature);
+  const TriangleIndices& t = triangles_[q.best.element];
+  const std::vector<glm::dvec3>& v = mesh_->vertices;
   if (q.feature == TriangleFeature::face) {
-    pseudonormal = normal(q.best.element);
+    normal_here = normal(q.best.element);
   } else if (feature >= 3) {
-    const std::uint32_t across = neighbours_[q.best.element][feature - 3];
-    const glm::dvec3 n = across == kNone ? glm::dvec3(0.0) : normal(across);
+    const PseudonormalQuery edge = pseudonormal(v[t[feature - 3]], v[t[(feature - 2) % 3]]);
     // A sliver across the edge has no normal to give, and neither side of it decides alone.
-    if (n == glm::dvec3(0.0)) return inside_by_winding(local);
-    pseudonormal = normal(q.best.element) + n;
+    if (edge.elements != 2 || edge.flat != 0) return winds_around(*mesh_, point);
+    normal_here = edge.sum;
   } else {
-    pseudonormal = vertex_normals_[triangles_[q.best.element][feature]];
+    normal_here = pseudonormal(v[t[feature]], v[t[feature]]).sum;
   }
   const glm::dvec3 away = (local - q.best.point) / q.best.distance;
-  const double side = glm::dot(away, pseudonormal);
+  const double side = glm::dot(away, normal_here);
   // At a fold so sharp that the normals cancel, the sign would be rounding.
-  if (std::abs(side) < 1e-9) return inside_by_winding(local);
+  if (std::abs(side) < 1e-9) return winds_around(*mesh_, point);
   return side < 0.0;
 }
 
-// The solid angle of the whole mesh (van Oosterom and Strackee 1983): right whatever the nearest triangles
-// look like, but it visits them all, so it only decides where the pseudonormal cannot.
-bool MeshSurface::inside_by_winding(const glm::dvec3& local) const {
-  double half_angle = 0.0;
-  for (const TriangleIndices& t : triangles_) {
-    const glm::dvec3 a = vertices_[t[0]] - local, b = vertices_[t[1]] - local, c = vertices_[t[2]] - local;
-    const double la = glm::length(a), lb = glm::length(b), lc = glm::length(c);
-    half_angle += std::atan2(glm::dot(a, glm::cross(b, c)),
-                             la * lb * lc + glm::dot(a, b) * lc + glm::dot(b, c) * la + glm::dot(c, a) * lb);
+// Angle-weighted pseudonormals (Baerentzen and Aanaes, Signed distance computation using the angle weighted
+// pseudonormal, 2005): at an edge or a corner the sign of the distance must not depend on which of the
+// triangles there was found first. They are found when they are needed: kept for every vertex and edge they
+// would take as much memory as the mesh itself.
+bool MeshSurface::on_pseudonormal(RTCPointQueryFunctionArguments* args) {
+  auto& q = *static_cast<PseudonormalQuery*>(args->userPtr);
+  const TriangleIndices& t = q.surface->triangles_[q.surface->element_of(args->primID)];
+  const std::vector<glm::dvec3>& v = q.surface->mesh_->vertices;
+  const glm::dvec3 &a = v[t[0]], &b = v[t[1]], &c = v[t[2]];
+  if (a == b || b == c || c == a) return false;
+  const auto has = [&](const glm::dvec3& corner) { return a == corner || b == corner || c == corner; };
+  if (!has(q.from) || !has(q.to)) return false;
+  const glm::dvec3 normal = unit_normal(a, b, c);
+  ++q.elements;
+  q.flat += normal == glm::dvec3(0.0) ? 1 : 0;
+  if (q.from != q.to) {
+    q.sum += normal;
+  } else {
+    q.sum += normal * (a == q.from   ? corner_angle(a, b, c)
+                       : b == q.from ? corner_angle(b, c, a)
+                                     : corner_angle(c, a, b));
   }
-  return half_angle > std::numbers::pi;  // half of the full 2π
+  return false;
+}
+
+MeshSurface::PseudonormalQuery MeshSurface::pseudonormal(const glm::dvec3& from, const glm::dvec3& to) const {
+  PseudonormalQuery q{.surface = this, .from = from, .to = to};
+  RTCPointQuery query{};
+  glm::dvec3 local(0.0);
+  float float_error = 0.0F;
+  if (!prepare(from, 0.0, local, float_error, query)) return q;
+  RTCPointQueryContext context{};
+  rtcInitPointQueryContext(&context);
+  rtcPointQuery(scene_, &query, &context, &MeshSurface::on_pseudonormal, &q);
+  return q;
 }
 
 std::size_t MeshSurface::memory_bytes() const noexcept {
   const auto embree = static_cast<std::size_t>(std::max<std::int64_t>(embree_bytes_.load(), 0));
-  return sizeof(*this) + embree + vertices_.capacity() * sizeof(glm::dvec3) +
-         triangles_.capacity() * sizeof(TriangleIndices) + elements_.capacity() * sizeof(std::uint32_t) +
-         neighbours_.capacity() * sizeof(neighbours_[0]) + vertex_normals_.capacity() * sizeof(glm::dvec3);
+  return sizeof(*this) + embree + mesh_->vertices.capacity() * sizeof(glm::dvec3) +
+         mesh_->triangles.capacity() * sizeof(TriangleIndices) +
+         elements_.capacity() * sizeof(std::uint32_t) + vertex_normals_.capacity() * sizeof(glm::vec3);
 }
 
 }  // namespace
 
+std::unique_ptr<RigidSurface> make_mesh_surface(std::shared_ptr<const TriangleMesh> mesh,
+                                                const SurfaceOptions& options) {
+  return std::make_unique<MeshSurface>(std::move(mesh), options);
+}
+
 std::unique_ptr<RigidSurface> make_mesh_surface(const TriangleMesh& mesh, bool solid) {
-  return std::make_unique<MeshSurface>(mesh, solid);
+  return make_mesh_surface(std::make_shared<const TriangleMesh>(mesh), {.solid = solid});
 }
 
 }  // namespace polygon

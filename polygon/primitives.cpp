@@ -5,6 +5,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <sstream>
 #include <stdexcept>
 
@@ -98,6 +99,38 @@ class PrimitiveSurface final : public RigidSurface {
     if (!(distance <= radius)) return false;
     out = {closest.point, distance, 0};
     return true;
+  }
+
+  // One convex element, as near from anywhere.
+  [[nodiscard]] GatherResult survey(const glm::dvec3& centre, double radius,
+                                    std::span<SeenElement> out) const noexcept override {
+    NearPoint seen;
+    if (!nearest(centre, radius, seen)) return {};
+    if (out.empty()) return {0, false};
+    const glm::dvec3 normal = seen.distance > 0.0 ? (centre - seen.point) / seen.distance : glm::dvec3(0.0);
+    out[0] = {normal, glm::dot(normal, seen.point), 0};
+    return {1, true};
+  }
+
+  [[nodiscard]] NearPoint closest(std::uint32_t /*element*/,
+                                  const glm::dvec3& point) const noexcept override {
+    const SurfacePoint found = shape_.closest(point);
+    return {found.point, found.inside ? 0.0 : glm::length(point - found.point), 0};
+  }
+
+  [[nodiscard]] glm::dvec3 face_normal(std::uint32_t /*element*/) const noexcept override {
+    return glm::dvec3(0.0);
+  }
+
+  // Never below a plane of its own: there is no second element that could cover it.
+  [[nodiscard]] double support(std::uint32_t /*element*/,
+                               const glm::dvec3& /*normal*/) const noexcept override {
+    return std::numeric_limits<double>::infinity();
+  }
+
+  [[nodiscard]] glm::dvec3 shaded_normal(std::uint32_t /*element*/, const glm::dvec3& /*point*/,
+                                         const glm::dvec3& away) const noexcept override {
+    return away;  // a primitive's own normal is smooth already
   }
 
   [[nodiscard]] bool inside(const glm::dvec3& point) const noexcept override {

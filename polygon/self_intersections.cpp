@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <glm/common.hpp>
 #include <utility>
 #include <vector>
 
@@ -59,13 +60,11 @@ class PairTest {
   std::span<const TriangleIndices> triangles_;
 };
 
-}  // namespace
-
-SelfIntersections find_self_intersections(std::span<const glm::dvec3> points,
-                                          std::span<const TriangleIndices> triangles) {
+std::vector<Box> boxes_of(std::span<const glm::dvec3> points, std::span<const TriangleIndices> triangles,
+                          std::uint32_t first) {
   std::vector<Box> boxes;
-  boxes.reserve(triangles.size());
-  for (std::uint32_t i = 0; i < triangles.size(); ++i) {
+  boxes.reserve(triangles.size() - first);
+  for (std::uint32_t i = first; i < triangles.size(); ++i) {
     CGAL::Bbox_3 bounds;
     for (const std::uint32_t corner : triangles[i]) {
       const glm::dvec3& p = points[corner];
@@ -73,17 +72,69 @@ SelfIntersections find_self_intersections(std::span<const glm::dvec3> points,
     }
     boxes.emplace_back(bounds, i);
   }
+  return boxes;
+}
+
+std::size_t most_tests(std::size_t triangles) {
+  return 1'000'000 + kMaxTestsPerTriangle * triangles;
+}
+
+struct EnoughTests {};  // thrown through CGAL's search, which has no other way to end early
+
+}  // namespace
+
+SelfIntersections find_self_intersections(std::span<const glm::dvec3> points,
+                                          std::span<const TriangleIndices> triangles) {
+  std::vector<Box> boxes = boxes_of(points, triangles, 0);
   const PairTest test(points, triangles);
   SelfIntersections result;
-  CGAL::box_self_intersection_d(boxes.begin(), boxes.end(), [&](const Box& x, const Box& y) {
-    const auto [first, second] = std::minmax({x.info(), y.info()});
-    if (!test.intersect(first, second)) return;
-    // The lowest pair, so that the order of CGAL's search does not show.
-    if (result.pairs++ == 0 || std::pair(first, second) < std::pair(result.first, result.second)) {
-      result.first = first;
-      result.second = second;
-    }
-  });
+  std::size_t tests = 0;
+  const auto middle = [&](std::uint32_t i) {
+    const TriangleIndices& t = triangles[i];
+    return (points[t[0]] + points[t[1]] + points[t[2]]) / 3.0;
+  };
+  try {
+    CGAL::box_self_intersection_d(boxes.begin(), boxes.end(), [&](const Box& x, const Box& y) {
+      if (++tests > most_tests(triangles.size())) throw EnoughTests{};
+      const auto [first, second] = std::minmax({x.info(), y.info()});
+      if (!test.intersect(first, second)) return;
+      // The lowest pair, so that the order of CGAL's search does not show.
+      if (result.pairs == 0) result.lower = result.upper = middle(first);
+      if (result.pairs++ == 0 || std::pair(first, second) < std::pair(result.first, result.second)) {
+        result.first = first;
+        result.second = second;
+      }
+      result.lower = glm::min(result.lower, glm::min(middle(first), middle(second)));
+      result.upper = glm::max(result.upper, glm::max(middle(first), middle(second)));
+    });
+  } catch (const EnoughTests&) {
+    result.complete = false;
+  }
+  return result;
+}
+
+std::vector<std::uint32_t> new_triangles_that_cut(std::span<const glm::dvec3> points,
+                                                  std::span<const TriangleIndices> triangles,
+                                                  std::uint32_t first_new) {
+  std::vector<Box> added = boxes_of(points, triangles, first_new);
+  std::vector<Box> all = boxes_of(points, triangles, 0);
+  const PairTest test(points, triangles);
+  std::vector<bool> cuts(triangles.size(), false);
+  std::size_t tests = 0;
+  try {
+    CGAL::box_intersection_d(added.begin(), added.end(), all.begin(), all.end(),
+                             [&](const Box& x, const Box& y) {
+                               if (++tests > most_tests(triangles.size())) throw EnoughTests{};
+                               if (y.info() >= x.info() || cuts[x.info()]) return;
+                               cuts[x.info()] = test.intersect(y.info(), x.info());
+                             });
+  } catch (const EnoughTests&) {
+    cuts.assign(cuts.size(), true);
+  }
+  std::vector<std::uint32_t> result;
+  for (std::uint32_t i = first_new; i < triangles.size(); ++i) {
+    if (cuts[i]) result.push_back(i);
+  }
   return result;
 }
 

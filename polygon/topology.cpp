@@ -5,7 +5,9 @@
 #include <array>
 #include <bit>
 #include <cstddef>
-#include <tuple>
+#include <stdexcept>
+#include <string>
+#include <utility>
 
 namespace polygon {
 namespace {
@@ -23,16 +25,31 @@ std::uint64_t hash_of(const glm::dvec3& v) {
   return h;
 }
 
-// Where the entries of each of `buckets` begin (one more at the end), from how many each has: a counting sort
-// keeps building linear in the number of triangles, where sorting them all takes seconds at a million.
-std::vector<std::size_t> starts_of(std::span<const std::uint32_t> bucket_of, std::uint32_t buckets) {
-  std::vector<std::size_t> starts(static_cast<std::size_t>(buckets) + 1, 0);
-  for (const std::uint32_t b : bucket_of) {
-    if (b != kNone) ++starts[static_cast<std::size_t>(b) + 1];
+// A counting sort keeps building linear in the number of triangles, where sorting them all takes seconds at a
+// million. Counts go in two places further up; once summed, place b + 1 is where bucket b begins, and is
+// moved on as it is filled, so that in the end bucket b runs from place b to place b + 1.
+class Buckets {
+ public:
+  explicit Buckets(std::uint32_t buckets) : places_(static_cast<std::size_t>(buckets) + 2, 0) {}
+  void count(std::uint32_t bucket) { ++places_[static_cast<std::size_t>(bucket) + 2]; }
+  // Returns how many there are.
+  std::size_t sum() {
+    for (std::size_t i = 1; i < places_.size(); ++i) places_[i] += places_[i - 1];
+    return places_.back();
   }
-  for (std::size_t i = 1; i < starts.size(); ++i) starts[i] += starts[i - 1];
-  return starts;
-}
+  std::size_t next(std::uint32_t bucket) { return places_[static_cast<std::size_t>(bucket) + 1]++; }
+  // Of each bucket, and the end of the last.
+  std::vector<std::size_t> starts() && {
+    places_.pop_back();
+    return std::move(places_);
+  }
+
+ private:
+  std::vector<std::size_t> places_;
+};
+
+// Most buckets hold a handful.
+constexpr std::size_t kFew = 16;
 
 TriangleIndices in_order(TriangleIndices t) {
   std::sort(t.begin(), t.end());
@@ -68,59 +85,110 @@ std::vector<TriangleIndices> welded_triangles(const TriangleMesh& mesh, const We
   return triangles;
 }
 
+EdgeTable::EdgeTable(std::span<const TriangleIndices> triangles, std::uint32_t points) {
+  if (triangles.size() >= (1ULL << 31U)) {
+    throw std::invalid_argument("the mesh has " + std::to_string(triangles.size()) +
+                                " triangles, more than 2^31 - 1; split it");
+  }
+  Buckets by_low(points);
+  const auto each_side = [&](auto&& visit) {
+    for (std::size_t i = 0; i < triangles.size(); ++i) {
+      const TriangleIndices& t = triangles[i];
+      if (has_repeated_corner(t)) continue;
+      for (std::size_t e = 0; e < 3; ++e) visit(static_cast<std::uint32_t>(i), t[e], t[(e + 1) % 3]);
+    }
+  };
+  each_side([&](std::uint32_t, std::uint32_t from, std::uint32_t to) { by_low.count(std::min(from, to)); });
+  uses_.resize(by_low.sum());
+  each_side([&](std::uint32_t triangle, std::uint32_t from, std::uint32_t to) {
+    uses_[by_low.next(std::min(from, to))] = {std::max(from, to), triangle, from < to};
+  });
+  starts_ = std::move(by_low).starts();
+  const auto before = [](const Use& a, const Use& b) { return a.order() < b.order(); };
+  for (std::size_t b = 0; b + 1 < starts_.size(); ++b) {
+    Use* const begin = uses_.data() + starts_[b];
+    Use* const end = uses_.data() + starts_[b + 1];
+    if (static_cast<std::size_t>(end - begin) > kFew) {
+      std::sort(begin, end, before);
+      continue;
+    }
+    for (Use* at = begin; at < end; ++at) {
+      const Use use = *at;
+      Use* to = at;
+      for (; to > begin && before(use, to[-1]); --to) *to = to[-1];
+      *to = use;
+    }
+  }
+}
+
 std::vector<EdgeUse> sorted_edges(std::span<const TriangleIndices> triangles, std::uint32_t points) {
-  std::vector<std::uint32_t> low_of(triangles.size() * 3, kNone);
-  for (std::size_t i = 0; i < triangles.size(); ++i) {
-    if (has_repeated_corner(triangles[i])) continue;
-    for (std::size_t e = 0; e < 3; ++e) {
-      low_of[3 * i + e] = std::min(triangles[i][e], triangles[i][(e + 1) % 3]);
+  std::vector<EdgeUse> edges;
+  EdgeTable(triangles, points).for_each([&](const EdgeTable::Edge& edge) {
+    for (const EdgeTable::Use& use : edge.uses) {
+      const TriangleIndices& t = triangles[use.triangle()];
+      const std::uint32_t from = use.forward() ? edge.low : edge.high;
+      const auto side = static_cast<std::uint8_t>(std::find(t.begin(), t.end(), from) - t.begin());
+      edges.push_back({edge.low, edge.high, use.triangle(), side, use.forward()});
     }
-  }
-  const std::vector<std::size_t> starts = starts_of(low_of, points);
-  std::vector<std::size_t> next(starts.begin(), starts.end() - 1);
-  std::vector<EdgeUse> edges(starts.back());
-  for (std::size_t i = 0; i < triangles.size(); ++i) {
-    for (std::size_t e = 0; e < 3; ++e) {
-      if (low_of[3 * i + e] == kNone) continue;
-      const std::uint32_t from = triangles[i][e];
-      const std::uint32_t to = triangles[i][(e + 1) % 3];
-      edges[next[low_of[3 * i + e]]++] = {std::min(from, to), std::max(from, to),
-                                          static_cast<std::uint32_t>(i), static_cast<std::uint8_t>(e),
-                                          from < to};
-    }
-  }
-  for (std::size_t b = 0; b + 1 < starts.size(); ++b) {
-    std::sort(edges.begin() + static_cast<std::ptrdiff_t>(starts[b]),
-              edges.begin() + static_cast<std::ptrdiff_t>(starts[b + 1]),
-              [](const EdgeUse& x, const EdgeUse& y) {
-                return std::tie(x.high, x.triangle) < std::tie(y.high, y.triangle);
-              });
-  }
+  });
   return edges;
 }
 
 std::vector<std::uint32_t> first_duplicates(std::span<const TriangleIndices> triangles,
                                             std::uint32_t points) {
-  std::vector<std::uint32_t> low_of(triangles.size());
-  for (std::size_t i = 0; i < triangles.size(); ++i) low_of[i] = in_order(triangles[i])[0];
-  const std::vector<std::size_t> starts = starts_of(low_of, points);
-  std::vector<std::size_t> next(starts.begin(), starts.end() - 1);
-  std::vector<std::uint32_t> order(triangles.size());
-  for (std::size_t i = 0; i < triangles.size(); ++i) order[next[low_of[i]]++] = static_cast<std::uint32_t>(i);
+  Buckets by_low(points);
+  for (const TriangleIndices& t : triangles) by_low.count(std::min({t[0], t[1], t[2]}));
+  std::vector<std::uint32_t> order(by_low.sum());
+  for (std::uint32_t i = 0; i < triangles.size(); ++i) {
+    const TriangleIndices& t = triangles[i];
+    order[by_low.next(std::min({t[0], t[1], t[2]}))] = i;
+  }
+  const std::vector<std::size_t> starts = std::move(by_low).starts();
 
   std::vector<std::uint32_t> first(triangles.size());
+  // The other two corners, and the triangle.
+  using Key = std::pair<std::uint64_t, std::uint32_t>;
+  const auto key_of = [&](std::uint32_t triangle) {
+    const TriangleIndices t = in_order(triangles[triangle]);
+    return Key(std::uint64_t{t[1]} << 32U | t[2], triangle);
+  };
+  std::vector<Key> keys;
   for (std::size_t b = 0; b + 1 < starts.size(); ++b) {
-    const auto begin = order.begin() + static_cast<std::ptrdiff_t>(starts[b]);
-    const auto end = order.begin() + static_cast<std::ptrdiff_t>(starts[b + 1]);
-    std::sort(begin, end, [&](std::uint32_t x, std::uint32_t y) {
-      return std::make_tuple(in_order(triangles[x]), x) < std::make_tuple(in_order(triangles[y]), y);
-    });
-    for (auto it = begin; it != end; ++it) {
-      const bool repeats = it != begin && in_order(triangles[*it]) == in_order(triangles[*(it - 1)]);
-      first[*it] = repeats ? first[*(it - 1)] : *it;
+    const std::span<const std::uint32_t> bucket(order.data() + starts[b], starts[b + 1] - starts[b]);
+    keys.clear();
+    for (const std::uint32_t triangle : bucket) keys.push_back(key_of(triangle));
+    if (keys.size() > kFew) std::sort(keys.begin(), keys.end());
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+      first[keys[i].second] = keys[i].second;
+      if (keys.size() > kFew) {
+        if (i > 0 && keys[i - 1].first == keys[i].first) first[keys[i].second] = first[keys[i - 1].second];
+        continue;
+      }
+      for (std::size_t j = 0; j < i; ++j) {
+        if (keys[j].first != keys[i].first) continue;
+        first[keys[i].second] = keys[j].second;
+        break;
+      }
     }
   }
   return first;
+}
+
+std::vector<std::uint32_t> distinct_triangles(const TriangleMesh& mesh) {
+  const std::vector<std::uint32_t> first = [&mesh] {
+    const WeldedVertices points = weld_vertices(mesh.vertices);
+    if (points.points == mesh.vertices.size()) return first_duplicates(mesh.triangles, points.points);
+    return first_duplicates(welded_triangles(mesh, points), points.points);
+  }();
+  std::vector<std::uint32_t> distinct;
+  std::size_t count = 0;
+  for (std::uint32_t i = 0; i < first.size(); ++i) count += first[i] == i ? 1 : 0;
+  if (count == first.size()) return distinct;
+  distinct.reserve(count);
+  for (std::uint32_t i = 0; i < first.size(); ++i) {
+    if (first[i] == i) distinct.push_back(i);
+  }
+  return distinct;
 }
 
 }  // namespace polygon

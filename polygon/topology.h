@@ -28,6 +28,53 @@ struct WeldedVertices {
   return t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
 }
 
+// The sides of all triangles without repeated corners, by edge: 8 bytes a side, in linear time.
+class EdgeTable {
+ public:
+  // std::invalid_argument at 2^31 triangles and more.
+  EdgeTable(std::span<const TriangleIndices> triangles, std::uint32_t points);
+
+  // One triangle at an edge.
+  class Use {
+   public:
+    Use() = default;
+    Use(std::uint32_t high, std::uint32_t triangle, bool forward)
+        : bits_(std::uint64_t{high} << 32U | std::uint64_t{triangle} << 1U | (forward ? 1U : 0U)) {}
+    [[nodiscard]] std::uint32_t high() const { return static_cast<std::uint32_t>(bits_ >> 32U); }
+    [[nodiscard]] std::uint32_t triangle() const { return static_cast<std::uint32_t>(bits_) >> 1U; }
+    [[nodiscard]] bool forward() const {
+      return (bits_ & 1U) != 0;
+    }  // it runs from the low to the high point
+    [[nodiscard]] std::uint64_t order() const { return bits_; }
+
+   private:
+    std::uint64_t bits_ = 0;
+  };
+  struct Edge {
+    std::uint32_t low = 0, high = 0;  // points, low < high
+    std::span<const Use> uses;        // in ascending order of triangles; at least one
+  };
+
+  // Calls visit(Edge) for each edge, in ascending order of (low, high).
+  template <typename Visit>
+  void for_each(Visit&& visit) const {
+    for (std::uint32_t low = 0; low + 1 < starts_.size(); ++low) {
+      std::span<const Use> rest(uses_.data() + starts_[low], starts_[low + 1] - starts_[low]);
+      while (!rest.empty()) {
+        std::size_t same = 1;
+        while (same < rest.size() && rest[same].high() == rest[0].high()) ++same;
+        visit(Edge{low, rest[0].high(), rest.first(same)});
+        rest = rest.subspan(same);
+      }
+    }
+  }
+  [[nodiscard]] bool empty() const { return uses_.empty(); }
+
+ private:
+  std::vector<std::size_t> starts_;  // [point] where the sides that have it for their low end begin
+  std::vector<Use> uses_;
+};
+
 // One side of one triangle. Edge i runs from corner i to corner (i + 1) % 3.
 struct EdgeUse {
   std::uint32_t low = 0, high = 0;  // points, low < high
@@ -45,5 +92,9 @@ struct EdgeUse {
 // first.
 [[nodiscard]] std::vector<std::uint32_t> first_duplicates(std::span<const TriangleIndices> triangles,
                                                           std::uint32_t points);
+
+// The triangles of a mesh but for those that repeat an earlier one's corners (by their coordinates), in
+// ascending order; empty when all of them are distinct.
+[[nodiscard]] std::vector<std::uint32_t> distinct_triangles(const TriangleMesh& mesh);
 
 }  // namespace polygon

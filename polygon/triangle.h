@@ -19,7 +19,23 @@ struct TrianglePoint {
 // No area to speak of: the sine of the angle between two edges is below 1e-14, so a normal would be rounding.
 [[nodiscard]] bool is_degenerate(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) noexcept;
 
+// Unit normal by the right hand; zero for a degenerate triangle, whose normal would be rounding.
+[[nodiscard]] glm::dvec3 unit_normal(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) noexcept;
+
+// Angle at `a` between the directions to b and to c (radians, 0 to π).
+[[nodiscard]] double corner_angle(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) noexcept;
+
 [[nodiscard]] TrianglePoint closest_on_triangle(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b,
                                                 const glm::dvec3& c) noexcept;
+
+// Whether a triangle may come within `radius` of `centre`: no when its bounds do not, nor a plane across the
+// way to its middle. That plane, with the triangle behind it, is the answer: as good as the closest point's
+// from a few edges away, in a third of the time.
+struct TriangleSight {
+  glm::dvec3 normal{0.0};  // unit, towards the centre; zero when that is the triangle's middle
+  double reach = 0.0;      // max over the triangle of normal · x
+};
+[[nodiscard]] bool see_triangle(const glm::dvec3& centre, double radius, const glm::dvec3& a,
+                                const glm::dvec3& b, const glm::dvec3& c, TriangleSight& sight) noexcept;
 
 }  // namespace polygon

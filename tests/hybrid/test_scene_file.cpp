@@ -195,6 +195,36 @@ TEST_F(SceneFile, SoftSources) {
   EXPECT_DOUBLE_EQ(layered.layers.at(0).thickness_m, 0.01);
 }
 
+TEST_F(SceneFile, TheFeelOfARigidSurface) {
+  write("relief.png", "an image is only opened when the scene is built");
+  const auto feel_of = [this](const std::string& keys) {
+    return load("format = 1\n" + ball + keys + path).rigid.at(0).feel;
+  };
+  EXPECT_FALSE(feel_of("").any()) << "off unless asked for";
+  const hybrid::FeelDescription all = feel_of(
+      "damping = 2.5\nfriction = [0.5, 0.4]\nshading = true\n[rigid.texture]\nimage = \"relief.png\"\n"
+      "size = 20\nheight = 0.3\nkind = \"shading\"\nalong = \"y\"\n");
+  EXPECT_EQ(all.damping_N_s_per_m, 2.5);
+  EXPECT_EQ(all.static_friction, 0.5);
+  EXPECT_EQ(all.dynamic_friction, 0.4);
+  EXPECT_TRUE(all.shading);
+  ASSERT_TRUE(all.texture.has_value());
+  EXPECT_EQ(all.texture->image, folder_ / "relief.png");
+  EXPECT_EQ(all.texture->mapping.kind, hybrid::TextureKind::shading);
+  EXPECT_EQ(all.texture->mapping.along, hybrid::TextureAlong::y);
+  EXPECT_DOUBLE_EQ(all.texture->mapping.size_m, 0.02);
+  EXPECT_DOUBLE_EQ(all.texture->mapping.height_m, 3e-4);
+
+  EXPECT_EQ(feel_of("friction = 0.3\n").dynamic_friction, 0.3);
+  EXPECT_EQ(feel_of("friction = { static = 0.3 }\n").dynamic_friction, 0.3);
+  EXPECT_EQ(feel_of("friction = { static = 0.3, dynamic = 0.1 }\n").dynamic_friction, 0.1);
+  const auto pattern = feel_of("texture = { pattern = \"bumps\", size = 4, height = 0.2 }\n").texture;
+  ASSERT_TRUE(pattern.has_value());
+  EXPECT_EQ(pattern->pattern, hybrid::TexturePattern::bumps);
+  EXPECT_EQ(pattern->mapping.kind, hybrid::TextureKind::height);
+  EXPECT_EQ(pattern->mapping.along, hybrid::TextureAlong::box);
+}
+
 TEST_F(SceneFile, Paths) {
   write("motion.csv", "t,x,y,z\n");
   const auto path_of = [this](const std::string& text) {

@@ -98,7 +98,22 @@ const Broken broken[] = {
     {"stretch-reversed", "12:1", "above its max", "smaller number first"},
     {"stretch-min-above-one", "12:1", "1.1", "min <= 1"},
     {"shear-negative", "12:1", "is -0.1", "0 or more"},
-    {"later-friction", "6:1", "not supported yet", "remove it"},
+    {"later-stiffness", "6:1", "not supported yet", "remove it"},
+    {"damping-negative", "6:1", "is -1", "0 or more"},
+    {"friction-negative", "6:18", "is -0.1", "friction coefficient"},
+    {"friction-reversed", "6:1", "holds less at rest", "static coefficient first"},
+    {"friction-three", "6:1", "3 numbers", "[static, dynamic]"},
+    {"friction-text", "6:1", "a string", "write e.g. 0.4"},
+    {"friction-key", "6:28", "'dinamic'", "'dynamic'"},
+    {"shading-number", "6:1", "true or false", "shading = true"},
+    {"texture-empty", "6:8", "what it is", "image, pattern"},
+    {"texture-image-missing", "7:1", "does not exist", "relative to the folder"},
+    {"texture-two-sources", "8:1", "an image and a pattern", "keep one"},
+    {"texture-pattern-unknown", "7:1", "unknown", "bumps"},
+    {"texture-size-zero", "8:1", "is 0", "above 0"},
+    {"texture-too-steep", "9:1", "more than half", "flatter"},
+    {"texture-kind-unknown", "6:56", "unknown", "height, shading"},
+    {"texture-key-unknown", "6:42", "'heigth'", "'height'"},
     {"later-energy", "7:1", "not supported yet", "six-link"},
     {"later-yield", "12:1", "not supported yet", "elastic"},
     {"later-device", "3:1", "not supported yet", "premium-1.5"},
@@ -111,6 +126,22 @@ const Broken broken[] = {
     {"path-point", "11:3", "point 2", "[x, y, z, seconds]"},
     {"path-csv-missing", "9:1", "motion.csv", "relative"},
     {"repeat-fraction", "11:1", "whole number", "repeat = 1"},
+    {"motion-unknown", "10:1", "unknown", "free"},
+    {"motion-path-missing", "10:1", "along which", "[rigid.path]"},
+    {"motion-mass-fixed", "10:1", "no meaning with motion", "motion = \"free\""},
+    {"motion-path-free", "12:8", "no meaning with motion", "motion = \"path\""},
+    {"motion-no-mass", "10:1", "neither mass nor density", "mass = 0.1"},
+    {"motion-mass-twice", "12:1", "both mass and density", "keep one"},
+    {"motion-mass-zero", "11:1", "is 0", "above 0"},
+    {"motion-inertia", "12:1", "any body", "sum of the other two"},
+    {"motion-inertia-density", "12:1", "no mass", "write mass"},
+    {"motion-drag-negative", "12:1", "is -1", "0 or more"},
+    {"spin-axis", "11:10", "no direction", "axis = [0, 0, 1]"},
+    {"spin-rate-missing", "11:1", "'rate' is missing", "rate = 90"},
+    {"spin-twice", "11:10", "to and fro", "keep rate"},
+    {"spin-frequency-missing", "11:1", "'frequency' is missing", "frequency = "},
+    {"spin-key", "11:10", "'rat'", "'rate'"},
+    {"path-of-rigid", "11:8", "'to' is missing", "add to"},
     {"cut-normal", "6:10", "no direction", "normal = [0, 0, 1]"},
 };
 
@@ -214,8 +245,10 @@ TEST_F(SceneRefusal, DamagedScenesAreScenesOrRefused) {
       "[tool]\nshape = \"ball\"\nradius = 3\nstiffness = 1e3\n[device]\nmodel = \"touch\"\nrate = 1000\n"
       "[hand]\nmass = 0.006\n[safety]\nmax_force = 3\n[material.a]\nyoung = 3e3\nstretch = [0.5, 1.5]\n"
       "[[rigid]]\nname = \"r\"\nprimitive = \"box\"\nsize = [1, 2, 3]\nrotation = [0, 90, 0]\n"
+      "motion = \"free\"\nmass = 0.1\ninertia = [1e-4, 1e-4, 1e-4]\ngravity = [0, 0, -9.81]\n"
       "[[rigid]]\nname = \"v\"\nvolume = \"scene.toml\"\nrange = [1, 9]\n"
-      "cut = [{ normal = [0, 0, 1], offset = 4 }]\n"
+      "cut = [{ normal = [0, 0, 1], offset = 4 }]\nmotion = \"path\"\nspin = { axis = [0, 1, 0], rate = 90 "
+      "}\n"
       "[[soft]]\nname = \"s\"\nformula = \"block\"\nsize = [20, 20, 10]\nspacing = 2\n"
       "layers = [{ thickness = 4, label = 2 }]\n"
       "inclusions = [{ shape = \"ball\", centre = [0, 0, 1], size = 4, label = 3 }]\n"

@@ -78,7 +78,7 @@ TEST_F(Abdomen, BonesAndOrgansOfACtAreFeltBoth) {
     for (const dvec3& direction : {dvec3(1, 0, 0), dvec3(0, -1, 0)}) {
       for (const dvec3& at :
            {outermost(
-                bone.drawn, [&](const dvec3& v) { return bone.to_scene(v); }, direction),
+                *bone.drawn, [&](const dvec3& v) { return bone.to_scene(v); }, direction),
             outermost(
                 organ.drawn, [&](const dvec3& v) { return organ.to_scene(v); }, direction)}) {
         touch.go({5, 5, 5}, 10.0);

@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "findings.h"
 #include "polygon/mesh_file.h"
 #include "polygon/primitives.h"
 #include "tests/polygon/brute_force.h"
@@ -15,12 +16,7 @@ namespace {
 
 using namespace polygon;
 
-std::size_t count_of(const std::vector<Finding>& findings, const std::string& id) {
-  for (const Finding& f : findings) {
-    if (f.id.starts_with(id)) return f.count;
-  }
-  return 0;
-}
+using tests::count_of;
 
 void append(TriangleMesh& mesh, const TriangleMesh& other, const glm::dvec3& offset, bool turned = false) {
   const auto base = static_cast<std::uint32_t>(mesh.vertices.size());
@@ -93,6 +89,47 @@ TEST(CheckMesh, EachDefectIsCountedAndPlaced) {
 
   for (const Finding& f : check_mesh(crossing, true).findings) {
     EXPECT_NE(f.text.find(") m)"), std::string::npos) << "a place: " << f.text;
+    EXPECT_TRUE(f.place.has_value()) << f.id;
+  }
+}
+
+// The place of each defect is where it was made.
+TEST(CheckMesh, PlacesAreWhereTheDefectsAre) {
+  const TriangleMesh ball = make_ball_mesh(1.0, 3);
+  const auto middle = [&](std::size_t i) {
+    const auto& [a, b, c] = ball.triangles[i];
+    return (ball.vertices[a] + ball.vertices[b] + ball.vertices[c]) / 3.0;
+  };
+  TriangleMesh bad = ball;
+  bad.triangles.push_back(ball.triangles[77]);
+  bad.triangles.push_back({5, 5, 6});
+  std::vector<Finding> findings = check_mesh(bad).findings;
+  const Finding* duplicate = tests::find_finding(findings, "M03");
+  ASSERT_TRUE(duplicate != nullptr && duplicate->place);
+  EXPECT_EQ(duplicate->place->triangle, ball.triangles.size());
+  EXPECT_LT(glm::length(duplicate->place->first_m - middle(77)), 1e-15);
+  EXPECT_EQ(tests::find_finding(findings, "M01")->place->triangle, ball.triangles.size() + 1);
+
+  TriangleMesh holed = ball;  // two holes; the place is the larger's
+  const auto [a, b, c] = ball.triangles[100];
+  std::erase_if(holed.triangles, [&, corner = a](const TriangleIndices& t) {
+    return t[0] == corner || t[1] == corner || t[2] == corner || t == ball.triangles[500];
+  });
+  findings = check_mesh(holed).findings;
+  const Finding* holes = tests::find_finding(findings, "M09");
+  ASSERT_TRUE(holes != nullptr && holes->place);
+  EXPECT_EQ(holes->count, 2U);
+  EXPECT_LT(glm::length(holes->place->first_m - ball.vertices[a]), 0.05);
+  EXPECT_LE(holes->place->lower_m.x, middle(500).x + 0.05);
+  EXPECT_GE(holes->place->upper_m.x, middle(500).x - 0.05);
+
+  TriangleMesh crossing = ball;
+  append(crossing, make_ball_mesh(0.2, 2), {1.0, 0.0, 0.0});
+  findings = check_mesh(crossing, true).findings;
+  const Finding* cuts = tests::find_finding(findings, "M12");
+  ASSERT_TRUE(cuts != nullptr && cuts->place);
+  for (const glm::dvec3& corner : {cuts->place->lower_m, cuts->place->upper_m, cuts->place->first_m}) {
+    EXPECT_LT(glm::length(corner - glm::dvec3(1.0, 0.0, 0.0)), 0.4);
   }
 }
 
@@ -219,35 +256,6 @@ TEST(SharedMeshes, HaveTheirDocumentedDefects) {
       }
     }
   }
-}
-
-TEST(SharedMeshes, RepairNeverMakesThemWorse) {
-  const auto folder = tests::shared_data("data/meshes_bad");
-  SKIP_WITHOUT(folder);
-  std::size_t closed = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    if (entry.path().filename() == "empty.stl") continue;
-    SCOPED_TRACE(entry.path().filename());
-    const TriangleMesh mesh = load_mesh(entry.path()).mesh;
-    const RepairedMesh repaired = repair_mesh(mesh);
-    ASSERT_FALSE(repaired.mesh.empty());
-    for (const TriangleIndices& t : repaired.mesh.triangles) {
-      for (const std::uint32_t corner : t) ASSERT_LT(corner, repaired.mesh.vertices.size());
-    }
-    const MeshCheck before = check_mesh(mesh);
-    const MeshCheck after = check_mesh(repaired.mesh);
-    EXPECT_EQ(count_of(after.findings, "M01"), 0U);
-    EXPECT_EQ(count_of(after.findings, "M03"), 0U);
-    EXPECT_EQ(count_of(repaired.changes, "R11"), 0U);
-    if (before.closed) {
-      EXPECT_TRUE(after.oriented);
-    }
-    if (count_of(repaired.changes, "R09") > 0) {
-      EXPECT_GT(tests::signed_volume(repaired.mesh), 0.0);
-      ++closed;
-    }
-  }
-  EXPECT_GE(closed, 6U);
 }
 
 }  // namespace

@@ -101,6 +101,32 @@ TEST_P(MeshSurfacePlaced, NearestIsBruteForce) {
   }
 }
 
+// Beyond hundreds of radii the float distances of all triangles are equal.
+TEST_P(MeshSurfacePlaced, NearestFromFarAwayIsBruteForce) {
+  const auto [scale, offset] = GetParam();
+  std::mt19937_64 random(5);
+  for (const bool sphere : {false, true}) {
+    const TriangleMesh mesh =
+        moved(sphere ? make_ball_mesh(1.0, 3) : tests::random_soup(random, 500, 1.0), scale, offset);
+    const auto surface = make_mesh_surface(mesh, sphere);
+    for (int i = 0; i < 100; ++i) {
+      const double away = std::pow(10.0, 2.0 + i % 10);
+      const glm::dvec3 p = glm::normalize(tests::random_point(random, 1.0)) * away * scale + offset;
+      double expected = kInfinity;
+      for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+        expected = std::min(expected, tests::triangle_distance(p, mesh, t));
+      }
+      const double rounding = 20.0 * tolerance() + 1e-14 * away * scale;
+      NearPoint found;
+      ASSERT_TRUE(surface->nearest(p, kInfinity, found));
+      EXPECT_NEAR(found.distance, expected, rounding) << away;
+      EXPECT_NEAR(tests::triangle_distance(p, mesh, found.element), expected, rounding) << away;
+      EXPECT_TRUE(surface->nearest(p, expected + rounding, found));
+      EXPECT_FALSE(surface->nearest(p, expected - rounding, found));
+    }
+  }
+}
+
 TEST_P(MeshSurfacePlaced, InsideIsTheWindingNumber) {
   const auto [scale, offset] = GetParam();
   std::mt19937_64 random(3);

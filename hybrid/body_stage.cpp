@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/body_stage.h"
+
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+
+#include "hybrid/rigid_sweep.h"
+
+namespace hybrid {
+namespace {
+
+constexpr int kWaysAside = 8;        // looked for when a body pushes the proxy into another
+constexpr double kStayed = 1e-9;     // of the ball: a proxy that is so near where it was pushed is there
+
+// What pressed on the body in the last tick: the proxy's coupling, shared as the contacts share it.
+std::size_t contacts_of(const World& world, const WorldState& state, std::uint32_t object,
+                        std::array<BodyContact, 4>& contacts) noexcept {
+  std::size_t count = 0;
+  for (std::uint32_t n = 0; n < state.active_count; ++n) {
+    const ActiveElement& active = state.active[n];
+    if (active.object != object) continue;
+    const double pressed = glm::length(active.force_N);
+    if (!(pressed > 0.0)) continue;
+    const glm::dvec3 normal = active.force_N / pressed;  // away from the body
+    contacts[count++] = {state.proxy_m - world.contact_radius_m() * normal, -normal, pressed,
+                         world.tool.stiffness_N_per_m};
+  }
+  const double rubbed = glm::length(state.friction_N);
+  if (count > 0 && rubbed > 0.0 && state.active[0].object == object) {
+    const glm::dvec3 along = state.friction_N / rubbed;
+    contacts[count] = {contacts[0].point_m, -along, rubbed, world.tool.stiffness_N_per_m};
+    ++count;
+  }
+  return count;
+}
+
+// The proxy, feasible against the body alone, is brought to where it is so against everything.
+void step_aside(const World& world, WorldState& state, std::uint32_t object, const glm::dvec3& before,
+                const glm::dvec3& pushed) noexcept {
+  const double near = kStayed * world.contact_radius_m() + 4.0 * world.rounding_m;
+  glm::dvec3 way = pushed, from = before;
+  for (int n = 0; n < kWaysAside; ++n) {
+    const Sweep others = sweep_past(world, state, object, true, from, way);
+    state.proxy_m = others.point;
+    if (glm::length(others.point - way) <= near) return;
+    // The others hold it: where does the body let it be that is nearest to there?
+    const Sweep body = sweep_past(world, state, object, false, way, others.point);
+    if (glm::length(body.point - others.point) <= near) return;
+    from = others.point;
+    way = body.point;
+  }
+  state.faults |= fault_infeasible;
+}
+
+}  // namespace
+
+void set_rigid_pose(const World& world, WorldState& state, std::uint32_t object, const Pose& pose) noexcept {
+  RigidNear& near = state.rigid[object];
+  const RigidMotion& motion = world.rigid[object].motion;
+  const double reach = world.contact_radius_m() + motion.displacement_bound(near.pose, pose);
+  const bool within = !world.use_map || (state.map.rigid_in(state.proxy_m - reach, state.proxy_m + reach) &
+                                         OccupancyMap::rigid_bit(object)) != 0;
+  const BodyFrame after(pose);
+  glm::dvec3 pushed = state.proxy_m;
+  if (within) {
+    const glm::dvec3 from = near.frame.to_body(state.proxy_m);
+    const bool stuck = state.stuck && state.active_count > 0 && state.active[0].object == object;
+    const glm::dvec3 target = stuck ? from : after.to_body(state.proxy_m);
+    // In the body's own frame it is the proxy that moves.
+    near.frame = BodyFrame();
+    const Sweep sweep = sweep_past(world, state, object, false, from, target);
+    pushed = after.to_scene(sweep.point);
+  }
+  near.frame = after;
+  near.pose = pose;
+  if (world.use_map) state.map.move_body(object, pose.position_m, pose.rotation);
+  state.look_m = -1.0;
+  state.swept_to_m = glm::dvec3(std::numeric_limits<double>::quiet_NaN());  // all is seen afresh
+  const glm::dvec3 before = state.proxy_m;
+  state.proxy_m = pushed;
+  if (pushed != before && world.rigid.size() > 1) step_aside(world, state, object, before, pushed);
+}
+
+void move_bodies(const World& world, WorldState& state, double dt_s) noexcept {
+  state.time_s += dt_s;
+  for (std::uint32_t o = 0; o < world.rigid.size(); ++o) {
+    const RigidMotion& motion = world.rigid[o].motion;
+    if (motion.kind() == RigidMotion::Kind::path) {
+      set_rigid_pose(world, state, o, motion.pose_at(state.time_s));
+    } else if (motion.kind() == RigidMotion::Kind::free) {
+      std::array<BodyContact, 4> contacts;
+      const std::size_t count = contacts_of(world, state, o, contacts);
+      if (!step_free_body(motion.free_body(), state.rigid[o].free, {contacts.data(), count}, dt_s))
+        state.faults |= fault_nonfinite_body;
+      set_rigid_pose(world, state, o, pose_of(motion.free_body(), state.rigid[o].free));
+    }
+  }
+}
+
+}  // namespace hybrid

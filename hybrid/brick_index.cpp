@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/brick_index.h"
+
+#include <cmath>
+#include <stdexcept>
+
+namespace hybrid {
+
+BrickIndex::BrickIndex(double cell_m, const glm::dvec3& origin)
+    : cell_m_(cell_m), per_cell_(1.0 / cell_m), origin_(origin) {
+  if (!(cell_m > 0.0) || !std::isfinite(cell_m) || !std::isfinite(per_cell_))
+    throw std::invalid_argument("an occupancy cell must be positive");
+  rehash(64);
+}
+
+std::uint32_t BrickIndex::hash(const CellCoordinates& c) noexcept {
+  // Three odd multipliers and a finaliser (Teschner et al. 2003 mix the same way, with worse low bits).
+  std::uint64_t h = static_cast<std::uint32_t>(c[0]) * 0x9E3779B97F4A7C15ULL ^
+                    static_cast<std::uint32_t>(c[1]) * 0xC2B2AE3D27D4EB4FULL ^
+                    static_cast<std::uint32_t>(c[2]) * 0x165667B19E3779F9ULL;
+  h ^= h >> 29;
+  h *= 0xBF58476D1CE4E5B9ULL;
+  return static_cast<std::uint32_t>(h >> 32);
+}
+
+std::uint32_t BrickIndex::find(const CellCoordinates& brick) const noexcept {
+  const std::size_t mask = table_.size() - 1;
+  for (std::size_t slot = hash(brick) & mask;; slot = (slot + 1) & mask) {
+    const Slot& s = table_[slot];
+    if (s.brick == kNone || s.at == brick) return s.brick;
+  }
+}
+
+std::uint32_t BrickIndex::find_or_add(const CellCoordinates& brick, bool may_allocate) {
+  const std::size_t mask = table_.size() - 1;
+  std::size_t slot = hash(brick) & mask;
+  for (; table_[slot].brick != kNone; slot = (slot + 1) & mask) {
+    if (table_[slot].at == brick) return table_[slot].brick;
+  }
+  const auto added = static_cast<std::uint32_t>(at_.size());
+  const bool table_full = (at_.size() + 1) * 2 > table_.size();
+  if (!may_allocate && (table_full || at_.size() == at_.capacity())) return kNone;
+  at_.push_back(brick);
+  if (table_full) {
+    rehash(table_.size() * 2);  // takes the new brick with it
+  } else {
+    table_[slot] = {brick, added};
+  }
+  mark(brick);
+  return added;
+}
+
+void BrickIndex::rehash(std::size_t capacity) {
+  table_.assign(capacity, Slot{});
+  for (std::uint32_t b = 0; b < at_.size(); ++b) {
+    std::size_t slot = hash(at_[b]) & (capacity - 1);
+    while (table_[slot].brick != kNone) slot = (slot + 1) & (capacity - 1);
+    table_[slot] = {at_[b], b};
+  }
+}
+
+void BrickIndex::seal(std::size_t more) {
+  at_.shrink_to_fit();
+  at_.reserve(at_.size() + more);
+  std::size_t capacity = 64;
+  while (capacity < 2 * (at_.capacity() + 1)) capacity *= 2;
+  rehash(capacity);
+
+  CellCoordinates low{}, high{};
+  if (!at_.empty()) low = high = at_.front();
+  for (const CellCoordinates& b : at_) {
+    for (std::size_t d = 0; d < 3; ++d) {
+      low[d] = std::min(low[d], b[d]);
+      high[d] = std::max(high[d], b[d]);
+    }
+  }
+  const auto fits = [&low, &high](int shift) {
+    for (std::size_t d = 0; d < 3; ++d) {
+      if ((high[d] >> shift) - (low[d] >> shift) >= kUnits) return false;
+    }
+    return true;
+  };
+  unit_shift_ = 0;
+  while (!fits(unit_shift_)) ++unit_shift_;
+  for (std::size_t d = 0; d < 3; ++d) {
+    first_unit_[d] = low[d] >> unit_shift_;
+    first_unit_number_[d] = first_unit_[d];
+  }
+  units_per_cell_ = std::ldexp(1.0, -(kShift + unit_shift_));
+  bitmap_.assign(static_cast<std::size_t>(kUnits) * kUnits, 0);
+  for (const CellCoordinates& b : at_) mark(b);
+}
+
+void BrickIndex::mark(const CellCoordinates& brick) noexcept {
+  if (bitmap_.empty()) return;
+  bitmap_[word(unit_of(brick[2], 2), unit_of(brick[1], 1))] |= 1ULL << unit_of(brick[0], 0);
+}
+
+std::size_t BrickIndex::memory_bytes() const noexcept {
+  return at_.capacity() * sizeof(CellCoordinates) + table_.size() * sizeof(Slot) +
+         bitmap_.capacity() * sizeof(std::uint64_t);
+}
+
+}  // namespace hybrid

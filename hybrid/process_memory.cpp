@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/process_memory.h"
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <fstream>
+
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+
+namespace hybrid {
+
+std::uint64_t held_memory_bytes() {
+  std::ifstream in("/proc/self/statm");
+  std::uint64_t whole = 0, resident = 0;
+  in >> whole >> resident;
+  const long page = sysconf(_SC_PAGE_SIZE);
+  return in && page > 0 ? resident * static_cast<std::uint64_t>(page) : 0;
+}
+
+std::uint64_t peak_memory_bytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024U;
+}
+
+void give_back_freed_memory() {
+#ifdef __GLIBC__
+  malloc_trim(0);
+#endif
+}
+
+}  // namespace hybrid

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A triangle mesh as a RigidSurface over CGAL's AABB tree: what mesh_surface.h does with Embree, done with
+// the other library that people reach for, so that the two can be timed on the same paths.
+#pragma once
+
+#include <memory>
+
+#include "polygon/contact.h"
+#include "polygon/mesh.h"
+
+namespace polygon {
+
+// The same answers as make_mesh_surface() (up to rounding), the same rules for duplicates, for gather() when
+// it is not complete and for queries that are not finite. Only the search differs: one triangle a leaf, boxes
+// in double, nearer child first. `solid`: closed and consistently oriented, so inside() and shaded normals
+// mean something. Throws std::invalid_argument for an empty mesh, an index out of range or a vertex that is
+// not finite (or beyond 1e12 m).
+std::unique_ptr<RigidSurface> make_cgal_surface(const TriangleMesh& mesh, bool solid);
+
+}  // namespace polygon
