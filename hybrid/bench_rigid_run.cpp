@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "hybrid/body_stage.h"
+#include "hybrid/build.h"
 #include "hybrid/rigid_sweep.h"
 #include "hybrid/tick.h"
 #include "polygon/cgal_surface.h"
@@ -21,7 +22,6 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t kBlock = 2000;  // ticks an engine has the processor's caches for itself
-constexpr double kMostCells = 512.0;  // the program's choice of cell for a scene of rigid objects
 
 double ms_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
@@ -36,7 +36,7 @@ OccupancyMap fill_map(const polygon::TriangleMesh& mesh, const Box& box, double 
                       const glm::dvec3& offset_m, bool moves) {
   const glm::dvec3 size = box.high - box.low;
   const double longest = std::max({size.x, size.y, size.z});
-  const double cell = std::max(0.5 * tool_radius_m, longest / kMostCells);
+  const double cell = rigid_cell_m(longest, tool_radius_m);
   const glm::dvec3 middle = 0.5 * (box.low + box.high);
   OccupancyMap map(cell, offset_m + middle);
   if (moves) {

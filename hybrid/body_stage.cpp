@@ -11,8 +11,8 @@
 namespace hybrid {
 namespace {
 
-constexpr int kWaysAside = 8;        // looked for when a body pushes the proxy into another
-constexpr double kStayed = 1e-9;     // of the ball: a proxy that is so near where it was pushed is there
+constexpr int kWaysAside = 8;     // looked for when a body pushes the proxy into another
+constexpr double kStayed = 1e-9;  // of the ball: a proxy that is so near where it was pushed is there
 
 // What pressed on the body in the last tick: the proxy's coupling, shared as the contacts share it.
 std::size_t contacts_of(const World& world, const WorldState& state, std::uint32_t object,

@@ -11,8 +11,8 @@ void move_bodies(const World& world, WorldState& state, double dt_s) noexcept;
 
 // Body number `object` is now at `pose` (body to scene). In the body's frame the proxy moves, and is swept
 // there as anywhere: so a body that moves into it pushes it, and never passes over it, at any speed. A proxy
-// that sticks to the body (friction) is carried with it. Where the body would push the proxy into another one,
-// it goes aside; where there is no room left, a fault is set and the other one's surface holds.
+// that sticks to the body (friction) is carried with it. Where the body would push the proxy into another
+// one, it goes aside; where there is no room left, a fault is set and the other one's surface holds.
 void set_rigid_pose(const World& world, WorldState& state, std::uint32_t object, const Pose& pose) noexcept;
 
 }  // namespace hybrid

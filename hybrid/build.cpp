@@ -23,6 +23,7 @@ namespace {
 constexpr int kSurfaceSmoothing = 6;  // of a soft object's drawn surface
 // Cells along the scene's longest side, at most, unless the scene says otherwise: 64 bricks however they lie.
 constexpr double kMostCells = 504.0;
+constexpr double kRigidCells = 200.0;      // where nothing is soft: finer cells name no fewer objects
 constexpr std::size_t kMapReserve = 2048;  // bricks that motion may add
 constexpr double kFarthestLook = 32.0;     // spacings that one distance query may clear of carving
 
@@ -69,8 +70,8 @@ double choose_cell(const Scene& scene, const Box& box, double soft_spacing) {
     }
     return *scene.occupancy_cell_m;
   }
-  const double wanted = soft_spacing > 0.0 ? soft_spacing : 0.5 * scene.tool.radius_m;
-  return std::max(wanted, longest / kMostCells);
+  return soft_spacing > 0.0 ? std::max(soft_spacing, longest / kMostCells)
+                            : rigid_cell_m(longest, scene.tool.radius_m);
 }
 
 // Distance to the nearest rigid surface within `range`, and whether the point is inside a rigid solid.
@@ -345,6 +346,10 @@ class Builder {
 };
 
 }  // namespace
+
+double rigid_cell_m(double longest_m, double tool_radius_m) {
+  return std::max(0.5 * tool_radius_m, longest_m / kRigidCells);
+}
 
 BuiltScene build_scene(const Scene& scene, const Progress& progress) {
   return Builder(scene, progress).build();

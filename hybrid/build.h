@@ -25,7 +25,7 @@ struct BuiltScene {
   std::unique_ptr<const World> world;
   std::unique_ptr<WorldState> state;  // at rest, not started: see start_proxy()
   std::vector<BuildNote> notes;       // what a person should know: findings, repairs, voxels carved
-  double seconds = 0.0;           // from the files to ready to be touched
+  double seconds = 0.0;               // from the files to ready to be touched
   // Of the whole program, when that was done: resident, and the most that ever was.
   std::uint64_t held_bytes = 0, peak_bytes = 0;
 };
@@ -35,6 +35,9 @@ using Progress = std::function<void(const std::string&)>;
 
 // Throws SceneError: a file that cannot be used, nothing left after carving, too large for the memory (with
 // the numbers, before it is allocated), objects that overlap where the scene asks to refuse that.
+// The occupancy map's cell (m) for a scene of rigid objects alone that is so long, unless it says otherwise.
+double rigid_cell_m(double longest_m, double tool_radius_m);
+
 BuiltScene build_scene(const Scene& scene, const Progress& progress = {});
 
 // Fixed surfaces for graphics; and what moves, filled in place (no allocation once its vectors have their

@@ -13,7 +13,8 @@ namespace hybrid {
 namespace {
 
 constexpr int kShadingPasses = 8;
-constexpr double kShadingStill = 1e-7;  // of the way to the goal: a pass that moves the proxy less is the last
+constexpr double kShadingStill =
+    1e-7;  // of the way to the goal: a pass that moves the proxy less is the last
 
 struct Contact {
   const RigidObject* object = nullptr;
@@ -30,7 +31,8 @@ std::span<const Contact> contacts_of(const World& world, const WorldState& state
     const ActiveElement& active = state.active[n];
     const double force = glm::length(active.force_N);
     if (!(force > 0.0)) continue;
-    contacts[count++] = {&world.rigid[active.object], active.element, active.object, active.force_N / force, force};
+    contacts[count++] = {&world.rigid[active.object], active.element, active.object, active.force_N / force,
+                         force};
   }
   return {contacts.data(), count};
 }
@@ -42,7 +44,8 @@ glm::dvec3 shaded(const World& world, const WorldState& state, const Contact& co
   const glm::dvec3 on_surface = frame.to_body(proxy - world.contact_radius_m() * contact.normal);
   const glm::dvec3 away = contact.normal * frame.rotation;
   return limit_shaded_normal(
-      frame.rotation * contact.object->surface->shaded_normal(contact.element, on_surface, away), contact.normal);
+      frame.rotation * contact.object->surface->shaded_normal(contact.element, on_surface, away),
+      contact.normal);
 }
 
 MixedFeel mixed(std::span<const Contact> contacts) noexcept {
@@ -60,10 +63,12 @@ Sweep shade(const World& world, WorldState& state, const glm::dvec3& target, con
   for (int n = 0; n < kShadingPasses; ++n) {
     std::array<Contact, 3> held;
     const std::span<const Contact> contacts = contacts_of(world, state, held);
-    if (std::none_of(contacts.begin(), contacts.end(), [](const Contact& c) { return c.object->feel.shading; }))
+    if (std::none_of(contacts.begin(), contacts.end(),
+                     [](const Contact& c) { return c.object->feel.shading; }))
       break;
     std::array<glm::dvec3, 3> normals;
-    for (std::size_t c = 0; c < contacts.size(); ++c) normals[c] = shaded(world, state, contacts[c], sweep.point);
+    for (std::size_t c = 0; c < contacts.size(); ++c)
+      normals[c] = shaded(world, state, contacts[c], sweep.point);
     const glm::dvec3 level = shaded_goal(target, sweep.point, metric, {normals.data(), contacts.size()});
     const Sweep next =
         sweep_proxy(world, state, sweep.point, level - compliance * sweep.force_N, metric, travel);
@@ -76,8 +81,8 @@ Sweep shade(const World& world, WorldState& state, const glm::dvec3& target, con
 
 }  // namespace
 
-Sweep sweep_with_feel(const World& world, WorldState& state, const glm::dvec3& target, const glm::dmat3& metric,
-                      double travel) noexcept {
+Sweep sweep_with_feel(const World& world, WorldState& state, const glm::dvec3& target,
+                      const glm::dmat3& metric, double travel) noexcept {
   const bool held = state.active_count > 0;  // since the last tick
   const glm::dvec3 from = state.proxy_m;
   Sweep sweep = sweep_proxy(world, state, from, target, metric, travel);
@@ -121,7 +126,8 @@ Sweep sweep_with_feel(const World& world, WorldState& state, const glm::dvec3& t
   return sweep;
 }
 
-glm::dvec3 added_force(const World& world, WorldState& state, const glm::dvec3& device_m, double dt_s) noexcept {
+glm::dvec3 added_force(const World& world, WorldState& state, const glm::dvec3& device_m,
+                       double dt_s) noexcept {
   std::array<Contact, 3> held;
   const std::span<const Contact> contacts = contacts_of(world, state, held);
   const double k = world.tool.stiffness_N_per_m;

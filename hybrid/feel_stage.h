@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The proxy on surfaces that are felt as more than hard and smooth: friction, shading, damping, texture. What no
-// object asks for costs one comparison.
+// The proxy on surfaces that are felt as more than hard and smooth: friction, shading, damping, texture. What
+// no object asks for costs one comparison.
 #pragma once
 
 #include "hybrid/rigid_sweep.h"
@@ -9,11 +9,12 @@ namespace hybrid {
 
 // The sweep from state.proxy_m, with what the touched objects feel like: shading turns the goal, friction
 // keeps the proxy or lets it slide. `force_N` of the answer is all that the surfaces do to the proxy.
-Sweep sweep_with_feel(const World& world, WorldState& state, const glm::dvec3& target, const glm::dmat3& metric,
-                      double travel) noexcept;
+Sweep sweep_with_feel(const World& world, WorldState& state, const glm::dvec3& target,
+                      const glm::dmat3& metric, double travel) noexcept;
 
 // What damping and texture add to the coupling's force on the hand (N, scene frame). `device_m` is where the
 // device is. Call once a tick, with or without contact.
-glm::dvec3 added_force(const World& world, WorldState& state, const glm::dvec3& device_m, double dt_s) noexcept;
+glm::dvec3 added_force(const World& world, WorldState& state, const glm::dvec3& device_m,
+                       double dt_s) noexcept;
 
 }  // namespace hybrid

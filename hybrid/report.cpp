@@ -180,7 +180,8 @@ std::vector<std::string> fault_texts(std::uint32_t faults) {
   say(fault_map_overflow,
       "the occupancy map had no room for a voxel that moved; use a larger [occupancy] cell");
   say(fault_pair_overflow, "more soft voxels press on one another than fit; use a coarser spacing");
-  say(fault_nonfinite_body, "a free body was pushed by a force that is not finite, and stood still for that tick");
+  say(fault_nonfinite_body,
+      "a free body was pushed by a force that is not finite, and stood still for that tick");
   say(fault_infeasible, "rigid surfaces left the tool no room; use a smaller tool radius");
   return texts;
 }

@@ -85,11 +85,12 @@ class Sweeper {
   }
 
  private:
-  // The proxy came here by another way than the last sweep's: a plane between it and an element may have it on
-  // the wrong side.
+  // The proxy came here by another way than the last sweep's: a plane between it and an element may have it
+  // on the wrong side.
   void look_afresh(const glm::dvec3& from) noexcept {
     for (std::uint32_t o = 0; o < world_.rigid.size(); ++o) {
-      if (scope_.kind != Scope::Kind::all && (scope_.kind == Scope::Kind::only) != (o == scope_.object)) continue;
+      if (scope_.kind != Scope::Kind::all && (scope_.kind == Scope::Kind::only) != (o == scope_.object))
+        continue;
       RigidNear& near = state_.rigid[o];
       near.near.see_from(*world_.rigid[o].surface, near.frame.to_body(from), radius_, rounding_);
     }
@@ -249,8 +250,7 @@ class Sweeper {
         return;
       }
       if (!covered(candidate))
-        candidate.in_body =
-            polygon::separate(*world_.rigid[o].surface, candidate.element, view, radius_);
+        candidate.in_body = polygon::separate(*world_.rigid[o].surface, candidate.element, view, radius_);
       near.near.set_plane(broken[n].index, candidate.in_body);
       if (candidate.in_body.offset - glm::dot(candidate.in_body.normal, end) > tolerance) {
         broken[n].fresh = true;
@@ -311,8 +311,13 @@ class Sweeper {
 
   [[nodiscard]] bool touches(const Held& held, const glm::dvec3& point) const noexcept {
     const glm::dvec3 view = state_.rigid[held.object].frame.to_body(point);
-    const double distance = world_.rigid[held.object].surface->closest(held.element, view).distance;
-    return distance <= radius_ * (1.0 + kConvergedBall) + 4.0 * rounding_;
+    const polygon::NearPoint near = world_.rigid[held.object].surface->closest(held.element, view);
+    if (!held.flat) return near.distance <= radius_ * (1.0 + kConvergedBall) + 4.0 * rounding_;
+    // The foot on the plane must be the closest point: by distance alone, a ball would lie on a triangle
+    // whose edge it had passed by a root of the tolerance.
+    const glm::dvec3 away = view - near.point;
+    const glm::dvec3 aside = away - glm::dot(away, held.in_body.normal) * held.in_body.normal;
+    return glm::length(aside) <= 4.0 * rounding_;
   }
 
   // Only what holds the proxy goes on to the next step.
@@ -381,8 +386,8 @@ Sweep sweep_proxy(const World& world, WorldState& state, const glm::dvec3& from,
   return Sweeper(world, state, target, metric).go(from, travel);
 }
 
-Sweep sweep_past(const World& world, WorldState& state, std::uint32_t object, bool but, const glm::dvec3& from,
-                 const glm::dvec3& target) noexcept {
+Sweep sweep_past(const World& world, WorldState& state, std::uint32_t object, bool but,
+                 const glm::dvec3& from, const glm::dvec3& target) noexcept {
   const Scope scope{but ? Scope::Kind::all_but : Scope::Kind::only, object};
   return Sweeper(world, state, target, glm::dmat3(1.0), scope).go(from, std::numeric_limits<double>::max());
 }

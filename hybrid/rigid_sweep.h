@@ -23,8 +23,8 @@ Sweep sweep_proxy(const World& world, WorldState& state, const glm::dvec3& from,
 
 // The same against one object alone (`but` = false), or against all but that one (`but` = true), to the point
 // nearest to `target`. Nothing is said of forces, nor of what holds the proxy.
-Sweep sweep_past(const World& world, WorldState& state, std::uint32_t object, bool but, const glm::dvec3& from,
-                 const glm::dvec3& target) noexcept;
+Sweep sweep_past(const World& world, WorldState& state, std::uint32_t object, bool but,
+                 const glm::dvec3& from, const glm::dvec3& target) noexcept;
 
 // True when the map says that nothing lies between the proxy and `goal`, nor within the tool's reach of
 // `soft_reach_m` on the way; then the proxy is there.

@@ -19,7 +19,8 @@ struct TickResult {
   glm::dvec3 device_m{0.0};  // scene frame, as used (the last good input)
   glm::dvec3 proxy_m{0.0};
   glm::dvec3 force_N{0.0};               // on the hand, after the limits
-  glm::dvec3 rigid_N{0.0}, soft_N{0.0};  // its parts before the limits: rigid_N + soft_N = K (proxy − device) and what damping and texture add
+  glm::dvec3 rigid_N{0.0}, soft_N{0.0};  // its parts before the limits: rigid_N + soft_N = K (proxy − device)
+                                         // and what damping and texture add
   std::uint32_t contacts = 0;  // bit per object, rigid ones first; objects beyond 31 share the last bit
   std::array<float, kStages> stage_us{};
   double tick_us = 0.0;  // processor time of this thread; the stages are wall time

@@ -158,7 +158,7 @@ struct WorldState {
   glm::dvec3 device_m{0.0};  // last good input
   device::ForceLimitState limit;
   std::uint64_t tick = 0;
-  double time_s = 0.0;  // simulated, of the bodies' paths
+  double time_s = 0.0;                // simulated, of the bodies' paths
   std::uint64_t nonfinite = 0;        // inputs or forces that were not finite
   std::uint32_t faults = 0;           // FaultBit, ever
   std::uint64_t truncated_ticks = 0;  // ticks that ended before the proxy arrived, by a bound on its steps
@@ -167,9 +167,9 @@ struct WorldState {
   glm::dvec3 swept_to_m{0.0};             // where the last sweep ended: what is known is known from there
   std::array<ActiveElement, 3> active{};  // elements that held the proxy last
   std::uint32_t active_count = 0;
-  bool stuck = false;           // friction holds the proxy on what is active
-  bool sliding = false;         // or lets it slide
-  glm::dvec3 friction_N{0.0};   // on the proxy: what friction and shading add to what presses
+  bool stuck = false;          // friction holds the proxy on what is active
+  bool sliding = false;        // or lets it slide
+  glm::dvec3 friction_N{0.0};  // on the proxy: what friction and shading add to what presses
   DampingState damping;
   // The rigid objects with surface within `look_m` of `look_at`, along each axis, as the map said.
   glm::dvec3 look_at{0.0};
