@@ -14,6 +14,7 @@
 #include "hybrid/arbitration.h"
 #include "hybrid/build_objects.h"
 #include "hybrid/label_surface.h"
+#include "hybrid/scene_feel.h"
 #include "hybrid/process_memory.h"
 #include "hybrid/soft_stage.h"
 
@@ -209,6 +210,8 @@ class Builder {
     at_place(scene_, d.source_place, d.name, [&] { world_->rigid.push_back(build_rigid(d, built_.notes)); });
     RigidObject& object = world_->rigid.back();
     at_place(scene_, d.motion_place, d.name, [&] { object.motion = build_motion(d, object); });
+    at_place(scene_, d.feel.texture ? d.feel.texture->place : d.place, d.name,
+             [&] { object.feel = build_feel(d.feel); });
     for (const glm::dvec3& v : object.drawn->vertices) box_.add(object.to_scene(v));
   }
 

@@ -154,7 +154,7 @@ void mend_borders(RepairSoup& soup, const RepairOptions& options, Changes& chang
   because(holes.branching, "whose rims branch");
   because(holes.unfillable, "that no fill fits without cutting the mesh");
   add_finding(changes, "R14-holes-left", Severity::warning, holes.left,
-              "holes or rims are left open: " + why);
+              "holes or rims were not filled: " + why);
 }
 
 // Same corners in the same sense, by coordinates: orienting may have given a triangle copies of its corners.
