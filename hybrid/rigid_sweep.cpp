@@ -64,6 +64,8 @@ class Sweeper {
           kConvergedWay * glm::length(target_ - point_) + kConvergedBall * radius_ + rounding_;
       if (length <= still && fraction_ == 1.0) {
         if (loosen_false_contacts()) continue;
+        sweep.point = minimum_.point;
+        keep_active();
         sweep.arrived = true;
         break;
       }
