@@ -28,7 +28,7 @@ std::size_t contacts_of(const World& world, const WorldState& state, std::uint32
                          world.tool.stiffness_N_per_m};
   }
   const double rubbed = glm::length(state.friction_N);
-  if (count > 0 && rubbed > 0.0 && state.active[0].object == object) {
+  if (count > 0 && rubbed > 0.0 && state.rubbed == object) {
     const glm::dvec3 along = state.friction_N / rubbed;
     contacts[count] = {contacts[0].point_m, -along, rubbed, world.tool.stiffness_N_per_m};
     ++count;
@@ -36,10 +36,14 @@ std::size_t contacts_of(const World& world, const WorldState& state, std::uint32
   return count;
 }
 
+double stayed_m(const World& world) noexcept {
+  return kStayed * world.contact_radius_m() + 4.0 * world.rounding_m;
+}
+
 // The proxy, feasible against the body alone, is brought to where it is so against everything.
 void step_aside(const World& world, WorldState& state, std::uint32_t object, const glm::dvec3& before,
                 const glm::dvec3& pushed) noexcept {
-  const double near = kStayed * world.contact_radius_m() + 4.0 * world.rounding_m;
+  const double near = stayed_m(world);
   glm::dvec3 way = pushed, from = before;
   for (int n = 0; n < kWaysAside; ++n) {
     const Sweep others = sweep_past(world, state, object, true, from, way);
@@ -54,6 +58,18 @@ void step_aside(const World& world, WorldState& state, std::uint32_t object, con
   state.faults |= fault_infeasible;
 }
 
+// Friction holds the proxy on this body, or lets it slide: it is drawn along either way.
+bool carries(const WorldState& state, std::uint32_t object) noexcept {
+  return (state.stuck || state.sliding) && state.active_count > 0 && state.rubbed == object;
+}
+
+// What holds the proxy turns with the body.
+void turn_contacts(WorldState& state, std::uint32_t object, const glm::dmat3& turn) noexcept {
+  for (std::uint32_t n = 0; n < state.active_count; ++n) {
+    if (state.active[n].object == object) state.active[n].force_N = turn * state.active[n].force_N;
+  }
+}
+
 }  // namespace
 
 void set_rigid_pose(const World& world, WorldState& state, std::uint32_t object, const Pose& pose) noexcept {
@@ -62,17 +78,17 @@ void set_rigid_pose(const World& world, WorldState& state, std::uint32_t object,
   const double reach = world.contact_radius_m() + motion.displacement_bound(near.pose, pose);
   const bool within = !world.use_map || (state.map.rigid_in(state.proxy_m - reach, state.proxy_m + reach) &
                                          OccupancyMap::rigid_bit(object)) != 0;
-  const BodyFrame after(pose);
-  glm::dvec3 pushed = state.proxy_m;
+  const BodyFrame before_move = near.frame, after(pose);
+  glm::dvec3 expected = state.proxy_m, pushed = state.proxy_m;
   if (within) {
     const glm::dvec3 from = near.frame.to_body(state.proxy_m);
-    const bool stuck = state.stuck && state.active_count > 0 && state.active[0].object == object;
-    const glm::dvec3 target = stuck ? from : after.to_body(state.proxy_m);
+    const glm::dvec3 target = carries(state, object) ? from : after.to_body(state.proxy_m);
+    expected = after.to_scene(target);
     // In the body's own frame it is the proxy that moves.
     near.frame = BodyFrame();
-    const Sweep sweep = sweep_past(world, state, object, false, from, target);
-    pushed = after.to_scene(sweep.point);
+    pushed = after.to_scene(sweep_past(world, state, object, false, from, target).point);
   }
+  turn_contacts(state, object, after.rotation * glm::transpose(before_move.rotation));
   near.frame = after;
   near.pose = pose;
   if (world.use_map) state.map.move_body(object, pose.position_m, pose.rotation);
@@ -81,6 +97,7 @@ void set_rigid_pose(const World& world, WorldState& state, std::uint32_t object,
   const glm::dvec3 before = state.proxy_m;
   state.proxy_m = pushed;
   if (pushed != before && world.rigid.size() > 1) step_aside(world, state, object, before, pushed);
+  state.pushed = state.pushed || glm::length(state.proxy_m - expected) > stayed_m(world);
 }
 
 void move_bodies(const World& world, WorldState& state, double dt_s) noexcept {

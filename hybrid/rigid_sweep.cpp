@@ -10,23 +10,16 @@ namespace {
 
 constexpr std::uint32_t kMaxSteps = 64;
 constexpr std::uint32_t kMaxExchanges = 64;  // planes that join or are made anew in one step
-constexpr std::uint32_t kMaxHeld = 32;       // planes of one step
 constexpr int kMaxShrinks = 60;              // of a survey that found too much
 constexpr int kMaxFreePieces = 512;          // of the way through free space looked at in one tick
 // A step shorter than this, of the way to the target and of the ball, is the end.
 constexpr double kConvergedWay = 1e-9, kConvergedBall = 1e-7;
 constexpr double kAhead = 0.6;  // of its margin a survey is made ahead of the proxy
-// A survey is good that finds as many elements as this: fewer are soon left, more are long to read.
-constexpr double kGoodCount = 128.0;
+// A survey is good that finds so many elements: fewer are soon left, more are long to read. A ball has more
+// under it than a point before it is free to move at all.
+constexpr double kGoodCount = 24.0, kGoodUnderBall = 104.0;
+constexpr double kShortLook = 0.05, kLongerLook = 32.0;
 constexpr double kLookCells = 8.0;  // how far the map is asked beyond the ball, in cells
-
-// One plane of the step's problem, and whose it is.
-struct Held {
-  std::uint32_t object = 0, element = 0;
-  polygon::SeparatingPlane in_body;
-  bool own_plane = true;  // the element's own plane may be used
-  bool flat = false;      // and it is what in_body says, from wherever it is seen
-};
 
 // Which objects a sweep minds.
 struct Scope {
@@ -43,6 +36,7 @@ class Sweeper {
         state_(state),
         target_(target),
         metric_(metric),
+        held_(state.held),
         scope_(scope),
         radius_(world.contact_radius_m()),
         rounding_(world.rounding_m) {}
@@ -51,11 +45,19 @@ class Sweeper {
     Sweep sweep;
     sweep.point = from;
     sweep.arrived = false;
-    if (from != state_.swept_to_m) look_afresh(from);
-    for (std::uint32_t n = 0; n < state_.active_count && scope_.kind == Scope::Kind::all; ++n)
-      held_[held_count_++] = {state_.active[n].object, state_.active[n].element, {}, true};
+    const bool goes_on = from == state_.swept_to_m;
+    if (!goes_on) look_afresh(from);
+    for (std::uint32_t n = 0; n < state_.active_count && scope_.kind == Scope::Kind::all; ++n) {
+      const ActiveElement& active = state_.active[n];
+      const HeldElement& last = held_[n];
+      // Held as the last sweep left it, unless something else used the list since.
+      if (!goes_on || last.object != active.object || last.element != active.element)
+        held_[n] = {active.object, active.element, {}, true};
+      ++held_count_;
+    }
     for (; sweep.steps < kMaxSteps; ++sweep.steps) {
       point_ = sweep.point;
+      if (sweep.steps < state_.trail.size()) state_.trail[sweep.steps] = point_;
       if (!look()) break;
       if (!solve()) break;
       const glm::dvec3 move = minimum_.point - point_;
@@ -73,6 +75,7 @@ class Sweeper {
       if (part * length > travel) part = travel / length;
       sweep.point = part == 1.0 ? minimum_.point : point_ + part * move;
       travel -= part * length;
+      stepped_ = part * length;
       keep_active();
       if (fraction_ == 1.0 && part == 1.0 && held_flatly(sweep.point)) {
         sweep.arrived = true;
@@ -137,7 +140,8 @@ class Sweeper {
       ++surveys_;
       if (near.near.survey(surface, moving ? view + ahead : view, near.margin_m, radius_, view)) {
         const double count = std::max(1.0, static_cast<double>(near.near.size()));
-        near.margin_m *= std::clamp(std::sqrt(kGoodCount / count), 0.5, 1.5);
+        const double good = kGoodCount + kGoodUnderBall * radius_ / (radius_ + near.margin_m);
+        near.margin_m *= std::clamp(std::sqrt(good / count), 0.5, 1.5);
         return true;
       }
       near.margin_m *= 0.5;
@@ -153,7 +157,8 @@ class Sweeper {
     // Of those that held the proxy before, the ones that it still touches, and those found not to.
     std::uint32_t kept = 0;
     for (std::uint32_t i = 0; i < held_count_; ++i) {
-      if (!asked(held_[i].object) || (held_[i].own_plane && !touches(held_[i], point_))) continue;
+      if (!asked(held_[i].object) || (held_[i].own_plane && !held_[i].touching && !touches(held_[i], point_)))
+        continue;
       held_[kept] = held_[i];
       if (!held_[kept].flat) make_plane(held_[kept]);
       ++kept;
@@ -167,9 +172,14 @@ class Sweeper {
         return false;  // stay: the place before was outside everything
       }
       fraction_ = clear_part(minimum_.point);
-      const glm::dvec3 end =
-          fraction_ == 1.0 ? minimum_.point : point_ + fraction_ * (minimum_.point - point_);
-      Held first = first_in_the_way(end);
+      // Nothing holds the proxy just after it slid off what did: what is next is near, and short looks see
+      // few elements.
+      HeldElement first{kNobody, 0, {}, true};
+      for (double part = held_count_ == 0 ? short_look(minimum_.point) : 1.0;; part *= kLongerLook) {
+        const double share = std::min(part, 1.0) * fraction_;
+        first = first_in_the_way(share == 1.0 ? minimum_.point : point_ + share * (minimum_.point - point_));
+        if (first.object != kNobody || part >= 1.0) break;
+      }
       if (first.object == kNobody) return true;
       if (held_count_ == kMaxHeld) return false;
       // Found by the plane across its closest point, which says soonest what is really met; held by its own,
@@ -179,6 +189,12 @@ class Sweeper {
       state_.planes.push_back(in_scene(first));
     }
     return false;
+  }
+
+  // Of the way to q, a part as long as a twentieth of the last step.
+  [[nodiscard]] double short_look(const glm::dvec3& q) const noexcept {
+    const double way = glm::length(q - point_);
+    return stepped_ > 0.0 && way > 0.0 ? kShortLook * stepped_ / way : 1.0;
   }
 
   // Of the straight way to q, the part within everything that was looked at.
@@ -219,8 +235,8 @@ class Sweeper {
   }
 
   // The element that the way to q meets first; kNobody when the way is clear.
-  Held first_in_the_way(const glm::dvec3& q) noexcept {
-    Held first{kNobody, 0, {}, true};
+  HeldElement first_in_the_way(const glm::dvec3& q) noexcept {
+    HeldElement first{kNobody, 0, {}, true};
     double soonest = 2.0;
     for (std::uint32_t o = 0; o < world_.rigid.size(); ++o) {
       if (asked(o)) first_of(o, q, first, soonest);
@@ -230,7 +246,7 @@ class Sweeper {
 
   // Planes seen from elsewhere say too soon rather than too late: so the soonest is seen from here instead,
   // until the soonest is one that was.
-  void first_of(std::uint32_t o, const glm::dvec3& q, Held& first, double& soonest) noexcept {
+  void first_of(std::uint32_t o, const glm::dvec3& q, HeldElement& first, double& soonest) noexcept {
     using Broken = polygon::Neighbourhood::Broken;
     RigidNear& near = state_.rigid[o];
     const glm::dvec3 view = near.frame.to_body(point_), end = near.frame.to_body(q);
@@ -245,7 +261,7 @@ class Sweeper {
           n = i;
       }
       if (broken[n].part >= soonest) return;
-      Held candidate{o, near.near.element(broken[n].index), {}, true};
+      HeldElement candidate{o, near.near.element(broken[n].index), {}, true};
       if (broken[n].fresh) {
         soonest = broken[n].part;
         first = candidate;
@@ -266,10 +282,10 @@ class Sweeper {
 
   // Does a plane that holds already keep the proxy from this element as well? On a convex surface one plane
   // covers everything, and the proxy need not stop at each edge.
-  bool covered(Held& candidate) const noexcept {
+  bool covered(HeldElement& candidate) const noexcept {
     const polygon::RigidSurface& surface = *world_.rigid[candidate.object].surface;
     for (std::uint32_t h = 0; h < held_count_; ++h) {
-      const Held& held = held_[h];
+      const HeldElement& held = held_[h];
       if (held.object != candidate.object) continue;
       if (held.element != candidate.element && !(surface.support(candidate.element, held.in_body.normal) <=
                                                  held.in_body.offset - radius_ + rounding_))
@@ -280,7 +296,7 @@ class Sweeper {
     return false;
   }
 
-  void make_plane(Held& held) noexcept {
+  void make_plane(HeldElement& held) noexcept {
     const glm::dvec3 view = state_.rigid[held.object].frame.to_body(point_);
     const polygon::RigidSurface& surface = *world_.rigid[held.object].surface;
     held.flat = held.own_plane &&
@@ -293,7 +309,7 @@ class Sweeper {
   bool loosen_false_contacts() noexcept {
     bool any = false;
     for (std::uint32_t n = 0; n < minimum_.active_count; ++n) {
-      Held& held = held_[minimum_.active[n]];
+      HeldElement& held = held_[minimum_.active[n]];
       if (!held.own_plane || touches(held, point_)) continue;
       held.own_plane = false;
       held.flat = false;
@@ -304,14 +320,15 @@ class Sweeper {
 
   // Held by nothing, or by elements' own planes alone where the elements are: no plane would change if it
   // were seen from `point`, so the minimum is the minimum.
-  [[nodiscard]] bool held_flatly(const glm::dvec3& point) const noexcept {
+  [[nodiscard]] bool held_flatly(const glm::dvec3& point) noexcept {
     for (std::uint32_t n = 0; n < held_count_; ++n) {
-      if (!held_[n].flat || !touches(held_[n], point)) return false;
+      held_[n].touching = held_[n].flat && touches(held_[n], point);
+      if (!held_[n].touching) return false;
     }
     return true;
   }
 
-  [[nodiscard]] bool touches(const Held& held, const glm::dvec3& point) const noexcept {
+  [[nodiscard]] bool touches(const HeldElement& held, const glm::dvec3& point) const noexcept {
     const glm::dvec3 view = state_.rigid[held.object].frame.to_body(point);
     const polygon::NearPoint near = world_.rigid[held.object].surface->closest(held.element, view);
     if (!held.flat) return near.distance <= radius_ * (1.0 + kConvergedBall) + 4.0 * rounding_;
@@ -333,6 +350,7 @@ class Sweeper {
         if (from[m] == n) from[m] = from[n];
       }
       held_[n].own_plane = true;
+      held_[n].touching = false;
     }
   }
 
@@ -355,7 +373,7 @@ class Sweeper {
     if (scope_.kind == Scope::Kind::all_but && o == scope_.object) return false;
     return (state_.look_mask & OccupancyMap::rigid_bit(o)) != 0;
   }
-  [[nodiscard]] polygon::ContactPlane in_scene(const Held& held) const noexcept {
+  [[nodiscard]] polygon::ContactPlane in_scene(const HeldElement& held) const noexcept {
     const BodyFrame& frame = state_.rigid[held.object].frame;
     const glm::dvec3 normal = frame.rotation * held.in_body.normal;
     return {normal, held.in_body.offset + glm::dot(normal, frame.position_m), held.object, held.element};
@@ -367,14 +385,15 @@ class Sweeper {
   const World& world_;
   WorldState& state_;
   const glm::dvec3 target_;
-  const glm::dmat3 metric_;
+  const polygon::Metric metric_;
+  std::array<HeldElement, kMaxHeld>& held_;
   const Scope scope_;
   const double radius_, rounding_;
   glm::dvec3 point_{0.0};      // feasible; where everything is seen from
   glm::dvec3 direction_{0.0};  // of the last way tried, unit
-  std::array<Held, kMaxHeld> held_;
   std::uint32_t held_count_ = 0;
   polygon::PlaneMinimum minimum_;
+  double stepped_ = 0.0;     // how long the last step was
   double fraction_ = 1.0;    // of the way to the minimum that is known to be clear
   std::uint32_t ended_ = 0;  // 1 + the object whose neighbourhood ended the way
   bool look_ended_ = false;  // the map's look ended it
@@ -498,6 +517,7 @@ RigidStep step_rigid(const World& world, WorldState& state, const glm::dvec3& de
         sweep_proxy(world, state, state.proxy_m, device_m, glm::dmat3(world.tool.stiffness_N_per_m),
                     std::numeric_limits<double>::max());
     state.proxy_m = sweep.point;
+    step.arrived = sweep.arrived;
     step.steps = sweep.steps;
     step.surveys = sweep.surveys;
   }

@@ -43,6 +43,7 @@ bool gather_planes(const World& world, WorldState& state, const glm::dvec3& poin
 struct RigidStep {
   glm::dvec3 proxy_m{0.0}, force_N{0.0};  // scene frame; the force on the hand, before any limit
   bool free = false;                      // nothing was near
+  bool arrived = true;                    // false: a bound on the steps ended it
   std::uint32_t steps = 0, surveys = 0;
 };
 RigidStep step_rigid(const World& world, WorldState& state, const glm::dvec3& device_m, double dt_s) noexcept;

@@ -97,7 +97,8 @@ Tool read_tool(const TableReader& table) {
   table.allow(keys, tool_later);
   Tool out;
   out.shape = table.choice("shape", shapes, 0) == 0 ? Tool::Shape::ball : Tool::Shape::punch;
-  out.radius_m = table.number("radius", table.source().size(), out.radius_m);
+  const bool ball = out.shape == Tool::Shape::ball;
+  out.radius_m = table.number("radius", ball ? table.source().distance() : table.source().size(), out.radius_m);
   const Quantity stiffness{"a stiffness above 0 in N/m", "1000", 1.0, 1e-6, 1e9};
   out.stiffness_N_per_m = table.number("stiffness", stiffness, out.stiffness_N_per_m);
   return out;
@@ -234,6 +235,13 @@ void check_anchors(const TableReader& table, const Scene& scene, const SoftDescr
                "add a face or a label to its anchors, or a [[rigid]] object");
 }
 
+// A voxel is felt by the ball that it is in; a point is in none.
+void check_point_tool(const SceneSource& source, const Scene& scene, SourcePlace place) {
+  if (scene.tool.radius_m > 0.0 || scene.soft.empty()) return;
+  source.refuse(place, "a tool of radius 0 is a point, which cannot press soft objects",
+                words("give it a radius of about two spacings of \"", scene.soft.front().name, "\""));
+}
+
 void read_objects(const SceneSource& source, const TableReader& root, Scene& scene) {
   for (const TreeNode& table : object_tables(root, "rigid")) {
     scene.rigid.push_back(read_rigid(source, table, scene.rigid.size() + 1));
@@ -280,12 +288,17 @@ Scene read_scene(const std::filesystem::path& file) {
     if (table.has("cell")) scene.occupancy_cell_m = table.number("cell", source.size());
     scene.occupancy_place = table.place_of("cell");
   });
-  read_once(root, "tool", [&](const TableReader& table) { scene.tool = read_tool(table); });
+  SourcePlace tool_radius;
+  read_once(root, "tool", [&](const TableReader& table) {
+    scene.tool = read_tool(table);
+    tool_radius = table.place_of("radius");
+  });
   read_once(root, "device", [&](const TableReader& table) { read_device(table, scene); });
   read_once(root, "hand", [&](const TableReader& table) { scene.hand = read_hand(table); });
   read_once(root, "safety", [&](const TableReader& table) { read_safety(table, scene); });
   read_once(root, "material", [&](const TableReader& table) { read_materials(table, scene); });
   read_objects(source, root, scene);
+  check_point_tool(source, scene, tool_radius);
   if (!root.has("path")) {
     source.refuse({1, 1}, "the scene has no [path], so the hand would not move",
                   "add [path] with kind = \"press\", from and to (see scenes/README.md)");

@@ -7,12 +7,14 @@
 #include <glm/matrix.hpp>
 #include <limits>
 
-#include "polygon/proxy.h"
-
 namespace hybrid {
 namespace {
 
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+constexpr double kAside =
+    1e-4;  // how freely a shaded proxy goes beside the normals, of how freely along them
+constexpr double kSameNormal =
+    1e-6;  // of the compliance: what of a normal lies outside the span of the others
 
 double largest(const glm::dvec3& v) noexcept {
   return std::max({std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)});
@@ -151,16 +153,19 @@ glm::dvec3 limit_shaded_normal(const glm::dvec3& shaded, const glm::dvec3& norma
   return least_cosine * normal + (sine / length) * aside;
 }
 
-glm::dvec3 shaded_goal(const glm::dvec3& goal, const glm::dvec3& proxy, const glm::dmat3& metric,
-                       std::span<const glm::dvec3> shaded_normals) noexcept {
-  // Counted from the proxy, so that distance from the origin costs no digits.
-  std::array<polygon::ContactPlane, 3> planes;
-  const std::size_t count = std::min(shaded_normals.size(), planes.size());
-  for (std::size_t i = 0; i < count; ++i) planes[i].normal = shaded_normals[i];
-  const glm::dvec3 way = goal - proxy;
-  const polygon::PlaneMinimum held = polygon::minimise_on_planes(
-      way, metric, std::span<const polygon::ContactPlane>(planes.data(), count), 1e-12 * glm::length(way));
-  return held.feasible ? proxy + held.point : goal;
+glm::dmat3 shading_metric(const glm::dmat3& metric, std::span<const glm::dvec3> shaded_normals) noexcept {
+  if (shaded_normals.empty()) return metric;
+  const glm::dmat3 compliance = glm::inverse(metric);
+  const double size = compliance[0][0] + compliance[1][1] + compliance[2][2];
+  glm::dmat3 rest = compliance, along(0.0);  // rest: of the ways that no normal before spans
+  for (const glm::dvec3& normal : shaded_normals) {
+    const glm::dvec3 way = rest * normal;
+    const double square = glm::dot(way, normal);
+    if (!(square > kSameNormal * size)) continue;
+    along += glm::outerProduct(way, way) / square;
+    rest -= glm::outerProduct(way, way) / square;
+  }
+  return glm::inverse(along + kAside * compliance);
 }
 
 }  // namespace hybrid

@@ -59,7 +59,8 @@ struct FrictionStep {
 // minimum without friction, so what the hand puts in is stored or lost. Where the surface curves the way can
 // be longer; `friction_spends` says whether it spent energy, and a proxy for which it did not stays.
 //
-// In a tick of several passes the first one's `sliding` is handed on, and the later ones are told true.
+// In a tick of several passes a proxy that slid in one of them is told to the later ones, and to the next
+// tick, as sliding.
 FrictionStep friction_target(const glm::dvec3& proxy, const glm::dvec3& target, const glm::dmat3& metric,
                              const glm::dvec3& normal, double static_friction, double dynamic_friction,
                              bool sliding) noexcept;
@@ -125,14 +126,14 @@ inline constexpr double kLeastShadedCosine = 0.5;  // 60°
 glm::dvec3 limit_shaded_normal(const glm::dvec3& shaded, const glm::dvec3& normal,
                                double least_cosine = kLeastShadedCosine) noexcept;
 
-// First pass of Ruspini's two: the goal (minimum of the pull without surfaces) as planes through the proxy
-// with the shaded normals would hold it. The second pass is the proxy's own step towards this goal on the
-// true planes. To repeat with p' = what the second pass returns and the shaded normals at p' until p' stays:
-// there A (goal − p') lies in the cone of the shaded normals, so the force does. Each pass brings the proxy
-// nearer by a factor of depth / (radius of curvature that the normals pretend + tool radius), below 1
-// wherever the depth is below that radius: 4 passes are plenty, and the last p' is feasible even where it is
-// not. At most three normals count; `goal` where the proxy is not pressed, or they leave no room.
-glm::dvec3 shaded_goal(const glm::dvec3& goal, const glm::dvec3& proxy, const glm::dmat3& metric,
-                       std::span<const glm::dvec3> shaded_normals) noexcept;
+// The metric in which the proxy goes freely along the pull of the shaded normals, and hardly beside it: its
+// step to the minimum of (q − goal)ᵀ M (q − goal) on the true planes is then to where the ways back from the
+// goal along those normals meet the surface, so that A (goal − q) lies in their span. To repeat with the
+// shaded normals at q until q stays: each pass brings it nearer by a factor of depth / (radius of curvature
+// that the normals pretend + tool radius), below 1 wherever the depth is below that radius. (Ruspini's two
+// passes, a goal level with the proxy and then the step towards it, were rejected: held by the true normals,
+// the goal is thrown over a convex edge and back by the depth times the angle between the facets.) At most
+// three normals count; `metric` when there are none.
+glm::dmat3 shading_metric(const glm::dmat3& metric, std::span<const glm::dvec3> shaded_normals) noexcept;
 
 }  // namespace hybrid

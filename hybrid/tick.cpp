@@ -98,7 +98,7 @@ void learn_stiffness(const World& world, WorldState& state, const glm::dvec3& de
 // One pass: the proxy goes to the minimum of ½K|q − x|² plus the tissue's quadratic model, outside everything
 // rigid; then the tissue answers. Returns how far the proxy went.
 double move_proxy(const World& world, WorldState& state, const glm::dvec3& device, bool near_soft,
-                  double travel, Sweep& sweep) noexcept {
+                  double travel, bool first_pass, Sweep& sweep) noexcept {
   const double k = world.tool.stiffness_N_per_m;
   glm::dmat3 model(k);
   for (const voxel::Reaction& reaction : state.reactions) model += reaction.stiffness_N_per_m;
@@ -106,7 +106,7 @@ double move_proxy(const World& world, WorldState& state, const glm::dvec3& devic
   const glm::dvec3 pull = pull_on_proxy(world, state, device);
   // Without tissue the target is the device, to the last bit.
   const glm::dvec3 target = near_soft ? state.proxy_m + glm::inverse(metric) * pull : device;
-  sweep = sweep_with_feel(world, state, target, metric, travel);
+  sweep = sweep_with_feel(world, state, target, metric, travel, first_pass);
   const glm::dvec3 delta = sweep.point - state.proxy_m;
   state.proxy_m = sweep.point;
   if (near_soft) {
@@ -165,7 +165,7 @@ Sweep settle_contact(const World& world, WorldState& state, const glm::dvec3& de
   if (around.near_soft) press_soft(world, state, state.proxy_m, glm::dvec3(0.0), 0);
   const double travel = around.near_soft ? around.range_m / kPasses : around.range_m;
   for (int pass = 0; pass < kPasses && !around.free; ++pass) {
-    const double moved = move_proxy(world, state, device, around.near_soft, travel, sweep);
+    const double moved = move_proxy(world, state, device, around.near_soft, travel, pass == 0, sweep);
     if (!around.near_soft || (pass > 0 && moved < kStill * world.contact_radius_m())) break;
   }
   if (around.near_soft) give_way(world, state, before, sweep);

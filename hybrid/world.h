@@ -11,6 +11,7 @@
 #include <glm/gtc/quaternion.hpp>
 #include <limits>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -88,6 +89,7 @@ struct World {
   device::ForceLimits limits;
   // A point is a ball too, of this radius: 1e-7 of the scene, far above rounding and far below anything felt.
   double skin_m = 0.0;
+  double extent_m = 0.0;    // diagonal of all objects' box
   double rounding_m = 0.0;  // what a coordinate of the scene may be off by
   double encoder_m = 0.0;   // what the device's position is rounded to
   bool use_map = true;      // false: every object is asked every time; a baseline to time the map against
@@ -99,10 +101,10 @@ struct World {
   [[nodiscard]] double contact_radius_m() const { return std::max(tool.radius_m, skin_m); }
   // Sets skin_m and rounding_m for rigid objects and soft ones within the box.
   void set_scale(const glm::dvec3& low, const glm::dvec3& high) {
-    const double extent = glm::length(high - low);
+    extent_m = glm::length(high - low);
     const double furthest = glm::length(glm::max(glm::abs(low), glm::abs(high)));
-    rounding_m = 8.0 * std::numeric_limits<double>::epsilon() * std::max(furthest, extent);
-    skin_m = std::max(1e-7 * extent, 1e2 * rounding_m);
+    rounding_m = 8.0 * std::numeric_limits<double>::epsilon() * std::max(furthest, extent_m);
+    skin_m = std::max(1e-7 * extent_m, 1e2 * rounding_m);
   }
 };
 
@@ -145,6 +147,16 @@ struct ActiveElement {
   glm::dvec3 force_N{0.0};  // on the proxy, scene frame
 };
 
+// One plane of the proxy's problem, and whose it is.
+struct HeldElement {
+  std::uint32_t object = 0, element = 0;
+  polygon::SeparatingPlane in_body;
+  bool own_plane = true;  // the element's own plane may be used
+  bool flat = false;      // and it is what in_body says, from wherever it is seen
+  bool touching = false;  // the proxy where the last sweep left it is known to lie on it
+};
+inline constexpr std::uint32_t kMaxHeld = 32;
+
 // Everything the tick writes. Buffers are sized when the world is built, and never after.
 struct WorldState {
   WorldState(const World& world, OccupancyMap occupancy);
@@ -164,12 +176,15 @@ struct WorldState {
   std::uint64_t truncated_ticks = 0;  // ticks that ended before the proxy arrived, by a bound on its steps
   double hidden_stiffness_N_per_m = 0.0;  // what tissue showed beyond the model of its pressed voxels
   std::vector<RigidNear> rigid;           // [rigid]
+  std::span<glm::dvec3> trail;            // for tests: where the steps of the last sweep began
   glm::dvec3 swept_to_m{0.0};             // where the last sweep ended: what is known is known from there
   std::array<ActiveElement, 3> active{};  // elements that held the proxy last
   std::uint32_t active_count = 0;
   bool stuck = false;          // friction holds the proxy on what is active
   bool sliding = false;        // or lets it slide
+  bool pushed = false;         // a body moved the proxy since, to where what is active may not be
   glm::dvec3 friction_N{0.0};  // on the proxy: what friction and shading add to what presses
+  std::uint32_t rubbed = 0;    // the rigid object that this comes from, and that carries the proxy
   DampingState damping;
   // The rigid objects with surface within `look_m` of `look_at`, along each axis, as the map said.
   glm::dvec3 look_at{0.0};
@@ -189,6 +204,7 @@ struct WorldState {
   std::vector<glm::dvec3> rigid_force_N;   // [rigid], scene frame
   std::vector<voxel::Reaction> reactions;  // [soft], scene frame
   std::vector<polygon::NearPoint> near;    // scratch
+  std::array<HeldElement, kMaxHeld> held{};
   std::vector<polygon::ContactPlane> planes;
   std::vector<voxel::ToolBound> bounds;
   std::vector<std::uint32_t> found;

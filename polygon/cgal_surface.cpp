@@ -139,7 +139,7 @@ class CgalSurface final : public RigidSurface {
   [[nodiscard]] GatherResult gather(const glm::dvec3& point, double radius,
                                     std::span<NearPoint> out) const noexcept override;
   [[nodiscard]] bool nearest(const glm::dvec3& point, double radius, NearPoint& out) const noexcept override;
-  [[nodiscard]] GatherResult survey(const glm::dvec3& centre, double radius,
+  [[nodiscard]] GatherResult survey(const glm::dvec3& centre, double radius, const glm::dvec3& view,
                                     std::span<SeenElement> out) const noexcept override;
   [[nodiscard]] NearPoint closest(std::uint32_t element, const glm::dvec3& point) const noexcept override;
   [[nodiscard]] glm::dvec3 face_normal(std::uint32_t element) const noexcept override;
@@ -253,14 +253,15 @@ bool CgalSurface::nearest(const glm::dvec3& point, double radius, NearPoint& out
   return true;
 }
 
-GatherResult CgalSurface::survey(const glm::dvec3& centre, double radius,
+GatherResult CgalSurface::survey(const glm::dvec3& centre, double radius, const glm::dvec3& view,
                                  std::span<SeenElement> out) const noexcept {
   GatherResult result;
   if (!answerable(centre, radius)) return result;
   const glm::dvec3 local = centre - centre_;
   auto leaf = [&](std::uint32_t element, double& squared_radius) {
     TriangleSight sight;
-    if (!see_triangle(local, radius, corners_(element, 0), corners_(element, 1), corners_(element, 2), sight))
+    if (!see_triangle(local, radius, view - centre_, corners_(element, 0), corners_(element, 1),
+                      corners_(element, 2), sight))
       return;
     if (result.count == out.size()) {
       result.complete = false;

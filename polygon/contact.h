@@ -54,9 +54,9 @@ class RigidSurface {
                                      NearPoint& out) const noexcept = 0;
 
   // What lies around a place: every element that comes within `radius` of `centre`, and perhaps others nearly
-  // so near, by geometry alone and not by how they are found. In no order. complete = false: the output was
-  // too small, and is worthless.
-  [[nodiscard]] virtual GatherResult survey(const glm::dvec3& centre, double radius,
+  // so near, by geometry alone and not by how they are found, each as seen from `view`. In no order.
+  // complete = false: the output was too small, and is worthless.
+  [[nodiscard]] virtual GatherResult survey(const glm::dvec3& centre, double radius, const glm::dvec3& view,
                                             std::span<SeenElement> out) const noexcept = 0;
 
   // The closest point of one element.

@@ -61,7 +61,7 @@ class MeshSurface final : public RigidSurface {
   [[nodiscard]] GatherResult gather(const glm::dvec3& point, double radius,
                                     std::span<NearPoint> out) const noexcept override;
   [[nodiscard]] bool nearest(const glm::dvec3& point, double radius, NearPoint& out) const noexcept override;
-  [[nodiscard]] GatherResult survey(const glm::dvec3& centre, double radius,
+  [[nodiscard]] GatherResult survey(const glm::dvec3& centre, double radius, const glm::dvec3& view,
                                     std::span<SeenElement> out) const noexcept override;
   [[nodiscard]] NearPoint closest(std::uint32_t element, const glm::dvec3& point) const noexcept override;
   [[nodiscard]] glm::dvec3 face_normal(std::uint32_t element) const noexcept override {
@@ -86,7 +86,7 @@ class MeshSurface final : public RigidSurface {
   };
   struct SurveyQuery {
     const MeshSurface* surface;
-    glm::dvec3 centre;  // from centre_
+    glm::dvec3 centre, view;  // from centre_
     double radius;
     std::span<SeenElement> out;
     GatherResult result;
@@ -301,7 +301,8 @@ bool MeshSurface::on_survey(RTCPointQueryFunctionArguments* args) {
   const std::uint32_t element = self.element_of(args->primID);
   const TriangleIndices& t = self.triangles_[element];
   TriangleSight sight;
-  if (!see_triangle(q.centre, q.radius, self.vertex(t[0]), self.vertex(t[1]), self.vertex(t[2]), sight))
+  if (!see_triangle(q.centre, q.radius, q.view, self.vertex(t[0]), self.vertex(t[1]), self.vertex(t[2]),
+                    sight))
     return false;
   if (q.result.count == q.out.size()) {
     q.result.complete = false;
@@ -312,9 +313,9 @@ bool MeshSurface::on_survey(RTCPointQueryFunctionArguments* args) {
   return false;
 }
 
-GatherResult MeshSurface::survey(const glm::dvec3& centre, double radius,
+GatherResult MeshSurface::survey(const glm::dvec3& centre, double radius, const glm::dvec3& view,
                                  std::span<SeenElement> out) const noexcept {
-  SurveyQuery q{this, {}, radius, out, {}};
+  SurveyQuery q{this, {}, view - centre_, radius, out, {}};
   RTCPointQuery query{};
   float float_error = 0.0F;
   if (!prepare(centre, radius, q.centre, float_error, query)) return {};

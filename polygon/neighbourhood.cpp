@@ -50,7 +50,7 @@ void Neighbourhood::set_plane(std::uint32_t i, const SeparatingPlane& plane) noe
 
 bool Neighbourhood::survey(const RigidSurface& surface, const glm::dvec3& centre, double margin,
                            double radius, const glm::dvec3& view) noexcept {
-  const GatherResult result = surface.survey(centre, radius + margin, seen_);
+  const GatherResult result = surface.survey(centre, radius + margin, view, seen_);
   if (!result.complete) {
     forget();
     return false;
@@ -61,7 +61,7 @@ bool Neighbourhood::survey(const RigidSurface& surface, const glm::dvec3& centre
   for (std::uint32_t i = 0; i < count_; ++i) {
     const SeenElement& seen = seen_[i];
     element_[i] = seen.element;
-    // Too near for a rough plane to pass between, or on the other side of it: an exact one.
+    // Too near for a rough plane to pass between: an exact one.
     const bool clear = glm::dot(seen.normal, view) >= seen.reach + radius;
     set_plane(i, clear ? SeparatingPlane{seen.normal, seen.reach + radius}
                        : separate(surface, seen.element, view, radius));
@@ -72,8 +72,8 @@ bool Neighbourhood::survey(const RigidSurface& surface, const glm::dvec3& centre
 void Neighbourhood::see_from(const RigidSurface& surface, const glm::dvec3& view, double radius,
                              double rounding) noexcept {
   if (!known()) return;
-  const double deepest = measure(x_.data(), y_.data(), z_.data(), offset_.data(), view.x, view.y, view.z,
-                                 depth_.data(), count_);
+  const double deepest =
+      measure(x_.data(), y_.data(), z_.data(), offset_.data(), view.x, view.y, view.z, depth_.data(), count_);
   if (!(deepest > rounding)) return;
   for (std::uint32_t i = 0; i < count_; ++i) {
     if (depth_[i] > rounding) set_plane(i, separate(surface, element_[i], view, radius));

@@ -69,8 +69,8 @@ class Neighbourhood {
 
   void set_plane(std::uint32_t i, const SeparatingPlane& plane) noexcept;
 
-  // Makes anew, from `view`, which touches nothing, all planes that say otherwise: when the proxy did not come
-  // here by a way that they allowed.
+  // Makes anew, from `view`, which touches nothing, all planes that say otherwise: when the proxy did not
+  // come here by a way that they allowed.
   void see_from(const RigidSurface& surface, const glm::dvec3& view, double radius, double rounding) noexcept;
 
  private:

@@ -102,12 +102,13 @@ class PrimitiveSurface final : public RigidSurface {
   }
 
   // One convex element, as near from anywhere.
-  [[nodiscard]] GatherResult survey(const glm::dvec3& centre, double radius,
+  [[nodiscard]] GatherResult survey(const glm::dvec3& centre, double radius, const glm::dvec3& view,
                                     std::span<SeenElement> out) const noexcept override {
     NearPoint seen;
     if (!nearest(centre, radius, seen)) return {};
     if (out.empty()) return {0, false};
-    const glm::dvec3 normal = seen.distance > 0.0 ? (centre - seen.point) / seen.distance : glm::dvec3(0.0);
+    seen = closest(0, view);
+    const glm::dvec3 normal = seen.distance > 0.0 ? (view - seen.point) / seen.distance : glm::dvec3(0.0);
     out[0] = {normal, glm::dot(normal, seen.point), 0};
     return {1, true};
   }

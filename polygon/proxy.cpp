@@ -37,7 +37,7 @@ struct Candidate {
 
 // Lower triangle L of a symmetric positive definite matrix, A = L Lᵀ (Golub & Van Loan, Matrix
 // Computations, 4.2), inverted.
-glm::dmat3 inverse_cholesky(const glm::dmat3& a) noexcept {
+glm::dmat3 inverse_cholesky_of(const glm::dmat3& a) noexcept {
   const double l00 = std::sqrt(a[0][0]), l10 = a[0][1] / l00, l20 = a[0][2] / l00;
   const double l11 = std::sqrt(a[1][1] - l10 * l10), l21 = (a[1][2] - l20 * l10) / l11;
   const double l22 = std::sqrt(a[2][2] - l20 * l20 - l21 * l21);
@@ -99,12 +99,14 @@ bool solve_subset(const glm::dmat3& inverse_l, const glm::dvec3& target, std::sp
 
 }  // namespace
 
-PlaneMinimum minimise_on_planes(const glm::dvec3& target, const glm::dmat3& metric,
+Metric::Metric(const glm::dmat3& a) noexcept : inverse_l_(inverse_cholesky_of(a)) {}
+
+PlaneMinimum minimise_on_planes(const glm::dvec3& target, const Metric& metric,
                                 std::span<const ContactPlane> planes, double tolerance) noexcept {
   PlaneMinimum result;
   result.point = target;
   if (planes.empty()) return result;
-  const glm::dmat3 inverse_l = inverse_cholesky(metric);
+  const glm::dmat3& inverse_l = metric.inverse_cholesky();
   // Far from the origin the offsets themselves are rounded.
   tolerance += 16.0 * std::numeric_limits<double>::epsilon() * glm::length(target);
   glm::dvec3 way(0.0);

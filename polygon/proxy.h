@@ -27,12 +27,27 @@ struct PlaneMinimum {
   bool feasible = true;                   // false: the planes leave no room, `point` breaks the last one
 };
 
+// A symmetric positive definite metric A, factored once for many problems.
+class Metric {
+ public:
+  explicit Metric(const glm::dmat3& a) noexcept;
+  // L⁻¹ of A = L Lᵀ, lower triangular ([column][row]).
+  [[nodiscard]] const glm::dmat3& inverse_cholesky() const noexcept { return inverse_l_; }
+
+ private:
+  glm::dmat3 inverse_l_;
+};
+
 // The point nearest to `target` in the metric (q − t)ᵀ A (q − t), A symmetric positive definite, in the
 // intersection of the planes' half-spaces. Exact: the most violated plane joins, and of the subsets of at
 // most three planes that contain it the one with non-negative multipliers is kept; the distance grows each
 // time, so it ends (an LP-type problem, Sharir & Welzl 1992). A plane counts as violated beyond `tolerance`
 // (unit: meter). Bounded, allocates nothing.
-PlaneMinimum minimise_on_planes(const glm::dvec3& target, const glm::dmat3& metric,
+PlaneMinimum minimise_on_planes(const glm::dvec3& target, const Metric& metric,
                                 std::span<const ContactPlane> planes, double tolerance) noexcept;
+inline PlaneMinimum minimise_on_planes(const glm::dvec3& target, const glm::dmat3& metric,
+                                       std::span<const ContactPlane> planes, double tolerance) noexcept {
+  return minimise_on_planes(target, Metric(metric), planes, tolerance);
+}
 
 }  // namespace polygon

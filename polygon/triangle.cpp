@@ -12,6 +12,7 @@
 namespace polygon {
 namespace {
 
+constexpr double kSmallestSquare = 1e-200;  // of a cross product, that still has all its digits
 constexpr double kDegenerateSineSquared = 1e-28;
 // A normal is off by rounding / sine, and a foot along it by that share of the triangle's length: 0.5 % at a
 // sine of 4e-14. Below this sine the edges, half a width away at most, are nearer the truth where they are
@@ -54,8 +55,11 @@ bool is_degenerate(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c
 }
 
 glm::dvec3 unit_normal(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) noexcept {
-  if (is_degenerate(a, b, c)) return glm::dvec3(0.0);
-  // Scaled first: the cross product of two nanometer edges would have a length whose square is denormal.
+  const glm::dvec3 n = glm::cross(b - a, c - a);
+  if (normal_is_rounding(n, b - a, c - a)) return glm::dvec3(0.0);
+  const double square = glm::dot(n, n);
+  if (square > kSmallestSquare) return n * (1.0 / std::sqrt(square));
+  // Scaled first: the cross product of two nanometer edges has a length whose square is denormal.
   return glm::normalize(glm::cross(glm::normalize(b - a), glm::normalize(c - a)));
 }
 
@@ -108,18 +112,6 @@ TrianglePoint closest_on_triangle(const glm::dvec3& p, const glm::dvec3& a, cons
 glm::dvec3 closest_point_on_triangle(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b,
                                      const glm::dvec3& c) noexcept {
   return closest_on_triangle(p, a, b, c).point;
-}
-
-bool see_triangle(const glm::dvec3& centre, double radius, const glm::dvec3& a, const glm::dvec3& b,
-                  const glm::dvec3& c, TriangleSight& sight) noexcept {
-  const glm::dvec3 low = glm::min(glm::min(a, b), c), high = glm::max(glm::max(a, b), c);
-  const glm::dvec3 out = glm::max(glm::max(low - centre, centre - high), glm::dvec3(0.0));
-  if (!(glm::dot(out, out) <= radius * radius)) return false;
-  const glm::dvec3 away = centre - (a + b + c) * (1.0 / 3.0);
-  const double length = glm::length(away);
-  sight.normal = length > 0.0 ? away / length : glm::dvec3(0.0);
-  sight.reach = std::max({glm::dot(sight.normal, a), glm::dot(sight.normal, b), glm::dot(sight.normal, c)});
-  return glm::dot(sight.normal, centre) - sight.reach <= radius;
 }
 
 }  // namespace polygon

@@ -122,9 +122,9 @@ TEST_P(CgalSurfacePlaced, SurveyMissesNothingAndIsEmbreesToo) {
     for (int i = 0; i < 40; ++i) {
       const dvec3 centre = random_place(random);
       const double radius = 0.5 * GetParam().scale * (i % 5) / 4.0;
-      const GatherResult result = surface->survey(centre, radius, out);
+      const GatherResult result = surface->survey(centre, radius, centre, out);
       ASSERT_TRUE(result.complete);
-      ASSERT_EQ(other->survey(centre, radius, others).count, result.count);
+      ASSERT_EQ(other->survey(centre, radius, centre, others).count, result.count);
       std::sort(out.begin(), out.begin() + result.count, by_element);
       std::sort(others.begin(), others.begin() + result.count, by_element);
       std::vector<bool> seen(mesh.triangles.size(), false);
@@ -141,7 +141,7 @@ TEST_P(CgalSurfacePlaced, SurveyMissesNothingAndIsEmbreesToo) {
         }
       }
       if (result.count > 1) {
-        EXPECT_FALSE(surface->survey(centre, radius, std::span(out).first(1)).complete);
+        EXPECT_FALSE(surface->survey(centre, radius, centre, std::span(out).first(1)).complete);
       }
     }
   }
