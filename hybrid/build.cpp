@@ -14,8 +14,8 @@
 #include "hybrid/arbitration.h"
 #include "hybrid/build_objects.h"
 #include "hybrid/label_surface.h"
-#include "hybrid/scene_feel.h"
 #include "hybrid/process_memory.h"
+#include "hybrid/scene_feel.h"
 #include "hybrid/soft_stage.h"
 
 namespace hybrid {
@@ -24,7 +24,7 @@ namespace {
 constexpr int kSurfaceSmoothing = 6;  // of a soft object's drawn surface
 // Cells along the scene's longest side, at most, unless the scene says otherwise: 64 bricks however they lie.
 constexpr double kMostCells = 504.0;
-constexpr double kDrawnPoint = 0.004;  // of the scene: a tool is drawn no smaller
+constexpr double kDrawnPoint = 0.004;      // of the scene: a tool is drawn no smaller
 constexpr double kRigidCells = 200.0;      // where nothing is soft: finer cells name no fewer objects
 constexpr std::size_t kMapReserve = 2048;  // bricks that motion may add
 constexpr double kFarthestLook = 32.0;     // spacings that one distance query may clear of carving
@@ -398,7 +398,16 @@ std::string in_words(const ObjectBox& box) {
                      1e3 * box.high.x, 1e3 * box.low.y, 1e3 * box.high.y, 1e3 * box.low.z, 1e3 * box.high.z);
 }
 
-void fill_soft_moved(const World& world, const WorldState& state, Snapshot& snapshot) {
+void fill_moved(const World& world, const WorldState& state, Snapshot& snapshot) {
+  snapshot.rigid_place.resize(world.rigid.size());
+  for (std::size_t o = 0; o < world.rigid.size(); ++o) {
+    const Pose &before = world.rigid[o].pose, &now = state.rigid[o].pose;
+    RigidPlace& place = snapshot.rigid_place[o];
+    place.moved = now.position_m != before.position_m || now.rotation != before.rotation;
+    place.about_m = before.position_m;
+    place.way_m = now.position_m - before.position_m;
+    place.turn = now.rotation * glm::conjugate(before.rotation);
+  }
   snapshot.soft_moved_m.resize(world.object_count());
   for (std::size_t o = 0; o < world.soft.size(); ++o) {
     const SoftBody& body = world.soft[o];

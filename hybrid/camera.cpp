@@ -27,13 +27,34 @@ void for_some_vertices(const DrawnScene& scene, const Snapshot& snapshot, const 
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
     const auto& rest = scene.objects[i].surface.vertices;
     const bool moved = i < snapshot.soft_moved_m.size() && snapshot.soft_moved_m[i].size() == rest.size();
+    const RigidPlace place = snapshot.place_of(i);
     const std::size_t stride = rest.size() / at_most + 1;
     for (std::size_t v = 0; v < rest.size(); v += stride) {
-      const glm::dvec3 at = moved ? rest[v] + glm::dvec3(snapshot.soft_moved_m[i][v]) : rest[v];
+      const glm::dvec3 at = moved ? rest[v] + glm::dvec3(snapshot.soft_moved_m[i][v]) : place(rest[v]);
       if (finite(at)) visit(at);
     }
   }
 }
+
+// Of finite points.
+struct Bounds {
+  glm::dvec3 lower{std::numeric_limits<double>::infinity()}, upper{-std::numeric_limits<double>::infinity()};
+
+  void add(const glm::dvec3& at) {
+    if (!finite(at)) return;
+    lower = glm::min(lower, at);
+    upper = glm::max(upper, at);
+  }
+  [[nodiscard]] SceneBounds ball() const {
+    SceneBounds bounds;
+    if (!(lower.x <= upper.x)) return bounds;  // nothing finite: an empty picture about the origin
+    bounds.centre_m = 0.5 * (lower + upper);
+    bounds.radius_m = 0.5 * glm::length(upper - lower);
+    // A scene that is one point still needs a view of some size.
+    if (!(bounds.radius_m > 0.0)) bounds.radius_m = std::max(1e-3, 1e-9 * glm::length(bounds.centre_m));
+    return bounds;
+  }
+};
 
 struct Candidate {
   double azimuth, elevation;
@@ -52,11 +73,13 @@ void add_hidden(const DrawnScene& scene, const Snapshot& snapshot, std::span<Can
     // A rigid object in front is drawn transparent, so it matters less than tissue.
     const double weight = object.soft ? 1.0 : 0.35;
     const auto& vertices = object.surface.vertices;
+    const RigidPlace place = snapshot.place_of(i);
     const std::size_t stride = object.surface.triangles.size() / at_most + 1;
     for (std::size_t t = 0; t < object.surface.triangles.size(); t += stride) {
       const auto& corner = object.surface.triangles[t];
       if (std::max({corner[0], corner[1], corner[2]}) >= vertices.size()) continue;
-      const glm::dvec3 &a = vertices[corner[0]], &b = vertices[corner[1]], &c = vertices[corner[2]];
+      const glm::dvec3 a = place(vertices[corner[0]]), b = place(vertices[corner[1]]),
+                       c = place(vertices[corner[2]]);
       const glm::dvec3 to = (a + b + c) / 3.0 - snapshot.proxy_m;
       const double distance = glm::length(to);
       if (!(distance > 1.5 * scene.tool_radius_m) || !std::isfinite(distance)) continue;
@@ -120,32 +143,25 @@ glm::dmat4 Camera::clip_from_scene(double aspect, const glm::dvec3& origin_m, co
   return projection * glm::lookAt(eye_m() - origin_m, target_m - origin_m, glm::dvec3(0.0, 0.0, 1.0));
 }
 
+SceneBounds bounds_of(const polygon::TriangleMesh& surface) {
+  Bounds box;
+  for (const glm::dvec3& at : surface.vertices) box.add(at);
+  return box.ball();
+}
+
 SceneBounds bounds_of(const DrawnScene& scene, const Snapshot* snapshot) {
-  glm::dvec3 lower(std::numeric_limits<double>::infinity());
-  glm::dvec3 upper(-std::numeric_limits<double>::infinity());
-  const auto add = [&](const glm::dvec3& at) {
-    lower = glm::min(lower, at);
-    upper = glm::max(upper, at);
-  };
-  for (const DrawnObject& object : scene.objects) {
-    for (const glm::dvec3& at : object.surface.vertices) {
-      if (finite(at)) add(at);
-    }
+  Bounds box;
+  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+    const RigidPlace place = snapshot != nullptr ? snapshot->place_of(i) : RigidPlace{};
+    for (const glm::dvec3& at : scene.objects[i].surface.vertices) box.add(place(at));
   }
   if (snapshot != nullptr) {
     for (const glm::dvec3& at : {snapshot->proxy_m, snapshot->device_m}) {
-      if (!finite(at)) continue;
-      add(at - scene.tool_radius_m);
-      add(at + scene.tool_radius_m);
+      box.add(at - scene.tool_radius_m);
+      box.add(at + scene.tool_radius_m);
     }
   }
-  SceneBounds bounds;
-  if (!(lower.x <= upper.x)) return bounds;  // nothing finite: an empty picture about the origin
-  bounds.centre_m = 0.5 * (lower + upper);
-  bounds.radius_m = 0.5 * glm::length(upper - lower);
-  // A scene that is one point still needs a view of some size.
-  if (!(bounds.radius_m > 0.0)) bounds.radius_m = std::max(1e-3, 1e-9 * glm::length(bounds.centre_m));
-  return bounds;
+  return box.ball();
 }
 
 Camera frame_scene(const DrawnScene& scene, const Snapshot& snapshot, double aspect) {

@@ -40,12 +40,13 @@ struct Camera {
                                            const glm::dvec3& centre_m, double radius_m) const;
 };
 
-// Ball that contains every finite vertex of the scene at rest; radius > 0 always. With a snapshot also the
-// tool where the proxy and the device are.
+// Ball that contains every finite vertex of the scene at rest; radius > 0 always. With a snapshot rigid
+// objects where they are then, and also the tool where the proxy and the device are.
 struct SceneBounds {
   glm::dvec3 centre_m{0.0};
   double radius_m = 1.0;
 };
+SceneBounds bounds_of(const polygon::TriangleMesh& surface);
 SceneBounds bounds_of(const DrawnScene& scene, const Snapshot* snapshot = nullptr);
 
 // The whole scene, seen from the side where least stands between eye and tool, at an angle to the force that

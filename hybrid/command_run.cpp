@@ -52,7 +52,7 @@ void check_writable(const std::filesystem::path& file) {
 
 void save_soft_surfaces(const std::filesystem::path& file, const BuiltScene& built) {
   Snapshot now;
-  fill_soft_moved(*built.world, *built.state, now);
+  fill_moved(*built.world, *built.state, now);
   polygon::TriangleMesh all;
   for (std::size_t o = 0; o < built.world->soft.size(); ++o) {
     const auto first = static_cast<std::uint32_t>(all.vertices.size());

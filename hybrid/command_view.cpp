@@ -97,7 +97,7 @@ class Player {
     out.force_N = felt.force_N;
     out.feel = built_.state->feel;
     out.tick_us = felt.tick_us;
-    fill_soft_moved(*built_.world, *built_.state, out);
+    fill_moved(*built_.world, *built_.state, out);
   }
 
  private:

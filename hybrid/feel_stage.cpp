@@ -219,9 +219,12 @@ Sweep sweep_with_feel(const World& world, WorldState& state, const glm::dvec3& t
   end_friction(state);
   if (!swept) smooth = sweep_proxy(world, state, state.proxy_m, target, metric, travel);
   const Contacts touched = contacts_of(world, state, smooth.point);
+  if (touched.count == 0) return smooth;
+  state.rubbed = rubbing(touched);
+  state.stuck = mixed(touched).static_friction > 0.0;  // from here a body carries it
   if (!touched.any([](const SurfaceFeel& f) { return f.shading; })) return smooth;
   smooth = shade(world, state, {target, metric, travel}, smooth);
-  return whole(state, {target, metric, travel}, rubbing(touched), smooth);
+  return whole(state, {target, metric, travel}, state.rubbed, smooth);
 }
 
 glm::dvec3 added_force(const World& world, WorldState& state, const glm::dvec3& device_m,

@@ -67,6 +67,15 @@ glm::mat4 place_tool(const DrawnScene& scene, const glm::dvec3& at_m, const glm:
   return placed(at_m - origin_m, {r, 0.0, 0.0, 0.0, r, 0.0, 0.0, 0.0, height});
 }
 
+glm::mat4 place_rigid(const RigidPlace& place, const glm::dvec3& origin_m) {
+  if (!place.moved) return glm::mat4(1.0F);
+  const glm::dmat3 turn = glm::mat3_cast(place.turn);
+  const glm::dvec3 about = place.about_m - origin_m;
+  glm::dmat4 placed(turn);
+  placed[3] = glm::dvec4(about + place.way_m - turn * about, 1.0);
+  return glm::mat4(placed);
+}
+
 glm::mat4 place_tool_disc(const DrawnScene& scene, const glm::dvec3& at_m, const Camera& camera,
                           const glm::dvec3& origin_m) {
   const double r = std::max(1.8 * scene.tool_radius_m, 0.015 * camera.view_height_m());

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Where the tool and the force arrow are drawn: placements of the unit shapes of draw_geometry.h.
+// Where things are drawn: placements of the unit shapes of draw_geometry.h (tool and force arrow), and of
+// rigid objects that move.
 #pragma once
 
 #include <glm/mat4x4.hpp>
@@ -29,6 +30,9 @@ ArrowPlacement place_arrow(const DrawnScene& scene, const Snapshot& snapshot, co
 // Unit ball (or, for a punch, unit cylinder) to tool. A flat punch touches with its lower face, the disc
 // about `at_m`; its body stands above, along scene +z.
 glm::mat4 place_tool(const DrawnScene& scene, const glm::dvec3& at_m, const glm::dvec3& origin_m);
+
+// A rigid object from where it lies at rest to where it is, relative to `origin_m`; composed in doubles.
+glm::mat4 place_rigid(const RigidPlace& place, const glm::dvec3& origin_m);
 
 // Unit disc to a disc about the tool that faces the camera, a little larger than the tool: what rigid
 // surfaces must not hide.

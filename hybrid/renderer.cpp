@@ -114,6 +114,8 @@ struct Object {
   DrawMesh moving;  // kept for a soft object only
   bool soft = false;
   glm::vec3 colour{1.0F};
+  SceneBounds bounds;      // at rest
+  glm::mat4 placed{1.0F};  // from where it was uploaded to where it is
 };
 
 bool finite(const glm::dvec3& v) {
@@ -213,9 +215,9 @@ void Renderer::State::draw_objects(bool soft, int pass) const {
   uniform("pass", pass);
   uniform("alpha", 1.0F);
   uniform("shine", soft ? 0.10F : 0.05F);
-  place(glm::mat4(1.0F));
   for (const Object& object : objects) {
     if (object.soft != soft || object.mesh.count == 0) continue;
+    place(object.placed);
     uniform("own_colour", object.colour);
     uniform("moved_scale", soft ? static_cast<float>(most_moved_m) : 0.0F);
     object.mesh.draw();
@@ -260,6 +262,7 @@ Renderer::Renderer(const DrawnScene& scene, Samples samples) : state_(std::make_
     Object& object = s.objects[i];
     object.soft = scene.objects[i].soft;
     object.colour = palette::of_object(scene, i);
+    object.bounds = bounds_of(scene.objects[i].surface);
     DrawMesh mesh = object.soft ? make_moving_mesh(scene.objects[i].surface, s.origin_m)
                                 : make_draw_mesh(scene.objects[i].surface, s.origin_m);
     object.mesh.upload(mesh, object.soft ? GL_STREAM_DRAW : GL_STATIC_DRAW);
@@ -317,6 +320,7 @@ void Renderer::begin(const DrawnScene& scene, const Snapshot& snapshot, int widt
   s.build_targets();
   for (std::size_t i = 0; i < s.objects.size(); ++i) {
     Object& object = s.objects[i];
+    object.placed = place_rigid(snapshot.place_of(i), s.origin_m);
     if (!object.soft || i >= snapshot.soft_moved_m.size() || i >= scene.objects.size()) continue;
     const auto& rest = scene.objects[i].surface.vertices;
     if (snapshot.soft_moved_m[i].size() != rest.size() || rest.size() != object.moving.vertices.size())
@@ -351,6 +355,12 @@ void Renderer::draw(const DrawnScene& scene, const Snapshot& snapshot, const Cam
   for (const glm::dvec3& at : {snapshot.proxy_m, snapshot.device_m, arrow_tip(scene, snapshot, camera)}) {
     if (finite(at))
       radius = std::max(radius, glm::length(at - s.bounds.centre_m) + 4.0 * scene.tool_radius_m);
+  }
+  for (std::size_t i = 0; i < s.objects.size(); ++i) {
+    const RigidPlace place = snapshot.place_of(i);
+    const glm::dvec3 at = place(s.objects[i].bounds.centre_m);
+    if (place.moved && finite(at))
+      radius = std::max(radius, glm::length(at - s.bounds.centre_m) + 1.1 * s.objects[i].bounds.radius_m);
   }
   const glm::mat4 clip(camera.clip_from_scene(static_cast<double>(where.width) / where.height, s.origin_m,
                                               s.bounds.centre_m, radius));

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "polygon/round_contact.h"
+
 namespace hybrid {
 namespace {
 
@@ -20,6 +22,10 @@ constexpr double kAhead = 0.6;  // of its margin a survey is made ahead of the p
 constexpr double kGoodCount = 24.0, kGoodUnderBall = 104.0;
 constexpr double kShortLook = 0.05, kLongerLook = 32.0;
 constexpr double kLookCells = 8.0;  // how far the map is asked beyond the ball, in cells
+constexpr double kFurtherLook = 4.0;  // times as far, when that ends a step
+// Round an edge or a corner, of the ball: how far beyond the minimum over its planes a step goes, and over
+// which way their turning is measured.
+constexpr double kRoundStep = 0.5, kTurnStep = 1e-4;
 
 // Which objects a sweep minds.
 struct Scope {
@@ -36,6 +42,7 @@ class Sweeper {
         state_(state),
         target_(target),
         metric_(metric),
+        factored_(metric),
         held_(state.held),
         scope_(scope),
         radius_(world.contact_radius_m()),
@@ -64,6 +71,15 @@ class Sweeper {
       const double length = glm::length(move);
       const double still =
           kConvergedWay * glm::length(target_ - point_) + kConvergedBall * radius_ + rounding_;
+      if (round_.taken && !round_step_paid()) {
+        sweep.point = round_.instead;
+        continue;
+      }
+      if (take_round_step(still, travel)) {
+        sweep.point = round_.to;
+        travel -= glm::length(round_.to - point_);
+        continue;
+      }
       if (length <= still && fraction_ == 1.0) {
         if (loosen_false_contacts()) continue;
         sweep.point = minimum_.point;
@@ -101,14 +117,72 @@ class Sweeper {
     }
   }
 
+  [[nodiscard]] double cost(const glm::dvec3& q) const noexcept {
+    return glm::dot(q - target_, metric_ * (q - target_));
+  }
+
+  // Held by something round, the proxy goes on to where the minimum will be when the planes have turned. That
+  // is a way uphill, and must pay with the next step.
+  bool take_round_step(double still, double travel) noexcept {
+    if (round_.useless || round_.taken || fraction_ != 1.0 || minimum_.active_count == 0 ||
+        glm::length(minimum_.point - point_) > radius_) {
+      round_.taken = false;
+      return false;
+    }
+    round_.taken = false;
+    std::array<polygon::TurningPlane, 3> planes;
+    bool turns = false;
+    for (std::uint32_t n = 0; n < minimum_.active_count; ++n) {
+      const HeldElement& held = held_[minimum_.active[n]];
+      planes[n] = {state_.planes[minimum_.active[n]].normal, minimum_.multiplier[n]};
+      if (held.flat) continue;
+      const BodyFrame& frame = state_.rigid[held.object].frame;
+      const glm::dvec3 view = frame.to_body(point_);
+      const glm::dvec3 on_plane =
+          view + (held.in_body.offset - glm::dot(held.in_body.normal, view)) * held.in_body.normal;
+      planes[n].turning = frame.rotation *
+                          polygon::turning_of(*world_.rigid[held.object].surface, held.element, on_plane,
+                                              kTurnStep * radius_) *
+                          glm::transpose(frame.rotation);
+      turns = true;
+    }
+    if (!turns) return false;
+    round_.instead = minimum_.point;
+    round_.to = polygon::minimum_on_turning_planes(
+        point_, minimum_.point, metric_, {planes.data(), minimum_.active_count}, kRoundStep * radius_);
+    const bool clear = glm::length(round_.to - round_.instead) > still &&
+                       glm::length(round_.to - point_) < travel && clear_part(round_.to) == 1.0 &&
+                       first_in_the_way(round_.to, 1.0).object == kNobody;
+    ended_ = 0;
+    look_ended_ = false;
+    if (!clear) return false;
+    stepped_ = glm::length(round_.to - point_);
+    round_.taken = true;
+    keep_active();
+    return true;
+  }
+
+  // Is what was reached better than the minimum that was left for it? If not, back to that, and no more of it.
+  bool round_step_paid() noexcept {
+    const glm::dvec3 reached = point_ + fraction_ * (minimum_.point - point_);
+    constexpr double kSame = 1.0 + 1e-14;
+    if (cost(reached) <= kSame * cost(round_.instead)) return true;
+    round_.taken = false;
+    round_.useless = true;
+    held_count_ = 0;
+    look_afresh(round_.instead);
+    return false;
+  }
+
   // Which objects are near, and that what is known of them covers the proxy.
   bool look() noexcept {
     const double room = state_.look_m - radius_ - max_component(glm::abs(point_ - state_.look_at));
     if (scope_.kind == Scope::Kind::only) {
       state_.look_m = -1.0;  // what the map said of the scene is not what is asked
     } else if (state_.look_m < 0.0 || room < 0.0 || look_ended_) {
+      if (look_ended_) look_cells_ *= kFurtherLook;  // too short-sighted for this motion
       state_.look_at = point_;
-      state_.look_m = radius_ + kLookCells * state_.map.cell_m();
+      state_.look_m = radius_ + look_cells_ * state_.map.cell_m();
       state_.look_mask = world_.use_map ? state_.map.rigid_in(point_ - state_.look_m, point_ + state_.look_m)
                                         : ~std::uint64_t{0};
       look_ended_ = false;
@@ -166,7 +240,7 @@ class Sweeper {
     held_count_ = kept;
     for (std::uint32_t i = 0; i < held_count_; ++i) state_.planes.push_back(in_scene(held_[i]));
     for (std::uint32_t n = 0; n < kMaxExchanges; ++n) {
-      minimum_ = polygon::minimise_on_planes(target_, metric_, state_.planes, rounding_);
+      minimum_ = polygon::minimise_on_planes(target_, factored_, state_.planes, rounding_);
       if (!minimum_.feasible) {
         state_.faults |= fault_infeasible;
         return false;  // stay: the place before was outside everything
@@ -177,18 +251,31 @@ class Sweeper {
       HeldElement first{kNobody, 0, {}, true};
       for (double part = held_count_ == 0 ? short_look(minimum_.point) : 1.0;; part *= kLongerLook) {
         const double share = std::min(part, 1.0) * fraction_;
-        first = first_in_the_way(share == 1.0 ? minimum_.point : point_ + share * (minimum_.point - point_));
+        first = first_in_the_way(minimum_.point, share);
         if (first.object != kNobody || part >= 1.0) break;
       }
       if (first.object == kNobody) return true;
-      if (held_count_ == kMaxHeld) return false;
       // Found by the plane across its closest point, which says soonest what is really met; held by its own,
       // which lets the proxy come up to it at once, not by halves.
       make_plane(first);
+      if (held_count_ == kMaxHeld || n + 1 == kMaxExchanges) {
+        stop_before(first);
+        return true;
+      }
       held_[held_count_++] = first;
       state_.planes.push_back(in_scene(first));
     }
-    return false;
+    return true;
+  }
+
+  // Too many planes for one step: the way to the minimum over those known ends at the next.
+  void stop_before(const HeldElement& next) noexcept {
+    const BodyFrame& frame = state_.rigid[next.object].frame;
+    const glm::dvec3 end = point_ + fraction_ * (minimum_.point - point_);
+    fraction_ *=
+        polygon::Neighbourhood::part_before(next.in_body, frame.to_body(point_), frame.to_body(end));
+    ended_ = 0;
+    look_ended_ = false;
   }
 
   // Of the way to q, a part as long as a twentieth of the last step.
@@ -234,22 +321,24 @@ class Sweeper {
     return part;
   }
 
-  // The element that the way to q meets first; kNobody when the way is clear.
-  HeldElement first_in_the_way(const glm::dvec3& q) noexcept {
+  // The element that the first `part` of the way to q meets first; kNobody when that is clear.
+  HeldElement first_in_the_way(const glm::dvec3& q, double part) noexcept {
     HeldElement first{kNobody, 0, {}, true};
     double soonest = 2.0;
     for (std::uint32_t o = 0; o < world_.rigid.size(); ++o) {
-      if (asked(o)) first_of(o, q, first, soonest);
+      if (asked(o)) first_of(o, q, part, first, soonest);
     }
     return first;
   }
 
   // Planes seen from elsewhere say too soon rather than too late: so the soonest is seen from here instead,
   // until the soonest is one that was.
-  void first_of(std::uint32_t o, const glm::dvec3& q, HeldElement& first, double& soonest) noexcept {
+  void first_of(std::uint32_t o, const glm::dvec3& q, double part, HeldElement& first,
+                double& soonest) noexcept {
     using Broken = polygon::Neighbourhood::Broken;
     RigidNear& near = state_.rigid[o];
-    const glm::dvec3 view = near.frame.to_body(point_), end = near.frame.to_body(q);
+    const glm::dvec3 view = near.frame.to_body(point_), goal = near.frame.to_body(q);
+    const glm::dvec3 end = part == 1.0 ? goal : view + part * (goal - view);
     const double tolerance = 2.0 * rounding_;
     std::span<Broken> broken = near.near.broken(view, end, tolerance);
     while (!broken.empty()) {
@@ -270,7 +359,11 @@ class Sweeper {
       if (!covered(candidate))
         candidate.in_body = polygon::separate(*world_.rigid[o].surface, candidate.element, view, radius_);
       near.near.set_plane(broken[n].index, candidate.in_body);
-      if (candidate.in_body.offset - glm::dot(candidate.in_body.normal, end) > tolerance) {
+      // A plane that only the first part of the way breaks, by what rounding did to where the proxy stands, is
+      // being left.
+      const double depth = candidate.in_body.offset - glm::dot(candidate.in_body.normal, end);
+      const double at_goal = candidate.in_body.offset - glm::dot(candidate.in_body.normal, goal);
+      if (depth > tolerance && at_goal > tolerance) {
         broken[n].fresh = true;
         broken[n].part = polygon::Neighbourhood::part_before(candidate.in_body, view, end);
       } else {
@@ -385,7 +478,8 @@ class Sweeper {
   const World& world_;
   WorldState& state_;
   const glm::dvec3 target_;
-  const polygon::Metric metric_;
+  const glm::dmat3 metric_;
+  const polygon::Metric factored_;
   std::array<HeldElement, kMaxHeld>& held_;
   const Scope scope_;
   const double radius_, rounding_;
@@ -393,10 +487,16 @@ class Sweeper {
   glm::dvec3 direction_{0.0};  // of the last way tried, unit
   std::uint32_t held_count_ = 0;
   polygon::PlaneMinimum minimum_;
+  struct RoundStep {
+    bool taken = false;    // the last step was one
+    bool useless = false;  // one did not pay in this sweep
+    glm::dvec3 instead{0.0}, to{0.0};
+  } round_;
   double stepped_ = 0.0;     // how long the last step was
   double fraction_ = 1.0;    // of the way to the minimum that is known to be clear
   std::uint32_t ended_ = 0;  // 1 + the object whose neighbourhood ended the way
   bool look_ended_ = false;  // the map's look ended it
+  double look_cells_ = kLookCells;
   std::uint32_t surveys_ = 0;
 };
 

@@ -32,28 +32,18 @@ std::uint64_t mix(std::uint64_t hash, const glm::dvec3& v) noexcept {
   return hash;
 }
 
+std::uint64_t mix(std::uint64_t hash, const glm::dquat& q) noexcept {
+  for (const double x : {q.w, q.x, q.y, q.z}) hash = mix(hash, std::bit_cast<std::uint64_t>(x));
+  return hash;
+}
+
 // The state again, sharing nothing that moves.
 std::unique_ptr<WorldState> copy_state(const World& world, const WorldState& state) {
   auto copy = std::make_unique<WorldState>(world, OccupancyMap(state.map));
   for (const auto& object : state.soft) copy->soft.push_back(object->copy());
   copy->prepare(world);
   copy->map.reserve_bricks(1024);
-  copy->proxy_m = state.proxy_m;
-  copy->device_m = state.device_m;
-  copy->rigid = state.rigid;
-  copy->active = state.active;
-  copy->active_count = state.active_count;
-  copy->look_at = state.look_at;
-  copy->look_m = state.look_m;
-  copy->look_mask = state.look_mask;
-  copy->swept_to_m = state.swept_to_m;
-  copy->time_s = state.time_s;
-  copy->stuck = state.stuck;
-  copy->sliding = state.sliding;
-  copy->hidden_stiffness_N_per_m = state.hidden_stiffness_N_per_m;
-  copy->obstacle_seen = state.obstacle_seen;
-  copy->paired = state.paired;
-  for (const VoxelPair& pair : state.pairs) copy->pairs.push_back(pair);
+  static_cast<CarriedState&>(*copy) = state;
   return copy;
 }
 
@@ -243,6 +233,11 @@ std::uint64_t hash_tick(std::uint64_t before, const TickResult& tick) noexcept {
 
 std::uint64_t hash_state(std::uint64_t before, const WorldState& state) noexcept {
   std::uint64_t hash = before;
+  for (const RigidNear& body : state.rigid) {
+    hash = mix(mix(hash, body.pose.position_m), body.pose.rotation);
+    hash = mix(mix(hash, body.free.centre_m), body.free.rotation);
+    hash = mix(mix(hash, body.free.velocity_m_per_s), body.free.spin_rad_per_s);
+  }
   for (const auto& object : state.soft) {
     for (const auto& axis : object->state().u) {
       for (const float u : axis) hash = mix(hash, std::bit_cast<std::uint32_t>(u));
@@ -259,27 +254,18 @@ Snapshot take_snapshot(const World& world, const WorldState& state, const TickRe
                     .force_N = tick.force_N,
                     .feel = state.feel,
                     .soft_moved_m = {},
+                    .rigid_place = {},
                     .tick_us = tick.tick_us};
-  fill_soft_moved(world, state, snapshot);
+  fill_moved(world, state, snapshot);
   return snapshot;
 }
 
 std::optional<glm::dvec3> equilibrium_force(const World& world, const WorldState& state, double tolerance_N) {
   const std::unique_ptr<WorldState> copy = copy_state(world, state);
   // The same physics with a generous budget: only how soon it settles may differ, not where.
-  World patient;
-  patient.tool = world.tool;
-  patient.limits = world.limits;
-  patient.skin_m = world.skin_m;
-  patient.rounding_m = world.rounding_m;
-  patient.meeting = world.meeting;
-  for (const SoftBody& body : world.soft) {
-    SoftBody slow = body;
-    slow.drawn = {};
-    slow.budget = kSettleBudget;
-    patient.soft.push_back(std::move(slow));
-  }
-  patient.rigid = world.rigid;
+  World patient = world;
+  for (SoftBody& body : patient.soft) body.budget = kSettleBudget;
+  for (RigidObject& object : patient.rigid) object.motion = {};  // what moves stands still meanwhile
   const device::DeviceState still{.position_m = state.device_m};
   glm::dvec3 before(0.0);
   for (int n = 1; n <= kSettleTicks; ++n) {

@@ -71,7 +71,8 @@ std::unique_ptr<device::HapticDevice> scene_device(const Scene& scene,
 // Starts the proxy or throws SceneError.
 void begin_session(const Scene& scene, const World& world, WorldState& state, const glm::dvec3& device_m);
 
-// Hashes. The running one takes what is felt, the final one also every displacement.
+// Hashes. The running one takes what is felt, the final one also every displacement, and where every rigid
+// body is and how it moves.
 std::uint64_t hash_tick(std::uint64_t before, const TickResult& tick) noexcept;
 std::uint64_t hash_state(std::uint64_t before, const WorldState& state) noexcept;
 
@@ -80,7 +81,7 @@ Snapshot take_snapshot(const World& world, const WorldState& state, const TickRe
 
 // The force that the present device position would be answered with once everything soft has come to rest
 // (N), found on a copy of the state, until it changes by less than `tolerance_N` over dozens of whole
-// relaxation cycles. Empty when it does not settle.
+// relaxation cycles; bodies that move stand still meanwhile. Empty when it does not settle.
 std::optional<glm::dvec3> equilibrium_force(const World& world, const WorldState& state,
                                             double tolerance_N = 1e-4);
 

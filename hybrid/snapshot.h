@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/gtc/quaternion.hpp>
 #include <glm/vec3.hpp>
 #include <string>
 #include <vector>
@@ -31,6 +32,17 @@ struct ObjectFeel {
   double force_N = 0.0;  // what this object contributes
 };
 
+// Where a rigid object is now, against where it lies at rest: a turn about a point that goes along with it.
+struct RigidPlace {
+  bool moved = false;
+  glm::dvec3 about_m{0.0}, way_m{0.0};  // scene frame
+  glm::dquat turn{1.0, 0.0, 0.0, 0.0};
+
+  [[nodiscard]] glm::dvec3 operator()(const glm::dvec3& at_rest_m) const {
+    return moved ? about_m + way_m + turn * (at_rest_m - about_m) : at_rest_m;
+  }
+};
+
 struct Snapshot {
   std::uint64_t tick = 0;
   double t_s = 0.0;
@@ -40,7 +52,12 @@ struct Snapshot {
   // (scene frame, meters). Displacements, because a float position 1,000 km from the origin is off by
   // centimeters.
   std::vector<std::vector<glm::vec3>> soft_moved_m;
+  std::vector<RigidPlace> rigid_place;  // one an object; fewer: the rest have not moved
   double tick_us = 0.0;
+
+  [[nodiscard]] RigidPlace place_of(std::size_t object) const {
+    return object < rigid_place.size() ? rigid_place[object] : RigidPlace{};
+  }
 };
 
 // One row of a trace: what was felt in one tick.

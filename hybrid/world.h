@@ -157,15 +157,9 @@ struct HeldElement {
 };
 inline constexpr std::uint32_t kMaxHeld = 32;
 
-// Everything the tick writes. Buffers are sized when the world is built, and never after.
-struct WorldState {
-  WorldState(const World& world, OccupancyMap occupancy);
-  // Sizes what depends on `soft`, once that is filled.
-  void prepare(const World& world);
-
+// What goes from tick to tick as plain values: assigning it is taking over the state.
+struct CarriedState {
   // ---- of the session ----
-  std::vector<std::unique_ptr<voxel::SoftObject>> soft;  // one a World::soft
-  OccupancyMap map;
   glm::dvec3 proxy_m{0.0};   // scene frame
   glm::dvec3 device_m{0.0};  // last good input
   device::ForceLimitState limit;
@@ -176,7 +170,6 @@ struct WorldState {
   std::uint64_t truncated_ticks = 0;  // ticks that ended before the proxy arrived, by a bound on its steps
   double hidden_stiffness_N_per_m = 0.0;  // what tissue showed beyond the model of its pressed voxels
   std::vector<RigidNear> rigid;           // [rigid]
-  std::span<glm::dvec3> trail;            // for tests: where the steps of the last sweep began
   glm::dvec3 swept_to_m{0.0};             // where the last sweep ended: what is known is known from there
   std::array<ActiveElement, 3> active{};  // elements that held the proxy last
   std::uint32_t active_count = 0;
@@ -198,6 +191,17 @@ struct WorldState {
       obstacle_seen;                  // [soft][surface voxel] displacement at which its obstacle was made
   std::vector<std::uint32_t> cursor;  // [soft] round-robin over surface voxels
   std::vector<std::uint32_t> pair_cursor;  // [meeting]
+};
+
+// Everything the tick writes. Buffers are sized when the world is built, and never after.
+struct WorldState : CarriedState {
+  WorldState(const World& world, OccupancyMap occupancy);
+  // Sizes what depends on `soft`, once that is filled.
+  void prepare(const World& world);
+
+  std::vector<std::unique_ptr<voxel::SoftObject>> soft;  // one a World::soft
+  OccupancyMap map;
+  std::span<glm::dvec3> trail;  // for tests: where the steps of the last sweep began
 
   // ---- of the current tick ----
   std::vector<ObjectFeel> feel;            // [rigid…, soft…]

@@ -198,8 +198,9 @@ TEST_F(Texture, ClosedWaysOverAFlatReliefGiveTheHandNothing) {
         const Gain gain = closed_way(touch, {0, 0, 0.01}, way.at, 2, 2e-6);
         std::printf("energy, %s%s, %s: the hand gains %+.3g mJ\n", image ? "image" : "pattern",
                     friction ? ", rough" : "", way.name, 1e3 * gain.work_J);
-        // Between ticks the force is not linear in the way: what the trapezoidal rule makes of that.
-        EXPECT_LE(gain.work_J, friction ? 0.0 : 1e-9);
+        // Between ticks the force is not linear in the way, and the trapezoidal rule makes something of that
+        // (of an image's spline; it vanishes with the step): a millionth of what goes in and out again.
+        EXPECT_LE(gain.work_J, friction ? 0.0 : 1e-8);
       }
     }
   }
@@ -244,7 +245,9 @@ TEST_F(Feel, DampingResistsTheWayInNeverPullsAndEndsWithTheMotion) {
   EXPECT_LE(work.gained_J(), 0.0);
 }
 
-TEST_F(Feel, DampingGivesNoEnergyHoweverTheToolShakes) {
+// A sampled damper is late by half a tick, and shaken faster than a third of the rate it gives where it
+// should take. It is found out, and left out (surface_feel.h): what it has given by then stays all there is.
+TEST_F(Feel, DampingFeedsNoShaking) {
   RigidDescription plate = box();
   for (const double damping : {1.0, 10.0, 100.0}) {
     plate.feel.damping_N_s_per_m = damping;
@@ -252,16 +255,17 @@ TEST_F(Feel, DampingGivesNoEnergyHoweverTheToolShakes) {
       Touch touch(scene_of({plate}, kRadius), {0, 0, 0.02});
       touch.go({0, 0, kRadius - 2e-3}, 1e-4, 50);
       Work work;
-      double least = 1e9;
-      for (int n = 0; n <= 1000; ++n) {
+      double least = 1e9, first = 0.0;
+      for (int n = 0; n <= 4000; ++n) {
         const double z = kRadius - 2e-3 + 5e-4 * std::sin(2.0 * glm::pi<double>() * hz * 1e-3 * n);
         const TickResult felt = touch.at({0, 0, z});
         work.add(felt);
         least = std::min(least, felt.force_N.z);
+        if (n == 1000) first = work.gained_J();
       }
       EXPECT_GE(least, 0.0);
-      // A sampled damper may give back some of what it takes, for a while (surface_feel.h).
-      EXPECT_LE(work.gained_J(), 0.0) << damping << " N s/m at " << hz << " Hz";
+      EXPECT_LE(work.gained_J(), first + 1e-12) << damping << " N s/m at " << hz << " Hz";
+      EXPECT_LE(work.gained_J(), hz < 333.0 / 2.0 ? 0.0 : 5e-4) << damping << " N s/m at " << hz << " Hz";
     }
   }
 }
