@@ -15,6 +15,7 @@ nlohmann::ordered_json report(const Scene& scene, const Comparison& comparison) 
   nlohmann::ordered_json j = report_head("compare");
   j["scene"] = scene.file.string();
   j["object"] = comparison.object;
+  if (!comparison.note.empty()) j["note"] = comparison.note;
   j["jnd"] = {{"share", kJndShare}, {"floor_N", comparison.jnd_floor_N}};
   j["models"] = nlohmann::ordered_json::array();
   for (const ModelResult& m : comparison.models) {
@@ -42,6 +43,7 @@ int compare(const CompareCommand& command) {
   fmt::print(words, "\"{}\" along the path of {}\n", comparison.object, scene.file.filename().string());
   fmt::print(words, "errors against: {}; 1 JND = max(7 %, {:.2f} N)\n\n", comparison.reference_text,
              comparison.jnd_floor_N);
+  if (!comparison.note.empty()) fmt::print(words, "{}\n\n", comparison.note);
   fmt::print(words, "{:<18} {:>8} {:>8} {:>8} {:>8} {:>7} {:>9} {:>9} {:>9} {:>9} {:>9}\n", "model", "rms N",
              "max N", "JND p50", "JND p99", ">1 JND", "dir p99", "work J", "p50 us", "p99 us", "max us");
   for (const ModelResult& m : comparison.models) {

@@ -97,10 +97,27 @@ ModelResult run_model(const std::string& name, const Scene& scene, const Progres
   return model;
 }
 
-ModelResult closed_model(const ClosedForm& form, const Tool& tool, const std::vector<TraceRow>& like) {
+// Where the object is in each tick; the same for all of one that stays.
+std::vector<Pose> poses_along(const RigidDescription& rigid, const Scene& scene, std::size_t ticks) {
+  std::vector<Pose> poses(ticks, rigid.pose);
+  if (!std::holds_alternative<PathMotion>(rigid.motion)) return poses;
+  const RigidMotion motion(rigid, rigid.pose, {}, false);
+  double t_s = 0.0;
+  for (Pose& pose : poses) pose = motion.pose_at(t_s += 1.0 / scene.rate_hz);  // as the tick counts it
+  return poses;
+}
+ClosedForm at_pose(const ClosedForm& form, const Pose& pose) {
+  ClosedForm moved = form;
+  moved.pose = pose;
+  return moved;
+}
+
+ModelResult closed_model(const ClosedForm& form, const Tool& tool, const std::vector<TraceRow>& like,
+                         const std::vector<Pose>& poses) {
   ModelResult model{.name = law_of(form, tool), .rows = {}, .depth_m = {}, .tick_us = {}};
-  for (const TraceRow& row : like) {
-    const Depth depth = depth_in(form, tool, row.device_m);
+  for (std::size_t i = 0; i < like.size(); ++i) {
+    const TraceRow& row = like[i];
+    const Depth depth = depth_in(at_pose(form, poses[i]), tool, row.device_m);
     TraceRow felt{.t_s = row.t_s, .device_m = row.device_m};
     felt.force_N = force_at(form, tool, depth.depth_m) * depth.out;
     felt.proxy_m = row.device_m + felt.force_N / tool.stiffness_N_per_m;
@@ -111,14 +128,15 @@ ModelResult closed_model(const ClosedForm& form, const Tool& tool, const std::ve
 }
 
 // The surface of the proxy's own model, without the proxy.
-ModelResult classic_model(const RigidDescription& rigid, const Tool& tool,
-                          const std::vector<TraceRow>& like) {
+ModelResult classic_model(const RigidDescription& rigid, const Tool& tool, const std::vector<TraceRow>& like,
+                          const std::vector<Pose>& poses) {
   std::vector<BuildNote> notes;
   const RigidObject object = build_rigid(rigid, notes);
   ModelResult model{.name = "nearest-surface", .rows = {}, .depth_m = {}, .tick_us = {}};
-  for (const TraceRow& row : like) {
-    const ClassicForce felt = nearest_surface_force(*object.surface, object.pose, row.device_m, tool.radius_m,
-                                                    tool.stiffness_N_per_m);
+  for (std::size_t i = 0; i < like.size(); ++i) {
+    const TraceRow& row = like[i];
+    const ClassicForce felt =
+        nearest_surface_force(*object.surface, poses[i], row.device_m, tool.radius_m, tool.stiffness_N_per_m);
     model.rows.push_back({.t_s = row.t_s,
                           .device_m = row.device_m,
                           .proxy_m = row.device_m + felt.force_N / tool.stiffness_N_per_m,
@@ -129,18 +147,22 @@ ModelResult classic_model(const RigidDescription& rigid, const Tool& tool,
 }
 
 // A rigid closed form knows where the device is, and not where it came from: it holds as long as the place it
-// would have the tool at never jumps further than the device moves (the rest is rounding and rounded
-// corners).
-bool holds_along(const ClosedForm& form, const Tool& tool, const std::vector<TraceRow>& rows) {
+// would have the tool at never jumps further than the device moves, seen from the object (the rest is
+// rounding and rounded corners).
+bool holds_along(const ClosedForm& form, const Tool& tool, const std::vector<TraceRow>& rows,
+                 const std::vector<Pose>& poses) {
   if (form.young_Pa > 0.0) return true;
   constexpr double most = 4.0;
-  glm::dvec3 before(0.0);
+  const ClosedForm at_origin = at_pose(form, {});
+  glm::dvec3 out_before(0.0), device_before(0.0);
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    const Depth depth = depth_in(form, tool, rows[i].device_m);
+    const glm::dvec3 device = glm::conjugate(poses[i].rotation) * (rows[i].device_m - poses[i].position_m);
+    const Depth depth = depth_in(at_origin, tool, device);
     const glm::dvec3 out = std::max(0.0, depth.depth_m) * depth.out;
-    const double moved = i > 0 ? glm::length(rows[i].device_m - rows[i - 1].device_m) : 0.0;
-    if (i > 0 && glm::length(out - before) > most * moved + 1e-3 * tool.radius_m) return false;
-    before = out;
+    const double moved = i > 0 ? glm::length(device - device_before) : 0.0;
+    if (i > 0 && glm::length(out - out_before) > most * moved + 1e-3 * tool.radius_m) return false;
+    out_before = out;
+    device_before = device;
   }
   return true;
 }
@@ -200,19 +222,32 @@ Comparison compare_models(const Scene& scene, const std::string& object, const P
   Comparison result{.object = is_soft ? soft->name : rigid->name, .models = {}, .reference_text = {}};
   result.jnd_floor_N = jnd_floor_N(scene);
 
+  const bool moves = !is_soft && !std::holds_alternative<std::monostate>(rigid->motion);
+  if (moves && std::holds_alternative<FreeMotion>(rigid->motion)) {
+    throw SceneError(
+        scene.file, rigid->motion_place,
+        fmt::format("\"{}\" is pushed by what touches it, so each model would have it somewhere else "
+                    "and there is no one motion to compare; fix it or give it a path",
+                    rigid->name));
+  }
   const bool punch = scene.tool.shape == Tool::Shape::punch;
   std::optional<ClosedForm> form = is_soft ? closed_form_of(scene, *soft) : closed_form_of(*rigid);
   if (!punch) {  // a punch feels nothing rigid
     Scene as_proxy = bare(scene);
     as_proxy.rigid.push_back(is_soft ? as_rigid(*soft) : *rigid);
     as_proxy.rigid.back().as_mesh = true;
-    as_proxy.rigid.back().motion = {};  // felt where it begins
     result.models.push_back(run_model("mesh and proxy", as_proxy, progress));
     if (!is_soft) {
-      result.models.push_back(classic_model(as_proxy.rigid.back(), scene.tool, result.models.front().rows));
+      const auto& rows = result.models.front().rows;
+      result.models.push_back(
+          classic_model(as_proxy.rigid.back(), scene.tool, rows, poses_along(*rigid, scene, rows.size())));
     }
   }
-  const std::optional<SoftDescription> voxels = is_soft ? *soft : as_soft(*rigid);
+  std::optional<SoftDescription> voxels = is_soft ? *soft : as_soft(*rigid);
+  if (voxels && moves) {
+    result.note = "it moves, which voxels do not: they are left out";
+    voxels.reset();
+  }
   if (voxels) {
     Scene as_voxels = bare(scene);
     as_voxels.soft.push_back(*voxels);
@@ -225,8 +260,11 @@ Comparison compare_models(const Scene& scene, const std::string& object, const P
         fmt::format("{}: \"{}\" has no voxels, and a punch feels nothing else; use [tool] shape = \"ball\"",
                     scene.file.string(), result.object));
   }
-  if (form && !holds_along(*form, scene.tool, result.models.front().rows)) form.reset();
-  if (form) result.models.push_back(closed_model(*form, scene.tool, result.models.front().rows));
+  const std::size_t ticks = result.models.front().rows.size();
+  std::vector<Pose> poses;
+  if (form) poses = is_soft ? std::vector<Pose>(ticks, form->pose) : poses_along(*rigid, scene, ticks);
+  if (form && !holds_along(*form, scene.tool, result.models.front().rows, poses)) form.reset();
+  if (form) result.models.push_back(closed_model(*form, scene.tool, result.models.front().rows, poses));
 
   // A closed form is the reference where it is exact or nearly so; else what the object is in the scene.
   const bool by_form = form && form->caveat.find("left out") == std::string::npos;
@@ -238,8 +276,8 @@ Comparison compare_models(const Scene& scene, const std::string& object, const P
   for (ModelResult& model : result.models) {
     measure(model, result.models[result.reference], result.jnd_floor_N);
     if (!form) continue;
-    for (const TraceRow& row : model.rows)
-      model.depth_m.push_back(depth_in(*form, scene.tool, row.device_m).depth_m);
+    for (std::size_t i = 0; i < model.rows.size(); ++i)
+      model.depth_m.push_back(depth_in(at_pose(*form, poses[i]), scene.tool, model.rows[i].device_m).depth_m);
   }
   return result;
 }

@@ -29,12 +29,13 @@ struct Comparison {
   std::vector<ModelResult> models;
   std::size_t reference = 0;   // index into models
   std::string reference_text;  // what it is, and where it does not hold
+  std::string note{};          // what was left out, and why; may be empty
   double jnd_floor_N = 0.0;
 };
 
-// Runs each model on an ideal device along the scene's path; a moving object is felt where it begins. Throws
-// SceneError, std::runtime_error: no such object, an object that cannot be rendered both ways (with the
-// reason).
+// Runs each model on an ideal device along the scene's path; an object with a path of its own goes along it
+// in every model. Throws SceneError, std::runtime_error: no such object, one that moves freely, an object
+// that cannot be rendered both ways (with the reason).
 Comparison compare_models(const Scene& scene, const std::string& object, const Progress& progress);
 
 }  // namespace hybrid

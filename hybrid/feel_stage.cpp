@@ -233,12 +233,17 @@ glm::dvec3 added_force(const World& world, WorldState& state, const glm::dvec3& 
   const double k = world.tool.stiffness_N_per_m;
   const double damping = mixed(contacts).damping_N_s_per_m;
   glm::dvec3 added(0.0), normal(0.0);
-  for (const Contact& c : contacts) normal += c.force_N * c.normal;
+  double shares = 0.0;
+  for (const Contact& c : contacts) {
+    normal += c.force_N * c.normal;
+    shares += c.force_N;
+  }
   const double pressed = glm::length(normal);
   if (damping > 0.0 && pressed > 0.0) {
     normal /= pressed;
     const double depth = glm::dot(state.proxy_m - device_m, normal);
-    added += normal * damping_force(state.damping, k * depth, depth, damping, dt_s, world.encoder_m);
+    added = normal * damping_force(state.damping, k * depth, depth, damping, dt_s, world.encoder_m);
+    for (const Contact& c : contacts) state.rigid_force_N[c.number] += (c.force_N / shares) * added;
   } else {
     end_damping(state.damping);
   }
@@ -251,7 +256,9 @@ glm::dvec3 added_force(const World& world, WorldState& state, const glm::dvec3& 
     const double depth = glm::dot(state.proxy_m - device_m, c.normal);
     const glm::dvec3 over = device_m + (depth - world.contact_radius_m()) * c.normal;
     const TexturedContact contact{frame.to_body(over), c.normal * frame.rotation, c.force_N / k, k};
-    added += frame.rotation * texture_force(*c.object->feel.texture, contact);
+    const glm::dvec3 relief = frame.rotation * texture_force(*c.object->feel.texture, contact);
+    state.rigid_force_N[c.number] += relief;
+    added += relief;
   }
   return added;
 }

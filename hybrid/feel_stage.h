@@ -17,8 +17,8 @@ namespace hybrid {
 Sweep sweep_with_feel(const World& world, WorldState& state, const glm::dvec3& target,
                       const glm::dmat3& metric, double travel, bool first_pass) noexcept;
 
-// What damping and texture add to the coupling's force on the hand (N, scene frame). `device_m` is where the
-// device is. Call once a tick, with or without contact.
+// What damping and texture add to the coupling's force on the hand (N, scene frame), and to
+// state.rigid_force_N. `device_m` is where the device is. Call once a tick, with or without contact.
 glm::dvec3 added_force(const World& world, WorldState& state, const glm::dvec3& device_m,
                        double dt_s) noexcept;
 

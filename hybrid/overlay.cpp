@@ -220,8 +220,12 @@ void draw_force_label(const Pen& pen, const DrawnScene& scene, const Snapshot& s
   const std::string words = force_text(force);
   const float most_x = static_cast<float>(where.width) - pen.width(words) - 0.6F * pen.em;
   const float most_y = static_cast<float>(where.height) - 2.0F * pen.em;
+  // Beyond the tip of an arrow to the left: beside it, the words would lie on the arrow.
+  const auto base = camera.pixel(snapshot.proxy_m, where.width, where.height);
+  const bool left = base && base->x - tip->x > 0.5 * std::abs(base->y - tip->y);
+  const float aside = left ? -0.8F * pen.em - pen.width(words) : 0.8F * pen.em;
   const float x =
-      std::clamp(static_cast<float>(tip->x) + 0.8F * pen.em, 0.5F * pen.em, std::max(most_x, 0.5F * pen.em));
+      std::clamp(static_cast<float>(tip->x) + aside, 0.5F * pen.em, std::max(most_x, 0.5F * pen.em));
   const float y =
       std::clamp(static_cast<float>(tip->y) - 0.6F * pen.em, 0.5F * pen.em, std::max(most_y, 0.5F * pen.em));
   pen.label(static_cast<float>(where.x) + x, static_cast<float>(where.y) + y, colour(palette::force), words);

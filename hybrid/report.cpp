@@ -29,7 +29,8 @@ Percentiles of_stage(const std::vector<float>& values) {
 }
 
 struct ObjectRow {
-  std::string name, kind;
+  std::string name, kind, motion{};  // motion: empty for what stays
+  glm::dvec3 position_m{0.0};        // of what moves, at the end
   std::size_t triangles = 0, voxels = 0, surface_voxels = 0, memory_bytes = 0;
   std::uint64_t contact_ticks = 0;
   double max_force_N = 0.0;
@@ -37,11 +38,15 @@ struct ObjectRow {
 
 std::vector<ObjectRow> object_rows(const BuiltScene& built, const SessionResult& result) {
   std::vector<ObjectRow> rows;
-  for (const RigidObject& o : built.world->rigid) {
-    rows.push_back({.name = o.name,
+  for (std::size_t o = 0; o < built.world->rigid.size(); ++o) {
+    const RigidObject& object = built.world->rigid[o];
+    const bool free = object.motion.kind() == RigidMotion::Kind::free;
+    rows.push_back({.name = object.name,
                     .kind = "rigid",
-                    .triangles = o.drawn->triangles.size(),
-                    .memory_bytes = o.memory_bytes()});
+                    .motion = object.motion.moves() ? (free ? "free" : "path") : "",
+                    .position_m = built.state->rigid[o].pose.position_m,
+                    .triangles = object.drawn->triangles.size(),
+                    .memory_bytes = object.memory_bytes()});
   }
   for (std::size_t o = 0; o < built.world->soft.size(); ++o) {
     const voxel::SoftObject& object = *built.state->soft[o];
@@ -99,6 +104,10 @@ nlohmann::ordered_json run_report(const Scene& scene, const BuiltScene& built, S
     o["memory_bytes"] = row.memory_bytes;
     o["contact_ticks"] = row.contact_ticks;
     o["max_force_N"] = row.max_force_N;
+    if (!row.motion.empty()) {
+      o["motion"] = row.motion;
+      o["position_m"] = {row.position_m.x, row.position_m.y, row.position_m.z};
+    }
     j["objects"].push_back(o);
   }
   j["occupancy"] = {{"cells", built.state->map.occupied_cells()},

@@ -13,6 +13,8 @@ namespace {
 constexpr std::uint32_t kMaxSteps = 64;
 constexpr std::uint32_t kMaxExchanges = 64;  // planes that join or are made anew in one step
 constexpr int kMaxShrinks = 60;              // of a survey that found too much
+constexpr int kCrowded = 5;                  // so many shrinks do not help where a fan has its pole
+constexpr std::uint32_t kManySurveys = 12;   // of one sweep: then larger ones
 constexpr int kMaxFreePieces = 512;          // of the way through free space looked at in one tick
 // A step shorter than this, of the way to the target and of the ball, is the end.
 constexpr double kConvergedWay = 1e-9, kConvergedBall = 1e-7;
@@ -20,6 +22,7 @@ constexpr double kAhead = 0.6;  // of its margin a survey is made ahead of the p
 // A survey is good that finds so many elements: fewer are soon left, more are long to read. A ball has more
 // under it than a point before it is free to move at all.
 constexpr double kGoodCount = 24.0, kGoodUnderBall = 104.0;
+constexpr double kCrowdStays = 0.7;  // of the count, when half of the margin still finds it: a pole
 constexpr double kShortLook = 0.05, kLongerLook = 32.0;
 constexpr double kLookCells = 8.0;  // how far the map is asked beyond the ball, in cells
 constexpr double kFurtherLook = 4.0;  // times as far, when that ends a step
@@ -124,7 +127,8 @@ class Sweeper {
   // Held by something round, the proxy goes on to where the minimum will be when the planes have turned. That
   // is a way uphill, and must pay with the next step.
   bool take_round_step(double still, double travel) noexcept {
-    if (round_.useless || round_.taken || fraction_ != 1.0 || minimum_.active_count == 0 ||
+    if (round_.waits > 0) --round_.waits;
+    if (round_.waits > 0 || round_.taken || fraction_ != 1.0 || minimum_.active_count == 0 ||
         glm::length(minimum_.point - point_) > radius_) {
       round_.taken = false;
       return false;
@@ -162,13 +166,14 @@ class Sweeper {
     return true;
   }
 
-  // Is what was reached better than the minimum that was left for it? If not, back to that, and no more of it.
+  // Is what was reached better than the minimum that was left for it? If not, back to that, and on without for
+  // a while.
   bool round_step_paid() noexcept {
     const glm::dvec3 reached = point_ + fraction_ * (minimum_.point - point_);
     constexpr double kSame = 1.0 + 1e-14;
     if (cost(reached) <= kSame * cost(round_.instead)) return true;
     round_.taken = false;
-    round_.useless = true;
+    round_.waits = round_.patience *= 2;
     held_count_ = 0;
     look_afresh(round_.instead);
     return false;
@@ -208,14 +213,25 @@ class Sweeper {
     const polygon::RigidSurface& surface = *world_.rigid[o].surface;
     const double smallest = 1e-6 * radius_ + 1e2 * rounding_;
     if (surveys_ > 1) near.margin_m *= 2.0;  // too short-sighted for this motion
-    near.margin_m = std::min(near.margin_m, glm::length(surface.upper() - surface.lower()) + radius_);
-    for (int n = 0; n < kMaxShrinks && near.margin_m > smallest; ++n) {
+    const double longest = glm::length(surface.upper() - surface.lower()) + radius_;
+    near.margin_m = std::clamp(near.margin_m, std::min(4.0 * smallest, longest), longest);
+    // From afar as far as there is nothing.
+    const glm::dvec3 outside =
+        glm::max(glm::max(surface.lower() - view, view - surface.upper()), glm::dvec3(0.0));
+    const double apart = (glm::length(outside) - radius_) * (1.0 - 1e-9) - 4.0 * rounding_;
+    if (apart > 2.0 * near.margin_m) {
+      ++surveys_;
+      return near.near.survey(surface, view, apart, radius_, view);
+    }
+    const double margin = near.margin_m;
+    for (int n = 0; n < kMaxShrinks; ++n) {
+      if (n == kCrowded) near.margin_m = margin;
+      if (n >= kCrowded && near.margin_m < smallest) break;
       const glm::dvec3 ahead = glm::transpose(near.frame.rotation) * direction_ * (kAhead * near.margin_m);
       ++surveys_;
-      if (near.near.survey(surface, moving ? view + ahead : view, near.margin_m, radius_, view)) {
-        const double count = std::max(1.0, static_cast<double>(near.near.size()));
-        const double good = kGoodCount + kGoodUnderBall * radius_ / (radius_ + near.margin_m);
-        near.margin_m *= std::clamp(std::sqrt(good / count), 0.5, 1.5);
+      if (near.near.survey(surface, moving ? view + ahead : view, near.margin_m, radius_, view,
+                           n >= kCrowded || surveys_ > kManySurveys)) {
+        adapt_margin(near);
         return true;
       }
       near.margin_m *= 0.5;
@@ -223,6 +239,20 @@ class Sweeper {
     near.margin_m = radius_ + 1e3 * rounding_;
     state_.faults |= fault_triangle_overflow;
     return false;
+  }
+
+  // Of the next survey: so that it finds neither too few elements nor too many, if that is in its power.
+  void adapt_margin(RigidNear& near) const noexcept {
+    const double count = std::max(1.0, static_cast<double>(near.near.size()));
+    const double good = kGoodCount + kGoodUnderBall * radius_ / (radius_ + near.margin_m);
+    const bool pole = count > good && count >= kCrowdStays * near.counted && near.margin_m < near.margin_counted_m;
+    near.counted = count;
+    near.margin_counted_m = near.margin_m;
+    if (pole) {
+      near.margin_m *= 2.0;
+    } else if (surveys_ < 3 || count < good) {  // else the way of this tick is what needs it
+      near.margin_m *= std::clamp(std::sqrt(good / count), 0.5, 1.5);
+    }
   }
 
   // The minimum over the planes in the way, and how much of the way there is known to be clear.
@@ -488,8 +518,8 @@ class Sweeper {
   std::uint32_t held_count_ = 0;
   polygon::PlaneMinimum minimum_;
   struct RoundStep {
-    bool taken = false;    // the last step was one
-    bool useless = false;  // one did not pay in this sweep
+    bool taken = false;                     // the last step was one
+    std::uint32_t waits = 0, patience = 1;  // steps until the next, since one did not pay
     glm::dvec3 instead{0.0}, to{0.0};
   } round_;
   double stepped_ = 0.0;     // how long the last step was

@@ -18,7 +18,7 @@ WorldState::WorldState(const World& world, OccupancyMap occupancy) : map(std::mo
     rigid.push_back({.frame = BodyFrame(object.pose),
                      .pose = object.pose,
                      .free = {},
-                     .near = {},
+                     .near = polygon::Neighbourhood(object.surface->element_count()),
                      .margin_m = kFirstMargin * extent});
     if (object.motion.kind() == RigidMotion::Kind::free)
       rigid.back().free = state_at(object.motion.free_body(), object.pose);

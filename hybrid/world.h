@@ -138,7 +138,8 @@ struct RigidNear {
   Pose pose;           // the same
   FreeBodyState free;  // of a free body
   polygon::Neighbourhood near;
-  double margin_m = 0.0;  // of the next survey, adapted to how crowded the last one was
+  double margin_m = 0.0;  // of the next survey, adapted to how crowded the last one was:
+  double counted = 0.0, margin_counted_m = 0.0;  // elements, and how far it looked
 };
 
 // An element that holds the proxy.

@@ -8,6 +8,7 @@
 // (gather radius − r) cannot reach it either. That is why the sweep cannot tunnel.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <span>
@@ -75,6 +76,9 @@ class RigidSurface {
 
   // Is the point inside the solid? Always false for an open sheet.
   [[nodiscard]] virtual bool inside(const glm::dvec3& point) const noexcept = 0;
+
+  // Elements are numbered below this; not every number need be in use.
+  [[nodiscard]] virtual std::size_t element_count() const noexcept = 0;
 
   // Body-frame bounds (unit: meter).
   [[nodiscard]] virtual glm::dvec3 lower() const noexcept = 0;

@@ -31,15 +31,15 @@ HYBRID_WIDE double measure(const double* x, const double* y, const double* z, co
 
 }  // namespace
 
-Neighbourhood::Neighbourhood()
-    : x_(kCapacity),
-      y_(kCapacity),
-      z_(kCapacity),
-      offset_(kCapacity),
-      depth_(kCapacity),
-      element_(kCapacity),
-      seen_(kCapacity),
-      broken_(kCapacity) {}
+Neighbourhood::Neighbourhood(std::size_t elements)
+    : x_(std::min<std::size_t>(elements, kCrowded)),
+      y_(x_.size()),
+      z_(x_.size()),
+      offset_(x_.size()),
+      depth_(x_.size()),
+      element_(x_.size()),
+      seen_(x_.size()),
+      broken_(x_.size()) {}
 
 void Neighbourhood::set_plane(std::uint32_t i, const SeparatingPlane& plane) noexcept {
   x_[i] = plane.normal.x;
@@ -49,8 +49,10 @@ void Neighbourhood::set_plane(std::uint32_t i, const SeparatingPlane& plane) noe
 }
 
 bool Neighbourhood::survey(const RigidSurface& surface, const glm::dvec3& centre, double margin,
-                           double radius, const glm::dvec3& view) noexcept {
-  const GatherResult result = surface.survey(centre, radius + margin, view, seen_);
+                           double radius, const glm::dvec3& view, bool crowded) noexcept {
+  std::span<SeenElement> room(seen_);
+  if (!crowded && room.size() > kCapacity) room = room.first(kCapacity);
+  const GatherResult result = surface.survey(centre, radius + margin, view, room);
   if (!result.complete) {
     forget();
     return false;

@@ -28,16 +28,17 @@ struct SeparatingPlane {
 
 class Neighbourhood {
  public:
-  static constexpr std::uint32_t kCapacity = 768;  // elements
+  static constexpr std::uint32_t kCapacity = 768;       // elements that are read in a row in no time
+  static constexpr std::uint32_t kCrowded = 16 * 1024;  // where so many meet that no margin is small enough
 
-  // Allocates what it ever will.
-  Neighbourhood();
+  // Allocates what it ever will, for a surface of so many elements.
+  explicit Neighbourhood(std::size_t elements = kCapacity);
 
   // Every element that may come nearer than `radius` to a centre within `margin` of `centre`, with planes
   // seen from `view` (body frame), which is at least `radius` from all of them. False when they are too many:
-  // ask again with a smaller margin.
+  // ask again with a smaller margin, or, round the pole of a fan, for a crowd.
   bool survey(const RigidSurface& surface, const glm::dvec3& centre, double margin, double radius,
-              const glm::dvec3& view) noexcept;
+              const glm::dvec3& view, bool crowded = false) noexcept;
   void forget() noexcept { margin_ = -1.0; }
 
   // How far from `point` a ball's centre may go before an element that is not here could touch it; negative

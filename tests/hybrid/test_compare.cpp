@@ -91,6 +91,46 @@ TEST_F(Compare, ABallsProxyIsItsClosedFormWithinOnePercent) {
               most, 100.0 * size_error / most, proxy->direction_p99_deg);
 }
 
+TEST_F(Compare, AnObjectOnAPathIsFeltOnItInEveryModel) {
+  // The ball comes from the left under a tool that goes down, and turns about an axis beside it.
+  const auto scene = load(
+      "format = 1\n[tool]\nradius = 5\n[[rigid]]\nname = \"ball\"\nprimitive = \"ball\"\nradius = 20\n"
+      "position = [-40, 0, 0]\nmotion = \"path\"\n[rigid.path]\nkind = \"waypoints\"\nspeed = 40\n"
+      "points = [[0, 0, 0], [40, 5, 0]]\n[rigid.spin]\naxis = [0, 0, 1]\nabout = [-45, 0, 0]\nrate = 50\n"
+      "[path]\nkind = \"waypoints\"\nspeed = 20\npoints = [[0, 0, 40], [0, 0, 22, 1.0], [0, 0, 40]]\n");
+  const Comparison c = hybrid::compare_models(scene, "ball", {});
+  expect_sane(c);
+  EXPECT_EQ(named(c, "voxels"), nullptr);
+  EXPECT_FALSE(c.note.empty()) << "it says that voxels do not move";
+  const ModelResult *const proxy = named(c, "mesh and proxy"), *const nearest = named(c, "nearest-surface");
+  ASSERT_NE(proxy, nullptr);
+  ASSERT_NE(nearest, nullptr);
+  EXPECT_EQ(c.models[c.reference].name, "rigid closed form");
+  const double most = max_force(c.models[c.reference]);
+  std::printf(
+      "ball on a path: of %.2f N, proxy off by %.4f N (max) and %.2f degrees (p99), nearest surface by %.4f "
+      "N\n",
+      most, proxy->max_N, proxy->direction_p99_deg, nearest->max_N);
+  EXPECT_GT(most, 1.0);
+  EXPECT_LE(nearest->max_N, 0.05 * most);
+  EXPECT_LE(proxy->max_N, 0.05 * most);
+}
+
+TEST_F(Compare, RefusesWhatIsPushedFreely) {
+  const auto scene = load(
+      "format = 1\n[[rigid]]\nname = \"puck\"\nprimitive = \"ball\"\nradius = 4\nmotion = \"free\"\n"
+      "mass = 0.1\n" +
+      tests::path);
+  try {
+    (void)hybrid::compare_models(scene, "puck", {});
+    FAIL() << "not refused";
+  } catch (const hybrid::SceneError& error) {
+    const std::string what = error.what();
+    EXPECT_NE(what.find("\"puck\""), std::string::npos) << what;
+    EXPECT_NE(what.find("scene.toml:6"), std::string::npos) << what;
+  }
+}
+
 TEST_F(Compare, RefusesAnObjectThatIsNotThere) {
   const auto scene = load("format = 1\n" + tests::ball + tests::path);
   try {

@@ -18,6 +18,7 @@
 #include "hybrid/draw_geometry.h"
 #include "hybrid/overlay.h"
 #include "hybrid/palette.h"
+#include "polygon/primitives.h"
 
 namespace {
 
@@ -321,6 +322,61 @@ TEST_F(Picture, IsTheSameTwiceAndFarFromTheOrigin) {
   EXPECT_LT(sum / static_cast<double>(here.rgb.size()), 1.0);
 }
 
+// A bar to the left, turned and carried to the right.
+TEST_F(Picture, DrawsARigidObjectWhereItIsAtThatMoment) {
+  for (const glm::dvec3& at : {glm::dvec3(0.0), glm::dvec3(1e6, -1e6, 1e6)}) {
+    Session s;
+    s.scene.tool_radius_m = 2e-3;
+    s.scene.max_force_N = 8.5;
+    s.scene.objects.push_back({"bar", false, polygon::make_box_mesh({0.03, 0.005, 0.005}, 1)});
+    for (glm::dvec3& v : s.scene.objects[0].surface.vertices) v += at + glm::dvec3(-0.05, 0.0, 0.0);
+    s.now.proxy_m = s.now.device_m = at + glm::dvec3(0.0, 0.0, 0.08);
+    s.now.feel.resize(1);
+    Camera above;
+    above.target_m = at;
+    above.distance_m = 0.4;
+    above.elevation_rad = 1.4;
+    above.azimuth_rad = -0.5 * std::numbers::pi;
+    const auto shown = [&](const Image& image, const glm::dvec3& p) {
+      const glm::vec3 colour = image.at(*above.pixel(at + p, 960, 720));
+      return glm::length(colour - hybrid::palette::background) > 0.1F;
+    };
+    DRAW_OR_SKIP(rest, s, small(above));
+    // By 90 degrees about its own middle, and 100 mm to the right: what lay along x lies along y.
+    s.now.rigid_place = {{.moved = true,
+                          .about_m = at + glm::dvec3(-0.05, 0.0, 0.0),
+                          .way_m = {0.1, 0.0, 0.0},
+                          .turn = glm::angleAxis(0.5 * std::numbers::pi, glm::dvec3(0.0, 0.0, 1.0))}};
+    DRAW_OR_SKIP(moved, s, small(above));
+    for (const double along : {-0.028, -0.01, 0.01, 0.028}) {
+      EXPECT_TRUE(shown(rest, {-0.05 + along, 0.0, 0.005}));
+      EXPECT_FALSE(shown(moved, {-0.05 + along, 0.0, 0.005})) << "gone from where it was";
+      EXPECT_TRUE(shown(moved, {0.05, along, 0.005}));
+      EXPECT_FALSE(shown(rest, {0.05, along, 0.005}));
+    }
+    EXPECT_FALSE(shown(moved, {0.07, 0.0, 0.005})) << "no more along x";
+  }
+}
+
+// Far beyond everything that lay still, and still in the picture: neither cut off nor out of the view.
+TEST_F(Picture, FollowsARigidObjectThatLeaves) {
+  Session s;
+  s.scene.tool_radius_m = 2e-3;
+  s.scene.objects.push_back({"ball", false, ball({0.0, 0.0, 0.0}, 0.02)});
+  s.scene.objects.push_back({"other", false, ball({0.1, 0.0, 0.0}, 0.02)});
+  s.now.proxy_m = s.now.device_m = {0.0, 0.0, 0.05};
+  s.now.rigid_place.resize(2);
+  s.now.rigid_place[1] = {.moved = true, .about_m = {0.1, 0.0, 0.0}, .way_m = {0.9, 0.5, -0.3}};
+  const Camera camera = hybrid::frame_scene(s.scene, s.now);
+  const glm::dvec3 there(1.0, 0.5, -0.3);
+  const auto pixel = camera.pixel(there, 960, 720);
+  ASSERT_TRUE(pixel.has_value());
+  EXPECT_GT(std::min(pixel->x, pixel->y), 0.0);
+  EXPECT_LT(std::max(pixel->x / 960, pixel->y / 720), 1.0);
+  DRAW_OR_SKIP(image, s, small(camera));
+  EXPECT_GT(glm::length(image.at(*pixel) - hybrid::palette::background), 0.05F);
+}
+
 TEST_F(Picture, DrawsNothingAndBrokenSnapshots) {
   Session empty;
   DRAW_OR_SKIP(nothing, empty, {});
@@ -329,6 +385,8 @@ TEST_F(Picture, DrawsNothingAndBrokenSnapshots) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   broken.now.proxy_m = broken.now.device_m = broken.now.force_N = {nan, nan, nan};
   broken.now.soft_moved_m[1].resize(3);  // not this mesh's
+  broken.now.rigid_place.resize(9);      // more than there are
+  broken.now.rigid_place[0] = {.moved = true, .way_m = {nan, nan, nan}};
   broken.now.feel.clear();
   broken.scene.title = std::string(500, 'W');
   broken.scene.objects[0].name = "100 %s %n Gehörgang \xff\xfe";

@@ -4,10 +4,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <fstream>
+#include <glm/geometric.hpp>
 #include <sstream>
 
+#include "polygon/mesh_file.h"
+#include "polygon/primitives.h"
 #include "scene_file_fixture.h"
 
 namespace {
@@ -79,11 +83,52 @@ TEST_P(ShippedScene, RunSavedLoadedAndReplayedIsTheSameToTheBit) {
   EXPECT_EQ(result.ticks, recorded.ticks.size());
   EXPECT_EQ(result.state_hash, recorded.state_hash);
 }
-INSTANTIATE_TEST_SUITE_P(Replays, ShippedScene, ::testing::Values("cube", "sheet", "two-soft", "head"),
+INSTANTIATE_TEST_SUITE_P(Replays, ShippedScene,
+                         ::testing::Values("cube", "sheet", "two-soft", "head", "thin-sheet",
+                                           "textured-plate", "moving"),
                          [](const auto& scene) {
-                           return std::string(scene.param == std::string("two-soft") ? "two_soft"
-                                                                                     : scene.param);
+                           std::string name = scene.param;
+                           std::replace(name.begin(), name.end(), '-', '_');
+                           return name;
                          });
+
+// All that goes from tick to tick besides tissue: a body on a path and one that is pushed, friction, shading,
+// damping and a relief, on meshes and primitives.
+TEST_F(RecordingFile, WithMotionAndSurfaceFeelItIsTheSameToTheBit) {
+  polygon::save_ply(folder_ / "ball.ply", polygon::make_ball_mesh(0.02, 3));
+  const std::string feel =
+      "friction = [0.5, 0.3]\ndamping = 2\nshading = true\ntexture = { pattern = \"bumps\", size = 3, height "
+      "= 0.3 }\n";
+  const auto file =
+      write("moving.toml",
+            "format = 1\n[[rigid]]\nname = \"ball\"\nmesh = \"ball.ply\"\nunit = \"m\"\n" + feel +
+                "motion = \"path\"\n[rigid.path]\nkind = \"lissajous\"\ncentre = [0, 0, 0]\namplitude = [3, "
+                "0, 2]\nfrequency "
+                "= 0.7\n[rigid.spin]\naxis = [0, 1, 0.2]\nrate = 80\n[[rigid]]\nname = \"puck\"\nprimitive = "
+                "\"box\"\nsize = "
+                "[10, 20, 20]\nposition = [40, 0, 20]\nmotion = \"free\"\ndensity = 1000\ndrag = 0.5\n" +
+                feel +
+                "[path]\nkind = \"waypoints\"\nspeed = 80\npoints = [[0, 0, 40], [0, 0, 18, 1.0], [18, 2, "
+                "20], [45, 3, 20]]\n");
+  const Recording a = record(file, std::nullopt);
+  const hybrid::ReplayResult again = hybrid::replay(a, {});
+  EXPECT_TRUE(again.equal) << "parts at tick " << again.parts_at;
+  EXPECT_EQ(again.state_hash, a.state_hash);
+  const hybrid::Scene scene = hybrid::load_scene(file);
+  hybrid::BuiltScene built = hybrid::build_scene(scene);
+  const hybrid::SessionResult result =
+      hybrid::run_session(scene, built, {.seconds = std::nullopt, .progress = {}});
+  EXPECT_GT(result.object_contact_ticks[0], 500U);
+  EXPECT_GT(result.object_contact_ticks[1], 50U) << "the puck is pushed";
+  EXPECT_GT(built.state->rigid[1].pose.position_m.x, 0.041);
+  EXPECT_EQ(built.state->faults, 0U);
+  // Where the bodies are is part of the state.
+  built.state->rigid[1].free.velocity_m_per_s.x += 1e-15;
+  EXPECT_NE(hybrid::hash_state(0, *built.state), hybrid::hash_state(0, *hybrid::build_scene(scene).state));
+  const std::uint64_t before = hybrid::hash_state(0, *built.state);
+  built.state->rigid[1].free.spin_rad_per_s.z += 1e-12;
+  EXPECT_NE(hybrid::hash_state(0, *built.state), before);
+}
 
 TEST_F(RecordingFile, TwoRunsOfASceneEndInTheSameState) {
   const auto file = small_scene();

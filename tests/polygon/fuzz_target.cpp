@@ -75,7 +75,8 @@ void touch(const TriangleMesh& mesh, bool solid) {
   const double size = glm::length(high - low);
   std::array<NearPoint, 64> near;
   for (int i = 0; i < 12; ++i) {
-    const glm::dvec3 share((i % 3) * 0.55 - 0.05, (i / 3 % 2) * 0.5 + 0.25, (i / 6) * 1.1 - 0.05);
+    const int column = i % 3, row = i / 3 % 2, layer = i / 6;
+    const glm::dvec3 share(0.55 * column - 0.05, 0.5 * row + 0.25, 1.1 * layer - 0.05);
     const glm::dvec3 p = low + share * (high - low);
     NearPoint nearest;
     if (surface->nearest(p, 2.0 * size, nearest)) {
