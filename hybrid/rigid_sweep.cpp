@@ -23,8 +23,8 @@ constexpr double kAhead = 0.6;  // of its margin a survey is made ahead of the p
 // under it than a point before it is free to move at all.
 constexpr double kGoodCount = 24.0, kGoodUnderBall = 104.0;
 constexpr double kCrowdStays = 0.7;  // of the count, when half of the margin still finds it: a pole
-constexpr double kShortLook = 0.05, kLongerLook = 32.0;
-constexpr double kLookCells = 8.0;  // how far the map is asked beyond the ball, in cells
+constexpr double kShortLook = 0.05, kLongerLook = 32.0, kLeastLook = 1e-9;
+constexpr double kLookCells = 8.0;    // how far the map is asked beyond the ball, in cells
 constexpr double kFurtherLook = 4.0;  // times as far, when that ends a step
 // Round an edge or a corner, of the ball: how far beyond the minimum over its planes a step goes, and over
 // which way their turning is measured.
@@ -166,8 +166,8 @@ class Sweeper {
     return true;
   }
 
-  // Is what was reached better than the minimum that was left for it? If not, back to that, and on without for
-  // a while.
+  // Is what was reached better than the minimum that was left for it? If not, back to that, and on without
+  // for a while.
   bool round_step_paid() noexcept {
     const glm::dvec3 reached = point_ + fraction_ * (minimum_.point - point_);
     constexpr double kSame = 1.0 + 1e-14;
@@ -245,7 +245,8 @@ class Sweeper {
   void adapt_margin(RigidNear& near) const noexcept {
     const double count = std::max(1.0, static_cast<double>(near.near.size()));
     const double good = kGoodCount + kGoodUnderBall * radius_ / (radius_ + near.margin_m);
-    const bool pole = count > good && count >= kCrowdStays * near.counted && near.margin_m < near.margin_counted_m;
+    const bool pole =
+        count > good && count >= kCrowdStays * near.counted && near.margin_m < near.margin_counted_m;
     near.counted = count;
     near.margin_counted_m = near.margin_m;
     if (pole) {
@@ -302,8 +303,7 @@ class Sweeper {
   void stop_before(const HeldElement& next) noexcept {
     const BodyFrame& frame = state_.rigid[next.object].frame;
     const glm::dvec3 end = point_ + fraction_ * (minimum_.point - point_);
-    fraction_ *=
-        polygon::Neighbourhood::part_before(next.in_body, frame.to_body(point_), frame.to_body(end));
+    fraction_ *= polygon::Neighbourhood::part_before(next.in_body, frame.to_body(point_), frame.to_body(end));
     ended_ = 0;
     look_ended_ = false;
   }
@@ -311,7 +311,9 @@ class Sweeper {
   // Of the way to q, a part as long as a twentieth of the last step.
   [[nodiscard]] double short_look(const glm::dvec3& q) const noexcept {
     const double way = glm::length(q - point_);
-    return stepped_ > 0.0 && way > 0.0 ? kShortLook * stepped_ / way : 1.0;
+    if (!(stepped_ > 0.0 && way > 0.0)) return 1.0;
+    const double part = kShortLook * stepped_ / way;
+    return part > kLeastLook ? part : kLeastLook;  // nor nothing, however far q is
   }
 
   // Of the straight way to q, the part within everything that was looked at.
@@ -389,8 +391,8 @@ class Sweeper {
       if (!covered(candidate))
         candidate.in_body = polygon::separate(*world_.rigid[o].surface, candidate.element, view, radius_);
       near.near.set_plane(broken[n].index, candidate.in_body);
-      // A plane that only the first part of the way breaks, by what rounding did to where the proxy stands, is
-      // being left.
+      // A plane that only the first part of the way breaks, by what rounding did to where the proxy stands,
+      // is being left.
       const double depth = candidate.in_body.offset - glm::dot(candidate.in_body.normal, end);
       const double at_goal = candidate.in_body.offset - glm::dot(candidate.in_body.normal, goal);
       if (depth > tolerance && at_goal > tolerance) {

@@ -211,6 +211,26 @@ TEST_F(Motion, APuckPushedSteadilyFeelsItsDrag) {
   EXPECT_GE(-felt.force_N.x, drag * speed - 1e-9);
 }
 
+// The reference that the tick's force is measured against: everything as it is now, and the bodies stand
+// still.
+TEST_F(Motion, TheEquilibriumOfACopyIsWhatIsFeltNow) {
+  RigidDescription wheel = turning(rough(ball()), {0, 1, 0}, 1.0);
+  wheel.feel.shading = true;
+  Touch touch(scene_of({wheel}, kRadius), {0, 0, 0.09});
+  touch.go({0, 0, 0.06}, 1e-3);
+  for (const int ticks : {20, 500}) {  // stuck, and then sliding
+    const TickResult felt = touch.go({0, 0, kBall - 1e-3}, 1e-3, ticks);
+    const std::uint64_t before = hybrid::hash_state(0, touch.state());
+    const double time_s = touch.state().time_s;
+    const auto equilibrium = hybrid::equilibrium_force(touch.world(), touch.state());
+    ASSERT_TRUE(equilibrium.has_value());
+    EXPECT_LE(glm::length(*equilibrium - felt.force_N), 1e-3) << ticks;
+    EXPECT_EQ(hybrid::hash_state(0, touch.state()), before) << "the state itself is not touched";
+    EXPECT_EQ(touch.state().time_s, time_s);
+    EXPECT_EQ(touch.state().sliding, ticks > 100);
+  }
+}
+
 TEST_F(Motion, AllOfItAtOnceIsFiniteAtAnyTickLength) {
   for (const double dt : {1e-4, 1e-3, 1e-2}) {
     RigidDescription wheel = turning(rough(ball(2)), {0.3, 1, 0.2}, 3.0);
