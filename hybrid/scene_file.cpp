@@ -98,7 +98,8 @@ Tool read_tool(const TableReader& table) {
   Tool out;
   out.shape = table.choice("shape", shapes, 0) == 0 ? Tool::Shape::ball : Tool::Shape::punch;
   const bool ball = out.shape == Tool::Shape::ball;
-  out.radius_m = table.number("radius", ball ? table.source().distance() : table.source().size(), out.radius_m);
+  out.radius_m =
+      table.number("radius", ball ? table.source().distance() : table.source().size(), out.radius_m);
   const Quantity stiffness{"a stiffness above 0 in N/m", "1000", 1.0, 1e-6, 1e9};
   out.stiffness_N_per_m = table.number("stiffness", stiffness, out.stiffness_N_per_m);
   return out;

@@ -43,7 +43,7 @@ std::unique_ptr<WorldState> copy_state(const World& world, const WorldState& sta
   for (const auto& object : state.soft) copy->soft.push_back(object->copy());
   copy->prepare(world);
   copy->map.reserve_bricks(1024);
-  static_cast<CarriedState&>(*copy) = state;
+  static_cast<CarriedState&>(*copy) = static_cast<const CarriedState&>(state);
   return copy;
 }
 

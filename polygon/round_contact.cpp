@@ -42,8 +42,9 @@ glm::dmat3 turning_of(const RigidSurface& surface, std::uint32_t element, const 
   return 0.5 * (turning + glm::transpose(turning));
 }
 
-glm::dvec3 minimum_on_turning_planes(const glm::dvec3& from, const glm::dvec3& minimum, const glm::dmat3& metric,
-                                     std::span<const TurningPlane> planes, double furthest) noexcept {
+glm::dvec3 minimum_on_turning_planes(const glm::dvec3& from, const glm::dvec3& minimum,
+                                     const glm::dmat3& metric, std::span<const TurningPlane> planes,
+                                     double furthest) noexcept {
   if (planes.empty() || planes.size() > 2) return minimum;
   std::array<glm::dvec3, 2> way{};
   if (planes.size() == 1) {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A ball on an edge or a corner: the plane that holds it turns as it moves. A proxy that goes from minimum to
 // minimum over such planes creeps where its goal lies near the edge, the more the nearer: what is left of the
-// way shrinks by no more than h/r a step, h from the edge to the goal, r the ball's radius. With the turning in
-// the model (Newton's method for the constrained minimum: Nocedal & Wright, Numerical Optimization, 18.1) one
-// step gets there.
+// way shrinks by no more than h/r a step, h from the edge to the goal, r the ball's radius. With the turning
+// in the model (Newton's method for the constrained minimum: Nocedal & Wright, Numerical Optimization, 18.1)
+// one step gets there.
 #pragma once
 
 #include <glm/mat3x3.hpp>
@@ -26,10 +26,11 @@ struct TurningPlane {
 glm::dmat3 turning_of(const RigidSurface& surface, std::uint32_t element, const glm::dvec3& view,
                       double step) noexcept;
 
-// Where the minimum lies when the one or two planes that hold it turn: on those planes, at most `furthest` from
-// `minimum`, which is the minimum over the planes as they stand, seen from `from`. `minimum` itself when
+// Where the minimum lies when the one or two planes that hold it turn: on those planes, at most `furthest`
+// from `minimum`, which is the minimum over the planes as they stand, seen from `from`. `minimum` itself when
 // nothing turns, or three planes leave no way to go.
-glm::dvec3 minimum_on_turning_planes(const glm::dvec3& from, const glm::dvec3& minimum, const glm::dmat3& metric,
-                                     std::span<const TurningPlane> planes, double furthest) noexcept;
+glm::dvec3 minimum_on_turning_planes(const glm::dvec3& from, const glm::dvec3& minimum,
+                                     const glm::dmat3& metric, std::span<const TurningPlane> planes,
+                                     double furthest) noexcept;
 
 }  // namespace polygon
