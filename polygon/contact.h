@@ -9,7 +9,6 @@
 #pragma once
 
 #include <cstddef>
-#include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <span>
@@ -77,9 +76,6 @@ class RigidSurface {
 
   // Is the point inside the solid? Always false for an open sheet.
   [[nodiscard]] virtual bool inside(const glm::dvec3& point) const noexcept = 0;
-
-  // Elements are numbered below this; not every number need be in use.
-  [[nodiscard]] virtual std::size_t element_count() const noexcept = 0;
 
   // Elements are numbered below this; not every number need be in use.
   [[nodiscard]] virtual std::size_t element_count() const noexcept = 0;

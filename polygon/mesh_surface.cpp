@@ -72,7 +72,6 @@ class MeshSurface final : public RigidSurface {
                                          const glm::dvec3& away) const noexcept override;
   [[nodiscard]] bool inside(const glm::dvec3& point) const noexcept override;
   [[nodiscard]] std::size_t element_count() const noexcept override { return triangles_.size(); }
-  [[nodiscard]] std::size_t element_count() const noexcept override { return triangles_.size(); }
   [[nodiscard]] glm::dvec3 lower() const noexcept override { return centre_ + lower_; }
   [[nodiscard]] glm::dvec3 upper() const noexcept override { return centre_ + upper_; }
   [[nodiscard]] std::size_t memory_bytes() const noexcept override;

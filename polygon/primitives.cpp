@@ -139,7 +139,6 @@ class PrimitiveSurface final : public RigidSurface {
   }
 
   [[nodiscard]] std::size_t element_count() const noexcept override { return 1; }
-  [[nodiscard]] std::size_t element_count() const noexcept override { return 1; }
   [[nodiscard]] glm::dvec3 lower() const noexcept override { return -shape_.extent(); }
   [[nodiscard]] glm::dvec3 upper() const noexcept override { return shape_.extent(); }
   [[nodiscard]] std::size_t memory_bytes() const noexcept override { return sizeof(*this); }
