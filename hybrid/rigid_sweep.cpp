@@ -22,7 +22,8 @@ constexpr double kAhead = 0.6;  // of its margin a survey is made ahead of the p
 // A survey is good that finds so many elements: fewer are soon left, more are long to read. A ball has more
 // under it than a point before it is free to move at all.
 constexpr double kGoodCount = 24.0, kGoodUnderBall = 104.0;
-constexpr double kCrowdStays = 0.7;  // of the count, when half of the margin still finds it: a pole
+constexpr double kCrowdStays = 0.7;  // of the count, when about half of the margin still finds it: a pole
+constexpr double kHalfOrSo = 0.6;
 constexpr double kShortLook = 0.05, kLongerLook = 32.0, kLeastLook = 1e-9;
 constexpr double kLookCells = 8.0;    // how far the map is asked beyond the ball, in cells
 constexpr double kFurtherLook = 4.0;  // times as far, when that ends a step
@@ -245,8 +246,8 @@ class Sweeper {
   void adapt_margin(RigidNear& near) const noexcept {
     const double count = std::max(1.0, static_cast<double>(near.near.size()));
     const double good = kGoodCount + kGoodUnderBall * radius_ / (radius_ + near.margin_m);
-    const bool pole =
-        count > good && count >= kCrowdStays * near.counted && near.margin_m < near.margin_counted_m;
+    const bool pole = count > good && count >= kCrowdStays * near.counted &&
+                      near.margin_m < kHalfOrSo * near.margin_counted_m;
     near.counted = count;
     near.margin_counted_m = near.margin_m;
     if (pole) {
