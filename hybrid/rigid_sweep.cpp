@@ -12,6 +12,7 @@ namespace {
 
 constexpr std::uint32_t kMaxSteps = 64;
 constexpr std::uint32_t kMaxExchanges = 64;  // planes that join or are made anew in one step
+constexpr std::uint32_t kMaxCrossings = 16;  // of nearly flat edges, in one sweep
 constexpr int kMaxShrinks = 60;              // of a survey that found too much
 constexpr int kCrowded = 5;                  // so many shrinks do not help where a fan has its pole
 constexpr std::uint32_t kManySurveys = 12;   // of one sweep: then larger ones
@@ -49,6 +50,7 @@ class Sweeper {
         factored_(metric),
         held_(state.held),
         scope_(scope),
+        isotropic_(metric == glm::dmat3(metric[0][0])),
         radius_(world.contact_radius_m()),
         rounding_(world.rounding_m) {}
 
@@ -88,6 +90,7 @@ class Sweeper {
         if (loosen_false_contacts()) continue;
         sweep.point = minimum_.point;
         keep_active();
+        if (cross_ridges(sweep.point, travel) == Crossing::moved) continue;
         sweep.arrived = true;
         break;
       }
@@ -97,9 +100,12 @@ class Sweeper {
       travel -= part * length;
       stepped_ = part * length;
       keep_active();
-      if (fraction_ == 1.0 && part == 1.0 && held_flatly(sweep.point)) {
-        sweep.arrived = true;
-        break;
+      if (fraction_ == 1.0 && part == 1.0) {
+        const Crossing crossing = cross_ridges(sweep.point, travel);
+        if (crossing == Crossing::arrived || (crossing == Crossing::none && held_flatly(sweep.point))) {
+          sweep.arrived = true;
+          break;
+        }
       }
       if (travel <= 0.0) break;
     }
@@ -156,8 +162,7 @@ class Sweeper {
     round_.to = polygon::minimum_on_turning_planes(
         point_, minimum_.point, metric_, {planes.data(), minimum_.active_count}, kRoundStep * radius_);
     const bool clear = glm::length(round_.to - round_.instead) > still &&
-                       glm::length(round_.to - point_) < travel && clear_part(round_.to) == 1.0 &&
-                       first_in_the_way(round_.to, 1.0).object == kNobody;
+                       glm::length(round_.to - point_) < travel && is_clear(round_.to);
     ended_ = 0;
     look_ended_ = false;
     if (!clear) return false;
@@ -178,6 +183,62 @@ class Sweeper {
     held_count_ = 0;
     look_afresh(round_.instead);
     return false;
+  }
+
+  // The proxy is at the minimum on one triangle's plane. When the next one's is nearer to the target, and
+  // only a nearly flat edge lies between, there, over that edge; and so on.
+  enum class Crossing : std::uint8_t { none, moved, arrived };
+  Crossing cross_ridges(glm::dvec3& point, double& travel) noexcept {
+    if (held_count_ != 1 || !held_[0].flat || scope_.kind != Scope::Kind::all || !isotropic_)
+      return Crossing::none;
+    HeldElement& held = held_[0];
+    RigidNear& near = state_.rigid[held.object];
+    const polygon::RigidSurface& surface = *world_.rigid[held.object].surface;
+    const glm::dvec3 target = near.frame.to_body(target_);
+    bool moved = false;
+    while (crossings_ < kMaxCrossings) {
+      if (near.ridges.element != held.element || near.ridges.plane != held.in_body)
+        near.ridges = polygon::ridges_of(surface, held.element, held.in_body, radius_, rounding_);
+      const polygon::Ridges::Side* side = polygon::nearer_side(near.ridges, target);
+      if (side == nullptr) break;
+      ++crossings_;
+      const polygon::RidgeCrossing crossing = polygon::cross_ridge(near.ridges, *side, target);
+      const glm::dvec3 top = near.frame.to_scene(crossing.top), end = near.frame.to_scene(crossing.end);
+      const double length = glm::length(top - point) + glm::length(end - top);
+      const HeldElement from = held;
+      point_ = point;
+      bool clear = length < travel && is_clear(top);
+      if (clear) {
+        point_ = top;
+        held = {from.object, side->element, side->plane, true, true, false};
+        clear = is_clear(end);
+      }
+      if (!clear) {
+        held = from;
+        look_afresh(point);
+        // Not far enough looked ahead: that comes first.
+        if (ended_ != 0 || look_ended_) return Crossing::moved;
+        break;
+      }
+      moved = true;
+      point = end;
+      travel -= length;
+      stepped_ = length;
+    }
+    if (!moved) return Crossing::none;
+    held.touching = touches(held, point);
+    if (!held.touching) return Crossing::moved;
+    state_.planes.assign(1, in_scene(held));
+    minimum_ = {};
+    minimum_.point = point;
+    minimum_.active_count = 1;
+    minimum_.multiplier[0] = metric_[0][0] * glm::length(point - target_);
+    return Crossing::arrived;
+  }
+
+  // The whole straight way to q, as far as it was looked at.
+  bool is_clear(const glm::dvec3& q) noexcept {
+    return clear_part(q) == 1.0 && first_in_the_way(q, 1.0).object == kNobody;
   }
 
   // Which objects are near, and that what is known of them covers the proxy.
@@ -515,6 +576,7 @@ class Sweeper {
   const polygon::Metric factored_;
   std::array<HeldElement, kMaxHeld>& held_;
   const Scope scope_;
+  const bool isotropic_;
   const double radius_, rounding_;
   glm::dvec3 point_{0.0};      // feasible; where everything is seen from
   glm::dvec3 direction_{0.0};  // of the last way tried, unit
@@ -525,6 +587,7 @@ class Sweeper {
     std::uint32_t waits = 0, patience = 1;  // steps until the next, since one did not pay
     glm::dvec3 instead{0.0}, to{0.0};
   } round_;
+  std::uint32_t crossings_ = 0;
   double stepped_ = 0.0;     // how long the last step was
   double fraction_ = 1.0;    // of the way to the minimum that is known to be clear
   std::uint32_t ended_ = 0;  // 1 + the object whose neighbourhood ended the way

@@ -19,7 +19,8 @@ WorldState::WorldState(const World& world, OccupancyMap occupancy) : map(std::mo
                      .pose = object.pose,
                      .free = {},
                      .near = polygon::Neighbourhood(object.surface->element_count()),
-                     .margin_m = kFirstMargin * extent});
+                     .margin_m = kFirstMargin * extent,
+                     .ridges = {}});
     if (object.motion.kind() == RigidMotion::Kind::free)
       rigid.back().free = state_at(object.motion.free_body(), object.pose);
   }

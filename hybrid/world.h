@@ -24,6 +24,7 @@
 #include "polygon/contact.h"
 #include "polygon/neighbourhood.h"
 #include "polygon/proxy.h"
+#include "polygon/ridge.h"
 #include "voxel/pair_contact.h"
 #include "voxel/soft_object.h"
 
@@ -140,6 +141,7 @@ struct RigidNear {
   polygon::Neighbourhood near;
   double margin_m = 0.0;  // of the next survey, adapted to how crowded the last one was:
   double counted = 0.0, margin_counted_m = 0.0;  // elements, and how far it looked
+  polygon::Ridges ridges;                        // of the element that last held the proxy alone
 };
 
 // An element that holds the proxy.

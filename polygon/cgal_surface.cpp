@@ -144,6 +144,9 @@ class CgalSurface final : public RigidSurface {
   [[nodiscard]] NearPoint closest(std::uint32_t element, const glm::dvec3& point) const noexcept override;
   [[nodiscard]] glm::dvec3 face_normal(std::uint32_t element) const noexcept override;
   [[nodiscard]] double support(std::uint32_t element, const glm::dvec3& normal) const noexcept override;
+  [[nodiscard]] std::array<std::uint32_t, 3> neighbours(std::uint32_t element) const noexcept override {
+    return across_[element];
+  }
   [[nodiscard]] glm::dvec3 shaded_normal(std::uint32_t element, const glm::dvec3& point,
                                          const glm::dvec3& away) const noexcept override;
   [[nodiscard]] bool inside(const glm::dvec3& point) const noexcept override;
@@ -168,7 +171,7 @@ class CgalSurface final : public RigidSurface {
   glm::dvec3 centre_{0.0};
   glm::dvec3 lower_{0.0}, upper_{0.0};  // from centre_
   std::vector<glm::dvec3> vertices_;    // from centre_
-  std::vector<TriangleIndices> triangles_;
+  std::vector<TriangleIndices> triangles_, across_;
   std::vector<glm::vec3> vertex_normals_;  // solid only
   Corners corners_;
   Tree tree_;
@@ -181,6 +184,7 @@ CgalSurface::CgalSurface(const TriangleMesh& mesh, bool solid) : solid_(solid), 
   upper_ = bounds.high - centre_;
   vertices_.reserve(mesh.vertices.size());
   for (const glm::dvec3& v : mesh.vertices) vertices_.push_back(v - centre_);
+  across_ = connect_triangles(mesh).across;
   corners_ = {&vertices_, &triangles_};
   if (solid_) vertex_normals_ = angle_weighted_normals(mesh);
 
@@ -332,7 +336,8 @@ bool CgalSurface::inside(const glm::dvec3& point) const noexcept {
 
 std::size_t CgalSurface::memory_bytes() const noexcept {
   return sizeof(*this) + tree_.size() * (sizeof(Node) + sizeof(IndexedTriangle)) +
-         vertices_.capacity() * sizeof(glm::dvec3) + triangles_.capacity() * sizeof(TriangleIndices) +
+         vertices_.capacity() * sizeof(glm::dvec3) +
+         (triangles_.capacity() + across_.capacity()) * sizeof(TriangleIndices) +
          vertex_normals_.capacity() * sizeof(glm::vec3);
 }
 

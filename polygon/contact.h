@@ -8,6 +8,7 @@
 // (gather radius − r) cannot reach it either. That is why the sweep cannot tunnel.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
@@ -34,6 +35,8 @@ struct GatherResult {
   std::uint32_t count = 0;  // entries written to the output, sorted by element
   bool complete = true;     // false: the output was too small; ask again with a smaller radius
 };
+
+inline constexpr std::uint32_t kNoElement = 0xffffffffU;
 
 // An object that can be asked which of its elements lie within a radius. Queries are const, take no
 // lock, allocate nothing and never throw.
@@ -68,6 +71,9 @@ class RigidSurface {
 
   // max over the element of normal · x: an element is below a plane when this is at most the plane's offset.
   [[nodiscard]] virtual double support(std::uint32_t element, const glm::dvec3& normal) const noexcept = 0;
+
+  // The elements on the other side of a flat element's edges; kNoElement where there is none, or several.
+  [[nodiscard]] virtual std::array<std::uint32_t, 3> neighbours(std::uint32_t element) const noexcept = 0;
 
   // Unit normal interpolated over the mesh's vertex normals at a point of an element (Phong 1975; for touch:
   // Morgenbesser & Srinivasan 1996), on the side where `away` points; exact for smooth primitives.

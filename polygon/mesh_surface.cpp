@@ -68,6 +68,9 @@ class MeshSurface final : public RigidSurface {
     return normal(element);
   }
   [[nodiscard]] double support(std::uint32_t element, const glm::dvec3& normal) const noexcept override;
+  [[nodiscard]] std::array<std::uint32_t, 3> neighbours(std::uint32_t element) const noexcept override {
+    return across_[element];
+  }
   [[nodiscard]] glm::dvec3 shaded_normal(std::uint32_t element, const glm::dvec3& point,
                                          const glm::dvec3& away) const noexcept override;
   [[nodiscard]] bool inside(const glm::dvec3& point) const noexcept override;
@@ -140,6 +143,7 @@ class MeshSurface final : public RigidSurface {
   bool solid_;
   glm::dvec3 centre_{0.0};
   glm::dvec3 lower_{0.0}, upper_{0.0};     // from centre_
+  std::vector<TriangleIndices> across_;    // [triangle][edge]
   std::vector<std::uint32_t> elements_;    // what the hierarchy holds: no duplicates; empty: all triangles
   std::vector<glm::vec3> vertex_normals_;  // only when asked for
   double slack_ = 0.0;                     // of taking coordinates from centre_ (unit: meter)
@@ -174,7 +178,9 @@ MeshSurface::MeshSurface(std::shared_ptr<const TriangleMesh> mesh, const Surface
   lower_ = low - centre_;
   upper_ = high - centre_;
   slack_ = 1e-15 * (glm::length(glm::max(glm::abs(low), glm::abs(high))) + glm::length(high - low));
-  elements_ = distinct_triangles(*mesh_);
+  Connections connections = connect_triangles(*mesh_);
+  elements_ = std::move(connections.distinct);
+  across_ = std::move(connections.across);
   if (options.vertex_normals) vertex_normals_ = angle_weighted_normals(*mesh_);
   build_hierarchy();
 }
@@ -492,7 +498,7 @@ MeshSurface::PseudonormalQuery MeshSurface::pseudonormal(const glm::dvec3& from,
 std::size_t MeshSurface::memory_bytes() const noexcept {
   const auto embree = static_cast<std::size_t>(std::max<std::int64_t>(embree_bytes_.load(), 0));
   return sizeof(*this) + embree + mesh_->vertices.capacity() * sizeof(glm::dvec3) +
-         mesh_->triangles.capacity() * sizeof(TriangleIndices) +
+         (mesh_->triangles.capacity() + across_.capacity()) * sizeof(TriangleIndices) +
          elements_.capacity() * sizeof(std::uint32_t) + vertex_normals_.capacity() * sizeof(glm::vec3);
 }
 

@@ -24,6 +24,8 @@ namespace polygon {
 struct SeparatingPlane {
   glm::dvec3 normal{0.0};
   double offset = 0.0;
+
+  bool operator==(const SeparatingPlane&) const = default;
 };
 
 class Neighbourhood {

@@ -123,6 +123,10 @@ class PrimitiveSurface final : public RigidSurface {
     return glm::dvec3(0.0);
   }
 
+  [[nodiscard]] std::array<std::uint32_t, 3> neighbours(std::uint32_t /*element*/) const noexcept override {
+    return {kNoElement, kNoElement, kNoElement};
+  }
+
   // Never below a plane of its own: there is no second element that could cover it.
   [[nodiscard]] double support(std::uint32_t /*element*/,
                                const glm::dvec3& /*normal*/) const noexcept override {

@@ -174,21 +174,39 @@ std::vector<std::uint32_t> first_duplicates(std::span<const TriangleIndices> tri
   return first;
 }
 
-std::vector<std::uint32_t> distinct_triangles(const TriangleMesh& mesh) {
-  const std::vector<std::uint32_t> first = [&mesh] {
-    const WeldedVertices points = weld_vertices(mesh.vertices);
-    if (points.points == mesh.vertices.size()) return first_duplicates(mesh.triangles, points.points);
-    return first_duplicates(welded_triangles(mesh, points), points.points);
-  }();
-  std::vector<std::uint32_t> distinct;
-  std::size_t count = 0;
-  for (std::uint32_t i = 0; i < first.size(); ++i) count += first[i] == i ? 1 : 0;
-  if (count == first.size()) return distinct;
-  distinct.reserve(count);
-  for (std::uint32_t i = 0; i < first.size(); ++i) {
-    if (first[i] == i) distinct.push_back(i);
+std::vector<TriangleIndices> triangles_across(std::span<const TriangleIndices> triangles,
+                                              std::uint32_t points) {
+  std::vector<TriangleIndices> across(triangles.size(),
+                                      TriangleIndices{kNoTriangle, kNoTriangle, kNoTriangle});
+  EdgeTable(triangles, points).for_each([&](const EdgeTable::Edge& edge) {
+    if (edge.uses.size() != 2) return;
+    for (std::size_t n = 0; n < 2; ++n) {
+      const EdgeTable::Use& use = edge.uses[n];
+      const std::uint32_t from = use.forward() ? edge.low : edge.high;
+      const TriangleIndices& t = triangles[use.triangle()];
+      const std::size_t i = t[0] == from ? 0 : t[1] == from ? 1 : 2;
+      across[use.triangle()][i] = edge.uses[1 - n].triangle();
+    }
+  });
+  return across;
+}
+
+Connections connect_triangles(const TriangleMesh& mesh) {
+  const WeldedVertices welded = weld_vertices(mesh.vertices);
+  const bool as_it_is = welded.points == mesh.vertices.size();
+  const std::vector<TriangleIndices> by_points =
+      as_it_is ? std::vector<TriangleIndices>() : welded_triangles(mesh, welded);
+  const std::span<const TriangleIndices> triangles = as_it_is ? mesh.triangles : by_points;
+  Connections connections;
+  {
+    const std::vector<std::uint32_t> first = first_duplicates(triangles, welded.points);
+    for (std::uint32_t i = 0; i < first.size(); ++i) {
+      if (first[i] == i) connections.distinct.push_back(i);
+    }
+    if (connections.distinct.size() == first.size()) connections.distinct = {};
   }
-  return distinct;
+  connections.across = triangles_across(triangles, welded.points);
+  return connections;
 }
 
 }  // namespace polygon

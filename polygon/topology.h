@@ -93,8 +93,19 @@ struct EdgeUse {
 [[nodiscard]] std::vector<std::uint32_t> first_duplicates(std::span<const TriangleIndices> triangles,
                                                           std::uint32_t points);
 
-// The triangles of a mesh but for those that repeat an earlier one's corners (by their coordinates), in
-// ascending order; empty when all of them are distinct.
-[[nodiscard]] std::vector<std::uint32_t> distinct_triangles(const TriangleMesh& mesh);
+inline constexpr std::uint32_t kNoTriangle = 0xffffffffU;
+
+// The triangle on the other side of each edge: [triangle][i] across the edge from corner i to (i + 1) % 3.
+// kNoTriangle where there is none, or more than one, and at triangles with a repeated corner.
+[[nodiscard]] std::vector<TriangleIndices> triangles_across(std::span<const TriangleIndices> triangles,
+                                                            std::uint32_t points);
+
+// What a surface needs to know of its mesh, by the corners' coordinates.
+struct Connections {
+  std::vector<std::uint32_t> distinct;  // triangles that repeat no earlier one's corners, in ascending order;
+                                        // empty when that is all of them
+  std::vector<TriangleIndices> across;  // triangles_across()
+};
+[[nodiscard]] Connections connect_triangles(const TriangleMesh& mesh);
 
 }  // namespace polygon
