@@ -51,7 +51,7 @@ bool finite(const WorldState& state) {
       if (!std::all_of(axis.begin(), axis.end(), [](float u) { return std::isfinite(u); })) return false;
     }
   }
-  return std::isfinite(state.time_s) && std::isfinite(state.limit.elapsed_s) && finite(state.limit.last_N) &&
+  return std::isfinite(state.clock.now_s()) && std::isfinite(state.limit.elapsed_s) && finite(state.limit.last_N) &&
          std::isfinite(state.hidden_stiffness_N_per_m) && std::isfinite(state.damping.balance_J);
 }
 
