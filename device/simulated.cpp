@@ -74,6 +74,7 @@ class IdealDevice final : public HapticDevice {
   void write(const glm::dvec3& /*force_N*/, double dt_s) noexcept override {
     if (dt_s > 0.0 && std::isfinite(dt_s)) clock_.add(dt_s);
   }
+  void hold(double extra_s) noexcept override { write(glm::dvec3(0.0), extra_s); }
   [[nodiscard]] DeviceLimits limits() const noexcept override { return device_limits(DeviceModel::ideal); }
   [[nodiscard]] std::string_view name() const noexcept override { return device_name(DeviceModel::ideal); }
 

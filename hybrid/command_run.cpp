@@ -120,8 +120,10 @@ int run(const RunCommand& command) {
   SessionOptions options{.seconds = command.seconds,
                          .realtime = command.realtime,
                          .keep_rows = !command.trace.empty() || !command.plot.empty(),
+                         .keep_recording = !command.record.empty(),
                          .keep_picture = !command.picture.empty(),
                          .reference_samples = command.samples,
+                         .start_ticks = command.start_ticks,
                          .progress = progress};
   SessionResult result = run_session(scene, built, options);
   end_progress();

@@ -17,6 +17,7 @@ struct RunCommand {
   std::optional<double> seconds;
   bool realtime = false;
   int samples = 6;
+  std::uint64_t start_ticks = 0;
   std::filesystem::path trace, plot, picture, record, save_surface, save_volume;  // empty: not written
   std::string json;                                                               // "-": standard output
 };

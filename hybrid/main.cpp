@@ -33,6 +33,8 @@ void add_run(CLI::App& app, int& status) {
          "how often the soft force is compared with its equilibrium (slow on large volumes); 0: never")
       ->check(CLI::Range(0, 1000))
       ->capture_default_str();
+  sub->add_option("--start-ticks", c->start_ticks,
+                  "begin with all clocks and counters as after so many ticks; nothing felt should differ");
   sub->add_option("--trace", c->trace, "write every tick as CSV");
   sub->add_option("--plot", c->plot, "write force over time with contacts as SVG");
   sub->add_option("--picture", c->picture, "write a picture of the most telling moment as PNG");

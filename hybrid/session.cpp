@@ -59,6 +59,27 @@ double telling(const World& world, const WorldState& state) {
   return score + (rigid && soft ? 10.0 : 0.0);
 }
 
+// A path that begins later.
+class LaterPath final : public device::Path {
+ public:
+  LaterPath(std::shared_ptr<const device::Path> path, double later_s)
+      : path_(std::move(path)), later_s_(later_s) {}
+  [[nodiscard]] glm::dvec3 position(double t_s) const noexcept override {
+    return path_->position(t_s - later_s_);
+  }
+  [[nodiscard]] double duration_s() const noexcept override { return path_->duration_s(); }
+  [[nodiscard]] const std::vector<std::string>& notes() const noexcept override { return path_->notes(); }
+
+ private:
+  std::shared_ptr<const device::Path> path_;
+  double later_s_;
+};
+
+std::shared_ptr<const device::Path> later(std::shared_ptr<const device::Path> path, double later_s) {
+  if (later_s == 0.0) return path;
+  return std::make_shared<LaterPath>(std::move(path), later_s);
+}
+
 class Run {
  public:
   Run(const Scene& scene, BuiltScene& built, const SessionOptions& options)
@@ -66,15 +87,13 @@ class Run {
         world_(*built.world),
         state_(*built.state),
         options_(options),
-        path_(scene_path(scene)),
+        path_(later(scene_path(scene), static_cast<double>(options.start_ticks) / scene.rate_hz)),
         device_(scene_device(scene, path_)),
         dt_(1.0 / scene.rate_hz) {
     const double seconds = options.seconds.value_or(path_->duration_s() + kAfterPath_s);
     ticks_ = static_cast<std::uint64_t>(std::llround(seconds * scene.rate_hz));
     result_.dt_s = dt_;
-    result_.tick_us.reserve(ticks_);
-    for (auto& stage : result_.stage_us) stage.reserve(ticks_);
-    result_.recording.reserve(ticks_);
+    if (options.keep_recording) result_.recording.reserve(ticks_);
     result_.object_contact_ticks.assign(world_.object_count(), 0);
     result_.object_max_force_N.assign(world_.object_count(), 0.0);
     if (!options.keep_rows) return;
@@ -85,12 +104,12 @@ class Run {
 
   SessionResult go() {
     flush_denormals();
+    start_clocks();
     begin_session(scene_, world_, state_, device_->read().position_m);
     std::optional<device::ServoTimer> timer;
-    std::vector<double> late;
+    TimeSpread late;
     if (options_.realtime) {
       timer.emplace(dt_);
-      late.reserve(ticks_);
       result_.realtime_note = timer->raise_priority();
     }
     const std::uint64_t sample_every =
@@ -99,7 +118,7 @@ class Run {
             : 0;
     auto said = std::chrono::steady_clock::now();
     for (std::uint64_t tick = 0; tick < ticks_; ++tick) {
-      if (timer) late.push_back(timer->wait() * 1e6);
+      if (timer) late.add(timer->wait() * 1e6);
       const TickResult felt = haptic_tick(world_, state_, device_->read(), dt_);
       device_->write(felt.force_N, dt_);
       keep(felt, tick);
@@ -122,7 +141,7 @@ class Run {
     }
     if (timer) {
       result_.deadline_misses = timer->missed();
-      result_.late_us = percentiles(late);
+      result_.late_us = late.percentiles();
     }
     result_.ticks = ticks_;
     result_.state_hash = hash_state(hash_, state_);
@@ -133,11 +152,21 @@ class Run {
   }
 
  private:
+  void start_clocks() {
+    if (options_.start_ticks == 0) return;
+    const double now_s = static_cast<double>(options_.start_ticks) * dt_;
+    device_->hold(now_s);
+    state_.tick = options_.start_ticks;
+    state_.clock = device::Clock(now_s);
+    state_.limit.elapsed_s = now_s;
+    state_.limit.clamped = state_.limit.slewed = state_.truncated_ticks = options_.start_ticks;
+  }
+
   void keep(const TickResult& felt, std::uint64_t tick) {
     hash_ = hash_tick(hash_, felt);
-    result_.recording.push_back({felt.device_m, hash_});
-    result_.tick_us.push_back(felt.tick_us);
-    for (std::size_t s = 0; s < kStages; ++s) result_.stage_us[s].push_back(felt.stage_us[s]);
+    if (options_.keep_recording) result_.recording.push_back({felt.device_m, hash_});
+    result_.tick_us.add(felt.tick_us);
+    for (std::size_t s = 0; s < kStages; ++s) result_.stage_us[s].add(static_cast<double>(felt.stage_us[s]));
     const double force = glm::length(felt.force_N);
     result_.max_force_N = std::max(result_.max_force_N, force);
     sum_force2_ += force * force;

@@ -13,12 +13,10 @@
 #include "device/path.h"
 #include "hybrid/build.h"
 #include "hybrid/tick.h"
+#include "hybrid/time_spread.h"
 
 namespace hybrid {
 
-struct Percentiles {
-  double p50 = 0.0, p99 = 0.0, p999 = 0.0, max = 0.0;
-};
 // Of the values given; all zero when there are none. Reorders them.
 Percentiles percentiles(std::vector<double>& values);
 
@@ -32,8 +30,12 @@ struct SessionOptions {
   std::optional<double> seconds;  // default: the path's length and half a second
   bool realtime = false;          // paced by a real timer; else fixed-step, as fast as it goes
   bool keep_rows = true;          // trace rows and per-object forces
+  bool keep_recording = true;     // every input, 32 bytes a tick: without it and the rows memory stays flat
   bool keep_picture = false;      // remember the most telling moment
   int reference_samples = 0;      // how often the force is compared with its equilibrium; 0 in real time
+  // Clocks and counters begin as after so many ticks, and the path so much later; nothing felt may differ. (A
+  // soft start is over by then.)
+  std::uint64_t start_ticks = 0;
   Progress progress;
 };
 
@@ -48,17 +50,17 @@ struct SessionResult {
   double dt_s = 0.0;
   std::uint64_t state_hash = 0;
   std::vector<TraceRow> rows;
-  std::vector<std::vector<double>> object_force_N;   // [object][row]
-  std::vector<std::uint64_t> object_contact_ticks;   // [object]
-  std::vector<double> object_max_force_N;            // [object]
-  std::vector<double> tick_us;                       // [tick], in order
-  std::array<std::vector<float>, kStages> stage_us;  // [stage][tick]
+  std::vector<std::vector<double>> object_force_N;  // [object][row]
+  std::vector<std::uint64_t> object_contact_ticks;  // [object]
+  std::vector<double> object_max_force_N;           // [object]
+  TimeSpread tick_us;
+  std::array<TimeSpread, kStages> stage_us;
   double max_force_N = 0.0, rms_force_N = 0.0;
   ForceError error;
-  std::optional<Snapshot> moment;  // of keep_picture
-  std::vector<RecordedTick> recording;
-  std::string realtime_note;  // what priority was granted
-  Percentiles late_us;        // how late the machine woke the loop; not part of the tick
+  std::optional<Snapshot> moment;       // of keep_picture
+  std::vector<RecordedTick> recording;  // of keep_recording
+  std::string realtime_note;            // what priority was granted
+  Percentiles late_us;                  // how late the machine woke the loop; not part of the tick
 };
 
 // Runs the scene's path to its end on its device. Throws SceneError: the tool starts inside something rigid.
