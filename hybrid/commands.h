@@ -60,6 +60,17 @@ const std::vector<std::string>& bench_paths();
 std::vector<std::string> bench_engines();
 std::string bench_mesh_error(const std::string& name);  // empty: there is such a mesh
 
+// `hybrid stability SCENE --extremes`, `--fuzz-ticks N`: the suite of extremes.h, and fuzz_ticks.h. The
+// status is 0 also when something fell short: the report says so.
+struct ExtremesCommand {
+  std::filesystem::path scene;
+  bool table = true;
+  bool quick = false;
+  std::uint64_t fuzz_ticks = 0, seed = 1;  // 0: none
+  std::string json;
+};
+int extremes(const ExtremesCommand& command);
+
 struct ViewCommand {
   std::filesystem::path scene;
   std::optional<std::uint64_t> frames;  // then closes; each written to `out` when that is given

@@ -3,6 +3,7 @@
 // must hold of each. A case ends in a right answer or in a clear refusal.
 #pragma once
 
+#include <filesystem>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -32,11 +33,17 @@ struct ExtremeRow {
 //   time     no tick takes long
 //   refused  file, line and column, what is wrong and what to do
 // TickWatch says exactly what is meant by the first four.
+//
+// A coupling stiffer than the sampled loop can hold buzzes: that is physics, and no row falls short for it.
+// What must hold then is that the buzz is fed by the sampling alone (energy), stays within the device's
+// limit, and ends when the tool leaves.
 
 struct ExtremesOptions {
   bool quick = false;  // a share of the table, in a few seconds
-  Progress progress;
-  std::function<void(const ExtremeRow&)> on_row;  // as soon as there is one
+  std::filesystem::path
+      scene{};  // also this one, as it is written, with every motion of a hand; may be empty
+  Progress progress{};
+  std::function<void(const ExtremeRow&)> on_row{};  // as soon as there is one
 };
 
 // Throws std::runtime_error: the folder for temporary files cannot be written.

@@ -121,7 +121,8 @@ class Drive {
     result_.over_force_N = watch_->over_force_N();
     result_.over_slew_N = watch_->over_slew_N();
     result_.excess_J = watch_->excess_J();
-    result_.rounding_J = watch_->rounding_J();
+    result_.tolerance_J = watch_->tolerance_J();
+    result_.moved_J = watch_->moved_J();
     result_.given_J = watch_->given_J();
     result_.allowed_J = watch_->allowed_J();
     result_.inside_m = watch_->inside_m();

@@ -245,12 +245,14 @@ class Fuzz {
     const bool infeasible = (state_.faults & fault_infeasible) != 0;  // between bodies that close on it
     if (watch_->inside_m() > kMostInside_m && !infeasible)
       fail(fmt::format("{:.3g} um inside something rigid", 1e6 * watch_->inside_m()));
-    if (which_.still && watch_->excess_J() > watch_->rounding_J())
-      fail(fmt::format("{:.3g} mJ given beyond what is allowed", 1e3 * watch_->excess_J()));
+    if (which_.still && watch_->excess_J() > watch_->tolerance_J())
+      fail(fmt::format("{:.3g} mJ given beyond what is allowed, {:.2g} % of the work done",
+                       1e3 * watch_->excess_J(), 100.0 * watch_->excess_J() / watch_->moved_J()));
     result_.most_N = std::max(result_.most_N, watch_->most_N());
     result_.inside_m = std::max(result_.inside_m, watch_->inside_m());
     result_.slowest_us = std::max(result_.slowest_us, watch_->slowest_us());
-    if (which_.still) result_.excess_J = std::max(result_.excess_J, watch_->excess_J());
+    if (which_.still && watch_->moved_J() > 0.0)
+      result_.excess_share = std::max(result_.excess_share, watch_->excess_J() / watch_->moved_J());
     result_.hash = result_.hash * 0x100000001B3ULL ^ watch_->hash();
   }
 

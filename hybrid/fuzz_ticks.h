@@ -13,7 +13,7 @@ namespace hybrid {
 struct FuzzOptions {
   std::uint64_t ticks = 20'000;  // over all scenes, a little more
   std::uint64_t seed = 1;
-  Progress progress;
+  Progress progress{};
 };
 
 // Of one scene: rigid, soft and mixed ones as in the extremes suite; one whose rigid objects move, turn, are
@@ -23,7 +23,8 @@ struct FuzzResult {
   std::uint64_t ticks = 0, contact_ticks = 0, nonfinite = 0;  // nonfinite: inputs that were held back
   std::uint32_t faults = 0;                                   // FaultBit, ever
   std::uint64_t hash = 0;  // of all that was felt, and of the state at the end
-  double most_N = 0.0, inside_m = 0.0, excess_J = 0.0, slowest_us = 0.0;
+  double most_N = 0.0, inside_m = 0.0, slowest_us = 0.0;
+  double excess_share = 0.0;          // of the work done in an episode, given beyond what is allowed
   std::uint64_t recoveries = 0;       // times the tool was led away, and all came to rest
   std::vector<std::string> failures;  // in words, with the tick; the first few
 };

@@ -105,6 +105,19 @@ void add_bench(CLI::App& app, int& status) {
   sub->callback([c, &status] { status = hybrid::run_bench(*c); });
 }
 
+void add_stability(CLI::App& app, int& status) {
+  auto* sub = app.add_subcommand("stability", "Where the loop stops being stable, and what it does beyond");
+  auto c = std::make_shared<hybrid::ExtremesCommand>();
+  c->table = false;
+  sub->add_option("SCENE", c->scene, "scene file (.toml)")->required();
+  sub->add_flag("--extremes", c->table, "rigid, soft and mixed scenes with every setting taken to its end");
+  sub->add_flag("--quick", c->quick, "of --extremes: a share of the table; a few seconds");
+  sub->add_option("--fuzz-ticks", c->fuzz_ticks, "so many ticks of random device input");
+  sub->add_option("--seed", c->seed, "of --fuzz-ticks")->capture_default_str();
+  sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
+  sub->callback([c, &status] { status = hybrid::extremes(*c); });
+}
+
 void add_view(CLI::App& app, int& status) {
   auto* sub = app.add_subcommand(
       "view", "A window: the simulated hand plays, or the mouse drags the tool (right button)");
@@ -128,6 +141,7 @@ int main(int argc, char** argv) {
   add_check(app, status);
   add_compare(app, status);
   add_bench(app, status);
+  add_stability(app, status);
   add_view(app, status);
   try {
     app.parse(argc, argv);

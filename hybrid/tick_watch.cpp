@@ -51,8 +51,9 @@ bool finite(const WorldState& state) {
       if (!std::all_of(axis.begin(), axis.end(), [](float u) { return std::isfinite(u); })) return false;
     }
   }
-  return std::isfinite(state.clock.now_s()) && std::isfinite(state.limit.elapsed_s) && finite(state.limit.last_N) &&
-         std::isfinite(state.hidden_stiffness_N_per_m) && std::isfinite(state.damping.balance_J);
+  return std::isfinite(state.clock.now_s()) && std::isfinite(state.limit.elapsed_s) &&
+         finite(state.limit.last_N) && std::isfinite(state.hidden_stiffness_N_per_m) &&
+         std::isfinite(state.damping.balance_J);
 }
 
 }  // namespace
@@ -64,8 +65,9 @@ TickWatch::TickWatch(const World& world, const WorldState& state)
   slewed_N_ = length(force_N_ - spring.clamped_N);
 }
 
-double TickWatch::rounding_J() const {
-  return kRounding * moved_J_ + 8.0 * world_.tool.stiffness_N_per_m * world_.rounding_m * world_.rounding_m;
+double TickWatch::tolerance_J() const {
+  return (world_.soft.empty() ? kRounding : kTissueShare) * moved_J_ +
+         8.0 * world_.tool.stiffness_N_per_m * world_.rounding_m * world_.rounding_m;
 }
 
 void TickWatch::see_all(const WorldState& state) {

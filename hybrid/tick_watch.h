@@ -26,11 +26,15 @@ namespace hybrid {
 // 1997, K·T/2), and an engine that adds nothing of its own stays within it, stable or not: a coupling stiffer
 // than the loop can hold buzzes on this share alone. With the clamp the same holds of the clamped spring's
 // energy. A limit on the slew is a delay, and may give |ΔF|·|Δx| more, ΔF what it changed; so that is added
-// to what is allowed, and is zero wherever the slew did not cut.
+// to what is allowed, and is zero wherever the slew did not cut. Tissue is not solved to equilibrium within a
+// tick: a wave may store in it what the hand has not paid for, and give it back. With tissue, kTissueShare of
+// all the work that went to and fro is let pass; that bounds this engine's error, and is no theorem.
 //
 // outside. The proxy's ball is not in a rigid object, nor nearer than its radius, but for rounding.
 class TickWatch {
  public:
+  static constexpr double kTissueShare = 0.01;
+
   // Both as a session begins. `world` is to outlive the watch.
   TickWatch(const World& world, const WorldState& state);
 
@@ -45,10 +49,11 @@ class TickWatch {
   // Beyond the limits (N); 0: within.
   [[nodiscard]] double over_force_N() const { return over_force_N_; }
   [[nodiscard]] double over_slew_N() const { return over_slew_N_; }
-  // The most by which what was given to the hand and is stored still exceeded what is allowed (J), and the
-  // rounding that this is to be compared with.
+  // The most by which what was given to the hand and is stored still exceeded what is allowed (J), and what
+  // that is to be compared with: rounding, and the tissue's share.
   [[nodiscard]] double excess_J() const { return excess_J_; }
-  [[nodiscard]] double rounding_J() const;
+  [[nodiscard]] double tolerance_J() const;
+  [[nodiscard]] double moved_J() const { return moved_J_; }      // to and fro
   [[nodiscard]] double given_J() const { return given_J_; }      // to the hand, by the end
   [[nodiscard]] double allowed_J() const { return allowed_J_; }  // by the end
   // The most by which the proxy's ball was in something rigid (m).
