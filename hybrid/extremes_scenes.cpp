@@ -162,7 +162,7 @@ std::filesystem::path write_scene(const SceneSetting& s, const std::filesystem::
   if (s.kind != SceneKind::soft)
     polygon::save_ply(folder / "ball.ply",
                       flawed(polygon::make_ball_mesh(6.0 * s.unit_m, 3), s.flaw, s.coincident));
-  const std::filesystem::path file = folder / "scene.toml";
+  std::filesystem::path file = folder / "scene.toml";
   std::ofstream out(file, std::ios::binary);
   out << scene_text(s);
   out.flush();

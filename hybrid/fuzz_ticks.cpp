@@ -215,7 +215,7 @@ class Fuzz {
   static std::filesystem::path write(const FuzzScene& which, const std::filesystem::path& folder) {
     SceneSetting setting;
     setting.kind = which.kind;
-    const std::filesystem::path file = write_scene(setting, folder);
+    std::filesystem::path file = write_scene(setting, folder);
     if (which.text.empty()) return file;
     std::filesystem::remove(file);
     std::ofstream(file, std::ios::binary) << which.text;

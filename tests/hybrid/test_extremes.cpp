@@ -100,11 +100,11 @@ class Late : public tests::SceneFile {
     const hybrid::Scene scene = load(text);
     hybrid::BuiltScene built = hybrid::build_scene(scene);
     hybrid::SessionOptions options;
-    options.seconds = 2.0;
+    options.seconds = 1.0;
     options.keep_rows = false;
     options.start_ticks = start_ticks;
     const hybrid::SessionResult result = hybrid::run_session(scene, built, options);
-    EXPECT_GT(result.contact_ticks, 300U);
+    EXPECT_GT(result.contact_ticks, 200U);
     return result.state_hash;
   }
   static constexpr std::uint64_t kDay = 86'400ULL * 1024, kWrap = (1ULL << 32) - 1000;
