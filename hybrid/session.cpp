@@ -12,7 +12,7 @@
 
 #include "device/servo_timer.h"
 #include "device/simulated.h"
-#include "hybrid/rigid_sweep.h"
+#include "hybrid/rigid_step.h"
 
 namespace hybrid {
 namespace {

@@ -13,7 +13,7 @@
 #include "hybrid/arbitration.h"
 #include "hybrid/body_stage.h"
 #include "hybrid/feel_stage.h"
-#include "hybrid/rigid_sweep.h"
+#include "hybrid/rigid_step.h"
 #include "hybrid/soft_stage.h"
 
 namespace hybrid {
