@@ -55,6 +55,13 @@ class Sweeper {
       point_ = sweep.point;
       if (sweep.steps < state_.trail.size()) state_.trail[sweep.steps] = point_;
       if (!around_.look_from(point_)) break;
+      if (sweep.steps == 0 &&
+          goes_on) {  // on the triangle that held it last: to the next, without a look here
+        const Crossing crossing = cross_ridges(sweep.point, travel);
+        if (crossing == Crossing::moved) continue;
+        sweep.arrived = crossing == Crossing::arrived;
+        if (sweep.arrived) break;
+      }
       if (!solve()) break;
       const glm::dvec3 move = minimum_.point - point_;
       const double length = glm::length(move);
