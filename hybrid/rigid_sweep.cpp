@@ -41,6 +41,7 @@ class Sweeper {
     Sweep sweep;
     sweep.point = from;
     sweep.arrived = false;
+    state_.trail_count = 0;
     const bool goes_on = from == state_.swept_to_m;
     if (!goes_on) around_.see_afresh(from);
     for (std::uint32_t n = 0; n < state_.active_count && scope_.kind == Scope::Kind::all; ++n) {
@@ -53,7 +54,7 @@ class Sweeper {
     }
     for (; sweep.steps < kMaxSteps; ++sweep.steps) {
       point_ = sweep.point;
-      if (sweep.steps < state_.trail.size()) state_.trail[sweep.steps] = point_;
+      leave_trail(point_);
       if (!around_.look_from(point_)) break;
       if (sweep.steps == 0 &&
           goes_on) {  // on the triangle that held it last: to the next, without a look here
@@ -198,6 +199,8 @@ class Sweeper {
         if (around_.ended()) return Crossing::moved;
         break;
       }
+      leave_trail(top);
+      leave_trail(end);
       moved = true;
       point = end;
       travel -= length;
@@ -348,6 +351,9 @@ class Sweeper {
 
   [[nodiscard]] std::span<const HeldElement> held_planes() const noexcept {
     return {held_.data(), held_count_};
+  }
+  void leave_trail(const glm::dvec3& corner) noexcept {
+    if (state_.trail_count < state_.trail.size()) state_.trail[state_.trail_count++] = corner;
   }
   void stand_at(const glm::dvec3& point) noexcept {
     point_ = point;

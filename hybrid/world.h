@@ -204,7 +204,9 @@ struct WorldState : CarriedState {
 
   std::vector<std::unique_ptr<voxel::SoftObject>> soft;  // one a World::soft
   OccupancyMap map;
-  std::span<glm::dvec3> trail;  // for tests: where the steps of the last sweep began
+  // For tests: the corners of the last sweep's way, as many as there is room for.
+  std::span<glm::dvec3> trail;
+  std::size_t trail_count = 0;
 
   // ---- of the current tick ----
   std::vector<ObjectFeel> feel;            // [rigid…, soft…]
