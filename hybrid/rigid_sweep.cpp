@@ -199,8 +199,7 @@ class Sweeper {
         if (around_.ended()) return Crossing::moved;
         break;
       }
-      leave_trail(top);
-      leave_trail(end);
+      for (const glm::dvec3& corner : {point, top, end}) leave_trail(corner);
       moved = true;
       point = end;
       travel -= length;

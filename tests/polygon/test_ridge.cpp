@@ -126,6 +126,11 @@ TEST(Ridges, TheNearerSideIsBeyondTheBisector) {
   }
 }
 
+TEST(Ridges, AGoalAboveASideIsNotHeldByIt) {
+  const polygon::Ridges ridges = ridges_of_first(roof(20));
+  EXPECT_EQ(polygon::nearer_side(ridges, {0.5, 0, kRadius - 1e-3}), nullptr);
+}
+
 TEST(Ridges, PrimitivesHaveNone) {
   const auto ball = polygon::make_ball_surface(0.01);
   EXPECT_EQ(polygon::ridges_of(*ball, 0, {{0, 0, 1}, 0.01}, kRadius, kRounding).count, 0U);
