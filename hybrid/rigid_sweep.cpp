@@ -69,6 +69,7 @@ class Sweeper {
       const double still =
           kConvergedWay * glm::length(target_ - point_) + kConvergedBall * radius_ + rounding_;
       if (round_.taken && !round_step_paid()) {
+        if (state_.trail_count > 0) --state_.trail_count;  // it never was there
         sweep.point = round_.instead;
         continue;
       }
@@ -247,20 +248,21 @@ class Sweeper {
         if (first.object != Surroundings::kNobody || part >= 1.0) break;
       }
       if (first.object == Surroundings::kNobody) return true;
-      // Found by the plane across its closest point, which says soonest what is really met; held by its own,
-      // which lets the proxy come up to it at once, not by halves.
-      make_plane(first);
       if (held_count_ == kMaxHeld || n + 1 == kMaxExchanges) {
         stop_before(first);
         return true;
       }
+      // Found by the plane across its closest point, which says soonest what is really met; held by its own,
+      // which lets the proxy come up to it at once, not by halves.
+      make_plane(first);
       held_[held_count_++] = first;
       state_.planes.push_back(in_scene(first));
     }
     return true;
   }
 
-  // Too many planes for one step: the way to the minimum over those known ends at the next.
+  // Too many planes for one step: the way to the minimum over those known ends at the next, by the plane that
+  // found it. (Its own would be reached later, and others that nobody has looked at yet stand before that.)
   void stop_before(const HeldElement& next) noexcept {
     const BodyFrame& frame = state_.rigid[next.object].frame;
     const glm::dvec3 end = point_ + fraction_ * (minimum_.point - point_);

@@ -186,6 +186,7 @@ void Surroundings::first_of(std::uint32_t o, const glm::dvec3& q, double part,
     if (broken[n].fresh) {
       soonest = broken[n].part;
       first = candidate;
+      first.in_body = near.near.plane(broken[n].index);
       return;
     }
     if (!covered(candidate, held))
