@@ -13,7 +13,7 @@ struct PassivityOptions {
   double resolution_m = 0.0;  // encoder step
   // What a tool does at most: faster than this it is taken to be at the start (unit: m/s), and between two
   // ticks it gains no more speed than this acceleration gives (unit: m/s²; 300 is 24 N on 81 g).
-  double max_speed_m_per_s = 5.0;
+  double max_speed_m_per_s = 2.0;
   double max_acceleration_m_per_s2 = 300.0;
   double release_s = 0.05;  // of work against a force, over which what was taken away of it comes back
   double jnd_share = 0.07, jnd_floor_N = 0.04;  // what of a force a hand can tell, for most_taken_jnd
@@ -43,7 +43,7 @@ struct PassivityState {
 // position_m. It never adds to a force, turns it, or lets more through than was asked, so every limit on
 // force_N holds for it too; it is the last to act.
 //
-// What is held, at every tick: given_J <= worst_tick_J + 1 nJ, for every motion whose ways between ticks are
+// What is held, at every tick: given_J <= worst_tick_J + 0.1 µJ, for every motion whose ways between ticks are
 // no longer than twice the longest of late plus max_acceleration·dt² plus an encoder step (`jumps` counts the
 // others). No controller that plays any force after a first tick that lost energy can hold more: the next
 // tick may lose as much again.
