@@ -10,6 +10,7 @@ namespace {
 
 constexpr auto rest = HdOutcome::rest;
 constexpr auto ended = HdOutcome::ended;
+constexpr auto lost = DeviceFault::lost;
 
 constexpr std::string_view kReport =
     "this program asked for something the driver does not know: install OpenHaptics 3.4, and report it if it "
@@ -18,47 +19,48 @@ constexpr std::string_view kCable =
     "check the cable, the power and the port; close other programs that hold the device; plug it in again";
 
 constexpr std::array<HdErrorText, 23> kTexts{{
-    {0x000, HdOutcome::none, "HD_SUCCESS", "no error", ""},
-    {0x100, ended, "HD_INVALID_ENUM", "the driver does not know a parameter", kReport},
-    {0x101, ended, "HD_INVALID_VALUE", "the driver refused a value", kReport},
-    {0x102, ended, "HD_INVALID_OPERATION", "the driver refused an operation at this time", kReport},
-    {0x103, ended, "HD_INVALID_INPUT_TYPE", "the driver wants another type for a parameter", kReport},
-    {0x104, ended, "HD_BAD_HANDLE", "the driver no longer knows the device",
+    {0x000, HdOutcome::none, DeviceFault::none, "HD_SUCCESS", "no error", ""},
+    {0x100, ended, lost, "HD_INVALID_ENUM", "the driver does not know a parameter", kReport},
+    {0x101, ended, lost, "HD_INVALID_VALUE", "the driver refused a value", kReport},
+    {0x102, ended, lost, "HD_INVALID_OPERATION", "the driver refused an operation at this time", kReport},
+    {0x103, ended, lost, "HD_INVALID_INPUT_TYPE", "the driver wants another type for a parameter", kReport},
+    {0x104, ended, lost, "HD_BAD_HANDLE", "the driver no longer knows the device",
      "the device was closed or unplugged: plug it in and start again"},
-    {0x200, rest, "HD_WARM_MOTORS", "the motors are warm",
+    {0x200, rest, DeviceFault::warm_motors, "HD_WARM_MOTORS", "the motors are warm",
      "forces are off until they cool: rest the device for some minutes, press less long or less hard, or "
      "lower "
      "[safety] max_force"},
-    {0x201, rest, "HD_EXCEEDED_MAX_FORCE", "the force was above what the device can hold",
-     "lower [tool] stiffness or [safety] max_force"},
-    {0x202, rest, "HD_EXCEEDED_MAX_FORCE_IMPULSE", "the force rose too fast",
+    {0x201, rest, DeviceFault::force_limit, "HD_EXCEEDED_MAX_FORCE",
+     "the force was above what the device can hold", "lower [tool] stiffness or [safety] max_force"},
+    {0x202, rest, DeviceFault::force_limit, "HD_EXCEEDED_MAX_FORCE_IMPULSE", "the force rose too fast",
      "lower [safety] max_slew or [tool] stiffness, or make [safety] soft_start longer"},
-    {0x203, rest, "HD_EXCEEDED_MAX_VELOCITY", "the arm moved faster than the driver allows",
+    {0x203, rest, DeviceFault::velocity_limit, "HD_EXCEEDED_MAX_VELOCITY",
+     "the arm moved faster than the driver allows",
      "move more slowly; if it kicks by itself, lower [tool] stiffness"},
-    {0x204, rest, "HD_FORCE_ERROR", "the driver could not give the force",
+    {0x204, rest, DeviceFault::force_limit, "HD_FORCE_ERROR", "the driver could not give the force",
      "check that the safety switch is held and the power is on"},
-    {0x300, ended, "HD_DEVICE_FAULT", "the device reports a fault of its own",
+    {0x300, ended, lost, "HD_DEVICE_FAULT", "the device reports a fault of its own",
      "check its power and its cables, switch it off and on, and run the maker's diagnostic program"},
-    {0x301, ended, "HD_DEVICE_ALREADY_INITIATED", "the device is open already",
+    {0x301, ended, lost, "HD_DEVICE_ALREADY_INITIATED", "the device is open already",
      "close the program that holds it"},
-    {0x302, ended, "HD_COMM_ERROR", "the connection to the device is broken", kCable},
-    {0x303, ended, "HD_COMM_CONFIG_ERROR", "the connection to the device is set up wrongly",
+    {0x302, ended, lost, "HD_COMM_ERROR", "the connection to the device is broken", kCable},
+    {0x303, ended, lost, "HD_COMM_CONFIG_ERROR", "the connection to the device is set up wrongly",
      "run the maker's setup program; the folder of its configuration is named by GTDD_HOME (delete a stale "
      "one in "
      "your home folder); be a user who may open the port (groups dialout, plugdev)"},
-    {0x304, ended, "HD_TIMER_ERROR", "the driver's servo timer does not run",
+    {0x304, ended, lost, "HD_TIMER_ERROR", "the driver's servo timer does not run",
      "close other programs that hold the device; allow real-time priority (device/README.md, Real time); "
      "start "
      "again"},
-    {0x400, ended, "HD_ILLEGAL_BEGIN", "a frame was begun at the wrong time", kReport},
-    {0x401, ended, "HD_ILLEGAL_END", "a frame was ended at the wrong time", kReport},
-    {0x402, ended, "HD_FRAME_ERROR", "a frame did not go through", kCable},
-    {0x500, ended, "HD_INVALID_PRIORITY", "the driver refused the servo priority", kReport},
-    {0x501, ended, "HD_SCHEDULER_FULL", "the driver has no room for another servo callback",
+    {0x400, ended, lost, "HD_ILLEGAL_BEGIN", "a frame was begun at the wrong time", kReport},
+    {0x401, ended, lost, "HD_ILLEGAL_END", "a frame was ended at the wrong time", kReport},
+    {0x402, ended, lost, "HD_FRAME_ERROR", "a frame did not go through", kCable},
+    {0x500, ended, lost, "HD_INVALID_PRIORITY", "the driver refused the servo priority", kReport},
+    {0x501, ended, lost, "HD_SCHEDULER_FULL", "the driver has no room for another servo callback",
      "close other programs that hold the device, and start again"},
-    {0x600, ended, "HD_INVALID_LICENSE", "OpenHaptics finds no valid licence",
+    {0x600, ended, lost, "HD_INVALID_LICENSE", "OpenHaptics finds no valid licence",
      "install its licence file where its own programs find it (the maker gives it free of charge)"},
-    {0xFFFFFFFF, ended, "unknown error", "the driver reports an error that this program does not know",
+    {0xFFFFFFFF, ended, lost, "unknown error", "the driver reports an error that this program does not know",
      "run the maker's diagnostic program"},
 }};
 

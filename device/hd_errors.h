@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "device/haptic_device.h"
 #include "device/libhd.h"
 
 namespace device {
@@ -19,6 +20,7 @@ enum class HdOutcome : std::uint8_t {
 struct HdErrorText {
   hd::Name code = 0;
   HdOutcome outcome = HdOutcome::ended;
+  DeviceFault fault = DeviceFault::lost;
   std::string_view name, what, remedy;
 };
 

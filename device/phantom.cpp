@@ -62,6 +62,8 @@ class Phantom final : public PhantomDevice {
         limits_(quoted_limits(info().model)) {
     if (options_.clock_ns == nullptr) options_.clock_ns = monotonic_ns;
     if (info().max_force_N > 0.0) limits_.max_force_N = info().max_force_N;
+    const glm::dvec3 size = info().workspace.high_m - info().workspace.low_m;
+    if (size.x > 0.0) limits_.workspace_m = size;
     std::array<unsigned char, 16> held{};
     connection_.call().get_booleans(hd::kSafetySwitch, held.data());
     has_safety_switch_ = connection_.take_errors().code == hd::kSuccess;

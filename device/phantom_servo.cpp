@@ -18,7 +18,7 @@ namespace {
 
 constexpr int kMostErrors = 16;           // read at a time
 constexpr std::size_t kMostValues = 16;   // of one parameter
-constexpr std::uint64_t kLookEvery = 64;  // ticks between two looks at calibration and temperature
+constexpr std::uint64_t kLookEvery = 64;  // ticks between two looks at the motors' temperature
 constexpr double kMillimeter = 1e-3;
 constexpr double kWarm = 0.8;  // of what the motors bear: worth a word
 
@@ -71,6 +71,7 @@ unsigned int PhantomServo::on_tick(void* servo) noexcept {
 }
 
 unsigned int PhantomServo::tick() noexcept {
+  if (crashed_.load()) return idle();
   if (!begin()) return let_go();
   read();
   look_around();
@@ -79,6 +80,7 @@ unsigned int PhantomServo::tick() noexcept {
   const ServoAnswer answer = compute();
   if (!answer.go_on) return let_go();
   const double share = gate_.pass(options_.dt_s);
+  if (share > 0.0) state_.fault = DeviceFault::none;
   give(share * options_.fit.force(answer.force_N));
   call_.end_frame(handle_);
   take_errors();  // what the driver says of this force: the next tick answers it, unless it is the end
@@ -101,7 +103,7 @@ bool PhantomServo::begin() noexcept {
     gate_.close();
   }
   call_.begin_frame(handle_);
-  if (crashed_.load() || stop_.load()) end_for(Reason::stopped);
+  if (stop_.load()) end_for(Reason::stopped);
   if (const hd::Name told = told_code_.exchange(0)) note({told, told_internal_.load(), handle_});
   take_errors();
   return reason_ == Reason::none;
@@ -132,7 +134,6 @@ void PhantomServo::read() noexcept {
 }
 
 void PhantomServo::look_around() noexcept {
-  if (ticks() % kLookEvery != 0) return;
   const hd::Name calibration = call_.check_calibration();
   if (calibration == hd::kNeedsHand) end_for(Reason::calibration);
   if (calibration == hd::kNeedsUpdate) {  // the position may jump by it
@@ -140,6 +141,7 @@ void PhantomServo::look_around() noexcept {
     gate_.close();
     call_.update_calibration(hd::kAutomatic);
   }
+  if (ticks() % kLookEvery != 0) return;
   std::array<double, kMostValues> temperature{};
   call_.get_doubles(hd::kMotorTemperature, temperature.data());
   for (const double one : temperature) {
@@ -178,9 +180,17 @@ unsigned int PhantomServo::let_go() noexcept {
   give(glm::dvec3(0.0));
   call_.end_frame(handle_);
   take_errors();
-  crash_zeroed_.store(true);
   done_.store(true, std::memory_order_release);
   return hd::kDone;
+}
+
+// The program is about to die of a crash: zero, and never done, so that nobody goes on with what is broken.
+unsigned int PhantomServo::idle() noexcept {
+  call_.begin_frame(handle_);
+  give(glm::dvec3(0.0));
+  call_.end_frame(handle_);
+  crash_zeroed_.store(true);
+  return hd::kContinue;
 }
 
 void PhantomServo::take_errors() noexcept {
@@ -194,6 +204,7 @@ void PhantomServo::take_errors() noexcept {
 void PhantomServo::note(const hd::ErrorInfo& error) noexcept {
   errors_.add(error);
   gate_.close();
+  state_.fault = hd_error_text(error.code).fault;
   if (hd_error_text(error.code).outcome == HdOutcome::ended) end_for(Reason::error);
 }
 
@@ -214,7 +225,7 @@ void PhantomServo::on_crash(void* servo) noexcept {
     return;
   }
   // Its next tick lets go; some ticks are given to it.
-  for (int i = 0; i < 20 && !self.crash_zeroed_.load(); ++i) {
+  for (int i = 0; i < 20 && !self.crash_zeroed_.load() && !self.done(); ++i) {
     constexpr timespec kHalfMillisecond{0, 500'000};
     nanosleep(&kHalfMillisecond, nullptr);
   }
@@ -247,8 +258,9 @@ ServoReport PhantomServo::report() const {
     case Reason::calibration:
       report.end = ServoEnd::lost;
       report.messages.emplace_back(
-          "the device lost its calibration: forces are off, and the session ended; "
-          "calibrate it (`hybrid devices` says how) and start again");
+          "the device lost its calibration: forces are off, and the session ended; what was felt until then "
+          "is "
+          "kept; calibrate it (`hybrid devices` says how) and start again");
       break;
   }
   say(cut_ticks_ > 0, std::to_string(cut_ticks_) + " ticks came more than " +

@@ -74,6 +74,7 @@ class PhantomServo {
   [[nodiscard]] ServoAnswer compute() noexcept;
   void give(const glm::dvec3& force_device_N) noexcept;
   unsigned int let_go() noexcept;
+  unsigned int idle() noexcept;
   void take_errors() noexcept;
   void note(const hd::ErrorInfo& error) noexcept;
   void end_for(Reason reason) noexcept {
