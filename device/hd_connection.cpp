@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "device/hd_connection.h"
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
@@ -164,6 +165,11 @@ void HdConnection::ask() {
   info_.continuous_force_N = number(hd::kContinuousForce);
   info_.workspace = box(hd::kWorkspace);
   info_.reach = box(hd::kMaxWorkspace);
+  std::array<double, kMostValues> temperature{};
+  call().get_doubles(hd::kMotorTemperature, temperature.data());
+  if (take_errors().code == hd::kSuccess) {
+    info_.motor_temperature = *std::max_element(temperature.begin(), temperature.end());
+  }
   std::array<int, kMostValues> style{};
   call().get_integers(hd::kCalibrationStyle, style.data());
   if (take_errors().code == hd::kSuccess) info_.calibration_style = style[0];

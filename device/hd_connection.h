@@ -21,8 +21,9 @@ struct PhantomInfo {
   double rate_hz = 1000.0;   // of the servo loop, as granted
   double max_force_N = 0.0;  // nominal; 0: not told
   double continuous_force_N = 0.0;
-  Box workspace, reach;       // device frame, m: usable, and the most; empty: not told
-  int calibration_style = 0;  // bit mask of hd::kEncoderReset, kAutomatic, kInkwell
+  double motor_temperature = 0.0;  // of the warmest, as it was opened: 0 cold to 1, the most it bears
+  Box workspace, reach;            // device frame, m: usable, and the most; empty: not told
+  int calibration_style = 0;       // bit mask of hd::kEncoderReset, kAutomatic, kInkwell
   bool calibrated = false;
   std::vector<std::string> notes;  // what was asked for and not granted, in words
 };

@@ -79,6 +79,7 @@ unsigned int PhantomServo::tick() noexcept {
   if (reason_ != Reason::none) return let_go();
   const ServoAnswer answer = compute();
   if (!answer.go_on) return let_go();
+  if (answer.skip) gate_.close();
   const double share = gate_.pass(options_.dt_s);
   if (share > 0.0) state_.fault = DeviceFault::none;
   give(share * options_.fit.force(answer.force_N));

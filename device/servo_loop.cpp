@@ -51,8 +51,9 @@ ServoReport run_servo(HapticDevice& device, const ServoOptions& options, ServoFu
     }
     input.device = device.read();
     const ServoAnswer answer = tick(input);
-    ++report.ticks;
+    if (!answer.skip) ++report.ticks;
     if (!answer.go_on) break;
+    if (answer.skip) continue;
     device.write(answer.force_N, dt_s);
   }
   if (timer) report.late_ticks = timer->missed();

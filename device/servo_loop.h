@@ -23,6 +23,7 @@ struct ServoInput {
 struct ServoAnswer {
   glm::dvec3 force_N{0.0};  // on the hand, scene frame
   bool go_on = true;        // false: this was the last tick, and its force is not given
+  bool skip = false;  // no tick, as in a pause: a simulated device stands still, a real one gets no force
 };
 
 // A reference to what computes a tick; it must outlive the loop. Costs no allocation.

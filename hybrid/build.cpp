@@ -326,10 +326,10 @@ class Builder {
     world_->set_scale(box_.low, box_.high);
     world_->limits = scene_.safety;
     if (!scene_.max_force_given) {
-      const double most = device::device_limits(scene_.device_model).max_force_N;
+      const double most = scene_limits(scene_).max_force_N;
       if (most > 0.0 && std::isfinite(most)) world_->limits.max_force_N = most;
     }
-    world_->encoder_m = device::device_limits(scene_.device_model).resolution_m;
+    world_->encoder_m = scene_limits(scene_).resolution_m;
     for (std::uint32_t a = 0; a < world_->soft.size(); ++a) {
       for (std::uint32_t b = a + 1; b < world_->soft.size(); ++b) world_->meeting.push_back({a, b});
     }

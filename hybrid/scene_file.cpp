@@ -29,7 +29,6 @@ constexpr LaterKey device_later[] = {
     {"delay", "remove it: the simulated device has none for now"},
 };
 constexpr LaterKey models_later[] = {
-    {"phantom", "use model = \"premium-1.5\" or \"touch\", the simulated ones"},
     {"mouse", "use model = \"ideal\" and a [path]"},
     {"replay", "use [path] kind = \"csv\" to follow a recorded motion"},
 };
@@ -105,13 +104,38 @@ Tool read_tool(const TableReader& table) {
   return out;
 }
 
+RealDevice read_real_device(const TableReader& table) {
+  RealDevice out;
+  out.place = table.place_of("model");
+  if (table.has("name")) out.name = table.text("name", "\"Default Device\"");
+  const TreeEntry* scale = table.find("scale");
+  if (scale != nullptr && scale->value.kind == TreeNode::Kind::string) {
+    static constexpr std::string_view words_for_it[] = {"fit"};
+    (void)table.choice("scale", words_for_it);
+    out.scale.reset();
+  } else {
+    const Quantity ratio{"a ratio above 0, or \"fit\"", "1", 1.0, 1e-3, 1e3};
+    out.scale = table.number("scale", ratio, out.scale);
+  }
+  return out;
+}
+
 void read_device(const TableReader& table, Scene& scene) {
-  static constexpr std::string_view keys[] = {"model", "rate"};
-  static constexpr std::string_view names[] = {"ideal", "premium-1.5", "touch"};
+  static constexpr std::string_view simulated_keys[] = {"model", "rate"};
+  static constexpr std::string_view real_keys[] = {"model", "rate", "name", "scale"};
+  static constexpr std::string_view names[] = {"ideal", "premium-1.5", "touch", "phantom"};
   static constexpr device::DeviceModel models[] = {
       device::DeviceModel::ideal, device::DeviceModel::premium_1_5, device::DeviceModel::touch};
-  table.allow(keys, device_later);
-  if (table.has("model")) scene.device_model = models[table.choice("model", names, {}, models_later)];
+  table.allow(real_keys, device_later);
+  if (table.has("model")) {
+    const std::size_t model = table.choice("model", names, {}, models_later);
+    if (model < std::size(models)) {
+      scene.device_model = models[model];
+    } else {
+      scene.real_device = read_real_device(table);
+    }
+  }
+  if (!scene.real_device) table.allow(simulated_keys, {}, real_keys, "a simulated model");
   const Quantity rate{"a servo rate in Hz", "1000", 1.0, 100.0, 20'000.0};
   scene.rate_hz = table.number("rate", rate, scene.rate_hz);
 }
