@@ -327,13 +327,13 @@ class Builder {
     world_->set_scale(box_.low, box_.high);
     world_->limits = scene_.safety;
     if (!scene_.max_force_given) {
-      const double most = device::device_limits(scene_.device_model).max_force_N;
+      const double most = scene_limits(scene_).max_force_N;
       if (most > 0.0 && std::isfinite(most)) world_->limits.max_force_N = most;
     }
-    world_->encoder_m = device::device_limits(scene_.device_model).resolution_m;
+    world_->encoder_m = scene_limits(scene_).resolution_m;
     world_->limits.deadline_s = scene_.deadline_periods / scene_.rate_hz;
     // What is where its path is, whatever the force, takes no energy.
-    const bool ideal = scene_.device_model == device::DeviceModel::ideal;
+    const bool ideal = is_ideal(scene_);
     if (ideal && !scene_.max_energy_given)
       world_->limits.max_energy_J = std::numeric_limits<double>::infinity();
     if (scene_.passivity && !ideal) world_->passivity = passivity_options();

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
@@ -175,6 +176,11 @@ nlohmann::ordered_json run_report(const Scene& scene, const BuiltScene& built, S
   if (!result.realtime_note.empty()) {
     j["realtime"] = {{"priority", result.realtime_note}, {"late_us", to_json(result.late_us)}};
   }
+  constexpr std::array kEnds{"finished", "stopped", "lost"};
+  j["device"] = {{"name", result.device_name},
+                 {"end", kEnds[static_cast<std::size_t>(result.end)]},
+                 {"messages", result.device_messages}};
+  j["path_notes"] = result.path_notes;
   j["faults"] = fault_texts(built.state->faults);
   j["build_s"] = built.seconds;
   j["load"] = {{"seconds", built.seconds},
@@ -220,6 +226,8 @@ std::string run_summary(const BuiltScene& built, SessionResult& result) {
         result.deadline_misses);
   }
   text += safety_words(built);
+  for (const std::string& note : result.path_notes) text += fmt::format("path: {}\n", note);
+  for (const std::string& message : result.device_messages) text += fmt::format("device: {}\n", message);
   for (const std::string& fault : fault_texts(built.state->faults)) text += fmt::format("fault: {}\n", fault);
   text += fmt::format("state hash {:016x}\n", result.state_hash);
   return text;

@@ -179,6 +179,14 @@ struct Tool {
   double stiffness_N_per_m = 1000.0;  // of the virtual coupling
 };
 
+// A real PHANToM, by its driver's library.
+struct RealDevice {
+  std::string name;  // as the driver knows it; empty: its default
+  std::optional<double> scale =
+      1.0;  // scene meters a meter of the hand; empty: as the scene needs, 1 or more
+  SourcePlace place;
+};
+
 enum class Overlap : std::uint8_t { carve, refuse };
 
 struct Scene {
@@ -193,7 +201,9 @@ struct Scene {
   std::vector<SoftDescription> soft;
   std::map<std::string, Material> materials;
   Tool tool;
-  device::DeviceModel device_model = device::DeviceModel::premium_1_5;
+  device::DeviceModel device_model = device::DeviceModel::premium_1_5;  // simulated, unless:
+  std::optional<RealDevice> real_device;
+  std::optional<device::DeviceLimits> opened_limits;  // of a real device that is open; else the model's
   double rate_hz = 1000.0;
   int delay_ticks = 0;               // of a simulated device, with
   std::optional<double> watchdog_s;  // this and
@@ -212,6 +222,16 @@ struct Scene {
 // the bounding box (labels, surface, the copies made on the way), within the physical memory.
 inline constexpr std::size_t lattice_bytes_per_voxel = 16;
 std::size_t max_lattice_voxels();
+
+// Whether the scene's device is where its path is, whatever the force.
+inline bool is_ideal(const Scene& scene) {
+  return !scene.real_device && scene.device_model == device::DeviceModel::ideal;
+}
+
+// What the scene's device bears and resolves.
+inline device::DeviceLimits scene_limits(const Scene& scene) {
+  return scene.opened_limits.value_or(device::device_limits(scene.device_model));
+}
 
 // Reads and checks a scene file. Nothing outside the file is opened except to see that it exists.
 // Throws SceneError.
