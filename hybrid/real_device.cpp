@@ -8,7 +8,7 @@
 #include <glm/common.hpp>
 #include <thread>
 
-#include "hybrid/rigid_sweep.h"
+#include "hybrid/rigid_step.h"
 #include "hybrid/session.h"
 
 namespace hybrid {
