@@ -67,7 +67,7 @@ class Run {
         world_(*built.world),
         state_(*built.state),
         options_(options),
-        path_(scene_path(scene)),
+        path_(options.path ? options.path : scene_path(scene)),
         simulated_(options.real_device == nullptr ? scene_device(scene, path_) : nullptr),
         device_(options.real_device == nullptr ? *simulated_ : *options.real_device),
         realtime_(options.realtime || options.real_device != nullptr),

@@ -145,11 +145,12 @@ TEST_F(RecordingFile, AFlippedBitOfAnInputIsNoticedAtItsTick) {
   ASSERT_TRUE(hybrid::replay(good, {}).equal);
   hybrid::save_recording(folder_ / "a.rec", good);
   const std::string bytes = read(folder_ / "a.rec");
-  const std::size_t first = bytes.size() - 32 * good.ticks.size();
+  constexpr std::size_t kTickBytes = 40;
+  const std::size_t first = bytes.size() - kTickBytes * good.ticks.size();
   for (const std::size_t tick : {std::size_t{0}, std::size_t{50}, std::size_t{200}, good.ticks.size() - 1}) {
     std::string flipped = bytes;
-    flipped[first + 32 * tick + 16 + 5] =
-        static_cast<char>(flipped[first + 32 * tick + 16 + 5] ^ 0x10);  // z: a few micrometers
+    flipped[first + kTickBytes * tick + 16 + 5] =
+        static_cast<char>(flipped[first + kTickBytes * tick + 16 + 5] ^ 0x10);  // z: a few micrometers
     const auto result = hybrid::replay(hybrid::load_recording(write("b.rec", flipped)), {});
     EXPECT_FALSE(result.equal);
     EXPECT_EQ(result.parts_at, tick);
