@@ -102,6 +102,7 @@ bool PhantomServo::begin() noexcept {
   if (late_s_ > options_.late_s) {
     ++cut_ticks_;
     gate_.close();
+    state_.fault = DeviceFault::late;
   }
   call_.begin_frame(handle_);
   if (stop_.load()) end_for(Reason::stopped);

@@ -57,7 +57,8 @@ struct ServoReport {
 
 struct ServoOptions {
   double rate_hz = 1000.0;
-  bool realtime = false;  // pace a simulated device with a timer, and stop on a signal
+  bool realtime = false;      // pace a simulated device with a timer, and stop on a signal
+  double deadline_s = 10e-3;  // a tick that comes later than by this is told as DeviceFault::late
 };
 
 // A device whose driver has the servo thread.

@@ -205,11 +205,17 @@ struct Scene {
   std::optional<RealDevice> real_device;
   std::optional<device::DeviceLimits> opened_limits;  // of a real device that is open; else the model's
   double rate_hz = 1000.0;
+  int delay_ticks = 0;               // of a simulated device, with
+  std::optional<double> watchdog_s;  // this and
+  device::HandTremor tremor;         // this of its hand
   device::HandModel hand;
   device::PathDescription path;
   SourcePlace path_place;
-  device::ForceLimits safety;
-  bool max_force_given = false;  // else the device's own limit holds
+  device::ForceLimits safety;     // of its deadline, deadline_periods counts
+  bool max_force_given = false;   // else the device's own limit holds
+  bool max_energy_given = false;  // else an ideal device has no limit: its motion is no answer to a force
+  double deadline_periods = 10.0;
+  bool passivity = false;
 };
 
 // The largest lattice that a soft object may have on this machine: what building it takes for each voxel of

@@ -100,7 +100,9 @@ class Run {
     auto tick = [this](const device::ServoInput& input) { return answer(input); };
     device::ServoReport served;
     if (ticks_ > 0) {
-      served = device::run_servo(device_, {.rate_hz = scene_.rate_hz, .realtime = realtime_}, tick);
+      served = device::run_servo(
+          device_, {.rate_hz = scene_.rate_hz, .realtime = realtime_, .deadline_s = world_.limits.deadline_s},
+          tick);
     }
     if (options_.keep_picture && !result_.moment) {
       TickResult last;
@@ -233,7 +235,14 @@ std::shared_ptr<const device::Path> scene_path(const Scene& scene) {
 
 std::unique_ptr<device::HapticDevice> scene_device(const Scene& scene,
                                                    std::shared_ptr<const device::Path> path) {
-  return device::make_simulated_device(scene.device_model, scene.hand, std::move(path));
+  if (scene.device_model == device::DeviceModel::ideal)
+    return device::make_simulated_device(scene.device_model, scene.hand, std::move(path));
+  return device::make_simulated_device({.mechanism = device::mechanism(scene.device_model),
+                                        .hand = scene.hand,
+                                        .tremor = scene.tremor,
+                                        .delay_ticks = scene.delay_ticks,
+                                        .watchdog_s = scene.watchdog_s},
+                                       std::move(path));
 }
 
 void begin_session(const Scene& scene, const World& world, WorldState& state, const glm::dvec3& device_m) {
@@ -254,7 +263,10 @@ std::uint64_t hash_tick(std::uint64_t before, const TickResult& tick) noexcept {
 }
 
 std::uint64_t hash_state(std::uint64_t before, const WorldState& state) noexcept {
-  std::uint64_t hash = before;
+  std::uint64_t hash = mix(before, state.limit.last_N);
+  for (const double x : {state.limit.elapsed_s, state.limit.handed.sum_J(), state.passive.given_J,
+                         state.passive.worst_tick_J, state.passive.stride_m, state.passive.share})
+    hash = mix(hash, std::bit_cast<std::uint64_t>(x));
   for (const RigidNear& body : state.rigid) {
     hash = mix(mix(hash, body.pose.position_m), body.pose.rotation);
     hash = mix(mix(hash, body.free.centre_m), body.free.rotation);

@@ -81,8 +81,8 @@ std::unique_ptr<device::HapticDevice> scene_device(const Scene& scene,
 // Starts the proxy or throws SceneError.
 void begin_session(const Scene& scene, const World& world, WorldState& state, const glm::dvec3& device_m);
 
-// Hashes. The running one takes what is felt, the final one also every displacement, and where every rigid
-// body is and how it moves.
+// Hashes. The running one takes what is felt, the final one also every displacement, where every rigid
+// body is and how it moves, and what the limits on the force remember.
 std::uint64_t hash_tick(std::uint64_t before, const TickResult& tick) noexcept;
 std::uint64_t hash_state(std::uint64_t before, const WorldState& state) noexcept;
 
