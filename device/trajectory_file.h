@@ -19,7 +19,7 @@
 namespace device {
 
 struct MeasuredFile {
-  std::filesystem::path file;
+  std::filesystem::path file{};
   std::string columns{};    // "t_s,x_mm,y_mm,z_mm,fx_N,fy_N,fz_N"; empty: as the file says
   std::string force{};      // of several forces the one so named: "giver" for giver_fx, giver_fy, giver_fz
   double unit_m = 1e-3;     // of lengths whose column names none
