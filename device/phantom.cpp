@@ -94,7 +94,7 @@ class Phantom final : public PhantomDevice {
     const HdFunctions& call = connection_.call();
     PhantomServo servo(call, connection_.handle(),
                        {.gate = options_.gate,
-                        .late_s = options.deadline_s,
+                        .deadline_s = options.deadline_s,
                         .clock_ns = options_.clock_ns,
                         .dt_s = 1.0 / info().rate_hz,
                         .max_force_N = limits_.max_force_N,

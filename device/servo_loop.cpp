@@ -42,7 +42,9 @@ ServoReport run_servo(HapticDevice& device, const ServoOptions& options, ServoFu
   while (true) {
     ServoInput input{.device = {}, .dt_s = dt_s};
     if (timer) {
+      const std::uint64_t missed = timer->missed();
       input.late_s = timer->wait();
+      device.hold(static_cast<double>(timer->missed() - missed) * dt_s);
       if (stop_signal() != 0) {
         report.end = ServoEnd::stopped;
         report.messages.emplace_back("stopped by a signal; what was felt until then is kept");
@@ -50,7 +52,7 @@ ServoReport run_servo(HapticDevice& device, const ServoOptions& options, ServoFu
       }
     }
     input.device = device.read();
-    if (input.late_s > options.deadline_s && input.device.fault == DeviceFault::none) {
+    if (dt_s + input.late_s > options.deadline_s && input.device.fault == DeviceFault::none) {
       input.device.fault = DeviceFault::late;
     }
     const ServoAnswer answer = tick(input);

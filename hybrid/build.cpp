@@ -333,7 +333,7 @@ class Builder {
     world_->encoder_m = scene_limits(scene_).resolution_m;
     world_->limits.deadline_s = scene_.deadline_periods / scene_.rate_hz;
     // What is where its path is, whatever the force, takes no energy.
-    const bool ideal = scene_.device_model == device::DeviceModel::ideal;
+    const bool ideal = is_ideal(scene_);
     if (ideal && !scene_.max_energy_given)
       world_->limits.max_energy_J = std::numeric_limits<double>::infinity();
     if (scene_.passivity && !ideal) world_->passivity = passivity_options();

@@ -225,9 +225,9 @@ std::string run_summary(const BuiltScene& built, SessionResult& result) {
         result.realtime_note, result.late_us.p50, result.late_us.p99, result.late_us.max,
         result.deadline_misses);
   }
+  text += safety_words(built);
   for (const std::string& note : result.path_notes) text += fmt::format("path: {}\n", note);
   for (const std::string& message : result.device_messages) text += fmt::format("device: {}\n", message);
-  text += safety_words(built);
   for (const std::string& fault : fault_texts(built.state->faults)) text += fmt::format("fault: {}\n", fault);
   text += fmt::format("state hash {:016x}\n", result.state_hash);
   return text;

@@ -223,6 +223,11 @@ struct Scene {
 inline constexpr std::size_t lattice_bytes_per_voxel = 16;
 std::size_t max_lattice_voxels();
 
+// Whether the scene's device is where its path is, whatever the force.
+inline bool is_ideal(const Scene& scene) {
+  return !scene.real_device && scene.device_model == device::DeviceModel::ideal;
+}
+
 // What the scene's device bears and resolves.
 inline device::DeviceLimits scene_limits(const Scene& scene) {
   return scene.opened_limits.value_or(device::device_limits(scene.device_model));

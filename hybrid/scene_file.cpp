@@ -119,9 +119,9 @@ RealDevice read_real_device(const TableReader& table) {
 }
 
 void read_device(const TableReader& table, Scene& scene) {
-  static constexpr std::string_view keys[] = {"model", "rate", "delay_ticks", "watchdog_ms", "name", "scale"};
-  static constexpr std::string_view simulated_keys[] = {"model", "rate", "delay_ticks", "watchdog_ms"};
-  static constexpr std::string_view real_keys[] = {"model", "rate", "name", "scale"};
+  static constexpr std::string_view keys[] = {"model", "rate", "name", "scale", "delay_ticks", "watchdog_ms"};
+  static constexpr std::string_view of_simulated[] = {"delay_ticks", "watchdog_ms"};
+  static constexpr std::string_view of_real[] = {"name", "scale"};
   static constexpr std::string_view names[] = {"ideal", "premium-1.5", "touch", "phantom"};
   static constexpr device::DeviceModel models[] = {
       device::DeviceModel::ideal, device::DeviceModel::premium_1_5, device::DeviceModel::touch};
@@ -134,21 +134,20 @@ void read_device(const TableReader& table, Scene& scene) {
       scene.real_device = read_real_device(table);
     }
   }
-  if (scene.real_device) {
-    table.allow(real_keys, {}, simulated_keys, "model = \"phantom\"");
-  } else {
-    table.allow(simulated_keys, {}, real_keys, "a simulated model");
-  }
+  const auto refuse_where_without_meaning = [&](std::span<const std::string_view> unused, const char* model) {
+    for (const std::string_view key : unused) {
+      if (!table.has(key)) continue;
+      table.refuse(key, words("'", key, "' has no meaning with ", model), "remove it, or change the model");
+    }
+  };
+  if (!scene.real_device) refuse_where_without_meaning(of_real, "a simulated model");
+  if (scene.real_device) refuse_where_without_meaning(of_simulated, "a real device: it has its own");
+  if (is_ideal(scene)) refuse_where_without_meaning(of_simulated, "the ideal device, which no force moves");
   const Quantity rate{"a servo rate in Hz", "1000", 1.0, 100.0, 20'000.0};
   scene.rate_hz = table.number("rate", rate, scene.rate_hz);
   scene.delay_ticks = static_cast<int>(table.integer("delay_ticks", 0, device::kMaxDelayTicks, 0));
   if (table.has("watchdog_ms"))
     scene.watchdog_s = table.number("watchdog_ms", {"a time above 0 in ms", "20", 1e-3, 1e-6, 3600.0});
-  for (const std::string_view key : {"delay_ticks", "watchdog_ms"}) {
-    if (scene.device_model != device::DeviceModel::ideal || !table.has(key)) continue;
-    table.refuse(key, words("'", key, "' means nothing to the ideal device, which no force moves"),
-                 "remove it, or use model = \"premium-1.5\" or \"touch\"");
-  }
 }
 
 device::HandModel read_hand(const TableReader& table, Scene& scene) {
@@ -191,8 +190,8 @@ void read_safety(const TableReader& table, Scene& scene) {
   out.energy_window_s =
       table.number("energy_window", {"a time above 0 in s", "0.1", 1.0, 1e-3, 3600.0}, out.energy_window_s);
   scene.passivity = table.boolean("passivity", false);
-  if (scene.passivity && scene.device_model == device::DeviceModel::ideal) {
-    table.refuse("passivity", "'passivity' means nothing to the ideal device, which no force moves",
+  if (scene.passivity && is_ideal(scene)) {
+    table.refuse("passivity", "'passivity' has no meaning with the ideal device, which no force moves",
                  "remove it, or use [device] model = \"premium-1.5\" or \"touch\"");
   }
 }

@@ -36,8 +36,8 @@ struct SessionOptions {
   // A real one, open, placed in the scene and out of anything rigid; always in real time. None: the scene's
   // simulated one.
   device::HapticDevice* real_device = nullptr;
-  bool keep_rows = true;                       // trace rows and per-object forces
-  bool keep_picture = false;                   // remember the most telling moment
+  bool keep_rows = true;      // trace rows and per-object forces
+  bool keep_picture = false;  // remember the most telling moment
   int reference_samples = 0;  // how often the force is compared with its equilibrium; 0 in real time
   Progress progress;
   std::shared_ptr<const device::Path> path{};  // of the hand, in place of the scene's
