@@ -76,7 +76,7 @@ device::HdFunctions idle_driver() {
   call.get_error = [] { return device::hd::ErrorInfo{}; };
   call.get_booleans = [](unsigned, unsigned char* value) { *value = 1; };
   call.get_integers = [](unsigned, int* value) { *value = 0; };
-  call.get_doubles = [](unsigned, double* value) { value[0] = value[1] = value[2] = 1.0; };
+  call.get_doubles = [](unsigned, double* value) { value[0] = value[1] = value[2] = 0.5; };
   call.set_doubles = [](unsigned, const double*) {};
   call.check_calibration = [] { return device::hd::kCalibrated; };
   call.update_calibration = [](unsigned) {};
