@@ -76,7 +76,8 @@ void* open_usual(std::string& file) {
     if (!is_absent(words, name)) {
       throw DeviceError("libHD: " + file + " is there and does not load: " + words + "; " + remedy(words));
     }
-    tried += (tried.empty() ? "" : ", ") + file;
+    if (!tried.empty()) tried += ", ";
+    tried += file;
   }
   throw DeviceError("libHD: no PHANToM driver found (tried " + tried + "); " + std::string(kInstall));
 }

@@ -43,9 +43,9 @@ struct PassivityState {
 // position_m. It never adds to a force, turns it, or lets more through than was asked, so every limit on
 // force_N holds for it too; it is the last to act.
 //
-// What is held, at every tick: given_J <= worst_tick_J + 0.1 µJ, for every motion whose ways between ticks are
-// no longer than twice the longest of late plus max_acceleration·dt² plus an encoder step (`jumps` counts the
-// others). No controller that plays any force after a first tick that lost energy can hold more: the next
+// What is held, at every tick: given_J <= worst_tick_J + 0.1 µJ, for every motion whose ways between ticks
+// are no longer than twice the longest of late plus max_acceleration·dt² plus an encoder step (`jumps` counts
+// the others). No controller that plays any force after a first tick that lost energy can hold more: the next
 // tick may lose as much again.
 //   - While no more was handed out than taken in: on the way out, the share is what the energy taken in can
 //     sustain back to where the force began, as a spring would. So a wall that a sampled loop cannot hold is

@@ -89,12 +89,12 @@ class Phantom final : public PhantomDevice {
     return state;
   }
 
-  ServoReport serve(ServoFunction tick, const ServoOptions& /*options*/) override {
+  ServoReport serve(ServoFunction tick, const ServoOptions& options) override {
     connection_.require_calibrated();
     const HdFunctions& call = connection_.call();
     PhantomServo servo(call, connection_.handle(),
                        {.gate = options_.gate,
-                        .late_s = options_.late_s,
+                        .deadline_s = options.deadline_s,
                         .clock_ns = options_.clock_ns,
                         .dt_s = 1.0 / info().rate_hz,
                         .max_force_N = limits_.max_force_N,

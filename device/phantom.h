@@ -20,8 +20,7 @@ namespace device {
 struct PhantomOptions {
   HdOpenOptions open;
   ForceGateOptions gate;
-  double late_s = 5e-3;    // a tick later than this gets no force, and forces come back by the ramp
-  double silence_s = 1.0;  // no tick for so long: the driver is taken for dead
+  double silence_s = 1.0;                         // no tick for so long: the driver is taken for dead
   std::int64_t (*clock_ns)() noexcept = nullptr;  // CLOCK_MONOTONIC; tests bring their own
 };
 

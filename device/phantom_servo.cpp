@@ -99,9 +99,10 @@ bool PhantomServo::begin() noexcept {
   late_s_ = std::max(0.0, gap_s - options_.dt_s);
   longest_late_s_ = std::max(longest_late_s_, late_s_);
   if (late_s_ > 0.5 * options_.dt_s) ++late_ticks_;
-  if (late_s_ > options_.late_s) {
+  if (options_.dt_s + late_s_ > options_.deadline_s) {
     ++cut_ticks_;
     gate_.close();
+    state_.fault = DeviceFault::late;
   }
   call_.begin_frame(handle_);
   if (stop_.load()) end_for(Reason::stopped);
@@ -264,10 +265,10 @@ ServoReport PhantomServo::report() const {
           "kept; calibrate it (`hybrid devices` says how) and start again");
       break;
   }
-  say(cut_ticks_ > 0, std::to_string(cut_ticks_) + " ticks came more than " +
-                          number("%.3g", 1e3 * options_.late_s) + " ms late (the longest " +
+  say(cut_ticks_ > 0, std::to_string(cut_ticks_) + " ticks missed the deadline of " +
+                          number("%.3g", 1e3 * options_.deadline_s) + " ms (the longest " +
                           number("%.3g", 1e3 * longest_late_s_) +
-                          " ms), and forces were off: close other programs, allow real-time priority "
+                          " ms late), and forces were off: close other programs, allow real-time priority "
                           "(device/README.md, Real time), or make the scene cheaper");
   say(nonfinite_ > 0,
       std::to_string(nonfinite_) +

@@ -35,7 +35,7 @@ class ErrorTally {
 
 struct PhantomServoOptions {
   ForceGateOptions gate;
-  double late_s = 5e-3;
+  double deadline_s = 10e-3;                      // from one tick to the next; a later one gets no force
   std::int64_t (*clock_ns)() noexcept = nullptr;  // required
   double dt_s = 1e-3;
   double max_force_N = 0.0;  // 0: not known, and not clamped here

@@ -52,6 +52,9 @@ ServoReport run_servo(HapticDevice& device, const ServoOptions& options, ServoFu
       }
     }
     input.device = device.read();
+    if (dt_s + input.late_s > options.deadline_s && input.device.fault == DeviceFault::none) {
+      input.device.fault = DeviceFault::late;
+    }
     const ServoAnswer answer = tick(input);
     if (!answer.skip) ++report.ticks;
     if (!answer.go_on) break;

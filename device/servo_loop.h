@@ -58,6 +58,8 @@ struct ServoReport {
 struct ServoOptions {
   double rate_hz = 1000.0;
   bool realtime = false;  // pace a simulated device with a timer, and stop on a signal
+  // From one tick to the next; a later one is told as DeviceFault::late, which is recorded, as it is felt.
+  double deadline_s = 10e-3;
 };
 
 // A device whose driver has the servo thread.

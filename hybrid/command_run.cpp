@@ -152,8 +152,7 @@ int run(const RunCommand& command) {
     save_picture(command.picture, drawn_scene(*built.world, title), *result.moment);
   if (!command.record.empty()) {
     save_recording(command.record, {std::filesystem::absolute(command.scene), read_text(command.scene),
-                                    result.dt_s, scene_limits(scene).max_force_N,
-                                    scene_limits(scene).resolution_m, result.state_hash, result.recording});
+                                    result.dt_s, scene_limits(scene), result.state_hash, result.recording});
   }
   if (!command.save_surface.empty()) save_soft_surfaces(command.save_surface, built);
   if (!command.json.empty()) save_json(command.json, run_report(scene, built, result));

@@ -91,6 +91,7 @@ class Player {
   }
   [[nodiscard]] double t_s() const { return static_cast<double>(ticks_) * dt_; }
   [[nodiscard]] double rate_hz() const { return rate_hz_; }
+  [[nodiscard]] double deadline_s() const { return built_.world->limits.deadline_s; }
   [[nodiscard]] device::HapticDevice& device() { return device_; }
   // A tick of no real time, on this thread.
   TickResult step(const Wish& wish) {
@@ -170,7 +171,9 @@ device::ServoReport play_live(Player& player, Window& window) {
       return {.force_N = felt.force_N};
     };
     try {
-      report = device::run_servo(player.device(), {.rate_hz = player.rate_hz(), .realtime = true}, tick);
+      report = device::run_servo(
+          player.device(), {.rate_hz = player.rate_hz(), .realtime = true, .deadline_s = player.deadline_s()},
+          tick);
     } catch (const std::exception& e) {
       report.end = device::ServoEnd::lost;
       report.messages.emplace_back(e.what());

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "hybrid/build.h"
+#include "hybrid/compare_measured.h"
 
 namespace hybrid {
 
@@ -46,7 +47,8 @@ int devices(const DevicesCommand& command);
 
 struct CompareCommand {
   std::filesystem::path scene;
-  std::string object;  // empty: the first that can be compared
+  std::string object;        // empty: the first that can be compared
+  MeasuredOptions measured;  // its file empty: no measurement
   std::filesystem::path plot;
   std::string json;
 };

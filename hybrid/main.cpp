@@ -89,6 +89,23 @@ void add_compare(CLI::App& app, int& status) {
   auto c = std::make_shared<hybrid::CompareCommand>();
   sub->add_option("SCENE", c->scene, "scene file (.toml)")->required();
   sub->add_option("--object", c->object, "name of the object; default: the first");
+  device::MeasuredFile& file = c->measured.measured;
+  auto* measured = sub->add_option(
+      "--measured", file.file, "compare the whole scene with forces measured along a motion (.traj, .csv)");
+  sub->add_option("--along", c->measured.along,
+                  "of --measured: the device's positions, from a file of their own")
+      ->needs(measured);
+  sub->add_option("--columns", file.columns,
+                  "of --measured: its columns, as in t_s,x_mm,y_mm,z_mm,fx_N,fy_N,fz_N")
+      ->needs(measured);
+  sub->add_option("--force", file.force,
+                  "of --measured: which force, by the first part of its columns' names")
+      ->needs(measured);
+  sub->add_option("--rate", file.rate_hz, "of --measured: samples a second, where it has no times")
+      ->check(CLI::PositiveNumber)
+      ->needs(measured);
+  sub->add_flag("--on-object", file.on_object, "of --measured: its forces are those on the object")
+      ->needs(measured);
   sub->add_option("--plot", c->plot, "write force over time and depth as SVG");
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
   sub->callback([c, &status] { status = hybrid::compare(*c); });

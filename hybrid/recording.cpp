@@ -12,20 +12,20 @@
 namespace hybrid {
 namespace {
 
-// Layout, little-endian: magic, sizes of path and text, tick count, dt, the device's greatest force and
-// resolution, state hash, path, text, ticks of (x, y, z, hash, fault of the device).
+// Layout, little-endian: magic, sizes of path and text, tick count, dt, the device's greatest force,
+// resolution and friction, state hash, path, text, ticks of (x, y, z, hash, fault of the device).
 constexpr std::array<char, 8> kMagic{'h', 'y', 'b', 'r', 'i', 'd', 'R', '2'};
 struct Header {
   std::array<char, 8> magic;
   std::uint64_t path_bytes, text_bytes, ticks;
-  double dt_s, max_force_N, resolution_m;
+  double dt_s, max_force_N, resolution_m, friction_N;
   std::uint64_t state_hash;
 };
 struct Tick {
   std::array<double, 3> position;
   std::uint64_t hash, fault;
 };
-static_assert(sizeof(Header) == 64 && sizeof(Tick) == 40, "the file's layout has no padding");
+static_assert(sizeof(Header) == 72 && sizeof(Tick) == 40, "the file's layout has no padding");
 
 std::string read_text(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
@@ -39,9 +39,15 @@ std::string read_text(const std::filesystem::path& file) {
 void save_recording(const std::filesystem::path& file, const Recording& recording) {
   std::ofstream out(file, std::ios::binary);
   const std::string path = recording.scene_file.string();
-  const Header header{
-      kMagic,         path.size(),           recording.scene_text.size(), recording.ticks.size(),
-      recording.dt_s, recording.max_force_N, recording.resolution_m,      recording.state_hash};
+  const Header header{kMagic,
+                      path.size(),
+                      recording.scene_text.size(),
+                      recording.ticks.size(),
+                      recording.dt_s,
+                      recording.device.max_force_N,
+                      recording.device.resolution_m,
+                      recording.device.friction_N,
+                      recording.state_hash};
   out.write(reinterpret_cast<const char*>(&header), sizeof header);
   out.write(path.data(), static_cast<std::streamsize>(path.size()));
   out.write(recording.scene_text.data(), static_cast<std::streamsize>(recording.scene_text.size()));
@@ -74,7 +80,8 @@ Recording load_recording(const std::filesystem::path& file) {
       header.path_bytes <= size && header.text_bytes <= size && header.ticks <= size / sizeof(Tick) &&
       sizeof header + header.path_bytes + header.text_bytes + header.ticks * sizeof(Tick) == size &&
       header.dt_s > 0.0 && std::isfinite(header.dt_s) && header.max_force_N >= 0.0 &&
-      header.resolution_m >= 0.0 && std::isfinite(header.resolution_m);
+      header.resolution_m >= 0.0 && std::isfinite(header.resolution_m) && header.friction_N >= 0.0 &&
+      std::isfinite(header.friction_N);
   if (!sane)
     throw std::runtime_error(
         fmt::format("{}: truncated or damaged ({} bytes); copy it again", file.string(), size));
@@ -85,8 +92,9 @@ Recording load_recording(const std::filesystem::path& file) {
   in.read(recording.scene_text.data(), static_cast<std::streamsize>(header.text_bytes));
   recording.scene_file = path;
   recording.dt_s = header.dt_s;
-  recording.max_force_N = header.max_force_N;
-  recording.resolution_m = header.resolution_m;
+  recording.device.max_force_N = header.max_force_N;
+  recording.device.resolution_m = header.resolution_m;
+  recording.device.friction_N = header.friction_N;
   recording.state_hash = header.state_hash;
   recording.ticks.resize(header.ticks);
   for (RecordedTick& t : recording.ticks) {
@@ -109,9 +117,8 @@ ReplayResult replay(const Recording& recording, const Progress& progress) {
                     recording.scene_file.string()));
   }
   Scene scene = load_scene(recording.scene_file);
-  scene.opened_limits = scene_limits(scene);  // it may have been felt with a device that is not here now
-  scene.opened_limits->max_force_N = recording.max_force_N;
-  scene.opened_limits->resolution_m = recording.resolution_m;
+  scene.opened_limits = recording.device;  // it may have been felt with one that is not here now
+  if (1.0 / scene.rate_hz != recording.dt_s) scene.rate_hz = 1.0 / recording.dt_s;  // its driver's
   const BuiltScene built = build_scene(scene, progress);
   ReplayResult result;
   result.ticks = recording.ticks.size();

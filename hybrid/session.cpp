@@ -67,7 +67,7 @@ class Run {
         world_(*built.world),
         state_(*built.state),
         options_(options),
-        path_(scene_path(scene)),
+        path_(options.path ? options.path : scene_path(scene)),
         simulated_(options.real_device == nullptr ? scene_device(scene, path_) : nullptr),
         device_(options.real_device == nullptr ? *simulated_ : *options.real_device),
         realtime_(options.realtime || options.real_device != nullptr),
@@ -100,7 +100,9 @@ class Run {
     auto tick = [this](const device::ServoInput& input) { return answer(input); };
     device::ServoReport served;
     if (ticks_ > 0) {
-      served = device::run_servo(device_, {.rate_hz = scene_.rate_hz, .realtime = realtime_}, tick);
+      served = device::run_servo(
+          device_, {.rate_hz = scene_.rate_hz, .realtime = realtime_, .deadline_s = world_.limits.deadline_s},
+          tick);
     }
     if (options_.keep_picture && !result_.moment) {
       TickResult last;
@@ -129,12 +131,8 @@ class Run {
   device::ServoAnswer answer(const device::ServoInput& input) {
     const FlushedDenormals flushed;
     const std::uint64_t tick = ticks_done_++;
-    // Late is what the force before stayed too long. Told as a fault, because that is recorded: it is felt.
-    device::DeviceState tool = input.device;
-    if (tool.fault == device::DeviceFault::none && dt_ + input.late_s > world_.limits.deadline_s)
-      tool.fault = device::DeviceFault::late;
-    const TickResult felt = haptic_tick(world_, state_, tool, dt_);
-    keep(felt, tick, tool.fault);
+    const TickResult felt = haptic_tick(world_, state_, input.device, dt_);
+    keep(felt, tick, input.device.fault);
     if (realtime_) {
       late_us_.push_back(input.late_s * 1e6);
     } else {

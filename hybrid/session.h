@@ -40,6 +40,7 @@ struct SessionOptions {
   bool keep_picture = false;  // remember the most telling moment
   int reference_samples = 0;  // how often the force is compared with its equilibrium; 0 in real time
   Progress progress;
+  std::shared_ptr<const device::Path> path{};  // of the hand, in place of the scene's
 };
 
 struct ForceError {  // of the tick's force against the equilibrium lattice with its limits, at the sampled

@@ -36,8 +36,7 @@ Recording record(const std::filesystem::path& file, std::optional<double> second
   return {.scene_file = file,
           .scene_text = read(file),
           .dt_s = result.dt_s,
-          .max_force_N = hybrid::scene_limits(scene).max_force_N,
-          .resolution_m = hybrid::scene_limits(scene).resolution_m,
+          .device = hybrid::scene_limits(scene),
           .state_hash = result.state_hash,
           .ticks = result.recording};
 }
