@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The program's own haptic loop, pressed on one place of a scene: what the measurements of stability and
+// passivity drive. The place is where the scene's path is first felt, the direction that of the force there.
+#pragma once
+
+#include <deque>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <string>
+
+#include "device/loop_theory.h"
+#include "device/simulated.h"
+#include "hybrid/build.h"
+#include "hybrid/tick.h"
+
+namespace hybrid {
+
+// One loop to be measured, but for the stiffness. The scene's own device and hand do not count.
+struct LoopSetting {
+  double rate_hz = 1000.0;
+  int delay_ticks = 0;  // from sample to force
+  double mass_kg = 0.075;             // apparent, of the mechanism
+  double viscous_N_s_per_m = 0.005;   // b, of the mechanism
+  double friction_N = 0.0;            // Coulomb, of the mechanism
+  double quantisation_m = 0.0;        // encoder step
+  device::HandModel hand{};
+  double wall_damping_N_s_per_m = 0.0;  // B, of every rigid surface
+  bool damping_account = false;         // of World: the care that keeps B passive; theory knows B without
+
+  [[nodiscard]] double period_s() const { return 1.0 / rate_hz; }
+};
+
+// What theory calls the same: with the hand for stability, without it for passivity.
+device::SampledLoop held_loop(const LoopSetting& setting);
+device::SampledLoop bare_loop(const LoopSetting& setting);
+
+// A scene, built once, touched again and again from the same state.
+class PressedScene {
+ public:
+  // Throws SceneError: what build_scene() refuses, or the path touches nothing.
+  explicit PressedScene(const Scene& scene, const Progress& progress = {});
+
+  // Back to the beginning, with the tool above the place, for a coupling of this stiffness.
+  void restart(const LoopSetting& setting, double stiffness_N_per_m);
+  TickResult tick(const device::DeviceState& input, double dt_s) noexcept {
+    return haptic_tick(world_, *state_, input, dt_s);
+  }
+
+  // `depth_m` into the surface, along its normal.
+  [[nodiscard]] glm::dvec3 at_depth(double depth_m) const { return touch_m_ - depth_m * normal_; }
+  [[nodiscard]] double depth_of(const glm::dvec3& point_m) const;
+  [[nodiscard]] const glm::dvec3& normal() const { return normal_; }
+  [[nodiscard]] const World& world() const { return world_; }
+  // How hard the measurements press (N): well within the scene's limit.
+  [[nodiscard]] double press_N() const { return press_N_; }
+
+ private:
+  BuiltScene built_;
+  World world_;
+  std::unique_ptr<WorldState> begin_, state_;
+  glm::dvec3 touch_m_{0.0}, normal_{0.0, 0.0, 1.0}, free_m_{0.0};
+  double press_N_ = 2.0;
+};
+
+// ---- passivity --------------------------------------------------------------------------------------------
+
+// A motion that no hand makes: at the ticks a sinusoid about a depth, between them even, because of all
+// motions through the same samples that is the one on which the mechanism's damping costs least.
+struct DrivenMotion {
+  int cycles = 1, ticks = 128;  // so many whole cycles in so many ticks
+  double centre_m = 1e-3;       // depth
+  double amplitude_m = 1e-5;    // less than the depth
+  double phase_rad = 0.0;
+};
+
+struct CycleEnergy {      // of one period of the motion, once it repeats (J)
+  double from_wall_J = 0.0;   // Σ F(k)·(x(k+1) − x(k)), F what the motors hold from k to k + 1
+  double dissipated_J = 0.0;  // by the mechanism: b·Δx²/T + f·|Δx| a tick
+};
+CycleEnergy drive(PressedScene& scene, const LoopSetting& setting, double stiffness_N_per_m,
+                  const DrivenMotion& motion);
+
+// The largest stiffness of the coupling (N/m) at which no motion of a fine grid gets more energy out of the
+// wall than the mechanism dissipates, by bisection to 0.1 %: all frequencies up to Nyquist's, and with an
+// encoder step also amplitudes from 1/64 of it and all places within it. 0: not even the softest (0.1 N/m).
+double measured_passive_stiffness(PressedScene& scene, const LoopSetting& setting);
+
+}  // namespace hybrid
