@@ -17,17 +17,19 @@ namespace hybrid {
 
 // One loop to be measured, but for the stiffness. The scene's own device and hand do not count.
 struct LoopSetting {
-  double rate_hz = 1000.0;
-  int delay_ticks = 0;  // from sample to force
-  double mass_kg = 0.075;             // apparent, of the mechanism
-  double viscous_N_s_per_m = 0.005;   // b, of the mechanism
-  double friction_N = 0.0;            // Coulomb, of the mechanism
-  double quantisation_m = 0.0;        // encoder step
+  device::Mechanism mechanism = linear_mechanism();
   device::HandModel hand{};
+  double rate_hz = 1000.0;
+  int delay_ticks = 0;                  // from sample to force
   double wall_damping_N_s_per_m = 0.0;  // B, of every rigid surface
   bool damping_account = false;         // of World: the care that keeps B passive; theory knows B without
 
+  // The Premium's mass; no friction, no encoder step, no limit: what theory answers.
+  static device::Mechanism linear_mechanism();
   [[nodiscard]] double period_s() const { return 1.0 / rate_hz; }
+  [[nodiscard]] double friction_N() const { return mechanism.limits.friction_N; }
+  [[nodiscard]] double encoder_m() const { return mechanism.limits.resolution_m; }
+  [[nodiscard]] bool linear() const { return friction_N() == 0.0 && encoder_m() == 0.0; }
 };
 
 // What theory calls the same: with the hand for stability, without it for passivity.
@@ -73,16 +75,51 @@ struct DrivenMotion {
   double phase_rad = 0.0;
 };
 
-struct CycleEnergy {      // of one period of the motion, once it repeats (J)
+struct CycleEnergy {          // of one period of the motion, once it repeats (J)
   double from_wall_J = 0.0;   // Σ F(k)·(x(k+1) − x(k)), F what the motors hold from k to k + 1
   double dissipated_J = 0.0;  // by the mechanism: b·Δx²/T + f·|Δx| a tick
 };
-CycleEnergy drive(PressedScene& scene, const LoopSetting& setting, double stiffness_N_per_m,
-                  const DrivenMotion& motion);
+// Goes on from where the scene is, which was restarted with this setting.
+CycleEnergy drive(PressedScene& scene, const LoopSetting& setting, const DrivenMotion& motion);
 
 // The largest stiffness of the coupling (N/m) at which no motion of a fine grid gets more energy out of the
 // wall than the mechanism dissipates, by bisection to 0.1 %: all frequencies up to Nyquist's, and with an
-// encoder step also amplitudes from 1/64 of it and all places within it. 0: not even the softest (0.1 N/m).
+// encoder step also amplitudes from 1/64 of it and all places within it. 0: not even the softest (1 N/m).
 double measured_passive_stiffness(PressedScene& scene, const LoopSetting& setting);
+
+// ---- stability --------------------------------------------------------------------------------------------
+
+// A simulated device in a simulated hand that presses it into the place, slowly and smoothly, and then holds
+// still.
+class HeldLoop {
+ public:
+  // `press_N` is what the wall answers with at rest. A hand without a spring presses by a spring of 1 N/m.
+  HeldLoop(PressedScene& scene, const LoopSetting& setting, double stiffness_N_per_m, double press_N);
+
+  // One tick, with a force of somebody else's added to the motors' (N, out of the surface). Returns how deep
+  // the tool truly is (m), not as the encoders say.
+  double step(double extra_N = 0.0);
+  [[nodiscard]] double rest_depth_m() const { return rest_m_; }
+  // Until the hand has arrived and a while longer.
+  void settle();
+  // The hand is knocked: one tick of a force that makes an oscillation of about `amplitude_m`.
+  void knock(double amplitude_m);
+
+ private:
+  PressedScene& scene_;
+  const LoopSetting setting_;
+  double stiffness_, rest_m_;
+  std::unique_ptr<device::HapticDevice> device_;
+};
+
+// The largest stiffness of the coupling (N/m) at which a knock dies out. In a linear loop (no friction, no
+// encoder) by the sign of the rate at which the envelope grows, far from anything that limits it: bisection
+// to 0.1 %. Otherwise by whether the tool comes to rest after it, at several presses within one encoder step,
+// to 0.5 %. 0: not even the softest (20 N/m).
+double measured_stable_stiffness(PressedScene& scene, const LoopSetting& setting);
+
+// The rate (1/s) at which the envelope of a knock grows in a linear loop; +infinity where it left the linear
+// range, −infinity where nothing is left of it.
+double envelope_growth(PressedScene& scene, const LoopSetting& setting, double stiffness_N_per_m);
 
 }  // namespace hybrid
