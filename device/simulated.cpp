@@ -79,13 +79,14 @@ class IdealDevice final : public HapticDevice {
 class SimulatedDevice final : public HapticDevice {
  public:
   SimulatedDevice(const SimulatedDeviceOptions& options, std::shared_ptr<const Path> path)
-      : options_(options), path_(std::move(path)), velocity_(options.velocity_span_s) {
-    const Mechanism& own = options_.mechanism;
-    mechanics_.mass_kg = own.apparent_mass_kg + options_.hand.mass_kg;
-    mechanics_.viscous_N_s_per_m = own.viscous_N_s_per_m;
-    mechanics_.coulomb_N = own.limits.friction_N;
-    mechanics_.hand_damping_N_s_per_m = options_.hand.damping_N_s_per_m;
-    mechanics_.hand_stiffness_N_per_m = options_.hand.stiffness_N_per_m;
+      : options_(options),
+        path_(std::move(path)),
+        mechanics_({.mass_kg = options.mechanism.apparent_mass_kg + options.hand.mass_kg,
+                    .viscous_N_s_per_m = options.mechanism.viscous_N_s_per_m,
+                    .coulomb_N = options.mechanism.limits.friction_N,
+                    .hand_damping_N_s_per_m = options.hand.damping_N_s_per_m,
+                    .hand_stiffness_N_per_m = options.hand.stiffness_N_per_m}),
+        velocity_(options.velocity_span_s) {
     tool_.position_m = target(0.0);
     velocity_.start(encoder_position());
   }
@@ -143,10 +144,10 @@ class SimulatedDevice final : public HapticDevice {
     const double driven_s = std::clamp(watchdog_s - since_write_s_, 0.0, dt_s);
     const glm::dvec3 from = target(t_s_), to = target(t_s_ + dt_s);
     const glm::dvec3 between = driven_s < dt_s ? from + (to - from) * (driven_s / dt_s) : to;
-    advance(mechanics_, tool_, from, between, motor_N_, driven_s);
+    mechanics_.advance(tool_, from, between, motor_N_, driven_s);
     if (driven_s < dt_s) {
       motor_N_ = glm::dvec3(0.0);
-      advance(mechanics_, tool_, between, to, motor_N_, dt_s - driven_s);
+      mechanics_.advance(tool_, between, to, motor_N_, dt_s - driven_s);
     }
     since_write_s_ += dt_s;
     t_s_ += dt_s;
@@ -160,7 +161,7 @@ class SimulatedDevice final : public HapticDevice {
 
   SimulatedDeviceOptions options_;
   std::shared_ptr<const Path> path_;
-  ToolMechanics mechanics_;
+  ToolIntegrator mechanics_;
   ToolMotion tool_;  // where the tool truly is
   VelocityEstimate velocity_;
   std::array<glm::dvec3, kMaxDelayTicks + 1> on_their_way_{};  // written forces that the motors wait for
