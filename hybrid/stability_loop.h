@@ -3,15 +3,15 @@
 // passivity drive. The place is where the scene's path is first felt, the direction that of the force there.
 #pragma once
 
-#include <deque>
 #include <glm/vec3.hpp>
 #include <memory>
-#include <string>
+#include <optional>
 
 #include "device/loop_theory.h"
 #include "device/simulated.h"
 #include "hybrid/build.h"
 #include "hybrid/tick.h"
+#include "hybrid/vibration.h"
 
 namespace hybrid {
 
@@ -24,6 +24,7 @@ struct LoopSetting {
   double wall_damping_N_s_per_m = 0.0;  // B, of every rigid surface
   bool damping_account = false;         // of World: the care that keeps B passive; theory knows B without
 
+  static constexpr double kNoHand_N_per_m = 1.0;  // a hand without a spring presses by one of this
   // The Premium's mass; no friction, no encoder step, no limit: what theory answers.
   static device::Mechanism linear_mechanism();
   [[nodiscard]] double period_s() const { return 1.0 / rate_hz; }
@@ -84,8 +85,9 @@ CycleEnergy drive(PressedScene& scene, const LoopSetting& setting, const DrivenM
 
 // The largest stiffness of the coupling (N/m) at which no motion of a fine grid gets more energy out of the
 // wall than the mechanism dissipates, by bisection to 0.1 %: all frequencies up to Nyquist's, and with an
-// encoder step also amplitudes from 1/64 of it and all places within it. 0: not even the softest (1 N/m).
-double measured_passive_stiffness(PressedScene& scene, const LoopSetting& setting);
+// encoder step also amplitudes from 1/64 of it and all places within it. 0: not even the softest (1 N/m);
+// empty: at all up to 10 MN/m.
+std::optional<double> measured_passive_stiffness(PressedScene& scene, const LoopSetting& setting);
 
 // ---- stability --------------------------------------------------------------------------------------------
 
@@ -102,7 +104,8 @@ class HeldLoop {
   [[nodiscard]] double rest_depth_m() const { return rest_m_; }
   // Until the hand has arrived and a while longer.
   void settle();
-  // The hand is knocked: one tick of a force that makes an oscillation of about `amplitude_m`.
+  // The tool is knocked: a short force no larger than the press, that makes an oscillation of about
+  // `amplitude_m`.
   void knock(double amplitude_m);
 
  private:
@@ -114,12 +117,29 @@ class HeldLoop {
 
 // The largest stiffness of the coupling (N/m) at which a knock dies out. In a linear loop (no friction, no
 // encoder) by the sign of the rate at which the envelope grows, far from anything that limits it: bisection
-// to 0.1 %. Otherwise by whether the tool comes to rest after it, at several presses within one encoder step,
-// to 0.5 %. 0: not even the softest (20 N/m).
-double measured_stable_stiffness(PressedScene& scene, const LoopSetting& setting);
+// to 0.1 %. Otherwise by whether the tool comes to rest after it, at several presses within one encoder step:
+// the first of stiffnesses 1.3 apart at which it does not, then bisection to 0.5 %. 0: not even the softest
+// (20 N/m); empty: at all up to 10 MN/m.
+std::optional<double> measured_stable_stiffness(PressedScene& scene, const LoopSetting& setting);
 
 // The rate (1/s) at which the envelope of a knock grows in a linear loop; +infinity where it left the linear
 // range, −infinity where nothing is left of it.
 double envelope_growth(PressedScene& scene, const LoopSetting& setting, double stiffness_N_per_m);
+
+// ---- buzz -------------------------------------------------------------------------------------------------
+
+// The most felt vibration of the tool half a second long, a second after a knock on a steady press; the worst
+// of several presses within one encoder step.
+Vibration pressed_vibration(PressedScene& scene, const LoopSetting& setting, double stiffness_N_per_m);
+
+// The stiffness of the coupling at which a steady press begins to buzz, that is to vibrate so that a hand
+// feels it: the first of a fine row of stiffnesses from 100 N/m (1.15 apart; on tissue 1.6), then bisection
+// to 1 %. At none of the row below it does it buzz.
+struct Buzz {
+  std::optional<double> begins_N_per_m;  // empty: nowhere up to stiffest_N_per_m
+  double stiffest_N_per_m = 0.0;
+  Vibration vibration;  // where it begins
+};
+Buzz measured_buzz(PressedScene& scene, const LoopSetting& setting);
 
 }  // namespace hybrid

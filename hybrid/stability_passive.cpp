@@ -2,6 +2,7 @@
 // Passivity, measured: the wall driven by sinusoids, and its energy counted.
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <glm/geometric.hpp>
 #include <numbers>
 #include <vector>
@@ -84,7 +85,7 @@ std::vector<DrivenMotion> motions(const PressedScene& scene, const LoopSetting& 
 
 }  // namespace
 
-double measured_passive_stiffness(PressedScene& scene, const LoopSetting& setting) {
+std::optional<double> measured_passive_stiffness(PressedScene& scene, const LoopSetting& setting) {
   std::size_t worst = 0;  // what was active at the last stiffness most likely is at this one
   const auto passive = [&](double stiffness) {
     const std::vector<DrivenMotion> all = motions(scene, setting, stiffness);
@@ -104,7 +105,7 @@ double measured_passive_stiffness(PressedScene& scene, const LoopSetting& settin
     low = high;
     high *= 2.0;
   }
-  if (high >= kStiffest_N_per_m) return high;
+  if (high >= kStiffest_N_per_m) return std::nullopt;
   while (high - low > kPassiveStep * high) {
     const double middle = 0.5 * (low + high);
     (passive(middle) ? low : high) = middle;
