@@ -81,7 +81,8 @@ double HeldLoop::step(double extra_N) {
 
 void HeldLoop::settle() {
   const device::SampledLoop loop = held_loop(setting_);
-  const double creeping_s = 5.0 * loop.damping_N_s_per_m / stiffness_;  // where damping outweighs the wall
+  // Where damping outweighs the wall it creeps there.
+  const double creeping_s = 5.0 * (loop.damping_N_s_per_m + loop.wall_damping_N_s_per_m) / stiffness_;
   const int ticks =
       static_cast<int>(std::lround((kPressing_s + std::max(kSettling_s, creeping_s)) * setting_.rate_hz));
   for (int n = 0; n < ticks; ++n) step();
@@ -97,14 +98,18 @@ void HeldLoop::knock(double amplitude_m) {
 double envelope_growth(PressedScene& scene, const LoopSetting& setting, double stiffness_N_per_m) {
   constexpr int kBlocks = 3;              // the first is left out: fast modes die in it
   constexpr double kKnock = 0.02;         // of the depth
+  constexpr double kMostShare = 0.5;      // of the press: damping that is stronger may be cut
   constexpr double kOutOfRange = 0.5;     // of the depth: from here contact may be lost
   constexpr double kNothingLeft = 1e-14;  // of the power of the knock: rounding comes near
   const double endless = std::numeric_limits<double>::infinity();
   HeldLoop loop(scene, setting, stiffness_N_per_m, press_for(scene, stiffness_N_per_m));
   const double rest = loop.rest_depth_m();
   loop.settle();
-  loop.knock(kKnock * rest);
-  const double period_s = 2.0 * std::numbers::pi * std::sqrt(held_loop(setting).mass_kg / stiffness_N_per_m);
+  const double pace = std::sqrt(stiffness_N_per_m / held_loop(setting).mass_kg);  // rad/s, undamped
+  const double wall_damping = setting.wall_damping_N_s_per_m;
+  const double uncut = 0.1 * kMostShare * stiffness_N_per_m * rest / (pace * wall_damping + 1e-9);
+  loop.knock(std::min(kKnock * rest, uncut));
+  const double period_s = 2.0 * std::numbers::pi / pace;
   const double block_s = std::min(kBlockPeriods * period_s, kMostBlock_s);
   const int ticks = static_cast<int>(std::lround(block_s * setting.rate_hz));
   double before = loop.step(), last = loop.step();
@@ -113,6 +118,8 @@ double envelope_growth(PressedScene& scene, const LoopSetting& setting, double s
     for (int n = 0; n < ticks; ++n) {
       const double depth = loop.step();
       if (std::fabs(depth - rest) > kOutOfRange * rest) return endless;
+      const double damping_N = wall_damping * std::fabs(depth - last) * setting.rate_hz;
+      if (damping_N > kMostShare * stiffness_N_per_m * rest) return endless;
       // The second difference knows neither the rest depth nor a slow drift towards it; Hann's window makes
       // the power nearly independent of where in a period the block begins.
       const double bend = depth - 2.0 * last + before;
@@ -147,15 +154,17 @@ std::optional<double> first_not_calm(double softest, double stiffest, double fac
   return 0.5 * (low + high);
 }
 
-// What is left of a knock after `wait_s`: the tool's depth over the `look_s` after that.
+// What is left of a knock after a second or more: the tool's depth over the half second after that.
 void watch_knock(PressedScene& scene, const LoopSetting& setting, double stiffness, double press_N,
                  std::vector<double>& depth_m) {
-  constexpr double kWait_s = 1.0, kLook_s = 0.5;
+  constexpr double kLook_s = 0.5;
+  // A knock of a loop that is mostly damping creeps back.
+  const double wait_s = std::max(1.0, 12.0 * held_loop(setting).damping_N_s_per_m / stiffness);
   HeldLoop loop(scene, setting, stiffness, press_N);
   loop.settle();
   // As deep again as the tool is pressed: on its way back to rest it passes whatever it could be caught in.
   loop.knock(loop.rest_depth_m());
-  for (int k = 0; k < kWait_s * setting.rate_hz; ++k) loop.step();
+  for (int k = 0; k < wait_s * setting.rate_hz; ++k) loop.step();
   depth_m.clear();
   for (int k = 0; k < kLook_s * setting.rate_hz; ++k) depth_m.push_back(loop.step());
 }
@@ -191,7 +200,9 @@ std::optional<double> measured_stable_stiffness(PressedScene& scene, const LoopS
     return first_not_calm(kSoftest_N_per_m, kStiffest_N_per_m, 2.0, 1e-3,
                           [&](double stiffness) { return envelope_growth(scene, setting, stiffness) < 0.0; });
   }
-  return first_not_calm(kSoftest_N_per_m, kStiffest_N_per_m, 1.3, 5e-3,
+  // A press that is hardly more than friction does not say where the tool rests.
+  const double softest = std::max(kSoftest_N_per_m, 10.0 * setting.friction_N() / kDeepest_m);
+  return first_not_calm(softest, kStiffest_N_per_m, 1.3, 5e-3,
                         [&](double stiffness) { return comes_to_rest(scene, setting, stiffness); });
 }
 

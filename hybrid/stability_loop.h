@@ -119,7 +119,7 @@ class HeldLoop {
 // encoder) by the sign of the rate at which the envelope grows, far from anything that limits it: bisection
 // to 0.1 %. Otherwise by whether the tool comes to rest after it, at several presses within one encoder step:
 // the first of stiffnesses 1.3 apart at which it does not, then bisection to 0.5 %. 0: not even the softest
-// (20 N/m); empty: at all up to 10 MN/m.
+// (20 N/m, or pressed 2 mm deep with ten times the friction); empty: at all up to 10 MN/m.
 std::optional<double> measured_stable_stiffness(PressedScene& scene, const LoopSetting& setting);
 
 // The rate (1/s) at which the envelope of a knock grows in a linear loop; +infinity where it left the linear
