@@ -34,11 +34,13 @@ struct StabilityRow {
   std::string grip = "none", device;  // device: empty where it is no real one's model
   // The stiffness of the virtual coupling (N/m) up to which the loop is so; of buzz that at which it begins.
   std::optional<double> measured;  // empty: nowhere up to `stiffest`
-  double stiffest_N_per_m = 1e7;
+  double stiffest = 1e7;
   std::optional<double> theory;       // empty: none is exact
   std::optional<double> lower_bound;  // what theory promises where it is not exact
   std::string theory_name;
-  std::optional<double> young_Pa;  // of tissue: of the first soft object
+  // Of tissue: Young's modulus of the first soft object; or the coupling is this stiff, and what is measured
+  // is the modulus (Pa) at which it begins to buzz, up to `stiffest`.
+  std::optional<double> young_Pa, coupling_N_per_m;
   // ---- of buzz ----
   Vibration vibration;                                     // where it begins
   std::optional<double> nominal_N_per_m, felt_at_nominal;  // at the device's nominal stiffness; felt above 1
@@ -58,11 +60,12 @@ struct StabilityReport {
   std::string scene;
   std::vector<StabilityRow> rows;
   std::vector<TheoryCurve> curves;
-  double seconds = 0.0;
+  double seconds = 0.0, processor_seconds = 0.0;
 };
 
 // Measures them all: over rigid scenes the whole plan (about two minutes), over scenes with something soft
-// where they begin to buzz, with Young's modulus from 1 to 100 kPa. Throws SceneError (see PressedScene).
+// where they begin to buzz: with Young's modulus at 1, 10 and 100 kPa, and with a stiff coupling by Young's
+// modulus. Throws SceneError (see PressedScene).
 StabilityReport measure_stability(const Scene& scene, const Progress& progress = {});
 
 // What theory and measurement are compared over: rows that have a theory, and how far the worst is off.

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "hybrid/first_not_so.h"
 #include "hybrid/stability_loop.h"
 
 namespace hybrid {
@@ -135,25 +136,6 @@ double envelope_growth(PressedScene& scene, const LoopSetting& setting, double s
 
 namespace {
 
-// From a stiffness that is calm upwards in steps of `factor` to the first that is not, then by bisection to
-// `precision`. 0: the first is not calm; empty: none below `stiffest` is not.
-template <class Calm>
-std::optional<double> first_not_calm(double softest, double stiffest, double factor, double precision,
-                                     Calm&& calm) {
-  if (!calm(softest)) return 0.0;
-  double low = softest, high = softest * factor;
-  while (high < stiffest && calm(high)) {
-    low = high;
-    high *= factor;
-  }
-  if (high >= stiffest) return std::nullopt;
-  while (high - low > precision * high) {
-    const double middle = 0.5 * (low + high);
-    (calm(middle) ? low : high) = middle;
-  }
-  return 0.5 * (low + high);
-}
-
 // What is left of a knock after a second or more: the tool's depth over the half second after that.
 void watch_knock(PressedScene& scene, const LoopSetting& setting, double stiffness, double press_N,
                  std::vector<double>& depth_m) {
@@ -197,13 +179,13 @@ bool comes_to_rest(PressedScene& scene, const LoopSetting& setting, double stiff
 
 std::optional<double> measured_stable_stiffness(PressedScene& scene, const LoopSetting& setting) {
   if (setting.linear()) {
-    return first_not_calm(kSoftest_N_per_m, kStiffest_N_per_m, 2.0, 1e-3,
-                          [&](double stiffness) { return envelope_growth(scene, setting, stiffness) < 0.0; });
+    return first_not_so(kSoftest_N_per_m, kStiffest_N_per_m, 2.0, 1e-3,
+                        [&](double stiffness) { return envelope_growth(scene, setting, stiffness) < 0.0; });
   }
   // A press that is hardly more than friction does not say where the tool rests.
   const double softest = std::max(kSoftest_N_per_m, 10.0 * setting.friction_N() / kDeepest_m);
-  return first_not_calm(softest, kStiffest_N_per_m, 1.3, 5e-3,
-                        [&](double stiffness) { return comes_to_rest(scene, setting, stiffness); });
+  return first_not_so(softest, kStiffest_N_per_m, 1.3, 5e-3,
+                      [&](double stiffness) { return comes_to_rest(scene, setting, stiffness); });
 }
 
 Vibration pressed_vibration(PressedScene& scene, const LoopSetting& setting, double stiffness_N_per_m) {
@@ -221,12 +203,12 @@ Buzz measured_buzz(PressedScene& scene, const LoopSetting& setting) {
   const bool soft = !scene.world().soft.empty();
   Buzz buzz;
   buzz.stiffest_N_per_m = soft ? 1e5 : 2e5;
-  buzz.begins_N_per_m = first_not_calm(kSoftestBuzz_N_per_m, buzz.stiffest_N_per_m, soft ? 1.6 : 1.15, 1e-2,
-                                       [&](double stiffness) {
-                                         const Vibration now = pressed_vibration(scene, setting, stiffness);
-                                         if (now.felt > 1.0) buzz.vibration = now;
-                                         return now.felt <= 1.0;
-                                       });
+  buzz.begins_N_per_m = first_not_so(kSoftestBuzz_N_per_m, buzz.stiffest_N_per_m, soft ? 1.6 : 1.15, 1e-2,
+                                     [&](double stiffness) {
+                                       const Vibration now = pressed_vibration(scene, setting, stiffness);
+                                       if (now.felt > 1.0) buzz.vibration = now;
+                                       return now.felt <= 1.0;
+                                     });
   return buzz;
 }
 

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <vector>
 
+#include "hybrid/first_not_so.h"
 #include "hybrid/stability_loop.h"
 
 namespace hybrid {
@@ -99,18 +100,7 @@ std::optional<double> measured_passive_stiffness(PressedScene& scene, const Loop
     }
     return true;
   };
-  double low = kSoftest_N_per_m, high = 2.0 * low;
-  if (!passive(low)) return 0.0;
-  while (high < kStiffest_N_per_m && passive(high)) {
-    low = high;
-    high *= 2.0;
-  }
-  if (high >= kStiffest_N_per_m) return std::nullopt;
-  while (high - low > kPassiveStep * high) {
-    const double middle = 0.5 * (low + high);
-    (passive(middle) ? low : high) = middle;
-  }
-  return 0.5 * (low + high);
+  return first_not_so(kSoftest_N_per_m, kStiffest_N_per_m, 2.0, kPassiveStep, passive);
 }
 
 }  // namespace hybrid

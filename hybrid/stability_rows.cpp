@@ -18,7 +18,7 @@ nlohmann::ordered_json row_json(const StabilityRow& row) {
   const LoopSetting& s = row.setting;
   nlohmann::ordered_json j{
       {"kind", name_of(row.kind)},
-      {"stiffness_N_per_m", row.measured.value_or(row.stiffest_N_per_m)},
+      {"stiffness_N_per_m", row.coupling_N_per_m.value_or(row.measured.value_or(row.stiffest))},
       {"damping_N_s_per_m", row.damping_N_s_per_m()},
       {"wall_damping_N_s_per_m", s.wall_damping_N_s_per_m},
       {"rate_hz", s.rate_hz},
@@ -36,6 +36,7 @@ nlohmann::ordered_json row_json(const StabilityRow& row) {
       {"lower_bound", or_null(row.lower_bound)},
       {"varied", title_of(row.sweep)}};
   if (row.young_Pa) j["young_Pa"] = *row.young_Pa;
+  j["unit"] = row.coupling_N_per_m ? "Pa" : "N/m";  // of what is measured
   if (row.kind == Boundary::buzz) {
     j["frequency_hz"] = row.measured ? nlohmann::ordered_json(row.vibration.frequency_hz) : nullptr;
     j["amplitude_m"] = row.measured ? nlohmann::ordered_json(row.vibration.amplitude_m) : nullptr;
@@ -50,12 +51,15 @@ std::string number(const std::optional<double>& value) {
 }
 
 std::string measured_text(const StabilityRow& row) {
-  return row.measured ? fmt::format("{:.0f}", *row.measured) : fmt::format("> {:.0f}", row.stiffest_N_per_m);
+  const double unit = row.coupling_N_per_m ? 1e3 : 1.0;  // moduli in kPa
+  return row.measured ? fmt::format("{:.0f}", *row.measured / unit)
+                      : fmt::format("> {:.0f}", row.stiffest / unit);
 }
 
 std::string note_of(const StabilityRow& row) {
   std::string note;
   if (!row.device.empty()) note = row.device.substr(0, row.device.find(" (")) + "; ";
+  if (row.coupling_N_per_m) note += fmt::format("kPa, of a coupling of {:.0f} N/m; ", *row.coupling_N_per_m);
   if (row.young_Pa) note += fmt::format("{:.0f} kPa; ", *row.young_Pa / 1e3);
   if (row.lower_bound) note += fmt::format("at least {:.0f}; ", *row.lower_bound);
   if (row.kind == Boundary::buzz && row.measured)
@@ -97,6 +101,7 @@ void add_sweep(std::string& text, const StabilityReport& report, StabilitySweep 
 void add_to_json(const StabilityReport& report, nlohmann::ordered_json& json) {
   json["scene"] = report.scene;
   json["seconds"] = report.seconds;
+  json["processor_seconds"] = report.processor_seconds;
   for (const Boundary kind : {Boundary::stable, Boundary::passive}) {
     const Agreement all = agreement(report, kind);
     json["agreement"][std::string(name_of(kind))] = {{"rows", all.rows}, {"worst_error", all.worst}};
@@ -128,7 +133,8 @@ std::string stability_tables(const StabilityReport& report) {
     fmt::format_to(std::back_inserter(text),
                    "lower bound of friction and quantisation: {} rows, {} below it\n", bounded,
                    below_bound(report));
-  fmt::format_to(std::back_inserter(text), "{:.0f} s\n", report.seconds);
+  fmt::format_to(std::back_inserter(text), "{:.0f} s, {:.0f} s of one core\n", report.seconds,
+                 report.processor_seconds);
   return text;
 }
 

@@ -63,7 +63,9 @@ Vibration strongest_vibration(std::span<const double> motion_m, double rate_hz) 
     const double frequency = static_cast<double>(k) * rate_hz / static_cast<double>(n);
     const double amplitude = scale * std::sqrt(before + here + after);
     const double felt = amplitude / vibration_threshold_m(frequency);
-    if (felt > strongest.felt) strongest = {frequency, amplitude, felt};
+    // Only where the spectrum peaks: on a peak's upper flank the threshold falls faster than the power.
+    const bool peak = here >= before && here >= after;
+    if (peak && felt > strongest.felt) strongest = {frequency, amplitude, felt};
     before = here;
     here = after;
   }
