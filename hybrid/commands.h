@@ -16,6 +16,7 @@ struct RunCommand {
   std::filesystem::path scene;
   std::optional<double> seconds;
   bool realtime = false;
+  std::string device;  // in place of the scene's; empty: the scene's
   int samples = 6;
   std::filesystem::path trace, plot, picture, record, save_surface, save_volume;  // empty: not written
   std::string json;                                                               // "-": standard output
@@ -36,6 +37,12 @@ struct CheckCommand {
   std::string json;
 };
 int check(const CheckCommand& command);
+
+struct DevicesCommand {
+  bool calibrate = false;  // take the pose in which the hand holds the arm as the one of calibration
+  std::string json;
+};
+int devices(const DevicesCommand& command);
 
 struct CompareCommand {
   std::filesystem::path scene;
@@ -70,6 +77,7 @@ struct ViewCommand {
   std::optional<std::uint64_t> frames;  // then closes; each written to `out` when that is given
   std::filesystem::path out;
   std::filesystem::path drag;  // CSV of goals that stand for the mouse: t, x, y, z
+  std::string device;          // in place of the scene's; empty: the scene's
 };
 int view(const ViewCommand& command);
 

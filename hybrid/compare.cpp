@@ -25,6 +25,7 @@ Scene bare(const Scene& scene) {
   one.rigid.clear();
   one.soft.clear();
   one.device_model = device::DeviceModel::ideal;
+  one.real_device.reset();
   one.max_force_given = true;  // the ideal device has no limit, and a comparison wants the whole force
   one.safety.max_force_N = 1e6;
   one.safety.max_slew_N_per_s = 1e12;

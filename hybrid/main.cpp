@@ -20,6 +20,11 @@ constexpr const char* kAbout =
     "A scene is one small text file; scenes/README.md describes its keys.\n"
     "Exit status: 0 done, 1 input refused (with the place and the remedy), 2 wrong usage.";
 
+void add_device(CLI::App& sub, std::string& device) {
+  sub.add_option("--device", device, "use this one in place of the scene's")
+      ->check(CLI::IsMember({"phantom", "premium-1.5", "touch", "ideal"}));
+}
+
 void add_run(CLI::App& app, int& status) {
   auto* sub =
       app.add_subcommand("run", "A haptic session without a display: the scene's path, felt from end to end");
@@ -28,6 +33,7 @@ void add_run(CLI::App& app, int& status) {
   sub->add_option("--seconds", c->seconds, "length of the session; default: the path and half a second")
       ->check(CLI::PositiveNumber);
   sub->add_flag("--realtime", c->realtime, "pace the loop with a real timer at the device's rate");
+  add_device(*sub, c->device);
   sub->add_option(
          "--samples", c->samples,
          "how often the soft force is compared with its equilibrium (slow on large volumes); 0: never")
@@ -66,6 +72,15 @@ void add_check(CLI::App& app, int& status) {
       ->capture_default_str();
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
   sub->callback([c, &status] { status = hybrid::check(*c); });
+}
+
+void add_devices(CLI::App& app, int& status) {
+  auto* sub = app.add_subcommand("devices", "What device is connected, and if none, why");
+  auto c = std::make_shared<hybrid::DevicesCommand>();
+  sub->add_flag("--calibrate", c->calibrate,
+                "calibrate a device that is reset by hand, while you hold its arm");
+  sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
+  sub->callback([c, &status] { status = hybrid::devices(*c); });
 }
 
 void add_compare(CLI::App& app, int& status) {
@@ -120,6 +135,7 @@ void add_view(CLI::App& app, int& status) {
   sub->add_option("SCENE", c->scene, "scene file (.toml)")->required();
   sub->add_option("--frames", c->frames, "close after this many frames")->check(CLI::PositiveNumber);
   sub->add_option("--out", c->out, "write each frame as PNG into this folder");
+  add_device(*sub, c->device);
   sub->add_option("--drag", c->drag, "drag the tool along a CSV (t_s, x_m, y_m, z_m) instead of the mouse");
   sub->callback([c, &status] { status = hybrid::view(*c); });
 }
@@ -134,6 +150,7 @@ int main(int argc, char** argv) {
   add_run(app, status);
   add_replay(app, status);
   add_check(app, status);
+  add_devices(app, status);
   add_compare(app, status);
   add_bench(app, status);
   add_stability(app, status);

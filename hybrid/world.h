@@ -11,11 +11,13 @@
 #include <glm/gtc/quaternion.hpp>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "device/force_limit.h"
+#include "device/passivity.h"
 #include "hybrid/occupancy.h"
 #include "hybrid/rigid_motion.h"
 #include "hybrid/scene.h"
@@ -87,6 +89,7 @@ struct World {
   std::vector<SoftBody> soft;
   Tool tool;
   device::ForceLimits limits;
+  std::optional<device::PassivityOptions> passivity;  // empty: no controller
   // A point is a ball too, of this radius: 1e-7 of the scene, far above rounding and far below anything felt.
   double skin_m = 0.0;
   double extent_m = 0.0;    // diagonal of all objects' box
@@ -165,6 +168,7 @@ struct CarriedState {
   glm::dvec3 proxy_m{0.0};   // scene frame
   glm::dvec3 device_m{0.0};  // last good input
   device::ForceLimitState limit;
+  device::PassivityState passive;
   std::uint64_t tick = 0;
   double time_s = 0.0;                // simulated, of the bodies' paths
   std::uint64_t nonfinite = 0;        // inputs or forces that were not finite

@@ -9,6 +9,7 @@
 #include <new>
 
 #include "device/force_limit.h"
+#include "device/passivity.h"
 #include "device/servo_timer.h"
 #include "device/simulated.h"
 
@@ -50,11 +51,13 @@ TEST(DeviceAllocation, ATickOfEveryDeviceAllocatesNothing) {
       const auto device = make_simulated_device(model, {}, device::make_path(description));
       device::ServoTimer timer(1e-5);
       device::ForceLimitState state;
+      device::PassivityState passive;
       const std::size_t before = allocations;
       for (int tick = 0; tick < 1000; ++tick) {
         const device::DeviceState read = device->read();
-        const glm::dvec3 force = limit_force({}, state, -500.0 * read.position_m, 1e-3);
-        device->write(force, 1e-3);
+        const glm::dvec3 force = limit_force({}, state, -500.0 * read.position_m, read, 1e-3);
+        device->write(keep_passive({}, passive, force, read.position_m, 1e-3), 1e-3);
+        device->hold(1e-4);
         (void)device->limits();
         (void)device->name();
         if (tick % 100 == 0) timer.wait();
