@@ -157,8 +157,8 @@ std::vector<double> presses(const PressedScene& scene, const LoopSetting& settin
   const double press = press_for(scene, stiffness), step_N = stiffness * setting.encoder_m();
   if (!(step_N > 0.0)) return {press};
   const int count = scene.world().soft.empty() ? 6 : 2;  // tissue costs more, and gives way between the steps
-  std::vector<double> all;
-  for (int n = 0; n < count; ++n) all.push_back(press + step_N * n / count);
+  std::vector<double> all(static_cast<std::size_t>(count));
+  for (int n = 0; n < count; ++n) all[static_cast<std::size_t>(n)] = press + step_N * n / count;
   return all;
 }
 
