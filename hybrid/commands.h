@@ -68,6 +68,12 @@ const std::vector<std::string>& bench_paths();
 std::vector<std::string> bench_engines();
 std::string bench_mesh_error(const std::string& name);  // empty: there is such a mesh
 
+struct StabilityCommand {
+  std::filesystem::path scene, plot;
+  std::string json;
+};
+int stability(const StabilityCommand& command);
+
 struct ViewCommand {
   std::filesystem::path scene;
   std::optional<std::uint64_t> frames;  // then closes; each written to `out` when that is given

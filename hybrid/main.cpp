@@ -135,6 +135,16 @@ void add_bench(CLI::App& app, int& status) {
   sub->callback([c, &status] { status = hybrid::run_bench(*c); });
 }
 
+void add_stability(CLI::App& app, int& status) {
+  auto* sub = app.add_subcommand(
+      "stability", "Up to which stiffness the loop is stable, passive and calm: measured, beside theory");
+  auto c = std::make_shared<hybrid::StabilityCommand>();
+  sub->add_option("SCENE", c->scene, "scene file (.toml), such as scenes/wall.toml")->required();
+  sub->add_option("--plot", c->plot, "write stiffness over damping and rate as SVG (rigid scenes)");
+  sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
+  sub->callback([c, &status] { status = hybrid::stability(*c); });
+}
+
 void add_view(CLI::App& app, int& status) {
   auto* sub = app.add_subcommand(
       "view", "A window: the simulated hand plays, or the mouse drags the tool (right button)");
@@ -160,6 +170,7 @@ int main(int argc, char** argv) {
   add_devices(app, status);
   add_compare(app, status);
   add_bench(app, status);
+  add_stability(app, status);
   add_view(app, status);
   try {
     app.parse(argc, argv);

@@ -38,16 +38,6 @@ std::uint64_t mix(std::uint64_t hash, const glm::dquat& q) noexcept {
   return hash;
 }
 
-// The state again, sharing nothing that moves.
-std::unique_ptr<WorldState> copy_state(const World& world, const WorldState& state) {
-  auto copy = std::make_unique<WorldState>(world, OccupancyMap(state.map));
-  for (const auto& object : state.soft) copy->soft.push_back(object->copy());
-  copy->prepare(world);
-  copy->map.reserve_bricks(1024);
-  static_cast<CarriedState&>(*copy) = static_cast<const CarriedState&>(state);
-  return copy;
-}
-
 // How much a moment says about the scene: different objects felt at once first, then force.
 double telling(const World& world, const WorldState& state) {
   double score = 0.0;
@@ -292,6 +282,15 @@ Snapshot take_snapshot(const World& world, const WorldState& state, const TickRe
                     .tick_us = tick.tick_us};
   fill_moved(world, state, snapshot);
   return snapshot;
+}
+
+std::unique_ptr<WorldState> copy_state(const World& world, const WorldState& state) {
+  auto copy = std::make_unique<WorldState>(world, OccupancyMap(state.map));
+  for (const auto& object : state.soft) copy->soft.push_back(object->copy());
+  copy->prepare(world);
+  copy->map.reserve_bricks(1024);
+  static_cast<CarriedState&>(*copy) = static_cast<const CarriedState&>(state);
+  return copy;
 }
 
 std::optional<glm::dvec3> equilibrium_force(const World& world, const WorldState& state, double tolerance_N) {

@@ -89,6 +89,9 @@ std::uint64_t hash_state(std::uint64_t before, const WorldState& state) noexcept
 // A snapshot of now.
 Snapshot take_snapshot(const World& world, const WorldState& state, const TickResult& tick, double t_s);
 
+// The state again, sharing nothing that moves.
+std::unique_ptr<WorldState> copy_state(const World& world, const WorldState& state);
+
 // The force that the present device position would be answered with once everything soft has come to rest
 // (N), found on a copy of the state, until it changes by less than `tolerance_N` over dozens of whole
 // relaxation cycles; bodies that move stand still meanwhile. Empty when it does not settle.

@@ -97,6 +97,7 @@ struct World {
   double rounding_m = 0.0;  // what a coordinate of the scene may be off by
   double encoder_m = 0.0;   // what the device's position is rounded to
   bool use_map = true;      // false: every object is asked every time; a baseline to time the map against
+  bool damping_account = true;  // false: sampled damping as it is; a baseline that theory is known for
   // Pairs of soft objects that may meet: {smaller index, larger index}.
   std::vector<std::array<std::uint32_t, 2>> meeting;
 
