@@ -66,6 +66,10 @@ void* open_named(const std::string& name, std::string_view by) {
                     (is_absent(words, name) ? "correct the path" : remedy(words)));
 }
 
+[[noreturn]] void refuse_broken(const std::string& file, const std::string& words) {
+  throw DeviceError("libHD: " + file + " is there and does not load: " + words + "; " + remedy(words));
+}
+
 void* open_usual(std::string& file) {
   std::string tried;
   for (const char* name : kUsualNames) {
@@ -73,11 +77,8 @@ void* open_usual(std::string& file) {
     file = name;
     if (void* library = open(name, words)) return library;
     // A library that is there and does not load is the one that was meant.
-    if (!is_absent(words, name)) {
-      throw DeviceError("libHD: " + file + " is there and does not load: " + words + "; " + remedy(words));
-    }
-    if (!tried.empty()) tried += ", ";
-    tried += file;
+    if (!is_absent(words, name)) refuse_broken(file, words);
+    tried.append(tried.empty() ? "" : ", ").append(file);
   }
   throw DeviceError("libHD: no PHANToM driver found (tried " + tried + "); " + std::string(kInstall));
 }
