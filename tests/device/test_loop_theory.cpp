@@ -5,7 +5,6 @@
 #include <cmath>
 #include <complex>
 #include <numbers>
-#include <tuple>
 
 #include "device/loop_theory.h"
 
@@ -80,8 +79,14 @@ TEST(LoopStability, RadiusIsTheRateAtWhichAMotionGrows) {
   const double m = 0.08, b = 5.0, k_hand = 600.0, T = 1e-3, decay = 0.5 * b / m;
   const double omega = std::sqrt(k_hand / m - decay * decay);
   const double e = std::exp(-decay * T), c = std::cos(omega * T), s = std::sin(omega * T) / omega;
-  for (const auto& [stiffness, wall_damping, delay] :
-       {std::tuple{4000.0, 0.0, 0}, {12000.0, 0.0, 0}, {3000.0, 2.0, 1}, {6000.0, 1.0, 2}}) {
+  struct Case {
+    double stiffness, wall_damping;
+    int delay;
+  };
+  for (const Case& each :
+       {Case{4000.0, 0.0, 0}, Case{12000.0, 0.0, 0}, Case{3000.0, 2.0, 1}, Case{6000.0, 1.0, 2}}) {
+    const double stiffness = each.stiffness, wall_damping = each.wall_damping;
+    const int delay = each.delay;
     const SampledLoop loop{.mass_kg = m,
                            .damping_N_s_per_m = b,
                            .hand_stiffness_N_per_m = k_hand,

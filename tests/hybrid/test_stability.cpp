@@ -160,6 +160,7 @@ TEST(Vibration, ThresholdOfTheSkin) {
 TEST(Vibration, AToneIsFoundWithItsAmplitudeWhereverItLies) {
   for (const double frequency : {40.0, 101.0, 100.5, 317.3}) {
     std::vector<double> motion;
+    motion.reserve(1000);
     for (int n = 0; n < 1000; ++n)  // on a drift, as of a creeping press
       motion.push_back(2e-3 + 1e-7 * n +
                        3e-6 * std::sin(2.0 * std::numbers::pi * frequency * n / 2000.0 + 0.4));
@@ -172,6 +173,7 @@ TEST(Vibration, AToneIsFoundWithItsAmplitudeWhereverItLies) {
 
 TEST(Vibration, OfTwoTonesTheOneThatIsFelt) {
   std::vector<double> motion;
+  motion.reserve(1000);
   for (int n = 0; n < 1000; ++n) {
     const double t = n * 1e-3;
     motion.push_back(20e-6 * std::sin(2.0 * std::numbers::pi * 20.0 * t) +
