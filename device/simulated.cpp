@@ -13,6 +13,7 @@
 #include <string>
 #include <utility>
 
+#include "device/clock.h"
 #include "device/tool_mechanics.h"
 
 namespace device {
@@ -32,6 +33,9 @@ class VelocityEstimate {
     samples_[++newest_ % kSize] = {now_s, position_m};
     if (newest_ - oldest_ >= kSize) oldest_ = newest_ - kSize + 1;
     while (oldest_ + 1 < newest_ && samples_[(oldest_ + 1) % kSize].t_s <= now_s - span_s_) ++oldest_;
+    // Only differences count. After a month a nanosecond would be lost in the rounding of the time itself.
+    if (now_s <= kRewind_s) return;
+    for (std::size_t i = oldest_; i <= newest_; ++i) samples_[i % kSize].t_s -= now_s;
   }
 
   [[nodiscard]] glm::dvec3 value() const noexcept {
@@ -42,7 +46,8 @@ class VelocityEstimate {
   }
 
  private:
-  static constexpr std::size_t kSize = 512;  // enough for 8 ms up to 64 kHz
+  static constexpr std::size_t kSize = 512;   // enough for 8 ms up to 64 kHz
+  static constexpr double kRewind_s = 100.0;  // times are counted anew after so long
   struct Sample {
     double t_s = 0.0;
     glm::dvec3 position_m{0.0};
@@ -60,20 +65,22 @@ class IdealDevice final : public HapticDevice {
   DeviceState read() noexcept override {
     constexpr double kHalf_s = 0.1e-3;  // of the central difference: a tenth of the usual tick
     DeviceState state;
-    state.position_m = path_->position(t_s_);
+    const double now_s = clock_.now_s();
+    state.position_m = path_->position(now_s);
     state.velocity_m_per_s =
-        (path_->position(t_s_ + kHalf_s) - path_->position(t_s_ - kHalf_s)) / (2.0 * kHalf_s);
+        (path_->position(now_s + kHalf_s) - path_->position(now_s - kHalf_s)) / (2.0 * kHalf_s);
     return state;
   }
   void write(const glm::dvec3& /*force_N*/, double dt_s) noexcept override {
-    if (dt_s > 0.0 && std::isfinite(dt_s)) t_s_ += dt_s;
+    if (dt_s > 0.0 && std::isfinite(dt_s)) clock_.add(dt_s);
   }
+  void hold(double extra_s) noexcept override { write(glm::dvec3(0.0), extra_s); }
   [[nodiscard]] DeviceLimits limits() const noexcept override { return device_limits(DeviceModel::ideal); }
   [[nodiscard]] std::string_view name() const noexcept override { return device_name(DeviceModel::ideal); }
 
  private:
   std::shared_ptr<const Path> path_;
-  double t_s_ = 0.0;
+  Clock clock_;
 };
 
 class SimulatedDevice final : public HapticDevice {
@@ -142,7 +149,9 @@ class SimulatedDevice final : public HapticDevice {
   void pass(double dt_s) noexcept {
     const double watchdog_s = options_.watchdog_s.value_or(std::numeric_limits<double>::infinity());
     const double driven_s = std::clamp(watchdog_s - since_write_s_, 0.0, dt_s);
-    const glm::dvec3 from = target(t_s_), to = target(t_s_ + dt_s);
+    const glm::dvec3 from = target(clock_.now_s());
+    clock_.add(dt_s);
+    const glm::dvec3 to = target(clock_.now_s());
     const glm::dvec3 between = driven_s < dt_s ? from + (to - from) * (driven_s / dt_s) : to;
     mechanics_.advance(tool_, from, between, motor_N_, driven_s);
     if (driven_s < dt_s) {
@@ -150,7 +159,6 @@ class SimulatedDevice final : public HapticDevice {
       mechanics_.advance(tool_, between, to, motor_N_, dt_s - driven_s);
     }
     since_write_s_ += dt_s;
-    t_s_ += dt_s;
     velocity_.add(dt_s, encoder_position());
   }
 
@@ -167,7 +175,8 @@ class SimulatedDevice final : public HapticDevice {
   std::array<glm::dvec3, kMaxDelayTicks + 1> on_their_way_{};  // written forces that the motors wait for
   std::size_t written_ = 0;
   glm::dvec3 motor_N_{0.0};
-  double since_write_s_ = 0.0, t_s_ = 0.0;
+  double since_write_s_ = 0.0;
+  Clock clock_;
 };
 
 void require_at_least_zero(double value, std::string_view what, bool may_be_infinite = false) {

@@ -100,7 +100,8 @@ void refresh_obstacles(const World& world, WorldState& state) noexcept {
     for (const voxel::VoxelId v : object.touched()) look(object.surface_number(v));
     const auto count = static_cast<std::uint32_t>(surface.size());
     for (std::uint32_t i = 0; i < std::min(kObstacleSlice, count); ++i) {
-      look(static_cast<std::uint32_t>((state.tick * kObstacleSlice + i) % count));
+      look(state.obstacle_cursor[o]);
+      if (++state.obstacle_cursor[o] == count) state.obstacle_cursor[o] = 0;
     }
   }
 }

@@ -101,11 +101,11 @@ void set_rigid_pose(const World& world, WorldState& state, std::uint32_t object,
 }
 
 void move_bodies(const World& world, WorldState& state, double dt_s) noexcept {
-  state.time_s += dt_s;
+  state.clock.add(dt_s);
   for (std::uint32_t o = 0; o < world.rigid.size(); ++o) {
     const RigidMotion& motion = world.rigid[o].motion;
     if (motion.kind() == RigidMotion::Kind::path) {
-      set_rigid_pose(world, state, o, motion.pose_at(state.time_s));
+      set_rigid_pose(world, state, o, motion.pose_at(state.clock.now_s()));
     } else if (motion.kind() == RigidMotion::Kind::free) {
       std::array<BodyContact, 4> contacts;
       const std::size_t count = contacts_of(world, state, o, contacts);

@@ -243,7 +243,18 @@ class Builder {
         note_carved(d, carved, "rigid objects");
       }
       for (std::size_t later = o + 1; later < volumes_.size(); ++later) {
-        note_carved(d, carve_by_soft(volumes_[o], volumes_[later]), "\"" + scene_.soft[later].name + "\"");
+        const std::size_t by_soft = carve_by_soft(volumes_[o], volumes_[later]);
+        note_carved(d, by_soft, "\"" + scene_.soft[later].name + "\"");
+        carved += by_soft;
+      }
+      const auto& labels = volumes_[o].labels;
+      const bool nothing = std::all_of(labels.begin(), labels.end(), [](auto label) { return label == 0; });
+      if (carved > 0 && nothing) {
+        refuse(
+            scene_, d.place,
+            fmt::format("nothing is left of \"{}\": other objects lie in all of its {} voxels, and carve it; "
+                        "move one of them",
+                        d.name, carved));
       }
     }
   }

@@ -130,8 +130,10 @@ int run(const RunCommand& command) {
                          .realtime = command.realtime,
                          .real_device = real.get(),
                          .keep_rows = !command.trace.empty() || !command.plot.empty(),
+                         .keep_recording = !command.record.empty(),
                          .keep_picture = !command.picture.empty(),
                          .reference_samples = command.samples,
+                         .start_ticks = command.start_ticks,
                          .progress = progress};
   SessionResult result = run_session(scene, built, options);
   end_progress();

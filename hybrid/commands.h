@@ -19,6 +19,7 @@ struct RunCommand {
   bool realtime = false;
   std::string device;  // in place of the scene's; empty: the scene's
   int samples = 6;
+  std::uint64_t start_ticks = 0;
   std::filesystem::path trace, plot, picture, record, save_surface, save_volume;  // empty: not written
   std::string json;                                                               // "-": standard output
 };
@@ -73,6 +74,16 @@ struct StabilityCommand {
   std::string json;
 };
 int stability(const StabilityCommand& command);
+// `hybrid stability SCENE --extremes`, `--fuzz-ticks N`: the suite of extremes.h, and fuzz_ticks.h. The
+// status is 0 also when something fell short: the report says so.
+struct ExtremesCommand {
+  std::filesystem::path scene;
+  bool table = true;
+  bool quick = false;
+  std::uint64_t fuzz_ticks = 0, seed = 1;  // 0: none
+  std::string json;
+};
+int extremes(const ExtremesCommand& command);
 
 struct ViewCommand {
   std::filesystem::path scene;

@@ -88,7 +88,7 @@ ModelResult run_model(const std::string& name, const Scene& scene, const Progres
   BuiltScene built = build_scene(scene, {});
   SessionResult session = run_session(scene, built, {.seconds = std::nullopt, .progress = {}});
   ModelResult model{
-      .name = name, .rows = std::move(session.rows), .depth_m = {}, .tick_us = percentiles(session.tick_us)};
+      .name = name, .rows = std::move(session.rows), .depth_m = {}, .tick_us = session.tick_us.percentiles()};
   return model;
 }
 

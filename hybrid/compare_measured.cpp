@@ -86,7 +86,7 @@ MeasuredComparison compare_measured(const Scene& scene, const MeasuredOptions& o
   ModelResult felt{.name = "scene",
                    .rows = std::move(session.rows),
                    .depth_m = {},
-                   .tick_us = percentiles(session.tick_us)};
+                   .tick_us = session.tick_us.percentiles()};
   const std::string file = options.measured.file.filename().string();
   ModelResult measured = measured_model(trajectory, file, felt, result.in_gaps);
   result.samples = felt.rows.size();

@@ -39,6 +39,8 @@ void add_run(CLI::App& app, int& status) {
          "how often the soft force is compared with its equilibrium (slow on large volumes); 0: never")
       ->check(CLI::Range(0, 1000))
       ->capture_default_str();
+  sub->add_option("--start-ticks", c->start_ticks,
+                  "begin with all clocks and counters as after so many ticks; nothing felt should differ");
   sub->add_option("--trace", c->trace, "write every tick as CSV");
   sub->add_option("--plot", c->plot, "write force over time with contacts as SVG");
   sub->add_option("--picture", c->picture, "write a picture of the most telling moment as PNG");
@@ -139,10 +141,22 @@ void add_stability(CLI::App& app, int& status) {
   auto* sub = app.add_subcommand(
       "stability", "Up to which stiffness the loop is stable, passive and calm: measured, beside theory");
   auto c = std::make_shared<hybrid::StabilityCommand>();
+  auto e = std::make_shared<hybrid::ExtremesCommand>();
+  e->table = false;
   sub->add_option("SCENE", c->scene, "scene file (.toml), such as scenes/wall.toml")->required();
   sub->add_option("--plot", c->plot, "write stiffness over damping and rate as SVG (rigid scenes)");
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
-  sub->callback([c, &status] { status = hybrid::stability(*c); });
+  auto* table = sub->add_flag("--extremes", e->table,
+                              "instead: rigid, soft and mixed scenes with every setting taken to its end");
+  sub->add_flag("--quick", e->quick, "of --extremes: a share of the table; a few seconds")->needs(table);
+  auto* ticks =
+      sub->add_option("--fuzz-ticks", e->fuzz_ticks, "instead: so many ticks of random device input");
+  sub->add_option("--seed", e->seed, "of --fuzz-ticks")->needs(ticks)->capture_default_str();
+  sub->callback([c, e, &status] {
+    e->scene = c->scene;
+    e->json = c->json;
+    status = e->table || e->fuzz_ticks > 0 ? hybrid::extremes(*e) : hybrid::stability(*c);
+  });
 }
 
 void add_view(CLI::App& app, int& status) {

@@ -11,6 +11,9 @@ namespace hybrid {
 // The most that ever was resident.
 [[nodiscard]] std::uint64_t peak_memory_bytes();
 
+// What the machine could give now without putting anything aside; 0 where the system does not say.
+[[nodiscard]] std::uint64_t available_memory_bytes();
+
 // After a large step of loading: what it freed goes back to the system. The C library would keep it for
 // itself, and the next step's memory would come on top.
 void give_back_freed_memory();

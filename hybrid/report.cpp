@@ -24,11 +24,6 @@ std::string processor() {
   return "unknown processor";
 }
 
-Percentiles of_stage(const std::vector<float>& values) {
-  std::vector<double> copy(values.begin(), values.end());
-  return percentiles(copy);
-}
-
 struct ObjectRow {
   std::string name, kind, motion{};  // motion: empty for what stays
   glm::dvec3 position_m{0.0};        // of what moves, at the end
@@ -135,10 +130,9 @@ nlohmann::ordered_json run_report(const Scene& scene, const BuiltScene& built, S
   j["nonfinite"] = built.state->nonfinite;
   j["deadline_misses"] = result.deadline_misses;
   j["contact_ticks"] = result.contact_ticks;
-  std::vector<double> tick_us = result.tick_us;
-  j["tick_us"] = to_json(percentiles(tick_us));
+  j["tick_us"] = to_json(result.tick_us.percentiles());
   for (std::size_t s = 0; s < kStages; ++s)
-    j["stage_us"][kStageNames[s]] = to_json(of_stage(result.stage_us[s]));
+    j["stage_us"][kStageNames[s]] = to_json(result.stage_us[s].percentiles());
   j["force_N"] = {{"max", result.max_force_N}, {"rms", result.rms_force_N}};
   j["objects"] = nlohmann::ordered_json::array();
   for (const ObjectRow& row : object_rows(built, result)) {
@@ -191,8 +185,7 @@ nlohmann::ordered_json run_report(const Scene& scene, const BuiltScene& built, S
 }
 
 std::string run_summary(const BuiltScene& built, SessionResult& result) {
-  std::vector<double> tick_us = result.tick_us;
-  const Percentiles tick = percentiles(tick_us);
+  const Percentiles tick = result.tick_us.percentiles();
   std::string text =
       fmt::format("{} ticks of {:.3g} ms ({:.2f} s), {} in contact; force at most {:.3f} N\n", result.ticks,
                   result.dt_s * 1e3, static_cast<double>(result.ticks) * result.dt_s, result.contact_ticks,

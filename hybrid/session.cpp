@@ -50,6 +50,27 @@ double telling(const World& world, const WorldState& state) {
   return score + (rigid && soft ? 10.0 : 0.0);
 }
 
+// A path that begins later.
+class LaterPath final : public device::Path {
+ public:
+  LaterPath(std::shared_ptr<const device::Path> path, double later_s)
+      : path_(std::move(path)), later_s_(later_s) {}
+  [[nodiscard]] glm::dvec3 position(double t_s) const noexcept override {
+    return path_->position(t_s - later_s_);
+  }
+  [[nodiscard]] double duration_s() const noexcept override { return path_->duration_s(); }
+  [[nodiscard]] const std::vector<std::string>& notes() const noexcept override { return path_->notes(); }
+
+ private:
+  std::shared_ptr<const device::Path> path_;
+  double later_s_;
+};
+
+std::shared_ptr<const device::Path> later(std::shared_ptr<const device::Path> path, double later_s) {
+  if (later_s == 0.0) return path;
+  return std::make_shared<LaterPath>(std::move(path), later_s);
+}
+
 class Run {
  public:
   Run(const Scene& scene, BuiltScene& built, const SessionOptions& options)
@@ -57,7 +78,8 @@ class Run {
         world_(*built.world),
         state_(*built.state),
         options_(options),
-        path_(options.path ? options.path : scene_path(scene)),
+        path_(later(options.path ? options.path : scene_path(scene),
+                    static_cast<double>(options.start_ticks) / scene.rate_hz)),
         simulated_(options.real_device == nullptr ? scene_device(scene, path_) : nullptr),
         device_(options.real_device == nullptr ? *simulated_ : *options.real_device),
         realtime_(options.realtime || options.real_device != nullptr),
@@ -68,9 +90,7 @@ class Run {
     result_.path_notes = path_->notes();
     ticks_ = static_cast<std::uint64_t>(std::llround(seconds * scene.rate_hz));
     result_.dt_s = dt_;
-    result_.tick_us.reserve(ticks_);
-    for (auto& stage : result_.stage_us) stage.reserve(ticks_);
-    result_.recording.reserve(ticks_);
+    if (options.keep_recording) result_.recording.reserve(ticks_);
     result_.object_contact_ticks.assign(world_.object_count(), 0);
     result_.object_max_force_N.assign(world_.object_count(), 0.0);
     if (!options.keep_rows) return;
@@ -81,8 +101,8 @@ class Run {
 
   SessionResult go() {
     flush_denormals();
+    start_clocks();
     begin_session(scene_, world_, state_, device_.read().position_m);
-    if (realtime_) late_us_.reserve(ticks_);
     if (options_.reference_samples > 0 && !realtime_) {
       sample_every_ =
           std::max<std::uint64_t>(1, ticks_ / static_cast<std::uint64_t>(2 * options_.reference_samples));
@@ -103,7 +123,7 @@ class Run {
     if (realtime_) {
       result_.realtime_note = served.priority;
       result_.deadline_misses = served.late_ticks;
-      result_.late_us = percentiles(late_us_);
+      result_.late_us = late_us_.percentiles();
     }
     result_.end = served.end;
     result_.device_messages = std::move(served.messages);
@@ -116,6 +136,16 @@ class Run {
   }
 
  private:
+  void start_clocks() {
+    if (options_.start_ticks == 0) return;
+    const double now_s = static_cast<double>(options_.start_ticks) * dt_;
+    device_.hold(now_s);
+    state_.tick = options_.start_ticks;
+    state_.clock = device::Clock(now_s);
+    state_.limit.elapsed_s = now_s;
+    state_.limit.clamped = state_.limit.slewed = state_.truncated_ticks = options_.start_ticks;
+  }
+
   // On the driver's thread where the device has one. In real time nothing may make the next tick late: no
   // allocation (every column has its room), no look for a picture, no reference.
   device::ServoAnswer answer(const device::ServoInput& input) {
@@ -124,7 +154,7 @@ class Run {
     const TickResult felt = haptic_tick(world_, state_, input.device, dt_);
     keep(felt, tick, input.device.fault);
     if (realtime_) {
-      late_us_.push_back(input.late_s * 1e6);
+      late_us_.add(input.late_s * 1e6);
     } else {
       if (sample_every_ != 0 && result_.error.samples < options_.reference_samples)
         sample(felt, sample_every_);
@@ -144,9 +174,9 @@ class Run {
 
   void keep(const TickResult& felt, std::uint64_t tick, device::DeviceFault fault) {
     hash_ = hash_tick(hash_, felt);
-    result_.recording.push_back({felt.device_m, hash_, fault});
-    result_.tick_us.push_back(felt.tick_us);
-    for (std::size_t s = 0; s < kStages; ++s) result_.stage_us[s].push_back(felt.stage_us[s]);
+    if (options_.keep_recording) result_.recording.push_back({felt.device_m, hash_, fault});
+    result_.tick_us.add(felt.tick_us);
+    for (std::size_t s = 0; s < kStages; ++s) result_.stage_us[s].add(static_cast<double>(felt.stage_us[s]));
     const double force = glm::length(felt.force_N);
     result_.max_force_N = std::max(result_.max_force_N, force);
     sum_force2_ += force * force;
@@ -195,7 +225,7 @@ class Run {
   device::HapticDevice& device_;
   bool realtime_;
   double dt_;
-  std::vector<double> late_us_;
+  TimeSpread late_us_;
   std::chrono::steady_clock::time_point said_ = std::chrono::steady_clock::now();
   std::uint64_t ticks_ = 0, ticks_done_ = 0, sample_every_ = 0, soft_ticks_ = 0,
                 hash_ = 0xCBF29CE484222325ULL;

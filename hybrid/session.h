@@ -14,12 +14,10 @@
 #include "device/servo_loop.h"
 #include "hybrid/build.h"
 #include "hybrid/tick.h"
+#include "hybrid/time_spread.h"
 
 namespace hybrid {
 
-struct Percentiles {
-  double p50 = 0.0, p99 = 0.0, p999 = 0.0, max = 0.0;
-};
 // Of the values given; all zero when there are none. Reorders them.
 Percentiles percentiles(std::vector<double>& values);
 
@@ -36,9 +34,13 @@ struct SessionOptions {
   // A real one, open, placed in the scene and out of anything rigid; always in real time. None: the scene's
   // simulated one.
   device::HapticDevice* real_device = nullptr;
-  bool keep_rows = true;      // trace rows and per-object forces
-  bool keep_picture = false;  // remember the most telling moment
-  int reference_samples = 0;  // how often the force is compared with its equilibrium; 0 in real time
+  bool keep_rows = true;       // trace rows and per-object forces
+  bool keep_recording = true;  // every input, 32 bytes a tick: without it and the rows memory stays flat
+  bool keep_picture = false;   // remember the most telling moment
+  int reference_samples = 0;   // how often the force is compared with its equilibrium; 0 in real time
+  // Clocks and counters begin as after so many ticks, and the path so much later; nothing felt may differ. (A
+  // soft start is over by then.)
+  std::uint64_t start_ticks = 0;
   Progress progress;
   std::shared_ptr<const device::Path> path{};  // of the hand, in place of the scene's
 };
@@ -54,15 +56,15 @@ struct SessionResult {
   double dt_s = 0.0;
   std::uint64_t state_hash = 0;
   std::vector<TraceRow> rows;
-  std::vector<std::vector<double>> object_force_N;   // [object][row]
-  std::vector<std::uint64_t> object_contact_ticks;   // [object]
-  std::vector<double> object_max_force_N;            // [object]
-  std::vector<double> tick_us;                       // [tick], in order
-  std::array<std::vector<float>, kStages> stage_us;  // [stage][tick]
+  std::vector<std::vector<double>> object_force_N;  // [object][row]
+  std::vector<std::uint64_t> object_contact_ticks;  // [object]
+  std::vector<double> object_max_force_N;           // [object]
+  TimeSpread tick_us;
+  std::array<TimeSpread, kStages> stage_us;
   double max_force_N = 0.0, rms_force_N = 0.0;
   ForceError error;
-  std::optional<Snapshot> moment;  // of keep_picture
-  std::vector<RecordedTick> recording;
+  std::optional<Snapshot> moment;       // of keep_picture
+  std::vector<RecordedTick> recording;  // of keep_recording
   std::string device_name;
   device::ServoEnd end = device::ServoEnd::finished;
   std::vector<std::string> device_messages;  // what happened to the device, and what to do about it

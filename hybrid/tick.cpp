@@ -19,8 +19,10 @@
 namespace hybrid {
 namespace {
 
-constexpr int kPasses = 3;  // proxy and tissue answer one another this often a tick
-constexpr int kSweeps = 1;  // of the contact's neighbourhood, a pass
+constexpr double kFarthestDevice_m = 1e12;
+constexpr double kLongestTick_s = 86'400.0;  // a day: times stay numbers however often it is said
+constexpr int kPasses = 3;                   // proxy and tissue answer one another this often a tick
+constexpr int kSweeps = 1;                   // of the contact's neighbourhood, a pass
 constexpr double kSoftStep =
     0.25;                        // of the tool's reach: the proxy moves no further against tissue in one pass
 constexpr double kStill = 1e-5;  // of the tool's radius: a pass that moves the proxy less is the last
@@ -59,14 +61,24 @@ bool finite(const glm::dvec3& v) noexcept {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
+// No device is further away than a thousand times the largest scene. What is, is as little a position as NaN.
+bool is_place(const glm::dvec3& v) noexcept {
+  return finite(v) && std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}) <= kFarthestDevice_m;
+}
+
 glm::dvec3 check_input(WorldState& state, const device::DeviceState& input) noexcept {
-  if (finite(input.position_m)) {
+  if (is_place(input.position_m)) {
     state.device_m = input.position_m;
   } else {
     ++state.nonfinite;
     state.faults |= fault_nonfinite_input;
   }
   return state.device_m;
+}
+
+// A clock that ran backwards, or said nothing, says that no time has passed.
+double check_time(double dt_s) noexcept {
+  return dt_s > 0.0 && std::isfinite(dt_s) ? std::min(dt_s, kLongestTick_s) : 0.0;
 }
 
 // What pulls the proxy, apart from rigid surfaces: coupling and tissue (N).
@@ -206,10 +218,11 @@ void publish_force(const World& world, WorldState& state, const Sweep& sweep,
 }  // namespace
 
 TickResult haptic_tick(const World& world, WorldState& state, const device::DeviceState& input,
-                       double dt_s) noexcept {
+                       double given_dt_s) noexcept {
   TickResult result;
   StageClock clock(result);
   result.device_m = check_input(state, input);
+  const double dt_s = check_time(given_dt_s);
 
   move_bodies(world, state, dt_s);
   clock.done(Stage::bodies);

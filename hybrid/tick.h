@@ -27,8 +27,10 @@ struct TickResult {
 };
 
 // One tick of dt_s. A pure function of (world, state, input, dt_s): the same inputs give the same bits (times
-// apart). Never allocates, locks, throws or does I/O; every loop is bounded.
+// apart). Never allocates, locks, throws or does I/O; every loop is bounded. Any input will do: in place of a
+// position that is not finite, or further away than 1e12 m, the last good one holds (fault_nonfinite_input);
+// a dt_s that is negative or not finite is 0, in which no time passes, and none is longer than a day.
 TickResult haptic_tick(const World& world, WorldState& state, const device::DeviceState& input,
-                       double dt_s) noexcept;
+                       double given_dt_s) noexcept;
 
 }  // namespace hybrid

@@ -31,6 +31,7 @@ void WorldState::prepare(const World& world) {
   reactions.resize(soft.size());
   obstacle_seen.resize(soft.size());
   cursor.assign(soft.size(), 0);
+  obstacle_cursor.assign(soft.size(), 0);
   touched.resize(soft.size());
   for (auto& list : touched) list.reserve(voxel::SoftObject::kMaxTouched);
   if (!soft.empty()) {

@@ -16,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "device/clock.h"
 #include "device/force_limit.h"
 #include "device/passivity.h"
 #include "hybrid/occupancy.h"
@@ -172,7 +173,7 @@ struct CarriedState {
   device::ForceLimitState limit;
   device::PassivityState passive;
   std::uint64_t tick = 0;
-  double time_s = 0.0;                // simulated, of the bodies' paths
+  device::Clock clock;                // simulated, of the bodies' paths
   std::uint64_t nonfinite = 0;        // inputs or forces that were not finite
   std::uint32_t faults = 0;           // FaultBit, ever
   std::uint64_t truncated_ticks = 0;  // ticks that ended before the proxy arrived, by a bound on its steps
@@ -196,9 +197,9 @@ struct CarriedState {
   std::vector<VoxelPair> pairs;
   std::vector<std::vector<std::uint8_t>> paired;  // [meeting][surface voxel of a]
   std::vector<std::vector<glm::vec3>>
-      obstacle_seen;                  // [soft][surface voxel] displacement at which its obstacle was made
-  std::vector<std::uint32_t> cursor;  // [soft] round-robin over surface voxels
-  std::vector<std::uint32_t> pair_cursor;  // [meeting]
+      obstacle_seen;  // [soft][surface voxel] displacement at which its obstacle was made
+  std::vector<std::uint32_t> cursor, obstacle_cursor;  // [soft] round-robin over surface voxels
+  std::vector<std::uint32_t> pair_cursor;              // [meeting]
 };
 
 // Everything the tick writes. Buffers are sized when the world is built, and never after.

@@ -27,7 +27,7 @@ SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice)
       relaxation_(*lattice_),
       surface_number_(lattice_->size(), kNoSurface),
       pair_held_(lattice_->surface().size(), 0),
-      carried_stamp_(lattice_->size(), 0),
+      carried_mark_(lattice_->size(), 0),
       carried_index_(lattice_->size(), 0) {
   const auto surface = lattice_->surface();
   for (std::size_t s = 0; s < surface.size(); ++s)
@@ -77,11 +77,10 @@ SoftObject::Gap SoftObject::gap(const ToolInBody& tool, const glm::dvec3& positi
 }
 
 void SoftObject::touch(std::span<const VoxelId> near) noexcept {
-  ++stamp_;
   std::size_t pressed = 0;
   for (const Touch& t : touches_) {
     if (!t.pressed) continue;
-    carried_stamp_[t.v] = stamp_;
+    carried_mark_[t.v] = 1;
     ++pressed;
   }
   for (const VoxelId v : touched_voxels_) state_.set_role(v, resting_role(v), *lattice_);
@@ -90,14 +89,15 @@ void SoftObject::touch(std::span<const VoxelId> near) noexcept {
     if (t.pressed) relaxation_.stir(t.v / static_cast<std::size_t>(lattice_->springs().dims[0]));
   }
   touches_.clear();
-  touched_voxels_.clear();
   for (const VoxelId v : near) {
     if (touches_.size() == kMaxTouched) break;
-    const bool kept = carried_stamp_[v] == stamp_;
+    const bool kept = carried_mark_[v] != 0;
     if (kept) --pressed;
     touches_.push_back({v, kept, glm::dvec3(0.0), glm::dvec3(0.0)});
-    touched_voxels_.push_back(v);
   }
+  for (const VoxelId v : touched_voxels_) carried_mark_[v] = 0;
+  touched_voxels_.clear();
+  for (const Touch& t : touches_) touched_voxels_.push_back(t.v);
   if (pressed > 0) relaxation_.wake();
   set_touch_roles();
 }
@@ -241,11 +241,10 @@ void SoftObject::relax_near(const ToolInBody& tool, int sweeps) noexcept {
 // chain's limit. Without it the force would saturate as soon as the chain is tight. Per axis, breadth first;
 // each voxel's load goes to the pressed voxel that it was first reached from.
 void SoftObject::gather_load(int axis) noexcept {
-  ++stamp_;
   carried_.clear();
   const auto& u = state_.u[static_cast<std::size_t>(axis)];
   const auto add = [this](VoxelId v, std::uint32_t touch_index) {
-    carried_stamp_[v] = stamp_;
+    carried_mark_[v] = 1;
     carried_index_[v] = touch_index;
     carried_.push_back({v, touch_index});
   };
@@ -267,7 +266,7 @@ void SoftObject::gather_load(int axis) noexcept {
         const bool pushed_up = difference <= b[0] + tight, pushed_down = difference >= b[1] - tight;
         if (!pushed_up && !pushed_down) continue;
         touches_[c.touch].tight = true;
-        if (carried_stamp_[w] == stamp_) continue;
+        if (carried_mark_[w] != 0) continue;
         const double pull = link_force(*lattice_, state_, w)[axis];
         if (!((pushed_up && pull < 0.0) || (pushed_down && pull > 0.0))) continue;
         touches_[c.touch].load[axis] += pull;
@@ -277,11 +276,19 @@ void SoftObject::gather_load(int axis) noexcept {
   }
 }
 
+// A mark for each voxel, taken back, and not the number of the gathering that it was carried in: such a
+// number comes round (after four days of contact, in 32 bits), and then every voxel ever carried would count
+// as carried now.
+void SoftObject::let_go_of_carried() noexcept {
+  for (const Carried& c : carried_) carried_mark_[c.v] = 0;
+  carried_.clear();
+}
+
 void SoftObject::add_stiffness(int axis, glm::dmat3& stiffness) const noexcept {
   // A carried voxel moves by q = n_a·n per unit of tool motion, n its touch's normal; what a link stores then
   // is ½ k (q_v·δ − q_w·δ)².
   const auto along = [&](VoxelId v) {
-    if (carried_stamp_[v] != stamp_) return glm::dvec3(0.0);
+    if (carried_mark_[v] == 0) return glm::dvec3(0.0);
     const glm::dvec3& n = touches_[carried_index_[v]].normal;
     return n[axis] * n;
   };
@@ -295,8 +302,7 @@ void SoftObject::add_stiffness(int axis, glm::dmat3& stiffness) const noexcept {
         const double stiff = static_cast<double>(up ? k[c.v] : k[w]);
         if (stiff == 0.0) continue;
         const glm::dvec3 r = q - along(w);
-        const double share =
-            carried_stamp_[w] == stamp_ ? 0.5 : 1.0;  // an inner link is met from both its ends
+        const double share = carried_mark_[w] != 0 ? 0.5 : 1.0;  // an inner link is met from both its ends
         stiffness += share * stiff * glm::outerProduct(r, r);
       }
     }
@@ -313,6 +319,7 @@ Reaction SoftObject::reaction(const ToolInBody& tool) noexcept {
   for (int axis = 0; axis < 3; ++axis) {
     gather_load(axis);
     add_stiffness(axis, result.stiffness_N_per_m);
+    let_go_of_carried();
   }
   for (const Touch& t : touches_) {
     if (!t.pressed) continue;
@@ -470,7 +477,7 @@ bool SoftObject::settle(const ToolInBody& tool, double tolerance_N, int max_cycl
 }
 
 std::size_t SoftObject::memory_bytes() const {
-  return lattice_->memory_bytes() + lattice_->size() * (3 * sizeof(float) + 1 + 3 * sizeof(std::uint32_t)) +
+  return lattice_->memory_bytes() + lattice_->size() * (3 * sizeof(float) + 2 + 2 * sizeof(std::uint32_t)) +
          chain_.memory_bytes() + relaxation_.memory_bytes() + obstacles_.size() * sizeof(Obstacle) +
          lattice_->surface().size() * 4 * sizeof(std::uint32_t);
 }

@@ -138,6 +138,7 @@ class SoftObject {
   void relax_touch(const ToolInBody& tool, Touch& touch) noexcept;
   void add_stiffness(int axis, glm::dmat3& stiffness) const noexcept;
   void gather_load(int axis) noexcept;
+  void let_go_of_carried() noexcept;
   [[nodiscard]] ObstacleView obstacle_view() const { return {obstacles_, surface_number_}; }
 
   std::shared_ptr<const Lattice> lattice_;
@@ -154,10 +155,9 @@ class SoftObject {
   std::vector<VoxelId> sources_;
   std::vector<glm::vec3> moves_;
   std::vector<Carried> carried_;              // [pressed first, then what hangs on them by a tight link]
-  std::vector<std::uint32_t> carried_stamp_;  // [v]
+  std::vector<std::uint8_t> carried_mark_;    // [v] 1: in carried_ (within touch(): was pressed)
   std::vector<std::uint32_t> carried_index_;  // [v]
-  std::uint32_t stamp_ = 0;
-  double unrelaxed_m_ = 0.0;  // motion of pressed voxels since the background was last woken
+  double unrelaxed_m_ = 0.0;                  // motion of pressed voxels since the background was last woken
   bool moved_ever_ = false;
 };
 

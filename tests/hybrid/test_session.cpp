@@ -90,9 +90,9 @@ TEST(CubeSession, CountsWhatItReports) {
   EXPECT_EQ(r.ticks, 500U);
   EXPECT_EQ(r.dt_s, 1e-3);
   ASSERT_EQ(r.rows.size(), 500U);
-  EXPECT_EQ(r.tick_us.size(), 500U);
+  EXPECT_EQ(r.tick_us.count(), 500U);
   EXPECT_EQ(r.recording.size(), 500U);
-  for (const auto& stage : r.stage_us) EXPECT_EQ(stage.size(), 500U);
+  for (const auto& stage : r.stage_us) EXPECT_EQ(stage.count(), 500U);
   std::uint64_t contact = 0;
   double most = 0.0, square = 0.0;
   for (std::size_t n = 0; n < r.rows.size(); ++n) {
