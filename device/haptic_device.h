@@ -17,6 +17,7 @@ enum class DeviceFault : std::uint8_t {
   warm_motors,     // its driver has cut the motors, or is about to, until they are cooler
   force_limit,     // its driver refused a force as too large
   velocity_limit,  // its driver cut the motors because the tool moves too fast
+  late,            // the loop's own fault: the force before this read stayed for longer than is allowed
 };
 
 // Whether no force may be played while the fault lasts; after it the force fades in anew (force_limit.h).

@@ -162,4 +162,11 @@ std::unique_ptr<Path> make_path(const PathDescription& description) {
   return std::visit([](const auto& path) { return make(path); }, description);
 }
 
+std::shared_ptr<const Path> make_path(Trajectory trajectory) {
+  if (trajectory.t_s.empty() || trajectory.t_s.size() != trajectory.position_m.size()) {
+    throw PathError("path: a trajectory without samples");
+  }
+  return std::make_shared<PolylinePath>(std::move(trajectory));
+}
+
 }  // namespace device

@@ -22,4 +22,7 @@ struct Trajectory {
 // left out.
 Trajectory read_trajectory(const CsvPath& csv);
 
+// Along a trajectory at hand. Throws PathError: no samples.
+std::shared_ptr<const Path> make_path(Trajectory trajectory);
+
 }  // namespace device

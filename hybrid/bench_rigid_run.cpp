@@ -11,7 +11,7 @@
 
 #include "hybrid/body_stage.h"
 #include "hybrid/build.h"
-#include "hybrid/rigid_sweep.h"
+#include "hybrid/rigid_step.h"
 #include "hybrid/tick.h"
 #include "polygon/cgal_surface.h"
 #include "polygon/mesh_surface.h"

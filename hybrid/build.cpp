@@ -16,6 +16,7 @@
 #include "hybrid/label_surface.h"
 #include "hybrid/process_memory.h"
 #include "hybrid/scene_feel.h"
+#include "hybrid/session.h"
 #include "hybrid/soft_stage.h"
 
 namespace hybrid {
@@ -337,16 +338,26 @@ class Builder {
     world_->set_scale(box_.low, box_.high);
     world_->limits = scene_.safety;
     if (!scene_.max_force_given) {
-      const double most = device::device_limits(scene_.device_model).max_force_N;
+      const double most = scene_limits(scene_).max_force_N;
       if (most > 0.0 && std::isfinite(most)) world_->limits.max_force_N = most;
     }
-    world_->encoder_m = device::device_limits(scene_.device_model).resolution_m;
+    world_->encoder_m = scene_limits(scene_).resolution_m;
+    world_->limits.deadline_s = scene_.deadline_periods / scene_.rate_hz;
+    // What is where its path is, whatever the force, takes no energy.
+    const bool ideal = is_ideal(scene_);
+    if (ideal && !scene_.max_energy_given)
+      world_->limits.max_energy_J = std::numeric_limits<double>::infinity();
+    if (scene_.passivity && !ideal) world_->passivity = passivity_options();
     for (std::uint32_t a = 0; a < world_->soft.size(); ++a) {
       for (std::uint32_t b = a + 1; b < world_->soft.size(); ++b) world_->meeting.push_back({a, b});
     }
     built_.state = std::make_unique<WorldState>(*world_, std::move(*map_));
     built_.state->soft = std::move(soft_);
     built_.state->prepare(*world_);
+  }
+
+  [[nodiscard]] device::PassivityOptions passivity_options() const {
+    return {.resolution_m = world_->encoder_m, .jnd_share = kJndShare, .jnd_floor_N = jnd_floor_N(scene_)};
   }
 
   const Scene& scene_;

@@ -81,6 +81,7 @@ const std::vector<std::string>& bench_paths() {
 }
 std::vector<std::string> bench_engines() {
   std::vector<std::string> names;
+  names.reserve(std::size(bench::kEngines));
   for (const bench::Engine engine : bench::kEngines) names.emplace_back(bench::engine_name(engine));
   return names;
 }

@@ -142,6 +142,9 @@ void check_scene_file(const std::filesystem::path& path, Json& file) {
     add_finding(file, {"S01", note.severity, 1,
                        fmt::format("{}{}{}", note.object, note.object.empty() ? "" : ": ", note.text)});
   }
+  for (const std::string& note : scene_path(scene)->notes()) {
+    add_finding(file, {"S03", polygon::Severity::info, 1, "path: " + note});
+  }
   file["objects"] = Json::array();
   for (const RigidObject& o : built.world->rigid) {
     file["objects"].push_back(

@@ -33,14 +33,7 @@ nlohmann::ordered_json report(const Scene& scene, const Comparison& comparison) 
   return j;
 }
 
-}  // namespace
-
-int compare(const CompareCommand& command) {
-  const Scene scene = load_scene(command.scene);
-  const Comparison comparison = compare_models(scene, command.object, progress_on_terminal());
-  end_progress();
-  std::FILE* words = command.json == "-" ? stderr : stdout;
-  fmt::print(words, "\"{}\" along the path of {}\n", comparison.object, scene.file.filename().string());
+void print_models(std::FILE* words, const Comparison& comparison) {
   fmt::print(words, "errors against: {}; 1 JND = max(7 %, {:.2f} N)\n\n", comparison.reference_text,
              comparison.jnd_floor_N);
   if (!comparison.note.empty()) fmt::print(words, "{}\n\n", comparison.note);
@@ -56,16 +49,61 @@ int compare(const CompareCommand& command) {
       fmt::print(words, "{:>9} {:>9} {:>9}\n", "-", "-", "-");
     }
   }
-  if (!command.plot.empty()) {
-    std::vector<ComparedModel> models;
-    for (const ModelResult& m : comparison.models) models.push_back({m.name, m.rows, m.depth_m});
-    save_compare_plot(
-        command.plot, models, {},
-        fmt::format("{}: {}", scene.title.empty() ? scene.file.stem().string() : scene.title,
-                    comparison.object),
-        {.reference = comparison.reference, .jnd_share = kJndShare, .jnd_floor_N = comparison.jnd_floor_N});
-    fmt::print(words, "\nplot: {}\n", command.plot.string());
-  }
+}
+
+void save_plot(const CompareCommand& command, const Scene& scene, const Comparison& comparison,
+               std::FILE* words) {
+  if (command.plot.empty()) return;
+  std::vector<ComparedModel> models;
+  for (const ModelResult& m : comparison.models) models.push_back({m.name, m.rows, m.depth_m});
+  save_compare_plot(
+      command.plot, models, {},
+      fmt::format("{}: {}", scene.title.empty() ? scene.file.stem().string() : scene.title,
+                  comparison.object),
+      {.reference = comparison.reference, .jnd_share = kJndShare, .jnd_floor_N = comparison.jnd_floor_N});
+  fmt::print(words, "\nplot: {}\n", command.plot.string());
+}
+
+int compare_with_measured(const CompareCommand& command, const Scene& scene) {
+  MeasuredOptions options = command.measured;
+  // The evaluation's files are in millimeters; a CSV without units follows the scene.
+  if (options.measured.file.extension() != ".traj") options.measured.unit_m = scene.unit_m;
+  const MeasuredComparison result = compare_measured(scene, options, progress_on_terminal());
+  end_progress();
+  for (const std::string& note : result.notes) std::fprintf(stderr, "note: %s\n", note.c_str());
+  std::FILE* words = command.json == "-" ? stderr : stdout;
+  const std::string file = options.measured.file.filename().string();
+  fmt::print(words, "{} along {}, {} ticks\n", scene.file.filename().string(),
+             options.along.empty() ? file : options.along.filename().string(), result.samples);
+  print_models(words, result.comparison);
+  fmt::print(words, "\nRMS force error over all ticks, in contact or not: {:.4f} N\n", result.rms_N);
+  if (result.in_gaps > 0)
+    fmt::print(words, "{} ticks lie in gaps of the measurement, and are left out\n", result.in_gaps);
+  save_plot(command, scene, result.comparison, words);
+  if (command.json.empty()) return 0;
+  nlohmann::ordered_json j = report(scene, result.comparison);
+  j["measured"] = {{"file", options.measured.file.string()},
+                   {"along", options.along.empty() ? nlohmann::ordered_json(nullptr)
+                                                   : nlohmann::ordered_json(options.along.string())},
+                   {"rms_N", result.rms_N},
+                   {"ticks", result.samples},
+                   {"ticks_in_gaps", result.in_gaps},
+                   {"notes", result.notes}};
+  save_json(command.json, j);
+  return 0;
+}
+
+}  // namespace
+
+int compare(const CompareCommand& command) {
+  const Scene scene = load_scene(command.scene);
+  if (!command.measured.measured.file.empty()) return compare_with_measured(command, scene);
+  const Comparison comparison = compare_models(scene, command.object, progress_on_terminal());
+  end_progress();
+  std::FILE* words = command.json == "-" ? stderr : stdout;
+  fmt::print(words, "\"{}\" along the path of {}\n", comparison.object, scene.file.filename().string());
+  print_models(words, comparison);
+  save_plot(command, scene, comparison, words);
   if (!command.json.empty()) save_json(command.json, report(scene, comparison));
   return 0;
 }

@@ -10,6 +10,7 @@
 #include "hybrid/commands.h"
 #include "hybrid/picture.h"
 #include "hybrid/plot.h"
+#include "hybrid/real_device.h"
 #include "hybrid/recording.h"
 #include "hybrid/report.h"
 #include "hybrid/session.h"
@@ -107,18 +108,27 @@ int run(const RunCommand& command) {
   if (!command.save_volume.empty()) {
     throw std::runtime_error("--save-volume: not supported yet; --save-surface writes the deformed surface");
   }
-  const Scene scene = load_scene(command.scene);
+  Scene scene = load_scene(command.scene);
+  if (!command.device.empty()) use_device(scene, command.device);
   for (const auto* file :
        {&command.trace, &command.plot, &command.picture, &command.record, &command.save_surface}) {
     check_writable(*file);
   }
   if (command.json != "-") check_writable(command.json);
   const Progress progress = progress_on_terminal();
+  const auto real = open_real_device(scene);  // before the build, which may take long
   BuiltScene built = build_scene(scene, progress);
   end_progress();
   print_notes(built);
+  if (real) {
+    std::fprintf(stderr, "note: %s\n", place_real_device(scene, *built.world, *real).c_str());
+    await_free_tool(scene, *built.world, *built.state, *real, progress);
+    end_progress();
+    std::fprintf(stderr, "note: in touch now; Ctrl-C ends the session and keeps it\n");
+  }
   SessionOptions options{.seconds = command.seconds,
                          .realtime = command.realtime,
+                         .real_device = real.get(),
                          .keep_rows = !command.trace.empty() || !command.plot.empty(),
                          .keep_recording = !command.record.empty(),
                          .keep_picture = !command.picture.empty(),
@@ -144,7 +154,7 @@ int run(const RunCommand& command) {
     save_picture(command.picture, drawn_scene(*built.world, title), *result.moment);
   if (!command.record.empty()) {
     save_recording(command.record, {std::filesystem::absolute(command.scene), read_text(command.scene),
-                                    result.dt_s, result.state_hash, result.recording});
+                                    result.dt_s, scene_limits(scene), result.state_hash, result.recording});
   }
   if (!command.save_surface.empty()) save_soft_surfaces(command.save_surface, built);
   if (!command.json.empty()) save_json(command.json, run_report(scene, built, result));
@@ -155,7 +165,7 @@ int run(const RunCommand& command) {
         std::pair{"surface", command.save_surface}}) {
     if (!file.empty()) fmt::print(words, "{}: {}\n", what, file.string());
   }
-  return 0;
+  return result.end == device::ServoEnd::lost ? 1 : 0;
 }
 
 int replay(const ReplayCommand& command) {

@@ -9,10 +9,11 @@
 #include <glm/geometric.hpp>
 #include <thread>
 
-#include "device/servo_timer.h"
+#include "device/servo_loop.h"
 #include "device/simulated.h"
 #include "hybrid/commands.h"
 #include "hybrid/hand_over.h"
+#include "hybrid/real_device.h"
 #include "hybrid/session.h"
 #include "hybrid/window.h"
 
@@ -59,17 +60,19 @@ class SteeredPath final : public device::Path {
 // The session's side. Once the mouse has taken the tool it keeps it where it was let go, until a restart.
 class Player {
  public:
-  Player(const Scene& scene, BuiltScene& built)
+  Player(const Scene& scene, BuiltScene& built, device::HapticDevice* real_device)
       : built_(built),
         path_(std::make_shared<SteeredPath>(scene_path(scene))),
-        device_(scene_device(scene, path_)),
+        simulated_(real_device == nullptr ? scene_device(scene, path_) : nullptr),
+        device_(real_device == nullptr ? *simulated_ : *real_device),
+        rate_hz_(scene.rate_hz),
         dt_(1.0 / scene.rate_hz) {
     flush_denormals();
-    goal_m_ = device_->read().position_m;
+    goal_m_ = device_.read().position_m;
     begin_session(scene, *built.world, *built.state, goal_m_);
   }
 
-  TickResult tick(const Wish& wish) {
+  TickResult tick(const Wish& wish, const device::DeviceState& input) {
     if (wish.restarts != restarts_) {
       restarts_ = wish.restarts;
       path_->restart(t_s());
@@ -81,14 +84,21 @@ class Player {
       goal_m_ = length > most ? goal_m_ + way * (most / length) : wish.goal_m;
       path_->hold(goal_m_);
     }
-    const TickResult felt = haptic_tick(*built_.world, *built_.state, device_->read(), dt_);
-    device_->write(felt.force_N, dt_);
+    const TickResult felt = haptic_tick(*built_.world, *built_.state, input, dt_);
     if (!wish.dragging) goal_m_ = felt.device_m;
     ++ticks_;
     return felt;
   }
   [[nodiscard]] double t_s() const { return static_cast<double>(ticks_) * dt_; }
-  [[nodiscard]] double dt_s() const { return dt_; }
+  [[nodiscard]] double rate_hz() const { return rate_hz_; }
+  [[nodiscard]] double deadline_s() const { return built_.world->limits.deadline_s; }
+  [[nodiscard]] device::HapticDevice& device() { return device_; }
+  // A tick of no real time, on this thread.
+  TickResult step(const Wish& wish) {
+    const TickResult felt = tick(wish, device_.read());
+    device_.write(felt.force_N, dt_);
+    return felt;
+  }
   void snapshot(const TickResult& felt, Snapshot& out) const {
     out.tick = built_.state->tick;
     out.t_s = t_s();
@@ -104,8 +114,9 @@ class Player {
   static constexpr double kHandSpeed_m_per_s = 0.5;
   BuiltScene& built_;
   std::shared_ptr<SteeredPath> path_;
-  std::unique_ptr<device::HapticDevice> device_;
-  double dt_;
+  std::unique_ptr<device::HapticDevice> simulated_;
+  device::HapticDevice& device_;
+  double rate_hz_, dt_;
   std::uint64_t ticks_ = 0;
   std::uint32_t restarts_ = 0;
   glm::dvec3 goal_m_{0.0};
@@ -129,7 +140,7 @@ void play_frames(const ViewCommand& command, Player& player, Window& window) {
         wish.dragging = true;
         wish.goal_m = drag->position(player.t_s());
       }
-      felt = player.tick(wish);
+      felt = player.step(wish);
     }
     player.snapshot(felt, snapshot);
     if (!window.frame(snapshot)) return;
@@ -138,26 +149,36 @@ void play_frames(const ViewCommand& command, Player& player, Window& window) {
   if (!command.out.empty()) fmt::print("{} frames in {}\n", *command.frames, command.out.string());
 }
 
-// The window on this thread, the session on another.
-void play_live(Player& player, Window& window) {
+// The window on this thread, the session on another. Says what happened to the device, if anything did.
+device::ServoReport play_live(Player& player, Window& window) {
   HandOver<Snapshot> snapshots;
   HandOver<Wish> wishes;
-  std::atomic<bool> stop{false};
+  std::atomic<bool> stop{false}, ended{false};
+  device::ServoReport report;
   std::jthread session([&] {
-    flush_denormals();
-    device::ServoTimer timer(player.dt_s());
-    timer.raise_priority();
     double next = 0.0;
-    while (!stop.load(std::memory_order_relaxed)) {
-      timer.wait();
+    auto tick = [&](const device::ServoInput& input) -> device::ServoAnswer {
+      const FlushedDenormals flushed;
+      const bool go_on = !stop.load(std::memory_order_relaxed);
       const Wish& wish = wishes.take();
-      if (wish.paused) continue;
-      const TickResult felt = player.tick(wish);
-      if (player.t_s() < next) continue;
-      next = player.t_s() + kSnapshotEvery_s;
-      player.snapshot(felt, snapshots.back());
-      snapshots.publish();
+      if (wish.paused || !go_on) return {.go_on = go_on, .skip = true};
+      const TickResult felt = player.tick(wish, input.device);
+      if (player.t_s() >= next) {
+        next = player.t_s() + kSnapshotEvery_s;
+        player.snapshot(felt, snapshots.back());
+        snapshots.publish();
+      }
+      return {.force_N = felt.force_N};
+    };
+    try {
+      report = device::run_servo(
+          player.device(), {.rate_hz = player.rate_hz(), .realtime = true, .deadline_s = player.deadline_s()},
+          tick);
+    } catch (const std::exception& e) {
+      report.end = device::ServoEnd::lost;
+      report.messages.emplace_back(e.what());
     }
+    ended = true;
   });
   Wish wish;
   do {
@@ -168,28 +189,43 @@ void play_live(Player& player, Window& window) {
     if (input.restart) ++wish.restarts;
     wishes.back() = wish;
     wishes.publish();
-  } while (window.frame(snapshots.take()));
+  } while (window.frame(snapshots.take()) && !ended);
   stop = true;
+  session.join();
+  return report;
 }
 
 }  // namespace
 
 int view(const ViewCommand& command) {
-  const Scene scene = load_scene(command.scene);
+  Scene scene = load_scene(command.scene);
+  if (!command.device.empty()) use_device(scene, command.device);
+  // Frames are pictures that can be made again, and so need a hand that can.
+  if (command.frames && scene.real_device) {
+    throw SceneError(scene.file, scene.real_device->place,
+                     "--frames needs a simulated device; add --device premium-1.5");
+  }
   if (!command.out.empty()) std::filesystem::create_directories(command.out);
+  const auto real = open_real_device(scene);
   BuiltScene built = build_scene(scene, progress_on_terminal());
   end_progress();
   print_notes(built);
   const DrawnScene drawn =
       drawn_scene(*built.world, scene.title.empty() ? command.scene.stem().string() : scene.title);
   Window window(drawn);
-  Player player(scene, built);
+  if (real) {
+    std::fprintf(stderr, "note: %s\n", place_real_device(scene, *built.world, *real).c_str());
+    await_free_tool(scene, *built.world, *built.state, *real, progress_on_terminal());
+    end_progress();
+  }
+  Player player(scene, built, real.get());
   if (command.frames) {
     play_frames(command, player, window);
-  } else {
-    play_live(player, window);
+    return 0;
   }
-  return 0;
+  const device::ServoReport report = play_live(player, window);
+  for (const std::string& message : report.messages) std::fprintf(stderr, "device: %s\n", message.c_str());
+  return report.end == device::ServoEnd::lost ? 1 : 0;
 }
 
 }  // namespace hybrid

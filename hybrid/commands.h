@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "hybrid/build.h"
+#include "hybrid/compare_measured.h"
 
 namespace hybrid {
 
@@ -16,6 +17,7 @@ struct RunCommand {
   std::filesystem::path scene;
   std::optional<double> seconds;
   bool realtime = false;
+  std::string device;  // in place of the scene's; empty: the scene's
   int samples = 6;
   std::uint64_t start_ticks = 0;
   std::filesystem::path trace, plot, picture, record, save_surface, save_volume;  // empty: not written
@@ -38,9 +40,16 @@ struct CheckCommand {
 };
 int check(const CheckCommand& command);
 
+struct DevicesCommand {
+  bool calibrate = false;  // take the pose in which the hand holds the arm as the one of calibration
+  std::string json;
+};
+int devices(const DevicesCommand& command);
+
 struct CompareCommand {
   std::filesystem::path scene;
-  std::string object;  // empty: the first that can be compared
+  std::string object;        // empty: the first that can be compared
+  MeasuredOptions measured;  // its file empty: no measurement
   std::filesystem::path plot;
   std::string json;
 };
@@ -60,6 +69,11 @@ const std::vector<std::string>& bench_paths();
 std::vector<std::string> bench_engines();
 std::string bench_mesh_error(const std::string& name);  // empty: there is such a mesh
 
+struct StabilityCommand {
+  std::filesystem::path scene, plot;
+  std::string json;
+};
+int stability(const StabilityCommand& command);
 // `hybrid stability SCENE --extremes`, `--fuzz-ticks N`: the suite of extremes.h, and fuzz_ticks.h. The
 // status is 0 also when something fell short: the report says so.
 struct ExtremesCommand {
@@ -76,6 +90,7 @@ struct ViewCommand {
   std::optional<std::uint64_t> frames;  // then closes; each written to `out` when that is given
   std::filesystem::path out;
   std::filesystem::path drag;  // CSV of goals that stand for the mouse: t, x, y, z
+  std::string device;          // in place of the scene's; empty: the scene's
 };
 int view(const ViewCommand& command);
 

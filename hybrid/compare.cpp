@@ -21,14 +21,9 @@ constexpr double kHardYoung_Pa =
 
 // The scene with one object only, on an ideal device.
 Scene bare(const Scene& scene) {
-  Scene one = scene;
+  Scene one = on_ideal_device(scene);
   one.rigid.clear();
   one.soft.clear();
-  one.device_model = device::DeviceModel::ideal;
-  one.max_force_given = true;  // the ideal device has no limit, and a comparison wants the whole force
-  one.safety.max_force_N = 1e6;
-  one.safety.max_slew_N_per_s = 1e12;
-  one.safety.soft_start_s = 0.0;
   return one;
 }
 
@@ -174,6 +169,19 @@ double percentile(std::vector<double>& values, double share) {
                          static_cast<std::size_t>(share * static_cast<double>(values.size())))];
 }
 
+}  // namespace
+
+Scene on_ideal_device(const Scene& scene) {
+  Scene ideal = scene;
+  ideal.device_model = device::DeviceModel::ideal;
+  ideal.real_device.reset();
+  ideal.max_force_given = true;  // the ideal device has no limit, and a comparison wants the whole force
+  ideal.safety.max_force_N = 1e6;
+  ideal.safety.max_slew_N_per_s = 1e12;
+  ideal.safety.soft_start_s = 0.0;
+  return ideal;
+}
+
 void measure(ModelResult& model, const ModelResult& reference, double floor_N) {
   std::vector<double> jnd, angle;
   double sum2 = 0.0;
@@ -203,8 +211,6 @@ void measure(ModelResult& model, const ModelResult& reference, double floor_N) {
   model.direction_p50_deg = percentile(angle, 0.5);
   model.direction_p99_deg = percentile(angle, 0.99);
 }
-
-}  // namespace
 
 Comparison compare_models(const Scene& scene, const std::string& object, const Progress& progress) {
   const auto named = [&object](const auto& o) { return object.empty() || o.name == object; };

@@ -38,4 +38,10 @@ struct Comparison {
 // that cannot be rendered both ways (with the reason).
 Comparison compare_models(const Scene& scene, const std::string& object, const Progress& progress);
 
+// The pieces, for other comparisons.
+// The scene on an ideal device, its forces neither clamped nor slewed.
+Scene on_ideal_device(const Scene& scene);
+// Fills what `model` has against the reference.
+void measure(ModelResult& model, const ModelResult& reference, double floor_N);
+
 }  // namespace hybrid

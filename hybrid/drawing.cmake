@@ -19,7 +19,8 @@ add_library(hybrid_drawing STATIC
   ${CMAKE_CURRENT_LIST_DIR}/window.cpp
   ${CMAKE_CURRENT_LIST_DIR}/svg_figure.cpp
   ${CMAKE_CURRENT_LIST_DIR}/decimate.cpp
-  ${CMAKE_CURRENT_LIST_DIR}/plot.cpp)
+  ${CMAKE_CURRENT_LIST_DIR}/plot.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/stability_plot.cpp)
 add_library(hybrid::drawing ALIAS hybrid_drawing)
 hybrid_target(hybrid_drawing)
 target_link_libraries(hybrid_drawing PRIVATE PkgConfig::EPOXY PkgConfig::IMGUI glfw PNG::PNG ${CMAKE_DL_LIBS})

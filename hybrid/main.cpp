@@ -20,6 +20,11 @@ constexpr const char* kAbout =
     "A scene is one small text file; scenes/README.md describes its keys.\n"
     "Exit status: 0 done, 1 input refused (with the place and the remedy), 2 wrong usage.";
 
+void add_device(CLI::App& sub, std::string& device) {
+  sub.add_option("--device", device, "use this one in place of the scene's")
+      ->check(CLI::IsMember({"phantom", "premium-1.5", "touch", "ideal"}));
+}
+
 void add_run(CLI::App& app, int& status) {
   auto* sub =
       app.add_subcommand("run", "A haptic session without a display: the scene's path, felt from end to end");
@@ -28,6 +33,7 @@ void add_run(CLI::App& app, int& status) {
   sub->add_option("--seconds", c->seconds, "length of the session; default: the path and half a second")
       ->check(CLI::PositiveNumber);
   sub->add_flag("--realtime", c->realtime, "pace the loop with a real timer at the device's rate");
+  add_device(*sub, c->device);
   sub->add_option(
          "--samples", c->samples,
          "how often the soft force is compared with its equilibrium (slow on large volumes); 0: never")
@@ -70,12 +76,38 @@ void add_check(CLI::App& app, int& status) {
   sub->callback([c, &status] { status = hybrid::check(*c); });
 }
 
+void add_devices(CLI::App& app, int& status) {
+  auto* sub = app.add_subcommand("devices", "What device is connected, and if none, why");
+  auto c = std::make_shared<hybrid::DevicesCommand>();
+  sub->add_flag("--calibrate", c->calibrate,
+                "calibrate a device that is reset by hand, while you hold its arm");
+  sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
+  sub->callback([c, &status] { status = hybrid::devices(*c); });
+}
+
 void add_compare(CLI::App& app, int& status) {
   auto* sub = app.add_subcommand(
       "compare", "One object as mesh and proxy, as voxels, and in closed form, along the same path");
   auto c = std::make_shared<hybrid::CompareCommand>();
   sub->add_option("SCENE", c->scene, "scene file (.toml)")->required();
   sub->add_option("--object", c->object, "name of the object; default: the first");
+  device::MeasuredFile& file = c->measured.measured;
+  auto* measured = sub->add_option(
+      "--measured", file.file, "compare the whole scene with forces measured along a motion (.traj, .csv)");
+  sub->add_option("--along", c->measured.along,
+                  "of --measured: the device's positions, from a file of their own")
+      ->needs(measured);
+  sub->add_option("--columns", file.columns,
+                  "of --measured: its columns, as in t_s,x_mm,y_mm,z_mm,fx_N,fy_N,fz_N")
+      ->needs(measured);
+  sub->add_option("--force", file.force,
+                  "of --measured: which force, by the first part of its columns' names")
+      ->needs(measured);
+  sub->add_option("--rate", file.rate_hz, "of --measured: samples a second, where it has no times")
+      ->check(CLI::PositiveNumber)
+      ->needs(measured);
+  sub->add_flag("--on-object", file.on_object, "of --measured: its forces are those on the object")
+      ->needs(measured);
   sub->add_option("--plot", c->plot, "write force over time and depth as SVG");
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
   sub->callback([c, &status] { status = hybrid::compare(*c); });
@@ -106,16 +138,25 @@ void add_bench(CLI::App& app, int& status) {
 }
 
 void add_stability(CLI::App& app, int& status) {
-  auto* sub = app.add_subcommand("stability", "Where the loop stops being stable, and what it does beyond");
-  auto c = std::make_shared<hybrid::ExtremesCommand>();
-  c->table = false;
-  sub->add_option("SCENE", c->scene, "scene file (.toml)")->required();
-  sub->add_flag("--extremes", c->table, "rigid, soft and mixed scenes with every setting taken to its end");
-  sub->add_flag("--quick", c->quick, "of --extremes: a share of the table; a few seconds");
-  sub->add_option("--fuzz-ticks", c->fuzz_ticks, "so many ticks of random device input");
-  sub->add_option("--seed", c->seed, "of --fuzz-ticks")->capture_default_str();
+  auto* sub = app.add_subcommand(
+      "stability", "Up to which stiffness the loop is stable, passive and calm: measured, beside theory");
+  auto c = std::make_shared<hybrid::StabilityCommand>();
+  auto e = std::make_shared<hybrid::ExtremesCommand>();
+  e->table = false;
+  sub->add_option("SCENE", c->scene, "scene file (.toml), such as scenes/wall.toml")->required();
+  sub->add_option("--plot", c->plot, "write stiffness over damping and rate as SVG (rigid scenes)");
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
-  sub->callback([c, &status] { status = hybrid::extremes(*c); });
+  auto* table = sub->add_flag("--extremes", e->table,
+                              "instead: rigid, soft and mixed scenes with every setting taken to its end");
+  sub->add_flag("--quick", e->quick, "of --extremes: a share of the table; a few seconds")->needs(table);
+  auto* ticks =
+      sub->add_option("--fuzz-ticks", e->fuzz_ticks, "instead: so many ticks of random device input");
+  sub->add_option("--seed", e->seed, "of --fuzz-ticks")->needs(ticks)->capture_default_str();
+  sub->callback([c, e, &status] {
+    e->scene = c->scene;
+    e->json = c->json;
+    status = e->table || e->fuzz_ticks > 0 ? hybrid::extremes(*e) : hybrid::stability(*c);
+  });
 }
 
 void add_view(CLI::App& app, int& status) {
@@ -125,6 +166,7 @@ void add_view(CLI::App& app, int& status) {
   sub->add_option("SCENE", c->scene, "scene file (.toml)")->required();
   sub->add_option("--frames", c->frames, "close after this many frames")->check(CLI::PositiveNumber);
   sub->add_option("--out", c->out, "write each frame as PNG into this folder");
+  add_device(*sub, c->device);
   sub->add_option("--drag", c->drag, "drag the tool along a CSV (t_s, x_m, y_m, z_m) instead of the mouse");
   sub->callback([c, &status] { status = hybrid::view(*c); });
 }
@@ -139,6 +181,7 @@ int main(int argc, char** argv) {
   add_run(app, status);
   add_replay(app, status);
   add_check(app, status);
+  add_devices(app, status);
   add_compare(app, status);
   add_bench(app, status);
   add_stability(app, status);

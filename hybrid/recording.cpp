@@ -12,20 +12,20 @@
 namespace hybrid {
 namespace {
 
-// Layout, little-endian: magic, sizes of path and text, tick count, dt, state hash, path, text, ticks of (x,
-// y, z, hash).
-constexpr std::array<char, 8> kMagic{'h', 'y', 'b', 'r', 'i', 'd', 'R', '1'};
+// Layout, little-endian: magic, sizes of path and text, tick count, dt, the device's greatest force,
+// resolution and friction, state hash, path, text, ticks of (x, y, z, hash, fault of the device).
+constexpr std::array<char, 8> kMagic{'h', 'y', 'b', 'r', 'i', 'd', 'R', '2'};
 struct Header {
   std::array<char, 8> magic;
   std::uint64_t path_bytes, text_bytes, ticks;
-  double dt_s;
+  double dt_s, max_force_N, resolution_m, friction_N;
   std::uint64_t state_hash;
 };
 struct Tick {
   std::array<double, 3> position;
-  std::uint64_t hash;
+  std::uint64_t hash, fault;
 };
-static_assert(sizeof(Header) == 48 && sizeof(Tick) == 32, "the file's layout has no padding");
+static_assert(sizeof(Header) == 72 && sizeof(Tick) == 40, "the file's layout has no padding");
 
 std::string read_text(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
@@ -39,14 +39,20 @@ std::string read_text(const std::filesystem::path& file) {
 void save_recording(const std::filesystem::path& file, const Recording& recording) {
   std::ofstream out(file, std::ios::binary);
   const std::string path = recording.scene_file.string();
-  const Header header{
-      kMagic,         path.size(),         recording.scene_text.size(), recording.ticks.size(),
-      recording.dt_s, recording.state_hash};
+  const Header header{kMagic,
+                      path.size(),
+                      recording.scene_text.size(),
+                      recording.ticks.size(),
+                      recording.dt_s,
+                      recording.device.max_force_N,
+                      recording.device.resolution_m,
+                      recording.device.friction_N,
+                      recording.state_hash};
   out.write(reinterpret_cast<const char*>(&header), sizeof header);
   out.write(path.data(), static_cast<std::streamsize>(path.size()));
   out.write(recording.scene_text.data(), static_cast<std::streamsize>(recording.scene_text.size()));
   for (const RecordedTick& t : recording.ticks) {
-    const Tick tick{{t.device_m.x, t.device_m.y, t.device_m.z}, t.hash};
+    const Tick tick{{t.device_m.x, t.device_m.y, t.device_m.z}, t.hash, static_cast<std::uint64_t>(t.fault)};
     out.write(reinterpret_cast<const char*>(&tick), sizeof tick);
   }
   out.flush();
@@ -73,7 +79,9 @@ Recording load_recording(const std::filesystem::path& file) {
   const bool sane =
       header.path_bytes <= size && header.text_bytes <= size && header.ticks <= size / sizeof(Tick) &&
       sizeof header + header.path_bytes + header.text_bytes + header.ticks * sizeof(Tick) == size &&
-      header.dt_s > 0.0 && std::isfinite(header.dt_s);
+      header.dt_s > 0.0 && std::isfinite(header.dt_s) && header.max_force_N >= 0.0 &&
+      header.resolution_m >= 0.0 && std::isfinite(header.resolution_m) && header.friction_N >= 0.0 &&
+      std::isfinite(header.friction_N);
   if (!sane)
     throw std::runtime_error(
         fmt::format("{}: truncated or damaged ({} bytes); copy it again", file.string(), size));
@@ -84,12 +92,17 @@ Recording load_recording(const std::filesystem::path& file) {
   in.read(recording.scene_text.data(), static_cast<std::streamsize>(header.text_bytes));
   recording.scene_file = path;
   recording.dt_s = header.dt_s;
+  recording.device.max_force_N = header.max_force_N;
+  recording.device.resolution_m = header.resolution_m;
+  recording.device.friction_N = header.friction_N;
   recording.state_hash = header.state_hash;
   recording.ticks.resize(header.ticks);
   for (RecordedTick& t : recording.ticks) {
     Tick tick{};
     in.read(reinterpret_cast<char*>(&tick), sizeof tick);
-    t = {{tick.position[0], tick.position[1], tick.position[2]}, tick.hash};
+    t = {{tick.position[0], tick.position[1], tick.position[2]},
+         tick.hash,
+         static_cast<device::DeviceFault>(tick.fault)};
   }
   if (!in) throw std::runtime_error(fmt::format("{}: could not be read to its end", file.string()));
   return recording;
@@ -103,7 +116,9 @@ ReplayResult replay(const Recording& recording, const Progress& progress) {
                     "or record again",
                     recording.scene_file.string()));
   }
-  const Scene scene = load_scene(recording.scene_file);
+  Scene scene = load_scene(recording.scene_file);
+  scene.opened_limits = recording.device;  // it may have been felt with one that is not here now
+  if (1.0 / scene.rate_hz != recording.dt_s) scene.rate_hz = 1.0 / recording.dt_s;  // its driver's
   const BuiltScene built = build_scene(scene, progress);
   ReplayResult result;
   result.ticks = recording.ticks.size();
@@ -113,7 +128,8 @@ ReplayResult replay(const Recording& recording, const Progress& progress) {
   begin_session(scene, *built.world, *built.state, recording.ticks.front().device_m);
   std::uint64_t hash = 0xCBF29CE484222325ULL;
   for (std::size_t n = 0; n < recording.ticks.size(); ++n) {
-    const device::DeviceState input{.position_m = recording.ticks[n].device_m};
+    const device::DeviceState input{.position_m = recording.ticks[n].device_m,
+                                    .fault = recording.ticks[n].fault};
     hash = hash_tick(hash, haptic_tick(*built.world, *built.state, input, recording.dt_s));
     if (hash == recording.ticks[n].hash || !result.equal) continue;
     result.equal = false;

@@ -15,7 +15,8 @@ struct Recording {
   std::filesystem::path scene_file;  // where the scene was; replay reads it again from there
   std::string scene_text;            // as it was, so that a changed scene is noticed
   double dt_s = 1e-3;
-  std::uint64_t state_hash = 0;  // after the last tick
+  device::DeviceLimits device{};  // that it was felt with
+  std::uint64_t state_hash = 0;   // after the last tick
   std::vector<RecordedTick> ticks;
 };
 

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
@@ -56,6 +57,53 @@ std::vector<ObjectRow> object_rows(const BuiltScene& built, const SessionResult&
     rows[o].max_force_N = result.object_max_force_N[o];
   }
   return rows;
+}
+
+// What the controller took away, over the ticks in which there was a force to take from.
+double rms_taken_N(const device::PassivityState& passive) {
+  return passive.felt > 0 ? std::sqrt(passive.taken_sum_N2 / static_cast<double>(passive.felt)) : 0.0;
+}
+
+nlohmann::ordered_json safety_json(const Scene& scene, const BuiltScene& built) {
+  const device::ForceLimitState& limit = built.state->limit;
+  nlohmann::ordered_json j{{"nonfinite", limit.nonfinite}, {"clamped", limit.clamped},
+                           {"slewed", limit.slewed},       {"late", limit.late},
+                           {"lost", limit.lost},           {"energy_limited", limit.energy_limited}};
+  j["passivity"] = nullptr;
+  if (!built.world->passivity) return j;
+  const device::PassivityState& passive = built.state->passive;
+  j["passivity"] = {{"acted_ticks", passive.acted},
+                    {"felt_ticks", passive.felt},
+                    {"taken_rms_N", rms_taken_N(passive)},
+                    {"taken_max_N", passive.most_taken_N},
+                    {"taken_max_jnd", passive.most_taken_jnd},
+                    {"jnd_floor_N", jnd_floor_N(scene)},
+                    {"given_max_J", passive.most_given_J},
+                    {"worst_tick_J", passive.worst_tick_J},
+                    {"jumps", passive.jumps}};
+  return j;
+}
+
+std::string safety_words(const BuiltScene& built) {
+  const device::ForceLimitState& limit = built.state->limit;
+  std::string text;
+  if (limit.late + limit.lost + limit.energy_limited > 0) {
+    text += fmt::format(
+        "the motors were let go: in {} ticks that came too late, {} in which the device was not there, {} "
+        "after more "
+        "than {:.3g} J went to the hand within {:.3g} s\n",
+        limit.late, limit.lost, limit.energy_limited, built.world->limits.max_energy_J,
+        built.world->limits.energy_window_s);
+  }
+  if (!built.world->passivity) return text;
+  const device::PassivityState& passive = built.state->passive;
+  text += fmt::format(
+      "passivity: at most {:.3g} mJ given out beyond what was taken in (one tick's worst: {:.3g} mJ); it "
+      "took force in "
+      "{} of {} ticks, {:.3f} N rms, at most {:.3f} N ({:.2f} JND)\n",
+      1e3 * passive.most_given_J, 1e3 * passive.worst_tick_J, passive.acted, passive.felt,
+      rms_taken_N(passive), passive.most_taken_N, passive.most_taken_jnd);
+  return text;
 }
 
 }  // namespace
@@ -117,10 +165,16 @@ nlohmann::ordered_json run_report(const Scene& scene, const BuiltScene& built, S
                  {"reference",
                   measured ? "equilibrium lattice with its limits, at the sampled ticks"
                            : "not measured (no soft contact at a sampled tick, real time, or --samples 0)"}};
+  j["safety"] = safety_json(scene, built);
   j["threads"] = nlohmann::ordered_json::array({{{"name", "main"}, {"share", 1.0}}});
   if (!result.realtime_note.empty()) {
     j["realtime"] = {{"priority", result.realtime_note}, {"late_us", to_json(result.late_us)}};
   }
+  constexpr std::array kEnds{"finished", "stopped", "lost"};
+  j["device"] = {{"name", result.device_name},
+                 {"end", kEnds[static_cast<std::size_t>(result.end)]},
+                 {"messages", result.device_messages}};
+  j["path_notes"] = result.path_notes;
   j["faults"] = fault_texts(built.state->faults);
   j["build_s"] = built.seconds;
   j["load"] = {{"seconds", built.seconds},
@@ -164,6 +218,9 @@ std::string run_summary(const BuiltScene& built, SessionResult& result) {
         result.realtime_note, result.late_us.p50, result.late_us.p99, result.late_us.max,
         result.deadline_misses);
   }
+  text += safety_words(built);
+  for (const std::string& note : result.path_notes) text += fmt::format("path: {}\n", note);
+  for (const std::string& message : result.device_messages) text += fmt::format("device: {}\n", message);
   for (const std::string& fault : fault_texts(built.state->faults)) text += fmt::format("fault: {}\n", fault);
   text += fmt::format("state hash {:016x}\n", result.state_hash);
   return text;

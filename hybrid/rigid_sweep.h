@@ -14,10 +14,10 @@ struct Sweep {
 };
 
 // From `from`, which is feasible, at most `travel` far towards the minimum of (q − target)ᵀ A (q − target)
-// over what can be reached on a way that stays outside and never climbs, until first-order conditions hold or
-// the bound on steps is met. Each step goes straight to the minimum over the planes that separate the
-// elements near from the proxy (polygon::Neighbourhood), made lazily: only those in the way. Fills
-// state.rigid_force_N.
+// over what can be reached on a way that stays outside and climbs over nothing but nearly flat edges, until
+// first-order conditions hold or the bound on steps is met. Each step goes straight to the minimum over the
+// planes that separate the elements near from the proxy (polygon::Neighbourhood), made lazily: only those in
+// the way. Fills state.rigid_force_N.
 Sweep sweep_proxy(const World& world, WorldState& state, const glm::dvec3& from, const glm::dvec3& target,
                   const glm::dmat3& metric, double travel) noexcept;
 
@@ -25,27 +25,5 @@ Sweep sweep_proxy(const World& world, WorldState& state, const glm::dvec3& from,
 // nearest to `target`. Nothing is said of forces, nor of what holds the proxy.
 Sweep sweep_past(const World& world, WorldState& state, std::uint32_t object, bool but,
                  const glm::dvec3& from, const glm::dvec3& target) noexcept;
-
-// True when the map says that nothing lies between the proxy and `goal`, nor within the tool's reach of
-// `soft_reach_m` on the way; then the proxy is there.
-bool advance_through_free_space(const World& world, WorldState& state, const glm::dvec3& goal,
-                                double soft_reach_m) noexcept;
-
-// Puts the proxy where the device is, or where it can be nearest to it outside everything rigid. False when
-// there is no such place: the session must not start there.
-bool start_proxy(const World& world, WorldState& state, const glm::dvec3& device_m) noexcept;
-
-// Half-spaces of all rigid elements within `radius` of `point`, into state.planes. False when there are too
-// many.
-bool gather_planes(const World& world, WorldState& state, const glm::dvec3& point, double radius) noexcept;
-
-// The rigid part of the tick and nothing else: map, contact, proxy, coupling. What `bench rigid` times.
-struct RigidStep {
-  glm::dvec3 proxy_m{0.0}, force_N{0.0};  // scene frame; the force on the hand, before any limit
-  bool free = false;                      // nothing was near
-  bool arrived = true;                    // false: a bound on the steps ended it
-  std::uint32_t steps = 0, surveys = 0;
-};
-RigidStep step_rigid(const World& world, WorldState& state, const glm::dvec3& device_m, double dt_s) noexcept;
 
 }  // namespace hybrid

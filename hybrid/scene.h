@@ -179,6 +179,14 @@ struct Tool {
   double stiffness_N_per_m = 1000.0;  // of the virtual coupling
 };
 
+// A real PHANToM, by its driver's library.
+struct RealDevice {
+  std::string name;  // as the driver knows it; empty: its default
+  std::optional<double> scale =
+      1.0;  // scene meters a meter of the hand; empty: as the scene needs, 1 or more
+  SourcePlace place;
+};
+
 enum class Overlap : std::uint8_t { carve, refuse };
 
 struct Scene {
@@ -193,19 +201,37 @@ struct Scene {
   std::vector<SoftDescription> soft;
   std::map<std::string, Material> materials;
   Tool tool;
-  device::DeviceModel device_model = device::DeviceModel::premium_1_5;
+  device::DeviceModel device_model = device::DeviceModel::premium_1_5;  // simulated, unless:
+  std::optional<RealDevice> real_device;
+  std::optional<device::DeviceLimits> opened_limits;  // of a real device that is open; else the model's
   double rate_hz = 1000.0;
+  int delay_ticks = 0;               // of a simulated device, with
+  std::optional<double> watchdog_s;  // this and
+  device::HandTremor tremor;         // this of its hand
   device::HandModel hand;
   device::PathDescription path;
   SourcePlace path_place;
-  device::ForceLimits safety;
-  bool max_force_given = false;  // else the device's own limit holds
+  device::ForceLimits safety;     // of its deadline, deadline_periods counts
+  bool max_force_given = false;   // else the device's own limit holds
+  bool max_energy_given = false;  // else an ideal device has no limit: its motion is no answer to a force
+  double deadline_periods = 10.0;
+  bool passivity = false;
 };
 
 // The largest lattice that a soft object may have on this machine: what building it takes for each voxel of
 // the bounding box (labels, surface, the copies made on the way), within the physical memory.
 inline constexpr std::size_t lattice_bytes_per_voxel = 16;
 std::size_t max_lattice_voxels();
+
+// Whether the scene's device is where its path is, whatever the force.
+inline bool is_ideal(const Scene& scene) {
+  return !scene.real_device && scene.device_model == device::DeviceModel::ideal;
+}
+
+// What the scene's device bears and resolves.
+inline device::DeviceLimits scene_limits(const Scene& scene) {
+  return scene.opened_limits.value_or(device::device_limits(scene.device_model));
+}
 
 // Reads and checks a scene file. Nothing outside the file is opened except to see that it exists.
 // Throws SceneError.

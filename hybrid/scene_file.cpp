@@ -26,15 +26,12 @@ constexpr LaterKey material_later[] = {
     {"density", "remove it: tissue has no mass here"},
 };
 constexpr LaterKey device_later[] = {
-    {"delay", "remove it: the simulated device has none for now"},
+    {"delay", "say it in ticks: delay_ticks = 1"},
+    {"watchdog", "say it in ms: watchdog_ms = 20"},
 };
 constexpr LaterKey models_later[] = {
-    {"phantom", "use model = \"premium-1.5\" or \"touch\", the simulated ones"},
     {"mouse", "use model = \"ideal\" and a [path]"},
     {"replay", "use [path] kind = \"csv\" to follow a recorded motion"},
-};
-constexpr LaterKey safety_later[] = {
-    {"passivity", "remove it: keep [tool] stiffness low enough for the device instead"},
 };
 constexpr LaterKey tool_later[] = {
     {"damping", "remove it: the coupling has no damping for now"},
@@ -105,32 +102,77 @@ Tool read_tool(const TableReader& table) {
   return out;
 }
 
+RealDevice read_real_device(const TableReader& table) {
+  RealDevice out;
+  out.place = table.place_of("model");
+  if (table.has("name")) out.name = table.text("name", "\"Default Device\"");
+  const TreeEntry* scale = table.find("scale");
+  if (scale != nullptr && scale->value.kind == TreeNode::Kind::string) {
+    static constexpr std::string_view words_for_it[] = {"fit"};
+    (void)table.choice("scale", words_for_it);
+    out.scale.reset();
+  } else {
+    const Quantity ratio{"a ratio above 0, or \"fit\"", "1", 1.0, 1e-3, 1e3};
+    out.scale = table.number("scale", ratio, out.scale);
+  }
+  return out;
+}
+
 void read_device(const TableReader& table, Scene& scene) {
-  static constexpr std::string_view keys[] = {"model", "rate"};
-  static constexpr std::string_view names[] = {"ideal", "premium-1.5", "touch"};
+  static constexpr std::string_view keys[] = {"model", "rate", "name", "scale", "delay_ticks", "watchdog_ms"};
+  static constexpr std::string_view of_simulated[] = {"delay_ticks", "watchdog_ms"};
+  static constexpr std::string_view of_real[] = {"name", "scale"};
+  static constexpr std::string_view names[] = {"ideal", "premium-1.5", "touch", "phantom"};
   static constexpr device::DeviceModel models[] = {
       device::DeviceModel::ideal, device::DeviceModel::premium_1_5, device::DeviceModel::touch};
   table.allow(keys, device_later);
-  if (table.has("model")) scene.device_model = models[table.choice("model", names, {}, models_later)];
+  if (table.has("model")) {
+    const std::size_t model = table.choice("model", names, {}, models_later);
+    if (model < std::size(models)) {
+      scene.device_model = models[model];
+    } else {
+      scene.real_device = read_real_device(table);
+    }
+  }
+  const auto refuse_where_without_meaning = [&](std::span<const std::string_view> unused, const char* model) {
+    for (const std::string_view key : unused) {
+      if (!table.has(key)) continue;
+      table.refuse(key, words("'", key, "' has no meaning with ", model), "remove it, or change the model");
+    }
+  };
+  if (!scene.real_device) refuse_where_without_meaning(of_real, "a simulated model");
+  if (scene.real_device) refuse_where_without_meaning(of_simulated, "a real device: it has its own");
+  if (is_ideal(scene)) refuse_where_without_meaning(of_simulated, "the ideal device, which no force moves");
   const Quantity rate{"a servo rate in Hz", "1000", 1.0, 100.0, 20'000.0};
   scene.rate_hz = table.number("rate", rate, scene.rate_hz);
+  scene.delay_ticks = static_cast<int>(table.integer("delay_ticks", 0, device::kMaxDelayTicks, 0));
+  if (table.has("watchdog_ms"))
+    scene.watchdog_s = table.number("watchdog_ms", {"a time above 0 in ms", "20", 1e-3, 1e-6, 3600.0});
 }
 
-device::HandModel read_hand(const TableReader& table) {
-  static constexpr std::string_view keys[] = {"mass", "damping", "stiffness"};
+device::HandModel read_hand(const TableReader& table, Scene& scene) {
+  static constexpr std::string_view keys[] = {"grip",      "mass",      "damping",
+                                              "stiffness", "tremor_mm", "tremor_hz"};
+  static constexpr std::string_view names[] = {"loose", "medium", "firm"};
+  static constexpr device::Grip grips[] = {device::Grip::loose, device::Grip::medium, device::Grip::firm};
   table.allow(keys);
-  device::HandModel out;
+  device::HandModel out = device::hand_of(grips[table.choice("grip", names, 1)]);
   out.mass_kg = table.number("mass", {"a mass above 0 in kg", "0.006", 1.0, 1e-6, 1e3}, out.mass_kg);
   out.damping_N_s_per_m =
       table.number("damping", {"a damping in N s/m, 0 or more", "5", 1.0, 0.0, 1e6}, out.damping_N_s_per_m);
   out.stiffness_N_per_m =
       table.number("stiffness", {"a stiffness above 0 in N/m", "600", 1.0, 1e-6, 1e9}, out.stiffness_N_per_m);
+  scene.tremor.amplitude_m =
+      table.number("tremor_mm", {"an amplitude in mm, 0 or more", "0.1", 1e-3, 0.0, 0.1}, 0.0);
+  scene.tremor.frequency_hz = table.number("tremor_hz", {"a frequency above 0 in Hz", "10", 1.0, 1e-3, 100.0},
+                                           scene.tremor.frequency_hz);
   return out;
 }
 
 void read_safety(const TableReader& table, Scene& scene) {
-  static constexpr std::string_view keys[] = {"max_force", "max_slew", "soft_start"};
-  table.allow(keys, safety_later);
+  static constexpr std::string_view keys[] = {"max_force",  "max_slew",      "soft_start", "deadline_periods",
+                                              "max_energy", "energy_window", "passivity"};
+  table.allow(keys);
   device::ForceLimits& out = scene.safety;
   out.max_force_N =
       table.number("max_force", {"a force above 0 in N", "8.5", 1.0, 1e-6, 1e4}, out.max_force_N);
@@ -139,6 +181,19 @@ void read_safety(const TableReader& table, Scene& scene) {
   out.soft_start_s =
       table.number("soft_start", {"a time in s, 0 or more", "0.05", 1.0, 0.0, 3600.0}, out.soft_start_s);
   scene.max_force_given = table.has("max_force");
+  scene.deadline_periods =
+      table.number("deadline_periods", {"periods of the servo rate, above 1", "10", 1.0, 1.001, 1e6},
+                   scene.deadline_periods);
+  out.max_energy_J =
+      table.number("max_energy", {"an energy above 0 in J", "0.5", 1.0, 1e-9, 1e9}, out.max_energy_J);
+  scene.max_energy_given = table.has("max_energy");
+  out.energy_window_s =
+      table.number("energy_window", {"a time above 0 in s", "0.1", 1.0, 1e-3, 3600.0}, out.energy_window_s);
+  scene.passivity = table.boolean("passivity", false);
+  if (scene.passivity && is_ideal(scene)) {
+    table.refuse("passivity", "'passivity' has no meaning with the ideal device, which no force moves",
+                 "remove it, or use [device] model = \"premium-1.5\" or \"touch\"");
+  }
 }
 
 void read_stretch(const TableReader& table, Material& out) {
@@ -295,7 +350,7 @@ Scene read_scene(const std::filesystem::path& file) {
     tool_radius = table.place_of("radius");
   });
   read_once(root, "device", [&](const TableReader& table) { read_device(table, scene); });
-  read_once(root, "hand", [&](const TableReader& table) { scene.hand = read_hand(table); });
+  read_once(root, "hand", [&](const TableReader& table) { scene.hand = read_hand(table, scene); });
   read_once(root, "safety", [&](const TableReader& table) { read_safety(table, scene); });
   read_once(root, "material", [&](const TableReader& table) { read_materials(table, scene); });
   read_objects(source, root, scene);

@@ -10,14 +10,15 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "device/servo_timer.h"
 #include "device/simulated.h"
-#include "hybrid/rigid_sweep.h"
+#include "hybrid/rigid_step.h"
 
 namespace hybrid {
 namespace {
 
 constexpr double kAfterPath_s = 0.5;
+constexpr double kWithHand_s = 60.0;             // a real device has no path that ends
+constexpr unsigned int kFlushAndZero = 0x8040U;  // FTZ and DAZ
 constexpr double kJndFloor_N = 0.04;
 constexpr std::uint64_t kMomentEvery = 20;  // ticks between two looks for a more telling moment
 constexpr int kSettleTicks = 1200;          // of equilibrium_force(), and
@@ -35,16 +36,6 @@ std::uint64_t mix(std::uint64_t hash, const glm::dvec3& v) noexcept {
 std::uint64_t mix(std::uint64_t hash, const glm::dquat& q) noexcept {
   for (const double x : {q.w, q.x, q.y, q.z}) hash = mix(hash, std::bit_cast<std::uint64_t>(x));
   return hash;
-}
-
-// The state again, sharing nothing that moves.
-std::unique_ptr<WorldState> copy_state(const World& world, const WorldState& state) {
-  auto copy = std::make_unique<WorldState>(world, OccupancyMap(state.map));
-  for (const auto& object : state.soft) copy->soft.push_back(object->copy());
-  copy->prepare(world);
-  copy->map.reserve_bricks(1024);
-  static_cast<CarriedState&>(*copy) = static_cast<const CarriedState&>(state);
-  return copy;
 }
 
 // How much a moment says about the scene: different objects felt at once first, then force.
@@ -87,10 +78,16 @@ class Run {
         world_(*built.world),
         state_(*built.state),
         options_(options),
-        path_(later(scene_path(scene), static_cast<double>(options.start_ticks) / scene.rate_hz)),
-        device_(scene_device(scene, path_)),
+        path_(later(options.path ? options.path : scene_path(scene),
+                    static_cast<double>(options.start_ticks) / scene.rate_hz)),
+        simulated_(options.real_device == nullptr ? scene_device(scene, path_) : nullptr),
+        device_(options.real_device == nullptr ? *simulated_ : *options.real_device),
+        realtime_(options.realtime || options.real_device != nullptr),
         dt_(1.0 / scene.rate_hz) {
-    const double seconds = options.seconds.value_or(path_->duration_s() + kAfterPath_s);
+    const double usual = options.real_device == nullptr ? path_->duration_s() + kAfterPath_s : kWithHand_s;
+    const double seconds = options.seconds.value_or(usual);
+    result_.device_name = device_.name();
+    result_.path_notes = path_->notes();
     ticks_ = static_cast<std::uint64_t>(std::llround(seconds * scene.rate_hz));
     result_.dt_s = dt_;
     if (options.keep_recording) result_.recording.reserve(ticks_);
@@ -105,47 +102,34 @@ class Run {
   SessionResult go() {
     flush_denormals();
     start_clocks();
-    begin_session(scene_, world_, state_, device_->read().position_m);
-    std::optional<device::ServoTimer> timer;
-    TimeSpread late;
-    if (options_.realtime) {
-      timer.emplace(dt_);
-      result_.realtime_note = timer->raise_priority();
+    begin_session(scene_, world_, state_, device_.read().position_m);
+    if (options_.reference_samples > 0 && !realtime_) {
+      sample_every_ =
+          std::max<std::uint64_t>(1, ticks_ / static_cast<std::uint64_t>(2 * options_.reference_samples));
     }
-    const std::uint64_t sample_every =
-        options_.reference_samples > 0 && !options_.realtime
-            ? std::max<std::uint64_t>(1, ticks_ / static_cast<std::uint64_t>(2 * options_.reference_samples))
-            : 0;
-    auto said = std::chrono::steady_clock::now();
-    for (std::uint64_t tick = 0; tick < ticks_; ++tick) {
-      if (timer) late.add(timer->wait() * 1e6);
-      const TickResult felt = haptic_tick(world_, state_, device_->read(), dt_);
-      device_->write(felt.force_N, dt_);
-      keep(felt, tick);
-      if (sample_every != 0 && result_.error.samples < options_.reference_samples) sample(felt, sample_every);
-      if (timer) continue;  // nothing that could make the next tick late
-      if (options_.keep_picture && tick % kMomentEvery == 0) look(felt, tick);
-      if (options_.progress && tick % 64 == 0 &&
-          std::chrono::steady_clock::now() - said > std::chrono::milliseconds(500)) {
-        said = std::chrono::steady_clock::now();
-        options_.progress(fmt::format("tick {} of {} ({:.0f} %)", tick, ticks_,
-                                      100.0 * static_cast<double>(tick) / static_cast<double>(ticks_)));
-      }
+    auto tick = [this](const device::ServoInput& input) { return answer(input); };
+    device::ServoReport served;
+    if (ticks_ > 0) {
+      served = device::run_servo(
+          device_, {.rate_hz = scene_.rate_hz, .realtime = realtime_, .deadline_s = world_.limits.deadline_s},
+          tick);
     }
-    device_->write(glm::dvec3(0.0), dt_);
     if (options_.keep_picture && !result_.moment) {
       TickResult last;
       last.device_m = state_.device_m;
       last.proxy_m = state_.proxy_m;
-      result_.moment = take_snapshot(world_, state_, last, static_cast<double>(ticks_) * dt_);
+      result_.moment = take_snapshot(world_, state_, last, static_cast<double>(ticks_done_) * dt_);
     }
-    if (timer) {
-      result_.deadline_misses = timer->missed();
-      result_.late_us = late.percentiles();
+    if (realtime_) {
+      result_.realtime_note = served.priority;
+      result_.deadline_misses = served.late_ticks;
+      result_.late_us = late_us_.percentiles();
     }
-    result_.ticks = ticks_;
+    result_.end = served.end;
+    result_.device_messages = std::move(served.messages);
+    result_.ticks = ticks_done_;
     result_.state_hash = hash_state(hash_, state_);
-    if (ticks_ > 0) result_.rms_force_N = std::sqrt(sum_force2_ / static_cast<double>(ticks_));
+    if (ticks_done_ > 0) result_.rms_force_N = std::sqrt(sum_force2_ / static_cast<double>(ticks_done_));
     if (result_.error.samples > 0)
       result_.error.rms_N = std::sqrt(result_.error.rms_N / result_.error.samples);
     return std::move(result_);
@@ -155,16 +139,42 @@ class Run {
   void start_clocks() {
     if (options_.start_ticks == 0) return;
     const double now_s = static_cast<double>(options_.start_ticks) * dt_;
-    device_->hold(now_s);
+    device_.hold(now_s);
     state_.tick = options_.start_ticks;
     state_.clock = device::Clock(now_s);
     state_.limit.elapsed_s = now_s;
     state_.limit.clamped = state_.limit.slewed = state_.truncated_ticks = options_.start_ticks;
   }
 
-  void keep(const TickResult& felt, std::uint64_t tick) {
+  // On the driver's thread where the device has one. In real time nothing may make the next tick late: no
+  // allocation (every column has its room), no look for a picture, no reference.
+  device::ServoAnswer answer(const device::ServoInput& input) {
+    const FlushedDenormals flushed;
+    const std::uint64_t tick = ticks_done_++;
+    const TickResult felt = haptic_tick(world_, state_, input.device, dt_);
+    keep(felt, tick, input.device.fault);
+    if (realtime_) {
+      late_us_.add(input.late_s * 1e6);
+    } else {
+      if (sample_every_ != 0 && result_.error.samples < options_.reference_samples)
+        sample(felt, sample_every_);
+      if (options_.keep_picture && tick % kMomentEvery == 0) look(felt, tick);
+      if (options_.progress && tick % 64 == 0) say_progress(tick);
+    }
+    return {.force_N = felt.force_N, .go_on = ticks_done_ < ticks_};
+  }
+
+  void say_progress(std::uint64_t tick) {
+    const auto now = std::chrono::steady_clock::now();
+    if (now - said_ <= std::chrono::milliseconds(500)) return;
+    said_ = now;
+    options_.progress(fmt::format("tick {} of {} ({:.0f} %)", tick, ticks_,
+                                  100.0 * static_cast<double>(tick) / static_cast<double>(ticks_)));
+  }
+
+  void keep(const TickResult& felt, std::uint64_t tick, device::DeviceFault fault) {
     hash_ = hash_tick(hash_, felt);
-    if (options_.keep_recording) result_.recording.push_back({felt.device_m, hash_});
+    if (options_.keep_recording) result_.recording.push_back({felt.device_m, hash_, fault});
     result_.tick_us.add(felt.tick_us);
     for (std::size_t s = 0; s < kStages; ++s) result_.stage_us[s].add(static_cast<double>(felt.stage_us[s]));
     const double force = glm::length(felt.force_N);
@@ -211,9 +221,14 @@ class Run {
   WorldState& state_;
   const SessionOptions& options_;
   std::shared_ptr<const device::Path> path_;
-  std::unique_ptr<device::HapticDevice> device_;
+  std::unique_ptr<device::HapticDevice> simulated_;
+  device::HapticDevice& device_;
+  bool realtime_;
   double dt_;
-  std::uint64_t ticks_ = 0, soft_ticks_ = 0, hash_ = 0xCBF29CE484222325ULL;
+  TimeSpread late_us_;
+  std::chrono::steady_clock::time_point said_ = std::chrono::steady_clock::now();
+  std::uint64_t ticks_ = 0, ticks_done_ = 0, sample_every_ = 0, soft_ticks_ = 0,
+                hash_ = 0xCBF29CE484222325ULL;
   double sum_force2_ = 0.0, best_ = 0.0;
   SessionResult result_;
 };
@@ -240,7 +255,14 @@ std::shared_ptr<const device::Path> scene_path(const Scene& scene) {
 
 std::unique_ptr<device::HapticDevice> scene_device(const Scene& scene,
                                                    std::shared_ptr<const device::Path> path) {
-  return device::make_simulated_device(scene.device_model, scene.hand, std::move(path));
+  if (scene.device_model == device::DeviceModel::ideal)
+    return device::make_simulated_device(scene.device_model, scene.hand, std::move(path));
+  return device::make_simulated_device({.mechanism = device::mechanism(scene.device_model),
+                                        .hand = scene.hand,
+                                        .tremor = scene.tremor,
+                                        .delay_ticks = scene.delay_ticks,
+                                        .watchdog_s = scene.watchdog_s},
+                                       std::move(path));
 }
 
 void begin_session(const Scene& scene, const World& world, WorldState& state, const glm::dvec3& device_m) {
@@ -261,7 +283,10 @@ std::uint64_t hash_tick(std::uint64_t before, const TickResult& tick) noexcept {
 }
 
 std::uint64_t hash_state(std::uint64_t before, const WorldState& state) noexcept {
-  std::uint64_t hash = before;
+  std::uint64_t hash = mix(before, state.limit.last_N);
+  for (const double x : {state.limit.elapsed_s, state.limit.handed.sum_J(), state.passive.given_J,
+                         state.passive.worst_tick_J, state.passive.stride_m, state.passive.share})
+    hash = mix(hash, std::bit_cast<std::uint64_t>(x));
   for (const RigidNear& body : state.rigid) {
     hash = mix(mix(hash, body.pose.position_m), body.pose.rotation);
     hash = mix(mix(hash, body.free.centre_m), body.free.rotation);
@@ -289,6 +314,15 @@ Snapshot take_snapshot(const World& world, const WorldState& state, const TickRe
   return snapshot;
 }
 
+std::unique_ptr<WorldState> copy_state(const World& world, const WorldState& state) {
+  auto copy = std::make_unique<WorldState>(world, OccupancyMap(state.map));
+  for (const auto& object : state.soft) copy->soft.push_back(object->copy());
+  copy->prepare(world);
+  copy->map.reserve_bricks(1024);
+  static_cast<CarriedState&>(*copy) = static_cast<const CarriedState&>(state);
+  return copy;
+}
+
 std::optional<glm::dvec3> equilibrium_force(const World& world, const WorldState& state, double tolerance_N) {
   const std::unique_ptr<WorldState> copy = copy_state(world, state);
   // The same physics with a generous budget: only how soon it settles may differ, not where.
@@ -312,11 +346,19 @@ double jnd_of(const glm::dvec3& force, const glm::dvec3& reference, double floor
 }
 
 double jnd_floor_N(const Scene& scene) {
-  return std::max(kJndFloor_N, device::device_limits(scene.device_model).friction_N);
+  return std::max(kJndFloor_N, scene_limits(scene).friction_N);
 }
 
 void flush_denormals() noexcept {
-  _mm_setcsr(_mm_getcsr() | 0x8040U);  // FTZ and DAZ
+  _mm_setcsr(_mm_getcsr() | kFlushAndZero);
+}
+
+FlushedDenormals::FlushedDenormals() noexcept : before_(_mm_getcsr()) {
+  flush_denormals();
+}
+
+FlushedDenormals::~FlushedDenormals() {
+  _mm_setcsr(before_);
 }
 
 }  // namespace hybrid

@@ -11,6 +11,7 @@
 
 #include "device/haptic_device.h"
 #include "device/path.h"
+#include "device/servo_loop.h"
 #include "hybrid/build.h"
 #include "hybrid/tick.h"
 #include "hybrid/time_spread.h"
@@ -24,19 +25,24 @@ Percentiles percentiles(std::vector<double>& values);
 struct RecordedTick {
   glm::dvec3 device_m{0.0};
   std::uint64_t hash = 0;
+  device::DeviceFault fault = device::DeviceFault::none;
 };
 
 struct SessionOptions {
-  std::optional<double> seconds;  // default: the path's length and half a second
+  std::optional<double> seconds;  // default: the path's length and half a second; a real device: a minute
   bool realtime = false;          // paced by a real timer; else fixed-step, as fast as it goes
-  bool keep_rows = true;          // trace rows and per-object forces
-  bool keep_recording = true;     // every input, 32 bytes a tick: without it and the rows memory stays flat
-  bool keep_picture = false;      // remember the most telling moment
-  int reference_samples = 0;      // how often the force is compared with its equilibrium; 0 in real time
+  // A real one, open, placed in the scene and out of anything rigid; always in real time. None: the scene's
+  // simulated one.
+  device::HapticDevice* real_device = nullptr;
+  bool keep_rows = true;       // trace rows and per-object forces
+  bool keep_recording = true;  // every input, 32 bytes a tick: without it and the rows memory stays flat
+  bool keep_picture = false;   // remember the most telling moment
+  int reference_samples = 0;   // how often the force is compared with its equilibrium; 0 in real time
   // Clocks and counters begin as after so many ticks, and the path so much later; nothing felt may differ. (A
   // soft start is over by then.)
   std::uint64_t start_ticks = 0;
   Progress progress;
+  std::shared_ptr<const device::Path> path{};  // of the hand, in place of the scene's
 };
 
 struct ForceError {  // of the tick's force against the equilibrium lattice with its limits, at the sampled
@@ -59,8 +65,12 @@ struct SessionResult {
   ForceError error;
   std::optional<Snapshot> moment;       // of keep_picture
   std::vector<RecordedTick> recording;  // of keep_recording
-  std::string realtime_note;            // what priority was granted
-  Percentiles late_us;                  // how late the machine woke the loop; not part of the tick
+  std::string device_name;
+  device::ServoEnd end = device::ServoEnd::finished;
+  std::vector<std::string> device_messages;  // what happened to the device, and what to do about it
+  std::vector<std::string> path_notes;       // what the path's reader noticed: gaps, repeated times
+  std::string realtime_note;                 // what priority was granted
+  Percentiles late_us;                       // how late the machine woke the loop; not part of the tick
 };
 
 // Runs the scene's path to its end on its device. Throws SceneError: the tool starts inside something rigid.
@@ -73,13 +83,16 @@ std::unique_ptr<device::HapticDevice> scene_device(const Scene& scene,
 // Starts the proxy or throws SceneError.
 void begin_session(const Scene& scene, const World& world, WorldState& state, const glm::dvec3& device_m);
 
-// Hashes. The running one takes what is felt, the final one also every displacement, and where every rigid
-// body is and how it moves.
+// Hashes. The running one takes what is felt, the final one also every displacement, where every rigid
+// body is and how it moves, and what the limits on the force remember.
 std::uint64_t hash_tick(std::uint64_t before, const TickResult& tick) noexcept;
 std::uint64_t hash_state(std::uint64_t before, const WorldState& state) noexcept;
 
 // A snapshot of now.
 Snapshot take_snapshot(const World& world, const WorldState& state, const TickResult& tick, double t_s);
+
+// The state again, sharing nothing that moves.
+std::unique_ptr<WorldState> copy_state(const World& world, const WorldState& state);
 
 // The force that the present device position would be answered with once everything soft has come to rest
 // (N), found on a copy of the state, until it changes by less than `tolerance_N` over dozens of whole
@@ -95,5 +108,18 @@ double jnd_floor_N(const Scene& scene);
 
 // Flush-to-zero on the calling thread: denormals would cost a tick its time.
 void flush_denormals() noexcept;
+// The same while it lives: on a thread that is the driver's.
+class FlushedDenormals {
+ public:
+  FlushedDenormals() noexcept;
+  ~FlushedDenormals();
+  FlushedDenormals(const FlushedDenormals&) = delete;
+  FlushedDenormals& operator=(const FlushedDenormals&) = delete;
+  FlushedDenormals(FlushedDenormals&&) = delete;
+  FlushedDenormals& operator=(FlushedDenormals&&) = delete;
+
+ private:
+  unsigned int before_;
+};
 
 }  // namespace hybrid

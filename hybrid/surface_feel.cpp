@@ -111,8 +111,8 @@ double DepthRate::add(double depth_m, double dt_s, double noise_m) noexcept {
 }
 
 double damping_force(DampingState& state, double normal_N, double depth_m, double damping_N_s_per_m,
-                     double dt_s, double noise_m) noexcept {
-  if (state.touching) {
+                     double dt_s, double noise_m, bool account) noexcept {
+  if (state.touching && account) {
     const double work_J = state.wanted_N * (depth_m - state.depth_m);
     if (state.felt) {
       state.balance_J = state.balance_J * std::max(0.0, 1.0 - dt_s / kDampingMemory_s) + work_J;

@@ -107,8 +107,9 @@ struct DampingState {
 // each time after. So it cannot feed an oscillation, however long the contact; the next contact starts
 // afresh.
 inline constexpr double kDampingMemory_s = 0.05;
+// With `account` false it is felt whatever it gives back, as sampled damping is without such care.
 double damping_force(DampingState& state, double normal_N, double depth_m, double damping_N_s_per_m,
-                     double dt_s, double noise_m) noexcept;
+                     double dt_s, double noise_m, bool account = true) noexcept;
 // Call in every tick without contact.
 inline void end_damping(DampingState& state) noexcept {
   state = DampingState{};

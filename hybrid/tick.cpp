@@ -13,7 +13,7 @@
 #include "hybrid/arbitration.h"
 #include "hybrid/body_stage.h"
 #include "hybrid/feel_stage.h"
-#include "hybrid/rigid_sweep.h"
+#include "hybrid/rigid_step.h"
 #include "hybrid/soft_stage.h"
 
 namespace hybrid {
@@ -185,17 +185,27 @@ Sweep settle_contact(const World& world, WorldState& state, const glm::dvec3& de
   return sweep;
 }
 
+// The last operations on the force, in the order that device/README.md gives reasons for.
+glm::dvec3 make_safe(const World& world, WorldState& state, const glm::dvec3& force_N,
+                     const device::DeviceState& input, double dt_s) noexcept {
+  // Where the tool is said to be; what is no place was taken for the last good one.
+  const device::DeviceState tool{.position_m = state.device_m, .fault = input.fault};
+  const std::uint64_t bad = state.limit.nonfinite;
+  const glm::dvec3 limited = device::limit_force(world.limits, state.limit, force_N, tool, dt_s);
+  state.nonfinite += state.limit.nonfinite - bad;
+  if (!world.passivity) return limited;
+  return device::keep_passive(*world.passivity, state.passive, limited, state.device_m, dt_s);
+}
+
 // The hand feels the coupling and nothing else; its parts, and who is felt, are for the record.
-void publish_force(const World& world, WorldState& state, const Sweep& sweep, double dt_s,
-                   TickResult& result) noexcept {
+void publish_force(const World& world, WorldState& state, const Sweep& sweep,
+                   const device::DeviceState& input, double dt_s, TickResult& result) noexcept {
   const glm::dvec3 coupling = world.tool.stiffness_N_per_m * (state.proxy_m - result.device_m);
   const glm::dvec3 added = added_force(world, state, result.device_m, dt_s);
   result.proxy_m = state.proxy_m;
   result.rigid_N = sweep.force_N + added;
   result.soft_N = coupling - sweep.force_N;
-  const std::uint64_t bad = state.limit.nonfinite;
-  result.force_N = device::limit_force(world.limits, state.limit, coupling + added, dt_s);
-  state.nonfinite += state.limit.nonfinite - bad;
+  result.force_N = make_safe(world, state, coupling + added, input, dt_s);
   for (std::size_t o = 0; o < world.object_count(); ++o) {
     const std::size_t rigid = world.rigid.size();
     const glm::dvec3 force = o < rigid ? state.rigid_force_N[o] : state.reactions[o - rigid].force_N;
@@ -233,7 +243,7 @@ TickResult haptic_tick(const World& world, WorldState& state, const device::Devi
   refresh_map(world, state);
   clock.done(Stage::map);
 
-  publish_force(world, state, sweep, dt_s, result);
+  publish_force(world, state, sweep, input, dt_s, result);
   ++state.tick;
   clock.done(Stage::force);
   clock.stop();

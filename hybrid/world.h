@@ -11,12 +11,14 @@
 #include <glm/gtc/quaternion.hpp>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "device/clock.h"
 #include "device/force_limit.h"
+#include "device/passivity.h"
 #include "hybrid/occupancy.h"
 #include "hybrid/rigid_motion.h"
 #include "hybrid/scene.h"
@@ -89,12 +91,14 @@ struct World {
   std::vector<SoftBody> soft;
   Tool tool;
   device::ForceLimits limits;
+  std::optional<device::PassivityOptions> passivity;  // empty: no controller
   // A point is a ball too, of this radius: 1e-7 of the scene, far above rounding and far below anything felt.
   double skin_m = 0.0;
   double extent_m = 0.0;    // diagonal of all objects' box
   double rounding_m = 0.0;  // what a coordinate of the scene may be off by
   double encoder_m = 0.0;   // what the device's position is rounded to
   bool use_map = true;      // false: every object is asked every time; a baseline to time the map against
+  bool damping_account = true;  // false: sampled damping as it is; a baseline that theory is known for
   // Pairs of soft objects that may meet: {smaller index, larger index}.
   std::vector<std::array<std::uint32_t, 2>> meeting;
 
@@ -167,6 +171,7 @@ struct CarriedState {
   glm::dvec3 proxy_m{0.0};   // scene frame
   glm::dvec3 device_m{0.0};  // last good input
   device::ForceLimitState limit;
+  device::PassivityState passive;
   std::uint64_t tick = 0;
   device::Clock clock;                // simulated, of the bodies' paths
   std::uint64_t nonfinite = 0;        // inputs or forces that were not finite
@@ -205,7 +210,9 @@ struct WorldState : CarriedState {
 
   std::vector<std::unique_ptr<voxel::SoftObject>> soft;  // one a World::soft
   OccupancyMap map;
-  std::span<glm::dvec3> trail;  // for tests: where the steps of the last sweep began
+  // For tests: the corners of the last sweep's way, as many as there is room for.
+  std::span<glm::dvec3> trail;
+  std::size_t trail_count = 0;
 
   // ---- of the current tick ----
   std::vector<ObjectFeel> feel;            // [rigid…, soft…]

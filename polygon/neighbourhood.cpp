@@ -90,7 +90,7 @@ std::span<Neighbourhood::Broken> Neighbourhood::broken(const glm::dvec3& from, c
   std::size_t count = 0;
   for (std::uint32_t i = 0; i < count_; ++i) {
     if (!(depth_[i] > tolerance)) continue;
-    broken_[count++] = {part_before({{x_[i], y_[i], z_[i]}, offset_[i]}, from, to), i, false};
+    broken_[count++] = {part_before(plane(i), from, to), i, false};
   }
   return {broken_.data(), count};
 }

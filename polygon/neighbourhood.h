@@ -70,6 +70,9 @@ class Neighbourhood {
     return room > 0.0 ? room / (room + depth) : 0.0;
   }
 
+  [[nodiscard]] SeparatingPlane plane(std::uint32_t i) const noexcept {
+    return {{x_[i], y_[i], z_[i]}, offset_[i]};
+  }
   void set_plane(std::uint32_t i, const SeparatingPlane& plane) noexcept;
 
   // Makes anew, from `view`, which touches nothing, all planes that say otherwise: when the proxy did not

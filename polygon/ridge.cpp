@@ -40,7 +40,8 @@ const Ridges::Side* nearer_side(const Ridges& ridges, const glm::dvec3& goal) no
   for (std::uint32_t n = 0; n < ridges.count; ++n) {
     const Ridges::Side& side = ridges.sides[n];
     const double there = side.plane.offset - glm::dot(side.plane.normal, goal);
-    if (there >= least || !(depth - there > kHysteresis * side.bend * depth)) continue;
+    // A goal above the side's plane is not held by it.
+    if (!(there > 0.0) || there >= least || !(depth - there > kHysteresis * side.bend * depth)) continue;
     least = there;
     nearest = &side;
   }

@@ -115,7 +115,7 @@ void move_body(benchmark::State& state) {
   OccupancyMap map = moving_balls(static_cast<int>(state.range(0)));
   const double step = 1e-6 * static_cast<double>(state.range(1));  // a tick of 1 ms
   double x = 0.0;
-  for (auto _ : state) {
+  while (state.KeepRunning()) {
     x = std::fmod(x + step, 0.4);
     map.move_body(0, {x, 0.0, 0.0}, dquat(1, 0, 0, 0));
   }
@@ -126,7 +126,7 @@ BENCHMARK(move_body)->ArgsProduct({{1, 50}, {20, 1000}})->ArgNames({"bodies", "m
 void move_by_rasterising(benchmark::State& state) {
   const auto& mesh = ball(static_cast<int>(state.range(0)));
   double x = 0.0;
-  for (auto _ : state) {
+  while (state.KeepRunning()) {
     x = std::fmod(x + 1e-3, 0.4);
     SurfaceCells cells(kCell, dvec3(0.0));
     for (const auto& t : mesh.triangles) {

@@ -9,6 +9,8 @@
 #include <new>
 
 #include "device/force_limit.h"
+#include "device/passivity.h"
+#include "device/phantom_servo.h"
 #include "device/servo_timer.h"
 #include "device/simulated.h"
 
@@ -50,11 +52,13 @@ TEST(DeviceAllocation, ATickOfEveryDeviceAllocatesNothing) {
       const auto device = make_simulated_device(model, {}, device::make_path(description));
       device::ServoTimer timer(1e-5);
       device::ForceLimitState state;
+      device::PassivityState passive;
       const std::size_t before = allocations;
       for (int tick = 0; tick < 1000; ++tick) {
         const device::DeviceState read = device->read();
-        const glm::dvec3 force = limit_force({}, state, -500.0 * read.position_m, 1e-3);
-        device->write(force, 1e-3);
+        const glm::dvec3 force = limit_force({}, state, -500.0 * read.position_m, read, 1e-3);
+        device->write(keep_passive({}, passive, force, read.position_m, 1e-3), 1e-3);
+        device->hold(1e-4);
         (void)device->limits();
         (void)device->name();
         if (tick % 100 == 0) timer.wait();
@@ -62,6 +66,43 @@ TEST(DeviceAllocation, ATickOfEveryDeviceAllocatesNothing) {
       EXPECT_EQ(allocations, before);
     }
   }
+}
+
+// The driver's callback, on a driver that does nothing: with errors, without, and when it ends.
+device::HdFunctions idle_driver() {
+  device::HdFunctions call;
+  call.begin_frame = [](unsigned) {};
+  call.end_frame = [](unsigned) {};
+  call.get_error = [] { return device::hd::ErrorInfo{}; };
+  call.get_booleans = [](unsigned, unsigned char* value) { *value = 1; };
+  call.get_integers = [](unsigned, int* value) { *value = 0; };
+  call.get_doubles = [](unsigned, double* value) { value[0] = value[1] = value[2] = 0.5; };
+  call.set_doubles = [](unsigned, const double*) {};
+  call.check_calibration = [] { return device::hd::kCalibrated; };
+  call.update_calibration = [](unsigned) {};
+  return call;
+}
+
+TEST(DeviceAllocation, ATickOfTheRealDevicesCallbackAllocatesNothing) {
+  int n = 0;
+  auto tick = [&n](const device::ServoInput& input) {
+    return device::ServoAnswer{.force_N = -500.0 * input.device.position_m, .go_on = ++n < 3000};
+  };
+  device::PhantomServo servo(idle_driver(), 1,
+                             {.gate = {},
+                              .clock_ns = []() noexcept { return std::int64_t{1}; },
+                              .fit = {},
+                              .has_safety_switch = true},
+                             tick);
+  const std::size_t before = allocations;
+  for (int i = 0; i < 4000 && !servo.done(); ++i) {
+    if (i == 1000) servo.tell({device::hd::kWarmMotors, 0, 1});
+    if (i == 2000) servo.tell({device::hd::kExceededForce, 0, 1});
+    device::PhantomServo::on_tick(&servo);
+  }
+  EXPECT_EQ(allocations, before);
+  EXPECT_TRUE(servo.done());
+  EXPECT_EQ(servo.report().messages.size(), 2U);
 }
 
 }  // namespace

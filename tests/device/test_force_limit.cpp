@@ -8,6 +8,8 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <random>
+#include <utility>
+#include <vector>
 
 namespace {
 
@@ -146,6 +148,80 @@ TEST(ForceLimit, LimitsThatMakeNoSenseLetNothingThrough) {
     EXPECT_EQ(limit_force({.soft_start_s = 0.0}, state, {1.0, 1.0, 1.0}, bad_dt_s), glm::dvec3(0.0));
     EXPECT_EQ(state.elapsed_s, 0.0);
   }
+}
+
+TEST(ForceLimit, AMissedDeadlineLetsGoAndFadesInAnew) {
+  ForceLimitState state;
+  const ForceLimits limits{
+      .max_force_N = 8.5, .max_slew_N_per_s = kInfinity, .soft_start_s = 0.05, .deadline_s = 5e-3};
+  const glm::dvec3 command(2.0, 0.0, 0.0);
+  for (int tick = 0; tick < 100; ++tick) limit_force(limits, state, command, 1e-3);
+  EXPECT_EQ(limit_force(limits, state, command, 5e-3), command) << "in time to the last";
+  EXPECT_EQ(limit_force(limits, state, command, 5.1e-3), glm::dvec3(0.0));
+  EXPECT_EQ(state.late, 1U);
+  for (int tick = 0; tick < 100; ++tick) {
+    EXPECT_NEAR(limit_force(limits, state, command, 1e-3).x, 2.0 * std::min(1.0, tick / 50.0), 1e-12);
+  }
+  EXPECT_EQ(limit_force(limits, state, command, {.fault = device::DeviceFault::late}, 1e-3), glm::dvec3(0.0));
+  EXPECT_EQ(state.late, 2U);
+  EXPECT_EQ(limit_force({.deadline_s = kNaN}, state, command, 1e-3), glm::dvec3(0.0));
+}
+
+TEST(ForceLimit, AFaultOfTheDeviceLetsGoForAsLongAsItLasts) {
+  using device::DeviceFault;
+  for (const DeviceFault fault : {DeviceFault::lost, DeviceFault::not_calibrated, DeviceFault::warm_motors,
+                                  DeviceFault::force_limit, DeviceFault::velocity_limit}) {
+    ForceLimitState state;
+    const ForceLimits limits{.soft_start_s = 0.05};
+    const glm::dvec3 command(0.0, 1.0, 0.0);
+    for (int tick = 0; tick < 100; ++tick) limit_force(limits, state, command, {}, 1e-3);
+    for (int tick = 0; tick < 10; ++tick)
+      ASSERT_EQ(limit_force(limits, state, command, {.fault = fault}, 1e-3), glm::dvec3(0.0));
+    EXPECT_EQ(state.lost, 10U);
+    EXPECT_EQ(limit_force(limits, state, command, {}, 1e-3), glm::dvec3(0.0)) << "and begins softly";
+    EXPECT_NEAR(limit_force(limits, state, command, {}, 1e-3).y, 1.0 / 50.0, 1e-12);
+  }
+}
+
+// Hurled along by a force that never ends.
+TEST(ForceLimit, NoMoreEnergyThanTheLimitIsHandedOutInAnyWindow) {
+  std::mt19937_64 random(4);
+  std::uniform_real_distribution<double> unit(-1.0, 1.0), dt(1e-4, 3e-3);
+  for (const double most_J : {0.01, 0.5}) {
+    const ForceLimits limits{
+        .max_slew_N_per_s = kInfinity, .soft_start_s = 0.0, .max_energy_J = most_J, .energy_window_s = 0.05};
+    ForceLimitState state;
+    glm::dvec3 position(0.0), force(0.0);
+    std::vector<std::pair<double, double>> handed;  // when, J
+    double now_s = 0.0, most_window_J = 0.0, most_tick_J = 0.0;
+    for (int tick = 0; tick < 5000; ++tick) {
+      const double dt_s = dt(random);
+      now_s += dt_s;
+      const glm::dvec3 way = dt_s * glm::dvec3(2.0 + unit(random), unit(random), 0.0);
+      position += way;
+      const double work = std::max(0.0, glm::dot(force, way));
+      handed.emplace_back(now_s, work);
+      most_tick_J = std::max(most_tick_J, work);
+      double window_J = 0.0;
+      for (auto i = handed.rbegin(); i != handed.rend() && i->first > now_s - 0.05; ++i)
+        window_J += i->second;
+      most_window_J = std::max(most_window_J, window_J);
+      force = limit_force(limits, state, {5.0, 0.0, 0.0}, {.position_m = position}, dt_s);
+    }
+    EXPECT_LE(most_window_J, most_J + most_tick_J);
+    EXPECT_GT(most_window_J, 0.5 * most_J);
+    EXPECT_GT(state.energy_limited, 0U);
+  }
+}
+
+TEST(ForceLimit, EnergyThatTheHandGivesIsNotLimited) {
+  ForceLimitState state;
+  const ForceLimits limits{.soft_start_s = 0.0, .max_energy_J = 0.01};
+  for (int tick = 0; tick < 1000; ++tick) {  // 8 N against 2 m/s: 16 J/s
+    const device::DeviceState tool{.position_m = {2e-3 * tick, 0, 0}};
+    ASSERT_EQ(limit_force(limits, state, {-8.0, 0, 0}, tool, 1e-3).x, -8.0);
+  }
+  EXPECT_EQ(state.energy_limited, 0U);
 }
 
 }  // namespace

@@ -13,7 +13,6 @@
 
 namespace {
 
-using device::DeviceModel;
 using device::make_simulated_device;
 using device::SimulatedDeviceOptions;
 

@@ -36,6 +36,7 @@ Recording record(const std::filesystem::path& file, std::optional<double> second
   return {.scene_file = file,
           .scene_text = read(file),
           .dt_s = result.dt_s,
+          .device = hybrid::scene_limits(scene),
           .state_hash = result.state_hash,
           .ticks = result.recording};
 }
@@ -130,6 +131,53 @@ TEST_F(RecordingFile, WithMotionAndSurfaceFeelItIsTheSameToTheBit) {
   EXPECT_NE(hybrid::hash_state(0, *built.state), before);
 }
 
+// A wall far beyond what the loop can hold, with everything that the limits and the controller remember.
+TEST_F(RecordingFile, WithPassivityControlDelayAndLateTicksItIsTheSameToTheBit) {
+  const auto file =
+      write("wall.toml",
+            "format = 1\n[tool]\nstiffness = 30000\n[device]\ndelay_ticks = 1\nwatchdog_ms = 5\n"
+            "[hand]\ngrip = \"firm\"\ntremor_mm = 0.05\n[safety]\npassivity = true\nmax_energy = 0.01\n"
+            "[[rigid]]\nname = \"wall\"\nprimitive = \"box\"\nsize = [100, 100, 20]\n"
+            "[path]\nkind = \"press\"\nfrom = [0, 0, 20]\nto = [0, 0, 6]\nhold = 0.3\n");
+  const hybrid::Scene scene = hybrid::load_scene(file);
+  hybrid::BuiltScene built = hybrid::build_scene(scene);
+  hybrid::SessionOptions options;
+  const hybrid::SessionResult result = hybrid::run_session(scene, built, options);
+  EXPECT_GT(built.state->passive.acted, 10U);
+  // What went out, counted from the trace: no more than one tick's worst, and 0.1 µJ.
+  double given_J = 0.0, worst_J = 0.0;
+  for (std::size_t n = 1; n < result.rows.size(); ++n) {
+    const double work =
+        glm::dot(result.rows[n - 1].force_N, result.rows[n].device_m - result.rows[n - 1].device_m);
+    given_J += work;
+    worst_J = std::max(worst_J, std::abs(work));
+    ASSERT_LE(given_J, worst_J + 1e-7) << n;
+  }
+  EXPECT_TRUE(hybrid::replay(record(file, std::nullopt), {}).equal);
+
+  // Ticks that came late, and a device that was gone for a while, are inputs.
+  Recording faulty = record(file, std::nullopt);
+  hybrid::BuiltScene again = hybrid::build_scene(scene);
+  hybrid::begin_session(scene, *again.world, *again.state, faulty.ticks.front().device_m);
+  std::uint64_t hash = 0xCBF29CE484222325ULL;
+  for (std::size_t n = 0; n < faulty.ticks.size(); ++n) {
+    auto& tick = faulty.ticks[n];
+    if (n % 200 == 150) tick.fault = device::DeviceFault::late;
+    if (n % 200 > 190) tick.fault = device::DeviceFault::lost;
+    const hybrid::TickResult felt = haptic_tick(
+        *again.world, *again.state, {.position_m = tick.device_m, .fault = tick.fault}, faulty.dt_s);
+    if (tick.fault != device::DeviceFault::none) {
+      ASSERT_EQ(felt.force_N, glm::dvec3(0.0)) << n;
+    }
+    hash = tick.hash = hybrid::hash_tick(hash, felt);
+  }
+  faulty.state_hash = hybrid::hash_state(hash, *again.state);
+  hybrid::save_recording(folder_ / "faulty.rec", faulty);
+  EXPECT_TRUE(hybrid::replay(hybrid::load_recording(folder_ / "faulty.rec"), {}).equal);
+  EXPECT_GT(again.state->limit.late, 1U);
+  EXPECT_GT(again.state->limit.lost, 10U);
+}
+
 TEST_F(RecordingFile, TwoRunsOfASceneEndInTheSameState) {
   const auto file = small_scene();
   const Recording a = record(file, std::nullopt), b = record(file, std::nullopt);
@@ -143,11 +191,12 @@ TEST_F(RecordingFile, AFlippedBitOfAnInputIsNoticedAtItsTick) {
   ASSERT_TRUE(hybrid::replay(good, {}).equal);
   hybrid::save_recording(folder_ / "a.rec", good);
   const std::string bytes = read(folder_ / "a.rec");
-  const std::size_t first = bytes.size() - 32 * good.ticks.size();
+  constexpr std::size_t kTickBytes = 40;
+  const std::size_t first = bytes.size() - kTickBytes * good.ticks.size();
   for (const std::size_t tick : {std::size_t{0}, std::size_t{50}, std::size_t{200}, good.ticks.size() - 1}) {
     std::string flipped = bytes;
-    flipped[first + 32 * tick + 16 + 5] =
-        static_cast<char>(flipped[first + 32 * tick + 16 + 5] ^ 0x10);  // z: a few micrometers
+    flipped[first + kTickBytes * tick + 16 + 5] =
+        static_cast<char>(flipped[first + kTickBytes * tick + 16 + 5] ^ 0x10);  // z: a few micrometers
     const auto result = hybrid::replay(hybrid::load_recording(write("b.rec", flipped)), {});
     EXPECT_FALSE(result.equal);
     EXPECT_EQ(result.parts_at, tick);

@@ -341,6 +341,51 @@ TEST_F(RigidSweep, FirstOrderConditionsHoldAgainstEveryTriangleAllAlongASlide) {
       worst, r - nearest);
 }
 
+// The nearest place on a convex surface, whatever way the proxy came: what it would be if no way back and
+// forth over the edges between caught it.
+TEST_F(RigidSweep, OnAFinelyFacetedBallTheProxyIsAtTheNearestFace) {
+  for (const double r : {0.0, 5e-3}) {
+    const auto icosphere = polygon::make_ball_mesh(0.02, 3);
+    Touch touch(scene_of({mesh("ball", icosphere)}, r), {0, 0, 0.05});
+    const double skin = touch.world().contact_radius_m();
+    std::size_t elsewhere = 0, ticks = 0;
+    double worst = 0.0;
+    for (int n = 0; n < 3000; ++n) {
+      const double angle = 1.3e-3 * n;
+      const dvec3 out(std::sin(angle) * std::cos(0.7 * angle), std::sin(angle) * std::sin(0.7 * angle),
+                      std::cos(angle));
+      const TickResult felt = touch.at((0.017 + r) * out);
+      double least = 1.0;
+      for (const auto& t : icosphere.triangles) {
+        const auto& v = icosphere.vertices;
+        const dvec3 normal = glm::normalize(glm::cross(v[t[1]] - v[t[0]], v[t[2]] - v[t[0]]));
+        least = std::min(least, glm::dot(normal, v[t[0]]) + skin - glm::dot(normal, felt.device_m));
+      }
+      const double depth = glm::length(felt.proxy_m - felt.device_m);
+      ++ticks;
+      elsewhere += depth > least * (1.0 + 1e-9) ? 1 : 0;
+      worst = std::max(worst, depth / least - 1.0);
+    }
+    // Neighbours bend by up to 11 degrees, which is worth 1.8 % of the depth; a twentieth of that is
+    // hysteresis. The nearest face may be up to three edges away, round a corner, and the first of them is
+    // worth at least a quarter of the whole.
+    EXPECT_LE(worst, 4.0 * 0.05 * 0.018) << r;
+    EXPECT_LE(elsewhere, ticks / 10) << r;
+    EXPECT_EQ(touch.state().truncated_ticks, 0U);
+  }
+}
+
+// A cube's edge is not crossed: pressed on the top, the tool stays there however near the side is.
+TEST_F(RigidSweep, ASharpEdgeIsNotCrossed) {
+  Touch touch(scene_of({mesh("cube", polygon::make_box_mesh(dvec3(0.02), 4))}, 2e-3), {0, 0, 0.05});
+  touch.go({0.015, 0, 0.021}, 1e-3);
+  touch.go({0.015, 0, 0.005}, 1e-4);
+  touch.go({0.0195, 0, 0.005}, 1e-4, 0, [&](const TickResult& felt) {
+    EXPECT_NEAR(felt.proxy_m.z, 0.022, 1e-9);
+    EXPECT_NEAR(felt.proxy_m.x, felt.device_m.x, 1e-9);
+  });
+}
+
 TEST_F(RigidSweep, AFlatMeshIsFlatWhereverTheToolCrossesItsEdges) {
   // Coordinates as a file of floats would hold them: planes that differ by millionths of a radian.
   auto sheet = polygon::make_plane_mesh(0.05, 25);

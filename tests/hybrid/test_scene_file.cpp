@@ -106,6 +106,29 @@ TEST_F(SceneFile, OtherTablesAreRead) {
   EXPECT_EQ(std::get<device::PressPath>(scene.path).repeat, 3);
 }
 
+TEST_F(SceneFile, DelayWatchdogGripTremorAndSafetyAreRead) {
+  const Scene scene = load(
+      "format = 1\n[device]\ndelay_ticks = 2\nwatchdog_ms = 20\n"
+      "[hand]\ngrip = \"firm\"\ndamping = 3\ntremor_mm = 0.05\ntremor_hz = 9\n"
+      "[safety]\npassivity = true\nmax_energy = 0.2\nenergy_window = 0.05\ndeadline_periods = 4\n" +
+      block + path);
+  EXPECT_EQ(scene.delay_ticks, 2);
+  EXPECT_DOUBLE_EQ(scene.watchdog_s.value_or(0.0), 0.02);
+  EXPECT_EQ(scene.hand.mass_kg, 8.7e-3);
+  EXPECT_EQ(scene.hand.damping_N_s_per_m, 3.0) << "a figure of its own stands before the grip's";
+  EXPECT_EQ(scene.hand.stiffness_N_per_m, 1255.0);
+  EXPECT_DOUBLE_EQ(scene.tremor.amplitude_m, 0.05e-3);
+  EXPECT_EQ(scene.tremor.frequency_hz, 9.0);
+  EXPECT_TRUE(scene.passivity);
+  EXPECT_EQ(scene.safety.max_energy_J, 0.2);
+  EXPECT_EQ(scene.safety.energy_window_s, 0.05);
+  EXPECT_EQ(scene.deadline_periods, 4.0);
+  const Scene usual = load("format = 1\n" + block + path);
+  EXPECT_EQ(usual.hand.stiffness_N_per_m, 600.0);
+  EXPECT_FALSE(usual.passivity);
+  EXPECT_FALSE(usual.watchdog_s.has_value());
+}
+
 // Extrinsic, x then y then z: the same as three rotation matrices applied one after the other.
 TEST_F(SceneFile, RotationIsAboutTheFixedAxesXThenYThenZ) {
   const Scene scene = load("format = 1\n" + ball + "rotation = [30, -50, 110]\n" + path);

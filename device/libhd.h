@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The driver's own library (libHD of OpenHaptics), loaded at run time: nothing of it is needed to build, and
+// a machine without it says what to install.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+
+namespace device {
+
+// A device that cannot be used: what is wrong, and what to do about it.
+class DeviceError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+// As the driver's C interface has them on x86-64 Linux (OpenHaptics 3.30).
+namespace hd {
+
+using Handle = unsigned int;
+using Name = unsigned int;  // of a parameter, capability, error or calibration state
+using Schedule = unsigned long;
+using Callback = unsigned int (*)(void* user);
+
+struct ErrorInfo {
+  unsigned int code = 0;
+  int internal_code = 0;
+  Handle device = 0;
+};
+static_assert(sizeof(ErrorInfo) == 12, "returned by value: its size is part of the calling convention");
+
+inline constexpr Handle kInvalidHandle = 0xFFFFFFFF;
+inline constexpr unsigned int kDone = 0, kContinue = 1;
+inline constexpr unsigned short kPriorityDefault = 32767, kPriorityMax = 65535;
+
+// What can be asked for; the unit stands behind it.
+inline constexpr Name kButtons = 0x2000, kSafetySwitch = 0x2001, kInkwellSwitch = 0x2002;
+inline constexpr Name kPosition = 0x2050;  // 3 doubles, mm
+inline constexpr Name kVelocity = 0x2051;  // 3 doubles, mm/s
+inline constexpr Name kForce = 0x2700;     // 3 doubles, N
+inline constexpr Name kVersion = 0x2500, kModel = 0x2501, kDriverVersion = 0x2502, kVendor = 0x2503,
+                      kSerial = 0x2504;
+inline constexpr Name kFirmware = 0x2505;                           // double
+inline constexpr Name kMaxWorkspace = 0x2550, kWorkspace = 0x2551;  // 6 doubles, mm: low corner, high corner
+inline constexpr Name kCalibrationStyle = 0x2555;                   // int
+inline constexpr Name kUpdateRate = 0x2600;                         // int, Hz
+inline constexpr Name kMaxForce = 0x2603, kContinuousForce = 0x2604;  // double, N
+inline constexpr Name kMotorTemperature = 0x2605;                     // double a motor, 0 to 1
+inline constexpr Name kForceOutput = 0x4000, kForceClamping = 0x4001, kForceRamping = 0x4002;
+
+inline constexpr Name kCalibrated = 0x5000, kNeedsUpdate = 0x5001, kNeedsHand = 0x5002;
+inline constexpr int kEncoderReset = 1, kAutomatic = 2, kInkwell = 4;  // styles
+
+inline constexpr Name kSuccess = 0, kBadHandle = 0x104;
+inline constexpr Name kWarmMotors = 0x200, kExceededForce = 0x201, kExceededImpulse = 0x202,
+                      kExceededVelocity = 0x203, kForceError = 0x204;
+inline constexpr Name kDeviceFault = 0x300, kAlreadyInitiated = 0x301, kCommError = 0x302,
+                      kCommConfigError = 0x303, kTimerError = 0x304;
+inline constexpr Name kSchedulerFull = 0x501, kInvalidLicense = 0x600;
+
+}  // namespace hd
+
+// The functions of the library that are used, all of them there.
+struct HdFunctions {
+  hd::Handle (*init_device)(const char* name) = nullptr;
+  void (*disable_device)(hd::Handle) = nullptr;
+  void (*make_current)(hd::Handle) = nullptr;
+  void (*begin_frame)(hd::Handle) = nullptr;
+  void (*end_frame)(hd::Handle) = nullptr;
+  hd::ErrorInfo (*get_error)() = nullptr;
+  const char* (*error_string)(unsigned int) = nullptr;
+  void (*enable)(hd::Name) = nullptr;
+  void (*get_booleans)(hd::Name, unsigned char*) = nullptr;
+  void (*get_integers)(hd::Name, int*) = nullptr;
+  void (*get_doubles)(hd::Name, double*) = nullptr;
+  void (*set_doubles)(hd::Name, const double*) = nullptr;
+  const char* (*get_string)(hd::Name) = nullptr;
+  hd::Name (*check_calibration)() = nullptr;
+  void (*update_calibration)(hd::Name) = nullptr;
+  void (*start_scheduler)() = nullptr;
+  void (*stop_scheduler)() = nullptr;
+  void (*set_rate)(unsigned long hz) = nullptr;
+  void (*schedule_synchronous)(hd::Callback, void* user, unsigned short priority) = nullptr;
+  hd::Schedule (*schedule_asynchronous)(hd::Callback, void* user, unsigned short priority) = nullptr;
+  void (*unschedule)(hd::Schedule) = nullptr;
+};
+
+struct HdLibrary {
+  HdFunctions call;
+  std::string file;  // as it was asked for
+};
+
+// Loads `file`, else the one that the environment's HYBRID_LIBHD names, else libHD.so, libHD.so.3.4,
+// libHD.so.3.0. One that was named and does not load is refused, not replaced by another. The library stays
+// loaded to the end of the program, as the driver keeps threads in it. Throws DeviceError: none found, one
+// of its own libraries missing, a function missing.
+HdLibrary load_libhd(const std::filesystem::path& file = {});
+
+}  // namespace device

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A session that is told to stop, or crashes, lets go of the motors first.
+#pragma once
+
+namespace device {
+
+// While one lives, SIGINT, SIGTERM and SIGHUP ask the servo loop to end; a second one of the same kind kills
+// as usual. One at a time in a program.
+class StopOnSignal {
+ public:
+  StopOnSignal();
+  ~StopOnSignal();
+  StopOnSignal(const StopOnSignal&) = delete;
+  StopOnSignal& operator=(const StopOnSignal&) = delete;
+  StopOnSignal(StopOnSignal&&) = delete;
+  StopOnSignal& operator=(StopOnSignal&&) = delete;
+};
+
+// The signal that asked, 0 while there was none. Lock-free.
+int stop_signal() noexcept;
+
+// While one lives, SIGSEGV, SIGBUS, SIGFPE, SIGILL and SIGABRT call `act(user)` on the thread that crashed,
+// and then do what they did before. `act` may do what a signal handler may. A stack that overflowed, SIGKILL
+// and a machine that stops leave no time for it. One at a time in a program.
+class OnCrash {
+ public:
+  using Act = void (*)(void* user) noexcept;
+  OnCrash(Act act, void* user);
+  ~OnCrash();
+  OnCrash(const OnCrash&) = delete;
+  OnCrash& operator=(const OnCrash&) = delete;
+  OnCrash(OnCrash&&) = delete;
+  OnCrash& operator=(OnCrash&&) = delete;
+};
+
+}  // namespace device
