@@ -72,7 +72,8 @@ glm::dvec3 limit_force(const ForceLimits& limits, ForceLimitState& state, const 
   const double dt = std::isfinite(dt_s) && dt_s > 0.0 ? dt_s : 0.0;
   count_energy(limits, state, tool.position_m, dt);
   const double fade = limits.soft_start_s > 0.0 ? std::min(1.0, state.elapsed_s / limits.soft_start_s) : 1.0;
-  state.elapsed_s += dt;
+  // A clock that stops where nothing asks any more is the same after a second and after a month.
+  state.elapsed_s = std::min(state.elapsed_s + dt, std::max(0.0, limits.soft_start_s));
 
   // Caught first: what is not finite must not reach the slew's memory. The motor is let go at once; the way
   // back is slewed from zero.

@@ -41,7 +41,7 @@ struct ForceLimitState {
   glm::dvec3 last_N{0.0};
   glm::dvec3 last_m{0.0};  // where the tool was then
   bool placed = false;     // last_m is known
-  double elapsed_s = 0.0;  // since the start, or since the motors were last let go
+  double elapsed_s = 0.0;  // of the soft start, since the start or since the motors were last let go
   EnergyWindow handed;
   std::uint64_t nonfinite = 0;  // commands that were not finite, and gave zero
   std::uint64_t clamped = 0;    // ticks in which the magnitude was cut

@@ -25,6 +25,7 @@ struct ExtremeRow {
 //   finite   no number in force or state is not one
 //   limits   the force is within the device's limit, and its step within the slew
 //   energy   the hand gets back what it stored, and no more than holding a force for a tick costs beside it
+//   passive  with the controller on, the hand gets no more than it gave, and one tick's worst case
 //   outside  the tool is in nothing rigid, nor nearer than its radius
 //   held     what the tool is pulled through by a metre in a tick, it does not go through
 //   settled  when the tool has left: no force, and everything soft back where it was

@@ -43,6 +43,18 @@ void cross_loops(Cases& cases, SceneKind kind) {
   }
 }
 
+// With the controller on.
+void passive_loops(Cases& cases, SceneKind kind) {
+  for (const double stiffness : {1e3, 25e3, 1e6}) {
+    SceneSetting s;
+    s.kind = kind;
+    s.stiffness_N_per_m = stiffness;
+    s.passivity = true;
+    for (const Motion motion : {Motion::path, Motion::stalls, Motion::not_numbers})
+      cases.add(s, motion, fmt::format("stiffness {:g} N/m, passivity control", stiffness));
+  }
+}
+
 void materials(Cases& cases, SceneKind kind) {
   if (!has_soft(kind)) return;
   SceneSetting base;
@@ -156,6 +168,7 @@ std::vector<DriveCase> drive_cases(bool quick) {
   Cases cases;
   for (const SceneKind kind : kSceneKinds) {
     if (!quick) cross_loops(cases, kind);
+    passive_loops(cases, kind);
     materials(cases, kind);
     sizes(cases, kind);
     far_away(cases, kind);

@@ -125,6 +125,8 @@ class Drive {
     result_.moved_J = watch_->moved_J();
     result_.given_J = watch_->given_J();
     result_.allowed_J = watch_->allowed_J();
+    result_.most_given_J = watch_->most_given_J();
+    result_.worst_tick_J = watch_->worst_tick_J();
     result_.inside_m = watch_->inside_m();
     result_.slowest_us = watch_->slowest_us();
     result_.left_moved_m = largest_displacement_m(state_);

@@ -129,7 +129,9 @@ std::string scene_text(const SceneSetting& s) {
       "[tool]\nradius = {:.17g}\nstiffness = {:.17g}\n[device]\nmodel = \"{}\"\nrate = {:.17g}\n"
       "[safety]\nsoft_start = 0\n{}",
       3.0 * s.unit_m, s.stiffness_N_per_m, s.ideal_device ? "ideal" : "premium-1.5", s.rate_hz,
-      s.ideal_device ? "max_force = 8.5\n" : "");
+      s.ideal_device ? "max_force = 8.5\n"
+      : s.passivity  ? "passivity = true\n"
+                     : "");
   if (s.kind != SceneKind::rigid) {
     text += fmt::format(
         "[material.gel]\nyoung = {:.17g}\nstretch = [{:.17g}, {:.17g}]\nshear = {:.17g}\n"

@@ -34,6 +34,7 @@ struct SceneSetting {
   double stretch_min = 0.4, stretch_max = 1.6, shear = 0.6;
   double rate_hz = 1000.0;
   bool ideal_device = false;  // goes exactly where the hand wants it; else a Premium 1.5 in a hand
+  bool passivity = false;     // the controller, of a device that a force moves
   BlockShape shape = BlockShape::block;
   MeshFlaw flaw = MeshFlaw::none;
   int coincident = 1'000'000;  // triangles in the same place, of MeshFlaw::coincident

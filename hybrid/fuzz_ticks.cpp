@@ -306,6 +306,7 @@ std::vector<FuzzResult> fuzz_ticks(const FuzzOptions& options) {
   std::filesystem::create_directories(folder);
   std::vector<FuzzResult> results;
   for (const FuzzScene& which : scenes()) {
+    if (!options.only.empty() && which.name != options.only) continue;
     if (options.progress) options.progress(fmt::format("fuzzing ticks: {}", which.name));
     results.push_back(
         Fuzz(which, folder, options.seed).run(std::max<std::uint64_t>(1, options.ticks / scenes().size())));

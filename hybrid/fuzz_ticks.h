@@ -13,6 +13,7 @@ namespace hybrid {
 struct FuzzOptions {
   std::uint64_t ticks = 20'000;  // over all scenes, a little more
   std::uint64_t seed = 1;
+  std::string only{};  // of the scenes, by its name; empty: all of them
   Progress progress{};
 };
 

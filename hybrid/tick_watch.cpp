@@ -81,6 +81,8 @@ void TickWatch::account(const TickResult& felt) {
   const glm::dvec3 way = felt.device_m - device_m_;
   const double moved = length(way), work = glm::dot(force_N_, way);
   given_J_ += work;
+  most_given_J_ = std::max(most_given_J_, given_J_);
+  worst_tick_J_ = std::max(worst_tick_J_, std::abs(work));
   moved_J_ += std::abs(work);
   if (stored > 0.0 || stored_J_ > 0.0)
     allowed_J_ += std::min(0.5 * k * moved, 2.0 * most) * moved;  // a clamped spring turns by no more

@@ -33,7 +33,7 @@ namespace hybrid {
 // outside. The proxy's ball is not in a rigid object, nor nearer than its radius, but for rounding.
 class TickWatch {
  public:
-  static constexpr double kTissueShare = 0.01;
+  static constexpr double kTissueShare = 0.005;
 
   // Both as a session begins. `world` is to outlive the watch.
   TickWatch(const World& world, const WorldState& state);
@@ -53,8 +53,11 @@ class TickWatch {
   // that is to be compared with: rounding, and the tissue's share.
   [[nodiscard]] double excess_J() const { return excess_J_; }
   [[nodiscard]] double tolerance_J() const;
-  [[nodiscard]] double moved_J() const { return moved_J_; }      // to and fro
-  [[nodiscard]] double given_J() const { return given_J_; }      // to the hand, by the end
+  [[nodiscard]] double moved_J() const { return moved_J_; }  // to and fro
+  [[nodiscard]] double given_J() const { return given_J_; }  // to the hand, by the end
+  // The most that was ever given, and the largest work of any one tick: what a passivity controller compares.
+  [[nodiscard]] double most_given_J() const { return most_given_J_; }
+  [[nodiscard]] double worst_tick_J() const { return worst_tick_J_; }
   [[nodiscard]] double allowed_J() const { return allowed_J_; }  // by the end
   // The most by which the proxy's ball was in something rigid (m).
   [[nodiscard]] double inside_m() const { return inside_m_; }
@@ -68,6 +71,7 @@ class TickWatch {
   const World& world_;
   std::uint64_t ticks_ = 0, not_finite_ = 0, hash_;
   double most_N_ = 0.0, over_force_N_ = 0.0, over_slew_N_ = 0.0, inside_m_ = 0.0, slowest_us_ = 0.0;
+  double most_given_J_ = 0.0, worst_tick_J_ = 0.0;
   double given_J_ = 0.0, allowed_J_ = 0.0, excess_J_ = 0.0, moved_J_ = 0.0, stored_J_ = 0.0;
   glm::dvec3 force_N_{0.0}, device_m_{0.0};
   double slewed_N_ = 0.0;  // how far the force was from the clamped one
