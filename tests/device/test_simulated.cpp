@@ -165,10 +165,9 @@ TEST(IdealDevice, IsWhereThePathIsWhateverTheForce) {
   const std::shared_ptr<const Path> path = make_path(curve);
   const auto device = make_simulated_device(DeviceModel::ideal, {}, path);
   EXPECT_EQ(device->read().position_m, path->position(0.0));
-  double t = 0.0;
   for (int tick = 0; tick < 3000; ++tick) {
     device->write(tick % 2 == 0 ? glm::dvec3(1e9, kNaN, -1e9) : glm::dvec3(0.0), kTick_s);
-    t += kTick_s;
+    const double t = (tick + 1) * kTick_s;
     const DeviceState state = device->read();
     ASSERT_EQ(state.position_m, path->position(t));
     for (int i = 0; i < 3; ++i) {

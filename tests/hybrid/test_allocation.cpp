@@ -129,7 +129,8 @@ TEST_P(AllocationOf, AllItsTicks) {
 INSTANTIATE_TEST_SUITE_P(ShippedScenes, AllocationOf,
                          ::testing::Values("cube.toml", "sheet.toml", "ball-and-block.toml", "two-soft.toml",
                                            "head.toml", "thin-sheet.toml", "convex-edge.toml",
-                                           "textured-plate.toml", "moving.toml"),
+                                           "textured-plate.toml", "moving.toml", "wall.toml",
+                                           "tissue.toml"),
                          [](const auto& scene) {
                            std::string name = scene.param;
                            name.resize(name.find('.'));
@@ -144,7 +145,7 @@ TEST(Allocation, KnowsEveryShippedScene) {
        std::filesystem::directory_iterator(std::filesystem::path(HYBRID_SOURCE_DIR) / "scenes")) {
     scenes += entry.path().extension() == ".toml" ? 1 : 0;
   }
-  EXPECT_EQ(scenes, 9U) << "add the new scene to the list above";
+  EXPECT_EQ(scenes, 11U) << "add the new scene to the list above";
 }
 
 }  // namespace
