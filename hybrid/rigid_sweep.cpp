@@ -195,6 +195,7 @@ class Sweeper {
       }
       if (!clear) {
         held = from;
+        stand_at(point);
         around_.see_afresh(point);
         // Not far enough looked ahead: that comes first.
         if (around_.ended()) return Crossing::moved;
