@@ -71,10 +71,15 @@ void materials(Cases& cases, SceneKind kind) {
     cases.add(s, motion, "no slack at all");
     s.shear = 0.6;
     cases.add(s, motion, "no slack along, some across");
+    s.stretch_min = 0.99;
+    s.stretch_max = 1.01;
+    cases.add(s, motion, "a hundredth of slack along, some across");
     s.stretch_min = 0.4;
     s.stretch_max = 1.6;
     s.shear = 0.0;
     cases.add(s, motion, "no slack across, some along");
+    s.shear = 0.01;
+    cases.add(s, motion, "a hundredth of slack across, some along");
     s.stretch_min = 1e-3;
     s.stretch_max = 1e3;
     s.shear = 1e3;

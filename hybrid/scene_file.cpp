@@ -233,6 +233,18 @@ Material read_material(const TableReader& table) {
   if (table.has("stretch")) read_stretch(table, out);
   out.shear =
       table.number("shear", {"a share of the rest length, 0 or more", "0.6", 1.0, 0.0, 1e6}, out.shear);
+  // Rows of voxels that are rigid one way and free the other: relaxation moves voxels and blocks of them, and
+  // neither can move without breaking the row, so such tissue would stay as it was pressed.
+  const bool stretches = out.stretch_max > out.stretch_min, slips = out.shear > 0.0;
+  if (stretches != slips) {
+    table.refuse(
+        table.has("shear") ? "shear" : "stretch",
+        words("the links of ", table.what(),
+              slips ? " may slip but not stretch" : " may stretch but not slip",
+              ", and nothing would bring back what is pressed"),
+        "give both some slack, e.g. stretch = [0.99, 1.01] and shear = 0.01, or neither: stretch = [1, "
+        "1] and shear = 0");
+  }
   return out;
 }
 

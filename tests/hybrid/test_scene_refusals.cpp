@@ -97,6 +97,8 @@ const Broken broken[] = {
     {"young-negative", "12:1", "is -1", "above 0"},
     {"stretch-reversed", "12:1", "above its max", "smaller number first"},
     {"stretch-min-above-one", "12:1", "1.1", "min <= 1"},
+    {"stretch-none", "12:1", "may slip but not stretch", "give both some slack"},
+    {"shear-none", "12:1", "may stretch but not slip", "or neither"},
     {"shear-negative", "12:1", "is -0.1", "0 or more"},
     {"later-stiffness", "6:1", "not supported yet", "remove it"},
     {"damping-negative", "6:1", "is -1", "0 or more"},
