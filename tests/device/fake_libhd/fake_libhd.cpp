@@ -35,7 +35,9 @@ void *asynchronous_user = nullptr, *synchronous_user = nullptr;
 std::thread scheduler;
 bool ends = false;
 
-// The scheduler's thread alone.
+// Of what follows: the scheduler's thread holds it for a whole tick, so that a thread that gives up on a
+// silent scheduler may use a frame of its own.
+std::recursive_mutex frames;
 bool in_frame = false, in_asynchronous = false, in_synchronous = false;
 double frame_force[3] = {0, 0, 0};
 bool force_set = false;
@@ -59,6 +61,7 @@ unsigned calibration_now() {
 }
 
 void run_asynchronous() {
+  const std::lock_guard tick(frames);
   Callback callback = nullptr;
   void* user = nullptr;
   {
@@ -169,12 +172,14 @@ void hdDisableDevice(unsigned handle) {
 void hdMakeCurrentDevice(unsigned /*handle*/) {}
 
 void hdBeginFrame(unsigned /*handle*/) {
+  const std::lock_guard lock(frames);
   if (in_frame) ++control.misuse;
   in_frame = true;
   force_set = false;
   if (!control.error_after_force && on_tick(control.error_at, control.error_ticks)) push(control.error);
 }
 void hdEndFrame(unsigned /*handle*/) {
+  const std::lock_guard lock(frames);
   if (!in_frame) ++control.misuse;
   in_frame = false;
   // Outside of the callback: a thread that gives up on it.
@@ -261,6 +266,7 @@ void hdGetDoublev(unsigned name, double* value) {
   }
 }
 void hdSetDoublev(unsigned name, const double* value) {
+  const std::lock_guard lock(frames);
   if (name != 0x2700) {
     push(0x100);
     return;
