@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <stdexcept>
 
 #include "hybrid/bench_rigid.h"
+#include "hybrid/bench_soft.h"
 #include "hybrid/commands.h"
 #include "hybrid/report.h"
 
@@ -39,10 +41,20 @@ std::string summary(const std::vector<bench::RigidRow>& rows) {
       runs, inside, pops, 1e6 * worst, lost);
 }
 
+// What of the user's choice belongs to a suite.
+std::vector<std::string> chosen_of(const std::vector<std::string>& chosen,
+                                   const std::vector<std::string>& suite) {
+  std::vector<std::string> result;
+  for (const std::string& name : chosen) {
+    if (std::find(suite.begin(), suite.end(), name) != suite.end()) result.push_back(name);
+  }
+  return result;
+}
+
 nlohmann::ordered_json rigid_suite(const BenchCommand& command, std::FILE* words) {
   bench::RigidBenchOptions options{.quick = command.quick,
                                    .every_tick = command.every_tick,
-                                   .paths = command.paths,
+                                   .paths = chosen_of(command.only, bench::rigid_paths()),
                                    .meshes = command.meshes,
                                    .engines = engines_of(command.engines),
                                    .trace = command.trace,
@@ -70,19 +82,74 @@ nlohmann::ordered_json rigid_suite(const BenchCommand& command, std::FILE* words
   return json;
 }
 
+// The rows, and beside them how work grows.
+nlohmann::ordered_json soft_suite(const BenchCommand& command, std::FILE* words,
+                                  nlohmann::ordered_json& growth) {
+  bench::SoftBenchOptions options{.quick = command.quick,
+                                  .cases = chosen_of(command.only, bench::soft_cases()),
+                                  .engines = {},
+                                  .sizes = command.sizes,
+                                  .progress = progress_on_terminal(),
+                                  .on_row = {}};
+  if (command.session_s) options.session_s = *command.session_s;
+  for (const bench::SoftEngine engine : bench::kSoftEngines) {
+    if (!chosen_of(command.engines, {bench::engine_name(engine)}).empty()) options.engines.push_back(engine);
+  }
+  options.on_row = [words](const bench::SoftRow& row) {
+    end_progress();
+    fmt::print(words, "{}", bench::soft_table_line(row));
+    std::fflush(words);
+  };
+  fmt::print(words, "times in us, depth and slack in spacings; 'viol' are links beyond their limits\n{}",
+             bench::soft_table_head());
+  const std::vector<bench::SoftRow> rows = bench::bench_soft(options);
+  end_progress();
+  if (const auto found = bench::growth_of(rows)) {
+    fmt::print(words, "\n{}", bench::in_words(*found));
+    growth = bench::to_json(*found);
+  }
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (const bench::SoftRow& row : rows) json.push_back(bench::to_json(row));
+  return json;
+}
+
+// A suite is left out of "all" where everything chosen belongs to others.
+bool has_work(const BenchCommand& command, const std::vector<std::string>& cases,
+              const std::vector<std::string>& engines) {
+  return (command.only.empty() || !chosen_of(command.only, cases).empty()) &&
+         (command.engines.empty() || !chosen_of(command.engines, engines).empty());
+}
+
+template <class Engines>
+std::vector<std::string> names_of(const Engines& engines) {
+  std::vector<std::string> names;
+  names.reserve(std::size(engines));
+  for (const auto engine : engines) names.emplace_back(bench::engine_name(engine));
+  return names;
+}
+
+std::string listed(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
 }  // namespace
 
 const std::vector<std::string>& bench_suites() {
-  static const std::vector<std::string> kSuites{"rigid"};
+  static const std::vector<std::string> kSuites{"rigid", "soft"};
   return kSuites;
 }
-const std::vector<std::string>& bench_paths() {
-  return bench::rigid_paths();
+std::vector<std::string> bench_parts() {
+  std::vector<std::string> parts = bench::rigid_paths();
+  parts.insert(parts.end(), bench::soft_cases().begin(), bench::soft_cases().end());
+  return parts;
 }
 std::vector<std::string> bench_engines() {
-  std::vector<std::string> names;
-  names.reserve(std::size(bench::kEngines));
-  for (const bench::Engine engine : bench::kEngines) names.emplace_back(bench::engine_name(engine));
+  std::vector<std::string> names = names_of(bench::kEngines);
+  for (const std::string& name : names_of(bench::kSoftEngines)) {
+    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+  }
   return names;
 }
 std::string bench_mesh_error(const std::string& name) {
@@ -99,9 +166,27 @@ int run_bench(const BenchCommand& command) {
   nlohmann::ordered_json report = report_head("bench");
   report["quick"] = command.quick;
   report["suites"] = nlohmann::ordered_json::object();
-  for (const std::string& suite : bench_suites()) {
-    if (command.suite != "all" && command.suite != suite) continue;
-    if (suite == "rigid") report["suites"]["rigid"] = rigid_suite(command, words);
+  const auto runs = [&command](const char* suite) {
+    return command.suite == "all" || command.suite == suite;
+  };
+  bool any = false;
+  if (runs("rigid") && has_work(command, bench::rigid_paths(), names_of(bench::kEngines))) {
+    report["suites"]["rigid"] = rigid_suite(command, words);
+    any = true;
+  }
+  if (runs("soft") && has_work(command, bench::soft_cases(), names_of(bench::kSoftEngines))) {
+    nlohmann::ordered_json growth;
+    report["suites"]["soft"] = soft_suite(command, words, growth);
+    report["growth"] = growth;
+    any = true;
+  }
+  if (!any) {
+    throw std::invalid_argument(fmt::format(
+        "bench {}: nothing of --only or --engines belongs to it; paths and engines of rigid are {} and {}, "
+        "cases and "
+        "engines of soft {} and {}",
+        command.suite, listed(bench::rigid_paths()), listed(names_of(bench::kEngines)),
+        listed(bench::soft_cases()), listed(names_of(bench::kSoftEngines))));
   }
   if (!command.json.empty()) save_json(command.json, report);
   return 0;

@@ -58,14 +58,16 @@ int compare(const CompareCommand& command);
 struct BenchCommand {
   std::string suite;  // of bench_suites(), or "all"
   bool quick = false, every_tick = false;
-  std::vector<std::string> paths, meshes, engines;  // empty: the suite's own choice
-  std::filesystem::path trace;                      // folder; empty: none
+  std::vector<std::string> only, meshes, engines;  // empty: the suite's own choice
+  std::vector<int> sizes;                          // of soft: voxels an edge; empty: its own choice
+  std::optional<double> session_s;                 // of soft: simulated time of a session
+  std::filesystem::path trace;                     // folder; empty: none
   std::string json;
 };
 int run_bench(const BenchCommand& command);
 // What may be asked for, so that a wrong word is refused with the right ones.
 const std::vector<std::string>& bench_suites();
-const std::vector<std::string>& bench_paths();
+std::vector<std::string> bench_parts();  // paths of rigid, cases of soft
 std::vector<std::string> bench_engines();
 std::string bench_mesh_error(const std::string& name);  // empty: there is such a mesh
 

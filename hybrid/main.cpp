@@ -121,15 +121,20 @@ void add_bench(CLI::App& app, int& status) {
   sub->add_option("SUITE", c->suite, "what to time")->required()->check(CLI::IsMember(suites));
   sub->add_flag("--quick", c->quick, "a short piece of each path on small meshes; a few seconds");
   sub->add_flag("--every-tick", c->every_tick, "ask the exact reference at every tick; slow");
-  sub->add_option("--only", c->paths, "of rigid: paths, with commas between")
+  sub->add_option("--only", c->only, "paths of rigid, cases of soft, with commas between")
       ->delimiter(',')
-      ->check(CLI::IsMember(hybrid::bench_paths()));
+      ->check(CLI::IsMember(hybrid::bench_parts()));
   sub->add_option("--meshes", c->meshes,
                   "of rigid: meshes, with commas between: ico0 to ico9 (20 x 4^n triangles), geo1 to geo1024 "
                   "(20 x n^2), cube1 to cube1024, corner1 to corner1024")
       ->delimiter(',')
       ->check(CLI::Validator(hybrid::bench_mesh_error, "MESH"));
-  sub->add_option("--engines", c->engines, "of rigid: engines, with commas between")
+  sub->add_option("--sizes", c->sizes, "of soft: voxels an edge of sessions and loads, with commas between")
+      ->delimiter(',')
+      ->check(CLI::Range(16, 1024));
+  sub->add_option("--seconds", c->session_s, "of soft: simulated time of a session")
+      ->check(CLI::Range(0.1, 3600.0));
+  sub->add_option("--engines", c->engines, "engines, with commas between")
       ->delimiter(',')
       ->check(CLI::IsMember(hybrid::bench_engines()));
   sub->add_option("--trace", c->trace, "write every run as CSV into this folder");

@@ -153,8 +153,8 @@ ClassicObject::ElementId ClassicObject::at(int i, int j, int k) const {
 
 glm::dvec3 ClassicObject::rest(ElementId v) const {
   const auto nx = static_cast<ElementId>(dims_[0]), ny = static_cast<ElementId>(dims_[1]);
-  return spacing_m_ * glm::dvec3(static_cast<double>(v % nx) - 1.0, static_cast<double>(v / nx % ny) - 1.0,
-                                 static_cast<double>(v / (nx * ny)) - 1.0);
+  const ElementId i = v % nx, j = v / nx % ny, k = v / (nx * ny);
+  return spacing_m_ * (glm::dvec3(i, j, k) - 1.0);  // the padding comes first
 }
 
 void ClassicObject::grow_queue() {  // full: head and tail are the same place

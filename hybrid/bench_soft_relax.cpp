@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A ball pressed ten spacings deep into a block, in steps and without relaxation; then how long until the
+// force on it is within 1 % of what it ends at.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <memory>
+
+#include "hybrid/bench_soft.h"
+#include "hybrid/bench_timer.h"
+#include "hybrid/session.h"
+#include "voxel/classic.h"
+#include "voxel/soft_object.h"
+
+namespace hybrid::bench {
+namespace {
+
+constexpr double kSpacing = 1e-3;
+constexpr double kDepth = 10.0, kRadius = 10.0;  // (unit: spacing)
+constexpr int kSweepsNear = 2;
+constexpr double kConverged = 0.01;
+constexpr double kFloor_N = 0.04;    // of a JND: the least friction of a device
+constexpr double kAsked_us = 100e3;  // when the force error is stated
+constexpr int kMostRounds = 4000;
+constexpr double kReferenceTolerance = 1e-6;  // of the lattice's force scale
+constexpr int kReferenceCycles = 400;
+
+struct Limits {
+  const char* name;
+  double slack;                   // in spacings, as the row has it; of the tightest material
+  voxel::LinkMaterial top, base;  // the upper 40 % and the rest
+};
+
+const std::array<Limits, 3>& all_limits() {
+  constexpr voxel::LinkMaterial tissue{};
+  constexpr voxel::LinkMaterial loose{.stretch_min = 0.05, .stretch_max = 10.0, .shear = 10.0};
+  constexpr voxel::LinkMaterial tight{.stretch_min = 1.0, .stretch_max = 1.0, .shear = 0.0};
+  static const std::array<Limits, 3> kLimits{Limits{"limits", 0.6, tissue, tissue},
+                                             Limits{"no limits", 0.95, loose, loose},
+                                             Limits{"slack 0", 0.0, tight, tissue}};
+  return kLimits;
+}
+
+class Pressed {
+ public:
+  Pressed(int edge, const Limits& limits) {
+    voxel::LabelVolume volume;
+    volume.dims = {edge, edge, edge};
+    volume.labels.assign(
+        static_cast<std::size_t>(edge) * static_cast<std::size_t>(edge) * static_cast<std::size_t>(edge), 1);
+    const std::size_t base = volume.index(0, 0, edge * 6 / 10);
+    std::fill(volume.labels.begin() + static_cast<std::ptrdiff_t>(base), volume.labels.end(),
+              std::uint8_t{2});
+    voxel::LatticeOptions options;
+    options.materials[1] = limits.base;
+    options.materials[2] = limits.top;
+    options.anchor_faces = {"-z"};
+    object_ = std::make_unique<voxel::SoftObject>(std::make_shared<voxel::Lattice>(volume, options));
+    const double middle = 0.5 * (edge - 1) * kSpacing, top = (edge - 1) * kSpacing;
+    tool_.radius = kRadius * kSpacing;
+    const double from = top + object_->reach(tool_.radius);
+    constexpr int steps = 40;
+    for (int n = 1; n <= steps; ++n) {
+      tool_.centre = {middle, middle, from - kDepth * kSpacing * n / steps};
+      near_.clear();
+      for (const voxel::VoxelId v : object_->lattice().surface()) {
+        if (glm::distance(object_->position(v), tool_.centre) < object_->reach(tool_.radius) + kSpacing)
+          near_.push_back(v);
+      }
+      object_->touch(near_);
+      if (n > 1) object_->follow({0.0, 0.0, -kDepth * kSpacing / steps});
+      object_->push_out(tool_);
+    }
+  }
+
+  [[nodiscard]] voxel::SoftObject& object() { return *object_; }
+  [[nodiscard]] const voxel::ToolInBody& tool() const { return tool_; }
+  [[nodiscard]] double force_N() { return glm::length(object_->reaction(tool_).force_N); }
+
+ private:
+  std::unique_ptr<voxel::SoftObject> object_;
+  voxel::ToolInBody tool_;
+  std::vector<voxel::VoxelId> near_;
+};
+
+// What the tick does with an object that stays pressed, round after round, until nothing is left to do.
+SoftRow relax_row(int edge, const Limits& limits) {
+  const TickTimer timer;
+  Pressed pressed(edge, limits);
+  voxel::SoftObject& object = pressed.object();
+  struct Moment {
+    double us, force_N;
+  };
+  std::vector<Moment> moments;
+  std::uint64_t updates = 0;
+  double us = 0.0, background_us = 0.0;
+  const std::uint64_t budget = object.lattice().voxel_count();
+  for (int n = 0; n < kMostRounds && (n == 0 || !object.asleep()) && us < 60e6; ++n) {
+    const std::uint64_t before = TickTimer::begin();
+    object.relax_near(pressed.tool(), kSweepsNear);
+    const double force = pressed.force_N();
+    const std::uint64_t between = TickTimer::begin();
+    updates += object.relax_background(budget);
+    const std::uint64_t after = TickTimer::end();
+    moments.push_back({us + timer.us(between - before), force});
+    us += timer.us(after - before);
+    background_us += timer.us(after - between);
+  }
+  object.settle(pressed.tool(), kReferenceTolerance * object.lattice().force_scale_N(), kReferenceCycles);
+  const double reference = pressed.force_N();
+  SoftRow row{.test_case = "relax",
+              .voxels = object.lattice().voxel_count(),
+              .material = limits.name,
+              .depth_spacings = kDepth,
+              .slack = limits.slack};
+  row.reference = "the same press, relaxed until no voxel feels a force";
+  const auto off = [reference](const Moment& m) {
+    return std::fabs(m.force_N - reference) > kConverged * reference;
+  };
+  const auto last_off = std::find_if(moments.rbegin(), moments.rend(), off);
+  if (!(reference > 0.0)) {
+    row.note = "nothing pressed back, neither at first nor at rest";
+    return row;
+  }
+  if (last_off == moments.rbegin()) {
+    row.note = fmt::format("not within 1 % of {:.4f} N when relaxation ended, after {:.0f} ms: {:.4f} N",
+                           reference, 1e-3 * us, moments.back().force_N);
+  } else {
+    const double reached = last_off.base()->us;  // the moment after
+    row.time_us = Percentiles{reached, reached, reached, reached};
+    row.note = fmt::format("until within 1 % of {:.4f} N", reference);
+  }
+  const auto asked =
+      std::find_if(moments.rbegin(), moments.rend(), [](const Moment& m) { return m.us <= kAsked_us; });
+  if (asked != moments.rend()) {
+    row.force_error_N = std::fabs(asked->force_N - reference);
+    row.force_error_jnd = *row.force_error_N / std::max(kJndShare * reference, kFloor_N);
+    row.note += "; error after 100 ms";
+  }
+  if (updates > 0) row.ns_per_voxel_update = 1e3 * background_us / static_cast<double>(updates);
+  row.bytes_per_voxel = static_cast<double>(object.memory_bytes()) / static_cast<double>(row.voxels);
+  return row;
+}
+
+// Its relaxation never ends (Fig 22); what it costs to go round once.
+SoftRow classic_row(int edge) {
+  const TickTimer timer;
+  voxel::LabelVolume volume;
+  volume.dims = {edge, edge, edge};
+  volume.labels.assign(
+      static_cast<std::size_t>(edge) * static_cast<std::size_t>(edge) * static_cast<std::size_t>(edge), 1);
+  voxel::LatticeOptions options;
+  options.anchor_faces = {"-z"};
+  voxel::ClassicObject object(volume, options);
+  const auto source = object.at(edge / 2, edge / 2, edge - 1);
+  const glm::vec3 move(0.0F, 0.0F, static_cast<float>(-kDepth * kSpacing));
+  object.move({&source, 1}, {&move, 1});
+  std::vector<double> us;
+  for (int n = 0; n < 5; ++n) {
+    const std::uint64_t before = TickTimer::begin();
+    object.relax_all();
+    us.push_back(timer.us(TickTimer::end() - before));
+  }
+  SoftRow row{.test_case = "relax",
+              .engine = SoftEngine::classic,
+              .voxels = volume.voxel_count(),
+              .material = "homogeneous",
+              .depth_spacings = kDepth};
+  row.repeats = us.size();
+  row.time_us = percentiles(us);
+  row.ns_per_voxel_update = 1e3 * row.time_us->p50 / static_cast<double>(row.voxels);
+  row.bytes_per_voxel = static_cast<double>(object.memory_bytes()) / static_cast<double>(row.voxels);
+  row.note = "one round; it has no end";
+  return row;
+}
+
+}  // namespace
+
+void bench_relaxation(const SoftBenchOptions& options, const std::vector<SoftEngine>& engines,
+                      const AddRow& add) {
+  const int edge = options.quick ? 40 : 100;
+  for (const SoftEngine engine : engines) {
+    if (engine == SoftEngine::classic) {
+      add(classic_row(edge));
+      continue;
+    }
+    for (const Limits& limits : all_limits()) {
+      if (options.progress)
+        options.progress(fmt::format("relaxation of {0} voxels an edge, {1}", edge, limits.name));
+      add(relax_row(edge, limits));
+    }
+  }
+}
+
+}  // namespace hybrid::bench
