@@ -18,6 +18,8 @@ struct SoftBenchOptions {
   bool quick = false;               // waves up to 5 spacings, small blocks, few repeats
   std::vector<std::string> cases;   // empty: all
   std::vector<SoftEngine> engines;  // empty: all
+  std::vector<double> depths;       // of the waves at slack 0.1, in spacings; empty: 5, 10 and 20
+  double wave_s = 2.0;              // spent on repeating one wave, about; at least five times
   std::vector<int> sizes;           // voxels an edge, of sessions and loads; empty: 64 and 128
   double session_s = 2.0;           // of simulated time
   Progress progress;

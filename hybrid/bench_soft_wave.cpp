@@ -24,8 +24,7 @@ struct Engine {
   std::vector<double> us;
 };
 
-constexpr double kSpacing = 1e-3;    // (unit: meter), LabelVolume's own
-constexpr double kRunTime_us = 2e6;  // spent on the repeats of one wave, about
+constexpr double kSpacing = 1e-3;  // (unit: meter), LabelVolume's own
 constexpr std::size_t kLeastRepeats = 5, kMostRepeats = 101;
 
 std::vector<Engine> engines_of(const std::vector<SoftEngine>& names) {
@@ -86,14 +85,14 @@ void add_with_speedup(std::vector<SoftRow> rows, const AddRow& add) {
 
 // Each engine from rest, in turns, so that whatever else the machine does meets all alike.
 void run_wave(const Wave& wave, std::vector<Engine>& engines, const voxel::LabelVolume& volume,
-              const voxel::LatticeOptions& options, const AddRow& add) {
+              const voxel::LatticeOptions& options, double most_us, const AddRow& add) {
   double spent_us = 0.0;
   for (Engine& engine : engines) {
     engine.does->prepare(volume, options, push_of(wave, volume.dims));
     engine.us.clear();
     engine.does->run_us();  // warm
   }
-  for (std::size_t n = 0; n < kMostRepeats && (n < kLeastRepeats || spent_us < kRunTime_us); ++n) {
+  for (std::size_t n = 0; n < kMostRepeats && (n < kLeastRepeats || spent_us < most_us); ++n) {
     for (std::size_t e = 0; e < engines.size(); ++e) {
       Engine& engine = engines[(n + e) % engines.size()];
       engine.does->rest();
@@ -162,7 +161,8 @@ void bench_waves(const SoftBenchOptions& options, const std::vector<SoftEngine>&
       options.progress(fmt::format("a wave {:g} spacings deep at slack {:g} through {}, {} axes", w.depth,
                                    w.slack, w.material, w.axes));
   };
-  const std::vector<double> depths = options.quick ? std::vector{5.0} : std::vector{5.0, 10.0, 20.0};
+  std::vector<double> depths = options.depths;
+  if (depths.empty()) depths = options.quick ? std::vector{5.0} : std::vector{5.0, 10.0, 20.0};
   for (const double depth : depths) {
     for (const std::string& material : wave_materials()) {
       const Wave shape{.material = material, .depth = depth};
@@ -171,14 +171,14 @@ void bench_waves(const SoftBenchOptions& options, const std::vector<SoftEngine>&
       for (const int axes : {1, 3}) {
         const Wave wave{.material = material, .depth = depth, .axes = axes};
         tell(wave);
-        run_wave(wave, engines, volume, limits, add);
+        run_wave(wave, engines, volume, limits, 1e6 * options.wave_s, add);
       }
     }
   }
   for (const Wave& wave : study(options.quick)) {
     tell(wave);
     run_wave(wave, engines, wave_volume(wave.material, dims_for(wave)),
-             wave_options(wave.material, wave.slack), add);
+             wave_options(wave.material, wave.slack), 1e6 * options.wave_s, add);
   }
   if (options.progress) options.progress("100 pushes of a tenth of a spacing into 50 voxels an edge");
   run_pushes(engines, options.quick ? 3 : 15, add);

@@ -88,6 +88,7 @@ nlohmann::ordered_json soft_suite(const BenchCommand& command, std::FILE* words,
   bench::SoftBenchOptions options{.quick = command.quick,
                                   .cases = chosen_of(command.only, bench::soft_cases()),
                                   .engines = {},
+                                  .depths = {},
                                   .sizes = command.sizes,
                                   .progress = progress_on_terminal(),
                                   .on_row = {}};

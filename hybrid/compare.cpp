@@ -10,6 +10,7 @@
 
 #include "hybrid/build_objects.h"
 #include "hybrid/classic_surface.h"
+#include "hybrid/classic_voxels.h"
 #include "hybrid/closed_form.h"
 
 namespace hybrid {
@@ -260,6 +261,10 @@ Comparison compare_models(const Scene& scene, const std::string& object, const P
     if (!is_soft) as_voxels.materials["hard"] = Material{.young_Pa = kHardYoung_Pa, .place = {}};
     as_voxels.soft.back().anchors.rigid_within_m = 0.0;  // nothing rigid is left to be held by
     result.models.push_back(run_model("voxels", as_voxels, progress));
+  }
+  if (is_soft && !punch) {  // its tool is a centre and six points around it
+    if (progress) progress("feeling it as classic");
+    result.models.push_back(classic_voxels(scene, *soft, result.models.back().rows));
   }
   if (result.models.empty()) {
     throw std::runtime_error(

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // One object of a scene felt in several ways along the same motion: as mesh and proxy, as voxels where it has
-// any, a rigid one by the surface nearest to the device (no proxy: thesis, Fig 18), and in closed form where
-// one applies (ball, box or block under a ball; flat punch on a block).
+// any, a rigid one by the surface nearest to the device (no proxy: thesis, Fig 18), a soft one also by the
+// thesis's own algorithm (voxel/classic.h), and in closed form where one applies (ball, box or block under a
+// ball; flat punch on a block).
 #pragma once
 
 #include <string>
@@ -12,8 +13,8 @@
 namespace hybrid {
 
 struct ModelResult {
-  std::string
-      name;  // "mesh and proxy", "nearest-surface", "voxels", "hertz", "flat punch", "rigid closed form"
+  std::string name;  // "mesh and proxy", "nearest-surface", "voxels", "classic", "hertz", "flat punch",
+                     // "rigid closed form"
   std::vector<TraceRow> rows;
   std::vector<double>
       depth_m;  // of the device in the undeformed object, [row]; negative outside; empty where unknown

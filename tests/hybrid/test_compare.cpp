@@ -63,6 +63,9 @@ TEST_F(Compare, TheCubeAsProxyVoxelsAndHertz) {
   ASSERT_NE(named(c, "hertz"), nullptr);
   EXPECT_EQ(c.models[c.reference].name, "voxels");  // Hertz leaves the core out
   EXPECT_GT(max_force(*named(c, "mesh and proxy")), max_force(*named(c, "voxels")));
+  ASSERT_NE(named(c, "classic"), nullptr);  // the thesis's own: it feels the block, and is off
+  EXPECT_GT(max_force(*named(c, "classic")), 0.05);
+  EXPECT_GT(named(c, "classic")->rms_N, named(c, "hertz")->rms_N);
 }
 
 TEST_F(Compare, ABallsProxyIsItsClosedFormWithinOnePercent) {
