@@ -137,18 +137,18 @@ TEST(Classic, ALockChangesNothingThatIsFelt) {
 
 // ---- the faults it is known for
 
-// A block of random materials, two sources that can both be had, and beside it an anchored voxel that has no
+// A block of random materials, sources that can all be had, and beside it an anchored voxel that has no
 // link to it (a lattice must be held somewhere).
-struct TwoSources {
+struct Sources {
   voxel::LabelVolume volume = tests::block({9, 6, 5}, glm::dvec3(1e-3));
   voxel::LatticeOptions options;
-  std::array<std::array<int, 3>, 2> at{};
-  std::array<glm::vec3, 2> move{};
+  std::vector<std::array<int, 3>> at;
+  std::vector<glm::vec3> move;
   std::array<std::vector<double>, 3> expected;  // [axis][voxel]: clamp(0, L, U)
 };
 
 // Bounds of u(b) − u(a) for neighbours a, b = a + d: along the link, across it.
-std::array<double, 2> bounds(const TwoSources& c, std::size_t a, std::size_t b, bool along) {
+std::array<double, 2> bounds(const Sources& c, std::size_t a, std::size_t b, bool along) {
   const auto &m = c.options.materials[c.volume.labels[a]], &n = c.options.materials[c.volume.labels[b]];
   const double h = c.volume.spacing_m.x, across = 0.5 * (m.shear + n.shear) * h;
   if (!along) return {-across, across};
@@ -157,7 +157,7 @@ std::array<double, 2> bounds(const TwoSources& c, std::size_t a, std::size_t b, 
 }
 
 // L and U of sources at displacement u, by Bellman and Ford.
-void paths_from(const TwoSources& c, int axis, std::size_t source, double u, std::vector<double>& low,
+void paths_from(const Sources& c, int axis, std::size_t source, double u, std::vector<double>& low,
                 std::vector<double>& high) {
   low[source] = std::max(low[source], u);
   high[source] = std::min(high[source], u);
@@ -185,8 +185,10 @@ void paths_from(const TwoSources& c, int axis, std::size_t source, double u, std
   }
 }
 
-TwoSources two_sources(Random& random, bool homogeneous) {
-  TwoSources c;
+Sources random_sources(Random& random, bool homogeneous, std::size_t count) {
+  Sources c;
+  c.at.resize(count);
+  c.move.resize(count);
   for (std::size_t n = 0; n < c.volume.labels.size(); ++n) {
     const std::size_t i = n % 9;
     c.volume.labels[n] = static_cast<std::uint8_t>(i == 7 ? 0 : 1 + random.below(homogeneous ? 1 : 3));
@@ -198,11 +200,11 @@ TwoSources two_sources(Random& random, bool homogeneous) {
   }
   c.options.anchor_faces = {"+x"};
   for (auto& at : c.at) at = {random.below(7), random.below(6), random.below(5)};
-  if (c.at[0] == c.at[1]) c.at[1][0] = (c.at[1][0] + 3) % 7;
+  if (count > 1 && c.at[0] == c.at[1]) c.at[1][0] = (c.at[1][0] + 3) % 7;
   for (int axis = 0; axis < 3; ++axis) {
     auto& expected = c.expected[static_cast<std::size_t>(axis)];
     std::vector<double> low(c.volume.labels.size(), -1e300), high(c.volume.labels.size(), 1e300);
-    for (std::size_t s = 0; s < 2; ++s) {
+    for (std::size_t s = 0; s < count; ++s) {
       const std::size_t v = c.volume.index(c.at[s][0], c.at[s][1], c.at[s][2]);
       // The second where the first leaves it, and mostly the other way.
       const double wanted = (s == 0 ? 1.0 : -0.9) * random.between(0.0, 2e-3);
@@ -217,7 +219,7 @@ TwoSources two_sources(Random& random, bool homogeneous) {
 }
 
 template <class Place>  // place(i, j, k): the displacement of a voxel
-bool elsewhere(const TwoSources& c, const Place& place) {
+bool elsewhere(const Sources& c, const Place& place) {
   for (std::size_t v = 0; v < c.volume.labels.size(); ++v) {
     if (c.volume.labels[v] == 0) continue;
     const glm::vec3 u = place(static_cast<int>(v % 9), static_cast<int>(v / 9 % 6), static_cast<int>(v / 54));
@@ -229,21 +231,21 @@ bool elsewhere(const TwoSources& c, const Place& place) {
   return false;
 }
 
-bool classic_ends_elsewhere(const TwoSources& c) {
+bool classic_ends_elsewhere(const Sources& c) {
   ClassicObject object(c.volume, c.options);
-  const std::array sources{object.at(c.at[0][0], c.at[0][1], c.at[0][2]),
-                           object.at(c.at[1][0], c.at[1][1], c.at[1][2])};
+  std::vector<ElementId> sources;
+  for (const auto& at : c.at) sources.push_back(object.at(at[0], at[1], at[2]));
   object.move(sources, c.move);
   return elsewhere(c, [&](int i, int j, int k) { return object.displacement(object.at(i, j, k)); });
 }
 
-bool chain_ends_elsewhere(const TwoSources& c) {
+bool chain_ends_elsewhere(const Sources& c) {
   const voxel::Lattice lattice(c.volume, c.options);
   voxel::Displacement state(lattice);
   voxel::ChainMail chain(lattice);
-  std::array<voxel::VoxelId, 2> sources{};
-  for (std::size_t s = 0; s < 2; ++s) {
-    sources[s] = tests::voxel_at(lattice, c.at[s][0], c.at[s][1], c.at[s][2]);
+  std::vector<voxel::VoxelId> sources;
+  for (std::size_t s = 0; s < c.at.size(); ++s) {
+    sources.push_back(tests::voxel_at(lattice, c.at[s][0], c.at[s][1], c.at[s][2]));
     state.set(sources[s], glm::dvec3(c.move[s]));
   }
   chain.settle(state, sources, c.move, {}, {});
@@ -251,20 +253,29 @@ bool chain_ends_elsewhere(const TwoSources& c) {
       c, [&](int i, int j, int k) { return glm::vec3(state.at(tests::voxel_at(lattice, i, j, k))); });
 }
 
-TEST(ClassicFaults, TwoSourcesEndElsewhereThanTheirDefinition) {
-  for (const bool homogeneous : {true, false}) {
-    Random random(homogeneous ? 11 : 12);
-    int classic = 0, chain = 0;
-    for (int n = 0; n < 200; ++n) {
-      const TwoSources c = two_sources(random, homogeneous);
-      classic += classic_ends_elsewhere(c) ? 1 : 0;
-      chain += chain_ends_elsewhere(c) ? 1 : 0;
+// One source is enough where materials differ: a voxel that a slow way has reached first pulls back what a
+// fast way has moved further, the source too (Schill, Gibson, Bauer & Männer, Biomechanical simulation of the
+// vitreous humor in the eye using an Enhanced ChainMail Algorithm, 1998).
+TEST(ClassicFaults, SourcesEndElsewhereThanTheirDefinition) {
+  for (const std::size_t sources : {1U, 2U}) {
+    for (const bool homogeneous : {true, false}) {
+      Random random(homogeneous ? 11 : 12);
+      int classic = 0, chain = 0;
+      for (int n = 0; n < 200; ++n) {
+        const Sources c = random_sources(random, homogeneous, sources);
+        classic += classic_ends_elsewhere(c) ? 1 : 0;
+        chain += chain_ends_elsewhere(c) ? 1 : 0;
+      }
+      std::cout << "[ measured ] " << (homogeneous ? "homogeneous, " : "random materials, ") << sources
+                << " sources: classic ends elsewhere in " << classic << " of 200, the chain in " << chain
+                << "\n";
+      if (homogeneous && sources == 1) {
+        EXPECT_EQ(classic, 0) << "every shortest way has as many links, and the queue goes by links";
+      } else {
+        EXPECT_GT(classic, homogeneous ? 5 : 50);
+      }
+      EXPECT_EQ(chain, 0);
     }
-    std::cout << "[ measured ] " << (homogeneous ? "homogeneous" : "random materials")
-              << ", two sources: classic ends elsewhere in " << classic << " of 200, the chain in " << chain
-              << "\n";
-    EXPECT_GT(classic, homogeneous ? 5 : 50);
-    EXPECT_EQ(chain, 0);
   }
 }
 
