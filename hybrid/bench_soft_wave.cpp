@@ -29,6 +29,7 @@ constexpr std::size_t kLeastRepeats = 5, kMostRepeats = 101;
 
 std::vector<Engine> engines_of(const std::vector<SoftEngine>& names) {
   std::vector<Engine> engines;
+  engines.reserve(names.size());
   for (const SoftEngine name : names) engines.push_back({name, make_wave_engine(name), {}});
   return engines;
 }
@@ -101,6 +102,7 @@ void run_wave(const Wave& wave, std::vector<Engine>& engines, const voxel::Label
     }
   }
   std::vector<SoftRow> rows;
+  rows.reserve(engines.size());
   for (Engine& engine : engines) rows.push_back(row_of(wave, engine, volume, options));
   add_with_speedup(std::move(rows), add);
 }

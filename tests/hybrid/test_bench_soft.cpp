@@ -12,7 +12,6 @@
 
 namespace {
 
-using hybrid::bench::Growth;
 using hybrid::bench::look_at;
 using hybrid::bench::Push;
 using hybrid::bench::SoftBenchOptions;
