@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The soft energies solved plainly: springs and bricks in a list, conjugate gradients, doubles. Slow and short, and
-// independent of the store and the solver that it is the reference for.
+// The soft energies solved plainly: springs and bricks in a list, conjugate gradients, doubles. Slow and
+// short, and independent of the store and the solver that it is the reference for.
 #pragma once
 
 #include <Eigen/Core>
@@ -53,8 +53,8 @@ struct PlainProblem {
     }
   }
 
-  // Relaxes u to the least energy; false where it does not come down to `tolerance` of where it began. Nodes that
-  // nothing holds stay.
+  // Relaxes u to the least energy; false where it does not come down to `tolerance` of where it began. Nodes
+  // that nothing holds stay.
   [[nodiscard]] bool solve(double tolerance, int most = 5000) {
     const std::size_t n = u.size();
     std::vector<Eigen::Vector3d> r(n), p(n), q(n);
@@ -65,8 +65,7 @@ struct PlainProblem {
     }
     for (const PlacedBrick& b : placed) {
       for (int c = 0; c < 8; ++c)
-        weight[b.node[static_cast<std::size_t>(c)]] +=
-            bricks[b.kind].diagonal().segment<3>(3 * c).sum();
+        weight[b.node[static_cast<std::size_t>(c)]] += bricks[b.kind].diagonal().segment<3>(3 * c).sum();
     }
     for (double& w : weight) w = w > 0.0 ? 3.0 / w : 0.0;
     apply(u, q);

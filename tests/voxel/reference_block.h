@@ -35,8 +35,8 @@ inline std::vector<ReferenceRow> reference_rows(const std::filesystem::path& fol
   return rows;
 }
 
-// Labels are 1 for 10 kPa and what the row's material adds. A voxel on an interface is of the stiffer side, as one
-// on the surface is of the object.
+// Labels are 1 for 10 kPa and what the row's material adds. A voxel on an interface is of the stiffer side,
+// as one on the surface is of the object.
 inline std::vector<double> young_by_label(const std::string& material) {
   if (material == "layers") return {0.0, 1e4, 3e4, 5e3};
   if (material == "inclusion") return {0.0, 1e4, 1e5};

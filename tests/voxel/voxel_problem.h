@@ -38,42 +38,46 @@ struct VoxelBody {
   }
 };
 
-inline voxel::ParallelLinks parallels(const VoxelBody& body, std::array<int, 3> a, std::size_t d) {
-  const auto there = [&](int p, int q) {
-    std::array<int, 3> from = a;
-    from[(d + 1) % 3] += p;
-    from[(d + 2) % 3] += q;
-    std::array<int, 3> to = from;
-    ++to[d];
-    return body.label_at(from) != 0 && body.label_at(to) != 0;
-  };
-  return {there(-1, 0),  there(1, 0),  there(0, -1), there(0, 1),
-          there(-1, -1), there(1, -1), there(-1, 1), there(1, 1)};
+inline voxel::LinkModuli moduli_at(const VoxelBody& body, std::array<int, 3> c) {
+  const int label = body.label_at(c);
+  if (label == 0) return {};
+  const Tissue& t = body.tissue[static_cast<std::size_t>(label)];
+  return {t.young_Pa, voxel::across_modulus_Pa(t.young_Pa, t.poisson)};
+}
+
+// Springs of the link that leaves voxel `a` in +d (N/m, by axis).
+inline Eigen::Vector3d link_springs(const VoxelBody& body, std::array<int, 3> a, std::size_t d) {
+  std::array<voxel::LinkModuli, 9> links;
+  for (int q = -1; q <= 1; ++q) {
+    for (int p = -1; p <= 1; ++p) {
+      std::array<int, 3> from = a;
+      from[(d + 1) % 3] += p;
+      from[(d + 2) % 3] += q;
+      std::array<int, 3> to = from;
+      ++to[d];
+      links[static_cast<std::size_t>(p + 1 + 3 * (q + 1))] =
+          voxel::softer(moduli_at(body, from), moduli_at(body, to));
+    }
+  }
+  const voxel::LinkModuli moduli = voxel::link_moduli(links);
+  const glm::dvec3 h = body.spacing_m;
+  const int axis = static_cast<int>(d);
+  Eigen::Vector3d stiffness = Eigen::Vector3d::Constant(moduli.across_Pa);
+  stiffness[axis] = moduli.along_Pa;
+  return h.x * h.y * h.z / (h[axis] * h[axis]) * stiffness;
 }
 
 inline void add_springs(const VoxelBody& body, PlainProblem& out) {
-  const glm::dvec3 h = body.spacing_m;
   for (int k = 0; k < body.dims[2]; ++k) {
     for (int j = 0; j < body.dims[1]; ++j) {
       for (int i = 0; i < body.dims[0]; ++i) {
-        const int first = body.label_at({i, j, k});
-        if (first == 0) continue;
+        if (body.label_at({i, j, k}) == 0) continue;
         for (std::size_t d = 0; d < 3; ++d) {
           std::array<int, 3> other{i, j, k};
           ++other[d];
-          const int second = body.label_at(other);
-          if (second == 0) continue;
-          const int axis = static_cast<int>(d);
-          const double scale =
-              voxel::link_weight(parallels(body, {i, j, k}, d)) * h.x * h.y * h.z / (h[axis] * h[axis]);
-          const auto series = [](double a, double b) { return 2.0 * a * b / (a + b); };
-          const Tissue &s = body.tissue[static_cast<std::size_t>(first)],
-                       &t = body.tissue[static_cast<std::size_t>(second)];
-          const double across = series(voxel::across_modulus_Pa(s.young_Pa, s.poisson),
-                                       voxel::across_modulus_Pa(t.young_Pa, t.poisson));
-          Eigen::Vector3d stiffness = Eigen::Vector3d::Constant(across);
-          stiffness[axis] = series(s.young_Pa, t.young_Pa);
-          out.springs.push_back({body.at(i, j, k), body.at(other[0], other[1], other[2]), scale * stiffness});
+          if (body.label_at(other) == 0) continue;
+          out.springs.push_back(
+              {body.at(i, j, k), body.at(other[0], other[1], other[2]), link_springs(body, {i, j, k}, d)});
         }
       }
     }
