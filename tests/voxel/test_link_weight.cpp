@@ -107,12 +107,14 @@ TEST(LinkModuli, OfAStiffSheetInSoftTissueAreTheSheets) {
   EXPECT_DOUBLE_EQ(link_moduli(links).across_Pa, 0.5 * 3e5 + 0.5 * 3e2);
 }
 
-// The two energies live in the same cells: stretched as a whole along an axis, at ν 0, a body without thin parts
-// takes the same energy in both, edges, notches and materials that meet at a corner included.
+// The two energies live in the same cells: stretched as a whole along an axis, at ν 0, a body without thin
+// parts takes the same energy in both, edges, notches and materials that meet at a corner included.
 TEST(LinkModuli, AgreeWithTheBricksOnUniformStretch) {
   constexpr int n = 8;
-  tests::VoxelBody body{
-      {n, n, n}, {1e-3, 2e-3, 0.5e-3}, std::vector<int>(n * n * n, 0), {{0, 0}, {1e4, 0}, {3e4, 0}, {7e4, 0}}};
+  tests::VoxelBody body{{n, n, n},
+                        {1e-3, 2e-3, 0.5e-3},
+                        std::vector<int>(n * n * n, 0),
+                        {{0, 0}, {1e4, 0}, {3e4, 0}, {7e4, 0}}};
   const auto fill = [&body](std::array<int, 3> low, std::array<int, 3> high, int label) {
     for (int k = low[2]; k <= high[2]; ++k) {
       for (int j = low[1]; j <= high[1]; ++j) {
