@@ -109,7 +109,7 @@ BrickStiffness brick_stiffness(double young_Pa, double poisson, const glm::dvec3
 }
 
 NodeStencil node_stencil(const BricksAround& bricks) {
-  std::array<std::array<double, 9>, 27> sum{};
+  std::array<std::array<double, 12>, 27> sum{};
   for (std::size_t octant = 0; octant < 8; ++octant) {
     if (bricks[octant] == nullptr) continue;
     const std::size_t self = 7 - octant;  // the brick's corner that is the node
@@ -121,13 +121,13 @@ NodeStencil node_stencil(const BricksAround& bricks) {
       }
       for (std::size_t r = 0; r < 3; ++r) {
         for (std::size_t c = 0; c < 3; ++c)
-          sum[o][3 * r + c] += bricks[octant]->at(3 * self + r, 3 * corner + c);
+          sum[o][4 * c + r] += bricks[octant]->at(3 * self + r, 3 * corner + c);
       }
     }
   }
   NodeStencil out;
   for (std::size_t o = 0; o < 27; ++o) {
-    for (std::size_t e = 0; e < 9; ++e) out.block[o][e] = static_cast<float>(sum[o][e]);
+    for (std::size_t e = 0; e < 12; ++e) out.block[o][e] = static_cast<float>(sum[o][e]);
   }
   return out;
 }

@@ -39,7 +39,7 @@ using BricksAround = std::array<const BrickStiffness*, 8>;
 // Differences, because then a rigid shift, however large, is exactly no force in floats. Each block is 3×3,
 // row by row; block[13], which the sum does not need, is the diagonal one: the node's own stiffness.
 struct NodeStencil {
-  std::array<std::array<float, 9>, 27> block{};
+  alignas(16) std::array<std::array<float, 12>, 27> block{};
 };
 
 [[nodiscard]] NodeStencil node_stencil(const BricksAround& bricks);
