@@ -81,7 +81,7 @@ inline double pressed_block(const ReferenceRow& row, Energy energy) {
     }
   }
   // The energy is right to the square of the residual.
-  if (!problem.solve(1e-4)) return std::numeric_limits<double>::quiet_NaN();
+  if (!problem.solve(3e-4)) return std::numeric_limits<double>::quiet_NaN();
   return 4.0 * 2.0 * problem.energy_J() / depth;
 }
 

@@ -46,7 +46,8 @@ inline voxel::LinkModuli moduli_at(const VoxelBody& body, std::array<int, 3> c) 
 }
 
 // Springs of the link that leaves voxel `a` in +d (N/m, by axis).
-inline Eigen::Vector3d link_springs(const VoxelBody& body, std::array<int, 3> a, std::size_t d) {
+inline Eigen::Vector3d link_springs(const VoxelBody& body, std::array<int, 3> a, std::size_t d,
+                                    Energy energy) {
   std::array<voxel::LinkModuli, 9> links;
   for (int q = -1; q <= 1; ++q) {
     for (int p = -1; p <= 1; ++p) {
@@ -59,7 +60,8 @@ inline Eigen::Vector3d link_springs(const VoxelBody& body, std::array<int, 3> a,
           voxel::softer(moduli_at(body, from), moduli_at(body, to));
     }
   }
-  const voxel::LinkModuli moduli = voxel::link_moduli(links);
+  const voxel::LinkModuli moduli =
+      energy == Energy::six_link ? voxel::link_moduli(links) : voxel::link_moduli_beside_bricks(links);
   const glm::dvec3 h = body.spacing_m;
   const int axis = static_cast<int>(d);
   Eigen::Vector3d stiffness = Eigen::Vector3d::Constant(moduli.across_Pa);
@@ -67,7 +69,7 @@ inline Eigen::Vector3d link_springs(const VoxelBody& body, std::array<int, 3> a,
   return h.x * h.y * h.z / (h[axis] * h[axis]) * stiffness;
 }
 
-inline void add_springs(const VoxelBody& body, PlainProblem& out) {
+inline void add_springs(const VoxelBody& body, Energy energy, PlainProblem& out) {
   for (int k = 0; k < body.dims[2]; ++k) {
     for (int j = 0; j < body.dims[1]; ++j) {
       for (int i = 0; i < body.dims[0]; ++i) {
@@ -76,8 +78,9 @@ inline void add_springs(const VoxelBody& body, PlainProblem& out) {
           std::array<int, 3> other{i, j, k};
           ++other[d];
           if (body.label_at(other) == 0) continue;
-          out.springs.push_back(
-              {body.at(i, j, k), body.at(other[0], other[1], other[2]), link_springs(body, {i, j, k}, d)});
+          const Eigen::Vector3d stiffness = link_springs(body, {i, j, k}, d, energy);
+          if (stiffness.isZero()) continue;
+          out.springs.push_back({body.at(i, j, k), body.at(other[0], other[1], other[2]), stiffness});
         }
       }
     }
@@ -116,7 +119,7 @@ inline void add_bricks(const VoxelBody& body, PlainProblem& out) {
 
 inline PlainProblem problem_of(const VoxelBody& body, Energy energy) {
   PlainProblem out(body.label.size());
-  if (energy == Energy::six_link) add_springs(body, out);
+  add_springs(body, energy, out);
   if (energy == Energy::accurate) add_bricks(body, out);
   return out;
 }
