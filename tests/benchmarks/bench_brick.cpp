@@ -51,7 +51,7 @@ const voxel::BrickStiffness& brick() {
 void bricks_in_one_material(benchmark::State& state) {
   Field field(static_cast<std::size_t>(state.range(0)));
   const voxel::NodeStencil stencil = voxel::node_stencil(brick());
-  for (auto _ : state) {
+  while (state.KeepRunning()) {
     field.each_row([&](std::size_t first) {
       voxel::row_forces(stencil, field.view(), first, field.n - 2,
                         {&field.force[0][first], &field.force[1][first], &field.force[2][first]});
@@ -63,7 +63,7 @@ void bricks_in_one_material(benchmark::State& state) {
 void bricks_by_stencil(benchmark::State& state) {
   Field field(static_cast<std::size_t>(state.range(0)));
   const voxel::NodeStencil stencil = voxel::node_stencil(brick());
-  for (auto _ : state) {
+  while (state.KeepRunning()) {
     field.each_row([&](std::size_t first) {
       for (std::size_t v = first; v < first + field.n - 2; ++v) {
         const auto f = voxel::node_force(stencil, field.view(), v);
@@ -79,7 +79,7 @@ void bricks_by_brick(benchmark::State& state) {
   const voxel::BrickFloats floats = voxel::in_floats(brick());
   const std::array<const voxel::BrickFloats*, 8> around{&floats, &floats, &floats, &floats,
                                                         &floats, &floats, &floats, &floats};
-  for (auto _ : state) {
+  while (state.KeepRunning()) {
     field.each_row([&](std::size_t first) {
       for (std::size_t v = first; v < first + field.n - 2; ++v) {
         const auto f = voxel::node_force(around, field.view(), v);
@@ -108,7 +108,7 @@ HYBRID_WIDE void six_link_row(const voxel::NodeField& field, std::size_t first, 
 
 void six_links(benchmark::State& state) {
   Field field(static_cast<std::size_t>(state.range(0)));
-  for (auto _ : state) {
+  while (state.KeepRunning()) {
     field.each_row([&](std::size_t first) {
       six_link_row(field.view(), first, field.n - 2,
                    {&field.force[0][first], &field.force[1][first], &field.force[2][first]});

@@ -100,7 +100,10 @@ TEST(BrickElement, ReproducesAConstantStrainInAPatch) {
   patch.bricks.push_back(matrix_of(brick_stiffness(1e4, 0.45, h)));
   Eigen::Matrix3d gradient;
   gradient << 1e-2, 2e-3, -1e-3, 5e-3, -4e-3, 3e-3, 2e-3, -6e-3, 7e-3;
-  const auto at = [](int i, int j, int k) { return static_cast<std::size_t>((k * n + j) * n + i); };
+  const auto at = [](int i, int j, int k) {
+    const int number = (k * n + j) * n + i;
+    return static_cast<std::size_t>(number);
+  };
   std::vector<Eigen::Vector3d> expected(patch.u.size());
   for (int k = 0; k < n; ++k) {
     for (int j = 0; j < n; ++j) {
@@ -128,9 +131,10 @@ TEST(BrickElement, ReproducesAConstantStrainInAPatch) {
 double cantilever_stiffness(double poisson, int long_, int thick, double edge) {
   const glm::dvec3 h(edge, 1e-3, 1e-3);
   const auto at = [&](int i, int j, int k) {
-    return static_cast<std::size_t>((k * (thick + 1) + j) * (long_ + 1) + i);
+    const int number = (k * (thick + 1) + j) * (long_ + 1) + i;
+    return static_cast<std::size_t>(number);
   };
-  tests::PlainProblem beam(static_cast<std::size_t>((long_ + 1) * (thick + 1) * (thick + 1)));
+  tests::PlainProblem beam(at(long_, thick, thick) + 1);
   beam.bricks.push_back(matrix_of(brick_stiffness(1e4, poisson, h)));
   const double depth = 1e-4;
   for (int k = 0; k <= thick; ++k) {

@@ -30,7 +30,8 @@ struct Field {
     }
   }
   [[nodiscard]] static std::size_t at(int i, int j, int k) {
-    return static_cast<std::size_t>((k * kY + j) * kX + i);
+    const int number = (k * kY + j) * kX + i;
+    return static_cast<std::size_t>(number);
   }
   [[nodiscard]] NodeField view() const { return {{u[0].data(), u[1].data(), u[2].data()}, kX, kX * kY}; }
 };

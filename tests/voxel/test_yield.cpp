@@ -51,7 +51,8 @@ TEST(Yield, LeavesNoLimitOfTheChain) {
 
 TEST(Yield, ForceIsTheSlopeOfItsEnergy) {
   const double k = 30.0, y = 1e-4, offset = 5e-5, step = 1e-9;
-  for (double difference = -4e-4; difference < 4e-4; difference += 1.3e-5) {
+  for (int at = -30; at <= 30; ++at) {
+    const double difference = 1.31e-5 * at;
     const double slope =
         (link_energy_J(k, difference + step, offset, y) - link_energy_J(k, difference - step, offset, y)) /
         (2 * step);

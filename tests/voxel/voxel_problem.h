@@ -56,8 +56,8 @@ inline Eigen::Vector3d link_springs(const VoxelBody& body, std::array<int, 3> a,
       from[(d + 2) % 3] += q;
       std::array<int, 3> to = from;
       ++to[d];
-      links[static_cast<std::size_t>(p + 1 + 3 * (q + 1))] =
-          voxel::softer(moduli_at(body, from), moduli_at(body, to));
+      const int number = p + 1 + 3 * (q + 1);
+      links[static_cast<std::size_t>(number)] = voxel::softer(moduli_at(body, from), moduli_at(body, to));
     }
   }
   const voxel::LinkModuli moduli =
