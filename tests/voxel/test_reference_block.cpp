@@ -40,8 +40,8 @@ TEST(ReferenceBlock, TheAccurateEnergyIsTheFiniteElements) {
   std::cout << "accurate | every row | within " << 100 * worst << " %\n";
 }
 
-// Nearly incompressible: what locks in volume is far too stiff on a coarse grid and falls with its spacing. Without
-// locking the spacing matters as little as at ν 0.3, 3 %.
+// Nearly incompressible: what locks in volume is far too stiff on a coarse grid and falls with its spacing.
+// Without locking the spacing matters as little as at ν 0.3, 3 %.
 TEST(ReferenceBlock, TheAccurateEnergyDoesNotLockInVolume) {
   const tests::ReferenceRow coarse{"hom", 0.005, 0.04, 0.499, 0.0}, fine{"hom", 0.0025, 0.04, 0.499, 0.0};
   const double at_coarse = tests::pressed_block(coarse, Energy::accurate),
