@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/vec3.hpp>
+#include <limits>
 #include <map>
 #include <optional>
 #include <stdexcept>
@@ -45,6 +46,9 @@ struct Material {
   double stretch_min = 0.4;  // shortest a link may become, of its rest length; 0 < min <= 1
   double stretch_max = 1.6;  // longest, >= 1
   double shear = 0.6;        // most a link's ends may slip across it, of its rest length; >= 0
+  // Strain beyond which a link keeps what is beyond (voxel/yield.h), of its rest length; > 0, infinite:
+  // never.
+  double yield = std::numeric_limits<double>::infinity();
   SourcePlace place;
 };
 
