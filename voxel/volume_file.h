@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Volumes in and out of files. The only part of the project that knows ITK.
+// Volumes out of files. The only part of the project that knows ITK. (Into files: volume_writer.h.)
 // Frame: whatever the format, positions come out in ITK's (and DICOM's) world frame, in which x points to the
 // patient's left, y to the back and z to the head (LPS). That frame is the scene's. NIfTI files state theirs
 // as RAS (x right, y front), so their x and y change sign here and again on saving: viewers see the same
@@ -68,9 +68,5 @@ struct VolumeStatistics {
 };
 VolumeStatistics read_volume_statistics(const std::filesystem::path& path,
                                         std::uint64_t max_bytes = 8ULL << 30);
-
-// Writes labels with their frame as NIfTI/NRRD/MetaImage, by extension. NRRD and MetaImage keep the frame to
-// double precision, NIfTI to single. Throws VolumeError.
-void save_volume(const std::filesystem::path& path, const LabelVolume& volume, double unit_m = 1e-3);
 
 }  // namespace voxel
