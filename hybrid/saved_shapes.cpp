@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <algorithm>
+#include <array>
 #include <cctype>
 #include <set>
 #include <stdexcept>
@@ -27,6 +27,8 @@ class SoftSlices {
     frame_.spacing_m = lattice.spacing_m();
     frame_.rotation = back * body.pose.rotation;
     frame_.origin_m = back * (body.pose.origin - pose.position_m);
+    for (std::size_t n = 0; n < 256; ++n) label_[n] = static_cast<std::uint8_t>(n);
+    for (const auto& [strut, label] : body.struts) label_[strut] = label;
   }
   [[nodiscard]] const voxel::VolumeFrame& frame() const { return frame_; }
   [[nodiscard]] std::size_t voxels() const {
@@ -34,7 +36,7 @@ class SoftSlices {
   }
 
   void labels(int k, std::span<std::uint8_t> out) const {
-    for_each(k, [&](std::size_t n, voxel::VoxelId v) { out[n] = object_.lattice().label(v); });
+    for_each(k, [&](std::size_t n, voxel::VoxelId v) { out[n] = label_[object_.lattice().label(v)]; });
   }
   // Along the axes of the volume; 0 where there is no tissue. (unit: meter)
   void displacement(int k, std::span<glm::vec3> out) const {
@@ -54,6 +56,7 @@ class SoftSlices {
 
   const voxel::SoftObject& object_;
   voxel::VolumeFrame frame_;
+  std::array<std::uint8_t, 256> label_{};  // as the object's source has it
 };
 
 std::string as_file_name(std::string name) {

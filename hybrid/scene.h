@@ -160,6 +160,14 @@ struct Anchors {
   std::vector<std::uint8_t> labels;
   double rigid_within_m = 0.0;  // voxels this near to a rigid surface are held by it; 0: none
 };
+// Inside of what is stiff, fewer voxels; see voxel/thinning.h.
+struct Thinning {
+  std::vector<std::uint8_t> labels;  // empty: those whose material is at least this stiff
+  double above_Pa = 0.0;
+  int every = 3;
+  int shell = 2;  // default: every - 1
+  SourcePlace place;
+};
 struct SoftDescription {
   std::string name;
   SoftSource source;
@@ -168,6 +176,7 @@ struct SoftDescription {
   std::string material;                           // name; empty: the default Material
   Anchors anchors;
   std::uint32_t budget = 12'000;  // voxel updates of background relaxation a tick
+  std::optional<Thinning> thinning{};
   SourcePlace place, source_place;
 };
 

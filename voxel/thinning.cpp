@@ -23,8 +23,8 @@ template <typename... Parts>
 void check(const LabelVolume& volume, const ThinningOptions& options) {
   if (options.every < 2 || options.every > 64)
     refuse("thinning keeps every ", options.every, "th row of voxels; use every = 2 to 64");
-  if (options.shell < 1 || options.shell > 8)
-    refuse("thinning keeps a shell ", options.shell, " voxels thick; use shell = 1 to 8");
+  if (options.shell < 1 || options.shell > 63)
+    refuse("thinning keeps a shell ", options.shell, " voxels thick; use shell = 1 to 63");
   const glm::dvec3& h = volume.spacing_m;
   const double smallest = std::min({h.x, h.y, h.z}), largest = std::max({h.x, h.y, h.z});
   const double middle = h.x + h.y + h.z - smallest - largest;

@@ -13,7 +13,7 @@ namespace voxel {
 struct ThinningOptions {
   std::vector<std::uint8_t> labels;  // the stiff ones
   int every = 3;                     // 2..64: inside, voxels stay in every n-th row and column only
-  int shell = 1;  // 1..8: so many voxels under the surface of the stiff region stay as they are
+  int shell = 1;  // 1..63: so many voxels under the surface of the stiff region stay as they are
   // Of what touches the object (unit: meter), and the longest a link of the shell may become, in rest
   // lengths: between them the tool must not fit through the shell, behind which there is nothing any more.
   double tool_radius_m = 0.0;
