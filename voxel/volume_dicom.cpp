@@ -233,31 +233,30 @@ DicomSeries read_dicom_header(const fs::path& folder, double unit_m) {
   return series;
 }
 
-void read_dicom_voxels(const fs::path& folder, DicomSeries& series) {
-  VolumeData& data = series.data;
+std::unique_ptr<SharedMemory> read_dicom_voxels(const fs::path& folder, const DicomSeries& series) {
+  const VolumeData& data = series.data;
   const std::vector<std::string>& files = series.files;
   const std::size_t voxels = data.header.bytes / size_of(data.component) / files.size();
   const std::size_t slice_bytes = voxels * size_of(data.component);
   const SharedMemory states(files.size() * sizeof(SharedSlice));
-  const SharedMemory memory(data.header.bytes);
+  auto memory = std::make_unique<SharedMemory>(data.header.bytes);
   auto* shared = new (states.data()) SharedSlice[files.size()];
   for_each_apart(folder, files, shared, [&](std::size_t n) {
-    VolumeData slice;
-    std::vector<std::byte> doubles;
+    Component component{};
+    std::vector<std::byte> bytes;
     in_words(files[n], "the slice cannot be read", kDamaged, [&] {
       const auto io = itk::GDCMImageIO::New();
       io->SetFileName(files[n]);
       io->ReadImageInformation();
-      slice.component = component_of(*io).value();
-      slice.bytes.resize(voxels * size_of(slice.component));
-      read_voxels(*io, slice.bytes);
+      component = component_of(*io).value();
+      bytes.resize(voxels * size_of(component));
+      read_voxels(*io, bytes);
     });
-    if (slice.component != data.component) append_as_doubles(slice, doubles);
-    const std::vector<std::byte>& bytes = doubles.empty() ? slice.bytes : doubles;
+    if (component != data.component) bytes = as_doubles(component, bytes);
     std::copy_n(bytes.begin(), std::min(bytes.size(), slice_bytes),
-                memory.data() + static_cast<std::ptrdiff_t>(n * slice_bytes));
+                memory->data() + static_cast<std::ptrdiff_t>(n * slice_bytes));
   });
-  data.bytes.assign(memory.data(), memory.data() + data.header.bytes);
+  return memory;
 }
 
 }  // namespace voxel

@@ -17,6 +17,7 @@
 
 #include "voxel/volume_inspect.h"
 #include "voxel/volume_itk.h"
+#include "voxel/voxel_stream.h"
 
 namespace voxel {
 namespace {
@@ -133,23 +134,59 @@ bool is_folder(const fs::path& path) {
   return fs::is_directory(path, error);
 }
 
-// The header and voxels of a file or a folder, within the limit.
-VolumeData read_volume(const fs::path& path, double unit_m, const std::optional<glm::dvec3>& spacing_m,
-                       std::uint64_t max_bytes) {
-  if (is_folder(path)) {
-    DicomSeries series = read_dicom_header(path, unit_m);
-    check_memory(path, series.data, 2.0, spacing_m, max_bytes);  // and what the process apart hands over
-    in_words(path, "the voxels cannot be read", kDamaged, [&] { read_dicom_voxels(path, series); });
-    return std::move(series.data);
-  }
+// The voxels of a single file, slice by slice: as they are where nothing has to be done to them, and as the
+// library reads them otherwise (text, bzip2, scaled NIfTI), in memory then.
+template <typename Use>
+auto with_file_slices(const fs::path& path, double unit_m, const std::optional<glm::dvec3>& spacing_m,
+                      std::uint64_t max_bytes, Use use) {
   OpenVolume open = open_volume(path, unit_m);
-  check_memory(path, open.data, open.copies, spacing_m, max_bytes);
-  check_packed(path, open.place, open.data.header);
+  const VolumeData& data = open.data;
+  const std::size_t component = size_of(data.component);
+  const bool packed = open.place.packing == VoxelPlace::Packing::deflate;
+  if (open.place.as_they_are && (packed || open.place.packing == VoxelPlace::Packing::raw) &&
+      (open.place.voxel_bytes == 0 || open.place.voxel_bytes == component)) {
+    check_memory(path, data, 0.0, spacing_m, max_bytes);
+    VoxelStream stream(path, open.place, data.header);
+    auto result = use(data, [&] { return stream.next(data.slice_bytes(), component); });
+    stream.finish();
+    return result;
+  }
+  check_memory(path, data, open.copies, spacing_m, max_bytes);
+  if (packed) {  // the libraries fill up with zeros what is not there
+    VoxelStream whole(path, open.place, data.header);
+    const std::uint64_t slice =
+        bytes_in_file(open.place, data.header) / static_cast<std::uint64_t>(data.header.dims[2]);
+    for (int k = 0; k < data.header.dims[2]; ++k) whole.next(slice, 1);
+    whole.finish();
+  }
+  std::vector<std::byte> bytes;
   in_words(path, "the voxels cannot be read", kDamaged, [&] {
-    open.data.bytes.resize(open.data.header.bytes);
-    read_voxels(*open.io, open.data.bytes);
+    bytes.resize(data.header.bytes);
+    read_voxels(*open.io, bytes);
   });
-  return std::move(open.data);
+  std::size_t at = 0;
+  return use(data, [&] {
+    const std::size_t begin = at;
+    at += data.slice_bytes();
+    return std::span<const std::byte>(bytes).subspan(begin, data.slice_bytes());
+  });
+}
+
+// Calls use(data, next slice) for a file or a folder, within the limit.
+template <typename Use>
+auto with_slices(const fs::path& path, double unit_m, const std::optional<glm::dvec3>& spacing_m,
+                 std::uint64_t max_bytes, Use use) {
+  if (!is_folder(path)) return with_file_slices(path, unit_m, spacing_m, max_bytes, use);
+  const DicomSeries series = read_dicom_header(path, unit_m);
+  check_memory(path, series.data, 1.0, spacing_m, max_bytes);  // what the process apart hands over
+  const auto voxels =
+      in_words(path, "the voxels cannot be read", kDamaged, [&] { return read_dicom_voxels(path, series); });
+  std::size_t at = 0;
+  return use(series.data, [&] {
+    const std::size_t begin = at;
+    at += series.data.slice_bytes();
+    return std::span<const std::byte>(voxels->data() + begin, series.data.slice_bytes());
+  });
 }
 
 }  // namespace
@@ -220,15 +257,19 @@ VolumeHeader read_volume_header(const fs::path& path, double unit_m) {
                          : open_volume(path, unit_m).data.header;
 }
 
-LabelVolume load_volume(const fs::path& path, const VolumeFileOptions& options) {
+LabelVolume load_volume(const fs::path& path, const VolumeFileOptions& options,
+                        std::vector<std::string>* notes) {
   check_options(path, options);
-  VolumeData data = read_volume(path, options.unit_m, options.spacing_m, options.max_bytes);
-  return in_words(path, "the voxels cannot be labelled", kDamaged,
-                  [&] { return label_voxels(path, std::move(data), options); });
+  return with_slices(path, options.unit_m, options.spacing_m, options.max_bytes,
+                     [&](const VolumeData& data, const NextSlice& next) {
+                       if (notes != nullptr) *notes = data.header.notes;
+                       return in_words(path, "the voxels cannot be labelled", kDamaged,
+                                       [&] { return label_voxels(path, data, next, options); });
+                     });
 }
 
 VolumeStatistics read_volume_statistics(const fs::path& path, std::uint64_t max_bytes) {
-  return statistics_of(read_volume(path, 1e-3, std::nullopt, max_bytes));
+  return with_slices(path, 1e-3, std::nullopt, max_bytes, statistics_of);
 }
 
 }  // namespace voxel

@@ -56,8 +56,10 @@ struct VolumeFileOptions {
 VolumeHeader read_volume_header(const std::filesystem::path& path, double unit_m = 1e-3);
 
 // The axes are permuted and flipped nowhere except where the file's frame is left-handed: then the first axis
-// is reversed, so that `rotation` is a proper rotation. Throws VolumeError.
-LabelVolume load_volume(const std::filesystem::path& path, const VolumeFileOptions& options);
+// is reversed, so that `rotation` is a proper rotation. What was found and put right is said in `notes`, as
+// in the header's. Throws VolumeError.
+LabelVolume load_volume(const std::filesystem::path& path, const VolumeFileOptions& options,
+                        std::vector<std::string>* notes = nullptr);
 
 // The labels found and how many voxels each has, and the range of intensities, for `check`. Throws
 // VolumeError.

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cctype>
 #include <cmath>
 #include <cstring>
@@ -18,6 +19,7 @@ namespace fs = std::filesystem;
 
 // Deflate packs at most 1,032 bytes into one.
 constexpr double kMostPacked = 1100.0;
+constexpr bool kLittle = std::endian::native == std::endian::little;
 
 bool ends_with(const std::string& text, const std::string& end) {
   return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
@@ -146,6 +148,11 @@ void inspect_meta(const fs::path& path, VoxelPlace& place) {
   const std::string binary = lower_case(header.text("binarydata"));
   if (starts_with(binary, "f") || starts_with(binary, "0")) place.packing = VoxelPlace::Packing::text;
   place.offset += bytes_to_skip(path, header, "headersize");
+  if (header.number("headersize", 0.0) < 0.0) place.as_they_are = false;  // at the file's end
+  for (const char* key : {"binarydatabyteordermsb", "elementbyteordermsb"}) {
+    const std::string order = lower_case(header.text(key));
+    if (starts_with(order, "t") || starts_with(order, "1")) place.swapped = kLittle;
+  }
   const double packed = header.number("compresseddatasize", 0.0);
   if (!(packed >= 0.0 && packed <= static_cast<double>(place.file_bytes))) {
     refuse_volume(path, "the header says ", header.text("compresseddatasize"),
@@ -168,6 +175,8 @@ void inspect_nrrd(const fs::path& path, VoxelPlace& place) {
   bytes_to_skip(path, header, "lineskip");
   const std::uint64_t skipped = bytes_to_skip(path, header, "byteskip");
   (place.packing == Packing::deflate ? place.skipped : place.offset) += skipped;
+  place.swapped = (lower_case(header.text("endian")) == "big") == kLittle && header.has("endian");
+  if (header.has("lineskip") || header.number("byteskip", 0.0) < 0.0) place.as_they_are = false;
   if (header.has("lineskip") && place.packing == Packing::deflate) place.packing = Packing::other;
 }
 
@@ -237,51 +246,16 @@ void inspect_nifti(const fs::path& path, VoxelPlace& place) {
   const auto type = type_bytes.find(field_at<std::int16_t>(header, 70, swapped));
   if (type != type_bytes.end())
     place.voxel_bytes = type->second;  // other types are refused once ITK names them
+  // With a slope, ITK makes floats of them.
+  const float slope = field_at<float>(header, 112, swapped),
+              intercept = field_at<float>(header, 116, swapped);
+  place.as_they_are = slope == 0.0F || (slope == 1.0F && intercept == 0.0F);
+  place.swapped = swapped;
   const auto begin = std::max<std::uint64_t>(static_cast<std::uint64_t>(offset), kHeaderBytes);
   (place.packing == VoxelPlace::Packing::raw ? place.offset : place.skipped) = begin;
 }
 
-class Inflater {
- public:
-  Inflater() {
-    ready_ = inflateInit2(&stream_, 15 + 32) == Z_OK;
-  }  // zlib or gzip, told apart by their headers
-  ~Inflater() {
-    if (ready_) inflateEnd(&stream_);
-  }
-  Inflater(const Inflater&) = delete;
-  Inflater& operator=(const Inflater&) = delete;
-
-  void feed(std::vector<unsigned char>& bytes, std::size_t count) {
-    stream_.next_in = bytes.data();
-    stream_.avail_in = static_cast<uInt>(count);
-  }
-  // Unpacks some of what was fed; false when there is nothing left, or at an error.
-  bool step() {
-    if (!ready_ || failed_ || (stream_.avail_in == 0 && !full_)) return false;
-    if (ended_) {  // gzip files may be several streams in a row
-      ended_ = false;
-      failed_ = inflateReset(&stream_) != Z_OK;
-    }
-    stream_.next_out = out_.data();
-    stream_.avail_out = static_cast<uInt>(out_.size());
-    const int status = inflate(&stream_, Z_NO_FLUSH);
-    full_ = stream_.avail_out == 0;
-    unpacked_ += out_.size() - stream_.avail_out;
-    ended_ = status == Z_STREAM_END;
-    failed_ = failed_ || (status != Z_OK && status != Z_STREAM_END && status != Z_BUF_ERROR);
-    return !failed_;
-  }
-  [[nodiscard]] std::uint64_t unpacked() const { return unpacked_; }
-  [[nodiscard]] bool ended() const { return ended_; }
-  [[nodiscard]] bool failed() const { return failed_ || !ready_; }
-
- private:
-  z_stream stream_{};
-  std::vector<unsigned char> out_ = std::vector<unsigned char>(std::size_t{1} << 18U);
-  std::uint64_t unpacked_ = 0;
-  bool ready_ = false, failed_ = false, ended_ = false, full_ = false;
-};
+}  // namespace
 
 std::uint64_t bytes_in_file(const VoxelPlace& place, const VolumeHeader& header) {
   if (place.voxel_bytes == 0) return header.bytes;
@@ -289,8 +263,6 @@ std::uint64_t bytes_in_file(const VoxelPlace& place, const VolumeHeader& header)
   for (const int n : header.dims) bytes *= static_cast<std::uint64_t>(n);
   return bytes;
 }
-
-}  // namespace
 
 VolumeFormat format_of(const fs::path& path) {
   const std::string name = lower_case(path.filename().string());
@@ -338,25 +310,6 @@ void check_file_size(const fs::path& path, const VoxelPlace& place, const Volume
   refuse_volume(path, "the header says ", header.dims[0], " x ", header.dims[1], " x ", header.dims[2],
                 " voxels of ", header.component, ", ", needed, " bytes, but '", place.file.string(),
                 "' has only ", left, raw ? " bytes of them; " : " packed bytes; ", kDamaged);
-}
-
-void check_packed(const fs::path& path, const VoxelPlace& place, const VolumeHeader& header) {
-  if (place.packing != VoxelPlace::Packing::deflate) return;
-  std::ifstream file(place.file, std::ios::binary);
-  file.seekg(static_cast<std::streamoff>(place.offset));
-  std::vector<unsigned char> bytes(std::size_t{1} << 16U);
-  const std::uint64_t needed = bytes_in_file(place, header) + place.skipped;
-  Inflater inflater;
-  // To the end of the stream, where its checksum is; a file may go on after that.
-  while (file && !inflater.failed() && !(inflater.ended() && inflater.unpacked() >= needed)) {
-    file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-    inflater.feed(bytes, static_cast<std::size_t>(file.gcount()));
-    while (!(inflater.ended() && inflater.unpacked() >= needed) && inflater.step()) continue;
-  }
-  if (!inflater.failed() && inflater.ended() && inflater.unpacked() >= needed) return;
-  refuse_volume(path, "the packed voxels in '", place.file.string(), "' ",
-                inflater.failed() ? "are damaged after" : "end after", " ", inflater.unpacked(), " of ",
-                needed, " bytes; ", kDamaged);
 }
 
 }  // namespace voxel
