@@ -12,7 +12,8 @@
 namespace voxel {
 namespace {
 
-constexpr double kLongestAxis = 1e6;  // (unit: voxel) more is not a volume but a broken header
+constexpr double kShortest = 1e-9, kLongest = 1e6;  // (unit: meter) of a voxel
+constexpr double kLongestAxis = 1e6;                // (unit: voxel) more is not a volume but a broken header
 
 // Calls visit with a value of the component's type.
 template <typename Visit>
@@ -188,6 +189,12 @@ void set_frame(const std::filesystem::path& path, const FileFrame& frame, Compon
                   " m; it must be above 0 (1e-3 for mm)");
   }
   check_frame(path, frame);
+  for (int axis = 0; axis < 3; ++axis) {
+    const double spacing_m = frame.spacing[axis] * unit_m;
+    if (spacing_m >= kShortest && spacing_m <= kLongest) continue;
+    refuse_volume(path, "voxels would be ", spacing_m, " m long along axis ", axis + 1,
+                  "; between 1 nm and 1,000 km can be used. Correct the header, or the unit");
+  }
   glm::dmat3 direction = exact_axes(frame.direction);
   glm::dvec3 origin = frame.origin;
   VolumeHeader& header = data.header;

@@ -106,7 +106,17 @@ OpenVolume open_volume(const fs::path& path, double unit_m) {
   open.io = reader_for(format);
   open.alone = std::make_unique<AloneFile>(path, format);
   open.io->SetFileName(open.alone->name());
-  in_words(path, "the header cannot be read", kDamaged, [&] { open.io->ReadImageInformation(); });
+  in_words(path, "the header cannot be read", kDamaged, [&] {
+    try {
+      open.io->ReadImageInformation();
+    } catch (const itk::ExceptionObject& error) {
+      if (words_of(error).find("orthonormal") == std::string::npos) throw;
+      refuse_volume(path,
+                    "the axes that the header's sform gives are not at right angles, or not as long as "
+                    "its voxel sizes; correct the header, or resample the volume onto a rectangular "
+                    "lattice first");
+    }
+  });
   const std::optional<Component> component = component_of(*open.io);
   if (!component) {
     refuse_volume(path, "each voxel holds ", open.io->GetNumberOfComponents(), " numbers of type ",
@@ -233,6 +243,8 @@ std::string words_of(const std::exception& any) {
   if (text.rfind(prefix, 0) == 0) text.erase(0, prefix.size());
   const auto address = text.find("): ");  // NiftiImageIO(0x55…): words
   if (address != std::string::npos && text.find("(0x") < address) text.erase(0, address + 3);
+  const auto last_word = text.rfind("[nrrd] ");  // one of the stack of its functions
+  if (last_word != std::string::npos) text.erase(0, last_word + 7);
   for (char& c : text) c = c == '\n' || c == '\r' ? ' ' : c;
   const auto last = text.find_last_not_of(" .");
   return text.substr(0, last == std::string::npos ? 0 : last + 1);

@@ -43,8 +43,9 @@ struct VoxelPlace {
 // Throws VolumeError where the header is not one of a volume of the format.
 VoxelPlace inspect_volume(const std::filesystem::path& path, VolumeFormat format);
 
-// Refuses a header that announces more voxels than the file can hold, before memory is asked for.
-void check_file_size(const std::filesystem::path& path, const VoxelPlace& place, const VolumeHeader& header);
+// Refuses a header that announces more voxels than the file can hold, before memory is asked for, and notes
+// where it holds more.
+void check_file_size(const std::filesystem::path& path, const VoxelPlace& place, VolumeHeader& header);
 
 // (unit: byte) of all voxels in the file, as they are there.
 std::uint64_t bytes_in_file(const VoxelPlace& place, const VolumeHeader& header);
