@@ -127,7 +127,7 @@ std::vector<fs::path> saved_volume_names(const fs::path& file, const Scene& scen
 }
 
 std::vector<fs::path> save_volumes(const fs::path& file, const Scene& scene, const BuiltScene& built) {
-  const std::vector<fs::path> names = saved_volume_names(file, scene);
+  std::vector<fs::path> names = saved_volume_names(file, scene);
   for (std::size_t o = 0; o < scene.soft.size(); ++o) {
     const SoftSlices slices(built.world->soft[o], scene.soft[o].pose, *built.state->soft[o]);
     const glm::dmat3 turn = glm::mat3_cast(slices.frame().rotation);

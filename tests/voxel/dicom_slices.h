@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// DICOM slices made by hand, explicit little-endian and uncompressed: just what a reader of volumes looks at.
+// DICOM slices made by hand, explicit little-endian, uncompressed or by run lengths: just what a reader of
+// volumes looks at.
 #pragma once
 
 #include <array>
@@ -8,6 +9,8 @@
 #include <string>
 
 namespace tests {
+
+inline const std::string kRunLengths = "1.2.840.10008.1.2.5";
 
 struct DicomSlice {
   int columns = 4, rows = 3;
@@ -20,17 +23,40 @@ struct DicomSlice {
   std::int16_t value = 7;  // of all voxels
 };
 
+inline std::string dicom_number(std::uint64_t n, int bytes) {
+  std::string out;
+  for (int b = 0; b < bytes; ++b) out.push_back(static_cast<char>(n >> (8 * b)));
+  return out;
+}
+
+// 16-bit pixels of one value as RLE Lossless has them (DICOM PS3.5, annex G): high bytes, then low bytes,
+// each as runs, in a fragment behind an empty table of offsets.
+inline std::string dicom_runs(int count, std::int16_t value) {
+  std::string high, low;
+  for (int left = count; left > 0; left -= 100) {
+    const int run = left < 100 ? left : 100;
+    const std::string length =
+        run == 1 ? std::string(1, '\0') : dicom_number(static_cast<std::uint64_t>(257 - run), 1);
+    high += length + static_cast<char>(value >> 8);
+    low += length + static_cast<char>(value);
+  }
+  if (high.size() % 2 != 0) high.push_back('\0');
+  if (low.size() % 2 != 0) low.push_back('\0');
+  std::string frame = dicom_number(2, 4) + dicom_number(64, 4) + dicom_number(64 + high.size(), 4);
+  frame.resize(64, '\0');
+  frame += high + low;
+  const std::string item = dicom_number(0xfffe, 2) + dicom_number(0xe000, 2);
+  return item + dicom_number(0, 4) + item + dicom_number(frame.size(), 4) + frame + dicom_number(0xfffe, 2) +
+         dicom_number(0xe0dd, 2) + dicom_number(0, 4);
+}
+
 inline std::string dicom_element(std::uint16_t group, std::uint16_t element, const std::string& type,
                                  std::string value) {
-  const auto number = [](std::uint64_t n, int bytes) {
-    std::string out;
-    for (int b = 0; b < bytes; ++b) out.push_back(static_cast<char>(n >> (8 * b)));
-    return out;
-  };
   if (value.size() % 2 != 0) value.push_back(type == "UI" ? '\0' : ' ');
   const bool is_long = type == "OW" || type == "OB";
-  return number(group, 2) + number(element, 2) + type +
-         (is_long ? std::string(2, '\0') + number(value.size(), 4) : number(value.size(), 2)) + value;
+  return dicom_number(group, 2) + dicom_number(element, 2) + type +
+         (is_long ? std::string(2, '\0') + dicom_number(value.size(), 4) : dicom_number(value.size(), 2)) +
+         value;
 }
 
 inline std::string dicom(const DicomSlice& s) {
@@ -61,7 +87,10 @@ inline std::string dicom(const DicomSlice& s) {
          dicom_element(0x28, 0x100, "US", us(8 * bytes)) + dicom_element(0x28, 0x101, "US", us(8 * bytes)) +
          dicom_element(0x28, 0x102, "US", us(8 * bytes - 1)) +
          dicom_element(0x28, 0x103, "US", us(s.samples == 1 ? 1 : 0)) +
-         dicom_element(0x7fe0, 0x10, s.samples == 1 ? "OW" : "OB", pixels);
+         (s.syntax == kRunLengths
+              ? dicom_number(0x7fe0, 2) + dicom_number(0x10, 2) + "OB" + std::string(2, '\0') +
+                    dicom_number(0xffffffffU, 4) + dicom_runs(s.columns * s.rows, s.value)
+              : dicom_element(0x7fe0, 0x10, s.samples == 1 ? "OW" : "OB", pixels));
 }
 
 }  // namespace tests

@@ -347,6 +347,18 @@ TEST_F(DicomCorpus, AStackIsReadInTheOrderOfItsPlaces) {
   for (int k = 0; k < 5; ++k) EXPECT_EQ(v.labels[v.index(1, 1, k)], k + 1);
 }
 
+TEST_F(DicomCorpus, RunLengthsAreUnpacked) {
+  std::vector<DicomSlice> slices = stack(4);
+  for (DicomSlice& slice : slices) slice.syntax = tests::kRunLengths;
+  slices[2].columns = slices[1].columns = slices[0].columns = slices[3].columns = 37;  // more than one run
+  slices[2].value = 0x123;                                                             // both bytes
+  voxel::VolumeFileOptions options;
+  options.rules = {{0x123, 0x123, 9}, {1, 4, 1}};
+  const LabelVolume v = voxel::load_volume(folder("a", slices), options);
+  ASSERT_EQ(v.dims, (std::array{37, 3, 4}));
+  for (std::size_t n = 0; n < v.labels.size(); ++n) EXPECT_EQ(v.labels[n], n / (37 * 3) == 2 ? 9 : 1);
+}
+
 TEST_F(DicomCorpus, WhatIsNotOneWholeSeriesIsRefusedInWords) {
   const auto said = [&](const std::string& name,
                         const std::function<void(std::vector<DicomSlice>&)>& change) {
@@ -405,7 +417,12 @@ TEST_F(DicomCorpus, DamagedFilesEndInAVolumeOrARefusal) {
   const double seconds = given == nullptr ? 1.5 : std::atof(given);
   std::mt19937 random(seed == nullptr ? 11U : static_cast<unsigned>(std::atoi(seed)));
   std::vector<Case> originals = corpus();
-  for (int n = 0; n < 6; ++n) originals.push_back({"slices/0", tests::dicom(DicomSlice{}), ""});
+  DicomSlice packed;
+  packed.syntax = tests::kRunLengths;
+  for (int n = 0; n < 4; ++n) {
+    originals.push_back({"slices/0", tests::dicom(DicomSlice{}), ""});
+    originals.push_back({"slices/0", tests::dicom(packed), ""});
+  }
   fs::create_directories(in_folder("slices"));
   voxel::VolumeFileOptions options;
   options.max_bytes = 16U << 20U;
