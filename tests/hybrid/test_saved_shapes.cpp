@@ -69,7 +69,9 @@ TEST_F(SavedShapes, AtRestTheFieldIsZeroAndTheLabelsAreTheVolumes) {
 
 TEST_F(SavedShapes, APressedObjectIsSavedAsItIs) {
   for (const char* turn : {"[0, 0, 0]", "[0, 0, 90]"}) {
-    const hybrid::Scene scene = load("format = 1\n" + tests::block + "rotation = " + turn + "\n" + kHeld);
+    const hybrid::Scene scene = load(
+        std::string("format = 1\n").append(tests::block).append("rotation = ").append(turn).append("\n") +
+        kHeld);
     hybrid::BuiltScene built = hybrid::build_scene(scene, {});
     hybrid::run_session(scene, built, {.seconds = 0.1, .progress = {}});
     const auto names = hybrid::save_volumes(in_folder("out.nii"), scene, built);
@@ -77,8 +79,8 @@ TEST_F(SavedShapes, APressedObjectIsSavedAsItIs) {
     const voxel::SoftObject& object = *built.state->soft[0];
     double deepest = 0.0;
     for (std::size_t n = 0; n < field.size(); ++n) {
-      const glm::dvec3 rest(2e-3 * static_cast<double>(n % 10), 2e-3 * static_cast<double>(n / 10 % 10),
-                            2e-3 * static_cast<double>(n / 100));
+      const std::array<std::size_t, 3> at{n % 10, n / 10 % 10, n / 100};
+      const glm::dvec3 rest = 2e-3 * glm::dvec3(at[0], at[1], at[2]);
       EXPECT_LT(glm::distance(field[n], object.displacement_at(rest)), 1e-8);  // the object's own frame
       deepest = std::min(deepest, field[n].z);
     }

@@ -25,7 +25,8 @@ LabelVolume random_labels(std::array<int, 3> dims, unsigned seed) {
   v.spacing_m = {1e-3, 2e-3, 0.5e-3};
   v.origin_m = {0.1, 0.2, -0.3};
   v.rotation = glm::normalize(glm::dquat(0.8, 0.1, 0.5, -0.2));
-  v.labels.resize(static_cast<std::size_t>(dims[0] * dims[1] * dims[2]));
+  v.labels.resize(static_cast<std::size_t>(dims[0]) * static_cast<std::size_t>(dims[1]) *
+                  static_cast<std::size_t>(dims[2]));
   for (auto& label : v.labels) label = static_cast<std::uint8_t>(random() % 4);
   return v;
 }
