@@ -18,6 +18,7 @@
 #include "hybrid/scene_feel.h"
 #include "hybrid/session.h"
 #include "hybrid/soft_stage.h"
+#include "hybrid/thin_object.h"
 
 namespace hybrid {
 namespace {
@@ -277,13 +278,14 @@ class Builder {
       at_place(scene_, d.source_place, d.name, [&] {
         voxel::LatticeOptions options = lattice_options(scene_, d);
         options.anchor_voxels = anchored_[o];
-        soft_.push_back(
-            std::make_unique<voxel::SoftObject>(std::make_unique<voxel::Lattice>(volumes_[o], options)));
         SoftBody body{.name = d.name,
                       .pose = {volumes_[o].origin_m, volumes_[o].rotation},
                       .budget = d.budget,
                       .drawn = {}};
-        body.drawn = surface_from_labels(volumes_[o], kSurfaceSmoothing);
+        body.drawn = surface_from_labels(volumes_[o], kSurfaceSmoothing);  // before the inside is thinned
+        if (d.thinning) thin_object(scene_, d, volumes_[o], options, body, built_.notes);
+        soft_.push_back(
+            std::make_unique<voxel::SoftObject>(std::make_unique<voxel::Lattice>(volumes_[o], options)));
         for (const glm::dvec3& v : body.drawn.vertices) box_.add(body.to_scene(v));
         world_->soft.push_back(std::move(body));
         volumes_[o] = {};  // the lattice has what it needs

@@ -74,11 +74,21 @@ voxel::VolumeFileOptions volume_options(const std::vector<voxel::LabelRule>& rul
   return {.unit_m = unit_m, .rules = rules, .spacing_m = spacing, .max_bytes = usable_memory_bytes() / 4};
 }
 
+// What the file's reader put right is news to whoever built on it.
+voxel::LabelVolume read_volume(const std::string& object, const std::filesystem::path& file,
+                               const voxel::VolumeFileOptions& options, std::vector<BuildNote>& notes) {
+  std::vector<std::string> of_file;
+  voxel::LabelVolume volume = voxel::load_volume(file, options, &of_file);
+  for (const std::string& note : of_file)
+    notes.push_back({object, polygon::Severity::warning, fmt::format("{}: {}", file.string(), note)});
+  return volume;
+}
+
 RigidObject volume_surface_object(const RigidDescription& d, const VolumeSurfaceSource& s,
                                   std::vector<BuildNote>& notes) {
   const std::optional<glm::dvec3> spacing =
       s.spacing_m ? std::optional<glm::dvec3>(glm::dvec3(*s.spacing_m)) : std::nullopt;
-  voxel::LabelVolume volume = voxel::load_volume(s.file, volume_options(s.rules, s.unit_m, spacing));
+  voxel::LabelVolume volume = read_volume(d.name, s.file, volume_options(s.rules, s.unit_m, spacing), notes);
   if (s.largest) keep_largest_piece(volume, true);
   if (s.grow_m > 0.0) volume = grow_labels(volume, s.grow_m);
   polygon::TriangleMesh mesh = surface_from_labels(volume, s.smooth);
@@ -128,7 +138,8 @@ struct VolumeBuilder {
   std::vector<BuildNote>& notes;
 
   voxel::LabelVolume operator()(const VolumeSource& s) const {
-    voxel::LabelVolume volume = voxel::load_volume(s.file, volume_options(s.rules, s.unit_m, s.spacing_m));
+    voxel::LabelVolume volume =
+        read_volume(d.name, s.file, volume_options(s.rules, s.unit_m, s.spacing_m), notes);
     if (s.largest) keep_largest_piece(volume, false);
     return volume;
   }

@@ -157,7 +157,8 @@ void check_scene_file(const std::filesystem::path& path, Json& file) {
                                {"kind", "soft"},
                                {"voxels", object.lattice().voxel_count()},
                                {"surface_voxels", object.lattice().surface().size()},
-                               {"anchored", object.lattice().anchored_count()}});
+                               {"anchored", object.lattice().anchored_count()},
+                               {"thinned_voxels", built.world->soft[o].thinned}});
     bytes += object.memory_bytes();
   }
   for (std::size_t o = 0; o < built.world->object_count(); ++o) {

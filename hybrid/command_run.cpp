@@ -13,9 +13,9 @@
 #include "hybrid/real_device.h"
 #include "hybrid/recording.h"
 #include "hybrid/report.h"
+#include "hybrid/saved_shapes.h"
 #include "hybrid/session.h"
 #include "hybrid/trace_file.h"
-#include "polygon/mesh_file.h"
 
 namespace hybrid {
 namespace {
@@ -51,27 +51,6 @@ void check_writable(const std::filesystem::path& file) {
   if (!existed) std::filesystem::remove(file);
 }
 
-void save_soft_surfaces(const std::filesystem::path& file, const BuiltScene& built) {
-  Snapshot now;
-  fill_moved(*built.world, *built.state, now);
-  polygon::TriangleMesh all;
-  for (std::size_t o = 0; o < built.world->soft.size(); ++o) {
-    const auto first = static_cast<std::uint32_t>(all.vertices.size());
-    const SoftBody& body = built.world->soft[o];
-    const auto& moved = now.soft_moved_m[built.world->rigid.size() + o];
-    for (std::size_t v = 0; v < moved.size(); ++v) {
-      all.vertices.push_back(body.to_scene(body.drawn.vertices[v]) + glm::dvec3(moved[v]));
-    }
-    for (const polygon::TriangleIndices& t : built.world->soft[o].drawn.triangles) {
-      all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
-    }
-  }
-  if (all.empty())
-    throw std::runtime_error(
-        "--save-surface: the scene has no soft object, so there is no deformed surface to save");
-  polygon::save_ply(file, all);
-}
-
 }  // namespace
 
 Progress progress_on_terminal() {
@@ -105,14 +84,14 @@ void print_notes(const BuiltScene& built) {
 }
 
 int run(const RunCommand& command) {
-  if (!command.save_volume.empty()) {
-    throw std::runtime_error("--save-volume: not supported yet; --save-surface writes the deformed surface");
-  }
   Scene scene = load_scene(command.scene);
   if (!command.device.empty()) use_device(scene, command.device);
   for (const auto* file :
        {&command.trace, &command.plot, &command.picture, &command.record, &command.save_surface}) {
     check_writable(*file);
+  }
+  if (!command.save_volume.empty()) {
+    for (const auto& file : saved_volume_names(command.save_volume, scene)) check_writable(file);
   }
   if (command.json != "-") check_writable(command.json);
   const Progress progress = progress_on_terminal();
@@ -156,7 +135,9 @@ int run(const RunCommand& command) {
     save_recording(command.record, {std::filesystem::absolute(command.scene), read_text(command.scene),
                                     result.dt_s, scene_limits(scene), result.state_hash, result.recording});
   }
-  if (!command.save_surface.empty()) save_soft_surfaces(command.save_surface, built);
+  if (!command.save_surface.empty()) save_surfaces(command.save_surface, built);
+  std::vector<std::filesystem::path> volumes;
+  if (!command.save_volume.empty()) volumes = save_volumes(command.save_volume, scene, built);
   if (!command.json.empty()) save_json(command.json, run_report(scene, built, result));
   fmt::print(words, "{}", run_summary(built, result));
   for (const auto& [what, file] :
@@ -165,6 +146,7 @@ int run(const RunCommand& command) {
         std::pair{"surface", command.save_surface}}) {
     if (!file.empty()) fmt::print(words, "{}: {}\n", what, file.string());
   }
+  for (const auto& file : volumes) fmt::print(words, "volume: {}\n", file.string());
   return result.end == device::ServoEnd::lost ? 1 : 0;
 }
 

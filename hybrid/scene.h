@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/vec3.hpp>
-#include <limits>
 #include <map>
 #include <optional>
 #include <stdexcept>
@@ -46,9 +45,6 @@ struct Material {
   double stretch_min = 0.4;  // shortest a link may become, of its rest length; 0 < min <= 1
   double stretch_max = 1.6;  // longest, >= 1
   double shear = 0.6;        // most a link's ends may slip across it, of its rest length; >= 0
-  // Strain beyond which a link keeps what is beyond (voxel/yield.h), of its rest length; > 0, infinite:
-  // never.
-  double yield = std::numeric_limits<double>::infinity();
   SourcePlace place;
 };
 
@@ -164,6 +160,14 @@ struct Anchors {
   std::vector<std::uint8_t> labels;
   double rigid_within_m = 0.0;  // voxels this near to a rigid surface are held by it; 0: none
 };
+// Inside of what is stiff, fewer voxels; see voxel/thinning.h.
+struct Thinning {
+  std::vector<std::uint8_t> labels;  // empty: those whose material is at least this stiff
+  double above_Pa = 0.0;
+  int every = 3;
+  int shell = 2;  // default: every - 1
+  SourcePlace place;
+};
 struct SoftDescription {
   std::string name;
   SoftSource source;
@@ -172,6 +176,7 @@ struct SoftDescription {
   std::string material;                           // name; empty: the default Material
   Anchors anchors;
   std::uint32_t budget = 12'000;  // voxel updates of background relaxation a tick
+  std::optional<Thinning> thinning{};
   SourcePlace place, source_place;
 };
 

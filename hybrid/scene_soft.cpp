@@ -12,7 +12,6 @@ namespace {
 
 constexpr LaterKey soft_later[] = {
     {"sweeps", "remove it; budget = N bounds the work of a tick"},
-    {"thinning", "remove it: stiff labels are kept as thick as they are"},
     {"model", "remove it: a [[soft]] object is always felt through its voxels"},
     {"friction", "remove it: soft surfaces are smooth for now"},
     {"damping", "remove it: soft contact is quasi-static for now"},
@@ -216,19 +215,43 @@ Anchors read_anchors(const TableReader& soft, const std::set<int>& known) {
   return out;
 }
 
+Thinning read_thinning(const TableReader& soft, const std::set<int>& known) {
+  static constexpr std::string_view keys[] = {"labels", "above", "every", "shell"};
+  const TableReader table = soft.table("thinning");
+  table.allow(keys);
+  Thinning out;
+  out.place = soft.place_of("thinning");
+  if (table.has("labels") == table.has("above")) {
+    soft.refuse(
+        "thinning", words(table.what(), " must say what is stiff, in one way"),
+        "write labels = [2], or above = 1e6 for every material of that Young's modulus (Pa) and more");
+  }
+  if (table.has("labels")) {
+    for (const std::int64_t label : table.integers("labels", 1, 255, "[2]")) {
+      check_label(table, table.place_of("labels"), static_cast<int>(label), known);
+      out.labels.push_back(static_cast<std::uint8_t>(label));
+    }
+  } else {
+    out.above_Pa = table.number("above", {"Young's modulus above 0, in Pa", "1e6", 1.0, 1e-3, 1e13});
+  }
+  out.every = static_cast<int>(table.integer("every", 2, 64, out.every));
+  out.shell = static_cast<int>(table.integer("shell", 1, 63, std::max(out.every - 1, 1)));
+  return out;
+}
+
 SoftSource read_source(const TableReader& table, std::string_view kind) {
-  static constexpr std::string_view of_mesh[] = {"name",    "mesh",   "unit",     "repair",
-                                                 "spacing", "energy", "material", "materials",
-                                                 "anchors", "budget", "position", "rotation"};
-  static constexpr std::string_view of_volume[] = {"name",      "volume",  "unit",    "labels",   "range",
-                                                   "ranges",    "largest", "spacing", "energy",   "material",
-                                                   "materials", "anchors", "budget",  "position", "rotation"};
+  static constexpr std::string_view of_mesh[] = {"name",     "mesh",     "unit",      "repair",  "spacing",
+                                                 "energy",   "material", "materials", "anchors", "budget",
+                                                 "thinning", "position", "rotation"};
+  static constexpr std::string_view of_volume[] = {
+      "name",   "volume",   "unit",      "labels",  "range",  "ranges",   "largest",  "spacing",
+      "energy", "material", "materials", "anchors", "budget", "thinning", "position", "rotation"};
   static constexpr std::string_view of_block[] = {
-      "name",   "formula",  "size",      "spacing", "label",  "layers",   "inclusions",
-      "energy", "material", "materials", "anchors", "budget", "position", "rotation"};
+      "name",     "formula",   "size",    "spacing", "label",    "layers",   "inclusions", "energy",
+      "material", "materials", "anchors", "budget",  "thinning", "position", "rotation"};
   static constexpr std::string_view of_ball[] = {"name",       "formula",  "size",     "spacing",   "label",
                                                  "inclusions", "energy",   "material", "materials", "anchors",
-                                                 "budget",     "position", "rotation"};
+                                                 "budget",     "thinning", "position", "rotation"};
   static constexpr std::string_view any[] = {"unit",    "repair", "labels", "range",  "ranges",
                                              "largest", "size",   "label",  "layers", "inclusions"};
   static constexpr std::string_view shapes[] = {"block", "ball"};
@@ -251,9 +274,9 @@ SoftSource read_source(const TableReader& table, std::string_view kind) {
 
 SoftDescription read_soft(const SceneSource& source, const TreeNode& table, std::size_t number) {
   static constexpr std::string_view all[] = {
-      "name",      "mesh",    "volume",  "formula", "unit",     "repair",  "spacing",    "labels",
-      "range",     "ranges",  "largest", "size",    "label",    "layers",  "inclusions", "material",
-      "materials", "anchors", "budget",  "energy",  "position", "rotation"};
+      "name",      "mesh",    "volume",  "formula",  "unit",   "repair",   "spacing",    "labels",
+      "range",     "ranges",  "largest", "size",     "label",  "layers",   "inclusions", "material",
+      "materials", "anchors", "budget",  "thinning", "energy", "position", "rotation"};
   static constexpr std::string_view sources[] = {"volume", "mesh", "formula"};
   static constexpr std::string_view energies[] = {"six-link"};
   const TableReader reader = object_table(source, table, "[[soft]]", number);
@@ -271,6 +294,7 @@ SoftDescription read_soft(const SceneSource& source, const TreeNode& table, std:
   }
   out.anchors = read_anchors(reader, known);
   out.budget = static_cast<std::uint32_t>(reader.integer("budget", 1, 1'000'000'000, out.budget));
+  if (reader.has("thinning")) out.thinning = read_thinning(reader, known);
   if (reader.has("energy")) (void)reader.choice("energy", energies, {}, energies_later);
   out.pose = read_pose(reader);
   return out;

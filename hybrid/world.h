@@ -57,10 +57,12 @@ struct RigidObject {
 
 struct SoftBody {  // the constant half of a soft object; the moving one is in WorldState::soft
   std::string name;
-  voxel::BodyPose pose;            // volume frame to scene
-  std::uint32_t first_number = 0;  // of its surface voxels in the occupancy map
-  std::uint32_t budget = 0;        // background voxel updates a tick
-  polygon::TriangleMesh drawn;     // volume frame, at rest
+  voxel::BodyPose pose;                               // volume frame to scene
+  std::uint32_t first_number = 0;                     // of its surface voxels in the occupancy map
+  std::uint32_t budget = 0;                           // background voxel updates a tick
+  polygon::TriangleMesh drawn;                        // volume frame, at rest
+  std::size_t thinned = 0;                            // voxels that thinning left out
+  std::vector<std::array<std::uint8_t, 2>> struts{};  // {label that thinning gave, label there was}
 
   [[nodiscard]] glm::dvec3 to_body(const glm::dvec3& in_scene) const {
     return glm::inverse(pose.rotation) * (in_scene - pose.origin);
@@ -94,10 +96,10 @@ struct World {
   std::optional<device::PassivityOptions> passivity;  // empty: no controller
   // A point is a ball too, of this radius: 1e-7 of the scene, far above rounding and far below anything felt.
   double skin_m = 0.0;
-  double extent_m = 0.0;    // diagonal of all objects' box
-  double rounding_m = 0.0;  // what a coordinate of the scene may be off by
-  double encoder_m = 0.0;   // what the device's position is rounded to
-  bool use_map = true;      // false: every object is asked every time; a baseline to time the map against
+  double extent_m = 0.0;        // diagonal of all objects' box
+  double rounding_m = 0.0;      // what a coordinate of the scene may be off by
+  double encoder_m = 0.0;       // what the device's position is rounded to
+  bool use_map = true;          // false: every object is asked every time; a baseline to time the map against
   bool damping_account = true;  // false: sampled damping as it is; a baseline that theory is known for
   // Pairs of soft objects that may meet: {smaller index, larger index}.
   std::vector<std::array<std::uint32_t, 2>> meeting;

@@ -12,7 +12,8 @@
 namespace voxel {
 namespace {
 
-constexpr double kLongestAxis = 1e6;  // (unit: voxel) more is not a volume but a broken header
+constexpr double kShortest = 1e-9, kLongest = 1e6;  // (unit: meter) of a voxel
+constexpr double kLongestAxis = 1e6;                // (unit: voxel) more is not a volume but a broken header
 
 // Calls visit with a value of the component's type.
 template <typename Visit>
@@ -43,7 +44,7 @@ auto visit_component(Component component, Visit visit) {
 }
 
 template <typename T>
-T value_at(const std::vector<std::byte>& bytes, std::size_t index) {
+T value_at(std::span<const std::byte> bytes, std::size_t index) {
   T value;
   std::memcpy(&value, &bytes[index * sizeof(T)], sizeof(T));
   return value;
@@ -143,16 +144,20 @@ Axis resample_axis(int voxels, double spacing, double wanted, bool reversed) {
 }
 
 template <typename T, typename Label>
-void fill_labels(const VolumeData& data, const std::array<Axis, 3>& axes, Label label_of,
-                 LabelVolume& volume) {
+void fill_labels(const VolumeData& data, const NextSlice& next, const std::array<Axis, 3>& axes,
+                 Label label_of, LabelVolume& volume) {
   const auto nx = static_cast<std::size_t>(data.header.dims[0]);
-  const auto ny = static_cast<std::size_t>(data.header.dims[1]);
+  const auto slices = static_cast<std::size_t>(data.header.dims[2]);
+  const std::vector<std::size_t>& from = axes[2].source;  // rising: only the first axis may be reversed
   std::size_t out = 0;
-  for (const std::size_t k : axes[2].source) {
-    for (const std::size_t j : axes[1].source) {
-      const std::size_t row = (k * ny + j) * nx;
-      for (const std::size_t i : axes[0].source) {
-        volume.labels[out++] = label_of(value_at<T>(data.bytes, row + i), row + i);
+  for (std::size_t slice = 0, k = 0; slice < slices; ++slice) {
+    const std::span<const std::byte> bytes = next();
+    for (; k < from.size() && from[k] == slice; ++k) {
+      for (const std::size_t j : axes[1].source) {
+        for (const std::size_t i : axes[0].source) {
+          const std::size_t at = j * nx + i;
+          volume.labels[out++] = label_of(value_at<T>(bytes, at), at, slice);
+        }
       }
     }
   }
@@ -184,6 +189,12 @@ void set_frame(const std::filesystem::path& path, const FileFrame& frame, Compon
                   " m; it must be above 0 (1e-3 for mm)");
   }
   check_frame(path, frame);
+  for (int axis = 0; axis < 3; ++axis) {
+    const double spacing_m = frame.spacing[axis] * unit_m;
+    if (spacing_m >= kShortest && spacing_m <= kLongest) continue;
+    refuse_volume(path, "voxels would be ", spacing_m, " m long along axis ", axis + 1,
+                  "; between 1 nm and 1,000 km can be used. Correct the header, or the unit");
+  }
   glm::dmat3 direction = exact_axes(frame.direction);
   glm::dvec3 origin = frame.origin;
   VolumeHeader& header = data.header;
@@ -227,7 +238,8 @@ void check_memory(const std::filesystem::path& path, const VolumeData& data, dou
     lattice << ", resampled to " << labels << " voxels at " << spacing_m->x << " x " << spacing_m->y << " x "
             << spacing_m->z << " m,";
   }
-  const double needed = copies * static_cast<double>(data.header.bytes) + labels;
+  const double needed =
+      copies * static_cast<double>(data.header.bytes) + static_cast<double>(data.slice_bytes()) + labels;
   if (needed > static_cast<double>(max_bytes)) {
     refuse_volume(path, lattice.str(), " need ", megabytes(needed), ", above the limit of ",
                   megabytes(static_cast<double>(max_bytes)),
@@ -255,7 +267,7 @@ void check_options(const std::filesystem::path& path, const VolumeFileOptions& o
   }
 }
 
-LabelVolume label_voxels(const std::filesystem::path& path, VolumeData data,
+LabelVolume label_voxels(const std::filesystem::path& path, const VolumeData& data, const NextSlice& next,
                          const VolumeFileOptions& options) {
   const VolumeHeader& header = data.header;
   LabelVolume volume;
@@ -279,29 +291,30 @@ LabelVolume label_voxels(const std::filesystem::path& path, VolumeData data,
     using T = decltype(zero);
     if (!options.rules.empty()) {
       fill_labels<T>(
-          data, axes,
-          [&](T value, std::size_t) { return label_by_rules(static_cast<double>(value), options.rules); },
+          data, next, axes,
+          [&](T value, std::size_t, std::size_t) {
+            return label_by_rules(static_cast<double>(value), options.rules);
+          },
           volume);
       return;
     }
-    const auto label_of = [&](T value, std::size_t index) {
+    const auto label_of = [&](T value, std::size_t index, std::size_t slice) {
       // In doubles, where the comparison with 255 means the same for every type; NaN fails it.
       const auto number = static_cast<double>(value);
       if (number >= 0.0 && number <= 255.0 && number == std::floor(number))
         return static_cast<std::uint8_t>(number);
       const auto nx = static_cast<std::size_t>(header.dims[0]);
-      const auto ny = static_cast<std::size_t>(header.dims[1]);
       refuse_volume(
-          path, "the file was read as labels, but voxel (", index % nx, ", ", index / nx % ny, ", ",
-          index / nx / ny, ") holds ", number,
+          path, "the file was read as labels, but voxel (", index % nx, ", ", index / nx, ", ", slice,
+          ") holds ", number,
           ", which is not a label from 0 to 255; give rules that map ranges of intensity to labels");
     };
-    fill_labels<T>(data, axes, label_of, volume);
+    fill_labels<T>(data, next, axes, label_of, volume);
   });
   return volume;
 }
 
-VolumeStatistics statistics_of(const VolumeData& data) {
+VolumeStatistics statistics_of(const VolumeData& data, const NextSlice& next) {
   VolumeStatistics statistics;
   std::array<std::size_t, 256> counts{};
   bool labels = true;
@@ -309,15 +322,17 @@ VolumeStatistics statistics_of(const VolumeData& data) {
   double high = -low;
   visit_component(data.component, [&](auto zero) {
     using T = decltype(zero);
-    const std::size_t voxels = data.bytes.size() / sizeof(T);
-    for (std::size_t n = 0; n < voxels; ++n) {
-      const auto value = static_cast<double>(value_at<T>(data.bytes, n));
-      if (value < low) low = value;  // NaN is in no range
-      if (value > high) high = value;
-      if (labels && value >= 0.0 && value <= 255.0 && value == std::floor(value)) {
-        ++counts[static_cast<std::size_t>(value)];
-      } else {
-        labels = false;
+    for (int slice = 0; slice < data.header.dims[2]; ++slice) {
+      const std::span<const std::byte> bytes = next();
+      for (std::size_t n = 0; n < bytes.size() / sizeof(T); ++n) {
+        const auto value = static_cast<double>(value_at<T>(bytes, n));
+        if (value < low) low = value;  // NaN is in no range
+        if (value > high) high = value;
+        if (labels && value >= 0.0 && value <= 255.0 && value == std::floor(value)) {
+          ++counts[static_cast<std::size_t>(value)];
+        } else {
+          labels = false;
+        }
       }
     }
   });
@@ -331,17 +346,18 @@ VolumeStatistics statistics_of(const VolumeData& data) {
   return statistics;
 }
 
-void append_as_doubles(const VolumeData& from, std::vector<std::byte>& to) {
-  visit_component(from.component, [&](auto zero) {
+std::vector<std::byte> as_doubles(Component component, std::span<const std::byte> voxels) {
+  std::vector<std::byte> out;
+  visit_component(component, [&](auto zero) {
     using T = decltype(zero);
-    const std::size_t voxels = from.bytes.size() / sizeof(T);
-    for (std::size_t n = 0; n < voxels; ++n) {
-      const auto value = static_cast<double>(value_at<T>(from.bytes, n));
-      std::array<std::byte, sizeof(double)> bytes{};
-      std::memcpy(bytes.data(), &value, sizeof(double));
-      to.insert(to.end(), bytes.begin(), bytes.end());
+    const std::size_t count = voxels.size() / sizeof(T);
+    out.resize(count * sizeof(double));
+    for (std::size_t n = 0; n < count; ++n) {
+      const auto value = static_cast<double>(value_at<T>(voxels, n));
+      std::memcpy(&out[n * sizeof(double)], &value, sizeof(double));
     }
   });
+  return out;
 }
 
 }  // namespace voxel

@@ -5,7 +5,9 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <glm/mat3x3.hpp>
+#include <span>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -33,9 +35,16 @@ std::size_t size_of(Component component);  // (unit: byte)
 struct VolumeData {
   VolumeHeader header;
   Component component = Component::uint8;
-  bool reversed = false;         // the header's first axis runs against the file's
-  std::vector<std::byte> bytes;  // components in the file's order, x fastest
+  bool reversed = false;  // the header's first axis runs against the file's
+
+  [[nodiscard]] std::size_t slice_bytes() const {
+    return header.bytes / static_cast<std::size_t>(header.dims[2]);
+  }
 };
+
+// Gives the next slice of voxels: components in the file's order, x fastest, valid until the next call. So
+// that a volume never lies in memory in its file's type, which may be eight times that of its labels.
+using NextSlice = std::function<std::span<const std::byte>()>;
 
 // Throws VolumeError: the file, what is wrong with it, and the parts' text put together.
 template <typename... Parts>
@@ -59,18 +68,18 @@ void set_frame(const std::filesystem::path& path, const FileFrame& frame, Compon
                VolumeData& data);
 
 // Refuses, with the numbers, what would need more than max_bytes. `copies` of the voxels are in memory at a
-// time.
+// time, and a slice.
 void check_memory(const std::filesystem::path& path, const VolumeData& data, double copies,
                   const std::optional<glm::dvec3>& spacing_m, std::uint64_t max_bytes);
 
-// Labels of the voxels, resampled where asked. Takes the bytes.
-LabelVolume label_voxels(const std::filesystem::path& path, VolumeData data,
+// Labels of the voxels, resampled where asked. Asks for every slice.
+LabelVolume label_voxels(const std::filesystem::path& path, const VolumeData& data, const NextSlice& next,
                          const VolumeFileOptions& options);
 
-VolumeStatistics statistics_of(const VolumeData& data);
+VolumeStatistics statistics_of(const VolumeData& data, const NextSlice& next);
 
-// Appends the voxels of `from`, each as a double.
-void append_as_doubles(const VolumeData& from, std::vector<std::byte>& to);
+// The voxels, each as a double.
+std::vector<std::byte> as_doubles(Component component, std::span<const std::byte> voxels);
 
 // Refuses rules, spacing, unit or limit that no file could meet.
 void check_options(const std::filesystem::path& path, const VolumeFileOptions& options);

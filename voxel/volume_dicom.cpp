@@ -10,6 +10,7 @@
 #include <glm/vec3.hpp>
 #include <map>
 #include <new>
+#include <sstream>
 #include <type_traits>
 
 #include "voxel/dicom_check.h"
@@ -39,6 +40,7 @@ struct SharedSlice {
   std::array<char, 1000> refusal{};
   std::array<char, 100> series{};
   Component component = Component::int16;
+  bool no_spacing = false;  // in its header, as far as that can be seen
   FileFrame frame;
 };
 static_assert(std::is_trivially_copyable_v<SharedSlice>);
@@ -62,6 +64,19 @@ void read_slice_header(const std::string& file, SharedSlice& slice) {
   std::string series;
   io->GetValueFromTag("0020|000e", series);
   copy_text(series, slice.series);
+  // GDCM puts 1 mm in the place of a spacing that is 0 or missing.
+  std::string spacing;
+  io->GetValueFromTag("0028|0030", spacing);
+  std::istringstream in(spacing);
+  for (double value = 0.0; in >> value; in.ignore(1, '\\')) {
+    if (value > 0.0) continue;
+    refuse_volume(path, "the header says a pixel spacing of ", value,
+                  "; it must be above 0. Correct the header or export the series again");
+  }
+  std::string of_detector;
+  io->GetValueFromTag("0018|1164", of_detector);
+  slice.no_spacing =
+      spacing.empty() && of_detector.empty() && io->GetSpacing(0) == 1.0 && io->GetSpacing(1) == 1.0;
   const unsigned axes = std::min(io->GetNumberOfDimensions(), 3U);
   slice.frame.dims = {1.0, 1.0, 1.0};
   for (unsigned axis = 0; axis < axes; ++axis) {
@@ -146,6 +161,8 @@ std::vector<Slice> read_slices(const fs::path& folder, std::vector<std::string>&
     refuse_volume(folder, "the folder holds ", series.size(), " DICOM series: ", text.str(),
                   named > 8 ? ", ..." : "", "; put the files of one of them into a folder of their own");
   }
+  if (shared[0].no_spacing)
+    notes.emplace_back("the slices do not say how large their pixels are; 1 mm was put in its place");
   if (others > 0)
     notes.push_back(std::to_string(others) + " files of the folder are not DICOM images and were left out");
   return slices;
@@ -233,31 +250,30 @@ DicomSeries read_dicom_header(const fs::path& folder, double unit_m) {
   return series;
 }
 
-void read_dicom_voxels(const fs::path& folder, DicomSeries& series) {
-  VolumeData& data = series.data;
+std::unique_ptr<SharedMemory> read_dicom_voxels(const fs::path& folder, const DicomSeries& series) {
+  const VolumeData& data = series.data;
   const std::vector<std::string>& files = series.files;
   const std::size_t voxels = data.header.bytes / size_of(data.component) / files.size();
   const std::size_t slice_bytes = voxels * size_of(data.component);
   const SharedMemory states(files.size() * sizeof(SharedSlice));
-  const SharedMemory memory(data.header.bytes);
+  auto memory = std::make_unique<SharedMemory>(data.header.bytes);
   auto* shared = new (states.data()) SharedSlice[files.size()];
   for_each_apart(folder, files, shared, [&](std::size_t n) {
-    VolumeData slice;
-    std::vector<std::byte> doubles;
+    Component component{};
+    std::vector<std::byte> bytes;
     in_words(files[n], "the slice cannot be read", kDamaged, [&] {
       const auto io = itk::GDCMImageIO::New();
       io->SetFileName(files[n]);
       io->ReadImageInformation();
-      slice.component = component_of(*io).value();
-      slice.bytes.resize(voxels * size_of(slice.component));
-      read_voxels(*io, slice.bytes);
+      component = component_of(*io).value();
+      bytes.resize(voxels * size_of(component));
+      read_voxels(*io, bytes);
     });
-    if (slice.component != data.component) append_as_doubles(slice, doubles);
-    const std::vector<std::byte>& bytes = doubles.empty() ? slice.bytes : doubles;
+    if (component != data.component) bytes = as_doubles(component, bytes);
     std::copy_n(bytes.begin(), std::min(bytes.size(), slice_bytes),
-                memory.data() + static_cast<std::ptrdiff_t>(n * slice_bytes));
+                memory->data() + static_cast<std::ptrdiff_t>(n * slice_bytes));
   });
-  data.bytes.assign(memory.data(), memory.data() + data.header.bytes);
+  return memory;
 }
 
 }  // namespace voxel

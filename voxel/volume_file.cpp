@@ -17,6 +17,7 @@
 
 #include "voxel/volume_inspect.h"
 #include "voxel/volume_itk.h"
+#include "voxel/voxel_stream.h"
 
 namespace voxel {
 namespace {
@@ -105,7 +106,17 @@ OpenVolume open_volume(const fs::path& path, double unit_m) {
   open.io = reader_for(format);
   open.alone = std::make_unique<AloneFile>(path, format);
   open.io->SetFileName(open.alone->name());
-  in_words(path, "the header cannot be read", kDamaged, [&] { open.io->ReadImageInformation(); });
+  in_words(path, "the header cannot be read", kDamaged, [&] {
+    try {
+      open.io->ReadImageInformation();
+    } catch (const itk::ExceptionObject& error) {
+      if (words_of(error).find("orthonormal") == std::string::npos) throw;
+      refuse_volume(path,
+                    "the axes that the header's sform gives are not at right angles, or not as long as "
+                    "its voxel sizes; correct the header, or resample the volume onto a rectangular "
+                    "lattice first");
+    }
+  });
   const std::optional<Component> component = component_of(*open.io);
   if (!component) {
     refuse_volume(path, "each voxel holds ", open.io->GetNumberOfComponents(), " numbers of type ",
@@ -133,23 +144,59 @@ bool is_folder(const fs::path& path) {
   return fs::is_directory(path, error);
 }
 
-// The header and voxels of a file or a folder, within the limit.
-VolumeData read_volume(const fs::path& path, double unit_m, const std::optional<glm::dvec3>& spacing_m,
-                       std::uint64_t max_bytes) {
-  if (is_folder(path)) {
-    DicomSeries series = read_dicom_header(path, unit_m);
-    check_memory(path, series.data, 2.0, spacing_m, max_bytes);  // and what the process apart hands over
-    in_words(path, "the voxels cannot be read", kDamaged, [&] { read_dicom_voxels(path, series); });
-    return std::move(series.data);
-  }
+// The voxels of a single file, slice by slice: as they are where nothing has to be done to them, and as the
+// library reads them otherwise (text, bzip2, scaled NIfTI), in memory then.
+template <typename Use>
+auto with_file_slices(const fs::path& path, double unit_m, const std::optional<glm::dvec3>& spacing_m,
+                      std::uint64_t max_bytes, Use use) {
   OpenVolume open = open_volume(path, unit_m);
-  check_memory(path, open.data, open.copies, spacing_m, max_bytes);
-  check_packed(path, open.place, open.data.header);
+  const VolumeData& data = open.data;
+  const std::size_t component = size_of(data.component);
+  const bool packed = open.place.packing == VoxelPlace::Packing::deflate;
+  if (open.place.as_they_are && (packed || open.place.packing == VoxelPlace::Packing::raw) &&
+      (open.place.voxel_bytes == 0 || open.place.voxel_bytes == component)) {
+    check_memory(path, data, 0.0, spacing_m, max_bytes);
+    VoxelStream stream(path, open.place, data.header);
+    auto result = use(data, [&] { return stream.next(data.slice_bytes(), component); });
+    stream.finish();
+    return result;
+  }
+  check_memory(path, data, open.copies, spacing_m, max_bytes);
+  if (packed) {  // the libraries fill up with zeros what is not there
+    VoxelStream whole(path, open.place, data.header);
+    const std::uint64_t slice =
+        bytes_in_file(open.place, data.header) / static_cast<std::uint64_t>(data.header.dims[2]);
+    for (int k = 0; k < data.header.dims[2]; ++k) whole.next(slice, 1);
+    whole.finish();
+  }
+  std::vector<std::byte> bytes;
   in_words(path, "the voxels cannot be read", kDamaged, [&] {
-    open.data.bytes.resize(open.data.header.bytes);
-    read_voxels(*open.io, open.data.bytes);
+    bytes.resize(data.header.bytes);
+    read_voxels(*open.io, bytes);
   });
-  return std::move(open.data);
+  std::size_t at = 0;
+  return use(data, [&] {
+    const std::size_t begin = at;
+    at += data.slice_bytes();
+    return std::span<const std::byte>(bytes).subspan(begin, data.slice_bytes());
+  });
+}
+
+// Calls use(data, next slice) for a file or a folder, within the limit.
+template <typename Use>
+auto with_slices(const fs::path& path, double unit_m, const std::optional<glm::dvec3>& spacing_m,
+                 std::uint64_t max_bytes, Use use) {
+  if (!is_folder(path)) return with_file_slices(path, unit_m, spacing_m, max_bytes, use);
+  const DicomSeries series = read_dicom_header(path, unit_m);
+  check_memory(path, series.data, 1.0, spacing_m, max_bytes);  // what the process apart hands over
+  const auto voxels =
+      in_words(path, "the voxels cannot be read", kDamaged, [&] { return read_dicom_voxels(path, series); });
+  std::size_t at = 0;
+  return use(series.data, [&] {
+    const std::size_t begin = at;
+    at += series.data.slice_bytes();
+    return std::span<const std::byte>(voxels->data() + begin, series.data.slice_bytes());
+  });
 }
 
 }  // namespace
@@ -196,6 +243,8 @@ std::string words_of(const std::exception& any) {
   if (text.rfind(prefix, 0) == 0) text.erase(0, prefix.size());
   const auto address = text.find("): ");  // NiftiImageIO(0x55…): words
   if (address != std::string::npos && text.find("(0x") < address) text.erase(0, address + 3);
+  const auto last_word = text.rfind("[nrrd] ");  // one of the stack of its functions
+  if (last_word != std::string::npos) text.erase(0, last_word + 7);
   for (char& c : text) c = c == '\n' || c == '\r' ? ' ' : c;
   const auto last = text.find_last_not_of(" .");
   return text.substr(0, last == std::string::npos ? 0 : last + 1);
@@ -220,70 +269,19 @@ VolumeHeader read_volume_header(const fs::path& path, double unit_m) {
                          : open_volume(path, unit_m).data.header;
 }
 
-LabelVolume load_volume(const fs::path& path, const VolumeFileOptions& options) {
+LabelVolume load_volume(const fs::path& path, const VolumeFileOptions& options,
+                        std::vector<std::string>* notes) {
   check_options(path, options);
-  VolumeData data = read_volume(path, options.unit_m, options.spacing_m, options.max_bytes);
-  return in_words(path, "the voxels cannot be labelled", kDamaged,
-                  [&] { return label_voxels(path, std::move(data), options); });
+  return with_slices(path, options.unit_m, options.spacing_m, options.max_bytes,
+                     [&](const VolumeData& data, const NextSlice& next) {
+                       if (notes != nullptr) *notes = data.header.notes;
+                       return in_words(path, "the voxels cannot be labelled", kDamaged,
+                                       [&] { return label_voxels(path, data, next, options); });
+                     });
 }
 
 VolumeStatistics read_volume_statistics(const fs::path& path, std::uint64_t max_bytes) {
-  return statistics_of(read_volume(path, 1e-3, std::nullopt, max_bytes));
-}
-
-void save_volume(const fs::path& path, const LabelVolume& volume, double unit_m) {
-  const VolumeFormat format = format_of(path);
-  if (!(std::isfinite(unit_m) && unit_m > 0.0)) {
-    refuse_volume(path, "the file's length unit is given as ", unit_m,
-                  " m; it must be above 0 (1e-3 for mm)");
-  }
-  double voxels = 1.0;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const int n = volume.dims[axis];
-    voxels *= n;
-    if (n < 1) refuse_volume(path, "a volume of ", n, " voxels along axis ", axis + 1, " cannot be saved");
-    if (format == VolumeFormat::nifti && n > 32767) {
-      refuse_volume(path, "NIfTI cannot hold ", n,
-                    " voxels along an axis (at most 32,767); save it as .nrrd");
-    }
-  }
-  if (voxels != static_cast<double>(volume.labels.size())) {
-    refuse_volume(path, "a volume of ", voxels, " voxels with ", volume.labels.size(),
-                  " labels cannot be saved");
-  }
-  if (!path.parent_path().empty() && !is_folder(path.parent_path())) {
-    refuse_volume(path, "there is no folder '", path.parent_path().string(), "'; make it first");
-  }
-  if (!std::ofstream(path, std::ios::trunc)) {
-    refuse_volume(path, "the file cannot be written; check the folder's permissions and free space");
-  }
-  const char* remedy = "check the folder's permissions and free space";
-  in_words(path, "the volume cannot be written", remedy, [&] {
-    const itk::ImageIOBase::Pointer io = reader_for(format);
-    if (format == VolumeFormat::meta) dynamic_cast<itk::MetaImageIO&>(*io).SetDoublePrecision(17);
-    io->SetFileName(path.string());
-    io->SetNumberOfDimensions(3);
-    io->SetNumberOfComponents(1);
-    io->SetPixelType(itk::IOPixelEnum::SCALAR);
-    io->SetComponentType(itk::IOComponentEnum::UCHAR);
-    io->SetUseCompression(true);
-    const glm::dmat3 direction = glm::mat3_cast(glm::normalize(volume.rotation));
-    itk::ImageIORegion region(3);
-    for (unsigned axis = 0; axis < 3; ++axis) {
-      const auto a = static_cast<int>(axis);
-      const auto n = static_cast<itk::SizeValueType>(volume.dims[axis]);
-      io->SetDimensions(axis, n);
-      io->SetSpacing(axis, volume.spacing_m[a] / unit_m);
-      io->SetOrigin(axis, volume.origin_m[a] / unit_m);
-      io->SetDirection(axis, std::vector<double>{direction[a].x, direction[a].y, direction[a].z});
-      region.SetSize(axis, n);
-    }
-    io->SetIORegion(region);
-    io->Write(volume.labels.data());
-  });
-  // The NIfTI library reports a full disk to nobody; what was written must read back.
-  if (read_volume_header(path, unit_m).dims != volume.dims)
-    refuse_volume(path, "the volume was not written; ", remedy);
+  return with_slices(path, 1e-3, std::nullopt, max_bytes, statistics_of);
 }
 
 }  // namespace voxel

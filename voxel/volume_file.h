@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Volumes in and out of files. The only part of the project that knows ITK.
+// Volumes out of files. The only part of the project that knows ITK. (Into files: volume_writer.h.)
 // Frame: whatever the format, positions come out in ITK's (and DICOM's) world frame, in which x points to the
 // patient's left, y to the back and z to the head (LPS). That frame is the scene's. NIfTI files state theirs
 // as RAS (x right, y front), so their x and y change sign here and again on saving: viewers see the same
@@ -56,8 +56,10 @@ struct VolumeFileOptions {
 VolumeHeader read_volume_header(const std::filesystem::path& path, double unit_m = 1e-3);
 
 // The axes are permuted and flipped nowhere except where the file's frame is left-handed: then the first axis
-// is reversed, so that `rotation` is a proper rotation. Throws VolumeError.
-LabelVolume load_volume(const std::filesystem::path& path, const VolumeFileOptions& options);
+// is reversed, so that `rotation` is a proper rotation. What was found and put right is said in `notes`, as
+// in the header's. Throws VolumeError.
+LabelVolume load_volume(const std::filesystem::path& path, const VolumeFileOptions& options,
+                        std::vector<std::string>* notes = nullptr);
 
 // The labels found and how many voxels each has, and the range of intensities, for `check`. Throws
 // VolumeError.
@@ -68,9 +70,5 @@ struct VolumeStatistics {
 };
 VolumeStatistics read_volume_statistics(const std::filesystem::path& path,
                                         std::uint64_t max_bytes = 8ULL << 30);
-
-// Writes labels with their frame as NIfTI/NRRD/MetaImage, by extension. NRRD and MetaImage keep the frame to
-// double precision, NIfTI to single. Throws VolumeError.
-void save_volume(const std::filesystem::path& path, const LabelVolume& volume, double unit_m = 1e-3);
 
 }  // namespace voxel

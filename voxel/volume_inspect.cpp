@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cctype>
 #include <cmath>
 #include <cstring>
@@ -18,6 +19,8 @@ namespace fs = std::filesystem;
 
 // Deflate packs at most 1,032 bytes into one.
 constexpr double kMostPacked = 1100.0;
+constexpr const char* kNoSpacing = "the header gives no voxel spacing; one unit was put in its place";
+constexpr bool kLittle = std::endian::native == std::endian::little;
 
 bool ends_with(const std::string& text, const std::string& end) {
   return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
@@ -146,6 +149,12 @@ void inspect_meta(const fs::path& path, VoxelPlace& place) {
   const std::string binary = lower_case(header.text("binarydata"));
   if (starts_with(binary, "f") || starts_with(binary, "0")) place.packing = VoxelPlace::Packing::text;
   place.offset += bytes_to_skip(path, header, "headersize");
+  if (header.number("headersize", 0.0) < 0.0) place.as_they_are = false;  // at the file's end
+  if (!header.has("elementspacing")) place.notes.emplace_back(kNoSpacing);
+  for (const char* key : {"binarydatabyteordermsb", "elementbyteordermsb"}) {
+    const std::string order = lower_case(header.text(key));
+    if (starts_with(order, "t") || starts_with(order, "1")) place.swapped = kLittle;
+  }
   const double packed = header.number("compresseddatasize", 0.0);
   if (!(packed >= 0.0 && packed <= static_cast<double>(place.file_bytes))) {
     refuse_volume(path, "the header says ", header.text("compresseddatasize"),
@@ -168,6 +177,19 @@ void inspect_nrrd(const fs::path& path, VoxelPlace& place) {
   bytes_to_skip(path, header, "lineskip");
   const std::uint64_t skipped = bytes_to_skip(path, header, "byteskip");
   (place.packing == Packing::deflate ? place.skipped : place.offset) += skipped;
+  const std::string directions = lower_case(header.text("spacedirections"));
+  const std::string spacings = lower_case(header.text("spacings"));
+  if (directions.find("nan") != std::string::npos || spacings.find("nan") != std::string::npos)
+    refuse_volume(path, "the header gives no voxel spacing along an axis (nan); correct it");
+  if (directions.empty() && spacings.empty()) place.notes.emplace_back(kNoSpacing);
+  // Of the axes, those without a direction are no space; three must be.
+  std::size_t none = 0;
+  for (auto at = directions.find("none"); at != std::string::npos; at = directions.find("none", at + 4))
+    ++none;
+  if (none > 0 && header.number("dimension", 0.0) - static_cast<double>(none) < 3.0)
+    refuse_volume(path, "the header gives no direction for one of the volume's three axes; correct it");
+  place.swapped = (lower_case(header.text("endian")) == "big") == kLittle && header.has("endian");
+  if (header.has("lineskip") || header.number("byteskip", 0.0) < 0.0) place.as_they_are = false;
   if (header.has("lineskip") && place.packing == Packing::deflate) place.packing = Packing::other;
 }
 
@@ -199,12 +221,57 @@ void check_nifti_frame(const fs::path& path, const std::array<unsigned char, Byt
   if (field_at<std::int16_t>(header, 254, swapped) > 0) check("sform", 280, 12);
 }
 
+// Files that are good, but not what their name says, or of a kind that is not read.
+template <std::size_t Bytes>
+void check_nifti_kind(const fs::path& path, const std::array<unsigned char, Bytes>& header) {
+  const bool named_packed = ends_with(lower_case(path.string()), ".gz");
+  std::ifstream file(path, std::ios::binary);
+  const bool packed = file.get() == 0x1f && file.get() == 0x8b;
+  if (packed && !named_packed) refuse_volume(path, "the file is packed by gzip; let its name end in .nii.gz");
+  if (!packed && named_packed && field_at<std::int32_t>(header, 0, false) == 348)
+    refuse_volume(path, "the file is not packed, as its name says; let it end in .nii");
+  for (const bool swapped : {false, true}) {
+    if (field_at<std::int32_t>(header, 0, swapped) == 540)
+      refuse_volume(path, "this is NIfTI-2, which is not read; save it as NIfTI-1, NRRD or MetaImage");
+  }
+  if (std::memcmp(&header[344], "ni1", 4) == 0)
+    refuse_volume(path, "the voxels are in a file of their own (.img); save it as one .nii file");
+}
+
+// Where the two frames of a header put a voxel in different places, it is luck which one a program takes.
+template <std::size_t Bytes>
+bool frames_differ(const std::array<unsigned char, Bytes>& header, bool swapped) {
+  const auto at = [&](std::size_t byte, std::size_t n) {
+    return static_cast<double>(field_at<float>(header, byte + 4 * n, swapped));
+  };
+  if (field_at<std::int16_t>(header, 252, swapped) <= 0 || field_at<std::int16_t>(header, 254, swapped) <= 0)
+    return false;
+  const double b = at(256, 0), c = at(256, 1), d = at(256, 2);
+  const double a = std::sqrt(std::max(0.0, 1.0 - b * b - c * c - d * d));  // nifti1.h, method 2
+  const double left = at(76, 0) < 0.0 ? -1.0 : 1.0;
+  const std::array<std::array<double, 3>, 3> turn{
+      {{a * a + b * b - c * c - d * d, 2 * (b * c - a * d), 2 * (b * d + a * c)},
+       {2 * (b * c + a * d), a * a + c * c - b * b - d * d, 2 * (c * d - a * b)},
+       {2 * (b * d - a * c), 2 * (c * d + a * b), a * a + d * d - b * b - c * c}}};
+  double off = 0.0, size = 0.0;
+  for (std::size_t row = 0; row < 3; ++row) {
+    off = std::max(off, std::abs(at(268, row) - at(280 + 16 * row, 3)));
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double step = turn[row][axis] * at(80, axis) * (axis == 2 ? left : 1.0);
+      off = std::max(off, std::abs(step - at(280 + 16 * row, axis)));
+      size = std::max(size, std::abs(at(80, axis)));
+    }
+  }
+  return off > 0.01 * size;
+}
+
 void inspect_nifti(const fs::path& path, VoxelPlace& place) {
   constexpr std::int32_t kHeaderBytes = 348;
   std::array<unsigned char, kHeaderBytes> header{};
   const gzFile file = gzopen(path.c_str(), "rb");  // reads what is not packed as it is
   const int got = file == nullptr ? 0 : gzread(file, header.data(), header.size());
   if (file != nullptr) gzclose(file);
+  check_nifti_kind(path, header);
   const bool swapped = field_at<std::int32_t>(header, 0, true) == kHeaderBytes;
   const bool magic = std::memcmp(&header[344], "n+1", 4) == 0;
   if (got != kHeaderBytes || (!swapped && field_at<std::int32_t>(header, 0, false) != kHeaderBytes) ||
@@ -219,12 +286,20 @@ void inspect_nifti(const fs::path& path, VoxelPlace& place) {
       refuse_volume(path, "the header says ", voxels, " voxels along axis ", axis, "; ", kDamaged);
     const float spacing = field_at<float>(header, 76 + 4 * static_cast<std::size_t>(axis), swapped);
     if (axis > 3 || spacing > 0.0F) continue;
+    if (voxels > 1 && spacing == 0.0F) {
+      refuse_volume(path, "the header says a voxel spacing of 0 along axis ", axis,
+                    "; it must be above 0. Correct the header or export the volume again");
+    }
     std::ostringstream note;
     note << "the header's voxel size along axis " << axis << " is " << spacing
          << "; another was put in its place";
     place.notes.push_back(note.str());
   }
   check_nifti_frame(path, header, swapped);
+  if (frames_differ(header, swapped))
+    place.notes.emplace_back(
+        "the header's qform and sform put the volume in different places; look whether it lies "
+        "where it should");
   if (ends_with(lower_case(path.string()), ".gz")) place.packing = VoxelPlace::Packing::deflate;
   const float offset = field_at<float>(header, 108, swapped);
   const double most = place.packing == VoxelPlace::Packing::raw ? 1.0 : kMostPacked;
@@ -237,51 +312,16 @@ void inspect_nifti(const fs::path& path, VoxelPlace& place) {
   const auto type = type_bytes.find(field_at<std::int16_t>(header, 70, swapped));
   if (type != type_bytes.end())
     place.voxel_bytes = type->second;  // other types are refused once ITK names them
+  // With a slope, ITK makes floats of them.
+  const float slope = field_at<float>(header, 112, swapped),
+              intercept = field_at<float>(header, 116, swapped);
+  place.as_they_are = slope == 0.0F || (slope == 1.0F && intercept == 0.0F);
+  place.swapped = swapped;
   const auto begin = std::max<std::uint64_t>(static_cast<std::uint64_t>(offset), kHeaderBytes);
   (place.packing == VoxelPlace::Packing::raw ? place.offset : place.skipped) = begin;
 }
 
-class Inflater {
- public:
-  Inflater() {
-    ready_ = inflateInit2(&stream_, 15 + 32) == Z_OK;
-  }  // zlib or gzip, told apart by their headers
-  ~Inflater() {
-    if (ready_) inflateEnd(&stream_);
-  }
-  Inflater(const Inflater&) = delete;
-  Inflater& operator=(const Inflater&) = delete;
-
-  void feed(std::vector<unsigned char>& bytes, std::size_t count) {
-    stream_.next_in = bytes.data();
-    stream_.avail_in = static_cast<uInt>(count);
-  }
-  // Unpacks some of what was fed; false when there is nothing left, or at an error.
-  bool step() {
-    if (!ready_ || failed_ || (stream_.avail_in == 0 && !full_)) return false;
-    if (ended_) {  // gzip files may be several streams in a row
-      ended_ = false;
-      failed_ = inflateReset(&stream_) != Z_OK;
-    }
-    stream_.next_out = out_.data();
-    stream_.avail_out = static_cast<uInt>(out_.size());
-    const int status = inflate(&stream_, Z_NO_FLUSH);
-    full_ = stream_.avail_out == 0;
-    unpacked_ += out_.size() - stream_.avail_out;
-    ended_ = status == Z_STREAM_END;
-    failed_ = failed_ || (status != Z_OK && status != Z_STREAM_END && status != Z_BUF_ERROR);
-    return !failed_;
-  }
-  [[nodiscard]] std::uint64_t unpacked() const { return unpacked_; }
-  [[nodiscard]] bool ended() const { return ended_; }
-  [[nodiscard]] bool failed() const { return failed_ || !ready_; }
-
- private:
-  z_stream stream_{};
-  std::vector<unsigned char> out_ = std::vector<unsigned char>(std::size_t{1} << 18U);
-  std::uint64_t unpacked_ = 0;
-  bool ready_ = false, failed_ = false, ended_ = false, full_ = false;
-};
+}  // namespace
 
 std::uint64_t bytes_in_file(const VoxelPlace& place, const VolumeHeader& header) {
   if (place.voxel_bytes == 0) return header.bytes;
@@ -289,8 +329,6 @@ std::uint64_t bytes_in_file(const VoxelPlace& place, const VolumeHeader& header)
   for (const int n : header.dims) bytes *= static_cast<std::uint64_t>(n);
   return bytes;
 }
-
-}  // namespace
 
 VolumeFormat format_of(const fs::path& path) {
   const std::string name = lower_case(path.filename().string());
@@ -328,35 +366,22 @@ VoxelPlace inspect_volume(const fs::path& path, VolumeFormat format) {
   return place;
 }
 
-void check_file_size(const fs::path& path, const VoxelPlace& place, const VolumeHeader& header) {
+void check_file_size(const fs::path& path, const VoxelPlace& place, VolumeHeader& header) {
   const std::uint64_t left = place.file_bytes > place.offset ? place.file_bytes - place.offset : 0;
   // As text a voxel of up to eight bytes takes one digit and a blank at least.
   const bool raw = place.packing == VoxelPlace::Packing::raw;
   const double most = raw ? 1.0 : place.packing == VoxelPlace::Packing::text ? 8.0 : kMostPacked;
   const std::uint64_t needed = bytes_in_file(place, header);
-  if (static_cast<double>(needed) <= most * static_cast<double>(left)) return;
+  if (static_cast<double>(needed) <= most * static_cast<double>(left)) {
+    if (raw && place.as_they_are && left > needed) {
+      header.notes.push_back("the file goes on for " + std::to_string(left - needed) +
+                             " bytes behind the last voxel; look whether the header's sizes are right");
+    }
+    return;
+  }
   refuse_volume(path, "the header says ", header.dims[0], " x ", header.dims[1], " x ", header.dims[2],
                 " voxels of ", header.component, ", ", needed, " bytes, but '", place.file.string(),
                 "' has only ", left, raw ? " bytes of them; " : " packed bytes; ", kDamaged);
-}
-
-void check_packed(const fs::path& path, const VoxelPlace& place, const VolumeHeader& header) {
-  if (place.packing != VoxelPlace::Packing::deflate) return;
-  std::ifstream file(place.file, std::ios::binary);
-  file.seekg(static_cast<std::streamoff>(place.offset));
-  std::vector<unsigned char> bytes(std::size_t{1} << 16U);
-  const std::uint64_t needed = bytes_in_file(place, header) + place.skipped;
-  Inflater inflater;
-  // To the end of the stream, where its checksum is; a file may go on after that.
-  while (file && !inflater.failed() && !(inflater.ended() && inflater.unpacked() >= needed)) {
-    file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-    inflater.feed(bytes, static_cast<std::size_t>(file.gcount()));
-    while (!(inflater.ended() && inflater.unpacked() >= needed) && inflater.step()) continue;
-  }
-  if (!inflater.failed() && inflater.ended() && inflater.unpacked() >= needed) return;
-  refuse_volume(path, "the packed voxels in '", place.file.string(), "' ",
-                inflater.failed() ? "are damaged after" : "end after", " ", inflater.unpacked(), " of ",
-                needed, " bytes; ", kDamaged);
 }
 
 }  // namespace voxel

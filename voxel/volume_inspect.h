@@ -35,16 +35,19 @@ struct VoxelPlace {
   std::uint64_t skipped = 0;  // (unit: byte) before the voxels inside the packed stream
   Packing packing = Packing::raw;
   std::uint64_t voxel_bytes = 0;  // (unit: byte) of a voxel in the file, where scaling may change it; or 0
+  bool swapped = false;           // not in this machine's byte order
+  bool as_they_are = true;        // raw or deflate: nothing but the byte order stands between file and voxels
   std::vector<std::string> notes;
 };
 
 // Throws VolumeError where the header is not one of a volume of the format.
 VoxelPlace inspect_volume(const std::filesystem::path& path, VolumeFormat format);
 
-// Refuses a header that announces more voxels than the file can hold, before memory is asked for.
-void check_file_size(const std::filesystem::path& path, const VoxelPlace& place, const VolumeHeader& header);
+// Refuses a header that announces more voxels than the file can hold, before memory is asked for, and notes
+// where it holds more.
+void check_file_size(const std::filesystem::path& path, const VoxelPlace& place, VolumeHeader& header);
 
-// Unpacks a packed file without keeping it, and refuses one that ends early or whose checksum is wrong.
-void check_packed(const std::filesystem::path& path, const VoxelPlace& place, const VolumeHeader& header);
+// (unit: byte) of all voxels in the file, as they are there.
+std::uint64_t bytes_in_file(const VoxelPlace& place, const VolumeHeader& header);
 
 }  // namespace voxel

@@ -4,11 +4,13 @@
 
 #include <exception>
 #include <filesystem>
+#include <memory>
 #include <new>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "voxel/run_apart.h"
 #include "voxel/volume_data.h"
 #include "voxel/volume_inspect.h"
 
@@ -49,6 +51,8 @@ struct DicomSeries {
   VolumeData data;  // without voxels
 };
 DicomSeries read_dicom_header(const std::filesystem::path& folder, double unit_m);
-void read_dicom_voxels(const std::filesystem::path& folder, DicomSeries& series);
+// All voxels, slice after slice.
+std::unique_ptr<SharedMemory> read_dicom_voxels(const std::filesystem::path& folder,
+                                                const DicomSeries& series);
 
 }  // namespace voxel

@@ -81,7 +81,7 @@ TEST_F(SceneFile, OtherTablesAreRead) {
       "[tool]\nshape = \"punch\"\n[device]\nmodel = \"touch\"\nrate = 2000\n"
       "[hand]\nmass = 0.1\ndamping = 3\nstiffness = 400\n"
       "[safety]\nmax_force = 3\nmax_slew = 1000\nsoft_start = 0.2\n"
-      "[material.gel]\nyoung = 4000\npoisson = 0.45\nstretch = [1, 1]\nshear = 0\nyield = 0.1\n" +
+      "[material.gel]\nyoung = 4000\npoisson = 0.45\nstretch = [1, 1]\nshear = 0\n" +
       block + "material = \"gel\"\n" + path + "hold = 2\nrepeat = 3\n");
   EXPECT_EQ(scene.title, "Two");
   EXPECT_EQ(scene.overlap, hybrid::Overlap::refuse);
@@ -101,7 +101,6 @@ TEST_F(SceneFile, OtherTablesAreRead) {
   EXPECT_EQ(gel.stretch_min, 1.0);
   EXPECT_EQ(gel.stretch_max, 1.0);
   EXPECT_EQ(gel.shear, 0.0);
-  EXPECT_EQ(gel.yield, 0.1);
   EXPECT_EQ(scene.soft.at(0).material, "gel");
   EXPECT_EQ(std::get<device::PressPath>(scene.path).hold_s, 2.0);
   EXPECT_EQ(std::get<device::PressPath>(scene.path).repeat, 3);

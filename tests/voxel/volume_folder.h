@@ -12,6 +12,7 @@
 #include <string>
 
 #include "voxel/volume_file.h"
+#include "voxel/volume_writer.h"
 
 namespace tests {
 
