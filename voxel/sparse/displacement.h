@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The moving half of a soft object: how far each voxel is from rest, and who is responsible for moving it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/vec3.hpp>
+
+#include "voxel/sparse/lattice.h"
+#include "voxel/sparse/lazy_array.h"
+
+namespace voxel::sparse {
+
+// Displacement, not position: at coordinate 100 a float position has lost the slack of the chain to rounding,
+// a displacement near zero has not.
+struct Displacement {
+  enum Role : std::uint8_t {
+    free = 0,
+    held = 1,      // near the tool or another soft object: moved by the contact solver only
+    obstacle = 2,  // near a rigid surface: also subject to n·u >= c
+  };
+
+  explicit Displacement(const Lattice& lattice)
+      : role(lattice.size()), row_held(lattice.grid().rows()), row_obstacles(lattice.grid().rows()) {
+    for (auto& axis : u) axis = LazyArray<float>(lattice.size());
+  }
+
+  std::array<LazyArray<float>, 3> u;                // [axis][v] (unit: meter)
+  LazyArray<std::uint8_t> role;                     // [v]
+  LazyArray<std::uint8_t> row_held, row_obstacles;  // [row]: voxels of the row with that role
+
+  [[nodiscard]] glm::dvec3 at(VoxelId v) const { return {u[0][v], u[1][v], u[2][v]}; }
+  void set(VoxelId v, const glm::dvec3& value) {
+    for (int a = 0; a < 3; ++a) u[static_cast<std::size_t>(a)][v] = static_cast<float>(value[a]);
+  }
+  void set_role(VoxelId v, Role r) {
+    if (role[v] == r) return;  // untouched tissue stays unwritten
+    const RowId row = v / kRow;
+    row_held[row] = static_cast<std::uint8_t>(row_held[row] + (r == held) - (role[v] == held));
+    row_obstacles[row] =
+        static_cast<std::uint8_t>(row_obstacles[row] + (r == obstacle) - (role[v] == obstacle));
+    role[v] = r;
+  }
+};
+
+// A half-space that one surface voxel may not leave: normal · u >= bound, u its displacement.
+struct Obstacle {
+  glm::vec3 normal{0.0F};
+  float bound = 0.0F;  // (unit: meter), <= 0 where the voxel is clear of it at rest
+};
+
+}  // namespace voxel::sparse

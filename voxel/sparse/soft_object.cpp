@@ -1,0 +1,494 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "voxel/sparse/soft_object.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <limits>
+
+#include "voxel/sparse/links.h"
+
+namespace voxel::sparse {
+namespace {
+
+constexpr double kSettled = 2e-3;     // of the spacing: a contact off by less is left to the background
+constexpr double kContraction = 0.5;  // of that, by a cycle round the contact
+constexpr int kMaxNear = 64;          // voxels across the contact that relax_near() works on at most
+constexpr std::size_t kMaxCarried = 20'000;  // voxels that may hang on the pressed ones by tight links
+constexpr int kProjections = 3;    // of a pressed voxel onto the tool, in search of its least energy
+constexpr double kStir = 1e-5;     // of the spacing: pressed voxels that moved less wake nobody
+constexpr double kGiveWay = 0.01;  // of the voxel radius: less is left to the next push
+constexpr float kTight = 1e-4F;    // of the spacing: nearer to its limit than this a link is tight
+
+}  // namespace
+
+SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice)
+    : lattice_(std::move(lattice)),
+      state_(*lattice_),
+      chain_(*lattice_),
+      relaxation_(*lattice_),
+      pair_held_(lattice_->surface().size(), 0),
+      carried_mark_(lattice_->size()),
+      carried_index_(lattice_->size()) {
+  const auto surface = lattice_->surface();
+  touches_.reserve(kMaxTouched);
+  touched_voxels_.reserve(kMaxTouched);
+  sources_.reserve(surface.size());
+  moves_.reserve(surface.size());
+  held_voxels_.reserve(surface.size());
+  all_held_.reserve(surface.size() + kMaxTouched);
+  carried_.reserve(kMaxCarried + kMaxTouched);
+}
+
+std::unique_ptr<SoftObject> SoftObject::copy() const {
+  auto result = std::make_unique<SoftObject>(lattice_);
+  result->state_ = state_;
+  result->obstacles_ = obstacles_;
+  result->pair_held_ = pair_held_;
+  for (const VoxelId v : held_voxels_) result->held_voxels_.push_back(v);
+  for (const Touch& t : touches_) result->touches_.push_back(t);
+  for (const VoxelId v : touched_voxels_) result->touched_voxels_.push_back(v);
+  result->moved_ever_ = moved_ever_;
+  result->relaxation_.copy_from(relaxation_);
+  return result;
+}
+
+double SoftObject::reach(double tool_radius) const {
+  // Half a cell's diagonal would do for voxels at rest; pressed, they part. From a spacing and a half on none
+  // lets go (a test presses tools of a hundredth of a spacing three spacings deep).
+  return std::max(tool_radius + voxel_radius(), 1.5 * lattice_->max_spacing_m());
+}
+
+SoftObject::Gap SoftObject::gap(const ToolInBody& tool, const glm::dvec3& position) const noexcept {
+  const glm::dvec3 d = position - tool.centre;
+  if (tool.shape == ToolInBody::Shape::punch) {
+    const double along = glm::dot(d, tool.axis);
+    const double across2 = glm::dot(d, d) - along * along;
+    // Only what lies under the face, and not behind it, is pressed by it.
+    const bool under = across2 <= tool.radius * tool.radius && along > -4.0 * lattice_->max_spacing_m();
+    return {under ? along - voxel_radius() : std::numeric_limits<double>::max(), tool.axis};
+  }
+  const double distance = glm::length(d);
+  // The tool's centre exactly on a voxel: any direction serves; back along the punch axis is one.
+  const glm::dvec3 normal = distance > 0.0 ? d / distance : tool.axis;
+  return {distance - reach(tool.radius), normal};
+}
+
+void SoftObject::touch(std::span<const VoxelId> near) noexcept {
+  std::size_t pressed = 0;
+  for (const Touch& t : touches_) {
+    if (!t.pressed) continue;
+    carried_mark_[t.v] = 1;
+    ++pressed;
+  }
+  for (const VoxelId v : touched_voxels_) state_.set_role(v, resting_role(v));
+  // What the tool leaves behind springs back, however long it was at rest.
+  for (const Touch& t : touches_) {
+    if (t.pressed) relaxation_.stir(t.v / kRow);
+  }
+  touches_.clear();
+  for (const VoxelId v : near) {
+    if (touches_.size() == kMaxTouched) break;
+    const bool kept = carried_mark_[v] != 0;
+    if (kept) --pressed;
+    touches_.push_back({v, kept, glm::dvec3(0.0), glm::dvec3(0.0)});
+  }
+  for (const VoxelId v : touched_voxels_) carried_mark_[v] = 0;
+  touched_voxels_.clear();
+  for (const Touch& t : touches_) touched_voxels_.push_back(t.v);
+  if (pressed > 0) relaxation_.wake();
+  set_touch_roles();
+}
+
+Displacement::Role SoftObject::resting_role(VoxelId v) const noexcept {
+  const std::uint32_t s = lattice_->surface_number(v);
+  if (pair_held_[s] != 0) return Displacement::held;
+  return obstacles_.empty() || obstacles_[s].normal == glm::vec3(0.0F) ? Displacement::free
+                                                                       : Displacement::obstacle;
+}
+
+// Only what carries load is kept from the background. A voxel that is merely near the tool must move with its
+// neighbours, or a correction of the coarse levels tears at it (which grew from cycle to cycle when all were
+// held).
+void SoftObject::set_touch_roles() noexcept {
+  for (const Touch& t : touches_) {
+    state_.set_role(t.v, t.pressed ? Displacement::held : resting_role(t.v));
+  }
+}
+
+void SoftObject::settle_chain() noexcept {
+  moved_ever_ = true;
+  float most = 0.0F;
+  for (const glm::vec3& move : moves_) most = std::max(most, glm::dot(move, move));
+  unrelaxed_m_ += std::sqrt(static_cast<double>(most));
+  unsettled_m_ += std::sqrt(static_cast<double>(most));
+  if (unrelaxed_m_ > kStir * lattice_->min_spacing_m()) {
+    unrelaxed_m_ = 0.0;
+    relaxation_.wake();
+  }
+  chain_.settle(state_, sources_, moves_, obstacles_);
+  for (const RowId row : chain_.moved_rows()) relaxation_.stir(row);
+}
+
+bool SoftObject::push_out(const ToolInBody& tool) noexcept {
+  sources_.clear();
+  moves_.clear();
+  bool any = false;
+  for (Touch& t : touches_) {
+    const Gap g = gap(tool, position(t.v));
+    t.normal = g.normal;
+    if (g.distance >= 0.0) continue;
+    any = true;
+    t.pressed = true;
+    if (lattice_->anchored(t.v)) continue;
+    const glm::dvec3 before = state_.at(t.v);
+    state_.set(t.v, before - g.distance * g.normal);
+    sources_.push_back(t.v);
+    moves_.emplace_back(state_.at(t.v) - before);
+  }
+  if (!sources_.empty()) settle_chain();
+  return any;
+}
+
+void SoftObject::relax_touch(const ToolInBody& tool, Touch& t) noexcept {
+  if (lattice_->anchored(t.v)) return;
+  const glm::dvec3 rest = lattice_->rest(t.v), before = state_.at(t.v);
+  const bool was_pressed = t.pressed;
+  glm::dvec3 wanted = link_minimum(relaxation_.couplings(), state_, t.v);
+  Gap g = gap(tool, rest + wanted);
+  t.pressed = g.distance < 0.0;
+  if (t.pressed) {
+    // Where the springs' energy is least on the tool's surface, so that sliding round the tool is free of
+    // friction: in their own metric, the surface straightened at the last place (one step left 3e-4 of the
+    // force scale of friction).
+    const glm::dvec3 w = link_compliance(relaxation_.couplings(), t.v), wished = wanted;
+    for (int n = 0; n < kProjections && g.distance < voxel_radius(); ++n) {
+      const double denominator = glm::dot(g.normal, w * g.normal);
+      if (denominator <= 0.0) break;
+      wanted = wished - ((g.distance + glm::dot(g.normal, wished - wanted)) / denominator) * w * g.normal;
+      g = gap(tool, rest + wanted);
+    }
+    if (g.distance < 0.0) wanted -= g.distance * g.normal;
+    t.normal = g.normal;
+  }
+  if (!obstacles_.empty()) {
+    const Obstacle& o = obstacles_[lattice_->surface_number(t.v)];
+    const glm::dvec3 n(o.normal);
+    const double depth = static_cast<double>(o.bound) - glm::dot(n, wanted);
+    if (depth > 0.0 && o.normal != glm::vec3(0.0F)) wanted += depth * n;
+  }
+  state_.set(t.v, clamp_to_links(*lattice_, state_, t.v, wanted));
+  if (t.pressed != was_pressed) unsettled_m_ += glm::distance(before, state_.at(t.v));
+  // A tool that jumped away moves no pressed voxel by follow(): what it let go of wakes the rest.
+  if (was_pressed && !t.pressed &&
+      glm::distance(before, state_.at(t.v)) > kStir * lattice_->min_spacing_m()) {
+    relaxation_.wake();
+  }
+}
+
+void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
+  for (int n = 0; n < cycles; ++n) {
+    for (Touch& t : touches_) relax_touch(tool, t);
+    set_touch_roles();
+    // A contact that stands still is the background's: it comes to rest with all the object, where a box
+    // comes to rest with its surroundings held.
+    if (unsettled_m_ < kSettled * lattice_->min_spacing_m()) break;
+    unsettled_m_ *= kContraction;
+    std::array<int, 3> low{}, high{};
+    low.fill(std::numeric_limits<int>::max());
+    bool any = false;
+    for (const Touch& t : touches_) {
+      relaxation_.stir(t.v / kRow);
+      if (!t.pressed) continue;
+      any = true;
+      const auto c = lattice_->coordinates(t.v);
+      for (std::size_t d = 0; d < 3; ++d) {
+        low[d] = std::min(low[d], c[d]);
+        high[d] = std::max(high[d], c[d]);
+      }
+    }
+    if (!any) continue;
+    // A contact wider than that is left to the background beyond its middle.
+    for (std::size_t d = 0; d < 3; ++d) {
+      const int beyond = high[d] - low[d] - kMaxNear;
+      if (beyond > 0) {
+        low[d] += beyond / 2;
+        high[d] = low[d] + kMaxNear;
+      }
+    }
+    list_held();
+    relaxation_.relax_contact(state_, obstacle_view(), all_held_, low, high);
+  }
+  // Last, so that what the tool feels is measured with its voxels where they belong.
+  for (Touch& t : touches_) relax_touch(tool, t);
+  set_touch_roles();
+}
+
+// What hangs on a pressed voxel by a tight link and pulls it back is felt through it: the multiplier of the
+// chain's limit. Without it the force would saturate as soon as the chain is tight. Per axis, breadth first;
+// each voxel's load goes to the pressed voxel that it was first reached from.
+void SoftObject::gather_load(int axis) noexcept {
+  carried_.clear();
+  const auto& u = state_.u[static_cast<std::size_t>(axis)];
+  const auto add = [this](VoxelId v, std::uint32_t touch_index) {
+    carried_mark_[v] = 1;
+    carried_index_[v] = touch_index;
+    carried_.push_back({v, touch_index});
+  };
+  for (std::size_t i = 0; i < touches_.size(); ++i) {
+    if (touches_[i].pressed && !lattice_->anchored(touches_[i].v))
+      add(touches_[i].v, static_cast<std::uint32_t>(i));
+  }
+  for (std::size_t head = 0; head < carried_.size() && carried_.size() < kMaxCarried; ++head) {
+    const Carried c = carried_[head];
+    for (int d = 0; d < 3; ++d) {
+      const float tight = kTight * static_cast<float>(lattice_->spacing_m()[d]);
+      for (const bool up : {false, true}) {
+        const VoxelId w = up ? lattice_->up(c.v, d) : lattice_->down(c.v, d);
+        if (!lattice_->filled(w) || lattice_->anchored(w)) continue;
+        auto b = lattice_->bounds(up ? c.v : w, d, axis);
+        if (!up) b = {-b[1], -b[0]};  // of u(w) − u(v), whichever way the link points
+        const float difference = u[w] - u[c.v];
+        const bool pushed_up = difference <= b[0] + tight, pushed_down = difference >= b[1] - tight;
+        if (!pushed_up && !pushed_down) continue;
+        touches_[c.touch].tight = true;
+        if (carried_mark_[w] != 0) continue;
+        const double pull = link_force(relaxation_.couplings(), state_, w)[axis];
+        if (!((pushed_up && pull < 0.0) || (pushed_down && pull > 0.0))) continue;
+        touches_[c.touch].load[axis] += pull;
+        add(w, c.touch);
+      }
+    }
+  }
+}
+
+// A mark for each voxel, taken back, and not the number of the gathering that it was carried in: such a
+// number comes round (after four days of contact, in 32 bits), and then every voxel ever carried would count
+// as carried now.
+void SoftObject::let_go_of_carried() noexcept {
+  for (const Carried& c : carried_) carried_mark_[c.v] = 0;
+  carried_.clear();
+}
+
+void SoftObject::add_stiffness(int axis, glm::dmat3& stiffness) noexcept {
+  // A carried voxel moves by q = n_a·n per unit of tool motion, n its touch's normal; what a link stores then
+  // is ½ k (q_v·δ − q_w·δ)².
+  const auto along = [&](VoxelId v) {
+    if (carried_mark_[v] == 0) return glm::dvec3(0.0);
+    const glm::dvec3& n = touches_[carried_index_[v]].normal;
+    return n[axis] * n;
+  };
+  for (const Carried& c : carried_) {
+    const glm::dvec3 q = along(c.v);
+    const VoxelSprings springs = relaxation_.couplings().springs_of(c.v);
+    for (int d = 0; d < 3; ++d) {
+      for (const bool up : {false, true}) {
+        const VoxelId w = up ? lattice_->up(c.v, d) : lattice_->down(c.v, d);
+        const Spring& spring = (up ? springs.up : springs.down)[static_cast<std::size_t>(d)];
+        const double stiff = static_cast<double>(spring.on(axis, d));
+        if (stiff == 0.0) continue;
+        const glm::dvec3 r = q - along(w);
+        const double share = carried_mark_[w] != 0 ? 0.5 : 1.0;  // an inner link is met from both its ends
+        stiffness += share * stiff * glm::outerProduct(r, r);
+      }
+    }
+  }
+}
+
+Reaction SoftObject::reaction(const ToolInBody& tool) noexcept {
+  Reaction result;
+  for (Touch& t : touches_) {
+    t.normal = gap(tool, position(t.v)).normal;
+    t.tight = false;
+    t.load = t.pressed ? link_force(relaxation_.couplings(), state_, t.v) : glm::dvec3(0.0);
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    gather_load(axis);
+    add_stiffness(axis, result.stiffness_N_per_m);
+    let_go_of_carried();
+  }
+  for (const Touch& t : touches_) {
+    if (!t.pressed) continue;
+    const double load = glm::dot(t.load, t.normal);
+    if (t.tight) {
+      // Tight links pass load between voxels, along and across their normals, and the sum of all is what is
+      // left of it: within the sum the chain's own forces cancel, whichever voxel each is booked to.
+      result.force_N += t.load;
+    } else if (load < 0.0) {
+      // Frictionless: the tool feels what the voxel presses along the normal; what pulls is no contact.
+      result.force_N += load * t.normal;
+    }
+    if (load < 0.0) ++result.pressed;
+  }
+  return result;
+}
+
+void SoftObject::follow(const glm::dvec3& delta) noexcept {
+  sources_.clear();
+  moves_.clear();
+  for (const Touch& t : touches_) {
+    if (!t.pressed || lattice_->anchored(t.v)) continue;
+    const glm::dvec3 before = state_.at(t.v);
+    state_.set(t.v, before + glm::dot(delta, t.normal) * t.normal);
+    sources_.push_back(t.v);
+    moves_.emplace_back(state_.at(t.v) - before);
+  }
+  if (!sources_.empty()) settle_chain();
+}
+
+std::size_t SoftObject::give_way(const ToolInBody& tool, std::span<ToolBound> out) const noexcept {
+  std::size_t count = 0;
+  for (const Touch& t : touches_) {
+    if (count == out.size()) break;
+    const glm::dvec3 p = position(t.v);
+    const Gap g = gap(tool, p);
+    if (g.distance >= -kGiveWay * voxel_radius()) continue;
+    const double away = tool.shape == ToolInBody::Shape::punch ? voxel_radius() : reach(tool.radius);
+    out[count++] = {-g.normal, glm::dot(-g.normal, p) + away};
+  }
+  return count;
+}
+
+void SoftObject::list_held() noexcept {
+  all_held_.clear();
+  for (const Touch& t : touches_) {
+    if (t.pressed) all_held_.push_back(t.v);
+  }
+  for (const VoxelId v : held_voxels_) all_held_.push_back(v);
+}
+
+std::uint64_t SoftObject::relax_background(std::uint64_t budget) noexcept {
+  if (relaxation_.asleep()) return 0;
+  list_held();
+  return relaxation_.run(state_, obstacle_view(), all_held_, budget);
+}
+
+void SoftObject::relax_cycle() noexcept {
+  list_held();
+  relaxation_.run_cycle(state_, obstacle_view(), all_held_);
+}
+
+void SoftObject::set_obstacle(std::size_t surface_number, const Obstacle& obstacle) noexcept {
+  const VoxelId v = lattice_->surface()[surface_number];
+  obstacles_[surface_number] = obstacle;
+  if (state_.role[v] == Displacement::held || lattice_->anchored(v)) return;
+  state_.set_role(v, resting_role(v));
+}
+
+void SoftObject::reserve_obstacles() {
+  obstacles_.resize(lattice_->surface().size());
+}
+
+void SoftObject::hold(VoxelId v) noexcept {
+  const std::uint32_t s = lattice_->surface_number(v);
+  if (pair_held_[s] != 0) return;
+  pair_held_[s] = 1;
+  held_voxels_.push_back(v);
+  state_.set_role(v, Displacement::held);
+}
+
+void SoftObject::release(VoxelId v) noexcept {
+  const std::uint32_t s = lattice_->surface_number(v);
+  if (pair_held_[s] == 0) return;
+  pair_held_[s] = 0;
+  const auto found = std::find(held_voxels_.begin(), held_voxels_.end(), v);
+  *found = held_voxels_.back();
+  held_voxels_.pop_back();
+  relaxation_.stir(v / kRow);
+  relaxation_.wake();
+  state_.set_role(v, resting_role(v));
+  set_touch_roles();
+}
+
+glm::dvec3 SoftObject::free_displacement(VoxelId v) noexcept {
+  return link_minimum(relaxation_.couplings(), state_, v);
+}
+
+glm::dvec3 SoftObject::compliance(VoxelId v) noexcept {
+  return link_compliance(relaxation_.couplings(), v);
+}
+
+void SoftObject::move(VoxelId v, const glm::dvec3& displacement) noexcept {
+  if (lattice_->anchored(v)) return;
+  moved_ever_ = true;
+  relaxation_.wake();
+  state_.set(v, clamp_to_links(*lattice_, state_, v, displacement));
+  relaxation_.stir(v / kRow);
+}
+
+glm::dvec3 SoftObject::displacement_at(const glm::dvec3& rest_point) const noexcept {
+  if (!moved_ever_) return glm::dvec3(0.0);
+  const auto& dims = lattice_->grid().dims;
+  const glm::dvec3 cell = rest_point / lattice_->spacing_m();
+  std::array<int, 3> base{};
+  std::array<double, 3> part{};
+  for (std::size_t d = 0; d < 3; ++d) {
+    const double c = std::clamp(cell[static_cast<int>(d)], -1.0, static_cast<double>(dims[d]) - 0.5);
+    base[d] = static_cast<int>(std::floor(c));
+    part[d] = c - base[d];
+  }
+  glm::dvec3 sum(0.0);
+  double weight = 0.0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const int i = corner & 1, j = (corner >> 1) & 1, k = (corner >> 2) & 1;
+    const VoxelId v = lattice_->at(base[0] + i, base[1] + j, base[2] + k);
+    if (!lattice_->filled(v)) continue;
+    const double w = (i != 0 ? part[0] : 1.0 - part[0]) * (j != 0 ? part[1] : 1.0 - part[1]) *
+                         (k != 0 ? part[2] : 1.0 - part[2]) +
+                     1e-9;  // a corner that is just reached still counts when it is the only one
+    sum += w * state_.at(v);
+    weight += w;
+  }
+  return weight > 0.0 ? sum / weight : glm::dvec3(0.0);
+}
+
+double SoftObject::energy_J() const noexcept {
+  double energy = 0.0;
+  for (RowId row = 0; row < lattice_->grid().rows(); ++row) {
+    if (lattice_->filled_in(row) == 0) continue;
+    for (VoxelId v = row * kRow; v < (row + 1) * kRow; ++v) {
+      if (!lattice_->filled(v)) continue;
+      for (int d = 0; d < 3; ++d) {
+        const VoxelId w = lattice_->up(v, d);
+        if (!lattice_->filled(w)) continue;
+        const Spring spring = lattice_->spring(v, d);
+        for (int axis = 0; axis < 3; ++axis) {
+          const auto& u = state_.u[static_cast<std::size_t>(axis)];
+          const double stretch = static_cast<double>(u[w]) - static_cast<double>(u[v]);
+          energy += 0.5 * static_cast<double>(spring.on(axis, d)) * stretch * stretch;
+        }
+      }
+    }
+  }
+  return energy;
+}
+
+bool SoftObject::settle(const ToolInBody& tool, double tolerance_N, int max_cycles) noexcept {
+  for (int n = 0; n < max_cycles; ++n) {
+    push_out(tool);
+    relax_near(tool, 4);
+    relaxation_.wake();
+    relax_cycle();
+    double worst = relaxation_.residual_N();
+    for (const Touch& t : touches_) {
+      if (lattice_->anchored(t.v)) continue;
+      glm::dvec3 left = link_force(relaxation_.couplings(), state_, t.v);
+      if (t.pressed) left -= std::min(0.0, glm::dot(left, t.normal)) * t.normal;
+      worst = std::max(worst, glm::length(left));
+    }
+    if (worst < tolerance_N) return true;
+  }
+  return false;
+}
+
+std::size_t SoftObject::memory_bytes() const {
+  std::size_t state = state_.role.resident_bytes() + state_.row_held.resident_bytes() +
+                      state_.row_obstacles.resident_bytes() + carried_mark_.resident_bytes() +
+                      carried_index_.resident_bytes();
+  for (const auto& axis : state_.u) state += axis.resident_bytes();
+  return lattice_->memory_bytes() + state + chain_.memory_bytes() + relaxation_.memory_bytes() +
+         obstacles_.size() * sizeof(Obstacle) + pair_held_.size();
+}
+
+}  // namespace voxel::sparse

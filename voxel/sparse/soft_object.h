@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A soft object that a tool can press: lattice, displacement, chain, relaxation and the contact between them.
+// Everything here is in the volume frame ("body") of the object: meters, newtons.
+//
+// One haptic tick uses it so (see hybrid/tick.cpp):
+//   touch() names the surface voxels near the tool → push_out() moves what the tool overlaps, and the chain
+//   with it → relax_near() brings the neighbourhood of the contact near equilibrium → reaction() says what
+//   the tool feels and how stiff it is → the proxy moves by δ → follow() takes the pressed voxels along … a
+//   few times; relax_background() once.
+#pragma once
+
+#include <cstdint>
+#include <glm/mat3x3.hpp>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "voxel/sparse/chainmail.h"
+#include "voxel/sparse/displacement.h"
+#include "voxel/sparse/lattice.h"
+#include "voxel/sparse/relaxation.h"
+
+namespace voxel::sparse {
+
+// The tool as one soft object sees it.
+struct ToolInBody {
+  enum class Shape : std::uint8_t { ball, punch } shape = Shape::ball;
+  glm::dvec3 centre{0.0};           // of the ball, or of the punch's flat face (unit: meter)
+  glm::dvec3 axis{0.0, 0.0, -1.0};  // punch: unit vector out of its face
+  double radius = 0.0;              // of ball or face (unit: meter)
+};
+
+// Force of the object on the tool, and how it grows when the tool moves: the quadratic model that the proxy
+// minimises.
+struct Reaction {
+  glm::dvec3 force_N{0.0};
+  glm::dmat3 stiffness_N_per_m{
+      0.0};  // symmetric, positive semi-definite; of the pressed voxels with all others still
+  std::uint32_t pressed = 0;  // voxels that carry load
+};
+
+// The tool's centre q must satisfy normal · q >= offset (body frame).
+struct ToolBound {
+  glm::dvec3 normal{0.0};
+  double offset = 0.0;
+};
+
+class SoftObject {
+ public:
+  static constexpr std::size_t kMaxTouched =
+      4096;  // surface voxels near the tool; more are left to the next tick
+
+  explicit SoftObject(std::shared_ptr<const Lattice> lattice);
+  // The same object in the same state, sharing the lattice; for references found beside a running session.
+  [[nodiscard]] std::unique_ptr<SoftObject> copy() const;
+
+  [[nodiscard]] const Lattice& lattice() const { return *lattice_; }
+  [[nodiscard]] const Displacement& state() const { return state_; }
+  [[nodiscard]] glm::dvec3 position(VoxelId v) const { return lattice_->rest(v) + state_.at(v); }
+  // A voxel is a ball of half its smallest spacing: the tool's surface stays this far from its centre.
+  [[nodiscard]] double voxel_radius() const { return 0.5 * lattice_->min_spacing_m(); }
+  // Distance of a ball tool's centre to the centre of a voxel it touches. A tool smaller than the gaps
+  // between voxels is felt as one that just cannot slip between them.
+  [[nodiscard]] double reach(double tool_radius) const;
+
+  // ---- the tick; none of these allocates, locks or throws ----
+  // The surface voxels near the tool, each once; at most kMaxTouched are kept.
+  void touch(std::span<const VoxelId> near) noexcept;
+  // Moves every touched voxel that the tool overlaps out of it, and the chain after. True when any was.
+  bool push_out(const ToolInBody& tool) noexcept;
+  void relax_near(const ToolInBody& tool, int sweeps) noexcept;
+  [[nodiscard]] Reaction reaction(const ToolInBody& tool) noexcept;
+  // The tool moves by `delta`: pressed voxels go along, each by the part of it along its own normal.
+  void follow(const glm::dvec3& delta) noexcept;
+  // Where the chain did not let voxels out of the tool's way, the tool has to give way. Returns how many
+  // bounds were written.
+  std::size_t give_way(const ToolInBody& tool, std::span<ToolBound> out) const noexcept;
+  std::uint64_t relax_background(std::uint64_t budget) noexcept;
+  // One whole cycle of it, however long that takes; nothing when at rest.
+  void relax_cycle() noexcept;
+
+  // Before the first set_obstacle(); allocates.
+  void reserve_obstacles();
+  // A rigid surface near surface voxel number s (index into lattice().surface()); a zero normal: none any
+  // more.
+  void set_obstacle(std::size_t surface_number, const Obstacle& obstacle) noexcept;
+  [[nodiscard]] std::span<const Obstacle> obstacles() const { return obstacles_; }
+  // A voxel pressed by another soft object: moved by the caller, held meanwhile. See pair_contact.h.
+  void hold(VoxelId v) noexcept;
+  void release(VoxelId v) noexcept;
+  // For the pair solver. Where its links alone would have a voxel, and how far a force of 1 N on it alone
+  // would move it (m/N): both 0 where it is anchored.
+  [[nodiscard]] glm::dvec3 free_displacement(VoxelId v) noexcept;
+  [[nodiscard]] glm::dvec3 compliance(VoxelId v) noexcept;
+  // Moves it, as far as its links allow.
+  void move(VoxelId v, const glm::dvec3& displacement) noexcept;
+
+  [[nodiscard]] bool moved_ever() const { return moved_ever_; }
+  [[nodiscard]] bool asleep() const { return relaxation_.asleep(); }
+  // Largest force left on any free voxel (N): what separates the state from equilibrium.
+  [[nodiscard]] double residual_N() const { return relaxation_.residual_N(); }
+  [[nodiscard]] const Relaxation& relaxation() const { return relaxation_; }
+  // Touched voxels of the last touch(), for the map to look at.
+  [[nodiscard]] std::span<const VoxelId> touched() const {
+    return {touched_voxels_.data(), touched_voxels_.size()};
+  }
+  // Number of a surface voxel; kNoSurface for one inside.
+  static constexpr std::uint32_t kNoSurface = Lattice::kNoSurface;
+  [[nodiscard]] std::uint32_t surface_number(VoxelId v) const { return lattice_->surface_number(v); }
+
+  // Displacement at any rest point in the body, from the voxels around it (unit: meter); 0 where none is
+  // near.
+  [[nodiscard]] glm::dvec3 displacement_at(const glm::dvec3& rest_point) const noexcept;
+
+  // Elastic energy (J); for tests and reports.
+  [[nodiscard]] double energy_J() const noexcept;
+  // Relaxes with the tool still until the residual is below `tolerance_N` or `max_cycles` passed; true when
+  // it is. For references, not for the tick.
+  bool settle(const ToolInBody& tool, double tolerance_N, int max_cycles) noexcept;
+
+  [[nodiscard]] std::size_t memory_bytes() const;
+
+ private:
+  struct Touch {
+    VoxelId v;
+    bool pressed;            // carries load towards the tool
+    glm::dvec3 normal{0.0};  // from tool to voxel, unit
+    glm::dvec3 load{0.0};    // of its links, and of what hangs on it by tight links (unit: newton)
+    bool tight = false;      // some tight link hands part of its load to or from another voxel
+  };
+  struct Gap {
+    double distance;  // of the voxel from the tool's surface along normal; negative: overlap
+    glm::dvec3 normal;
+  };
+  struct Carried {
+    VoxelId v;
+    std::uint32_t touch;  // whose load it adds to
+  };
+
+  [[nodiscard]] Gap gap(const ToolInBody& tool, const glm::dvec3& position) const noexcept;
+  void settle_chain() noexcept;
+  [[nodiscard]] Displacement::Role resting_role(VoxelId v) const noexcept;  // when no tool presses it
+  void set_touch_roles() noexcept;
+  void list_held() noexcept;
+  void relax_touch(const ToolInBody& tool, Touch& touch) noexcept;
+  void add_stiffness(int axis, glm::dmat3& stiffness) noexcept;
+  void gather_load(int axis) noexcept;
+  void let_go_of_carried() noexcept;
+  [[nodiscard]] ObstacleView obstacle_view() const { return {obstacles_, lattice_.get()}; }
+
+  std::shared_ptr<const Lattice> lattice_;
+  Displacement state_;
+  ChainMail chain_;
+  Relaxation relaxation_;
+  std::vector<std::uint8_t> pair_held_;  // [surface number] 1 while another soft object presses it
+  std::vector<Obstacle> obstacles_;      // [surface number], empty when there is none
+  std::vector<Touch> touches_;
+  std::vector<VoxelId> touched_voxels_;
+  std::vector<VoxelId> held_voxels_;  // by pairs
+  std::vector<VoxelId> all_held_;     // by the tool, too
+  std::vector<VoxelId> sources_;
+  std::vector<glm::vec3> moves_;
+  std::vector<Carried> carried_;            // [pressed first, then what hangs on them by a tight link]
+  LazyArray<std::uint8_t> carried_mark_;    // [v] 1: in carried_ (within touch(): was pressed)
+  LazyArray<std::uint32_t> carried_index_;  // [v]
+  double unrelaxed_m_ = 0.0;                // motion of pressed voxels since the background was last woken
+  double unsettled_m_ = 0.0;                // how far the contact may be from the rest of the object
+  bool moved_ever_ = false;
+};
+
+}  // namespace voxel::sparse
