@@ -2,97 +2,14 @@
 #include "voxel/sparse/chain_rows.h"
 
 #include <array>
-#include <cstring>
 
+#include "voxel/sparse/chain_lanes.h"
 #include "voxel/wide.h"
-
-// Inlined into both widths, whatever the compiler thinks of its size.
-#define HYBRID_INLINE inline __attribute__((always_inline))
 
 namespace voxel::sparse {
 namespace {
 
-// Vectors by name, since the compiler finds neither the look-up in registers nor the question whether any
-// lane moves in plain loops. Where registers are narrower, it takes them apart.
-constexpr std::size_t kWidth = 8, kVectors = kRow / kWidth;
-using Floats = float __attribute__((vector_size(4 * kWidth)));
-using Masks = std::int32_t __attribute__((vector_size(4 * kWidth)));
-
-constexpr float kNever = 1e30F;
-
-HYBRID_INLINE void load(const float* at, Floats& out) {
-  std::memcpy(&out, at, sizeof out);
-}
-HYBRID_INLINE void store(const Floats& value, float* at) {
-  std::memcpy(at, &value, sizeof value);
-}
-// Lanes n − 1 …, and n + 1 …, of a row.
-HYBRID_INLINE void shift_up(const Floats& before, const Floats& value, Floats& out) {
-  out = __builtin_shufflevector(before, value, 7, 8, 9, 10, 11, 12, 13, 14);
-}
-HYBRID_INLINE void shift_down(const Floats& value, const Floats& after, Floats& out) {
-  out = __builtin_shufflevector(value, after, 1, 2, 3, 4, 5, 6, 7, 8);
-}
-HYBRID_INLINE bool any_of(const Masks& mask) {
-  std::array<std::int64_t, kWidth / 2> halves;
-  std::memcpy(halves.data(), &mask, sizeof mask);
-  return (halves[0] | halves[1] | halves[2] | halves[3]) != 0;
-}
-
-// A table of half limits, in registers where it fits.
-struct Table {
-  const float* values;
-  Floats low, high;
-
-  HYBRID_INLINE explicit Table(const float* table) : values(table) {
-    load(table, low);
-    load(table + kWidth, high);
-  }
-};
-
-// Labels of a row, as wide as what they stand for.
-struct Indices {
-  alignas(32) std::array<std::int32_t, kRow> at;
-
-  HYBRID_INLINE explicit Indices(const std::uint8_t* labels) {
-    for (std::size_t i = 0; i < at.size(); ++i) at[i] = labels[i];
-  }
-};
-
-template <int kRegisters>
-HYBRID_INLINE void look_up(const Table& table, const Indices& indices, std::size_t i, Floats& out) {
-#if !defined(__clang__)
-  if (kRegisters > 0) {
-    Masks index;
-    std::memcpy(&index, indices.at.data() + i, sizeof index);
-    out = kRegisters == 1 ? __builtin_shuffle(table.low, index)
-                          : __builtin_shuffle(table.low, table.high, index);
-    return;
-  }
-#endif
-  for (std::size_t n = 0; n < kWidth; ++n) out[n] = table.values[indices.at[i + n]];
-}
-
-template <bool kRaise>
-HYBRID_INLINE void ask(const Floats& from, const Floats& limit, Floats& wanted) {
-  wanted = kRaise ? from - limit : from + limit;
-}
-template <bool kRaise>
-HYBRID_INLINE float asked(float from, float limit) {
-  return kRaise ? from - limit : from + limit;
-}
-template <bool kRaise>
-HYBRID_INLINE bool beyond(float wanted, float now, float margin) {
-  return kRaise ? wanted > now + margin : wanted < now - margin;
-}
-template <bool kRaise>
-HYBRID_INLINE void compare(const Floats& wanted, const Floats& now, float margin, Masks& moves) {
-  moves = kRaise ? wanted > now + margin : wanted < now - margin;
-}
-
-HYBRID_INLINE Moved moved(const Masks& front, const Masks& back) {
-  return static_cast<Moved>(kAnyMoved | (front[0] & kFirstMoved) | (back[kWidth - 1] & kLastMoved));
-}
+using namespace lanes;
 
 // `limit_of(i, out)`: limits of the links of lanes i to i + kWidth.
 template <bool kRaise, class LimitOf>
@@ -238,8 +155,9 @@ HYBRID_INLINE int cone(const ConeRows& rows, double apex, double per_row, const 
 
 }  // namespace
 
-HYBRID_WIDE Moved raise_beside(const float* from, const std::uint8_t* from_labels, float* to,
-                               const std::uint8_t* to_labels, const HalfLimits& half, float margin) noexcept {
+HYBRID_WIDE_AND_MANY Moved raise_beside(const float* from, const std::uint8_t* from_labels, float* to,
+                                        const std::uint8_t* to_labels, const HalfLimits& half,
+                                        float margin) noexcept {
   switch (half.registers) {
     case 1:
       return beside_by_label<true, 1>(from, from_labels, to, to_labels, half.table, margin);
@@ -249,8 +167,9 @@ HYBRID_WIDE Moved raise_beside(const float* from, const std::uint8_t* from_label
       return beside_by_label<true, 0>(from, from_labels, to, to_labels, half.table, margin);
   }
 }
-HYBRID_WIDE Moved lower_beside(const float* from, const std::uint8_t* from_labels, float* to,
-                               const std::uint8_t* to_labels, const HalfLimits& half, float margin) noexcept {
+HYBRID_WIDE_AND_MANY Moved lower_beside(const float* from, const std::uint8_t* from_labels, float* to,
+                                        const std::uint8_t* to_labels, const HalfLimits& half,
+                                        float margin) noexcept {
   switch (half.registers) {
     case 1:
       return beside_by_label<false, 1>(from, from_labels, to, to_labels, half.table, margin);
@@ -260,15 +179,17 @@ HYBRID_WIDE Moved lower_beside(const float* from, const std::uint8_t* from_label
       return beside_by_label<false, 0>(from, from_labels, to, to_labels, half.table, margin);
   }
 }
-HYBRID_WIDE Moved raise_beside_alike(const float* from, float* to, float limit, float margin) noexcept {
+HYBRID_WIDE_AND_MANY Moved raise_beside_alike(const float* from, float* to, float limit,
+                                              float margin) noexcept {
   return beside_alike<true>(from, to, limit, margin);
 }
-HYBRID_WIDE Moved lower_beside_alike(const float* from, float* to, float limit, float margin) noexcept {
+HYBRID_WIDE_AND_MANY Moved lower_beside_alike(const float* from, float* to, float limit,
+                                              float margin) noexcept {
   return beside_alike<false>(from, to, limit, margin);
 }
 
-HYBRID_WIDE Moved raise_along(float* row, const std::uint8_t* labels, const HalfLimits& up,
-                              const HalfLimits& down, float margin) noexcept {
+HYBRID_WIDE_AND_MANY Moved raise_along(float* row, const std::uint8_t* labels, const HalfLimits& up,
+                                       const HalfLimits& down, float margin) noexcept {
   switch (up.registers) {
     case 1:
       return along_by_label<true, 1>(row, labels, up.table, down.table, margin);
@@ -278,8 +199,8 @@ HYBRID_WIDE Moved raise_along(float* row, const std::uint8_t* labels, const Half
       return along_by_label<true, 0>(row, labels, up.table, down.table, margin);
   }
 }
-HYBRID_WIDE Moved lower_along(float* row, const std::uint8_t* labels, const HalfLimits& up,
-                              const HalfLimits& down, float margin) noexcept {
+HYBRID_WIDE_AND_MANY Moved lower_along(float* row, const std::uint8_t* labels, const HalfLimits& up,
+                                       const HalfLimits& down, float margin) noexcept {
   switch (up.registers) {
     case 1:
       return along_by_label<false, 1>(row, labels, up.table, down.table, margin);
@@ -289,19 +210,19 @@ HYBRID_WIDE Moved lower_along(float* row, const std::uint8_t* labels, const Half
       return along_by_label<false, 0>(row, labels, up.table, down.table, margin);
   }
 }
-HYBRID_WIDE Moved raise_along_alike(float* row, float up, float down, float margin) noexcept {
+HYBRID_WIDE_AND_MANY Moved raise_along_alike(float* row, float up, float down, float margin) noexcept {
   return along_alike<true>(row, up, down, margin);
 }
-HYBRID_WIDE Moved lower_along_alike(float* row, float up, float down, float margin) noexcept {
+HYBRID_WIDE_AND_MANY Moved lower_along_alike(float* row, float up, float down, float margin) noexcept {
   return along_alike<false>(row, up, down, margin);
 }
 
-HYBRID_WIDE int raise_cone(const ConeRows& rows, double apex, double per_row, const float* fall, int nearest,
-                           float margin) noexcept {
+HYBRID_WIDE_AND_MANY int raise_cone(const ConeRows& rows, double apex, double per_row, const float* fall,
+                                    int nearest, float margin) noexcept {
   return cone<true>(rows, apex, per_row, fall, nearest, margin);
 }
-HYBRID_WIDE int lower_cone(const ConeRows& rows, double apex, double per_row, const float* fall, int nearest,
-                           float margin) noexcept {
+HYBRID_WIDE_AND_MANY int lower_cone(const ConeRows& rows, double apex, double per_row, const float* fall,
+                                    int nearest, float margin) noexcept {
   return cone<false>(rows, apex, per_row, fall, nearest, margin);
 }
 

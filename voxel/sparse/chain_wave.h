@@ -17,10 +17,12 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
 #include "voxel/sparse/chain_limits.h"
+#include "voxel/sparse/chain_pull.h"
 #include "voxel/sparse/chain_rows.h"
 #include "voxel/sparse/lattice.h"
 #include "voxel/sparse/lazy_array.h"
@@ -58,6 +60,7 @@ class ChainWave {
   void put_back() noexcept;
 
   void note_moved(RowId row) noexcept;
+  void note_moved(RowId from, int count) noexcept;
   // Rows that moved since begin(), each once; no order is promised.
   [[nodiscard]] std::span<const RowId> moved_rows() const { return {moved_.data(), moved_count_}; }
   [[nodiscard]] std::span<const RowId> waiting_rows() const { return {waiting_.data(), waiting_count_}; }
@@ -66,18 +69,9 @@ class ChainWave {
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
+  static constexpr std::uint64_t kConeRows = 8;  // of a cone take about as long as one update of a row
   // first, last: since the row was last looked at, its first voxel moved, its last one.
   enum Mark : std::uint8_t { first = kFirstMoved, last = kLastMoved, queued = 8, moved = 16, pulled = 32 };
-  // What decides how a row is dealt with, together, since one visit looks at seven of them.
-  struct RowInfo {
-    std::uint32_t free = 0;     // bit of each lane
-    std::uint8_t label = 0;     // of a row full of free voxels of one label; else 0
-    bool filled : 1 = false;    // has any voxel
-    bool anchored : 1 = false;  // has any anchor
-    std::uint8_t mark = 0;      // Mark bits
-    std::uint8_t waits = 0;     // bit of each wave (see wave_bit) that is still to ask from here; kListed
-  };
-  static_assert(sizeof(RowInfo) == 8);
   struct Pass {  // one wave
     float* u = nullptr;
     int axis = 0;
@@ -90,7 +84,33 @@ class ChainWave {
   [[nodiscard]] static std::uint8_t wave_bit(int axis, Way way) {
     return static_cast<std::uint8_t>(1U << (2 * axis + (way == Way::raise ? 0 : 1)));
   }
-  struct Box {  // voxels from an apex, each way
+  struct Span {  // of whole numbers, both included; empty: low > high
+    int low = std::numeric_limits<int>::max(), high = -1;
+    void add(int n) noexcept;
+    void add(const Span& other) noexcept;
+    [[nodiscard]] bool empty() const { return low > high; }
+  };
+  struct Plane {               // that is being swept
+    const float* u = nullptr;  // displacements, of the whole lattice
+    int at = 0, z = -1;        // it, and where to (-1 or 1)
+    int column = 0, x = 1;     // a column of it, and where to
+    int step = 1;              // where to in y
+  };
+  struct Sweep {
+    int column = 0, y = 0;       // from where outwards
+    Span sources;                // planes where they stand
+    std::array<Span, 2> planes;  // that are asked from below, from above
+    Span columns;                // in which any row is
+    Plane plane;
+    Pull task;        // what is the same for many rows
+    Span up, down;    // rows of this plane and column that are asked from below and above (in y)
+    Span next, back;  // rows that ask the next plane, and the one before
+    Span rest;        // rows among which some are still asked, when it was stopped
+    std::uint64_t visits = 0, most = 0;
+    bool stopped = false;  // by its budget
+  };
+  static constexpr std::uint64_t kLeastSwept = 512;  // row updates; with fewer left, the nearest first
+  struct Box {                                       // voxels from an apex, each way
     std::array<int, kWays> steps{};
     std::array<bool, kWays> cut{};  // ends at something that is no free voxel
   };
@@ -111,6 +131,17 @@ class ChainWave {
   void ask_beside(const Pass& p, RowId row, RowId to, int direction) noexcept;
   void ask_across(const Pass& p, RowId row, RowId to, int direction) noexcept;
   void ask_voxel(const Pass& p, VoxelId from, VoxelId to, int direction) noexcept;
+  [[nodiscard]] Span& asked_span(int way, int column, int z) noexcept;
+  void ask_row(Sweep& sweep, int way, const std::array<int, 3>& at, std::uint8_t by) noexcept;
+  bool begin_sweep(const Pass& p, std::span<const Source> sources, Sweep& sweep) noexcept;
+  bool sweep(const Pass& p, std::span<const Source> sources, std::uint64_t most,
+             std::uint64_t& visits) noexcept;
+  void sweep_plane(const Pass& p, Sweep& sweep, int z, int by) noexcept;
+  void sweep_rows(const Pass& p, Sweep& sweep, int column, int x, const Span& span) noexcept;
+  void pull_rows(const Pass& p, Sweep& sweep, int step, const Span& span) noexcept;
+  bool pull_by_anchor(const Pass& p, Sweep& sweep, Pull task, RowId row, int y) noexcept;
+  void note_pulled_row(Sweep& sweep, RowId row, int y, Moved what) noexcept;
+  void leave_sweep(const Pass& p, Sweep& sweep) noexcept;
   bool cone(const Pass& p, VoxelId apex, std::uint64_t most) noexcept;
   [[nodiscard]] Box reach(const Pass& p, VoxelId apex) const noexcept;
   [[nodiscard]] bool full(const std::array<int, 3>& low, const std::array<int, 3>& high) const noexcept;
@@ -128,8 +159,42 @@ class ChainWave {
   std::size_t head_ = 0, tail_ = 0;
   LazyArray<RowId> moved_, pulled_, waiting_, taken_;
   std::size_t moved_count_ = 0, pulled_count_ = 0, waiting_count_ = 0, taken_count_ = 0;
-  std::vector<float> fall_;  // [column][lane] of the cone that is being written
+  LazyArray<std::uint8_t> asked_;  // [row] Asked bits; 0 between sweeps
+  std::vector<Span> asked_spans_;  // [way][column][z + 1] rows among which some are; empty between sweeps
+  std::vector<std::array<Span, 2>> in_plane_;  // [column] likewise, of the plane that is being swept
+  std::vector<Moved> moves_;                   // [n] of rows that are being swept
+  std::vector<float> fall_;                    // [column][lane] of the cone that is being written
   std::uint64_t work_ = 0, cone_rows_ = 0;
 };
+
+inline void ChainWave::enqueue(RowId row, std::uint8_t ends) noexcept {
+  std::uint8_t& mark = rows_[row].mark;
+  const bool waited = (mark & queued) != 0;
+  mark |= static_cast<std::uint8_t>(ends | queued);
+  if (waited) return;
+  ring_[tail_] = row;
+  tail_ = tail_ + 1 == ring_.size() ? 0 : tail_ + 1;
+}
+
+inline void ChainWave::note_moved(RowId row) noexcept {
+  std::uint8_t& mark = rows_[row].mark;
+  moved_[moved_count_] = row;  // one beyond, where it is there already
+  moved_count_ += (mark & moved) == 0 ? 1 : 0;
+  mark |= moved;
+}
+
+// Marks are bytes, which may be anything to the compiler: the count is kept out of their way.
+inline void ChainWave::note_moved(RowId from, int count) noexcept {
+  std::size_t at = moved_count_;
+  RowId* const list = moved_.data();
+  RowInfo* const rows = rows_.data() + from;
+  for (int n = 0; n < count; ++n) {
+    const std::uint8_t mark = rows[n].mark;
+    list[at] = from + static_cast<RowId>(n);
+    at += (mark & moved) == 0 ? 1 : 0;
+    rows[n].mark = mark | moved;
+  }
+  moved_count_ = at;
+}
 
 }  // namespace voxel::sparse

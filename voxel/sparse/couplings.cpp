@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace voxel::sparse {
 
@@ -15,8 +16,22 @@ Couplings::Couplings(const Lattice& lattice, const Couplings* finer)
       label_(grid_.rows()),
       written_at_(grid_.rows()),
       written_(grid_.rows()) {
+  if (finer_ == nullptr) {
+    if (!lattice.uniform_limits()) written_limits_ = LazyArray<RowLimits::Written>(grid_.rows());
+    for (std::size_t label = 0; label < 256; ++label) {
+      std::array<LinkLimit, 3> links;
+      for (int d = 0; d < 3; ++d) {
+        const auto l = static_cast<std::uint8_t>(label);
+        links[static_cast<std::size_t>(d)] =
+            lattice.uniform_limits() ? lattice.tightest(d) : lattice.limit_between(l, l, d);
+      }
+      for (int axis = 0; axis < 3; ++axis)
+        label_limits_[label][static_cast<std::size_t>(axis)] = AxisLimits(links, axis);
+    }
+  }
   ones_.fill(1.0F);
-  zeros_.fill(0.0F);
+  eighths_.fill(0.125F);
+  for (Lanes& lanes : zeros_) lanes.fill(0.0F);
   std::array<bool, 256> used{};
   if (finer_ == nullptr) {
     for (RowId row = 0; row < grid_.rows(); ++row) {
@@ -160,6 +175,7 @@ void Couplings::find(RowId row) noexcept {
     if (std::all_of(out.filled.begin(), out.filled.end(), [](float f) { return f == 0.0F; })) {
       kind = empty;
     } else {
+      if (written_limits_.size() > 0) write_limits(row, written_limits_[written_count_]);
       written_at_[row] = written_count_++;
     }
   }
@@ -234,6 +250,45 @@ void Couplings::write_voxels(RowId row, Written& out) const noexcept {
   }
 }
 
+void Couplings::write_limits(RowId row, RowLimits::Written& out) const noexcept {
+  constexpr float kFar = std::numeric_limits<float>::max();
+  constexpr LinkLimit kNone{-kFar, kFar, kFar};
+  std::array<LinkLimit, 3> tightest{kNone, kNone, kNone};
+  for (std::size_t i = 0; i < kRow; ++i) {
+    const auto v = static_cast<VoxelId>(row * kRow + i);
+    for (int d = 0; d < 3; ++d) {
+      const auto ud = static_cast<std::size_t>(d);
+      const VoxelId up = grid_.up(v, d), down = grid_.down(v, d);
+      const bool here = lattice_.filled(v);
+      const LinkLimit above = here && lattice_.filled(up) ? lattice_.limit(v, d) : kNone,
+                      below = here && lattice_.filled(down) ? lattice_.limit(down, d) : kNone;
+      out.up_low[ud][i] = above.along_low;
+      out.up_high[ud][i] = above.along_high;
+      out.up_across[ud][i] = above.across;
+      out.down_low[ud][i] = below.along_low;
+      out.down_high[ud][i] = below.along_high;
+      out.down_across[ud][i] = below.across;
+      for (const LinkLimit& l : {above, below}) {
+        LinkLimit& t = tightest[ud];
+        t.along_low = std::max(t.along_low, l.along_low);
+        t.along_high = std::min(t.along_high, l.along_high);
+        t.across = std::min(t.across, l.across);
+      }
+    }
+  }
+  for (int axis = 0; axis < 3; ++axis)
+    out.tightest[static_cast<std::size_t>(axis)] = AxisLimits(tightest, axis);
+}
+
+RowLimits Couplings::limits(RowId row) const noexcept {
+  RowLimits out{&label_limits_[label_[row]], nullptr};
+  if (written_limits_.size() > 0 && kind_[row] == mixed) {
+    out.lanes = &written_limits_[written_at_[row]];
+    out.of = &out.lanes->tightest;
+  }
+  return out;
+}
+
 void Couplings::write_cells(RowId row, Written& out) const noexcept {
   const std::array<int, 3> c = grid_.row_coordinates(row);
   for (int lane = 0; lane < kRow; ++lane) {
@@ -249,6 +304,15 @@ void Couplings::write_cells(RowId row, Written& out) const noexcept {
       }
     }
     if (inside != held) springs.set_inverse();
+    int below = 0;
+    for (int corner = 0; inside != nothing && corner < 8; ++corner) {
+      const std::array<int, 3> fine{2 * cell[0] + (corner & 1), 2 * cell[1] + (corner >> 1 & 1),
+                                    2 * cell[2] + (corner >> 2)};
+      const auto& dims = finer_->grid_.dims;
+      if (fine[0] < dims[0] && fine[1] < dims[1] && fine[2] < dims[2] && finer_->content(fine) != nothing)
+        ++below;
+    }
+    out.share[static_cast<std::size_t>(lane)] = below > 0 ? 1.0F / static_cast<float>(below) : 0.0F;
     out.filled[static_cast<std::size_t>(lane)] = inside == nothing ? 0.0F : 1.0F;
     write_lane(static_cast<std::size_t>(lane), springs, out);
   }
@@ -291,21 +355,37 @@ RowSprings Couplings::springs(RowId row, int axis) const noexcept {
     }
     out.inverse = w.inverse[ua].data();
   } else {
-    out.up.fill(zeros_.data());
-    out.down.fill(zeros_.data());
-    out.inverse = zeros_.data();
+    out.up.fill(zeros_[0].data());
+    out.down.fill(zeros_[0].data());
+    out.inverse = zeros_[0].data();
   }
   return out;
 }
 
+RowCouplings Couplings::all(RowId row) const noexcept {
+  if (kind_[row] == one_label) {
+    const Constant& c = *constant_[label_[row]];
+    const float *along = c.along[0].data(), *across = c.across[0].data();
+    return {along, across, along, across, c.inverse[0].data(), eighths_.data(), ones_.data(), true};
+  }
+  if (kind_[row] == mixed) {
+    const Written& w = written_[written_at_[row]];
+    return {w.up_along[0].data(), w.up_across[0].data(), w.down_along[0].data(), w.down_across[0].data(),
+            w.inverse[0].data(),  w.share.data(),        w.filled.data(),        false};
+  }
+  const float* zeros = zeros_[0].data();
+  return {zeros, zeros, zeros, zeros, zeros, zeros, zeros, false};
+}
+
 const float* Couplings::filled(RowId row) const noexcept {
   if (kind_[row] == one_label) return ones_.data();
-  return kind_[row] == mixed ? written_[written_at_[row]].filled.data() : zeros_.data();
+  return kind_[row] == mixed ? written_[written_at_[row]].filled.data() : zeros_[0].data();
 }
 
 std::size_t Couplings::memory_bytes() const {
   return kind_.resident_bytes() + label_.resident_bytes() + content_.resident_bytes() +
-         written_at_.resident_bytes() + written_count_ * sizeof(Written);
+         written_at_.resident_bytes() + written_count_ * sizeof(Written) +
+         (written_limits_.size() > 0 ? written_count_ * sizeof(RowLimits::Written) : 0);
 }
 
 }  // namespace voxel::sparse

@@ -25,6 +25,42 @@ struct RowSprings {
   const float* inverse = nullptr;  // 1 / Σ; 0 where nothing may move
 };
 
+// Those of all axes: [d][lane], what the link in d weighs on its own axis and on the two others.
+struct RowCouplings {
+  const float *up_along = nullptr, *up_across = nullptr, *down_along = nullptr, *down_across = nullptr;
+  const float* inverse = nullptr;  // [axis][lane]
+  const float* share = nullptr;    // [lane] 1 / number of cells of the level below; 0 where there is none
+  const float* filled = nullptr;   // [lane] 1 where there is a cell, 0 elsewhere
+  bool uniform = false;            // the same in every lane
+};
+
+using Lanes = std::array<float, kRow>;
+
+// Limits of all links of a lattice, or of a label, on one axis: low[d] <= u(up) − u(v) <= high[d].
+struct AxisLimits {
+  std::array<float, 3> low{}, high{};
+
+  AxisLimits() = default;
+  AxisLimits(const std::array<LinkLimit, 3>& links, int axis) {
+    for (std::size_t d = 0; d < 3; ++d) {
+      const bool along = axis == static_cast<int>(d);
+      low[d] = along ? links[d].along_low : -links[d].across;
+      high[d] = along ? links[d].along_high : links[d].across;
+    }
+  }
+};
+
+// Limits of the links of one row of voxels: the same for all, or lane by lane, [d], without end where there
+// is no link.
+struct RowLimits {
+  struct Written {
+    std::array<Lanes, 3> up_low, up_high, up_across, down_low, down_high, down_across;
+    std::array<AxisLimits, 3> tightest;  // [axis] no link is tighter
+  };
+  const std::array<AxisLimits, 3>* of = nullptr;  // [axis] no link is tighter
+  const Written* lanes = nullptr;                 // null: all are as tight as that
+};
+
 class Couplings {
  public:
   // `finer`: the level below, kept by the caller; none for level 0.
@@ -41,6 +77,9 @@ class Couplings {
   }
   [[nodiscard]] bool uniform(RowId row) const { return kind_[row] == one_label; }
   [[nodiscard]] RowSprings springs(RowId row, int axis) const noexcept;
+  [[nodiscard]] RowCouplings all(RowId row) const noexcept;
+  // Of level 0.
+  [[nodiscard]] RowLimits limits(RowId row) const noexcept;
   // Those of one voxel or cell, on all axes; a few loads once its row was prepared, which it sees to.
   [[nodiscard]] VoxelSprings springs_of(VoxelId cell) noexcept;
   [[nodiscard]] const Lattice& lattice() const { return lattice_; }
@@ -52,10 +91,9 @@ class Couplings {
  private:
   enum Kind : std::uint8_t { unknown = 0, empty, one_label, mixed };
   enum Content : std::uint8_t { nothing = 0, some = 1, held = 2 };
-  using Lanes = std::array<float, kRow>;
   struct Written {  // springs of a mixed row
     std::array<Lanes, 3> up_along, up_across, down_along, down_across, inverse;
-    Lanes filled;
+    Lanes filled, share;
   };
   struct Constant {  // springs of all rows of one label
     std::array<Lanes, 3> along, across, inverse;
@@ -66,6 +104,7 @@ class Couplings {
   void write_out(RowId row, Written& out) const noexcept;
   static void write_lane(std::size_t lane, const VoxelSprings& springs, Written& out) noexcept;
   void write_voxels(RowId row, Written& out) const noexcept;
+  void write_limits(RowId row, RowLimits::Written& out) const noexcept;
   void write_cells(RowId row, Written& out) const noexcept;
   [[nodiscard]] Spring link(const std::array<int, 3>& cell, int d) const noexcept;
   [[nodiscard]] Content content(const std::array<int, 3>& cell) const noexcept;
@@ -78,9 +117,12 @@ class Couplings {
   LazyArray<std::uint8_t> content_;       // [cell], from level 2 on; found on the fly below
   LazyArray<std::uint32_t> written_at_;   // [row] into written_
   LazyArray<Written> written_;
+  LazyArray<RowLimits::Written> written_limits_;  // as written_; empty where all links have the same
+  std::array<std::array<AxisLimits, 3>, 256> label_limits_;  // [label][axis]
   std::uint32_t written_count_ = 0;
   std::array<std::unique_ptr<Constant>, 256> constant_;  // [label]
-  Lanes ones_, zeros_;
+  Lanes ones_, eighths_;
+  std::array<Lanes, 3> zeros_;
 };
 
 }  // namespace voxel::sparse

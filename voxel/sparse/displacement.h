@@ -8,6 +8,7 @@
 
 #include "voxel/sparse/lattice.h"
 #include "voxel/sparse/lazy_array.h"
+#include "voxel/sparse/rest_offsets.h"
 
 namespace voxel::sparse {
 
@@ -21,13 +22,17 @@ struct Displacement {
   };
 
   explicit Displacement(const Lattice& lattice)
-      : role(lattice.size()), row_held(lattice.grid().rows()), row_obstacles(lattice.grid().rows()) {
+      : role(lattice.size()),
+        row_held(lattice.grid().rows()),
+        row_obstacles(lattice.grid().rows()),
+        rest(lattice) {
     for (auto& axis : u) axis = LazyArray<float>(lattice.size());
   }
 
   std::array<LazyArray<float>, 3> u;                // [axis][v] (unit: meter)
   LazyArray<std::uint8_t> role;                     // [v]
   LazyArray<std::uint8_t> row_held, row_obstacles;  // [row]: voxels of the row with that role
+  RestOffsets rest;
 
   [[nodiscard]] glm::dvec3 at(VoxelId v) const { return {u[0][v], u[1][v], u[2][v]}; }
   void set(VoxelId v, const glm::dvec3& value) {

@@ -23,6 +23,7 @@ void check_material(std::size_t label, const LinkMaterial& m) {
   if (!(m.stretch_min > 0.0 && m.stretch_min <= 1.0)) say("a least stretch outside 0 < min <= 1");
   if (!(m.stretch_max >= 1.0 && std::isfinite(m.stretch_max))) say("a greatest stretch below 1");
   if (!(m.shear >= 0.0 && std::isfinite(m.shear))) say("a negative shear limit");
+  if (!(m.yield > 0.0)) say("a yield strain that is not positive; leave it out where nothing yields");
 }
 
 }  // namespace
@@ -116,6 +117,9 @@ void Lattice::fill_links(const LatticeOptions& options) {
     tightest = {-std::numeric_limits<float>::max(), std::numeric_limits<float>::max(),
                 std::numeric_limits<float>::max()};
     limits_[ud].assign(material_count_ * material_count_, {});
+    constexpr float never = std::numeric_limits<float>::infinity();
+    yield_m_[ud].assign(material_count_ * material_count_, never);
+    first_yield_m_[ud] = never;
     for (std::size_t ia = 1; ia < material_count_; ++ia) {
       for (std::size_t ib = 1; ib < material_count_; ++ib) {
         const LinkMaterial &a = materials[ia], &b = materials[ib];
@@ -124,6 +128,10 @@ void Lattice::fill_links(const LatticeOptions& options) {
         limit.along_low = static_cast<float>((0.5 * (a.stretch_min + b.stretch_min) - 1.0) * h[d]);
         limit.along_high = static_cast<float>((0.5 * (a.stretch_max + b.stretch_max) - 1.0) * h[d]);
         limit.across = static_cast<float>(0.5 * (a.shear + b.shear) * h[d]);
+        float& yield = yield_m_[ud][ia * material_count_ + ib];
+        yield = static_cast<float>(std::min(a.yield, b.yield) * h[d]);
+        first_yield_m_[ud] = std::min(first_yield_m_[ud], yield);
+        yields_ = yields_ || yield < never;
         tightest.along_low = std::max(tightest.along_low, limit.along_low);
         tightest.along_high = std::min(tightest.along_high, limit.along_high);
         tightest.across = std::min(tightest.across, limit.across);
@@ -325,7 +333,8 @@ std::uint32_t Lattice::surface_number(VoxelId v) const noexcept {
 std::size_t Lattice::memory_bytes() const {
   return label_.resident_bytes() + anchored_.resident_bytes() + row_filled_.resident_bytes() +
          inside_.resident_bytes() + surface_.size() * sizeof(VoxelId) +
-         surface_before_.size() * sizeof(std::uint32_t) + 3 * limits_[0].size() * sizeof(LinkLimit);
+         surface_before_.size() * sizeof(std::uint32_t) +
+         3 * limits_[0].size() * (sizeof(LinkLimit) + sizeof(float));
 }
 
 }  // namespace voxel::sparse

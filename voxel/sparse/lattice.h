@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/vec3.hpp>
+#include <limits>
 #include <span>
 #include <string>
 #include <vector>
@@ -28,6 +29,8 @@ struct LinkMaterial {
   double stretch_min = 0.4;  // shortest, in rest lengths
   double stretch_max = 1.6;  // longest
   double shear = 0.6;        // most slip across the link, in its rest length
+  // Strain beyond which a link keeps what is beyond (voxel/yield.h), of its rest length.
+  double yield = std::numeric_limits<double>::infinity();
 
   friend bool operator==(const LinkMaterial&, const LinkMaterial&) = default;
 };
@@ -145,6 +148,14 @@ class Lattice {
   // Every link in a direction has the same limits: those of tightest().
   [[nodiscard]] bool uniform_limits() const { return uniform_limits_; }
 
+  // Does any link yield; from which difference on, on any axis, the link v → up(v, d) does, that of its ends
+  // which yields first (m, infinite: never); and from which on some link in that direction does.
+  [[nodiscard]] bool yields() const { return yields_; }
+  [[nodiscard]] float yield_m(VoxelId v, int d) const {
+    return yield_m_[static_cast<std::size_t>(d)][pair_of(label_[v], label_[grid_.up(v, d)])];
+  }
+  [[nodiscard]] float first_yield_m(int d) const { return first_yield_m_[static_cast<std::size_t>(d)]; }
+
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
@@ -162,7 +173,7 @@ class Lattice {
   glm::dvec3 spacing_m_{1e-3};
   double min_spacing_m_ = 1e-3, max_spacing_m_ = 1e-3;
   double force_scale_N_ = 0.0;
-  bool uniform_limits_ = true;
+  bool uniform_limits_ = true, yields_ = false;
   std::size_t voxel_count_ = 0, anchored_count_ = 0, material_count_ = 1;
   LazyArray<std::uint8_t> label_, anchored_, row_filled_, inside_;
   std::array<std::uint8_t, 256> material_{};  // label → number among equal materials; 0: empty
@@ -171,6 +182,8 @@ class Lattice {
   std::array<std::vector<Spring>, 3> within_;     // [d][material]
   std::array<std::vector<LinkLimit>, 3> limits_;  // [d][material a · material_count + material b]
   std::array<LinkLimit, 3> tightest_;
+  std::array<std::vector<float>, 3> yield_m_;  // as limits_
+  std::array<float, 3> first_yield_m_{};
   std::vector<VoxelId> surface_;
   std::vector<std::uint32_t> surface_before_;  // [id / kSurfaceBlock] surface voxels with smaller ids
 };

@@ -18,6 +18,8 @@
 #include "voxel/sparse/lattice.h"
 #include "voxel/sparse/links.h"
 #include "voxel/sparse/row_kernels.h"
+#include "voxel/sparse/row_passes.h"
+#include "voxel/sparse/tile_queue.h"
 
 namespace voxel::sparse {
 
@@ -32,25 +34,22 @@ class Multigrid {
 
   // What is known of a row.
   enum Flag : std::uint8_t {
-    active = 1,   // its residual may be too large
-    dirty = 2,    // it, or a row beside it, changed since it was passed on to the next coarser level
-    changed = 4,  // (coarse) it changed since what it holds was told
-    loud = 8,     // (coarse) what is being told is too large to leave out
+    active = 1,    // its residual may be too large
+    dirty = 2,     // it, or a row beside it, changed since it was passed on to the next coarser level
+    changed = 4,   // (coarse) it changed since what it holds was told
+    renewed = 8,   // (coarse) its values were renewed, its load is to be
+    telling = 16,  // (coarse) it tells what it holds, in the cycle that goes on
   };
   [[nodiscard]] bool has(int level, RowId row, std::uint8_t flag) const {
     return (at(level).flags[row] & flag) != 0;
   }
-  // May any row of a plane (rows of one column and z: row / grid.row_z) have it?
-  [[nodiscard]] bool plane_has(int level, RowId plane, std::uint8_t flag) const {
-    return (at(level).plane_flags[plane] & flag) != 0;
-  }
-  void clear_plane(int level, RowId plane, std::uint8_t flag) noexcept {
-    at(level).plane_flags[plane] &= static_cast<std::uint8_t>(~flag);
-  }
-  void mark(int level, RowId row, std::uint8_t flag) noexcept;
+  void mark(int level, RowId row, std::uint8_t flag) noexcept { at(level).flags[row] |= flag; }
   void unmark(int level, RowId row, std::uint8_t flag) noexcept {
     at(level).flags[row] &= static_cast<std::uint8_t>(~flag);
   }
+  // Tiles of voxels near which somebody moved something; see Relaxation.
+  [[nodiscard]] TileQueue& tiles() { return tiles_; }
+  [[nodiscard]] const TileQueue& tiles() const { return tiles_; }
   // Somebody moved voxels of this row: it and the rows beside it are to be looked at.
   void stir(int level, RowId row) noexcept { spread(level, row, active | dirty); }
 
@@ -60,32 +59,55 @@ class Multigrid {
   void set_hold(float times) noexcept { hold_ = times; }
   // Cells held because a chain at its limit holds a voxel in them, until this is called.
   void release_limited() noexcept;
+  // The voxels among them: `visit(v, axis)` for each axis on which a limit holds one.
+  template <class Visit>
+  void for_limited(const Visit& visit) const {
+    for (const HeldCell& s : stopped_) {
+      if (s.level != 0) continue;
+      for (int axis = 0; axis < 3; ++axis) {
+        if ((at(0).stopped[s.cell] & (1 << axis)) != 0) visit(s.cell, axis);
+      }
+    }
+  }
 
   // Is there anything in the row? Call it before any of what follows.
   bool prepare(int level, RowId row) noexcept { return at(level).couplings->prepare(row); }
 
+  // Renews what yielded links add to the load of a row of voxels; `keep`: they keep it. True where a link is
+  // beyond what it keeps.
+  bool yield(RowId row, Displacement& state, bool keep) noexcept;
+  // The child (bit 0: in x, 1: in y, 2: in z) of a coarse row on the level below; where the lattice ends, a
+  // row of its empty border.
+  [[nodiscard]] RowId row_below(int level, RowId row, int child) const noexcept;
+
+  // What follows works on the octets of `span` only; by default, on the whole row.
+
   // Moves the voxels, or cells, of a row to the minimum of their energy given all other rows, every second
   // one first, without leaving their limits.
-  void smooth(int level, RowId row, Displacement& state, const ObstacleView& obstacles) noexcept;
+  void smooth(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
+              OctetSpan span = {}) noexcept;
   // The cells of a coarse row take the means of what they hold, and keep what they know beyond that …
-  void restrict_values(int level, RowId row, const Displacement& state) noexcept;
+  void restrict_values(int level, RowId row, Displacement& state, OctetSpan span = {}) noexcept;
   // … and the load under which those would be at rest where they are. Returns the largest force left on any
-  // voxel below (N); only for level 1 is it one of voxels.
-  float restrict_loads(int level, RowId row, const Displacement& state,
-                       const ObstacleView& obstacles) noexcept;
-  // Sets aside what a coarse row has to tell, for prolong(): that row is told.
-  void begin_telling(int level, RowId row) noexcept;
-  // Passes on to a row what the next coarser one has set aside; or, `now`, what it knows beyond what it told,
-  // which end_telling() then takes as told.
-  void prolong(int level, RowId row, bool now, Displacement& state, const ObstacleView& obstacles) noexcept;
-  void end_telling(int level, RowId row) noexcept;
+  // voxel below (N); only for level 1 is it one of voxels. Of whole rows it also finds which are at rest.
+  float restrict_loads(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
+                       OctetSpan span = {}) noexcept;
+  // What a cell has yet to tell is told as a hat: all of it to the voxels nearest to its middle, less and
+  // less to those up to the middles of the cells beside it. Adds to a row of voxels the hats of those cells
+  // around it that tell: of coarse rows marked `telling`, those from first to last along x, as counted from
+  // the first of all.
+  void prolong(int level, RowId row, Displacement& state, const ObstacleView& obstacles, OctetSpan span,
+               int first, int last) noexcept;
+  // Those cells of a coarse row have told.
+  void end_telling(int level, RowId row, int first, int last) noexcept;
   // The most that any cell of a coarse row has yet to tell (m).
-  [[nodiscard]] float untold(int level, RowId row) const noexcept;
-  // Puts a row where the next coarser level says it is; what finer detail it had is forgotten.
-  void follow_coarse(int level, RowId row, Displacement& state, const ObstacleView& obstacles) noexcept;
+  [[nodiscard]] float untold(int level, RowId row, OctetSpan span = {}) const noexcept;
 
   // Rows whose voxels are pulled by less than `tolerance_N`, or whose cells would move less than `quiet_m`,
   // are left alone.
+  [[nodiscard]] float quiet_m() const { return quiet_m_; }
+  // Less than this is not passed on to other levels: a small share of what a row is left alone with.
+  [[nodiscard]] float passed_on_m() const { return quiet_m_ / 32.0F; }
   void set_quiet(float tolerance_N, float quiet_m) noexcept {
     tolerance_N_ = tolerance_N;
     quiet_m_ = quiet_m;
@@ -97,13 +119,13 @@ class Multigrid {
   struct Level {
     std::unique_ptr<Couplings> couplings;
     // [axis][cell]; those of level 0 are elsewhere. `told` is the value that what the cell holds knows of, so
-    // value − told is what it has yet to hear; `telling` is such a difference set aside.
-    std::array<LazyArray<float>, 3> value, told, load, telling;
-    LazyArray<std::uint8_t> stopped;      // [cell or voxel] bits 0 to 2: held by a limit on that axis
-    LazyArray<std::uint16_t> held;        // [cell] voxels in it that the tool or another object holds
-    LazyArray<std::uint8_t> row_held;     // [row] 1: some cell of it has one of these
-    LazyArray<std::uint8_t> flags;        // [row]
-    LazyArray<std::uint8_t> plane_flags;  // [row / row_z]
+    // value − told is what it has yet to hear.
+    std::array<LazyArray<float>, 3> value, told, load;
+    LazyArray<std::uint8_t> stopped;   // [cell or voxel] bits 0 to 2: held by a limit on that axis
+    LazyArray<std::uint16_t> held;     // [cell] voxels in it that the tool or another object holds
+    LazyArray<float> hold;             // [cell] how hard those hold it, in units of all its springs
+    LazyArray<std::uint8_t> row_held;  // [row] 1: some cell of it has one of these
+    LazyArray<std::uint8_t> flags;     // [row]
   };
   struct HeldCell {
     std::uint8_t level;
@@ -112,32 +134,23 @@ class Multigrid {
 
   [[nodiscard]] Level& at(int level) { return levels_[static_cast<std::size_t>(level)]; }
   [[nodiscard]] const Level& at(int level) const { return levels_[static_cast<std::size_t>(level)]; }
-  [[nodiscard]] float* values(int level, int axis, Displacement& state) noexcept {
-    return (level == 0 ? state.u : at(level).value)[static_cast<std::size_t>(axis)].data();
-  }
-  [[nodiscard]] const float* values(int level, int axis, const Displacement& state) const noexcept {
-    return (level == 0 ? state.u : at(level).value)[static_cast<std::size_t>(axis)].data();
-  }
   void spread(int level, RowId row, std::uint8_t flags) noexcept;
   void note_change(int level, RowId row, float change) noexcept;
   void stop_cells(VoxelId v, std::uint8_t bits) noexcept;
-  void keep_held(int level, RowId row, int axis, float* wanted) const noexcept;
-  void smooth_voxels(RowId row, Displacement& state, const ObstacleView& obstacles) noexcept;
-  void smooth_cells(int level, RowId row) noexcept;
-  void mean_of_children(int level, RowId row, int axis, const Displacement& state, Row& out) noexcept;
-  float residual_of(int level, RowId row, int axis, const Displacement& state, const ObstacleView& obstacles,
-                    Row& out) noexcept;
-  void correct_voxels(RowId row, int axis, Row& correction, Displacement& state) noexcept;
-  enum class Of : std::uint8_t { set_aside, untold, values };
-  void interpolate(int level, RowId row, int axis, Of of, Row& out) noexcept;
-  void correct(int level, RowId row, int axis, Row& correction, Displacement& state) noexcept;
+  [[nodiscard]] LevelRow row_of(int level, RowId row, Displacement& state) noexcept;
+  [[nodiscard]] LevelRow told_row(int level, RowId row) noexcept;
+  [[nodiscard]] std::array<float*, 3> loads(int level, RowId row) noexcept;
+  RowResidual residual_of(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
+                          OctetSpan span, RowVector& out) noexcept;
+  float correct(int level, RowId row, const RowVector& correction, Displacement& state,
+                OctetSpan span) noexcept;
   void clear_obstacles(RowId row, Displacement& state, const ObstacleView& obstacles) noexcept;
-  [[nodiscard]] bool rows_below(int level, RowId row, int child, RowId& fine) const noexcept;
 
   const Lattice& lattice_;
+  TileQueue tiles_;
   std::vector<Level> levels_;
   std::vector<HeldCell> held_, stopped_;
-  std::array<AxisLimits, 3> limits_;
+  std::array<AxisLimits, 3> yield_limits_;
   float tolerance_N_ = 0.0F, quiet_m_ = 0.0F, hold_ = 1.0F;
 };
 

@@ -3,49 +3,28 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace voxel::sparse {
 namespace {
 
 constexpr int kCoarsestSweeps = 8;
-constexpr int kPatience = 40;        // cycles without gain before an object counts as resting
-constexpr double kGoesAlong = 2e-3;  // of the spacing
+constexpr int kPatience = 40;  // cycles without gain before an object counts as resting
+// Of the spacing: cells beside a box that have less to tell wait for a cycle of their own.
+constexpr double kGoesAlong = 2e-4;
 constexpr double kWorse = 1.05;
 constexpr float kHarder = 8.0F, kSofter = 0.97F, kHardest = 1e4F;
-constexpr double kGain = 0.98;     // of the least residual so far: less is a gain
-constexpr int kContactMargin = 4;  // cells round the contact that are smoothed, on each level
+constexpr double kGain = 0.98;      // of the least residual so far: less is a gain
+constexpr double kNearRest = 10.0;  // times the tolerance: what limits hold moves together from here on
+constexpr double kProgress = 1e-3;  // of the spacing: clusters that move further are on their way
+constexpr std::uint64_t kNextFirst = 7919;  // of these voxels is looked at first in the next round
+constexpr int kContactMargin = 4;           // cells round the contact that are smoothed, on each level
+constexpr int kLooksAtOnce = 256;  // tiles looked at for what coarse levels have to tell them, a call
 
 }  // namespace
 
-Relaxation::Relaxation(const Lattice& lattice) : lattice_(lattice), multigrid_(lattice) {
+Relaxation::Relaxation(const Lattice& lattice) : lattice_(lattice), multigrid_(lattice), clusters_(lattice) {
   set_tolerance(kRestingResidual * lattice.force_scale_N());
-  const auto last = static_cast<std::uint8_t>(multigrid_.levels() - 1);
-  // What coarse levels know and finer ones do not is told first: a step between voxels that were told and
-  // others that were not would look like a force to the cells above it.
-  for (int level = last - 1; level >= 0; --level) {
-    steps_.push_back({Stage::telling, static_cast<std::uint8_t>(level + 1), 0});
-    steps_.push_back({Stage::prolong, static_cast<std::uint8_t>(level), 0});
-  }
-  for (std::uint8_t level = 0; level < last; ++level) {
-    steps_.push_back({Stage::smooth, level, 0});
-    steps_.push_back({Stage::smooth, level, 1});
-    steps_.push_back({Stage::values, static_cast<std::uint8_t>(level + 1), 0});
-    steps_.push_back({Stage::loads, static_cast<std::uint8_t>(level + 1), 0});
-  }
-  for (int n = 0; n < kCoarsestSweeps; ++n) {
-    steps_.push_back({Stage::smooth, last, 0});
-    steps_.push_back({Stage::smooth, last, 1});
-  }
-  for (int level = last - 1; level >= 0; --level) {
-    steps_.push_back({Stage::telling, static_cast<std::uint8_t>(level + 1), 0});
-    steps_.push_back({Stage::prolong, static_cast<std::uint8_t>(level), 0});
-    steps_.push_back({Stage::smooth, static_cast<std::uint8_t>(level), 1});
-    steps_.push_back({Stage::smooth, static_cast<std::uint8_t>(level), 0});
-  }
-  const RowBox none{1, 0, 1, 0, 1, 0};
-  for (auto* boxes : {&smooth_box_, &parent_box_, &told_box_, &teller_box_})
-    boxes->assign(static_cast<std::size_t>(multigrid_.levels()), none);
+  boxes_.resize(static_cast<std::size_t>(multigrid_.levels()));
 }
 
 void Relaxation::set_tolerance(double tolerance_N) noexcept {
@@ -60,6 +39,7 @@ void Relaxation::set_tolerance(double tolerance_N) noexcept {
 void Relaxation::copy_from(const Relaxation& other) noexcept {
   multigrid_.copy_from(other.multigrid_);
   set_tolerance(other.tolerance_N_);
+  unkept_ = other.unkept_;
   wake();
 }
 
@@ -69,191 +49,202 @@ void Relaxation::stir_all() noexcept {
   }
 }
 
-int Relaxation::planes(const Step& step) const {
-  const Grid& g = multigrid_.grid(step.level);
-  return (g.columns - 2) * g.dims[2];
-}
-
 std::uint64_t Relaxation::run(Displacement& state, const ObstacleView& obstacles,
                               std::span<const VoxelId> held, std::uint64_t budget) noexcept {
+  if (asleep_) return 0;
+  multigrid_.set_held(held);
+  TileQueue& tiles = multigrid_.tiles();
   std::uint64_t spent = 0;
-  while (!asleep_ && spent < budget) {
-    if (step_ == 0 && plane_ == 0) begin_cycle(held);
-    spent += do_plane(state, obstacles, steps_[step_], plane_) + 1;
-    if (++plane_ < planes(steps_[step_])) continue;
-    plane_ = 0;
-    if (++step_ == steps_.size()) {
-      step_ = 0;
-      end_cycle();
+  credit_ += static_cast<std::int64_t>(budget);
+  const auto spend = [&](std::uint64_t updates) {
+    credit_ -= static_cast<std::int64_t>(updates);
+    spent += updates;
+  };
+  while (!asleep_ && credit_ > 0) {
+    if (keeping_) {
+      spend(keep_yielded(state, static_cast<std::uint64_t>(credit_)));
+      continue;
+    }
+    if (round_left_ == 0) round_left_ = tiles.waiting();
+    if (tiles.waiting() > 0) {
+      looked_at_ = 0;
+      spend(relax_tile(state, obstacles, tiles.pop()));
+      if (round_left_ > 0 && --round_left_ == 0) end_round(state, running_residual_N_);
+      continue;
+    }
+    // Nothing was stirred: what coarse levels know may still have to be told somewhere.
+    for (int n = 0; n < kLooksAtOnce && looked_at_ < tiles.tiles() && tiles.waiting() == 0;
+         ++n, ++looked_at_) {
+      if (tile_waits_for_coarse(cursor_)) tiles.push(cursor_);
+      cursor_ = (cursor_ + 1) % tiles.tiles();
+    }
+    spend(kLooksAtOnce * 4);
+    if (looked_at_ >= tiles.tiles() && tiles.waiting() == 0) {
+      looked_at_ = 0;
+      running_residual_N_ = 0.0;
+      end_round(state, std::min(residual_N_, 0.99 * tolerance_N_));
     }
   }
+  // What was not needed is not saved up for a tick that has enough to do.
+  credit_ = std::min<std::int64_t>(credit_, 0);
   return spent;
 }
 
 void Relaxation::run_cycle(Displacement& state, const ObstacleView& obstacles,
                            std::span<const VoxelId> held) noexcept {
-  const std::uint64_t cycles = cycles_;
-  while (!asleep_ && cycles_ == cycles) run(state, obstacles, held, 1);
-}
-
-void Relaxation::begin_cycle(std::span<const VoxelId> held) noexcept {
-  running_residual_N_ = 0.0;
+  if (asleep_) return;
+  if (keeping_) {
+    while (keeping_) keep_yielded(state, ~std::uint64_t{0});
+    return;
+  }
   multigrid_.set_held(held);
+  multigrid_.tiles().clear();
+  round_left_ = 0;
+  running_residual_N_ = 0.0;
+  const auto& dims = lattice_.grid().dims;
+  lay_boxes({0, 0, 0}, {dims[0] - 1, dims[1] - 1, dims[2] - 1}, 0);
+  cycle(state, obstacles, Look::active, 0.0);
+  end_round(state, running_residual_N_);
 }
 
-void Relaxation::end_cycle() noexcept {
+void Relaxation::relax_contact(Displacement& state, const ObstacleView& obstacles,
+                               std::span<const VoxelId> held, const std::array<int, 3>& low,
+                               const std::array<int, 3>& high) noexcept {
+  multigrid_.set_held(held);
+  const int wide = std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
+  lay_boxes(low, high, wide);
+  cycle(state, obstacles, Look::all, kGoesAlong * lattice_.min_spacing_m());
+}
+
+std::uint64_t Relaxation::relax_tile(Displacement& state, const ObstacleView& obstacles,
+                                     std::size_t number) noexcept {
+  const TileQueue::Tile t = multigrid_.tiles().tile(number);
+  constexpr int kSide = TileQueue::kSide;
+  lay_boxes({t.column * kRow, t.j * kSide, t.k * kSide},
+            {(t.column + 1) * kRow - 1, (t.j + 1) * kSide - 1, (t.k + 1) * kSide - 1}, -1);
+  cycle(state, obstacles, Look::all, 0.0);
+  std::uint64_t updates = 0;
+  for (const LevelBoxes& b : boxes_) {
+    updates += static_cast<std::uint64_t>(b.smoothed.q1 - b.smoothed.q0 + 1) * kOctet *
+               static_cast<std::uint64_t>(b.smoothed.j1 - b.smoothed.j0 + 1) *
+               static_cast<std::uint64_t>(b.smoothed.k1 - b.smoothed.k0 + 1);
+  }
+  return 2 * updates;
+}
+
+// What limits held in this round moves with what it pulls on; returns the largest force a voxel that did (N).
+// Which voxel is first goes round, so that all have their turn however few a round has time for.
+double Relaxation::move_clusters(Displacement& state) noexcept {
+  clusters_.begin();
+  std::uint64_t count = 0;
+  multigrid_.for_limited([&count](VoxelId, int) { ++count; });
+  if (count == 0) return 0.0;
+  const std::uint64_t first = cycles_ * kNextFirst % count;
+  double most_N = 0.0;
+  for (const bool before : {false, true}) {
+    std::uint64_t n = 0;
+    multigrid_.for_limited([&](VoxelId v, int axis) {
+      if ((n++ < first) != before) return;
+      const float from = state.u[static_cast<std::size_t>(axis)][v];
+      const double force = clusters_.move(multigrid_.couplings(), state, v, axis, 0.5 * tolerance_N_);
+      if (force == 0.0) return;
+      most_N = std::max(most_N, force);
+      // Every such step lowers the energy, though it may be far from limit to limit to where the force falls.
+      if (std::fabs(state.u[static_cast<std::size_t>(axis)][v] - from) > kProgress * lattice_.min_spacing_m())
+        cycles_without_gain_ = std::min(cycles_without_gain_, kPatience / 2 + 1);
+      for (const VoxelId w : clusters_.moved()) multigrid_.stir(0, w / kRow);
+    });
+  }
+  credit_ -= static_cast<std::int64_t>(clusters_.looked_at());
+  return most_N;
+}
+
+// A round has looked at all that moves: is it at rest?
+void Relaxation::end_round(Displacement& state, double residual_N) noexcept {
+  // Only when nothing else moves any more: between other corrections they would undo one another (energy grew
+  // 1.9 times within a cycle).
+  if (residual_N < kNearRest * tolerance_N_ || cycles_without_gain_ > kPatience / 2)
+    residual_N = std::max(residual_N, move_clusters(state));
   multigrid_.release_limited();
   // Scattered voxels hold a cell harder than a patch of them does. A cycle that ends worse than it began says
   // so.
-  if (running_residual_N_ > kWorse * residual_N_ && cycles_without_gain_ > 0) {
+  if (residual_N > kWorse * residual_N_ && cycles_without_gain_ > 0) {
     hold_ = std::min(hold_ * kHarder, kHardest);
   } else {
     hold_ = std::max(1.0F, hold_ * kSofter);
   }
   multigrid_.set_hold(hold_);
-  residual_N_ = running_residual_N_;
+  residual_N_ = residual_N;
+  running_residual_N_ = 0.0;
   ++cycles_;
   if (cycles_without_gain_ == 0 || residual_N_ < kGain * least_residual_N_) {
     least_residual_N_ = residual_N_;
     cycles_without_gain_ = 0;
   }
   ++cycles_without_gain_;
-  if (residual_N_ < tolerance_N_ || cycles_without_gain_ > kPatience) asleep_ = true;
+  const bool at_rest = residual_N_ < tolerance_N_ || cycles_without_gain_ > kPatience;
+  if (!at_rest) return;
+  // What yielded is kept at rest, and then there is a new rest to be found.
+  if (unkept_) {
+    keeping_ = true;
+    unkept_ = false;
+    keep_row_ = 0;
+    return;
+  }
+  if (multigrid_.tiles().waiting() > 0 && cycles_without_gain_ <= kPatience) return;
+  multigrid_.tiles().clear();
+  asleep_ = true;
 }
 
-// Was anything that a coarse row holds moved since it was passed on?
-bool Relaxation::restrict_due(int level, RowId row) const noexcept {
-  const Grid &coarse = multigrid_.grid(level), &fine = multigrid_.grid(level - 1);
-  const auto c = coarse.row_coordinates(row);
-  const int column = 2 * (c[0] - 1) + 1, j = 2 * c[1], k = 2 * c[2];
-  for (int child = 0; child < 8; ++child) {
-    const int cc = column + (child & 1), cj = j + (child >> 1 & 1), ck = k + (child >> 2);
-    if (cc + 1 >= fine.columns || cj >= fine.dims[1] || ck >= fine.dims[2]) continue;
-    if (multigrid_.has(level - 1, fine.row(cc, cj, ck), Multigrid::dirty)) return true;
+std::uint64_t Relaxation::keep_yielded(Displacement& state, std::uint64_t budget) noexcept {
+  std::uint64_t spent = 0;
+  const auto rows = static_cast<RowId>(lattice_.grid().rows());
+  for (; keep_row_ < rows && spent < budget; ++keep_row_, ++spent) {
+    if (state.rest.row[keep_row_] == 0 || !multigrid_.prepare(0, keep_row_)) continue;
+    multigrid_.yield(keep_row_, state, true);
+    spent += kRow;
+  }
+  keeping_ = keep_row_ < rows;
+  return spent;
+}
+
+// Have the cells above a tile anything to tell it?
+bool Relaxation::tile_waits_for_coarse(std::size_t number) const noexcept {
+  constexpr int kSide = TileQueue::kSide;
+  const TileQueue::Tile t = multigrid_.tiles().tile(number);
+  for (int level = 1; level < multigrid_.levels(); ++level) {
+    const Grid& g = multigrid_.grid(level);
+    const int column = (t.column >> level) + 1, rows = std::max(1, kSide >> level);
+    const int j0 = t.j * kSide >> level, k0 = t.k * kSide >> level;
+    for (int k = k0; k < std::min(k0 + rows, g.dims[2]); ++k) {
+      for (int j = j0; j < std::min(j0 + rows, g.dims[1]); ++j) {
+        const RowId row = g.row(column, j, k);
+        if (multigrid_.has(level, row, Multigrid::changed) &&
+            multigrid_.untold(level, row) > multigrid_.quiet_m())
+          return true;
+      }
+    }
   }
   return false;
 }
 
-// Cells of the next finer level that a row of cells holds.
-std::uint64_t Relaxation::cells_below(int level, RowId row) const noexcept {
-  const Grid &coarse = multigrid_.grid(level), &fine = multigrid_.grid(level - 1);
-  const auto c = coarse.row_coordinates(row);
-  const auto within = [](int first, int count, int dims) {
-    return static_cast<std::uint64_t>(std::clamp(dims - first, 0, count));
-  };
-  return within(2 * kRow * (c[0] - 1), 2 * kRow, fine.dims[0]) * within(2 * c[1], 2, fine.dims[1]) *
-         within(2 * c[2], 2, fine.dims[2]);
-}
-
-std::uint64_t Relaxation::do_plane(Displacement& state, const ObstacleView& obstacles, const Step& step,
-                                   int plane) noexcept {
-  const int level = step.level;
-  const Grid& g = multigrid_.grid(level);
-  const int column = 1 + plane / g.dims[2], k = plane % g.dims[2];
-  const RowId first = g.row(column, 0, k), plane_id = first / g.row_z;
-  const auto rows = static_cast<RowId>(g.dims[1]);
-  // Fine planes below this one, or coarse ones around.
-  const auto any_below = [&](std::uint8_t flag) {
-    const Grid& fine = multigrid_.grid(level - 1);
-    bool any = false;
-    for (int child = 0; child < 4; ++child) {
-      const int cc = 2 * (column - 1) + 1 + (child & 1), ck = 2 * k + (child >> 1);
-      if (cc + 1 < fine.columns && ck < fine.dims[2])
-        any = any || multigrid_.plane_has(level - 1, fine.row(cc, 0, ck) / fine.row_z, flag);
-    }
-    return any;
-  };
-  std::uint64_t spent = 0;
-  const auto lanes = static_cast<std::uint64_t>(std::min(kRow, g.dims[0]));
-  switch (step.stage) {
-    case Stage::smooth: {
-      if (!multigrid_.plane_has(level, plane_id, Multigrid::active)) return 0;
-      bool any = false;
-      for (RowId row = first; row < first + rows; ++row) {
-        if (!multigrid_.has(level, row, Multigrid::active)) continue;
-        any = true;
-        if (((static_cast<int>(row - first) + k + step.colour) & 1) != 0) continue;
-        if (!multigrid_.prepare(level, row)) {
-          multigrid_.unmark(level, row, Multigrid::active | Multigrid::dirty);
-          continue;
-        }
-        multigrid_.smooth(level, row, state, obstacles);
-        spent += lanes;
-      }
-      if (!any) multigrid_.clear_plane(level, plane_id, Multigrid::active);
-      return spent + rows / 8;
-    }
-    case Stage::values: {
-      if (!any_below(Multigrid::dirty)) return 0;
-      for (RowId row = first; row < first + rows; ++row) {
-        if (!restrict_due(level, row) || !multigrid_.prepare(level, row)) continue;
-        multigrid_.restrict_values(level, row, state);
-        // The load holds a row where it is beside its neighbours where they are.
-        for (const RowId r :
-             {row, row - 1, row + 1, row - g.row_z, row + g.row_z, row - g.row_x, row + g.row_x})
-          multigrid_.mark(level, r, kRenewed);
-        spent += lanes;
-      }
-      return spent + rows / 8;
-    }
-    case Stage::loads: {
-      if (!multigrid_.plane_has(level, plane_id, kRenewed)) return 0;
-      for (RowId row = first; row < first + rows; ++row) {
-        if (!multigrid_.has(level, row, kRenewed)) continue;
-        multigrid_.unmark(level, row, kRenewed);
-        if (!multigrid_.prepare(level, row)) continue;
-        const float worst = multigrid_.restrict_loads(level, row, state, obstacles);
-        if (level == 1) running_residual_N_ = std::max(running_residual_N_, static_cast<double>(worst));
-        spent += cells_below(level, row);
-      }
-      multigrid_.clear_plane(level, plane_id, kRenewed);
-      return spent + rows / 8;
-    }
-    case Stage::telling: {
-      constexpr std::uint8_t told = Multigrid::changed | Multigrid::loud;
-      if (!multigrid_.plane_has(level, plane_id, told)) return 0;
-      multigrid_.clear_plane(level, plane_id, told);
-      for (RowId row = first; row < first + rows; ++row) {
-        if (!multigrid_.has(level, row, told)) continue;
-        if (multigrid_.has(level, row, Multigrid::changed)) {
-          multigrid_.begin_telling(level, row);
-          spent += lanes;
-        } else {
-          multigrid_.unmark(level, row, told);
-        }
-      }
-      return spent + rows / 8;
-    }
-    case Stage::prolong: {
-      const Grid& coarse = multigrid_.grid(level + 1);
-      bool any = false;
-      const int own_k = k / 2, near_k = (k & 1) != 0 ? own_k + 1 : own_k - 1;
-      const int own_column = (column - 1) / 2 + 1,
-                near_column = (column & 1) != 0 ? own_column - 1 : own_column + 1;
-      for (const int ck : {own_k, near_k}) {
-        for (const int cc : {own_column, near_column})
-          any = any || multigrid_.plane_has(level + 1, coarse.row(cc, 0, ck) / coarse.row_z, Multigrid::loud);
-      }
-      if (!any) return 0;
-      for (RowId row = first; row < first + rows; ++row) {
-        if (!multigrid_.prepare(level, row)) continue;
-        multigrid_.prolong(level, row, false, state, obstacles);
-        spent += lanes;
-      }
-      return spent + rows / 8;
-    }
+// Was anything that a coarse row holds moved since it was passed on?
+bool Relaxation::restrict_due(int level, RowId row) const noexcept {
+  for (int child = 0; child < 8; ++child) {
+    if (multigrid_.has(level - 1, multigrid_.row_below(level, row, child), Multigrid::dirty)) return true;
   }
-  return 0;
+  return false;
 }
 
 template <class Visit>
 void Relaxation::for_rows(int level, const RowBox& box, const Visit& visit) noexcept {
   const Grid& g = multigrid_.grid(level);
-  for (int c = box.c0; c <= box.c1; ++c) {
+  for (int c = box.q0 / kOctets; c <= box.q1 / kOctets && box.q0 <= box.q1; ++c) {
+    const OctetSpan span{std::max(box.q0 - c * kOctets, 0), std::min(box.q1 - c * kOctets, kOctets - 1)};
     for (int k = box.k0; k <= box.k1; ++k) {
       for (int j = box.j0; j <= box.j1; ++j) {
-        const RowId row = g.row(c, j, k);
-        if (multigrid_.prepare(level, row)) visit(row);
+        const RowId row = g.row(c + 1, j, k);
+        if (multigrid_.prepare(level, row)) visit(row, span, j, k);
       }
     }
   }
@@ -261,100 +252,120 @@ void Relaxation::for_rows(int level, const RowBox& box, const Visit& visit) noex
 
 Relaxation::RowBox Relaxation::clipped(int level, const RowBox& b) const noexcept {
   const Grid& g = multigrid_.grid(level);
-  return {std::max(b.c0, 1), std::min(b.c1, g.columns - 2), std::max(b.j0, 0), std::min(b.j1, g.dims[1] - 1),
+  return {std::max(b.q0, 0), std::min(b.q1, (g.columns - 2) * kOctets - 1),
+          std::max(b.j0, 0), std::min(b.j1, g.dims[1] - 1),
           std::max(b.k0, 0), std::min(b.k1, g.dims[2] - 1)};
 }
 
-// Rows of one colour: j + k even or odd.
-void Relaxation::smooth_box(int level, int colour, Displacement& state,
-                            const ObstacleView& obstacles) noexcept {
-  const Grid& g = multigrid_.grid(level);
-  const RowBox& box = smooth_box_[static_cast<std::size_t>(level)];
-  for (int c = box.c0; c <= box.c1; ++c) {
-    for (int k = box.k0; k <= box.k1; ++k) {
-      for (int j = box.j0 + ((box.j0 + k + colour) & 1); j <= box.j1; j += 2) {
-        const RowId row = g.row(c, j, k);
-        if (multigrid_.prepare(level, row)) multigrid_.smooth(level, row, state, obstacles);
-      }
-    }
-  }
-}
-
-// Tells the rows of a level what the next coarser one knows, within the contact's boxes.
-void Relaxation::tell_box(int level, Displacement& state, const ObstacleView& obstacles) noexcept {
-  const auto ul = static_cast<std::size_t>(level);
-  const RowBox &tellers = teller_box_[ul + 1], &own = parent_box_[ul + 1];
-  const Grid &fine = multigrid_.grid(level), &coarse = multigrid_.grid(level + 1);
-  // Beside the box voxels only go along, and nobody brings them to rest there: they are left alone as soon as
-  // coarse cells hardly move.
-  constexpr std::uint8_t goes_along = 32;
-  const auto inside = [&own](int c, int j, int k) {
-    return c >= own.c0 && c <= own.c1 && j >= own.j0 && j <= own.j1 && k >= own.k0 && k <= own.k1;
-  };
-  const auto worth_it = static_cast<float>(kGoesAlong * lattice_.min_spacing_m());
-  for_rows(level + 1, tellers, [&](RowId row) {
-    const auto c = coarse.row_coordinates(row);
-    if (!inside(c[0], c[1], c[2]) && multigrid_.untold(level + 1, row) > worth_it)
-      multigrid_.mark(level + 1, row, goes_along);
-  });
-  for_rows(level, told_box_[ul], [&](RowId row) {
-    const auto c = fine.row_coordinates(row);
-    const int column = (c[0] - 1) / 2 + 1, j = c[1] / 2, k = c[2] / 2;
-    if (inside(column, j, k)) {
-      multigrid_.prolong(level, row, true, state, obstacles);
-    } else if (multigrid_.has(level + 1, coarse.row(column, j, k), goes_along)) {
-      multigrid_.follow_coarse(level, row, state, obstacles);
-    }
-  });
-  for_rows(level + 1, tellers, [&](RowId row) {
-    const auto c = coarse.row_coordinates(row);
-    if (inside(c[0], c[1], c[2]) || multigrid_.has(level + 1, row, goes_along))
-      multigrid_.end_telling(level + 1, row);
-    multigrid_.unmark(level + 1, row, goes_along);
-  });
-}
-
-void Relaxation::relax_contact(Displacement& state, const ObstacleView& obstacles,
-                               std::span<const VoxelId> held, const std::array<int, 3>& low,
-                               const std::array<int, 3>& high) noexcept {
+// The boxes of a cycle that is to bring voxels low … high to rest: on each level so many cells more on every
+// side as the way that a force at the middle is felt, in cells; `wide` is how wide the contact is, or
+// negative where there is none and the voxels themselves are enough.
+void Relaxation::lay_boxes(const std::array<int, 3>& low, const std::array<int, 3>& high, int wide) noexcept {
   const int last = multigrid_.levels() - 1;
-  multigrid_.set_held(held);
-  const int wide = std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
   for (int l = 0; l <= last; ++l) {
-    const auto ul = static_cast<std::size_t>(l);
+    const int margin = wide < 0 && l == 0 ? 0 : kContactMargin + (std::max(wide, 0) >> l) / 4;
     std::array<int, 3> from{}, to{};
     for (std::size_t d = 0; d < 3; ++d) {
-      const int margin = kContactMargin + (wide >> l) / 4;
       from[d] = std::max(0, (low[d] >> l) - margin);
       to[d] = std::min(multigrid_.grid(l).dims[d] - 1, (high[d] >> l) + margin);
     }
     // Whole cells of the next level, so that each of them is passed on once all it holds is smooth.
-    smooth_box_[ul] =
-        clipped(l, {from[0] / kRow + 1, to[0] / kRow + 1, from[1] & ~1, to[1] | 1, from[2] & ~1, to[2] | 1});
+    RowBox& s = boxes(l).smoothed;
+    s = clipped(
+        l, {(from[0] / kOctet) & ~1, (to[0] / kOctet) | 1, from[1] & ~1, to[1] | 1, from[2] & ~1, to[2] | 1});
     if (l == last) break;
-    const RowBox& s = smooth_box_[ul];
-    const RowBox p{(s.c0 - 1) / 2 + 1, (s.c1 - 1) / 2 + 1, s.j0 / 2, s.j1 / 2, s.k0 / 2, s.k1 / 2};
-    parent_box_[ul + 1] = p;
-    // They and the cells beside them tell all they hold what they know.
-    teller_box_[ul + 1] = clipped(l + 1, {p.c0, p.c1, p.j0 - 1, p.j1 + 1, p.k0 - 1, p.k1 + 1});
-    const RowBox& t = teller_box_[ul + 1];
-    told_box_[ul] = clipped(l, {2 * t.c0 - 1, 2 * t.c1, 2 * t.j0, 2 * t.j1 + 1, 2 * t.k0, 2 * t.k1 + 1});
+    const RowBox p{s.q0 / 2, s.q1 / 2, s.j0 / 2, s.j1 / 2, s.k0 / 2, s.k1 / 2};
+    boxes(l + 1).parents = p;
+    // They and the cells beside them tell all they hold what they know, and the voxels beside those their
+    // part of it. Along x one cell more is enough; voxels come by the vector there.
+    boxes(l + 1).tellers = clipped(l + 1, {p.q0 - 1, p.q1 + 1, p.j0 - 1, p.j1 + 1, p.k0 - 1, p.k1 + 1});
+    const RowBox& t = boxes(l + 1).tellers;
+    boxes(l + 1).first_teller = std::max(p.q0 * kOctet - 1, 0);
+    boxes(l + 1).last_teller = p.q1 * kOctet + kOctet;
+    boxes(l).told =
+        clipped(l, {2 * p.q0 - 2, 2 * p.q1 + 3, 2 * t.j0 - 1, 2 * t.j1 + 2, 2 * t.k0 - 1, 2 * t.k1 + 2});
   }
+}
+
+// Rows of one colour, so that no two that are beside one another are of the same.
+void Relaxation::smooth_box(int level, int colour, Displacement& state, const ObstacleView& obstacles,
+                            Look look) noexcept {
+  for_rows(level, boxes(level).smoothed, [&](RowId row, OctetSpan span, int j, int k) {
+    if (((j + k + colour) & 1) != 0) return;
+    if (look == Look::active && !multigrid_.has(level, row, Multigrid::active)) return;
+    multigrid_.smooth(level, row, state, obstacles, span);
+  });
+}
+
+// Tells the rows of a level what the next coarser one knows, within the boxes: cells that have so much to
+// tell, in the box and beside it. Those beside it go along: nobody brings what they hold to rest, but the box
+// would feel it if they stayed behind.
+void Relaxation::tell_box(int level, Displacement& state, const ObstacleView& obstacles, double inside_m,
+                          double beside_m) noexcept {
+  const LevelBoxes& b = boxes(level + 1);
+  const float whisper = multigrid_.passed_on_m();
+  const float inside = std::max(static_cast<float>(inside_m), whisper),
+              beside = std::max(static_cast<float>(beside_m), whisper);
+  for_rows(level + 1, b.tellers, [&](RowId row, OctetSpan span, int j, int k) {
+    if (!multigrid_.has(level + 1, row, Multigrid::changed)) return;
+    if (multigrid_.untold(level + 1, row, span) > (b.parents.has(j, k) ? inside : beside))
+      multigrid_.mark(level + 1, row, Multigrid::telling);
+  });
+  for_rows(level, boxes(level).told, [&](RowId row, OctetSpan span, int, int) {
+    multigrid_.prolong(level, row, state, obstacles, span, b.first_teller, b.last_teller);
+  });
+  for_rows(level + 1, b.tellers, [&](RowId row, OctetSpan, int, int) {
+    if (!multigrid_.has(level + 1, row, Multigrid::telling)) return;
+    multigrid_.end_telling(level + 1, row, b.first_teller, b.last_teller);
+    multigrid_.unmark(level + 1, row, Multigrid::telling);
+  });
+}
+
+void Relaxation::cycle(Displacement& state, const ObstacleView& obstacles, Look look,
+                       double least_m) noexcept {
+  const int last = multigrid_.levels() - 1;
+  // What coarse levels know and finer ones do not is told first: a step between voxels that were told and
+  // others that were not would look like a force to the cells above it.
+  for (int l = last - 1; l >= 0; --l) tell_box(l, state, obstacles, least_m, least_m);
   for (int l = 0; l < last; ++l) {
-    const RowBox& parents = parent_box_[static_cast<std::size_t>(l) + 1];
-    for (const int colour : {0, 1}) smooth_box(l, colour, state, obstacles);
-    for_rows(l + 1, parents, [&](RowId row) { multigrid_.restrict_values(l + 1, row, state); });
-    for_rows(l + 1, parents, [&](RowId row) { multigrid_.restrict_loads(l + 1, row, state, obstacles); });
+    for (const int colour : {0, 1}) smooth_box(l, colour, state, obstacles, look);
+    // Before forces are summed, so that what is called the residual is that of links that yield.
+    if (l == 0 && lattice_.yields()) {
+      for_rows(0, boxes(0).smoothed, [&](RowId row, OctetSpan, int, int) {
+        if (look == Look::all || multigrid_.has(0, row, Multigrid::active | Multigrid::dirty))
+          unkept_ = multigrid_.yield(row, state, false) || unkept_;
+      });
+    }
+    const RowBox& parents = boxes(l + 1).parents;
+    const Grid& g = multigrid_.grid(l + 1);
+    for_rows(l + 1, parents, [&](RowId row, OctetSpan span, int, int) {
+      if (look == Look::active) {
+        if (!restrict_due(l + 1, row)) return;
+        // The load holds a row where it is beside its neighbours where they are.
+        for (const RowId r :
+             {row, row - 1, row + 1, row - g.row_z, row + g.row_z, row - g.row_x, row + g.row_x})
+          multigrid_.mark(l + 1, r, Multigrid::renewed);
+      }
+      multigrid_.restrict_values(l + 1, row, state, span);
+    });
+    for_rows(l + 1, parents, [&](RowId row, OctetSpan span, int, int) {
+      if (look == Look::active) {
+        if (!multigrid_.has(l + 1, row, Multigrid::renewed)) return;
+        multigrid_.unmark(l + 1, row, Multigrid::renewed);
+      }
+      const float worst = multigrid_.restrict_loads(l + 1, row, state, obstacles, span);
+      if (l == 0) running_residual_N_ = std::max(running_residual_N_, static_cast<double>(worst));
+    });
   }
-  for (int n = 0; n < 2 * kCoarsestSweeps; ++n) smooth_box(last, n & 1, state, obstacles);
+  for (int n = 0; n < 2 * kCoarsestSweeps; ++n) smooth_box(last, n & 1, state, obstacles, look);
   for (int l = last - 1; l >= 0; --l) {
-    tell_box(l, state, obstacles);
-    for (const int colour : {1, 0}) smooth_box(l, colour, state, obstacles);
+    tell_box(l, state, obstacles, 0.0, least_m);
+    for (const int colour : {1, 0}) smooth_box(l, colour, state, obstacles, look);
   }
 }
 
 std::size_t Relaxation::memory_bytes() const {
-  return multigrid_.memory_bytes() + steps_.size() * sizeof(Step) + 4 * smooth_box_.size() * sizeof(RowBox);
+  return multigrid_.memory_bytes() + clusters_.memory_bytes() + boxes_.capacity() * sizeof(LevelBoxes);
 }
 
 }  // namespace voxel::sparse

@@ -2,10 +2,14 @@
 // Relaxation of the six-link energy towards its equilibrium, under chain limits, anchors and obstacles.
 //
 // Per axis the energy is ½ Σ k (u(b) − u(a))² over the links: an anisotropic Laplace problem, solved by
-// multigrid cycles (see multigrid.h) in two ways. Round the contact, whole cycles at once over boxes of the
-// same number of cells on each level: a tick's work, the same for any size of object. And everywhere, a few
-// planes at a time, as many voxel updates as the budget says: counted work, never measured time. Rows that
-// are at rest, in a neighbourhood at rest, are not visited.
+// multigrid cycles (see multigrid.h). A cycle works on a box of voxels and, on each coarser level, on a box
+// of cells round it: about the same work for any size of object, and whole in itself, so that cycles in
+// different places, one after the other, never find one another half done. (A cycle over the whole object,
+// cut into pieces of a tick's work, was rejected: with cycles round the contact in between, what it had set
+// aside to be told was found a second time and told twice, and a contact in a large object sank.)
+//
+// Round the contact there is a cycle in every tick. Everywhere else one tile after the other that was
+// stirred, as many voxel updates as the budget says: counted work, never measured time.
 #pragma once
 
 #include <array>
@@ -13,6 +17,7 @@
 #include <span>
 #include <vector>
 
+#include "voxel/sparse/cluster_moves.h"
 #include "voxel/sparse/displacement.h"
 #include "voxel/sparse/lattice.h"
 #include "voxel/sparse/links.h"
@@ -27,11 +32,11 @@ class Relaxation {
  public:
   explicit Relaxation(const Lattice& lattice);
 
-  // Spends `budget` voxel updates (a little more: planes are not cut), unless the object is at rest. Returns
-  // what it spent.
+  // Spends `budget` voxel updates, on average over many calls (a cycle is not cut), unless the object is at
+  // rest. Returns what it spent.
   std::uint64_t run(Displacement& state, const ObstacleView& obstacles, std::span<const VoxelId> held,
                     std::uint64_t budget) noexcept;
-  // One whole cycle everywhere, or what is left of the one begun. For references, not for the tick.
+  // One cycle over the whole object. For references, not for the tick.
   void run_cycle(Displacement& state, const ObstacleView& obstacles, std::span<const VoxelId> held) noexcept;
   // One cycle round the contact: the box of voxels from `low` to `high`, both included.
   void relax_contact(Displacement& state, const ObstacleView& obstacles, std::span<const VoxelId> held,
@@ -48,51 +53,64 @@ class Relaxation {
     cycles_without_gain_ = 0;
   }
   [[nodiscard]] bool asleep() const { return asleep_; }
-  // Largest force that any free voxel still feels, as the last whole cycle found it (unit: newton); below the
-  // tolerance it is only known to be that.
+  // Largest force that any free voxel still feels, as the last cycle over all that moves found it (unit:
+  // newton); below the tolerance it is only known to be that.
   [[nodiscard]] double residual_N() const { return residual_N_; }
   // Cycles stop when the residual falls below this (unit: newton), or has not fallen for a while: what chain
   // limits hold has a residual that no relaxation removes. Default: kRestingResidual of the lattice's force
   // scale.
   void set_tolerance(double tolerance_N) noexcept;
+  // Cycles over all that moves.
   [[nodiscard]] std::uint64_t cycles() const { return cycles_; }
   // Starts in the same state as `other`, of the same lattice.
   void copy_from(const Relaxation& other) noexcept;
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
-  enum class Stage : std::uint8_t { smooth, values, loads, telling, prolong };
-  struct Step {
-    Stage stage;
-    std::uint8_t level;
-    std::uint8_t colour;
-  };
-  // Rows of columns c0 … c1, and so on, all included.
+  // Octets q0 … q1 along x, counted from the first voxel on, and rows j0 … j1 and k0 … k1, all included.
   struct RowBox {
-    int c0, c1, j0, j1, k0, k1;
-  };
-  static constexpr std::uint8_t kRenewed = 16;  // a flag of our own: values are new, loads are not yet
+    int q0 = 0, q1 = -1, j0 = 0, j1 = -1, k0 = 0, k1 = -1;
 
-  void begin_cycle(std::span<const VoxelId> held) noexcept;
-  void end_cycle() noexcept;
-  std::uint64_t do_plane(Displacement& state, const ObstacleView& obstacles, const Step& step,
-                         int plane) noexcept;
-  [[nodiscard]] int planes(const Step& step) const;
+    [[nodiscard]] bool has(int j, int k) const { return j >= j0 && j <= j1 && k >= k0 && k <= k1; }
+  };
+  // Of one cycle, on one level.
+  struct LevelBoxes {
+    RowBox smoothed;                         // what is brought to rest
+    RowBox parents;                          // cells that hold what is brought to rest on the level below
+    RowBox tellers;                          // these, and the cells beside them
+    int first_teller = 0, last_teller = -1;  // cells along x
+    RowBox told;                             // what the next level's tellers have something to tell
+  };
+  enum class Look : std::uint8_t { all, active };  // rows at rest are left alone
+
+  void lay_boxes(const std::array<int, 3>& low, const std::array<int, 3>& high, int margin) noexcept;
+  void cycle(Displacement& state, const ObstacleView& obstacles, Look look, double least_m) noexcept;
+  void end_round(Displacement& state, double residual_N) noexcept;
+  double move_clusters(Displacement& state) noexcept;
+  std::uint64_t relax_tile(Displacement& state, const ObstacleView& obstacles, std::size_t number) noexcept;
+  std::uint64_t keep_yielded(Displacement& state, std::uint64_t budget) noexcept;
+  [[nodiscard]] bool tile_waits_for_coarse(std::size_t number) const noexcept;
   [[nodiscard]] bool restrict_due(int level, RowId row) const noexcept;
-  [[nodiscard]] std::uint64_t cells_below(int level, RowId row) const noexcept;
   template <class Visit>
   void for_rows(int level, const RowBox& box, const Visit& visit) noexcept;
   [[nodiscard]] RowBox clipped(int level, const RowBox& box) const noexcept;
-  void smooth_box(int level, int colour, Displacement& state, const ObstacleView& obstacles) noexcept;
-  void tell_box(int level, Displacement& state, const ObstacleView& obstacles) noexcept;
+  void smooth_box(int level, int colour, Displacement& state, const ObstacleView& obstacles,
+                  Look look) noexcept;
+  void tell_box(int level, Displacement& state, const ObstacleView& obstacles, double inside_m,
+                double beside_m) noexcept;
+  [[nodiscard]] LevelBoxes& boxes(int level) { return boxes_[static_cast<std::size_t>(level)]; }
 
   const Lattice& lattice_;
   Multigrid multigrid_;
-  std::vector<Step> steps_;
-  std::vector<RowBox> smooth_box_, parent_box_, told_box_, teller_box_;  // [level] of the contact
-  std::size_t step_ = 0;
-  int plane_ = 0;
+  ClusterMoves clusters_;
+  std::vector<LevelBoxes> boxes_;
+  std::int64_t credit_ = 0;                 // voxel updates that may be spent; negative: were spent too many
+  std::size_t round_left_ = 0;              // tiles until this round ends
+  std::size_t cursor_ = 0, looked_at_ = 0;  // tiles looked at for what coarse levels have to tell them
+  RowId keep_row_ = 0;                      // where keeping goes on
   bool asleep_ = true;
+  bool unkept_ = false;   // some link is beyond what it keeps
+  bool keeping_ = false;  // it is kept now
   double residual_N_ = 0.0, running_residual_N_ = 0.0, tolerance_N_ = 0.0, least_residual_N_ = 0.0;
   float hold_ = 1.0F;
   int cycles_without_gain_ = 0;

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "voxel/sparse/links.h"
+#include "voxel/yield.h"
 
 namespace voxel::sparse {
 namespace {
@@ -29,6 +30,7 @@ SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice)
       chain_(*lattice_),
       relaxation_(*lattice_),
       pair_held_(lattice_->surface().size(), 0),
+      pair_load_(lattice_->surface().size()),
       carried_mark_(lattice_->size()),
       carried_index_(lattice_->size()) {
   const auto surface = lattice_->surface();
@@ -46,6 +48,7 @@ std::unique_ptr<SoftObject> SoftObject::copy() const {
   result->state_ = state_;
   result->obstacles_ = obstacles_;
   result->pair_held_ = pair_held_;
+  result->pair_load_.copy_from(pair_load_);
   for (const VoxelId v : held_voxels_) result->held_voxels_.push_back(v);
   for (const Touch& t : touches_) result->touches_.push_back(t);
   for (const VoxelId v : touched_voxels_) result->touched_voxels_.push_back(v);
@@ -225,6 +228,13 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
   set_touch_roles();
 }
 
+// Force of its links on a voxel, and of other soft objects (N).
+glm::dvec3 SoftObject::load_on(VoxelId v) noexcept {
+  const glm::dvec3 links = link_force(relaxation_.couplings(), state_, v);
+  if (state_.role[v] != Displacement::held) return links;
+  return links + pair_load(v);
+}
+
 // What hangs on a pressed voxel by a tight link and pulls it back is felt through it: the multiplier of the
 // chain's limit. Without it the force would saturate as soon as the chain is tight. Per axis, breadth first;
 // each voxel's load goes to the pressed voxel that it was first reached from.
@@ -254,7 +264,7 @@ void SoftObject::gather_load(int axis) noexcept {
         if (!pushed_up && !pushed_down) continue;
         touches_[c.touch].tight = true;
         if (carried_mark_[w] != 0) continue;
-        const double pull = link_force(relaxation_.couplings(), state_, w)[axis];
+        const double pull = load_on(w)[axis];
         if (!((pushed_up && pull < 0.0) || (pushed_down && pull > 0.0))) continue;
         touches_[c.touch].load[axis] += pull;
         add(w, c.touch);
@@ -301,7 +311,7 @@ Reaction SoftObject::reaction(const ToolInBody& tool) noexcept {
   for (Touch& t : touches_) {
     t.normal = gap(tool, position(t.v)).normal;
     t.tight = false;
-    t.load = t.pressed ? link_force(relaxation_.couplings(), state_, t.v) : glm::dvec3(0.0);
+    t.load = t.pressed ? load_on(t.v) : glm::dvec3(0.0);
   }
   for (int axis = 0; axis < 3; ++axis) {
     gather_load(axis);
@@ -392,6 +402,7 @@ void SoftObject::release(VoxelId v) noexcept {
   const std::uint32_t s = lattice_->surface_number(v);
   if (pair_held_[s] == 0) return;
   pair_held_[s] = 0;
+  pair_load_[s] = glm::vec3(0.0F);
   const auto found = std::find(held_voxels_.begin(), held_voxels_.end(), v);
   *found = held_voxels_.back();
   held_voxels_.pop_back();
@@ -399,6 +410,18 @@ void SoftObject::release(VoxelId v) noexcept {
   relaxation_.wake();
   state_.set_role(v, resting_role(v));
   set_touch_roles();
+}
+
+void SoftObject::clear_pair_load(VoxelId v) noexcept {
+  pair_load_[lattice_->surface_number(v)] = glm::vec3(0.0F);
+}
+
+void SoftObject::add_pair_load(VoxelId v, const glm::dvec3& force_N) noexcept {
+  pair_load_[lattice_->surface_number(v)] += glm::vec3(force_N);
+}
+
+glm::dvec3 SoftObject::pair_load(VoxelId v) const noexcept {
+  return glm::dvec3(pair_load_[lattice_->surface_number(v)]);
 }
 
 glm::dvec3 SoftObject::free_displacement(VoxelId v) noexcept {
@@ -456,7 +479,10 @@ double SoftObject::energy_J() const noexcept {
         for (int axis = 0; axis < 3; ++axis) {
           const auto& u = state_.u[static_cast<std::size_t>(axis)];
           const double stretch = static_cast<double>(u[w]) - static_cast<double>(u[v]);
-          energy += 0.5 * static_cast<double>(spring.on(axis, d)) * stretch * stretch;
+          energy += link_energy_J(static_cast<double>(spring.on(axis, d)), stretch,
+                                  static_cast<double>(state_.rest.offset_of(v, static_cast<std::size_t>(d),
+                                                                            static_cast<std::size_t>(axis))),
+                                  static_cast<double>(lattice_->yield_m(v, d)));
         }
       }
     }
@@ -484,8 +510,9 @@ bool SoftObject::settle(const ToolInBody& tool, double tolerance_N, int max_cycl
 
 std::size_t SoftObject::memory_bytes() const {
   std::size_t state = state_.role.resident_bytes() + state_.row_held.resident_bytes() +
-                      state_.row_obstacles.resident_bytes() + carried_mark_.resident_bytes() +
-                      carried_index_.resident_bytes();
+                      state_.row_obstacles.resident_bytes() + state_.rest.memory_bytes() +
+                      carried_mark_.resident_bytes() + carried_index_.resident_bytes() +
+                      pair_load_.resident_bytes();
   for (const auto& axis : state_.u) state += axis.resident_bytes();
   return lattice_->memory_bytes() + state + chain_.memory_bytes() + relaxation_.memory_bytes() +
          obstacles_.size() * sizeof(Obstacle) + pair_held_.size();

@@ -88,6 +88,11 @@ class SoftObject {
   // A voxel pressed by another soft object: moved by the caller, held meanwhile. See pair_contact.h.
   void hold(VoxelId v) noexcept;
   void release(VoxelId v) noexcept;
+  // What other objects press it with (body frame, N): a tool under which the chain is tight down to it feels
+  // that.
+  void clear_pair_load(VoxelId v) noexcept;
+  void add_pair_load(VoxelId v, const glm::dvec3& force_N) noexcept;
+  [[nodiscard]] glm::dvec3 pair_load(VoxelId v) const noexcept;
   // For the pair solver. Where its links alone would have a voxel, and how far a force of 1 N on it alone
   // would move it (m/N): both 0 where it is anchored.
   [[nodiscard]] glm::dvec3 free_displacement(VoxelId v) noexcept;
@@ -112,7 +117,7 @@ class SoftObject {
   // near.
   [[nodiscard]] glm::dvec3 displacement_at(const glm::dvec3& rest_point) const noexcept;
 
-  // Elastic energy (J); for tests and reports.
+  // What the springs store, and what yielding spent since the last state of rest (J); for tests and reports.
   [[nodiscard]] double energy_J() const noexcept;
   // Relaxes with the tool still until the residual is below `tolerance_N` or `max_cycles` passed; true when
   // it is. For references, not for the tick.
@@ -144,6 +149,7 @@ class SoftObject {
   void list_held() noexcept;
   void relax_touch(const ToolInBody& tool, Touch& touch) noexcept;
   void add_stiffness(int axis, glm::dmat3& stiffness) noexcept;
+  [[nodiscard]] glm::dvec3 load_on(VoxelId v) noexcept;
   void gather_load(int axis) noexcept;
   void let_go_of_carried() noexcept;
   [[nodiscard]] ObstacleView obstacle_view() const { return {obstacles_, lattice_.get()}; }
@@ -153,6 +159,7 @@ class SoftObject {
   ChainMail chain_;
   Relaxation relaxation_;
   std::vector<std::uint8_t> pair_held_;  // [surface number] 1 while another soft object presses it
+  LazyArray<glm::vec3> pair_load_;       // [surface number] and with what force (N)
   std::vector<Obstacle> obstacles_;      // [surface number], empty when there is none
   std::vector<Touch> touches_;
   std::vector<VoxelId> touched_voxels_;

@@ -1,197 +1,25 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // ChainMail against its definition: per axis the new state is clamp(u, L, U), with L and U from shortest
-// paths in the graph of the limits (voxel/chainmail.h). The reference finds those paths by Bellman and Ford,
-// in double.
+// paths in the graph of the limits (voxel/chainmail.h).
 #include "voxel/sparse/chainmail.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <cstdlib>
 #include <glm/geometric.hpp>
 #include <iostream>
-#include <limits>
-#include <unordered_set>
-#include <utility>
+#include <vector>
 
+#include "tests/voxel/sparse/chain_reference.h"
 #include "tests/voxel/sparse/lattice_scenes.h"
-#include "voxel/sparse/links.h"
+#include "voxel/sparse/validate.h"
 
 namespace {
 
-using tests::block;
-using tests::Random;
-using tests::random_scene;
-using tests::RandomScene;
-using tests::voxel_at;
-using tests::voxel_of;
-using voxel::sparse::ChainMail;
-using voxel::sparse::Displacement;
-using voxel::sparse::Lattice;
+using namespace tests;
 using voxel::sparse::LatticeOptions;
-using voxel::sparse::Obstacle;
 using voxel::sparse::RowId;
-using voxel::sparse::VoxelId;
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kHalfUlp = 6e-8;  // 2^-24: one rounding of a float, relative
-
-struct Source {
-  VoxelId v;
-  glm::vec3 place;  // displacement it is moved to
-};
-
-// Of the sources placed so far, per axis: the interval each voxel is left by them.
-struct Interval {
-  std::vector<double> low, high;
-};
-
-struct Arc {
-  VoxelId from, to;
-  double low, high;  // of u(to) − u(from)
-};
-
-std::vector<Arc> arcs_of(const Lattice& lattice, int axis) {
-  std::vector<Arc> arcs;
-  for (std::size_t i = 0; i < lattice.size(); ++i) {
-    const auto a = static_cast<VoxelId>(i);
-    if (!lattice.filled(a)) continue;
-    for (int d = 0; d < 3; ++d) {
-      const VoxelId b = lattice.up(a, d);
-      if (!lattice.filled(b)) continue;
-      const auto bounds = lattice.bounds(a, d, axis);
-      arcs.push_back({a, b, static_cast<double>(bounds[0]), static_cast<double>(bounds[1])});
-    }
-  }
-  return arcs;
-}
-
-// Shrinks the interval by the paths from one source at displacement u: Bellman and Ford until nothing
-// changes.
-void constrain(const Lattice& lattice, int axis, VoxelId source, double u, Interval& interval) {
-  auto& [low, high] = interval;
-  low[source] = std::max(low[source], u);
-  high[source] = std::min(high[source], u);
-  const std::vector<Arc> arcs = arcs_of(lattice, axis);
-  for (bool changed = true; changed;) {
-    changed = false;
-    const auto tighten = [&](double& value, double wanted, bool up) {
-      if (up ? wanted <= value : wanted >= value) return;
-      value = wanted;
-      changed = true;
-    };
-    for (const Arc& arc : arcs) {
-      tighten(low[arc.to], low[arc.from] + arc.low, true);
-      tighten(low[arc.from], low[arc.to] - arc.high, true);
-      tighten(high[arc.to], high[arc.from] + arc.high, false);
-      tighten(high[arc.from], high[arc.to] - arc.low, false);
-    }
-  }
-}
-
-// More scenes than in an everyday run: HYBRID_CHAIN_SCENES of each kind.
-int scenes(int everyday) {
-  const char* const wanted = std::getenv("HYBRID_CHAIN_SCENES");  // NOLINT(concurrency-mt-unsafe)
-  return wanted != nullptr ? std::atoi(wanted) : everyday;
-}
-
-using Intervals = std::array<Interval, 3>;
-
-Intervals held_by_anchors(const Lattice& lattice) {
-  Intervals result;
-  for (int axis = 0; axis < 3; ++axis) {
-    auto& interval = result[static_cast<std::size_t>(axis)];
-    interval.low.assign(lattice.size(), -kInfinity);
-    interval.high.assign(lattice.size(), kInfinity);
-    for (std::size_t v = 0; v < lattice.size(); ++v) {
-      if (lattice.anchored(static_cast<VoxelId>(v)))
-        constrain(lattice, axis, static_cast<VoxelId>(v), 0.0, interval);
-    }
-  }
-  return result;
-}
-
-// Up to `count` sources, each placed anywhere that anchors and those before it leave it, so that all are
-// mutually feasible. `extreme`: at the very ends of that interval.
-std::vector<Source> feasible_sources(const RandomScene& scene, const Lattice& lattice, Random& random,
-                                     int count, bool extreme, Intervals& intervals) {
-  std::vector<Source> sources;
-  const double reach = 8.0 * lattice.max_spacing_m();
-  for (int n = 0; n < count; ++n) {
-    const VoxelId v =
-        voxel_of(lattice, scene.volume,
-                 scene.filled[static_cast<std::size_t>(random.below(static_cast<int>(scene.filled.size())))]);
-    const bool again = std::any_of(sources.begin(), sources.end(), [v](const Source& s) { return s.v == v; });
-    if (lattice.anchored(v) || again) continue;
-    Source s{v, {}};
-    for (int axis = 0; axis < 3; ++axis) {
-      auto& interval = intervals[static_cast<std::size_t>(axis)];
-      const double low = std::max(interval.low[v], -reach), high = std::min(interval.high[v], reach);
-      const double part = extreme ? random.below(2) : random.unit();
-      auto u = static_cast<float>(low + (high - low) * part);
-      // What rounding to a float put outside is not feasible.
-      if (static_cast<double>(u) > high) u = std::nextafter(u, -1e30F);
-      if (static_cast<double>(u) < low) u = std::nextafter(u, 1e30F);
-      s.place[axis] = u;
-      constrain(lattice, axis, v, static_cast<double>(u), interval);
-    }
-    sources.push_back(s);
-  }
-  return sources;
-}
-
-// Values that differ in any bit.
-std::size_t differing_bits(const Lattice& lattice, const Displacement& a, const Displacement& b) {
-  std::size_t count = 0;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    for (std::size_t v = 0; v < lattice.size(); ++v) {
-      if (std::bit_cast<std::uint32_t>(a.u[axis][v]) != std::bit_cast<std::uint32_t>(b.u[axis][v])) ++count;
-    }
-  }
-  return count;
-}
-
-std::size_t moved_voxels(const Lattice& lattice, const Displacement& state) {
-  std::size_t count = 0;
-  for (std::size_t v = 0; v < lattice.size(); ++v) {
-    if (state.at(static_cast<VoxelId>(v)) != glm::dvec3(0.0)) ++count;
-  }
-  return count;
-}
-
-double largest(const Displacement& state) {
-  float most = 0.0F;
-  for (const auto& axis : state.u) {
-    for (const float u : axis) most = std::max(most, std::fabs(u));
-  }
-  return static_cast<double>(most);
-}
-
-// Moves the sources and settles the chain, as a contact does.
-void pull(const Lattice& lattice, ChainMail& chain, Displacement& state, const std::vector<Source>& sources,
-          std::span<const Obstacle> obstacles = {}) {
-  std::vector<VoxelId> voxels;
-  std::vector<glm::vec3> moves;
-  for (const Source& s : sources) {
-    const glm::vec3 before(state.at(s.v));
-    state.set(s.v, glm::dvec3(s.place));
-    voxels.push_back(s.v);
-    moves.push_back(s.place - before);
-  }
-  chain.settle(state, voxels, moves, obstacles);
-  for (std::size_t v = 0; v < lattice.size(); ++v) {
-    if (!lattice.anchored(static_cast<VoxelId>(v))) continue;
-    EXPECT_EQ(state.at(static_cast<VoxelId>(v)), glm::dvec3(0.0)) << "an anchor moved";
-  }
-}
-
-// Rounding that a chain of additions along any path may gather.
-double rounding(const RandomScene& scene, const Displacement& state) {
-  const auto& dims = scene.volume.dims;
-  return kHalfUlp * largest(state) * 2 * (dims[0] + dims[1] + dims[2]);
-}
 
 TEST(ChainMail, IsTheClampOfItsDefinition) {
   Random random(11);
@@ -235,6 +63,9 @@ TEST(ChainMail, IsTheClampOfItsDefinition) {
       pull(lattice, chain, again, sources);
       ASSERT_EQ(differing_bits(lattice, again, state), 0U) << "scene " << n << ", round " << round;
     }
+    EXPECT_EQ(voxel::sparse::validate(lattice), "") << "scene " << n;
+    const double path = 2.0 * (scene.volume.dims[0] + scene.volume.dims[1] + scene.volume.dims[2]);
+    EXPECT_EQ(voxel::sparse::validate(lattice, state, path), "") << "scene " << n;
   }
   std::cout << settles << " settles of " << sources_in_all << " sources that moved " << moved
             << " voxels; largest error " << worst << ", largest violation " << worst_link
@@ -420,210 +251,6 @@ TEST(ChainMail, ADeepPushMovesAnOctahedron) {
   pull(lattice, chain, state,
        {{voxel_at(lattice, 15, 15, 15), glm::vec3(static_cast<float>(0.5 * h * 4.5))}});
   EXPECT_EQ(moved_voxels(lattice, state), 129U);
-}
-
-// Blocks and balls of one material, larger than a row, pushed at their surface: cones in closed form, cut by
-// faces, by anchors, and where the body is no box.
-TEST(ChainMail, ConesAreTheClampToo) {
-  Random random(15);
-  double worst = 0.0;
-  for (int n = 0; n < scenes(15); ++n) {
-    RandomScene scene;
-    scene.volume = block({20 + random.below(60), 5 + random.below(12), 5 + random.below(12)},
-                         {random.between(0.5e-3, 2e-3), random.between(0.5e-3, 2e-3), 1e-3});
-    auto& volume = scene.volume;
-    if (n % 3 == 0) {  // a lens, or a slit in a block
-      for (int k = 0; k < volume.dims[2]; ++k) {
-        for (int j = 0; j < volume.dims[1]; ++j) {
-          for (int i = 0; i < volume.dims[0]; ++i) {
-            const glm::dvec3 to(2.0 * i / (volume.dims[0] - 1) - 1.0, 2.0 * j / (volume.dims[1] - 1) - 1.0,
-                                1.0 * k / (volume.dims[2] - 1));
-            if (glm::length(to) > 1.0) volume.labels[volume.index(i, j, k)] = 0;
-          }
-        }
-      }
-    } else if (n % 3 == 1) {
-      const int i = 1 + random.below(volume.dims[0] - 2), until = random.below(volume.dims[1]);
-      for (int k = 0; k < volume.dims[2]; ++k) {
-        for (int j = 0; j < until; ++j) volume.labels[volume.index(i, j, k)] = 0;
-      }
-    }
-    for (std::size_t v = 0; v < volume.labels.size(); ++v) {
-      if (volume.labels[v] != 0) scene.filled.push_back(v);
-    }
-    scene.options = tests::made_of({.stretch_min = random.between(0.5, 0.9),
-                                    .stretch_max = random.between(1.1, 1.8),
-                                    .shear = random.between(0.1, 0.5)});
-    const Lattice lattice(volume, scene.options);
-    ChainMail chain(lattice);
-    Displacement state(lattice);
-    for (int round = 0; round < 4; ++round) {
-      const Displacement before = state;
-      Intervals allowed;
-      for (auto& interval : allowed) {
-        interval.low.assign(lattice.size(), -kInfinity);
-        interval.high.assign(lattice.size(), kInfinity);
-      }
-      // All anchors at once: they are as many as the lower face has voxels.
-      for (int axis = 0; axis < 3; ++axis) {
-        auto& interval = allowed[static_cast<std::size_t>(axis)];
-        VoxelId any = 0;
-        for (std::size_t v = 0; v < lattice.size(); ++v) {
-          if (!lattice.anchored(static_cast<VoxelId>(v))) continue;
-          any = static_cast<VoxelId>(v);
-          interval.low[v] = interval.high[v] = 0.0;
-        }
-        constrain(lattice, axis, any, 0.0, interval);
-      }
-      auto sources = feasible_sources(scene, lattice, random, 1 + random.below(3), false, allowed);
-      pull(lattice, chain, state, sources);
-      const double tolerance = std::max(rounding(scene, state), rounding(scene, before));
-      const double most = std::max(largest(state), 1e-30);
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const auto& [low, high] = allowed[axis];
-        for (std::size_t v = 0; v < lattice.size(); ++v) {
-          if (!lattice.filled(static_cast<VoxelId>(v))) continue;
-          const double expected = std::min(std::max(static_cast<double>(before.u[axis][v]), low[v]), high[v]);
-          const double error = std::fabs(static_cast<double>(state.u[axis][v]) - expected);
-          ASSERT_LE(error, tolerance) << "scene " << n << ", round " << round << ", axis " << axis;
-          worst = std::max(worst, error / most);
-        }
-      }
-      Displacement again = before;
-      std::reverse(sources.begin(), sources.end());
-      pull(lattice, chain, again, sources);
-      ASSERT_EQ(differing_bits(lattice, again, state), 0U) << "scene " << n << ", round " << round;
-    }
-  }
-  std::cout << "largest error " << worst << " of the largest displacement\n";
-}
-
-TEST(ChainMail, RoundingDoesNotAddUpOverASession) {
-  // Thousands of small strokes, forth and back, over tissue of one and of three materials.
-  for (const int materials : {1, 3}) {
-    Random random(16);
-    auto volume = block({40, 12, 12}, glm::dvec3(1e-3));
-    for (auto& label : volume.labels) label = static_cast<std::uint8_t>(1 + random.below(materials));
-    LatticeOptions options = tests::made_of({.stretch_min = 0.9, .stretch_max = 1.1, .shear = 0.1});
-    options.materials[2] = {.stretch_min = 0.85, .stretch_max = 1.13, .shear = 0.17};
-    options.materials[3] = {.stretch_min = 0.8, .stretch_max = 1.2, .shear = 0.2};
-    const Lattice lattice(volume, options);
-    ChainMail chain(lattice);
-    Displacement state(lattice);
-    double early = 0.0, late = 0.0, most = 0.0;
-    const int strokes = 10 * scenes(400);
-    for (int n = 0; n < strokes; ++n) {
-      std::vector<Source> sources;
-      for (int s = 0; s < 1 + n % 6; ++s) {
-        const VoxelId v = voxel_at(lattice, random.below(40), random.below(12), 8 + random.below(4));
-        if (std::any_of(sources.begin(), sources.end(), [v](const Source& o) { return o.v == v; })) continue;
-        const glm::dvec3 by(random.between(-1e-3, 1e-3), random.between(-1e-3, 1e-3),
-                            random.between(-1e-3, 1e-3));
-        sources.push_back({v, glm::vec3(state.at(v) + by)});
-      }
-      pull(lattice, chain, state, sources);
-      if (n % 20 != 0) continue;
-      most = std::max(most, largest(state));
-      double& worst = n < strokes / 4 ? early : late;
-      worst = std::max(worst, voxel::sparse::worst_violation(lattice, state));
-    }
-    std::cout << materials << " materials: " << strokes << " strokes, largest violation " << early / most
-              << " of the largest displacement in the first quarter, " << late / most << " after\n";
-    EXPECT_LE(early, 8 * kHalfUlp * most);
-    EXPECT_LE(late, 8 * kHalfUlp * most);
-  }
-}
-
-// Links beyond their limits by more than `tolerance` none of whose ends lies in a row that waits.
-std::size_t unexplained(const std::array<std::vector<Arc>, 3>& arcs, const Displacement& state,
-                        const ChainMail& chain, double tolerance) {
-  const auto waiting = chain.waiting_rows();
-  const std::unordered_set<RowId> rows(waiting.begin(), waiting.end());
-  std::size_t count = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto& u = state.u[static_cast<std::size_t>(axis)];
-    for (const Arc& arc : arcs[static_cast<std::size_t>(axis)]) {
-      const double apart = static_cast<double>(u[arc.to]) - static_cast<double>(u[arc.from]);
-      if (apart >= arc.low - tolerance && apart <= arc.high + tolerance) continue;
-      count +=
-          rows.count(arc.from / voxel::sparse::kRow) + rows.count(arc.to / voxel::sparse::kRow) == 0 ? 1 : 0;
-    }
-  }
-  return count;
-}
-
-TEST(ChainMail, WhatIsBeyondABudgetWaitsAndIsFinished) {
-  Random random(17);
-  std::size_t partial = 0, calls = 0;
-  for (int n = 0; n < scenes(40); ++n) {
-    auto volume =
-        block({40 + random.below(30), 10 + random.below(20), 10 + random.below(20)}, glm::dvec3(1e-3));
-    const int materials = 1 + 2 * random.below(2);
-    for (auto& label : volume.labels) label = static_cast<std::uint8_t>(1 + random.below(materials));
-    LatticeOptions options = tests::made_of({.stretch_min = 0.9, .stretch_max = 1.1, .shear = 0.1});
-    options.materials[2] = {.stretch_min = 0.85, .stretch_max = 1.13, .shear = 0.17};
-    const Lattice lattice(volume, options);
-    const std::array arcs{arcs_of(lattice, 0), arcs_of(lattice, 1), arcs_of(lattice, 2)};
-    ChainMail chain(lattice), whole(lattice);
-    Displacement state(lattice), reference(lattice);
-    const int nx = volume.dims[0], ny = volume.dims[1], nz = volume.dims[2];
-    const double far = 0.1e-3 * (nz - 1);  // no anchor holds it back
-    double asked = 0.0;
-    for (int round = 0; round < 4; ++round) {
-      const VoxelId v = voxel_at(lattice, random.below(nx), random.below(ny), nz - 1);
-      glm::vec3 place(0.0F);
-      for (int a = 0; a < 3; ++a) place[a] = static_cast<float>(random.between(-far, far));
-      asked = std::max(asked, largest(state));
-      for (int a = 0; a < 3; ++a) asked = std::max(asked, std::fabs(static_cast<double>(place[a])));
-      const double tolerance = 16 * kHalfUlp * asked;
-      const auto move_to = [&](ChainMail& with, Displacement& of, std::uint64_t budget) {
-        const glm::vec3 move = place - glm::vec3(of.at(v));
-        of.set(v, glm::dvec3(place));
-        with.settle(of, {&v, 1}, {&move, 1}, {}, budget);
-      };
-      move_to(chain, state, 100);
-      ++calls;
-      partial += chain.waiting_rows().empty() ? 0 : 1;
-      ASSERT_EQ(unexplained(arcs, state, chain, tolerance), 0U) << "scene " << n << ", round " << round;
-      if (round == 0) {
-        // The contact is where it was put, and its own links hold, whatever else waits.
-        EXPECT_EQ(state.at(v), glm::dvec3(place));
-        for (int axis = 0; axis < 3; ++axis) {
-          const auto interval = voxel::sparse::link_interval(lattice, state, v, axis);
-          EXPECT_GE(place[axis], interval[0] - static_cast<float>(tolerance));
-          EXPECT_LE(place[axis], interval[1] + static_cast<float>(tolerance));
-        }
-        move_to(whole, reference, ChainMail::kUnlimited);
-        for (int more = 0; !chain.waiting_rows().empty(); ++more) {
-          ASSERT_LT(more, 10000);
-          chain.finish(state, {}, 50);
-          ASSERT_EQ(unexplained(arcs, state, chain, tolerance), 0U) << "scene " << n;
-        }
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-          for (std::size_t i = 0; i < lattice.size(); ++i) {
-            ASSERT_NEAR(state.u[axis][i], reference.u[axis][i], kHalfUlp * asked * 4 * (nx + ny + nz));
-          }
-        }
-        continue;
-      }
-      // Some of it, or nothing, before the next stroke meets what still waits.
-      for (int more = random.below(4); more > 0; --more) {
-        chain.finish(state, {}, 30);
-        ASSERT_EQ(unexplained(arcs, state, chain, tolerance), 0U) << "scene " << n << ", round " << round;
-      }
-    }
-    chain.finish(state, {});
-    EXPECT_TRUE(chain.waiting_rows().empty());
-    EXPECT_LE(voxel::sparse::worst_violation(lattice, state),
-              16 * kHalfUlp * std::max(asked, largest(state)));
-    for (std::size_t v = 0; v < lattice.size(); ++v) {
-      if (lattice.anchored(static_cast<VoxelId>(v))) {
-        ASSERT_EQ(state.at(static_cast<VoxelId>(v)), glm::dvec3(0.0));
-      }
-    }
-  }
-  std::cout << partial << " of " << calls << " calls left something waiting\n";
-  EXPECT_GT(partial, calls / 2);
 }
 
 }  // namespace

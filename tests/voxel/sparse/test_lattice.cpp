@@ -333,6 +333,8 @@ TEST(Lattice, RefusesInWords) {
       {with([](LinkMaterial& m) { m.stretch_max = 0.9; }), "greatest stretch"},
       {with([&](LinkMaterial& m) { m.stretch_max = nan; }), "greatest stretch"},
       {with([](LinkMaterial& m) { m.shear = -0.1; }), "shear"},
+      {with([](LinkMaterial& m) { m.yield = 0.0; }), "yield"},
+      {with([&](LinkMaterial& m) { m.yield = nan; }), "yield"},
       {with([&](LinkMaterial& m) { m.shear = nan; }), "shear"},
   };
   for (const Row& row : rows) {
