@@ -9,9 +9,12 @@
 #include "hybrid/bench_soft.h"
 #include "hybrid/commands.h"
 #include "hybrid/report.h"
+#include "hybrid/settling_plot.h"
 
 namespace hybrid {
 namespace {
+
+constexpr int kSettlingRounds = 60;  // of the plot
 
 std::vector<bench::Engine> engines_of(const std::vector<std::string>& names) {
   std::vector<bench::Engine> engines;
@@ -108,6 +111,10 @@ nlohmann::ordered_json soft_suite(const BenchCommand& command, std::FILE* words,
   if (const auto found = bench::growth_of(rows)) {
     fmt::print(words, "\n{}", bench::in_words(*found));
     growth = bench::to_json(*found);
+  }
+  if (!command.plot.empty()) {
+    save_settling_plot(command.plot, bench::measure_settling(kSettlingRounds));
+    fmt::print(words, "plot: {}\n", command.plot.string());
   }
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
   for (const bench::SoftRow& row : rows) json.push_back(bench::to_json(row));

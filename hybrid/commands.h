@@ -62,6 +62,7 @@ struct BenchCommand {
   std::vector<int> sizes;                          // of soft: voxels an edge; empty: its own choice
   std::optional<double> session_s;                 // of soft: simulated time of a session
   std::filesystem::path trace;                     // folder; empty: none
+  std::filesystem::path plot;                      // of soft: relaxation round by round; empty: none
   std::string json;
 };
 int run_bench(const BenchCommand& command);

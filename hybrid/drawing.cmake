@@ -20,6 +20,7 @@ add_library(hybrid_drawing STATIC
   ${CMAKE_CURRENT_LIST_DIR}/svg_figure.cpp
   ${CMAKE_CURRENT_LIST_DIR}/decimate.cpp
   ${CMAKE_CURRENT_LIST_DIR}/plot.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/settling_plot.cpp
   ${CMAKE_CURRENT_LIST_DIR}/stability_plot.cpp)
 add_library(hybrid::drawing ALIAS hybrid_drawing)
 hybrid_target(hybrid_drawing)

@@ -139,6 +139,7 @@ void add_bench(CLI::App& app, int& status) {
       ->delimiter(',')
       ->check(CLI::IsMember(hybrid::bench_engines()));
   sub->add_option("--trace", c->trace, "write every run as CSV into this folder");
+  sub->add_option("--plot", c->plot, "of soft: write relaxation round by round, classic's and ours, as SVG");
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
   sub->callback([c, &status] { status = hybrid::run_bench(*c); });
 }

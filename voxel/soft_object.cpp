@@ -373,6 +373,11 @@ std::uint64_t SoftObject::relax_background(std::uint64_t budget) noexcept {
   return relaxation_.run(state_, obstacle_view(), background_held_, budget);
 }
 
+void SoftObject::relax_cycle() noexcept {
+  const std::uint64_t cycles = relaxation_.cycles();
+  while (!relaxation_.asleep() && relaxation_.cycles() == cycles) relax_background(relaxation_.cycle_cost());
+}
+
 void SoftObject::set_obstacle(std::size_t surface_number, const Obstacle& obstacle) noexcept {
   const VoxelId v = lattice_->surface()[surface_number];
   obstacles_[surface_number] = obstacle;

@@ -76,6 +76,8 @@ class SoftObject {
   // bounds were written.
   std::size_t give_way(const ToolInBody& tool, std::span<ToolBound> out) const noexcept;
   std::uint64_t relax_background(std::uint64_t budget) noexcept;
+  // One whole cycle of it, however long that takes; nothing when at rest.
+  void relax_cycle() noexcept;
 
   // Before the first set_obstacle(); allocates.
   void reserve_obstacles();

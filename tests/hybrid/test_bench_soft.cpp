@@ -9,6 +9,7 @@
 #include <set>
 
 #include "hybrid/bench_soft_engines.h"
+#include "hybrid/bench_soft_settling.h"
 
 namespace {
 
@@ -88,6 +89,24 @@ TEST(BenchSoft, SessionsAndLoadsSayWhatTheyAre) {
     EXPECT_GT(*row.bytes_per_voxel, 0.5);
   }
   EXPECT_TRUE(rows[1].force_error_N && rows[1].force_error_jnd && rows[1].truncated_share);
+}
+
+// The thesis's figure 22: a corner that both of its links take along swings for ever, ours is at rest at
+// once.
+TEST(BenchSoft, ClassicOscillatesForEverAndOursSettles) {
+  const auto objects = hybrid::bench::measure_settling(60);
+  ASSERT_EQ(objects.size(), 2U);
+  for (const auto& object : objects) {
+    ASSERT_EQ(object.curves.size(), 3U);
+    for (const auto& curve : object.curves) {
+      ASSERT_EQ(curve.displacement.size(), 61U);
+      EXPECT_EQ(curve.displacement.front(), 1.0);
+    }
+    EXPECT_LE(std::fabs(object.curves.back().displacement[20]), 1e-3) << object.name;
+    EXPECT_LE(std::fabs(object.curves.back().displacement.back()), 1e-4) << object.name;
+  }
+  for (std::size_t n = 0; n <= 60; ++n)
+    EXPECT_EQ(objects[0].curves[0].displacement[n], n % 2 == 0 ? 1.0 : -1.0) << n;
 }
 
 TEST(BenchSoft, EveryKeyIsThereAndNullWhereARowHasNoSuchThing) {
