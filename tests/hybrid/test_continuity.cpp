@@ -56,7 +56,7 @@ TEST(ClosedPaths, GiveNoEnergy) {
 }
 
 // Slow strokes stay within a tenth of a JND of the equilibrium's own steps. Faster ones do not yet where they
-// turn round (voxel/README.md has the table), but no step is one that jumps.
+// turn round, but no step is one that jumps.
 TEST(Continuity, StepsAreThoseOfTheEquilibrium) {
   const StrokeCase slow{.radius_spacings = 2.0, .depth_spacings = 1.0, .speed_m_per_s = 0.01};
   const StrokeCase slide{

@@ -133,7 +133,7 @@ TEST(SoftExtremes, SlackOneWayOnly) {
 }
 
 // Nearer to nothing, and yet not nothing, such clusters take so many steps from limit to limit that they are
-// left where the tool left them: nothing is wrong with them but that (voxel/README.md, Limits).
+// left where the tool left them: nothing is wrong with them but that.
 TEST(SoftExtremes, HardlyAnySlackOneWayOnlyIsKeptWithinItsLimits) {
   for (const LinkMaterial& material : {of(0.4, 1.6, 0.0), of(0.4, 1.6, 1e-6), of(1.0 - 1e-6, 1.0 + 1e-6, 0.6),
                                        of(1.0 - 1e-4, 1.0 + 1e-4, 0.6)}) {
