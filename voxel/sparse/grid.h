@@ -11,8 +11,8 @@
 #include <cstddef>
 #include <cstdint>
 
-// The sparse store and its multigrid are not yet what SoftObject of voxel/ stands on: a contact's cycle is
-// too long for a tick of a millisecond. Names are those of voxel/, which they are to replace.
+// The sparse store and its multigrid are not yet what SoftObject of voxel/ stands on: where limits are tight
+// over many tiles its force does not come to rest. Names are those of voxel/, which they are to replace.
 namespace voxel::sparse {
 
 using namespace ::voxel;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <glm/geometric.hpp>
 #include <limits>
 #include <stdexcept>
 
@@ -328,6 +329,21 @@ std::uint32_t Lattice::surface_number(VoxelId v) const noexcept {
              last = surface_.begin() + static_cast<std::ptrdiff_t>(surface_before_[block + 1]);
   const auto found = std::lower_bound(first, last, v);
   return found != last && *found == v ? static_cast<std::uint32_t>(found - surface_.begin()) : kNoSurface;
+}
+
+glm::dvec3 Lattice::outward(VoxelId v) const noexcept {
+  const auto c = coordinates(v);
+  glm::dvec3 sum(0.0);
+  for (int k = -1; k <= 1; ++k) {
+    for (int j = -1; j <= 1; ++j) {
+      for (int i = -1; i <= 1; ++i) {
+        if (!filled(at(c[0] + i, c[1] + j, c[2] + k))) sum += glm::dvec3(i, j, k);
+      }
+    }
+  }
+  sum /= spacing_m_;
+  const double length = glm::length(sum);
+  return length > 0.0 ? sum / length : sum;
 }
 
 std::size_t Lattice::memory_bytes() const {

@@ -112,6 +112,9 @@ class Lattice {
   static constexpr std::uint32_t kNoSurface = 0xFFFFFFFFU;
   [[nodiscard]] std::span<const VoxelId> surface() const { return surface_; }
   [[nodiscard]] std::uint32_t surface_number(VoxelId v) const noexcept;
+  // Away from the object at a surface voxel at rest, by its 26 neighbours: unit, volume frame; 0 where these
+  // do not say, in a sheet one voxel thick.
+  [[nodiscard]] glm::dvec3 outward(VoxelId v) const noexcept;
 
   // Of the link v → up(v, d); nothing where an end is missing. It looks at up to eighteen labels: what a tick
   // asks for, it asks of Couplings.

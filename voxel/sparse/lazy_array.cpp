@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <cstring>
 
 namespace voxel::sparse {
@@ -32,6 +33,12 @@ void look(const void* at, std::size_t bytes, const Visit& visit) {
 }
 
 }  // namespace
+
+void populate(void* at, std::size_t bytes) noexcept {
+  const auto page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+  auto* bytes_at = static_cast<volatile std::uint8_t*>(at);
+  for (std::size_t n = 0; n < bytes; n += page) bytes_at[n] = bytes_at[n];
+}
 
 std::size_t resident_bytes(const void* at, std::size_t bytes) {
   std::size_t sum = 0;

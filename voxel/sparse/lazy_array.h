@@ -60,6 +60,9 @@ class LazyArray {
     return std::equal(a.begin(), a.end(), b.begin(), b.end());
   }
 
+  // Gives every page its memory now: what a first touch of each takes (about a microsecond) is then not taken
+  // from a tick.
+  void populate() noexcept;
   // Memory that the pages written so far take (unit: byte).
   [[nodiscard]] std::size_t resident_bytes() const;
   // Copies what `other`, of the same size, holds; pages that hold nothing stay untouched.
@@ -70,6 +73,7 @@ class LazyArray {
   std::size_t size_ = 0;
 };
 
+void populate(void* at, std::size_t bytes) noexcept;
 // How many bytes of `bytes` from `at` (a mapping) are in memory.
 [[nodiscard]] std::size_t resident_bytes(const void* at, std::size_t bytes);
 // Copies only pages of `from` that are in memory. Both are mappings of `bytes`.
@@ -78,6 +82,11 @@ void copy_resident(void* to, const void* from, std::size_t bytes) noexcept;
 template <class T>
 std::size_t LazyArray<T>::resident_bytes() const {
   return data_ == nullptr ? 0 : voxel::sparse::resident_bytes(data_, size_ * sizeof(T));
+}
+
+template <class T>
+void LazyArray<T>::populate() noexcept {
+  if (data_ != nullptr) voxel::sparse::populate(data_, size_ * sizeof(T));
 }
 
 template <class T>

@@ -53,16 +53,31 @@ Multigrid::Multigrid(const Lattice& lattice) : lattice_(lattice), tiles_(lattice
     // One coarse level at least: it is where residuals are measured.
     if (levels() > 1 && *std::max_element(g.dims.begin(), g.dims.end()) <= kSmallest) break;
   }
-  for (int l = kWrittenAtOnce; l < levels(); ++l) {
-    const Grid& g = grid(l);
-    for (int c = 1; c + 1 < g.columns; ++c) {
-      for (int k = 0; k < g.dims[2]; ++k) {
-        for (int j = 0; j < g.dims[1]; ++j) prepare(l, g.row(c, j, k));
-      }
-    }
-  }
+  for (int l = kWrittenAtOnce; l < levels(); ++l) prepare_level(l);
+  hats_ = Hats(lattice.grid());
   held_.reserve(kMaxHeld);
   stopped_.reserve(kMaxHeld);
+}
+
+void Multigrid::prepare_level(int level) noexcept {
+  const Grid& g = grid(level);
+  for (int c = 1; c + 1 < g.columns; ++c) {
+    for (int k = 0; k < g.dims[2]; ++k) {
+      for (int j = 0; j < g.dims[1]; ++j) prepare(level, g.row(c, j, k));
+    }
+  }
+}
+
+void Multigrid::prepare_all() noexcept {
+  for (int l = 0; l < levels(); ++l) {
+    prepare_level(l);
+    Level& level = at(l);
+    for (auto* arrays : {&level.value, &level.told, &level.load}) {
+      for (auto& array : *arrays) array.populate();
+    }
+    level.stopped.populate();
+    level.flags.populate();
+  }
 }
 
 // Marks a row and the rows beside it.
@@ -122,12 +137,16 @@ void Multigrid::stop_cells(VoxelId v, std::uint8_t bits) noexcept {
     const VoxelId cell = level.couplings->grid().at(c[0], c[1], c[2]);
     if ((level.stopped[cell] & bits) == bits || stopped_.size() == stopped_.capacity()) return;
     level.stopped[cell] |= bits;
+    mark(l, cell / kRow, limited);
     stopped_.push_back({static_cast<std::uint8_t>(l), cell});
   }
 }
 
 void Multigrid::release_limited() noexcept {
-  for (const HeldCell& s : stopped_) at(s.level).stopped[s.cell] = 0;
+  for (const HeldCell& s : stopped_) {
+    at(s.level).stopped[s.cell] = 0;
+    unmark(s.level, s.cell / kRow, limited);
+  }
   stopped_.clear();
 }
 

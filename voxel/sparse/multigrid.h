@@ -15,6 +15,7 @@
 
 #include "voxel/sparse/couplings.h"
 #include "voxel/sparse/displacement.h"
+#include "voxel/sparse/hats.h"
 #include "voxel/sparse/lattice.h"
 #include "voxel/sparse/links.h"
 #include "voxel/sparse/row_kernels.h"
@@ -39,6 +40,7 @@ class Multigrid {
     changed = 4,   // (coarse) it changed since what it holds was told
     renewed = 8,   // (coarse) its values were renewed, its load is to be
     telling = 16,  // (coarse) it tells what it holds, in the cycle that goes on
+    limited = 32,  // something in it is held by a limit
   };
   [[nodiscard]] bool has(int level, RowId row, std::uint8_t flag) const {
     return (at(level).flags[row] & flag) != 0;
@@ -92,16 +94,19 @@ class Multigrid {
   // voxel below (N); only for level 1 is it one of voxels. Of whole rows it also finds which are at rest.
   float restrict_loads(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
                        OctetSpan span = {}) noexcept;
-  // What a cell has yet to tell is told as a hat: all of it to the voxels nearest to its middle, less and
-  // less to those up to the middles of the cells beside it. Adds to a row of voxels the hats of those cells
-  // around it that tell: of coarse rows marked `telling`, those from first to last along x, as counted from
-  // the first of all.
-  void prolong(int level, RowId row, Displacement& state, const ObstacleView& obstacles, OctetSpan span,
-               int first, int last) noexcept;
-  // Those cells of a coarse row have told.
-  void end_telling(int level, RowId row, int first, int last) noexcept;
-  // The most that any cell of a coarse row has yet to tell (m).
-  [[nodiscard]] float untold(int level, RowId row, OctetSpan span = {}) const noexcept;
+  // Tells the rows of a box on a level what cells above them have yet to tell (see hats.h): those of coarse
+  // rows marked `telling`, from first to last along x. What links at their limits keep from following, the
+  // cells take back: a cell whose voxels stayed behind would pull at the cells beside it, a little more every
+  // time, until it was kilometers away.
+  struct Told {
+    int q0, q1, j0, j1, k0, k1;     // octets and rows of the level, all included; q0 even, q1 odd
+    int first_teller, last_teller;  // cells of the next coarser level along x
+  };
+  void tell(int level, const Told& box, Displacement& state, const ObstacleView& obstacles) noexcept;
+  // The most that any cell of a coarse row has yet to tell, of those in the octets that are also from first
+  // to last in the row (m).
+  [[nodiscard]] float untold(int level, RowId row, OctetSpan span = {}, int first = 0,
+                             int last = kRow - 1) const noexcept;
 
   // Rows whose voxels are pulled by less than `tolerance_N`, or whose cells would move less than `quiet_m`,
   // are left alone.
@@ -113,6 +118,8 @@ class Multigrid {
     quiet_m_ = quiet_m;
   }
   void copy_from(const Multigrid& other) noexcept;
+  // Finds all springs and takes all memory now, not when a tick first needs them.
+  void prepare_all() noexcept;
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
@@ -134,6 +141,7 @@ class Multigrid {
 
   [[nodiscard]] Level& at(int level) { return levels_[static_cast<std::size_t>(level)]; }
   [[nodiscard]] const Level& at(int level) const { return levels_[static_cast<std::size_t>(level)]; }
+  void prepare_level(int level) noexcept;
   void spread(int level, RowId row, std::uint8_t flags) noexcept;
   void note_change(int level, RowId row, float change) noexcept;
   void stop_cells(VoxelId v, std::uint8_t bits) noexcept;
@@ -142,13 +150,17 @@ class Multigrid {
   [[nodiscard]] std::array<float*, 3> loads(int level, RowId row) noexcept;
   RowResidual residual_of(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
                           OctetSpan span, RowVector& out) noexcept;
-  float correct(int level, RowId row, const RowVector& correction, Displacement& state,
-                OctetSpan span) noexcept;
+  void spread_hats(int level, int j, int k, const Told& box) noexcept;
+  void tell_row(int level, RowId row, const std::array<HatRow, 4>& hats, Displacement& state,
+                const ObstacleView& obstacles, OctetSpan span, int first, int last) noexcept;
+  void take_back_refused(int level, RowId row, const RowVector& refused, unsigned axes,
+                         OctetSpan span) noexcept;
   void clear_obstacles(RowId row, Displacement& state, const ObstacleView& obstacles) noexcept;
 
   const Lattice& lattice_;
   TileQueue tiles_;
   std::vector<Level> levels_;
+  Hats hats_;
   std::vector<HeldCell> held_, stopped_;
   std::array<AxisLimits, 3> yield_limits_;
   float tolerance_N_ = 0.0F, quiet_m_ = 0.0F, hold_ = 1.0F;

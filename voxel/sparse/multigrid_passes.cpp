@@ -35,7 +35,7 @@ LevelRow Multigrid::row_of(int level, RowId row, Displacement& state) noexcept {
   }
   if (l.row_held[row] != 0) r.hold = l.hold.data() + begin;
   r.hold_times = hold_;
-  if (!stopped_.empty()) r.stopped = l.stopped.data() + begin;
+  if (has(level, row, limited)) r.stopped = l.stopped.data() + begin;
   return r;
 }
 
@@ -186,82 +186,143 @@ std::array<float*, 3> Multigrid::loads(int level, RowId row) noexcept {
   return {l.load[0].data() + begin, l.load[1].data() + begin, l.load[2].data() + begin};
 }
 
-float Multigrid::untold(int level, RowId row, OctetSpan span) const noexcept {
+float Multigrid::untold(int level, RowId row, OctetSpan span, int first, int last) const noexcept {
   const Level& l = at(level);
   const std::size_t begin = static_cast<std::size_t>(row) * kRow;
   float most = 0.0F;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    most = std::max(most, row_difference(l.value[axis].data() + begin, l.told[axis].data() + begin, span));
+    most = std::max(
+        most, row_difference(l.value[axis].data() + begin, l.told[axis].data() + begin, span, first, last));
   }
   return most;
 }
 
-void Multigrid::end_telling(int level, RowId row, int first, int last) noexcept {
+// Reads what the cells of one row, all along x, have to tell, and with that they have told it.
+void Multigrid::spread_hats(int level, int j, int k, const Told& box) noexcept {
   Level& l = at(level);
-  const int origin = (grid(level).row_coordinates(row)[0] - 1) * kRow;
-  const int from = std::max(first - origin, 0), to = std::min(last - origin, kRow - 1);
-  const std::size_t begin = static_cast<std::size_t>(row) * kRow;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    for (int i = from; i <= to; ++i)
-      l.told[axis][begin + static_cast<std::size_t>(i)] = l.value[axis][begin + static_cast<std::size_t>(i)];
+  const Grid& g = l.couplings->grid();
+  bool tells = false, whole = true;
+  const int before = hats_.first() - 1, after = hats_.first() + hats_.octets();
+  for (int q = before; q <= after; ++q) {
+    const int column = (q + kOctets) / kOctets;  // the empty one before the first included
+    const RowId row = g.row(column, j, k);
+    tells = tells || (q > before && q < after && has(level, row, telling));
+    whole = whole && l.couplings->prepare(row) && l.couplings->uniform(row);
   }
-  if ((from == 0 && to == kRow - 1) || untold(level, row) == 0.0F) unmark(level, row, changed);
-}
-
-float Multigrid::correct(int level, RowId row, const RowVector& correction, Displacement& state,
-                         OctetSpan span) noexcept {
-  LevelRow r = row_of(level, row, state);
-  if (level > 0) return correct_row(r, nullptr, span, correction);
-  // A voxel that pulls against a link at its limit stays, until the limit lets go of it.
-  if (!stopped_.empty()) r.stopped = at(0).stopped.data() + static_cast<std::size_t>(row) * kRow;
-  const RowLimits limits = couplings().limits(row);
-  return correct_row(r, &limits, span, correction);
-}
-
-void Multigrid::prolong(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
-                        OctetSpan span, int first, int last) noexcept {
-  Level& coarse = at(level + 1);
-  const Grid& g = coarse.couplings->grid();
-  const auto c = grid(level).row_coordinates(row);
-  const int column = (c[0] - 1) / 2 + 1;
-  const int own_j = c[1] / 2, own_k = c[2] / 2;
-  const int near_j = (c[1] & 1) != 0 ? own_j + 1 : own_j - 1,
-            near_k = (c[2] & 1) != 0 ? own_k + 1 : own_k - 1;
-  const std::array<RowId, 4> rows{g.row(column, own_j, own_k), g.row(column, near_j, own_k),
-                                  g.row(column, own_j, near_k), g.row(column, near_j, near_k)};
-  bool any = false;
-  for (const RowId r : rows) any = any || (coarse.flags[r] & telling) != 0;
-  if (!any) return;
-  CoarseRows around;
-  around.half = (c[0] - 1) % 2 * (kRow / 2);
-  around.x = static_cast<std::ptrdiff_t>(g.row_x) * kRow;
-  around.first_teller = first - (column - 1) * kRow;
-  around.last_teller = last - (column - 1) * kRow;
-  const auto filled = [&coarse](RowId r) {
-    return coarse.couplings->prepare(r) ? coarse.couplings->filled(r) : nullptr;
+  const auto add = [this](std::size_t which, int q) {
+    return hats_.cells(which) + static_cast<std::ptrdiff_t>(q - hats_.first()) * kOctet;
   };
-  for (std::size_t n = 0; n < 4; ++n) {
-    CoarseRows::One& one = around.row[n];
-    one.tells = (coarse.flags[rows[n]] & telling) != 0;
-    one.filled = filled(rows[n]);
-    if (around.half == 0 && span.first == 0) one.filled_left = filled(rows[n] - g.row_x);
-    if (around.half != 0 && span.last == kOctets - 1) one.filled_right = filled(rows[n] + g.row_x);
-    const std::size_t begin = static_cast<std::size_t>(rows[n]) * kRow;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      one.value[axis] = coarse.value[axis].data() + begin;
-      one.told[axis] = coarse.told[axis].data() + begin;
+  const Octet none{};
+  for (int q = before; q <= after && (tells || !whole); ++q) {
+    const int column = (q + kOctets) / kOctets;
+    const RowId row = g.row(column, j, k);
+    const int octet = (q + kOctets) % kOctets;
+    const bool any = l.couplings->prepare(row);
+    if (!whole) {
+      if (any) {
+        std::copy_n(l.couplings->filled(row) + octet * kOctet, kOctet, add(3, q));
+      } else {
+        store(add(3, q), none);
+      }
+    }
+    const bool here = any && q > before && q < after && has(level, row, telling);
+    const int origin = (column - 1) * kRow;
+    const std::size_t begin = static_cast<std::size_t>(row) * kRow;
+    for (std::size_t axis = 0; axis < 3 && tells; ++axis) {
+      if (here) {
+        take_untold(l.value[axis].data() + begin, l.told[axis].data() + begin, l.couplings->filled(row),
+                    {octet, octet}, box.first_teller - origin, box.last_teller - origin, add(axis, q));
+      } else {
+        store(add(axis, q), none);
+      }
     }
   }
-  RowVector correction;
-  interpolate_row(around, span, correction);
+  if (tells) {
+    for (int c = hats_.first() / kOctets; c <= (after - 1) / kOctets; ++c) {
+      const RowId row = g.row(c + 1, j, k);
+      if (!has(level, row, telling)) continue;
+      unmark(level, row, telling);
+      if (untold(level, row) == 0.0F) unmark(level, row, changed);
+    }
+  }
+  hats_.spread(j, k, tells, whole);
+}
+
+void Multigrid::tell(int level, const Told& box, Displacement& state,
+                     const ObstacleView& obstacles) noexcept {
+  const Grid& g = grid(level);
+  // Of the two cells around a voxel the lower one.
+  const auto below = [](int x) { return (x + 1) / 2 - 1; };
+  hats_.begin(box.q0 / 2, box.q1 / 2, below(box.j0), below(box.j1) + 1);
+  int spread = below(box.k0) - 1;  // plane of cells; the last that is
+  for (int k = box.k0; k <= box.k1; ++k) {
+    for (; spread <= below(k); ++spread) {
+      for (int j = below(box.j0); j <= below(box.j1) + 1; ++j) spread_hats(level + 1, j, spread + 1, box);
+    }
+    const int own_k = k / 2, near_k = (k & 1) != 0 ? own_k + 1 : own_k - 1;
+    for (int j = box.j0; j <= box.j1; ++j) {
+      const int own_j = j / 2, near_j = (j & 1) != 0 ? own_j + 1 : own_j - 1;
+      const auto hats = [&](int octet) {
+        return std::array<HatRow, 4>{hats_.row(own_j, own_k, octet), hats_.row(near_j, own_k, octet),
+                                     hats_.row(own_j, near_k, octet), hats_.row(near_j, near_k, octet)};
+      };
+      const auto here = hats(box.q0);
+      if (std::none_of(here.begin(), here.end(), [](const HatRow& r) { return r.tells; })) continue;
+      for (int c = box.q0 / kOctets; c <= box.q1 / kOctets; ++c) {
+        const int first = std::max(box.q0, c * kOctets), last = std::min(box.q1, c * kOctets + kOctets - 1);
+        const RowId row = g.row(c + 1, j, k);
+        if (!prepare(level, row)) continue;
+        tell_row(level, row, hats(first), state, obstacles, {first - c * kOctets, last - c * kOctets},
+                 box.first_teller, box.last_teller);
+      }
+    }
+  }
+}
+
+void Multigrid::tell_row(int level, RowId row, const std::array<HatRow, 4>& hats, Displacement& state,
+                         const ObstacleView& obstacles, OctetSpan span, int first, int last) noexcept {
+  RowVector correction, refused;
+  sum_hats(hats, span, correction);
   // Beyond these lanes no hat reaches.
-  const int origin = (c[0] - 1) * kRow;
+  const int origin = (grid(level).row_coordinates(row)[0] - 1) * kRow;
   span.first = std::max(span.first, (std::max(2 * first - 1, origin) - origin) / kOctet);
   span.last = std::min(span.last, (2 * last + 2 - origin) / kOctet);
   if (span.first > span.last) return;
-  const float most = correct(level, row, correction, state, span);
-  if (level == 0 && most > 0.0F) clear_obstacles(row, state, obstacles);
-  note_change(level, row, most);
+  LevelRow r = row_of(level, row, state);
+  RowCorrection done;
+  if (level > 0) {
+    done = correct_row(r, nullptr, span, correction, refused);
+  } else {
+    // A voxel that pulls against a link at its limit stays, until the limit lets go of it.
+    if (has(0, row, limited)) r.stopped = at(0).stopped.data() + static_cast<std::size_t>(row) * kRow;
+    const RowLimits limits = couplings().limits(row);
+    done = correct_row(r, &limits, span, correction, refused);
+    if (done.most_m > 0.0F) clear_obstacles(row, state, obstacles);
+  }
+  if (done.refused != 0) take_back_refused(level, row, refused, done.refused, span);
+  note_change(level, row, done.most_m);
+}
+
+void Multigrid::take_back_refused(int level, RowId row, const RowVector& refused, unsigned axes,
+                                  OctetSpan span) noexcept {
+  Level& coarse = at(level + 1);
+  const auto c = grid(level).row_coordinates(row);
+  const RowId above = coarse.couplings->grid().row((c[0] - 1) / 2 + 1, c[1] / 2, c[2] / 2);
+  const int half = (c[0] - 1) % 2;
+  const OctetSpan pairs{span.first & ~1, span.last | 1};
+  RowVector sums{}, lanes{};
+  std::array<float*, 3> value{}, told{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    value[axis] = coarse.value[axis].data() + static_cast<std::size_t>(above) * kRow;
+    told[axis] = coarse.told[axis].data() + static_cast<std::size_t>(above) * kRow;
+    if ((axes >> axis & 1U) == 0) continue;
+    std::copy_n(refused[axis].begin() + span.first * kOctet, (span.last - span.first + 1) * kOctet,
+                lanes[axis].begin() + span.first * kOctet);
+    add_pairs(lanes[axis].data(), pairs, sums[axis].data() + half * kRow / 2);
+  }
+  take_back(sums, coarse.couplings->all(above).share, value, told,
+            {half * kOctets / 2 + pairs.first / 2, half * kOctets / 2 + pairs.last / 2});
+  spread(level + 1, above, active | dirty);
 }
 
 void Multigrid::clear_obstacles(RowId row, Displacement& state, const ObstacleView& obstacles) noexcept {

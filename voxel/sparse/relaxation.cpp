@@ -8,16 +8,17 @@ namespace voxel::sparse {
 namespace {
 
 constexpr int kCoarsestSweeps = 8;
-constexpr int kPatience = 40;  // cycles without gain before an object counts as resting
-// Of the spacing: cells beside a box that have less to tell wait for a cycle of their own.
-constexpr double kGoesAlong = 2e-4;
+constexpr std::uint64_t kLetGoEvery = 8;  // rounds
+constexpr int kPatience = 40;             // cycles without gain before an object counts as resting
 constexpr double kWorse = 1.05;
 constexpr float kHarder = 8.0F, kSofter = 0.97F, kHardest = 1e4F;
 constexpr double kGain = 0.98;      // of the least residual so far: less is a gain
 constexpr double kNearRest = 10.0;  // times the tolerance: what limits hold moves together from here on
 constexpr double kProgress = 1e-3;  // of the spacing: clusters that move further are on their way
-constexpr std::uint64_t kNextFirst = 7919;  // of these voxels is looked at first in the next round
-constexpr int kContactMargin = 4;           // cells round the contact that are smoothed, on each level
+constexpr std::uint64_t kNextFirst = 7919;   // of these voxels is looked at first in the next round
+constexpr int kContactMargin = 3;            // cells round the contact that are smoothed, on each level
+constexpr std::uint64_t kBesideContact = 2;  // this part of the budget is left beside cycles round a contact
+constexpr int kTileMargin = 3;               // … round a tile, from level 1 on
 constexpr int kLooksAtOnce = 256;  // tiles looked at for what coarse levels have to tell them, a call
 
 }  // namespace
@@ -55,7 +56,8 @@ std::uint64_t Relaxation::run(Displacement& state, const ObstacleView& obstacles
   multigrid_.set_held(held);
   TileQueue& tiles = multigrid_.tiles();
   std::uint64_t spent = 0;
-  credit_ += static_cast<std::int64_t>(budget);
+  credit_ += static_cast<std::int64_t>(contact_relaxed_ ? budget / kBesideContact : budget);
+  contact_relaxed_ = false;
   const auto spend = [&](std::uint64_t updates) {
     credit_ -= static_cast<std::int64_t>(updates);
     spent += updates;
@@ -103,17 +105,18 @@ void Relaxation::run_cycle(Displacement& state, const ObstacleView& obstacles,
   running_residual_N_ = 0.0;
   const auto& dims = lattice_.grid().dims;
   lay_boxes({0, 0, 0}, {dims[0] - 1, dims[1] - 1, dims[2] - 1}, 0);
-  cycle(state, obstacles, Look::active, 0.0);
+  cycle(state, obstacles, Look::active);
   end_round(state, running_residual_N_);
 }
 
 void Relaxation::relax_contact(Displacement& state, const ObstacleView& obstacles,
                                std::span<const VoxelId> held, const std::array<int, 3>& low,
                                const std::array<int, 3>& high) noexcept {
+  contact_relaxed_ = true;
   multigrid_.set_held(held);
   const int wide = std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
   lay_boxes(low, high, wide);
-  cycle(state, obstacles, Look::all, kGoesAlong * lattice_.min_spacing_m());
+  cycle(state, obstacles, Look::all);
 }
 
 std::uint64_t Relaxation::relax_tile(Displacement& state, const ObstacleView& obstacles,
@@ -122,7 +125,7 @@ std::uint64_t Relaxation::relax_tile(Displacement& state, const ObstacleView& ob
   constexpr int kSide = TileQueue::kSide;
   lay_boxes({t.column * kRow, t.j * kSide, t.k * kSide},
             {(t.column + 1) * kRow - 1, (t.j + 1) * kSide - 1, (t.k + 1) * kSide - 1}, -1);
-  cycle(state, obstacles, Look::all, 0.0);
+  cycle(state, obstacles, Look::all);
   std::uint64_t updates = 0;
   for (const LevelBoxes& b : boxes_) {
     updates += static_cast<std::uint64_t>(b.smoothed.q1 - b.smoothed.q0 + 1) * kOctet *
@@ -165,7 +168,9 @@ void Relaxation::end_round(Displacement& state, double residual_N) noexcept {
   // 1.9 times within a cycle).
   if (residual_N < kNearRest * tolerance_N_ || cycles_without_gain_ > kPatience / 2)
     residual_N = std::max(residual_N, move_clusters(state));
-  multigrid_.release_limited();
+  // While rounds gain nothing, what limits hold stays held for a few of them: let go of in every round, two
+  // sets of voxels can take turns for ever.
+  if (cycles_without_gain_ <= 1 || cycles_ % kLetGoEvery == 0) multigrid_.release_limited();
   // Scattered voxels hold a cell harder than a patch of them does. A cycle that ends worse than it began says
   // so.
   if (residual_N > kWorse * residual_N_ && cycles_without_gain_ > 0) {
@@ -263,7 +268,7 @@ Relaxation::RowBox Relaxation::clipped(int level, const RowBox& b) const noexcep
 void Relaxation::lay_boxes(const std::array<int, 3>& low, const std::array<int, 3>& high, int wide) noexcept {
   const int last = multigrid_.levels() - 1;
   for (int l = 0; l <= last; ++l) {
-    const int margin = wide < 0 && l == 0 ? 0 : kContactMargin + (std::max(wide, 0) >> l) / 4;
+    const int margin = wide >= 0 ? kContactMargin + (wide >> l) / 4 : l == 0 ? 0 : kTileMargin;
     std::array<int, 3> from{}, to{};
     for (std::size_t d = 0; d < 3; ++d) {
       from[d] = std::max(0, (low[d] >> l) - margin);
@@ -297,36 +302,33 @@ void Relaxation::smooth_box(int level, int colour, Displacement& state, const Ob
   });
 }
 
-// Tells the rows of a level what the next coarser one knows, within the boxes: cells that have so much to
-// tell, in the box and beside it. Those beside it go along: nobody brings what they hold to rest, but the box
-// would feel it if they stayed behind.
-void Relaxation::tell_box(int level, Displacement& state, const ObstacleView& obstacles, double inside_m,
-                          double beside_m) noexcept {
+// Tells the rows of a level what the next coarser one knows, within the boxes: cells in the box and beside
+// it. Those beside it go along, however little they have to tell: nobody brings what they hold to rest, but
+// the box would feel it if they stayed behind, four times as much on each coarser level. (Letting those with
+// less than 2e-4 spacings to tell wait was rejected: energy grew without end where tissue hangs by little.)
+void Relaxation::tell_box(int level, Displacement& state, const ObstacleView& obstacles) noexcept {
   const LevelBoxes& b = boxes(level + 1);
-  const float whisper = multigrid_.passed_on_m();
-  const float inside = std::max(static_cast<float>(inside_m), whisper),
-              beside = std::max(static_cast<float>(beside_m), whisper);
-  for_rows(level + 1, b.tellers, [&](RowId row, OctetSpan span, int j, int k) {
+  bool any = false;
+  for_rows(level + 1, b.tellers, [&](RowId row, OctetSpan span, int, int) {
     if (!multigrid_.has(level + 1, row, Multigrid::changed)) return;
-    if (multigrid_.untold(level + 1, row, span) > (b.parents.has(j, k) ? inside : beside))
-      multigrid_.mark(level + 1, row, Multigrid::telling);
+    const int origin = (multigrid_.grid(level + 1).row_coordinates(row)[0] - 1) * kRow;
+    const float most =
+        multigrid_.untold(level + 1, row, span, b.first_teller - origin, b.last_teller - origin);
+    if (most <= multigrid_.passed_on_m()) return;
+    multigrid_.mark(level + 1, row, Multigrid::telling);
+    any = true;
   });
-  for_rows(level, boxes(level).told, [&](RowId row, OctetSpan span, int, int) {
-    multigrid_.prolong(level, row, state, obstacles, span, b.first_teller, b.last_teller);
-  });
-  for_rows(level + 1, b.tellers, [&](RowId row, OctetSpan, int, int) {
-    if (!multigrid_.has(level + 1, row, Multigrid::telling)) return;
-    multigrid_.end_telling(level + 1, row, b.first_teller, b.last_teller);
-    multigrid_.unmark(level + 1, row, Multigrid::telling);
-  });
+  if (!any) return;
+  const RowBox& t = boxes(level).told;
+  multigrid_.tell(level, {t.q0, t.q1, t.j0, t.j1, t.k0, t.k1, b.first_teller, b.last_teller}, state,
+                  obstacles);
 }
 
-void Relaxation::cycle(Displacement& state, const ObstacleView& obstacles, Look look,
-                       double least_m) noexcept {
+void Relaxation::cycle(Displacement& state, const ObstacleView& obstacles, Look look) noexcept {
   const int last = multigrid_.levels() - 1;
   // What coarse levels know and finer ones do not is told first: a step between voxels that were told and
   // others that were not would look like a force to the cells above it.
-  for (int l = last - 1; l >= 0; --l) tell_box(l, state, obstacles, least_m, least_m);
+  for (int l = last - 1; l >= 0; --l) tell_box(l, state, obstacles);
   for (int l = 0; l < last; ++l) {
     for (const int colour : {0, 1}) smooth_box(l, colour, state, obstacles, look);
     // Before forces are summed, so that what is called the residual is that of links that yield.
@@ -359,7 +361,7 @@ void Relaxation::cycle(Displacement& state, const ObstacleView& obstacles, Look 
   }
   for (int n = 0; n < 2 * kCoarsestSweeps; ++n) smooth_box(last, n & 1, state, obstacles, look);
   for (int l = last - 1; l >= 0; --l) {
-    tell_box(l, state, obstacles, 0.0, least_m);
+    tell_box(l, state, obstacles);
     for (const int colour : {1, 0}) smooth_box(l, colour, state, obstacles, look);
   }
 }

@@ -33,7 +33,7 @@ class Relaxation {
   explicit Relaxation(const Lattice& lattice);
 
   // Spends `budget` voxel updates, on average over many calls (a cycle is not cut), unless the object is at
-  // rest. Returns what it spent.
+  // rest; half of it where a contact was relaxed since the last call. Returns what it spent.
   std::uint64_t run(Displacement& state, const ObstacleView& obstacles, std::span<const VoxelId> held,
                     std::uint64_t budget) noexcept;
   // One cycle over the whole object. For references, not for the tick.
@@ -62,6 +62,7 @@ class Relaxation {
   void set_tolerance(double tolerance_N) noexcept;
   // Cycles over all that moves.
   [[nodiscard]] std::uint64_t cycles() const { return cycles_; }
+  void prepare_all() noexcept { multigrid_.prepare_all(); }
   // Starts in the same state as `other`, of the same lattice.
   void copy_from(const Relaxation& other) noexcept;
   [[nodiscard]] std::size_t memory_bytes() const;
@@ -84,7 +85,7 @@ class Relaxation {
   enum class Look : std::uint8_t { all, active };  // rows at rest are left alone
 
   void lay_boxes(const std::array<int, 3>& low, const std::array<int, 3>& high, int margin) noexcept;
-  void cycle(Displacement& state, const ObstacleView& obstacles, Look look, double least_m) noexcept;
+  void cycle(Displacement& state, const ObstacleView& obstacles, Look look) noexcept;
   void end_round(Displacement& state, double residual_N) noexcept;
   double move_clusters(Displacement& state) noexcept;
   std::uint64_t relax_tile(Displacement& state, const ObstacleView& obstacles, std::size_t number) noexcept;
@@ -96,8 +97,7 @@ class Relaxation {
   [[nodiscard]] RowBox clipped(int level, const RowBox& box) const noexcept;
   void smooth_box(int level, int colour, Displacement& state, const ObstacleView& obstacles,
                   Look look) noexcept;
-  void tell_box(int level, Displacement& state, const ObstacleView& obstacles, double inside_m,
-                double beside_m) noexcept;
+  void tell_box(int level, Displacement& state, const ObstacleView& obstacles) noexcept;
   [[nodiscard]] LevelBoxes& boxes(int level) { return boxes_[static_cast<std::size_t>(level)]; }
 
   const Lattice& lattice_;
@@ -109,8 +109,9 @@ class Relaxation {
   std::size_t cursor_ = 0, looked_at_ = 0;  // tiles looked at for what coarse levels have to tell them
   RowId keep_row_ = 0;                      // where keeping goes on
   bool asleep_ = true;
-  bool unkept_ = false;   // some link is beyond what it keeps
-  bool keeping_ = false;  // it is kept now
+  bool contact_relaxed_ = false;  // since run() last was
+  bool unkept_ = false;           // some link is beyond what it keeps
+  bool keeping_ = false;          // it is kept now
   double residual_N_ = 0.0, running_residual_N_ = 0.0, tolerance_N_ = 0.0, least_residual_N_ = 0.0;
   float hold_ = 1.0F;
   int cycles_without_gain_ = 0;

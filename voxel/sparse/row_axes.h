@@ -46,15 +46,19 @@ HYBRID_INLINE bool any(const OctetMask& mask) {
   return (words[0] | words[1] | words[2] | words[3]) != 0;
 }
 
-// Lanes of an axis that do not move.
-HYBRID_INLINE void staying(OctetMask& stays, const LevelRow& row, const Octet& inverse, std::size_t axis,
-                           int octet) {
-  stays = inverse == 0.0F;
+// Lanes that are anchored, or held.
+HYBRID_INLINE void standing(OctetMask& stands, const LevelRow& row, const Octet& inverse, int octet) {
+  stands = inverse == 0.0F;
   if (row.held != nullptr) {
     OctetMask bits;
     bits_set(bits, row.held + octet * kOctet, 1);
-    stays |= bits;
+    stands |= bits;
   }
+}
+// Lanes of an axis that do not move.
+HYBRID_INLINE void staying(OctetMask& stays, const LevelRow& row, const Octet& inverse, std::size_t axis,
+                           int octet) {
+  standing(stays, row, inverse, octet);
   if (row.stopped != nullptr) {
     OctetMask bits;
     bits_set(bits, row.stopped + octet * kOctet, 1 << axis);

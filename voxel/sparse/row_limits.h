@@ -204,12 +204,29 @@ HYBRID_INLINE unsigned beyond_band(const Axes& u, const LevelRow& row, const Row
       Octet x_down, x_up;
       shift_down(x_down, u[axis][n], u[axis][n + 1]);
       shift_up(x_up, u[axis][n + 1], u[axis][n + 2]);
-      look_beyond<kUniform>(beyond[axis], u[axis][n + 1], x_down, x_up, row, band[axis], axis, octet);
+      look_beyond<true>(beyond[axis], u[axis][n + 1], x_down, x_up, row, band[axis], axis, octet);
     }
   }
   unsigned out = 0;
-  const OctetMask all = beyond[0] | beyond[1] | beyond[2];
+  OctetMask all = beyond[0] | beyond[1] | beyond[2];
   if (!any(all)) return out;
+  if (!kUniform) {
+    // So far, neighbours that are not there counted as neighbours at rest: springs need not be read then.
+    beyond = {};
+#pragma GCC unroll 1
+    for (int octet = span.first; octet <= span.last; ++octet) {
+      const auto n = static_cast<std::size_t>(octet - span.first);
+#pragma GCC unroll 3
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        Octet x_down, x_up;
+        shift_down(x_down, u[axis][n], u[axis][n + 1]);
+        shift_up(x_up, u[axis][n + 1], u[axis][n + 2]);
+        look_beyond<false>(beyond[axis], u[axis][n + 1], x_down, x_up, row, band[axis], axis, octet);
+      }
+    }
+    all = beyond[0] | beyond[1] | beyond[2];
+    if (!any(all)) return out;
+  }
   if (!kUniform && limits.lanes != nullptr) {
     // Tighter links are elsewhere in the row, mostly.
     beyond = {};

@@ -272,7 +272,7 @@ HYBRID_INLINE void residual_axes(RowResidual& result, const LevelRow& row, const
 
 template <bool kUniform, Limits kLimits>
 HYBRID_INLINE void correct_axis(const LevelRow& row, const AxisBounds& bounds, std::size_t axis,
-                                OctetSpan span, const float* correction, Octet& most) {
+                                OctetSpan span, const float* correction, float* refused, Octet& most) {
   const AxisSprings s(row.springs, axis);
   float* own = row.u[axis];
   const int count = span.last - span.first + 1;
@@ -321,16 +321,54 @@ HYBRID_INLINE void correct_axis(const LevelRow& row, const AxisBounds& bounds, s
     }
   }
 #pragma GCC unroll 1
-  for (int n = 0; n < count; ++n)
-    store(own + (span.first + n) * kOctet, u.at[static_cast<std::size_t>(n) + 1]);
+  for (int n = 0; n < count; ++n) {
+    const int octet = span.first + n;
+    const auto un = static_cast<std::size_t>(n);
+    Octet now, way, inverse;
+    load(now, own + octet * kOctet);
+    load(way, correction + octet * kOctet);
+    spring<kUniform>(inverse, s.inverse, octet);
+    OctetMask fixed;
+    standing(fixed, row, inverse, octet);
+    const Octet left = now + way - u.at[un + 1];
+    store(refused + octet * kOctet, fixed ? Octet{} : left);
+    store(own + octet * kOctet, u.at[un + 1]);
+  }
+}
+
+// What stopped voxels do not take of a correction. Returns the axes on which there is any.
+template <bool kUniform>
+HYBRID_INLINE unsigned note_stopped(const LevelRow& row, OctetSpan span, const RowVector& correction,
+                                    RowVector& refused) {
+  unsigned refusing = 0;
+#pragma GCC unroll 1
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    OctetMask some{};
+#pragma GCC unroll 1
+    for (int octet = span.first; octet <= span.last; ++octet) {
+      Octet way, inverse;
+      OctetMask fixed, stopped;
+      load(way, correction[axis].data() + octet * kOctet);
+      inverse_of<kUniform>(inverse, row.springs, axis, octet);
+      standing(fixed, row, inverse, octet);
+      bits_set(stopped, row.stopped + octet * kOctet, 1 << axis);
+      way = stopped & ~fixed ? way : Octet{};
+      some |= way != 0.0F;
+      store(refused[axis].data() + octet * kOctet, way);
+    }
+    if (any(some)) refusing |= 1U << axis;
+  }
+  return refusing;
 }
 
 // Adds corrections on the axes on which no limit comes near; returns the others, bit by bit, left as they
 // were.
 template <bool kUniform, bool kLook>
 HYBRID_INLINE unsigned correct_freely(const LevelRow& row, const RowLimits* limits, OctetSpan span,
-                                      const RowVector& correction, Octet& most) {
+                                      const RowVector& correction, RowVector& refused, unsigned& refusing,
+                                      Octet& most) {
   Axes u;
+  if (row.stopped != nullptr) refusing = note_stopped<kUniform>(row, span, correction, refused);
   if (kLook) {
     load_axes(u, row, span);
   }
@@ -363,19 +401,21 @@ HYBRID_INLINE unsigned correct_freely(const LevelRow& row, const RowLimits* limi
 }
 
 template <bool kUniform, Limits kLimits>
-HYBRID_INLINE float correct_axes(const LevelRow& row, const RowLimits* limits, OctetSpan span,
-                                 const RowVector& correction) {
+HYBRID_INLINE RowCorrection correct_axes(const LevelRow& row, const RowLimits* limits, OctetSpan span,
+                                         const RowVector& correction, RowVector& refused) {
   Octet most{};
-  const unsigned beyond = correct_freely<kUniform, clamps(kLimits)>(row, limits, span, correction, most);
+  unsigned refusing = 0;
+  const unsigned beyond =
+      correct_freely<kUniform, clamps(kLimits)>(row, limits, span, correction, refused, refusing, most);
   if constexpr (clamps(kLimits)) {
 #pragma GCC unroll 1
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if ((beyond >> axis & 1U) == 0) continue;
       correct_axis<kUniform, kLimits>(row, bounds_of(limits, axis), axis, span, correction[axis].data(),
-                                      most);
+                                      refused[axis].data(), most);
     }
   }
-  return largest(most);
+  return {largest(most), refusing | beyond};
 }
 
 }  // namespace
@@ -424,12 +464,13 @@ HYBRID_WIDE_AND_MANY void measure_row(const RowCouplings& springs, const RowVect
   out.most_way_m = largest(most_m);
 }
 
-HYBRID_WIDE_AND_MANY float correct_row(const LevelRow& row, const RowLimits* limits, OctetSpan span,
-                                       const RowVector& correction) noexcept {
-  if (limits == nullptr) return correct_axes<false, Limits::none>(row, limits, span, correction);
-  if (limits->lanes != nullptr) return correct_axes<false, Limits::lanes>(row, limits, span, correction);
-  return row.springs.uniform ? correct_axes<true, Limits::row>(row, limits, span, correction)
-                             : correct_axes<false, Limits::row>(row, limits, span, correction);
+HYBRID_WIDE_AND_MANY RowCorrection correct_row(const LevelRow& row, const RowLimits* limits, OctetSpan span,
+                                               const RowVector& correction, RowVector& refused) noexcept {
+  if (limits == nullptr) return correct_axes<false, Limits::none>(row, limits, span, correction, refused);
+  if (limits->lanes != nullptr)
+    return correct_axes<false, Limits::lanes>(row, limits, span, correction, refused);
+  return row.springs.uniform ? correct_axes<true, Limits::row>(row, limits, span, correction, refused)
+                             : correct_axes<false, Limits::row>(row, limits, span, correction, refused);
 }
 
 }  // namespace voxel::sparse

@@ -57,31 +57,40 @@ void take_means(const RowVector& sums, const float* share, const std::array<floa
 // load = force − Σ k (told(neighbour) − told); `row.u` are the values told.
 void take_loads(const LevelRow& row, const RowVector& force, const std::array<float*, 3>& load,
                 OctetSpan span) noexcept;
-// The four coarse rows around a fine one, own cell's first, then the nearer in y, in z, in both.
-struct CoarseRows {
-  struct One {
-    std::array<const float*, 3> value{}, told{};  // [axis] what is interpolated is value − told
-    // [lane] of the row and of those beside it along x: 1 where there is a cell; null: nothing there.
-    const float *filled = nullptr, *filled_left = nullptr, *filled_right = nullptr;
-    bool tells = false;  // else it weighs, but adds nothing
-  };
-  std::array<One, 4> row;
-  std::ptrdiff_t x = 0;  // floats to the next coarse row along x
-  int half = 0;          // 0 or kRow / 2: where the cells above the fine row begin
-  int first_teller = 0,
-      last_teller = kRow - 1;  // lanes that tell, counted in the coarse row; −1 and kRow: beside it
+// Of the lanes first … last of a coarse row, which may go beyond it: out = value − told, 0 in others of the
+// span; told = value.
+void take_untold(const float* value, float* told, const float* filled, OctetSpan span, int first, int last,
+                 float* out) noexcept;
+// From cells to the lanes of the finer level, along x: 3/4 of the cell a lane is in, 1/4 of the nearer
+// neighbour. Of the octets before and after `cells` the nearest lane is read.
+void spread_along(const float* cells, int octets, float* lanes) noexcept;
+// Is every one of these lanes 1?
+bool all_ones(const float* lanes, int octets) noexcept;
+
+// What the four coarse rows around a fine one tell it, own cell's first, then the nearer in y, in z, in both;
+// spread along x.
+struct HatRow {
+  std::array<const float*, 3> sum{};  // [axis][lane]
+  const float* weight = nullptr;      // [lane] of what there is of its cells; null: all of them
+  bool tells = false;                 // else it weighs, but adds nothing
 };
+// Their sum, with cell-centred trilinear weights: 3/4 to the cell a voxel is in, 1/4 to the nearer neighbour,
+// on each axis; an empty neighbour's share goes to the others (a free surface). The rows' lanes begin with
+// the span's.
+void sum_hats(const std::array<HatRow, 4>& rows, OctetSpan span, RowVector& out) noexcept;
+// From the sums over what cells hold: value and told less their means.
+void take_back(const RowVector& sums, const float* share, const std::array<float*, 3>& value,
+               const std::array<float*, 3>& told, OctetSpan span) noexcept;
+// The largest |a[i] − b[i]| of one axis, of the lanes of the span that lie in first … last.
+float row_difference(const float* a, const float* b, OctetSpan span, int first, int last) noexcept;
 
-// Cell-centred trilinear weights: 3/4 to the cell a voxel is in, 1/4 to the nearer neighbour, on each axis;
-// an empty neighbour's share goes to the others (a free surface). `span` begins with an even octet and ends
-// with an odd one.
-void interpolate_row(const CoarseRows& coarse, OctetSpan span, RowVector& out) noexcept;
-// The largest |a[i] − b[i]| of one axis.
-float row_difference(const float* a, const float* b, OctetSpan span) noexcept;
-
-// Adds a correction to a row as far as its links allow. Returns the most that any voxel was asked to
-// move (m).
-float correct_row(const LevelRow& row, const RowLimits* limits, OctetSpan span,
-                  const RowVector& correction) noexcept;
+struct RowCorrection {
+  float most_m = 0.0F;   // the most that any voxel was asked to move
+  unsigned refused = 0;  // bit of each axis on which some did not follow all the way
+};
+// Adds a correction to a row as far as its links allow. `refused`: where the bit is set, what was left of it
+// in the lanes of the span; of what is held or anchored nothing is expected.
+RowCorrection correct_row(const LevelRow& row, const RowLimits* limits, OctetSpan span,
+                          const RowVector& correction, RowVector& refused) noexcept;
 
 }  // namespace voxel::sparse

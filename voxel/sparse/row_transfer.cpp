@@ -76,108 +76,119 @@ HYBRID_WIDE_AND_MANY void take_loads(const LevelRow& row, const RowVector& force
   }
 }
 
-HYBRID_WIDE_AND_MANY void interpolate_row(const CoarseRows& c, OctetSpan span, RowVector& out) noexcept {
-  static constexpr std::array<float, 4> kShare{0.5625F, 0.1875F, 0.1875F, 0.0625F};
-  const int first = c.half + span.first * kOctet / 2;  // coarse lane
-  const int count = (span.last - span.first + 1) / 2;  // coarse octets
-  const int end = first + count * kOctet;
-  // Sums over the four rows, for the coarse octets and one lane more at both ends.
-  std::array<Octet, kOctets / 2 + 2> weight{};
-  std::array<std::array<Octet, kOctets / 2 + 2>, 3> value{};
-  float weight_left = 0.0F, weight_right = 0.0F;
-  std::array<float, 3> left{}, right{};
+HYBRID_WIDE_AND_MANY void take_untold(const float* value, float* told, const float* filled, OctetSpan span,
+                                      int first, int last, float* out) noexcept {
   constexpr OctetMask kLane{0, 1, 2, 3, 4, 5, 6, 7};
-  const bool tells_left = first - 1 >= c.first_teller && first - 1 <= c.last_teller,
-             tells_right = end >= c.first_teller && end <= c.last_teller;
 #pragma GCC unroll 1
-  for (std::size_t n = 0; n < 4; ++n) {
-    const CoarseRows::One& r = c.row[n];
-    if (r.filled != nullptr) {
-#pragma GCC unroll 1
-      for (int m = 0; m < count; ++m) {
-        const auto um = static_cast<std::size_t>(m) + 1;
-        const int lane = first + m * kOctet;
-        Octet f;
-        load(f, r.filled + lane);
-        f *= kShare[n];
-        weight[um] += f;
-        if (!r.tells) continue;
-        const OctetMask at = kLane + lane;
-        f = (at >= c.first_teller) & (at <= c.last_teller) ? f : Octet{};
-#pragma GCC unroll 3
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-          Octet v, t;
-          load(v, r.value[axis] + lane);
-          load(t, r.told[axis] + lane);
-          value[axis][um] += f * (v - t);
-        }
-      }
-    }
-    const float *before = first > 0 ? r.filled : r.filled_left,
-                *behind = end < kRow ? r.filled : r.filled_right;
-    if (before != nullptr) {
-      const float f = kShare[n] * before[first > 0 ? first - 1 : kRow - 1];
-      weight_left += f;
-      if (r.tells && tells_left) {
-        const std::ptrdiff_t at = first > 0 ? first - 1 : kRow - 1 - c.x;
-        for (std::size_t axis = 0; axis < 3; ++axis) left[axis] += f * (r.value[axis][at] - r.told[axis][at]);
-      }
-    }
-    if (behind != nullptr) {
-      const float f = kShare[n] * behind[end < kRow ? end : 0];
-      weight_right += f;
-      if (r.tells && tells_right) {
-        const std::ptrdiff_t at = end < kRow ? end : c.x;
-        for (std::size_t axis = 0; axis < 3; ++axis)
-          right[axis] += f * (r.value[axis][at] - r.told[axis][at]);
-      }
-    }
+  for (int octet = span.first; octet <= span.last; ++octet) {
+    const int lane = octet * kOctet;
+    const OctetMask at = kLane + lane;
+    const OctetMask tells = (at >= first) & (at <= last);
+    Octet v, t, f;
+    load(v, value + lane);
+    load(t, told + lane);
+    load(f, filled + lane);
+    f *= v - t;
+    store(out + (octet - span.first) * kOctet, tells ? f : Octet{});
+    store(told + lane, tells ? v : t);
   }
-  const auto after = static_cast<std::size_t>(count) + 1;
-  weight[0] = Octet{} + weight_left;
-  weight[after] = Octet{} + weight_right;
+}
+
+HYBRID_WIDE_AND_MANY void spread_along(const float* cells, int octets, float* lanes) noexcept {
+  Octet before, own, after;
+  load(before, cells - kOctet);
+  load(own, cells);
+#pragma GCC unroll 1
+  for (int m = 0; m < octets; ++m) {
+    load(after, cells + (m + 1) * kOctet);
+    const Octet low = 0.75F * __builtin_shufflevector(own, own, 0, 0, 1, 1, 2, 2, 3, 3) +
+                      0.25F * __builtin_shufflevector(own, before, 15, 1, 0, 2, 1, 3, 2, 4);
+    const Octet high = 0.75F * __builtin_shufflevector(own, own, 4, 4, 5, 5, 6, 6, 7, 7) +
+                       0.25F * __builtin_shufflevector(own, after, 3, 5, 4, 6, 5, 7, 6, 8);
+    store(lanes + 2 * m * kOctet, low);
+    store(lanes + (2 * m + 1) * kOctet, high);
+    before = own;
+    own = after;
+  }
+}
+
+HYBRID_WIDE_AND_MANY bool all_ones(const float* lanes, int octets) noexcept {
+  OctetMask other{};
+#pragma GCC unroll 1
+  for (int m = 0; m < octets; ++m) {
+    Octet x;
+    load(x, lanes + m * kOctet);
+    other |= x != 1.0F;
+  }
+  return !any(other);
+}
+
+HYBRID_WIDE_AND_MANY void sum_hats(const std::array<HatRow, 4>& rows, OctetSpan span,
+                                   RowVector& out) noexcept {
+  static constexpr std::array<float, 4> kShare{0.5625F, 0.1875F, 0.1875F, 0.0625F};
+  bool whole = true;
+  for (const HatRow& r : rows) whole = whole && r.weight == nullptr;
+#pragma GCC unroll 1
+  for (int octet = span.first; octet <= span.last; ++octet) {
+    const int lane = (octet - span.first) * kOctet;
+    std::array<Octet, 3> sum{};
+    Octet weight{};
+#pragma GCC unroll 1
+    for (std::size_t n = 0; n < 4; ++n) {
+      const HatRow& r = rows[n];
+      if (!whole) {
+        Octet w = Octet{} + 1.0F;
+        if (r.weight != nullptr) load(w, r.weight + lane);
+        weight += kShare[n] * w;
+      }
+      if (!r.tells) continue;
 #pragma GCC unroll 3
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        Octet x;
+        load(x, r.sum[axis] + lane);
+        sum[axis] += kShare[n] * x;
+      }
+    }
+    if (!whole) {
+      const Octet inverse = weight > 0.0F ? (Octet{} + 1.0F) / weight : Octet{};
+      for (std::size_t axis = 0; axis < 3; ++axis) sum[axis] *= inverse;
+    }
+#pragma GCC unroll 3
+    for (std::size_t axis = 0; axis < 3; ++axis) store(out[axis].data() + octet * kOctet, sum[axis]);
+  }
+}
+
+HYBRID_WIDE_AND_MANY void take_back(const RowVector& sums, const float* share,
+                                    const std::array<float*, 3>& value, const std::array<float*, 3>& told,
+                                    OctetSpan span) noexcept {
+#pragma GCC unroll 1
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    value[axis][0] = Octet{} + left[axis];
-    value[axis][after] = Octet{} + right[axis];
-  }
 #pragma GCC unroll 1
-  for (int m = 0; m < count; ++m) {
-    const auto um = static_cast<std::size_t>(m) + 1;
-    // 3/4 of the own cell and 1/4 of the nearer neighbour, for the lower and the upper four cells.
-    const auto low = [um](Octet& to, const auto& x) {
-      to = 0.75F * __builtin_shufflevector(x[um], x[um], 0, 0, 1, 1, 2, 2, 3, 3) +
-           0.25F * __builtin_shufflevector(x[um - 1], x[um], 7, 9, 8, 10, 9, 11, 10, 12);
-    };
-    const auto high = [um](Octet& to, const auto& x) {
-      to = 0.75F * __builtin_shufflevector(x[um], x[um], 4, 4, 5, 5, 6, 6, 7, 7) +
-           0.25F * __builtin_shufflevector(x[um], x[um + 1], 3, 5, 4, 6, 5, 7, 6, 8);
-    };
-    Octet w_low, w_high;
-    low(w_low, weight);
-    high(w_high, weight);
-    const Octet one = Octet{} + 1.0F;
-    w_low = w_low > 0.0F ? one / w_low : Octet{};
-    w_high = w_high > 0.0F ? one / w_high : Octet{};
-#pragma GCC unroll 3
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      float* to = out[axis].data() + (span.first + 2 * m) * kOctet;
-      Octet v;
-      low(v, value[axis]);
-      store(to, v * w_low);
-      high(v, value[axis]);
-      store(to + kOctet, v * w_high);
+    for (int octet = span.first; octet <= span.last; ++octet) {
+      Octet mean, part, x;
+      load(mean, sums[axis].data() + octet * kOctet);
+      load(part, share + octet * kOctet);
+      mean *= part;
+      load(x, value[axis] + octet * kOctet);
+      store(value[axis] + octet * kOctet, x - mean);
+      load(x, told[axis] + octet * kOctet);
+      store(told[axis] + octet * kOctet, x - mean);
     }
   }
 }
 
-HYBRID_WIDE_AND_MANY float row_difference(const float* a, const float* b, OctetSpan span) noexcept {
+HYBRID_WIDE_AND_MANY float row_difference(const float* a, const float* b, OctetSpan span, int first,
+                                          int last) noexcept {
+  constexpr OctetMask kLane{0, 1, 2, 3, 4, 5, 6, 7};
   Octet most{}, x, y;
 #pragma GCC unroll 1
   for (int octet = span.first; octet <= span.last; ++octet) {
     load(x, a + octet * kOctet);
     load(y, b + octet * kOctet);
-    take_largest_size(most, x - y);
+    const OctetMask at = kLane + octet * kOctet;
+    x -= y;
+    x = (at >= first) & (at <= last) ? x : Octet{};
+    take_largest_size(most, x);
   }
   return largest(most);
 }

@@ -14,7 +14,7 @@ namespace voxel::sparse {
 class TileQueue {
  public:
   // Rows of a tile in y and in z; along x it is one row long.
-  static constexpr int kSide = 16;
+  static constexpr int kSide = 8;
   struct Tile {
     int column = 0, j = 0, k = 0;  // its first row is grid.row(column + 1, j · kSide, k · kSide)
   };

@@ -48,7 +48,7 @@ inline voxel::sparse::LatticeOptions made_of(const voxel::sparse::LinkMaterial& 
   return options;
 }
 
-// Index into the padded grid of voxel (i, j, k) of the volume.
+// Voxel (i, j, k) of the volume.
 inline voxel::sparse::VoxelId voxel_at(const voxel::sparse::Lattice& lattice, int i, int j, int k) {
   return lattice.at(i, j, k);
 }

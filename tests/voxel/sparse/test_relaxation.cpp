@@ -304,6 +304,64 @@ TEST(Relaxation, ItsResidualIsTheLargestForceLeft) {
   }
 }
 
+// A porous ball on a thin stem, pressed at its top: it hangs by little, so that coarse levels have much to
+// say, and cells beside a cycle's box that kept theirs to themselves fed energy to it, cycle by cycle.
+TEST(Relaxation, CyclesRoundAContactBetweenTilesEndWhereWholeOnesDo) {
+  constexpr int kSize = 48, kWide = 5;
+  LabelVolume volume = block({kSize, kSize, kSize}, glm::dvec3(1e-3));
+  for (int k = 0; k < kSize; ++k) {
+    for (int j = 0; j < kSize; ++j) {
+      for (int i = 0; i < kSize; ++i) {
+        const double x = i / 2.0, y = j / 2.0, z = k / 2.0, half = kSize / 2.0;
+        const double lumps =
+            std::sin(x + 0.4 * y + 1.0) + std::sin(y - 0.5 * z + 2.0) + std::sin(z + 0.3 * x + 3.0);
+        const double aside = std::hypot(i - half, j - half);
+        const bool ball = std::hypot(aside, k - half) < half - 1.0 && lumps > -0.3;
+        const bool stem = k < kSize / 6 && aside < kSize / 10.0;
+        volume.labels[volume.index(i, j, k)] = ball || stem ? 1 : 0;
+      }
+    }
+  }
+  LatticeOptions options = tests::made_of(
+      {.young_Pa = 1e4, .poisson = 0.3, .stretch_min = 1e-3, .stretch_max = 100.0, .shear = 100.0});
+  const Lattice lattice(volume, options);
+  const auto pressed = [&](Displacement& state, std::vector<VoxelId>& held) {
+    std::array<int, 3> low{kSize, kSize, kSize}, high{};
+    for (int j = 0; j < kSize; ++j) {
+      for (int i = 0; i < kSize; ++i) {
+        if (std::hypot(i - kSize / 2, j - kSize / 2) > kWide) continue;
+        int k = kSize - 1;
+        while (k > kSize / 2 && !lattice.filled(voxel_at(lattice, i, j, k))) --k;
+        if (k == kSize / 2) continue;
+        hold(state, held, voxel_at(lattice, i, j, k), {0.0, 0.0, -4e-4});
+        const std::array<int, 3> at{i, j, k};
+        for (std::size_t d = 0; d < 3; ++d) {
+          low[d] = std::min(low[d], at[d]);
+          high[d] = std::max(high[d], at[d]);
+        }
+      }
+    }
+    return std::pair{low, high};
+  };
+  const auto relaxed = [&](bool tiles) {
+    Displacement state(lattice);
+    std::vector<VoxelId> held;
+    const auto [low, high] = pressed(state, held);
+    Relaxation relaxation(lattice);
+    relaxation.stir_all();
+    relaxation.wake();
+    for (int n = 0; n < 100 && !tiles; ++n) relaxation.run_cycle(state, {}, held);
+    for (int n = 0; n < 4000 && tiles; ++n) {
+      relaxation.relax_contact(state, {}, held, low, high);
+      relaxation.run(state, {}, held, 4000);
+    }
+    return energy_of(lattice, options, state);
+  };
+  const double expected = relaxed(false), found = relaxed(true);
+  std::cout << "energy " << found / expected << " times the converged one\n";
+  EXPECT_LE(found, 1.02 * expected);
+}
+
 // ---- limits ----
 
 struct Tight {
