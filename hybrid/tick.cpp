@@ -114,7 +114,9 @@ double move_proxy(const World& world, WorldState& state, const glm::dvec3& devic
   const double k = world.tool.stiffness_N_per_m;
   glm::dmat3 model(k);
   for (const voxel::Reaction& reaction : state.reactions) model += reaction.stiffness_N_per_m;
-  const glm::dmat3 metric = model + glm::dmat3(state.hidden_stiffness_N_per_m);
+  // What tissue hides, it hides where it is pressed: out of contact the proxy goes to the device, at once.
+  const bool pressed = model != glm::dmat3(k);
+  const glm::dmat3 metric = pressed ? model + glm::dmat3(state.hidden_stiffness_N_per_m) : model;
   const glm::dvec3 pull = pull_on_proxy(world, state, device);
   // Without tissue the target is the device, to the last bit.
   const glm::dvec3 target = near_soft ? state.proxy_m + glm::inverse(metric) * pull : device;
@@ -128,17 +130,30 @@ double move_proxy(const World& world, WorldState& state, const glm::dvec3& devic
   return glm::length(delta);
 }
 
+// How deep a tool at `point` is in what soft objects let it have, at most: the last `count` planes (m).
+double deepest(const WorldState& state, std::size_t count, const glm::dvec3& point) noexcept {
+  double most = 0.0;
+  for (std::size_t i = state.planes.size() - count; i < state.planes.size(); ++i)
+    most = std::max(most, state.planes[i].offset - glm::dot(state.planes[i].normal, point));
+  return most;
+}
+
 // Tissue that anchors, bone or its own chain keep from leaving the tool's way: the tool leaves its way
 // instead, if need be back to `before`, where it was at the start of the tick.
 void give_way(const World& world, WorldState& state, const glm::dvec3& before, Sweep& sweep) noexcept {
   const double radius = world.tool.radius_m;
   if (!gather_planes(world, state, state.proxy_m, 2.0 * radius)) return;
-  if (soft_bounds(world, state, state.proxy_m) == 0) return;
+  const std::size_t bounds = soft_bounds(world, state, state.proxy_m);
+  if (bounds == 0) return;
   const polygon::PlaneMinimum out =
       polygon::minimise_on_planes(state.proxy_m, glm::dmat3(1.0), state.planes, 1e-9 * radius);
-  // Rigid half-spaces were gathered this far only. Too deep in tissue to see a way out, the way back is one.
-  const bool found = out.feasible && glm::length(out.point - state.proxy_m) <= radius;
-  state.proxy_m = found ? out.point : before;
+  // Rigid half-spaces were gathered this far only. Too deep in tissue to see a way out, the way back is one;
+  // but not where it was deeper still, and is being pulled out.
+  if (out.feasible && glm::length(out.point - state.proxy_m) <= radius) {
+    state.proxy_m = out.point;
+  } else if (deepest(state, bounds, before) <= deepest(state, bounds, state.proxy_m)) {
+    state.proxy_m = before;
+  }
   sweep.point = state.proxy_m;
 }
 
