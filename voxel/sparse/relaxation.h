@@ -71,8 +71,6 @@ class Relaxation {
   // Octets q0 … q1 along x, counted from the first voxel on, and rows j0 … j1 and k0 … k1, all included.
   struct RowBox {
     int q0 = 0, q1 = -1, j0 = 0, j1 = -1, k0 = 0, k1 = -1;
-
-    [[nodiscard]] bool has(int j, int k) const { return j >= j0 && j <= j1 && k >= k0 && k <= k1; }
   };
   // Of one cycle, on one level.
   struct LevelBoxes {

@@ -164,7 +164,6 @@ HYBRID_INLINE void look_beyond(OctetMask& beyond, const Octet& own, const Octet&
   }
 }
 
-// Which axes may have links beyond the band, bit by bit, if the row stood at `u`.
 // The same where each lane has limits of its own.
 HYBRID_INLINE void look_beyond_lanes(OctetMask& beyond, const Octet& own, const Octet& x_down,
                                      const Octet& x_up, const LevelRow& row, const RowLimits::Written& w,
@@ -190,12 +189,15 @@ HYBRID_INLINE void look_beyond_lanes(OctetMask& beyond, const Octet& own, const 
   }
 }
 
-template <bool kUniform>
-HYBRID_INLINE unsigned beyond_band(const Axes& u, const LevelRow& row, const RowLimits& limits,
-                                   OctetSpan span, float tight) {
-  std::array<OctetMask, 3> beyond{};
-  const std::array<Band, 3> band{Band((*limits.of)[0], tight), Band((*limits.of)[1], tight),
-                                 Band((*limits.of)[2], tight)};
+// How a row's links are looked at: by the tightest limits, neighbours that are not there taken for neighbours
+// at rest, so that no spring is read; by the same, only where there is a link; each by its own.
+enum class Beyond : std::uint8_t { tightest, linked, lanes };
+
+// True when any octet has such a link.
+template <Beyond kBeyond>
+HYBRID_INLINE bool look_at_axes(std::array<OctetMask, 3>& beyond, const Axes& u, const LevelRow& row,
+                                const RowLimits& limits, const std::array<Band, 3>& band, OctetSpan span) {
+  beyond = {};
 #pragma GCC unroll 1
   for (int octet = span.first; octet <= span.last; ++octet) {
     const auto n = static_cast<std::size_t>(octet - span.first);
@@ -204,44 +206,32 @@ HYBRID_INLINE unsigned beyond_band(const Axes& u, const LevelRow& row, const Row
       Octet x_down, x_up;
       shift_down(x_down, u[axis][n], u[axis][n + 1]);
       shift_up(x_up, u[axis][n + 1], u[axis][n + 2]);
-      look_beyond<true>(beyond[axis], u[axis][n + 1], x_down, x_up, row, band[axis], axis, octet);
+      if constexpr (kBeyond == Beyond::lanes) {
+        look_beyond_lanes(beyond[axis], u[axis][n + 1], x_down, x_up, row, *limits.lanes, axis, octet);
+      } else {
+        look_beyond<kBeyond == Beyond::tightest>(beyond[axis], u[axis][n + 1], x_down, x_up, row, band[axis],
+                                                 axis, octet);
+      }
     }
+  }
+  const OctetMask all = beyond[0] | beyond[1] | beyond[2];
+  return any(all);
+}
+
+// Which axes may have links beyond the band, bit by bit, if the row stood at `u`. Most rows have none, and
+// each look costs more than the one before it.
+template <bool kUniform>
+HYBRID_INLINE unsigned beyond_band(const Axes& u, const LevelRow& row, const RowLimits& limits,
+                                   OctetSpan span, float tight) {
+  std::array<OctetMask, 3> beyond{};
+  const std::array<Band, 3> band{Band((*limits.of)[0], tight), Band((*limits.of)[1], tight),
+                                 Band((*limits.of)[2], tight)};
+  if (!look_at_axes<Beyond::tightest>(beyond, u, row, limits, band, span)) return 0;
+  if constexpr (!kUniform) {
+    if (!look_at_axes<Beyond::linked>(beyond, u, row, limits, band, span)) return 0;
+    if (limits.lanes != nullptr && !look_at_axes<Beyond::lanes>(beyond, u, row, limits, band, span)) return 0;
   }
   unsigned out = 0;
-  OctetMask all = beyond[0] | beyond[1] | beyond[2];
-  if (!any(all)) return out;
-  if (!kUniform) {
-    // So far, neighbours that are not there counted as neighbours at rest: springs need not be read then.
-    beyond = {};
-#pragma GCC unroll 1
-    for (int octet = span.first; octet <= span.last; ++octet) {
-      const auto n = static_cast<std::size_t>(octet - span.first);
-#pragma GCC unroll 3
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        Octet x_down, x_up;
-        shift_down(x_down, u[axis][n], u[axis][n + 1]);
-        shift_up(x_up, u[axis][n + 1], u[axis][n + 2]);
-        look_beyond<false>(beyond[axis], u[axis][n + 1], x_down, x_up, row, band[axis], axis, octet);
-      }
-    }
-    all = beyond[0] | beyond[1] | beyond[2];
-    if (!any(all)) return out;
-  }
-  if (!kUniform && limits.lanes != nullptr) {
-    // Tighter links are elsewhere in the row, mostly.
-    beyond = {};
-#pragma GCC unroll 1
-    for (int octet = span.first; octet <= span.last; ++octet) {
-      const auto n = static_cast<std::size_t>(octet - span.first);
-#pragma GCC unroll 3
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        Octet x_down, x_up;
-        shift_down(x_down, u[axis][n], u[axis][n + 1]);
-        shift_up(x_up, u[axis][n + 1], u[axis][n + 2]);
-        look_beyond_lanes(beyond[axis], u[axis][n + 1], x_down, x_up, row, *limits.lanes, axis, octet);
-      }
-    }
-  }
   for (std::size_t axis = 0; axis < 3; ++axis) out |= any(beyond[axis]) ? 1U << axis : 0U;
   return out;
 }
