@@ -5,17 +5,21 @@
 // independent. After some voxels (the sources) moved, the new state is clamp(u, L, U), where
 // L(v) = max over sources of u(s) − dist(v→s), U(v) = min over sources of u(s) + dist(s→v), and dist is the
 // shortest path with an arc a→b of length hi and an arc b→a of length −lo for each link. It violates no link
-// if the old state violated none, and is the same whatever the order of visits: what runs here is a
-// label-correcting shortest path restricted to the voxels that move. (A first-come queue, as in Gibson 1997,
-// ends elsewhere; Schill's violation order, 1998, is Dijkstra on these paths.)
+// if the old state violated none. First everything is raised, then everything lowered (see chain_wave.h),
+// then what gives way to obstacles and to anchors does: two waves each. (A first-come queue, as in Gibson
+// 1997, ends elsewhere; Schill's violation order, 1998, is Dijkstra on these paths.)
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
 
+#include "voxel/chain_wave.h"
 #include "voxel/displacement.h"
 #include "voxel/lattice.h"
+#include "voxel/lazy_array.h"
 
 namespace voxel {
 
@@ -23,51 +27,55 @@ class ChainMail {
  public:
   explicit ChainMail(const Lattice& lattice);
 
+  static constexpr std::uint64_t kUnlimited = ChainWave::kUnlimited;
+  // Row updates that a wave takes in any case, so that what is around a contact is always settled: a row is
+  // 32 voxels along x, and rows are taken in the order of their distance.
+  static constexpr std::uint64_t kNearest = 64;
+
   // Restores every link after the voxels in `sources` were moved in `state` by `moves` (unit: meter), which
   // violated no link before they were. Sources give way to anchors and obstacles (indexed by surface number;
-  // empty: none): a source that the chain cannot follow is itself pulled back, so that afterwards no link is
-  // violated, whatever was asked. Each source is given once. Allocates nothing.
+  // empty: none), those that cannot all be where they were put to one another: afterwards no link is violated
+  // by more than floats round, whatever was asked. Each source is given once; their order changes no bit.
+  // Rounding does not add up over calls: a link is violated by a few roundings of its ends at most, however
+  // old the state. Allocates nothing.
+  //
+  // With a budget (unit: row update, about 0.1 us), what is beyond it waits, and is finished by later calls
+  // of either function; waiting_rows() says where. Meanwhile a link is violated only if one of its ends is in
+  // a row that waits. What may move a voxel within the limits of its links, where these leave it any room,
+  // may do so in between. When nothing waits any more, no link is violated.
   void settle(Displacement& state, std::span<const VoxelId> sources, std::span<const glm::vec3> moves,
-              std::span<const Obstacle> obstacles, std::span<const std::uint32_t> surface_number) noexcept;
+              std::span<const Obstacle> obstacles, std::uint64_t budget = kUnlimited) noexcept;
+  // Goes on with what waits.
+  void finish(Displacement& state, std::span<const Obstacle> obstacles,
+              std::uint64_t budget = kUnlimited) noexcept;
+  [[nodiscard]] std::span<const RowId> waiting_rows() const { return wave_.waiting_rows(); }
 
-  // Voxels that moved in the last settle(), sources included; each once.
-  [[nodiscard]] std::span<const VoxelId> moved() const { return moved_; }
-  // Link checks of the last settle(): the work done, in candidates.
-  [[nodiscard]] std::uint64_t candidates() const { return candidates_; }
+  // Rows that moved in the last call, those of the sources included; each once.
+  [[nodiscard]] std::span<const RowId> moved_rows() const { return wave_.moved_rows(); }
+  // Voxels in these rows: what moved, and what stands beside it.
+  [[nodiscard]] std::size_t moved_count() const noexcept;
+  // Row updates of the last call.
+  [[nodiscard]] std::uint64_t work() const { return wave_.work(); }
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
-  enum Mark : std::uint8_t {
-    untouched = 0,
-    raised = 1,
-    lowered = 2,
-    queued = 4,
-    fixed = 8,
-    listed = 16,
-    pulled = 32
-  };
-
-  void enqueue(VoxelId v) noexcept;
-  void begin_axis() noexcept;
-  void spread(Displacement& state, int axis) noexcept;
+  [[nodiscard]] float margin_of(const Displacement& state, int axis, std::span<const VoxelId> voxels,
+                                std::span<const glm::vec3> moves) const noexcept;
   void spread_moves(Displacement& state, std::span<const VoxelId> voxels,
                     std::span<const glm::vec3> moves) noexcept;
-  bool stop_at(Displacement& state, std::span<const Obstacle> obstacles,
-               std::span<const std::uint32_t> surface_number) noexcept;
-  void visit(Displacement& state, int axis, VoxelId from, VoxelId to, float low, float high) noexcept;
-  void note_moved(VoxelId v) noexcept;
-  void note_pulled(VoxelId anchor) noexcept;
+  void spread_waiting(Displacement& state) noexcept;
+  void give_way(Displacement& state, std::span<const Obstacle> obstacles) noexcept;
+  void take(std::uint64_t updates) noexcept { left_ -= std::min(left_, updates); }
+  bool stop_at(Displacement& state, std::span<const Obstacle> obstacles) noexcept;
 
   const Lattice& lattice_;
-  std::vector<std::uint8_t> mark_;  // [v] Mark bits
-  std::vector<VoxelId> ring_;       // queue; a voxel stands in it at most once
-  std::size_t head_ = 0, tail_ = 0;
-  std::vector<VoxelId> touched_;  // voxels with a mark to clear
-  std::vector<VoxelId> moved_;
-  std::vector<VoxelId> pulled_;   // anchors that the wave reached; each once
+  ChainWave wave_;
+  std::uint64_t left_ = 0;  // of the budget
+  std::array<float, 3>
+      margin_{};  // of this settle(), and those before of which something waits (unit: meter)
+  LazyArray<ChainWave::Source> raised_, lowered_;
   std::vector<VoxelId> stopped_;  // voxels put back onto their obstacles, and by how much
   std::vector<glm::vec3> stops_;
-  std::uint64_t candidates_ = 0;
 };
 
 // The most by which any link exceeds its limits (unit: meter), over the whole lattice; for tests.

@@ -5,9 +5,10 @@
 #include <array>
 #include <cstdint>
 #include <glm/vec3.hpp>
-#include <vector>
 
 #include "voxel/lattice.h"
+#include "voxel/lazy_array.h"
+#include "voxel/rest_offsets.h"
 
 namespace voxel {
 
@@ -21,25 +22,28 @@ struct Displacement {
   };
 
   explicit Displacement(const Lattice& lattice)
-      : role(lattice.size(), free),
-        row_held(lattice.springs().row.size(), 0),
-        row_obstacles(lattice.springs().row.size(), 0) {
-    for (auto& axis : u) axis.assign(lattice.size(), 0.0F);
+      : role(lattice.size()),
+        row_held(lattice.grid().rows()),
+        row_obstacles(lattice.grid().rows()),
+        rest(lattice) {
+    for (auto& axis : u) axis = LazyArray<float>(lattice.size());
   }
 
-  std::array<std::vector<float>, 3> u;                 // [axis][v] (unit: meter)
-  std::vector<std::uint8_t> role;                      // [v]
-  std::vector<std::uint16_t> row_held, row_obstacles;  // [row]: voxels of the row with that role
+  std::array<LazyArray<float>, 3> u;                // [axis][v] (unit: meter)
+  LazyArray<std::uint8_t> role;                     // [v]
+  LazyArray<std::uint8_t> row_held, row_obstacles;  // [row]: voxels of the row with that role
+  RestOffsets rest;
 
   [[nodiscard]] glm::dvec3 at(VoxelId v) const { return {u[0][v], u[1][v], u[2][v]}; }
   void set(VoxelId v, const glm::dvec3& value) {
     for (int a = 0; a < 3; ++a) u[static_cast<std::size_t>(a)][v] = static_cast<float>(value[a]);
   }
-  void set_role(VoxelId v, Role r, const Lattice& lattice) {
-    const std::size_t row = v / static_cast<std::size_t>(lattice.springs().dims[0]);
-    row_held[row] = static_cast<std::uint16_t>(row_held[row] + (r == held) - (role[v] == held));
+  void set_role(VoxelId v, Role r) {
+    if (role[v] == r) return;  // untouched tissue stays unwritten
+    const RowId row = v / kRow;
+    row_held[row] = static_cast<std::uint8_t>(row_held[row] + (r == held) - (role[v] == held));
     row_obstacles[row] =
-        static_cast<std::uint16_t>(row_obstacles[row] + (r == obstacle) - (role[v] == obstacle));
+        static_cast<std::uint8_t>(row_obstacles[row] + (r == obstacle) - (role[v] == obstacle));
     role[v] = r;
   }
 };

@@ -3,25 +3,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <glm/geometric.hpp>
 #include <limits>
 #include <stdexcept>
 
 namespace voxel {
 namespace {
 
-struct LinkModuli {
-  double along = 0.0, across = 0.0;  // (unit: Pa)
-};
-
-LinkModuli moduli_of(const LinkMaterial& material) {
-  const double nu = material.poisson;
-  return {material.young_Pa, material.young_Pa / (4.0 * (1.0 - nu * nu))};
-}
-
-// Two half links in series, each of its own material.
-double in_series(double a, double b) {
-  return 2.0 * a * b / (a + b);
-}
+constexpr std::size_t kSurfaceBlock = 1024;  // ids between two entries of surface_before_
+constexpr std::size_t kMostCells = std::size_t{1} << 31;
 
 void check_material(std::size_t label, const LinkMaterial& m) {
   const auto say = [label](const std::string& what) {
@@ -33,6 +24,7 @@ void check_material(std::size_t label, const LinkMaterial& m) {
   if (!(m.stretch_min > 0.0 && m.stretch_min <= 1.0)) say("a least stretch outside 0 < min <= 1");
   if (!(m.stretch_max >= 1.0 && std::isfinite(m.stretch_max))) say("a greatest stretch below 1");
   if (!(m.shear >= 0.0 && std::isfinite(m.shear))) say("a negative shear limit");
+  if (!(m.yield > 0.0)) say("a yield strain that is not positive; leave it out where nothing yields");
 }
 
 }  // namespace
@@ -46,42 +38,43 @@ Lattice::Lattice(const LabelVolume& volume, const LatticeOptions& options) : spa
   min_spacing_m_ = std::min({spacing_m_.x, spacing_m_.y, spacing_m_.z});
   max_spacing_m_ = std::max({spacing_m_.x, spacing_m_.y, spacing_m_.z});
   fill_labels(volume);
-  fill_springs(options);
+  fill_inside();
+  fill_links(options);
+  fill_force_scale();
   fill_anchors(volume, options);
-  fill_limits(options);
   find_surface();
 }
 
 void Lattice::fill_labels(const LabelVolume& volume) {
-  std::size_t cells = 1;
-  for (std::size_t d = 0; d < 3; ++d) {
-    springs_.dims[d] = volume.dims[d] + 2;
-    cells *= static_cast<std::size_t>(springs_.dims[d]);
+  std::size_t expected = 1, cells = 1;
+  for (const int n : volume.dims) {
+    expected *= static_cast<std::size_t>(std::max(n, 0));
+    cells *= static_cast<std::size_t>(std::max(n, 0)) + 2 * kRow;
+    if (cells > kMostCells) {
+      throw std::invalid_argument("a soft object of " + std::to_string(volume.dims[0]) + " x " +
+                                  std::to_string(volume.dims[1]) + " x " + std::to_string(volume.dims[2]) +
+                                  " voxels is too large; give it a coarser spacing");
+    }
   }
-  if (cells > static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max())) {
-    throw std::invalid_argument("a soft object of " + std::to_string(cells) +
-                                " lattice cells is too large; give it a coarser spacing");
-  }
-  std::size_t expected = 1;
-  for (const int n : volume.dims) expected *= static_cast<std::size_t>(std::max(n, 0));
   if (volume.labels.size() != expected)
     throw std::invalid_argument("a label volume must hold one label a voxel");
-  springs_.stride = {1, static_cast<std::size_t>(springs_.dims[0]),
-                     static_cast<std::size_t>(springs_.dims[0]) * static_cast<std::size_t>(springs_.dims[1])};
-  label_.assign(cells, 0);
-  springs_.row.assign(static_cast<std::size_t>(springs_.dims[1]) * static_cast<std::size_t>(springs_.dims[2]),
-                      {0, 0});
+  if (expected == 0)
+    throw std::invalid_argument("a soft object without a voxel: check its labels or intensity range");
+  grid_ = Grid(volume.dims);
+  label_ = LazyArray<std::uint8_t>(grid_.size());
+  row_filled_ = LazyArray<std::uint8_t>(grid_.rows());
+  const std::array<std::uint8_t, kRow> nothing{};
   for (int k = 0; k < volume.dims[2]; ++k) {
     for (int j = 0; j < volume.dims[1]; ++j) {
-      auto& row = springs_.row[static_cast<std::size_t>(k + 1) * static_cast<std::size_t>(springs_.dims[1]) +
-                               static_cast<std::size_t>(j + 1)];
-      for (int i = 0; i < volume.dims[0]; ++i) {
-        const std::uint8_t label = volume.labels[volume.index(i, j, k)];
-        if (label == 0) continue;
-        label_[at(i + 1, j + 1, k + 1)] = label;
-        if (row[1] == 0) row[0] = i + 1;
-        row[1] = i + 2;
-        ++voxel_count_;
+      for (int i = 0; i < volume.dims[0]; i += kRow) {
+        const auto count = static_cast<std::size_t>(std::min(kRow, volume.dims[0] - i));
+        const std::uint8_t* from = volume.labels.data() + volume.index(i, j, k);
+        // Rows of nothing are not written: empty space costs no memory.
+        if (std::memcmp(from, nothing.data(), count) == 0) continue;
+        std::memcpy(label_.data() + grid_.at(i, j, k), from, count);
+        const auto filled = count - static_cast<std::size_t>(std::count(from, from + count, std::uint8_t{0}));
+        row_filled_[grid_.at(i, j, k) / kRow] = static_cast<std::uint8_t>(filled);
+        voxel_count_ += filled;
       }
     }
   }
@@ -90,143 +83,274 @@ void Lattice::fill_labels(const LabelVolume& volume) {
   }
 }
 
-void Lattice::fill_springs(const LatticeOptions& options) {
-  std::array<LinkModuli, 256> moduli;
+void Lattice::fill_links(const LatticeOptions& options) {
   std::array<bool, 256> used{};
-  for (const std::uint8_t label : label_) used[label] = true;
+  for (RowId row = 0; row < grid_.rows(); ++row) {
+    if (row_filled_[row] == 0) continue;
+    const std::uint8_t* at = labels(row);
+    for (int i = 0; i < kRow; ++i) used[at[i]] = true;
+  }
+  // Equal materials share a number, so that the tables stay small.
+  std::vector<LinkMaterial> materials(1);  // [0]: nothing
   for (std::size_t label = 1; label < 256; ++label) {
     if (!used[label]) continue;
-    check_material(label, options.materials[label]);
-    moduli[label] = moduli_of(options.materials[label]);
+    const LinkMaterial& m = options.materials[label];
+    check_material(label, m);
+    const auto found = std::find(materials.begin() + 1, materials.end(), m);
+    material_[label] = static_cast<std::uint8_t>(found - materials.begin());
+    if (found == materials.end()) materials.push_back(m);
   }
+  material_count_ = materials.size();
+
   const glm::dvec3 h = spacing_m_;
-  const std::array<double, 3> area_by_length{h.y * h.z / h.x, h.x * h.z / h.y, h.x * h.y / h.z};
-  for (std::size_t d = 0; d < 3; ++d) {
-    springs_.along[d].assign(size(), 0.0F);
-    springs_.across[d].assign(size(), 0.0F);
+  area_by_length_m_ = {h.y * h.z / h.x, h.x * h.z / h.y, h.x * h.y / h.z};
+  moduli_.assign(material_count_, {});
+  for (std::size_t m = 1; m < material_count_; ++m)
+    moduli_[m] = {materials[m].young_Pa, across_modulus_Pa(materials[m].young_Pa, materials[m].poisson)};
+  for (int d = 0; d < 3; ++d) {
+    const auto ud = static_cast<std::size_t>(d);
+    within_[ud].assign(material_count_, {});
+    for (std::size_t m = 1; m < material_count_; ++m) {
+      within_[ud][m] = {static_cast<float>(moduli_[m].along_Pa * area_by_length_m_[ud]),
+                        static_cast<float>(moduli_[m].across_Pa * area_by_length_m_[ud])};
+    }
+    LinkLimit& tightest = tightest_[ud];
+    tightest = {-std::numeric_limits<float>::max(), std::numeric_limits<float>::max(),
+                std::numeric_limits<float>::max()};
+    limits_[ud].assign(material_count_ * material_count_, {});
+    constexpr float never = std::numeric_limits<float>::infinity();
+    yield_m_[ud].assign(material_count_ * material_count_, never);
+    first_yield_m_[ud] = never;
+    for (std::size_t ia = 1; ia < material_count_; ++ia) {
+      for (std::size_t ib = 1; ib < material_count_; ++ib) {
+        const LinkMaterial &a = materials[ia], &b = materials[ib];
+        LinkLimit& limit = limits_[ud][ia * material_count_ + ib];
+        // A link of two materials is half of each, so its limits are their means.
+        limit.along_low = static_cast<float>((0.5 * (a.stretch_min + b.stretch_min) - 1.0) * h[d]);
+        limit.along_high = static_cast<float>((0.5 * (a.stretch_max + b.stretch_max) - 1.0) * h[d]);
+        limit.across = static_cast<float>(0.5 * (a.shear + b.shear) * h[d]);
+        float& yield = yield_m_[ud][ia * material_count_ + ib];
+        yield = static_cast<float>(std::min(a.yield, b.yield) * h[d]);
+        first_yield_m_[ud] = std::min(first_yield_m_[ud], yield);
+        yields_ = yields_ || yield < never;
+        tightest.along_low = std::max(tightest.along_low, limit.along_low);
+        tightest.along_high = std::min(tightest.along_high, limit.along_high);
+        tightest.across = std::min(tightest.across, limit.across);
+        uniform_limits_ = uniform_limits_ && a.stretch_min == materials[1].stretch_min &&
+                          a.stretch_max == materials[1].stretch_max && a.shear == materials[1].shear;
+      }
+    }
   }
-  for (std::size_t a = 0; a < 3; ++a) springs_.inverse_diagonal[a].assign(size(), 0.0F);
-  std::size_t links = 0;
-  for (std::size_t v = 0; v < size(); ++v) {
-    if (label_[v] == 0) continue;
-    for (std::size_t d = 0; d < 3; ++d) {
-      const std::uint8_t other = label_[v + springs_.stride[d]];
-      if (other == 0) continue;
-      const LinkModuli &a = moduli[label_[v]], &b = moduli[other];
-      springs_.along[d][v] = static_cast<float>(in_series(a.along, b.along) * area_by_length[d]);
-      springs_.across[d][v] = static_cast<float>(in_series(a.across, b.across) * area_by_length[d]);
-      force_scale_N_ += static_cast<double>(springs_.along[d][v]) * spacing_m_[static_cast<int>(d)];
-      ++links;
+}
+
+// Which rows are inside a region of one label.
+void Lattice::fill_inside() {
+  inside_ = LazyArray<std::uint8_t>(grid_.rows());
+  LazyArray<std::uint8_t> whole(grid_.rows());  // label of a row that is all of one
+  for (RowId row = 0; row < grid_.rows(); ++row) {
+    if (row_filled_[row] != kRow) continue;
+    const std::uint8_t* at = labels(row);
+    if (std::count(at, at + kRow, at[0]) == kRow) whole[row] = at[0];
+  }
+  for (RowId row = 0; row < grid_.rows(); ++row) {
+    const std::uint8_t own = whole[row];
+    if (own == 0) continue;
+    bool same = true;
+    for (const RowId plane : {row - grid_.row_z, row, row + grid_.row_z}) {
+      for (const RowId r : {plane - 1, plane, plane + 1}) {
+        const VoxelId first = r * kRow;
+        same = same && whole[r] == own && label_[grid_.down(first, 0)] == own &&
+               label_[grid_.up(first + kRow - 1, 0)] == own;
+      }
+    }
+    if (same) inside_[row] = own;
+  }
+}
+
+void Lattice::fill_force_scale() {
+  std::vector<std::size_t> count(3 * material_count_ * material_count_);  // links by direction and materials
+  for (RowId row = 0; row < grid_.rows(); ++row) {
+    if (row_filled_[row] == 0) continue;
+    const std::uint8_t* at = labels(row);
+    for (int i = 0; i < kRow; ++i) {
+      if (at[i] == 0) continue;
+      const VoxelId v = row * kRow + static_cast<VoxelId>(i);
+      for (int d = 0; d < 3; ++d) {
+        const std::uint8_t other = label_[grid_.up(v, d)];
+        if (other != 0)
+          ++count[static_cast<std::size_t>(d) * material_count_ * material_count_ + pair_of(at[i], other)];
+      }
+    }
+  }
+  std::size_t links = 0, pair = 0;
+  for (int d = 0; d < 3; ++d) {
+    for (std::size_t a = 0; a < material_count_; ++a) {
+      for (std::size_t b = 0; b < material_count_; ++b) {
+        const std::size_t n = count[pair++];
+        links += n;
+        force_scale_N_ += static_cast<double>(n) * softer(moduli_[a], moduli_[b]).along_Pa *
+                          area_by_length_m_[static_cast<std::size_t>(d)] * spacing_m_[d];
+      }
     }
   }
   if (links > 0) force_scale_N_ /= static_cast<double>(links);
 }
 
+Spring Lattice::spring_among(const std::array<std::uint8_t, 9>& from, const std::array<std::uint8_t, 9>& to,
+                             int d) const noexcept {
+  const auto ud = static_cast<std::size_t>(d);
+  const std::uint8_t own = from[kLinkItself];
+  if (own == 0 || to[kLinkItself] == 0) return {};
+  bool one = true;
+  for (std::size_t n = 0; n < 9; ++n) one = one && from[n] == own && to[n] == own;
+  if (one) return within_[ud][own];
+  std::array<LinkModuli, 9> links;
+  for (std::size_t n = 0; n < 9; ++n) links[n] = softer(moduli_[from[n]], moduli_[to[n]]);
+  const LinkModuli moduli = link_moduli(links);
+  return {static_cast<float>(moduli.along_Pa * area_by_length_m_[ud]),
+          static_cast<float>(moduli.across_Pa * area_by_length_m_[ud])};
+}
+
+Spring Lattice::spring(VoxelId v, int d) const noexcept {
+  const std::uint8_t within = inside_[v / kRow];
+  if (within != 0) return spring_within(within, d);
+  const VoxelId w = grid_.up(v, d);
+  if (label_[v] == 0 || label_[w] == 0) return {};
+  const int p = (d + 1) % 3, q = (d + 2) % 3;
+  std::array<std::uint8_t, 9> from{}, to{};
+  const auto look = [&](VoxelId at, std::array<std::uint8_t, 9>& out) {
+    std::size_t n = 0;
+    for (const VoxelId a : {grid_.down(at, q), at, grid_.up(at, q)}) {
+      for (const VoxelId b : {grid_.down(a, p), a, grid_.up(a, p)}) out[n++] = material(b);
+    }
+  };
+  look(v, from);
+  look(w, to);
+  return spring_among(from, to, d);
+}
+
+VoxelSprings Lattice::springs_of(VoxelId v) const noexcept {
+  VoxelSprings out;
+  for (int d = 0; d < 3; ++d) {
+    const auto ud = static_cast<std::size_t>(d);
+    out.up[ud] = spring(v, d);
+    out.down[ud] = spring(grid_.down(v, d), d);
+  }
+  if (!anchored(v)) out.set_inverse();
+  return out;
+}
+
 void Lattice::fill_anchors(const LabelVolume& volume, const LatticeOptions& options) {
-  anchored_.assign(size(), 0);
+  anchored_ = LazyArray<std::uint8_t>(grid_.size());
   // The outermost voxels on a side are those in the outermost occupied layer of the lattice.
-  std::array<int, 3> low = springs_.dims, high{0, 0, 0};
-  for (std::size_t v = 0; v < size(); ++v) {
-    if (label_[v] == 0) continue;
-    const auto c = coordinates(static_cast<VoxelId>(v));
+  std::array<int, 3> low = grid_.dims, high{-1, -1, -1};
+  std::array<bool, 256> by_label{};
+  for (const std::uint8_t label : options.anchor_labels) by_label[label] = true;
+  const auto for_each_voxel = [this](const auto& visit) {
+    for (RowId row = 0; row < grid_.rows(); ++row) {
+      if (row_filled_[row] == 0) continue;
+      const std::array<int, 3> c = grid_.row_coordinates(row);
+      for (int i = 0; i < kRow; ++i) {
+        const VoxelId v = row * kRow + static_cast<VoxelId>(i);
+        if (label_[v] != 0) visit(v, std::array<int, 3>{(c[0] - 1) * kRow + i, c[1], c[2]});
+      }
+    }
+  };
+  for_each_voxel([&](VoxelId, const std::array<int, 3>& c) {
     for (std::size_t d = 0; d < 3; ++d) {
       low[d] = std::min(low[d], c[d]);
       high[d] = std::max(high[d], c[d]);
     }
-  }
-  std::array<bool, 256> by_label{};
-  for (const std::uint8_t label : options.anchor_labels) by_label[label] = true;
-  for (std::size_t v = 0; v < size(); ++v) {
-    if (label_[v] == 0) continue;
-    bool held = by_label[label_[v]];
-    const auto c = coordinates(static_cast<VoxelId>(v));
-    for (const std::string& face : options.anchor_faces) {
-      if (face.size() != 2 || (face[0] != '-' && face[0] != '+') || face[1] < 'x' || face[1] > 'z') {
-        throw std::invalid_argument("unknown anchor face \"" + face + "\"; use -x, +x, -y, +y, -z or +z");
-      }
-      const auto d = static_cast<std::size_t>(face[1] - 'x');
-      held = held || c[d] == (face[0] == '-' ? low[d] : high[d]);
+  });
+  struct Face {
+    std::size_t d;
+    int layer;
+  };
+  std::vector<Face> faces;
+  for (const std::string& face : options.anchor_faces) {
+    if (face.size() != 2 || (face[0] != '-' && face[0] != '+') || face[1] < 'x' || face[1] > 'z') {
+      throw std::invalid_argument("unknown anchor face \"" + face + "\"; use -x, +x, -y, +y, -z or +z");
     }
-    if (held) anchored_[v] = 1;
+    const auto d = static_cast<std::size_t>(face[1] - 'x');
+    faces.push_back({d, face[0] == '-' ? low[d] : high[d]});
   }
+  const auto anchor = [this](VoxelId v) {
+    anchored_count_ += anchored_[v] == 0 ? 1 : 0;
+    anchored_[v] = 1;
+  };
+  for_each_voxel([&](VoxelId v, const std::array<int, 3>& c) {
+    const bool on_face =
+        std::any_of(faces.begin(), faces.end(), [&c](const Face& f) { return c[f.d] == f.layer; });
+    if (on_face || by_label[label_[v]]) anchor(v);
+  });
   for (const std::size_t index : options.anchor_voxels) {
     if (index >= volume.labels.size())
       throw std::invalid_argument("an anchored voxel lies outside the volume");
     const auto nx = static_cast<std::size_t>(volume.dims[0]), ny = static_cast<std::size_t>(volume.dims[1]);
-    const VoxelId v = at(static_cast<int>(index % nx) + 1, static_cast<int>(index / nx % ny) + 1,
-                         static_cast<int>(index / (nx * ny)) + 1);
-    if (label_[v] != 0) anchored_[v] = 1;
+    const VoxelId v = at(static_cast<int>(index % nx), static_cast<int>(index / nx % ny),
+                         static_cast<int>(index / (nx * ny)));
+    if (label_[v] != 0) anchor(v);
   }
-  anchored_count_ = static_cast<std::size_t>(std::count(anchored_.begin(), anchored_.end(), std::uint8_t{1}));
   if (anchored_count_ == 0) {
     throw std::invalid_argument(
         "a free soft object has no equilibrium force: anchor a face, a label, or what touches bone");
   }
-  // What is anchored, and what has no link at all, has no degree of freedom.
-  for (std::size_t v = 0; v < size(); ++v) {
-    if (label_[v] == 0 || anchored_[v] != 0) continue;
-    for (int axis = 0; axis < 3; ++axis) {
-      double sum = 0.0;
-      for (int d = 0; d < 3; ++d) {
-        const float* k = springs_.stiffness(axis, d);
-        sum += static_cast<double>(k[v]) + static_cast<double>(k[v - stride(d)]);
-      }
-      if (sum > 0.0)
-        springs_.inverse_diagonal[static_cast<std::size_t>(axis)][v] = static_cast<float>(1.0 / sum);
-    }
-  }
-}
-
-void Lattice::fill_limits(const LatticeOptions& options) {
-  // Labels with equal limits share a class, so that the table stays small.
-  std::vector<LinkMaterial> classes;
-  std::array<bool, 256> used{};
-  for (const std::uint8_t label : label_) used[label] = true;
-  for (std::size_t label = 1; label < 256; ++label) {
-    if (!used[label]) continue;
-    const LinkMaterial& m = options.materials[label];
-    const auto same = [&m](const LinkMaterial& c) {
-      return c.stretch_min == m.stretch_min && c.stretch_max == m.stretch_max && c.shear == m.shear;
-    };
-    const auto found = std::find_if(classes.begin(), classes.end(), same);
-    limit_class_[label] = static_cast<std::size_t>(found - classes.begin());
-    if (found == classes.end()) classes.push_back(m);
-  }
-  class_count_ = classes.size();
-  for (int d = 0; d < 3; ++d) {
-    const double h = spacing_m_[d];
-    auto& table = limits_[static_cast<std::size_t>(d)];
-    LinkLimit& tightest = tightest_[static_cast<std::size_t>(d)];
-    tightest = {-std::numeric_limits<float>::max(), std::numeric_limits<float>::max(),
-                std::numeric_limits<float>::max()};
-    for (const LinkMaterial& a : classes) {
-      for (const LinkMaterial& b : classes) {
-        // A link of two materials is half of each, so its limits are their means.
-        LinkLimit limit;
-        limit.along_low = static_cast<float>((0.5 * (a.stretch_min + b.stretch_min) - 1.0) * h);
-        limit.along_high = static_cast<float>((0.5 * (a.stretch_max + b.stretch_max) - 1.0) * h);
-        limit.across = static_cast<float>(0.5 * (a.shear + b.shear) * h);
-        table.push_back(limit);
-        tightest.along_low = std::max(tightest.along_low, limit.along_low);
-        tightest.along_high = std::min(tightest.along_high, limit.along_high);
-        tightest.across = std::min(tightest.across, limit.across);
-      }
-    }
-  }
 }
 
 void Lattice::find_surface() {
-  for (std::size_t v = 0; v < size(); ++v) {
-    if (label_[v] == 0) continue;
-    bool outside = false;
-    for (int d = 0; d < 3; ++d) outside = outside || label_[v - stride(d)] == 0 || label_[v + stride(d)] == 0;
-    if (outside) surface_.push_back(static_cast<VoxelId>(v));
+  surface_before_.assign(grid_.size() / kSurfaceBlock + 2, 0);
+  for (RowId row = 0; row < grid_.rows(); ++row) {
+    const VoxelId first = row * kRow;
+    if (first % kSurfaceBlock == 0)
+      surface_before_[first / kSurfaceBlock] = static_cast<std::uint32_t>(surface_.size());
+    if (row_filled_[row] == 0) continue;
+    // Full rows among full rows have a surface at their ends at most.
+    const bool inside = row_filled_[row] == kRow && row_filled_[row - 1] == kRow &&
+                        row_filled_[row + 1] == kRow && row_filled_[row - grid_.row_z] == kRow &&
+                        row_filled_[row + grid_.row_z] == kRow;
+    for (int i = 0; i < kRow; i += inside ? kRow - 1 : 1) {
+      const VoxelId v = first + static_cast<VoxelId>(i);
+      if (label_[v] == 0) continue;
+      bool outside = false;
+      for (int d = 0; d < 3; ++d)
+        outside = outside || label_[grid_.down(v, d)] == 0 || label_[grid_.up(v, d)] == 0;
+      if (outside) surface_.push_back(v);
+    }
   }
+  surface_.shrink_to_fit();
+  const std::size_t known = (grid_.size() - 1) / kSurfaceBlock + 1;
+  for (std::size_t b = known; b < surface_before_.size(); ++b)
+    surface_before_[b] = static_cast<std::uint32_t>(surface_.size());
+}
+
+std::uint32_t Lattice::surface_number(VoxelId v) const noexcept {
+  const auto block = v / kSurfaceBlock;
+  const auto first = surface_.begin() + static_cast<std::ptrdiff_t>(surface_before_[block]),
+             last = surface_.begin() + static_cast<std::ptrdiff_t>(surface_before_[block + 1]);
+  const auto found = std::lower_bound(first, last, v);
+  return found != last && *found == v ? static_cast<std::uint32_t>(found - surface_.begin()) : kNoSurface;
+}
+
+glm::dvec3 Lattice::outward(VoxelId v) const noexcept {
+  const auto c = coordinates(v);
+  glm::dvec3 sum(0.0);
+  for (int k = -1; k <= 1; ++k) {
+    for (int j = -1; j <= 1; ++j) {
+      for (int i = -1; i <= 1; ++i) {
+        if (!filled(at(c[0] + i, c[1] + j, c[2] + k))) sum += glm::dvec3(i, j, k);
+      }
+    }
+  }
+  sum /= spacing_m_;
+  const double length = glm::length(sum);
+  return length > 0.0 ? sum / length : sum;
 }
 
 std::size_t Lattice::memory_bytes() const {
-  return size() * (2 + 9 * sizeof(float)) + surface_.size() * sizeof(VoxelId) +
-         springs_.row.size() * sizeof(springs_.row[0]);
+  return label_.resident_bytes() + anchored_.resident_bytes() + row_filled_.resident_bytes() +
+         inside_.resident_bytes() + surface_.size() * sizeof(VoxelId) +
+         surface_before_.size() * sizeof(std::uint32_t) +
+         3 * limits_[0].size() * (sizeof(LinkLimit) + sizeof(float));
 }
 
 }  // namespace voxel

@@ -2,33 +2,37 @@
 // The constant half of a soft object: which voxels there are, how stiff each link is, how far each link
 // may stretch, what is anchored. Nothing here changes while a person touches it.
 //
-// Storage is a dense grid with an empty border of one voxel, so that every voxel has six neighbours and no
-// bound is ever checked. Voxel v's neighbour along +d is v + stride(d).
+// A voxel costs its label: a link's stiffness follows from the labels around it (voxel/link_weight.h), its
+// limits from those at its two ends, and rest positions from the index (see grid.h).
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/vec3.hpp>
+#include <limits>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "voxel/grid.h"
+#include "voxel/lazy_array.h"
+#include "voxel/link_weight.h"
 #include "voxel/volume.h"
 
 namespace voxel {
 
-using VoxelId = std::uint32_t;  // index into the padded grid
-
-// What a label is made of. Springs of E·A/h along a link and G·A/h across it (h its length, A the area a link
-// stands for), G = E / (4(1−ν²)): pressing a face then feels the contact modulus E/(1−ν²) of the elastic
-// half-space.
+// What a label is made of.
 struct LinkMaterial {
   double young_Pa = 5e3;
   double poisson = 0.3;
   double stretch_min = 0.4;  // shortest, in rest lengths
   double stretch_max = 1.6;  // longest
   double shear = 0.6;        // most slip across the link, in its rest length
+  // Strain beyond which a link keeps what is beyond (voxel/yield.h), of its rest length.
+  double yield = std::numeric_limits<double>::infinity();
+
+  friend bool operator==(const LinkMaterial&, const LinkMaterial&) = default;
 };
 
 // Bounds of the displacement difference u(b) − u(a) of a link a→b in +d (unit: meter).
@@ -44,19 +48,28 @@ struct LatticeOptions {
   std::vector<std::size_t> anchor_voxels;  // indices into the volume's labels
 };
 
-// Springs of one level of the multigrid hierarchy; level 0 is the lattice itself.
-struct Springs {
-  std::array<int, 3> dims{0, 0, 0};  // padded
-  std::array<std::size_t, 3> stride{1, 0, 0};
-  std::array<std::vector<float>, 3> along;             // [d][v]: stiffness along link v → v+stride(d) (N/m)
-  std::array<std::vector<float>, 3> across;            // [d][v]: across it
-  std::array<std::vector<float>, 3> inverse_diagonal;  // [axis][v]: 1 / Σ stiffness; 0 where nothing may move
-  std::vector<std::array<int, 2>> row;  // [k·dims[1] + j]: first and one past last filled voxel
+// Stiffness of one link (unit: N/m).
+struct Spring {
+  float along = 0.0F, across = 0.0F;
 
-  [[nodiscard]] std::size_t size() const { return row.size() * static_cast<std::size_t>(dims[0]); }
-  [[nodiscard]] const float* stiffness(int axis, int d) const {
-    const auto ud = static_cast<std::size_t>(d);
-    return axis == d ? along[ud].data() : across[ud].data();
+  [[nodiscard]] float on(int axis, int d) const { return axis == d ? along : across; }
+
+  friend bool operator==(const Spring&, const Spring&) = default;
+};
+
+// The six links of a voxel, by direction, and 1 / Σ of them on each axis, 0 where nothing may move.
+struct VoxelSprings {
+  std::array<Spring, 3> up, down;
+  std::array<float, 3> inverse{};
+
+  // Of a voxel that may move.
+  void set_inverse() noexcept {
+    for (int axis = 0; axis < 3; ++axis) {
+      float sum = 0.0F;
+      for (std::size_t d = 0; d < 3; ++d)
+        sum += up[d].on(axis, static_cast<int>(d)) + down[d].on(axis, static_cast<int>(d));
+      inverse[static_cast<std::size_t>(axis)] = sum > 0.0F ? 1.0F / sum : 0.0F;
+    }
   }
 };
 
@@ -66,43 +79,68 @@ class Lattice {
   // material out of range, more than 2^31 cells.
   Lattice(const LabelVolume& volume, const LatticeOptions& options);
 
-  [[nodiscard]] const Springs& springs() const { return springs_; }
-  [[nodiscard]] std::size_t stride(int d) const { return springs_.stride[static_cast<std::size_t>(d)]; }
-  [[nodiscard]] std::size_t size() const { return label_.size(); }
+  [[nodiscard]] const Grid& grid() const { return grid_; }
+  [[nodiscard]] std::size_t size() const { return label_.size(); }  // of the grid, the border included
   [[nodiscard]] std::size_t voxel_count() const { return voxel_count_; }
-  [[nodiscard]] std::span<const VoxelId> surface() const { return surface_; }
+  [[nodiscard]] std::size_t anchored_count() const { return anchored_count_; }
   [[nodiscard]] bool filled(VoxelId v) const { return label_[v] != 0; }
   [[nodiscard]] bool anchored(VoxelId v) const { return anchored_[v] != 0; }
-  [[nodiscard]] std::size_t anchored_count() const { return anchored_count_; }
   [[nodiscard]] std::uint8_t label(VoxelId v) const { return label_[v]; }
+  [[nodiscard]] const std::uint8_t* labels(RowId row) const {
+    return label_.data() + row * std::size_t{kRow};
+  }
+  [[nodiscard]] int filled_in(RowId row) const { return row_filled_[row]; }
   [[nodiscard]] const glm::dvec3& spacing_m() const { return spacing_m_; }
   [[nodiscard]] double min_spacing_m() const { return min_spacing_m_; }
   [[nodiscard]] double max_spacing_m() const { return max_spacing_m_; }
-  // Force that stretches an average link to twice its length (unit: newton): the scale by which residuals are
-  // small.
+  // Force that stretches an average link, were it a whole one, to twice its length (unit: newton): the scale
+  // by which residuals are small.
   [[nodiscard]] double force_scale_N() const { return force_scale_N_; }
 
+  [[nodiscard]] VoxelId at(int i, int j, int k) const { return grid_.at(i, j, k); }
+  [[nodiscard]] std::array<int, 3> coordinates(VoxelId v) const { return grid_.coordinates(v); }
+  [[nodiscard]] VoxelId up(VoxelId v, int d) const { return grid_.up(v, d); }
+  [[nodiscard]] VoxelId down(VoxelId v, int d) const { return grid_.down(v, d); }
   // Centre of a voxel at rest, volume frame (unit: meter).
   [[nodiscard]] glm::dvec3 rest(VoxelId v) const {
     const auto c = coordinates(v);
-    return {(c[0] - 1) * spacing_m_.x, (c[1] - 1) * spacing_m_.y, (c[2] - 1) * spacing_m_.z};
-  }
-  [[nodiscard]] std::array<int, 3> coordinates(VoxelId v) const {  // padded
-    const auto nx = static_cast<std::uint32_t>(springs_.dims[0]),
-               ny = static_cast<std::uint32_t>(springs_.dims[1]);
-    return {static_cast<int>(v % nx), static_cast<int>((v / nx) % ny), static_cast<int>(v / (nx * ny))};
-  }
-  [[nodiscard]] VoxelId at(int i, int j, int k) const {  // padded coordinates
-    return static_cast<VoxelId>(static_cast<std::size_t>(i) + static_cast<std::size_t>(j) * stride(1) +
-                                static_cast<std::size_t>(k) * stride(2));
+    return {c[0] * spacing_m_.x, c[1] * spacing_m_.y, c[2] * spacing_m_.z};
   }
 
-  // Limit of the link v → v+stride(d); only meaningful where both ends are filled.
-  [[nodiscard]] const LinkLimit& limit(VoxelId v, int d) const {
-    return limits_[static_cast<std::size_t>(d)]
-                  [limit_class_[label_[v]] * class_count_ + limit_class_[label_[v + stride(d)]]];
+  // Voxels with a missing neighbour, in the order of their ids, and the number of one of them among these;
+  // kNoSurface for one inside.
+  static constexpr std::uint32_t kNoSurface = 0xFFFFFFFFU;
+  [[nodiscard]] std::span<const VoxelId> surface() const { return surface_; }
+  [[nodiscard]] std::uint32_t surface_number(VoxelId v) const noexcept;
+  // Away from the object at a surface voxel at rest, by its 26 neighbours: unit, volume frame; 0 where these
+  // do not say, in a sheet one voxel thick.
+  [[nodiscard]] glm::dvec3 outward(VoxelId v) const noexcept;
+
+  // Of the link v → up(v, d); nothing where an end is missing. It looks at up to eighteen labels: what a tick
+  // asks for, it asks of Couplings.
+  [[nodiscard]] Spring spring(VoxelId v, int d) const noexcept;
+  [[nodiscard]] VoxelSprings springs_of(VoxelId v) const noexcept;
+  // The label that a row, the eight rows beside it and the voxels beyond all their ends are of, all of them;
+  // 0 where they are not of one. Every link of the row's voxels is then within that label.
+  [[nodiscard]] std::uint8_t inside(RowId row) const { return inside_[row]; }
+  [[nodiscard]] const Spring& spring_within(std::uint8_t label, int d) const {
+    return within_[static_cast<std::size_t>(d)][material_[label]];
   }
-  // Bounds of u(b) − u(a) on `axis` for the link v → v+stride(d).
+  // Number of a voxel's material; equal ones share it. 0: no voxel.
+  [[nodiscard]] std::uint8_t material(VoxelId v) const { return material_[label_[v]]; }
+  // Of a link in +d whose parallels (link_weight.h) leave voxels of materials `from` and end in `to`.
+  [[nodiscard]] Spring spring_among(const std::array<std::uint8_t, 9>& from,
+                                    const std::array<std::uint8_t, 9>& to, int d) const noexcept;
+
+  // Limit of the link v → up(v, d); only meaningful where both ends are filled.
+  [[nodiscard]] const LinkLimit& limit(VoxelId v, int d) const {
+    return limits_[static_cast<std::size_t>(d)][pair_of(label_[v], label_[grid_.up(v, d)])];
+  }
+  // Of a link in direction d between two labels.
+  [[nodiscard]] const LinkLimit& limit_between(std::uint8_t a, std::uint8_t b, int d) const {
+    return limits_[static_cast<std::size_t>(d)][pair_of(a, b)];
+  }
+  // Bounds of u(b) − u(a) on `axis` for the link v → up(v, d).
   [[nodiscard]] std::array<float, 2> bounds(VoxelId v, int d, int axis) const {
     const LinkLimit& l = limit(v, d);
     return axis == d ? std::array<float, 2>{l.along_low, l.along_high}
@@ -110,26 +148,47 @@ class Lattice {
   }
   // No link in direction d is tighter than this: where it holds, no link needs to be looked at one by one.
   [[nodiscard]] const LinkLimit& tightest(int d) const { return tightest_[static_cast<std::size_t>(d)]; }
+  // Every link in a direction has the same limits: those of tightest().
+  [[nodiscard]] bool uniform_limits() const { return uniform_limits_; }
+
+  // Does any link yield; from which difference on, on any axis, the link v → up(v, d) does, that of its ends
+  // which yields first (m, infinite: never); and from which on some link in that direction does.
+  [[nodiscard]] bool yields() const { return yields_; }
+  [[nodiscard]] float yield_m(VoxelId v, int d) const {
+    return yield_m_[static_cast<std::size_t>(d)][pair_of(label_[v], label_[grid_.up(v, d)])];
+  }
+  [[nodiscard]] float first_yield_m(int d) const { return first_yield_m_[static_cast<std::size_t>(d)]; }
 
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
+  [[nodiscard]] std::size_t pair_of(std::uint8_t a, std::uint8_t b) const {
+    return std::size_t{material_[a]} * material_count_ + material_[b];
+  }
   void fill_labels(const LabelVolume& volume);
   void fill_anchors(const LabelVolume& volume, const LatticeOptions& options);
-  void fill_springs(const LatticeOptions& options);
-  void fill_limits(const LatticeOptions& options);
+  void fill_inside();
+  void fill_links(const LatticeOptions& options);
+  void fill_force_scale();
   void find_surface();
 
-  Springs springs_;
+  Grid grid_;
   glm::dvec3 spacing_m_{1e-3};
   double min_spacing_m_ = 1e-3, max_spacing_m_ = 1e-3;
   double force_scale_N_ = 0.0;
-  std::size_t voxel_count_ = 0, anchored_count_ = 0, class_count_ = 1;
-  std::vector<std::uint8_t> label_, anchored_;
-  std::vector<VoxelId> surface_;
-  std::array<std::size_t, 256> limit_class_{};    // label → class of equal limits
-  std::array<std::vector<LinkLimit>, 3> limits_;  // [d][class a · class_count + class b]
+  bool uniform_limits_ = true, yields_ = false;
+  std::size_t voxel_count_ = 0, anchored_count_ = 0, material_count_ = 1;
+  LazyArray<std::uint8_t> label_, anchored_, row_filled_, inside_;
+  std::array<std::uint8_t, 256> material_{};  // label → number among equal materials; 0: empty
+  std::vector<LinkModuli> moduli_;            // [material]; [0]: none
+  std::array<double, 3> area_by_length_m_{};
+  std::array<std::vector<Spring>, 3> within_;     // [d][material]
+  std::array<std::vector<LinkLimit>, 3> limits_;  // [d][material a · material_count + material b]
   std::array<LinkLimit, 3> tightest_;
+  std::array<std::vector<float>, 3> yield_m_;  // as limits_
+  std::array<float, 3> first_yield_m_{};
+  std::vector<VoxelId> surface_;
+  std::vector<std::uint32_t> surface_before_;  // [id / kSurfaceBlock] surface voxels with smaller ids
 };
 
 }  // namespace voxel

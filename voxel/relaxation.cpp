@@ -4,513 +4,370 @@
 #include <algorithm>
 #include <cmath>
 
-#include "voxel/wide.h"
-
 namespace voxel {
 namespace {
 
 constexpr int kCoarsestSweeps = 8;
-constexpr std::size_t kMaxLevels = 10;
-constexpr double kTouching = 1e-6;  // of the spacing: nearer to its obstacle than this a voxel lies on it
-constexpr int kPatience = 40;       // cycles without gain before an object counts as resting
+constexpr std::uint64_t kLetGoEvery = 8;  // rounds
+constexpr int kPatience = 40;             // cycles without gain before an object counts as resting
+constexpr double kWorse = 1.05;
+constexpr float kHarder = 8.0F, kSofter = 0.97F, kHardest = 1e4F;
 constexpr double kGain = 0.98;      // of the least residual so far: less is a gain
-
-VoxelId cell_at(const Springs& s, int i, int j, int k) {
-  return static_cast<VoxelId>(static_cast<std::size_t>(i) + static_cast<std::size_t>(j) * s.stride[1] +
-                              static_cast<std::size_t>(k) * s.stride[2]);
-}
-// Padded index of the cell that holds padded index i of the next finer level.
-constexpr int parent(int i) {
-  return (i + 1) / 2;
-}
-
-std::vector<std::uint64_t> costs_by_plane(const Springs& s) {
-  std::vector<std::uint64_t> cost(static_cast<std::size_t>(s.dims[2]), 0);
-  for (std::size_t row = 0; row < s.row.size(); ++row) {
-    cost[row / static_cast<std::size_t>(s.dims[1])] +=
-        static_cast<std::uint64_t>(s.row[row][1] - s.row[row][0]);
-  }
-  return cost;
-}
+constexpr double kNearRest = 10.0;  // times the tolerance: what limits hold moves together from here on
+constexpr double kProgress = 1e-3;  // of the spacing: clusters that move further are on their way
+constexpr std::uint64_t kNextFirst = 7919;   // of these voxels is looked at first in the next round
+constexpr int kContactMargin = 3;            // cells round the contact that are smoothed, on each level
+constexpr std::uint64_t kBesideContact = 2;  // this part of the budget is left beside cycles round a contact
+constexpr int kTileMargin = 3;               // … round a tile, from level 1 on
+constexpr int kLooksAtOnce = 256;  // tiles looked at for what coarse levels have to tell them, a call
 
 }  // namespace
 
-Relaxation::Relaxation(const Lattice& lattice)
-    : lattice_(lattice), tolerance_N_(kRestingResidual * lattice.force_scale_N()) {
-  std::vector<float> filled(lattice.size());
-  std::vector<std::uint8_t> fixed(lattice.size());
-  for (std::size_t v = 0; v < lattice.size(); ++v) {
-    filled[v] = lattice.filled(static_cast<VoxelId>(v)) ? 1.0F : 0.0F;
-    fixed[v] = lattice.anchored(static_cast<VoxelId>(v)) ? 1 : 0;
-  }
-  levels_.reserve(kMaxLevels);
-  levels_.emplace_back();
-  levels_[0].plane_cost = costs_by_plane(lattice.springs());
-  while (levels_.size() < kMaxLevels) {
-    const Springs& fine = springs(levels_.size() - 1);
-    const bool small = *std::max_element(fine.dims.begin(), fine.dims.end()) <= 2 + 3;
-    if (small && levels_.size() > 1) break;  // one coarse level at least: it is where residuals are measured
-    Level coarse;
-    std::vector<std::uint8_t> coarse_fixed;
-    build_level(fine, filled, fixed, coarse, coarse_fixed);
-    filled = coarse.filled;
-    fixed = std::move(coarse_fixed);
-    levels_.push_back(std::move(coarse));
-  }
-
-  const auto last = static_cast<std::uint8_t>(levels_.size() - 1);
-  for (std::uint8_t level = 0; level < last; ++level) {
-    steps_.push_back({Stage::smooth, level, 0});
-    steps_.push_back({Stage::smooth, level, 1});
-    steps_.push_back({Stage::restrict_residual, level, 0});
-  }
-  for (int n = 0; n < kCoarsestSweeps; ++n) {
-    steps_.push_back({Stage::smooth, last, 0});
-    steps_.push_back({Stage::smooth, last, 1});
-  }
-  for (int level = last - 1; level >= 0; --level) {
-    steps_.push_back({Stage::prolong, static_cast<std::uint8_t>(level), 0});
-    steps_.push_back({Stage::smooth, static_cast<std::uint8_t>(level), 1});
-    steps_.push_back({Stage::smooth, static_cast<std::uint8_t>(level), 0});
-  }
-  for (const Step& step : steps_) {
-    for (const std::uint64_t cost : levels_[step.level].plane_cost) {
-      cycle_cost_ += step.stage == Stage::smooth ? (cost + 1) / 2 : cost;
-    }
-  }
-  std::size_t longest = 0;
-  for (std::size_t level = 0; level < levels_.size(); ++level) {
-    longest = std::max(longest, static_cast<std::size_t>(springs(level).dims[0]) + 4);
-  }
-  scratch_.assign(longest, 0.0F);
-  coarse_value_.assign(longest, 0.0F);
-  coarse_weight_.assign(longest, 0.0F);
-  at_limit_.assign(lattice.size(), 0);
-  held_cells_.reserve(16384);
-  unseen_.assign(lattice.springs().row.size(), 0);
-  row_residual_.assign(lattice.springs().row.size(), 0.0F);
+Relaxation::Relaxation(const Lattice& lattice) : lattice_(lattice), multigrid_(lattice), clusters_(lattice) {
+  set_tolerance(kRestingResidual * lattice.force_scale_N());
+  boxes_.resize(static_cast<std::size_t>(multigrid_.levels()));
 }
 
-void Relaxation::stir(std::size_t row) noexcept {
-  const auto across = static_cast<std::size_t>(lattice_.springs().dims[1]);
-  // A filled row has a border row on every side, so no index leaves the array.
-  unseen_[row] = unseen_[row - 1] = unseen_[row + 1] = unseen_[row - across] = unseen_[row + across] = 1;
+void Relaxation::set_tolerance(double tolerance_N) noexcept {
+  tolerance_N_ = tolerance_N;
+  // A motion below this changes no force by more than the tolerance.
+  const double scale = lattice_.force_scale_N();
+  multigrid_.set_quiet(
+      static_cast<float>(tolerance_N),
+      scale > 0.0 ? static_cast<float>(tolerance_N / scale * lattice_.min_spacing_m()) : 0.0F);
+}
+
+void Relaxation::copy_from(const Relaxation& other) noexcept {
+  multigrid_.copy_from(other.multigrid_);
+  set_tolerance(other.tolerance_N_);
+  unkept_ = other.unkept_;
+  wake();
 }
 
 void Relaxation::stir_all() noexcept {
-  std::fill(unseen_.begin(), unseen_.end(), std::uint8_t{1});
-}
-
-void Relaxation::build_level(const Springs& fine, const std::vector<float>& fine_filled,
-                             const std::vector<std::uint8_t>& fine_fixed, Level& coarse,
-                             std::vector<std::uint8_t>& fixed) const {
-  Springs& s = coarse.springs;
-  std::size_t cells = 1;
-  for (std::size_t d = 0; d < 3; ++d) {
-    s.dims[d] = (fine.dims[d] - 1) / 2 + 2;
-    cells *= static_cast<std::size_t>(s.dims[d]);
+  for (RowId row = 0; row < lattice_.grid().rows(); ++row) {
+    if (lattice_.filled_in(row) != 0) multigrid_.stir(0, row);
   }
-  s.stride = {1, static_cast<std::size_t>(s.dims[0]),
-              static_cast<std::size_t>(s.dims[0]) * static_cast<std::size_t>(s.dims[1])};
-  s.row.assign(static_cast<std::size_t>(s.dims[1]) * static_cast<std::size_t>(s.dims[2]), {0, 0});
-  coarse.filled.assign(cells, 0.0F);
-  coarse.loud.assign(s.row.size(), 0);
-  fixed.assign(cells, 0);
-  for (std::size_t d = 0; d < 3; ++d) {
-    s.along[d].assign(cells, 0.0F);
-    s.across[d].assign(cells, 0.0F);
-    s.inverse_diagonal[d].assign(cells, 0.0F);
-    coarse.correction[d].assign(cells, 0.0F);
-    coarse.residual[d].assign(cells, 0.0F);
-  }
-  for (int k = 1; k + 1 < fine.dims[2]; ++k) {
-    for (int j = 1; j + 1 < fine.dims[1]; ++j) {
-      for (int i = 1; i + 1 < fine.dims[0]; ++i) {
-        const VoxelId v = cell_at(fine, i, j, k);
-        if (fine_filled[v] == 0.0F) continue;
-        const VoxelId cell = cell_at(s, parent(i), parent(j), parent(k));
-        coarse.filled[cell] = 1.0F;
-        // A cell with any anchor is held: an underestimate of the correction beside an anchor, never a wrong
-        // one.
-        if (fine_fixed[v] != 0) fixed[cell] = 1;
-        const std::array<int, 3> c{i, j, k};
-        for (std::size_t d = 0; d < 3; ++d) {
-          if (parent(c[d] + 1) == parent(c[d])) continue;
-          // A coarse link is as many fine links side by side as cross the face, each twice as long.
-          s.along[d][cell] += 0.5F * fine.along[d][v];
-          s.across[d][cell] += 0.5F * fine.across[d][v];
-        }
-      }
-    }
-  }
-  for (int k = 1; k + 1 < s.dims[2]; ++k) {
-    for (int j = 1; j + 1 < s.dims[1]; ++j) {
-      auto& row = s.row[static_cast<std::size_t>(k) * static_cast<std::size_t>(s.dims[1]) +
-                        static_cast<std::size_t>(j)];
-      for (int i = 1; i + 1 < s.dims[0]; ++i) {
-        const VoxelId v = cell_at(s, i, j, k);
-        if (coarse.filled[v] == 0.0F) continue;
-        if (row[1] == 0) row[0] = i;
-        row[1] = i + 1;
-        if (fixed[v] != 0) continue;
-        for (int axis = 0; axis < 3; ++axis) {
-          float sum = 0.0F;
-          for (int d = 0; d < 3; ++d) {
-            const float* stiffness = s.stiffness(axis, d);
-            sum += stiffness[v] + stiffness[v - s.stride[static_cast<std::size_t>(d)]];
-          }
-          if (sum > 0.0F) s.inverse_diagonal[static_cast<std::size_t>(axis)][v] = 1.0F / sum;
-        }
-      }
-    }
-  }
-  coarse.plane_cost = costs_by_plane(s);
-}
-
-int Relaxation::planes(const Step& step) const {
-  // A restriction works on planes of the level it fills, so that each cell is summed at once.
-  const std::size_t level = step.stage == Stage::restrict_residual ? step.level + std::size_t{1} : step.level;
-  return springs(level).dims[2];
 }
 
 std::uint64_t Relaxation::run(Displacement& state, const ObstacleView& obstacles,
                               std::span<const VoxelId> held, std::uint64_t budget) noexcept {
+  if (asleep_) return 0;
+  multigrid_.set_held(held);
+  TileQueue& tiles = multigrid_.tiles();
   std::uint64_t spent = 0;
-  while (!asleep_ && spent < budget) {
-    if (step_ == 0 && plane_ == 1) begin_cycle(held);
-    spent += do_plane(state, obstacles, steps_[step_], plane_) + 1;
-    if (++plane_ + 1 < planes(steps_[step_])) continue;
-    plane_ = 1;
-    if (++step_ == steps_.size()) {
-      step_ = 0;
-      end_cycle();
+  credit_ += static_cast<std::int64_t>(contact_relaxed_ ? budget / kBesideContact : budget);
+  contact_relaxed_ = false;
+  const auto spend = [&](std::uint64_t updates) {
+    credit_ -= static_cast<std::int64_t>(updates);
+    spent += updates;
+  };
+  while (!asleep_ && credit_ > 0) {
+    if (keeping_) {
+      spend(keep_yielded(state, static_cast<std::uint64_t>(credit_)));
+      continue;
+    }
+    if (round_left_ == 0) round_left_ = tiles.waiting();
+    if (tiles.waiting() > 0) {
+      looked_at_ = 0;
+      spend(relax_tile(state, obstacles, tiles.pop()));
+      if (round_left_ > 0 && --round_left_ == 0) end_round(state, running_residual_N_);
+      continue;
+    }
+    // Nothing was stirred: what coarse levels know may still have to be told somewhere.
+    for (int n = 0; n < kLooksAtOnce && looked_at_ < tiles.tiles() && tiles.waiting() == 0;
+         ++n, ++looked_at_) {
+      if (tile_waits_for_coarse(cursor_)) tiles.push(cursor_);
+      cursor_ = (cursor_ + 1) % tiles.tiles();
+    }
+    spend(kLooksAtOnce * 4);
+    if (looked_at_ >= tiles.tiles() && tiles.waiting() == 0) {
+      looked_at_ = 0;
+      running_residual_N_ = 0.0;
+      end_round(state, std::min(residual_N_, 0.99 * tolerance_N_));
     }
   }
+  // What was not needed is not saved up for a tick that has enough to do.
+  credit_ = std::min<std::int64_t>(credit_, 0);
   return spent;
 }
 
-void Relaxation::begin_cycle(std::span<const VoxelId> held) noexcept {
+void Relaxation::run_cycle(Displacement& state, const ObstacleView& obstacles,
+                           std::span<const VoxelId> held) noexcept {
+  if (asleep_) return;
+  if (keeping_) {
+    while (keeping_) keep_yielded(state, ~std::uint64_t{0});
+    return;
+  }
+  multigrid_.set_held(held);
+  multigrid_.tiles().clear();
+  round_left_ = 0;
   running_residual_N_ = 0.0;
-  // What the tool holds does not move in this cycle, nor does the cell around it on any coarser level.
-  for (const VoxelId v : held) {
-    auto c = lattice_.coordinates(v);
-    for (std::size_t level = 1; level < levels_.size(); ++level) {
-      for (int& x : c) x = parent(x);
-      Springs& s = levels_[level].springs;
-      const VoxelId cell = cell_at(s, c[0], c[1], c[2]);
-      if (s.inverse_diagonal[0][cell] == 0.0F && s.inverse_diagonal[1][cell] == 0.0F &&
-          s.inverse_diagonal[2][cell] == 0.0F) {
-        break;  // held already, and so are the cells above it
-      }
-      if (held_cells_.size() == held_cells_.capacity())
-        return;  // the rest moves a little with the correction
-      held_cells_.push_back(
-          {static_cast<std::uint8_t>(level),
-           cell,
-           {s.inverse_diagonal[0][cell], s.inverse_diagonal[1][cell], s.inverse_diagonal[2][cell]}});
-      for (auto& inverse : s.inverse_diagonal) inverse[cell] = 0.0F;
-    }
-  }
+  const auto& dims = lattice_.grid().dims;
+  lay_boxes({0, 0, 0}, {dims[0] - 1, dims[1] - 1, dims[2] - 1}, 0);
+  cycle(state, obstacles, Look::active);
+  end_round(state, running_residual_N_);
 }
 
-// On one axis, the cells around v on all coarser levels do not move in this cycle.
-void Relaxation::hold_cells(VoxelId v, int axis) noexcept {
-  auto c = lattice_.coordinates(v);
-  for (std::size_t level = 1; level < levels_.size(); ++level) {
-    for (int& x : c) x = parent(x);
-    Springs& s = levels_[level].springs;
-    const VoxelId cell = cell_at(s, c[0], c[1], c[2]);
-    float& inverse = s.inverse_diagonal[static_cast<std::size_t>(axis)][cell];
-    if (inverse == 0.0F || held_cells_.size() == held_cells_.capacity()) return;
-    held_cells_.push_back(
-        {static_cast<std::uint8_t>(level),
-         cell,
-         {s.inverse_diagonal[0][cell], s.inverse_diagonal[1][cell], s.inverse_diagonal[2][cell]}});
-    inverse = 0.0F;
-  }
+void Relaxation::relax_contact(Displacement& state, const ObstacleView& obstacles,
+                               std::span<const VoxelId> held, const std::array<int, 3>& low,
+                               const std::array<int, 3>& high) noexcept {
+  contact_relaxed_ = true;
+  multigrid_.set_held(held);
+  const int wide = std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
+  lay_boxes(low, high, wide);
+  cycle(state, obstacles, Look::all);
 }
 
-void Relaxation::end_cycle() noexcept {
-  // Last first: a cell may have been held on one axis, then on another.
-  for (auto held = held_cells_.rbegin(); held != held_cells_.rend(); ++held) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      levels_[held->level].springs.inverse_diagonal[axis][held->cell] = held->inverse_diagonal[axis];
-    }
+std::uint64_t Relaxation::relax_tile(Displacement& state, const ObstacleView& obstacles,
+                                     std::size_t number) noexcept {
+  const TileQueue::Tile t = multigrid_.tiles().tile(number);
+  constexpr int kSide = TileQueue::kSide;
+  lay_boxes({t.column * kRow, t.j * kSide, t.k * kSide},
+            {(t.column + 1) * kRow - 1, (t.j + 1) * kSide - 1, (t.k + 1) * kSide - 1}, -1);
+  cycle(state, obstacles, Look::all);
+  std::uint64_t updates = 0;
+  for (const LevelBoxes& b : boxes_) {
+    updates += static_cast<std::uint64_t>(b.smoothed.q1 - b.smoothed.q0 + 1) * kOctet *
+               static_cast<std::uint64_t>(b.smoothed.j1 - b.smoothed.j0 + 1) *
+               static_cast<std::uint64_t>(b.smoothed.k1 - b.smoothed.k0 + 1);
   }
-  held_cells_.clear();
-  residual_N_ = running_residual_N_;
+  return 2 * updates;
+}
+
+// What limits held in this round moves with what it pulls on; returns the largest force a voxel that did (N).
+// Which voxel is first goes round, so that all have their turn however few a round has time for.
+double Relaxation::move_clusters(Displacement& state) noexcept {
+  clusters_.begin();
+  std::uint64_t count = 0;
+  multigrid_.for_limited([&count](VoxelId, int) { ++count; });
+  if (count == 0) return 0.0;
+  const std::uint64_t first = cycles_ * kNextFirst % count;
+  double most_N = 0.0;
+  for (const bool before : {false, true}) {
+    std::uint64_t n = 0;
+    multigrid_.for_limited([&](VoxelId v, int axis) {
+      if ((n++ < first) != before) return;
+      const float from = state.u[static_cast<std::size_t>(axis)][v];
+      const double force = clusters_.move(multigrid_.couplings(), state, v, axis, 0.5 * tolerance_N_);
+      if (force == 0.0) return;
+      most_N = std::max(most_N, force);
+      // Every such step lowers the energy, though it may be far from limit to limit to where the force falls.
+      if (std::fabs(state.u[static_cast<std::size_t>(axis)][v] - from) > kProgress * lattice_.min_spacing_m())
+        cycles_without_gain_ = std::min(cycles_without_gain_, kPatience / 2 + 1);
+      for (const VoxelId w : clusters_.moved()) multigrid_.stir(0, w / kRow);
+    });
+  }
+  credit_ -= static_cast<std::int64_t>(clusters_.looked_at());
+  return most_N;
+}
+
+// A round has looked at all that moves: is it at rest?
+void Relaxation::end_round(Displacement& state, double residual_N) noexcept {
+  // Only when nothing else moves any more: between other corrections they would undo one another (energy grew
+  // 1.9 times within a cycle).
+  if (residual_N < kNearRest * tolerance_N_ || cycles_without_gain_ > kPatience / 2)
+    residual_N = std::max(residual_N, move_clusters(state));
+  // While rounds gain nothing, what limits hold stays held for a few of them: let go of in every round, two
+  // sets of voxels can take turns for ever.
+  if (cycles_without_gain_ <= 1 || cycles_ % kLetGoEvery == 0) multigrid_.release_limited();
+  // Scattered voxels hold a cell harder than a patch of them does. A cycle that ends worse than it began says
+  // so.
+  if (residual_N > kWorse * residual_N_ && cycles_without_gain_ > 0) {
+    hold_ = std::min(hold_ * kHarder, kHardest);
+  } else {
+    hold_ = std::max(1.0F, hold_ * kSofter);
+  }
+  multigrid_.set_hold(hold_);
+  residual_N_ = residual_N;
+  running_residual_N_ = 0.0;
   ++cycles_;
   if (cycles_without_gain_ == 0 || residual_N_ < kGain * least_residual_N_) {
     least_residual_N_ = residual_N_;
     cycles_without_gain_ = 0;
   }
   ++cycles_without_gain_;
-  if (residual_N_ < tolerance_N_ || cycles_without_gain_ > kPatience) asleep_ = true;
-}
-
-std::uint64_t Relaxation::do_plane(Displacement& state, const ObstacleView& obstacles, const Step& step,
-                                   int plane) noexcept {
-  const std::size_t level = step.level;
-  const std::size_t at = static_cast<std::size_t>(plane);
-  switch (step.stage) {
-    case Stage::smooth:
-      if (level == 0) return smooth_lattice(state, obstacles, step.colour, plane);
-      smooth_coarse(levels_[level], step.colour, plane);
-      return (levels_[level].plane_cost[at] + 1) / 2;
-    case Stage::restrict_residual:
-      if (level == 0) return restrict_from_lattice(state, obstacles, plane);
-      restrict_from_level(level, plane);
-      return 4 * levels_[level + 1].plane_cost[at];
-    case Stage::prolong:
-      if (level == 0) return prolong_to_lattice(state, obstacles, plane);
-      prolong_to_level(level, plane);
-      return levels_[level].plane_cost[at];
+  const bool at_rest = residual_N_ < tolerance_N_ || cycles_without_gain_ > kPatience;
+  if (!at_rest) return;
+  // What yielded is kept at rest, and then there is a new rest to be found.
+  if (unkept_) {
+    keeping_ = true;
+    unkept_ = false;
+    keep_row_ = 0;
+    return;
   }
-  return 0;
+  if (multigrid_.tiles().waiting() > 0 && cycles_without_gain_ <= kPatience) return;
+  multigrid_.tiles().clear();
+  asleep_ = true;
 }
 
-std::uint64_t Relaxation::smooth_lattice(Displacement& state, const ObstacleView& obstacles, int colour,
-                                         int plane) noexcept {
-  const Springs& s = lattice_.springs();
-  const auto tolerance = static_cast<float>(tolerance_N_);
+std::uint64_t Relaxation::keep_yielded(Displacement& state, std::uint64_t budget) noexcept {
   std::uint64_t spent = 0;
-  for (int j = 1 + ((plane + 1 + colour) & 1); j + 1 < s.dims[1]; j += 2) {
-    const std::size_t row =
-        static_cast<std::size_t>(plane) * static_cast<std::size_t>(s.dims[1]) + static_cast<std::size_t>(j);
-    if (s.row[row][1] <= s.row[row][0] || (unseen_[row] == 0 && row_residual_[row] < tolerance)) continue;
-    relax_row(lattice_, state, obstacles, row, s.row[row][0], s.row[row][1]);
-    stir(row);
-    spent += static_cast<std::uint64_t>(s.row[row][1] - s.row[row][0]);
+  const auto rows = static_cast<RowId>(lattice_.grid().rows());
+  for (; keep_row_ < rows && spent < budget; ++keep_row_, ++spent) {
+    if (state.rest.row[keep_row_] == 0 || !multigrid_.prepare(0, keep_row_)) continue;
+    multigrid_.yield(keep_row_, state, true);
+    spent += kRow;
   }
+  keeping_ = keep_row_ < rows;
   return spent;
 }
 
-HYBRID_WIDE void Relaxation::smooth_coarse(Level& level, int colour, int plane) noexcept {
-  const Springs& s = level.springs;
-  const auto sy = static_cast<std::ptrdiff_t>(s.stride[1]), sz = static_cast<std::ptrdiff_t>(s.stride[2]);
-  // A correction below this changes no residual by more than the tolerance.
-  const auto quiet = static_cast<float>(tolerance_N_ / lattice_.force_scale_N() * lattice_.min_spacing_m());
-  for (int j = 1 + ((plane + 1 + colour) & 1); j + 1 < s.dims[1]; j += 2) {
-    const std::size_t row =
-        static_cast<std::size_t>(plane) * static_cast<std::size_t>(s.dims[1]) + static_cast<std::size_t>(j);
-    const int count = s.row[row][1] - s.row[row][0];
-    if (count <= 0) continue;
-    const std::size_t begin =
-        row * static_cast<std::size_t>(s.dims[0]) + static_cast<std::size_t>(s.row[row][0]);
-    int loud = 0;
-    for (int axis = 0; axis < 3; ++axis) {
-      const auto ua = static_cast<std::size_t>(axis);
-      float* e = level.correction[ua].data() + begin;
-      const float *r = level.residual[ua].data() + begin, *inverse = s.inverse_diagonal[ua].data() + begin;
-      const float *kx = s.stiffness(axis, 0) + begin, *ky = s.stiffness(axis, 1) + begin,
-                  *kz = s.stiffness(axis, 2) + begin;
-      float* next = scratch_.data();
-      for (int i = 0; i < count; ++i) {
-        next[i] = (r[i] + kx[i - 1] * e[i - 1] + kx[i] * e[i + 1] + ky[i - sy] * e[i - sy] +
-                   ky[i] * e[i + sy] + kz[i - sz] * e[i - sz] + kz[i] * e[i + sz]) *
-                  inverse[i];
-        loud |= static_cast<int>(next[i] > quiet) | static_cast<int>(next[i] < -quiet);
+// Have the cells above a tile anything to tell it?
+bool Relaxation::tile_waits_for_coarse(std::size_t number) const noexcept {
+  constexpr int kSide = TileQueue::kSide;
+  const TileQueue::Tile t = multigrid_.tiles().tile(number);
+  for (int level = 1; level < multigrid_.levels(); ++level) {
+    const Grid& g = multigrid_.grid(level);
+    const int column = (t.column >> level) + 1, rows = std::max(1, kSide >> level);
+    const int j0 = t.j * kSide >> level, k0 = t.k * kSide >> level;
+    for (int k = k0; k < std::min(k0 + rows, g.dims[2]); ++k) {
+      for (int j = j0; j < std::min(j0 + rows, g.dims[1]); ++j) {
+        const RowId row = g.row(column, j, k);
+        if (multigrid_.has(level, row, Multigrid::changed) &&
+            multigrid_.untold(level, row) > multigrid_.quiet_m())
+          return true;
       }
-      std::copy_n(next, count, e);
-    }
-    level.loud[row] = static_cast<std::uint8_t>(loud);
-  }
-}
-
-HYBRID_WIDE std::uint64_t Relaxation::restrict_from_lattice(const Displacement& state,
-                                                            const ObstacleView& obstacles,
-                                                            int plane) noexcept {
-  const Springs& s = lattice_.springs();
-  Level& coarse = levels_[1];
-  const auto sy = static_cast<std::ptrdiff_t>(s.stride[1]), sz = static_cast<std::ptrdiff_t>(s.stride[2]);
-  const auto coarse_plane =
-      static_cast<std::ptrdiff_t>(static_cast<std::size_t>(plane) * coarse.springs.stride[2]);
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    std::fill_n(coarse.residual[axis].begin() + coarse_plane, coarse.springs.stride[2], 0.0F);
-    std::fill_n(coarse.correction[axis].begin() + coarse_plane, coarse.springs.stride[2], 0.0F);
-  }
-  const double touching = kTouching * lattice_.min_spacing_m();
-  std::uint64_t spent = 0;
-  for (int k = 2 * plane - 1; k <= std::min(2 * plane, s.dims[2] - 2); ++k) {
-    for (int j = 1; j + 1 < s.dims[1]; ++j) {
-      const std::size_t row =
-          static_cast<std::size_t>(k) * static_cast<std::size_t>(s.dims[1]) + static_cast<std::size_t>(j);
-      const int first = s.row[row][0], count = s.row[row][1] - first;
-      if (count <= 0 || unseen_[row] == 0) continue;  // unchanged, and small: nothing to pass on
-      unseen_[row] = 0;
-      float worst = 0.0F;
-      const std::size_t begin = row * static_cast<std::size_t>(s.dims[0]) + static_cast<std::size_t>(first);
-      const std::uint8_t* role = state.role.data() + begin;
-      std::fill_n(at_limit_.begin() + static_cast<std::ptrdiff_t>(begin), count, std::uint8_t{0});
-      for (int axis = 0; axis < 3; ++axis) {
-        const auto ua = static_cast<std::size_t>(axis);
-        const float* u = state.u[ua].data() + begin;
-        const float* inverse = s.inverse_diagonal[ua].data() + begin;
-        const float *kx = s.stiffness(axis, 0) + begin, *ky = s.stiffness(axis, 1) + begin,
-                    *kz = s.stiffness(axis, 2) + begin;
-        float* r = scratch_.data();
-        for (int i = 0; i < count; ++i) {
-          const float pull = kx[i - 1] * (u[i - 1] - u[i]) + kx[i] * (u[i + 1] - u[i]) +
-                             ky[i - sy] * (u[i - sy] - u[i]) + ky[i] * (u[i + sy] - u[i]) +
-                             kz[i - sz] * (u[i - sz] - u[i]) + kz[i] * (u[i + sz] - u[i]);
-          // Only what may move passes its residual on.
-          r[i] = inverse[i] != 0.0F && role[i] != Displacement::held ? pull : 0.0F;
-        }
-        if (state.row_obstacles[row] != 0) {
-          // What an obstacle holds is balanced by it.
-          for (int i = 0; i < count; ++i) {
-            const bool held_by_it =
-                role[i] == Displacement::obstacle &&
-                blocked(obstacles, state, static_cast<VoxelId>(begin) + static_cast<VoxelId>(i), touching);
-            if (held_by_it) r[i] = 0.0F;
-          }
-        }
-        if (near_limits(lattice_, state, axis, begin, count)) {
-          // What the chain holds is balanced by it. Passed on, its residual would drive the coarse levels
-          // against links that do not give, and the sweeps after would undo it: a cycle that ends where it
-          // began, far from equilibrium.
-          for (int i = 0; i < count; ++i) {
-            const VoxelId v = static_cast<VoxelId>(begin) + static_cast<VoxelId>(i);
-            if (r[i] == 0.0F || !resisted(lattice_, state, axis, v, r[i])) continue;
-            r[i] = 0.0F;
-            at_limit_[v] |= static_cast<std::uint8_t>(1 << axis);
-            hold_cells(v, axis);
-          }
-        }
-        float* target = coarse.residual[ua].data() + cell_at(coarse.springs, 0, parent(j), plane);
-        for (int i = 0; i < count; ++i) {
-          worst = std::max(worst, std::fabs(r[i]));
-          target[parent(first + i)] += r[i];  // two neighbours share a cell
-        }
-      }
-      row_residual_[row] = worst;
-      running_residual_N_ = std::max(running_residual_N_, static_cast<double>(worst));
-      spent += static_cast<std::uint64_t>(count);
     }
   }
-  return spent;
+  return false;
 }
 
-void Relaxation::restrict_from_level(std::size_t fine, int plane) noexcept {
-  const Level& level = levels_[fine];
-  Level& coarse = levels_[fine + 1];
-  const Springs& s = level.springs;
-  const std::size_t coarse_plane = static_cast<std::size_t>(plane) * coarse.springs.stride[2];
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto ua = static_cast<std::size_t>(axis);
-    std::fill_n(coarse.residual[ua].begin() + static_cast<std::ptrdiff_t>(coarse_plane),
-                coarse.springs.stride[2], 0.0F);
-    std::fill_n(coarse.correction[ua].begin() + static_cast<std::ptrdiff_t>(coarse_plane),
-                coarse.springs.stride[2], 0.0F);
-    const auto& e = level.correction[ua];
-    const float *kx = s.stiffness(axis, 0), *ky = s.stiffness(axis, 1), *kz = s.stiffness(axis, 2);
-    for (int k = 2 * plane - 1; k <= std::min(2 * plane, s.dims[2] - 2); ++k) {
-      for (int j = 1; j + 1 < s.dims[1]; ++j) {
-        const std::size_t row =
-            static_cast<std::size_t>(k) * static_cast<std::size_t>(s.dims[1]) + static_cast<std::size_t>(j);
-        for (int i = s.row[row][0]; i < s.row[row][1]; ++i) {
-          const std::size_t v = row * static_cast<std::size_t>(s.dims[0]) + static_cast<std::size_t>(i);
-          if (s.inverse_diagonal[ua][v] == 0.0F) continue;
-          const float pull =
-              kx[v - 1] * (e[v - 1] - e[v]) + kx[v] * (e[v + 1] - e[v]) +
-              ky[v - s.stride[1]] * (e[v - s.stride[1]] - e[v]) + ky[v] * (e[v + s.stride[1]] - e[v]) +
-              kz[v - s.stride[2]] * (e[v - s.stride[2]] - e[v]) + kz[v] * (e[v + s.stride[2]] - e[v]);
-          coarse.residual[ua][cell_at(coarse.springs, parent(i), parent(j), plane)] +=
-              level.residual[ua][v] + pull;
-        }
+// Was anything that a coarse row holds moved since it was passed on?
+bool Relaxation::restrict_due(int level, RowId row) const noexcept {
+  for (int child = 0; child < 8; ++child) {
+    if (multigrid_.has(level - 1, multigrid_.row_below(level, row, child), Multigrid::dirty)) return true;
+  }
+  return false;
+}
+
+template <class Visit>
+void Relaxation::for_rows(int level, const RowBox& box, const Visit& visit) noexcept {
+  const Grid& g = multigrid_.grid(level);
+  for (int c = box.q0 / kOctets; c <= box.q1 / kOctets && box.q0 <= box.q1; ++c) {
+    const OctetSpan span{std::max(box.q0 - c * kOctets, 0), std::min(box.q1 - c * kOctets, kOctets - 1)};
+    for (int k = box.k0; k <= box.k1; ++k) {
+      for (int j = box.j0; j <= box.j1; ++j) {
+        const RowId row = g.row(c + 1, j, k);
+        if (multigrid_.prepare(level, row)) visit(row, span, j, k);
       }
     }
   }
 }
 
-HYBRID_WIDE void Relaxation::interpolate_row(const Level& coarse, int axis, int j, int k, int first,
-                                             int last) noexcept {
-  // Cell-centred trilinear weights: 3/4 to the cell a voxel is in, 1/4 to the nearer neighbour, on each axis;
-  // an empty neighbour's share goes to the others (a free surface).
-  const Springs& s = coarse.springs;
-  const auto& e = coarse.correction[static_cast<std::size_t>(axis)];
-  const int own_j = parent(j), own_k = parent(k);
-  const int near_j = (j & 1) != 0 ? own_j - 1 : own_j + 1, near_k = (k & 1) != 0 ? own_k - 1 : own_k + 1;
-  const std::array<std::size_t, 4> rows{cell_at(s, 0, own_j, own_k), cell_at(s, 0, near_j, own_k),
-                                        cell_at(s, 0, own_j, near_k), cell_at(s, 0, near_j, near_k)};
-  const int from = parent(first) - 1, to = std::min(parent(last - 1) + 2, s.dims[0]);
-  for (int c = from; c < to; ++c) {
-    const auto x = static_cast<std::size_t>(c);
-    const float w0 = 0.5625F * coarse.filled[rows[0] + x], w1 = 0.1875F * coarse.filled[rows[1] + x],
-                w2 = 0.1875F * coarse.filled[rows[2] + x], w3 = 0.0625F * coarse.filled[rows[3] + x];
-    coarse_weight_[x] = w0 + w1 + w2 + w3;
-    coarse_value_[x] = w0 * e[rows[0] + x] + w1 * e[rows[1] + x] + w2 * e[rows[2] + x] + w3 * e[rows[3] + x];
-  }
-  for (int i = first; i < last; ++i) {
-    const auto own = static_cast<std::size_t>(parent(i));
-    const std::size_t near = (i & 1) != 0 ? own - 1 : own + 1;
-    const float weight = 0.75F * coarse_weight_[own] + 0.25F * coarse_weight_[near];
-    const float value = 0.75F * coarse_value_[own] + 0.25F * coarse_value_[near];
-    scratch_[static_cast<std::size_t>(i - first)] = weight > 0.0F ? value / weight : 0.0F;
-  }
+Relaxation::RowBox Relaxation::clipped(int level, const RowBox& b) const noexcept {
+  const Grid& g = multigrid_.grid(level);
+  return {std::max(b.q0, 0), std::min(b.q1, (g.columns - 2) * kOctets - 1),
+          std::max(b.j0, 0), std::min(b.j1, g.dims[1] - 1),
+          std::max(b.k0, 0), std::min(b.k1, g.dims[2] - 1)};
 }
 
-bool Relaxation::negligible(const Level& coarse, int j, int k) const noexcept {
-  const auto across = static_cast<std::size_t>(coarse.springs.dims[1]);
-  const auto own_j = static_cast<std::size_t>(parent(j)), own_k = static_cast<std::size_t>(parent(k));
-  const std::size_t near_j = (j & 1) != 0 ? own_j - 1 : own_j + 1,
-                    near_k = (k & 1) != 0 ? own_k - 1 : own_k + 1;
-  return (coarse.loud[own_k * across + own_j] | coarse.loud[own_k * across + near_j] |
-          coarse.loud[near_k * across + own_j] | coarse.loud[near_k * across + near_j]) == 0;
-}
-
-std::uint64_t Relaxation::prolong_to_lattice(Displacement& state, const ObstacleView& obstacles,
-                                             int plane) noexcept {
-  const Springs& s = lattice_.springs();
-  std::uint64_t spent = 0;
-  for (int j = 1; j + 1 < s.dims[1]; ++j) {
-    const std::size_t row =
-        static_cast<std::size_t>(plane) * static_cast<std::size_t>(s.dims[1]) + static_cast<std::size_t>(j);
-    const int first = s.row[row][0], last = s.row[row][1];
-    if (last <= first) continue;
-    ++spent;
-    if (negligible(levels_[1], j, plane)) continue;
-    const std::size_t begin = row * static_cast<std::size_t>(s.dims[0]) + static_cast<std::size_t>(first);
-    for (int axis = 0; axis < 3; ++axis) {
-      interpolate_row(levels_[1], axis, j, plane, first, last);
-      for (int i = 0; i < last - first; ++i) {
-        if ((at_limit_[begin + static_cast<std::size_t>(i)] >> axis & 1) != 0)
-          scratch_[static_cast<std::size_t>(i)] = 0.0F;
-      }
-      correct_row(lattice_, state, axis, begin, last - first, scratch_.data());
+// The boxes of a cycle that is to bring voxels low … high to rest: on each level so many cells more on every
+// side as the way that a force at the middle is felt, in cells; `wide` is how wide the contact is, or
+// negative where there is none and the voxels themselves are enough.
+void Relaxation::lay_boxes(const std::array<int, 3>& low, const std::array<int, 3>& high, int wide) noexcept {
+  const int last = multigrid_.levels() - 1;
+  for (int l = 0; l <= last; ++l) {
+    const int margin = wide >= 0 ? kContactMargin + (wide >> l) / 4 : l == 0 ? 0 : kTileMargin;
+    std::array<int, 3> from{}, to{};
+    for (std::size_t d = 0; d < 3; ++d) {
+      from[d] = std::max(0, (low[d] >> l) - margin);
+      to[d] = std::min(multigrid_.grid(l).dims[d] - 1, (high[d] >> l) + margin);
     }
-    if (state.row_obstacles[row] != 0) clear_obstacles(lattice_, state, obstacles, begin, last - first);
-    stir(row);
-    spent += static_cast<std::uint64_t>(last - first);
+    // Whole cells of the next level, so that each of them is passed on once all it holds is smooth.
+    RowBox& s = boxes(l).smoothed;
+    s = clipped(
+        l, {(from[0] / kOctet) & ~1, (to[0] / kOctet) | 1, from[1] & ~1, to[1] | 1, from[2] & ~1, to[2] | 1});
+    if (l == last) break;
+    const RowBox p{s.q0 / 2, s.q1 / 2, s.j0 / 2, s.j1 / 2, s.k0 / 2, s.k1 / 2};
+    boxes(l + 1).parents = p;
+    // They and the cells beside them tell all they hold what they know, and the voxels beside those their
+    // part of it. Along x one cell more is enough; voxels come by the vector there.
+    boxes(l + 1).tellers = clipped(l + 1, {p.q0 - 1, p.q1 + 1, p.j0 - 1, p.j1 + 1, p.k0 - 1, p.k1 + 1});
+    const RowBox& t = boxes(l + 1).tellers;
+    boxes(l + 1).first_teller = std::max(p.q0 * kOctet - 1, 0);
+    boxes(l + 1).last_teller = p.q1 * kOctet + kOctet;
+    boxes(l).told =
+        clipped(l, {2 * p.q0 - 2, 2 * p.q1 + 3, 2 * t.j0 - 1, 2 * t.j1 + 2, 2 * t.k0 - 1, 2 * t.k1 + 2});
   }
-  return spent;
 }
 
-void Relaxation::prolong_to_level(std::size_t fine, int plane) noexcept {
-  Level& level = levels_[fine];
-  const Springs& s = level.springs;
-  for (int j = 1; j + 1 < s.dims[1]; ++j) {
-    const std::size_t row =
-        static_cast<std::size_t>(plane) * static_cast<std::size_t>(s.dims[1]) + static_cast<std::size_t>(j);
-    const int first = s.row[row][0], last = s.row[row][1];
-    if (last <= first) continue;
-    for (int axis = 0; axis < 3; ++axis) {
-      interpolate_row(levels_[fine + 1], axis, j, plane, first, last);
-      auto& e = level.correction[static_cast<std::size_t>(axis)];
-      const auto& inverse = s.inverse_diagonal[static_cast<std::size_t>(axis)];
-      for (int i = first; i < last; ++i) {
-        const std::size_t v = row * static_cast<std::size_t>(s.dims[0]) + static_cast<std::size_t>(i);
-        if (inverse[v] != 0.0F) e[v] += scratch_[static_cast<std::size_t>(i - first)];
-      }
+// Rows of one colour, so that no two that are beside one another are of the same.
+void Relaxation::smooth_box(int level, int colour, Displacement& state, const ObstacleView& obstacles,
+                            Look look) noexcept {
+  for_rows(level, boxes(level).smoothed, [&](RowId row, OctetSpan span, int j, int k) {
+    if (((j + k + colour) & 1) != 0) return;
+    if (look == Look::active && !multigrid_.has(level, row, Multigrid::active)) return;
+    multigrid_.smooth(level, row, state, obstacles, span);
+  });
+}
+
+// Tells the rows of a level what the next coarser one knows, within the boxes: cells in the box and beside
+// it. Those beside it go along, however little they have to tell: nobody brings what they hold to rest, but
+// the box would feel it if they stayed behind, four times as much on each coarser level. (Letting those with
+// less than 2e-4 spacings to tell wait was rejected: energy grew without end where tissue hangs by little.)
+void Relaxation::tell_box(int level, Displacement& state, const ObstacleView& obstacles) noexcept {
+  const LevelBoxes& b = boxes(level + 1);
+  bool any = false;
+  for_rows(level + 1, b.tellers, [&](RowId row, OctetSpan span, int, int) {
+    if (!multigrid_.has(level + 1, row, Multigrid::changed)) return;
+    const int origin = (multigrid_.grid(level + 1).row_coordinates(row)[0] - 1) * kRow;
+    const float most =
+        multigrid_.untold(level + 1, row, span, b.first_teller - origin, b.last_teller - origin);
+    if (most <= multigrid_.passed_on_m()) return;
+    multigrid_.mark(level + 1, row, Multigrid::telling);
+    any = true;
+  });
+  if (!any) return;
+  const RowBox& t = boxes(level).told;
+  multigrid_.tell(level, {t.q0, t.q1, t.j0, t.j1, t.k0, t.k1, b.first_teller, b.last_teller}, state,
+                  obstacles);
+}
+
+void Relaxation::cycle(Displacement& state, const ObstacleView& obstacles, Look look) noexcept {
+  const int last = multigrid_.levels() - 1;
+  // What coarse levels know and finer ones do not is told first: a step between voxels that were told and
+  // others that were not would look like a force to the cells above it.
+  for (int l = last - 1; l >= 0; --l) tell_box(l, state, obstacles);
+  for (int l = 0; l < last; ++l) {
+    for (const int colour : {0, 1}) smooth_box(l, colour, state, obstacles, look);
+    // Before forces are summed, so that what is called the residual is that of links that yield.
+    if (l == 0 && lattice_.yields()) {
+      for_rows(0, boxes(0).smoothed, [&](RowId row, OctetSpan, int, int) {
+        if (look == Look::all || multigrid_.has(0, row, Multigrid::active | Multigrid::dirty))
+          unkept_ = multigrid_.yield(row, state, false) || unkept_;
+      });
     }
+    const RowBox& parents = boxes(l + 1).parents;
+    const Grid& g = multigrid_.grid(l + 1);
+    for_rows(l + 1, parents, [&](RowId row, OctetSpan span, int, int) {
+      if (look == Look::active) {
+        if (!restrict_due(l + 1, row)) return;
+        // The load holds a row where it is beside its neighbours where they are.
+        for (const RowId r :
+             {row, row - 1, row + 1, row - g.row_z, row + g.row_z, row - g.row_x, row + g.row_x})
+          multigrid_.mark(l + 1, r, Multigrid::renewed);
+      }
+      multigrid_.restrict_values(l + 1, row, state, span);
+    });
+    for_rows(l + 1, parents, [&](RowId row, OctetSpan span, int, int) {
+      if (look == Look::active) {
+        if (!multigrid_.has(l + 1, row, Multigrid::renewed)) return;
+        multigrid_.unmark(l + 1, row, Multigrid::renewed);
+      }
+      const float worst = multigrid_.restrict_loads(l + 1, row, state, obstacles, span);
+      if (l == 0) running_residual_N_ = std::max(running_residual_N_, static_cast<double>(worst));
+    });
+  }
+  for (int n = 0; n < 2 * kCoarsestSweeps; ++n) smooth_box(last, n & 1, state, obstacles, look);
+  for (int l = last - 1; l >= 0; --l) {
+    tell_box(l, state, obstacles);
+    for (const int colour : {1, 0}) smooth_box(l, colour, state, obstacles, look);
   }
 }
 
 std::size_t Relaxation::memory_bytes() const {
-  std::size_t bytes = 0;
-  for (std::size_t level = 1; level < levels_.size(); ++level)
-    bytes += levels_[level].filled.size() * 16 * sizeof(float);
-  return bytes + held_cells_.capacity() * sizeof(HeldCell);
+  return multigrid_.memory_bytes() + clusters_.memory_bytes() + boxes_.capacity() * sizeof(LevelBoxes);
 }
 
 }  // namespace voxel

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Relaxation of the six-link energy towards its equilibrium, under chain limits, anchors and obstacles.
 //
-// Per axis the energy is ½ Σ k (u(b) − u(a))² over the links: an anisotropic Laplace problem. One cycle is a
-// multigrid V(1,1) cycle (Briggs, Henson & McCormick, A Multigrid Tutorial, chapters 3 and 10): zebra sweeps
-// over rows, residuals summed into cells of 2×2×2, correction interpolated back trilinearly. The cycle is cut
-// into planes, so that a tick does as many voxel updates as its budget says and goes on where it stopped:
-// counted work, never measured time. Rows that are at rest, in a neighbourhood at rest, are not visited: work
-// follows what moves, not the size of the object.
+// Per axis the energy is ½ Σ k (u(b) − u(a))² over the links: an anisotropic Laplace problem, solved by
+// multigrid cycles (see multigrid.h). A cycle works on a box of voxels and, on each coarser level, on a box
+// of cells round it: about the same work for any size of object, and whole in itself, so that cycles in
+// different places, one after the other, never find one another half done. (A cycle over the whole object,
+// cut into pieces of a tick's work, was rejected: with cycles round the contact in between, what it had set
+// aside to be told was found a second time and told twice, and a contact in a large object sank.)
+//
+// Round the contact there is a cycle in every tick. Everywhere else one tile after the other that was
+// stirred, as many voxel updates as the budget says: counted work, never measured time.
 #pragma once
 
 #include <array>
@@ -14,62 +17,35 @@
 #include <span>
 #include <vector>
 
+#include "voxel/cluster_moves.h"
 #include "voxel/displacement.h"
 #include "voxel/lattice.h"
+#include "voxel/links.h"
+#include "voxel/multigrid.h"
 
 namespace voxel {
 
-struct ObstacleView {
-  std::span<const Obstacle> obstacles;            // by surface number
-  std::span<const std::uint32_t> surface_number;  // [v]
-};
-
-// Moves voxels first..last (not included) of one row to the minimum of their energy given all other rows,
-// without leaving their limits. Within the row the update is simultaneous where no limit is near (so it
-// vectorises, and lowers the energy all the same: 2D − A is diagonally dominant on a row), one by one
-// otherwise. Held voxels stay.
-void relax_row(const Lattice& lattice, Displacement& state, const ObstacleView& obstacles, std::size_t row,
-               int first, int last) noexcept;
-
-// Is a voxel whose role is obstacle within `margin` of it, or in it (unit: meter)?
-bool blocked(const ObstacleView& view, const Displacement& state, VoxelId v, double margin) noexcept;
-
-// Where voxel v would go if only its links pulled, and the interval its links allow it, per axis.
-glm::dvec3 link_minimum(const Lattice& lattice, const Displacement& state, VoxelId v) noexcept;
-glm::dvec3 clamp_to_links(const Lattice& lattice, const Displacement& state, VoxelId v,
-                          const glm::dvec3& wanted) noexcept;
-// Force of its links on voxel v (unit: newton).
-glm::dvec3 link_force(const Lattice& lattice, const Displacement& state, VoxelId v) noexcept;
-
-// May any link of these voxels be at its limit? And is voxel v pulled against one that is, on this axis?
-bool near_limits(const Lattice& lattice, const Displacement& state, int axis, std::size_t begin,
-                 int count) noexcept;
-bool resisted(const Lattice& lattice, const Displacement& state, int axis, VoxelId v, float pull) noexcept;
-
-// Adds a correction to one axis of `count` voxels from `begin`, as far as their links allow it. Held and
-// anchored voxels stay.
-void correct_row(const Lattice& lattice, Displacement& state, int axis, std::size_t begin, int count,
-                 const float* correction) noexcept;
-// Brings voxels that a correction pushed into an obstacle back to it, as far as their links allow it.
-void clear_obstacles(const Lattice& lattice, Displacement& state, const ObstacleView& obstacles,
-                     std::size_t begin, int count) noexcept;
-
-// An object rests when no free voxel feels more than this part of Lattice::force_scale_N(): a hundred times
-// the rounding of floats at a displacement of ten spacings, and far below what a hand can feel.
+// An object counts as at rest when no free voxel is pulled by more than this share of the force scale.
 inline constexpr double kRestingResidual = 1e-5;
 
 class Relaxation {
  public:
   explicit Relaxation(const Lattice& lattice);
 
-  // Spends `budget` voxel updates (a little more: planes are not cut), unless the object is at rest. Returns
-  // what it spent.
+  // Spends `budget` voxel updates, on average over many calls (a cycle is not cut), unless the object is at
+  // rest; half of it where a contact was relaxed since the last call. Returns what it spent.
   std::uint64_t run(Displacement& state, const ObstacleView& obstacles, std::span<const VoxelId> held,
                     std::uint64_t budget) noexcept;
+  // One cycle over the whole object. For references, not for the tick.
+  void run_cycle(Displacement& state, const ObstacleView& obstacles, std::span<const VoxelId> held) noexcept;
+  // One cycle round the contact: the box of voxels from `low` to `high`, both included.
+  void relax_contact(Displacement& state, const ObstacleView& obstacles, std::span<const VoxelId> held,
+                     const std::array<int, 3>& low, const std::array<int, 3>& high) noexcept;
 
-  // Voxels of a row (v / dims[0]) were moved by somebody else: it and the rows beside it are to be looked at
-  // again.
-  void stir(std::size_t row) noexcept;
+  [[nodiscard]] Couplings& couplings() { return multigrid_.couplings(); }
+
+  // Voxels of a row (v / kRow) were moved by somebody else: it and the rows beside it are to be looked at.
+  void stir(RowId row) noexcept { multigrid_.stir(0, row); }
   void stir_all() noexcept;
   // Something moved: relax until the residual is below the tolerance again.
   void wake() noexcept {
@@ -77,78 +53,67 @@ class Relaxation {
     cycles_without_gain_ = 0;
   }
   [[nodiscard]] bool asleep() const { return asleep_; }
-  // Largest force that any free voxel still feels, as the last whole cycle found it (unit: newton); below the
-  // tolerance it is only known to be that.
+  // Largest force that any free voxel still feels, as the last cycle over all that moves found it (unit:
+  // newton); below the tolerance it is only known to be that.
   [[nodiscard]] double residual_N() const { return residual_N_; }
   // Cycles stop when the residual falls below this (unit: newton), or has not fallen for a while: what chain
   // limits hold has a residual that no relaxation removes. Default: kRestingResidual of the lattice's force
   // scale.
-  void set_tolerance(double tolerance_N) noexcept { tolerance_N_ = tolerance_N; }
+  void set_tolerance(double tolerance_N) noexcept;
+  // Cycles over all that moves.
   [[nodiscard]] std::uint64_t cycles() const { return cycles_; }
-  [[nodiscard]] std::uint64_t cycle_cost() const { return cycle_cost_; }
+  void prepare_all() noexcept { multigrid_.prepare_all(); }
+  // Starts in the same state as `other`, of the same lattice.
+  void copy_from(const Relaxation& other) noexcept;
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
-  struct Level {  // level 0 stands for the lattice itself and keeps no arrays of its own
-    Springs springs;
-    std::array<std::vector<float>, 3> correction, residual;  // [axis][cell]
-    std::vector<float> filled;                               // [cell] 1 or 0
-    std::vector<std::uint8_t> loud;         // [row] 1: its correction is too large to leave out
-    std::vector<std::uint64_t> plane_cost;  // [plane] voxels in it
+  // Octets q0 … q1 along x, counted from the first voxel on, and rows j0 … j1 and k0 … k1, all included.
+  struct RowBox {
+    int q0 = 0, q1 = -1, j0 = 0, j1 = -1, k0 = 0, k1 = -1;
   };
-  enum class Stage : std::uint8_t { smooth, restrict_residual, prolong };
-  struct Step {
-    Stage stage;
-    std::uint8_t level;
-    std::uint8_t colour;
+  // Of one cycle, on one level.
+  struct LevelBoxes {
+    RowBox smoothed;                         // what is brought to rest
+    RowBox parents;                          // cells that hold what is brought to rest on the level below
+    RowBox tellers;                          // these, and the cells beside them
+    int first_teller = 0, last_teller = -1;  // cells along x
+    RowBox told;                             // what the next level's tellers have something to tell
   };
-  struct HeldCell {
-    std::uint8_t level;
-    VoxelId cell;
-    std::array<float, 3> inverse_diagonal;
-  };
+  enum class Look : std::uint8_t { all, active };  // rows at rest are left alone
 
-  void build_level(const Springs& fine, const std::vector<float>& fine_filled,
-                   const std::vector<std::uint8_t>& fine_fixed, Level& coarse,
-                   std::vector<std::uint8_t>& fixed) const;
-  [[nodiscard]] const Springs& springs(std::size_t level) const {
-    return level == 0 ? lattice_.springs() : levels_[level].springs;
-  }
-  std::uint64_t smooth_lattice(Displacement& state, const ObstacleView& obstacles, int colour,
-                               int plane) noexcept;
-  std::uint64_t do_plane(Displacement& state, const ObstacleView& obstacles, const Step& step,
-                         int plane) noexcept;
-  void begin_cycle(std::span<const VoxelId> held) noexcept;
-  void end_cycle() noexcept;
-  void hold_cells(VoxelId v, int axis) noexcept;
-  void smooth_coarse(Level& level, int colour, int plane) noexcept;
-  std::uint64_t restrict_from_lattice(const Displacement& state, const ObstacleView& obstacles,
-                                      int plane) noexcept;
-  void restrict_from_level(std::size_t fine, int plane) noexcept;
-  std::uint64_t prolong_to_lattice(Displacement& state, const ObstacleView& obstacles, int plane) noexcept;
-  void prolong_to_level(std::size_t fine, int plane) noexcept;
-  // Interpolates the correction of `coarse` along one fine row into scratch_.
-  void interpolate_row(const Level& coarse, int axis, int j, int k, int first, int last) noexcept;
-  [[nodiscard]] int planes(const Step& step) const;
-  // Is the correction that a fine row would get too small to matter?
-  [[nodiscard]] bool negligible(const Level& coarse, int j, int k) const noexcept;
+  void lay_boxes(const std::array<int, 3>& low, const std::array<int, 3>& high, int margin) noexcept;
+  void cycle(Displacement& state, const ObstacleView& obstacles, Look look) noexcept;
+  void end_round(Displacement& state, double residual_N) noexcept;
+  double move_clusters(Displacement& state) noexcept;
+  std::uint64_t relax_tile(Displacement& state, const ObstacleView& obstacles, std::size_t number) noexcept;
+  std::uint64_t keep_yielded(Displacement& state, std::uint64_t budget) noexcept;
+  [[nodiscard]] bool tile_waits_for_coarse(std::size_t number) const noexcept;
+  [[nodiscard]] bool restrict_due(int level, RowId row) const noexcept;
+  template <class Visit>
+  void for_rows(int level, const RowBox& box, const Visit& visit) noexcept;
+  [[nodiscard]] RowBox clipped(int level, const RowBox& box) const noexcept;
+  void smooth_box(int level, int colour, Displacement& state, const ObstacleView& obstacles,
+                  Look look) noexcept;
+  void tell_box(int level, Displacement& state, const ObstacleView& obstacles) noexcept;
+  [[nodiscard]] LevelBoxes& boxes(int level) { return boxes_[static_cast<std::size_t>(level)]; }
 
   const Lattice& lattice_;
-  std::vector<Level> levels_;
-  std::vector<Step> steps_;
-  std::vector<HeldCell> held_cells_;
-  std::vector<float> scratch_, coarse_value_, coarse_weight_;
-  std::vector<std::uint8_t>
-      at_limit_;  // [v] bit of each axis on which a link at its limit stands against v's pull
-  std::vector<std::uint8_t>
-      unseen_;  // [row of the lattice] 1: its residual may have changed since it was last found
-  std::vector<float> row_residual_;  // [row] largest force on a free voxel when it was last found (N)
-  std::size_t step_ = 0;
-  int plane_ = 1;
+  Multigrid multigrid_;
+  ClusterMoves clusters_;
+  std::vector<LevelBoxes> boxes_;
+  std::int64_t credit_ = 0;                 // voxel updates that may be spent; negative: were spent too many
+  std::size_t round_left_ = 0;              // tiles until this round ends
+  std::size_t cursor_ = 0, looked_at_ = 0;  // tiles looked at for what coarse levels have to tell them
+  RowId keep_row_ = 0;                      // where keeping goes on
   bool asleep_ = true;
+  bool contact_relaxed_ = false;  // since run() last was
+  bool unkept_ = false;           // some link is beyond what it keeps
+  bool keeping_ = false;          // it is kept now
   double residual_N_ = 0.0, running_residual_N_ = 0.0, tolerance_N_ = 0.0, least_residual_N_ = 0.0;
+  float hold_ = 1.0F;
   int cycles_without_gain_ = 0;
-  std::uint64_t cycles_ = 0, cycle_cost_ = 0;
+  std::uint64_t cycles_ = 0;
 };
 
 }  // namespace voxel

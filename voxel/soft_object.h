@@ -88,7 +88,16 @@ class SoftObject {
   // A voxel pressed by another soft object: moved by the caller, held meanwhile. See pair_contact.h.
   void hold(VoxelId v) noexcept;
   void release(VoxelId v) noexcept;
-  // Moves one voxel, as far as its links allow; used by the pair solver.
+  // What other objects press it with (body frame, N): a tool under which the chain is tight down to it feels
+  // that.
+  void clear_pair_load(VoxelId v) noexcept;
+  void add_pair_load(VoxelId v, const glm::dvec3& force_N) noexcept;
+  [[nodiscard]] glm::dvec3 pair_load(VoxelId v) const noexcept;
+  // For the pair solver. Where its links alone would have a voxel, and how far a force of 1 N on it alone
+  // would move it (m/N): both 0 where it is anchored.
+  [[nodiscard]] glm::dvec3 free_displacement(VoxelId v) noexcept;
+  [[nodiscard]] glm::dvec3 compliance(VoxelId v) noexcept;
+  // Moves it, as far as its links allow.
   void move(VoxelId v, const glm::dvec3& displacement) noexcept;
 
   [[nodiscard]] bool moved_ever() const { return moved_ever_; }
@@ -101,14 +110,14 @@ class SoftObject {
     return {touched_voxels_.data(), touched_voxels_.size()};
   }
   // Number of a surface voxel; kNoSurface for one inside.
-  static constexpr std::uint32_t kNoSurface = 0xFFFFFFFFU;
-  [[nodiscard]] std::uint32_t surface_number(VoxelId v) const { return surface_number_[v]; }
+  static constexpr std::uint32_t kNoSurface = Lattice::kNoSurface;
+  [[nodiscard]] std::uint32_t surface_number(VoxelId v) const { return lattice_->surface_number(v); }
 
   // Displacement at any rest point in the body, from the voxels around it (unit: meter); 0 where none is
   // near.
   [[nodiscard]] glm::dvec3 displacement_at(const glm::dvec3& rest_point) const noexcept;
 
-  // Elastic energy (J); for tests and reports.
+  // What the springs store, and what yielding spent since the last state of rest (J); for tests and reports.
   [[nodiscard]] double energy_J() const noexcept;
   // Relaxes with the tool still until the residual is below `tolerance_N` or `max_cycles` passed; true when
   // it is. For references, not for the tick.
@@ -137,29 +146,33 @@ class SoftObject {
   void settle_chain() noexcept;
   [[nodiscard]] Displacement::Role resting_role(VoxelId v) const noexcept;  // when no tool presses it
   void set_touch_roles() noexcept;
+  void list_held() noexcept;
   void relax_touch(const ToolInBody& tool, Touch& touch) noexcept;
-  void add_stiffness(int axis, glm::dmat3& stiffness) const noexcept;
+  void add_stiffness(int axis, glm::dmat3& stiffness) noexcept;
+  [[nodiscard]] glm::dvec3 load_on(VoxelId v) noexcept;
   void gather_load(int axis) noexcept;
   void let_go_of_carried() noexcept;
-  [[nodiscard]] ObstacleView obstacle_view() const { return {obstacles_, surface_number_}; }
+  [[nodiscard]] ObstacleView obstacle_view() const { return {obstacles_, lattice_.get()}; }
 
   std::shared_ptr<const Lattice> lattice_;
   Displacement state_;
   ChainMail chain_;
   Relaxation relaxation_;
-  std::vector<std::uint32_t> surface_number_;  // [v]
-  std::vector<std::uint8_t> pair_held_;        // [surface number] 1 while another soft object presses it
-  std::vector<Obstacle> obstacles_;            // [surface number], empty when there is none
+  std::vector<std::uint8_t> pair_held_;  // [surface number] 1 while another soft object presses it
+  LazyArray<glm::vec3> pair_load_;       // [surface number] and with what force (N)
+  std::vector<Obstacle> obstacles_;      // [surface number], empty when there is none
   std::vector<Touch> touches_;
   std::vector<VoxelId> touched_voxels_;
   std::vector<VoxelId> held_voxels_;  // by pairs
-  std::vector<VoxelId> background_held_;
+  std::vector<VoxelId> all_held_;     // by the tool, too
   std::vector<VoxelId> sources_;
   std::vector<glm::vec3> moves_;
-  std::vector<Carried> carried_;              // [pressed first, then what hangs on them by a tight link]
-  std::vector<std::uint8_t> carried_mark_;    // [v] 1: in carried_ (within touch(): was pressed)
-  std::vector<std::uint32_t> carried_index_;  // [v]
-  double unrelaxed_m_ = 0.0;                  // motion of pressed voxels since the background was last woken
+  std::vector<Carried> carried_;            // [pressed first, then what hangs on them by a tight link]
+  LazyArray<std::uint8_t> carried_mark_;    // [v] 1: in carried_ (within touch(): was pressed)
+  LazyArray<std::uint32_t> carried_index_;  // [v]
+  double unrelaxed_m_ = 0.0;                // motion of pressed voxels since the background was last woken
+  int cycles_since_touch_ = 0;              // round the contact
+  double unsettled_m_ = 0.0;                // how far the contact may be from the rest of the object
   bool moved_ever_ = false;
 };
 

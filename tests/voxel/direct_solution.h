@@ -8,11 +8,14 @@
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <vector>
 
 #include "voxel/displacement.h"
 #include "voxel/lattice.h"
+#include "voxel/link_weight.h"
 
 namespace tests {
 
@@ -21,24 +24,43 @@ struct Link {
   double k, low, high;
 };
 
-// From labels and materials, not from the lattice's own springs.
+// Moduli of the link that leaves voxel `c` in +d, from labels and materials and not from the lattice's own
+// springs: the voxels around it one by one.
+inline voxel::LinkModuli moduli_of(const voxel::Lattice& lattice, const voxel::LatticeOptions& options,
+                                   const std::array<int, 3>& c, std::size_t d) {
+  const auto at = [&](const std::array<int, 3>& place) {
+    const std::uint8_t label = lattice.label(lattice.at(place[0], place[1], place[2]));
+    if (label == 0) return voxel::LinkModuli{};
+    const voxel::LinkMaterial& m = options.materials[label];
+    return voxel::LinkModuli{m.young_Pa, voxel::across_modulus_Pa(m.young_Pa, m.poisson)};
+  };
+  std::array<voxel::LinkModuli, 9> links;
+  for (int n = 0; n < 9; ++n) {
+    std::array<int, 3> from = c;
+    from[(d + 1) % 3] += n % 3 - 1;
+    from[(d + 2) % 3] += n / 3 - 1;
+    std::array<int, 3> to = from;
+    ++to[d];
+    links[static_cast<std::size_t>(n)] = voxel::softer(at(from), at(to));
+  }
+  return voxel::link_moduli(links);
+}
+
 inline std::vector<Link> links_of(const voxel::Lattice& lattice, const voxel::LatticeOptions& options,
                                   int axis) {
   std::vector<Link> links;
   const glm::dvec3 h = lattice.spacing_m();
-  const auto modulus = [&](voxel::VoxelId v, int d) {
-    const voxel::LinkMaterial& m = options.materials[lattice.label(v)];
-    return axis == d ? m.young_Pa : m.young_Pa / (4 * (1 - m.poisson * m.poisson));
-  };
   for (std::size_t i = 0; i < lattice.size(); ++i) {
     const auto a = static_cast<voxel::VoxelId>(i);
     if (!lattice.filled(a)) continue;
     for (int d = 0; d < 3; ++d) {
-      const voxel::VoxelId b = a + static_cast<voxel::VoxelId>(lattice.stride(d));
+      const voxel::VoxelId b = lattice.up(a, d);
       if (!lattice.filled(b)) continue;
+      const voxel::LinkModuli m =
+          moduli_of(lattice, options, lattice.coordinates(a), static_cast<std::size_t>(d));
       const double area = h.x * h.y * h.z / h[d];
       const auto bounds = lattice.bounds(a, d, axis);
-      links.push_back({a, b, area / (h[d] / 2 / modulus(a, d) + h[d] / 2 / modulus(b, d)),
+      links.push_back({a, b, (axis == d ? m.along_Pa : m.across_Pa) * area / h[d],
                        static_cast<double>(bounds[0]), static_cast<double>(bounds[1])});
     }
   }

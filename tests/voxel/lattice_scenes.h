@@ -47,9 +47,9 @@ inline voxel::LatticeOptions made_of(const voxel::LinkMaterial& material, const 
   return options;
 }
 
-// Index into the padded grid of voxel (i, j, k) of the volume.
+// Voxel (i, j, k) of the volume.
 inline voxel::VoxelId voxel_at(const voxel::Lattice& lattice, int i, int j, int k) {
-  return lattice.at(i + 1, j + 1, k + 1);
+  return lattice.at(i, j, k);
 }
 
 // A scene as hard as a volume can be: up to 10×9×8 voxels of one to four materials, with holes and slits, and

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The lattice against closed forms: two half links in series, the area a link stands for, and a brute-force
-// surface.
+// The lattice and its couplings against the voxels around a link looked at one by one, closed forms, and a
+// brute-force surface.
 #include "voxel/lattice.h"
 
 #include <gtest/gtest.h>
@@ -8,11 +8,15 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <set>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
+#include "tests/voxel/direct_solution.h"
 #include "tests/voxel/lattice_scenes.h"
+#include "voxel/couplings.h"
 
 namespace {
 
@@ -23,11 +27,14 @@ using tests::Random;
 using tests::random_scene;
 using tests::voxel_at;
 using tests::voxel_of;
+using voxel::Couplings;
 using voxel::LabelVolume;
 using voxel::Lattice;
 using voxel::LatticeOptions;
 using voxel::LinkMaterial;
+using voxel::RowId;
 using voxel::VoxelId;
+using voxel::VoxelSprings;
 
 std::string refusal(const LabelVolume& volume, const LatticeOptions& options) {
   try {
@@ -38,17 +45,7 @@ std::string refusal(const LabelVolume& volume, const LatticeOptions& options) {
   return {};
 }
 
-// Half a link of length h/2 and area A has stiffness modulus·A/(h/2); two of them in series.
-double series(double a, double b, double area, double h) {
-  const double ka = a * area / (h / 2), kb = b * area / (h / 2);
-  return ka * kb / (ka + kb);
-}
-
-double shear_modulus(const LinkMaterial& m) {
-  return m.young_Pa / (4.0 * (1.0 - m.poisson * m.poisson));
-}
-
-TEST(Lattice, SpringsAreTwoHalfLinksInSeries) {
+TEST(Lattice, SpringsAreThoseOfTheLinksAroundThem) {
   Random random(1);
   for (int n = 0; n < 40; ++n) {
     const auto scene = random_scene(random);
@@ -57,19 +54,108 @@ TEST(Lattice, SpringsAreTwoHalfLinksInSeries) {
     for (const std::size_t index : scene.filled) {
       const VoxelId v = voxel_of(lattice, scene.volume, index);
       for (int d = 0; d < 3; ++d) {
-        const VoxelId w = v + static_cast<VoxelId>(lattice.stride(d));
-        double along = 0.0, across = 0.0;
-        if (lattice.filled(w)) {
-          const LinkMaterial &a = scene.options.materials[lattice.label(v)],
-                             &b = scene.options.materials[lattice.label(w)];
-          const double area = h.x * h.y * h.z / h[d];
-          along = series(a.young_Pa, b.young_Pa, area, h[d]);
-          across = series(shear_modulus(a), shear_modulus(b), area, h[d]);
-        }
+        voxel::LinkModuli m;
+        if (lattice.filled(lattice.up(v, d)))
+          m = tests::moduli_of(lattice, scene.options, lattice.coordinates(v), static_cast<std::size_t>(d));
         for (int axis = 0; axis < 3; ++axis) {
-          const double expected = axis == d ? along : across;
-          EXPECT_NEAR(static_cast<double>(lattice.springs().stiffness(axis, d)[v]), expected,
-                      1e-6 * expected);
+          const double expected = (axis == d ? m.along_Pa : m.across_Pa) * h.x * h.y * h.z / (h[d] * h[d]);
+          EXPECT_NEAR(static_cast<double>(lattice.spring(v, d).on(axis, d)), expected, 1e-6 * expected);
+        }
+      }
+    }
+  }
+}
+
+// Volumes with whole rows inside a label, others where labels meet in the middle or at one end of a row or
+// along its edges only, and a hole.
+LabelVolume wide_volume() {
+  LabelVolume volume = block({140, 11, 9}, {1e-3, 1.2e-3, 0.9e-3});
+  for (int k = 0; k < 9; ++k) {
+    for (int j = 0; j < 11; ++j) {
+      for (int i = 0; i < 140; ++i) {
+        std::uint8_t& label = volume.labels[volume.index(i, j, k)];
+        if (k > 6) label = 2;
+        if (i == 63 && j == 4 && k == 4) label = 3;
+        if (i > 90 && j > 5 && (i + j + k) % 7 == 0) label = 4;
+        if (i > 100 && i < 104 && j > 2) label = 0;
+      }
+    }
+  }
+  return volume;
+}
+
+// What inner loops and single voxels are given is what the lattice says, to the last bit, in whatever order
+// rows are asked for; and a coarse link is half the four below it.
+TEST(Lattice, CouplingsAreItsSpringsOnEveryLevel) {
+  LatticeOptions options = made_of(elastic(1e4, 0.3));
+  options.materials[2] = elastic(5e3, 0.45);
+  options.materials[3] = elastic(1e6, 0.0);
+  options.materials[4] = elastic(2e3, 0.2);
+  const Lattice lattice(wide_volume(), options);
+  // Every row asked for on the way up, or only those of the level looked at.
+  std::vector<std::unique_ptr<Couplings>> known, unknown;
+  for (int level = 0; level < 4; ++level) {
+    for (auto* levels : {&known, &unknown})
+      levels->push_back(std::make_unique<Couplings>(lattice, level == 0 ? nullptr : levels->back().get()));
+    for (RowId row = 0; row < known.back()->grid().rows(); ++row) known.back()->prepare(row);
+  }
+  std::size_t uniform = 0;
+  for (RowId row = 0; row < lattice.grid().rows(); ++row) {
+    if (!known[0]->prepare(row)) {
+      EXPECT_EQ(lattice.filled_in(row), 0);
+      continue;
+    }
+    uniform += known[0]->uniform(row) ? 1 : 0;
+    for (VoxelId i = 0; i < voxel::kRow; ++i) {
+      const VoxelId v = row * voxel::kRow + i;
+      if (!lattice.filled(v)) continue;
+      const VoxelSprings expected = lattice.springs_of(v), found = known[0]->springs_of(v);
+      EXPECT_EQ(found.up, expected.up) << v;
+      EXPECT_EQ(found.down, expected.down) << v;
+      EXPECT_EQ(found.inverse, expected.inverse) << v;
+      for (int axis = 0; axis < 3; ++axis) {
+        const voxel::RowSprings springs = known[0]->springs(row, axis);
+        for (std::size_t d = 0; d < 3; ++d) {
+          EXPECT_EQ(springs.up[d][i], expected.up[d].on(axis, static_cast<int>(d)));
+          EXPECT_EQ(springs.down[d][i], expected.down[d].on(axis, static_cast<int>(d)));
+        }
+      }
+    }
+  }
+  EXPECT_GT(uniform, 20U);
+
+  const auto& dims = lattice.grid().dims;
+  for (int level = 1; level < 4; ++level) {
+    const auto ul = static_cast<std::size_t>(level);
+    const voxel::Grid& g = known[ul]->grid();
+    const int size = 1 << level;
+    // All of them here; of the other, those of this level alone, once.
+    Couplings alone(lattice, unknown[ul - 1].get());
+    const auto sum_of = [&](const std::array<int, 3>& cell, std::size_t d) {
+      double sum = 0.0;
+      std::array<int, 3> at{};
+      at[d] = (cell[d] + 1) * size - 1;
+      if (at[d] + 1 >= dims[d]) return sum;
+      const std::size_t p = (d + 1) % 3, q = (d + 2) % 3;
+      for (at[p] = cell[p] * size; at[p] < std::min((cell[p] + 1) * size, dims[p]); ++at[p]) {
+        for (at[q] = cell[q] * size; at[q] < std::min((cell[q] + 1) * size, dims[q]); ++at[q])
+          sum += static_cast<double>(
+              lattice.spring(lattice.at(at[0], at[1], at[2]), static_cast<int>(d)).across);
+      }
+      return sum;
+    };
+    for (int k = 0; k < g.dims[2]; ++k) {
+      for (int j = 0; j < g.dims[1]; ++j) {
+        for (int i = 0; i < g.dims[0]; ++i) {
+          const VoxelSprings found = known[ul]->springs_of(g.at(i, j, k)),
+                             again = alone.springs_of(g.at(i, j, k));
+          EXPECT_EQ(found.up, again.up);
+          EXPECT_EQ(found.down, again.down);
+          EXPECT_EQ(found.inverse, again.inverse);
+          for (std::size_t d = 0; d < 3; ++d) {
+            const double sum = sum_of({i, j, k}, d) / size;
+            EXPECT_NEAR(static_cast<double>(found.up[d].across), sum, 1e-6 * sum);
+          }
         }
       }
     }
@@ -87,8 +173,8 @@ TEST(Lattice, AnUnequalSpacingIsTheSameMaterial) {
       const double area = h.x * h.y * h.z / h[d], length = 5 * h[d];
       double compliance = 0.0;
       VoxelId v = voxel_at(lattice, 0, 0, 0);
-      for (int n = 0; n < 5; ++n, v += static_cast<VoxelId>(lattice.stride(d))) {
-        compliance += 1.0 / static_cast<double>(lattice.springs().stiffness(d, d)[v]);
+      for (int n = 0; n < 5; ++n, v = lattice.up(v, d)) {
+        compliance += 1.0 / static_cast<double>(lattice.spring(v, d).on(d, d));
       }
       EXPECT_NEAR(1.0 / compliance, 8e3 * area / length, 1e-6 * 8e3 * area / length);
     }
@@ -104,7 +190,7 @@ TEST(Lattice, LimitsOfALinkAreTheMeanOfItsTwoHalves) {
     for (const std::size_t index : scene.filled) {
       const VoxelId v = voxel_of(lattice, scene.volume, index);
       for (int d = 0; d < 3; ++d) {
-        const VoxelId w = v + static_cast<VoxelId>(lattice.stride(d));
+        const VoxelId w = lattice.up(v, d);
         if (!lattice.filled(w)) continue;
         const LinkMaterial &a = scene.options.materials[lattice.label(v)],
                            &b = scene.options.materials[lattice.label(w)];
@@ -173,8 +259,9 @@ TEST(Lattice, AnchorsByFaceLabelAndVoxel) {
       const auto v = static_cast<VoxelId>(i);
       if (!lattice.anchored(v)) continue;
       const auto c = lattice.coordinates(v);
-      result.insert({c[0] - 1, c[1] - 1, c[2] - 1});
-      for (const auto& inverse : lattice.springs().inverse_diagonal) EXPECT_EQ(inverse[v], 0.0F);
+      result.insert(c);
+      for (int axis = 0; axis < 3; ++axis)
+        EXPECT_EQ(lattice.springs_of(v).inverse[static_cast<std::size_t>(axis)], 0.0F);
     }
     EXPECT_EQ(result.size(), lattice.anchored_count());
     return result;
@@ -246,6 +333,8 @@ TEST(Lattice, RefusesInWords) {
       {with([](LinkMaterial& m) { m.stretch_max = 0.9; }), "greatest stretch"},
       {with([&](LinkMaterial& m) { m.stretch_max = nan; }), "greatest stretch"},
       {with([](LinkMaterial& m) { m.shear = -0.1; }), "shear"},
+      {with([](LinkMaterial& m) { m.yield = 0.0; }), "yield"},
+      {with([&](LinkMaterial& m) { m.yield = nan; }), "yield"},
       {with([&](LinkMaterial& m) { m.shear = nan; }), "shear"},
   };
   for (const Row& row : rows) {

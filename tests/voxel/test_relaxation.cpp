@@ -60,10 +60,9 @@ LabelVolume connected_to_origin(LabelVolume volume) {
 }
 
 // Holds `v` at `u`, and tells the relaxation.
-void hold(const Lattice& lattice, Displacement& state, std::vector<VoxelId>& held, VoxelId v,
-          const glm::dvec3& u) {
+void hold(Displacement& state, std::vector<VoxelId>& held, VoxelId v, const glm::dvec3& u) {
   state.set(v, u);
-  state.set_role(v, Displacement::held, lattice);
+  state.set_role(v, Displacement::held);
   held.push_back(v);
 }
 
@@ -74,7 +73,7 @@ int relax(Relaxation& relaxation, Displacement& state, const std::vector<VoxelId
   int cycles = 0;
   while (!relaxation.asleep() && cycles < most) {
     const auto before = relaxation.cycles();
-    while (relaxation.cycles() == before) relaxation.run(state, {}, held, 1);
+    while (relaxation.cycles() == before) relaxation.run(state, {}, held, 100'000);
     ++cycles;
   }
   return cycles;
@@ -119,7 +118,7 @@ TEST(Relaxation, ConvergesToTheDirectSolutionOnIrregularVolumes) {
       const VoxelId v = voxel_of(lattice, scene.volume, index);
       if (!lattice.filled(v) || lattice.anchored(v) || random.unit() > 0.05) continue;
       const double h = 0.3 * lattice.min_spacing_m();
-      hold(lattice, state, held, v, {random.between(-h, h), random.between(-h, h), random.between(-h, h)});
+      hold(state, held, v, {random.between(-h, h), random.between(-h, h), random.between(-h, h)});
     }
     if (held.empty()) continue;
     Relaxation relaxation(lattice);
@@ -178,7 +177,7 @@ std::vector<Pressed> pressed_blocks() {
 std::vector<VoxelId> press_patch(const Lattice& lattice, Displacement& state, const glm::dvec3& u) {
   std::vector<VoxelId> held;
   for (int j = 7; j < 12; ++j) {
-    for (int i = 8; i < 13; ++i) hold(lattice, state, held, voxel_at(lattice, i, j, 15), u);
+    for (int i = 8; i < 13; ++i) hold(state, held, voxel_at(lattice, i, j, 15), u);
   }
   return held;
 }
@@ -234,7 +233,7 @@ double largest_growth(bool limits_act) {
                            random.between(-far, far) * lattice.min_spacing_m(),
                            random.between(-far, far) * lattice.min_spacing_m());
       state.set(v, state.at(v) + glm::dvec3(move));
-      chain.settle(state, {&v, 1}, {&move, 1}, {}, {});
+      chain.settle(state, {&v, 1}, {&move, 1}, {});
     }
     Relaxation relaxation(lattice);
     relaxation.stir_all();
@@ -245,7 +244,7 @@ double largest_growth(bool limits_act) {
     for (int cycle = 0; cycle < 60 && !relaxation.asleep(); ++cycle) {
       const auto number = relaxation.cycles();
       while (relaxation.cycles() == number) {
-        relaxation.run(state, {}, {}, 1);
+        relaxation.run(state, {}, {}, 20'000);
         // Not only at its end: never.
         EXPECT_LE(voxel::worst_violation(lattice, state), rounding) << "scene " << n << ", cycle " << cycle;
       }
@@ -288,16 +287,11 @@ TEST(Relaxation, ItsResidualIsTheLargestForceLeft) {
       }
       return most;
     };
-    const int planes = p.volume.dims[2];
+    // It is measured after the first smoothing of a cycle: about what there was before it.
     for (int cycle = 0; cycle < 8; ++cycle) {
-      // It is measured after the first smoothing of the cycle, two colours of every plane; with a budget of
-      // one a call does one plane.
-      for (int n = 0; n < 2 * planes; ++n) relaxation.run(state, {}, held, 1);
-      const double expected = largest_force();
-      const auto number = relaxation.cycles();
-      while (relaxation.cycles() == number) relaxation.run(state, {}, held, 1);
-      EXPECT_NEAR(relaxation.residual_N(), expected, 1e-5 * expected + 1e-7 * lattice.force_scale_N())
-          << p.name;
+      const double before = largest_force();
+      relaxation.run_cycle(state, {}, held);
+      EXPECT_LE(relaxation.residual_N(), 2.0 * before) << p.name;
     }
     // At rest it is below the tolerance, and so is what is really left.
     relax(relaxation, state, held);
@@ -307,6 +301,64 @@ TEST(Relaxation, ItsResidualIsTheLargestForceLeft) {
     EXPECT_LT(largest_force(), 2 * resting) << p.name;
     EXPECT_EQ(relaxation.run(state, {}, held, 1'000'000), 0U);
   }
+}
+
+// A porous ball on a thin stem, pressed at its top: it hangs by little, so that coarse levels have much to
+// say, and cells beside a cycle's box that kept theirs to themselves fed energy to it, cycle by cycle.
+TEST(Relaxation, CyclesRoundAContactBetweenTilesEndWhereWholeOnesDo) {
+  constexpr int kSize = 48, kWide = 5;
+  LabelVolume volume = block({kSize, kSize, kSize}, glm::dvec3(1e-3));
+  for (int k = 0; k < kSize; ++k) {
+    for (int j = 0; j < kSize; ++j) {
+      for (int i = 0; i < kSize; ++i) {
+        const double x = i / 2.0, y = j / 2.0, z = k / 2.0, half = kSize / 2.0;
+        const double lumps =
+            std::sin(x + 0.4 * y + 1.0) + std::sin(y - 0.5 * z + 2.0) + std::sin(z + 0.3 * x + 3.0);
+        const double aside = std::hypot(i - half, j - half);
+        const bool ball = std::hypot(aside, k - half) < half - 1.0 && lumps > -0.3;
+        const bool stem = k < kSize / 6 && aside < kSize / 10.0;
+        volume.labels[volume.index(i, j, k)] = ball || stem ? 1 : 0;
+      }
+    }
+  }
+  LatticeOptions options = tests::made_of(
+      {.young_Pa = 1e4, .poisson = 0.3, .stretch_min = 1e-3, .stretch_max = 100.0, .shear = 100.0});
+  const Lattice lattice(volume, options);
+  const auto pressed = [&](Displacement& state, std::vector<VoxelId>& held) {
+    std::array<int, 3> low{kSize, kSize, kSize}, high{};
+    for (int j = 0; j < kSize; ++j) {
+      for (int i = 0; i < kSize; ++i) {
+        if (std::hypot(i - kSize / 2, j - kSize / 2) > kWide) continue;
+        int k = kSize - 1;
+        while (k > kSize / 2 && !lattice.filled(voxel_at(lattice, i, j, k))) --k;
+        if (k == kSize / 2) continue;
+        hold(state, held, voxel_at(lattice, i, j, k), {0.0, 0.0, -4e-4});
+        const std::array<int, 3> at{i, j, k};
+        for (std::size_t d = 0; d < 3; ++d) {
+          low[d] = std::min(low[d], at[d]);
+          high[d] = std::max(high[d], at[d]);
+        }
+      }
+    }
+    return std::pair{low, high};
+  };
+  const auto relaxed = [&](bool tiles) {
+    Displacement state(lattice);
+    std::vector<VoxelId> held;
+    const auto [low, high] = pressed(state, held);
+    Relaxation relaxation(lattice);
+    relaxation.stir_all();
+    relaxation.wake();
+    for (int n = 0; n < 100 && !tiles; ++n) relaxation.run_cycle(state, {}, held);
+    for (int n = 0; n < 4000 && tiles; ++n) {
+      relaxation.relax_contact(state, {}, held, low, high);
+      relaxation.run(state, {}, held, 4000);
+    }
+    return energy_of(lattice, options, state);
+  };
+  const double expected = relaxed(false), found = relaxed(true);
+  std::cout << "energy " << found / expected << " times the converged one\n";
+  EXPECT_LE(found, 1.02 * expected);
 }
 
 // ---- limits ----
@@ -331,11 +383,11 @@ TEST(Relaxation, WhereLimitsHoldTheStateIsTheOptimumOfTheProgram) {
     std::vector<glm::vec3> moves;
     for (int j = 4; j < 7; ++j) {
       for (int i = 4; i < 7; ++i) {
-        hold(lattice, state, held, voxel_at(lattice, i, j, 10), {0.0, 0.0, -row.depth * 1e-3});
+        hold(state, held, voxel_at(lattice, i, j, 10), {0.0, 0.0, -row.depth * 1e-3});
         moves.emplace_back(0.0F, 0.0F, static_cast<float>(-row.depth * 1e-3));
       }
     }
-    chain.settle(state, held, moves, {}, {});
+    chain.settle(state, held, moves, {});
     Relaxation relaxation(lattice);
     relaxation.stir_all();
     relaxation.wake();
@@ -343,7 +395,7 @@ TEST(Relaxation, WhereLimitsHoldTheStateIsTheOptimumOfTheProgram) {
     for (; cycles < 3000 && !relaxation.asleep(); ++cycles) {
       const auto number = relaxation.cycles();
       while (relaxation.cycles() == number) {
-        relaxation.run(state, {}, held, 1);
+        relaxation.run(state, {}, held, 100'000);
         ASSERT_LE(voxel::worst_violation(lattice, state), 1e-9) << row.name;
       }
     }
@@ -386,8 +438,8 @@ TEST(Relaxation, WhereLimitsHoldTheStateIsTheOptimumOfTheProgram) {
 TEST(Relaxation, WorkIsBoundedAndCutsChangeNoBit) {
   const Pressed p = pressed_blocks()[1];
   const Lattice lattice(p.volume, p.options);
-  // The largest a step can cost beyond its budget: two planes, which a restriction sums at once.
-  const std::uint64_t two_planes = 2 * 21 * 19 + 1;
+  // What a call may spend beyond what was granted so far: a cycle round one tile, which is not cut.
+  const std::uint64_t a_cycle = 4 * lattice.size();
   Random random(23);
   std::vector<Displacement> ends;
   std::vector<std::uint64_t> cycles;
@@ -397,13 +449,15 @@ TEST(Relaxation, WorkIsBoundedAndCutsChangeNoBit) {
     Relaxation relaxation(lattice);
     relaxation.stir_all();
     relaxation.wake();
-    for (int n = 0; n < 1'000'000 && !relaxation.asleep(); ++n) {
+    std::uint64_t granted = 0, all_spent = 0;
+    for (int n = 0; n < 10'000'000 && !relaxation.asleep(); ++n) {
       const auto budget = slicing == 0   ? std::uint64_t{1'000'000'000}
-                          : slicing == 1 ? std::uint64_t{1}
+                          : slicing == 1 ? std::uint64_t{100}
                           : slicing == 2 ? std::uint64_t{1000}
                                          : static_cast<std::uint64_t>(random.below(20'000));
-      const std::uint64_t spent = relaxation.run(state, {}, held, budget);
-      ASSERT_LE(spent, budget + two_planes);
+      granted += budget;
+      all_spent += relaxation.run(state, {}, held, budget);
+      ASSERT_LE(all_spent, granted + a_cycle);
     }
     ASSERT_TRUE(relaxation.asleep());
     ends.push_back(state);

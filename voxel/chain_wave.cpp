@@ -1,0 +1,313 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "voxel/chain_wave.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace voxel {
+namespace {
+
+constexpr std::uint32_t kAll = 0xFFFFFFFFU;
+constexpr std::size_t kAhead = 12;  // rows
+constexpr std::size_t kMostCones = 4;
+
+}  // namespace
+
+ChainWave::ChainWave(const Lattice& lattice)
+    : lattice_(lattice),
+      limits_(lattice),
+      rows_(lattice.grid().rows()),
+      ring_(lattice.grid().rows() + 1),
+      moved_(lattice.grid().rows() + 1),
+      pulled_(lattice.grid().rows()),
+      waiting_(lattice.grid().rows()),
+      taken_(lattice.grid().rows()),
+      asked_(lattice.grid().rows()),
+      asked_spans_(2 * static_cast<std::size_t>(lattice.grid().columns) *
+                   (static_cast<std::size_t>(lattice.grid().dims[2]) + 2)),
+      in_plane_(static_cast<std::size_t>(lattice.grid().columns)),
+      moves_(static_cast<std::size_t>(lattice.grid().dims[1])),
+      fall_(static_cast<std::size_t>(lattice.grid().columns) * kRow) {
+  const Grid& grid = lattice.grid();
+  free_low_ = grid.dims;
+  free_high_.fill(-1);
+  std::size_t count = 0;
+  for (RowId row = 0; row < grid.rows(); ++row) {
+    if (lattice.filled_in(row) == 0) continue;
+    const std::uint8_t* const labels = lattice.labels(row);
+    std::uint32_t free = 0, anchors = 0;
+    bool alike = true;
+    for (VoxelId i = 0; i < kRow; ++i) {
+      const std::uint32_t bit = 1U << i;
+      alike = alike && labels[i] == labels[0];
+      if (labels[i] == 0) continue;
+      (lattice.anchored(row * kRow + i) ? anchors : free) |= bit;
+    }
+    const bool plain = free == kAll && alike;
+    rows_[row] = {free, plain ? labels[0] : std::uint8_t{0}, true, anchors != 0, 0, 0};
+    if (free == 0) continue;
+    count += static_cast<std::size_t>(__builtin_popcount(free));
+    const std::array<int, 3> c = grid.row_coordinates(row);
+    const int x = (c[0] - 1) * kRow;
+    free_low_[0] = std::min(free_low_[0], x + __builtin_ctz(free));
+    free_high_[0] = std::max(free_high_[0], x + kRow - 1 - __builtin_clz(free));
+    for (std::size_t d = 1; d < 3; ++d) {
+      free_low_[d] = std::min(free_low_[d], c[d]);
+      free_high_[d] = std::max(free_high_[d], c[d]);
+    }
+  }
+  std::size_t box = 1;
+  for (std::size_t d = 0; d < 3; ++d)
+    box *= static_cast<std::size_t>(std::max(0, free_high_[d] - free_low_[d] + 1));
+  free_is_box_ = box == count;
+}
+
+void ChainWave::begin() noexcept {
+  for (std::size_t n = 0; n < moved_count_; ++n) rows_[moved_[n]].mark = 0;
+  for (std::size_t n = 0; n < pulled_count_; ++n) rows_[pulled_[n]].mark = 0;
+  moved_count_ = pulled_count_ = 0;
+  work_ = 0;
+}
+
+void ChainWave::note_pulled(RowId row) noexcept {
+  std::uint8_t& mark = rows_[row].mark;
+  if ((mark & pulled) != 0) return;
+  mark |= pulled;
+  pulled_[pulled_count_++] = row;
+}
+
+// The voxel beyond the end of a row.
+void ChainWave::ask_across(const Pass& p, RowId row, RowId to, int direction) noexcept {
+  const RowInfo &own = rows_[row], &other = rows_[to];
+  if (!other.filled) return;
+  const VoxelId end = kRow - 1, from = row * kRow + (direction == 0 ? end : 0),
+                at = to * kRow + (direction == 0 ? 0 : end);
+  if (own.label == 0 || other.label == 0) {
+    if (lattice_.filled(from)) ask_voxel(p, from, at, direction);
+    return;
+  }
+  const float limit = p.limits.between(direction, own.label, other.label);
+  const float wanted = p.way == Way::raise ? p.u[from] - limit : p.u[from] + limit;
+  if (p.way == Way::raise ? !(wanted > p.u[at] + p.margin) : !(wanted < p.u[at] - p.margin)) return;
+  p.u[at] = wanted;
+  note_moved(to);
+  enqueue(to, direction == 0 ? first : last);
+}
+
+void ChainWave::ask_voxel(const Pass& p, VoxelId from, VoxelId to, int direction) noexcept {
+  const RowId row = to / kRow;
+  if (!lattice_.filled(to)) return;
+  const float limit = p.limits.between(direction, lattice_.label(from), lattice_.label(to));
+  const float wanted = p.way == Way::raise ? p.u[from] - limit : p.u[from] + limit;
+  if (p.way == Way::raise ? !(wanted > p.u[to] + p.margin) : !(wanted < p.u[to] - p.margin)) return;
+  if (!free(to)) {
+    note_pulled(row);
+    return;
+  }
+  p.u[to] = wanted;
+  note_moved(row);
+  enqueue(row);
+}
+
+void ChainWave::ask_beside(const Pass& p, RowId row, RowId to, int direction) noexcept {
+  if (!rows_[to].filled) return;
+  if (rows_[to].anchored) {
+    for (VoxelId i = 0; i < kRow; ++i) {
+      if (lattice_.filled(row * kRow + i)) ask_voxel(p, row * kRow + i, to * kRow + i, direction);
+    }
+    return;
+  }
+  float* const own = row_at(p, row);
+  float* const other = row_at(p, to);
+  const float* const half = p.limits.half[static_cast<std::size_t>(direction)];
+  const std::uint8_t a = rows_[row].label, b = rows_[to].label;
+  Moved moves = kNothingMoved;
+  if (a != 0 && b != 0) {
+    moves = p.way == Way::raise ? raise_beside_alike(own, other, half[a] + half[b], p.margin)
+                                : lower_beside_alike(own, other, half[a] + half[b], p.margin);
+  } else {
+    const HalfLimits h{half, limits_.registers()};
+    const std::uint8_t *la = lattice_.labels(row), *lb = lattice_.labels(to);
+    moves = p.way == Way::raise ? raise_beside(own, la, other, lb, h, p.margin)
+                                : lower_beside(own, la, other, lb, h, p.margin);
+  }
+  if (moves == kNothingMoved) return;
+  note_moved(to);
+  enqueue(to, moves & (first | last));
+}
+
+Moved ChainWave::ask_along(const Pass& p, RowId row) noexcept {
+  float* const own = row_at(p, row);
+  if (rows_[row].anchored) {
+    const VoxelId begin = row * kRow, end = begin + kRow - 1;
+    for (VoxelId v = begin; v < end; ++v) {
+      if (lattice_.filled(v)) ask_voxel(p, v, v + 1, 0);
+    }
+    for (VoxelId v = end; v > begin; --v) {
+      if (lattice_.filled(v)) ask_voxel(p, v, v - 1, 1);
+    }
+    return kFirstMoved | kLastMoved;
+  }
+  const std::uint8_t label = rows_[row].label;
+  if (label != 0) {
+    const float up = p.limits.between(0, label, label), down = p.limits.between(1, label, label);
+    return p.way == Way::raise ? raise_along_alike(own, up, down, p.margin)
+                               : lower_along_alike(own, up, down, p.margin);
+  }
+  const HalfLimits up{p.limits.half[0], limits_.registers()}, down{p.limits.half[1], limits_.registers()};
+  return p.way == Way::raise ? raise_along(own, lattice_.labels(row), up, down, p.margin)
+                             : lower_along(own, lattice_.labels(row), up, down, p.margin);
+}
+
+void ChainWave::ask_around(const Pass& p, RowId row) noexcept {
+  const Grid& grid = lattice_.grid();
+  // Before it asks: with anchors in it, a row may put itself into the queue again.
+  std::uint8_t ends = rows_[row].mark & (first | last);
+  rows_[row].mark &= static_cast<std::uint8_t>(~(queued | first | last));
+  ends |= ask_along(p, row);
+  ask_beside(p, row, row + 1, 2);
+  ask_beside(p, row, row - 1, 3);
+  ask_beside(p, row, row + grid.row_z, 4);
+  ask_beside(p, row, row - grid.row_z, 5);
+  if ((ends & last) != 0) ask_across(p, row, row + grid.row_x, 0);
+  if ((ends & first) != 0) ask_across(p, row, row - grid.row_x, 1);
+}
+
+// A row's neighbours lie in as many places; what stands further back in the queue is fetched meanwhile.
+inline void ChainWave::fetch_around(const Pass& p, RowId row) const noexcept {
+  const Grid& grid = lattice_.grid();
+  const RowInfo info = rows_[row];
+  const auto fetch = [&](RowId r) {
+    __builtin_prefetch(row_at(p, r));
+    __builtin_prefetch(row_at(p, r) + kCone);
+  };
+  __builtin_prefetch(&rows_[row - grid.row_z]);
+  __builtin_prefetch(&rows_[row + grid.row_z]);
+  fetch(row - grid.row_z);
+  fetch(row + grid.row_z);
+  fetch(row - 1);
+  fetch(row + 1);
+  if (info.label == 0) {
+    __builtin_prefetch(lattice_.labels(row - grid.row_z));
+    __builtin_prefetch(lattice_.labels(row + grid.row_z));
+  }
+  if ((info.mark & last) != 0) {
+    __builtin_prefetch(row_at(p, row + grid.row_x));
+    __builtin_prefetch(&rows_[row + grid.row_x]);
+    __builtin_prefetch(lattice_.labels(row + grid.row_x));
+  }
+  if ((info.mark & first) != 0) {
+    __builtin_prefetch(row_at(p, row - grid.row_x) + kCone);
+    __builtin_prefetch(&rows_[row - grid.row_x]);
+    __builtin_prefetch(lattice_.labels(row - grid.row_x));
+  }
+}
+
+std::uint64_t ChainWave::run(const Pass& p, std::uint64_t most) noexcept {
+  std::uint64_t visits = 0;
+  for (; head_ != tail_ && visits < most; ++visits) {
+    const RowId row = ring_[head_];
+    const std::size_t ahead = head_ + kAhead < ring_.size() ? head_ + kAhead : 0;
+    fetch_around(p, ring_[ahead]);  // past the queue's end, whatever was there before
+    head_ = head_ + 1 == ring_.size() ? 0 : head_ + 1;
+    ask_around(p, row);
+  }
+  for (; head_ != tail_; head_ = head_ + 1 == ring_.size() ? 0 : head_ + 1) {
+    rows_[ring_[head_]].mark &= static_cast<std::uint8_t>(~(queued | first | last));
+    wait(ring_[head_], wave_bit(p.axis, p.way));
+  }
+  work_ += visits;
+  return visits;
+}
+
+void ChainWave::wait(RowId row, std::uint8_t waves) noexcept {
+  std::uint8_t& waits = rows_[row].waits;
+  if ((waits & kListed) == 0) waiting_[waiting_count_++] = row;
+  waits |= static_cast<std::uint8_t>(waves | kListed);
+}
+
+std::uint64_t ChainWave::spread(float* u, int axis, Way way, std::span<Source> sources, float margin,
+                                std::uint64_t most) noexcept {
+  if (sources.empty()) return 0;
+  Pass p{u, axis, way, margin, limits_.pass(axis, way), {}};
+  // The one that goes furthest first: what it takes along needs no second visit.
+  std::sort(sources.begin(), sources.end(), [way](const Source& a, const Source& b) {
+    if (a.u != b.u) return way == Way::raise ? a.u > b.u : a.u < b.u;
+    return a.v < b.v;
+  });
+  const bool cones = lattice_.uniform_limits() && sources.size() <= kMostCones;
+  const std::uint8_t label = lattice_.label(sources.front().v);
+  for (int n = 0; n < kWays; ++n)
+    p.limit[static_cast<std::size_t>(n)] = static_cast<double>(p.limits.between(n, label, label));
+  cone_rows_ = 0;
+  std::uint64_t visits = 0;
+  const auto taken = [&] { return visits + cone_rows_ / kConeRows; };
+  const auto left = [&] { return taken() < most ? most - taken() : 0; };
+  // Cones and sweeps start from a state that violates nothing: no row waits.
+  const bool whole = waiting_count_ == 0;
+  std::size_t moves = 0;
+  for (const Source& s : sources) {
+    note_moved(s.v / kRow);
+    if (way == Way::raise ? s.u <= u[s.v] : s.u >= u[s.v]) continue;  // a stronger one took it along
+    u[s.v] = s.u;
+    sources[moves++] = s;
+    if (!cones) continue;
+    // One after the other.
+    if (!whole || !cone(p, s.v, left())) {
+      if (!whole || !sweep(p, {&s, 1}, left(), visits)) enqueue(s.v / kRow);
+    }
+    visits += run(p, left());
+  }
+  if (!cones && moves > 0 && (!whole || !sweep(p, sources.first(moves), left(), visits))) {
+    for (const Source& s : sources.first(moves)) enqueue(s.v / kRow);
+  }
+  visits += run(p, left());
+  work_ += cone_rows_ / kConeRows;
+  return taken();
+}
+
+std::uint64_t ChainWave::spread_from_pulled(float* u, int axis, Way way, float margin,
+                                            std::uint64_t most) noexcept {
+  const Pass p{u, axis, way, margin, limits_.pass(axis, way), {}};
+  const std::size_t count = pulled_count_;
+  for (std::size_t n = 0; n < count; ++n) enqueue(pulled_[n]);
+  return run(p, most);
+}
+
+void ChainWave::take_waiting() noexcept {
+  std::swap(waiting_, taken_);
+  taken_count_ = std::exchange(waiting_count_, 0);
+  for (std::size_t n = 0; n < taken_count_; ++n)
+    rows_[taken_[n]].waits &= static_cast<std::uint8_t>(~kListed);
+}
+
+std::uint64_t ChainWave::spread_from_taken(float* u, int axis, Way way, float margin,
+                                           std::uint64_t most) noexcept {
+  const Pass p{u, axis, way, margin, limits_.pass(axis, way), {}};
+  const std::uint8_t bit = wave_bit(axis, way);
+  std::uint64_t count = 0;
+  for (std::size_t n = 0; n < taken_count_ && count < most; ++n) {
+    std::uint8_t& waits = rows_[taken_[n]].waits;
+    if ((waits & bit) == 0) continue;
+    waits &= static_cast<std::uint8_t>(~bit);
+    enqueue(taken_[n]);
+    ++count;
+  }
+  return run(p, most);
+}
+
+void ChainWave::put_back() noexcept {
+  for (std::size_t n = 0; n < taken_count_; ++n) {
+    if (rows_[taken_[n]].waits != 0) wait(taken_[n], 0);
+  }
+  taken_count_ = 0;
+}
+
+std::size_t ChainWave::memory_bytes() const {
+  return rows_.resident_bytes() + ring_.resident_bytes() + moved_.resident_bytes() +
+         pulled_.resident_bytes() + waiting_.resident_bytes() + taken_.resident_bytes() +
+         asked_.resident_bytes() + asked_spans_.size() * sizeof(Span) +
+         in_plane_.size() * sizeof(in_plane_[0]) + moves_.size() + fall_.size() * sizeof(float);
+}
+
+}  // namespace voxel

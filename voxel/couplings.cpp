@@ -1,0 +1,391 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "voxel/couplings.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace voxel {
+
+Couplings::Couplings(const Lattice& lattice, const Couplings* finer)
+    : lattice_(lattice),
+      finer_(finer),
+      level_(finer == nullptr ? 0 : finer->level_ + 1),
+      grid_(finer == nullptr ? lattice.grid() : coarsened(finer->grid_)),
+      kind_(grid_.rows()),
+      label_(grid_.rows()),
+      written_at_(grid_.rows()),
+      written_(grid_.rows()) {
+  if (finer_ == nullptr) {
+    if (!lattice.uniform_limits()) written_limits_ = LazyArray<RowLimits::Written>(grid_.rows());
+    for (std::size_t label = 0; label < 256; ++label) {
+      std::array<LinkLimit, 3> links;
+      for (int d = 0; d < 3; ++d) {
+        const auto l = static_cast<std::uint8_t>(label);
+        links[static_cast<std::size_t>(d)] =
+            lattice.uniform_limits() ? lattice.tightest(d) : lattice.limit_between(l, l, d);
+      }
+      for (int axis = 0; axis < 3; ++axis)
+        label_limits_[label][static_cast<std::size_t>(axis)] = AxisLimits(links, axis);
+    }
+  }
+  ones_.fill(1.0F);
+  eighths_.fill(0.125F);
+  for (Lanes& lanes : zeros_) lanes.fill(0.0F);
+  std::array<bool, 256> used{};
+  if (finer_ == nullptr) {
+    for (RowId row = 0; row < grid_.rows(); ++row) {
+      if (lattice_.filled_in(row) == 0) continue;
+      const std::uint8_t* at = lattice_.labels(row);
+      for (int i = 0; i < kRow; ++i) used[at[i]] = true;
+    }
+    used[0] = false;
+  }
+  const auto scale = static_cast<float>(std::ldexp(1.0, level_));
+  for (std::size_t label = 1; label < 256; ++label) {
+    if (finer_ == nullptr ? !used[label] : finer_->constant_[label] == nullptr) continue;
+    constant_[label] = std::make_unique<Constant>();
+    Constant& c = *constant_[label];
+    std::array<Spring, 3> springs;
+    for (std::size_t d = 0; d < 3; ++d) {
+      springs[d] = lattice_.spring_within(static_cast<std::uint8_t>(label), static_cast<int>(d));
+      c.along[d].fill(scale * springs[d].along);
+      c.across[d].fill(scale * springs[d].across);
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+      float sum = 0.0F;
+      for (std::size_t d = 0; d < 3; ++d) sum += 2.0F * scale * springs[d].on(axis, static_cast<int>(d));
+      c.inverse[static_cast<std::size_t>(axis)].fill(1.0F / sum);
+    }
+  }
+  if (level_ < 2) return;
+  content_ = LazyArray<std::uint8_t>(grid_.size());
+  for (int k = 0; k < grid_.dims[2]; ++k) {
+    for (int j = 0; j < grid_.dims[1]; ++j) {
+      for (int i = 0; i < grid_.dims[0]; ++i) {
+        Content all = nothing;
+        for (int corner = 0; corner < 8 && all != held; ++corner) {
+          const std::array<int, 3> fine{2 * i + (corner & 1), 2 * j + (corner >> 1 & 1),
+                                        2 * k + (corner >> 2)};
+          if (fine[0] >= finer_->grid_.dims[0] || fine[1] >= finer_->grid_.dims[1] ||
+              fine[2] >= finer_->grid_.dims[2])
+            continue;
+          all = std::max(all, finer_->content(fine));
+        }
+        if (all != nothing) content_[grid_.at(i, j, k)] = all;
+      }
+    }
+  }
+}
+
+// What a cell holds. A cell with any anchor in it is held: an underestimate of the correction beside an
+// anchor, never a wrong one.
+Couplings::Content Couplings::content(const std::array<int, 3>& cell) const noexcept {
+  const auto [i, j, k] = cell;
+  if (level_ == 0) {
+    const VoxelId v = grid_.at(i, j, k);
+    return !lattice_.filled(v) ? nothing : lattice_.anchored(v) ? held : some;
+  }
+  if (level_ >= 2) return static_cast<Content>(content_[grid_.at(i, j, k)]);
+  Content all = nothing;
+  for (int corner = 0; corner < 8 && all != held; ++corner) {
+    const std::array<int, 3> fine{2 * i + (corner & 1), 2 * j + (corner >> 1 & 1), 2 * k + (corner >> 2)};
+    if (fine[0] >= finer_->grid_.dims[0] || fine[1] >= finer_->grid_.dims[1] ||
+        fine[2] >= finer_->grid_.dims[2])
+      continue;
+    all = std::max(all, finer_->content(fine));
+  }
+  return all;
+}
+
+// The link of a cell to its upper neighbour in d: what was or will be written for it, to the last bit.
+Spring Couplings::link(const std::array<int, 3>& cell, int d) const noexcept {
+  const auto ud = static_cast<std::size_t>(d);
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (cell[a] < 0 || cell[a] >= grid_.dims[a]) return {};
+  }
+  const VoxelId v = grid_.at(cell[0], cell[1], cell[2]);
+  const RowId row = v / kRow;
+  if (kind_[row] == one_label) {
+    const Constant& c = *constant_[label_[row]];
+    return {c.along[ud][0], c.across[ud][0]};
+  }
+  if (kind_[row] == mixed) {
+    const Written& w = written_[written_at_[row]];
+    return {w.up_along[ud][v % kRow], w.up_across[ud][v % kRow]};
+  }
+  if (kind_[row] == empty) return {};
+  if (level_ == 0) return lattice_.spring(v, d);
+  const std::size_t p = (ud + 1) % 3, q = (ud + 2) % 3;
+  std::array<Spring, 4> fine;
+  for (std::size_t n = 0; n < 4; ++n) {
+    std::array<int, 3> at{};
+    at[ud] = 2 * cell[ud] + 1;  // the last layer of this cell; the link crosses to the next one's first
+    at[p] = 2 * cell[p] + static_cast<int>(n & 1);
+    at[q] = 2 * cell[q] + static_cast<int>(n >> 1);
+    fine[n] = finer_->link(at, d);
+  }
+  // In pairs, so that four equal springs are exactly four times one.
+  return {0.5F * ((fine[0].along + fine[1].along) + (fine[2].along + fine[3].along)),
+          0.5F * ((fine[0].across + fine[1].across) + (fine[2].across + fine[3].across))};
+}
+
+bool Couplings::is_one_label(RowId row, std::uint8_t& label) const noexcept {
+  if (level_ == 0) {
+    label = lattice_.inside(row);
+    if (label == 0) return false;
+    for (VoxelId v = row * kRow; v < (row + 1) * kRow; ++v) {
+      if (lattice_.anchored(v)) return false;
+    }
+    return true;
+  }
+  const std::array<int, 3> c = grid_.row_coordinates(row);
+  label = 0;
+  for (int child = 0; child < 8; ++child) {
+    const int j = 2 * c[1] + (child >> 1 & 1), k = 2 * c[2] + (child >> 2);
+    const int column = 2 * (c[0] - 1) + 1 + (child & 1);
+    if (j >= finer_->grid_.dims[1] || k >= finer_->grid_.dims[2] || column + 1 >= finer_->grid_.columns)
+      return false;
+    const RowId fine = finer_->grid_.row(column, j, k);
+    std::uint8_t fine_label = 0;
+    if (finer_->kind_[fine] == one_label) {
+      fine_label = finer_->label_[fine];
+    } else if (finer_->kind_[fine] != unknown || !finer_->is_one_label(fine, fine_label)) {
+      return false;
+    }
+    if (child == 0) label = fine_label;
+    if (fine_label != label) return false;
+  }
+  return true;
+}
+
+void Couplings::find(RowId row) noexcept {
+  const std::array<int, 3> c = grid_.row_coordinates(row);
+  std::uint8_t label = 0;
+  Kind kind = mixed;
+  if (c[0] < 1 || c[0] + 1 >= grid_.columns || c[1] < 0 || c[1] >= grid_.dims[1] || c[2] < 0 ||
+      c[2] >= grid_.dims[2] || (level_ == 0 && lattice_.filled_in(row) == 0)) {
+    kind = empty;
+  } else if (is_one_label(row, label)) {
+    kind = one_label;
+    label_[row] = label;
+  } else {
+    Written& out = written_[written_count_];
+    write_out(row, out);
+    if (std::all_of(out.filled.begin(), out.filled.end(), [](float f) { return f == 0.0F; })) {
+      kind = empty;
+    } else {
+      if (written_limits_.size() > 0) write_limits(row, written_limits_[written_count_]);
+      written_at_[row] = written_count_++;
+    }
+  }
+  kind_[row] = kind;
+}
+
+void Couplings::write_out(RowId row, Written& out) const noexcept {
+  if (level_ == 0) {
+    write_voxels(row, out);
+  } else {
+    write_cells(row, out);
+  }
+}
+
+void Couplings::write_lane(std::size_t i, const VoxelSprings& springs, Written& out) noexcept {
+  for (std::size_t d = 0; d < 3; ++d) {
+    out.up_along[d][i] = springs.up[d].along;
+    out.up_across[d][i] = springs.up[d].across;
+    out.down_along[d][i] = springs.down[d].along;
+    out.down_across[d][i] = springs.down[d].across;
+    out.inverse[d][i] = springs.inverse[d];
+  }
+}
+
+void Couplings::write_voxels(RowId row, Written& out) const noexcept {
+  // Materials around the row, [lane + 1][z][y]: those at one place along the row stand together.
+  using Slice = std::array<std::uint8_t, 9>;
+  std::array<Slice, kRow + 2> around{};
+  for (std::size_t n = 0; n < 9; ++n) {
+    const RowId r =
+        row - grid_.row_z - 1 + static_cast<RowId>(n / 3) * grid_.row_z + static_cast<RowId>(n % 3);
+    const VoxelId first = r * kRow;
+    around[0][n] = lattice_.material(grid_.down(first, 0));
+    for (VoxelId i = 0; i < kRow; ++i) around[i + 1][n] = lattice_.material(first + i);
+    around[kRow + 1][n] = lattice_.material(grid_.up(first + kRow - 1, 0));
+  }
+  // The link in +d of the voxel at (y, z) of slice x; y and z are 0 (one back), 1 or 2.
+  const auto along_x = [&](std::size_t x) { return lattice_.spring_among(around[x], around[x + 1], 0); };
+  const auto in_slices = [&](std::size_t x, std::size_t from, int d) {
+    Slice a{}, b{};
+    const std::size_t along = d == 1 ? 1 : 3, across = d == 1 ? 3 : 1;
+    for (std::size_t n = 0; n < 9; ++n) {
+      // In the order of Lattice::spring(): sums round alike.
+      const std::size_t beside = d == 1 ? n / 3 : n % 3,
+                        at = (d == 1 ? n % 3 : n / 3) * across + from * along;
+      a[n] = around[x - 1 + beside][at];
+      b[n] = around[x - 1 + beside][at + along];
+    }
+    return lattice_.spring_among(a, b, d);
+  };
+  VoxelSprings springs;
+  bool anchored = false;
+  for (std::size_t i = 0; i < kRow; ++i) {
+    const std::size_t x = i + 1;
+    const auto v = static_cast<VoxelId>(row * kRow + i);
+    out.filled[i] = around[x][4] != 0 ? 1.0F : 0.0F;
+    // Along a row little changes: mostly the links are those of the voxel before.
+    const bool as_before = i > 0 && around[x + 1] == around[x] && around[x] == around[x - 1] &&
+                           around[x - 1] == around[x - 2] && anchored == lattice_.anchored(v);
+    if (!as_before) {
+      anchored = lattice_.anchored(v);
+      springs.down[0] = i > 0 ? springs.up[0] : along_x(0);
+      springs.up[0] = along_x(x);
+      for (const int d : {1, 2}) {
+        springs.down[static_cast<std::size_t>(d)] = in_slices(x, 0, d);
+        springs.up[static_cast<std::size_t>(d)] = in_slices(x, 1, d);
+      }
+      springs.inverse = {};
+      if (!anchored) springs.set_inverse();
+    }
+    write_lane(i, springs, out);
+  }
+}
+
+void Couplings::write_limits(RowId row, RowLimits::Written& out) const noexcept {
+  constexpr float kFar = std::numeric_limits<float>::max();
+  constexpr LinkLimit kNone{-kFar, kFar, kFar};
+  std::array<LinkLimit, 3> tightest{kNone, kNone, kNone};
+  for (std::size_t i = 0; i < kRow; ++i) {
+    const auto v = static_cast<VoxelId>(row * kRow + i);
+    for (int d = 0; d < 3; ++d) {
+      const auto ud = static_cast<std::size_t>(d);
+      const VoxelId up = grid_.up(v, d), down = grid_.down(v, d);
+      const bool here = lattice_.filled(v);
+      const LinkLimit above = here && lattice_.filled(up) ? lattice_.limit(v, d) : kNone,
+                      below = here && lattice_.filled(down) ? lattice_.limit(down, d) : kNone;
+      out.up_low[ud][i] = above.along_low;
+      out.up_high[ud][i] = above.along_high;
+      out.up_across[ud][i] = above.across;
+      out.down_low[ud][i] = below.along_low;
+      out.down_high[ud][i] = below.along_high;
+      out.down_across[ud][i] = below.across;
+      for (const LinkLimit& l : {above, below}) {
+        LinkLimit& t = tightest[ud];
+        t.along_low = std::max(t.along_low, l.along_low);
+        t.along_high = std::min(t.along_high, l.along_high);
+        t.across = std::min(t.across, l.across);
+      }
+    }
+  }
+  for (int axis = 0; axis < 3; ++axis)
+    out.tightest[static_cast<std::size_t>(axis)] = AxisLimits(tightest, axis);
+}
+
+RowLimits Couplings::limits(RowId row) const noexcept {
+  RowLimits out{&label_limits_[label_[row]], nullptr};
+  if (written_limits_.size() > 0 && kind_[row] == mixed) {
+    out.lanes = &written_limits_[written_at_[row]];
+    out.of = &out.lanes->tightest;
+  }
+  return out;
+}
+
+void Couplings::write_cells(RowId row, Written& out) const noexcept {
+  const std::array<int, 3> c = grid_.row_coordinates(row);
+  for (int lane = 0; lane < kRow; ++lane) {
+    const std::array<int, 3> cell{(c[0] - 1) * kRow + lane, c[1], c[2]};
+    const Content inside = cell[0] < grid_.dims[0] ? content(cell) : nothing;
+    VoxelSprings springs;
+    if (inside != nothing) {
+      for (std::size_t d = 0; d < 3; ++d) {
+        std::array<int, 3> below = cell;
+        --below[d];
+        springs.up[d] = link(cell, static_cast<int>(d));
+        springs.down[d] = link(below, static_cast<int>(d));
+      }
+    }
+    if (inside != held) springs.set_inverse();
+    int below = 0;
+    for (int corner = 0; inside != nothing && corner < 8; ++corner) {
+      const std::array<int, 3> fine{2 * cell[0] + (corner & 1), 2 * cell[1] + (corner >> 1 & 1),
+                                    2 * cell[2] + (corner >> 2)};
+      const auto& dims = finer_->grid_.dims;
+      if (fine[0] < dims[0] && fine[1] < dims[1] && fine[2] < dims[2] && finer_->content(fine) != nothing)
+        ++below;
+    }
+    out.share[static_cast<std::size_t>(lane)] = below > 0 ? 1.0F / static_cast<float>(below) : 0.0F;
+    out.filled[static_cast<std::size_t>(lane)] = inside == nothing ? 0.0F : 1.0F;
+    write_lane(static_cast<std::size_t>(lane), springs, out);
+  }
+}
+
+VoxelSprings Couplings::springs_of(VoxelId cell) noexcept {
+  VoxelSprings out;
+  const RowId row = cell / kRow;
+  if (!prepare(row)) return out;
+  if (kind_[row] == one_label) {
+    const Constant& c = *constant_[label_[row]];
+    for (std::size_t d = 0; d < 3; ++d) {
+      out.up[d] = out.down[d] = {c.along[d][0], c.across[d][0]};
+      out.inverse[d] = c.inverse[d][0];
+    }
+    return out;
+  }
+  const Written& w = written_[written_at_[row]];
+  const std::size_t i = cell % kRow;
+  for (std::size_t d = 0; d < 3; ++d) {
+    out.up[d] = {w.up_along[d][i], w.up_across[d][i]};
+    out.down[d] = {w.down_along[d][i], w.down_across[d][i]};
+    out.inverse[d] = w.inverse[d][i];
+  }
+  return out;
+}
+
+RowSprings Couplings::springs(RowId row, int axis) const noexcept {
+  RowSprings out;
+  const auto ua = static_cast<std::size_t>(axis);
+  if (kind_[row] == one_label) {
+    const Constant& c = *constant_[label_[row]];
+    for (std::size_t d = 0; d < 3; ++d) out.up[d] = out.down[d] = (ua == d ? c.along[d] : c.across[d]).data();
+    out.inverse = c.inverse[ua].data();
+  } else if (kind_[row] == mixed) {
+    const Written& w = written_[written_at_[row]];
+    for (std::size_t d = 0; d < 3; ++d) {
+      out.up[d] = (ua == d ? w.up_along[d] : w.up_across[d]).data();
+      out.down[d] = (ua == d ? w.down_along[d] : w.down_across[d]).data();
+    }
+    out.inverse = w.inverse[ua].data();
+  } else {
+    out.up.fill(zeros_[0].data());
+    out.down.fill(zeros_[0].data());
+    out.inverse = zeros_[0].data();
+  }
+  return out;
+}
+
+RowCouplings Couplings::all(RowId row) const noexcept {
+  if (kind_[row] == one_label) {
+    const Constant& c = *constant_[label_[row]];
+    const float *along = c.along[0].data(), *across = c.across[0].data();
+    return {along, across, along, across, c.inverse[0].data(), eighths_.data(), ones_.data(), true};
+  }
+  if (kind_[row] == mixed) {
+    const Written& w = written_[written_at_[row]];
+    return {w.up_along[0].data(), w.up_across[0].data(), w.down_along[0].data(), w.down_across[0].data(),
+            w.inverse[0].data(),  w.share.data(),        w.filled.data(),        false};
+  }
+  const float* zeros = zeros_[0].data();
+  return {zeros, zeros, zeros, zeros, zeros, zeros, zeros, false};
+}
+
+const float* Couplings::filled(RowId row) const noexcept {
+  if (kind_[row] == one_label) return ones_.data();
+  return kind_[row] == mixed ? written_[written_at_[row]].filled.data() : zeros_[0].data();
+}
+
+std::size_t Couplings::memory_bytes() const {
+  return kind_.resident_bytes() + label_.resident_bytes() + content_.resident_bytes() +
+         written_at_.resident_bytes() + written_count_ * sizeof(Written) +
+         (written_limits_.size() > 0 ? written_count_ * sizeof(RowLimits::Written) : 0);
+}
+
+}  // namespace voxel

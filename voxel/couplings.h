@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The springs of one level of the multigrid hierarchy, row by row, as inner loops want them.
+//
+// Level 0 is the lattice; a cell of level l stands for 2×2×2 cells of the level below it. A coarse link is as
+// many fine links side by side as cross the face between its two cells, each 2^l times as long: half the sum
+// of the four of the level below. Rows inside a region of one label share one set of constants; any other row
+// has its springs written out when it is first asked for. So untouched tissue costs nothing, on any level.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "voxel/grid.h"
+#include "voxel/lattice.h"
+#include "voxel/lazy_array.h"
+
+namespace voxel {
+
+// Springs of one row on one axis: up[d][i] is the link of voxel i to its upper neighbour in d (N/m), 0 where
+// there is none.
+struct RowSprings {
+  std::array<const float*, 3> up{}, down{};
+  const float* inverse = nullptr;  // 1 / Σ; 0 where nothing may move
+};
+
+// Those of all axes: [d][lane], what the link in d weighs on its own axis and on the two others.
+struct RowCouplings {
+  const float *up_along = nullptr, *up_across = nullptr, *down_along = nullptr, *down_across = nullptr;
+  const float* inverse = nullptr;  // [axis][lane]
+  const float* share = nullptr;    // [lane] 1 / number of cells of the level below; 0 where there is none
+  const float* filled = nullptr;   // [lane] 1 where there is a cell, 0 elsewhere
+  bool uniform = false;            // the same in every lane
+};
+
+using Lanes = std::array<float, kRow>;
+
+// Limits of all links of a lattice, or of a label, on one axis: low[d] <= u(up) − u(v) <= high[d].
+struct AxisLimits {
+  std::array<float, 3> low{}, high{};
+
+  AxisLimits() = default;
+  AxisLimits(const std::array<LinkLimit, 3>& links, int axis) {
+    for (std::size_t d = 0; d < 3; ++d) {
+      const bool along = axis == static_cast<int>(d);
+      low[d] = along ? links[d].along_low : -links[d].across;
+      high[d] = along ? links[d].along_high : links[d].across;
+    }
+  }
+};
+
+// Limits of the links of one row of voxels: the same for all, or lane by lane, [d], without end where there
+// is no link.
+struct RowLimits {
+  struct Written {
+    std::array<Lanes, 3> up_low, up_high, up_across, down_low, down_high, down_across;
+    std::array<AxisLimits, 3> tightest;  // [axis] no link is tighter
+  };
+  const std::array<AxisLimits, 3>* of = nullptr;  // [axis] no link is tighter
+  const Written* lanes = nullptr;                 // null: all are as tight as that
+};
+
+class Couplings {
+ public:
+  // `finer`: the level below, kept by the caller; none for level 0.
+  Couplings(const Lattice& lattice, const Couplings* finer);
+
+  [[nodiscard]] const Grid& grid() const { return grid_; }
+  [[nodiscard]] int level() const { return level_; }
+
+  // Is there any cell in this row? Finds out, and writes out the springs where they are not uniform: call it
+  // before what follows. Allocates address space never, pages of memory the first time.
+  bool prepare(RowId row) noexcept {
+    if (kind_[row] == unknown) find(row);
+    return kind_[row] != empty;
+  }
+  [[nodiscard]] bool uniform(RowId row) const { return kind_[row] == one_label; }
+  [[nodiscard]] RowSprings springs(RowId row, int axis) const noexcept;
+  [[nodiscard]] RowCouplings all(RowId row) const noexcept;
+  // Of level 0.
+  [[nodiscard]] RowLimits limits(RowId row) const noexcept;
+  // Those of one voxel or cell, on all axes; a few loads once its row was prepared, which it sees to.
+  [[nodiscard]] VoxelSprings springs_of(VoxelId cell) noexcept;
+  [[nodiscard]] const Lattice& lattice() const { return lattice_; }
+  // 1 where there is a cell, 0 elsewhere; of a prepared row.
+  [[nodiscard]] const float* filled(RowId row) const noexcept;
+
+  [[nodiscard]] std::size_t memory_bytes() const;
+
+ private:
+  enum Kind : std::uint8_t { unknown = 0, empty, one_label, mixed };
+  enum Content : std::uint8_t { nothing = 0, some = 1, held = 2 };
+  struct Written {  // springs of a mixed row
+    std::array<Lanes, 3> up_along, up_across, down_along, down_across, inverse;
+    Lanes filled, share;
+  };
+  struct Constant {  // springs of all rows of one label
+    std::array<Lanes, 3> along, across, inverse;
+  };
+
+  void find(RowId row) noexcept;
+  [[nodiscard]] bool is_one_label(RowId row, std::uint8_t& label) const noexcept;
+  void write_out(RowId row, Written& out) const noexcept;
+  static void write_lane(std::size_t lane, const VoxelSprings& springs, Written& out) noexcept;
+  void write_voxels(RowId row, Written& out) const noexcept;
+  void write_limits(RowId row, RowLimits::Written& out) const noexcept;
+  void write_cells(RowId row, Written& out) const noexcept;
+  [[nodiscard]] Spring link(const std::array<int, 3>& cell, int d) const noexcept;
+  [[nodiscard]] Content content(const std::array<int, 3>& cell) const noexcept;
+
+  const Lattice& lattice_;
+  const Couplings* finer_;
+  int level_;
+  Grid grid_;
+  LazyArray<std::uint8_t> kind_, label_;  // [row]
+  LazyArray<std::uint8_t> content_;       // [cell], from level 2 on; found on the fly below
+  LazyArray<std::uint32_t> written_at_;   // [row] into written_
+  LazyArray<Written> written_;
+  LazyArray<RowLimits::Written> written_limits_;  // as written_; empty where all links have the same
+  std::array<std::array<AxisLimits, 3>, 256> label_limits_;  // [label][axis]
+  std::uint32_t written_count_ = 0;
+  std::array<std::unique_ptr<Constant>, 256> constant_;  // [label]
+  Lanes ones_, eighths_;
+  std::array<Lanes, 3> zeros_;
+};
+
+}  // namespace voxel

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "voxel/links.h"
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+#include <limits>
+
+namespace voxel {
+namespace {
+
+constexpr float kTight = 1e-6F;  // of the spacing: nearer to its limit than this a link is at it
+
+glm::dvec3 force_of(const VoxelSprings& springs, const Lattice& lattice, const Displacement& state,
+                    VoxelId v) noexcept {
+  std::array<double, 3> force{};
+  for (std::size_t axis = 0; axis < 3; ++axis) force[axis] = static_cast<double>(state.rest.load_at(v, axis));
+  for (std::size_t d = 0; d < 3; ++d) {
+    const int id = static_cast<int>(d);
+    const VoxelId up = lattice.up(v, id), down = lattice.down(v, id);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const LazyArray<float>& u = state.u[axis];
+      const int ia = static_cast<int>(axis);
+      force[axis] += static_cast<double>(springs.up[d].on(ia, id) * (u[up] - u[v])) +
+                     static_cast<double>(springs.down[d].on(ia, id) * (u[down] - u[v]));
+    }
+  }
+  return {force[0], force[1], force[2]};
+}
+
+}  // namespace
+
+std::array<float, 2> link_interval(const Lattice& lattice, const Displacement& state, VoxelId v,
+                                   int axis) noexcept {
+  const LazyArray<float>& u = state.u[static_cast<std::size_t>(axis)];
+  float low = -std::numeric_limits<float>::max(), high = std::numeric_limits<float>::max();
+  for (int d = 0; d < 3; ++d) {
+    const VoxelId up = lattice.up(v, d), down = lattice.down(v, d);
+    if (lattice.filled(up)) {  // b0 <= u(up) − u(v) <= b1
+      const auto b = lattice.bounds(v, d, axis);
+      low = std::max(low, u[up] - b[1]);
+      high = std::min(high, u[up] - b[0]);
+    }
+    if (lattice.filled(down)) {
+      const auto b = lattice.bounds(down, d, axis);
+      low = std::max(low, u[down] + b[0]);
+      high = std::min(high, u[down] + b[1]);
+    }
+  }
+  return {low, high};
+}
+
+float clamp_to(const std::array<float, 2>& interval, float wanted, float now) noexcept {
+  return interval[0] > interval[1] ? now : std::clamp(wanted, interval[0], interval[1]);
+}
+
+bool resisted(const Lattice& lattice, const Displacement& state, int axis, VoxelId v, float pull) noexcept {
+  const float u = state.u[static_cast<std::size_t>(axis)][v];
+  const auto interval = link_interval(lattice, state, v, axis);
+  const float tight = kTight * static_cast<float>(lattice.min_spacing_m());
+  return pull > 0.0F ? u >= interval[1] - tight : u <= interval[0] + tight;
+}
+
+glm::dvec3 link_minimum(Couplings& couplings, const Displacement& state, VoxelId v) noexcept {
+  const VoxelSprings springs = couplings.springs_of(v);
+  const Grid& grid = couplings.grid();
+  std::array<float, 3> sum{};
+  for (std::size_t axis = 0; axis < 3; ++axis) sum[axis] = state.rest.load_at(v, axis);
+  for (std::size_t d = 0; d < 3; ++d) {
+    const int id = static_cast<int>(d);
+    const VoxelId up = grid.up(v, id), down = grid.down(v, id);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const LazyArray<float>& u = state.u[axis];
+      const int ia = static_cast<int>(axis);
+      sum[axis] += springs.up[d].on(ia, id) * u[up] + springs.down[d].on(ia, id) * u[down];
+    }
+  }
+  return {static_cast<double>(sum[0] * springs.inverse[0]), static_cast<double>(sum[1] * springs.inverse[1]),
+          static_cast<double>(sum[2] * springs.inverse[2])};
+}
+
+glm::dvec3 clamp_to_links(const Lattice& lattice, const Displacement& state, VoxelId v,
+                          const glm::dvec3& wanted) noexcept {
+  glm::dvec3 result(0.0);
+  for (int axis = 0; axis < 3; ++axis) {
+    result[axis] =
+        static_cast<double>(clamp_to(link_interval(lattice, state, v, axis), static_cast<float>(wanted[axis]),
+                                     state.u[static_cast<std::size_t>(axis)][v]));
+  }
+  return result;
+}
+
+glm::dvec3 link_force(Couplings& couplings, const Displacement& state, VoxelId v) noexcept {
+  return force_of(couplings.springs_of(v), couplings.lattice(), state, v);
+}
+
+glm::dvec3 link_force(const Lattice& lattice, const Displacement& state, VoxelId v) noexcept {
+  return force_of(lattice.springs_of(v), lattice, state, v);
+}
+
+glm::dvec3 link_compliance(Couplings& couplings, VoxelId v) noexcept {
+  const std::array<float, 3> inverse = couplings.springs_of(v).inverse;
+  return {inverse[0], inverse[1], inverse[2]};
+}
+
+bool blocked(const ObstacleView& view, const Displacement& state, VoxelId v, double margin) noexcept {
+  const Obstacle& o = view.of(v);
+  return glm::dot(glm::dvec3(o.normal), state.at(v)) < static_cast<double>(o.bound) + margin;
+}
+
+void relax_obstacle(Couplings& couplings, Displacement& state, const ObstacleView& view, VoxelId v) noexcept {
+  if (!blocked(view, state, v, 0.0)) return;
+  glm::dvec3 wanted = link_minimum(couplings, state, v);
+  const Obstacle& o = view.of(v);
+  const glm::dvec3 n(o.normal);
+  const double depth = static_cast<double>(o.bound) - glm::dot(n, wanted);
+  if (depth > 0.0) {
+    // Projected in the metric of the springs, so that the step lowers the energy along the surface.
+    const glm::dvec3 w = link_compliance(couplings, v);
+    const double denominator = glm::dot(n, w * n);
+    if (denominator > 0.0) wanted += (depth / denominator) * w * n;
+  }
+  state.set(v, clamp_to_links(couplings.lattice(), state, v, wanted));
+}
+
+void clear_obstacle(const Lattice& lattice, Displacement& state, const ObstacleView& view,
+                    VoxelId v) noexcept {
+  const Obstacle& o = view.of(v);
+  const glm::dvec3 n(o.normal);
+  const double depth = static_cast<double>(o.bound) - glm::dot(n, state.at(v));
+  if (depth > 0.0) state.set(v, clamp_to_links(lattice, state, v, state.at(v) + depth * n));
+}
+
+}  // namespace voxel

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What its links ask of one voxel, and allow it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <span>
+
+#include "voxel/couplings.h"
+#include "voxel/displacement.h"
+#include "voxel/lattice.h"
+
+namespace voxel {
+
+// `couplings` are those of level 0.
+
+// Where voxel v would go if only its links pulled, and the interval its links allow it, per axis (unit:
+// meter).
+glm::dvec3 link_minimum(Couplings& couplings, const Displacement& state, VoxelId v) noexcept;
+std::array<float, 2> link_interval(const Lattice& lattice, const Displacement& state, VoxelId v,
+                                   int axis) noexcept;
+glm::dvec3 clamp_to_links(const Lattice& lattice, const Displacement& state, VoxelId v,
+                          const glm::dvec3& wanted) noexcept;
+// The value nearest to `wanted` in the interval. An empty interval can only be a rounding wide: `now` then.
+float clamp_to(const std::array<float, 2>& interval, float wanted, float now) noexcept;
+// Force of its links on voxel v (unit: newton); of a lattice's own springs slowly, for references.
+glm::dvec3 link_force(Couplings& couplings, const Displacement& state, VoxelId v) noexcept;
+glm::dvec3 link_force(const Lattice& lattice, const Displacement& state, VoxelId v) noexcept;
+// How far a force of 1 N on voxel v alone moves it, per axis (unit: m/N); 0 where it is anchored.
+glm::dvec3 link_compliance(Couplings& couplings, VoxelId v) noexcept;
+// Is voxel v, pulled this way on this axis, held by a link that is at its limit?
+bool resisted(const Lattice& lattice, const Displacement& state, int axis, VoxelId v, float pull) noexcept;
+
+struct ObstacleView {
+  std::span<const Obstacle> obstacles;  // by surface number; empty: none
+  const Lattice* lattice = nullptr;     // whose surface numbers these are
+
+  [[nodiscard]] const Obstacle& of(VoxelId v) const { return obstacles[lattice->surface_number(v)]; }
+};
+
+// Is a voxel whose role is obstacle within `margin` of it, or in it (unit: meter)?
+bool blocked(const ObstacleView& view, const Displacement& state, VoxelId v, double margin) noexcept;
+// After the links had their way with a voxel whose role is obstacle: if that took it into its obstacle, where
+// it goes with the obstacle there.
+void relax_obstacle(Couplings& couplings, Displacement& state, const ObstacleView& view, VoxelId v) noexcept;
+// Brings it back onto the surface as far as its links allow.
+void clear_obstacle(const Lattice& lattice, Displacement& state, const ObstacleView& view,
+                    VoxelId v) noexcept;
+
+}  // namespace voxel

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "voxel/multigrid.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace voxel {
+namespace {
+
+constexpr int kMaxLevels = 10;
+constexpr int kSmallest = 3;             // cells across the coarsest level
+constexpr int kWrittenAtOnce = 3;        // from this level on springs are written out on construction
+constexpr std::size_t kMaxHeld = 65536;  // cells of all levels held at a time; more move a little
+// A cycle over a held disc of 2, 4, 8, 16 or 24 spacings' radius leaves 0.5, 0.5, 0.5, 0.4 and 0.6 of what it
+// found; with kSide 1.4, all that statics asks for, the layer under a wide one swung (−0.9 at 8 spacings).
+constexpr float kDisc = 0.5F, kSide = 28.0F;
+constexpr std::uint16_t kMostCounted = 65535;
+
+// How hard n held voxels hold the cell of size³ they are in, in units of all springs of the cell: few of them
+// as a disc on a half-space, 4·κ·a with a = h·sqrt(n/π); a whole side of them as the fine links under it do
+// before sweeps have reached the cell's depth.
+float hold_of(std::uint16_t n, float size) {
+  const float covered = std::sqrt(static_cast<float>(n)) / size;
+  return (kDisc + kSide * covered) * covered;
+}
+
+}  // namespace
+
+Multigrid::Multigrid(const Lattice& lattice) : lattice_(lattice), tiles_(lattice.grid()) {
+  for (AxisLimits& axis : yield_limits_) {
+    for (std::size_t d = 0; d < 3; ++d) {
+      axis.high[d] = lattice.first_yield_m(static_cast<int>(d));
+      axis.low[d] = -axis.high[d];
+    }
+  }
+  levels_.reserve(kMaxLevels);
+  while (levels() < kMaxLevels) {
+    Level level;
+    const Couplings* finer = levels_.empty() ? nullptr : levels_.back().couplings.get();
+    level.couplings = std::make_unique<Couplings>(lattice, finer);
+    const Grid& g = level.couplings->grid();
+    if (finer != nullptr) {
+      for (auto* arrays : {&level.value, &level.told, &level.load}) {
+        for (auto& array : *arrays) array = LazyArray<float>(g.size());
+      }
+      level.held = LazyArray<std::uint16_t>(g.size());
+      level.hold = LazyArray<float>(g.size());
+      level.row_held = LazyArray<std::uint8_t>(g.rows());
+    }
+    level.stopped = LazyArray<std::uint8_t>(g.size());
+    level.flags = LazyArray<std::uint8_t>(g.rows());
+    levels_.push_back(std::move(level));
+    // One coarse level at least: it is where residuals are measured.
+    if (levels() > 1 && *std::max_element(g.dims.begin(), g.dims.end()) <= kSmallest) break;
+  }
+  for (int l = kWrittenAtOnce; l < levels(); ++l) prepare_level(l);
+  hats_ = Hats(lattice.grid());
+  held_.reserve(kMaxHeld);
+  stopped_.reserve(kMaxHeld);
+}
+
+void Multigrid::prepare_level(int level) noexcept {
+  const Grid& g = grid(level);
+  for (int c = 1; c + 1 < g.columns; ++c) {
+    for (int k = 0; k < g.dims[2]; ++k) {
+      for (int j = 0; j < g.dims[1]; ++j) prepare(level, g.row(c, j, k));
+    }
+  }
+}
+
+void Multigrid::prepare_all() noexcept {
+  for (int l = 0; l < levels(); ++l) {
+    prepare_level(l);
+    Level& level = at(l);
+    for (auto* arrays : {&level.value, &level.told, &level.load}) {
+      for (auto& array : *arrays) array.populate();
+    }
+    level.stopped.populate();
+    level.flags.populate();
+  }
+}
+
+// Marks a row and the rows beside it.
+void Multigrid::spread(int level, RowId row, std::uint8_t flags) noexcept {
+  Level& l = at(level);
+  const Grid& g = l.couplings->grid();
+  for (const RowId r : {row, row - 1, row + 1, row - g.row_z, row + g.row_z, row - g.row_x, row + g.row_x})
+    l.flags[r] |= flags;
+  if (level == 0 && (flags & active) != 0) tiles_.stir(g.row_coordinates(row));
+}
+
+// A row was moved by as much. What is too little for a sweep is still passed on: a small force on each of
+// many voxels is a large one on the cell that holds them, four times as large on each level.
+void Multigrid::note_change(int level, RowId row, float change) noexcept {
+  if (change <= passed_on_m()) return;
+  spread(level, row, change > quiet_m_ ? active | dirty : dirty);
+  if (level > 0) mark(level, row, changed);
+}
+
+// Held voxels hold on to the cells above them as a disc of them holds on to a half-space: a spring to the
+// mean of what the cell holds. (Cells that stand still as a whole were rejected: a cycle then gained a
+// quarter; cells that know nothing of it swing past the contact.)
+void Multigrid::set_held(std::span<const VoxelId> held) noexcept {
+  for (const HeldCell& h : held_) {
+    at(h.level).held[h.cell] = 0;
+    at(h.level).hold[h.cell] = 0.0F;
+    at(h.level).row_held[h.cell / kRow] = 0;
+  }
+  held_.clear();
+  bool full = false;
+  for (const VoxelId v : held) {
+    auto c = lattice_.coordinates(v);
+    for (int l = 1; l < levels() && !full; ++l) {
+      for (int& x : c) x /= 2;
+      Level& level = at(l);
+      const VoxelId cell = level.couplings->grid().at(c[0], c[1], c[2]);
+      if (level.held[cell] == 0) {
+        full = held_.size() == held_.capacity();
+        if (full) break;
+        held_.push_back({static_cast<std::uint8_t>(l), cell});
+        level.row_held[cell / kRow] = 1;
+      }
+      if (level.held[cell] < kMostCounted) ++level.held[cell];
+    }
+  }
+  for (const HeldCell& h : held_)
+    at(h.level).hold[h.cell] = hold_of(at(h.level).held[h.cell], static_cast<float>(1 << h.level));
+}
+
+void Multigrid::stop_cells(VoxelId v, std::uint8_t bits) noexcept {
+  auto c = lattice_.coordinates(v);
+  for (int l = 0; l < levels(); ++l) {
+    if (l > 0) {
+      for (int& x : c) x /= 2;
+    }
+    Level& level = at(l);
+    const VoxelId cell = level.couplings->grid().at(c[0], c[1], c[2]);
+    if ((level.stopped[cell] & bits) == bits || stopped_.size() == stopped_.capacity()) return;
+    level.stopped[cell] |= bits;
+    mark(l, cell / kRow, limited);
+    stopped_.push_back({static_cast<std::uint8_t>(l), cell});
+  }
+}
+
+void Multigrid::release_limited() noexcept {
+  for (const HeldCell& s : stopped_) {
+    at(s.level).stopped[s.cell] = 0;
+    unmark(s.level, s.cell / kRow, limited);
+  }
+  stopped_.clear();
+}
+
+void Multigrid::copy_from(const Multigrid& other) noexcept {
+  tiles_ = other.tiles_;
+  for (int l = 0; l < levels(); ++l) {
+    Level& to = at(l);
+    const Level& from = other.at(l);
+    to.flags.copy_from(from.flags);
+    if (l == 0) continue;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      to.value[axis].copy_from(from.value[axis]);
+      to.told[axis].copy_from(from.told[axis]);
+      to.load[axis].copy_from(from.load[axis]);
+    }
+  }
+}
+
+std::size_t Multigrid::memory_bytes() const {
+  std::size_t bytes = (held_.capacity() + stopped_.capacity()) * sizeof(HeldCell);
+  for (const Level& l : levels_) {
+    bytes += l.couplings->memory_bytes() + l.flags.resident_bytes() + l.stopped.resident_bytes() +
+             l.held.resident_bytes() + l.hold.resident_bytes() + l.row_held.resident_bytes();
+    for (const auto* arrays : {&l.value, &l.told, &l.load}) {
+      for (const auto& array : *arrays) bytes += array.resident_bytes();
+    }
+  }
+  return bytes;
+}
+
+}  // namespace voxel

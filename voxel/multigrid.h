@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The passes of which a multigrid cycle is made, row by row; which rows, and when, is Relaxation's business.
+//
+// Full approximation scheme (Brandt 1977; Briggs, Henson & McCormick, A Multigrid Tutorial, chapter 6): a
+// coarse cell holds the whole displacement, not a correction. So a neighbourhood of the contact can be
+// solved on all levels in a tick while fine voxels further away are still where they were: the coarse cells
+// there go on, and the voxels follow when their turn comes.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "voxel/couplings.h"
+#include "voxel/displacement.h"
+#include "voxel/hats.h"
+#include "voxel/lattice.h"
+#include "voxel/links.h"
+#include "voxel/row_kernels.h"
+#include "voxel/row_passes.h"
+#include "voxel/tile_queue.h"
+
+namespace voxel {
+
+class Multigrid {
+ public:
+  explicit Multigrid(const Lattice& lattice);
+
+  [[nodiscard]] int levels() const { return static_cast<int>(levels_.size()); }
+  [[nodiscard]] const Grid& grid(int level) const { return at(level).couplings->grid(); }
+  // The springs of the voxels' links.
+  [[nodiscard]] Couplings& couplings() { return *at(0).couplings; }
+
+  // What is known of a row.
+  enum Flag : std::uint8_t {
+    active = 1,    // its residual may be too large
+    dirty = 2,     // it, or a row beside it, changed since it was passed on to the next coarser level
+    changed = 4,   // (coarse) it changed since what it holds was told
+    renewed = 8,   // (coarse) its values were renewed, its load is to be
+    telling = 16,  // (coarse) it tells what it holds, in the cycle that goes on
+    limited = 32,  // something in it is held by a limit
+  };
+  [[nodiscard]] bool has(int level, RowId row, std::uint8_t flag) const {
+    return (at(level).flags[row] & flag) != 0;
+  }
+  void mark(int level, RowId row, std::uint8_t flag) noexcept { at(level).flags[row] |= flag; }
+  void unmark(int level, RowId row, std::uint8_t flag) noexcept {
+    at(level).flags[row] &= static_cast<std::uint8_t>(~flag);
+  }
+  // Tiles of voxels near which somebody moved something; see Relaxation.
+  [[nodiscard]] TileQueue& tiles() { return tiles_; }
+  [[nodiscard]] const TileQueue& tiles() const { return tiles_; }
+  // Somebody moved voxels of this row: it and the rows beside it are to be looked at.
+  void stir(int level, RowId row) noexcept { spread(level, row, active | dirty); }
+
+  // What the tool and other objects hold does not move, nor do the cells around it on coarser levels.
+  void set_held(std::span<const VoxelId> held) noexcept;
+  // Held voxels hold the cells above them as many times harder: what a cycle that overshot asks for.
+  void set_hold(float times) noexcept { hold_ = times; }
+  // Cells held because a chain at its limit holds a voxel in them, until this is called.
+  void release_limited() noexcept;
+  // The voxels among them: `visit(v, axis)` for each axis on which a limit holds one.
+  template <class Visit>
+  void for_limited(const Visit& visit) const {
+    for (const HeldCell& s : stopped_) {
+      if (s.level != 0) continue;
+      for (int axis = 0; axis < 3; ++axis) {
+        if ((at(0).stopped[s.cell] & (1 << axis)) != 0) visit(s.cell, axis);
+      }
+    }
+  }
+
+  // Is there anything in the row? Call it before any of what follows.
+  bool prepare(int level, RowId row) noexcept { return at(level).couplings->prepare(row); }
+
+  // Renews what yielded links add to the load of a row of voxels; `keep`: they keep it. True where a link is
+  // beyond what it keeps.
+  bool yield(RowId row, Displacement& state, bool keep) noexcept;
+  // The child (bit 0: in x, 1: in y, 2: in z) of a coarse row on the level below; where the lattice ends, a
+  // row of its empty border.
+  [[nodiscard]] RowId row_below(int level, RowId row, int child) const noexcept;
+
+  // What follows works on the octets of `span` only; by default, on the whole row.
+
+  // Moves the voxels, or cells, of a row to the minimum of their energy given all other rows, every second
+  // one first, without leaving their limits.
+  void smooth(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
+              OctetSpan span = {}) noexcept;
+  // The cells of a coarse row take the means of what they hold, and keep what they know beyond that …
+  void restrict_values(int level, RowId row, Displacement& state, OctetSpan span = {}) noexcept;
+  // … and the load under which those would be at rest where they are. Returns the largest force left on any
+  // voxel below (N); only for level 1 is it one of voxels. Of whole rows it also finds which are at rest.
+  float restrict_loads(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
+                       OctetSpan span = {}) noexcept;
+  // Tells the rows of a box on a level what cells above them have yet to tell (see hats.h): those of coarse
+  // rows marked `telling`, from first to last along x. What links at their limits keep from following, the
+  // cells take back: a cell whose voxels stayed behind would pull at the cells beside it, a little more every
+  // time, until it was kilometers away.
+  struct Told {
+    int q0, q1, j0, j1, k0, k1;     // octets and rows of the level, all included; q0 even, q1 odd
+    int first_teller, last_teller;  // cells of the next coarser level along x
+  };
+  void tell(int level, const Told& box, Displacement& state, const ObstacleView& obstacles) noexcept;
+  // The most that any cell of a coarse row has yet to tell, of those in the octets that are also from first
+  // to last in the row (m).
+  [[nodiscard]] float untold(int level, RowId row, OctetSpan span = {}, int first = 0,
+                             int last = kRow - 1) const noexcept;
+
+  // Rows whose voxels are pulled by less than `tolerance_N`, or whose cells would move less than `quiet_m`,
+  // are left alone.
+  [[nodiscard]] float quiet_m() const { return quiet_m_; }
+  // Less than this is not passed on to other levels: a small share of what a row is left alone with.
+  [[nodiscard]] float passed_on_m() const { return quiet_m_ / 32.0F; }
+  void set_quiet(float tolerance_N, float quiet_m) noexcept {
+    tolerance_N_ = tolerance_N;
+    quiet_m_ = quiet_m;
+  }
+  void copy_from(const Multigrid& other) noexcept;
+  // Finds all springs and takes all memory now, not when a tick first needs them.
+  void prepare_all() noexcept;
+  [[nodiscard]] std::size_t memory_bytes() const;
+
+ private:
+  struct Level {
+    std::unique_ptr<Couplings> couplings;
+    // [axis][cell]; those of level 0 are elsewhere. `told` is the value that what the cell holds knows of, so
+    // value − told is what it has yet to hear.
+    std::array<LazyArray<float>, 3> value, told, load;
+    LazyArray<std::uint8_t> stopped;   // [cell or voxel] bits 0 to 2: held by a limit on that axis
+    LazyArray<std::uint16_t> held;     // [cell] voxels in it that the tool or another object holds
+    LazyArray<float> hold;             // [cell] how hard those hold it, in units of all its springs
+    LazyArray<std::uint8_t> row_held;  // [row] 1: some cell of it has one of these
+    LazyArray<std::uint8_t> flags;     // [row]
+  };
+  struct HeldCell {
+    std::uint8_t level;
+    VoxelId cell;
+  };
+
+  [[nodiscard]] Level& at(int level) { return levels_[static_cast<std::size_t>(level)]; }
+  [[nodiscard]] const Level& at(int level) const { return levels_[static_cast<std::size_t>(level)]; }
+  void prepare_level(int level) noexcept;
+  void spread(int level, RowId row, std::uint8_t flags) noexcept;
+  void note_change(int level, RowId row, float change) noexcept;
+  void stop_cells(VoxelId v, std::uint8_t bits) noexcept;
+  [[nodiscard]] LevelRow row_of(int level, RowId row, Displacement& state) noexcept;
+  [[nodiscard]] LevelRow told_row(int level, RowId row) noexcept;
+  [[nodiscard]] std::array<float*, 3> loads(int level, RowId row) noexcept;
+  RowResidual residual_of(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
+                          OctetSpan span, RowVector& out) noexcept;
+  void spread_hats(int level, int j, int k, const Told& box) noexcept;
+  void tell_row(int level, RowId row, const std::array<HatRow, 4>& hats, Displacement& state,
+                const ObstacleView& obstacles, OctetSpan span, int first, int last) noexcept;
+  void take_back_refused(int level, RowId row, const RowVector& refused, unsigned axes,
+                         OctetSpan span) noexcept;
+  void clear_obstacles(RowId row, Displacement& state, const ObstacleView& obstacles) noexcept;
+
+  const Lattice& lattice_;
+  TileQueue tiles_;
+  std::vector<Level> levels_;
+  Hats hats_;
+  std::vector<HeldCell> held_, stopped_;
+  std::array<AxisLimits, 3> yield_limits_;
+  float tolerance_N_ = 0.0F, quiet_m_ = 0.0F, hold_ = 1.0F;
+};
+
+}  // namespace voxel

@@ -1,0 +1,335 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The passes of which a cycle is made.
+#include <algorithm>
+
+#include "voxel/multigrid.h"
+
+namespace voxel {
+namespace {
+
+constexpr double kTouching = 1e-6;  // of the spacing: nearer to its obstacle than this a voxel lies on it
+constexpr float kTight = 1e-4F;     // of the spacing: nearer to its limit than this a link is at it
+
+}  // namespace
+
+LevelRow Multigrid::row_of(int level, RowId row, Displacement& state) noexcept {
+  Level& l = at(level);
+  const Grid& g = l.couplings->grid();
+  const std::size_t begin = static_cast<std::size_t>(row) * kRow;
+  LevelRow r;
+  r.springs = l.couplings->all(row);
+  r.z = static_cast<std::ptrdiff_t>(g.row_z) * kRow;
+  r.x = static_cast<std::ptrdiff_t>(g.row_x) * kRow;
+  if (level == 0) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      r.u[axis] = state.u[axis].data() + begin;
+      r.load[axis] = state.rest.load_of(row, static_cast<int>(axis));
+    }
+    if (state.row_held[row] != 0) r.held = state.role.data() + begin;
+    return r;
+  }
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    r.u[axis] = l.value[axis].data() + begin;
+    r.load[axis] = l.load[axis].data() + begin;
+    r.told[axis] = l.told[axis].data() + begin;
+  }
+  if (l.row_held[row] != 0) r.hold = l.hold.data() + begin;
+  r.hold_times = hold_;
+  if (has(level, row, limited)) r.stopped = l.stopped.data() + begin;
+  return r;
+}
+
+bool Multigrid::yield(RowId row, Displacement& state, bool keep) noexcept {
+  if (state.rest.row[row] == 0) {
+    bool beyond = false;
+    for (int axis = 0; axis < 3 && !beyond; ++axis) {
+      const auto ua = static_cast<std::size_t>(axis);
+      const RowView view(lattice_.grid(), state.u[ua].data(), row);
+      beyond = row_near_limits(couplings().springs(row, axis), view, yield_limits_[ua], 1.0F, view.own);
+    }
+    if (!beyond) return false;
+  }
+  const RowYield found = yield_row(couplings(), state, row, keep);
+  note_change(0, row, found.moved_m);
+  return found.unkept;
+}
+
+void Multigrid::smooth(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
+                       OctetSpan span) noexcept {
+  const LevelRow r = row_of(level, row, state);
+  if (level > 0) {
+    note_change(level, row, smooth_row(r, nullptr, span));
+    return;
+  }
+  const RowLimits limits = couplings().limits(row);
+  const float change = smooth_row(r, &limits, span);
+  if (!obstacles.obstacles.empty() && state.row_obstacles[row] != 0) {
+    for (VoxelId v = row * kRow; v < (row + 1) * kRow; ++v) {
+      if (state.role[v] == Displacement::obstacle) relax_obstacle(couplings(), state, obstacles, v);
+    }
+  }
+  note_change(0, row, change);
+}
+
+RowId Multigrid::row_below(int level, RowId row, int child) const noexcept {
+  const auto c = grid(level).row_coordinates(row);
+  return grid(level - 1).row(2 * (c[0] - 1) + 1 + (child & 1), 2 * c[1] + (child >> 1 & 1),
+                             2 * c[2] + (child >> 2));
+}
+
+namespace {
+
+// The octets of the half-th finer row that octets of a coarse row hold; none: first > last.
+OctetSpan octets_below(OctetSpan coarse, int half) {
+  const int from = half * kOctets / 2;
+  return {2 * (std::max(coarse.first, from) - from),
+          2 * (std::min(coarse.last, from + kOctets / 2 - 1) - from) + 1};
+}
+
+}  // namespace
+
+void Multigrid::restrict_values(int level, RowId row, Displacement& state, OctetSpan span) noexcept {
+  Level& l = at(level);
+  const std::size_t begin = static_cast<std::size_t>(row) * kRow;
+  RowVector sums{};
+  std::array<float*, 3> value{}, told{};
+  for (int child = 0; child < 8; ++child) {
+    const int half = child & 1;
+    const OctetSpan below = octets_below(span, half);
+    if (below.first > below.last) continue;
+    const std::size_t fine = static_cast<std::size_t>(row_below(level, row, child)) * kRow;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const float* u = (level == 1 ? state.u : at(level - 1).value)[axis].data() + fine;
+      add_pairs(u, below, sums[axis].data() + half * kRow / 2);
+    }
+  }
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    value[axis] = l.value[axis].data() + begin;
+    told[axis] = l.told[axis].data() + begin;
+  }
+  take_means(sums, l.couplings->all(row).share, value, told, span);
+}
+
+// What pulls the voxels, or cells, of a row that are free to follow.
+RowResidual Multigrid::residual_of(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
+                                   OctetSpan span, RowVector& out) noexcept {
+  const LevelRow r = row_of(level, row, state);
+  if (level > 0) return residual_row(r, nullptr, 0.0F, span, out);
+  const RowLimits limits = couplings().limits(row);
+  const float tight = kTight * static_cast<float>(lattice_.min_spacing_m());
+  RowResidual found = residual_row(r, &limits, tight, span, out);
+  if (state.row_obstacles[row] != 0) {
+    // What an obstacle holds is balanced by it.
+    const double touching = kTouching * lattice_.min_spacing_m();
+    for (std::size_t i = 0; i < kRow; ++i) {
+      const auto v = static_cast<VoxelId>(row * kRow + i);
+      if (state.role[v] != Displacement::obstacle || !blocked(obstacles, state, v, touching)) continue;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        out[axis][i] = 0.0F;
+        found.resisted[axis] &= ~(1U << i);
+      }
+    }
+    measure_row(r.springs, out, span, found);
+  }
+  // What the chain holds is balanced by it. Passed on, its residual would drive the coarse levels against
+  // links that do not give, and the sweeps after would undo it.
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (std::size_t i = 0; i < kRow && found.resisted[axis] >> i != 0; ++i) {
+      if ((found.resisted[axis] >> i & 1U) != 0)
+        stop_cells(static_cast<VoxelId>(row * kRow + i), static_cast<std::uint8_t>(1U << axis));
+    }
+  }
+  return found;
+}
+
+float Multigrid::restrict_loads(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
+                                OctetSpan span) noexcept {
+  Couplings& finer = *at(level - 1).couplings;
+  float worst = 0.0F;
+  RowVector sums{};
+  for (int child = 0; child < 8; ++child) {
+    const RowId fine = row_below(level, row, child);
+    const int half = child & 1;
+    const OctetSpan below = octets_below(span, half);
+    if (below.first > below.last || !finer.prepare(fine)) continue;
+    RowVector residual;
+    const RowResidual left = residual_of(level - 1, fine, state, obstacles, below, residual);
+    worst = std::max(worst, left.most_N);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      add_pairs(residual[axis].data(), below, sums[axis].data() + half * kRow / 2);
+    if (!span.whole()) continue;
+    // Of voxels as a force, of cells as a displacement, whose threshold is the same on all levels.
+    const bool at_rest = level == 1 ? left.most_N < tolerance_N_ : left.most_way_m < quiet_m_;
+    unmark(level - 1, fine, at_rest ? active | dirty : dirty);
+    if (!at_rest) mark(level - 1, fine, active);
+  }
+  take_loads(told_row(level, row), sums, loads(level, row), span);
+  spread(level, row, active | dirty);
+  return worst;
+}
+
+LevelRow Multigrid::told_row(int level, RowId row) noexcept {
+  Level& l = at(level);
+  const Grid& g = l.couplings->grid();
+  LevelRow r;
+  r.springs = l.couplings->all(row);
+  r.z = static_cast<std::ptrdiff_t>(g.row_z) * kRow;
+  r.x = static_cast<std::ptrdiff_t>(g.row_x) * kRow;
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    r.u[axis] = l.told[axis].data() + static_cast<std::size_t>(row) * kRow;
+  return r;
+}
+
+std::array<float*, 3> Multigrid::loads(int level, RowId row) noexcept {
+  Level& l = at(level);
+  const std::size_t begin = static_cast<std::size_t>(row) * kRow;
+  return {l.load[0].data() + begin, l.load[1].data() + begin, l.load[2].data() + begin};
+}
+
+float Multigrid::untold(int level, RowId row, OctetSpan span, int first, int last) const noexcept {
+  const Level& l = at(level);
+  const std::size_t begin = static_cast<std::size_t>(row) * kRow;
+  float most = 0.0F;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    most = std::max(
+        most, row_difference(l.value[axis].data() + begin, l.told[axis].data() + begin, span, first, last));
+  }
+  return most;
+}
+
+// Reads what the cells of one row, all along x, have to tell, and with that they have told it.
+void Multigrid::spread_hats(int level, int j, int k, const Told& box) noexcept {
+  Level& l = at(level);
+  const Grid& g = l.couplings->grid();
+  bool tells = false, whole = true;
+  const int before = hats_.first() - 1, after = hats_.first() + hats_.octets();
+  for (int q = before; q <= after; ++q) {
+    const int column = (q + kOctets) / kOctets;  // the empty one before the first included
+    const RowId row = g.row(column, j, k);
+    tells = tells || (q > before && q < after && has(level, row, telling));
+    whole = whole && l.couplings->prepare(row) && l.couplings->uniform(row);
+  }
+  const auto add = [this](std::size_t which, int q) {
+    return hats_.cells(which) + static_cast<std::ptrdiff_t>(q - hats_.first()) * kOctet;
+  };
+  const Octet none{};
+  for (int q = before; q <= after && (tells || !whole); ++q) {
+    const int column = (q + kOctets) / kOctets;
+    const RowId row = g.row(column, j, k);
+    const int octet = (q + kOctets) % kOctets;
+    const bool any = l.couplings->prepare(row);
+    if (!whole) {
+      if (any) {
+        std::copy_n(l.couplings->filled(row) + octet * kOctet, kOctet, add(3, q));
+      } else {
+        store(add(3, q), none);
+      }
+    }
+    const bool here = any && q > before && q < after && has(level, row, telling);
+    const int origin = (column - 1) * kRow;
+    const std::size_t begin = static_cast<std::size_t>(row) * kRow;
+    for (std::size_t axis = 0; axis < 3 && tells; ++axis) {
+      if (here) {
+        take_untold(l.value[axis].data() + begin, l.told[axis].data() + begin, l.couplings->filled(row),
+                    {octet, octet}, box.first_teller - origin, box.last_teller - origin, add(axis, q));
+      } else {
+        store(add(axis, q), none);
+      }
+    }
+  }
+  if (tells) {
+    for (int c = hats_.first() / kOctets; c <= (after - 1) / kOctets; ++c) {
+      const RowId row = g.row(c + 1, j, k);
+      if (!has(level, row, telling)) continue;
+      unmark(level, row, telling);
+      if (untold(level, row) == 0.0F) unmark(level, row, changed);
+    }
+  }
+  hats_.spread(j, k, tells, whole);
+}
+
+void Multigrid::tell(int level, const Told& box, Displacement& state,
+                     const ObstacleView& obstacles) noexcept {
+  const Grid& g = grid(level);
+  // Of the two cells around a voxel the lower one.
+  const auto below = [](int x) { return (x + 1) / 2 - 1; };
+  hats_.begin(box.q0 / 2, box.q1 / 2, below(box.j0), below(box.j1) + 1);
+  int spread = below(box.k0) - 1;  // plane of cells; the last that is
+  for (int k = box.k0; k <= box.k1; ++k) {
+    for (; spread <= below(k); ++spread) {
+      for (int j = below(box.j0); j <= below(box.j1) + 1; ++j) spread_hats(level + 1, j, spread + 1, box);
+    }
+    const int own_k = k / 2, near_k = (k & 1) != 0 ? own_k + 1 : own_k - 1;
+    for (int j = box.j0; j <= box.j1; ++j) {
+      const int own_j = j / 2, near_j = (j & 1) != 0 ? own_j + 1 : own_j - 1;
+      const auto hats = [&](int octet) {
+        return std::array<HatRow, 4>{hats_.row(own_j, own_k, octet), hats_.row(near_j, own_k, octet),
+                                     hats_.row(own_j, near_k, octet), hats_.row(near_j, near_k, octet)};
+      };
+      const auto here = hats(box.q0);
+      if (std::none_of(here.begin(), here.end(), [](const HatRow& r) { return r.tells; })) continue;
+      for (int c = box.q0 / kOctets; c <= box.q1 / kOctets; ++c) {
+        const int first = std::max(box.q0, c * kOctets), last = std::min(box.q1, c * kOctets + kOctets - 1);
+        const RowId row = g.row(c + 1, j, k);
+        if (!prepare(level, row)) continue;
+        tell_row(level, row, hats(first), state, obstacles, {first - c * kOctets, last - c * kOctets},
+                 box.first_teller, box.last_teller);
+      }
+    }
+  }
+}
+
+void Multigrid::tell_row(int level, RowId row, const std::array<HatRow, 4>& hats, Displacement& state,
+                         const ObstacleView& obstacles, OctetSpan span, int first, int last) noexcept {
+  RowVector correction, refused;
+  sum_hats(hats, span, correction);
+  // Beyond these lanes no hat reaches.
+  const int origin = (grid(level).row_coordinates(row)[0] - 1) * kRow;
+  span.first = std::max(span.first, (std::max(2 * first - 1, origin) - origin) / kOctet);
+  span.last = std::min(span.last, (2 * last + 2 - origin) / kOctet);
+  if (span.first > span.last) return;
+  LevelRow r = row_of(level, row, state);
+  RowCorrection done;
+  if (level > 0) {
+    done = correct_row(r, nullptr, span, correction, refused);
+  } else {
+    // A voxel that pulls against a link at its limit stays, until the limit lets go of it.
+    if (has(0, row, limited)) r.stopped = at(0).stopped.data() + static_cast<std::size_t>(row) * kRow;
+    const RowLimits limits = couplings().limits(row);
+    done = correct_row(r, &limits, span, correction, refused);
+    if (done.most_m > 0.0F) clear_obstacles(row, state, obstacles);
+  }
+  if (done.refused != 0) take_back_refused(level, row, refused, done.refused, span);
+  note_change(level, row, done.most_m);
+}
+
+void Multigrid::take_back_refused(int level, RowId row, const RowVector& refused, unsigned axes,
+                                  OctetSpan span) noexcept {
+  Level& coarse = at(level + 1);
+  const auto c = grid(level).row_coordinates(row);
+  const RowId above = coarse.couplings->grid().row((c[0] - 1) / 2 + 1, c[1] / 2, c[2] / 2);
+  const int half = (c[0] - 1) % 2;
+  const OctetSpan pairs{span.first & ~1, span.last | 1};
+  RowVector sums{}, lanes{};
+  std::array<float*, 3> value{}, told{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    value[axis] = coarse.value[axis].data() + static_cast<std::size_t>(above) * kRow;
+    told[axis] = coarse.told[axis].data() + static_cast<std::size_t>(above) * kRow;
+    if ((axes >> axis & 1U) == 0) continue;
+    std::copy_n(refused[axis].begin() + span.first * kOctet, (span.last - span.first + 1) * kOctet,
+                lanes[axis].begin() + span.first * kOctet);
+    add_pairs(lanes[axis].data(), pairs, sums[axis].data() + half * kRow / 2);
+  }
+  take_back(sums, coarse.couplings->all(above).share, value, told,
+            {half * kOctets / 2 + pairs.first / 2, half * kOctets / 2 + pairs.last / 2});
+  spread(level + 1, above, active | dirty);
+}
+
+void Multigrid::clear_obstacles(RowId row, Displacement& state, const ObstacleView& obstacles) noexcept {
+  if (obstacles.obstacles.empty() || state.row_obstacles[row] == 0) return;
+  for (VoxelId v = row * kRow; v < (row + 1) * kRow; ++v) {
+    if (state.role[v] == Displacement::obstacle) clear_obstacle(lattice_, state, obstacles, v);
+  }
+}
+
+}  // namespace voxel

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "voxel/rest_offsets.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "voxel/couplings.h"
+#include "voxel/displacement.h"
+#include "voxel/lattice.h"
+#include "voxel/yield.h"
+
+namespace voxel {
+
+RestOffsets::RestOffsets(const Lattice& lattice) {
+  if (!lattice.yields()) return;
+  for (auto& d : offset) {
+    for (auto& axis : d) axis = LazyArray<float>(lattice.size());
+  }
+  for (auto& axis : load) axis = LazyArray<float>(lattice.size());
+  row = LazyArray<std::uint8_t>(lattice.grid().rows());
+}
+
+std::size_t RestOffsets::memory_bytes() const {
+  std::size_t bytes = row.resident_bytes();
+  for (const auto& d : offset) {
+    for (const auto& axis : d) bytes += axis.resident_bytes();
+  }
+  for (const auto& axis : load) bytes += axis.resident_bytes();
+  return bytes;
+}
+
+RowYield yield_row(Couplings& couplings, Displacement& state, RowId row, bool keep) noexcept {
+  const Lattice& lattice = couplings.lattice();
+  const Grid& grid = lattice.grid();
+  RestOffsets& rest = state.rest;
+  RowYield out;
+  for (VoxelId v = row * kRow; v < (row + 1) * kRow; ++v) {
+    if (!lattice.filled(v)) continue;
+    const VoxelSprings springs = couplings.springs_of(v);
+    std::array<float, 3> load{};
+    for (std::size_t d = 0; d < 3; ++d) {
+      const int id = static_cast<int>(d);
+      for (const bool up : {false, true}) {
+        const VoxelId a = up ? v : grid.down(v, id), b = up ? grid.up(v, id) : v;
+        if (!lattice.filled(up ? b : a)) continue;
+        const float yield = lattice.yield_m(a, id);
+        const Spring& spring = (up ? springs.up : springs.down)[d];
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          const LazyArray<float>& u = state.u[axis];
+          const float before = rest.offset[d][axis][a];
+          const float after = yield_link(u[b] - u[a], before, yield).offset;
+          load[axis] += (up ? -after : after) * spring.on(static_cast<int>(axis), id);
+          if (after == before) continue;
+          if (!keep) {
+            out.unkept = true;
+          } else if (up) {
+            rest.offset[d][axis][a] = after;
+          }
+        }
+      }
+    }
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      float& known = rest.load[axis][v];
+      if (load[axis] == known) continue;
+      out.moved_m = std::max(out.moved_m, std::fabs(load[axis] - known) * springs.inverse[axis]);
+      known = load[axis];
+      rest.row[row] = 1;
+    }
+  }
+  return out;
+}
+
+}  // namespace voxel
