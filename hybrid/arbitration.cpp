@@ -141,7 +141,8 @@ void find_pairs(const World& world, WorldState& state, std::uint32_t meeting) no
       return;
     }
     const voxel::VoxelId va = surface_a[s], vb = b.lattice().surface()[partner];
-    state.pairs.push_back({meeting, va, vb, s});
+    const glm::dvec3 side = voxel::side_of_pair({a, world.soft[ia].pose}, va, {b, world.soft[ib].pose}, vb);
+    state.pairs.push_back({meeting, {va, vb, glm::dvec3(0.0), side}, s});
     state.paired[meeting][s] = 1;
     a.hold(va);
     b.hold(vb);
@@ -152,13 +153,24 @@ void find_pairs(const World& world, WorldState& state, std::uint32_t meeting) no
 
 void relax_pairs(const World& world, WorldState& state) noexcept {
   for (std::uint32_t m = 0; m < world.meeting.size(); ++m) find_pairs(world, state, m);
+  const auto with_objects = [&](VoxelPair& pair, const auto& visit) {
+    const auto [ia, ib] = world.meeting[pair.meeting];
+    return visit(voxel::PosedObject{*state.soft[ia], world.soft[ia].pose},
+                 voxel::PosedObject{*state.soft[ib], world.soft[ib].pose}, pair.pressed);
+  };
+  for (VoxelPair& pair : state.pairs) {
+    with_objects(pair, [](const auto& a, const auto& b, const voxel::PressedPair& p) {
+      a.object.clear_pair_load(p.a);
+      b.object.clear_pair_load(p.b);
+    });
+  }
+  for (VoxelPair& pair : state.pairs) with_objects(pair, voxel::load_pair);
   for (int sweep = 0; sweep < kPairSweeps; ++sweep) {
     for (std::size_t i = 0; i < state.pairs.size();) {
+      const double gap = with_objects(state.pairs[i], voxel::relax_pair);
       const VoxelPair pair = state.pairs[i];
       const auto [ia, ib] = world.meeting[pair.meeting];
       voxel::SoftObject &a = *state.soft[ia], &b = *state.soft[ib];
-      const double gap =
-          voxel::relax_pair({a, world.soft[ia].pose}, pair.a, {b, world.soft[ib].pose}, pair.b);
       if (sweep > 0 || gap < (kPartAt - 1.0) * (a.voxel_radius() + b.voxel_radius())) {
         ++i;
         continue;
@@ -166,12 +178,15 @@ void relax_pairs(const World& world, WorldState& state) noexcept {
       state.paired[pair.meeting][pair.surface_a] = 0;
       state.pairs[i] = state.pairs.back();
       state.pairs.pop_back();
-      a.release(pair.a);
-      // The partner may be pressed by another voxel still.
-      const bool still = std::any_of(state.pairs.begin(), state.pairs.end(), [&](const VoxelPair& p) {
-        return p.meeting == pair.meeting && p.b == pair.b;
-      });
-      if (!still) b.release(pair.b);
+      // Either may be pressed by another voxel still.
+      const auto still = [&](std::uint32_t object, voxel::VoxelId v) {
+        return std::any_of(state.pairs.begin(), state.pairs.end(), [&](const VoxelPair& p) {
+          const auto [pa, pb] = world.meeting[p.meeting];
+          return (pa == object && p.pressed.a == v) || (pb == object && p.pressed.b == v);
+        });
+      };
+      if (!still(ia, pair.pressed.a)) a.release(pair.pressed.a);
+      if (!still(ib, pair.pressed.b)) b.release(pair.pressed.b);
     }
   }
 }

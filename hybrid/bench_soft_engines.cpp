@@ -28,7 +28,7 @@ class ChainEngine : public WaveEngine {
     state_ = std::make_unique<voxel::Displacement>(*lattice_);
     chain_ = std::make_unique<voxel::ChainMail>(*lattice_);
     sources_.clear();
-    for (const auto& s : push.sources) sources_.push_back(lattice_->at(s[0] + 1, s[1] + 1, s[2] + 1));
+    for (const auto& s : push.sources) sources_.push_back(lattice_->at(s[0], s[1], s[2]));
     moves_ = push.moves;
   }
   void rest() override {
@@ -38,16 +38,16 @@ class ChainEngine : public WaveEngine {
     const std::uint64_t before = TickTimer::begin();
     for (std::size_t s = 0; s < sources_.size(); ++s)
       state_->set(sources_[s], state_->at(sources_[s]) + glm::dvec3(moves_[s]));
-    chain_->settle(*state_, sources_, moves_, {}, {});
+    chain_->settle(*state_, sources_, moves_, {});
     return timer().us(TickTimer::end() - before);
   }
   void read_plane(int k, std::vector<glm::vec3>& out) const override {
     std::size_t n = 0;
     for (int j = 0; j < dims_[1]; ++j) {
-      for (int i = 0; i < dims_[0]; ++i) out[n++] = glm::vec3(state_->at(lattice_->at(i + 1, j + 1, k + 1)));
+      for (int i = 0; i < dims_[0]; ++i) out[n++] = glm::vec3(state_->at(lattice_->at(i, j, k)));
     }
   }
-  [[nodiscard]] std::uint64_t candidates() const override { return chain_->candidates(); }
+  [[nodiscard]] std::uint64_t candidates() const override { return chain_->work() * voxel::kRow; }
   [[nodiscard]] std::size_t bytes() const override {
     return lattice_->memory_bytes() + lattice_->size() * (3 * sizeof(float) + 1) + chain_->memory_bytes();
   }

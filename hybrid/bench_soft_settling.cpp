@@ -64,9 +64,7 @@ SettlingCurve of_classic(const Object& object, const char* name, double damping,
 
 SettlingCurve of_ours(const Object& object, int rounds) {
   voxel::SoftObject soft(std::make_shared<voxel::Lattice>(object.volume, object.options));
-  // A lattice has an empty voxel on every side.
-  const voxel::VoxelId pushed =
-      soft.lattice().at(object.pushed[0] + 1, object.pushed[1] + 1, object.pushed[2] + 1);
+  const voxel::VoxelId pushed = soft.lattice().at(object.pushed[0], object.pushed[1], object.pushed[2]);
   soft.move(pushed, {0.0, 0.0, static_cast<double>(kPush)});
   SettlingCurve curve{"ours, a cycle a round", {}};
   for (int n = 0; n <= rounds; ++n) {

@@ -222,7 +222,7 @@ class Builder {
     say(fmt::format("reading soft \"{}\"", d.name));
     at_place(scene_, d.source_place, d.name, [&] {
       volumes_.push_back(build_volume(d, built_.notes));
-      const std::uint64_t bytes = soft_volume_bytes(volumes_.back().dims);
+      const std::uint64_t bytes = soft_load_bytes(volumes_.back().dims);
       if (bytes > usable_memory_bytes()) {
         throw std::runtime_error(
             fmt::format("a lattice of {} x {} x {} voxels needs about {:.1f} GB and this machine has "
@@ -286,11 +286,23 @@ class Builder {
         if (d.thinning) thin_object(scene_, d, volumes_[o], options, body, built_.notes);
         soft_.push_back(
             std::make_unique<voxel::SoftObject>(std::make_unique<voxel::Lattice>(volumes_[o], options)));
+        note_memory(d, soft_.back()->lattice());
         for (const glm::dvec3& v : body.drawn.vertices) box_.add(body.to_scene(v));
         world_->soft.push_back(std::move(body));
         volumes_[o] = {};  // the lattice has what it needs
       });
     }
+  }
+
+  // A scene that fits as long as only some of it is touched is no mistake.
+  void note_memory(const SoftDescription& d, const voxel::Lattice& lattice) {
+    const std::uint64_t bytes = soft_touched_bytes(lattice), usable = usable_memory_bytes();
+    if (bytes <= usable) return;
+    built_.notes.push_back(
+        {d.name, polygon::Severity::warning,
+         fmt::format("touched everywhere it would take about {:.1f} GB, and this machine has {:.1f} GB; keep "
+                     "the tool to a part of it, or give it a coarser spacing",
+                     static_cast<double>(bytes) / 1e9, static_cast<double>(usable) / 1e9)});
   }
 
   void fill_map() {

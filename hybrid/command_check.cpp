@@ -121,15 +121,15 @@ void check_volume_file(const std::filesystem::path& path, Json& file) {
   Json labels = Json::object();
   for (const auto& [label, count] : s.label_counts) labels[std::to_string(label)] = count;
   if (!s.label_counts.empty()) file["labels"] = labels;
-  const std::uint64_t bytes = soft_volume_bytes(h.dims);
+  const std::uint64_t bytes = soft_load_bytes(h.dims);
   file["touch_bytes"] = bytes;
   file["summary"] = fmt::format(
       "{}, {} x {} x {} {}, {:.3g} x {:.3g} x {:.3g} mm, {:.6g} to {:.6g}{}; about {:.0f} MB to touch as it "
-      "is",
+      "is, {:.0f} MB where it has been touched everywhere",
       h.format, h.dims[0], h.dims[1], h.dims[2], h.component, h.spacing_m.x * 1e3, h.spacing_m.y * 1e3,
       h.spacing_m.z * 1e3, s.minimum, s.maximum,
       s.label_counts.empty() ? "" : fmt::format(", {} labels", s.label_counts.size()),
-      static_cast<double>(bytes) / 1e6);
+      static_cast<double>(bytes) / 1e6, static_cast<double>(soft_touched_bytes(h.dims)) / 1e6);
 }
 
 void check_scene_file(const std::filesystem::path& path, Json& file) {

@@ -147,8 +147,9 @@ class Suite {
   // Whether what it takes is free: to fill a machine that others use is no test. Refused is another matter.
   bool enough_memory() {
     const double free = static_cast<double>(available_memory_bytes());
-    const double takes = static_cast<double>(soft_volume_bytes({512, 512, 512}));
-    if (takes > static_cast<double>(usable_memory_bytes())) return true;  // it will be refused
+    const double takes = static_cast<double>(soft_touched_bytes({512, 512, 512}));
+    if (static_cast<double>(soft_load_bytes({512, 512, 512})) > static_cast<double>(usable_memory_bytes()))
+      return true;  // it will be refused
     if (takes * 1.1 < free) return true;
     say("time", true,
         fmt::format("not built: it takes {:.1f} GB, of which {:.1f} GB are free now", 1e-9 * takes,

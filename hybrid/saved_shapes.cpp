@@ -23,7 +23,7 @@ class SoftSlices {
   SoftSlices(const SoftBody& body, const Pose& pose, const voxel::SoftObject& object) : object_(object) {
     const voxel::Lattice& lattice = object.lattice();
     const glm::dquat back = glm::conjugate(glm::normalize(pose.rotation));
-    for (std::size_t a = 0; a < 3; ++a) frame_.dims[a] = lattice.springs().dims[a] - 2;  // without its border
+    for (std::size_t a = 0; a < 3; ++a) frame_.dims[a] = lattice.grid().dims[a];
     frame_.spacing_m = lattice.spacing_m();
     frame_.rotation = back * body.pose.rotation;
     frame_.origin_m = back * (body.pose.origin - pose.position_m);
@@ -50,7 +50,7 @@ class SoftSlices {
   void for_each(int k, Visit visit) const {
     std::size_t n = 0;
     for (int j = 0; j < frame_.dims[1]; ++j) {
-      for (int i = 0; i < frame_.dims[0]; ++i, ++n) visit(n, object_.lattice().at(i + 1, j + 1, k + 1));
+      for (int i = 0; i < frame_.dims[0]; ++i, ++n) visit(n, object_.lattice().at(i, j, k));
     }
   }
 

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/vec3.hpp>
+#include <limits>
 #include <map>
 #include <optional>
 #include <stdexcept>
@@ -45,6 +46,8 @@ struct Material {
   double stretch_min = 0.4;  // shortest a link may become, of its rest length; 0 < min <= 1
   double stretch_max = 1.6;  // longest, >= 1
   double shear = 0.6;        // most a link's ends may slip across it, of its rest length; >= 0
+  // Strain beyond which a link keeps what is beyond, once it is at rest; > 0.
+  double yield = std::numeric_limits<double>::infinity();
   SourcePlace place;
 };
 
@@ -228,8 +231,9 @@ struct Scene {
 };
 
 // The largest lattice that a soft object may have on this machine: what building it takes for each voxel of
-// the bounding box (labels, surface, the copies made on the way), within the physical memory.
-inline constexpr std::size_t lattice_bytes_per_voxel = 16;
+// the bounding box (labels, surface, the copies made on the way; 3.4 bytes in 511³ voxels), within the
+// physical memory.
+inline constexpr std::size_t lattice_bytes_per_voxel = 4;
 std::size_t max_lattice_voxels();
 
 // Whether the scene's device is where its path is, whatever the force.

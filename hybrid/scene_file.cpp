@@ -19,9 +19,8 @@ namespace hybrid {
 namespace {
 
 constexpr LaterKey material_later[] = {
-    {"yield", "remove it: every material is elastic for now"},
-    {"elastic", "remove it: every material is elastic for now"},
-    {"plastic", "remove it: every material is elastic for now"},
+    {"elastic", "remove it: every material is elastic up to its yield"},
+    {"plastic", "say from which strain on: yield = 0.2"},
     {"damping", "remove it: tissue is quasi-static for now"},
     {"density", "remove it: tissue has no mass here"},
 };
@@ -222,7 +221,7 @@ void read_stretch(const TableReader& table, Material& out) {
 }
 
 Material read_material(const TableReader& table) {
-  static constexpr std::string_view keys[] = {"young", "poisson", "stretch", "shear"};
+  static constexpr std::string_view keys[] = {"young", "poisson", "stretch", "shear", "yield"};
   table.allow(keys, material_later);
   Material out;
   out.place = table.place();
@@ -233,6 +232,8 @@ Material read_material(const TableReader& table) {
   if (table.has("stretch")) read_stretch(table, out);
   out.shear =
       table.number("shear", {"a share of the rest length, 0 or more", "0.6", 1.0, 0.0, 1e6}, out.shear);
+  out.yield = table.number(
+      "yield", {"a strain, above 0, beyond which it stays deformed", "0.2", 1.0, 1e-6, 1e6}, out.yield);
   // Rows of voxels that are rigid one way and free the other: relaxation moves voxels and blocks of them, and
   // neither can move without breaking the row, so such tissue would stay as it was pressed.
   const bool stretches = out.stretch_max > out.stretch_min, slips = out.shear > 0.0;

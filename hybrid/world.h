@@ -119,7 +119,7 @@ struct World {
 // A pair of surface voxels of two soft objects that press on one another.
 struct VoxelPair {
   std::uint32_t meeting = 0;  // index into World::meeting
-  voxel::VoxelId a = 0, b = 0;
+  voxel::PressedPair pressed;
   std::uint32_t surface_a = 0;
 };
 

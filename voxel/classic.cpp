@@ -95,7 +95,7 @@ void ClassicObject::fill_tables(const std::vector<LinkMaterial>& materials) {
         const double longest = (0.5 * (a.stretch_max + b.stretch_max) - 1.0) * length;
         const double across = 0.5 * (a.shear + b.shear) * length;
         const auto shear_modulus = [](const LinkMaterial& m) {
-          return m.young_Pa / (4.0 * (1.0 - m.poisson * m.poisson));
+          return across_modulus_Pa(m.young_Pa, m.poisson);
         };
         Limits limits;
         std::array<float, 3> springs{};

@@ -6,7 +6,8 @@
 // element (getForce), and a relaxation in which each element goes where its links ask, damped or not. It is a
 // competent one: dense arrays, an element in 16 bytes, a queue that does not allocate once it has grown. Two
 // things it has that the thesis had not, so that neither rounding nor units count against it: displacements
-// from rest in place of absolute positions, and springs of the same stiffness as `Lattice`.
+// from rest in place of absolute positions, and springs of the moduli of `Lattice` (whole ones everywhere:
+// that those on a border weigh half is not the thesis's).
 #pragma once
 
 #include <array>
@@ -32,7 +33,7 @@ struct ClassicOptions {
 
 class ClassicObject {
  public:
-  using ElementId = std::uint32_t;  // index into the padded grid
+  using ElementId = std::uint32_t;  // index into a grid with a border of one
 
   // Throws std::invalid_argument: a volume whose labels do not fit its size, or of 2^29 cells and more. The
   // materials are taken as valid: see Lattice, which checks them.

@@ -11,8 +11,6 @@
 #include <cstddef>
 #include <cstdint>
 
-// The sparse store and its multigrid are not yet what SoftObject of voxel/ stands on: where limits are tight
-// over many tiles its force does not come to rest. Names are those of voxel/, which they are to replace.
 namespace voxel {
 
 using VoxelId = std::uint32_t;  // index into a grid

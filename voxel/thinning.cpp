@@ -94,16 +94,45 @@ class Thinner {
       refuse("no voxel has a label that thinning names; name the labels of what is stiff");
   }
 
+  // Struts along the edges of cubes, and a frame of them under the surface layer (see the header).
   void mark() {
-    for (int k = 0; k < volume().dims[2]; ++k) {
-      for (int j = 0; j < volume().dims[1]; ++j) {
-        for (int i = 0; i < volume().dims[0]; ++i) {
-          const std::uint8_t label = volume().labels[volume().index(i, j, k)];
-          if (removed_label_[label] == 0 || !is_inside(i, j, k)) continue;
-          const int n = options_.every;
-          const int on_grid = (i % n == 0) + (j % n == 0) + (k % n == 0);
-          volume().labels[volume().index(i, j, k)] =
-              on_grid >= 2 ? result_.strut_label[label] : removed_label_[label];
+    const LabelVolume& v = volume();
+    std::vector<bool> inside(v.labels.size());
+    for_each_stiff([&](const std::array<int, 3>& at, std::size_t index) {
+      inside[index] = is_inside(at[0], at[1], at[2]);
+    });
+    const auto is_in = [&](std::array<int, 3> at, std::size_t d, int step) {
+      at[d] += step;
+      return at[d] >= 0 && at[d] < v.dims[d] && inside[v.index(at[0], at[1], at[2])];
+    };
+    for_each_stiff([&](const std::array<int, 3>& at, std::size_t index) {
+      std::array<bool, 3> on{};
+      for (std::size_t d = 0; d < 3; ++d) on[d] = at[d] % options_.every == 0;
+      // A shell of one layer has the frame beneath it, any other in its innermost layer.
+      const bool may_carry = inside[index] == (options_.shell == 1);
+      bool strut = inside[index] && on[0] + on[1] + on[2] >= 2;
+      for (std::size_t d = 0; d < 3 && may_carry && !strut; ++d) {
+        const bool beside_other = is_in(at, d, -1) != inside[index] || is_in(at, d, 1) != inside[index];
+        strut = beside_other && (on[(d + 1) % 3] || on[(d + 2) % 3]);
+      }
+      std::uint8_t& label = volume().labels[index];
+      if (strut) {
+        label = result_.strut_label[label];
+      } else if (inside[index]) {
+        label = removed_label_[label];
+      }
+    });
+  }
+
+  // visit(place, index) for the voxels of the labels to be thinned.
+  template <typename Visit>
+  void for_each_stiff(const Visit& visit) {
+    const std::array<int, 3>& n = volume().dims;
+    std::size_t index = 0;
+    for (int k = 0; k < n[2]; ++k) {
+      for (int j = 0; j < n[1]; ++j) {
+        for (int i = 0; i < n[0]; ++i, ++index) {
+          if (removed_label_[volume().labels[index]] != 0) visit(std::array<int, 3>{i, j, k}, index);
         }
       }
     }

@@ -26,7 +26,7 @@ struct Thinned {
   // thinned object to be as stiff as it was, the struts' material must be `every`² times as stiff: a strut
   // stands for a column of n × n voxels, so that n of its links in a row are together the one link, n times
   // as long, of a lattice with an n times larger spacing, in stiffness (n²·E·h / n = E·n·h) and in limits
-  // alike.
+  // alike. Its links are whole ones, as those of any row of voxels (voxel/link_weight.h).
   std::array<std::uint8_t, 256> strut_label{};
   std::size_t stiff = 0;    // voxels of the stiff labels before
   std::size_t removed = 0;  // of them, that are empty now
@@ -39,6 +39,13 @@ struct Thinned {
 // something else than stiff material, corners included, stays as it is, `shell` deep: the surface, its
 // contact and its anchors do not change. What was connected (by faces) still is: where a part, such as the
 // wall of a small cavity, met no strut, the shortest path to the rest is kept too.
+//
+// What presses on n × n voxels of the surface must come together in one strut. Lines of strut material do
+// that, n apart both ways in the innermost layer of the shell (in the layer beneath it where the shell has
+// one layer only): with them, wherever planes of struts lie, the force on bare bone is within 7 % up to n = 4
+// with a shell of one layer or of n − 1. Without, a link from the shell to a strut is as soft as the shell,
+// n² times softer than what it stands for; so is what leads to it within the shell, whose inner side has
+// links of half the weight; and the next lines to spread the load lie up to n layers deeper: −20 to −53 %.
 //
 // Throws std::invalid_argument in words: options out of range, a tool that fits through the shell, no stiff
 // voxel, or no label left for the struts (254 in use).

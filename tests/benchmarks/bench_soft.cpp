@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "voxel/links.h"
 #include "voxel/soft_object.h"
 
 namespace {
@@ -59,15 +60,13 @@ void sweeps_alone(benchmark::State& state) {
     Pressed pressed = pressed_cube(n);
     voxel::Displacement copy = pressed.object->state();
     const voxel::Lattice& lattice = pressed.object->lattice();
-    const auto& springs = lattice.springs();
-    for (const voxel::VoxelId v : pressed.object->touched())
-      copy.set_role(v, voxel::Displacement::held, lattice);
+    voxel::Couplings couplings(lattice, nullptr);
+    for (const voxel::VoxelId v : pressed.object->touched()) copy.set_role(v, voxel::Displacement::held);
     state.ResumeTiming();
     for (int sweep = 0; sweep < 500; ++sweep) {
-      for (std::size_t row = 0; row < springs.row.size(); ++row) {
-        if (springs.row[row][1] > springs.row[row][0]) {
-          voxel::relax_row(lattice, copy, {}, row, springs.row[row][0], springs.row[row][1]);
-        }
+      for (voxel::VoxelId v = 0; v < lattice.size(); ++v) {
+        if (!lattice.filled(v) || lattice.anchored(v) || copy.role[v] != voxel::Displacement::free) continue;
+        copy.set(v, voxel::link_minimum(couplings, copy, v));
       }
     }
     state.PauseTiming();

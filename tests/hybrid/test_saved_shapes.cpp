@@ -151,8 +151,23 @@ TEST_F(SavedShapes, ThinnedObjectsKeepLabelsAnchorsAndMaterials) {
       kBone + "anchors = { labels = [2] }\nthinning = { above = 1e5, every = 4, shell = 1 }\n" + tests::path);
   const hybrid::BuiltScene built = hybrid::build_scene(scene, {});
   const voxel::Lattice& lattice = built.state->soft[0]->lattice();
-  const std::size_t inside = 28;  // voxels of the bone that its shell leaves, an axis; 7 of them on the frame
-  const std::size_t frame = 3 * 7 * 7 * inside - 2 * 7 * 7 * 7;
+  // Of the bone its shell leaves voxels 6 to 33 on each axis. Struts run where two coordinates are on the
+  // frame,
+  // and in the outermost layers of the inside where one is.
+  const std::size_t inside = 28;
+  std::size_t frame = 0;
+  for (int k = 6; k <= 33; ++k) {
+    for (int j = 6; j <= 33; ++j) {
+      for (int i = 6; i <= 33; ++i) {
+        const auto on = [](int c) { return c % 4 == 0; };
+        const auto outermost = [](int c) { return c == 6 || c == 33; };
+        const bool strut = (on(i) && on(j)) || (on(j) && on(k)) || (on(k) && on(i));
+        const bool line = (outermost(i) && (on(j) || on(k))) || (outermost(j) && (on(k) || on(i))) ||
+                          (outermost(k) && (on(i) || on(j)));
+        frame += strut || line ? 1 : 0;
+      }
+    }
+  }
   EXPECT_EQ(built.world->soft[0].thinned, inside * inside * inside - frame);
   EXPECT_EQ(lattice.voxel_count(), 64000 - built.world->soft[0].thinned);
   // The shell and its struts are anchored as the bone was.
