@@ -12,8 +12,8 @@ constexpr float kTight = 1e-6F;  // of the spacing: nearer to its limit than thi
 
 glm::dvec3 force_of(const VoxelSprings& springs, const Lattice& lattice, const Displacement& state,
                     VoxelId v) noexcept {
-  std::array<double, 3> force{};
-  for (std::size_t axis = 0; axis < 3; ++axis) force[axis] = static_cast<double>(state.rest.load_at(v, axis));
+  const std::array<float, 3> yielded = yielded_load(lattice, state, springs, v);
+  std::array<double, 3> force{yielded[0], yielded[1], yielded[2]};
   for (std::size_t d = 0; d < 3; ++d) {
     const int id = static_cast<int>(d);
     const VoxelId up = lattice.up(v, id), down = lattice.down(v, id);
@@ -63,8 +63,7 @@ bool resisted(const Lattice& lattice, const Displacement& state, int axis, Voxel
 glm::dvec3 link_minimum(Couplings& couplings, const Displacement& state, VoxelId v) noexcept {
   const VoxelSprings springs = couplings.springs_of(v);
   const Grid& grid = couplings.grid();
-  std::array<float, 3> sum{};
-  for (std::size_t axis = 0; axis < 3; ++axis) sum[axis] = state.rest.load_at(v, axis);
+  std::array<float, 3> sum = yielded_load(couplings.lattice(), state, springs, v);
   for (std::size_t d = 0; d < 3; ++d) {
     const int id = static_cast<int>(d);
     const VoxelId up = grid.up(v, id), down = grid.down(v, id);

@@ -29,36 +29,61 @@ std::size_t RestOffsets::memory_bytes() const {
   return bytes;
 }
 
+namespace {
+
+// Calls `visit(d, axis, up, offset before, offset after, spring)` for each link of v, on each axis.
+template <class Visit>
+void for_links(const Lattice& lattice, const Displacement& state, VoxelId v, const VoxelSprings& springs,
+               const Visit& visit) noexcept {
+  const Grid& grid = lattice.grid();
+  for (std::size_t d = 0; d < 3; ++d) {
+    const int id = static_cast<int>(d);
+    for (const bool up : {false, true}) {
+      const VoxelId a = up ? v : grid.down(v, id), b = up ? grid.up(v, id) : v;
+      if (!lattice.filled(up ? b : a)) continue;
+      const float yield = lattice.yield_m(a, id);
+      const Spring& spring = (up ? springs.up : springs.down)[d];
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const LazyArray<float>& u = state.u[axis];
+        const float before = state.rest.offset_of(a, d, axis);
+        const float after = yield_link(u[b] - u[a], before, yield).offset;
+        visit(d, axis, up, before, after, spring.on(static_cast<int>(axis), id));
+      }
+    }
+  }
+}
+
+}  // namespace
+
+std::array<float, 3> yielded_load(const Lattice& lattice, const Displacement& state,
+                                  const VoxelSprings& springs, VoxelId v) noexcept {
+  std::array<float, 3> load{};
+  if (state.rest.row.size() == 0 || !lattice.filled(v)) return load;
+  for_links(lattice, state, v, springs,
+            [&](std::size_t, std::size_t axis, bool up, float, float after, float spring) {
+              load[axis] += (up ? -after : after) * spring;
+            });
+  return load;
+}
+
 RowYield yield_row(Couplings& couplings, Displacement& state, RowId row, bool keep) noexcept {
   const Lattice& lattice = couplings.lattice();
-  const Grid& grid = lattice.grid();
   RestOffsets& rest = state.rest;
   RowYield out;
   for (VoxelId v = row * kRow; v < (row + 1) * kRow; ++v) {
     if (!lattice.filled(v)) continue;
     const VoxelSprings springs = couplings.springs_of(v);
     std::array<float, 3> load{};
-    for (std::size_t d = 0; d < 3; ++d) {
-      const int id = static_cast<int>(d);
-      for (const bool up : {false, true}) {
-        const VoxelId a = up ? v : grid.down(v, id), b = up ? grid.up(v, id) : v;
-        if (!lattice.filled(up ? b : a)) continue;
-        const float yield = lattice.yield_m(a, id);
-        const Spring& spring = (up ? springs.up : springs.down)[d];
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-          const LazyArray<float>& u = state.u[axis];
-          const float before = rest.offset[d][axis][a];
-          const float after = yield_link(u[b] - u[a], before, yield).offset;
-          load[axis] += (up ? -after : after) * spring.on(static_cast<int>(axis), id);
-          if (after == before) continue;
-          if (!keep) {
-            out.unkept = true;
-          } else if (up) {
-            rest.offset[d][axis][a] = after;
-          }
-        }
-      }
-    }
+    for_links(lattice, state, v, springs,
+              [&](std::size_t d, std::size_t axis, bool up, float before, float after, float spring) {
+                load[axis] += (up ? -after : after) * spring;
+                if (after == before) return;
+                if (!keep) {
+                  out.unkept = true;
+                } else if (up) {
+                  rest.offset[d][axis][v] = after;
+                }
+              });
     for (std::size_t axis = 0; axis < 3; ++axis) {
       float& known = rest.load[axis][v];
       if (load[axis] == known) continue;

@@ -17,6 +17,7 @@ namespace voxel {
 class Couplings;
 class Lattice;
 struct Displacement;
+struct VoxelSprings;
 
 struct RestOffsets {
   RestOffsets() = default;
@@ -34,14 +35,17 @@ struct RestOffsets {
     if (row.size() == 0 || row[r] == 0) return nullptr;
     return load[static_cast<std::size_t>(axis)].data() + static_cast<std::size_t>(r) * kRow;
   }
-  [[nodiscard]] float load_at(VoxelId v, std::size_t axis) const noexcept {
-    return row.size() == 0 || row[v / kRow] == 0 ? 0.0F : load[axis][v];
-  }
   [[nodiscard]] float offset_of(VoxelId v, std::size_t d, std::size_t axis) const noexcept {
     return row.size() == 0 || row[v / kRow] == 0 ? 0.0F : offset[d][axis][v];
   }
   [[nodiscard]] std::size_t memory_bytes() const;
 };
+
+// What offsets, and yielding, add to the force of its springs on a voxel where it and its neighbours are now
+// (N, per axis). Rows keep what they were told last; a contact wants to know it now, or a held tool and its
+// tissue answer one another's last round for ever.
+std::array<float, 3> yielded_load(const Lattice& lattice, const Displacement& state,
+                                  const VoxelSprings& springs, VoxelId v) noexcept;
 
 struct RowYield {
   float moved_m = 0.0F;  // how far the change of its load would move a voxel of the row

@@ -23,10 +23,12 @@ constexpr std::size_t kPreparedWhole = 1U << 18U;
 constexpr int kMostCycles = 2;
 constexpr int kMaxNear = 64;                 // voxels across the contact that relax_near() works on at most
 constexpr std::size_t kMaxCarried = 20'000;  // voxels that may hang on the pressed ones by tight links
-constexpr int kProjections = 3;    // of a pressed voxel onto the tool, in search of its least energy
-constexpr double kStir = 1e-5;     // of the spacing: pressed voxels that moved less wake nobody
-constexpr double kGiveWay = 0.01;  // of the voxel radius: less is left to the next push
-constexpr float kTight = 1e-4F;    // of the spacing: nearer to its limit than this a link is tight
+constexpr int kProjections = 3;           // of a pressed voxel onto the tool, in search of its least energy
+constexpr std::size_t kMostDrawn = 2000;  // of them come along with the pressed ones in a tick
+constexpr float kNearlyTight = 0.1F;      // of the spacing: links that are looked at for that
+constexpr double kStir = 1e-5;            // of the spacing: pressed voxels that moved less wake nobody
+constexpr double kGiveWay = 0.01;         // of the voxel radius: less is left to the next push
+constexpr float kTight = 1e-4F;           // of the spacing: nearer to its limit than this a link is tight
 
 }  // namespace
 
@@ -246,6 +248,48 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
     }
   }
   set_touch_roles();
+  for (int axis = 0; axis < 3; ++axis) draw_along(axis);
+}
+
+// What hangs on pressed voxels by tight links comes along when they withdraw: it is felt only where it is
+// tight, and the background may need many ticks to get to it. (Left to that, the force lost a sixth of itself
+// whenever the proxy was pushed back by a tenth of a micron, and a held tool never came to rest.) Breadth
+// first, so that each voxel finds the one it hangs on where that belongs.
+void SoftObject::draw_along(int axis) noexcept {
+  auto& u = state_.u[static_cast<std::size_t>(axis)];
+  carried_.clear();
+  for (const Touch& t : touches_) {
+    if (!t.pressed || lattice_->anchored(t.v)) continue;
+    carried_mark_[t.v] = 1;
+    carried_.push_back({t.v, 0});
+  }
+  const std::size_t most = carried_.size() + kMostDrawn;
+  for (std::size_t head = 0; head < carried_.size() && carried_.size() < most; ++head) {
+    const VoxelId v = carried_[head].v;
+    for (int d = 0; d < 3; ++d) {
+      const float spacing = static_cast<float>(lattice_->spacing_m()[d]);
+      for (const bool up : {false, true}) {
+        const VoxelId w = up ? lattice_->up(v, d) : lattice_->down(v, d);
+        if (!lattice_->filled(w) || carried_mark_[w] != 0 || lattice_->anchored(w) ||
+            state_.role[w] != Displacement::free)
+          continue;
+        const auto b = lattice_->bounds(up ? v : w, d, axis);
+        const auto room = [&] {
+          const float difference = up ? u[w] - u[v] : u[v] - u[w];
+          return std::min(difference - b[0], b[1] - difference);
+        };
+        if (room() > kNearlyTight * spacing) continue;
+        const auto wanted = static_cast<float>(link_minimum(relaxation_.couplings(), state_, w)[axis]);
+        const float before = u[w];
+        u[w] = clamp_to(link_interval(*lattice_, state_, w, axis), wanted, before);
+        if (std::fabs(u[w] - before) > static_cast<float>(kStir) * spacing) relaxation_.stir(w / kRow);
+        if (room() > kTight * spacing) continue;
+        carried_mark_[w] = 1;
+        carried_.push_back({w, 0});
+      }
+    }
+  }
+  let_go_of_carried();
 }
 
 // Force of its links on a voxel, and of other soft objects (N).

@@ -150,6 +150,7 @@ class SoftObject {
   void relax_touch(const ToolInBody& tool, Touch& touch) noexcept;
   void add_stiffness(int axis, glm::dmat3& stiffness) noexcept;
   [[nodiscard]] glm::dvec3 load_on(VoxelId v) noexcept;
+  void draw_along(int axis) noexcept;
   void gather_load(int axis) noexcept;
   void let_go_of_carried() noexcept;
   [[nodiscard]] ObstacleView obstacle_view() const { return {obstacles_, lattice_.get()}; }
