@@ -2,6 +2,8 @@
 // On one level.
 #include "voxel/row_passes.h"
 
+#include <cstring>
+
 #include "voxel/row_axes.h"
 #include "voxel/row_limits.h"
 #include "voxel/wide.h"
@@ -20,6 +22,15 @@ HYBRID_INLINE void ends_of(Span& s, const float* own, std::ptrdiff_t x, OctetSpa
   const float after = span.last < kOctets - 1 ? own[(span.last + 1) * kOctet] : own[x];
   s.at[0] = Octet{} + before;
   s.at[static_cast<std::size_t>(span.last - span.first + 2)] = Octet{} + after;
+}
+
+// Bit i for lane i.
+HYBRID_INLINE std::uint32_t lanes_set(const OctetMask& mask) {
+  std::array<std::int32_t, kOctet> lanes;
+  std::memcpy(lanes.data(), &mask, sizeof mask);
+  std::uint32_t bits = 0;
+  for (std::uint32_t i = 0; i < kOctet; ++i) bits |= (lanes[i] != 0 ? 1U : 0U) << i;
+  return bits;
 }
 
 // One axis of a row where limits matter; cells, which have none, never come here.
@@ -247,8 +258,7 @@ HYBRID_INLINE void residual_axis(RowResidual& result, const LevelRow& row, const
         const OctetMask resisted =
             ((r > 0.0F) & (at.own >= in.high - tight)) | ((r < 0.0F) & (at.own <= in.low + tight));
         r = resisted ? Octet{} : r;
-        for (int i = 0; i < kOctet; ++i)
-          result.resisted[axis] |= (resisted[i] != 0 ? 1U : 0U) << (octet * kOctet + i);
+        result.resisted[axis] |= lanes_set(resisted) << (octet * kOctet);
       }
     }
     store(out + octet * kOctet, r);
