@@ -86,8 +86,9 @@ inline void ChainWave::note_pulled_row(Sweep& sweep, RowId row, int y, Moved wha
     const RowId to = row + static_cast<RowId>(x) * row_x;
     if (!rows_[to].filled) return;
     asked_[to] |= x > 0 ? kFromBelowX : kFromAboveX;
-    in_plane_[static_cast<std::size_t>(plane.column + x)][x > 0 ? 0 : 1].add(y);
-    sweep.columns.add(plane.column + x);
+    const int column = plane.column + x;
+    in_plane_[static_cast<std::size_t>(column)][x > 0 ? 0 : 1].add(y);
+    sweep.columns.add(column);
   };
   if ((what & (plane.x > 0 ? kLastMoved : kFirstMoved)) != 0) ask_across(plane.x);
   if ((what & kAsksX) != 0) ask_across(-plane.x);

@@ -90,7 +90,7 @@ HYBRID_INLINE void load_axes(Axes& u, const LevelRow& row, OctetSpan span) {
     const float before = span.first > 0 ? own[span.first * kOctet - 1] : own[kRow - 1 - row.x];
     const float after = span.last < kOctets - 1 ? own[(span.last + 1) * kOctet] : own[row.x];
     u[axis][0] = Octet{} + before;
-    u[axis][static_cast<std::size_t>(count + 1)] = Octet{} + after;
+    u[axis][static_cast<std::size_t>(count) + 1] = Octet{} + after;
   }
 #pragma GCC unroll 1
   for (int n = 0; n < count; ++n) {

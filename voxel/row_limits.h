@@ -170,7 +170,7 @@ HYBRID_INLINE void look_beyond_lanes(OctetMask& beyond, const Octet& own, const 
                                      std::size_t axis, int octet) {
   constexpr float kNear = 0.999F;
   const float* at = row.u[axis] + octet * kOctet;
-  const auto lanes = static_cast<std::size_t>(octet * kOctet);
+  const auto lanes = static_cast<std::size_t>(octet) * kOctet;
   for (std::size_t d = 0; d < 3; ++d) {
     Octet above = x_up, below = x_down, low, high;
     if (d > 0) {

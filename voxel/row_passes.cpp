@@ -21,7 +21,7 @@ HYBRID_INLINE void ends_of(Span& s, const float* own, std::ptrdiff_t x, OctetSpa
   const float before = span.first > 0 ? own[span.first * kOctet - 1] : own[kRow - 1 - x];
   const float after = span.last < kOctets - 1 ? own[(span.last + 1) * kOctet] : own[x];
   s.at[0] = Octet{} + before;
-  s.at[static_cast<std::size_t>(span.last - span.first + 2)] = Octet{} + after;
+  s.at[static_cast<std::size_t>(span.last - span.first) + 2] = Octet{} + after;
 }
 
 // Bit i for lane i.
@@ -362,7 +362,7 @@ HYBRID_INLINE unsigned note_stopped(const LevelRow& row, OctetSpan span, const R
       inverse_of<kUniform>(inverse, row.springs, axis, octet);
       standing(fixed, row, inverse, octet);
       bits_set(stopped, row.stopped + octet * kOctet, 1 << axis);
-      way = stopped & ~fixed ? way : Octet{};
+      way = (stopped & ~fixed) ? way : Octet{};
       some |= way != 0.0F;
       store(refused[axis].data() + octet * kOctet, way);
     }

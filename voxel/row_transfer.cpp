@@ -187,7 +187,7 @@ HYBRID_WIDE_AND_MANY float row_difference(const float* a, const float* b, OctetS
     load(y, b + octet * kOctet);
     const OctetMask at = kLane + octet * kOctet;
     x -= y;
-    x = (at >= first) & (at <= last) ? x : Octet{};
+    x = ((at >= first) & (at <= last)) ? x : Octet{};
     take_largest_size(most, x);
   }
   return largest(most);
