@@ -243,7 +243,7 @@ glm::dvec3 added_force(const World& world, WorldState& state, const glm::dvec3& 
     normal /= pressed;
     const double depth = glm::dot(state.proxy_m - device_m, normal);
     added = normal * damping_force(state.damping, k * depth, depth, damping, dt_s, world.encoder_m,
-                                    world.damping_account);
+                                   world.damping_account);
     for (const Contact& c : contacts) state.rigid_force_N[c.number] += (c.force_N / shares) * added;
   } else {
     end_damping(state.damping);

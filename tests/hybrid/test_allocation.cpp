@@ -129,8 +129,7 @@ TEST_P(AllocationOf, AllItsTicks) {
 INSTANTIATE_TEST_SUITE_P(ShippedScenes, AllocationOf,
                          ::testing::Values("cube.toml", "sheet.toml", "ball-and-block.toml", "two-soft.toml",
                                            "head.toml", "thin-sheet.toml", "convex-edge.toml",
-                                           "textured-plate.toml", "moving.toml", "wall.toml",
-                                           "tissue.toml"),
+                                           "textured-plate.toml", "moving.toml", "wall.toml", "tissue.toml"),
                          [](const auto& scene) {
                            std::string name = scene.param;
                            name.resize(name.find('.'));
