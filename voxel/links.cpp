@@ -8,8 +8,6 @@
 namespace voxel {
 namespace {
 
-constexpr float kTight = 1e-6F;  // of the spacing: nearer to its limit than this a link is at it
-
 glm::dvec3 force_of(const VoxelSprings& springs, const Lattice& lattice, const Displacement& state,
                     VoxelId v) noexcept {
   const std::array<float, 3> yielded = yielded_load(lattice, state, springs, v);
@@ -51,13 +49,6 @@ std::array<float, 2> link_interval(const Lattice& lattice, const Displacement& s
 
 float clamp_to(const std::array<float, 2>& interval, float wanted, float now) noexcept {
   return interval[0] > interval[1] ? now : std::clamp(wanted, interval[0], interval[1]);
-}
-
-bool resisted(const Lattice& lattice, const Displacement& state, int axis, VoxelId v, float pull) noexcept {
-  const float u = state.u[static_cast<std::size_t>(axis)][v];
-  const auto interval = link_interval(lattice, state, v, axis);
-  const float tight = kTight * static_cast<float>(lattice.min_spacing_m());
-  return pull > 0.0F ? u >= interval[1] - tight : u <= interval[0] + tight;
 }
 
 glm::dvec3 link_minimum(Couplings& couplings, const Displacement& state, VoxelId v) noexcept {

@@ -29,8 +29,6 @@ glm::dvec3 link_force(Couplings& couplings, const Displacement& state, VoxelId v
 glm::dvec3 link_force(const Lattice& lattice, const Displacement& state, VoxelId v) noexcept;
 // How far a force of 1 N on voxel v alone moves it, per axis (unit: m/N); 0 where it is anchored.
 glm::dvec3 link_compliance(Couplings& couplings, VoxelId v) noexcept;
-// Is voxel v, pulled this way on this axis, held by a link that is at its limit?
-bool resisted(const Lattice& lattice, const Displacement& state, int axis, VoxelId v, float pull) noexcept;
 
 struct ObstacleView {
   std::span<const Obstacle> obstacles;  // by surface number; empty: none

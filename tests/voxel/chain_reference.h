@@ -182,6 +182,24 @@ inline double rounding(const RandomScene& scene, const Displacement& state) {
   return kHalfUlp * largest(state) * 2 * (dims[0] + dims[1] + dims[2]);
 }
 
+// The largest difference between a state and its definition, the clamp of the state before into what is
+// allowed (m).
+inline double error_of_clamp(const Lattice& lattice, const Displacement& before, const Displacement& state,
+                             const Intervals& allowed) {
+  double worst = 0.0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto& [low, high] = allowed[axis];
+    for (std::size_t v = 0; v < lattice.size(); ++v) {
+      if (!lattice.filled(static_cast<VoxelId>(v))) continue;
+      const double expected = std::min(std::max(static_cast<double>(before.u[axis][v]), low[v]), high[v]);
+      const double error = std::fabs(static_cast<double>(state.u[axis][v]) - expected);
+      if (!std::isfinite(error)) return error;
+      worst = std::max(worst, error);
+    }
+  }
+  return worst;
+}
+
 // Pulls a scene four times, each time from where the last one left it, and holds it against the definition.
 inline void pull_and_compare(const RandomScene& scene, Random& random, int n, double& worst) {
   const Lattice lattice(scene.volume, scene.options);
@@ -209,17 +227,9 @@ inline void pull_and_compare(const RandomScene& scene, Random& random, int n, do
         feasible_sources(scene, lattice, random, 1 + random.below(n % 2 == 0 ? 3 : 12), false, allowed);
     pull(lattice, chain, state, sources);
     const double tolerance = std::max(rounding(scene, state), rounding(scene, before));
-    const double most = std::max(largest(state), 1e-30);
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto& [low, high] = allowed[axis];
-      for (std::size_t v = 0; v < lattice.size(); ++v) {
-        if (!lattice.filled(static_cast<VoxelId>(v))) continue;
-        const double expected = std::min(std::max(static_cast<double>(before.u[axis][v]), low[v]), high[v]);
-        const double error = std::fabs(static_cast<double>(state.u[axis][v]) - expected);
-        ASSERT_LE(error, tolerance) << "scene " << n << ", round " << round << ", axis " << axis;
-        worst = std::max(worst, error / most);
-      }
-    }
+    const double error = error_of_clamp(lattice, before, state, allowed);
+    ASSERT_LE(error, tolerance) << "scene " << n << ", round " << round;
+    worst = std::max(worst, error / std::max(largest(state), 1e-30));
     Displacement again = before;
     std::reverse(sources.begin(), sources.end());
     pull(lattice, chain, again, sources);

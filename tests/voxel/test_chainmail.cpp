@@ -39,17 +39,9 @@ TEST(ChainMail, IsTheClampOfItsDefinition) {
       if (sources.empty()) continue;
       pull(lattice, chain, state, sources);
       const double tolerance = std::max(rounding(scene, state), rounding(scene, before));
-      const double most = std::max(largest(state), 1e-30);
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const auto& [low, high] = allowed[axis];
-        for (std::size_t v = 0; v < lattice.size(); ++v) {
-          if (!lattice.filled(static_cast<VoxelId>(v))) continue;
-          const double expected = std::min(std::max(static_cast<double>(before.u[axis][v]), low[v]), high[v]);
-          const double error = std::fabs(static_cast<double>(state.u[axis][v]) - expected);
-          ASSERT_LE(error, tolerance) << "scene " << n << ", round " << round << ", axis " << axis;
-          worst = std::max(worst, error / most);
-        }
-      }
+      const double error = error_of_clamp(lattice, before, state, allowed);
+      ASSERT_LE(error, tolerance) << "scene " << n << ", round " << round;
+      worst = std::max(worst, error / std::max(largest(state), 1e-30));
       const double link = voxel::worst_violation(lattice, state);
       ASSERT_LE(link, tolerance);
       worst_link = std::max(worst_link, link / std::max(largest(state), 1e-30));
