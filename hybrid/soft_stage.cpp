@@ -100,16 +100,21 @@ void press_soft(const World& world, WorldState& state, const glm::dvec3& point, 
   }
 }
 
-std::size_t soft_bounds(const World& world, WorldState& state, const glm::dvec3& point) noexcept {
+std::size_t soft_bounds(const World& world, WorldState& state, const glm::dvec3& point, bool fast,
+                        std::vector<polygon::ContactPlane>& out) noexcept {
   std::size_t added = 0;
   for (std::uint32_t o = 0; o < state.soft.size(); ++o) {
-    if (state.soft[o]->touched().empty()) continue;
+    voxel::SoftObject& object = *state.soft[o];
+    if (object.touched().empty()) continue;
     const SoftBody& body = world.soft[o];
-    const std::size_t count = state.soft[o]->give_way(tool_in_body(world, body, point), state.bounds);
-    for (std::size_t i = 0; i < count && state.planes.size() < state.planes.capacity(); ++i, ++added) {
-      const glm::dvec3 normal = body.pose.rotation * state.bounds[i].normal;
-      state.planes.push_back({normal, state.bounds[i].offset + glm::dot(normal, body.pose.origin),
-                              static_cast<std::uint32_t>(world.rigid.size()) + o, 0});
+    const std::size_t count = object.give_way(tool_in_body(world, body, point), state.bounds);
+    for (std::size_t i = 0; i < count && out.size() < out.capacity(); ++i) {
+      const voxel::ToolBound& bound = state.bounds[i];
+      if (fast && !object.held_fast(bound.voxel, -bound.normal)) continue;
+      const glm::dvec3 normal = body.pose.rotation * bound.normal;
+      out.push_back({normal, bound.offset + glm::dot(normal, body.pose.origin),
+                     static_cast<std::uint32_t>(world.rigid.size()) + o, 0});
+      ++added;
     }
   }
   return added;

@@ -29,7 +29,8 @@ constexpr double kStill = 1e-5;  // of the tool's radius: a pass that moves the 
 constexpr double kForget = 0.9;  // of the hidden stiffness is kept from pass to pass
 constexpr double kOvershoot = 0.25;     // of the pull before, turned round: a step that overshot
 constexpr double kMostOvershoot = 3.0;  // believed of one step
-constexpr double kMostHidden = 50.0;    // hidden stiffness at most, of the model's
+constexpr double kProbe = 0.005;  // of the tool's radius: how far into tissue that was blocked a tick looks
+constexpr double kMostHidden = 50.0;  // hidden stiffness at most, of the model's
 
 // Stages by the wall clock, which is cheap; the whole tick by the thread's own processor time, because on a
 // shared machine a tick that was put aside for another process is not a slow tick.
@@ -107,6 +108,21 @@ void learn_stiffness(const World& world, WorldState& state, const glm::dvec3& de
   state.hidden_stiffness_N_per_m = std::max(state.hidden_stiffness_N_per_m, hidden);
 }
 
+// Where tissue cannot leave the tool's way, it is as good as rigid, and the proxy stops there: pressed
+// further in every pass, to be taken back at the end of the tick, the tool would be a wedge that drives
+// voxels aside, and get back from them what it never gave. Whether they still cannot is asked once a tick, by
+// a probe.
+glm::dvec3 stop_at_blocked(const World& world, WorldState& state, const glm::dvec3& target,
+                           const glm::dmat3& metric, bool probe) noexcept {
+  if (state.blocked.empty()) return target;
+  if (probe) {
+    for (polygon::ContactPlane& plane : state.blocked) plane.offset -= kProbe * world.contact_radius_m();
+  }
+  const polygon::PlaneMinimum stop =
+      polygon::minimise_on_planes(target, metric, state.blocked, 1e-9 * world.contact_radius_m());
+  return stop.feasible ? stop.point : target;
+}
+
 // One pass: the proxy goes to the minimum of ½K|q − x|² plus the tissue's quadratic model, outside everything
 // rigid; then the tissue answers. Returns how far the proxy went.
 double move_proxy(const World& world, WorldState& state, const glm::dvec3& device, bool near_soft,
@@ -119,13 +135,18 @@ double move_proxy(const World& world, WorldState& state, const glm::dvec3& devic
   const glm::dmat3 metric = pressed ? model + glm::dmat3(state.hidden_stiffness_N_per_m) : model;
   const glm::dvec3 pull = pull_on_proxy(world, state, device);
   // Without tissue the target is the device, to the last bit.
-  const glm::dvec3 target = near_soft ? state.proxy_m + glm::inverse(metric) * pull : device;
+  const glm::dvec3 target =
+      near_soft
+          ? stop_at_blocked(world, state, state.proxy_m + glm::inverse(metric) * pull, metric, first_pass)
+          : device;
   sweep = sweep_with_feel(world, state, target, metric, travel, first_pass);
   const glm::dvec3 delta = sweep.point - state.proxy_m;
   state.proxy_m = sweep.point;
   if (near_soft) {
     press_soft(world, state, state.proxy_m, delta, kSweeps);
     learn_stiffness(world, state, delta, pull, pull_on_proxy(world, state, device), model, metric);
+    if (first_pass) state.blocked.clear();
+    soft_bounds(world, state, state.proxy_m, true, state.blocked);
   }
   return glm::length(delta);
 }
@@ -143,7 +164,7 @@ double deepest(const WorldState& state, std::size_t count, const glm::dvec3& poi
 void give_way(const World& world, WorldState& state, const glm::dvec3& before, Sweep& sweep) noexcept {
   const double radius = world.tool.radius_m;
   if (!gather_planes(world, state, state.proxy_m, 2.0 * radius)) return;
-  const std::size_t bounds = soft_bounds(world, state, state.proxy_m);
+  const std::size_t bounds = soft_bounds(world, state, state.proxy_m, false, state.planes);
   if (bounds == 0) return;
   const polygon::PlaneMinimum out =
       polygon::minimise_on_planes(state.proxy_m, glm::dmat3(1.0), state.planes, 1e-9 * radius);
@@ -188,7 +209,10 @@ Sweep settle_contact(const World& world, WorldState& state, const glm::dvec3& de
   const glm::dvec3 before = state.proxy_m;
   std::fill(state.rigid_force_N.begin(), state.rigid_force_N.end(), glm::dvec3(0.0));
   std::fill(state.reactions.begin(), state.reactions.end(), voxel::Reaction{});
-  if (!around.near_soft) state.hidden_stiffness_N_per_m = 0.0;
+  if (!around.near_soft) {
+    state.hidden_stiffness_N_per_m = 0.0;
+    state.blocked.clear();
+  }
   if (around.near_soft) press_soft(world, state, state.proxy_m, glm::dvec3(0.0), 0);
   const double travel = around.near_soft ? around.range_m / kPasses : around.range_m;
   for (int pass = 0; pass < kPasses && !around.free; ++pass) {

@@ -36,6 +36,7 @@ void WorldState::prepare(const World& world) {
   for (auto& list : touched) list.reserve(voxel::SoftObject::kMaxTouched);
   if (!soft.empty()) {
     bounds.resize(kMaxPlanes / 2);
+    blocked.reserve(kMaxPlanes);
     found.resize(kMaxFound);
   }
   pair_cursor.assign(world.meeting.size(), 0);

@@ -180,6 +180,8 @@ struct CarriedState {
   std::uint32_t faults = 0;           // FaultBit, ever
   std::uint64_t truncated_ticks = 0;  // ticks that ended before the proxy arrived, by a bound on its steps
   double hidden_stiffness_N_per_m = 0.0;  // what tissue showed beyond the model of its pressed voxels
+  // Half-spaces of voxels that could not leave the tool's way, when they were last pressed (scene frame).
+  std::vector<polygon::ContactPlane> blocked;
   std::vector<RigidNear> rigid;           // [rigid]
   glm::dvec3 swept_to_m{0.0};             // where the last sweep ended: what is known is known from there
   std::array<ActiveElement, 3> active{};  // elements that held the proxy last

@@ -26,6 +26,7 @@ constexpr std::size_t kMaxCarried = 20'000;  // voxels that may hang on the pres
 constexpr int kProjections = 3;           // of a pressed voxel onto the tool, in search of its least energy
 constexpr std::size_t kMostDrawn = 2000;  // of them come along with the pressed ones in a tick
 constexpr float kNearlyTight = 0.1F;      // of the spacing: links that are looked at for that
+constexpr std::size_t kMostTied = 500;    // voxels looked at for what holds one of them
 constexpr double kStir = 1e-5;            // of the spacing: pressed voxels that moved less wake nobody
 constexpr double kGiveWay = 0.01;         // of the voxel radius: less is left to the next push
 constexpr float kTight = 1e-4F;           // of the spacing: nearer to its limit than this a link is tight
@@ -419,9 +420,47 @@ std::size_t SoftObject::give_way(const ToolInBody& tool, std::span<ToolBound> ou
     const Gap g = gap(tool, p);
     if (g.distance >= -kGiveWay * voxel_radius()) continue;
     const double away = tool.shape == ToolInBody::Shape::punch ? voxel_radius() : reach(tool.radius);
-    out[count++] = {-g.normal, glm::dot(-g.normal, p) + away};
+    out[count++] = {-g.normal, glm::dot(-g.normal, p) + away, t.v};
   }
   return count;
+}
+
+bool SoftObject::held_fast(VoxelId v, const glm::dvec3& direction) noexcept {
+  const glm::dvec3 size = glm::abs(direction);
+  const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+  const bool upwards = direction[axis] > 0.0;
+  const auto& u = state_.u[static_cast<std::size_t>(axis)];
+  const auto rests = [&](VoxelId w) {
+    if (lattice_->anchored(w)) return true;
+    if (state_.role[w] != Displacement::obstacle) return false;
+    const Obstacle& o = obstacles_[lattice_->surface_number(w)];
+    const double room = glm::dot(glm::dvec3(o.normal), state_.at(w)) - static_cast<double>(o.bound);
+    return room <= static_cast<double>(kTight) * lattice_->min_spacing_m() &&
+           (upwards ? o.normal[axis] < -0.5F : o.normal[axis] > 0.5F);
+  };
+  carried_.clear();
+  carried_mark_[v] = 1;
+  carried_.push_back({v, 0});
+  bool held = rests(v);
+  for (std::size_t head = 0; head < carried_.size() && carried_.size() < kMostTied && !held; ++head) {
+    const VoxelId c = carried_[head].v;
+    for (int d = 0; d < 3 && !held; ++d) {
+      const float tight = kTight * static_cast<float>(lattice_->spacing_m()[d]);
+      for (const bool up : {false, true}) {
+        const VoxelId w = up ? lattice_->up(c, d) : lattice_->down(c, d);
+        if (!lattice_->filled(w) || carried_mark_[w] != 0) continue;
+        auto b = lattice_->bounds(up ? c : w, d, axis);
+        if (!up) b = {-b[1], -b[0]};
+        const float difference = u[w] - u[c];
+        if (upwards ? difference > b[0] + tight : difference < b[1] - tight) continue;
+        held = held || rests(w);
+        carried_mark_[w] = 1;
+        carried_.push_back({w, 0});
+      }
+    }
+  }
+  let_go_of_carried();
+  return held;
 }
 
 void SoftObject::list_held() noexcept {

@@ -43,6 +43,7 @@ struct Reaction {
 struct ToolBound {
   glm::dvec3 normal{0.0};
   double offset = 0.0;
+  VoxelId voxel = 0;  // that is in the way
 };
 
 class SoftObject {
@@ -75,6 +76,10 @@ class SoftObject {
   // Where the chain did not let voxels out of the tool's way, the tool has to give way. Returns how many
   // bounds were written.
   std::size_t give_way(const ToolInBody& tool, std::span<ToolBound> out) const noexcept;
+  // Whether a voxel cannot move along `direction` because tight links tie it to what stands still: anchors,
+  // or voxels on rigid surfaces. Looks along the largest component of it, no further than some hundred
+  // voxels.
+  [[nodiscard]] bool held_fast(VoxelId v, const glm::dvec3& direction) noexcept;
   std::uint64_t relax_background(std::uint64_t budget) noexcept;
   // One whole cycle of it, however long that takes; nothing when at rest.
   void relax_cycle() noexcept;

@@ -344,6 +344,37 @@ TEST_F(Tick, AJumpIntoTissueEndsWhereASlowPressDoes) {
   }
 }
 
+// Rows of voxels that hardly shorten and stand on anchors are as good as rigid: a tool between two of them is
+// no wedge that drives them apart, pass by pass, and is paid for it.
+TEST_F(Tick, AToolOnRowsThatStandOnAnchorsIsNoWedge) {
+  const std::string rows =
+      "format = 1\n[tool]\nradius = 3\nstiffness = 1000\n" + tests::unlimited +
+      "[material.gel]\nyoung = 8000\nstretch = [0.99, 1.01]\nshear = 0.6\n[[soft]]\nname = \"block\"\n"
+      "formula = \"block\"\nsize = [40, 40, 20]\nspacing = 2\nposition = [0, 0, 0]\nmaterial = \"gel\"\n" +
+      tests::some_path;
+  // Over a voxel, beside one, and between two.
+  for (const double x_mm : {11.0, 10.6, 10.0}) {
+    const dvec3 above(1e-3 * x_mm, 1e-3, 0.0135), below = above - dvec3(0, 0, 3e-3);
+    Touch touch(load(rows), above);
+    double work = 0.0, most = 0.0;
+    TickResult before = touch.go(above, 1e-4, 1);
+    const auto see = [&](const TickResult& felt) {
+      work += 0.5 * glm::dot(before.force_N + felt.force_N, felt.device_m - before.device_m);
+      most = std::max(most, glm::length(felt.force_N));
+      before = felt;
+    };
+    const TickResult pressed = touch.go(below, 1.5e-4, 200, see);
+    const double aside = glm::length(glm::dvec2(coupling(pressed)));
+    touch.go(above, 1.5e-4, 200, see);
+    std::printf("x = %.1f mm: %.3f N, %.4f N of it aside, at most %.3f N; %.4f mJ given there and back\n",
+                x_mm, glm::length(coupling(pressed)), aside, most, 1e3 * work);
+    EXPECT_GT(most, 1.5);
+    if (x_mm != 10.6) EXPECT_LE(aside, 0.01 * most);  // beside a voxel it slides off, as it should
+    EXPECT_LE(most, 3.0);                             // the coupling's, 3 mm from the device at most
+    EXPECT_LE(std::abs(work), 1e-5);
+  }
+}
+
 // A tool of many spacings touches thousands of voxels: it is felt, or said to be too much; not felt as
 // nothing.
 TEST_F(Tick, AToolOfManySpacingsIsFelt) {
