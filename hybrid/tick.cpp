@@ -118,9 +118,21 @@ glm::dvec3 stop_at_blocked(const World& world, WorldState& state, const glm::dve
   if (probe) {
     for (polygon::ContactPlane& plane : state.blocked) plane.offset -= kProbe * world.contact_radius_m();
   }
-  const polygon::PlaneMinimum stop =
-      polygon::minimise_on_planes(target, metric, state.blocked, 1e-9 * world.contact_radius_m());
-  return stop.feasible ? stop.point : target;
+  const double radius = world.contact_radius_m();
+  if (!gather_planes(world, state, state.proxy_m, 2.0 * radius)) return target;
+  const std::size_t rigid = state.planes.size();
+  for (const polygon::ContactPlane& plane : state.blocked) {
+    if (state.planes.size() == state.planes.capacity()) break;
+    state.planes.push_back(plane);
+  }
+  const polygon::PlaneMinimum stop = polygon::minimise_on_planes(target, metric, state.planes, 1e-9 * radius);
+  if (!stop.feasible) return target;
+  // Of the two kinds of planes that hold it there, rigid ones are for the sweep to meet.
+  glm::dvec3 held_N(0.0);
+  for (std::uint32_t i = 0; i < stop.active_count; ++i) {
+    if (stop.active[i] >= rigid) held_N += stop.multiplier[i] * state.planes[stop.active[i]].normal;
+  }
+  return target + glm::inverse(metric) * held_N;
 }
 
 // One pass: the proxy goes to the minimum of ½K|q − x|² plus the tissue's quadratic model, outside everything
