@@ -170,6 +170,8 @@ class Builder {
              "a punch against rigid objects is not supported yet; use [tool] shape = \"ball\"");
     }
     refuse_motion_beside_soft();
+    for (const ModelNote& note : scene_.model_notes)
+      built_.notes.push_back({note.object, polygon::Severity::info, note.text});
     for (const RigidDescription& d : scene_.rigid) add_rigid(d);
     for (const SoftDescription& d : scene_.soft) read_soft(d);
     settle_overlaps();

@@ -12,6 +12,7 @@
 #include "hybrid/classic_surface.h"
 #include "hybrid/classic_voxels.h"
 #include "hybrid/closed_form.h"
+#include "hybrid/model_choice.h"
 
 namespace hybrid {
 namespace {
@@ -26,33 +27,6 @@ Scene bare(const Scene& scene) {
   one.rigid.clear();
   one.soft.clear();
   return one;
-}
-
-// A soft object as the rigid one of the same shape.
-RigidDescription as_rigid(const SoftDescription& soft) {
-  RigidDescription rigid{.name = soft.name,
-                         .source = {},
-                         .pose = soft.pose,
-                         .place = soft.place,
-                         .source_place = soft.source_place};
-  if (const auto* formula = std::get_if<voxel::Formula>(&soft.source)) {
-    if (formula->shape == voxel::Formula::Shape::ball) {
-      rigid.source = BallPrimitive{0.5 * formula->size_m.x};
-    } else {
-      rigid.source = BoxPrimitive{formula->size_m};
-    }
-  } else if (const auto* mesh = std::get_if<ClosedMeshSource>(&soft.source)) {
-    rigid.source = mesh->mesh;
-  } else {
-    const auto& volume = std::get<VolumeSource>(soft.source);
-    VolumeSurfaceSource surface{
-        .file = volume.file, .rules = volume.rules, .spacing_m = std::nullopt, .cuts = {}};
-    if (volume.spacing_m) surface.spacing_m = volume.spacing_m->x;
-    surface.largest = volume.largest;
-    surface.unit_m = volume.unit_m;
-    rigid.source = surface;
-  }
-  return rigid;
 }
 
 // A rigid object as the soft one of the same shape, of material "hard"; empty where it has no voxels: a

@@ -171,6 +171,8 @@ struct Thinning {
   int shell = 2;  // default: every - 1
   SourcePlace place;
 };
+// How it is felt: through its voxels, through the proxy as if it were rigid, or whichever is enough.
+enum class SoftModel : std::uint8_t { voxels, proxy, automatic };
 struct SoftDescription {
   std::string name;
   SoftSource source;
@@ -180,6 +182,7 @@ struct SoftDescription {
   Anchors anchors;
   std::uint32_t budget = 12'000;  // voxel updates of background relaxation a tick
   std::optional<Thinning> thinning{};
+  SoftModel model = SoftModel::voxels;  // of what stands in Scene::soft always this: the others were chosen
   SourcePlace place, source_place;
 };
 
@@ -201,6 +204,11 @@ struct RealDevice {
 
 enum class Overlap : std::uint8_t { carve, refuse };
 
+// What an object with a `model` became, and why.
+struct ModelNote {
+  std::string object, text;
+};
+
 struct Scene {
   std::filesystem::path file;
   std::string title;
@@ -211,6 +219,7 @@ struct Scene {
   Overlap overlap = Overlap::carve;
   std::vector<RigidDescription> rigid;
   std::vector<SoftDescription> soft;
+  std::vector<ModelNote> model_notes;
   std::map<std::string, Material> materials;
   Tool tool;
   device::DeviceModel device_model = device::DeviceModel::premium_1_5;  // simulated, unless:

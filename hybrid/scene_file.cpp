@@ -9,6 +9,7 @@
 #include <new>
 #include <set>
 
+#include "hybrid/model_choice.h"
 #include "hybrid/scene.h"
 #include "hybrid/scene_keys.h"
 #include "hybrid/scene_objects.h"
@@ -368,6 +369,7 @@ Scene read_scene(const std::filesystem::path& file) {
   read_once(root, "material", [&](const TableReader& table) { read_materials(table, scene); });
   read_objects(source, root, scene);
   check_point_tool(source, scene, tool_radius);
+  choose_models(scene);
   if (!root.has("path")) {
     source.refuse({1, 1}, "the scene has no [path], so the hand would not move",
                   "add [path] with kind = \"press\", from and to (see scenes/README.md)");

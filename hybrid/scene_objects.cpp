@@ -21,7 +21,7 @@ constexpr std::size_t most_labels = 254;
 
 constexpr LaterKey rigid_later[] = {
     {"stiffness", "remove it: the stiffness of every rigid contact is [tool] stiffness for now"},
-    {"model", "remove it: a [[rigid]] object is always felt through the proxy"},
+    {"model", "remove it; what may be felt either way is a [[soft]] object with model = \"auto\""},
 };
 
 bool usable_name(const std::string& name) {

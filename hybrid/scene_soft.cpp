@@ -12,7 +12,6 @@ namespace {
 
 constexpr LaterKey soft_later[] = {
     {"sweeps", "remove it; budget = N bounds the work of a tick"},
-    {"model", "remove it: a [[soft]] object is always felt through its voxels"},
     {"friction", "remove it: soft surfaces are smooth for now"},
     {"damping", "remove it: soft contact is quasi-static for now"},
     {"motion", "remove it: a soft object stays where position and rotation put it"},
@@ -242,16 +241,16 @@ Thinning read_thinning(const TableReader& soft, const std::set<int>& known) {
 SoftSource read_source(const TableReader& table, std::string_view kind) {
   static constexpr std::string_view of_mesh[] = {"name",     "mesh",     "unit",      "repair",  "spacing",
                                                  "energy",   "material", "materials", "anchors", "budget",
-                                                 "thinning", "position", "rotation"};
+                                                 "thinning", "model",    "position",  "rotation"};
   static constexpr std::string_view of_volume[] = {
-      "name",   "volume",   "unit",      "labels",  "range",  "ranges",   "largest",  "spacing",
-      "energy", "material", "materials", "anchors", "budget", "thinning", "position", "rotation"};
+      "name",     "volume",    "unit",    "labels", "range",    "ranges", "largest",  "spacing", "energy",
+      "material", "materials", "anchors", "budget", "thinning", "model",  "position", "rotation"};
   static constexpr std::string_view of_block[] = {
-      "name",     "formula",   "size",    "spacing", "label",    "layers",   "inclusions", "energy",
-      "material", "materials", "anchors", "budget",  "thinning", "position", "rotation"};
-  static constexpr std::string_view of_ball[] = {"name",       "formula",  "size",     "spacing",   "label",
-                                                 "inclusions", "energy",   "material", "materials", "anchors",
-                                                 "budget",     "thinning", "position", "rotation"};
+      "name",     "formula",   "size",    "spacing", "label",    "layers", "inclusions", "energy",
+      "material", "materials", "anchors", "budget",  "thinning", "model",  "position",   "rotation"};
+  static constexpr std::string_view of_ball[] = {
+      "name",      "formula", "size",   "spacing",  "label", "inclusions", "energy",  "material",
+      "materials", "anchors", "budget", "thinning", "model", "position",   "rotation"};
   static constexpr std::string_view any[] = {"unit",    "repair", "labels", "range",  "ranges",
                                              "largest", "size",   "label",  "layers", "inclusions"};
   static constexpr std::string_view shapes[] = {"block", "ball"};
@@ -274,11 +273,12 @@ SoftSource read_source(const TableReader& table, std::string_view kind) {
 
 SoftDescription read_soft(const SceneSource& source, const TreeNode& table, std::size_t number) {
   static constexpr std::string_view all[] = {
-      "name",      "mesh",    "volume",  "formula",  "unit",   "repair",   "spacing",    "labels",
-      "range",     "ranges",  "largest", "size",     "label",  "layers",   "inclusions", "material",
-      "materials", "anchors", "budget",  "thinning", "energy", "position", "rotation"};
+      "name",      "mesh",    "volume",  "formula",  "unit",   "repair", "spacing",    "labels",
+      "range",     "ranges",  "largest", "size",     "label",  "layers", "inclusions", "material",
+      "materials", "anchors", "budget",  "thinning", "energy", "model",  "position",   "rotation"};
   static constexpr std::string_view sources[] = {"volume", "mesh", "formula"};
   static constexpr std::string_view energies[] = {"six-link"};
+  static constexpr std::string_view models[] = {"voxels", "proxy", "auto"};
   const TableReader reader = object_table(source, table, "[[soft]]", number);
   reader.allow(all, soft_later);
   const std::string_view kind = source_key(reader, sources);
@@ -296,6 +296,8 @@ SoftDescription read_soft(const SceneSource& source, const TreeNode& table, std:
   out.budget = static_cast<std::uint32_t>(reader.integer("budget", 1, 1'000'000'000, out.budget));
   if (reader.has("thinning")) out.thinning = read_thinning(reader, known);
   if (reader.has("energy")) (void)reader.choice("energy", energies, {}, energies_later);
+  static constexpr SoftModel kinds[] = {SoftModel::voxels, SoftModel::proxy, SoftModel::automatic};
+  out.model = kinds[reader.choice("model", models, 0)];
   out.pose = read_pose(reader);
   return out;
 }
