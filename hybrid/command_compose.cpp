@@ -60,7 +60,7 @@ Json report(const Composed& composed) {
   json["path_s"] = composed.path_s;
   json["tool_radius_m"] = composed.tool_radius_m;
   json["notes"] = composed.notes;
-  json["overlaps"] = composed.overlaps;
+  json["places"] = composed.places;
   return json;
 }
 
@@ -72,7 +72,8 @@ int compose(const ComposeCommand& command) {
   std::FILE* words = command.json == "-" ? stderr : stdout;
   for (const std::string& note : composed.notes) fmt::print(stderr, "note: {}\n", note);
   if (!composed.rows.empty()) print_table(words, composed.rows);
-  for (const std::string& overlap : composed.overlaps) fmt::print(words, "{}\n", overlap);
+  if (!composed.places.empty()) fmt::print(words, "\n");
+  for (const std::string& place : composed.places) fmt::print(words, "{}\n", place);
   if (!composed.path.presses.empty()) {
     fmt::print(words, "\nthe path presses, with a ball of {:.3g} mm radius:\n", composed.tool_radius_m * 1e3);
     for (const Press& press : composed.path.presses) fmt::print(words, "  {}, {}\n", press.what, press.where);

@@ -20,6 +20,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::size_t kMostPlaces = 12;  // objects of a segmentation that are said one by one
+
 bool is_mesh(const fs::path& file) {
   fs::path name = file;
   const auto lower = [](std::string s) {
@@ -162,15 +164,17 @@ void compose_segmentation(const ComposeOptions& options, ComposeFolder& folder, 
   }
 }
 
-// Boxes that overlap, and what lies far from everything else: both may be meant, or a wrong unit or place.
-std::vector<std::string> overlaps(const World& world, bool segmented) {
+// Where objects lie, whose boxes overlap, and what lies far from everything else: all may be meant, or a
+// wrong unit or place. Bones in a body overlap it by nature.
+std::vector<std::string> places(const World& world, bool segmented) {
   std::vector<std::string> found;
   const std::size_t count = world.object_count();
   const auto name = [&](std::size_t o) {
     return o < world.rigid.size() ? world.rigid[o].name : world.soft[o - world.rigid.size()].name;
   };
-  if (segmented && world.soft.size() <= 1 && count > 12)
-    return found;  // bones in a body overlap it, by nature
+  if (segmented && count > kMostPlaces) return found;
+  for (std::size_t o = 0; o < count; ++o)
+    found.push_back(fmt::format("{} lies in {}", name(o), in_words(object_box(world, o))));
   for (std::size_t a = 0; a < count; ++a) {
     const ObjectBox box_a = object_box(world, a);
     bool near = count == 1;
@@ -186,8 +190,7 @@ std::vector<std::string> overlaps(const World& world, bool segmented) {
       }
     }
     if (!near) {
-      found.push_back(fmt::format("{} lies far from everything else, in {}; is its unit or --place right?",
-                                  name(a), in_words(box_a)));
+      found.push_back(name(a) + " lies far from everything else; is its unit or --place right?");
     }
   }
   return found;
@@ -268,7 +271,7 @@ Composed compose(const ComposeOptions& options, const Progress& progress) {
     const BuiltScene built = build_scene(load_scene(folder.scene()), progress);
     if (progress) progress("planning a path");
     composed.path = plan_presses(built, parts, settings.tool_radius_m);
-    composed.overlaps = overlaps(*built.world, !options.labels.empty());
+    composed.places = places(*built.world, !options.labels.empty());
   }
   if (composed.path.points.empty()) {
     throw ComposeError(

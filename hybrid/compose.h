@@ -30,7 +30,7 @@ struct Composed {
   std::filesystem::path scene{};
   std::vector<ComposedPart> rows{};
   std::vector<std::string> notes{};
-  std::vector<std::string> overlaps{};  // of objects' boxes, in words
+  std::vector<std::string> places{};  // where objects lie, and whose boxes overlap, in words
   PressPath path{};
   double path_s = 0.0;
   double tool_radius_m = 0.0;

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
-#include <numeric>
 
 #include "hybrid/label_surface.h"
 #include "polygon/mesh_bounds.h"
@@ -224,24 +223,17 @@ void add_tissue(const LabelVolume& tissue, const LabelNames& names, const Split&
                 SceneParts& parts) {
   const std::array<Box, 256> boxes = label_boxes(tissue);
   const std::vector<bool> soft = as_flags(split.soft);
-  Box all;
-  for (const int label : split.soft) {
-    const Box& box = boxes[static_cast<std::size_t>(label)];
-    if (box.high[0] < 0) {
-      parts.notes.push_back(fmt::format("{}: no voxel is left of it at this spacing", names.at(label)));
-      continue;
-    }
-    all.add(box.low[0], box.low[1], box.low[2]);
-    all.add(box.high[0], box.high[1], box.high[2]);
-  }
-  if (all.high[0] < 0) {
+  const auto missing = [&](int label) { return boxes[static_cast<std::size_t>(label)].high[0] < 0; };
+  if (std::all_of(split.soft.begin(), split.soft.end(), missing))
     throw ComposeError("no soft label has a voxel at this spacing; give --spacing a smaller one");
-  }
   SoftPart part{
       .name = folder.unused_name("tissue"), .file = {}, .comment = {}, .placement = {}, .volume = {}};
   part.file = part.name + ".nii.gz";
   for (const int label : split.soft) {
-    if (boxes[static_cast<std::size_t>(label)].high[0] < 0) continue;
+    if (missing(label)) {
+      parts.notes.push_back(fmt::format("{}: no voxel is left of it at this spacing", names.at(label)));
+      continue;
+    }
     const Tissue* found = find_tissue(names.at(label));
     const Tissue* known = found == nullptr || found->bone ? &unknown_tissue() : found;
     if (known == &unknown_tissue()) {
@@ -256,11 +248,14 @@ void add_tissue(const LabelVolume& tissue, const LabelNames& names, const Split&
   LabelVolume work = tissue;
   const voxel::ConnectedRuns runs(work, soft);
   LooseTissue(work, part, parts).settle(runs, held_pieces(tissue, as_flags(split.rigid), runs));
-  std::set<int> kept;  // anchored layers have labels of their own
-  for (const auto& [label, known] : part.materials) kept.insert(label);
-  const std::vector<bool> in_file = as_flags(kept);
-  part.volume =
-      cropped(work, all, [&](std::size_t at) { return in_file[work.labels[at]] && soft[tissue.labels[at]]; });
+  const auto is_tissue = [&](std::size_t at) { return soft[tissue.labels[at]] && work.labels[at] != 0; };
+  Box box;
+  for_each_voxel(work, [&](int i, int j, int k, std::size_t at) {
+    if (is_tissue(at)) box.add(i, j, k);
+  });
+  if (box.high[0] < 0)
+    throw ComposeError("the soft labels are loose specks of a few voxels each; choose others with --soft");
+  part.volume = cropped(work, box, is_tissue);
   const double h = std::max({tissue.spacing_m.x, tissue.spacing_m.y, tissue.spacing_m.z});
   if (!split.rigid.empty()) part.rigid_within_mm = kHeldWithin * h * 1e3;
   voxel::save_volume(folder.claim(part.file), part.volume);

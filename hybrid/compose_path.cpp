@@ -20,6 +20,7 @@ constexpr double kSoftDepth = 0.8;     // of the tool's radius, that the hand go
 constexpr double kBoneDepth = 0.25;    // the same, where nothing gives way
 constexpr double kClearance_m = 0.01;  // between presses, above what lies between; at least a diameter
 constexpr double kHold_s = 0.3;
+constexpr double kFastest_m_per_s = 0.06;             // a hand that explores
 constexpr std::size_t kMostRigid = 8, kMostSoft = 8;  // presses of each kind
 constexpr double kNothing = -std::numeric_limits<double>::infinity();
 
@@ -376,7 +377,7 @@ PressPath plan_presses(const BuiltScene& built, const SceneParts& parts, double 
     if (!pressed) path.hidden.push_back(all.targets[t].name);
   }
   const glm::dvec3 size = all.high - all.low;
-  path.speed_m_per_s = std::clamp(0.3 * std::max({size.x, size.y, size.z}), 0.02, 0.1);
+  path.speed_m_per_s = std::clamp(0.3 * std::max({size.x, size.y, size.z}), 0.01, kFastest_m_per_s);
   return path;
 }
 

@@ -258,7 +258,7 @@ TEST_F(Compose, TissueIsReadCoarserWhereAskedAndBoneIsNot) {
   const Composed composed = hybrid::compose(options);
   EXPECT_EQ(row(composed, "rib_left_1").voxels, 6U * 4U * 16U);
   EXPECT_LT(row(composed, "liver").voxels, 24U * 16U * 16U / 6U);
-  EXPECT_NEAR(composed.tool_radius_m, 8e-3, 1e-12);
+  EXPECT_NEAR(composed.tool_radius_m, 8e-3, 1e-12) << "two spacings";
   EXPECT_GT(touched(composed.scene).at("tissue"), 0U);
 }
 
@@ -278,7 +278,7 @@ TEST_F(Compose, AMeshIsPlacedInAVolume) {
   EXPECT_EQ(scene.rigid.at(0).pose.position_m, glm::dvec3(0.005, 0.028, 0.36));
   EXPECT_NEAR(glm::angle(scene.rigid.at(0).pose.rotation), glm::radians(45.0), 1e-9);
   EXPECT_THAT(all(composed.notes), HasSubstr("Otsu"));
-  EXPECT_THAT(all(composed.overlaps), HasSubstr("part and head: their boxes share"));
+  EXPECT_THAT(all(composed.places), HasSubstr("part and head: their boxes share"));
   const auto ticks = touched(composed.scene);
   EXPECT_GT(ticks.at("part"), 100U);
   EXPECT_GT(ticks.at("head"), 100U);
@@ -292,7 +292,7 @@ TEST_F(Compose, WhatLiesFarAwayIsSaid) {
   options.out = folder_ / "out";
   options.place = {"b=500,0,0"};
   const Composed composed = hybrid::compose(options);
-  EXPECT_THAT(all(composed.overlaps), HasSubstr("lies far from everything else"));
+  EXPECT_THAT(all(composed.places), HasSubstr("lies far from everything else"));
   EXPECT_THAT(all(composed.notes), HasSubstr("if the file is in meters"));
 }
 
