@@ -13,6 +13,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+constexpr std::size_t kMostSaid = 24;  // names in a line
+
 // An argument of a command line, as a shell takes it.
 std::string in_shell(const std::string& text) {
   const bool plain = !text.empty() && text.find_first_not_of(
@@ -78,9 +80,14 @@ int compose(const ComposeCommand& command) {
     fmt::print(words, "\nthe path presses, with a ball of {:.3g} mm radius:\n", composed.tool_radius_m * 1e3);
     for (const Press& press : composed.path.presses) fmt::print(words, "  {}, {}\n", press.what, press.where);
   }
-  const std::vector<std::string_view> hidden(composed.path.hidden.begin(), composed.path.hidden.end());
-  if (!hidden.empty())
-    fmt::print(words, "not pressed, as others lie before it on every side: {}\n", joined(hidden));
+  const std::vector<std::string>& hidden = composed.path.hidden;
+  if (!hidden.empty()) {
+    const std::size_t said = std::min(hidden.size(), kMostSaid);
+    fmt::print(words, "not pressed, as others lie before it on every side or are easier to reach: {}{}\n",
+               joined(std::vector<std::string_view>(hidden.begin(),
+                                                    hidden.begin() + static_cast<std::ptrdiff_t>(said))),
+               said < hidden.size() ? fmt::format(" and {} more", hidden.size() - said) : "");
+  }
   const std::string scene = composed.scene.string();
   fmt::print(words, "\n{}: written; its path takes {:.0f} s\nnext: hybrid run {} --picture {}\n", scene,
              composed.path_s, in_shell(scene),

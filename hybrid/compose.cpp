@@ -99,14 +99,34 @@ std::string in_words(const voxel::VolumeHeader& h) {
                      h.spacing_m.z * 1e3, h.origin_m.x * 1e3, h.origin_m.y * 1e3, h.origin_m.z * 1e3);
 }
 
-// Labels drawn on another grid than the scan's mean that one of both files is the wrong one.
+// The box that the centres of the outermost voxels span in the scene.
+ObjectBox span_of(const voxel::VolumeHeader& h) {
+  ObjectBox box{glm::dvec3(1e300), glm::dvec3(-1e300)};
+  for (int corner = 0; corner < 8; ++corner) {
+    glm::dvec3 at(0.0);
+    for (int axis = 0; axis < 3; ++axis) {
+      if (((corner >> axis) & 1) != 0)
+        at[axis] = (h.dims[static_cast<std::size_t>(axis)] - 1) * h.spacing_m[axis];
+    }
+    const glm::dvec3 in_scene = h.origin_m + h.rotation * at;
+    box.low = glm::min(box.low, in_scene);
+    box.high = glm::max(box.high, in_scene);
+  }
+  return box;
+}
+
+// Labels drawn on another grid than the scan's mean that one of both files is the wrong one. Formats count
+// the axes from different ends, so it is where the voxels lie that is compared, and how many there are.
 void check_grid(const fs::path& scan, const fs::path& labels) {
   const voxel::VolumeHeader a = voxel::read_volume_header(scan), b = voxel::read_volume_header(labels);
-  const double h = std::min({a.spacing_m.x, a.spacing_m.y, a.spacing_m.z});
-  const bool same = a.dims == b.dims && glm::length(a.spacing_m - b.spacing_m) < 1e-3 * h &&
-                    glm::length(a.origin_m - b.origin_m) < 0.1 * h &&
-                    std::abs(glm::dot(a.rotation, b.rotation)) > 0.9999;
-  if (same) return;
+  const double near = 0.1 * std::min({a.spacing_m.x, a.spacing_m.y, a.spacing_m.z});
+  const ObjectBox of_scan = span_of(a), of_labels = span_of(b);
+  std::array<int, 3> n = a.dims, m = b.dims;
+  std::sort(n.begin(), n.end());
+  std::sort(m.begin(), m.end());
+  if (n == m && glm::length(of_scan.low - of_labels.low) < near &&
+      glm::length(of_scan.high - of_labels.high) < near)
+    return;
   throw ComposeError(
       fmt::format("{}: has another grid than {}: {}, not {}; give the labels of this volume, or the labels "
                   "alone",

@@ -9,6 +9,7 @@
 #include <glm/common.hpp>
 
 #include "hybrid/label_surface.h"
+#include "hybrid/scene_keys.h"
 #include "polygon/mesh_bounds.h"
 #include "polygon/mesh_check.h"
 #include "polygon/mesh_file.h"
@@ -229,6 +230,7 @@ void add_tissue(const LabelVolume& tissue, const LabelNames& names, const Split&
   SoftPart part{
       .name = folder.unused_name("tissue"), .file = {}, .comment = {}, .placement = {}, .volume = {}};
   part.file = part.name + ".nii.gz";
+  std::vector<std::string_view> unknown;
   for (const int label : split.soft) {
     if (missing(label)) {
       parts.notes.push_back(fmt::format("{}: no voxel is left of it at this spacing", names.at(label)));
@@ -236,14 +238,15 @@ void add_tissue(const LabelVolume& tissue, const LabelNames& names, const Split&
     }
     const Tissue* found = find_tissue(names.at(label));
     const Tissue* known = found == nullptr || found->bone ? &unknown_tissue() : found;
-    if (known == &unknown_tissue()) {
-      parts.notes.push_back(
-          fmt::format("{}: no stiffness of such a tissue is known here; it gets {:.3g} kPa. Correct "
-                      "[material.{}] in the scene",
-                      names.at(label), known->young_Pa / 1e3, known->name));
-    }
+    if (known == &unknown_tissue()) unknown.push_back(names.at(label));
     part.materials[label] = known;
     part.label_names[label] = names.at(label);
+  }
+  if (!unknown.empty()) {
+    parts.notes.push_back(fmt::format(
+        "{}: no stiffness of such a tissue is known here; {} kPa is assumed. Correct [material.{}] "
+        "in the scene",
+        joined(unknown), unknown_tissue().young_Pa / 1e3, unknown_tissue().name));
   }
   LabelVolume work = tissue;
   const voxel::ConnectedRuns runs(work, soft);

@@ -463,6 +463,17 @@ TEST(Tissues, PatternsHaveStarsAndQuestionMarks) {
   EXPECT_FALSE(hybrid::fits_pattern("aab", "a*a"));
 }
 
+// The same voxels, counted from the other end of an axis: a flip that formats make.
+TEST_F(Compose, AGridThatIsCountedFromAnotherEndIsTheSameGrid) {
+  voxel::LabelVolume scan = volume_of(torso());
+  const glm::dvec3 far = glm::dvec3(scan.dims[0] - 1, scan.dims[1] - 1, 0) * scan.spacing_m;
+  scan.origin_m += far;
+  scan.rotation = glm::angleAxis(glm::radians(180.0), glm::dvec3(0, 0, 1));
+  ComposeOptions options = of_torso();
+  options.inputs = {save("turned.nii.gz", scan)};
+  EXPECT_EQ(refused(options), "");
+}
+
 // ---- a real scan
 // ----------------------------------------------------------------------------------------------
 
