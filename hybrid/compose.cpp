@@ -20,6 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char* kDraft = ".compose-draft.toml";
 constexpr std::size_t kMostPlaces = 12;  // objects of a segmentation that are said one by one
 
 bool is_mesh(const fs::path& file) {
@@ -263,6 +264,10 @@ Composed compose(const ComposeOptions& options, const Progress& progress) {
     throw ComposeError(
         "--names, --rigid and --soft choose among labels; give the segmentation with --labels FILE");
   }
+  if (options.range && !((*options.range)[0] <= (*options.range)[1])) {
+    throw ComposeError(fmt::format("--range {:.6g},{:.6g}: must be LO,HI with LO at most HI, as in 300,3000",
+                                   (*options.range)[0], (*options.range)[1]));
+  }
   for (const fs::path& scan : scans) check_grid(scan, options.labels);
 
   ComposeFolder folder(options.out, options.force);
@@ -285,10 +290,10 @@ Composed compose(const ComposeOptions& options, const Progress& progress) {
 
   // Built once with a path that touches nothing: the surfaces say where a path can touch. (What the build
   // carves is then known too.)
-  folder.write_text("scene.toml", scene_text(parts, settings, no_path()));
+  folder.write_text(kDraft, scene_text(parts, settings, no_path()));
   Composed composed{.scene = folder.scene(), .tool_radius_m = settings.tool_radius_m};
   {
-    const BuiltScene built = build_scene(load_scene(folder.scene()), progress);
+    const BuiltScene built = build_scene(load_scene(folder.path() / kDraft), progress);
     if (progress) progress("planning a path");
     composed.path = plan_presses(built, parts, settings.tool_radius_m);
     composed.places = places(*built.world, !options.labels.empty());
@@ -297,6 +302,7 @@ Composed compose(const ComposeOptions& options, const Progress& progress) {
     throw ComposeError(
         "nothing of this scene can be reached from outside along an axis; `hybrid check` the inputs");
   }
+  folder.drop(kDraft);
   folder.write_text("scene.toml", scene_text(parts, settings, composed.path));
   composed.path_s = scene_path(load_scene(folder.scene()))->duration_s();
   composed.rows = std::move(parts.rows);

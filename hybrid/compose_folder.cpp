@@ -65,6 +65,11 @@ void ComposeFolder::write_text(const std::string& name, const std::string& text)
   if (!out) throw ComposeError(fmt::format("{}: cannot be written; is the disk full?", file.string()));
 }
 
+void ComposeFolder::drop(const std::string& name) {
+  std::error_code error;
+  fs::remove(folder_ / name, error);
+}
+
 void ComposeFolder::copy(const fs::path& from, const std::string& name) {
   std::error_code error;
   if (fs::equivalent(from, folder_ / name, error)) return;

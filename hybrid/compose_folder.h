@@ -25,6 +25,8 @@ class ComposeFolder {
   // `force` is false.
   std::filesystem::path claim(const std::string& name);
   void write_text(const std::string& name, const std::string& text);
+  // Takes a file away again that write_text() wrote.
+  void drop(const std::string& name);
   // A copy of an input; nothing where it is that very file.
   void copy(const std::filesystem::path& from, const std::string& name);
   // A name for a file or object, of letters, digits, '-', '_' alone and not given out before.

@@ -110,7 +110,8 @@ void add_intensities(const std::filesystem::path& file, const std::string& name,
   if (filled() == 0) {
     throw ComposeError(
         fmt::format("{}: no voxel lies within {:.4g} to {:.4g}; the file goes from {:.4g} to {:.4g}, "
-                    "give --range within that",
+                    "give --range within that, "
+                    "or a smaller --spacing",
                     file.string(), (*range)[0], (*range)[1], statistics.minimum, statistics.maximum));
   }
   keep_largest_piece(volume, false);

@@ -257,7 +257,9 @@ void add_tissue(const LabelVolume& tissue, const LabelNames& names, const Split&
     if (is_tissue(at)) box.add(i, j, k);
   });
   if (box.high[0] < 0)
-    throw ComposeError("the soft labels are loose specks of a few voxels each; choose others with --soft");
+    throw ComposeError(
+        "the soft labels are loose specks of a few voxels each; choose others with --soft, or a smaller "
+        "--spacing");
   part.volume = cropped(work, box, is_tissue);
   const double h = std::max({tissue.spacing_m.x, tissue.spacing_m.y, tissue.spacing_m.z});
   if (!split.rigid.empty()) part.rigid_within_mm = kHeldWithin * h * 1e3;

@@ -377,6 +377,26 @@ TEST_F(Compose, ARefusalSaysWhatWhereAndWhatToDoAndLeavesNothing) {
          o.inputs = {};
        },
        {"need something to work on"}},
+      {"a range the wrong way round",
+       [&](auto& o) {
+         o.labels.clear();
+         o.names.clear();
+         o.inputs = {same};
+         o.range = std::array{5.0, 1.0};
+       },
+       {"--range 5,1", "LO at most HI"}},
+      {"a range of nothing",
+       [&](auto& o) {
+         o.labels.clear();
+         o.names.clear();
+         o.inputs = {same};
+         o.range = std::array{500.0, 600.0};
+       },
+       {"no voxel lies within 500 to 600", "goes from 0 to 4"}},
+      {"a spacing that leaves nothing", [](auto& o) { o.spacing_m = 1.0; }, {"--spacing"}},
+      {"a folder that cannot be made",
+       [&](auto& o) { o.out = names_ / "out"; },
+       {"names.csv/out", "nothing can be written there"}},
       {"a file for a folder", [&](auto& o) { o.out = names_; }, {"is a file", "name a folder"}},
   };
   for (const Case& c : cases) {
