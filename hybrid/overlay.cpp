@@ -120,7 +120,7 @@ void draw_legend(const Pen& pen, float top, const DrawnScene& scene, const Snaps
     const auto rank = [&](std::size_t i) { return feel_of(i).contact ? 0 : scene.objects[i].soft ? 1 : 2; };
     std::stable_sort(shown.begin(), shown.end(),
                      [&](std::size_t a, std::size_t b) { return rank(a) < rank(b); });
-    shown.resize(most);
+    shown.resize(std::min<std::size_t>(most, 10));  // a list that is cut anyway need not hide the scene
   }
   for (const std::size_t i : shown) {
     const DrawnObject& object = scene.objects[i];
@@ -129,8 +129,9 @@ void draw_legend(const Pen& pen, float top, const DrawnScene& scene, const Snaps
                     object.soft ? "soft" : "rigid", feel.contact ? force_text(feel.force_N) : "-",
                     feel.contact});
   }
-  if (scene.objects.size() > most) {
-    rows.push_back({0, "and " + std::to_string(scene.objects.size() - most) + " more", "", "", false});
+  if (scene.objects.size() > shown.size()) {
+    rows.push_back(
+        {0, "and " + std::to_string(scene.objects.size() - shown.size()) + " more", "", "", false});
   }
   rows.push_back(
       {colour(palette::tool), "tool, as felt (proxy)", scene.tool_is_punch ? "punch" : "ball", "", false});
