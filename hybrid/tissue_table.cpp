@@ -49,12 +49,11 @@ constexpr std::array kTissues{
     Tissue{"bowel", "*bowel* *colon* *duodenum* *intestin* *rectum* *esophagus* *oesophagus*", false, 1.9e3, 0.45,
            false, "as the stomach's"},
     Tissue{"bladder", "*bladder*", false, 1.9e3, 0.45, false, "a wall around fluid; as the stomach's"},
-    Tissue{"lung", "*lung*", false, 1.0e3, 0.42, true,
-           "inflated dog lobes, shear modulus 0.7 P and bulk modulus 4 P at P = 0.5 kPa, Lai-Fook et al. 1976, "
-           "J Appl Physiol 40:508"},
+    Tissue{"lung", "*lung*", false, 1.0e3, 0.43, true,
+           "inflated dog lobes, E = 2 P by indentation, at P = 0.5 kPa, Lai-Fook et al. 1976, J Appl Physiol 40:508"},
     Tissue{"airway", "*trachea* *bronch*", false, 1.0e5, 0.30, false, "no figure for a filled label; between vessel and cartilage"},
     Tissue{"heart", "*heart* *atri* *ventricle_of_heart* *myocard*", false, 1.3e4, 0.45, true,
-           "diastolic myocardium, shear modulus 4.5 kPa, Villemain et al. 2019, JACC Cardiovasc Imaging 12:1135"},
+           "diastolic myocardium, shear modulus 4.5 kPa (2.6 to 6.1 with age), Villemain et al. 2019, JACC Cardiovasc Imaging 12:1135"},
     Tissue{"muscle", "*muscle* *muscul* *gluteus* *autochthon* *psoas* *erector* *quadriceps* *biceps* *rectus* "
            "*oblique*", false, 1.11e4, 0.45, true, kArda},
     Tissue{"skin", "*skin* *dermis* *cutis", false, 1.0e5, 0.45, true,
