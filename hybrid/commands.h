@@ -10,6 +10,7 @@
 
 #include "hybrid/build.h"
 #include "hybrid/compare_measured.h"
+#include "hybrid/compose.h"
 
 namespace hybrid {
 
@@ -39,6 +40,12 @@ struct CheckCommand {
   std::string json;
 };
 int check(const CheckCommand& command);
+
+struct ComposeCommand {
+  ComposeOptions options;
+  std::string json;
+};
+int compose(const ComposeCommand& command);
 
 struct DevicesCommand {
   bool calibrate = false;  // take the pose in which the hand holds the arm as the one of calibration

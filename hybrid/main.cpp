@@ -16,7 +16,9 @@ constexpr const char* kAbout =
     "  hybrid view scenes/head.toml                                     a window; drag the tool with the "
     "mouse\n"
     "  hybrid check skull.stl ct.nii.gz my-scene.toml                   what a file is, and what is wrong "
-    "with it\n\n"
+    "with it\n"
+    "  hybrid compose --labels labels.nii.gz --names labels.csv --out body   a scene from a segmented "
+    "scan\n\n"
     "A scene is one small text file; scenes/README.md describes its keys.\n"
     "Exit status: 0 done, 1 input refused (with the place and the remedy), 2 wrong usage.";
 
@@ -76,6 +78,47 @@ void add_check(CLI::App& app, int& status) {
       ->capture_default_str();
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
   sub->callback([c, &status] { status = hybrid::check(*c); });
+}
+
+void add_compose(CLI::App& app, int& status) {
+  auto* sub = app.add_subcommand(
+      "compose", "Writes a scene that runs: from a segmented volume, from meshes and volumes, or a starter");
+  auto c = std::make_shared<hybrid::ComposeCommand>();
+  hybrid::ComposeOptions& o = c->options;
+  sub->add_option(
+      "INPUT", o.inputs,
+      "meshes (mm), volumes, folders of a DICOM series; with --labels the scan they are of. None: a "
+      "starter scene");
+  sub->add_option("--out", o.out, "folder to write; scene.toml and the files that it reads")->required();
+  auto* labels = sub->add_option("--labels", o.labels, "label volume of a segmentation");
+  sub->add_option("--names", o.names, "of --labels: what they are called (CSV: number, name; or JSON)")
+      ->needs(labels);
+  sub->add_option("--rigid", o.rigid,
+                  "of --labels: names, patterns (rib_*) and numbers, with commas between, that become rigid "
+                  "surfaces; or none. Default: bones, by their names")
+      ->delimiter(',')
+      ->needs(labels);
+  sub->add_option("--soft", o.soft,
+                  "of --labels: those that become tissue; or none. Default: all that is not bone")
+      ->delimiter(',')
+      ->needs(labels);
+  sub->add_option("--place", o.place, "where an input lies: NAME=x,y,z[,rx,ry,rz] (mm, degrees); repeatable")
+      ->take_all();
+  sub->add_option_function<std::vector<double>>(
+         "--range",
+         [c](const std::vector<double>& v) {
+           c->options.range = {v.at(0), v.at(1)};
+         },
+         "intensities LO,HI that are tissue, of a volume without labels; default: above Otsu's threshold")
+      ->delimiter(',')
+      ->expected(2);
+  sub->add_option_function<double>(
+         "--spacing", [c](double mm) { c->options.spacing_m = mm * 1e-3; },
+         "voxel size of tissue in mm; default: the file's, coarser above 1.5 million voxels of tissue")
+      ->check(CLI::PositiveNumber);
+  sub->add_flag("--force", o.force, "write over a scene that is there");
+  sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
+  sub->callback([c, &status] { status = hybrid::compose(*c); });
 }
 
 void add_devices(CLI::App& app, int& status) {
@@ -189,6 +232,7 @@ int main(int argc, char** argv) {
   add_run(app, status);
   add_replay(app, status);
   add_check(app, status);
+  add_compose(app, status);
   add_devices(app, status);
   add_compare(app, status);
   add_bench(app, status);

@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <glm/geometric.hpp>
+#include <numeric>
 #include <system_error>
 
 #include "hybrid/felt_geometry.h"
@@ -107,18 +108,30 @@ void draw_legend(const Pen& pen, float top, const DrawnScene& scene, const Snaps
     bool touched;
   };
   std::vector<Row> rows;
-  // What does not fit is counted, not dropped in silence.
+  // What does not fit is counted, not dropped in silence; what is touched and what is soft goes first.
   const std::size_t most =
       static_cast<std::size_t>(std::max(3.0F, (0.55F * static_cast<float>(content.height)) / (1.6F * em)));
-  for (std::size_t i = 0; i < scene.objects.size() && i < most; ++i) {
+  const auto feel_of = [&snapshot](std::size_t i) {
+    return i < snapshot.feel.size() ? snapshot.feel[i] : ObjectFeel{};
+  };
+  std::vector<std::size_t> shown(scene.objects.size());
+  std::iota(shown.begin(), shown.end(), std::size_t{0});
+  if (shown.size() > most) {
+    const auto rank = [&](std::size_t i) { return feel_of(i).contact ? 0 : scene.objects[i].soft ? 1 : 2; };
+    std::stable_sort(shown.begin(), shown.end(),
+                     [&](std::size_t a, std::size_t b) { return rank(a) < rank(b); });
+    shown.resize(std::min<std::size_t>(most, 10));  // a list that is cut anyway need not hide the scene
+  }
+  for (const std::size_t i : shown) {
     const DrawnObject& object = scene.objects[i];
-    const ObjectFeel feel = i < snapshot.feel.size() ? snapshot.feel[i] : ObjectFeel{};
+    const ObjectFeel feel = feel_of(i);
     rows.push_back({colour(palette::of_object(scene, i)), pen.fit(object.name, 22.0F * em),
                     object.soft ? "soft" : "rigid", feel.contact ? force_text(feel.force_N) : "-",
                     feel.contact});
   }
-  if (scene.objects.size() > most) {
-    rows.push_back({0, "and " + std::to_string(scene.objects.size() - most) + " more", "", "", false});
+  if (scene.objects.size() > shown.size()) {
+    rows.push_back(
+        {0, "and " + std::to_string(scene.objects.size() - shown.size()) + " more", "", "", false});
   }
   rows.push_back(
       {colour(palette::tool), "tool, as felt (proxy)", scene.tool_is_punch ? "punch" : "ball", "", false});

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What is known of tissues by their names: bone or not, and how stiff, with where the figure is from.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace hybrid {
+
+struct Tissue {
+  std::string_view name;      // of the family: "rib", "liver", "vessel"; also of its material in a scene
+  std::string_view patterns;  // of label names, with spaces between; '*' and '?' stand for any characters
+  bool bone = false;          // felt as a rigid surface; the figures below are then not used
+  double young_Pa = 0.0;
+  double poisson = 0.0;
+  bool measured = false;    // published for this tissue; else a stand-in, and `source` says which
+  std::string_view source;  // where the figure is from
+};
+
+// The first row wins. Young's moduli are of small, slow deformation in living tissue where there is such a
+// measurement; elastography gives E = 3·ρ·c². Poisson's ratio: what does not change its volume gets 0.45,
+// near which the lattice's calibration ends.
+std::span<const Tissue> tissue_table();
+
+// The row that a label's name belongs to; null when there is none.
+const Tissue* find_tissue(std::string_view label_name);
+
+// What a label gets that no row knows.
+const Tissue& unknown_tissue();
+
+// Whether a name fits a pattern of '*' (any characters, also none) and '?' (one), capitals ignored.
+bool fits_pattern(std::string_view name, std::string_view pattern);
+
+}  // namespace hybrid
