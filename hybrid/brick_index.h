@@ -12,6 +12,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <limits>
 #include <vector>
 
 namespace hybrid {
@@ -51,11 +52,24 @@ class BrickIndex {
                                       (cell[2] & mask) * kEdge * kEdge);
   }
 
+  // Of a layer of a brick (one z), bit x + 8 y: the cells x low to high and y low to high of a part of it.
+  [[nodiscard]] static std::uint64_t layer_mask(const CellRange& part) noexcept {
+    constexpr std::int32_t in_brick = kEdge - 1;
+    const std::int32_t x0 = part.low[0] & in_brick, x1 = part.high[0] & in_brick, y0 = part.low[1] & in_brick,
+                       y1 = part.high[1] & in_brick;
+    const std::uint64_t row = (0xFFULL << x0) & (0xFFULL >> (in_brick - x1));
+    const std::uint64_t rows = (~0ULL << (8 * y0)) & (~0ULL >> (8 * (in_brick - y1)));
+    return row * 0x0101010101010101ULL & rows;
+  }
+
   // Numbers run from 0 in order of appearance; kNone: there is no such brick.
   [[nodiscard]] std::uint32_t find(const CellCoordinates& brick) const noexcept;
-  // kNone only when it may not allocate and there is no room.
+  // kNone only when it may not allocate and there is no room. Numbers that were released come first.
   std::uint32_t find_or_add(const CellCoordinates& brick, bool may_allocate);
-  [[nodiscard]] std::size_t size() const noexcept { return at_.size(); }
+  // The brick is no more: its number and its room are the next new brick's. Allocates nothing.
+  void release(std::uint32_t brick) noexcept;
+  [[nodiscard]] std::size_t size() const noexcept { return at_.size(); }  // numbers ever given
+  [[nodiscard]] std::size_t live() const noexcept { return at_.size() - released_; }
   [[nodiscard]] const CellCoordinates& at(std::uint32_t brick) const noexcept { return at_[brick]; }
 
   // Room for so many more bricks without allocating, and the bitmap over those that exist. Bricks may be
@@ -114,6 +128,9 @@ class BrickIndex {
  private:
   static constexpr double kFarthestCell = 1e9;
   static constexpr std::int32_t kUnits = 64;  // of the bitmap, along an edge
+  // In place of the first coordinate of a released brick: no cell is there. The second is the number that was
+  // released before it.
+  static constexpr std::int32_t kReleased = std::numeric_limits<std::int32_t>::min();
   struct Slot {
     CellCoordinates at{};
     std::uint32_t brick = kNone;
@@ -156,10 +173,13 @@ class BrickIndex {
   }
   void rehash(std::size_t capacity);
   void mark(const CellCoordinates& brick) noexcept;
+  void unmark(const CellCoordinates& brick) noexcept;
 
   double cell_m_, per_cell_;
   glm::dvec3 origin_;
-  std::vector<CellCoordinates> at_;    // [brick]
+  std::vector<CellCoordinates> at_;  // [brick], released ones too
+  std::uint32_t last_released_ = kNone;
+  std::size_t released_ = 0;
   std::vector<Slot> table_;            // open addressing, linear probing, at most half full
   std::vector<std::uint64_t> bitmap_;  // [z][y], bit x; empty until sealed
   CellCoordinates first_unit_{};

@@ -41,6 +41,8 @@ class OccupancyMap {
   std::uint32_t add_soft(std::uint32_t count);
   void place(std::uint32_t number, const glm::dvec3& position);
   // Room for motion: bricks may grow by this many without allocating. Call once, after everything is placed.
+  // Voxels need no more than one brick each, and a brick that the last one leaves is room again: however long
+  // they wander, only how many bricks they are in at one time counts.
   void reserve_bricks(std::size_t more);
 
   // ---- in the tick; these do not allocate ----
@@ -60,6 +62,8 @@ class OccupancyMap {
   [[nodiscard]] double cell_m() const { return fixed_.cell_m(); }
   [[nodiscard]] std::size_t occupied_cells() const noexcept;
   [[nodiscard]] std::size_t memory_bytes() const;
+  // Bricks in which soft voxels are: never an empty one.
+  [[nodiscard]] std::size_t soft_bricks() const noexcept { return soft_index_.live(); }
   // Moves that found no room for a brick: raise the reserve. The voxel stays known at its last cell.
   [[nodiscard]] std::uint64_t overflows() const { return overflows_; }
   // Of moving bodies: districts entered or left since they were added.
@@ -74,14 +78,19 @@ class OccupancyMap {
 
  private:
   static constexpr int kCells = BrickIndex::kCells;
-  struct SoftBrick {
-    std::uint32_t count = 0;
-    std::array<std::uint32_t, kCells> head{};  // first soft voxel of the cell, or kNone
+  struct alignas(64) SoftBrick {  // 33 cache lines, of which a question reads the first and those it needs
+    std::array<std::uint64_t, BrickIndex::kEdge> layer{};  // [z], bit x + 8 y: the cell is occupied
+    // [x + 8 y + 64 z] the cell's first soft voxel. What is not occupied has no meaning: a brick need not be
+    // written over when it is used again.
+    std::array<std::uint32_t, kCells> head;
   };
+  static_assert(sizeof(SoftBrick) == 33 * 64);
 
   void put(std::uint32_t number, const glm::dvec3& position, bool may_allocate);
-  // The soft layer's part in any_near().
-  [[nodiscard]] bool soft_near(const glm::dvec3& low, const glm::dvec3& high) const noexcept;
+  // Out of its cell, which may leave an empty brick; then release_if_empty().
+  void unlink(std::uint32_t number) noexcept;
+  void release_if_empty(std::uint32_t brick) noexcept;
+  [[nodiscard]] bool alone_in_brick(std::uint32_t number) const noexcept;
 
   SurfaceCells fixed_;
   MovingCells moving_;
