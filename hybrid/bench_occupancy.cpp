@@ -30,6 +30,8 @@ constexpr std::array<int, 2> kBoxes{1, 5};  // cells along an edge: one cell; a 
 
 struct Box {
   glm::dvec3 low, high;
+  // What the map is asked: of one cell of voxels a point in it, which is the same question.
+  glm::dvec3 map_low, map_high;
 };
 using Found = std::array<std::uint32_t, kMostFound>;
 
@@ -77,7 +79,7 @@ class Bench {
   void update_voxels(const std::function<void(OccupancyRow)>& add);
   void update_body(const std::function<void(OccupancyRow)>& add);
 
-  // The box about a place, and for voxels the cells it touches: the same points lie in these for every
+  // Whole cells about a place: the same points lie in these for every engine.
   // engine.
   [[nodiscard]] Box box_about(const glm::dvec3& p, int box_cells) const;
   [[nodiscard]] std::size_t ask(OccupancyEngine engine, const Box& box, Found& out) const;
@@ -161,7 +163,8 @@ Box Bench::box_about(const glm::dvec3& p, int box_cells) const {
   // A hair within the cells' faces, where no voxel is.
   const glm::dvec3 middle = ball_.cell_m * (glm::dvec3(c[0], c[1], c[2]) + 0.5),
                    half(ball_.cell_m * (reach + 0.5 - 1e-3));
-  return {middle - half, middle + half};
+  const Box box{middle - half, middle + half, middle - half, middle + half};
+  return box_cells == 1 && voxels() ? Box{box.low, box.high, middle, middle} : box;
 }
 
 std::size_t Bench::ask_brute(const Box& box, Found& out) const {
@@ -180,10 +183,10 @@ std::size_t Bench::ask(OccupancyEngine engine, const Box& box, Found& out) const
   if (engine == OccupancyEngine::brute) return ask_brute(box, out);
   // Of triangles the map says whether there are any, and the tree ends with the first.
   if (!voxels()) {
-    if (engine == OccupancyEngine::map) return map_->rigid_in(box.low, box.high) != 0 ? 1 : 0;
+    if (engine == OccupancyEngine::map) return map_->rigid_in(box.map_low, box.map_high) != 0 ? 1 : 0;
     return tree_->in(box.low, box.high, std::span(out).first(1));
   }
-  return engine == OccupancyEngine::map ? map_->soft_in(box.low, box.high, out)
+  return engine == OccupancyEngine::map ? map_->soft_in(box.map_low, box.map_high, out)
                                         : tree_->in(box.low, box.high, out);
 }
 

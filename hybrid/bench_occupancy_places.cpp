@@ -112,18 +112,23 @@ std::vector<glm::dvec3> places(const OccupancyBall& ball, OccupancyPattern patte
   std::vector<glm::dvec3> at(count);
   SplitMix64 random(2);
   for (std::size_t n = 0; n < count; ++n) {
+    // A surface voxel's cell is about its middle, half a cell from where the lattice counts, and the
+    // outermost ones are up to a cell below the radius.
+    const double surface_m =
+        ball.what == OccupancyWhat::triangles ? ball.radius_m : ball.radius_m - 0.5 * kBallCell_m;
+    const glm::dvec3 middle(ball.what == OccupancyWhat::triangles ? 0.0 : 0.5 * kBallCell_m);
     if (pattern == OccupancyPattern::empty) {
       // About the box's corners: 1.2 to 1.4 radii from the middle, near its diagonals.
       const glm::dvec3 d = random.direction();
       const glm::dvec3 corner(d.x < 0.0 ? -1.0 : 1.0, d.y < 0.0 ? -1.0 : 1.0, d.z < 0.0 ? -1.0 : 1.0);
       at[n] = ball.radius_m * (1.2 + 0.2 * random.unit()) * glm::normalize(corner + 0.2 * d);
     } else if (pattern == OccupancyPattern::random) {
-      at[n] = ball.radius_m * random.direction();
+      at[n] = middle + surface_m * random.direction();
     } else {
       const double way = 0.2 * ball.cell_m / ball.radius_m * static_cast<double>(n);
       const double latitude = 0.2 + 0.3 * std::sin(0.37 * way);
-      at[n] = ball.radius_m * glm::dvec3(std::cos(latitude) * std::cos(way),
-                                         std::cos(latitude) * std::sin(way), std::sin(latitude));
+      at[n] = middle + surface_m * glm::dvec3(std::cos(latitude) * std::cos(way),
+                                              std::cos(latitude) * std::sin(way), std::sin(latitude));
     }
   }
   return at;

@@ -13,24 +13,6 @@ BrickIndex::BrickIndex(double cell_m, const glm::dvec3& origin)
   rehash(64);
 }
 
-std::uint32_t BrickIndex::hash(const CellCoordinates& c) noexcept {
-  // Three odd multipliers and a finaliser (Teschner et al. 2003 mix the same way, with worse low bits).
-  std::uint64_t h = static_cast<std::uint32_t>(c[0]) * 0x9E3779B97F4A7C15ULL ^
-                    static_cast<std::uint32_t>(c[1]) * 0xC2B2AE3D27D4EB4FULL ^
-                    static_cast<std::uint32_t>(c[2]) * 0x165667B19E3779F9ULL;
-  h ^= h >> 29;
-  h *= 0xBF58476D1CE4E5B9ULL;
-  return static_cast<std::uint32_t>(h >> 32);
-}
-
-std::uint32_t BrickIndex::find(const CellCoordinates& brick) const noexcept {
-  const std::size_t mask = table_.size() - 1;
-  for (std::size_t slot = hash(brick) & mask;; slot = (slot + 1) & mask) {
-    const Slot& s = table_[slot];
-    if (s.brick == kNone || s.at == brick) return s.brick;
-  }
-}
-
 std::uint32_t BrickIndex::find_or_add(const CellCoordinates& brick, bool may_allocate) {
   const std::size_t mask = table_.size() - 1;
   std::size_t slot = hash(brick) & mask;

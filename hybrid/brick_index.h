@@ -41,7 +41,8 @@ class BrickIndex {
     return {along(p.x - origin_.x), along(p.y - origin_.y), along(p.z - origin_.z)};
   }
   [[nodiscard]] CellRange cells_of(const glm::dvec3& low, const glm::dvec3& high) const noexcept {
-    return {cell_of(low), cell_of(high)};
+    const CellCoordinates first = cell_of(low);
+    return {first, low == high ? first : cell_of(high)};
   }
   [[nodiscard]] static CellCoordinates brick_of(const CellCoordinates& cell) noexcept {
     return {cell[0] >> kShift, cell[1] >> kShift, cell[2] >> kShift};
@@ -63,7 +64,13 @@ class BrickIndex {
   }
 
   // Numbers run from 0 in order of appearance; kNone: there is no such brick.
-  [[nodiscard]] std::uint32_t find(const CellCoordinates& brick) const noexcept;
+  [[nodiscard]] std::uint32_t find(const CellCoordinates& brick) const noexcept {
+    const std::size_t mask = table_.size() - 1;
+    for (std::size_t slot = hash(brick) & mask;; slot = (slot + 1) & mask) {
+      const Slot& s = table_[slot];
+      if (s.brick == kNone || s.at == brick) return s.brick;
+    }
+  }
   // kNone only when it may not allocate and there is no room. Numbers that were released come first.
   std::uint32_t find_or_add(const CellCoordinates& brick, bool may_allocate);
   // The brick is no more: its number and its room are the next new brick's. Allocates nothing.
@@ -99,6 +106,11 @@ class BrickIndex {
     if (!perhaps(low, high)) return;
     const CellRange cells = cells_of(low, high);
     const CellCoordinates a = brick_of(cells.low), b = brick_of(cells.high);
+    if (a == b) {  // one brick: a point, and most small boxes
+      const std::uint32_t n = find(a);
+      if (n != kNone) visit(n, cells);
+      return;
+    }
     double bricks = 1.0;
     for (std::size_t d = 0; d < 3; ++d) bricks *= std::max(0.0, static_cast<double>(b[d]) - a[d] + 1.0);
     if (bricks > static_cast<double>(at_.size())) {
@@ -151,7 +163,15 @@ class BrickIndex {
     }
     return part;
   }
-  [[nodiscard]] static std::uint32_t hash(const CellCoordinates& c) noexcept;
+  [[nodiscard]] static std::uint32_t hash(const CellCoordinates& c) noexcept {
+    // Three odd multipliers and a finaliser (Teschner et al. 2003 mix the same way, with worse low bits).
+    std::uint64_t h = static_cast<std::uint32_t>(c[0]) * 0x9E3779B97F4A7C15ULL ^
+                      static_cast<std::uint32_t>(c[1]) * 0xC2B2AE3D27D4EB4FULL ^
+                      static_cast<std::uint32_t>(c[2]) * 0x165667B19E3779F9ULL;
+    h ^= h >> 29;
+    h *= 0xBF58476D1CE4E5B9ULL;
+    return static_cast<std::uint32_t>(h >> 32);
+  }
   [[nodiscard]] std::int32_t unit_of(std::int32_t brick, std::size_t axis) const noexcept {
     return std::clamp((brick >> unit_shift_) - first_unit_[axis], 0, kUnits - 1);
   }

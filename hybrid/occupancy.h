@@ -42,7 +42,8 @@ class OccupancyMap {
   void place(std::uint32_t number, const glm::dvec3& position);
   // Room for motion: bricks may grow by this many without allocating. Call once, after everything is placed.
   // Voxels need no more than one brick each, and a brick that the last one leaves is room again: however long
-  // they wander, only how many bricks they are in at one time counts.
+  // they wander, only how many bricks (and blocks of them, of which there are four for each) they are in at
+  // one time counts.
   void reserve_bricks(std::size_t more);
 
   // ---- in the tick; these do not allocate ----
@@ -78,26 +79,49 @@ class OccupancyMap {
 
  private:
   static constexpr int kCells = BrickIndex::kCells;
-  struct alignas(64) SoftBrick {  // 33 cache lines, of which a question reads the first and those it needs
-    std::array<std::uint64_t, BrickIndex::kEdge> layer{};  // [z], bit x + 8 y: the cell is occupied
-    // [x + 8 y + 64 z] the cell's first soft voxel. What is not occupied has no meaning: a brick need not be
-    // written over when it is used again.
-    std::array<std::uint32_t, kCells> head;
+  // Of a soft brick's cells only those blocks have room for voxels in which some are: a surface passes
+  // through about half of them.
+  static constexpr int kBlockShift = 2, kBlocks = 8, kBlockCells = kCells / kBlocks;  // 4 x 4 x 4 cells
+  struct BlockOfBrick {
+    std::uint64_t occupied = 0;  // bit x + 4 y + 16 z: the cell is
+    std::uint32_t number = 0;    // of soft_blocks_, where any cell is occupied
   };
-  static_assert(sizeof(SoftBrick) == 33 * 64);
+  struct alignas(64) SoftBrick {  // what is known of a block lies in one cache line
+    std::array<BlockOfBrick, kBlocks> block{};
+  };
+  static_assert(sizeof(SoftBrick) == 128);
+  // [cell] a link to its first soft voxel. What is not occupied has no meaning: nothing is written over when
+  // a block is used again.
+  using SoftBlock = std::array<std::uint32_t, kBlockCells>;
+  // A link is a voxel's number and whether there is another after it: then next_ has the link to that one,
+  // and where a voxel is alone in its cell, as nearly all are, next_ is not read.
+  static constexpr std::uint32_t kMore = 0x80000000U, kNumber = kMore - 1;
+  struct Within {  // a brick
+    std::uint32_t block, cell;
+  };
+  [[nodiscard]] static Within within_brick(const CellCoordinates& cell) noexcept {
+    const auto part = [&cell](std::size_t d) {
+      return static_cast<std::uint32_t>(cell[d] & (BrickIndex::kEdge - 1));
+    };
+    const std::uint32_t x = part(0), y = part(1), z = part(2);
+    return {(x >> 2) + 2 * (y >> 2) + 4 * (z >> 2), (x & 3) + 4 * (y & 3) + 16 * (z & 3)};
+  }
 
   void put(std::uint32_t number, const glm::dvec3& position, bool may_allocate);
-  // Out of its cell, which may leave an empty brick; then release_if_empty().
-  void unlink(std::uint32_t number) noexcept;
-  void release_if_empty(std::uint32_t brick) noexcept;
-  [[nodiscard]] bool alone_in_brick(std::uint32_t number) const noexcept;
+  // Out of its cell; a block and a brick that are then empty are room again.
+  void take_out(std::uint32_t number) noexcept;
+  // False: there is no room, and nothing was changed.
+  bool put_in(std::uint32_t number, const CellCoordinates& brick, const Within& at, bool may_allocate);
 
   SurfaceCells fixed_;
   MovingCells moving_;
   BrickIndex soft_index_;
-  std::vector<SoftBrick> soft_bricks_;    // [brick of soft_index_]
-  std::vector<std::uint32_t> next_;       // [soft number] next in its cell
-  std::vector<std::uint32_t> soft_cell_;  // [soft number] brick · kCells + cell, or kNone
+  std::vector<SoftBrick> soft_bricks_;  // [brick of soft_index_]
+  std::vector<SoftBlock> soft_blocks_;  // [number]; of free ones the first entry is the next free one
+  std::uint32_t free_block_ = kNone;
+  std::vector<std::uint32_t> next_;  // [soft number] link to the next in its cell, if any
+  std::vector<std::uint32_t>
+      soft_cell_;  // [soft number] brick · kCells + block · kBlockCells + cell, or kNone
   std::uint64_t overflows_ = 0;
 };
 
