@@ -118,10 +118,11 @@ std::vector<glm::dvec3> places(const OccupancyBall& ball, OccupancyPattern patte
         ball.what == OccupancyWhat::triangles ? ball.radius_m : ball.radius_m - 0.5 * kBallCell_m;
     const glm::dvec3 middle(ball.what == OccupancyWhat::triangles ? 0.0 : 0.5 * kBallCell_m);
     if (pattern == OccupancyPattern::empty) {
-      // About the box's corners: 1.2 to 1.4 radii from the middle, near its diagonals.
+      // About the box's corners: 1.2 to 1.4 radii from the middle, and further from a small ball.
       const glm::dvec3 d = random.direction();
       const glm::dvec3 corner(d.x < 0.0 ? -1.0 : 1.0, d.y < 0.0 ? -1.0 : 1.0, d.z < 0.0 ? -1.0 : 1.0);
-      at[n] = ball.radius_m * (1.2 + 0.2 * random.unit()) * glm::normalize(corner + 0.2 * d);
+      at[n] = std::max(ball.radius_m * (1.2 + 0.2 * random.unit()), ball.radius_m + 8.0 * ball.cell_m) *
+              glm::normalize(corner + 0.2 * d);
     } else if (pattern == OccupancyPattern::random) {
       at[n] = middle + surface_m * random.direction();
     } else {

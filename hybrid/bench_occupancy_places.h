@@ -34,8 +34,8 @@ OccupancyBall make_ball(OccupancyWhat what, std::size_t count);
 OccupancyBall make_ball_surface_of(std::size_t count);
 
 // Middles of boxes to ask about. Coherent: along the surface in steps of a fifth of a cell, as a tool at
-// 0.2 m/s does in a tick of 1 ms. Random: anywhere on the surface. Empty: within the ball's bounding box and
-// far outside of the ball.
+// 0.2 m/s does in a tick of 1 ms. Random: anywhere on the surface. Empty: outside of the ball, most
+// of it within its bounding box.
 std::vector<glm::dvec3> places(const OccupancyBall& ball, OccupancyPattern pattern, std::size_t count);
 
 }  // namespace hybrid::bench

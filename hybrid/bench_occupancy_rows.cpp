@@ -11,7 +11,7 @@ namespace {
 std::string time_text(double ns) {
   return ns < 100.0 ? fmt::format("{:.1f}", ns)
          : ns < 1e5 ? fmt::format("{:.0f}", ns)
-         : ns < 1e8 ? fmt::format("{:.4g}k", ns / 1e3)
+         : ns < 1e7 ? fmt::format("{:.0f}k", ns / 1e3)
                     : fmt::format("{:.4g}M", ns / 1e6);
 }
 
