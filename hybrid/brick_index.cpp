@@ -13,29 +13,20 @@ BrickIndex::BrickIndex(double cell_m, const glm::dvec3& origin)
   rehash(64);
 }
 
-std::uint32_t BrickIndex::hash(const CellCoordinates& c) noexcept {
-  // Three odd multipliers and a finaliser (Teschner et al. 2003 mix the same way, with worse low bits).
-  std::uint64_t h = static_cast<std::uint32_t>(c[0]) * 0x9E3779B97F4A7C15ULL ^
-                    static_cast<std::uint32_t>(c[1]) * 0xC2B2AE3D27D4EB4FULL ^
-                    static_cast<std::uint32_t>(c[2]) * 0x165667B19E3779F9ULL;
-  h ^= h >> 29;
-  h *= 0xBF58476D1CE4E5B9ULL;
-  return static_cast<std::uint32_t>(h >> 32);
-}
-
-std::uint32_t BrickIndex::find(const CellCoordinates& brick) const noexcept {
-  const std::size_t mask = table_.size() - 1;
-  for (std::size_t slot = hash(brick) & mask;; slot = (slot + 1) & mask) {
-    const Slot& s = table_[slot];
-    if (s.brick == kNone || s.at == brick) return s.brick;
-  }
-}
-
 std::uint32_t BrickIndex::find_or_add(const CellCoordinates& brick, bool may_allocate) {
   const std::size_t mask = table_.size() - 1;
   std::size_t slot = hash(brick) & mask;
   for (; table_[slot].brick != kNone; slot = (slot + 1) & mask) {
     if (table_[slot].at == brick) return table_[slot].brick;
+  }
+  if (last_released_ != kNone) {
+    const std::uint32_t again = last_released_;
+    last_released_ = static_cast<std::uint32_t>(at_[again][1]);
+    --released_;
+    at_[again] = brick;
+    table_[slot] = {brick, again};
+    mark(brick);
+    return again;
   }
   const auto added = static_cast<std::uint32_t>(at_.size());
   const bool table_full = (at_.size() + 1) * 2 > table_.size();
@@ -50,9 +41,30 @@ std::uint32_t BrickIndex::find_or_add(const CellCoordinates& brick, bool may_all
   return added;
 }
 
+void BrickIndex::release(std::uint32_t brick) noexcept {
+  const CellCoordinates at = at_[brick];
+  const std::size_t mask = table_.size() - 1;
+  std::size_t hole = hash(at) & mask;
+  while (table_[hole].brick != brick) hole = (hole + 1) & mask;
+  // No tombstones, which would fill the table in a long session: what a probe finds beyond the hole moves up
+  // into it, unless its own place lies between (Knuth, The Art of Computer Programming 3, 6.4 R).
+  for (std::size_t slot = (hole + 1) & mask; table_[slot].brick != kNone; slot = (slot + 1) & mask) {
+    const std::size_t home = hash(table_[slot].at) & mask;
+    if (((slot - home) & mask) < ((slot - hole) & mask)) continue;
+    table_[hole] = table_[slot];
+    hole = slot;
+  }
+  table_[hole] = Slot{};
+  at_[brick] = {kReleased, static_cast<std::int32_t>(last_released_), 0};
+  last_released_ = brick;
+  ++released_;
+  unmark(at);
+}
+
 void BrickIndex::rehash(std::size_t capacity) {
   table_.assign(capacity, Slot{});
   for (std::uint32_t b = 0; b < at_.size(); ++b) {
+    if (at_[b][0] == kReleased) continue;
     std::size_t slot = hash(at_[b]) & (capacity - 1);
     while (table_[slot].brick != kNone) slot = (slot + 1) & (capacity - 1);
     table_[slot] = {at_[b], b};
@@ -67,8 +79,11 @@ void BrickIndex::seal(std::size_t more) {
   rehash(capacity);
 
   CellCoordinates low{}, high{};
-  if (!at_.empty()) low = high = at_.front();
+  bool first = true;
   for (const CellCoordinates& b : at_) {
+    if (b[0] == kReleased) continue;
+    if (first) low = high = b;
+    first = false;
     for (std::size_t d = 0; d < 3; ++d) {
       low[d] = std::min(low[d], b[d]);
       high[d] = std::max(high[d], b[d]);
@@ -88,12 +103,36 @@ void BrickIndex::seal(std::size_t more) {
   }
   units_per_cell_ = std::ldexp(1.0, -(kShift + unit_shift_));
   bitmap_.assign(static_cast<std::size_t>(kUnits) * kUnits, 0);
-  for (const CellCoordinates& b : at_) mark(b);
+  for (const CellCoordinates& b : at_) {
+    if (b[0] != kReleased) mark(b);
+  }
 }
 
 void BrickIndex::mark(const CellCoordinates& brick) noexcept {
   if (bitmap_.empty()) return;
   bitmap_[word(unit_of(brick[2], 2), unit_of(brick[1], 1))] |= 1ULL << unit_of(brick[0], 0);
+}
+
+void BrickIndex::unmark(const CellCoordinates& brick) noexcept {
+  // A bit too many costs a probe of the table and no more. It stays where finding out would cost many: in
+  // units of many bricks, and in the outermost, which are also all that lies further out.
+  constexpr int kMostShift = 2;
+  if (bitmap_.empty() || unit_shift_ > kMostShift) return;
+  for (std::size_t d = 0; d < 3; ++d) {
+    const std::int32_t unit = unit_of(brick[d], d);
+    if (unit == 0 || unit == kUnits - 1) return;
+  }
+  CellCoordinates low{}, c{};
+  for (std::size_t d = 0; d < 3; ++d) low[d] = (brick[d] >> unit_shift_) * (1 << unit_shift_);
+  const std::int32_t edge = 1 << unit_shift_;
+  for (c[2] = low[2]; c[2] < low[2] + edge; ++c[2]) {
+    for (c[1] = low[1]; c[1] < low[1] + edge; ++c[1]) {
+      for (c[0] = low[0]; c[0] < low[0] + edge; ++c[0]) {
+        if (find(c) != kNone) return;
+      }
+    }
+  }
+  bitmap_[word(unit_of(brick[2], 2), unit_of(brick[1], 1))] &= ~(1ULL << unit_of(brick[0], 0));
 }
 
 std::size_t BrickIndex::memory_bytes() const noexcept {

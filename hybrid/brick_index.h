@@ -12,6 +12,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <limits>
 #include <vector>
 
 namespace hybrid {
@@ -40,7 +41,8 @@ class BrickIndex {
     return {along(p.x - origin_.x), along(p.y - origin_.y), along(p.z - origin_.z)};
   }
   [[nodiscard]] CellRange cells_of(const glm::dvec3& low, const glm::dvec3& high) const noexcept {
-    return {cell_of(low), cell_of(high)};
+    const CellCoordinates first = cell_of(low);
+    return {first, low == high ? first : cell_of(high)};
   }
   [[nodiscard]] static CellCoordinates brick_of(const CellCoordinates& cell) noexcept {
     return {cell[0] >> kShift, cell[1] >> kShift, cell[2] >> kShift};
@@ -51,11 +53,30 @@ class BrickIndex {
                                       (cell[2] & mask) * kEdge * kEdge);
   }
 
+  // Of a layer of a brick (one z), bit x + 8 y: the cells x low to high and y low to high of a part of it.
+  [[nodiscard]] static std::uint64_t layer_mask(const CellRange& part) noexcept {
+    constexpr std::int32_t in_brick = kEdge - 1;
+    const std::int32_t x0 = part.low[0] & in_brick, x1 = part.high[0] & in_brick, y0 = part.low[1] & in_brick,
+                       y1 = part.high[1] & in_brick;
+    const std::uint64_t row = (0xFFULL << x0) & (0xFFULL >> (in_brick - x1));
+    const std::uint64_t rows = (~0ULL << (8 * y0)) & (~0ULL >> (8 * (in_brick - y1)));
+    return row * 0x0101010101010101ULL & rows;
+  }
+
   // Numbers run from 0 in order of appearance; kNone: there is no such brick.
-  [[nodiscard]] std::uint32_t find(const CellCoordinates& brick) const noexcept;
-  // kNone only when it may not allocate and there is no room.
+  [[nodiscard]] std::uint32_t find(const CellCoordinates& brick) const noexcept {
+    const std::size_t mask = table_.size() - 1;
+    for (std::size_t slot = hash(brick) & mask;; slot = (slot + 1) & mask) {
+      const Slot& s = table_[slot];
+      if (s.brick == kNone || s.at == brick) return s.brick;
+    }
+  }
+  // kNone only when it may not allocate and there is no room. Numbers that were released come first.
   std::uint32_t find_or_add(const CellCoordinates& brick, bool may_allocate);
-  [[nodiscard]] std::size_t size() const noexcept { return at_.size(); }
+  // The brick is no more: its number and its room are the next new brick's. Allocates nothing.
+  void release(std::uint32_t brick) noexcept;
+  [[nodiscard]] std::size_t size() const noexcept { return at_.size(); }  // numbers ever given
+  [[nodiscard]] std::size_t live() const noexcept { return at_.size() - released_; }
   [[nodiscard]] const CellCoordinates& at(std::uint32_t brick) const noexcept { return at_[brick]; }
 
   // Room for so many more bricks without allocating, and the bitmap over those that exist. Bricks may be
@@ -85,6 +106,11 @@ class BrickIndex {
     if (!perhaps(low, high)) return;
     const CellRange cells = cells_of(low, high);
     const CellCoordinates a = brick_of(cells.low), b = brick_of(cells.high);
+    if (a == b) {  // one brick: a point, and most small boxes
+      const std::uint32_t n = find(a);
+      if (n != kNone) visit(n, cells);
+      return;
+    }
     double bricks = 1.0;
     for (std::size_t d = 0; d < 3; ++d) bricks *= std::max(0.0, static_cast<double>(b[d]) - a[d] + 1.0);
     if (bricks > static_cast<double>(at_.size())) {
@@ -114,6 +140,9 @@ class BrickIndex {
  private:
   static constexpr double kFarthestCell = 1e9;
   static constexpr std::int32_t kUnits = 64;  // of the bitmap, along an edge
+  // In place of the first coordinate of a released brick: no cell is there. The second is the number that was
+  // released before it.
+  static constexpr std::int32_t kReleased = std::numeric_limits<std::int32_t>::min();
   struct Slot {
     CellCoordinates at{};
     std::uint32_t brick = kNone;
@@ -134,7 +163,15 @@ class BrickIndex {
     }
     return part;
   }
-  [[nodiscard]] static std::uint32_t hash(const CellCoordinates& c) noexcept;
+  [[nodiscard]] static std::uint32_t hash(const CellCoordinates& c) noexcept {
+    // Three odd multipliers and a finaliser (Teschner et al. 2003 mix the same way, with worse low bits).
+    std::uint64_t h = static_cast<std::uint32_t>(c[0]) * 0x9E3779B97F4A7C15ULL ^
+                      static_cast<std::uint32_t>(c[1]) * 0xC2B2AE3D27D4EB4FULL ^
+                      static_cast<std::uint32_t>(c[2]) * 0x165667B19E3779F9ULL;
+    h ^= h >> 29;
+    h *= 0xBF58476D1CE4E5B9ULL;
+    return static_cast<std::uint32_t>(h >> 32);
+  }
   [[nodiscard]] std::int32_t unit_of(std::int32_t brick, std::size_t axis) const noexcept {
     return std::clamp((brick >> unit_shift_) - first_unit_[axis], 0, kUnits - 1);
   }
@@ -156,10 +193,13 @@ class BrickIndex {
   }
   void rehash(std::size_t capacity);
   void mark(const CellCoordinates& brick) noexcept;
+  void unmark(const CellCoordinates& brick) noexcept;
 
   double cell_m_, per_cell_;
   glm::dvec3 origin_;
-  std::vector<CellCoordinates> at_;    // [brick]
+  std::vector<CellCoordinates> at_;  // [brick], released ones too
+  std::uint32_t last_released_ = kNone;
+  std::size_t released_ = 0;
   std::vector<Slot> table_;            // open addressing, linear probing, at most half full
   std::vector<std::uint64_t> bitmap_;  // [z][y], bit x; empty until sealed
   CellCoordinates first_unit_{};

@@ -5,9 +5,11 @@
 #include <cstdio>
 #include <stdexcept>
 
+#include "hybrid/bench_occupancy.h"
 #include "hybrid/bench_rigid.h"
 #include "hybrid/bench_soft.h"
 #include "hybrid/commands.h"
+#include "hybrid/occupancy_plot.h"
 #include "hybrid/report.h"
 #include "hybrid/settling_plot.h"
 
@@ -121,6 +123,46 @@ nlohmann::ordered_json soft_suite(const BenchCommand& command, std::FILE* words,
   return json;
 }
 
+// Each suite's own name for the plot, where several write one.
+std::filesystem::path occupancy_plot(const BenchCommand& command) {
+  if (command.plot.empty() || command.suite != "all") return command.plot;
+  std::filesystem::path plot = command.plot;
+  return plot.replace_filename(plot.stem().string() + "-occupancy" + plot.extension().string());
+}
+
+nlohmann::ordered_json occupancy_suite(const BenchCommand& command, std::FILE* words) {
+  bench::OccupancyBenchOptions options{.quick = command.quick,
+                                       .cases = chosen_of(command.only, bench::occupancy_cases()),
+                                       .engines = {},
+                                       .cells = command.cells,
+                                       .progress = progress_on_terminal(),
+                                       .on_row = {}};
+  for (const bench::OccupancyEngine engine : bench::kOccupancyEngines) {
+    if (!chosen_of(command.engines, {bench::engine_name(engine)}).empty()) options.engines.push_back(engine);
+  }
+  options.on_row = [words](const bench::OccupancyRow& row) {
+    end_progress();
+    fmt::print(words, "{}", bench::occupancy_table_line(row));
+    std::fflush(words);
+  };
+  fmt::print(
+      words,
+      "times in ns (k us, M ms), each the mean over 64 operations, but of brute force's look-ups, of "
+      "rebuilds and of the tree's updates, which are timed alone; 'box' in cells an edge; 'extra' is what "
+      "lies within a cell of the box\n{}",
+      bench::occupancy_table_head());
+  const std::vector<bench::OccupancyRow> rows = bench::bench_occupancy(options);
+  end_progress();
+  fmt::print(words, "\n{}", bench::occupancy_summary(rows));
+  if (const std::filesystem::path plot = occupancy_plot(command); !plot.empty()) {
+    save_occupancy_plot(plot, rows);
+    fmt::print(words, "plot: {}\n", plot.string());
+  }
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (const bench::OccupancyRow& row : rows) json.push_back(bench::to_json(row));
+  return json;
+}
+
 // A suite is left out of "all" where everything chosen belongs to others.
 bool has_work(const BenchCommand& command, const std::vector<std::string>& cases,
               const std::vector<std::string>& engines) {
@@ -145,18 +187,21 @@ std::string listed(const std::vector<std::string>& names) {
 }  // namespace
 
 const std::vector<std::string>& bench_suites() {
-  static const std::vector<std::string> kSuites{"rigid", "soft"};
+  static const std::vector<std::string> kSuites{"rigid", "soft", "occupancy"};
   return kSuites;
 }
 std::vector<std::string> bench_parts() {
   std::vector<std::string> parts = bench::rigid_paths();
   parts.insert(parts.end(), bench::soft_cases().begin(), bench::soft_cases().end());
+  parts.insert(parts.end(), bench::occupancy_cases().begin(), bench::occupancy_cases().end());
   return parts;
 }
 std::vector<std::string> bench_engines() {
   std::vector<std::string> names = names_of(bench::kEngines);
-  for (const std::string& name : names_of(bench::kSoftEngines)) {
-    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+  for (const auto& more : {names_of(bench::kSoftEngines), names_of(bench::kOccupancyEngines)}) {
+    for (const std::string& name : more) {
+      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+    }
   }
   return names;
 }
@@ -188,13 +233,17 @@ int run_bench(const BenchCommand& command) {
     report["growth"] = growth;
     any = true;
   }
+  if (runs("occupancy") && has_work(command, bench::occupancy_cases(), names_of(bench::kOccupancyEngines))) {
+    report["suites"]["occupancy"] = occupancy_suite(command, words);
+    any = true;
+  }
   if (!any) {
     throw std::invalid_argument(fmt::format(
         "bench {}: nothing of --only or --engines belongs to it; paths and engines of rigid are {} and {}, "
-        "cases and "
-        "engines of soft {} and {}",
+        "cases and engines of soft {} and {}, of occupancy {} and {}",
         command.suite, listed(bench::rigid_paths()), listed(names_of(bench::kEngines)),
-        listed(bench::soft_cases()), listed(names_of(bench::kSoftEngines))));
+        listed(bench::soft_cases()), listed(names_of(bench::kSoftEngines)), listed(bench::occupancy_cases()),
+        listed(names_of(bench::kOccupancyEngines))));
   }
   if (!command.json.empty()) save_json(command.json, report);
   return 0;

@@ -67,15 +67,16 @@ struct BenchCommand {
   bool quick = false, every_tick = false;
   std::vector<std::string> only, meshes, engines;  // empty: the suite's own choice
   std::vector<int> sizes;                          // of soft: voxels an edge; empty: its own choice
+  std::vector<std::size_t> cells;                  // of occupancy: occupied cells; empty: its own choice
   std::optional<double> session_s;                 // of soft: simulated time of a session
   std::filesystem::path trace;                     // folder; empty: none
-  std::filesystem::path plot;                      // of soft: relaxation round by round; empty: none
+  std::filesystem::path plot;  // of soft: relaxation round by round; of occupancy: times; empty: none
   std::string json;
 };
 int run_bench(const BenchCommand& command);
 // What may be asked for, so that a wrong word is refused with the right ones.
 const std::vector<std::string>& bench_suites();
-std::vector<std::string> bench_parts();  // paths of rigid, cases of soft
+std::vector<std::string> bench_parts();  // paths of rigid, cases of soft and occupancy
 std::vector<std::string> bench_engines();
 std::string bench_mesh_error(const std::string& name);  // empty: there is such a mesh
 

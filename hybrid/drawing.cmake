@@ -12,6 +12,7 @@ add_library(hybrid_drawing STATIC
   ${CMAKE_CURRENT_LIST_DIR}/draw_geometry.cpp
   ${CMAKE_CURRENT_LIST_DIR}/felt_geometry.cpp
   ${CMAKE_CURRENT_LIST_DIR}/renderer.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/occupancy_plot.cpp
   ${CMAKE_CURRENT_LIST_DIR}/overlay.cpp
   ${CMAKE_CURRENT_LIST_DIR}/frame_painter.cpp
   ${CMAKE_CURRENT_LIST_DIR}/png_file.cpp

@@ -166,7 +166,7 @@ void add_bench(CLI::App& app, int& status) {
   sub->add_option("SUITE", c->suite, "what to time")->required()->check(CLI::IsMember(suites));
   sub->add_flag("--quick", c->quick, "a short piece of each path on small meshes; a few seconds");
   sub->add_flag("--every-tick", c->every_tick, "ask the exact reference at every tick; slow");
-  sub->add_option("--only", c->only, "paths of rigid, cases of soft, with commas between")
+  sub->add_option("--only", c->only, "paths of rigid, cases of soft and occupancy, with commas between")
       ->delimiter(',')
       ->check(CLI::IsMember(hybrid::bench_parts()));
   sub->add_option("--meshes", c->meshes,
@@ -177,13 +177,18 @@ void add_bench(CLI::App& app, int& status) {
   sub->add_option("--sizes", c->sizes, "of soft: voxels an edge of sessions and loads, with commas between")
       ->delimiter(',')
       ->check(CLI::Range(16, 1024));
+  sub->add_option("--cells", c->cells, "of occupancy: occupied cells, about, with commas between")
+      ->delimiter(',')
+      ->check(CLI::Range(100, 20'000'000));
   sub->add_option("--seconds", c->session_s, "of soft: simulated time of a session")
       ->check(CLI::Range(0.1, 3600.0));
   sub->add_option("--engines", c->engines, "engines, with commas between")
       ->delimiter(',')
       ->check(CLI::IsMember(hybrid::bench_engines()));
   sub->add_option("--trace", c->trace, "write every run as CSV into this folder");
-  sub->add_option("--plot", c->plot, "of soft: write relaxation round by round, classic's and ours, as SVG");
+  sub->add_option("--plot", c->plot,
+                  "as SVG: of soft relaxation round by round, classic's and ours; of occupancy look-ups over "
+                  "cells (with all: beside it, NAME-occupancy.svg)");
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
   sub->callback([c, &status] { status = hybrid::run_bench(*c); });
 }

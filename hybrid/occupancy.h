@@ -41,6 +41,9 @@ class OccupancyMap {
   std::uint32_t add_soft(std::uint32_t count);
   void place(std::uint32_t number, const glm::dvec3& position);
   // Room for motion: bricks may grow by this many without allocating. Call once, after everything is placed.
+  // Voxels need no more than one brick each, and a brick that the last one leaves is room again: however long
+  // they wander, only how many bricks (and blocks of them, of which there are four for each) they are in at
+  // one time counts.
   void reserve_bricks(std::size_t more);
 
   // ---- in the tick; these do not allocate ----
@@ -60,6 +63,8 @@ class OccupancyMap {
   [[nodiscard]] double cell_m() const { return fixed_.cell_m(); }
   [[nodiscard]] std::size_t occupied_cells() const noexcept;
   [[nodiscard]] std::size_t memory_bytes() const;
+  // Bricks in which soft voxels are: never an empty one.
+  [[nodiscard]] std::size_t soft_bricks() const noexcept { return soft_index_.live(); }
   // Moves that found no room for a brick: raise the reserve. The voxel stays known at its last cell.
   [[nodiscard]] std::uint64_t overflows() const { return overflows_; }
   // Of moving bodies: districts entered or left since they were added.
@@ -74,21 +79,49 @@ class OccupancyMap {
 
  private:
   static constexpr int kCells = BrickIndex::kCells;
-  struct SoftBrick {
-    std::uint32_t count = 0;
-    std::array<std::uint32_t, kCells> head{};  // first soft voxel of the cell, or kNone
+  // Of a soft brick's cells only those blocks have room for voxels in which some are: a surface passes
+  // through about half of them.
+  static constexpr int kBlockShift = 2, kBlocks = 8, kBlockCells = kCells / kBlocks;  // 4 x 4 x 4 cells
+  struct BlockOfBrick {
+    std::uint64_t occupied = 0;  // bit x + 4 y + 16 z: the cell is
+    std::uint32_t number = 0;    // of soft_blocks_, where any cell is occupied
   };
+  struct alignas(64) SoftBrick {  // what is known of a block lies in one cache line
+    std::array<BlockOfBrick, kBlocks> block{};
+  };
+  static_assert(sizeof(SoftBrick) == 128);
+  // [cell] a link to its first soft voxel. What is not occupied has no meaning: nothing is written over when
+  // a block is used again.
+  using SoftBlock = std::array<std::uint32_t, kBlockCells>;
+  // A link is a voxel's number and whether there is another after it: then next_ has the link to that one,
+  // and where a voxel is alone in its cell, as nearly all are, next_ is not read.
+  static constexpr std::uint32_t kMore = 0x80000000U, kNumber = kMore - 1;
+  struct Within {  // a brick
+    std::uint32_t block, cell;
+  };
+  [[nodiscard]] static Within within_brick(const CellCoordinates& cell) noexcept {
+    const auto part = [&cell](std::size_t d) {
+      return static_cast<std::uint32_t>(cell[d] & (BrickIndex::kEdge - 1));
+    };
+    const std::uint32_t x = part(0), y = part(1), z = part(2);
+    return {(x >> 2) + 2 * (y >> 2) + 4 * (z >> 2), (x & 3) + 4 * (y & 3) + 16 * (z & 3)};
+  }
 
   void put(std::uint32_t number, const glm::dvec3& position, bool may_allocate);
-  // The soft layer's part in any_near().
-  [[nodiscard]] bool soft_near(const glm::dvec3& low, const glm::dvec3& high) const noexcept;
+  // Out of its cell; a block and a brick that are then empty are room again.
+  void take_out(std::uint32_t number) noexcept;
+  // False: there is no room, and nothing was changed.
+  bool put_in(std::uint32_t number, const CellCoordinates& brick, const Within& at, bool may_allocate);
 
   SurfaceCells fixed_;
   MovingCells moving_;
   BrickIndex soft_index_;
-  std::vector<SoftBrick> soft_bricks_;    // [brick of soft_index_]
-  std::vector<std::uint32_t> next_;       // [soft number] next in its cell
-  std::vector<std::uint32_t> soft_cell_;  // [soft number] brick · kCells + cell, or kNone
+  std::vector<SoftBrick> soft_bricks_;  // [brick of soft_index_]
+  std::vector<SoftBlock> soft_blocks_;  // [number]; of free ones the first entry is the next free one
+  std::uint32_t free_block_ = kNone;
+  std::vector<std::uint32_t> next_;  // [soft number] link to the next in its cell, if any
+  std::vector<std::uint32_t>
+      soft_cell_;  // [soft number] brick · kCells + block · kBlockCells + cell, or kNone
   std::uint64_t overflows_ = 0;
 };
 

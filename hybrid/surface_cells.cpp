@@ -36,16 +36,6 @@ bool triangle_touches_box(const std::array<glm::dvec3, 3>& t, const glm::dvec3& 
   return !separates(glm::cross(e[0], e[1]));
 }
 
-// Cells x low to high and y low to high of a layer, all within one brick.
-std::uint64_t layer_mask(const CellRange& part) {
-  constexpr std::int32_t in_brick = kEdge - 1;
-  const std::int32_t x0 = part.low[0] & in_brick, x1 = part.high[0] & in_brick, y0 = part.low[1] & in_brick,
-                     y1 = part.high[1] & in_brick;
-  const std::uint64_t row = (0xFFULL << x0) & (0xFFULL >> (in_brick - x1));
-  const std::uint64_t rows = (~0ULL << (8 * y0)) & (~0ULL >> (8 * (in_brick - y1)));
-  return row * 0x0101010101010101ULL & rows;
-}
-
 std::uint64_t bit_in_layer(const CellCoordinates& cell) {
   constexpr std::int32_t in_brick = kEdge - 1;
   return 1ULL << ((cell[0] & in_brick) + kEdge * (cell[1] & in_brick));
@@ -144,7 +134,7 @@ std::uint64_t SurfaceCells::objects_in(const glm::dvec3& low, const glm::dvec3& 
   index_.each(low, high, [&](std::uint32_t n, const CellRange& part) {
     const Brick& brick = bricks_[n];
     if ((brick.objects & ~objects) == 0) return true;
-    const std::uint64_t mask = layer_mask(part);
+    const std::uint64_t mask = BrickIndex::layer_mask(part);
     const std::size_t last = layer_of(part.high);
     for (std::size_t z = layer_of(part.low); z <= last; ++z) {
       if ((brick.layer[z] & mask) == 0) continue;

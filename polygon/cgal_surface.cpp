@@ -12,7 +12,9 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <numeric>
 #include <span>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -341,7 +343,87 @@ std::size_t CgalSurface::memory_bytes() const noexcept {
          vertex_normals_.capacity() * sizeof(glm::vec3);
 }
 
+// A point that is an index, as IndexedTriangle is for triangles.
+class IndexedPoint {
+ public:
+  using Id = std::uint32_t;
+  using Point = Kernel::Point_3;
+  using Point_reference = Point;
+  using Datum = Point;
+  using Datum_reference = Datum;
+  using Shared_data = const glm::dvec3*;
+
+  IndexedPoint() = default;
+  IndexedPoint(std::vector<std::uint32_t>::const_iterator id, Shared_data /*points*/) : id_(*id) {}
+  [[nodiscard]] Id id() const { return id_; }
+  [[nodiscard]] Datum datum(Shared_data points) const {
+    return {points[id_].x, points[id_].y, points[id_].z};
+  }
+  [[nodiscard]] Point reference_point(Shared_data points) const { return datum(points); }
+  static Shared_data construct_shared_data(Shared_data points) { return points; }
+
+ private:
+  Id id_ = 0;
+};
+
+template <class Primitive>
+class CgalBoxSearch final : public BoxSearch {
+ public:
+  using Shared = typename Primitive::Shared_data;
+  CgalBoxSearch(std::size_t count, const Shared& shared) : shared_(shared) {
+    std::vector<std::uint32_t> ids(count);
+    std::iota(ids.begin(), ids.end(), 0U);
+    tree_.do_not_accelerate_distance_queries();
+    tree_.insert(ids.cbegin(), ids.cend(), shared_);
+    tree_.build();
+  }
+
+  [[nodiscard]] std::size_t in(const glm::dvec3& low, const glm::dvec3& high,
+                               std::span<std::uint32_t> out) const noexcept override {
+    Listing listing{{low.x, low.y, low.z, high.x, high.y, high.z}, shared_, out};
+    if (!out.empty()) tree_.traversal(0, listing);
+    return listing.count;
+  }
+  [[nodiscard]] std::size_t memory_bytes() const noexcept override {
+    return tree_.size() * (sizeof(BoxNode) + sizeof(Primitive));
+  }
+
+ private:
+  using BoxTraits = CGAL::AABB_traits<Kernel, Primitive>;
+  using BoxNode = CGAL::AABB_node<BoxTraits>;
+  struct Listing {  // a model of the tree's traversal traits
+    CGAL::Bbox_3 box;
+    const Shared& shared;
+    std::span<std::uint32_t> out;
+    std::size_t count = 0;
+
+    [[nodiscard]] bool go_further() const { return count < out.size(); }
+    [[nodiscard]] bool do_intersect(int /*query*/, const BoxNode& node) const {
+      return CGAL::do_overlap(box, node.bbox());
+    }
+    void intersection(int /*query*/, const Primitive& primitive) {
+      const auto datum = primitive.datum(shared);
+      bool meets = CGAL::do_overlap(box, datum.bbox());
+      if constexpr (std::is_same_v<Primitive, IndexedTriangle>)
+        meets = meets && CGAL::do_intersect(box, datum);
+      if (meets) out[count++] = primitive.id();
+    }
+  };
+
+  Shared shared_;
+  CGAL::AABB_tree<BoxTraits> tree_;
+};
+
 }  // namespace
+
+std::unique_ptr<BoxSearch> make_cgal_search(std::span<const glm::dvec3> points) {
+  return std::make_unique<CgalBoxSearch<IndexedPoint>>(points.size(), points.data());
+}
+
+std::unique_ptr<BoxSearch> make_cgal_search(const TriangleMesh& mesh) {
+  return std::make_unique<CgalBoxSearch<IndexedTriangle>>(mesh.triangles.size(),
+                                                          Corners{&mesh.vertices, &mesh.triangles});
+}
 
 std::unique_ptr<RigidSurface> make_cgal_surface(const TriangleMesh& mesh, bool solid) {
   return std::make_unique<CgalSurface>(mesh, solid);

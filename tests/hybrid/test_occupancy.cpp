@@ -161,16 +161,23 @@ TEST_P(Occupancy, NothingIsNearWhereNothingIs) {
   EXPECT_EQ(map.soft_in(origin + 10.0 * brick - 1e-3, origin + 10.0 * brick + 1e-3, out), 1U);
 }
 
+// Seven voxels want seven bricks, and there are four: who finds none stays where it was last known.
 TEST_P(Occupancy, AFullMapKeepsAVoxelWhereItWasLastKnown) {
-  map.add_soft(1);
-  map.place(0, origin);
+  map.add_soft(7);
+  for (std::uint32_t n = 0; n < 7; ++n) map.place(n, origin);
   map.reserve_bricks(3);
-  for (int n = 1; n <= 100; ++n) map.move(0, origin + dvec3(0.1 * n, 0, 0));
-  EXPECT_GT(map.overflows(), 0U);
+  for (std::uint32_t n = 1; n < 7; ++n) map.move(n, origin + dvec3(0.1 * n, 0, 0));
+  EXPECT_EQ(map.overflows(), 3U);
   EXPECT_TRUE(map.validate());
-  map.move(0, origin);
-  std::vector<std::uint32_t> out(4);
-  EXPECT_EQ(map.soft_in(origin - 1e-3, origin + 1e-3, out), 1U);
+  std::vector<std::uint32_t> out(8);
+  EXPECT_EQ(map.soft_in(origin - 1e-3, origin + 1e-3, out), 4U);
+  // One comes back, and its brick is room for another.
+  map.move(1, origin);
+  map.move(6, origin + dvec3(0.6, 0, 0));
+  EXPECT_EQ(map.overflows(), 3U);
+  EXPECT_EQ(map.soft_in(origin - 1e-3, origin + 1e-3, out), 4U);
+  EXPECT_EQ(map.soft_in(origin + dvec3(0.6, 0, 0) - 1e-3, origin + dvec3(0.6, 0, 0) + 1e-3, out), 1U);
+  EXPECT_TRUE(map.validate());
 }
 
 TEST_P(Occupancy, WritesNoMoreThanThereIsRoomFor) {
