@@ -16,7 +16,8 @@ constexpr int kPairSweeps = 2;
 
 struct NearestRigid {
   glm::dvec3 normal{0.0};  // away from the surface, scene frame, unit
-  double distance = 0.0;
+  double distance = 0.0;   // negative: within the solid
+  std::uint32_t object = 0;
   bool found = false;
 };
 
@@ -31,9 +32,19 @@ NearestRigid nearest_rigid(const World& world, const WorldState& state, const gl
     polygon::NearPoint near;
     if (!object.surface->nearest(object.to_body(point), best.distance, near) || !(near.distance > 0.0))
       continue;
-    best = {(point - object.to_scene(near.point)) / near.distance, near.distance, true};
+    best = {(point - object.to_scene(near.point)) / near.distance, near.distance, o, true};
   }
   return best;
+}
+
+// From within a solid the nearest surface is seen from its wrong side, and would hold a voxel in there for
+// ever.
+NearestRigid from_outside(const World& world, const glm::dvec3& point, NearestRigid near) noexcept {
+  const RigidObject& object = world.rigid[near.object];
+  if (!near.found || !object.surface->inside(object.to_body(point))) return near;
+  near.normal = -near.normal;
+  near.distance = -near.distance;
+  return near;
 }
 
 voxel::Obstacle obstacle_of(const SoftBody& body, const voxel::SoftObject& object, voxel::VoxelId v,
@@ -82,7 +93,8 @@ void refresh_obstacles(const World& world, WorldState& state) noexcept {
       if (glm::dot(moved, moved) < enough * enough || queries >= kObstacleQueries) return;
       ++queries;
       state.obstacle_seen[o][s] = u;
-      const NearestRigid near = nearest_rigid(world, state, body.to_scene(object.position(v)), range);
+      const glm::dvec3 at = body.to_scene(object.position(v));
+      const NearestRigid near = from_outside(world, at, nearest_rigid(world, state, at, range));
       const voxel::Obstacle old = object.obstacles()[s];
       if (!near.found) {
         object.set_obstacle(s, {});

@@ -12,6 +12,9 @@
 #include <sstream>
 #include <vector>
 
+#include "hybrid/arbitration.h"
+#include "polygon/mesh_file.h"
+#include "polygon/primitives.h"
 #include "touch.h"
 #include "voxel/relaxation.h"
 
@@ -181,6 +184,47 @@ TEST_F(Arbitration, NoVoxelIsPressedIntoAPlate) {
     EXPECT_LE(deepest(touch), 0.05 + at_rest);
     EXPECT_EQ(touch.at({0, 0, 0.04}).force_N, dvec3(0.0));
   }
+}
+
+// Driven into a solid by a jump, a voxel sees its surface from within: the way out is still out. (It was held
+// on the inside, for ever: a fuzzed session found it after 48,936 ticks.)
+TEST_F(Arbitration, AVoxelWithinASolidIsShownTheWayOut) {
+  polygon::save_ply(folder_ / "ball.ply", polygon::make_ball_mesh(6e-3, 3));
+  Touch touch(load(tool_of_5 + "[material.loose]\nstretch = [0.001, 1000]\nshear = 1000\n" +
+                   "[[soft]]\nname = \"block\"\nformula = \"block\"\nsize = [40, 40, 20]\nspacing = 2\n"
+                   "position = [0, 0, 0]\nmaterial = \"loose\"\n"
+                   "[[rigid]]\nname = \"ball\"\nmesh = \"ball.ply\"\nunit = \"m\"\nposition = [0, 0, 14]\n" +
+                   tests::some_path),
+              {0, 0, 0.05});
+  voxel::SoftObject& object = *touch.state().soft[0];
+  const dvec3 centre(0, 0, 0.014);
+  const auto place = [&](voxel::VoxelId v) { return touch.world().soft[0].to_scene(object.position(v)); };
+  std::size_t inside = 0;
+  for (const voxel::VoxelId v : object.lattice().surface()) {
+    const dvec3 at = place(v);
+    if (at.z < 6.5e-3 || std::hypot(at.x, at.y) > 4e-3) continue;
+    object.set_obstacle(object.surface_number(v), {});  // as one that was far away has none
+    object.move(v, {0, 0, 10e-3});                      // past the middle
+    ++inside;
+  }
+  ASSERT_GE(inside, 4U);
+  for (int n = 0; n < 100; ++n) hybrid::refresh_obstacles(touch.world(), touch.state());
+  std::size_t seen = 0;
+  for (const voxel::VoxelId v : object.lattice().surface()) {
+    const voxel::Obstacle& o = object.obstacles()[object.surface_number(v)];
+    const dvec3 away = place(v) - centre;
+    if (glm::length(away) >= 6e-3 || o.normal == glm::vec3(0.0F)) continue;
+    ++seen;
+    EXPECT_GT(glm::dot(dvec3(o.normal), away), 0.9 * glm::length(away));
+    EXPECT_GE(glm::dot(o.normal, glm::vec3(object.state().at(v))), o.bound - 1e-9F)
+        << "not thrown out at once";
+  }
+  EXPECT_EQ(seen, inside);
+  // And from there it comes out, and back.
+  for (int n = 0; n < 4000 && !object.asleep(); ++n) touch.at({0, 0, 0.05});
+  EXPECT_TRUE(object.asleep());
+  for (const voxel::VoxelId v : object.lattice().surface())
+    ASSERT_LE(glm::length(dvec3(object.state().at(v))), 2e-5) << "of a spacing of 2 mm";
 }
 
 TEST_F(Arbitration, APlateBelowIsFeltThroughTheTissue) {
