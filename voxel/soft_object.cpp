@@ -31,6 +31,17 @@ constexpr double kStir = 1e-5;            // of the spacing: pressed voxels that
 constexpr double kGiveWay = 0.01;         // of the voxel radius: less is left to the next push
 constexpr float kTight = 1e-4F;           // of the spacing: nearer to its limit than this a link is tight
 
+// u(w) − u(v) of neighbours along d, and what their link lets it be, whichever way the link points.
+struct LinkState {
+  float difference, low, high;
+  [[nodiscard]] float room() const { return std::min(difference - low, high - difference); }
+};
+LinkState link_state(const Lattice& lattice, const LazyArray<float>& u, VoxelId v, VoxelId w, int d, bool up,
+                     int axis) {
+  const auto b = lattice.bounds(up ? v : w, d, axis);
+  return {u[w] - u[v], up ? b[0] : -b[1], up ? b[1] : -b[0]};
+}
+
 }  // namespace
 
 SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice)
@@ -274,11 +285,7 @@ void SoftObject::draw_along(int axis) noexcept {
         if (!lattice_->filled(w) || carried_mark_[w] != 0 || lattice_->anchored(w) ||
             state_.role[w] != Displacement::free)
           continue;
-        const auto b = lattice_->bounds(up ? v : w, d, axis);
-        const auto room = [&] {
-          const float difference = up ? u[w] - u[v] : u[v] - u[w];
-          return std::min(difference - b[0], b[1] - difference);
-        };
+        const auto room = [&] { return link_state(*lattice_, u, v, w, d, up, axis).room(); };
         if (room() > kNearlyTight * spacing) continue;
         const auto wanted = static_cast<float>(link_minimum(relaxation_.couplings(), state_, w)[axis]);
         const float before = u[w];
@@ -322,10 +329,9 @@ void SoftObject::gather_load(int axis) noexcept {
       for (const bool up : {false, true}) {
         const VoxelId w = up ? lattice_->up(c.v, d) : lattice_->down(c.v, d);
         if (!lattice_->filled(w) || lattice_->anchored(w)) continue;
-        auto b = lattice_->bounds(up ? c.v : w, d, axis);
-        if (!up) b = {-b[1], -b[0]};  // of u(w) − u(v), whichever way the link points
-        const float difference = u[w] - u[c.v];
-        const bool pushed_up = difference <= b[0] + tight, pushed_down = difference >= b[1] - tight;
+        const LinkState link = link_state(*lattice_, u, c.v, w, d, up, axis);
+        const bool pushed_up = link.difference <= link.low + tight,
+                   pushed_down = link.difference >= link.high - tight;
         if (!pushed_up && !pushed_down) continue;
         touches_[c.touch].tight = true;
         if (carried_mark_[w] != 0) continue;
@@ -449,10 +455,8 @@ bool SoftObject::held_fast(VoxelId v, const glm::dvec3& direction) noexcept {
       for (const bool up : {false, true}) {
         const VoxelId w = up ? lattice_->up(c, d) : lattice_->down(c, d);
         if (!lattice_->filled(w) || carried_mark_[w] != 0) continue;
-        auto b = lattice_->bounds(up ? c : w, d, axis);
-        if (!up) b = {-b[1], -b[0]};
-        const float difference = u[w] - u[c];
-        if (upwards ? difference > b[0] + tight : difference < b[1] - tight) continue;
+        const LinkState link = link_state(*lattice_, u, c, w, d, up, axis);
+        if (upwards ? link.difference > link.low + tight : link.difference < link.high - tight) continue;
         held = held || rests(w);
         carried_mark_[w] = 1;
         carried_.push_back({w, 0});
