@@ -62,6 +62,9 @@ TickWatch::TickWatch(const World& world, const WorldState& state)
     : world_(world), hash_(kFirstHash), force_N_(state.limit.last_N), device_m_(state.device_m) {
   const Spring spring = spring_of(world, state.proxy_m, state.device_m);
   allowed_J_ = stored_J_ = spring.stored_J;  // what is there already may be given
+  for (const auto& object : state.soft) {
+    if (object->moved_ever()) allowed_J_ += object->energy_J();
+  }
   slewed_N_ = length(force_N_ - spring.clamped_N);
 }
 

@@ -418,15 +418,19 @@ void SoftObject::follow(const glm::dvec3& delta) noexcept {
   if (!sources_.empty()) settle_chain();
 }
 
-std::size_t SoftObject::give_way(const ToolInBody& tool, std::span<ToolBound> out) const noexcept {
+std::size_t SoftObject::give_way(const ToolInBody& tool, const glm::dvec3& before,
+                                 std::span<ToolBound> out) const noexcept {
+  const bool flat = tool.shape == ToolInBody::Shape::punch;
+  const double reached = flat ? voxel_radius() : reach(tool.radius);
   std::size_t count = 0;
   for (const Touch& t : touches_) {
     if (count == out.size()) break;
     const glm::dvec3 p = position(t.v);
     const Gap g = gap(tool, p);
     if (g.distance >= -kGiveWay * voxel_radius()) continue;
-    const double away = tool.shape == ToolInBody::Shape::punch ? voxel_radius() : reach(tool.radius);
-    out[count++] = {-g.normal, glm::dot(-g.normal, p) + away, t.v};
+    const glm::dvec3 from = p - before;
+    const double was = reached - (flat ? glm::dot(from, tool.axis) : glm::length(from));
+    out[count++] = {-g.normal, glm::dot(-g.normal, p) + reached - std::max(0.0, was), t.v};
   }
   return count;
 }
