@@ -17,10 +17,10 @@ namespace hybrid {
 // limits. The force is no longer than ForceLimits::max_force_N, and changes by no more than max_slew_N_per_s
 // times the tick, but to zero.
 //
-// energy. Of rigid objects that stay and have no friction, damping or texture, and of tissue. What coupling and
-// tissue store as the watch begins may be given to the hand. Let U(x) be the
-// least energy of the coupling (and of the tissue) that the proxy can reach from where it is when the device
-// is at x. The proxy of the tick before can stay, so the new energy is at most
+// energy. Of rigid objects that stay and have no friction, damping or texture, and of tissue. What coupling
+// and tissue store as the watch begins may be given to the hand. Let U(x) be the least energy of the coupling
+// (and of the tissue) that the proxy can reach from where it is when the device is at x. The proxy of the
+// tick before can stay, so the new energy is at most
 //     U' <= ½K|x' − q|² = U − F·(x' − x) + ½K|x' − x|²,    F = K (q − x) the force,
 // whatever the surface: the work F·(x' − x) that the held force does on the hand is what was stored, and no
 // more than ½K|Δx|² a tick beside it. That much is what holding a force for a tick costs (Colgate & Schenkel
