@@ -76,6 +76,7 @@ bool touch_soft(const World& world, WorldState& state, const glm::dvec3& point, 
     std::sort(state.touched[o].begin(), state.touched[o].end());
     if (state.touched[o].empty() && state.soft[o]->touched().empty()) continue;
     state.soft[o]->touch(state.touched[o]);
+    state.soft[o]->note_depths(tool_in_body(world, world.soft[o], point));
     any = any || !state.touched[o].empty();
   }
   return any;
@@ -100,16 +101,14 @@ void press_soft(const World& world, WorldState& state, const glm::dvec3& point, 
   }
 }
 
-std::size_t soft_bounds(const World& world, WorldState& state, const glm::dvec3& point,
-                        const glm::dvec3& before, bool fast,
+std::size_t soft_bounds(const World& world, WorldState& state, const glm::dvec3& point, bool fast,
                         std::vector<polygon::ContactPlane>& out) noexcept {
   std::size_t added = 0;
   for (std::uint32_t o = 0; o < state.soft.size(); ++o) {
     voxel::SoftObject& object = *state.soft[o];
     if (object.touched().empty()) continue;
     const SoftBody& body = world.soft[o];
-    const std::size_t count =
-        object.give_way(tool_in_body(world, body, point), body.to_body(before), state.bounds);
+    const std::size_t count = object.give_way(tool_in_body(world, body, point), state.bounds);
     for (std::size_t i = 0; i < count && out.size() < out.capacity(); ++i) {
       const voxel::ToolBound& bound = state.bounds[i];
       if (fast && !object.held_fast(bound.voxel, -bound.normal)) continue;

@@ -16,11 +16,9 @@ bool touch_soft(const World& world, WorldState& state, const glm::dvec3& point, 
 void press_soft(const World& world, WorldState& state, const glm::dvec3& point, const glm::dvec3& delta,
                 int sweeps) noexcept;
 
-// Half-spaces of voxels that could not leave the way of a tool that came to `point` from `before`, appended
-// to `out` as far as its capacity goes; `fast`: only of those that cannot, until what holds them moves.
-// Returns how many.
-std::size_t soft_bounds(const World& world, WorldState& state, const glm::dvec3& point,
-                        const glm::dvec3& before, bool fast,
+// Half-spaces of voxels that could not leave the way of a tool at `point`, appended to `out` as far as its
+// capacity goes; `fast`: only of those that cannot, until what holds them moves. Returns how many.
+std::size_t soft_bounds(const World& world, WorldState& state, const glm::dvec3& point, bool fast,
                         std::vector<polygon::ContactPlane>& out) noexcept;
 
 // The tool in an object's volume frame.

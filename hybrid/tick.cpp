@@ -137,8 +137,8 @@ glm::dvec3 stop_at_blocked(const World& world, WorldState& state, const glm::dve
 
 // One pass: the proxy goes to the minimum of ½K|q − x|² plus the tissue's quadratic model, outside everything
 // rigid; then the tissue answers. Returns how far the proxy went.
-double move_proxy(const World& world, WorldState& state, const glm::dvec3& device, const glm::dvec3& before,
-                  bool near_soft, double travel, bool first_pass, Sweep& sweep) noexcept {
+double move_proxy(const World& world, WorldState& state, const glm::dvec3& device, bool near_soft,
+                  double travel, bool first_pass, Sweep& sweep) noexcept {
   const double k = world.tool.stiffness_N_per_m;
   glm::dmat3 model(k);
   for (const voxel::Reaction& reaction : state.reactions) model += reaction.stiffness_N_per_m;
@@ -158,9 +158,17 @@ double move_proxy(const World& world, WorldState& state, const glm::dvec3& devic
     press_soft(world, state, state.proxy_m, delta, kSweeps);
     learn_stiffness(world, state, delta, pull, pull_on_proxy(world, state, device), model, metric);
     if (first_pass) state.blocked.clear();
-    soft_bounds(world, state, state.proxy_m, before, true, state.blocked);
+    soft_bounds(world, state, state.proxy_m, true, state.blocked);
   }
   return glm::length(delta);
+}
+
+// How deep a tool at `point` is in what soft objects let it have, at most: the last `count` planes (m).
+double deepest(const WorldState& state, std::size_t count, const glm::dvec3& point) noexcept {
+  double most = 0.0;
+  for (std::size_t i = state.planes.size() - count; i < state.planes.size(); ++i)
+    most = std::max(most, state.planes[i].offset - glm::dot(state.planes[i].normal, point));
+  return most;
 }
 
 // Tissue that anchors, bone or its own chain keep from leaving the tool's way: the tool leaves its way
@@ -168,12 +176,17 @@ double move_proxy(const World& world, WorldState& state, const glm::dvec3& devic
 void give_way(const World& world, WorldState& state, const glm::dvec3& before, Sweep& sweep) noexcept {
   const double radius = world.tool.radius_m;
   if (!gather_planes(world, state, state.proxy_m, 2.0 * radius)) return;
-  if (soft_bounds(world, state, state.proxy_m, before, false, state.planes) == 0) return;
+  const std::size_t bounds = soft_bounds(world, state, state.proxy_m, false, state.planes);
+  if (bounds == 0) return;
   const polygon::PlaneMinimum out =
       polygon::minimise_on_planes(state.proxy_m, glm::dmat3(1.0), state.planes, 1e-9 * radius);
-  // Rigid half-spaces were gathered this far only.
-  const bool near = out.feasible && glm::length(out.point - state.proxy_m) <= radius;
-  state.proxy_m = near ? out.point : before;
+  // Rigid half-spaces were gathered this far only. Too deep in tissue to see a way out, the way back is one;
+  // but not where it was deeper still, and is being pulled out.
+  if (out.feasible && glm::length(out.point - state.proxy_m) <= radius) {
+    state.proxy_m = out.point;
+  } else if (deepest(state, bounds, before) <= deepest(state, bounds, state.proxy_m)) {
+    state.proxy_m = before;
+  }
   sweep.point = state.proxy_m;
 }
 
@@ -215,7 +228,7 @@ Sweep settle_contact(const World& world, WorldState& state, const glm::dvec3& de
   if (around.near_soft) press_soft(world, state, state.proxy_m, glm::dvec3(0.0), 0);
   const double travel = around.near_soft ? around.range_m / kPasses : around.range_m;
   for (int pass = 0; pass < kPasses && !around.free; ++pass) {
-    const double moved = move_proxy(world, state, device, before, around.near_soft, travel, pass == 0, sweep);
+    const double moved = move_proxy(world, state, device, around.near_soft, travel, pass == 0, sweep);
     if (!around.near_soft || (pass > 0 && moved < kStill * world.contact_radius_m())) break;
   }
   if (around.near_soft) give_way(world, state, before, sweep);

@@ -29,6 +29,7 @@ constexpr float kNearlyTight = 0.1F;      // of the spacing: links that are look
 constexpr std::size_t kMostTied = 500;    // voxels looked at for what holds one of them
 constexpr double kStir = 1e-5;            // of the spacing: pressed voxels that moved less wake nobody
 constexpr double kGiveWay = 0.01;         // of the voxel radius: less is left to the next push
+constexpr double kDeep = 0.05;            // of the voxel radius: less is an error of a tick, and is mended
 constexpr float kTight = 1e-4F;           // of the spacing: nearer to its limit than this a link is tight
 
 // u(w) − u(v) of neighbours along d, and what their link lets it be, whichever way the link points.
@@ -418,21 +419,37 @@ void SoftObject::follow(const glm::dvec3& delta) noexcept {
   if (!sources_.empty()) settle_chain();
 }
 
-std::size_t SoftObject::give_way(const ToolInBody& tool, const glm::dvec3& before,
-                                 std::span<ToolBound> out) const noexcept {
+std::size_t SoftObject::give_way(const ToolInBody& tool, std::span<ToolBound> out) const noexcept {
   const bool flat = tool.shape == ToolInBody::Shape::punch;
-  const double reached = flat ? voxel_radius() : reach(tool.radius);
   std::size_t count = 0;
   for (const Touch& t : touches_) {
     if (count == out.size()) break;
     const glm::dvec3 p = position(t.v);
     const Gap g = gap(tool, p);
     if (g.distance >= -kGiveWay * voxel_radius()) continue;
-    const glm::dvec3 from = p - before;
-    const double was = reached - (flat ? glm::dot(from, tool.axis) : glm::length(from));
-    out[count++] = {-g.normal, glm::dot(-g.normal, p) + reached - std::max(0.0, was), t.v};
+    if (t.beside && -g.distance > kDeep * voxel_radius()) {
+      const glm::dvec3 from = p - tool.centre, across = from - glm::dot(from, tool.axis) * tool.axis;
+      const double distance = glm::length(across);
+      if (distance > 0.0) {
+        out[count++] = {-across / distance, tool.radius - glm::dot(across / distance, p), t.v};
+        continue;
+      }
+    }
+    const double away = flat ? voxel_radius() : reach(tool.radius);
+    out[count++] = {-g.normal, glm::dot(-g.normal, p) + away - t.noted, t.v};
   }
   return count;
+}
+
+void SoftObject::note_depths(const ToolInBody& tool) noexcept {
+  const bool flat = tool.shape == ToolInBody::Shape::punch;
+  for (Touch& t : touches_) {
+    const glm::dvec3 from = position(t.v) - tool.centre;
+    const double along = glm::dot(from, tool.axis), distance = glm::length(from);
+    t.beside = flat && distance * distance - along * along > tool.radius * tool.radius;
+    const double depth = flat ? voxel_radius() - along : reach(tool.radius) - distance;
+    t.noted = depth > kDeep * voxel_radius() ? depth : 0.0;
+  }
 }
 
 bool SoftObject::held_fast(VoxelId v, const glm::dvec3& direction) noexcept {

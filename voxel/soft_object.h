@@ -73,12 +73,13 @@ class SoftObject {
   [[nodiscard]] Reaction reaction(const ToolInBody& tool) noexcept;
   // The tool moves by `delta`: pressed voxels go along, each by the part of it along its own normal.
   void follow(const glm::dvec3& delta) noexcept;
-  // Where the chain did not let voxels out of the way of a tool that came from `before`, the tool has to give
-  // way. But what stands still can stop a tool, and cannot push one: where it was as deep already, it may
-  // stay. (A punch that slid sideways under 8 mm of anchored tissue was lifted out by it, and gave the hand
-  // 35 mJ from nothing.) Returns how many bounds were written.
-  std::size_t give_way(const ToolInBody& tool, const glm::dvec3& before,
-                       std::span<ToolBound> out) const noexcept;
+  // The tool as a tick begins: where each touched voxel is in it.
+  void note_depths(const ToolInBody& tool) noexcept;
+  // Where the chain did not let voxels out of the tool's way, the tool has to give way. But what did not move
+  // can stop a tool, and cannot push one: where it was as deep when the tick began, the tool may stay, and
+  // what was beside a punch then stops it by its side. (A punch that slid sideways under 8 mm of anchored
+  // tissue was lifted out by it, and gave the hand 35 mJ from nothing.) Returns how many bounds were written.
+  std::size_t give_way(const ToolInBody& tool, std::span<ToolBound> out) const noexcept;
   // Whether a voxel cannot move along `direction` because tight links tie it to what stands still: anchors,
   // or voxels on rigid surfaces. Looks along the largest component of it, no further than some hundred
   // voxels.
@@ -139,6 +140,8 @@ class SoftObject {
     bool pressed;            // carries load towards the tool
     glm::dvec3 normal{0.0};  // from tool to voxel, unit
     glm::dvec3 load{0.0};    // of its links, and of what hangs on it by tight links (unit: newton)
+    double noted = 0.0;      // how deep it was in the tool as the tick began (m)
+    bool beside = false;     // it was beside a punch then
     bool tight = false;      // some tight link hands part of its load to or from another voxel
   };
   struct Gap {

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "hybrid/arbitration.h"
+#include "hybrid/tick_watch.h"
 #include "polygon/mesh_file.h"
 #include "polygon/primitives.h"
 #include "touch.h"
@@ -418,6 +419,37 @@ TEST_F(Tick, AToolOnRowsThatStandOnAnchorsIsNoWedge) {
     }
     EXPECT_LE(most, 3.0);  // the coupling's, 3 mm from the device at most
     EXPECT_LE(std::abs(work), 1e-5);
+  }
+}
+
+// A punch has no sides: one that is drawn against such rows from aside suddenly has some far above its face,
+// that cannot go where it would push them. They stop it there, and do not lift it: nobody paid for that.
+TEST_F(Tick, APunchDrawnAgainstRowsThatStandOnAnchorsIsStoppedAndNotLifted) {
+  const std::string rows =
+      "format = 1\n[tool]\nshape = \"punch\"\nradius = 6\nstiffness = 1000\n" + tests::unlimited +
+      "[material.gel]\nyoung = 4000\nstretch = [0.99, 1.01]\nshear = 0.6\n[[soft]]\nname = \"block\"\n"
+      "formula = \"block\"\nsize = [40, 40, 20]\nspacing = 2\nposition = [0, 0, 0]\nmaterial = \"gel\"\n" +
+      tests::some_path;
+  constexpr double edge_m = 0.019;  // of the outermost voxels' centres
+  for (const double depth_mm : {1.0, 3.0, 6.0}) {
+    const double z = 0.01 - 1e-3 * depth_mm;
+    Touch touch(load(rows), {0.06, 0, z});
+    hybrid::TickWatch watch(touch.world(), touch.state());
+    double lifted = 0.0, furthest = 1.0;
+    const auto see = [&](const TickResult& felt) {
+      watch.see(touch.state(), felt, 1e-3);
+      lifted = std::max(lifted, felt.proxy_m.z - felt.device_m.z);
+      furthest = std::min(furthest, felt.proxy_m.x);
+    };
+    touch.go({0.02, 0, z}, 4e-3, 50, see);
+    const TickResult back = touch.go({0.06, 0, z}, 4e-3, 50, see);
+    std::printf(
+        "%.0f mm under the top: %.3f mm into the block, lifted by %.3f mm; %.4f mJ beyond its account\n",
+        depth_mm, 1e3 * (edge_m + 6e-3 - furthest), 1e3 * lifted, 1e3 * watch.excess_J());
+    EXPECT_LE(watch.excess_J(), watch.tolerance_J());
+    EXPECT_LE(lifted, 0.1e-3);
+    EXPECT_GE(furthest, edge_m + 6e-3 - 2e-3);  // a spacing
+    EXPECT_EQ(coupling(back), dvec3(0.0));
   }
 }
 
