@@ -2,6 +2,8 @@
 // A session that is told to stop, or crashes, lets go of the motors first.
 #pragma once
 
+#include <cstddef>
+
 namespace device {
 
 // While one lives, SIGINT, SIGTERM and SIGHUP ask the servo loop to end; a second one of the same kind kills
@@ -21,9 +23,12 @@ int stop_signal() noexcept;
 
 // While one lives, SIGSEGV, SIGBUS, SIGFPE, SIGILL and SIGABRT call `act(user)` on the thread that crashed,
 // and then do what they did before. `act` may do what a signal handler may. A stack that overflowed, SIGKILL
-// and a machine that stops leave no time for it. One at a time in a program.
+// and a machine that stops leave no time for it. Of several the last made acts first; if it crashes, the
+// others still act. They end in the reverse order that they are made in. Throws std::logic_error: more than
+// kMost.
 class OnCrash {
  public:
+  static constexpr std::size_t kMost = 4;
   using Act = void (*)(void* user) noexcept;
   OnCrash(Act act, void* user);
   ~OnCrash();

@@ -83,11 +83,16 @@ void print_notes(const BuiltScene& built) {
   }
 }
 
+void print_fault(const KeptBox& kept) {
+  const std::string said = kept.save_on_fault();
+  if (!said.empty()) std::fprintf(stderr, "warning: %s\n", said.c_str());
+}
+
 int run(const RunCommand& command) {
   Scene scene = load_scene(command.scene);
   if (!command.device.empty()) use_device(scene, command.device);
-  for (const auto* file :
-       {&command.trace, &command.plot, &command.picture, &command.record, &command.save_surface}) {
+  for (const auto* file : {&command.trace, &command.plot, &command.picture, &command.record,
+                           &command.save_surface, &command.black_box}) {
     check_writable(*file);
   }
   if (!command.save_volume.empty()) {
@@ -105,6 +110,7 @@ int run(const RunCommand& command) {
     end_progress();
     std::fprintf(stderr, "note: in touch now; Ctrl-C ends the session and keeps it\n");
   }
+  const auto kept = keep_box(command.black_box, command.scene, command.realtime || real, scene.rate_hz);
   SessionOptions options{.seconds = command.seconds,
                          .realtime = command.realtime,
                          .real_device = real.get(),
@@ -113,9 +119,11 @@ int run(const RunCommand& command) {
                          .keep_picture = !command.picture.empty(),
                          .reference_samples = command.samples,
                          .start_ticks = command.start_ticks,
-                         .progress = progress};
+                         .progress = progress,
+                         .black_box = kept ? &kept->box() : nullptr};
   SessionResult result = run_session(scene, built, options);
   end_progress();
+  if (kept) print_fault(*kept);
 
   std::FILE* words = words_for(command.json);
   if (!command.trace.empty()) save_trace(command.trace, result.rows);

@@ -89,6 +89,9 @@ class Player {
     ++ticks_;
     return felt;
   }
+  [[nodiscard]] BlackBoxRow row(const device::ServoInput& input, const TickResult& felt) const {
+    return black_box_row(input, felt, ticks_ - 1, *built_.state);
+  }
   [[nodiscard]] double t_s() const { return static_cast<double>(ticks_) * dt_; }
   [[nodiscard]] double rate_hz() const { return rate_hz_; }
   [[nodiscard]] double deadline_s() const { return built_.world->limits.deadline_s; }
@@ -150,7 +153,7 @@ void play_frames(const ViewCommand& command, Player& player, Window& window) {
 }
 
 // The window on this thread, the session on another. Says what happened to the device, if anything did.
-device::ServoReport play_live(Player& player, Window& window) {
+device::ServoReport play_live(Player& player, Window& window, BlackBox& box) {
   HandOver<Snapshot> snapshots;
   HandOver<Wish> wishes;
   std::atomic<bool> stop{false}, ended{false};
@@ -163,6 +166,7 @@ device::ServoReport play_live(Player& player, Window& window) {
       const Wish& wish = wishes.take();
       if (wish.paused || !go_on) return {.go_on = go_on, .skip = true};
       const TickResult felt = player.tick(wish, input.device);
+      box.add(player.row(input, felt));
       if (player.t_s() >= next) {
         next = player.t_s() + kSnapshotEvery_s;
         player.snapshot(felt, snapshots.back());
@@ -223,7 +227,9 @@ int view(const ViewCommand& command) {
     play_frames(command, player, window);
     return 0;
   }
-  const device::ServoReport report = play_live(player, window);
+  const auto kept = keep_box({}, command.scene, true, scene.rate_hz);
+  const device::ServoReport report = play_live(player, window, kept->box());
+  print_fault(*kept);
   for (const std::string& message : report.messages) std::fprintf(stderr, "device: %s\n", message.c_str());
   return report.end == device::ServoEnd::lost ? 1 : 0;
 }

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "hybrid/black_box.h"
 #include "hybrid/build.h"
 #include "hybrid/compare_measured.h"
 #include "hybrid/compose.h"
@@ -22,6 +23,7 @@ struct RunCommand {
   int samples = 6;
   std::uint64_t start_ticks = 0;
   std::filesystem::path trace, plot, picture, record, save_surface, save_volume;  // empty: not written
+  std::filesystem::path black_box;                                                // empty: see keep_box()
   std::string json;                                                               // "-": standard output
 };
 int run(const RunCommand& command);
@@ -109,7 +111,8 @@ int view(const ViewCommand& command);
 // no terminal and less than a second has passed.
 Progress progress_on_terminal();
 void end_progress();
-// What the build noticed, on standard error.
+// On standard error: what the build noticed; where the seconds around a fault are, if there was one.
 void print_notes(const BuiltScene& built);
+void print_fault(const KeptBox& kept);
 
 }  // namespace hybrid

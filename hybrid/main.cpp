@@ -47,6 +47,8 @@ void add_run(CLI::App& app, int& status) {
   sub->add_option("--plot", c->plot, "write force over time with contacts as SVG");
   sub->add_option("--picture", c->picture, "write a picture of the most telling moment as PNG");
   sub->add_option("--record", c->record, "write a recording for `hybrid replay`");
+  sub->add_option("--black-box", c->black_box,
+                  "where the 2 s around the first fault go; default in real time: SCENE-fault.csv here");
   sub->add_option("--save-surface", c->save_surface,
                   "write all surfaces as they are at the end as one PLY (m, scene frame)");
   sub->add_option("--save-volume", c->save_volume,

@@ -153,6 +153,7 @@ class Run {
     const std::uint64_t tick = ticks_done_++;
     const TickResult felt = haptic_tick(world_, state_, input.device, dt_);
     keep(felt, tick, input.device.fault);
+    if (options_.black_box != nullptr) options_.black_box->add(black_box_row(input, felt, tick, state_));
     if (realtime_) {
       late_us_.add(input.late_s * 1e6);
     } else {
@@ -234,6 +235,17 @@ class Run {
 };
 
 }  // namespace
+
+BlackBoxRow black_box_row(const device::ServoInput& input, const TickResult& felt, std::uint64_t tick,
+                          const WorldState& state) noexcept {
+  return {.tick = tick,
+          .said_m = input.device.position_m,
+          .said = input.device.fault,
+          .faults = state.faults,
+          .nonfinite = state.nonfinite,
+          .late_us = static_cast<float>(input.late_s * 1e6),
+          .felt = felt};
+}
 
 Percentiles percentiles(std::vector<double>& values) {
   if (values.empty()) return {};

@@ -12,6 +12,7 @@
 #include "device/haptic_device.h"
 #include "device/path.h"
 #include "device/servo_loop.h"
+#include "hybrid/black_box.h"
 #include "hybrid/build.h"
 #include "hybrid/tick.h"
 #include "hybrid/time_spread.h"
@@ -42,6 +43,7 @@ struct SessionOptions {
   // soft start is over by then.)
   std::uint64_t start_ticks = 0;
   Progress progress;
+  BlackBox* black_box = nullptr;               // every tick is added to it
   std::shared_ptr<const device::Path> path{};  // of the hand, in place of the scene's
 };
 
@@ -82,6 +84,10 @@ std::unique_ptr<device::HapticDevice> scene_device(const Scene& scene,
                                                    std::shared_ptr<const device::Path> path);
 // Starts the proxy or throws SceneError.
 void begin_session(const Scene& scene, const World& world, WorldState& state, const glm::dvec3& device_m);
+
+// Of tick number `tick` of the session, which has just been felt.
+BlackBoxRow black_box_row(const device::ServoInput& input, const TickResult& felt, std::uint64_t tick,
+                          const WorldState& state) noexcept;
 
 // Hashes. The running one takes what is felt, the final one also every displacement, where every rigid
 // body is and how it moves, and what the limits on the force remember.
