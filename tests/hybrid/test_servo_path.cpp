@@ -1,30 +1,65 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Once a scene is built, its ticks allocate nothing. This program counts every call of operator new and
-// malloc that its thread makes while it is watched.
+// Once a scene is built, its ticks allocate nothing, lock nothing, wait for nobody, throw nothing, and read
+// and write no file. This program counts the calls of all that which its thread makes while it is watched.
+#include <dlfcn.h>
 #include <gtest/gtest.h>
+#include <pthread.h>
+#include <sched.h>
+#include <semaphore.h>
+#include <time.h>  // NOLINT(modernize-deprecated-headers): nanosleep() is POSIX
+#include <unistd.h>
 
 #include <algorithm>
+#include <array>
+#include <cstdarg>
 #include <cstddef>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
+#include <mutex>
 #include <new>
+#include <ostream>
 #include <string>
+#include <thread>
+#include <utility>
 
 #include "hybrid/session.h"
 
 namespace {
-thread_local bool watched = false;
-thread_local std::size_t allocations = 0;
-void count() noexcept {
-  if (watched) ++allocations;
+
+struct Calls {
+  std::size_t allocations = 0, locks = 0, waits = 0, throws = 0, files = 0;
+  bool operator==(const Calls&) const = default;
+};
+std::ostream& operator<<(std::ostream& out, const Calls& c) {
+  return out << c.allocations << " allocations, " << c.locks << " locks, " << c.waits << " waits, "
+             << c.throws << " throws, " << c.files << " reads or writes";
 }
+
+thread_local bool watched = false;
+thread_local Calls calls;
+void count(std::size_t Calls::*of) noexcept {
+  if (watched) ++(calls.*of);
+}
+void count() noexcept {
+  count(&Calls::allocations);
+}
+
+// What the next library in line has under that name.
+template <class Function>
+Function* next(const char* name) noexcept {
+  const bool was = std::exchange(watched, false);
+  auto* const found = reinterpret_cast<Function*>(dlsym(RTLD_NEXT, name));
+  watched = was;
+  return found;
+}
+
 }  // namespace
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define COUNTS_MALLOC 0  // sanitizers bring their own
+#define COUNTS_CALLS 0  // sanitizers bring their own
 #else
-#define COUNTS_MALLOC 1
+#define COUNTS_CALLS 1
 // The GNU C library's own names for what it would have called.
 // NOLINTBEGIN(bugprone-reserved-identifier,cert-dcl37-c,cert-dcl51-cpp,readability-inconsistent-declaration-parameter-name)
 extern "C" {
@@ -43,6 +78,50 @@ void* calloc(std::size_t number, std::size_t size) noexcept {
 void* realloc(void* memory, std::size_t size) noexcept {
   count();
   return __libc_realloc(memory, size);
+}
+
+// std::mutex and its kin, std::condition_variable, semaphores; std::atomic::wait() goes through syscall().
+#define COUNTED(of, result, name, parameters, ...)            \
+  result name parameters noexcept {                           \
+    static auto* const real = next<result parameters>(#name); \
+    count(&Calls::of);                                        \
+    return real(__VA_ARGS__);                                 \
+  }
+COUNTED(locks, int, pthread_mutex_lock, (pthread_mutex_t * lock), lock)
+COUNTED(locks, int, pthread_mutex_trylock, (pthread_mutex_t * lock), lock)
+COUNTED(locks, int, pthread_rwlock_rdlock, (pthread_rwlock_t * lock), lock)
+COUNTED(locks, int, pthread_rwlock_wrlock, (pthread_rwlock_t * lock), lock)
+COUNTED(locks, int, pthread_spin_lock, (pthread_spinlock_t * lock), lock)
+COUNTED(waits, int, sem_wait, (sem_t * semaphore), semaphore)
+COUNTED(waits, int, sched_yield, (), )
+#undef COUNTED
+// Points where a thread may be cancelled: they may throw.
+#define COUNTED(of, result, name, parameters, ...)            \
+  result name parameters {                                    \
+    static auto* const real = next<result parameters>(#name); \
+    count(&Calls::of);                                        \
+    return real(__VA_ARGS__);                                 \
+  }
+COUNTED(waits, int, pthread_cond_wait, (pthread_cond_t * condition, pthread_mutex_t* lock), condition, lock)
+COUNTED(waits, int, nanosleep, (const timespec* time, timespec* left), time, left)
+COUNTED(files, ssize_t, read, (int file, void* to, std::size_t size), file, to, size)
+COUNTED(files, ssize_t, write, (int file, const void* from, std::size_t size), file, from, size)
+#undef COUNTED
+[[noreturn]] void __cxa_throw(void* thrown, void* type, void (*destroy)(void*)) {
+  static auto* const real = next<void(void*, void*, void (*)(void*))>("__cxa_throw");
+  count(&Calls::throws);
+  real(thrown, type, destroy);
+  std::abort();  // it does not return
+}
+long syscall(long number, ...) noexcept {
+  std::va_list arguments;
+  va_start(arguments, number);
+  std::array<long, 6> a{};
+  for (long& argument : a) argument = va_arg(arguments, long);
+  va_end(arguments);
+  static auto* const real = next<long(long, long, long, long, long, long, long)>("syscall");
+  count(&Calls::waits);
+  return real(number, a[0], a[1], a[2], a[3], a[4], a[5]);
 }
 }
 // NOLINTEND(bugprone-reserved-identifier,cert-dcl37-c,cert-dcl51-cpp,readability-inconsistent-declaration-parameter-name)
@@ -82,21 +161,36 @@ namespace {
 
 constexpr int kTicks = 10'000;
 
-TEST(Allocation, TheCounterCounts) {
+TEST(ServoPath, TheCountersCount) {
+  std::mutex mutex;
+  calls = {};
   watched = true;
   const auto something = std::make_unique<int>(1);
-  const std::size_t by_new = allocations;
+  const std::size_t by_new = calls.allocations;
   void* const memory = std::malloc(10);
-  const std::size_t by_malloc = allocations - by_new;
+  const std::size_t by_malloc = calls.allocations - by_new;
+  mutex.lock();
+  mutex.unlock();
+  std::this_thread::yield();
+  try {
+    throw 1;
+  } catch (int) {
+  }
+  if (::write(-1, "", 0) == 0) ADD_FAILURE() << "there is no such file";
   watched = false;
   std::free(memory);
   EXPECT_GE(by_new, 1U) << *something;
-  EXPECT_EQ(by_malloc, static_cast<std::size_t>(COUNTS_MALLOC));
+  if (COUNTS_CALLS == 0) GTEST_SKIP() << "skipped: a sanitizer brings its own functions";
+  EXPECT_EQ(by_malloc, 1U);
+  EXPECT_EQ(calls.locks, 1U);
+  EXPECT_EQ(calls.waits, 1U);
+  EXPECT_EQ(calls.throws, 1U);
+  EXPECT_EQ(calls.files, 1U);
 }
 
-class AllocationOf : public ::testing::TestWithParam<const char*> {};
+class ServoPathOf : public ::testing::TestWithParam<const char*> {};
 
-TEST_P(AllocationOf, AllItsTicks) {
+TEST_P(ServoPathOf, AllItsTicks) {
   std::unique_ptr<hybrid::Scene> scene;
   try {
     scene = std::make_unique<hybrid::Scene>(
@@ -112,7 +206,7 @@ TEST_P(AllocationOf, AllItsTicks) {
   hybrid::begin_session(*scene, *built.world, *built.state, device->read().position_m);
   const double dt = 1.0 / scene->rate_hz;
   std::size_t felt_ticks = 0;
-  allocations = 0;
+  calls = {};
   watched = true;
   for (int tick = 0; tick < kTicks; ++tick) {
     const hybrid::TickResult felt = hybrid::haptic_tick(*built.world, *built.state, device->read(), dt);
@@ -120,13 +214,13 @@ TEST_P(AllocationOf, AllItsTicks) {
     felt_ticks += felt.contacts != 0 ? 1 : 0;
   }
   watched = false;
-  EXPECT_EQ(allocations, 0U);
+  EXPECT_EQ(calls, Calls{});
   EXPECT_GT(felt_ticks, 500U) << "the path is meant to touch something";
   EXPECT_EQ(built.state->nonfinite, 0U);
   EXPECT_EQ(built.state->faults, 0U);
 }
 
-INSTANTIATE_TEST_SUITE_P(ShippedScenes, AllocationOf,
+INSTANTIATE_TEST_SUITE_P(ShippedScenes, ServoPathOf,
                          ::testing::Values("cube.toml", "sheet.toml", "ball-and-block.toml", "two-soft.toml",
                                            "head.toml", "thin-sheet.toml", "convex-edge.toml",
                                            "textured-plate.toml", "moving.toml", "wall.toml", "tissue.toml"),
@@ -138,7 +232,7 @@ INSTANTIATE_TEST_SUITE_P(ShippedScenes, AllocationOf,
                          });
 
 // A scene that is shipped later is watched too.
-TEST(Allocation, KnowsEveryShippedScene) {
+TEST(ServoPath, KnowsEveryShippedScene) {
   std::size_t scenes = 0;
   for (const auto& entry :
        std::filesystem::directory_iterator(std::filesystem::path(HYBRID_SOURCE_DIR) / "scenes")) {
