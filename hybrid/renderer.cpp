@@ -4,8 +4,10 @@
 #include <epoxy/gl.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/gtc/type_ptr.hpp>
 #include <limits>
@@ -69,8 +71,26 @@ const void* offset(std::size_t bytes) {
   return reinterpret_cast<const void*>(bytes);  // NOLINT(performance-no-int-to-ptr): how OpenGL wants it
 }
 
+using VertexColour = std::array<std::uint8_t, 4>;
+
+// Of the materials beneath an object's vertices; empty where it has one colour.
+std::vector<VertexColour> colours_of_vertices(const DrawnScene& scene, std::size_t index) {
+  const DrawnObject& object = scene.objects[index];
+  if (object.materials.empty()) return {};
+  std::vector<VertexColour> of_material, of_vertex;
+  for (const glm::vec3& c : palette::of_materials(scene, index)) {
+    const glm::vec3 byte = glm::round(255.0F * c);
+    of_material.push_back({static_cast<std::uint8_t>(byte.r), static_cast<std::uint8_t>(byte.g),
+                           static_cast<std::uint8_t>(byte.b), 255});
+  }
+  of_vertex.reserve(object.vertex_material.size());
+  for (const std::uint8_t m : object.vertex_material)
+    of_vertex.push_back(of_material[std::min<std::size_t>(m, of_material.size() - 1)]);
+  return of_vertex;
+}
+
 struct Mesh {
-  GLuint array = 0, vertices = 0, indices = 0;
+  GLuint array = 0, vertices = 0, indices = 0, colours = 0;
   GLsizei count = 0;
 
   void upload(const DrawMesh& mesh, GLenum usage) {
@@ -95,6 +115,16 @@ struct Mesh {
     glVertexAttribPointer(2, 1, GL_FLOAT, GL_FALSE, stride, offset(offsetof(DrawVertex, displacement_m)));
     for (GLuint i = 0; i < 3; ++i) glEnableVertexAttribArray(i);
     count = static_cast<GLsizei>(mesh.indices.size());
+  }
+  // A colour a vertex, sRGB, once.
+  void upload_colours(const std::vector<VertexColour>& of_vertex) {
+    glGenBuffers(1, &colours);
+    glBindVertexArray(array);
+    glBindBuffer(GL_ARRAY_BUFFER, colours);
+    glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(of_vertex.size() * sizeof(VertexColour)),
+                 of_vertex.data(), GL_STATIC_DRAW);
+    glVertexAttribPointer(3, 4, GL_UNSIGNED_BYTE, GL_TRUE, 0, offset(0));
+    glEnableVertexAttribArray(3);
   }
   // Orphans the old storage, so that the card need not wait for the last frame.
   void stream(const DrawMesh& mesh) const {
@@ -219,10 +249,12 @@ void Renderer::State::draw_objects(bool soft, int pass) const {
     if (object.soft != soft || object.mesh.count == 0) continue;
     place(object.placed);
     uniform("own_colour", object.colour);
+    uniform("coloured_vertices", object.mesh.colours != 0 ? 1 : 0);
     uniform("moved_scale", soft ? static_cast<float>(most_moved_m) : 0.0F);
     object.mesh.draw();
   }
   uniform("moved_scale", 0.0F);
+  uniform("coloured_vertices", 0);
   uniform("pass", 0);
 }
 
@@ -266,6 +298,9 @@ Renderer::Renderer(const DrawnScene& scene, Samples samples) : state_(std::make_
     DrawMesh mesh = object.soft ? make_moving_mesh(scene.objects[i].surface, s.origin_m)
                                 : make_draw_mesh(scene.objects[i].surface, s.origin_m);
     object.mesh.upload(mesh, object.soft ? GL_STREAM_DRAW : GL_STATIC_DRAW);
+    const std::vector<VertexColour> colours = colours_of_vertices(scene, i);
+    if (object.soft && colours.size() == mesh.vertices.size() && !colours.empty())
+      object.mesh.upload_colours(colours);
     if (object.soft) object.moving = std::move(mesh);
   }
   s.ball.upload(make_unit_ball(), GL_STATIC_DRAW);
