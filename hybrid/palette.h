@@ -34,18 +34,19 @@ inline constexpr std::array<glm::vec3, 6> soft{{{0.86F, 0.58F, 0.62F},
                                                 {0.75F, 0.48F, 0.72F}}};
 
 // Of the materials of one object. Found by a search in Oklab for the largest least distance between any two,
-// as seen by normal eyes and by those without the first or the second cone (Machado et al. 2009), and from the
-// colours above: each is told from every other by hue, or else by lightness. The first are furthest apart.
-inline constexpr std::array<glm::vec3, 10> material{{{0.91F, 0.50F, 0.58F},
-                                                     {0.35F, 0.27F, 0.62F},
-                                                     {0.69F, 0.85F, 0.52F},
-                                                     {0.20F, 0.70F, 0.85F},
-                                                     {0.60F, 0.26F, 0.50F},
-                                                     {0.96F, 0.79F, 0.89F},
-                                                     {0.47F, 0.40F, 0.31F},
-                                                     {0.30F, 0.62F, 0.40F},
-                                                     {0.58F, 0.52F, 0.90F},
-                                                     {0.04F, 0.47F, 0.68F}}};
+// as seen by normal eyes and by those without the first or the second cone (Machado et al. 2009), and from
+// the colours above: each is told from every other by hue, or else by lightness. The first are furthest
+// apart.
+inline constexpr std::array<glm::vec3, 10> material{{{0.86F, 0.57F, 0.57F},
+                                                     {0.54F, 0.71F, 0.96F},
+                                                     {0.74F, 0.90F, 0.56F},
+                                                     {0.54F, 0.28F, 0.53F},
+                                                     {0.36F, 0.56F, 0.62F},
+                                                     {0.98F, 0.79F, 0.94F},
+                                                     {0.45F, 0.37F, 0.33F},
+                                                     {0.68F, 0.52F, 0.80F},
+                                                     {0.61F, 0.62F, 0.37F},
+                                                     {0.20F, 0.38F, 0.68F}}};
 // Of every material beyond these: an honest "one of the rest" instead of a colour that means two things.
 inline constexpr glm::vec3 other_material{0.50F, 0.50F, 0.50F};
 
@@ -57,8 +58,8 @@ inline glm::vec3 of_object(const DrawnScene& scene, std::size_t index) {
   return is_soft ? soft[rank % soft.size()] : rigid[rank % rigid.size()];
 }
 
-// Colours of an object's materials, in their order; of none: the object's own. A material has one colour in the
-// whole scene, so the colours are dealt by name, object after object.
+// Colours of an object's materials, in their order; of none: the object's own. A material has one colour in
+// the whole scene, so the colours are dealt by name, object after object.
 inline std::vector<glm::vec3> of_materials(const DrawnScene& scene, std::size_t index) {
   if (scene.objects[index].materials.empty()) return {of_object(scene, index)};
   std::vector<std::string> dealt;
