@@ -7,6 +7,7 @@
 #include <array>
 #include <cstddef>
 #include <glm/common.hpp>
+#include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 #include <string>
 #include <vector>
@@ -58,17 +59,33 @@ inline glm::vec3 of_object(const DrawnScene& scene, std::size_t index) {
   return is_soft ? soft[rank % soft.size()] : rigid[rank % rigid.size()];
 }
 
+// The colours that materials are dealt: those unlike the colours of the scene's soft objects of one material.
+inline std::vector<glm::vec3> free_for_materials(const DrawnScene& scene) {
+  constexpr float alike = 0.25F;
+  std::vector<glm::vec3> free(material.begin(), material.end());
+  std::size_t rank = 0;
+  for (const DrawnObject& object : scene.objects) {
+    if (!object.soft) continue;
+    const glm::vec3 own = soft[rank++ % soft.size()];
+    if (!object.materials.empty()) continue;
+    std::erase_if(free, [&](const glm::vec3& c) { return glm::distance(c, own) < alike; });
+    if (rank >= soft.size()) break;  // those that follow have the same colours
+  }
+  return free;
+}
+
 // Colours of an object's materials, in their order; of none: the object's own. A material has one colour in
 // the whole scene, so the colours are dealt by name, object after object.
 inline std::vector<glm::vec3> of_materials(const DrawnScene& scene, std::size_t index) {
   if (scene.objects[index].materials.empty()) return {of_object(scene, index)};
+  const std::vector<glm::vec3> free = free_for_materials(scene);
   std::vector<std::string> dealt;
   std::vector<glm::vec3> colours;
   for (std::size_t i = 0; i <= index; ++i) {
     for (const std::string& name : scene.objects[i].materials) {
       const auto rank = static_cast<std::size_t>(std::ranges::find(dealt, name) - dealt.begin());
       if (rank == dealt.size()) dealt.push_back(name);
-      if (i == index) colours.push_back(rank < material.size() ? material[rank] : other_material);
+      if (i == index) colours.push_back(rank < free.size() ? free[rank] : other_material);
     }
   }
   return colours;
