@@ -85,8 +85,8 @@ std::vector<PixelBox> boxes_to_keep_clear(const Pen& pen, const DrawnScene& scen
   return boxes;
 }
 
-// Top left, bottom left, top right, bottom right; beside what stands there already, and on the picture as far
-// as it fits.
+// Top left, bottom left, then the right corners, the emptier first; beside what stands there already, and on
+// the picture as far as it fits.
 std::vector<PixelBox> corners(const Pen& pen, const Furniture& furniture, const OverlayContent& content,
                               const glm::vec2& size) {
   const float em = pen.em;
@@ -98,10 +98,12 @@ std::vector<PixelBox> corners(const Pen& pen, const Furniture& furniture, const 
   const float lowest = std::max(furniture.above - gap - size.y, furniture.below);
   const float bottom =
       std::max(whole.y - (content.help.empty() ? 1.0F : 2.4F) * em - size.y, furniture.below);
+  const glm::vec2 top_right(std::max(right_of - size.x, left), furniture.below);
+  const glm::vec2 bottom_right(std::max(right_low - size.x, left), bottom);
   std::vector<PixelBox> places;
-  for (const glm::vec2& low : {glm::vec2(left, furniture.below), glm::vec2(left, lowest),
-                               glm::vec2(std::max(right_of - size.x, left), furniture.below),
-                               glm::vec2(std::max(right_low - size.x, left), bottom)}) {
+  for (const glm::vec2& low :
+       {glm::vec2(left, furniture.below), glm::vec2(left, lowest), content.inset ? top_right : bottom_right,
+        content.inset ? bottom_right : top_right}) {
     places.push_back({low, low + size});
   }
   return places;
