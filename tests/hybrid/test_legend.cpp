@@ -97,7 +97,7 @@ TEST(MaterialColours, AreUnlikeOneAnotherAndOnesOwnInAScene) {
   for (const glm::vec3& c : first) EXPECT_GT(glm::distance(c, gel[0]), 0.2F);
 }
 
-TEST_F(DrawnSceneOf, LayersHasTheMaterialBeneathEachVertex) {
+TEST_F(DrawnSceneOf, HasTheMaterialBeneathEachVertex) {
   const std::string text =
       "format = 1\nunits = \"mm\"\n[material.lean]\nyoung = 9000\n[material.fat]\nyoung = 3000\n" +
       tests::block + "layers = [{ thickness = 3, label = 3 }, { thickness = 7, label = 1 }]\n" +
@@ -129,6 +129,28 @@ TEST_F(DrawnSceneOf, LayersHasTheMaterialBeneathEachVertex) {
     }
   }
   EXPECT_EQ(seen.size(), 2U);
+}
+
+// Thinning gives what it leaves labels of its own; they are of the tissue that they stand for.
+TEST_F(DrawnSceneOf, ThinnedTissueHasTheMaterialsItHad) {
+  const std::string text =
+      "format = 1\nunits = \"mm\"\n[material.lean]\nyoung = 9000\n[material.fat]\nyoung = 3000\n" +
+      tests::block + "layers = [{ thickness = 4, label = 3 }, { thickness = 6, label = 1 }]\n" +
+      "materials = { \"1\" = \"lean\", \"3\" = \"fat\" }\n";
+  const hybrid::Scene whole = load(text + tests::path);
+  const hybrid::Scene thinned = load(text + "thinning = { labels = [1], every = 2 }\n" + tests::path);
+  const hybrid::BuiltScene built = hybrid::build_scene(whole), fewer = hybrid::build_scene(thinned);
+  ASSERT_FALSE(fewer.world->soft[0].struts.empty());
+  const DrawnObject a = hybrid::drawn_scene(whole, built, "whole").objects[0];
+  const DrawnObject b = hybrid::drawn_scene(thinned, fewer, "thinned").objects[0];
+  EXPECT_EQ(a.materials.size(), 2U);
+  EXPECT_EQ(a.materials, b.materials);
+  ASSERT_EQ(a.vertex_material.size(), b.vertex_material.size());
+  // Where both meet, what thinning left out has no say in what most of the voxels are of.
+  std::size_t same = 0;
+  for (std::size_t v = 0; v < a.vertex_material.size(); ++v)
+    same += a.vertex_material[v] == b.vertex_material[v] ? 1U : 0U;
+  EXPECT_GT(same, a.vertex_material.size() * 9 / 10);
 }
 
 TEST_F(DrawnSceneOf, OneMaterialCarriesNothing) {
