@@ -4,10 +4,8 @@
 #include <epoxy/gl.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
-#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/gtc/type_ptr.hpp>
 #include <limits>
@@ -69,24 +67,6 @@ GLuint link(const char* vertex, const char* fragment) {
 
 const void* offset(std::size_t bytes) {
   return reinterpret_cast<const void*>(bytes);  // NOLINT(performance-no-int-to-ptr): how OpenGL wants it
-}
-
-using VertexColour = std::array<std::uint8_t, 4>;
-
-// Of the materials beneath an object's vertices; empty where it has one colour.
-std::vector<VertexColour> colours_of_vertices(const DrawnScene& scene, std::size_t index) {
-  const DrawnObject& object = scene.objects[index];
-  if (object.materials.empty()) return {};
-  std::vector<VertexColour> of_material, of_vertex;
-  for (const glm::vec3& c : palette::of_materials(scene, index)) {
-    const glm::vec3 byte = glm::round(255.0F * c);
-    of_material.push_back({static_cast<std::uint8_t>(byte.r), static_cast<std::uint8_t>(byte.g),
-                           static_cast<std::uint8_t>(byte.b), 255});
-  }
-  of_vertex.reserve(object.vertex_material.size());
-  for (const std::uint8_t m : object.vertex_material)
-    of_vertex.push_back(of_material[std::min<std::size_t>(m, of_material.size() - 1)]);
-  return of_vertex;
 }
 
 struct Mesh {
