@@ -26,7 +26,6 @@ namespace {
 constexpr int kSurfaceSmoothing = 6;  // of a soft object's drawn surface
 // Cells along the scene's longest side, at most, unless the scene says otherwise: 64 bricks however they lie.
 constexpr double kMostCells = 504.0;
-constexpr double kDrawnPoint = 0.004;      // of the scene: a tool is drawn no smaller
 constexpr double kRigidCells = 200.0;      // where nothing is soft: finer cells name no fewer objects
 constexpr std::size_t kMapReserve = 2048;  // bricks that motion may add
 constexpr double kFarthestLook = 32.0;     // spacings that one distance query may clear of carving
@@ -401,23 +400,6 @@ std::uint64_t usable_memory_bytes() {
   const long pages = sysconf(_SC_PHYS_PAGES), size = sysconf(_SC_PAGE_SIZE);
   return pages > 0 && size > 0 ? static_cast<std::uint64_t>(pages) * static_cast<std::uint64_t>(size)
                                : 4ULL << 30;
-}
-
-DrawnScene drawn_scene(const World& world, const std::string& title) {
-  DrawnScene drawn{.title = title,
-                   .objects = {},
-                   .tool_is_punch = world.tool.shape == Tool::Shape::punch,
-                   .tool_radius_m = std::max(world.tool.radius_m, kDrawnPoint * world.extent_m),
-                   .max_force_N = world.limits.max_force_N};
-  for (const RigidObject& object : world.rigid) {
-    drawn.objects.push_back({object.name, false, *object.drawn});
-    for (glm::dvec3& v : drawn.objects.back().surface.vertices) v = object.to_scene(v);
-  }
-  for (const SoftBody& body : world.soft) {
-    drawn.objects.push_back({body.name, true, body.drawn});
-    for (glm::dvec3& v : drawn.objects.back().surface.vertices) v = body.to_scene(v);
-  }
-  return drawn;
 }
 
 ObjectBox object_box(const World& world, std::size_t object) {

@@ -40,9 +40,8 @@ double rigid_cell_m(double longest_m, double tool_radius_m);
 
 BuiltScene build_scene(const Scene& scene, const Progress& progress = {});
 
-// Surfaces for graphics, at rest; and where what moves is, filled in place (no allocation once its vectors
-// have their size).
-DrawnScene drawn_scene(const World& world, const std::string& title);
+// Where what moves is, for graphics (drawn_scene.h has what stays), filled in place: no allocation once its
+// vectors have their size.
 void fill_moved(const World& world, const WorldState& state, Snapshot& snapshot);
 
 // Where an object lies at rest (scene frame, meters), rigid ones first; in words: "x 1.2 to 3.4, y …, z …

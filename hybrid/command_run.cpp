@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "hybrid/commands.h"
+#include "hybrid/drawn_scene.h"
 #include "hybrid/picture.h"
 #include "hybrid/plot.h"
 #include "hybrid/real_device.h"
@@ -138,7 +139,7 @@ int run(const RunCommand& command) {
     save_session_plot(command.plot, result.rows, objects, title);
   }
   if (!command.picture.empty())
-    save_picture(command.picture, drawn_scene(*built.world, title), *result.moment);
+    save_picture(command.picture, drawn_scene(scene, built, title), *result.moment);
   if (!command.record.empty()) {
     save_recording(command.record, {std::filesystem::absolute(command.scene), read_text(command.scene),
                                     result.dt_s, scene_limits(scene), result.state_hash, result.recording});

@@ -12,6 +12,7 @@
 #include "device/servo_loop.h"
 #include "device/simulated.h"
 #include "hybrid/commands.h"
+#include "hybrid/drawn_scene.h"
 #include "hybrid/hand_over.h"
 #include "hybrid/real_device.h"
 #include "hybrid/session.h"
@@ -215,7 +216,7 @@ int view(const ViewCommand& command) {
   end_progress();
   print_notes(built);
   const DrawnScene drawn =
-      drawn_scene(*built.world, scene.title.empty() ? command.scene.stem().string() : scene.title);
+      drawn_scene(scene, built, scene.title.empty() ? command.scene.stem().string() : scene.title);
   Window window(drawn);
   if (real) {
     std::fprintf(stderr, "note: %s\n", place_real_device(scene, *built.world, *real).c_str());

@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "hybrid/palette.h"
 #include "polygon/mesh.h"
 
 namespace hybrid {
@@ -146,6 +148,21 @@ DrawMesh make_draw_mesh(const polygon::TriangleMesh& mesh, const glm::dvec3& ori
 
 DrawMesh make_moving_mesh(const polygon::TriangleMesh& mesh, const glm::dvec3& origin_m) {
   return shared_mesh(mesh, origin_m);
+}
+
+std::vector<VertexColour> colours_of_vertices(const DrawnScene& scene, std::size_t index) {
+  const DrawnObject& object = scene.objects[index];
+  if (object.materials.empty()) return {};
+  std::vector<VertexColour> of_material, of_vertex;
+  for (const glm::vec3& c : palette::of_materials(scene, index)) {
+    const glm::vec3 byte = glm::round(255.0F * c);
+    of_material.push_back({static_cast<std::uint8_t>(byte.r), static_cast<std::uint8_t>(byte.g),
+                           static_cast<std::uint8_t>(byte.b), 255});
+  }
+  of_vertex.reserve(object.vertex_material.size());
+  for (const std::uint8_t m : object.vertex_material)
+    of_vertex.push_back(of_material[std::min<std::size_t>(m, of_material.size() - 1)]);
+  return of_vertex;
 }
 
 float move_vertices(DrawMesh& draw, std::span<const glm::dvec3> rest, std::span<const glm::vec3> moved_m,

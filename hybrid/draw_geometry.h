@@ -2,11 +2,14 @@
 // Meshes as a graphics card wants them: floats about an origin, with normals. Knows no graphics library.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <span>
 #include <vector>
 
+#include "hybrid/snapshot.h"
 #include "polygon/mesh.h"
 
 namespace hybrid {
@@ -30,6 +33,11 @@ DrawMesh make_draw_mesh(const polygon::TriangleMesh& mesh, const glm::dvec3& ori
 
 // One vertex a mesh vertex, in the mesh's order, so that move_vertices() can follow.
 DrawMesh make_moving_mesh(const polygon::TriangleMesh& mesh, const glm::dvec3& origin_m);
+
+// Colours (sRGB) of the materials beneath an object's vertices, in the mesh's order; empty where it has one
+// colour.
+using VertexColour = std::array<std::uint8_t, 4>;
+std::vector<VertexColour> colours_of_vertices(const DrawnScene& scene, std::size_t index);
 
 // Puts the vertices of a moving mesh where they are now, `moved_m` from rest; normals and displacements
 // follow. Vertices whose displacement is not finite stay at rest. Returns the largest displacement (unit:

@@ -13,7 +13,11 @@ add_library(hybrid_drawing STATIC
   ${CMAKE_CURRENT_LIST_DIR}/felt_geometry.cpp
   ${CMAKE_CURRENT_LIST_DIR}/renderer.cpp
   ${CMAKE_CURRENT_LIST_DIR}/occupancy_plot.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/legend.cpp
   ${CMAKE_CURRENT_LIST_DIR}/overlay.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/overlay_legend.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/overlay_parts.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/pen.cpp
   ${CMAKE_CURRENT_LIST_DIR}/frame_painter.cpp
   ${CMAKE_CURRENT_LIST_DIR}/png_file.cpp
   ${CMAKE_CURRENT_LIST_DIR}/picture.cpp

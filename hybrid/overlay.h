@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The words on a picture: title, time, legend, colour scale, scale bar, labels, and in the window a strip of
 // force and a line of help. The only part of the project that knows Dear ImGui; it uses its draw lists and
-// its font, and no backend: what it makes is triangles in pixels.
+// its font (pen.cpp), and no backend: what it makes is triangles in pixels. Its parts are in
+// overlay_parts.h.
 #pragma once
 
 #include <functional>
@@ -58,6 +59,12 @@ class Overlay {
 
 // "12 mm", "0.5 µm", "3 m": at most three digits, in the unit a person would say.
 std::string length_text(double length_m);
+
+// "1.20 N": three digits where there are so many, to a thousandth of a newton.
+std::string force_text(double force_N);
+
+// A number in a printf format that has one %g or %f.
+std::string number_text(double value, const char* format);
 
 // Largest of 1, 2, 5 · 10^n that is at most `value`; 0 when value is not positive or not finite.
 double round_down(double value);

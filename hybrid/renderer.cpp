@@ -70,7 +70,7 @@ const void* offset(std::size_t bytes) {
 }
 
 struct Mesh {
-  GLuint array = 0, vertices = 0, indices = 0;
+  GLuint array = 0, vertices = 0, indices = 0, colours = 0;
   GLsizei count = 0;
 
   void upload(const DrawMesh& mesh, GLenum usage) {
@@ -95,6 +95,16 @@ struct Mesh {
     glVertexAttribPointer(2, 1, GL_FLOAT, GL_FALSE, stride, offset(offsetof(DrawVertex, displacement_m)));
     for (GLuint i = 0; i < 3; ++i) glEnableVertexAttribArray(i);
     count = static_cast<GLsizei>(mesh.indices.size());
+  }
+  // A colour a vertex, sRGB, once.
+  void upload_colours(const std::vector<VertexColour>& of_vertex) {
+    glGenBuffers(1, &colours);
+    glBindVertexArray(array);
+    glBindBuffer(GL_ARRAY_BUFFER, colours);
+    glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(of_vertex.size() * sizeof(VertexColour)),
+                 of_vertex.data(), GL_STATIC_DRAW);
+    glVertexAttribPointer(3, 4, GL_UNSIGNED_BYTE, GL_TRUE, 0, offset(0));
+    glEnableVertexAttribArray(3);
   }
   // Orphans the old storage, so that the card need not wait for the last frame.
   void stream(const DrawMesh& mesh) const {
@@ -219,10 +229,12 @@ void Renderer::State::draw_objects(bool soft, int pass) const {
     if (object.soft != soft || object.mesh.count == 0) continue;
     place(object.placed);
     uniform("own_colour", object.colour);
+    uniform("coloured_vertices", object.mesh.colours != 0 ? 1 : 0);
     uniform("moved_scale", soft ? static_cast<float>(most_moved_m) : 0.0F);
     object.mesh.draw();
   }
   uniform("moved_scale", 0.0F);
+  uniform("coloured_vertices", 0);
   uniform("pass", 0);
 }
 
@@ -266,6 +278,9 @@ Renderer::Renderer(const DrawnScene& scene, Samples samples) : state_(std::make_
     DrawMesh mesh = object.soft ? make_moving_mesh(scene.objects[i].surface, s.origin_m)
                                 : make_draw_mesh(scene.objects[i].surface, s.origin_m);
     object.mesh.upload(mesh, object.soft ? GL_STREAM_DRAW : GL_STATIC_DRAW);
+    const std::vector<VertexColour> colours = colours_of_vertices(scene, i);
+    if (object.soft && colours.size() == mesh.vertices.size() && !colours.empty())
+      object.mesh.upload_colours(colours);
     if (object.soft) object.moving = std::move(mesh);
   }
   s.ball.upload(make_unit_ball(), GL_STATIC_DRAW);

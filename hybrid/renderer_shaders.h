@@ -8,18 +8,21 @@ inline constexpr const char* mesh_vertex = R"(#version 330 core
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 normal;
 layout(location = 2) in float displacement;
+layout(location = 3) in vec3 vertex_colour;
 uniform mat4 scene_from_mesh;   // scene: relative to the renderer's origin
 uniform mat3 normal_from_mesh;
 uniform mat4 clip_from_scene;
 out vec3 scene_position;
 out vec3 scene_normal;
 out float moved;
+out vec3 material_colour;
 invariant gl_Position;  // equal depths in every program
 void main() {
   vec4 at = scene_from_mesh * vec4(position, 1.0);
   scene_position = at.xyz;
   scene_normal = normal_from_mesh * normal;
   moved = displacement;
+  material_colour = vertex_colour;
   gl_Position = clip_from_scene * at;
 }
 )";
@@ -31,10 +34,12 @@ inline constexpr const char* mesh_fragment = R"(#version 330 core
 in vec3 scene_position;
 in vec3 scene_normal;
 in float moved;
+in vec3 material_colour;
 uniform vec3 eye;
 uniform vec3 light_right;   // camera axes: the light moves with the eye
 uniform vec3 light_up;
 uniform vec3 own_colour;
+uniform bool coloured_vertices;  // material_colour in place of own_colour
 uniform vec3 moved_half;
 uniform vec3 moved_most;
 uniform float moved_scale;  // 0: the object does not move
@@ -64,10 +69,11 @@ void main() {
     if (pass == 2) a = mix(0.17, 0.80, pow(1.0 - facing, 1.7));
   }
 
-  vec3 base = own_colour;
+  vec3 own = coloured_vertices ? material_colour : own_colour;
+  vec3 base = own;
   if (moved_scale > 0.0) {
     float t = clamp(moved / moved_scale, 0.0, 1.0);
-    base = t < 0.5 ? mix(own_colour, moved_half, t * 2.0) : mix(moved_half, moved_most, t * 2.0 - 1.0);
+    base = t < 0.5 ? mix(own, moved_half, t * 2.0) : mix(moved_half, moved_most, t * 2.0 - 1.0);
     // A thin darker line every tenth of the scale: contours show shape where colour alone does not.
     float line = t * 10.0;
     float width = max(fwidth(line), 1e-4);

@@ -17,6 +17,10 @@ struct DrawnObject {
   std::string name;
   bool soft = false;
   polygon::TriangleMesh surface;  // scene frame, meters, at rest
+  // Of a soft object whose surface is of several materials, else both empty: their names, the one with the
+  // most surface first, and for each vertex which of them lies beneath it.
+  std::vector<std::string> materials{};
+  std::vector<std::uint8_t> vertex_material{};
 };
 
 struct DrawnScene {

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the overlay draws with: lines, plates and words in pixels (y down), of one list and two fonts.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <string>
+
+struct ImDrawList;
+struct ImFont;
+
+namespace hybrid {
+
+using Ink = std::uint32_t;  // 0xAABBGGRR
+
+constexpr Ink ink_of(std::uint32_t r, std::uint32_t g, std::uint32_t b, std::uint32_t alpha = 255) {
+  return alpha << 24 | b << 16 | g << 8 | r;
+}
+Ink ink_of(const glm::vec3& colour, float alpha = 1.0F);  // sRGB, 0 to 1
+
+inline constexpr Ink kInk = ink_of(28, 33, 41);
+inline constexpr Ink kPaleInk = ink_of(92, 101, 114);
+inline constexpr Ink kPaper = ink_of(255, 255, 255, 222);
+inline constexpr Ink kEdge = ink_of(160, 168, 178);
+
+struct Pen {
+  ImDrawList* list = nullptr;
+  ImFont* body = nullptr;
+  ImFont* head = nullptr;
+  float em = 13.0F;  // height of body text (pixels)
+
+  [[nodiscard]] float width(const std::string& text, bool large = false) const;
+  void text(float x, float y, Ink ink, const std::string& words, bool large = false) const;
+  // On a light plate, for words over the scene.
+  void label(float x, float y, Ink ink, const std::string& words) const;
+  void plate(float x, float y, float w, float h) const;
+  void fill(const glm::vec2& low, const glm::vec2& high, Ink ink, float round = 0.0F) const;
+  void frame(const glm::vec2& low, const glm::vec2& high, Ink ink, float round = 0.0F,
+             float thick = 1.0F) const;
+  void line(const glm::vec2& from, const glm::vec2& to, Ink ink, float thick = 1.0F) const;
+  void circle(const glm::vec2& centre, float radius, Ink ink, float thick) const;
+  // Shortened at the end so that it is at most `most` pixels wide; cuts between UTF-8 characters.
+  [[nodiscard]] std::string fit(std::string words, float most) const;
+};
+
+}  // namespace hybrid
