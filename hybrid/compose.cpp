@@ -83,6 +83,7 @@ void place_inputs(const std::vector<std::string>& words, std::vector<Input>& inp
         std::find_if(inputs.begin(), inputs.end(), [&](const Input& i) { return i.name == name; });
     if (found == inputs.end()) {
       std::vector<std::string_view> known;
+      known.reserve(inputs.size());
       for (const Input& i : inputs) known.push_back(i.name);
       throw ComposeError(fmt::format("--place {}: no input has this name; {}", word,
                                      known.empty() ? std::string("there is none that can be placed")

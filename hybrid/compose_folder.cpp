@@ -44,7 +44,7 @@ ComposeFolder::~ComposeFolder() {
 }
 
 fs::path ComposeFolder::claim(const std::string& name) {
-  const fs::path file = folder_ / name;
+  fs::path file = folder_ / name;
   std::error_code error;
   const bool ours = std::find(fresh_.begin(), fresh_.end(), file) != fresh_.end();
   if (!fs::exists(file, error)) {
