@@ -61,7 +61,7 @@ int extremes(const ExtremesCommand& command) {
   if (command.fuzz_ticks > 0) report["fuzz"] = fuzz(command, words, ok);
   report["ok"] = ok;
   if (!command.json.empty()) save_json(command.json, report);
-  return 0;
+  return ok ? 0 : 1;
 }
 
 }  // namespace hybrid

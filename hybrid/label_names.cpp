@@ -149,6 +149,7 @@ std::set<int> chosen_labels(const std::vector<std::string>& words, const LabelNa
                                      listed(present, names)));
     }
     std::vector<std::string_view> candidates;
+    candidates.reserve(present.size());
     for (const int label : present) candidates.push_back(names.at(label));
     if (number || word.find_first_of("*?") != std::string::npos) {
       throw ComposeError(
