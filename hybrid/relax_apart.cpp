@@ -7,21 +7,40 @@
 
 #include "hybrid/session.h"
 #include "hybrid/world.h"
+#include "voxel/replica.h"
 
 namespace hybrid {
+
+struct RelaxedApart {
+  explicit RelaxedApart(voxel::SoftObject& object) : replica(object) {}
+  enum class Phase : std::uint8_t { tick, thread };  // whose turn it is
+
+  voxel::Replica replica;
+  std::atomic<Phase> phase{Phase::tick};
+  // ---- the tick's ----
+  bool given = false, taking = false;
+  std::uint64_t due = 0;  // tick; of Arrival::counted
+};
+
+Apart::Apart() = default;
+Apart::~Apart() = default;
+
 namespace {
 
-constexpr std::size_t kMostApart = 64;  // bits of Apart::arrived
-constexpr std::size_t kRowsTaken = 1500;  // a tick: what a result is added to, about 100 us of it
+constexpr std::size_t kMostApart = 64;   // bits of Apart::arrived
+constexpr std::size_t kRowsTaken = 250;  // a tick: what a result is added to, about 100 us of it
 // Rows that another core relaxes in a tick's time, so that a fixed-step session takes results as late as one
 // in real time does.
 constexpr std::uint64_t kRowsRelaxed = 1000;
 
 bool has_arrived(const Apart& apart, const RelaxedApart& object, std::size_t o, std::uint64_t tick) noexcept {
   switch (apart.arrival) {
-    case Arrival::counted: return tick >= object.due;
-    case Arrival::thread: return object.phase.load(std::memory_order_acquire) == RelaxedApart::Phase::tick;
-    case Arrival::recorded: break;
+    case Arrival::counted:
+      return tick >= object.due;
+    case Arrival::thread:
+      return object.phase.load(std::memory_order_acquire) == RelaxedApart::Phase::tick;
+    case Arrival::recorded:
+      break;
   }
   return (apart.arrived >> o & 1U) != 0;
 }

@@ -2,9 +2,9 @@
 // The background stage of the tick: tissue away from the contact goes on to its equilibrium, in the tick, by
 // a budget of voxel updates, or apart from it, on a thread of its own (voxel/replica.h).
 //
-// Apart, the tick gives what moved and takes what was found; it never waits. When a result is there depends on
-// the machine, and nothing else does, so the tick in which one is first taken is recorded, and a session that
-// is played again takes it in the same tick.
+// Apart, the tick gives what moved and takes what was found; it never waits. When a result is there depends
+// on the machine, and nothing else does, so the tick in which one is first taken is recorded, and a session
+// that is played again takes it in the same tick.
 #pragma once
 
 #include <atomic>
@@ -13,8 +13,6 @@
 #include <memory>
 #include <thread>
 #include <vector>
-
-#include "voxel/replica.h"
 
 namespace hybrid {
 
@@ -28,18 +26,16 @@ enum class Arrival : std::uint8_t {
   recorded,  // at once, and in the tick that `arrived` says
 };
 
-struct RelaxedApart {
-  explicit RelaxedApart(voxel::SoftObject& object) : replica(object) {}
-  enum class Phase : std::uint8_t { tick, thread };  // whose turn it is
-
-  voxel::Replica replica;
-  std::atomic<Phase> phase{Phase::tick};
-  // ---- the tick's ----
-  bool given = false, taking = false;
-  std::uint64_t due = 0;  // tick; of Arrival::counted
-};
+struct RelaxedApart;  // one object, and whose turn it is
 
 struct Apart {
+  Apart();
+  ~Apart();
+  Apart(const Apart&) = delete;
+  Apart& operator=(const Apart&) = delete;
+  Apart(Apart&&) = delete;
+  Apart& operator=(Apart&&) = delete;
+
   Arrival arrival = Arrival::counted;
   std::vector<std::unique_ptr<RelaxedApart>> objects;  // [soft]; null, or none at all: relaxed in the tick
   // Bit o: in this tick the result of soft object o began to be taken. With Arrival::recorded said before the
@@ -55,8 +51,8 @@ void relax_apart(WorldState& state, Arrival arrival);
 // The stage.
 void relax_background(const World& world, WorldState& state) noexcept;
 
-// Relaxes what the tick gives, until it is destroyed. It looks every 100 us whether there is something: to wake
-// it would be a call into the system from the tick.
+// Relaxes what the tick gives, until it is destroyed. It looks every 100 us whether there is something: to
+// wake it would be a call into the system from the tick.
 class RelaxationThread {
  public:
   explicit RelaxationThread(Apart& apart);
