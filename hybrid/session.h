@@ -14,6 +14,7 @@
 #include "device/servo_loop.h"
 #include "hybrid/black_box.h"
 #include "hybrid/build.h"
+#include "hybrid/clearance.h"
 #include "hybrid/tick.h"
 #include "hybrid/time_spread.h"
 
@@ -35,10 +36,11 @@ struct SessionOptions {
   // A real one, open, placed in the scene and out of anything rigid; always in real time. None: the scene's
   // simulated one.
   device::HapticDevice* real_device = nullptr;
-  bool keep_rows = true;       // trace rows and per-object forces
-  bool keep_recording = true;  // every input, 32 bytes a tick: without it and the rows memory stays flat
-  bool keep_picture = false;   // remember the most telling moment
-  int reference_samples = 0;   // how often the force is compared with its equilibrium; 0 in real time
+  bool keep_rows = true;        // trace rows and per-object forces
+  bool keep_recording = true;   // every input, 32 bytes a tick: without it and the rows memory stays flat
+  bool keep_clearance = false;  // how near objects come, at a thousand moments
+  bool keep_picture = false;    // remember the most telling moment
+  int reference_samples = 0;    // how often the force is compared with its equilibrium; 0 in real time
   // Clocks and counters begin as after so many ticks, and the path so much later; nothing felt may differ. (A
   // soft start is over by then.)
   std::uint64_t start_ticks = 0;
@@ -59,6 +61,7 @@ struct SessionResult {
   std::uint64_t state_hash = 0;
   std::vector<TraceRow> rows;
   std::vector<std::vector<double>> object_force_N;  // [object][row]
+  ClearanceCourse clearance;                        // of keep_clearance, where anything is soft
   std::vector<std::uint64_t> object_contact_ticks;  // [object]
   std::vector<double> object_max_force_N;           // [object]
   TimeSpread tick_us;
