@@ -63,13 +63,13 @@ std::size_t find_obstacles(const World& world, WorldState& state, std::size_t so
   const auto surface = object.lattice().surface();
   const double range = kObstacleRange * object.lattice().max_spacing_m();
   std::size_t count = 0;
+  // Also where nothing is near: it may be pressed further than one looks.
+  object.reserve_obstacles();
+  state.obstacle_seen[soft].assign(surface.size(), glm::vec3(0.0F));
   for (std::size_t s = 0; s < surface.size(); ++s) {
     const NearestRigid near = nearest_rigid(world, state, body.to_scene(object.position(surface[s])), range);
     if (!near.found) continue;
-    if (count++ == 0) {
-      object.reserve_obstacles();
-      state.obstacle_seen[soft].assign(surface.size(), glm::vec3(0.0F));
-    }
+    ++count;
     voxel::Obstacle obstacle = obstacle_of(body, object, surface[s], near);
     obstacle.bound = std::min(obstacle.bound, 0.0F);  // nothing presses at rest
     object.set_obstacle(s, obstacle);
@@ -105,8 +105,10 @@ void refresh_obstacles(const World& world, WorldState& state) noexcept {
       // A thin sheet seen from its other side: the voxel was squeezed through by rounding; its own side
       // stands.
       if (had && glm::dot(old.normal, fresh.normal) < 0.0F) return;
-      // A voxel that overlaps may not be thrown out at once: the depth it has stays.
-      fresh.bound = std::min(fresh.bound, glm::dot(fresh.normal, u));
+      // A voxel that overlaps may not be thrown out at once: it comes out by as much as is looked at anew.
+      // (The depth it has was left to it once: then a fast tool presses it in deeper tick by tick, and
+      // through.)
+      fresh.bound = std::min(fresh.bound, glm::dot(fresh.normal, u) + enough);
       object.set_obstacle(s, fresh);
     };
     for (const voxel::VoxelId v : object.touched()) look(object.surface_number(v));

@@ -119,6 +119,7 @@ int run(const RunCommand& command) {
       .real_device = real.get(),
       .keep_rows = !command.trace.empty() || !command.plot.empty(),
       .keep_recording = !command.record.empty(),
+      .keep_clearance = !command.plot.empty(),
       .keep_picture = !command.picture.empty(),
       .reference_samples = command.samples,
       .start_ticks = command.start_ticks,
@@ -139,7 +140,7 @@ int run(const RunCommand& command) {
       objects.push_back({o < rigid ? built.world->rigid[o].name : built.world->soft[o - rigid].name,
                          o >= rigid, result.object_force_N[o]});
     }
-    save_session_plot(command.plot, result.rows, objects, title);
+    save_session_plot(command.plot, result.rows, objects, title, result.clearance);
   }
   if (!command.picture.empty())
     save_picture(command.picture, drawn_scene(scene, built, title), *result.moment);

@@ -180,10 +180,36 @@ bool some_turn_round(std::span<const ComparedModel> models, const ComparedModel&
   });
 }
 
+// How near tissue comes to what is rigid, and to other tissue. Without series where it never comes near.
+Panel clearance_panel(const ClearanceCourse& near) {
+  Panel panel;
+  panel.title = "Between objects (0: they touch; below: they overlap)";
+  panel.y_label = "gap (mm)";
+  panel.height = 150.0;
+  panel.from_zero = true;
+  const auto add = [&](const char* name, const std::vector<double>& gap_m, std::size_t colour) {
+    std::vector<double> gap_mm;
+    double deepest = 0.0;
+    for (const double g : gap_m) {
+      gap_mm.push_back(g * 1e3);
+      if (g < deepest) deepest = g;
+    }
+    if (std::ranges::none_of(gap_mm, [](double g) { return std::isfinite(g); })) return;
+    panel.series.push_back({std::string(name) + ", at most " +
+                                text_of(100.0 * std::fabs(deepest) / near.cell_m, "%.2f %%") +
+                                " of a cell deep",
+                            near.t_s, std::move(gap_mm), series_colour(colour)});
+  };
+  add("tissue and rigid", near.rigid_m, 0);
+  add("tissue and tissue", near.soft_m, 1);
+  return panel;
+}
+
 }  // namespace
 
 void save_session_plot(const std::filesystem::path& svg, std::span<const TraceRow> rows,
-                       std::span<const PlottedObject> objects, const std::string& title) {
+                       std::span<const PlottedObject> objects, const std::string& title,
+                       const ClearanceCourse& near) {
   const std::vector<double> t = times(rows);
   const Intervals any = contact_intervals(rows, ~0U);
   Figure figure;
@@ -253,6 +279,11 @@ void save_session_plot(const std::filesystem::path& svg, std::span<const TraceRo
   group.panels.push_back(std::move(force));
   if (!contact.lanes.empty()) group.panels.push_back(std::move(contact));
   group.panels.push_back(std::move(depth));
+  Panel gaps = clearance_panel(near);
+  if (!gaps.series.empty()) {
+    gaps.bands.push_back({"", any, touched_colour});
+    group.panels.push_back(std::move(gaps));
+  }
   figure.groups.push_back(std::move(group));
   save_svg(svg, figure);
 }

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "hybrid/clearance.h"
 #include "hybrid/snapshot.h"
 
 namespace hybrid {
@@ -18,10 +19,11 @@ struct PlottedObject {
   std::vector<double> force_N;
 };
 
-// Force over time, a lane of contact for each object, and how far the device is from the proxy. Throws
-// std::runtime_error: file not writable.
+// Force over time, a lane of contact for each object, how far the device is from the proxy, and, where `near`
+// has anything to say, how near objects came to one another. Throws std::runtime_error: file not writable.
 void save_session_plot(const std::filesystem::path& svg, std::span<const TraceRow> rows,
-                       std::span<const PlottedObject> objects, const std::string& title);
+                       std::span<const PlottedObject> objects, const std::string& title,
+                       const ClearanceCourse& near = {});
 
 struct ComparedModel {
   std::string name;

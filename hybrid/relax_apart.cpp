@@ -33,6 +33,12 @@ constexpr std::size_t kRowsTaken = 250;  // a tick: what a result is added to, a
 // in real time does.
 constexpr std::uint64_t kRowsRelaxed = 1000;
 
+double own_time_s() noexcept {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + static_cast<double>(now.tv_nsec) * 1e-9;
+}
+
 bool has_arrived(const Apart& apart, const RelaxedApart& object, std::size_t o, std::uint64_t tick) noexcept {
   switch (apart.arrival) {
     case Arrival::counted:
@@ -52,7 +58,9 @@ void give(WorldState& state, RelaxedApart& object, std::size_t o) noexcept {
     object.phase.store(RelaxedApart::Phase::thread, std::memory_order_release);
     return;
   }
+  const double before_s = own_time_s();
   object.replica.relax();
+  state.apart.elsewhere_us += 1e6 * (own_time_s() - before_s);
   object.due = state.tick + 1 + object.replica.work() / kRowsRelaxed;
 }
 
@@ -71,12 +79,6 @@ void exchange(WorldState& state, std::size_t o, std::uint64_t& arrived) noexcept
   }
 }
 
-double own_time_s() noexcept {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + static_cast<double>(now.tv_nsec) * 1e-9;
-}
-
 }  // namespace
 
 void relax_apart(WorldState& state, Arrival arrival) {
@@ -90,6 +92,7 @@ void relax_apart(WorldState& state, Arrival arrival) {
 
 void relax_background(const World& world, WorldState& state) noexcept {
   std::uint64_t arrived = 0;
+  state.apart.elsewhere_us = 0.0;
   for (std::size_t o = 0; o < state.soft.size(); ++o) {
     if (state.apart.objects.empty() || state.apart.objects[o] == nullptr) {
       state.soft[o]->relax_background(world.soft[o].budget);

@@ -42,6 +42,8 @@ struct Apart {
   // tick, else by it.
   std::uint64_t arrived = 0;
   std::uint64_t results = 0;  // taken so far
+  // Of this tick's processor time, what a thread of its own would have had (us): not counted as the tick's.
+  double elsewhere_us = 0.0;
 };
 
 // From now on soft objects are relaxed apart; those with a yield, and all from the 65th on, stay in the tick.

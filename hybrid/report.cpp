@@ -166,7 +166,14 @@ nlohmann::ordered_json run_report(const Scene& scene, const BuiltScene& built, S
                   measured ? "equilibrium lattice with its limits, at the sampled ticks"
                            : "not measured (no soft contact at a sampled tick, real time, or --samples 0)"}};
   j["safety"] = safety_json(scene, built);
-  j["threads"] = nlohmann::ordered_json::array({{{"name", "main"}, {"share", 1.0}}});
+  const double seconds = static_cast<double>(result.ticks) * result.dt_s;
+  const auto thread = [&](const char* name, double cpu_s) {
+    return nlohmann::ordered_json{
+        {"name", name}, {"cpu_s", cpu_s}, {"share", seconds > 0.0 ? cpu_s / seconds : 0.0}};
+  };
+  j["threads"] = nlohmann::ordered_json::array({thread("servo", result.servo_s)});
+  if (result.relaxed_apart > 0) j["threads"].push_back(thread("relaxation", result.relaxation_s));
+  j["relaxed_apart"] = result.relaxed_apart;
   if (!result.realtime_note.empty()) {
     j["realtime"] = {{"priority", result.realtime_note}, {"late_us", to_json(result.late_us)}};
   }
@@ -211,6 +218,14 @@ std::string run_summary(const BuiltScene& built, SessionResult& result) {
         "force error against the equilibrium lattice at {} sampled ticks: at most {:.4f} N ({:.2f} JND), rms "
         "{:.4f} N\n",
         result.error.samples, result.error.max_N, result.error.max_jnd, result.error.rms_N);
+  }
+  if (result.relaxed_apart > 0) {
+    const double seconds = static_cast<double>(result.ticks) * result.dt_s;
+    text += fmt::format(
+        "processor time by thread: servo {:.1f} %, relaxation {:.1f} % of the session's{}; its results were "
+        "taken {} times\n",
+        100.0 * result.servo_s / seconds, 100.0 * result.relaxation_s / seconds,
+        result.realtime_note.empty() ? " (simulated: one core did both in turns)" : "", result.relaxed_apart);
   }
   if (!result.realtime_note.empty()) {
     text += fmt::format(

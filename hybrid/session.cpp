@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <limits>
 
 #include "device/simulated.h"
 #include "hybrid/rigid_step.h"
@@ -21,8 +22,10 @@ constexpr double kWithHand_s = 60.0;             // a real device has no path th
 constexpr unsigned int kFlushAndZero = 0x8040U;  // FTZ and DAZ
 constexpr double kJndFloor_N = 0.04;
 constexpr std::uint64_t kMomentEvery = 20;  // ticks between two looks for a more telling moment
-constexpr int kSettleTicks = 1200;          // of equilibrium_force(), and
-constexpr int kCalmTicks = 40;              // ticks over which its force may change by the tolerance
+constexpr std::uint64_t kClearances =
+    1000;                           // moments of a session at which it is looked how near objects are
+constexpr int kSettleTicks = 1200;  // of equilibrium_force(), and
+constexpr int kCalmTicks = 40;      // ticks over which its force may change by the tolerance
 constexpr std::uint32_t kSettleBudget = 400'000;
 
 std::uint64_t mix(std::uint64_t hash, std::uint64_t bits) noexcept {  // FNV-1a, eight bytes at a time
@@ -90,6 +93,7 @@ class Run {
     result_.path_notes = path_->notes();
     ticks_ = static_cast<std::uint64_t>(std::llround(seconds * scene.rate_hz));
     result_.dt_s = dt_;
+    clearance_every_ = std::max<std::uint64_t>(1, ticks_ / kClearances);
     if (options.keep_recording) result_.recording.reserve(ticks_);
     result_.object_contact_ticks.assign(world_.object_count(), 0);
     result_.object_max_force_N.assign(world_.object_count(), 0.0);
@@ -128,7 +132,7 @@ class Run {
       result_.deadline_misses = served.late_ticks;
       result_.late_us = late_us_.percentiles();
     }
-    if (relaxation) result_.relaxation_thread_s = relaxation->busy_s();
+    if (relaxation) result_.relaxation_s = relaxation->busy_s();
     relaxation.reset();
     result_.relaxed_apart = state_.apart.results;
     result_.end = served.end;
@@ -166,6 +170,7 @@ class Run {
       if (sample_every_ != 0 && result_.error.samples < options_.reference_samples)
         sample(felt, sample_every_);
       if (options_.keep_picture && tick % kMomentEvery == 0) look(felt, tick);
+      if (options_.keep_clearance && tick % clearance_every_ == 0) measure_clearance(tick);
       if (options_.progress && tick % 64 == 0) say_progress(tick);
     }
     return {.force_N = felt.force_N, .go_on = ticks_done_ < ticks_};
@@ -184,6 +189,8 @@ class Run {
     if (options_.keep_recording)
       result_.recording.push_back({felt.device_m, hash_, fault, state_.apart.arrived});
     result_.tick_us.add(felt.tick_us);
+    result_.servo_s += 1e-6 * felt.tick_us;
+    result_.relaxation_s += 1e-6 * state_.apart.elsewhere_us;
     for (std::size_t s = 0; s < kStages; ++s) result_.stage_us[s].add(static_cast<double>(felt.stage_us[s]));
     const double force = glm::length(felt.force_N);
     result_.max_force_N = std::max(result_.max_force_N, force);
@@ -217,6 +224,18 @@ class Run {
     result_.error.max_jnd = std::max(result_.error.max_jnd, jnd_of(raw, *reference, jnd_floor_N(scene_)));
   }
 
+  void measure_clearance(std::uint64_t tick) {
+    if (state_.soft.empty()) return;
+    ClearanceCourse& course = result_.clearance;
+    const Clearance now = clearance(world_, state_);
+    course.t_s.push_back(static_cast<double>(tick) * dt_);
+    course.rigid_m.push_back(now.rigid_m);
+    course.soft_m.push_back(now.soft_m);
+    course.cell_m = std::numeric_limits<double>::infinity();
+    for (const auto& object : state_.soft)
+      course.cell_m = std::min(course.cell_m, object->lattice().min_spacing_m());
+  }
+
   void look(const TickResult& felt, std::uint64_t tick) {
     const double score = telling(world_, state_);
     if (score <= best_ * 1.02) return;
@@ -235,6 +254,7 @@ class Run {
   double dt_;
   TimeSpread late_us_;
   std::chrono::steady_clock::time_point said_ = std::chrono::steady_clock::now();
+  std::uint64_t clearance_every_ = 1;
   std::uint64_t ticks_ = 0, ticks_done_ = 0, sample_every_ = 0, soft_ticks_ = 0,
                 hash_ = 0xCBF29CE484222325ULL;
   double sum_force2_ = 0.0, best_ = 0.0;

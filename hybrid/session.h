@@ -14,6 +14,7 @@
 #include "device/servo_loop.h"
 #include "hybrid/black_box.h"
 #include "hybrid/build.h"
+#include "hybrid/clearance.h"
 #include "hybrid/tick.h"
 #include "hybrid/time_spread.h"
 
@@ -36,10 +37,11 @@ struct SessionOptions {
   // A real one, open, placed in the scene and out of anything rigid; always in real time. None: the scene's
   // simulated one.
   device::HapticDevice* real_device = nullptr;
-  bool keep_rows = true;       // trace rows and per-object forces
-  bool keep_recording = true;  // every input, 32 bytes a tick: without it and the rows memory stays flat
-  bool keep_picture = false;   // remember the most telling moment
-  int reference_samples = 0;   // how often the force is compared with its equilibrium; 0 in real time
+  bool keep_rows = true;        // trace rows and per-object forces
+  bool keep_recording = true;   // every input, 32 bytes a tick: without it and the rows memory stays flat
+  bool keep_clearance = false;  // how near objects come, at a thousand moments
+  bool keep_picture = false;    // remember the most telling moment
+  int reference_samples = 0;    // how often the force is compared with its equilibrium; 0 in real time
   // Clocks and counters begin as after so many ticks, and the path so much later; nothing felt may differ. (A
   // soft start is over by then.)
   std::uint64_t start_ticks = 0;
@@ -62,6 +64,7 @@ struct SessionResult {
   std::uint64_t state_hash = 0;
   std::vector<TraceRow> rows;
   std::vector<std::vector<double>> object_force_N;  // [object][row]
+  ClearanceCourse clearance;                        // of keep_clearance, where anything is soft
   std::vector<std::uint64_t> object_contact_ticks;  // [object]
   std::vector<double> object_max_force_N;           // [object]
   TimeSpread tick_us;
@@ -76,8 +79,10 @@ struct SessionResult {
   std::vector<std::string> path_notes;       // what the path's reader noticed: gaps, repeated times
   std::string realtime_note;                 // what priority was granted
   Percentiles late_us;                       // how late the machine woke the loop; not part of the tick
-  double relaxation_thread_s = 0.0;          // its own processor time
-  std::uint64_t relaxed_apart = 0;           // results that ticks took
+  // Processor time of the ticks, and of relaxation apart from them: of its thread in real time, else of what
+  // that would have done.
+  double servo_s = 0.0, relaxation_s = 0.0;
+  std::uint64_t relaxed_apart = 0;  // results that ticks took
 };
 
 // Runs the scene's path to its end on its device. Throws SceneError: the tool starts inside something rigid.

@@ -44,7 +44,13 @@ class StageClock {
         std::chrono::duration<float, std::micro>(now - last_).count();
     last_ = now;
   }
-  void stop() noexcept { result_.tick_us = own_time_us() - start_us_; }
+  // So much of the stage that was just done, and of the tick, is not theirs.
+  void leave_out(Stage stage, double us) noexcept {
+    float& of_stage = result_.stage_us[static_cast<std::size_t>(stage)];
+    of_stage = std::max(0.0F, of_stage - static_cast<float>(us));
+    left_out_us_ += us;
+  }
+  void stop() noexcept { result_.tick_us = own_time_us() - start_us_ - left_out_us_; }
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -55,7 +61,7 @@ class StageClock {
   }
 
   TickResult& result_;
-  double start_us_;
+  double start_us_, left_out_us_ = 0.0;
   Clock::time_point last_;
 };
 
@@ -291,6 +297,7 @@ TickResult haptic_tick(const World& world, WorldState& state, const device::Devi
 
   relax_background(world, state);
   clock.done(Stage::background);
+  if (state.apart.elsewhere_us > 0.0) clock.leave_out(Stage::background, state.apart.elsewhere_us);
 
   refresh_map(world, state);
   clock.done(Stage::map);

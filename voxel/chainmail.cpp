@@ -8,7 +8,7 @@
 namespace voxel {
 namespace {
 
-constexpr int kObstaclePasses = 2;
+constexpr int kObstaclePasses = 8;
 constexpr float kMargin = 2.4e-7F;  // four roundings of a float, relative
 constexpr double kTouching = 1e-6;  // of the spacing: no deeper in its obstacle than this, a voxel lies on it
 

@@ -98,26 +98,26 @@ bool blocked(const ObstacleView& view, const Displacement& state, VoxelId v, dou
 }
 
 void relax_obstacle(Couplings& couplings, Displacement& state, const ObstacleView& view, VoxelId v) noexcept {
-  if (!blocked(view, state, v, 0.0)) return;
-  glm::dvec3 wanted = link_minimum(couplings, state, v);
   const Obstacle& o = view.of(v);
-  const glm::dvec3 n(o.normal);
-  const double depth = static_cast<double>(o.bound) - glm::dot(n, wanted);
+  const glm::dvec3 n(o.normal), before = state.at(v);
+  const auto depth_of = [&](const glm::dvec3& u) { return static_cast<double>(o.bound) - glm::dot(n, u); };
+  glm::dvec3 wanted = link_minimum(couplings, state, v);
+  const double depth = depth_of(wanted);
   if (depth > 0.0) {
     // Projected in the metric of the springs, so that the step lowers the energy along the surface.
     const glm::dvec3 w = link_compliance(couplings, v);
     const double denominator = glm::dot(n, w * n);
     if (denominator > 0.0) wanted += (depth / denominator) * w * n;
   }
-  state.set(v, clamp_to_links(couplings.lattice(), state, v, wanted));
-}
-
-void clear_obstacle(const Lattice& lattice, Displacement& state, const ObstacleView& view,
-                    VoxelId v) noexcept {
-  const Obstacle& o = view.of(v);
-  const glm::dvec3 n(o.normal);
-  const double depth = static_cast<double>(o.bound) - glm::dot(n, state.at(v));
-  if (depth > 0.0) state.set(v, clamp_to_links(lattice, state, v, state.at(v) + depth * n));
+  glm::dvec3 allowed = clamp_to_links(couplings.lattice(), state, v, wanted);
+  // Each axis is held by its own links; what is left of the way may lead into the obstacle. Then only as far
+  // as that.
+  const double now = depth_of(before), then = depth_of(allowed);
+  if (then > std::max(now, 0.0)) {
+    const double out = std::max(-now, 0.0);
+    allowed = before + (allowed - before) * (out / (then + out));
+  }
+  state.set(v, allowed);
 }
 
 }  // namespace voxel

@@ -39,11 +39,8 @@ struct ObstacleView {
 
 // Is a voxel whose role is obstacle within `margin` of it, or in it (unit: meter)?
 bool blocked(const ObstacleView& view, const Displacement& state, VoxelId v, double margin) noexcept;
-// After the links had their way with a voxel whose role is obstacle: if that took it into its obstacle, where
-// it goes with the obstacle there.
+// Takes a voxel whose role is obstacle where its links would have it, on this side of the obstacle. One that
+// is in it comes out as far as its links allow, and no deeper.
 void relax_obstacle(Couplings& couplings, Displacement& state, const ObstacleView& view, VoxelId v) noexcept;
-// Brings it back onto the surface as far as its links allow.
-void clear_obstacle(const Lattice& lattice, Displacement& state, const ObstacleView& view,
-                    VoxelId v) noexcept;
 
 }  // namespace voxel

@@ -173,7 +173,9 @@ class Multigrid {
                 const ObstacleView& obstacles, OctetSpan span, int first, int last) noexcept;
   void take_back_refused(int level, RowId row, const RowVector& refused, unsigned axes,
                          OctetSpan span) noexcept;
-  void clear_obstacles(RowId row, Displacement& state, const ObstacleView& obstacles) noexcept;
+  template <class Move>
+  void move_outside(LevelRow r, RowId row, Displacement& state, const ObstacleView& obstacles,
+                    const Move& move) noexcept;
 
   const Lattice& lattice_;
   TileQueue tiles_;

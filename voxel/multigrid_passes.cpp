@@ -8,6 +8,7 @@ namespace voxel {
 namespace {
 
 constexpr double kTouching = 1e-6;  // of the spacing: nearer to its obstacle than this a voxel lies on it
+constexpr int kObstacleRounds = 3;  // of a row, in which more voxels each time stay out of their obstacles
 constexpr float kTight = 1e-4F;     // of the spacing: nearer to its limit than this a link is at it
 
 }  // namespace
@@ -63,13 +64,48 @@ void Multigrid::smooth(int level, RowId row, Displacement& state, const Obstacle
     return;
   }
   const RowLimits limits = couplings().limits(row);
-  const float change = smooth_row(r, &limits, span);
-  if (!obstacles.obstacles.empty() && state.row_obstacles[row] != 0) {
-    for (VoxelId v = row * kRow; v < (row + 1) * kRow; ++v) {
-      if (state.role[v] == Displacement::obstacle) relax_obstacle(couplings(), state, obstacles, v);
-    }
-  }
+  float change = 0.0F;
+  move_outside(r, row, state, obstacles,
+               [&](const LevelRow& way) { change = std::max(change, smooth_row(way, &limits, span)); });
   note_change(0, row, change);
+}
+
+// A row is moved at once, and what that takes into its obstacle has to stay while the others are: put back
+// afterwards, it would find that the voxels beside it followed it in there as far as the links let them, and
+// hold it there.
+template <class Move>
+void Multigrid::move_outside(LevelRow r, RowId row, Displacement& state, const ObstacleView& obstacles,
+                             const Move& move) noexcept {
+  if (obstacles.obstacles.empty() || state.row_obstacles[row] == 0) {
+    move(r);
+    return;
+  }
+  RowVector before;
+  for (std::size_t axis = 0; axis < 3; ++axis) std::copy_n(r.u[axis], kRow, before[axis].begin());
+  std::array<std::uint8_t, kRow> stays{};
+  if (r.stopped != nullptr) std::copy_n(r.stopped, kRow, stays.begin());
+  std::uint32_t blocked_lanes = 0;
+  const VoxelId first = row * kRow;
+  for (int n = 0; n < kObstacleRounds; ++n) {
+    move(r);
+    std::uint32_t more = 0;
+    for (VoxelId lane = 0; lane < kRow; ++lane) {
+      if (state.role[first + lane] == Displacement::obstacle && (blocked_lanes >> lane & 1U) == 0 &&
+          blocked(obstacles, state, first + lane, 0.0))
+        more |= 1U << lane;
+    }
+    if (more == 0) break;
+    blocked_lanes |= more;
+    if (n + 1 == kObstacleRounds) break;
+    for (std::size_t axis = 0; axis < 3; ++axis) std::copy_n(before[axis].begin(), kRow, r.u[axis]);
+    for (VoxelId lane = 0; lane < kRow; ++lane) {
+      if ((blocked_lanes >> lane & 1U) != 0) stays[lane] = 7;
+    }
+    r.stopped = stays.data();
+  }
+  for (VoxelId lane = 0; lane < kRow; ++lane) {
+    if ((blocked_lanes >> lane & 1U) != 0) relax_obstacle(couplings(), state, obstacles, first + lane);
+  }
 }
 
 RowId Multigrid::row_below(int level, RowId row, int child) const noexcept {
@@ -301,8 +337,8 @@ void Multigrid::tell_row(int level, RowId row, const std::array<HatRow, 4>& hats
     // A voxel that pulls against a link at its limit stays, until the limit lets go of it.
     if (has(0, row, limited)) r.stopped = at(0).stopped.data() + static_cast<std::size_t>(row) * kRow;
     const RowLimits limits = couplings().limits(row);
-    done = correct_row(r, &limits, span, correction, refused);
-    if (done.most_m > 0.0F) clear_obstacles(row, state, obstacles);
+    move_outside(r, row, state, obstacles,
+                 [&](const LevelRow& way) { done = correct_row(way, &limits, span, correction, refused); });
   }
   if (done.refused != 0) take_back_refused(level, row, refused, done.refused, span);
   note_change(level, row, done.most_m);
@@ -314,8 +350,9 @@ void Multigrid::add(RowId row, const RowVector& way, Displacement& state,
   RowVector refused;
   const LevelRow r = row_of(0, row, state);
   const RowLimits limits = couplings().limits(row);
-  const RowCorrection done = correct_row(r, &limits, {}, way, refused);
-  if (done.most_m > 0.0F) clear_obstacles(row, state, obstacles);
+  RowCorrection done;
+  move_outside(r, row, state, obstacles,
+               [&](const LevelRow& to) { done = correct_row(to, &limits, {}, way, refused); });
   if (done.refused != 0) take_back_refused(0, row, refused, done.refused, {});
   note_change(0, row, done.most_m);
 }
@@ -341,13 +378,6 @@ void Multigrid::take_back_refused(int level, RowId row, const RowVector& refused
   take_back(sums, coarse.couplings->all(above).share, value, told,
             {half * kOctets / 2 + pairs.first / 2, half * kOctets / 2 + pairs.last / 2});
   spread(level + 1, above, active | dirty);
-}
-
-void Multigrid::clear_obstacles(RowId row, Displacement& state, const ObstacleView& obstacles) noexcept {
-  if (obstacles.obstacles.empty() || state.row_obstacles[row] == 0) return;
-  for (VoxelId v = row * kRow; v < (row + 1) * kRow; ++v) {
-    if (state.role[v] == Displacement::obstacle) clear_obstacle(lattice_, state, obstacles, v);
-  }
 }
 
 }  // namespace voxel

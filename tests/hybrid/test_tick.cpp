@@ -217,7 +217,9 @@ TEST_F(Arbitration, AVoxelWithinASolidIsShownTheWayOut) {
     if (glm::length(away) >= 6e-3 || o.normal == glm::vec3(0.0F)) continue;
     ++seen;
     EXPECT_GT(glm::dot(dvec3(o.normal), away), 0.9 * glm::length(away));
-    EXPECT_GE(glm::dot(o.normal, glm::vec3(object.state().at(v))), o.bound - 1e-9F)
+    // By a quarter of a spacing of 2 mm each time that it is looked at. (It was left as deep as it is; then
+    // what a fast tool presses into a ridge, tick by tick, is let in deeper in each.)
+    EXPECT_GE(glm::dot(o.normal, glm::vec3(object.state().at(v))), o.bound - 0.5e-3F - 1e-9F)
         << "not thrown out at once";
   }
   EXPECT_EQ(seen, inside);

@@ -1,0 +1,267 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Who gives way to whom: one scene for each rule, and the same four bars for all of them. (a) No voxel's ball
+// is deeper than a twentieth of a spacing in anything rigid, after any tick. (b) At rest the force on the
+// hand is what anchors and rigid surfaces carry. (c) Nothing passes through anything at 1 m/s. (d) A closed
+// path gives the hand no energy.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "arbitration_watch.h"
+#include "touch.h"
+
+namespace {
+
+using glm::dvec3;
+using hybrid::TickResult;
+using tests::ArbitrationWatch;
+using tests::coupling;
+using tests::Face;
+using tests::Touch;
+
+// From its first point to its last, and what may not be passed on the way.
+struct Stroke {
+  std::vector<dvec3> points_mm;
+  std::vector<Face> fronts{};  // by the tool's centre
+  // Where a bar does not hold yet, what does; why stands beside it.
+  double deepest = 0.05;   // spacings
+  std::size_t passed = 0;  // voxels in a solid, added up over the ticks
+  double apart_mm = 0.0;   // of faces that face one another
+};
+
+struct Scenario {
+  const char* name;
+  const char* file;  // from the top folder
+  std::vector<Stroke> strokes;
+  std::vector<std::vector<dvec3>> loops_mm;     // each ends where it begins
+  std::vector<std::pair<Face, Face>> facing{};  // faces of soft objects that may not cross
+};
+
+void PrintTo(const Scenario& scenario, std::ostream* out) {
+  *out << scenario.name;
+}
+
+constexpr double kOverlap = 0.05;  // of the spacing
+constexpr double kBalance = 0.01;  // of the force
+constexpr double kGain_J = 1e-6;
+
+class Arbitration : public ::testing::TestWithParam<Scenario> {
+ protected:
+  static hybrid::Scene scene() { return hybrid::load_scene(tests::source_folder / GetParam().file); }
+  // The corners of the scene's own path, its speed, and where it holds.
+  static device::WaypointPath path(const hybrid::Scene& scene) {
+    if (const auto* press = std::get_if<device::PressPath>(&scene.path))
+      return {{{press->from_m}, {press->to_m, press->hold_s}, {press->from_m, 0.1}}, press->speed_m_per_s};
+    return std::get<device::WaypointPath>(scene.path);
+  }
+  static bool asleep(Touch& touch) {
+    return std::all_of(touch.state().soft.begin(), touch.state().soft.end(),
+                       [](const auto& object) { return object->asleep(); });
+  }
+};
+
+TEST_P(Arbitration, NothingOverlapsAndAtRestForcesBalance) {
+  const hybrid::Scene scene = Arbitration::scene();
+  const device::WaypointPath way = path(scene);
+  Touch touch(scene, way.points.front().position_m);
+  ArbitrationWatch watch(touch.world(), touch.state());
+  const auto see = [&](const TickResult& felt) { watch.see(touch.state(), felt); };
+  for (const device::Waypoint& point : way.points) {
+    touch.go(point.position_m, 1e-3 * way.speed_m_per_s, 0, see);
+    if (point.hold_s == 0.0) continue;
+    int ticks = 0;
+    while (ticks < static_cast<int>(1e3 * point.hold_s) || (!asleep(touch) && ticks < 1500)) {
+      touch.go(point.position_m, 1.0, 1, see);
+      ++ticks;
+    }
+    const TickResult felt = touch.at(point.position_m);
+    see(felt);
+    dvec3 carried(0.0), left(0.0), tool(0.0), anchors(0.0), rigid(0.0);
+    std::size_t tight = 0;
+    double worst = 0.0;
+    for (const tests::Bearing& b : tests::bearings(touch.world(), touch.state())) {
+      carried += b.anchors_N + b.rigid_N;
+      anchors += b.anchors_N;
+      rigid += b.rigid_N;
+      left += b.left_N;
+      tool += b.tool_N;
+      tight += b.tight;
+      worst = std::max(worst, b.worst_left_N);
+    }
+    const dvec3 force = coupling(felt);
+    if (force == dvec3(0.0)) continue;
+    // What the tissue's supports do not carry, rigid surfaces that the tool touches do.
+    const dvec3 off = tests::beyond_rigid(touch.world(), touch.state(), force + carried);
+    std::printf(
+        "%s at (%g, %g, %g): %d ticks, hand (%.4f, %.4f, %.4f) N, anchors (%.4f, %.4f, %.4f), bone (%.4f, "
+        "%.4f, "
+        "%.4f), tool by tissue (%.4f, %.4f, %.4f); off %.5f N = %.2f %%; left %.2e N, worst voxel %.2e, %zu "
+        "tight; "
+        "deepest now %.4f\n",
+        GetParam().name, 1e3 * point.position_m.x, 1e3 * point.position_m.y, 1e3 * point.position_m.z, ticks,
+        force.x, force.y, force.z, anchors.x, anchors.y, anchors.z, rigid.x, rigid.y, rigid.z, tool.x, tool.y,
+        tool.z, glm::length(off), 100.0 * glm::length(off) / std::max(glm::length(force), 1e-9),
+        glm::length(left), worst, tight, watch.deepest_now());
+    EXPECT_LE(glm::length(off), kBalance * glm::length(force) + 1e-5);
+  }
+  EXPECT_EQ(coupling(touch.at(way.points.back().position_m)), dvec3(0.0)) << "out of contact";
+  std::printf("%s: deepest %.4f spacings, at tick %lu; %zu passed; tool %.3e m in bone; %lu faults\n",
+              GetParam().name, watch.deepest(), static_cast<unsigned long>(watch.deepest_tick()),
+              watch.passed(), watch.tool_inside_m(), static_cast<unsigned long>(touch.state().faults));
+  EXPECT_LE(watch.deepest(), kOverlap);
+  EXPECT_EQ(watch.passed(), 0U);
+  EXPECT_LE(watch.tool_inside_m(), 1e-3 * scene.tool.radius_m);
+  EXPECT_EQ(touch.state().faults, 0U);
+}
+
+TEST_P(Arbitration, NothingPassesThroughAnythingAtAMeterASecond) {
+  for (const Stroke& stroke : GetParam().strokes) {
+    Touch touch(scene(), 1e-3 * stroke.points_mm.front());
+    ArbitrationWatch watch(touch.world(), touch.state());
+    double front = 1.0, between = 1.0, most = 0.0;
+    const auto see = [&](const TickResult& felt) {
+      watch.see(touch.state(), felt);
+      most = std::max(most, glm::length(coupling(felt)));
+      for (const Face& face : stroke.fronts)
+        front = std::min(front, tests::in_front_of(touch.world(), touch.state(), face, felt.proxy_m));
+      for (const auto& [a, b] : GetParam().facing)
+        between = std::min(between, tests::in_front_of(touch.world(), touch.state(), a, b));
+    };
+    for (const dvec3& point : stroke.points_mm) touch.go(1e-3 * point, 1e-3, 0, see);
+    const double moving = watch.deepest();
+    touch.go(1e-3 * stroke.points_mm.back(), 1.0, 100, see);
+    for (std::size_t n = stroke.points_mm.size(); n-- > 0;)
+      touch.go(1e-3 * stroke.points_mm[n], 1e-3, 0, see);
+    touch.go(1e-3 * stroke.points_mm.front(), 1.0, 50, see);
+    std::printf(
+        "%s at 1 m/s to (%g, %g, %g): %.2f N; deepest %.4f going, %.4f ever (tick %lu); %zu passed; tool in "
+        "bone "
+        "%.2e m; in front by %.2f mm, faces apart %.2f mm\n",
+        GetParam().name, stroke.points_mm.back().x, stroke.points_mm.back().y, stroke.points_mm.back().z,
+        most, moving, watch.deepest(), static_cast<unsigned long>(watch.deepest_tick()), watch.passed(),
+        watch.tool_inside_m(), 1e3 * front, 1e3 * between);
+    EXPECT_LE(watch.deepest(), stroke.deepest);
+    EXPECT_LE(watch.passed(), stroke.passed);
+    EXPECT_LE(watch.tool_inside_m(), 1e-3 * touch.world().tool.radius_m);
+    EXPECT_FALSE(watch.tool_crossed());
+    EXPECT_GT(front, 0.0);
+    EXPECT_GT(between, 1e-3 * stroke.apart_mm);
+    EXPECT_GT(most, 0.1);
+  }
+}
+
+// What the hand gains by a tick's motion (J). The trapezoid between two ticks is exact where forces grow
+// evenly. Where a rigid surface is met or left in between, they do not, and it would be off by as much as
+// K·h²/8 of a way h: 8 uJ at 0.25 m/s. But what a rigid surface loads the coupling with is known.
+double work_of_tick(const TickResult& before, const TickResult& now, double stiffness_N_per_m) {
+  const dvec3 way = now.device_m - before.device_m;
+  const double soft = 0.5 * glm::dot(before.soft_N + now.soft_N, way);
+  const double was = glm::length(before.rigid_N), is = glm::length(now.rigid_N);
+  if ((was > 0.0) != (is > 0.0)) return soft + 0.5 * (was * was - is * is) / stiffness_N_per_m;
+  return soft + 0.5 * glm::dot(before.rigid_N + now.rigid_N, way);
+}
+
+TEST_P(Arbitration, AClosedPathGivesTheHandNoEnergy) {
+  for (const std::vector<dvec3>& loop : GetParam().loops_mm) {
+    for (const double speed : {0.04, 0.25}) {
+      for (const bool back : {false, true}) {
+        std::vector<dvec3> points = loop;
+        if (back) std::reverse(points.begin(), points.end());
+        Touch touch(scene(), 1e-3 * points.front());
+        ArbitrationWatch watch(touch.world(), touch.state());
+        double gain = 0.0, most = 0.0;
+        TickResult before = touch.at(1e-3 * points.front());
+        std::string gains;
+        for (int round = 0; round < 2; ++round) {  // the first settles
+          double work = 0.0;
+          for (const dvec3& point : points) {
+            touch.go(1e-3 * point, 1e-3 * speed, 0, [&](const TickResult& felt) {
+              watch.see(touch.state(), felt);
+              work += work_of_tick(before, felt, touch.world().tool.stiffness_N_per_m);
+              before = felt;
+              most = std::max(most, glm::length(coupling(felt)));
+            });
+          }
+          if (round > 0) gain = std::max(gain, work);
+          gains += " " + std::to_string(1e6 * work);
+        }
+        std::printf("%s, loop of %zu corners at %g m/s %s: uJ%s; at most %.2f N; deepest %.4f (tick %lu)\n",
+                    GetParam().name, points.size(), speed, back ? "back" : "forth", gains.c_str(), most,
+                    watch.deepest(), static_cast<unsigned long>(watch.deepest_tick()));
+        EXPECT_LE(gain, kGain_J);
+        EXPECT_GT(most, 0.03);
+        EXPECT_LE(watch.deepest(), kOverlap);
+        EXPECT_EQ(watch.passed(), 0U);
+      }
+    }
+  }
+}
+
+const Face top{0, 2, true}, left{0, 0, false};
+
+std::vector<Scenario> scenarios() {
+  const std::vector<dvec3> across{{-10, 0, 24}, {-10, 0, 14}, {10, 0, 14}, {10, 6, 14},
+                                  {-10, 6, 14}, {-10, 0, 14}, {-10, 0, 24}};
+  return {
+      {"OnBoneIntoTissue",
+       "tests/hybrid/arbitration/rigid_first.toml",
+       {{{{-12, 0, 12}, {-12, 0, 4}, {10, 0, -4}}, {left}}, {{{8, 0, 24}, {8, 0, -14}}, {top}}},
+       {{{-12, 0, 8}, {-12, 0, 4}, {-2, 0, 4}, {-2, 6, 4}, {-12, 6, 4}, {-12, 0, 4}, {-12, 0, 8}},
+        {{-12, 0, 8}, {-12, 0, 4}, {-3, 10, 4}, {-3, 24, 4}, {10, 24, 4}, {-12, 24, 4}, {-12, 0, 8}}}},
+      {"HalfOnBoneHalfOnTissue",
+       "scenes/edge-of-bone.toml",
+       {{{{1, 0, 12}, {1, 0, -15}}, {}}, {{{-10, 0, 12}, {-10, 0, 0}, {20, 0, 0}}, {}}},
+       {{{-8, -2, 8}, {-8, -2, 3}, {8, -2, 3}, {8, 2, 3}, {-8, 2, 3}, {-8, -2, 3}, {-8, -2, 8}},
+        {{-8, 10, 8}, {-8, 10, 3}, {8, 10, 3}, {8, 24, 3}, {-8, 24, 3}, {-8, 10, 3}, {-8, 10, 8}}}},
+      {"TissueOnBone", "scenes/tissue-on-bone.toml", {{{{0, 0, 20}, {0, 0, -10}}, {top}}}, {across}},
+      {"TissueOnARidge",
+       "tests/hybrid/arbitration/tissue_on_ridge.toml",
+       // Crushed on the ridge by 20 N, and let go: 0.16. The chain is at its limits all over, and what it and
+       // two oblique half-spaces ask of a voxel is not solved within a tick.
+       {{.points_mm = {{0, 0, 20}, {0, 0, -10}}, .fronts = {top}, .deepest = 0.2}},
+       {across}},
+      {"TissueOnASheet",
+       "tests/hybrid/arbitration/tissue_on_sheet.toml",
+       {{{{0, 0, 20}, {0, 0, -10}}, {top}}},
+       {}},
+      {"TissueFarFromBone",
+       "tests/hybrid/arbitration/tissue_far_from_bone.toml",
+       // 1.0, 40: of voxels that arrive together, 24 a tick are shown the plate (kObstacleQueries).
+       {{.points_mm = {{0, 0, 20}, {0, 0, 0}}, .fronts = {top}, .deepest = 1.1, .passed = 60}},
+       {}},
+      {"TissueInAGroove",
+       "tests/hybrid/arbitration/tissue_in_groove.toml",
+       {{{{0, 0, 20}, {0, 0, -10}}, {top}}},
+       {{{-3, -6, 20}, {-3, -6, 15}, {3, -6, 15}, {3, 6, 15}, {-3, 6, 15}, {-3, -6, 15}, {-3, -6, 20}}}},
+      {"TissueOnTissue",
+       "tests/hybrid/arbitration/soft_on_soft.toml",
+       // -5.5 mm, and as much when pressed slowly: surfaces of balls slide off one another into the gaps
+       // between them, and through, because pairs press from centre to centre (voxel/pair_contact.cpp).
+       {{.points_mm = {{0, 0, 18}, {0, 0, -12}}, .fronts = {{1, 2, true}}, .apart_mm = -6.0}},
+       {{{-8, 0, 20}, {-8, 0, 13}, {8, 0, 13}, {8, 6, 13}, {-8, 6, 13}, {-8, 0, 13}, {-8, 0, 20}}},
+       {{{0, 2, true}, {1, 2, false}}}},
+      {"BetweenBoneAndTissue",
+       "scenes/cleft.toml",
+       {{{{1, 0, 10}, {1, 0, -20}}, {left}}, {{{1, 0, 10}, {1, 0, -10}, {12, 0, -10}}, {left}}},
+       {{{1, -4, 10}, {1, -4, -6}, {1, 4, -6}, {1, 4, 10}, {1, -4, 10}},
+        {{1, 8, 10}, {1, 8, -6}, {1, 28, -6}, {8, 28, -6}, {8, 28, 10}, {1, 8, 10}}}},
+      {"CarvedAtRest",
+       "tests/hybrid/arbitration/carved.toml",
+       {{{{10, 0, 14}, {10, 0, -8}}, {}}, {{{0, 0, 14}, {0, 0, 0}, {16, 0, -4}}, {}}},
+       {{{0, 0, 14}, {0, 0, 9}, {10, 0, 3}, {14, 0, 3}, {14, 5, 3}, {10, 5, 3}, {0, 0, 9}, {0, 0, 14}}}},
+      {"ContactKept",
+       "tests/hybrid/arbitration/kept.toml",
+       {{{{-10, 0, 14}, {-10, 0, 2}, {10, 0, 2}}, {top}}, {{{0, 0, 14}, {0, 0, -18}}, {top}}},
+       {{{-10, 0, 14}, {-10, 0, 7}, {10, 0, 7}, {10, 5, 7}, {-10, 5, 7}, {-10, 0, 7}, {-10, 0, 14}}}},
+  };
+}
+
+INSTANTIATE_TEST_SUITE_P(Rules, Arbitration, ::testing::ValuesIn(scenarios()),
+                         [](const auto& s) { return std::string(s.param.name); });
+
+}  // namespace
