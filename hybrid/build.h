@@ -43,6 +43,8 @@ BuiltScene build_scene(const Scene& scene, const Progress& progress = {});
 // Where what moves is, for graphics (drawn_scene.h has what stays), filled in place: no allocation once its
 // vectors have their size.
 void fill_moved(const World& world, const WorldState& state, Snapshot& snapshot);
+// The same from within a tick that must not wait: of a soft object relaxed apart, only what is near the tool.
+void fill_moved_near(const World& world, const WorldState& state, Snapshot& snapshot);
 
 // Where an object lies at rest (scene frame, meters), rigid ones first; in words: "x 1.2 to 3.4, y …, z …
 // mm".

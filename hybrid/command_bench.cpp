@@ -8,6 +8,7 @@
 #include "hybrid/bench_occupancy.h"
 #include "hybrid/bench_rigid.h"
 #include "hybrid/bench_soft.h"
+#include "hybrid/bench_threads.h"
 #include "hybrid/commands.h"
 #include "hybrid/occupancy_plot.h"
 #include "hybrid/report.h"
@@ -163,6 +164,20 @@ nlohmann::ordered_json occupancy_suite(const BenchCommand& command, std::FILE* w
   return json;
 }
 
+nlohmann::ordered_json threads_suite(const BenchCommand& command, std::FILE* words) {
+  bench::ThreadsBenchOptions options{.scenes = command.scenes, .progress = progress_on_terminal()};
+  if (command.session_s) options.seconds = *command.session_s;
+  const std::vector<bench::ThreadsRow> rows = bench::bench_threads(options);
+  end_progress();
+  fmt::print(words,
+             "the servo thread's own processor time, in us, while the other cores relax and snap, and while "
+             "they copy memory\n{}",
+             bench::threads_table(rows));
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (const bench::ThreadsRow& row : rows) json.push_back(bench::to_json(row));
+  return json;
+}
+
 // A suite is left out of "all" where everything chosen belongs to others.
 bool has_work(const BenchCommand& command, const std::vector<std::string>& cases,
               const std::vector<std::string>& engines) {
@@ -187,7 +202,7 @@ std::string listed(const std::vector<std::string>& names) {
 }  // namespace
 
 const std::vector<std::string>& bench_suites() {
-  static const std::vector<std::string> kSuites{"rigid", "soft", "occupancy"};
+  static const std::vector<std::string> kSuites{"rigid", "soft", "occupancy", "threads"};
   return kSuites;
 }
 std::vector<std::string> bench_parts() {
@@ -235,6 +250,12 @@ int run_bench(const BenchCommand& command) {
   }
   if (runs("occupancy") && has_work(command, bench::occupancy_cases(), names_of(bench::kOccupancyEngines))) {
     report["suites"]["occupancy"] = occupancy_suite(command, words);
+    any = true;
+  }
+  if (command.suite == "threads" && command.scenes.empty())
+    throw std::invalid_argument("bench threads: no scene; say which, as in --scenes scenes/cube.toml");
+  if (!command.scenes.empty() && runs("threads")) {
+    report["suites"]["threads"] = threads_suite(command, words);
     any = true;
   }
   if (!any) {

@@ -124,7 +124,7 @@ int run(const RunCommand& command) {
       .reference_samples = command.samples,
       .start_ticks = command.start_ticks,
       .progress = progress,
-      .relax_apart = command.relaxation == "apart" || (command.relaxation == "auto" && realtime),
+      .relax_apart = command.relaxation == "apart",
       .black_box = kept ? &kept->box() : nullptr};
   SessionResult result = run_session(scene, built, options);
   end_progress();

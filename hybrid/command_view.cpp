@@ -14,6 +14,7 @@
 #include "hybrid/commands.h"
 #include "hybrid/drawn_scene.h"
 #include "hybrid/hand_over.h"
+#include "hybrid/live_surface.h"
 #include "hybrid/real_device.h"
 #include "hybrid/session.h"
 #include "hybrid/window.h"
@@ -111,7 +112,17 @@ class Player {
     out.force_N = felt.force_N;
     out.feel = built_.state->feel;
     out.tick_us = felt.tick_us;
-    fill_moved(*built_.world, *built_.state, out);
+    if (live_) {
+      fill_moved_near(*built_.world, *built_.state, out);
+    } else {
+      fill_moved(*built_.world, *built_.state, out);
+    }
+  }
+  // From now on tissue is relaxed by a thread, which the caller runs.
+  [[nodiscard]] std::unique_ptr<RelaxationThread> go_live() {
+    live_ = true;
+    relax_apart(*built_.state, Arrival::thread);
+    return std::make_unique<RelaxationThread>(*built_.world, built_.state->apart, 1.0 / kSnapshotEvery_s);
   }
 
  private:
@@ -121,6 +132,7 @@ class Player {
   std::unique_ptr<device::HapticDevice> simulated_;
   device::HapticDevice& device_;
   double rate_hz_, dt_;
+  bool live_ = false;
   std::uint64_t ticks_ = 0;
   std::uint32_t restarts_ = 0;
   glm::dvec3 goal_m_{0.0};
@@ -154,11 +166,12 @@ void play_frames(const ViewCommand& command, Player& player, Window& window) {
 }
 
 // The window on this thread, the session on another. Says what happened to the device, if anything did.
-device::ServoReport play_live(Player& player, Window& window, BlackBox& box) {
+device::ServoReport play_live(const DrawnScene& drawn, Player& player, Window& window, BlackBox& box) {
   HandOver<Snapshot> snapshots;
   HandOver<Wish> wishes;
   std::atomic<bool> stop{false}, ended{false};
   device::ServoReport report;
+  const std::unique_ptr<RelaxationThread> relaxation = player.go_live();
   std::jthread session([&] {
     double next = 0.0;
     auto tick = [&](const device::ServoInput& input) -> device::ServoAnswer {
@@ -186,6 +199,7 @@ device::ServoReport play_live(Player& player, Window& window, BlackBox& box) {
     ended = true;
   });
   Wish wish;
+  Snapshot shown;
   do {
     const WindowInput input = window.take_input();
     wish.dragging = input.dragged_goal_m.has_value();
@@ -194,7 +208,8 @@ device::ServoReport play_live(Player& player, Window& window, BlackBox& box) {
     if (input.restart) ++wish.restarts;
     wishes.back() = wish;
     wishes.publish();
-  } while (window.frame(snapshots.take()) && !ended);
+    show_live(drawn, snapshots.take(), relaxation->surfaces(), shown);
+  } while (window.frame(shown) && !ended);
   stop = true;
   session.join();
   return report;
@@ -225,11 +240,12 @@ int view(const ViewCommand& command) {
   }
   Player player(scene, built, real.get());
   if (command.frames) {
+    relax_apart(*built.state, Arrival::counted);
     play_frames(command, player, window);
     return 0;
   }
   const auto kept = keep_box({}, command.scene, true, scene.rate_hz);
-  const device::ServoReport report = play_live(player, window, kept->box());
+  const device::ServoReport report = play_live(drawn, player, window, kept->box());
   print_fault(*kept);
   for (const std::string& message : report.messages) std::fprintf(stderr, "device: %s\n", message.c_str());
   return report.end == device::ServoEnd::lost ? 1 : 0;

@@ -22,7 +22,7 @@ struct RunCommand {
   std::string device;  // in place of the scene's; empty: the scene's
   int samples = 6;
   std::uint64_t start_ticks = 0;
-  std::string relaxation = "auto";  // or "tick", "apart": where tissue away from the contact is relaxed
+  std::string relaxation = "apart";  // or "tick": where tissue away from the contact is relaxed
   std::filesystem::path trace, plot, picture, record, save_surface, save_volume;  // empty: not written
   std::filesystem::path black_box;                                                // empty: see keep_box()
   std::string json;                                                               // "-": standard output
@@ -71,9 +71,10 @@ struct BenchCommand {
   std::vector<std::string> only, meshes, engines;  // empty: the suite's own choice
   std::vector<int> sizes;                          // of soft: voxels an edge; empty: its own choice
   std::vector<std::size_t> cells;                  // of occupancy: occupied cells; empty: its own choice
-  std::optional<double> session_s;                 // of soft: simulated time of a session
-  std::filesystem::path trace;                     // folder; empty: none
-  std::filesystem::path plot;  // of soft: relaxation round by round; of occupancy: times; empty: none
+  std::vector<std::filesystem::path> scenes;       // of threads
+  std::optional<double> session_s;  // of soft: simulated time of a session; of threads: real time of a load
+  std::filesystem::path trace;      // folder; empty: none
+  std::filesystem::path plot;       // of soft: relaxation round by round; of occupancy: times; empty: none
   std::string json;
 };
 int run_bench(const BenchCommand& command);

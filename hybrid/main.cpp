@@ -45,9 +45,9 @@ void add_run(CLI::App& app, int& status) {
                   "begin with all clocks and counters as after so many ticks; nothing felt should differ");
   sub->add_option(
          "--relaxation", c->relaxation,
-         "where tissue away from the contact comes to rest: in the tick, by its budget; apart from it, "
-         "in real time on a thread of its own; auto: apart in real time")
-      ->check(CLI::IsMember({"auto", "tick", "apart"}))
+         "where tissue away from the contact comes to rest: apart from the tick, in real time on a thread of "
+         "its own, or in the tick, by its budget")
+      ->check(CLI::IsMember({"apart", "tick"}))
       ->capture_default_str();
   sub->add_option("--trace", c->trace, "write every tick as CSV");
   sub->add_option("--plot", c->plot, "write force over time with contacts as SVG");
@@ -188,7 +188,11 @@ void add_bench(CLI::App& app, int& status) {
   sub->add_option("--cells", c->cells, "of occupancy: occupied cells, about, with commas between")
       ->delimiter(',')
       ->check(CLI::Range(100, 20'000'000));
-  sub->add_option("--seconds", c->session_s, "of soft: simulated time of a session")
+  sub->add_option("--scenes", c->scenes, "of threads: scene files, with commas between")
+      ->delimiter(',')
+      ->check(CLI::ExistingFile);
+  sub->add_option("--seconds", c->session_s,
+                  "of soft: simulated time of a session; of threads: real time of each load (60)")
       ->check(CLI::Range(0.1, 3600.0));
   sub->add_option("--engines", c->engines, "engines, with commas between")
       ->delimiter(',')

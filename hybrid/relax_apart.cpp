@@ -103,24 +103,52 @@ void relax_background(const World& world, WorldState& state) noexcept {
   if (state.apart.arrival != Arrival::recorded) state.apart.arrived = arrived;
 }
 
-RelaxationThread::RelaxationThread(Apart& apart) : apart_(apart), thread_([this] { go(); }) {}
+RelaxationThread::RelaxationThread(const World& world, Apart& apart, double surfaces_hz)
+    : world_(world), apart_(apart), surfaces_hz_(surfaces_hz), thread_([this] { go(); }) {}
 
 RelaxationThread::~RelaxationThread() {
   stop_.store(true, std::memory_order_relaxed);
   thread_.join();
 }
 
-void RelaxationThread::go() noexcept {
+bool RelaxationThread::relax_given() noexcept {
+  bool any = false;
+  for (const auto& object : apart_.objects) {
+    if (object == nullptr || object->phase.load(std::memory_order_acquire) != RelaxedApart::Phase::thread)
+      continue;
+    object->replica.relax();
+    object->phase.store(RelaxedApart::Phase::tick, std::memory_order_release);
+    any = true;
+  }
+  return any;
+}
+
+// Of its own state, which the tick never writes.
+void RelaxationThread::say_surfaces() {
+  Moved& moved = surfaces_.back();
+  moved.resize(world_.object_count());
+  for (std::size_t o = 0; o < world_.soft.size(); ++o) {
+    if (!apart_.has(o)) continue;
+    const SoftBody& body = world_.soft[o];
+    auto& of_object = moved[world_.rigid.size() + o];
+    of_object.resize(body.drawn.vertices.size());
+    for (std::size_t v = 0; v < of_object.size(); ++v)
+      of_object[v] =
+          glm::vec3(body.pose.rotation * apart_.objects[o]->replica.displacement_at(body.drawn.vertices[v]));
+  }
+  surfaces_.publish();
+}
+
+void RelaxationThread::go() {
   flush_denormals();  // as the tick does: it is to be the same to the last bit when it is played again
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point next = Clock::now();
   while (!stop_.load(std::memory_order_relaxed)) {
-    bool any = false;
-    for (const auto& object : apart_.objects) {
-      if (object == nullptr || object->phase.load(std::memory_order_acquire) != RelaxedApart::Phase::thread)
-        continue;
-      object->replica.relax();
-      object->phase.store(RelaxedApart::Phase::tick, std::memory_order_release);
-      jobs_.fetch_add(1, std::memory_order_relaxed);
-      any = true;
+    const bool any = relax_given();
+    if (surfaces_hz_ > 0.0 && Clock::now() >= next) {
+      say_surfaces();
+      next = Clock::now() +
+             std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / surfaces_hz_));
     }
     busy_s_.store(own_time_s(), std::memory_order_relaxed);
     if (!any) std::this_thread::sleep_for(std::chrono::microseconds(100));

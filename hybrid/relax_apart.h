@@ -10,9 +10,12 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <glm/vec3.hpp>
 #include <memory>
 #include <thread>
 #include <vector>
+
+#include "hybrid/hand_over.h"
 
 namespace hybrid {
 
@@ -36,6 +39,8 @@ struct Apart {
   Apart(Apart&&) = delete;
   Apart& operator=(Apart&&) = delete;
 
+  [[nodiscard]] bool has(std::size_t o) const { return o < objects.size() && objects[o] != nullptr; }
+
   Arrival arrival = Arrival::counted;
   std::vector<std::unique_ptr<RelaxedApart>> objects;  // [soft]; null, or none at all: relaxed in the tick
   // Bit o: in this tick the result of soft object o began to be taken. With Arrival::recorded said before the
@@ -57,24 +62,33 @@ void relax_background(const World& world, WorldState& state) noexcept;
 // wake it would be a call into the system from the tick.
 class RelaxationThread {
  public:
-  explicit RelaxationThread(Apart& apart);
+  // [object][vertex of its surface] how far from rest (scene frame, meters); empty where not relaxed apart.
+  using Moved = std::vector<std::vector<glm::vec3>>;
+
+  // `surfaces_hz`: how often, between two results, it also says where surfaces are; 0: never.
+  RelaxationThread(const World& world, Apart& apart, double surfaces_hz);
   ~RelaxationThread();
   RelaxationThread(const RelaxationThread&) = delete;
   RelaxationThread& operator=(const RelaxationThread&) = delete;
   RelaxationThread(RelaxationThread&&) = delete;
   RelaxationThread& operator=(RelaxationThread&&) = delete;
 
-  // Its own processor time so far (s), and what it relaxed.
+  // Its own processor time so far (s).
   [[nodiscard]] double busy_s() const { return busy_s_.load(std::memory_order_relaxed); }
-  [[nodiscard]] std::uint64_t jobs() const { return jobs_.load(std::memory_order_relaxed); }
+  // For one other thread, which draws: the latest. The tick is not asked.
+  [[nodiscard]] const Moved& surfaces() noexcept { return surfaces_.take(); }
 
  private:
-  void go() noexcept;
+  void go();
+  bool relax_given() noexcept;
+  void say_surfaces();
 
+  const World& world_;
   Apart& apart_;
+  double surfaces_hz_;
+  HandOver<Moved> surfaces_;
   std::atomic<bool> stop_{false};
   std::atomic<double> busy_s_{0.0};
-  std::atomic<std::uint64_t> jobs_{0};
   std::thread thread_;
 };
 

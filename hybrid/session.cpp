@@ -109,7 +109,8 @@ class Run {
     begin_session(scene_, world_, state_, device_.read().position_m);
     if (options_.relax_apart) relax_apart(state_, realtime_ ? Arrival::thread : Arrival::counted);
     std::optional<RelaxationThread> relaxation;
-    if (options_.relax_apart && realtime_ && !state_.soft.empty()) relaxation.emplace(state_.apart);
+    if (options_.relax_apart && options_.relaxation_thread && realtime_ && !state_.soft.empty())
+      relaxation.emplace(world_, state_.apart, options_.surfaces_hz);
     if (options_.reference_samples > 0 && !realtime_) {
       sample_every_ =
           std::max<std::uint64_t>(1, ticks_ / static_cast<std::uint64_t>(2 * options_.reference_samples));

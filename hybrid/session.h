@@ -48,7 +48,9 @@ struct SessionOptions {
   Progress progress;
   // Tissue away from the contact is relaxed apart from the tick: in real time on a thread of its own.
   bool relax_apart = false;
-  BlackBox* black_box = nullptr;               // every tick is added to it
+  bool relaxation_thread = true;  // false: nothing is relaxed apart; for benchmarks
+  double surfaces_hz = 0.0;       // how often that thread says where surfaces are, for whoever draws
+  BlackBox* black_box = nullptr;  // every tick is added to it
   std::shared_ptr<const device::Path> path{};  // of the hand, in place of the scene's
 };
 

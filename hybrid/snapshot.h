@@ -47,6 +47,11 @@ struct RigidPlace {
   }
 };
 
+// Points of a soft object near the tool, at rest, and how far they are from there (scene frame, meters).
+struct SoftPatch {
+  std::vector<glm::vec3> at_rest_m, moved_m;
+};
+
 struct Snapshot {
   std::uint64_t tick = 0;
   double t_s = 0.0;
@@ -56,6 +61,8 @@ struct Snapshot {
   // (scene frame, meters). Displacements, because a float position 1,000 km from the origin is off by
   // centimeters.
   std::vector<std::vector<glm::vec3>> soft_moved_m;
+  // One an object; of those whose tissue is relaxed on a thread of its own, which says where the rest is.
+  std::vector<SoftPatch> patches{};
   std::vector<RigidPlace> rigid_place;  // one an object; fewer: the rest have not moved
   double tick_us = 0.0;
 

@@ -24,6 +24,11 @@ class TimeSpread {
     ++count_;
     max_ = std::max(max_, time_us);
   }
+  void add(const TimeSpread& other) noexcept {
+    for (std::size_t b = 0; b < bins_.size(); ++b) bins_[b] += other.bins_[b];
+    count_ += other.count_;
+    max_ = std::max(max_, other.max_);
+  }
   [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
   [[nodiscard]] Percentiles percentiles() const noexcept { return {at(0.5), at(0.99), at(0.999), max_}; }
 

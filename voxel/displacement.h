@@ -48,6 +48,10 @@ struct Displacement {
   }
 };
 
+// Displacement at any rest point of the body, from the voxels around it (unit: meter); 0 where none is near.
+[[nodiscard]] glm::dvec3 displacement_at(const Lattice& lattice, const Displacement& state,
+                                         const glm::dvec3& rest_point) noexcept;
+
 // A half-space that one surface voxel may not leave: normal · u >= bound, u its displacement.
 struct Obstacle {
   glm::vec3 normal{0.0F};

@@ -52,6 +52,11 @@ class Replica {
   // Rows, of all levels, that the last relax() wrote: what it cost, in counted work.
   [[nodiscard]] std::size_t work() const { return work_; }
 
+  // Displacement of a rest point as it is known here; 0 where none is near. By the thread that relaxes.
+  [[nodiscard]] glm::dvec3 displacement_at(const glm::dvec3& rest_point) const noexcept {
+    return voxel::displacement_at(lattice_, state_, rest_point);
+  }
+
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
