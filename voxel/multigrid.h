@@ -173,9 +173,12 @@ class Multigrid {
                 const ObstacleView& obstacles, OctetSpan span, int first, int last) noexcept;
   void take_back_refused(int level, RowId row, const RowVector& refused, unsigned axes,
                          OctetSpan span) noexcept;
+  // Lanes that obstacles kept from going along.
   template <class Move>
-  void move_outside(LevelRow r, RowId row, Displacement& state, const ObstacleView& obstacles,
-                    const Move& move) noexcept;
+  std::uint32_t move_outside(LevelRow r, RowId row, Displacement& state, const ObstacleView& obstacles,
+                             const Move& move) noexcept;
+  RowCorrection correct_voxels(const LevelRow& r, RowId row, const RowVector& correction, Displacement& state,
+                               const ObstacleView& obstacles, OctetSpan span, RowVector& refused) noexcept;
 
   const Lattice& lattice_;
   TileQueue tiles_;

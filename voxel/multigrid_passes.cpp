@@ -74,11 +74,11 @@ void Multigrid::smooth(int level, RowId row, Displacement& state, const Obstacle
 // afterwards, it would find that the voxels beside it followed it in there as far as the links let them, and
 // hold it there.
 template <class Move>
-void Multigrid::move_outside(LevelRow r, RowId row, Displacement& state, const ObstacleView& obstacles,
-                             const Move& move) noexcept {
+std::uint32_t Multigrid::move_outside(LevelRow r, RowId row, Displacement& state,
+                                      const ObstacleView& obstacles, const Move& move) noexcept {
   if (obstacles.obstacles.empty() || state.row_obstacles[row] == 0) {
     move(r);
-    return;
+    return 0;
   }
   RowVector before;
   for (std::size_t axis = 0; axis < 3; ++axis) std::copy_n(r.u[axis], kRow, before[axis].begin());
@@ -106,6 +106,28 @@ void Multigrid::move_outside(LevelRow r, RowId row, Displacement& state, const O
   for (VoxelId lane = 0; lane < kRow; ++lane) {
     if ((blocked_lanes >> lane & 1U) != 0) relax_obstacle(couplings(), state, obstacles, first + lane);
   }
+  return blocked_lanes;
+}
+
+// Corrects a row of voxels as far as links and obstacles allow. What an obstacle keeps from following is not
+// refused: a voxel that slides along it goes on with its neighbours, and cells that took its part back in
+// every cycle swung between two states (a block pressed onto a plate: 0.26 to 0.68 N, where 0.40 is right).
+RowCorrection Multigrid::correct_voxels(const LevelRow& r, RowId row, const RowVector& correction,
+                                        Displacement& state, const ObstacleView& obstacles, OctetSpan span,
+                                        RowVector& refused) noexcept {
+  const RowLimits limits = couplings().limits(row);
+  RowCorrection done;
+  const std::uint32_t kept_out = move_outside(r, row, state, obstacles, [&](const LevelRow& way) {
+    done = correct_row(way, &limits, span, correction, refused);
+  });
+  for (std::size_t lane = 0; lane < kRow && kept_out >> lane != 0; ++lane) {
+    if ((kept_out >> lane & 1U) == 0) continue;
+    const unsigned stopped = r.stopped == nullptr ? 0U : r.stopped[lane];
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if ((stopped >> axis & 1U) == 0) refused[axis][lane] = 0.0F;
+    }
+  }
+  return done;
 }
 
 RowId Multigrid::row_below(int level, RowId row, int child) const noexcept {
@@ -336,9 +358,7 @@ void Multigrid::tell_row(int level, RowId row, const std::array<HatRow, 4>& hats
   } else {
     // A voxel that pulls against a link at its limit stays, until the limit lets go of it.
     if (has(0, row, limited)) r.stopped = at(0).stopped.data() + static_cast<std::size_t>(row) * kRow;
-    const RowLimits limits = couplings().limits(row);
-    move_outside(r, row, state, obstacles,
-                 [&](const LevelRow& way) { done = correct_row(way, &limits, span, correction, refused); });
+    done = correct_voxels(r, row, correction, state, obstacles, span, refused);
   }
   if (done.refused != 0) take_back_refused(level, row, refused, done.refused, span);
   note_change(level, row, done.most_m);
@@ -348,11 +368,7 @@ void Multigrid::add(RowId row, const RowVector& way, Displacement& state,
                     const ObstacleView& obstacles) noexcept {
   if (!prepare(0, row)) return;
   RowVector refused;
-  const LevelRow r = row_of(0, row, state);
-  const RowLimits limits = couplings().limits(row);
-  RowCorrection done;
-  move_outside(r, row, state, obstacles,
-               [&](const LevelRow& to) { done = correct_row(to, &limits, {}, way, refused); });
+  const RowCorrection done = correct_voxels(row_of(0, row, state), row, way, state, obstacles, {}, refused);
   if (done.refused != 0) take_back_refused(0, row, refused, done.refused, {});
   note_change(0, row, done.most_m);
 }

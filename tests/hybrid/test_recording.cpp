@@ -209,7 +209,7 @@ TEST_F(RecordingFile, AFlippedBitOfAnInputIsNoticedAtItsTick) {
   ASSERT_TRUE(hybrid::replay(good, {}).equal);
   hybrid::save_recording(folder_ / "a.rec", good);
   const std::string bytes = read(folder_ / "a.rec");
-  constexpr std::size_t kTickBytes = 40;
+  constexpr std::size_t kTickBytes = 48;
   const std::size_t first = bytes.size() - kTickBytes * good.ticks.size();
   for (const std::size_t tick : {std::size_t{0}, std::size_t{50}, std::size_t{200}, good.ticks.size() - 1}) {
     std::string flipped = bytes;
