@@ -53,9 +53,10 @@ class Relaxation {
     asleep_ = false;
     cycles_without_gain_ = 0;
   }
-  [[nodiscard]] bool asleep() const { return asleep_; }
-  // Nothing to do here until somebody moves something: another relaxes it (replica.h) …
-  void sleep() noexcept { asleep_ = true; }
+  [[nodiscard]] bool asleep() const { return asleep_ && !away_; }
+  // Another relaxes it (replica.h): nothing to do here until somebody moves something …
+  void give_away() noexcept { asleep_ = away_ = true; }
+  [[nodiscard]] bool idle() const { return asleep_; }
   // … and how far that is.
   struct Progress {
     double residual_N = 0.0;
@@ -63,6 +64,7 @@ class Relaxation {
   };
   [[nodiscard]] Progress progress() const { return {residual_N_, hold_}; }
   void take_over(const Progress& other) noexcept {
+    away_ = false;
     residual_N_ = other.residual_N;
     multigrid_.set_hold(other.hold);
     multigrid_.release_limited();
@@ -120,7 +122,7 @@ class Relaxation {
   std::size_t round_left_ = 0;              // tiles until this round ends
   std::size_t cursor_ = 0, looked_at_ = 0;  // tiles looked at for what coarse levels have to tell them
   RowId keep_row_ = 0;                      // where keeping goes on
-  bool asleep_ = true;
+  bool asleep_ = true, away_ = false;
   bool contact_relaxed_ = false;  // since run() last was
   bool unkept_ = false;           // some link is beyond what it keeps
   bool keeping_ = false;          // it is kept now

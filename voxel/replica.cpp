@@ -89,7 +89,7 @@ void Replica::give(SoftObject& object) noexcept {
   object.list_held();
   given_held_.clear();
   for (const VoxelId v : object.all_held_) given_held_.push_back(v);
-  object.relaxation_.sleep();  // until something moves again
+  object.relaxation_.give_away();
 }
 
 void Replica::open_given() noexcept {

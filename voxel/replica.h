@@ -39,8 +39,8 @@ class Replica {
   // relax_background() is for objects without a replica. Allocates; throws std::bad_alloc.
   explicit Replica(SoftObject& object);
 
-  // Has anything moved that is not at rest yet?
-  [[nodiscard]] static bool wanted(const SoftObject& object) { return !object.asleep(); }
+  // Has anything moved since it was given, or is not at rest yet? Not while something given is still out.
+  [[nodiscard]] static bool wanted(const SoftObject& object) { return !object.relaxation_.idle(); }
 
   // ---- the tick; none of these allocates, locks or throws ----
   void give(SoftObject& object) noexcept;

@@ -25,9 +25,11 @@ inline const std::string some_path = "[path]\nkind = \"press\"\nfrom = [0, 0, 20
 
 class Touch {
  public:
-  Touch(const hybrid::Scene& scene, const glm::dvec3& start_m) : built(hybrid::build_scene(scene)) {
+  Touch(const hybrid::Scene& scene, const glm::dvec3& start_m, bool relaxed_apart = false)
+      : built(hybrid::build_scene(scene)) {
     hybrid::flush_denormals();
     hybrid::begin_session(scene, world(), state(), start_m);
+    if (relaxed_apart) hybrid::relax_apart(state(), hybrid::Arrival::counted);
   }
 
   hybrid::TickResult at(const glm::dvec3& device_m, double dt_s = 1e-3) {
