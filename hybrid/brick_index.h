@@ -127,7 +127,8 @@ class BrickGrid {
   [[nodiscard]] std::int32_t along(double offset_m) const noexcept {
     // std::floor is a call where the processor's newer instructions may not be assumed. Written so that what
     // is not a number becomes the lowest cell.
-    const double x = std::max(-kFarthestCell, std::min(offset_m * per_cell_, kFarthestCell));
+    const double scaled = offset_m * per_cell_, below = scaled < kFarthestCell ? scaled : kFarthestCell,
+                 x = below > -kFarthestCell ? below : -kFarthestCell;
     const auto cell = static_cast<std::int32_t>(x);
     return cell - (static_cast<double>(cell) > x ? 1 : 0);
   }
@@ -204,7 +205,7 @@ class BrickIndex : public BrickGrid {
   void each(const CellRange& cells, CellTrail& trail, Visit&& visit) const noexcept {
     if (table_.size() == 0) return;
     const CellCoordinates a = brick_of(cells.low), b = brick_of(cells.high);
-    if (a == b) {  // one brick: a point, and most small boxes
+    if (same(a, b)) {  // one brick: a point, and most small boxes
       const std::uint32_t n = find(a, trail);
       if (n != kNone) visit(table_[n], cells);
       return;

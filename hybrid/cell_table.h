@@ -25,6 +25,11 @@ namespace hybrid {
 
 using CellCoordinates = std::array<std::int32_t, 3>;
 
+// In registers, as coordinates mostly are; the array's own comparison would have to store them first.
+[[nodiscard]] inline bool same(const CellCoordinates& a, const CellCoordinates& b) noexcept {
+  return ((a[0] ^ b[0]) | (a[1] ^ b[1]) | (a[2] ^ b[2])) == 0;
+}
+
 // In place of the first coordinate of what is not there: no cell has it.
 inline constexpr std::int32_t kNoPlace = std::numeric_limits<std::int32_t>::min();
 
@@ -188,9 +193,6 @@ class CellTable {
   }
   [[nodiscard]] static std::uint32_t place_of(std::size_t chunk, std::uint64_t match) noexcept {
     return static_cast<std::uint32_t>(chunk * kPlaces + static_cast<std::size_t>(std::countr_zero(match) / 8));
-  }
-  [[nodiscard]] static bool same(const CellCoordinates& a, const CellCoordinates& b) noexcept {
-    return ((a[0] ^ b[0]) | (a[1] ^ b[1]) | (a[2] ^ b[2])) == 0;
   }
   [[nodiscard]] static std::size_t parity(const CellCoordinates& at) noexcept {
     return static_cast<std::size_t>((at[0] & 1) + 2 * (at[1] & 1) + 4 * (at[2] & 1));

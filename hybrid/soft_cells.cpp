@@ -102,7 +102,7 @@ void SoftCells::put(std::uint32_t number, const glm::dvec3& position, bool may_a
   }
   const CellCoordinates old_block = blocks_[old / kBlockCells].at;
   const std::uint32_t old_cell = old % kBlockCells;
-  if (old_cell == cell && old_block == block) return;
+  if (old_cell == cell && same(old_block, block)) return;
   // First out, so that what it leaves is room for what it needs: a voxel that is alone needs no other.
   take_out(number);
   if (put_in(number, block, cell, may_allocate)) return;
@@ -194,7 +194,7 @@ std::uint32_t SoftCells::add_block(const CellCoordinates& at, bool may_allocate)
 bool SoftCells::put_in(std::uint32_t number, const CellCoordinates& at, std::uint32_t cell,
                        bool may_allocate) {
   std::uint32_t place = last_put_;
-  if (place >= blocks_.places() || blocks_[place].at != at) place = blocks_.find(at);
+  if (place >= blocks_.places() || !same(blocks_[place].at, at)) place = blocks_.find(at);
   if (place == kNone) place = add_block(at, may_allocate);
   if (place == kNone) return false;
   last_put_ = place;
@@ -220,12 +220,6 @@ bool SoftCells::any_near(const glm::dvec3& low, const glm::dvec3& high) const no
   return any;
 }
 
-std::uint32_t SoftCells::block_at(const CellCoordinates& at, CellTrail& trail) const noexcept {
-  const std::uint32_t hinted = blocks_.hinted(at, trail);
-  if (hinted != kNone || !bricks_.perhaps_brick(brick_of_block(at))) return hinted;
-  return blocks_.find(at, trail);
-}
-
 void SoftCells::list(const Block& block, std::uint64_t mask, std::span<std::uint32_t> out,
                      std::size_t& count) const noexcept {
   for (std::uint64_t bits = block.occupied & mask; bits != 0; bits &= bits - 1) {
@@ -240,11 +234,31 @@ void SoftCells::list(const Block& block, std::uint64_t mask, std::span<std::uint
 
 std::size_t SoftCells::in(const glm::dvec3& low, const glm::dvec3& high, std::span<std::uint32_t> out,
                           CellTrail& trail) const noexcept {
+  if (blocks_.size() == 0) return 0;
+  const CellCoordinates first = bricks_.cell_of(low);
+  return low == high ? in_cell(first, out, trail) : in_box({first, bricks_.cell_of(high)}, out, trail);
+}
+
+std::size_t SoftCells::in_cell(const CellCoordinates& cell, std::span<std::uint32_t> out,
+                               CellTrail& trail) const noexcept {
+  const std::uint32_t place = block_at(block_of(cell), trail);
+  if (place == kNone) return 0;
+  const Block& block = blocks_[place];
+  const std::uint32_t in_block = cell_in_block(cell);
+  if ((block.occupied >> in_block & 1U) == 0) return 0;
   std::size_t count = 0;
-  if (blocks_.size() == 0) return count;
-  const CellRange cells = bricks_.cells_of(low, high);
+  for (std::uint32_t link = link_at(block, in_block);; link = next_[link & kNumber]) {
+    if (count == out.size()) return count;
+    out[count++] = link & kNumber;
+    if ((link & kMore) == 0) return count;
+  }
+}
+
+std::size_t SoftCells::in_box(const CellRange& cells, std::span<std::uint32_t> out,
+                              CellTrail& trail) const noexcept {
+  std::size_t count = 0;
   const CellCoordinates a = block_of(cells.low), b = block_of(cells.high);
-  if (a == b) {  // one block: a point, and many small boxes
+  if (same(a, b)) {  // one block: a point, and many small boxes
     const std::uint32_t place = block_at(a, trail);
     if (place != kNone) list(blocks_[place], block_mask(a, cells), out, count);
     return count;

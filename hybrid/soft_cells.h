@@ -101,7 +101,15 @@ class SoftCells {
   void remove_cell(Block& block, std::uint32_t cell) noexcept;
   void now_at(const Block& block, std::uint32_t place) noexcept;
 
-  [[nodiscard]] std::uint32_t block_at(const CellCoordinates& at, CellTrail& trail) const noexcept;
+  [[nodiscard]] std::size_t in_cell(const CellCoordinates& cell, std::span<std::uint32_t> out,
+                                    CellTrail& trail) const noexcept;
+  [[nodiscard]] std::size_t in_box(const CellRange& cells, std::span<std::uint32_t> out,
+                                   CellTrail& trail) const noexcept;
+  [[nodiscard]] std::uint32_t block_at(const CellCoordinates& at, CellTrail& trail) const noexcept {
+    const std::uint32_t hinted = blocks_.hinted(at, trail);
+    if (hinted != kNone || !bricks_.perhaps_brick(brick_of_block(at))) return hinted;
+    return blocks_.find(at, trail);
+  }
   // Writes what the cells of the mask hold.
   void list(const Block& block, std::uint64_t mask, std::span<std::uint32_t> out,
             std::size_t& count) const noexcept;
