@@ -206,7 +206,8 @@ class BrickIndex : public BrickGrid {
     if (table_.size() == 0) return;
     const CellCoordinates a = brick_of(cells.low), b = brick_of(cells.high);
     if (same(a, b)) {  // one brick: a point, and most small boxes
-      const std::uint32_t n = find(a, trail);
+      std::uint32_t n = table_.hinted(a, trail);
+      if (n == kNone && perhaps_brick(a)) n = table_.find_and_look_ahead(a, trail);
       if (n != kNone) visit(table_[n], cells);
       return;
     }
@@ -224,7 +225,7 @@ class BrickIndex : public BrickGrid {
       return;
     }
     CellCoordinates c{};
-    if (bricks <= 8.0) {
+    if (bricks <= 8.0 && table_.large()) {
       for (c[2] = a[2]; c[2] <= b[2]; ++c[2]) {
         for (c[1] = a[1]; c[1] <= b[1]; ++c[1]) {
           for (c[0] = a[0]; c[0] <= b[0]; ++c[0]) {

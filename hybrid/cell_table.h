@@ -83,9 +83,16 @@ class CellTable {
   [[nodiscard]] std::uint32_t find(const CellCoordinates& at, CellTrail& trail) const noexcept {
     const std::uint32_t place = find(at);
     if (place != kNone) trail.place[parity(at)] = place;
-    fetch_ahead(at, trail);
     return place;
   }
+  // The same, and where the trail leads to will be in a cache when it gets there.
+  [[nodiscard]] std::uint32_t find_and_look_ahead(const CellCoordinates& at, CellTrail& trail) const noexcept {
+    const std::uint32_t place = find(at, trail);
+    if (large()) fetch_ahead(at, trail);
+    return place;
+  }
+  // Larger than a cache that a core has for itself: then it is worth to tell the memory early.
+  [[nodiscard]] bool large() const noexcept { return entries_.size() * sizeof(Entry) > (std::size_t{1} << 19); }
 
   // Tells the memory that find() of it will follow: of several that are told first, one waits for all.
   void fetch(const CellCoordinates& at) const noexcept {

@@ -241,8 +241,13 @@ std::size_t SoftCells::in(const glm::dvec3& low, const glm::dvec3& high, std::sp
 
 std::size_t SoftCells::in_cell(const CellCoordinates& cell, std::span<std::uint32_t> out,
                                CellTrail& trail) const noexcept {
-  const std::uint32_t place = block_at(block_of(cell), trail);
-  if (place == kNone) return 0;
+  const CellCoordinates at = block_of(cell);
+  std::uint32_t place = blocks_.hinted(at, trail);
+  if (place == kNone) {
+    if (!bricks_.perhaps(cell)) return 0;
+    place = blocks_.find_and_look_ahead(at, trail);
+    if (place == kNone) return 0;
+  }
   const Block& block = blocks_[place];
   const std::uint32_t in_block = cell_in_block(cell);
   if ((block.occupied >> in_block & 1U) == 0) return 0;
@@ -279,7 +284,7 @@ std::size_t SoftCells::in_box(const CellRange& cells, std::span<std::uint32_t> o
   if (!bricks_.perhaps(cells)) return count;
   // All blocks come at once. Then brick by brick, in the order in which they are of more blocks.
   CellCoordinates c{};
-  for (c[2] = a[2]; c[2] <= b[2]; ++c[2]) {
+  for (c[2] = a[2]; blocks_.large() && c[2] <= b[2]; ++c[2]) {
     for (c[1] = a[1]; c[1] <= b[1]; ++c[1]) {
       for (c[0] = a[0]; c[0] <= b[0]; ++c[0]) {
         if (blocks_.hinted(c, trail) == kNone) blocks_.fetch(c);
