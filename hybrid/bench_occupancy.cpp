@@ -184,8 +184,7 @@ std::size_t Bench::ask(OccupancyEngine engine, const Box& box, Found& out) const
   if (engine == OccupancyEngine::brute) return ask_brute(box, out);
   // Of triangles the map says whether there are any, and the tree ends with the first.
   if (!voxels()) {
-    if (engine == OccupancyEngine::map)
-      return map_->rigid_in(box.map_low, box.map_high, trail_) != 0 ? 1 : 0;
+    if (engine == OccupancyEngine::map) return map_->rigid_in(box.map_low, box.map_high, trail_) != 0 ? 1 : 0;
     return tree_->in(box.low, box.high, std::span(out).first(1));
   }
   return engine == OccupancyEngine::map ? map_->soft_in(box.map_low, box.map_high, out, trail_)

@@ -168,8 +168,7 @@ class BrickIndex : public BrickGrid {
   // kNone only when it may not allocate and there is no room.
   std::uint32_t find_or_add(const CellCoordinates& brick, bool may_allocate) {
     const std::size_t before = table_.size();
-    const std::uint32_t number =
-        table_.find_or_add(brick, may_allocate, [](const Brick&, std::uint32_t) {});
+    const std::uint32_t number = table_.find_or_add(brick, may_allocate, [](const Brick&, std::uint32_t) {});
     if (table_.size() != before) mark(brick);
     return number;
   }

@@ -34,9 +34,9 @@ using CellCoordinates = std::array<std::int32_t, 3>;
 inline constexpr std::int32_t kNoPlace = std::numeric_limits<std::int32_t>::min();
 
 // What the caller of a table remembers from one question to the next, so that a path costs no hash: where the
-// last ones were, one for each parity of the three coordinates (so that a box over two along each axis has all
-// its eight), and where to. Only hints: whatever they say, and to whatever table they are given, answers are
-// the same. One for each thread that asks.
+// last ones were, one for each parity of the three coordinates (so that a box over two along each axis has
+// all its eight), and where to. Only hints: whatever they say, and to whatever table they are given, answers
+// are the same. One for each thread that asks.
 struct CellTrail {
   std::array<std::uint32_t, 8> place{};
   CellCoordinates last{};  // the last that was not among them
@@ -86,17 +86,22 @@ class CellTable {
     return place;
   }
   // The same, and where the trail leads to will be in a cache when it gets there.
-  [[nodiscard]] std::uint32_t find_and_look_ahead(const CellCoordinates& at, CellTrail& trail) const noexcept {
+  [[nodiscard]] std::uint32_t find_and_look_ahead(const CellCoordinates& at,
+                                                  CellTrail& trail) const noexcept {
     const std::uint32_t place = find(at, trail);
     if (large()) fetch_ahead(at, trail);
     return place;
   }
   // Larger than a cache that a core has for itself: then it is worth to tell the memory early.
-  [[nodiscard]] bool large() const noexcept { return entries_.size() * sizeof(Entry) > (std::size_t{1} << 19); }
+  [[nodiscard]] bool large() const noexcept {
+    return entries_.size() * sizeof(Entry) > (std::size_t{1} << 19);
+  }
 
   // Tells the memory that find() of it will follow: of several that are told first, one waits for all.
-  void fetch(const CellCoordinates& at) const noexcept {
-    const std::uint64_t h = hash(at), m = matches(chunks_[home(h)], h);
+  // (GCC 12 takes a function that only prefetches for one that does nothing, and leaves out its calls.)
+  [[gnu::always_inline]] void fetch(const CellCoordinates& at) const noexcept { fetch(hash(at)); }
+  [[gnu::always_inline]] void fetch(std::uint64_t h) const noexcept {
+    const std::uint64_t m = matches(chunks_[home(h)], h);
     // Without a match, too, some address: a branch would have to wait for the tags.
     const std::uint32_t place = place_of(home(h), m | static_cast<std::uint64_t>(m == 0) << 7);
     __builtin_prefetch(&entries_[place]);
@@ -162,7 +167,8 @@ class CellTable {
       if (!tagged) continue;
       ++held;
       if (find(entries_[place].at) != place) return false;
-      for (std::size_t c = home(hash(entries_[place].at)); c != last; c = (c + 1) % chunks_.size()) ++passed[c];
+      for (std::size_t c = home(hash(entries_[place].at)); c != last; c = (c + 1) % chunks_.size())
+        ++passed[c];
     }
     for (std::size_t c = 0; c < chunks_.size(); ++c) {
       const std::uint64_t says = chunks_[c] >> kPassedShift;
@@ -174,15 +180,21 @@ class CellTable {
  private:
   static constexpr std::size_t kPlaces = 7;  // of a chunk
   static constexpr int kPassedShift = 56;
-  static constexpr std::uint64_t kOnePassed = 1ULL << kPassedShift, kMostPassed = 0xFF;  // it counts no further
+  static constexpr std::uint64_t kOnePassed = 1ULL << kPassedShift,
+                                 kMostPassed = 0xFF;  // it counts no further
   static constexpr std::uint64_t kOnes = 0x0101010101010101ULL;
   static constexpr std::size_t kMostPlaces = std::size_t{1} << 26;
 
   [[nodiscard]] static std::uint64_t hash(const CellCoordinates& c) noexcept {
-    // Three odd multipliers and a finaliser (Teschner et al. 2003 mix the same way, with worse low bits).
-    std::uint64_t h = static_cast<std::uint32_t>(c[0]) * 0x9E3779B97F4A7C15ULL ^
-                      static_cast<std::uint32_t>(c[1]) * 0xC2B2AE3D27D4EB4FULL ^
-                      static_cast<std::uint32_t>(c[2]) * 0x165667B19E3779F9ULL;
+    return finished(part(0, c[0]) ^ part(1, c[1]) ^ part(2, c[2]));
+  }
+  // Three odd multipliers and a finaliser (Teschner et al. 2003 mix the same way, with worse low bits).
+  [[nodiscard]] static std::uint64_t part(std::size_t axis, std::int32_t c) noexcept {
+    constexpr std::array<std::uint64_t, 3> odd{0x9E3779B97F4A7C15ULL, 0xC2B2AE3D27D4EB4FULL,
+                                               0x165667B19E3779F9ULL};
+    return static_cast<std::uint32_t>(c) * odd[axis];
+  }
+  [[nodiscard]] static std::uint64_t finished(std::uint64_t h) noexcept {
     h ^= h >> 29;
     h *= 0xBF58476D1CE4E5B9ULL;
     return h ^ h >> 32;
@@ -199,30 +211,42 @@ class CellTable {
     return (x - kOnes) & ~x & 0x0080808080808080ULL;
   }
   [[nodiscard]] static std::uint32_t place_of(std::size_t chunk, std::uint64_t match) noexcept {
-    return static_cast<std::uint32_t>(chunk * kPlaces + static_cast<std::size_t>(std::countr_zero(match) / 8));
+    return static_cast<std::uint32_t>(chunk * kPlaces +
+                                      static_cast<std::size_t>(std::countr_zero(match) / 8));
   }
   [[nodiscard]] static std::size_t parity(const CellCoordinates& at) noexcept {
     return static_cast<std::size_t>((at[0] & 1) + 2 * (at[1] & 1) + 4 * (at[2] & 1));
   }
   // What of an entry lies beyond its first cache line comes together with it.
-  void fetch_rest(std::uint32_t place) const noexcept {
+  [[gnu::always_inline]] void fetch_rest(std::uint32_t place) const noexcept {
     if constexpr (sizeof(Entry) > 32)
       __builtin_prefetch(reinterpret_cast<const char*>(&entries_[place]) + sizeof(Entry) - 1);
   }
   // Along a path the next one is beside this, in the direction in which it has gone so far.
-  void fetch_ahead(const CellCoordinates& at, CellTrail& trail) const noexcept {
+  [[gnu::always_inline]] void fetch_ahead(const CellCoordinates& at, CellTrail& trail) const noexcept {
     bool path = true;
     for (std::size_t d = 0; d < 3; ++d) {
-      const std::uint32_t step = static_cast<std::uint32_t>(at[d]) - static_cast<std::uint32_t>(trail.last[d]);
+      const std::uint32_t step =
+          static_cast<std::uint32_t>(at[d]) - static_cast<std::uint32_t>(trail.last[d]);
       path = path && step + 2 <= 4;
       if (step != 0) trail.step[d] = static_cast<std::int32_t>(step) < 0 ? -1 : 1;
     }
     trail.last = at;
     if (!path) return;
+    // Its entry, and the tags of those beyond it: fetching an entry has to read its tags.
+    std::array<std::array<std::uint64_t, 3>, 3> parts{};  // [axis][steps ahead]
     for (std::size_t d = 0; d < 3; ++d) {
-      CellCoordinates next = at;
-      next[d] += trail.step[d];
-      fetch(next);
+      for (std::int32_t n = 0; n < 3; ++n)
+        parts[d][static_cast<std::size_t>(n)] = part(d, at[d] + n * trail.step[d]);
+    }
+    for (std::size_t x = 0; x < 3; ++x) {
+      for (std::size_t y = 0; x + y < 3; ++y) {
+        for (std::size_t z = 0; x + y + z < 3; ++z) {
+          const std::uint64_t h = finished(parts[0][x] ^ parts[1][y] ^ parts[2][z]);
+          if (x + y + z == 1) fetch(h);
+          if (x + y + z == 2) __builtin_prefetch(&chunks_[home(h)]);
+        }
+      }
     }
   }
 

@@ -232,15 +232,8 @@ void SoftCells::list(const Block& block, std::uint64_t mask, std::span<std::uint
   }
 }
 
-std::size_t SoftCells::in(const glm::dvec3& low, const glm::dvec3& high, std::span<std::uint32_t> out,
-                          CellTrail& trail) const noexcept {
-  if (blocks_.size() == 0) return 0;
-  const CellCoordinates first = bricks_.cell_of(low);
-  return low == high ? in_cell(first, out, trail) : in_box({first, bricks_.cell_of(high)}, out, trail);
-}
-
-std::size_t SoftCells::in_cell(const CellCoordinates& cell, std::span<std::uint32_t> out,
-                               CellTrail& trail) const noexcept {
+inline std::size_t SoftCells::in_cell(const CellCoordinates& cell, std::span<std::uint32_t> out,
+                                      CellTrail& trail) const noexcept {
   const CellCoordinates at = block_of(cell);
   std::uint32_t place = blocks_.hinted(at, trail);
   if (place == kNone) {
@@ -259,8 +252,8 @@ std::size_t SoftCells::in_cell(const CellCoordinates& cell, std::span<std::uint3
   }
 }
 
-std::size_t SoftCells::in_box(const CellRange& cells, std::span<std::uint32_t> out,
-                              CellTrail& trail) const noexcept {
+inline std::size_t SoftCells::in_box(const CellRange& cells, std::span<std::uint32_t> out,
+                                     CellTrail& trail) const noexcept {
   std::size_t count = 0;
   const CellCoordinates a = block_of(cells.low), b = block_of(cells.high);
   if (same(a, b)) {  // one block: a point, and many small boxes
@@ -306,6 +299,13 @@ std::size_t SoftCells::in_box(const CellRange& cells, std::span<std::uint32_t> o
   return count;
 }
 
+std::size_t SoftCells::in(const glm::dvec3& low, const glm::dvec3& high, std::span<std::uint32_t> out,
+                          CellTrail& trail) const noexcept {
+  if (blocks_.size() == 0) return 0;
+  const CellCoordinates first = bricks_.cell_of(low);
+  return low == high ? in_cell(first, out, trail) : in_box({first, bricks_.cell_of(high)}, out, trail);
+}
+
 std::size_t SoftCells::memory_bytes() const noexcept {
   return bricks_.memory_bytes() + blocks_.memory_bytes() + full_.capacity() * sizeof(Full) +
          (next_.capacity() + cell_.capacity()) * sizeof(std::uint32_t);
@@ -319,7 +319,8 @@ bool SoftCells::validate() const {
     right = right && block.occupied != 0 && brick != kNone && bricks_.perhaps_brick(bricks_[brick].at) &&
             (bricks_[brick].blocks & bit_in_brick(block.at)) != 0;
     full += block.full != kNone ? 1 : 0;
-    right = right && (block.full != kNone ? bits_in(block.occupied) >= kFew : bits_in(block.occupied) <= kPacked);
+    right =
+        right && (block.full != kNone ? bits_in(block.occupied) >= kFew : bits_in(block.occupied) <= kPacked);
     for (std::uint64_t bits = block.occupied; right && bits != 0; bits &= bits - 1) {
       const auto cell = static_cast<std::uint32_t>(std::countr_zero(bits));
       for (std::uint32_t link = link_at(block, cell); right; link = next_[link & kNumber]) {

@@ -101,10 +101,12 @@ class SoftCells {
   void remove_cell(Block& block, std::uint32_t cell) noexcept;
   void now_at(const Block& block, std::uint32_t place) noexcept;
 
-  [[nodiscard]] std::size_t in_cell(const CellCoordinates& cell, std::span<std::uint32_t> out,
-                                    CellTrail& trail) const noexcept;
-  [[nodiscard]] std::size_t in_box(const CellRange& cells, std::span<std::uint32_t> out,
-                                   CellTrail& trail) const noexcept;
+  // Inline, so that coordinates stay in registers.
+  [[nodiscard, gnu::always_inline]] std::size_t in_cell(const CellCoordinates& cell,
+                                                        std::span<std::uint32_t> out,
+                                                        CellTrail& trail) const noexcept;
+  [[nodiscard, gnu::always_inline]] std::size_t in_box(const CellRange& cells, std::span<std::uint32_t> out,
+                                                       CellTrail& trail) const noexcept;
   [[nodiscard]] std::uint32_t block_at(const CellCoordinates& at, CellTrail& trail) const noexcept {
     const std::uint32_t hinted = blocks_.hinted(at, trail);
     if (hinted != kNone || !bricks_.perhaps_brick(brick_of_block(at))) return hinted;
@@ -119,8 +121,9 @@ class SoftCells {
   std::vector<Full, HugePages<Full>> full_;
   std::uint32_t free_full_ = kNone;
   std::vector<std::uint32_t, HugePages<std::uint32_t>> next_;  // [number] link to the next in its cell
-  std::vector<std::uint32_t, HugePages<std::uint32_t>> cell_;  // [number] place of block · 64 + cell, or kNone
-  std::uint32_t last_put_ = 0;                                 // block, mostly the next one's too
+  std::vector<std::uint32_t, HugePages<std::uint32_t>>
+      cell_;                    // [number] place of block · 64 + cell, or kNone
+  std::uint32_t last_put_ = 0;  // block, mostly the next one's too
   std::uint64_t overflows_ = 0;
 };
 
