@@ -14,8 +14,10 @@ namespace {
 
 nlohmann::ordered_json fuzz(const ExtremesCommand& command, std::FILE* words, bool& ok) {
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();
-  const FuzzOptions options{
-      .ticks = command.fuzz_ticks, .seed = command.seed, .progress = progress_on_terminal()};
+  const FuzzOptions options{.ticks = command.fuzz_ticks,
+                            .seed = command.seed,
+                            .relax_apart = command.relax_apart,
+                            .progress = progress_on_terminal()};
   for (const FuzzResult& r : fuzz_ticks(options)) {
     end_progress();
     fmt::print(

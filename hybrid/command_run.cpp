@@ -111,17 +111,20 @@ int run(const RunCommand& command) {
     end_progress();
     std::fprintf(stderr, "note: in touch now; Ctrl-C ends the session and keeps it\n");
   }
-  const auto kept = keep_box(command.black_box, command.scene, command.realtime || real, scene.rate_hz);
-  SessionOptions options{.seconds = command.seconds,
-                         .realtime = command.realtime,
-                         .real_device = real.get(),
-                         .keep_rows = !command.trace.empty() || !command.plot.empty(),
-                         .keep_recording = !command.record.empty(),
-                         .keep_picture = !command.picture.empty(),
-                         .reference_samples = command.samples,
-                         .start_ticks = command.start_ticks,
-                         .progress = progress,
-                         .black_box = kept ? &kept->box() : nullptr};
+  const bool realtime = command.realtime || real;
+  const auto kept = keep_box(command.black_box, command.scene, realtime, scene.rate_hz);
+  SessionOptions options{
+      .seconds = command.seconds,
+      .realtime = command.realtime,
+      .real_device = real.get(),
+      .keep_rows = !command.trace.empty() || !command.plot.empty(),
+      .keep_recording = !command.record.empty(),
+      .keep_picture = !command.picture.empty(),
+      .reference_samples = command.samples,
+      .start_ticks = command.start_ticks,
+      .progress = progress,
+      .relax_apart = command.relaxation == "apart" || (command.relaxation == "auto" && realtime),
+      .black_box = kept ? &kept->box() : nullptr};
   SessionResult result = run_session(scene, built, options);
   end_progress();
   if (kept) print_fault(*kept);
@@ -141,8 +144,9 @@ int run(const RunCommand& command) {
   if (!command.picture.empty())
     save_picture(command.picture, drawn_scene(scene, built, title), *result.moment);
   if (!command.record.empty()) {
-    save_recording(command.record, {std::filesystem::absolute(command.scene), read_text(command.scene),
-                                    result.dt_s, scene_limits(scene), result.state_hash, result.recording});
+    save_recording(command.record,
+                   {std::filesystem::absolute(command.scene), read_text(command.scene), result.dt_s,
+                    scene_limits(scene), options.relax_apart, result.state_hash, result.recording});
   }
   if (!command.save_surface.empty()) save_surfaces(command.save_surface, built);
   std::vector<std::filesystem::path> volumes;

@@ -22,6 +22,7 @@ struct RunCommand {
   std::string device;  // in place of the scene's; empty: the scene's
   int samples = 6;
   std::uint64_t start_ticks = 0;
+  std::string relaxation = "auto";  // or "tick", "apart": where tissue away from the contact is relaxed
   std::filesystem::path trace, plot, picture, record, save_surface, save_volume;  // empty: not written
   std::filesystem::path black_box;                                                // empty: see keep_box()
   std::string json;                                                               // "-": standard output
@@ -94,6 +95,7 @@ struct ExtremesCommand {
   bool table = true;
   bool quick = false;
   std::uint64_t fuzz_ticks = 0, seed = 1;  // 0: none
+  bool relax_apart = false;                // of fuzz_ticks
   std::string json;
 };
 int extremes(const ExtremesCommand& command);

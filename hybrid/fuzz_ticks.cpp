@@ -188,7 +188,7 @@ class Input {
 
 class Fuzz {
  public:
-  Fuzz(const FuzzScene& which, const std::filesystem::path& folder, std::uint64_t seed)
+  Fuzz(const FuzzScene& which, const std::filesystem::path& folder, std::uint64_t seed, bool apart)
       : which_(which),
         scene_(load_scene(write(which, folder))),
         built_(build_scene(scene_)),
@@ -196,6 +196,7 @@ class Fuzz {
         state_(*built_.state),
         input_(seed) {
     result_.scene = which.name;
+    if (apart) relax_apart(state_, Arrival::counted);
   }
 
   FuzzResult run(std::uint64_t ticks) {
@@ -308,8 +309,8 @@ std::vector<FuzzResult> fuzz_ticks(const FuzzOptions& options) {
   for (const FuzzScene& which : scenes()) {
     if (!options.only.empty() && which.name != options.only) continue;
     if (options.progress) options.progress(fmt::format("fuzzing ticks: {}", which.name));
-    results.push_back(
-        Fuzz(which, folder, options.seed).run(std::max<std::uint64_t>(1, options.ticks / scenes().size())));
+    results.push_back(Fuzz(which, folder, options.seed, options.relax_apart)
+                          .run(std::max<std::uint64_t>(1, options.ticks / scenes().size())));
   }
   std::error_code none;
   std::filesystem::remove_all(folder, none);

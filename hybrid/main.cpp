@@ -43,6 +43,12 @@ void add_run(CLI::App& app, int& status) {
       ->capture_default_str();
   sub->add_option("--start-ticks", c->start_ticks,
                   "begin with all clocks and counters as after so many ticks; nothing felt should differ");
+  sub->add_option(
+         "--relaxation", c->relaxation,
+         "where tissue away from the contact comes to rest: in the tick, by its budget; apart from it, "
+         "in real time on a thread of its own; auto: apart in real time")
+      ->check(CLI::IsMember({"auto", "tick", "apart"}))
+      ->capture_default_str();
   sub->add_option("--trace", c->trace, "write every tick as CSV");
   sub->add_option("--plot", c->plot, "write force over time with contacts as SVG");
   sub->add_option("--picture", c->picture, "write a picture of the most telling moment as PNG");
@@ -210,6 +216,8 @@ void add_stability(CLI::App& app, int& status) {
   auto* ticks =
       sub->add_option("--fuzz-ticks", e->fuzz_ticks, "instead: so many ticks of random device input");
   sub->add_option("--seed", e->seed, "of --fuzz-ticks")->needs(ticks)->capture_default_str();
+  sub->add_flag("--apart", e->relax_apart, "with --fuzz-ticks: tissue is relaxed apart from the tick")
+      ->needs(ticks);
   sub->callback([c, e, &status] {
     e->scene = c->scene;
     e->json = c->json;

@@ -16,6 +16,7 @@ struct Recording {
   std::string scene_text;            // as it was, so that a changed scene is noticed
   double dt_s = 1e-3;
   device::DeviceLimits device{};  // that it was felt with
+  bool relax_apart = false;       // SessionOptions::relax_apart
   std::uint64_t state_hash = 0;   // after the last tick
   std::vector<RecordedTick> ticks;
 };

@@ -103,6 +103,9 @@ class Run {
     flush_denormals();
     start_clocks();
     begin_session(scene_, world_, state_, device_.read().position_m);
+    if (options_.relax_apart) relax_apart(state_, realtime_ ? Arrival::thread : Arrival::counted);
+    std::optional<RelaxationThread> relaxation;
+    if (options_.relax_apart && realtime_ && !state_.soft.empty()) relaxation.emplace(state_.apart);
     if (options_.reference_samples > 0 && !realtime_) {
       sample_every_ =
           std::max<std::uint64_t>(1, ticks_ / static_cast<std::uint64_t>(2 * options_.reference_samples));
@@ -125,6 +128,9 @@ class Run {
       result_.deadline_misses = served.late_ticks;
       result_.late_us = late_us_.percentiles();
     }
+    if (relaxation) result_.relaxation_thread_s = relaxation->busy_s();
+    relaxation.reset();
+    result_.relaxed_apart = state_.apart.results;
     result_.end = served.end;
     result_.device_messages = std::move(served.messages);
     result_.ticks = ticks_done_;
@@ -175,7 +181,8 @@ class Run {
 
   void keep(const TickResult& felt, std::uint64_t tick, device::DeviceFault fault) {
     hash_ = hash_tick(hash_, felt);
-    if (options_.keep_recording) result_.recording.push_back({felt.device_m, hash_, fault});
+    if (options_.keep_recording)
+      result_.recording.push_back({felt.device_m, hash_, fault, state_.apart.arrived});
     result_.tick_us.add(felt.tick_us);
     for (std::size_t s = 0; s < kStages; ++s) result_.stage_us[s].add(static_cast<double>(felt.stage_us[s]));
     const double force = glm::length(felt.force_N);

@@ -27,6 +27,7 @@ struct RecordedTick {
   glm::dvec3 device_m{0.0};
   std::uint64_t hash = 0;
   device::DeviceFault fault = device::DeviceFault::none;
+  std::uint64_t arrived = 0;  // soft objects whose relaxation, apart, began to be taken in this tick
 };
 
 struct SessionOptions {
@@ -43,6 +44,8 @@ struct SessionOptions {
   // soft start is over by then.)
   std::uint64_t start_ticks = 0;
   Progress progress;
+  // Tissue away from the contact is relaxed apart from the tick: in real time on a thread of its own.
+  bool relax_apart = false;
   BlackBox* black_box = nullptr;               // every tick is added to it
   std::shared_ptr<const device::Path> path{};  // of the hand, in place of the scene's
 };
@@ -73,6 +76,8 @@ struct SessionResult {
   std::vector<std::string> path_notes;       // what the path's reader noticed: gaps, repeated times
   std::string realtime_note;                 // what priority was granted
   Percentiles late_us;                       // how late the machine woke the loop; not part of the tick
+  double relaxation_thread_s = 0.0;          // its own processor time
+  std::uint64_t relaxed_apart = 0;           // results that ticks took
 };
 
 // Runs the scene's path to its end on its device. Throws SceneError: the tool starts inside something rigid.

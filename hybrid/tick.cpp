@@ -13,6 +13,7 @@
 #include "hybrid/arbitration.h"
 #include "hybrid/body_stage.h"
 #include "hybrid/feel_stage.h"
+#include "hybrid/relax_apart.h"
 #include "hybrid/rigid_step.h"
 #include "hybrid/soft_stage.h"
 
@@ -288,7 +289,7 @@ TickResult haptic_tick(const World& world, WorldState& state, const device::Devi
   if (!world.meeting.empty()) relax_pairs(world, state);
   clock.done(Stage::arbitration);
 
-  for (std::size_t o = 0; o < state.soft.size(); ++o) state.soft[o]->relax_background(world.soft[o].budget);
+  relax_background(world, state);
   clock.done(Stage::background);
 
   refresh_map(world, state);

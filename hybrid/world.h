@@ -20,6 +20,7 @@
 #include "device/force_limit.h"
 #include "device/passivity.h"
 #include "hybrid/occupancy.h"
+#include "hybrid/relax_apart.h"
 #include "hybrid/rigid_motion.h"
 #include "hybrid/scene.h"
 #include "hybrid/snapshot.h"
@@ -213,6 +214,7 @@ struct WorldState : CarriedState {
   void prepare(const World& world);
 
   std::vector<std::unique_ptr<voxel::SoftObject>> soft;  // one a World::soft
+  Apart apart;                                           // those of them that are relaxed apart
   OccupancyMap map;
   OccupancyMap::Trail map_trail;  // of the tick's questions to it: hints only
   // For tests: the corners of the last sweep's way, as many as there is room for.

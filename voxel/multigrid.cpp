@@ -165,8 +165,14 @@ void Multigrid::copy_from(const Multigrid& other) noexcept {
   }
 }
 
+void Multigrid::keep_log() {
+  std::vector<std::size_t> rows;
+  for (int l = 0; l < levels(); ++l) rows.push_back(grid(l).rows());
+  log_.begin(rows);
+}
+
 std::size_t Multigrid::memory_bytes() const {
-  std::size_t bytes = (held_.capacity() + stopped_.capacity()) * sizeof(HeldCell);
+  std::size_t bytes = log_.memory_bytes() + (held_.capacity() + stopped_.capacity()) * sizeof(HeldCell);
   for (const Level& l : levels_) {
     bytes += l.couplings->memory_bytes() + l.flags.resident_bytes() + l.stopped.resident_bytes() +
              l.held.resident_bytes() + l.hold.resident_bytes() + l.row_held.resident_bytes();

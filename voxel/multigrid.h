@@ -13,6 +13,7 @@
 #include <span>
 #include <vector>
 
+#include "voxel/change_log.h"
 #include "voxel/couplings.h"
 #include "voxel/displacement.h"
 #include "voxel/hats.h"
@@ -53,7 +54,10 @@ class Multigrid {
   [[nodiscard]] TileQueue& tiles() { return tiles_; }
   [[nodiscard]] const TileQueue& tiles() const { return tiles_; }
   // Somebody moved voxels of this row: it and the rows beside it are to be looked at.
-  void stir(int level, RowId row) noexcept { spread(level, row, active | dirty); }
+  void stir(int level, RowId row) noexcept {
+    log_.note(level, row);
+    spread(level, row, active | dirty);
+  }
 
   // What the tool and other objects hold does not move, nor do the cells around it on coarser levels.
   void set_held(std::span<const VoxelId> held) noexcept;
@@ -111,6 +115,7 @@ class Multigrid {
   // Rows whose voxels are pulled by less than `tolerance_N`, or whose cells would move less than `quiet_m`,
   // are left alone.
   [[nodiscard]] float quiet_m() const { return quiet_m_; }
+  [[nodiscard]] float tolerance_N() const { return tolerance_N_; }
   // Less than this is not passed on to other levels: a small share of what a row is left alone with.
   [[nodiscard]] float passed_on_m() const { return quiet_m_ / 32.0F; }
   void set_quiet(float tolerance_N, float quiet_m) noexcept {
@@ -118,6 +123,19 @@ class Multigrid {
     quiet_m_ = quiet_m;
   }
   void copy_from(const Multigrid& other) noexcept;
+
+  // ---- two of the same lattice that work on one object, in turns (replica.h) ----
+  // From now on every row that is written is noted. Allocates.
+  void keep_log();
+  [[nodiscard]] ChangeLog& log() { return log_; }
+  // What a coarse row holds, [value, told, load][axis]: one after the other.
+  static constexpr std::size_t kFields = 9;
+  [[nodiscard]] LazyArray<float>& field(int level, std::size_t which) {
+    auto& arrays = which < 3 ? at(level).value : which < 6 ? at(level).told : at(level).load;
+    return arrays[which % 3];
+  }
+  // Adds to a row of voxels what somebody else found, as far as its links allow.
+  void add(RowId row, const RowVector& way, Displacement& state, const ObstacleView& obstacles) noexcept;
   // Finds all springs and takes all memory now, not when a tick first needs them.
   void prepare_all() noexcept;
   [[nodiscard]] std::size_t memory_bytes() const;
@@ -159,6 +177,7 @@ class Multigrid {
 
   const Lattice& lattice_;
   TileQueue tiles_;
+  ChangeLog log_;
   std::vector<Level> levels_;
   Hats hats_;
   std::vector<HeldCell> held_, stopped_;

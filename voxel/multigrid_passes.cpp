@@ -57,6 +57,7 @@ bool Multigrid::yield(RowId row, Displacement& state, bool keep) noexcept {
 void Multigrid::smooth(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
                        OctetSpan span) noexcept {
   const LevelRow r = row_of(level, row, state);
+  log_.note(level, row);
   if (level > 0) {
     note_change(level, row, smooth_row(r, nullptr, span));
     return;
@@ -90,6 +91,7 @@ OctetSpan octets_below(OctetSpan coarse, int half) {
 
 void Multigrid::restrict_values(int level, RowId row, Displacement& state, OctetSpan span) noexcept {
   Level& l = at(level);
+  log_.note(level, row);
   const std::size_t begin = static_cast<std::size_t>(row) * kRow;
   RowVector sums{};
   std::array<float*, 3> value{}, told{};
@@ -163,6 +165,7 @@ float Multigrid::restrict_loads(int level, RowId row, Displacement& state, const
     unmark(level - 1, fine, at_rest ? active | dirty : dirty);
     if (!at_rest) mark(level - 1, fine, active);
   }
+  log_.note(level, row);
   take_loads(told_row(level, row), sums, loads(level, row), span);
   spread(level, row, active | dirty);
   return worst;
@@ -242,6 +245,7 @@ void Multigrid::spread_hats(int level, int j, int k, const Told& box) noexcept {
       const RowId row = g.row(c + 1, j, k);
       if (!has(level, row, telling)) continue;
       unmark(level, row, telling);
+      log_.note(level, row);
       if (untold(level, row) == 0.0F) unmark(level, row, changed);
     }
   }
@@ -289,6 +293,7 @@ void Multigrid::tell_row(int level, RowId row, const std::array<HatRow, 4>& hats
   span.last = std::min(span.last, (2 * last + 2 - origin) / kOctet);
   if (span.first > span.last) return;
   LevelRow r = row_of(level, row, state);
+  log_.note(level, row);
   RowCorrection done;
   if (level > 0) {
     done = correct_row(r, nullptr, span, correction, refused);
@@ -303,11 +308,24 @@ void Multigrid::tell_row(int level, RowId row, const std::array<HatRow, 4>& hats
   note_change(level, row, done.most_m);
 }
 
+void Multigrid::add(RowId row, const RowVector& way, Displacement& state,
+                    const ObstacleView& obstacles) noexcept {
+  if (!prepare(0, row)) return;
+  RowVector refused;
+  const LevelRow r = row_of(0, row, state);
+  const RowLimits limits = couplings().limits(row);
+  const RowCorrection done = correct_row(r, &limits, {}, way, refused);
+  if (done.most_m > 0.0F) clear_obstacles(row, state, obstacles);
+  if (done.refused != 0) take_back_refused(0, row, refused, done.refused, {});
+  note_change(0, row, done.most_m);
+}
+
 void Multigrid::take_back_refused(int level, RowId row, const RowVector& refused, unsigned axes,
                                   OctetSpan span) noexcept {
   Level& coarse = at(level + 1);
   const auto c = grid(level).row_coordinates(row);
   const RowId above = coarse.couplings->grid().row((c[0] - 1) / 2 + 1, c[1] / 2, c[2] / 2);
+  log_.note(level + 1, above);
   const int half = (c[0] - 1) % 2;
   const OctetSpan pairs{span.first & ~1, span.last | 1};
   RowVector sums{}, lanes{};

@@ -43,6 +43,7 @@ class Relaxation {
                      const std::array<int, 3>& low, const std::array<int, 3>& high) noexcept;
 
   [[nodiscard]] Couplings& couplings() { return multigrid_.couplings(); }
+  [[nodiscard]] Multigrid& multigrid() { return multigrid_; }
 
   // Voxels of a row (v / kRow) were moved by somebody else: it and the rows beside it are to be looked at.
   void stir(RowId row) noexcept { multigrid_.stir(0, row); }
@@ -53,6 +54,19 @@ class Relaxation {
     cycles_without_gain_ = 0;
   }
   [[nodiscard]] bool asleep() const { return asleep_; }
+  // Nothing to do here until somebody moves something: another relaxes it (replica.h) …
+  void sleep() noexcept { asleep_ = true; }
+  // … and how far that is.
+  struct Progress {
+    double residual_N = 0.0;
+    float hold = 1.0F;
+  };
+  [[nodiscard]] Progress progress() const { return {residual_N_, hold_}; }
+  void take_over(const Progress& other) noexcept {
+    residual_N_ = other.residual_N;
+    multigrid_.set_hold(other.hold);
+    multigrid_.release_limited();
+  }
   // Largest force that any free voxel still feels, as the last cycle over all that moves found it (unit:
   // newton); below the tolerance it is only known to be that.
   [[nodiscard]] double residual_N() const { return residual_N_; }

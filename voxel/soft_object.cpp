@@ -15,9 +15,6 @@ namespace {
 
 constexpr double kSettled = 2e-3;     // of the spacing: a contact off by less is left to the background
 constexpr double kContraction = 0.5;  // of that, by a cycle round the contact
-// Voxels of an object that has all its memory from the start, up to 50 MB: what a tick touches for the first
-// time takes it five times as long. A larger one gets it where it is touched.
-constexpr std::size_t kPreparedWhole = 1U << 18U;
 // Cycles round the contact a tick: of a ball pressed at 0.2 m/s into 24,000 voxels one leaves 1.1, two 0.55,
 // three 0.46 just noticeable differences of the force.
 constexpr int kMostCycles = 2;
@@ -209,6 +206,7 @@ void SoftObject::relax_touch(const ToolInBody& tool, Touch& t) noexcept {
     if (depth > 0.0 && o.normal != glm::vec3(0.0F)) wanted += depth * n;
   }
   state_.set(t.v, clamp_to_links(*lattice_, state_, t.v, wanted));
+  relaxation_.multigrid().log().note(0, t.v / kRow);
   if (t.pressed != was_pressed) unsettled_m_ += glm::distance(before, state_.at(t.v));
   // A tool that jumped away moves no pressed voxel by follow(): what it let go of wakes the rest.
   if (was_pressed && !t.pressed &&
@@ -292,6 +290,7 @@ void SoftObject::draw_along(int axis) noexcept {
         const float before = u[w];
         u[w] = clamp_to(link_interval(*lattice_, state_, w, axis), wanted, before);
         if (std::fabs(u[w] - before) > static_cast<float>(kStir) * spacing) relaxation_.stir(w / kRow);
+        relaxation_.multigrid().log().note(0, w / kRow);
         if (room() > kTight * spacing) continue;
         carried_mark_[w] = 1;
         carried_.push_back({w, 0});
@@ -510,6 +509,10 @@ void SoftObject::relax_cycle() noexcept {
 void SoftObject::set_obstacle(std::size_t surface_number, const Obstacle& obstacle) noexcept {
   const VoxelId v = lattice_->surface()[surface_number];
   obstacles_[surface_number] = obstacle;
+  if (!obstacle_changed_.empty() && obstacle_changed_[surface_number] == 0) {
+    obstacle_changed_[surface_number] = 1;
+    changed_obstacles_.push_back(static_cast<std::uint32_t>(surface_number));
+  }
   if (state_.role[v] == Displacement::held || lattice_->anchored(v)) return;
   state_.set_role(v, resting_role(v));
 }
@@ -565,6 +568,7 @@ void SoftObject::move(VoxelId v, const glm::dvec3& displacement) noexcept {
   moved_ever_ = true;
   const glm::dvec3 before = state_.at(v);
   state_.set(v, clamp_to_links(*lattice_, state_, v, displacement));
+  relaxation_.multigrid().log().note(0, v / kRow);
   if (glm::distance(before, state_.at(v)) <= kStir * lattice_->min_spacing_m()) return;
   relaxation_.wake();
   relaxation_.stir(v / kRow);

@@ -25,18 +25,23 @@ std::string read(const std::filesystem::path& file) {
   return text.str();
 }
 
-Recording record(const std::filesystem::path& file, std::optional<double> seconds) {
+Recording record(const std::filesystem::path& file, std::optional<double> seconds, bool apart = false,
+                 bool realtime = false) {
   const hybrid::Scene scene = hybrid::load_scene(file);
   hybrid::BuiltScene built = hybrid::build_scene(scene);
   hybrid::SessionOptions options;
   options.seconds = seconds;
   options.keep_rows = false;
+  options.relax_apart = apart;
+  options.realtime = realtime;
   const hybrid::SessionResult result = hybrid::run_session(scene, built, options);
   EXPECT_GT(result.contact_ticks, 50U);
+  EXPECT_GE(result.relaxed_apart, apart ? 10U : 0U);
   return {.scene_file = file,
           .scene_text = read(file),
           .dt_s = result.dt_s,
           .device = hybrid::scene_limits(scene),
+          .relax_apart = apart,
           .state_hash = result.state_hash,
           .ticks = result.recording};
 }
@@ -92,6 +97,19 @@ INSTANTIATE_TEST_SUITE_P(Replays, ShippedScene,
                            std::replace(name.begin(), name.end(), '-', '_');
                            return name;
                          });
+
+// Which results of the relaxation thread a tick found is the machine's doing, and on record.
+TEST_F(RecordingFile, WithTheRelaxationThreadItIsTheSameToTheBit) {
+  for (const bool realtime : {true, false}) {
+    const Recording recorded = record(small_scene(), std::nullopt, true, realtime);
+    hybrid::save_recording(folder_ / "a.rec", recorded);
+    const Recording loaded = hybrid::load_recording(folder_ / "a.rec");
+    EXPECT_TRUE(loaded.relax_apart);
+    const hybrid::ReplayResult result = hybrid::replay(loaded, {});
+    EXPECT_TRUE(result.equal) << "parts at tick " << result.parts_at << (realtime ? ", in real time" : "");
+    EXPECT_EQ(result.state_hash, recorded.state_hash);
+  }
+}
 
 // All that goes from tick to tick besides tissue: a body on a path and one that is pushed, friction, shading,
 // damping and a relief, on meshes and primitives.

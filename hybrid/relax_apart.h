@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The background stage of the tick: tissue away from the contact goes on to its equilibrium, in the tick, by
+// a budget of voxel updates, or apart from it, on a thread of its own (voxel/replica.h).
+//
+// Apart, the tick gives what moved and takes what was found; it never waits. When a result is there depends
+// on the machine, and nothing else does, so the tick in which one is first taken is recorded, and a session
+// that is played again takes it in the same tick.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <thread>
+#include <vector>
+
+namespace hybrid {
+
+struct World;
+struct WorldState;
+
+// When what was given is relaxed, and the result is there to be taken.
+enum class Arrival : std::uint8_t {
+  counted,   // at once, and after as many ticks as its work is worth: for fixed-step sessions
+  thread,    // by the thread, when it is done
+  recorded,  // at once, and in the tick that `arrived` says
+};
+
+struct RelaxedApart;  // one object, and whose turn it is
+
+struct Apart {
+  Apart();
+  ~Apart();
+  Apart(const Apart&) = delete;
+  Apart& operator=(const Apart&) = delete;
+  Apart(Apart&&) = delete;
+  Apart& operator=(Apart&&) = delete;
+
+  Arrival arrival = Arrival::counted;
+  std::vector<std::unique_ptr<RelaxedApart>> objects;  // [soft]; null, or none at all: relaxed in the tick
+  // Bit o: in this tick the result of soft object o began to be taken. With Arrival::recorded said before the
+  // tick, else by it.
+  std::uint64_t arrived = 0;
+  std::uint64_t results = 0;  // taken so far
+};
+
+// From now on soft objects are relaxed apart; those with a yield, and all from the 65th on, stay in the tick.
+// Allocates. `arrival` thread: somebody runs a RelaxationThread.
+void relax_apart(WorldState& state, Arrival arrival);
+
+// The stage.
+void relax_background(const World& world, WorldState& state) noexcept;
+
+// Relaxes what the tick gives, until it is destroyed. It looks every 100 us whether there is something: to
+// wake it would be a call into the system from the tick.
+class RelaxationThread {
+ public:
+  explicit RelaxationThread(Apart& apart);
+  ~RelaxationThread();
+  RelaxationThread(const RelaxationThread&) = delete;
+  RelaxationThread& operator=(const RelaxationThread&) = delete;
+  RelaxationThread(RelaxationThread&&) = delete;
+  RelaxationThread& operator=(RelaxationThread&&) = delete;
+
+  // Its own processor time so far (s), and what it relaxed.
+  [[nodiscard]] double busy_s() const { return busy_s_.load(std::memory_order_relaxed); }
+  [[nodiscard]] std::uint64_t jobs() const { return jobs_.load(std::memory_order_relaxed); }
+
+ private:
+  void go() noexcept;
+
+  Apart& apart_;
+  std::atomic<bool> stop_{false};
+  std::atomic<double> busy_s_{0.0};
+  std::atomic<std::uint64_t> jobs_{0};
+  std::thread thread_;
+};
+
+}  // namespace hybrid

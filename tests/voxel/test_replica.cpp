@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Relaxed apart: the same rest, never more energy, no limit broken, whatever the tick does meanwhile.
+#include "voxel/replica.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "tests/voxel/soft_press.h"
+#include "voxel/validate.h"
+
+namespace {
+
+using tests::elastic;
+using tests::SoftBlock;
+using voxel::LinkMaterial;
+using voxel::Replica;
+using voxel::ToolInBody;
+
+constexpr double kH = 1e-3;  // spacing (m)
+constexpr LinkMaterial kFirm{
+    .young_Pa = 1e4, .poisson = 0.3, .stretch_min = 0.9, .stretch_max = 1.1, .shear = 0.1};
+
+// One exchange as ticks make it; `rows` a tick.
+void exchange(Replica& replica, SoftBlock& soft, std::size_t rows) {
+  replica.give(*soft.object);
+  replica.relax();
+  while (!replica.take(*soft.object, rows)) {
+  }
+}
+
+double largest_difference(const voxel::SoftObject& a, const voxel::SoftObject& b) {
+  double most = 0.0;
+  for (voxel::VoxelId v = 0; v < a.lattice().size(); ++v) {
+    if (a.lattice().filled(v)) most = std::max(most, glm::distance(a.state().at(v), b.state().at(v)));
+  }
+  return most;
+}
+
+TEST(Replica, AHeldContactComesToTheSameRest) {
+  for (const LinkMaterial& material : {elastic(1e4, 0.3), kFirm}) {
+    SoftBlock apart({41, 37, 25}, kH, material), there({41, 37, 25}, kH, material);
+    const ToolInBody tool = apart.ball(6 * kH, 1.5 * kH);
+    const voxel::Reaction wanted = there.press(tool, 9 * kH, 1e-5, 2000);
+    Replica replica(*apart.object);
+    apart.touch(tool, 9 * kH);
+    voxel::Reaction felt;
+    for (int n = 0; n < 60; ++n) {
+      apart.object->push_out(tool);
+      apart.object->relax_near(tool, 1);
+      felt = apart.object->reaction(tool);
+      exchange(replica, apart, 333);
+    }
+    EXPECT_NEAR(felt.force_N.z, wanted.force_N.z, 2e-3 * wanted.force_N.z);
+    EXPECT_LT(largest_difference(*apart.object, *there.object), 0.02 * kH);
+    EXPECT_EQ(voxel::validate(*apart.lattice, apart.object->state(), 4.0), "");
+  }
+}
+
+TEST(Replica, WhatTheToolLeftComesToRestAndIsLeftAlone) {
+  SoftBlock soft({41, 37, 25}, kH, elastic(1e4, 0.3));
+  Replica replica(*soft.object);
+  const ToolInBody tool = soft.ball(6 * kH, 3 * kH);
+  soft.touch(tool, 9 * kH);
+  for (int n = 0; n < 10; ++n) {
+    soft.object->push_out(tool);
+    soft.object->relax_near(tool, 1);
+    exchange(replica, soft, 1000);
+  }
+  soft.object->touch({});
+  int exchanges = 0;
+  for (; exchanges < 200 && Replica::wanted(*soft.object); ++exchanges) exchange(replica, soft, 1000);
+  EXPECT_LT(exchanges, 60);
+  double most = 0.0;
+  for (voxel::VoxelId v = 0; v < soft.lattice->size(); ++v)
+    most = std::max(most, glm::length(soft.object->state().at(v)));
+  EXPECT_LT(most, 1e-3 * kH);
+}
+
+// The tool stands still, and in turns the tick has its cycles round the contact and the replica its own, of a
+// state that is so many ticks old. What voxels the tool presses changes, so energy is compared with the
+// tool's work left out: of the same pressed voxels in the same places.
+TEST(Replica, TheSumNeverHasMoreEnergyThanWhatWasGiven) {
+  for (const LinkMaterial& material : {elastic(1e4, 0.3), kFirm}) {
+    SoftBlock soft({41, 37, 25}, kH, material);
+    Replica replica(*soft.object);
+    const ToolInBody tool = soft.ball(6 * kH, 2 * kH);
+    soft.touch(tool, 9 * kH);
+    soft.object->push_out(tool);
+    double before = soft.object->energy_J();
+    const double first = before;
+    double worst = 0.0;
+    for (int n = 0; n < 40; ++n) {
+      replica.give(*soft.object);
+      replica.relax();
+      for (int tick = 0; tick < n % 4; ++tick) soft.object->relax_near(tool, 1);
+      while (!replica.take(*soft.object, 100)) {
+        if (n % 2 == 1) soft.object->relax_near(tool, 1);
+      }
+      const double now = soft.object->energy_J();
+      worst = std::max(worst, (now - before) / first);
+      before = now;
+    }
+    EXPECT_LT(worst, 1e-4);
+    EXPECT_LT(before, 0.6 * first);
+    EXPECT_EQ(voxel::validate(*soft.lattice, soft.object->state(), 4.0), "");
+  }
+}
+
+// A tool that moves on while results are old, deep where the chain is tight: limits hold after every slice.
+TEST(Replica, NoLinkLeavesItsLimitsInBetween) {
+  SoftBlock soft({31, 29, 19}, kH, kFirm);
+  Replica replica(*soft.object);
+  std::mt19937_64 random(7);
+  const auto uniform = [&random](double low, double high) {
+    return low + (high - low) * (static_cast<double>(random() >> 11) * 0x1.0p-53);
+  };
+  bool given = false, taking = false;
+  for (int tick = 0; tick < 600; ++tick) {
+    ToolInBody tool = soft.ball(5 * kH, 0.0);
+    tool.centre += glm::dvec3(4 * kH * std::sin(0.031 * tick), 3 * kH * std::sin(0.017 * tick),
+                              2 * kH * std::sin(0.05 * tick) - 1.2 * kH);
+    soft.touch(tool, 9 * kH);
+    soft.object->push_out(tool);
+    soft.object->relax_near(tool, 1);
+    if (!given && Replica::wanted(*soft.object)) {
+      replica.give(*soft.object);
+      replica.relax();
+      given = true;
+    } else if (given && !taking) {
+      taking = uniform(0.0, 1.0) < 0.2;
+    }
+    if (taking && replica.take(*soft.object, 50)) given = taking = false;
+    if (tick % 7 == 0) {
+      ASSERT_EQ(voxel::validate(*soft.lattice, soft.object->state(), 4.0), "") << "tick " << tick;
+    }
+  }
+}
+
+}  // namespace
