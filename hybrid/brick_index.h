@@ -165,10 +165,11 @@ class BrickIndex : public BrickGrid {
   [[nodiscard]] bool has_room() const noexcept { return table_.has_room(); }
   [[nodiscard]] const CellTable<Brick>& table() const noexcept { return table_; }
 
-  // kNone only when it may not allocate and there is no room.
-  std::uint32_t find_or_add(const CellCoordinates& brick, bool may_allocate) {
+  // kNone only when it may not allocate and there is no room. moved(brick, its new number): the table grew.
+  template <class Moved>
+  std::uint32_t find_or_add(const CellCoordinates& brick, bool may_allocate, Moved&& moved) {
     const std::size_t before = table_.size();
-    const std::uint32_t number = table_.find_or_add(brick, may_allocate, [](const Brick&, std::uint32_t) {});
+    const std::uint32_t number = table_.find_or_add(brick, may_allocate, moved);
     if (table_.size() != before) mark(brick);
     return number;
   }
@@ -181,8 +182,9 @@ class BrickIndex : public BrickGrid {
 
   // Room for so many more bricks without allocating, and the bitmap over those that exist. Bricks may be
   // added later; those beyond the bitmap's edge share its outermost units.
-  void seal(std::size_t more) {
-    table_.seal(more, [](const Brick&, std::uint32_t) {});
+  template <class Moved>
+  void seal(std::size_t more, Moved&& moved) {
+    table_.seal(more, moved);
     CellCoordinates low{}, high{};
     bool first = true;
     table_.each([&](const Brick& b, std::uint32_t) {

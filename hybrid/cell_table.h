@@ -43,7 +43,8 @@ struct CellTrail {
   std::array<std::int32_t, 3> step{1, 1, 1};
 };
 
-// Entry: default constructed it is free; `CellCoordinates at{kNoPlace, 0, 0}` is its first member.
+// Entry: default constructed it is free; `CellCoordinates at{kNoPlace, 0, 0}` is its first member. start(at)
+// makes of whatever it was before one that knows nothing yet.
 template <class Entry>
 class CellTable {
  public:
@@ -58,8 +59,8 @@ class CellTable {
   [[nodiscard]] const Entry& operator[](std::uint32_t place) const noexcept { return entries_[place]; }
 
   // The place of the entry; kNone: there is none.
-  [[nodiscard]] std::uint32_t find(const CellCoordinates& at) const noexcept {
-    const std::uint64_t h = hash(at);
+  [[nodiscard]] std::uint32_t find(const CellCoordinates& at) const noexcept { return find(at, hash(at)); }
+  [[nodiscard]] std::uint32_t find(const CellCoordinates& at, std::uint64_t h) const noexcept {
     std::size_t chunk = home(h);
     for (std::size_t n = 0; n < chunks_.size(); ++n) {
       const std::uint64_t word = chunks_[chunk];
@@ -108,20 +109,18 @@ class CellTable {
     fetch_rest(place);
   }
 
-  // The place of the entry, which is new and otherwise as constructed when there was none. kNone only when it
-  // may not allocate and there is no room. If the table grew, moved(entry, its new place) was called for all.
+  // The place of the entry, which is new and started when there was none. kNone only when it may not allocate
+  // and there is no room. If the table grew, moved(entry, its new place) was called for all.
   template <class Moved>
   std::uint32_t find_or_add(const CellCoordinates& at, bool may_allocate, Moved&& moved) {
-    const std::uint32_t found = find(at);
-    if (found != kNone) return found;
-    if (size_ >= most_) {
-      if (!may_allocate) return kNone;
-      grow(2 * chunks_.size(), moved);
-    }
-    ++size_;
-    const std::uint32_t place = take_place(hash(at));
-    entries_[place].at = at;
-    return place;
+    const std::uint64_t h = hash(at);
+    const std::uint32_t found = find(at, h);
+    return found != kNone ? found : add(at, h, may_allocate, moved);
+  }
+  // The same of what is known not to be there.
+  template <class Moved>
+  std::uint32_t add(const CellCoordinates& at, bool may_allocate, Moved&& moved) {
+    return add(at, hash(at), may_allocate, moved);
   }
   [[nodiscard]] bool has_room() const noexcept { return size_ < most_; }
 
@@ -133,15 +132,21 @@ class CellTable {
       if (chunks_[chunk] >> kPassedShift != kMostPassed) chunks_[chunk] -= kOnePassed;
     }
     chunks_[last] &= ~(0xFFULL << (8 * (place % kPlaces)));
-    entries_[place] = Entry{};
+    entries_[place].at[0] = kNoPlace;  // the rest when it is started again
     --size_;
   }
 
+  // Room for about so many more, which are expected on load: so that it need not grow step by step.
+  template <class Moved>
+  void expect(std::size_t more, Moved&& moved) {
+    const std::size_t chunks = chunks_for(size_ + more);
+    if (chunks > chunks_.size()) grow(chunks, moved);
+  }
   // Room for so many more, and no more than that.
   template <class Moved>
   void seal(std::size_t more, Moved&& moved) {
     const std::size_t most = size_ + more;
-    grow(std::max<std::size_t>(1, (most * 4 + 3 * kPlaces - 1) / (3 * kPlaces)), moved);
+    if (chunks_for(most) != chunks_.size()) grow(chunks_for(most), moved);
     most_ = most;
   }
 
@@ -150,6 +155,12 @@ class CellTable {
     for (std::uint32_t place = 0; place < entries_.size(); ++place) {
       if (holds(place)) visit(entries_[place], place);
     }
+  }
+
+  // The entry's memory will be read soon.
+  [[gnu::always_inline]] void fetch_place(std::uint32_t place) const noexcept {
+    __builtin_prefetch(&entries_[place]);
+    fetch_rest(place);
   }
 
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
@@ -254,14 +265,28 @@ class CellTable {
     std::size_t chunk = home(h);
     for (;;) {  // there is a free place: most_ is less than the places
       std::uint64_t& word = chunks_[chunk];
-      for (std::size_t n = 0; n < kPlaces; ++n) {
-        if ((word >> (8 * n) & 0xFF) != 0) continue;
-        word |= tag(h) << (8 * n);
-        return static_cast<std::uint32_t>(chunk * kPlaces + n);
+      const std::uint64_t free = (word - kOnes) & ~word & 0x0080808080808080ULL;  // the first is one
+      if (free != 0) {
+        word |= tag(h) << (std::countr_zero(free) - 7);
+        return place_of(chunk, free);
       }
       if (word >> kPassedShift != kMostPassed) word += kOnePassed;
       if (++chunk == chunks_.size()) chunk = 0;
     }
+  }
+  template <class Moved>
+  std::uint32_t add(const CellCoordinates& at, std::uint64_t h, bool may_allocate, Moved&& moved) {
+    if (size_ >= most_) {
+      if (!may_allocate) return kNone;
+      grow(2 * chunks_.size(), moved);
+    }
+    ++size_;
+    const std::uint32_t place = take_place(h);
+    entries_[place].start(at);
+    return place;
+  }
+  [[nodiscard]] static std::size_t chunks_for(std::size_t most) noexcept {
+    return std::max<std::size_t>(1, (most * 4 + 3 * kPlaces - 1) / (3 * kPlaces));
   }
   void lay_out(std::size_t chunks) {
     if (chunks * kPlaces > kMostPlaces) throw std::length_error("the occupancy map is too large");

@@ -27,7 +27,8 @@ class OccupancyMap {
   // What the caller of a path of questions keeps between them, so that each starts where the last one ended.
   // Only hints: with any trail, and whatever moved since, the answers are the same. One a thread.
   struct Trail {
-    CellTrail fixed, soft;
+    CellTrail fixed;
+    SoftCells::Trail soft;
   };
 
   // `cell_m` > 0; `origin` near the scene, so that cells are exact far from the world's origin.

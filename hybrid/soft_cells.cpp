@@ -4,12 +4,16 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <utility>
 
 namespace hybrid {
 namespace {
 
 constexpr std::size_t kBlocksOfNewBrick = 4;  // of eight; a surface passes through about half
-constexpr std::size_t kFewBlocks = 8;         // that a box is asked of block by block, and not by bricks
+// Of voxels that are expected on load, in a block: a surface's.
+constexpr std::size_t kVoxelsOfBlock = 12;
+constexpr std::size_t kParts = 16;                    // of a box, blocks that are fetched together
+constexpr std::size_t kLarge = std::size_t{1} << 19;  // bytes: more than a core's own cache has room for
 
 // std::popcount is a call where the processor's newer instructions may not be assumed.
 std::size_t bits_in(std::uint64_t x) noexcept {
@@ -63,10 +67,18 @@ std::uint32_t SoftCells::add(std::uint32_t count) {
   const auto first = static_cast<std::uint32_t>(next_.size());
   next_.resize(next_.size() + count, kNone);
   cell_.resize(cell_.size() + count, kNone);
+  blocks_.expect(count / kVoxelsOfBlock,
+                 [this](const Block& block, std::uint32_t place) { now_at(block, place); });
   return first;
 }
 
+void SoftCells::now_at(const Brick& brick, std::uint32_t place) noexcept {
+  for (std::uint32_t bits = brick.blocks; bits != 0; bits &= bits - 1)
+    blocks_[brick.place[static_cast<std::size_t>(std::countr_zero(bits))]].brick = place;
+}
+
 void SoftCells::now_at(const Block& block, std::uint32_t place) noexcept {
+  bricks_[block.brick].place[block_in_brick(block.at)] = place;
   for (std::uint64_t bits = block.occupied; bits != 0; bits &= bits - 1) {
     const auto cell = static_cast<std::uint32_t>(std::countr_zero(bits));
     for (std::uint32_t link = link_at(block, cell);; link = next_[link & kNumber]) {
@@ -78,11 +90,44 @@ void SoftCells::now_at(const Block& block, std::uint32_t place) noexcept {
 
 void SoftCells::seal(std::size_t more_bricks) {
   const std::size_t more = std::min(more_bricks, next_.size());  // a voxel is in one brick
-  bricks_.seal(more);
+  bricks_.seal(more, [this](const Brick& brick, std::uint32_t place) { now_at(brick, place); });
   blocks_.seal(std::min(kBlocksOfNewBrick * more, next_.size()),
                [this](const Block& block, std::uint32_t place) { now_at(block, place); });
-  full_.shrink_to_fit();
-  full_.reserve(full_.size() + std::min(kBlocksOfNewBrick * more, next_.size() / kFew));
+  std::vector<Full, HugePages<Full>> full;  // as many as that and no more, in one copy
+  full.reserve(full_.size() + std::min(kBlocksOfNewBrick * more, next_.size() / kFew));
+  full.assign(full_.begin(), full_.end());
+  full_ = std::move(full);
+}
+
+inline void SoftCells::put(std::uint32_t number, const glm::dvec3& position, bool may_allocate) {
+  const CellCoordinates to = bricks_.cell_of(position), block = block_of(to);
+  const std::uint32_t cell = cell_in_block(to), hint = hinted_brick(brick_of_block(block));
+  // Beside what the voxel leaves, of which its number tells: one wait for both.
+  if (hint == kNone && blocks_.large()) blocks_.fetch(block);
+  const std::uint32_t old = cell_[number];
+  if (old == kNone) {
+    if (!put_in(number, block, cell, hint, may_allocate)) ++overflows_;
+    return;
+  }
+  const std::uint32_t place = old / kBlockCells, old_cell = old % kBlockCells;
+  Block& left = blocks_[place];
+  if (same(left.at, block)) {
+    if (old_cell == cell) return;
+    if (hint == kNone) put_next_to(left);
+    if (!move_within(number, left, old_cell, cell)) {
+      take_out(number, left, old_cell);
+      link_in(number, place, cell, false);  // there is room: it was in this block
+    }
+    cell_[number] = place * kBlockCells + cell;
+    return;
+  }
+  // First out, so that what it leaves is room for what it needs: a voxel that is alone needs no other.
+  const CellCoordinates old_block = left.at;
+  take_out(number, left, old_cell);
+  if (left.occupied == 0) remove_block(place);
+  if (put_in(number, block, cell, hint, may_allocate)) return;
+  ++overflows_;
+  put_in(number, old_block, old_cell, kNone, false);  // what it left is still there
 }
 
 void SoftCells::place(std::uint32_t number, const glm::dvec3& position) {
@@ -93,56 +138,61 @@ void SoftCells::move(std::uint32_t number, const glm::dvec3& position) noexcept 
   put(number, position, false);
 }
 
-void SoftCells::put(std::uint32_t number, const glm::dvec3& position, bool may_allocate) {
-  const CellCoordinates to = bricks_.cell_of(position), block = block_of(to);
-  const std::uint32_t cell = cell_in_block(to), old = cell_[number];
-  if (old == kNone) {
-    if (!put_in(number, block, cell, may_allocate)) ++overflows_;
-    return;
+inline bool SoftCells::move_within(std::uint32_t number, Block& block, std::uint32_t from,
+                                   std::uint32_t to) noexcept {
+  const std::uint64_t from_bit = 1ULL << from, to_bit = 1ULL << to, others = block.occupied & ~from_bit;
+  if ((others & to_bit) != 0) return false;
+  if (block.full != kNone) {
+    Full& full = full_[block.full];
+    if (full[from] != number) return false;
+    full[to] = number;
+    block.occupied = others | to_bit;
+    return true;
   }
-  const CellCoordinates old_block = blocks_[old / kBlockCells].at;
-  const std::uint32_t old_cell = old % kBlockCells;
-  if (old_cell == cell && same(old_block, block)) return;
-  // First out, so that what it leaves is room for what it needs: a voxel that is alone needs no other.
-  take_out(number);
-  if (put_in(number, block, cell, may_allocate)) return;
-  ++overflows_;
-  put_in(number, old_block, old_cell, false);  // what it left is still there
+  std::size_t n = bits_in(others & (from_bit - 1));
+  if (block.links[n] != number) return false;
+  // Only what lies between them moves up or down: of the next cell along x nothing does.
+  if (to > from) {
+    for (std::uint64_t bits = others & (to_bit - from_bit); bits != 0; bits &= bits - 1, ++n)
+      block.links[n] = block.links[n + 1];
+  } else {
+    for (std::uint64_t bits = others & (from_bit - to_bit); bits != 0; bits &= bits - 1, --n)
+      block.links[n] = block.links[n - 1];
+  }
+  block.links[n] = number;
+  block.occupied = others | to_bit;
+  return true;
 }
 
-void SoftCells::take_out(std::uint32_t number) noexcept {
-  const std::uint32_t place = cell_[number] / kBlockCells, cell = cell_[number] % kBlockCells;
-  Block& block = blocks_[place];
-  std::uint32_t *link = &link_at(block, cell), *before = nullptr;
+inline void SoftCells::take_out(std::uint32_t number, Block& block, std::uint32_t cell) noexcept {
+  std::uint32_t *const first = &link_at(block, cell), *link = first, *before = nullptr;
   while ((*link & kNumber) != number) {
     before = link;
     link = &next_[*link & kNumber];
   }
   if ((*link & kMore) != 0) {
     *link = next_[number];
-    return;
-  }
-  if (before != nullptr) {
+  } else if (before != nullptr) {
     *before &= ~kMore;
-    return;
+  } else {
+    remove_cell(block, cell, first);
   }
-  remove_cell(block, cell);
-  if (block.occupied != 0) return;
-  const std::uint32_t brick = bricks_.find(brick_of_block(block.at));
-  bricks_[brick].blocks &= ~bit_in_brick(block.at);
+}
+
+void SoftCells::remove_block(std::uint32_t place) noexcept {
+  const std::uint32_t brick = blocks_[place].brick;
+  bricks_[brick].blocks &= ~(1U << block_in_brick(blocks_[place].at));
   blocks_.erase(place);
   if (bricks_[brick].blocks == 0) bricks_.release(brick);
 }
 
-void SoftCells::remove_cell(Block& block, std::uint32_t cell) noexcept {
+inline void SoftCells::remove_cell(Block& block, std::uint32_t cell, std::uint32_t* link) noexcept {
   const std::size_t count = bits_in(block.occupied) - 1;
+  block.occupied &= ~(1ULL << cell);
   if (block.full == kNone) {
-    const std::size_t at = rank(block, 1ULL << cell);
-    for (std::size_t n = at; n < count; ++n) block.links[n] = block.links[n + 1];
-    block.occupied &= ~(1ULL << cell);
+    for (std::uint32_t* const last = block.links.data() + count; link < last; ++link) link[0] = link[1];
     return;
   }
-  block.occupied &= ~(1ULL << cell);
   if (count >= kFew) return;
   Full& full = full_[block.full];
   std::size_t n = 0;
@@ -184,20 +234,47 @@ bool SoftCells::add_cell(Block& block, std::uint32_t cell, std::uint32_t link, b
 
 std::uint32_t SoftCells::add_block(const CellCoordinates& at, bool may_allocate) {
   if (!may_allocate && !blocks_.has_room()) return kNone;
-  const std::uint32_t brick = bricks_.find_or_add(brick_of_block(at), may_allocate);
+  const std::uint32_t brick =
+      bricks_.find_or_add(brick_of_block(at), may_allocate,
+                          [this](const Brick& moved, std::uint32_t place) { now_at(moved, place); });
   if (brick == kNone) return kNone;
-  bricks_[brick].blocks |= bit_in_brick(at);
-  return blocks_.find_or_add(at, may_allocate,
-                             [this](const Block& block, std::uint32_t place) { now_at(block, place); });
+  const std::uint32_t place = blocks_.add(
+      at, may_allocate, [this](const Block& block, std::uint32_t moved) { now_at(block, moved); });
+  blocks_[place].brick = brick;
+  bricks_[brick].blocks |= 1U << block_in_brick(at);
+  bricks_[brick].place[block_in_brick(at)] = place;
+  return place;
 }
 
-bool SoftCells::put_in(std::uint32_t number, const CellCoordinates& at, std::uint32_t cell,
-                       bool may_allocate) {
-  std::uint32_t place = last_put_;
-  if (place >= blocks_.places() || !same(blocks_[place].at, at)) place = blocks_.find(at);
+inline std::uint32_t SoftCells::hinted_brick(const CellCoordinates& brick) const noexcept {
+  for (const std::uint32_t n : last_put_) {
+    if (n < bricks_.table().places() && same(bricks_[n].at, brick)) return n;
+  }
+  return kNone;
+}
+
+inline void SoftCells::put_next_to(const Block& block) noexcept {
+  last_put_[1] = last_put_[0];
+  last_put_[0] = block.brick;
+}
+
+inline bool SoftCells::put_in(std::uint32_t number, const CellCoordinates& at, std::uint32_t cell,
+                              std::uint32_t hint, bool may_allocate) {
+  const std::uint32_t in_brick = block_in_brick(at);
+  std::uint32_t place = kNone;
+  if (hint == kNone) {
+    place = blocks_.find(at);
+  } else if ((bricks_[hint].blocks >> in_brick & 1U) != 0) {
+    place = bricks_[hint].place[in_brick];
+  }
   if (place == kNone) place = add_block(at, may_allocate);
   if (place == kNone) return false;
-  last_put_ = place;
+  if (hint == kNone) put_next_to(blocks_[place]);
+  return link_in(number, place, cell, may_allocate);
+}
+
+inline bool SoftCells::link_in(std::uint32_t number, std::uint32_t place, std::uint32_t cell,
+                               bool may_allocate) {
   Block& block = blocks_[place];
   if ((block.occupied >> cell & 1U) != 0) {
     std::uint32_t& link = link_at(block, cell);
@@ -220,11 +297,22 @@ bool SoftCells::any_near(const glm::dvec3& low, const glm::dvec3& high) const no
   return any;
 }
 
-void SoftCells::list(const Block& block, std::uint64_t mask, std::span<std::uint32_t> out,
+void SoftCells::list(const Block& block, std::uint64_t bits, std::span<std::uint32_t> out,
                      std::size_t& count) const noexcept {
-  for (std::uint64_t bits = block.occupied & mask; bits != 0; bits &= bits - 1) {
-    for (std::uint32_t link = link_at(block, static_cast<std::uint32_t>(std::countr_zero(bits)));;
-         link = next_[link & kNumber]) {
+  const bool packed = block.full == kNone;
+  const std::uint32_t* const links = packed ? block.links.data() : full_[block.full].data();
+  std::uint64_t passed = 0;  // cells before these
+  std::size_t n = 0;         // of them occupied
+  for (; bits != 0; bits &= bits - 1) {
+    std::size_t at = static_cast<std::size_t>(std::countr_zero(bits));
+    if (packed) {
+      const std::uint64_t before = (bits & (~bits + 1)) - 1;
+      const std::uint64_t between = block.occupied & before & ~passed;
+      n += between == 0 ? 0 : bits_in(between);
+      passed = before;
+      at = n;
+    }
+    for (std::uint32_t link = links[at];; link = next_[link & kNumber]) {
       if (count == out.size()) return;
       out[count++] = link & kNumber;
       if ((link & kMore) == 0) break;
@@ -233,12 +321,12 @@ void SoftCells::list(const Block& block, std::uint64_t mask, std::span<std::uint
 }
 
 inline std::size_t SoftCells::in_cell(const CellCoordinates& cell, std::span<std::uint32_t> out,
-                                      CellTrail& trail) const noexcept {
+                                      Trail& trail) const noexcept {
   const CellCoordinates at = block_of(cell);
-  std::uint32_t place = blocks_.hinted(at, trail);
+  std::uint32_t place = blocks_.hinted(at, trail.blocks);
   if (place == kNone) {
     if (!bricks_.perhaps(cell)) return 0;
-    place = blocks_.find_and_look_ahead(at, trail);
+    place = blocks_.find_and_look_ahead(at, trail.blocks);
     if (place == kNone) return 0;
   }
   const Block& block = blocks_[place];
@@ -252,58 +340,52 @@ inline std::size_t SoftCells::in_cell(const CellCoordinates& cell, std::span<std
   }
 }
 
-inline std::size_t SoftCells::in_box(const CellRange& cells, std::span<std::uint32_t> out,
-                                     CellTrail& trail) const noexcept {
-  std::size_t count = 0;
+std::size_t SoftCells::in_box(const CellRange& cells, std::span<std::uint32_t> out,
+                              Trail& trail) const noexcept {
+  // What the bricks say comes first, then what their blocks say: so that of the blocks of a small box all
+  // are on their way from the memory together, and of their arrays too.
+  struct Part {
+    std::uint32_t place;
+    std::uint64_t bits;
+  };
+  std::array<Part, kParts> parts;
+  std::size_t count = 0, waiting = 0;
+  const bool fetch_blocks = blocks_.large(), fetch_full = full_.size() * sizeof(Full) > kLarge;
+  const auto list_waiting = [&] {
+    for (std::size_t n = 0; n < waiting; ++n) {
+      const Block& block = blocks_[parts[n].place];
+      parts[n].bits &= block.occupied;
+      if (!fetch_full || block.full == kNone) continue;
+      for (std::size_t z = 0; z < 4; ++z) {
+        if ((parts[n].bits >> (16 * z) & 0xFFFF) != 0) __builtin_prefetch(&full_[block.full][16 * z]);
+      }
+    }
+    for (std::size_t n = 0; n < waiting; ++n) list(blocks_[parts[n].place], parts[n].bits, out, count);
+    waiting = 0;
+    return count < out.size();
+  };
   const CellCoordinates a = block_of(cells.low), b = block_of(cells.high);
-  if (same(a, b)) {  // one block: a point, and many small boxes
-    const std::uint32_t place = block_at(a, trail);
-    if (place != kNone) list(blocks_[place], block_mask(a, cells), out, count);
-    return count;
-  }
-  double blocks = 1.0;
-  for (std::size_t d = 0; d < 3; ++d) blocks *= std::max(0.0, static_cast<double>(b[d]) - a[d] + 1.0);
-  if (blocks > kFewBlocks) {
-    CellTrail unused;
-    bricks_.each(cells, unused, [&](const Brick& brick, const CellRange& part) {
-      return each_block(brick.at, a, b, [&](const CellCoordinates& at) {
-        if ((brick.blocks & bit_in_brick(at)) == 0) return true;
-        list(blocks_[blocks_.find(at)], block_mask(at, part), out, count);
-        return count < out.size();
-      });
+  bricks_.each(cells, trail.bricks, [&](const Brick& brick, const CellRange& part) {
+    return each_block(brick.at, a, b, [&](const CellCoordinates& at) {
+      const std::uint32_t in_brick = block_in_brick(at);
+      if ((brick.blocks >> in_brick & 1U) == 0) return true;
+      const std::uint32_t place = brick.place[in_brick];
+      if (fetch_blocks) blocks_.fetch_place(place);
+      parts[waiting++] = {place, block_mask(at, part)};
+      return waiting < kParts || list_waiting();
     });
-    return count;
-  }
-  if (!bricks_.perhaps(cells)) return count;
-  // All blocks come at once. Then brick by brick, in the order in which they are of more blocks.
-  CellCoordinates c{};
-  for (c[2] = a[2]; blocks_.large() && c[2] <= b[2]; ++c[2]) {
-    for (c[1] = a[1]; c[1] <= b[1]; ++c[1]) {
-      for (c[0] = a[0]; c[0] <= b[0]; ++c[0]) {
-        if (blocks_.hinted(c, trail) == kNone) blocks_.fetch(c);
-      }
-    }
-  }
-  const CellCoordinates first = brick_of_block(a), last = brick_of_block(b);
-  for (c[2] = first[2]; c[2] <= last[2]; ++c[2]) {
-    for (c[1] = first[1]; c[1] <= last[1]; ++c[1]) {
-      for (c[0] = first[0]; c[0] <= last[0]; ++c[0]) {
-        each_block(c, a, b, [&](const CellCoordinates& at) {
-          const std::uint32_t place = block_at(at, trail);
-          if (place != kNone) list(blocks_[place], block_mask(at, cells), out, count);
-          return true;
-        });
-      }
-    }
-  }
+  });
+  list_waiting();
   return count;
 }
 
 std::size_t SoftCells::in(const glm::dvec3& low, const glm::dvec3& high, std::span<std::uint32_t> out,
-                          CellTrail& trail) const noexcept {
+                          Trail& trail) const noexcept {
   if (blocks_.size() == 0) return 0;
   const CellCoordinates first = bricks_.cell_of(low);
-  return low == high ? in_cell(first, out, trail) : in_box({first, bricks_.cell_of(high)}, out, trail);
+  if (low == high) return in_cell(first, out, trail);
+  const CellRange cells{first, bricks_.cell_of(high)};
+  return bricks_.perhaps(cells) ? in_box(cells, out, trail) : 0;
 }
 
 std::size_t SoftCells::memory_bytes() const noexcept {
@@ -315,9 +397,10 @@ bool SoftCells::validate() const {
   bool right = bricks_.table().validate() && blocks_.validate();
   std::size_t listed = 0, placed = 0, full = 0, blocks_of_bricks = 0;
   blocks_.each([&](const Block& block, std::uint32_t place) {
-    const std::uint32_t brick = bricks_.find(brick_of_block(block.at));
+    const std::uint32_t brick = bricks_.find(brick_of_block(block.at)), in_brick = block_in_brick(block.at);
     right = right && block.occupied != 0 && brick != kNone && bricks_.perhaps_brick(bricks_[brick].at) &&
-            (bricks_[brick].blocks & bit_in_brick(block.at)) != 0;
+            block.brick == brick && (bricks_[brick].blocks >> in_brick & 1U) != 0 &&
+            bricks_[brick].place[in_brick] == place;
     full += block.full != kNone ? 1 : 0;
     right =
         right && (block.full != kNone ? bits_in(block.occupied) >= kFew : bits_in(block.occupied) <= kPacked);

@@ -5,8 +5,8 @@
 // Blocks of 4×4×4 cells lie in a hash table of two cache lines each, with the first voxel of every occupied
 // cell packed in the order of cells: a surface passes through 10 to 20 of 64. So one cell is looked up in one
 // wait for the memory, where a table of bricks that lead to blocks that lead to lists waits three times. A
-// block too full for that has an array of its own. Bricks of 2×2×2 blocks say which blocks there are, for
-// boxes of many and for what only asks whether anything is near.
+// block too full for that has an array of its own. Bricks of 2×2×2 blocks say where their blocks lie, for
+// boxes, for what moves from one to another and for what only asks whether anything is near.
 #pragma once
 
 #include <array>
@@ -22,6 +22,9 @@ namespace hybrid {
 class SoftCells {
  public:
   static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
+  struct Trail {
+    CellTrail blocks, bricks;
+  };
 
   SoftCells(double cell_m, const glm::dvec3& origin) : bricks_(cell_m, origin) {}
 
@@ -39,7 +42,7 @@ class SoftCells {
   // Voxels of the cells that the box touches: bricks along x, y, z, in these blocks, in these cells, in these
   // the last that came first.
   [[nodiscard]] std::size_t in(const glm::dvec3& low, const glm::dvec3& high, std::span<std::uint32_t> out,
-                               CellTrail& trail) const noexcept;
+                               Trail& trail) const noexcept;
 
   [[nodiscard]] std::size_t bricks() const noexcept { return bricks_.size(); }
   [[nodiscard]] std::uint64_t overflows() const noexcept { return overflows_; }
@@ -50,7 +53,7 @@ class SoftCells {
 
  private:
   static constexpr int kBlockShift = 2, kBlockEdge = 4, kBlockCells = 64;
-  static constexpr std::size_t kPacked = 26;
+  static constexpr std::size_t kPacked = 25;
   // Fewer than so many cells and an array of its own is given back.
   static constexpr std::size_t kFew = 17;
   // A link is a voxel's number and whether there is another after it: then next_ has the link to that one,
@@ -61,12 +64,24 @@ class SoftCells {
     CellCoordinates at{kNoPlace, 0, 0};
     std::uint32_t full = kNone;  // number in full_; kNone: packed
     std::uint64_t occupied = 0;  // bit x + 4 y + 16 z: the cell is
-    std::array<std::uint32_t, kPacked> links{};
+    std::uint32_t brick = kNone;
+    std::array<std::uint32_t, kPacked> links;  // as many as cells are occupied; the rest has no meaning
+    Block() noexcept {}                        // NOLINT: links stay as they are, a cache line of memory
+    void start(const CellCoordinates& block) noexcept {
+      at = block;
+      full = kNone;
+      occupied = 0;
+    }
   };
   static_assert(sizeof(Block) == 128);
   struct Brick {
     CellCoordinates at{kNoPlace, 0, 0};
-    std::uint32_t blocks = 0;  // bit x + 2 y + 4 z: the block exists
+    std::uint32_t blocks = 0;              // bit x + 2 y + 4 z: the block exists
+    std::array<std::uint32_t, 8> place{};  // [x + 2 y + 4 z], of those that do
+    void start(const CellCoordinates& brick) noexcept {
+      at = brick;
+      blocks = 0;
+    }
   };
   using Full = std::array<std::uint32_t, kBlockCells>;  // [cell] link; free: [0] is the next free one
 
@@ -76,8 +91,8 @@ class SoftCells {
   [[nodiscard]] static CellCoordinates brick_of_block(const CellCoordinates& block) noexcept {
     return {block[0] >> 1, block[1] >> 1, block[2] >> 1};
   }
-  [[nodiscard]] static std::uint32_t bit_in_brick(const CellCoordinates& block) noexcept {
-    return 1U << ((block[0] & 1) + 2 * (block[1] & 1) + 4 * (block[2] & 1));
+  [[nodiscard]] static std::uint32_t block_in_brick(const CellCoordinates& block) noexcept {
+    return static_cast<std::uint32_t>((block[0] & 1) + 2 * (block[1] & 1) + 4 * (block[2] & 1));
   }
   [[nodiscard]] static std::uint32_t cell_in_block(const CellCoordinates& cell) noexcept {
     return static_cast<std::uint32_t>((cell[0] & 3) + 4 * (cell[1] & 3) + 16 * (cell[2] & 3));
@@ -92,28 +107,33 @@ class SoftCells {
   }
 
   void put(std::uint32_t number, const glm::dvec3& position, bool may_allocate);
-  // Out of its cell; a block and a brick that are then empty are room again.
-  void take_out(std::uint32_t number) noexcept;
-  // False: there is no room, and nothing was changed.
-  bool put_in(std::uint32_t number, const CellCoordinates& block, std::uint32_t cell, bool may_allocate);
+  // False, and nothing is changed: there are others in one of the two cells.
+  bool move_within(std::uint32_t number, Block& block, std::uint32_t from, std::uint32_t to) noexcept;
+  // Out of its cell; the block may then be empty.
+  void take_out(std::uint32_t number, Block& block, std::uint32_t cell) noexcept;
+  // A block that is empty, and a brick that then is, are room again.
+  void remove_block(std::uint32_t place) noexcept;
+  // False: there is no room, and nothing was changed. `hint`: the block's brick, or kNone where it is not
+  // known.
+  bool put_in(std::uint32_t number, const CellCoordinates& block, std::uint32_t cell, std::uint32_t hint,
+              bool may_allocate);
+  bool link_in(std::uint32_t number, std::uint32_t place, std::uint32_t cell, bool may_allocate);
+  [[nodiscard]] std::uint32_t hinted_brick(const CellCoordinates& brick) const noexcept;
+  void put_next_to(const Block& block) noexcept;
   [[nodiscard]] std::uint32_t add_block(const CellCoordinates& at, bool may_allocate);
   bool add_cell(Block& block, std::uint32_t cell, std::uint32_t link, bool may_allocate);
-  void remove_cell(Block& block, std::uint32_t cell) noexcept;
+  void remove_cell(Block& block, std::uint32_t cell, std::uint32_t* link) noexcept;
   void now_at(const Block& block, std::uint32_t place) noexcept;
+  void now_at(const Brick& brick, std::uint32_t place) noexcept;
 
   // Inline, so that coordinates stay in registers.
   [[nodiscard, gnu::always_inline]] std::size_t in_cell(const CellCoordinates& cell,
                                                         std::span<std::uint32_t> out,
-                                                        CellTrail& trail) const noexcept;
-  [[nodiscard, gnu::always_inline]] std::size_t in_box(const CellRange& cells, std::span<std::uint32_t> out,
-                                                       CellTrail& trail) const noexcept;
-  [[nodiscard]] std::uint32_t block_at(const CellCoordinates& at, CellTrail& trail) const noexcept {
-    const std::uint32_t hinted = blocks_.hinted(at, trail);
-    if (hinted != kNone || !bricks_.perhaps_brick(brick_of_block(at))) return hinted;
-    return blocks_.find(at, trail);
-  }
-  // Writes what the cells of the mask hold.
-  void list(const Block& block, std::uint64_t mask, std::span<std::uint32_t> out,
+                                                        Trail& trail) const noexcept;
+  [[nodiscard, gnu::noinline]] std::size_t in_box(const CellRange& cells, std::span<std::uint32_t> out,
+                                                  Trail& trail) const noexcept;
+  // Writes what the cells of these bits hold, all of which are occupied.
+  void list(const Block& block, std::uint64_t bits, std::span<std::uint32_t> out,
             std::size_t& count) const noexcept;
 
   BrickIndex<Brick> bricks_;
@@ -122,8 +142,10 @@ class SoftCells {
   std::uint32_t free_full_ = kNone;
   std::vector<std::uint32_t, HugePages<std::uint32_t>> next_;  // [number] link to the next in its cell
   std::vector<std::uint32_t, HugePages<std::uint32_t>>
-      cell_;                    // [number] place of block · 64 + cell, or kNone
-  std::uint32_t last_put_ = 0;  // block, mostly the next one's too
+      cell_;  // [number] place of block · 64 + cell, or kNone
+  // Bricks that were put into last, mostly the next one's too: of a surface whose two sides are numbered in
+  // turns, the last but one.
+  std::array<std::uint32_t, 2> last_put_{};
   std::uint64_t overflows_ = 0;
 };
 

@@ -49,7 +49,8 @@ std::size_t layer_of(const CellCoordinates& cell) {
 
 SurfaceCells::Brick& SurfaceCells::brick_at(const CellCoordinates& cell) {
   const CellCoordinates at = BrickGrid::brick_of(cell);
-  if (last_ == kNone || index_[last_].at != at) last_ = index_.find_or_add(at, true);
+  if (last_ == kNone || index_[last_].at != at)
+    last_ = index_.find_or_add(at, true, [](const Brick&, std::uint32_t) {});
   return index_[last_];
 }
 
@@ -113,7 +114,7 @@ bool SurfaceCells::known(const CellCoordinates& cell, std::uint64_t object_bit) 
 }
 
 void SurfaceCells::seal() {
-  index_.seal(0);
+  index_.seal(0, [](const Brick&, std::uint32_t) {});
   last_ = kNone;
 }
 

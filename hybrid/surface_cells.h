@@ -46,6 +46,7 @@ class SurfaceCells {
     CellCoordinates at{kNoPlace, 0, 0};
     std::uint64_t objects = 0;
     std::array<std::uint64_t, BrickGrid::kEdge> layer{};  // [z], bit x + 8 y
+    void start(const CellCoordinates& brick) noexcept { *this = Brick{brick}; }
   };
   static constexpr std::uint32_t kNone = BrickIndex<Brick>::kNone;
   [[nodiscard]] bool touches_bounds(const glm::dvec3& low, const glm::dvec3& high) const noexcept {
