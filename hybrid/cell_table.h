@@ -142,11 +142,12 @@ class CellTable {
     const std::size_t chunks = chunks_for(size_ + more);
     if (chunks > chunks_.size()) grow(chunks, moved);
   }
-  // Room for so many more, and no more than that.
+  // Room for so many more, and no more than that, in memory for hardly more.
   template <class Moved>
   void seal(std::size_t more, Moved&& moved) {
     const std::size_t most = size_ + more;
-    if (chunks_for(most) != chunks_.size()) grow(chunks_for(most), moved);
+    const std::size_t chunks = chunks_for(most);
+    if (chunks > chunks_.size() || chunks + chunks / kSpare < chunks_.size()) grow(chunks, moved);
     most_ = most;
   }
 
@@ -194,6 +195,7 @@ class CellTable {
   static constexpr std::uint64_t kOnePassed = 1ULL << kPassedShift,
                                  kMostPassed = 0xFF;  // it counts no further
   static constexpr std::uint64_t kOnes = 0x0101010101010101ULL;
+  static constexpr std::size_t kSpare = 8;  // a part of so many is not worth to move all
   static constexpr std::size_t kMostPlaces = std::size_t{1} << 26;
 
   [[nodiscard]] static std::uint64_t hash(const CellCoordinates& c) noexcept {

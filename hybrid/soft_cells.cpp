@@ -10,8 +10,8 @@ namespace hybrid {
 namespace {
 
 constexpr std::size_t kBlocksOfNewBrick = 4;  // of eight; a surface passes through about half
-// Of voxels that are expected on load, in a block: a surface's.
-constexpr std::size_t kVoxelsOfBlock = 12;
+// Of voxels that are expected on load, in a block: of a surface 10 are, and a few blocks more are for motion.
+constexpr std::size_t kVoxelsOfBlock = 9;
 constexpr std::size_t kParts = 16;                    // of a box, blocks that are fetched together
 constexpr std::size_t kLarge = std::size_t{1} << 19;  // bytes: more than a core's own cache has room for
 
