@@ -87,9 +87,10 @@ class Bench {
 
   const OccupancyBenchOptions& options_;
   OccupancyBall ball_;
-  BrickIndex index_;  // for its rounding
+  BrickGrid index_;  // for its rounding
   TickTimer timer_;
   std::unique_ptr<OccupancyMap> map_;
+  mutable OccupancyMap::Trail trail_;  // as a tick asks; answers do not depend on it
   std::unique_ptr<polygon::BoxSearch> tree_;
   std::size_t cells_ = 0;
   Samples tree_build_;
@@ -183,10 +184,10 @@ std::size_t Bench::ask(OccupancyEngine engine, const Box& box, Found& out) const
   if (engine == OccupancyEngine::brute) return ask_brute(box, out);
   // Of triangles the map says whether there are any, and the tree ends with the first.
   if (!voxels()) {
-    if (engine == OccupancyEngine::map) return map_->rigid_in(box.map_low, box.map_high) != 0 ? 1 : 0;
+    if (engine == OccupancyEngine::map) return map_->rigid_in(box.map_low, box.map_high, trail_) != 0 ? 1 : 0;
     return tree_->in(box.low, box.high, std::span(out).first(1));
   }
-  return engine == OccupancyEngine::map ? map_->soft_in(box.map_low, box.map_high, out)
+  return engine == OccupancyEngine::map ? map_->soft_in(box.map_low, box.map_high, out, trail_)
                                         : tree_->in(box.low, box.high, out);
 }
 

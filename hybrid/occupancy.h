@@ -8,16 +8,14 @@
 // one by one (an intrusive list a cell), moved in O(1).
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/vec3.hpp>
 #include <memory>
 #include <span>
-#include <vector>
 
-#include "hybrid/brick_index.h"
 #include "hybrid/moving_cells.h"
+#include "hybrid/soft_cells.h"
 #include "hybrid/surface_cells.h"
 
 namespace hybrid {
@@ -25,6 +23,13 @@ namespace hybrid {
 class OccupancyMap {
  public:
   static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
+
+  // What the caller of a path of questions keeps between them, so that each starts where the last one ended.
+  // Only hints: with any trail, and whatever moved since, the answers are the same. One a thread.
+  struct Trail {
+    CellTrail fixed;
+    SoftCells::Trail soft;
+  };
 
   // `cell_m` > 0; `origin` near the scene, so that cells are exact far from the world's origin.
   OccupancyMap(double cell_m, const glm::dvec3& origin);
@@ -38,8 +43,8 @@ class OccupancyMap {
   void add_moving(std::uint32_t object, std::shared_ptr<const SurfaceCells> cells, const glm::dvec3& position,
                   const glm::dquat& rotation);
   // `count` soft surface voxels get numbers of their own; returns the first. Then place each.
-  std::uint32_t add_soft(std::uint32_t count);
-  void place(std::uint32_t number, const glm::dvec3& position);
+  std::uint32_t add_soft(std::uint32_t count) { return soft_.add(count); }
+  void place(std::uint32_t number, const glm::dvec3& position) { soft_.place(number, position); }
   // Room for motion: bricks may grow by this many without allocating. Call once, after everything is placed.
   // Voxels need no more than one brick each, and a brick that the last one leaves is room again: however long
   // they wander, only how many bricks (and blocks of them, of which there are four for each) they are in at
@@ -48,25 +53,37 @@ class OccupancyMap {
 
   // ---- in the tick; these do not allocate ----
   // Soft voxel `number` is now at `position` (scene frame, meters).
-  void move(std::uint32_t number, const glm::dvec3& position) noexcept;
+  void move(std::uint32_t number, const glm::dvec3& position) noexcept { soft_.move(number, position); }
   // The moving rigid object is now there. O(1); every question asked later is answered for this pose.
   void move_body(std::uint32_t object, const glm::dvec3& position, const glm::dquat& rotation) noexcept;
   // Does anything at all lie in a brick that this box touches? The cheapest question: no cell is looked at.
   [[nodiscard]] bool any_near(const glm::dvec3& low, const glm::dvec3& high) const noexcept;
   // Bit per rigid object (objects beyond 62 share bit 63) with surface in a brick of which the box touches an
   // occupied cell: never too few, perhaps too many; the exact question goes to the surface.
-  [[nodiscard]] std::uint64_t rigid_in(const glm::dvec3& low, const glm::dvec3& high) const noexcept;
+  [[nodiscard]] std::uint64_t rigid_in(const glm::dvec3& low, const glm::dvec3& high,
+                                       Trail& trail) const noexcept;
+  [[nodiscard]] std::uint64_t rigid_in(const glm::dvec3& low, const glm::dvec3& high) const noexcept {
+    Trail trail;
+    return rigid_in(low, high, trail);
+  }
   // Soft voxel numbers in the cells that the box touches; returns how many were written, at most out.size().
   [[nodiscard]] std::size_t soft_in(const glm::dvec3& low, const glm::dvec3& high,
-                                    std::span<std::uint32_t> out) const noexcept;
+                                    std::span<std::uint32_t> out, Trail& trail) const noexcept {
+    return soft_.in(low, high, out, trail.soft);
+  }
+  [[nodiscard]] std::size_t soft_in(const glm::dvec3& low, const glm::dvec3& high,
+                                    std::span<std::uint32_t> out) const noexcept {
+    Trail trail;
+    return soft_in(low, high, out, trail);
+  }
 
   [[nodiscard]] double cell_m() const { return fixed_.cell_m(); }
   [[nodiscard]] std::size_t occupied_cells() const noexcept;
   [[nodiscard]] std::size_t memory_bytes() const;
   // Bricks in which soft voxels are: never an empty one.
-  [[nodiscard]] std::size_t soft_bricks() const noexcept { return soft_index_.live(); }
+  [[nodiscard]] std::size_t soft_bricks() const noexcept { return soft_.bricks(); }
   // Moves that found no room for a brick: raise the reserve. The voxel stays known at its last cell.
-  [[nodiscard]] std::uint64_t overflows() const { return overflows_; }
+  [[nodiscard]] std::uint64_t overflows() const { return soft_.overflows(); }
   // Of moving bodies: districts entered or left since they were added.
   [[nodiscard]] std::uint64_t district_changes() const noexcept { return moving_.district_changes(); }
   // For tests: every soft voxel stands in the list of the cell it says it is in, every moving body in those
@@ -78,51 +95,9 @@ class OccupancyMap {
   }
 
  private:
-  static constexpr int kCells = BrickIndex::kCells;
-  // Of a soft brick's cells only those blocks have room for voxels in which some are: a surface passes
-  // through about half of them.
-  static constexpr int kBlockShift = 2, kBlocks = 8, kBlockCells = kCells / kBlocks;  // 4 x 4 x 4 cells
-  struct BlockOfBrick {
-    std::uint64_t occupied = 0;  // bit x + 4 y + 16 z: the cell is
-    std::uint32_t number = 0;    // of soft_blocks_, where any cell is occupied
-  };
-  struct alignas(64) SoftBrick {  // what is known of a block lies in one cache line
-    std::array<BlockOfBrick, kBlocks> block{};
-  };
-  static_assert(sizeof(SoftBrick) == 128);
-  // [cell] a link to its first soft voxel. What is not occupied has no meaning: nothing is written over when
-  // a block is used again.
-  using SoftBlock = std::array<std::uint32_t, kBlockCells>;
-  // A link is a voxel's number and whether there is another after it: then next_ has the link to that one,
-  // and where a voxel is alone in its cell, as nearly all are, next_ is not read.
-  static constexpr std::uint32_t kMore = 0x80000000U, kNumber = kMore - 1;
-  struct Within {  // a brick
-    std::uint32_t block, cell;
-  };
-  [[nodiscard]] static Within within_brick(const CellCoordinates& cell) noexcept {
-    const auto part = [&cell](std::size_t d) {
-      return static_cast<std::uint32_t>(cell[d] & (BrickIndex::kEdge - 1));
-    };
-    const std::uint32_t x = part(0), y = part(1), z = part(2);
-    return {(x >> 2) + 2 * (y >> 2) + 4 * (z >> 2), (x & 3) + 4 * (y & 3) + 16 * (z & 3)};
-  }
-
-  void put(std::uint32_t number, const glm::dvec3& position, bool may_allocate);
-  // Out of its cell; a block and a brick that are then empty are room again.
-  void take_out(std::uint32_t number) noexcept;
-  // False: there is no room, and nothing was changed.
-  bool put_in(std::uint32_t number, const CellCoordinates& brick, const Within& at, bool may_allocate);
-
   SurfaceCells fixed_;
   MovingCells moving_;
-  BrickIndex soft_index_;
-  std::vector<SoftBrick> soft_bricks_;  // [brick of soft_index_]
-  std::vector<SoftBlock> soft_blocks_;  // [number]; of free ones the first entry is the next free one
-  std::uint32_t free_block_ = kNone;
-  std::vector<std::uint32_t> next_;  // [soft number] link to the next in its cell, if any
-  std::vector<std::uint32_t>
-      soft_cell_;  // [soft number] brick · kCells + block · kBlockCells + cell, or kNone
-  std::uint64_t overflows_ = 0;
+  SoftCells soft_;
 };
 
 }  // namespace hybrid

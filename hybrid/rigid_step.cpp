@@ -17,7 +17,7 @@ constexpr int kMaxFreePieces = 512;  // of the way through free space looked at 
 
 bool gather_planes(const World& world, WorldState& state, const glm::dvec3& point, double radius) noexcept {
   state.planes.clear();
-  const std::uint64_t mask = state.map.rigid_in(point - radius, point + radius);
+  const std::uint64_t mask = state.map.rigid_in(point - radius, point + radius, state.map_trail);
   if (mask == 0) return true;
   bool complete = true;
   for (std::uint32_t o = 0; o < world.rigid.size(); ++o) {
@@ -70,7 +70,7 @@ bool advance_through_free_space(const World& world, WorldState& state, const glm
       if (world.soft.empty()) {  // for the ticks to come
         state.look_at = goal;
         state.look_m = radius + look_cells * state.map.cell_m();
-        state.look_mask = state.map.rigid_in(goal - state.look_m, goal + state.look_m);
+        state.look_mask = state.map.rigid_in(goal - state.look_m, goal + state.look_m, state.map_trail);
       }
       return true;
     }

@@ -63,7 +63,7 @@ bool touch_soft(const World& world, WorldState& state, const glm::dvec3& point, 
   bool any = false;
   // A voxel may have moved since the map last looked at it, by much less than a cell.
   const glm::dvec3 box(soft_reach(world, state) + range + 0.5 * state.map.cell_m());
-  const std::size_t count = state.map.soft_in(point - box, point + box, state.found);
+  const std::size_t count = state.map.soft_in(point - box, point + box, state.found, state.map_trail);
   bool fits = count < state.found.size() && list_touched(world, state, point, range, count);
   // A tool of many spacings: it looks less far ahead, and so goes less far in a tick.
   for (int n = 0; n < kMaxHalvings && !fits; ++n) {

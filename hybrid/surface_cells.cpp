@@ -10,7 +10,7 @@
 namespace hybrid {
 namespace {
 
-constexpr int kEdge = BrickIndex::kEdge;
+constexpr int kEdge = BrickGrid::kEdge;
 // Longer triangles are halved until each spans few cells: else the box of an oblique one would be all there
 // is to look at.
 constexpr double kLongestPiece = 8.0;  // cells
@@ -48,10 +48,10 @@ std::size_t layer_of(const CellCoordinates& cell) {
 }  // namespace
 
 SurfaceCells::Brick& SurfaceCells::brick_at(const CellCoordinates& cell) {
-  const CellCoordinates at = BrickIndex::brick_of(cell);
-  if (last_ == BrickIndex::kNone || index_.at(last_) != at) last_ = index_.find_or_add(at, true);
-  if (last_ == bricks_.size()) bricks_.emplace_back();
-  return bricks_[last_];
+  const CellCoordinates at = BrickGrid::brick_of(cell);
+  if (last_ == kNone || index_[last_].at != at)
+    last_ = index_.find_or_add(at, true, [](const Brick&, std::uint32_t) {});
+  return index_[last_];
 }
 
 void SurfaceCells::add_triangle(std::uint64_t object_bit, const glm::dvec3& a, const glm::dvec3& b,
@@ -108,33 +108,34 @@ void SurfaceCells::add_piece(std::uint64_t object_bit, const std::array<glm::dve
 }
 
 bool SurfaceCells::known(const CellCoordinates& cell, std::uint64_t object_bit) const noexcept {
-  if (last_ == BrickIndex::kNone || index_.at(last_) != BrickIndex::brick_of(cell)) return false;
-  const Brick& brick = bricks_[last_];
+  if (last_ == kNone || index_[last_].at != BrickGrid::brick_of(cell)) return false;
+  const Brick& brick = index_[last_];
   return (brick.objects & object_bit) != 0 && (brick.layer[layer_of(cell)] & bit_in_layer(cell)) != 0;
 }
 
 void SurfaceCells::seal() {
-  bricks_.shrink_to_fit();
-  index_.seal(0);
+  index_.seal(0, [](const Brick&, std::uint32_t) {});
+  last_ = kNone;
 }
 
 bool SurfaceCells::any_near(const glm::dvec3& low, const glm::dvec3& high) const noexcept {
   if (!touches_bounds(low, high)) return false;
   bool any = false;
-  index_.each(low, high, [&any](std::uint32_t, const CellRange&) {
+  CellTrail trail;
+  index_.each(index_.cells_of(low, high), trail, [&any](const Brick&, const CellRange&) {
     any = true;
     return false;
   });
   return any;
 }
 
-std::uint64_t SurfaceCells::objects_in(const glm::dvec3& low, const glm::dvec3& high) const noexcept {
+std::uint64_t SurfaceCells::objects_in(const glm::dvec3& low, const glm::dvec3& high,
+                                       CellTrail& trail) const noexcept {
   if (!touches_bounds(low, high)) return 0;
   std::uint64_t objects = 0;
-  index_.each(low, high, [&](std::uint32_t n, const CellRange& part) {
-    const Brick& brick = bricks_[n];
+  index_.each(index_.cells_of(low, high), trail, [&](const Brick& brick, const CellRange& part) {
     if ((brick.objects & ~objects) == 0) return true;
-    const std::uint64_t mask = BrickIndex::layer_mask(part);
+    const std::uint64_t mask = BrickGrid::layer_mask(part);
     const std::size_t last = layer_of(part.high);
     for (std::size_t z = layer_of(part.low); z <= last; ++z) {
       if ((brick.layer[z] & mask) == 0) continue;
@@ -147,20 +148,20 @@ std::uint64_t SurfaceCells::objects_in(const glm::dvec3& low, const glm::dvec3& 
 }
 
 bool SurfaceCells::occupied(const CellCoordinates& cell) const noexcept {
-  const std::uint32_t n = index_.find(BrickIndex::brick_of(cell));
-  return n != BrickIndex::kNone && (bricks_[n].layer[layer_of(cell)] & bit_in_layer(cell)) != 0;
+  const std::uint32_t n = index_.find(BrickGrid::brick_of(cell));
+  return n != kNone && (index_[n].layer[layer_of(cell)] & bit_in_layer(cell)) != 0;
 }
 
 std::size_t SurfaceCells::occupied_cells() const noexcept {
   std::size_t cells = 0;
-  for (const Brick& b : bricks_) {
+  index_.table().each([&cells](const Brick& b, std::uint32_t) {
     for (const std::uint64_t layer : b.layer) cells += static_cast<std::size_t>(std::popcount(layer));
-  }
+  });
   return cells;
 }
 
 std::size_t SurfaceCells::memory_bytes() const noexcept {
-  return index_.memory_bytes() + bricks_.capacity() * sizeof(Brick);
+  return index_.memory_bytes();
 }
 
 }  // namespace hybrid

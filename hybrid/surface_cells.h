@@ -6,7 +6,6 @@
 #include <array>
 #include <cstdint>
 #include <glm/vec3.hpp>
-#include <vector>
 
 #include "hybrid/brick_index.h"
 
@@ -26,12 +25,17 @@ class SurfaceCells {
   // Is there surface in a brick that this box touches?
   [[nodiscard]] bool any_near(const glm::dvec3& low, const glm::dvec3& high) const noexcept;
   // Bits of the objects with surface in a brick of which the box touches an occupied cell.
-  [[nodiscard]] std::uint64_t objects_in(const glm::dvec3& low, const glm::dvec3& high) const noexcept;
+  [[nodiscard]] std::uint64_t objects_in(const glm::dvec3& low, const glm::dvec3& high,
+                                         CellTrail& trail) const noexcept;
+  [[nodiscard]] std::uint64_t objects_in(const glm::dvec3& low, const glm::dvec3& high) const noexcept {
+    CellTrail trail;
+    return objects_in(low, high, trail);
+  }
 
   // Bounds of what was added; low > high when nothing was.
   [[nodiscard]] const glm::dvec3& low() const noexcept { return low_; }
   [[nodiscard]] const glm::dvec3& high() const noexcept { return high_; }
-  [[nodiscard]] bool empty() const noexcept { return bricks_.empty(); }
+  [[nodiscard]] bool empty() const noexcept { return index_.size() == 0; }
   [[nodiscard]] bool occupied(const CellCoordinates& cell) const noexcept;
   [[nodiscard]] std::size_t occupied_cells() const noexcept;
   [[nodiscard]] double cell_m() const noexcept { return index_.cell_m(); }
@@ -39,9 +43,12 @@ class SurfaceCells {
 
  private:
   struct Brick {
+    CellCoordinates at{kNoPlace, 0, 0};
     std::uint64_t objects = 0;
-    std::array<std::uint64_t, BrickIndex::kEdge> layer{};  // [z], bit x + 8 y
+    std::array<std::uint64_t, BrickGrid::kEdge> layer{};  // [z], bit x + 8 y
+    void start(const CellCoordinates& brick) noexcept { *this = Brick{brick}; }
   };
+  static constexpr std::uint32_t kNone = BrickIndex<Brick>::kNone;
   [[nodiscard]] bool touches_bounds(const glm::dvec3& low, const glm::dvec3& high) const noexcept {
     return !(low.x > high_.x || high.x < low_.x || low.y > high_.y || high.y < low_.y || low.z > high_.z ||
              high.z < low_.z);
@@ -51,9 +58,8 @@ class SurfaceCells {
   // Is the cell occupied already, in the brick that was added to last?
   [[nodiscard]] bool known(const CellCoordinates& cell, std::uint64_t object_bit) const noexcept;
 
-  BrickIndex index_;
-  std::vector<Brick> bricks_;               // [brick of index_]
-  std::uint32_t last_ = BrickIndex::kNone;  // the brick that was added to last: mostly the next one too
+  BrickIndex<Brick> index_;
+  std::uint32_t last_ = kNone;  // the brick that was added to last: mostly the next one too
   glm::dvec3 low_{1e300}, high_{-1e300};
 };
 

@@ -216,6 +216,7 @@ struct WorldState : CarriedState {
   std::vector<std::unique_ptr<voxel::SoftObject>> soft;  // one a World::soft
   Apart apart;                                           // those of them that are relaxed apart
   OccupancyMap map;
+  OccupancyMap::Trail map_trail;  // of the tick's questions to it: hints only
   // For tests: the corners of the last sweep's way, as many as there is room for.
   std::span<glm::dvec3> trail;
   std::size_t trail_count = 0;

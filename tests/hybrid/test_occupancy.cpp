@@ -60,12 +60,16 @@ class Occupancy : public ::testing::TestWithParam<double> {
   const double rounding = 1e-15 + 4e-16 * GetParam();
   std::mt19937_64 random{99};
   OccupancyMap map{kCell, origin};
+  OccupancyMap::Trail trail;  // through everything that is asked
 
   void expect_soft(const std::vector<dvec3>& points, const dvec3& low, const dvec3& high) {
     std::vector<std::uint32_t> out(points.size());
     const std::size_t count = map.soft_in(low, high, out);
     const std::set<std::uint32_t> found(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(count));
     ASSERT_EQ(found.size(), count) << "a voxel was reported twice";
+    std::vector<std::uint32_t> again(points.size());
+    ASSERT_EQ(map.soft_in(low, high, again, trail), count);
+    ASSERT_EQ(again, out) << "the trail changed the answer";
     const dvec3 cell(kCell + 4.0 * rounding);
     for (std::uint32_t n = 0; n < points.size(); ++n) {
       if (within(points[n], low, high)) {
@@ -110,6 +114,35 @@ TEST_P(Occupancy, FindsSoftVoxelsAsBruteForceDoesAfterManyMoves) {
   EXPECT_EQ(map.overflows(), 0U);
 }
 
+// More than a block has room for beside its cells: all 64 cells, two voxels in each, and empty again.
+TEST_P(Occupancy, ABlockMayBeFullAndEmptyAgain) {
+  const dvec3 far = origin + 100.0 * kCell;
+  std::vector<dvec3> cells, points;
+  for (int n = 0; n < 64; ++n) cells.push_back(origin + kCell * (dvec3(n % 4, n / 4 % 4, n / 16) + 0.5));
+  map.add_soft(128);
+  for (std::uint32_t n = 0; n < 128; ++n) {
+    points.push_back(far);
+    map.place(n, far);
+  }
+  map.reserve_bricks(2);
+  for (int round = 0; round < 6; ++round) {
+    std::vector<std::uint32_t> order(128);
+    for (std::uint32_t n = 0; n < 128; ++n) order[n] = n;
+    std::shuffle(order.begin(), order.end(), random);
+    for (const std::uint32_t n : order) {
+      points[n] = round % 2 == 0 ? cells[n % 64] : far;
+      map.move(n, points[n]);
+      ASSERT_TRUE(map.validate());
+      const dvec3& at = cells[random() % 64];
+      expect_soft(points, at, at);
+      expect_soft(points, at - kCell, at + kCell);
+      if (HasFatalFailure()) return;
+    }
+    expect_soft(points, origin, origin + 4.0 * kCell);
+    ASSERT_EQ(map.overflows(), 0U);
+  }
+}
+
 TEST_P(Occupancy, FindsRigidSurfacesAsBruteForceDoes) {
   std::vector<Triangle> triangles;
   for (std::uint32_t n = 0; n < 40; ++n) {
@@ -127,6 +160,7 @@ TEST_P(Occupancy, FindsRigidSurfacesAsBruteForceDoes) {
                 half = glm::abs(random_point(random, n % 2 == 0 ? 2e-3 : 0.02));
     const dvec3 low = centre - half, high = centre + half;
     const std::uint64_t mask = map.rigid_in(low, high);
+    ASSERT_EQ(map.rigid_in(low, high, trail), mask) << "the trail changed the answer";
     bool near = false;
     for (std::uint32_t o = 0; o < triangles.size(); ++o) {
       if (meets(triangles[o], low, high)) {
