@@ -59,6 +59,23 @@ bool each_block(const CellCoordinates& brick, const CellCoordinates& low, const 
 
 }  // namespace
 
+namespace {
+
+constexpr std::uint64_t kNoKey = ~std::uint64_t{0};
+
+// A cell in one word; none where it is so far out that it has no room there.
+std::uint64_t key_of(const CellCoordinates& cell) noexcept {
+  constexpr std::int32_t kHalf = 1 << 20;
+  std::uint64_t key = 0;
+  for (const std::int32_t c : cell) {
+    if (c < -kHalf || c >= kHalf) return kNoKey;
+    key = key << 21U | static_cast<std::uint64_t>(c + kHalf);
+  }
+  return key;
+}
+
+}  // namespace
+
 std::size_t SoftCells::rank(const Block& block, std::uint64_t bit) noexcept {
   return bits_in(block.occupied & (bit - 1));
 }
@@ -67,6 +84,7 @@ std::uint32_t SoftCells::add(std::uint32_t count) {
   const auto first = static_cast<std::uint32_t>(next_.size());
   next_.resize(next_.size() + count, kNone);
   cell_.resize(cell_.size() + count, kNone);
+  key_.resize(cell_.size(), kNoKey);
   blocks_.expect(count / kVoxelsOfBlock,
                  [this](const Block& block, std::uint32_t place) { now_at(block, place); });
   return first;
@@ -100,18 +118,27 @@ void SoftCells::seal(std::size_t more_bricks) {
 }
 
 inline void SoftCells::put(std::uint32_t number, const glm::dvec3& position, bool may_allocate) {
-  const CellCoordinates to = bricks_.cell_of(position), block = block_of(to);
+  const CellCoordinates to = bricks_.cell_of(position);
+  // Most that are looked at are where they were; of those no block is asked for.
+  const std::uint64_t key = key_of(to);
+  if (key != kNoKey && key_[number] == key) return;
+  const CellCoordinates block = block_of(to);
   const std::uint32_t cell = cell_in_block(to), hint = hinted_brick(brick_of_block(block));
   // Beside what the voxel leaves, of which its number tells: one wait for both.
   if (hint == kNone && blocks_.large()) blocks_.fetch(block);
   const std::uint32_t old = cell_[number];
   if (old == kNone) {
-    if (!put_in(number, block, cell, hint, may_allocate)) ++overflows_;
+    if (put_in(number, block, cell, hint, may_allocate)) {
+      key_[number] = key;
+    } else {
+      ++overflows_;
+    }
     return;
   }
   const std::uint32_t place = old / kBlockCells, old_cell = old % kBlockCells;
   Block& left = blocks_[place];
   if (same(left.at, block)) {
+    key_[number] = key;
     if (old_cell == cell) return;
     if (hint == kNone) put_next_to(left);
     if (!move_within(number, left, old_cell, cell)) {
@@ -125,7 +152,10 @@ inline void SoftCells::put(std::uint32_t number, const glm::dvec3& position, boo
   const CellCoordinates old_block = left.at;
   take_out(number, left, old_cell);
   if (left.occupied == 0) remove_block(place);
-  if (put_in(number, block, cell, hint, may_allocate)) return;
+  if (put_in(number, block, cell, hint, may_allocate)) {
+    key_[number] = key;
+    return;
+  }
   ++overflows_;
   put_in(number, old_block, old_cell, kNone, false);  // what it left is still there
 }
@@ -390,7 +420,8 @@ std::size_t SoftCells::in(const glm::dvec3& low, const glm::dvec3& high, std::sp
 
 std::size_t SoftCells::memory_bytes() const noexcept {
   return bricks_.memory_bytes() + blocks_.memory_bytes() + full_.capacity() * sizeof(Full) +
-         (next_.capacity() + cell_.capacity()) * sizeof(std::uint32_t);
+         (next_.capacity() + cell_.capacity()) * sizeof(std::uint32_t) +
+         key_.capacity() * sizeof(std::uint64_t);
 }
 
 bool SoftCells::validate() const {

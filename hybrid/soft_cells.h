@@ -143,6 +143,7 @@ class SoftCells {
   std::vector<std::uint32_t, HugePages<std::uint32_t>> next_;  // [number] link to the next in its cell
   std::vector<std::uint32_t, HugePages<std::uint32_t>>
       cell_;  // [number] place of block · 64 + cell, or kNone
+  std::vector<std::uint64_t, HugePages<std::uint64_t>> key_;  // [number] the cell's coordinates in one word
   // Bricks that were put into last, mostly the next one's too: of a surface whose two sides are numbered in
   // turns, the last but one.
   std::array<std::uint32_t, 2> last_put_{};
