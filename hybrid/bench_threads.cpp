@@ -19,6 +19,7 @@ constexpr double kAsOftenAsItCan_hz = 1e6;
 
 // Copies memory until it is told to stop.
 void hog_memory(const std::atomic<bool>& stop) {
+  take_ordinary_priority();
   std::vector<char> a(kHogged, 1), b(kHogged, 2);
   while (!stop.load(std::memory_order_relaxed)) {
     std::memcpy(a.data(), b.data(), kHogged);
@@ -28,6 +29,7 @@ void hog_memory(const std::atomic<bool>& stop) {
 
 // Another session of the scene, as fast as it goes, its surfaces taken after each tick.
 void relax_and_snap(const Scene& scene, BuiltScene& built, const std::atomic<bool>& stop) {
+  take_ordinary_priority();
   flush_denormals();
   relax_apart(*built.state, Arrival::counted);
   Snapshot snapshot;

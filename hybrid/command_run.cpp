@@ -113,19 +113,18 @@ int run(const RunCommand& command) {
   }
   const bool realtime = command.realtime || real;
   const auto kept = keep_box(command.black_box, command.scene, realtime, scene.rate_hz);
-  SessionOptions options{
-      .seconds = command.seconds,
-      .realtime = command.realtime,
-      .real_device = real.get(),
-      .keep_rows = !command.trace.empty() || !command.plot.empty(),
-      .keep_recording = !command.record.empty(),
-      .keep_clearance = !command.plot.empty(),
-      .keep_picture = !command.picture.empty(),
-      .reference_samples = command.samples,
-      .start_ticks = command.start_ticks,
-      .progress = progress,
-      .relax_apart = command.relaxation == "apart",
-      .black_box = kept ? &kept->box() : nullptr};
+  SessionOptions options{.seconds = command.seconds,
+                         .realtime = command.realtime,
+                         .real_device = real.get(),
+                         .keep_rows = !command.trace.empty() || !command.plot.empty(),
+                         .keep_recording = !command.record.empty(),
+                         .keep_clearance = !command.plot.empty(),
+                         .keep_picture = !command.picture.empty(),
+                         .reference_samples = command.samples,
+                         .start_ticks = command.start_ticks,
+                         .progress = progress,
+                         .relax_apart = command.relaxation == "apart",
+                         .black_box = kept ? &kept->box() : nullptr};
   SessionResult result = run_session(scene, built, options);
   end_progress();
   if (kept) print_fault(*kept);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "hybrid/relax_apart.h"
 
+#include <sched.h>
 #include <time.h>
 
 #include <chrono>
@@ -139,7 +140,13 @@ void RelaxationThread::say_surfaces() {
   surfaces_.publish();
 }
 
+void take_ordinary_priority() noexcept {
+  const sched_param none{};
+  (void)sched_setscheduler(0, SCHED_OTHER, &none);  // giving up a right is never refused
+}
+
 void RelaxationThread::go() {
+  take_ordinary_priority();
   flush_denormals();  // as the tick does: it is to be the same to the last bit when it is played again
   using Clock = std::chrono::steady_clock;
   Clock::time_point next = Clock::now();

@@ -58,6 +58,9 @@ void relax_apart(WorldState& state, Arrival arrival);
 // The stage.
 void relax_background(const World& world, WorldState& state) noexcept;
 
+// The calling thread goes on at ordinary priority: one that the servo thread made has got its own from it.
+void take_ordinary_priority() noexcept;
+
 // Relaxes what the tick gives, until it is destroyed. It looks every 100 us whether there is something: to
 // wake it would be a call into the system from the tick.
 class RelaxationThread {
