@@ -38,7 +38,7 @@ struct SessionOptions {
   // simulated one.
   device::HapticDevice* real_device = nullptr;
   bool keep_rows = true;        // trace rows and per-object forces
-  bool keep_recording = true;   // every input, 32 bytes a tick: without it and the rows memory stays flat
+  bool keep_recording = true;   // every input, 48 bytes a tick: without it and the rows memory stays flat
   bool keep_clearance = false;  // how near objects come, at a thousand moments
   bool keep_picture = false;    // remember the most telling moment
   int reference_samples = 0;    // how often the force is compared with its equilibrium; 0 in real time

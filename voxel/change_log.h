@@ -19,7 +19,6 @@ class ChangeLog {
     levels_.clear();
     for (const std::size_t n : rows) levels_.push_back({LazyArray<std::uint8_t>(n), LazyArray<RowId>(n), 0});
   }
-  [[nodiscard]] bool keeps() const { return !levels_.empty(); }
 
   void note(int level, RowId row) noexcept {
     if (levels_.empty()) return;
