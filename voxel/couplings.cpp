@@ -64,13 +64,13 @@ Couplings::Couplings(const Lattice& lattice, const Couplings* finer)
     for (int j = 0; j < grid_.dims[1]; ++j) {
       for (int i = 0; i < grid_.dims[0]; ++i) {
         Content all = nothing;
-        for (int corner = 0; corner < 8 && all != held; ++corner) {
+        for (int corner = 0; corner < 8 && all != some; ++corner) {
           const std::array<int, 3> fine{2 * i + (corner & 1), 2 * j + (corner >> 1 & 1),
                                         2 * k + (corner >> 2)};
           if (fine[0] >= finer_->grid_.dims[0] || fine[1] >= finer_->grid_.dims[1] ||
               fine[2] >= finer_->grid_.dims[2])
             continue;
-          all = std::max(all, finer_->content(fine));
+          all = together(all, finer_->content(fine));
         }
         if (all != nothing) content_[grid_.at(i, j, k)] = all;
       }
@@ -78,8 +78,8 @@ Couplings::Couplings(const Lattice& lattice, const Couplings* finer)
   }
 }
 
-// What a cell holds. A cell with any anchor in it is held: an underestimate of the correction beside an
-// anchor, never a wrong one.
+// What a cell holds: it is held where all it holds is. Where only some is, that holds on to it (see
+// Multigrid::hold_cells).
 Couplings::Content Couplings::content(const std::array<int, 3>& cell) const noexcept {
   const auto [i, j, k] = cell;
   if (level_ == 0) {
@@ -88,12 +88,12 @@ Couplings::Content Couplings::content(const std::array<int, 3>& cell) const noex
   }
   if (level_ >= 2) return static_cast<Content>(content_[grid_.at(i, j, k)]);
   Content all = nothing;
-  for (int corner = 0; corner < 8 && all != held; ++corner) {
+  for (int corner = 0; corner < 8 && all != some; ++corner) {
     const std::array<int, 3> fine{2 * i + (corner & 1), 2 * j + (corner >> 1 & 1), 2 * k + (corner >> 2)};
     if (fine[0] >= finer_->grid_.dims[0] || fine[1] >= finer_->grid_.dims[1] ||
         fine[2] >= finer_->grid_.dims[2])
       continue;
-    all = std::max(all, finer_->content(fine));
+    all = together(all, finer_->content(fine));
   }
   return all;
 }

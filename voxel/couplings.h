@@ -91,6 +91,7 @@ class Couplings {
  private:
   enum Kind : std::uint8_t { unknown = 0, empty, one_label, mixed };
   enum Content : std::uint8_t { nothing = 0, some = 1, held = 2 };
+  static Content together(Content a, Content b) { return a == nothing || (a == held && b == some) ? b : a; }
   struct Written {  // springs of a mixed row
     std::array<Lanes, 3> up_along, up_across, down_along, down_across, inverse;
     Lanes filled, share;

@@ -97,15 +97,16 @@ bool blocked(const ObstacleView& view, const Displacement& state, VoxelId v, dou
   return glm::dot(glm::dvec3(o.normal), state.at(v)) < static_cast<double>(o.bound) + margin;
 }
 
-void relax_obstacle(Couplings& couplings, Displacement& state, const ObstacleView& view, VoxelId v) noexcept {
+void relax_obstacle(Couplings& couplings, Displacement& state, const ObstacleView& view, VoxelId v,
+                    const glm::dvec3& load_N) noexcept {
   const Obstacle& o = view.of(v);
   const glm::dvec3 n(o.normal), before = state.at(v);
   const auto depth_of = [&](const glm::dvec3& u) { return static_cast<double>(o.bound) - glm::dot(n, u); };
-  glm::dvec3 wanted = link_minimum(couplings, state, v);
+  const glm::dvec3 w = link_compliance(couplings, v);
+  glm::dvec3 wanted = link_minimum(couplings, state, v) + w * load_N;
   const double depth = depth_of(wanted);
   if (depth > 0.0) {
     // Projected in the metric of the springs, so that the step lowers the energy along the surface.
-    const glm::dvec3 w = link_compliance(couplings, v);
     const double denominator = glm::dot(n, w * n);
     if (denominator > 0.0) wanted += (depth / denominator) * w * n;
   }

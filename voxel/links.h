@@ -41,6 +41,7 @@ struct ObstacleView {
 bool blocked(const ObstacleView& view, const Displacement& state, VoxelId v, double margin) noexcept;
 // Takes a voxel whose role is obstacle where its links would have it, on this side of the obstacle. One that
 // is in it comes out as far as its links allow, and no deeper.
-void relax_obstacle(Couplings& couplings, Displacement& state, const ObstacleView& view, VoxelId v) noexcept;
+void relax_obstacle(Couplings& couplings, Displacement& state, const ObstacleView& view, VoxelId v,
+                    const glm::dvec3& load_N) noexcept;
 
 }  // namespace voxel

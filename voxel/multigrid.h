@@ -68,7 +68,7 @@ class Multigrid {
   // The voxels among them: `visit(v, axis)` for each axis on which a limit holds one.
   template <class Visit>
   void for_limited(const Visit& visit) const {
-    for (const HeldCell& s : stopped_) {
+    for (const StoppedCell& s : stopped_) {
       if (s.level != 0) continue;
       for (int axis = 0; axis < 3; ++axis) {
         if ((at(0).stopped[s.cell] & (1 << axis)) != 0) visit(s.cell, axis);
@@ -134,6 +134,17 @@ class Multigrid {
     auto& arrays = which < 3 ? at(level).value : which < 6 ? at(level).told : at(level).load;
     return arrays[which % 3];
   }
+  // Forgets what coarse cells hold. Allocates.
+  void forget_coarse();
+  // Coarse cells whose rows are in the log hold nothing any more, and nothing is balanced.
+  void begin_anew() noexcept;
+  // What still pulls the voxels of a row counts as balanced from now on: they are at rest where they are.
+  void balance(RowId row, Displacement& state, const ObstacleView& obstacles, OctetSpan span = {}) noexcept;
+  [[nodiscard]] glm::dvec3 balance_of(VoxelId v) const noexcept {
+    return row_balanced_.size() == 0 || row_balanced_[v / kRow] == 0
+               ? glm::dvec3(0.0)
+                                        : glm::dvec3(balance_[0][v], balance_[1][v], balance_[2][v]);
+  }
   // Adds to a row of voxels what somebody else found, as far as its links allow.
   void add(RowId row, const RowVector& way, Displacement& state, const ObstacleView& obstacles) noexcept;
   // Finds all springs and takes all memory now, not when a tick first needs them.
@@ -147,15 +158,20 @@ class Multigrid {
     // value − told is what it has yet to hear.
     std::array<LazyArray<float>, 3> value, told, load;
     LazyArray<std::uint8_t> stopped;   // [cell or voxel] bits 0 to 2: held by a limit on that axis
-    LazyArray<std::uint16_t> held;     // [cell] voxels in it that the tool or another object holds
-    LazyArray<float> hold;             // [cell] how hard those hold it, in units of all its springs
-    LazyArray<std::uint8_t> row_held;  // [row] 1: some cell of it has one of these
-    LazyArray<std::uint8_t> flags;     // [row]
+    // [axis][cell] voxels in it that are held, in parts of kHeld, and how hard they hold it, in units of all its
+    // springs.
+    std::array<LazyArray<std::uint32_t>, 3> held;
+    std::array<LazyArray<float>, 3> hold;
+    LazyArray<std::uint16_t> row_held;  // [row] how many of these are not 0
+    LazyArray<std::uint8_t> flags;      // [row]
   };
-  struct HeldCell {
+  struct StoppedCell {
     std::uint8_t level;
     VoxelId cell;
   };
+  // How much of a voxel is held, by axis; kHeld: it does not move along that.
+  static constexpr std::uint8_t kHeld = 255;
+  using HeldParts = std::array<std::uint8_t, 3>;
 
   [[nodiscard]] Level& at(int level) { return levels_[static_cast<std::size_t>(level)]; }
   [[nodiscard]] const Level& at(int level) const { return levels_[static_cast<std::size_t>(level)]; }
@@ -163,6 +179,11 @@ class Multigrid {
   void spread(int level, RowId row, std::uint8_t flags) noexcept;
   void note_change(int level, RowId row, float change) noexcept;
   void stop_cells(VoxelId v, std::uint8_t bits) noexcept;
+  void hold_cells(VoxelId v, const HeldParts& more, const HeldParts& less) noexcept;
+  void hold_anchored() noexcept;
+  void support(VoxelId v, const HeldParts& parts) noexcept;
+  void balance_obstacles(RowId row, const Displacement& state, const ObstacleView& obstacles, OctetSpan span,
+                         RowResidual& found, RowVector& out) noexcept;
   [[nodiscard]] LevelRow row_of(int level, RowId row, Displacement& state) noexcept;
   [[nodiscard]] LevelRow told_row(int level, RowId row) noexcept;
   [[nodiscard]] std::array<float*, 3> loads(int level, RowId row) noexcept;
@@ -185,7 +206,13 @@ class Multigrid {
   ChangeLog log_;
   std::vector<Level> levels_;
   Hats hats_;
-  std::vector<HeldCell> held_, stopped_;
+  std::vector<VoxelId> held_;
+  LazyArray<HeldParts> supported_;            // [voxel] by its obstacle
+  LazyArray<std::uint8_t> row_supported_;     // [row] 1: a voxel of it was
+  std::vector<StoppedCell> stopped_;
+  std::array<LazyArray<float>, 3> balance_;  // [axis][voxel] load that balances it (N), in rows that have one
+  LazyArray<std::uint8_t> row_balanced_;     // [row] 1: it has
+  std::vector<RowId> balanced_;              // these
   std::array<AxisLimits, 3> yield_limits_;
   float tolerance_N_ = 0.0F, quiet_m_ = 0.0F, hold_ = 1.0F;
 };

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The passes of which a cycle is made.
 #include <algorithm>
+#include <cmath>
 
 #include "voxel/multigrid.h"
 
@@ -22,9 +23,11 @@ LevelRow Multigrid::row_of(int level, RowId row, Displacement& state) noexcept {
   r.z = static_cast<std::ptrdiff_t>(g.row_z) * kRow;
   r.x = static_cast<std::ptrdiff_t>(g.row_x) * kRow;
   if (level == 0) {
+    const bool balanced = row_balanced_.size() > 0 && row_balanced_[row] != 0;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       r.u[axis] = state.u[axis].data() + begin;
-      r.load[axis] = state.rest.load_of(row, static_cast<int>(axis));
+      r.load[axis] =
+          balanced ? balance_[axis].data() + begin : state.rest.load_of(row, static_cast<int>(axis));
     }
     if (state.row_held[row] != 0) r.held = state.role.data() + begin;
     return r;
@@ -34,7 +37,7 @@ LevelRow Multigrid::row_of(int level, RowId row, Displacement& state) noexcept {
     r.load[axis] = l.load[axis].data() + begin;
     r.told[axis] = l.told[axis].data() + begin;
   }
-  if (l.row_held[row] != 0) r.hold = l.hold.data() + begin;
+  for (std::size_t axis = 0; axis < 3 && l.row_held[row] != 0; ++axis) r.hold[axis] = l.hold[axis].data() + begin;
   r.hold_times = hold_;
   if (has(level, row, limited)) r.stopped = l.stopped.data() + begin;
   return r;
@@ -104,7 +107,7 @@ std::uint32_t Multigrid::move_outside(LevelRow r, RowId row, Displacement& state
     r.stopped = stays.data();
   }
   for (VoxelId lane = 0; lane < kRow; ++lane) {
-    if ((blocked_lanes >> lane & 1U) != 0) relax_obstacle(couplings(), state, obstacles, first + lane);
+    if ((blocked_lanes >> lane & 1U) != 0) relax_obstacle(couplings(), state, obstacles, first + lane, balance_of(first + lane));
   }
   return blocked_lanes;
 }
@@ -170,6 +173,46 @@ void Multigrid::restrict_values(int level, RowId row, Displacement& state, Octet
   take_means(sums, l.couplings->all(row).share, value, told, span);
 }
 
+void Multigrid::balance(RowId row, Displacement& state, const ObstacleView& obstacles,
+                        OctetSpan span) noexcept {
+  if (!prepare(0, row) || balanced_.size() == balanced_.capacity()) return;
+  RowVector left;
+  residual_of(0, row, state, obstacles, span, left);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    float* to = balance_[axis].data() + static_cast<std::size_t>(row) * kRow;
+    std::fill_n(to, kRow, 0.0F);
+    for (std::size_t i = static_cast<std::size_t>(span.first) * kOctet;
+         i < static_cast<std::size_t>(span.last + 1) * kOctet; ++i)
+      to[i] = -left[axis][i];
+  }
+  row_balanced_[row] = 1;
+  balanced_.push_back(row);
+}
+
+// What presses a voxel against its obstacle is balanced by it, and the cells above are held by it.
+void Multigrid::balance_obstacles(RowId row, const Displacement& state, const ObstacleView& obstacles,
+                                  OctetSpan span, RowResidual& found, RowVector& out) noexcept {
+  const double touching = kTouching * lattice_.min_spacing_m();
+  const auto first = static_cast<std::size_t>(span.first) * kOctet,
+             last = static_cast<std::size_t>(span.last) * kOctet + kOctet;
+  for (std::size_t i = first; i < last; ++i) {
+    const auto v = static_cast<VoxelId>(row * kRow + i);
+    HeldParts parts{};
+    if (state.role[v] == Displacement::obstacle && blocked(obstacles, state, v, touching)) {
+      const glm::vec3 n = obstacles.of(v).normal;
+      const float into = out[0][i] * n.x + out[1][i] * n.y + out[2][i] * n.z;
+      for (int axis = 0; axis < 3; ++axis) {
+        const auto ua = static_cast<std::size_t>(axis);
+        found.resisted[ua] &= ~(1U << i);
+        if (into >= 0.0F) continue;
+        out[ua][i] -= into * n[axis];
+        parts[ua] = static_cast<std::uint8_t>(std::lround(kHeld * std::min(n[axis] * n[axis], 1.0F)));
+      }
+    }
+    support(v, parts);
+  }
+}
+
 // What pulls the voxels, or cells, of a row that are free to follow.
 RowResidual Multigrid::residual_of(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
                                    OctetSpan span, RowVector& out) noexcept {
@@ -178,17 +221,8 @@ RowResidual Multigrid::residual_of(int level, RowId row, Displacement& state, co
   const RowLimits limits = couplings().limits(row);
   const float tight = kTight * static_cast<float>(lattice_.min_spacing_m());
   RowResidual found = residual_row(r, &limits, tight, span, out);
-  if (state.row_obstacles[row] != 0) {
-    // What an obstacle holds is balanced by it.
-    const double touching = kTouching * lattice_.min_spacing_m();
-    for (std::size_t i = 0; i < kRow; ++i) {
-      const auto v = static_cast<VoxelId>(row * kRow + i);
-      if (state.role[v] != Displacement::obstacle || !blocked(obstacles, state, v, touching)) continue;
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        out[axis][i] = 0.0F;
-        found.resisted[axis] &= ~(1U << i);
-      }
-    }
+  if (state.row_obstacles[row] != 0 || row_supported_[row] != 0) {
+    balance_obstacles(row, state, obstacles, span, found, out);
     measure_row(r.springs, out, span, found);
   }
   // What the chain holds is balanced by it. Passed on, its residual would drive the coarse levels against
@@ -368,9 +402,7 @@ void Multigrid::add(RowId row, const RowVector& way, Displacement& state,
                     const ObstacleView& obstacles) noexcept {
   if (!prepare(0, row)) return;
   RowVector refused;
-  const RowCorrection done = correct_voxels(row_of(0, row, state), row, way, state, obstacles, {}, refused);
-  if (done.refused != 0) take_back_refused(0, row, refused, done.refused, {});
-  note_change(0, row, done.most_m);
+  note_change(0, row, correct_voxels(row_of(0, row, state), row, way, state, obstacles, {}, refused).most_m);
 }
 
 void Multigrid::take_back_refused(int level, RowId row, const RowVector& refused, unsigned axes,

@@ -16,6 +16,10 @@ constexpr double kGain = 0.98;      // of the least residual so far: less is a g
 constexpr double kNearRest = 10.0;  // times the tolerance: what limits hold moves together from here on
 constexpr double kProgress = 1e-3;  // of the spacing: clusters that move further are on their way
 constexpr std::uint64_t kNextFirst = 7919;   // of these voxels is looked at first in the next round
+// Levels of a cycle round a contact where another relaxes the object: what is further away is his. (With all of
+// them both moved the coarsest cells, and a brain held for a minute wavered by a tenth of its force.)
+constexpr int kContactLevels = 5;
+constexpr int kNear = 2;  // rows that a cycle round a contact reads beyond those it brings to rest
 constexpr int kContactMargin = 3;            // cells round the contact that are smoothed, on each level
 constexpr std::uint64_t kBesideContact = 2;  // this part of the budget is left beside cycles round a contact
 constexpr int kTileMargin = 3;               // … round a tile, from level 1 on
@@ -42,6 +46,36 @@ void Relaxation::copy_from(const Relaxation& other) noexcept {
   set_tolerance(other.tolerance_N_);
   unkept_ = other.unkept_;
   wake();
+}
+
+void Relaxation::renew_coarse(Displacement& state, const ObstacleView& obstacles) noexcept {
+  const auto& dims = lattice_.grid().dims;
+  lay_boxes({0, 0, 0}, {dims[0] - 1, dims[1] - 1, dims[2] - 1}, 0);
+  stir_all();
+  for (int l = 1; l < multigrid_.levels(); ++l) {
+    for_rows(l, boxes(l).parents,
+             [&](RowId row, OctetSpan span, int, int) { multigrid_.restrict_values(l, row, state, span); });
+    for_rows(l, boxes(l).parents, [&](RowId row, OctetSpan span, int, int) {
+      multigrid_.restrict_loads(l, row, state, obstacles, span);
+    });
+  }
+}
+
+void Relaxation::leave_to_another() {
+  apart_ = true;
+  multigrid_.forget_coarse();
+  multigrid_.keep_log();
+}
+
+void Relaxation::give_away(Displacement& state, const ObstacleView& obstacles) noexcept {
+  asleep_ = away_ = true;
+  multigrid_.begin_anew();
+  const Grid& g = lattice_.grid();
+  for (int c = near_.first[0]; c <= near_.last[0]; ++c) {
+    for (int k = near_.first[2]; k <= near_.last[2]; ++k) {
+      for (int j = near_.first[1]; j <= near_.last[1]; ++j) multigrid_.balance(g.row(c, j, k), state, obstacles);
+    }
+  }
 }
 
 void Relaxation::stir_all() noexcept {
@@ -116,6 +150,10 @@ void Relaxation::relax_contact(Displacement& state, const ObstacleView& obstacle
   multigrid_.set_held(held);
   const int wide = std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
   lay_boxes(low, high, wide);
+  const RowBox& b = boxes(0).smoothed;
+  const Grid& g = lattice_.grid();
+  near_.first = {b.q0 / kOctets + 1, std::max(b.j0 - kNear, 0), std::max(b.k0 - kNear, 0)};
+  near_.last = {b.q1 / kOctets + 1, std::min(b.j1 + kNear, g.dims[1] - 1), std::min(b.k1 + kNear, g.dims[2] - 1)};
   cycle(state, obstacles, Look::all);
 }
 
@@ -325,7 +363,7 @@ void Relaxation::tell_box(int level, Displacement& state, const ObstacleView& ob
 }
 
 void Relaxation::cycle(Displacement& state, const ObstacleView& obstacles, Look look) noexcept {
-  const int last = multigrid_.levels() - 1;
+  const int last = std::min(multigrid_.levels(), apart_ ? kContactLevels : multigrid_.levels()) - 1;
   // What coarse levels know and finer ones do not is told first: a step between voxels that were told and
   // others that were not would look like a force to the cells above it.
   for (int l = last - 1; l >= 0; --l) tell_box(l, state, obstacles);
@@ -348,7 +386,8 @@ void Relaxation::cycle(Displacement& state, const ObstacleView& obstacles, Look 
              {row, row - 1, row + 1, row - g.row_z, row + g.row_z, row - g.row_x, row + g.row_x})
           multigrid_.mark(l + 1, r, Multigrid::renewed);
       }
-      multigrid_.restrict_values(l + 1, row, state, span);
+      // Apart, coarse cells hold only what was moved since all was balanced, and know that from themselves.
+      if (!apart_) multigrid_.restrict_values(l + 1, row, state, span);
     });
     for_rows(l + 1, parents, [&](RowId row, OctetSpan span, int, int) {
       if (look == Look::active) {

@@ -12,6 +12,7 @@
 // stirred, as many voxel updates as the budget says: counted work, never measured time.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <span>
@@ -54,21 +55,34 @@ class Relaxation {
     cycles_without_gain_ = 0;
   }
   [[nodiscard]] bool asleep() const { return asleep_ && !away_; }
-  // Another relaxes it (replica.h): nothing to do here until somebody moves something …
-  void give_away() noexcept { asleep_ = away_ = true; }
+  // From now on another relaxes it (replica.h), and what is left to do here is to follow the tool with what is
+  // near the contact. Allocates.
+  void leave_to_another();
+  [[nodiscard]] bool left_to_another() const { return apart_; }
+  // … and is at it now.
+  [[nodiscard]] bool away() const { return away_; }
+  // It was given to that: nothing to do here until somebody moves something. What pulls near the contact is the
+  // other's business now, and counts as balanced here.
+  void give_away(Displacement& state, const ObstacleView& obstacles) noexcept;
   [[nodiscard]] bool idle() const { return asleep_; }
-  // … and how far that is.
-  struct Progress {
-    double residual_N = 0.0;
-    float hold = 1.0F;
-  };
-  [[nodiscard]] Progress progress() const { return {residual_N_, hold_}; }
-  void take_over(const Progress& other) noexcept {
+  // What it found is taken from here on; with that residual (N).
+  void take_over(double residual_N) noexcept {
     away_ = false;
-    residual_N_ = other.residual_N;
-    multigrid_.set_hold(other.hold);
+    residual_N_ = residual_N;
+    multigrid_.begin_anew();
     multigrid_.release_limited();
   }
+  // Rows of voxels that the last cycle round a contact read, as rows and columns: [first, last] of columns, j, k.
+  struct NearRows {
+    std::array<int, 3> first{0, 0, 0}, last{-1, -1, -1};
+    // How many rows away one is; 0: it is one of them.
+    [[nodiscard]] int distance(const std::array<int, 3>& row) const {
+      int most = 0;
+      for (std::size_t d = 0; d < 3; ++d) most = std::max({most, first[d] - row[d], row[d] - last[d]});
+      return most;
+    }
+  };
+  [[nodiscard]] const NearRows& near_contact() const { return near_; }
   // Largest force that any free voxel still feels, as the last cycle over all that moves found it (unit:
   // newton); below the tolerance it is only known to be that.
   [[nodiscard]] double residual_N() const { return residual_N_; }
@@ -79,8 +93,10 @@ class Relaxation {
   // Cycles over all that moves.
   [[nodiscard]] std::uint64_t cycles() const { return cycles_; }
   void prepare_all() noexcept { multigrid_.prepare_all(); }
-  // Starts in the same state as `other`, of the same lattice.
+  // Starts in the same state as `other`, of the same lattice …
   void copy_from(const Relaxation& other) noexcept;
+  // … which was left to another, so that its coarse cells know next to nothing: they are found anew.
+  void renew_coarse(Displacement& state, const ObstacleView& obstacles) noexcept;
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
@@ -123,6 +139,8 @@ class Relaxation {
   std::size_t cursor_ = 0, looked_at_ = 0;  // tiles looked at for what coarse levels have to tell them
   RowId keep_row_ = 0;                      // where keeping goes on
   bool asleep_ = true, away_ = false;
+  bool apart_ = false;  // another relaxes it
+  NearRows near_;
   bool contact_relaxed_ = false;  // since run() last was
   bool unkept_ = false;           // some link is beyond what it keeps
   bool keeping_ = false;          // it is kept now

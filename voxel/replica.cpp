@@ -11,38 +11,24 @@ std::size_t at(RowId row) {
   return static_cast<std::size_t>(row) * kRow;
 }
 
+constexpr std::size_t kMostAtOnce = 1000;  // rows that a tick adds at once; a wider contact sees steps go by
+
 }  // namespace
-
-Replica::Parcel::Parcel(Multigrid& multigrid) {
-  std::size_t rows = 0, floats = 0;
-  for (int l = 0; l < multigrid.levels(); ++l) {
-    rows += multigrid.grid(l).rows();
-    floats += multigrid.grid(l).rows() * fields(l) * kRow;
-  }
-  entries_ = LazyArray<Entry>(rows);
-  values_ = LazyArray<float>(floats);
-}
-
-float* Replica::Parcel::add(int level, RowId row) noexcept {
-  entries_[count_++] = {filled_, row, static_cast<std::uint32_t>(level)};
-  float* values = values_.data() + filled_;
-  filled_ += fields(level) * kRow;
-  return values;
-}
 
 Replica::Replica(SoftObject& object)
     : lattice_(object.lattice()),
       state_(object.state_),
       relaxation_(lattice_),
       obstacles_(object.obstacles_),
-      before_(static_cast<std::size_t>(multigrid().levels())),
-      given_(multigrid()),
-      found_(multigrid()) {
-  object.relaxation_.multigrid().keep_log();
+      distance_(lattice_.grid().rows()),
+      by_distance_(lattice_.grid().rows()),
+      given_(lattice_.grid().rows()),
+      is_given_(lattice_.grid().rows()),
+      found_{Parcel(lattice_.grid().rows()), Parcel(lattice_.grid().rows())} {
   multigrid().keep_log();
   relaxation_.copy_from(object.relaxation_);
+  object.relaxation_.leave_to_another();
   least_m_ = multigrid().quiet_m();
-  least_N_ = multigrid().tolerance_N();
   const std::size_t most_held = lattice_.surface().size() + SoftObject::kMaxTouched;
   held_.reserve(most_held);
   given_held_.reserve(most_held);
@@ -50,32 +36,27 @@ Replica::Replica(SoftObject& object)
   given_obstacles_.reserve(lattice_.surface().size());
   object.changed_obstacles_.reserve(lattice_.surface().size());
   object.obstacle_changed_.assign(object.obstacles_.size(), 0);
-  for (int l = 0; l < multigrid().levels(); ++l) {
-    for (std::size_t which = 0; which < fields(l); ++which)
-      before(l, which) = field(state_, multigrid(), l, which);
-  }
+  for (std::size_t axis = 0; axis < 3; ++axis) before_[axis] = state_.u[axis];
   if (lattice_.voxel_count() >= SoftObject::kPreparedWhole) return;
   relaxation_.prepare_all();
+  object.relaxation_.prepare_all();
   for (auto& axis : state_.u) axis.populate();
   state_.role.populate();
-  for (auto& level : before_) {
-    for (auto& field : level) field.populate();
-  }
+  for (auto& axis : before_) axis.populate();
   given_.populate();
-  found_.populate();
+  for (Parcel& parcel : found_) parcel.populate();
 }
 
 void Replica::give(SoftObject& object) noexcept {
-  Multigrid& from = object.relaxation_.multigrid();
+  ChangeLog& log = object.relaxation_.multigrid().log();
+  for (std::size_t n = 0; n < given_.count(); ++n) is_given_[given_.row(n)] = 0;
   given_.clear();
-  for (int l = 0; l < from.levels(); ++l) {
-    for (const RowId row : from.log().rows(l)) {
-      float* to = given_.add(l, row);
-      for (std::size_t which = 0; which < fields(l); ++which, to += kRow)
-        std::copy_n(field(object.state_, from, l, which).data() + at(row), kRow, to);
-    }
+  for (const RowId row : log.rows(0)) {
+    float* to = given_.add(row);
+    is_given_[row] = 1;
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      std::copy_n(object.state_.u[axis].data() + at(row), kRow, to + axis * kRow);
   }
-  from.log().clear();
   given_roles_.clear();
   given_obstacles_.clear();
   for (const std::uint32_t s : object.changed_obstacles_) {
@@ -89,21 +70,20 @@ void Replica::give(SoftObject& object) noexcept {
   object.list_held();
   given_held_.clear();
   for (const VoxelId v : object.all_held_) given_held_.push_back(v);
-  object.relaxation_.give_away();
+  near_ = given_held_.empty() ? Relaxation::NearRows{} : object.relaxation_.near_contact();
+  object.give_away();
+  log.clear();
 }
 
 void Replica::open_given() noexcept {
   Multigrid& to = multigrid();
   for (std::size_t n = 0; n < given_.count(); ++n) {
-    const Parcel::Entry& entry = given_.entry(n);
-    const int level = static_cast<int>(entry.level);
-    const float* from = given_.values(entry);
-    for (std::size_t which = 0; which < fields(level); ++which, from += kRow) {
-      std::copy_n(from, kRow, field(state_, to, level, which).data() + at(entry.row));
-      std::copy_n(from, kRow, before(level, which).data() + at(entry.row));
+    const RowId row = given_.row(n);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      std::copy_n(given_.values(n) + axis * kRow, kRow, state_.u[axis].data() + at(row));
+      std::copy_n(given_.values(n) + axis * kRow, kRow, before_[axis].data() + at(row));
     }
-    to.stir(level, entry.row);
-    if (level > 0) to.mark(level, entry.row, Multigrid::changed);
+    to.stir(0, row);
   }
   for (const GivenObstacle& given : given_obstacles_) {
     obstacles_[given.surface_number] = given.obstacle;
@@ -126,100 +106,97 @@ void Replica::relax() noexcept {
   pack_changes();
 }
 
-// From the coarsest level down: before cells are what they are to be, what they told would be told twice.
+// Counted and laid out (there are few distances): the order within one distance is that of the log.
+void Replica::sort_by_distance() noexcept {
+  const auto rows = multigrid().log().rows(0);
+  begin_.fill(0);
+  for (std::size_t n = 0; n < rows.size(); ++n) {
+    const int away = near_.distance(lattice_.grid().row_coordinates(rows[n]));
+    distance_[n] = static_cast<std::uint8_t>(std::min(away, kDistances - 1));
+    ++begin_[distance_[n] + 1U];
+  }
+  for (std::size_t d = 1; d < begin_.size(); ++d) begin_[d] += begin_[d - 1];
+  for (std::size_t n = 0; n < rows.size(); ++n) by_distance_[begin_[distance_[n]]++] = rows[n];
+}
+
 void Replica::pack_changes() noexcept {
-  found_.clear();
-  taken_ = 0;
+  Parcel& parcel = found_[1 - taking_];
+  parcel.clear();
   at_rest_ = relaxation_.asleep();
-  progress_ = relaxation_.progress();
-  for (int l = multigrid().levels() - 1; l >= 0; --l) {
-    for (const RowId row : multigrid().log().rows(l)) {
-      if (!pack_row(l, row)) found_.drop_last();
-    }
+  residual_N_ = relaxation_.residual_N();
+  sort_by_distance();
+  near_count_ = 0;
+  const std::size_t count = multigrid().log().rows(0).size();
+  // What is near was laid out first, so it ends where the next distance began.
+  const std::size_t near = near_.first[0] > near_.last[0] ? 0 : std::min<std::size_t>(begin_[0], kMostAtOnce);
+  for (std::size_t n = 0; n < count; ++n) {
+    if (!pack_row(by_distance_[n])) parcel.drop_last();
+    if (n < near) near_count_ = parcel.count();
   }
 }
 
 // False where next to nothing changed, less than a row is left alone with: that waits until it is more.
-bool Replica::pack_row(int level, RowId row) noexcept {
-  float* way = found_.add(level, row);
-  bool any = false;
-  for (std::size_t which = 0; which < fields(level); ++which) {
-    const float* now = field(state_, multigrid(), level, which).data() + at(row);
-    const float* was = before(level, which).data() + at(row);
-    const float least = which < 6 ? least_m_ : least_N_;
-    float most = 0.0F;
+bool Replica::pack_row(RowId row) noexcept {
+  float* way = found_[1 - taking_].add(row);
+  float most = 0.0F;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const float* now = state_.u[axis].data() + at(row);
+    const float* was = before_[axis].data() + at(row);
     for (std::size_t i = 0; i < kRow; ++i) {
-      way[which * kRow + i] = now[i] - was[i];
-      most = std::max(most, std::fabs(way[which * kRow + i]));
+      way[axis * kRow + i] = now[i] - was[i];
+      most = std::max(most, std::fabs(way[axis * kRow + i]));
     }
-    any = any || most > least;
   }
-  if (!any) return false;
+  if (most <= least_m_) return false;
   // The same sum as the tick's, to the last bit.
-  for (std::size_t which = 0; which < fields(level); ++which) {
-    float* now = field(state_, multigrid(), level, which).data() + at(row);
-    float* was = before(level, which).data() + at(row);
-    for (std::size_t i = 0; i < kRow; ++i) was[i] += way[which * kRow + i];
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    float* now = state_.u[axis].data() + at(row);
+    float* was = before_[axis].data() + at(row);
+    for (std::size_t i = 0; i < kRow; ++i) was[i] += way[axis * kRow + i];
     std::copy_n(was, kRow, now);
   }
   return true;
 }
 
-void Replica::take_cells(Multigrid& to, const Parcel::Entry& entry) noexcept {
-  const int level = static_cast<int>(entry.level);
-  const float* way = found_.values(entry);
-  for (std::size_t which = 0; which < Multigrid::kFields; ++which, way += kRow) {
-    float* there = to.field(level, which).data() + at(entry.row);
-    for (std::size_t i = 0; i < kRow; ++i) there[i] += way[i];
-  }
-  to.mark(level, entry.row, Multigrid::changed);
-}
-
-void Replica::take_voxels(SoftObject& object, const Parcel::Entry& entry) noexcept {
+void Replica::take_row(SoftObject& object, std::size_t n) noexcept {
   Multigrid& to = object.relaxation_.multigrid();
-  const float* way = found_.values(entry);
+  const RowId row = found_[taking_].row(n);
+  const float* way = found_[taking_].values(n);
   RowVector ways, wanted;
   for (std::size_t axis = 0; axis < 3; ++axis, way += kRow) {
-    const float* there = object.state_.u[axis].data() + at(entry.row);
+    const float* there = object.state_.u[axis].data() + at(row);
     for (std::size_t i = 0; i < kRow; ++i) {
       ways[axis][i] = way[i];
       wanted[axis][i] = there[i] + way[i];
     }
   }
-  to.add(entry.row, ways, object.state_, object.obstacle_view());
-  if (to.log().has(0, entry.row)) return;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    if (!std::equal(wanted[axis].begin(), wanted[axis].end(), object.state_.u[axis].data() + at(entry.row))) {
-      to.log().note(0, entry.row);
-      return;
-    }
-  }
+  to.add(row, ways, object.state_, object.obstacle_view());
+  bool as_found = is_given_[row] == 0;  // it was given before this came, so without it
+  for (std::size_t axis = 0; axis < 3 && as_found; ++axis)
+    as_found = std::equal(wanted[axis].begin(), wanted[axis].end(), object.state_.u[axis].data() + at(row));
+  if (!as_found) to.log().note(0, row);
 }
 
-bool Replica::take(SoftObject& object, std::size_t rows) noexcept {
-  Multigrid& to = object.relaxation_.multigrid();
-  for (; rows > 0 && taken_ < found_.count(); --rows, ++taken_) {
-    const Parcel::Entry& entry = found_.entry(taken_);
-    if (entry.level > 0) {
-      take_cells(to, entry);
-    } else {
-      take_voxels(object, entry);
-    }
-  }
-  if (taken_ < found_.count()) return false;
-  object.relaxation_.take_over(progress_);
-  if (!at_rest_ || found_.count() > 0) object.relaxation_.wake();
-  return true;
+void Replica::take(SoftObject& object) noexcept {
+  taking_ = 1 - taking_;
+  for (std::size_t n = 0; n < given_.count(); ++n) is_given_[given_.row(n)] = 0;
+  object.relaxation_.take_over(residual_N_);
+  for (drained_ = 0; drained_ < near_count_; ++drained_) take_row(object, drained_);
+  if (!at_rest_ || !drained()) object.relaxation_.wake();
+}
+
+void Replica::drain(SoftObject& object, std::size_t rows) noexcept {
+  for (; rows > 0 && !drained(); --rows, ++drained_) take_row(object, drained_);
 }
 
 std::size_t Replica::memory_bytes() const {
   std::size_t bytes = relaxation_.memory_bytes() + obstacles_.size() * sizeof(Obstacle) +
                       state_.role.resident_bytes() + state_.row_held.resident_bytes() +
-                      state_.row_obstacles.resident_bytes() + given_.memory_bytes() + found_.memory_bytes();
-  for (const auto& axis : state_.u) bytes += axis.resident_bytes();
-  for (const auto& level : before_) {
-    for (const auto& field : level) bytes += field.resident_bytes();
-  }
+                      state_.row_obstacles.resident_bytes() + given_.memory_bytes() + is_given_.resident_bytes() +
+                      distance_.resident_bytes() + by_distance_.resident_bytes();
+  for (const Parcel& parcel : found_) bytes += parcel.memory_bytes();
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    bytes += state_.u[axis].resident_bytes() + before_[axis].resident_bytes();
   return bytes;
 }
 

@@ -6,17 +6,21 @@
 //   give()   the tick says what changed in the object since the last time;
 //   relax()  the other thread goes one whole cycle nearer to equilibrium, the pressed voxels held where they
 //            were given, and says what that changed;
-//   take()   later, the tick adds that to the object, some rows at a time.
-// Everything in it is linear where no limit is active: displacements, what coarse cells hold, what they have
-// told. So what is taken is added, row by row, to what the tick did meanwhile round the contact: with X and Y
-// the shares of the error that the one and the other leave (0 <= X, Y <= 1 in the energy's metric, and
-// symmetric), what is left is X + Y - 1, between -1 and 1, and the sum never has more energy than what was
-// given. Rows that the tick left alone become the replica's to the last bit. (Putting the replica's rows in
-// place of the tick's was rejected: at the seam between the two there is a step. So was giving the thread
-// tiles of the object itself: coarse cells are everybody's.)
+//   take()   later, the tick adds that to the object: near the contact at once, or the contact would see a
+//            step go by; then, with drain(), the rest, some rows at a time, while the next is relaxed.
+// Displacements are linear where no limit is active, so what is found is added to what the tick did meanwhile.
+// For that each error has to be the business of one of the two. What was given is the other thread's: round the
+// contact it counts as balanced from then on (Relaxation::give_away), and the tick brings to rest only what it
+// moves itself. With X of that left by the tick, and Y of the other by a cycle, what is left is the sum of the
+// two, and never more. (Rejected: both at work on all of it, which leaves X + Y - 1. As long as a tool stood
+// still that was never more energy than was given; but it is -1 for all that both do well, and a tool held in a
+// brain felt 0 to 0.9 N where 0.14 is right. The replica's rows in place of the tick's: there is a step at the
+// seam. Tiles of the object itself for the thread: coarse cells are everybody's.)
 //
-// Limits hold throughout: what a row cannot follow, by the links to its neighbours as they now are, is
-// refused and taken back from the cells above it.
+// Coarse cells are not exchanged: each of the two has its own.
+//
+// Limits hold throughout: what a row cannot follow, by the links to its neighbours as they now are, is left
+// out, and what became of it is given the next time.
 //
 // Not for tissue that yields, whose rest lengths change too.
 #pragma once
@@ -44,8 +48,11 @@ class Replica {
 
   // ---- the tick; none of these allocates, locks or throws ----
   void give(SoftObject& object) noexcept;
-  // Adds the next `rows` rows of what relax() changed; true when that was all of it.
-  bool take(SoftObject& object, std::size_t rows) noexcept;
+  // Once relax() is done and what it found before that is drained: adds what it found near the contact.
+  void take(SoftObject& object) noexcept;
+  // Adds the next `rows` rows of the rest.
+  void drain(SoftObject& object, std::size_t rows) noexcept;
+  [[nodiscard]] bool drained() const { return drained_ == found_[taking_].count(); }
 
   // ---- between the two, the other thread ----
   void relax() noexcept;
@@ -60,36 +67,33 @@ class Replica {
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
-  // Rows on their way from one thread to the other, one after the other in memory: to fetch what another core
-  // wrote costs more than all that is done with it, and least where it stands in a row.
+  // Rows of voxels on their way from one thread to the other, one after the other in memory: to fetch what
+  // another core wrote costs more than all that is done with it, and least where it stands in a row.
   class Parcel {
    public:
-    explicit Parcel(Multigrid& multigrid);
-    void clear() noexcept { count_ = filled_ = 0; }
-    // Room for another row: [field][lane] of a coarse one, [axis][lane] of voxels.
-    [[nodiscard]] float* add(int level, RowId row) noexcept;
-    void drop_last() noexcept { filled_ = entries_[--count_].begin; }
-
-    struct Entry {
-      std::uint64_t begin;
-      RowId row;
-      std::uint32_t level;
-    };
+    static constexpr std::size_t kFloats = 3 * kRow;  // [axis][lane]
+    explicit Parcel(std::size_t rows) : rows_(rows), values_(rows * kFloats) {}
+    void clear() noexcept { count_ = 0; }
+    [[nodiscard]] float* add(RowId row) noexcept {
+      rows_[count_] = row;
+      return values_.data() + kFloats * count_++;
+    }
+    void drop_last() noexcept { --count_; }
     [[nodiscard]] std::size_t count() const { return count_; }
-    [[nodiscard]] const Entry& entry(std::size_t n) const { return entries_[n]; }
-    [[nodiscard]] const float* values(const Entry& entry) const { return values_.data() + entry.begin; }
+    [[nodiscard]] RowId row(std::size_t n) const { return rows_[n]; }
+    [[nodiscard]] const float* values(std::size_t n) const { return values_.data() + kFloats * n; }
     void populate() noexcept {
-      entries_.populate();
+      rows_.populate();
       values_.populate();
     }
     [[nodiscard]] std::size_t memory_bytes() const {
-      return entries_.resident_bytes() + values_.resident_bytes();
+      return rows_.resident_bytes() + values_.resident_bytes();
     }
 
    private:
-    LazyArray<Entry> entries_;
+    LazyArray<RowId> rows_;
     LazyArray<float> values_;
-    std::size_t count_ = 0, filled_ = 0;
+    std::size_t count_ = 0;
   };
   struct GivenRole {
     VoxelId v;
@@ -101,39 +105,37 @@ class Replica {
   };
 
   [[nodiscard]] Multigrid& multigrid() { return relaxation_.multigrid(); }
-  [[nodiscard]] static std::size_t fields(int level) { return level == 0 ? 3 : Multigrid::kFields; }
-  // Where a field of the rows of a level is, in `state` and its multigrid.
-  [[nodiscard]] static LazyArray<float>& field(Displacement& state, Multigrid& multigrid, int level,
-                                               std::size_t which) {
-    return level == 0 ? state.u[which] : multigrid.field(level, which);
-  }
-  [[nodiscard]] LazyArray<float>& before(int level, std::size_t which) {
-    return before_[static_cast<std::size_t>(level)][which];
-  }
   void open_given() noexcept;
+  void sort_by_distance() noexcept;
   void pack_changes() noexcept;
-  bool pack_row(int level, RowId row) noexcept;
-  void take_cells(Multigrid& to, const Parcel::Entry& entry) noexcept;
-  void take_voxels(SoftObject& object, const Parcel::Entry& entry) noexcept;
+  bool pack_row(RowId row) noexcept;
+  void take_row(SoftObject& object, std::size_t n) noexcept;
 
   const Lattice& lattice_;
   Displacement state_;
   Relaxation relaxation_;
   std::vector<Obstacle> obstacles_;
   std::vector<VoxelId> held_;
-  // [level][field][row, lane] what is here as the other state knows it.
-  std::vector<std::array<LazyArray<float>, Multigrid::kFields>> before_;
+  std::array<LazyArray<float>, 3> before_;  // [axis][voxel] what is here as the other state knows it
   std::size_t work_ = 0;
-  float least_m_ = 0.0F, least_N_ = 0.0F;  // smaller changes are not passed on
+  float least_m_ = 0.0F;  // smaller changes are not passed on
+  static constexpr int kDistances = 64;
+  std::array<std::uint32_t, kDistances + 1> begin_{};  // [distance] of by_distance_
+  LazyArray<std::uint8_t> distance_;                   // [n] of the rows in the log
+  LazyArray<RowId> by_distance_;                       // these, nearest to the contact first
 
   // ---- what goes over ----
-  Parcel given_, found_;
+  Parcel given_;
+  LazyArray<std::uint8_t> is_given_;  // [row] 1: it is in there
+  std::array<Parcel, 2> found_;       // what is drained, and what is found meanwhile
   std::vector<GivenRole> given_roles_;
   std::vector<GivenObstacle> given_obstacles_;
   std::vector<VoxelId> given_held_;
-  std::size_t taken_ = 0;
+  Relaxation::NearRows near_;            // the contact
+  std::size_t taking_ = 0, drained_ = 0;  // which of found_, and how many of its rows
+  std::size_t near_count_ = 0;            // of the other one's: they are near the contact
   bool at_rest_ = true;
-  Relaxation::Progress progress_;
+  double residual_N_ = 0.0;
 };
 
 }  // namespace voxel

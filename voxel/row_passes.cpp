@@ -142,12 +142,6 @@ HYBRID_INLINE unsigned smooth_freely(const LevelRow& row, const RowLimits* limit
 #pragma GCC unroll 1
     for (int octet = span.first; octet <= span.last; ++octet) {
       const auto n = static_cast<std::size_t>(octet - span.first);
-      Octet hold{};
-      if (row.hold != nullptr) {
-        load(hold, row.hold + octet * kOctet);
-        hold *= row.hold_times;
-        hold = hold / (1.0F + hold);
-      }
 #pragma GCC unroll 3
       for (std::size_t axis = 0; axis < 3; ++axis) {
         const Octet now = u[axis][n + 1];
@@ -158,10 +152,12 @@ HYBRID_INLINE unsigned smooth_freely(const LevelRow& row, const RowLimits* limit
         spring_up<kUniform>(kxu, s, axis, 0, octet);
         inverse_of<kUniform>(inverse, s, axis, octet);
         Octet wanted = (kxd * x_down + kxu * x_up + beside[axis][n]) * inverse;
-        if (row.hold != nullptr) {
-          Octet told;
+        if (row.hold[axis] != nullptr) {
+          Octet told, hold;
           load(told, row.told[axis] + octet * kOctet);
-          wanted += (told - wanted) * hold;
+          load(hold, row.hold[axis] + octet * kOctet);
+          hold *= row.hold_times;
+          wanted += (told - wanted) * (hold / (1.0F + hold));
         }
         select(u[axis][n + 1], own_colour & ~stays[axis][n], wanted, now);
       }
@@ -237,9 +233,9 @@ HYBRID_INLINE void residual_axis(RowResidual& result, const LevelRow& row, const
       load(force, row.load[axis] + octet * kOctet);
       r += force;
     }
-    if (row.hold != nullptr) {
+    if (row.hold[axis] != nullptr) {
       Octet hold, told;
-      load(hold, row.hold + octet * kOctet);
+      load(hold, row.hold[axis] + octet * kOctet);
       load(told, row.told[axis] + octet * kOctet);
       const Octet safe = inverse == 0.0F ? Octet{} + 1.0F : inverse;
       r += row.hold_times * hold / safe * (told - at.own);

@@ -23,8 +23,8 @@ struct LevelRow {
   RowCouplings springs;
   const std::uint8_t* held = nullptr;     // [lane] bit 0: does not move; null: all may
   const std::uint8_t* stopped = nullptr;  // [lane] bit `axis`: does not move on that axis; null: all may
-  // A spring to `told`, as many times as stiff as all links of the cell; null: none has one.
-  const float* hold = nullptr;
+  // [axis] A spring to `told`, as many times as stiff as all links of the cell; all null: none has one.
+  std::array<const float*, 3> hold{};
   std::array<const float*, 3> told{};
   float hold_times = 1.0F;
 };

@@ -53,6 +53,7 @@ SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice)
       carried_index_(lattice_->size()) {
   const auto surface = lattice_->surface();
   touches_.reserve(kMaxTouched);
+  touched_before_.reserve(kMaxTouched);
   touched_voxels_.reserve(kMaxTouched);
   sources_.reserve(surface.size());
   moves_.reserve(surface.size());
@@ -77,6 +78,7 @@ std::unique_ptr<SoftObject> SoftObject::copy() const {
   for (const VoxelId v : touched_voxels_) result->touched_voxels_.push_back(v);
   result->moved_ever_ = moved_ever_;
   result->relaxation_.copy_from(relaxation_);
+  if (relaxation_.left_to_another()) result->relaxation_.renew_coarse(result->state_, result->obstacle_view());
   return result;
 }
 
@@ -104,9 +106,12 @@ SoftObject::Gap SoftObject::gap(const ToolInBody& tool, const glm::dvec3& positi
 void SoftObject::touch(std::span<const VoxelId> near) noexcept {
   cycles_since_touch_ = 0;
   std::size_t pressed = 0;
+  touched_before_.clear();
   for (const Touch& t : touches_) {
     if (!t.pressed) continue;
     carried_mark_[t.v] = 1;
+    carried_index_[t.v] = static_cast<std::uint32_t>(touched_before_.size());
+    touched_before_.push_back(t);
     ++pressed;
   }
   for (const VoxelId v : touched_voxels_) state_.set_role(v, resting_role(v));
@@ -119,7 +124,8 @@ void SoftObject::touch(std::span<const VoxelId> near) noexcept {
     if (touches_.size() == kMaxTouched) break;
     const bool kept = carried_mark_[v] != 0;
     if (kept) --pressed;
-    touches_.push_back({v, kept, glm::dvec3(0.0), glm::dvec3(0.0)});
+    touches_.push_back({v, kept});
+    if (kept) touches_.back().left = touched_before_[carried_index_[v]].left;
   }
   for (const VoxelId v : touched_voxels_) carried_mark_[v] = 0;
   touched_voxels_.clear();
@@ -178,10 +184,9 @@ bool SoftObject::push_out(const ToolInBody& tool) noexcept {
   return any;
 }
 
-void SoftObject::relax_touch(const ToolInBody& tool, Touch& t) noexcept {
-  if (lattice_->anchored(t.v)) return;
-  const glm::dvec3 rest = lattice_->rest(t.v), before = state_.at(t.v);
-  const bool was_pressed = t.pressed;
+// Where a touched voxel belongs, everything else where it is; `pressed`: by the tool.
+glm::dvec3 SoftObject::place_of(const ToolInBody& tool, Touch& t) noexcept {
+  const glm::dvec3 rest = lattice_->rest(t.v);
   glm::dvec3 wanted = link_minimum(relaxation_.couplings(), state_, t.v);
   Gap g = gap(tool, rest + wanted);
   t.pressed = g.distance < 0.0;
@@ -205,7 +210,19 @@ void SoftObject::relax_touch(const ToolInBody& tool, Touch& t) noexcept {
     const double depth = static_cast<double>(o.bound) - glm::dot(n, wanted);
     if (depth > 0.0 && o.normal != glm::vec3(0.0F)) wanted += depth * n;
   }
-  state_.set(t.v, clamp_to_links(*lattice_, state_, t.v, wanted));
+  return clamp_to_links(*lattice_, state_, t.v, wanted);
+}
+
+void SoftObject::relax_touch(const ToolInBody& tool, Touch& t) noexcept {
+  if (lattice_->anchored(t.v)) return;
+  const glm::dvec3 before = state_.at(t.v);
+  const bool was_pressed = t.pressed;
+  // While another relaxes the object, a voxel that the tool does not press is his.
+  if (relaxation_.away() && !t.pressed && gap(tool, position(t.v)).distance >= 0.0) return;
+  glm::dvec3 place = place_of(tool, t);
+  if (relaxation_.away() && was_pressed && t.pressed)
+    place = clamp_to_links(*lattice_, state_, t.v, place - t.left);
+  state_.set(t.v, place);
   relaxation_.multigrid().log().note(0, t.v / kRow);
   if (t.pressed != was_pressed) unsettled_m_ += glm::distance(before, state_.at(t.v));
   // A tool that jumped away moves no pressed voxel by follow(): what it let go of wakes the rest.
@@ -216,6 +233,7 @@ void SoftObject::relax_touch(const ToolInBody& tool, Touch& t) noexcept {
 }
 
 void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
+  tool_ = tool;
   for (int n = 0; n < cycles; ++n) {
     for (Touch& t : touches_) relax_touch(tool, t);
     set_touch_roles();
@@ -286,7 +304,10 @@ void SoftObject::draw_along(int axis) noexcept {
           continue;
         const auto room = [&] { return link_state(*lattice_, u, v, w, d, up, axis).room(); };
         if (room() > kNearlyTight * spacing) continue;
-        const auto wanted = static_cast<float>(link_minimum(relaxation_.couplings(), state_, w)[axis]);
+        glm::dvec3 rest = link_minimum(relaxation_.couplings(), state_, w);
+        if (relaxation_.away())
+          rest += link_compliance(relaxation_.couplings(), w) * relaxation_.multigrid().balance_of(w);
+        const auto wanted = static_cast<float>(rest[axis]);
         const float before = u[w];
         u[w] = clamp_to(link_interval(*lattice_, state_, w, axis), wanted, before);
         if (std::fabs(u[w] - before) > static_cast<float>(kStir) * spacing) relaxation_.stir(w / kRow);
@@ -499,6 +520,20 @@ std::uint64_t SoftObject::relax_background(std::uint64_t budget) noexcept {
   if (relaxation_.asleep()) return 0;
   list_held();
   return relaxation_.run(state_, obstacle_view(), all_held_, budget);
+}
+
+// What pressed voxels would do now they do not: they follow the tool, and once between two results they look
+// for their places. (Sliding while their neighbours were on their way elsewhere, ever so little more each time,
+// they never came to rest.)
+void SoftObject::give_away() noexcept {
+  relaxation_.give_away(state_, obstacle_view());
+  for (Touch& t : touches_) {
+    t.left = glm::dvec3(0.0);
+    if (!t.pressed || lattice_->anchored(t.v)) continue;
+    Touch here = t;
+    const glm::dvec3 place = place_of(tool_, here);
+    if (here.pressed) t.left = place - state_.at(t.v);
+  }
 }
 
 void SoftObject::relax_cycle() noexcept {

@@ -142,12 +142,13 @@ class SoftObject {
 
   struct Touch {
     VoxelId v;
-    bool pressed;            // carries load towards the tool
+    bool pressed = false;    // carries load towards the tool
     glm::dvec3 normal{0.0};  // from tool to voxel, unit
     glm::dvec3 load{0.0};    // of its links, and of what hangs on it by tight links (unit: newton)
     double noted = 0.0;      // how deep it was in the tool as the tick began (m)
     bool beside = false;     // it was beside a punch then
     bool tight = false;      // some tight link hands part of its load to or from another voxel
+    glm::dvec3 left{0.0};    // the way it had still to go when the object was given away (m)
   };
   struct Gap {
     double distance;  // of the voxel from the tool's surface along normal; negative: overlap
@@ -162,7 +163,9 @@ class SoftObject {
   void settle_chain() noexcept;
   [[nodiscard]] Displacement::Role resting_role(VoxelId v) const noexcept;  // when no tool presses it
   void set_touch_roles() noexcept;
+  void give_away() noexcept;  // what pulls near the contact is somebody else's
   void list_held() noexcept;
+  [[nodiscard]] glm::dvec3 place_of(const ToolInBody& tool, Touch& touch) noexcept;
   void relax_touch(const ToolInBody& tool, Touch& touch) noexcept;
   void add_stiffness(int axis, glm::dmat3& stiffness) noexcept;
   [[nodiscard]] glm::dvec3 load_on(VoxelId v) noexcept;
@@ -181,6 +184,8 @@ class SoftObject {
   std::vector<std::uint32_t> changed_obstacles_;  // surface numbers, since a replica was last told
   std::vector<std::uint8_t> obstacle_changed_;    // [surface number] 1: among them; empty: no replica
   std::vector<Touch> touches_;
+  std::vector<Touch> touched_before_;  // those pressed then
+  ToolInBody tool_;                    // as relax_near() last saw it
   std::vector<VoxelId> touched_voxels_;
   std::vector<VoxelId> held_voxels_;  // by pairs
   std::vector<VoxelId> all_held_;     // by the tool, too
