@@ -35,8 +35,8 @@ constexpr std::size_t kRowsTaken = 250;  // a tick: what a result is added to, a
 // in real time does.
 constexpr std::uint64_t kRowsRelaxed = 400;
 // Ticks between a result and what is given next, in which the contact looks at all that pulls. (With one of
-// them a block that a ball was pushed into beside another was 1.8 just noticeable differences off at most, with
-// three 1.3, with eight 1.2.)
+// them a block that a ball was pushed into beside another was 1.8 just noticeable differences off at most,
+// with three 1.3, with eight 1.2.)
 constexpr std::uint64_t kOwnTicks = 3;
 
 double own_time_s() noexcept {

@@ -143,7 +143,7 @@ class Multigrid {
   [[nodiscard]] glm::dvec3 balance_of(VoxelId v) const noexcept {
     return row_balanced_.size() == 0 || row_balanced_[v / kRow] == 0
                ? glm::dvec3(0.0)
-                                        : glm::dvec3(balance_[0][v], balance_[1][v], balance_[2][v]);
+               : glm::dvec3(balance_[0][v], balance_[1][v], balance_[2][v]);
   }
   // Adds to a row of voxels what somebody else found, as far as its links allow.
   void add(RowId row, const RowVector& way, Displacement& state, const ObstacleView& obstacles) noexcept;
@@ -157,9 +157,9 @@ class Multigrid {
     // [axis][cell]; those of level 0 are elsewhere. `told` is the value that what the cell holds knows of, so
     // value − told is what it has yet to hear.
     std::array<LazyArray<float>, 3> value, told, load;
-    LazyArray<std::uint8_t> stopped;   // [cell or voxel] bits 0 to 2: held by a limit on that axis
-    // [axis][cell] voxels in it that are held, in parts of kHeld, and how hard they hold it, in units of all its
-    // springs.
+    LazyArray<std::uint8_t> stopped;  // [cell or voxel] bits 0 to 2: held by a limit on that axis
+    // [axis][cell] voxels in it that are held, in parts of kHeld, and how hard they hold it, in units of all
+    // its springs.
     std::array<LazyArray<std::uint32_t>, 3> held;
     std::array<LazyArray<float>, 3> hold;
     LazyArray<std::uint16_t> row_held;  // [row] how many of these are not 0
@@ -207,8 +207,8 @@ class Multigrid {
   std::vector<Level> levels_;
   Hats hats_;
   std::vector<VoxelId> held_;
-  LazyArray<HeldParts> supported_;            // [voxel] by its obstacle
-  LazyArray<std::uint8_t> row_supported_;     // [row] 1: a voxel of it was
+  LazyArray<HeldParts> supported_;         // [voxel] by its obstacle
+  LazyArray<std::uint8_t> row_supported_;  // [row] 1: a voxel of it was
   std::vector<StoppedCell> stopped_;
   std::array<LazyArray<float>, 3> balance_;  // [axis][voxel] load that balances it (N), in rows that have one
   LazyArray<std::uint8_t> row_balanced_;     // [row] 1: it has

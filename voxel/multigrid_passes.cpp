@@ -37,7 +37,8 @@ LevelRow Multigrid::row_of(int level, RowId row, Displacement& state) noexcept {
     r.load[axis] = l.load[axis].data() + begin;
     r.told[axis] = l.told[axis].data() + begin;
   }
-  for (std::size_t axis = 0; axis < 3 && l.row_held[row] != 0; ++axis) r.hold[axis] = l.hold[axis].data() + begin;
+  for (std::size_t axis = 0; axis < 3 && l.row_held[row] != 0; ++axis)
+    r.hold[axis] = l.hold[axis].data() + begin;
   r.hold_times = hold_;
   if (has(level, row, limited)) r.stopped = l.stopped.data() + begin;
   return r;
@@ -107,7 +108,8 @@ std::uint32_t Multigrid::move_outside(LevelRow r, RowId row, Displacement& state
     r.stopped = stays.data();
   }
   for (VoxelId lane = 0; lane < kRow; ++lane) {
-    if ((blocked_lanes >> lane & 1U) != 0) relax_obstacle(couplings(), state, obstacles, first + lane, balance_of(first + lane));
+    if ((blocked_lanes >> lane & 1U) != 0)
+      relax_obstacle(couplings(), state, obstacles, first + lane, balance_of(first + lane));
   }
   return blocked_lanes;
 }

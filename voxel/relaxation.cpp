@@ -15,12 +15,12 @@ constexpr float kHarder = 8.0F, kSofter = 0.97F, kHardest = 1e4F;
 constexpr double kGain = 0.98;      // of the least residual so far: less is a gain
 constexpr double kNearRest = 10.0;  // times the tolerance: what limits hold moves together from here on
 constexpr double kProgress = 1e-3;  // of the spacing: clusters that move further are on their way
-constexpr std::uint64_t kNextFirst = 7919;   // of these voxels is looked at first in the next round
-// Levels of a cycle round a contact where another relaxes the object: what is further away is his. (With all of
-// them both moved the coarsest cells, and a brain held for a minute wavered by a tenth of its force.)
+constexpr std::uint64_t kNextFirst = 7919;  // of these voxels is looked at first in the next round
+// Levels of a cycle round a contact where another relaxes the object: what is further away is his. (With all
+// of them both moved the coarsest cells, and a brain held for a minute wavered by a tenth of its force.)
 constexpr int kContactLevels = 5;
-constexpr int kNear = 2;  // rows that a cycle round a contact reads beyond those it brings to rest
-constexpr int kContactMargin = 3;            // cells round the contact that are smoothed, on each level
+constexpr int kNear = 2;           // rows that a cycle round a contact reads beyond those it brings to rest
+constexpr int kContactMargin = 3;  // cells round the contact that are smoothed, on each level
 constexpr std::uint64_t kBesideContact = 2;  // this part of the budget is left beside cycles round a contact
 constexpr int kTileMargin = 3;               // … round a tile, from level 1 on
 constexpr int kLooksAtOnce = 256;  // tiles looked at for what coarse levels have to tell them, a call
@@ -73,7 +73,8 @@ void Relaxation::give_away(Displacement& state, const ObstacleView& obstacles) n
   const Grid& g = lattice_.grid();
   for (int c = near_.first[0]; c <= near_.last[0]; ++c) {
     for (int k = near_.first[2]; k <= near_.last[2]; ++k) {
-      for (int j = near_.first[1]; j <= near_.last[1]; ++j) multigrid_.balance(g.row(c, j, k), state, obstacles);
+      for (int j = near_.first[1]; j <= near_.last[1]; ++j)
+        multigrid_.balance(g.row(c, j, k), state, obstacles);
     }
   }
 }
@@ -153,7 +154,8 @@ void Relaxation::relax_contact(Displacement& state, const ObstacleView& obstacle
   const RowBox& b = boxes(0).smoothed;
   const Grid& g = lattice_.grid();
   near_.first = {b.q0 / kOctets + 1, std::max(b.j0 - kNear, 0), std::max(b.k0 - kNear, 0)};
-  near_.last = {b.q1 / kOctets + 1, std::min(b.j1 + kNear, g.dims[1] - 1), std::min(b.k1 + kNear, g.dims[2] - 1)};
+  near_.last = {b.q1 / kOctets + 1, std::min(b.j1 + kNear, g.dims[1] - 1),
+                std::min(b.k1 + kNear, g.dims[2] - 1)};
   cycle(state, obstacles, Look::all);
 }
 

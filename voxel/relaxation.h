@@ -55,14 +55,14 @@ class Relaxation {
     cycles_without_gain_ = 0;
   }
   [[nodiscard]] bool asleep() const { return asleep_ && !away_; }
-  // From now on another relaxes it (replica.h), and what is left to do here is to follow the tool with what is
-  // near the contact. Allocates.
+  // From now on another relaxes it (replica.h), and what is left to do here is to follow the tool with what
+  // is near the contact. Allocates.
   void leave_to_another();
   [[nodiscard]] bool left_to_another() const { return apart_; }
   // … and is at it now.
   [[nodiscard]] bool away() const { return away_; }
-  // It was given to that: nothing to do here until somebody moves something. What pulls near the contact is the
-  // other's business now, and counts as balanced here.
+  // It was given to that: nothing to do here until somebody moves something. What pulls near the contact is
+  // the other's business now, and counts as balanced here.
   void give_away(Displacement& state, const ObstacleView& obstacles) noexcept;
   [[nodiscard]] bool idle() const { return asleep_; }
   // What it found is taken from here on; with that residual (N).
@@ -72,7 +72,8 @@ class Relaxation {
     multigrid_.begin_anew();
     multigrid_.release_limited();
   }
-  // Rows of voxels that the last cycle round a contact read, as rows and columns: [first, last] of columns, j, k.
+  // Rows of voxels that the last cycle round a contact read, as rows and columns: [first, last] of columns,
+  // j, k.
   struct NearRows {
     std::array<int, 3> first{0, 0, 0}, last{-1, -1, -1};
     // How many rows away one is; 0: it is one of them.

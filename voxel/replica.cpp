@@ -192,8 +192,8 @@ void Replica::drain(SoftObject& object, std::size_t rows) noexcept {
 std::size_t Replica::memory_bytes() const {
   std::size_t bytes = relaxation_.memory_bytes() + obstacles_.size() * sizeof(Obstacle) +
                       state_.role.resident_bytes() + state_.row_held.resident_bytes() +
-                      state_.row_obstacles.resident_bytes() + given_.memory_bytes() + is_given_.resident_bytes() +
-                      distance_.resident_bytes() + by_distance_.resident_bytes();
+                      state_.row_obstacles.resident_bytes() + given_.memory_bytes() +
+                      is_given_.resident_bytes() + distance_.resident_bytes() + by_distance_.resident_bytes();
   for (const Parcel& parcel : found_) bytes += parcel.memory_bytes();
   for (std::size_t axis = 0; axis < 3; ++axis)
     bytes += state_.u[axis].resident_bytes() + before_[axis].resident_bytes();

@@ -8,14 +8,15 @@
 //            were given, and says what that changed;
 //   take()   later, the tick adds that to the object: near the contact at once, or the contact would see a
 //            step go by; then, with drain(), the rest, some rows at a time, while the next is relaxed.
-// Displacements are linear where no limit is active, so what is found is added to what the tick did meanwhile.
-// For that each error has to be the business of one of the two. What was given is the other thread's: round the
-// contact it counts as balanced from then on (Relaxation::give_away), and the tick brings to rest only what it
-// moves itself. With X of that left by the tick, and Y of the other by a cycle, what is left is the sum of the
-// two, and never more. (Rejected: both at work on all of it, which leaves X + Y - 1. As long as a tool stood
-// still that was never more energy than was given; but it is -1 for all that both do well, and a tool held in a
-// brain felt 0 to 0.9 N where 0.14 is right. The replica's rows in place of the tick's: there is a step at the
-// seam. Tiles of the object itself for the thread: coarse cells are everybody's.)
+// Displacements are linear where no limit is active, so what is found is added to what the tick did
+// meanwhile. For that each error has to be the business of one of the two. What was given is the other
+// thread's: round the contact it counts as balanced from then on (Relaxation::give_away), and the tick brings
+// to rest only what it moves itself. With X of that left by the tick, and Y of the other by a cycle, what is
+// left is the sum of the two, and never more. (Rejected: both at work on all of it, which leaves X + Y - 1.
+// As long as a tool stood still that was never more energy than was given; but it is -1 for all that both do
+// well, and a tool held in a brain felt 0 to 0.9 N where 0.14 is right. The replica's rows in place of the
+// tick's: there is a step at the seam. Tiles of the object itself for the thread: coarse cells are
+// everybody's.)
 //
 // Coarse cells are not exchanged: each of the two has its own.
 //
@@ -131,7 +132,7 @@ class Replica {
   std::vector<GivenRole> given_roles_;
   std::vector<GivenObstacle> given_obstacles_;
   std::vector<VoxelId> given_held_;
-  Relaxation::NearRows near_;            // the contact
+  Relaxation::NearRows near_;             // the contact
   std::size_t taking_ = 0, drained_ = 0;  // which of found_, and how many of its rows
   std::size_t near_count_ = 0;            // of the other one's: they are near the contact
   bool at_rest_ = true;

@@ -78,7 +78,8 @@ std::unique_ptr<SoftObject> SoftObject::copy() const {
   for (const VoxelId v : touched_voxels_) result->touched_voxels_.push_back(v);
   result->moved_ever_ = moved_ever_;
   result->relaxation_.copy_from(relaxation_);
-  if (relaxation_.left_to_another()) result->relaxation_.renew_coarse(result->state_, result->obstacle_view());
+  if (relaxation_.left_to_another())
+    result->relaxation_.renew_coarse(result->state_, result->obstacle_view());
   return result;
 }
 
@@ -220,8 +221,12 @@ void SoftObject::relax_touch(const ToolInBody& tool, Touch& t) noexcept {
   // While another relaxes the object, a voxel that the tool does not press is his.
   if (relaxation_.away() && !t.pressed && gap(tool, position(t.v)).distance >= 0.0) return;
   glm::dvec3 place = place_of(tool, t);
-  if (relaxation_.away() && was_pressed && t.pressed)
-    place = clamp_to_links(*lattice_, state_, t.v, place - t.left);
+  if (relaxation_.away() && was_pressed && t.pressed) {
+    place -= t.left;
+    const Gap g = gap(tool, lattice_->rest(t.v) + place);
+    if (g.distance < 0.0) place -= g.distance * g.normal;
+    place = clamp_to_links(*lattice_, state_, t.v, place);
+  }
   state_.set(t.v, place);
   relaxation_.multigrid().log().note(0, t.v / kRow);
   if (t.pressed != was_pressed) unsettled_m_ += glm::distance(before, state_.at(t.v));
@@ -423,6 +428,7 @@ Reaction SoftObject::reaction(const ToolInBody& tool) noexcept {
     }
     if (load < 0.0) ++result.pressed;
   }
+  if (result.pressed == 0) result.force_N = glm::dvec3(0.0);  // what only pulls is no contact
   return result;
 }
 
@@ -523,8 +529,8 @@ std::uint64_t SoftObject::relax_background(std::uint64_t budget) noexcept {
 }
 
 // What pressed voxels would do now they do not: they follow the tool, and once between two results they look
-// for their places. (Sliding while their neighbours were on their way elsewhere, ever so little more each time,
-// they never came to rest.)
+// for their places. (Sliding while their neighbours were on their way elsewhere, ever so little more each
+// time, they never came to rest.)
 void SoftObject::give_away() noexcept {
   relaxation_.give_away(state_, obstacle_view());
   for (Touch& t : touches_) {

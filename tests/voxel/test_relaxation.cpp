@@ -263,8 +263,7 @@ TEST(Relaxation, EnergyNeverGrows) {
 }
 
 // With links at their limits a correction is clipped, and a cycle is no descent step any more: some of the
-// energy may come back on the way, in the worst of these scenes 17 %. What is relied on is that it ends far
-// below its start.
+// energy may come back on the way. What is relied on is that it ends far below its start.
 TEST(Relaxation, WithLimitsInTheWayItEndsFarBelowItsStart) {
   EXPECT_LE(largest_growth(true), 1.25);
 }

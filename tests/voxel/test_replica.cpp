@@ -59,8 +59,8 @@ TEST(Replica, AHeldContactComesToTheSameRest) {
   }
 }
 
-// For as long as one likes: what the one and the other find are parts of the same way, not the same way twice.
-// (When they were, the force wavered by its own size.)
+// For as long as one likes: what the one and the other find are parts of the same way, not the same way
+// twice. (When they were, the force wavered by its own size.)
 TEST(Replica, AHeldContactStaysAtRest) {
   SoftBlock soft({41, 37, 25}, kH, kFirm);
   Replica replica(*soft.object);
