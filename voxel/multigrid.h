@@ -128,12 +128,6 @@ class Multigrid {
   // From now on every row that is written is noted. Allocates.
   void keep_log();
   [[nodiscard]] ChangeLog& log() { return log_; }
-  // What a coarse row holds, [value, told, load][axis]: one after the other.
-  static constexpr std::size_t kFields = 9;
-  [[nodiscard]] LazyArray<float>& field(int level, std::size_t which) {
-    auto& arrays = which < 3 ? at(level).value : which < 6 ? at(level).told : at(level).load;
-    return arrays[which % 3];
-  }
   // Forgets what coarse cells hold. Allocates.
   void forget_coarse();
   // Coarse cells whose rows are in the log hold nothing any more, and nothing is balanced.
