@@ -12,7 +12,7 @@ constexpr int kSmallest = 3;       // cells across the coarsest level
 constexpr int kWrittenAtOnce = 3;  // from this level on springs are written out on construction
 // An anchor counts for so many: where limits act, a cycle gave back 1.4 times the energy that it found when
 // it counted for one. From four on none comes back.
-constexpr int kAnchored = 16;
+constexpr int kAnchored = 12;
 constexpr std::size_t kMaxBalanced = 4096;  // rows; the contact of a tool has some hundred
 constexpr std::size_t kMaxStopped = 65536;  // cells of all levels stopped at a time; more move a little
 // A cycle over a held disc of 2, 4, 8, 16 or 24 spacings' radius leaves 0.5, 0.5, 0.5, 0.4 and 0.6 of what it
