@@ -23,6 +23,11 @@ constexpr double kH = 1e-3;  // spacing (m)
 constexpr LinkMaterial kFirm{
     .young_Pa = 1e4, .poisson = 0.3, .stretch_min = 0.9, .stretch_max = 1.1, .shear = 0.1};
 
+// How far beyond its limits a link may be left: the chain lets four roundings of the largest move be, so that
+// waves do not run for roundings, and a limit and the place taken at it are rounded once each. It does not
+// grow: 5.5 is the most that 800 exchanges with the tool held leave, always from the chain.
+constexpr double kRoundings = 6.0;
+
 // One exchange as ticks make it; `rows` a tick.
 void exchange(Replica& replica, SoftBlock& soft, std::size_t rows) {
   replica.give(*soft.object);
@@ -55,7 +60,7 @@ TEST(Replica, AHeldContactComesToTheSameRest) {
     }
     EXPECT_NEAR(felt.force_N.z, wanted.force_N.z, 2e-3 * wanted.force_N.z);
     EXPECT_LT(largest_difference(*apart.object, *there.object), 0.02 * kH);
-    EXPECT_EQ(voxel::validate(*apart.lattice, apart.object->state(), 4.0), "");
+    EXPECT_EQ(voxel::validate(*apart.lattice, apart.object->state(), kRoundings), "");
   }
 }
 
@@ -132,7 +137,7 @@ TEST(Replica, TheSumNeverHasMoreEnergyThanWhatWasGiven) {
     }
     EXPECT_LT(worst, 1e-4);
     EXPECT_LT(before, 0.6 * first);
-    EXPECT_EQ(voxel::validate(*soft.lattice, soft.object->state(), 4.0), "");
+    EXPECT_EQ(voxel::validate(*soft.lattice, soft.object->state(), kRoundings), "");
   }
 }
 
@@ -164,7 +169,7 @@ TEST(Replica, NoLinkLeavesItsLimitsInBetween) {
       given = true;
     }
     if (tick % 7 == 0) {
-      ASSERT_EQ(voxel::validate(*soft.lattice, soft.object->state(), 4.0), "") << "tick " << tick;
+      ASSERT_EQ(voxel::validate(*soft.lattice, soft.object->state(), kRoundings), "") << "tick " << tick;
     }
   }
 }
