@@ -78,6 +78,7 @@ class OccupancyMap {
   }
 
   [[nodiscard]] double cell_m() const { return fixed_.cell_m(); }
+  [[nodiscard]] const glm::dvec3& origin() const { return fixed_.origin(); }
   [[nodiscard]] std::size_t occupied_cells() const noexcept;
   [[nodiscard]] std::size_t memory_bytes() const;
   // Bricks in which soft voxels are: never an empty one.

@@ -39,6 +39,7 @@ class SurfaceCells {
   [[nodiscard]] bool occupied(const CellCoordinates& cell) const noexcept;
   [[nodiscard]] std::size_t occupied_cells() const noexcept;
   [[nodiscard]] double cell_m() const noexcept { return index_.cell_m(); }
+  [[nodiscard]] const glm::dvec3& origin() const noexcept { return index_.origin(); }
   [[nodiscard]] std::size_t memory_bytes() const noexcept;
 
  private:
