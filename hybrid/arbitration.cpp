@@ -2,15 +2,20 @@
 #include "hybrid/arbitration.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <glm/geometric.hpp>
+#include <span>
 
 namespace hybrid {
 namespace {
 
 constexpr std::uint32_t kObstacleSlice = 256;  // surface voxels whose motion is looked at a tick
-constexpr int kObstacleQueries = 24;           // exact queries a tick
-constexpr float kMovedEnough = 0.25F;          // of the spacing: an obstacle is made anew beyond it
-constexpr std::uint32_t kPairSlice = 256;      // surface voxels looked up for a partner a tick
+constexpr std::size_t kObstacleQueries = 24;   // exact queries a tick
+// A voxel looks again when it has moved by so many spacings, or to within so many of where it might meet a
+// rigid surface that it has not seen.
+constexpr float kMovedEnough = 0.25F, kSeenAhead = 2.0F;
+constexpr std::uint32_t kPairSlice = 256;  // surface voxels looked up for a partner a tick
 constexpr double kPartAt = 1.25;  // a pair parts when further apart than this many touching distances
 constexpr int kPairSweeps = 2;
 
@@ -65,9 +70,10 @@ std::size_t find_obstacles(const World& world, WorldState& state, std::size_t so
   std::size_t count = 0;
   // Also where nothing is near: it may be pressed further than one looks.
   object.reserve_obstacles();
-  state.obstacle_seen[soft].assign(surface.size(), glm::vec3(0.0F));
+  state.obstacle_seen[soft].assign(surface.size(), {});
   for (std::size_t s = 0; s < surface.size(); ++s) {
     const NearestRigid near = nearest_rigid(world, state, body.to_scene(object.position(surface[s])), range);
+    state.obstacle_seen[soft][s].clear_m = static_cast<float>(near.distance);
     if (!near.found) continue;
     ++count;
     voxel::Obstacle obstacle = obstacle_of(body, object, surface[s], near);
@@ -77,46 +83,106 @@ std::size_t find_obstacles(const World& world, WorldState& state, std::size_t so
   return count;
 }
 
+namespace {
+
+// Surface voxels of one object that have to look for rigid surfaces again, those first that may meet one
+// first.
+class LooksDue {
+ public:
+  LooksDue(const voxel::SoftObject& object, std::span<const SurfaceSeen> seen)
+      : object_(object),
+        seen_(seen),
+        spacing_m_(static_cast<float>(object.lattice().min_spacing_m())),
+        radius_m_(static_cast<float>(object.voxel_radius())) {}
+
+  // Voxel number s of the surface, if it has moved enough.
+  void consider(std::uint32_t s) noexcept {
+    const SurfaceSeen& seen = seen_[s];
+    const glm::vec3 way = glm::vec3(object_.state().at(object_.lattice().surface()[s])) - seen.from;
+    const float square = glm::dot(way, way);
+    const float enough = std::max(kMovedEnough, seen.clear_m / spacing_m_ - kSeenAhead) * spacing_m_;
+    if (square < enough * enough) return;
+    // The surface that it knows holds it; another is further than that one was.
+    const bool held = object_.obstacles()[s].normal != glm::vec3(0.0F);
+    const float room = held ? std::max(seen.clear_m, spacing_m_) : seen.clear_m - radius_m_;
+    add({room - std::sqrt(square), s});
+  }
+  [[nodiscard]] std::size_t count() const { return count_; }
+  [[nodiscard]] std::uint32_t operator[](std::size_t n) const { return first_[n].s; }
+
+ private:
+  struct Due {
+    float room_m;  // left until it may meet what it has not seen
+    std::uint32_t s;
+  };
+  void add(const Due& due) noexcept {
+    const bool full = count_ == first_.size();
+    if (full && due.room_m >= first_[count_ - 1].room_m) return;
+    for (std::size_t n = 0; n < count_; ++n) {
+      if (first_[n].s == due.s) return;
+    }
+    std::size_t at = full ? count_ - 1 : count_++;
+    for (; at > 0 && first_[at - 1].room_m > due.room_m; --at) first_[at] = first_[at - 1];
+    first_[at] = due;
+  }
+
+  const voxel::SoftObject& object_;
+  std::span<const SurfaceSeen> seen_;
+  float spacing_m_, radius_m_;
+  std::array<Due, kObstacleQueries> first_{};
+  std::size_t count_ = 0;
+};
+
+void renew_obstacle(const World& world, WorldState& state, std::size_t o, std::uint32_t s) noexcept {
+  voxel::SoftObject& object = *state.soft[o];
+  const SoftBody& body = world.soft[o];
+  const voxel::VoxelId v = object.lattice().surface()[s];
+  const glm::vec3 u(object.state().at(v));
+  const double range = kObstacleRange * object.lattice().max_spacing_m();
+  const glm::dvec3 at = body.to_scene(object.position(v));
+  const NearestRigid near = from_outside(world, at, nearest_rigid(world, state, at, range));
+  state.obstacle_seen[o][s] = {u, static_cast<float>(std::max(near.distance, 0.0))};
+  if (!near.found) {
+    object.set_obstacle(s, {});
+    return;
+  }
+  const voxel::Obstacle old = object.obstacles()[s];
+  voxel::Obstacle fresh = obstacle_of(body, object, v, near);
+  // A thin sheet seen from its other side: the voxel was squeezed through by rounding; its own side stands.
+  if (old.normal != glm::vec3(0.0F) && glm::dot(old.normal, fresh.normal) < 0.0F) return;
+  // A voxel that overlaps may not be thrown out at once: it comes out by as much as is looked at anew. (The
+  // depth it has was left to it once: then a fast tool presses it in deeper tick by tick, and through.)
+  const float enough = kMovedEnough * static_cast<float>(object.lattice().min_spacing_m());
+  fresh.bound = std::min(fresh.bound, glm::dot(fresh.normal, u) + enough);
+  object.set_obstacle(s, fresh);
+}
+
+}  // namespace
+
 void refresh_obstacles(const World& world, WorldState& state) noexcept {
-  int queries = 0;
+  std::size_t left = kObstacleQueries;
   for (std::size_t o = 0; o < state.soft.size(); ++o) {
     voxel::SoftObject& object = *state.soft[o];
-    if (object.obstacles().empty() || object.asleep()) continue;
-    const SoftBody& body = world.soft[o];
-    const auto surface = object.lattice().surface();
-    const float enough = kMovedEnough * static_cast<float>(object.lattice().min_spacing_m());
-    const double range = kObstacleRange * object.lattice().max_spacing_m();
-    const auto look = [&](std::uint32_t s) {
-      const voxel::VoxelId v = surface[s];
-      const glm::vec3 u(object.state().at(v));
-      const glm::vec3 moved = u - state.obstacle_seen[o][s];
-      if (glm::dot(moved, moved) < enough * enough || queries >= kObstacleQueries) return;
-      ++queries;
-      state.obstacle_seen[o][s] = u;
-      const glm::dvec3 at = body.to_scene(object.position(v));
-      const NearestRigid near = from_outside(world, at, nearest_rigid(world, state, at, range));
-      const voxel::Obstacle old = object.obstacles()[s];
-      if (!near.found) {
-        object.set_obstacle(s, {});
-        return;
+    if (object.obstacles().empty()) continue;
+    if (!object.asleep()) {
+      const voxel::Lattice& lattice = object.lattice();
+      LooksDue due(object, state.obstacle_seen[o]);
+      for (const voxel::VoxelId v : object.touched()) due.consider(object.surface_number(v));
+      for (const voxel::RowId row : object.moved_rows()) {
+        const auto [first, last] = lattice.surface_in(row);
+        for (std::uint32_t s = first; s < last; ++s) due.consider(s);
       }
-      voxel::Obstacle fresh = obstacle_of(body, object, v, near);
-      const bool had = old.normal != glm::vec3(0.0F);
-      // A thin sheet seen from its other side: the voxel was squeezed through by rounding; its own side
-      // stands.
-      if (had && glm::dot(old.normal, fresh.normal) < 0.0F) return;
-      // A voxel that overlaps may not be thrown out at once: it comes out by as much as is looked at anew.
-      // (The depth it has was left to it once: then a fast tool presses it in deeper tick by tick, and
-      // through.)
-      fresh.bound = std::min(fresh.bound, glm::dot(fresh.normal, u) + enough);
-      object.set_obstacle(s, fresh);
-    };
-    for (const voxel::VoxelId v : object.touched()) look(object.surface_number(v));
-    const auto count = static_cast<std::uint32_t>(surface.size());
-    for (std::uint32_t i = 0; i < std::min(kObstacleSlice, count); ++i) {
-      look(state.obstacle_cursor[o]);
-      if (++state.obstacle_cursor[o] == count) state.obstacle_cursor[o] = 0;
+      // What moves by itself, a little in each tick, is found in turns.
+      const auto count = static_cast<std::uint32_t>(lattice.surface().size());
+      for (std::uint32_t i = 0; i < std::min(kObstacleSlice, count); ++i) {
+        due.consider(state.obstacle_cursor[o]);
+        if (++state.obstacle_cursor[o] == count) state.obstacle_cursor[o] = 0;
+      }
+      const std::size_t looks = std::min(left, due.count());
+      for (std::size_t n = 0; n < looks; ++n) renew_obstacle(world, state, o, due[n]);
+      left -= looks;
     }
+    object.forget_moved_rows();
   }
 }
 

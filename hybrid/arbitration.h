@@ -13,7 +13,10 @@ inline constexpr double kObstacleRange = 4.0;
 // presses: a voxel that already overlaps keeps the depth it has. Returns how many voxels have one.
 std::size_t find_obstacles(const World& world, WorldState& state, std::size_t soft);
 
-// In the tick: looks again at the rigid surface near voxels that moved since; a bounded slice a tick.
+// In the tick: voxels that moved look again for rigid surfaces, so many a tick, those first that are nearest
+// to meeting one they have not seen. Looked through are what the tool touches, the rows that waves moved, and
+// a slice of all. (By turns, and each whenever it had moved a quarter of its spacing, voxels far from
+// everything took the looks of those that arrived: tissue thrown at a plate at 1 m/s went in by its spacing.)
 void refresh_obstacles(const World& world, WorldState& state) noexcept;
 
 // In the tick: finds pairs of voxels of different objects that meet (a slice of the surface a tick), relaxes

@@ -168,6 +168,12 @@ struct HeldElement {
 };
 inline constexpr std::uint32_t kMaxHeld = 32;
 
+// What was seen from a surface voxel when rigid surfaces were last looked for there.
+struct SurfaceSeen {
+  glm::vec3 from{0.0F};  // its displacement then (m)
+  float clear_m = 0.0F;  // from its centre to the nearest of them, or how far was looked
+};
+
 // What goes from tick to tick as plain values: assigning it is taking over the state.
 struct CarriedState {
   // ---- of the session ----
@@ -200,11 +206,10 @@ struct CarriedState {
 
   // ---- of arbitration ----
   std::vector<VoxelPair> pairs;
-  std::vector<std::vector<std::uint8_t>> paired;  // [meeting][surface voxel of a]
-  std::vector<std::vector<glm::vec3>>
-      obstacle_seen;  // [soft][surface voxel] displacement at which its obstacle was made
-  std::vector<std::uint32_t> cursor, obstacle_cursor;  // [soft] round-robin over surface voxels
-  std::vector<std::uint32_t> pair_cursor;              // [meeting]
+  std::vector<std::vector<std::uint8_t>> paired;        // [meeting][surface voxel of a]
+  std::vector<std::vector<SurfaceSeen>> obstacle_seen;  // [soft][surface voxel]
+  std::vector<std::uint32_t> cursor, obstacle_cursor;   // [soft] round-robin over surface voxels
+  std::vector<std::uint32_t> pair_cursor;               // [meeting]
 };
 
 // Everything the tick writes. Buffers are sized when the world is built, and never after.

@@ -323,12 +323,24 @@ void Lattice::find_surface() {
     surface_before_[b] = static_cast<std::uint32_t>(surface_.size());
 }
 
-std::uint32_t Lattice::surface_number(VoxelId v) const noexcept {
+// Of the first surface voxel that is `v` or beyond it, within the block that `v` is in.
+std::uint32_t Lattice::surface_from(VoxelId v) const noexcept {
   const auto block = v / kSurfaceBlock;
   const auto first = surface_.begin() + static_cast<std::ptrdiff_t>(surface_before_[block]),
              last = surface_.begin() + static_cast<std::ptrdiff_t>(surface_before_[block + 1]);
-  const auto found = std::lower_bound(first, last, v);
-  return found != last && *found == v ? static_cast<std::uint32_t>(found - surface_.begin()) : kNoSurface;
+  return static_cast<std::uint32_t>(std::lower_bound(first, last, v) - surface_.begin());
+}
+
+std::uint32_t Lattice::surface_number(VoxelId v) const noexcept {
+  const std::uint32_t number = surface_from(v);
+  return number < surface_.size() && surface_[number] == v ? number : kNoSurface;
+}
+
+std::array<std::uint32_t, 2> Lattice::surface_in(RowId row) const noexcept {
+  const std::uint32_t first = surface_from(row * kRow);
+  std::uint32_t last = first;
+  while (last < surface_.size() && surface_[last] < (row + 1) * kRow) ++last;
+  return {first, last};
 }
 
 glm::dvec3 Lattice::outward(VoxelId v) const noexcept {

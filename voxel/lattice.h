@@ -112,6 +112,8 @@ class Lattice {
   static constexpr std::uint32_t kNoSurface = 0xFFFFFFFFU;
   [[nodiscard]] std::span<const VoxelId> surface() const { return surface_; }
   [[nodiscard]] std::uint32_t surface_number(VoxelId v) const noexcept;
+  // The numbers of those in a row: from the first on, up to but without the second.
+  [[nodiscard]] std::array<std::uint32_t, 2> surface_in(RowId row) const noexcept;
   // Away from the object at a surface voxel at rest, by its 26 neighbours: unit, volume frame; 0 where these
   // do not say, in a sheet one voxel thick.
   [[nodiscard]] glm::dvec3 outward(VoxelId v) const noexcept;
@@ -171,6 +173,7 @@ class Lattice {
   void fill_links(const LatticeOptions& options);
   void fill_force_scale();
   void find_surface();
+  [[nodiscard]] std::uint32_t surface_from(VoxelId v) const noexcept;
 
   Grid grid_;
   glm::dvec3 spacing_m_{1e-3};

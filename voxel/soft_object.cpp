@@ -70,6 +70,7 @@ SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice)
 std::unique_ptr<SoftObject> SoftObject::copy() const {
   auto result = std::make_unique<SoftObject>(lattice_);
   result->state_ = state_;
+  if (!obstacles_.empty()) result->reserve_obstacles();
   result->obstacles_ = obstacles_;
   result->pair_held_ = pair_held_;
   result->pair_load_.copy_from(pair_load_);
@@ -163,6 +164,18 @@ void SoftObject::settle_chain() noexcept {
   }
   chain_.settle(state_, sources_, moves_, obstacles_);
   for (const RowId row : chain_.moved_rows()) relaxation_.stir(row);
+  if (obstacles_.empty()) return;
+  for (const RowId row : chain_.moved_rows()) {
+    if (moved_rows_.size() == moved_rows_.capacity()) break;
+    if (row_moved_[row] != 0) continue;
+    row_moved_[row] = 1;
+    moved_rows_.push_back(row);
+  }
+}
+
+void SoftObject::forget_moved_rows() noexcept {
+  for (const RowId row : moved_rows_) row_moved_[row] = 0;
+  moved_rows_.clear();
 }
 
 bool SoftObject::push_out(const ToolInBody& tool) noexcept {
@@ -560,6 +573,8 @@ void SoftObject::set_obstacle(std::size_t surface_number, const Obstacle& obstac
 
 void SoftObject::reserve_obstacles() {
   obstacles_.resize(lattice_->surface().size());
+  moved_rows_.reserve(kMostMovedRows);
+  row_moved_ = LazyArray<std::uint8_t>(lattice_->grid().rows());
 }
 
 void SoftObject::hold(VoxelId v) noexcept {
@@ -665,7 +680,7 @@ std::size_t SoftObject::memory_bytes() const {
   std::size_t state = state_.role.resident_bytes() + state_.row_held.resident_bytes() +
                       state_.row_obstacles.resident_bytes() + state_.rest.memory_bytes() +
                       carried_mark_.resident_bytes() + carried_index_.resident_bytes() +
-                      pair_load_.resident_bytes();
+                      pair_load_.resident_bytes() + row_moved_.resident_bytes();
   for (const auto& axis : state_.u) state += axis.resident_bytes();
   return lattice_->memory_bytes() + state + chain_.memory_bytes() + relaxation_.memory_bytes() +
          obstacles_.size() * sizeof(Obstacle) + pair_held_.size();

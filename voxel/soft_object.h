@@ -94,6 +94,11 @@ class SoftObject {
   // more.
   void set_obstacle(std::size_t surface_number, const Obstacle& obstacle) noexcept;
   [[nodiscard]] std::span<const Obstacle> obstacles() const { return obstacles_; }
+  // Where there may be obstacles: rows that the chain moved since these were forgotten, each once, the first
+  // kMostMovedRows of them.
+  static constexpr std::size_t kMostMovedRows = 1024;
+  [[nodiscard]] std::span<const RowId> moved_rows() const { return moved_rows_; }
+  void forget_moved_rows() noexcept;
   // A voxel pressed by another soft object: moved by the caller, held meanwhile. See pair_contact.h.
   void hold(VoxelId v) noexcept;
   void release(VoxelId v) noexcept;
@@ -178,9 +183,11 @@ class SoftObject {
   Displacement state_;
   ChainMail chain_;
   Relaxation relaxation_;
-  std::vector<std::uint8_t> pair_held_;           // [surface number] 1 while another soft object presses it
-  LazyArray<glm::vec3> pair_load_;                // [surface number] and with what force (N)
-  std::vector<Obstacle> obstacles_;               // [surface number], empty when there is none
+  std::vector<std::uint8_t> pair_held_;  // [surface number] 1 while another soft object presses it
+  LazyArray<glm::vec3> pair_load_;       // [surface number] and with what force (N)
+  std::vector<Obstacle> obstacles_;      // [surface number], empty when there is none
+  std::vector<RowId> moved_rows_;
+  LazyArray<std::uint8_t> row_moved_;             // 1: among them; empty: no obstacles
   std::vector<std::uint32_t> changed_obstacles_;  // surface numbers, since a replica was last told
   std::vector<std::uint8_t> obstacle_changed_;    // [surface number] 1: among them; empty: no replica
   std::vector<Touch> touches_;

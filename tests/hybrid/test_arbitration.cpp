@@ -236,8 +236,7 @@ std::vector<Scenario> scenarios() {
        {}},
       {"TissueFarFromBone",
        "tests/hybrid/arbitration/tissue_far_from_bone.toml",
-       // 1.0, 40: of voxels that arrive together, 24 a tick are shown the plate (kObstacleQueries).
-       {{.points_mm = {{0, 0, 20}, {0, 0, 0}}, .fronts = {top}, .deepest = 1.1, .passed = 60}},
+       {{{{0, 0, 20}, {0, 0, 0}}, {top}}},
        {}},
       {"TissueInAGroove",
        "tests/hybrid/arbitration/tissue_in_groove.toml",
