@@ -400,11 +400,31 @@ void Multigrid::tell_row(int level, RowId row, const std::array<HatRow, 4>& hats
   note_change(level, row, done.most_m);
 }
 
+// What the other found is outside of its obstacles but for rounding. (Taken for a voxel that was moved into
+// its obstacle, one would look for its place again, beside others that have not come along yet, and the
+// other, told of that, would find it pulled: they disagreed about the underside of a brain by a little more
+// in each exchange.)
 void Multigrid::add(RowId row, const RowVector& way, Displacement& state,
                     const ObstacleView& obstacles) noexcept {
   if (!prepare(0, row)) return;
-  RowVector refused;
-  note_change(0, row, correct_voxels(row_of(0, row, state), row, way, state, obstacles, {}, refused).most_m);
+  RowVector refused, before;
+  const LevelRow r = row_of(0, row, state);
+  if (obstacles.obstacles.empty() || state.row_obstacles[row] == 0) {
+    note_change(0, row, correct_voxels(r, row, way, state, obstacles, {}, refused).most_m);
+    return;
+  }
+  for (std::size_t axis = 0; axis < 3; ++axis) std::copy_n(r.u[axis], kRow, before[axis].begin());
+  const RowLimits limits = couplings().limits(row);
+  RowCorrection done = correct_row(r, &limits, {}, way, refused);
+  const double touching = kTouching * lattice_.min_spacing_m();
+  bool inside = false;
+  for (VoxelId v = row * kRow; v < (row + 1) * kRow; ++v)
+    inside = inside || (state.role[v] == Displacement::obstacle && blocked(obstacles, state, v, -touching));
+  if (inside) {
+    for (std::size_t axis = 0; axis < 3; ++axis) std::copy_n(before[axis].begin(), kRow, r.u[axis]);
+    done = correct_voxels(r, row, way, state, obstacles, {}, refused);
+  }
+  note_change(0, row, done.most_m);
 }
 
 void Multigrid::take_back_refused(int level, RowId row, const RowVector& refused, unsigned axes,

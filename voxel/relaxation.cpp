@@ -145,10 +145,23 @@ void Relaxation::run_cycle(Displacement& state, const ObstacleView& obstacles,
 }
 
 void Relaxation::relax_contact(Displacement& state, const ObstacleView& obstacles,
-                               std::span<const VoxelId> held, const std::array<int, 3>& low,
-                               const std::array<int, 3>& high) noexcept {
+                               std::span<const VoxelId> held, std::span<const VoxelId> pressed) noexcept {
   contact_relaxed_ = true;
   multigrid_.set_held(held);
+  std::array<int, 3> low = lattice_.coordinates(pressed.front()), high = low;
+  for (const VoxelId v : pressed) {
+    const auto c = lattice_.coordinates(v);
+    for (std::size_t d = 0; d < 3; ++d) {
+      low[d] = std::min(low[d], c[d]);
+      high[d] = std::max(high[d], c[d]);
+    }
+  }
+  for (std::size_t d = 0; d < 3; ++d) {
+    const int beyond = high[d] - low[d] - kMaxNear;
+    if (beyond <= 0) continue;
+    low[d] += beyond / 2;
+    high[d] = low[d] + kMaxNear;
+  }
   const int wide = std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
   lay_boxes(low, high, wide);
   const RowBox& b = boxes(0).smoothed;

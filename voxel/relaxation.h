@@ -39,9 +39,11 @@ class Relaxation {
                     std::uint64_t budget) noexcept;
   // One cycle over the whole object. For references, not for the tick.
   void run_cycle(Displacement& state, const ObstacleView& obstacles, std::span<const VoxelId> held) noexcept;
-  // One cycle round the contact: the box of voxels from `low` to `high`, both included.
+  // One cycle round the contact: the box of `pressed`, of which there is one at least; those of them are in
+  // `held`. Of a contact wider than kMaxNear voxels the middle: the rest is left to whole cycles.
+  static constexpr int kMaxNear = 64;
   void relax_contact(Displacement& state, const ObstacleView& obstacles, std::span<const VoxelId> held,
-                     const std::array<int, 3>& low, const std::array<int, 3>& high) noexcept;
+                     std::span<const VoxelId> pressed) noexcept;
 
   [[nodiscard]] Couplings& couplings() { return multigrid_.couplings(); }
   [[nodiscard]] Multigrid& multigrid() { return multigrid_; }

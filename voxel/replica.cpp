@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
 
 namespace voxel {
 namespace {
@@ -12,6 +13,14 @@ std::size_t at(RowId row) {
 }
 
 constexpr std::size_t kMostAtOnce = 1000;  // rows that a tick adds at once; a wider contact sees steps go by
+// After a whole cycle, of which little reaches the contact (0.75 of its error is left in a brain), so many
+// round it, while the tool moves by so many spacings from one result to the next and some results longer: a
+// brain that felt 0.28 N on the way to 0.15 feels 0.22, and is within a twentieth of it after 0.2 s instead
+// of 0.6. At rest they are left out: beyond their boxes coarse cells know of the whole cycle's last sweeps
+// only in the next one, and a voxel that hardly touches the tool was let go and pressed in turns, with steps
+// of 30 mN.
+constexpr int kContactCycles = 4, kUnsettled = 4;
+constexpr double kMoved = 0.1;
 
 }  // namespace
 
@@ -67,12 +76,21 @@ void Replica::give(SoftObject& object) noexcept {
   }
   object.changed_obstacles_.clear();
   for (const VoxelId v : given_held_) given_roles_.push_back({v, object.resting_role(v)});
-  object.list_held();
+  given_pressed_ = object.list_held();
+  note_motion(object);
   given_held_.clear();
   for (const VoxelId v : object.all_held_) given_held_.push_back(v);
   near_ = given_held_.empty() ? Relaxation::NearRows{} : object.relaxation_.near_contact();
   object.give_away();
   log.clear();
+}
+
+void Replica::note_motion(const SoftObject& object) noexcept {
+  const double way = glm::distance(object.tool_.centre, given_tool_m_);
+  given_tool_m_ = object.tool_.centre;
+  if (way > kMoved * lattice_.min_spacing_m()) unsettled_ = kUnsettled;
+  settle_contact_ = unsettled_ > 0 && given_pressed_ > 0;
+  if (unsettled_ > 0) --unsettled_;
 }
 
 void Replica::open_given() noexcept {
@@ -101,7 +119,10 @@ void Replica::open_given() noexcept {
 
 void Replica::relax() noexcept {
   open_given();
-  relaxation_.run_cycle(state_, {obstacles_, &lattice_}, held_);
+  const ObstacleView obstacles{obstacles_, &lattice_};
+  relaxation_.run_cycle(state_, obstacles, held_);
+  for (int n = 0; n < kContactCycles && settle_contact_; ++n)
+    relaxation_.relax_contact(state_, obstacles, held_, {held_.data(), given_pressed_});
   work_ = multigrid().log().count();
   pack_changes();
 }

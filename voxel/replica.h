@@ -106,6 +106,7 @@ class Replica {
   };
 
   [[nodiscard]] Multigrid& multigrid() { return relaxation_.multigrid(); }
+  void note_motion(const SoftObject& object) noexcept;
   void open_given() noexcept;
   void sort_by_distance() noexcept;
   void pack_changes() noexcept;
@@ -132,6 +133,10 @@ class Replica {
   std::vector<GivenRole> given_roles_;
   std::vector<GivenObstacle> given_obstacles_;
   std::vector<VoxelId> given_held_;
+  std::size_t given_pressed_ = 0;         // so many of them, the first, by the tool
+  glm::dvec3 given_tool_m_{0.0};          // where that was
+  int unsettled_ = 0;                     // results to come in which the contact is brought to rest once more
+  bool settle_contact_ = false;           // in this one
   Relaxation::NearRows near_;             // the contact
   std::size_t taking_ = 0, drained_ = 0;  // which of found_, and how many of its rows
   std::size_t near_count_ = 0;            // of the other one's: they are near the contact

@@ -18,7 +18,6 @@ constexpr double kContraction = 0.5;  // of that, by a cycle round the contact
 // Cycles round the contact a tick: of a ball pressed at 0.2 m/s into 24,000 voxels one leaves 1.1, two 0.55,
 // three 0.46 just noticeable differences of the force.
 constexpr int kMostCycles = 2;
-constexpr int kMaxNear = 64;                 // voxels across the contact that relax_near() works on at most
 constexpr std::size_t kMaxCarried = 20'000;  // voxels that may hang on the pressed ones by tight links
 constexpr int kProjections = 3;           // of a pressed voxel onto the tool, in search of its least energy
 constexpr std::size_t kMostDrawn = 2000;  // of them come along with the pressed ones in a tick
@@ -261,30 +260,10 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
     if (cycles_since_touch_ == kMostCycles) break;
     ++cycles_since_touch_;
     unsettled_m_ *= kContraction;
-    std::array<int, 3> low{}, high{};
-    low.fill(std::numeric_limits<int>::max());
-    bool any = false;
-    for (const Touch& t : touches_) {
-      relaxation_.stir(t.v / kRow);
-      if (!t.pressed) continue;
-      any = true;
-      const auto c = lattice_->coordinates(t.v);
-      for (std::size_t d = 0; d < 3; ++d) {
-        low[d] = std::min(low[d], c[d]);
-        high[d] = std::max(high[d], c[d]);
-      }
-    }
-    if (!any) continue;
-    // A contact wider than that is left to the background beyond its middle.
-    for (std::size_t d = 0; d < 3; ++d) {
-      const int beyond = high[d] - low[d] - kMaxNear;
-      if (beyond > 0) {
-        low[d] += beyond / 2;
-        high[d] = low[d] + kMaxNear;
-      }
-    }
-    list_held();
-    relaxation_.relax_contact(state_, obstacle_view(), all_held_, low, high);
+    for (const Touch& t : touches_) relaxation_.stir(t.v / kRow);
+    const std::size_t pressed = list_held();
+    if (pressed == 0) continue;
+    relaxation_.relax_contact(state_, obstacle_view(), all_held_, {all_held_.data(), pressed});
   }
   // Last, so that what the tool feels is measured with its voxels where they belong; what is pressed first,
   // because what hangs on it by a tight link counts where that is tight still. (In the order of the list half
@@ -527,12 +506,14 @@ bool SoftObject::held_fast(VoxelId v, const glm::dvec3& direction) noexcept {
   return held;
 }
 
-void SoftObject::list_held() noexcept {
+std::size_t SoftObject::list_held() noexcept {
   all_held_.clear();
   for (const Touch& t : touches_) {
     if (t.pressed) all_held_.push_back(t.v);
   }
+  const std::size_t pressed = all_held_.size();
   for (const VoxelId v : held_voxels_) all_held_.push_back(v);
+  return pressed;
 }
 
 std::uint64_t SoftObject::relax_background(std::uint64_t budget) noexcept {

@@ -169,7 +169,7 @@ class SoftObject {
   [[nodiscard]] Displacement::Role resting_role(VoxelId v) const noexcept;  // when no tool presses it
   void set_touch_roles() noexcept;
   void give_away() noexcept;  // what pulls near the contact is somebody else's
-  void list_held() noexcept;
+  std::size_t list_held() noexcept;
   [[nodiscard]] glm::dvec3 place_of(const ToolInBody& tool, Touch& touch) noexcept;
   void relax_touch(const ToolInBody& tool, Touch& touch) noexcept;
   void add_stiffness(int axis, glm::dmat3& stiffness) noexcept;
