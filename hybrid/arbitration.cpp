@@ -16,7 +16,14 @@ constexpr std::size_t kObstacleQueries = 24;   // exact queries a tick
 // rigid surface that it has not seen.
 constexpr float kMovedEnough = 0.25F, kSeenAhead = 2.0F;
 constexpr std::uint32_t kPairSlice = 256;  // surface voxels looked up for a partner a tick
-constexpr double kPartAt = 1.25;  // a pair parts when further apart than this many touching distances
+// Touching distances: pairs are made before they touch, so that none is jumped over before its turn, and part
+// when further apart.
+constexpr double kLookForPairs = 1.5;
+constexpr double kPartAt = 1.75;
+// Of it, apart: the pair moves its voxels. (Let go of at 0.1, while the surfaces were still on their way
+// apart, they swung, and a loop at 0.25 m/s gave the hand 26 uJ.)
+constexpr double kHoldAt = 0.1, kLetGoAt = 0.3;
+constexpr std::size_t kFarTurns = 4;  // ticks in which each pair that is too far apart to press is looked at
 constexpr int kPairSweeps = 2;
 
 struct NearestRigid {
@@ -188,87 +195,148 @@ void refresh_obstacles(const World& world, WorldState& state) noexcept {
 
 namespace {
 
-void find_pairs(const World& world, WorldState& state, std::uint32_t meeting) noexcept {
+// Both objects of a meeting where they lie.
+template <class Visit>
+auto with_objects(const World& world, WorldState& state, std::uint32_t meeting, const Visit& visit) noexcept {
   const auto [ia, ib] = world.meeting[meeting];
-  voxel::SoftObject &a = *state.soft[ia], &b = *state.soft[ib];
-  if (!a.moved_ever() && !b.moved_ever()) return;
-  if (a.asleep() && b.asleep() && state.pair_cursor[meeting] == 0) return;
-  const auto surface_a = a.lattice().surface();
-  const auto count_a = static_cast<std::uint32_t>(surface_a.size());
-  const auto count_b = static_cast<std::uint32_t>(b.lattice().surface().size());
-  const double apart = a.voxel_radius() + b.voxel_radius();
-  for (std::uint32_t i = 0; i < std::min(kPairSlice, count_a); ++i) {
-    const std::uint32_t s = state.pair_cursor[meeting];
-    state.pair_cursor[meeting] = s + 1 == count_a ? 0 : s + 1;
-    if (state.paired[meeting][s] != 0) continue;
-    const glm::dvec3 at = world.soft[ia].to_scene(a.position(surface_a[s]));
-    const std::size_t found = state.map.soft_in(at - apart, at + apart, state.found);
-    double nearest = apart;
+  return visit(voxel::PosedObject{*state.soft[ia], world.soft[ia].pose},
+               voxel::PosedObject{*state.soft[ib], world.soft[ib].pose});
+}
+
+// Of the second object's surface the voxel nearest to a voxel of the first, and the facet there.
+voxel::PressedPair partner_of(const World& world, WorldState& state, std::uint32_t meeting,
+                              voxel::VoxelId v) noexcept {
+  const std::uint32_t ib = world.meeting[meeting][1];
+  return with_objects(world, state, meeting, [&](const auto& a, const auto& b) {
+    const auto surface = b.object.lattice().surface();
+    const glm::dvec3 at = a.pose.origin + a.pose.rotation * a.object.position(v);
+    const double look = kLookForPairs * (a.object.voxel_radius() + b.object.voxel_radius());
+    const std::size_t found = state.map.soft_in(at - look, at + look, state.found);
+    voxel::PressedPair best;
+    double nearest = look;
     std::uint32_t partner = voxel::SoftObject::kNoSurface;
     for (std::size_t n = 0; n < found; ++n) {
       const std::uint32_t number = state.found[n] - world.soft[ib].first_number;
-      if (state.found[n] < world.soft[ib].first_number || number >= count_b) continue;
-      const glm::dvec3 other = world.soft[ib].to_scene(b.position(b.lattice().surface()[number]));
-      const double distance = glm::length(other - at);
-      if (distance < nearest || (distance == nearest && number < partner)) {
-        nearest = distance;
-        partner = number;
-      }
+      if (state.found[n] < world.soft[ib].first_number || number >= surface.size()) continue;
+      const double distance = glm::length(world.soft[ib].to_scene(b.object.position(surface[number])) - at);
+      if (distance > nearest || (distance == nearest && number >= partner)) continue;
+      const voxel::PressedPair pair = voxel::pair_of(a, v, b, surface[number]);
+      if (pair.side == glm::dvec3(0.0) ||
+          voxel::gap_of_pair(a, b, pair) >= (kLookForPairs - 1.0) * pair.reach_m)
+        continue;
+      best = pair;
+      nearest = distance;
+      partner = number;
     }
-    if (partner == voxel::SoftObject::kNoSurface) continue;
+    return best;
+  });
+}
+
+void find_pairs(const World& world, WorldState& state, std::uint32_t meeting) noexcept {
+  const auto [ia, ib] = world.meeting[meeting];
+  const voxel::SoftObject &a = *state.soft[ia], &b = *state.soft[ib];
+  if (!a.moved_ever() && !b.moved_ever()) return;
+  if (a.asleep() && b.asleep() && state.pair_cursor[meeting] == 0) return;
+  const auto surface = a.lattice().surface();
+  const auto count = static_cast<std::uint32_t>(surface.size());
+  for (std::uint32_t i = 0; i < std::min(kPairSlice, count); ++i) {
+    const std::uint32_t s = state.pair_cursor[meeting];
+    state.pair_cursor[meeting] = s + 1 == count ? 0 : s + 1;
+    if (state.paired[meeting][s] != 0) continue;
+    const voxel::PressedPair pressed = partner_of(world, state, meeting, surface[s]);
+    if (pressed.side == glm::dvec3(0.0)) continue;
     if (state.pairs.size() == state.pairs.capacity()) {
       state.faults |= fault_pair_overflow;
       return;
     }
-    const voxel::VoxelId va = surface_a[s], vb = b.lattice().surface()[partner];
-    const glm::dvec3 side = voxel::side_of_pair({a, world.soft[ia].pose}, va, {b, world.soft[ib].pose}, vb);
-    state.pairs.push_back({meeting, {va, vb, glm::dvec3(0.0), side}, s});
+    state.pairs.push_back({meeting, pressed, s, false});
     state.paired[meeting][s] = 1;
-    a.hold(va);
-    b.hold(vb);
+  }
+}
+
+// Voxels moved over one another: the pair looks for its facet again. Returns the gap, in touching distances.
+double renew_pair(const World& world, WorldState& state, VoxelPair& pair) noexcept {
+  return with_objects(world, state, pair.meeting, [&](const auto& a, const auto& b) {
+    const voxel::PressedPair before = pair.pressed;
+    voxel::find_facet(a, b, pair.pressed);
+    const double gap = voxel::gap_of_pair(a, b, pair.pressed) / pair.pressed.reach_m;
+    const bool hold = gap < (pair.held ? kLetGoAt : kHoldAt);
+    const bool same = pair.held && hold && before.facet == pair.pressed.facet;
+    // Before the old ones are let go of: what is in both stays held.
+    if (hold && !same) voxel::hold_pair(a, b, pair.pressed);
+    if (pair.held && !same) voxel::release_pair(a, b, before);
+    if (!hold) pair.pressed.force_N = glm::dvec3(0.0);
+    pair.held = hold;
+    return gap;
+  });
+}
+
+// By the facet that it was over when last looked for.
+bool may_press(const World& world, WorldState& state, const VoxelPair& pair) noexcept {
+  return pair.held || with_objects(world, state, pair.meeting, [&](const auto& a, const auto& b) {
+           return voxel::gap_of_pair(a, b, pair.pressed) < kLetGoAt * pair.pressed.reach_m;
+         });
+}
+
+void renew_pairs(const World& world, WorldState& state) noexcept {
+  for (std::size_t i = 0; i < state.pairs.size();) {
+    VoxelPair& pair = state.pairs[i];
+    // Most are only near one another, and a look for a facet costs as much as all else.
+    if ((i + state.tick) % kFarTurns != 0 && !may_press(world, state, pair)) {
+      ++i;
+      continue;
+    }
+    if (renew_pair(world, state, pair) < kPartAt - 1.0) {
+      ++i;
+      continue;
+    }
+    state.paired[pair.meeting][pair.surface_a] = 0;
+    pair = state.pairs.back();
+    state.pairs.pop_back();
+  }
+}
+
+// What links alone could not part, the chains of both follow: first of both, then, where anchors held one, of
+// the other.
+void part_pairs(const World& world, WorldState& state) noexcept {
+  for (VoxelPair& pair : state.pairs) {
+    if (may_press(world, state, pair)) renew_pair(world, state, pair);
+  }
+  for (const voxel::GiveWay who :
+       {voxel::GiveWay::both, voxel::GiveWay::both, voxel::GiveWay::second, voxel::GiveWay::first}) {
+    bool any = false;
+    // Those too far apart to be held as well: the chain takes along more than was dragged.
+    for (const VoxelPair& pair : state.pairs) {
+      any = with_objects(
+                world, state, pair.meeting,
+                [&](const auto& a, const auto& b) { return voxel::part_pair(a, b, pair.pressed, who); }) ||
+            any;
+    }
+    if (!any) return;
+    for (const auto& object : state.soft) object->settle_dragged();
   }
 }
 
 }  // namespace
 
 void relax_pairs(const World& world, WorldState& state) noexcept {
+  renew_pairs(world, state);
   for (std::uint32_t m = 0; m < world.meeting.size(); ++m) find_pairs(world, state, m);
-  const auto with_objects = [&](VoxelPair& pair, const auto& visit) {
-    const auto [ia, ib] = world.meeting[pair.meeting];
-    return visit(voxel::PosedObject{*state.soft[ia], world.soft[ia].pose},
-                 voxel::PosedObject{*state.soft[ib], world.soft[ib].pose}, pair.pressed);
-  };
-  for (VoxelPair& pair : state.pairs) {
-    with_objects(pair, [](const auto& a, const auto& b, const voxel::PressedPair& p) {
-      a.object.clear_pair_load(p.a);
-      b.object.clear_pair_load(p.b);
-    });
-  }
-  for (VoxelPair& pair : state.pairs) with_objects(pair, voxel::load_pair);
-  for (int sweep = 0; sweep < kPairSweeps; ++sweep) {
-    for (std::size_t i = 0; i < state.pairs.size();) {
-      const double gap = with_objects(state.pairs[i], voxel::relax_pair);
-      const VoxelPair pair = state.pairs[i];
-      const auto [ia, ib] = world.meeting[pair.meeting];
-      voxel::SoftObject &a = *state.soft[ia], &b = *state.soft[ib];
-      if (sweep > 0 || gap < (kPartAt - 1.0) * (a.voxel_radius() + b.voxel_radius())) {
-        ++i;
-        continue;
-      }
-      state.paired[pair.meeting][pair.surface_a] = 0;
-      state.pairs[i] = state.pairs.back();
-      state.pairs.pop_back();
-      // Either may be pressed by another voxel still.
-      const auto still = [&](std::uint32_t object, voxel::VoxelId v) {
-        return std::any_of(state.pairs.begin(), state.pairs.end(), [&](const VoxelPair& p) {
-          const auto [pa, pb] = world.meeting[p.meeting];
-          return (pa == object && p.pressed.a == v) || (pb == object && p.pressed.b == v);
-        });
-      };
-      if (!still(ia, pair.pressed.a)) a.release(pair.pressed.a);
-      if (!still(ib, pair.pressed.b)) b.release(pair.pressed.b);
+  const auto for_pairs = [&](const auto& visit) {
+    for (VoxelPair& pair : state.pairs) {
+      if (!pair.held) continue;
+      with_objects(world, state, pair.meeting,
+                   [&](const auto& a, const auto& b) { visit(a, b, pair.pressed); });
     }
-  }
+  };
+  const auto load = [&] {
+    for_pairs(voxel::clear_pair_load);
+    for_pairs(voxel::load_pair);
+  };
+  load();
+  for (int sweep = 0; sweep < kPairSweeps; ++sweep) for_pairs(voxel::relax_pair);
+  part_pairs(world, state);
+  load();  // by the facets as they now are
 }
 
 }  // namespace hybrid

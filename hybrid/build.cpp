@@ -348,6 +348,18 @@ class Builder {
     map_->add_moving(o, cells, object.pose.position_m, object.pose.rotation);
   }
 
+  void add_meetings() {
+    const auto spacing = [this](std::uint32_t o) { return soft_[o]->lattice().min_spacing_m(); };
+    for (std::uint32_t a = 0; a < soft_.size(); ++a) {
+      for (std::uint32_t b = a + 1; b < soft_.size(); ++b) {
+        if (spacing(a) < spacing(b)) {
+          world_->meeting.push_back({a, b});
+        } else {
+          world_->meeting.push_back({b, a});
+        }
+      }
+    }
+  }
   void finish_world() {
     world_->tool = scene_.tool;
     world_->set_scale(box_.low, box_.high);
@@ -363,9 +375,7 @@ class Builder {
     if (ideal && !scene_.max_energy_given)
       world_->limits.max_energy_J = std::numeric_limits<double>::infinity();
     if (scene_.passivity && !ideal) world_->passivity = passivity_options();
-    for (std::uint32_t a = 0; a < world_->soft.size(); ++a) {
-      for (std::uint32_t b = a + 1; b < world_->soft.size(); ++b) world_->meeting.push_back({a, b});
-    }
+    add_meetings();
     built_.state = std::make_unique<WorldState>(*world_, std::move(*map_));
     built_.state->soft = std::move(soft_);
     built_.state->prepare(*world_);

@@ -53,10 +53,8 @@ Clearance clearance(const World& world, const WorldState& state) noexcept {
   }
   for (const VoxelPair& pair : state.pairs) {
     const auto [a, b] = world.meeting[pair.meeting];
-    const voxel::SoftObject &first = *state.soft[a], &second = *state.soft[b];
-    const double distance = glm::distance(world.soft[a].to_scene(first.position(pair.pressed.a)),
-                                          world.soft[b].to_scene(second.position(pair.pressed.b)));
-    soft = std::min(soft, distance - first.voxel_radius() - second.voxel_radius());
+    soft = std::min(soft, voxel::gap_of_pair({*state.soft[a], world.soft[a].pose},
+                                             {*state.soft[b], world.soft[b].pose}, pair.pressed));
   }
   const auto or_nothing = [](double gap) {
     return std::isfinite(gap) ? gap : std::numeric_limits<double>::quiet_NaN();

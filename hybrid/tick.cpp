@@ -225,7 +225,6 @@ Surroundings look_around(const World& world, WorldState& state, const glm::dvec3
 Sweep settle_contact(const World& world, WorldState& state, const glm::dvec3& device,
                      const Surroundings& around) noexcept {
   Sweep sweep;
-  const glm::dvec3 before = state.proxy_m;
   std::fill(state.rigid_force_N.begin(), state.rigid_force_N.end(), glm::dvec3(0.0));
   std::fill(state.reactions.begin(), state.reactions.end(), voxel::Reaction{});
   if (!around.near_soft) {
@@ -238,7 +237,6 @@ Sweep settle_contact(const World& world, WorldState& state, const glm::dvec3& de
     const double moved = move_proxy(world, state, device, around.near_soft, travel, pass == 0, sweep);
     if (!around.near_soft || (pass > 0 && moved < kStill * world.contact_radius_m())) break;
   }
-  if (around.near_soft) give_way(world, state, before, sweep);
   if (!sweep.arrived) ++state.truncated_ticks;
   return sweep;
 }
@@ -288,16 +286,24 @@ TickResult haptic_tick(const World& world, WorldState& state, const device::Devi
   const Surroundings around = look_around(world, state, result.device_m);
   clock.done(Stage::broad_phase);
 
-  const Sweep sweep = settle_contact(world, state, result.device_m, around);
+  const glm::dvec3 before = state.proxy_m;
+  Sweep sweep = settle_contact(world, state, result.device_m, around);
   clock.done(Stage::contact);
 
   refresh_obstacles(world, state);
-  if (!world.meeting.empty()) relax_pairs(world, state);
+  const bool may_meet = !world.meeting.empty();
+  if (around.near_soft && !may_meet) give_way(world, state, before, sweep);
   clock.done(Stage::arbitration);
 
   relax_background(world, state);
   clock.done(Stage::background);
   if (state.apart.elsewhere_us > 0.0) clock.leave_out(Stage::background, state.apart.elsewhere_us);
+
+  // Last of all that moves tissue: nothing overlaps as a tick ends. And the tool after it, because one object
+  // may push the other back into its way.
+  if (may_meet) relax_pairs(world, state);
+  if (around.near_soft && may_meet) give_way(world, state, before, sweep);
+  clock.done(Stage::arbitration);
 
   refresh_map(world, state);
   clock.done(Stage::map);

@@ -102,7 +102,8 @@ struct World {
   double encoder_m = 0.0;       // what the device's position is rounded to
   bool use_map = true;          // false: every object is asked every time; a baseline to time the map against
   bool damping_account = true;  // false: sampled damping as it is; a baseline that theory is known for
-  // Pairs of soft objects that may meet: {smaller index, larger index}.
+  // Pairs of soft objects that may meet: the voxels of the first, the finer one, meet the surface of the
+  // second.
   std::vector<std::array<std::uint32_t, 2>> meeting;
 
   [[nodiscard]] std::size_t object_count() const { return rigid.size() + soft.size(); }
@@ -117,11 +118,12 @@ struct World {
   }
 };
 
-// A pair of surface voxels of two soft objects that press on one another.
+// A surface voxel of one soft object, and the other's surface that it presses on.
 struct VoxelPair {
   std::uint32_t meeting = 0;  // index into World::meeting
   voxel::PressedPair pressed;
   std::uint32_t surface_a = 0;
+  bool held = false;  // near enough to press: its voxels are moved with it, and by nobody else
 };
 
 // Named faults of a tick: each says which setting to raise.

@@ -11,7 +11,7 @@
 namespace voxel {
 namespace {
 
-constexpr std::size_t kSurfaceBlock = 1024;  // ids between two entries of surface_before_
+constexpr std::size_t kSurfaceBlock = 64;  // ids between two entries of surface_before_
 constexpr std::size_t kMostCells = std::size_t{1} << 31;
 
 void check_material(std::size_t label, const LinkMaterial& m) {

@@ -2,83 +2,345 @@
 #include "voxel/pair_contact.h"
 
 #include <algorithm>
+#include <cmath>
 #include <glm/geometric.hpp>
+#include <limits>
 
 namespace voxel {
 namespace {
 
 constexpr double kLeastSide = 0.1;  // surfaces that look the same way say nothing of who is where
+constexpr double kLeastAlong =
+    0.3;  // of a facet's normal along the axis: a steeper one is pressed as a level one
+// Of the touching distance: a voxel further beside the last facet of a surface than this is past its edge.
+constexpr double kBeside = 0.75;
+constexpr double kPushed = 1e-6;   // of it: roundings
+constexpr double kParted = 0.01;   // of it: less overlap is left to the next tick
+constexpr int kSteps = 4;          // over the surface, in search of the facet
+constexpr double kInside = -1e-9;  // barycentric
+constexpr VoxelId kNone = std::numeric_limits<VoxelId>::max();
 
 struct End {
   glm::dvec3 free_place;  // where its links and the other pairs would have it, scene frame
   glm::dvec3 compliance;  // per body axis (m/N); 0 where it is anchored
 };
 
+glm::dvec3 to_scene(const PosedObject& o, const glm::dvec3& in_body) noexcept {
+  return o.pose.origin + o.pose.rotation * in_body;
+}
+glm::dvec3 to_body(const PosedObject& o, const glm::dvec3& in_scene) noexcept {
+  return glm::inverse(o.pose.rotation) * (in_scene - o.pose.origin);
+}
+glm::dvec3 place_of(const PosedObject& o, VoxelId v) noexcept {
+  return to_scene(o, o.object.position(v));
+}
+
 End end_of(const PosedObject& o, VoxelId v) noexcept {
   const glm::dvec3 w = o.object.compliance(v);
   const glm::dvec3 u = o.object.free_displacement(v) + w * o.object.pair_load(v);
-  return {o.pose.origin + o.pose.rotation * (o.object.lattice().rest(v) + u), w};
+  return {to_scene(o, o.object.lattice().rest(v) + u), w};
 }
 
 void place(const PosedObject& o, VoxelId v, const glm::dvec3& in_scene) noexcept {
-  const glm::dvec3 in_body = glm::inverse(o.pose.rotation) * (in_scene - o.pose.origin);
-  o.object.move(v, in_body - o.object.lattice().rest(v));
+  o.object.move(v, to_body(o, in_scene) - o.object.lattice().rest(v));
 }
 
 void press(const PosedObject& o, VoxelId v, const glm::dvec3& force_N) noexcept {
   o.object.add_pair_load(v, glm::inverse(o.pose.rotation) * force_N);
 }
 
-glm::dvec3 between(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept {
-  return (b.pose.origin + b.pose.rotation * b.object.position(pair.b)) -
-         (a.pose.origin + a.pose.rotation * a.object.position(pair.a));
+// How far a force of 1 N along `way` (scene frame) takes a voxel along it (m/N), and the way it goes (body).
+struct Yielding {
+  double along;
+  glm::dvec3 way;
+};
+Yielding yielding(const PosedObject& o, const glm::dvec3& compliance, const glm::dvec3& way) noexcept {
+  const glm::dvec3 in_body = glm::inverse(o.pose.rotation) * way;
+  return {glm::dot(in_body, compliance * in_body), compliance * in_body};
 }
 
-// From the first to the second, on the side where that belongs: mirrored where they passed one another.
-glm::dvec3 direction(const glm::dvec3& now, const glm::dvec3& side) noexcept {
-  const double length = glm::length(now);
-  if (!(length > 0.0)) return side != glm::dvec3(0.0) ? side : glm::dvec3(0.0, 0.0, 1.0);
-  const double passed = std::min(glm::dot(now, side), 0.0);
-  return (now - 2.0 * passed * side) / length;
+// A surface seen along one axis of its lattice: a height over the two others.
+struct Surface {
+  const SoftObject& object;
+  int axis;
+  bool upwards;
+
+  [[nodiscard]] int across(int n) const { return (axis + 1 + n) % 3; }
+  [[nodiscard]] VoxelId outer(VoxelId v) const {
+    return upwards ? object.lattice().up(v, axis) : object.lattice().down(v, axis);
+  }
+  [[nodiscard]] VoxelId inner(VoxelId v) const {
+    return upwards ? object.lattice().down(v, axis) : object.lattice().up(v, axis);
+  }
+  [[nodiscard]] bool is_top(VoxelId v) const {
+    return object.lattice().filled(v) && !object.lattice().filled(outer(v));
+  }
+  // The next one on the surface, a step of the lattice higher or lower at most.
+  [[nodiscard]] VoxelId beside(VoxelId v, int n, bool up) const {
+    if (v == kNone) return kNone;
+    const VoxelId level = up ? object.lattice().up(v, across(n)) : object.lattice().down(v, across(n));
+    for (const VoxelId w : {level, outer(level), inner(level)}) {
+      if (is_top(w)) return w;
+    }
+    return kNone;
+  }
+  [[nodiscard]] glm::dvec2 flat(const glm::dvec3& p) const { return {p[across(0)], p[across(1)]}; }
+};
+
+double cross(const glm::dvec2& a, const glm::dvec2& b) noexcept {
+  return a.x * b.y - a.y * b.x;
+}
+
+// Of a point in a flat triangle; false where it is outside, or the triangle is none.
+bool shares(const std::array<glm::dvec2, 3>& at, const glm::dvec2& p, std::array<double, 3>& out) noexcept {
+  const double area = cross(at[1] - at[0], at[2] - at[0]);
+  if (area == 0.0) return false;
+  out[1] = cross(p - at[0], at[2] - at[0]) / area;
+  out[2] = cross(at[1] - at[0], p - at[0]) / area;
+  out[0] = 1.0 - out[1] - out[2];
+  return out[0] >= kInside && out[1] >= kInside && out[2] >= kInside;
+}
+
+// Of the facets round a surface voxel, split along the diagonal from the lower to the upper corner, that
+// under p.
+bool facet_round(const Surface& surface, VoxelId v, const glm::dvec3& p, PressedPair& pair) noexcept {
+  const glm::dvec2 flat = surface.flat(p), from = flat - surface.flat(surface.object.position(v));
+  for (int n = 0; n < 4; ++n) {
+    // The most likely first.
+    const bool up0 = (from.x >= 0.0) != ((n & 1) != 0), up1 = (from.y >= 0.0) != ((n & 2) != 0);
+    VoxelId corner = v;
+    if (!up0) corner = surface.beside(corner, 0, false);
+    if (!up1) corner = surface.beside(corner, 1, false);
+    const VoxelId along0 = surface.beside(corner, 0, true), along1 = surface.beside(corner, 1, true);
+    const VoxelId far_corner = surface.beside(along0, 1, true);
+    if (corner == kNone || far_corner == kNone) continue;
+    for (const VoxelId third : {along0, along1}) {
+      if (third == kNone) continue;
+      const std::array<VoxelId, 3> voxels{corner, third, far_corner};
+      std::array<glm::dvec2, 3> at;
+      for (std::size_t i = 0; i < 3; ++i) at[i] = surface.flat(surface.object.position(voxels[i]));
+      if (!shares(at, flat, pair.share)) continue;
+      pair.facet = voxels;
+      return true;
+    }
+  }
+  return false;
+}
+
+// The component along the axis of a triangle's unit normal, and that normal over it.
+double normal_of(const std::array<glm::dvec3, 3>& at, int axis, bool inwards_up, glm::dvec3& out) noexcept {
+  const glm::dvec3 n = glm::cross(at[1] - at[0], at[2] - at[0]);
+  const double length = glm::length(n), along = length > 0.0 ? std::fabs(n[axis]) / length : 0.0;
+  out = glm::dvec3(0.0);
+  out[axis] = inwards_up ? 1.0 : -1.0;
+  if (along >= kLeastAlong) out = n / (inwards_up ? n[axis] : -n[axis]);
+  return along;
+}
+
+glm::dvec3 middle(const PosedObject& b, const PressedPair& pair) noexcept {
+  glm::dvec3 sum(0.0);
+  for (std::size_t i = 0; i < 3; ++i) sum += pair.share[i] * place_of(b, pair.facet[i]);
+  return sum;
+}
+
+double overlap_of(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept {
+  return pair.reach_m - glm::dot(middle(b, pair) - place_of(a, pair.a), pair.across);
+}
+
+template <class Visit>
+void for_corners(const PressedPair& pair, const Visit& visit) noexcept {
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (pair.share[i] > 0.0) visit(pair.facet[i], pair.share[i], i);
+  }
+}
+
+double yielding_of_facet(const PosedObject& b, const PressedPair& pair) noexcept {
+  double sum = 0.0;
+  for_corners(pair, [&](VoxelId v, double share, std::size_t) {
+    sum += share * share * yielding(b, b.object.compliance(v), pair.across).along;
+  });
+  return sum;
+}
+
+void press_more(const PosedObject& a, const PosedObject& b, PressedPair& pair, double more_N) noexcept {
+  PressedPair more = pair;
+  more.force_N = more_N * pair.across;
+  pair.force_N += more.force_N;
+  load_pair(a, b, more);
+}
+
+// What the chain of one object did not let it give way by, the other gives way by, and presses that much
+// harder.
+void push_the_rest(const PosedObject& a, const PosedObject& b, PressedPair& pair, double yielding_a,
+                   double yielding_b) noexcept {
+  const double least = kPushed * pair.reach_m;
+  const double left = overlap_of(a, b, pair);
+  if (left > least && yielding_b > 0.0) {
+    for_corners(pair, [&](VoxelId v, double share, std::size_t) {
+      const glm::dvec3 way = yielding(b, b.object.compliance(v), pair.across).way;
+      b.object.move(v, b.object.state().at(v) + (share * left / yielding_b) * way);
+    });
+    press_more(a, b, pair, std::max(left - overlap_of(a, b, pair), 0.0) / yielding_b);
+  }
+  const double rest = overlap_of(a, b, pair);
+  if (rest > least && yielding_a > 0.0) {
+    const glm::dvec3 way = yielding(a, a.object.compliance(pair.a), pair.across).way;
+    a.object.move(pair.a, a.object.state().at(pair.a) - (rest / yielding_a) * way);
+    press_more(a, b, pair, std::max(rest - overlap_of(a, b, pair), 0.0) / yielding_a);
+  }
 }
 
 }  // namespace
 
-glm::dvec3 side_of_pair(const PosedObject& a, VoxelId in_a, const PosedObject& b, VoxelId in_b) noexcept {
+PressedPair pair_of(const PosedObject& a, VoxelId in_a, const PosedObject& b, VoxelId in_b) noexcept {
+  PressedPair pair{.a = in_a, .b = in_b};
   const glm::dvec3 side =
       a.pose.rotation * a.object.lattice().outward(in_a) - b.pose.rotation * b.object.lattice().outward(in_b);
   const double length = glm::length(side);
-  return length > kLeastSide ? side / length : glm::dvec3(0.0);
+  if (!(length > kLeastSide)) return pair;
+  const glm::dvec3 out = glm::inverse(b.pose.rotation) * (-side / length);
+  double most = kLeastAlong;
+  for (int axis = 0; axis < 3; ++axis) {
+    const bool upwards = out[axis] > 0.0;
+    if (std::fabs(out[axis]) <= most || !Surface{b.object, axis, upwards}.is_top(in_b)) continue;
+    most = std::fabs(out[axis]);
+    pair.axis = axis;
+    pair.upwards = upwards;
+    pair.side = side / length;
+  }
+  if (pair.side != glm::dvec3(0.0)) find_facet(a, b, pair);
+  return pair;
+}
+
+void find_facet(const PosedObject& a, const PosedObject& b, PressedPair& pair) noexcept {
+  const Surface surface{b.object, pair.axis, pair.upwards};
+  const glm::dvec3 p = to_body(b, place_of(a, pair.a));
+  const glm::dvec2 flat = surface.flat(p);
+  const auto away = [&](VoxelId v) {
+    const glm::dvec2 d = surface.flat(b.object.position(v)) - flat;
+    return glm::dot(d, d);
+  };
+  double nearest = away(pair.b);
+  bool found = false;
+  for (int step = 0; step < kSteps && !found; ++step) {
+    found = facet_round(surface, pair.b, p, pair);
+    if (found) break;
+    VoxelId next = pair.b;
+    for (int n = 0; n < 2; ++n) {
+      for (const bool up : {false, true}) {
+        const VoxelId w = surface.beside(pair.b, n, up);
+        if (w == kNone || away(w) >= nearest) continue;
+        nearest = away(w);
+        next = w;
+      }
+    }
+    if (next == pair.b) break;
+    pair.b = next;
+  }
+  const double apart = a.object.voxel_radius() + b.object.voxel_radius();
+  pair.reach_m = apart;
+  pair.over = found || nearest <= kBeside * kBeside * apart * apart;
+  glm::dvec3 across(0.0);
+  across[pair.axis] = pair.upwards ? -1.0 : 1.0;
+  if (found) {
+    std::array<glm::dvec3, 3> at, rest;
+    for (std::size_t i = 0; i < 3; ++i) {
+      at[i] = b.object.position(pair.facet[i]);
+      rest[i] = b.object.lattice().rest(pair.facet[i]);
+      pair.share[i] = std::clamp(pair.share[i], 0.0, 1.0);
+    }
+    // Along the axis two oblique surfaces that touch are further apart than across themselves.
+    glm::dvec3 at_rest;
+    pair.reach_m = apart / std::max(normal_of(rest, pair.axis, !pair.upwards, at_rest), kLeastAlong);
+    normal_of(at, pair.axis, !pair.upwards, across);
+    const auto most = std::max_element(pair.share.begin(), pair.share.end());
+    pair.b = pair.facet[static_cast<std::size_t>(most - pair.share.begin())];
+  } else {
+    pair.facet = {pair.b, pair.b, pair.b};
+    pair.share = {1.0, 0.0, 0.0};
+  }
+  pair.across = b.pose.rotation * across;
+}
+
+double gap_of_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept {
+  return pair.over ? -overlap_of(a, b, pair) : std::numeric_limits<double>::infinity();
+}
+
+void hold_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept {
+  a.object.hold(pair.a);
+  for (const VoxelId v : pair.facet) b.object.hold(v);
+}
+
+void release_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept {
+  a.object.release(pair.a);
+  for (const VoxelId v : pair.facet) b.object.release(v);
+}
+
+void clear_pair_load(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept {
+  a.object.clear_pair_load(pair.a);
+  for (const VoxelId v : pair.facet) b.object.clear_pair_load(v);
 }
 
 void load_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept {
   press(a, pair.a, -pair.force_N);
-  press(b, pair.b, pair.force_N);
+  for_corners(pair, [&](VoxelId v, double share, std::size_t) { press(b, v, share * pair.force_N); });
 }
 
 double relax_pair(const PosedObject& a, const PosedObject& b, PressedPair& pair) noexcept {
-  load_pair(a, b, {pair.a, pair.b, -pair.force_N, pair.side});  // its own share is found anew
+  PressedPair own = pair;
+  own.force_N = -pair.force_N;
+  load_pair(a, b, own);  // its own share is found anew
   pair.force_N = glm::dvec3(0.0);
-  End ea = end_of(a, pair.a), eb = end_of(b, pair.b);
-  const double apart = a.object.voxel_radius() + b.object.voxel_radius();
-  // The direction is that of the voxels as they are: their free places may lie on the wrong side of one
-  // another.
-  const glm::dvec3 n = direction(between(a, b, pair), pair.side);
-  const double overlap = apart - glm::dot(eb.free_place - ea.free_place, n);
-  if (overlap > 0.0) {
-    const glm::dvec3 na = glm::inverse(a.pose.rotation) * n, nb = glm::inverse(b.pose.rotation) * n;
-    const double wa = glm::dot(na, ea.compliance * na), wb = glm::dot(nb, eb.compliance * nb);
-    if (wa + wb > 0.0) {
-      const double force = overlap / (wa + wb);  // N, equal and opposite
-      ea.free_place -= a.pose.rotation * (force * ea.compliance * na);
-      eb.free_place += b.pose.rotation * (force * eb.compliance * nb);
-      pair.force_N = force * n;
-      load_pair(a, b, pair);
-    }
+  End first = end_of(a, pair.a);
+  std::array<End, 3> corners;
+  glm::dvec3 free_middle(0.0);
+  for_corners(pair, [&](VoxelId v, double share, std::size_t i) {
+    corners[i] = end_of(b, v);
+    free_middle += share * corners[i].free_place;
+  });
+  const double overlap =
+      pair.over ? pair.reach_m - glm::dot(free_middle - first.free_place, pair.across) : 0.0;
+  const Yielding of_first = yielding(a, first.compliance, pair.across);
+  const double of_facet = yielding_of_facet(b, pair);
+  if (overlap > 0.0 && of_first.along + of_facet > 0.0) {
+    const double force = overlap / (of_first.along + of_facet);  // N, equal and opposite
+    first.free_place -= a.pose.rotation * (force * of_first.way);
+    for_corners(pair, [&](VoxelId, double share, std::size_t i) {
+      corners[i].free_place +=
+          b.pose.rotation * (share * force * yielding(b, corners[i].compliance, pair.across).way);
+    });
+    press_more(a, b, pair, force);
   }
-  place(a, pair.a, ea.free_place);
-  place(b, pair.b, eb.free_place);
-  return glm::length(between(a, b, pair)) - apart;
+  place(a, pair.a, first.free_place);
+  for_corners(pair, [&](VoxelId v, double, std::size_t i) { place(b, v, corners[i].free_place); });
+  if (overlap > 0.0) push_the_rest(a, b, pair, of_first.along, of_facet);
+  return gap_of_pair(a, b, pair);
+}
+
+bool part_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pair, GiveWay who) noexcept {
+  if (!pair.over) return false;
+  const double overlap = overlap_of(a, b, pair);
+  if (overlap <= kParted * pair.reach_m) return false;
+  const double of_first = yielding(a, a.object.compliance(pair.a), pair.across).along;
+  const double of_facet = yielding_of_facet(b, pair);
+  const double first = who == GiveWay::second ? 0.0 : of_first;
+  const double second = who == GiveWay::first ? 0.0 : of_facet;
+  if (!(first + second > 0.0)) return true;
+  // Along the axis, so that the voxel stays over the facet. (Across the facet, as forces go, it had slid to
+  // the next one when all was done, and was half a spacing deep in that.)
+  glm::dvec3 along(0.0);
+  along[pair.axis] = pair.upwards ? -overlap : overlap;
+  const glm::dvec3 in_scene = b.pose.rotation * along;
+  if (first > 0.0)
+    a.object.drag(pair.a, glm::inverse(a.pose.rotation) * in_scene * (-first / (first + second)));
+  if (second > 0.0) {
+    double squares = 0.0;
+    for (const double share : pair.share) squares += share * share;
+    for_corners(pair, [&](VoxelId v, double share, std::size_t) {
+      b.object.drag(v, along * (share / squares * second / (first + second)));
+    });
+  }
+  return true;
 }
 
 }  // namespace voxel

@@ -99,7 +99,8 @@ class SoftObject {
   static constexpr std::size_t kMostMovedRows = 1024;
   [[nodiscard]] std::span<const RowId> moved_rows() const { return moved_rows_; }
   void forget_moved_rows() noexcept;
-  // A voxel pressed by another soft object: moved by the caller, held meanwhile. See pair_contact.h.
+  // A voxel pressed by another soft object: moved by the caller, held meanwhile, until it was released as
+  // often as it was held. See pair_contact.h.
   void hold(VoxelId v) noexcept;
   void release(VoxelId v) noexcept;
   // What other objects press it with (body frame, N): a tool under which the chain is tight down to it feels
@@ -113,6 +114,10 @@ class SoftObject {
   [[nodiscard]] glm::dvec3 compliance(VoxelId v) noexcept;
   // Moves it, as far as its links allow.
   void move(VoxelId v, const glm::dvec3& displacement) noexcept;
+  // Moves it however far, and, once all that is to be moved so was, the chain after: anchors and rigid
+  // surfaces may keep it from getting there.
+  void drag(VoxelId v, const glm::dvec3& by) noexcept;
+  void settle_dragged() noexcept;
 
   [[nodiscard]] bool moved_ever() const { return moved_ever_; }
   [[nodiscard]] bool asleep() const { return relaxation_.asleep(); }
@@ -163,10 +168,16 @@ class SoftObject {
     VoxelId v;
     std::uint32_t touch;  // whose load it adds to
   };
+  struct Hanging {       // as Carried, by the link through which it was first reached
+    std::uint32_t from;  // index into carried_
+    bool up, down;       // that link is at the limit that pulls it up, down
+    double load;         // of it, and of what hangs on it (N)
+  };
 
   [[nodiscard]] Gap gap(const ToolInBody& tool, const glm::dvec3& position) const noexcept;
   void settle_chain() noexcept;
   [[nodiscard]] Displacement::Role resting_role(VoxelId v) const noexcept;  // when no tool presses it
+  [[nodiscard]] bool pair_held(VoxelId v) const { return pair_held_[lattice_->surface_number(v)] != 0; }
   void set_touch_roles() noexcept;
   void give_away() noexcept;  // what pulls near the contact is somebody else's
   std::size_t list_held() noexcept;
@@ -176,6 +187,7 @@ class SoftObject {
   [[nodiscard]] glm::dvec3 load_on(VoxelId v) noexcept;
   void draw_along(int axis) noexcept;
   void gather_load(int axis) noexcept;
+  void gather_load_with_pairs(int axis) noexcept;
   void let_go_of_carried() noexcept;
   [[nodiscard]] ObstacleView obstacle_view() const { return {obstacles_, lattice_.get()}; }
 
@@ -183,9 +195,9 @@ class SoftObject {
   Displacement state_;
   ChainMail chain_;
   Relaxation relaxation_;
-  std::vector<std::uint8_t> pair_held_;  // [surface number] 1 while another soft object presses it
-  LazyArray<glm::vec3> pair_load_;       // [surface number] and with what force (N)
-  std::vector<Obstacle> obstacles_;      // [surface number], empty when there is none
+  std::vector<std::uint16_t> pair_held_;  // [surface number] pairs with other soft objects it is in
+  LazyArray<glm::vec3> pair_load_;        // [surface number] and with what force (N)
+  std::vector<Obstacle> obstacles_;       // [surface number], empty when there is none
   std::vector<RowId> moved_rows_;
   LazyArray<std::uint8_t> row_moved_;             // 1: among them; empty: no obstacles
   std::vector<std::uint32_t> changed_obstacles_;  // surface numbers, since a replica was last told
@@ -198,7 +210,9 @@ class SoftObject {
   std::vector<VoxelId> all_held_;     // by the tool, too
   std::vector<VoxelId> sources_;
   std::vector<glm::vec3> moves_;
+  bool dragging_ = false;                   // sources_ are what drag() moved, moves_ where they were
   std::vector<Carried> carried_;            // [pressed first, then what hangs on them by a tight link]
+  std::vector<Hanging> hanging_;            // [as carried_]
   LazyArray<std::uint8_t> carried_mark_;    // [v] 1: in carried_ (within touch(): was pressed)
   LazyArray<std::uint32_t> carried_index_;  // [v]
   double unrelaxed_m_ = 0.0;                // motion of pressed voxels since the background was last woken

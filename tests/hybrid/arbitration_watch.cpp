@@ -203,6 +203,12 @@ double in_front_of(const FaceGrid& grid, const Face& face, const dvec3& p) {
     for (int i = 0; i + 1 < grid.count[0]; ++i) {
       const std::array<std::size_t, 4> corner{index(i, j), index(i + 1, j), index(i + 1, j + 1),
                                               index(i, j + 1)};
+      const auto past = [&](int axis) {
+        const auto at = [&](std::size_t n) { return grid.at[corner[n]][axis]; };
+        return p[axis] < std::min({at(0), at(1), at(2), at(3)}) ||
+               p[axis] > std::max({at(0), at(1), at(2), at(3)});
+      };
+      if (past(x) || past(y)) continue;
       for (const std::array<std::size_t, 3>& t :
            {std::array<std::size_t, 3>{0, 1, 2}, std::array<std::size_t, 3>{0, 2, 3}}) {
         const std::size_t ia = corner[t[0]], ib = corner[t[1]], ic = corner[t[2]];

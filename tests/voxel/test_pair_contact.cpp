@@ -33,10 +33,10 @@ struct Stack {
   std::shared_ptr<const Lattice> lattice_below, lattice_above;
   SoftObject below, above;
   BodyPose pose_below, pose_above;
-  std::vector<PressedPair> pairs;  // a: below
+  std::vector<PressedPair> pairs;  // of the voxels below, on the surface above
 
   Stack(const std::array<int, 3>& size, double young_below, double young_above, double overlap,
-        const BodyPose& frame = {})
+        const BodyPose& frame = {}, double beside = 0.0)
       : dims(size),
         lattice_below(
             std::make_shared<Lattice>(block(size, glm::dvec3(kH)), made_of(elastic(young_below, 0.3), "-z"))),
@@ -45,16 +45,17 @@ struct Stack {
         below(lattice_below),
         above(lattice_above),
         pose_below(frame),
-        pose_above{frame.origin + frame.rotation * glm::dvec3(0, 0, size[2] * kH - overlap), frame.rotation} {
+        pose_above{frame.origin + frame.rotation * glm::dvec3(beside, beside, size[2] * kH - overlap),
+                   frame.rotation} {
     for (int j = 0; j < size[1]; ++j) {
       for (int i = 0; i < size[0]; ++i) {
-        pairs.push_back({voxel_at(*lattice_below, i, j, size[2] - 1), voxel_at(*lattice_above, i, j, 0)});
+        pairs.push_back(voxel::pair_of({below, pose_below}, voxel_at(*lattice_below, i, j, size[2] - 1),
+                                       {above, pose_above}, voxel_at(*lattice_above, i, j, 0)));
       }
     }
-    for (PressedPair& pair : pairs) {
-      pair.side = voxel::side_of_pair({below, pose_below}, pair.a, {above, pose_above}, pair.b);
-      below.hold(pair.a);
-      above.hold(pair.b);
+    for (const PressedPair& pair : pairs) {
+      // Single voxels look nowhere.
+      if (pair.side != glm::dvec3(0.0)) voxel::hold_pair({below, pose_below}, {above, pose_above}, pair);
     }
   }
 
@@ -126,13 +127,55 @@ TEST(PairContact, ForcesAreEqualAndOpposite) {
         EXPECT_LE(deepest, 0.05 * kH);
         EXPECT_NEAR(force, expected, 0.01 * expected);
         // The softer one gives way by so much more as it is softer.
-        const auto& [b, a, force_N, side] = stack.pairs[stack.pairs.size() / 2];
-        const double down = -stack.below.state().at(b).z, up = stack.above.state().at(a).z;
+        const PressedPair& middle = stack.pairs[stack.pairs.size() / 2];
+        const double down = -stack.below.state().at(middle.a).z, up = stack.above.state().at(middle.b).z;
         EXPECT_NEAR(down / up, young_above / young_below, 0.02 * young_above / young_below);
         EXPECT_NEAR(down + up, 0.8 * kH, 0.01 * kH);
       }
     }
   }
+}
+
+TEST(PairContact, AVoxelBetweenFourIsHeldByAllOfThem) {
+  for (const double beside : {0.25 * kH, 0.5 * kH}) {
+    Stack stack({6, 6, 6}, 1e4, 2e4, 0.6 * kH, {}, beside);
+    stack.relax(400);
+    glm::dvec3 below(0.0), above(0.0), pressed(0.0);
+    double deepest = 0.0;
+    for (const PressedPair& pair : stack.pairs) {
+      deepest = std::max(deepest, -voxel::gap_of_pair({stack.below, stack.pose_below},
+                                                      {stack.above, stack.pose_above}, pair));
+      below += stack.force_below(pair.a);
+      pressed += pair.force_N;
+      double shares = 0.0;
+      for (const double share : pair.share) shares += share;
+      EXPECT_NEAR(shares, 1.0, 1e-9);
+    }
+    for (int j = 0; j < 6; ++j) {
+      for (int i = 0; i < 6; ++i) above += stack.force_above(voxel_at(*stack.lattice_above, i, j, 0));
+    }
+    std::cout << beside / kH << " spacings beside: below " << below.z << " N, above " << above.z
+              << " N, deepest " << deepest / kH << " spacings\n";
+    EXPECT_GT(pressed.z, 0.0);
+    EXPECT_LE(glm::length(below + above), 0.01 * glm::length(below));
+    EXPECT_LE(glm::length(below - pressed), 0.01 * glm::length(below));
+    EXPECT_LE(deepest, 0.05 * kH);
+  }
+}
+
+TEST(PairContact, ChainsFollowWhatLinksCannot) {
+  // Each voxel may come 0.95 of a spacing nearer to the one behind it; the rest is for those behind.
+  Stack stack({3, 3, 4}, 1e4, 2e4, 2.4 * kH);
+  const voxel::PosedObject below{stack.below, stack.pose_below}, above{stack.above, stack.pose_above};
+  for (PressedPair& pair : stack.pairs) EXPECT_LT(stack.press(pair), -0.4 * kH);
+  for (const auto who : {voxel::GiveWay::both, voxel::GiveWay::second, voxel::GiveWay::first}) {
+    for (const PressedPair& pair : stack.pairs) voxel::part_pair(below, above, pair, who);
+    stack.below.settle_dragged();
+    stack.above.settle_dragged();
+  }
+  for (const PressedPair& pair : stack.pairs) EXPECT_GE(voxel::gap_of_pair(below, above, pair), -0.02 * kH);
+  EXPECT_LE(voxel::worst_violation(*stack.lattice_below, stack.below.state()), 1e-5 * kH);
+  EXPECT_LE(voxel::worst_violation(*stack.lattice_above, stack.above.state()), 1e-5 * kH);
 }
 
 TEST(PairContact, OverlapIsSharedInverselyToStiffnessAtOnce) {
@@ -172,8 +215,8 @@ TEST(PairContact, AnAnchoredVoxelDoesNotGiveWay) {
   SoftObject above(tall);
   BodyPose pose{{0.0, 0.0, 0.7 * kH}, {1.0, 0.0, 0.0, 0.0}};
   const VoxelId b = voxel_at(*stack.lattice_below, 0, 0, 0), a = voxel_at(*tall, 0, 0, 0);
-  above.hold(a);
-  PressedPair pair{b, a};
+  PressedPair pair = voxel::pair_of({stack.below, stack.pose_below}, b, {above, pose}, a);
+  voxel::hold_pair({stack.below, stack.pose_below}, {above, pose}, pair);
   const double gap = voxel::relax_pair({stack.below, stack.pose_below}, {above, pose}, pair);
   EXPECT_NEAR(gap, 0.0, 1e-9);
   EXPECT_EQ(stack.below.state().at(b), glm::dvec3(0.0));
