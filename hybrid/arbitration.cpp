@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <glm/geometric.hpp>
 
+#include "hybrid/body_tissue.h"
+
 namespace hybrid {
 namespace {
 
@@ -29,6 +31,7 @@ NearestRigid nearest_rigid(const World& world, const WorldState& state, const gl
   for (std::uint32_t o = 0; o < world.rigid.size(); ++o) {
     if ((mask & OccupancyMap::rigid_bit(o)) == 0) continue;
     const RigidObject& object = world.rigid[o];
+    if (object.presses_tissue) continue;  // is looked at in every tick (body_tissue.h)
     polygon::NearPoint near;
     if (!object.surface->nearest(object.to_body(point), best.distance, near) || !(near.distance > 0.0))
       continue;
@@ -72,7 +75,7 @@ std::size_t find_obstacles(const World& world, WorldState& state, std::size_t so
     ++count;
     voxel::Obstacle obstacle = obstacle_of(body, object, surface[s], near);
     obstacle.bound = std::min(obstacle.bound, 0.0F);  // nothing presses at rest
-    object.set_obstacle(s, obstacle);
+    set_standing_obstacle(state, soft, s, obstacle);
   }
   return count;
 }
@@ -95,9 +98,9 @@ void refresh_obstacles(const World& world, WorldState& state) noexcept {
       state.obstacle_seen[o][s] = u;
       const glm::dvec3 at = body.to_scene(object.position(v));
       const NearestRigid near = from_outside(world, at, nearest_rigid(world, state, at, range));
-      const voxel::Obstacle old = object.obstacles()[s];
+      const voxel::Obstacle old = standing_obstacle(state, o, s);
       if (!near.found) {
-        object.set_obstacle(s, {});
+        set_standing_obstacle(state, o, s, {});
         return;
       }
       voxel::Obstacle fresh = obstacle_of(body, object, v, near);
@@ -109,7 +112,7 @@ void refresh_obstacles(const World& world, WorldState& state) noexcept {
       // (The depth it has was left to it once: then a fast tool presses it in deeper tick by tick, and
       // through.)
       fresh.bound = std::min(fresh.bound, glm::dot(fresh.normal, u) + enough);
-      object.set_obstacle(s, fresh);
+      set_standing_obstacle(state, o, s, fresh);
     };
     for (const voxel::VoxelId v : object.touched()) look(object.surface_number(v));
     const auto count = static_cast<std::uint32_t>(surface.size());

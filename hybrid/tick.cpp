@@ -12,6 +12,7 @@
 
 #include "hybrid/arbitration.h"
 #include "hybrid/body_stage.h"
+#include "hybrid/body_tissue.h"
 #include "hybrid/feel_stage.h"
 #include "hybrid/relax_apart.h"
 #include "hybrid/rigid_step.h"
@@ -288,6 +289,9 @@ TickResult haptic_tick(const World& world, WorldState& state, const device::Devi
   const Surroundings around = look_around(world, state, result.device_m);
   clock.done(Stage::broad_phase);
 
+  press_by_bodies(world, state);
+  clock.done(Stage::arbitration);
+
   const Sweep sweep = settle_contact(world, state, result.device_m, around);
   clock.done(Stage::contact);
 
@@ -299,6 +303,7 @@ TickResult haptic_tick(const World& world, WorldState& state, const device::Devi
   clock.done(Stage::background);
   if (state.apart.elsewhere_us > 0.0) clock.leave_out(Stage::background, state.apart.elsewhere_us);
 
+  judge_bodies(world, state);
   refresh_map(world, state);
   clock.done(Stage::map);
 

@@ -1,0 +1,255 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/body_tissue.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+
+#include "polygon/signed_distance.h"
+
+namespace hybrid {
+namespace {
+
+constexpr std::size_t kLooks = 600;   // exact queries a tick, of each soft object
+constexpr double kWatched = 1.5;      // spacings from a body within which a voxel has its half-space
+constexpr double kLookFar = 8.0;      // spacings further that one query looks, so that the next is not soon
+constexpr double kMovedAgain = 0.02;  // of the spacing: a voxel at a body that stands is looked at again
+constexpr double kComesOut = 0.25;    // of the spacing, and as far as the body moved: in one tick
+constexpr double kRests = 1e-3;       // of the spacing: so near to its half-space a voxel lies on it
+constexpr double kSqueezed = 0.05;    // of the spacing: deeper in a body than this is a fault
+
+bool exists(const voxel::Obstacle& o) {
+  return o.normal != glm::vec3(0.0F);
+}
+
+// How far a voxel is from the plane it may not cross (m).
+double slack(const voxel::Obstacle& o, const glm::dvec3& u) {
+  return glm::dot(glm::dvec3(o.normal), u) - static_cast<double>(o.bound);
+}
+
+class TissueAtBodies {
+ public:
+  TissueAtBodies(const World& world, WorldState& state, std::size_t soft)
+      : world_(world),
+        state_(state),
+        body_(world.soft[soft]),
+        soft_(soft),
+        object_(*state.soft[soft]),
+        beside_(state.beside_bodies[soft]),
+        spacing_m_(object_.lattice().min_spacing_m()),
+        watched_m_(kWatched * object_.lattice().max_spacing_m()) {}
+
+  // Which voxels may be near, and have to be looked at.
+  void list(std::uint32_t b) noexcept {
+    const double moved = state_.body_moved_m[b];
+    for (const std::uint32_t s : beside_.near) {
+      if (beside_.whose[s] != b) continue;
+      const double since = glm::distance(displacement(s), glm::dvec3(sight(b, s).u));
+      if (moved == 0.0 && since < kMovedAgain * spacing_m_) continue;
+      add(slack(beside_.moving[s], displacement(s)) - moved - object_.voxel_radius(), b, s);
+    }
+    if (moved == 0.0 && object_.asleep()) return;
+    const BodyFrame& frame = state_.rigid[b].frame;
+    const polygon::RigidSurface& surface = *world_.rigid[b].surface;
+    const glm::dvec3 half = 0.5 * (surface.upper() - surface.lower());
+    glm::dvec3 reach(watched_m_ + moved + object_.voxel_radius() + 2.0 * state_.map.cell_m());
+    for (int axis = 0; axis < 3; ++axis) reach += glm::abs(frame.rotation[axis]) * half[axis];
+    const glm::dvec3 middle = frame.to_scene(0.5 * (surface.upper() + surface.lower()));
+    const std::size_t count = state_.map.soft_in(middle - reach, middle + reach, state_.found);
+    if (count == state_.found.size()) state_.faults |= fault_body_crowded;
+    const std::size_t surface_count = object_.lattice().surface().size();
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::uint32_t s = state_.found[i] - body_.first_number;
+      if (state_.found[i] < body_.first_number || s >= surface_count || beside_.whose[s] == b) continue;
+      const BodySight& seen = sight(b, s);
+      const double left = seen.until_m - state_.body_travel_m[b] -
+                          glm::distance(displacement(s), glm::dvec3(seen.u));
+      if (left <= moved) add(left, b, s);
+    }
+  }
+
+  // Looks at what was listed, those nearest first as far as the budget goes.
+  void look() noexcept {
+    auto& due = state_.due;
+    if (due.size() > kLooks) {
+      const auto end = due.begin() + static_cast<std::ptrdiff_t>(kLooks);
+      std::nth_element(due.begin(), end, due.end());
+      // What was left out may be within what it should keep out of.
+      for (auto d = end; d != due.end(); ++d) {
+        if (d->left_m < -watched_m_) state_.faults |= fault_body_crowded;
+      }
+      due.resize(kLooks);
+    }
+    // The map's lists are in the order of motion; sorted, the result does not depend on history.
+    std::sort(due.begin(), due.end(), [](const BodyLook& a, const BodyLook& b) {
+      return a.body != b.body ? a.body < b.body : a.surface_number < b.surface_number;
+    });
+    for (const BodyLook& d : due) look(d.body, d.surface_number);
+  }
+
+  // Each voxel that a body is near to gets the half-space of that or of what stands, and leaves it.
+  void press() noexcept {
+    auto& in_the_way = state_.in_the_way;
+    in_the_way.clear();
+    std::size_t kept = 0;
+    for (const std::uint32_t s : beside_.near) {
+      choose(s);
+      const voxel::Obstacle& o = object_.obstacles()[s];
+      if (o.moving && slack(o, displacement(s)) < 0.0) in_the_way.push_back(s);
+      if (beside_.whose[s] != BesideBodies::kNobody) {
+        beside_.near[kept++] = s;
+      } else {
+        beside_.listed[s] = 0;
+      }
+    }
+    beside_.near.resize(kept);
+    if (!in_the_way.empty()) object_.leave_obstacles(in_the_way);
+  }
+
+  void first_look(std::uint32_t b) noexcept {
+    const auto count = static_cast<std::uint32_t>(object_.lattice().surface().size());
+    for (std::uint32_t s = 0; s < count; ++s) look(b, s);
+    for (const std::uint32_t s : beside_.near) choose(s);
+  }
+
+  // The half-space in force is that which a voxel is nearer to.
+  void choose(std::uint32_t s) noexcept {
+    const voxel::Obstacle &moving = beside_.moving[s], &standing = beside_.standing[s];
+    const glm::dvec3 u = displacement(s);
+    const voxel::Obstacle* in_force = &standing;
+    if (exists(moving)) {
+      const double of_moving = slack(moving, u);
+      const double of_standing = exists(standing) ? slack(standing, u) : std::numeric_limits<double>::max();
+      const bool in_both = of_moving < 0.0 && of_standing < 0.0;
+      if (!in_both && of_moving < of_standing) in_force = &moving;
+    }
+    const voxel::Obstacle old = object_.obstacles()[s];
+    if (old.normal == in_force->normal && old.bound == in_force->bound && old.moving == in_force->moving)
+      return;
+    object_.set_obstacle(s, *in_force);
+    if (exists(old) && slack(old, u) < kRests * spacing_m_) object_.stir(s);
+  }
+
+  // Is tissue deeper in a body than it should be?
+  [[nodiscard]] bool squeezed() const noexcept {
+    double worst = -kSqueezed * spacing_m_;
+    std::uint32_t where = BesideBodies::kNobody;
+    for (const std::uint32_t s : beside_.near) {
+      if (object_.lattice().anchored(object_.lattice().surface()[s])) continue;
+      const double here = slack(beside_.moving[s], displacement(s));
+      if (here >= worst) continue;
+      worst = here;
+      where = s;
+    }
+    if (where == BesideBodies::kNobody) return false;
+    polygon::SignedDistance near;
+    const double radius = object_.voxel_radius();
+    return distance(beside_.whose[where], where, radius, near) &&
+           near.distance < radius - kSqueezed * spacing_m_;
+  }
+
+ private:
+  [[nodiscard]] glm::dvec3 displacement(std::uint32_t s) const noexcept {
+    return object_.state().at(object_.lattice().surface()[s]);
+  }
+  [[nodiscard]] BodySight& sight(std::uint32_t b, std::uint32_t s) const noexcept {
+    return beside_.sights[b][s];
+  }
+  void add(double left_m, std::uint32_t b, std::uint32_t s) noexcept {
+    if (state_.due.size() < state_.due.capacity()) state_.due.push_back({left_m, b, s});
+  }
+
+  [[nodiscard]] bool distance(std::uint32_t b, std::uint32_t s, double range,
+                              polygon::SignedDistance& out) const noexcept {
+    const BodyFrame& frame = state_.rigid[b].frame;
+    const glm::dvec3 at = frame.to_body(body_.to_scene(object_.position(object_.lattice().surface()[s])));
+    glm::dvec3 known(0.0);
+    if (beside_.whose[s] == b)
+      known = (body_.pose.rotation * glm::dvec3(beside_.moving[s].normal)) * frame.rotation;
+    return polygon::signed_distance(*world_.rigid[b].surface, at, range, known, out);
+  }
+
+  void look(std::uint32_t b, std::uint32_t s) noexcept {
+    const double moved = state_.body_moved_m[b], watched = watched_m_ + moved,
+                 radius = object_.voxel_radius(),
+                 range = watched + radius + kLookFar * object_.lattice().max_spacing_m();
+    polygon::SignedDistance near;
+    const bool found = distance(b, s, range, near);
+    const double gap = found ? near.distance - radius : range - radius;
+    const glm::dvec3 u = displacement(s);
+    sight(b, s) = {glm::vec3(u), state_.body_travel_m[b] + gap - watched_m_};
+    std::uint32_t& whose = beside_.whose[s];
+    if (!found || gap >= watched) {
+      if (whose == b) forget(s);
+      return;
+    }
+    if (whose != BesideBodies::kNobody && whose != b && slack(beside_.moving[s], u) <= gap) return;
+    const glm::dvec3 n = glm::inverse(body_.pose.rotation) * (state_.rigid[b].frame.rotation * near.normal);
+    // What lies deep, because it was squeezed, comes out bit by bit.
+    const double depth = std::min(-gap, moved + kComesOut * spacing_m_);
+    beside_.moving[s] = {glm::vec3(n), static_cast<float>(glm::dot(n, u) + depth), true};
+    whose = b;
+    if (beside_.listed[s] != 0) return;
+    beside_.listed[s] = 1;
+    beside_.near.push_back(s);
+  }
+  void forget(std::uint32_t s) noexcept {
+    beside_.whose[s] = BesideBodies::kNobody;
+    beside_.moving[s] = {};
+  }
+
+  const World& world_;
+  WorldState& state_;
+  const SoftBody& body_;
+  std::size_t soft_;
+  voxel::SoftObject& object_;
+  BesideBodies& beside_;
+  double spacing_m_, watched_m_;
+};
+
+}  // namespace
+
+void watch_bodies(const World& world, WorldState& state) {
+  for (std::size_t o = 0; o < state.beside_bodies.size(); ++o) {
+    TissueAtBodies tissue(world, state, o);
+    for (std::uint32_t b = 0; b < world.rigid.size(); ++b) {
+      if (world.rigid[b].presses_tissue) tissue.first_look(b);
+    }
+  }
+}
+
+void press_by_bodies(const World& world, WorldState& state) noexcept {
+  for (std::size_t o = 0; o < state.beside_bodies.size(); ++o) {
+    TissueAtBodies tissue(world, state, o);
+    state.due.clear();
+    for (std::uint32_t b = 0; b < world.rigid.size(); ++b) {
+      if (world.rigid[b].presses_tissue) tissue.list(b);
+    }
+    tissue.look();
+    tissue.press();
+  }
+}
+
+void judge_bodies(const World& world, WorldState& state) noexcept {
+  for (std::size_t o = 0; o < state.beside_bodies.size(); ++o) {
+    if (TissueAtBodies(world, state, o).squeezed()) state.faults |= fault_body_squeezed;
+  }
+}
+
+const voxel::Obstacle& standing_obstacle(const WorldState& state, std::size_t soft, std::size_t s) noexcept {
+  return state.beside_bodies.empty() ? state.soft[soft]->obstacles()[s] : state.beside_bodies[soft].standing[s];
+}
+
+void set_standing_obstacle(WorldState& state, std::size_t soft, std::size_t s,
+                           const voxel::Obstacle& obstacle) noexcept {
+  if (state.beside_bodies.empty()) {
+    state.soft[soft]->set_obstacle(s, obstacle);
+    return;
+  }
+  BesideBodies& beside = state.beside_bodies[soft];
+  beside.standing[s] = obstacle;
+  if (!exists(beside.moving[s])) state.soft[soft]->set_obstacle(s, obstacle);
+}
+
+}  // namespace hybrid
