@@ -17,6 +17,8 @@ constexpr double kLookFar = 8.0;      // spacings further that one query looks, 
 constexpr double kMovedAgain = 0.02;  // of the spacing: a voxel at a body that stands is looked at again
 constexpr double kComesOut = 0.25;    // of the spacing, and as far as the body moved: in one tick
 constexpr double kRests = 1e-3;       // of the spacing: so near to its half-space a voxel lies on it
+constexpr double kAtBone = 0.3;       // spacings from what stands within which a voxel has the half-space of that
+constexpr double kWayAlong = 0.4;     // sine of the angle between body and bone: in a closer gap there is no way
 constexpr double kSqueezed = 0.05;    // of the spacing: deeper in a body than this is a fault
 
 bool exists(const voxel::Obstacle& o) {
@@ -95,8 +97,7 @@ class TissueAtBodies {
     std::size_t kept = 0;
     for (const std::uint32_t s : beside_.near) {
       choose(s);
-      const voxel::Obstacle& o = object_.obstacles()[s];
-      if (o.moving && slack(o, displacement(s)) < 0.0) in_the_way.push_back(s);
+      if (leads_out(s)) in_the_way.push_back(s);
       if (beside_.whose[s] != BesideBodies::kNobody) {
         beside_.near[kept++] = s;
       } else {
@@ -104,6 +105,15 @@ class TissueAtBodies {
       }
     }
     beside_.near.resize(kept);
+    if (in_the_way.empty()) return;
+    object_.leave_obstacles(in_the_way);
+    // What the wave took into bone comes out of it, wherever that is in the body.
+    in_the_way.clear();
+    for (const std::uint32_t s : beside_.near) {
+      choose(s);
+      const voxel::Obstacle& o = object_.obstacles()[s];
+      if (exists(o) && !o.moving && slack(o, displacement(s)) < -kRests * spacing_m_) in_the_way.push_back(s);
+    }
     if (!in_the_way.empty()) object_.leave_obstacles(in_the_way);
   }
 
@@ -113,16 +123,15 @@ class TissueAtBodies {
     for (const std::uint32_t s : beside_.near) choose(s);
   }
 
-  // The half-space in force is that which a voxel is nearer to.
+  // The half-space in force is that which a voxel is nearer to; on what stands, that.
   void choose(std::uint32_t s) noexcept {
     const voxel::Obstacle &moving = beside_.moving[s], &standing = beside_.standing[s];
     const glm::dvec3 u = displacement(s);
     const voxel::Obstacle* in_force = &standing;
     if (exists(moving)) {
-      const double of_moving = slack(moving, u);
       const double of_standing = exists(standing) ? slack(standing, u) : std::numeric_limits<double>::max();
-      const bool in_both = of_moving < 0.0 && of_standing < 0.0;
-      if (!in_both && of_moving < of_standing) in_force = &moving;
+      const double at_bone = kAtBone * spacing_m_ + state_.body_moved_m[beside_.whose[s]];
+      if (of_standing > at_bone && slack(moving, u) < of_standing) in_force = &moving;
     }
     const voxel::Obstacle old = object_.obstacles()[s];
     if (old.normal == in_force->normal && old.bound == in_force->bound && old.moving == in_force->moving)
@@ -150,6 +159,25 @@ class TissueAtBodies {
   }
 
  private:
+  // Is a voxel in a body, and is there a way out that does not lead into what stands? Where the shortest one
+  // does, its obstacle becomes one for the way along that surface, until it has gone it.
+  bool leads_out(std::uint32_t s) noexcept {
+    const voxel::Obstacle &moving = beside_.moving[s], &standing = beside_.standing[s];
+    if (!exists(moving)) return false;
+    const glm::dvec3 u = displacement(s), n(moving.normal);
+    const double depth = -slack(moving, u);
+    if (!(depth > 0.0)) return false;
+    if (!exists(standing) || slack(standing, u + depth * n) >= 0.0) {
+      object_.set_obstacle(s, moving);
+      return true;
+    }
+    const glm::dvec3 wall(standing.normal), along = n - glm::dot(n, wall) * wall;
+    const double part = glm::length(along);
+    if (part < kWayAlong) return false;  // between the two of them there is none
+    object_.set_obstacle(s, {glm::vec3(along / part),
+                             static_cast<float>(glm::dot(along / part, u) + depth / part), true});
+    return true;
+  }
   [[nodiscard]] glm::dvec3 displacement(std::uint32_t s) const noexcept {
     return object_.state().at(object_.lattice().surface()[s]);
   }

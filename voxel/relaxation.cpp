@@ -29,6 +29,8 @@ constexpr int kLooksAtOnce = 256;  // tiles looked at for what coarse levels hav
 
 Relaxation::Relaxation(const Lattice& lattice) : lattice_(lattice), multigrid_(lattice), clusters_(lattice) {
   set_tolerance(kRestingResidual * lattice.force_scale_N());
+  for (int d = 0; d < 3; ++d)
+    farthest_m_ += static_cast<float>(lattice.grid().dims[static_cast<std::size_t>(d)] * lattice.spacing_m()[d]);
   boxes_.resize(static_cast<std::size_t>(multigrid_.levels()));
 }
 
@@ -355,6 +357,11 @@ void Relaxation::tell_box(int level, Displacement& state, const ObstacleView& ob
     const float most =
         multigrid_.untold(level + 1, row, span, b.first_teller - origin, b.last_teller - origin);
     if (most <= multigrid_.passed_on_m()) return;
+    // Squeezed between obstacles, tissue with links at their limits can make coarse cells run away.
+    if (!(most <= farthest_m_)) {
+      multigrid_.forget_untold(level + 1, row, state, obstacles);
+      return;
+    }
     multigrid_.mark(level + 1, row, Multigrid::telling);
     any = true;
   });
