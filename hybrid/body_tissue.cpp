@@ -19,6 +19,7 @@ constexpr double kComesOut = 0.25;    // of the spacing, and as far as the body 
 constexpr double kRests = 1e-3;       // of the spacing: so near to its half-space a voxel lies on it
 constexpr double kAtBone = 0.3;       // spacings from what stands within which a voxel has the half-space of that
 constexpr double kWayAlong = 0.4;     // sine of the angle between body and bone: in a closer gap there is no way
+constexpr double kGivenUp = 0.5;      // of the spacing: deeper than this after the wave, there is no way out
 constexpr double kSqueezed = 0.05;    // of the spacing: deeper in a body than this is a fault
 
 bool exists(const voxel::Obstacle& o) {
@@ -104,7 +105,9 @@ class TissueAtBodies {
         beside_.listed[s] = 0;
       }
     }
+    const bool left = kept == 0 && !beside_.near.empty();
     beside_.near.resize(kept);
+    if (left) spring_back();
     if (in_the_way.empty()) return;
     object_.leave_obstacles(in_the_way);
     // What the wave took into bone comes out of it, wherever that is in the body.
@@ -115,6 +118,7 @@ class TissueAtBodies {
       if (exists(o) && !o.moving && slack(o, displacement(s)) < -kRests * spacing_m_) in_the_way.push_back(s);
     }
     if (!in_the_way.empty()) object_.leave_obstacles(in_the_way);
+    give_up();
   }
 
   void first_look(std::uint32_t b) noexcept {
@@ -159,6 +163,23 @@ class TissueAtBodies {
   }
 
  private:
+  // What could not leave a body's way, by much, is let through it: pushed on, towards whichever side of the
+  // body is the next, it would come out behind it, and be caught there.
+  void give_up() noexcept {
+    for (const std::uint32_t s : beside_.near) {
+      if (slack(beside_.moving[s], displacement(s)) >= -kGivenUp * spacing_m_) continue;
+      sight(beside_.whose[s], s).given_up = true;
+      forget(s);
+      choose(s);
+      state_.faults |= fault_body_squeezed;
+    }
+  }
+  // Where links at their limits held tissue, relaxation may have let it be, far from rest. Now that the last
+  // body left, nothing holds it.
+  void spring_back() noexcept {
+    if ((state_.faults & fault_body_squeezed) == 0) return;
+    for (std::size_t s = 0; s < object_.lattice().surface().size(); ++s) object_.stir(s);
+  }
   // Is a voxel in a body, and is there a way out that does not lead into what stands? Where the shortest one
   // does, its obstacle becomes one for the way along that surface, until it has gone it.
   bool leads_out(std::uint32_t s) noexcept {
@@ -206,9 +227,10 @@ class TissueAtBodies {
     const bool found = distance(b, s, range, near);
     const double gap = found ? near.distance - radius : range - radius;
     const glm::dvec3 u = displacement(s);
-    sight(b, s) = {glm::vec3(u), state_.body_travel_m[b] + gap - watched_m_};
+    const bool given_up = sight(b, s).given_up && (!found || gap < 0.0);
+    sight(b, s) = {glm::vec3(u), given_up, state_.body_travel_m[b] + gap - watched_m_};
     std::uint32_t& whose = beside_.whose[s];
-    if (!found || gap >= watched) {
+    if (!found || given_up || gap >= watched) {
       if (whose == b) forget(s);
       return;
     }

@@ -173,8 +173,9 @@ inline constexpr std::uint32_t kMaxHeld = 32;
 
 // When a surface voxel has to be looked at again for one body.
 struct BodySight {
-  glm::vec3 u{0.0F};     // displacement when it was last looked at
-  double until_m = 0.0;  // it is not near the body before that has travelled so far, or the voxel moved
+  glm::vec3 u{0.0F};      // displacement when it was last looked at
+  bool given_up = false;  // it is deep in the body, and left alone until it is out of it
+  double until_m = 0.0;   // it is not near the body before that has travelled so far, or the voxel moved
 };
 
 // What bodies on a path ask of one soft object (hybrid/body_tissue.h).
