@@ -17,10 +17,10 @@ constexpr double kLookFar = 8.0;      // spacings further that one query looks, 
 constexpr double kMovedAgain = 0.02;  // of the spacing: a voxel at a body that stands is looked at again
 constexpr double kComesOut = 0.25;    // of the spacing, and as far as the body moved: in one tick
 constexpr double kRests = 1e-3;       // of the spacing: so near to its half-space a voxel lies on it
-constexpr double kAtBone = 0.3;       // spacings from what stands within which a voxel has the half-space of that
-constexpr double kWayAlong = 0.4;     // sine of the angle between body and bone: in a closer gap there is no way
-constexpr double kGivenUp = 0.5;      // of the spacing: deeper than this after the wave, there is no way out
-constexpr double kSqueezed = 0.05;    // of the spacing: deeper in a body than this is a fault
+constexpr double kAtBone = 0.3;  // spacings from what stands within which a voxel has the half-space of that
+constexpr double kWayAlong = 0.4;  // sine of the angle between body and bone: in a closer gap there is no way
+constexpr double kGivenUp = 0.5;   // of the spacing: deeper than this after the wave, there is no way out
+constexpr double kSqueezed = 0.05;  // of the spacing: deeper in a body than this is a fault
 
 bool exists(const voxel::Obstacle& o) {
   return o.normal != glm::vec3(0.0F);
@@ -49,8 +49,7 @@ class TissueAtBodies {
     for (const std::uint32_t s : beside_.near) {
       if (beside_.whose[s] != b) continue;
       const double since = glm::distance(displacement(s), glm::dvec3(sight(b, s).u));
-      if (moved == 0.0 && since < kMovedAgain * spacing_m_) continue;
-      add(slack(beside_.moving[s], displacement(s)) - moved - object_.voxel_radius(), b, s);
+      if (moved > 0.0 || since > kMovedAgain * spacing_m_) add(left(b, s), b, s);
     }
     if (moved == 0.0 && object_.asleep()) return;
     const BodyFrame& frame = state_.rigid[b].frame;
@@ -65,10 +64,8 @@ class TissueAtBodies {
     for (std::size_t i = 0; i < count; ++i) {
       const std::uint32_t s = state_.found[i] - body_.first_number;
       if (state_.found[i] < body_.first_number || s >= surface_count || beside_.whose[s] == b) continue;
-      const BodySight& seen = sight(b, s);
-      const double left = seen.until_m - state_.body_travel_m[b] -
-                          glm::distance(displacement(s), glm::dvec3(seen.u));
-      if (left <= moved) add(left, b, s);
+      const double left_m = left(b, s);
+      if (left_m <= moved) add(left_m, b, s);
     }
   }
 
@@ -80,7 +77,7 @@ class TissueAtBodies {
       std::nth_element(due.begin(), end, due.end());
       // What was left out may be within what it should keep out of.
       for (auto d = end; d != due.end(); ++d) {
-        if (d->left_m < -watched_m_) state_.faults |= fault_body_crowded;
+        if (d->left_m < -watched_m_ - kSqueezed * spacing_m_) state_.faults |= fault_body_crowded;
       }
       due.resize(kLooks);
     }
@@ -105,9 +102,9 @@ class TissueAtBodies {
         beside_.listed[s] = 0;
       }
     }
-    const bool left = kept == 0 && !beside_.near.empty();
+    const bool all_left = kept == 0 && !beside_.near.empty();
     beside_.near.resize(kept);
-    if (left) spring_back();
+    if (all_left) spring_back();
     if (in_the_way.empty()) return;
     object_.leave_obstacles(in_the_way);
     // What the wave took into bone comes out of it, wherever that is in the body.
@@ -187,7 +184,9 @@ class TissueAtBodies {
     if (!exists(moving)) return false;
     const glm::dvec3 u = displacement(s), n(moving.normal);
     const double depth = -slack(moving, u);
-    if (!(depth > 0.0)) return false;
+    // At a body that stands, relaxation brings out what rounding left in it: or nothing came to rest.
+    const bool stands = state_.body_moved_m[beside_.whose[s]] == 0.0;
+    if (!(depth > (stands ? kRests * spacing_m_ : 0.0))) return false;
     if (!exists(standing) || slack(standing, u + depth * n) >= 0.0) {
       object_.set_obstacle(s, moving);
       return true;
@@ -195,8 +194,8 @@ class TissueAtBodies {
     const glm::dvec3 wall(standing.normal), along = n - glm::dot(n, wall) * wall;
     const double part = glm::length(along);
     if (part < kWayAlong) return false;  // between the two of them there is none
-    object_.set_obstacle(s, {glm::vec3(along / part),
-                             static_cast<float>(glm::dot(along / part, u) + depth / part), true});
+    object_.set_obstacle(
+        s, {glm::vec3(along / part), static_cast<float>(glm::dot(along / part, u) + depth / part), true});
     return true;
   }
   [[nodiscard]] glm::dvec3 displacement(std::uint32_t s) const noexcept {
@@ -204,6 +203,11 @@ class TissueAtBodies {
   }
   [[nodiscard]] BodySight& sight(std::uint32_t b, std::uint32_t s) const noexcept {
     return beside_.sights[b][s];
+  }
+  // How far body and voxel may still move, at least, before the voxel is within what is watched (m).
+  [[nodiscard]] double left(std::uint32_t b, std::uint32_t s) const noexcept {
+    const BodySight& seen = sight(b, s);
+    return seen.until_m - state_.body_travel_m[b] - glm::distance(displacement(s), glm::dvec3(seen.u));
   }
   void add(double left_m, std::uint32_t b, std::uint32_t s) noexcept {
     if (state_.due.size() < state_.due.capacity()) state_.due.push_back({left_m, b, s});
@@ -288,7 +292,8 @@ void judge_bodies(const World& world, WorldState& state) noexcept {
 }
 
 const voxel::Obstacle& standing_obstacle(const WorldState& state, std::size_t soft, std::size_t s) noexcept {
-  return state.beside_bodies.empty() ? state.soft[soft]->obstacles()[s] : state.beside_bodies[soft].standing[s];
+  return state.beside_bodies.empty() ? state.soft[soft]->obstacles()[s]
+                                     : state.beside_bodies[soft].standing[s];
 }
 
 void set_standing_obstacle(WorldState& state, std::size_t soft, std::size_t s,

@@ -6,9 +6,9 @@
 // along the normal, all voxels in one wave of the chain, and relaxation does the rest. A voxel has one
 // half-space: of body and bone that which it is nearer to, and where it is in both, the bone's.
 //
-// Which voxels those are: the map says which are in the body's box. Of each it is known how far it was when it
-// was last looked at, and it is looked at again when body and voxel have moved so far in sum that it may be
-// near: so nearly all exact queries are of voxels that are near.
+// Which voxels those are: the map says which are in the body's box. Of each it is known how far it was when
+// it was last looked at, and it is looked at again when body and voxel have moved so far in sum that it may
+// be near: so nearly all exact queries are of voxels that are near.
 #pragma once
 
 #include "hybrid/world.h"

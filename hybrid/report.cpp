@@ -257,7 +257,8 @@ std::vector<std::string> fault_texts(std::uint32_t faults) {
   say(fault_nonfinite_body,
       "a free body was pushed by a force that is not finite, and stood still for that tick");
   say(fault_body_squeezed,
-      "tissue could not leave the way of a rigid object on a path, for anchors, bone or links at their limits, "
+      "tissue could not leave the way of a rigid object on a path, for anchors, bone or links at their "
+      "limits, "
       "and they overlapped; let its path press less deep, or let the tissue stretch further");
   say(fault_body_crowded,
       "a rigid object on a path came to more soft voxels than a tick looks at, and may have overlapped some; "

@@ -69,7 +69,8 @@ void WorldState::prepare_beside_bodies(const World& world) {
     beside_bodies.push_back(std::move(beside));
     beside_bodies.back().near.reserve(count);
   }
-  const auto bodies = static_cast<std::size_t>(std::count_if(world.rigid.begin(), world.rigid.end(), presses));
+  const auto bodies =
+      static_cast<std::size_t>(std::count_if(world.rigid.begin(), world.rigid.end(), presses));
   due.reserve(most * bodies);
   in_the_way.reserve(most);
 }

@@ -16,9 +16,9 @@ struct SignedDistance {
 };
 
 // The nearest place of the surface within `radius` of the point (body frame). `known` is the normal that the
-// point had a moment ago, or zero: where the surface is still seen from that side, a mesh is not asked for its
-// inside, and on the surface itself, where there is no way out to be seen, it stays. False when nothing is so
-// near, or no normal is to be had.
+// point had a moment ago, or zero: where the surface is still seen from that side, a mesh is not asked for
+// its inside, and on the surface itself, where there is no way out to be seen, it stays. False when nothing
+// is so near, or no normal is to be had.
 [[nodiscard]] bool signed_distance(const RigidSurface& surface, const glm::dvec3& point, double radius,
                                    const glm::dvec3& known, SignedDistance& out) noexcept;
 

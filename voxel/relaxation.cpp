@@ -30,7 +30,8 @@ constexpr int kLooksAtOnce = 256;  // tiles looked at for what coarse levels hav
 Relaxation::Relaxation(const Lattice& lattice) : lattice_(lattice), multigrid_(lattice), clusters_(lattice) {
   set_tolerance(kRestingResidual * lattice.force_scale_N());
   for (int d = 0; d < 3; ++d)
-    farthest_m_ += static_cast<float>(lattice.grid().dims[static_cast<std::size_t>(d)] * lattice.spacing_m()[d]);
+    farthest_m_ +=
+        static_cast<float>(lattice.grid().dims[static_cast<std::size_t>(d)] * lattice.spacing_m()[d]);
   boxes_.resize(static_cast<std::size_t>(multigrid_.levels()));
 }
 

@@ -3,19 +3,19 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <cfenv>
-#include <csignal>
-#include <execinfo.h>
-#include <unistd.h>
-#include <cstdio>
+#include <fstream>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
+#include <iterator>
+#include <limits>
 #include <string>
 #include <vector>
 
 #include "arbitration_watch.h"
+#include "hybrid/recording.h"
 #include "polygon/mesh_file.h"
 #include "polygon/primitives.h"
 #include "polygon/signed_distance.h"
@@ -29,6 +29,9 @@ using tests::Touch;
 
 constexpr dvec3 kFarAway(0.0, 0.0, 0.2);
 constexpr double kSpacing = 2e-3;
+constexpr double kOverlap = 0.05;  // of the spacing
+constexpr double kBack_m = 1e-3 * kSpacing;
+constexpr double kLinks_m = 1e-8;
 
 struct Shape {
   const char* name;
@@ -79,26 +82,20 @@ const voxel::SoftObject& tissue(Touch& touch) {
   return *touch.state().soft[0];
 }
 
-// How deep the ball of a voxel is in a rigid object, at most (spacings): of the surface; of all.
-struct Depths {
-  double surface = 0.0, all = 0.0;
-};
-Depths deepest(Touch& touch, std::size_t rigid = 0) {
+// How deep the ball of a surface voxel is in a rigid object, at most (spacings).
+double deepest(Touch& touch, std::size_t rigid = 0) {
   const hybrid::BodyFrame& frame = touch.state().rigid[rigid].frame;
   const polygon::RigidSurface& surface = *touch.world().rigid[rigid].surface;
   const voxel::SoftObject& object = tissue(touch);
   const dvec3 low = surface.lower() - object.voxel_radius(), high = surface.upper() + object.voxel_radius();
-  Depths worst;
-  for (std::size_t i = 0; i < object.lattice().size(); ++i) {
-    const auto v = static_cast<voxel::VoxelId>(i);
-    if (!object.lattice().filled(v) || object.lattice().anchored(v)) continue;
+  double worst = 0.0;
+  for (const voxel::VoxelId v : object.lattice().surface()) {
+    if (object.lattice().anchored(v)) continue;
     const dvec3 at = frame.to_body(touch.world().soft[0].to_scene(object.position(v)));
     if (glm::any(glm::lessThan(at, low)) || glm::any(glm::greaterThan(at, high))) continue;
     polygon::SignedDistance near;
     if (!polygon::signed_distance(surface, at, 0.02, dvec3(0.0), near)) continue;
-    const double deep = (object.voxel_radius() - near.distance) / object.lattice().min_spacing_m();
-    worst.all = std::max(worst.all, deep);
-    if (object.surface_number(v) != voxel::SoftObject::kNoSurface) worst.surface = std::max(worst.surface, deep);
+    worst = std::max(worst, (object.voxel_radius() - near.distance) / object.lattice().min_spacing_m());
   }
   return worst;
 }
@@ -107,108 +104,266 @@ double largest_displacement(Touch& touch) {
   double most = 0.0;
   for (const voxel::VoxelId v : tissue(touch).lattice().surface()) {
     const dvec3 u = tissue(touch).state().at(v);
-    if (!tests::finite(u)) return 1e9;
+    if (!tests::finite(u)) return std::numeric_limits<double>::infinity();
     most = std::max(most, glm::length(u));
   }
   return most;
 }
 
-TEST_F(BodyTissue, DISABLED_Explore) {
-  for (const Shape& shape : shapes()) {
-    for (const double along : {0.0, 8.0})
-    for (const double speed : {10.0, 50.0, 200.0, 1000.0}) {
-      for (const bool apart : {false, true}) {
-      Touch touch(load(block() + pusher(shape, 6.0, along, speed)), kFarAway, apart);
-      Depths worst; double moved = 0.0, violated = 0.0, us = 0.0, most_us = 0.0;
-      const int ticks = static_cast<int>((9.0 + along + 9.0) / speed * 1e3) + 20;
-      const int every = std::max(1, ticks / 300);
-      int when = 0;
-      for (int n = 0; n < ticks; ++n) {
-        const auto felt = touch.at(kFarAway);
-        us += felt.tick_us; most_us = std::max(most_us, felt.tick_us);
-        if (n % every != 0) continue;
-        const Depths d = deepest(touch);
-        if (d.surface > worst.surface) when = n;
-        worst.surface = std::max(worst.surface, d.surface);
-        worst.all = std::max(worst.all, d.all);
-        moved = std::max(moved, largest_displacement(touch));
-      }
-          violated =
-              std::max(violated, voxel::worst_violation(tissue(touch).lattice(), tissue(touch).state()));
-      int n = 0;
-      for (; n < 3000 && !tissue(touch).asleep(); ++n) touch.at(kFarAway);
-      std::printf("%-14s along %g %6g mm/s %s: surface %.4f (tick %d of %d) all %.4f moved %.2f mm; links %.1e; back to %.2e after %d; us mean %.0f max %.0f; near %zu faults %u\n", shape.name, along, speed, apart ? "apart" : "tick ",
-         worst.surface, when, ticks, worst.all, 1e3*moved, violated, 1e3*largest_displacement(touch), n, us / ticks, most_us, touch.state().beside_bodies[0].near.size(), touch.state().faults);
-    }
-    }
-  }
+void come_to_rest(Touch& touch, const dvec3& device) {
+  for (int n = 0; n < 3000 && !tissue(touch).asleep(); ++n) touch.at(device);
+  EXPECT_TRUE(tissue(touch).asleep());
 }
 
-
-TEST_F(BodyTissue, DISABLED_Squeezed) {
-  for (const double along : {0.0, 10.0})
-  for (const double deep : {7.0, 8.5})
+TEST_F(BodyTissue, LeavesTheWayOfABodyAtAnySpeedAndComesBack) {
   for (const Shape& shape : shapes()) {
-    for (const double speed : {20.0, 200.0, 1000.0}) {
+    for (const double speed : {100.0, 1000.0}) {
       for (const bool apart : {false, true}) {
-      const std::string slab = head() + 
-          "[[soft]]\nname = \"slab\"\nformula = \"block\"\n"
-          "size = [60, 40, 8]\nspacing = 2\nposition = [0, 0, -4]\nmaterial = \"gel\"\n"
-          "[soft.anchors]\nfaces = [\"-x\"]\nrigid_within = 0\n" +
-          tests::some_path;
-      const std::string plate =
-          "[[rigid]]\nname = \"plate\"\nprimitive = \"box\"\nsize = [80, 60, 6]\nposition = [0, 0, -12]\n";
-      Touch touch(load(slab + pusher(shape, deep, along, speed) + plate), kFarAway, apart);
-      double body = 0.0, bone = 0.0, moved = 0.0, us = 0.0, most_us = 0.0;
-      int when = 0, when_bone = 0;
-      const int ticks = static_cast<int>((3.0 + deep + 10.0 + 3.0 + deep) / speed * 1e3) + 300;
-      for (int n = 0; n < ticks; ++n) {
-        const auto felt = touch.at(kFarAway);
-        us += felt.tick_us; most_us = std::max(most_us, felt.tick_us);
-        if (n % std::max(1, ticks / 300) != 0) continue;
-        const double a = deepest(touch, 0).surface, b = deepest(touch, 1).surface;
-        if (a > body) body = a, when = n;
-        if (b > bone) bone = b, when_bone = n;
-        moved = std::max(moved, largest_displacement(touch));
-      }
-      const double violated = voxel::worst_violation(tissue(touch).lattice(), tissue(touch).state());
-      int n = 0;
-      for (; n < 3000 && !tissue(touch).asleep(); ++n) touch.at(kFarAway);
-      if (largest_displacement(touch) > 1e-3) { int shown = 0; for (const voxel::VoxelId v : tissue(touch).lattice().surface()) { const dvec3 u = tissue(touch).state().at(v); if (glm::length(u) < 0.9 * largest_displacement(touch) || ++shown > 4) continue; const dvec3 r = 1e3 * touch.world().soft[0].to_scene(tissue(touch).lattice().rest(v)), p = r + 1e3 * u; const auto& o = tissue(touch).obstacles()[tissue(touch).surface_number(v)]; std::printf("   (%.1f %.1f %.1f) -> (%.1f %.1f %.1f) obstacle n (%.2f %.2f %.2f) slack %.3f moving %d\n", r.x, r.y, r.z, p.x, p.y, p.z, o.normal.x, o.normal.y, o.normal.z, 1e3*(glm::dot(dvec3(o.normal), u) - o.bound), o.moving); } }
-      std::printf("%-14s along %g deep %g %6g mm/s %s: body %.4f (%d of %d) bone %.4f (%d) moved %.2f mm; links %.1e; back to %.2e after %d; us mean %.0f max %.0f; faults %u\n", shape.name, along, deep, speed, apart ? "apart" : "tick ",
-         body, when, ticks, bone, when_bone, 1e3*moved, violated, 1e3*largest_displacement(touch), n, us / ticks, most_us, touch.state().faults);
+        SCOPED_TRACE(std::string(shape.name) + " at " + std::to_string(speed) + " mm/s" +
+                     (apart ? ", relaxed apart" : ""));
+        Touch touch(load(block() + pusher(shape, 6.0, 8.0, speed)), kFarAway, apart);
+        double worst = 0.0, moved = 0.0;
+        const int ticks = static_cast<int>((9.0 + 8.0 + 9.0) / speed * 1e3) + 20;
+        for (int n = 0; n < ticks; ++n) {
+          touch.at(kFarAway);
+          worst = std::max(worst, deepest(touch));
+          moved = std::max(moved, largest_displacement(touch));
+        }
+        EXPECT_LE(voxel::worst_violation(tissue(touch).lattice(), tissue(touch).state()), kLinks_m);
+        come_to_rest(touch, kFarAway);
+        EXPECT_LE(worst, kOverlap);
+        EXPECT_GT(moved, 4e-3) << "it was pushed";
+        EXPECT_LE(largest_displacement(touch), kBack_m) << "it springs back";
+        EXPECT_EQ(touch.state().faults, 0U);
       }
     }
   }
 }
 
-TEST_F(BodyTissue, DISABLED_Blows) {
-      const std::string slab = head() + 
-          "[[soft]]\nname = \"slab\"\nformula = \"block\"\n"
-          "size = [60, 40, 8]\nspacing = 2\nposition = [0, 0, -4]\nmaterial = \"gel\"\n"
-          "[soft.anchors]\nfaces = [\"-x\"]\nrigid_within = 0\n" +
-          tests::some_path;
-      const std::string plate =
-          "[[rigid]]\nname = \"plate\"\nprimitive = \"box\"\nsize = [80, 60, 6]\nposition = [0, 0, -12]\n";
-      Touch touch(load(slab + pusher(shapes()[0], std::atof(getenv("DEEP")), 10.0, std::atof(getenv("SPEED")), 5.0) + plate), kFarAway, false);
-      std::signal(SIGFPE, [](int) { void* a[40]; const int c = backtrace(a, 40); backtrace_symbols_fd(a, c, 1); _exit(1); });
-      for (int n = 0; n < 2000; ++n) {
-        if (n == 100000) feenableexcept(FE_INVALID | FE_OVERFLOW | FE_DIVBYZERO);
+// What the springs store grows with the way of the body by what presses on the anchors, and nothing pulls at
+// anything else.
+TEST_F(BodyTissue, StandingInTissueABodyIsCarriedByItsAnchors) {
+  for (const bool apart : {false, true}) {
+    std::array<double, 2> energy{}, force{};
+    for (const std::size_t n : {0U, 1U}) {
+      const double deep_mm = n == 0 ? 2.0 : 2.2;
+      Touch touch(load(block() + pusher(shapes()[0], deep_mm, 0.0, 50.0, 60.0)), kFarAway, apart);
+      for (int tick = 0; tick < 200; ++tick) touch.at(kFarAway);
+      come_to_rest(touch, kFarAway);
+      const tests::Bearing bearing = tests::bearings(touch.world(), touch.state())[0];
+      energy[n] = tissue(touch).energy_J();
+      force[n] = glm::length(bearing.anchors_N);
+      EXPECT_LE(glm::length(bearing.anchors_N + bearing.rigid_N), 0.01 * force[n]);
+      EXPECT_LE(bearing.worst_left_N, 0.01 * force[n]);
+      EXPECT_LE(deepest(touch), kOverlap);
+      for (int tick = 0; tick < 100; ++tick) touch.at(kFarAway);
+      EXPECT_EQ(tissue(touch).energy_J(), energy[n]) << "at rest it stays as it is";
+    }
+    EXPECT_GT(force[0], 0.05);
+    EXPECT_NEAR((energy[1] - energy[0]) / 0.2e-3, 0.5 * (force[0] + force[1]), 0.02 * force[0]);
+  }
+}
+
+TEST_F(BodyTissue, ABarSlidesAcrossTheSurface) {
+  const Shape bar{"bar", "primitive = \"capsule\"\nradius = 3\nlength = 40\nrotation = [90, 0, 0]\n", 3.0};
+  for (const double speed : {50.0, 300.0, 1000.0}) {
+    for (const bool apart : {false, true}) {
+      SCOPED_TRACE(std::to_string(speed) + " mm/s" + (apart ? ", relaxed apart" : ""));
+      Touch touch(load(block() + pusher(bar, 3.0, 30.0, speed)), kFarAway, apart);
+      double worst = 0.0;
+      for (int n = 0; n < static_cast<int>(42.0 / speed * 1e3) + 20; ++n) {
         touch.at(kFarAway);
-        const double d = largest_displacement(touch);
-        if (n % 20 == 0 || d > 0.03) {
-        }
-        if (n > 340 && n % 2 == 0) { auto& mg = const_cast<voxel::Relaxation&>(tissue(touch).relaxation()).multigrid();
-        std::printf("%d:", n);
-        for (int l = 1; l < mg.levels(); ++l) { double most = 0; voxel::RowId w = 0; for (voxel::RowId r = 0; r < mg.grid(l).rows(); ++r) { const double m = mg.untold(l, r); if (m > most) most = m, w = r; } const auto c = mg.grid(l).row_coordinates(w); std::printf("  %d %.2e (%d,%d,%d of %d,%d,%d)", l, most, c[0], c[1], c[2], mg.grid(l).dims[0], mg.grid(l).dims[1], mg.grid(l).dims[2]); }
-        std::printf("\n");
-        }
-        if (false) {
-        double coarse[9] = {};
-        std::printf("%d: moved %.3f mm, body %.4f bone %.4f, energy %.4g residual %.3g asleep %d near %zu\n", n, 1e3 * d, deepest(touch,0).surface, deepest(touch,1).surface, tissue(touch).energy_J(), tissue(touch).residual_N(), tissue(touch).asleep(), touch.state().beside_bodies[0].near.size());
-        (void)coarse;
-        }
-        if (d > 1.0) break;
+        worst = std::max(worst, deepest(touch));
       }
+      come_to_rest(touch, kFarAway);
+      EXPECT_LE(worst, kOverlap);
+      EXPECT_LE(largest_displacement(touch), kBack_m);
+      EXPECT_EQ(touch.state().faults, 0U);
+    }
+  }
 }
+
+// The tool rests on tissue that a ball pushes from the side. From tick to tick the proxy goes no further than
+// the tissue under it.
+TEST_F(BodyTissue, AToolThatRestsOnTheTissueFeelsABodyBesideIt) {
+  const std::string ball =
+      "[[rigid]]\nname = \"pusher\"\nprimitive = \"ball\"\nradius = 8\nposition = [45, 0, -4]\n"
+      "motion = \"path\"\n[rigid.path]\nkind = \"waypoints\"\nspeed = 100\n"
+      "points = [[45, 0, -4], [45, 0, -4, 0.4], [32, 0, -4, 0.2], [45, 0, -4]]\n";
+  const dvec3 above(0.018, 0.0, 0.02), on(0.018, 0.0, 0.003);
+  for (const bool apart : {false, true}) {
+    SCOPED_TRACE(apart ? "relaxed apart" : "in the tick");
+    Touch touch(load(block() + ball), above, apart);
+    tests::ArbitrationWatch watch(touch.world(), touch.state());
+    touch.go(on, 1e-4, 0);
+    while (touch.state().tick < 390) touch.at(on);
+    const double alone = glm::length(tests::coupling(touch.at(on)));
+    double least = alone, most = alone, jump = 0.0, worst = 0.0;
+    dvec3 before = touch.state().proxy_m;
+    std::vector<dvec3> places;
+    for (int n = 0; n < 600; ++n) {
+      places.clear();
+      for (const voxel::VoxelId v : tissue(touch).lattice().surface())
+        places.push_back(tissue(touch).position(v));
+      const hybrid::TickResult felt = touch.at(on);
+      watch.see(touch.state(), felt);
+      double way = 0.0;
+      for (std::size_t s = 0; s < places.size(); ++s) {
+        const dvec3 now = tissue(touch).position(tissue(touch).lattice().surface()[s]);
+        if (glm::distance(touch.world().soft[0].to_scene(now), felt.proxy_m) > 0.01) continue;
+        way = std::max(way, glm::distance(now, places[s]));
+      }
+      jump = std::max(jump, glm::distance(felt.proxy_m, before) - way);
+      before = felt.proxy_m;
+      const double force = glm::length(tests::coupling(felt));
+      least = std::min(least, force);
+      most = std::max(most, force);
+      worst = std::max(worst, deepest(touch));
+    }
+    EXPECT_GT(most - least, 0.05 * alone) << "what the body moves is felt through the tissue";
+    EXPECT_LE(jump, 5e-6);
+    EXPECT_LE(worst, kOverlap);
+    EXPECT_LE(watch.tool_inside_m(), 5e-6);
+    EXPECT_NEAR(glm::length(tests::coupling(touch.at(on))), alone, 0.05 * alone) << "and no more afterwards";
+    EXPECT_EQ(touch.state().faults, 0U);
+  }
+}
+
+// Deeper than links let tissue be squeezed: bone holds, the body overlaps, and that is said.
+TEST_F(BodyTissue, SqueezedOntoBoneItStaysOutOfBoneAndComesBack) {
+  const std::string slab = head() +
+                           "[[soft]]\nname = \"slab\"\nformula = \"block\"\n"
+                           "size = [60, 40, 8]\nspacing = 2\nposition = [0, 0, -4]\nmaterial = \"gel\"\n"
+                           "[soft.anchors]\nfaces = [\"-x\"]\nrigid_within = 0\n" +
+                           tests::some_path;
+  const std::string plate =
+      "[[rigid]]\nname = \"plate\"\nprimitive = \"box\"\nsize = [80, 60, 6]\nposition = [0, 0, -12]\n";
+  for (const Shape& shape : shapes()) {
+    if (shape.name == std::string("small ball")) continue;  // as small as a voxel, it parts them
+    for (const double speed : {100.0, 1000.0}) {
+      for (const bool apart : {false, true}) {
+        SCOPED_TRACE(std::string(shape.name) + " at " + std::to_string(speed) + " mm/s" +
+                     (apart ? ", relaxed apart" : ""));
+        Touch touch(load(slab + pusher(shape, 8.0, 0.0, speed) + plate), kFarAway, apart);
+        double bone = 0.0, moved = 0.0;
+        for (int n = 0; n < static_cast<int>(22.0 / speed * 1e3) + 300; ++n) {
+          touch.at(kFarAway);
+          bone = std::max(bone, deepest(touch, 1));
+          moved = std::max(moved, largest_displacement(touch));
+        }
+        EXPECT_LE(voxel::worst_violation(tissue(touch).lattice(), tissue(touch).state()), kLinks_m);
+        come_to_rest(touch, kFarAway);
+        EXPECT_LE(bone, kOverlap);
+        EXPECT_LT(moved, 0.1);
+        EXPECT_LE(largest_displacement(touch), kBack_m);
+        EXPECT_EQ(touch.state().faults, static_cast<std::uint32_t>(hybrid::fault_body_squeezed));
+      }
+    }
+  }
+}
+
+TEST_F(BodyTissue, SqueezedOntoAnchorsItComesBack) {
+  for (const bool apart : {false, true}) {
+    Touch touch(load(block() + pusher(shapes()[0], 20.0, 0.0, 200.0)), kFarAway, apart);
+    for (int n = 0; n < 300; ++n) {
+      touch.at(kFarAway);
+      ASSERT_LT(largest_displacement(touch), 0.1);
+    }
+    EXPECT_LE(voxel::worst_violation(tissue(touch).lattice(), tissue(touch).state()), kLinks_m);
+    come_to_rest(touch, kFarAway);
+    EXPECT_LE(largest_displacement(touch), kBack_m);
+    EXPECT_EQ(touch.state().faults, static_cast<std::uint32_t>(hybrid::fault_body_squeezed));
+  }
+}
+
+// More voxels than a tick looks at: that is said, and nothing else happens.
+TEST_F(BodyTissue, ABodyThatComesToTooManyVoxelsSaysSo) {
+  const std::string sheet =
+      head() +
+      "[[soft]]\nname = \"sheet\"\nformula = \"block\"\nsize = [50, 50, 4]\nspacing = 1\n"
+      "position = [0, 0, -2]\nmaterial = \"gel\"\n" +
+      tests::some_path +
+      "[[rigid]]\nname = \"plate\"\nprimitive = \"box\"\nsize = [60, 60, 10]\nposition = [0, 0, 8]\n"
+      "motion = \"path\"\n[rigid.path]\nkind = \"waypoints\"\nspeed = 50\n"
+      "points = [[0, 0, 8], [0, 0, 4], [0, 0, 10]]\n";
+  Touch touch(load(sheet), kFarAway);
+  for (int n = 0; n < 250; ++n) touch.at(kFarAway);
+  EXPECT_NE(touch.state().faults & hybrid::fault_body_crowded, 0U);
+  EXPECT_LT(largest_displacement(touch), 0.1);
+}
+
+TEST_F(BodyTissue, ARecordedSessionReplaysToTheBit) {
+  const auto file = tests::source_folder / "scenes" / "pushed-tissue.toml";
+  const hybrid::Scene scene = hybrid::load_scene(file);
+  std::ifstream in(file, std::ios::binary);
+  const std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+  for (const bool realtime : {false, true}) {
+    hybrid::BuiltScene built = hybrid::build_scene(scene);
+    hybrid::SessionOptions options;
+    options.seconds = realtime ? 1.2 : 2.5;
+    options.keep_rows = false;
+    options.relax_apart = true;
+    options.realtime = realtime;
+    const hybrid::SessionResult felt = hybrid::run_session(scene, built, options);
+    EXPECT_GT(felt.relaxed_apart, 10U);
+    const hybrid::ReplayResult again = hybrid::replay({.scene_file = file,
+                                                       .scene_text = text,
+                                                       .dt_s = felt.dt_s,
+                                                       .device = hybrid::scene_limits(scene),
+                                                       .relax_apart = true,
+                                                       .state_hash = felt.state_hash,
+                                                       .ticks = felt.recording},
+                                                      {});
+    EXPECT_TRUE(again.equal) << "parts at tick " << again.parts_at << (realtime ? ", in real time" : "");
+    EXPECT_EQ(built.state->faults, 0U);
+  }
+}
+
+TEST_F(BodyTissue, RefusesWhatIsNotSupported) {
+  const auto refusal = [&](const std::string& rigid) -> std::string {
+    const hybrid::Scene scene = load(block() + rigid);
+    try {
+      (void)hybrid::build_scene(scene);
+    } catch (const std::exception& e) {
+      return e.what();
+    }
+    return "";
+  };
+  const std::string free = refusal(
+      "[[rigid]]\nname = \"b\"\nprimitive = \"ball\"\nradius = 8\nposition = [0, 0, 30]\n"
+      "motion = \"free\"\nmass = 0.01\n");
+  EXPECT_NE(free.find("free rigid objects beside soft ones are not supported yet"), std::string::npos)
+      << free;
+  const std::string sheet = refusal(
+      "[[rigid]]\nname = \"b\"\nprimitive = \"plane\"\nsize = 20\nposition = [0, 0, 30]\nmotion = \"path\"\n"
+      "[rigid.path]\nkind = \"waypoints\"\nspeed = 10\npoints = [[0, 0, 30], [0, 0, 20]]\n");
+  EXPECT_NE(sheet.find("open sheet"), std::string::npos) << sheet;
+}
+
+// The way out of a primitive, from outside and from within.
+TEST(SignedDistance, SaysTheWayOutFromEitherSide) {
+  const auto check = [](const polygon::RigidSurface& surface, const dvec3& from, const dvec3& way,
+                        double distance) {
+    polygon::SignedDistance near;
+    ASSERT_TRUE(polygon::signed_distance(surface, from, 1.0, dvec3(0.0), near));
+    EXPECT_NEAR(near.distance, distance, 1e-15);
+    EXPECT_GT(glm::dot(near.normal, way), 0.99);
+  };
+  const dvec3 z(0.0, 0.0, 1.0), x(1.0, 0.0, 0.0);
+  const auto ball = polygon::make_ball_surface(0.01);
+  check(*ball, 0.012 * z, z, 0.002);
+  check(*ball, 0.007 * z, z, -0.003);
+  const auto box = polygon::make_box_surface({0.01, 0.02, 0.03});
+  check(*box, {0.009, 0.0, 0.0}, x, -0.001);
+  check(*box, {0.0, 0.0, 0.031}, z, 0.001);
+  const auto capsule = polygon::make_capsule_surface(0.005, 0.01);
+  check(*capsule, {0.004, 0.0, 0.005}, x, -0.001);
+  polygon::SignedDistance near;
+  // On the surface there is only what was known.
+  EXPECT_FALSE(polygon::signed_distance(*ball, 0.01 * z, 1.0, dvec3(0.0), near));
+  ASSERT_TRUE(polygon::signed_distance(*ball, 0.01 * z, 1.0, x, near));
+  EXPECT_EQ(near.normal, x);
+  EXPECT_EQ(near.distance, 0.0);
+}
+
 }  // namespace
