@@ -37,7 +37,6 @@ class TissueAtBodies {
       : world_(world),
         state_(state),
         body_(world.soft[soft]),
-        soft_(soft),
         object_(*state.soft[soft]),
         beside_(state.beside_bodies[soft]),
         spacing_m_(object_.lattice().min_spacing_m()),
@@ -141,12 +140,11 @@ class TissueAtBodies {
     if (exists(old) && slack(old, u) < kRests * spacing_m_) object_.stir(s);
   }
 
-  // Is tissue deeper in a body than it should be?
+  // Is tissue deeper in a body than it should be? Anchors count: they do not leave its way.
   [[nodiscard]] bool squeezed() const noexcept {
     double worst = -kSqueezed * spacing_m_;
     std::uint32_t where = BesideBodies::kNobody;
     for (const std::uint32_t s : beside_.near) {
-      if (object_.lattice().anchored(object_.lattice().surface()[s])) continue;
       const double here = slack(beside_.moving[s], displacement(s));
       if (here >= worst) continue;
       worst = here;
@@ -256,7 +254,6 @@ class TissueAtBodies {
   const World& world_;
   WorldState& state_;
   const SoftBody& body_;
-  std::size_t soft_;
   voxel::SoftObject& object_;
   BesideBodies& beside_;
   double spacing_m_, watched_m_;
