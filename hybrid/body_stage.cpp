@@ -106,10 +106,8 @@ void move_bodies(const World& world, WorldState& state, double dt_s) noexcept {
     const RigidMotion& motion = world.rigid[o].motion;
     if (motion.kind() == RigidMotion::Kind::path) {
       const Pose next = motion.pose_at(state.clock.now_s());
-      if (world.rigid[o].presses_tissue) {
+      if (world.rigid[o].presses_tissue)
         state.body_moved_m[o] = motion.displacement_bound(state.rigid[o].pose, next);
-        state.body_travel_m[o] += state.body_moved_m[o];
-      }
       set_rigid_pose(world, state, o, next);
     } else if (motion.kind() == RigidMotion::Kind::free) {
       std::array<BodyContact, 4> contacts;

@@ -11,7 +11,8 @@
 namespace hybrid {
 namespace {
 
-constexpr std::size_t kLooks = 600;   // exact queries a tick, of each soft object
+// Exact queries a tick, of each soft object: 50 to 100 ns each of a primitive, 1 to 2 us of a mesh.
+constexpr std::size_t kLooks = 3000, kMeshLooks = 750;
 constexpr double kWatched = 1.5;      // spacings from a body within which a voxel has its half-space
 constexpr double kLookFar = 8.0;      // spacings further that one query looks, so that the next is not soon
 constexpr double kMovedAgain = 0.02;  // of the spacing: a voxel at a body that stands is looked at again
@@ -20,7 +21,10 @@ constexpr double kRests = 1e-3;       // of the spacing: so near to its half-spa
 constexpr double kAtBone = 0.3;  // spacings from what stands within which a voxel has the half-space of that
 constexpr double kWayAlong = 0.4;  // sine of the angle between body and bone: in a closer gap there is no way
 constexpr double kGivenUp = 0.5;   // of the spacing: deeper than this after the wave, there is no way out
-constexpr double kSqueezed = 0.05;  // of the spacing: deeper in a body than this is a fault
+constexpr double kOnSurface = 1e-9;  // of the spacing
+constexpr double kStep = 0.5;        // of the spacing: bodies come in steps no larger than this …
+constexpr int kMostSteps = 8;        // … and no more of them in a tick
+constexpr double kSqueezed = 0.05;   // of the spacing: deeper in a body than this is a fault
 
 bool exists(const voxel::Obstacle& o) {
   return o.normal != glm::vec3(0.0F);
@@ -33,17 +37,21 @@ double slack(const voxel::Obstacle& o, const glm::dvec3& u) {
 
 class TissueAtBodies {
  public:
-  TissueAtBodies(const World& world, WorldState& state, std::size_t soft)
+  // `back_s`: bodies are looked at where they were so much before now.
+  TissueAtBodies(const World& world, WorldState& state, std::size_t soft, double back_s = 0.0)
       : world_(world),
         state_(state),
         body_(world.soft[soft]),
         object_(*state.soft[soft]),
         beside_(state.beside_bodies[soft]),
         spacing_m_(object_.lattice().min_spacing_m()),
-        watched_m_(kWatched * object_.lattice().max_spacing_m()) {}
+        watched_m_(kWatched * object_.lattice().max_spacing_m()),
+        back_s_(back_s) {}
 
   // Which voxels may be near, and have to be looked at.
   void list(std::uint32_t b) noexcept {
+    const polygon::RigidSurface& surface = *world_.rigid[b].surface;
+    meshes_ = meshes_ || surface.element_count() > 1;
     const double moved = state_.body_moved_m[b];
     for (const std::uint32_t s : beside_.near) {
       if (beside_.whose[s] != b) continue;
@@ -51,8 +59,7 @@ class TissueAtBodies {
       if (moved > 0.0 || since > kMovedAgain * spacing_m_) add(left(b, s), b, s);
     }
     if (moved == 0.0 && object_.asleep()) return;
-    const BodyFrame& frame = state_.rigid[b].frame;
-    const polygon::RigidSurface& surface = *world_.rigid[b].surface;
+    const BodyFrame& frame = frame_of(b);
     const glm::dvec3 half = 0.5 * (surface.upper() - surface.lower());
     glm::dvec3 reach(watched_m_ + moved + object_.voxel_radius() + 2.0 * state_.map.cell_m());
     for (int axis = 0; axis < 3; ++axis) reach += glm::abs(frame.rotation[axis]) * half[axis];
@@ -71,14 +78,15 @@ class TissueAtBodies {
   // Looks at what was listed, those nearest first as far as the budget goes.
   void look() noexcept {
     auto& due = state_.due;
-    if (due.size() > kLooks) {
-      const auto end = due.begin() + static_cast<std::ptrdiff_t>(kLooks);
+    const std::size_t most = meshes_ ? kMeshLooks : kLooks;
+    if (due.size() > most) {
+      const auto end = due.begin() + static_cast<std::ptrdiff_t>(most);
       std::nth_element(due.begin(), end, due.end());
       // What was left out may be within what it should keep out of.
       for (auto d = end; d != due.end(); ++d) {
         if (d->left_m < -watched_m_ - kSqueezed * spacing_m_) state_.faults |= fault_body_crowded;
       }
-      due.resize(kLooks);
+      due.resize(most);
     }
     // The map's lists are in the order of motion; sorted, the result does not depend on history.
     std::sort(due.begin(), due.end(), [](const BodyLook& a, const BodyLook& b) {
@@ -141,7 +149,7 @@ class TissueAtBodies {
   }
 
   // Is tissue deeper in a body than it should be? Anchors count: they do not leave its way.
-  [[nodiscard]] bool squeezed() const noexcept {
+  [[nodiscard]] bool squeezed() noexcept {
     double worst = -kSqueezed * spacing_m_;
     std::uint32_t where = BesideBodies::kNobody;
     for (const std::uint32_t s : beside_.near) {
@@ -211,14 +219,28 @@ class TissueAtBodies {
     if (state_.due.size() < state_.due.capacity()) state_.due.push_back({left_m, b, s});
   }
 
+  [[nodiscard]] const BodyFrame& frame_of(std::uint32_t b) noexcept {
+    if (back_s_ == 0.0) return state_.rigid[b].frame;
+    if (frame_of_ != b) frame_ = BodyFrame(world_.rigid[b].motion.pose_at(state_.clock.now_s() - back_s_));
+    frame_of_ = b;
+    return frame_;
+  }
   [[nodiscard]] bool distance(std::uint32_t b, std::uint32_t s, double range,
-                              polygon::SignedDistance& out) const noexcept {
-    const BodyFrame& frame = state_.rigid[b].frame;
+                              polygon::SignedDistance& out) noexcept {
+    const BodyFrame& frame = frame_of(b);
     const glm::dvec3 at = frame.to_body(body_.to_scene(object_.position(object_.lattice().surface()[s])));
     glm::dvec3 known(0.0);
     if (beside_.whose[s] == b)
       known = (body_.pose.rotation * glm::dvec3(beside_.moving[s].normal)) * frame.rotation;
-    return polygon::signed_distance(*world_.rigid[b].surface, at, range, known, out);
+    const polygon::RigidSurface& surface = *world_.rigid[b].surface;
+    const bool found = polygon::signed_distance(surface, at, range, known, out);
+    if (found && std::abs(out.distance) > kOnSurface * spacing_m_) return found;
+    // On the surface itself there is no way out to be seen, and what was known may be another face's.
+    const glm::dvec3 away = at - 0.5 * (surface.lower() + surface.upper());
+    const double far = glm::length(away);
+    if (!(far > 0.0) || (!found && far > range)) return found;
+    return polygon::signed_distance(surface, at + (2.0 * kOnSurface * spacing_m_ / far) * away, range, known,
+                                    out);
   }
 
   void look(std::uint32_t b, std::uint32_t s) noexcept {
@@ -237,7 +259,7 @@ class TissueAtBodies {
       return;
     }
     if (whose != BesideBodies::kNobody && whose != b && slack(beside_.moving[s], u) <= gap) return;
-    const glm::dvec3 n = glm::inverse(body_.pose.rotation) * (state_.rigid[b].frame.rotation * near.normal);
+    const glm::dvec3 n = glm::inverse(body_.pose.rotation) * (frame_of(b).rotation * near.normal);
     // What lies deep, because it was squeezed, comes out bit by bit.
     const double depth = std::min(-gap, moved + kComesOut * spacing_m_);
     beside_.moving[s] = {glm::vec3(n), static_cast<float>(glm::dot(n, u) + depth), true};
@@ -256,7 +278,10 @@ class TissueAtBodies {
   const SoftBody& body_;
   voxel::SoftObject& object_;
   BesideBodies& beside_;
-  double spacing_m_, watched_m_;
+  double spacing_m_, watched_m_, back_s_;
+  BodyFrame frame_;  // of the body that was asked for last
+  std::uint32_t frame_of_ = BesideBodies::kNobody;
+  bool meshes_ = false;  // among the bodies
 };
 
 }  // namespace
@@ -270,15 +295,44 @@ void watch_bodies(const World& world, WorldState& state) {
   }
 }
 
-void press_by_bodies(const World& world, WorldState& state) noexcept {
+namespace {
+
+// Bodies are where they were back_s ago, having moved by body_moved_m since the last step.
+void press_once(const World& world, WorldState& state, double back_s) noexcept {
   for (std::size_t o = 0; o < state.beside_bodies.size(); ++o) {
-    TissueAtBodies tissue(world, state, o);
+    TissueAtBodies tissue(world, state, o, back_s);
     state.due.clear();
     for (std::uint32_t b = 0; b < world.rigid.size(); ++b) {
       if (world.rigid[b].presses_tissue) tissue.list(b);
     }
     tissue.look();
     tissue.press();
+  }
+}
+
+}  // namespace
+
+void press_by_bodies(const World& world, WorldState& state, double dt_s) noexcept {
+  if (state.beside_bodies.empty()) return;
+  double steps = 1.0;
+  for (const double moved : state.body_moved_m) {
+    for (const auto& object : state.soft)
+      steps = std::max(steps, std::ceil(moved / (kStep * object->lattice().min_spacing_m()) - kOnSurface));
+  }
+  const int count = static_cast<int>(std::min(steps, static_cast<double>(kMostSteps)));
+  for (int n = 1; n <= count; ++n) {
+    const double back_s = n == count ? 0.0 : dt_s * (1.0 - static_cast<double>(n) / count);
+    for (std::uint32_t b = 0; b < world.rigid.size(); ++b) {
+      if (!world.rigid[b].presses_tissue) continue;
+      if (count > 1) {
+        const RigidMotion& motion = world.rigid[b].motion;
+        const double now_s = state.clock.now_s(), step_s = dt_s / count;
+        state.body_moved_m[b] = motion.displacement_bound(motion.pose_at(now_s - back_s - step_s),
+                                                          motion.pose_at(now_s - back_s));
+      }
+      state.body_travel_m[b] += state.body_moved_m[b];
+    }
+    press_once(world, state, back_s);
   }
 }
 

@@ -18,8 +18,10 @@ namespace hybrid {
 // On load, after find_obstacles(): how far from bodies that press tissue its surface voxels are.
 void watch_bodies(const World& world, WorldState& state);
 
-// In the tick, after the bodies moved and before the tool looks for its place.
-void press_by_bodies(const World& world, WorldState& state) noexcept;
+// In the tick, after the bodies moved by dt_s and before the tool looks for its place. Those that moved by
+// more than half a spacing come in steps of that: an edge that went further in one would push voxels beside
+// one another different ways.
+void press_by_bodies(const World& world, WorldState& state, double dt_s) noexcept;
 
 // At its end: sets a fault where tissue could not leave a body's way.
 void judge_bodies(const World& world, WorldState& state) noexcept;

@@ -289,7 +289,7 @@ TickResult haptic_tick(const World& world, WorldState& state, const device::Devi
   const Surroundings around = look_around(world, state, result.device_m);
   clock.done(Stage::broad_phase);
 
-  press_by_bodies(world, state);
+  press_by_bodies(world, state, dt_s);
   clock.done(Stage::arbitration);
 
   const Sweep sweep = settle_contact(world, state, result.device_m, around);

@@ -140,6 +140,26 @@ TEST_F(BodyTissue, LeavesTheWayOfABodyAtAnySpeedAndComesBack) {
   }
 }
 
+// At 1 m/s a body goes two of these spacings in a tick.
+TEST_F(BodyTissue, LeavesTheWayOfABodyThatGoesSpacingsInATick) {
+  const std::string fine = head() +
+                           "[[soft]]\nname = \"block\"\nformula = \"block\"\nsize = [22.5, 22.5, 7]\n"
+                           "spacing = 0.5\nposition = [0, 0, -3.5]\nmaterial = \"gel\"\n" +
+                           tests::some_path;
+  for (const std::size_t number : {0U, 2U}) {
+    for (const bool apart : {false, true}) {
+      Touch touch(load(fine + pusher(shapes()[number], 1.5, 2.0, 1000.0)), kFarAway, apart);
+      double worst = 0.0;
+      for (int n = 0; n < 60; ++n) {
+        touch.at(kFarAway);
+        worst = std::max(worst, deepest(touch));
+      }
+      EXPECT_LE(worst, kOverlap) << shapes()[number].name;
+      EXPECT_EQ(touch.state().faults, 0U);
+    }
+  }
+}
+
 // What the springs store grows with the way of the body by what presses on the anchors, and nothing pulls at
 // anything else.
 TEST_F(BodyTissue, StandingInTissueABodyIsCarriedByItsAnchors) {
@@ -281,7 +301,7 @@ TEST_F(BodyTissue, SqueezedOntoAnchorsItComesBack) {
 TEST_F(BodyTissue, ABodyThatComesToTooManyVoxelsSaysSo) {
   const std::string sheet =
       head() +
-      "[[soft]]\nname = \"sheet\"\nformula = \"block\"\nsize = [50, 50, 4]\nspacing = 1\n"
+      "[[soft]]\nname = \"sheet\"\nformula = \"block\"\nsize = [50, 50, 3.2]\nspacing = 0.8\n"
       "position = [0, 0, -2]\nmaterial = \"gel\"\n" +
       tests::some_path +
       "[[rigid]]\nname = \"plate\"\nprimitive = \"box\"\nsize = [60, 60, 10]\nposition = [0, 0, 8]\n"
