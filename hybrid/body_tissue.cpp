@@ -190,9 +190,8 @@ class TissueAtBodies {
     if (!exists(moving)) return false;
     const glm::dvec3 u = displacement(s), n(moving.normal);
     const double depth = -slack(moving, u);
-    // At a body that stands, relaxation brings out what rounding left in it: or nothing came to rest.
-    const bool stands = state_.body_moved_m[beside_.whose[s]] == 0.0;
-    if (!(depth > (stands ? kRests * spacing_m_ : 0.0))) return false;
+    // At a body that stands it is relaxation that brings out what can come out: or nothing came to rest.
+    if (!(depth > 0.0) || state_.body_moved_m[beside_.whose[s]] == 0.0) return false;
     if (!exists(standing) || slack(standing, u + depth * n) >= 0.0) {
       object_.set_obstacle(s, moving);
       return true;

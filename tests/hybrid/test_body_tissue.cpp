@@ -283,6 +283,24 @@ TEST_F(BodyTissue, SqueezedOntoBoneItStaysOutOfBoneAndComesBack) {
   }
 }
 
+TEST_F(BodyTissue, SqueezedByABodyThatStandsItIsCalm) {
+  for (const bool apart : {false, true}) {
+    Touch touch(load(block() + pusher(shapes()[0], 20.0, 0.0, 200.0, 60.0)), kFarAway, apart);
+    for (int n = 0; n < 2500; ++n) touch.at(kFarAway);
+    const auto surface = tissue(touch).lattice().surface();
+    std::vector<dvec3> before;
+    for (const voxel::VoxelId v : surface) before.push_back(tissue(touch).state().at(v));
+    double way = 0.0;
+    for (int n = 0; n < 500; ++n) {
+      touch.at(kFarAway);
+      for (std::size_t s = 0; s < surface.size(); ++s)
+        way = std::max(way, glm::distance(before[s], tissue(touch).state().at(surface[s])));
+    }
+    EXPECT_LE(way, apart ? 0.0 : 0.25 * kSpacing);
+    EXPECT_TRUE(tissue(touch).asleep() || !apart);
+  }
+}
+
 TEST_F(BodyTissue, SqueezedOntoAnchorsItComesBack) {
   for (const bool apart : {false, true}) {
     Touch touch(load(block() + pusher(shapes()[0], 20.0, 0.0, 200.0)), kFarAway, apart);
