@@ -7,6 +7,8 @@
 #include <glm/geometric.hpp>
 #include <span>
 
+#include "hybrid/body_tissue.h"
+
 namespace hybrid {
 namespace {
 
@@ -41,6 +43,7 @@ NearestRigid nearest_rigid(const World& world, const WorldState& state, const gl
   for (std::uint32_t o = 0; o < world.rigid.size(); ++o) {
     if ((mask & OccupancyMap::rigid_bit(o)) == 0) continue;
     const RigidObject& object = world.rigid[o];
+    if (object.presses_tissue) continue;  // is looked at in every tick (body_tissue.h)
     polygon::NearPoint near;
     if (!object.surface->nearest(object.to_body(point), best.distance, near) || !(near.distance > 0.0))
       continue;
@@ -85,7 +88,7 @@ std::size_t find_obstacles(const World& world, WorldState& state, std::size_t so
     ++count;
     voxel::Obstacle obstacle = obstacle_of(body, object, surface[s], near);
     obstacle.bound = std::min(obstacle.bound, 0.0F);  // nothing presses at rest
-    object.set_obstacle(s, obstacle);
+    set_standing_obstacle(state, soft, s, obstacle);
   }
   return count;
 }
@@ -96,11 +99,13 @@ namespace {
 // first.
 class LooksDue {
  public:
-  LooksDue(const voxel::SoftObject& object, std::span<const SurfaceSeen> seen)
-      : object_(object),
-        seen_(seen),
-        spacing_m_(static_cast<float>(object.lattice().min_spacing_m())),
-        radius_m_(static_cast<float>(object.voxel_radius())) {}
+  LooksDue(const WorldState& state, std::size_t soft)
+      : state_(state),
+        soft_(soft),
+        object_(*state.soft[soft]),
+        seen_(state.obstacle_seen[soft]),
+        spacing_m_(static_cast<float>(object_.lattice().min_spacing_m())),
+        radius_m_(static_cast<float>(object_.voxel_radius())) {}
 
   // Voxel number s of the surface, if it has moved enough.
   void consider(std::uint32_t s) noexcept {
@@ -110,7 +115,7 @@ class LooksDue {
     const float enough = std::max(kMovedEnough, seen.clear_m / spacing_m_ - kSeenAhead) * spacing_m_;
     if (square < enough * enough) return;
     // The surface that it knows holds it; another is further than that one was.
-    const bool held = object_.obstacles()[s].normal != glm::vec3(0.0F);
+    const bool held = standing_obstacle(state_, soft_, s).normal != glm::vec3(0.0F);
     const float room = held ? std::max(seen.clear_m, spacing_m_) : seen.clear_m - radius_m_;
     add({room - std::sqrt(square), s});
   }
@@ -133,6 +138,8 @@ class LooksDue {
     first_[at] = due;
   }
 
+  const WorldState& state_;
+  std::size_t soft_;
   const voxel::SoftObject& object_;
   std::span<const SurfaceSeen> seen_;
   float spacing_m_, radius_m_;
@@ -141,7 +148,7 @@ class LooksDue {
 };
 
 void renew_obstacle(const World& world, WorldState& state, std::size_t o, std::uint32_t s) noexcept {
-  voxel::SoftObject& object = *state.soft[o];
+  const voxel::SoftObject& object = *state.soft[o];
   const SoftBody& body = world.soft[o];
   const voxel::VoxelId v = object.lattice().surface()[s];
   const glm::vec3 u(object.state().at(v));
@@ -150,10 +157,10 @@ void renew_obstacle(const World& world, WorldState& state, std::size_t o, std::u
   const NearestRigid near = from_outside(world, at, nearest_rigid(world, state, at, range));
   state.obstacle_seen[o][s] = {u, static_cast<float>(std::max(near.distance, 0.0))};
   if (!near.found) {
-    object.set_obstacle(s, {});
+    set_standing_obstacle(state, o, s, {});
     return;
   }
-  const voxel::Obstacle old = object.obstacles()[s];
+  const voxel::Obstacle old = standing_obstacle(state, o, s);
   voxel::Obstacle fresh = obstacle_of(body, object, v, near);
   // A thin sheet seen from its other side: the voxel was squeezed through by rounding; its own side stands.
   if (old.normal != glm::vec3(0.0F) && glm::dot(old.normal, fresh.normal) < 0.0F) return;
@@ -161,7 +168,7 @@ void renew_obstacle(const World& world, WorldState& state, std::size_t o, std::u
   // depth it has was left to it once: then a fast tool presses it in deeper tick by tick, and through.)
   const float enough = kMovedEnough * static_cast<float>(object.lattice().min_spacing_m());
   fresh.bound = std::min(fresh.bound, glm::dot(fresh.normal, u) + enough);
-  object.set_obstacle(s, fresh);
+  set_standing_obstacle(state, o, s, fresh);
 }
 
 }  // namespace
@@ -173,7 +180,7 @@ void refresh_obstacles(const World& world, WorldState& state) noexcept {
     if (object.obstacles().empty()) continue;
     if (!object.asleep()) {
       const voxel::Lattice& lattice = object.lattice();
-      LooksDue due(object, state.obstacle_seen[o]);
+      LooksDue due(state, o);
       for (const voxel::VoxelId v : object.touched()) due.consider(object.surface_number(v));
       for (const voxel::RowId row : object.moved_rows()) {
         const auto [first, last] = lattice.surface_in(row);

@@ -105,7 +105,10 @@ void move_bodies(const World& world, WorldState& state, double dt_s) noexcept {
   for (std::uint32_t o = 0; o < world.rigid.size(); ++o) {
     const RigidMotion& motion = world.rigid[o].motion;
     if (motion.kind() == RigidMotion::Kind::path) {
-      set_rigid_pose(world, state, o, motion.pose_at(state.clock.now_s()));
+      const Pose next = motion.pose_at(state.clock.now_s());
+      if (world.rigid[o].presses_tissue)
+        state.body_moved_m[o] = motion.displacement_bound(state.rigid[o].pose, next);
+      set_rigid_pose(world, state, o, next);
     } else if (motion.kind() == RigidMotion::Kind::free) {
       std::array<BodyContact, 4> contacts;
       const std::size_t count = contacts_of(world, state, o, contacts);

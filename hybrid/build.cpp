@@ -12,6 +12,7 @@
 #include <glm/matrix.hpp>
 
 #include "hybrid/arbitration.h"
+#include "hybrid/body_tissue.h"
 #include "hybrid/build_objects.h"
 #include "hybrid/label_surface.h"
 #include "hybrid/process_memory.h"
@@ -77,17 +78,20 @@ double choose_cell(const Scene& scene, const Box& box, double soft_spacing) {
                             : rigid_cell_m(longest, scene.tool.radius_m);
 }
 
-// Distance to the nearest rigid surface within `range`, and whether the point is inside a rigid solid.
+// Distance to the nearest rigid surface within `range`, to the nearest that stays, and whether the point is
+// inside a rigid solid.
 struct RigidDistance {
-  double distance;
+  double distance, fixed;
   bool inside;
 };
 RigidDistance rigid_distance(const std::vector<RigidObject>& rigid, const glm::dvec3& p, double range) {
-  RigidDistance result{range, false};
+  RigidDistance result{range, range, false};
   for (const RigidObject& object : rigid) {
     const glm::dvec3 in_body = object.to_body(p);
     polygon::NearPoint near;
-    if (object.surface->nearest(in_body, result.distance, near)) result.distance = near.distance;
+    double& least = object.motion.moves() ? result.distance : result.fixed;
+    if (object.surface->nearest(in_body, least, near)) least = near.distance;
+    result.distance = std::min(result.distance, result.fixed);
     const glm::dvec3 low = object.surface->lower(), high = object.surface->upper();
     const bool within =
         glm::all(glm::greaterThanEqual(in_body, low)) && glm::all(glm::lessThanEqual(in_body, high));
@@ -97,8 +101,8 @@ RigidDistance rigid_distance(const std::vector<RigidObject>& rigid, const glm::d
 }
 
 // Takes out voxels that lie in a rigid solid or nearer than half a spacing to a rigid surface, so that
-// nothing is felt before contact; and gathers those within `anchor_m`, which bone will hold. Returns how many
-// were carved.
+// nothing is felt before contact; and gathers those within `anchor_m` of one that stays, which will hold
+// them. Returns how many were carved.
 std::size_t carve_by_rigid(const std::vector<RigidObject>& rigid, voxel::LabelVolume& volume, double anchor_m,
                            std::vector<std::size_t>& anchored) {
   const double h = std::min({volume.spacing_m.x, volume.spacing_m.y, volume.spacing_m.z});
@@ -120,7 +124,7 @@ std::size_t carve_by_rigid(const std::vector<RigidObject>& rigid, voxel::LabelVo
           if (near.inside || (run == 0 && near.distance < 0.5 * h)) {
             label = 0;
             ++carved;
-          } else if (run == 0 && near.distance <= anchor_m) {
+          } else if (run == 0 && near.fixed <= anchor_m) {
             anchored.push_back(volume.index(i, j, k));
           }
         }
@@ -168,7 +172,7 @@ class Builder {
       refuse(scene_, scene_.rigid.front().place,
              "a punch against rigid objects is not supported yet; use [tool] shape = \"ball\"");
     }
-    refuse_motion_beside_soft();
+    refuse_free_beside_soft();
     for (const ModelNote& note : scene_.model_notes)
       built_.notes.push_back({note.object, polygon::Severity::info, note.text});
     for (const RigidDescription& d : scene_.rigid) add_rigid(d);
@@ -184,6 +188,7 @@ class Builder {
           {world_->soft[o].name, polygon::Severity::info,
            fmt::format("{} surface voxels lie near rigid objects, which will stop them", near)});
     }
+    watch_bodies(*world_, *built_.state);
     built_.world = std::move(world_);
     give_back_freed_memory();
     built_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -197,16 +202,25 @@ class Builder {
     if (progress_) progress_(text);
   }
 
-  void refuse_motion_beside_soft() const {
+  void refuse_free_beside_soft() const {
     if (scene_.soft.empty()) return;
     for (const RigidDescription& d : scene_.rigid) {
-      if (std::holds_alternative<std::monostate>(d.motion)) continue;
-      refuse(scene_, d.motion_place,
-             fmt::format(
-                 "\"{}\" moves, and moving rigid objects beside soft ones are not supported yet; remove its "
-                 "motion, or the [[soft]] objects",
-                 d.name));
+      if (!std::holds_alternative<FreeMotion>(d.motion)) continue;
+      refuse(
+          scene_, d.motion_place,
+          fmt::format("\"{}\" is free, and free rigid objects beside soft ones are not supported yet; let it "
+                      "move on a path, remove its motion, or the [[soft]] objects",
+                      d.name));
     }
+  }
+
+  // What tissue has to leave the way of must have an inside.
+  void refuse_sheet_beside_soft(const RigidDescription& d, const RigidObject& object) const {
+    if (scene_.soft.empty() || !object.motion.moves() || object.surface->solid()) return;
+    refuse(scene_, d.motion_place,
+           fmt::format("\"{}\" moves and is an open sheet, and such rigid objects beside soft ones are not "
+                       "supported yet; close it, remove its motion, or the [[soft]] objects",
+                       d.name));
   }
 
   void add_rigid(const RigidDescription& d) {
@@ -214,6 +228,7 @@ class Builder {
     at_place(scene_, d.source_place, d.name, [&] { world_->rigid.push_back(build_rigid(d, built_.notes)); });
     RigidObject& object = world_->rigid.back();
     at_place(scene_, d.motion_place, d.name, [&] { object.motion = build_motion(d, object); });
+    refuse_sheet_beside_soft(d, object);
     at_place(scene_, d.feel.texture ? d.feel.texture->place : d.place, d.name,
              [&] { object.feel = build_feel(d.feel); });
     for (const glm::dvec3& v : object.drawn->vertices) box_.add(object.to_scene(v));
@@ -376,6 +391,8 @@ class Builder {
       world_->limits.max_energy_J = std::numeric_limits<double>::infinity();
     if (scene_.passivity && !ideal) world_->passivity = passivity_options();
     add_meetings();
+    for (RigidObject& object : world_->rigid)
+      object.presses_tissue = object.motion.kind() == RigidMotion::Kind::path && !soft_.empty();
     built_.state = std::make_unique<WorldState>(*world_, std::move(*map_));
     built_.state->soft = std::move(soft_);
     built_.state->prepare(*world_);

@@ -369,6 +369,7 @@ std::optional<glm::dvec3> equilibrium_force(const World& world, const WorldState
   World patient = world;
   for (SoftBody& body : patient.soft) body.budget = kSettleBudget;
   for (RigidObject& object : patient.rigid) object.motion = {};  // what moves stands still meanwhile
+  std::fill(copy->body_moved_m.begin(), copy->body_moved_m.end(), 0.0);
   const device::DeviceState still{.position_m = state.device_m};
   glm::dvec3 before(0.0);
   for (int n = 1; n <= kSettleTicks; ++n) {

@@ -134,6 +134,9 @@ void refresh_map(const World& world, WorldState& state) noexcept {
         state.map.move(body.first_number + s, body.to_scene(object.position(v)));
     };
     for (const voxel::VoxelId v : object.touched()) look(v);
+    if (!state.beside_bodies.empty()) {
+      for (const std::uint32_t number : state.beside_bodies[o].near) look(surface[number]);
+    }
     if (object.asleep() && state.cursor[o] == 0) continue;  // a whole round since it came to rest
     const auto count = static_cast<std::uint32_t>(surface.size());
     for (std::uint32_t i = 0; i < std::min(kMapSlice, count); ++i) {

@@ -12,6 +12,7 @@
 
 #include "hybrid/arbitration.h"
 #include "hybrid/body_stage.h"
+#include "hybrid/body_tissue.h"
 #include "hybrid/feel_stage.h"
 #include "hybrid/relax_apart.h"
 #include "hybrid/rigid_step.h"
@@ -286,6 +287,9 @@ TickResult haptic_tick(const World& world, WorldState& state, const device::Devi
   const Surroundings around = look_around(world, state, result.device_m);
   clock.done(Stage::broad_phase);
 
+  press_by_bodies(world, state, dt_s);
+  clock.done(Stage::arbitration);
+
   const glm::dvec3 before = state.proxy_m;
   Sweep sweep = settle_contact(world, state, result.device_m, around);
   clock.done(Stage::contact);
@@ -305,6 +309,7 @@ TickResult haptic_tick(const World& world, WorldState& state, const device::Devi
   if (around.near_soft && may_meet) give_way(world, state, before, sweep);
   clock.done(Stage::arbitration);
 
+  judge_bodies(world, state);
   refresh_map(world, state);
   clock.done(Stage::map);
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "hybrid/world.h"
 
+#include <algorithm>
+
 namespace hybrid {
 namespace {
 
@@ -39,12 +41,38 @@ void WorldState::prepare(const World& world) {
     blocked.reserve(kMaxPlanes);
     found.resize(kMaxFound);
   }
+  prepare_beside_bodies(world);
   pair_cursor.assign(world.meeting.size(), 0);
   paired.resize(world.meeting.size());
   for (std::size_t m = 0; m < world.meeting.size(); ++m) {
     paired[m].assign(soft[world.meeting[m][0]]->lattice().surface().size(), 0);
   }
   pairs.reserve(world.meeting.empty() ? 0 : kMaxPairs);
+}
+
+void WorldState::prepare_beside_bodies(const World& world) {
+  const auto presses = [](const RigidObject& object) { return object.presses_tissue; };
+  if (std::none_of(world.rigid.begin(), world.rigid.end(), presses)) return;
+  body_travel_m.assign(world.rigid.size(), 0.0);
+  body_moved_m.assign(world.rigid.size(), 0.0);
+  std::size_t most = 0;
+  for (const auto& object : soft) {
+    const std::size_t count = object->lattice().surface().size();
+    most = std::max(most, count);
+    BesideBodies beside;
+    beside.standing.resize(count);
+    beside.moving.resize(count);
+    beside.whose.assign(count, BesideBodies::kNobody);
+    beside.listed.assign(count, 0);
+    for (const RigidObject& rigid_object : world.rigid)
+      beside.sights.emplace_back(rigid_object.presses_tissue ? count : 0);
+    beside_bodies.push_back(std::move(beside));
+    beside_bodies.back().near.reserve(count);
+  }
+  const auto bodies =
+      static_cast<std::size_t>(std::count_if(world.rigid.begin(), world.rigid.end(), presses));
+  due.reserve(most * bodies);
+  in_the_way.reserve(most);
 }
 
 }  // namespace hybrid

@@ -42,6 +42,7 @@ struct RigidObject {
   RigidMotion motion{};                                  // fixed unless the scene says otherwise
   SurfaceFeel feel{};                                    // hard and smooth unless the scene says otherwise
   bool surface_is_drawn = false;                         // the surface is of that very mesh, and shares it
+  bool presses_tissue = false;                           // it moves along a path, beside soft objects
 
   [[nodiscard]] glm::dvec3 to_body(const glm::dvec3& in_scene) const {
     return glm::inverse(pose.rotation) * (in_scene - pose.position_m);
@@ -136,6 +137,8 @@ enum FaultBit : std::uint32_t {
   fault_pair_overflow = 16,     // more pairs of soft voxels than fit: use coarser voxels
   fault_infeasible = 32,        // rigid planes left no room for the tool
   fault_nonfinite_body = 64,    // a free body was pushed by something that is not finite: it stood still
+  fault_body_squeezed = 128,    // tissue could not leave the way of a body on a path: they overlapped
+  fault_body_crowded = 256,     // a body on a path came to more soft voxels than a tick looks at
 };
 
 inline constexpr std::size_t kMaxNear = 256;     // triangles considered at once
@@ -176,6 +179,34 @@ struct SurfaceSeen {
   float clear_m = 0.0F;  // from its centre to the nearest of them, or how far was looked
 };
 
+// When a surface voxel has to be looked at again for one body.
+struct BodySight {
+  glm::vec3 u{0.0F};      // displacement when it was last looked at
+  bool given_up = false;  // it is deep in the body, and left alone until it is out of it
+  double until_m = 0.0;   // it is not near the body before that has travelled so far, or the voxel moved
+};
+
+// What bodies on a path ask of one soft object (hybrid/body_tissue.h).
+struct BesideBodies {
+  static constexpr std::uint32_t kNobody = 0xFFFFFFFFU;
+  std::vector<voxel::Obstacle> standing;       // [surface voxel] what fixed surfaces ask of it
+  std::vector<voxel::Obstacle> moving;         // [surface voxel] what the nearest body asks of it
+  std::vector<std::uint32_t> whose;            // [surface voxel] the rigid object that this is; kNobody: none
+  std::vector<std::uint8_t> listed;            // [surface voxel] 1: in `near`
+  std::vector<std::uint32_t> near;             // surface voxels that a body is near to
+  std::vector<std::vector<BodySight>> sights;  // [rigid object][surface voxel]; empty: it does not press
+};
+
+// A surface voxel that may be near a body; those with the least left come first.
+struct BodyLook {
+  double left_m = 0.0;
+  std::uint32_t body = 0, surface_number = 0;
+  bool operator<(const BodyLook& other) const noexcept {
+    if (left_m != other.left_m) return left_m < other.left_m;
+    return body != other.body ? body < other.body : surface_number < other.surface_number;
+  }
+};
+
 // What goes from tick to tick as plain values: assigning it is taking over the state.
 struct CarriedState {
   // ---- of the session ----
@@ -212,6 +243,9 @@ struct CarriedState {
   std::vector<std::vector<SurfaceSeen>> obstacle_seen;  // [soft][surface voxel]
   std::vector<std::uint32_t> cursor, obstacle_cursor;   // [soft] round-robin over surface voxels
   std::vector<std::uint32_t> pair_cursor;               // [meeting]
+  std::vector<BesideBodies> beside_bodies;              // [soft]; none where no body presses tissue
+  // Of bodies that press tissue: how far any point of them moved since the session began, and in this tick.
+  std::vector<double> body_travel_m, body_moved_m;  // [rigid]
 };
 
 // Everything the tick writes. Buffers are sized when the world is built, and never after.
@@ -219,6 +253,7 @@ struct WorldState : CarriedState {
   WorldState(const World& world, OccupancyMap occupancy);
   // Sizes what depends on `soft`, once that is filled.
   void prepare(const World& world);
+  void prepare_beside_bodies(const World& world);
 
   std::vector<std::unique_ptr<voxel::SoftObject>> soft;  // one a World::soft
   Apart apart;                                           // those of them that are relaxed apart
@@ -238,6 +273,8 @@ struct WorldState : CarriedState {
   std::vector<voxel::ToolBound> bounds;
   std::vector<std::uint32_t> found;
   std::vector<std::vector<voxel::VoxelId>> touched;  // [soft]
+  std::vector<BodyLook> due;                         // surface voxels that bodies may be near to
+  std::vector<std::uint32_t> in_the_way;             // … and that are in one
 };
 
 }  // namespace hybrid

@@ -83,6 +83,9 @@ class RigidSurface {
   // Is the point inside the solid? Always false for an open sheet.
   [[nodiscard]] virtual bool inside(const glm::dvec3& point) const noexcept = 0;
 
+  // Has it an inside?
+  [[nodiscard]] virtual bool solid() const noexcept = 0;
+
   // Elements are numbered below this; not every number need be in use.
   [[nodiscard]] virtual std::size_t element_count() const noexcept = 0;
 

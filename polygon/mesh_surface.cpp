@@ -74,6 +74,7 @@ class MeshSurface final : public RigidSurface {
   [[nodiscard]] glm::dvec3 shaded_normal(std::uint32_t element, const glm::dvec3& point,
                                          const glm::dvec3& away) const noexcept override;
   [[nodiscard]] bool inside(const glm::dvec3& point) const noexcept override;
+  [[nodiscard]] bool solid() const noexcept override { return solid_; }
   [[nodiscard]] std::size_t element_count() const noexcept override { return triangles_.size(); }
   [[nodiscard]] glm::dvec3 lower() const noexcept override { return centre_ + lower_; }
   [[nodiscard]] glm::dvec3 upper() const noexcept override { return centre_ + upper_; }

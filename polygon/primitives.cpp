@@ -8,6 +8,7 @@
 #include <limits>
 #include <sstream>
 #include <stdexcept>
+#include <type_traits>
 
 namespace polygon {
 namespace {
@@ -141,6 +142,7 @@ class PrimitiveSurface final : public RigidSurface {
   [[nodiscard]] bool inside(const glm::dvec3& point) const noexcept override {
     return is_finite(point) && shape_.closest(point).inside;
   }
+  [[nodiscard]] bool solid() const noexcept override { return !std::is_same_v<Shape, Sheet>; }
 
   [[nodiscard]] std::size_t element_count() const noexcept override { return 1; }
   [[nodiscard]] glm::dvec3 lower() const noexcept override { return -shape_.extent(); }

@@ -71,7 +71,7 @@ void ChainMail::spread_waiting(Displacement& state) noexcept {
 }
 
 // What went into its obstacle is put back onto the surface. True when any was.
-bool ChainMail::stop_at(Displacement& state, std::span<const Obstacle> obstacles) noexcept {
+bool ChainMail::stop_at(Displacement& state, std::span<const Obstacle> obstacles, Stop stop) noexcept {
   stopped_.clear();
   stops_.clear();
   const double touching = kTouching * lattice_.min_spacing_m();
@@ -80,9 +80,11 @@ bool ChainMail::stop_at(Displacement& state, std::span<const Obstacle> obstacles
     for (VoxelId v = row * kRow; v < (row + 1) * kRow; ++v) {
       if (state.role[v] != Displacement::obstacle) continue;
       const Obstacle& o = obstacles[lattice_.surface_number(v)];
+      if (o.moving && stop == Stop::at_standing) continue;
       const glm::dvec3 n(o.normal), before = state.at(v);
       const double depth = static_cast<double>(o.bound) - glm::dot(n, before);
       if (depth <= touching) continue;
+      stopped_by_moving_ = stopped_by_moving_ || o.moving;
       state.set(v, before + depth * n);
       stopped_.push_back(v);
       stops_.emplace_back(state.at(v) - before);
@@ -116,10 +118,17 @@ void ChainMail::give_way(Displacement& state, std::span<const Obstacle> obstacle
   // What the wave pushed into bone is stopped at its surface, and the tool's voxels give way. At rest
   // everything is clear, so along an axis what is stopped never meets another obstacle; one oblique to the
   // lattice moves its voxel on axes where it was in nobody's way, and may need to be asked again.
-  for (int n = 0; n < kObstaclePasses && !obstacles.empty(); ++n) {
-    if (!stop_at(state, obstacles)) break;
-    spread_moves(state, stopped_, stops_);
-  }
+  bool clear = obstacles.empty();
+  const auto stop = [&](Stop which) {
+    for (int n = 0; n < kObstaclePasses && !clear; ++n) {
+      clear = !stop_at(state, obstacles, which);
+      if (!clear) spread_moves(state, stopped_, stops_);
+    }
+  };
+  stopped_by_moving_ = false;
+  stop(Stop::at_all);
+  // Squeezed between what moves and what stands, tissue stays out of what stands.
+  if (stopped_by_moving_) stop(Stop::at_standing);
 
   // Anchors are mutually feasible, so what gives way to those that were pulled leaves no link violated.
   for (int axis = 0; axis < 3 && wave_.pulled_any(); ++axis) {

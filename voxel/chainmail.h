@@ -66,7 +66,8 @@ class ChainMail {
   void spread_waiting(Displacement& state) noexcept;
   void give_way(Displacement& state, std::span<const Obstacle> obstacles) noexcept;
   void take(std::uint64_t updates) noexcept { left_ -= std::min(left_, updates); }
-  bool stop_at(Displacement& state, std::span<const Obstacle> obstacles) noexcept;
+  enum class Stop : std::uint8_t { at_all, at_standing };  // obstacles that move are passed over
+  bool stop_at(Displacement& state, std::span<const Obstacle> obstacles, Stop stop) noexcept;
 
   const Lattice& lattice_;
   ChainWave wave_;
@@ -74,7 +75,8 @@ class ChainMail {
   std::array<float, 3>
       margin_{};  // of this settle(), and those before of which something waits (unit: meter)
   LazyArray<ChainWave::Source> raised_, lowered_;
-  std::vector<VoxelId> stopped_;  // voxels put back onto their obstacles, and by how much
+  bool stopped_by_moving_ = false;  // since settle() began, some voxel was
+  std::vector<VoxelId> stopped_;    // voxels put back onto their obstacles, and by how much
   std::vector<glm::vec3> stops_;
 };
 

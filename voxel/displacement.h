@@ -56,6 +56,8 @@ struct Displacement {
 struct Obstacle {
   glm::vec3 normal{0.0F};
   float bound = 0.0F;  // (unit: meter), <= 0 where the voxel is clear of it at rest
+  // It is a body's that moves: where a voxel cannot be outside of all, it is in that, and not in what stands.
+  bool moving = false;
 };
 
 }  // namespace voxel

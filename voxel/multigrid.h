@@ -112,6 +112,9 @@ class Multigrid {
   [[nodiscard]] float untold(int level, RowId row, OctetSpan span = {}, int first = 0,
                              int last = kRow - 1) const noexcept;
 
+  // The cells of a coarse row know nothing any more that what they hold does not.
+  void forget_untold(int level, RowId row, Displacement& state, const ObstacleView& obstacles) noexcept;
+
   // Rows whose voxels are pulled by less than `tolerance_N`, or whose cells would move less than `quiet_m`,
   // are left alone.
   [[nodiscard]] float quiet_m() const { return quiet_m_; }

@@ -294,6 +294,19 @@ float Multigrid::untold(int level, RowId row, OctetSpan span, int first, int las
   return most;
 }
 
+void Multigrid::forget_untold(int level, RowId row, Displacement& state,
+                              const ObstacleView& obstacles) noexcept {
+  Level& l = at(level);
+  const std::size_t begin = static_cast<std::size_t>(row) * kRow;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::fill_n(l.value[axis].data() + begin, kRow, 0.0F);
+    std::fill_n(l.told[axis].data() + begin, kRow, 0.0F);
+  }
+  restrict_values(level, row, state);
+  restrict_loads(level, row, state, obstacles);
+  unmark(level, row, changed);
+}
+
 // Reads what the cells of one row, all along x, have to tell, and with that they have told it.
 void Multigrid::spread_hats(int level, int j, int k, const Told& box) noexcept {
   Level& l = at(level);

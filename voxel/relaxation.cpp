@@ -15,6 +15,9 @@ constexpr float kHarder = 8.0F, kSofter = 0.97F, kHardest = 1e4F;
 constexpr double kGain = 0.98;      // of the least residual so far: less is a gain
 constexpr double kNearRest = 10.0;  // times the tolerance: what limits hold moves together from here on
 constexpr double kProgress = 1e-3;  // of the spacing: clusters that move further are on their way
+// Spacings that a coarse cell may have to tell. Between a body and a plate cells ran away to 1e30 m in ten
+// ticks; with ten spacings, or four, some went on running to and fro when the body had left.
+constexpr float kFarthest = 2.0F;
 constexpr std::uint64_t kNextFirst = 7919;  // of these voxels is looked at first in the next round
 // Levels of a cycle round a contact where another relaxes the object: what is further away is his. (With all
 // of them both moved the coarsest cells, and a brain held for a minute wavered by a tenth of its force.)
@@ -29,6 +32,7 @@ constexpr int kLooksAtOnce = 256;  // tiles looked at for what coarse levels hav
 
 Relaxation::Relaxation(const Lattice& lattice) : lattice_(lattice), multigrid_(lattice), clusters_(lattice) {
   set_tolerance(kRestingResidual * lattice.force_scale_N());
+  farthest_m_ = kFarthest * static_cast<float>(lattice.max_spacing_m());
   boxes_.resize(static_cast<std::size_t>(multigrid_.levels()));
 }
 
@@ -368,6 +372,11 @@ void Relaxation::tell_box(int level, Displacement& state, const ObstacleView& ob
     const float most =
         multigrid_.untold(level + 1, row, span, b.first_teller - origin, b.last_teller - origin);
     if (most <= multigrid_.passed_on_m()) return;
+    // Where links at their limits hold tissue between obstacles, coarse cells can run away.
+    if (!(most <= farthest_m_)) {
+      multigrid_.forget_untold(level + 1, row, state, obstacles);
+      return;
+    }
     multigrid_.mark(level + 1, row, Multigrid::telling);
     any = true;
   });

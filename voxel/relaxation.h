@@ -149,6 +149,7 @@ class Relaxation {
   bool keeping_ = false;          // it is kept now
   double residual_N_ = 0.0, running_residual_N_ = 0.0, tolerance_N_ = 0.0, least_residual_N_ = 0.0;
   float hold_ = 1.0F;
+  float farthest_m_ = 0.0F;  // a cell that has more to tell forgets it
   int cycles_without_gain_ = 0;
   std::uint64_t cycles_ = 0;
 };

@@ -608,6 +608,27 @@ void SoftObject::set_obstacle(std::size_t surface_number, const Obstacle& obstac
   state_.set_role(v, resting_role(v));
 }
 
+void SoftObject::leave_obstacles(std::span<const std::uint32_t> surface_numbers) noexcept {
+  sources_.clear();
+  moves_.clear();
+  for (const std::uint32_t s : surface_numbers) {
+    const VoxelId v = lattice_->surface()[s];
+    const Obstacle& o = obstacles_[s];
+    const glm::dvec3 n(o.normal), before = state_.at(v);
+    const double depth = static_cast<double>(o.bound) - glm::dot(n, before);
+    if (!(depth > 0.0) || lattice_->anchored(v)) continue;
+    state_.set(v, before + depth * n);
+    sources_.push_back(v);
+    moves_.emplace_back(state_.at(v) - before);
+  }
+  if (!sources_.empty()) settle_chain();
+}
+
+void SoftObject::stir(std::size_t surface_number) noexcept {
+  relaxation_.stir(lattice_->surface()[surface_number] / kRow);
+  relaxation_.wake();
+}
+
 void SoftObject::reserve_obstacles() {
   obstacles_.resize(lattice_->surface().size());
   moved_rows_.reserve(kMostMovedRows);

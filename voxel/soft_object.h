@@ -94,6 +94,10 @@ class SoftObject {
   // more.
   void set_obstacle(std::size_t surface_number, const Obstacle& obstacle) noexcept;
   [[nodiscard]] std::span<const Obstacle> obstacles() const { return obstacles_; }
+  // Obstacles moved: brings these surface voxels out of theirs, as one wave, and the chain with them.
+  void leave_obstacles(std::span<const std::uint32_t> surface_numbers) noexcept;
+  // An obstacle that surface voxel number s lay on went away: it looks for its place.
+  void stir(std::size_t surface_number) noexcept;
   // Where there may be obstacles: rows that the chain moved since these were forgotten, each once, the first
   // kMostMovedRows of them.
   static constexpr std::size_t kMostMovedRows = 1024;

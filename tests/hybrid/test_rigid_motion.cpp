@@ -249,15 +249,15 @@ TEST_F(MotionScene, TheMapCoversCurvedPrimitives) {
   }
 }
 
-TEST_F(MotionScene, BesideSoftObjectsIsRefusedAtItsPlace) {
+TEST_F(MotionScene, AFreeBodyBesideSoftObjectsIsRefusedAtItsPlace) {
   const std::string text = kBox + std::string("motion = \"free\"\nmass = 0.2\n") + tests::block;
   try {
     (void)hybrid::build_scene(load(text));
-    FAIL() << "moving objects beside soft ones are not supported yet";
+    FAIL() << "free objects beside soft ones are not supported yet";
   } catch (const hybrid::SceneError& error) {
     const std::string what = error.what();
-    EXPECT_NE(what.find("scene.toml:11:1: \"box\" moves"), std::string::npos) << what;
-    EXPECT_NE(what.find("not supported yet; remove"), std::string::npos) << what;
+    EXPECT_NE(what.find("scene.toml:11:1: \"box\" is free"), std::string::npos) << what;
+    EXPECT_NE(what.find("not supported yet; let it move on a path"), std::string::npos) << what;
   }
 }
 
