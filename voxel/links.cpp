@@ -92,6 +92,11 @@ glm::dvec3 link_compliance(Couplings& couplings, VoxelId v) noexcept {
   return {inverse[0], inverse[1], inverse[2]};
 }
 
+double depth_in_obstacle(const ObstacleView& view, const Displacement& state, VoxelId v) noexcept {
+  const Obstacle& o = view.of(v);
+  return static_cast<double>(o.bound) - glm::dot(glm::dvec3(o.normal), state.at(v));
+}
+
 bool blocked(const ObstacleView& view, const Displacement& state, VoxelId v, double margin) noexcept {
   const Obstacle& o = view.of(v);
   return glm::dot(glm::dvec3(o.normal), state.at(v)) < static_cast<double>(o.bound) + margin;

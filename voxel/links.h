@@ -37,6 +37,8 @@ struct ObstacleView {
   [[nodiscard]] const Obstacle& of(VoxelId v) const { return obstacles[lattice->surface_number(v)]; }
 };
 
+// How deep a voxel whose role is obstacle is in it (m; negative: clear of it).
+double depth_in_obstacle(const ObstacleView& view, const Displacement& state, VoxelId v) noexcept;
 // Is a voxel whose role is obstacle within `margin` of it, or in it (unit: meter)?
 bool blocked(const ObstacleView& view, const Displacement& state, VoxelId v, double margin) noexcept;
 // Takes a voxel whose role is obstacle where its links would have it, on this side of the obstacle. One that

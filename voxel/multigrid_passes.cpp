@@ -413,10 +413,10 @@ void Multigrid::tell_row(int level, RowId row, const std::array<HatRow, 4>& hats
   note_change(level, row, done.most_m);
 }
 
-// What the other found is outside of its obstacles but for rounding. (Taken for a voxel that was moved into
-// its obstacle, one would look for its place again, beside others that have not come along yet, and the
-// other, told of that, would find it pulled: they disagreed about the underside of a brain by a little more
-// in each exchange.)
+// What the other found is no deeper in its obstacles than it was, but for rounding. (Taken for a voxel that
+// was moved into its obstacle, one would look for its place again, beside others that have not come along
+// yet, and the other, told of that, would find it pulled: they disagreed about the underside of a brain by a
+// little more in each exchange.)
 void Multigrid::add(RowId row, const RowVector& way, Displacement& state,
                     const ObstacleView& obstacles) noexcept {
   if (!prepare(0, row)) return;
@@ -426,14 +426,22 @@ void Multigrid::add(RowId row, const RowVector& way, Displacement& state,
     note_change(0, row, correct_voxels(r, row, way, state, obstacles, {}, refused).most_m);
     return;
   }
+  std::array<double, kRow> depth{};
+  for (VoxelId lane = 0; lane < kRow; ++lane) {
+    if (state.role[row * kRow + lane] == Displacement::obstacle)
+      depth[lane] = depth_in_obstacle(obstacles, state, row * kRow + lane);
+  }
   for (std::size_t axis = 0; axis < 3; ++axis) std::copy_n(r.u[axis], kRow, before[axis].begin());
   const RowLimits limits = couplings().limits(row);
   RowCorrection done = correct_row(r, &limits, {}, way, refused);
   const double touching = kTouching * lattice_.min_spacing_m();
-  bool inside = false;
-  for (VoxelId v = row * kRow; v < (row + 1) * kRow; ++v)
-    inside = inside || (state.role[v] == Displacement::obstacle && blocked(obstacles, state, v, -touching));
-  if (inside) {
+  bool deeper = false;
+  for (VoxelId lane = 0; lane < kRow && !deeper; ++lane) {
+    const VoxelId v = row * kRow + lane;
+    deeper = state.role[v] == Displacement::obstacle &&
+             depth_in_obstacle(obstacles, state, v) > std::max(depth[lane], 0.0) + touching;
+  }
+  if (deeper) {
     for (std::size_t axis = 0; axis < 3; ++axis) std::copy_n(before[axis].begin(), kRow, r.u[axis]);
     done = correct_voxels(r, row, way, state, obstacles, {}, refused);
   }
