@@ -168,6 +168,9 @@ class SoftObject {
     double distance;  // of the voxel from the tool's surface along normal; negative: overlap
     glm::dvec3 normal;
   };
+  static constexpr std::size_t kMaxCarried =
+      20'000;                            // voxels that may hang on the pressed ones by tight links
+  static constexpr double kStir = 1e-5;  // of the spacing: voxels that moved less wake nobody
   struct Carried {
     VoxelId v;
     std::uint32_t touch;  // whose load it adds to
@@ -190,6 +193,7 @@ class SoftObject {
   void add_stiffness(int axis, glm::dmat3& stiffness) noexcept;
   [[nodiscard]] glm::dvec3 load_on(VoxelId v) noexcept;
   void draw_along(int axis) noexcept;
+  void carry(VoxelId v, std::uint32_t touch) noexcept;
   void gather_load(int axis) noexcept;
   void gather_load_with_pairs(int axis) noexcept;
   void let_go_of_carried() noexcept;
