@@ -47,9 +47,9 @@ bool Surroundings::look_from(const glm::dvec3& point) noexcept {
     if (look_ended_) look_cells_ *= kFurtherLook;  // too short-sighted for this motion
     state_.look_at = point_;
     state_.look_m = radius_ + look_cells_ * state_.map.cell_m();
-    state_.look_mask = world_.use_map
-                           ? state_.map.rigid_in(point_ - state_.look_m, point_ + state_.look_m, state_.map_trail)
-                           : ~std::uint64_t{0};
+    state_.look_mask =
+        world_.use_map ? state_.map.rigid_in(point_ - state_.look_m, point_ + state_.look_m, state_.map_trail)
+                       : ~std::uint64_t{0};
     look_ended_ = false;
     // Unasked, a neighbourhood does not follow the proxy, which may come back on another side.
     for (std::uint32_t o = 0; o < world_.rigid.size(); ++o) {
