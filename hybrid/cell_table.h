@@ -228,7 +228,8 @@ class CellTable {
                                       static_cast<std::size_t>(std::countr_zero(match) / 8));
   }
   [[nodiscard]] static std::size_t parity(const CellCoordinates& at) noexcept {
-    return static_cast<std::size_t>((at[0] & 1) + 2 * (at[1] & 1) + 4 * (at[2] & 1));
+    const auto odd = [&at](std::size_t d) { return static_cast<std::size_t>(at[d] & 1); };
+    return odd(0) + 2 * odd(1) + 4 * odd(2);
   }
   // What of an entry lies beyond its first cache line comes together with it.
   [[gnu::always_inline]] void fetch_rest(std::uint32_t place) const noexcept {
