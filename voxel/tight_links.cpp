@@ -39,6 +39,20 @@ void for_neighbours(const Lattice& lattice, VoxelId v, const Visit& visit) {
   }
 }
 
+// `visit(w, pushed_up, pushed_down)` for those whose link to v is at a limit along `axis`: at that below
+// which w cannot go, which pushes it up, at the one above, or at both.
+template <class Visit>
+void for_tight_neighbours(const Lattice& lattice, const LazyArray<float>& u, VoxelId v, int axis,
+                          const Visit& visit) {
+  for_neighbours(lattice, v, [&](VoxelId w, int d, bool up) {
+    const float tight = kTight * static_cast<float>(lattice.spacing_m()[d]);
+    const LinkState link = link_state(lattice, u, v, w, d, up, axis);
+    const bool pushed_up = link.difference <= link.low + tight,
+               pushed_down = link.difference >= link.high - tight;
+    if (pushed_up || pushed_down) visit(w, pushed_up, pushed_down);
+  });
+}
+
 }  // namespace
 
 // What hangs on pressed voxels by tight links comes along when they withdraw: it is felt only where it is
@@ -102,13 +116,8 @@ void SoftObject::gather_load(int axis) noexcept {
   }
   for (std::size_t head = 0; head < carried_.size() && carried_.size() < kMaxCarried; ++head) {
     const Carried c = carried_[head];
-    for_neighbours(*lattice_, c.v, [&](VoxelId w, int d, bool up) {
+    for_tight_neighbours(*lattice_, u, c.v, axis, [&](VoxelId w, bool pushed_up, bool pushed_down) {
       if (lattice_->anchored(w)) return;
-      const float tight = kTight * static_cast<float>(lattice_->spacing_m()[d]);
-      const LinkState link = link_state(*lattice_, u, c.v, w, d, up, axis);
-      const bool pushed_up = link.difference <= link.low + tight,
-                 pushed_down = link.difference >= link.high - tight;
-      if (!pushed_up && !pushed_down) return;
       touches_[c.touch].tight = true;
       if (carried_mark_[w] != 0) return;
       const double pull = load_on(w)[axis];
@@ -134,13 +143,8 @@ void SoftObject::gather_load_with_pairs(int axis) noexcept {
   hanging_.assign(pressed, Hanging{});
   for (std::size_t head = 0; head < carried_.size() && carried_.size() < kMaxCarried; ++head) {
     const Carried c = carried_[head];
-    for_neighbours(*lattice_, c.v, [&](VoxelId w, int d, bool up) {
+    for_tight_neighbours(*lattice_, u, c.v, axis, [&](VoxelId w, bool pushed_up, bool pushed_down) {
       if (lattice_->anchored(w)) return;
-      const float tight = kTight * static_cast<float>(lattice_->spacing_m()[d]);
-      const LinkState link = link_state(*lattice_, u, c.v, w, d, up, axis);
-      const bool pushed_up = link.difference <= link.low + tight,
-                 pushed_down = link.difference >= link.high - tight;
-      if (!pushed_up && !pushed_down) return;
       touches_[c.touch].tight = true;
       if (carried_mark_[w] != 0) return;
       carry(w, c.touch);
@@ -245,11 +249,8 @@ bool SoftObject::held_fast(VoxelId v, const glm::dvec3& direction) noexcept {
   bool held = rests(v);
   for (std::size_t head = 0; head < carried_.size() && carried_.size() < kMostTied && !held; ++head) {
     const VoxelId c = carried_[head].v;
-    for_neighbours(*lattice_, c, [&](VoxelId w, int d, bool up) {
-      if (held || carried_mark_[w] != 0) return;
-      const float tight = kTight * static_cast<float>(lattice_->spacing_m()[d]);
-      const LinkState link = link_state(*lattice_, u, c, w, d, up, axis);
-      if (upwards ? link.difference > link.low + tight : link.difference < link.high - tight) return;
+    for_tight_neighbours(*lattice_, u, c, axis, [&](VoxelId w, bool pushed_up, bool pushed_down) {
+      if (held || carried_mark_[w] != 0 || !(upwards ? pushed_up : pushed_down)) return;
       held = rests(w);
       carried_mark_[w] = 1;
       carried_.push_back({w, 0});
