@@ -118,7 +118,7 @@ class Relaxation {
   enum class Look : std::uint8_t { all, active };  // rows at rest are left alone
 
   void lay_boxes(const std::array<int, 3>& low, const std::array<int, 3>& high, int margin) noexcept;
-  void cycle(Displacement& state, const ObstacleView& obstacles, Look look) noexcept;
+  void cycle(Displacement& state, const ObstacleView& obstacles, Look look, int levels) noexcept;
   void end_round(Displacement& state, double residual_N) noexcept;
   double move_clusters(Displacement& state) noexcept;
   std::uint64_t relax_tile(Displacement& state, const ObstacleView& obstacles, std::size_t number) noexcept;
