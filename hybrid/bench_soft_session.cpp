@@ -81,7 +81,8 @@ SoftRow session_row(int edge, const Scene& scene, BuiltScene& built, const SoftB
                                             .keep_rows = false,
                                             .keep_recording = false,
                                             .reference_samples = 6,
-                                            .progress = {}});
+                                            .progress = {},
+                                            .relax_apart = true});
   row.repeats = result.ticks;
   row.time_us = result.tick_us.percentiles();
   row.truncated_share = static_cast<double>(built.state->truncated_ticks) /
