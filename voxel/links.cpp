@@ -83,6 +83,20 @@ glm::dvec3 link_force(Couplings& couplings, const Displacement& state, VoxelId v
   return force_of(couplings.springs_of(v), couplings.lattice(), state, v);
 }
 
+double link_force(Couplings& couplings, const Displacement& state, VoxelId v, int axis) noexcept {
+  const VoxelSprings springs = couplings.springs_of(v);
+  const Lattice& lattice = couplings.lattice();
+  const auto ua = static_cast<std::size_t>(axis);
+  const LazyArray<float>& u = state.u[ua];
+  double force = yielded_load(lattice, state, springs, v)[ua];
+  for (int d = 0; d < 3; ++d) {
+    const auto ud = static_cast<std::size_t>(d);
+    force += static_cast<double>(springs.up[ud].on(axis, d) * (u[lattice.up(v, d)] - u[v])) +
+             static_cast<double>(springs.down[ud].on(axis, d) * (u[lattice.down(v, d)] - u[v]));
+  }
+  return force;
+}
+
 glm::dvec3 link_force(const Lattice& lattice, const Displacement& state, VoxelId v) noexcept {
   return force_of(lattice.springs_of(v), lattice, state, v);
 }

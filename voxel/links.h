@@ -27,6 +27,8 @@ float clamp_to(const std::array<float, 2>& interval, float wanted, float now) no
 // Force of its links on voxel v (unit: newton); of a lattice's own springs slowly, for references.
 glm::dvec3 link_force(Couplings& couplings, const Displacement& state, VoxelId v) noexcept;
 glm::dvec3 link_force(const Lattice& lattice, const Displacement& state, VoxelId v) noexcept;
+// The same along one axis, in a third of the time.
+double link_force(Couplings& couplings, const Displacement& state, VoxelId v, int axis) noexcept;
 // How far a force of 1 N on voxel v alone moves it, per axis (unit: m/N); 0 where it is anchored.
 glm::dvec3 link_compliance(Couplings& couplings, VoxelId v) noexcept;
 

@@ -150,9 +150,9 @@ class SoftObject {
 
  private:
   friend class Replica;  // the same object, relaxed elsewhere
-  // Voxels of an object that has all its memory from the start, up to 50 MB: what a tick touches for the
+  // Voxels of an object that has all its memory from the start, up to 200 MB: what a tick touches for the
   // first time takes it five times as long. A larger one gets it where it is touched.
-  static constexpr std::size_t kPreparedWhole = 1U << 18U;
+  static constexpr std::size_t kPreparedWhole = 1U << 20U;
 
   struct Touch {
     VoxelId v;
@@ -192,6 +192,7 @@ class SoftObject {
   void relax_touch(const ToolInBody& tool, Touch& touch) noexcept;
   void add_stiffness(int axis, glm::dmat3& stiffness) noexcept;
   [[nodiscard]] glm::dvec3 load_on(VoxelId v) noexcept;
+  [[nodiscard]] double load_on(VoxelId v, int axis) noexcept;
   void draw_along(int axis) noexcept;
   void carry(VoxelId v, std::uint32_t touch) noexcept;
   void gather_load(int axis) noexcept;

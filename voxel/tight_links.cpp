@@ -98,6 +98,12 @@ glm::dvec3 SoftObject::load_on(VoxelId v) noexcept {
   return links + pair_load(v);
 }
 
+double SoftObject::load_on(VoxelId v, int axis) noexcept {
+  const double links = link_force(relaxation_.couplings(), state_, v, axis);
+  if (state_.role[v] != Displacement::held) return links;
+  return links + pair_load(v)[axis];
+}
+
 void SoftObject::carry(VoxelId v, std::uint32_t touch) noexcept {
   carried_mark_[v] = 1;
   carried_index_[v] = touch;
@@ -120,7 +126,7 @@ void SoftObject::gather_load(int axis) noexcept {
       if (lattice_->anchored(w)) return;
       touches_[c.touch].tight = true;
       if (carried_mark_[w] != 0) return;
-      const double pull = load_on(w)[axis];
+      const double pull = load_on(w, axis);
       if (!((pushed_up && pull < 0.0) || (pushed_down && pull > 0.0))) return;
       touches_[c.touch].load[axis] += pull;
       carry(w, c.touch);
@@ -148,7 +154,7 @@ void SoftObject::gather_load_with_pairs(int axis) noexcept {
       touches_[c.touch].tight = true;
       if (carried_mark_[w] != 0) return;
       carry(w, c.touch);
-      hanging_.push_back({static_cast<std::uint32_t>(head), pushed_up, pushed_down, load_on(w)[axis]});
+      hanging_.push_back({static_cast<std::uint32_t>(head), pushed_up, pushed_down, load_on(w, axis)});
     });
   }
   for (std::size_t i = carried_.size(); i-- > pressed;) {
@@ -182,9 +188,17 @@ void SoftObject::add_stiffness(int axis, glm::dmat3& stiffness) noexcept {
   for (const Carried& c : carried_) {
     if (carried_mark_[c.v] == 0) continue;
     const glm::dvec3 q = along(c.v);
+    // Most hang on the same as all beside them, and no link of theirs is stretched.
+    unsigned stretched = 0;
+    for (int n = 0; n < 6; ++n) {
+      const VoxelId w = n % 2 != 0 ? lattice_->up(c.v, n / 2) : lattice_->down(c.v, n / 2);
+      if (carried_mark_[w] == 0 || carried_index_[w] != carried_index_[c.v]) stretched |= 1U << n;
+    }
+    if (stretched == 0) continue;
     const VoxelSprings springs = relaxation_.couplings().springs_of(c.v);
     for (int d = 0; d < 3; ++d) {
       for (const bool up : {false, true}) {
+        if ((stretched >> (2 * d + (up ? 1 : 0)) & 1U) == 0) continue;
         const VoxelId w = up ? lattice_->up(c.v, d) : lattice_->down(c.v, d);
         const Spring& spring = (up ? springs.up : springs.down)[static_cast<std::size_t>(d)];
         const double stiff = static_cast<double>(spring.on(axis, d));
