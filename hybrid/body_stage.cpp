@@ -6,12 +6,18 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "hybrid/body_support.h"
 #include "hybrid/rigid_sweep.h"
 
 namespace hybrid {
 namespace {
 
-constexpr int kWaysAside = 8;     // looked for when a body pushes the proxy into another
+constexpr int kWaysAside = 8;  // looked for when a body pushes the proxy into another
+// A body rests after so many ticks in which it goes no further than this (spacings), and no force changes or
+// is left over by more than this share of all that presses; it moves again when that is more than so many
+// times.
+constexpr std::uint32_t kCalmTicks = 100;
+constexpr double kCalmWay = 1e-5, kCalmForce = 1e-3, kRoused = 3.0;
 constexpr double kStayed = 1e-9;  // of the ball: a proxy that is so near where it was pushed is there
 
 // What pressed on the body in the last tick: the proxy's coupling, shared as the contacts share it.
@@ -100,6 +106,59 @@ void set_rigid_pose(const World& world, WorldState& state, std::uint32_t object,
   state.pushed = state.pushed || glm::length(state.proxy_m - expected) > stayed_m(world);
 }
 
+namespace {
+
+// Is a body that went from `before` to `after` about to come to rest, or still there? Of the contacts the
+// first `springs` are the tool and what tissue's links press with.
+bool is_calm(const FreeBody& body, const FreeBodyState& before, const FreeBodyState& after,
+             std::span<const BodyContact> contacts, std::size_t springs, double dt_s, double most) noexcept {
+  double pressed = 0.0, change = 0.0;
+  for (std::size_t n = 0; n < springs; ++n) {
+    const BodyContact& c = contacts[n];
+    if (!(c.force_N > 0.0)) continue;
+    const glm::dvec3 way =
+        after.velocity_m_per_s + glm::cross(after.spin_rad_per_s, c.point_m - before.centre_m);
+    pressed += c.force_N;
+    change += dt_s * c.stiffness_N_per_m * std::abs(glm::dot(c.normal, way));
+  }
+  const double left =
+      body.mass.mass_kg * glm::length(after.velocity_m_per_s - before.velocity_m_per_s) / dt_s;
+  const double weight = body.mass.mass_kg * glm::length(body.gravity_m_per_s2);
+  return pressed > 0.0 && std::max(change, left) <= most * std::max(pressed, weight);
+}
+
+// One step of a free body beside tissue.
+void move_in_tissue(const World& world, WorldState& state, std::uint32_t o, double dt_s) noexcept {
+  const RigidMotion& motion = world.rigid[o].motion;
+  RigidNear& near = state.rigid[o];
+  near.before = near.pose;
+  state.body_moved_m[o] = 0.0;
+  std::array<BodyContact, 4> of_tool;
+  const std::size_t count = contacts_of(world, state, o, of_tool);
+  state.body_contacts.assign(of_tool.begin(), of_tool.begin() + static_cast<std::ptrdiff_t>(count));
+  const std::size_t springs = add_tissue_contacts(world, state, o, dt_s);
+  FreeBodyState next = near.free;
+  if (!step_free_body(motion.free_body(), next, state.body_contacts, dt_s))
+    state.faults |= fault_nonfinite_body;
+  const Pose pose = pose_of(motion.free_body(), next);
+  const double way = motion.displacement_bound(near.pose, pose);
+  const bool rests = near.calm_ticks == kCalmTicks;
+  const double most = rests ? kRoused : 1.0;
+  const bool calm =
+      way <= most * kCalmWay * least_spacing_m(state) &&
+      is_calm(motion.free_body(), near.free, next, state.body_contacts, springs, dt_s, most * kCalmForce);
+  near.calm_ticks = calm ? std::min(near.calm_ticks + 1, kCalmTicks) : 0;
+  if (near.calm_ticks == kCalmTicks) {
+    near.free.velocity_m_per_s = near.free.spin_rad_per_s = glm::dvec3(0.0);
+    return;
+  }
+  near.free = next;
+  state.body_moved_m[o] = way;
+  set_rigid_pose(world, state, o, pose);
+}
+
+}  // namespace
+
 void move_bodies(const World& world, WorldState& state, double dt_s) noexcept {
   state.clock.add(dt_s);
   for (std::uint32_t o = 0; o < world.rigid.size(); ++o) {
@@ -109,6 +168,8 @@ void move_bodies(const World& world, WorldState& state, double dt_s) noexcept {
       if (world.rigid[o].presses_tissue)
         state.body_moved_m[o] = motion.displacement_bound(state.rigid[o].pose, next);
       set_rigid_pose(world, state, o, next);
+    } else if (motion.kind() == RigidMotion::Kind::free && world.rigid[o].presses_tissue) {
+      move_in_tissue(world, state, o, dt_s);
     } else if (motion.kind() == RigidMotion::Kind::free) {
       std::array<BodyContact, 4> contacts;
       const std::size_t count = contacts_of(world, state, o, contacts);

@@ -6,7 +6,8 @@
 
 namespace hybrid {
 
-// Moves every body on by dt_s: along its path, or freely, pushed by what pressed on it in the last tick.
+// Moves every body on by dt_s: along its path, or freely, pushed by what pressed on it in the last tick. A
+// free body that tissue carries, and that would hardly move any more, rests.
 void move_bodies(const World& world, WorldState& state, double dt_s) noexcept;
 
 // Body number `object` is now at `pose` (body to scene). In the body's frame the proxy moves, and is swept

@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "hybrid/body_support.h"
 #include "polygon/signed_distance.h"
 
 namespace hybrid {
@@ -25,6 +26,8 @@ constexpr double kOnSurface = 1e-9;  // of the spacing
 constexpr double kStep = 0.5;        // of the spacing: bodies come in steps no larger than this …
 constexpr int kMostSteps = 8;        // … and no more of them in a tick
 constexpr double kSqueezed = 0.05;   // of the spacing: deeper in a body than this is a fault
+constexpr int kMostRounds = 4;       // in a step a free body goes back and tissue leaves its way, in turns
+constexpr double kNoFurther = 0.25;  // of the spacing: in tissue that is so deep in it a free body stops
 
 bool exists(const voxel::Obstacle& o) {
   return o.normal != glm::vec3(0.0F);
@@ -35,10 +38,27 @@ double slack(const voxel::Obstacle& o, const glm::dvec3& u) {
   return glm::dot(glm::dvec3(o.normal), u) - static_cast<double>(o.bound);
 }
 
+bool is_free(const World& world, std::uint32_t b) noexcept {
+  return world.rigid[b].motion.kind() == RigidMotion::Kind::free;
+}
+
+// A moment within the tick: simulated time, and the part of the tick that is still to come.
+struct Moment {
+  double t_s = 0.0, to_come = 0.0;
+};
+
+// Where a body is then: a free one on the straight way from where it was.
+Pose pose_at(const World& world, const WorldState& state, std::uint32_t b, const Moment& moment) noexcept {
+  if (!is_free(world, b)) return world.rigid[b].motion.pose_at(moment.t_s);
+  const Pose &before = state.rigid[b].before, &now = state.rigid[b].pose;
+  return {glm::mix(now.position_m, before.position_m, moment.to_come),
+          glm::slerp(now.rotation, before.rotation, moment.to_come)};
+}
+
 class TissueAtBodies {
  public:
-  // `back_s`: bodies are looked at where they were so much before now.
-  TissueAtBodies(const World& world, WorldState& state, std::size_t soft, double back_s = 0.0)
+  // Bodies are looked at where they are at that moment.
+  TissueAtBodies(const World& world, WorldState& state, std::size_t soft, const Moment& moment = {})
       : world_(world),
         state_(state),
         body_(world.soft[soft]),
@@ -46,7 +66,7 @@ class TissueAtBodies {
         beside_(state.beside_bodies[soft]),
         spacing_m_(object_.lattice().min_spacing_m()),
         watched_m_(kWatched * object_.lattice().max_spacing_m()),
-        back_s_(back_s) {}
+        moment_(moment) {}
 
   // Which voxels may be near, and have to be looked at.
   void list(std::uint32_t b) noexcept {
@@ -125,6 +145,12 @@ class TissueAtBodies {
     give_up();
   }
 
+  void look_again(std::uint32_t b) noexcept {
+    for (const std::uint32_t s : beside_.near) {
+      if (beside_.whose[s] == b) look(b, s);
+    }
+  }
+
   void first_look(std::uint32_t b) noexcept {
     const auto count = static_cast<std::uint32_t>(object_.lattice().surface().size());
     for (std::uint32_t s = 0; s < count; ++s) look(b, s);
@@ -170,6 +196,8 @@ class TissueAtBodies {
   // body is the next, it would come out behind it, and be caught there.
   void give_up() noexcept {
     for (const std::uint32_t s : beside_.near) {
+      // A free body gives way itself.
+      if (beside_.whose[s] == BesideBodies::kNobody || is_free(world_, beside_.whose[s])) continue;
       if (slack(beside_.moving[s], displacement(s)) >= -kGivenUp * spacing_m_) continue;
       sight(beside_.whose[s], s).given_up = true;
       forget(s);
@@ -219,8 +247,8 @@ class TissueAtBodies {
   }
 
   [[nodiscard]] const BodyFrame& frame_of(std::uint32_t b) noexcept {
-    if (back_s_ == 0.0) return state_.rigid[b].frame;
-    if (frame_of_ != b) frame_ = BodyFrame(world_.rigid[b].motion.pose_at(state_.clock.now_s() - back_s_));
+    if (moment_.to_come == 0.0) return state_.rigid[b].frame;
+    if (frame_of_ != b) frame_ = BodyFrame(pose_at(world_, state_, b, moment_));
     frame_of_ = b;
     return frame_;
   }
@@ -270,6 +298,7 @@ class TissueAtBodies {
   void forget(std::uint32_t s) noexcept {
     beside_.whose[s] = BesideBodies::kNobody;
     beside_.moving[s] = {};
+    beside_.blocked[s] = 0;
   }
 
   const World& world_;
@@ -277,7 +306,8 @@ class TissueAtBodies {
   const SoftBody& body_;
   voxel::SoftObject& object_;
   BesideBodies& beside_;
-  double spacing_m_, watched_m_, back_s_;
+  double spacing_m_, watched_m_;
+  Moment moment_;
   BodyFrame frame_;  // of the body that was asked for last
   std::uint32_t frame_of_ = BesideBodies::kNobody;
   bool meshes_ = false;  // among the bodies
@@ -296,16 +326,28 @@ void watch_bodies(const World& world, WorldState& state) {
 
 namespace {
 
-// Bodies are where they were back_s ago, having moved by body_moved_m since the last step.
-void press_once(const World& world, WorldState& state, double back_s) noexcept {
+// Bodies are where they are at that moment, having moved by body_moved_m since the last step.
+void press_once(const World& world, WorldState& state, const Moment& moment) noexcept {
   for (std::size_t o = 0; o < state.beside_bodies.size(); ++o) {
-    TissueAtBodies tissue(world, state, o, back_s);
+    TissueAtBodies tissue(world, state, o, moment);
     state.due.clear();
     for (std::uint32_t b = 0; b < world.rigid.size(); ++b) {
       if (world.rigid[b].presses_tissue) tissue.list(b);
     }
     tissue.look();
     tissue.press();
+  }
+}
+
+// A free body that tissue could not leave the way of gives way itself; as it turns, other tissue has to.
+void stop_in_tissue(const World& world, WorldState& state, std::uint32_t b, const Moment& moment,
+                    double dt_s) noexcept {
+  Pose pose = pose_at(world, state, b, moment);
+  double limit = moment.to_come > 0.0 ? kNoFurther : kTooDeep;
+  for (int n = 0; n < kMostRounds && give_way_to_tissue(world, state, b, pose, limit, dt_s); ++n) {
+    for (std::size_t o = 0; o < state.beside_bodies.size(); ++o) TissueAtBodies(world, state, o).press();
+    pose = state.rigid[b].pose;
+    limit = kTooDeep;
   }
 }
 
@@ -319,20 +361,26 @@ void press_by_bodies(const World& world, WorldState& state, double dt_s) noexcep
       steps = std::max(steps, std::ceil(moved / (kStep * object->lattice().min_spacing_m()) - kOnSurface));
   }
   const int count = static_cast<int>(std::min(steps, static_cast<double>(kMostSteps)));
+  const double now_s = state.clock.now_s(), step_s = dt_s / count;
   for (int n = 1; n <= count; ++n) {
-    const double back_s = n == count ? 0.0 : dt_s * (1.0 - static_cast<double>(n) / count);
+    const double to_come = 1.0 - static_cast<double>(n) / count, back_s = n == count ? 0.0 : dt_s * to_come;
+    const Moment from{now_s - back_s - step_s, to_come + 1.0 / count}, to{now_s - back_s, to_come};
     for (std::uint32_t b = 0; b < world.rigid.size(); ++b) {
       if (!world.rigid[b].presses_tissue) continue;
-      if (count > 1) {
-        const RigidMotion& motion = world.rigid[b].motion;
-        const double now_s = state.clock.now_s(), step_s = dt_s / count;
-        state.body_moved_m[b] = motion.displacement_bound(motion.pose_at(now_s - back_s - step_s),
-                                                          motion.pose_at(now_s - back_s));
-      }
+      if (count > 1)
+        state.body_moved_m[b] = world.rigid[b].motion.displacement_bound(pose_at(world, state, b, from),
+                                                                         pose_at(world, state, b, to));
       state.body_travel_m[b] += state.body_moved_m[b];
     }
-    press_once(world, state, back_s);
+    press_once(world, state, to);
+    for (std::uint32_t b = 0; b < world.rigid.size(); ++b) {
+      if (world.rigid[b].presses_tissue && is_free(world, b)) stop_in_tissue(world, state, b, to, dt_s);
+    }
   }
+}
+
+void look_again(const World& world, WorldState& state, std::uint32_t b) noexcept {
+  for (std::size_t o = 0; o < state.beside_bodies.size(); ++o) TissueAtBodies(world, state, o).look_again(b);
 }
 
 void judge_bodies(const World& world, WorldState& state) noexcept {

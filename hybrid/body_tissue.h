@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tissue leaves the way of rigid bodies that move along a path, and comes back when they leave.
+// Tissue leaves the way of rigid bodies that move, and comes back when they leave. What it answers to those
+// that are free stands in body_support.h.
 //
 // A surface voxel near such a body has its half-space, as one near bone has: outside of the plane through the
 // body's nearest point. It is made anew in every tick in which either moved. What it then lies in, it leaves
@@ -22,6 +23,9 @@ void watch_bodies(const World& world, WorldState& state);
 // more than half a spacing come in steps of that: an edge that went further in one would push voxels beside
 // one another different ways.
 void press_by_bodies(const World& world, WorldState& state, double dt_s) noexcept;
+
+// Body b was moved since: the voxels beside it are looked at again.
+void look_again(const World& world, WorldState& state, std::uint32_t b) noexcept;
 
 // At its end: sets a fault where tissue could not leave a body's way.
 void judge_bodies(const World& world, WorldState& state) noexcept;

@@ -172,7 +172,6 @@ class Builder {
       refuse(scene_, scene_.rigid.front().place,
              "a punch against rigid objects is not supported yet; use [tool] shape = \"ball\"");
     }
-    refuse_free_beside_soft();
     for (const ModelNote& note : scene_.model_notes)
       built_.notes.push_back({note.object, polygon::Severity::info, note.text});
     for (const RigidDescription& d : scene_.rigid) add_rigid(d);
@@ -200,18 +199,6 @@ class Builder {
  private:
   void say(const std::string& text) const {
     if (progress_) progress_(text);
-  }
-
-  void refuse_free_beside_soft() const {
-    if (scene_.soft.empty()) return;
-    for (const RigidDescription& d : scene_.rigid) {
-      if (!std::holds_alternative<FreeMotion>(d.motion)) continue;
-      refuse(
-          scene_, d.motion_place,
-          fmt::format("\"{}\" is free, and free rigid objects beside soft ones are not supported yet; let it "
-                      "move on a path, remove its motion, or the [[soft]] objects",
-                      d.name));
-    }
   }
 
   // What tissue has to leave the way of must have an inside.
@@ -391,8 +378,7 @@ class Builder {
       world_->limits.max_energy_J = std::numeric_limits<double>::infinity();
     if (scene_.passivity && !ideal) world_->passivity = passivity_options();
     add_meetings();
-    for (RigidObject& object : world_->rigid)
-      object.presses_tissue = object.motion.kind() == RigidMotion::Kind::path && !soft_.empty();
+    for (RigidObject& object : world_->rigid) object.presses_tissue = object.motion.moves() && !soft_.empty();
     built_.state = std::make_unique<WorldState>(*world_, std::move(*map_));
     built_.state->soft = std::move(soft_);
     built_.state->prepare(*world_);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bitset>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
@@ -93,10 +94,8 @@ bool push(const FreeBody& body, const FreeBodyState& state, std::span<const Body
   const glm::dmat3 rotation = glm::mat3_cast(state.rotation);
   const glm::dmat3 inertia = rotation * body.mass.inertia_kg_m2 * glm::transpose(rotation);
   const std::size_t one_sided = std::min(contacts.size(), kMaxOneSided);
-  std::uint64_t pressing = ~0ULL;
-  for (std::size_t c = 0; c < one_sided; ++c) {
-    if (contacts[c].force_N < 0.0) pressing &= ~(1ULL << c);
-  }
+  std::bitset<kMaxOneSided> pressing;
+  for (std::size_t c = 0; c < one_sided; ++c) pressing[c] = !(contacts[c].force_N < 0.0);
   for (int solve = 0; solve < kMaxSolves; ++solve) {
     System system;
     system.add_block(0, glm::dmat3(body.mass.mass_kg + dt * body.drag_N_s_per_m));
@@ -104,7 +103,7 @@ bool push(const FreeBody& body, const FreeBodyState& state, std::span<const Body
     after = {body.mass.mass_kg * (state.velocity_m_per_s + dt * body.gravity_m_per_s2),
              inertia * state.spin_rad_per_s};
     for (std::size_t c = 0; c < contacts.size(); ++c) {
-      if (c < one_sided && (pressing >> c & 1U) == 0) continue;
+      if (c < one_sided && !pressing[c]) continue;
       const Twist j = lever(contacts[c], state);
       system.add_outer(j, dt * dt * contacts[c].stiffness_N_per_m);
       after.linear += dt * contacts[c].force_N * j.linear;
@@ -114,11 +113,10 @@ bool push(const FreeBody& body, const FreeBodyState& state, std::span<const Body
     // The energy is convex in the velocity, so the set that confirms itself is the solution (a semi-smooth
     // Newton method). Should it not be found in time, the last velocity is one of contacts that may pull a
     // little.
-    const std::uint64_t before = pressing;
+    const std::bitset<kMaxOneSided> before = pressing;
     for (std::size_t c = 0; c < one_sided; ++c) {
       const double gives = dt * contacts[c].stiffness_N_per_m * dot(lever(contacts[c], state), after);
-      const bool presses = contacts[c].force_N - gives > 0.0;
-      pressing = presses ? pressing | 1ULL << c : pressing & ~(1ULL << c);
+      pressing[c] = contacts[c].force_N - gives > 0.0;
     }
     if (pressing == before) break;
   }

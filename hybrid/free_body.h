@@ -47,8 +47,10 @@ struct BodyContact {
   double force_N = 0.0, stiffness_N_per_m = 0.0;
 };
 
-// Beyond so many contacts the rest press, and are never let go within the step.
-inline constexpr std::size_t kMaxOneSided = 64;
+// Beyond so many contacts the rest press, and are never let go within the step. (Voxels of tissue are
+// hundreds of contacts. One stiffness for all of them was rejected: where a body leaves, what should let go
+// pulls.)
+inline constexpr std::size_t kMaxOneSided = 4096;
 
 // Advances the body by dt_s. Pure, bounded, allocates nothing. False when the outcome would not be finite (an
 // input was not): the body then stands still where it was, and contacts that are not finite are what to look

@@ -257,11 +257,12 @@ std::vector<std::string> fault_texts(std::uint32_t faults) {
   say(fault_nonfinite_body,
       "a free body was pushed by a force that is not finite, and stood still for that tick");
   say(fault_body_squeezed,
-      "tissue could not leave the way of a rigid object on a path, for anchors, bone or links at their "
+      "tissue could not leave the way of a rigid object that moves, for anchors, bone or links at their "
       "limits, "
-      "and they overlapped; let its path press less deep, or let the tissue stretch further");
+      "and they overlapped; let it press less deep, or let the tissue stretch further");
   say(fault_body_crowded,
-      "a rigid object on a path came to more soft voxels than a tick looks at, and may have overlapped some; "
+      "a rigid object that moves came to more soft voxels than a tick looks at, and may have overlapped "
+      "some; "
       "use a coarser spacing, or a smaller or slower object");
   say(fault_infeasible, "rigid surfaces left the tool no room; use a smaller tool radius");
   return texts;

@@ -12,6 +12,7 @@
 
 #include "hybrid/arbitration.h"
 #include "hybrid/body_stage.h"
+#include "hybrid/body_support.h"
 #include "hybrid/body_tissue.h"
 #include "hybrid/feel_stage.h"
 #include "hybrid/relax_apart.h"
@@ -309,6 +310,7 @@ TickResult haptic_tick(const World& world, WorldState& state, const device::Devi
   if (around.near_soft && may_meet) give_way(world, state, before, sweep);
   clock.done(Stage::arbitration);
 
+  keep_out_of_tissue(world, state, dt_s);
   judge_bodies(world, state);
   refresh_map(world, state);
   clock.done(Stage::map);

@@ -20,6 +20,7 @@ WorldState::WorldState(const World& world, OccupancyMap occupancy) : map(std::mo
     rigid.push_back({.frame = BodyFrame(object.pose),
                      .pose = object.pose,
                      .free = {},
+                     .before = object.pose,
                      .near = polygon::Neighbourhood(object.surface->element_count()),
                      .margin_m = kFirstMargin * extent,
                      .ridges = {}});
@@ -64,6 +65,7 @@ void WorldState::prepare_beside_bodies(const World& world) {
     beside.moving.resize(count);
     beside.whose.assign(count, BesideBodies::kNobody);
     beside.listed.assign(count, 0);
+    beside.blocked.assign(count, 0);
     for (const RigidObject& rigid_object : world.rigid)
       beside.sights.emplace_back(rigid_object.presses_tissue ? count : 0);
     beside_bodies.push_back(std::move(beside));
@@ -73,6 +75,14 @@ void WorldState::prepare_beside_bodies(const World& world) {
       static_cast<std::size_t>(std::count_if(world.rigid.begin(), world.rigid.end(), presses));
   due.reserve(most * bodies);
   in_the_way.reserve(most);
+  const auto free = [](const RigidObject& object) {
+    return object.presses_tissue && object.motion.kind() == RigidMotion::Kind::free;
+  };
+  if (std::none_of(world.rigid.begin(), world.rigid.end(), free)) return;
+  body_contacts.reserve(kMaxOneSided);
+  at_body.reserve(voxel::SoftObject::kMaxTouched);
+  held_by_body.reserve(voxel::SoftObject::kMaxTouched);
+  held_loads.resize(voxel::SoftObject::kMaxTouched);
 }
 
 }  // namespace hybrid

@@ -42,7 +42,7 @@ struct RigidObject {
   RigidMotion motion{};                                  // fixed unless the scene says otherwise
   SurfaceFeel feel{};                                    // hard and smooth unless the scene says otherwise
   bool surface_is_drawn = false;                         // the surface is of that very mesh, and shares it
-  bool presses_tissue = false;                           // it moves along a path, beside soft objects
+  bool presses_tissue = false;                           // it moves, beside soft objects
 
   [[nodiscard]] glm::dvec3 to_body(const glm::dvec3& in_scene) const {
     return glm::inverse(pose.rotation) * (in_scene - pose.position_m);
@@ -137,8 +137,8 @@ enum FaultBit : std::uint32_t {
   fault_pair_overflow = 16,     // more pairs of soft voxels than fit: use coarser voxels
   fault_infeasible = 32,        // rigid planes left no room for the tool
   fault_nonfinite_body = 64,    // a free body was pushed by something that is not finite: it stood still
-  fault_body_squeezed = 128,    // tissue could not leave the way of a body on a path: they overlapped
-  fault_body_crowded = 256,     // a body on a path came to more soft voxels than a tick looks at
+  fault_body_squeezed = 128,    // tissue could not leave the way of a body that moves: they overlapped
+  fault_body_crowded = 256,     // a body that moves came to more soft voxels than a tick looks at
 };
 
 inline constexpr std::size_t kMaxNear = 256;     // triangles considered at once
@@ -148,9 +148,11 @@ inline constexpr std::size_t kMaxFound = 32768;  // map entries read in one look
 
 // What the proxy knows of one rigid object, and where that is.
 struct RigidNear {
-  BodyFrame frame;     // now
-  Pose pose;           // the same
-  FreeBodyState free;  // of a free body
+  BodyFrame frame;               // now
+  Pose pose;                     // the same
+  FreeBodyState free;            // of a free body
+  Pose before;                   // of one that presses tissue: where it was before this tick
+  std::uint32_t calm_ticks = 0;  // … and since when it rests, as far as can be told
   polygon::Neighbourhood near;
   double margin_m = 0.0;  // of the next survey, adapted to how crowded the last one was:
   double counted = 0.0, margin_counted_m = 0.0;  // elements, and how far it looked
@@ -186,13 +188,14 @@ struct BodySight {
   double until_m = 0.0;   // it is not near the body before that has travelled so far, or the voxel moved
 };
 
-// What bodies on a path ask of one soft object (hybrid/body_tissue.h).
+// What bodies that move ask of one soft object (hybrid/body_tissue.h).
 struct BesideBodies {
   static constexpr std::uint32_t kNobody = 0xFFFFFFFFU;
   std::vector<voxel::Obstacle> standing;       // [surface voxel] what fixed surfaces ask of it
   std::vector<voxel::Obstacle> moving;         // [surface voxel] what the nearest body asks of it
   std::vector<std::uint32_t> whose;            // [surface voxel] the rigid object that this is; kNobody: none
   std::vector<std::uint8_t> listed;            // [surface voxel] 1: in `near`
+  std::vector<std::uint8_t> blocked;           // [surface voxel] 1: it could not leave the way of a free body
   std::vector<std::uint32_t> near;             // surface voxels that a body is near to
   std::vector<std::vector<BodySight>> sights;  // [rigid object][surface voxel]; empty: it does not press
 };
@@ -275,6 +278,10 @@ struct WorldState : CarriedState {
   std::vector<std::vector<voxel::VoxelId>> touched;  // [soft]
   std::vector<BodyLook> due;                         // surface voxels that bodies may be near to
   std::vector<std::uint32_t> in_the_way;             // … and that are in one
+  std::vector<BodyContact> body_contacts;            // what presses on a free body
+  std::vector<std::uint32_t> at_body;                // surface voxels of one object that do …
+  std::vector<voxel::VoxelId> held_by_body;          // … these voxels
+  std::vector<voxel::HeldLoad> held_loads;           // … and what with
 };
 
 }  // namespace hybrid

@@ -39,6 +39,13 @@ struct Reaction {
   std::uint32_t pressed = 0;  // voxels that carry load
 };
 
+// What one of several voxels that are held in place would pull at what holds it with.
+struct HeldLoad {
+  glm::dvec3 force_N{0.0};            // of its links, and of what hangs on it by tight links
+  glm::dvec3 stiffness_N_per_m{0.0};  // per axis, of them all while the others stand still
+  bool tight = false;                 // some tight link hands part of its load to or from another voxel
+};
+
 // The tool's centre q must satisfy normal · q >= offset (body frame).
 struct ToolBound {
   glm::dvec3 normal{0.0};
@@ -96,6 +103,10 @@ class SoftObject {
   [[nodiscard]] std::span<const Obstacle> obstacles() const { return obstacles_; }
   // Obstacles moved: brings these surface voxels out of theirs, as one wave, and the chain with them.
   void leave_obstacles(std::span<const std::uint32_t> surface_numbers) noexcept;
+  // What voxels that obstacles hold press these with, each of `held` once, in their order. The first
+  // `pressed` of them, kMaxTouched at most, do; the others are near: what of them hangs on the first is not
+  // theirs.
+  void load_held(std::span<const VoxelId> held, std::size_t pressed, std::span<HeldLoad> loads) noexcept;
   // An obstacle that surface voxel number s lay on went away: it looks for its place.
   void stir(std::size_t surface_number) noexcept;
   // Where there may be obstacles: rows that the chain moved since these were forgotten, each once, the first
@@ -197,6 +208,8 @@ class SoftObject {
   void carry(VoxelId v, std::uint32_t touch) noexcept;
   void gather_load(int axis) noexcept;
   void gather_load_with_pairs(int axis) noexcept;
+  void add_hanging(int axis, std::span<const VoxelId> pressed, std::span<HeldLoad> loads) noexcept;
+  void add_stiffness(int axis, std::span<HeldLoad> loads) noexcept;
   void let_go_of_carried() noexcept;
   [[nodiscard]] ObstacleView obstacle_view() const { return {obstacles_, lattice_.get()}; }
 

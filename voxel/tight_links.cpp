@@ -16,6 +16,10 @@ constexpr std::size_t kMostDrawn = 2000;  // voxels that come along with the pre
 constexpr float kNearlyTight = 0.1F;      // of the spacing: links that are looked at for that
 constexpr std::size_t kMostTied = 500;    // voxels looked at for what holds one of them
 constexpr float kTight = 1e-4F;           // of the spacing: nearer to its limit than this a link is tight
+// The same for what a body presses. At rest what does not hang on it is balanced, and adds nothing; what does
+// is left behind a little whenever the body withdraws.
+constexpr std::size_t kMostHanging = 3000;  // voxels that hang on those that a body presses
+constexpr float kTightAtBody = 0.02F;
 
 // u(w) − u(v) of neighbours along d, and what their link lets it be, whichever way the link points.
 struct LinkState {
@@ -43,9 +47,9 @@ void for_neighbours(const Lattice& lattice, VoxelId v, const Visit& visit) {
 // which w cannot go, which pushes it up, at the one above, or at both.
 template <class Visit>
 void for_tight_neighbours(const Lattice& lattice, const LazyArray<float>& u, VoxelId v, int axis,
-                          const Visit& visit) {
+                          const Visit& visit, float share = kTight) {
   for_neighbours(lattice, v, [&](VoxelId w, int d, bool up) {
-    const float tight = kTight * static_cast<float>(lattice.spacing_m()[d]);
+    const float tight = share * static_cast<float>(lattice.spacing_m()[d]);
     const LinkState link = link_state(lattice, u, v, w, d, up, axis);
     const bool pushed_up = link.difference <= link.low + tight,
                pushed_down = link.difference >= link.high - tight;
@@ -166,6 +170,72 @@ void SoftObject::gather_load_with_pairs(int axis) noexcept {
     } else {
       hanging_[h.from].load += h.load;
     }
+  }
+}
+
+// As gather_load_with_pairs(), for voxels that a body presses.
+void SoftObject::add_hanging(int axis, std::span<const VoxelId> pressed, std::span<HeldLoad> loads) noexcept {
+  const auto& u = state_.u[static_cast<std::size_t>(axis)];
+  for (std::size_t i = 0; i < pressed.size(); ++i) {
+    if (!lattice_->anchored(pressed[i])) carry(pressed[i], static_cast<std::uint32_t>(i));
+  }
+  const std::size_t first = carried_.size();
+  hanging_.assign(first, Hanging{});
+  const auto walk = [&](std::size_t head, VoxelId w, bool pushed_up, bool pushed_down) {
+    if (lattice_->anchored(w)) return;
+    const std::uint32_t touch = carried_[head].touch;
+    loads[touch].tight = true;
+    if (carried_mark_[w] != 0 || carried_.size() >= first + kMostHanging) return;
+    carry(w, touch);
+    hanging_.push_back({static_cast<std::uint32_t>(head), pushed_up, pushed_down, load_on(w)[axis]});
+  };
+  for (std::size_t head = 0; head < carried_.size(); ++head) {
+    for_tight_neighbours(
+        *lattice_, u, carried_[head].v, axis, [&](VoxelId w, bool up, bool down) { walk(head, w, up, down); },
+        kTightAtBody);
+  }
+  for (std::size_t i = carried_.size(); i-- > first;) {
+    const Hanging& h = hanging_[i];
+    if (!((h.up && h.load < 0.0) || (h.down && h.load > 0.0))) {
+      carried_mark_[carried_[i].v] = 0;
+    } else if (h.from < first) {
+      loads[carried_[h.from].touch].force_N[axis] += h.load;
+    } else {
+      hanging_[h.from].load += h.load;
+    }
+  }
+}
+
+// Of what moves along with each of the voxels that carry, while all else stands still.
+void SoftObject::add_stiffness(int axis, std::span<HeldLoad> loads) noexcept {
+  for (const Carried& c : carried_) {
+    if (carried_mark_[c.v] == 0) continue;
+    const VoxelSprings springs = relaxation_.couplings().springs_of(c.v);
+    for (int d = 0; d < 3; ++d) {
+      for (const bool up : {false, true}) {
+        const VoxelId w = up ? lattice_->up(c.v, d) : lattice_->down(c.v, d);
+        if (carried_mark_[w] != 0 && carried_index_[w] == c.touch) continue;
+        const Spring& spring = (up ? springs.up : springs.down)[static_cast<std::size_t>(d)];
+        loads[c.touch].stiffness_N_per_m[axis] += static_cast<double>(spring.on(axis, d));
+      }
+    }
+  }
+}
+
+void SoftObject::load_held(std::span<const VoxelId> held, std::size_t pressed,
+                           std::span<HeldLoad> loads) noexcept {
+  for (std::size_t i = 0; i < held.size(); ++i) {
+    loads[i] = {.force_N = load_on(held[i]), .stiffness_N_per_m = glm::dvec3(0.0)};
+    if (i >= pressed) loads[i].stiffness_N_per_m = 1.0 / compliance(held[i]);
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    carried_.clear();
+    add_hanging(axis, held.first(pressed), loads);
+    add_stiffness(axis, loads);
+    for (std::size_t i = pressed; i < held.size(); ++i) {
+      if (carried_mark_[held[i]] != 0) loads[i].force_N[axis] = 0.0;
+    }
+    let_go_of_carried();
   }
 }
 

@@ -91,7 +91,7 @@ TEST_P(ShippedScene, RunSavedLoadedAndReplayedIsTheSameToTheBit) {
 }
 INSTANTIATE_TEST_SUITE_P(Replays, ShippedScene,
                          ::testing::Values("cube", "sheet", "two-soft", "head", "thin-sheet",
-                                           "textured-plate", "moving", "pushed-tissue"),
+                                           "textured-plate", "moving", "pushed-tissue", "dropped-weight"),
                          [](const auto& scene) {
                            std::string name = scene.param;
                            std::replace(name.begin(), name.end(), '-', '_');

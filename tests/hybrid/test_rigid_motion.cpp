@@ -249,18 +249,6 @@ TEST_F(MotionScene, TheMapCoversCurvedPrimitives) {
   }
 }
 
-TEST_F(MotionScene, AFreeBodyBesideSoftObjectsIsRefusedAtItsPlace) {
-  const std::string text = kBox + std::string("motion = \"free\"\nmass = 0.2\n") + tests::block;
-  try {
-    (void)hybrid::build_scene(load(text));
-    FAIL() << "free objects beside soft ones are not supported yet";
-  } catch (const hybrid::SceneError& error) {
-    const std::string what = error.what();
-    EXPECT_NE(what.find("scene.toml:11:1: \"box\" is free"), std::string::npos) << what;
-    EXPECT_NE(what.find("not supported yet; let it move on a path"), std::string::npos) << what;
-  }
-}
-
 TEST_F(MotionScene, AFreeSheetWithoutInertiaIsRefusedAtItsPlace) {
   const std::string text =
       "format = 1\n[path]\nkind = \"press\"\nfrom = [0, 0, 60]\nto = [0, 0, 30]\n"
