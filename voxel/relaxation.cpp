@@ -21,16 +21,10 @@ constexpr double kProgress = 1e-3;  // of the spacing: clusters that move furthe
 constexpr float kFarthest = 2.0F;
 constexpr std::uint64_t kNextFirst = 7919;  // of these voxels is looked at first in the next round
 // Levels of a cycle round a contact where another relaxes the object: what is further away is his. (With all
-// of them both moved the coarsest cells, and a brain held for a minute wavered by a tenth of its force.) So
-// many that it reaches three radii of the contact: further out it finds loads of before the tool moved, and
-// a block pressed over 4 spacings was 2.7 just noticeable differences off at most with five, 1.5 with three,
-// and over 8 spacings 1.1 with four, 1.6 with four and three.
-constexpr int kContactLevels = 5, kFewestLevels = 2;
-int contact_levels(int wide) {
-  const int levels = 1 + static_cast<int>(std::lround(std::log2(0.5 * (wide + 1))));
-  return std::clamp(levels, kFewestLevels, kContactLevels);
-}
-
+// of them both moved the coarsest cells, and a brain held for a minute wavered by a tenth of its force. With
+// four, or as many as reach three radii of the contact, the force on the way into organs was 4 to 25 %
+// higher.)
+constexpr int kContactLevels = 5;
 constexpr int kNear = 2;           // rows that a cycle round a contact reads beyond those it brings to rest
 constexpr int kContactMargin = 3;  // cells round the contact that are smoothed, on each level
 constexpr std::uint64_t kBesideContact = 2;  // this part of the budget is left beside cycles round a contact
@@ -153,12 +147,13 @@ void Relaxation::run_cycle(Displacement& state, const ObstacleView& obstacles,
   running_residual_N_ = 0.0;
   const auto& dims = lattice_.grid().dims;
   lay_boxes({0, 0, 0}, {dims[0] - 1, dims[1] - 1, dims[2] - 1}, 0);
-  cycle(state, obstacles, Look::active, multigrid_.levels());
+  cycle(state, obstacles, Look::active, false);
   end_round(state, running_residual_N_);
 }
 
 void Relaxation::relax_contact(Displacement& state, const ObstacleView& obstacles,
-                               std::span<const VoxelId> held, std::span<const VoxelId> pressed) noexcept {
+                               std::span<const VoxelId> held, std::span<const VoxelId> pressed,
+                               bool again) noexcept {
   contact_relaxed_ = true;
   multigrid_.set_held(held);
   std::array<int, 3> low = lattice_.coordinates(pressed.front()), high = low;
@@ -182,7 +177,7 @@ void Relaxation::relax_contact(Displacement& state, const ObstacleView& obstacle
   near_.first = {b.q0 / kOctets + 1, std::max(b.j0 - kNear, 0), std::max(b.k0 - kNear, 0)};
   near_.last = {b.q1 / kOctets + 1, std::min(b.j1 + kNear, g.dims[1] - 1),
                 std::min(b.k1 + kNear, g.dims[2] - 1)};
-  cycle(state, obstacles, Look::all, apart_ ? contact_levels(wide) : multigrid_.levels());
+  cycle(state, obstacles, Look::all, apart_ && again);
 }
 
 std::uint64_t Relaxation::relax_tile(Displacement& state, const ObstacleView& obstacles,
@@ -191,7 +186,7 @@ std::uint64_t Relaxation::relax_tile(Displacement& state, const ObstacleView& ob
   constexpr int kSide = TileQueue::kSide;
   lay_boxes({t.column * kRow, t.j * kSide, t.k * kSide},
             {(t.column + 1) * kRow - 1, (t.j + 1) * kSide - 1, (t.k + 1) * kSide - 1}, -1);
-  cycle(state, obstacles, Look::all, multigrid_.levels());
+  cycle(state, obstacles, Look::all, false);
   std::uint64_t updates = 0;
   for (const LevelBoxes& b : boxes_) {
     updates += static_cast<std::uint64_t>(b.smoothed.q1 - b.smoothed.q0 + 1) * kOctet *
@@ -395,14 +390,16 @@ void Relaxation::tell_box(int level, Displacement& state, const ObstacleView& ob
                   obstacles);
 }
 
-void Relaxation::cycle(Displacement& state, const ObstacleView& obstacles, Look look, int levels) noexcept {
-  const int most = std::min(multigrid_.levels(), apart_ ? kContactLevels : multigrid_.levels());
-  const int last = std::min(levels, most) - 1;
+void Relaxation::cycle(Displacement& state, const ObstacleView& obstacles, Look look,
+                       bool smoothed) noexcept {
+  const int last = std::min(multigrid_.levels(), apart_ ? kContactLevels : multigrid_.levels()) - 1;
   // What coarse levels know and finer ones do not is told first: a step between voxels that were told and
   // others that were not would look like a force to the cells above it.
-  for (int l = most - 2; l >= 0; --l) tell_box(l, state, obstacles);
+  for (int l = last - 1; l >= 0; --l) tell_box(l, state, obstacles);
   for (int l = 0; l < last; ++l) {
-    for (const int colour : {0, 1}) smooth_box(l, colour, state, obstacles, look);
+    if (!smoothed) {
+      for (const int colour : {0, 1}) smooth_box(l, colour, state, obstacles, look);
+    }
     // Before forces are summed, so that what is called the residual is that of links that yield.
     if (l == 0 && lattice_.yields()) {
       for_rows(0, boxes(0).smoothed, [&](RowId row, OctetSpan, int, int) {
