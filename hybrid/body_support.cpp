@@ -20,8 +20,11 @@ constexpr double kProbe = 0.01, kUnblocked = 0.002;
 constexpr double kUnpaid = 0.005;  // of the spacing, in a step
 constexpr double kOnBody = 1e-3;   // of the spacing: no further from the body than this it is on it
 constexpr double kAcross = 1e-3;   // of the sum of normals: what they hardly span they do not take
-// Times the stiffness of tight links: a damper. What these hand on changes in steps, on which bodies would
-// dance.
+// Times the stiffness of links: what is more than theirs is a damper. Relaxed apart, tissue is a spring
+// between two results, and gives back in one what it took before another: with 1 a box of 17 g hopped 0.2 mm
+// high for ever, from 2 on it rests.
+constexpr double kDamping = 3.0;
+// The same of tight links. What these hand on changes in steps, on which bodies would dance.
 constexpr double kTightDamping = 20.0;
 constexpr double kOthers = 1e-2;  // of that: tissue that may leave the way of a body that goes back
 constexpr double kRigid = 1e4;    // times what stops the body within a tick: as good as rigid
@@ -156,11 +159,13 @@ void add_pressing(const World& world, WorldState& state, std::uint32_t b, std::s
     const voxel::HeldLoad& load = state.held_loads[n];
     const Held held = held_of(object, beside, s);
     BodyContact contact = contact_at(world.soft[o], object, beside.sights[b][s], s, held);
-    contact.stiffness_N_per_m = glm::dot(held.normal, load.stiffness_N_per_m * held.normal);
-    contact.force_N = -glm::dot(held.normal, load.force_N) - contact.stiffness_N_per_m * held.gap_m;
+    const double springs = glm::dot(held.normal, load.stiffness_N_per_m * held.normal);
+    contact.stiffness_N_per_m = kDamping * springs;
+    contact.force_N = -glm::dot(held.normal, load.force_N) -
+                      (held.gap_m > 0.0 ? contact.stiffness_N_per_m : springs) * held.gap_m;
     if (load.tight && pressed(n, held.normal) > 0.0) {
       contact.force_N += glm::dot(share, held.normal);
-      contact.stiffness_N_per_m *= kTightDamping;
+      contact.stiffness_N_per_m = kTightDamping * springs;
     }
     add(state, contact);
   }

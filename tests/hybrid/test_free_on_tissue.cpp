@@ -135,6 +135,23 @@ TEST_F(FreeOnTissue, ABallComesToRestAndItsWeightIsCarried) {
   }
 }
 
+// Between two results tissue that is relaxed apart is a spring, and no hop may live on that.
+TEST_F(FreeOnTissue, ADroppedWeightComesToRest) {
+  for (const bool apart : {false, true}) {
+    SCOPED_TRACE(apart ? "relaxed apart" : "in the tick");
+    Touch touch(hybrid::load_scene(tests::source_folder / "scenes/dropped-weight.toml"), kFarAway, apart);
+    const double weight = 9.81 * touch.world().rigid[0].motion.free_body().mass.mass_kg;
+    for (int n = 0; n < 1000; ++n) touch.at(kFarAway);
+    double fastest = 0.0;
+    for (int n = 0; n < 200; ++n) {
+      touch.at(kFarAway);
+      fastest = std::max(fastest, std::abs(free_body(touch).velocity_m_per_s.z));  // over tissue it slides
+    }
+    EXPECT_LT(fastest, 1e-3);
+    EXPECT_NEAR(carried_N(touch), weight, 0.02 * weight);
+  }
+}
+
 // What tissue gives back is less than it took: the energy is that of the body alone.
 TEST_F(FreeOnTissue, ThrownAtItABodyNeitherOverlapsNorGainsEnergy) {
   for (const std::string& shape : {kBall, kBox}) {
