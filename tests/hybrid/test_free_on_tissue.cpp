@@ -276,8 +276,10 @@ TEST_F(FreeOnTissue, SqueezedBetweenToolTissueAndBoneItStaysOutOfBoth) {
   for (const std::string& shape : {kBall, kBox}) {
     for (const bool apart : {false, true}) {
       SCOPED_TRACE(std::string(shape == kBall ? "ball" : "box") + (apart ? ", relaxed apart" : ""));
-      Touch touch(load(slab + body(shape, 0.02, 8.6, false, "drag = 0.5\nangular_drag = 1e-4\n") + plate),
-                  {0.3e-3, 0.7e-3, 30e-3}, apart);
+      std::string scene = slab;
+      scene += body(shape, 0.02, 8.6, false, "drag = 0.5\nangular_drag = 1e-4\n");
+      scene += plate;
+      Touch touch(load(scene), {0.3e-3, 0.7e-3, 30e-3}, apart);
       double bone = 0.0, overlap = 0.0, moved = 0.0;
       for (int n = 0; n < 1500; ++n) {
         const double z = n < 1000 ? std::max(30e-3 - 0.05e-3 * n, 0.0) : std::min(0.1e-3 * (n - 1000), 40e-3);
