@@ -44,11 +44,13 @@ void for_neighbours(const Lattice& lattice, VoxelId v, const Visit& visit) {
 }
 
 // `visit(w, pushed_up, pushed_down)` for those whose link to v is at a limit along `axis`: at that below
-// which w cannot go, which pushes it up, at the one above, or at both.
-template <class Visit>
+// which w cannot go, which pushes it up, at the one above, or at both. Where known(w), nothing is looked at:
+// of tissue that is tight all through, that is five neighbours of six.
+template <class Known, class Visit>
 void for_tight_neighbours(const Lattice& lattice, const LazyArray<float>& u, VoxelId v, int axis,
-                          const Visit& visit, float share = kTight) {
+                          const Known& known, const Visit& visit, float share = kTight) {
   for_neighbours(lattice, v, [&](VoxelId w, int d, bool up) {
+    if (known(w)) return;
     const float tight = share * static_cast<float>(lattice.spacing_m()[d]);
     const LinkState link = link_state(lattice, u, v, w, d, up, axis);
     const bool pushed_up = link.difference <= link.low + tight,
@@ -126,7 +128,8 @@ void SoftObject::gather_load(int axis) noexcept {
   }
   for (std::size_t head = 0; head < carried_.size() && carried_.size() < kMaxCarried; ++head) {
     const Carried c = carried_[head];
-    for_tight_neighbours(*lattice_, u, c.v, axis, [&](VoxelId w, bool pushed_up, bool pushed_down) {
+    const auto known = [&](VoxelId w) { return carried_mark_[w] != 0 && touches_[c.touch].tight; };
+    for_tight_neighbours(*lattice_, u, c.v, axis, known, [&](VoxelId w, bool pushed_up, bool pushed_down) {
       if (lattice_->anchored(w)) return;
       touches_[c.touch].tight = true;
       if (carried_mark_[w] != 0) return;
@@ -153,7 +156,8 @@ void SoftObject::gather_load_with_pairs(int axis) noexcept {
   hanging_.assign(pressed, Hanging{});
   for (std::size_t head = 0; head < carried_.size() && carried_.size() < kMaxCarried; ++head) {
     const Carried c = carried_[head];
-    for_tight_neighbours(*lattice_, u, c.v, axis, [&](VoxelId w, bool pushed_up, bool pushed_down) {
+    const auto known = [&](VoxelId w) { return carried_mark_[w] != 0 && touches_[c.touch].tight; };
+    for_tight_neighbours(*lattice_, u, c.v, axis, known, [&](VoxelId w, bool pushed_up, bool pushed_down) {
       if (lattice_->anchored(w)) return;
       touches_[c.touch].tight = true;
       if (carried_mark_[w] != 0) return;
@@ -187,12 +191,14 @@ void SoftObject::add_hanging(int axis, std::span<const VoxelId> pressed, std::sp
     loads[touch].tight = true;
     if (carried_mark_[w] != 0 || carried_.size() >= first + kMostHanging) return;
     carry(w, touch);
-    hanging_.push_back({static_cast<std::uint32_t>(head), pushed_up, pushed_down, load_on(w)[axis]});
+    hanging_.push_back({static_cast<std::uint32_t>(head), pushed_up, pushed_down, load_on(w, axis)});
   };
   for (std::size_t head = 0; head < carried_.size(); ++head) {
+    const std::uint32_t touch = carried_[head].touch;
+    const auto known = [&](VoxelId w) { return carried_mark_[w] != 0 && loads[touch].tight; };
     for_tight_neighbours(
-        *lattice_, u, carried_[head].v, axis, [&](VoxelId w, bool up, bool down) { walk(head, w, up, down); },
-        kTightAtBody);
+        *lattice_, u, carried_[head].v, axis, known,
+        [&](VoxelId w, bool up, bool down) { walk(head, w, up, down); }, kTightAtBody);
   }
   for (std::size_t i = carried_.size(); i-- > first;) {
     const Hanging& h = hanging_[i];
@@ -333,8 +339,9 @@ bool SoftObject::held_fast(VoxelId v, const glm::dvec3& direction) noexcept {
   bool held = rests(v);
   for (std::size_t head = 0; head < carried_.size() && carried_.size() < kMostTied && !held; ++head) {
     const VoxelId c = carried_[head].v;
-    for_tight_neighbours(*lattice_, u, c, axis, [&](VoxelId w, bool pushed_up, bool pushed_down) {
-      if (held || carried_mark_[w] != 0 || !(upwards ? pushed_up : pushed_down)) return;
+    const auto known = [&](VoxelId w) { return held || carried_mark_[w] != 0; };
+    for_tight_neighbours(*lattice_, u, c, axis, known, [&](VoxelId w, bool pushed_up, bool pushed_down) {
+      if (held || !(upwards ? pushed_up : pushed_down)) return;
       held = rests(w);
       carried_mark_[w] = 1;
       carried_.push_back({w, 0});
