@@ -161,8 +161,9 @@ void add_pressing(const World& world, WorldState& state, std::uint32_t b, std::s
     BodyContact contact = contact_at(world.soft[o], object, beside.sights[b][s], s, held);
     const double springs = glm::dot(held.normal, load.stiffness_N_per_m * held.normal);
     contact.stiffness_N_per_m = kDamping * springs;
-    contact.force_N = -glm::dot(held.normal, load.force_N) -
-                      (held.gap_m > 0.0 ? contact.stiffness_N_per_m : springs) * held.gap_m;
+    contact.force_N = -glm::dot(held.normal, load.force_N) - springs * held.gap_m;
+    // What would not come to the body by itself begins to press where they meet, and no earlier.
+    if (contact.force_N < 0.0) contact.force_N *= kDamping;
     if (load.tight && pressed(n, held.normal) > 0.0) {
       contact.force_N += glm::dot(share, held.normal);
       contact.stiffness_N_per_m = kTightDamping * springs;
