@@ -59,6 +59,22 @@ void for_tight_neighbours(const Lattice& lattice, const LazyArray<float>& u, Vox
   });
 }
 
+// Each of `hanging` from `first` on hands its load to what it hangs on, `carries(i, load)` where that is one
+// of those before; `drops(i)` where its link does not press that way.
+template <class Hanging, class Drops, class Carries>
+void add_from_far_end(Hanging& hanging, std::size_t first, const Drops& drops, const Carries& carries) {
+  for (std::size_t i = hanging.size(); i-- > first;) {
+    const auto& h = hanging[i];
+    if (!((h.up && h.load < 0.0) || (h.down && h.load > 0.0))) {
+      drops(i);
+    } else if (h.from < first) {
+      carries(h.from, h.load);
+    } else {
+      hanging[h.from].load += h.load;
+    }
+  }
+}
+
 }  // namespace
 
 // What hangs on pressed voxels by tight links comes along when they withdraw: it is felt only where it is
@@ -165,16 +181,9 @@ void SoftObject::gather_load_with_pairs(int axis) noexcept {
       hanging_.push_back({static_cast<std::uint32_t>(head), pushed_up, pushed_down, load_on(w, axis)});
     });
   }
-  for (std::size_t i = carried_.size(); i-- > pressed;) {
-    const Hanging& h = hanging_[i];
-    if (!((h.up && h.load < 0.0) || (h.down && h.load > 0.0))) {
-      carried_mark_[carried_[i].v] = 0;
-    } else if (h.from < pressed) {
-      touches_[carried_[h.from].touch].load[axis] += h.load;
-    } else {
-      hanging_[h.from].load += h.load;
-    }
-  }
+  add_from_far_end(
+      hanging_, pressed, [&](std::size_t i) { carried_mark_[carried_[i].v] = 0; },
+      [&](std::size_t i, double load) { touches_[carried_[i].touch].load[axis] += load; });
 }
 
 // As gather_load_with_pairs(), for voxels that a body presses.
@@ -200,16 +209,9 @@ void SoftObject::add_hanging(int axis, std::span<const VoxelId> pressed, std::sp
         *lattice_, u, carried_[head].v, axis, known,
         [&](VoxelId w, bool up, bool down) { walk(head, w, up, down); }, kTightAtBody);
   }
-  for (std::size_t i = carried_.size(); i-- > first;) {
-    const Hanging& h = hanging_[i];
-    if (!((h.up && h.load < 0.0) || (h.down && h.load > 0.0))) {
-      carried_mark_[carried_[i].v] = 0;
-    } else if (h.from < first) {
-      loads[carried_[h.from].touch].force_N[axis] += h.load;
-    } else {
-      hanging_[h.from].load += h.load;
-    }
-  }
+  add_from_far_end(
+      hanging_, first, [&](std::size_t i) { carried_mark_[carried_[i].v] = 0; },
+      [&](std::size_t i, double load) { loads[carried_[i].touch].force_N[axis] += load; });
 }
 
 // Of what moves along with each of the voxels that carry, while all else stands still.
