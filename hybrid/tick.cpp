@@ -308,10 +308,10 @@ TickResult haptic_tick(const World& world, WorldState& state, const device::Devi
   // may push the other back into its way.
   if (may_meet) relax_pairs(world, state);
   if (around.near_soft && may_meet) give_way(world, state, before, sweep);
-  clock.done(Stage::arbitration);
-
   keep_out_of_tissue(world, state, dt_s);
   judge_bodies(world, state);
+  clock.done(Stage::arbitration);
+
   refresh_map(world, state);
   clock.done(Stage::map);
 

@@ -1,11 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "arbitration_watch.h"
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <fstream>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <iterator>
+#include <string>
+
+#include "hybrid/build.h"
+#include "hybrid/recording.h"
+#include "hybrid/session.h"
 
 namespace tests {
 namespace {
@@ -307,6 +316,32 @@ dvec3 beyond_rigid(const hybrid::World& world, const hybrid::WorldState& state, 
     }
   }
   return left;
+}
+
+void expect_replays(const std::filesystem::path& file, double seconds) {
+  const hybrid::Scene scene = hybrid::load_scene(file);
+  std::ifstream in(file, std::ios::binary);
+  const std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+  for (const bool realtime : {false, true}) {
+    hybrid::BuiltScene built = hybrid::build_scene(scene);
+    hybrid::SessionOptions options;
+    options.seconds = realtime ? 1.2 : seconds;
+    options.keep_rows = false;
+    options.relax_apart = true;
+    options.realtime = realtime;
+    const hybrid::SessionResult felt = hybrid::run_session(scene, built, options);
+    EXPECT_GT(felt.relaxed_apart, 10U);
+    const hybrid::ReplayResult again = hybrid::replay({.scene_file = file,
+                                                       .scene_text = text,
+                                                       .dt_s = felt.dt_s,
+                                                       .device = hybrid::scene_limits(scene),
+                                                       .relax_apart = true,
+                                                       .state_hash = felt.state_hash,
+                                                       .ticks = felt.recording},
+                                                      {});
+    EXPECT_TRUE(again.equal) << "parts at tick " << again.parts_at << (realtime ? ", in real time" : "");
+    EXPECT_EQ(built.state->faults, 0U);
+  }
 }
 
 }  // namespace tests

@@ -3,6 +3,7 @@
 // nothing with the engine but the lattice at rest, the displacements, and the exact rigid surfaces.
 #pragma once
 
+#include <filesystem>
 #include <glm/vec3.hpp>
 #include <limits>
 #include <vector>
@@ -80,5 +81,9 @@ std::vector<Bearing> bearings(const hybrid::World& world, const hybrid::WorldSta
 // all that they can across themselves (N).
 glm::dvec3 beyond_rigid(const hybrid::World& world, const hybrid::WorldState& state,
                         const glm::dvec3& force_N);
+
+// A session of the scene, relaxed apart, as fast as it goes and in real time, is the same to the bit when it
+// is played again, and has no fault.
+void expect_replays(const std::filesystem::path& file, double seconds);
 
 }  // namespace tests

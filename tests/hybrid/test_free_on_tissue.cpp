@@ -4,10 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
-#include <iterator>
 #include <limits>
 #include <random>
 #include <string>
@@ -15,7 +13,6 @@
 
 #include "arbitration_watch.h"
 #include "hybrid/free_body.h"
-#include "hybrid/recording.h"
 #include "polygon/mesh_file.h"
 #include "polygon/primitives.h"
 #include "polygon/signed_distance.h"
@@ -310,30 +307,7 @@ TEST_F(FreeOnTissue, ABodyThatMeetsNoTissueMovesAsWithoutIt) {
 }
 
 TEST_F(FreeOnTissue, ARecordedSessionReplaysToTheBit) {
-  const auto file = tests::source_folder / "scenes" / "dropped-weight.toml";
-  const hybrid::Scene scene = hybrid::load_scene(file);
-  std::ifstream in(file, std::ios::binary);
-  const std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
-  for (const bool realtime : {false, true}) {
-    hybrid::BuiltScene built = hybrid::build_scene(scene);
-    hybrid::SessionOptions options;
-    options.seconds = realtime ? 1.2 : 3.0;
-    options.keep_rows = false;
-    options.relax_apart = true;
-    options.realtime = realtime;
-    const hybrid::SessionResult felt = hybrid::run_session(scene, built, options);
-    EXPECT_GT(felt.relaxed_apart, 10U);
-    const hybrid::ReplayResult again = hybrid::replay({.scene_file = file,
-                                                       .scene_text = text,
-                                                       .dt_s = felt.dt_s,
-                                                       .device = hybrid::scene_limits(scene),
-                                                       .relax_apart = true,
-                                                       .state_hash = felt.state_hash,
-                                                       .ticks = felt.recording},
-                                                      {});
-    EXPECT_TRUE(again.equal) << "parts at tick " << again.parts_at << (realtime ? ", in real time" : "");
-    EXPECT_EQ(built.state->faults, 0U);
-  }
+  tests::expect_replays(tests::source_folder / "scenes" / "dropped-weight.toml", 3.0);
 }
 
 }  // namespace
