@@ -23,7 +23,7 @@ namespace {
 constexpr int kBallSubdivisions = 4;  // 5,120 triangles: for drawing and the map only, contact is exact
 // Measured, 160³ voxels (of one label 57 bytes, four labels in layers 92, mixed voxel by voxel 175, with
 // yield 224).
-constexpr double kTouchedBytes = 60.0, kTouchedMixedBytes = 180.0, kYieldBytes = 50.0;
+constexpr double kTouchedBytes = 60.0, kTouchedMixedBytes = 180.0, kYieldBytes = 50.0, kBrickBytes = 40.0;
 
 std::string in_words(const polygon::Finding& f) {
   return fmt::format("{}: {} {}", f.id, f.count, f.text);
@@ -205,7 +205,8 @@ std::uint64_t soft_touched_bytes(const voxel::Lattice& lattice) {
   for (voxel::RowId row = 0; row < lattice.grid().rows(); ++row) {
     if (lattice.filled_in(row) == 0) continue;
     bytes += voxel::kRow * ((lattice.inside(row) != 0 ? kTouchedBytes : kTouchedMixedBytes) +
-                            (lattice.yields() ? kYieldBytes : 0.0));
+                            (lattice.yields() ? kYieldBytes : 0.0) +
+                            (lattice.has_bricks() ? kBrickBytes : 0.0));
   }
   return static_cast<std::uint64_t>(bytes);
 }
@@ -259,10 +260,11 @@ polygon::TriangleMesh cut_mesh(const polygon::TriangleMesh& mesh, const Pose& to
 }
 
 voxel::LatticeOptions lattice_options(const Scene& scene, const SoftDescription& description) {
-  const auto link = [&scene](const std::string& name) {
+  const auto link = [&](const std::string& name) {
     const auto found = scene.materials.find(name);
     const Material m = found == scene.materials.end() ? Material{} : found->second;
-    return voxel::LinkMaterial{m.young_Pa, m.poisson, m.stretch_min, m.stretch_max, m.shear, m.yield};
+    const bool bricks = m.energy.value_or(description.energy) == Energy::trilinear;
+    return voxel::LinkMaterial{m.young_Pa, m.poisson, m.stretch_min, m.stretch_max, m.shear, m.yield, bricks};
   };
   voxel::LatticeOptions options;
   options.materials.fill(link(description.material));

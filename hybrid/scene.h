@@ -40,6 +40,9 @@ struct Pose {  // body frame to scene frame
   glm::dquat rotation{1.0, 0.0, 0.0, 0.0};
 };
 
+// Of tissue: springs between neighbours, or elastic bricks between eight voxels (voxel/brick_loads.h).
+enum class Energy : std::uint8_t { six_link, trilinear };
+
 struct Material {
   double young_Pa = 5e3;     // > 0
   double poisson = 0.3;      // 0 <= ν < 0.5
@@ -48,6 +51,7 @@ struct Material {
   double shear = 0.6;        // most a link's ends may slip across it, of its rest length; >= 0
   // Strain beyond which a link keeps what is beyond, once it is at rest; > 0.
   double yield = std::numeric_limits<double>::infinity();
+  std::optional<Energy> energy{};  // empty: its object's
   SourcePlace place;
 };
 
@@ -182,6 +186,7 @@ struct SoftDescription {
   Anchors anchors;
   std::uint32_t budget = 12'000;  // voxel updates of background relaxation a tick
   std::optional<Thinning> thinning{};
+  Energy energy = Energy::six_link;     // of materials that do not say
   SoftModel model = SoftModel::voxels;  // of what stands in Scene::soft always this: the others were chosen
   SourcePlace place, source_place;
 };

@@ -222,7 +222,7 @@ void read_stretch(const TableReader& table, Material& out) {
 }
 
 Material read_material(const TableReader& table) {
-  static constexpr std::string_view keys[] = {"young", "poisson", "stretch", "shear", "yield"};
+  static constexpr std::string_view keys[] = {"young", "poisson", "stretch", "shear", "yield", "energy"};
   table.allow(keys, material_later);
   Material out;
   out.place = table.place();
@@ -235,6 +235,11 @@ Material read_material(const TableReader& table) {
       table.number("shear", {"a share of the rest length, 0 or more", "0.6", 1.0, 0.0, 1e6}, out.shear);
   out.yield = table.number(
       "yield", {"a strain, above 0, beyond which it stays deformed", "0.2", 1.0, 1e-6, 1e6}, out.yield);
+  out.energy = read_energy(table);
+  if (out.energy == Energy::trilinear && std::isfinite(out.yield)) {
+    table.refuse("energy", words(table.what(), " has both a yield and the trilinear energy"),
+                 "take one of them away: what yields is of links");
+  }
   // Rows of voxels that are rigid one way and free the other: relaxation moves voxels and blocks of them, and
   // neither can move without breaking the row, so such tissue would stay as it was pressed.
   const bool stretches = out.stretch_max > out.stretch_min, slips = out.shear > 0.0;

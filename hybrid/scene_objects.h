@@ -2,6 +2,7 @@
 // The [[rigid]] and [[soft]] tables of a scene file.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,8 @@ TableReader object_table(const SceneSource& source, const TreeNode& table, const
 std::string read_name(const TableReader& table);
 Pose read_pose(const TableReader& table);
 MeshSource read_mesh_source(const TableReader& table);
+// `energy` of an object or a material; nothing where it does not say.
+std::optional<Energy> read_energy(const TableReader& table);
 // `labels` or `range` (and `ranges` where each may become its own label); none of them: no rules.
 std::vector<voxel::LabelRule> read_label_rules(const TableReader& table, bool keep_labels);
 // Which one of the keys names the source; exactly one must.

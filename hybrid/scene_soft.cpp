@@ -16,10 +16,10 @@ constexpr LaterKey soft_later[] = {
     {"damping", "remove it: soft contact is quasi-static for now"},
     {"motion", "remove it: a soft object stays where position and rotation put it"},
 };
+
 constexpr LaterKey energies_later[] = {
-    {"eighteen-link", "write energy = \"six-link\", or remove the key"},
-    {"18-link", "write energy = \"six-link\", or remove the key"},
-    {"trilinear", "write energy = \"six-link\", or remove the key"},
+    {"eighteen-link", "write energy = \"trilinear\", which is as accurate"},
+    {"18-link", "write energy = \"trilinear\", which is as accurate"},
 };
 
 // Most voxels along one axis: indices stay far inside an int, and a row inside a cache.
@@ -271,13 +271,18 @@ SoftSource read_source(const TableReader& table, std::string_view kind) {
 
 }  // namespace
 
+std::optional<Energy> read_energy(const TableReader& table) {
+  static constexpr std::string_view energies[] = {"six-link", "trilinear"};
+  if (!table.has("energy")) return std::nullopt;
+  return table.choice("energy", energies, {}, energies_later) == 1 ? Energy::trilinear : Energy::six_link;
+}
+
 SoftDescription read_soft(const SceneSource& source, const TreeNode& table, std::size_t number) {
   static constexpr std::string_view all[] = {
       "name",      "mesh",    "volume",  "formula",  "unit",   "repair", "spacing",    "labels",
       "range",     "ranges",  "largest", "size",     "label",  "layers", "inclusions", "material",
       "materials", "anchors", "budget",  "thinning", "energy", "model",  "position",   "rotation"};
   static constexpr std::string_view sources[] = {"volume", "mesh", "formula"};
-  static constexpr std::string_view energies[] = {"six-link"};
   static constexpr std::string_view models[] = {"voxels", "proxy", "auto"};
   const TableReader reader = object_table(source, table, "[[soft]]", number);
   reader.allow(all, soft_later);
@@ -295,7 +300,7 @@ SoftDescription read_soft(const SceneSource& source, const TreeNode& table, std:
   out.anchors = read_anchors(reader, known);
   out.budget = static_cast<std::uint32_t>(reader.integer("budget", 1, 1'000'000'000, out.budget));
   if (reader.has("thinning")) out.thinning = read_thinning(reader, known);
-  if (reader.has("energy")) (void)reader.choice("energy", energies, {}, energies_later);
+  if (const auto energy = read_energy(reader)) out.energy = *energy;
   static constexpr SoftModel kinds[] = {SoftModel::voxels, SoftModel::proxy, SoftModel::automatic};
   out.model = kinds[reader.choice("model", models, 0)];
   out.pose = read_pose(reader);

@@ -3,9 +3,13 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <stdexcept>
+
+#include "voxel/link_weight.h"
 
 namespace voxel {
 namespace {
@@ -66,9 +70,7 @@ ModeStrain mode_strain(const Eigen::Vector3d& at, const Eigen::Vector3d& spacing
   return out;
 }
 
-}  // namespace
-
-BrickStiffness brick_stiffness(double young_Pa, double poisson, const glm::dvec3& spacing_m) {
+void check(double young_Pa, double poisson, const glm::dvec3& spacing_m) {
   if (!std::isfinite(young_Pa) || young_Pa <= 0.0)
     throw std::invalid_argument("a brick needs a Young's modulus above 0, in Pa, e.g. 5000");
   if (!(poisson >= 0.0 && poisson < 0.5))
@@ -77,6 +79,12 @@ BrickStiffness brick_stiffness(double young_Pa, double poisson, const glm::dvec3
     if (!std::isfinite(spacing_m[a]) || spacing_m[a] <= 0.0)
       throw std::invalid_argument("a brick needs spacings above 0, in m");
   }
+}
+
+}  // namespace
+
+BrickStiffness brick_stiffness(double young_Pa, double poisson, const glm::dvec3& spacing_m) {
+  check(young_Pa, poisson, spacing_m);
   // In units of the longest edge and of E, so that nothing under- or overflows at 1 µm or 1 TPa.
   const Eigen::Vector3d metres(spacing_m.x, spacing_m.y, spacing_m.z);
   const double unit = metres.maxCoeff();
@@ -104,6 +112,46 @@ BrickStiffness brick_stiffness(double young_Pa, double poisson, const glm::dvec3
   const Eigen::Matrix<double, 24, 24> symmetric = 0.5 * young_Pa * unit * (corners + corners.transpose());
   std::copy_n(symmetric.data(), symmetric.size(), out.entry.begin());
   return out;
+}
+
+BrickStiffness link_cell_stiffness(double young_Pa, double poisson, const glm::dvec3& spacing_m) {
+  check(young_Pa, poisson, spacing_m);
+  const double across = across_modulus_Pa(young_Pa, poisson);
+  BrickStiffness out;
+  for (std::size_t corner = 0; corner < 8; ++corner) {
+    for (std::size_t d = 0; d < 3; ++d) {
+      const std::size_t other = corner ^ (std::size_t{1} << d);
+      const double h = spacing_m[static_cast<int>(d)];
+      const double area_by_length = spacing_m.x * spacing_m.y * spacing_m.z / (h * h);
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const double k = 0.25 * area_by_length * (axis == d ? young_Pa : across);
+        out.entry[24 * (3 * corner + axis) + 3 * corner + axis] += k;
+        out.entry[24 * (3 * corner + axis) + 3 * other + axis] -= k;
+      }
+    }
+  }
+  return out;
+}
+
+BrickStiffness difference(const BrickStiffness& a, const BrickStiffness& b) {
+  BrickStiffness out;
+  std::transform(a.entry.begin(), a.entry.end(), b.entry.begin(), out.entry.begin(), std::minus<>{});
+  return out;
+}
+
+double largest_ratio(const BrickStiffness& brick, const BrickStiffness& links) {
+  using Matrix = Eigen::Matrix<double, 24, 24>;
+  const Matrix of = Eigen::Map<const Matrix>(brick.entry.data());
+  Matrix to = Eigen::Map<const Matrix>(links.entry.data());
+  // Shifts cost neither of them anything, and would make the second singular.
+  const double stiffness = to.trace() / 24.0;
+  for (int axis = 0; axis < 3; ++axis) {
+    Eigen::Matrix<double, 24, 1> shift = Eigen::Matrix<double, 24, 1>::Zero();
+    for (int corner = 0; corner < 8; ++corner) shift[3 * corner + axis] = 1.0;
+    to += stiffness / 8.0 * shift * shift.transpose();
+  }
+  const Eigen::GeneralizedSelfAdjointEigenSolver<Matrix> solver(of, to, Eigen::EigenvaluesOnly);
+  return solver.eigenvalues().maxCoeff();
 }
 
 NodeStencil node_stencil(const BricksAround& bricks) {

@@ -12,6 +12,33 @@
 
 namespace voxel {
 
+// What bricks add to the forces of links, as it was when it was last found (voxel/brick_loads.h).
+struct BrickLoad {
+  BrickLoad() = default;
+  // Takes no address space where no tissue is of bricks.
+  explicit BrickLoad(const Lattice& lattice) {
+    if (!lattice.has_bricks()) return;
+    for (auto& axis : load) axis = LazyArray<float>(lattice.size());
+    row = LazyArray<std::uint8_t>(lattice.grid().rows());
+  }
+
+  std::array<LazyArray<float>, 3> load;  // [axis][v] (N)
+  LazyArray<std::uint8_t> row;           // [row] 1 where it has any
+
+  [[nodiscard]] bool has(RowId r) const noexcept { return row.size() != 0 && row[r] != 0; }
+  [[nodiscard]] std::array<float, 3> at(VoxelId v) const noexcept {
+    return has(v / kRow) ? std::array<float, 3>{load[0][v], load[1][v], load[2][v]} : std::array<float, 3>{};
+  }
+  void populate() noexcept {
+    for (auto& axis : load) axis.populate();
+    row.populate();
+  }
+  [[nodiscard]] std::size_t memory_bytes() const {
+    return load[0].resident_bytes() + load[1].resident_bytes() + load[2].resident_bytes() +
+           row.resident_bytes();
+  }
+};
+
 // Displacement, not position: at coordinate 100 a float position has lost the slack of the chain to rounding,
 // a displacement near zero has not.
 struct Displacement {
@@ -25,7 +52,8 @@ struct Displacement {
       : role(lattice.size()),
         row_held(lattice.grid().rows()),
         row_obstacles(lattice.grid().rows()),
-        rest(lattice) {
+        rest(lattice),
+        bricks(lattice) {
     for (auto& axis : u) axis = LazyArray<float>(lattice.size());
   }
 
@@ -33,7 +61,14 @@ struct Displacement {
   LazyArray<std::uint8_t> role;                     // [v]
   LazyArray<std::uint8_t> row_held, row_obstacles;  // [row]: voxels of the row with that role
   RestOffsets rest;
+  BrickLoad bricks;
 
+  // Loads of a row of voxels beside the pulls of their springs; null: none (N).
+  [[nodiscard]] const float* load_of(RowId r, int axis) const noexcept {
+    if (bricks.has(r))
+      return bricks.load[static_cast<std::size_t>(axis)].data() + static_cast<std::size_t>(r) * kRow;
+    return rest.load_of(r, axis);
+  }
   [[nodiscard]] glm::dvec3 at(VoxelId v) const { return {u[0][v], u[1][v], u[2][v]}; }
   void set(VoxelId v, const glm::dvec3& value) {
     for (int a = 0; a < 3; ++a) u[static_cast<std::size_t>(a)][v] = static_cast<float>(value[a]);

@@ -24,6 +24,9 @@ void check_material(std::size_t label, const LinkMaterial& m) {
   if (!(m.stretch_min > 0.0 && m.stretch_min <= 1.0)) say("a least stretch outside 0 < min <= 1");
   if (!(m.stretch_max >= 1.0 && std::isfinite(m.stretch_max))) say("a greatest stretch below 1");
   if (!(m.shear >= 0.0 && std::isfinite(m.shear))) say("a negative shear limit");
+  if (m.bricks && m.poisson > kMostPoissonOfBricks)
+    say("the trilinear energy and a Poisson's ratio above 0.49, which takes too long to come to rest; give 0.49 "
+        "or less");
   if (!(m.yield > 0.0)) say("a yield strain that is not positive; leave it out where nothing yields");
 }
 
@@ -91,7 +94,8 @@ void Lattice::fill_links(const LatticeOptions& options) {
     for (int i = 0; i < kRow; ++i) used[at[i]] = true;
   }
   // Equal materials share a number, so that the tables stay small.
-  std::vector<LinkMaterial> materials(1);  // [0]: nothing
+  std::vector<LinkMaterial>& materials = materials_;
+  materials.resize(1);
   for (std::size_t label = 1; label < 256; ++label) {
     if (!used[label]) continue;
     const LinkMaterial& m = options.materials[label];
@@ -99,6 +103,7 @@ void Lattice::fill_links(const LatticeOptions& options) {
     const auto found = std::find(materials.begin() + 1, materials.end(), m);
     material_[label] = static_cast<std::uint8_t>(found - materials.begin());
     if (found == materials.end()) materials.push_back(m);
+    has_bricks_ = has_bricks_ || m.bricks;
   }
   material_count_ = materials.size();
 
@@ -133,6 +138,11 @@ void Lattice::fill_links(const LatticeOptions& options) {
         yield = static_cast<float>(std::min(a.yield, b.yield) * h[d]);
         first_yield_m_[ud] = std::min(first_yield_m_[ud], yield);
         yields_ = yields_ || yield < never;
+        if (yields_ && has_bricks_) {
+          throw std::invalid_argument(
+              "tissue that yields and tissue of the trilinear energy cannot be one object: give both the "
+              "six-link energy, or take the yield away");
+        }
         tightest.along_low = std::max(tightest.along_low, limit.along_low);
         tightest.along_high = std::min(tightest.along_high, limit.along_high);
         tightest.across = std::min(tightest.across, limit.across);

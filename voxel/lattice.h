@@ -31,6 +31,8 @@ struct LinkMaterial {
   double shear = 0.6;        // most slip across the link, in its rest length
   // Strain beyond which a link keeps what is beyond (voxel/yield.h), of its rest length.
   double yield = std::numeric_limits<double>::infinity();
+  // Cells of which it is the softest are of the accurate energy (voxel/brick_loads.h), not of links.
+  bool bricks = false;
 
   friend bool operator==(const LinkMaterial&, const LinkMaterial&) = default;
 };
@@ -40,6 +42,10 @@ struct LinkLimit {
   float along_low = 0.0F, along_high = 0.0F;  // along the link; low <= 0 <= high
   float across = 0.0F;                        // across it, both ways; >= 0
 };
+
+// Towards 0.5 bricks are ever so much stiffer in volume than links, and it takes as many times longer until
+// they are at rest.
+inline constexpr double kMostPoissonOfBricks = 0.49;
 
 struct LatticeOptions {
   std::array<LinkMaterial, 256> materials;  // by label; [0] unused
@@ -130,6 +136,9 @@ class Lattice {
   }
   // Number of a voxel's material; equal ones share it. 0: no voxel.
   [[nodiscard]] std::uint8_t material(VoxelId v) const { return material_[label_[v]]; }
+  // The materials by that number; of [0] nothing is true.
+  [[nodiscard]] std::span<const LinkMaterial> materials() const { return materials_; }
+  [[nodiscard]] bool has_bricks() const { return has_bricks_; }
   // Of a link in +d whose parallels (link_weight.h) leave voxels of materials `from` and end in `to`.
   [[nodiscard]] Spring spring_among(const std::array<std::uint8_t, 9>& from,
                                     const std::array<std::uint8_t, 9>& to, int d) const noexcept;
@@ -179,10 +188,11 @@ class Lattice {
   glm::dvec3 spacing_m_{1e-3};
   double min_spacing_m_ = 1e-3, max_spacing_m_ = 1e-3;
   double force_scale_N_ = 0.0;
-  bool uniform_limits_ = true, yields_ = false;
+  bool uniform_limits_ = true, yields_ = false, has_bricks_ = false;
   std::size_t voxel_count_ = 0, anchored_count_ = 0, material_count_ = 1;
   LazyArray<std::uint8_t> label_, anchored_, row_filled_, inside_;
   std::array<std::uint8_t, 256> material_{};  // label → number among equal materials; 0: empty
+  std::vector<LinkMaterial> materials_;       // [material]
   std::vector<LinkModuli> moduli_;            // [material]; [0]: none
   std::array<double, 3> area_by_length_m_{};
   std::array<std::vector<Spring>, 3> within_;     // [d][material]

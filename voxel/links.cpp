@@ -8,10 +8,16 @@
 namespace voxel {
 namespace {
 
+// What pulls a voxel beside its springs: bricks, or links that yielded. No object has both.
+std::array<float, 3> load_beside_springs(const Lattice& lattice, const Displacement& state,
+                                         const VoxelSprings& springs, VoxelId v) noexcept {
+  return lattice.has_bricks() ? state.bricks.at(v) : yielded_load(lattice, state, springs, v);
+}
+
 glm::dvec3 force_of(const VoxelSprings& springs, const Lattice& lattice, const Displacement& state,
                     VoxelId v) noexcept {
-  const std::array<float, 3> yielded = yielded_load(lattice, state, springs, v);
-  std::array<double, 3> force{yielded[0], yielded[1], yielded[2]};
+  const std::array<float, 3> load = load_beside_springs(lattice, state, springs, v);
+  std::array<double, 3> force{load[0], load[1], load[2]};
   for (std::size_t d = 0; d < 3; ++d) {
     const int id = static_cast<int>(d);
     const VoxelId up = lattice.up(v, id), down = lattice.down(v, id);
@@ -54,7 +60,7 @@ float clamp_to(const std::array<float, 2>& interval, float wanted, float now) no
 glm::dvec3 link_minimum(Couplings& couplings, const Displacement& state, VoxelId v) noexcept {
   const VoxelSprings springs = couplings.springs_of(v);
   const Grid& grid = couplings.grid();
-  std::array<float, 3> sum = yielded_load(couplings.lattice(), state, springs, v);
+  std::array<float, 3> sum = load_beside_springs(couplings.lattice(), state, springs, v);
   for (std::size_t d = 0; d < 3; ++d) {
     const int id = static_cast<int>(d);
     const VoxelId up = grid.up(v, id), down = grid.down(v, id);
@@ -88,7 +94,7 @@ double link_force(Couplings& couplings, const Displacement& state, VoxelId v, in
   const Lattice& lattice = couplings.lattice();
   const auto ua = static_cast<std::size_t>(axis);
   const LazyArray<float>& u = state.u[ua];
-  double force = yielded_load(lattice, state, springs, v)[ua];
+  double force = static_cast<double>(load_beside_springs(lattice, state, springs, v)[ua]);
   for (int d = 0; d < 3; ++d) {
     const auto ud = static_cast<std::size_t>(d);
     force += static_cast<double>(springs.up[ud].on(axis, d) * (u[lattice.up(v, d)] - u[v])) +

@@ -29,7 +29,8 @@ float hold_of(float n, float size) {
 
 }  // namespace
 
-Multigrid::Multigrid(const Lattice& lattice) : lattice_(lattice), tiles_(lattice.grid()) {
+Multigrid::Multigrid(const Lattice& lattice)
+    : lattice_(lattice), tiles_(lattice.grid()), bricks_(lattice) {
   for (AxisLimits& axis : yield_limits_) {
     for (std::size_t d = 0; d < 3; ++d) {
       axis.high[d] = lattice.first_yield_m(static_cast<int>(d));
@@ -99,6 +100,7 @@ void Multigrid::spread(int level, RowId row, std::uint8_t flags) noexcept {
 // many voxels is a large one on the cell that holds them, four times as large on each level.
 void Multigrid::note_change(int level, RowId row, float change) noexcept {
   if (change <= passed_on_m()) return;
+  if (level == 0) bricks_.look_at(row);
   spread(level, row, change > quiet_m_ ? active | dirty : dirty);
   if (level > 0) mark(level, row, changed);
 }
@@ -184,6 +186,7 @@ void Multigrid::release_limited() noexcept {
 
 void Multigrid::copy_from(const Multigrid& other) noexcept {
   tiles_ = other.tiles_;
+  bricks_.look_at_all_of(other.bricks_);
   for (int l = 0; l < levels(); ++l) {
     Level& to = at(l);
     const Level& from = other.at(l);
@@ -198,12 +201,20 @@ void Multigrid::copy_from(const Multigrid& other) noexcept {
 }
 
 void Multigrid::forget_coarse() {
+  bricks_.leave_to_another();
   for (int l = 1; l < levels(); ++l) {
     Level& level = at(l);
     for (auto* arrays : {&level.value, &level.told, &level.load}) {
       for (auto& array : *arrays) array = LazyArray<float>(level.couplings->grid().size());
     }
   }
+}
+
+std::size_t Multigrid::renew_bricks(Displacement& state, std::size_t most_rows) noexcept {
+  return bricks_.renew(state, most_rows, [this](RowId row) {
+    log_.note(0, row);
+    spread(0, row, active | dirty);
+  });
 }
 
 void Multigrid::begin_anew() noexcept {
@@ -231,7 +242,7 @@ void Multigrid::keep_log() {
 }
 
 std::size_t Multigrid::memory_bytes() const {
-  std::size_t bytes = log_.memory_bytes() + held_.capacity() * sizeof(VoxelId) +
+  std::size_t bytes = log_.memory_bytes() + bricks_.memory_bytes() + held_.capacity() * sizeof(VoxelId) +
                       stopped_.capacity() * sizeof(StoppedCell) + supported_.resident_bytes() +
                       row_supported_.resident_bytes() + row_balanced_.resident_bytes() +
                       balanced_.capacity() * sizeof(RowId);

@@ -13,6 +13,7 @@
 #include <span>
 #include <vector>
 
+#include "voxel/brick_loads.h"
 #include "voxel/change_log.h"
 #include "voxel/couplings.h"
 #include "voxel/displacement.h"
@@ -56,8 +57,13 @@ class Multigrid {
   // Somebody moved voxels of this row: it and the rows beside it are to be looked at.
   void stir(int level, RowId row) noexcept {
     log_.note(level, row);
+    if (level == 0) bricks_.look_at(row);
     spread(level, row, active | dirty);
   }
+  // Finds the loads of bricks anew where voxels moved, in at most so many rows. Returns in how many it did.
+  std::size_t renew_bricks(Displacement& state, std::size_t most_rows) noexcept;
+  [[nodiscard]] BrickLoads& bricks() { return bricks_; }
+  [[nodiscard]] const BrickLoads& bricks() const { return bricks_; }
 
   // What the tool and other objects hold does not move, nor do the cells around it on coarser levels.
   void set_held(std::span<const VoxelId> held) noexcept;
@@ -124,6 +130,7 @@ class Multigrid {
   void set_quiet(float tolerance_N, float quiet_m) noexcept {
     tolerance_N_ = tolerance_N;
     quiet_m_ = quiet_m;
+    bricks_.set_least(kLeastLoad * tolerance_N);
   }
   void copy_from(const Multigrid& other) noexcept;
 
@@ -131,16 +138,17 @@ class Multigrid {
   // From now on every row that is written is noted. Allocates.
   void keep_log();
   [[nodiscard]] ChangeLog& log() { return log_; }
-  // Forgets what coarse cells hold. Allocates.
+  // Forgets what coarse cells hold, and leaves the loads of bricks to the other. Allocates.
   void forget_coarse();
   // Coarse cells whose rows are in the log hold nothing any more, and nothing is balanced.
   void begin_anew() noexcept;
   // What still pulls the voxels of a row counts as balanced from now on: they are at rest where they are.
   void balance(RowId row, Displacement& state, const ObstacleView& obstacles, OctetSpan span = {}) noexcept;
-  [[nodiscard]] glm::dvec3 balance_of(VoxelId v) const noexcept {
-    return row_balanced_.size() == 0 || row_balanced_[v / kRow] == 0
-               ? glm::dvec3(0.0)
-               : glm::dvec3(balance_[0][v], balance_[1][v], balance_[2][v]);
+  // The load that is for that, beside those that the voxel has of itself (N).
+  [[nodiscard]] glm::dvec3 balance_of(VoxelId v, const Displacement& state) const noexcept {
+    if (row_balanced_.size() == 0 || row_balanced_[v / kRow] == 0) return glm::dvec3(0.0);
+    const std::array<float, 3> own = state.bricks.at(v);
+    return {balance_[0][v] - own[0], balance_[1][v] - own[1], balance_[2][v] - own[2]};
   }
   // Adds to a row of voxels what somebody else found, as far as its links allow.
   void add(RowId row, const RowVector& way, Displacement& state, const ObstacleView& obstacles) noexcept;
@@ -169,6 +177,7 @@ class Multigrid {
   // How much of a voxel is held, by axis; kHeld: it does not move along that.
   static constexpr std::uint8_t kHeld = 255;
   using HeldParts = std::array<std::uint8_t, 3>;
+  static constexpr float kLeastLoad = 0.25F;  // of the tolerance: loads less wrong than this are right
 
   [[nodiscard]] Level& at(int level) { return levels_[static_cast<std::size_t>(level)]; }
   [[nodiscard]] const Level& at(int level) const { return levels_[static_cast<std::size_t>(level)]; }
@@ -201,13 +210,15 @@ class Multigrid {
   const Lattice& lattice_;
   TileQueue tiles_;
   ChangeLog log_;
+  BrickLoads bricks_;
   std::vector<Level> levels_;
   Hats hats_;
   std::vector<VoxelId> held_;
   LazyArray<HeldParts> supported_;         // [voxel] by its obstacle
   LazyArray<std::uint8_t> row_supported_;  // [row] 1: a voxel of it was
   std::vector<StoppedCell> stopped_;
-  std::array<LazyArray<float>, 3> balance_;  // [axis][voxel] load that balances it (N), in rows that have one
+  // [axis][voxel] its own load and what balances it (N), in rows where something does
+  std::array<LazyArray<float>, 3> balance_;
   LazyArray<std::uint8_t> row_balanced_;     // [row] 1: it has
   std::vector<RowId> balanced_;              // these
   std::array<AxisLimits, 3> yield_limits_;

@@ -27,7 +27,7 @@ LevelRow Multigrid::row_of(int level, RowId row, Displacement& state) noexcept {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       r.u[axis] = state.u[axis].data() + begin;
       r.load[axis] =
-          balanced ? balance_[axis].data() + begin : state.rest.load_of(row, static_cast<int>(axis));
+          balanced ? balance_[axis].data() + begin : state.load_of(row, static_cast<int>(axis));
     }
     if (state.row_held[row] != 0) r.held = state.role.data() + begin;
     return r;
@@ -109,7 +109,7 @@ std::uint32_t Multigrid::move_outside(LevelRow r, RowId row, Displacement& state
   }
   for (VoxelId lane = 0; lane < kRow; ++lane) {
     if ((blocked_lanes >> lane & 1U) != 0)
-      relax_obstacle(couplings(), state, obstacles, first + lane, balance_of(first + lane));
+      relax_obstacle(couplings(), state, obstacles, first + lane, balance_of(first + lane, state));
   }
   return blocked_lanes;
 }
@@ -182,10 +182,11 @@ void Multigrid::balance(RowId row, Displacement& state, const ObstacleView& obst
   residual_of(0, row, state, obstacles, span, left);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     float* to = balance_[axis].data() + static_cast<std::size_t>(row) * kRow;
-    std::fill_n(to, kRow, 0.0F);
+    const float* own = state.load_of(row, static_cast<int>(axis));
+    for (std::size_t i = 0; i < kRow; ++i) to[i] = own == nullptr ? 0.0F : own[i];
     for (std::size_t i = static_cast<std::size_t>(span.first) * kOctet;
          i < static_cast<std::size_t>(span.last + 1) * kOctet; ++i)
-      to[i] = -left[axis][i];
+      to[i] -= left[axis][i];
   }
   row_balanced_[row] = 1;
   balanced_.push_back(row);

@@ -28,6 +28,8 @@ constexpr int kContactLevels = 5;
 constexpr int kNear = 2;           // rows that a cycle round a contact reads beyond those it brings to rest
 constexpr int kContactMargin = 3;  // cells round the contact that are smoothed, on each level
 constexpr std::uint64_t kBesideContact = 2;  // this part of the budget is left beside cycles round a contact
+// Loads of bricks: what a row of them takes, in voxel updates, and what part of a budget they may have.
+constexpr std::uint64_t kBrickUpdates = 4 * kRow, kBrickShare = 4;
 constexpr int kTileMargin = 3;               // … round a tile, from level 1 on
 constexpr int kLooksAtOnce = 256;  // tiles looked at for what coarse levels have to tell them, a call
 
@@ -104,6 +106,7 @@ std::uint64_t Relaxation::run(Displacement& state, const ObstacleView& obstacles
     credit_ -= static_cast<std::int64_t>(updates);
     spent += updates;
   };
+  spend(kBrickUpdates * multigrid_.renew_bricks(state, 1 + budget / (kBrickShare * kBrickUpdates)));
   while (!asleep_ && credit_ > 0) {
     if (keeping_) {
       spend(keep_yielded(state, static_cast<std::uint64_t>(credit_)));
@@ -142,6 +145,7 @@ void Relaxation::run_cycle(Displacement& state, const ObstacleView& obstacles,
     return;
   }
   multigrid_.set_held(held);
+  multigrid_.renew_bricks(state, multigrid_.grid(0).rows());
   multigrid_.tiles().clear();
   round_left_ = 0;
   running_residual_N_ = 0.0;
@@ -225,6 +229,7 @@ double Relaxation::move_clusters(Displacement& state) noexcept {
 
 // A round has looked at all that moves: is it at rest?
 void Relaxation::end_round(Displacement& state, double residual_N) noexcept {
+  residual_N = std::max(residual_N, static_cast<double>(multigrid_.bricks().left_N()));
   // Only when nothing else moves any more: between other corrections they would undo one another (energy grew
   // 1.9 times within a cycle).
   if (residual_N < kNearRest * tolerance_N_ || cycles_without_gain_ > kPatience / 2)
@@ -248,7 +253,8 @@ void Relaxation::end_round(Displacement& state, double residual_N) noexcept {
     cycles_without_gain_ = 0;
   }
   ++cycles_without_gain_;
-  const bool at_rest = residual_N_ < tolerance_N_ || cycles_without_gain_ > kPatience;
+  const bool at_rest = (residual_N_ < tolerance_N_ && multigrid_.bricks().done()) ||
+                       cycles_without_gain_ > kPatience;
   if (!at_rest) return;
   // What yielded is kept at rest, and then there is a new rest to be found.
   if (unkept_) {

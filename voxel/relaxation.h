@@ -51,6 +51,7 @@ class Relaxation {
 
   [[nodiscard]] Couplings& couplings() { return multigrid_.couplings(); }
   [[nodiscard]] Multigrid& multigrid() { return multigrid_; }
+  [[nodiscard]] const Multigrid& multigrid() const { return multigrid_; }
 
   // Voxels of a row (v / kRow) were moved by somebody else: it and the rows beside it are to be looked at.
   void stir(RowId row) noexcept { multigrid_.stir(0, row); }

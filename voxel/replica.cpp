@@ -22,6 +22,11 @@ constexpr std::size_t kMostAtOnce = 1000;  // rows that a tick adds at once; a w
 constexpr int kContactCycles = 4, kUnsettled = 4;
 constexpr double kMoved = 0.1;
 
+// Floats of a row that go over: ways, and where there are bricks their loads.
+std::size_t arrays_of(const Lattice& lattice) {
+  return lattice.has_bricks() ? 6 : 3;
+}
+
 }  // namespace
 
 Replica::Replica(SoftObject& object)
@@ -33,7 +38,8 @@ Replica::Replica(SoftObject& object)
       by_distance_(lattice_.grid().rows()),
       given_(lattice_.grid().rows()),
       is_given_(lattice_.grid().rows()),
-      found_{Parcel(lattice_.grid().rows()), Parcel(lattice_.grid().rows())} {
+      found_{Parcel(lattice_.grid().rows(), arrays_of(lattice_)),
+             Parcel(lattice_.grid().rows(), arrays_of(lattice_))} {
   multigrid().keep_log();
   relaxation_.copy_from(object.relaxation_);
   object.relaxation_.leave_to_another();
@@ -50,6 +56,7 @@ Replica::Replica(SoftObject& object)
   relaxation_.prepare_all();
   object.relaxation_.prepare_all();
   for (auto& axis : state_.u) axis.populate();
+  state_.bricks.populate();
   state_.role.populate();
   for (auto& axis : before_) axis.populate();
   given_.populate();
@@ -168,13 +175,16 @@ bool Replica::pack_row(RowId row) noexcept {
       most = std::max(most, std::fabs(way[axis * kRow + i]));
     }
   }
-  if (most <= least_m_) return false;
+  const bool loads_changed = multigrid().bricks().take_changed(row);
+  if (most <= least_m_ && !loads_changed) return false;
   // The same sum as the tick's, to the last bit.
   for (std::size_t axis = 0; axis < 3; ++axis) {
     float* now = state_.u[axis].data() + at(row);
     float* was = before_[axis].data() + at(row);
     for (std::size_t i = 0; i < kRow; ++i) was[i] += way[axis * kRow + i];
     std::copy_n(was, kRow, now);
+    if (state_.bricks.row.size() > 0)
+      std::copy_n(state_.bricks.load[axis].data() + at(row), kRow, way + (3 + axis) * kRow);
   }
   return true;
 }
@@ -190,6 +200,11 @@ void Replica::take_row(SoftObject& object, std::size_t n) noexcept {
       ways[axis][i] = way[i];
       wanted[axis][i] = there[i] + way[i];
     }
+  }
+  if (BrickLoad& bricks = object.state_.bricks; bricks.row.size() > 0) {
+    for (std::size_t axis = 0; axis < 3; ++axis, way += kRow)
+      std::copy_n(way, kRow, bricks.load[axis].data() + at(row));
+    bricks.row[row] = 1;
   }
   to.add(row, ways, object.state_, object.obstacle_view());
   bool as_found = is_given_[row] == 0;  // it was given before this came, so without it

@@ -72,17 +72,18 @@ class Replica {
   // another core wrote costs more than all that is done with it, and least where it stands in a row.
   class Parcel {
    public:
-    static constexpr std::size_t kFloats = 3 * kRow;  // [axis][lane]
-    explicit Parcel(std::size_t rows) : rows_(rows), values_(rows * kFloats) {}
+    // Of each row `arrays` of them, [array][lane].
+    explicit Parcel(std::size_t rows, std::size_t arrays = 3)
+        : floats_(arrays * kRow), rows_(rows), values_(rows * floats_) {}
     void clear() noexcept { count_ = 0; }
     [[nodiscard]] float* add(RowId row) noexcept {
       rows_[count_] = row;
-      return values_.data() + kFloats * count_++;
+      return values_.data() + floats_ * count_++;
     }
     void drop_last() noexcept { --count_; }
     [[nodiscard]] std::size_t count() const { return count_; }
     [[nodiscard]] RowId row(std::size_t n) const { return rows_[n]; }
-    [[nodiscard]] const float* values(std::size_t n) const { return values_.data() + kFloats * n; }
+    [[nodiscard]] const float* values(std::size_t n) const { return values_.data() + floats_ * n; }
     void populate() noexcept {
       rows_.populate();
       values_.populate();
@@ -92,6 +93,7 @@ class Replica {
     }
 
    private:
+    std::size_t floats_;
     LazyArray<RowId> rows_;
     LazyArray<float> values_;
     std::size_t count_ = 0;
@@ -129,7 +131,7 @@ class Replica {
   // ---- what goes over ----
   Parcel given_;
   LazyArray<std::uint8_t> is_given_;  // [row] 1: it is in there
-  std::array<Parcel, 2> found_;       // what is drained, and what is found meanwhile
+  std::array<Parcel, 2> found_;       // what is drained, and what is found meanwhile: ways, loads of bricks
   std::vector<GivenRole> given_roles_;
   std::vector<GivenObstacle> given_obstacles_;
   std::vector<VoxelId> given_held_;

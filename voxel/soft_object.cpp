@@ -45,6 +45,7 @@ SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice)
   hanging_.reserve(kMaxCarried + kMaxTouched);
   if (lattice_->voxel_count() < kPreparedWhole) {
     for (auto& axis : state_.u) axis.populate();
+    state_.bricks.populate();
     state_.role.populate();
     relaxation_.prepare_all();
   }
@@ -353,8 +354,16 @@ glm::dvec3 SoftObject::displacement_at(const glm::dvec3& rest_point) const noexc
 
 double SoftObject::energy_J() const noexcept {
   double energy = 0.0;
+  std::array<Lanes, 3> bricks;
   for (RowId row = 0; row < lattice_->grid().rows(); ++row) {
     if (lattice_->filled_in(row) == 0) continue;
+    if (relaxation_.multigrid().bricks().loads_of(row, state_, bricks)) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const float* u = state_.u[axis].data() + static_cast<std::size_t>(row) * kRow;
+        for (std::size_t i = 0; i < kRow; ++i)
+          energy -= 0.5 * static_cast<double>(bricks[axis][i]) * static_cast<double>(u[i]);
+      }
+    }
     for (VoxelId v = row * kRow; v < (row + 1) * kRow; ++v) {
       if (!lattice_->filled(v)) continue;
       for (int d = 0; d < 3; ++d) {
@@ -394,7 +403,7 @@ bool SoftObject::settle(const ToolInBody& tool, double tolerance_N, int max_cycl
 }
 
 std::size_t SoftObject::memory_bytes() const {
-  std::size_t state = state_.role.resident_bytes() + state_.row_held.resident_bytes() +
+  std::size_t state = state_.bricks.memory_bytes() + state_.role.resident_bytes() + state_.row_held.resident_bytes() +
                       state_.row_obstacles.resident_bytes() + state_.rest.memory_bytes() +
                       carried_mark_.resident_bytes() + carried_index_.resident_bytes() +
                       pair_load_.resident_bytes() + row_moved_.resident_bytes();

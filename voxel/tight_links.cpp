@@ -99,7 +99,7 @@ void SoftObject::draw_along(int axis) noexcept {
       if (room() > kNearlyTight * spacing) return;
       glm::dvec3 rest = link_minimum(relaxation_.couplings(), state_, w);
       if (relaxation_.away())
-        rest += link_compliance(relaxation_.couplings(), w) * relaxation_.multigrid().balance_of(w);
+        rest += link_compliance(relaxation_.couplings(), w) * relaxation_.multigrid().balance_of(w, state_);
       const auto wanted = static_cast<float>(rest[axis]);
       const float before = u[w];
       u[w] = clamp_to(link_interval(*lattice_, state_, w, axis), wanted, before);

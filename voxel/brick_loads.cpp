@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "voxel/brick_loads.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace voxel {
+namespace {
+
+constexpr double kShare = 1.5;  // of what a cell's bricks are stiffer than its links by at most; below 2
+
+// The rows around one, each with a voxel more at both ends, one after the other: [z][y].
+constexpr std::size_t kStrideY = 40, kStrideZ = 3 * kStrideY, kOwn = kStrideZ + kStrideY + 1;
+using Around = std::array<float, 3 * kStrideZ>;
+
+RowId row_around(const Grid& grid, RowId row, std::size_t n) {
+  return row - grid.row_z - 1 + static_cast<RowId>(n / 3) * grid.row_z + static_cast<RowId>(n % 3);
+}
+
+}  // namespace
+
+BrickLoads::BrickLoads(const Lattice& lattice) : lattice_(lattice) {
+  if (!lattice.has_bricks()) return;
+  double ratio = 0.0;
+  for (const LinkMaterial& m : lattice.materials()) {
+    kind_.emplace_back();
+    if (!m.bricks) continue;
+    const BrickStiffness brick = brick_stiffness(m.young_Pa, m.poisson, lattice.spacing_m());
+    const BrickStiffness links = link_cell_stiffness(m.young_Pa, m.poisson, lattice.spacing_m());
+    const BrickStiffness beyond = difference(brick, links);
+    kind_.back() = std::make_unique<Kind>(Kind{node_stencil(beyond), in_floats(beyond)});
+    ratio = std::max(ratio, largest_ratio(brick, links));
+  }
+  share_ = static_cast<float>(std::min(1.0, kShare / ratio));
+  const std::size_t rows = lattice.grid().rows();
+  mark_ = LazyArray<std::uint8_t>(rows);
+  for (Rows* list : {&moved_, &due_, &again_}) list->row = LazyArray<RowId>(rows);
+}
+
+void BrickLoads::look_at_all_of(const BrickLoads& other) noexcept {
+  if (!any()) return;
+  for (RowId row = 0; row < other.mark_.size(); ++row) {
+    if ((other.mark_[row] & kEver) != 0) look_at(row);
+  }
+}
+
+// What is around rows that moved is due, and what was not right yet.
+bool BrickLoads::begin_round() noexcept {
+  if (moved_.count + again_.count == 0) return false;
+  due_.count = next_ = 0;
+  worst_N_ = 0.0F;
+  for (std::size_t n = 0; n < again_.count; ++n) {
+    mark_[again_.row[n]] &= static_cast<std::uint8_t>(~kAgain);
+    put(due_, again_.row[n], kDue);
+  }
+  again_.count = 0;
+  const Grid& grid = lattice_.grid();
+  for (std::size_t n = 0; n < moved_.count; ++n) {
+    const RowId row = moved_.row[n];
+    mark_[row] &= static_cast<std::uint8_t>(~kMoved);
+    for (std::size_t around = 0; around < 9; ++around) {
+      const RowId beside = row_around(grid, row, around);
+      for (const RowId r : {beside - grid.row_x, beside, beside + grid.row_x}) {
+        if ((mark_[r] & kDue) == 0 && lattice_.filled_in(r) != 0) put(due_, r, kDue);
+      }
+    }
+  }
+  moved_.count = 0;
+  return due_.count > 0;
+}
+
+bool BrickLoads::renew_row(RowId row, Displacement& state) noexcept {
+  std::array<Lanes, 3> wanted;
+  if (!loads_of(row, state, wanted)) return false;
+  float worst = 0.0F;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const float* known = state.bricks.load[axis].data() + static_cast<std::size_t>(row) * kRow;
+    for (std::size_t i = 0; i < kRow; ++i) worst = std::max(worst, std::fabs(wanted[axis][i] - known[i]));
+  }
+  worst_N_ = std::max(worst_N_, worst);
+  if (worst <= least_N_) return false;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    float* known = state.bricks.load[axis].data() + static_cast<std::size_t>(row) * kRow;
+    for (std::size_t i = 0; i < kRow; ++i) known[i] += share_ * (wanted[axis][i] - known[i]);
+  }
+  state.bricks.row[row] = 1;
+  mark_[row] |= kChanged;
+  if ((mark_[row] & kAgain) == 0) put(again_, row, kAgain);
+  return true;
+}
+
+bool BrickLoads::loads_of(RowId row, const Displacement& state, std::array<Lanes, 3>& out) const noexcept {
+  if (kind_.empty()) return false;
+  const Grid& grid = lattice_.grid();
+  const std::uint8_t label = lattice_.inside(row);
+  const Kind* inside = label == 0 ? nullptr : kind_[lattice_.material(row * kRow)].get();
+  if (label != 0 && inside == nullptr) return false;
+  std::array<Around, 3> around;
+  NodeField field{{}, kStrideY, kStrideZ};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const float* u = state.u[axis].data();
+    for (std::size_t n = 0; n < 9; ++n) {
+      const VoxelId first = row_around(grid, row, n) * kRow;
+      float* to = around[axis].data() + n / 3 * kStrideZ + n % 3 * kStrideY;
+      to[0] = u[grid.down(first, 0)];
+      std::copy_n(u + first, kRow, to + 1);
+      to[kRow + 1] = u[grid.up(first + kRow - 1, 0)];
+      std::fill(to + kRow + 2, to + kStrideY, 0.0F);
+    }
+    field.u[axis] = around[axis].data();
+  }
+  if (inside != nullptr) {
+    row_forces(inside->inside, field, kOwn, kRow, {out[0].data(), out[1].data(), out[2].data()});
+  } else {
+    mixed_loads(row, field, out);
+  }
+  return true;
+}
+
+void BrickLoads::mixed_loads(RowId row, const NodeField& field, std::array<Lanes, 3>& out) const noexcept {
+  const Grid& grid = lattice_.grid();
+  std::array<Materials, 9> material;
+  for (std::size_t n = 0; n < 9; ++n) {
+    const VoxelId first = row_around(grid, row, n) * kRow;
+    material[n][0] = lattice_.material(grid.down(first, 0));
+    for (VoxelId i = 0; i < kRow; ++i) material[n][i + 1] = lattice_.material(first + i);
+    material[n][kRow + 1] = lattice_.material(grid.up(first + kRow - 1, 0));
+  }
+  // The softest voxel of the cells between slices x and x + 1, by whether they are above in y and in z; 0
+  // where a voxel is missing.
+  const auto cells_at = [&](std::size_t x) {
+    std::array<std::uint8_t, 4> softest{};
+    for (std::size_t cell = 0; cell < 4; ++cell) {
+      const std::size_t low = (cell & 1) + 3 * (cell >> 1);
+      std::uint8_t found = material[low][x];
+      for (const std::size_t n : {low, low + 1, low + 3, low + 4}) {
+        for (const std::size_t at : {x, x + 1})
+          found = found == 0 || material[n][at] == 0 ? std::uint8_t{0} : softer(found, material[n][at]);
+      }
+      softest[cell] = found;
+    }
+    return softest;
+  };
+  std::array<std::uint8_t, 4> before = cells_at(0);
+  for (std::size_t i = 0; i < kRow; ++i) {
+    const std::array<std::uint8_t, 4> after = cells_at(i + 1);
+    std::array<const BrickFloats*, 8> bricks{};
+    bool any = false;
+    for (std::size_t octant = 0; octant < 8; ++octant) {
+      const std::uint8_t m = ((octant & 1) != 0 ? after : before)[octant >> 1];
+      if (m == 0 || kind_[m] == nullptr) continue;
+      bricks[octant] = &kind_[m]->brick;
+      any = true;
+    }
+    const std::array<float, 3> load = any ? node_force(bricks, field, kOwn + i) : std::array<float, 3>{};
+    for (std::size_t axis = 0; axis < 3; ++axis) out[axis][i] = load[axis];
+    before = after;
+  }
+}
+
+std::size_t BrickLoads::memory_bytes() const {
+  return mark_.resident_bytes() + moved_.row.resident_bytes() + due_.row.resident_bytes() +
+         again_.row.resident_bytes() + kind_.size() * sizeof(Kind);
+}
+
+}  // namespace voxel
