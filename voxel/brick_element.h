@@ -30,9 +30,10 @@ struct BrickStiffness {
 // Throws std::invalid_argument in words: modulus or spacing not positive and finite, ν outside 0 <= ν < 0.5.
 [[nodiscard]] BrickStiffness brick_stiffness(double young_Pa, double poisson, const glm::dvec3& spacing_m);
 
-// The quarters of links that a cell of eight voxels has in the six-link energy (voxel/link_weight.h), as such a
-// stiffness. Throws as brick_stiffness().
-[[nodiscard]] BrickStiffness link_cell_stiffness(double young_Pa, double poisson, const glm::dvec3& spacing_m);
+// The quarters of links that a cell of eight voxels has in the six-link energy (voxel/link_weight.h), as such
+// a stiffness. Throws as brick_stiffness().
+[[nodiscard]] BrickStiffness link_cell_stiffness(double young_Pa, double poisson,
+                                                 const glm::dvec3& spacing_m);
 [[nodiscard]] BrickStiffness difference(const BrickStiffness& a, const BrickStiffness& b);
 // The most that the energy of `brick` is of that of `links`, in any deformation: the largest λ of
 // K_brick x = λ K_links x.

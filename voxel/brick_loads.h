@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The accurate energy in a lattice whose solver knows links: what its bricks (voxel/brick_element.h) pull at a
-// voxel beyond what the links of their cells do, as a load on that voxel.
+// The accurate energy in a lattice whose solver knows links: what its bricks (voxel/brick_element.h) pull at
+// a voxel beyond what the links of their cells do, as a load on that voxel.
 //
-// Deferred correction (Stetter 1978; Trottenberg, Oosterlee & Schüller, Multigrid, section 5.4): with the load
-// kept, links come to rest by everything that knows links - contact, limits, coarse levels -, then the load is
-// found anew where they are, u ← u − ω·K_links⁻¹·K_bricks·u. It ends where the bricks are at rest, whatever
-// the links are. A cell's bricks are at most `largest_ratio` times as stiff as its links, so ω of 1.5 of its
-// inverse goes there without swinging. (Rejected: a smoother and coarse levels of bricks, 27 blocks of 3×3 a
-// voxel in every pass, ten times the work in the tick, and limits per axis no longer limits of one unknown.)
+// Deferred correction (Stetter 1978; Trottenberg, Oosterlee & Schüller, Multigrid, section 5.4): with the
+// load kept, links come to rest by everything that knows links - contact, limits, coarse levels -, then the
+// load is found anew where they are, u ← u − ω·K_links⁻¹·K_bricks·u. It ends where the bricks are at rest,
+// whatever the links are. A cell's bricks are at most `largest_ratio` times as stiff as its links, so ω
+// of 1.5 of its inverse goes there without swinging. (Rejected: a smoother and coarse levels of bricks, 27
+// blocks of 3×3 a voxel in every pass, ten times the work in the tick, and limits per axis no longer limits
+// of one unknown.)
 //
 // So a tick feels links at once, within some tenths right, and the rest of the way as results come.
 #pragma once
@@ -42,8 +43,8 @@ class BrickLoads {
   }
   // Every row that `other` ever looked at.
   void look_at_all_of(const BrickLoads& other) noexcept;
-  // Renews the loads of at most so many rows, of each of which voxels moved once, `changed(row)` for each that
-  // changed. Returns how many it looked at.
+  // Renews the loads of at most so many rows, of each of which voxels moved once, `changed(row)` for each
+  // that changed. Returns how many it looked at.
   template <class Changed>
   std::size_t renew(Displacement& state, std::size_t most_rows, const Changed& changed) noexcept {
     if (!any() || (next_ == due_.count && !begin_round())) return 0;
@@ -63,7 +64,9 @@ class BrickLoads {
     return changed;
   }
   // All loads are what they should be, but for `least`.
-  [[nodiscard]] bool done() const { return !any() || (moved_.count + again_.count == 0 && next_ == due_.count); }
+  [[nodiscard]] bool done() const {
+    return !any() || (moved_.count + again_.count == 0 && next_ == due_.count);
+  }
   // How wrong the worst was when it was last looked at (N).
   [[nodiscard]] float left_N() const { return left_N_; }
 

@@ -25,7 +25,8 @@ void check_material(std::size_t label, const LinkMaterial& m) {
   if (!(m.stretch_max >= 1.0 && std::isfinite(m.stretch_max))) say("a greatest stretch below 1");
   if (!(m.shear >= 0.0 && std::isfinite(m.shear))) say("a negative shear limit");
   if (m.bricks && m.poisson > kMostPoissonOfBricks)
-    say("the trilinear energy and a Poisson's ratio above 0.49, which takes too long to come to rest; give 0.49 "
+    say("the trilinear energy and a Poisson's ratio above 0.49, which takes too long to come to rest; give "
+        "0.49 "
         "or less");
   if (!(m.yield > 0.0)) say("a yield strain that is not positive; leave it out where nothing yields");
 }

@@ -29,8 +29,7 @@ float hold_of(float n, float size) {
 
 }  // namespace
 
-Multigrid::Multigrid(const Lattice& lattice)
-    : lattice_(lattice), tiles_(lattice.grid()), bricks_(lattice) {
+Multigrid::Multigrid(const Lattice& lattice) : lattice_(lattice), tiles_(lattice.grid()), bricks_(lattice) {
   for (AxisLimits& axis : yield_limits_) {
     for (std::size_t d = 0; d < 3; ++d) {
       axis.high[d] = lattice.first_yield_m(static_cast<int>(d));

@@ -219,8 +219,8 @@ class Multigrid {
   std::vector<StoppedCell> stopped_;
   // [axis][voxel] its own load and what balances it (N), in rows where something does
   std::array<LazyArray<float>, 3> balance_;
-  LazyArray<std::uint8_t> row_balanced_;     // [row] 1: it has
-  std::vector<RowId> balanced_;              // these
+  LazyArray<std::uint8_t> row_balanced_;  // [row] 1: it has
+  std::vector<RowId> balanced_;           // these
   std::array<AxisLimits, 3> yield_limits_;
   float tolerance_N_ = 0.0F, quiet_m_ = 0.0F, hold_ = 1.0F;
 };

@@ -26,8 +26,7 @@ LevelRow Multigrid::row_of(int level, RowId row, Displacement& state) noexcept {
     const bool balanced = row_balanced_.size() > 0 && row_balanced_[row] != 0;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       r.u[axis] = state.u[axis].data() + begin;
-      r.load[axis] =
-          balanced ? balance_[axis].data() + begin : state.load_of(row, static_cast<int>(axis));
+      r.load[axis] = balanced ? balance_[axis].data() + begin : state.load_of(row, static_cast<int>(axis));
     }
     if (state.row_held[row] != 0) r.held = state.role.data() + begin;
     return r;

@@ -30,7 +30,7 @@ constexpr int kContactMargin = 3;  // cells round the contact that are smoothed,
 constexpr std::uint64_t kBesideContact = 2;  // this part of the budget is left beside cycles round a contact
 // Loads of bricks: what a row of them takes, in voxel updates, and what part of a budget they may have.
 constexpr std::uint64_t kBrickUpdates = 4 * kRow, kBrickShare = 4;
-constexpr int kTileMargin = 3;               // … round a tile, from level 1 on
+constexpr int kTileMargin = 3;     // … round a tile, from level 1 on
 constexpr int kLooksAtOnce = 256;  // tiles looked at for what coarse levels have to tell them, a call
 
 }  // namespace
@@ -253,8 +253,8 @@ void Relaxation::end_round(Displacement& state, double residual_N) noexcept {
     cycles_without_gain_ = 0;
   }
   ++cycles_without_gain_;
-  const bool at_rest = (residual_N_ < tolerance_N_ && multigrid_.bricks().done()) ||
-                       cycles_without_gain_ > kPatience;
+  const bool at_rest =
+      (residual_N_ < tolerance_N_ && multigrid_.bricks().done()) || cycles_without_gain_ > kPatience;
   if (!at_rest) return;
   // What yielded is kept at rest, and then there is a new rest to be found.
   if (unkept_) {

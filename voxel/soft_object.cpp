@@ -18,7 +18,8 @@ constexpr double kContraction = 0.5;  // of that, by a cycle round the contact
 // Cycles round the contact a tick: of a ball pressed at 0.2 m/s into 24,000 voxels one leaves 1.1, two 0.55,
 // three 0.46 just noticeable differences of the force.
 constexpr int kMostCycles = 2;
-constexpr int kProjections = 3;    // of a pressed voxel onto the tool, in search of its least energy
+constexpr int kProjections = 3;  // of a pressed voxel onto the tool, in search of its least energy
+constexpr double kSlides = 0.1;  // sin² between tool and obstacle; where they meet nearly flat it is squeezed
 constexpr double kGiveWay = 0.01;  // of the voxel radius: less is left to the next push
 constexpr double kDeep = 0.05;     // of the voxel radius: less is an error of a tick, and is mended
 
@@ -207,7 +208,20 @@ glm::dvec3 SoftObject::place_of(const ToolInBody& tool, Touch& t) noexcept {
     const Obstacle& o = obstacles_[lattice_->surface_number(t.v)];
     const glm::dvec3 n(o.normal);
     const double depth = static_cast<double>(o.bound) - glm::dot(n, wanted);
-    if (depth > 0.0 && o.normal != glm::vec3(0.0F)) wanted += depth * n;
+    if (depth > 0.0 && o.normal != glm::vec3(0.0F)) {
+      wanted += depth * n;
+      // Where that takes it into the tool it slides along the obstacle, out of its way. (Left there, the tool
+      // had to give way to tissue that bulged against the side of a bone: by 0.08 N of 1.1, in three ticks of
+      // four.)
+      for (int k = 0; k < kProjections; ++k) {
+        g = gap(tool, rest + wanted);
+        const glm::dvec3 slide = g.normal - glm::dot(g.normal, n) * n;
+        if (g.distance >= 0.0 || g.distance < -voxel_radius() || glm::dot(slide, slide) < kSlides) break;
+        wanted -= g.distance / glm::dot(slide, slide) * slide;
+        t.pressed = true;
+        t.normal = g.normal;
+      }
+    }
   }
   return clamp_to_links(*lattice_, state_, t.v, wanted);
 }
@@ -403,10 +417,10 @@ bool SoftObject::settle(const ToolInBody& tool, double tolerance_N, int max_cycl
 }
 
 std::size_t SoftObject::memory_bytes() const {
-  std::size_t state = state_.bricks.memory_bytes() + state_.role.resident_bytes() + state_.row_held.resident_bytes() +
-                      state_.row_obstacles.resident_bytes() + state_.rest.memory_bytes() +
-                      carried_mark_.resident_bytes() + carried_index_.resident_bytes() +
-                      pair_load_.resident_bytes() + row_moved_.resident_bytes();
+  std::size_t state =
+      state_.bricks.memory_bytes() + state_.role.resident_bytes() + state_.row_held.resident_bytes() +
+      state_.row_obstacles.resident_bytes() + state_.rest.memory_bytes() + carried_mark_.resident_bytes() +
+      carried_index_.resident_bytes() + pair_load_.resident_bytes() + row_moved_.resident_bytes();
   for (const auto& axis : state_.u) state += axis.resident_bytes();
   return lattice_->memory_bytes() + state + chain_.memory_bytes() + relaxation_.memory_bytes() +
          obstacles_.size() * sizeof(Obstacle) + pair_held_.size();
