@@ -5,10 +5,10 @@
 // Deferred correction (Stetter 1978; Trottenberg, Oosterlee & Schüller, Multigrid, section 5.4): with the
 // load kept, links come to rest by everything that knows links - contact, limits, coarse levels -, then the
 // load is found anew where they are, u ← u − ω·K_links⁻¹·K_bricks·u. It ends where the bricks are at rest,
-// whatever the links are. A cell's bricks are at most `largest_ratio` times as stiff as its links, so ω
-// of 1.5 of its inverse goes there without swinging. (Rejected: a smoother and coarse levels of bricks, 27
-// blocks of 3×3 a voxel in every pass, ten times the work in the tick, and limits per axis no longer limits
-// of one unknown.)
+// whatever the links are. A cell's bricks are at most `largest_ratio` times as stiff as its links, which says
+// how large ω may be; a part of each step is carried on to the next (without, a tool held in layers of ν 0.45
+// came to rest three times as slowly). (Rejected: a smoother and coarse levels of bricks, 27 blocks of 3×3 a
+// voxel in every pass, ten times the work in the tick, and limits per axis no longer limits of one unknown.)
 //
 // So a tick feels links at once, within some tenths right, and the rest of the way as results come.
 #pragma once
@@ -54,7 +54,7 @@ class BrickLoads {
       mark_[row] &= static_cast<std::uint8_t>(~kDue);
       if (renew_row(row, state)) changed(row);
     }
-    if (next_ == due_.count) left_N_ = worst_N_;
+    if (next_ == due_.count) end_round();
     return count;
   }
   // Whether its loads changed since this was last asked.
@@ -63,11 +63,9 @@ class BrickLoads {
     if (changed) mark_[row] &= static_cast<std::uint8_t>(~kChanged);
     return changed;
   }
-  // All loads are what they should be, but for `least`.
-  [[nodiscard]] bool done() const {
-    return !any() || (moved_.count + again_.count == 0 && next_ == due_.count);
-  }
-  // How wrong the worst was when it was last looked at (N).
+  // All that was due when the last round began was looked at.
+  [[nodiscard]] bool round_ended() const { return next_ == due_.count; }
+  // How wrong the worst was when the last whole round looked at it (N).
   [[nodiscard]] float left_N() const { return left_N_; }
 
   // What bricks pull the voxels of a row with beyond what the links of their cells do, where those are now
@@ -86,7 +84,7 @@ class BrickLoads {
     LazyArray<RowId> row;
     std::size_t count = 0;
   };
-  static constexpr std::uint8_t kMoved = 1, kDue = 2, kAgain = 4, kEver = 8, kChanged = 16;
+  static constexpr std::uint8_t kMoved = 1, kDue = 2, kAgain = 4, kEver = 8, kChanged = 16, kStepped = 32;
   using Materials = std::array<std::uint8_t, kRow + 2>;  // of a row, and the voxels beyond its ends
 
   void put(Rows& rows, RowId row, std::uint8_t mark) noexcept {
@@ -94,6 +92,7 @@ class BrickLoads {
     rows.row[rows.count++] = row;
   }
   bool begin_round() noexcept;
+  void end_round() noexcept;
   bool renew_row(RowId row, Displacement& state) noexcept;
   [[nodiscard]] std::uint8_t softer(std::uint8_t a, std::uint8_t b) const noexcept {
     return lattice_.materials()[b].young_Pa < lattice_.materials()[a].young_Pa ? b : a;
@@ -103,7 +102,12 @@ class BrickLoads {
   const Lattice& lattice_;
   std::vector<std::unique_ptr<Kind>> kind_;  // [material], null where that is of links
   float share_ = 0.0F;                       // ω; 0: nothing to renew
+  float carry_on_ = 0.0F;                    // of the last step
+  std::array<LazyArray<float>, 3> step_;     // [axis][v] that (N)
   float least_N_ = 0.0F, left_N_ = 0.0F, worst_N_ = 0.0F;
+  float calm_ = 1.0F;             // of the share: less where rounds do not gain
+  float least_left_N_ = 0.0F;     // since the contact was last somewhere else
+  int without_gain_ = 0;          // rounds
   LazyArray<std::uint8_t> mark_;  // [row]
   Rows moved_, due_, again_;      // again_: still wrong when they were looked at in this round
   std::size_t next_ = 0;          // of due_

@@ -122,6 +122,16 @@ bool blocked(const ObstacleView& view, const Displacement& state, VoxelId v, dou
   return glm::dot(glm::dvec3(o.normal), state.at(v)) < static_cast<double>(o.bound) + margin;
 }
 
+glm::dvec3 no_deeper(const Obstacle& o, const glm::dvec3& before, const glm::dvec3& after) noexcept {
+  const auto depth_of = [&](const glm::dvec3& u) {
+    return static_cast<double>(o.bound) - glm::dot(glm::dvec3(o.normal), u);
+  };
+  const double now = depth_of(before), then = depth_of(after);
+  if (then <= std::max(now, 0.0)) return after;
+  const double out = std::max(-now, 0.0);
+  return before + (after - before) * (out / (then + out));
+}
+
 void relax_obstacle(Couplings& couplings, Displacement& state, const ObstacleView& view, VoxelId v,
                     const glm::dvec3& load_N) noexcept {
   const Obstacle& o = view.of(v);
@@ -135,15 +145,7 @@ void relax_obstacle(Couplings& couplings, Displacement& state, const ObstacleVie
     const double denominator = glm::dot(n, w * n);
     if (denominator > 0.0) wanted += (depth / denominator) * w * n;
   }
-  glm::dvec3 allowed = clamp_to_links(couplings.lattice(), state, v, wanted);
-  // Each axis is held by its own links; what is left of the way may lead into the obstacle. Then only as far
-  // as that.
-  const double now = depth_of(before), then = depth_of(allowed);
-  if (then > std::max(now, 0.0)) {
-    const double out = std::max(-now, 0.0);
-    allowed = before + (allowed - before) * (out / (then + out));
-  }
-  state.set(v, allowed);
+  state.set(v, no_deeper(o, before, clamp_to_links(couplings.lattice(), state, v, wanted)));
 }
 
 }  // namespace voxel

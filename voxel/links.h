@@ -43,6 +43,9 @@ struct ObstacleView {
 double depth_in_obstacle(const ObstacleView& view, const Displacement& state, VoxelId v) noexcept;
 // Is a voxel whose role is obstacle within `margin` of it, or in it (unit: meter)?
 bool blocked(const ObstacleView& view, const Displacement& state, VoxelId v, double margin) noexcept;
+// The way of a voxel that must go no deeper into its obstacle than it was: as far as that, however links
+// clamped it (each axis is held by its own).
+glm::dvec3 no_deeper(const Obstacle& o, const glm::dvec3& before, const glm::dvec3& after) noexcept;
 // Takes a voxel whose role is obstacle where its links would have it, on this side of the obstacle. One that
 // is in it comes out as far as its links allow, and no deeper.
 void relax_obstacle(Couplings& couplings, Displacement& state, const ObstacleView& view, VoxelId v,

@@ -254,7 +254,7 @@ void Relaxation::end_round(Displacement& state, double residual_N) noexcept {
   }
   ++cycles_without_gain_;
   const bool at_rest =
-      (residual_N_ < tolerance_N_ && multigrid_.bricks().done()) || cycles_without_gain_ > kPatience;
+      (residual_N_ < tolerance_N_ && multigrid_.bricks().round_ended()) || cycles_without_gain_ > kPatience;
   if (!at_rest) return;
   // What yielded is kept at rest, and then there is a new rest to be found.
   if (unkept_) {

@@ -204,26 +204,26 @@ glm::dvec3 SoftObject::place_of(const ToolInBody& tool, Touch& t) noexcept {
     if (g.distance < 0.0) wanted -= g.distance * g.normal;
     t.normal = g.normal;
   }
-  if (!obstacles_.empty()) {
-    const Obstacle& o = obstacles_[lattice_->surface_number(t.v)];
-    const glm::dvec3 n(o.normal);
-    const double depth = static_cast<double>(o.bound) - glm::dot(n, wanted);
-    if (depth > 0.0 && o.normal != glm::vec3(0.0F)) {
-      wanted += depth * n;
-      // Where that takes it into the tool it slides along the obstacle, out of its way. (Left there, the tool
-      // had to give way to tissue that bulged against the side of a bone: by 0.08 N of 1.1, in three ticks of
-      // four.)
-      for (int k = 0; k < kProjections; ++k) {
-        g = gap(tool, rest + wanted);
-        const glm::dvec3 slide = g.normal - glm::dot(g.normal, n) * n;
-        if (g.distance >= 0.0 || g.distance < -voxel_radius() || glm::dot(slide, slide) < kSlides) break;
-        wanted -= g.distance / glm::dot(slide, slide) * slide;
-        t.pressed = true;
-        t.normal = g.normal;
-      }
+  if (obstacles_.empty()) return clamp_to_links(*lattice_, state_, t.v, wanted);
+  const Obstacle& o = obstacles_[lattice_->surface_number(t.v)];
+  const glm::dvec3 n(o.normal);
+  const double depth = static_cast<double>(o.bound) - glm::dot(n, wanted);
+  if (depth > 0.0 && n != glm::dvec3(0.0)) {
+    wanted += depth * n;
+    // Where that takes it into the tool it slides along the obstacle, out of its way. (Left there, the tool
+    // had to give way to tissue that bulged against the side of a bone: by 0.08 N of 1.1, in three ticks of
+    // four.)
+    for (int k = 0; k < kProjections; ++k) {
+      g = gap(tool, rest + wanted);
+      const glm::dvec3 slide = g.normal - glm::dot(g.normal, n) * n;
+      if (g.distance >= 0.0 || g.distance < -voxel_radius() || glm::dot(slide, slide) < kSlides) break;
+      wanted -= g.distance / glm::dot(slide, slide) * slide;
+      t.pressed = true;
+      t.normal = g.normal;
     }
   }
-  return clamp_to_links(*lattice_, state_, t.v, wanted);
+  const glm::dvec3 place = clamp_to_links(*lattice_, state_, t.v, wanted);
+  return n == glm::dvec3(0.0) ? place : no_deeper(o, state_.at(t.v), place);
 }
 
 void SoftObject::relax_touch(const ToolInBody& tool, Touch& t) noexcept {

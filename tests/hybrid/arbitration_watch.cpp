@@ -15,6 +15,7 @@
 #include "hybrid/build.h"
 #include "hybrid/recording.h"
 #include "hybrid/session.h"
+#include "voxel/brick_loads.h"
 
 namespace tests {
 namespace {
@@ -265,10 +266,18 @@ std::vector<Bearing> bearings(const hybrid::World& world, const hybrid::WorldSta
     const hybrid::SoftBody& body = world.soft[o];
     const double touching = kTouching * lattice.min_spacing_m();
     bearing.tight = tight_links(object);
+    // Found anew, and not as the object knows them.
+    const voxel::BrickLoads bricks(lattice);
+    std::array<voxel::Lanes, 3> loads{};
     for (std::size_t i = 0; i < lattice.size(); ++i) {
       const auto v = static_cast<voxel::VoxelId>(i);
+      const std::size_t lane = i % voxel::kRow;
+      if (lane == 0 && (lattice.filled_in(v / voxel::kRow) == 0 ||
+                        !bricks.loads_of(v / voxel::kRow, object.state(), loads)))
+        loads = {};
       if (!lattice.filled(v)) continue;
-      dvec3 force = body.pose.rotation * pull_of_links(object, v);
+      dvec3 force = body.pose.rotation *
+                    (pull_of_links(object, v) + dvec3(loads[0][lane], loads[1][lane], loads[2][lane]));
       if (lattice.anchored(v)) {
         bearing.anchors_N += force;
         continue;

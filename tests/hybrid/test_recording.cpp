@@ -91,7 +91,8 @@ TEST_P(ShippedScene, RunSavedLoadedAndReplayedIsTheSameToTheBit) {
 }
 INSTANTIATE_TEST_SUITE_P(Replays, ShippedScene,
                          ::testing::Values("cube", "sheet", "two-soft", "head", "thin-sheet",
-                                           "textured-plate", "moving", "pushed-tissue", "dropped-weight"),
+                                           "textured-plate", "moving", "pushed-tissue", "dropped-weight",
+                                           "layers"),
                          [](const auto& scene) {
                            std::string name = scene.param;
                            std::replace(name.begin(), name.end(), '-', '_');

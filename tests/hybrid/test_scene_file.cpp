@@ -191,7 +191,7 @@ TEST_F(SceneFile, SoftSources) {
       "[[soft]]\nname = \"l\"\nvolume = \"head.nii\"\nlabels = [7, 4]\n"
       "[[soft]]\nname = \"all\"\nvolume = \"head.nii\"\nmaterials = { \"200\" = \"b\" }\n"
       "[[soft]]\nname = \"m\"\nmesh = \"bone.ply\"\nspacing = 2\n"
-      "[[soft]]\nname = \"f\"\nformula = \"ball\"\nsize = 30\nspacing = 1\nenergy = \"six-link\"\n"
+      "[[soft]]\nname = \"f\"\nformula = \"ball\"\nsize = 30\nspacing = 1\nenergy = \"trilinear\"\n"
       "inclusions = [{ shape = \"box\", centre = [1, 2, 3], size = [4, 5, 6], label = 3 }]\n"
       "[[soft]]\nname = \"g\"\nformula = \"block\"\nsize = 30\nspacing = 1\nlabel = 5\n"
       "layers = [{ thickness = 10, label = 2 }]\n" +
@@ -216,6 +216,8 @@ TEST_F(SceneFile, SoftSources) {
   EXPECT_EQ(formula.shape, voxel::Formula::Shape::ball);
   expect_near(formula.inclusions.at(0).centre_m, glm::dvec3(1e-3, 2e-3, 3e-3));
   EXPECT_EQ(formula.inclusions[0].label, 3);
+  EXPECT_EQ(scene.soft[4].energy, hybrid::Energy::trilinear);
+  EXPECT_EQ(scene.soft[5].energy, hybrid::Energy::six_link);
   const auto& layered = std::get<voxel::Formula>(scene.soft[5].source);
   expect_near(layered.size_m, glm::dvec3(0.03));
   EXPECT_EQ(layered.label, 5);

@@ -122,6 +122,7 @@ const Broken broken[] = {
     {"texture-too-steep", "9:1", "more than half", "flatter"},
     {"texture-kind-unknown", "6:56", "unknown", "height, shading"},
     {"texture-key-unknown", "6:42", "'heigth'", "'height'"},
+    {"yield-of-bricks", "5:1", "both a yield", "take one"},
     {"later-energy", "7:1", "not supported yet", "trilinear"},
     {"later-device", "3:1", "not supported yet", "ideal"},
     {"device-scale-simulated", "4:1", "no meaning with a simulated model", "remove it"},

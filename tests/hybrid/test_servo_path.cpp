@@ -239,7 +239,7 @@ INSTANTIATE_TEST_SUITE_P(ShippedScenes, ServoPathOf,
                                            "head.toml", "thin-sheet.toml", "convex-edge.toml",
                                            "textured-plate.toml", "moving.toml", "wall.toml", "tissue.toml",
                                            "edge-of-bone.toml", "tissue-on-bone.toml", "cleft.toml",
-                                           "pushed-tissue.toml", "dropped-weight.toml"),
+                                           "pushed-tissue.toml", "dropped-weight.toml", "layers.toml"),
                          [](const auto& scene) {
                            std::string name = scene.param;
                            name.resize(name.find('.'));
@@ -254,7 +254,7 @@ TEST(ServoPath, KnowsEveryShippedScene) {
        std::filesystem::directory_iterator(std::filesystem::path(HYBRID_SOURCE_DIR) / "scenes")) {
     scenes += entry.path().extension() == ".toml" ? 1 : 0;
   }
-  EXPECT_EQ(scenes, 16U) << "add the new scene to the list above";
+  EXPECT_EQ(scenes, 17U) << "add the new scene to the list above";
 }
 
 }  // namespace
