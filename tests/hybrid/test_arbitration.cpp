@@ -331,4 +331,9 @@ std::vector<Scenario> in_all_ways() {
 INSTANTIATE_TEST_SUITE_P(Rules, Arbitration, ::testing::ValuesIn(in_all_ways()),
                          [](const auto& s) { return full_name(s.param); });
 
+// The loads of bricks go from thread to thread with the ways, and on record.
+TEST(Bricks, ARecordedSessionReplaysToTheBit) {
+  tests::expect_replays(tests::source_folder / "scenes" / "layers.toml", 2.0);
+}
+
 }  // namespace
