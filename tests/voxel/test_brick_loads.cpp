@@ -346,6 +346,44 @@ TEST(BrickLoads, LeavesNothingBehind) {
   EXPECT_LT(most, 1e-3 * 1.5e-3);
 }
 
+// In units of Young's modulus and the spacing a force is the same number, from a soft micrometer to a hard
+// ten meters.
+TEST(BrickLoads, UnitsDoNotMatter) {
+  double expected = 0.0;
+  for (const double h : {1e-3, 1e-6, 10.0}) {
+    for (const double young : {1e4, 1.0, 1e12}) {
+      tests::SoftBlock block({17, 17, 9}, h, bricks_of(young, 0.3));
+      const double force =
+          block.press(block.ball(3 * h, 0.7 * h), 5 * h, 1e-5, 1000).force_N.z / (young * h * h);
+      ASSERT_TRUE(std::isfinite(force)) << h << ' ' << young;
+      if (expected == 0.0) expected = force;
+      EXPECT_NEAR(force, expected, 1e-3 * expected) << h << ' ' << young;
+    }
+  }
+  EXPECT_GT(expected, 0.1);
+}
+
+// Sheets and rows of single voxels have no brick, and tissue without slack has bricks that never deform.
+TEST(BrickLoads, WhatIsThinOrTightIsFiniteAndComesToRest) {
+  for (const std::array<int, 3>& dims : {std::array{17, 17, 2}, std::array{9, 2, 12}, std::array{2, 2, 2}}) {
+    for (const bool tight : {false, true}) {
+      voxel::LinkMaterial material = bricks_of(1e4, 0.45);
+      if (tight) {
+        material.stretch_min = material.stretch_max = 1.0;
+        material.shear = 0.0;
+      }
+      tests::SoftBlock block(dims, 1e-3, material);
+      const voxel::Reaction felt = block.press(block.ball(3e-3, 0.3e-3), 5e-3, 1e-5, 1000);
+      EXPECT_TRUE(std::isfinite(glm::length(felt.force_N))) << dims[0] << ' ' << tight;
+      for (const voxel::VoxelId v : block.lattice->surface())
+        ASSERT_LT(glm::length(block.object->state().at(v)), 1e-2) << dims[0] << ' ' << tight;
+      block.object->touch({});
+      for (int n = 0; n < 2000 && !block.object->asleep(); ++n) block.object->relax_cycle();
+      EXPECT_TRUE(block.object->asleep()) << dims[0] << ' ' << tight;
+    }
+  }
+}
+
 TEST(BrickLoads, RefusesWhatWouldNotComeToRest) {
   const voxel::LabelVolume volume = tests::block({4, 4, 4}, glm::dvec3(1e-3));
   EXPECT_THROW(voxel::Lattice(volume, tests::made_of(bricks_of(1e4, 0.495))), std::invalid_argument);
