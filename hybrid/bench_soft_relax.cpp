@@ -12,6 +12,7 @@
 #include "hybrid/bench_timer.h"
 #include "hybrid/session.h"
 #include "voxel/classic.h"
+#include "voxel/replica.h"
 #include "voxel/soft_object.h"
 
 namespace hybrid::bench {
@@ -24,6 +25,8 @@ constexpr double kConverged = 0.01;
 constexpr double kFloor_N = 0.04;    // of a JND: the least friction of a device
 constexpr double kAsked_us = 100e3;  // when the force error is stated
 constexpr int kMostRounds = 4000;
+constexpr double kCalm = 1e-4;                // of the force: it changes by less than this …
+constexpr int kCalmRounds = 30;               // … for so many rounds: there is nothing more to see
 constexpr double kReferenceTolerance = 1e-6;  // of the lattice's force scale
 constexpr int kReferenceCycles = 400;
 
@@ -33,13 +36,14 @@ struct Limits {
   voxel::LinkMaterial top, base;  // the upper 40 % and the rest
 };
 
-const std::array<Limits, 3>& all_limits() {
-  constexpr voxel::LinkMaterial tissue{};
+const std::array<Limits, 5>& all_limits() {
+  constexpr voxel::LinkMaterial tissue{}, bricks{.bricks = true}, full{.poisson = 0.45, .bricks = true};
   constexpr voxel::LinkMaterial loose{.stretch_min = 0.05, .stretch_max = 10.0, .shear = 10.0};
   constexpr voxel::LinkMaterial tight{.stretch_min = 1.0, .stretch_max = 1.0, .shear = 0.0};
-  static const std::array<Limits, 3> kLimits{Limits{"limits", 0.6, tissue, tissue},
-                                             Limits{"no limits", 0.95, loose, loose},
-                                             Limits{"slack 0", 0.0, tight, tissue}};
+  static const std::array<Limits, 5> kLimits{
+      Limits{"limits", 0.6, tissue, tissue}, Limits{"no limits", 0.95, loose, loose},
+      Limits{"slack 0", 0.0, tight, tissue}, Limits{"trilinear", 0.6, bricks, bricks},
+      Limits{"trilinear, 0.45", 0.6, full, full}};
   return kLimits;
 }
 
@@ -64,15 +68,20 @@ class Pressed {
     constexpr int steps = 40;
     for (int n = 1; n <= steps; ++n) {
       tool_.centre = {middle, middle, from - kDepth * kSpacing * n / steps};
-      near_.clear();
-      for (const voxel::VoxelId v : object_->lattice().surface()) {
-        if (glm::distance(object_->position(v), tool_.centre) < object_->reach(tool_.radius) + kSpacing)
-          near_.push_back(v);
-      }
-      object_->touch(near_);
+      touch();
       if (n > 1) object_->follow({0.0, 0.0, -kDepth * kSpacing / steps});
       object_->push_out(tool_);
     }
+  }
+
+  // As a tick begins.
+  void touch() {
+    near_.clear();
+    for (const voxel::VoxelId v : object_->lattice().surface()) {
+      if (glm::distance(object_->position(v), tool_.centre) < object_->reach(tool_.radius) + kSpacing)
+        near_.push_back(v);
+    }
+    object_->touch(near_);
   }
 
   [[nodiscard]] voxel::SoftObject& object() { return *object_; }
@@ -85,7 +94,8 @@ class Pressed {
   std::vector<voxel::VoxelId> near_;
 };
 
-// What the tick does with an object that stays pressed, round after round, until nothing is left to do.
+// What the tick does with an object that stays pressed, and the thread that relaxes it, in turns on one core,
+// until nothing is left to do.
 SoftRow relax_row(int edge, const Limits& limits) {
   const TickTimer timer;
   Pressed pressed(edge, limits);
@@ -96,18 +106,31 @@ SoftRow relax_row(int edge, const Limits& limits) {
   std::vector<Moment> moments;
   std::uint64_t updates = 0;
   double us = 0.0, background_us = 0.0;
-  const std::uint64_t budget = object.lattice().voxel_count();
-  for (int n = 0; n < kMostRounds && (n == 0 || !object.asleep()) && us < 60e6; ++n) {
+  voxel::Replica replica(object);
+  int calm = 0;
+  for (int n = 0;
+       n < kMostRounds && (n == 0 || voxel::Replica::wanted(object)) && us < 60e6 && calm < kCalmRounds;
+       ++n) {
+    pressed.touch();
     const std::uint64_t before = TickTimer::begin();
+    object.push_out(pressed.tool());
     object.relax_near(pressed.tool(), kSweepsNear);
     const double force = pressed.force_N();
     const std::uint64_t between = TickTimer::begin();
-    updates += object.relax_background(budget);
+    if (voxel::Replica::wanted(object)) {
+      replica.give(object);
+      replica.relax();
+      replica.take(object);
+      replica.drain(object, object.lattice().grid().rows());
+      updates += replica.work() * voxel::kRow;
+    }
     const std::uint64_t after = TickTimer::end();
+    calm = !moments.empty() && std::fabs(force - moments.back().force_N) <= kCalm * force ? calm + 1 : 0;
     moments.push_back({us + timer.us(between - before), force});
     us += timer.us(after - before);
     background_us += timer.us(after - between);
   }
+  pressed.touch();
   object.settle(pressed.tool(), kReferenceTolerance * object.lattice().force_scale_N(), kReferenceCycles);
   const double reference = pressed.force_N();
   SoftRow row{.test_case = "relax",

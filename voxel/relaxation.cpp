@@ -29,7 +29,7 @@ constexpr int kNear = 2;           // rows that a cycle round a contact reads be
 constexpr int kContactMargin = 3;  // cells round the contact that are smoothed, on each level
 constexpr std::uint64_t kBesideContact = 2;  // this part of the budget is left beside cycles round a contact
 // Loads of bricks: what a row of them takes, in voxel updates, and what part of a budget they may have.
-constexpr std::uint64_t kBrickUpdates = 4 * kRow, kBrickShare = 4;
+constexpr std::uint64_t kBrickUpdates = 4 * kRow, kBrickShare = 2;
 constexpr int kTileMargin = 3;     // … round a tile, from level 1 on
 constexpr int kLooksAtOnce = 256;  // tiles looked at for what coarse levels have to tell them, a call
 
