@@ -233,6 +233,7 @@ void Multigrid::begin_anew() noexcept {
 
 void Multigrid::keep_log() {
   std::vector<std::size_t> rows;
+  rows.reserve(levels_.size());
   for (int l = 0; l < levels(); ++l) rows.push_back(grid(l).rows());
   log_.begin(rows);
   for (auto& axis : balance_) axis = LazyArray<float>(lattice_.size());

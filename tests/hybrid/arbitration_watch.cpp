@@ -208,7 +208,10 @@ FaceGrid grid_of(const hybrid::WorldState& state, const Face& face) {
 double in_front_of(const FaceGrid& grid, const Face& face, const dvec3& p) {
   const int x = grid.axes[0], y = grid.axes[1], z = face.axis;
   double least = std::numeric_limits<double>::infinity();
-  const auto index = [&](int i, int j) { return static_cast<std::size_t>(j * grid.count[0] + i); };
+  const auto index = [&](int i, int j) {
+    return static_cast<std::size_t>(j) * static_cast<std::size_t>(grid.count[0]) +
+           static_cast<std::size_t>(i);
+  };
   for (int j = 0; j + 1 < grid.count[1]; ++j) {
     for (int i = 0; i + 1 < grid.count[0]; ++i) {
       const std::array<std::size_t, 4> corner{index(i, j), index(i + 1, j), index(i + 1, j + 1),
