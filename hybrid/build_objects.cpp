@@ -22,8 +22,8 @@ namespace {
 
 constexpr int kBallSubdivisions = 4;  // 5,120 triangles: for drawing and the map only, contact is exact
 // Measured, 160³ voxels (of one label 57 bytes, four labels in layers 92, mixed voxel by voxel 175, with
-// yield 224).
-constexpr double kTouchedBytes = 60.0, kTouchedMixedBytes = 180.0, kYieldBytes = 50.0, kBrickBytes = 13.0;
+// yield 224; bricks 24 more).
+constexpr double kTouchedBytes = 60.0, kTouchedMixedBytes = 180.0, kYieldBytes = 50.0, kBrickBytes = 25.0;
 
 std::string in_words(const polygon::Finding& f) {
   return fmt::format("{}: {} {}", f.id, f.count, f.text);
