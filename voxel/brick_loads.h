@@ -7,8 +7,8 @@
 // load is found anew where they are, u ← u − ω·K_links⁻¹·K_bricks·u. It ends where the bricks are at rest,
 // whatever the links are. A cell's bricks are at most `largest_ratio` times as stiff as its links, which says
 // how large ω may be; a part of each step is carried on to the next (without, a tool held in layers of ν 0.45
-// came to rest half as fast). (Rejected: a smoother and coarse levels of bricks, 27 blocks of 3×3 a
-// voxel in every pass, ten times the work in the tick, and limits per axis no longer limits of one unknown.)
+// came to rest half as fast). (Rejected: a smoother and coarse levels of bricks: 27 blocks of 3×3 a voxel in
+// every pass of the tick, and limits per axis would no longer be limits of one unknown.)
 //
 // So a tick feels links at once, within some tenths right, and the rest of the way as results come.
 #pragma once

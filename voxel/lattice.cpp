@@ -25,9 +25,8 @@ void check_material(std::size_t label, const LinkMaterial& m) {
   if (!(m.stretch_max >= 1.0 && std::isfinite(m.stretch_max))) say("a greatest stretch below 1");
   if (!(m.shear >= 0.0 && std::isfinite(m.shear))) say("a negative shear limit");
   if (m.bricks && m.poisson > kMostPoissonOfBricks)
-    say("the trilinear energy and a Poisson's ratio above 0.49, which takes too long to come to rest; give "
-        "0.49 "
-        "or less");
+    say("the trilinear energy and a Poisson's ratio above 0.49, which takes too long to come to "
+        "rest; give 0.49 or less");
   if (!(m.yield > 0.0)) say("a yield strain that is not positive; leave it out where nothing yields");
 }
 
@@ -139,11 +138,6 @@ void Lattice::fill_links(const LatticeOptions& options) {
         yield = static_cast<float>(std::min(a.yield, b.yield) * h[d]);
         first_yield_m_[ud] = std::min(first_yield_m_[ud], yield);
         yields_ = yields_ || yield < never;
-        if (yields_ && has_bricks_) {
-          throw std::invalid_argument(
-              "tissue that yields and tissue of the trilinear energy cannot be one object: give both the "
-              "six-link energy, or take the yield away");
-        }
         tightest.along_low = std::max(tightest.along_low, limit.along_low);
         tightest.along_high = std::min(tightest.along_high, limit.along_high);
         tightest.across = std::min(tightest.across, limit.across);
@@ -151,6 +145,11 @@ void Lattice::fill_links(const LatticeOptions& options) {
                           a.stretch_max == materials[1].stretch_max && a.shear == materials[1].shear;
       }
     }
+  }
+  if (yields_ && has_bricks_) {
+    throw std::invalid_argument(
+        "tissue that yields and tissue of the trilinear energy cannot be one object: give both the six-link "
+        "energy, or take the yield away");
   }
 }
 

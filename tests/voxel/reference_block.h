@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/voxel/lattice_scenes.h"
 #include "tests/voxel/voxel_problem.h"
 
 namespace tests {
@@ -51,6 +52,22 @@ inline int label_in_block(const std::string& material, double x, double y, doubl
     return inside(x, 0.035, 0.065) && inside(y, 0.035, 0.065) && inside(z, 0.03, 0.045) ? 2 : 1;
   }
   return 1;
+}
+
+// The whole block, a voxel at each of its nodes.
+inline voxel::LabelVolume reference_volume(const ReferenceRow& row) {
+  const double h = row.spacing_m;
+  const int n = static_cast<int>(std::lround(0.1 / h)) + 1, nz = static_cast<int>(std::lround(0.06 / h)) + 1;
+  voxel::LabelVolume volume = block({n, n, nz}, glm::dvec3(h));
+  for (int k = 0; k < nz; ++k) {
+    for (int j = 0; j < n; ++j) {
+      for (int i = 0; i < n; ++i) {
+        volume.labels[volume.index(i, j, k)] =
+            static_cast<std::uint8_t>(label_in_block(row.material, i * h, j * h, k * h));
+      }
+    }
+  }
+  return volume;
 }
 
 // Reaction on the punch (N); NaN where the solver did not come to its end.

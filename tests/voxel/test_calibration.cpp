@@ -182,15 +182,7 @@ double pressed_square(const tests::ReferenceRow& row) {
   const double h = row.spacing_m, depth = 1e-3;
   const int n = static_cast<int>(std::lround(0.1 / h)) + 1, nz = static_cast<int>(std::lround(0.06 / h)) + 1;
   const std::vector<double> young = tests::young_by_label(row.material);
-  voxel::LabelVolume volume = tests::block({n, n, nz}, glm::dvec3(h));
-  for (int k = 0; k < nz; ++k) {
-    for (int j = 0; j < n; ++j) {
-      for (int i = 0; i < n; ++i) {
-        volume.labels[volume.index(i, j, k)] =
-            static_cast<std::uint8_t>(tests::label_in_block(row.material, i * h, j * h, k * h));
-      }
-    }
-  }
+  const voxel::LabelVolume volume = tests::reference_volume(row);
   voxel::LatticeOptions options = tests::made_of(elastic(kYoung, row.poisson));
   for (std::size_t label = 1; label < young.size(); ++label)
     options.materials[label] = elastic(young[label], row.poisson);
