@@ -424,7 +424,94 @@ HYBRID_INLINE RowCorrection correct_axes(const LevelRow& row, const RowLimits* l
   return {largest(most), refusing | beyond};
 }
 
+// Bit i of any lane.
+HYBRID_INLINE std::uint32_t all_bits(const OctetMask& bits) {
+  const OctetMask half = bits | __builtin_shufflevector(bits, bits, 4, 5, 6, 7, 0, 1, 2, 3);
+  const OctetMask pair = half | __builtin_shufflevector(half, half, 2, 3, 0, 1, 2, 3, 0, 1);
+  return static_cast<std::uint32_t>(pair[0] | pair[1]);
+}
+
+template <bool kUniform, Limits kLimits>
+HYBRID_INLINE void look_at_limits(const LevelRow& row, const AxisBounds& bounds, std::size_t axis,
+                                  const std::array<float, 3>& tight, LinksAtLimits& out) {
+  const AxisSprings s(row.springs, axis);
+  const float* own = row.u[axis];
+  Span u;
+  ends_of(u, own, row.x, {});
+#pragma GCC unroll 1
+  for (int octet = 0; octet < kOctets; ++octet)
+    load(u.at[static_cast<std::size_t>(octet) + 1], own + octet * kOctet);
+  // Each lane sets its own bit: gathered lane by lane in every octet, they took longer than all else.
+  OctetMask bit{1, 2, 4, 8, 16, 32, 64, 128};
+  std::array<OctetMask, 3> at_low{}, at_high{}, down_at_low{}, down_at_high{};
+  OctetMask pulled_up{}, pulled_down{}, movable{};
+#pragma GCC unroll 1
+  for (int octet = 0; octet < kOctets; ++octet, bit <<= kOctet) {
+    const auto n = static_cast<std::size_t>(octet);
+    const int lane = octet * kOctet;
+    Around at;
+    look_around(at, own + lane, row.z);
+    Octet x_down, x_up, k, inverse;
+    shift_down(x_down, u.at[n], at.own);
+    shift_up(x_up, at.own, u.at[n + 2]);
+    const std::array<Octet, 3> up{x_up - at.own, at.y_up - at.own, at.z_up - at.own},
+        down{at.own - x_down, at.own - at.y_down, at.own - at.z_down};
+    Octet pull{};
+#pragma GCC unroll 3
+    for (std::size_t d = 0; d < 3; ++d) {
+      Octet low = Octet{} + bounds.row.low[d], high = Octet{} + bounds.row.high[d];
+      if constexpr (kLimits == Limits::lanes) {
+        load(low, bounds.down_low[d] + lane);
+        low *= bounds.sign[d];
+        load(high, bounds.down_high[d] + lane);
+      }
+      spring<kUniform>(k, s.down[d], octet);
+      pull -= k * down[d];
+      down_at_low[d] |= (k > 0.0F) & (down[d] <= low + tight[d]) & bit;
+      down_at_high[d] |= (k > 0.0F) & (down[d] >= high - tight[d]) & bit;
+      if constexpr (kLimits == Limits::lanes) {
+        load(low, bounds.up_low[d] + lane);
+        low *= bounds.sign[d];
+        load(high, bounds.up_high[d] + lane);
+      }
+      spring<kUniform>(k, s.up[d], octet);
+      pull += k * up[d];
+      at_low[d] |= (k > 0.0F) & (up[d] <= low + tight[d]) & bit;
+      at_high[d] |= (k > 0.0F) & (up[d] >= high - tight[d]) & bit;
+    }
+    if (row.load[axis] != nullptr) {
+      load(k, row.load[axis] + lane);
+      pull += k;
+    }
+    spring<kUniform>(inverse, s.inverse, octet);
+    movable |= (inverse != 0.0F) & bit;
+    pulled_up |= (pull > 0.0F) & bit;
+    pulled_down |= (pull < 0.0F) & bit;
+    store(out.pull_N.data() + lane, pull);
+  }
+  for (std::size_t d = 0; d < 3; ++d) {
+    out.at_low[d] = all_bits(at_low[d]);
+    out.at_high[d] = all_bits(at_high[d]);
+    out.down_at_low[d] = all_bits(down_at_low[d]);
+    out.down_at_high[d] = all_bits(down_at_high[d]);
+  }
+  out.movable = all_bits(movable);
+  out.pulled_up = all_bits(pulled_up);
+  out.pulled_down = all_bits(pulled_down);
+}
+
 }  // namespace
+
+HYBRID_WIDE_AND_MANY void links_at_limits(const LevelRow& row, const RowLimits& limits, std::size_t axis,
+                                          const std::array<float, 3>& tight_m, LinksAtLimits& out) noexcept {
+  const AxisBounds bounds(limits, axis);
+  if (limits.lanes != nullptr) {
+    look_at_limits<false, Limits::lanes>(row, bounds, axis, tight_m, out);
+  } else {
+    row.springs.uniform ? look_at_limits<true, Limits::row>(row, bounds, axis, tight_m, out)
+                        : look_at_limits<false, Limits::row>(row, bounds, axis, tight_m, out);
+  }
+}
 
 HYBRID_WIDE_AND_MANY float smooth_row(const LevelRow& row, const RowLimits* limits, OctetSpan span) noexcept {
   const bool uniform = row.springs.uniform;

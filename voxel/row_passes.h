@@ -84,6 +84,18 @@ void take_back(const RowVector& sums, const float* share, const std::array<float
 // The largest |a[i] − b[i]| of one axis, of the lanes of the span that lie in first … last.
 float row_difference(const float* a, const float* b, OctetSpan span, int first, int last) noexcept;
 
+// Links of a row of voxels on one axis, and what they pull at it; bits are lanes.
+struct LinksAtLimits {
+  // [d] of the link up, and of the link down: the difference can be no less, no more.
+  std::array<std::uint32_t, 3> at_low, at_high, down_at_low, down_at_high;
+  std::uint32_t pulled_up, pulled_down;
+  std::uint32_t movable;  // not anchored
+  Lanes pull_N;           // of links and loads
+};
+// Of `row` only that axis is read. Nearer to its limit than `tight_m` [d] a link is at it.
+void links_at_limits(const LevelRow& row, const RowLimits& limits, std::size_t axis,
+                     const std::array<float, 3>& tight_m, LinksAtLimits& out) noexcept;
+
 struct RowCorrection {
   float most_m = 0.0F;   // the most that any voxel was asked to move
   unsigned refused = 0;  // bit of each axis on which some did not follow all the way

@@ -32,6 +32,7 @@ SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice)
       relaxation_(*lattice_),
       pair_held_(lattice_->surface().size(), 0),
       pair_load_(lattice_->surface().size()),
+      tight_rows_(*lattice_),
       carried_mark_(lattice_->size()),
       carried_index_(lattice_->size()) {
   const auto surface = lattice_->surface();
@@ -42,6 +43,7 @@ SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice)
   moves_.reserve(surface.size());
   held_voxels_.reserve(surface.size());
   all_held_.reserve(surface.size() + kMaxTouched);
+  roots_.reserve(kMaxTouched);
   carried_.reserve(kMaxCarried + kMaxTouched);
   hanging_.reserve(kMaxCarried + kMaxTouched);
   if (lattice_->voxel_count() < kPreparedWhole) {
@@ -278,15 +280,20 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
     }
   }
   set_touch_roles();
-  for (int axis = 0; axis < 3; ++axis) draw_along(axis);
+  if (withdrew_) {
+    for (int axis = 0; axis < 3; ++axis) draw_along(axis);
+  }
+  withdrew_ = true;
 }
 
 void SoftObject::follow(const glm::dvec3& delta) noexcept {
   sources_.clear();
   moves_.clear();
+  withdrew_ = false;
   for (const Touch& t : touches_) {
     if (!t.pressed || lattice_->anchored(t.v)) continue;
     const glm::dvec3 before = state_.at(t.v);
+    if (glm::dot(delta, t.normal) < 0.0) withdrew_ = true;
     state_.set(t.v, before + glm::dot(delta, t.normal) * t.normal);
     sources_.push_back(t.v);
     moves_.emplace_back(state_.at(t.v) - before);
@@ -417,10 +424,11 @@ bool SoftObject::settle(const ToolInBody& tool, double tolerance_N, int max_cycl
 }
 
 std::size_t SoftObject::memory_bytes() const {
-  std::size_t state =
-      state_.bricks.memory_bytes() + state_.role.resident_bytes() + state_.row_held.resident_bytes() +
-      state_.row_obstacles.resident_bytes() + state_.rest.memory_bytes() + carried_mark_.resident_bytes() +
-      carried_index_.resident_bytes() + pair_load_.resident_bytes() + row_moved_.resident_bytes();
+  std::size_t state = state_.bricks.memory_bytes() + state_.role.resident_bytes() +
+                      state_.row_held.resident_bytes() + state_.row_obstacles.resident_bytes() +
+                      state_.rest.memory_bytes() + carried_mark_.resident_bytes() +
+                      carried_index_.resident_bytes() + tight_rows_.memory_bytes() +
+                      pair_load_.resident_bytes() + row_moved_.resident_bytes();
   for (const auto& axis : state_.u) state += axis.resident_bytes();
   return lattice_->memory_bytes() + state + chain_.memory_bytes() + relaxation_.memory_bytes() +
          obstacles_.size() * sizeof(Obstacle) + pair_held_.size();

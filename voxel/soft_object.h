@@ -19,6 +19,7 @@
 #include "voxel/displacement.h"
 #include "voxel/lattice.h"
 #include "voxel/relaxation.h"
+#include "voxel/tight_rows.h"
 
 namespace voxel {
 
@@ -206,7 +207,8 @@ class SoftObject {
   [[nodiscard]] double load_on(VoxelId v, int axis) noexcept;
   void draw_along(int axis) noexcept;
   void carry(VoxelId v, std::uint32_t touch) noexcept;
-  void gather_load(int axis) noexcept;
+  [[nodiscard]] glm::dvec3 gather_load(glm::dmat3& stiffness) noexcept;
+  void add_stiffness_of_touches(int axis, const glm::dvec3& way, glm::dmat3& stiffness) noexcept;
   void gather_load_with_pairs(int axis) noexcept;
   void add_hanging(int axis, std::span<const VoxelId> pressed, std::span<HeldLoad> loads) noexcept;
   void add_stiffness(int axis, std::span<HeldLoad> loads) noexcept;
@@ -232,7 +234,11 @@ class SoftObject {
   std::vector<VoxelId> all_held_;     // by the tool, too
   std::vector<VoxelId> sources_;
   std::vector<glm::vec3> moves_;
-  bool dragging_ = false;                   // sources_ are what drag() moved, moves_ where they were
+  bool dragging_ = false;  // sources_ are what drag() moved, moves_ where they were
+  // The tool drew voxels back since what hangs on them was drawn along, or nobody knows.
+  bool withdrew_ = true;
+  TightRows tight_rows_;
+  std::vector<VoxelId> roots_;              // of these: what is pressed and not anchored
   std::vector<Carried> carried_;            // [pressed first, then what hangs on them by a tight link]
   std::vector<Hanging> hanging_;            // [as carried_]
   LazyArray<std::uint8_t> carried_mark_;    // [v] 1: in carried_ (within touch(): was pressed)

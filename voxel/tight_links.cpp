@@ -133,27 +133,60 @@ void SoftObject::carry(VoxelId v, std::uint32_t touch) noexcept {
 }
 
 // What hangs on a pressed voxel by a tight link and pulls it back is felt through it: the multiplier of the
-// chain's limit. Without it the force would saturate as soon as the chain is tight. Per axis, breadth first;
-// each voxel's load goes to the pressed voxel that it was first reached from.
-void SoftObject::gather_load(int axis) noexcept {
+// chain's limit. Without it the force would saturate as soon as the chain is tight.
+glm::dvec3 SoftObject::gather_load(glm::dmat3& stiffness) noexcept {
+  glm::dvec3 force(0.0);
   carried_.clear();
-  const auto& u = state_.u[static_cast<std::size_t>(axis)];
+  roots_.clear();
   for (std::size_t i = 0; i < touches_.size(); ++i) {
-    if (touches_[i].pressed && !lattice_->anchored(touches_[i].v))
-      carry(touches_[i].v, static_cast<std::uint32_t>(i));
+    if (!touches_[i].pressed || lattice_->anchored(touches_[i].v)) continue;
+    carry(touches_[i].v, static_cast<std::uint32_t>(i));
+    roots_.push_back(touches_[i].v);
   }
-  for (std::size_t head = 0; head < carried_.size() && carried_.size() < kMaxCarried; ++head) {
-    const Carried c = carried_[head];
-    const auto known = [&](VoxelId w) { return carried_mark_[w] != 0 && touches_[c.touch].tight; };
-    for_tight_neighbours(*lattice_, u, c.v, axis, known, [&](VoxelId w, bool pushed_up, bool pushed_down) {
-      if (lattice_->anchored(w)) return;
-      touches_[c.touch].tight = true;
-      if (carried_mark_[w] != 0) return;
-      const double pull = load_on(w, axis);
-      if (!((pushed_up && pull < 0.0) || (pushed_down && pull > 0.0))) return;
-      touches_[c.touch].load[axis] += pull;
-      carry(w, c.touch);
-    });
+  for (int axis = 0; axis < 3; ++axis) {
+    tight_rows_.gather(relaxation_.couplings(), state_, roots_, axis);
+    // What hangs on them goes along with the mean of those that something may hang on.
+    glm::dvec3 way(0.0);
+    int tight = 0;
+    for (const Carried& c : carried_) {
+      Touch& t = touches_[c.touch];
+      if (!tight_rows_.tight(t.v)) continue;
+      t.tight = true;
+      way += t.normal[axis] * t.normal;
+      ++tight;
+    }
+    if (tight > 0) way /= tight;
+    const TightRows::Hanging hanging = tight_rows_.hanging(relaxation_.couplings());
+    force[axis] = hanging.force_N;
+    stiffness += hanging.stiffness_N_per_m * glm::outerProduct(way, way);
+    add_stiffness_of_touches(axis, way, stiffness);
+  }
+  let_go_of_carried();
+  return force;
+}
+
+// Of the links of pressed voxels, what hangs on which goes along by `way` a unit of the tool's motion.
+void SoftObject::add_stiffness_of_touches(int axis, const glm::dvec3& way, glm::dmat3& stiffness) noexcept {
+  for (const Carried& c : carried_) {
+    const glm::dvec3 q = touches_[c.touch].normal[axis] * touches_[c.touch].normal;
+    const VoxelSprings springs = relaxation_.couplings().springs_of(c.v);
+    for (int d = 0; d < 3; ++d) {
+      for (const bool up : {false, true}) {
+        const Spring& spring = (up ? springs.up : springs.down)[static_cast<std::size_t>(d)];
+        const double stiff = static_cast<double>(spring.on(axis, d));
+        if (stiff == 0.0) continue;
+        const VoxelId w = up ? lattice_->up(c.v, d) : lattice_->down(c.v, d);
+        double share = 1.0;
+        glm::dvec3 beside(0.0);
+        if (carried_mark_[w] != 0) {
+          beside = touches_[carried_index_[w]].normal[axis] * touches_[carried_index_[w]].normal;
+          share = 0.5;  // met from both its ends
+        } else if (tight_rows_.carried(w)) {
+          beside = way;
+        }
+        stiffness += share * stiff * glm::outerProduct(q - beside, q - beside);
+      }
+    }
   }
 }
 
@@ -296,23 +329,24 @@ Reaction SoftObject::reaction(const ToolInBody& tool) noexcept {
     t.tight = false;
     t.load = t.pressed ? load_on(t.v) : glm::dvec3(0.0);
   }
-  for (int axis = 0; axis < 3; ++axis) {
-    if (held_voxels_.empty()) {
-      gather_load(axis);
-    } else {
-      gather_load_with_pairs(axis);
-    }
+  glm::dvec3 hanging_N(0.0);
+  if (held_voxels_.empty()) hanging_N = gather_load(result.stiffness_N_per_m);
+  for (int axis = 0; axis < 3 && !held_voxels_.empty(); ++axis) {
+    gather_load_with_pairs(axis);
     add_stiffness(axis, result.stiffness_N_per_m);
     let_go_of_carried();
   }
+  // Tight links pass load between voxels, along and across their normals, and the sum of all is what is left
+  // of it: within the sum the chain's own forces cancel, whichever voxel each is booked to.
+  for (const Touch& t : touches_) {
+    if (t.pressed && t.tight) result.force_N += t.load;
+  }
+  result.force_N += hanging_N;
+  const glm::dvec3 through_links = result.force_N;
   for (const Touch& t : touches_) {
     if (!t.pressed) continue;
-    const double load = glm::dot(t.load, t.normal);
-    if (t.tight) {
-      // Tight links pass load between voxels, along and across their normals, and the sum of all is what is
-      // left of it: within the sum the chain's own forces cancel, whichever voxel each is booked to.
-      result.force_N += t.load;
-    } else if (load < 0.0) {
+    const double load = glm::dot(t.tight ? through_links : t.load, t.normal);
+    if (!t.tight && load < 0.0) {
       // Frictionless: the tool feels what the voxel presses along the normal; what pulls is no contact.
       result.force_N += load * t.normal;
     }
