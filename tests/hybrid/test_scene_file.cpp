@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What a scene file says reaches the Scene in SI, and every way to say it wrongly is refused with its place
 // and a remedy. broken_scenes/ has one file for each of those ways.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -14,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "hybrid/build.h"
 #include "hybrid/scene.h"
 #include "hybrid/scene_tree.h"
 #include "tests/hybrid/scene_file_fixture.h"
@@ -310,6 +312,26 @@ TEST_F(SceneFile, TheLimitOfALatticeIsThatOfTheMachine) {
   };
   EXPECT_EQ(refusal(cube(0.99 * edge)), "");
   EXPECT_NE(refusal(cube(1.01 * edge)).find("bytes"), std::string::npos);
+}
+
+// A plate without slack, on tissue or on its own, and what the program says of it.
+TEST_F(SceneFile, TissueWithoutSlackOnOtherTissueIsWarnedOf) {
+  const auto warnings = [&](const std::string& stretch, const std::string& shear, double below) {
+    std::ostringstream out;
+    out << "format = 1\n[material.plate]\nstretch = " << stretch << "\nshear = " << shear
+        << "\n[material.tissue]\n[[soft]]\nname = \"a\"\nformula = \"block\"\nspacing = 1\nsize = 8\n"
+        << "material = \"tissue\"\nmaterials = { \"2\" = \"plate\" }\nlayers = [";
+    if (below > 0.0) out << "{ thickness = " << below << ", label = 1 }, ";
+    out << "{ thickness = " << 8.0 - below << ", label = 2 }]\n" << path;
+    std::string all;
+    for (const auto& note : hybrid::build_scene(load(out.str())).notes) {
+      if (note.severity == polygon::Severity::warning) all += note.object + ": " + note.text;
+    }
+    return all;
+  };
+  EXPECT_THAT(warnings("[1, 1]", "0", 4.0), testing::HasSubstr("a: tissue without any slack"));
+  EXPECT_EQ(warnings("[0.95, 1.05]", "0.05", 4.0), "");
+  EXPECT_EQ(warnings("[1, 1]", "0", 0.0), "");  // it stands on its anchors
 }
 
 TEST(Scenes, AllThatComeWithTheProgramLoad) {
