@@ -264,12 +264,12 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
     // comes to rest with its surroundings held.
     if (unsettled_m_ < kSettled * lattice_->min_spacing_m()) break;
     if (cycles_since_touch_ == kMostCycles) break;
-    const bool again = ++cycles_since_touch_ > 1;
+    const auto round = ++cycles_since_touch_ > 1 ? Relaxation::Round::again : Relaxation::Round::first;
     unsettled_m_ *= kContraction;
     for (const Touch& t : touches_) relaxation_.stir(t.v / kRow);
     const std::size_t pressed = list_held();
     if (pressed == 0) continue;
-    relaxation_.relax_contact(state_, obstacle_view(), all_held_, {all_held_.data(), pressed}, again);
+    relaxation_.relax_contact(state_, obstacle_view(), all_held_, {all_held_.data(), pressed}, round);
   }
   // Last, so that what the tool feels is measured with its voxels where they belong; what is pressed first,
   // because what hangs on it by a tight link counts where that is tight still. (In the order of the list half
@@ -280,20 +280,15 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
     }
   }
   set_touch_roles();
-  if (withdrew_) {
-    for (int axis = 0; axis < 3; ++axis) draw_along(axis);
-  }
-  withdrew_ = true;
+  for (int axis = 0; axis < 3; ++axis) draw_along(axis);
 }
 
 void SoftObject::follow(const glm::dvec3& delta) noexcept {
   sources_.clear();
   moves_.clear();
-  withdrew_ = false;
   for (const Touch& t : touches_) {
     if (!t.pressed || lattice_->anchored(t.v)) continue;
     const glm::dvec3 before = state_.at(t.v);
-    if (glm::dot(delta, t.normal) < 0.0) withdrew_ = true;
     state_.set(t.v, before + glm::dot(delta, t.normal) * t.normal);
     sources_.push_back(t.v);
     moves_.emplace_back(state_.at(t.v) - before);

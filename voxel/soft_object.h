@@ -235,8 +235,6 @@ class SoftObject {
   std::vector<VoxelId> sources_;
   std::vector<glm::vec3> moves_;
   bool dragging_ = false;  // sources_ are what drag() moved, moves_ where they were
-  // The tool drew voxels back since what hangs on them was drawn along, or nobody knows.
-  bool withdrew_ = true;
   TightRows tight_rows_;
   std::vector<VoxelId> roots_;              // of these: what is pressed and not anchored
   std::vector<Carried> carried_;            // [pressed first, then what hangs on them by a tight link]
