@@ -27,7 +27,6 @@ constexpr std::uint64_t kNextFirst = 7919;  // of these voxels is looked at firs
 constexpr int kContactLevels = 5;
 constexpr int kNear = 2;           // rows that a cycle round a contact reads beyond those it brings to rest
 constexpr int kContactMargin = 3;  // cells round the contact that are smoothed, on each level
-constexpr int kWideMargin = 8;     // … by whoever has the time
 constexpr std::uint64_t kBesideContact = 2;  // this part of the budget is left beside cycles round a contact
 // Loads of bricks: what a row of them takes, in voxel updates, and what part of a budget they may have.
 constexpr std::uint64_t kBrickUpdates = 4 * kRow, kBrickShare = 2;
@@ -60,7 +59,7 @@ void Relaxation::copy_from(const Relaxation& other) noexcept {
 
 void Relaxation::renew_coarse(Displacement& state, const ObstacleView& obstacles) noexcept {
   const auto& dims = lattice_.grid().dims;
-  lay_boxes({0, 0, 0}, {dims[0] - 1, dims[1] - 1, dims[2] - 1}, 0, 0);
+  lay_boxes({0, 0, 0}, {dims[0] - 1, dims[1] - 1, dims[2] - 1}, 0);
   stir_all();
   for (int l = 1; l < multigrid_.levels(); ++l) {
     for_rows(l, boxes(l).parents,
@@ -151,14 +150,14 @@ void Relaxation::run_cycle(Displacement& state, const ObstacleView& obstacles,
   round_left_ = 0;
   running_residual_N_ = 0.0;
   const auto& dims = lattice_.grid().dims;
-  lay_boxes({0, 0, 0}, {dims[0] - 1, dims[1] - 1, dims[2] - 1}, 0, 0);
+  lay_boxes({0, 0, 0}, {dims[0] - 1, dims[1] - 1, dims[2] - 1}, 0);
   cycle(state, obstacles, Look::active, false);
   end_round(state, running_residual_N_);
 }
 
 void Relaxation::relax_contact(Displacement& state, const ObstacleView& obstacles,
                                std::span<const VoxelId> held, std::span<const VoxelId> pressed,
-                               Round round) noexcept {
+                               bool again) noexcept {
   contact_relaxed_ = true;
   multigrid_.set_held(held);
   std::array<int, 3> low = lattice_.coordinates(pressed.front()), high = low;
@@ -176,13 +175,13 @@ void Relaxation::relax_contact(Displacement& state, const ObstacleView& obstacle
     high[d] = low[d] + kMaxNear;
   }
   const int wide = std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
-  lay_boxes(low, high, wide, round == Round::wide ? kWideMargin : kContactMargin);
+  lay_boxes(low, high, wide);
   const RowBox& b = boxes(0).smoothed;
   const Grid& g = lattice_.grid();
   near_.first = {b.q0 / kOctets + 1, std::max(b.j0 - kNear, 0), std::max(b.k0 - kNear, 0)};
   near_.last = {b.q1 / kOctets + 1, std::min(b.j1 + kNear, g.dims[1] - 1),
                 std::min(b.k1 + kNear, g.dims[2] - 1)};
-  cycle(state, obstacles, Look::all, apart_ && round == Round::again);
+  cycle(state, obstacles, Look::all, apart_ && again);
 }
 
 std::uint64_t Relaxation::relax_tile(Displacement& state, const ObstacleView& obstacles,
@@ -190,7 +189,7 @@ std::uint64_t Relaxation::relax_tile(Displacement& state, const ObstacleView& ob
   const TileQueue::Tile t = multigrid_.tiles().tile(number);
   constexpr int kSide = TileQueue::kSide;
   lay_boxes({t.column * kRow, t.j * kSide, t.k * kSide},
-            {(t.column + 1) * kRow - 1, (t.j + 1) * kSide - 1, (t.k + 1) * kSide - 1}, -1, 0);
+            {(t.column + 1) * kRow - 1, (t.j + 1) * kSide - 1, (t.k + 1) * kSide - 1}, -1);
   cycle(state, obstacles, Look::all, false);
   std::uint64_t updates = 0;
   for (const LevelBoxes& b : boxes_) {
@@ -332,12 +331,11 @@ Relaxation::RowBox Relaxation::clipped(int level, const RowBox& b) const noexcep
 
 // The boxes of a cycle that is to bring voxels low … high to rest: on each level so many cells more on every
 // side as the way that a force at the middle is felt, in cells; `wide` is how wide the contact is, or
-// negative where there is none and the voxels themselves are enough; `cells` more for a contact.
-void Relaxation::lay_boxes(const std::array<int, 3>& low, const std::array<int, 3>& high, int wide,
-                           int cells) noexcept {
+// negative where there is none and the voxels themselves are enough.
+void Relaxation::lay_boxes(const std::array<int, 3>& low, const std::array<int, 3>& high, int wide) noexcept {
   const int last = multigrid_.levels() - 1;
   for (int l = 0; l <= last; ++l) {
-    const int margin = wide >= 0 ? cells + (wide >> l) / 4 : l == 0 ? 0 : kTileMargin;
+    const int margin = wide >= 0 ? kContactMargin + (wide >> l) / 4 : l == 0 ? 0 : kTileMargin;
     std::array<int, 3> from{}, to{};
     for (std::size_t d = 0; d < 3; ++d) {
       from[d] = std::max(0, (low[d] >> l) - margin);
@@ -359,15 +357,6 @@ void Relaxation::lay_boxes(const std::array<int, 3>& low, const std::array<int, 
     boxes(l).told =
         clipped(l, {2 * p.q0 - 2, 2 * p.q1 + 3, 2 * t.j0 - 1, 2 * t.j1 + 2, 2 * t.k0 - 1, 2 * t.k1 + 2});
   }
-}
-
-std::size_t Relaxation::rows_of_cycle() const noexcept {
-  int rows = 0;
-  for (const LevelBoxes& b : boxes_) {
-    const RowBox& s = b.smoothed;
-    rows += (s.q1 / kOctets - s.q0 / kOctets + 1) * (s.j1 - s.j0 + 1) * (s.k1 - s.k0 + 1);
-  }
-  return static_cast<std::size_t>(rows);
 }
 
 // Rows of one colour, so that no two that are beside one another are of the same.

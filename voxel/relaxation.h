@@ -45,15 +45,9 @@ class Relaxation {
   // to the coarse levels. It is cheaper by a quarter, and takes more of what the tool moved to where it
   // reaches far: an organ held 1.2 s into a path was 0.12 to 0.2 N off, now 0.04, of 1.43; a block in which
   // all is near was 0.075 N off at most, now 0.095.
-  // `wide`: for whoever has the time. Where stiff and soft tissue lie side by side, what coarse levels tell
-  // voxels is far from rest, and a narrow box leaves most of it as it is.
-  enum class Round : std::uint8_t { first, again, wide };
   static constexpr int kMaxNear = 64;
   void relax_contact(Displacement& state, const ObstacleView& obstacles, std::span<const VoxelId> held,
-                     std::span<const VoxelId> pressed, Round round = Round::first) noexcept;
-
-  // Rows of all levels that the last cycle brought to rest: what it cost, in counted work.
-  [[nodiscard]] std::size_t rows_of_cycle() const noexcept;
+                     std::span<const VoxelId> pressed, bool again = false) noexcept;
 
   [[nodiscard]] Couplings& couplings() { return multigrid_.couplings(); }
   [[nodiscard]] Multigrid& multigrid() { return multigrid_; }
@@ -128,7 +122,7 @@ class Relaxation {
   };
   enum class Look : std::uint8_t { all, active };  // rows at rest are left alone
 
-  void lay_boxes(const std::array<int, 3>& low, const std::array<int, 3>& high, int wide, int cells) noexcept;
+  void lay_boxes(const std::array<int, 3>& low, const std::array<int, 3>& high, int margin) noexcept;
   void cycle(Displacement& state, const ObstacleView& obstacles, Look look, bool smoothed) noexcept;
   void end_round(Displacement& state, double residual_N) noexcept;
   double move_clusters(Displacement& state) noexcept;

@@ -15,14 +15,11 @@ std::size_t at(RowId row) {
 constexpr std::size_t kMostAtOnce = 1000;  // rows that a tick adds at once; a wider contact sees steps go by
 // After a whole cycle, of which little reaches the contact (0.75 of its error is left in a brain), so many
 // round it, while the tool moves by so many spacings from one result to the next and some results longer: a
-// brain that felt 0.29 N on the way to 0.14 feels 0.27, and is within a twentieth of it after 0.2 s instead
+// brain that felt 0.28 N on the way to 0.15 feels 0.22, and is within a twentieth of it after 0.2 s instead
 // of 0.6. At rest they are left out: beyond their boxes coarse cells know of the whole cycle's last sweeps
 // only in the next one, and a voxel that hardly touches the tool was let go and pressed in turns, with steps
 // of 30 mN.
 constexpr int kContactCycles = 4, kUnsettled = 4;
-// Of whole cycles of so many rows those of wide boxes are a fifth, and worth it; in a block of 24,000 voxels
-// they would take as long again, and its results come later.
-constexpr std::size_t kWideFrom = 10'000;
 constexpr double kMoved = 0.1;
 
 // Floats of a row that go over: ways, and where there are bricks their loads.
@@ -131,13 +128,9 @@ void Replica::relax() noexcept {
   open_given();
   const ObstacleView obstacles{obstacles_, &lattice_};
   relaxation_.run_cycle(state_, obstacles, held_);
+  for (int n = 0; n < kContactCycles && settle_contact_; ++n)
+    relaxation_.relax_contact(state_, obstacles, held_, {held_.data(), given_pressed_});
   work_ = multigrid().log().count();
-  const bool wide = work_ >= kWideFrom;
-  for (int n = 0; n < kContactCycles && settle_contact_; ++n) {
-    relaxation_.relax_contact(state_, obstacles, held_, {held_.data(), given_pressed_},
-                              wide ? Relaxation::Round::wide : Relaxation::Round::first);
-    if (wide) work_ += relaxation_.rows_of_cycle();
-  }
   pack_changes();
 }
 

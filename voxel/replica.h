@@ -57,8 +57,7 @@ class Replica {
 
   // ---- between the two, the other thread ----
   void relax() noexcept;
-  // Rows, of all levels, that the last relax() wrote, those of wide cycles round the contact each time: what
-  // it cost, in counted work.
+  // Rows, of all levels, that the last relax() wrote: what it cost, in counted work.
   [[nodiscard]] std::size_t work() const { return work_; }
 
   // Displacement of a rest point as it is known here; 0 where none is near. By the thread that relaxes.

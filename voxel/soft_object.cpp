@@ -264,12 +264,12 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
     // comes to rest with its surroundings held.
     if (unsettled_m_ < kSettled * lattice_->min_spacing_m()) break;
     if (cycles_since_touch_ == kMostCycles) break;
-    const auto round = ++cycles_since_touch_ > 1 ? Relaxation::Round::again : Relaxation::Round::first;
+    const bool again = ++cycles_since_touch_ > 1;
     unsettled_m_ *= kContraction;
     for (const Touch& t : touches_) relaxation_.stir(t.v / kRow);
     const std::size_t pressed = list_held();
     if (pressed == 0) continue;
-    relaxation_.relax_contact(state_, obstacle_view(), all_held_, {all_held_.data(), pressed}, round);
+    relaxation_.relax_contact(state_, obstacle_view(), all_held_, {all_held_.data(), pressed}, again);
   }
   // Last, so that what the tool feels is measured with its voxels where they belong; what is pressed first,
   // because what hangs on it by a tight link counts where that is tight still. (In the order of the list half
