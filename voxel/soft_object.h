@@ -170,7 +170,7 @@ class SoftObject {
     VoxelId v;
     bool pressed = false;    // carries load towards the tool
     glm::dvec3 normal{0.0};  // from tool to voxel, unit
-    glm::dvec3 load{0.0};    // of its links, and of what hangs on it by tight links (unit: newton)
+    glm::dvec3 load{0.0};    // of its links; beside other soft objects, of what hangs on it, too (N)
     double noted = 0.0;      // how deep it was in the tool as the tick began (m)
     bool beside = false;     // it was beside a punch then
     bool tight = false;      // some tight link hands part of its load to or from another voxel

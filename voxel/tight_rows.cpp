@@ -133,10 +133,10 @@ TightRows::Hanging TightRows::hanging(const Couplings& couplings) const noexcept
     if (hangs == 0) continue;
     sum.force_N += sum_of(r.links.pull_N.data(), hangs);
     const RowCouplings s = couplings.all(r.row);
-    const std::array<std::uint32_t, 3> up{r.carried >> 1U | carried_beside(r.row + row_x) << (kRow - 1),
-                                          carried_beside(r.row + 1), carried_beside(r.row + row_z)};
-    const std::array<std::uint32_t, 3> down{r.carried << 1U | carried_beside(r.row - row_x) >> (kRow - 1),
-                                            carried_beside(r.row - 1), carried_beside(r.row - row_z)};
+    const std::array<std::uint32_t, 3> up{r.carried >> 1U | carried_in(r.row + row_x) << (kRow - 1),
+                                          carried_in(r.row + 1), carried_in(r.row + row_z)};
+    const std::array<std::uint32_t, 3> down{r.carried << 1U | carried_in(r.row - row_x) >> (kRow - 1),
+                                            carried_in(r.row - 1), carried_in(r.row - row_z)};
     for (std::size_t d = 0; d < 3; ++d) {
       const bool along = static_cast<int>(d) == axis_;
       sum.stiffness_N_per_m += sum_of((along ? s.up_along : s.up_across) + d * kRow, hangs & ~up[d]) +

@@ -32,7 +32,9 @@ class TightRows {
   // link lets go neither way hangs on it in any case. What was found before is forgotten.
   void gather(Couplings& couplings, Displacement& state, std::span<const VoxelId> roots, int axis) noexcept;
   // Is it one of them, or a root?
-  [[nodiscard]] bool carried(VoxelId v) const noexcept { return has(v, &Row::carried); }
+  [[nodiscard]] bool carried(VoxelId v) const noexcept {
+    return (carried_in(v / kRow) >> v % kRow & 1U) != 0;
+  }
   // Of a root: is any link of it to what may move at a limit?
   [[nodiscard]] bool tight(VoxelId root) const noexcept;
   // What pulls all that hangs on the roots, without these (N), and the springs of their links to what does
@@ -61,16 +63,12 @@ class TightRows {
   [[nodiscard]] const Row* find(RowId row) const noexcept {
     return entry_[row] == 0 ? nullptr : &rows_[entry_[row] - 1U];
   }
-  [[nodiscard]] bool has(VoxelId v, std::uint32_t Row::*bits) const noexcept {
-    const Row* r = find(v / kRow);
-    return r != nullptr && (r->*bits >> v % kRow & 1U) != 0;
-  }
   [[nodiscard]] Row* look_at(RowId row) noexcept;
   [[nodiscard]] static std::uint32_t pushed(const Row& row, std::uint32_t at_low, std::uint32_t at_high,
                                             End end) noexcept;
   void add(Row& row, std::uint32_t bits) noexcept;
   void ask(RowId row, std::uint32_t at_low, std::uint32_t at_high, End end) noexcept;
-  [[nodiscard]] std::uint32_t carried_beside(RowId row) const noexcept {
+  [[nodiscard]] std::uint32_t carried_in(RowId row) const noexcept {
     const Row* r = find(row);
     return r == nullptr ? 0U : r->carried;
   }
