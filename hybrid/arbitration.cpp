@@ -14,6 +14,9 @@ namespace {
 
 constexpr std::uint32_t kObstacleSlice = 256;  // surface voxels whose motion is looked at a tick
 constexpr std::size_t kObstacleQueries = 24;   // exact queries a tick
+// … where a result arrived (with 24, 4.4 % of a cell of overlap in `head`; with these 3 %).
+constexpr std::size_t kArrivedQueries = 48;
+constexpr double kInside = 0.01;  // of the spacing: deeper in a surface a voxel leaves it
 // A voxel looks again when it has moved by so many spacings, or to within so many of where it might meet a
 // rigid surface that it has not seen.
 constexpr float kMovedEnough = 0.25F, kSeenAhead = 2.0F;
@@ -143,7 +146,7 @@ class LooksDue {
   const voxel::SoftObject& object_;
   std::span<const SurfaceSeen> seen_;
   float spacing_m_, radius_m_;
-  std::array<Due, kObstacleQueries> first_{};
+  std::array<Due, kArrivedQueries> first_{};
   std::size_t count_ = 0;
 };
 
@@ -196,6 +199,35 @@ void refresh_obstacles(const World& world, WorldState& state) noexcept {
       for (std::size_t n = 0; n < looks; ++n) renew_obstacle(world, state, o, due[n]);
       left -= looks;
     }
+    object.forget_moved_rows();
+  }
+}
+
+void refresh_arrived(const World& world, WorldState& state) noexcept {
+  std::size_t left = kArrivedQueries;
+  for (std::size_t o = 0; o < state.soft.size(); ++o) {
+    voxel::SoftObject& object = *state.soft[o];
+    if (object.obstacles().empty() || object.moved_rows().empty()) continue;
+    LooksDue due(state, o);
+    for (const voxel::RowId row : object.moved_rows()) {
+      const auto [first, last] = object.lattice().surface_in(row);
+      for (std::uint32_t s = first; s < last; ++s) due.consider(s);
+    }
+    const double depth = kInside * object.lattice().min_spacing_m();
+    std::array<std::uint32_t, kArrivedQueries> inside{};
+    std::size_t count = 0;
+    const std::size_t looks = std::min(left, due.count());
+    for (std::size_t n = 0; n < looks; ++n) {
+      const std::uint32_t s = due[n];
+      renew_obstacle(world, state, o, s);
+      const voxel::Obstacle& now = object.obstacles()[s];
+      const glm::dvec3 u = object.state().at(object.lattice().surface()[s]);
+      if (now.normal != glm::vec3(0.0F) &&
+          glm::dot(glm::dvec3(now.normal), u) < static_cast<double>(now.bound) - depth)
+        inside[count++] = s;
+    }
+    left -= looks;
+    if (count > 0) object.leave_obstacles(std::span(inside).first(count));
     object.forget_moved_rows();
   }
 }

@@ -18,6 +18,10 @@ std::size_t find_obstacles(const World& world, WorldState& state, std::size_t so
 // a slice of all. (By turns, and each whenever it had moved a quarter of its spacing, voxels far from
 // everything took the looks of those that arrived: tissue thrown at a plate at 1 m/s went in by its spacing.)
 void refresh_obstacles(const World& world, WorldState& state) noexcept;
+// The same where what was relaxed apart arrived in this tick, which may be far from where it was. What is in
+// a surface that it did not know leaves it at once. (Left to the next result, a brain that came down on the
+// skull was in it by a tenth of a cell.)
+void refresh_arrived(const World& world, WorldState& state) noexcept;
 
 // In the tick: finds pairs of voxels of different objects that meet (a slice of the surface a tick), relaxes
 // all pairs, and lets go of those that parted.

@@ -303,6 +303,7 @@ TickResult haptic_tick(const World& world, WorldState& state, const device::Devi
   relax_background(world, state);
   clock.done(Stage::background);
   if (state.apart.elsewhere_us > 0.0) clock.leave_out(Stage::background, state.apart.elsewhere_us);
+  refresh_arrived(world, state);
 
   // Last of all that moves tissue: nothing overlaps as a tick ends. And the tool after it, because one object
   // may push the other back into its way.

@@ -18,6 +18,7 @@
 #include "voxel/couplings.h"
 #include "voxel/displacement.h"
 #include "voxel/hats.h"
+#include "voxel/holds.h"
 #include "voxel/lattice.h"
 #include "voxel/links.h"
 #include "voxel/row_kernels.h"
@@ -65,8 +66,10 @@ class Multigrid {
   [[nodiscard]] BrickLoads& bricks() { return bricks_; }
   [[nodiscard]] const BrickLoads& bricks() const { return bricks_; }
 
-  // What the tool and other objects hold does not move, nor do the cells around it on coarser levels.
-  void set_held(std::span<const VoxelId> held) noexcept;
+  // What the tool and other objects hold does not move, and holds on to the cells around it.
+  void set_held(std::span<const VoxelId> held) noexcept { holds_->set_held(held); }
+  // So does what lies pressed on obstacles, as residuals found it since.
+  void renew_holds() noexcept { holds_->renew(); }
   // Held voxels hold the cells above them as many times harder: what a cycle that overshot asks for.
   void set_hold(float times) noexcept { hold_ = times; }
   // Cells held because a chain at its limit holds a voxel in them, until this is called.
@@ -160,23 +163,17 @@ class Multigrid {
   struct Level {
     std::unique_ptr<Couplings> couplings;
     // [axis][cell]; those of level 0 are elsewhere. `told` is the value that what the cell holds knows of, so
-    // value − told is what it has yet to hear.
-    std::array<LazyArray<float>, 3> value, told, load;
+    // value − told is what it has yet to hear. `loaded_at` is what was told when the load was found: what
+    // holds the cell pulls from there on. (From what is told now on, cells beside a cycle's box went a little
+    // further in every cycle, as if nothing held them.)
+    std::array<LazyArray<float>, 3> value, told, load, loaded_at;
     LazyArray<std::uint8_t> stopped;  // [cell or voxel] bits 0 to 2: held by a limit on that axis
-    // [axis][cell] voxels in it that are held, in parts of kHeld, and how hard they hold it, in units of all
-    // its springs.
-    std::array<LazyArray<std::uint32_t>, 3> held;
-    std::array<LazyArray<float>, 3> hold;
-    LazyArray<std::uint16_t> row_held;  // [row] how many of these are not 0
-    LazyArray<std::uint8_t> flags;      // [row]
+    LazyArray<std::uint8_t> flags;    // [row]
   };
   struct StoppedCell {
     std::uint8_t level;
     VoxelId cell;
   };
-  // How much of a voxel is held, by axis; kHeld: it does not move along that.
-  static constexpr std::uint8_t kHeld = 255;
-  using HeldParts = std::array<std::uint8_t, 3>;
   static constexpr float kLeastLoad = 0.25F;  // of the tolerance: loads less wrong than this are right
 
   [[nodiscard]] Level& at(int level) { return levels_[static_cast<std::size_t>(level)]; }
@@ -185,9 +182,6 @@ class Multigrid {
   void spread(int level, RowId row, std::uint8_t flags) noexcept;
   void note_change(int level, RowId row, float change) noexcept;
   void stop_cells(VoxelId v, std::uint8_t bits) noexcept;
-  void hold_cells(VoxelId v, const HeldParts& more, const HeldParts& less) noexcept;
-  void hold_anchored() noexcept;
-  void support(VoxelId v, const HeldParts& parts) noexcept;
   void balance_obstacles(RowId row, const Displacement& state, const ObstacleView& obstacles, OctetSpan span,
                          RowResidual& found, RowVector& out) noexcept;
   [[nodiscard]] LevelRow row_of(int level, RowId row, Displacement& state) noexcept;
@@ -213,9 +207,7 @@ class Multigrid {
   BrickLoads bricks_;
   std::vector<Level> levels_;
   Hats hats_;
-  std::vector<VoxelId> held_;
-  LazyArray<HeldParts> supported_;         // [voxel] by its obstacle
-  LazyArray<std::uint8_t> row_supported_;  // [row] 1: a voxel of it was
+  std::unique_ptr<Holds> holds_;
   std::vector<StoppedCell> stopped_;
   // [axis][voxel] its own load and what balances it (N), in rows where something does
   std::array<LazyArray<float>, 3> balance_;

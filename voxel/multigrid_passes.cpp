@@ -34,10 +34,10 @@ LevelRow Multigrid::row_of(int level, RowId row, Displacement& state) noexcept {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     r.u[axis] = l.value[axis].data() + begin;
     r.load[axis] = l.load[axis].data() + begin;
-    r.told[axis] = l.told[axis].data() + begin;
+    r.held_at[axis] = l.loaded_at[axis].data() + begin;
   }
-  for (std::size_t axis = 0; axis < 3 && l.row_held[row] != 0; ++axis)
-    r.hold[axis] = l.hold[axis].data() + begin;
+  for (std::size_t axis = 0; axis < 3 && holds_->any(level, row); ++axis)
+    r.hold[axis] = holds_->hold(level, row, axis);
   r.hold_times = hold_;
   if (has(level, row, limited)) r.stopped = l.stopped.data() + begin;
   return r;
@@ -199,7 +199,7 @@ void Multigrid::balance_obstacles(RowId row, const Displacement& state, const Ob
              last = static_cast<std::size_t>(span.last) * kOctet + kOctet;
   for (std::size_t i = first; i < last; ++i) {
     const auto v = static_cast<VoxelId>(row * kRow + i);
-    HeldParts parts{};
+    Holds::Parts parts{};
     if (state.role[v] == Displacement::obstacle && blocked(obstacles, state, v, touching)) {
       const glm::vec3 n = obstacles.of(v).normal;
       const float into = out[0][i] * n.x + out[1][i] * n.y + out[2][i] * n.z;
@@ -208,10 +208,10 @@ void Multigrid::balance_obstacles(RowId row, const Displacement& state, const Ob
         found.resisted[ua] &= ~(1U << i);
         if (into >= 0.0F) continue;
         out[ua][i] -= into * n[axis];
-        parts[ua] = static_cast<std::uint8_t>(std::lround(kHeld * std::min(n[axis] * n[axis], 1.0F)));
+        parts[ua] = static_cast<std::uint8_t>(std::lround(Holds::kWhole * std::min(n[axis] * n[axis], 1.0F)));
       }
     }
-    support(v, parts);
+    holds_->support(v, parts);
   }
 }
 
@@ -223,7 +223,7 @@ RowResidual Multigrid::residual_of(int level, RowId row, Displacement& state, co
   const RowLimits limits = couplings().limits(row);
   const float tight = kTight * static_cast<float>(lattice_.min_spacing_m());
   RowResidual found = residual_row(r, &limits, tight, span, out);
-  if (state.row_obstacles[row] != 0 || row_supported_[row] != 0) {
+  if (state.row_obstacles[row] != 0 || holds_->supports(row)) {
     balance_obstacles(row, state, obstacles, span, found, out);
     measure_row(r.springs, out, span, found);
   }
@@ -261,6 +261,12 @@ float Multigrid::restrict_loads(int level, RowId row, Displacement& state, const
   }
   log_.note(level, row);
   take_loads(told_row(level, row), sums, loads(level, row), span);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::size_t begin =
+        static_cast<std::size_t>(row) * kRow + static_cast<std::size_t>(span.first) * kOctet;
+    std::copy_n(at(level).told[axis].data() + begin, (span.last - span.first + 1) * kOctet,
+                at(level).loaded_at[axis].data() + begin);
+  }
   spread(level, row, active | dirty);
   return worst;
 }
@@ -399,6 +405,10 @@ void Multigrid::tell_row(int level, RowId row, const std::array<HatRow, 4>& hats
   span.first = std::max(span.first, (std::max(2 * first - 1, origin) - origin) / kOctet);
   span.last = std::min(span.last, (2 * last + 2 - origin) / kOctet);
   if (span.first > span.last) return;
+  for (std::size_t axis = 0; axis < 3 && level > 0 && holds_->any(level, row); ++axis) {
+    const float* nearer = holds_->nearer(level, row, axis);
+    for (std::size_t i = 0; i < kRow; ++i) correction[axis][i] /= 1.0F + nearer[i];
+  }
   LevelRow r = row_of(level, row, state);
   log_.note(level, row);
   RowCorrection done;

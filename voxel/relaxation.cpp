@@ -434,6 +434,7 @@ void Relaxation::cycle(Displacement& state, const ObstacleView& obstacles, Look 
       const float worst = multigrid_.restrict_loads(l + 1, row, state, obstacles, span);
       if (l == 0) running_residual_N_ = std::max(running_residual_N_, static_cast<double>(worst));
     });
+    if (l == 0) multigrid_.renew_holds();
   }
   const int sweeps = apart_ ? kContactSweeps : kCoarsestSweeps;
   for (int n = 0; n < 2 * sweeps; ++n) smooth_box(last, n & 1, state, obstacles, look);

@@ -37,7 +37,6 @@ Replica::Replica(SoftObject& object)
       distance_(lattice_.grid().rows()),
       by_distance_(lattice_.grid().rows()),
       given_(lattice_.grid().rows()),
-      is_given_(lattice_.grid().rows()),
       found_{Parcel(lattice_.grid().rows(), arrays_of(lattice_)),
              Parcel(lattice_.grid().rows(), arrays_of(lattice_))} {
   multigrid().keep_log();
@@ -65,13 +64,18 @@ Replica::Replica(SoftObject& object)
 
 void Replica::give(SoftObject& object) noexcept {
   ChangeLog& log = object.relaxation_.multigrid().log();
-  for (std::size_t n = 0; n < given_.count(); ++n) is_given_[given_.row(n)] = 0;
   given_.clear();
+  const Parcel& found = found_[taking_];
   for (const RowId row : log.rows(0)) {
     float* to = given_.add(row);
-    is_given_[row] = 1;
     for (std::size_t axis = 0; axis < 3; ++axis)
       std::copy_n(object.state_.u[axis].data() + at(row), kRow, to + axis * kRow);
+    // As it will be once it is drained: without that, a row would be torn from those around it, which are
+    // known here with what they have yet to go; it would be mended, and so go that way twice. (The better a
+    // cycle was, the longer that went to and fro: a brain that hung free swung by a millimeter for ever.)
+    const std::size_t n = found.find(row);
+    if (n < drained_ || n == found.count()) continue;
+    for (std::size_t i = 0; i < std::size_t{3} * kRow; ++i) to[i] += found.values(n)[i];
   }
   given_roles_.clear();
   given_obstacles_.clear();
@@ -207,7 +211,8 @@ void Replica::take_row(SoftObject& object, std::size_t n) noexcept {
     bricks.row[row] = 1;
   }
   to.add(row, ways, object.state_, object.obstacle_view());
-  bool as_found = is_given_[row] == 0;  // it was given before this came, so without it
+  object.note_moved(row);
+  bool as_found = true;
   for (std::size_t axis = 0; axis < 3 && as_found; ++axis)
     as_found = std::equal(wanted[axis].begin(), wanted[axis].end(), object.state_.u[axis].data() + at(row));
   if (!as_found) to.log().note(0, row);
@@ -215,7 +220,6 @@ void Replica::take_row(SoftObject& object, std::size_t n) noexcept {
 
 void Replica::take(SoftObject& object) noexcept {
   taking_ = 1 - taking_;
-  for (std::size_t n = 0; n < given_.count(); ++n) is_given_[given_.row(n)] = 0;
   object.relaxation_.take_over(residual_N_);
   for (drained_ = 0; drained_ < near_count_; ++drained_) take_row(object, drained_);
   if (!at_rest_ || !drained()) object.relaxation_.wake();
@@ -229,7 +233,7 @@ std::size_t Replica::memory_bytes() const {
   std::size_t bytes = relaxation_.memory_bytes() + obstacles_.size() * sizeof(Obstacle) +
                       state_.role.resident_bytes() + state_.row_held.resident_bytes() +
                       state_.row_obstacles.resident_bytes() + given_.memory_bytes() +
-                      is_given_.resident_bytes() + distance_.resident_bytes() + by_distance_.resident_bytes();
+                      distance_.resident_bytes() + by_distance_.resident_bytes();
   for (const Parcel& parcel : found_) bytes += parcel.memory_bytes();
   for (std::size_t axis = 0; axis < 3; ++axis)
     bytes += state_.u[axis].resident_bytes() + before_[axis].resident_bytes();

@@ -74,28 +74,35 @@ class Replica {
    public:
     // Of each row `arrays` of them, [array][lane].
     explicit Parcel(std::size_t rows, std::size_t arrays = 3)
-        : floats_(arrays * kRow), rows_(rows), values_(rows * floats_) {}
-    void clear() noexcept { count_ = 0; }
+        : floats_(arrays * kRow), rows_(rows), values_(rows * floats_), after_(rows) {}
+    void clear() noexcept {
+      while (count_ > 0) drop_last();
+    }
     [[nodiscard]] float* add(RowId row) noexcept {
       rows_[count_] = row;
+      after_[row] = static_cast<std::uint32_t>(count_ + 1);
       return values_.data() + floats_ * count_++;
     }
-    void drop_last() noexcept { --count_; }
+    void drop_last() noexcept { after_[rows_[--count_]] = 0; }
     [[nodiscard]] std::size_t count() const { return count_; }
+    // Where a row is in it; count() where it is not.
+    [[nodiscard]] std::size_t find(RowId row) const { return after_[row] == 0 ? count_ : after_[row] - 1; }
     [[nodiscard]] RowId row(std::size_t n) const { return rows_[n]; }
     [[nodiscard]] const float* values(std::size_t n) const { return values_.data() + floats_ * n; }
     void populate() noexcept {
       rows_.populate();
       values_.populate();
+      after_.populate();
     }
     [[nodiscard]] std::size_t memory_bytes() const {
-      return rows_.resident_bytes() + values_.resident_bytes();
+      return rows_.resident_bytes() + values_.resident_bytes() + after_.resident_bytes();
     }
 
    private:
     std::size_t floats_;
     LazyArray<RowId> rows_;
     LazyArray<float> values_;
+    LazyArray<std::uint32_t> after_;  // [row] the entries up to its own; 0: it is not in there
     std::size_t count_ = 0;
   };
   struct GivenRole {
@@ -130,8 +137,7 @@ class Replica {
 
   // ---- what goes over ----
   Parcel given_;
-  LazyArray<std::uint8_t> is_given_;  // [row] 1: it is in there
-  std::array<Parcel, 2> found_;       // what is drained, and what is found meanwhile: ways, loads of bricks
+  std::array<Parcel, 2> found_;  // what is drained, and what is found meanwhile: ways, loads of bricks
   std::vector<GivenRole> given_roles_;
   std::vector<GivenObstacle> given_obstacles_;
   std::vector<VoxelId> given_held_;

@@ -154,7 +154,7 @@ HYBRID_INLINE unsigned smooth_freely(const LevelRow& row, const RowLimits* limit
         Octet wanted = (kxd * x_down + kxu * x_up + beside[axis][n]) * inverse;
         if (row.hold[axis] != nullptr) {
           Octet told, hold;
-          load(told, row.told[axis] + octet * kOctet);
+          load(told, row.held_at[axis] + octet * kOctet);
           load(hold, row.hold[axis] + octet * kOctet);
           hold *= row.hold_times;
           wanted += (told - wanted) * (hold / (1.0F + hold));
@@ -236,7 +236,7 @@ HYBRID_INLINE void residual_axis(RowResidual& result, const LevelRow& row, const
     if (row.hold[axis] != nullptr) {
       Octet hold, told;
       load(hold, row.hold[axis] + octet * kOctet);
-      load(told, row.told[axis] + octet * kOctet);
+      load(told, row.held_at[axis] + octet * kOctet);
       const Octet safe = inverse == 0.0F ? Octet{} + 1.0F : inverse;
       r += row.hold_times * hold / safe * (told - at.own);
     }

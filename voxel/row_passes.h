@@ -23,9 +23,9 @@ struct LevelRow {
   RowCouplings springs;
   const std::uint8_t* held = nullptr;     // [lane] bit 0: does not move; null: all may
   const std::uint8_t* stopped = nullptr;  // [lane] bit `axis`: does not move on that axis; null: all may
-  // [axis] A spring to `told`, as many times as stiff as all links of the cell; all null: none has one.
+  // [axis] A spring to `held_at`, as many times as stiff as all links of the cell; all null: none has one.
   std::array<const float*, 3> hold{};
-  std::array<const float*, 3> told{};
+  std::array<const float*, 3> held_at{};
   float hold_times = 1.0F;
 };
 

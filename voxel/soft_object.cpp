@@ -151,13 +151,13 @@ void SoftObject::settle_chain() noexcept {
   }
   chain_.settle(state_, sources_, moves_, obstacles_);
   for (const RowId row : chain_.moved_rows()) relaxation_.stir(row);
-  if (obstacles_.empty()) return;
-  for (const RowId row : chain_.moved_rows()) {
-    if (moved_rows_.size() == moved_rows_.capacity()) break;
-    if (row_moved_[row] != 0) continue;
-    row_moved_[row] = 1;
-    moved_rows_.push_back(row);
-  }
+  for (const RowId row : chain_.moved_rows()) note_moved(row);
+}
+
+void SoftObject::note_moved(RowId row) noexcept {
+  if (obstacles_.empty() || moved_rows_.size() == moved_rows_.capacity() || row_moved_[row] != 0) return;
+  row_moved_[row] = 1;
+  moved_rows_.push_back(row);
 }
 
 void SoftObject::forget_moved_rows() noexcept {

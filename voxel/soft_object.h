@@ -110,8 +110,8 @@ class SoftObject {
   void load_held(std::span<const VoxelId> held, std::size_t pressed, std::span<HeldLoad> loads) noexcept;
   // An obstacle that surface voxel number s lay on went away: it looks for its place.
   void stir(std::size_t surface_number) noexcept;
-  // Where there may be obstacles: rows that the chain moved since these were forgotten, each once, the first
-  // kMostMovedRows of them.
+  // Where there may be obstacles: rows that the chain moved, or what was found apart, since these were
+  // forgotten, each once, the first kMostMovedRows of them.
   static constexpr std::size_t kMostMovedRows = 1024;
   [[nodiscard]] std::span<const RowId> moved_rows() const { return moved_rows_; }
   void forget_moved_rows() noexcept;
@@ -195,6 +195,7 @@ class SoftObject {
 
   [[nodiscard]] Gap gap(const ToolInBody& tool, const glm::dvec3& position) const noexcept;
   void settle_chain() noexcept;
+  void note_moved(RowId row) noexcept;
   [[nodiscard]] Displacement::Role resting_role(VoxelId v) const noexcept;  // when no tool presses it
   [[nodiscard]] bool pair_held(VoxelId v) const { return pair_held_[lattice_->surface_number(v)] != 0; }
   void set_touch_roles() noexcept;

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// How hard what does not move holds on to the cells around it, on every coarse level: what the tool holds,
+// what lies pressed on an obstacle, along its normal, and anchors.
+//
+// A voxel that is free and linked to one that is not is a spring from its cell to where it is. Seen from the
+// middle of the next coarser cell, half a link of its level further away, that spring is in series with
+// those: so a plane that is held stays where it is on every level, and a voxel held alone holds a large cell
+// by about what it takes to move it in a lattice without end (3.96 of its links; Cserti, Am. J. Phys. 68,
+// 2000). Each axis, and links in each direction, by themselves.
+//
+// (Rejected: as a disc holds on to a half-space, in units of all springs of the cell, times what kept cycles
+// from swinging. Cycles left 0.85 of the error in a block of one material; and where a stiff piece was in the
+// cell, too, it was held that much harder, so that layers 64 times as stiff kept 0.99. Cells that stand still
+// as a whole: a brain that stands on its stem was tied to all of its coarsest cell. Cells that know nothing
+// of it: a brain pressed onto the skull swung for ever.)
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "voxel/couplings.h"
+#include "voxel/lattice.h"
+#include "voxel/lazy_array.h"
+
+namespace voxel {
+
+class Holds {
+ public:
+  // How much of a voxel is held, by axis; kWhole: it does not move along that.
+  static constexpr std::uint8_t kWhole = 255;
+  using Parts = std::array<std::uint8_t, 3>;
+
+  // `levels`: level 0 first; kept by the caller. Allocates.
+  Holds(const Lattice& lattice, const std::vector<Couplings*>& levels);
+
+  // What the tool and other objects hold. Of more than there are surface voxels the first.
+  void set_held(std::span<const VoxelId> held) noexcept;
+  // So much of voxel v is held by its obstacle; takes effect with renew().
+  void support(VoxelId v, const Parts& parts) noexcept;
+  [[nodiscard]] bool supports(RowId row) const { return row_supported_[row] != 0; }
+  void renew() noexcept;
+
+  // ---- of coarse rows ----
+  [[nodiscard]] bool any(int level, RowId row) const { return at(level).row_held[row] != 0; }
+  // [lane] by a spring so many times as stiff as all springs of the cell.
+  [[nodiscard]] const float* hold(int level, RowId row, std::size_t axis) const {
+    return at(level).hold[axis].data() + static_cast<std::size_t>(row) * kRow;
+  }
+  // [lane] Of what it is told a cell follows by the 1 / (1 + this)th part: it is nearer to what holds it than
+  // the middle of the cell that tells. (Told all of it, cells beside an anchor overshot by as much, on every
+  // level: 0.23 of the error left with three levels, and 1 with seven.)
+  [[nodiscard]] const float* nearer(int level, RowId row, std::size_t axis) const {
+    return at(level).nearer[axis].data() + static_cast<std::size_t>(row) * kRow;
+  }
+  // Takes all memory now, not when a tick first needs it.
+  void populate() noexcept;
+  [[nodiscard]] std::size_t memory_bytes() const;
+
+ private:
+  using Through = std::array<std::array<float, 3>, 3>;  // [axis][d] a spring, of links in d (N/m)
+  struct Level {
+    Couplings* couplings = nullptr;
+    std::array<std::array<LazyArray<float>, 3>, 3> through;  // [axis][d][cell]
+    std::array<LazyArray<float>, 3> hold, nearer;            // [axis][cell]
+    LazyArray<std::uint16_t> row_held;                       // [row] how many of these are not 0
+    LazyArray<std::uint8_t> queued;                          // [cell] 1: it is in its queue
+  };
+
+  [[nodiscard]] Level& at(int level) { return levels_[static_cast<std::size_t>(level)]; }
+  [[nodiscard]] const Level& at(int level) const { return levels_[static_cast<std::size_t>(level)]; }
+  [[nodiscard]] Parts parts_of(VoxelId v) const noexcept {
+    return held_mark_[v] != 0 || lattice_.anchored(v) ? Parts{kWhole, kWhole, kWhole} : supported_[v];
+  }
+  void look_at(VoxelId v) noexcept;
+  void queue(int level, VoxelId cell) noexcept;
+  void renew_first(VoxelId cell) noexcept;
+  void renew_above(int level, VoxelId cell) noexcept;
+  void set(int level, VoxelId cell, const std::array<int, 3>& place, const Through& through,
+           const std::array<bool, 3>& immovable) noexcept;
+
+  const Lattice& lattice_;
+  std::vector<Level> levels_;
+  std::vector<VoxelId> held_;
+  LazyArray<std::uint8_t> held_mark_;          // [voxel]
+  LazyArray<Parts> supported_;                 // [voxel]
+  LazyArray<std::uint8_t> row_supported_;      // [row] 1: a voxel of it was
+  std::array<std::vector<VoxelId>, 2> queue_;  // cells of a level, and of the next, that are to be looked at
+};
+
+}  // namespace voxel
