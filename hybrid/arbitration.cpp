@@ -15,7 +15,7 @@ namespace {
 constexpr std::uint32_t kObstacleSlice = 256;  // surface voxels whose motion is looked at a tick
 constexpr std::size_t kObstacleQueries = 24;   // exact queries a tick
 // … where a result arrived (with 24, 4.4 % of a cell of overlap in `head`; with these 3 %).
-constexpr std::size_t kArrivedQueries = 48;
+constexpr std::size_t kArrivedQueries = 64;
 constexpr double kInside = 0.01;  // of the spacing: deeper in a surface a voxel leaves it
 // A voxel looks again when it has moved by so many spacings, or to within so many of where it might meet a
 // rigid surface that it has not seen.

@@ -95,8 +95,8 @@ class Relaxation {
   // newton); below the tolerance it is only known to be that.
   [[nodiscard]] double residual_N() const { return residual_N_; }
   // Cycles stop when the residual falls below this (unit: newton), or has not fallen for a while: what chain
-  // limits hold has a residual that no relaxation removes. Default: kRestingResidual of the lattice's force
-  // scale.
+  // limits hold has a residual that no relaxation removes. Default: half of kRestingResidual of the lattice's
+  // force scale, so that no more than that is left.
   void set_tolerance(double tolerance_N) noexcept;
   // Cycles over all that moves.
   [[nodiscard]] std::uint64_t cycles() const { return cycles_; }

@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What holds coarse cells, and with it how much of its error a cycle leaves.
+#include "voxel/holds.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <iostream>
+#include <memory>
+#include <random>
+#include <vector>
+
+#include "tests/voxel/lattice_scenes.h"
+#include "voxel/displacement.h"
+#include "voxel/relaxation.h"
+
+namespace {
+
+using tests::elastic;
+using voxel::Couplings;
+using voxel::Displacement;
+using voxel::Holds;
+using voxel::LabelVolume;
+using voxel::Lattice;
+using voxel::LatticeOptions;
+using voxel::Relaxation;
+using voxel::VoxelId;
+
+constexpr double kH = 1e-3;  // spacing (m)
+
+LabelVolume block(const std::array<int, 3>& dims) {
+  return tests::block(dims, glm::dvec3(kH));
+}
+
+struct Levels {
+  explicit Levels(const Lattice& lattice) {
+    for (int n = 0; n < 4; ++n) {
+      levels.push_back(std::make_unique<Couplings>(lattice, n == 0 ? nullptr : levels.back().get()));
+      pointers.push_back(levels.back().get());
+    }
+  }
+  // Of a cell, in units of one link of the voxels across the held plane (N/m).
+  double hold(const Holds& holds, int level, VoxelId cell, int axis) {
+    const voxel::VoxelSprings springs = pointers[static_cast<std::size_t>(level)]->springs_of(cell);
+    return static_cast<double>(
+               holds.hold(level, cell / voxel::kRow, static_cast<std::size_t>(axis))[cell % voxel::kRow]) /
+           static_cast<double>(springs.inverse[static_cast<std::size_t>(axis)]);
+  }
+  std::vector<std::unique_ptr<Couplings>> levels;
+  std::vector<Couplings*> pointers;
+};
+
+// A plane that is held is as far from the middle of a cell on each level as it is: (2^l − 1) / 2 links of the
+// voxels, 4^l of them side by side. Seen from either side, along each axis.
+TEST(Holds, APlaneStaysWhereItIsOnEveryLevel) {
+  LatticeOptions options;
+  options.materials[1] = elastic(1e4, 0.3);
+  options.anchor_faces = {"-z"};
+  const Lattice lattice(block({32, 32, 32}), options);
+  Levels levels(lattice);
+  const Holds holds(lattice, levels.pointers);
+  const voxel::Spring link = lattice.spring_within(1, 2);
+  for (int level = 1; level < 4; ++level) {
+    const voxel::Grid& g = levels.pointers[static_cast<std::size_t>(level)]->grid();
+    const int middle = g.dims[0] / 2;
+    const double links = std::ldexp(1.0, 2 * level) / (0.5 * (std::ldexp(1.0, level) - 1.0));
+    for (int axis = 0; axis < 3; ++axis) {
+      const double one = static_cast<double>(link.on(axis, 2));
+      EXPECT_NEAR(levels.hold(holds, level, g.at(middle, middle, 0), axis), links * one, 1e-4 * links * one)
+          << level << ' ' << axis;
+      EXPECT_EQ(levels.hold(holds, level, g.at(middle, middle, 1), axis), 0.0);
+    }
+  }
+}
+
+// Whatever came and went before: what is held now is all that counts.
+TEST(Holds, DependOnWhatIsHeldAlone) {
+  LatticeOptions options;
+  options.materials[1] = elastic(1e4, 0.3);
+  options.anchor_faces = {"-z"};
+  const Lattice lattice(block({24, 20, 18}), options);
+  Levels levels(lattice);
+  Holds changed(lattice, levels.pointers);
+  std::mt19937 random(5);
+  const auto some = [&] {
+    std::vector<VoxelId> held;
+    for (int n = 0; n < 12; ++n)
+      held.push_back(lattice.grid().at(static_cast<int>(random() % 24), static_cast<int>(random() % 20), 17));
+    return held;
+  };
+  for (int n = 0; n < 30; ++n) {
+    const std::vector<VoxelId> held = some();
+    changed.set_held(held);
+    const VoxelId pressed = some().front();
+    changed.support(pressed, {0, 100, 255});
+    changed.renew();
+    Holds fresh(lattice, levels.pointers);
+    fresh.set_held(held);
+    fresh.support(pressed, {0, 100, 255});
+    fresh.renew();
+    for (int level = 1; level < 4; ++level) {
+      const voxel::Grid& g = levels.pointers[static_cast<std::size_t>(level)]->grid();
+      for (voxel::RowId row = 0; row < g.rows(); ++row) {
+        ASSERT_EQ(changed.any(level, row), fresh.any(level, row));
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          for (int i = 0; i < voxel::kRow; ++i) {
+            ASSERT_EQ(changed.hold(level, row, axis)[i], fresh.hold(level, row, axis)[i]);
+            ASSERT_EQ(changed.nearer(level, row, axis)[i], fresh.nearer(level, row, axis)[i]);
+          }
+        }
+      }
+    }
+    changed.support(pressed, {});
+  }
+}
+
+// Six cycles over a block that was bent as a whole, and is to come back to 0: what each leaves of the error,
+// in energy, on the mean.
+double left_by_a_cycle(const std::array<int, 3>& dims, int patch) {
+  LatticeOptions options;
+  options.materials[1] = {
+      .young_Pa = 1e4, .poisson = 0.3, .stretch_min = 1e-3, .stretch_max = 1e3, .shear = 1e3};
+  options.anchor_faces = {"-z"};
+  const Lattice lattice(block(dims), options);
+  Displacement state(lattice);
+  std::vector<VoxelId> held;
+  for (int k = 1; k < dims[2]; ++k) {
+    for (int j = 0; j < dims[1]; ++j) {
+      for (int i = 0; i < dims[0]; ++i) {
+        const VoxelId v = lattice.grid().at(i, j, k);
+        if (k == dims[2] - 1 && 2 * std::abs(i - dims[0] / 2) < patch &&
+            2 * std::abs(j - dims[1] / 2) < patch) {
+          state.set_role(v, Displacement::held);
+          held.push_back(v);
+          continue;
+        }
+        for (auto& axis : state.u)
+          axis[v] = static_cast<float>(0.1 * kH * std::sin(1.5 * static_cast<double>(k) / (dims[2] - 1)));
+      }
+    }
+  }
+  const auto energy = [&] {
+    double sum = 0.0;
+    for (VoxelId v = 0; v < lattice.size(); ++v) {
+      for (int d = 0; d < 3 && lattice.filled(v); ++d) {
+        const VoxelId w = lattice.up(v, d);
+        if (!lattice.filled(w)) continue;
+        const voxel::Spring spring = lattice.spring(v, d);
+        for (int axis = 0; axis < 3; ++axis) {
+          const auto& u = state.u[static_cast<std::size_t>(axis)];
+          const double stretch = static_cast<double>(u[w]) - static_cast<double>(u[v]);
+          sum += 0.5 * static_cast<double>(spring.on(axis, d)) * stretch * stretch;
+        }
+      }
+    }
+    return sum;
+  };
+  Relaxation relaxation(lattice);
+  relaxation.set_tolerance(1e-12 * lattice.force_scale_N());
+  relaxation.stir_all();
+  constexpr int kCycles = 6;
+  const double before = energy();
+  for (int n = 0; n < kCycles; ++n) {
+    relaxation.wake();
+    relaxation.run_cycle(state, {}, held);
+  }
+  return std::pow(energy() / before, 0.5 / kCycles);
+}
+
+TEST(Holds, ACycleLeavesAsLittleOfTheErrorAtAnySize) {
+  for (const int size : {8, 16, 32, 64}) {
+    const double left = left_by_a_cycle({size, size, size}, 0);
+    std::cout << size << " voxels an edge: " << left << '\n';
+    EXPECT_LT(left, 0.3) << size;
+  }
+  for (const int size : {9, 17, 33, 61}) {  // a cell of one layer on every level, or on some
+    const double left = left_by_a_cycle({size, size, size}, 0);
+    std::cout << size << " voxels an edge: " << left << '\n';
+    EXPECT_LT(left, 0.45) << size;
+  }
+  EXPECT_LT(left_by_a_cycle({1, 1, 64}, 0), 0.33);
+}
+
+TEST(Holds, ACycleRoundWhatTheToolHoldsLeavesNoMore) {
+  for (const int patch : {1, 5, 9, 17}) {
+    const double left = left_by_a_cycle({33, 31, 30}, patch);
+    std::cout << patch << " voxels held: " << left << '\n';
+    EXPECT_LT(left, 0.45) << patch;
+  }
+}
+
+}  // namespace
