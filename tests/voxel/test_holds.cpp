@@ -84,6 +84,7 @@ TEST(Holds, DependOnWhatIsHeldAlone) {
   std::mt19937 random(5);
   const auto some = [&] {
     std::vector<VoxelId> held;
+    held.reserve(12);
     for (int n = 0; n < 12; ++n)
       held.push_back(lattice.grid().at(static_cast<int>(random() % 24), static_cast<int>(random() % 20), 17));
     return held;
