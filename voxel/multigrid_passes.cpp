@@ -407,7 +407,9 @@ void Multigrid::tell_row(int level, RowId row, const std::array<HatRow, 4>& hats
   if (span.first > span.last) return;
   for (std::size_t axis = 0; axis < 3 && level > 0 && holds_->any(level, row); ++axis) {
     const float* nearer = holds_->nearer(level, row, axis);
-    for (std::size_t i = 0; i < kRow; ++i) correction[axis][i] /= 1.0F + nearer[i];
+    for (std::size_t i = static_cast<std::size_t>(span.first) * kOctet;
+         i < static_cast<std::size_t>(span.last + 1) * kOctet; ++i)
+      correction[axis][i] /= 1.0F + nearer[i];
   }
   LevelRow r = row_of(level, row, state);
   log_.note(level, row);

@@ -39,7 +39,7 @@ struct Levels {
       pointers.push_back(levels.back().get());
     }
   }
-  // Of a cell, in units of one link of the voxels across the held plane (N/m).
+  // Of a cell (N/m).
   double hold(const Holds& holds, int level, VoxelId cell, int axis) {
     const voxel::VoxelSprings springs = pointers[static_cast<std::size_t>(level)]->springs_of(cell);
     return static_cast<double>(
