@@ -46,12 +46,16 @@ struct Displacement {
     free = 0,
     held = 1,      // near the tool or another soft object: moved by the contact solver only
     obstacle = 2,  // near a rigid surface: also subject to n·u >= c
+    pressed = 3,   // on the tool, and nothing else: slides along it (see sliding.h)
   };
+  // Those that stand while their rows are relaxed.
+  [[nodiscard]] static bool stands(std::uint8_t role) noexcept { return (role & 1U) != 0; }
 
   explicit Displacement(const Lattice& lattice)
       : role(lattice.size()),
         row_held(lattice.grid().rows()),
         row_obstacles(lattice.grid().rows()),
+        tool_normal(lattice.surface().size()),
         rest(lattice),
         bricks(lattice) {
     for (auto& axis : u) axis = LazyArray<float>(lattice.size());
@@ -59,7 +63,8 @@ struct Displacement {
 
   std::array<LazyArray<float>, 3> u;                // [axis][v] (unit: meter)
   LazyArray<std::uint8_t> role;                     // [v]
-  LazyArray<std::uint8_t> row_held, row_obstacles;  // [row]: voxels of the row with that role
+  LazyArray<std::uint8_t> row_held, row_obstacles;  // [row]: voxels of the row that stand; with obstacles
+  LazyArray<glm::vec3> tool_normal;                 // [surface number] from the tool, unit; of those pressed
   RestOffsets rest;
   BrickLoad bricks;
 
@@ -76,7 +81,7 @@ struct Displacement {
   void set_role(VoxelId v, Role r) {
     if (role[v] == r) return;  // untouched tissue stays unwritten
     const RowId row = v / kRow;
-    row_held[row] = static_cast<std::uint8_t>(row_held[row] + (r == held) - (role[v] == held));
+    row_held[row] = static_cast<std::uint8_t>(row_held[row] + stands(r) - stands(role[v]));
     row_obstacles[row] =
         static_cast<std::uint8_t>(row_obstacles[row] + (r == obstacle) - (role[v] == obstacle));
     role[v] = r;

@@ -17,6 +17,7 @@
 
 #include <array>
 #include <cstdint>
+#include <glm/vec3.hpp>
 #include <span>
 #include <vector>
 
@@ -28,17 +29,23 @@ namespace voxel {
 
 class Holds {
  public:
-  // How much of a voxel is held, by axis; kWhole: it does not move along that.
-  static constexpr std::uint8_t kWhole = 255;
-  using Parts = std::array<std::uint8_t, 3>;
+  // How a voxel is held: not, altogether, or along a normal, while it slides across that.
+  struct Support {
+    enum class By : std::uint8_t { nothing, normal, all } by = By::nothing;
+    std::array<std::int8_t, 3> n{};  // in parts of kUnit, so that what hardly turns does not change
+    bool operator==(const Support&) const = default;
+  };
+  static constexpr int kUnit = 127;
+  [[nodiscard]] static Support along(const glm::vec3& normal) noexcept;
+  static constexpr Support kAll{Support::By::all, {}};
 
   // `levels`: level 0 first; kept by the caller. Allocates.
   Holds(const Lattice& lattice, const std::vector<Couplings*>& levels);
 
   // What the tool and other objects hold. Of more than there are surface voxels the first.
   void set_held(std::span<const VoxelId> held) noexcept;
-  // So much of voxel v is held by its obstacle; takes effect with renew().
-  void support(VoxelId v, const Parts& parts) noexcept;
+  // So is voxel v held by its obstacle, or by the tool it slides on; takes effect with renew().
+  void support(VoxelId v, const Support& by) noexcept;
   [[nodiscard]] bool supports(RowId row) const { return row_supported_[row] != 0; }
   void renew() noexcept;
 
@@ -54,6 +61,15 @@ class Holds {
   [[nodiscard]] const float* nearer(int level, RowId row, std::size_t axis) const {
     return at(level).nearer[axis].data() + static_cast<std::size_t>(row) * kRow;
   }
+  // Tissue on an inclined surface: what holds a cell along one axis pulls it along the others, too. Each axis
+  // by itself, it would be held three times too softly along the normal, and cycles near a contact swung, or
+  // too hard along the surface.
+  [[nodiscard]] bool tilted(int level, RowId row) const { return at(level).row_tilted[row] != 0; }
+  // Off the diagonal, of xy, xz and yz, in N/m; all 0: the axes are by themselves.
+  [[nodiscard]] std::array<float, 3> tilt(int level, VoxelId cell) const {
+    const Level& l = at(level);
+    return {l.tilt[0][cell], l.tilt[1][cell], l.tilt[2][cell]};
+  }
   // Takes all memory now, not when a tick first needs it.
   void populate() noexcept;
   [[nodiscard]] std::size_t memory_bytes() const;
@@ -65,26 +81,28 @@ class Holds {
     std::array<std::array<LazyArray<float>, 3>, 3> through;  // [axis][d][cell]
     std::array<LazyArray<float>, 3> hold, nearer;            // [axis][cell]
     LazyArray<std::uint16_t> row_held;                       // [row] how many of these are not 0
+    std::array<LazyArray<float>, 3> tilt;                    // [xy, xz, yz][cell]
+    LazyArray<std::uint16_t> row_tilted;                     // [row] cells with any
     LazyArray<std::uint8_t> queued;                          // [cell] 1: it is in its queue
   };
 
   [[nodiscard]] Level& at(int level) { return levels_[static_cast<std::size_t>(level)]; }
   [[nodiscard]] const Level& at(int level) const { return levels_[static_cast<std::size_t>(level)]; }
-  [[nodiscard]] Parts parts_of(VoxelId v) const noexcept {
-    return held_mark_[v] != 0 || lattice_.anchored(v) ? Parts{kWhole, kWhole, kWhole} : supported_[v];
+  [[nodiscard]] Support support_of(VoxelId v) const noexcept {
+    return held_mark_[v] != 0 || lattice_.anchored(v) ? kAll : supported_[v];
   }
   void look_at(VoxelId v) noexcept;
   void queue(int level, VoxelId cell) noexcept;
   void renew_first(VoxelId cell) noexcept;
   void renew_above(int level, VoxelId cell) noexcept;
   void set(int level, VoxelId cell, const std::array<int, 3>& place, const Through& through,
-           const std::array<bool, 3>& immovable) noexcept;
+           const std::array<float, 3>& tilt, const std::array<bool, 3>& immovable) noexcept;
 
   const Lattice& lattice_;
   std::vector<Level> levels_;
   std::vector<VoxelId> held_;
   LazyArray<std::uint8_t> held_mark_;          // [voxel]
-  LazyArray<Parts> supported_;                 // [voxel]
+  LazyArray<Support> supported_;               // [voxel]
   LazyArray<std::uint8_t> row_supported_;      // [row] 1: a voxel of it was
   std::array<std::vector<VoxelId>, 2> queue_;  // cells of a level, and of the next, that are to be looked at
 };

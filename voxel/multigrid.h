@@ -68,7 +68,7 @@ class Multigrid {
 
   // What the tool and other objects hold does not move, and holds on to the cells around it.
   void set_held(std::span<const VoxelId> held) noexcept { holds_->set_held(held); }
-  // So does what lies pressed on obstacles, as residuals found it since.
+  // So do the tool and obstacles what lies pressed on them, along their normals, as residuals found it since.
   void renew_holds() noexcept { holds_->renew(); }
   // Held voxels hold the cells above them as many times harder: what a cycle that overshot asks for.
   void set_hold(float times) noexcept { hold_ = times; }
@@ -182,8 +182,14 @@ class Multigrid {
   void spread(int level, RowId row, std::uint8_t flags) noexcept;
   void note_change(int level, RowId row, float change) noexcept;
   void stop_cells(VoxelId v, std::uint8_t bits) noexcept;
-  void balance_obstacles(RowId row, const Displacement& state, const ObstacleView& obstacles, OctetSpan span,
-                         RowResidual& found, RowVector& out) noexcept;
+  void balance_contacts(RowId row, Displacement& state, const ObstacleView& obstacles, OctetSpan span,
+                        RowResidual& found, RowVector& out) noexcept;
+  template <class Visit>
+  void for_tilted(int level, RowId row, const LevelRow& r, OctetSpan span, const Visit& visit) noexcept;
+  float smooth_tilted(int level, RowId row, const LevelRow& r, OctetSpan span) noexcept;
+  void add_tilt(int level, RowId row, const LevelRow& r, OctetSpan span, RowVector& out) noexcept;
+  float slide_pressed(RowId row, Displacement& state, OctetSpan span) noexcept;
+  float slide_pressed_by(RowId row, const RowVector& way, Displacement& state, OctetSpan span) noexcept;
   [[nodiscard]] LevelRow row_of(int level, RowId row, Displacement& state) noexcept;
   [[nodiscard]] LevelRow told_row(int level, RowId row) noexcept;
   [[nodiscard]] std::array<float*, 3> loads(int level, RowId row) noexcept;

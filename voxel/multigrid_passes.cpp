@@ -2,8 +2,11 @@
 // The passes of which a cycle is made.
 #include <algorithm>
 #include <cmath>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
 
 #include "voxel/multigrid.h"
+#include "voxel/sliding.h"
 
 namespace voxel {
 namespace {
@@ -63,14 +66,135 @@ void Multigrid::smooth(int level, RowId row, Displacement& state, const Obstacle
   const LevelRow r = row_of(level, row, state);
   log_.note(level, row);
   if (level > 0) {
-    note_change(level, row, smooth_row(r, nullptr, span));
+    float change = smooth_row(r, nullptr, span);
+    if (holds_->tilted(level, row)) change = std::max(change, smooth_tilted(level, row, r, span));
+    note_change(level, row, change);
     return;
   }
   const RowLimits limits = couplings().limits(row);
   float change = 0.0F;
   move_outside(r, row, state, obstacles,
                [&](const LevelRow& way) { change = std::max(change, smooth_row(way, &limits, span)); });
+  change = std::max(change, slide_pressed(row, state, span));
   note_change(0, row, change);
+}
+
+namespace {
+
+// `visit(v, lane)` for the voxels of a row, in the octets of a span, that the tool presses.
+template <class Visit>
+void for_pressed(const Displacement& state, RowId row, OctetSpan span, const Visit& visit) {
+  if (state.row_held[row] == 0) return;
+  const auto first = static_cast<std::size_t>(span.first) * kOctet,
+             last = static_cast<std::size_t>(span.last) * kOctet + kOctet;
+  for (std::size_t lane = first; lane < last; ++lane) {
+    const auto v = static_cast<VoxelId>(row * kRow + lane);
+    if (state.role[v] == Displacement::pressed) visit(v, lane);
+  }
+}
+
+}  // namespace
+
+float Multigrid::slide_pressed(RowId row, Displacement& state, OctetSpan span) noexcept {
+  float most = 0.0F;
+  for_pressed(state, row, span, [&](VoxelId v, std::size_t) {
+    most = std::max(most, slide(couplings(), state, v, balance_of(v, state)));
+  });
+  return most;
+}
+
+float Multigrid::slide_pressed_by(RowId row, const RowVector& way, Displacement& state,
+                                  OctetSpan span) noexcept {
+  float most = 0.0F;
+  for_pressed(state, row, span, [&](VoxelId v, std::size_t i) {
+    most = std::max(most, slide_by(couplings(), state, v, {way[0][i], way[1][i], way[2][i]}));
+  });
+  return most;
+}
+
+namespace {
+
+// What holds a cell, off the diagonal: for x, of y and z, and so on.
+glm::vec3 across(const std::array<float, 3>& tilt, const glm::vec3& way) {
+  return {tilt[0] * way.y + tilt[1] * way.z, tilt[0] * way.x + tilt[2] * way.z,
+          tilt[1] * way.x + tilt[2] * way.y};
+}
+
+}  // namespace
+
+template <class Visit>
+void Multigrid::for_tilted(int level, RowId row, const LevelRow& r, OctetSpan span,
+                           const Visit& visit) noexcept {
+  const auto first = static_cast<std::size_t>(span.first) * kOctet,
+             last = static_cast<std::size_t>(span.last) * kOctet + kOctet;
+  for (std::size_t i = first; i < last; ++i) {
+    const auto cell = static_cast<VoxelId>(row * kRow + i);
+    const std::array<float, 3> tilt = holds_->tilt(level, cell);
+    if (tilt == std::array<float, 3>{}) continue;
+    // A cell that a limit stops, or that does not move on an axis, is held by that.
+    bool moves = r.stopped == nullptr || r.stopped[i] == 0;
+    std::array<float, 3> hold{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const float inverse = r.springs.inverse[axis * kRow + (r.springs.uniform ? 0 : i)];
+      moves = moves && inverse > 0.0F;
+      hold[axis] = moves ? r.hold_times * r.hold[axis][i] / inverse : 0.0F;
+    }
+    if (!moves) continue;
+    visit(cell, i, tilt, hold);
+  }
+}
+
+// Cells on inclined surfaces, whose axes are not by themselves: each where its energy is least.
+float Multigrid::smooth_tilted(int level, RowId row, const LevelRow& r, OctetSpan span) noexcept {
+  Level& l = at(level);
+  const Grid& g = l.couplings->grid();
+  float most = 0.0F;
+  for_tilted(
+      level, row, r, span,
+      [&](VoxelId cell, std::size_t i, const std::array<float, 3>& tilt, const std::array<float, 3>& hold) {
+        const VoxelSprings springs = l.couplings->springs_of(cell);
+        glm::dmat3 stiffness(0.0);  // whose determinant a float may not hold
+        glm::dvec3 pull(0.0);       // from where the cell is held
+        for (int axis = 0; axis < 3; ++axis) {
+          const auto ua = static_cast<std::size_t>(axis);
+          const float told = r.held_at[ua][i];
+          float sum = 0.0F, all = r.load[ua][i];
+          for (int d = 0; d < 3; ++d) {
+            const auto ud = static_cast<std::size_t>(d);
+            const float up = springs.up[ud].on(axis, d), down = springs.down[ud].on(axis, d);
+            all += up * (l.value[ua][g.up(cell, d)] - told) + down * (l.value[ua][g.down(cell, d)] - told);
+            sum += up + down;
+          }
+          stiffness[axis][axis] = static_cast<double>(sum + hold[ua]);
+          pull[axis] = static_cast<double>(all);
+        }
+        const glm::dvec3 off = r.hold_times * glm::vec3(tilt[0], tilt[1], tilt[2]);
+        stiffness[0][1] = stiffness[1][0] = off[0];
+        stiffness[0][2] = stiffness[2][0] = off[1];
+        stiffness[1][2] = stiffness[2][1] = off[2];
+        const glm::dvec3 way = glm::inverse(stiffness) * pull;
+        for (int axis = 0; axis < 3; ++axis) {
+          const auto ua = static_cast<std::size_t>(axis);
+          const float to = r.held_at[ua][i] + static_cast<float>(way[axis]);
+          most = std::max(most, std::fabs(to - r.u[ua][i]));
+          r.u[ua][i] = to;
+        }
+      });
+  return most;
+}
+
+// Adds to the residual of a coarse row what inclined surfaces pull across.
+void Multigrid::add_tilt(int level, RowId row, const LevelRow& r, OctetSpan span, RowVector& out) noexcept {
+  for_tilted(level, row, r, span,
+             [&](VoxelId, std::size_t i, const std::array<float, 3>& tilt, const std::array<float, 3>&) {
+               glm::vec3 back(0.0F);
+               for (int axis = 0; axis < 3; ++axis) {
+                 const auto ua = static_cast<std::size_t>(axis);
+                 back[axis] = r.held_at[ua][i] - r.u[ua][i];
+               }
+               const glm::vec3 pull = r.hold_times * across(tilt, back);
+               for (int axis = 0; axis < 3; ++axis) out[static_cast<std::size_t>(axis)][i] += pull[axis];
+             });
 }
 
 // A row is moved at once, and what that takes into its obstacle has to stay while the others are: put back
@@ -131,6 +255,7 @@ RowCorrection Multigrid::correct_voxels(const LevelRow& r, RowId row, const RowV
       if ((stopped >> axis & 1U) == 0) refused[axis][lane] = 0.0F;
     }
   }
+  done.most_m = std::max(done.most_m, slide_pressed_by(row, correction, state, span));
   return done;
 }
 
@@ -191,27 +316,32 @@ void Multigrid::balance(RowId row, Displacement& state, const ObstacleView& obst
   balanced_.push_back(row);
 }
 
-// What presses a voxel against its obstacle is balanced by it, and the cells above are held by it.
-void Multigrid::balance_obstacles(RowId row, const Displacement& state, const ObstacleView& obstacles,
-                                  OctetSpan span, RowResidual& found, RowVector& out) noexcept {
+// What presses a voxel against its obstacle, or the tool, is balanced by it, and the cells above are held by
+// it.
+void Multigrid::balance_contacts(RowId row, Displacement& state, const ObstacleView& obstacles,
+                                 OctetSpan span, RowResidual& found, RowVector& out) noexcept {
   const double touching = kTouching * lattice_.min_spacing_m();
   const auto first = static_cast<std::size_t>(span.first) * kOctet,
              last = static_cast<std::size_t>(span.last) * kOctet + kOctet;
   for (std::size_t i = first; i < last; ++i) {
     const auto v = static_cast<VoxelId>(row * kRow + i);
-    Holds::Parts parts{};
-    if (state.role[v] == Displacement::obstacle && blocked(obstacles, state, v, touching)) {
+    Holds::Support by{};
+    if (state.role[v] == Displacement::pressed) {
+      const auto force = sliding_force(couplings(), state, v, balance_of(v, state));
+      for (int axis = 0; axis < 3 && force; ++axis)
+        out[static_cast<std::size_t>(axis)][i] = static_cast<float>((*force)[axis]);
+      by = force ? Holds::along(state.tool_normal[lattice_.surface_number(v)]) : Holds::kAll;
+    } else if (state.role[v] == Displacement::obstacle && blocked(obstacles, state, v, touching)) {
       const glm::vec3 n = obstacles.of(v).normal;
       const float into = out[0][i] * n.x + out[1][i] * n.y + out[2][i] * n.z;
       for (int axis = 0; axis < 3; ++axis) {
         const auto ua = static_cast<std::size_t>(axis);
         found.resisted[ua] &= ~(1U << i);
-        if (into >= 0.0F) continue;
-        out[ua][i] -= into * n[axis];
-        parts[ua] = static_cast<std::uint8_t>(std::lround(Holds::kWhole * std::min(n[axis] * n[axis], 1.0F)));
+        if (into < 0.0F) out[ua][i] -= into * n[axis];
       }
+      if (into < 0.0F) by = Holds::along(n);
     }
-    holds_->support(v, parts);
+    holds_->support(v, by);
   }
 }
 
@@ -219,12 +349,19 @@ void Multigrid::balance_obstacles(RowId row, const Displacement& state, const Ob
 RowResidual Multigrid::residual_of(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
                                    OctetSpan span, RowVector& out) noexcept {
   const LevelRow r = row_of(level, row, state);
-  if (level > 0) return residual_row(r, nullptr, 0.0F, span, out);
+  if (level > 0) {
+    RowResidual found = residual_row(r, nullptr, 0.0F, span, out);
+    if (holds_->tilted(level, row)) {
+      add_tilt(level, row, r, span, out);
+      measure_row(r.springs, out, span, found);
+    }
+    return found;
+  }
   const RowLimits limits = couplings().limits(row);
   const float tight = kTight * static_cast<float>(lattice_.min_spacing_m());
   RowResidual found = residual_row(r, &limits, tight, span, out);
-  if (state.row_obstacles[row] != 0 || holds_->supports(row)) {
-    balance_obstacles(row, state, obstacles, span, found, out);
+  if (state.row_obstacles[row] != 0 || state.row_held[row] != 0 || holds_->supports(row)) {
+    balance_contacts(row, state, obstacles, span, found, out);
     measure_row(r.springs, out, span, found);
   }
   // What the chain holds is balanced by it. Passed on, its residual would drive the coarse levels against
@@ -446,6 +583,7 @@ void Multigrid::add(RowId row, const RowVector& way, Displacement& state,
   for (std::size_t axis = 0; axis < 3; ++axis) std::copy_n(r.u[axis], kRow, before[axis].begin());
   const RowLimits limits = couplings().limits(row);
   RowCorrection done = correct_row(r, &limits, {}, way, refused);
+  done.most_m = std::max(done.most_m, slide_pressed_by(row, way, state, {}));
   const double touching = kTouching * lattice_.min_spacing_m();
   bool deeper = false;
   for (VoxelId lane = 0; lane < kRow && !deeper; ++lane) {

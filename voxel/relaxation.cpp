@@ -20,6 +20,10 @@ constexpr double kMeasured = 0.5;
 constexpr double kGain = 0.98;      // of the least residual so far: less is a gain
 constexpr double kNearRest = 10.0;  // times the tolerance: what limits hold moves together from here on
 constexpr double kProgress = 1e-3;  // of the spacing: clusters that move further are on their way
+// … and where links have next to no slack, those that all went this much further than ever in a round; not
+// between surfaces, where what is squeezed would be on its way for long. (Taken for what their steps free of
+// energy, it was for ever.)
+constexpr double kDrift = 2e-5;
 // Spacings that a coarse cell may have to tell. Between a body and a plate cells ran away to 1e30 m in ten
 // ticks; with ten spacings, or four, some went on running to and fro when the body had left.
 constexpr float kFarthest = 2.0F;
@@ -43,6 +47,7 @@ Relaxation::Relaxation(const Lattice& lattice) : lattice_(lattice), multigrid_(l
   set_tolerance(kMeasured * kRestingResidual * lattice.force_scale_N());
   farthest_m_ = kFarthest * static_cast<float>(lattice.max_spacing_m());
   boxes_.resize(static_cast<std::size_t>(multigrid_.levels()));
+  standing_.reserve(lattice.surface().size());
 }
 
 void Relaxation::set_tolerance(double tolerance_N) noexcept {
@@ -98,10 +103,20 @@ void Relaxation::stir_all() noexcept {
   }
 }
 
+// What the tool presses slides, and is held by where it does; see Multigrid.
+void Relaxation::hold_what_stands(const Displacement& state, std::span<const VoxelId> held) noexcept {
+  standing_.clear();
+  for (const VoxelId v : held) {
+    if (state.role[v] == Displacement::held && standing_.size() < standing_.capacity())
+      standing_.push_back(v);
+  }
+  multigrid_.set_held(standing_);
+}
+
 std::uint64_t Relaxation::run(Displacement& state, const ObstacleView& obstacles,
                               std::span<const VoxelId> held, std::uint64_t budget) noexcept {
   if (asleep_) return 0;
-  multigrid_.set_held(held);
+  hold_what_stands(state, held);
   TileQueue& tiles = multigrid_.tiles();
   std::uint64_t spent = 0;
   credit_ += static_cast<std::int64_t>(contact_relaxed_ ? budget / kBesideContact : budget);
@@ -120,7 +135,7 @@ std::uint64_t Relaxation::run(Displacement& state, const ObstacleView& obstacles
     if (tiles.waiting() > 0) {
       looked_at_ = 0;
       spend(relax_tile(state, obstacles, tiles.pop()));
-      if (round_left_ > 0 && --round_left_ == 0) end_round(state, running_residual_N_);
+      if (round_left_ > 0 && --round_left_ == 0) end_round(state, obstacles, running_residual_N_);
       continue;
     }
     // Nothing was stirred: what coarse levels know may still have to be told somewhere.
@@ -133,7 +148,7 @@ std::uint64_t Relaxation::run(Displacement& state, const ObstacleView& obstacles
     if (looked_at_ >= tiles.tiles() && tiles.waiting() == 0) {
       looked_at_ = 0;
       running_residual_N_ = 0.0;
-      end_round(state, std::min(residual_N_, 0.99 * tolerance_N_));
+      end_round(state, obstacles, std::min(residual_N_, 0.99 * tolerance_N_));
     }
   }
   // What was not needed is not saved up for a tick that has enough to do.
@@ -148,7 +163,7 @@ void Relaxation::run_cycle(Displacement& state, const ObstacleView& obstacles,
     while (keeping_) keep_yielded(state, ~std::uint64_t{0});
     return;
   }
-  multigrid_.set_held(held);
+  hold_what_stands(state, held);
   multigrid_.renew_bricks(state, multigrid_.grid(0).rows());
   multigrid_.tiles().clear();
   round_left_ = 0;
@@ -156,14 +171,14 @@ void Relaxation::run_cycle(Displacement& state, const ObstacleView& obstacles,
   const auto& dims = lattice_.grid().dims;
   lay_boxes({0, 0, 0}, {dims[0] - 1, dims[1] - 1, dims[2] - 1}, 0);
   cycle(state, obstacles, Look::active, false);
-  end_round(state, running_residual_N_);
+  end_round(state, obstacles, running_residual_N_);
 }
 
 void Relaxation::relax_contact(Displacement& state, const ObstacleView& obstacles,
                                std::span<const VoxelId> held, std::span<const VoxelId> pressed,
                                bool again) noexcept {
   contact_relaxed_ = true;
-  multigrid_.set_held(held);
+  hold_what_stands(state, held);
   std::array<int, 3> low = lattice_.coordinates(pressed.front()), high = low;
   for (const VoxelId v : pressed) {
     const auto c = lattice_.coordinates(v);
@@ -206,13 +221,15 @@ std::uint64_t Relaxation::relax_tile(Displacement& state, const ObstacleView& ob
 
 // What limits held in this round moves with what it pulls on; returns the largest force a voxel that did (N).
 // Which voxel is first goes round, so that all have their turn however few a round has time for.
-double Relaxation::move_clusters(Displacement& state) noexcept {
+double Relaxation::move_clusters(Displacement& state, const ObstacleView& obstacles) noexcept {
   clusters_.begin();
   std::uint64_t count = 0;
   multigrid_.for_limited([&count](VoxelId, int) { ++count; });
   if (count == 0) return 0.0;
   const std::uint64_t first = cycles_ * kNextFirst % count;
   double most_N = 0.0;
+  std::array<double, 3> went{};
+  int moves = 0;
   for (const bool before : {false, true}) {
     std::uint64_t n = 0;
     multigrid_.for_limited([&](VoxelId v, int axis) {
@@ -222,22 +239,33 @@ double Relaxation::move_clusters(Displacement& state) noexcept {
       if (force == 0.0) return;
       most_N = std::max(most_N, force);
       // Every such step lowers the energy, though it may be far from limit to limit to where the force falls.
-      if (std::fabs(state.u[static_cast<std::size_t>(axis)][v] - from) > kProgress * lattice_.min_spacing_m())
+      const auto way = static_cast<double>(state.u[static_cast<std::size_t>(axis)][v] - from);
+      went[static_cast<std::size_t>(axis)] += way;
+      ++moves;
+      if (std::fabs(way) > kProgress * lattice_.min_spacing_m())
         cycles_without_gain_ = std::min(cycles_without_gain_, kPatience / 2 + 1);
       for (const VoxelId w : clusters_.moved()) multigrid_.stir(0, w / kRow);
     });
+  }
+  for (std::size_t axis = 0; axis < 3 && moves > 0 && obstacles.obstacles.empty(); ++axis) {
+    drift_m_[axis] += went[axis] / moves;
+    const double further = std::fabs(drift_m_[axis]) - furthest_m_[axis];
+    if (further <= 0.0) continue;
+    furthest_m_[axis] += further;
+    if (further > kDrift * lattice_.min_spacing_m())
+      cycles_without_gain_ = std::min(cycles_without_gain_, kPatience / 2 + 1);
   }
   credit_ -= static_cast<std::int64_t>(clusters_.looked_at());
   return most_N;
 }
 
 // A round has looked at all that moves: is it at rest?
-void Relaxation::end_round(Displacement& state, double residual_N) noexcept {
+void Relaxation::end_round(Displacement& state, const ObstacleView& obstacles, double residual_N) noexcept {
   residual_N = std::max(residual_N, static_cast<double>(multigrid_.bricks().left_N()));
   // Only when nothing else moves any more: between other corrections they would undo one another (energy grew
   // 1.9 times within a cycle).
   if (residual_N < kNearRest * tolerance_N_ || cycles_without_gain_ > kPatience / 2)
-    residual_N = std::max(residual_N, move_clusters(state));
+    residual_N = std::max(residual_N, move_clusters(state, obstacles));
   // While rounds gain nothing, what limits hold stays held for a few of them: let go of in every round, two
   // sets of voxels can take turns for ever.
   if (cycles_without_gain_ <= 1 || cycles_ % kLetGoEvery == 0) multigrid_.release_limited();
@@ -449,7 +477,8 @@ void Relaxation::cycle(Displacement& state, const ObstacleView& obstacles, Look 
 }
 
 std::size_t Relaxation::memory_bytes() const {
-  return multigrid_.memory_bytes() + clusters_.memory_bytes() + boxes_.capacity() * sizeof(LevelBoxes);
+  return multigrid_.memory_bytes() + clusters_.memory_bytes() + boxes_.capacity() * sizeof(LevelBoxes) +
+         standing_.capacity() * sizeof(VoxelId);
 }
 
 }  // namespace voxel

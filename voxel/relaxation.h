@@ -60,6 +60,7 @@ class Relaxation {
   void wake() noexcept {
     asleep_ = false;
     cycles_without_gain_ = 0;
+    drift_m_ = furthest_m_ = {};
   }
   [[nodiscard]] bool asleep() const { return asleep_ && !away_; }
   // From now on another relaxes it (replica.h), and what is left to do here is to follow the tool with what
@@ -124,8 +125,9 @@ class Relaxation {
 
   void lay_boxes(const std::array<int, 3>& low, const std::array<int, 3>& high, int margin) noexcept;
   void cycle(Displacement& state, const ObstacleView& obstacles, Look look, bool smoothed) noexcept;
-  void end_round(Displacement& state, double residual_N) noexcept;
-  double move_clusters(Displacement& state) noexcept;
+  void end_round(Displacement& state, const ObstacleView& obstacles, double residual_N) noexcept;
+  void hold_what_stands(const Displacement& state, std::span<const VoxelId> held) noexcept;
+  double move_clusters(Displacement& state, const ObstacleView& obstacles) noexcept;
   std::uint64_t relax_tile(Displacement& state, const ObstacleView& obstacles, std::size_t number) noexcept;
   std::uint64_t keep_yielded(Displacement& state, std::uint64_t budget) noexcept;
   [[nodiscard]] bool tile_waits_for_coarse(std::size_t number) const noexcept;
@@ -142,6 +144,7 @@ class Relaxation {
   Multigrid multigrid_;
   ClusterMoves clusters_;
   std::vector<LevelBoxes> boxes_;
+  std::vector<VoxelId> standing_;           // what the last cycle found held, on all axes
   std::int64_t credit_ = 0;                 // voxel updates that may be spent; negative: were spent too many
   std::size_t round_left_ = 0;              // tiles until this round ends
   std::size_t cursor_ = 0, looked_at_ = 0;  // tiles looked at for what coarse levels have to tell them
@@ -154,7 +157,8 @@ class Relaxation {
   bool keeping_ = false;          // it is kept now
   double residual_N_ = 0.0, running_residual_N_ = 0.0, tolerance_N_ = 0.0, least_residual_N_ = 0.0;
   float hold_ = 1.0F;
-  float farthest_m_ = 0.0F;  // a cell that has more to tell forgets it
+  std::array<double, 3> drift_m_{}, furthest_m_{};  // of clusters at limits, since it was woken
+  float farthest_m_ = 0.0F;                         // a cell that has more to tell forgets it
   int cycles_without_gain_ = 0;
   std::uint64_t cycles_ = 0;
 };

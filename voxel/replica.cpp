@@ -46,6 +46,7 @@ Replica::Replica(SoftObject& object)
   const std::size_t most_held = lattice_.surface().size() + SoftObject::kMaxTouched;
   held_.reserve(most_held);
   given_held_.reserve(most_held);
+  given_contacts_.reserve(SoftObject::kMaxTouched);
   given_roles_.reserve(2 * most_held);
   given_obstacles_.reserve(lattice_.surface().size());
   object.changed_obstacles_.reserve(lattice_.surface().size());
@@ -90,7 +91,12 @@ void Replica::give(SoftObject& object) noexcept {
   given_pressed_ = object.list_held();
   note_motion(object);
   given_held_.clear();
-  for (const VoxelId v : object.all_held_) given_held_.push_back(v);
+  given_contacts_.clear();
+  for (const VoxelId v : object.all_held_) {
+    given_held_.push_back(v);
+    if (object.state_.role[v] == Displacement::pressed)
+      given_contacts_.push_back({v, object.state_.tool_normal[lattice_.surface_number(v)]});
+  }
   near_ = given_held_.empty() ? Relaxation::NearRows{} : object.relaxation_.near_contact();
   object.give_away();
   log.clear();
@@ -123,6 +129,10 @@ void Replica::open_given() noexcept {
   for (const VoxelId v : given_held_) {
     held_.push_back(v);
     state_.set_role(v, Displacement::held);
+  }
+  for (const GivenContact& given : given_contacts_) {
+    state_.set_role(given.v, Displacement::pressed);
+    state_.tool_normal[lattice_.surface_number(given.v)] = given.normal;
   }
   if (given_.count() > 0 || !given_obstacles_.empty()) relaxation_.wake();
   to.log().clear();

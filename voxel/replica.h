@@ -109,6 +109,10 @@ class Replica {
     VoxelId v;
     Displacement::Role role;
   };
+  struct GivenContact {
+    VoxelId v;
+    glm::vec3 normal;
+  };
   struct GivenObstacle {
     std::uint32_t surface_number;
     Obstacle obstacle;
@@ -141,8 +145,9 @@ class Replica {
   std::vector<GivenRole> given_roles_;
   std::vector<GivenObstacle> given_obstacles_;
   std::vector<VoxelId> given_held_;
-  std::size_t given_pressed_ = 0;         // so many of them, the first, by the tool
-  glm::dvec3 given_tool_m_{0.0};          // where that was
+  std::vector<GivenContact> given_contacts_;  // of those that slide along the tool
+  std::size_t given_pressed_ = 0;             // so many of them, the first, by the tool
+  glm::dvec3 given_tool_m_{0.0};              // where that was
   int unsettled_ = 0;                     // results to come in which the contact is brought to rest once more
   bool settle_contact_ = false;           // in this one
   Relaxation::NearRows near_;             // the contact

@@ -114,7 +114,10 @@ void SoftObject::touch(std::span<const VoxelId> near) noexcept {
     const bool kept = carried_mark_[v] != 0;
     if (kept) --pressed;
     touches_.push_back({v, kept});
-    if (kept) touches_.back().left = touched_before_[carried_index_[v]].left;
+    if (!kept) continue;
+    const Touch& before = touched_before_[carried_index_[v]];
+    touches_.back().normal = before.normal;
+    touches_.back().left = before.left;
   }
   for (const VoxelId v : touched_voxels_) carried_mark_[v] = 0;
   touched_voxels_.clear();
@@ -135,7 +138,14 @@ Displacement::Role SoftObject::resting_role(VoxelId v) const noexcept {
 // held).
 void SoftObject::set_touch_roles() noexcept {
   for (const Touch& t : touches_) {
-    state_.set_role(t.v, t.pressed ? Displacement::held : resting_role(t.v));
+    const Displacement::Role resting = resting_role(t.v);
+    if (!t.pressed || lattice_->anchored(t.v)) {
+      state_.set_role(t.v, t.pressed ? Displacement::held : resting);
+      continue;
+    }
+    // What the tool and something else hold is the contact solver's alone.
+    state_.set_role(t.v, resting == Displacement::free ? Displacement::pressed : Displacement::held);
+    state_.tool_normal[lattice_->surface_number(t.v)] = glm::vec3(t.normal);
   }
 }
 
@@ -422,8 +432,8 @@ std::size_t SoftObject::memory_bytes() const {
   std::size_t state = state_.bricks.memory_bytes() + state_.role.resident_bytes() +
                       state_.row_held.resident_bytes() + state_.row_obstacles.resident_bytes() +
                       state_.rest.memory_bytes() + carried_mark_.resident_bytes() +
-                      carried_index_.resident_bytes() + tight_rows_.memory_bytes() +
-                      pair_load_.resident_bytes() + row_moved_.resident_bytes();
+                      state_.tool_normal.resident_bytes() + carried_index_.resident_bytes() +
+                      tight_rows_.memory_bytes() + pair_load_.resident_bytes() + row_moved_.resident_bytes();
   for (const auto& axis : state_.u) state += axis.resident_bytes();
   return lattice_->memory_bytes() + state + chain_.memory_bytes() + relaxation_.memory_bytes() +
          obstacles_.size() * sizeof(Obstacle) + pair_held_.size();

@@ -16,7 +16,7 @@ void SoftObject::set_obstacle(std::size_t surface_number, const Obstacle& obstac
     obstacle_changed_[surface_number] = 1;
     changed_obstacles_.push_back(static_cast<std::uint32_t>(surface_number));
   }
-  if (state_.role[v] == Displacement::held || lattice_->anchored(v)) return;
+  if (Displacement::stands(state_.role[v]) || lattice_->anchored(v)) return;
   state_.set_role(v, resting_role(v));
 }
 

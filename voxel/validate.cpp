@@ -41,12 +41,12 @@ std::string validate_row(const Lattice& lattice, const Displacement& state, RowI
   int held = 0, obstacles = 0;
   for (VoxelId v = row * kRow; v < (row + 1) * kRow; ++v) {
     const std::uint8_t role = state.role[v];
-    if (role > Displacement::obstacle) return where(lattice, v) + " has a role that there is not";
+    if (role > Displacement::pressed) return where(lattice, v) + " has a role that there is not";
     if (role != Displacement::free && !lattice.filled(v))
       return where(lattice, v) + " has a role and is empty";
-    if (role == Displacement::obstacle && lattice.surface_number(v) == Lattice::kNoSurface)
-      return where(lattice, v) + " lies inside and has an obstacle";
-    held += role == Displacement::held ? 1 : 0;
+    if (role >= Displacement::obstacle && lattice.surface_number(v) == Lattice::kNoSurface)
+      return where(lattice, v) + " lies inside and is pressed, or has an obstacle";
+    held += Displacement::stands(role) ? 1 : 0;
     obstacles += role == Displacement::obstacle ? 1 : 0;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const float u = state.u[axis][v];

@@ -4,7 +4,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <iostream>
 #include <memory>
 #include <random>
@@ -93,11 +95,11 @@ TEST(Holds, DependOnWhatIsHeldAlone) {
     const std::vector<VoxelId> held = some();
     changed.set_held(held);
     const VoxelId pressed = some().front();
-    changed.support(pressed, {0, 100, 255});
+    changed.support(pressed, Holds::along(glm::normalize(glm::vec3(0.0F, 0.5F, 1.0F))));
     changed.renew();
     Holds fresh(lattice, levels.pointers);
     fresh.set_held(held);
-    fresh.support(pressed, {0, 100, 255});
+    fresh.support(pressed, Holds::along(glm::normalize(glm::vec3(0.0F, 0.5F, 1.0F))));
     fresh.renew();
     for (int level = 1; level < 4; ++level) {
       const voxel::Grid& g = levels.pointers[static_cast<std::size_t>(level)]->grid();
@@ -109,10 +111,84 @@ TEST(Holds, DependOnWhatIsHeldAlone) {
             ASSERT_EQ(changed.nearer(level, row, axis)[i], fresh.nearer(level, row, axis)[i]);
           }
         }
+        ASSERT_EQ(changed.tilted(level, row), fresh.tilted(level, row));
+        for (VoxelId cell = row * voxel::kRow; cell < (row + 1) * voxel::kRow; ++cell)
+          ASSERT_EQ(changed.tilt(level, cell), fresh.tilt(level, cell));
       }
     }
     changed.support(pressed, {});
   }
+}
+
+// Voxels that slide along an inclined surface hold the cells above them along its normal, and not across.
+TEST(Holds, WhatSlidesHoldsAlongItsNormalAlone) {
+  LatticeOptions options;
+  options.materials[1] = elastic(1e4, 0.3);
+  options.anchor_faces = {"-z"};
+  const Lattice lattice(block({24, 20, 18}), options);
+  Levels levels(lattice);
+  Holds holds(lattice, levels.pointers);
+  const glm::vec3 n = glm::normalize(glm::vec3(0.5F, -0.4F, 0.8F));
+  for (int j = 0; j < 20; ++j) {
+    for (int i = 0; i < 24; ++i) holds.support(lattice.grid().at(i, j, 17), Holds::along(n));
+  }
+  holds.renew();
+  const voxel::Spring link = lattice.spring_within(1, 2);
+  const VoxelId cell = levels.pointers[1]->grid().at(6, 5, 8);
+  const auto k = [&link](int axis) { return 8.0 * static_cast<double>(link.on(axis, 2)); };
+  constexpr std::array<std::array<int, 2>, 3> pairs{{{0, 1}, {0, 2}, {1, 2}}};
+  for (int axis = 0; axis < 3; ++axis) {
+    const double expected = k(axis) * static_cast<double>(n[axis] * n[axis]);
+    EXPECT_NEAR(levels.hold(holds, 1, cell, axis), expected, 0.02 * k(axis)) << axis;
+  }
+  for (std::size_t p = 0; p < 3; ++p) {
+    const auto [a, b] = pairs[p];
+    EXPECT_NEAR(static_cast<double>(holds.tilt(1, cell)[p]),
+                std::sqrt(k(a) * k(b)) * static_cast<double>(n[a] * n[b]), 0.02 * k(2))
+        << p;
+  }
+}
+
+// However surfaces are inclined, nothing that holds a cell pushes it on.
+TEST(Holds, NeverPush) {
+  LatticeOptions options;
+  options.materials[1] = elastic(1e4, 0.3);
+  options.anchor_faces = {"-x"};
+  const Lattice lattice(block({24, 20, 18}), options);
+  Levels levels(lattice);
+  Holds holds(lattice, levels.pointers);
+  std::mt19937 random(7);
+  std::normal_distribution<float> any;
+  for (int j = 3; j < 17; ++j) {
+    for (int i = 2; i < 22; ++i) {
+      const glm::vec3 n = glm::normalize(glm::vec3(any(random), any(random), any(random)));
+      if (random() % 3 != 0) holds.support(lattice.grid().at(i, j, 17), Holds::along(n));
+    }
+  }
+  holds.renew();
+  int tilted = 0;
+  for (int level = 1; level < 4; ++level) {
+    const voxel::Grid& g = levels.pointers[static_cast<std::size_t>(level)]->grid();
+    for (int j = 0; j < g.dims[1]; ++j) {
+      for (int i = 0; i < g.dims[0]; ++i) {
+        const VoxelId cell = g.at(i, j, g.dims[2] - 1);
+        const auto off = holds.tilt(level, cell);
+        if (off == std::array<float, 3>{}) continue;
+        ++tilted;
+        const double x = levels.hold(holds, level, cell, 0), y = levels.hold(holds, level, cell, 1),
+                     z = levels.hold(holds, level, cell, 2);
+        const double xy = static_cast<double>(off[0]), xz = static_cast<double>(off[1]),
+                     yz = static_cast<double>(off[2]);
+        const double most = std::max({x, y, z});
+        EXPECT_GE(x * y - xy * xy, -1e-5 * most * most);
+        EXPECT_GE(x * z - xz * xz, -1e-5 * most * most);
+        EXPECT_GE(y * z - yz * yz, -1e-5 * most * most);
+        EXPECT_GE(x * y * z + 2.0 * xy * xz * yz - x * yz * yz - y * xz * xz - z * xy * xy,
+                  -1e-5 * most * most * most);
+      }
+    }
+  }
+  EXPECT_GT(tilted, 50);
 }
 
 // Six cycles over a block that was bent as a whole, and is to come back to 0: what each leaves of the error,
