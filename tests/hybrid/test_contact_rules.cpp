@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// When contact begins and when it ends: nothing is felt and nothing moves before the tool's ball meets
+// something, by the distances themselves; and contact made is kept until the tool leaves.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <numbers>
+#include <random>
+#include <string>
+#include <tuple>
+
+#include "arbitration_watch.h"
+#include "touch.h"
+
+namespace {
+
+using glm::dvec3;
+using tests::coupling;
+using tests::Touch;
+
+double between(std::mt19937& engine, double low, double high) {
+  return low + (high - low) * (static_cast<double>(engine()) / 4294967296.0);
+}
+
+dvec3 direction(std::mt19937& engine) {
+  const double z = between(engine, -1.0, 1.0), angle = between(engine, 0.0, 2.0 * std::numbers::pi);
+  return {std::sqrt(1.0 - z * z) * std::cos(angle), std::sqrt(1.0 - z * z) * std::sin(angle), z};
+}
+
+// From the tool's ball to the nearest thing, every surface voxel and every rigid surface looked at (m);
+// inside: negative, for solids as for tissue. A sheet is left out where the tool is on neither side of it.
+double gap(Touch& touch, const dvec3& at) {
+  double least = std::numeric_limits<double>::infinity();
+  const double radius = touch.world().tool.radius_m;
+  for (std::size_t o = 0; o < touch.state().soft.size(); ++o) {
+    const voxel::SoftObject& object = *touch.state().soft[o];
+    for (const voxel::VoxelId v : object.lattice().surface()) {
+      const double away = glm::distance(touch.world().soft[o].to_scene(object.position(v)), at);
+      least = std::min(least, away - object.reach(radius));
+    }
+  }
+  for (std::size_t o = 0; o < touch.state().rigid.size(); ++o) {
+    const polygon::RigidSurface& surface = *touch.world().rigid[o].surface;
+    const dvec3 p = touch.state().rigid[o].frame.to_body(at);
+    polygon::NearPoint near;
+    if (!surface.nearest(p, 1.0, near)) continue;
+    const double away = glm::distance(p, near.point);
+    least = std::min(least, (surface.inside(p) ? -away : away) - radius);
+  }
+  return least;
+}
+
+bool moved(const voxel::SoftObject& object) {
+  const auto surface = object.lattice().surface();
+  return std::any_of(surface.begin(), surface.end(),
+                     [&](voxel::VoxelId v) { return object.state().at(v) != dvec3(0.0); });
+}
+
+// The middle of a soft object's surface voxels, and how far they are from it (m, scene frame).
+std::pair<dvec3, double> extent(Touch& touch, std::size_t o) {
+  const voxel::SoftObject& object = *touch.state().soft[o];
+  dvec3 low(std::numeric_limits<double>::infinity()), high = -low;
+  for (const voxel::VoxelId v : object.lattice().surface()) {
+    const dvec3 at = touch.world().soft[o].to_scene(object.position(v));
+    low = glm::min(low, at);
+    high = glm::max(high, at);
+  }
+  return {0.5 * (low + high), 0.5 * glm::distance(low, high)};
+}
+
+class Approach : public ::testing::TestWithParam<const char*> {};
+
+// What was put into one another at rest was carved, so that none of it presses on the other, and the tool
+// comes from anywhere.
+TEST_P(Approach, NothingIsFeltBeforeContact) {
+  constexpr int kWays = 40;
+  constexpr double kStep = 2e-4, kFast = 1e-3;  // m a tick, near and far
+  constexpr double kRounding = 1e-9;            // m: places are floats
+  const hybrid::Scene scene = hybrid::load_scene(tests::source_folder / GetParam());
+  std::mt19937 engine(6);
+  double latest = 0.0;
+  Touch at_rest(scene, dvec3(0.0, 0.0, 1.0));
+  for (int n = 0; n < kWays; ++n) {
+    const auto [middle, size] = extent(at_rest, static_cast<std::size_t>(n) % at_rest.state().soft.size());
+    const dvec3 way = direction(engine);
+    // To some place in the middle half of the object.
+    const dvec3 to = middle + 0.25 * size * direction(engine), from = to - (1.5 * size + 0.02) * way;
+    if (gap(at_rest, from) <= 0.0) continue;  // within another object
+    Touch touch(scene, from, n % 2 == 1);
+    dvec3 at = from;
+    double left = gap(touch, at);
+    bool felt = false;
+    while (!felt && left > -5.0 * kStep) {
+      at += (left > kFast + kStep ? kFast : kStep) * way;
+      left = gap(touch, at);
+      const bool shifted_before = std::any_of(touch.state().soft.begin(), touch.state().soft.end(),
+                                              [](const auto& object) { return moved(*object); });
+      const dvec3 force = coupling(touch.at(at));
+      felt = force != dvec3(0.0);
+      if (left > kRounding) {
+        EXPECT_FALSE(felt) << glm::length(force) << " N, " << left << " m before contact, way " << n;
+        EXPECT_FALSE(shifted_before) << left << " m before contact, way " << n;
+      }
+    }
+    EXPECT_TRUE(felt) << "not felt by " << -left << " m after contact, way " << n;
+    latest = std::max(latest, -left);
+  }
+  std::printf("%s: felt %.3f mm after contact at the latest, in steps of %.3f mm\n", GetParam(), 1e3 * latest,
+              1e3 * kStep);
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, Approach,
+                         ::testing::Values("tests/hybrid/arbitration/carved.toml",
+                                           "tests/hybrid/arbitration/kept.toml",
+                                           "tests/hybrid/arbitration/soft_on_soft.toml",
+                                           "scenes/edge-of-bone.toml", "scenes/two-soft.toml",
+                                           "scenes/cleft.toml"),
+                         [](const auto& file) {
+                           std::string name(file.param);
+                           name = name.substr(name.rfind('/') + 1);
+                           name = name.substr(0, name.find('.'));
+                           std::erase_if(name, [](char c) { return c == '-' || c == '_'; });
+                           return name;
+                         });
+
+class Stroke : public ::testing::TestWithParam<std::tuple<const char*, bool>> {};
+
+// Pressed, drawn along, held and lifted, somewhere on the top of the tissue: one contact, from the first tick
+// that feels something to the last (the thesis's Fig 20: it bounced), and the tool stays on top (Fig 21: it
+// slipped between voxels).
+TEST_P(Stroke, IsOneContact) {
+  constexpr int kStrokes = 40;
+  const auto [file, apart] = GetParam();
+  const hybrid::Scene scene = hybrid::load_scene(tests::source_folder / file);
+  std::mt19937 engine(20);
+  double deepest = 0.0;
+  for (int n = 0; n < kStrokes; ++n) {
+    // The block's top is at z = 6 mm, the ball's radius 4 mm: on top its middle is at 10.
+    const double speed = std::exp(between(engine, std::log(0.01), std::log(0.5)));
+    const double depth = between(engine, 0.2, 4.5);
+    const dvec3 first(between(engine, -12.0, 12.0), between(engine, -6.0, 6.0), 10.0 - depth),
+        second(between(engine, -12.0, 12.0), between(engine, -6.0, 6.0), 10.0 - between(engine, 0.2, depth));
+    const dvec3 up(0.0, 0.0, 4.0 + depth);
+    Touch touch(scene, 1e-3 * (first + up), apart);
+    int contacts = 0, ticks = 0;
+    bool before = false;
+    double lowest = 1.0, front = 1.0;
+    const auto see = [&](const hybrid::TickResult& felt) {
+      const bool now = coupling(felt) != dvec3(0.0);
+      contacts += now && !before ? 1 : 0;
+      before = now;
+      ticks += now ? 1 : 0;
+      lowest = std::min(lowest, felt.proxy_m.z);
+      front = std::min(front, tests::in_front_of(touch.world(), touch.state(), {0, 2, true}, felt.proxy_m));
+    };
+    touch.go(1e-3 * first, 1e-3 * speed, 60, see);
+    touch.go(1e-3 * second, 1e-3 * speed, 60, see);
+    touch.go(1e-3 * (second + up), 1e-3 * speed, 20, see);
+    EXPECT_EQ(contacts, 1) << "stroke " << n << ", " << depth << " mm deep at " << speed << " m/s, " << ticks
+                           << " ticks";
+    EXPECT_FALSE(before) << "still felt after it left, stroke " << n;
+    EXPECT_GT(ticks, 100);
+    EXPECT_GT(front, 0.0) << "between voxels, stroke " << n;
+    // Not deeper than the hand is.
+    EXPECT_GE(lowest, 1e-3 * std::min(first.z, second.z) - 1e-9);
+    deepest = std::max(deepest, depth);
+  }
+  std::printf("%d strokes, at most %.1f mm deep: one contact each\n", kStrokes, deepest);
+}
+
+INSTANTIATE_TEST_SUITE_P(Blocks, Stroke,
+                         ::testing::Combine(::testing::Values("tests/hybrid/arbitration/kept.toml"),
+                                            ::testing::Bool()),
+                         [](const auto& s) {
+                           return std::string(std::get<1>(s.param) ? "relaxedApart" : "relaxedInTheTick");
+                         });
+
+}  // namespace
