@@ -7,13 +7,18 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <memory>
 #include <numbers>
 #include <random>
 #include <string>
 #include <tuple>
+#include <utility>
+#include <vector>
 
 #include "arbitration_watch.h"
+#include "hybrid/build_objects.h"
 #include "touch.h"
+#include "voxel/classic.h"
 
 namespace {
 
@@ -177,5 +182,93 @@ INSTANTIATE_TEST_SUITE_P(Blocks, Stroke,
                          [](const auto& s) {
                            return std::string(std::get<1>(s.param) ? "relaxedApart" : "relaxedInTheTick");
                          });
+
+// A device of a Premium's mass in a hand that is pulled along.
+struct Hand {
+  static constexpr double kMass_kg = 0.075, kStiffness_N_per_m = 300.0, kDamping_Ns_per_m = 3.0, kDt_s = 1e-3;
+  dvec3 at_m, velocity{0.0};
+
+  void step(const dvec3& target_m, const dvec3& felt_N) {
+    const dvec3 force = kStiffness_N_per_m * (target_m - at_m) - kDamping_Ns_per_m * velocity + felt_N;
+    velocity += kDt_s / kMass_kg * force;
+    at_m += kDt_s * velocity;
+  }
+};
+
+// How often contact is lost in strokes of such a hand, while it presses and while it draws along.
+struct Lost {
+  int pressing = 0, drawing = 0;
+};
+
+// Strokes over a block whose top a tool meets at z = `top_m`. `feel` says what is felt at a place: whether
+// there is contact, and the force.
+template <class Begin, class Feel>
+Lost strokes_of_a_hand(int count, double top_m, Begin&& begin, Feel&& feel) {
+  Lost lost;
+  std::mt19937 engine(21);
+  for (int n = 0; n < count; ++n) {
+    const double speed = between(engine, 0.02, 0.2);
+    const auto place = [&] {
+      return dvec3(1e-3 * between(engine, -12.0, 12.0), 1e-3 * between(engine, -6.0, 6.0),
+                   top_m - 1e-3 * between(engine, 2.0, 8.0));
+    };
+    const dvec3 first = place(), second = place(), above(first.x, first.y, top_m + 2e-3);
+    begin(above);
+    Hand hand{above};
+    bool before = false;
+    const auto go = [&](const dvec3& from, const dvec3& to, int hold, int& losses) {
+      const int steps = static_cast<int>(std::ceil(glm::distance(from, to) / (1e-3 * speed)));
+      for (int k = 1; k <= steps + hold; ++k) {
+        const auto [contact, force] = feel(hand.at_m);
+        losses += before && !contact ? 1 : 0;
+        before = contact;
+        hand.step(k < steps ? from + (to - from) * (static_cast<double>(k) / steps) : to, force);
+      }
+    };
+    go(above, first, 100, lost.pressing);
+    go(first, second, 100, lost.drawing);
+  }
+  return lost;
+}
+
+// The thesis's own check loses contact as it found, and with the points it added; ours does not.
+TEST(Hands, LoseContactAsInTheThesisAndNotHere) {
+  constexpr int kStrokes = 30;
+  constexpr double kTop = 6e-3;
+  const hybrid::Scene scene =
+      hybrid::load_scene(tests::source_folder / "tests" / "hybrid" / "arbitration" / "kept.toml");
+  const hybrid::SoftDescription& soft = scene.soft.front();
+  const double radius = scene.tool.radius_m;
+  std::vector<hybrid::BuildNote> notes;
+  const voxel::LabelVolume volume = hybrid::build_volume(soft, notes);
+  const auto classic = [&](bool six_points) {
+    voxel::ClassicObject object(volume, hybrid::lattice_options(scene, soft),
+                                {.damping = 0.5, .six_points = six_points});
+    const auto feel = [&](const dvec3& at) {
+      const auto felt = object.touch(at - volume.origin_m, radius);
+      object.relax_in_turn(soft.budget);
+      return std::pair(felt.contact, felt.force_N);
+    };
+    return strokes_of_a_hand(
+        kStrokes, six_points ? kTop + radius : kTop, [&](const dvec3&) { object.reset(); }, feel);
+  };
+  const Lost point = classic(false), points = classic(true);
+  std::unique_ptr<Touch> touch;
+  const Lost ours = strokes_of_a_hand(
+      kStrokes, kTop + radius, [&](const dvec3& from) { touch = std::make_unique<Touch>(scene, from, true); },
+      [&](const dvec3& at) {
+        const dvec3 force = coupling(touch->at(at));
+        return std::pair(force != dvec3(0.0), force);
+      });
+  std::printf(
+      "%d strokes of a hand, contact lost while pressing and drawing along: by a point %d and %d times, by "
+      "six "
+      "%d and %d, here %d and %d\n",
+      kStrokes, point.pressing, point.drawing, points.pressing, points.drawing, ours.pressing, ours.drawing);
+  EXPECT_GT(point.pressing, 0) << "Fig 20";
+  EXPECT_GT(point.drawing, 0) << "Fig 21";
+  EXPECT_EQ(ours.pressing, 0);
+  EXPECT_EQ(ours.drawing, 0);
+}
 
 }  // namespace
