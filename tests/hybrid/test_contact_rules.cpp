@@ -173,7 +173,7 @@ TEST_P(Stroke, IsOneContact) {
     EXPECT_GE(lowest, 1e-3 * std::min(first.z, second.z) - 1e-9);
     deepest = std::max(deepest, depth);
   }
-  std::printf("%d strokes, at most %.1f mm deep: one contact each\n", kStrokes, deepest);
+  std::printf("%d strokes, at most %.1f mm deep\n", kStrokes, deepest);
 }
 
 INSTANTIATE_TEST_SUITE_P(Blocks, Stroke,
