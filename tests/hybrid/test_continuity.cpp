@@ -8,17 +8,15 @@
 #include <random>
 
 #include "hybrid/bench_soft_continuity.h"
+#include "touch.h"
 
 namespace {
 
 using hybrid::bench::Smooth;
 using hybrid::bench::StrokeCase;
+using tests::between;
 
 constexpr double kSpacing = 1e-3;
-
-double between(std::mt19937& engine, double low, double high) {
-  return low + (high - low) * (static_cast<double>(engine()) / 4294967296.0);
-}
 
 // Down, round at random depths, and back up to where it began: frictionless tissue gives back what it got, or
 // less.

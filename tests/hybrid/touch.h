@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <random>
 #include <string>
 #include <utility>
 #include <vector>
@@ -60,6 +61,11 @@ class Touch {
 // What the coupling asks for before the limits.
 inline glm::dvec3 coupling(const hybrid::TickResult& tick) {
   return tick.rigid_N + tick.soft_N;
+}
+
+// Evenly; the same with every library, where its own distributions are not.
+inline double between(std::mt19937& engine, double low, double high) {
+  return low + (high - low) * (static_cast<double>(engine()) / 4294967296.0);
 }
 
 inline bool finite(const glm::dvec3& v) {
