@@ -229,6 +229,7 @@ class SoftObject {
   std::vector<std::uint8_t> obstacle_changed_;    // [surface number] 1: among them; empty: no replica
   std::vector<Touch> touches_;
   std::vector<Touch> touched_before_;  // those pressed then
+  std::vector<VoxelId> pressed_last_;  // while any is pressed, and in the call in which the last is let go
   ToolInBody tool_;                    // as relax_near() last saw it
   std::vector<VoxelId> touched_voxels_;
   std::vector<VoxelId> held_voxels_;  // by pairs

