@@ -32,6 +32,8 @@ Couplings::Couplings(const Lattice& lattice, const Couplings* finer)
   ones_.fill(1.0F);
   eighths_.fill(0.125F);
   for (Lanes& lanes : zeros_) lanes.fill(0.0F);
+  movable_.fill(0);
+  immovable_.fill(7);
   std::array<bool, 256> used{};
   if (finer_ == nullptr) {
     for (RowId row = 0; row < grid_.rows(); ++row) {
@@ -191,13 +193,16 @@ void Couplings::write_out(RowId row, Written& out) const noexcept {
 }
 
 void Couplings::write_lane(std::size_t i, const VoxelSprings& springs, Written& out) noexcept {
+  unsigned stands = 0;
   for (std::size_t d = 0; d < 3; ++d) {
     out.up_along[d][i] = springs.up[d].along;
     out.up_across[d][i] = springs.up[d].across;
     out.down_along[d][i] = springs.down[d].along;
     out.down_across[d][i] = springs.down[d].across;
     out.inverse[d][i] = springs.inverse[d];
+    if (springs.inverse[d] == 0.0F) stands |= 1U << d;
   }
+  out.stands[i] = static_cast<std::uint8_t>(stands);
 }
 
 void Couplings::write_voxels(RowId row, Written& out) const noexcept {
@@ -360,21 +365,6 @@ RowSprings Couplings::springs(RowId row, int axis) const noexcept {
     out.inverse = zeros_[0].data();
   }
   return out;
-}
-
-RowCouplings Couplings::all(RowId row) const noexcept {
-  if (kind_[row] == one_label) {
-    const Constant& c = *constant_[label_[row]];
-    const float *along = c.along[0].data(), *across = c.across[0].data();
-    return {along, across, along, across, c.inverse[0].data(), eighths_.data(), ones_.data(), true};
-  }
-  if (kind_[row] == mixed) {
-    const Written& w = written_[written_at_[row]];
-    return {w.up_along[0].data(), w.up_across[0].data(), w.down_along[0].data(), w.down_across[0].data(),
-            w.inverse[0].data(),  w.share.data(),        w.filled.data(),        false};
-  }
-  const float* zeros = zeros_[0].data();
-  return {zeros, zeros, zeros, zeros, zeros, zeros, zeros, false};
 }
 
 const float* Couplings::filled(RowId row) const noexcept {

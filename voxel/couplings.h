@@ -31,8 +31,12 @@ struct RowCouplings {
   const float* inverse = nullptr;  // [axis][lane]
   const float* share = nullptr;    // [lane] 1 / number of cells of the level below; 0 where there is none
   const float* filled = nullptr;   // [lane] 1 where there is a cell, 0 elsewhere
-  bool uniform = false;            // the same in every lane
+  // [lane] bit `axis`: inverse is 0. A twelfth of what there is to read of that.
+  const std::uint8_t* stands = nullptr;
+  bool uniform = false;  // the same in every lane
 };
+
+using LaneBits = std::array<std::uint8_t, kRow>;
 
 using Lanes = std::array<float, kRow>;
 
@@ -77,7 +81,43 @@ class Couplings {
   }
   [[nodiscard]] bool uniform(RowId row) const { return kind_[row] == one_label; }
   [[nodiscard]] RowSprings springs(RowId row, int axis) const noexcept;
-  [[nodiscard]] RowCouplings all(RowId row) const noexcept;
+  // By reference, and member by member: returned by value it was written and read back at once in pieces of
+  // different sizes, which took longer than to smooth an octet.
+  void all(RowId row, RowCouplings& out) const noexcept {
+    if (kind_[row] == one_label) {
+      const Constant& c = *constant_[label_[row]];
+      out.up_along = out.down_along = c.along[0].data();
+      out.up_across = out.down_across = c.across[0].data();
+      out.inverse = c.inverse[0].data();
+      out.share = eighths_.data();
+      out.filled = ones_.data();
+      out.stands = movable_.data();
+      out.uniform = true;
+      return;
+    }
+    if (kind_[row] == mixed) {
+      const Written& w = written_[written_at_[row]];
+      out.up_along = w.up_along[0].data();
+      out.up_across = w.up_across[0].data();
+      out.down_along = w.down_along[0].data();
+      out.down_across = w.down_across[0].data();
+      out.inverse = w.inverse[0].data();
+      out.share = w.share.data();
+      out.filled = w.filled.data();
+      out.stands = w.stands.data();
+      out.uniform = false;
+      return;
+    }
+    out.up_along = out.up_across = out.down_along = out.down_across = out.inverse = zeros_[0].data();
+    out.share = out.filled = zeros_[0].data();
+    out.stands = immovable_.data();
+    out.uniform = false;
+  }
+  // [lane] 1 / number of cells of the level below; 0 where there is none.
+  [[nodiscard]] const float* share(RowId row) const noexcept {
+    if (kind_[row] == one_label) return eighths_.data();
+    return kind_[row] == mixed ? written_[written_at_[row]].share.data() : zeros_[0].data();
+  }
   // Of level 0.
   [[nodiscard]] RowLimits limits(RowId row) const noexcept;
   // Those of one voxel or cell, on all axes; a few loads once its row was prepared, which it sees to.
@@ -92,9 +132,10 @@ class Couplings {
   enum Kind : std::uint8_t { unknown = 0, empty, one_label, mixed };
   enum Content : std::uint8_t { nothing = 0, some = 1, held = 2 };
   static Content together(Content a, Content b) { return a == nothing || (a == held && b == some) ? b : a; }
-  struct Written {  // springs of a mixed row
+  struct alignas(64) Written {  // springs of a mixed row
     std::array<Lanes, 3> up_along, up_across, down_along, down_across, inverse;
     Lanes filled, share;
+    LaneBits stands;
   };
   struct Constant {  // springs of all rows of one label
     std::array<Lanes, 3> along, across, inverse;
@@ -124,6 +165,7 @@ class Couplings {
   std::array<std::unique_ptr<Constant>, 256> constant_;  // [label]
   Lanes ones_, eighths_;
   std::array<Lanes, 3> zeros_;
+  LaneBits movable_, immovable_;
 };
 
 }  // namespace voxel

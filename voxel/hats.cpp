@@ -32,15 +32,4 @@ void Hats::spread(int j, int k, bool tells, bool whole) noexcept {
   for (std::size_t axis = 0; axis < 3; ++axis) spread_along(cells(axis), octets_, lanes + axis * lanes_);
 }
 
-HatRow Hats::row(int j, int k, int octet) const noexcept {
-  const std::size_t at = slot(j, k);
-  const float* lanes =
-      lanes_of_.data() + at * 4 * lanes_ + static_cast<std::size_t>(octet - 2 * first_) * kOctet;
-  HatRow out;
-  out.tells = spread_[at].tells;
-  if (!spread_[at].whole) out.weight = lanes + 3 * lanes_;
-  for (std::size_t axis = 0; axis < 3; ++axis) out.sum[axis] = lanes + axis * lanes_;
-  return out;
-}
-
 }  // namespace voxel

@@ -37,7 +37,16 @@ class Hats {
   // Spreads what is in cells(): `whole`, nothing is missing there.
   void spread(int j, int k, bool tells, bool whole) noexcept;
   // A row of the finer level's lanes from its octet `octet` on, of all octets along x.
-  [[nodiscard]] HatRow row(int j, int k, int octet) const noexcept;
+  [[nodiscard]] HatRow row(int j, int k, int octet) const noexcept {
+    const std::size_t at = slot(j, k);
+    const float* lanes =
+        lanes_of_.data() + at * 4 * lanes_ + static_cast<std::size_t>(octet - 2 * first_) * kOctet;
+    HatRow out;
+    out.tells = spread_[at].tells;
+    if (!spread_[at].whole) out.weight = lanes + 3 * lanes_;
+    for (std::size_t axis = 0; axis < 3; ++axis) out.sum[axis] = lanes + axis * lanes_;
+    return out;
+  }
 
  private:
   struct Spread {

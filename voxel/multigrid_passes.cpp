@@ -22,7 +22,7 @@ LevelRow Multigrid::row_of(int level, RowId row, Displacement& state) noexcept {
   const Grid& g = l.couplings->grid();
   const std::size_t begin = static_cast<std::size_t>(row) * kRow;
   LevelRow r;
-  r.springs = l.couplings->all(row);
+  l.couplings->all(row, r.springs);
   r.z = static_cast<std::ptrdiff_t>(g.row_z) * kRow;
   r.x = static_cast<std::ptrdiff_t>(g.row_x) * kRow;
   if (level == 0) {
@@ -130,7 +130,7 @@ void Multigrid::for_tilted(int level, RowId row, const LevelRow& r, OctetSpan sp
   for (std::size_t i = first; i < last; ++i) {
     const auto cell = static_cast<VoxelId>(row * kRow + i);
     const std::array<float, 3> tilt = holds_->tilt(level, cell);
-    if (tilt == std::array<float, 3>{}) continue;
+    if (tilt[0] == 0.0F && tilt[1] == 0.0F && tilt[2] == 0.0F) continue;
     // A cell that a limit stops, or that does not move on an axis, is held by that.
     bool moves = r.stopped == nullptr || r.stopped[i] == 0;
     std::array<float, 3> hold{};
@@ -296,7 +296,7 @@ void Multigrid::restrict_values(int level, RowId row, Displacement& state, Octet
     value[axis] = l.value[axis].data() + begin;
     told[axis] = l.told[axis].data() + begin;
   }
-  take_means(sums, l.couplings->all(row).share, value, told, span);
+  take_means(sums, l.couplings->share(row), value, told, span);
 }
 
 void Multigrid::balance(RowId row, Displacement& state, const ObstacleView& obstacles,
@@ -412,7 +412,7 @@ LevelRow Multigrid::told_row(int level, RowId row) noexcept {
   Level& l = at(level);
   const Grid& g = l.couplings->grid();
   LevelRow r;
-  r.springs = l.couplings->all(row);
+  l.couplings->all(row, r.springs);
   r.z = static_cast<std::ptrdiff_t>(g.row_z) * kRow;
   r.x = static_cast<std::ptrdiff_t>(g.row_x) * kRow;
   for (std::size_t axis = 0; axis < 3; ++axis)
@@ -616,7 +616,7 @@ void Multigrid::take_back_refused(int level, RowId row, const RowVector& refused
                 lanes[axis].begin() + span.first * kOctet);
     add_pairs(lanes[axis].data(), pairs, sums[axis].data() + half * kRow / 2);
   }
-  take_back(sums, coarse.couplings->all(above).share, value, told,
+  take_back(sums, coarse.couplings->share(above), value, told,
             {half * kOctets / 2 + pairs.first / 2, half * kOctets / 2 + pairs.last / 2});
   spread(level + 1, above, active | dirty);
 }

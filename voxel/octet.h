@@ -57,9 +57,10 @@ HYBRID_INLINE void take_largest_size(Octet& most, const Octet& x) {
   most = size > most ? size : most;
 }
 HYBRID_INLINE float largest(const Octet& x) {
-  float most = x[0];
-  for (int i = 1; i < kOctet; ++i) most = x[i] > most ? x[i] : most;
-  return most;
+  Octet most = x;
+  take_largest(most, Octet(__builtin_shufflevector(most, most, 4, 5, 6, 7, 4, 5, 6, 7)));
+  take_largest(most, Octet(__builtin_shufflevector(most, most, 2, 3, 2, 3, 2, 3, 2, 3)));
+  return most[1] > most[0] ? most[1] : most[0];
 }
 // Lanes whose byte has any of these bits.
 HYBRID_INLINE void bits_set(OctetMask& out, const std::uint8_t* bytes, int bits) {

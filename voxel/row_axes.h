@@ -55,6 +55,15 @@ HYBRID_INLINE void standing(OctetMask& stands, const LevelRow& row, const Octet&
     stands |= bits;
   }
 }
+// The same of an axis, read from bits.
+HYBRID_INLINE void standing_by_bits(OctetMask& stands, const LevelRow& row, std::size_t axis, int octet) {
+  bits_set(stands, row.springs.stands + octet * kOctet, 1 << axis);
+  if (row.held != nullptr) {
+    OctetMask bits;
+    bits_set(bits, row.held + octet * kOctet, 1);
+    stands |= bits;
+  }
+}
 // Lanes of an axis that do not move.
 HYBRID_INLINE void staying(OctetMask& stays, const LevelRow& row, const Octet& inverse, std::size_t axis,
                            int octet) {

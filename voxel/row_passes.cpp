@@ -383,12 +383,16 @@ HYBRID_INLINE unsigned correct_freely(const LevelRow& row, const RowLimits* limi
     const auto n = static_cast<std::size_t>(octet - span.first);
 #pragma GCC unroll 3
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      Octet now, way, inverse;
+      Octet now, way;
       OctetMask stays;
       load(now, row.u[axis] + octet * kOctet);
       load(way, correction[axis].data() + octet * kOctet);
-      inverse_of<kUniform>(inverse, row.springs, axis, octet);
-      staying(stays, row, inverse, axis, octet);
+      standing_by_bits(stays, row, axis, octet);
+      if (row.stopped != nullptr) {
+        OctetMask stopped;
+        bits_set(stopped, row.stopped + octet * kOctet, 1 << axis);
+        stays |= stopped;
+      }
       take_largest_size(most, way);
       u[axis][n + 1] = stays ? now : now + way;
     }

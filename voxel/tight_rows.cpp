@@ -33,7 +33,7 @@ TightRows::Row* TightRows::look_at(RowId row) noexcept {
   at.load[ua] = state_->load_of(row, axis_);
   at.z = static_cast<std::ptrdiff_t>(g.row_z) * kRow;
   at.x = static_cast<std::ptrdiff_t>(g.row_x) * kRow;
-  at.springs = couplings_->all(row);
+  couplings_->all(row, at.springs);
   std::array<float, 3> tight{};
   for (std::size_t d = 0; d < 3; ++d) tight[d] = kTight * static_cast<float>(lattice_.spacing_m()[d]);
   Row& out = rows_.emplace_back();
@@ -132,7 +132,8 @@ TightRows::Hanging TightRows::hanging(const Couplings& couplings) const noexcept
     const std::uint32_t hangs = r.carried & ~r.roots;
     if (hangs == 0) continue;
     sum.force_N += sum_of(r.links.pull_N.data(), hangs);
-    const RowCouplings s = couplings.all(r.row);
+    RowCouplings s;
+    couplings.all(r.row, s);
     const std::array<std::uint32_t, 3> up{r.carried >> 1U | carried_in(r.row + row_x) << (kRow - 1),
                                           carried_in(r.row + 1), carried_in(r.row + row_z)};
     const std::array<std::uint32_t, 3> down{r.carried << 1U | carried_in(r.row - row_x) >> (kRow - 1),
