@@ -174,9 +174,9 @@ void Relaxation::run_cycle(Displacement& state, const ObstacleView& obstacles,
   end_round(state, obstacles, running_residual_N_);
 }
 
-void Relaxation::relax_contact(Displacement& state, const ObstacleView& obstacles,
-                               std::span<const VoxelId> held, std::span<const VoxelId> pressed,
-                               bool again) noexcept {
+std::size_t Relaxation::relax_contact(Displacement& state, const ObstacleView& obstacles,
+                                      std::span<const VoxelId> held, std::span<const VoxelId> pressed,
+                                      bool again) noexcept {
   contact_relaxed_ = true;
   hold_what_stands(state, held);
   std::array<int, 3> low = lattice_.coordinates(pressed.front()), high = low;
@@ -201,6 +201,21 @@ void Relaxation::relax_contact(Displacement& state, const ObstacleView& obstacle
   near_.last = {b.q1 / kOctets + 1, std::min(b.j1 + kNear, g.dims[1] - 1),
                 std::min(b.k1 + kNear, g.dims[2] - 1)};
   cycle(state, obstacles, Look::all, apart_ && again);
+  return octets_of_cycle();
+}
+
+// Smoothed, passed on and told; what of the boxes is empty counts too.
+std::size_t Relaxation::octets_of_cycle() const noexcept {
+  const auto octets = [](const RowBox& b) {
+    return static_cast<std::size_t>(b.q1 - b.q0 + 1) * static_cast<std::size_t>(b.j1 - b.j0 + 1) *
+           static_cast<std::size_t>(b.k1 - b.k0 + 1);
+  };
+  std::size_t sum = 0;
+  for (int l = 0; l <= last_level(); ++l) {
+    const LevelBoxes& b = boxes_[static_cast<std::size_t>(l)];
+    sum += 2 * octets(b.smoothed) + (l < last_level() ? octets(b.told) : 0);
+  }
+  return sum;
 }
 
 std::uint64_t Relaxation::relax_tile(Displacement& state, const ObstacleView& obstacles,
@@ -340,6 +355,10 @@ bool Relaxation::restrict_due(int level, RowId row) const noexcept {
   return false;
 }
 
+int Relaxation::last_level() const noexcept {
+  return std::min(multigrid_.levels(), apart_ ? kContactLevels : multigrid_.levels()) - 1;
+}
+
 template <class Visit>
 void Relaxation::for_rows(int level, const RowBox& box, const Visit& visit) noexcept {
   const Grid& g = multigrid_.grid(level);
@@ -430,7 +449,7 @@ void Relaxation::tell_box(int level, Displacement& state, const ObstacleView& ob
 
 void Relaxation::cycle(Displacement& state, const ObstacleView& obstacles, Look look,
                        bool smoothed) noexcept {
-  const int last = std::min(multigrid_.levels(), apart_ ? kContactLevels : multigrid_.levels()) - 1;
+  const int last = last_level();
   // What coarse levels know and finer ones do not is told first: a step between voxels that were told and
   // others that were not would look like a force to the cells above it.
   for (int l = last - 1; l >= 0; --l) tell_box(l, state, obstacles);

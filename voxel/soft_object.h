@@ -245,6 +245,7 @@ class SoftObject {
   LazyArray<std::uint32_t> carried_index_;  // [v]
   double unrelaxed_m_ = 0.0;                // motion of pressed voxels since the background was last woken
   int cycles_since_touch_ = 0;              // round the contact
+  std::size_t contact_octets_ = 0;          // that the last of these visited
   double unsettled_m_ = 0.0;                // how far the contact may be from the rest of the object
   bool moved_ever_ = false;
 };
