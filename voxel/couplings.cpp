@@ -15,7 +15,8 @@ Couplings::Couplings(const Lattice& lattice, const Couplings* finer)
       kind_(grid_.rows()),
       label_(grid_.rows()),
       written_at_(grid_.rows()),
-      written_(grid_.rows()) {
+      written_(grid_.rows()),
+      written_stands_(grid_.rows()) {
   if (finer_ == nullptr) {
     if (!lattice.uniform_limits()) written_limits_ = LazyArray<RowLimits::Written>(grid_.rows());
     for (std::size_t label = 0; label < 256; ++label) {
@@ -173,7 +174,7 @@ void Couplings::find(RowId row) noexcept {
     label_[row] = label;
   } else {
     Written& out = written_[written_count_];
-    write_out(row, out);
+    write_out(row, out, written_stands_[written_count_]);
     if (std::all_of(out.filled.begin(), out.filled.end(), [](float f) { return f == 0.0F; })) {
       kind = empty;
     } else {
@@ -184,28 +185,29 @@ void Couplings::find(RowId row) noexcept {
   kind_[row] = kind;
 }
 
-void Couplings::write_out(RowId row, Written& out) const noexcept {
+void Couplings::write_out(RowId row, Written& out, LaneBits& stands) const noexcept {
   if (level_ == 0) {
-    write_voxels(row, out);
+    write_voxels(row, out, stands);
   } else {
-    write_cells(row, out);
+    write_cells(row, out, stands);
   }
 }
 
-void Couplings::write_lane(std::size_t i, const VoxelSprings& springs, Written& out) noexcept {
-  unsigned stands = 0;
+void Couplings::write_lane(std::size_t i, const VoxelSprings& springs, Written& out,
+                           LaneBits& stands) noexcept {
+  unsigned bits = 0;
   for (std::size_t d = 0; d < 3; ++d) {
     out.up_along[d][i] = springs.up[d].along;
     out.up_across[d][i] = springs.up[d].across;
     out.down_along[d][i] = springs.down[d].along;
     out.down_across[d][i] = springs.down[d].across;
     out.inverse[d][i] = springs.inverse[d];
-    if (springs.inverse[d] == 0.0F) stands |= 1U << d;
+    if (springs.inverse[d] == 0.0F) bits |= 1U << d;
   }
-  out.stands[i] = static_cast<std::uint8_t>(stands);
+  stands[i] = static_cast<std::uint8_t>(bits);
 }
 
-void Couplings::write_voxels(RowId row, Written& out) const noexcept {
+void Couplings::write_voxels(RowId row, Written& out, LaneBits& stands) const noexcept {
   // Materials around the row, [lane + 1][z][y]: those at one place along the row stand together.
   using Slice = std::array<std::uint8_t, 9>;
   std::array<Slice, kRow + 2> around{};
@@ -251,7 +253,7 @@ void Couplings::write_voxels(RowId row, Written& out) const noexcept {
       springs.inverse = {};
       if (!anchored) springs.set_inverse();
     }
-    write_lane(i, springs, out);
+    write_lane(i, springs, out, stands);
   }
 }
 
@@ -294,7 +296,7 @@ RowLimits Couplings::limits(RowId row) const noexcept {
   return out;
 }
 
-void Couplings::write_cells(RowId row, Written& out) const noexcept {
+void Couplings::write_cells(RowId row, Written& out, LaneBits& stands) const noexcept {
   const std::array<int, 3> c = grid_.row_coordinates(row);
   for (int lane = 0; lane < kRow; ++lane) {
     const std::array<int, 3> cell{(c[0] - 1) * kRow + lane, c[1], c[2]};
@@ -319,7 +321,7 @@ void Couplings::write_cells(RowId row, Written& out) const noexcept {
     }
     out.share[static_cast<std::size_t>(lane)] = below > 0 ? 1.0F / static_cast<float>(below) : 0.0F;
     out.filled[static_cast<std::size_t>(lane)] = inside == nothing ? 0.0F : 1.0F;
-    write_lane(static_cast<std::size_t>(lane), springs, out);
+    write_lane(static_cast<std::size_t>(lane), springs, out, stands);
   }
 }
 
@@ -374,7 +376,7 @@ const float* Couplings::filled(RowId row) const noexcept {
 
 std::size_t Couplings::memory_bytes() const {
   return kind_.resident_bytes() + label_.resident_bytes() + content_.resident_bytes() +
-         written_at_.resident_bytes() + written_count_ * sizeof(Written) +
+         written_at_.resident_bytes() + written_count_ * (sizeof(Written) + sizeof(LaneBits)) +
          (written_limits_.size() > 0 ? written_count_ * sizeof(RowLimits::Written) : 0);
 }
 

@@ -104,7 +104,7 @@ class Couplings {
       out.inverse = w.inverse[0].data();
       out.share = w.share.data();
       out.filled = w.filled.data();
-      out.stands = w.stands.data();
+      out.stands = written_stands_[written_at_[row]].data();
       out.uniform = false;
       return;
     }
@@ -112,6 +112,9 @@ class Couplings {
     out.share = out.filled = zeros_[0].data();
     out.stands = immovable_.data();
     out.uniform = false;
+  }
+  void fetch_ahead(RowId row) const noexcept {
+    if (kind_[row] == mixed) __builtin_prefetch(written_stands_[written_at_[row]].data());
   }
   // [lane] 1 / number of cells of the level below; 0 where there is none.
   [[nodiscard]] const float* share(RowId row) const noexcept {
@@ -135,7 +138,6 @@ class Couplings {
   struct alignas(64) Written {  // springs of a mixed row
     std::array<Lanes, 3> up_along, up_across, down_along, down_across, inverse;
     Lanes filled, share;
-    LaneBits stands;
   };
   struct Constant {  // springs of all rows of one label
     std::array<Lanes, 3> along, across, inverse;
@@ -143,11 +145,12 @@ class Couplings {
 
   void find(RowId row) noexcept;
   [[nodiscard]] bool is_one_label(RowId row, std::uint8_t& label) const noexcept;
-  void write_out(RowId row, Written& out) const noexcept;
-  static void write_lane(std::size_t lane, const VoxelSprings& springs, Written& out) noexcept;
-  void write_voxels(RowId row, Written& out) const noexcept;
+  void write_out(RowId row, Written& out, LaneBits& stands) const noexcept;
+  static void write_lane(std::size_t lane, const VoxelSprings& springs, Written& out,
+                         LaneBits& stands) noexcept;
+  void write_voxels(RowId row, Written& out, LaneBits& stands) const noexcept;
   void write_limits(RowId row, RowLimits::Written& out) const noexcept;
-  void write_cells(RowId row, Written& out) const noexcept;
+  void write_cells(RowId row, Written& out, LaneBits& stands) const noexcept;
   [[nodiscard]] Spring link(const std::array<int, 3>& cell, int d) const noexcept;
   [[nodiscard]] Content content(const std::array<int, 3>& cell) const noexcept;
 
@@ -159,6 +162,9 @@ class Couplings {
   LazyArray<std::uint8_t> content_;       // [cell], from level 2 on; found on the fly below
   LazyArray<std::uint32_t> written_at_;   // [row] into written_
   LazyArray<Written> written_;
+  // As written_, and apart from it: corrections read no more than this, and of that 128 rows are on a page of
+  // memory instead of two. (In there, to wait for the page was a third of what it took to add a result.)
+  LazyArray<LaneBits> written_stands_;
   LazyArray<RowLimits::Written> written_limits_;  // as written_; empty where all links have the same
   std::array<std::array<AxisLimits, 3>, 256> label_limits_;  // [label][axis]
   std::uint32_t written_count_ = 0;
