@@ -162,8 +162,8 @@ class Couplings {
   LazyArray<std::uint8_t> content_;       // [cell], from level 2 on; found on the fly below
   LazyArray<std::uint32_t> written_at_;   // [row] into written_
   LazyArray<Written> written_;
-  // As written_, and apart from it: corrections read no more than this, and of that 128 rows are on a page of
-  // memory instead of two. (In there, to wait for the page was a third of what it took to add a result.)
+  // As written_, and apart from it: corrections read no more than this, and what they read stands together.
+  // (In there, to wait for it was a third of what it took to add a result.)
   LazyArray<LaneBits> written_stands_;
   LazyArray<RowLimits::Written> written_limits_;  // as written_; empty where all links have the same
   std::array<std::array<AxisLimits, 3>, 256> label_limits_;  // [label][axis]

@@ -21,6 +21,12 @@ constexpr std::size_t kMostAtOnce = 1000;  // rows that a tick adds at once; a w
 // of 30 mN.
 constexpr int kContactCycles = 4, kUnsettled = 4;
 constexpr double kMoved = 0.1;
+// Far from the contact, changes are passed on that are so many times as large as a row is left alone with
+// (1e-4 of the spacing); the others when they are as large, or all is at rest. The tick adds a third of the
+// rows for it. Within so many rows all are, and so is what the tick itself moves: given again, it would
+// lose what was kept back.
+constexpr float kFarther = 20.0F;
+constexpr std::size_t kNearRows = 3;
 
 // Floats of a row that go over: ways, and where there are bricks their loads.
 std::size_t arrays_of(const Lattice& lattice) {
@@ -34,6 +40,8 @@ Replica::Replica(SoftObject& object)
       state_(object.state_),
       relaxation_(lattice_),
       obstacles_(object.obstacles_),
+      kept_back_(lattice_.grid().rows()),
+      rows_kept_back_(lattice_.grid().rows()),
       distance_(lattice_.grid().rows()),
       by_distance_(lattice_.grid().rows()),
       given_(lattice_.grid().rows()),
@@ -172,13 +180,34 @@ void Replica::pack_changes() noexcept {
   // What is near was laid out first, so it ends where the next distance began.
   const std::size_t near = near_.first[0] > near_.last[0] ? 0 : std::min<std::size_t>(begin_[0], kMostAtOnce);
   for (std::size_t n = 0; n < count; ++n) {
-    if (!pack_row(by_distance_[n])) parcel.drop_last();
+    const RowId row = by_distance_[n];
+    const bool all = at_rest_ || n < begin_[kNearRows] || given_.find(row) != given_.count();
+    if (!pack_row(row, all ? least_m_ : kFarther * least_m_)) {
+      parcel.drop_last();
+      if (!all) keep_back(row);
+    }
     if (n < near) near_count_ = parcel.count();
   }
+  if (at_rest_) pack_kept_back();
 }
 
-// False where next to nothing changed, less than a row is left alone with: that waits until it is more.
-bool Replica::pack_row(RowId row) noexcept {
+void Replica::keep_back(RowId row) noexcept {
+  if (kept_back_[row] != 0) return;
+  kept_back_[row] = 1;
+  rows_kept_back_[kept_back_count_++] = row;
+}
+
+void Replica::pack_kept_back() noexcept {
+  for (std::size_t n = 0; n < kept_back_count_; ++n) {
+    const RowId row = rows_kept_back_[n];
+    kept_back_[row] = 0;
+    if (!multigrid().log().has(0, row) && !pack_row(row, least_m_)) found_[1 - taking_].drop_last();
+  }
+  kept_back_count_ = 0;
+}
+
+// False where no voxel changed by more than that: it waits until it is more.
+bool Replica::pack_row(RowId row, float least_m) noexcept {
   float* way = found_[1 - taking_].add(row);
   float most = 0.0F;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -190,7 +219,7 @@ bool Replica::pack_row(RowId row) noexcept {
     }
   }
   const bool loads_changed = multigrid().bricks().take_changed(row);
-  if (most <= least_m_ && !loads_changed) return false;
+  if (most <= least_m && !loads_changed) return false;
   // The same sum as the tick's, to the last bit.
   for (std::size_t axis = 0; axis < 3; ++axis) {
     float* now = state_.u[axis].data() + at(row);
@@ -243,7 +272,8 @@ std::size_t Replica::memory_bytes() const {
   std::size_t bytes = relaxation_.memory_bytes() + obstacles_.size() * sizeof(Obstacle) +
                       state_.role.resident_bytes() + state_.row_held.resident_bytes() +
                       state_.row_obstacles.resident_bytes() + given_.memory_bytes() +
-                      distance_.resident_bytes() + by_distance_.resident_bytes();
+                      distance_.resident_bytes() + by_distance_.resident_bytes() +
+                      kept_back_.resident_bytes() + rows_kept_back_.resident_bytes();
   for (const Parcel& parcel : found_) bytes += parcel.memory_bytes();
   for (std::size_t axis = 0; axis < 3; ++axis)
     bytes += state_.u[axis].resident_bytes() + before_[axis].resident_bytes();

@@ -123,7 +123,9 @@ class Replica {
   void open_given() noexcept;
   void sort_by_distance() noexcept;
   void pack_changes() noexcept;
-  bool pack_row(RowId row) noexcept;
+  bool pack_row(RowId row, float least_m) noexcept;
+  void keep_back(RowId row) noexcept;
+  void pack_kept_back() noexcept;
   void take_row(SoftObject& object, std::size_t n) noexcept;
 
   const Lattice& lattice_;
@@ -134,6 +136,10 @@ class Replica {
   std::array<LazyArray<float>, 3> before_;  // [axis][voxel] what is here as the other state knows it
   std::size_t work_ = 0;
   float least_m_ = 0.0F;  // smaller changes are not passed on
+  LazyArray<std::uint8_t>
+      kept_back_;  // [row] 1: in the list of those whose change waits until all is at rest
+  LazyArray<RowId> rows_kept_back_;
+  std::size_t kept_back_count_ = 0;
   static constexpr int kDistances = 64;
   std::array<std::uint32_t, kDistances + 1> begin_{};  // [distance] of by_distance_
   LazyArray<std::uint8_t> distance_;                   // [n] of the rows in the log

@@ -113,6 +113,24 @@ TEST(Replica, WhatTheToolLeftComesToRestAndIsLeftAlone) {
   EXPECT_LT(most, 1e-3 * kH);
 }
 
+// Far from the contact small changes wait, but not for ever: at rest both know the same.
+TEST(Replica, WhatWasKeptBackIsPassedOnAtRest) {
+  SoftBlock soft({41, 65, 65}, kH, elastic(1e4, 0.3));
+  Replica replica(*soft.object);
+  const ToolInBody tool = soft.ball(6 * kH, 2 * kH);
+  soft.touch(tool, 9 * kH);
+  soft.object->push_out(tool);
+  for (int n = 0; n < 300 && Replica::wanted(*soft.object); ++n) exchange(replica, soft, 1000);
+  ASSERT_FALSE(Replica::wanted(*soft.object));
+  double most = 0.0;
+  for (voxel::VoxelId v = 0; v < soft.lattice->size(); ++v) {
+    if (!soft.lattice->filled(v)) continue;
+    const glm::dvec3 known = replica.displacement_at(soft.lattice->rest(v));
+    most = std::max(most, glm::distance(soft.object->state().at(v), known));
+  }
+  EXPECT_LT(most, voxel::kRestingResidual * kH);
+}
+
 // Draining what was found takes longer than the next is given: what a tick moves meanwhile is given without
 // what it has yet to go, and must not go that twice. The block comes loose and is to come to rest.
 TEST(Replica, WhatIsGivenWhileItIsDrainedGoesItsWayOnce) {
