@@ -113,9 +113,6 @@ class Couplings {
     out.stands = immovable_.data();
     out.uniform = false;
   }
-  void fetch_ahead(RowId row) const noexcept {
-    if (kind_[row] == mixed) __builtin_prefetch(written_stands_[written_at_[row]].data());
-  }
   // [lane] 1 / number of cells of the level below; 0 where there is none.
   [[nodiscard]] const float* share(RowId row) const noexcept {
     if (kind_[row] == one_label) return eighths_.data();

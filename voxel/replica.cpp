@@ -21,10 +21,9 @@ constexpr std::size_t kMostAtOnce = 1000;  // rows that a tick adds at once; a w
 // of 30 mN.
 constexpr int kContactCycles = 4, kUnsettled = 4;
 constexpr double kMoved = 0.1;
-// Far from the contact, changes are passed on that are so many times as large as a row is left alone with
-// (1e-4 of the spacing); the others when they are as large, or all is at rest. The tick adds a third of the
-// rows for it. Within so many rows all are, and so is what the tick itself moves: given again, it would
-// lose what was kept back.
+// Far from the contact only what changed by so many times as much as rows are left alone with (1e-4 of the
+// spacing) is passed on, and the rest once all is at rest. Within so many rows of it everything is, and so is
+// what the tick itself moved: given again, it would lose what was kept back.
 constexpr float kFarther = 20.0F;
 constexpr std::size_t kNearRows = 3;
 
@@ -40,8 +39,8 @@ Replica::Replica(SoftObject& object)
       state_(object.state_),
       relaxation_(lattice_),
       obstacles_(object.obstacles_),
-      kept_back_(lattice_.grid().rows()),
       rows_kept_back_(lattice_.grid().rows()),
+      kept_back_(lattice_.grid().rows()),
       distance_(lattice_.grid().rows()),
       by_distance_(lattice_.grid().rows()),
       given_(lattice_.grid().rows()),
@@ -206,7 +205,7 @@ void Replica::pack_kept_back() noexcept {
   kept_back_count_ = 0;
 }
 
-// False where no voxel changed by more than that: it waits until it is more.
+// False where no voxel changed by more than `least_m`: it waits until it is more.
 bool Replica::pack_row(RowId row, float least_m) noexcept {
   float* way = found_[1 - taking_].add(row);
   float most = 0.0F;

@@ -18,7 +18,8 @@
 // tick's: there is a step at the seam. Tiles of the object itself for the thread: coarse cells are
 // everybody's.)
 //
-// Coarse cells are not exchanged: each of the two has its own.
+// Coarse cells are not exchanged: each of the two has its own. Nor are changes too small to matter, until all
+// is at rest.
 //
 // Limits hold throughout: what a row cannot follow, by the links to its neighbours as they now are, is left
 // out, and what became of it is given the next time.
@@ -136,10 +137,10 @@ class Replica {
   std::array<LazyArray<float>, 3> before_;  // [axis][voxel] what is here as the other state knows it
   std::size_t work_ = 0;
   float least_m_ = 0.0F;  // smaller changes are not passed on
-  LazyArray<std::uint8_t>
-      kept_back_;  // [row] 1: in the list of those whose change waits until all is at rest
+  // Rows whose change waits until all is at rest; some that were passed on since are among them.
   LazyArray<RowId> rows_kept_back_;
   std::size_t kept_back_count_ = 0;
+  LazyArray<std::uint8_t> kept_back_;  // [row] 1: it is one of them
   static constexpr int kDistances = 64;
   std::array<std::uint32_t, kDistances + 1> begin_{};  // [distance] of by_distance_
   LazyArray<std::uint8_t> distance_;                   // [n] of the rows in the log
