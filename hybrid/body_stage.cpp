@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "hybrid/body_collisions.h"
 #include "hybrid/body_support.h"
 #include "hybrid/rigid_sweep.h"
 
@@ -108,13 +109,12 @@ void set_rigid_pose(const World& world, WorldState& state, std::uint32_t object,
 
 namespace {
 
-// Is a body that went from `before` to `after` about to come to rest, or still there? Of the contacts the
-// first `springs` are the tool and what tissue's links press with.
+// Is a body that went from `before` to `after` about to come to rest, or still there? `springs`: the tool and
+// what tissue's links press with.
 bool is_calm(const FreeBody& body, const FreeBodyState& before, const FreeBodyState& after,
-             std::span<const BodyContact> contacts, std::size_t springs, double dt_s, double most) noexcept {
+             std::span<const BodyContact> springs, double dt_s, double most) noexcept {
   double pressed = 0.0, change = 0.0;
-  for (std::size_t n = 0; n < springs; ++n) {
-    const BodyContact& c = contacts[n];
+  for (const BodyContact& c : springs) {
     if (!(c.force_N > 0.0)) continue;
     const glm::dvec3 way =
         after.velocity_m_per_s + glm::cross(after.spin_rad_per_s, c.point_m - before.centre_m);
@@ -127,34 +127,64 @@ bool is_calm(const FreeBody& body, const FreeBodyState& before, const FreeBodySt
   return pressed > 0.0 && std::max(change, left) <= most * std::max(pressed, weight);
 }
 
-// One step of a free body beside tissue.
-void move_in_tissue(const World& world, WorldState& state, std::uint32_t o, double dt_s) noexcept {
-  const RigidMotion& motion = world.rigid[o].motion;
-  RigidNear& near = state.rigid[o];
-  near.before = near.pose;
-  state.body_moved_m[o] = 0.0;
+// What acts on a free body by itself: first the tool, then what tissue's links press with, then what is as
+// good as rigid.
+OwnContacts list_contacts(const World& world, WorldState& state, std::uint32_t o, std::uint32_t member,
+                          double dt_s) noexcept {
   std::array<BodyContact, 4> of_tool;
   const std::size_t count = contacts_of(world, state, o, of_tool);
-  state.body_contacts.assign(of_tool.begin(), of_tool.begin() + static_cast<std::ptrdiff_t>(count));
-  const std::size_t springs = add_tissue_contacts(world, state, o, dt_s);
-  FreeBodyState next = near.free;
-  if (!step_free_body(motion.free_body(), next, state.body_contacts, dt_s))
-    state.faults |= fault_nonfinite_body;
-  const Pose pose = pose_of(motion.free_body(), next);
-  const double way = motion.displacement_bound(near.pose, pose);
-  const bool rests = near.calm_ticks == kCalmTicks;
-  const double most = rests ? kRoused : 1.0;
-  const bool calm =
-      way <= most * kCalmWay * least_spacing_m(state) &&
-      is_calm(motion.free_body(), near.free, next, state.body_contacts, springs, dt_s, most * kCalmForce);
+  OwnContacts own{.first = state.body_contacts.size()};
+  for (std::size_t n = 0; n < count; ++n) own.springs += add_contact(state, of_tool[n]) ? 1 : 0;
+  if (world.rigid[o].presses_tissue) own.springs += add_tissue_contacts(world, state, o, dt_s);
+  for (std::size_t n = own.first; n < state.body_contacts.size(); ++n) state.body_contacts[n].body = member;
+  return own;
+}
+
+// Beside tissue: does the body rest, in place of what its step says?
+bool rests(const World& world, WorldState& state, std::uint32_t o, const FreeBodyState& next,
+           const OwnContacts& own, double dt_s) noexcept {
+  const RigidMotion& motion = world.rigid[o].motion;
+  RigidNear& near = state.rigid[o];
+  const double most = near.calm_ticks == kCalmTicks ? kRoused : 1.0;
+  const auto springs = std::span(state.body_contacts).subspan(own.first, own.springs);
+  const bool calm = state.body_moved_m[o] <= most * kCalmWay * least_spacing_m(state) &&
+                    is_calm(motion.free_body(), near.free, next, springs, dt_s, most * kCalmForce);
   near.calm_ticks = calm ? std::min(near.calm_ticks + 1, kCalmTicks) : 0;
-  if (near.calm_ticks == kCalmTicks) {
-    near.free.velocity_m_per_s = near.free.spin_rad_per_s = glm::dvec3(0.0);
-    return;
+  return near.calm_ticks == kCalmTicks;
+}
+
+void move_free_bodies(const World& world, WorldState& state, double dt_s) noexcept {
+  Colliding& all = state.colliding;
+  all.stepped.clear();
+  all.object.clear();
+  all.own.clear();
+  state.body_contacts.clear();
+  for (std::uint32_t o = 0; o < world.rigid.size(); ++o) {
+    if (world.rigid[o].motion.kind() != RigidMotion::Kind::free) continue;
+    all.own.push_back(list_contacts(world, state, o, static_cast<std::uint32_t>(all.stepped.size()), dt_s));
+    all.stepped.push_back({.body = &world.rigid[o].motion.free_body(), .state = state.rigid[o].free});
+    all.object.push_back(o);
   }
-  near.free = next;
-  state.body_moved_m[o] = way;
-  set_rigid_pose(world, state, o, pose);
+  if (all.stepped.empty()) return;
+  step_past_rigid(world, state, dt_s);
+  for (std::size_t n = 0; n < all.stepped.size(); ++n) {
+    const std::uint32_t o = all.object[n];
+    RigidNear& near = state.rigid[o];
+    const SteppedBody& stepped = all.stepped[n];
+    if (stepped.stopped) state.faults |= fault_nonfinite_body;
+    const Pose pose = pose_of(*stepped.body, stepped.state);
+    if (world.rigid[o].presses_tissue) {
+      near.before = near.pose;
+      state.body_moved_m[o] = world.rigid[o].motion.displacement_bound(near.pose, pose);
+      if (rests(world, state, o, stepped.state, all.own[n], dt_s)) {
+        near.free.velocity_m_per_s = near.free.spin_rad_per_s = glm::dvec3(0.0);
+        state.body_moved_m[o] = 0.0;
+        continue;
+      }
+    }
+    near.free = stepped.state;
+    set_rigid_pose(world, state, o, pose);
+  }
 }
 
 }  // namespace
@@ -163,21 +193,13 @@ void move_bodies(const World& world, WorldState& state, double dt_s) noexcept {
   state.clock.add(dt_s);
   for (std::uint32_t o = 0; o < world.rigid.size(); ++o) {
     const RigidMotion& motion = world.rigid[o].motion;
-    if (motion.kind() == RigidMotion::Kind::path) {
-      const Pose next = motion.pose_at(state.clock.now_s());
-      if (world.rigid[o].presses_tissue)
-        state.body_moved_m[o] = motion.displacement_bound(state.rigid[o].pose, next);
-      set_rigid_pose(world, state, o, next);
-    } else if (motion.kind() == RigidMotion::Kind::free && world.rigid[o].presses_tissue) {
-      move_in_tissue(world, state, o, dt_s);
-    } else if (motion.kind() == RigidMotion::Kind::free) {
-      std::array<BodyContact, 4> contacts;
-      const std::size_t count = contacts_of(world, state, o, contacts);
-      if (!step_free_body(motion.free_body(), state.rigid[o].free, {contacts.data(), count}, dt_s))
-        state.faults |= fault_nonfinite_body;
-      set_rigid_pose(world, state, o, pose_of(motion.free_body(), state.rigid[o].free));
-    }
+    if (motion.kind() != RigidMotion::Kind::path) continue;
+    const Pose next = motion.pose_at(state.clock.now_s());
+    if (world.rigid[o].presses_tissue)
+      state.body_moved_m[o] = motion.displacement_bound(state.rigid[o].pose, next);
+    set_rigid_pose(world, state, o, next);
   }
+  move_free_bodies(world, state, dt_s);
 }
 
 }  // namespace hybrid

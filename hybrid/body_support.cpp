@@ -8,6 +8,7 @@
 #include <glm/matrix.hpp>
 #include <span>
 
+#include "hybrid/body_collisions.h"
 #include "hybrid/body_stage.h"
 #include "hybrid/body_tissue.h"
 
@@ -61,15 +62,6 @@ void for_voxels_at(const WorldState& state, std::uint32_t b, const Visit& visit)
   }
 }
 
-bool add(WorldState& state, const BodyContact& contact) noexcept {
-  if (state.body_contacts.size() == state.body_contacts.capacity()) {
-    state.faults |= fault_body_crowded;
-    return false;
-  }
-  state.body_contacts.push_back(contact);
-  return true;
-}
-
 double rigid_stiffness(const FreeBody& body, double dt_s) noexcept {
   return dt_s > 0.0 ? kRigid * body.mass.mass_kg / (dt_s * dt_s) : 0.0;
 }
@@ -91,7 +83,7 @@ void add_stops(const World& world, WorldState& state, std::uint32_t b, double st
     const double left = held.gap_m + kProbe * object.lattice().min_spacing_m();
     contact.force_N = -stiffness * std::max(left, 0.0);
     contact.stiffness_N_per_m = stiffness;
-    add(state, contact);
+    add_contact(state, contact);
   });
 }
 
@@ -168,7 +160,7 @@ void add_pressing(const World& world, WorldState& state, std::uint32_t b, std::s
       contact.force_N += glm::dot(share, held.normal);
       contact.stiffness_N_per_m = kTightDamping * springs;
     }
-    add(state, contact);
+    add_contact(state, contact);
   }
 }
 
@@ -176,6 +168,7 @@ void add_pressing(const World& world, WorldState& state, std::uint32_t b, std::s
 
 std::size_t add_tissue_contacts(const World& world, WorldState& state, std::uint32_t b,
                                 double dt_s) noexcept {
+  const std::size_t before = state.body_contacts.size();
   for (std::size_t o = 0; o < state.beside_bodies.size(); ++o) {
     const std::size_t pressed = list_pressing(state, b, o);
     state.soft[o]->load_held(state.held_by_body, pressed, state.held_loads);
@@ -183,7 +176,7 @@ std::size_t add_tissue_contacts(const World& world, WorldState& state, std::uint
   }
   const std::size_t links = state.body_contacts.size();
   add_rigid_contacts(world, state, b, rigid_stiffness(world.rigid[b].motion.free_body(), dt_s));
-  return links;
+  return links - before;
 }
 
 namespace {
@@ -214,7 +207,7 @@ bool list_overlaps(const World& world, WorldState& state, std::uint32_t b, doubl
     BodyContact contact = contact_at(world.soft[o], object, state.beside_bodies[o].sights[b][s], s, held);
     contact.stiffness_N_per_m = stiffness;
     contact.force_N = stiffness * (-held.gap_m - kProbe * h);
-    add(state, contact);
+    add_contact(state, contact);
   });
   return any;
 }
@@ -256,6 +249,7 @@ bool give_way_to_tissue(const World& world, WorldState& state, std::uint32_t b, 
   if (!list_overlaps(world, state, b, limit, stiffness)) return false;
   const std::size_t overlaps = state.body_contacts.size();
   add_rigid_contacts(world, state, b, stiffness);
+  add_collision_stops(world, state, b, stiffness);
   const std::size_t rigid = state.body_contacts.size();
   // Into other tissue only as far as it has to: the least motion of its mass may be a turn that goes far.
   add_stops(world, state, b, kOthers * stiffness,

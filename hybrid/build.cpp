@@ -12,6 +12,7 @@
 #include <glm/matrix.hpp>
 
 #include "hybrid/arbitration.h"
+#include "hybrid/body_collisions.h"
 #include "hybrid/body_tissue.h"
 #include "hybrid/build_objects.h"
 #include "hybrid/label_surface.h"
@@ -394,9 +395,21 @@ class Builder {
     if (scene_.passivity && !ideal) world_->passivity = passivity_options();
     add_meetings();
     for (RigidObject& object : world_->rigid) object.presses_tissue = object.motion.moves() && !soft_.empty();
+    add_surface_points();
     built_.state = std::make_unique<WorldState>(*world_, std::move(*map_));
     built_.state->soft = std::move(soft_);
     built_.state->prepare(*world_);
+    prepare_collisions(*world_, *built_.state);
+    watch_collisions(*world_, *built_.state);
+  }
+
+  void add_surface_points() {
+    const auto free = [](const RigidObject& object) {
+      return object.motion.kind() == RigidMotion::Kind::free;
+    };
+    if (world_->rigid.size() < 2 || std::none_of(world_->rigid.begin(), world_->rigid.end(), free)) return;
+    for (std::size_t o = 0; o < world_->rigid.size(); ++o)
+      world_->rigid[o].points = surface_points(scene_.rigid[o].source, *world_->rigid[o].drawn);
   }
 
   [[nodiscard]] device::PassivityOptions passivity_options() const {

@@ -264,6 +264,10 @@ std::vector<std::string> fault_texts(std::uint32_t faults) {
       "a rigid object that moves came to more soft voxels than a tick looks at, and may have overlapped "
       "some; "
       "use a coarser spacing, or a smaller or slower object");
+  say(fault_bodies_overlap,
+      "a free body was squeezed between rigid objects, or began in one, and they overlapped; give it room, "
+      "or "
+      "a path that leaves it some");
   say(fault_infeasible, "rigid surfaces left the tool no room; use a smaller tool radius");
   return texts;
 }

@@ -38,6 +38,8 @@ class SceneError : public std::runtime_error {
 struct Pose {  // body frame to scene frame
   glm::dvec3 position_m{0.0};
   glm::dquat rotation{1.0, 0.0, 0.0, 0.0};
+
+  bool operator==(const Pose&) const = default;
 };
 
 // Of tissue: springs between neighbours, or elastic bricks between eight voxels (voxel/brick_loads.h).

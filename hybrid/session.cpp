@@ -12,6 +12,7 @@
 #include <limits>
 
 #include "device/simulated.h"
+#include "hybrid/body_collisions.h"
 #include "hybrid/rigid_step.h"
 
 namespace hybrid {
@@ -358,6 +359,7 @@ std::unique_ptr<WorldState> copy_state(const World& world, const WorldState& sta
   auto copy = std::make_unique<WorldState>(world, OccupancyMap(state.map));
   for (const auto& object : state.soft) copy->soft.push_back(object->copy());
   copy->prepare(world);
+  prepare_collisions(world, *copy);
   copy->map.reserve_bricks(1024);
   static_cast<CarriedState&>(*copy) = static_cast<const CarriedState&>(state);
   return copy;

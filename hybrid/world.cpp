@@ -79,7 +79,6 @@ void WorldState::prepare_beside_bodies(const World& world) {
     return object.presses_tissue && object.motion.kind() == RigidMotion::Kind::free;
   };
   if (std::none_of(world.rigid.begin(), world.rigid.end(), free)) return;
-  body_contacts.reserve(kMaxOneSided);
   at_body.reserve(voxel::SoftObject::kMaxTouched);
   held_by_body.reserve(voxel::SoftObject::kMaxTouched);
   held_loads.resize(voxel::SoftObject::kMaxTouched);

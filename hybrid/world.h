@@ -25,6 +25,7 @@
 #include "hybrid/scene.h"
 #include "hybrid/snapshot.h"
 #include "hybrid/surface_feel.h"
+#include "hybrid/surface_points.h"
 #include "polygon/contact.h"
 #include "polygon/neighbourhood.h"
 #include "polygon/proxy.h"
@@ -43,6 +44,7 @@ struct RigidObject {
   SurfaceFeel feel{};                                    // hard and smooth unless the scene says otherwise
   bool surface_is_drawn = false;                         // the surface is of that very mesh, and shares it
   bool presses_tissue = false;                           // it moves, beside soft objects
+  std::vector<SurfacePoint> points{};  // for where it meets others; none where no body is free
 
   [[nodiscard]] glm::dvec3 to_body(const glm::dvec3& in_scene) const {
     return glm::inverse(pose.rotation) * (in_scene - pose.position_m);
@@ -139,6 +141,7 @@ enum FaultBit : std::uint32_t {
   fault_nonfinite_body = 64,    // a free body was pushed by something that is not finite: it stood still
   fault_body_squeezed = 128,    // tissue could not leave the way of a body that moves: they overlapped
   fault_body_crowded = 256,     // a body that moves came to more soft voxels than a tick looks at
+  fault_bodies_overlap = 512,   // a free body had no way out between rigid objects
 };
 
 inline constexpr std::size_t kMaxNear = 256;     // triangles considered at once
@@ -200,6 +203,52 @@ struct BesideBodies {
   std::vector<std::vector<BodySight>> sights;  // [rigid object][surface voxel]; empty: it does not press
 };
 
+// What a point of one rigid object sees of another's surface, in the other one's frame.
+struct SeenSurface {
+  glm::dvec3 normal{0.0};  // out of it
+  glm::dvec3 at_m{0.0};    // its nearest place
+  double gap_m = 0.0;      // negative: within it
+};
+struct PointSight : SeenSurface {
+  double seen_m = -1e300;      // how far both objects had travelled then
+  SeenSurface end;             // where its way ends in this tick …
+  std::uint64_t followed = 0;  // … as it was followed in that round
+};
+
+// A free rigid body and another one, free or not, that it may collide with (hybrid/body_collisions.h).
+struct PairOfBodies {
+  std::uint32_t free = 0, other = 0;
+  double size_m = 0.0, skin_m = 0.0;         // of the smaller one; how far apart they are kept
+  double friction = 0.0;                     // Coulomb's coefficient
+  double until_m = -1e300, seen_m = -1e300;  // they do not touch before both have travelled so far in sum
+  std::array<std::vector<PointSight>, 2> sights;  // of the points of the one, then of the other
+};
+struct BodyCollisions {
+  std::vector<PairOfBodies> pairs;
+  std::vector<double> travel_m;  // [rigid] no point of it has moved further since the session began
+  std::vector<Pose> last;        // [rigid] as the last tick left them
+  std::uint64_t round = 0;
+};
+
+// Of all that acts on free bodies, what acts on one by itself: the first of it, and how much of it are
+// springs.
+struct OwnContacts {
+  std::size_t first = 0, springs = 0;
+};
+// Of the current tick: free bodies that step together.
+struct Colliding {
+  std::vector<SteppedBody> stepped;
+  std::vector<OwnContacts> own;          // [stepped]
+  std::vector<std::uint32_t> object;     // [stepped] which rigid object it is
+  std::vector<std::uint32_t> member;     // [rigid] which of `stepped`
+  std::vector<BodyFrame> before, after;  // [rigid]
+  std::vector<Pose> next;                // [rigid]
+  std::vector<double> moves_m;           // [rigid]
+  std::vector<FreeBody> alone;           // each by itself: nothing but contacts acts on it
+  std::vector<SteppedBody> still;        // … and it has no speed
+  BodySystem system;
+};
+
 // A surface voxel that may be near a body; those with the least left come first.
 struct BodyLook {
   double left_m = 0.0;
@@ -249,6 +298,7 @@ struct CarriedState {
   std::vector<BesideBodies> beside_bodies;              // [soft]; none where no body presses tissue
   // Of bodies that press tissue: how far any point of them moved since the session began, and in this tick.
   std::vector<double> body_travel_m, body_moved_m;  // [rigid]
+  BodyCollisions collisions;
 };
 
 // Everything the tick writes. Buffers are sized when the world is built, and never after.
@@ -278,10 +328,21 @@ struct WorldState : CarriedState {
   std::vector<std::vector<voxel::VoxelId>> touched;  // [soft]
   std::vector<BodyLook> due;                         // surface voxels that bodies may be near to
   std::vector<std::uint32_t> in_the_way;             // … and that are in one
-  std::vector<BodyContact> body_contacts;            // what presses on a free body
+  std::vector<BodyContact> body_contacts;            // what presses on free bodies
+  Colliding colliding;                               // … which are these
   std::vector<std::uint32_t> at_body;                // surface voxels of one object that do …
   std::vector<voxel::VoxelId> held_by_body;          // … these voxels
   std::vector<voxel::HeldLoad> held_loads;           // … and what with
 };
+
+// Appends to state.body_contacts; false, and a fault, where there is no more room.
+inline bool add_contact(WorldState& state, const BodyContact& contact) noexcept {
+  if (state.body_contacts.size() == state.body_contacts.capacity()) {
+    state.faults |= fault_body_crowded;
+    return false;
+  }
+  state.body_contacts.push_back(contact);
+  return true;
+}
 
 }  // namespace hybrid
