@@ -53,7 +53,7 @@ struct Displacement {
 
   explicit Displacement(const Lattice& lattice)
       : role(lattice.size()),
-        row_held(lattice.grid().rows()),
+        row_standing(lattice.grid().rows()),
         row_obstacles(lattice.grid().rows()),
         tool_normal(lattice.surface().size()),
         rest(lattice),
@@ -61,10 +61,10 @@ struct Displacement {
     for (auto& axis : u) axis = LazyArray<float>(lattice.size());
   }
 
-  std::array<LazyArray<float>, 3> u;                // [axis][v] (unit: meter)
-  LazyArray<std::uint8_t> role;                     // [v]
-  LazyArray<std::uint8_t> row_held, row_obstacles;  // [row]: voxels of the row that stand; with obstacles
-  LazyArray<glm::vec3> tool_normal;                 // [surface number] from the tool, unit; of those pressed
+  std::array<LazyArray<float>, 3> u;                    // [axis][v] (unit: meter)
+  LazyArray<std::uint8_t> role;                         // [v]
+  LazyArray<std::uint8_t> row_standing, row_obstacles;  // [row]: voxels of the row that stand; with obstacles
+  LazyArray<glm::vec3> tool_normal;  // [surface number] from the tool, unit; of those pressed
   RestOffsets rest;
   BrickLoad bricks;
 
@@ -81,7 +81,7 @@ struct Displacement {
   void set_role(VoxelId v, Role r) {
     if (role[v] == r) return;  // untouched tissue stays unwritten
     const RowId row = v / kRow;
-    row_held[row] = static_cast<std::uint8_t>(row_held[row] + stands(r) - stands(role[v]));
+    row_standing[row] = static_cast<std::uint8_t>(row_standing[row] + stands(r) - stands(role[v]));
     row_obstacles[row] =
         static_cast<std::uint8_t>(row_obstacles[row] + (r == obstacle) - (role[v] == obstacle));
     role[v] = r;

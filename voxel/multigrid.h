@@ -182,14 +182,6 @@ class Multigrid {
   void spread(int level, RowId row, std::uint8_t flags) noexcept;
   void note_change(int level, RowId row, float change) noexcept;
   void stop_cells(VoxelId v, std::uint8_t bits) noexcept;
-  void balance_contacts(RowId row, Displacement& state, const ObstacleView& obstacles, OctetSpan span,
-                        RowResidual& found, RowVector& out) noexcept;
-  template <class Visit>
-  void for_tilted(int level, RowId row, const LevelRow& r, OctetSpan span, const Visit& visit) noexcept;
-  float smooth_tilted(int level, RowId row, const LevelRow& r, OctetSpan span) noexcept;
-  void add_tilt(int level, RowId row, const LevelRow& r, OctetSpan span, RowVector& out) noexcept;
-  float slide_pressed(RowId row, Displacement& state, OctetSpan span) noexcept;
-  float slide_pressed_by(RowId row, const RowVector& way, Displacement& state, OctetSpan span) noexcept;
   [[nodiscard]] LevelRow row_of(int level, RowId row, Displacement& state) noexcept;
   [[nodiscard]] LevelRow told_row(int level, RowId row) noexcept;
   [[nodiscard]] std::array<float*, 3> loads(int level, RowId row) noexcept;
@@ -200,12 +192,24 @@ class Multigrid {
                 const ObstacleView& obstacles, OctetSpan span, int first, int last) noexcept;
   void take_back_refused(int level, RowId row, const RowVector& refused, unsigned axes,
                          OctetSpan span) noexcept;
+
+  // ---- where something is touched (contact_passes.cpp) ----
+  float smooth_voxels(const LevelRow& r, RowId row, Displacement& state, const ObstacleView& obstacles,
+                      OctetSpan span) noexcept;
+  RowCorrection correct_voxels(const LevelRow& r, RowId row, const RowVector& correction, Displacement& state,
+                               const ObstacleView& obstacles, OctetSpan span, RowVector& refused) noexcept;
   // Lanes that obstacles kept from going along.
   template <class Move>
   std::uint32_t move_outside(LevelRow r, RowId row, Displacement& state, const ObstacleView& obstacles,
                              const Move& move) noexcept;
-  RowCorrection correct_voxels(const LevelRow& r, RowId row, const RowVector& correction, Displacement& state,
-                               const ObstacleView& obstacles, OctetSpan span, RowVector& refused) noexcept;
+  float slide_pressed(RowId row, Displacement& state, OctetSpan span) noexcept;
+  float slide_pressed_by(RowId row, const RowVector& way, Displacement& state, OctetSpan span) noexcept;
+  void balance_contacts(RowId row, Displacement& state, const ObstacleView& obstacles, OctetSpan span,
+                        RowResidual& found, RowVector& out) noexcept;
+  template <class Visit>
+  void for_tilted(int level, RowId row, const LevelRow& r, OctetSpan span, const Visit& visit) noexcept;
+  float smooth_tilted(int level, RowId row, const LevelRow& r, OctetSpan span) noexcept;
+  void add_tilt(int level, RowId row, const LevelRow& r, OctetSpan span, RowVector& out) noexcept;
 
   const Lattice& lattice_;
   TileQueue tiles_;

@@ -124,23 +124,25 @@ class Relaxation {
   };
   enum class Look : std::uint8_t { all, active };  // rows at rest are left alone
 
-  void lay_boxes(const std::array<int, 3>& low, const std::array<int, 3>& high, int margin) noexcept;
-  void cycle(Displacement& state, const ObstacleView& obstacles, Look look, bool smoothed) noexcept;
   void end_round(Displacement& state, const ObstacleView& obstacles, double residual_N) noexcept;
   void hold_what_stands(const Displacement& state, std::span<const VoxelId> held) noexcept;
   double move_clusters(Displacement& state, const ObstacleView& obstacles) noexcept;
   std::uint64_t relax_tile(Displacement& state, const ObstacleView& obstacles, std::size_t number) noexcept;
   std::uint64_t keep_yielded(Displacement& state, std::uint64_t budget) noexcept;
   [[nodiscard]] bool tile_waits_for_coarse(std::size_t number) const noexcept;
+
+  // ---- one cycle (relaxation_cycle.cpp) ----
+  void lay_boxes(const std::array<int, 3>& low, const std::array<int, 3>& high, int wide) noexcept;
+  void cycle(Displacement& state, const ObstacleView& obstacles, Look look, bool smoothed) noexcept;
+  void smooth_box(int level, int colour, Displacement& state, const ObstacleView& obstacles,
+                  Look look) noexcept;
+  void tell_box(int level, Displacement& state, const ObstacleView& obstacles) noexcept;
   [[nodiscard]] bool restrict_due(int level, RowId row) const noexcept;
   template <class Visit>
   void for_rows(int level, const RowBox& box, const Visit& visit) noexcept;
   [[nodiscard]] RowBox clipped(int level, const RowBox& box) const noexcept;
   [[nodiscard]] int last_level() const noexcept;  // of a cycle
   [[nodiscard]] std::size_t octets_of_cycle() const noexcept;
-  void smooth_box(int level, int colour, Displacement& state, const ObstacleView& obstacles,
-                  Look look) noexcept;
-  void tell_box(int level, Displacement& state, const ObstacleView& obstacles) noexcept;
   [[nodiscard]] LevelBoxes& boxes(int level) { return boxes_[static_cast<std::size_t>(level)]; }
 
   const Lattice& lattice_;

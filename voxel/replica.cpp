@@ -269,7 +269,7 @@ void Replica::drain(SoftObject& object, std::size_t rows) noexcept {
 
 std::size_t Replica::memory_bytes() const {
   std::size_t bytes = relaxation_.memory_bytes() + obstacles_.size() * sizeof(Obstacle) +
-                      state_.role.resident_bytes() + state_.row_held.resident_bytes() +
+                      state_.role.resident_bytes() + state_.row_standing.resident_bytes() +
                       state_.row_obstacles.resident_bytes() + given_.memory_bytes() +
                       distance_.resident_bytes() + by_distance_.resident_bytes() +
                       kept_back_.resident_bytes() + rows_kept_back_.resident_bytes();

@@ -447,7 +447,7 @@ bool SoftObject::settle(const ToolInBody& tool, double tolerance_N, int max_cycl
 
 std::size_t SoftObject::memory_bytes() const {
   std::size_t state = state_.bricks.memory_bytes() + state_.role.resident_bytes() +
-                      state_.row_held.resident_bytes() + state_.row_obstacles.resident_bytes() +
+                      state_.row_standing.resident_bytes() + state_.row_obstacles.resident_bytes() +
                       state_.rest.memory_bytes() + carried_mark_.resident_bytes() +
                       state_.tool_normal.resident_bytes() + carried_index_.resident_bytes() +
                       tight_rows_.memory_bytes() + pair_load_.resident_bytes() + row_moved_.resident_bytes();

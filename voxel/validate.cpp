@@ -38,7 +38,7 @@ bool has_gap_beside(const Lattice& lattice, VoxelId v) {
 }
 
 std::string validate_row(const Lattice& lattice, const Displacement& state, RowId row) {
-  int held = 0, obstacles = 0;
+  int standing = 0, obstacles = 0;
   for (VoxelId v = row * kRow; v < (row + 1) * kRow; ++v) {
     const std::uint8_t role = state.role[v];
     if (role > Displacement::pressed) return where(lattice, v) + " has a role that there is not";
@@ -46,7 +46,7 @@ std::string validate_row(const Lattice& lattice, const Displacement& state, RowI
       return where(lattice, v) + " has a role and is empty";
     if (role >= Displacement::obstacle && lattice.surface_number(v) == Lattice::kNoSurface)
       return where(lattice, v) + " lies inside and is pressed, or has an obstacle";
-    held += Displacement::stands(role) ? 1 : 0;
+    standing += Displacement::stands(role) ? 1 : 0;
     obstacles += role == Displacement::obstacle ? 1 : 0;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const float u = state.u[axis][v];
@@ -55,7 +55,7 @@ std::string validate_row(const Lattice& lattice, const Displacement& state, RowI
       if (u != 0.0F && lattice.anchored(v)) return where(lattice, v) + " is anchored and displaced";
     }
   }
-  if (held != state.row_held[row] || obstacles != state.row_obstacles[row])
+  if (standing != state.row_standing[row] || obstacles != state.row_obstacles[row])
     return said("the row of ", where(lattice, row * kRow), " counts its roles wrongly");
   return {};
 }
