@@ -2,19 +2,17 @@
 #include "hybrid/build.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <glm/common.hpp>
-#include <glm/geometric.hpp>
-#include <glm/matrix.hpp>
 
 #include "hybrid/arbitration.h"
 #include "hybrid/body_collisions.h"
 #include "hybrid/body_tissue.h"
 #include "hybrid/build_objects.h"
+#include "hybrid/carve.h"
 #include "hybrid/label_surface.h"
 #include "hybrid/process_memory.h"
 #include "hybrid/scene_feel.h"
@@ -30,7 +28,6 @@ constexpr int kSurfaceSmoothing = 6;  // of a soft object's drawn surface
 constexpr double kMostCells = 504.0;
 constexpr double kRigidCells = 200.0;      // where nothing is soft: finer cells name no fewer objects
 constexpr std::size_t kMapReserve = 2048;  // bricks that motion may add
-constexpr double kFarthestLook = 32.0;     // spacings that one distance query may clear of carving
 
 struct Box {
   glm::dvec3 low{1e300}, high{-1e300};
@@ -77,90 +74,6 @@ double choose_cell(const Scene& scene, const Box& box, double soft_spacing) {
   }
   return soft_spacing > 0.0 ? std::max(soft_spacing, longest / kMostCells)
                             : rigid_cell_m(longest, scene.tool.radius_m);
-}
-
-// Distance to the nearest rigid surface within `range`, to the nearest that stays, and whether the point is
-// inside a rigid solid.
-struct RigidDistance {
-  double distance, fixed;
-  bool inside;
-};
-RigidDistance rigid_distance(const std::vector<RigidObject>& rigid, const glm::dvec3& p, double range) {
-  RigidDistance result{range, range, false};
-  for (const RigidObject& object : rigid) {
-    const glm::dvec3 in_body = object.to_body(p);
-    polygon::NearPoint near;
-    double& least = object.motion.moves() ? result.distance : result.fixed;
-    if (object.surface->nearest(in_body, least, near)) least = near.distance;
-    result.distance = std::min(result.distance, result.fixed);
-    const glm::dvec3 low = object.surface->lower(), high = object.surface->upper();
-    const bool within =
-        glm::all(glm::greaterThanEqual(in_body, low)) && glm::all(glm::lessThanEqual(in_body, high));
-    result.inside = result.inside || (within && object.surface->inside(in_body));
-  }
-  return result;
-}
-
-// Takes out voxels that lie in a rigid solid or nearer than half a spacing to a rigid surface, so that
-// nothing is felt before contact; and gathers those within `anchor_m` of one that stays, which will hold
-// them. Returns how many were carved.
-std::size_t carve_by_rigid(const std::vector<RigidObject>& rigid, voxel::LabelVolume& volume, double anchor_m,
-                           std::vector<std::size_t>& anchored) {
-  const double h = std::min({volume.spacing_m.x, volume.spacing_m.y, volume.spacing_m.z});
-  const double clear = std::max(0.5 * h, anchor_m);
-  std::size_t carved = 0;
-  for (int k = 0; k < volume.dims[2]; ++k) {
-    for (int j = 0; j < volume.dims[1]; ++j) {
-      for (int i = 0; i < volume.dims[0]; ++i) {
-        if (volume.labels[volume.index(i, j, k)] == 0) continue;
-        const glm::dvec3 p = volume.origin_m + volume.rotation * (glm::dvec3(i, j, k) * volume.spacing_m);
-        const RigidDistance near = rigid_distance(rigid, p, clear + kFarthestLook * h);
-        // Everything nearer to p than the surface lies on the same side of it: voxels of the row that are
-        // further from it than `clear` need no look of their own.
-        const int run = std::max(0, static_cast<int>((near.distance - clear) / volume.spacing_m.x));
-        const int last = std::min(volume.dims[0] - 1, i + run);
-        for (; i <= last; ++i) {
-          std::uint8_t& label = volume.labels[volume.index(i, j, k)];
-          if (label == 0) continue;
-          if (near.inside || (run == 0 && near.distance < 0.5 * h)) {
-            label = 0;
-            ++carved;
-          } else if (run == 0 && near.fixed <= anchor_m) {
-            anchored.push_back(volume.index(i, j, k));
-          }
-        }
-        --i;
-      }
-    }
-  }
-  return carved;
-}
-
-// Voxels of `first` that lie in filled voxels of `later` are taken out of it.
-std::size_t carve_by_soft(voxel::LabelVolume& first, const voxel::LabelVolume& later) {
-  std::size_t carved = 0;
-  const glm::dquat to_later = glm::inverse(later.rotation) * first.rotation;
-  const glm::dvec3 shift = glm::inverse(later.rotation) * (first.origin_m - later.origin_m);
-  for (int k = 0; k < first.dims[2]; ++k) {
-    for (int j = 0; j < first.dims[1]; ++j) {
-      for (int i = 0; i < first.dims[0]; ++i) {
-        std::uint8_t& label = first.labels[first.index(i, j, k)];
-        if (label == 0) continue;
-        const glm::dvec3 c =
-            glm::round((shift + to_later * (glm::dvec3(i, j, k) * first.spacing_m)) / later.spacing_m);
-        bool within = true;
-        for (int d = 0; d < 3; ++d)
-          within = within && c[d] >= 0.0 && c[d] < later.dims[static_cast<std::size_t>(d)];
-        if (!within) continue;
-        if (later.labels[later.index(static_cast<int>(c.x), static_cast<int>(c.y), static_cast<int>(c.z))] ==
-            0)
-          continue;
-        label = 0;
-        ++carved;
-      }
-    }
-  }
-  return carved;
 }
 
 class Builder {
@@ -437,12 +350,6 @@ BuiltScene build_scene(const Scene& scene, const Progress& progress) {
   return Builder(scene, progress).build();
 }
 
-std::uint64_t usable_memory_bytes() {
-  const long pages = sysconf(_SC_PHYS_PAGES), size = sysconf(_SC_PAGE_SIZE);
-  return pages > 0 && size > 0 ? static_cast<std::uint64_t>(pages) * static_cast<std::uint64_t>(size)
-                               : 4ULL << 30;
-}
-
 ObjectBox object_box(const World& world, std::size_t object) {
   const std::size_t rigid = world.rigid.size();
   const polygon::TriangleMesh& mesh =
@@ -457,57 +364,6 @@ ObjectBox object_box(const World& world, std::size_t object) {
 std::string in_words(const ObjectBox& box) {
   return fmt::format("x {:.4g} to {:.4g}, y {:.4g} to {:.4g}, z {:.4g} to {:.4g} mm", 1e3 * box.low.x,
                      1e3 * box.high.x, 1e3 * box.low.y, 1e3 * box.high.y, 1e3 * box.low.z, 1e3 * box.high.z);
-}
-
-namespace {
-
-void fill_places(const World& world, const WorldState& state, Snapshot& snapshot) {
-  snapshot.rigid_place.resize(world.rigid.size());
-  for (std::size_t o = 0; o < world.rigid.size(); ++o) {
-    const Pose &before = world.rigid[o].pose, &now = state.rigid[o].pose;
-    RigidPlace& place = snapshot.rigid_place[o];
-    place.moved = now.position_m != before.position_m || now.rotation != before.rotation;
-    place.about_m = before.position_m;
-    place.way_m = now.position_m - before.position_m;
-    place.turn = now.rotation * glm::conjugate(before.rotation);
-  }
-}
-
-void fill_surface(const SoftBody& body, const voxel::SoftObject& object, std::vector<glm::vec3>& moved) {
-  moved.resize(body.drawn.vertices.size());
-  for (std::size_t v = 0; v < moved.size(); ++v)
-    moved[v] = glm::vec3(body.pose.rotation * object.displacement_at(body.drawn.vertices[v]));
-}
-
-}  // namespace
-
-void fill_moved(const World& world, const WorldState& state, Snapshot& snapshot) {
-  fill_places(world, state, snapshot);
-  snapshot.soft_moved_m.resize(world.object_count());
-  for (std::size_t o = 0; o < world.soft.size(); ++o)
-    fill_surface(world.soft[o], *state.soft[o], snapshot.soft_moved_m[world.rigid.size() + o]);
-}
-
-void fill_moved_near(const World& world, const WorldState& state, Snapshot& snapshot) {
-  fill_places(world, state, snapshot);
-  snapshot.soft_moved_m.resize(world.object_count());
-  snapshot.patches.resize(world.object_count());
-  for (std::size_t o = 0; o < world.soft.size(); ++o) {
-    const SoftBody& body = world.soft[o];
-    const voxel::SoftObject& object = *state.soft[o];
-    const std::size_t number = world.rigid.size() + o;
-    if (!state.apart.has(o)) {
-      fill_surface(body, object, snapshot.soft_moved_m[number]);
-      continue;
-    }
-    SoftPatch& patch = snapshot.patches[number];
-    patch.at_rest_m.clear();
-    patch.moved_m.clear();
-    for (const voxel::VoxelId v : object.touched()) {
-      patch.at_rest_m.emplace_back(body.to_scene(object.lattice().rest(v)));
-      patch.moved_m.emplace_back(body.pose.rotation * object.state().at(v));
-    }
-  }
 }
 
 }  // namespace hybrid

@@ -33,18 +33,12 @@ struct BuiltScene {
 // `progress` is told what begins, in words; may be empty.
 using Progress = std::function<void(const std::string&)>;
 
-// Throws SceneError: a file that cannot be used, nothing left after carving, too large for the memory (with
-// the numbers, before it is allocated), objects that overlap where the scene asks to refuse that.
 // The occupancy map's cell (m) for a scene of rigid objects alone that is so long, unless it says otherwise.
 double rigid_cell_m(double longest_m, double tool_radius_m);
 
+// Throws SceneError: a file that cannot be used, nothing left after carving, too large for the memory (with
+// the numbers, before it is allocated), objects that overlap where the scene asks to refuse that.
 BuiltScene build_scene(const Scene& scene, const Progress& progress = {});
-
-// Where what moves is, for graphics (drawn_scene.h has what stays), filled in place: no allocation once its
-// vectors have their size.
-void fill_moved(const World& world, const WorldState& state, Snapshot& snapshot);
-// The same from within a tick that must not wait: of a soft object relaxed apart, only what is near the tool.
-void fill_moved_near(const World& world, const WorldState& state, Snapshot& snapshot);
 
 // Where an object lies at rest (scene frame, meters), rigid ones first; in words: "x 1.2 to 3.4, y …, z …
 // mm".
@@ -61,8 +55,5 @@ std::uint64_t soft_load_bytes(const std::array<int, 3>& dims);
 // of one label. In a session that is as far as the tool went and relaxation followed.
 std::uint64_t soft_touched_bytes(const std::array<int, 3>& dims);  // of one label
 std::uint64_t soft_touched_bytes(const voxel::Lattice& lattice);
-
-// Bytes of physical memory that can be used at all (what one object may take at most).
-std::uint64_t usable_memory_bytes();
 
 }  // namespace hybrid

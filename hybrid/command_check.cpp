@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "hybrid/commands.h"
+#include "hybrid/process_memory.h"
 #include "hybrid/report.h"
 #include "polygon/mesh_check.h"
 #include "polygon/mesh_file.h"

@@ -13,6 +13,7 @@
 #include "device/simulated.h"
 #include "hybrid/commands.h"
 #include "hybrid/drawn_scene.h"
+#include "hybrid/fill_snapshot.h"
 #include "hybrid/hand_over.h"
 #include "hybrid/live_surface.h"
 #include "hybrid/real_device.h"

@@ -8,6 +8,7 @@
 
 #include "hybrid/compose_parts.h"
 #include "hybrid/label_surface.h"
+#include "hybrid/process_memory.h"
 #include "polygon/mesh_bounds.h"
 #include "polygon/mesh_check.h"
 #include "polygon/mesh_file.h"

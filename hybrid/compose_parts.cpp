@@ -9,6 +9,7 @@
 #include <glm/common.hpp>
 
 #include "hybrid/label_surface.h"
+#include "hybrid/process_memory.h"
 #include "hybrid/scene_keys.h"
 #include "polygon/mesh_bounds.h"
 #include "polygon/mesh_check.h"

@@ -9,6 +9,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "hybrid/fill_snapshot.h"
 #include "polygon/mesh_file.h"
 #include "voxel/warped_labels.h"
 

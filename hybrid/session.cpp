@@ -13,6 +13,7 @@
 
 #include "device/simulated.h"
 #include "hybrid/body_collisions.h"
+#include "hybrid/fill_snapshot.h"
 #include "hybrid/rigid_step.h"
 
 namespace hybrid {

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/fill_snapshot.h"
+
+#include <glm/gtc/quaternion.hpp>
+
+namespace hybrid {
+namespace {
+
+void fill_places(const World& world, const WorldState& state, Snapshot& snapshot) {
+  snapshot.rigid_place.resize(world.rigid.size());
+  for (std::size_t o = 0; o < world.rigid.size(); ++o) {
+    const Pose &before = world.rigid[o].pose, &now = state.rigid[o].pose;
+    RigidPlace& place = snapshot.rigid_place[o];
+    place.moved = now.position_m != before.position_m || now.rotation != before.rotation;
+    place.about_m = before.position_m;
+    place.way_m = now.position_m - before.position_m;
+    place.turn = now.rotation * glm::conjugate(before.rotation);
+  }
+}
+
+void fill_surface(const SoftBody& body, const voxel::SoftObject& object, std::vector<glm::vec3>& moved) {
+  moved.resize(body.drawn.vertices.size());
+  for (std::size_t v = 0; v < moved.size(); ++v)
+    moved[v] = glm::vec3(body.pose.rotation * object.displacement_at(body.drawn.vertices[v]));
+}
+
+}  // namespace
+
+void fill_moved(const World& world, const WorldState& state, Snapshot& snapshot) {
+  fill_places(world, state, snapshot);
+  snapshot.soft_moved_m.resize(world.object_count());
+  for (std::size_t o = 0; o < world.soft.size(); ++o)
+    fill_surface(world.soft[o], *state.soft[o], snapshot.soft_moved_m[world.rigid.size() + o]);
+}
+
+void fill_moved_near(const World& world, const WorldState& state, Snapshot& snapshot) {
+  fill_places(world, state, snapshot);
+  snapshot.soft_moved_m.resize(world.object_count());
+  snapshot.patches.resize(world.object_count());
+  for (std::size_t o = 0; o < world.soft.size(); ++o) {
+    const SoftBody& body = world.soft[o];
+    const voxel::SoftObject& object = *state.soft[o];
+    const std::size_t number = world.rigid.size() + o;
+    if (!state.apart.has(o)) {
+      fill_surface(body, object, snapshot.soft_moved_m[number]);
+      continue;
+    }
+    SoftPatch& patch = snapshot.patches[number];
+    patch.at_rest_m.clear();
+    patch.moved_m.clear();
+    for (const voxel::VoxelId v : object.touched()) {
+      patch.at_rest_m.emplace_back(body.to_scene(object.lattice().rest(v)));
+      patch.moved_m.emplace_back(body.pose.rotation * object.state().at(v));
+    }
+  }
+}
+
+}  // namespace hybrid
