@@ -80,11 +80,6 @@ double squared_distance(const glm::dvec3& p, const CGAL::Bbox_3& box) {
   return squared_distance(p, {box.xmin(), box.ymin(), box.zmin()}, {box.xmax(), box.ymax(), box.zmax()});
 }
 
-// The better of two nearest points, so that which is found first does not matter.
-bool nearer(const NearPoint& a, const NearPoint& b) {
-  return a.distance < b.distance || (a.distance == b.distance && a.element < b.element);
-}
-
 // Traversal_traits of CGAL's tree: boxes within `squared_radius` of `point` are opened, Leaf decides the rest
 // and may shrink the radius.
 template <typename Leaf>

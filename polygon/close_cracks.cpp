@@ -5,13 +5,13 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
-#include <numeric>
 #include <set>
 #include <tuple>
 #include <unordered_map>
 #include <utility>
 #include <vector>
 
+#include "polygon/disjoint_sets.h"
 #include "polygon/repair_soup.h"
 #include "polygon/topology.h"
 
@@ -82,20 +82,6 @@ class Leaders {
   std::vector<Leader> leaders_;
 };
 
-struct Target {
-  explicit Target(std::uint32_t points) : of(points) { std::iota(of.begin(), of.end(), 0U); }
-  std::vector<std::uint32_t> of;  // one a point: the point it becomes
-  std::uint32_t find(std::uint32_t p) {
-    while (of[p] != p) p = of[p] = of[of[p]];
-    return p;
-  }
-  void unite(std::uint32_t a, std::uint32_t b) {
-    a = find(a);
-    b = find(b);
-    of[std::max(a, b)] = std::min(a, b);
-  }
-};
-
 // Two border edges that lie side by side: xa meets ya, and xb yb.
 struct Match {
   std::uint32_t xa, ya, xb, yb;
@@ -132,14 +118,15 @@ std::vector<Match> match_edges(const std::vector<glm::dvec3>& points, const std:
   return matches;
 }
 
-std::vector<TriangleIndices> moved(const std::vector<TriangleIndices>& triangles, Target& target) {
+std::vector<TriangleIndices> moved(const std::vector<TriangleIndices>& triangles, DisjointSets& target) {
   std::vector<TriangleIndices> result = triangles;
   for (TriangleIndices& t : result) t = {target.find(t[0]), target.find(t[1]), target.find(t[2])};
   return result;
 }
 
-Target merged(const std::vector<Match>& matches, std::uint32_t points) {
-  Target target(points);
+// Each point with the one that it becomes.
+DisjointSets merged(const std::vector<Match>& matches, std::uint32_t points) {
+  DisjointSets target(points);
   for (const Match& m : matches) {
     target.unite(m.xa, m.ya);
     target.unite(m.xb, m.yb);
@@ -151,7 +138,7 @@ Target merged(const std::vector<Match>& matches, std::uint32_t points) {
 // fewer merges do wrong, more merges did wrong too, at the same points.
 void drop_harmful(std::vector<Match>& matches, const std::vector<TriangleIndices>& triangles,
                   std::uint32_t points) {
-  Target target = merged(matches, points);
+  DisjointSets target = merged(matches, points);
   const std::vector<TriangleIndices> after = moved(triangles, target);
   std::vector<bool> harmful(points, false);
   for (const TriangleIndices& t : after) {
@@ -194,7 +181,7 @@ ClosedCracks close_cracks(RepairSoup& soup, double tolerance_m) {
   }
   std::vector<Match> matches = match_edges(points, border, leader, tolerance_m);
   drop_harmful(matches, soup.mesh.triangles, count);
-  Target target = merged(matches, count);
+  DisjointSets target = merged(matches, count);
 
   // What was a border edge and is one no more; each joined pair is met twice and counted once.
   std::vector<TriangleIndices> after = moved(soup.mesh.triangles, target);
@@ -214,7 +201,7 @@ ClosedCracks close_cracks(RepairSoup& soup, double tolerance_m) {
   }
   if (closed.edges.count == 0) return closed;
   for (std::uint32_t p = 0; p < count; ++p) {
-    if (target.of[p] == p) continue;
+    if (target.find(p) == p) continue;
     ++closed.vertices;
     closed.furthest_m = std::max(closed.furthest_m, glm::length(points[p] - points[target.find(p)]));
   }

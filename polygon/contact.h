@@ -23,6 +23,11 @@ struct NearPoint {
   std::uint32_t element = 0;  // triangle index; 0 for a primitive
 };
 
+// The better of two nearest points, so that which is found first does not matter.
+[[nodiscard]] inline bool nearer(const NearPoint& a, const NearPoint& b) {
+  return a.distance < b.distance || (a.distance == b.distance && a.element < b.element);
+}
+
 // An element as seen from a point: it lies wholly behind a plane across some way to the point, not always the
 // shortest.
 struct SeenElement {

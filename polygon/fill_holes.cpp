@@ -5,12 +5,12 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
-#include <numeric>
 #include <unordered_map>
 #include <unordered_set>
 #include <utility>
 #include <vector>
 
+#include "polygon/disjoint_sets.h"
 #include "polygon/repair_soup.h"
 #include "polygon/self_intersections.h"
 #include "polygon/topology.h"
@@ -44,23 +44,6 @@ struct Loop {
 std::uint64_t edge_key(std::uint32_t a, std::uint32_t b) {
   return static_cast<std::uint64_t>(std::min(a, b)) << 32U | std::max(a, b);
 }
-
-class Sets {
- public:
-  explicit Sets(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0U); }
-  std::uint32_t find(std::uint32_t i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  void unite(std::uint32_t a, std::uint32_t b) {
-    a = find(a);
-    b = find(b);
-    parent_[std::max(a, b)] = std::min(a, b);
-  }
-
- private:
-  std::vector<std::uint32_t> parent_;
-};
 
 class Border {
  public:
@@ -117,7 +100,7 @@ class Border {
   // What branches was followed in pieces, from where it was met to where it branched: those that hang
   // together are one.
   [[nodiscard]] std::vector<Loop> with_branches_joined(std::vector<Loop> loops) const {
-    Sets ends(mesh_.vertices.size());
+    DisjointSets ends(mesh_.vertices.size());
     for (const Loop& loop : loops) {
       for (const std::uint32_t p : loop.points) ends.unite(loop.points[0], p);
     }
@@ -160,7 +143,7 @@ class Pieces {
   double diagonal(std::uint32_t point) { return boxes_[sets_.find(point)].diagonal(); }
 
  private:
-  Sets sets_;
+  DisjointSets sets_;
   std::vector<Box> boxes_;
 };
 

@@ -7,9 +7,9 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
-#include <numeric>
 #include <span>
 
+#include "polygon/disjoint_sets.h"
 #include "polygon/found.h"
 #include "polygon/self_intersections.h"
 #include "polygon/topology.h"
@@ -17,24 +17,6 @@
 
 namespace polygon {
 namespace {
-
-class UnionFind {
- public:
-  explicit UnionFind(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0U); }
-  std::uint32_t find(std::uint32_t i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  // Towards the lower, so that names of sets do not depend on the order of unions.
-  void unite(std::uint32_t a, std::uint32_t b) {
-    a = find(a);
-    b = find(b);
-    parent_[std::max(a, b)] = std::min(a, b);
-  }
-
- private:
-  std::vector<std::uint32_t> parent_;
-};
 
 // The mesh as it is connected.
 struct Connected {
@@ -142,7 +124,7 @@ EdgeCounts check_edges(const Connected& c, const EdgeTable& edges, MeshCheck& ch
 
 // Triangles around a point that hang together by their edges are one fan; a manifold point has one.
 void check_points(const Connected& c, const EdgeTable& edges, MeshCheck& check) {
-  UnionFind corners(c.triangles.size() * 3);
+  DisjointSets corners(c.triangles.size() * 3);
   edges.for_each([&](const EdgeTable::Edge& edge) {
     const auto corner_at = [&](const EdgeTable::Use& use, std::uint32_t point) {
       const TriangleIndices& t = c.triangles[use.triangle()];
@@ -180,7 +162,7 @@ void check_boundary(const Connected& c, const EdgeTable& edges, const EdgeCounts
     glm::dvec3 low{std::numeric_limits<double>::infinity()}, high{-std::numeric_limits<double>::infinity()};
     [[nodiscard]] glm::dvec3 middle() const { return 0.5 * (low + high); }
   };
-  UnionFind ends(c.points.size());
+  DisjointSets ends(c.points.size());
   const auto for_each_boundary_edge = [&](auto&& visit) {
     edges.for_each([&](const EdgeTable::Edge& edge) {
       if (edge.uses.size() == 1) visit(edge);
@@ -215,7 +197,7 @@ void check_boundary(const Connected& c, const EdgeTable& edges, const EdgeCounts
 // Pieces that share no point, and the signed volume of each about the mesh's own middle (about the origin, a
 // mesh far from it would lose the digits of its volume).
 void check_pieces(const Connected& c, MeshCheck& check) {
-  UnionFind pieces(c.points.size());
+  DisjointSets pieces(c.points.size());
   glm::dvec3 low(std::numeric_limits<double>::infinity()), high(-std::numeric_limits<double>::infinity());
   for (const TriangleIndices& t : c.triangles) {
     pieces.unite(t[0], t[1]);

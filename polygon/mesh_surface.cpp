@@ -1,21 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "polygon/mesh_surface.h"
 
-#include <embree3/rtcore.h>
-
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
 #include <limits>
+#include <optional>
 #include <stdexcept>
-#include <string>
 #include <utility>
 #include <vector>
 
+#include "polygon/box_tree.h"
 #include "polygon/mesh_bounds.h"
 #include "polygon/topology.h"
 #include "polygon/triangle.h"
@@ -25,28 +23,10 @@ namespace polygon {
 namespace {
 
 constexpr std::uint32_t kNone = 0xffffffffU;
-constexpr double kFurthestQuery = 1e18;        // (unit: meter) its square still is a float
-constexpr std::size_t kLargeMesh = 1U << 18U;  // elements
 constexpr double kFarAway = 700.0;  // radii of the mesh: where the rounding of floats, and a lens, cost least
-constexpr double kRelativeSlack = 1e-6;  // of the few float roundings in Embree's box test, each at most 6e-8
 
 bool is_finite(const glm::dvec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
-
-float rounded_down(double x) {
-  const auto f = static_cast<float>(x);
-  return static_cast<double>(f) <= x ? f : std::nextafterf(f, -std::numeric_limits<float>::infinity());
-}
-
-float rounded_up(double x) {
-  const auto f = static_cast<float>(x);
-  return static_cast<double>(f) >= x ? f : std::nextafterf(f, std::numeric_limits<float>::infinity());
-}
-
-// The better of two nearest points, so that which is found first does not matter.
-bool nearer(const NearPoint& a, const NearPoint& b) {
-  return a.distance < b.distance || (a.distance == b.distance && a.element < b.element);
 }
 
 class MeshSurface final : public RigidSurface {
@@ -56,7 +36,7 @@ class MeshSurface final : public RigidSurface {
   MeshSurface& operator=(const MeshSurface&) = delete;
   MeshSurface(MeshSurface&&) = delete;
   MeshSurface& operator=(MeshSurface&&) = delete;
-  ~MeshSurface() override;
+  ~MeshSurface() override = default;
 
   [[nodiscard]] GatherResult gather(const glm::dvec3& point, double radius,
                                     std::span<NearPoint> out) const noexcept override;
@@ -116,28 +96,25 @@ class MeshSurface final : public RigidSurface {
     std::uint32_t elements = 0, flat = 0;
   };
 
-  static void bounds_of(const RTCBoundsFunctionArguments* args);
-  static bool on_gather(RTCPointQueryFunctionArguments* args);
-  static bool on_survey(RTCPointQueryFunctionArguments* args);
-  static bool on_nearest(RTCPointQueryFunctionArguments* args);
-  static bool on_pseudonormal(RTCPointQueryFunctionArguments* args);
-  static bool on_memory(void* self, ssize_t bytes, bool post);
+  static bool on_gather(void* asker, std::uint32_t box, float& radius);
+  static bool on_survey(void* asker, std::uint32_t box, float& radius);
+  static bool on_nearest(void* asker, std::uint32_t box, float& radius);
+  static bool on_pseudonormal(void* asker, std::uint32_t box, float& radius);
 
   [[nodiscard]] TrianglePoint closest(const glm::dvec3& local, std::uint32_t triangle) const {
     const TriangleIndices& t = triangles_[triangle];
     return closest_on_triangle(local, vertex(t[0]), vertex(t[1]), vertex(t[2]));
   }
   [[nodiscard]] glm::dvec3 vertex(std::uint32_t i) const { return mesh_->vertices[i] - centre_; }
-  [[nodiscard]] std::uint32_t element_of(std::uint32_t primitive) const {
-    return elements_.empty() ? primitive : elements_[primitive];
+  [[nodiscard]] std::uint32_t element_of(std::uint32_t box) const {
+    return elements_.empty() ? box : elements_[box];
   }
   [[nodiscard]] glm::dvec3 normal(std::uint32_t triangle) const;
   [[nodiscard]] bool prepare(const glm::dvec3& point, double radius, glm::dvec3& local, float& float_error,
-                             RTCPointQuery& query) const;
+                             BoxTree::Query& query) const;
   [[nodiscard]] double lens_radius(const NearPoint& x, const NearestQuery& query) const;
   [[nodiscard]] bool find_nearest(const glm::dvec3& point, double radius, NearestQuery& query) const;
   [[nodiscard]] PseudonormalQuery pseudonormal(const glm::dvec3& from, const glm::dvec3& to) const;
-  void build_hierarchy();
 
   std::shared_ptr<const TriangleMesh> mesh_;
   std::span<const TriangleIndices> triangles_;  // of mesh_
@@ -148,27 +125,8 @@ class MeshSurface final : public RigidSurface {
   std::vector<std::uint32_t> elements_;    // what the hierarchy holds: no duplicates; empty: all triangles
   std::vector<glm::vec3> vertex_normals_;  // only when asked for
   double slack_ = 0.0;                     // of taking coordinates from centre_ (unit: meter)
-  std::atomic<std::int64_t> embree_bytes_{0};
-  RTCDevice device_ = nullptr;
-  RTCScene scene_ = nullptr;
+  std::optional<BoxTree> tree_;            // of elements; always there
 };
-
-// Float radius that is sure to reach what lies within `radius` of the true point.
-float conservative(double radius, float float_error) {
-  const double reach = (radius + static_cast<double>(float_error)) * (1.0 + kRelativeSlack) + 1e-30;
-  return reach < kFurthestQuery ? rounded_up(reach) : std::numeric_limits<float>::infinity();
-}
-
-// Points the query, and returns how far the float point lies from the true one, and the slack.
-float aim(const glm::dvec3& local, double radius, double slack, RTCPointQuery& query) {
-  query.x = static_cast<float>(local.x);
-  query.y = static_cast<float>(local.y);
-  query.z = static_cast<float>(local.z);
-  query.time = 0.0F;
-  const float float_error = rounded_up(glm::length(local - glm::dvec3(query.x, query.y, query.z)) + slack);
-  query.radius = conservative(radius, float_error);
-  return float_error;
-}
 
 MeshSurface::MeshSurface(std::shared_ptr<const TriangleMesh> mesh, const SurfaceOptions& options)
     : mesh_(std::move(mesh)), solid_(options.solid) {
@@ -183,46 +141,11 @@ MeshSurface::MeshSurface(std::shared_ptr<const TriangleMesh> mesh, const Surface
   elements_ = std::move(connections.distinct);
   across_ = std::move(connections.across);
   if (options.vertex_normals) vertex_normals_ = angle_weighted_normals(*mesh_);
-  build_hierarchy();
-}
-
-void MeshSurface::build_hierarchy() {
-  device_ = rtcNewDevice(nullptr);
-  if (device_ == nullptr) {
-    throw std::runtime_error("Embree cannot start on this machine (error " +
-                             std::to_string(static_cast<int>(rtcGetDeviceError(nullptr))) +
-                             "); Embree 3 needs a processor with SSE2 and free memory");
-  }
-  rtcSetDeviceMemoryMonitorFunction(device_, &MeshSurface::on_memory, this);
-  scene_ = rtcNewScene(device_);
-  rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_ROBUST);
-  // Of a large mesh, queries wait for memory, and Embree's fast build is as quick to ask, takes a third of
-  // the memory and half of the time; of a small one its looser boxes would cost a fifth of a query.
-  const std::size_t elements = elements_.empty() ? triangles_.size() : elements_.size();
-  rtcSetSceneBuildQuality(scene_, elements > kLargeMesh ? RTC_BUILD_QUALITY_LOW : RTC_BUILD_QUALITY_MEDIUM);
-  // User geometry, not Embree's triangles: its boxes are rounded outward here, which Embree's own float
-  // vertices are not, and it holds no second copy of the vertices.
-  RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_USER);
-  rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(elements));
-  rtcSetGeometryUserData(geometry, this);
-  rtcSetGeometryBoundsFunction(geometry, &MeshSurface::bounds_of, nullptr);
-  rtcCommitGeometry(geometry);
-  rtcAttachGeometry(scene_, geometry);
-  rtcReleaseGeometry(geometry);
-  rtcCommitScene(scene_);
-  const RTCError error = rtcGetDeviceError(device_);
-  if (error != RTC_ERROR_NONE) {
-    rtcReleaseScene(scene_);
-    rtcReleaseDevice(device_);
-    throw std::runtime_error("Embree failed (error " + std::to_string(static_cast<int>(error)) +
-                             ") to build a hierarchy of " + std::to_string(elements) +
-                             " triangles; most likely memory ran out: use a coarser mesh");
-  }
-}
-
-MeshSurface::~MeshSurface() {
-  rtcReleaseScene(scene_);
-  rtcReleaseDevice(device_);
+  tree_.emplace(elements_.empty() ? triangles_.size() : elements_.size(), [this](std::uint32_t box) {
+    const TriangleIndices& t = triangles_[element_of(box)];
+    const glm::dvec3 a = vertex(t[0]), b = vertex(t[1]), c = vertex(t[2]);
+    return BoxTree::Box{glm::min(glm::min(a, b), c), glm::max(glm::max(a, b), c)};
+  });
 }
 
 glm::dvec3 MeshSurface::normal(std::uint32_t triangle) const {
@@ -230,41 +153,22 @@ glm::dvec3 MeshSurface::normal(std::uint32_t triangle) const {
   return unit_normal(vertex(t[0]), vertex(t[1]), vertex(t[2]));
 }
 
-void MeshSurface::bounds_of(const RTCBoundsFunctionArguments* args) {
-  const auto* self = static_cast<const MeshSurface*>(args->geometryUserPtr);
-  const TriangleIndices& t = self->triangles_[self->element_of(args->primID)];
-  const glm::dvec3 a = self->vertex(t[0]), b = self->vertex(t[1]), c = self->vertex(t[2]);
-  const glm::dvec3 low = glm::min(glm::min(a, b), c);
-  const glm::dvec3 high = glm::max(glm::max(a, b), c);
-  args->bounds_o->lower_x = rounded_down(low.x);
-  args->bounds_o->lower_y = rounded_down(low.y);
-  args->bounds_o->lower_z = rounded_down(low.z);
-  args->bounds_o->upper_x = rounded_up(high.x);
-  args->bounds_o->upper_y = rounded_up(high.y);
-  args->bounds_o->upper_z = rounded_up(high.z);
-}
-
-bool MeshSurface::on_memory(void* self, ssize_t bytes, bool /*post*/) {
-  static_cast<MeshSurface*>(self)->embree_bytes_ += bytes;
-  return true;
-}
-
-// rtcPointQuery checks nothing, so everything is checked here. False: nothing can be found.
+// The hierarchy checks nothing, so everything is checked here. False: nothing can be found.
 bool MeshSurface::prepare(const glm::dvec3& point, double radius, glm::dvec3& local, float& float_error,
-                          RTCPointQuery& query) const {
+                          BoxTree::Query& query) const {
   if (!is_finite(point) || !(radius >= 0.0)) return false;
   local = point - centre_;
   if (!(glm::length(local) < kFurthestQuery)) return false;
   const glm::dvec3 outside = glm::max(glm::max(lower_ - local, local - upper_), glm::dvec3(0.0));
   const double slack = slack_ + 1e-15 * glm::length(point);
   if (glm::length(outside) > radius * (1.0 + 1e-12) + slack) return false;
-  float_error = aim(local, radius, slack, query);
+  float_error = BoxTree::aim(local, radius, slack, query);
   return true;
 }
 
-bool MeshSurface::on_gather(RTCPointQueryFunctionArguments* args) {
-  auto& q = *static_cast<GatherQuery*>(args->userPtr);
-  const std::uint32_t element = q.surface->element_of(args->primID);
+bool MeshSurface::on_gather(void* asker, std::uint32_t box, float& radius) {
+  auto& q = *static_cast<GatherQuery*>(asker);
+  const std::uint32_t element = q.surface->element_of(box);
   const TrianglePoint closest = q.surface->closest(q.point, element);
   const NearPoint found{closest.point, std::sqrt(closest.squared_distance), element};
   if (!(found.distance <= q.radius)) return false;
@@ -276,7 +180,7 @@ bool MeshSurface::on_gather(RTCPointQueryFunctionArguments* args) {
   // Full: keep the nearest, and look no further than the furthest of them.
   q.result.complete = false;
   if (q.out.empty()) {
-    args->query->radius = 0.0F;
+    radius = 0.0F;
     return true;
   }
   if (nearer(found, q.out.front())) {
@@ -284,18 +188,16 @@ bool MeshSurface::on_gather(RTCPointQueryFunctionArguments* args) {
     q.out.back() = found;
     std::push_heap(q.out.begin(), q.out.end(), nearer);
   }
-  args->query->radius = std::min(args->query->radius, conservative(q.out.front().distance, q.float_error));
+  radius = std::min(radius, conservative(q.out.front().distance, q.float_error));
   return true;
 }
 
 GatherResult MeshSurface::gather(const glm::dvec3& point, double radius,
                                  std::span<NearPoint> out) const noexcept {
   GatherQuery q{this, {}, radius, 0.0F, out, {}};
-  RTCPointQuery query{};
+  BoxTree::Query query;
   if (!prepare(point, radius, q.point, q.float_error, query)) return {};
-  RTCPointQueryContext context{};
-  rtcInitPointQueryContext(&context);
-  rtcPointQuery(scene_, &query, &context, &MeshSurface::on_gather, &q);
+  tree_->ask(query, &MeshSurface::on_gather, &q);
   const std::span<NearPoint> found = out.first(q.result.count);
   std::sort(found.begin(), found.end(),
             [](const NearPoint& a, const NearPoint& b) { return a.element < b.element; });
@@ -303,10 +205,10 @@ GatherResult MeshSurface::gather(const glm::dvec3& point, double radius,
   return q.result;
 }
 
-bool MeshSurface::on_survey(RTCPointQueryFunctionArguments* args) {
-  auto& q = *static_cast<SurveyQuery*>(args->userPtr);
+bool MeshSurface::on_survey(void* asker, std::uint32_t box, float& radius) {
+  auto& q = *static_cast<SurveyQuery*>(asker);
   const MeshSurface& self = *q.surface;
-  const std::uint32_t element = self.element_of(args->primID);
+  const std::uint32_t element = self.element_of(box);
   const TriangleIndices& t = self.triangles_[element];
   TriangleSight sight;
   if (!see_triangle(q.centre, q.radius, q.view, self.vertex(t[0]), self.vertex(t[1]), self.vertex(t[2]),
@@ -314,7 +216,7 @@ bool MeshSurface::on_survey(RTCPointQueryFunctionArguments* args) {
     return false;
   if (q.result.count == q.out.size()) {
     q.result.complete = false;
-    args->query->radius = 0.0F;
+    radius = 0.0F;
     return true;
   }
   q.out[q.result.count++] = {sight.normal, sight.reach + glm::dot(sight.normal, self.centre_), element};
@@ -324,12 +226,10 @@ bool MeshSurface::on_survey(RTCPointQueryFunctionArguments* args) {
 GatherResult MeshSurface::survey(const glm::dvec3& centre, double radius, const glm::dvec3& view,
                                  std::span<SeenElement> out) const noexcept {
   SurveyQuery q{this, {}, view - centre_, radius, out, {}};
-  RTCPointQuery query{};
+  BoxTree::Query query;
   float float_error = 0.0F;
   if (!prepare(centre, radius, q.centre, float_error, query)) return {};
-  RTCPointQueryContext context{};
-  rtcInitPointQueryContext(&context);
-  rtcPointQuery(scene_, &query, &context, &MeshSurface::on_survey, &q);
+  tree_->ask(query, &MeshSurface::on_survey, &q);
   return q.result;
 }
 
@@ -364,9 +264,9 @@ glm::dvec3 MeshSurface::shaded_normal(std::uint32_t element, const glm::dvec3& p
   return glm::dot(shaded, away) < 0.0 ? -shaded : shaded;
 }
 
-bool MeshSurface::on_nearest(RTCPointQueryFunctionArguments* args) {
-  auto& q = *static_cast<NearestQuery*>(args->userPtr);
-  const std::uint32_t element = q.surface->element_of(args->primID);
+bool MeshSurface::on_nearest(void* asker, std::uint32_t box, float& radius) {
+  auto& q = *static_cast<NearestQuery*>(asker);
+  const std::uint32_t element = q.surface->element_of(box);
   if (q.skip_degenerate) {
     const TriangleIndices& t = q.surface->triangles_[element];
     const MeshSurface& self = *q.surface;
@@ -376,8 +276,7 @@ bool MeshSurface::on_nearest(RTCPointQueryFunctionArguments* args) {
   const NearPoint found{closest.point, std::sqrt(closest.squared_distance), element};
   if (q.lens > 0.0) {
     // Whether or not it is near enough to be an answer, nothing beyond it needs to be looked at.
-    args->query->radius =
-        std::min(args->query->radius, conservative(q.surface->lens_radius(found, q), q.float_error));
+    radius = std::min(radius, conservative(q.surface->lens_radius(found, q), q.float_error));
   }
   // best.distance starts as the radius, with an element above all others: the radius itself still counts.
   if (!nearer(found, q.best)) return q.lens > 0.0;
@@ -385,7 +284,7 @@ bool MeshSurface::on_nearest(RTCPointQueryFunctionArguments* args) {
   q.feature = closest.feature;
   q.found = true;
   if (q.lens == 0.0) {
-    args->query->radius = std::min(args->query->radius, conservative(found.distance, q.float_error));
+    radius = std::min(radius, conservative(found.distance, q.float_error));
   }
   return true;
 }
@@ -405,7 +304,7 @@ bool MeshSurface::find_nearest(const glm::dvec3& point, double radius, NearestQu
   q.surface = this;
   q.best = {{}, radius, kNone};
   q.found = false;
-  RTCPointQuery query{};
+  BoxTree::Query query;
   if (!prepare(point, radius, q.point, q.float_error, query)) return false;
   q.asked_from = q.point;
   q.lens = 0.0;
@@ -413,11 +312,9 @@ bool MeshSurface::find_nearest(const glm::dvec3& point, double radius, NearestQu
   if (distance > far && far > 0.0) {
     q.asked_from = q.point * (far / distance);
     q.lens = 1.0 - far / distance;
-    q.float_error = aim(q.asked_from, std::numeric_limits<double>::infinity(), slack_, query);
+    q.float_error = BoxTree::aim(q.asked_from, std::numeric_limits<double>::infinity(), slack_, query);
   }
-  RTCPointQueryContext context{};
-  rtcInitPointQueryContext(&context);
-  rtcPointQuery(scene_, &query, &context, &MeshSurface::on_nearest, &q);
+  tree_->ask(query, &MeshSurface::on_nearest, &q);
   return q.found;
 }
 
@@ -463,9 +360,9 @@ bool MeshSurface::inside(const glm::dvec3& point) const noexcept {
 // pseudonormal, 2005): at an edge or a corner the sign of the distance must not depend on which of the
 // triangles there was found first. They are found when they are needed: kept for every vertex and edge they
 // would take as much memory as the mesh itself.
-bool MeshSurface::on_pseudonormal(RTCPointQueryFunctionArguments* args) {
-  auto& q = *static_cast<PseudonormalQuery*>(args->userPtr);
-  const TriangleIndices& t = q.surface->triangles_[q.surface->element_of(args->primID)];
+bool MeshSurface::on_pseudonormal(void* asker, std::uint32_t box, float& /*radius*/) {
+  auto& q = *static_cast<PseudonormalQuery*>(asker);
+  const TriangleIndices& t = q.surface->triangles_[q.surface->element_of(box)];
   const std::vector<glm::dvec3>& v = q.surface->mesh_->vertices;
   const glm::dvec3 &a = v[t[0]], &b = v[t[1]], &c = v[t[2]];
   if (a == b || b == c || c == a) return false;
@@ -486,19 +383,16 @@ bool MeshSurface::on_pseudonormal(RTCPointQueryFunctionArguments* args) {
 
 MeshSurface::PseudonormalQuery MeshSurface::pseudonormal(const glm::dvec3& from, const glm::dvec3& to) const {
   PseudonormalQuery q{.surface = this, .from = from, .to = to};
-  RTCPointQuery query{};
+  BoxTree::Query query;
   glm::dvec3 local(0.0);
   float float_error = 0.0F;
   if (!prepare(from, 0.0, local, float_error, query)) return q;
-  RTCPointQueryContext context{};
-  rtcInitPointQueryContext(&context);
-  rtcPointQuery(scene_, &query, &context, &MeshSurface::on_pseudonormal, &q);
+  tree_->ask(query, &MeshSurface::on_pseudonormal, &q);
   return q;
 }
 
 std::size_t MeshSurface::memory_bytes() const noexcept {
-  const auto embree = static_cast<std::size_t>(std::max<std::int64_t>(embree_bytes_.load(), 0));
-  return sizeof(*this) + embree + mesh_->vertices.capacity() * sizeof(glm::dvec3) +
+  return sizeof(*this) + tree_->memory_bytes() + mesh_->vertices.capacity() * sizeof(glm::dvec3) +
          (mesh_->triangles.capacity() + across_.capacity()) * sizeof(TriangleIndices) +
          elements_.capacity() * sizeof(std::uint32_t) + vertex_normals_.capacity() * sizeof(glm::vec3);
 }

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A triangle mesh as a RigidSurface, through an Embree 3 bounding volume hierarchy. The only part of the
-// project that knows Embree.
+// A triangle mesh as a RigidSurface, through a bounding volume hierarchy (box_tree.h).
 #pragma once
 
 #include <memory>
@@ -15,7 +14,7 @@ struct SurfaceOptions {
   bool vertex_normals = false;  // kept, 12 bytes a vertex, so that shaded_normal() can interpolate them
 };
 
-// Builds the hierarchy (a third of a second for a million triangles). Embree works in floats about the mesh's
+// Builds the hierarchy (a third of a second for a million triangles). That works in floats about the mesh's
 // own centre and proposes candidates conservatively; the closest points themselves are computed in double.
 // The surface shares the mesh and makes no copy of it: about 42 bytes a triangle come on top,
 // twelve of them the triangles across its edges.
