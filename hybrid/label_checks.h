@@ -3,21 +3,13 @@
 #pragma once
 
 #include <cmath>
-#include <sstream>
-#include <stdexcept>
 
+#include "voxel/refuse.h"
 #include "voxel/volume.h"
 
 namespace hybrid {
 
-// Throws std::invalid_argument with the parts, one after another, as its text.
-template <typename... Parts>
-[[noreturn]] void refuse(const Parts&... parts) {
-  std::ostringstream text;
-  text.precision(9);
-  (text << ... << parts);
-  throw std::invalid_argument(text.str());
-}
+using voxel::refuse;
 
 inline void check_volume(const voxel::LabelVolume& volume) {
   const auto& n = volume.dims;

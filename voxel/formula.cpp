@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
-#include <stdexcept>
+
+#include "voxel/refuse.h"
 
 namespace voxel {
 namespace {
@@ -12,14 +12,6 @@ namespace {
 // Centres that lie on a boundary up to rounding are treated alike on every side of a shape. (unit: one
 // spacing)
 constexpr double kTie = 1e-9;
-
-template <typename... Parts>
-[[noreturn]] void refuse(const Parts&... parts) {
-  std::ostringstream text;
-  text.precision(9);
-  (text << ... << parts);
-  throw std::invalid_argument(text.str());
-}
 
 constexpr std::array<char, 3> kAxis{'x', 'y', 'z'};
 
