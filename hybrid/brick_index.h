@@ -13,6 +13,9 @@
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <vector>
+#if defined(__x86_64__)
+#include <emmintrin.h>
+#endif
 
 #include "hybrid/cell_table.h"
 
@@ -37,7 +40,16 @@ class BrickGrid {
   // The same rounding for what is put in and for what is asked. What lies further out than the farthest cell
   // (and what is not a number) is in the outermost cells, where questions from out there find it.
   [[nodiscard]] CellCoordinates cell_of(const glm::dvec3& p) const noexcept {
+#if defined(__x86_64__)
+    // The same, x and y at once: of a look-up along a path rounding is a large part.
+    const __m128d per_cell = _mm_set1_pd(per_cell_);
+    const __m128i xy = below(_mm_mul_pd(_mm_sub_pd(_mm_loadu_pd(&p.x), _mm_loadu_pd(&origin_.x)), per_cell)),
+                  z = below(_mm_mul_sd(_mm_sub_sd(_mm_load_sd(&p.z), _mm_load_sd(&origin_.z)), per_cell));
+    const auto both = static_cast<std::uint64_t>(_mm_cvtsi128_si64(xy));
+    return {static_cast<std::int32_t>(both), static_cast<std::int32_t>(both >> 32), _mm_cvtsi128_si32(z)};
+#else
     return {along(p.x - origin_.x), along(p.y - origin_.y), along(p.z - origin_.z)};
+#endif
   }
   [[nodiscard]] CellRange cells_of(const glm::dvec3& low, const glm::dvec3& high) const noexcept {
     const CellCoordinates first = cell_of(low);
@@ -124,14 +136,23 @@ class BrickGrid {
   static constexpr double kFarthestCell = 1e9;
   static constexpr std::int32_t kUnits = 64;  // of the bitmap, along an edge
 
+  // The greatest whole number that is not above: std::floor is a call where the processor's newer
+  // instructions may not be assumed. Written so that what is not a number becomes the highest cell.
+#if defined(__x86_64__)
+  [[nodiscard]] static __m128i below(__m128d scaled) noexcept {  // of two
+    const __m128d x = _mm_max_pd(_mm_min_pd(scaled, _mm_set1_pd(kFarthestCell)), _mm_set1_pd(-kFarthestCell));
+    const __m128i cell = _mm_cvttpd_epi32(x);
+    const __m128i above = _mm_castpd_si128(_mm_cmpgt_pd(_mm_cvtepi32_pd(cell), x));  // 64 bits each, or none
+    return _mm_add_epi32(cell, _mm_shuffle_epi32(above, 0x08));
+  }
+#else
   [[nodiscard]] std::int32_t along(double offset_m) const noexcept {
-    // std::floor is a call where the processor's newer instructions may not be assumed. Written so that what
-    // is not a number becomes the lowest cell.
-    const double scaled = offset_m * per_cell_, below = scaled < kFarthestCell ? scaled : kFarthestCell,
-                 x = below > -kFarthestCell ? below : -kFarthestCell;
+    const double scaled = offset_m * per_cell_, low = scaled < kFarthestCell ? scaled : kFarthestCell,
+                 x = low > -kFarthestCell ? low : -kFarthestCell;
     const auto cell = static_cast<std::int32_t>(x);
     return cell - (static_cast<double>(cell) > x ? 1 : 0);
   }
+#endif
   [[nodiscard]] std::int32_t unit_of(const CellCoordinates& cell, std::size_t axis) const noexcept {
     return std::clamp((cell[axis] >> unit_shift_) - first_unit_[axis], 0, kUnits - 1);
   }
@@ -207,9 +228,12 @@ class BrickIndex : public BrickGrid {
     if (table_.size() == 0) return;
     const CellCoordinates a = brick_of(cells.low), b = brick_of(cells.high);
     if (same(a, b)) {  // one brick: a point, and most small boxes
-      std::uint32_t n = table_.hinted(a, trail);
-      if (n == kNone && perhaps_brick(a)) n = table_.find_and_look_ahead(a, trail);
-      if (n != kNone) visit(table_[n], cells);
+      const Brick* brick = table_.still_in(a, trail);
+      if (brick == nullptr && perhaps_brick(a)) {
+        const std::uint32_t n = table_.find_and_look_ahead(a, trail);
+        brick = n != kNone ? &table_[n] : nullptr;
+      }
+      if (brick != nullptr) visit(*brick, cells);
       return;
     }
     if (!perhaps(cells)) return;

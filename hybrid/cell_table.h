@@ -34,12 +34,13 @@ using CellCoordinates = std::array<std::int32_t, 3>;
 inline constexpr std::int32_t kNoPlace = std::numeric_limits<std::int32_t>::min();
 
 // What the caller of a table remembers from one question to the next, so that a path costs no hash: where the
-// last ones were, one for each parity of the three coordinates (so that a box over two along each axis has
-// all its eight), and where to. Only hints: whatever they say, and to whatever table they are given, answers
-// are the same. One for each thread that asks.
+// last one was, where others before it were or those beside it will be, one for each parity of the three
+// coordinates (so that a box over two along each axis has all its eight), and where to. Only hints: whatever
+// they say, and to whatever table they are given, answers are the same. One for each thread that asks.
 struct CellTrail {
+  std::uint32_t here = 0;  // of the last that was there
   std::array<std::uint32_t, 8> place{};
-  CellCoordinates last{};  // the last that was not among them
+  CellCoordinates last{};  // the last that another was before
   std::array<std::int32_t, 3> step{1, 1, 1};
 };
 
@@ -75,10 +76,15 @@ class CellTable {
     return kNone;
   }
 
-  // The same along a path. Of what was asked of last: its place if it is there, at once.
+  // The same along a path. Of what the last question was about: its entry, at once; else null.
+  [[nodiscard, gnu::always_inline]] const Entry* still_in(const CellCoordinates& at,
+                                                          const CellTrail& trail) const noexcept {
+    return is_at(trail.here, at) ? &entries_[trail.here] : nullptr;
+  }
+  // Of what was asked of before, or was on the way: its place if it is there.
   [[nodiscard]] std::uint32_t hinted(const CellCoordinates& at, const CellTrail& trail) const noexcept {
     const std::uint32_t hint = trail.place[parity(at)];
-    return hint < entries_.size() && same(entries_[hint].at, at) ? hint : kNone;
+    return is_at(hint, at) ? hint : kNone;
   }
   // Of what was not.
   [[nodiscard]] std::uint32_t find(const CellCoordinates& at, CellTrail& trail) const noexcept {
@@ -86,11 +92,14 @@ class CellTable {
     if (place != kNone) trail.place[parity(at)] = place;
     return place;
   }
-  // The same, and where the trail leads to will be in a cache when it gets there.
+  // Of any but the last, and where the trail leads to will be in a cache when it gets there.
   [[nodiscard]] std::uint32_t find_and_look_ahead(const CellCoordinates& at,
                                                   CellTrail& trail) const noexcept {
-    const std::uint32_t place = find(at, trail);
-    if (large()) fetch_ahead(at, trail);
+    const bool moved = !same(at, trail.last), on_path = follow(at, trail);
+    std::uint32_t place = on_path ? hinted(at, trail) : kNone;
+    if (place == kNone) place = find(at, trail);
+    if (place != kNone) trail.here = place;
+    if (on_path && moved && large()) look_ahead(at, trail);
     return place;
   }
   // Larger than a cache that a core has for itself: then it is worth to tell the memory early.
@@ -100,13 +109,15 @@ class CellTable {
 
   // Tells the memory that find() of it will follow: of several that are told first, one waits for all.
   // (GCC 12 takes a function that only prefetches for one that does nothing, and leaves out its calls.)
-  [[gnu::always_inline]] void fetch(const CellCoordinates& at) const noexcept { fetch(hash(at)); }
-  [[gnu::always_inline]] void fetch(std::uint64_t h) const noexcept {
+  [[gnu::always_inline]] void fetch(const CellCoordinates& at) const noexcept { (void)fetch(hash(at)); }
+  // The place where it is if anywhere, by its tag alone; kNone: probably nowhere.
+  [[gnu::always_inline]] std::uint32_t fetch(std::uint64_t h) const noexcept {
     const std::uint64_t m = matches(chunks_[home(h)], h);
     // Without a match, too, some address: a branch would have to wait for the tags.
     const std::uint32_t place = place_of(home(h), m | static_cast<std::uint64_t>(m == 0) << 7);
     __builtin_prefetch(&entries_[place]);
     fetch_rest(place);
+    return m == 0 ? kNone : place;
   }
 
   // The place of the entry, which is new and started when there was none. kNone only when it may not allocate
@@ -231,36 +242,45 @@ class CellTable {
     const auto odd = [&at](std::size_t d) { return static_cast<std::size_t>(at[d] & 1); };
     return odd(0) + 2 * odd(1) + 4 * odd(2);
   }
+  [[nodiscard]] bool is_at(std::uint32_t place, const CellCoordinates& at) const noexcept {
+    return place < entries_.size() && same(entries_[place].at, at);
+  }
   // What of an entry lies beyond its first cache line comes together with it.
   [[gnu::always_inline]] void fetch_rest(std::uint32_t place) const noexcept {
     if constexpr (sizeof(Entry) > 32)
       __builtin_prefetch(reinterpret_cast<const char*>(&entries_[place]) + sizeof(Entry) - 1);
   }
-  // Along a path the next one is beside this, in the direction in which it has gone so far.
-  [[gnu::always_inline]] void fetch_ahead(const CellCoordinates& at, CellTrail& trail) const noexcept {
-    bool path = true;
+  // The trail now leads from here, in the direction in which it has gone so far. False: it jumped.
+  [[gnu::always_inline]] static bool follow(const CellCoordinates& at, CellTrail& trail) noexcept {
+    bool far = false;
     for (std::size_t d = 0; d < 3; ++d) {
       const std::uint32_t step =
           static_cast<std::uint32_t>(at[d]) - static_cast<std::uint32_t>(trail.last[d]);
-      path = path && step + 2 <= 4;
-      if (step != 0) trail.step[d] = static_cast<std::int32_t>(step) < 0 ? -1 : 1;
+      far |= step + 2 > 4;
+      const std::int32_t sign = static_cast<std::int32_t>(step) < 0 ? -1 : 1;
+      trail.step[d] = step != 0 ? sign : trail.step[d];  // no branch: which axis is next is not foreseen
     }
     trail.last = at;
-    if (!path) return;
-    // Its entry, and the tags of those beyond it: fetching an entry has to read its tags.
+    return !far;
+  }
+  // Along a path the next one is beside this: its entry is on the way when the path gets there, and where it
+  // is in the trail.
+  [[gnu::always_inline]] void look_ahead(const CellCoordinates& at, CellTrail& trail) const noexcept {
     std::array<std::array<std::uint64_t, 3>, 3> parts{};  // [axis][steps ahead]
     for (std::size_t d = 0; d < 3; ++d) {
       for (std::int32_t n = 0; n < 3; ++n)
         parts[d][static_cast<std::size_t>(n)] = part(d, at[d] + n * trail.step[d]);
     }
-    for (std::size_t x = 0; x < 3; ++x) {
-      for (std::size_t y = 0; x + y < 3; ++y) {
-        for (std::size_t z = 0; x + y + z < 3; ++z) {
-          const std::uint64_t h = finished(parts[0][x] ^ parts[1][y] ^ parts[2][z]);
-          if (x + y + z == 1) fetch(h);
-          if (x + y + z == 2) __builtin_prefetch(&chunks_[home(h)]);
-        }
-      }
+    const std::size_t here = parity(at);
+    for (std::size_t d = 0; d < 3; ++d) {
+      const std::size_t e = (d + 1) % 3, f = (d + 2) % 3;
+      const std::uint64_t beside = parts[e][0] ^ parts[f][0];
+      const std::uint32_t place = fetch(finished(parts[d][1] ^ beside));
+      std::uint32_t& hint = trail.place[here ^ (1U << d)];
+      hint = place != kNone ? place : hint;
+      // Of those beyond it the tags: fetching an entry has to read them.
+      __builtin_prefetch(&chunks_[home(finished(parts[d][2] ^ beside))]);
+      __builtin_prefetch(&chunks_[home(finished(parts[d][1] ^ parts[e][1] ^ parts[f][0]))]);
     }
   }
 

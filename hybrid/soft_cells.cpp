@@ -23,6 +23,14 @@ std::size_t bits_in(std::uint64_t x) noexcept {
   return static_cast<std::size_t>(x * 0x0101010101010101ULL >> 56);
 }
 
+// In integers, which takes one branch; where only zero's sign differs, the answer for a box is the same.
+bool same_bits(const glm::dvec3& a, const glm::dvec3& b) noexcept {
+  const auto differ = [](double x, double y) {
+    return std::bit_cast<std::uint64_t>(x) ^ std::bit_cast<std::uint64_t>(y);
+  };
+  return (differ(a.x, b.x) | differ(a.y, b.y) | differ(a.z, b.z)) == 0;
+}
+
 // Of a block of 4 x 4 x 4 cells, bit x + 4 y + 16 z: the cells of the range, which may reach beyond it.
 std::uint64_t block_mask(const CellCoordinates& block, const CellRange& part) noexcept {
   std::array<std::int32_t, 3> from{}, to{};
@@ -350,28 +358,35 @@ void SoftCells::list(const Block& block, std::uint64_t bits, std::span<std::uint
   }
 }
 
-inline std::size_t SoftCells::in_cell(const CellCoordinates& cell, std::span<std::uint32_t> out,
-                                      Trail& trail) const noexcept {
-  const CellCoordinates at = block_of(cell);
-  std::uint32_t place = blocks_.hinted(at, trail.blocks);
-  if (place == kNone) {
-    if (!bricks_.perhaps(cell)) return 0;
-    place = blocks_.find_and_look_ahead(at, trail.blocks);
-    if (place == kNone) return 0;
-  }
-  const Block& block = blocks_[place];
-  const std::uint32_t in_block = cell_in_block(cell);
-  if ((block.occupied >> in_block & 1U) == 0) return 0;
-  std::size_t count = 0;
-  for (std::uint32_t link = link_at(block, in_block);; link = next_[link & kNumber]) {
-    if (count == out.size()) return count;
+std::size_t SoftCells::follow(std::uint32_t link, std::span<std::uint32_t> out) const noexcept {
+  std::size_t count = 1;
+  while ((link & kMore) != 0 && count < out.size()) {
+    link = next_[link & kNumber];
     out[count++] = link & kNumber;
-    if ((link & kMore) == 0) return count;
   }
+  return count;
 }
 
-std::size_t SoftCells::in_box(const CellRange& cells, std::span<std::uint32_t> out,
+inline std::size_t SoftCells::in_cell(const Block& block, std::uint32_t cell,
+                                      std::span<std::uint32_t> out) const noexcept {
+  if ((block.occupied >> cell & 1U) == 0 || out.empty()) return 0;
+  const std::uint32_t link = link_at(block, cell);
+  out[0] = link & kNumber;
+  return (link & kMore) == 0 ? 1 : follow(link, out);
+}
+
+std::size_t SoftCells::in_other_block(const CellCoordinates& cell, std::span<std::uint32_t> out,
+                                      Trail& trail) const noexcept {
+  if (blocks_.size() == 0 || !bricks_.perhaps(cell)) return 0;
+  const std::uint32_t place = blocks_.find_and_look_ahead(block_of(cell), trail.blocks);
+  return place == kNone ? 0 : in_cell(blocks_[place], cell_in_block(cell), out);
+}
+
+std::size_t SoftCells::in_box(const glm::dvec3& low, const glm::dvec3& high, std::span<std::uint32_t> out,
                               Trail& trail) const noexcept {
+  if (blocks_.size() == 0) return 0;
+  const CellRange cells = bricks_.cells_of(low, high);
+  if (!bricks_.perhaps(cells)) return 0;
   // What the bricks say comes first, then what their blocks say: so that of the blocks of a small box all
   // are on their way from the memory together, and of their arrays too.
   struct Part {
@@ -411,11 +426,10 @@ std::size_t SoftCells::in_box(const CellRange& cells, std::span<std::uint32_t> o
 
 std::size_t SoftCells::in(const glm::dvec3& low, const glm::dvec3& high, std::span<std::uint32_t> out,
                           Trail& trail) const noexcept {
-  if (blocks_.size() == 0) return 0;
-  const CellCoordinates first = bricks_.cell_of(low);
-  if (low == high) return in_cell(first, out, trail);
-  const CellRange cells{first, bricks_.cell_of(high)};
-  return bricks_.perhaps(cells) ? in_box(cells, out, trail) : 0;
+  if (!same_bits(low, high)) return in_box(low, high, out, trail);
+  const CellCoordinates cell = bricks_.cell_of(low);
+  const Block* const block = blocks_.still_in(block_of(cell), trail.blocks);
+  return block != nullptr ? in_cell(*block, cell_in_block(cell), out) : in_other_block(cell, out, trail);
 }
 
 std::size_t SoftCells::memory_bytes() const noexcept {

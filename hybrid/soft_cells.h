@@ -126,12 +126,17 @@ class SoftCells {
   void now_at(const Block& block, std::uint32_t place) noexcept;
   void now_at(const Brick& brick, std::uint32_t place) noexcept;
 
-  // Inline, so that coordinates stay in registers.
-  [[nodiscard, gnu::always_inline]] std::size_t in_cell(const CellCoordinates& cell,
-                                                        std::span<std::uint32_t> out,
-                                                        Trail& trail) const noexcept;
-  [[nodiscard, gnu::noinline]] std::size_t in_box(const CellRange& cells, std::span<std::uint32_t> out,
-                                                  Trail& trail) const noexcept;
+  // What in() rarely comes to, apart: so that what it mostly does is short and needs no stack.
+  [[nodiscard, gnu::noinline]] std::size_t in_other_block(const CellCoordinates& cell,
+                                                          std::span<std::uint32_t> out,
+                                                          Trail& trail) const noexcept;
+  [[nodiscard, gnu::noinline]] std::size_t in_box(const glm::dvec3& low, const glm::dvec3& high,
+                                                  std::span<std::uint32_t> out, Trail& trail) const noexcept;
+  [[nodiscard, gnu::always_inline]] std::size_t in_cell(const Block& block, std::uint32_t cell,
+                                                        std::span<std::uint32_t> out) const noexcept;
+  // All of a list but the first, which is written.
+  [[nodiscard, gnu::noinline]] std::size_t follow(std::uint32_t link,
+                                                  std::span<std::uint32_t> out) const noexcept;
   // Writes what the cells of these bits hold, all of which are occupied.
   void list(const Block& block, std::uint64_t bits, std::span<std::uint32_t> out,
             std::size_t& count) const noexcept;

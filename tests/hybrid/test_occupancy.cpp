@@ -7,11 +7,14 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
+#include <limits>
 #include <random>
 #include <set>
+#include <utility>
 #include <vector>
 
 namespace {
@@ -242,6 +245,63 @@ TEST(OccupancyMap, ManyObjectsShareTheLastBit) {
     const dvec3 at(100.0 * o, 0.0, 0.0);
     EXPECT_EQ(map.rigid_in(at - 0.1, at + 0.1), 1ULL << std::min(o, 63U));
   }
+}
+
+// Along each axis the same, on either side of a cell's face, of zero and of what has no cell of its own.
+TEST(OccupancyMap, ACellBeginsAtItsLowerFace) {
+  const hybrid::BrickGrid grid(0.5, dvec3(0.0));
+  const double far = 1e300, none = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<std::pair<double, std::int32_t>> cells{{0.0, 0},
+                                                           {-0.0, 0},
+                                                           {0.5, 1},
+                                                           {std::nextafter(0.5, 0.0), 0},
+                                                           {-5e-324, -1},
+                                                           {-0.5, -1},
+                                                           {std::nextafter(-0.5, -1.0), -2},
+                                                           {1e8 + 0.75, 200'000'001},
+                                                           {-1e8 - 0.75, -200'000'002},
+                                                           {far, 1'000'000'000},
+                                                           {-far, -1'000'000'000},
+                                                           {none, 1'000'000'000}};
+  for (const auto& [x, cell] : cells) {
+    EXPECT_EQ(grid.cell_of({x, 0.25, -0.25}), (hybrid::CellCoordinates{cell, 0, -1})) << x;
+    EXPECT_EQ(grid.cell_of({-0.25, x, 0.25}), (hybrid::CellCoordinates{-1, cell, 0})) << x;
+    EXPECT_EQ(grid.cell_of({0.25, -0.25, x}), (hybrid::CellCoordinates{0, -1, cell})) << x;
+  }
+}
+
+// Forward and back through blocks that are there, that are not, and that come and go meanwhile: with one
+// trail, and with one that has been through another map, the answers are those without any.
+TEST(OccupancyMap, APathFindsWhatIsThereNow) {
+  constexpr double kCell = 1e-3;
+  constexpr std::uint32_t kCount = 20'000;
+  std::mt19937_64 random(5);
+  OccupancyMap map(kCell, dvec3(0.0)), other(kCell, dvec3(0.0));
+  map.add_soft(kCount);
+  other.add_soft(kCount);
+  for (std::uint32_t n = 0; n < kCount; ++n) {
+    map.place(n, random_point(random, 0.04));
+    other.place(n, random_point(random, 0.04));
+  }
+  map.reserve_bricks(4096);
+  other.reserve_bricks(0);
+  OccupancyMap::Trail trail;
+  std::array<std::uint32_t, 64> with{}, without{};
+  std::uint32_t mover = 0;
+  for (int path = 0; path < 200; ++path) {
+    const dvec3 start = random_point(random, 0.05), way = random_point(random, 0.4 * kCell);
+    for (int n = 0; n < 200; ++n) {
+      const dvec3 p = start + static_cast<double>(n < 150 ? n : 300 - n) * way;
+      // Some voxel comes into the way, or leaves it.
+      map.move(mover++ % kCount, n % 3 == 0 ? p + way : random_point(random, 0.04));
+      if (n % 50 == 49) (void)other.soft_in(p, p, with, trail);
+      const std::size_t count = map.soft_in(p, p, with, trail);
+      ASSERT_EQ(count, map.soft_in(p, p, without));
+      ASSERT_TRUE(
+          std::equal(with.begin(), with.begin() + static_cast<std::ptrdiff_t>(count), without.begin()));
+    }
+  }
+  EXPECT_TRUE(map.validate());
 }
 
 TEST(OccupancyMap, RefusesACellThatIsNone) {
