@@ -319,7 +319,7 @@ class CellTable {
   }
   template <class Moved>
   void grow(std::size_t chunks, Moved&& moved) {
-    const auto old = std::move(entries_);
+    const auto old = std::exchange(entries_, {});
     lay_out(chunks);
     for (const Entry& entry : old) {
       if (entry.at[0] == kNoPlace) continue;
