@@ -95,11 +95,11 @@ class CellTable {
   // Of any but the last, and where the trail leads to will be in a cache when it gets there.
   [[nodiscard]] std::uint32_t find_and_look_ahead(const CellCoordinates& at,
                                                   CellTrail& trail) const noexcept {
-    const bool moved = !same(at, trail.last), on_path = follow(at, trail);
-    std::uint32_t place = on_path ? hinted(at, trail) : kNone;
+    const bool ahead = large() && !same(at, trail.last) && follow(at, trail);
+    std::uint32_t place = hinted(at, trail);
     if (place == kNone) place = find(at, trail);
     if (place != kNone) trail.here = place;
-    if (on_path && moved && large()) look_ahead(at, trail);
+    if (ahead) look_ahead(at, trail);
     return place;
   }
   // Larger than a cache that a core has for itself: then it is worth to tell the memory early.
