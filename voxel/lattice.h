@@ -95,6 +95,10 @@ class Lattice {
   [[nodiscard]] const std::uint8_t* labels(RowId row) const {
     return label_.data() + row * std::size_t{kRow};
   }
+  // [lane] 1 where one is anchored, 0 elsewhere.
+  [[nodiscard]] const std::uint8_t* anchors(RowId row) const {
+    return anchored_.data() + row * std::size_t{kRow};
+  }
   [[nodiscard]] int filled_in(RowId row) const { return row_filled_[row]; }
   [[nodiscard]] const glm::dvec3& spacing_m() const { return spacing_m_; }
   [[nodiscard]] double min_spacing_m() const { return min_spacing_m_; }

@@ -39,6 +39,7 @@ SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice)
       pair_held_(lattice_->surface().size(), 0),
       pair_load_(lattice_->surface().size()),
       tight_rows_(*lattice_),
+      drawn_rows_(*lattice_, kMaxTouched),
       carried_mark_(lattice_->size()),
       carried_index_(lattice_->size()) {
   const auto surface = lattice_->surface();
@@ -307,7 +308,7 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
   set_touch_roles();
   if (std::none_of(touches_.begin(), touches_.end(), [](const Touch& t) { return t.pressed; }))
     pressed_last_.clear();
-  for (int axis = 0; axis < 3; ++axis) draw_along(axis);
+  draw_along();
 }
 
 void SoftObject::follow(const glm::dvec3& delta) noexcept {
@@ -450,7 +451,7 @@ std::size_t SoftObject::memory_bytes() const {
                       state_.row_standing.resident_bytes() + state_.row_obstacles.resident_bytes() +
                       state_.rest.memory_bytes() + carried_mark_.resident_bytes() +
                       state_.tool_normal.resident_bytes() + carried_index_.resident_bytes() +
-                      tight_rows_.memory_bytes() + pair_load_.resident_bytes() + row_moved_.resident_bytes();
+                      tight_rows_.memory_bytes() + drawn_rows_.memory_bytes() + pair_load_.resident_bytes() + row_moved_.resident_bytes();
   for (const auto& axis : state_.u) state += axis.resident_bytes();
   return lattice_->memory_bytes() + state + chain_.memory_bytes() + relaxation_.memory_bytes() +
          obstacles_.size() * sizeof(Obstacle) + pair_held_.size();

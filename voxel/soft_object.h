@@ -17,6 +17,7 @@
 
 #include "voxel/chainmail.h"
 #include "voxel/displacement.h"
+#include "voxel/drawn_rows.h"
 #include "voxel/lattice.h"
 #include "voxel/relaxation.h"
 #include "voxel/tight_rows.h"
@@ -206,7 +207,7 @@ class SoftObject {
   void add_stiffness(int axis, glm::dmat3& stiffness) noexcept;
   [[nodiscard]] glm::dvec3 load_on(VoxelId v) noexcept;
   [[nodiscard]] double load_on(VoxelId v, int axis) noexcept;
-  void draw_along(int axis) noexcept;
+  void draw_along() noexcept;
   void carry(VoxelId v, std::uint32_t touch) noexcept;
   [[nodiscard]] glm::dvec3 gather_load(glm::dmat3& stiffness) noexcept;
   void add_stiffness_of_touches(int axis, const glm::dvec3& way, glm::dmat3& stiffness) noexcept;
@@ -238,6 +239,7 @@ class SoftObject {
   std::vector<glm::vec3> moves_;
   bool dragging_ = false;  // sources_ are what drag() moved, moves_ where they were
   TightRows tight_rows_;
+  DrawnRows drawn_rows_;
   std::vector<VoxelId> roots_;              // of these: what is pressed and not anchored
   std::vector<Carried> carried_;            // [pressed first, then what hangs on them by a tight link]
   std::vector<Hanging> hanging_;            // [as carried_]

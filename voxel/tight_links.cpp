@@ -12,8 +12,6 @@
 namespace voxel {
 namespace {
 
-constexpr std::size_t kMostDrawn = 2000;  // voxels that come along with the pressed ones in a tick
-constexpr float kNearlyTight = 0.1F;      // of the spacing: links that are looked at for that
 constexpr std::size_t kMostTied = 500;    // voxels looked at for what holds one of them
 constexpr float kTight = 1e-4F;           // of the spacing: nearer to its limit than this a link is tight
 // The same for what a body presses. At rest what does not hang on it is balanced, and adds nothing; what does
@@ -24,7 +22,6 @@ constexpr float kTightAtBody = 0.02F;
 // u(w) − u(v) of neighbours along d, and what their link lets it be, whichever way the link points.
 struct LinkState {
   float difference, low, high;
-  [[nodiscard]] float room() const { return std::min(difference - low, high - difference); }
 };
 LinkState link_state(const Lattice& lattice, const LazyArray<float>& u, VoxelId v, VoxelId w, int d, bool up,
                      int axis) {
@@ -79,38 +76,13 @@ void add_from_far_end(Hanging& hanging, std::size_t first, const Drops& drops, c
 
 // What hangs on pressed voxels by tight links comes along when they withdraw: it is felt only where it is
 // tight, and the background may need many ticks to get to it. (Left to that, the force lost a sixth of itself
-// whenever the proxy was pushed back by a tenth of a micron, and a held tool never came to rest.) Breadth
-// first, so that each voxel finds the one it hangs on where that belongs.
-void SoftObject::draw_along(int axis) noexcept {
-  auto& u = state_.u[static_cast<std::size_t>(axis)];
-  carried_.clear();
+// whenever the proxy was pushed back by a tenth of a micron, and a held tool never came to rest.)
+void SoftObject::draw_along() noexcept {
+  roots_.clear();
   for (const Touch& t : touches_) {
-    if (!t.pressed || lattice_->anchored(t.v)) continue;
-    carried_mark_[t.v] = 1;
-    carried_.push_back({t.v, 0});
+    if (t.pressed && !lattice_->anchored(t.v)) roots_.push_back(t.v);
   }
-  const std::size_t most = carried_.size() + kMostDrawn;
-  for (std::size_t head = 0; head < carried_.size() && carried_.size() < most; ++head) {
-    const VoxelId v = carried_[head].v;
-    for_neighbours(*lattice_, v, [&](VoxelId w, int d, bool up) {
-      if (carried_mark_[w] != 0 || lattice_->anchored(w) || state_.role[w] != Displacement::free) return;
-      const auto spacing = static_cast<float>(lattice_->spacing_m()[d]);
-      const auto room = [&] { return link_state(*lattice_, u, v, w, d, up, axis).room(); };
-      if (room() > kNearlyTight * spacing) return;
-      glm::dvec3 rest = link_minimum(relaxation_.couplings(), state_, w);
-      if (relaxation_.away())
-        rest += link_compliance(relaxation_.couplings(), w) * relaxation_.multigrid().balance_of(w, state_);
-      const auto wanted = static_cast<float>(rest[axis]);
-      const float before = u[w];
-      u[w] = clamp_to(link_interval(*lattice_, state_, w, axis), wanted, before);
-      if (std::fabs(u[w] - before) > static_cast<float>(kStir) * spacing) relaxation_.stir(w / kRow);
-      relaxation_.multigrid().log().note(0, w / kRow);
-      if (room() > kTight * spacing) return;
-      carried_mark_[w] = 1;
-      carried_.push_back({w, 0});
-    });
-  }
-  let_go_of_carried();
+  if (!roots_.empty()) drawn_rows_.draw(relaxation_, state_, roots_, static_cast<float>(kStir));
 }
 
 // Force of its links on a voxel, and of other soft objects (N).
