@@ -153,7 +153,7 @@ class Multigrid {
     const std::array<float, 3> own = state.bricks.at(v);
     return {balance_[0][v] - own[0], balance_[1][v] - own[1], balance_[2][v] - own[2]};
   }
-  // Of a row of voxels on one axis, without taking off what they have of themselves; null: nothing is balanced.
+  // Of a row on one axis, what voxels have of themselves not taken off; null: nothing is balanced.
   [[nodiscard]] const float* balance_of(RowId row, std::size_t axis) const noexcept {
     if (row_balanced_.size() == 0 || row_balanced_[row] == 0) return nullptr;
     return balance_[axis].data() + static_cast<std::size_t>(row) * kRow;

@@ -100,6 +100,14 @@ SoftObject::Gap SoftObject::gap(const ToolInBody& tool, const glm::dvec3& positi
   return {distance - reach(tool.radius), normal};
 }
 
+bool SoftObject::clear_of(const ToolInBody& tool, const glm::dvec3& position) const noexcept {
+  constexpr double kSurely = 1.0 + 1e-9;  // much more than rounding
+  const glm::dvec3 d = position - tool.centre;
+  const double away = kSurely * reach(tool.radius);
+  if (tool.shape == ToolInBody::Shape::ball && glm::dot(d, d) > away * away) return true;
+  return gap(tool, position).distance >= 0.0;
+}
+
 void SoftObject::touch(std::span<const VoxelId> near) noexcept {
   cycles_since_touch_ = 0;
   contact_octets_ = 0;
@@ -123,7 +131,7 @@ void SoftObject::touch(std::span<const VoxelId> near) noexcept {
     if (touches_.size() == kMaxTouched) break;
     const bool kept = carried_mark_[v] != 0;
     if (kept) --pressed;
-    touches_.push_back({v, kept});
+    touches_.push_back({v, kept, lattice_->rest(v)});
     if (!kept) continue;
     const Touch& before = touched_before_[carried_index_[v]];
     touches_.back().normal = before.normal;
@@ -137,6 +145,7 @@ void SoftObject::touch(std::span<const VoxelId> near) noexcept {
 }
 
 Displacement::Role SoftObject::resting_role(VoxelId v) const noexcept {
+  if (held_voxels_.empty() && obstacles_.empty()) return Displacement::free;
   const std::uint32_t s = lattice_->surface_number(v);
   if (pair_held_[s] != 0) return Displacement::held;
   return obstacles_.empty() || obstacles_[s].normal == glm::vec3(0.0F) ? Displacement::free
@@ -190,7 +199,9 @@ bool SoftObject::push_out(const ToolInBody& tool) noexcept {
   moves_.clear();
   bool any = false;
   for (Touch& t : touches_) {
-    const Gap g = gap(tool, position(t.v));
+    const glm::dvec3 p = position(t);
+    if (!t.pressed && clear_of(tool, p)) continue;
+    const Gap g = gap(tool, p);
     t.normal = g.normal;
     if (g.distance >= 0.0) continue;
     any = true;
@@ -207,7 +218,7 @@ bool SoftObject::push_out(const ToolInBody& tool) noexcept {
 
 // Where a touched voxel belongs, everything else where it is; `pressed`: by the tool.
 glm::dvec3 SoftObject::place_of(const ToolInBody& tool, Touch& t) noexcept {
-  const glm::dvec3 rest = lattice_->rest(t.v);
+  const glm::dvec3 rest = t.rest;
   glm::dvec3 wanted = link_minimum(relaxation_.couplings(), state_, t.v);
   if (pair_held(t.v)) wanted += link_compliance(relaxation_.couplings(), t.v) * pair_load(t.v);
   Gap g = gap(tool, rest + wanted);
@@ -253,15 +264,15 @@ void SoftObject::relax_touch(const ToolInBody& tool, Touch& t) noexcept {
   const glm::dvec3 before = state_.at(t.v);
   const bool was_pressed = t.pressed;
   // While another relaxes the object, a voxel that the tool does not press is his.
-  if (relaxation_.away() && !t.pressed && gap(tool, position(t.v)).distance >= 0.0) return;
+  if (relaxation_.away() && !t.pressed && clear_of(tool, position(t))) return;
   // One that another soft object presses is its pair's. (Brought to where its links alone would have it, it
   // was a spacing deep in the other object whenever the force was measured, and the tool felt nothing of what
   // that carries: 0.31 N of 0.61.)
-  if (pair_held(t.v) && !t.pressed && gap(tool, position(t.v)).distance >= 0.0) return;
+  if (pair_held(t.v) && !t.pressed && clear_of(tool, position(t))) return;
   glm::dvec3 place = place_of(tool, t);
   if (relaxation_.away() && was_pressed && t.pressed) {
     place -= t.left;
-    const Gap g = gap(tool, lattice_->rest(t.v) + place);
+    const Gap g = gap(tool, t.rest + place);
     if (g.distance < 0.0) place -= g.distance * g.normal;
     place = clamp_to_links(*lattice_, state_, t.v, place);
   }
@@ -287,7 +298,11 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
     if (contact_octets_ > kCheap && unsettled_m_ < kJump * lattice_->min_spacing_m()) break;
     const bool again = ++cycles_since_touch_ > 1;
     unsettled_m_ *= kContraction;
-    for (const Touch& t : touches_) relaxation_.stir(t.v / kRow);
+    // They are in the order of their ids, so those of a row follow one another.
+    for (std::size_t i = 0; i < touches_.size(); ++i) {
+      const RowId row = touches_[i].v / kRow;
+      if (i == 0 || touches_[i - 1].v / kRow != row) relaxation_.stir(row);
+    }
     const std::size_t pressed = list_held();
     if (pressed > 0)
       pressed_last_.assign(all_held_.begin(), all_held_.begin() + static_cast<std::ptrdiff_t>(pressed));
@@ -329,7 +344,8 @@ std::size_t SoftObject::give_way(const ToolInBody& tool, std::span<ToolBound> ou
   std::size_t count = 0;
   for (const Touch& t : touches_) {
     if (count == out.size()) break;
-    const glm::dvec3 p = position(t.v);
+    const glm::dvec3 p = position(t);
+    if (clear_of(tool, p)) continue;
     const Gap g = gap(tool, p);
     if (g.distance >= -kGiveWay * voxel_radius()) continue;
     if (t.beside && -g.distance > kDeep * voxel_radius()) {
@@ -349,7 +365,7 @@ std::size_t SoftObject::give_way(const ToolInBody& tool, std::span<ToolBound> ou
 void SoftObject::note_depths(const ToolInBody& tool) noexcept {
   const bool flat = tool.shape == ToolInBody::Shape::punch;
   for (Touch& t : touches_) {
-    const glm::dvec3 from = position(t.v) - tool.centre;
+    const glm::dvec3 from = position(t) - tool.centre;
     const double along = glm::dot(from, tool.axis), distance = glm::length(from);
     t.beside = flat && distance * distance - along * along > tool.radius * tool.radius;
     const double depth = flat ? voxel_radius() - along : reach(tool.radius) - distance;
@@ -447,11 +463,11 @@ bool SoftObject::settle(const ToolInBody& tool, double tolerance_N, int max_cycl
 }
 
 std::size_t SoftObject::memory_bytes() const {
-  std::size_t state = state_.bricks.memory_bytes() + state_.role.resident_bytes() +
-                      state_.row_standing.resident_bytes() + state_.row_obstacles.resident_bytes() +
-                      state_.rest.memory_bytes() + carried_mark_.resident_bytes() +
-                      state_.tool_normal.resident_bytes() + carried_index_.resident_bytes() +
-                      tight_rows_.memory_bytes() + drawn_rows_.memory_bytes() + pair_load_.resident_bytes() + row_moved_.resident_bytes();
+  std::size_t state =
+      state_.bricks.memory_bytes() + state_.role.resident_bytes() + state_.row_standing.resident_bytes() +
+      state_.row_obstacles.resident_bytes() + state_.rest.memory_bytes() + carried_mark_.resident_bytes() +
+      state_.tool_normal.resident_bytes() + carried_index_.resident_bytes() + tight_rows_.memory_bytes() +
+      drawn_rows_.memory_bytes() + pair_load_.resident_bytes() + row_moved_.resident_bytes();
   for (const auto& axis : state_.u) state += axis.resident_bytes();
   return lattice_->memory_bytes() + state + chain_.memory_bytes() + relaxation_.memory_bytes() +
          obstacles_.size() * sizeof(Obstacle) + pair_held_.size();

@@ -170,6 +170,7 @@ class SoftObject {
   struct Touch {
     VoxelId v;
     bool pressed = false;    // carries load towards the tool
+    glm::dvec3 rest{0.0};    // asked for several times a tick, and to find it takes two divisions
     glm::dvec3 normal{0.0};  // from tool to voxel, unit
     glm::dvec3 load{0.0};    // of its links; beside other soft objects, of what hangs on it, too (N)
     double noted = 0.0;      // how deep it was in the tool as the tick began (m)
@@ -194,11 +195,16 @@ class SoftObject {
     double load;         // of it, and of what hangs on it (N)
   };
 
+  [[nodiscard]] glm::dvec3 position(const Touch& t) const { return t.rest + state_.at(t.v); }
   [[nodiscard]] Gap gap(const ToolInBody& tool, const glm::dvec3& position) const noexcept;
+  // Is the gap no overlap? Most that is near is far enough to be told so without a root.
+  [[nodiscard]] bool clear_of(const ToolInBody& tool, const glm::dvec3& position) const noexcept;
   void settle_chain() noexcept;
   void note_moved(RowId row) noexcept;
   [[nodiscard]] Displacement::Role resting_role(VoxelId v) const noexcept;  // when no tool presses it
-  [[nodiscard]] bool pair_held(VoxelId v) const { return pair_held_[lattice_->surface_number(v)] != 0; }
+  [[nodiscard]] bool pair_held(VoxelId v) const {
+    return !held_voxels_.empty() && pair_held_[lattice_->surface_number(v)] != 0;
+  }
   void set_touch_roles() noexcept;
   void give_away() noexcept;  // what pulls near the contact is somebody else's
   std::size_t list_held() noexcept;

@@ -12,8 +12,8 @@
 namespace voxel {
 namespace {
 
-constexpr std::size_t kMostTied = 500;    // voxels looked at for what holds one of them
-constexpr float kTight = 1e-4F;           // of the spacing: nearer to its limit than this a link is tight
+constexpr std::size_t kMostTied = 500;  // voxels looked at for what holds one of them
+constexpr float kTight = 1e-4F;         // of the spacing: nearer to its limit than this a link is tight
 // The same for what a body presses. At rest what does not hang on it is balanced, and adds nothing; what does
 // is left behind a little whenever the body withdraws.
 constexpr std::size_t kMostHanging = 3000;  // voxels that hang on those that a body presses
@@ -297,9 +297,11 @@ void SoftObject::add_stiffness(int axis, glm::dmat3& stiffness) noexcept {
 Reaction SoftObject::reaction(const ToolInBody& tool) noexcept {
   Reaction result;
   for (Touch& t : touches_) {
-    t.normal = gap(tool, position(t.v)).normal;
     t.tight = false;
-    t.load = t.pressed ? load_on(t.v) : glm::dvec3(0.0);
+    t.load = glm::dvec3(0.0);
+    if (!t.pressed) continue;
+    t.normal = gap(tool, position(t)).normal;
+    t.load = load_on(t.v);
   }
   glm::dvec3 hanging_N(0.0);
   if (held_voxels_.empty()) hanging_N = gather_load(result.stiffness_N_per_m);
