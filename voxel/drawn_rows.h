@@ -4,7 +4,7 @@
 // Voxel by voxel, breadth first, each after the one it hangs on. What is asked of a voxel on the way (may it
 // move, was it brought along, what are its springs and limits, what else pulls it) is looked up once for its
 // row of 32 and all three axes: looked up for each voxel it took more than a third of a contact that a quick
-// hand pressed until the chain was tight, now a tenth.
+// hand pressed until the chain was tight, now a sixth.
 #pragma once
 
 #include <array>
