@@ -287,7 +287,7 @@ class Collisions {
           return;
         }
         look_now(pair, side, i, sight);
-        SeenSurface met = sight;
+        SeenSurface met = static_cast<const SeenSurface&>(sight);
         bool looked = false;
         if (way_is_free(pair, side, i, met, looked)) {
           if (looked) {
@@ -489,6 +489,14 @@ void prepare_collisions(const World& world, WorldState& state) {
 
 void watch_collisions(const World& world, WorldState& state) {
   if (!state.collisions.pairs.empty()) Collisions(world, state, 1.0).look_at_all();
+}
+
+double overlap_m(const PairOfBodies& pair) noexcept {
+  double least = std::numeric_limits<double>::max();
+  for (const auto& sights : pair.sights) {
+    for (const PointSight& sight : sights) least = std::min(least, sight.gap_m);
+  }
+  return -least;
 }
 
 void step_past_rigid(const World& world, WorldState& state, double dt_s) noexcept {

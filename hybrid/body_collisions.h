@@ -22,6 +22,9 @@ void prepare_collisions(const World& world, WorldState& state);
 // After that: what every point sees.
 void watch_collisions(const World& world, WorldState& state);
 
+// How deep the two are in one another, as their points see it (m); negative: so far apart.
+[[nodiscard]] double overlap_m(const PairOfBodies& pair) noexcept;
+
 // In the tick, when objects on paths were moved and before free ones are: takes state.stepped[i], as it is
 // now, to where it is after dt_s, under state.body_contacts (the index in state.stepped as `body`) and what
 // it collides with, which is appended there.

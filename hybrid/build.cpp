@@ -314,8 +314,20 @@ class Builder {
     built_.state->prepare(*world_);
     prepare_collisions(*world_, *built_.state);
     watch_collisions(*world_, *built_.state);
+    note_overlapping_bodies();
   }
 
+  void note_overlapping_bodies() {
+    for (const PairOfBodies& pair : built_.state->collisions.pairs) {
+      const double deep_m = overlap_m(pair);
+      if (deep_m <= pair.skin_m) continue;
+      built_.notes.push_back(
+          {world_->rigid[pair.free].name, polygon::Severity::warning,
+           fmt::format("begins {:.3g} mm deep in \"{}\", and comes out of it by {:.2g} mm a tick; "
+                       "move one of them if that is not meant",
+                       1e3 * deep_m, world_->rigid[pair.other].name, 1e3 * pair.skin_m)});
+    }
+  }
   void add_surface_points() {
     const auto free = [](const RigidObject& object) {
       return object.motion.kind() == RigidMotion::Kind::free;

@@ -122,6 +122,7 @@ TEST_F(BodyCollisions, WhatIsDroppedComesToRestOnWhatStands) {
     std::string shape;
     double rest_mm;  // its centre above the table
   };
+  const std::string damped = kFalls + "drag = 0.02\nangular_drag = 1e-6\n";
   const std::vector<Case> cases{{"ball", kBall, 8.0},
                                 {"box", kBox, 5.0},
                                 {"box on an edge", kBox + "rotation = [20, 7, 0]\n", 5.0},
@@ -129,8 +130,7 @@ TEST_F(BodyCollisions, WhatIsDroppedComesToRestOnWhatStands) {
   for (const Case& c : cases) {
     for (const auto& [table, top_mm] : {std::pair{kTable, 10.0}, {kSheet, 0.0}, {mesh, 10.0}}) {
       SCOPED_TRACE(std::string(c.name) + " on " + table);
-      Touch touch(load(kHead + free(c.shape, {3, 2, 40}, kFalls + "drag = 0.02\nangular_drag = 1e-6\n") +
-                       rigid("table", table, {0, 0, -top_mm})),
+      Touch touch(load(kHead + free(c.shape, {3, 2, 40}, damped) + rigid("table", table, {0, 0, -top_mm})),
                   kFarAway);
       Overlap overlap(touch, 0, 1);
       double worst = 0.0, before = energy_J(touch, 0), gained = 0.0, most_us = 0.0;
@@ -164,12 +164,11 @@ TEST_F(BodyCollisions, NothingPassesThroughAnythingAtAnySpeed) {
   double worst = 0.0;
   int cases = 0;
   for (const std::string& shape : {kBall, kBox, kCapsule, mesh}) {
+    const std::string turned = shape + "rotation = [30, 50, 10]\n";
     for (const std::string& wall : {kSheet, kThin, kTable}) {
       for (const double speed : {0.1, 1.0, 5.0, 19.0}) {
         SCOPED_TRACE(shape + wall + std::to_string(speed));
-        Touch touch(load(kHead + free(shape + "rotation = [30, 50, 10]\n", {0, 0, 60}, "") +
-                         rigid("wall", wall, {0, 0, -10})),
-                    kFarAway);
+        Touch touch(load(kHead + free(turned, {0, 0, 60}, "") + rigid("wall", wall, {0, 0, -10})), kFarAway);
         hybrid::FreeBodyState& body = touch.state().rigid[0].free;
         const dvec3 aim(tests::between(engine, -0.3, 0.3), tests::between(engine, -0.3, 0.3), -1.0);
         body.velocity_m_per_s = speed * glm::normalize(aim);
@@ -262,9 +261,8 @@ TEST_F(BodyCollisions, OnASlopeFrictionHoldsUpToItsCone) {
     const std::string rough = "friction = " + std::to_string(friction) + "\n";
     const std::string tilt = "rotation = [0, " + std::to_string(angle) + ", 0]\n";
     const dvec3 up(std::sin(angle * degrees), 0.0, std::cos(angle * degrees));
-    Touch touch(load(kHead + free(kBox + tilt, 1e3 * (0.015 + 3.05e-6) * up, kFalls + rough) +
-                     rigid("slope", kTable + tilt, {0, 0, 0}, rough)),
-                kFarAway);
+    const std::string block = free(kBox + tilt, 1e3 * (0.015 + 3.05e-6) * up, kFalls + rough);
+    Touch touch(load(kHead + block + rigid("slope", kTable + tilt, {0, 0, 0}, rough)), kFarAway);
     const dvec3 from = state_of(touch, 0).centre_m;
     const int ticks = 150;
     for (int n = 0; n < ticks; ++n) touch.at(kFarAway);
@@ -354,6 +352,79 @@ TEST_F(BodyCollisions, TheToolFeelsTheWallThroughABody) {
   EXPECT_NEAR(touch.state().rigid[0].pose.position_m.x, 0.02, 2e-5);
   EXPECT_NEAR(pressed.force_N.x, -1000.0 * (0.02 + 0.005 - 0.01), 0.05);
   EXPECT_EQ(touch.state().faults, 0U);
+}
+
+// Two knobbly meshes, and edges across edges: as deep as what lies between points may be.
+TEST_F(BodyCollisions, OfMeshesAndEdgesOnlyWhatLiesBetweenPointsOverlaps) {
+  polygon::TriangleMesh knobs = polygon::make_ball_mesh(0.02, 4);
+  for (dvec3& v : knobs.vertices)
+    v *= 1.0 + 0.1 * std::sin(300.0 * v.x) * std::sin(250.0 * v.y + 1.0) * std::cos(280.0 * v.z);
+  polygon::save_ply(folder_ / "knobs.ply", knobs);
+  const std::string mesh = "mesh = \"knobs.ply\"\nunit = \"m\"\n";
+  const std::string rod = "primitive = \"box\"\nsize = [60, 6, 6]\n";
+  struct Case {
+    const char* name;
+    std::string first, second;
+  };
+  const std::vector<Case> cases{
+      {"mesh on mesh", mesh, mesh + "rotation = [40, 10, 70]\n"},
+      {"rod across rod", rod + "rotation = [45, 0, 0]\n", rod + "rotation = [45, 0, 90]\n"},
+      {"box on mesh", kBox + "rotation = [30, 20, 0]\n", mesh}};
+  for (const Case& c : cases) {
+    Touch touch(load(kHead + free(c.first, {2, 3, 50}) + rigid("under", c.second, {0, 0, 0})), kFarAway);
+    Overlap overlap(touch, 0, 1);
+    double worst = 0.0, most_us = 0.0, before = energy_J(touch, 0), gained = 0.0;
+    std::vector<double> us;
+    for (int n = 0; n < 400; ++n) {
+      us.push_back(touch.at(kFarAway).tick_us);
+      worst = std::max(worst, overlap.deepest());
+      gained = std::max(gained, energy_J(touch, 0) - before);
+      before = energy_J(touch, 0);
+    }
+    std::sort(us.begin(), us.end());
+    most_us = us.back();
+    std::printf(
+        "%s: overlap at most %.3f mm, energy gained in a tick %.1e J, tick p50 %.0f, p99 %.0f, max %.0f us\n",
+        c.name, 1e3 * worst, gained, us[us.size() / 2], us[us.size() * 99 / 100], most_us);
+    EXPECT_LE(worst, 0.6e-3);
+    EXPECT_LE(gained, 1e-7) << "lifted out of one another";
+    EXPECT_EQ(touch.state().faults, 0U);
+  }
+}
+
+// Beside tissue: a ball falls past it onto bone, and what presses it into bone is felt as bone.
+TEST_F(BodyCollisions, BesideTissueBoneStopsIt) {
+  Touch touch(
+      load(kHead + free(kBall, {0, 0, 30}) + rigid("bone", kTable, {0, 0, -10}) +
+           "[material.gel]\nyoung = 5000\npoisson = 0.3\n[[soft]]\nname = \"wall\"\nformula = \"block\"\n"
+           "size = [20, 40, 20]\nspacing = 2\nposition = [17, 0, 10]\nmaterial = \"gel\"\n"),
+      kFarAway);
+  Overlap overlap(touch, 0, 1);
+  double worst = 0.0;
+  for (int n = 0; n < 2500; ++n) {
+    touch.at(kFarAway);
+    worst = std::max(worst, overlap.deepest());
+  }
+  // It was thrown aside by the tissue that it fell onto by a millimeter.
+  EXPECT_NEAR(state_of(touch, 0).centre_m.z, 0.008, 2e-5);
+  EXPECT_EQ(worst, 0.0);
+  EXPECT_EQ(touch.state().faults, 0U);
+}
+
+TEST_F(BodyCollisions, WhatBeginsInAnotherComesOutOfItSlowlyAndIsSaid) {
+  Touch touch(load(kHead + free(kBox, {0, 0, 4.0}) + rigid("table", kTable, {0, 0, -10})), kFarAway);
+  const auto said =
+      std::any_of(touch.built.notes.begin(), touch.built.notes.end(), [](const hybrid::BuildNote& note) {
+        return note.object == "body" && note.text.find("1 mm deep in \"table\"") != std::string::npos;
+      });
+  EXPECT_TRUE(said);
+  double fastest = 0.0;
+  for (int n = 0; n < 1500; ++n) {
+    touch.at(kFarAway);
+    fastest = std::max(fastest, glm::length(state_of(touch, 0).velocity_m_per_s));
+  }
+  EXPECT_NEAR(state_of(touch, 0).centre_m.z, 0.005, 2e-5);
+  EXPECT_LE(fastest, 0.02);
 }
 
 }  // namespace
