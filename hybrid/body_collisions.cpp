@@ -21,6 +21,8 @@ constexpr double kOffSurface = 1e-6;  // of the way to an object's middle
 constexpr double kOverlap = 0.02;     // of the smaller object: deeper than this is a fault
 constexpr double kRigid = 1e5;        // times what stops the lighter body within a tick: as good as rigid
 constexpr double kSamePlane = 1e-9;   // 1 − cosine between normals
+constexpr double kSlides = 0.05;      // of the smaller object: nearer than this, points slide along edges
+constexpr double kSlidEnough = 0.01;  // of their reach
 constexpr double kStride = 0.02;      // of the smaller object: steps on the way
 constexpr int kMostStrides = 32;
 constexpr int kRounds = 6;  // of solving and following ways
@@ -97,6 +99,13 @@ class Collisions {
   }
   [[nodiscard]] const SurfacePoint& point(const PairOfBodies& pair, Side side, std::size_t i) const noexcept {
     return world_.rigid[whose(pair, side)].points[i];
+  }
+  // Where the point is on its object's surface now, in the object's own frame.
+  [[nodiscard]] static glm::dvec3 place(const SurfacePoint& p, const PointSight& sight) noexcept {
+    return p.at_m + sight.slid_m * p.along;
+  }
+  [[nodiscard]] glm::dvec3 place(const PairOfBodies& pair, Side side, std::size_t i) const noexcept {
+    return place(point(pair, side, i), pair.sights[side][i]);
   }
   template <class Visit>
   void for_points(PairOfBodies& pair, const Visit& visit) noexcept {
@@ -190,7 +199,8 @@ class Collisions {
   void look_now(const PairOfBodies& pair, Side side, std::size_t i, PointSight& sight) noexcept {
     if (drift(pair, sight) == 0.0) return;
     const SurfacePoint& p = point(pair, side, i);
-    const glm::dvec3 x = now_[at_whose(pair, side)].to_body(now_[whose(pair, side)].to_scene(p.at_m));
+    const glm::dvec3 x =
+        now_[at_whose(pair, side)].to_body(now_[whose(pair, side)].to_scene(place(p, sight)));
     static_cast<SeenSurface&>(sight) = look_from(pair, side, x, p.radius_m, glm::dvec3(0.0), 0.0);
     sight.seen_m = travel(pair);
   }
@@ -203,7 +213,7 @@ class Collisions {
     const SurfacePoint& p = point(pair, side, i);
     BodyContact contact;
     contact.normal = at[at_whose(pair, side)].rotation * sight.normal;
-    contact.point_m = of[whose(pair, side)].to_scene(p.at_m) - p.radius_m * contact.normal;
+    contact.point_m = of[whose(pair, side)].to_scene(place(pair, side, i)) - p.radius_m * contact.normal;
     contact.friction = pair.friction;
     std::uint32_t body = member_[whose(pair, side)], beside = member_[at_whose(pair, side)];
     if (body == BodyContact::kNone) {
@@ -240,16 +250,34 @@ class Collisions {
   void add_touching() noexcept {
     for (PairOfBodies& pair : all_.pairs) {
       if (!in_motion(pair)) continue;
-      const double near_m = kTouching * pair.skin_m;
-      if (far_apart(pair, near_m)) continue;
+      const double near_m = kTouching * pair.skin_m, slides_m = kSlides * pair.size_m;
+      if (far_apart(pair, slides_m)) continue;
       for_points(pair, [&](Side side, std::size_t i, PointSight& sight) {
-        if (sight.gap_m - drift(pair, sight) > near_m || looks_ > kLooks) return;
+        const double watched_m = point(pair, side, i).has_ends() ? slides_m : near_m;
+        if (sight.gap_m - drift(pair, sight) > watched_m || looks_ > kLooks) return;
         look_now(pair, side, i, sight);
+        slide(pair, side, i, sight);
         if (sight.gap_m > near_m || is_implied(pair, side, i)) return;
         const BodyContact contact = contact_at(pair, side, i, sight, now_, now_);
         add(contact, pair, std::max(sight.gap_m - pair.skin_m, 0.0) - comes(contact));
       });
     }
+  }
+  // To where its edge is nearest to the other object: where it crosses an edge, and does not begin to
+  // overlap.
+  void slide(const PairOfBodies& pair, Side side, std::size_t i, PointSight& sight) noexcept {
+    const SurfacePoint& p = point(pair, side, i);
+    if (!p.has_ends() || !(sight.gap_m > 0.0)) return;
+    const glm::dvec3 along =
+        (now_[whose(pair, side)].rotation * p.along) * now_[at_whose(pair, side)].rotation;
+    const double to_m =
+        std::clamp(sight.slid_m - sight.gap_m * glm::dot(sight.normal, along), -p.reach_m, p.reach_m);
+    if (std::abs(to_m - sight.slid_m) < kSlidEnough * p.reach_m) return;
+    PointSight there = sight;
+    there.slid_m = to_m;
+    there.seen_m = -std::numeric_limits<double>::infinity();
+    look_now(pair, side, i, there);
+    if (there.gap_m > 0.0) sight = there;
   }
   // Both ends of the point's edge, which were looked at before it, are contacts with the same plane.
   [[nodiscard]] bool is_implied(const PairOfBodies& pair, Side side, std::size_t i) const noexcept {
@@ -313,8 +341,8 @@ class Collisions {
                    bool& looked) noexcept {
     const SurfacePoint& p = point(pair, side, i);
     const std::uint32_t a = whose(pair, side), b = at_whose(pair, side);
-    const glm::dvec3 from = now_[b].to_body(now_[a].to_scene(p.at_m)),
-                     to = after_[b].to_body(after_[a].to_scene(p.at_m));
+    const glm::dvec3 from = now_[b].to_body(now_[a].to_scene(place(pair, side, i))),
+                     to = after_[b].to_body(after_[a].to_scene(place(pair, side, i)));
     const double way = glm::distance(from, to), least = least_ * pair.skin_m;
     double gap = met.gap_m;
     if (way <= std::max(0.0, gap - least)) return true;
@@ -342,8 +370,8 @@ class Collisions {
   void add_met(PairOfBodies& pair, Side side, std::size_t i, const SeenSurface& met) noexcept {
     const SurfacePoint& p = point(pair, side, i);
     const std::uint32_t a = whose(pair, side), b = at_whose(pair, side);
-    const glm::dvec3 from = now_[b].to_body(now_[a].to_scene(p.at_m)),
-                     to = after_[b].to_body(after_[a].to_scene(p.at_m));
+    const glm::dvec3 from = now_[b].to_body(now_[a].to_scene(place(pair, side, i))),
+                     to = after_[b].to_body(after_[a].to_scene(place(pair, side, i)));
     const BodyContact contact = contact_at(pair, side, i, met, now_, after_);
     const double before = in_front(met, to, p) - pair.skin_m -
                           dt_s_ * (speed_of(contact.body, contact) - speed_of(contact.other, contact));

@@ -28,7 +28,7 @@ constexpr std::size_t kMostFailures = 20;
 constexpr double kUnit_m = 1e-3, kJump_m = 1.0;
 constexpr double kMostInside_m = 1e-9, kLongTick_us = 1e6;
 
-constexpr const char* kMoving = R"(# Rigid objects that move, turn, are pushed, rub and are textured.
+constexpr const char* kMoving = R"(# Rigid objects that move, turn, fall on one another, are pushed, rub and are textured.
 format = 1
 [tool]
 radius = 3
@@ -59,6 +59,22 @@ motion = "free"
 density = 1000
 drag = 2
 angular_drag = 1e-4
+gravity = [0, 0, -9.81]
+friction = 0.4
+[[rigid]]
+name = "marble"
+primitive = "ball"
+radius = 6
+position = [-8, 3, 25]
+motion = "free"
+density = 3000
+gravity = [0, 0, -9.81]
+[[rigid]]
+name = "floor"
+primitive = "plane"
+size = 200
+position = [0, 0, -45]
+friction = 0.3
 [[rigid]]
 name = "plate"
 mesh = "block.ply"

@@ -24,6 +24,7 @@ struct Weighed {
   glm::dvec3 at{0.0};
   double sharpness = 0.0;  // 0: flat; a boundary or a corner most
   std::array<std::uint32_t, 2> ends{};
+  glm::dvec3 step{0.0};  // to the next point of the edge
 };
 
 struct Edge {
@@ -99,7 +100,8 @@ class SharpPlaces {
     const glm::dvec3 &a = shape_.vertices[edge.low], &b = shape_.vertices[edge.high];
     const int steps = static_cast<int>(std::ceil(glm::distance(a, b) / step_m_));
     for (int n = 1; n < steps; ++n)
-      points_.push_back({glm::mix(a, b, static_cast<double>(n) / steps), edge.sharpness, ends});
+      points_.push_back({glm::mix(a, b, static_cast<double>(n) / steps), edge.sharpness, ends,
+                         (b - a) / (static_cast<double>(steps))});
   }
 
   const polygon::TriangleMesh& shape_;
@@ -132,9 +134,17 @@ std::vector<SurfacePoint> thinned(std::vector<Weighed> points, double cell_m) {
   }
   std::vector<SurfacePoint> result;
   result.reserve(points.size());
-  for (const Weighed& p : points)
-    result.push_back(
-        {.at_m = p.at, .radius_m = 0.0, .ends = whole ? p.ends : std::array<std::uint32_t, 2>{}});
+  for (const Weighed& p : points) {
+    SurfacePoint point;
+    point.at_m = p.at;
+    const double reach_m = glm::length(p.step);
+    if (whole && reach_m > 0.0) {
+      point.ends = p.ends;
+      point.along = p.step / reach_m;
+      point.reach_m = reach_m;
+    }
+    result.push_back(point);
+  }
   return result;
 }
 
@@ -148,7 +158,7 @@ std::vector<SurfacePoint> points_of(const polygon::TriangleMesh& shape) {
 
 std::vector<SurfacePoint> surface_points(const RigidSource& source, const polygon::TriangleMesh& shape) {
   if (const auto* ball = std::get_if<BallPrimitive>(&source))
-    return {{.at_m = glm::dvec3(0.0), .radius_m = ball->radius_m, .ends = {}}};
+    return {{.at_m = glm::dvec3(0.0), .radius_m = ball->radius_m, .ends = {}, .along = {}}};
   if (const auto* capsule = std::get_if<CapsulePrimitive>(&source)) {
     const int steps =
         std::clamp(static_cast<int>(std::ceil(capsule->length_m / (kAlongAxis * capsule->radius_m))), 1,
@@ -156,7 +166,7 @@ std::vector<SurfacePoint> surface_points(const RigidSource& source, const polygo
     std::vector<SurfacePoint> result;
     for (int n = 0; n <= steps; ++n) {
       const double along = (static_cast<double>(n) / steps - 0.5) * capsule->length_m;
-      result.push_back({.at_m = {0.0, 0.0, along}, .radius_m = capsule->radius_m, .ends = {}});
+      result.push_back({.at_m = {0.0, 0.0, along}, .radius_m = capsule->radius_m, .ends = {}, .along = {}});
     }
     return result;
   }

@@ -3,8 +3,9 @@
 //
 // Two surfaces that are kept apart at all points of the one and all points of the other overlap nowhere by
 // more than what lies between points: nothing for a ball (its centre, with its radius) and for a corner or a
-// face on anything; up to half of the points' distance where two edges cross. So points are needed where a
-// surface is not flat: at vertices and along sharp edges, and none inside faces.
+// face on anything; up to half of the points' distance where two edges cross, which is why those on edges
+// slide to where they cross. So points are needed where a surface is not flat: at vertices and along sharp
+// edges, and none inside faces.
 #pragma once
 
 #include <array>
@@ -21,8 +22,11 @@ namespace hybrid {
 struct SurfacePoint {
   glm::dvec3 at_m{0.0};   // body frame
   double radius_m = 0.0;  // a ball of this radius is part of the object
-  // Between two other points, earlier in the list, on a straight edge.
+  // Between two other points, earlier in the list, on a straight edge. It may slide along that, this far
+  // either way.
   std::array<std::uint32_t, 2> ends{};
+  glm::dvec3 along{0.0};  // unit
+  double reach_m = 0.0;
   [[nodiscard]] bool has_ends() const { return ends[0] != ends[1]; }
 };
 

@@ -211,6 +211,7 @@ struct SeenSurface {
 };
 struct PointSight : SeenSurface {
   double seen_m = -1e300;      // how far both objects had travelled then
+  double slid_m = 0.0;         // along the point's edge
   SeenSurface end;             // where its way ends in this tick …
   std::uint64_t followed = 0;  // … as it was followed in that round
 };

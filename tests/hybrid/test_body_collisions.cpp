@@ -365,11 +365,12 @@ TEST_F(BodyCollisions, OfMeshesAndEdgesOnlyWhatLiesBetweenPointsOverlaps) {
   struct Case {
     const char* name;
     std::string first, second;
+    double most_m;
   };
   const std::vector<Case> cases{
-      {"mesh on mesh", mesh, mesh + "rotation = [40, 10, 70]\n"},
-      {"rod across rod", rod + "rotation = [45, 0, 0]\n", rod + "rotation = [45, 0, 90]\n"},
-      {"box on mesh", kBox + "rotation = [30, 20, 0]\n", mesh}};
+      {"mesh on mesh", mesh, mesh + "rotation = [40, 10, 70]\n", 0.6e-3},
+      {"rod across rod", rod + "rotation = [45, 0, 0]\n", rod + "rotation = [45, 0, 90]\n", 0.2e-3},
+      {"box on mesh", kBox + "rotation = [30, 20, 0]\n", mesh, 0.2e-3}};
   for (const Case& c : cases) {
     Touch touch(load(kHead + free(c.first, {2, 3, 50}) + rigid("under", c.second, {0, 0, 0})), kFarAway);
     Overlap overlap(touch, 0, 1);
@@ -386,7 +387,7 @@ TEST_F(BodyCollisions, OfMeshesAndEdgesOnlyWhatLiesBetweenPointsOverlaps) {
     std::printf(
         "%s: overlap at most %.3f mm, energy gained in a tick %.1e J, tick p50 %.0f, p99 %.0f, max %.0f us\n",
         c.name, 1e3 * worst, gained, us[us.size() / 2], us[us.size() * 99 / 100], most_us);
-    EXPECT_LE(worst, 0.6e-3);
+    EXPECT_LE(worst, c.most_m);
     EXPECT_LE(gained, 1e-7) << "lifted out of one another";
     EXPECT_EQ(touch.state().faults, 0U);
   }
