@@ -23,6 +23,7 @@ constexpr double kRigid = 1e5;        // times what stops the lighter body withi
 constexpr double kSamePlane = 1e-9;   // 1 − cosine between normals
 constexpr double kSlides = 0.05;      // of the smaller object: nearer than this, points slide along edges
 constexpr double kSlidEnough = 0.01;  // of their reach
+constexpr double kStillSeen = 0.01;   // skins
 constexpr double kStride = 0.02;      // of the smaller object: steps on the way
 constexpr int kMostStrides = 32;
 constexpr int kRounds = 6;  // of solving and following ways
@@ -122,6 +123,11 @@ class Collisions {
     return travel(pair) - sight.seen_m;
   }
 
+  // Both have hardly moved since: what is at rest is not looked at for ever.
+  [[nodiscard]] bool is_current(const PairOfBodies& pair, const PointSight& sight) const noexcept {
+    return drift(pair, sight) <= kStillSeen * pair.skin_m;
+  }
+
   // Where all were before this tick: those on paths have moved already, and what tissue did to free ones
   // since counts as travel.
   void place_now() noexcept {
@@ -197,7 +203,7 @@ class Collisions {
   }
   // A point whose last ways were all shorter than its distance is seen afresh, from wherever it is.
   void look_now(const PairOfBodies& pair, Side side, std::size_t i, PointSight& sight) noexcept {
-    if (drift(pair, sight) == 0.0) return;
+    if (is_current(pair, sight)) return;
     const SurfacePoint& p = point(pair, side, i);
     const glm::dvec3 x =
         now_[at_whose(pair, side)].to_body(now_[whose(pair, side)].to_scene(place(p, sight)));
@@ -279,14 +285,19 @@ class Collisions {
     look_now(pair, side, i, there);
     if (there.gap_m > 0.0) sight = there;
   }
-  // Both ends of the point's edge, which were looked at before it, are contacts with the same plane.
+  // Those beside it on its edge are contacts with the same plane.
   [[nodiscard]] bool is_implied(const PairOfBodies& pair, Side side, std::size_t i) const noexcept {
-    const SurfacePoint& p = point(pair, side, i);
-    return p.has_ends() && std::all_of(p.ends.begin(), p.ends.end(), [&](std::uint32_t end) {
-             const PointSight &of_end = pair.sights[side][end], &own = pair.sights[side][i];
-             return drift(pair, of_end) == 0.0 && of_end.gap_m <= kTouching * pair.skin_m &&
-                    glm::dot(of_end.normal, own.normal) > 1.0 - kSamePlane;
-           });
+    const std::vector<SurfacePoint>& points = world_.rigid[whose(pair, side)].points;
+    const SurfacePoint& p = points[i];
+    if (!p.has_ends()) return false;
+    const auto touches_too = [&](std::size_t n) {
+      const PointSight &beside = pair.sights[side][n], &own = pair.sights[side][i];
+      return is_current(pair, beside) && beside.gap_m <= kTouching * pair.skin_m &&
+             glm::dot(beside.normal, own.normal) > 1.0 - kSamePlane;
+    };
+    const bool follows = points[i - 1].ends == p.ends,
+               goes_on = i + 1 < points.size() && points[i + 1].ends == p.ends;
+    return touches_too(follows ? i - 1 : p.ends[0]) && touches_too(goes_on ? i + 1 : p.ends[1]);
   }
   [[nodiscard]] bool in_motion(const PairOfBodies& pair) const noexcept {
     return member_[pair.free] != BodyContact::kNone || member_[pair.other] != BodyContact::kNone;

@@ -28,7 +28,8 @@ constexpr std::size_t kMostFailures = 20;
 constexpr double kUnit_m = 1e-3, kJump_m = 1.0;
 constexpr double kMostInside_m = 1e-9, kLongTick_us = 1e6;
 
-constexpr const char* kMoving = R"(# Rigid objects that move, turn, fall on one another, are pushed, rub and are textured.
+constexpr const char* kMoving =
+    R"(# Rigid objects that move, turn, fall on one another, are pushed, rub and are textured.
 format = 1
 [tool]
 radius = 3

@@ -22,8 +22,8 @@ namespace hybrid {
 struct SurfacePoint {
   glm::dvec3 at_m{0.0};   // body frame
   double radius_m = 0.0;  // a ball of this radius is part of the object
-  // Between two other points, earlier in the list, on a straight edge. It may slide along that, this far
-  // either way.
+  // Between two other points, earlier in the list, on a straight edge, of which the points stand in the list
+  // in order. It may slide along that, this far either way.
   std::array<std::uint32_t, 2> ends{};
   glm::dvec3 along{0.0};  // unit
   double reach_m = 0.0;

@@ -128,9 +128,16 @@ TEST_F(BodyCollisions, WhatIsDroppedComesToRestOnWhatStands) {
                                 {"box on an edge", kBox + "rotation = [20, 7, 0]\n", 5.0},
                                 {"capsule", kCapsule + "rotation = [80, 0, 0]\n", 5.0}};
   for (const Case& c : cases) {
-    for (const auto& [table, top_mm] : {std::pair{kTable, 10.0}, {kSheet, 0.0}, {mesh, 10.0}}) {
-      SCOPED_TRACE(std::string(c.name) + " on " + table);
-      Touch touch(load(kHead + free(c.shape, {3, 2, 40}, damped) + rigid("table", table, {0, 0, -top_mm})),
+    struct Table {
+      const char* name;
+      std::string shape;
+      double top_mm;
+    };
+    for (const Table& table :
+         {Table{"box", kTable, 10.0}, Table{"sheet", kSheet, 0.0}, Table{"mesh", mesh, 10.0}}) {
+      SCOPED_TRACE(std::string(c.name) + " on a " + table.name);
+      Touch touch(load(kHead + free(c.shape, {3, 2, 40}, damped) +
+                       rigid("table", table.shape, {0, 0, -table.top_mm})),
                   kFarAway);
       Overlap overlap(touch, 0, 1);
       double worst = 0.0, before = energy_J(touch, 0), gained = 0.0, most_us = 0.0;
@@ -143,9 +150,10 @@ TEST_F(BodyCollisions, WhatIsDroppedComesToRestOnWhatStands) {
         if (n % 20 == 0) worst = std::max(worst, overlap.deepest());
       }
       std::printf(
-          "%s on %s: rests %.4f mm up, speed %.2e m/s, overlap at most %.2e mm, energy gained in a tick %.1e "
+          "%s on a %s: rests %.4f mm up, speed %.2e m/s, overlap at most %.2e mm, energy gained in a tick "
+          "%.1e "
           "J, tick at most %.0f us\n",
-          c.name, table.substr(0, 21).c_str(), 1e3 * state_of(touch, 0).centre_m.z,
+          c.name, table.name, 1e3 * state_of(touch, 0).centre_m.z,
           glm::length(state_of(touch, 0).velocity_m_per_s), 1e3 * worst, gained, most_us);
       EXPECT_NEAR(1e3 * state_of(touch, 0).centre_m.z, c.rest_mm, 0.02);
       EXPECT_LE(worst, 1e-6);
@@ -309,15 +317,18 @@ TEST_F(BodyCollisions, AStackStands) {
     text += another("box" + std::to_string(n), kBox, {0.3 * n, 0.2 * n, 5.0 + 10.2 * n},
                     kFalls + "friction = 0.5\n");
   Touch touch(load(text), kFarAway);
-  double most_us = 0.0;
-  for (int n = 0; n < 3000; ++n) most_us = std::max(most_us, touch.at(kFarAway).tick_us);
+  std::vector<double> us;
+  us.reserve(3000);
+  for (int n = 0; n < 3000; ++n) us.push_back(touch.at(kFarAway).tick_us);
+  std::sort(us.begin(), us.end());
   for (std::size_t o = 1; o <= 6; ++o) {
     std::printf("box %zu: z %.4f mm, speed %.1e m/s\n", o, 1e3 * state_of(touch, o).centre_m.z,
                 glm::length(state_of(touch, o).velocity_m_per_s));
     EXPECT_NEAR(1e3 * state_of(touch, o).centre_m.z, 5.0 + 10.0 * static_cast<double>(o - 1), 0.1);
     EXPECT_LE(glm::length(state_of(touch, o).velocity_m_per_s), 1e-3);
   }
-  std::printf("six boxes: tick at most %.0f us\n", most_us);
+  std::printf("six boxes: tick p50 %.0f, p99 %.0f, max %.0f us\n", us[us.size() / 2],
+              us[us.size() * 99 / 100], us.back());
   EXPECT_EQ(touch.state().faults, 0U);
 }
 
@@ -376,6 +387,7 @@ TEST_F(BodyCollisions, OfMeshesAndEdgesOnlyWhatLiesBetweenPointsOverlaps) {
     Overlap overlap(touch, 0, 1);
     double worst = 0.0, most_us = 0.0, before = energy_J(touch, 0), gained = 0.0;
     std::vector<double> us;
+    us.reserve(400);
     for (int n = 0; n < 400; ++n) {
       us.push_back(touch.at(kFarAway).tick_us);
       worst = std::max(worst, overlap.deepest());
