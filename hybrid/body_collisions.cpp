@@ -32,10 +32,6 @@ constexpr double kLookFar = 0.5;    // of the smaller object: further than it ha
 constexpr double kLookAgain = 0.1;  // of the smaller object: after so much travel of a pair that is near
 constexpr double kBesides = 0.05;   // of the smaller object: within so much a body that gives way is stopped
 
-bool is_free(const World& world, std::uint32_t o) noexcept {
-  return world.rigid[o].motion.kind() == RigidMotion::Kind::free;
-}
-
 glm::dvec3 middle_of(const RigidObject& object) noexcept {
   return 0.5 * (object.surface->lower() + object.surface->upper());
 }
@@ -237,7 +233,7 @@ class Collisions {
     return contact;
   }
   // A contact of which `gap` (m) is left, before either gives way.
-  void add(BodyContact contact, const PairOfBodies& pair, double gap) noexcept {
+  void add(BodyContact contact, double gap) noexcept {
     double mass = mass_of(contact.body);
     if (contact.other != BodyContact::kNone) {
       const double other = mass_of(contact.other);
@@ -245,7 +241,6 @@ class Collisions {
     }
     contact.stiffness_N_per_m = kRigid * mass / (dt_s_ * dt_s_);
     contact.force_N = -contact.stiffness_N_per_m * gap;
-    contact.friction = pair.friction;
     add_contact(state_, contact);
   }
   [[nodiscard]] double mass_of(std::uint32_t member) const noexcept {
@@ -265,7 +260,7 @@ class Collisions {
         slide(pair, side, i, sight);
         if (sight.gap_m > near_m || is_implied(pair, side, i)) return;
         const BodyContact contact = contact_at(pair, side, i, sight, now_, now_);
-        add(contact, pair, std::max(sight.gap_m - pair.skin_m, 0.0) - comes(contact));
+        add(contact, std::max(sight.gap_m - pair.skin_m, 0.0) - comes(contact));
       });
     }
   }
@@ -346,14 +341,21 @@ class Collisions {
     }
     return all_free;
   }
+  // Where a point comes from and goes to, in the other's frame.
+  struct Way {
+    glm::dvec3 from, to;
+  };
+  [[nodiscard]] Way way_of(const PairOfBodies& pair, Side side, std::size_t i) const noexcept {
+    const std::uint32_t a = whose(pair, side), b = at_whose(pair, side);
+    const glm::dvec3 at = place(pair, side, i);
+    return {now_[b].to_body(now_[a].to_scene(at)), after_[b].to_body(after_[a].to_scene(at))};
+  }
   // Follows a point in the other's frame; `met`: what it saw as the tick began, then what it came too near
   // to.
   bool way_is_free(const PairOfBodies& pair, Side side, std::size_t i, SeenSurface& met,
                    bool& looked) noexcept {
     const SurfacePoint& p = point(pair, side, i);
-    const std::uint32_t a = whose(pair, side), b = at_whose(pair, side);
-    const glm::dvec3 from = now_[b].to_body(now_[a].to_scene(place(pair, side, i))),
-                     to = after_[b].to_body(after_[a].to_scene(place(pair, side, i)));
+    const auto [from, to] = way_of(pair, side, i);
     const double way = glm::distance(from, to), least = least_ * pair.skin_m;
     double gap = met.gap_m;
     if (way <= std::max(0.0, gap - least)) return true;
@@ -380,14 +382,12 @@ class Collisions {
   // The half-space that a point met on its way is kept, as seen from where the last solution took it.
   void add_met(PairOfBodies& pair, Side side, std::size_t i, const SeenSurface& met) noexcept {
     const SurfacePoint& p = point(pair, side, i);
-    const std::uint32_t a = whose(pair, side), b = at_whose(pair, side);
-    const glm::dvec3 from = now_[b].to_body(now_[a].to_scene(place(pair, side, i))),
-                     to = after_[b].to_body(after_[a].to_scene(place(pair, side, i)));
+    const auto [from, to] = way_of(pair, side, i);
     const BodyContact contact = contact_at(pair, side, i, met, now_, after_);
     const double before = in_front(met, to, p) - pair.skin_m -
                           dt_s_ * (speed_of(contact.body, contact) - speed_of(contact.other, contact));
     // Where it began nearer than that, nobody is thrown back.
-    add(contact, pair, before + std::max(0.0, pair.skin_m - in_front(met, from, p)));
+    add(contact, before + std::max(0.0, pair.skin_m - in_front(met, from, p)));
   }
   [[nodiscard]] static double in_front(const SeenSurface& met, const glm::dvec3& place,
                                        const SurfacePoint& p) noexcept {
@@ -413,10 +413,7 @@ class Collisions {
 
   // What was seen where the ways ended is what is seen as the next tick begins.
   void finish() noexcept {
-    for (std::uint32_t o = 0; o < world_.rigid.size(); ++o) {
-      all_.travel_m[o] += moves_[o];
-      all_.last[o] = next_[o];
-    }
+    arrive();
     bool overlaps = false;
     for (PairOfBodies& pair : all_.pairs) {
       if (far_apart_now(pair)) continue;
@@ -440,8 +437,8 @@ class Collisions {
         if (sight.gap_m > kTouching * pair.skin_m) return;
         BodyContact contact = contact_at(pair, side, i, sight, after_, after_);
         contact.carried_m_per_s = glm::dvec3(0.0);
-        add(contact, pair, std::max(sight.gap_m - pair.skin_m, -kBack * pair.skin_m));
-        state_.body_contacts.back().friction = 0.0;
+        contact.friction = 0.0;
+        add(contact, std::max(sight.gap_m - pair.skin_m, -kBack * pair.skin_m));
       });
     }
     auto& still = state_.colliding.still;
@@ -456,6 +453,10 @@ class Collisions {
     }
     state_.body_contacts.resize(own);
     place_after();
+    arrive();
+  }
+  // All are where the tick leaves them.
+  void arrive() noexcept {
     for (std::uint32_t o = 0; o < world_.rigid.size(); ++o) {
       all_.travel_m[o] += moves_[o];
       all_.last[o] = next_[o];
@@ -491,12 +492,9 @@ void prepare_collisions(const World& world, WorldState& state) {
   colliding.system = BodySystem(free);
   for (std::uint32_t o = 0; o < count; ++o) {
     if (!is_free(world, o)) continue;
-    FreeBody alone = world.rigid[o].motion.free_body();
-    alone.gravity_m_per_s2 = glm::dvec3(0.0);
-    alone.drag_N_s_per_m = alone.angular_drag_N_m_s = 0.0;
-    colliding.alone.push_back(alone);
+    colliding.alone.push_back(alone(world.rigid[o].motion.free_body()));
   }
-  for (const FreeBody& alone : colliding.alone) colliding.still.push_back({.body = &alone, .state = {}});
+  for (const FreeBody& body : colliding.alone) colliding.still.push_back({.body = &body, .state = {}});
   state.body_contacts.reserve(kMaxOneSided);
   BodyCollisions& all = state.collisions;
   const auto size = [&](std::uint32_t o) {

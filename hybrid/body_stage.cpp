@@ -160,7 +160,7 @@ void move_free_bodies(const World& world, WorldState& state, double dt_s) noexce
   all.own.clear();
   state.body_contacts.clear();
   for (std::uint32_t o = 0; o < world.rigid.size(); ++o) {
-    if (world.rigid[o].motion.kind() != RigidMotion::Kind::free) continue;
+    if (!is_free(world, o)) continue;
     all.own.push_back(list_contacts(world, state, o, static_cast<std::uint32_t>(all.stepped.size()), dt_s));
     all.stepped.push_back({.body = &world.rigid[o].motion.free_body(), .state = state.rigid[o].free});
     all.object.push_back(o);

@@ -181,14 +181,6 @@ std::size_t add_tissue_contacts(const World& world, WorldState& state, std::uint
 
 namespace {
 
-// The body by itself: nothing but the contacts acts on it.
-FreeBody alone(const FreeBody& body) noexcept {
-  FreeBody result = body;
-  result.gravity_m_per_s2 = glm::dvec3(0.0);
-  result.drag_N_s_per_m = result.angular_drag_N_m_s = 0.0;
-  return result;
-}
-
 // Lists contacts that take overlaps beyond the probe back; false: there is none beyond `limit`.
 bool list_overlaps(const World& world, WorldState& state, std::uint32_t b, double limit,
                    double stiffness) noexcept {
@@ -281,7 +273,7 @@ bool give_way_to_tissue(const World& world, WorldState& state, std::uint32_t b, 
 void keep_out_of_tissue(const World& world, WorldState& state, double dt_s) noexcept {
   if (state.beside_bodies.empty()) return;
   for (std::uint32_t b = 0; b < world.rigid.size(); ++b) {
-    if (!world.rigid[b].presses_tissue || world.rigid[b].motion.kind() != RigidMotion::Kind::free) continue;
+    if (!world.rigid[b].presses_tissue || !is_free(world, b)) continue;
     give_way_to_tissue(world, state, b, state.rigid[b].pose, kTooDeep, dt_s);
     for_voxels_at(state, b, [&](std::size_t o, std::uint32_t s) {
       const voxel::SoftObject& object = *state.soft[o];

@@ -38,10 +38,6 @@ double slack(const voxel::Obstacle& o, const glm::dvec3& u) {
   return glm::dot(glm::dvec3(o.normal), u) - static_cast<double>(o.bound);
 }
 
-bool is_free(const World& world, std::uint32_t b) noexcept {
-  return world.rigid[b].motion.kind() == RigidMotion::Kind::free;
-}
-
 // A moment within the tick: simulated time, and the part of the tick that is still to come.
 struct Moment {
   double t_s = 0.0, to_come = 0.0;

@@ -106,6 +106,13 @@ void step(std::span<SteppedBody> bodies, std::span<const BodyContact> contacts, 
 
 }  // namespace
 
+FreeBody alone(const FreeBody& body) noexcept {
+  FreeBody result = body;
+  result.gravity_m_per_s2 = glm::dvec3(0.0);
+  result.drag_N_s_per_m = result.angular_drag_N_m_s = 0.0;
+  return result;
+}
+
 FreeBodyState state_at(const FreeBody& body, const Pose& pose) {
   FreeBodyState state;
   state.rotation = glm::normalize(pose.rotation);

@@ -38,6 +38,9 @@ struct FreeBodyState {
   glm::dvec3 spin_rad_per_s{0.0};           // scene frame
 };
 
+// The body by itself: nothing but contacts acts on it.
+FreeBody alone(const FreeBody& body) noexcept;
+
 FreeBodyState state_at(const FreeBody& body, const Pose& pose);
 Pose pose_of(const FreeBody& body, const FreeBodyState& state) noexcept;
 

@@ -121,6 +121,10 @@ struct World {
   }
 };
 
+inline bool is_free(const World& world, std::uint32_t rigid) noexcept {
+  return world.rigid[rigid].motion.kind() == RigidMotion::Kind::free;
+}
+
 // A surface voxel of one soft object, and the other's surface that it presses on.
 struct VoxelPair {
   std::uint32_t meeting = 0;  // index into World::meeting
