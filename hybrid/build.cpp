@@ -201,13 +201,14 @@ class Builder {
                       .drawn = {}};
         body.drawn = surface_from_labels(volumes_[o], kSurfaceSmoothing);  // before the inside is thinned
         if (d.thinning) thin_object(scene_, d, volumes_[o], options, body, built_.notes);
-        soft_.push_back(
-            std::make_unique<voxel::SoftObject>(std::make_unique<voxel::Lattice>(volumes_[o], options)));
+        // The lattice has what it needs, and the volume's memory goes as that comes.
+        soft_.push_back(std::make_unique<voxel::SoftObject>(
+            std::make_unique<voxel::Lattice>(std::move(volumes_[o]), options)));
+        volumes_[o] = {};
         note_memory(d, soft_.back()->lattice());
         note_without_slack(d, soft_.back()->lattice());
         for (const glm::dvec3& v : body.drawn.vertices) box_.add(body.to_scene(v));
         world_->soft.push_back(std::move(body));
-        volumes_[o] = {};  // the lattice has what it needs
       });
     }
   }

@@ -149,6 +149,15 @@ class NetBuilder {
     const std::size_t layer = row_length_ * (static_cast<std::size_t>(n[1]) + 1);
     below_.resize(layer);
     here_.resize(layer);
+    // Twice what the sides of a full lattice take. Room that is not used takes no memory; to grow would take
+    // half as much again as there is, beside it, while the labels are there, too.
+    const auto area = [&n](std::size_t a, std::size_t b) {
+      return (static_cast<std::size_t>(n[a]) + 1) * (static_cast<std::size_t>(n[b]) + 1);
+    };
+    const std::size_t most = 4 * (area(0, 1) + area(1, 2) + area(0, 2));
+    net_.positions.reserve(most);
+    net_.cells.reserve(most);
+    net_.quads.reserve(most);
     for (int k = -1; k < n[2]; ++k) {
       for (int j = -1; j < n[1]; ++j) build_row(j, k);
       below_.swap(here_);
@@ -312,6 +321,7 @@ polygon::TriangleMesh surface_from_labels(const LabelVolume& volume, int smoothi
   polygon::TriangleMesh mesh;
   mesh.vertices = std::move(net.positions);
   for (glm::dvec3& vertex : mesh.vertices) vertex *= volume.spacing_m;
+  net.cells = {};
   mesh.triangles.reserve(2 * net.quads.size());
   const auto squared = [](const glm::dvec3& d) { return d.x * d.x + d.y * d.y + d.z * d.z; };
   for (const Quad& q : net.quads) {  // along the shorter diagonal, which follows ridges

@@ -16,6 +16,7 @@ struct RowInfo {
   std::uint8_t label = 0;     // of a row full of free voxels of one label; else 0
   bool filled : 1 = false;    // has any voxel
   bool anchored : 1 = false;  // has any anchor
+  bool known : 1 = false;     // all of this was looked up
   std::uint8_t mark = 0;      // ChainWave::Mark bits
   std::uint8_t waits = 0;     // bit of each wave that is still to ask from here; ChainWave::kListed
 };

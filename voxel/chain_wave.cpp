@@ -31,22 +31,9 @@ ChainWave::ChainWave(const Lattice& lattice)
   const Grid& grid = lattice.grid();
   free_low_ = grid.dims;
   free_high_.fill(-1);
-  std::size_t count = 0;
   for (RowId row = 0; row < grid.rows(); ++row) {
-    if (lattice.filled_in(row) == 0) continue;
-    const std::uint8_t* const labels = lattice.labels(row);
-    std::uint32_t free = 0, anchors = 0;
-    bool alike = true;
-    for (VoxelId i = 0; i < kRow; ++i) {
-      const std::uint32_t bit = 1U << i;
-      alike = alike && labels[i] == labels[0];
-      if (labels[i] == 0) continue;
-      (lattice.anchored(row * kRow + i) ? anchors : free) |= bit;
-    }
-    const bool plain = free == kAll && alike;
-    rows_[row] = {free, plain ? labels[0] : std::uint8_t{0}, true, anchors != 0, 0, 0};
+    const std::uint32_t free = lattice.filled_lanes(row) & ~lattice.anchored_lanes(row);
     if (free == 0) continue;
-    count += static_cast<std::size_t>(__builtin_popcount(free));
     const std::array<int, 3> c = grid.row_coordinates(row);
     const int x = (c[0] - 1) * kRow;
     free_low_[0] = std::min(free_low_[0], x + __builtin_ctz(free));
@@ -59,7 +46,28 @@ ChainWave::ChainWave(const Lattice& lattice)
   std::size_t box = 1;
   for (std::size_t d = 0; d < 3; ++d)
     box *= static_cast<std::size_t>(std::max(0, free_high_[d] - free_low_[d] + 1));
-  free_is_box_ = box == count;
+  free_is_box_ = box == lattice.voxel_count() - lattice.anchored_count();
+}
+
+void ChainWave::look_up(RowId row) noexcept {
+  const RowId row_z = lattice_.grid().row_z, begin = row / row_z * row_z;
+  for (RowId r = begin; r < begin + row_z; ++r) {
+    RowInfo& out = rows_[r];
+    const std::uint32_t filled = lattice_.filled_lanes(r), anchors = lattice_.anchored_lanes(r);
+    const std::uint8_t* const labels = lattice_.labels(r);
+    out.free = filled & ~anchors;
+    out.filled = filled != 0;
+    out.anchored = anchors != 0;
+    out.known = true;
+    if (out.free != kAll) continue;
+    if (lattice_.inside(r) != 0 || std::count(labels, labels + kRow, labels[0]) == kRow)
+      out.label = labels[0];
+  }
+}
+
+void ChainWave::prepare_all() noexcept {
+  const Grid& grid = lattice_.grid();
+  for (RowId row = 0; row < grid.rows(); row += grid.row_z) look_up(row);
 }
 
 void ChainWave::begin() noexcept {
@@ -78,7 +86,7 @@ void ChainWave::note_pulled(RowId row) noexcept {
 
 // The voxel beyond the end of a row.
 void ChainWave::ask_across(const Pass& p, RowId row, RowId to, int direction) noexcept {
-  const RowInfo &own = rows_[row], &other = rows_[to];
+  const RowInfo &own = info(row), &other = info(to);
   if (!other.filled) return;
   const VoxelId end = kRow - 1, from = row * kRow + (direction == 0 ? end : 0),
                 at = to * kRow + (direction == 0 ? 0 : end);
@@ -110,8 +118,9 @@ void ChainWave::ask_voxel(const Pass& p, VoxelId from, VoxelId to, int direction
 }
 
 void ChainWave::ask_beside(const Pass& p, RowId row, RowId to, int direction) noexcept {
-  if (!rows_[to].filled) return;
-  if (rows_[to].anchored) {
+  const RowInfo& other_row = info(to);
+  if (!other_row.filled) return;
+  if (other_row.anchored) {
     for (VoxelId i = 0; i < kRow; ++i) {
       if (lattice_.filled(row * kRow + i)) ask_voxel(p, row * kRow + i, to * kRow + i, direction);
     }
@@ -120,7 +129,7 @@ void ChainWave::ask_beside(const Pass& p, RowId row, RowId to, int direction) no
   float* const own = row_at(p, row);
   float* const other = row_at(p, to);
   const float* const half = p.limits.half[static_cast<std::size_t>(direction)];
-  const std::uint8_t a = rows_[row].label, b = rows_[to].label;
+  const std::uint8_t a = info(row).label, b = other_row.label;
   Moved moves = kNothingMoved;
   if (a != 0 && b != 0) {
     moves = p.way == Way::raise ? raise_beside_alike(own, other, half[a] + half[b], p.margin)
@@ -138,7 +147,7 @@ void ChainWave::ask_beside(const Pass& p, RowId row, RowId to, int direction) no
 
 Moved ChainWave::ask_along(const Pass& p, RowId row) noexcept {
   float* const own = row_at(p, row);
-  if (rows_[row].anchored) {
+  if (info(row).anchored) {
     const VoxelId begin = row * kRow, end = begin + kRow - 1;
     for (VoxelId v = begin; v < end; ++v) {
       if (lattice_.filled(v)) ask_voxel(p, v, v + 1, 0);
@@ -306,8 +315,8 @@ void ChainWave::put_back() noexcept {
 std::size_t ChainWave::memory_bytes() const {
   return rows_.resident_bytes() + ring_.resident_bytes() + moved_.resident_bytes() +
          pulled_.resident_bytes() + waiting_.resident_bytes() + taken_.resident_bytes() +
-         asked_.resident_bytes() + asked_spans_.size() * sizeof(Span) +
-         in_plane_.size() * sizeof(in_plane_[0]) + moves_.size() + fall_.size() * sizeof(float);
+         asked_.resident_bytes() + resident_bytes(asked_spans_) + resident_bytes(in_plane_) +
+         resident_bytes(moves_) + resident_bytes(fall_);
 }
 
 }  // namespace voxel

@@ -35,6 +35,9 @@ class ChainWave {
 
   static constexpr std::uint64_t kUnlimited = ~std::uint64_t{0};
 
+  // Looks all rows up now, not when a wave first comes to them.
+  void prepare_all() noexcept;
+
   // Forgets what moved and which anchors were pulled; rows that wait go on waiting.
   void begin() noexcept;
 
@@ -118,7 +121,15 @@ class ChainWave {
   [[nodiscard]] float* row_at(const Pass& p, RowId row) const noexcept {
     return p.u + static_cast<std::size_t>(row) * kRow;
   }
-  [[nodiscard]] bool free(VoxelId v) const noexcept { return (rows_[v / kRow].free >> (v % kRow) & 1U) != 0; }
+  // What is known of a row, which is looked up when it is first asked for: written for all rows, it took as
+  // much memory as a quarter of the labels. All rows of a line in y are looked up together: what is known of
+  // one is known of those.
+  [[nodiscard]] const RowInfo& info(RowId row) noexcept {
+    if (!rows_[row].known) look_up(row);
+    return rows_[row];
+  }
+  void look_up(RowId row) noexcept;
+  [[nodiscard]] bool free(VoxelId v) noexcept { return (info(v / kRow).free >> (v % kRow) & 1U) != 0; }
   // `ends`: first and last, those to be looked at beyond.
   void enqueue(RowId row, std::uint8_t ends = first | last) noexcept;
   void note_pulled(RowId row) noexcept;
@@ -143,8 +154,8 @@ class ChainWave {
   void note_pulled_row(Sweep& sweep, RowId row, int y, Moved what) noexcept;
   void leave_sweep(const Pass& p, Sweep& sweep) noexcept;
   bool cone(const Pass& p, VoxelId apex, std::uint64_t most) noexcept;
-  [[nodiscard]] Box reach(const Pass& p, VoxelId apex) const noexcept;
-  [[nodiscard]] bool full(const std::array<int, 3>& low, const std::array<int, 3>& high) const noexcept;
+  [[nodiscard]] Box reach(const Pass& p, VoxelId apex) noexcept;
+  [[nodiscard]] bool full(const std::array<int, 3>& low, const std::array<int, 3>& high) noexcept;
   void write_cone(const Pass& p, VoxelId apex, const Box& box) noexcept;
   int write_column(const Pass& p, RowId row, int nearest, bool has_apex, const Box& box, double base,
                    const float* fall) noexcept;
@@ -152,7 +163,7 @@ class ChainWave {
 
   const Lattice& lattice_;
   ChainLimits limits_;
-  LazyArray<RowInfo> rows_;
+  LazyArray<RowInfo> rows_;  // read by info(), but for the marks
   std::array<int, 3> free_low_{}, free_high_{};
   bool free_is_box_ = true;  // the free voxels fill that box
   LazyArray<RowId> ring_;    // queue; a row stands in it at most once

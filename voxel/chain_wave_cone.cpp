@@ -15,7 +15,7 @@ constexpr std::uint32_t kAll = 0xFFFFFFFFU;
 // How far a cone gets along the three lines through its apex. Where nothing but free voxels is within, those
 // at which it ends included, it raises nothing beyond: what it raises there, it raises all along every
 // shortest way to it, and one of these leads over such a line.
-ChainWave::Box ChainWave::reach(const Pass& p, VoxelId apex) const noexcept {
+ChainWave::Box ChainWave::reach(const Pass& p, VoxelId apex) noexcept {
   Box box;
   const Grid& grid = lattice_.grid();
   for (int n = 0; n < kWays; ++n) {
@@ -35,7 +35,7 @@ ChainWave::Box ChainWave::reach(const Pass& p, VoxelId apex) const noexcept {
   return box;
 }
 
-bool ChainWave::full(const std::array<int, 3>& low, const std::array<int, 3>& high) const noexcept {
+bool ChainWave::full(const std::array<int, 3>& low, const std::array<int, 3>& high) noexcept {
   if (free_is_box_) return true;
   const Grid& grid = lattice_.grid();
   for (int c = low[0] / kRow + 1; c <= high[0] / kRow + 1; ++c) {
@@ -44,7 +44,7 @@ bool ChainWave::full(const std::array<int, 3>& low, const std::array<int, 3>& hi
     if (low[0] > x) needed &= kAll << (low[0] - x);
     if (high[0] < x + kRow - 1) needed &= kAll >> (x + kRow - 1 - high[0]);
     for (int z = low[2]; z <= high[2]; ++z) {
-      const RowInfo* const row = rows_.data() + grid.row(c, low[1], z);
+      const RowInfo* const row = &info(grid.row(c, low[1], z));
       std::uint32_t all = kAll;
       for (int n = 0; n <= high[1] - low[1]; ++n) all &= row[n].free;
       if ((all & needed) != needed) return false;
@@ -153,7 +153,7 @@ void ChainWave::enqueue_cut_faces(VoxelId apex, const Box& box) noexcept {
           std::array<int, 3> other{0, y, z};
           if (d > 0) other[d] += beyond;
           const bool something = d == 0 ? lattice_.filled(grid.at(low[0] + beyond, y, z))
-                                        : rows_[grid.row(c, other[1], other[2])].filled;
+                                        : info(grid.row(c, other[1], other[2])).filled;
           if (something) enqueue(grid.row(c, y, z));
         }
       }

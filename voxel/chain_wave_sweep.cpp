@@ -36,7 +36,7 @@ inline ChainWave::Span& ChainWave::asked_span(int way, int column, int z) noexce
 // It is this row's turn when its plane is next swept upwards (0) or downwards (1).
 void ChainWave::ask_row(Sweep& sweep, int way, const std::array<int, 3>& at, std::uint8_t by) noexcept {
   const RowId row = lattice_.grid().row(at[0], at[1], at[2]);
-  if (!rows_[row].filled) return;
+  if (!info(row).filled) return;
   asked_[row] |= by;
   asked_span(way, at[0], at[2]).add(at[1]);
   sweep.planes[static_cast<std::size_t>(way)].add(at[2]);
@@ -49,7 +49,7 @@ bool ChainWave::begin_sweep(const Pass& p, std::span<const Source> sources, Swee
   const Grid& grid = lattice_.grid();
   std::array<Span, 3> box;
   for (const Source& s : sources) {
-    if (rows_[s.v / kRow].anchored) return false;
+    if (info(s.v / kRow).anchored) return false;
     const std::array<int, 3> at = grid.row_coordinates(s.v / kRow);
     for (std::size_t d = 0; d < 3; ++d) box[d].add(at[d]);
   }
@@ -84,7 +84,7 @@ inline void ChainWave::note_pulled_row(Sweep& sweep, RowId row, int y, Moved wha
   }
   const auto ask_across = [&](int x) {
     const RowId to = row + static_cast<RowId>(x) * row_x;
-    if (!rows_[to].filled) return;
+    if (!info(to).filled) return;
     asked_[to] |= x > 0 ? kFromBelowX : kFromAboveX;
     const int column = plane.column + x;
     in_plane_[static_cast<std::size_t>(column)][x > 0 ? 0 : 1].add(y);
@@ -151,7 +151,7 @@ void ChainWave::pull_rows(const Pass& p, Sweep& sweep, int step, const Span& spa
   task.most = step > 0 ? grid.dims[1] - y : y + 1;
   while (task.most > 0 && (on || task.count > 0)) {
     const RowId row = grid.row(plane.column, y, plane.at);
-    const auto strip = [&](RowId r) { return RowStrip{row_at(p, r), lattice_.labels(r), &rows_[r]}; };
+    const auto strip = [&](RowId r) { return RowStrip{row_at(p, r), lattice_.labels(r), &info(r)}; };
     task.own = strip(row);
     const int from_z = plane.at - plane.z;
     task.z = from_z >= 0 && from_z < grid.dims[2] ? strip(row - static_cast<RowId>(plane.z) * grid.row_z)
@@ -270,7 +270,7 @@ void ChainWave::leave_sweep(const Pass& p, Sweep& sweep) noexcept {
         for (int y = std::max(span.low, 0); y <= std::min(span.high, grid.dims[1] - 1); ++y) {
           const RowId row = grid.row(c, y, z);
           for (std::size_t n = 0; n < from.size(); ++n) {
-            if ((asked_[row] >> n & 1U) != 0 && rows_[row - from[n]].filled)
+            if ((asked_[row] >> n & 1U) != 0 && info(row - from[n]).filled)
               wait(row - from[n], wave_bit(p.axis, p.way));
           }
           asked_[row] = 0;

@@ -147,7 +147,7 @@ std::size_t ChainMail::moved_count() const noexcept {
 
 std::size_t ChainMail::memory_bytes() const {
   return wave_.memory_bytes() + raised_.resident_bytes() + lowered_.resident_bytes() +
-         stopped_.capacity() * sizeof(VoxelId) + stops_.capacity() * sizeof(glm::vec3);
+         resident_bytes(stopped_) + resident_bytes(stops_);
 }
 
 double worst_violation(const Lattice& lattice, const Displacement& state) {

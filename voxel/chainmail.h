@@ -27,6 +27,9 @@ class ChainMail {
  public:
   explicit ChainMail(const Lattice& lattice);
 
+  // Looks up what waves need of the lattice now, not when one first comes there.
+  void prepare_all() noexcept { wave_.prepare_all(); }
+
   static constexpr std::uint64_t kUnlimited = ChainWave::kUnlimited;
   // Row updates that a wave takes in any case, so that what is around a contact is always settled: a row is
   // 32 voxels along x, and rows are taken in the order of their distance.
@@ -76,8 +79,8 @@ class ChainMail {
       margin_{};  // of this settle(), and those before of which something waits (unit: meter)
   LazyArray<ChainWave::Source> raised_, lowered_;
   bool stopped_by_moving_ = false;  // since settle() began, some voxel was
-  std::vector<VoxelId> stopped_;    // voxels put back onto their obstacles, and by how much
-  std::vector<glm::vec3> stops_;
+  LazyVector<VoxelId> stopped_;     // voxels put back onto their obstacles, and by how much
+  LazyVector<glm::vec3> stops_;
 };
 
 // The most by which any link exceeds its limits (unit: meter), over the whole lattice; for tests.

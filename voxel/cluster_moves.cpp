@@ -110,7 +110,7 @@ double ClusterMoves::move(Couplings& couplings, Displacement& state, VoxelId v, 
 }
 
 std::size_t ClusterMoves::memory_bytes() const {
-  return (cluster_.capacity() + seen_.capacity()) * sizeof(VoxelId) + mark_.resident_bytes();
+  return resident_bytes(cluster_) + resident_bytes(seen_) + mark_.resident_bytes();
 }
 
 }  // namespace voxel

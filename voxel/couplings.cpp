@@ -61,21 +61,21 @@ Couplings::Couplings(const Lattice& lattice, const Couplings* finer)
       c.inverse[static_cast<std::size_t>(axis)].fill(1.0F / sum);
     }
   }
-  if (level_ < 2) return;
+  if (level_ >= kKept) keep_cells();
+}
+
+void Couplings::keep_cells() {
   content_ = LazyArray<std::uint8_t>(grid_.size());
+  for (auto& links : link_) links = LazyArray<Spring>(grid_.size());
   for (int k = 0; k < grid_.dims[2]; ++k) {
     for (int j = 0; j < grid_.dims[1]; ++j) {
       for (int i = 0; i < grid_.dims[0]; ++i) {
-        Content all = nothing;
-        for (int corner = 0; corner < 8 && all != some; ++corner) {
-          const std::array<int, 3> fine{2 * i + (corner & 1), 2 * j + (corner >> 1 & 1),
-                                        2 * k + (corner >> 2)};
-          if (fine[0] >= finer_->grid_.dims[0] || fine[1] >= finer_->grid_.dims[1] ||
-              fine[2] >= finer_->grid_.dims[2])
-            continue;
-          all = together(all, finer_->content(fine));
-        }
-        if (all != nothing) content_[grid_.at(i, j, k)] = all;
+        const std::array<int, 3> cell{i, j, k};
+        const Content all = content_from_finer(cell);
+        if (all == nothing) continue;
+        const VoxelId at = grid_.at(i, j, k);
+        content_[at] = all;
+        for (int d = 0; d < 3; ++d) link_[static_cast<std::size_t>(d)][at] = link_from_finer(cell, d);
       }
     }
   }
@@ -89,7 +89,11 @@ Couplings::Content Couplings::content(const std::array<int, 3>& cell) const noex
     const VoxelId v = grid_.at(i, j, k);
     return !lattice_.filled(v) ? nothing : lattice_.anchored(v) ? held : some;
   }
-  if (level_ >= 2) return static_cast<Content>(content_[grid_.at(i, j, k)]);
+  return level_ >= kKept ? static_cast<Content>(content_[grid_.at(i, j, k)]) : content_from_finer(cell);
+}
+
+Couplings::Content Couplings::content_from_finer(const std::array<int, 3>& cell) const noexcept {
+  const auto [i, j, k] = cell;
   Content all = nothing;
   for (int corner = 0; corner < 8 && all != some; ++corner) {
     const std::array<int, 3> fine{2 * i + (corner & 1), 2 * j + (corner >> 1 & 1), 2 * k + (corner >> 2)};
@@ -109,6 +113,7 @@ Spring Couplings::link(const std::array<int, 3>& cell, int d) const noexcept {
   }
   const VoxelId v = grid_.at(cell[0], cell[1], cell[2]);
   const RowId row = v / kRow;
+  if (level_ >= kKept) return link_[ud][v];
   if (kind_[row] == one_label) {
     const Constant& c = *constant_[label_[row]];
     return {c.along[ud][0], c.across[ud][0]};
@@ -118,7 +123,11 @@ Spring Couplings::link(const std::array<int, 3>& cell, int d) const noexcept {
     return {w.up_along[ud][v % kRow], w.up_across[ud][v % kRow]};
   }
   if (kind_[row] == empty) return {};
-  if (level_ == 0) return lattice_.spring(v, d);
+  return level_ == 0 ? lattice_.spring(v, d) : link_from_finer(cell, d);
+}
+
+Spring Couplings::link_from_finer(const std::array<int, 3>& cell, int d) const noexcept {
+  const auto ud = static_cast<std::size_t>(d);
   const std::size_t p = (ud + 1) % 3, q = (ud + 2) % 3;
   std::array<Spring, 4> fine;
   for (std::size_t n = 0; n < 4; ++n) {
@@ -137,10 +146,7 @@ bool Couplings::is_one_label(RowId row, std::uint8_t& label) const noexcept {
   if (level_ == 0) {
     label = lattice_.inside(row);
     if (label == 0) return false;
-    for (VoxelId v = row * kRow; v < (row + 1) * kRow; ++v) {
-      if (lattice_.anchored(v)) return false;
-    }
-    return true;
+    return lattice_.anchored_lanes(row) == 0;
   }
   const std::array<int, 3> c = grid_.row_coordinates(row);
   label = 0;
@@ -301,16 +307,7 @@ void Couplings::write_cells(RowId row, Written& out, LaneBits& stands) const noe
   for (int lane = 0; lane < kRow; ++lane) {
     const std::array<int, 3> cell{(c[0] - 1) * kRow + lane, c[1], c[2]};
     const Content inside = cell[0] < grid_.dims[0] ? content(cell) : nothing;
-    VoxelSprings springs;
-    if (inside != nothing) {
-      for (std::size_t d = 0; d < 3; ++d) {
-        std::array<int, 3> below = cell;
-        --below[d];
-        springs.up[d] = link(cell, static_cast<int>(d));
-        springs.down[d] = link(below, static_cast<int>(d));
-      }
-    }
-    if (inside != held) springs.set_inverse();
+    const VoxelSprings springs = springs_by_links(cell, inside);
     int below = 0;
     for (int corner = 0; inside != nothing && corner < 8; ++corner) {
       const std::array<int, 3> fine{2 * cell[0] + (corner & 1), 2 * cell[1] + (corner >> 1 & 1),
@@ -325,10 +322,35 @@ void Couplings::write_cells(RowId row, Written& out, LaneBits& stands) const noe
   }
 }
 
+VoxelSprings Couplings::springs_by_links(const std::array<int, 3>& cell, Content inside) const noexcept {
+  VoxelSprings springs;
+  if (inside == nothing) return springs;
+  for (std::size_t d = 0; d < 3; ++d) {
+    std::array<int, 3> below = cell;
+    --below[d];
+    springs.up[d] = link(cell, static_cast<int>(d));
+    springs.down[d] = link(below, static_cast<int>(d));
+  }
+  if (inside != held) springs.set_inverse();
+  return springs;
+}
+
 VoxelSprings Couplings::springs_of(VoxelId cell) noexcept {
+  return prepare(cell / kRow) ? known_springs(cell) : VoxelSprings{};
+}
+
+VoxelSprings Couplings::find_springs(VoxelId cell) const noexcept {
+  const Kind kind = static_cast<Kind>(kind_[cell / kRow]);
+  if (kind == empty) return {};
+  if (kind != unknown) return known_springs(cell);
+  if (level_ == 0) return lattice_.springs_of(cell);
+  const std::array<int, 3> at = grid_.coordinates(cell);
+  return springs_by_links(at, content(at));
+}
+
+VoxelSprings Couplings::known_springs(VoxelId cell) const noexcept {
   VoxelSprings out;
   const RowId row = cell / kRow;
-  if (!prepare(row)) return out;
   if (kind_[row] == one_label) {
     const Constant& c = *constant_[label_[row]];
     for (std::size_t d = 0; d < 3; ++d) {
@@ -375,9 +397,12 @@ const float* Couplings::filled(RowId row) const noexcept {
 }
 
 std::size_t Couplings::memory_bytes() const {
-  return kind_.resident_bytes() + label_.resident_bytes() + content_.resident_bytes() +
-         written_at_.resident_bytes() + written_count_ * (sizeof(Written) + sizeof(LaneBits)) +
-         (written_limits_.size() > 0 ? written_count_ * sizeof(RowLimits::Written) : 0);
+  std::size_t bytes = sizeof(*this) + kind_.resident_bytes() + label_.resident_bytes() +
+                      content_.resident_bytes() + written_at_.resident_bytes() + written_.resident_bytes() +
+                      written_stands_.resident_bytes() + written_limits_.resident_bytes();
+  for (const auto& links : link_) bytes += links.resident_bytes();
+  for (const auto& constant : constant_) bytes += constant != nullptr ? sizeof(Constant) : 0;
+  return bytes;
 }
 
 }  // namespace voxel

@@ -4,7 +4,8 @@
 // Level 0 is the lattice; a cell of level l stands for 2×2×2 cells of the level below it. A coarse link is as
 // many fine links side by side as cross the face between its two cells, each 2^l times as long: half the sum
 // of the four of the level below. Rows inside a region of one label share one set of constants; any other row
-// has its springs written out when it is first asked for. So untouched tissue costs nothing, on any level.
+// has its springs written out when it is first asked for. So untouched tissue costs nothing: what is kept of
+// it from the start is the links of coarse levels alone, a few hundredths of a byte a voxel.
 #pragma once
 
 #include <array>
@@ -67,6 +68,11 @@ struct RowLimits {
 
 class Couplings {
  public:
+  // The first level whose links and contents are kept for all cells. To find one of its rows from those below
+  // took a millisecond where tissues mix; written out as inner loops want them (2.2 kB a row), they took four
+  // times as much memory.
+  static constexpr int kKept = 3;
+
   // `finer`: the level below, kept by the caller; none for level 0.
   Couplings(const Lattice& lattice, const Couplings* finer);
 
@@ -122,6 +128,12 @@ class Couplings {
   [[nodiscard]] RowLimits limits(RowId row) const noexcept;
   // Those of one voxel or cell, on all axes; a few loads once its row was prepared, which it sees to.
   [[nodiscard]] VoxelSprings springs_of(VoxelId cell) noexcept;
+  // The same to the last bit, and nothing is written out for it: slower where nobody prepared its row.
+  [[nodiscard]] VoxelSprings find_springs(VoxelId cell) const noexcept;
+  // Is there a voxel in this cell of the grid?
+  [[nodiscard]] bool holds_any(const std::array<int, 3>& cell) const noexcept {
+    return content(cell) != nothing;
+  }
   [[nodiscard]] const Lattice& lattice() const { return lattice_; }
   // 1 where there is a cell, 0 elsewhere; of a prepared row.
   [[nodiscard]] const float* filled(RowId row) const noexcept;
@@ -148,16 +160,22 @@ class Couplings {
   void write_voxels(RowId row, Written& out, LaneBits& stands) const noexcept;
   void write_limits(RowId row, RowLimits::Written& out) const noexcept;
   void write_cells(RowId row, Written& out, LaneBits& stands) const noexcept;
+  void keep_cells();
   [[nodiscard]] Spring link(const std::array<int, 3>& cell, int d) const noexcept;
+  [[nodiscard]] Spring link_from_finer(const std::array<int, 3>& cell, int d) const noexcept;
   [[nodiscard]] Content content(const std::array<int, 3>& cell) const noexcept;
+  [[nodiscard]] Content content_from_finer(const std::array<int, 3>& cell) const noexcept;
+  [[nodiscard]] VoxelSprings springs_by_links(const std::array<int, 3>& cell, Content inside) const noexcept;
+  [[nodiscard]] VoxelSprings known_springs(VoxelId cell) const noexcept;
 
   const Lattice& lattice_;
   const Couplings* finer_;
   int level_;
   Grid grid_;
-  LazyArray<std::uint8_t> kind_, label_;  // [row]
-  LazyArray<std::uint8_t> content_;       // [cell], from level 2 on; found on the fly below
-  LazyArray<std::uint32_t> written_at_;   // [row] into written_
+  LazyArray<std::uint8_t> kind_, label_;   // [row]
+  LazyArray<std::uint8_t> content_;        // [cell], from kKept on; found on the fly below
+  std::array<LazyArray<Spring>, 3> link_;  // [d][cell], likewise: to its upper neighbour
+  LazyArray<std::uint32_t> written_at_;    // [row] into written_
   LazyArray<Written> written_;
   // As written_, and apart from it: corrections read no more than this, and what they read stands together.
   // (In there, to wait for it was a third of what it took to add a result.)

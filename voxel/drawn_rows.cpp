@@ -14,13 +14,10 @@ namespace {
 // Lanes of a row whose voxels are not there, are anchored, or are moved by somebody else.
 std::uint32_t staying(const Lattice& lattice, const Displacement& state, RowId row) {
   const std::size_t first = static_cast<std::size_t>(row) * kRow;
-  const std::uint8_t *label = lattice.labels(row), *anchored = lattice.anchors(row),
-                     *role = state.role.data() + first;
-  std::uint32_t bits = 0;
-  for (std::size_t i = 0; i < kRow; ++i) {
-    const bool stays = label[i] == 0 || anchored[i] != 0 || role[i] != Displacement::free;
-    bits |= static_cast<std::uint32_t>(stays) << i;
-  }
+  const std::uint8_t* role = state.role.data() + first;
+  std::uint32_t bits = ~lattice.filled_lanes(row) | lattice.anchored_lanes(row);
+  for (std::size_t i = 0; i < kRow; ++i)
+    bits |= static_cast<std::uint32_t>(role[i] != Displacement::free) << i;
   return bits;
 }
 

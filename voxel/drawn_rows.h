@@ -36,7 +36,7 @@ class DrawnRows {
   void draw(Relaxation& relaxation, Displacement& state, std::span<const VoxelId> roots, float stir) noexcept;
 
   [[nodiscard]] std::size_t memory_bytes() const {
-    return entry_.resident_bytes() + rows_.capacity() * sizeof(Row) + drawn_.capacity() * sizeof(VoxelId);
+    return entry_.resident_bytes() + resident_bytes(rows_) + resident_bytes(drawn_);
   }
 
  private:
@@ -72,7 +72,7 @@ class DrawnRows {
   Displacement* state_ = nullptr;
   float stir_ = 0.0F;
   LazyArray<std::uint16_t> entry_;  // [row] 1 + index into rows_; 0: not looked at
-  std::vector<Row> rows_;
+  LazyVector<Row> rows_;
   std::vector<VoxelId> drawn_;  // the roots first
 };
 

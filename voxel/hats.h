@@ -24,6 +24,10 @@ class Hats {
   // For any box of this grid, the finer of two.
   explicit Hats(const Grid& fine);
 
+  [[nodiscard]] std::size_t memory_bytes() const {
+    return cells_.resident_bytes() + lanes_of_.resident_bytes() + resident_bytes(spread_);
+  }
+
   // Coarse octets first … last along x, and coarse rows j0 … j1 of every plane.
   void begin(int first, int last, int j0, int j1) noexcept;
   [[nodiscard]] int first() const { return first_; }

@@ -2,6 +2,7 @@
 #include "voxel/holds.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdlib>
 
@@ -29,6 +30,21 @@ Spring to_sibling(const VoxelSprings& springs, const std::array<int, 3>& child, 
   return (child[d] & 1) != 0 ? springs.down[d] : springs.up[d];
 }
 
+bool stands(const VoxelSprings& springs) {
+  return springs.inverse == std::array<float, 3>{};
+}
+
+// Lanes of a row of the next coarser level, of its first half.
+std::uint32_t lanes_above(std::uint32_t lanes) {
+  std::uint32_t out = 0;
+  for (std::uint32_t rest = lanes; rest != 0;) {
+    const int pair = std::countr_zero(rest) / 2;
+    out |= 1U << pair;
+    rest &= ~(3U << 2 * pair);
+  }
+  return out;
+}
+
 }  // namespace
 
 Holds::Holds(const Lattice& lattice, const std::vector<Couplings*>& levels)
@@ -50,17 +66,142 @@ Holds::Holds(const Lattice& lattice, const std::vector<Couplings*>& levels)
       level.nearer[axis] = LazyArray<float>(g.size());
     }
     for (auto& pair : level.tilt) pair = LazyArray<float>(g.size());
-    level.row_held = LazyArray<std::uint16_t>(g.rows());
-    level.row_tilted = LazyArray<std::uint16_t>(g.rows());
+    level.row_held = LazyArray<std::uint8_t>(g.rows());
+    level.row_tilted = LazyArray<std::uint8_t>(g.rows());
     level.queued = LazyArray<std::uint8_t>(g.size());
+    level.found = LazyArray<std::uint32_t>(g.rows());
   }
-  for (RowId row = 0; row < lattice.grid().rows(); ++row) {
-    if (lattice.filled_in(row) == 0) continue;
-    for (VoxelId v = row * kRow; v < (row + 1) * kRow; ++v) {
-      if (lattice.filled(v) && lattice.anchored(v)) look_at(v);
+  wait_for_anchors();
+}
+
+// Rows with a cell that anchors may hold, on each level.
+void Holds::wait_for_anchors() {
+  const auto above = [this](int level, RowId row) {
+    const std::array<int, 3> c = at(level - 1).couplings->grid().row_coordinates(row);
+    at(level).row_held[at(level).couplings->grid().row((c[0] - 1) / 2 + 1, c[1] / 2, c[2] / 2)] |= kWaits;
+  };
+  const Grid& g = lattice_.grid();
+  for (RowId row = 0; row < g.rows(); ++row) {
+    if (lattice_.anchored_lanes(row) == 0) continue;
+    above(1, row);
+    for (const RowId beside :
+         {row - 1, row + 1, row - g.row_z, row + g.row_z, row - g.row_x, row + g.row_x}) {
+      if (lattice_.filled_in(beside) != 0) above(1, beside);
     }
   }
-  renew();
+  for (int level = 1; level < static_cast<int>(levels_.size()); ++level) {
+    for (RowId row = 0; row < at(level).couplings->grid().rows(); ++row) {
+      if (level + 1 < static_cast<int>(levels_.size()) && at(level).row_held[row] != 0) above(level + 1, row);
+    }
+    if (level >= Couplings::kKept) keep_records(level);
+  }
+}
+
+void Holds::keep_records(int level) {
+  Level& l = at(level);
+  for (RowId row = 0; row < l.couplings->grid().rows(); ++row) {
+    if (l.row_held[row] == 0) continue;
+    for (std::uint32_t lanes = cells_at_anchors(level, row); lanes != 0; lanes &= lanes - 1) {
+      const auto cell = static_cast<VoxelId>(row * kRow + static_cast<RowId>(std::countr_zero(lanes)));
+      Found found;
+      Axes all{};
+      find_above(level, cell, found, all);
+      unsigned which = 0;
+      const auto first = static_cast<std::uint32_t>(l.values.size());
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        for (std::size_t d = 0; d < 3; ++d) {
+          if (found.through[axis][d] == 0.0F) continue;
+          which |= 1U << (3 * axis + d);
+          l.values.push_back(found.through[axis][d]);
+        }
+        which |= all[axis] ? 1U << (9 + axis) : 0U;
+      }
+      l.records.push_back({cell, first, static_cast<std::uint16_t>(which)});
+    }
+  }
+  l.records.shrink_to_fit();
+  l.values.shrink_to_fit();
+}
+
+// Lanes of voxels that are anchored or linked to one that is.
+std::uint32_t Holds::voxels_at_anchors(RowId row) const noexcept {
+  const Grid& g = lattice_.grid();
+  const std::uint32_t filled = lattice_.filled_lanes(row), own = lattice_.anchored_lanes(row);
+  if (filled == 0) return 0;
+  std::uint32_t lanes = own | own << 1U | own >> 1U;
+  for (const RowId beside : {row - 1, row + 1, row - g.row_z, row + g.row_z})
+    lanes |= lattice_.anchored_lanes(beside);
+  lanes |= lattice_.anchored_lanes(row - g.row_x) >> (kRow - 1);
+  lanes |= lattice_.anchored_lanes(row + g.row_x) << (kRow - 1);
+  return lanes & filled;
+}
+
+// Lanes of the cells of a row that hold such a voxel.
+std::uint32_t Holds::cells_at_anchors(int level, RowId row) const noexcept {
+  const Grid& finer = at(level - 1).couplings->grid();
+  const std::array<int, 3> c = at(level).couplings->grid().row_coordinates(row);
+  std::uint32_t lanes = 0;
+  for (int child = 0; child < 8; ++child) {
+    const int half = child & 1, j = 2 * c[1] + (child >> 1 & 1), k = 2 * c[2] + (child >> 2);
+    const int column = 2 * (c[0] - 1) + 1 + half;
+    if (column + 1 >= finer.columns || j >= finer.dims[1] || k >= finer.dims[2]) continue;
+    const RowId below = finer.row(column, j, k);
+    std::uint32_t cells = 0;
+    if (level > Couplings::kKept) {
+      for (const Record& record : records_in(level - 1, below)) cells |= 1U << record.cell % kRow;
+    } else {
+      cells = level == 1 ? voxels_at_anchors(below) : cells_at_anchors(level - 1, below);
+    }
+    lanes |= lanes_above(cells) << (half * kRow / 2);
+  }
+  return lanes;
+}
+
+std::span<const Holds::Record> Holds::records_in(int level, RowId row) const noexcept {
+  const std::vector<Record>& records = at(level).records;
+  const auto from = [&records](VoxelId cell) {
+    return std::lower_bound(records.begin(), records.end(), cell,
+                            [](const Record& r, VoxelId c) { return r.cell < c; });
+  };
+  return {from(row * kRow), from((row + 1) * kRow)};
+}
+
+Holds::Found Holds::recorded(int level, const Record& record) const noexcept {
+  Found found;
+  Axes all{};
+  const float* value = at(level).values.data() + record.first;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (std::size_t d = 0; d < 3; ++d) {
+      if ((record.which >> (3 * axis + d) & 1U) != 0) found.through[axis][d] = *value++;
+    }
+    all[axis] = (record.which >> (9 + axis) & 1U) != 0;
+  }
+  complete(level, record.cell, all, found);
+  return found;
+}
+
+// Of a cell that waits.
+Holds::Found Holds::waiting(int level, VoxelId cell) const noexcept {
+  if (level < Couplings::kKept) return find(level, cell);
+  for (const Record& record : records_in(level, cell / kRow)) {
+    if (record.cell == cell) return recorded(level, record);
+  }
+  return {};
+}
+
+void Holds::find_waiting(int level, RowId row) noexcept {
+  Level& l = at(level);
+  if (level >= Couplings::kKept) {
+    for (const Record& record : records_in(level, row)) {
+      if (waits(level, record.cell)) set(level, record.cell, recorded(level, record));
+    }
+  } else {
+    for (std::uint32_t lanes = cells_at_anchors(level, row) & ~l.found[row]; lanes != 0; lanes &= lanes - 1) {
+      const auto cell = static_cast<VoxelId>(row * kRow + static_cast<RowId>(std::countr_zero(lanes)));
+      set(level, cell, find(level, cell));
+    }
+  }
+  l.row_held[row] &= static_cast<std::uint8_t>(~kWaits);
 }
 
 void Holds::queue(int level, VoxelId cell) noexcept {
@@ -125,7 +266,7 @@ void Holds::renew() noexcept {
     auto& cells = queue_[static_cast<std::size_t>(level & 1)];
     for (const VoxelId cell : cells) {
       at(level).queued[cell] = 0;
-      level == 1 ? renew_first(cell) : renew_above(level, cell);
+      renew(level, cell);
       if (level == last) continue;
       const std::array<int, 3> c = at(level).couplings->grid().coordinates(cell);
       queue(level + 1, at(level + 1).couplings->grid().at(c[0] / 2, c[1] / 2, c[2] / 2));
@@ -172,21 +313,72 @@ Kept kept_by(const Holds::Support& own, const Holds::Support& other) {
 
 }  // namespace
 
+void Holds::renew(int level, VoxelId cell) noexcept {
+  // What is below it is kept from now on: a tool that moves asks for it again and again.
+  if (level > 1) {
+    const Level& finer = at(level - 1);
+    for_children(finer.couplings->grid(), at(level).couplings->grid().coordinates(cell),
+                 [&](VoxelId w, const std::array<int, 3>&) {
+                   if (!waits(level - 1, w) || stands(finer.couplings->find_springs(w))) return;
+                   if (level - 1 >= Couplings::kKept) {
+                     set(level - 1, w, waiting(level - 1, w));
+                   } else {
+                     renew(level - 1, w);
+                   }
+                 });
+  }
+  set(level, cell, find(level, cell));
+}
+
+Holds::Found Holds::find(int level, VoxelId cell) const noexcept {
+  Found found;
+  Axes all{};
+  level == 1 ? find_first(cell, found, all) : find_above(level, cell, found, all);
+  complete(level, cell, all, found);
+  return found;
+}
+
+void Holds::complete(int level, VoxelId cell, const Axes& all, Found& found) const noexcept {
+  const Couplings& couplings = *at(level).couplings;
+  const std::array<int, 3> place = couplings.grid().coordinates(cell);
+  const VoxelSprings own = couplings.find_springs(cell);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    float sum = 0.0F;
+    for (std::size_t d = 0; d < 3; ++d) {
+      sum += found.through[axis][d];
+      const float k = to_sibling(own, place, d).on(static_cast<int>(axis), static_cast<int>(d));
+      if (k > 0.0F) found.nearer[axis] += found.through[axis][d] / (2.0F * k);
+    }
+    found.hold[axis] = all[axis] ? kImmovable : std::min(sum * own.inverse[axis], kImmovable);
+  }
+}
+
+Holds::Found Holds::known(int level, VoxelId cell) const noexcept {
+  const Level& l = at(level);
+  Found out;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (std::size_t d = 0; d < 3; ++d) out.through[axis][d] = l.through[axis][d][cell];
+    out.hold[axis] = l.hold[axis][cell];
+    out.tilt[axis] = l.tilt[axis][cell];
+  }
+  return out;
+}
+
 // Voxels of a cell that are free, by their links to others that are not: in the same cell, these are half a
 // link from its middle.
-void Holds::renew_first(VoxelId cell) noexcept {
+void Holds::find_first(VoxelId cell, Found& found, Axes& all) const noexcept {
   const Grid& g = lattice_.grid();
-  Couplings& couplings = *at(0).couplings;
+  const Couplings& couplings = *at(0).couplings;
   const std::array<int, 3> place = at(1).couplings->grid().coordinates(cell);
-  Through through{};
-  std::array<float, 3> tilt{}, all_along{}, all_across{};
+  Through& through = found.through;
+  std::array<float, 3>& tilt = found.tilt;
+  std::array<float, 3> all_along{}, all_across{};
   std::array<int, 3> held{};
   int count = 0, supported = 0;
   for_children(g, place, [&](VoxelId v, const std::array<int, 3>& c) {
     if (!lattice_.filled(v)) return;
     ++count;
     const Support own = support_of(v);
-    const VoxelSprings springs = couplings.springs_of(v);
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const bool stays =
           own.by == Support::By::all || (own.by == Support::By::normal && std::abs(own.n[axis]) == kUnit);
@@ -194,6 +386,7 @@ void Holds::renew_first(VoxelId cell) noexcept {
     }
     supported += own.by == Support::By::nothing ? 0 : 1;
     if (own.by == Support::By::all) return;
+    const VoxelSprings springs = couplings.find_springs(v);
     if (own.by == Support::By::normal) {
       constexpr float unit = 1.0F / (kUnit * kUnit);
       const auto k = [&springs](std::size_t axis) {
@@ -227,30 +420,34 @@ void Holds::renew_first(VoxelId cell) noexcept {
     for (std::size_t axis = 0; axis < 3; ++axis) through[axis][axis] += kAllSlide * all_along[axis];
     for (std::size_t p = 0; p < 3; ++p) tilt[p] += kAllSlide * all_across[p];
   }
-  set(1, cell, place, through, tilt, {held[0] == count, held[1] == count, held[2] == count});
+  for (std::size_t axis = 0; axis < 3; ++axis) all[axis] = held[axis] == count;
 }
 
-void Holds::renew_above(int level, VoxelId cell) noexcept {
-  Level& finer = at(level - 1);
+void Holds::find_above(int level, VoxelId cell, Found& found, Axes& all) const noexcept {
+  const Level& finer = at(level - 1);
   const std::array<int, 3> place = at(level).couplings->grid().coordinates(cell);
   const auto size = static_cast<float>(1 << level);
-  Through through{};
-  std::array<float, 3> tilt{};
+  Through& through = found.through;
+  std::array<float, 3>& tilt = found.tilt;
   std::array<int, 3> held{};
   int count = 0;
   for_children(finer.couplings->grid(), place, [&](VoxelId w, const std::array<int, 3>& c) {
-    if (!finer.couplings->prepare(w / kRow) || finer.couplings->filled(w / kRow)[w % kRow] == 0.0F) return;
+    if (!finer.couplings->holds_any(c)) return;
     ++count;
-    const VoxelSprings springs = finer.couplings->springs_of(w);
+    const VoxelSprings springs = finer.couplings->find_springs(w);
+    // What stands does so whatever holds it.
+    const Found child = stands(springs)       ? Found{}
+                        : waits(level - 1, w) ? waiting(level - 1, w)
+                                              : known(level - 1, w);
     std::array<float, 3> passed{};  // of what holds the child, that part holds this one
     for (std::size_t axis = 0; axis < 3; ++axis) {
       float before = 0.0F, after = 0.0F;
-      const bool all = springs.inverse[axis] == 0.0F || finer.hold[axis][w] == kImmovable;
-      held[axis] += all ? 1 : 0;
+      const bool stays = springs.inverse[axis] == 0.0F || child.hold[axis] == kImmovable;
+      held[axis] += stays ? 1 : 0;
       for (std::size_t d = 0; d < 3; ++d) {
         const float k = to_sibling(springs, c, d).on(static_cast<int>(axis), static_cast<int>(d));
-        const float own = finer.through[axis][d][w];
-        if (all) {  // up to the middle of this one, but for half a voxel
+        const float own = child.through[axis][d];
+        if (stays) {  // up to the middle of this one, but for half a voxel
           through[axis][d] += size * k;
         } else if (own > 0.0F) {
           const float series = k > 0.0F ? 2.0F * k * own / (2.0F * k + own) : own;
@@ -262,37 +459,30 @@ void Holds::renew_above(int level, VoxelId cell) noexcept {
       if (before > 0.0F) passed[axis] = after / before;
     }
     for (std::size_t p = 0; p < 3; ++p) {
-      if (finer.tilt[p][w] != 0.0F)
-        tilt[p] += finer.tilt[p][w] * std::sqrt(passed[kPairs[p][0]] * passed[kPairs[p][1]]);
+      if (child.tilt[p] != 0.0F)
+        tilt[p] += child.tilt[p] * std::sqrt(passed[kPairs[p][0]] * passed[kPairs[p][1]]);
     }
   });
-  set(level, cell, place, through, tilt, {held[0] == count, held[1] == count, held[2] == count});
+  for (std::size_t axis = 0; axis < 3; ++axis) all[axis] = held[axis] == count;
 }
 
-void Holds::set(int level, VoxelId cell, const std::array<int, 3>& place, const Through& through,
-                const std::array<float, 3>& tilt, const std::array<bool, 3>& immovable) noexcept {
+void Holds::set(int level, VoxelId cell, const Found& found) noexcept {
   Level& l = at(level);
-  const VoxelSprings own = l.couplings->springs_of(cell);
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    float sum = 0.0F, nearer = 0.0F;
-    for (std::size_t d = 0; d < 3; ++d) {
-      l.through[axis][d][cell] = through[axis][d];
-      sum += through[axis][d];
-      const float k = to_sibling(own, place, d).on(static_cast<int>(axis), static_cast<int>(d));
-      if (k > 0.0F) nearer += through[axis][d] / (2.0F * k);
-    }
-    const float hold = immovable[axis] ? kImmovable : std::min(sum * own.inverse[axis], kImmovable);
-    float& now = l.hold[axis][cell];
-    if ((now != 0.0F) != (hold != 0.0F)) l.row_held[cell / kRow] += hold != 0.0F ? 1 : -1;
-    now = hold;
-    l.nearer[axis][cell] = nearer;
+    for (std::size_t d = 0; d < 3; ++d) l.through[axis][d][cell] = found.through[axis][d];
+    float& hold = l.hold[axis][cell];
+    if ((hold != 0.0F) != (found.hold[axis] != 0.0F))
+      l.row_held[cell / kRow] += found.hold[axis] != 0.0F ? 1 : -1;
+    hold = found.hold[axis];
+    l.nearer[axis][cell] = found.nearer[axis];
   }
-  const bool was = this->tilt(level, cell) != std::array<float, 3>{}, is = tilt != std::array<float, 3>{};
+  const bool was = tilt(level, cell) != std::array<float, 3>{}, is = found.tilt != std::array<float, 3>{};
   if (is != was) l.row_tilted[cell / kRow] += is ? 1 : -1;
-  for (std::size_t p = 0; p < 3 && (is || was); ++p) l.tilt[p][cell] = tilt[p];
+  for (std::size_t p = 0; p < 3 && (is || was); ++p) l.tilt[p][cell] = found.tilt[p];
+  if ((l.row_held[cell / kRow] & kWaits) != 0) l.found[cell / kRow] |= 1U << cell % kRow;
 }
 
-void Holds::populate() noexcept {
+void Holds::prepare_all() noexcept {
   held_mark_.populate();
   supported_.populate();
   for (Level& l : levels_) {
@@ -304,14 +494,20 @@ void Holds::populate() noexcept {
       l.nearer[axis].populate();
     }
   }
+  for (int level = 1; level < static_cast<int>(levels_.size()); ++level) {
+    for (RowId row = 0; row < at(level).couplings->grid().rows(); ++row) {
+      if ((at(level).row_held[row] & kWaits) != 0) find_waiting(level, row);
+    }
+  }
 }
 
 std::size_t Holds::memory_bytes() const {
-  std::size_t bytes = held_.capacity() * sizeof(VoxelId) + held_mark_.resident_bytes() +
+  std::size_t bytes = sizeof(*this) + resident_bytes(held_) + held_mark_.resident_bytes() +
                       supported_.resident_bytes() + row_supported_.resident_bytes();
-  for (const auto& cells : queue_) bytes += cells.capacity() * sizeof(VoxelId);
+  for (const auto& cells : queue_) bytes += resident_bytes(cells);
   for (const Level& l : levels_) {
-    bytes += l.row_held.resident_bytes() + l.row_tilted.resident_bytes() + l.queued.resident_bytes();
+    bytes += l.row_held.resident_bytes() + l.row_tilted.resident_bytes() + l.queued.resident_bytes() +
+             l.found.resident_bytes() + resident_bytes(l.records) + resident_bytes(l.values);
     for (const auto& pair : l.tilt) bytes += pair.resident_bytes();
     for (std::size_t axis = 0; axis < 3; ++axis) {
       for (const auto& d : l.through[axis]) bytes += d.resident_bytes();

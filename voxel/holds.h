@@ -50,7 +50,12 @@ class Holds {
   void renew() noexcept;
 
   // ---- of coarse rows ----
-  [[nodiscard]] bool any(int level, RowId row) const { return at(level).row_held[row] != 0; }
+  // Is any cell of the row held? Ask it before what follows: what anchors hold on fine levels is found when
+  // it is first asked for.
+  [[nodiscard]] bool any(int level, RowId row) noexcept {
+    if ((at(level).row_held[row] & kWaits) != 0) find_waiting(level, row);
+    return at(level).row_held[row] != 0;
+  }
   // [lane] by a spring so many times as stiff as all springs of the cell.
   [[nodiscard]] const float* hold(int level, RowId row, std::size_t axis) const {
     return at(level).hold[axis].data() + static_cast<std::size_t>(row) * kRow;
@@ -70,41 +75,80 @@ class Holds {
     const Level& l = at(level);
     return {l.tilt[0][cell], l.tilt[1][cell], l.tilt[2][cell]};
   }
-  // Takes all memory now, not when a tick first needs it.
-  void populate() noexcept;
+  // Takes all memory, and finds what waits, now, not when a tick first needs it.
+  void prepare_all() noexcept;
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
   using Through = std::array<std::array<float, 3>, 3>;  // [axis][d] a spring, of links in d (N/m)
+  // What anchors hold waits until somebody asks for its row: found for all cells, it took a quarter of what
+  // the labels take above an anchored face, and forty times as much as the labels where a fifth of an object
+  // is bone. On coarse levels, where it takes long to find, it is found on construction and kept as what of
+  // it is not 0: most anchors hold a cell by links in one direction.
+  struct Record {
+    VoxelId cell;
+    std::uint32_t first;  // of its values
+    std::uint16_t which;  // bit 3·axis + d: through; bit 9 + axis: all of it is held
+  };
   struct Level {
     Couplings* couplings = nullptr;
     std::array<std::array<LazyArray<float>, 3>, 3> through;  // [axis][d][cell]
     std::array<LazyArray<float>, 3> hold, nearer;            // [axis][cell]
-    LazyArray<std::uint16_t> row_held;                       // [row] how many of these are not 0
+    LazyArray<std::uint8_t> row_held;                        // [row] how many of these are not 0, and kWaits
     std::array<LazyArray<float>, 3> tilt;                    // [xy, xz, yz][cell]
-    LazyArray<std::uint16_t> row_tilted;                     // [row] cells with any
+    LazyArray<std::uint8_t> row_tilted;                      // [row] cells with any
     LazyArray<std::uint8_t> queued;                          // [cell] 1: it is in its queue
+    LazyArray<std::uint32_t> found;  // [row] lanes of a row that waits that do not any more
+    // From Couplings::kKept on, of the cells that wait or did, in their order.
+    std::vector<Record> records;
+    std::vector<float> values;
   };
+  static constexpr std::uint8_t kWaits = 0x80;
+
+  struct Found {  // of a cell; as in Level
+    Through through{};
+    std::array<float, 3> hold{}, nearer{}, tilt{};
+  };
+  using Axes = std::array<bool, 3>;
 
   [[nodiscard]] Level& at(int level) { return levels_[static_cast<std::size_t>(level)]; }
   [[nodiscard]] const Level& at(int level) const { return levels_[static_cast<std::size_t>(level)]; }
   [[nodiscard]] Support support_of(VoxelId v) const noexcept {
     return held_mark_[v] != 0 || lattice_.anchored(v) ? kAll : supported_[v];
   }
+  // ---- what anchors hold ----
+  void wait_for_anchors();
+  void keep_records(int level);
+  void find_waiting(int level, RowId row) noexcept;
+  [[nodiscard]] bool waits(int level, VoxelId cell) const noexcept {
+    const Level& l = at(level);
+    const RowId row = cell / kRow;
+    return (l.row_held[row] & kWaits) != 0 && (l.found[row] >> cell % kRow & 1U) == 0;
+  }
+  [[nodiscard]] std::uint32_t cells_at_anchors(int level, RowId row) const noexcept;
+  [[nodiscard]] std::uint32_t voxels_at_anchors(RowId row) const noexcept;
+  [[nodiscard]] std::span<const Record> records_in(int level, RowId row) const noexcept;
+  [[nodiscard]] Found recorded(int level, const Record& record) const noexcept;
+  [[nodiscard]] Found waiting(int level, VoxelId cell) const noexcept;
+
   void look_at(VoxelId v) noexcept;
   void queue(int level, VoxelId cell) noexcept;
-  void renew_first(VoxelId cell) noexcept;
-  void renew_above(int level, VoxelId cell) noexcept;
-  void set(int level, VoxelId cell, const std::array<int, 3>& place, const Through& through,
-           const std::array<float, 3>& tilt, const std::array<bool, 3>& immovable) noexcept;
+  void renew(int level, VoxelId cell) noexcept;
+  [[nodiscard]] Found find(int level, VoxelId cell) const noexcept;
+  // `all`: the axes on which all of the cell is held. These find the springs, and complete() the rest.
+  void find_first(VoxelId cell, Found& found, Axes& all) const noexcept;
+  void find_above(int level, VoxelId cell, Found& found, Axes& all) const noexcept;
+  void complete(int level, VoxelId cell, const Axes& all, Found& found) const noexcept;
+  [[nodiscard]] Found known(int level, VoxelId cell) const noexcept;
+  void set(int level, VoxelId cell, const Found& found) noexcept;
 
   const Lattice& lattice_;
   std::vector<Level> levels_;
-  std::vector<VoxelId> held_;
-  LazyArray<std::uint8_t> held_mark_;          // [voxel]
-  LazyArray<Support> supported_;               // [voxel]
-  LazyArray<std::uint8_t> row_supported_;      // [row] 1: a voxel of it was
-  std::array<std::vector<VoxelId>, 2> queue_;  // cells of a level, and of the next, that are to be looked at
+  LazyVector<VoxelId> held_;
+  LazyArray<std::uint8_t> held_mark_;         // [voxel]
+  LazyArray<Support> supported_;              // [voxel]
+  LazyArray<std::uint8_t> row_supported_;     // [row] 1: a voxel of it was
+  std::array<LazyVector<VoxelId>, 2> queue_;  // cells of a level, and of the next, that are to be looked at
 };
 
 }  // namespace voxel

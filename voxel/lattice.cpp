@@ -11,7 +11,10 @@
 namespace voxel {
 namespace {
 
-constexpr std::size_t kSurfaceBlock = 64;  // ids between two entries of surface_before_
+// Ids between two entries of surface_before_: with 64 these took more memory than the surface itself, in a
+// full cube, and to find a voxel's number took no less time.
+constexpr std::size_t kSurfaceBlock = 256;
+constexpr std::size_t kGivenBack = std::size_t{1} << 24U;  // bytes of a volume, at a time
 constexpr std::size_t kMostCells = std::size_t{1} << 31;
 
 void check_material(std::size_t label, const LinkMaterial& m) {
@@ -32,7 +35,16 @@ void check_material(std::size_t label, const LinkMaterial& m) {
 
 }  // namespace
 
-Lattice::Lattice(const LabelVolume& volume, const LatticeOptions& options) : spacing_m_(volume.spacing_m) {
+Lattice::Lattice(const LabelVolume& volume, const LatticeOptions& options)
+    : Lattice(volume, options, nullptr) {}
+
+Lattice::Lattice(LabelVolume&& volume, const LatticeOptions& options)
+    : Lattice(volume, options, volume.labels.data()) {
+  volume.labels = {};
+}
+
+Lattice::Lattice(const LabelVolume& volume, const LatticeOptions& options, std::uint8_t* give_back)
+    : spacing_m_(volume.spacing_m) {
   for (int d = 0; d < 3; ++d) {
     if (!(spacing_m_[d] > 0.0) || !std::isfinite(spacing_m_[d])) {
       throw std::invalid_argument("the spacing of a soft object must be positive and finite");
@@ -40,7 +52,7 @@ Lattice::Lattice(const LabelVolume& volume, const LatticeOptions& options) : spa
   }
   min_spacing_m_ = std::min({spacing_m_.x, spacing_m_.y, spacing_m_.z});
   max_spacing_m_ = std::max({spacing_m_.x, spacing_m_.y, spacing_m_.z});
-  fill_labels(volume);
+  fill_labels(volume, give_back);
   fill_inside();
   fill_links(options);
   fill_force_scale();
@@ -48,7 +60,7 @@ Lattice::Lattice(const LabelVolume& volume, const LatticeOptions& options) : spa
   find_surface();
 }
 
-void Lattice::fill_labels(const LabelVolume& volume) {
+void Lattice::fill_labels(const LabelVolume& volume, std::uint8_t* give_back) {
   std::size_t expected = 1, cells = 1;
   for (const int n : volume.dims) {
     expected *= static_cast<std::size_t>(std::max(n, 0));
@@ -65,7 +77,8 @@ void Lattice::fill_labels(const LabelVolume& volume) {
     throw std::invalid_argument("a soft object without a voxel: check its labels or intensity range");
   grid_ = Grid(volume.dims);
   label_ = LazyArray<std::uint8_t>(grid_.size());
-  row_filled_ = LazyArray<std::uint8_t>(grid_.rows());
+  rows_ = LazyArray<std::uint8_t>(grid_.rows());
+  std::size_t given = 0;
   const std::array<std::uint8_t, kRow> nothing{};
   for (int k = 0; k < volume.dims[2]; ++k) {
     for (int j = 0; j < volume.dims[1]; ++j) {
@@ -76,9 +89,14 @@ void Lattice::fill_labels(const LabelVolume& volume) {
         if (std::memcmp(from, nothing.data(), count) == 0) continue;
         std::memcpy(label_.data() + grid_.at(i, j, k), from, count);
         const auto filled = count - static_cast<std::size_t>(std::count(from, from + count, std::uint8_t{0}));
-        row_filled_[grid_.at(i, j, k) / kRow] = static_cast<std::uint8_t>(filled);
+        rows_[grid_.at(i, j, k) / kRow] = static_cast<std::uint8_t>(filled);
         voxel_count_ += filled;
       }
+    }
+    const std::size_t read = volume.index(0, 0, k + 1);
+    if (give_back != nullptr && (read - given >= kGivenBack || k + 1 == volume.dims[2])) {
+      voxel::give_back(give_back + given, read - given);
+      given = read;
     }
   }
   if (voxel_count_ == 0) {
@@ -89,7 +107,7 @@ void Lattice::fill_labels(const LabelVolume& volume) {
 void Lattice::fill_links(const LatticeOptions& options) {
   std::array<bool, 256> used{};
   for (RowId row = 0; row < grid_.rows(); ++row) {
-    if (row_filled_[row] == 0) continue;
+    if (filled_in(row) == 0) continue;
     const std::uint8_t* at = labels(row);
     for (int i = 0; i < kRow; ++i) used[at[i]] = true;
   }
@@ -155,10 +173,9 @@ void Lattice::fill_links(const LatticeOptions& options) {
 
 // Which rows are inside a region of one label.
 void Lattice::fill_inside() {
-  inside_ = LazyArray<std::uint8_t>(grid_.rows());
   LazyArray<std::uint8_t> whole(grid_.rows());  // label of a row that is all of one
   for (RowId row = 0; row < grid_.rows(); ++row) {
-    if (row_filled_[row] != kRow) continue;
+    if (filled_in(row) != kRow) continue;
     const std::uint8_t* at = labels(row);
     if (std::count(at, at + kRow, at[0]) == kRow) whole[row] = at[0];
   }
@@ -173,14 +190,14 @@ void Lattice::fill_inside() {
                label_[grid_.up(first + kRow - 1, 0)] == own;
       }
     }
-    if (same) inside_[row] = own;
+    if (same) rows_[row] = kInside;
   }
 }
 
 void Lattice::fill_force_scale() {
   std::vector<std::size_t> count(3 * material_count_ * material_count_);  // links by direction and materials
   for (RowId row = 0; row < grid_.rows(); ++row) {
-    if (row_filled_[row] == 0) continue;
+    if (filled_in(row) == 0) continue;
     const std::uint8_t* at = labels(row);
     for (int i = 0; i < kRow; ++i) {
       if (at[i] == 0) continue;
@@ -222,7 +239,7 @@ Spring Lattice::spring_among(const std::array<std::uint8_t, 9>& from, const std:
 }
 
 Spring Lattice::spring(VoxelId v, int d) const noexcept {
-  const std::uint8_t within = inside_[v / kRow];
+  const std::uint8_t within = inside(v / kRow);
   if (within != 0) return spring_within(within, d);
   const VoxelId w = grid_.up(v, d);
   if (label_[v] == 0 || label_[w] == 0) return {};
@@ -251,14 +268,14 @@ VoxelSprings Lattice::springs_of(VoxelId v) const noexcept {
 }
 
 void Lattice::fill_anchors(const LabelVolume& volume, const LatticeOptions& options) {
-  anchored_ = LazyArray<std::uint8_t>(grid_.size());
+  LazyArray<std::uint32_t> lanes(grid_.rows());  // of each row, those that are anchored
   // The outermost voxels on a side are those in the outermost occupied layer of the lattice.
   std::array<int, 3> low = grid_.dims, high{-1, -1, -1};
   std::array<bool, 256> by_label{};
   for (const std::uint8_t label : options.anchor_labels) by_label[label] = true;
   const auto for_each_voxel = [this](const auto& visit) {
     for (RowId row = 0; row < grid_.rows(); ++row) {
-      if (row_filled_[row] == 0) continue;
+      if (filled_in(row) == 0) continue;
       const std::array<int, 3> c = grid_.row_coordinates(row);
       for (int i = 0; i < kRow; ++i) {
         const VoxelId v = row * kRow + static_cast<VoxelId>(i);
@@ -284,9 +301,10 @@ void Lattice::fill_anchors(const LabelVolume& volume, const LatticeOptions& opti
     const auto d = static_cast<std::size_t>(face[1] - 'x');
     faces.push_back({d, face[0] == '-' ? low[d] : high[d]});
   }
-  const auto anchor = [this](VoxelId v) {
-    anchored_count_ += anchored_[v] == 0 ? 1 : 0;
-    anchored_[v] = 1;
+  const auto anchor = [this, &lanes](VoxelId v) {
+    const std::uint32_t bit = 1U << v % kRow;
+    anchored_count_ += (lanes[v / kRow] & bit) == 0 ? 1 : 0;
+    lanes[v / kRow] |= bit;
   };
   for_each_voxel([&](VoxelId v, const std::array<int, 3>& c) {
     const bool on_face =
@@ -305,6 +323,35 @@ void Lattice::fill_anchors(const LabelVolume& volume, const LatticeOptions& opti
     throw std::invalid_argument(
         "a free soft object has no equilibrium force: anchor a face, a label, or what touches bone");
   }
+  list_anchors(lanes);
+}
+
+void Lattice::list_anchors(const LazyArray<std::uint32_t>& lanes) {
+  listed_before_.assign(grid_.rows() / kListBlock + 1, 0);
+  for (RowId row = 0; row < grid_.rows(); ++row) {
+    if (row % kListBlock == 0)
+      listed_before_[row / kListBlock] = static_cast<std::uint32_t>(anchored_.size());
+    if (filled_in(row) == 0 || lanes[row] == 0) continue;
+    const Anchors which = lanes[row] == filled_lanes(row) ? Anchors::all : Anchors::some;
+    rows_[row] |= static_cast<std::uint8_t>(static_cast<unsigned>(which) << kAnchorShift);
+    if (which == Anchors::some) anchored_.push_back(lanes[row]);
+  }
+  anchored_.shrink_to_fit();
+}
+
+std::uint32_t Lattice::listed_anchors(RowId row) const noexcept {
+  std::size_t at = listed_before_[row / kListBlock];
+  for (RowId r = row - row % kListBlock; r < row; ++r) at += anchors_of(r) == Anchors::some ? 1 : 0;
+  return anchored_[at];
+}
+
+std::uint32_t Lattice::filled_lanes(RowId row) const noexcept {
+  const int count = filled_in(row);
+  if (count == 0 || count == kRow) return count == 0 ? 0U : ~0U;
+  const std::uint8_t* at = labels(row);
+  std::uint32_t lanes = 0;
+  for (int i = 0; i < kRow; ++i) lanes |= static_cast<std::uint32_t>(at[i] != 0) << i;
+  return lanes;
 }
 
 void Lattice::find_surface() {
@@ -313,11 +360,10 @@ void Lattice::find_surface() {
     const VoxelId first = row * kRow;
     if (first % kSurfaceBlock == 0)
       surface_before_[first / kSurfaceBlock] = static_cast<std::uint32_t>(surface_.size());
-    if (row_filled_[row] == 0) continue;
+    if (filled_in(row) == 0) continue;
     // Full rows among full rows have a surface at their ends at most.
-    const bool inside = row_filled_[row] == kRow && row_filled_[row - 1] == kRow &&
-                        row_filled_[row + 1] == kRow && row_filled_[row - grid_.row_z] == kRow &&
-                        row_filled_[row + grid_.row_z] == kRow;
+    const bool inside = filled_in(row) == kRow && filled_in(row - 1) == kRow && filled_in(row + 1) == kRow &&
+                        filled_in(row - grid_.row_z) == kRow && filled_in(row + grid_.row_z) == kRow;
     for (int i = 0; i < kRow; i += inside ? kRow - 1 : 1) {
       const VoxelId v = first + static_cast<VoxelId>(i);
       if (label_[v] == 0) continue;
@@ -369,9 +415,8 @@ glm::dvec3 Lattice::outward(VoxelId v) const noexcept {
 }
 
 std::size_t Lattice::memory_bytes() const {
-  return label_.resident_bytes() + anchored_.resident_bytes() + row_filled_.resident_bytes() +
-         inside_.resident_bytes() + surface_.size() * sizeof(VoxelId) +
-         surface_before_.size() * sizeof(std::uint32_t) +
+  return sizeof(*this) + label_.resident_bytes() + rows_.resident_bytes() + resident_bytes(listed_before_) +
+         resident_bytes(anchored_) + resident_bytes(surface_) + resident_bytes(surface_before_) +
          3 * limits_[0].size() * (sizeof(LinkLimit) + sizeof(float));
 }
 

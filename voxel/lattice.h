@@ -6,6 +6,7 @@
 // limits from those at its two ends, and rest positions from the index (see grid.h).
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <glm/gtc/quaternion.hpp>
@@ -84,22 +85,31 @@ class Lattice {
   // Throws std::invalid_argument in words: no voxel, no anchor (a free object has no equilibrium force), a
   // material out of range, more than 2^31 cells.
   Lattice(const LabelVolume& volume, const LatticeOptions& options);
+  // The same; what was read of the volume gives its memory back meanwhile, and the volume holds nothing more.
+  Lattice(LabelVolume&& volume, const LatticeOptions& options);
 
   [[nodiscard]] const Grid& grid() const { return grid_; }
   [[nodiscard]] std::size_t size() const { return label_.size(); }  // of the grid, the border included
   [[nodiscard]] std::size_t voxel_count() const { return voxel_count_; }
   [[nodiscard]] std::size_t anchored_count() const { return anchored_count_; }
   [[nodiscard]] bool filled(VoxelId v) const { return label_[v] != 0; }
-  [[nodiscard]] bool anchored(VoxelId v) const { return anchored_[v] != 0; }
+  [[nodiscard]] bool anchored(VoxelId v) const {
+    const Anchors which = anchors_of(v / kRow);
+    if (which == Anchors::none) return false;
+    return which == Anchors::all ? filled(v) : (listed_anchors(v / kRow) >> v % kRow & 1U) != 0;
+  }
   [[nodiscard]] std::uint8_t label(VoxelId v) const { return label_[v]; }
   [[nodiscard]] const std::uint8_t* labels(RowId row) const {
     return label_.data() + row * std::size_t{kRow};
   }
-  // [lane] 1 where one is anchored, 0 elsewhere.
-  [[nodiscard]] const std::uint8_t* anchors(RowId row) const {
-    return anchored_.data() + row * std::size_t{kRow};
+  // Bits of a row's lanes: where there is a voxel, where an anchored one.
+  [[nodiscard]] std::uint32_t filled_lanes(RowId row) const noexcept;
+  [[nodiscard]] std::uint32_t anchored_lanes(RowId row) const noexcept {
+    const Anchors which = anchors_of(row);
+    if (which == Anchors::none) return 0;
+    return which == Anchors::all ? filled_lanes(row) : listed_anchors(row);
   }
-  [[nodiscard]] int filled_in(RowId row) const { return row_filled_[row]; }
+  [[nodiscard]] int filled_in(RowId row) const { return std::min(rows_[row] & kCount, kRow); }
   [[nodiscard]] const glm::dvec3& spacing_m() const { return spacing_m_; }
   [[nodiscard]] double min_spacing_m() const { return min_spacing_m_; }
   [[nodiscard]] double max_spacing_m() const { return max_spacing_m_; }
@@ -134,7 +144,9 @@ class Lattice {
   [[nodiscard]] VoxelSprings springs_of(VoxelId v) const noexcept;
   // The label that a row, the eight rows beside it and the voxels beyond all their ends are of, all of them;
   // 0 where they are not of one. Every link of the row's voxels is then within that label.
-  [[nodiscard]] std::uint8_t inside(RowId row) const { return inside_[row]; }
+  [[nodiscard]] std::uint8_t inside(RowId row) const {
+    return (rows_[row] & kCount) == kInside ? labels(row)[0] : std::uint8_t{0};
+  }
   [[nodiscard]] const Spring& spring_within(std::uint8_t label, int d) const {
     return within_[static_cast<std::size_t>(d)][material_[label]];
   }
@@ -177,11 +189,24 @@ class Lattice {
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
+  // What is known of a row in one byte: how many voxels it has, and, beyond kRow, that it is full and inside
+  // a label (see inside()); above that which of its voxels are anchored. A byte for each voxel was rejected:
+  // anchors on a side of an object lie in all of its pages.
+  enum class Anchors : std::uint8_t { none = 0, all = 1, some = 2 };
+  static constexpr std::uint8_t kCount = 63, kInside = kRow + 1;
+  static constexpr int kAnchorShift = 6;
+  static constexpr std::size_t kListBlock = 64;  // rows
+  [[nodiscard]] Anchors anchors_of(RowId row) const { return Anchors(rows_[row] >> kAnchorShift); }
+  // Of a row in which some voxels are anchored and others are not.
+  [[nodiscard]] std::uint32_t listed_anchors(RowId row) const noexcept;
+
   [[nodiscard]] std::size_t pair_of(std::uint8_t a, std::uint8_t b) const {
     return std::size_t{material_[a]} * material_count_ + material_[b];
   }
-  void fill_labels(const LabelVolume& volume);
+  Lattice(const LabelVolume& volume, const LatticeOptions& options, std::uint8_t* give_back);
+  void fill_labels(const LabelVolume& volume, std::uint8_t* give_back);
   void fill_anchors(const LabelVolume& volume, const LatticeOptions& options);
+  void list_anchors(const LazyArray<std::uint32_t>& lanes);
   void fill_inside();
   void fill_links(const LatticeOptions& options);
   void fill_force_scale();
@@ -194,7 +219,9 @@ class Lattice {
   double force_scale_N_ = 0.0;
   bool uniform_limits_ = true, yields_ = false, has_bricks_ = false;
   std::size_t voxel_count_ = 0, anchored_count_ = 0, material_count_ = 1;
-  LazyArray<std::uint8_t> label_, anchored_, row_filled_, inside_;
+  LazyArray<std::uint8_t> label_, rows_;
+  std::vector<std::uint32_t> listed_before_;  // [row / kListBlock] rows in anchored_ with smaller ids
+  std::vector<std::uint32_t> anchored_;       // lanes of rows of which some are
   std::array<std::uint8_t, 256> material_{};  // label → number among equal materials; 0: empty
   std::vector<LinkMaterial> materials_;       // [material]
   std::vector<LinkModuli> moduli_;            // [material]; [0]: none

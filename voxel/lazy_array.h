@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <memory>
 #include <new>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 namespace voxel {
 
@@ -63,7 +65,7 @@ class LazyArray {
   // Gives every page its memory now: what a first touch of each takes (about a microsecond) is then not taken
   // from a tick.
   void populate() noexcept;
-  // Memory that the pages written so far take (unit: byte).
+  // Memory that what was written so far takes (unit: byte); what was only read takes none.
   [[nodiscard]] std::size_t resident_bytes() const;
   // Copies what `other`, of the same size, holds; pages that hold nothing stay untouched.
   void copy_from(const LazyArray& other) noexcept;
@@ -74,10 +76,56 @@ class LazyArray {
 };
 
 void populate(void* at, std::size_t bytes) noexcept;
-// How many bytes of `bytes` from `at` (a mapping) are in memory.
+// What is there is not needed any more, but for its destructor: whole pages go back to the system, and read
+// as zeros.
+void give_back(void* at, std::size_t bytes) noexcept;
+// How many of `bytes` from `at` on take memory of their own. A page that was only read does not: all such
+// pages are the same one, of zeros.
 [[nodiscard]] std::size_t resident_bytes(const void* at, std::size_t bytes);
-// Copies only pages of `from` that are in memory. Both are mappings of `bytes`.
+// Copies only pages of `from` that hold anything. Both are mappings of `bytes`, `to` of zeros.
 void copy_resident(void* to, const void* from, std::size_t bytes) noexcept;
+
+// For vectors that have room for the most there can ever be, and mostly hold next to nothing: theirs is
+// address space of their own. From the C library they get, once larger ones were freed, what those had
+// written to.
+template <class T>
+struct LazyRoom {
+  using value_type = T;
+  LazyRoom() = default;
+  template <class Other>
+  LazyRoom(const LazyRoom<Other>&) noexcept {}  // NOLINT(google-explicit-constructor): an allocator's
+
+  [[nodiscard]] T* allocate(std::size_t count) {
+    if (count * sizeof(T) < kLeast) return std::allocator<T>().allocate(count);
+    void* at = ::mmap(nullptr, count * sizeof(T), PROT_READ | PROT_WRITE,
+                      MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+    if (at == MAP_FAILED) throw std::bad_alloc();
+    (void)::madvise(at, count * sizeof(T), MADV_NOHUGEPAGE);
+    return static_cast<T*>(at);
+  }
+  void deallocate(T* at, std::size_t count) noexcept {
+    if (count * sizeof(T) < kLeast) {
+      std::allocator<T>().deallocate(at, count);
+    } else {
+      ::munmap(at, count * sizeof(T));
+    }
+  }
+  template <class Other>
+  bool operator==(const LazyRoom<Other>&) const noexcept {
+    return true;
+  }
+
+ private:
+  static constexpr std::size_t kLeast = std::size_t{1} << 16U;  // bytes
+};
+template <class T>
+using LazyVector = std::vector<T, LazyRoom<T>>;
+
+// Of what a vector has room for, what takes memory: room that is reserved and not used does not.
+template <class T, class Allocator>
+[[nodiscard]] std::size_t resident_bytes(const std::vector<T, Allocator>& v) {
+  return resident_bytes(v.data(), v.capacity() * sizeof(T));
+}
 
 template <class T>
 std::size_t LazyArray<T>::resident_bytes() const {

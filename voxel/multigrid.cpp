@@ -9,7 +9,7 @@ namespace {
 
 constexpr int kMaxLevels = 10;
 constexpr int kSmallest = 3;                // cells across the coarsest level
-constexpr int kWrittenAtOnce = 3;           // from this level on springs are written out on construction
+constexpr int kWrittenAtOnce = 5;           // from this level on springs are written out on construction
 constexpr std::size_t kMaxBalanced = 4096;  // rows; the contact of a tool has some hundred
 constexpr std::size_t kMaxStopped = 65536;  // cells of all levels stopped at a time; more move a little
 
@@ -57,7 +57,6 @@ void Multigrid::prepare_level(int level) noexcept {
 }
 
 void Multigrid::prepare_all() noexcept {
-  holds_->populate();
   for (int l = 0; l < levels(); ++l) {
     prepare_level(l);
     Level& level = at(l);
@@ -67,6 +66,7 @@ void Multigrid::prepare_all() noexcept {
     level.stopped.populate();
     level.flags.populate();
   }
+  holds_->prepare_all();
 }
 
 // Marks a row and the rows beside it.
@@ -170,9 +170,9 @@ void Multigrid::keep_log() {
 }
 
 std::size_t Multigrid::memory_bytes() const {
-  std::size_t bytes = log_.memory_bytes() + bricks_.memory_bytes() + holds_->memory_bytes() +
-                      stopped_.capacity() * sizeof(StoppedCell) + row_balanced_.resident_bytes() +
-                      balanced_.capacity() * sizeof(RowId);
+  std::size_t bytes = tiles_.memory_bytes() + log_.memory_bytes() + bricks_.memory_bytes() +
+                      holds_->memory_bytes() + hats_.memory_bytes() + resident_bytes(stopped_) +
+                      row_balanced_.resident_bytes() + resident_bytes(balanced_);
   for (const auto& axis : balance_) bytes += axis.resident_bytes();
   for (const Level& l : levels_) {
     bytes += l.couplings->memory_bytes() + l.flags.resident_bytes() + l.stopped.resident_bytes();

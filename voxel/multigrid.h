@@ -223,11 +223,11 @@ class Multigrid {
   std::vector<Level> levels_;
   Hats hats_;
   std::unique_ptr<Holds> holds_;
-  std::vector<StoppedCell> stopped_;
+  LazyVector<StoppedCell> stopped_;
   // [axis][voxel] its own load and what balances it (N), in rows where something does
   std::array<LazyArray<float>, 3> balance_;
   LazyArray<std::uint8_t> row_balanced_;  // [row] 1: it has
-  std::vector<RowId> balanced_;           // these
+  LazyVector<RowId> balanced_;            // these
   std::array<AxisLimits, 3> yield_limits_;
   float tolerance_N_ = 0.0F, quiet_m_ = 0.0F, hold_ = 1.0F;
 };

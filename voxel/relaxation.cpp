@@ -313,7 +313,7 @@ bool Relaxation::tile_waits_for_coarse(std::size_t number) const noexcept {
 
 std::size_t Relaxation::memory_bytes() const {
   return multigrid_.memory_bytes() + clusters_.memory_bytes() + boxes_.capacity() * sizeof(LevelBoxes) +
-         standing_.capacity() * sizeof(VoxelId);
+         resident_bytes(standing_);
 }
 
 }  // namespace voxel

@@ -149,7 +149,7 @@ class Relaxation {
   Multigrid multigrid_;
   ClusterMoves clusters_;
   std::vector<LevelBoxes> boxes_;
-  std::vector<VoxelId> standing_;           // what the last cycle found held, on all axes
+  LazyVector<VoxelId> standing_;            // what the last cycle found held, on all axes
   std::int64_t credit_ = 0;                 // voxel updates that may be spent; negative: were spent too many
   std::size_t round_left_ = 0;              // tiles until this round ends
   std::size_t cursor_ = 0, looked_at_ = 0;  // tiles looked at for what coarse levels have to tell them

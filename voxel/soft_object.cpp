@@ -36,7 +36,7 @@ SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice)
       state_(*lattice_),
       chain_(*lattice_),
       relaxation_(*lattice_),
-      pair_held_(lattice_->surface().size(), 0),
+      pair_held_(lattice_->surface().size()),
       pair_load_(lattice_->surface().size()),
       tight_rows_(*lattice_),
       drawn_rows_(*lattice_, kMaxTouched),
@@ -58,6 +58,8 @@ SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice)
     for (auto& axis : state_.u) axis.populate();
     state_.bricks.populate();
     state_.role.populate();
+    pair_held_.populate();
+    chain_.prepare_all();
     relaxation_.prepare_all();
   }
 }
@@ -463,14 +465,22 @@ bool SoftObject::settle(const ToolInBody& tool, double tolerance_N, int max_cycl
 }
 
 std::size_t SoftObject::memory_bytes() const {
-  std::size_t state =
-      state_.bricks.memory_bytes() + state_.role.resident_bytes() + state_.row_standing.resident_bytes() +
-      state_.row_obstacles.resident_bytes() + state_.rest.memory_bytes() + carried_mark_.resident_bytes() +
-      state_.tool_normal.resident_bytes() + carried_index_.resident_bytes() + tight_rows_.memory_bytes() +
-      drawn_rows_.memory_bytes() + pair_load_.resident_bytes() + row_moved_.resident_bytes();
+  std::size_t state = state_.bricks.memory_bytes() + state_.role.resident_bytes() +
+                      state_.row_standing.resident_bytes() + state_.row_obstacles.resident_bytes() +
+                      state_.rest.memory_bytes() + state_.tool_normal.resident_bytes();
   for (const auto& axis : state_.u) state += axis.resident_bytes();
-  return lattice_->memory_bytes() + state + chain_.memory_bytes() + relaxation_.memory_bytes() +
-         obstacles_.size() * sizeof(Obstacle) + pair_held_.size();
+  const std::size_t contact =
+      resident_bytes(touches_) + resident_bytes(touched_before_) + resident_bytes(pressed_last_) +
+      resident_bytes(touched_voxels_) + resident_bytes(held_voxels_) + resident_bytes(all_held_) +
+      resident_bytes(sources_) + resident_bytes(moves_) + resident_bytes(roots_) + resident_bytes(carried_) +
+      resident_bytes(hanging_) + carried_mark_.resident_bytes() + carried_index_.resident_bytes() +
+      tight_rows_.memory_bytes() + drawn_rows_.memory_bytes();
+  const std::size_t others = pair_held_.resident_bytes() + pair_load_.resident_bytes() +
+                             resident_bytes(obstacles_) + resident_bytes(moved_rows_) +
+                             row_moved_.resident_bytes() + resident_bytes(changed_obstacles_) +
+                             resident_bytes(obstacle_changed_);
+  return sizeof(*this) + lattice_->memory_bytes() + state + contact + others + chain_.memory_bytes() +
+         relaxation_.memory_bytes();
 }
 
 }  // namespace voxel

@@ -227,28 +227,28 @@ class SoftObject {
   Displacement state_;
   ChainMail chain_;
   Relaxation relaxation_;
-  std::vector<std::uint16_t> pair_held_;  // [surface number] pairs with other soft objects it is in
-  LazyArray<glm::vec3> pair_load_;        // [surface number] and with what force (N)
-  std::vector<Obstacle> obstacles_;       // [surface number], empty when there is none
+  LazyArray<std::uint16_t> pair_held_;  // [surface number] pairs with other soft objects it is in
+  LazyArray<glm::vec3> pair_load_;      // [surface number] and with what force (N)
+  std::vector<Obstacle> obstacles_;     // [surface number], empty when there is none
   std::vector<RowId> moved_rows_;
   LazyArray<std::uint8_t> row_moved_;             // 1: among them; empty: no obstacles
   std::vector<std::uint32_t> changed_obstacles_;  // surface numbers, since a replica was last told
   std::vector<std::uint8_t> obstacle_changed_;    // [surface number] 1: among them; empty: no replica
-  std::vector<Touch> touches_;
-  std::vector<Touch> touched_before_;  // those pressed then
+  LazyVector<Touch> touches_;
+  LazyVector<Touch> touched_before_;   // those pressed then
   std::vector<VoxelId> pressed_last_;  // while any is pressed, and in the call in which the last is let go
   ToolInBody tool_;                    // as relax_near() last saw it
   std::vector<VoxelId> touched_voxels_;
-  std::vector<VoxelId> held_voxels_;  // by pairs
-  std::vector<VoxelId> all_held_;     // by the tool, too
-  std::vector<VoxelId> sources_;
-  std::vector<glm::vec3> moves_;
+  LazyVector<VoxelId> held_voxels_;  // by pairs
+  LazyVector<VoxelId> all_held_;     // by the tool, too
+  LazyVector<VoxelId> sources_;
+  LazyVector<glm::vec3> moves_;
   bool dragging_ = false;  // sources_ are what drag() moved, moves_ where they were
   TightRows tight_rows_;
   DrawnRows drawn_rows_;
   std::vector<VoxelId> roots_;              // of these: what is pressed and not anchored
-  std::vector<Carried> carried_;            // [pressed first, then what hangs on them by a tight link]
-  std::vector<Hanging> hanging_;            // [as carried_]
+  LazyVector<Carried> carried_;             // [pressed first, then what hangs on them by a tight link]
+  LazyVector<Hanging> hanging_;             // [as carried_]
   LazyArray<std::uint8_t> carried_mark_;    // [v] 1: in carried_ (within touch(): was pressed)
   LazyArray<std::uint32_t> carried_index_;  // [v]
   double unrelaxed_m_ = 0.0;                // motion of pressed voxels since the background was last woken

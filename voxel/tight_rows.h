@@ -45,8 +45,7 @@ class TightRows {
   [[nodiscard]] Hanging hanging(const Couplings& couplings) const noexcept;
 
   [[nodiscard]] std::size_t memory_bytes() const {
-    return entry_.resident_bytes() + rows_.capacity() * sizeof(Row) +
-           queue_.capacity() * sizeof(std::uint32_t);
+    return entry_.resident_bytes() + resident_bytes(rows_) + resident_bytes(queue_);
   }
 
  private:
@@ -78,7 +77,7 @@ class TightRows {
   Displacement* state_ = nullptr;   // …, only read
   int axis_ = 0;
   LazyArray<std::uint16_t> entry_;  // [row] 1 + index into rows_; 0: not looked at
-  std::vector<Row> rows_;
+  LazyVector<Row> rows_;
   std::vector<std::uint32_t> queue_;  // into rows_, a ring
   std::size_t head_ = 0, waiting_ = 0;
 };

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <vector>
 
 #include "voxel/grid.h"
+#include "voxel/lazy_array.h"
 
 namespace voxel {
 
@@ -62,9 +62,7 @@ class TileQueue {
     const int n = static_cast<int>(number);
     return {n / (js_ * ks_), n % js_, n / js_ % ks_};
   }
-  [[nodiscard]] std::size_t memory_bytes() const {
-    return waits_.capacity() + order_.capacity() * sizeof(std::uint32_t);
-  }
+  [[nodiscard]] std::size_t memory_bytes() const { return waits_.resident_bytes() + order_.resident_bytes(); }
 
  private:
   void push(int column, int j, int k) noexcept {
@@ -76,8 +74,8 @@ class TileQueue {
   }
 
   int columns_, js_, ks_;
-  std::vector<std::uint8_t> waits_;
-  std::vector<std::uint32_t> order_;  // a ring, from first_ on
+  LazyArray<std::uint8_t> waits_;
+  LazyArray<std::uint32_t> order_;  // a ring, from first_ on
   std::size_t first_ = 0, waiting_ = 0;
 };
 

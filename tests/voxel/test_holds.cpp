@@ -5,11 +5,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <iostream>
 #include <memory>
 #include <random>
+#include <span>
 #include <vector>
 
 #include "tests/voxel/lattice_scenes.h"
@@ -42,8 +44,9 @@ struct Levels {
     }
   }
   // Of a cell (N/m).
-  double hold(const Holds& holds, int level, VoxelId cell, int axis) {
+  double hold(Holds& holds, int level, VoxelId cell, int axis) {
     const voxel::VoxelSprings springs = pointers[static_cast<std::size_t>(level)]->springs_of(cell);
+    if (!holds.any(level, cell / voxel::kRow)) return 0.0;
     return static_cast<double>(
                holds.hold(level, cell / voxel::kRow, static_cast<std::size_t>(axis))[cell % voxel::kRow]) /
            static_cast<double>(springs.inverse[static_cast<std::size_t>(axis)]);
@@ -60,7 +63,7 @@ TEST(Holds, APlaneStaysWhereItIsOnEveryLevel) {
   options.anchor_faces = {"-z"};
   const Lattice lattice(block({32, 32, 32}), options);
   Levels levels(lattice);
-  const Holds holds(lattice, levels.pointers);
+  Holds holds(lattice, levels.pointers);
   const voxel::Spring link = lattice.spring_within(1, 2);
   for (int level = 1; level < 4; ++level) {
     const voxel::Grid& g = levels.pointers[static_cast<std::size_t>(level)]->grid();
@@ -117,6 +120,72 @@ TEST(Holds, DependOnWhatIsHeldAlone) {
       }
     }
     changed.support(pressed, {});
+  }
+}
+
+// When and in which order rows are asked for changes nothing, nor what is held in between: what anchors hold
+// is the same, to the last bit, as if all of it had been found at the start.
+TEST(Holds, OfAnchorsAreTheSameWheneverTheyAreAskedFor) {
+  std::mt19937 random(9);
+  for (int n = 0; n < 6; ++n) {
+    LabelVolume volume = block({80, 40, 36});
+    LatticeOptions options;
+    options.materials[1] = elastic(1e4, 0.3);
+    options.materials[2] = elastic(3e5, 0.2);
+    options.anchor_labels = {2};
+    for (std::uint8_t& label : volume.labels) label = random() % 9 == 0 ? 0 : 1;
+    for (int piece = 0; piece < 3; ++piece) {  // of bone, of any size
+      std::array<int, 3> low{}, high{};
+      for (std::size_t d = 0; d < 3; ++d) {
+        low[d] = static_cast<int>(random() % static_cast<unsigned>(volume.dims[d]));
+        high[d] = std::min(volume.dims[d], low[d] + 1 + static_cast<int>(random() % 20));
+      }
+      for (int k = low[2]; k < high[2]; ++k) {
+        for (int j = low[1]; j < high[1]; ++j) {
+          for (int i = low[0]; i < high[0]; ++i) volume.labels[volume.index(i, j, k)] = 2;
+        }
+      }
+    }
+    const Lattice lattice(volume, options);
+    Levels at_once_levels(lattice), later_levels(lattice);
+    Holds at_once(lattice, at_once_levels.pointers), later(lattice, later_levels.pointers);
+    at_once.prepare_all();
+    const auto any_row = [&](int level) {
+      return static_cast<voxel::RowId>(random() %
+                                       later_levels.pointers[static_cast<std::size_t>(level)]->grid().rows());
+    };
+    for (int step = 0; step < 40; ++step) {
+      for (int ask = 0; ask < 5; ++ask) {
+        const int level = 1 + static_cast<int>(random() % 3);
+        (void)later.any(level, any_row(level));
+      }
+      std::vector<VoxelId> held;
+      while (held.size() < 4) {
+        const VoxelId v = lattice.at(static_cast<int>(random() % 80), static_cast<int>(random() % 40),
+                                     static_cast<int>(random() % 36));
+        if (lattice.filled(v)) held.push_back(v);
+      }
+      const Holds::Support by = Holds::along(glm::normalize(glm::vec3(0.3F, -0.5F, 0.8F)));
+      for (Holds* holds : {&at_once, &later}) {
+        holds->set_held(std::span(held).first(3));
+        holds->support(held.back(), by);
+        holds->renew();
+      }
+    }
+    for (int level = 1; level < 4; ++level) {
+      const voxel::Grid& g = later_levels.pointers[static_cast<std::size_t>(level)]->grid();
+      for (voxel::RowId row = 0; row < g.rows(); ++row) {
+        ASSERT_EQ(later.any(level, row), at_once.any(level, row)) << level;
+        ASSERT_EQ(later.tilted(level, row), at_once.tilted(level, row));
+        for (VoxelId i = 0; i < voxel::kRow; ++i) {
+          for (std::size_t axis = 0; axis < 3; ++axis) {
+            ASSERT_EQ(later.hold(level, row, axis)[i], at_once.hold(level, row, axis)[i]) << level;
+            ASSERT_EQ(later.nearer(level, row, axis)[i], at_once.nearer(level, row, axis)[i]);
+          }
+          ASSERT_EQ(later.tilt(level, row * voxel::kRow + i), at_once.tilt(level, row * voxel::kRow + i));
+        }
+      }
+    }
   }
 }
 

@@ -17,6 +17,7 @@
 #include "tests/voxel/direct_solution.h"
 #include "tests/voxel/lattice_scenes.h"
 #include "voxel/couplings.h"
+#include "voxel/validate.h"
 
 namespace {
 
@@ -110,6 +111,8 @@ TEST(Lattice, CouplingsAreItsSpringsOnEveryLevel) {
       const VoxelId v = row * voxel::kRow + i;
       if (!lattice.filled(v)) continue;
       const VoxelSprings expected = lattice.springs_of(v), found = known[0]->springs_of(v);
+      EXPECT_EQ(unknown[0]->find_springs(v).up, expected.up) << v;
+      EXPECT_EQ(unknown[0]->find_springs(v).inverse, expected.inverse) << v;
       EXPECT_EQ(found.up, expected.up) << v;
       EXPECT_EQ(found.down, expected.down) << v;
       EXPECT_EQ(found.inverse, expected.inverse) << v;
@@ -147,8 +150,15 @@ TEST(Lattice, CouplingsAreItsSpringsOnEveryLevel) {
     for (int k = 0; k < g.dims[2]; ++k) {
       for (int j = 0; j < g.dims[1]; ++j) {
         for (int i = 0; i < g.dims[0]; ++i) {
-          const VoxelSprings found = known[ul]->springs_of(g.at(i, j, k)),
-                             again = alone.springs_of(g.at(i, j, k));
+          const VoxelSprings unwritten = alone.find_springs(g.at(i, j, k)),
+                             found = known[ul]->springs_of(g.at(i, j, k)),
+                             again = alone.springs_of(g.at(i, j, k)),
+                             written = alone.find_springs(g.at(i, j, k));
+          for (const VoxelSprings& other : {unwritten, written}) {
+            EXPECT_EQ(found.up, other.up);
+            EXPECT_EQ(found.down, other.down);
+            EXPECT_EQ(found.inverse, other.inverse);
+          }
           EXPECT_EQ(found.up, again.up);
           EXPECT_EQ(found.down, again.down);
           EXPECT_EQ(found.inverse, again.inverse);
@@ -288,6 +298,45 @@ TEST(Lattice, AnchorsByFaceLabelAndVoxel) {
   options.anchor_voxels = {volume.index(1, 2, 3), volume.index(4, 3, 5),
                            volume.index(0, 0, 0)};  // the last is empty
   EXPECT_EQ(anchored(options), (std::set<std::array<int, 3>>{{1, 2, 3}, {4, 3, 5}}));
+}
+
+// Rows without an anchor, with nothing but anchors, and with some, in any order.
+TEST(Lattice, KnowsEachAnchor) {
+  tests::Random random(21);
+  for (int n = 0; n < 12; ++n) {
+    LabelVolume volume = block({70, 23, 19}, glm::dvec3(1e-3));
+    const double filled = n % 3 == 0 ? 1.0 : 0.7;
+    for (std::uint8_t& label : volume.labels) label = random.unit() < filled ? 1 : 0;
+    std::vector<bool> expected(volume.labels.size());
+    LatticeOptions options = made_of(LinkMaterial{}, nullptr);
+    const auto anchor = [&](int i, int j, int k) {
+      const std::size_t at = volume.index(i, j, k);
+      options.anchor_voxels.push_back(at);
+      expected[at] = volume.labels[at] != 0;
+    };
+    for (int k = 0; k < 19; ++k) {
+      for (int j = 0; j < 23; ++j) {
+        const double share = random.unit() < 0.4 ? 0.0 : random.unit() < 0.5 ? 1.0 : 0.2;
+        for (int i = 0; i < 70; ++i) {
+          if (random.unit() < share) anchor(i, j, k);
+        }
+      }
+    }
+    const Lattice lattice(volume, options);
+    for (int k = 0; k < 19; ++k) {
+      for (int j = 0; j < 23; ++j) {
+        for (int i = 0; i < 70; ++i) {
+          const VoxelId v = lattice.at(i, j, k);
+          const std::size_t at = volume.index(i, j, k);
+          ASSERT_EQ(lattice.anchored(v), expected[at]);
+          ASSERT_EQ((lattice.anchored_lanes(v / voxel::kRow) >> v % voxel::kRow & 1U) != 0, expected[at]);
+          ASSERT_EQ((lattice.filled_lanes(v / voxel::kRow) >> v % voxel::kRow & 1U) != 0,
+                    volume.labels[at] != 0);
+        }
+      }
+    }
+    EXPECT_EQ(voxel::validate(lattice), "");
+  }
 }
 
 TEST(Lattice, RefusesInWords) {
