@@ -49,7 +49,7 @@ ObjectBox object_box(const World& world, std::size_t object);
 std::string in_words(const ObjectBox& box);
 
 // The most that a soft object of so many voxels takes until it is touched: what it is read into, its lattice
-// (2.4 bytes a voxel at their most), its surface and its part of the map.
+// (2.5 bytes a voxel at their most), its surface and its part of the map.
 std::uint64_t soft_load_bytes(const std::array<int, 3>& dims);
 // And once something has moved everywhere in it: state and coarse levels, and springs where they are not all
 // of one label. In a session that is as far as the tool went and relaxation followed.

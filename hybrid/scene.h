@@ -247,7 +247,7 @@ struct Scene {
 };
 
 // The largest lattice that a soft object may have on this machine: what building it takes for each voxel of
-// the bounding box (labels, surface, the copies made on the way; 3.4 bytes in 511³ voxels), within the
+// the bounding box (labels, surface, the copies made on the way; 2.6 bytes in 512³ voxels), within the
 // physical memory.
 inline constexpr std::size_t lattice_bytes_per_voxel = 4;
 std::size_t max_lattice_voxels();

@@ -12,7 +12,7 @@ namespace voxel {
 namespace {
 
 // Ids between two entries of surface_before_: with 64 these took more memory than the surface itself, in a
-// full cube, and to find a voxel's number took no less time.
+// full cube, for some nanoseconds a look-up.
 constexpr std::size_t kSurfaceBlock = 256;
 constexpr std::size_t kGivenBack = std::size_t{1} << 24U;  // bytes of a volume, at a time
 constexpr std::size_t kMostCells = std::size_t{1} << 31;
@@ -382,17 +382,21 @@ void Lattice::find_surface() {
 // Of the first surface voxel that is `v` or beyond it, within the block that `v` is in.
 std::uint32_t Lattice::surface_from(VoxelId v) const noexcept {
   const auto block = v / kSurfaceBlock;
+  // (A search without branches was rejected: rows are mostly asked for one after the other, and then branches
+  // are foretold.)
   const auto first = surface_.begin() + static_cast<std::ptrdiff_t>(surface_before_[block]),
              last = surface_.begin() + static_cast<std::ptrdiff_t>(surface_before_[block + 1]);
   return static_cast<std::uint32_t>(std::lower_bound(first, last, v) - surface_.begin());
 }
 
 std::uint32_t Lattice::surface_number(VoxelId v) const noexcept {
+  if (inside(v / kRow) != 0) return kNoSurface;
   const std::uint32_t number = surface_from(v);
   return number < surface_.size() && surface_[number] == v ? number : kNoSurface;
 }
 
 std::array<std::uint32_t, 2> Lattice::surface_in(RowId row) const noexcept {
+  if (inside(row) != 0) return {0, 0};
   const std::uint32_t first = surface_from(row * kRow);
   std::uint32_t last = first;
   while (last < surface_.size() && surface_[last] < (row + 1) * kRow) ++last;
