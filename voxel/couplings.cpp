@@ -2,8 +2,11 @@
 #include "voxel/couplings.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstring>
 #include <limits>
+#include <type_traits>
 
 namespace voxel {
 
@@ -16,7 +19,8 @@ Couplings::Couplings(const Lattice& lattice, const Couplings* finer)
       label_(grid_.rows()),
       written_at_(grid_.rows()),
       written_(grid_.rows()),
-      written_stands_(grid_.rows()) {
+      written_stands_(grid_.rows()),
+      written_by_hash_(std::bit_ceil(2 * grid_.rows())) {
   if (finer_ == nullptr) {
     if (!lattice.uniform_limits()) written_limits_ = LazyArray<RowLimits::Written>(grid_.rows());
     for (std::size_t label = 0; label < 256; ++label) {
@@ -185,10 +189,55 @@ void Couplings::find(RowId row) noexcept {
       kind = empty;
     } else {
       if (written_limits_.size() > 0) write_limits(row, written_limits_[written_count_]);
-      written_at_[row] = written_count_++;
+      written_at_[row] = find_written();
+      written_count_ = std::max(written_count_, written_at_[row] + 1);
     }
   }
   kind_[row] = kind;
+}
+
+namespace {
+
+// FNV-1a, by words.
+template <class T>
+void add_to_hash(std::uint64_t& hash, const T& what) {
+  static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % sizeof(std::uint64_t) == 0);
+  constexpr std::uint64_t kPrime = 0x100000001b3;
+  const auto* at = reinterpret_cast<const char*>(&what);
+  for (std::size_t n = 0; n < sizeof(T); n += sizeof(std::uint64_t)) {
+    std::uint64_t word = 0;
+    std::memcpy(&word, at + n, sizeof word);
+    hash = (hash ^ word) * kPrime;
+  }
+}
+
+template <class T>
+bool same_bits(const T& a, const T& b) {
+  return std::memcmp(&a, &b, sizeof(T)) == 0;
+}
+
+}  // namespace
+
+// Where what was just written after all others stands: there, or where the same was written before.
+std::uint32_t Couplings::find_written() noexcept {
+  const std::uint32_t last = written_count_;
+  std::uint64_t hash = 0xcbf29ce484222325;
+  add_to_hash(hash, written_[last]);
+  add_to_hash(hash, written_stands_[last]);
+  if (written_limits_.size() > 0) add_to_hash(hash, written_limits_[last]);
+  const std::size_t mask = written_by_hash_.size() - 1;
+  // What is hashed last changes the high bits most.
+  for (std::size_t n = (hash ^ hash >> 32U) & mask;; n = (n + 1) & mask) {
+    if (written_by_hash_[n] == 0) {
+      written_by_hash_[n] = last + 1;
+      return last;
+    }
+    const std::uint32_t other = written_by_hash_[n] - 1;
+    if (same_bits(written_[other], written_[last]) &&
+        same_bits(written_stands_[other], written_stands_[last]) &&
+        (written_limits_.size() == 0 || same_bits(written_limits_[other], written_limits_[last])))
+      return other;
+  }
 }
 
 void Couplings::write_out(RowId row, Written& out, LaneBits& stands) const noexcept {
@@ -399,7 +448,8 @@ const float* Couplings::filled(RowId row) const noexcept {
 std::size_t Couplings::memory_bytes() const {
   std::size_t bytes = sizeof(*this) + kind_.resident_bytes() + label_.resident_bytes() +
                       content_.resident_bytes() + written_at_.resident_bytes() + written_.resident_bytes() +
-                      written_stands_.resident_bytes() + written_limits_.resident_bytes();
+                      written_stands_.resident_bytes() + written_limits_.resident_bytes() +
+                      written_by_hash_.resident_bytes();
   for (const auto& links : link_) bytes += links.resident_bytes();
   for (const auto& constant : constant_) bytes += constant != nullptr ? sizeof(Constant) : 0;
   return bytes;

@@ -155,6 +155,7 @@ class Couplings {
   void find(RowId row) noexcept;
   [[nodiscard]] bool is_one_label(RowId row, std::uint8_t& label) const noexcept;
   void write_out(RowId row, Written& out, LaneBits& stands) const noexcept;
+  [[nodiscard]] std::uint32_t find_written() noexcept;
   static void write_lane(std::size_t lane, const VoxelSprings& springs, Written& out,
                          LaneBits& stands) noexcept;
   void write_voxels(RowId row, Written& out, LaneBits& stands) const noexcept;
@@ -183,6 +184,9 @@ class Couplings {
   LazyArray<RowLimits::Written> written_limits_;  // as written_; empty where all links have the same
   std::array<std::array<AxisLimits, 3>, 256> label_limits_;  // [label][axis]
   std::uint32_t written_count_ = 0;
+  // Rows with the same springs share them: along a face or between layers there are thousands of each kind,
+  // and to wait for 2 kB of its own a row was a third of what a whole cycle of 10^6 voxels took.
+  LazyArray<std::uint32_t> written_by_hash_;             // 1 + index into written_; 0: none
   std::array<std::unique_ptr<Constant>, 256> constant_;  // [label]
   Lanes ones_, eighths_;
   std::array<Lanes, 3> zeros_;
