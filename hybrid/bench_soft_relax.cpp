@@ -62,6 +62,7 @@ class Pressed {
     options.materials[2] = limits.top;
     options.anchor_faces = {"-z"};
     object_ = std::make_unique<voxel::SoftObject>(std::make_shared<voxel::Lattice>(volume, options));
+    replica_ = std::make_unique<voxel::Replica>(*object_);
     const double middle = 0.5 * (edge - 1) * kSpacing, top = (edge - 1) * kSpacing;
     tool_.radius = kRadius * kSpacing;
     const double from = top + object_->reach(tool_.radius);
@@ -85,11 +86,13 @@ class Pressed {
   }
 
   [[nodiscard]] voxel::SoftObject& object() { return *object_; }
+  [[nodiscard]] voxel::Replica& replica() { return *replica_; }
   [[nodiscard]] const voxel::ToolInBody& tool() const { return tool_; }
   [[nodiscard]] double force_N() { return glm::length(object_->reaction(tool_).force_N); }
 
  private:
   std::unique_ptr<voxel::SoftObject> object_;
+  std::unique_ptr<voxel::Replica> replica_;  // there from the start, as in a session: the press is news to it
   voxel::ToolInBody tool_;
   std::vector<voxel::VoxelId> near_;
 };
@@ -106,7 +109,7 @@ SoftRow relax_row(int edge, const Limits& limits) {
   std::vector<Moment> moments;
   std::uint64_t updates = 0;
   double us = 0.0, background_us = 0.0;
-  voxel::Replica replica(object);
+  voxel::Replica& replica = pressed.replica();
   int calm = 0;
   for (int n = 0;
        n < kMostRounds && (n == 0 || voxel::Replica::wanted(object)) && us < 60e6 && calm < kCalmRounds;
@@ -121,7 +124,7 @@ SoftRow relax_row(int edge, const Limits& limits) {
       replica.give(object);
       replica.relax();
       replica.take(object);
-      replica.drain(object, object.lattice().grid().rows());
+      while (!replica.drained()) replica.drain(object, object.lattice().grid().rows());
       updates += replica.work() * voxel::kRow;
     }
     const std::uint64_t after = TickTimer::end();

@@ -42,6 +42,7 @@ Multigrid::Multigrid(const Lattice& lattice) : lattice_(lattice), tiles_(lattice
   for (int l = kWrittenAtOnce; l < levels(); ++l) prepare_level(l);
   hats_ = Hats(lattice.grid());
   stopped_.reserve(kMaxStopped);
+  refused_ = LazyArray<Refused>(std::min(kMostRefused, lattice.grid().rows()));
   std::vector<Couplings*> couplings;
   for (const Level& level : levels_) couplings.push_back(level.couplings.get());
   holds_ = std::make_unique<Holds>(lattice, couplings);
@@ -172,7 +173,7 @@ void Multigrid::keep_log() {
 std::size_t Multigrid::memory_bytes() const {
   std::size_t bytes = tiles_.memory_bytes() + log_.memory_bytes() + bricks_.memory_bytes() +
                       holds_->memory_bytes() + hats_.memory_bytes() + resident_bytes(stopped_) +
-                      row_balanced_.resident_bytes() + resident_bytes(balanced_);
+                      row_balanced_.resident_bytes() + resident_bytes(balanced_) + refused_.resident_bytes();
   for (const auto& axis : balance_) bytes += axis.resident_bytes();
   for (const Level& l : levels_) {
     bytes += l.couplings->memory_bytes() + l.flags.resident_bytes() + l.stopped.resident_bytes();

@@ -282,8 +282,8 @@ void Multigrid::spread_hats(int level, int j, int k, const Told& box) noexcept {
   hats_.spread(j, k, tells, whole);
 }
 
-void Multigrid::tell(int level, const Told& box, Displacement& state,
-                     const ObstacleView& obstacles) noexcept {
+void Multigrid::tell(int level, const Told& box, Displacement& state, const ObstacleView& obstacles,
+                     bool again) noexcept {
   const Grid& g = grid(level);
   // Of the two cells around a voxel the lower one.
   const auto below = [](int x) { return (x + 1) / 2 - 1; };
@@ -307,15 +307,17 @@ void Multigrid::tell(int level, const Told& box, Displacement& state,
         const RowId row = g.row(c + 1, j, k);
         if (!prepare(level, row)) continue;
         tell_row(level, row, hats(first), state, obstacles, {first - c * kOctets, last - c * kOctets},
-                 box.first_teller, box.last_teller);
+                 box.first_teller, box.last_teller, again && level == 0);
       }
     }
   }
+  if (again) tell_again(state, obstacles);
 }
 
 void Multigrid::tell_row(int level, RowId row, const std::array<HatRow, 4>& hats, Displacement& state,
-                         const ObstacleView& obstacles, OctetSpan span, int first, int last) noexcept {
-  RowVector correction, refused;
+                         const ObstacleView& obstacles, OctetSpan span, int first, int last,
+                         bool again) noexcept {
+  RowVector correction;
   sum_hats(hats, span, correction);
   // Beyond these lanes no hat reaches.
   const int origin = (grid(level).row_coordinates(row)[0] - 1) * kRow;
@@ -328,24 +330,53 @@ void Multigrid::tell_row(int level, RowId row, const std::array<HatRow, 4>& hats
          i < static_cast<std::size_t>(span.last + 1) * kOctet; ++i)
       correction[axis][i] /= 1.0F + nearer[i];
   }
-  LevelRow r = row_of(level, row, state);
   log_.note(level, row);
+  Refused at_once;
+  Refused& refused = again && refused_count_ < refused_.size() ? refused_[refused_count_] : at_once;
+  correct(level, row, correction, state, obstacles, span, refused);
+  if (refused.axes == 0) return;
+  if (&refused != &at_once) {
+    ++refused_count_;
+  } else {
+    take_back_refused(level, refused);
+  }
+}
+
+void Multigrid::correct(int level, RowId row, const RowVector& correction, Displacement& state,
+                        const ObstacleView& obstacles, OctetSpan span, Refused& refused) noexcept {
+  LevelRow r = row_of(level, row, state);
   RowCorrection done;
   if (level > 0) {
-    done = correct_row(r, nullptr, span, correction, refused);
+    done = correct_row(r, nullptr, span, correction, refused.way);
   } else {
     // A voxel that pulls against a link at its limit stays, until the limit lets go of it.
     if (has(0, row, limited)) r.stopped = at(0).stopped.data() + static_cast<std::size_t>(row) * kRow;
-    done = correct_voxels(r, row, correction, state, obstacles, span, refused);
+    done = correct_voxels(r, row, correction, state, obstacles, span, refused.way);
   }
-  if (done.refused != 0) take_back_refused(level, row, refused, done.refused, span);
+  refused.row = row;
+  refused.axes = done.refused;
+  refused.span = span;
   note_change(level, row, done.most_m);
 }
 
-void Multigrid::take_back_refused(int level, RowId row, const RowVector& refused, unsigned axes,
-                                  OctetSpan span) noexcept {
+void Multigrid::tell_again(Displacement& state, const ObstacleView& obstacles) noexcept {
+  while (refused_count_ > 0) {
+    Refused& refused = refused_[--refused_count_];
+    RowVector left{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if ((refused.axes >> axis & 1U) == 0) continue;
+      for (int i = refused.span.first * kOctet; i < (refused.span.last + 1) * kOctet; ++i)
+        left[axis][static_cast<std::size_t>(i)] = refused.way[axis][static_cast<std::size_t>(i)];
+    }
+    correct(0, refused.row, left, state, obstacles, refused.span, refused);
+    if (refused.axes != 0) take_back_refused(0, refused);
+  }
+}
+
+void Multigrid::take_back_refused(int level, const Refused& refused) noexcept {
+  const OctetSpan span = refused.span;
   Level& coarse = at(level + 1);
-  const auto c = grid(level).row_coordinates(row);
+  const auto c = grid(level).row_coordinates(refused.row);
   const RowId above = coarse.couplings->grid().row((c[0] - 1) / 2 + 1, c[1] / 2, c[2] / 2);
   log_.note(level + 1, above);
   const int half = (c[0] - 1) % 2;
@@ -355,8 +386,8 @@ void Multigrid::take_back_refused(int level, RowId row, const RowVector& refused
   for (std::size_t axis = 0; axis < 3; ++axis) {
     value[axis] = coarse.value[axis].data() + static_cast<std::size_t>(above) * kRow;
     told[axis] = coarse.told[axis].data() + static_cast<std::size_t>(above) * kRow;
-    if ((axes >> axis & 1U) == 0) continue;
-    std::copy_n(refused[axis].begin() + span.first * kOctet, (span.last - span.first + 1) * kOctet,
+    if ((refused.axes >> axis & 1U) == 0) continue;
+    std::copy_n(refused.way[axis].begin() + span.first * kOctet, (span.last - span.first + 1) * kOctet,
                 lanes[axis].begin() + span.first * kOctet);
     add_pairs(lanes[axis].data(), pairs, sums[axis].data() + half * kRow / 2);
   }

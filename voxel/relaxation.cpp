@@ -25,7 +25,8 @@ constexpr double kDrift = 2e-5;
 // Spacings that a coarse cell may have to tell. Between a body and a plate cells ran away to 1e30 m in ten
 // ticks; with ten spacings, or four, some went on running to and fro when the body had left.
 constexpr float kFarthest = 2.0F;
-constexpr std::uint64_t kNextFirst = 7919;  // of these voxels is looked at first in the next round
+constexpr std::uint64_t kNextFirst = 7919;           // of these voxels is looked at first in the next round
+constexpr int kContactMargin = 3, kWideMargin = 14;  // cells round a contact that are smoothed, on each level
 constexpr int kNear = 2;  // rows that a cycle round a contact reads beyond those it brings to rest
 constexpr std::uint64_t kBesideContact = 2;  // this part of the budget is left beside cycles round a contact
 // Loads of bricks: what a row of them takes, in voxel updates, and what part of a budget they may have.
@@ -146,8 +147,7 @@ void Relaxation::run_cycle(Displacement& state, const ObstacleView& obstacles,
   multigrid_.tiles().clear();
   round_left_ = 0;
   running_residual_N_ = 0.0;
-  const auto& dims = lattice_.grid().dims;
-  lay_boxes({0, 0, 0}, {dims[0] - 1, dims[1] - 1, dims[2] - 1}, 0);
+  lay_whole_boxes();
   cycle(state, obstacles, Look::active, false);
   end_round(state, obstacles, running_residual_N_);
 }
@@ -157,6 +157,29 @@ std::size_t Relaxation::relax_contact(Displacement& state, const ObstacleView& o
                                       bool again) noexcept {
   contact_relaxed_ = true;
   hold_what_stands(state, held);
+  lay_contact_boxes(pressed, kContactMargin);
+  const RowBox& b = boxes(0).smoothed;
+  const Grid& g = lattice_.grid();
+  near_.first = {b.q0 / kOctets + 1, std::max(b.j0 - kNear, 0), std::max(b.k0 - kNear, 0)};
+  near_.last = {b.q1 / kOctets + 1, std::min(b.j1 + kNear, g.dims[1] - 1),
+                std::min(b.k1 + kNear, g.dims[2] - 1)};
+  cycle(state, obstacles, Look::all, apart_ && again);
+  return octets_of_cycle();
+}
+
+std::size_t Relaxation::relax_widely(Displacement& state, const ObstacleView& obstacles,
+                                     std::span<const VoxelId> held,
+                                     std::span<const VoxelId> pressed) noexcept {
+  hold_what_stands(state, held);
+  multigrid_.release_limited();
+  lay_contact_boxes(pressed, kWideMargin);
+  tells_again_ = true;
+  cycle(state, obstacles, Look::all, false);
+  tells_again_ = false;
+  return octets_of_cycle();
+}
+
+void Relaxation::lay_contact_boxes(std::span<const VoxelId> pressed, int margin) noexcept {
   std::array<int, 3> low = lattice_.coordinates(pressed.front()), high = low;
   for (const VoxelId v : pressed) {
     const auto c = lattice_.coordinates(v);
@@ -172,14 +195,7 @@ std::size_t Relaxation::relax_contact(Displacement& state, const ObstacleView& o
     high[d] = low[d] + kMaxNear;
   }
   const int wide = std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
-  lay_boxes(low, high, wide);
-  const RowBox& b = boxes(0).smoothed;
-  const Grid& g = lattice_.grid();
-  near_.first = {b.q0 / kOctets + 1, std::max(b.j0 - kNear, 0), std::max(b.k0 - kNear, 0)};
-  near_.last = {b.q1 / kOctets + 1, std::min(b.j1 + kNear, g.dims[1] - 1),
-                std::min(b.k1 + kNear, g.dims[2] - 1)};
-  cycle(state, obstacles, Look::all, apart_ && again);
-  return octets_of_cycle();
+  lay_boxes(low, high, wide, margin);
 }
 
 std::uint64_t Relaxation::relax_tile(Displacement& state, const ObstacleView& obstacles,
@@ -187,7 +203,7 @@ std::uint64_t Relaxation::relax_tile(Displacement& state, const ObstacleView& ob
   const TileQueue::Tile t = multigrid_.tiles().tile(number);
   constexpr int kSide = TileQueue::kSide;
   lay_boxes({t.column * kRow, t.j * kSide, t.k * kSide},
-            {(t.column + 1) * kRow - 1, (t.j + 1) * kSide - 1, (t.k + 1) * kSide - 1}, -1);
+            {(t.column + 1) * kRow - 1, (t.j + 1) * kSide - 1, (t.k + 1) * kSide - 1}, kNoContact, 0);
   cycle(state, obstacles, Look::all, false);
   std::uint64_t updates = 0;
   for (const LevelBoxes& b : boxes_) {

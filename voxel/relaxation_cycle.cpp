@@ -14,8 +14,7 @@ constexpr int kContactSweeps = 4;  // of the coarsest level of a cycle round a c
 // four, or as many as reach three radii of the contact, the force on the way into organs was 4 to 25 %
 // higher.)
 constexpr int kContactLevels = 5;
-constexpr int kContactMargin = 3;  // cells round the contact that are smoothed, on each level
-constexpr int kTileMargin = 3;     // … round a tile, from level 1 on
+constexpr int kTileMargin = 3;  // cells round a tile that are smoothed, from level 1 on
 
 }  // namespace
 
@@ -45,12 +44,13 @@ Relaxation::RowBox Relaxation::clipped(int level, const RowBox& b) const noexcep
 }
 
 // The boxes of a cycle that is to bring voxels low … high to rest: on each level so many cells more on every
-// side as the way that a force at the middle is felt, in cells; `wide` is how wide the contact is, or
-// negative where there is none and the voxels themselves are enough.
-void Relaxation::lay_boxes(const std::array<int, 3>& low, const std::array<int, 3>& high, int wide) noexcept {
+// side as the way that a force at the middle is felt: `margin` and a quarter of how `wide` the contact is, in
+// cells, or where there is none the voxels themselves and a little more of their cells.
+void Relaxation::lay_boxes(const std::array<int, 3>& low, const std::array<int, 3>& high, int wide,
+                           int contact_margin) noexcept {
   const int last = multigrid_.levels() - 1;
   for (int l = 0; l <= last; ++l) {
-    const int margin = wide >= 0 ? kContactMargin + (wide >> l) / 4 : l == 0 ? 0 : kTileMargin;
+    const int margin = wide != kNoContact ? contact_margin + (wide >> l) / 4 : l == 0 ? 0 : kTileMargin;
     std::array<int, 3> from{}, to{};
     for (std::size_t d = 0; d < 3; ++d) {
       from[d] = std::max(0, (low[d] >> l) - margin);
@@ -122,7 +122,7 @@ void Relaxation::tell_box(int level, Displacement& state, const ObstacleView& ob
   if (!any) return;
   const RowBox& t = boxes(level).told;
   multigrid_.tell(level, {t.q0, t.q1, t.j0, t.j1, t.k0, t.k1, b.first_teller, b.last_teller}, state,
-                  obstacles);
+                  obstacles, tells_again_);
 }
 
 // Was anything that a coarse row holds moved since it was passed on?
@@ -181,9 +181,20 @@ void Relaxation::cycle(Displacement& state, const ObstacleView& obstacles, Look 
   }
 }
 
-void Relaxation::renew_coarse(Displacement& state, const ObstacleView& obstacles) noexcept {
+void Relaxation::lay_whole_boxes() noexcept {
   const auto& dims = lattice_.grid().dims;
-  lay_boxes({0, 0, 0}, {dims[0] - 1, dims[1] - 1, dims[2] - 1}, 0);
+  lay_boxes({0, 0, 0}, {dims[0] - 1, dims[1] - 1, dims[2] - 1}, kNoContact, 0);
+}
+
+void Relaxation::tell_all(Displacement& state, const ObstacleView& obstacles) noexcept {
+  lay_whole_boxes();
+  tells_again_ = true;
+  for (int l = last_level() - 1; l >= 0; --l) tell_box(l, state, obstacles);
+  tells_again_ = false;
+}
+
+void Relaxation::renew_coarse(Displacement& state, const ObstacleView& obstacles) noexcept {
+  lay_whole_boxes();
   stir_all();
   for (int l = 1; l < multigrid_.levels(); ++l) {
     for_rows(l, boxes(l).parents,

@@ -113,6 +113,62 @@ TEST(Replica, WhatTheToolLeftComesToRestAndIsLeftAlone) {
   EXPECT_LT(most, 1e-3 * kH);
 }
 
+// Ten spacings deep, in steps and without a cycle between them, as a tool that jumps finds it: everything
+// that moved is at its limits, and has spacings to go.
+ToolInBody press_at_once(SoftBlock& soft) {
+  ToolInBody tool;
+  constexpr int steps = 40;
+  for (int n = 1; n <= steps; ++n) {
+    tool = soft.ball(10 * kH, 10 * kH * n / steps);
+    soft.touch(tool, 13 * kH);
+    if (n > 1) soft.object->follow({0.0, 0.0, -10 * kH / steps});
+    soft.object->push_out(tool);
+  }
+  return tool;
+}
+
+constexpr std::array<int, 3> kWide{75, 73, 57};
+constexpr LinkMaterial kLoose{.stretch_min = 0.05, .stretch_max = 10.0, .shear = 10.0};
+
+TEST(Replica, AJumpIsFeltRightAfterThreeResults) {
+  for (const LinkMaterial& material : {LinkMaterial{}, kLoose}) {
+    SoftBlock soft(kWide, kH, material), there(kWide, kH, material);
+    Replica replica(*soft.object);
+    const ToolInBody tool = press_at_once(soft);
+    const double wanted = there.press(tool, 13 * kH, 1e-5, 200).force_N.z;
+    for (int n = 0; n < 3; ++n) {
+      soft.object->relax_near(tool, 2);
+      exchange(replica, soft, 250);
+      soft.touch(tool, 13 * kH);
+      soft.object->push_out(tool);
+    }
+    soft.object->relax_near(tool, 2);
+    EXPECT_NEAR(soft.object->reaction(tool).force_N.z, wanted, 0.05 * wanted);
+    EXPECT_EQ(voxel::validate(*soft.lattice, soft.object->state(), kRoundings), "");
+  }
+}
+
+// A result moves rows by spacings, and none can go there before those beside it: all get there all the same.
+TEST(Replica, WhatMovesFarIsAddedWhole) {
+  for (const LinkMaterial& material : {LinkMaterial{}, kLoose}) {
+    SoftBlock soft(kWide, kH, material);
+    Replica replica(*soft.object);
+    const ToolInBody tool = press_at_once(soft);
+    soft.object->relax_near(tool, 2);
+    exchange(replica, soft, 250);
+    std::size_t moved = 0, behind = 0;
+    for (voxel::VoxelId v = 0; v < soft.lattice->size(); ++v) {
+      if (!soft.lattice->filled(v)) continue;
+      const glm::dvec3 here = soft.object->state().at(v),
+                       there = replica.displacement_at(soft.lattice->rest(v));
+      moved += glm::length(there) > 0.1 * kH ? 1 : 0;
+      behind += glm::distance(here, there) > 0.1 * kH ? 1 : 0;
+    }
+    EXPECT_GT(moved, 50'000U);
+    EXPECT_LT(behind, moved / 100);
+  }
+}
+
 // Far from the contact small changes wait, but not for ever: at rest both know the same.
 TEST(Replica, WhatWasKeptBackIsPassedOnAtRest) {
   SoftBlock soft({41, 65, 65}, kH, elastic(1e4, 0.3));
