@@ -61,13 +61,15 @@ template <std::size_t... o>
 
 HYBRID_WIDE void row_forces(const NodeStencil& inside, const NodeField& field, std::size_t first,
                             std::size_t count, const std::array<float*, 3>& force) {
-  for (std::size_t done = 0; done + kLanes <= count; done += kLanes) {
+  // The last ones with some before them once more: one by one they took a tenth of a block's whole cycle.
+  for (std::size_t done = 0; done < count && count >= kLanes; done += kLanes) {
+    const std::size_t from = std::min(done, count - kLanes);
     Lanes self[3], sum[3] = {};
-    for (std::size_t c = 0; c < 3; ++c) load(self[c], field.u[c] + first + done);
-    add_pairs(std::make_index_sequence<kSelf>{}, inside, field, first + done, self, sum);
-    for (std::size_t c = 0; c < 3; ++c) std::memcpy(force[c] + done, &sum[c], sizeof sum[c]);
+    for (std::size_t c = 0; c < 3; ++c) load(self[c], field.u[c] + first + from);
+    add_pairs(std::make_index_sequence<kSelf>{}, inside, field, first + from, self, sum);
+    for (std::size_t c = 0; c < 3; ++c) std::memcpy(force[c] + from, &sum[c], sizeof sum[c]);
   }
-  for (std::size_t i = count / kLanes * kLanes; i < count; ++i) {
+  for (std::size_t i = 0; i < count && count < kLanes; ++i) {
     const std::array<float, 3> f = node_force(inside, field, first + i);
     for (std::size_t c = 0; c < 3; ++c) force[c][i] = f[c];
   }

@@ -184,21 +184,48 @@ void BrickLoads::mixed_loads(RowId row, const NodeField& field, std::array<Lanes
     }
     return softest;
   };
+  // Along a row little changes: mostly the cells are those before.
+  std::array<std::uint8_t, kRow + 1> changes{};  // [x] is slice x + 1 another than slice x?
+  for (const Materials& m : material) {
+    for (std::size_t x = 0; x < changes.size(); ++x) changes[x] |= static_cast<std::uint8_t>(m[x] ^ m[x + 1]);
+  }
+  // Where all cells are of one material, by the octet: in rows that end on a face of a block nearly all are.
+  const Kind* one = nullptr;
+  std::size_t since = 0;
+  const auto end_run = [&](std::size_t i) {
+    if (one != nullptr)
+      row_forces(one->inside, field, kOwn + since, i - since,
+                 {out[0].data() + since, out[1].data() + since, out[2].data() + since});
+    one = nullptr;
+  };
   std::array<std::uint8_t, 4> before = cells_at(0);
   for (std::size_t i = 0; i < kRow; ++i) {
-    const std::array<std::uint8_t, 4> after = cells_at(i + 1);
+    const std::array<std::uint8_t, 4> after =
+        changes[i] == 0 && changes[i + 1] == 0 ? before : cells_at(i + 1);
+    const std::uint8_t first = before[0];
+    const auto same = [first](std::uint8_t m) { return m == first; };
+    const bool all_one =
+        std::all_of(before.begin(), before.end(), same) && std::all_of(after.begin(), after.end(), same);
+    const Kind* here = all_one && first != 0 ? kind_[first].get() : nullptr;
+    if (here != one || here == nullptr) {
+      end_run(i);
+      one = here;
+      since = i;
+    }
+    const std::array<std::uint8_t, 4> cells_before = std::exchange(before, after);
+    if (here != nullptr) continue;
     std::array<const BrickFloats*, 8> bricks{};
     bool any = false;
     for (std::size_t octant = 0; octant < 8; ++octant) {
-      const std::uint8_t m = ((octant & 1) != 0 ? after : before)[octant >> 1];
+      const std::uint8_t m = ((octant & 1) != 0 ? after : cells_before)[octant >> 1];
       if (m == 0 || kind_[m] == nullptr) continue;
       bricks[octant] = &kind_[m]->brick;
       any = true;
     }
     const std::array<float, 3> load = any ? node_force(bricks, field, kOwn + i) : std::array<float, 3>{};
     for (std::size_t axis = 0; axis < 3; ++axis) out[axis][i] = load[axis];
-    before = after;
   }
+  end_run(kRow);
 }
 
 std::size_t BrickLoads::memory_bytes() const {
