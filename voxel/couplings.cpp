@@ -213,7 +213,8 @@ void add_to_hash(std::uint64_t& hash, const T& what) {
 
 template <class T>
 bool same_bits(const T& a, const T& b) {
-  return std::memcmp(&a, &b, sizeof(T)) == 0;
+  const auto* bytes = reinterpret_cast<const char*>(&a);
+  return std::equal(bytes, bytes + sizeof(T), reinterpret_cast<const char*>(&b));
 }
 
 }  // namespace

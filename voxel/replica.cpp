@@ -163,8 +163,10 @@ void Replica::open_given() noexcept {
   if (given_.count() > 0 || !given_obstacles_.empty()) relaxation_.wake();
   to.log().clear();
   // One whole cycle at least between two jumps: all else has its turn, however long the tool goes on.
-  if (moved_m > kJumped * static_cast<float>(lattice_.min_spacing_m()) && quick_ == 0 && !was_quick_)
+  if (moved_m > kJumped * static_cast<float>(lattice_.min_spacing_m()) && quick_ == 0 && !was_quick_) {
     quick_ = kQuickResults;
+    far_ = kQuickResults + kUnsettled;
+  }
   if (given_pressed_ == 0) quick_ = 0;
 }
 
@@ -189,6 +191,8 @@ void Replica::relax() noexcept {
   open_given();
   const ObstacleView obstacles{obstacles_, &lattice_};
   was_quick_ = quick_ > 0;
+  found_far_ = far_ > 0;
+  if (found_far_) --far_;
   if (was_quick_) {
     relax_quickly(obstacles);
   } else {
@@ -301,6 +305,7 @@ bool Replica::take_row(SoftObject& object, std::size_t n) noexcept {
     as_found = std::equal(wanted[axis].begin(), wanted[axis].end(), object.state_.u[axis].data() + at(row));
   if (as_found) return false;
   to.log().note(0, row);
+  if (!in_turns_) return false;
   float most = 0.0F;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const float* there = object.state_.u[axis].data() + at(row);
@@ -318,6 +323,7 @@ void Replica::take(SoftObject& object) noexcept {
   taking_ = 1 - taking_;
   object.relaxation_.take_over(residual_N_);
   again_.clear();
+  in_turns_ = found_far_;
   for (drained_ = 0; drained_ < near_count_; ++drained_) {
     if (take_row(object, drained_)) again_.put(drained_);
   }
