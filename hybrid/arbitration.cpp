@@ -30,6 +30,10 @@ constexpr double kPartAt = 1.75;
 constexpr double kHoldAt = 0.1, kLetGoAt = 0.3;
 constexpr std::size_t kFarTurns = 4;  // ticks in which each pair that is too far apart to press is looked at
 constexpr int kPairSweeps = 2;
+// Rounds in which an object that the tool does not press gives way alone, and to how much of an overlap, in
+// touching distances: at rest. (To any, a tool at 1 m/s drove one object half a spacing into the other.)
+constexpr int kFirstGive = 2;
+constexpr double kGivesAlone = 0.05;
 
 struct NearestRigid {
   glm::dvec3 normal{0.0};  // away from the surface, scene frame, unit
@@ -336,24 +340,45 @@ void renew_pairs(const World& world, WorldState& state) noexcept {
   }
 }
 
-// What links alone could not part, the chains of both follow: first of both, then, where anchors held one, of
-// the other.
+// An object that the tool presses is held by it where its chain is tight, so the other one gives way.
+// (Shared, what was pushed back came to the tool, which gave way to it in every tick and came again in the
+// next: the hand felt up to two thirds more than tissue pressed the tool with, and nothing came to rest.)
+voxel::GiveWay first_to_give(const World& world, WorldState& state, const VoxelPair& pair) noexcept {
+  const auto [ia, ib] = world.meeting[pair.meeting];
+  const bool of_a = state.reactions[ia].pressed > 0, of_b = state.reactions[ib].pressed > 0;
+  if (of_a == of_b) return voxel::GiveWay::both;
+  const double gap = with_objects(world, state, pair.meeting, [&](const auto& a, const auto& b) {
+    return voxel::gap_of_pair(a, b, pair.pressed);
+  });
+  if (gap < -kGivesAlone * pair.pressed.reach_m) return voxel::GiveWay::both;
+  return of_a ? voxel::GiveWay::second : voxel::GiveWay::first;
+}
+
+// What links alone could not part, the chains follow: of who gives way first, then of both, then, where
+// anchors held one, of the other.
 void part_pairs(const World& world, WorldState& state) noexcept {
+  using voxel::GiveWay;
   for (VoxelPair& pair : state.pairs) {
     if (may_press(world, state, pair)) renew_pair(world, state, pair);
   }
-  for (const voxel::GiveWay who :
-       {voxel::GiveWay::both, voxel::GiveWay::both, voxel::GiveWay::second, voxel::GiveWay::first}) {
+  const auto part = [&](const auto& who) {
     bool any = false;
     // Those too far apart to be held as well: the chain takes along more than was dragged.
     for (const VoxelPair& pair : state.pairs) {
-      any = with_objects(
-                world, state, pair.meeting,
-                [&](const auto& a, const auto& b) { return voxel::part_pair(a, b, pair.pressed, who); }) ||
+      any = with_objects(world, state, pair.meeting,
+                         [&](const auto& a, const auto& b) {
+                           return voxel::part_pair(a, b, pair.pressed, who(pair));
+                         }) ||
             any;
     }
-    if (!any) return;
     for (const auto& object : state.soft) object->settle_dragged();
+    return any;
+  };
+  for (int n = 0; n < kFirstGive; ++n) {
+    if (!part([&](const VoxelPair& pair) { return first_to_give(world, state, pair); })) return;
+  }
+  for (const GiveWay who : {GiveWay::both, GiveWay::both, GiveWay::second, GiveWay::first}) {
+    if (!part([&](const VoxelPair&) { return who; })) return;
   }
 }
 
@@ -374,6 +399,14 @@ void relax_pairs(const World& world, WorldState& state) noexcept {
     for_pairs(voxel::load_pair);
   };
   load();
+  // What hangs on voxels of an object that the tool presses may hang on the tool as well, which feels it.
+  for (std::size_t o = 0; o < state.soft.size(); ++o) {
+    if (state.reactions[o].pressed == 0) {
+      state.soft[o]->find_hanging_on_pairs();
+    } else {
+      state.soft[o]->forget_hanging_on_pairs();
+    }
+  }
   for (int sweep = 0; sweep < kPairSweeps; ++sweep) for_pairs(voxel::relax_pair);
   part_pairs(world, state);
   load();  // by the facets as they now are

@@ -21,7 +21,7 @@ constexpr double kInside = -1e-9;  // barycentric
 constexpr VoxelId kNone = std::numeric_limits<VoxelId>::max();
 
 struct End {
-  glm::dvec3 free_place;  // where its links and the other pairs would have it, scene frame
+  glm::dvec3 free_place;  // where links, what hangs on it and the other pairs would have it, scene frame
   glm::dvec3 compliance;  // per body axis (m/N); 0 where it is anchored
 };
 
@@ -35,10 +35,26 @@ glm::dvec3 place_of(const PosedObject& o, VoxelId v) noexcept {
   return to_scene(o, o.object.position(v));
 }
 
+// Per body axis (m/N), of a voxel and what hangs on it; 0 where it is anchored.
+glm::dvec3 compliance_of(const PosedObject& o, VoxelId v) noexcept {
+  glm::dvec3 w = o.object.compliance(v);
+  const HeldLoad hanging = o.object.hanging_on_pair(v);
+  for (int axis = 0; axis < 3; ++axis) {
+    if (hanging.stiffness_N_per_m[axis] > 0.0) w[axis] = 1.0 / hanging.stiffness_N_per_m[axis];
+  }
+  return w;
+}
+
 End end_of(const PosedObject& o, VoxelId v) noexcept {
-  const glm::dvec3 w = o.object.compliance(v);
-  const glm::dvec3 u = o.object.free_displacement(v) + w * o.object.pair_load(v);
-  return {to_scene(o, o.object.lattice().rest(v) + u), w};
+  const glm::dvec3 own = o.object.compliance(v), w = compliance_of(o, v);
+  const HeldLoad hanging = o.object.hanging_on_pair(v);
+  glm::dvec3 u = o.object.free_displacement(v);
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!(hanging.stiffness_N_per_m[axis] > 0.0)) continue;
+    const double now = o.object.state().at(v)[axis];
+    u[axis] = now + w[axis] * ((u[axis] - now) / own[axis] + hanging.force_N[axis]);
+  }
+  return {to_scene(o, o.object.lattice().rest(v) + u + w * o.object.pair_load(v)), w};
 }
 
 void place(const PosedObject& o, VoxelId v, const glm::dvec3& in_scene) noexcept {
@@ -157,7 +173,7 @@ void for_corners(const PressedPair& pair, const Visit& visit) noexcept {
 double yielding_of_facet(const PosedObject& b, const PressedPair& pair) noexcept {
   double sum = 0.0;
   for_corners(pair, [&](VoxelId v, double share, std::size_t) {
-    sum += share * share * yielding(b, b.object.compliance(v), pair.across).along;
+    sum += share * share * yielding(b, compliance_of(b, v), pair.across).along;
   });
   return sum;
 }
@@ -177,14 +193,14 @@ void push_the_rest(const PosedObject& a, const PosedObject& b, PressedPair& pair
   const double left = overlap_of(a, b, pair);
   if (left > least && yielding_b > 0.0) {
     for_corners(pair, [&](VoxelId v, double share, std::size_t) {
-      const glm::dvec3 way = yielding(b, b.object.compliance(v), pair.across).way;
+      const glm::dvec3 way = yielding(b, compliance_of(b, v), pair.across).way;
       b.object.move(v, b.object.state().at(v) + (share * left / yielding_b) * way);
     });
     press_more(a, b, pair, std::max(left - overlap_of(a, b, pair), 0.0) / yielding_b);
   }
   const double rest = overlap_of(a, b, pair);
   if (rest > least && yielding_a > 0.0) {
-    const glm::dvec3 way = yielding(a, a.object.compliance(pair.a), pair.across).way;
+    const glm::dvec3 way = yielding(a, compliance_of(a, pair.a), pair.across).way;
     a.object.move(pair.a, a.object.state().at(pair.a) - (rest / yielding_a) * way);
     press_more(a, b, pair, std::max(rest - overlap_of(a, b, pair), 0.0) / yielding_a);
   }
@@ -321,7 +337,7 @@ bool part_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pa
   if (!pair.over) return false;
   const double overlap = overlap_of(a, b, pair);
   if (overlap <= kParted * pair.reach_m) return false;
-  const double of_first = yielding(a, a.object.compliance(pair.a), pair.across).along;
+  const double of_first = yielding(a, compliance_of(a, pair.a), pair.across).along;
   const double of_facet = yielding_of_facet(b, pair);
   const double first = who == GiveWay::second ? 0.0 : of_first;
   const double second = who == GiveWay::first ? 0.0 : of_facet;

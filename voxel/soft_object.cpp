@@ -38,6 +38,7 @@ SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice)
       relaxation_(*lattice_),
       pair_held_(lattice_->surface().size()),
       pair_load_(lattice_->surface().size()),
+      hanging_entry_(lattice_->surface().size()),
       tight_rows_(*lattice_),
       drawn_rows_(*lattice_, kMaxTouched),
       carried_mark_(lattice_->size()),
@@ -51,6 +52,8 @@ SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice)
   moves_.reserve(surface.size());
   held_voxels_.reserve(surface.size());
   all_held_.reserve(surface.size() + kMaxTouched);
+  pair_roots_.reserve(kMaxTouched);
+  hanging_on_pairs_.reserve(kMaxTouched);
   roots_.reserve(kMaxTouched);
   carried_.reserve(kMaxCarried + kMaxTouched);
   hanging_.reserve(kMaxCarried + kMaxTouched);
@@ -476,9 +479,10 @@ std::size_t SoftObject::memory_bytes() const {
       resident_bytes(hanging_) + carried_mark_.resident_bytes() + carried_index_.resident_bytes() +
       tight_rows_.memory_bytes() + drawn_rows_.memory_bytes();
   const std::size_t others = pair_held_.resident_bytes() + pair_load_.resident_bytes() +
-                             resident_bytes(obstacles_) + resident_bytes(moved_rows_) +
-                             row_moved_.resident_bytes() + resident_bytes(changed_obstacles_) +
-                             resident_bytes(obstacle_changed_);
+                             resident_bytes(pair_roots_) + resident_bytes(hanging_on_pairs_) +
+                             hanging_entry_.resident_bytes() + resident_bytes(obstacles_) +
+                             resident_bytes(moved_rows_) + row_moved_.resident_bytes() +
+                             resident_bytes(changed_obstacles_) + resident_bytes(obstacle_changed_);
   return sizeof(*this) + lattice_->memory_bytes() + state + contact + others + chain_.memory_bytes() +
          relaxation_.memory_bytes();
 }

@@ -125,6 +125,17 @@ class SoftObject {
   void clear_pair_load(VoxelId v) noexcept;
   void add_pair_load(VoxelId v, const glm::dvec3& force_N) noexcept;
   [[nodiscard]] glm::dvec3 pair_load(VoxelId v) const noexcept;
+  // What hangs by tight links on the voxels that pairs press, kMaxTouched of them at most: as it is now,
+  // until it is forgotten.
+  void find_hanging_on_pairs() noexcept;
+  void forget_hanging_on_pairs() noexcept;
+  // Of one of them, what that pulls it by, without its own links, and the springs of them all; 0: nothing
+  // hangs on it.
+  [[nodiscard]] HeldLoad hanging_on_pair(VoxelId v) const noexcept {
+    if (hanging_on_pairs_.empty()) return {};
+    const std::uint32_t entry = hanging_entry_[lattice_->surface_number(v)];
+    return entry == 0 ? HeldLoad{} : hanging_on_pairs_[entry - 1U];
+  }
   // For the pair solver. Where its links alone would have a voxel, and how far a force of 1 N on it alone
   // would move it (m/N): both 0 where it is anchored.
   [[nodiscard]] glm::dvec3 free_displacement(VoxelId v) noexcept;
@@ -220,6 +231,7 @@ class SoftObject {
   void gather_load_with_pairs(int axis) noexcept;
   void add_hanging(int axis, std::span<const VoxelId> pressed, std::span<HeldLoad> loads) noexcept;
   void add_stiffness(int axis, std::span<HeldLoad> loads) noexcept;
+  void hand_on(int axis) noexcept;
   void let_go_of_carried() noexcept;
   [[nodiscard]] ObstacleView obstacle_view() const { return {obstacles_, lattice_.get()}; }
 
@@ -227,9 +239,12 @@ class SoftObject {
   Displacement state_;
   ChainMail chain_;
   Relaxation relaxation_;
-  LazyArray<std::uint16_t> pair_held_;  // [surface number] pairs with other soft objects it is in
-  LazyArray<glm::vec3> pair_load_;      // [surface number] and with what force (N)
-  std::vector<Obstacle> obstacles_;     // [surface number], empty when there is none
+  LazyArray<std::uint16_t> pair_held_;      // [surface number] pairs with other soft objects it is in
+  LazyArray<glm::vec3> pair_load_;          // [surface number] and with what force (N)
+  std::vector<VoxelId> pair_roots_;         // what pairs press, hardest first
+  std::vector<HeldLoad> hanging_on_pairs_;  // [as pair_roots_]; empty: nothing hangs on any
+  LazyArray<std::uint32_t> hanging_entry_;  // [surface number] 1 + index into these; 0: none
+  std::vector<Obstacle> obstacles_;         // [surface number], empty when there is none
   std::vector<RowId> moved_rows_;
   LazyArray<std::uint8_t> row_moved_;             // 1: among them; empty: no obstacles
   std::vector<std::uint32_t> changed_obstacles_;  // surface numbers, since a replica was last told
