@@ -115,7 +115,7 @@ class Multigrid {
   // has far to go is in its own way: of 9,475 spacings that 3,044 rows did not follow when a cone of tight
   // links was told how to open, 70 were left then.)
   struct Told {
-    int q0, q1, j0, j1, k0, k1;     // octets and rows of the level, all included; q0 even, q1 odd
+    int q0, q1, j0, j1, k0, k1;     // octets and rows of the level, all included
     int first_teller, last_teller;  // cells of the next coarser level along x
   };
   void tell(int level, const Told& box, Displacement& state, const ObstacleView& obstacles,

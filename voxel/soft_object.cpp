@@ -22,7 +22,7 @@ constexpr int kMostCycles = 2;
 // second brought little and took what the tick did not have: a brain that is pressed feels the same within
 // 2 %, and of 6,750 ticks in real time 91 missed their deadlines in place of 278; an abdomen 10 of 52,000 in
 // place of 69.
-constexpr std::size_t kCheap = 4000;
+constexpr std::size_t kCheap = 2500;
 constexpr double kJump = 0.1;    // … unless the contact has as many spacings to go still
 constexpr int kProjections = 3;  // of a pressed voxel onto the tool, in search of its least energy
 constexpr double kSlides = 0.1;  // sin² between tool and obstacle; where they meet nearly flat it is squeezed
