@@ -143,7 +143,7 @@ class Relaxation {
   // ---- one cycle (relaxation_cycle.cpp) ----
   static constexpr int kNoContact = -1;
   void lay_boxes(const std::array<int, 3>& low, const std::array<int, 3>& high, int wide,
-                 int margin) noexcept;
+                 int contact_margin) noexcept;
   void lay_contact_boxes(std::span<const VoxelId> pressed, int margin) noexcept;
   void lay_whole_boxes() noexcept;
   void cycle(Displacement& state, const ObstacleView& obstacles, Look look, bool smoothed) noexcept;

@@ -44,7 +44,7 @@ Relaxation::RowBox Relaxation::clipped(int level, const RowBox& b) const noexcep
 }
 
 // The boxes of a cycle that is to bring voxels low … high to rest: on each level so many cells more on every
-// side as the way that a force at the middle is felt: `margin` and a quarter of how `wide` the contact is, in
+// side as the way that a force at the middle is felt: `contact_margin` and a quarter of how `wide` it is, in
 // cells, or where there is none the voxels themselves and a little more of their cells.
 void Relaxation::lay_boxes(const std::array<int, 3>& low, const std::array<int, 3>& high, int wide,
                            int contact_margin) noexcept {
