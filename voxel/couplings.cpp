@@ -19,6 +19,7 @@ Couplings::Couplings(const Lattice& lattice, const Couplings* finer)
       label_(grid_.rows()),
       written_at_(grid_.rows()),
       written_(grid_.rows()),
+      written_cells_(finer == nullptr ? 0 : grid_.rows()),
       written_stands_(grid_.rows()),
       written_by_hash_(std::bit_ceil(2 * grid_.rows())) {
   if (finer_ == nullptr) {
@@ -118,15 +119,12 @@ Spring Couplings::link(const std::array<int, 3>& cell, int d) const noexcept {
   const VoxelId v = grid_.at(cell[0], cell[1], cell[2]);
   const RowId row = v / kRow;
   if (level_ >= kKept) return link_[ud][v];
-  if (kind_[row] == one_label) {
-    const Constant& c = *constant_[label_[row]];
-    return {c.along[ud][0], c.across[ud][0]};
+  if (kind(row) == one_label || kind(row) == mixed) {
+    const float *along = nullptr, *across = nullptr;
+    find_up(row, ud, along, across);
+    return {along[v % kRow], across[v % kRow]};
   }
-  if (kind_[row] == mixed) {
-    const Written& w = written_[written_at_[row]];
-    return {w.up_along[ud][v % kRow], w.up_across[ud][v % kRow]};
-  }
-  if (kind_[row] == empty) return {};
+  if (kind(row) == empty) return {};
   return level_ == 0 ? lattice_.spring(v, d) : link_from_finer(cell, d);
 }
 
@@ -161,9 +159,9 @@ bool Couplings::is_one_label(RowId row, std::uint8_t& label) const noexcept {
       return false;
     const RowId fine = finer_->grid_.row(column, j, k);
     std::uint8_t fine_label = 0;
-    if (finer_->kind_[fine] == one_label) {
+    if (finer_->kind(fine) == one_label) {
       fine_label = finer_->label_[fine];
-    } else if (finer_->kind_[fine] != unknown || !finer_->is_one_label(fine, fine_label)) {
+    } else if (finer_->kind(fine) != unknown || !finer_->is_one_label(fine, fine_label)) {
       return false;
     }
     if (child == 0) label = fine_label;
@@ -172,28 +170,32 @@ bool Couplings::is_one_label(RowId row, std::uint8_t& label) const noexcept {
   return true;
 }
 
+void Couplings::make_ready(RowId row) noexcept {
+  if (kind(row) == unknown) find(row);
+  for (std::size_t d = 1; d < 3 && kind(row) == mixed; ++d) {
+    if (kind(below(row, d)) == unknown) find(below(row, d));
+  }
+  kind_[row] |= ready;
+}
+
 void Couplings::find(RowId row) noexcept {
   const std::array<int, 3> c = grid_.row_coordinates(row);
   std::uint8_t label = 0;
-  Kind kind = mixed;
+  Kind found = mixed;
   if (c[0] < 1 || c[0] + 1 >= grid_.columns || c[1] < 0 || c[1] >= grid_.dims[1] || c[2] < 0 ||
       c[2] >= grid_.dims[2] || (level_ == 0 && lattice_.filled_in(row) == 0)) {
-    kind = empty;
+    found = empty;
   } else if (is_one_label(row, label)) {
-    kind = one_label;
+    found = one_label;
     label_[row] = label;
+  } else if (!write_out(row)) {
+    found = empty;
   } else {
-    Written& out = written_[written_count_];
-    write_out(row, out, written_stands_[written_count_]);
-    if (std::all_of(out.filled.begin(), out.filled.end(), [](float f) { return f == 0.0F; })) {
-      kind = empty;
-    } else {
-      if (written_limits_.size() > 0) write_limits(row, written_limits_[written_count_]);
-      written_at_[row] = find_written();
-      written_count_ = std::max(written_count_, written_at_[row] + 1);
-    }
+    if (written_limits_.size() > 0) write_limits(row, written_limits_[written_count_]);
+    written_at_[row] = find_written();
+    written_count_ = std::max(written_count_, written_at_[row] + 1);
   }
-  kind_[row] = kind;
+  kind_[row] = found;
 }
 
 namespace {
@@ -225,6 +227,7 @@ std::uint32_t Couplings::find_written() noexcept {
   std::uint64_t hash = 0xcbf29ce484222325;
   add_to_hash(hash, written_[last]);
   add_to_hash(hash, written_stands_[last]);
+  if (written_cells_.size() > 0) add_to_hash(hash, written_cells_[last]);
   if (written_limits_.size() > 0) add_to_hash(hash, written_limits_[last]);
   const std::size_t mask = written_by_hash_.size() - 1;
   // What is hashed last changes the high bits most.
@@ -236,34 +239,37 @@ std::uint32_t Couplings::find_written() noexcept {
     const std::uint32_t other = written_by_hash_[n] - 1;
     if (same_bits(written_[other], written_[last]) &&
         same_bits(written_stands_[other], written_stands_[last]) &&
+        (written_cells_.size() == 0 || same_bits(written_cells_[other], written_cells_[last])) &&
         (written_limits_.size() == 0 || same_bits(written_limits_[other], written_limits_[last])))
       return other;
   }
 }
 
-void Couplings::write_out(RowId row, Written& out, LaneBits& stands) const noexcept {
-  if (level_ == 0) {
-    write_voxels(row, out, stands);
-  } else {
-    write_cells(row, out, stands);
-  }
+// After all that was written. False where there is nothing in the row.
+bool Couplings::write_out(RowId row) noexcept {
+  Written& out = written_[written_count_];
+  LaneBits& stands = written_stands_[written_count_];
+  return level_ == 0 ? write_voxels(row, out, stands)
+                     : write_cells(row, out, stands, written_cells_[written_count_]);
 }
 
 void Couplings::write_lane(std::size_t i, const VoxelSprings& springs, Written& out,
                            LaneBits& stands) noexcept {
   unsigned bits = 0;
   for (std::size_t d = 0; d < 3; ++d) {
-    out.up_along[d][i] = springs.up[d].along;
-    out.up_across[d][i] = springs.up[d].across;
-    out.down_along[d][i] = springs.down[d].along;
-    out.down_across[d][i] = springs.down[d].across;
+    const std::size_t at = Written::kBefore + d * kRow + i;
+    out.along[at] = springs.up[d].along;
+    out.across[at] = springs.up[d].across;
     out.inverse[d][i] = springs.inverse[d];
     if (springs.inverse[d] == 0.0F) bits |= 1U << d;
   }
   stands[i] = static_cast<std::uint8_t>(bits);
+  if (i > 0) return;
+  out.along[Written::kBefore - 1] = springs.down[0].along;
+  out.across[Written::kBefore - 1] = springs.down[0].across;
 }
 
-void Couplings::write_voxels(RowId row, Written& out, LaneBits& stands) const noexcept {
+bool Couplings::write_voxels(RowId row, Written& out, LaneBits& stands) const noexcept {
   // Materials around the row, [lane + 1][z][y]: those at one place along the row stand together.
   using Slice = std::array<std::uint8_t, 9>;
   std::array<Slice, kRow + 2> around{};
@@ -290,11 +296,11 @@ void Couplings::write_voxels(RowId row, Written& out, LaneBits& stands) const no
     return lattice_.spring_among(a, b, d);
   };
   VoxelSprings springs;
-  bool anchored = false;
+  bool anchored = false, any = false;
   for (std::size_t i = 0; i < kRow; ++i) {
     const std::size_t x = i + 1;
     const auto v = static_cast<VoxelId>(row * kRow + i);
-    out.filled[i] = around[x][4] != 0 ? 1.0F : 0.0F;
+    any = any || around[x][4] != 0;
     // Along a row little changes: mostly the links are those of the voxel before.
     const bool as_before = i > 0 && around[x + 1] == around[x] && around[x] == around[x - 1] &&
                            around[x - 1] == around[x - 2] && anchored == lattice_.anchored(v);
@@ -311,6 +317,7 @@ void Couplings::write_voxels(RowId row, Written& out, LaneBits& stands) const no
     }
     write_lane(i, springs, out, stands);
   }
+  return any;
 }
 
 void Couplings::write_limits(RowId row, RowLimits::Written& out) const noexcept {
@@ -345,15 +352,16 @@ void Couplings::write_limits(RowId row, RowLimits::Written& out) const noexcept 
 
 RowLimits Couplings::limits(RowId row) const noexcept {
   RowLimits out{&label_limits_[label_[row]], nullptr};
-  if (written_limits_.size() > 0 && kind_[row] == mixed) {
+  if (written_limits_.size() > 0 && kind(row) == mixed) {
     out.lanes = &written_limits_[written_at_[row]];
     out.of = &out.lanes->tightest;
   }
   return out;
 }
 
-void Couplings::write_cells(RowId row, Written& out, LaneBits& stands) const noexcept {
+bool Couplings::write_cells(RowId row, Written& out, LaneBits& stands, Cells& cells) const noexcept {
   const std::array<int, 3> c = grid_.row_coordinates(row);
+  bool any = false;
   for (int lane = 0; lane < kRow; ++lane) {
     const std::array<int, 3> cell{(c[0] - 1) * kRow + lane, c[1], c[2]};
     const Content inside = cell[0] < grid_.dims[0] ? content(cell) : nothing;
@@ -366,10 +374,12 @@ void Couplings::write_cells(RowId row, Written& out, LaneBits& stands) const noe
       if (fine[0] < dims[0] && fine[1] < dims[1] && fine[2] < dims[2] && finer_->content(fine) != nothing)
         ++below;
     }
-    out.share[static_cast<std::size_t>(lane)] = below > 0 ? 1.0F / static_cast<float>(below) : 0.0F;
-    out.filled[static_cast<std::size_t>(lane)] = inside == nothing ? 0.0F : 1.0F;
+    any = any || inside != nothing;
+    cells.share[static_cast<std::size_t>(lane)] = below > 0 ? 1.0F / static_cast<float>(below) : 0.0F;
+    cells.filled[static_cast<std::size_t>(lane)] = inside == nothing ? 0.0F : 1.0F;
     write_lane(static_cast<std::size_t>(lane), springs, out, stands);
   }
+  return any;
 }
 
 VoxelSprings Couplings::springs_by_links(const std::array<int, 3>& cell, Content inside) const noexcept {
@@ -390,9 +400,8 @@ VoxelSprings Couplings::springs_of(VoxelId cell) noexcept {
 }
 
 VoxelSprings Couplings::find_springs(VoxelId cell) const noexcept {
-  const Kind kind = static_cast<Kind>(kind_[cell / kRow]);
-  if (kind == empty) return {};
-  if (kind != unknown) return known_springs(cell);
+  const RowId row = cell / kRow;
+  if ((kind_[row] & ready) != 0 || kind(row) == empty) return known_springs(cell);
   if (level_ == 0) return lattice_.springs_of(cell);
   const std::array<int, 3> at = grid_.coordinates(cell);
   return springs_by_links(at, content(at));
@@ -401,56 +410,36 @@ VoxelSprings Couplings::find_springs(VoxelId cell) const noexcept {
 VoxelSprings Couplings::known_springs(VoxelId cell) const noexcept {
   VoxelSprings out;
   const RowId row = cell / kRow;
-  if (kind_[row] == one_label) {
-    const Constant& c = *constant_[label_[row]];
-    for (std::size_t d = 0; d < 3; ++d) {
-      out.up[d] = out.down[d] = {c.along[d][0], c.across[d][0]};
-      out.inverse[d] = c.inverse[d][0];
-    }
-    return out;
-  }
-  const Written& w = written_[written_at_[row]];
+  if (kind(row) == empty) return out;
+  RowCouplings s;
+  all(row, s);
   const std::size_t i = cell % kRow;
   for (std::size_t d = 0; d < 3; ++d) {
-    out.up[d] = {w.up_along[d][i], w.up_across[d][i]};
-    out.down[d] = {w.down_along[d][i], w.down_across[d][i]};
-    out.inverse[d] = w.inverse[d][i];
+    out.up[d] = {s.up_along[d * kRow + i], s.up_across[d * kRow + i]};
+    out.down[d] = {s.down_along[d][i], s.down_across[d][i]};
+    out.inverse[d] = s.inverse[d * kRow + i];
   }
   return out;
 }
 
 RowSprings Couplings::springs(RowId row, int axis) const noexcept {
-  RowSprings out;
+  RowCouplings s;
+  all(row, s);
   const auto ua = static_cast<std::size_t>(axis);
-  if (kind_[row] == one_label) {
-    const Constant& c = *constant_[label_[row]];
-    for (std::size_t d = 0; d < 3; ++d) out.up[d] = out.down[d] = (ua == d ? c.along[d] : c.across[d]).data();
-    out.inverse = c.inverse[ua].data();
-  } else if (kind_[row] == mixed) {
-    const Written& w = written_[written_at_[row]];
-    for (std::size_t d = 0; d < 3; ++d) {
-      out.up[d] = (ua == d ? w.up_along[d] : w.up_across[d]).data();
-      out.down[d] = (ua == d ? w.down_along[d] : w.down_across[d]).data();
-    }
-    out.inverse = w.inverse[ua].data();
-  } else {
-    out.up.fill(zeros_[0].data());
-    out.down.fill(zeros_[0].data());
-    out.inverse = zeros_[0].data();
+  RowSprings out;
+  for (std::size_t d = 0; d < 3; ++d) {
+    out.up[d] = (ua == d ? s.up_along : s.up_across) + d * kRow;
+    out.down[d] = (ua == d ? s.down_along : s.down_across)[d];
   }
+  out.inverse = s.inverse + ua * kRow;
   return out;
-}
-
-const float* Couplings::filled(RowId row) const noexcept {
-  if (kind_[row] == one_label) return ones_.data();
-  return kind_[row] == mixed ? written_[written_at_[row]].filled.data() : zeros_[0].data();
 }
 
 std::size_t Couplings::memory_bytes() const {
   std::size_t bytes = sizeof(*this) + kind_.resident_bytes() + label_.resident_bytes() +
                       content_.resident_bytes() + written_at_.resident_bytes() + written_.resident_bytes() +
-                      written_stands_.resident_bytes() + written_limits_.resident_bytes() +
-                      written_by_hash_.resident_bytes();
+                      written_cells_.resident_bytes() + written_stands_.resident_bytes() +
+                      written_limits_.resident_bytes() + written_by_hash_.resident_bytes();
   for (const auto& links : link_) bytes += links.resident_bytes();
   for (const auto& constant : constant_) bytes += constant != nullptr ? sizeof(Constant) : 0;
   return bytes;

@@ -26,12 +26,12 @@ struct RowSprings {
   const float* inverse = nullptr;  // 1 / Σ; 0 where nothing may move
 };
 
-// Those of all axes: [d][lane], what the link in d weighs on its own axis and on the two others.
+// Those of all axes: [d][lane], what the link in d weighs on its own axis and on the two others. Links down
+// are those up of the row below, and read from there.
 struct RowCouplings {
-  const float *up_along = nullptr, *up_across = nullptr, *down_along = nullptr, *down_across = nullptr;
-  const float* inverse = nullptr;  // [axis][lane]
-  const float* share = nullptr;    // [lane] 1 / number of cells of the level below; 0 where there is none
-  const float* filled = nullptr;   // [lane] 1 where there is a cell, 0 elsewhere
+  const float *up_along = nullptr, *up_across = nullptr;
+  std::array<const float*, 3> down_along{}, down_across{};  // [d], each of [lane]
+  const float* inverse = nullptr;                           // [axis][lane]
   // [lane] bit `axis`: inverse is 0. A twelfth of what there is to read of that.
   const std::uint8_t* stands = nullptr;
   bool uniform = false;  // the same in every lane
@@ -69,8 +69,8 @@ struct RowLimits {
 class Couplings {
  public:
   // The first level whose links and contents are kept for all cells. To find one of its rows from those below
-  // took a millisecond where tissues mix; written out as inner loops want them (2.2 kB a row), they took four
-  // times as much memory.
+  // took a millisecond where tissues mix; written out as inner loops want them (1.5 kB a row), they took
+  // three times as much memory.
   static constexpr int kKept = 3;
 
   // `finer`: the level below, kept by the caller; none for level 0.
@@ -82,47 +82,54 @@ class Couplings {
   // Is there any cell in this row? Finds out, and writes out the springs where they are not uniform: call it
   // before what follows. Allocates address space never, pages of memory the first time.
   bool prepare(RowId row) noexcept {
-    if (kind_[row] == unknown) find(row);
-    return kind_[row] != empty;
+    if ((kind_[row] & ready) == 0) make_ready(row);
+    return kind(row) != empty;
   }
-  [[nodiscard]] bool uniform(RowId row) const { return kind_[row] == one_label; }
+  [[nodiscard]] bool uniform(RowId row) const { return kind(row) == one_label; }
   [[nodiscard]] RowSprings springs(RowId row, int axis) const noexcept;
   // By reference, and member by member: returned by value it was written and read back at once in pieces of
   // different sizes, which took longer than to smooth an octet.
   void all(RowId row, RowCouplings& out) const noexcept {
-    if (kind_[row] == one_label) {
+    const Kind what = kind(row);
+    if (what == one_label) {
       const Constant& c = *constant_[label_[row]];
-      out.up_along = out.down_along = c.along[0].data();
-      out.up_across = out.down_across = c.across[0].data();
+      out.up_along = c.along[0].data();
+      out.up_across = c.across[0].data();
+      for (std::size_t d = 0; d < 3; ++d) {
+        out.down_along[d] = c.along[d].data();
+        out.down_across[d] = c.across[d].data();
+      }
       out.inverse = c.inverse[0].data();
-      out.share = eighths_.data();
-      out.filled = ones_.data();
       out.stands = movable_.data();
       out.uniform = true;
       return;
     }
-    if (kind_[row] == mixed) {
+    out.uniform = false;
+    if (what == mixed) {
       const Written& w = written_[written_at_[row]];
-      out.up_along = w.up_along[0].data();
-      out.up_across = w.up_across[0].data();
-      out.down_along = w.down_along[0].data();
-      out.down_across = w.down_across[0].data();
+      out.up_along = w.up_along(0);
+      out.up_across = w.up_across(0);
+      out.down_along[0] = w.up_along(0) - 1;
+      out.down_across[0] = w.up_across(0) - 1;
+      for (std::size_t d = 1; d < 3; ++d) find_up(below(row, d), d, out.down_along[d], out.down_across[d]);
       out.inverse = w.inverse[0].data();
-      out.share = w.share.data();
-      out.filled = w.filled.data();
       out.stands = written_stands_[written_at_[row]].data();
-      out.uniform = false;
       return;
     }
-    out.up_along = out.up_across = out.down_along = out.down_across = out.inverse = zeros_[0].data();
-    out.share = out.filled = zeros_[0].data();
+    out.up_along = out.up_across = out.inverse = zeros_[0].data();
+    out.down_along.fill(zeros_[0].data());
+    out.down_across.fill(zeros_[0].data());
     out.stands = immovable_.data();
-    out.uniform = false;
   }
-  // [lane] 1 / number of cells of the level below; 0 where there is none.
+  // [lane] 1 / number of cells of the level below; 0 where there is none. Not of level 0, of a prepared row.
   [[nodiscard]] const float* share(RowId row) const noexcept {
-    if (kind_[row] == one_label) return eighths_.data();
-    return kind_[row] == mixed ? written_[written_at_[row]].share.data() : zeros_[0].data();
+    if (kind(row) == one_label) return eighths_.data();
+    return kind(row) == mixed ? written_cells_[written_at_[row]].share.data() : zeros_[0].data();
+  }
+  // [lane] 1 where there is a cell, 0 elsewhere; the same.
+  [[nodiscard]] const float* filled(RowId row) const noexcept {
+    if (kind(row) == one_label) return ones_.data();
+    return kind(row) == mixed ? written_cells_[written_at_[row]].filled.data() : zeros_[0].data();
   }
   // Of level 0.
   [[nodiscard]] RowLimits limits(RowId row) const noexcept;
@@ -135,32 +142,60 @@ class Couplings {
     return content(cell) != nothing;
   }
   [[nodiscard]] const Lattice& lattice() const { return lattice_; }
-  // 1 where there is a cell, 0 elsewhere; of a prepared row.
-  [[nodiscard]] const float* filled(RowId row) const noexcept;
 
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
-  enum Kind : std::uint8_t { unknown = 0, empty, one_label, mixed };
+  // `ready`: so are the rows whose links up are those down of this one, unless they are the same anyway.
+  enum Kind : std::uint8_t { unknown = 0, empty, one_label, mixed, ready };
   enum Content : std::uint8_t { nothing = 0, some = 1, held = 2 };
   static Content together(Content a, Content b) { return a == nothing || (a == held && b == some) ? b : a; }
-  struct alignas(64) Written {  // springs of a mixed row
-    std::array<Lanes, 3> up_along, up_across, down_along, down_across, inverse;
+  // Springs of a mixed row: of the links up, [d][lane]; before those in x, the link of the voxel before the
+  // first. (With those down, which are their neighbours', and what is now Cells, a cycle round a contact
+  // waited for 2.2 kB a row.)
+  struct alignas(64) Written {
+    static constexpr std::size_t kBefore = 8;
+    std::array<float, kBefore + std::size_t{3} * kRow> along, across;
+    std::array<Lanes, 3> inverse;
+
+    [[nodiscard]] const float* up_along(std::size_t d) const { return along.data() + kBefore + d * kRow; }
+    [[nodiscard]] const float* up_across(std::size_t d) const { return across.data() + kBefore + d * kRow; }
+  };
+  struct Cells {  // of a mixed row of a coarse level
     Lanes filled, share;
   };
   struct Constant {  // springs of all rows of one label
     std::array<Lanes, 3> along, across, inverse;
   };
 
+  [[nodiscard]] Kind kind(RowId row) const noexcept { return static_cast<Kind>(kind_[row] & mixed); }
+  // The row whose links up in d, 1 or 2, lead to this one.
+  [[nodiscard]] RowId below(RowId row, std::size_t d) const noexcept {
+    return d == 1 ? row - 1 : row - grid_.row_z;
+  }
+  // The links up in d of any row that was found.
+  void find_up(RowId row, std::size_t d, const float*& along, const float*& across) const noexcept {
+    along = across = zeros_[0].data();
+    if (kind(row) == one_label) {
+      const Constant& c = *constant_[label_[row]];
+      along = c.along[d].data();
+      across = c.across[d].data();
+    } else if (kind(row) == mixed) {
+      const Written& w = written_[written_at_[row]];
+      along = w.up_along(d);
+      across = w.up_across(d);
+    }
+  }
+  void make_ready(RowId row) noexcept;
   void find(RowId row) noexcept;
   [[nodiscard]] bool is_one_label(RowId row, std::uint8_t& label) const noexcept;
-  void write_out(RowId row, Written& out, LaneBits& stands) const noexcept;
+  bool write_out(RowId row) noexcept;
   [[nodiscard]] std::uint32_t find_written() noexcept;
   static void write_lane(std::size_t lane, const VoxelSprings& springs, Written& out,
                          LaneBits& stands) noexcept;
-  void write_voxels(RowId row, Written& out, LaneBits& stands) const noexcept;
+  bool write_voxels(RowId row, Written& out, LaneBits& stands) const noexcept;
   void write_limits(RowId row, RowLimits::Written& out) const noexcept;
-  void write_cells(RowId row, Written& out, LaneBits& stands) const noexcept;
+  bool write_cells(RowId row, Written& out, LaneBits& stands, Cells& cells) const noexcept;
   void keep_cells();
   [[nodiscard]] Spring link(const std::array<int, 3>& cell, int d) const noexcept;
   [[nodiscard]] Spring link_from_finer(const std::array<int, 3>& cell, int d) const noexcept;
@@ -178,6 +213,7 @@ class Couplings {
   std::array<LazyArray<Spring>, 3> link_;  // [d][cell], likewise: to its upper neighbour
   LazyArray<std::uint32_t> written_at_;    // [row] into written_
   LazyArray<Written> written_;
+  LazyArray<Cells> written_cells_;  // as written_; none of level 0
   // As written_, and apart from it: corrections read no more than this, and what they read stands together.
   // (In there, to wait for it was a third of what it took to add a result.)
   LazyArray<LaneBits> written_stands_;
@@ -189,7 +225,7 @@ class Couplings {
   LazyArray<std::uint32_t> written_by_hash_;             // 1 + index into written_; 0: none
   std::array<std::unique_ptr<Constant>, 256> constant_;  // [label]
   Lanes ones_, eighths_;
-  std::array<Lanes, 3> zeros_;
+  std::array<Lanes, 3> zeros_;  // [d or axis]
   LaneBits movable_, immovable_;
 };
 

@@ -44,7 +44,7 @@ void add_links(const RowCouplings& springs, const RowLimits& limits, std::size_t
                float& pull, std::array<float, 2>& interval) {
   const std::size_t at = kD * kRow + lane;
   const float k_up = (kAxis == kD ? springs.up_along : springs.up_across)[at],
-              k_down = (kAxis == kD ? springs.down_along : springs.down_across)[at];
+              k_down = (kAxis == kD ? springs.down_along : springs.down_across)[kD][lane];
   pull += k_up * up + k_down * down;
   const std::array<float, 2> above = bounds_of<kAxis, kD, true>(limits, lane),
                              below = bounds_of<kAxis, kD, false>(limits, lane);

@@ -20,7 +20,7 @@ struct AxisSprings {
   AxisSprings(const RowCouplings& s, std::size_t axis) : inverse(s.inverse + axis * kRow) {
     for (std::size_t d = 0; d < 3; ++d) {
       up[d] = (d == axis ? s.up_along : s.up_across) + d * kRow;
-      down[d] = (d == axis ? s.down_along : s.down_across) + d * kRow;
+      down[d] = (d == axis ? s.down_along : s.down_across)[d];
     }
   }
 };
@@ -82,7 +82,7 @@ HYBRID_INLINE void spring_up(Octet& k, const RowCouplings& s, std::size_t axis, 
 }
 template <bool kUniform>
 HYBRID_INLINE void spring_down(Octet& k, const RowCouplings& s, std::size_t axis, std::size_t d, int octet) {
-  load(k, (d == axis ? s.down_along : s.down_across) + d * kRow + (kUniform ? 0 : octet * kOctet));
+  load(k, (d == axis ? s.down_along : s.down_across)[d] + (kUniform ? 0 : octet * kOctet));
 }
 template <bool kUniform>
 HYBRID_INLINE void inverse_of(Octet& inverse, const RowCouplings& s, std::size_t axis, int octet) {

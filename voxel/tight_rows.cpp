@@ -141,7 +141,7 @@ TightRows::Hanging TightRows::hanging(const Couplings& couplings) const noexcept
     for (std::size_t d = 0; d < 3; ++d) {
       const bool along = static_cast<int>(d) == axis_;
       sum.stiffness_N_per_m += sum_of((along ? s.up_along : s.up_across) + d * kRow, hangs & ~up[d]) +
-                               sum_of((along ? s.down_along : s.down_across) + d * kRow, hangs & ~down[d]);
+                               sum_of((along ? s.down_along : s.down_across)[d], hangs & ~down[d]);
     }
   }
   return sum;
