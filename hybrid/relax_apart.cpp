@@ -22,6 +22,7 @@ struct RelaxedApart {
   bool given = false;
   std::uint64_t due = 0;   // tick; of Arrival::counted
   std::uint64_t next = 0;  // tick, from which on it is given again
+  bool waited = false;     // in the tick before
 };
 
 Apart::Apart() = default;
@@ -29,8 +30,9 @@ Apart::~Apart() = default;
 
 namespace {
 
-constexpr std::size_t kMostApart = 64;   // bits of Apart::arrived
-constexpr std::size_t kRowsTaken = 250;  // a tick: what a result is added to, about 100 us of it
+constexpr std::size_t kMostApart = 64;  // bits of Apart::arrived
+// A tick: what a result is added to, about 100 us of it; and after one in which it waited.
+constexpr std::size_t kRowsTaken = 250, kRowsAfterWaiting = 400;
 // Rows that another core relaxes in a tick's time, so that a fixed-step session takes results as late as one
 // in real time does.
 constexpr std::uint64_t kRowsRelaxed = 400;
@@ -70,11 +72,22 @@ void give(WorldState& state, RelaxedApart& object, std::size_t o) noexcept {
   object.due = state.tick + 1 + object.replica.work() / kRowsRelaxed;
 }
 
+// One of the three a tick, and none beside a wide cycle round the contact, but for every other one: each
+// takes some 100 us, up to 500 at worst.
 void exchange(WorldState& state, std::size_t o, std::uint64_t& arrived) noexcept {
   RelaxedApart& object = *state.apart.objects[o];
   voxel::SoftObject& soft = *state.soft[o];
-  if (!object.replica.drained()) {
-    object.replica.drain(soft, kRowsTaken);
+  const bool wide = soft.wide_cycle();
+  if (wide && !object.waited) {
+    object.waited = true;
+    return;
+  }
+  const std::size_t rows = object.waited && !wide ? kRowsAfterWaiting : kRowsTaken;
+  object.waited = false;
+  if (!object.given && state.tick >= object.next && voxel::Replica::wanted(soft)) {
+    give(state, object, o);
+  } else if (!object.replica.drained()) {
+    object.replica.drain(soft, rows);
   } else if (object.given && has_arrived(state.apart, object, o, state.tick)) {
     object.replica.take(soft);
     object.given = false;
@@ -82,7 +95,6 @@ void exchange(WorldState& state, std::size_t o, std::uint64_t& arrived) noexcept
     ++state.apart.results;
     object.next = state.tick + kOwnTicks;
   }
-  if (!object.given && state.tick >= object.next && voxel::Replica::wanted(soft)) give(state, object, o);
 }
 
 }  // namespace

@@ -79,6 +79,8 @@ class SoftObject {
   // Moves every touched voxel that the tool overlaps out of it, and the chain after. True when any was.
   bool push_out(const ToolInBody& tool) noexcept;
   void relax_near(const ToolInBody& tool, int sweeps) noexcept;
+  // Had it, since touch(), a cycle round a contact so wide that it is most of what a tick may take?
+  [[nodiscard]] bool wide_cycle() const noexcept;
   [[nodiscard]] Reaction reaction(const ToolInBody& tool) noexcept;
   // The tool moves by `delta`: pressed voxels go along, each by the part of it along its own normal.
   void follow(const glm::dvec3& delta) noexcept;
@@ -219,6 +221,7 @@ class SoftObject {
   void set_touch_roles() noexcept;
   void give_away() noexcept;  // what pulls near the contact is somebody else's
   std::size_t list_held() noexcept;
+  [[nodiscard]] bool cycle_due(bool any_pressed) const noexcept;
   [[nodiscard]] glm::dvec3 place_of(const ToolInBody& tool, Touch& touch) noexcept;
   void relax_touch(const ToolInBody& tool, Touch& touch) noexcept;
   void add_stiffness(int axis, glm::dmat3& stiffness) noexcept;
@@ -269,6 +272,7 @@ class SoftObject {
   double unrelaxed_m_ = 0.0;                // motion of pressed voxels since the background was last woken
   int cycles_since_touch_ = 0;              // round the contact
   std::size_t contact_octets_ = 0;          // that the last of these visited
+  bool rests_ = false;                      // the one before touch() was wide: none now, if that can wait
   double unsettled_m_ = 0.0;                // how far the contact may be from the rest of the object
   bool moved_ever_ = false;
 };
