@@ -3,6 +3,7 @@
 #pragma once
 
 #include <malloc.h>
+#include <sys/mman.h>
 
 #include <cstddef>
 #include <fstream>
@@ -25,6 +26,21 @@ inline std::size_t own_bytes() {
     if (line.rfind("RssAnon:", 0) == 0) return 1024 * std::stoul(line.substr(8));
   }
   return 0;
+}
+
+// Some kernels give a page that was only read memory of its own, where others show the one page of zeros that
+// all of them share. There what is read costs as much as what is written, and no bound on it holds.
+inline bool reading_takes_memory() {
+  constexpr std::size_t kBytes = std::size_t{4} << 20U, kPage = 4096;
+  void* const at = ::mmap(nullptr, kBytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  if (at == MAP_FAILED) return false;
+  (void)::madvise(at, kBytes, MADV_NOHUGEPAGE);
+  const std::size_t before = own_bytes();
+  const volatile char* const bytes = static_cast<const char*>(at);
+  for (std::size_t n = 0; n < kBytes; n += kPage) (void)bytes[n];
+  const bool takes = own_bytes() > before + kBytes / 2;
+  ::munmap(at, kBytes);
+  return takes;
 }
 
 }  // namespace tests
