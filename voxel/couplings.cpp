@@ -181,16 +181,15 @@ void Couplings::make_ready(RowId row) noexcept {
 void Couplings::find(RowId row) noexcept {
   const std::array<int, 3> c = grid_.row_coordinates(row);
   std::uint8_t label = 0;
-  Kind found = mixed;
-  if (c[0] < 1 || c[0] + 1 >= grid_.columns || c[1] < 0 || c[1] >= grid_.dims[1] || c[2] < 0 ||
-      c[2] >= grid_.dims[2] || (level_ == 0 && lattice_.filled_in(row) == 0)) {
-    found = empty;
-  } else if (is_one_label(row, label)) {
+  Kind found = empty;
+  const bool outside = c[0] < 1 || c[0] + 1 >= grid_.columns || c[1] < 0 || c[1] >= grid_.dims[1] ||
+                       c[2] < 0 || c[2] >= grid_.dims[2];
+  const bool any = !outside && (level_ > 0 || lattice_.filled_in(row) != 0);
+  if (any && is_one_label(row, label)) {
     found = one_label;
     label_[row] = label;
-  } else if (!write_out(row)) {
-    found = empty;
-  } else {
+  } else if (any && write_out(row)) {
+    found = mixed;
     if (written_limits_.size() > 0) write_limits(row, written_limits_[written_count_]);
     written_at_[row] = find_written();
     written_count_ = std::max(written_count_, written_at_[row] + 1);
