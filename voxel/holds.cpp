@@ -355,7 +355,9 @@ void Holds::complete(int level, VoxelId cell, const Axes& all, Found& found) con
 
 Holds::Found Holds::known(int level, VoxelId cell) const noexcept {
   const Level& l = at(level);
+  const RowId row = cell / kRow;
   Found out;
+  if ((l.row_held[row] & ~kWaits) == 0 && l.row_tilted[row] == 0) return out;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     for (std::size_t d = 0; d < 3; ++d) out.through[axis][d] = l.through[axis][d][cell];
     out.hold[axis] = l.hold[axis][cell];

@@ -114,7 +114,9 @@ class Holds {
   [[nodiscard]] Level& at(int level) { return levels_[static_cast<std::size_t>(level)]; }
   [[nodiscard]] const Level& at(int level) const { return levels_[static_cast<std::size_t>(level)]; }
   [[nodiscard]] Support support_of(VoxelId v) const noexcept {
-    return held_mark_[v] != 0 || lattice_.anchored(v) ? kAll : supported_[v];
+    // By the row first: where kernels give memory to what is only read, it took as much as what is written.
+    if ((!held_.empty() && held_mark_[v] != 0) || lattice_.anchored(v)) return kAll;
+    return supports(v / kRow) ? supported_[v] : Support{};
   }
   // ---- what anchors hold ----
   void wait_for_anchors();
