@@ -296,8 +296,12 @@ void SoftObject::relax_touch(const ToolInBody& tool, Touch& t) noexcept {
   }
 }
 
+bool SoftObject::any_pressed() const noexcept {
+  return std::any_of(touches_.begin(), touches_.end(), [](const Touch& t) { return t.pressed; });
+}
+
 // Is a cycle round the contact due?
-bool SoftObject::cycle_due(bool any_pressed) const noexcept {
+bool SoftObject::cycle_due() const noexcept {
   const double to_go = unsettled_m_ / lattice_->min_spacing_m();
   // A contact that stands still is the background's: it comes to rest with all the object, where a box comes
   // to rest with its surroundings held.
@@ -305,7 +309,7 @@ bool SoftObject::cycle_due(bool any_pressed) const noexcept {
   if (to_go >= kJump) return true;
   if (cycles_since_touch_ > 0) return !wide_cycle();
   // What was let go of has this tick only.
-  return !rests_ || !any_pressed;
+  return !rests_ || !any_pressed();
 }
 
 void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
@@ -313,8 +317,7 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
   for (int n = 0; n < cycles; ++n) {
     for (Touch& t : touches_) relax_touch(tool, t);
     set_touch_roles();
-    const std::size_t pressed = list_held();
-    if (!cycle_due(pressed > 0)) break;
+    if (!cycle_due()) break;
     const bool again = ++cycles_since_touch_ > 1;
     unsettled_m_ *= kContraction;
     // They are in the order of their ids, so those of a row follow one another.
@@ -322,6 +325,7 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
       const RowId row = touches_[i].v / kRow;
       if (i == 0 || touches_[i - 1].v / kRow != row) relaxation_.stir(row);
     }
+    const std::size_t pressed = list_held();
     if (pressed > 0)
       pressed_last_.assign(all_held_.begin(), all_held_.begin() + static_cast<std::ptrdiff_t>(pressed));
     // What the tool just let go of follows it, this once. (Left to the other thread, tissue that a quick tool
@@ -339,8 +343,7 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
     }
   }
   set_touch_roles();
-  if (std::none_of(touches_.begin(), touches_.end(), [](const Touch& t) { return t.pressed; }))
-    pressed_last_.clear();
+  if (!any_pressed()) pressed_last_.clear();
   draw_along();
 }
 

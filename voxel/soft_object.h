@@ -221,7 +221,8 @@ class SoftObject {
   void set_touch_roles() noexcept;
   void give_away() noexcept;  // what pulls near the contact is somebody else's
   std::size_t list_held() noexcept;
-  [[nodiscard]] bool cycle_due(bool any_pressed) const noexcept;
+  [[nodiscard]] bool any_pressed() const noexcept;
+  [[nodiscard]] bool cycle_due() const noexcept;
   [[nodiscard]] glm::dvec3 place_of(const ToolInBody& tool, Touch& touch) noexcept;
   void relax_touch(const ToolInBody& tool, Touch& touch) noexcept;
   void add_stiffness(int axis, glm::dmat3& stiffness) noexcept;
