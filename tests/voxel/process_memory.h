@@ -28,6 +28,9 @@ inline std::size_t own_bytes() {
   return 0;
 }
 
+// Why what is said of memory that was only read is skipped.
+inline constexpr const char* kReadingTakes = "this system gives memory to what was only read";
+
 // Some kernels give a page that was only read memory of its own, where others show the one page of zeros that
 // all of them share. There what is read costs as much as what is written, and no bound on it holds.
 inline bool reading_takes_memory() {

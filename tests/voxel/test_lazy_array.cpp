@@ -43,7 +43,7 @@ std::set<std::size_t> write_some(LazyArray<std::uint8_t>& array, std::size_t cou
 }
 
 TEST(LazyArray, TakesWhatWasWrittenAndNothingForWhatWasRead) {
-  if (tests::reading_takes_memory()) GTEST_SKIP() << "this system gives memory to what was only read";
+  if (tests::reading_takes_memory()) GTEST_SKIP() << tests::kReadingTakes;
   LazyArray<std::uint8_t> array(kPages * page());
   EXPECT_EQ(array.resident_bytes(), 0U);
   const std::size_t before = own_bytes();
