@@ -4,6 +4,7 @@
 #include <sched.h>
 #include <time.h>
 
+#include <algorithm>
 #include <chrono>
 
 #include "hybrid/session.h"
@@ -22,7 +23,8 @@ struct RelaxedApart {
   bool given = false;
   std::uint64_t due = 0;   // tick; of Arrival::counted
   std::uint64_t next = 0;  // tick, from which on it is given again
-  bool waited = false;     // in the tick before
+  bool here = false;       // what was found of it
+  int waited = 0;          // ticks that a give or a take has waited
 };
 
 Apart::Apart() = default;
@@ -31,8 +33,11 @@ Apart::~Apart() = default;
 namespace {
 
 constexpr std::size_t kMostApart = 64;  // bits of Apart::arrived
-// A tick: what a result is added to, about 100 us of it; and after one in which it waited.
-constexpr std::size_t kRowsTaken = 250, kRowsAfterWaiting = 400;
+// A tick: what a result is added to, about 100 us of it; beside a wide cycle round the contact as many rows
+// as that leaves work for, so much each.
+constexpr std::size_t kRowsTaken = 250, kWorkOfRow = 11;
+// A give or a take, of some 100 us and up to 400, waits for a tick without one; so many ticks at most.
+constexpr int kMostWaits = 3;
 // Rows that another core relaxes in a tick's time, so that a fixed-step session takes results as late as one
 // in real time does.
 constexpr std::uint64_t kRowsRelaxed = 400;
@@ -72,28 +77,35 @@ void give(WorldState& state, RelaxedApart& object, std::size_t o) noexcept {
   object.due = state.tick + 1 + object.replica.work() / kRowsRelaxed;
 }
 
-// One of the three a tick, and none beside a wide cycle round the contact, but for every other one: each
-// takes some 100 us, up to 500 at worst.
+// One of the three a tick.
 void exchange(WorldState& state, std::size_t o, std::uint64_t& arrived) noexcept {
   RelaxedApart& object = *state.apart.objects[o];
   voxel::SoftObject& soft = *state.soft[o];
-  const bool wide = soft.wide_cycle();
-  if (wide && !object.waited) {
-    object.waited = true;
-    return;
-  }
-  const std::size_t rows = object.waited && !wide ? kRowsAfterWaiting : kRowsTaken;
-  object.waited = false;
-  if (!object.given && state.tick >= object.next && voxel::Replica::wanted(soft)) {
-    give(state, object, o);
-  } else if (!object.replica.drained()) {
-    object.replica.drain(soft, rows);
-  } else if (object.given && has_arrived(state.apart, object, o, state.tick)) {
-    object.replica.take(soft);
-    object.given = false;
+  // Noted when it is seen, not when it is taken: what is done until then depends on it.
+  if (object.given && !object.here && has_arrived(state.apart, object, o, state.tick)) {
+    object.here = true;
     arrived |= std::uint64_t{1} << o;
+  }
+  const bool drained = object.replica.drained();
+  const bool gives = !object.given && state.tick >= object.next && voxel::Replica::wanted(soft);
+  const bool takes = object.here && drained && !gives;
+  const bool waits = (gives || takes) && soft.wide_cycle() && object.waited < kMostWaits;
+  if (waits) {
+    ++object.waited;
+    soft.ask_to_rest();
+  } else if (gives || takes) {
+    object.waited = 0;
+  }
+  if (gives && !waits) {
+    give(state, object, o);
+  } else if (takes && !waits) {
+    object.replica.take(soft);
+    object.given = object.here = false;
     ++state.apart.results;
     object.next = state.tick + kOwnTicks;
+  } else if (!drained) {
+    const std::size_t beside = soft.work_left() / kWorkOfRow;
+    object.replica.drain(soft, soft.wide_cycle() ? std::min(kRowsTaken, beside) : kRowsTaken);
   }
 }
 

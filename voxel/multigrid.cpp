@@ -72,6 +72,7 @@ void Multigrid::prepare_all() noexcept {
 
 // Marks a row and the rows beside it.
 void Multigrid::spread(int level, RowId row, std::uint8_t flags) noexcept {
+  if (all_visited_) return;
   Level& l = at(level);
   const Grid& g = l.couplings->grid();
   for (const RowId r : {row, row - 1, row + 1, row - g.row_z, row + g.row_z, row - g.row_x, row + g.row_x})
@@ -130,6 +131,7 @@ void Multigrid::copy_from(const Multigrid& other) noexcept {
 
 void Multigrid::forget_coarse() {
   bricks_.leave_to_another();
+  all_visited_ = true;
   for (int l = 1; l < levels(); ++l) {
     Level& level = at(l);
     for (auto* arrays : {&level.value, &level.told, &level.load, &level.loaded_at}) {
@@ -156,7 +158,7 @@ void Multigrid::begin_anew() noexcept {
       unmark(l, row, static_cast<std::uint8_t>(~limited));
     }
   }
-  for (const RowId row : balanced_) row_balanced_[row] = 0;
+  for (const RowId row : balanced_) balance_number_[row] = 0;
   balanced_.clear();
 }
 
@@ -165,16 +167,18 @@ void Multigrid::keep_log() {
   rows.reserve(levels_.size());
   for (int l = 0; l < levels(); ++l) rows.push_back(grid(l).rows());
   log_.begin(rows);
-  for (auto& axis : balance_) axis = LazyArray<float>(lattice_.size());
-  row_balanced_ = LazyArray<std::uint8_t>(grid(0).rows());
-  balanced_.reserve(kMaxBalanced);
+  const std::size_t most = std::min(kMaxBalanced, grid(0).rows());
+  balanced_.reserve(most);
+  balance_ = LazyArray<float>(most * 3 * kRow);
+  balance_.populate();
+  balance_number_ = LazyArray<std::uint16_t>(grid(0).rows());
 }
 
 std::size_t Multigrid::memory_bytes() const {
   std::size_t bytes = tiles_.memory_bytes() + log_.memory_bytes() + bricks_.memory_bytes() +
                       holds_->memory_bytes() + hats_.memory_bytes() + resident_bytes(stopped_) +
-                      row_balanced_.resident_bytes() + resident_bytes(balanced_) + refused_.resident_bytes();
-  for (const auto& axis : balance_) bytes += axis.resident_bytes();
+                      balance_number_.resident_bytes() + balance_.resident_bytes() +
+                      resident_bytes(balanced_) + refused_.resident_bytes();
   for (const Level& l : levels_) {
     bytes += l.couplings->memory_bytes() + l.flags.resident_bytes() + l.stopped.resident_bytes();
     for (const auto* arrays : {&l.value, &l.told, &l.load, &l.loaded_at}) {

@@ -91,9 +91,9 @@ class Multigrid {
   // Renews what yielded links add to the load of a row of voxels; `keep`: they keep it. True where a link is
   // beyond what it keeps.
   bool yield(RowId row, Displacement& state, bool keep) noexcept;
-  // The child (bit 0: in x, 1: in y, 2: in z) of a coarse row on the level below; where the lattice ends, a
-  // row of its empty border.
-  [[nodiscard]] RowId row_below(int level, RowId row, int child) const noexcept;
+  // The children (bit 0: in x, 1: in y, 2: in z) of a coarse row on the level below; where the lattice ends,
+  // rows of its empty border.
+  [[nodiscard]] std::array<RowId, 8> rows_below(int level, RowId row) const noexcept;
 
   // What follows works on the octets of `span` only; by default, on the whole row.
 
@@ -153,14 +153,16 @@ class Multigrid {
   void balance(RowId row, Displacement& state, const ObstacleView& obstacles, OctetSpan span = {}) noexcept;
   // The load that is for that, beside those that the voxel has of itself (N).
   [[nodiscard]] glm::dvec3 balance_of(VoxelId v, const Displacement& state) const noexcept {
-    if (row_balanced_.size() == 0 || row_balanced_[v / kRow] == 0) return glm::dvec3(0.0);
+    const float* of_row = balance_of(static_cast<RowId>(v / kRow), 0);
+    if (of_row == nullptr) return glm::dvec3(0.0);
     const std::array<float, 3> own = state.bricks.at(v);
-    return {balance_[0][v] - own[0], balance_[1][v] - own[1], balance_[2][v] - own[2]};
+    const float* at = of_row + v % kRow;
+    return {at[0] - own[0], at[kRow] - own[1], at[2 * kRow] - own[2]};
   }
   // Of a row on one axis, what voxels have of themselves not taken off; null: nothing is balanced.
   [[nodiscard]] const float* balance_of(RowId row, std::size_t axis) const noexcept {
-    if (row_balanced_.size() == 0 || row_balanced_[row] == 0) return nullptr;
-    return balance_[axis].data() + static_cast<std::size_t>(row) * kRow;
+    if (balance_number_.size() == 0 || balance_number_[row] == 0) return nullptr;
+    return balance_.data() + ((balance_number_[row] - std::size_t{1}) * 3 + axis) * kRow;
   }
   // Adds to a row of voxels what somebody else found, as far as its links allow.
   void add(RowId row, const RowVector& way, Displacement& state, const ObstacleView& obstacles) noexcept;
@@ -206,7 +208,7 @@ class Multigrid {
                           OctetSpan span, RowVector& out) noexcept;
   void spread_hats(int level, int j, int k, const Told& box) noexcept;
   void tell_row(int level, RowId row, const std::array<HatRow, 4>& hats, Displacement& state,
-                const ObstacleView& obstacles, OctetSpan span, int first, int last, bool again) noexcept;
+                const ObstacleView& obstacles, OctetSpan span, bool again) noexcept;
   void correct(int level, RowId row, const RowVector& correction, Displacement& state,
                const ObstacleView& obstacles, OctetSpan span, Refused& refused) noexcept;
   void tell_again(Displacement& state, const ObstacleView& obstacles) noexcept;
@@ -240,11 +242,13 @@ class Multigrid {
   LazyVector<StoppedCell> stopped_;
   LazyArray<Refused> refused_;
   std::size_t refused_count_ = 0;
-  // [axis][voxel] its own load and what balances it (N), in rows where something does
-  std::array<LazyArray<float>, 3> balance_;
-  LazyArray<std::uint8_t> row_balanced_;  // [row] 1: it has
-  LazyVector<RowId> balanced_;            // these
+  // Rows in which something balances what pulls: that and their own load (N), one beside the other. (At their
+  // voxels' places, each in pages of its own, a first give took up to 1.2 ms, most of it to get these.)
+  LazyVector<RowId> balanced_;
+  LazyArray<float> balance_;                 // [as balanced_][axis][lane]
+  LazyArray<std::uint16_t> balance_number_;  // [row] 1 + where; 0: none
   std::array<AxisLimits, 3> yield_limits_;
+  bool all_visited_ = false;  // cycles look at all in their boxes: which rows are active nobody asks
   float tolerance_N_ = 0.0F, quiet_m_ = 0.0F, hold_ = 1.0F;
 };
 

@@ -20,10 +20,10 @@ LevelRow Multigrid::row_of(int level, RowId row, Displacement& state) noexcept {
   r.z = static_cast<std::ptrdiff_t>(g.row_z) * kRow;
   r.x = static_cast<std::ptrdiff_t>(g.row_x) * kRow;
   if (level == 0) {
-    const bool balanced = row_balanced_.size() > 0 && row_balanced_[row] != 0;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       r.u[axis] = state.u[axis].data() + begin;
-      r.load[axis] = balanced ? balance_[axis].data() + begin : state.load_of(row, static_cast<int>(axis));
+      const float* balanced = balance_of(row, axis);
+      r.load[axis] = balanced != nullptr ? balanced : state.load_of(row, static_cast<int>(axis));
     }
     if (state.row_standing[row] != 0) r.held = state.role.data() + begin;
     return r;
@@ -68,10 +68,14 @@ void Multigrid::smooth(int level, RowId row, Displacement& state, const Obstacle
   note_change(0, row, smooth_voxels(r, row, state, obstacles, span));
 }
 
-RowId Multigrid::row_below(int level, RowId row, int child) const noexcept {
+std::array<RowId, 8> Multigrid::rows_below(int level, RowId row) const noexcept {
+  const Grid& g = grid(level - 1);
   const auto c = grid(level).row_coordinates(row);
-  return grid(level - 1).row(2 * (c[0] - 1) + 1 + (child & 1), 2 * c[1] + (child >> 1 & 1),
-                             2 * c[2] + (child >> 2));
+  const RowId first = g.row(2 * (c[0] - 1) + 1, 2 * c[1], 2 * c[2]);
+  std::array<RowId, 8> below;
+  for (RowId child = 0; child < 8; ++child)
+    below[child] = first + (child & 1U) * g.row_x + (child >> 1U & 1U) + (child >> 2U) * g.row_z;
+  return below;
 }
 
 namespace {
@@ -91,11 +95,12 @@ void Multigrid::restrict_values(int level, RowId row, Displacement& state, Octet
   const std::size_t begin = static_cast<std::size_t>(row) * kRow;
   RowVector sums{};
   std::array<float*, 3> value{}, told{};
-  for (int child = 0; child < 8; ++child) {
-    const int half = child & 1;
+  const std::array<RowId, 8> rows = rows_below(level, row);
+  for (std::size_t child = 0; child < 8; ++child) {
+    const int half = static_cast<int>(child & 1U);
     const OctetSpan below = octets_below(span, half);
     if (below.first > below.last) continue;
-    const std::size_t fine = static_cast<std::size_t>(row_below(level, row, child)) * kRow;
+    const std::size_t fine = static_cast<std::size_t>(rows[child]) * kRow;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const float* u = (level == 1 ? state.u : at(level - 1).value)[axis].data() + fine;
       add_pairs(u, below, sums[axis].data() + half * kRow / 2);
@@ -114,15 +119,15 @@ void Multigrid::balance(RowId row, Displacement& state, const ObstacleView& obst
   RowVector left;
   residual_of(0, row, state, obstacles, span, left);
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    float* to = balance_[axis].data() + static_cast<std::size_t>(row) * kRow;
+    float* to = balance_.data() + (balanced_.size() * 3 + axis) * kRow;
     const float* own = state.load_of(row, static_cast<int>(axis));
     for (std::size_t i = 0; i < kRow; ++i) to[i] = own == nullptr ? 0.0F : own[i];
     for (std::size_t i = static_cast<std::size_t>(span.first) * kOctet;
          i < static_cast<std::size_t>(span.last + 1) * kOctet; ++i)
       to[i] -= left[axis][i];
   }
-  row_balanced_[row] = 1;
   balanced_.push_back(row);
+  balance_number_[row] = static_cast<std::uint16_t>(balanced_.size());
 }
 
 // What pulls the voxels, or cells, of a row that are free to follow.
@@ -160,9 +165,10 @@ float Multigrid::restrict_loads(int level, RowId row, Displacement& state, const
   Couplings& finer = *at(level - 1).couplings;
   float worst = 0.0F;
   RowVector sums{};
-  for (int child = 0; child < 8; ++child) {
-    const RowId fine = row_below(level, row, child);
-    const int half = child & 1;
+  const std::array<RowId, 8> rows = rows_below(level, row);
+  for (std::size_t child = 0; child < 8; ++child) {
+    const RowId fine = rows[child];
+    const int half = static_cast<int>(child & 1U);
     const OctetSpan below = octets_below(span, half);
     if (below.first > below.last || !finer.prepare(fine)) continue;
     RowVector residual;
@@ -303,11 +309,16 @@ void Multigrid::tell(int level, const Told& box, Displacement& state, const Obst
       const auto here = hats(box.q0);
       if (std::none_of(here.begin(), here.end(), [](const HatRow& r) { return r.tells; })) continue;
       for (int c = box.q0 / kOctets; c <= box.q1 / kOctets; ++c) {
-        const int first = std::max(box.q0, c * kOctets), last = std::min(box.q1, c * kOctets + kOctets - 1);
         const RowId row = g.row(c + 1, j, k);
         if (!prepare(level, row)) continue;
+        // Beyond these lanes no hat reaches.
+        const int from = std::max(2 * box.first_teller - 1, 0) / kOctet,
+                  to = (2 * box.last_teller + 2) / kOctet;
+        const int first = std::max({box.q0, from, c * kOctets});
+        const int last = std::min({box.q1, to, c * kOctets + kOctets - 1});
+        if (first > last) continue;
         tell_row(level, row, hats(first), state, obstacles, {first - c * kOctets, last - c * kOctets},
-                 box.first_teller, box.last_teller, again && level == 0);
+                 again && level == 0);
       }
     }
   }
@@ -315,15 +326,9 @@ void Multigrid::tell(int level, const Told& box, Displacement& state, const Obst
 }
 
 void Multigrid::tell_row(int level, RowId row, const std::array<HatRow, 4>& hats, Displacement& state,
-                         const ObstacleView& obstacles, OctetSpan span, int first, int last,
-                         bool again) noexcept {
+                         const ObstacleView& obstacles, OctetSpan span, bool again) noexcept {
   RowVector correction;
   sum_hats(hats, span, correction);
-  // Beyond these lanes no hat reaches.
-  const int origin = (grid(level).row_coordinates(row)[0] - 1) * kRow;
-  span.first = std::max(span.first, (std::max(2 * first - 1, origin) - origin) / kOctet);
-  span.last = std::min(span.last, (2 * last + 2 - origin) / kOctet);
-  if (span.first > span.last) return;
   for (std::size_t axis = 0; axis < 3 && level > 0 && holds_->any(level, row); ++axis) {
     const float* nearer = holds_->nearer(level, row, axis);
     for (std::size_t i = static_cast<std::size_t>(span.first) * kOctet;

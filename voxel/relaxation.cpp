@@ -66,6 +66,7 @@ void Relaxation::leave_to_another() {
 
 void Relaxation::give_away(Displacement& state, const ObstacleView& obstacles) noexcept {
   asleep_ = away_ = true;
+  step_ = 0;
   multigrid_.begin_anew();
   const Grid& g = lattice_.grid();
   for (int c = near_.first[0]; c <= near_.last[0]; ++c) {
@@ -148,13 +149,13 @@ void Relaxation::run_cycle(Displacement& state, const ObstacleView& obstacles,
   round_left_ = 0;
   running_residual_N_ = 0.0;
   lay_whole_boxes();
-  cycle(state, obstacles, Look::active, false);
+  cycle(state, obstacles, Look::active);
   end_round(state, obstacles, running_residual_N_);
 }
 
 std::size_t Relaxation::relax_contact(Displacement& state, const ObstacleView& obstacles,
                                       std::span<const VoxelId> held, std::span<const VoxelId> pressed,
-                                      bool again) noexcept {
+                                      bool again, std::size_t at_once) noexcept {
   contact_relaxed_ = true;
   hold_what_stands(state, held);
   lay_contact_boxes(pressed, kContactMargin);
@@ -163,8 +164,33 @@ std::size_t Relaxation::relax_contact(Displacement& state, const ObstacleView& o
   near_.first = {b.q0 / kOctets + 1, std::max(b.j0 - kNear, 0), std::max(b.k0 - kNear, 0)};
   near_.last = {b.q1 / kOctets + 1, std::min(b.j1 + kNear, g.dims[1] - 1),
                 std::min(b.k1 + kNear, g.dims[2] - 1)};
-  cycle(state, obstacles, Look::all, apart_ && again);
-  return octets_of_cycle();
+  step_ = 0;
+  smoothed_ = apart_ && again;
+  wide_ = octets_of_cycle() > kNarrow;
+  return run_steps(state, obstacles, wide_ ? at_once : kWhole);
+}
+
+std::size_t Relaxation::continue_contact(Displacement& state, const ObstacleView& obstacles,
+                                         std::span<const VoxelId> held, std::size_t at_once) noexcept {
+  hold_what_stands(state, held);
+  return run_steps(state, obstacles, at_once);
+}
+
+// Of what is left to do an equal part.
+std::size_t Relaxation::run_steps(Displacement& state, const ObstacleView& obstacles,
+                                  std::size_t at_once) noexcept {
+  const int steps = 2 * last_level() + 1;
+  std::size_t left = 0, done = 0;
+  for (int n = step_; n < steps; ++n) left += work_of_step(n);
+  const std::size_t parts = at_once == 0 ? left : (left - 1) / at_once + 1;
+  const std::size_t part = left / parts;
+  do {
+    done += work_of_step(step_);
+    step(step_, state, obstacles, Look::all, smoothed_);
+    ++step_;
+  } while (step_ < steps && (parts == 1 || done + work_of_step(step_) / 2 <= part));
+  if (step_ == steps) step_ = 0;
+  return done;
 }
 
 std::size_t Relaxation::relax_widely(Displacement& state, const ObstacleView& obstacles,
@@ -174,7 +200,7 @@ std::size_t Relaxation::relax_widely(Displacement& state, const ObstacleView& ob
   multigrid_.release_limited();
   lay_contact_boxes(pressed, kWideMargin);
   tells_again_ = true;
-  cycle(state, obstacles, Look::all, false);
+  cycle(state, obstacles, Look::all);
   tells_again_ = false;
   return octets_of_cycle();
 }
@@ -204,7 +230,7 @@ std::uint64_t Relaxation::relax_tile(Displacement& state, const ObstacleView& ob
   constexpr int kSide = TileQueue::kSide;
   lay_boxes({t.column * kRow, t.j * kSide, t.k * kSide},
             {(t.column + 1) * kRow - 1, (t.j + 1) * kSide - 1, (t.k + 1) * kSide - 1}, kNoContact, 0);
-  cycle(state, obstacles, Look::all, false);
+  cycle(state, obstacles, Look::all);
   std::uint64_t updates = 0;
   for (const LevelBoxes& b : boxes_) {
     updates += static_cast<std::uint64_t>(b.smoothed.q1 - b.smoothed.q0 + 1) * kOctet *

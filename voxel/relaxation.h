@@ -45,10 +45,23 @@ class Relaxation {
   // to the coarse levels. It is cheaper by a quarter, and takes more of what the tool moved to where it
   // reaches far: an organ held 1.2 s into a path was 0.12 to 0.2 N off, now 0.04, of 1.43; a block in which
   // all is near was 0.075 N off at most, now 0.095.
-  // Returns how many octets of rows, of all levels, its boxes have: what it cost, in counted work.
+  // Returns what it took, in counted work: as many octets told, of 45 ns or so.
+  // Of a wide one (below) that takes more than `at_once` a part is done; the rest is for continue_contact().
   static constexpr int kMaxNear = 64;
+  static constexpr std::size_t kWhole = ~std::size_t{0};
   std::size_t relax_contact(Displacement& state, const ObstacleView& obstacles, std::span<const VoxelId> held,
-                            std::span<const VoxelId> pressed, bool again = false) noexcept;
+                            std::span<const VoxelId> pressed, bool again = false,
+                            std::size_t at_once = kWhole) noexcept;
+  // Goes on with it, in the same boxes, by about so much; a level at least. Parts are as equal as levels let
+  // them be. Between two of them everything may be moved.
+  std::size_t continue_contact(Displacement& state, const ObstacleView& obstacles,
+                               std::span<const VoxelId> held, std::size_t at_once) noexcept;
+  [[nodiscard]] bool under_way() const { return step_ > 0; }
+  // Had the last one, or has this one, more than kNarrow octets to visit, on all levels?
+  static constexpr std::size_t kNarrow = 2500;
+  [[nodiscard]] bool wide() const { return wide_; }
+  // What coarse levels have still to tell waits for the next cycle.
+  void end_contact() noexcept { step_ = 0; }
 
   // The same in boxes wide enough for tissue that has spacings to go, for a thread that has the time for it:
   // 2.5 ms where a whole cycle of 10^6 voxels takes 50. What limits hold is let go of first: while most of
@@ -86,6 +99,7 @@ class Relaxation {
   // What it found is taken from here on; with that residual (N).
   void take_over(double residual_N) noexcept {
     away_ = false;
+    step_ = 0;
     residual_N_ = residual_N;
     multigrid_.begin_anew();
     multigrid_.release_limited();
@@ -146,7 +160,16 @@ class Relaxation {
                  int contact_margin) noexcept;
   void lay_contact_boxes(std::span<const VoxelId> pressed, int margin) noexcept;
   void lay_whole_boxes() noexcept;
-  void cycle(Displacement& state, const ObstacleView& obstacles, Look look, bool smoothed) noexcept;
+  // In steps: a level each on the way down, the coarsest, and a level each on the way up.
+  void cycle(Displacement& state, const ObstacleView& obstacles, Look look) noexcept {
+    for (int n = 0; n <= 2 * last_level(); ++n) step(n, state, obstacles, look, false);
+  }
+  void step(int n, Displacement& state, const ObstacleView& obstacles, Look look, bool smoothed) noexcept;
+  std::size_t run_steps(Displacement& state, const ObstacleView& obstacles, std::size_t at_once) noexcept;
+  [[nodiscard]] std::size_t work_of_step(int n) const noexcept;
+  void go_down(int level, Displacement& state, const ObstacleView& obstacles, Look look,
+               bool smoothed) noexcept;
+  void go_up(int level, Displacement& state, const ObstacleView& obstacles, Look look) noexcept;
   void smooth_box(int level, int colour, Displacement& state, const ObstacleView& obstacles,
                   Look look) noexcept;
   void tell_box(int level, Displacement& state, const ObstacleView& obstacles) noexcept;
@@ -155,6 +178,7 @@ class Relaxation {
   void for_rows(int level, const RowBox& box, const Visit& visit) noexcept;
   [[nodiscard]] RowBox clipped(int level, const RowBox& box) const noexcept;
   [[nodiscard]] int last_level() const noexcept;  // of a cycle
+  [[nodiscard]] static std::size_t octets(const RowBox& box);
   [[nodiscard]] std::size_t octets_of_cycle() const noexcept;
   [[nodiscard]] LevelBoxes& boxes(int level) { return boxes_[static_cast<std::size_t>(level)]; }
 
@@ -171,9 +195,12 @@ class Relaxation {
   bool apart_ = false;  // another relaxes it
   NearRows near_;
   bool contact_relaxed_ = false;  // since run() last was
-  bool unkept_ = false;           // some link is beyond what it keeps
-  bool keeping_ = false;          // it is kept now
-  bool tells_again_ = false;      // what limits keep from following is told twice
+  bool wide_ = false;
+  int step_ = 0;              // the next one of a cycle round the contact, with its boxes in boxes_
+  bool smoothed_ = false;     // and on its way down nothing is smoothed
+  bool unkept_ = false;       // some link is beyond what it keeps
+  bool keeping_ = false;      // it is kept now
+  bool tells_again_ = false;  // what limits keep from following is told twice
   double residual_N_ = 0.0, running_residual_N_ = 0.0, tolerance_N_ = 0.0, least_residual_N_ = 0.0;
   float hold_ = 1.0F;
   std::array<double, 3> drift_m_{}, furthest_m_{};  // of clusters at limits, since it was woken

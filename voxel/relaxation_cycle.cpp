@@ -14,6 +14,8 @@ constexpr int kContactSweeps = 4;  // of the coarsest level of a cycle round a c
 // four, or as many as reach three radii of the contact, the force on the way into organs was 4 to 25 %
 // higher.)
 constexpr int kContactLevels = 5;
+// What octets take, in those that are told: smoothed; smoothed and passed on.
+constexpr std::size_t kSmoothed = 2, kPassedOn = 5;
 constexpr int kTileMargin = 3;  // cells round a tile that are smoothed, from level 1 on
 
 }  // namespace
@@ -86,18 +88,32 @@ void Relaxation::lay_boxes(const std::array<int, 3>& low, const std::array<int, 
   }
 }
 
+std::size_t Relaxation::octets(const RowBox& b) {
+  return static_cast<std::size_t>(b.q1 - b.q0 + 1) * static_cast<std::size_t>(b.j1 - b.j0 + 1) *
+         static_cast<std::size_t>(b.k1 - b.k0 + 1);
+}
+
 // Smoothed, passed on and told; what of the boxes is empty counts too.
 std::size_t Relaxation::octets_of_cycle() const noexcept {
-  const auto octets = [](const RowBox& b) {
-    return static_cast<std::size_t>(b.q1 - b.q0 + 1) * static_cast<std::size_t>(b.j1 - b.j0 + 1) *
-           static_cast<std::size_t>(b.k1 - b.k0 + 1);
-  };
   std::size_t sum = 0;
   for (int l = 0; l <= last_level(); ++l) {
     const LevelBoxes& b = boxes_[static_cast<std::size_t>(l)];
     sum += 2 * octets(b.smoothed) + (l < last_level() ? octets(b.told) : 0);
   }
   return sum;
+}
+
+// In octets told.
+std::size_t Relaxation::work_of_step(int n) const noexcept {
+  const int last = last_level(), level = n <= last ? n : 2 * last - n;
+  const LevelBoxes& b = boxes_[static_cast<std::size_t>(level)];
+  if (n == last) return kContactSweeps * kSmoothed * octets(b.smoothed);
+  if (n < last) return kPassedOn * octets(b.smoothed);
+  // Along x no hat reaches more than an octet further.
+  RowBox told = b.told;
+  told.q0 = std::max(told.q0, b.smoothed.q0 - 1);
+  told.q1 = std::min(told.q1, b.smoothed.q1 + 1);
+  return octets(told) + kSmoothed * octets(b.smoothed);
 }
 
 // Rows of one colour, so that no two that are beside one another are of the same.
@@ -139,58 +155,66 @@ void Relaxation::tell_box(int level, Displacement& state, const ObstacleView& ob
 
 // Was anything that a coarse row holds moved since it was passed on?
 bool Relaxation::restrict_due(int level, RowId row) const noexcept {
-  for (int child = 0; child < 8; ++child) {
-    if (multigrid_.has(level - 1, multigrid_.row_below(level, row, child), Multigrid::dirty)) return true;
-  }
-  return false;
+  const std::array<RowId, 8> below = multigrid_.rows_below(level, row);
+  return std::any_of(below.begin(), below.end(),
+                     [&](RowId child) { return multigrid_.has(level - 1, child, Multigrid::dirty); });
 }
 
-void Relaxation::cycle(Displacement& state, const ObstacleView& obstacles, Look look,
-                       bool smoothed) noexcept {
+void Relaxation::step(int n, Displacement& state, const ObstacleView& obstacles, Look look,
+                      bool smoothed) noexcept {
   const int last = last_level();
   // What coarse levels know and finer ones do not is told first: a step between voxels that were told and
   // others that were not would look like a force to the cells above it.
-  for (int l = last - 1; l >= 0; --l) tell_box(l, state, obstacles);
-  for (int l = 0; l < last; ++l) {
-    if (!smoothed) {
-      for (const int colour : {0, 1}) smooth_box(l, colour, state, obstacles, look);
-    }
-    // Before forces are summed, so that what is called the residual is that of links that yield.
-    if (l == 0 && lattice_.yields()) {
-      for_rows(0, boxes(0).smoothed, [&](RowId row, OctetSpan, int, int) {
-        if (look == Look::all || multigrid_.has(0, row, Multigrid::active | Multigrid::dirty))
-          unkept_ = multigrid_.yield(row, state, false) || unkept_;
-      });
-    }
-    const RowBox& parents = boxes(l + 1).parents;
-    const Grid& g = multigrid_.grid(l + 1);
-    for_rows(l + 1, parents, [&](RowId row, OctetSpan span, int, int) {
-      if (look == Look::active) {
-        if (!restrict_due(l + 1, row)) return;
-        // The load holds a row where it is beside its neighbours where they are.
-        for (const RowId r :
-             {row, row - 1, row + 1, row - g.row_z, row + g.row_z, row - g.row_x, row + g.row_x})
-          multigrid_.mark(l + 1, r, Multigrid::renewed);
-      }
-      // Apart, coarse cells hold only what was moved since all was balanced, and know that from themselves.
-      if (!apart_) multigrid_.restrict_values(l + 1, row, state, span);
-    });
-    for_rows(l + 1, parents, [&](RowId row, OctetSpan span, int, int) {
-      if (look == Look::active) {
-        if (!multigrid_.has(l + 1, row, Multigrid::renewed)) return;
-        multigrid_.unmark(l + 1, row, Multigrid::renewed);
-      }
-      const float worst = multigrid_.restrict_loads(l + 1, row, state, obstacles, span);
-      if (l == 0) running_residual_N_ = std::max(running_residual_N_, static_cast<double>(worst));
-    });
-    if (l == 0) multigrid_.renew_holds();
+  for (int l = last - 1; n == 0 && l >= 0; --l) tell_box(l, state, obstacles);
+  if (n < last) {
+    go_down(n, state, obstacles, look, smoothed);
+  } else if (n == last) {
+    const int sweeps = apart_ ? kContactSweeps : kCoarsestSweeps;
+    for (int k = 0; k < 2 * sweeps; ++k) smooth_box(last, k & 1, state, obstacles, look);
+  } else {
+    go_up(2 * last - n, state, obstacles, look);
   }
-  const int sweeps = apart_ ? kContactSweeps : kCoarsestSweeps;
-  for (int n = 0; n < 2 * sweeps; ++n) smooth_box(last, n & 1, state, obstacles, look);
-  for (int l = last - 1; l >= 0; --l) {
-    tell_box(l, state, obstacles);
-    for (const int colour : {1, 0}) smooth_box(l, colour, state, obstacles, look);
+}
+
+void Relaxation::go_down(int l, Displacement& state, const ObstacleView& obstacles, Look look,
+                         bool smoothed) noexcept {
+  if (!smoothed) {
+    for (const int colour : {0, 1}) smooth_box(l, colour, state, obstacles, look);
   }
+  // Before forces are summed, so that what is called the residual is that of links that yield.
+  if (l == 0 && lattice_.yields()) {
+    for_rows(0, boxes(0).smoothed, [&](RowId row, OctetSpan, int, int) {
+      if (look == Look::all || multigrid_.has(0, row, Multigrid::active | Multigrid::dirty))
+        unkept_ = multigrid_.yield(row, state, false) || unkept_;
+    });
+  }
+  const RowBox& parents = boxes(l + 1).parents;
+  const Grid& g = multigrid_.grid(l + 1);
+  for_rows(l + 1, parents, [&](RowId row, OctetSpan span, int, int) {
+    if (look == Look::active) {
+      if (!restrict_due(l + 1, row)) return;
+      // The load holds a row where it is beside its neighbours where they are.
+      for (const RowId r :
+           {row, row - 1, row + 1, row - g.row_z, row + g.row_z, row - g.row_x, row + g.row_x})
+        multigrid_.mark(l + 1, r, Multigrid::renewed);
+    }
+    // Apart, coarse cells hold only what was moved since all was balanced, and know that from themselves.
+    if (!apart_) multigrid_.restrict_values(l + 1, row, state, span);
+  });
+  for_rows(l + 1, parents, [&](RowId row, OctetSpan span, int, int) {
+    if (look == Look::active) {
+      if (!multigrid_.has(l + 1, row, Multigrid::renewed)) return;
+      multigrid_.unmark(l + 1, row, Multigrid::renewed);
+    }
+    const float worst = multigrid_.restrict_loads(l + 1, row, state, obstacles, span);
+    if (l == 0) running_residual_N_ = std::max(running_residual_N_, static_cast<double>(worst));
+  });
+  if (l == 0) multigrid_.renew_holds();
+}
+
+void Relaxation::go_up(int l, Displacement& state, const ObstacleView& obstacles, Look look) noexcept {
+  tell_box(l, state, obstacles);
+  for (const int colour : {1, 0}) smooth_box(l, colour, state, obstacles, look);
 }
 
 void Relaxation::lay_whole_boxes() noexcept {

@@ -18,16 +18,22 @@ constexpr double kContraction = 0.5;  // of that, by a cycle round the contact
 // Cycles round the contact a tick: of a ball pressed at 0.2 m/s into 24,000 voxels one leaves 0.7, two 0.24
 // just noticeable differences of the force (60 samples), for 470 and 650 us.
 constexpr int kMostCycles = 2;
-// … where the first had no more octets to visit than this, about 300 us of them. Where the box is wide the
-// second brought little and took what the tick did not have: a brain that is pressed feels the same within
-// 2 %, and of 6,750 ticks in real time 91 missed their deadlines in place of 278; an abdomen 10 of 52,000 in
-// place of 69.
-constexpr std::size_t kCheap = 2500;
-// Nor has it one in the tick after that: what a tick has time for is then had by the results of the other
-// thread, which wait in a tick with a wide cycle. (A composed abdomen's p99.9, tick by tick the least of
-// three runs, is 620 us with both and was 800; what is felt on the way into thirteen organs is the same
-// within 0.03 N, into cartilage 1.26 in place of 1.19.)
-constexpr double kJump = 0.1;    // … unless the contact has as many spacings to go still
+// … where the first is not a wide one (Relaxation::wide): there the second brought little and took what the
+// tick did not have: a brain that is pressed feels the same within 2 %, and of 6,750 ticks in real time 91
+// missed their deadlines in place of 278. Unless the contact has as many spacings to go still.
+constexpr double kJump = 0.1;
+// Where another thread relaxes the object, wide cycles have this much work of a tick (in octets told), some
+// 150 us: what is left of one goes on in the next tick, and what one leaves of a tick begins the next.
+// (Whole, one took up to 450 us of a tick, and so had every other tick only. In parts of narrow ones a cube
+// of 24,000 voxels pressed at 200 mm/s was 2.2 just noticeable differences off in place of 0.6.)
+constexpr std::size_t kContactWork = 3500, kLeastWork = 1000;
+// … and with what is added of results.
+constexpr std::size_t kTickWork = 4000;
+// A whole cycle, in the same thread or beside it in the same cache, leaves nothing of the contact in there,
+// and until that is read again all takes up to twice as long: for so many ticks there is less work. The same
+// where the tool comes upon tissue that was not touched for long.
+constexpr int kColdTicks = 5;
+constexpr std::size_t kColdWork = 2400;
 constexpr int kProjections = 3;  // of a pressed voxel onto the tool, in search of its least energy
 constexpr double kSlides = 0.1;  // sin² between tool and obstacle; where they meet nearly flat it is squeezed
 constexpr double kGiveWay = 0.01;  // of the voxel radius: less is left to the next push
@@ -119,8 +125,12 @@ bool SoftObject::clear_of(const ToolInBody& tool, const glm::dvec3& position) co
 
 void SoftObject::touch(std::span<const VoxelId> near) noexcept {
   cycles_since_touch_ = 0;
-  rests_ = wide_cycle() && relaxation_.left_to_another();
-  contact_octets_ = 0;
+  if (near.empty()) relaxation_.end_contact();
+  if (cold_ticks_ > 0) --cold_ticks_;
+  rests_ = asked_to_rest_ && !relaxation_.under_way();
+  if (rests_) asked_to_rest_ = false;
+  contact_work_ = 0;
+  wide_cycle_ = false;
   if (near.empty()) pressed_last_.clear();
   std::size_t pressed = 0;
   touched_before_.clear();
@@ -302,12 +312,14 @@ bool SoftObject::any_pressed() const noexcept {
 
 // Is a cycle round the contact due?
 bool SoftObject::cycle_due() const noexcept {
+  if (relaxation_.under_way()) return cycles_since_touch_ == 0;
   const double to_go = unsettled_m_ / lattice_->min_spacing_m();
   // A contact that stands still is the background's: it comes to rest with all the object, where a box comes
   // to rest with its surroundings held.
   if (to_go < kSettled || cycles_since_touch_ == kMostCycles) return false;
-  if (to_go >= kJump) return true;
-  if (cycles_since_touch_ > 0) return !wide_cycle();
+  const bool in_parts = relaxation_.left_to_another() && wide_cycle_;
+  if (to_go >= kJump && !in_parts && !rests_) return true;
+  if (cycles_since_touch_ > 0) return in_parts ? contact_work_left() >= kLeastWork : !wide_cycle_;
   // What was let go of has this tick only.
   return !rests_ || !any_pressed();
 }
@@ -319,20 +331,30 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
     set_touch_roles();
     if (!cycle_due()) break;
     const bool again = ++cycles_since_touch_ > 1;
-    unsettled_m_ *= kContraction;
+    if (!relaxation_.under_way()) unsettled_m_ *= kContraction;
     // They are in the order of their ids, so those of a row follow one another.
     for (std::size_t i = 0; i < touches_.size(); ++i) {
       const RowId row = touches_[i].v / kRow;
       if (i == 0 || touches_[i - 1].v / kRow != row) relaxation_.stir(row);
     }
     const std::size_t pressed = list_held();
+    if (pressed > 0 && pressed_last_.empty()) cold_ticks_ = kColdTicks;
     if (pressed > 0)
       pressed_last_.assign(all_held_.begin(), all_held_.begin() + static_cast<std::ptrdiff_t>(pressed));
+    const std::size_t left = contact_work_left();
+    if (relaxation_.under_way()) {
+      contact_work_ += relaxation_.continue_contact(state_, obstacle_view(), all_held_, left);
+      wide_cycle_ = true;
+      continue;
+    }
     // What the tool just let go of follows it, this once. (Left to the other thread, tissue that a quick tool
     // was drawn along hung back by a twenty-fifth of a spacing for up to six ticks: of 5,000 strokes 12 lost
     // contact by it.)
     if (pressed_last_.empty()) continue;
-    contact_octets_ = relaxation_.relax_contact(state_, obstacle_view(), all_held_, pressed_last_, again);
+    const bool in_parts = relaxation_.left_to_another() && pressed > 0;
+    contact_work_ += relaxation_.relax_contact(state_, obstacle_view(), all_held_, pressed_last_, again,
+                                               in_parts ? left : Relaxation::kWhole);
+    wide_cycle_ = relaxation_.wide();
   }
   // Last, so that what the tool feels is measured with its voxels where they belong; what is pressed first,
   // because what hangs on it by a tight link counts where that is tight still. (In the order of the list half
@@ -404,8 +426,14 @@ std::size_t SoftObject::list_held() noexcept {
   return pressed;
 }
 
-bool SoftObject::wide_cycle() const noexcept {
-  return contact_octets_ > kCheap;
+std::size_t SoftObject::contact_work_left() const noexcept {
+  const std::size_t all = cold_ticks_ > 0 ? kColdWork : kContactWork;
+  return all - std::min(all, contact_work_);
+}
+
+std::size_t SoftObject::work_left() const noexcept {
+  const std::size_t all = cold_ticks_ > 0 ? kColdWork : kTickWork;
+  return all - std::min(all, contact_work_);
 }
 
 std::uint64_t SoftObject::relax_background(std::uint64_t budget) noexcept {
@@ -419,6 +447,7 @@ std::uint64_t SoftObject::relax_background(std::uint64_t budget) noexcept {
 // time, they never came to rest.)
 void SoftObject::give_away() noexcept {
   relaxation_.give_away(state_, obstacle_view());
+  cold_ticks_ = kColdTicks;
   for (Touch& t : touches_) {
     t.left = glm::dvec3(0.0);
     if (!t.pressed || lattice_->anchored(t.v)) continue;

@@ -79,8 +79,12 @@ class SoftObject {
   // Moves every touched voxel that the tool overlaps out of it, and the chain after. True when any was.
   bool push_out(const ToolInBody& tool) noexcept;
   void relax_near(const ToolInBody& tool, int sweeps) noexcept;
-  // Had it, since touch(), a cycle round a contact so wide that it is most of what a tick may take?
-  [[nodiscard]] bool wide_cycle() const noexcept;
+  // Was there, since touch(), a wide cycle round the contact, or a part of one? What it leaves of a tick, as
+  // Relaxation counts work.
+  [[nodiscard]] bool wide_cycle() const { return wide_cycle_; }
+  [[nodiscard]] std::size_t work_left() const noexcept;
+  // No cycle round the contact is begun in the next tick, or, where one is under way, in the one after it.
+  void ask_to_rest() noexcept { asked_to_rest_ = true; }
   [[nodiscard]] Reaction reaction(const ToolInBody& tool) noexcept;
   // The tool moves by `delta`: pressed voxels go along, each by the part of it along its own normal.
   void follow(const glm::dvec3& delta) noexcept;
@@ -223,6 +227,7 @@ class SoftObject {
   std::size_t list_held() noexcept;
   [[nodiscard]] bool any_pressed() const noexcept;
   [[nodiscard]] bool cycle_due() const noexcept;
+  [[nodiscard]] std::size_t contact_work_left() const noexcept;
   [[nodiscard]] glm::dvec3 place_of(const ToolInBody& tool, Touch& touch) noexcept;
   void relax_touch(const ToolInBody& tool, Touch& touch) noexcept;
   void add_stiffness(int axis, glm::dmat3& stiffness) noexcept;
@@ -272,9 +277,12 @@ class SoftObject {
   LazyArray<std::uint32_t> carried_index_;  // [v]
   double unrelaxed_m_ = 0.0;                // motion of pressed voxels since the background was last woken
   int cycles_since_touch_ = 0;              // round the contact
-  std::size_t contact_octets_ = 0;          // that the last of these visited
-  bool rests_ = false;                      // the one before touch() was wide: none now, if that can wait
-  double unsettled_m_ = 0.0;                // how far the contact may be from the rest of the object
+  std::size_t contact_work_ = 0;            // since touch(), of them
+  bool wide_cycle_ = false;                 // and one of them was wide
+  int cold_ticks_ = 0;                      // for which what is near the contact is in no cache
+  bool asked_to_rest_ = false;
+  bool rests_ = false;        // none of them is begun now, if that can wait
+  double unsettled_m_ = 0.0;  // how far the contact may be from the rest of the object
   bool moved_ever_ = false;
 };
 

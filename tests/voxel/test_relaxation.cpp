@@ -353,6 +353,66 @@ TEST(Relaxation, CyclesRoundAContactBetweenTilesEndWhereWholeOnesDo) {
   EXPECT_LE(found, 1.02 * expected);
 }
 
+// A ball's print on top of a block that something else relaxes, or nothing else.
+struct Pressed {
+  Pressed(const Lattice& lattice, bool apart) : state(lattice), relaxation(lattice) {
+    if (apart) relaxation.leave_to_another();
+    const auto& dims = lattice.grid().dims;
+    for (int j = -4; j <= 4; ++j) {
+      for (int i = -4; i <= 4; ++i) {
+        if (i * i + j * j > 16) continue;
+        const VoxelId v = voxel_at(lattice, dims[0] / 2 + i, dims[1] / 2 + j, dims[2] - 1);
+        hold(state, held, v, {0.0, 0.0, -4e-4 + 2e-5 * (i * i + j * j)});
+        relaxation.stir(v / voxel::kRow);
+      }
+    }
+  }
+  Displacement state;
+  Relaxation relaxation;
+  std::vector<VoxelId> held;
+};
+
+TEST(Relaxation, ACycleInPartsEndsWhereAWholeOneDoes) {
+  const LatticeOptions options = tests::made_of(elastic(1e4, 0.3));
+  const Lattice lattice(block({45, 43, 40}, glm::dvec3(1e-3)), options);
+  for (const bool apart : {false, true}) {
+    Pressed whole(lattice, apart);
+    std::size_t work = 0;
+    for (int n = 0; n < 3; ++n)
+      work = whole.relaxation.relax_contact(whole.state, {}, whole.held, whole.held);
+    EXPECT_FALSE(whole.relaxation.under_way());
+    for (const std::size_t at_once : {std::size_t{0}, std::size_t{1}, work / 5, work / 2, work - 1, work}) {
+      Pressed parts(lattice, apart);
+      for (int n = 0; n < 3; ++n) {
+        std::size_t done =
+            parts.relaxation.relax_contact(parts.state, {}, parts.held, parts.held, false, at_once);
+        EXPECT_EQ(parts.relaxation.under_way(), at_once < work);
+        while (parts.relaxation.under_way())
+          done += parts.relaxation.continue_contact(parts.state, {}, parts.held, at_once);
+        EXPECT_EQ(done, work);
+      }
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        EXPECT_EQ(parts.state.u[axis], whole.state.u[axis]) << at_once << " of " << work << " at once";
+    }
+  }
+}
+
+// What one leaves undone, the next begins with.
+TEST(Relaxation, CyclesThatEndHalfWayComeToTheSameRest) {
+  const LatticeOptions options = tests::made_of(elastic(1e4, 0.3));
+  const Lattice lattice(block({29, 27, 24}, glm::dvec3(1e-3)), options);
+  Pressed expected(lattice, false), halves(lattice, false);
+  for (int n = 0; n < 60; ++n) expected.relaxation.run_cycle(expected.state, {}, expected.held);
+  for (int n = 0; n < 120; ++n) {
+    halves.relaxation.relax_contact(halves.state, {}, halves.held, halves.held, false, 1000);
+    EXPECT_TRUE(halves.relaxation.under_way());
+    halves.relaxation.end_contact();
+    halves.relaxation.run_cycle(halves.state, {}, halves.held);
+  }
+  const double energy = energy_of(lattice, options, expected.state);
+  EXPECT_NEAR(energy_of(lattice, options, halves.state), energy, 1e-6 * energy);
+}
+
 // ---- limits ----
 
 struct Tight {
