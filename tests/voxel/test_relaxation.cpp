@@ -354,8 +354,8 @@ TEST(Relaxation, CyclesRoundAContactBetweenTilesEndWhereWholeOnesDo) {
 }
 
 // A ball's print on top of a block that something else relaxes, or nothing else.
-struct Pressed {
-  Pressed(const Lattice& lattice, bool apart) : state(lattice), relaxation(lattice) {
+struct Print {
+  Print(const Lattice& lattice, bool apart) : state(lattice), relaxation(lattice) {
     if (apart) relaxation.leave_to_another();
     const auto& dims = lattice.grid().dims;
     for (int j = -4; j <= 4; ++j) {
@@ -376,13 +376,13 @@ TEST(Relaxation, ACycleInPartsEndsWhereAWholeOneDoes) {
   const LatticeOptions options = tests::made_of(elastic(1e4, 0.3));
   const Lattice lattice(block({45, 43, 40}, glm::dvec3(1e-3)), options);
   for (const bool apart : {false, true}) {
-    Pressed whole(lattice, apart);
+    Print whole(lattice, apart);
     std::size_t work = 0;
     for (int n = 0; n < 3; ++n)
       work = whole.relaxation.relax_contact(whole.state, {}, whole.held, whole.held);
     EXPECT_FALSE(whole.relaxation.under_way());
     for (const std::size_t at_once : {std::size_t{0}, std::size_t{1}, work / 5, work / 2, work - 1, work}) {
-      Pressed parts(lattice, apart);
+      Print parts(lattice, apart);
       for (int n = 0; n < 3; ++n) {
         std::size_t done =
             parts.relaxation.relax_contact(parts.state, {}, parts.held, parts.held, false, at_once);
@@ -401,7 +401,7 @@ TEST(Relaxation, ACycleInPartsEndsWhereAWholeOneDoes) {
 TEST(Relaxation, CyclesThatEndHalfWayComeToTheSameRest) {
   const LatticeOptions options = tests::made_of(elastic(1e4, 0.3));
   const Lattice lattice(block({29, 27, 24}, glm::dvec3(1e-3)), options);
-  Pressed expected(lattice, false), halves(lattice, false);
+  Print expected(lattice, false), halves(lattice, false);
   for (int n = 0; n < 60; ++n) expected.relaxation.run_cycle(expected.state, {}, expected.held);
   for (int n = 0; n < 120; ++n) {
     halves.relaxation.relax_contact(halves.state, {}, halves.held, halves.held, false, 1000);
