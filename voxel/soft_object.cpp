@@ -27,6 +27,9 @@ constexpr double kJump = 0.1;
 // (Whole, one took up to 450 us of a tick, and so had every other tick only. In parts of narrow ones a cube
 // of 24,000 voxels pressed at 200 mm/s was 2.2 just noticeable differences off in place of 0.6.)
 constexpr std::size_t kContactWork = 3500, kLeastWork = 1000;
+// What has fewer spacings to go stays whole: it stands, but for a voxel that slips, and in parts what a held
+// brain is felt with made a step of 1.2 mN of 152.
+constexpr double kSlow = 0.01;
 // … and with what is added of results.
 constexpr std::size_t kTickWork = 4000;
 // A whole cycle, in the same thread or beside it in the same cache, leaves nothing of the contact in there,
@@ -331,6 +334,7 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
     set_touch_roles();
     if (!cycle_due()) break;
     const bool again = ++cycles_since_touch_ > 1;
+    const bool slow = unsettled_m_ < kSlow * lattice_->min_spacing_m();
     if (!relaxation_.under_way()) unsettled_m_ *= kContraction;
     // They are in the order of their ids, so those of a row follow one another.
     for (std::size_t i = 0; i < touches_.size(); ++i) {
@@ -351,7 +355,7 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
     // was drawn along hung back by a twenty-fifth of a spacing for up to six ticks: of 5,000 strokes 12 lost
     // contact by it.)
     if (pressed_last_.empty()) continue;
-    const bool in_parts = relaxation_.left_to_another() && pressed > 0;
+    const bool in_parts = relaxation_.left_to_another() && pressed > 0 && !slow;
     contact_work_ += relaxation_.relax_contact(state_, obstacle_view(), all_held_, pressed_last_, again,
                                                in_parts ? left : Relaxation::kWhole);
     wide_cycle_ = relaxation_.wide();
