@@ -182,7 +182,8 @@ std::size_t Relaxation::run_steps(Displacement& state, const ObstacleView& obsta
   const int steps = 2 * last_level() + 1;
   std::size_t left = 0, done = 0;
   for (int n = step_; n < steps; ++n) left += work_of_step(n);
-  const std::size_t parts = at_once == 0 ? left : (left - 1) / at_once + 1;
+  const std::size_t most = std::max<std::size_t>(at_once, 1);
+  const std::size_t parts = left <= most ? 1 : std::max<std::size_t>(2, (left - 1) / most + 1);
   const std::size_t part = left / parts;
   do {
     done += work_of_step(step_);
