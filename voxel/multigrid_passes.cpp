@@ -294,6 +294,9 @@ void Multigrid::tell(int level, const Told& box, Displacement& state, const Obst
   // Of the two cells around a voxel the lower one.
   const auto below = [](int x) { return (x + 1) / 2 - 1; };
   hats_.begin(box.q0 / 2, box.q1 / 2, below(box.j0), below(box.j1) + 1);
+  // Beyond these octets no hat reaches.
+  const int q0 = std::max(box.q0, std::max(2 * box.first_teller - 1, 0) / kOctet);
+  const int q1 = std::min(box.q1, (2 * box.last_teller + 2) / kOctet);
   int spread = below(box.k0) - 1;  // plane of cells; the last that is
   for (int k = box.k0; k <= box.k1; ++k) {
     for (; spread <= below(k); ++spread) {
@@ -306,17 +309,12 @@ void Multigrid::tell(int level, const Told& box, Displacement& state, const Obst
         return std::array<HatRow, 4>{hats_.row(own_j, own_k, octet), hats_.row(near_j, own_k, octet),
                                      hats_.row(own_j, near_k, octet), hats_.row(near_j, near_k, octet)};
       };
-      const auto here = hats(box.q0);
+      const auto here = hats(q0);
       if (std::none_of(here.begin(), here.end(), [](const HatRow& r) { return r.tells; })) continue;
-      for (int c = box.q0 / kOctets; c <= box.q1 / kOctets; ++c) {
+      for (int c = q0 / kOctets; c <= q1 / kOctets; ++c) {
         const RowId row = g.row(c + 1, j, k);
         if (!prepare(level, row)) continue;
-        // Beyond these lanes no hat reaches.
-        const int from = std::max(2 * box.first_teller - 1, 0) / kOctet,
-                  to = (2 * box.last_teller + 2) / kOctet;
-        const int first = std::max({box.q0, from, c * kOctets});
-        const int last = std::min({box.q1, to, c * kOctets + kOctets - 1});
-        if (first > last) continue;
+        const int first = std::max(q0, c * kOctets), last = std::min(q1, c * kOctets + kOctets - 1);
         tell_row(level, row, hats(first), state, obstacles, {first - c * kOctets, last - c * kOctets},
                  again && level == 0);
       }

@@ -8,8 +8,9 @@
 // cut into pieces of a tick's work, was rejected: with cycles round the contact in between, what it had set
 // aside to be told was found a second time and told twice, and a contact in a large object sank.)
 //
-// Round the contact there is a cycle in every tick. Everywhere else one tile after the other that was
-// stirred, as many voxel updates as the budget says: counted work, never measured time.
+// Round the contact there is a cycle in every tick, or, where another thread relaxes the object and the
+// contact is wide, a part of one: no other cycle comes between its parts. Everywhere else one tile after the
+// other that was stirred, as many voxel updates as the budget says: counted work, never measured time.
 #pragma once
 
 #include <algorithm>

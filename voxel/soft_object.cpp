@@ -27,11 +27,11 @@ constexpr double kJump = 0.1;
 // (Whole, one took up to 450 us of a tick, and so had every other tick only. In parts of narrow ones a cube
 // of 24,000 voxels pressed at 200 mm/s was 2.2 just noticeable differences off in place of 0.6.)
 constexpr std::size_t kContactWork = 3500, kLeastWork = 1000;
-// What has fewer spacings to go stays whole: it stands, but for a voxel that slips, and in parts what a held
-// brain is felt with made a step of 1.2 mN of 152.
-constexpr double kSlow = 0.01;
 // … and with what is added of results.
 constexpr std::size_t kTickWork = 4000;
+// A contact with fewer spacings to go has its cycle whole: it stands, but for a voxel that slips, and in
+// parts what a held brain is felt with made a step of 1.2 mN of 152.
+constexpr double kSlow = 0.01;
 // A whole cycle, in the same thread or beside it in the same cache, leaves nothing of the contact in there,
 // and until that is read again all takes up to twice as long: for so many ticks there is less work. The same
 // where the tool comes upon tissue that was not touched for long.
@@ -322,7 +322,7 @@ bool SoftObject::cycle_due() const noexcept {
   if (to_go < kSettled || cycles_since_touch_ == kMostCycles) return false;
   const bool in_parts = relaxation_.left_to_another() && wide_cycle_;
   if (to_go >= kJump && !in_parts && !rests_) return true;
-  if (cycles_since_touch_ > 0) return in_parts ? contact_work_left() >= kLeastWork : !wide_cycle_;
+  if (cycles_since_touch_ > 0) return in_parts ? left_of(kContactWork) >= kLeastWork : !wide_cycle_;
   // What was let go of has this tick only.
   return !rests_ || !any_pressed();
 }
@@ -345,7 +345,7 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
     if (pressed > 0 && pressed_last_.empty()) cold_ticks_ = kColdTicks;
     if (pressed > 0)
       pressed_last_.assign(all_held_.begin(), all_held_.begin() + static_cast<std::ptrdiff_t>(pressed));
-    const std::size_t left = contact_work_left();
+    const std::size_t left = left_of(kContactWork);
     if (relaxation_.under_way()) {
       contact_work_ += relaxation_.continue_contact(state_, obstacle_view(), all_held_, left);
       wide_cycle_ = true;
@@ -430,14 +430,13 @@ std::size_t SoftObject::list_held() noexcept {
   return pressed;
 }
 
-std::size_t SoftObject::contact_work_left() const noexcept {
-  const std::size_t all = cold_ticks_ > 0 ? kColdWork : kContactWork;
+std::size_t SoftObject::left_of(std::size_t work) const noexcept {
+  const std::size_t all = cold_ticks_ > 0 ? kColdWork : work;
   return all - std::min(all, contact_work_);
 }
 
 std::size_t SoftObject::work_left() const noexcept {
-  const std::size_t all = cold_ticks_ > 0 ? kColdWork : kTickWork;
-  return all - std::min(all, contact_work_);
+  return left_of(kTickWork);
 }
 
 std::uint64_t SoftObject::relax_background(std::uint64_t budget) noexcept {

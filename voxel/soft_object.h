@@ -227,7 +227,7 @@ class SoftObject {
   std::size_t list_held() noexcept;
   [[nodiscard]] bool any_pressed() const noexcept;
   [[nodiscard]] bool cycle_due() const noexcept;
-  [[nodiscard]] std::size_t contact_work_left() const noexcept;
+  [[nodiscard]] std::size_t left_of(std::size_t work) const noexcept;  // of a tick's; less while all is cold
   [[nodiscard]] glm::dvec3 place_of(const ToolInBody& tool, Touch& touch) noexcept;
   void relax_touch(const ToolInBody& tool, Touch& touch) noexcept;
   void add_stiffness(int axis, glm::dmat3& stiffness) noexcept;
