@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <tuple>
 
+#include "hybrid/denormals.h"
 #include "hybrid/report.h"
 #include "hybrid/trace_file.h"
 

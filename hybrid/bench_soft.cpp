@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "hybrid/denormals.h"
+
 namespace hybrid::bench {
 
 const std::vector<std::string>& soft_cases() {

@@ -10,6 +10,7 @@
 
 #include "hybrid/bench_soft.h"
 #include "hybrid/build.h"
+#include "hybrid/denormals.h"
 #include "hybrid/session.h"
 #include "hybrid/soft_stage.h"
 #include "hybrid/tick.h"

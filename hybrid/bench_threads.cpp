@@ -9,6 +9,7 @@
 #include <memory>
 #include <thread>
 
+#include "hybrid/denormals.h"
 #include "hybrid/fill_snapshot.h"
 #include "hybrid/session.h"
 

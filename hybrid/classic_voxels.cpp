@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "hybrid/build_objects.h"
+#include "hybrid/denormals.h"
 #include "voxel/classic.h"
 
 namespace hybrid {

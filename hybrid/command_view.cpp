@@ -12,6 +12,7 @@
 #include "device/servo_loop.h"
 #include "device/simulated.h"
 #include "hybrid/commands.h"
+#include "hybrid/denormals.h"
 #include "hybrid/drawn_scene.h"
 #include "hybrid/fill_snapshot.h"
 #include "hybrid/hand_over.h"

@@ -8,6 +8,7 @@
 #include <optional>
 #include <random>
 
+#include "hybrid/denormals.h"
 #include "hybrid/extremes_scenes.h"
 #include "hybrid/session.h"
 #include "hybrid/tick_watch.h"

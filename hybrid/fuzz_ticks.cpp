@@ -14,6 +14,7 @@
 #include <optional>
 #include <random>
 
+#include "hybrid/denormals.h"
 #include "hybrid/extremes_drive.h"
 #include "hybrid/extremes_scenes.h"
 #include "hybrid/session.h"

@@ -9,6 +9,8 @@
 #include <fstream>
 #include <sstream>
 
+#include "hybrid/denormals.h"
+
 namespace hybrid {
 namespace {
 

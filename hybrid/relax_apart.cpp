@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <chrono>
 
-#include "hybrid/session.h"
+#include "hybrid/denormals.h"
 #include "hybrid/world.h"
 #include "voxel/replica.h"
 

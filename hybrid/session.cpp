@@ -2,7 +2,6 @@
 #include "hybrid/session.h"
 
 #include <fmt/format.h>
-#include <xmmintrin.h>
 
 #include <algorithm>
 #include <bit>
@@ -13,6 +12,7 @@
 
 #include "device/simulated.h"
 #include "hybrid/body_collisions.h"
+#include "hybrid/denormals.h"
 #include "hybrid/fill_snapshot.h"
 #include "hybrid/rigid_step.h"
 
@@ -20,8 +20,7 @@ namespace hybrid {
 namespace {
 
 constexpr double kAfterPath_s = 0.5;
-constexpr double kWithHand_s = 60.0;             // a real device has no path that ends
-constexpr unsigned int kFlushAndZero = 0x8040U;  // FTZ and DAZ
+constexpr double kWithHand_s = 60.0;  // a real device has no path that ends
 constexpr double kJndFloor_N = 0.04;
 constexpr std::uint64_t kMomentEvery = 20;  // ticks between two looks for a more telling moment
 constexpr std::uint64_t kClearances =
@@ -391,18 +390,6 @@ double jnd_of(const glm::dvec3& force, const glm::dvec3& reference, double floor
 
 double jnd_floor_N(const Scene& scene) {
   return std::max(kJndFloor_N, scene_limits(scene).friction_N);
-}
-
-void flush_denormals() noexcept {
-  _mm_setcsr(_mm_getcsr() | kFlushAndZero);
-}
-
-FlushedDenormals::FlushedDenormals() noexcept : before_(_mm_getcsr()) {
-  flush_denormals();
-}
-
-FlushedDenormals::~FlushedDenormals() {
-  _mm_setcsr(before_);
 }
 
 }  // namespace hybrid

@@ -124,20 +124,4 @@ double jnd_of(const glm::dvec3& force, const glm::dvec3& reference, double floor
 // The floor for a scene's device: its friction, and 0.04 N at least.
 double jnd_floor_N(const Scene& scene);
 
-// Flush-to-zero on the calling thread: denormals would cost a tick its time.
-void flush_denormals() noexcept;
-// The same while it lives: on a thread that is the driver's.
-class FlushedDenormals {
- public:
-  FlushedDenormals() noexcept;
-  ~FlushedDenormals();
-  FlushedDenormals(const FlushedDenormals&) = delete;
-  FlushedDenormals& operator=(const FlushedDenormals&) = delete;
-  FlushedDenormals(FlushedDenormals&&) = delete;
-  FlushedDenormals& operator=(FlushedDenormals&&) = delete;
-
- private:
-  unsigned int before_;
-};
-
 }  // namespace hybrid

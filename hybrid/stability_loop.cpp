@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "hybrid/denormals.h"
 #include "hybrid/rigid_sweep.h"
 #include "hybrid/session.h"
 

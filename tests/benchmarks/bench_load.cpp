@@ -24,6 +24,7 @@
 #include <vector>
 
 #include "hybrid/build.h"
+#include "hybrid/denormals.h"
 #include "hybrid/process_memory.h"
 #include "hybrid/session.h"
 #include "hybrid/tick.h"

@@ -23,6 +23,7 @@
 #include <thread>
 #include <utility>
 
+#include "hybrid/denormals.h"
 #include "hybrid/session.h"
 
 namespace {

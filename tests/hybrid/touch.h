@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "hybrid/build.h"
+#include "hybrid/denormals.h"
 #include "hybrid/session.h"
 #include "hybrid/tick.h"
 #include "scene_file_fixture.h"

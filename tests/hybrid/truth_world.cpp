@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "hybrid/build.h"
+#include "hybrid/denormals.h"
 #include "hybrid/session.h"
 #include "polygon/mesh_surface.h"
 
