@@ -20,10 +20,11 @@ LevelRow Multigrid::row_of(int level, RowId row, Displacement& state) noexcept {
   r.z = static_cast<std::ptrdiff_t>(g.row_z) * kRow;
   r.x = static_cast<std::ptrdiff_t>(g.row_x) * kRow;
   if (level == 0) {
+    const float* const balanced = balance_of(row, 0);
     for (std::size_t axis = 0; axis < 3; ++axis) {
       r.u[axis] = state.u[axis].data() + begin;
-      const float* balanced = balance_of(row, axis);
-      r.load[axis] = balanced != nullptr ? balanced : state.load_of(row, static_cast<int>(axis));
+      r.load[axis] =
+          balanced != nullptr ? balanced + axis * kRow : state.load_of(row, static_cast<int>(axis));
     }
     if (state.row_standing[row] != 0) r.held = state.role.data() + begin;
     return r;
@@ -33,8 +34,9 @@ LevelRow Multigrid::row_of(int level, RowId row, Displacement& state) noexcept {
     r.load[axis] = l.load[axis].data() + begin;
     r.held_at[axis] = l.loaded_at[axis].data() + begin;
   }
-  for (std::size_t axis = 0; axis < 3 && holds_->any(level, row); ++axis)
-    r.hold[axis] = holds_->hold(level, row, axis);
+  if (holds_->any(level, row)) {
+    for (std::size_t axis = 0; axis < 3; ++axis) r.hold[axis] = holds_->hold(level, row, axis);
+  }
   r.hold_times = hold_;
   if (has(level, row, limited)) r.stopped = l.stopped.data() + begin;
   return r;
