@@ -90,6 +90,9 @@ void press_soft(const World& world, WorldState& state, const glm::dvec3& point, 
     if (object.touched().empty()) continue;
     const SoftBody& body = world.soft[o];
     const voxel::ToolInBody tool = tool_in_body(world, body, point);
+    // Two waves of the chain: what comes along with the first need not be pushed out by the second. (In one,
+    // a vessel pressed at 60 mm/s felt 0.20 N rms off in place of 0.12, a spleen 0.06 in place of 0.02, and a
+    // tick was no faster.)
     if (delta != glm::dvec3(0.0)) object.follow(glm::inverse(body.pose.rotation) * delta);
     object.push_out(tool);
     object.relax_near(tool, sweeps);
