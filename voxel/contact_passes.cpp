@@ -187,12 +187,12 @@ void Multigrid::add(RowId row, const RowVector& way, Displacement& state,
   const double touching = kTouching * lattice_.min_spacing_m();
   bool deeper = false;
   for_lanes(row, obstacle_lanes(state, row), [&](VoxelId v, std::size_t lane) {
-    const double depth = depth_in_obstacle(obstacles, state, v);
-    if (deeper || depth <= touching) return;
+    if (deeper) return;
     const Obstacle& o = obstacles.of(v);
+    const double depth = depth_in_obstacle(o, state.at(v));
+    if (depth <= touching) return;
     const glm::dvec3 was(before[0][lane], before[1][lane], before[2][lane]);
-    deeper =
-        depth > std::max(static_cast<double>(o.bound) - glm::dot(glm::dvec3(o.normal), was), 0.0) + touching;
+    deeper = depth > std::max(depth_in_obstacle(o, was), 0.0) + touching;
   });
   if (deeper) {
     for (std::size_t axis = 0; axis < 3; ++axis) std::copy_n(before[axis].begin(), kRow, r.u[axis]);

@@ -112,9 +112,8 @@ glm::dvec3 link_compliance(Couplings& couplings, VoxelId v) noexcept {
   return {inverse[0], inverse[1], inverse[2]};
 }
 
-double depth_in_obstacle(const ObstacleView& view, const Displacement& state, VoxelId v) noexcept {
-  const Obstacle& o = view.of(v);
-  return static_cast<double>(o.bound) - glm::dot(glm::dvec3(o.normal), state.at(v));
+double depth_in_obstacle(const Obstacle& o, const glm::dvec3& u) noexcept {
+  return static_cast<double>(o.bound) - glm::dot(glm::dvec3(o.normal), u);
 }
 
 bool blocked(const ObstacleView& view, const Displacement& state, VoxelId v, double margin) noexcept {
@@ -123,10 +122,7 @@ bool blocked(const ObstacleView& view, const Displacement& state, VoxelId v, dou
 }
 
 glm::dvec3 no_deeper(const Obstacle& o, const glm::dvec3& before, const glm::dvec3& after) noexcept {
-  const auto depth_of = [&](const glm::dvec3& u) {
-    return static_cast<double>(o.bound) - glm::dot(glm::dvec3(o.normal), u);
-  };
-  const double now = depth_of(before), then = depth_of(after);
+  const double now = depth_in_obstacle(o, before), then = depth_in_obstacle(o, after);
   if (then <= std::max(now, 0.0)) return after;
   const double out = std::max(-now, 0.0);
   return before + (after - before) * (out / (then + out));

@@ -39,8 +39,8 @@ struct ObstacleView {
   [[nodiscard]] const Obstacle& of(VoxelId v) const { return obstacles[lattice->surface_number(v)]; }
 };
 
-// How deep a voxel whose role is obstacle is in it (m; negative: clear of it).
-double depth_in_obstacle(const ObstacleView& view, const Displacement& state, VoxelId v) noexcept;
+// How deep a voxel displaced by `u` is in its obstacle (m; negative: clear of it).
+double depth_in_obstacle(const Obstacle& o, const glm::dvec3& u) noexcept;
 // Is a voxel whose role is obstacle within `margin` of it, or in it (unit: meter)?
 bool blocked(const ObstacleView& view, const Displacement& state, VoxelId v, double margin) noexcept;
 // The way of a voxel that must go no deeper into its obstacle than it was: as far as that, however links

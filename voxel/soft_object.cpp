@@ -30,7 +30,8 @@ constexpr std::size_t kContactWork = 3500, kLeastWork = 1000;
 // … and with what is added of results.
 constexpr std::size_t kTickWork = 4000;
 // A contact with fewer spacings to go has its cycle whole: it stands, but for a voxel that slips, and in
-// parts what a held brain is felt with made a step of 1.2 mN of 152.
+// parts what a held brain is felt with made a step of 1.2 mN of 152. (That is a result's, and each is less
+// than the one before: in parts they fall at other ticks.)
 constexpr double kSlow = 0.01;
 // A whole cycle, in the same thread or beside it in the same cache, leaves nothing of the contact in there,
 // and until that is read again all takes up to twice as long: for so many ticks there is less work. The same
