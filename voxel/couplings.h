@@ -121,6 +121,16 @@ class Couplings {
     out.down_across.fill(zeros_[0].data());
     out.stands = immovable_.data();
   }
+  // Has what a correction reads of a row fetched into the cache meanwhile; of one that was found.
+  void fetch_ahead(RowId row) const noexcept {
+    if (kind(row) != mixed) return;
+    const std::uint32_t at = written_at_[row];
+    __builtin_prefetch(&written_stands_[at]);
+    if (written_limits_.size() == 0) return;
+    const auto* tightest = reinterpret_cast<const char*>(&written_limits_[at].tightest);
+    __builtin_prefetch(tightest);
+    __builtin_prefetch(tightest + sizeof(RowLimits::Written::tightest) - 1);
+  }
   // [lane] 1 / number of cells of the level below; 0 where there is none. Not of level 0, of a prepared row.
   [[nodiscard]] const float* share(RowId row) const noexcept {
     if (kind(row) == one_label) return eighths_.data();

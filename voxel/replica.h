@@ -183,6 +183,7 @@ class Replica {
   void keep_back(RowId row) noexcept;
   void pack_kept_back() noexcept;
   bool take_row(SoftObject& object, std::size_t n) noexcept;
+  void fetch_ahead(SoftObject& object, std::size_t n) const noexcept;
 
   const Lattice& lattice_;
   Displacement state_;
