@@ -159,6 +159,8 @@ class Multigrid {
     const float* at = of_row + v % kRow;
     return {at[0] - own[0], at[kRow] - own[1], at[2 * kRow] - own[2]};
   }
+  // Of what is balanced this part stays so.
+  void keep_balanced(float part, const Displacement& state) noexcept;
   // Of a row on one axis, what voxels have of themselves not taken off; null: nothing is balanced.
   [[nodiscard]] const float* balance_of(RowId row, std::size_t axis) const noexcept {
     if (balance_number_.size() == 0 || balance_number_[row] == 0) return nullptr;

@@ -132,6 +132,19 @@ void Multigrid::balance(RowId row, Displacement& state, const ObstacleView& obst
   balance_number_[row] = static_cast<std::uint16_t>(balanced_.size());
 }
 
+void Multigrid::keep_balanced(float part, const Displacement& state) noexcept {
+  for (std::size_t n = 0; n < balanced_.size(); ++n) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      float* of_row = balance_.data() + (n * 3 + axis) * kRow;
+      const float* own = state.load_of(balanced_[n], static_cast<int>(axis));
+      for (std::size_t i = 0; i < kRow; ++i) {
+        const float beside = own == nullptr ? 0.0F : own[i];
+        of_row[i] = beside + part * (of_row[i] - beside);
+      }
+    }
+  }
+}
+
 // What pulls the voxels, or cells, of a row that are free to follow.
 RowResidual Multigrid::residual_of(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
                                    OctetSpan span, RowVector& out) noexcept {

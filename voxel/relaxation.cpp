@@ -179,9 +179,8 @@ std::size_t Relaxation::continue_contact(Displacement& state, const ObstacleView
 // Of what is left to do an equal part.
 std::size_t Relaxation::run_steps(Displacement& state, const ObstacleView& obstacles,
                                   std::size_t at_once) noexcept {
-  const int steps = 2 * last_level() + 1;
   std::size_t left = 0, done = 0;
-  for (int n = step_; n < steps; ++n) left += work_of_step(n);
+  for (int n = step_; n < steps(); ++n) left += work_of_step(n);
   const std::size_t most = std::max<std::size_t>(at_once, 1);
   const std::size_t parts = left <= most ? 1 : std::max<std::size_t>(2, (left - 1) / most + 1);
   const std::size_t part = left / parts;
@@ -189,8 +188,8 @@ std::size_t Relaxation::run_steps(Displacement& state, const ObstacleView& obsta
     done += work_of_step(step_);
     step(step_, state, obstacles, Look::all, smoothed_);
     ++step_;
-  } while (step_ < steps && (parts == 1 || done + work_of_step(step_) / 2 <= part));
-  if (step_ == steps) step_ = 0;
+  } while (step_ < steps() && (parts == 1 || done + work_of_step(step_) / 2 <= part));
+  if (step_ == steps()) step_ = 0;
   return done;
 }
 

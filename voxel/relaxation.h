@@ -53,7 +53,7 @@ class Relaxation {
   std::size_t relax_contact(Displacement& state, const ObstacleView& obstacles, std::span<const VoxelId> held,
                             std::span<const VoxelId> pressed, bool again = false,
                             std::size_t at_once = kWhole) noexcept;
-  // Goes on with it, in the same boxes, by about so much; a level at least. Parts are as equal as levels let
+  // Goes on with it, in the same boxes, by about so much; a step at least. Parts are as equal as these let
   // them be. Between two of them everything may be moved.
   std::size_t continue_contact(Displacement& state, const ObstacleView& obstacles,
                                std::span<const VoxelId> held, std::size_t at_once) noexcept;
@@ -161,16 +161,20 @@ class Relaxation {
                  int contact_margin) noexcept;
   void lay_contact_boxes(std::span<const VoxelId> pressed, int margin) noexcept;
   void lay_whole_boxes() noexcept;
-  // In steps: a level each on the way down, the coarsest, and a level each on the way up.
+  // In steps: on the way down a level is smoothed, then passed on; the coarsest; a level each on the way up.
+  struct Step {
+    int level;
+    enum What : std::uint8_t { smooths, passes_on, solves, tells } what;
+  };
+  [[nodiscard]] Step step_of(int n) const noexcept;
+  [[nodiscard]] int steps() const noexcept { return 3 * last_level() + 1; }
   void cycle(Displacement& state, const ObstacleView& obstacles, Look look) noexcept {
-    for (int n = 0; n <= 2 * last_level(); ++n) step(n, state, obstacles, look, false);
+    for (int n = 0; n < steps(); ++n) step(n, state, obstacles, look, false);
   }
   void step(int n, Displacement& state, const ObstacleView& obstacles, Look look, bool smoothed) noexcept;
   std::size_t run_steps(Displacement& state, const ObstacleView& obstacles, std::size_t at_once) noexcept;
   [[nodiscard]] std::size_t work_of_step(int n) const noexcept;
-  void go_down(int level, Displacement& state, const ObstacleView& obstacles, Look look,
-               bool smoothed) noexcept;
-  void go_up(int level, Displacement& state, const ObstacleView& obstacles, Look look) noexcept;
+  void pass_on(int level, Displacement& state, const ObstacleView& obstacles, Look look) noexcept;
   void smooth_box(int level, int colour, Displacement& state, const ObstacleView& obstacles,
                   Look look) noexcept;
   void tell_box(int level, Displacement& state, const ObstacleView& obstacles) noexcept;

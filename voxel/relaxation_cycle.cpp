@@ -14,8 +14,8 @@ constexpr int kContactSweeps = 4;  // of the coarsest level of a cycle round a c
 // four, or as many as reach three radii of the contact, the force on the way into organs was 4 to 25 %
 // higher.)
 constexpr int kContactLevels = 5;
-// What octets take, in those that are told: smoothed; smoothed and passed on.
-constexpr std::size_t kSmoothed = 2, kPassedOn = 5;
+// What octets take, in those that are told: smoothed; passed on.
+constexpr std::size_t kSmoothed = 2, kPassedOn = 3;
 constexpr int kTileMargin = 3;  // cells round a tile that are smoothed, from level 1 on
 
 }  // namespace
@@ -103,12 +103,27 @@ std::size_t Relaxation::octets_of_cycle() const noexcept {
   return sum;
 }
 
+// On the way down a level has two steps, smoothed and passed on; then the coarsest, and up a step each.
+Relaxation::Step Relaxation::step_of(int n) const noexcept {
+  const int last = last_level();
+  if (n < 2 * last) return {n / 2, n % 2 == 0 ? Step::smooths : Step::passes_on};
+  return n == 2 * last ? Step{last, Step::solves} : Step{3 * last - n, Step::tells};
+}
+
 // In octets told.
 std::size_t Relaxation::work_of_step(int n) const noexcept {
-  const int last = last_level(), level = n <= last ? n : 2 * last - n;
-  const LevelBoxes& b = boxes_[static_cast<std::size_t>(level)];
-  if (n == last) return kContactSweeps * kSmoothed * octets(b.smoothed);
-  if (n < last) return kPassedOn * octets(b.smoothed);
+  const Step step = step_of(n);
+  const LevelBoxes& b = boxes_[static_cast<std::size_t>(step.level)];
+  switch (step.what) {
+    case Step::smooths:
+      return smoothed_ ? 0 : kSmoothed * octets(b.smoothed);
+    case Step::passes_on:
+      return kPassedOn * octets(b.smoothed);
+    case Step::solves:
+      return kContactSweeps * kSmoothed * octets(b.smoothed);
+    case Step::tells:
+      break;
+  }
   // Along x no hat reaches more than an octet further.
   RowBox told = b.told;
   told.q0 = std::max(told.q0, b.smoothed.q0 - 1);
@@ -162,25 +177,30 @@ bool Relaxation::restrict_due(int level, RowId row) const noexcept {
 
 void Relaxation::step(int n, Displacement& state, const ObstacleView& obstacles, Look look,
                       bool smoothed) noexcept {
-  const int last = last_level();
+  const Step step = step_of(n);
   // What coarse levels know and finer ones do not is told first: a step between voxels that were told and
   // others that were not would look like a force to the cells above it.
-  for (int l = last - 1; n == 0 && l >= 0; --l) tell_box(l, state, obstacles);
-  if (n < last) {
-    go_down(n, state, obstacles, look, smoothed);
-  } else if (n == last) {
-    const int sweeps = apart_ ? kContactSweeps : kCoarsestSweeps;
-    for (int k = 0; k < 2 * sweeps; ++k) smooth_box(last, k & 1, state, obstacles, look);
-  } else {
-    go_up(2 * last - n, state, obstacles, look);
+  for (int l = last_level() - 1; n == 0 && l >= 0; --l) tell_box(l, state, obstacles);
+  switch (step.what) {
+    case Step::smooths:
+      for (int colour = 0; colour < 2 && !smoothed; ++colour)
+        smooth_box(step.level, colour, state, obstacles, look);
+      break;
+    case Step::passes_on:
+      pass_on(step.level, state, obstacles, look);
+      break;
+    case Step::solves: {
+      const int sweeps = apart_ ? kContactSweeps : kCoarsestSweeps;
+      for (int k = 0; k < 2 * sweeps; ++k) smooth_box(step.level, k & 1, state, obstacles, look);
+      break;
+    }
+    case Step::tells:
+      tell_box(step.level, state, obstacles);
+      for (const int colour : {1, 0}) smooth_box(step.level, colour, state, obstacles, look);
   }
 }
 
-void Relaxation::go_down(int l, Displacement& state, const ObstacleView& obstacles, Look look,
-                         bool smoothed) noexcept {
-  if (!smoothed) {
-    for (const int colour : {0, 1}) smooth_box(l, colour, state, obstacles, look);
-  }
+void Relaxation::pass_on(int l, Displacement& state, const ObstacleView& obstacles, Look look) noexcept {
   // Before forces are summed, so that what is called the residual is that of links that yield.
   if (l == 0 && lattice_.yields()) {
     for_rows(0, boxes(0).smoothed, [&](RowId row, OctetSpan, int, int) {
@@ -210,11 +230,6 @@ void Relaxation::go_down(int l, Displacement& state, const ObstacleView& obstacl
     if (l == 0) running_residual_N_ = std::max(running_residual_N_, static_cast<double>(worst));
   });
   if (l == 0) multigrid_.renew_holds();
-}
-
-void Relaxation::go_up(int l, Displacement& state, const ObstacleView& obstacles, Look look) noexcept {
-  tell_box(l, state, obstacles);
-  for (const int colour : {1, 0}) smooth_box(l, colour, state, obstacles, look);
 }
 
 void Relaxation::lay_whole_boxes() noexcept {

@@ -304,7 +304,7 @@ void Replica::fetch_ahead(SoftObject& object, std::size_t n) const noexcept {
 }
 
 // True where free voxels did not follow; then what is left stands in the parcel.
-bool Replica::take_row(SoftObject& object, std::size_t n) noexcept {
+bool Replica::take_row(SoftObject& object, std::size_t n, float part) noexcept {
   Multigrid& to = object.relaxation_.multigrid();
   const RowId row = found_[taking_].row(n);
   float* way = found_[taking_].values(n);
@@ -312,8 +312,9 @@ bool Replica::take_row(SoftObject& object, std::size_t n) noexcept {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const float* there = object.state_.u[axis].data() + at(row);
     for (std::size_t i = 0; i < kRow; ++i) {
-      ways[axis][i] = way[axis * kRow + i];
+      ways[axis][i] = part * way[axis * kRow + i];
       wanted[axis][i] = there[i] + ways[axis][i];
+      if (part < 1.0F) way[axis * kRow + i] -= ways[axis][i];
     }
   }
   if (BrickLoad& bricks = object.state_.bricks; bricks.row.size() > 0) {
@@ -344,15 +345,34 @@ bool Replica::take_row(SoftObject& object, std::size_t n) noexcept {
   return most > kFollows * static_cast<float>(lattice_.min_spacing_m());
 }
 
-void Replica::take(SoftObject& object) noexcept {
+void Replica::take(SoftObject& object, int parts) noexcept {
   taking_ = 1 - taking_;
-  object.relaxation_.take_over(residual_N_);
   again_.clear();
   in_turns_ = found_far_;
-  for (drained_ = 0; drained_ < near_count_; ++drained_) {
-    fetch_ahead(object, drained_ + kAhead);
-    if (take_row(object, drained_)) again_.put(drained_);
+  drained_ = near_count_;
+  parts_left_ = parts;
+  take_part(object, parts <= 1 || in_turns_);
+}
+
+// While parts are left, as much of what was given counts as balanced as has not come yet: the two ends of a
+// way are both at rest, and where forces are linear so is what lies between.
+void Replica::take_part(SoftObject& object, bool last) noexcept {
+  const auto left = static_cast<float>(std::max(parts_left_, 1));
+  if (last || parts_left_ == 1) {
+    parts_left_ = 0;
+    object.relaxation_.take_over(residual_N_);
+  } else {
+    --parts_left_;
+    object.keep_away((left - 1.0F) / left);
   }
+  const bool whole = parts_left_ == 0;
+  for (std::size_t n = 0; n < near_count_; ++n) {
+    fetch_ahead(object, n + kAhead);
+    // By parts it is rounded otherwise than the other thread knows it.
+    if (left > 1.0F) object.relaxation_.multigrid().log().note(0, found_[taking_].row(n));
+    if (take_row(object, n, whole ? 1.0F : 1.0F / left) && whole) again_.put(n);
+  }
+  if (!whole) return;
   while (again_.count() > 0 && again_.turn() < kTurnsAtOnce)
     again_.take(kTurns, [&](std::size_t n) { return take_row(object, n); });
   if (!at_rest_ || !drained()) object.relaxation_.wake();

@@ -6,8 +6,9 @@
 //   give()   the tick says what changed in the object since the last time;
 //   relax()  the other thread goes one whole cycle nearer to equilibrium, the pressed voxels held where they
 //            were given, and says what that changed;
-//   take()   later, the tick adds that to the object: near the contact at once, or the contact would see a
-//            step go by; then, with drain(), the rest, some rows at a time, while the next is relaxed.
+//   take()   later, the tick adds that to the object: near the contact at once, or it would see a step go by,
+//            or in parts, of which each leaves balanced what is still to come; then, with drain(), the rest,
+//            some rows at a time, while the next is relaxed.
 // Displacements are linear where no limit is active, so what is found is added to what the tick did
 // meanwhile. For that each error has to be the business of one of the two. What was given is the other
 // thread's: round the contact it counts as balanced from then on (Relaxation::give_away), and the tick brings
@@ -56,11 +57,17 @@ class Replica {
 
   // ---- the tick; none of these allocates, locks or throws ----
   void give(SoftObject& object) noexcept;
-  // Once relax() is done and what it found before that is drained: adds what it found near the contact.
-  void take(SoftObject& object) noexcept;
+  // Once relax() is done and what it found before that is drained: adds what it found near the contact, at
+  // once, or the first of so many parts. What of it is still to come stays the other thread's business.
+  void take(SoftObject& object, int parts = 1) noexcept;
+  [[nodiscard]] bool in_parts() const { return parts_left_ > 0; }
+  // The next part; of those that are left, the last.
+  void take_part(SoftObject& object, bool last) noexcept;
   // Adds the next `rows` rows of the rest.
   void drain(SoftObject& object, std::size_t rows) noexcept;
-  [[nodiscard]] bool drained() const { return drained_ == found_[taking_].count() && again_.count() == 0; }
+  [[nodiscard]] bool drained() const {
+    return parts_left_ == 0 && drained_ == found_[taking_].count() && again_.count() == 0;
+  }
 
   // ---- between the two, the other thread ----
   void relax() noexcept;
@@ -182,7 +189,7 @@ class Replica {
   bool pack_row(RowId row, float least_m) noexcept;
   void keep_back(RowId row) noexcept;
   void pack_kept_back() noexcept;
-  bool take_row(SoftObject& object, std::size_t n) noexcept;
+  bool take_row(SoftObject& object, std::size_t n, float part = 1.0F) noexcept;
   void fetch_ahead(SoftObject& object, std::size_t n) const noexcept;
 
   const Lattice& lattice_;
@@ -222,6 +229,7 @@ class Replica {
   Again again_;                           // of these
   bool in_turns_ = false;                 // rows that do not follow have another turn
   std::size_t near_count_ = 0;            // of the other one's: they are near the contact
+  int parts_left_ = 0;                    // in which these are still to be added
   bool at_rest_ = true;
   double residual_N_ = 0.0;
 };

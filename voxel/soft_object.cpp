@@ -25,19 +25,20 @@ constexpr double kJump = 0.1;
 // Where another thread relaxes the object, wide cycles have this much work of a tick (in octets told), some
 // 150 us: what is left of one goes on in the next tick, and what one leaves of a tick begins the next.
 // (Whole, one took up to 450 us of a tick, and so had every other tick only. In parts of narrow ones a cube
-// of 24,000 voxels pressed at 200 mm/s was 2.2 just noticeable differences off in place of 0.6.)
-constexpr std::size_t kContactWork = 3500, kLeastWork = 1000;
+// of 24,000 voxels pressed at 200 mm/s was 2.2 just noticeable differences off in place of 0.6. With 3,200
+// the tick's p99.9 in an abdomen is a tenth less, and forces on the way into its organs are 0.09 N off in
+// place of 0.066; with 5,000 it is a fifteenth more, and they are 0.045 N off.)
+constexpr std::size_t kContactWork = 4200, kLeastWork = 1000;
 // … and with what is added of results.
-constexpr std::size_t kTickWork = 4000;
-// A contact with fewer spacings to go has its cycle whole: it stands, but for a voxel that slips, and in
-// parts what a held brain is felt with made a step of 1.2 mN of 152. (That is a result's, and each is less
-// than the one before: in parts they fall at other ticks.)
-constexpr double kSlow = 0.01;
+constexpr std::size_t kTickWork = 4800;
+// Waves of the chain count as well, so much a row that they visit: eight of them a tick, which took 160 us of
+// an organ that is pressed deep. (Uncounted, the slowest ticks had all three.)
+constexpr std::size_t kWorkOfVisit = 3;
 // A whole cycle, in the same thread or beside it in the same cache, leaves nothing of the contact in there,
 // and until that is read again all takes up to twice as long: for so many ticks there is less work. The same
 // where the tool comes upon tissue that was not touched for long.
 constexpr int kColdTicks = 5;
-constexpr std::size_t kColdWork = 2400;
+constexpr std::size_t kColdWork = 2600;
 constexpr int kProjections = 3;  // of a pressed voxel onto the tool, in search of its least energy
 constexpr double kSlides = 0.1;  // sin² between tool and obstacle; where they meet nearly flat it is squeezed
 constexpr double kGiveWay = 0.01;  // of the voxel radius: less is left to the next push
@@ -203,6 +204,7 @@ void SoftObject::settle_chain() noexcept {
     relaxation_.wake();
   }
   chain_.settle(state_, sources_, moves_, obstacles_);
+  contact_work_ += kWorkOfVisit * static_cast<std::size_t>(chain_.work());
   for (const RowId row : chain_.moved_rows()) relaxation_.stir(row);
   for (const RowId row : chain_.moved_rows()) note_moved(row);
 }
@@ -314,6 +316,10 @@ bool SoftObject::any_pressed() const noexcept {
   return std::any_of(touches_.begin(), touches_.end(), [](const Touch& t) { return t.pressed; });
 }
 
+bool SoftObject::held_still() const noexcept {
+  return any_pressed() && relaxation_.wide() && unsettled_m_ < kJump * lattice_->min_spacing_m();
+}
+
 // Is a cycle round the contact due?
 bool SoftObject::cycle_due() const noexcept {
   if (relaxation_.under_way()) return cycles_since_touch_ == 0;
@@ -335,7 +341,6 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
     set_touch_roles();
     if (!cycle_due()) break;
     const bool again = ++cycles_since_touch_ > 1;
-    const bool slow = unsettled_m_ < kSlow * lattice_->min_spacing_m();
     if (!relaxation_.under_way()) unsettled_m_ *= kContraction;
     // They are in the order of their ids, so those of a row follow one another.
     for (std::size_t i = 0; i < touches_.size(); ++i) {
@@ -356,7 +361,7 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
     // was drawn along hung back by a twenty-fifth of a spacing for up to six ticks: of 5,000 strokes 12 lost
     // contact by it.)
     if (pressed_last_.empty()) continue;
-    const bool in_parts = relaxation_.left_to_another() && pressed > 0 && !slow;
+    const bool in_parts = relaxation_.left_to_another() && pressed > 0;
     contact_work_ += relaxation_.relax_contact(state_, obstacle_view(), all_held_, pressed_last_, again,
                                                in_parts ? left : Relaxation::kWhole);
     wide_cycle_ = relaxation_.wide();
@@ -459,6 +464,11 @@ void SoftObject::give_away() noexcept {
     const glm::dvec3 place = place_of(tool_, here);
     if (here.pressed) t.left = place - state_.at(t.v);
   }
+}
+
+void SoftObject::keep_away(float part) noexcept {
+  relaxation_.multigrid().keep_balanced(part, state_);
+  for (Touch& t : touches_) t.left *= static_cast<double>(part);
 }
 
 void SoftObject::relax_cycle() noexcept {

@@ -83,6 +83,9 @@ class SoftObject {
   // Relaxation counts work.
   [[nodiscard]] bool wide_cycle() const { return wide_cycle_; }
   [[nodiscard]] std::size_t work_left() const noexcept;
+  // Is the tool pressed into it, wide enough for cycles in parts, and hardly moves? A voxel that slips, or a
+  // result on its way, is no motion.
+  [[nodiscard]] bool held_still() const noexcept;
   // No cycle round the contact is begun in the next tick, or, where one is under way, in the one after it.
   void ask_to_rest() noexcept { asked_to_rest_ = true; }
   [[nodiscard]] Reaction reaction(const ToolInBody& tool) noexcept;
@@ -223,7 +226,8 @@ class SoftObject {
     return !held_voxels_.empty() && pair_held_[lattice_->surface_number(v)] != 0;
   }
   void set_touch_roles() noexcept;
-  void give_away() noexcept;  // what pulls near the contact is somebody else's
+  void give_away() noexcept;            // what pulls near the contact is somebody else's
+  void keep_away(float part) noexcept;  // … and this part of it still is
   std::size_t list_held() noexcept;
   [[nodiscard]] bool any_pressed() const noexcept;
   [[nodiscard]] bool cycle_due() const noexcept;

@@ -58,6 +58,13 @@ TEST(RestingTissue, ABrainStaysOutsideItsSkullAndComesToRest) {
   double step = 0.0;
   for (std::size_t n = 900; n < 1040; ++n)
     step = std::max(step, std::fabs(course.force_N[n] - course.force_N[n - 1]));
+  // And from soon after it stopped: a result of the other thread is felt in parts, none of which is noticed
+  // by itself (7 % of the force). At once one was 48 mN.
+  double result = 0.0;
+  for (std::size_t n = 700; n < 1040; ++n)
+    result = std::max(result, std::fabs(course.force_N[n] - course.force_N[n - 1]));
+  std::cout << "with results: " << 1e3 * result << " mN\n";
+  EXPECT_LT(result, 0.07 * course.force_N[1000]);
   std::cout << "steps while held: " << 1e3 * step << " mN of " << 1e3 * course.force_N[1000] << '\n';
   EXPECT_LT(step, 1e-3);
 }
