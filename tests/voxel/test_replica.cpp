@@ -100,6 +100,70 @@ TEST(Replica, AHeldContactStaysAtRest) {
   EXPECT_LT(*high - *low, 1e-3 * felt.back());
 }
 
+// A result that comes in parts while the tool is held: on the way nothing pulls by itself, so the force goes
+// from what it was to what it is at once in even steps, and ends there.
+TEST(Replica, AResultInPartsIsFeltInEvenSteps) {
+  constexpr int parts = 8;
+  SoftBlock whole({41, 37, 25}, kH, elastic(1e4, 0.3)), some({41, 37, 25}, kH, elastic(1e4, 0.3));
+  const ToolInBody tool = whole.ball(6 * kH, 0.3 * kH);
+  const auto feel = [&](SoftBlock& soft) {
+    soft.object->push_out(tool);
+    soft.object->relax_near(tool, 1);
+    return soft.object->reaction(tool).force_N.z;
+  };
+  Replica of_whole(*whole.object), of_some(*some.object);
+  double before = 0.0, after = 0.0;
+  std::vector<double> felt;
+  for (SoftBlock* soft : {&whole, &some}) {
+    Replica& replica = soft == &whole ? of_whole : of_some;
+    soft->touch(tool, 9 * kH);
+    before = feel(*soft);
+    replica.give(*soft->object);
+    replica.relax();
+    replica.take(*soft->object, soft == &whole ? 1 : parts);
+    EXPECT_EQ(replica.in_parts(), soft == &some);
+    for (int n = 1; n < parts && soft == &some; ++n) {
+      EXPECT_FALSE(replica.drained());
+      felt.push_back(feel(*soft));
+      replica.take_part(*soft->object, false);
+    }
+    EXPECT_FALSE(replica.in_parts());
+    while (!replica.drained()) replica.drain(*soft->object, 1000);
+    const double now = feel(*soft);
+    if (soft == &whole) after = now;
+    felt.push_back(now);
+  }
+  felt.erase(felt.begin());  // of the one that came at once
+  const double step = (after - before) / parts;
+  ASSERT_EQ(felt.size(), static_cast<std::size_t>(parts));
+  EXPECT_LT(after, 0.99 * before) << "a result that changes something";
+  for (std::size_t n = 0; n < felt.size(); ++n)
+    EXPECT_NEAR(felt[n], before + step * static_cast<double>(n + 1), 0.5 * std::fabs(step)) << n;
+  EXPECT_LT(largest_difference(*whole.object, *some.object), 0.01 * kH);
+}
+
+// And one that is cut short, as when the tool moves, has come whole.
+TEST(Replica, AResultInPartsThatIsCutShortHasComeWhole) {
+  SoftBlock whole({41, 37, 25}, kH, elastic(1e4, 0.3)), some({41, 37, 25}, kH, elastic(1e4, 0.3));
+  for (SoftBlock* soft : {&whole, &some}) {
+    const ToolInBody tool = soft->ball(6 * kH, 0.3 * kH);
+    Replica replica(*soft->object);
+    soft->touch(tool, 9 * kH);
+    soft->object->push_out(tool);
+    soft->object->relax_near(tool, 1);
+    replica.give(*soft->object);
+    replica.relax();
+    replica.take(*soft->object, soft == &whole ? 1 : 8);
+    if (soft == &some) {
+      replica.take_part(*soft->object, false);
+      replica.take_part(*soft->object, true);
+    }
+    EXPECT_FALSE(replica.in_parts());
+    while (!replica.drained()) replica.drain(*soft->object, 1000);
+  }
+  EXPECT_LT(largest_difference(*whole.object, *some.object), 1e-5 * kH);
+}
+
 TEST(Replica, WhatTheToolLeftComesToRestAndIsLeftAlone) {
   SoftBlock soft({41, 37, 25}, kH, elastic(1e4, 0.3));
   Replica replica(*soft.object);
