@@ -80,7 +80,7 @@ void give(WorldState& state, RelaxedApart& object, std::size_t o) noexcept {
   object.due = state.tick + 1 + object.replica.work() / kRowsRelaxed;
 }
 
-// One of the three a tick.
+// One of these a tick: a part of what is taken, a give, a take, some rows.
 void exchange(WorldState& state, std::size_t o, std::uint64_t& arrived) noexcept {
   RelaxedApart& object = *state.apart.objects[o];
   voxel::SoftObject& soft = *state.soft[o];

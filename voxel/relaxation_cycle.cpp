@@ -183,8 +183,8 @@ void Relaxation::step(int n, Displacement& state, const ObstacleView& obstacles,
   for (int l = last_level() - 1; n == 0 && l >= 0; --l) tell_box(l, state, obstacles);
   switch (step.what) {
     case Step::smooths:
-      for (int colour = 0; colour < 2 && !smoothed; ++colour)
-        smooth_box(step.level, colour, state, obstacles, look);
+      if (smoothed) break;
+      for (const int colour : {0, 1}) smooth_box(step.level, colour, state, obstacles, look);
       break;
     case Step::passes_on:
       pass_on(step.level, state, obstacles, look);

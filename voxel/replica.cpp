@@ -351,26 +351,27 @@ void Replica::take(SoftObject& object, int parts) noexcept {
   in_turns_ = found_far_;
   drained_ = near_count_;
   parts_left_ = parts;
-  take_part(object, parts <= 1 || in_turns_);
+  // Loads of bricks come whole, so their ways do.
+  take_part(object, parts <= 1 || in_turns_ || lattice_.has_bricks());
 }
 
 // While parts are left, as much of what was given counts as balanced as has not come yet: the two ends of a
 // way are both at rest, and where forces are linear so is what lies between.
 void Replica::take_part(SoftObject& object, bool last) noexcept {
-  const auto left = static_cast<float>(std::max(parts_left_, 1));
-  if (last || parts_left_ == 1) {
-    parts_left_ = 0;
+  const int left = std::max(parts_left_, 1);
+  const bool whole = last || left == 1;
+  parts_left_ = whole ? 0 : left - 1;
+  const float part = whole ? 1.0F : 1.0F / static_cast<float>(left);
+  if (whole) {
     object.relaxation_.take_over(residual_N_);
   } else {
-    --parts_left_;
-    object.keep_away((left - 1.0F) / left);
+    object.keep_away(static_cast<float>(left - 1) / static_cast<float>(left));
   }
-  const bool whole = parts_left_ == 0;
   for (std::size_t n = 0; n < near_count_; ++n) {
     fetch_ahead(object, n + kAhead);
     // By parts it is rounded otherwise than the other thread knows it.
-    if (left > 1.0F) object.relaxation_.multigrid().log().note(0, found_[taking_].row(n));
-    if (take_row(object, n, whole ? 1.0F : 1.0F / left) && whole) again_.put(n);
+    if (left > 1) object.relaxation_.multigrid().log().note(0, found_[taking_].row(n));
+    if (take_row(object, n, part) && whole) again_.put(n);
   }
   if (!whole) return;
   while (again_.count() > 0 && again_.turn() < kTurnsAtOnce)

@@ -102,6 +102,8 @@ TEST(Replica, AHeldContactStaysAtRest) {
 
 // A result that comes in parts while the tool is held: on the way nothing pulls by itself, so the force goes
 // from what it was to what it is at once in even steps, and ends there.
+// (Pressed so little that no link is at its limits: what these do not let a row follow depends on how it
+// comes.)
 TEST(Replica, AResultInPartsIsFeltInEvenSteps) {
   constexpr int parts = 8;
   SoftBlock whole({41, 37, 25}, kH, elastic(1e4, 0.3)), some({41, 37, 25}, kH, elastic(1e4, 0.3));
