@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // `hybrid bench threads`: what the servo thread's ticks cost it while relaxation and snapshots have the other
-// cores, beside what they cost while something that knows nothing of it, and only moves memory, has them.
+// cores, beside what the same ticks, to the last bit, cost while something that knows nothing of them, and
+// only moves memory, has these.
 #pragma once
 
 #include <cstdint>
@@ -23,17 +24,22 @@ struct ThreadsBenchOptions {
 
 // Of a scene under one load.
 struct ThreadsRow {
-  std::string scene, load;                               // relaxation, memory
+  std::string scene, load;                               // relaxation, memory, nothing relaxed
   std::uint64_t ticks = 0, late_ticks = 0, results = 0;  // results: of relaxation, that ticks took
   Percentiles tick_us;                                   // the servo thread's own processor time
   double p99_ratio = 0.0, p999_ratio = 0.0;              // to the same scene's under `memory`
   double relaxation_share = 0.0;                         // of the time, of its thread
+  bool same_ticks = true;                                // as under `relaxation`, by their hash
 };
 
-// Loads:
-//   relaxation  the session's relaxation thread, which also says where surfaces are as often as it can, and
-//               another session of the scene that is relaxed and snapped without a pause;
-//   memory      in place of all that a thread that copies 256 MB to and fro.
+// Loads, in turns:
+//   relaxation       the session's relaxation thread, which also says where surfaces are as often as it can,
+//                    and another session of the scene that is relaxed and snapped without a pause;
+//   memory           in place of all that a thread that copies 256 MB to and fro. The session before is
+//   played
+//                    again, with its inputs; what was found apart then is handed to the ticks that took it,
+//                    by that thread, so that another core wrote it here, too;
+//   nothing relaxed  as `memory`, and no result ever comes: what ticks cost that have less to do.
 // Throws SceneError.
 std::vector<ThreadsRow> bench_threads(const ThreadsBenchOptions& options);
 

@@ -134,7 +134,7 @@ ReplayResult replay(const Recording& recording, const Progress& progress) {
   if (recording.ticks.empty()) return result;
   begin_session(scene, *built.world, *built.state, recording.ticks.front().device_m);
   if (recording.relax_apart) relax_apart(*built.state, Arrival::recorded);
-  std::uint64_t hash = 0xCBF29CE484222325ULL;
+  std::uint64_t hash = kHashBegin;
   for (std::size_t n = 0; n < recording.ticks.size(); ++n) {
     const device::DeviceState input{.position_m = recording.ticks[n].device_m,
                                     .fault = recording.ticks[n].fault};

@@ -9,7 +9,6 @@
 
 #include "hybrid/denormals.h"
 #include "hybrid/world.h"
-#include "voxel/replica.h"
 
 namespace hybrid {
 
@@ -62,6 +61,7 @@ bool has_arrived(const Apart& apart, const RelaxedApart& object, std::size_t o, 
     case Arrival::thread:
       return object.phase.load(std::memory_order_acquire) == RelaxedApart::Phase::tick;
     case Arrival::recorded:
+    case Arrival::played:
       break;
   }
   return (apart.arrived >> o & 1U) != 0;
@@ -70,7 +70,7 @@ bool has_arrived(const Apart& apart, const RelaxedApart& object, std::size_t o, 
 void give(WorldState& state, RelaxedApart& object, std::size_t o) noexcept {
   object.replica.give(*state.soft[o]);
   object.given = true;
-  if (state.apart.arrival == Arrival::thread) {
+  if (state.apart.arrival == Arrival::thread || state.apart.arrival == Arrival::played) {
     object.phase.store(RelaxedApart::Phase::thread, std::memory_order_release);
     return;
   }
@@ -140,7 +140,35 @@ void relax_background(const World& world, WorldState& state) noexcept {
       exchange(state, o, arrived);
     }
   }
-  if (state.apart.arrival != Arrival::recorded) state.apart.arrived = arrived;
+  const bool said = state.apart.arrival == Arrival::recorded || state.apart.arrival == Arrival::played;
+  if (!said) state.apart.arrived = arrived;
+}
+
+void ResultTape::keep(const Apart& apart) {
+  for (std::size_t o = 0; o < apart.objects.size(); ++o) {
+    if (apart.has(o) && apart.objects[o]->replica.times_relaxed() > found_[o].size())
+      found_[o].push_back(apart.objects[o]->replica.found());
+  }
+}
+
+void ResultTape::hand_out(Apart& apart) noexcept {
+  for (std::size_t o = 0; o < apart.objects.size(); ++o) {
+    if (!apart.has(o)) continue;
+    RelaxedApart& object = *apart.objects[o];
+    if (object.phase.load(std::memory_order_acquire) != RelaxedApart::Phase::thread ||
+        next_[o] == found_[o].size())
+      continue;
+    object.replica.find_again(found_[o][next_[o]++]);
+    object.phase.store(RelaxedApart::Phase::tick, std::memory_order_release);
+  }
+}
+
+bool ResultTape::ready(const Apart& apart) noexcept {
+  for (std::size_t o = 0; o < apart.objects.size(); ++o) {
+    if ((apart.arrived >> o & 1U) == 0 || !apart.has(o)) continue;
+    if (apart.objects[o]->phase.load(std::memory_order_acquire) != RelaxedApart::Phase::tick) return false;
+  }
+  return true;
 }
 
 RelaxationThread::RelaxationThread(const World& world, Apart& apart, double surfaces_hz)

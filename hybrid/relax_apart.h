@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "hybrid/hand_over.h"
+#include "voxel/replica.h"
 
 namespace hybrid {
 
@@ -27,6 +28,7 @@ enum class Arrival : std::uint8_t {
   counted,   // at once, and after as many ticks as its work is worth: for fixed-step sessions
   thread,    // by the thread, when it is done
   recorded,  // at once, and in the tick that `arrived` says
+  played,    // not at all: another thread hands out what was once found, and `arrived` says when it is taken
 };
 
 struct RelaxedApart;  // one object, and whose turn it is
@@ -43,8 +45,8 @@ struct Apart {
 
   Arrival arrival = Arrival::counted;
   std::vector<std::unique_ptr<RelaxedApart>> objects;  // [soft]; null, or none at all: relaxed in the tick
-  // Bit o: in this tick the result of soft object o began to be taken. With Arrival::recorded said before the
-  // tick, else by it.
+  // Bit o: in this tick the result of soft object o began to be taken. With Arrival::recorded and ::played
+  // said before the tick, else by it.
   std::uint64_t arrived = 0;
   std::uint64_t results = 0;  // taken so far
   // Of this tick's processor time, what a thread of its own would have had (us): not counted as the tick's.
@@ -57,6 +59,24 @@ void relax_apart(WorldState& state, Arrival arrival);
 
 // The stage.
 void relax_background(const World& world, WorldState& state) noexcept;
+
+// All that was found apart in a session, so that it can be played again with nothing relaxed: its ticks are
+// the same to the last bit, whatever the other cores do meanwhile.
+class ResultTape {
+ public:
+  explicit ResultTape(std::size_t objects) : found_(objects), next_(objects, 0) {}
+
+  // After each tick of a session of Arrival::recorded.
+  void keep(const Apart& apart);
+  // By another thread, in a session of Arrival::played: what was given since the last time is found.
+  void hand_out(Apart& apart) noexcept;
+  // Is what the next tick takes there?
+  [[nodiscard]] static bool ready(const Apart& apart) noexcept;
+
+ private:
+  std::vector<std::vector<voxel::Replica::Found>> found_;  // [soft]
+  std::vector<std::size_t> next_;                          // [soft] to be handed out
+};
 
 // The calling thread goes on at ordinary priority: one that the servo thread made has got its own from it.
 void take_ordinary_priority() noexcept;

@@ -258,7 +258,7 @@ class Run {
   std::chrono::steady_clock::time_point said_ = std::chrono::steady_clock::now();
   std::uint64_t clearance_every_ = 1;
   std::uint64_t ticks_ = 0, ticks_done_ = 0, sample_every_ = 0, soft_ticks_ = 0,
-                hash_ = 0xCBF29CE484222325ULL;
+                hash_ = kHashBegin;
   double sum_force2_ = 0.0, best_ = 0.0;
   SessionResult result_;
 };

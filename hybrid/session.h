@@ -103,6 +103,7 @@ BlackBoxRow black_box_row(const device::ServoInput& input, const TickResult& fel
 
 // Hashes. The running one takes what is felt, the final one also every displacement, where every rigid
 // body is and how it moves, and what the limits on the force remember.
+inline constexpr std::uint64_t kHashBegin = 0xCBF29CE484222325ULL;
 std::uint64_t hash_tick(std::uint64_t before, const TickResult& tick) noexcept;
 std::uint64_t hash_state(std::uint64_t before, const WorldState& state) noexcept;
 

@@ -13,8 +13,7 @@ namespace hybrid {
 namespace {
 
 constexpr std::uint64_t kLookEvery = 64;  // ticks between two looks at every displacement
-constexpr std::uint64_t kFirstHash = 0xCBF29CE484222325ULL;
-constexpr double kRounding = 1e-12;  // of all the work that was done, to and fro
+constexpr double kRounding = 1e-12;       // of all the work that was done, to and fro
 
 bool finite(const glm::dvec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
@@ -59,7 +58,7 @@ bool finite(const WorldState& state) {
 }  // namespace
 
 TickWatch::TickWatch(const World& world, const WorldState& state)
-    : world_(world), hash_(kFirstHash), force_N_(state.limit.last_N), device_m_(state.device_m) {
+    : world_(world), hash_(kHashBegin), force_N_(state.limit.last_N), device_m_(state.device_m) {
   const Spring spring = spring_of(world, state.proxy_m, state.device_m);
   allowed_J_ = stored_J_ = spring.stored_J;  // what is there already may be given
   for (const auto& object : state.soft) {

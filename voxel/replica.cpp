@@ -204,6 +204,30 @@ void Replica::relax() noexcept {
     work_ = multigrid().log().count();
   }
   pack_changes();
+  ++times_relaxed_;
+}
+
+Replica::Found Replica::found() const {
+  const Parcel& parcel = found_[1 - taking_];
+  const std::size_t floats = arrays_of(lattice_) * kRow;
+  Found result{{}, {}, near_count_, found_far_, at_rest_, residual_N_};
+  for (std::size_t n = 0; n < parcel.count(); ++n) {
+    result.rows.push_back(parcel.row(n));
+    result.values.insert(result.values.end(), parcel.values(n), parcel.values(n) + floats);
+  }
+  return result;
+}
+
+void Replica::find_again(const Found& found) noexcept {
+  Parcel& parcel = found_[1 - taking_];
+  const std::size_t floats = arrays_of(lattice_) * kRow;
+  parcel.clear();
+  for (std::size_t n = 0; n < found.rows.size(); ++n)
+    std::copy_n(found.values.data() + n * floats, floats, parcel.add(found.rows[n]));
+  near_count_ = found.near_count;
+  found_far_ = found.far;
+  at_rest_ = found.at_rest;
+  residual_N_ = found.residual_N;
 }
 
 // Counted and laid out (there are few distances): the order within one distance is that of the log.

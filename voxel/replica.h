@@ -71,6 +71,18 @@ class Replica {
 
   // ---- between the two, the other thread ----
   void relax() noexcept;
+  // What relax() found, until it is taken; and, for a session that is played again, the same found at once in
+  // place of relax(), which then must not be called any more.
+  struct Found {
+    std::vector<RowId> rows;
+    std::vector<float> values;  // [row][array][lane], as in a parcel
+    std::size_t near_count = 0;
+    bool far = false, at_rest = false;
+    double residual_N = 0.0;
+  };
+  [[nodiscard]] Found found() const;
+  void find_again(const Found& found) noexcept;
+  [[nodiscard]] std::uint64_t times_relaxed() const { return times_relaxed_; }
   // What the last relax() cost: as many rows, of all levels, as a whole cycle writes in that time.
   [[nodiscard]] std::size_t work() const { return work_; }
 
@@ -232,6 +244,7 @@ class Replica {
   int parts_left_ = 0;                    // in which these are still to be added
   bool at_rest_ = true;
   double residual_N_ = 0.0;
+  std::uint64_t times_relaxed_ = 0;
 };
 
 }  // namespace voxel

@@ -178,7 +178,7 @@ TEST_F(RecordingFile, WithPassivityControlDelayAndLateTicksItIsTheSameToTheBit) 
   Recording faulty = record(file, std::nullopt);
   hybrid::BuiltScene again = hybrid::build_scene(scene);
   hybrid::begin_session(scene, *again.world, *again.state, faulty.ticks.front().device_m);
-  std::uint64_t hash = 0xCBF29CE484222325ULL;
+  std::uint64_t hash = hybrid::kHashBegin;
   for (std::size_t n = 0; n < faulty.ticks.size(); ++n) {
     auto& tick = faulty.ticks[n];
     if (n % 200 == 150) tick.fault = device::DeviceFault::late;
