@@ -120,14 +120,13 @@ void ChainWave::ask_voxel(const Pass& p, VoxelId from, VoxelId to, int direction
 void ChainWave::ask_beside(const Pass& p, RowId row, RowId to, int direction) noexcept {
   const RowInfo& other_row = info(to);
   if (!other_row.filled) return;
-  if (other_row.anchored) {
-    for (VoxelId i = 0; i < kRow; ++i) {
-      if (lattice_.filled(row * kRow + i)) ask_voxel(p, row * kRow + i, to * kRow + i, direction);
-    }
-    return;
-  }
   float* const own = row_at(p, row);
-  float* const other = row_at(p, to);
+  float* other = row_at(p, to);
+  std::array<float, kRow> asked;
+  if (other_row.anchored) {
+    std::copy_n(other, kRow, asked.data());
+    other = asked.data();
+  }
   const float* const half = p.limits.half[static_cast<std::size_t>(direction)];
   const std::uint8_t a = info(row).label, b = other_row.label;
   Moved moves = kNothingMoved;
@@ -141,22 +140,57 @@ void ChainWave::ask_beside(const Pass& p, RowId row, RowId to, int direction) no
                                 : lower_beside(own, la, other, lb, h, p.margin);
   }
   if (moves == kNothingMoved) return;
+  if (other_row.anchored) moves = move_free(p, to, asked.data());
+  if (moves == kNothingMoved) return;
   note_moved(to);
   enqueue(to, moves & (first | last));
 }
 
+// Of a row in which something is anchored, what is free goes where it is asked; the rest is pulled.
+Moved ChainWave::move_free(const Pass& p, RowId row, const float* asked) noexcept {
+  float* const u = row_at(p, row);
+  const std::uint32_t free = info(row).free;
+  std::uint32_t moves = 0;
+  for (std::uint32_t i = 0; i < kRow; ++i) moves |= asked[i] != u[i] ? 1U << i : 0U;
+  if ((moves & ~free) != 0) note_pulled(row);
+  moves &= free;
+  for (std::uint32_t left = moves; left != 0; left &= left - 1) {
+    const int i = __builtin_ctz(left);
+    u[i] = asked[i];
+  }
+  return static_cast<Moved>((moves != 0 ? kAnyMoved : kNothingMoved) | ((moves & 1U) != 0 ? kFirstMoved : 0) |
+                            (moves >> (kRow - 1) != 0 ? kLastMoved : 0));
+}
+
+// The same within it, while nothing anchored is pulled: or what that asks in turn is asked voxel by voxel.
+Moved ChainWave::ask_along_anchors(const Pass& p, RowId row) noexcept {
+  std::array<float, kRow + 2> asked;  // one beyond both ends, as kernels read them
+  std::copy_n(row_at(p, row) - 1, asked.size(), asked.data());
+  const HalfLimits up{p.limits.half[0], limits_.registers()}, down{p.limits.half[1], limits_.registers()};
+  float* const own = asked.data() + 1;
+  const Moved moves = p.way == Way::raise ? raise_along(own, lattice_.labels(row), up, down, p.margin)
+                                          : lower_along(own, lattice_.labels(row), up, down, p.margin);
+  if (moves == kNothingMoved) return moves;
+  std::uint32_t lanes = 0;
+  for (std::uint32_t i = 0; i < kRow; ++i) lanes |= own[i] != row_at(p, row)[i] ? 1U << i : 0U;
+  if ((lanes & ~info(row).free) == 0) {
+    std::copy_n(own, kRow, row_at(p, row));
+    note_moved(row);
+    return moves;
+  }
+  const VoxelId begin = row * kRow, end = begin + kRow - 1;
+  for (VoxelId v = begin; v < end; ++v) {
+    if (lattice_.filled(v)) ask_voxel(p, v, v + 1, 0);
+  }
+  for (VoxelId v = end; v > begin; --v) {
+    if (lattice_.filled(v)) ask_voxel(p, v, v - 1, 1);
+  }
+  return kFirstMoved | kLastMoved;
+}
+
 Moved ChainWave::ask_along(const Pass& p, RowId row) noexcept {
   float* const own = row_at(p, row);
-  if (info(row).anchored) {
-    const VoxelId begin = row * kRow, end = begin + kRow - 1;
-    for (VoxelId v = begin; v < end; ++v) {
-      if (lattice_.filled(v)) ask_voxel(p, v, v + 1, 0);
-    }
-    for (VoxelId v = end; v > begin; --v) {
-      if (lattice_.filled(v)) ask_voxel(p, v, v - 1, 1);
-    }
-    return kFirstMoved | kLastMoved;
-  }
+  if (info(row).anchored) return ask_along_anchors(p, row);
   const std::uint8_t label = rows_[row].label;
   if (label != 0) {
     const float up = p.limits.between(0, label, label), down = p.limits.between(1, label, label);

@@ -140,6 +140,8 @@ class ChainWave {
   void ask_around(const Pass& p, RowId row) noexcept;
   Moved ask_along(const Pass& p, RowId row) noexcept;
   void ask_beside(const Pass& p, RowId row, RowId to, int direction) noexcept;
+  Moved move_free(const Pass& p, RowId row, const float* asked) noexcept;
+  Moved ask_along_anchors(const Pass& p, RowId row) noexcept;
   void ask_across(const Pass& p, RowId row, RowId to, int direction) noexcept;
   void ask_voxel(const Pass& p, VoxelId from, VoxelId to, int direction) noexcept;
   [[nodiscard]] Span& asked_span(int way, int column, int z) noexcept;

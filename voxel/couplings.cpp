@@ -444,4 +444,20 @@ std::size_t Couplings::memory_bytes() const {
   return bytes;
 }
 
+std::vector<bool> Couplings::rows_in_use() {
+  std::vector<bool> rows(grid_.rows());
+  for (int c = 1; c + 1 < grid_.columns; ++c) {
+    for (int k = 0; k < grid_.dims[2]; ++k) {
+      for (int j = 0; j < grid_.dims[1]; ++j) {
+        const RowId row = grid_.row(c, j, k);
+        if (!prepare(row)) continue;
+        for (const RowId r : {row, row - 1, row + 1, row - grid_.row_z, row + grid_.row_z, row - grid_.row_x,
+                              row + grid_.row_x})
+          rows[r] = true;
+      }
+    }
+  }
+  return rows;
+}
+
 }  // namespace voxel

@@ -85,6 +85,8 @@ class Couplings {
     if ((kind_[row] & ready) == 0) make_ready(row);
     return kind(row) != empty;
   }
+  // Rows in which there is anything, and those beside them, whose values are read with theirs.
+  [[nodiscard]] std::vector<bool> rows_in_use();
   [[nodiscard]] bool uniform(RowId row) const { return kind(row) == one_label; }
   [[nodiscard]] RowSprings springs(RowId row, int axis) const noexcept;
   // By reference, and member by member: returned by value it was written and read back at once in pieces of

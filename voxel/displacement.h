@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <vector>
 
 #include "voxel/lattice.h"
 #include "voxel/lazy_array.h"
@@ -29,8 +30,8 @@ struct BrickLoad {
   [[nodiscard]] std::array<float, 3> at(VoxelId v) const noexcept {
     return has(v / kRow) ? std::array<float, 3>{load[0][v], load[1][v], load[2][v]} : std::array<float, 3>{};
   }
-  void populate() noexcept {
-    for (auto& axis : load) axis.populate();
+  void populate(const std::vector<bool>& rows) noexcept {
+    for (auto& axis : load) axis.populate(kRow, rows);
     row.populate();
   }
   [[nodiscard]] std::size_t memory_bytes() const {
@@ -68,6 +69,12 @@ struct Displacement {
   RestOffsets rest;
   BrickLoad bricks;
 
+  // All memory that these rows will take, now.
+  void populate(const std::vector<bool>& rows) noexcept {
+    for (auto& axis : u) axis.populate(kRow, rows);
+    role.populate(kRow, rows);
+    bricks.populate(rows);
+  }
   // Loads of a row of voxels beside the pulls of their springs; null: none (N).
   [[nodiscard]] const float* load_of(RowId r, int axis) const noexcept {
     if (bricks.has(r))

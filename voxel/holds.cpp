@@ -488,12 +488,13 @@ void Holds::prepare_all() noexcept {
   held_mark_.populate();
   supported_.populate();
   for (Level& l : levels_) {
-    l.queued.populate();
-    for (auto& pair : l.tilt) pair.populate();
+    const std::vector<bool> rows = l.couplings->rows_in_use();
+    l.queued.populate(kRow, rows);
+    for (auto& pair : l.tilt) pair.populate(kRow, rows);
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      for (auto& d : l.through[axis]) d.populate();
-      l.hold[axis].populate();
-      l.nearer[axis].populate();
+      for (auto& d : l.through[axis]) d.populate(kRow, rows);
+      l.hold[axis].populate(kRow, rows);
+      l.nearer[axis].populate(kRow, rows);
     }
   }
   for (int level = 1; level < static_cast<int>(levels_.size()); ++level) {

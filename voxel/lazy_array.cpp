@@ -78,7 +78,9 @@ void for_held(const void* at, std::size_t bytes, const Visit& visit) {
 void populate(void* at, std::size_t bytes) noexcept {
   const auto page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
   auto* bytes_at = static_cast<volatile std::uint8_t*>(at);
+  if (bytes == 0) return;
   for (std::size_t n = 0; n < bytes; n += page) bytes_at[n] = bytes_at[n];
+  bytes_at[bytes - 1] = bytes_at[bytes - 1];  // what does not begin with a page may end in one more
 }
 
 void give_back(void* at, std::size_t bytes) noexcept {

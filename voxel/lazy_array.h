@@ -65,6 +65,9 @@ class LazyArray {
   // Gives every page its memory now: what a first touch of each takes (about a microsecond) is then not taken
   // from a tick.
   void populate() noexcept;
+  // The same of those parts of `each` values, one after the other, that are `wanted`, and of what shares a
+  // page with them.
+  void populate(std::size_t each, const std::vector<bool>& wanted) noexcept;
   // Memory that what was written so far takes (unit: byte); what was only read takes none.
   [[nodiscard]] std::size_t resident_bytes() const;
   // Copies what `other`, of the same size, holds; pages that hold nothing stay untouched.
@@ -135,6 +138,15 @@ std::size_t LazyArray<T>::resident_bytes() const {
 template <class T>
 void LazyArray<T>::populate() noexcept {
   if (data_ != nullptr) voxel::populate(data_, size_ * sizeof(T));
+}
+
+template <class T>
+void LazyArray<T>::populate(std::size_t each, const std::vector<bool>& wanted) noexcept {
+  const std::size_t parts = std::min(wanted.size(), size_ / each);
+  for (std::size_t n = 0, end = 0; n < parts; n = end + 1) {
+    for (end = n; end < parts && wanted[end];) ++end;
+    if (end > n) voxel::populate(data_ + n * each, (end - n) * each * sizeof(T));
+  }
 }
 
 template <class T>

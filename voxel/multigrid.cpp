@@ -59,12 +59,12 @@ void Multigrid::prepare_level(int level) noexcept {
 
 void Multigrid::prepare_all() noexcept {
   for (int l = 0; l < levels(); ++l) {
-    prepare_level(l);
     Level& level = at(l);
+    const std::vector<bool> rows = level.couplings->rows_in_use();  // which finds all springs
     for (auto* arrays : {&level.value, &level.told, &level.load, &level.loaded_at}) {
-      for (auto& array : *arrays) array.populate();
+      for (auto& array : *arrays) array.populate(kRow, rows);
     }
-    level.stopped.populate();
+    level.stopped.populate(kRow, rows);
     level.flags.populate();
   }
   holds_->prepare_all();

@@ -78,12 +78,12 @@ Replica::Replica(SoftObject& object)
   if (lattice_.voxel_count() >= SoftObject::kPreparedWhole) return;
   relaxation_.prepare_all();
   object.relaxation_.prepare_all();
-  for (auto& axis : state_.u) axis.populate();
-  state_.bricks.populate();
-  state_.role.populate();
-  for (auto& axis : before_) axis.populate();
-  given_.populate();
-  for (Parcel& parcel : found_) parcel.populate();
+  const std::vector<bool> rows = relaxation_.couplings().rows_in_use();
+  state_.populate(rows);
+  for (auto& axis : before_) axis.populate(kRow, rows);
+  const auto most = static_cast<std::size_t>(std::count(rows.begin(), rows.end(), true));
+  given_.populate(most);
+  for (Parcel& parcel : found_) parcel.populate(most);
   again_.populate();
 }
 

@@ -116,9 +116,10 @@ class Replica {
     [[nodiscard]] RowId row(std::size_t n) const { return rows_[n]; }
     [[nodiscard]] const float* values(std::size_t n) const { return values_.data() + floats_ * n; }
     [[nodiscard]] float* values(std::size_t n) { return values_.data() + floats_ * n; }
-    void populate() noexcept {
+    // What so many rows take.
+    void populate(std::size_t rows) noexcept {
       rows_.populate();
-      values_.populate();
+      values_.populate(rows * floats_, {true});
       after_.populate();
     }
     [[nodiscard]] std::size_t memory_bytes() const {

@@ -73,9 +73,7 @@ SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice)
   carried_.reserve(kMaxCarried + kMaxTouched);
   hanging_.reserve(kMaxCarried + kMaxTouched);
   if (lattice_->voxel_count() < kPreparedWhole) {
-    for (auto& axis : state_.u) axis.populate();
-    state_.bricks.populate();
-    state_.role.populate();
+    state_.populate(relaxation_.couplings().rows_in_use());
     pair_held_.populate();
     chain_.prepare_all();
     relaxation_.prepare_all();

@@ -185,7 +185,7 @@ class SoftObject {
   friend class Replica;  // the same object, relaxed elsewhere
   // Voxels of an object that has all its memory from the start, up to 200 MB: what a tick touches for the
   // first time takes it five times as long. A larger one gets it where it is touched.
-  static constexpr std::size_t kPreparedWhole = 1U << 20U;
+  static constexpr std::size_t kPreparedWhole = 1U << 21U;
 
   struct Touch {
     VoxelId v;
