@@ -22,6 +22,7 @@ ChainWave::ChainWave(const Lattice& lattice)
       pulled_(lattice.grid().rows()),
       waiting_(lattice.grid().rows()),
       taken_(lattice.grid().rows()),
+      pulled_by_(lattice.grid().rows()),
       asked_(lattice.grid().rows()),
       asked_spans_(2 * static_cast<std::size_t>(lattice.grid().columns) *
                    (static_cast<std::size_t>(lattice.grid().dims[2]) + 2)),
@@ -72,16 +73,19 @@ void ChainWave::prepare_all() noexcept {
 
 void ChainWave::begin() noexcept {
   for (std::size_t n = 0; n < moved_count_; ++n) rows_[moved_[n]].mark = 0;
-  for (std::size_t n = 0; n < pulled_count_; ++n) rows_[pulled_[n]].mark = 0;
+  for (std::size_t n = 0; n < pulled_count_; ++n) {
+    rows_[pulled_[n]].mark = 0;
+    pulled_by_[pulled_[n]] = 0;
+  }
   moved_count_ = pulled_count_ = 0;
   work_ = 0;
 }
 
-void ChainWave::note_pulled(RowId row) noexcept {
-  std::uint8_t& mark = rows_[row].mark;
-  if ((mark & pulled) != 0) return;
-  mark |= pulled;
-  pulled_[pulled_count_++] = row;
+// What is raised too far for an anchor has to be lowered again, and the reverse.
+void ChainWave::note_pulled(const Pass& p, RowId row) noexcept {
+  std::uint8_t& by = pulled_by_[row];
+  if (by == 0) pulled_[pulled_count_++] = row;
+  by |= wave_bit(p.axis, p.way == Way::raise ? Way::lower : Way::raise);
 }
 
 // The voxel beyond the end of a row.
@@ -109,7 +113,7 @@ void ChainWave::ask_voxel(const Pass& p, VoxelId from, VoxelId to, int direction
   const float wanted = p.way == Way::raise ? p.u[from] - limit : p.u[from] + limit;
   if (p.way == Way::raise ? !(wanted > p.u[to] + p.margin) : !(wanted < p.u[to] - p.margin)) return;
   if (!free(to)) {
-    note_pulled(row);
+    note_pulled(p, row);
     return;
   }
   p.u[to] = wanted;
@@ -152,7 +156,7 @@ Moved ChainWave::move_free(const Pass& p, RowId row, const float* asked) noexcep
   const std::uint32_t free = info(row).free;
   std::uint32_t moves = 0;
   for (std::uint32_t i = 0; i < kRow; ++i) moves |= asked[i] != u[i] ? 1U << i : 0U;
-  if ((moves & ~free) != 0) note_pulled(row);
+  if ((moves & ~free) != 0) note_pulled(p, row);
   moves &= free;
   for (std::uint32_t left = moves; left != 0; left &= left - 1) {
     const int i = __builtin_ctz(left);
@@ -312,8 +316,10 @@ std::uint64_t ChainWave::spread(float* u, int axis, Way way, std::span<Source> s
 std::uint64_t ChainWave::spread_from_pulled(float* u, int axis, Way way, float margin,
                                             std::uint64_t most) noexcept {
   const Pass p{u, axis, way, margin, limits_.pass(axis, way), {}};
-  const std::size_t count = pulled_count_;
-  for (std::size_t n = 0; n < count; ++n) enqueue(pulled_[n]);
+  const std::uint8_t bit = wave_bit(axis, way);
+  for (std::size_t n = 0; n < pulled_count_; ++n) {
+    if ((pulled_by_[pulled_[n]] & bit) != 0) enqueue(pulled_[n]);
+  }
   return run(p, most);
 }
 
@@ -348,9 +354,9 @@ void ChainWave::put_back() noexcept {
 
 std::size_t ChainWave::memory_bytes() const {
   return rows_.resident_bytes() + ring_.resident_bytes() + moved_.resident_bytes() +
-         pulled_.resident_bytes() + waiting_.resident_bytes() + taken_.resident_bytes() +
-         asked_.resident_bytes() + resident_bytes(asked_spans_) + resident_bytes(in_plane_) +
-         resident_bytes(moves_) + resident_bytes(fall_);
+         pulled_.resident_bytes() + pulled_by_.resident_bytes() + waiting_.resident_bytes() +
+         taken_.resident_bytes() + asked_.resident_bytes() + resident_bytes(asked_spans_) +
+         resident_bytes(in_plane_) + resident_bytes(moves_) + resident_bytes(fall_);
 }
 
 }  // namespace voxel

@@ -52,7 +52,7 @@ class ChainWave {
   // chain_rows.h. Sorts the sources, so that the result does not depend on their order in any bit.
   std::uint64_t spread(float* u, int axis, Way way, std::span<Source> sources, float margin,
                        std::uint64_t most = kUnlimited) noexcept;
-  // The rows where anchors were pulled ask what is around them to give way.
+  // The rows where anchors were pulled, on this axis and the other way, ask what is around them to give way.
   std::uint64_t spread_from_pulled(float* u, int axis, Way way, float margin,
                                    std::uint64_t most = kUnlimited) noexcept;
   // Deals with the rows that wait: take_waiting(), a wave for each axis and way, and put_back() of what these
@@ -74,7 +74,7 @@ class ChainWave {
  private:
   static constexpr std::uint64_t kConeRows = 8;  // of a cone take about as long as one update of a row
   // first, last: since the row was last looked at, its first voxel moved, its last one.
-  enum Mark : std::uint8_t { first = kFirstMoved, last = kLastMoved, queued = 8, moved = 16, pulled = 32 };
+  enum Mark : std::uint8_t { first = kFirstMoved, last = kLastMoved, queued = 8, moved = 16 };
   struct Pass {  // one wave
     float* u = nullptr;
     int axis = 0;
@@ -132,7 +132,7 @@ class ChainWave {
   [[nodiscard]] bool free(VoxelId v) noexcept { return (info(v / kRow).free >> (v % kRow) & 1U) != 0; }
   // `ends`: first and last, those to be looked at beyond.
   void enqueue(RowId row, std::uint8_t ends = first | last) noexcept;
-  void note_pulled(RowId row) noexcept;
+  void note_pulled(const Pass& p, RowId row) noexcept;
   // Visits at most `most` rows of the queue; the rest waits.
   std::uint64_t run(const Pass& p, std::uint64_t most) noexcept;
   void wait(RowId row, std::uint8_t waves) noexcept;
@@ -172,7 +172,8 @@ class ChainWave {
   std::size_t head_ = 0, tail_ = 0;
   LazyArray<RowId> moved_, pulled_, waiting_, taken_;
   std::size_t moved_count_ = 0, pulled_count_ = 0, waiting_count_ = 0, taken_count_ = 0;
-  LazyArray<std::uint8_t> asked_;  // [row] Asked bits; 0 between sweeps
+  LazyArray<std::uint8_t> pulled_by_;  // [row] bit of each wave that is to ask here for its anchors' sake
+  LazyArray<std::uint8_t> asked_;      // [row] Asked bits; 0 between sweeps
   std::vector<Span> asked_spans_;  // [way][column][z + 1] rows among which some are; empty between sweeps
   std::vector<std::array<Span, 2>> in_plane_;  // [column] likewise, of the plane that is being swept
   std::vector<Moved> moves_;                   // [n] of rows that are being swept
