@@ -137,6 +137,7 @@ void relax_background(const World& world, WorldState& state) noexcept {
     if (state.apart.objects.empty() || state.apart.objects[o] == nullptr) {
       state.soft[o]->relax_background(world.soft[o].budget);
     } else {
+      state.soft[o]->relax_near_pairs();
       exchange(state, o, arrived);
     }
   }

@@ -138,6 +138,9 @@ class SoftObject {
   // until it is forgotten.
   void find_hanging_on_pairs() noexcept;
   void forget_hanging_on_pairs() noexcept;
+  // While something does, in an object that the tool does not press and another thread relaxes: a cycle round
+  // these voxels, or a part of a wide one. Otherwise nothing.
+  void relax_near_pairs() noexcept;
   // Of one of them, what that pulls it by, without its own links, and the springs of them all; 0: nothing
   // hangs on it.
   [[nodiscard]] HeldLoad hanging_on_pair(VoxelId v) const noexcept {
