@@ -98,7 +98,9 @@ bool presses(voxel::SoftObject& object, std::uint32_t s, const Held& held) noexc
   if (held.gap_m < kOnBody * object.lattice().min_spacing_m()) return true;
   const voxel::VoxelId v = object.lattice().surface()[s];
   const glm::dvec3 stiffness = 1.0 / object.compliance(v);
-  const glm::dvec3 left = object.free_displacement(v) - object.state().at(v) + held.gap_m * held.normal;
+  const glm::dvec3 place =
+      voxel::clamp_to_links(object.lattice(), object.state(), v, object.free_displacement(v));
+  const glm::dvec3 left = place - object.state().at(v) + held.gap_m * held.normal;
   return glm::dot(held.normal, stiffness * left) < 0.0;
 }
 

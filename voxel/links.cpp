@@ -2,6 +2,8 @@
 #include "voxel/links.h"
 
 #include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
 
@@ -128,20 +130,60 @@ glm::dvec3 no_deeper(const Obstacle& o, const glm::dvec3& before, const glm::dve
   return before + (after - before) * (out / (then + out));
 }
 
+namespace {
+
+// From `wanted`, where its links alone would have a voxel, to the place of least energy that both these and
+// the obstacle allow: along the way that the obstacle presses, w · n of each axis, as far as it lies in the
+// interval of that axis. (Projected onto the obstacle first and clamped to the intervals then, what a link at
+// its limit kept from the one axis was missing on the others as well, and voxels rested off the obstacle:
+// below a ball 0.07 spacings from it, pulled towards it by half of what the ball presses such a voxel with.)
+glm::dvec3 least_outside(const Obstacle& o, const glm::dvec3& w, const glm::dvec3& wanted,
+                         const glm::dvec3& low, const glm::dvec3& high) noexcept {
+  const glm::dvec3 n(o.normal), rate = w * n;
+  glm::dvec3 place = glm::clamp(wanted, low, high);
+  double depth = depth_in_obstacle(o, place), pressed = 0.0;  // by so much has the obstacle pressed so far
+  for (int part = 0; part < 6 && depth > 0.0; ++part) {       // of the way: an axis begins to move, or ends
+    double until = std::numeric_limits<double>::infinity(), out = 0.0;
+    glm::dvec3 moves(0.0);
+    for (int axis = 0; axis < 3; ++axis) {
+      if (rate[axis] == 0.0) continue;
+      const double to_low = (low[axis] - wanted[axis]) / rate[axis],
+                   to_high = (high[axis] - wanted[axis]) / rate[axis], begins = std::min(to_low, to_high),
+                   ends = std::max(to_low, to_high);
+      if (pressed >= ends) continue;
+      if (pressed < begins) {
+        until = std::min(until, begins);
+        continue;
+      }
+      until = std::min(until, ends);
+      moves[axis] = rate[axis];
+      out += n[axis] * rate[axis];
+    }
+    const double more = out > 0.0 ? std::min(until - pressed, depth / out) : until - pressed;
+    if (!std::isfinite(more)) break;
+    place = glm::clamp(place + more * moves, low, high);
+    depth -= more * out;
+    if (out > 0.0 && pressed + more < until) break;
+    pressed = until;
+  }
+  return place;
+}
+
+}  // namespace
+
 void relax_obstacle(Couplings& couplings, Displacement& state, const ObstacleView& view, VoxelId v,
                     const glm::dvec3& load_N) noexcept {
   const Obstacle& o = view.of(v);
-  const glm::dvec3 n(o.normal), before = state.at(v);
-  const auto depth_of = [&](const glm::dvec3& u) { return static_cast<double>(o.bound) - glm::dot(n, u); };
-  const glm::dvec3 w = link_compliance(couplings, v);
-  glm::dvec3 wanted = link_minimum(couplings, state, v) + w * load_N;
-  const double depth = depth_of(wanted);
-  if (depth > 0.0) {
-    // Projected in the metric of the springs, so that the step lowers the energy along the surface.
-    const double denominator = glm::dot(n, w * n);
-    if (denominator > 0.0) wanted += (depth / denominator) * w * n;
+  const glm::dvec3 before = state.at(v), w = link_compliance(couplings, v);
+  const glm::dvec3 wanted = link_minimum(couplings, state, v) + w * load_N;
+  glm::dvec3 low, high;
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::array<float, 2> interval = link_interval(couplings.lattice(), state, v, axis);
+    const bool empty = !(interval[0] <= interval[1]);  // by a rounding
+    low[axis] = empty ? before[axis] : static_cast<double>(interval[0]);
+    high[axis] = empty ? before[axis] : static_cast<double>(interval[1]);
   }
-  state.set(v, no_deeper(o, before, clamp_to_links(couplings.lattice(), state, v, wanted)));
+  state.set(v, no_deeper(o, before, least_outside(o, w, wanted, low, high)));
 }
 
 }  // namespace voxel

@@ -132,6 +132,30 @@ TEST_F(FreeOnTissue, ABallComesToRestAndItsWeightIsCarried) {
   }
 }
 
+// So deep that links are at their limits; springs across the layer of anchors carry all, since none is there.
+TEST_F(FreeOnTissue, ABallOnTightLinksComesToRestAndItsWeightIsCarried) {
+  struct Case {
+    double mass_kg, young_Pa;
+  };
+  for (const Case& c : {Case{0.05, 5e3}, Case{0.1, 1e4}, Case{0.02, 2e3}}) {
+    for (const bool apart : {false, true}) {
+      SCOPED_TRACE(std::to_string(c.mass_kg) + (apart ? " kg, relaxed apart" : " kg, in the tick"));
+      Touch touch(load(block(c.young_Pa) + body(kBall, c.mass_kg, 9.0, true)), kFarAway, apart);
+      const double weight = 9.81 * c.mass_kg;
+      for (int n = 0; n < 5000; ++n) touch.at(kFarAway);
+      double fastest = 0.0;
+      for (int n = 0; n < 100; ++n) {
+        touch.at(kFarAway);
+        fastest = std::max(fastest, glm::length(free_body(touch).velocity_m_per_s));
+      }
+      EXPECT_GT(tests::bearings(touch.world(), touch.state())[0].tight, 20U);
+      EXPECT_LT(fastest, 1e-4);
+      EXPECT_NEAR(carried_N(touch), weight, 0.01 * weight);
+      EXPECT_LE(deepest(touch), kOverlap);
+    }
+  }
+}
+
 // Between two results tissue that is relaxed apart is a spring, and no hop may live on that.
 TEST_F(FreeOnTissue, ADroppedWeightComesToRest) {
   for (const bool apart : {false, true}) {
