@@ -7,7 +7,8 @@
 namespace voxel {
 namespace {
 
-constexpr int kPatience = 40;  // cycles without gain before an object counts as resting
+constexpr std::uint64_t kLetGoEvery = 8;  // rounds
+constexpr int kPatience = 40;             // cycles without gain before an object counts as resting
 constexpr double kWorse = 1.05;
 constexpr float kHarder = 8.0F, kSofter = 0.97F, kHardest = 1e4F;
 // A residual is what a cycle finds before its coarse levels correct it: round what is a hundred times stiffer
@@ -286,9 +287,9 @@ void Relaxation::end_round(Displacement& state, const ObstacleView& obstacles, d
   // 1.9 times within a cycle).
   if (residual_N < kNearRest * tolerance_N_ || cycles_without_gain_ > kPatience / 2)
     residual_N = std::max(residual_N, move_clusters(state, obstacles));
-  // What is still pulled against the limit that holds it stays held. (Let go of in every round, coarse levels
-  // took it off its limit and two sets of voxels took turns: under a free ball by 0.03 spacings, for ever.)
-  multigrid_.release_unlimited(state);
+  // While rounds gain nothing, what limits hold stays held for a few of them: let go of in every round, two
+  // sets of voxels can take turns for ever.
+  if (cycles_without_gain_ <= 1 || cycles_ % kLetGoEvery == 0) multigrid_.release_limited();
   // Scattered voxels hold a cell harder than a patch of them does. A cycle that ends worse than it began says
   // so.
   if (residual_N > kWorse * residual_N_ && cycles_without_gain_ > 0) {

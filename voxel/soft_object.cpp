@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <limits>
+#include <utility>
 
 #include "voxel/links.h"
 #include "voxel/yield.h"
@@ -382,14 +383,20 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
 // went on for ever, with no result as well: the proxy went 0.5 mm in and 0.4 mm out in every tick, and the
 // hand felt 1.2 to 1.7 N where 0.92 is right.)
 void SoftObject::relax_near_pairs() noexcept {
+  if (touches_.empty()) {  // no touch() was before
+    contact_work_ = 0;
+    wide_cycle_ = false;
+  }
   if (hanging_on_pairs_.empty() || any_pressed() || !relaxation_.left_to_another()) return;
+  const bool goes_on = relaxation_.under_way();
+  if (std::exchange(asked_to_rest_, false) && !goes_on) return;
+  const std::size_t left = left_of(kContactWork);
   for (const VoxelId v : pair_roots_) relaxation_.stir(v / kRow);
   list_held();
-  if (relaxation_.under_way()) {
-    relaxation_.continue_contact(state_, obstacle_view(), all_held_, kContactWork);
-  } else {
-    relaxation_.relax_contact(state_, obstacle_view(), all_held_, pair_roots_, false, kContactWork);
-  }
+  contact_work_ +=
+      goes_on ? relaxation_.continue_contact(state_, obstacle_view(), all_held_, left)
+              : relaxation_.relax_contact(state_, obstacle_view(), all_held_, pair_roots_, false, left);
+  wide_cycle_ = relaxation_.wide();
 }
 
 void SoftObject::follow(const glm::dvec3& delta) noexcept {
