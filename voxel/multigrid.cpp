@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "voxel/links.h"
+
 namespace voxel {
 namespace {
 
@@ -12,6 +14,7 @@ constexpr int kSmallest = 3;                // cells across the coarsest level
 constexpr int kWrittenAtOnce = 5;           // from this level on springs are written out on construction
 constexpr std::size_t kMaxBalanced = 4096;  // rows; the contact of a tool has some hundred
 constexpr std::size_t kMaxStopped = 65536;  // cells of all levels stopped at a time; more move a little
+constexpr float kTight = 1e-4F;             // of the spacing: nearer to its limit than this a link is at it
 
 }  // namespace
 
@@ -42,6 +45,7 @@ Multigrid::Multigrid(const Lattice& lattice) : lattice_(lattice), tiles_(lattice
   for (int l = kWrittenAtOnce; l < levels(); ++l) prepare_level(l);
   hats_ = Hats(lattice.grid());
   stopped_.reserve(kMaxStopped);
+  still_stopped_.reserve(kMaxStopped);
   refused_ = LazyArray<Refused>(std::min(kMostRefused, lattice.grid().rows()));
   std::vector<Couplings*> couplings;
   for (const Level& level : levels_) couplings.push_back(level.couplings.get());
@@ -112,6 +116,33 @@ void Multigrid::release_limited() noexcept {
   stopped_.clear();
 }
 
+void Multigrid::release_unlimited(const Displacement& state) noexcept {
+  const float tight = kTight * static_cast<float>(lattice_.min_spacing_m());
+  const auto pulled_against_limit = [&](VoxelId v, int axis) {
+    const float at = state.u[static_cast<std::size_t>(axis)][v];
+    const std::array<float, 2> interval = link_interval(lattice_, state, v, axis);
+    const bool low = at <= interval[0] + tight, high = at >= interval[1] - tight;
+    if (!low && !high) return false;
+    const double force = link_force(couplings(), state, v, axis);
+    return force > 0.0 ? high : low && force < 0.0;
+  };
+  still_stopped_.clear();
+  for (const StoppedCell& s : stopped_) {
+    if (s.level != 0) continue;
+    std::uint8_t bits = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto bit = static_cast<std::uint8_t>(1U << axis);
+      if ((at(0).stopped[s.cell] & bit) != 0 && pulled_against_limit(s.cell, axis)) bits |= bit;
+    }
+    if (bits == 0) continue;
+    // Listed once for each time that axes were added: the first is enough.
+    at(0).stopped[s.cell] = 0;
+    still_stopped_.push_back({bits, s.cell});
+  }
+  release_limited();
+  for (const StoppedCell& s : still_stopped_) stop_cells(s.cell, s.level);
+}
+
 void Multigrid::copy_from(const Multigrid& other) noexcept {
   tiles_ = other.tiles_;
   bricks_.look_at_all_of(other.bricks_);
@@ -177,8 +208,8 @@ void Multigrid::keep_log() {
 std::size_t Multigrid::memory_bytes() const {
   std::size_t bytes = tiles_.memory_bytes() + log_.memory_bytes() + bricks_.memory_bytes() +
                       holds_->memory_bytes() + hats_.memory_bytes() + resident_bytes(stopped_) +
-                      balance_number_.resident_bytes() + balance_.resident_bytes() +
-                      resident_bytes(balanced_) + refused_.resident_bytes();
+                      resident_bytes(still_stopped_) + balance_number_.resident_bytes() +
+                      balance_.resident_bytes() + resident_bytes(balanced_) + refused_.resident_bytes();
   for (const Level& l : levels_) {
     bytes += l.couplings->memory_bytes() + l.flags.resident_bytes() + l.stopped.resident_bytes();
     for (const auto* arrays : {&l.value, &l.told, &l.load, &l.loaded_at}) {

@@ -74,6 +74,8 @@ class Multigrid {
   void set_hold(float times) noexcept { hold_ = times; }
   // Cells held because a chain at its limit holds a voxel in them, until this is called.
   void release_limited() noexcept;
+  // The same, but for those in which a voxel is still pulled against the limit that holds it.
+  void release_unlimited(const Displacement& state) noexcept;
   // The voxels among them: `visit(v, axis)` for each axis on which a limit holds one.
   template <class Visit>
   void for_limited(const Visit& visit) const {
@@ -241,7 +243,7 @@ class Multigrid {
   std::vector<Level> levels_;
   Hats hats_;
   std::unique_ptr<Holds> holds_;
-  LazyVector<StoppedCell> stopped_;
+  LazyVector<StoppedCell> stopped_, still_stopped_;
   LazyArray<Refused> refused_;
   std::size_t refused_count_ = 0;
   // Rows in which something balances what pulls: that and their own load (N), one beside the other. (At their

@@ -289,7 +289,16 @@ void Relaxation::end_round(Displacement& state, const ObstacleView& obstacles, d
     residual_N = std::max(residual_N, move_clusters(state, obstacles));
   // While rounds gain nothing, what limits hold stays held for a few of them: let go of in every round, two
   // sets of voxels can take turns for ever.
-  if (cycles_without_gain_ <= 1 || cycles_ % kLetGoEvery == 0) multigrid_.release_limited();
+  // Beside a body something moves in every tick, so that each round is as the first, and there what is still
+  // pulled against its limit stays held. (Let go of, coarse levels took it off the limit and back: under a
+  // ball at rest by 0.03 spacings, for ever. Kept everywhere, tissue that jumped stayed far from rest.)
+  const bool beside_body = std::any_of(obstacles.obstacles.begin(), obstacles.obstacles.end(),
+                                       [](const Obstacle& o) { return o.moving; });
+  if (beside_body) {
+    multigrid_.release_unlimited(state);
+  } else if (cycles_without_gain_ <= 1 || cycles_ % kLetGoEvery == 0) {
+    multigrid_.release_limited();
+  }
   // Scattered voxels hold a cell harder than a patch of them does. A cycle that ends worse than it began says
   // so.
   if (residual_N > kWorse * residual_N_ && cycles_without_gain_ > 0) {
