@@ -174,7 +174,7 @@ class ChainWave {
   std::size_t moved_count_ = 0, pulled_count_ = 0, waiting_count_ = 0, taken_count_ = 0;
   LazyArray<std::uint8_t> pulled_by_;  // [row] bit of each wave that is to ask here for its anchors' sake
   LazyArray<std::uint8_t> asked_;      // [row] Asked bits; 0 between sweeps
-  std::vector<Span> asked_spans_;  // [way][column][z + 1] rows among which some are; empty between sweeps
+  std::vector<Span> asked_spans_;      // [way][column][z + 1] rows among which some are; empty between sweeps
   std::vector<std::array<Span, 2>> in_plane_;  // [column] likewise, of the plane that is being swept
   std::vector<Moved> moves_;                   // [n] of rows that are being swept
   std::vector<float> fall_;                    // [column][lane] of the cone that is being written

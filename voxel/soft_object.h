@@ -186,8 +186,8 @@ class SoftObject {
 
  private:
   friend class Replica;  // the same object, relaxed elsewhere
-  // Voxels of an object that has all its memory from the start, up to 200 MB: what a tick touches for the
-  // first time takes it five times as long. A larger one gets it where it is touched.
+  // Voxels of an object that has all its memory from the start, 280 bytes a voxel: what a tick touches for
+  // the first time takes it five times as long. A larger one gets it where it is touched.
   static constexpr std::size_t kPreparedWhole = 1U << 21U;
 
   struct Touch {
