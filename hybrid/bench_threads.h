@@ -35,8 +35,7 @@ struct ThreadsRow {
 // Loads, in turns:
 //   relaxation       the session's relaxation thread, which also says where surfaces are as often as it can,
 //                    and another session of the scene that is relaxed and snapped without a pause;
-//   memory           in place of all that a thread that copies 256 MB to and fro. The session before is
-//   played
+//   memory           in place of all that a thread that copies 256 MB to and fro. The session before is felt
 //                    again, with its inputs; what was found apart then is handed to the ticks that took it,
 //                    by that thread, so that another core wrote it here, too;
 //   nothing relaxed  as `memory`, and no result ever comes: what ticks cost that have less to do.

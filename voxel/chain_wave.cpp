@@ -170,10 +170,8 @@ Moved ChainWave::move_free(const Pass& p, RowId row, const float* asked) noexcep
 Moved ChainWave::ask_along_anchors(const Pass& p, RowId row) noexcept {
   std::array<float, kRow + 2> asked;  // one beyond both ends, as kernels read them
   std::copy_n(row_at(p, row) - 1, asked.size(), asked.data());
-  const HalfLimits up{p.limits.half[0], limits_.registers()}, down{p.limits.half[1], limits_.registers()};
   float* const own = asked.data() + 1;
-  const Moved moves = p.way == Way::raise ? raise_along(own, lattice_.labels(row), up, down, p.margin)
-                                          : lower_along(own, lattice_.labels(row), up, down, p.margin);
+  const Moved moves = ask_along_labels(p, row, own);
   if (moves == kNothingMoved) return moves;
   std::uint32_t lanes = 0;
   for (std::uint32_t i = 0; i < kRow; ++i) lanes |= own[i] != row_at(p, row)[i] ? 1U << i : 0U;
@@ -201,9 +199,13 @@ Moved ChainWave::ask_along(const Pass& p, RowId row) noexcept {
     return p.way == Way::raise ? raise_along_alike(own, up, down, p.margin)
                                : lower_along_alike(own, up, down, p.margin);
   }
+  return ask_along_labels(p, row, own);
+}
+
+Moved ChainWave::ask_along_labels(const Pass& p, RowId row, float* u) noexcept {
   const HalfLimits up{p.limits.half[0], limits_.registers()}, down{p.limits.half[1], limits_.registers()};
-  return p.way == Way::raise ? raise_along(own, lattice_.labels(row), up, down, p.margin)
-                             : lower_along(own, lattice_.labels(row), up, down, p.margin);
+  return p.way == Way::raise ? raise_along(u, lattice_.labels(row), up, down, p.margin)
+                             : lower_along(u, lattice_.labels(row), up, down, p.margin);
 }
 
 void ChainWave::ask_around(const Pass& p, RowId row) noexcept {

@@ -142,6 +142,7 @@ class ChainWave {
   void ask_beside(const Pass& p, RowId row, RowId to, int direction) noexcept;
   Moved move_free(const Pass& p, RowId row, const float* asked) noexcept;
   Moved ask_along_anchors(const Pass& p, RowId row) noexcept;
+  Moved ask_along_labels(const Pass& p, RowId row, float* u) noexcept;  // its values, or a copy of them
   void ask_across(const Pass& p, RowId row, RowId to, int direction) noexcept;
   void ask_voxel(const Pass& p, VoxelId from, VoxelId to, int direction) noexcept;
   [[nodiscard]] Span& asked_span(int way, int column, int z) noexcept;

@@ -14,7 +14,6 @@ constexpr int kSmallest = 3;                // cells across the coarsest level
 constexpr int kWrittenAtOnce = 5;           // from this level on springs are written out on construction
 constexpr std::size_t kMaxBalanced = 4096;  // rows; the contact of a tool has some hundred
 constexpr std::size_t kMaxStopped = 65536;  // cells of all levels stopped at a time; more move a little
-constexpr float kTight = 1e-4F;             // of the spacing: nearer to its limit than this a link is at it
 
 }  // namespace
 
@@ -137,10 +136,10 @@ void Multigrid::release_unlimited(const Displacement& state) noexcept {
     if (bits == 0) continue;
     // Listed once for each time that axes were added: the first is enough.
     at(0).stopped[s.cell] = 0;
-    still_stopped_.push_back({bits, s.cell});
+    still_stopped_.push_back({s.cell, bits});
   }
   release_limited();
-  for (const StoppedCell& s : still_stopped_) stop_cells(s.cell, s.level);
+  for (const StoppedVoxel& s : still_stopped_) stop_cells(s.v, s.axes);
 }
 
 void Multigrid::copy_from(const Multigrid& other) noexcept {

@@ -189,6 +189,10 @@ class Multigrid {
     std::uint8_t level;
     VoxelId cell;
   };
+  struct StoppedVoxel {
+    VoxelId v;
+    std::uint8_t axes;  // bits
+  };
   // What a row of voxels was told and did not follow.
   struct Refused {
     RowId row = 0;
@@ -197,7 +201,8 @@ class Multigrid {
     RowVector way;
   };
   static constexpr std::size_t kMostRefused = 8192;  // rows at a time; of more, cells take it back at once
-  static constexpr float kLeastLoad = 0.25F;         // of the tolerance: loads less wrong than this are right
+  static constexpr float kTight = 1e-4F;      // of the spacing: nearer to its limit than this a link is at it
+  static constexpr float kLeastLoad = 0.25F;  // of the tolerance: loads less wrong than this are right
 
   [[nodiscard]] Level& at(int level) { return levels_[static_cast<std::size_t>(level)]; }
   [[nodiscard]] const Level& at(int level) const { return levels_[static_cast<std::size_t>(level)]; }
@@ -243,7 +248,8 @@ class Multigrid {
   std::vector<Level> levels_;
   Hats hats_;
   std::unique_ptr<Holds> holds_;
-  LazyVector<StoppedCell> stopped_, still_stopped_;
+  LazyVector<StoppedCell> stopped_;
+  LazyVector<StoppedVoxel> still_stopped_;
   LazyArray<Refused> refused_;
   std::size_t refused_count_ = 0;
   // Rows in which something balances what pulls: that and their own load (N), one beside the other. (At their

@@ -5,11 +5,6 @@
 #include "voxel/multigrid.h"
 
 namespace voxel {
-namespace {
-
-constexpr float kTight = 1e-4F;  // of the spacing: nearer to its limit than this a link is at it
-
-}  // namespace
 
 LevelRow Multigrid::row_of(int level, RowId row, Displacement& state) noexcept {
   Level& l = at(level);
