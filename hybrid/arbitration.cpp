@@ -199,7 +199,7 @@ void refresh_obstacles(const World& world, WorldState& state) noexcept {
     if (!object.asleep()) {
       const voxel::Lattice& lattice = object.lattice();
       LooksDue due(state, o);
-      for (const voxel::VoxelId v : object.touched()) due.consider(object.surface_number(v));
+      for (const std::uint32_t number : object.touched_numbers()) due.consider(number);
       due.consider_moved();
       // What moves by itself, a little in each tick, is found in turns.
       const auto count = static_cast<std::uint32_t>(lattice.surface().size());

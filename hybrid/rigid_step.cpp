@@ -15,20 +15,23 @@ constexpr int kMaxFreePieces = 512;  // of the way through free space looked at 
 
 }  // namespace
 
-bool gather_planes(const World& world, WorldState& state, const glm::dvec3& point, double radius) noexcept {
+double gather_planes(const World& world, WorldState& state, const glm::dvec3& point, double radius) noexcept {
   state.planes.clear();
   const std::uint64_t mask = state.map.rigid_in(point - radius, point + radius, state.map_trail);
-  if (mask == 0) return true;
-  bool complete = true;
+  double known = radius;
   for (std::uint32_t o = 0; o < world.rigid.size(); ++o) {
     if ((mask & OccupancyMap::rigid_bit(o)) == 0) continue;
     const BodyFrame& frame = state.rigid[o].frame;
     const polygon::GatherResult found =
         world.rigid[o].surface->gather(frame.to_body(point), radius, state.near);
-    complete = complete && found.complete;
+    double furthest = 0.0;
     for (std::uint32_t i = 0; i < found.count; ++i) {
-      if (state.planes.size() == state.planes.capacity()) return false;
       const polygon::NearPoint& near = state.near[i];
+      furthest = std::max(furthest, near.distance);
+      if (state.planes.size() == state.planes.capacity()) {
+        known = std::min(known, near.distance);
+        continue;
+      }
       const glm::dvec3 on_surface = frame.to_scene(near.point);
       const glm::dvec3 away = point - on_surface;
       const double distance = glm::length(away);
@@ -38,8 +41,9 @@ bool gather_planes(const World& world, WorldState& state, const glm::dvec3& poin
       state.planes.push_back(
           {normal, glm::dot(normal, on_surface) + world.contact_radius_m(), o, near.element});
     }
+    if (!found.complete) known = std::min(known, furthest);
   }
-  return complete;
+  return known;
 }
 
 bool advance_through_free_space(const World& world, WorldState& state, const glm::dvec3& goal,

@@ -131,19 +131,17 @@ void refresh_map(const World& world, WorldState& state) noexcept {
     if (!object.moved_ever()) continue;
     const SoftBody& body = world.soft[o];
     const auto surface = object.lattice().surface();
-    const auto look = [&](voxel::VoxelId v) {
-      const std::uint32_t s = object.surface_number(v);
-      if (s != voxel::SoftObject::kNoSurface)
-        state.map.move(body.first_number + s, body.to_scene(object.position(v)));
+    const auto look = [&](std::uint32_t number) {
+      state.map.move(body.first_number + number, body.to_scene(object.position(surface[number])));
     };
-    for (const voxel::VoxelId v : object.touched()) look(v);
+    for (const std::uint32_t number : object.touched_numbers()) look(number);
     if (!state.beside_bodies.empty()) {
-      for (const std::uint32_t number : state.beside_bodies[o].near) look(surface[number]);
+      for (const std::uint32_t number : state.beside_bodies[o].near) look(number);
     }
     if (object.asleep() && state.cursor[o] == 0) continue;  // a whole round since it came to rest
     const auto count = static_cast<std::uint32_t>(surface.size());
     for (std::uint32_t i = 0; i < std::min(kMapSlice, count); ++i) {
-      look(surface[state.cursor[o]]);
+      look(state.cursor[o]);
       if (++state.cursor[o] == count) {
         state.cursor[o] = 0;
         if (object.asleep()) break;

@@ -4,6 +4,7 @@
 #include <time.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -34,6 +35,10 @@ constexpr double kOvershoot = 0.25;     // of the pull before, turned round: a s
 constexpr double kMostOvershoot = 3.0;  // believed of one step
 constexpr double kProbe = 0.005;  // of the tool's radius: how far into tissue that was blocked a tick looks
 constexpr double kMostHidden = 50.0;  // hidden stiffness at most, of the model's
+// Of the tool's radius: how far from the proxy rigid planes are looked for when tissue stops it. Seldom is
+// the first not enough, and beside a fine mesh the second holds five times as many triangles: a seventh of a
+// tick.
+constexpr std::array<double, 2> kPlanesWithin{1.25, 2.0};
 
 // Stages by the wall clock, which is cheap; the whole tick by the thread's own processor time, because on a
 // shared machine a tick that was put aside for another process is not a slow tick.
@@ -117,6 +122,31 @@ void learn_stiffness(const World& world, WorldState& state, const glm::dvec3& de
   state.hidden_stiffness_N_per_m = std::max(state.hidden_stiffness_N_per_m, hidden);
 }
 
+struct OutsideRigid {
+  polygon::PlaneMinimum minimum;
+  std::size_t rigid = 0;  // state.planes: so many of them first
+  bool sure = false;      // feasible, and no rigid plane that was not looked for can change it
+};
+
+// The least of the metric about `target`, outside what is rigid near the proxy and outside the planes that
+// add_others() appends to state.planes. A rigid plane that was not found is further from the proxy than was
+// looked, so a minimum that is nearer than that is the minimum among them all.
+template <class AddOthers>
+OutsideRigid minimise_outside_rigid(const World& world, WorldState& state, const glm::dvec3& target,
+                                    const polygon::Metric& metric, AddOthers&& add_others) noexcept {
+  const double radius = world.contact_radius_m();
+  OutsideRigid least;
+  for (const double within : kPlanesWithin) {
+    const double known = gather_planes(world, state, state.proxy_m, within * radius);
+    least.rigid = state.planes.size();
+    add_others();
+    least.minimum = polygon::minimise_on_planes(target, metric, state.planes, 1e-9 * radius);
+    least.sure = least.minimum.feasible && glm::length(least.minimum.point - state.proxy_m) <= known - radius;
+    if (!least.minimum.feasible || least.sure || known < within * radius) break;
+  }
+  return least;
+}
+
 // Where tissue cannot leave the tool's way, it is as good as rigid, and the proxy stops there: pressed
 // further in every pass, to be taken back at the end of the tick, the tool would be a wedge that drives
 // voxels aside, and get back from them what it never gave. Whether they still cannot is asked once a tick, by
@@ -127,19 +157,18 @@ glm::dvec3 stop_at_blocked(const World& world, WorldState& state, const glm::dve
   if (probe) {
     for (polygon::ContactPlane& plane : state.blocked) plane.offset -= kProbe * world.contact_radius_m();
   }
-  const double radius = world.contact_radius_m();
-  if (!gather_planes(world, state, state.proxy_m, 2.0 * radius)) return target;
-  const std::size_t rigid = state.planes.size();
-  for (const polygon::ContactPlane& plane : state.blocked) {
-    if (state.planes.size() == state.planes.capacity()) break;
-    state.planes.push_back(plane);
-  }
-  const polygon::PlaneMinimum stop = polygon::minimise_on_planes(target, metric, state.planes, 1e-9 * radius);
+  const OutsideRigid least = minimise_outside_rigid(world, state, target, polygon::Metric(metric), [&state] {
+    for (const polygon::ContactPlane& plane : state.blocked) {
+      if (state.planes.size() == state.planes.capacity()) break;
+      state.planes.push_back(plane);
+    }
+  });
+  const polygon::PlaneMinimum& stop = least.minimum;
   if (!stop.feasible) return target;
   // Of the two kinds of planes that hold it there, rigid ones are for the sweep to meet.
   glm::dvec3 held_N(0.0);
   for (std::uint32_t i = 0; i < stop.active_count; ++i) {
-    if (stop.active[i] >= rigid) held_N += stop.multiplier[i] * state.planes[stop.active[i]].normal;
+    if (stop.active[i] >= least.rigid) held_N += stop.multiplier[i] * state.planes[stop.active[i]].normal;
   }
   return target + glm::inverse(metric) * held_N;
 }
@@ -183,16 +212,16 @@ double deepest(const WorldState& state, std::size_t count, const glm::dvec3& poi
 // Tissue that anchors, bone or its own chain keep from leaving the tool's way: the tool leaves its way
 // instead, if need be back to `before`, where it was at the start of the tick.
 void give_way(const World& world, WorldState& state, const glm::dvec3& before, Sweep& sweep) noexcept {
-  const double radius = world.tool.radius_m;
-  if (!gather_planes(world, state, state.proxy_m, 2.0 * radius)) return;
-  const std::size_t bounds = soft_bounds(world, state, state.proxy_m, false, state.planes);
+  state.planes.clear();
+  std::size_t bounds = soft_bounds(world, state, state.proxy_m, false, state.planes);
   if (bounds == 0) return;
-  const polygon::PlaneMinimum out =
-      polygon::minimise_on_planes(state.proxy_m, glm::dmat3(1.0), state.planes, 1e-9 * radius);
-  // Rigid half-spaces were gathered this far only. Too deep in tissue to see a way out, the way back is one;
-  // but not where it was deeper still, and is being pulled out.
-  if (out.feasible && glm::length(out.point - state.proxy_m) <= radius) {
-    state.proxy_m = out.point;
+  const auto least =
+      minimise_outside_rigid(world, state, state.proxy_m, polygon::Metric(glm::dmat3(1.0)),
+                             [&] { bounds = soft_bounds(world, state, state.proxy_m, false, state.planes); });
+  // Too deep in tissue to see a way out, the way back is one; but not where it was deeper still, and is being
+  // pulled out.
+  if (least.sure) {
+    state.proxy_m = least.minimum.point;
   } else if (deepest(state, bounds, before) <= deepest(state, bounds, state.proxy_m)) {
     state.proxy_m = before;
   }

@@ -64,6 +64,7 @@ SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice)
   pressed_last_.reserve(kMaxTouched);
   touched_before_.reserve(kMaxTouched);
   touched_voxels_.reserve(kMaxTouched);
+  touched_numbers_.reserve(kMaxTouched);
   sources_.reserve(surface.size());
   moves_.reserve(surface.size());
   held_voxels_.reserve(surface.size());
@@ -90,7 +91,8 @@ std::unique_ptr<SoftObject> SoftObject::copy() const {
   result->pair_load_.copy_from(pair_load_);
   for (const VoxelId v : held_voxels_) result->held_voxels_.push_back(v);
   for (const Touch& t : touches_) result->touches_.push_back(t);
-  for (const VoxelId v : touched_voxels_) result->touched_voxels_.push_back(v);
+  result->touched_voxels_.assign(touched_voxels_.begin(), touched_voxels_.end());
+  result->touched_numbers_.assign(touched_numbers_.begin(), touched_numbers_.end());
   result->moved_ever_ = moved_ever_;
   result->relaxation_.copy_from(relaxation_);
   if (relaxation_.left_to_another())
@@ -145,7 +147,7 @@ void SoftObject::touch(std::span<const VoxelId> near) noexcept {
     touched_before_.push_back(t);
     ++pressed;
   }
-  for (const VoxelId v : touched_voxels_) state_.set_role(v, resting_role(v));
+  for (const Touch& t : touches_) state_.set_role(t.v, resting_role_at(t.surface));
   // What the tool leaves behind springs back, however long it was at rest.
   for (const Touch& t : touches_) {
     if (t.pressed) relaxation_.stir(t.v / kRow);
@@ -155,7 +157,7 @@ void SoftObject::touch(std::span<const VoxelId> near) noexcept {
     if (touches_.size() == kMaxTouched) break;
     const bool kept = carried_mark_[v] != 0;
     if (kept) --pressed;
-    touches_.push_back({v, kept, lattice_->rest(v)});
+    touches_.push_back({v, lattice_->surface_number(v), kept, lattice_->rest(v)});
     if (!kept) continue;
     const Touch& before = touched_before_[carried_index_[v]];
     touches_.back().normal = before.normal;
@@ -163,17 +165,25 @@ void SoftObject::touch(std::span<const VoxelId> near) noexcept {
   }
   for (const VoxelId v : touched_voxels_) carried_mark_[v] = 0;
   touched_voxels_.clear();
-  for (const Touch& t : touches_) touched_voxels_.push_back(t.v);
+  touched_numbers_.clear();
+  for (const Touch& t : touches_) {
+    touched_voxels_.push_back(t.v);
+    touched_numbers_.push_back(t.surface);
+  }
   if (pressed > 0) relaxation_.wake();
   set_touch_roles();
 }
 
 Displacement::Role SoftObject::resting_role(VoxelId v) const noexcept {
   if (held_voxels_.empty() && obstacles_.empty()) return Displacement::free;
-  const std::uint32_t s = lattice_->surface_number(v);
-  if (pair_held_[s] != 0) return Displacement::held;
-  return obstacles_.empty() || obstacles_[s].normal == glm::vec3(0.0F) ? Displacement::free
-                                                                       : Displacement::obstacle;
+  return resting_role_at(lattice_->surface_number(v));
+}
+
+Displacement::Role SoftObject::resting_role_at(std::uint32_t surface) const noexcept {
+  if (held_voxels_.empty() && obstacles_.empty()) return Displacement::free;
+  if (pair_held_[surface] != 0) return Displacement::held;
+  return obstacles_.empty() || obstacles_[surface].normal == glm::vec3(0.0F) ? Displacement::free
+                                                                             : Displacement::obstacle;
 }
 
 // Only what carries load is kept from the background. A voxel that is merely near the tool must move with its
@@ -181,14 +191,14 @@ Displacement::Role SoftObject::resting_role(VoxelId v) const noexcept {
 // held).
 void SoftObject::set_touch_roles() noexcept {
   for (const Touch& t : touches_) {
-    const Displacement::Role resting = resting_role(t.v);
+    const Displacement::Role resting = resting_role_at(t.surface);
     if (!t.pressed || lattice_->anchored(t.v)) {
       state_.set_role(t.v, t.pressed ? Displacement::held : resting);
       continue;
     }
     // What the tool and something else hold is the contact solver's alone.
     state_.set_role(t.v, resting == Displacement::free ? Displacement::pressed : Displacement::held);
-    state_.tool_normal[lattice_->surface_number(t.v)] = glm::vec3(t.normal);
+    state_.tool_normal[t.surface] = glm::vec3(t.normal);
   }
 }
 
@@ -245,7 +255,8 @@ bool SoftObject::push_out(const ToolInBody& tool) noexcept {
 glm::dvec3 SoftObject::place_of(const ToolInBody& tool, Touch& t) noexcept {
   const glm::dvec3 rest = t.rest;
   glm::dvec3 wanted = link_minimum(relaxation_.couplings(), state_, t.v);
-  if (pair_held(t.v)) wanted += link_compliance(relaxation_.couplings(), t.v) * pair_load(t.v);
+  if (pair_held(t))
+    wanted += link_compliance(relaxation_.couplings(), t.v) * glm::dvec3(pair_load_[t.surface]);
   Gap g = gap(tool, rest + wanted);
   t.pressed = g.distance < 0.0;
   if (t.pressed) {
@@ -263,7 +274,7 @@ glm::dvec3 SoftObject::place_of(const ToolInBody& tool, Touch& t) noexcept {
     t.normal = g.normal;
   }
   if (obstacles_.empty()) return clamp_to_links(*lattice_, state_, t.v, wanted);
-  const Obstacle& o = obstacles_[lattice_->surface_number(t.v)];
+  const Obstacle& o = obstacles_[t.surface];
   const glm::dvec3 n(o.normal);
   const double depth = static_cast<double>(o.bound) - glm::dot(n, wanted);
   if (depth > 0.0 && n != glm::dvec3(0.0)) {
@@ -293,7 +304,7 @@ void SoftObject::relax_touch(const ToolInBody& tool, Touch& t) noexcept {
   // One that another soft object presses is its pair's. (Brought to where its links alone would have it, it
   // was a spacing deep in the other object whenever the force was measured, and the tool felt nothing of what
   // that carries: 0.31 N of 0.61.)
-  if (pair_held(t.v) && !t.pressed && clear_of(tool, position(t))) return;
+  if (pair_held(t) && !t.pressed && clear_of(tool, position(t))) return;
   glm::dvec3 place = place_of(tool, t);
   if (relaxation_.away() && was_pressed && t.pressed) {
     place -= t.left;
@@ -557,10 +568,10 @@ std::size_t SoftObject::memory_bytes() const {
   for (const auto& axis : state_.u) state += axis.resident_bytes();
   const std::size_t contact =
       resident_bytes(touches_) + resident_bytes(touched_before_) + resident_bytes(pressed_last_) +
-      resident_bytes(touched_voxels_) + resident_bytes(held_voxels_) + resident_bytes(all_held_) +
-      resident_bytes(sources_) + resident_bytes(moves_) + resident_bytes(roots_) + resident_bytes(carried_) +
-      resident_bytes(hanging_) + carried_mark_.resident_bytes() + carried_index_.resident_bytes() +
-      tight_rows_.memory_bytes() + drawn_rows_.memory_bytes();
+      resident_bytes(touched_voxels_) + resident_bytes(touched_numbers_) + resident_bytes(held_voxels_) +
+      resident_bytes(all_held_) + resident_bytes(sources_) + resident_bytes(moves_) + resident_bytes(roots_) +
+      resident_bytes(carried_) + resident_bytes(hanging_) + carried_mark_.resident_bytes() +
+      carried_index_.resident_bytes() + tight_rows_.memory_bytes() + drawn_rows_.memory_bytes();
   const std::size_t others = pair_held_.resident_bytes() + pair_load_.resident_bytes() +
                              resident_bytes(pair_roots_) + resident_bytes(hanging_on_pairs_) +
                              hanging_entry_.resident_bytes() + resident_bytes(obstacles_) +

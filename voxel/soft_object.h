@@ -164,10 +164,9 @@ class SoftObject {
   // Largest force left on any free voxel (N): what separates the state from equilibrium.
   [[nodiscard]] double residual_N() const { return relaxation_.residual_N(); }
   [[nodiscard]] const Relaxation& relaxation() const { return relaxation_; }
-  // Touched voxels of the last touch(), for the map to look at.
-  [[nodiscard]] std::span<const VoxelId> touched() const {
-    return {touched_voxels_.data(), touched_voxels_.size()};
-  }
+  // Touched voxels of the last touch(), for the map to look at, and their surface numbers.
+  [[nodiscard]] std::span<const VoxelId> touched() const { return touched_voxels_; }
+  [[nodiscard]] std::span<const std::uint32_t> touched_numbers() const { return touched_numbers_; }
   // Number of a surface voxel; kNoSurface for one inside.
   static constexpr std::uint32_t kNoSurface = Lattice::kNoSurface;
   [[nodiscard]] std::uint32_t surface_number(VoxelId v) const { return lattice_->surface_number(v); }
@@ -192,6 +191,7 @@ class SoftObject {
 
   struct Touch {
     VoxelId v;
+    std::uint32_t surface;   // its surface number, which takes a search to find
     bool pressed = false;    // carries load towards the tool
     glm::dvec3 rest{0.0};    // asked for several times a tick, and to find it takes two divisions
     glm::dvec3 normal{0.0};  // from tool to voxel, unit
@@ -224,9 +224,11 @@ class SoftObject {
   [[nodiscard]] bool clear_of(const ToolInBody& tool, const glm::dvec3& position) const noexcept;
   void settle_chain() noexcept;
   void note_moved(RowId row) noexcept;
-  [[nodiscard]] Displacement::Role resting_role(VoxelId v) const noexcept;  // when no tool presses it
-  [[nodiscard]] bool pair_held(VoxelId v) const {
-    return !held_voxels_.empty() && pair_held_[lattice_->surface_number(v)] != 0;
+  // When no tool presses; of a voxel, and of a surface number.
+  [[nodiscard]] Displacement::Role resting_role(VoxelId v) const noexcept;
+  [[nodiscard]] Displacement::Role resting_role_at(std::uint32_t surface) const noexcept;
+  [[nodiscard]] bool pair_held(const Touch& t) const {
+    return !held_voxels_.empty() && pair_held_[t.surface] != 0;
   }
   void set_touch_roles() noexcept;
   void give_away() noexcept;            // what pulls near the contact is somebody else's
@@ -270,8 +272,9 @@ class SoftObject {
   std::vector<VoxelId> pressed_last_;  // while any is pressed, and in the call in which the last is let go
   ToolInBody tool_;                    // as relax_near() last saw it
   std::vector<VoxelId> touched_voxels_;
-  LazyVector<VoxelId> held_voxels_;  // by pairs
-  LazyVector<VoxelId> all_held_;     // by the tool, too
+  std::vector<std::uint32_t> touched_numbers_;  // [as touched_voxels_] surface number
+  LazyVector<VoxelId> held_voxels_;             // by pairs
+  LazyVector<VoxelId> all_held_;                // by the tool, too
   LazyVector<VoxelId> sources_;
   LazyVector<glm::vec3> moves_;
   bool dragging_ = false;  // sources_ are what drag() moved, moves_ where they were
