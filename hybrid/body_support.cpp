@@ -143,7 +143,8 @@ double way_to_body(const voxel::SoftObject& object, std::uint32_t s, const Held&
 // What these press with: along its normal each what is pulled into the body by it. Tight links hand load from
 // voxel to voxel, across the normals as well, and of that only the sum is left: so what the sum then lacks is
 // shared among them, along their normals, as little of it to each as can be. (Added to each as it was booked
-// it turned a ball, which no surface without friction can.)
+// it turned a ball, which no surface without friction can.) Where limits and obstacles were found that
+// balance all, they press with that: the share above has no torque that a box could rest by.
 void add_pressing(const World& world, WorldState& state, std::uint32_t b, std::size_t o) noexcept {
   const voxel::SoftObject& object = *state.soft[o];
   const BesideBodies& beside = state.beside_bodies[o];
@@ -170,6 +171,13 @@ void add_pressing(const World& world, WorldState& state, std::uint32_t b, std::s
     contact.stiffness_N_per_m = kDamping * springs;
     contact.force_N =
         -glm::dot(held.normal, load.force_N) - springs * way_to_body(object, s, held, load.tight);
+    if (load.balanced) {
+      const bool presses = load.pressed_N > 0.0;
+      contact.force_N = presses ? load.pressed_N : -kDamping * springs * std::max(held.gap_m, 0.0);
+      contact.stiffness_N_per_m = (presses && load.tight ? kTightDamping : kDamping) * springs;
+      add_contact(state, contact);
+      continue;
+    }
     // What would not come to the body by itself begins to press where they meet, and no earlier.
     if (contact.force_N < 0.0) contact.force_N *= kDamping;
     if (load.tight && pressed(n, held.normal) > 0.0) {

@@ -35,6 +35,7 @@ glm::dvec3 link_compliance(Couplings& couplings, VoxelId v) noexcept;
 struct ObstacleView {
   std::span<const Obstacle> obstacles;  // by surface number; empty: none
   const Lattice* lattice = nullptr;     // whose surface numbers these are
+  std::size_t moving = 0;               // how many of them are of bodies that move
 
   [[nodiscard]] const Obstacle& of(VoxelId v) const { return obstacles[lattice->surface_number(v)]; }
 };

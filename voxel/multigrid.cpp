@@ -43,6 +43,8 @@ Multigrid::Multigrid(const Lattice& lattice) : lattice_(lattice), tiles_(lattice
   }
   for (int l = kWrittenAtOnce; l < levels(); ++l) prepare_level(l);
   hats_ = Hats(lattice.grid());
+  for (auto& axis : tied_) axis = LazyArray<float>(lattice.size());
+  row_tied_ = LazyArray<std::uint16_t>(lattice.grid().rows());
   stopped_.reserve(kMaxStopped);
   still_stopped_.reserve(kMaxStopped);
   refused_ = LazyArray<Refused>(std::min(kMostRefused, lattice.grid().rows()));
@@ -105,6 +107,17 @@ void Multigrid::stop_cells(VoxelId v, std::uint8_t bits) noexcept {
     mark(l, cell / kRow, limited);
     stopped_.push_back({static_cast<std::uint8_t>(l), cell});
   }
+}
+
+void Multigrid::tie(VoxelId v, const glm::vec3& force_N) noexcept {
+  const auto tied = [&] { return tied_[0][v] != 0.0F || tied_[1][v] != 0.0F || tied_[2][v] != 0.0F; };
+  const bool was = tied();
+  if (!was && force_N == glm::vec3(0.0F)) return;
+  for (int axis = 0; axis < 3; ++axis) tied_[static_cast<std::size_t>(axis)][v] = force_N[axis];
+  const bool is = tied();
+  if (was == is) return;
+  std::uint16_t& count = row_tied_[v / kRow];
+  count = static_cast<std::uint16_t>(is ? count + 1 : count - 1);
 }
 
 void Multigrid::release_limited() noexcept {
@@ -207,8 +220,10 @@ void Multigrid::keep_log() {
 std::size_t Multigrid::memory_bytes() const {
   std::size_t bytes = tiles_.memory_bytes() + log_.memory_bytes() + bricks_.memory_bytes() +
                       holds_->memory_bytes() + hats_.memory_bytes() + resident_bytes(stopped_) +
-                      resident_bytes(still_stopped_) + balance_number_.resident_bytes() +
-                      balance_.resident_bytes() + resident_bytes(balanced_) + refused_.resident_bytes();
+                      resident_bytes(still_stopped_) + row_tied_.resident_bytes() +
+                      balance_number_.resident_bytes() + balance_.resident_bytes() +
+                      resident_bytes(balanced_) + refused_.resident_bytes();
+  for (const auto& axis : tied_) bytes += axis.resident_bytes();
   for (const Level& l : levels_) {
     bytes += l.couplings->memory_bytes() + l.flags.resident_bytes() + l.stopped.resident_bytes();
     for (const auto* arrays : {&l.value, &l.told, &l.load, &l.loaded_at}) {

@@ -76,6 +76,9 @@ class Multigrid {
   void release_limited() noexcept;
   // The same, but for those in which a voxel is still pulled against the limit that holds it.
   void release_unlimited(const Displacement& state) noexcept;
+  // What links at their limits were found to pull a voxel by (N), until another is: so it balances what its
+  // springs pull by, and the cells above it stand.
+  void tie(VoxelId v, const glm::vec3& force_N) noexcept;
   // The voxels among them: `visit(v, axis)` for each axis on which a limit holds one.
   template <class Visit>
   void for_limited(const Visit& visit) const {
@@ -209,6 +212,7 @@ class Multigrid {
   void prepare_level(int level) noexcept;
   void spread(int level, RowId row, std::uint8_t flags) noexcept;
   void note_change(int level, RowId row, float change) noexcept;
+  void add_ties(RowId row, LevelRow& r, RowVector& loads) noexcept;
   void stop_cells(VoxelId v, std::uint8_t bits) noexcept;
   [[nodiscard]] LevelRow row_of(int level, RowId row, Displacement& state) noexcept;
   [[nodiscard]] LevelRow told_row(int level, RowId row) noexcept;
@@ -250,6 +254,8 @@ class Multigrid {
   std::unique_ptr<Holds> holds_;
   LazyVector<StoppedCell> stopped_;
   LazyVector<StoppedVoxel> still_stopped_;
+  std::array<LazyArray<float>, 3> tied_;  // [axis][v] (N)
+  LazyArray<std::uint16_t> row_tied_;     // [row] voxels that are
   LazyArray<Refused> refused_;
   std::size_t refused_count_ = 0;
   // Rows in which something balances what pulls: that and their own load (N), one beside the other. (At their

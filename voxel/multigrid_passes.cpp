@@ -140,10 +140,19 @@ void Multigrid::keep_balanced(float part, const Displacement& state) noexcept {
   }
 }
 
+void Multigrid::add_ties(RowId row, LevelRow& r, RowVector& loads) noexcept {
+  const std::size_t begin = static_cast<std::size_t>(row) * kRow;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (std::size_t i = 0; i < kRow; ++i)
+      loads[axis][i] = tied_[axis][begin + i] + (r.load[axis] == nullptr ? 0.0F : r.load[axis][i]);
+    r.load[axis] = loads[axis].data();
+  }
+}
+
 // What pulls the voxels, or cells, of a row that are free to follow.
 RowResidual Multigrid::residual_of(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
                                    OctetSpan span, RowVector& out) noexcept {
-  const LevelRow r = row_of(level, row, state);
+  LevelRow r = row_of(level, row, state);
   if (level > 0) {
     RowResidual found = residual_row(r, nullptr, 0.0F, span, out);
     if (holds_->tilted(level, row)) {
@@ -154,10 +163,21 @@ RowResidual Multigrid::residual_of(int level, RowId row, Displacement& state, co
   }
   const RowLimits limits = couplings().limits(row);
   const float tight = kTight * static_cast<float>(lattice_.min_spacing_m());
+  RowVector loads;
+  const bool ties = row_tied_[row] != 0;
+  if (ties) add_ties(row, r, loads);
   RowResidual found = residual_row(r, &limits, tight, span, out);
   if (state.row_obstacles[row] != 0 || state.row_standing[row] != 0 || holds_->supports(row)) {
     balance_contacts(row, state, obstacles, span, found, out);
     measure_row(r.springs, out, span, found);
+  }
+  for (std::size_t axis = 0; axis < 3 && ties; ++axis) {
+    const float* tied = tied_[axis].data() + static_cast<std::size_t>(row) * kRow;
+    for (std::size_t i = static_cast<std::size_t>(span.first) * kOctet;
+         i < static_cast<std::size_t>(span.last + 1) * kOctet; ++i) {
+      if (tied[i] != 0.0F)
+        stop_cells(static_cast<VoxelId>(row * kRow + i), static_cast<std::uint8_t>(1U << axis));
+    }
   }
   // What the chain holds is balanced by it. Passed on, its residual would drive the coarse levels against
   // links that do not give, and the sweeps after would undo it.

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "voxel/limited_region.h"
+
 namespace voxel {
 namespace {
 
@@ -35,12 +37,18 @@ constexpr int kLooksAtOnce = 256;  // tiles looked at for what coarse levels hav
 
 }  // namespace
 
-Relaxation::Relaxation(const Lattice& lattice) : lattice_(lattice), multigrid_(lattice), clusters_(lattice) {
+Relaxation::Relaxation(const Lattice& lattice)
+    : lattice_(lattice),
+      multigrid_(lattice),
+      clusters_(lattice),
+      limited_(std::make_unique<LimitedRegion>(lattice)) {
   set_tolerance(kMeasured * kRestingResidual * lattice.force_scale_N());
   farthest_m_ = kFarthest * static_cast<float>(lattice.max_spacing_m());
   boxes_.resize(static_cast<std::size_t>(multigrid_.levels()));
   standing_.reserve(lattice.surface().size());
 }
+
+Relaxation::~Relaxation() = default;
 
 void Relaxation::set_tolerance(double tolerance_N) noexcept {
   tolerance_N_ = tolerance_N;
@@ -240,6 +248,17 @@ std::uint64_t Relaxation::relax_tile(Displacement& state, const ObstacleView& ob
   return 2 * updates;
 }
 
+bool Relaxation::relax_limited(Displacement& state, const ObstacleView& obstacles,
+                               std::span<const VoxelId> on_body) noexcept {
+  if (on_body.empty()) {
+    limited_->pass(multigrid_);
+    return false;
+  }
+  const double most_N = limited_->relax(multigrid_, state, obstacles, on_body);
+  if (most_N > tolerance_N_) wake();
+  return limited_->found();
+}
+
 // What limits held in this round moves with what it pulls on; returns the largest force a voxel that did (N).
 // Which voxel is first goes round, so that all have their turn however few a round has time for.
 double Relaxation::move_clusters(Displacement& state, const ObstacleView& obstacles) noexcept {
@@ -292,12 +311,13 @@ void Relaxation::end_round(Displacement& state, const ObstacleView& obstacles, d
   // Beside a body something moves in every tick, so that each round is as the first, and there what is still
   // pulled against its limit stays held. (Let go of, coarse levels took it off the limit and back: under a
   // ball at rest by 0.03 spacings, for ever. Kept everywhere, tissue that jumped stayed far from rest.)
-  const bool beside_body = std::any_of(obstacles.obstacles.begin(), obstacles.obstacles.end(),
-                                       [](const Obstacle& o) { return o.moving; });
-  if (beside_body) {
+  if (obstacles.moving > 0) {
+    residual_N = std::max(residual_N, limited_->relax(multigrid_, state, obstacles, {}));
+    credit_ -= static_cast<std::int64_t>(limited_->looked_at());
     multigrid_.release_unlimited(state);
-  } else if (cycles_without_gain_ <= 1 || cycles_ % kLetGoEvery == 0) {
-    multigrid_.release_limited();
+  } else {
+    limited_->forget(multigrid_);
+    if (cycles_without_gain_ <= 1 || cycles_ % kLetGoEvery == 0) multigrid_.release_limited();
   }
   // Scattered voxels hold a cell harder than a patch of them does. A cycle that ends worse than it began says
   // so.
@@ -363,8 +383,8 @@ bool Relaxation::tile_waits_for_coarse(std::size_t number) const noexcept {
 }
 
 std::size_t Relaxation::memory_bytes() const {
-  return multigrid_.memory_bytes() + clusters_.memory_bytes() + boxes_.capacity() * sizeof(LevelBoxes) +
-         resident_bytes(standing_);
+  return multigrid_.memory_bytes() + clusters_.memory_bytes() + limited_->memory_bytes() +
+         boxes_.capacity() * sizeof(LevelBoxes) + resident_bytes(standing_);
 }
 
 }  // namespace voxel

@@ -16,6 +16,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -30,9 +31,12 @@ namespace voxel {
 // An object counts as at rest when no free voxel is pulled by more than this share of the force scale.
 inline constexpr double kRestingResidual = 1e-5;
 
+class LimitedRegion;
+
 class Relaxation {
  public:
   explicit Relaxation(const Lattice& lattice);
+  ~Relaxation();
 
   // Spends `budget` voxel updates, on average over many calls (a cycle is not cut), unless the object is at
   // rest; half of it where a contact was relaxed since the last call. Returns what it spent.
@@ -80,6 +84,11 @@ class Relaxation {
   // Voxels of a row (v / kRow) were moved by somebody else: it and the rows beside it are to be looked at.
   void stir(RowId row) noexcept { multigrid_.stir(0, row); }
   void stir_all() noexcept;
+  // Where links round voxels that lie on a body are at their limits: these and all round them go on towards
+  // their least energy. False: no link is.
+  bool relax_limited(Displacement& state, const ObstacleView& obstacles,
+                     std::span<const VoxelId> on_body) noexcept;
+  [[nodiscard]] const LimitedRegion& limited() const { return *limited_; }
   // Something moved: relax until the residual is below the tolerance again.
   void wake() noexcept {
     asleep_ = false;
@@ -190,6 +199,7 @@ class Relaxation {
   const Lattice& lattice_;
   Multigrid multigrid_;
   ClusterMoves clusters_;
+  std::unique_ptr<LimitedRegion> limited_;
   std::vector<LevelBoxes> boxes_;
   LazyVector<VoxelId> standing_;            // what the last cycle found held, on all axes
   std::int64_t credit_ = 0;                 // voxel updates that may be spent; negative: were spent too many

@@ -54,6 +54,7 @@ Replica::Replica(SoftObject& object)
       state_(object.state_),
       relaxation_(lattice_),
       obstacles_(object.obstacles_),
+      moving_obstacles_(object.moving_obstacles_),
       rows_kept_back_(lattice_.grid().rows()),
       kept_back_(lattice_.grid().rows()),
       distance_(lattice_.grid().rows()),
@@ -149,7 +150,9 @@ void Replica::open_given() noexcept {
     to.stir(0, row);
   }
   for (const GivenObstacle& given : given_obstacles_) {
-    obstacles_[given.surface_number] = given.obstacle;
+    Obstacle& o = obstacles_[given.surface_number];
+    moving_obstacles_ = moving_obstacles_ + (given.obstacle.moving ? 1 : 0) - (o.moving ? 1 : 0);
+    o = given.obstacle;
     to.stir(0, lattice_.surface()[given.surface_number] / kRow);
   }
   for (const GivenRole& given : given_roles_) state_.set_role(given.v, given.role);
@@ -191,7 +194,7 @@ void Replica::relax_quickly(const ObstacleView& obstacles) noexcept {
 
 void Replica::relax() noexcept {
   open_given();
-  const ObstacleView obstacles{obstacles_, &lattice_};
+  const ObstacleView obstacles{obstacles_, &lattice_, moving_obstacles_};
   was_quick_ = quick_ > 0;
   found_far_ = far_ > 0;
   if (found_far_) --far_;

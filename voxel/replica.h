@@ -209,6 +209,7 @@ class Replica {
   Displacement state_;
   Relaxation relaxation_;
   std::vector<Obstacle> obstacles_;
+  std::size_t moving_obstacles_ = 0;
   std::vector<VoxelId> held_;
   std::array<LazyArray<float>, 3> before_;  // [axis][voxel] what is here as the other state knows it
   std::size_t work_ = 0;

@@ -87,6 +87,7 @@ std::unique_ptr<SoftObject> SoftObject::copy() const {
   result->state_ = state_;
   if (!obstacles_.empty()) result->reserve_obstacles();
   result->obstacles_ = obstacles_;
+  result->moving_obstacles_ = moving_obstacles_;
   result->pair_held_ = pair_held_;
   result->pair_load_.copy_from(pair_load_);
   for (const VoxelId v : held_voxels_) result->held_voxels_.push_back(v);

@@ -46,6 +46,8 @@ struct HeldLoad {
   glm::dvec3 force_N{0.0};            // of its links, and of what hangs on it by tight links
   glm::dvec3 stiffness_N_per_m{0.0};  // per axis, of them all while the others stand still
   bool tight = false;                 // some tight link hands part of its load to or from another voxel
+  bool balanced = false;              // limits and obstacles were found that hold it and all round it …
+  double pressed_N = 0.0;             // … it with so much along its normal
 };
 
 // The tool's centre q must satisfy normal · q >= offset (body frame).
@@ -251,7 +253,7 @@ class SoftObject {
   void add_stiffness(int axis, std::span<HeldLoad> loads) noexcept;
   void hand_on(int axis) noexcept;
   void let_go_of_carried() noexcept;
-  [[nodiscard]] ObstacleView obstacle_view() const { return {obstacles_, lattice_.get()}; }
+  [[nodiscard]] ObstacleView obstacle_view() const { return {obstacles_, lattice_.get(), moving_obstacles_}; }
 
   std::shared_ptr<const Lattice> lattice_;
   Displacement state_;
@@ -263,6 +265,7 @@ class SoftObject {
   std::vector<HeldLoad> hanging_on_pairs_;  // [as pair_roots_]; empty: nothing hangs on any
   LazyArray<std::uint32_t> hanging_entry_;  // [surface number] 1 + index into these; 0: none
   std::vector<Obstacle> obstacles_;         // [surface number], empty when there is none
+  std::size_t moving_obstacles_ = 0;        // of them, those of bodies that move
   std::vector<RowId> moved_rows_;
   LazyArray<std::uint8_t> row_moved_;             // 1: among them; empty: no obstacles
   std::vector<std::uint32_t> changed_obstacles_;  // surface numbers, since a replica was last told

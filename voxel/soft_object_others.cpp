@@ -11,7 +11,9 @@ namespace voxel {
 
 void SoftObject::set_obstacle(std::size_t surface_number, const Obstacle& obstacle) noexcept {
   const VoxelId v = lattice_->surface()[surface_number];
-  obstacles_[surface_number] = obstacle;
+  Obstacle& o = obstacles_[surface_number];
+  moving_obstacles_ = moving_obstacles_ + (obstacle.moving ? 1 : 0) - (o.moving ? 1 : 0);
+  o = obstacle;
   if (!obstacle_changed_.empty() && obstacle_changed_[surface_number] == 0) {
     obstacle_changed_[surface_number] = 1;
     changed_obstacles_.push_back(static_cast<std::uint32_t>(surface_number));

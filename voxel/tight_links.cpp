@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include "voxel/limited_region.h"
 #include "voxel/links.h"
 #include "voxel/soft_object.h"
 
@@ -277,6 +278,17 @@ void SoftObject::load_held(std::span<const VoxelId> held, std::size_t pressed,
       if (carried_mark_[held[i]] != 0) loads[i].force_N[axis] = 0.0;
     }
     let_go_of_carried();
+  }
+  const bool tight = std::any_of(loads.begin(), loads.begin() + static_cast<std::ptrdiff_t>(pressed),
+                                 [](const HeldLoad& l) { return l.tight; });
+  // Asleep it presses as it did, or what rests on it would be roused.
+  const bool balanced =
+      asleep() ? tight && relaxation_.limited().found()
+               : relaxation_.relax_limited(state_, obstacle_view(), held.first(tight ? pressed : 0));
+  if (!balanced) return;
+  for (std::size_t i = 0; i < held.size(); ++i) {
+    loads[i].balanced = true;
+    loads[i].pressed_N = relaxation_.limited().pressed_N(held[i]);
   }
 }
 
