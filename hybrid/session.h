@@ -115,7 +115,8 @@ std::unique_ptr<WorldState> copy_state(const World& world, const WorldState& sta
 
 // The force that the present device position would be answered with once everything soft has come to rest
 // (N), found on a copy of the state, until it changes by less than `tolerance_N` over dozens of whole
-// relaxation cycles; bodies that move stand still meanwhile. Empty when it does not settle.
+// relaxation cycles, and the anchors carry it; bodies that move stand still meanwhile. Empty when it does not
+// settle.
 std::optional<glm::dvec3> equilibrium_force(const World& world, const WorldState& state,
                                             double tolerance_N = 1e-4);
 

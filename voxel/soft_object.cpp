@@ -2,6 +2,7 @@
 #include "voxel/soft_object.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
@@ -542,6 +543,32 @@ double SoftObject::energy_J() const noexcept {
     }
   }
   return energy;
+}
+
+std::optional<glm::dvec3> SoftObject::carried_by_anchors_N() const noexcept {
+  constexpr float kTight = 1e-4F;  // of the spacing: nearer to its limit than this a link is at it
+  const float tight_m = kTight * static_cast<float>(lattice_->min_spacing_m());
+  glm::dvec3 carried(0.0);
+  for (RowId row = 0; row < lattice_->grid().rows(); ++row) {
+    for (std::uint32_t lanes = lattice_->anchored_lanes(row); lanes != 0; lanes &= lanes - 1) {
+      const VoxelId v = row * kRow + static_cast<VoxelId>(std::countr_zero(lanes));
+      for (int d = 0; d < 3; ++d) {
+        for (const bool up : {false, true}) {
+          const VoxelId w = up ? lattice_->up(v, d) : lattice_->down(v, d);
+          if (!lattice_->filled(w) || lattice_->anchored(w)) continue;
+          const VoxelId from = up ? v : w;
+          const Spring spring = lattice_->spring(from, d);
+          for (int axis = 0; axis < 3; ++axis) {
+            const float u = state_.u[static_cast<std::size_t>(axis)][w], longer = up ? u : -u;
+            const auto bounds = lattice_->bounds(from, d, axis);
+            if (longer < bounds[0] + tight_m || longer > bounds[1] - tight_m) return std::nullopt;
+            carried[axis] += static_cast<double>(spring.on(axis, d)) * static_cast<double>(u);
+          }
+        }
+      }
+    }
+  }
+  return carried;
 }
 
 bool SoftObject::settle(const ToolInBody& tool, double tolerance_N, int max_cycles) noexcept {

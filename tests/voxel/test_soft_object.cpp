@@ -67,6 +67,32 @@ TEST(SoftObject, TheTightChainIsFelt) {
   std::cout << "largest difference " << 100 * worst << " %\n";
 }
 
+// At rest, and not before: an object that is calm in between is told apart by it.
+TEST(SoftObject, AnchorsCarryWhatIsFelt) {
+  for (const LinkMaterial& material : {elastic(1e4, 0.3), kFirm}) {
+    SoftBlock soft({25, 25, 17}, kH, material);
+    const double range = 8 * kH;
+    for (const double depth : {0.3, 0.6}) {
+      const double felt = soft.press(soft.ball(5 * kH, depth * kH), range).force_N.z;
+      const auto carried = soft.object->carried_by_anchors_N();
+      ASSERT_TRUE(carried.has_value());
+      EXPECT_NEAR(-carried->z, felt, 5e-3 * felt) << depth;
+      EXPECT_LT(glm::length(glm::dvec2(*carried)), 1e-3 * felt);
+    }
+    const double on_its_way = soft.press(soft.ball(5 * kH, 1.2 * kH), range, 0.0, 1).force_N.z;
+    const auto carried = soft.object->carried_by_anchors_N();
+    ASSERT_TRUE(carried.has_value());
+    EXPECT_GT(std::abs(on_its_way + carried->z), 0.05 * on_its_way);
+  }
+}
+
+// A link to an anchor at its limit carries what its spring does not say.
+TEST(SoftObject, WhatTightAnchorsCarryIsNotSaid) {
+  SoftBlock soft({15, 15, 3}, kH, kFirm);
+  soft.press(soft.ball(4 * kH, 0.6 * kH), 8 * kH);
+  EXPECT_FALSE(soft.object->carried_by_anchors_N().has_value());
+}
+
 TEST(SoftObject, NoWorkIsDoneAroundAClosedPath) {
   SoftBlock soft({27, 27, 17}, kH, elastic(1e4, 0.3));
   const double side = 1.0 * kH;
