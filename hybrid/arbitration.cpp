@@ -36,7 +36,7 @@ constexpr int kPairSweeps = 2;
 // Rounds in which an object that the tool does not press gives way alone, and to how much of an overlap, in
 // touching distances: at rest. (To any, a tool at 1 m/s drove one object half a spacing into the other.)
 constexpr int kFirstGive = 2;
-constexpr double kGivesAlone = 0.2;
+constexpr double kGivesAlone = 0.1;
 
 struct NearestRigid {
   glm::dvec3 normal{0.0};  // away from the surface, scene frame, unit
