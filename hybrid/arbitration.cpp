@@ -36,7 +36,7 @@ constexpr int kPairSweeps = 2;
 // Rounds in which an object that the tool does not press gives way alone, and to how much of an overlap, in
 // touching distances: at rest. (To any, a tool at 1 m/s drove one object half a spacing into the other.)
 constexpr int kFirstGive = 2;
-constexpr double kGivesAlone = 0.05;
+constexpr double kGivesAlone = 0.1;
 
 struct NearestRigid {
   glm::dvec3 normal{0.0};  // away from the surface, scene frame, unit
@@ -297,24 +297,53 @@ void find_pairs(const World& world, WorldState& state, std::uint32_t meeting) no
       state.faults |= fault_pair_overflow;
       return;
     }
-    state.pairs.push_back({meeting, pressed, s, false});
+    state.pairs.push_back({.meeting = meeting, .pressed = pressed, .surface_a = s});
     state.paired[meeting][s] = 1;
   }
 }
 
-// Voxels moved over one another: the pair looks for its facet again. Returns the gap, in touching distances.
+// That which it is over last, so that this holds, whatever the others asked for.
+template <class Pair, class Visit>
+void for_facets(Pair& pair, const Visit& visit) noexcept {
+  for (std::size_t i = 0; i < pair.besides; ++i) visit(pair.beside[i]);
+  visit(pair.pressed);
+}
+
+// Facets that it pressed before, and lies on still, press as they did; what it left gives its force to the
+// one that it is over.
+void keep_facets(const voxel::PosedObject& a, const voxel::PosedObject& b, const VoxelPair& before,
+                 VoxelPair& now) noexcept {
+  now.besides = 0;
+  now.pressed.force_N = glm::dvec3(0.0);
+  const auto keep = [&](const voxel::PressedPair& was) {
+    voxel::PressedPair beside = was;
+    if (was.force_N != glm::dvec3(0.0) && now.besides < now.beside.size() &&
+        voxel::lies_beside(a, b, now.pressed, beside)) {
+      now.beside[now.besides++] = beside;
+    } else {
+      now.pressed.force_N += was.force_N;
+    }
+  };
+  keep(before.pressed);
+  for (std::size_t i = 0; i < before.besides; ++i) keep(before.beside[i]);
+}
+
+// Voxels moved over one another: the pair looks for its facets again. Returns the gap, in touching distances.
 double renew_pair(const World& world, WorldState& state, VoxelPair& pair) noexcept {
   return with_objects(world, state, pair.meeting, [&](const auto& a, const auto& b) {
-    const voxel::PressedPair before = pair.pressed;
+    const VoxelPair before = pair;
     voxel::find_facet(a, b, pair.pressed);
     const double gap = voxel::gap_of_pair(a, b, pair.pressed) / pair.pressed.reach_m;
-    const bool hold = gap < (pair.held ? kLetGoAt : kHoldAt);
-    const bool same = pair.held && hold && before.facet == pair.pressed.facet;
+    pair.held = gap < (before.held ? kLetGoAt : kHoldAt);
     // Before the old ones are let go of: what is in both stays held.
-    if (hold && !same) voxel::hold_pair(a, b, pair.pressed);
-    if (pair.held && !same) voxel::release_pair(a, b, before);
-    if (!hold) pair.pressed.force_N = glm::dvec3(0.0);
-    pair.held = hold;
+    if (pair.held) {
+      keep_facets(a, b, before, pair);
+      for_facets(pair, [&](const voxel::PressedPair& p) { voxel::hold_pair(a, b, p); });
+    } else {
+      pair.besides = 0;
+      pair.pressed.force_N = glm::dvec3(0.0);
+    }
+    if (before.held) for_facets(before, [&](const voxel::PressedPair& p) { voxel::release_pair(a, b, p); });
     return gap;
   });
 }
@@ -341,6 +370,17 @@ void renew_pairs(const World& world, WorldState& state) noexcept {
     state.paired[pair.meeting][pair.surface_a] = 0;
     pair = state.pairs.back();
     state.pairs.pop_back();
+  }
+}
+
+// What a sweep took over the edge of its facet meets the next one in the next sweep.
+void follow_over_edges(const World& world, WorldState& state) noexcept {
+  for (VoxelPair& pair : state.pairs) {
+    const bool left =
+        pair.held && with_objects(world, state, pair.meeting, [&](const auto& a, const auto& b) {
+          return voxel::left_facet(a, b, pair.pressed);
+        });
+    if (left) renew_pair(world, state, pair);
   }
 }
 
@@ -394,8 +434,9 @@ void relax_pairs(const World& world, WorldState& state) noexcept {
   const auto for_pairs = [&](const auto& visit) {
     for (VoxelPair& pair : state.pairs) {
       if (!pair.held) continue;
-      with_objects(world, state, pair.meeting,
-                   [&](const auto& a, const auto& b) { visit(a, b, pair.pressed); });
+      with_objects(world, state, pair.meeting, [&](const auto& a, const auto& b) {
+        for_facets(pair, [&](voxel::PressedPair& p) { visit(a, b, p); });
+      });
     }
   };
   const auto load = [&] {
@@ -411,7 +452,13 @@ void relax_pairs(const World& world, WorldState& state) noexcept {
       state.soft[o]->forget_hanging_on_pairs();
     }
   }
-  for (int sweep = 0; sweep < kPairSweeps; ++sweep) for_pairs(voxel::relax_pair);
+  for (int sweep = 0; sweep < kPairSweeps; ++sweep) {
+    if (sweep > 0) {
+      follow_over_edges(world, state);
+      load();
+    }
+    for_pairs(voxel::relax_pair);
+  }
   part_pairs(world, state);
   load();  // by the facets as they now are
 }

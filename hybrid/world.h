@@ -127,8 +127,11 @@ inline bool is_free(const World& world, std::uint32_t rigid) noexcept {
 
 // A surface voxel of one soft object, and the other's surface that it presses on.
 struct VoxelPair {
-  std::uint32_t meeting = 0;  // index into World::meeting
-  voxel::PressedPair pressed;
+  std::uint32_t meeting = 0;   // index into World::meeting
+  voxel::PressedPair pressed;  // the facet that the voxel is over
+  // Others that it lies on as well, in a hollow; see voxel::lies_beside().
+  std::array<voxel::PressedPair, 2> beside{};
+  std::size_t besides = 0;
   std::uint32_t surface_a = 0;
   bool held = false;  // near enough to press: its voxels are moved with it, and by nobody else
 };

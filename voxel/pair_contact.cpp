@@ -14,8 +14,11 @@ constexpr double kLeastAlong =
     0.3;  // of a facet's normal along the axis: a steeper one is pressed as a level one
 // Of the touching distance: a voxel further beside the last facet of a surface than this is past its edge.
 constexpr double kBeside = 0.75;
-constexpr double kPushed = 1e-6;   // of it: roundings
-constexpr double kParted = 0.01;   // of it: less overlap is left to the next tick
+constexpr double kPushed = 1e-6;  // of it: roundings
+constexpr double kParted = 0.01;  // of it: less overlap is left to the next tick
+// Of it: where a surface rises less towards a voxel, on a facet's middle, it is no hollow. How far beside a
+// facet (barycentric) one may be that still lies on it.
+constexpr double kHollow = 0.005, kFarBeside = 0.5;
 constexpr int kSteps = 4;          // over the surface, in search of the facet
 constexpr double kInside = -1e-9;  // barycentric
 constexpr VoxelId kNone = std::numeric_limits<VoxelId>::max();
@@ -206,6 +209,38 @@ void push_the_rest(const PosedObject& a, const PosedObject& b, PressedPair& pair
   }
 }
 
+bool is_facet(const PressedPair& pair) noexcept {
+  return pair.over && pair.facet[0] != pair.facet[1];
+}
+
+// Of its facet where the voxel is now; false where that is over none, or another.
+bool shares_of(const PosedObject& a, const PosedObject& b, const PressedPair& pair,
+               std::array<double, 3>& out) noexcept {
+  if (!is_facet(pair)) return false;
+  const Surface surface{b.object, pair.axis, pair.upwards};
+  std::array<glm::dvec2, 3> at;
+  for (std::size_t i = 0; i < 3; ++i) at[i] = surface.flat(b.object.position(pair.facet[i]));
+  return shares(at, surface.flat(to_body(b, place_of(a, pair.a))), out);
+}
+
+// What follows from its facet and its shares of it, as both objects are now.
+void lie_on_facet(const PosedObject& a, const PosedObject& b, PressedPair& pair) noexcept {
+  std::array<glm::dvec3, 3> at, rest;
+  for (std::size_t i = 0; i < 3; ++i) {
+    at[i] = b.object.position(pair.facet[i]);
+    rest[i] = b.object.lattice().rest(pair.facet[i]);
+    pair.share[i] = std::clamp(pair.share[i], 0.0, 1.0);
+  }
+  // Along the axis two oblique surfaces that touch are further apart than across themselves.
+  const double apart = a.object.voxel_radius() + b.object.voxel_radius();
+  glm::dvec3 at_rest, across(0.0);
+  pair.reach_m = apart / std::max(normal_of(rest, pair.axis, !pair.upwards, at_rest), kLeastAlong);
+  normal_of(at, pair.axis, !pair.upwards, across);
+  const auto most = std::max_element(pair.share.begin(), pair.share.end());
+  pair.b = pair.facet[static_cast<std::size_t>(most - pair.share.begin())];
+  pair.across = b.pose.rotation * across;
+}
+
 }  // namespace
 
 PressedPair pair_of(const PosedObject& a, VoxelId in_a, const PosedObject& b, VoxelId in_b) noexcept {
@@ -254,28 +289,40 @@ void find_facet(const PosedObject& a, const PosedObject& b, PressedPair& pair) n
     pair.b = next;
   }
   const double apart = a.object.voxel_radius() + b.object.voxel_radius();
-  pair.reach_m = apart;
   pair.over = found || nearest <= kBeside * kBeside * apart * apart;
+  if (found) {
+    lie_on_facet(a, b, pair);
+    return;
+  }
+  pair.reach_m = apart;
+  pair.facet = {pair.b, pair.b, pair.b};
+  pair.share = {1.0, 0.0, 0.0};
   glm::dvec3 across(0.0);
   across[pair.axis] = pair.upwards ? -1.0 : 1.0;
-  if (found) {
-    std::array<glm::dvec3, 3> at, rest;
-    for (std::size_t i = 0; i < 3; ++i) {
-      at[i] = b.object.position(pair.facet[i]);
-      rest[i] = b.object.lattice().rest(pair.facet[i]);
-      pair.share[i] = std::clamp(pair.share[i], 0.0, 1.0);
-    }
-    // Along the axis two oblique surfaces that touch are further apart than across themselves.
-    glm::dvec3 at_rest;
-    pair.reach_m = apart / std::max(normal_of(rest, pair.axis, !pair.upwards, at_rest), kLeastAlong);
-    normal_of(at, pair.axis, !pair.upwards, across);
-    const auto most = std::max_element(pair.share.begin(), pair.share.end());
-    pair.b = pair.facet[static_cast<std::size_t>(most - pair.share.begin())];
-  } else {
-    pair.facet = {pair.b, pair.b, pair.b};
-    pair.share = {1.0, 0.0, 0.0};
-  }
   pair.across = b.pose.rotation * across;
+}
+
+bool left_facet(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept {
+  std::array<double, 3> share;
+  return !shares_of(a, b, pair, share);
+}
+
+bool lies_beside(const PosedObject& a, const PosedObject& b, const PressedPair& pair,
+                 PressedPair& beside) noexcept {
+  if (!is_facet(pair) || !is_facet(beside) || beside.facet == pair.facet) return false;
+  glm::dvec3 centre(0.0);
+  for (const VoxelId v : beside.facet) centre += place_of(b, v) / 3.0;
+  if (glm::dot(middle(b, pair) - centre, pair.across) < kHollow * pair.reach_m) return false;
+  shares_of(a, b, beside, beside.share);
+  double sum = 0.0;
+  for (double& share : beside.share) {
+    if (!(share > -kFarBeside)) return false;
+    share = std::max(share, 0.0);
+    sum += share;
+  }
+  for (double& share : beside.share) share /= sum;
+  lie_on_facet(a, b, beside);
+  return gap_of_pair(a, b, beside) >= gap_of_pair(a, b, pair) - kPushed * pair.reach_m;
 }
 
 double gap_of_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept {
@@ -329,7 +376,8 @@ double relax_pair(const PosedObject& a, const PosedObject& b, PressedPair& pair)
   }
   place(a, pair.a, first.free_place);
   for_corners(pair, [&](VoxelId v, double, std::size_t i) { place(b, v, corners[i].free_place); });
-  if (overlap > 0.0) push_the_rest(a, b, pair, of_first.along, of_facet);
+  // Also where links at their limits keep them from getting where they would not overlap.
+  if (pair.over) push_the_rest(a, b, pair, of_first.along, of_facet);
   return gap_of_pair(a, b, pair);
 }
 

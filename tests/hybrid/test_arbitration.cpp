@@ -324,10 +324,9 @@ Scenario of_bricks(Scenario scenario) {
   // sideways.
   if (std::string_view(scenario.name) == "TissueOnARidge") scenario.balance = 0.08;
   if (std::string_view(scenario.name) == "TissueOnTissue") {
-    // With both objects' links at their limits the force swings by a tenth from tick to tick, 16 % off, and
-    // at 1 m/s they go into one another by a third of a spacing.
-    scenario.holds_mm.clear();
-    scenario.strokes.clear();
+    // With both objects' links at their limits the force swings from tick to tick: on average by 0.5 % off at
+    // z = 7, in single ticks by 43 %, and more below.
+    scenario.holds_mm.resize(1);
   }
   return scenario;
 }
