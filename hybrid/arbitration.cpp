@@ -331,10 +331,14 @@ void keep_facets(const voxel::PosedObject& a, const voxel::PosedObject& b, const
 // Voxels moved over one another: the pair looks for its facets again. Returns the gap, in touching distances.
 double renew_pair(const World& world, WorldState& state, VoxelPair& pair) noexcept {
   return with_objects(world, state, pair.meeting, [&](const auto& a, const auto& b) {
-    const VoxelPair before = pair;
+    const voxel::PressedPair pressed = pair.pressed;
     voxel::find_facet(a, b, pair.pressed);
     const double gap = voxel::gap_of_pair(a, b, pair.pressed) / pair.pressed.reach_m;
-    pair.held = gap < (before.held ? kLetGoAt : kHoldAt);
+    const bool held = gap < (pair.held ? kLetGoAt : kHoldAt);
+    if (held == pair.held && pair.besides == 0 && (!held || pressed.facet == pair.pressed.facet)) return gap;
+    VoxelPair before = pair;
+    before.pressed = pressed;
+    pair.held = held;
     // Before the old ones are let go of: what is in both stays held.
     if (pair.held) {
       keep_facets(a, b, before, pair);
@@ -374,14 +378,19 @@ void renew_pairs(const World& world, WorldState& state) noexcept {
 }
 
 // What a sweep took over the edge of its facet meets the next one in the next sweep.
-void follow_over_edges(const World& world, WorldState& state) noexcept {
+// False: none was.
+bool follow_over_edges(const World& world, WorldState& state) noexcept {
+  bool any = false;
   for (VoxelPair& pair : state.pairs) {
     const bool left =
         pair.held && with_objects(world, state, pair.meeting, [&](const auto& a, const auto& b) {
           return voxel::left_facet(a, b, pair.pressed);
         });
-    if (left) renew_pair(world, state, pair);
+    if (!left) continue;
+    renew_pair(world, state, pair);
+    any = true;
   }
+  return any;
 }
 
 // An object that the tool presses is held by it where its chain is tight, so the other one gives way.
@@ -453,10 +462,7 @@ void relax_pairs(const World& world, WorldState& state) noexcept {
     }
   }
   for (int sweep = 0; sweep < kPairSweeps; ++sweep) {
-    if (sweep > 0) {
-      follow_over_edges(world, state);
-      load();
-    }
+    if (sweep > 0 && follow_over_edges(world, state)) load();
     for_pairs(voxel::relax_pair);
   }
   part_pairs(world, state);

@@ -194,7 +194,8 @@ void push_the_rest(const PosedObject& a, const PosedObject& b, PressedPair& pair
                    double yielding_b) noexcept {
   const double least = kPushed * pair.reach_m;
   const double left = overlap_of(a, b, pair);
-  if (left > least && yielding_b > 0.0) {
+  if (left <= least) return;
+  if (yielding_b > 0.0) {
     for_corners(pair, [&](VoxelId v, double share, std::size_t) {
       const glm::dvec3 way = yielding(b, compliance_of(b, v), pair.across).way;
       b.object.move(v, b.object.state().at(v) + (share * left / yielding_b) * way);
