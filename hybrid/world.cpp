@@ -58,6 +58,7 @@ void WorldState::prepare_beside_bodies(const World& world) {
   body_moved_m.assign(world.rigid.size(), 0.0);
   std::size_t most = 0;
   for (const auto& object : soft) {
+    object->prepare_beside_bodies();
     const std::size_t count = object->lattice().surface().size();
     most = std::max(most, count);
     BesideBodies beside;

@@ -38,12 +38,28 @@ LimitedRegion::LimitedRegion(const Lattice& lattice)
       spacing_m_(lattice.min_spacing_m()),
       number_(lattice.size()),
       asked_(lattice.size()) {
+  const std::size_t most = std::min(4 * kMost, lattice.voxel_count());
   on_body_.reserve(kMost);
-  members_.reserve(4 * kMost);
-  links_.reserve(3 * 4 * kMost);
-  known_.reserve(kMostKnown);
+  members_.reserve(most);
+  links_.reserve(3 * most);
+  known_.reserve(std::min(kMostKnown, lattice.voxel_count()));
   for (auto& of_axis : beyond_) of_axis = LazyArray<float>(lattice.size());
   for (auto& of_axis : pressed_) of_axis = LazyArray<float>(lattice.size());
+}
+
+void LimitedRegion::prepare_all() {
+  const auto fill = [](auto& list) {
+    list.resize(list.capacity());
+    list.clear();
+  };
+  fill(on_body_);
+  fill(members_);
+  fill(links_);
+  fill(known_);
+  number_.populate();
+  asked_.populate();
+  for (auto& of_axis : beyond_) of_axis.populate();
+  for (auto& of_axis : pressed_) of_axis.populate();
 }
 
 std::uint32_t LimitedRegion::add(VoxelId v) noexcept {

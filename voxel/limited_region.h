@@ -32,6 +32,8 @@ namespace voxel {
 class LimitedRegion {
  public:
   explicit LimitedRegion(const Lattice& lattice);
+  // All its memory now, which else comes where a body first goes.
+  void prepare_all();
 
   // Voxels round those that limits hold, or that lie `on_body`, and on from there along links at their
   // limits, go on towards their least energy. Empty: those that lay on a body the last time, and for longer.

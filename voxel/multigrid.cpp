@@ -75,6 +75,11 @@ void Multigrid::prepare_all() noexcept {
   holds_->prepare_all();
 }
 
+void Multigrid::prepare_tied() noexcept {
+  for (auto& axis : tied_) axis.populate();
+  row_tied_.populate();
+}
+
 // Marks a row and the rows beside it.
 void Multigrid::spread(int level, RowId row, std::uint8_t flags) noexcept {
   if (all_visited_) return;

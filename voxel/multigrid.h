@@ -175,6 +175,7 @@ class Multigrid {
   void add(RowId row, const RowVector& way, Displacement& state, const ObstacleView& obstacles) noexcept;
   // Finds all springs and takes all memory now, not when a tick first needs them.
   void prepare_all() noexcept;
+  void prepare_tied() noexcept;  // what tie() writes to
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:

@@ -50,6 +50,11 @@ Relaxation::Relaxation(const Lattice& lattice)
 
 Relaxation::~Relaxation() = default;
 
+void Relaxation::prepare_beside_bodies() {
+  multigrid_.prepare_tied();
+  limited_->prepare_all();
+}
+
 void Relaxation::set_tolerance(double tolerance_N) noexcept {
   tolerance_N_ = tolerance_N;
   // A motion below this changes no force by more than the tolerance.

@@ -136,6 +136,7 @@ class Relaxation {
   // Cycles over all that moves.
   [[nodiscard]] std::uint64_t cycles() const { return cycles_; }
   void prepare_all() noexcept { multigrid_.prepare_all(); }
+  void prepare_beside_bodies();  // that move
   // Starts in the same state as `other`, of the same lattice …
   void copy_from(const Relaxation& other) noexcept;
   // … which was left to another, so that its coarse cells know next to nothing: they are found anew.

@@ -79,6 +79,7 @@ Replica::Replica(SoftObject& object)
   if (lattice_.voxel_count() >= SoftObject::kPreparedWhole) return;
   relaxation_.prepare_all();
   object.relaxation_.prepare_all();
+  if (object.beside_bodies_) relaxation_.prepare_beside_bodies();
   const std::vector<bool> rows = relaxation_.couplings().rows_in_use();
   state_.populate(rows);
   for (auto& axis : before_) axis.populate(kRow, rows);

@@ -111,6 +111,8 @@ class SoftObject {
 
   // Before the first set_obstacle(); allocates.
   void reserve_obstacles();
+  // Some of them will move: all memory that this takes, now. Before a Replica is made; allocates.
+  void prepare_beside_bodies();
   // A rigid surface near surface voxel number s (index into lattice().surface()); a zero normal: none any
   // more.
   void set_obstacle(std::size_t surface_number, const Obstacle& obstacle) noexcept;
@@ -301,6 +303,7 @@ class SoftObject {
   bool rests_ = false;        // none of them is begun now, if that can wait
   double unsettled_m_ = 0.0;  // how far the contact may be from the rest of the object
   bool moved_ever_ = false;
+  bool beside_bodies_ = false;  // that move
 };
 
 }  // namespace voxel

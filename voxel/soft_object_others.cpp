@@ -49,6 +49,11 @@ void SoftObject::reserve_obstacles() {
   row_moved_ = LazyArray<std::uint8_t>(lattice_->grid().rows());
 }
 
+void SoftObject::prepare_beside_bodies() {
+  beside_bodies_ = true;
+  if (lattice_->voxel_count() < kPreparedWhole) relaxation_.prepare_beside_bodies();
+}
+
 void SoftObject::hold(VoxelId v) noexcept {
   const std::uint32_t s = lattice_->surface_number(v);
   if (pair_held_[s] == std::numeric_limits<std::uint16_t>::max() || pair_held_[s]++ != 0) return;
