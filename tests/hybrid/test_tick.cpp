@@ -424,6 +424,31 @@ TEST_F(Tick, AToolOnRowsThatStandOnAnchorsIsNoWedge) {
   }
 }
 
+// Beside a surface of many small triangles, too: there are more of them near the tool than a tick looks at,
+// and it is stopped as beside the same surface of two.
+TEST_F(Tick, AToolOnRowsThatStandOnAnchorsIsStoppedBesideAFineMeshAsBesideACoarseOne) {
+  std::array<TickResult, 2> pressed;
+  for (std::size_t fine = 0; fine < 2; ++fine) {
+    polygon::save_ply(folder_ / "wall.ply", polygon::make_plane_mesh(0.015, fine == 1 ? 150 : 1));
+    Touch touch(
+        load("format = 1\n[tool]\nradius = 3\nstiffness = 1000\n" + tests::unlimited +
+             "[[rigid]]\nname = \"wall\"\nmesh = \"wall.ply\"\nunit = \"m\"\nposition = [21, 0, 10]\n"
+             "rotation = [0, 90, 0]\n"
+             "[material.gel]\nyoung = 8000\nstretch = [0.99, 1.01]\nshear = 0.6\n[[soft]]\nname = \"block\"\n"
+             "formula = \"block\"\nsize = [40, 40, 20]\nspacing = 2\nposition = [0, 0, 0]\n"
+             "material = \"gel\"\n" +
+             tests::some_path),
+        {0.017, 1e-3, 0.0135});
+    pressed[fine] = touch.go({0.0175, 1e-3, 0.0105}, 1.5e-4, 200);
+    EXPECT_EQ(touch.state().faults, 0U);
+  }
+  std::printf("beside two triangles %.4f N, beside 45,000 %.4f N\n", glm::length(coupling(pressed[0])),
+              glm::length(coupling(pressed[1])));
+  EXPECT_GT(coupling(pressed[0]).z, 1.5);
+  EXPECT_LE(glm::length(coupling(pressed[1]) - coupling(pressed[0])),
+            0.01 * glm::length(coupling(pressed[0])));
+}
+
 // A punch has no sides: one that is drawn against such rows from aside suddenly has some far above its face,
 // that cannot go where it would push them. They stop it there, and do not lift it: nobody paid for that.
 TEST_F(Tick, APunchDrawnAgainstRowsThatStandOnAnchorsIsStoppedAndNotLifted) {
