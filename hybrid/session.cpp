@@ -257,8 +257,7 @@ class Run {
   TimeSpread late_us_;
   std::chrono::steady_clock::time_point said_ = std::chrono::steady_clock::now();
   std::uint64_t clearance_every_ = 1;
-  std::uint64_t ticks_ = 0, ticks_done_ = 0, sample_every_ = 0, soft_ticks_ = 0,
-                hash_ = kHashBegin;
+  std::uint64_t ticks_ = 0, ticks_done_ = 0, sample_every_ = 0, soft_ticks_ = 0, hash_ = kHashBegin;
   double sum_force2_ = 0.0, best_ = 0.0;
   SessionResult result_;
 };
@@ -368,9 +367,9 @@ std::unique_ptr<WorldState> copy_state(const World& world, const WorldState& sta
 namespace {
 
 // Do anchors carry what is felt of each object that nothing but the tool presses? Far from rest an object may
-// be calm: with links at their limits all about a deep push, nothing moves from one cycle to the next, and half
-// of what presses has not reached the anchors, or is not felt. (Of a cube of 257 voxels an edge, 16 spacings
-// deep, 8.9 N were felt for good where 15.8 are right.)
+// be calm: with links at their limits all about a deep push, nothing moves from one cycle to the next, and
+// half of what presses has not reached the anchors, or is not felt. (Of a cube of 257 voxels an edge, 16
+// spacings deep, 8.9 N were felt for good where 15.8 are right.)
 bool carried_by_anchors(const World& world, const WorldState& state) noexcept {
   constexpr double kShare = 0.01, kLeast_N = 1e-3;
   if (!world.meeting.empty()) return true;

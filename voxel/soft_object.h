@@ -180,8 +180,9 @@ class SoftObject {
   // near.
   [[nodiscard]] glm::dvec3 displacement_at(const glm::dvec3& rest_point) const noexcept;
 
-  // What its springs pull the anchors with (N, body frame): at rest, what presses it, whether or not links are
-  // at their limits. Empty where a link to an anchor is, which carries what no spring says. For references.
+  // What its springs pull the anchors with (N, body frame): at rest, what presses it, whether or not links
+  // are at their limits. Empty where a link to an anchor is, which carries what no spring says. For
+  // references.
   [[nodiscard]] std::optional<glm::dvec3> carried_by_anchors_N() const noexcept;
   // What the springs store, and what yielding spent since the last state of rest (J); for tests and reports.
   [[nodiscard]] double energy_J() const noexcept;
