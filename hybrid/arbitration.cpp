@@ -377,8 +377,7 @@ void renew_pairs(const World& world, WorldState& state) noexcept {
   }
 }
 
-// What a sweep took over the edge of its facet meets the next one in the next sweep.
-// False: none was.
+// What a sweep took over the edge of its facet meets the next one in the next sweep. False: nothing was.
 bool follow_over_edges(const World& world, WorldState& state) noexcept {
   bool any = false;
   for (VoxelPair& pair : state.pairs) {
