@@ -87,6 +87,53 @@ glm::dvec3 clamp_to_links(const Lattice& lattice, const Displacement& state, Vox
   return result;
 }
 
+VoxelLinks links_of(Couplings& couplings, const Displacement& state, VoxelId v) noexcept {
+  const Lattice& lattice = couplings.lattice();
+  const VoxelSprings springs = couplings.springs_of(v);
+  std::array<float, 3> sum = load_beside_springs(lattice, state, springs, v), low, high;
+  low.fill(-std::numeric_limits<float>::max());
+  high.fill(std::numeric_limits<float>::max());
+  for (std::size_t d = 0; d < 3; ++d) {
+    const int id = static_cast<int>(d);
+    const VoxelId up = lattice.up(v, id), down = lattice.down(v, id);
+    const bool filled_up = lattice.filled(up), filled_down = lattice.filled(down),
+               same = lattice.uniform_limits();
+    const LinkLimit& to_up = same ? lattice.tightest(id) : lattice.limit(v, id);
+    const LinkLimit& to_down = same ? lattice.tightest(id) : lattice.limit(down, id);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const float above = state.u[axis][up], below = state.u[axis][down];
+      const int ia = static_cast<int>(axis);
+      sum[axis] += springs.up[d].on(ia, id) * above + springs.down[d].on(ia, id) * below;
+      if (filled_up) {  // b0 <= u(up) − u(v) <= b1
+        low[axis] = std::max(low[axis], above - (axis == d ? to_up.along_high : to_up.across));
+        high[axis] = std::min(high[axis], above - (axis == d ? to_up.along_low : -to_up.across));
+      }
+      if (filled_down) {
+        low[axis] = std::max(low[axis], below + (axis == d ? to_down.along_low : -to_down.across));
+        high[axis] = std::min(high[axis], below + (axis == d ? to_down.along_high : to_down.across));
+      }
+    }
+  }
+  VoxelLinks out;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const int ia = static_cast<int>(axis);
+    out.minimum[ia] = static_cast<double>(sum[axis] * springs.inverse[axis]);
+    out.compliance[ia] = static_cast<double>(springs.inverse[axis]);
+    out.interval[axis] = {low[axis], high[axis]};
+  }
+  return out;
+}
+
+glm::dvec3 clamp_to_links(const VoxelLinks& links, const glm::dvec3& wanted, const glm::dvec3& now) noexcept {
+  glm::dvec3 result(0.0);
+  for (int axis = 0; axis < 3; ++axis) {
+    result[axis] =
+        static_cast<double>(clamp_to(links.interval[static_cast<std::size_t>(axis)],
+                                     static_cast<float>(wanted[axis]), static_cast<float>(now[axis])));
+  }
+  return result;
+}
+
 glm::dvec3 link_force(Couplings& couplings, const Displacement& state, VoxelId v) noexcept {
   return force_of(couplings.springs_of(v), couplings.lattice(), state, v);
 }

@@ -121,12 +121,15 @@ SoftObject::Gap SoftObject::gap(const ToolInBody& tool, const glm::dvec3& positi
   return {distance - reach(tool.radius), normal};
 }
 
-bool SoftObject::clear_of(const ToolInBody& tool, const glm::dvec3& position) const noexcept {
+bool SoftObject::surely_clear_of(const ToolInBody& tool, const glm::dvec3& position) const noexcept {
   constexpr double kSurely = 1.0 + 1e-9;  // much more than rounding
   const glm::dvec3 d = position - tool.centre;
   const double away = kSurely * reach(tool.radius);
-  if (tool.shape == ToolInBody::Shape::ball && glm::dot(d, d) > away * away) return true;
-  return gap(tool, position).distance >= 0.0;
+  return tool.shape == ToolInBody::Shape::ball && glm::dot(d, d) > away * away;
+}
+
+bool SoftObject::clear_of(const ToolInBody& tool, const glm::dvec3& position) const noexcept {
+  return surely_clear_of(tool, position) || gap(tool, position).distance >= 0.0;
 }
 
 void SoftObject::touch(std::span<const VoxelId> near) noexcept {
@@ -252,18 +255,21 @@ bool SoftObject::push_out(const ToolInBody& tool) noexcept {
 }
 
 // Where a touched voxel belongs, everything else where it is; `pressed`: by the tool.
-glm::dvec3 SoftObject::place_of(const ToolInBody& tool, Touch& t) noexcept {
-  const glm::dvec3 rest = t.rest;
-  glm::dvec3 wanted = link_minimum(relaxation_.couplings(), state_, t.v);
-  if (pair_held(t))
-    wanted += link_compliance(relaxation_.couplings(), t.v) * glm::dvec3(pair_load_[t.surface]);
-  Gap g = gap(tool, rest + wanted);
-  t.pressed = g.distance < 0.0;
+glm::dvec3 SoftObject::place_of(const ToolInBody& tool, const VoxelLinks& links, Touch& t) noexcept {
+  const glm::dvec3 rest = t.rest, now = state_.at(t.v);
+  glm::dvec3 wanted = links.minimum;
+  if (pair_held(t)) wanted += links.compliance * glm::dvec3(pair_load_[t.surface]);
+  t.pressed = !surely_clear_of(tool, rest + wanted);
+  Gap g;
+  if (t.pressed) {
+    g = gap(tool, rest + wanted);
+    t.pressed = g.distance < 0.0;
+  }
   if (t.pressed) {
     // Where the springs' energy is least on the tool's surface, so that sliding round the tool is free of
     // friction: in their own metric, the surface straightened at the last place (one step left 3e-4 of the
     // force scale of friction).
-    const glm::dvec3 w = link_compliance(relaxation_.couplings(), t.v), wished = wanted;
+    const glm::dvec3 w = links.compliance, wished = wanted;
     for (int n = 0; n < kProjections && g.distance < voxel_radius(); ++n) {
       const double denominator = glm::dot(g.normal, w * g.normal);
       if (denominator <= 0.0) break;
@@ -273,7 +279,7 @@ glm::dvec3 SoftObject::place_of(const ToolInBody& tool, Touch& t) noexcept {
     if (g.distance < 0.0) wanted -= g.distance * g.normal;
     t.normal = g.normal;
   }
-  if (obstacles_.empty()) return clamp_to_links(*lattice_, state_, t.v, wanted);
+  if (obstacles_.empty()) return clamp_to_links(links, wanted, now);
   const Obstacle& o = obstacles_[t.surface];
   const glm::dvec3 n(o.normal);
   const double depth = static_cast<double>(o.bound) - glm::dot(n, wanted);
@@ -291,8 +297,8 @@ glm::dvec3 SoftObject::place_of(const ToolInBody& tool, Touch& t) noexcept {
       t.normal = g.normal;
     }
   }
-  const glm::dvec3 place = clamp_to_links(*lattice_, state_, t.v, wanted);
-  return n == glm::dvec3(0.0) ? place : no_deeper(o, state_.at(t.v), place);
+  const glm::dvec3 place = clamp_to_links(links, wanted, now);
+  return n == glm::dvec3(0.0) ? place : no_deeper(o, now, place);
 }
 
 void SoftObject::relax_touch(const ToolInBody& tool, Touch& t) noexcept {
@@ -305,12 +311,13 @@ void SoftObject::relax_touch(const ToolInBody& tool, Touch& t) noexcept {
   // was a spacing deep in the other object whenever the force was measured, and the tool felt nothing of what
   // that carries: 0.31 N of 0.61.)
   if (pair_held(t) && !t.pressed && clear_of(tool, position(t))) return;
-  glm::dvec3 place = place_of(tool, t);
+  const VoxelLinks links = links_of(relaxation_.couplings(), state_, t.v);
+  glm::dvec3 place = place_of(tool, links, t);
   if (relaxation_.away() && was_pressed && t.pressed) {
     place -= t.left;
     const Gap g = gap(tool, t.rest + place);
     if (g.distance < 0.0) place -= g.distance * g.normal;
-    place = clamp_to_links(*lattice_, state_, t.v, place);
+    place = clamp_to_links(links, place, before);
   }
   state_.set(t.v, place);
   relaxation_.multigrid().log().note(0, t.v / kRow);
@@ -492,7 +499,7 @@ void SoftObject::give_away() noexcept {
     t.left = glm::dvec3(0.0);
     if (!t.pressed || lattice_->anchored(t.v)) continue;
     Touch here = t;
-    const glm::dvec3 place = place_of(tool_, here);
+    const glm::dvec3 place = place_of(tool_, links_of(relaxation_.couplings(), state_, t.v), here);
     if (here.pressed) t.left = place - state_.at(t.v);
   }
 }

@@ -211,8 +211,8 @@ class SoftObject {
     glm::dvec3 left{0.0};    // the way it had still to go when the object was given away (m)
   };
   struct Gap {
-    double distance;  // of the voxel from the tool's surface along normal; negative: overlap
-    glm::dvec3 normal;
+    double distance = 0.0;  // of the voxel from the tool's surface along normal; negative: overlap
+    glm::dvec3 normal{0.0};
   };
   static constexpr std::size_t kMaxCarried =
       20'000;                            // voxels that may hang on the pressed ones by tight links
@@ -229,7 +229,8 @@ class SoftObject {
 
   [[nodiscard]] glm::dvec3 position(const Touch& t) const { return t.rest + state_.at(t.v); }
   [[nodiscard]] Gap gap(const ToolInBody& tool, const glm::dvec3& position) const noexcept;
-  // Is the gap no overlap? Most that is near is far enough to be told so without a root.
+  // Is the gap no overlap? Most that is near is far enough to be told so without a root: surely.
+  [[nodiscard]] bool surely_clear_of(const ToolInBody& tool, const glm::dvec3& position) const noexcept;
   [[nodiscard]] bool clear_of(const ToolInBody& tool, const glm::dvec3& position) const noexcept;
   void settle_chain() noexcept;
   void note_moved(RowId row) noexcept;
@@ -246,7 +247,7 @@ class SoftObject {
   [[nodiscard]] bool any_pressed() const noexcept;
   [[nodiscard]] bool cycle_due() const noexcept;
   [[nodiscard]] std::size_t left_of(std::size_t work) const noexcept;  // of a tick's; less while all is cold
-  [[nodiscard]] glm::dvec3 place_of(const ToolInBody& tool, Touch& touch) noexcept;
+  [[nodiscard]] glm::dvec3 place_of(const ToolInBody& tool, const VoxelLinks& links, Touch& touch) noexcept;
   void relax_touch(const ToolInBody& tool, Touch& touch) noexcept;
   void add_stiffness(int axis, glm::dmat3& stiffness) noexcept;
   [[nodiscard]] glm::dvec3 load_on(VoxelId v) noexcept;
