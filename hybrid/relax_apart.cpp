@@ -91,7 +91,11 @@ void exchange(WorldState& state, std::size_t o, std::uint64_t& arrived) noexcept
   }
   if (object.replica.in_parts()) {
     object.replica.take_part(soft, !soft.held_still());
-    if (!object.replica.in_parts()) object.next = state.tick + kOwnTicks;
+    if (!object.replica.in_parts()) {
+      object.next = state.tick + kOwnTicks;
+    } else {
+      soft.ask_to_rest();
+    }
     return;
   }
   const bool drained = object.replica.drained();
@@ -104,12 +108,17 @@ void exchange(WorldState& state, std::size_t o, std::uint64_t& arrived) noexcept
   } else if (gives || takes) {
     object.waited = 0;
   }
+  if ((gives || takes) && !waits && soft.prepare_exchange()) {
+    soft.ask_to_rest();
+    return;
+  }
   if (gives && !waits) {
     give(state, object, o);
   } else if (takes && !waits) {
     // At once it would be felt as a step where the tool is held still: of 48 mN in 150 in a brain. (While it
     // moves that is lost in its motion, and would come later.)
     object.replica.take(soft, soft.held_still() ? kParts : 1);
+    if (object.replica.in_parts()) soft.ask_to_rest();
     object.given = object.here = false;
     ++state.apart.results;
     object.next = state.tick + kOwnTicks;

@@ -41,10 +41,12 @@ class ChangeLog {
     return sum;
   }
   void clear() noexcept {
-    for (Level& l : levels_) {
-      for (std::size_t i = 0; i < l.count; ++i) l.noted[l.rows[i]] = 0;
-      l.count = 0;
-    }
+    for (std::size_t level = 0; level < levels_.size(); ++level) clear(static_cast<int>(level));
+  }
+  void clear(int level) noexcept {
+    Level& l = levels_[static_cast<std::size_t>(level)];
+    for (std::size_t i = 0; i < l.count; ++i) l.noted[l.rows[i]] = 0;
+    l.count = 0;
   }
   [[nodiscard]] std::size_t memory_bytes() const {
     std::size_t bytes = 0;

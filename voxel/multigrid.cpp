@@ -195,7 +195,13 @@ std::size_t Multigrid::renew_bricks(Displacement& state, std::size_t most_rows) 
   });
 }
 
-void Multigrid::begin_anew() noexcept {
+std::size_t Multigrid::rows_to_drop() const noexcept {
+  std::size_t rows = 0;
+  for (int l = 1; l < levels(); ++l) rows += log_.rows(l).size();
+  return rows;
+}
+
+void Multigrid::drop_coarse() noexcept {
   for (int l = 1; l < levels(); ++l) {
     Level& level = at(l);
     for (const RowId row : log_.rows(l)) {
@@ -205,7 +211,12 @@ void Multigrid::begin_anew() noexcept {
       }
       unmark(l, row, static_cast<std::uint8_t>(~limited));
     }
+    log_.clear(l);
   }
+}
+
+void Multigrid::begin_anew() noexcept {
+  drop_coarse();
   for (const RowId row : balanced_) balance_number_[row] = 0;
   balanced_.clear();
 }

