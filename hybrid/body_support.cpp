@@ -16,12 +16,10 @@
 namespace hybrid {
 namespace {
 
-// Of the spacing. A blocked voxel lets a body in by the first of them, so that it is seen when it is blocked
-// no more: then it is less deep than the second.
-constexpr double kProbe = 0.01, kUnblocked = 0.002;
-constexpr double kUnpaid = 0.005;  // of the spacing, in a step
-constexpr double kOnBody = 1e-3;   // of the spacing: no further from the body than this it is on it
-constexpr double kAcross = 1e-3;   // of the sum of normals: what they hardly span they do not take
+constexpr double kUnblocked = 0.002;  // of the spacing: no deeper than this a voxel is blocked no more
+constexpr double kUnpaid = 0.005;     // of the spacing, in a step
+constexpr double kOnBody = 1e-3;      // of the spacing: no further from the body than this it is on it
+constexpr double kAcross = 1e-3;      // of the sum of normals: what they hardly span they do not take
 // Times the stiffness of links: what is more than theirs is a damper. Relaxed apart, tissue is a spring
 // between two results, and gives back in one what it took before another: with 1 a box of 17 g hopped 0.2 mm
 // high for ever, from 2 on it rests.
@@ -302,7 +300,11 @@ void keep_out_of_tissue(const World& world, WorldState& state, double dt_s) noex
     for_voxels_at(state, b, [&](std::size_t o, std::uint32_t s) {
       const voxel::SoftObject& object = *state.soft[o];
       const double gap_m = held_of(object, state.beside_bodies[o], s).gap_m;
-      if (gap_m > -kUnblocked * object.lattice().min_spacing_m()) state.beside_bodies[o].blocked[s] = 0;
+      const double spacing_m = object.lattice().min_spacing_m();
+      std::uint8_t& blocked = state.beside_bodies[o].blocked[s];
+      if (gap_m > -kUnblocked * spacing_m) blocked = 0;
+      // Not only once it is too deep: bodies that went from voxel to voxel, lifted out of each, never rested.
+      if (gap_m < -kProbe * spacing_m) blocked = 1;
     });
   }
 }

@@ -10,8 +10,8 @@
 // press tissue in its first tick without paying for it.
 //
 // Where links at their limits, anchors or bone keep a voxel in the body's way, it is as good as rigid: it was
-// blocked. That ends a body's motion without throwing it back, and what is left of an overlap is taken back
-// as the tick ends.
+// blocked, and a tick ended with it in the body. That ends a body's motion without throwing it back, and what
+// is too deep then goes back.
 #pragma once
 
 #include "hybrid/world.h"
@@ -20,6 +20,9 @@ namespace hybrid {
 
 // Of the spacing: a body that is deeper in tissue as a step or tick ends goes back.
 inline constexpr double kTooDeep = 0.02;
+
+// Of the spacing: a blocked voxel lets a body in by this, so that it is seen when it is blocked no more.
+inline constexpr double kProbe = 0.01;
 
 // Of all soft objects, of which there is one (m).
 [[nodiscard]] double least_spacing_m(const WorldState& state) noexcept;

@@ -91,9 +91,9 @@ class FreeOnTissue : public tests::SceneFile {
            "size = [60, 60, 24]\nspacing = 2\nposition = [0, 0, -12]\nmaterial = \"gel\"\n";
   }
   static std::string body(const std::string& shape, double mass_kg, double z_mm, bool gravity,
-                          const std::string& more = "") {
-    return "[[rigid]]\nname = \"body\"\n" + shape + "position = [0.3, 0.7, " + std::to_string(z_mm) +
-           "]\nmotion = \"free\"\nmass = " + std::to_string(mass_kg) + "\n" +
+                          const std::string& more = "", double x_mm = 0.3) {
+    return "[[rigid]]\nname = \"body\"\n" + shape + "position = [" + std::to_string(x_mm) + ", 0.7, " +
+           std::to_string(z_mm) + "]\nmotion = \"free\"\nmass = " + std::to_string(mass_kg) + "\n" +
            (gravity ? "gravity = [0, 0, -9.81]\n" : "") + more;
   }
   // A ball on a path, from above to that place, where it stays.
@@ -169,6 +169,38 @@ TEST_F(FreeOnTissue, OnTightLinksABodyComesToRestAndItsWeightIsCarried) {
       }
       EXPECT_NEAR(carried_N(held), weight, 0.01 * weight);
       EXPECT_LE(worst_held, kOverlap);
+    }
+  }
+}
+
+// Anchors carry it through links at their limits, of which springs say nothing. But it comes to rest there
+// (wherever it first meets the lattice), and hardly anything lifts it on its way.
+TEST_F(FreeOnTissue, SoHeavyThatItSqueezesItOntoItsAnchorsABallComesToRest) {
+  struct Case {
+    double mass_kg, young_Pa, x_mm;
+  };
+  for (const Case& c : {Case{10.0, 1e3, 0.3}, Case{10.0, 1e3, 1.1}, Case{3.0, 1e3, 1.1}, Case{0.3, 2e3, 0.3},
+                        Case{30.0, 1e4, 0.3}}) {
+    for (const bool apart : {false, true}) {
+      SCOPED_TRACE(std::to_string(c.mass_kg) + " kg on " + std::to_string(c.young_Pa) + " Pa" +
+                   (apart ? ", relaxed apart" : ", in the tick"));
+      Touch touch(load(block(c.young_Pa) + body(kBall, c.mass_kg, 9.0, true, "", c.x_mm)), kFarAway, apart);
+      const double begun = energy_J(touch);
+      double worst = 0.0, before = begun, lifted = 0.0;
+      for (int n = 0; n < 1500; ++n) {
+        touch.at(kFarAway);
+        worst = std::max(worst, deepest(touch));
+        lifted += std::max(0.0, energy_J(touch) - before);
+        before = energy_J(touch);
+      }
+      EXPECT_EQ(free_body(touch).velocity_m_per_s, dvec3(0.0));
+      EXPECT_LE(worst, kOverlap);
+      EXPECT_LE(lifted, 1e-3 * (begun - energy_J(touch)));
+      EXPECT_LT(touch.state().rigid[0].pose.position_m.z, -5e-3);
+      const dvec3 rest = touch.state().rigid[0].pose.position_m;
+      for (int n = 0; n < 500; ++n) touch.at(kFarAway);
+      EXPECT_EQ(touch.state().rigid[0].pose.position_m, rest) << "it stays there";
+      EXPECT_EQ(touch.state().faults, 0U);
     }
   }
 }
