@@ -292,6 +292,22 @@ bool give_way_to_tissue(const World& world, WorldState& state, std::uint32_t b, 
   return true;
 }
 
+void relax_under_paths(const World& world, WorldState& state) noexcept {
+  for (std::size_t o = 0; o < state.beside_bodies.size(); ++o) {
+    voxel::SoftObject& object = *state.soft[o];
+    const BesideBodies& beside = state.beside_bodies[o];
+    state.held_by_body.clear();
+    for (const std::uint32_t s : beside.near) {
+      const std::uint32_t b = beside.whose[s];
+      if (b == BesideBodies::kNobody || is_free(world, b) || !object.obstacles()[s].moving) continue;
+      if (held_of(object, beside, s).gap_m >= kOnBody * object.lattice().min_spacing_m()) continue;
+      if (state.held_by_body.size() == state.held_by_body.capacity()) break;
+      state.held_by_body.push_back(object.lattice().surface()[s]);
+    }
+    if (!state.held_by_body.empty()) object.relax_held(state.held_by_body);
+  }
+}
+
 void keep_out_of_tissue(const World& world, WorldState& state, double dt_s) noexcept {
   if (state.beside_bodies.empty()) return;
   for (std::uint32_t b = 0; b < world.rigid.size(); ++b) {

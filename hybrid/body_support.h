@@ -36,6 +36,9 @@ std::size_t add_tissue_contacts(const World& world, WorldState& state, std::uint
 bool give_way_to_tissue(const World& world, WorldState& state, std::uint32_t b, const Pose& pose,
                         double limit, double dt_s) noexcept;
 
+// Tissue under bodies on paths, where its links are at their limits, goes on towards its least energy.
+void relax_under_paths(const World& world, WorldState& state) noexcept;
+
 // As a tick ends, after all that moves tissue: so for every free body, and notes which voxels are blocked.
 void keep_out_of_tissue(const World& world, WorldState& state, double dt_s) noexcept;
 

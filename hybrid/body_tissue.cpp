@@ -387,6 +387,7 @@ void press_by_bodies(const World& world, WorldState& state, double dt_s) noexcep
       if (world.rigid[b].presses_tissue && is_free(world, b)) stop_in_tissue(world, state, b, to, dt_s);
     }
   }
+  relax_under_paths(world, state);
 }
 
 void look_again(const World& world, WorldState& state, std::uint32_t b) noexcept {
