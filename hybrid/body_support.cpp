@@ -16,12 +16,10 @@
 namespace hybrid {
 namespace {
 
-// Of the spacing. A blocked voxel lets a body in by the first of them, so that it is seen when it is blocked
-// no more: then it is less deep than the second.
-constexpr double kProbe = 0.01, kUnblocked = 0.002;
-constexpr double kUnpaid = 0.005;  // of the spacing, in a step
-constexpr double kOnBody = 1e-3;   // of the spacing: no further from the body than this it is on it
-constexpr double kAcross = 1e-3;   // of the sum of normals: what they hardly span they do not take
+constexpr double kUnblocked = 0.002;  // of the spacing: no deeper than this a voxel is blocked no more
+constexpr double kUnpaid = 0.005;     // of the spacing, in a step
+constexpr double kOnBody = 1e-3;      // of the spacing: no further from the body than this it is on it
+constexpr double kAcross = 1e-3;      // of the sum of normals: what they hardly span they do not take
 // Times the stiffness of links: what is more than theirs is a damper. Relaxed apart, tissue is a spring
 // between two results, and gives back in one what it took before another: with 1 a box of 17 g hopped 0.2 mm
 // high for ever, from 2 on it rests.
@@ -294,6 +292,22 @@ bool give_way_to_tissue(const World& world, WorldState& state, std::uint32_t b, 
   return true;
 }
 
+void relax_under_paths(const World& world, WorldState& state) noexcept {
+  for (std::size_t o = 0; o < state.beside_bodies.size(); ++o) {
+    voxel::SoftObject& object = *state.soft[o];
+    const BesideBodies& beside = state.beside_bodies[o];
+    state.held_by_body.clear();
+    for (const std::uint32_t s : beside.near) {
+      const std::uint32_t b = beside.whose[s];
+      if (b == BesideBodies::kNobody || is_free(world, b) || !object.obstacles()[s].moving) continue;
+      if (held_of(object, beside, s).gap_m >= kOnBody * object.lattice().min_spacing_m()) continue;
+      if (state.held_by_body.size() == state.held_by_body.capacity()) break;
+      state.held_by_body.push_back(object.lattice().surface()[s]);
+    }
+    if (!state.held_by_body.empty()) object.relax_held(state.held_by_body);
+  }
+}
+
 void keep_out_of_tissue(const World& world, WorldState& state, double dt_s) noexcept {
   if (state.beside_bodies.empty()) return;
   for (std::uint32_t b = 0; b < world.rigid.size(); ++b) {
@@ -302,7 +316,11 @@ void keep_out_of_tissue(const World& world, WorldState& state, double dt_s) noex
     for_voxels_at(state, b, [&](std::size_t o, std::uint32_t s) {
       const voxel::SoftObject& object = *state.soft[o];
       const double gap_m = held_of(object, state.beside_bodies[o], s).gap_m;
-      if (gap_m > -kUnblocked * object.lattice().min_spacing_m()) state.beside_bodies[o].blocked[s] = 0;
+      const double spacing_m = object.lattice().min_spacing_m();
+      std::uint8_t& blocked = state.beside_bodies[o].blocked[s];
+      if (gap_m > -kUnblocked * spacing_m) blocked = 0;
+      // Not only once it is too deep: bodies that went from voxel to voxel, lifted out of each, never rested.
+      if (gap_m < -kProbe * spacing_m) blocked = 1;
     });
   }
 }

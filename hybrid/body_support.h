@@ -10,8 +10,8 @@
 // press tissue in its first tick without paying for it.
 //
 // Where links at their limits, anchors or bone keep a voxel in the body's way, it is as good as rigid: it was
-// blocked. That ends a body's motion without throwing it back, and what is left of an overlap is taken back
-// as the tick ends.
+// blocked, and a tick ended with it in the body. That ends a body's motion without throwing it back, and what
+// is too deep then goes back.
 #pragma once
 
 #include "hybrid/world.h"
@@ -20,6 +20,9 @@ namespace hybrid {
 
 // Of the spacing: a body that is deeper in tissue as a step or tick ends goes back.
 inline constexpr double kTooDeep = 0.02;
+
+// Of the spacing: a blocked voxel lets a body in by this, so that it is seen when it is blocked no more.
+inline constexpr double kProbe = 0.01;
 
 // Of all soft objects, of which there is one (m).
 [[nodiscard]] double least_spacing_m(const WorldState& state) noexcept;
@@ -32,6 +35,9 @@ std::size_t add_tissue_contacts(const World& world, WorldState& state, std::uint
 // there, and no longer goes in. False: it is not.
 bool give_way_to_tissue(const World& world, WorldState& state, std::uint32_t b, const Pose& pose,
                         double limit, double dt_s) noexcept;
+
+// Tissue under bodies on paths, where its links are at their limits, goes on towards its least energy.
+void relax_under_paths(const World& world, WorldState& state) noexcept;
 
 // As a tick ends, after all that moves tissue: so for every free body, and notes which voxels are blocked.
 void keep_out_of_tissue(const World& world, WorldState& state, double dt_s) noexcept;

@@ -76,12 +76,12 @@ void WorldState::prepare_beside_bodies(const World& world) {
       static_cast<std::size_t>(std::count_if(world.rigid.begin(), world.rigid.end(), presses));
   due.reserve(most * bodies);
   in_the_way.reserve(most);
+  held_by_body.reserve(voxel::SoftObject::kMaxTouched);
   const auto free = [](const RigidObject& object) {
     return object.presses_tissue && object.motion.kind() == RigidMotion::Kind::free;
   };
   if (std::none_of(world.rigid.begin(), world.rigid.end(), free)) return;
   at_body.reserve(voxel::SoftObject::kMaxTouched);
-  held_by_body.reserve(voxel::SoftObject::kMaxTouched);
   held_loads.resize(voxel::SoftObject::kMaxTouched);
 }
 

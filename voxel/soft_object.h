@@ -126,6 +126,10 @@ class SoftObject {
   // `pressed` of them, kMaxTouched at most, do; the others are near: what of them hangs on the first is not
   // theirs.
   void load_held(std::span<const VoxelId> held, std::size_t pressed, std::span<HeldLoad> loads) noexcept;
+  // What obstacles that answer to nothing press, while another thread relaxes the object and links there are
+  // at their limits: goes on towards its least energy with all round it. A result is added row by row, and
+  // none of them can go that way by itself.
+  void relax_held(std::span<const VoxelId> pressed) noexcept;
   // An obstacle that surface voxel number s lay on went away: it looks for its place.
   void stir(std::size_t surface_number) noexcept;
   // Where there may be obstacles: rows that the chain moved, or what was found apart, since these were

@@ -292,6 +292,12 @@ void SoftObject::load_held(std::span<const VoxelId> held, std::size_t pressed,
   }
 }
 
+void SoftObject::relax_held(std::span<const VoxelId> pressed) noexcept {
+  if (asleep() || !relaxation_.left_to_another()) return;
+  const bool tight = may_be_tight(*lattice_, state_, pressed, kTightBesideOthers);
+  relaxation_.relax_limited(state_, obstacle_view(), pressed.first(tight ? pressed.size() : 0));
+}
+
 void SoftObject::forget_hanging_on_pairs() noexcept {
   for (const VoxelId v : pair_roots_) hanging_entry_[lattice_->surface_number(v)] = 0;
   pair_roots_.clear();
