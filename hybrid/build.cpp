@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <glm/common.hpp>
+#include <glm/vector_relational.hpp>
 
 #include "hybrid/arbitration.h"
 #include "hybrid/body_collisions.h"
@@ -101,6 +102,7 @@ class Builder {
           {world_->soft[o].name, polygon::Severity::info,
            fmt::format("{} surface voxels lie near rigid objects, which will stop them", near)});
     }
+    use_grids();
     watch_bodies(*world_, *built_.state);
     built_.world = std::move(world_);
     give_back_freed_memory();
@@ -122,6 +124,43 @@ class Builder {
            fmt::format("\"{}\" moves and is an open sheet, and such rigid objects beside soft ones are not "
                        "supported yet; close it, remove its motion, or the [[soft]] objects",
                        d.name));
+  }
+
+  // Objects that meet nothing but the tool may have their contacts on a composite grid: where nothing moves,
+  // and nothing else comes nearer to one than a part of its size.
+  void use_grids() {
+    constexpr double kApart = 0.25;
+    const auto moves = [](const RigidObject& object) { return object.motion.moves(); };
+    if (std::any_of(world_->rigid.begin(), world_->rigid.end(), moves)) return;
+    std::vector<Box> boxes;
+    for (const RigidObject& object : world_->rigid) {
+      boxes.emplace_back();
+      for (const glm::dvec3& v : object.drawn->vertices) boxes.back().add(object.to_scene(v));
+    }
+    const std::size_t rigid = boxes.size();
+    for (std::size_t o = 0; o < world_->soft.size(); ++o) {
+      boxes.emplace_back();
+      const voxel::Lattice& lattice = built_.state->soft[o]->lattice();
+      const auto& dims = lattice.grid().dims;
+      for (int corner = 0; corner < 8; ++corner) {
+        const glm::dvec3 at(corner & 1 ? dims[0] : -1, corner & 2 ? dims[1] : -1, corner & 4 ? dims[2] : -1);
+        boxes.back().add(world_->soft[o].to_scene(at * lattice.spacing_m()));
+      }
+    }
+    for (std::size_t o = 0; o < world_->soft.size(); ++o) {
+      const Box& own = boxes[rigid + o];
+      const glm::dvec3 size = own.high - own.low;
+      const double apart = kApart * std::max({size.x, size.y, size.z});
+      const bool alone = std::none_of(boxes.begin(), boxes.end(), [&](const Box& other) {
+        return &other != &own && glm::all(glm::lessThan(other.low, own.high + apart)) &&
+               glm::all(glm::lessThan(own.low - apart, other.high));
+      });
+      if (!alone) continue;
+      const voxel::ToolInBody tool = tool_in_body(*world_, world_->soft[o], glm::dvec3(0.0));
+      if (built_.state->soft[o]->use_composite_grid(tool).empty())
+        built_.notes.push_back({world_->soft[o].name, polygon::Severity::info,
+                                "contacts are on a composite grid: the same time for any depth and size"});
+    }
   }
 
   void add_rigid(const RigidDescription& d) {

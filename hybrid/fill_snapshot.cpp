@@ -50,7 +50,7 @@ void fill_moved_near(const World& world, const WorldState& state, Snapshot& snap
     patch.moved_m.clear();
     for (const voxel::VoxelId v : object.touched()) {
       patch.at_rest_m.emplace_back(body.to_scene(object.lattice().rest(v)));
-      patch.moved_m.emplace_back(body.pose.rotation * object.state().at(v));
+      patch.moved_m.emplace_back(body.pose.rotation * object.displacement(v));
     }
   }
 }

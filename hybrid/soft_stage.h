@@ -29,6 +29,8 @@ double soft_reach(const World& world, const WorldState& state) noexcept;
 
 // Tells the map where surface voxels are now: those near the tool, those the chain moved, and a slice of the
 // rest.
+// Is something pressed whose contact is on a composite grid? The map has such an object as it is at rest.
+[[nodiscard]] bool contact_on_grid(const WorldState& state) noexcept;
 void refresh_map(const World& world, WorldState& state) noexcept;
 
 }  // namespace hybrid
