@@ -130,8 +130,8 @@ class Builder {
   // and nothing else comes nearer to one than a part of its size.
   void use_grids() {
     constexpr double kApart = 0.25;
-    const auto moves = [](const RigidObject& object) { return object.motion.moves(); };
-    if (std::any_of(world_->rigid.begin(), world_->rigid.end(), moves)) return;
+    const bool moves = std::any_of(world_->rigid.begin(), world_->rigid.end(),
+                                   [](const RigidObject& object) { return object.motion.moves(); });
     std::vector<Box> boxes;
     for (const RigidObject& object : world_->rigid) {
       boxes.emplace_back();
@@ -151,15 +151,21 @@ class Builder {
       const Box& own = boxes[rigid + o];
       const glm::dvec3 size = own.high - own.low;
       const double apart = kApart * std::max({size.x, size.y, size.z});
-      const bool alone = std::none_of(boxes.begin(), boxes.end(), [&](const Box& other) {
+      const bool alone = !moves && std::none_of(boxes.begin(), boxes.end(), [&](const Box& other) {
         return &other != &own && glm::all(glm::lessThan(other.low, own.high + apart)) &&
                glm::all(glm::lessThan(own.low - apart, other.high));
       });
-      if (!alone) continue;
+      voxel::SoftObject& object = *built_.state->soft[o];
+      if (object.lattice().voxel_count() < voxel::SoftObject::kLeastOnGrid) continue;
       const voxel::ToolInBody tool = tool_in_body(*world_, world_->soft[o], glm::dvec3(0.0));
-      if (built_.state->soft[o]->use_composite_grid(tool).empty())
-        built_.notes.push_back({world_->soft[o].name, polygon::Severity::info,
-                                "contacts are on a composite grid: the same time for any depth and size"});
+      const std::string obstacle = alone ? object.use_composite_grid(tool) : "other objects may meet it";
+      built_.notes.push_back(
+          {world_->soft[o].name, polygon::Severity::info,
+           obstacle.empty()
+               ? std::string(
+                     "contacts are kept on a composite grid: a tick takes the same time for any depth "
+                     "and size")
+               : fmt::format("contacts are kept voxel by voxel, not on a composite grid: {}", obstacle)});
     }
   }
 

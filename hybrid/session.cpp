@@ -15,6 +15,7 @@
 #include "hybrid/denormals.h"
 #include "hybrid/fill_snapshot.h"
 #include "hybrid/rigid_step.h"
+#include "voxel/composite_grid.h"
 
 namespace hybrid {
 namespace {

@@ -136,6 +136,13 @@ bool contact_on_grid(const WorldState& state) noexcept {
                      [](const auto& object) { return object->grid_in_use() != nullptr; });
 }
 
+void prepare_grids(const World& world, WorldState& state, const glm::dvec3& point) noexcept {
+  for (std::size_t o = 0; o < state.soft.size(); ++o) {
+    if (!state.soft[o]->uses_grid()) continue;
+    state.soft[o]->come_near_on_grid(tool_in_body(world, world.soft[o], point));
+  }
+}
+
 void refresh_map(const World& world, WorldState& state) noexcept {
   const std::uint64_t before = state.map.overflows();
   for (std::size_t o = 0; o < state.soft.size(); ++o) {

@@ -253,6 +253,7 @@ Surroundings look_around(const World& world, WorldState& state, const glm::dvec3
       if (!object->touched().empty()) object->touch({});
     }
   }
+  prepare_grids(world, state, state.proxy_m);
   return around;
 }
 

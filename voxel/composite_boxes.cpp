@@ -48,9 +48,10 @@ void CompositeGrid::make_room(Level& level, std::size_t l) const {
     level.line[d].part.resize(most[d] + 16);
     level.line[d].along.resize(most[d] + 16);
     // By nodes of the next level, which may be all there are.
+    const std::size_t next = most[d] + 4 * index(half_width_of(l + 1));
     for (auto* by_node : {&level.line[d].from_low, &level.line[d].from_own, &level.line[d].from_high})
-      by_node->resize(most[d] + 4 * coarse_half_width_);
-    level.line[d].fine.resize(most[d] + 4 * coarse_half_width_);
+      by_node->resize(next);
+    level.line[d].fine.resize(next);
   }
   const std::size_t stride = (most[0] + 7) / 8 * 8, plane = stride * most[1];
   const std::size_t floats = plane * most[2] + 2 * (plane + stride + kPad) + 64;
@@ -66,24 +67,56 @@ void CompositeGrid::make_room(Level& level, std::size_t l) const {
   level.beside.reserve(floats / share);
 }
 
-// The nodes of a level, its box round `centre`. A node is where its cell has a part in the box of all voxels.
+// Of before_: where the nodes of the largest box that moves were.
+void CompositeGrid::make_room_to_move() {
+  std::size_t most = 0;
+  for (std::size_t l = 0; l < whole_; ++l) {
+    most = std::max(most, levels_[l].u[0].size());
+    for (std::size_t d = 0; d < 3; ++d) {
+      // As large as lines of any level, which are assigned to them.
+      Line& line = before_.line[d];
+      const Line& of = levels_[l].line[d];
+      const auto grow = [](auto& room, const auto& like) { room.resize(std::max(room.size(), like.size())); };
+      grow(line.coarse, of.coarse);
+      grow(line.part, of.part);
+      grow(line.along, of.along);
+      grow(line.fine, of.fine);
+      grow(line.from_low, of.from_low);
+      grow(line.from_own, of.from_own);
+      grow(line.from_high, of.from_high);
+    }
+  }
+  for (auto* arrays : {&before_.u, &before_.held}) {
+    for (Floats& axis : *arrays) axis.assign(most, 0.0F);
+  }
+}
+
+// A node is where its cell has a part in the box of all voxels.
+CompositeGrid::Span CompositeGrid::span_of(std::size_t l, std::size_t d, int centre) const noexcept {
+  const int step = levels_[l].step, half = half_width_of(l) * step;
+  const int start = cells_.low(d), end = cells_.high(d);
+  // Where something is anchored they go as far as that: what holds is found between two of them.
+  Span span{floored(cells_.anchored_part(d, 0) > kHeld ? start : start + step / 2, step),
+            floored(end + (cells_.anchored_part(d, 1) > kHeld ? step - 1 : (step - 1) / 2), step), false,
+            false};
+  if (l >= whole_ || half < 0) return span;
+  // Its sides are nodes of the next level.
+  const int middle = floored(centre + step, 2 * step);
+  span.open_low = middle - half > start;
+  span.open_high = middle + half < end;
+  if (span.open_low) span.low = middle - half;
+  if (span.open_high) span.high = middle + half;
+  return span;
+}
+
 void CompositeGrid::lay_lines(Level& level, std::size_t l, const Place& centre) const noexcept {
-  const int step = level.step, half = half_width_of(l) * step;
   for (std::size_t d = 0; d < 3; ++d) {
+    const Span span = span_of(l, d, centre[d]);
     Line& line = level.line[d];
-    const int start = cells_.low(d), end = cells_.high(d);
-    // Where something is anchored they go as far as that: what holds is found between two of them.
-    int low = floored(cells_.anchored_part(d, 0) > kHeld ? start : start + step / 2, step);
-    int high = floored(end + (cells_.anchored_part(d, 1) > kHeld ? step - 1 : (step - 1) / 2), step);
-    // Its sides are nodes of the next level.
-    const int middle = floored(centre[d] + step, 2 * step);
-    const bool all = l >= whole_ || half < 0;
-    line.open_low = !all && middle - half > start;
-    line.open_high = !all && middle + half < end;
-    if (line.open_low) low = middle - half;
-    if (line.open_high) high = middle + half;
-    line.begin = low;
-    line.count = (high - low) / step + 1;
+    line.open_low = span.open_low;
+    line.open_high = span.open_high;
+    line.begin = span.low;
+    line.count = span.count(level.step);
     line.first = line.open_low ? 1 : 0;
     line.last = line.count - (line.open_high ? 2 : 1);
   }
@@ -139,8 +172,7 @@ void CompositeGrid::join(Level& fine, const Level& coarse) const noexcept {
   }
 }
 
-void CompositeGrid::lay(Level& level, std::size_t l) noexcept {
-  (void)l;
+void CompositeGrid::lay(Level& level) noexcept {
   weigh(level);
   Place low{}, high{};
   for (std::size_t d = 0; d < 3; ++d) {
@@ -250,6 +282,7 @@ void CompositeGrid::find_holds(Level& level, bool near) noexcept {
   const auto whole = static_cast<float>(step);
   level.broken = false;
   level.held_area = 0.0;
+  level.holds = false;
   for (Floats& hold : level.hold) std::fill(hold.begin(), hold.end(), 0.0F);
   for (int k = 0; k < line[2].count; ++k) {
     for (int j = 0; j < line[1].count; ++j) {
@@ -285,6 +318,7 @@ void CompositeGrid::find_holds(Level& level, bool near) noexcept {
                            cells_.filled(after) && !cells_.unbroken(at, d, step);
           if (anchors.ahead == 0 && anchors.back == 0 && !gap) continue;
           weight = 0.0F;
+          level.holds = level.holds || !gap || anchors.ahead > 0 || anchors.back > 0;
           level.broken = level.broken || gap;
         }
       }

@@ -22,6 +22,7 @@
 // enough: there links may be beyond their limits (see most_beyond_limits()).
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -48,9 +49,11 @@ class CompositeGrid {
 
   // ---- none of these allocates, locks or throws ----
   using Place = std::array<int, 3>;
-  // At rest, boxes round voxel (i, j, k).
+  // Ahead of a contact, once a tick: what begin() does about this voxel, of one level.
+  void prepare(const Place& centre) noexcept;
+  // At rest, boxes round voxel (i, j, k); where they have it well inside already, they stay.
   void begin(const Place& centre) noexcept;
-  // Boxes go along with the contact: what is new in one is interpolated.
+  // Once a tick: boxes go along with the contact, one at a time but where that would be too late.
   // True where the box of level 0 did.
   bool centre_on(const Place& centre) noexcept;
   // Voxels of it: the first and the last that may be moved.
@@ -81,6 +84,15 @@ class CompositeGrid {
   // Displacement of any voxel, or point in units of voxels (m).
   [[nodiscard]] glm::dvec3 at_point(const std::array<double, 3>& point) const noexcept;
   [[nodiscard]] glm::dvec3 at(const Place& voxel) const noexcept;
+  // For whoever draws: the nodes of its boxes, the finest first.
+  struct Nodes {
+    Place first{}, count{};  // the voxel at which node (0, 0, 0) is; how many
+    int step = 1;            // voxels from one to the next
+    std::size_t stride = 0, plane = 0;
+    std::array<const float*, 3> u{};  // [axis][k · plane + j · stride + i] (m)
+  };
+  [[nodiscard]] std::size_t boxes() const noexcept { return whole_ + 1; }
+  [[nodiscard]] Nodes nodes_of(std::size_t box) const noexcept;
   [[nodiscard]] std::size_t work_of_cycle() const noexcept { return work_; }  // octets relaxed
   [[nodiscard]] std::size_t memory_bytes() const;
   template <class Visit>
@@ -91,6 +103,8 @@ class CompositeGrid {
       }
     }
   }
+  // Is all that is anchored in sides of the object that are anchored as a whole?
+  [[nodiscard]] bool anchored_by_sides() const noexcept;
   // Is nothing anchored within some voxels of it, as far as a contact should be from that?
   [[nodiscard]] bool far_from_anchors(const Place& voxel) const noexcept;
   // How much of what anchors hold, as links count it, coarse levels see: 1 where all.
@@ -122,6 +136,8 @@ class CompositeGrid {
   };
   struct Level {
     int step = 1;
+    bool laid = false;   // with the present offset of coordinates
+    bool moved = false;  // since it was put to rest
     std::array<Line, 3> line;
     std::size_t stride = 8, plane = 0;
     std::array<Floats, 3> u, held;       // [axis] held: 1 at its least, −1 at its most
@@ -132,6 +148,7 @@ class CompositeGrid {
     std::array<bool, 2> bounded{};
     bool dragged = false;    // by what is stuck on finer levels; likewise
     double held_area = 0.0;  // by anchors (unit: face of a voxel)
+    bool holds = false;      // some anchor holds some node
     bool broken = false;     // some link within the box is missing
     std::vector<Ghost> ghosts;
     std::vector<std::uint32_t> beside;  // of ghosts
@@ -154,13 +171,32 @@ class CompositeGrid {
   struct Passes;  // innermost loops (composite_passes.cpp)
 
   [[nodiscard]] std::string wrong_somewhere();
+  // Wide enough that a level holds the finer one wherever the contact is among their nodes.
   [[nodiscard]] int half_width_of(std::size_t level) const {
-    return level == 0 ? half_width_ : coarse_half_width_;
+    int half = half_width_;
+    for (std::size_t l = 0; l < level; ++l) half = std::max(coarse_half_width_, (half + 7) / 4 * 2);
+    return half;
   }
+  // ---- composite_moves.cpp ----
+  [[nodiscard]] bool in_place(std::size_t l) const noexcept;
+  [[nodiscard]] bool nested(std::size_t l) const noexcept;
+  [[nodiscard]] bool off_centre(const Place& centre) const noexcept;
+  void aim_at(const Place& centre) noexcept;
+  void lay_anew(std::size_t l) noexcept;
+  void put_to_rest(Level& level) noexcept;
+  void move(std::size_t l) noexcept;
   // ---- composite_boxes.cpp ----
   void make_room(Level& level, std::size_t l) const;
+  void make_room_to_move();
+  // The nodes of a level along d, first and last, its box round the coordinate `centre`.
+  struct Span {
+    int low, high;
+    bool open_low, open_high;
+    [[nodiscard]] int count(int step) const { return (high - low) / step + 1; }
+  };
+  [[nodiscard]] Span span_of(std::size_t l, std::size_t d, int centre) const noexcept;
   void lay_lines(Level& level, std::size_t l, const Place& centre) const noexcept;
-  void lay(Level& level, std::size_t l) noexcept;
+  void lay(Level& level) noexcept;
   void weigh(Level& level) noexcept;
   void weigh_box(Level& level) noexcept;
   // `near`: there may be anchors in it.
@@ -197,7 +233,6 @@ class CompositeGrid {
   TissueCells cells_;
   std::array<std::array<float, 3>, 3> spring_{};               // [d][axis] of a link between voxels (N/m)
   std::array<std::array<std::array<float, 2>, 3>, 3> room_{};  // [d][axis][0: shorter, 1: longer] (m), >= 0
-  float tightest_ = 0.0F;                                      // of them
   int half_width_, coarse_half_width_;
   Place centre_{};
   std::vector<Level> levels_;

@@ -8,6 +8,7 @@
 #include <limits>
 #include <utility>
 
+#include "voxel/composite_grid.h"
 #include "voxel/links.h"
 
 namespace voxel {
@@ -80,6 +81,8 @@ SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice)
     relaxation_.prepare_all();
   }
 }
+
+SoftObject::~SoftObject() = default;
 
 std::unique_ptr<SoftObject> SoftObject::copy() const {
   auto result = std::make_unique<SoftObject>(lattice_);

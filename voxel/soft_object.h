@@ -17,7 +17,6 @@
 #include <vector>
 
 #include "voxel/chainmail.h"
-#include "voxel/composite_grid.h"
 #include "voxel/displacement.h"
 #include "voxel/drawn_rows.h"
 #include "voxel/lattice.h"
@@ -25,6 +24,8 @@
 #include "voxel/tight_rows.h"
 
 namespace voxel {
+
+class CompositeGrid;
 
 // The tool as one soft object sees it.
 struct ToolInBody {
@@ -65,6 +66,11 @@ class SoftObject {
       4096;  // surface voxels near the tool; more are left to the next tick
 
   explicit SoftObject(std::shared_ptr<const Lattice> lattice);
+  ~SoftObject();
+  SoftObject(const SoftObject&) = delete;
+  SoftObject& operator=(const SoftObject&) = delete;
+  SoftObject(SoftObject&&) = delete;
+  SoftObject& operator=(SoftObject&&) = delete;
   // The same object in the same state, sharing the lattice; for references found beside a running session.
   [[nodiscard]] std::unique_ptr<SoftObject> copy() const;
 
@@ -92,6 +98,9 @@ class SoftObject {
   [[nodiscard]] bool uses_grid() const { return grid_ != nullptr; }
   // While something is pressed.
   [[nodiscard]] const CompositeGrid* grid_in_use() const { return on_grid_ ? grid_.get() : nullptr; }
+  // Once a tick, while nothing is pressed: what a contact with this tool will need is made ready, a part at a
+  // time.
+  void come_near_on_grid(const ToolInBody& tool) noexcept;
   // Surface voxels where the contact is: while there is one, what may be touched is among them.
   [[nodiscard]] std::span<const VoxelId> near_on_grid() const { return near_on_grid_; }
   // Boxes many times as wide, for references. Allocates.

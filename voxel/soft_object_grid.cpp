@@ -9,6 +9,7 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include "voxel/composite_grid.h"
 #include "voxel/soft_object.h"
 
 namespace voxel {
@@ -91,6 +92,27 @@ void SoftObject::list_near_on_grid() noexcept {
       }
     }
   }
+}
+
+// By the voxel that the tool will meet, as far as that is known: of those near it the nearest, else that of
+// the object's box.
+void SoftObject::come_near_on_grid(const ToolInBody& tool) noexcept {
+  if (!grid_ || on_grid_) return;
+  std::array<int, 3> nearest{};
+  const auto& dims = lattice_->grid().dims;
+  for (int d = 0; d < 3; ++d) {
+    const double at = tool.centre[d] / lattice_->spacing_m()[d];
+    nearest[static_cast<std::size_t>(d)] =
+        static_cast<int>(std::clamp(at + 0.5, 0.0, dims[static_cast<std::size_t>(d)] - 1.0));
+  }
+  double least = std::numeric_limits<double>::max();
+  for (const Touch& t : touches_) {
+    const glm::dvec3 away = t.rest - tool.centre;
+    if (glm::dot(away, away) >= least) continue;
+    least = glm::dot(away, away);
+    nearest = lattice_->coordinates(t.v);
+  }
+  grid_->prepare(nearest);
 }
 
 void SoftObject::touch_on_grid(std::span<const VoxelId> near) noexcept {
@@ -251,7 +273,7 @@ void SoftObject::relax_on_grid(const ToolInBody& tool) noexcept {
     settle_on_grid(tool);
     return;
   }
-  if (grid_->centre_on(centre_)) list_near_on_grid();
+  if (contact_work_ == 0 && grid_->centre_on(centre_)) list_near_on_grid();
   press_on_grid(tool);
   grid_->cycle(axes_due());
   contact_work_ += grid_->work_of_cycle();

@@ -4,6 +4,7 @@
 #include <bit>
 #include <glm/geometric.hpp>
 
+#include "voxel/composite_grid.h"
 #include "voxel/links.h"
 #include "voxel/soft_object.h"
 #include "voxel/yield.h"

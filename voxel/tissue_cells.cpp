@@ -2,12 +2,14 @@
 #include "voxel/tissue_cells.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <cstring>
 
 namespace voxel {
 namespace {
 
-constexpr int kLevels = 12;  // of cubes: 2^31 voxels have no more along an axis than the coarsest spans
+constexpr int kLevels = 12;    // of cubes: 2^31 voxels have no more along an axis than the coarsest spans
+constexpr int kNearerEnd = 4;  // an end is when a voxel is off the middle by one such part of the size
 constexpr int kMostAlong = 1 << (kLevels - 1);
 
 std::size_t index(int i) {
@@ -21,7 +23,8 @@ TissueCells::TissueCells(const Lattice& lattice) : lattice_(lattice), dims_(latt
   choose_offset();
   kept_.resize(kLevels);
   for (int m = 0; m < kLevels; ++m) {
-    for (std::size_t d = 0; d < 3; ++d) kept_[index(m)].dims[d] = (high(d) >> m) + 1;
+    for (std::size_t d = 0; d < 3; ++d)
+      kept_[index(m)].dims[d] = ((fills_box_ ? dims_[d] - 1 : high(d)) >> m) + 1;
   }
   if (!fills_box_) count_cells();
   mark_anchors();
@@ -59,9 +62,14 @@ int TissueCells::offset_of_high_end(std::size_t d) const noexcept {
   return whole - (dims_[d] - 1);
 }
 
-void TissueCells::align_to(const Place& voxel) noexcept {
-  if (!fills_box_) return;
-  for (std::size_t d = 0; d < 3; ++d) offset_[d] = 2 * voxel[d] > dims_[d] - 1 ? offset_of_high_end(d) : 0;
+bool TissueCells::align_to(const Place& voxel) noexcept {
+  if (!fills_box_) return false;
+  const Place before = offset_;
+  for (std::size_t d = 0; d < 3; ++d) {
+    const int last = dims_[d] - 1, middle = 2 * voxel[d] - last;
+    if (std::abs(middle) * kNearerEnd > last) offset_[d] = middle > 0 ? offset_of_high_end(d) : 0;
+  }
+  return offset_ != before;
 }
 
 bool TissueCells::filled(const Place& p) const noexcept {
@@ -250,6 +258,7 @@ TissueCells::Anchored TissueCells::anchors_along(const Place& p, std::size_t d, 
   Place end = p;
   end[d] += links;
   if (!anchor_near(p, end, links)) return found;
+  if (fills_box_) return anchors_in_box(p, d, links);
   Place q = in_tissue(p, d, links);
   bool before = false;
   for (int t = 0; t <= links; ++t, ++q[d]) {
@@ -266,6 +275,46 @@ TissueCells::Anchored TissueCells::anchors_along(const Place& p, std::size_t d, 
     if (t > 0 && found.ahead == 0) found.ahead = t;
     if (t < links) found.back = links - t;
   }
+  return found;
+}
+
+// The same where all is tissue: how much of the line there is needs no look, and of cubes without an anchor
+// none of their voxels.
+TissueCells::Anchored TissueCells::anchors_in_box(const Place& p, std::size_t d, int links) const noexcept {
+  Anchored found;
+  Place q = p;
+  for (const std::size_t e : {(d + 1) % 3, (d + 2) % 3}) q[e] = std::clamp(q[e], low(e), high(e));
+  const int first = std::max(low(d) - p[d], 0), last = std::min(high(d) - p[d], links);
+  found.links = std::max(last - first, 0);
+  if (first > last) return found;
+  const Kept& kept = kept_[kAnchorBlocks];
+  const auto anchor_at = [&](int t) {
+    q[d] = p[d] + t;
+    return anchored(q);
+  };
+  // To the first anchor from `from` on, in steps of ±1; `links` + 1: there is none.
+  const auto scan = [&](int from, int to, int way) {
+    for (int t = from; way > 0 ? t <= to : t >= to;) {
+      const int at = p[d] + t - offset_[d];
+      Place cube{};
+      for (std::size_t e = 0; e < 3; ++e) cube[e] = (q[e] - offset_[e]) >> kAnchorBlocks;
+      cube[d] = at >> kAnchorBlocks;
+      if (kept.anchored[kept.at(cube)] == 0) {
+        const int edge = cube[d] << kAnchorBlocks;  // on to the next cube
+        t += way > 0 ? edge + (1 << kAnchorBlocks) - at : edge - 1 - at;
+        continue;
+      }
+      if (anchor_at(t)) return t;
+      t += way;
+    }
+    return links + 1;
+  };
+  // The ends themselves are somebody else's.
+  const int ahead = scan(std::max(first, 1), last, 1), back = scan(std::min(last, links - 1), first, -1);
+  if (ahead <= links) found.ahead = ahead;
+  if (back <= links) found.back = links - back;
+  found.low_free = first == 0 && !anchor_at(0);
+  found.high_free = last == links && !anchor_at(links);
   return found;
 }
 

@@ -24,8 +24,9 @@ class TissueCells {
 
   using Place = std::array<int, 3>;
   [[nodiscard]] const Place& offset() const { return offset_; }
-  // Of an object that fills its box: from now on the ends nearest to a voxel are nodes of every level.
-  void align_to(const Place& voxel) noexcept;
+  // Of an object that fills its box: from now on the ends nearest to a voxel are nodes of every level; as it
+  // was along an axis where it is about as far from both. True: the offset changed.
+  bool align_to(const Place& voxel) noexcept;
   // Of the outermost voxels, with the offset.
   [[nodiscard]] int low(std::size_t d) const { return offset_[d]; }
   [[nodiscard]] int high(std::size_t d) const { return offset_[d] + dims_[d] - 1; }
@@ -80,6 +81,7 @@ class TissueCells {
   void mark_anchors();
   void layer(int k, int x0, int nx, int y0, int ny, std::uint8_t* out) noexcept;
   void line(int x0, int nx, int j, int k, std::uint8_t* out) const noexcept;
+  [[nodiscard]] Anchored anchors_in_box(const Place& p, std::size_t d, int links) const noexcept;
   [[nodiscard]] Place in_tissue(const Place& p, std::size_t d, int links) const noexcept;
 
   const Lattice& lattice_;
