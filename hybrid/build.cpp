@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <glm/common.hpp>
+#include <glm/vector_relational.hpp>
 
 #include "hybrid/arbitration.h"
 #include "hybrid/body_collisions.h"
@@ -101,6 +102,7 @@ class Builder {
           {world_->soft[o].name, polygon::Severity::info,
            fmt::format("{} surface voxels lie near rigid objects, which will stop them", near)});
     }
+    use_grids();
     watch_bodies(*world_, *built_.state);
     built_.world = std::move(world_);
     give_back_freed_memory();
@@ -122,6 +124,49 @@ class Builder {
            fmt::format("\"{}\" moves and is an open sheet, and such rigid objects beside soft ones are not "
                        "supported yet; close it, remove its motion, or the [[soft]] objects",
                        d.name));
+  }
+
+  // Objects that meet nothing but the tool may have their contacts on a composite grid: where nothing moves,
+  // and nothing else comes nearer to one than a part of its size.
+  void use_grids() {
+    constexpr double kApart = 0.25;
+    const bool moves = std::any_of(world_->rigid.begin(), world_->rigid.end(),
+                                   [](const RigidObject& object) { return object.motion.moves(); });
+    std::vector<Box> boxes;
+    for (const RigidObject& object : world_->rigid) {
+      boxes.emplace_back();
+      for (const glm::dvec3& v : object.drawn->vertices) boxes.back().add(object.to_scene(v));
+    }
+    const std::size_t rigid = boxes.size();
+    for (std::size_t o = 0; o < world_->soft.size(); ++o) {
+      boxes.emplace_back();
+      const voxel::Lattice& lattice = built_.state->soft[o]->lattice();
+      const auto& dims = lattice.grid().dims;
+      for (int corner = 0; corner < 8; ++corner) {
+        const glm::dvec3 at(corner & 1 ? dims[0] : -1, corner & 2 ? dims[1] : -1, corner & 4 ? dims[2] : -1);
+        boxes.back().add(world_->soft[o].to_scene(at * lattice.spacing_m()));
+      }
+    }
+    for (std::size_t o = 0; o < world_->soft.size(); ++o) {
+      const Box& own = boxes[rigid + o];
+      const glm::dvec3 size = own.high - own.low;
+      const double apart = kApart * std::max({size.x, size.y, size.z});
+      const bool alone = !moves && std::none_of(boxes.begin(), boxes.end(), [&](const Box& other) {
+        return &other != &own && glm::all(glm::lessThan(other.low, own.high + apart)) &&
+               glm::all(glm::lessThan(own.low - apart, other.high));
+      });
+      voxel::SoftObject& object = *built_.state->soft[o];
+      if (object.lattice().voxel_count() < voxel::SoftObject::kLeastOnGrid) continue;
+      const voxel::ToolInBody tool = tool_in_body(*world_, world_->soft[o], glm::dvec3(0.0));
+      const std::string obstacle = alone ? object.use_composite_grid(tool) : "other objects may meet it";
+      built_.notes.push_back(
+          {world_->soft[o].name, polygon::Severity::info,
+           obstacle.empty()
+               ? std::string(
+                     "contacts are kept on a composite grid: a tick takes the same time for any depth "
+                     "and size")
+               : fmt::format("contacts are kept voxel by voxel, not on a composite grid: {}", obstacle)});
+    }
   }
 
   void add_rigid(const RigidDescription& d) {

@@ -3,6 +3,8 @@
 
 #include <glm/gtc/quaternion.hpp>
 
+#include "voxel/composite_grid.h"
+
 namespace hybrid {
 namespace {
 
@@ -24,6 +26,31 @@ void fill_surface(const SoftBody& body, const voxel::SoftObject& object, std::ve
     moved[v] = glm::vec3(body.pose.rotation * object.displacement_at(body.drawn.vertices[v]));
 }
 
+// The nodes as they are: a few hundred kilobytes, however large the object. (Its surface, vertex by vertex,
+// is a hundred milliseconds of a tick.)
+void fill_dent(const SoftBody& body, const voxel::SoftObject& object, SoftDent& dent) {
+  dent.used = true;
+  dent.count = 0;
+  const voxel::CompositeGrid* const grid = object.grid_in_use();
+  if (grid == nullptr) return;
+  dent.to_scene = glm::mat3_cast(body.pose.rotation);
+  dent.origin_m = body.pose.origin;
+  dent.spacing_m = object.lattice().spacing_m();
+  dent.count = grid->boxes();
+  if (dent.boxes.size() < dent.count) dent.boxes.resize(dent.count);
+  for (std::size_t n = 0; n < dent.count; ++n) {
+    const voxel::CompositeGrid::Nodes nodes = grid->nodes_of(n);
+    SoftDent::Box& box = dent.boxes[n];
+    box.first = nodes.first;
+    box.count = nodes.count;
+    box.step = nodes.step;
+    box.stride = nodes.stride;
+    box.plane = nodes.plane;
+    const std::size_t size = nodes.plane * static_cast<std::size_t>(nodes.count[2]);
+    for (std::size_t a = 0; a < 3; ++a) box.moved_m[a].assign(nodes.u[a], nodes.u[a] + size);
+  }
+}
+
 }  // namespace
 
 void fill_moved(const World& world, const WorldState& state, Snapshot& snapshot) {
@@ -37,10 +64,15 @@ void fill_moved_near(const World& world, const WorldState& state, Snapshot& snap
   fill_places(world, state, snapshot);
   snapshot.soft_moved_m.resize(world.object_count());
   snapshot.patches.resize(world.object_count());
+  snapshot.dents.resize(world.object_count());
   for (std::size_t o = 0; o < world.soft.size(); ++o) {
     const SoftBody& body = world.soft[o];
     const voxel::SoftObject& object = *state.soft[o];
     const std::size_t number = world.rigid.size() + o;
+    if (object.uses_grid()) {
+      fill_dent(body, object, snapshot.dents[number]);
+      continue;
+    }
     if (!state.apart.has(o)) {
       fill_surface(body, object, snapshot.soft_moved_m[number]);
       continue;
@@ -50,7 +82,7 @@ void fill_moved_near(const World& world, const WorldState& state, Snapshot& snap
     patch.moved_m.clear();
     for (const voxel::VoxelId v : object.touched()) {
       patch.at_rest_m.emplace_back(body.to_scene(object.lattice().rest(v)));
-      patch.moved_m.emplace_back(body.pose.rotation * object.state().at(v));
+      patch.moved_m.emplace_back(body.pose.rotation * object.displacement(v));
     }
   }
 }

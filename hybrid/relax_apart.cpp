@@ -134,7 +134,8 @@ void relax_apart(WorldState& state, Arrival arrival) {
   state.apart.arrival = arrival;
   state.apart.objects.clear();
   for (std::size_t o = 0; o < state.soft.size(); ++o) {
-    const bool apart = o < kMostApart && !state.soft[o]->lattice().yields();
+    const voxel::SoftObject& object = *state.soft[o];
+    const bool apart = o < kMostApart && !object.lattice().yields() && !object.uses_grid();
     state.apart.objects.push_back(apart ? std::make_unique<RelaxedApart>(*state.soft[o]) : nullptr);
   }
 }

@@ -53,8 +53,8 @@ struct Apart {
   double elsewhere_us = 0.0;
 };
 
-// From now on soft objects are relaxed apart; those with a yield, and all from the 65th on, stay in the tick.
-// Allocates. `arrival` thread: somebody runs a RelaxationThread.
+// From now on soft objects are relaxed apart; those with a yield, those on a composite grid, and all from the
+// 65th on, stay in the tick. Allocates. `arrival` thread: somebody runs a RelaxationThread.
 void relax_apart(WorldState& state, Arrival arrival);
 
 // The stage.

@@ -42,7 +42,7 @@ class SoftSlices {
   // Along the axes of the volume; 0 where there is no tissue. (unit: meter)
   void displacement(int k, std::span<glm::vec3> out) const {
     for_each(k, [&](std::size_t n, voxel::VoxelId v) {
-      out[n] = object_.lattice().filled(v) ? glm::vec3(object_.state().at(v)) : glm::vec3(0.0F);
+      out[n] = object_.lattice().filled(v) ? glm::vec3(object_.displacement(v)) : glm::vec3(0.0F);
     });
   }
 

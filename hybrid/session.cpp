@@ -15,6 +15,7 @@
 #include "hybrid/denormals.h"
 #include "hybrid/fill_snapshot.h"
 #include "hybrid/rigid_step.h"
+#include "voxel/composite_grid.h"
 
 namespace hybrid {
 namespace {
@@ -336,6 +337,9 @@ std::uint64_t hash_state(std::uint64_t before, const WorldState& state) noexcept
     for (const auto& axis : object->state().u) {
       for (const float u : axis) hash = mix(hash, std::bit_cast<std::uint32_t>(u));
     }
+    if (object->grid_in_use() == nullptr) continue;
+    object->grid_in_use()->for_values(
+        [&hash](float u) { hash = mix(hash, std::bit_cast<std::uint32_t>(u)); });
   }
   return hash;
 }
@@ -395,6 +399,7 @@ std::optional<glm::dvec3> equilibrium_force(const World& world, const WorldState
   for (SoftBody& body : patient.soft) body.budget = kSettleBudget;
   for (RigidObject& object : patient.rigid) object.motion = {};  // what moves stands still meanwhile
   std::fill(copy->body_moved_m.begin(), copy->body_moved_m.end(), 0.0);
+  for (const auto& object : copy->soft) object->widen_grid();
   const device::DeviceState still{.position_m = state.device_m};
   glm::dvec3 before(0.0);
   for (int n = 1; n <= kSettleTicks; ++n) {

@@ -3,8 +3,11 @@
 // opens a window; picture and viewer read these and nothing else.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <glm/gtc/quaternion.hpp>
+#include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 #include <string>
 #include <vector>
@@ -52,6 +55,25 @@ struct SoftPatch {
   std::vector<glm::vec3> at_rest_m, moved_m;
 };
 
+// How far the points of a soft object are from rest, on nested boxes of nodes, the finest first: what a point
+// lies in first says where it is, between its nodes.
+struct SoftDent {
+  struct Box {
+    std::array<int, 3> first{}, count{};  // where node (0, 0, 0) is (unit: spacing of the object); how many
+    int step = 1;                         // from one to the next; likewise
+    std::size_t stride = 0, plane = 0;
+    std::array<std::vector<float>, 3> moved_m{};  // [axis of the object][k · plane + j · stride + i]
+  };
+  bool used = false;       // by this object; where there is no box it is at rest
+  glm::dmat3 to_scene{1};  // of the object's axes
+  glm::dvec3 origin_m{0.0}, spacing_m{1.0};
+  std::size_t count = 0;  // of boxes; others are kept for their room
+  std::vector<Box> boxes{};
+
+  // Of a point at rest (scene frame, meters).
+  [[nodiscard]] glm::vec3 at(const glm::dvec3& at_rest_m) const noexcept;
+};
+
 struct Snapshot {
   std::uint64_t tick = 0;
   double t_s = 0.0;
@@ -63,6 +85,8 @@ struct Snapshot {
   std::vector<std::vector<glm::vec3>> soft_moved_m;
   // One an object; of those whose tissue is relaxed on a thread of its own, which says where the rest is.
   std::vector<SoftPatch> patches{};
+  // One an object, or none at all: of those whose contact is on a composite grid, in place of soft_moved_m.
+  std::vector<SoftDent> dents{};
   std::vector<RigidPlace> rigid_place;  // one an object; fewer: the rest have not moved
   double tick_us = 0.0;
 

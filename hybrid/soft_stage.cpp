@@ -39,20 +39,27 @@ bool list_touched(const World& world, WorldState& state, const glm::dvec3& point
                   std::size_t count) noexcept {
   for (auto& list : state.touched) list.clear();
   bool fits = true;
+  const auto take = [&](std::size_t o, voxel::VoxelId v) {
+    const voxel::SoftObject& object = *state.soft[o];
+    const glm::dvec3 away = world.soft[o].to_scene(object.position(v)) - point;
+    const double reach = object.reach(world.tool.radius_m) + range;
+    if (glm::dot(away, away) > reach * reach) return true;
+    if (state.touched[o].size() == voxel::SoftObject::kMaxTouched) return false;
+    state.touched[o].push_back(v);
+    return true;
+  };
   for (std::size_t i = 0; i < count; ++i) {
     const std::uint32_t number = state.found[i];
     std::size_t o = world.soft.size() - 1;
     while (world.soft[o].first_number > number) --o;
     const voxel::SoftObject& object = *state.soft[o];
-    const voxel::VoxelId v = object.lattice().surface()[number - world.soft[o].first_number];
-    const glm::dvec3 away = world.soft[o].to_scene(object.position(v)) - point;
-    const double reach = object.reach(world.tool.radius_m) + range;
-    if (glm::dot(away, away) > reach * reach) continue;
-    if (state.touched[o].size() == voxel::SoftObject::kMaxTouched) {
-      fits = false;
-      break;
-    }
-    state.touched[o].push_back(v);
+    if (object.grid_in_use() != nullptr) continue;
+    fits = take(o, object.lattice().surface()[number - world.soft[o].first_number]);
+    if (!fits) break;
+  }
+  for (std::size_t o = 0; o < state.soft.size() && fits; ++o) {
+    if (state.soft[o]->grid_in_use() == nullptr) continue;
+    for (const voxel::VoxelId v : state.soft[o]->near_on_grid()) fits = fits && take(o, v);
   }
   return fits;
 }
@@ -124,11 +131,23 @@ std::size_t soft_bounds(const World& world, WorldState& state, const glm::dvec3&
   return added;
 }
 
+bool contact_on_grid(const WorldState& state) noexcept {
+  return std::any_of(state.soft.begin(), state.soft.end(),
+                     [](const auto& object) { return object->grid_in_use() != nullptr; });
+}
+
+void prepare_grids(const World& world, WorldState& state, const glm::dvec3& point) noexcept {
+  for (std::size_t o = 0; o < state.soft.size(); ++o) {
+    if (!state.soft[o]->uses_grid()) continue;
+    state.soft[o]->come_near_on_grid(tool_in_body(world, world.soft[o], point));
+  }
+}
+
 void refresh_map(const World& world, WorldState& state) noexcept {
   const std::uint64_t before = state.map.overflows();
   for (std::size_t o = 0; o < state.soft.size(); ++o) {
     const voxel::SoftObject& object = *state.soft[o];
-    if (!object.moved_ever()) continue;
+    if (!object.moved_ever() || object.uses_grid()) continue;
     const SoftBody& body = world.soft[o];
     const auto surface = object.lattice().surface();
     const auto look = [&](std::uint32_t number) {

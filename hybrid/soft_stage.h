@@ -27,6 +27,10 @@ voxel::ToolInBody tool_in_body(const World& world, const SoftBody& body, const g
 // Largest distance from the tool's centre at which it can touch a voxel of any soft object (unit: meter).
 double soft_reach(const World& world, const WorldState& state) noexcept;
 
+// Is something pressed whose contact is on a composite grid? The map has such an object as it is at rest.
+[[nodiscard]] bool contact_on_grid(const WorldState& state) noexcept;
+// Objects on such a grid that are not pressed make ready for a tool at `point` (scene frame).
+void prepare_grids(const World& world, WorldState& state, const glm::dvec3& point) noexcept;
 // Tells the map where surface voxels are now: those near the tool, those the chain moved, and a slice of the
 // rest.
 void refresh_map(const World& world, WorldState& state) noexcept;

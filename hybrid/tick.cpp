@@ -194,7 +194,9 @@ double move_proxy(const World& world, WorldState& state, const glm::dvec3& devic
   state.proxy_m = sweep.point;
   if (near_soft) {
     press_soft(world, state, state.proxy_m, delta, kSweeps);
-    learn_stiffness(world, state, delta, pull, pull_on_proxy(world, state, device), model, metric);
+    // On a composite grid the model is of the equilibrium, and nothing is hidden from it.
+    if (!contact_on_grid(state))
+      learn_stiffness(world, state, delta, pull, pull_on_proxy(world, state, device), model, metric);
     if (first_pass) state.blocked.clear();
     soft_bounds(world, state, state.proxy_m, true, state.blocked);
   }
@@ -240,7 +242,9 @@ Surroundings look_around(const World& world, WorldState& state, const glm::dvec3
   // Against tissue no further in a tick than was looked, part of the tool's reach at a time, so that no voxel
   // is jumped over.
   if (!state.soft.empty()) around.range_m = kPasses * kSoftStep * soft_reach(world, state);
-  around.free = advance_through_free_space(world, state, device, soft_reach(world, state));
+  // What is pressed there is not in the map.
+  around.free =
+      !contact_on_grid(state) && advance_through_free_space(world, state, device, soft_reach(world, state));
   if (around.free) state.active_count = 0;
   if (!around.free && !state.soft.empty()) {
     around.near_soft = touch_soft(world, state, state.proxy_m, around.range_m);
@@ -249,6 +253,7 @@ Surroundings look_around(const World& world, WorldState& state, const glm::dvec3
       if (!object->touched().empty()) object->touch({});
     }
   }
+  prepare_grids(world, state, state.proxy_m);
   return around;
 }
 

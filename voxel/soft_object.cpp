@@ -8,6 +8,7 @@
 #include <limits>
 #include <utility>
 
+#include "voxel/composite_grid.h"
 #include "voxel/links.h"
 
 namespace voxel {
@@ -83,6 +84,8 @@ SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice)
   }
 }
 
+SoftObject::~SoftObject() = default;
+
 std::unique_ptr<SoftObject> SoftObject::copy() const {
   auto result = std::make_unique<SoftObject>(lattice_);
   result->state_ = state_;
@@ -97,6 +100,17 @@ std::unique_ptr<SoftObject> SoftObject::copy() const {
   result->touched_numbers_.assign(touched_numbers_.begin(), touched_numbers_.end());
   result->moved_ever_ = moved_ever_;
   result->relaxation_.copy_from(relaxation_);
+  if (grid_) {
+    result->grid_ = std::make_unique<CompositeGrid>(*grid_);
+    result->near_on_grid_.reserve(kMaxTouched);
+    result->near_on_grid_.assign(near_on_grid_.begin(), near_on_grid_.end());
+    result->on_grid_ = on_grid_;
+    result->centre_ = centre_;
+    result->grid_force_N_ = grid_force_N_;
+    result->grid_tool_m_ = grid_tool_m_;
+    result->nearest_m_ = nearest_m_;
+    result->grid_cycles_ = grid_cycles_;
+  }
   if (relaxation_.left_to_another())
     result->relaxation_.renew_coarse(result->state_, result->obstacle_view());
   return result;
@@ -135,6 +149,7 @@ bool SoftObject::clear_of(const ToolInBody& tool, const glm::dvec3& position) co
 }
 
 void SoftObject::touch(std::span<const VoxelId> near) noexcept {
+  if (grid_) return touch_on_grid(near);
   cycles_since_touch_ = 0;
   if (near.empty()) relaxation_.end_contact();
   if (cold_ticks_ > 0) --cold_ticks_;
@@ -234,6 +249,7 @@ void SoftObject::forget_moved_rows() noexcept {
 }
 
 bool SoftObject::push_out(const ToolInBody& tool) noexcept {
+  if (grid_) return push_out_on_grid(tool);
   sources_.clear();
   moves_.clear();
   bool any = false;
@@ -354,6 +370,10 @@ bool SoftObject::cycle_due() const noexcept {
 }
 
 void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
+  if (grid_) {
+    for (int n = 0; n < cycles; ++n) relax_on_grid(tool);
+    return;
+  }
   tool_ = tool;
   for (int n = 0; n < cycles; ++n) {
     for (Touch& t : touches_) relax_touch(tool, t);
@@ -420,6 +440,7 @@ void SoftObject::relax_near_pairs() noexcept {
 }
 
 void SoftObject::follow(const glm::dvec3& delta) noexcept {
+  if (grid_) return;  // it goes along in the next cycle
   sources_.clear();
   moves_.clear();
   for (const Touch& t : touches_) {
@@ -437,6 +458,7 @@ std::size_t SoftObject::give_way(const ToolInBody& tool, std::span<ToolBound> ou
   std::size_t count = 0;
   for (const Touch& t : touches_) {
     if (count == out.size()) break;
+    if (on_grid_ && !t.pressed) continue;  // all that are in the tool are
     const glm::dvec3 p = position(t);
     if (clear_of(tool, p)) continue;
     const Gap g = gap(tool, p);
@@ -457,6 +479,7 @@ std::size_t SoftObject::give_way(const ToolInBody& tool, std::span<ToolBound> ou
 
 void SoftObject::note_depths(const ToolInBody& tool) noexcept {
   const bool flat = tool.shape == ToolInBody::Shape::punch;
+  if (on_grid_ && !flat) return;  // as each cycle ends nothing is in it that could be elsewhere
   for (Touch& t : touches_) {
     const glm::dvec3 from = position(t) - tool.centre;
     const double along = glm::dot(from, tool.axis), distance = glm::length(from);
@@ -523,6 +546,10 @@ void SoftObject::relax_cycle() noexcept {
 }
 
 glm::dvec3 SoftObject::displacement_at(const glm::dvec3& rest_point) const noexcept {
+  if (on_grid_) {
+    const glm::dvec3 at = rest_point / lattice_->spacing_m();
+    return grid_->at_point({at.x, at.y, at.z});
+  }
   return moved_ever_ ? voxel::displacement_at(*lattice_, state_, rest_point) : glm::dvec3(0.0);
 }
 

@@ -25,6 +25,8 @@
 
 namespace voxel {
 
+class CompositeGrid;
+
 // The tool as one soft object sees it.
 struct ToolInBody {
   enum class Shape : std::uint8_t { ball, punch } shape = Shape::ball;
@@ -64,17 +66,45 @@ class SoftObject {
       4096;  // surface voxels near the tool; more are left to the next tick
 
   explicit SoftObject(std::shared_ptr<const Lattice> lattice);
+  ~SoftObject();
+  SoftObject(const SoftObject&) = delete;
+  SoftObject& operator=(const SoftObject&) = delete;
+  SoftObject(SoftObject&&) = delete;
+  SoftObject& operator=(SoftObject&&) = delete;
   // The same object in the same state, sharing the lattice; for references found beside a running session.
   [[nodiscard]] std::unique_ptr<SoftObject> copy() const;
 
   [[nodiscard]] const Lattice& lattice() const { return *lattice_; }
   [[nodiscard]] const Displacement& state() const { return state_; }
-  [[nodiscard]] glm::dvec3 position(VoxelId v) const { return lattice_->rest(v) + state_.at(v); }
+  // How far a voxel has moved; in state() only where the object keeps its contact there (see below).
+  [[nodiscard]] glm::dvec3 displacement(VoxelId v) const noexcept {
+    return on_grid_ ? displacement_on_grid(v) : state_.at(v);
+  }
+  [[nodiscard]] glm::dvec3 position(VoxelId v) const {
+    return on_grid_ ? position_on_grid(v) : lattice_->rest(v) + state_.at(v);
+  }
   // A voxel is a ball of half its smallest spacing: the tool's surface stays this far from its centre.
   [[nodiscard]] double voxel_radius() const { return 0.5 * lattice_->min_spacing_m(); }
   // Distance of a ball tool's centre to the centre of a voxel it touches. A tool smaller than the gaps
   // between voxels is felt as one that just cannot slip between them.
   [[nodiscard]] double reach(double tool_radius) const;
+
+  // A large object of one tissue may keep what a tool does to it on a composite grid (composite_grid.h): then
+  // a tick costs the same for any depth and size, and state() is the object as it was before, at rest, while
+  // displacement() is asked for what is felt. For objects that meet nothing but the tool. Returns what is in
+  // the way of that, and it stays as it is; empty: nothing. Allocates.
+  static constexpr std::size_t kLeastOnGrid = 200'000;  // voxels
+  std::string use_composite_grid(const ToolInBody& tool);
+  [[nodiscard]] bool uses_grid() const { return grid_ != nullptr; }
+  // While something is pressed.
+  [[nodiscard]] const CompositeGrid* grid_in_use() const { return on_grid_ ? grid_.get() : nullptr; }
+  // Once a tick, while nothing is pressed: what a contact with this tool will need is made ready, a part at a
+  // time.
+  void come_near_on_grid(const ToolInBody& tool) noexcept;
+  // Surface voxels where the contact is: while there is one, what may be touched is among them.
+  [[nodiscard]] std::span<const VoxelId> near_on_grid() const { return near_on_grid_; }
+  // Boxes many times as wide, for references. Allocates.
+  void widen_grid();
 
   // ---- the tick; none of these allocates, locks or throws ----
   // The surface voxels near the tool, each once; at most kMaxTouched are kept.
@@ -172,7 +202,7 @@ class SoftObject {
   void settle_dragged() noexcept;
 
   [[nodiscard]] bool moved_ever() const { return moved_ever_; }
-  [[nodiscard]] bool asleep() const { return relaxation_.asleep(); }
+  [[nodiscard]] bool asleep() const { return relaxation_.asleep() && !on_grid_; }
   // Largest force left on any free voxel (N): what separates the state from equilibrium.
   [[nodiscard]] double residual_N() const { return relaxation_.residual_N(); }
   [[nodiscard]] const Relaxation& relaxation() const { return relaxation_; }
@@ -234,7 +264,7 @@ class SoftObject {
     double load;         // of it, and of what hangs on it (N)
   };
 
-  [[nodiscard]] glm::dvec3 position(const Touch& t) const { return t.rest + state_.at(t.v); }
+  [[nodiscard]] glm::dvec3 position(const Touch& t) const { return t.rest + displacement(t.v); }
   [[nodiscard]] Gap gap(const ToolInBody& tool, const glm::dvec3& position) const noexcept;
   // Is the gap no overlap? Most that is near is far enough to be told so without a root: surely.
   [[nodiscard]] bool surely_clear_of(const ToolInBody& tool, const glm::dvec3& position) const noexcept;
@@ -269,6 +299,26 @@ class SoftObject {
   void hand_on(int axis) noexcept;
   void let_go_of_carried() noexcept;
   [[nodiscard]] ObstacleView obstacle_view() const { return {obstacles_, lattice_.get(), moving_obstacles_}; }
+  // ---- on the composite grid (soft_object_grid.cpp) ----
+  [[nodiscard]] glm::dvec3 displacement_on_grid(VoxelId v) const noexcept;
+  [[nodiscard]] glm::dvec3 position_on_grid(VoxelId v) const noexcept;
+  void list_near_on_grid() noexcept;
+  void touch_on_grid(std::span<const VoxelId> near) noexcept;
+  bool push_out_on_grid(const ToolInBody& tool) noexcept;
+  void relax_on_grid(const ToolInBody& tool) noexcept;
+  void press_on_grid(const ToolInBody& tool) noexcept;
+  void settle_on_grid(const ToolInBody& tool) noexcept;
+  [[nodiscard]] std::array<bool, 3> axes_due() noexcept;
+  [[nodiscard]] Reaction reaction_on_grid(const ToolInBody& tool) const noexcept;
+  [[nodiscard]] bool at_anchors_end(VoxelId v, const glm::dvec3& direction) const noexcept;
+  // The axis along which a voxel is pressed, the way out of the tool, and where on it the tool's surface is.
+  struct Bound {
+    int axis = 0;
+    double way = 1.0, u = 0.0;
+    bool any = false;
+  };
+  [[nodiscard]] Bound bound_by(const ToolInBody& tool, const Touch& touch,
+                               const glm::dvec3& u) const noexcept;
 
   std::shared_ptr<const Lattice> lattice_;
   Displacement state_;
@@ -312,7 +362,14 @@ class SoftObject {
   bool rests_ = false;        // none of them is begun now, if that can wait
   double unsettled_m_ = 0.0;  // how far the contact may be from the rest of the object
   bool moved_ever_ = false;
-  bool beside_bodies_ = false;  // that move
+  bool beside_bodies_ = false;           // that move
+  std::unique_ptr<CompositeGrid> grid_;  // none: contacts are in state_
+  bool on_grid_ = false;                 // there is a contact, and it is there
+  std::vector<VoxelId> near_on_grid_;
+  std::array<int, 3> centre_{};                      // of the contact
+  glm::dvec3 grid_force_N_{0.0}, grid_tool_m_{0.0};  // and where the tool was
+  double nearest_m_ = 0.0;                           // of a voxel to the tool
+  std::uint32_t grid_cycles_ = 0;                    // since contact began
 };
 
 }  // namespace voxel

@@ -4,6 +4,7 @@
 #include <bit>
 #include <glm/geometric.hpp>
 
+#include "voxel/composite_grid.h"
 #include "voxel/links.h"
 #include "voxel/soft_object.h"
 #include "voxel/yield.h"
@@ -11,6 +12,7 @@
 namespace voxel {
 
 double SoftObject::energy_J() const noexcept {
+  if (on_grid_) return grid_->energy_J();
   double energy = 0.0;
   std::array<Lanes, 3> bricks;
   for (RowId row = 0; row < lattice_->grid().rows(); ++row) {
@@ -43,6 +45,7 @@ double SoftObject::energy_J() const noexcept {
 }
 
 std::optional<glm::dvec3> SoftObject::carried_by_anchors_N() const noexcept {
+  if (on_grid_) return -grid_force_N_;
   constexpr float kTight = 1e-4F;  // of the spacing: nearer to its limit than this a link is at it
   const float tight_m = kTight * static_cast<float>(lattice_->min_spacing_m());
   glm::dvec3 carried(0.0);
@@ -103,7 +106,7 @@ std::size_t SoftObject::memory_bytes() const {
                              resident_bytes(moved_rows_) + row_moved_.resident_bytes() +
                              resident_bytes(changed_obstacles_) + resident_bytes(obstacle_changed_);
   return sizeof(*this) + lattice_->memory_bytes() + state + contact + others + chain_.memory_bytes() +
-         relaxation_.memory_bytes();
+         relaxation_.memory_bytes() + (grid_ ? grid_->memory_bytes() : 0);
 }
 
 }  // namespace voxel

@@ -405,6 +405,7 @@ void SoftObject::add_stiffness(int axis, glm::dmat3& stiffness) noexcept {
 }
 
 Reaction SoftObject::reaction(const ToolInBody& tool) noexcept {
+  if (grid_) return reaction_on_grid(tool);
   Reaction result;
   for (Touch& t : touches_) {
     t.tight = false;
@@ -441,6 +442,7 @@ Reaction SoftObject::reaction(const ToolInBody& tool) noexcept {
 }
 
 bool SoftObject::held_fast(VoxelId v, const glm::dvec3& direction) noexcept {
+  if (grid_) return at_anchors_end(v, direction);
   const glm::dvec3 size = glm::abs(direction);
   const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
   const bool upwards = direction[axis] > 0.0;

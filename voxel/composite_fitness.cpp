@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Which objects a composite grid is right for.
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "voxel/composite_grid.h"
+#include "voxel/link_weight.h"
+
+namespace voxel {
+namespace {
+
+constexpr int kTried = 10;                            // half width of level 0 where an object is tried
+constexpr double kConverges = 0.85;                   // of what is left of rest stays in a cycle
+constexpr double kMostOff = 0.05;                     // of the force, where boxes twice as wide have it
+constexpr int kFromAnchors = 16;                      // voxels
+constexpr double kLeastSeen = 0.8, kMostSeen = 1.25;  // of what anchors hold
+
+std::size_t index(int i) {
+  return static_cast<std::size_t>(i);
+}
+
+// Has every link a cell on some side? One in a sheet, or a row, of single voxels has none.
+bool has_thin_parts(const Lattice& lattice) {
+  for (const VoxelId v : lattice.surface()) {
+    const auto c = lattice.coordinates(v);
+    std::uint32_t filled = 0;
+    for (int n = 0; n < 27; ++n) {
+      if (lattice.filled(lattice.at(c[0] + n % 3 - 1, c[1] + n / 3 % 3 - 1, c[2] + n / 9 - 1)))
+        filled |= 1U << n;
+    }
+    for (int d = 0; d < 3; ++d) {
+      if (!lattice.filled(lattice.up(v, d))) continue;
+      const std::uint32_t parallels = parallel_links(filled, d);
+      const auto there = [parallels](int p, int q) { return (parallels >> (p + 1 + 3 * (q + 1)) & 1U) != 0; };
+      bool any = false;
+      for (const int p : {-1, 1}) {
+        for (const int q : {-1, 1}) any = any || (there(p, 0) && there(0, q) && there(p, q));
+      }
+      if (!any) return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
+std::string CompositeGrid::obstacle_to(const Lattice& lattice) {
+  if (lattice.materials().size() != 2) return "it is of several materials";
+  if (lattice.yields()) return "it keeps dents";
+  if (lattice.has_bricks()) return "it is of the accurate energy";
+  for (int d = 0; d < 3; ++d) {
+    const LinkLimit& l = lattice.tightest(d);
+    if (l.along_low >= 0.0F || l.along_high <= 0.0F || l.across <= 0.0F) return "its links have no slack";
+  }
+  if (has_thin_parts(lattice)) return "parts of it are one voxel thick";
+  const CompositeGrid grid(lattice, kHalfWidth);
+  // How far the chain lets tissue go beside other anchors, nothing tells a press.
+  if (!grid.anchored_by_sides()) return "it is anchored otherwise than by whole sides";
+  const double seen = grid.anchors_seen();
+  if (seen < kLeastSeen || seen > kMostSeen) return "coarse levels do not see what anchors hold";
+  return CompositeGrid(lattice, kTried).wrong_somewhere();
+}
+
+// Asked of places all over the surface: from any state without a tool cycles come to rest, and a patch that
+// is pressed feels what it does in boxes twice as wide. (Where a slot or an inclusion is as wide as the
+// spacing of a level, what that is told to do may stretch links across it that it knows nothing of: such
+// objects fail here.)
+std::string CompositeGrid::wrong_somewhere() {
+  constexpr std::size_t kPlaces = 12;
+  constexpr int kCycles = 10, kFirst = 2, kPressedCycles = 24;
+  constexpr double kDepth = 1.0;  // spacings
+  CompositeGrid wide(lattice_, 2 * kTried, 2 * kHalfWidth);
+  const auto surface = lattice_.surface();
+  for (std::size_t n = 0; n < kPlaces; ++n) {
+    const VoxelId v = surface[(2 * n + 1) * surface.size() / (2 * kPlaces)];
+    const Place place = lattice_.coordinates(v);
+    if (lattice_.anchored(v)) continue;
+    begin(place);
+    std::uint32_t random = 1;
+    for (Level& level : levels_) {
+      for (std::size_t i = 0; i < level.inverse[0].size(); ++i) {
+        for (std::size_t a = 0; a < 3; ++a) {
+          random = random * 1664525U + 1013904223U;
+          level.u[a][i] =
+              level.inverse[a][i] > 0.0F ? static_cast<float>(random >> 8U) * 0x1p-24F - 0.3F : 0.0F;
+        }
+      }
+    }
+    double before = energy_J();
+    for (int c = 0; c < kCycles; ++c) {
+      cycle();
+      const double now = energy_J();
+      if (c >= kFirst && !(now < kConverges * kConverges * before))
+        return "coarse levels do not come to rest";
+      before = now;
+    }
+    const glm::dvec3 outward = lattice_.outward(v), size = glm::abs(outward);
+    if (outward == glm::dvec3(0.0) || !far_from_anchors(place)) continue;
+    const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+    glm::dvec3 normal(0.0);
+    normal[axis] = outward[axis] > 0.0 ? -1.0 : 1.0;
+    std::array<bool, 3> axes{};
+    axes[index(axis)] = true;
+    std::array<double, 2> felt_N{};
+    for (CompositeGrid* const grid : {this, &wide}) {
+      grid->begin(place);
+      for (int c = 0; c < kPressedCycles; ++c) {
+        grid->clear_pressed();
+        grid->press(place, kDepth * lattice_.min_spacing_m() * normal, normal);
+        grid->cycle(axes);
+      }
+      felt_N[grid == this ? 0 : 1] = glm::length(grid->force_on_tool_N());
+    }
+    if (!(std::fabs(felt_N[0] - felt_N[1]) < kMostOff * felt_N[1]))
+      return "coarse levels know too little of its shape";
+  }
+  return {};
+}
+
+bool CompositeGrid::anchored_by_sides() const noexcept {
+  const auto& dims = lattice_.grid().dims;
+  for (RowId row = 0; row < lattice_.grid().rows(); ++row) {
+    for (std::uint32_t lanes = lattice_.anchored_lanes(row); lanes != 0; lanes &= lanes - 1) {
+      const Place at = lattice_.coordinates(row * kRow + static_cast<VoxelId>(std::countr_zero(lanes)));
+      bool in_side = false;
+      for (std::size_t d = 0; d < 3; ++d) {
+        in_side = in_side || (at[d] == 0 && cells_.anchored_part(d, 0) == 1.0) ||
+                  (at[d] == dims[d] - 1 && cells_.anchored_part(d, 1) == 1.0);
+      }
+      if (!in_side) return false;
+    }
+  }
+  return true;
+}
+
+bool CompositeGrid::far_from_anchors(const Place& voxel) const noexcept {
+  return !cells_.anchor_near(shifted(voxel), shifted(voxel), 2 * kFromAnchors);
+}
+
+}  // namespace voxel

@@ -1,0 +1,327 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "voxel/composite_passes.h"
+
+namespace voxel::composite {
+namespace {
+
+// A row that bounds nothing.
+const std::array<float, kMostOctets* kOctet> kNoBound = [] {
+  std::array<float, kMostOctets * kOctet> row{};
+  row.fill(kNone);
+  return row;
+}();
+
+// Of what ties nodes to stuck ones: with all of it a contact that moves lags, with a third it wavers.
+constexpr float kDrags = 0.5F;
+
+// Lanes of every second node, beginning with the first, with the second.
+struct Colours {
+  OctetMask even, odd;
+};
+HYBRID_INLINE void find_colours(Colours& c) {
+  c.even = OctetMask{-1, 0, -1, 0, -1, 0, -1, 0};
+  c.odd = OctetMask{0, -1, 0, -1, 0, -1, 0, -1};
+}
+
+// `kOctetsOfRow` 0: as many as the row has.
+template <int kOctetsOfRow>
+HYBRID_INLINE void smooth_row(const View& v, int j, int k) {
+  constexpr int kRoom = kOctetsOfRow == 0 ? kMostOctets : kOctetsOfRow;
+  const int octets = kOctetsOfRow == 0 ? static_cast<int>(v.stride / kOctet) : kOctetsOfRow;
+  const std::size_t row = static_cast<std::size_t>(k) * v.plane + static_cast<std::size_t>(j) * v.stride;
+  float* const u = v.u + row;
+  const float* const gy = v.link[1] + row;
+  const float* const gz = v.link[2] + row;
+  const float* const gx = v.link[0] + row;
+  const float* const lo = v.least != nullptr ? v.least + row : kNoBound.data();
+  const float* const hi = v.most_negative != nullptr ? v.most_negative + row : kNoBound.data();
+  const float* const of_all = v.with_drag != nullptr ? v.with_drag : v.inverse;
+  Octet own[kRoom], pull[kRoom];
+  for (int o = 0; o < octets; ++o) {
+    const int at = o * kOctet;
+    Octet x, g, sum{};
+    load(own[o], u + at);
+    load(x, u + at - v.stride);
+    load(g, gy + at - v.stride);
+    sum = g * x;
+    load(x, u + at + v.stride);
+    load(g, gy + at);
+    sum = v.spring[1] * (sum + g * x);
+    Octet other{};
+    load(x, u + at - v.plane);
+    load(g, gz + at - v.plane);
+    other = g * x;
+    load(x, u + at + v.plane);
+    load(g, gz + at);
+    pull[o] = sum + v.spring[2] * (other + g * x);
+    if (v.f != nullptr) {
+      load(x, v.f + row + at);
+      pull[o] += x;
+    }
+  }
+  Colours colours;
+  find_colours(colours);
+  for (int parity = 0; parity < 2; ++parity) {
+    const OctetMask& colour = parity == 0 ? colours.even : colours.odd;
+    for (int o = 0; o < octets; ++o) {
+      const int at = o * kOctet;
+      Octet down, up, low, high, back, ahead, inverse;
+      shift_down(down, own[o > 0 ? o - 1 : 0], own[o]);
+      shift_up(up, own[o], own[o + 1 < octets ? o + 1 : o]);
+      load(back, gx + at - 1);
+      load(ahead, gx + at);
+      load(inverse, of_all + row + at);
+      load(low, lo + at);
+      load(high, hi + at);
+      Octet x = (pull[o] + v.spring[0] * (back * down + ahead * up)) * inverse;
+      x = x > low ? x : low;
+      high = -high;
+      x = x < high ? x : high;
+      own[o] = (colour & (inverse > Octet{})) ? x : own[o];
+    }
+  }
+  for (int o = 0; o < octets; ++o) store(u + o * kOctet, own[o]);
+}
+
+template <int kOctetsOfRow>
+HYBRID_INLINE void smooth(const View& v) {
+  for (int colour = 0; colour < 2; ++colour) {
+    for (int k = v.first[2]; k <= v.last[2]; ++k) {
+      const int from = v.first[1] + ((v.first[1] + k + colour) & 1);
+      for (int j = from; j <= v.last[1]; j += 2) smooth_row<kOctetsOfRow>(v, j, k);
+    }
+  }
+}
+
+template <bool kLinks>
+HYBRID_INLINE void residual(const View& v, const std::array<int, 3>& first, const std::array<int, 3>& last) {
+  const int octets = static_cast<int>(v.stride / kOctet);
+  for (int k = first[2]; k <= last[2]; ++k) {
+    for (int j = first[1]; j <= last[1]; ++j) {
+      const std::size_t row = static_cast<std::size_t>(k) * v.plane + static_cast<std::size_t>(j) * v.stride;
+      const float* const u = v.u + row;
+      const float *const gx = v.link[0] + row, *const gy = v.link[1] + row, *const gz = v.link[2] + row;
+      for (int o = 0; o < octets; ++o) {
+        const int at = o * kOctet;
+        Octet own, x, g, r, along, all, inverse;
+        load(own, u + at);
+        load(x, u + at - v.stride);
+        load(g, gy + at - v.stride);
+        r = g * x;
+        load(x, u + at + v.stride);
+        load(g, gy + at);
+        r = v.spring[1] * (r + g * x);
+        load(x, u + at - v.plane);
+        load(g, gz + at - v.plane);
+        along = g * x;
+        load(x, u + at + v.plane);
+        load(g, gz + at);
+        r += v.spring[2] * (along + g * x);
+        load(x, u + at - 1);
+        load(g, gx + at - 1);
+        along = g * x;
+        load(x, u + at + 1);
+        load(g, gx + at);
+        r += v.spring[0] * (along + g * x);
+        load(all, v.all + row + at);
+        load(inverse, v.inverse + row + at);
+        r -= all * own;
+        const Octet zero{};
+        if constexpr (!kLinks) {
+          if (v.f != nullptr) {
+            load(x, v.f + row + at);
+            r += x;
+          }
+        }
+        r = inverse > zero ? r : zero;
+        if constexpr (!kLinks) {
+          const Octet one = zero + 1.0F;
+          Octet follows = inverse > zero ? one : zero, stuck{};
+          if (v.least != nullptr) {
+            load(x, v.least + row + at);
+            const OctetMask held = (own <= x) & (r < zero);
+            r = held ? zero : r;
+            follows = held ? zero : follows;
+            stuck = held ? one : stuck;
+          }
+          if (v.most_negative != nullptr) {
+            load(x, v.most_negative + row + at);
+            const OctetMask held = (own >= -x) & (r > zero);
+            r = held ? zero : r;
+            follows = held ? zero : follows;
+            stuck = held ? one : stuck;
+          }
+          store(v.follows + row + at, follows);
+          store(v.stuck + row + at, stuck);
+        }
+        store(v.residual + row + at, r);
+      }
+    }
+  }
+}
+
+}  // namespace
+
+HYBRID_WIDE void smooth_level(const View& v) noexcept {
+  switch (v.stride) {
+    case 8:
+      smooth<1>(v);
+      break;
+    case 16:
+      smooth<2>(v);
+      break;
+    case 24:
+      smooth<3>(v);
+      break;
+    case 32:
+      smooth<4>(v);
+      break;
+    default:
+      smooth<0>(v);
+  }
+}
+
+HYBRID_WIDE void residual_of_level(const View& v) noexcept {
+  residual<false>(v, v.first, v.last);
+}
+
+HYBRID_WIDE void links_of_level(const View& v, const std::array<int, 3>& first,
+                                const std::array<int, 3>& last) noexcept {
+  residual<true>(v, first, last);
+}
+
+HYBRID_WIDE void drags_of_level(const View& v) noexcept {
+  const int octets = static_cast<int>(v.stride / kOctet);
+  for (int k = v.first[2]; k <= v.last[2]; ++k) {
+    for (int j = v.first[1]; j <= v.last[1]; ++j) {
+      const std::size_t row = static_cast<std::size_t>(k) * v.plane + static_cast<std::size_t>(j) * v.stride;
+      for (int o = 0; o < octets; ++o) {
+        const std::size_t at = row + static_cast<std::size_t>(o * kOctet);
+        Octet x, g, sum, ties{}, own;
+        const std::array<std::size_t, 3> by{1, v.stride, v.plane};
+        for (std::size_t d = 0; d < 3; ++d) {
+          load(x, v.stuck + at - by[d]);
+          load(g, v.link[d] + at - by[d]);
+          sum = g * x;
+          load(x, v.stuck + at + by[d]);
+          load(g, v.link[d] + at);
+          ties += v.spring[d] * (sum + g * x);
+        }
+        load(own, v.drag + at);
+        load(x, v.follows + at);
+        store(v.drag + at, x * (own + kDrags * ties));
+      }
+    }
+  }
+}
+
+HYBRID_WIDE void take_drags(const View& v, float* f) noexcept {
+  const int octets = static_cast<int>(v.stride / kOctet);
+  for (int k = v.first[2]; k <= v.last[2]; ++k) {
+    for (int j = v.first[1]; j <= v.last[1]; ++j) {
+      const std::size_t row = static_cast<std::size_t>(k) * v.plane + static_cast<std::size_t>(j) * v.stride;
+      for (int o = 0; o < octets; ++o) {
+        const std::size_t at = row + static_cast<std::size_t>(o * kOctet);
+        Octet drag, own, load_f, all, inverse;
+        load(drag, v.drag + at);
+        load(own, v.u + at);
+        load(load_f, f + at);
+        load(all, v.all + at);
+        load(inverse, v.inverse + at);
+        store(f + at, load_f + drag * own);
+        const Octet zero{}, one = zero + 1.0F;
+        Octet sum = all + drag;
+        sum = inverse > zero ? sum : one;
+        const Octet with = one / sum;
+        store(v.with_drag + at, inverse > zero ? with : zero);
+      }
+    }
+  }
+}
+
+HYBRID_WIDE void tell_row(const Telling& t) noexcept {
+  for (int o = 0; o < t.octets; ++o) {
+    Octet sum{};
+    for (int n = 0; n < t.count; ++n) {
+      Octet row;
+      load(row, t.rows[static_cast<std::size_t>(n)] + (kOctet / 2) * o);
+      sum += t.weights[static_cast<std::size_t>(n)] * row;
+    }
+    Octet before, after;
+    if (t.odd) {
+      before = __builtin_shufflevector(sum, sum, 0, 1, 1, 2, 2, 3, 3, 4);
+      after = __builtin_shufflevector(sum, sum, 1, 2, 2, 3, 3, 4, 4, 5);
+    } else {
+      before = __builtin_shufflevector(sum, sum, 0, 0, 1, 1, 2, 2, 3, 3);
+      after = __builtin_shufflevector(sum, sum, 1, 1, 2, 2, 3, 3, 4, 4);
+    }
+    const int at = o * kOctet;
+    Octet part, own;
+    load(part, t.along + at);
+    load(own, t.u + at);
+    Octet x = before + part * (after - before);
+    if (t.adds) {
+      Octet follows;
+      load(follows, t.follows + at);
+      x = own + follows * x;
+    }
+    if (t.least != nullptr) {
+      Octet low;
+      load(low, t.least + at);
+      x = x > low ? x : low;
+    }
+    if (t.most_negative != nullptr) {
+      Octet high;
+      load(high, t.most_negative + at);
+      high = -high;
+      x = x < high ? x : high;
+    }
+    store(t.u + at, x);
+  }
+}
+
+// Left where it was, a tight cone came after its bound by a node a sweep, since only where its planes meet
+// does anything pull at it, and the force was a fifth off, and then for good. What a bound goes beyond goes
+// with it, too: found by the cycle alone, on the way down the force was twice as far off.
+HYBRID_WIDE void follow_bounds(float* u, const float* held, const float* least, const float* most_negative,
+                               std::size_t count) noexcept {
+  for (std::size_t n = 0; n < count; n += kOctet) {
+    Octet x, h;
+    load(x, u + n);
+    load(h, held + n);
+    const Octet none = Octet{} + 0.5F * kNone, zero{};
+    if (least != nullptr) {
+      Octet low;
+      load(low, least + n);
+      x = (((h > zero) & (low > none)) | (low > x)) ? low : x;
+    }
+    if (most_negative != nullptr) {
+      Octet high;
+      load(high, most_negative + n);
+      high = -high;
+      x = (((h < zero) & (high < -none)) | (high < x)) ? high : x;
+    }
+    store(u + n, x);
+  }
+}
+
+HYBRID_WIDE void note_held(float* held, const float* u, const float* least, const float* most_negative,
+                           std::size_t count) noexcept {
+  for (std::size_t n = 0; n < count; n += kOctet) {
+    Octet x, bound;
+    load(x, u + n);
+    const Octet one = Octet{} + 1.0F;
+    Octet h{};
+    if (least != nullptr) {
+      load(bound, least + n);
+      h = x <= bound ? one : h;
+    }
+    if (most_negative != nullptr) {
+      load(bound, most_negative + n);
+      h = x >= -bound ? -one : h;
+    }
+    store(held + n, h);
+  }
+}
+
+}  // namespace voxel::composite

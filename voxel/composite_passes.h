@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Innermost loops of a composite grid, in octets of nodes along x.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstring>
+
+#include "voxel/octet.h"
+#include "voxel/wide.h"
+
+namespace voxel::composite {
+
+inline constexpr float kNone = -1e30F;  // no bound
+inline constexpr int kMostOctets = 80;  // of a row
+
+// One axis of one level. Rows beside a box's, and nodes beside a row's, may be read: links there are worth 0.
+struct View {
+  float* u;
+  const float* f;                      // null: 0
+  const float *least, *most_negative;  // bounds; null: none
+  // 1 or 0: a node does what coarser levels say; it does not, because it is pulled against its bound.
+  float *residual, *follows, *stuck;
+  float *drag, *with_drag;           // a spring to where it was, and 1 / Σ springs with that; null: none
+  std::array<const float*, 3> link;  // [d] of the link up, without springs
+  const float *inverse, *all;
+  std::array<float, 3> spring;
+  std::array<int, 3> first, last;
+  std::size_t stride, plane;
+};
+
+// Each node to the minimum of its energy given all others, within its bounds; every second row first, and in
+// a row every second node.
+void smooth_level(const View& view) noexcept;
+// What is left of f; 0 for what does not move, and for what is pulled against the bound that holds it: that
+// does not follow coarser levels either.
+void residual_of_level(const View& view) noexcept;
+// What nodes that follow are tied with to those that are stuck, and what they are dragged by: into drag.
+void drags_of_level(const View& view) noexcept;
+// From now on a node's drag holds it where it is.
+void take_drags(const View& view, float* f) noexcept;
+// Of these rows, without f and bounds: what links pull with.
+void links_of_level(const View& view, const std::array<int, 3>& first,
+                    const std::array<int, 3>& last) noexcept;
+
+// A row as coarse ones have it: `rows` are those that weigh, from the coarse lane on by which lane 0 goes.
+struct Telling {
+  std::array<const float*, 4> rows;
+  std::array<float, 4> weights;
+  int count = 0;
+  bool odd = false;
+  const float *along, *least, *most_negative, *follows;  // bounds null: none
+  float* u;
+  int octets;
+  bool adds;  // to nodes that follow; else all nodes become what is told
+};
+void tell_row(const Telling& telling) noexcept;
+
+// What a bound held, or goes beyond, goes along with it.
+void follow_bounds(float* u, const float* held, const float* least, const float* most_negative,
+                   std::size_t count) noexcept;
+// 1: at its least, −1: at its most.
+void note_held(float* held, const float* u, const float* least, const float* most_negative,
+               std::size_t count) noexcept;
+
+}  // namespace voxel::composite
