@@ -38,7 +38,8 @@ constexpr std::size_t kMostApart = 64;  // bits of Apart::arrived
 constexpr std::size_t kRowsTaken = 250, kLeastRows = 100, kWorkOfRow = 12;
 // Parts of what is taken near a contact that is held still.
 constexpr int kParts = 8;
-// A give or a take, of some 100 us and up to 400, waits for a tick without one; so many ticks at most.
+// A give or a take, of some 100 us and up to 300, comes in a tick without one: the contact is asked to rest,
+// which it does while the tool presses. Otherwise so many ticks go by at most.
 constexpr int kMostWaits = 3;
 // Rows that another core relaxes in a tick's time, so that a fixed-step session takes results as late as one
 // in real time does.
@@ -80,7 +81,7 @@ void give(WorldState& state, RelaxedApart& object, std::size_t o) noexcept {
   object.due = state.tick + 1 + object.replica.work() / kRowsRelaxed;
 }
 
-// One of these a tick: a part of what is taken, a give, a take, some rows.
+// One of these a tick: a part of what is taken, what comes before a give or a take, these, some rows.
 void exchange(WorldState& state, std::size_t o, std::uint64_t& arrived) noexcept {
   RelaxedApart& object = *state.apart.objects[o];
   voxel::SoftObject& soft = *state.soft[o];
