@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
 
@@ -19,6 +20,7 @@ constexpr double kParted = 0.01;  // of it: less overlap is left to the next tic
 // Of it: where a surface rises less towards a voxel, on a facet's middle, it is no hollow. How far beside a
 // facet (barycentric) one may be that still lies on it.
 constexpr double kHollow = 0.005, kFarBeside = 0.5;
+constexpr double kTurns = 0.01;    // of what is left, whenever a pair is looked at: its way across a facet
 constexpr int kSteps = 4;          // over the surface, in search of the facet
 constexpr double kInside = -1e-9;  // barycentric
 constexpr VoxelId kNone = std::numeric_limits<VoxelId>::max();
@@ -224,6 +226,17 @@ bool shares_of(const PosedObject& a, const PosedObject& b, const PressedPair& pa
   return shares(at, surface.flat(to_body(b, place_of(a, pair.a))), out);
 }
 
+// Bricks that a facet's slope presses sideways give way up and down as well, and so tilt it the other way:
+// where links are at their limits in both objects four voxels handed half of their force to and fro in turns,
+// and what presses followed from tick to tick. So there it turns with the facet slowly. At rest it is the
+// same, and how far the two are apart, along the axis, does not depend on it. (Links alone give way along
+// their axes only, and came to rest before.)
+glm::dvec3 turned(const PosedObject& a, const PosedObject& b, const PressedPair& pair,
+                  const glm::dvec3& across) noexcept {
+  if (!a.object.lattice().has_bricks() && !b.object.lattice().has_bricks()) return across;
+  return glm::dot(pair.across, across) > 0.0 ? glm::mix(pair.across, across, kTurns) : across;
+}
+
 // What follows from its facet and its shares of it, as both objects are now.
 void lie_on_facet(const PosedObject& a, const PosedObject& b, PressedPair& pair) noexcept {
   std::array<glm::dvec3, 3> at, rest;
@@ -239,7 +252,7 @@ void lie_on_facet(const PosedObject& a, const PosedObject& b, PressedPair& pair)
   normal_of(at, pair.axis, !pair.upwards, across);
   const auto most = std::max_element(pair.share.begin(), pair.share.end());
   pair.b = pair.facet[static_cast<std::size_t>(most - pair.share.begin())];
-  pair.across = b.pose.rotation * across;
+  pair.across = turned(a, b, pair, b.pose.rotation * across);
 }
 
 }  // namespace
