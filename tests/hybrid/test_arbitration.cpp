@@ -320,9 +320,6 @@ std::vector<Scenario> scenarios() {
 // Of bricks, what does not hold yet stands here.
 Scenario of_bricks(Scenario scenario) {
   scenario.apart = scenario.bricks = true;
-  // Voxels that limits hold on both sides of a ridge stay a little where they were: 7 % of the force,
-  // sideways.
-  if (std::string_view(scenario.name) == "TissueOnARidge") scenario.balance = 0.08;
   if (std::string_view(scenario.name) == "TissueOnTissue") {
     // With both objects' links at their limits the force wavers from tick to tick: see below for z = 7. At z
     // = 6 it is 2.5 % off on average and 4 % in single ticks, at z = 5 1.6 % and 29 %.
