@@ -42,6 +42,14 @@ CompositeGrid::CompositeGrid(const Lattice& lattice, int half_width, int coarse_
   levels_.resize(count);
   for (std::size_t l = 0; l < count; ++l) make_room(levels_[l], l);
   if (whole_ > 0) make_room_to_move();
+  // What weighing a level takes: its half cells, two a node and axis and one on either side, a plane at a
+  // time.
+  std::size_t most = 0;
+  for (const Level& level : levels_) {
+    for (const Line& line : level.line) most = std::max(most, line.coarse.size());
+  }
+  for (Floats& plane : halves_) plane.reserve((2 * most + 2) * (2 * most + 2));
+  cells_.make_room(2 * most + 2);
   begin({dims[0] / 2, dims[1] / 2, dims[2] / 2});
 }
 
