@@ -44,6 +44,8 @@ void fill_dent(const SoftBody& body, const voxel::SoftObject& object, SoftDent& 
     box.first = nodes.first;
     box.count = nodes.count;
     box.step = nodes.step;
+    box.open_low = nodes.open_low;
+    box.open_high = nodes.open_high;
     box.stride = nodes.stride;
     box.plane = nodes.plane;
     const std::size_t size = nodes.plane * static_cast<std::size_t>(nodes.count[2]);

@@ -40,7 +40,7 @@ void lay_patch(const polygon::TriangleMesh& surface, const SoftPatch& patch, std
 
 }  // namespace
 
-// Between the nodes of the finest box that it is in; beyond the coarsest as at its sides.
+// Between the nodes of the finest box that it is in.
 glm::vec3 SoftDent::at(const glm::dvec3& at_rest_m) const noexcept {
   const glm::dvec3 point = ((at_rest_m - origin_m) * to_scene) / spacing_m;  // v · R is Rᵀ v
   for (std::size_t n = 0; n < count; ++n) {
@@ -50,7 +50,7 @@ glm::vec3 SoftDent::at(const glm::dvec3& at_rest_m) const noexcept {
     bool inside = true;
     for (std::size_t d = 0; d < 3; ++d) {
       const double steps = (point[static_cast<int>(d)] - box.first[d]) / box.step, last = box.count[d] - 1.0;
-      inside = inside && steps >= 0.0 && steps <= last;
+      inside = inside && (!box.open_low[d] || steps >= 0.0) && (!box.open_high[d] || steps <= last);
       const double at = std::clamp(steps, 0.0, last),
                    low = std::clamp(std::floor(at), 0.0, std::max(0.0, last - 1.0));
       node[d] = static_cast<std::size_t>(low);

@@ -61,6 +61,9 @@ struct SoftDent {
   struct Box {
     std::array<int, 3> first{}, count{};  // where node (0, 0, 0) is (unit: spacing of the object); how many
     int step = 1;                         // from one to the next; likewise
+    // Does the object go on beyond it there? Else what is beyond, which is less than half a step, is as at
+    // the last node.
+    std::array<bool, 3> open_low{}, open_high{};
     std::size_t stride = 0, plane = 0;
     std::array<std::vector<float>, 3> moved_m{};  // [axis of the object][k · plane + j · stride + i]
   };

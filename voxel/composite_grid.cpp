@@ -42,6 +42,14 @@ CompositeGrid::CompositeGrid(const Lattice& lattice, int half_width, int coarse_
   levels_.resize(count);
   for (std::size_t l = 0; l < count; ++l) make_room(levels_[l], l);
   if (whole_ > 0) make_room_to_move();
+  // What weighing a level takes: its half cells, two a node and axis and one on either side, a plane at a
+  // time.
+  std::size_t most = 0;
+  for (const Level& level : levels_) {
+    for (const Line& line : level.line) most = std::max(most, line.coarse.size());
+  }
+  for (Floats& plane : halves_) plane.reserve((2 * most + 2) * (2 * most + 2));
+  cells_.make_room(2 * most + 2);
   begin({dims[0] / 2, dims[1] / 2, dims[2] / 2});
 }
 
@@ -77,6 +85,14 @@ glm::dvec3 CompositeGrid::fine_at(const Place& voxel) const noexcept {
 void CompositeGrid::set_fine(const Place& voxel, const glm::dvec3& u) noexcept {
   const std::size_t n = fine_node(voxel);
   for (std::size_t a = 0; a < 3; ++a) levels_[0].u[a][n] = static_cast<float>(u[static_cast<int>(a)]);
+}
+
+void CompositeGrid::scale(std::size_t axis, double factor) noexcept {
+  const auto by = static_cast<float>(factor);
+  for (Level& level : levels_) {
+    const std::size_t end = level.first_row() + level.floats();
+    for (std::size_t n = level.first_row(); n < end; ++n) level.u[axis][n] *= by;
+  }
 }
 
 glm::dvec3 CompositeGrid::link_minimum(const Place& voxel) const noexcept {

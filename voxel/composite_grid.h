@@ -69,6 +69,8 @@ class CompositeGrid {
   // The displacement nearest to `u` that the chain lets a voxel have, anchors standing still (m).
   [[nodiscard]] glm::dvec3 within_anchors(const Place& voxel, const glm::dvec3& u) const noexcept;
 
+  // All displacements along an axis times a factor.
+  void scale(std::size_t axis, double factor) noexcept;
   // Before a cycle: nothing is pressed; then, each voxel of level 0 that is pressed along `normal`.
   void clear_pressed() noexcept { pressed_.clear(); }
   void press(const Place& voxel, const glm::dvec3& u, const glm::dvec3& normal) noexcept;
@@ -86,8 +88,9 @@ class CompositeGrid {
   [[nodiscard]] glm::dvec3 at(const Place& voxel) const noexcept;
   // For whoever draws: the nodes of its boxes, the finest first.
   struct Nodes {
-    Place first{}, count{};  // the voxel at which node (0, 0, 0) is; how many
-    int step = 1;            // voxels from one to the next
+    Place first{}, count{};                       // the voxel at which node (0, 0, 0) is; how many
+    int step = 1;                                 // voxels from one to the next
+    std::array<bool, 3> open_low{}, open_high{};  // does the object go on beyond it there?
     std::size_t stride = 0, plane = 0;
     std::array<const float*, 3> u{};  // [axis][k · plane + j · stride + i] (m)
   };

@@ -182,10 +182,15 @@ glm::dvec3 CompositeGrid::at(const Place& voxel) const noexcept {
 
 CompositeGrid::Nodes CompositeGrid::nodes_of(std::size_t box) const noexcept {
   const Level& level = levels_[box];
-  Nodes nodes{.step = level.step, .stride = level.stride, .plane = level.plane};
+  Nodes nodes;
+  nodes.step = level.step;
+  nodes.stride = level.stride;
+  nodes.plane = level.plane;
   for (std::size_t d = 0; d < 3; ++d) {
     nodes.first[d] = level.line[d].begin - cells_.offset()[d];
     nodes.count[d] = level.line[d].count;
+    nodes.open_low[d] = level.line[d].open_low;
+    nodes.open_high[d] = level.line[d].open_high;
     nodes.u[d] = level.u[d].data() + level.first_row();
   }
   return nodes;

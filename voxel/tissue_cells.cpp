@@ -170,6 +170,11 @@ void TissueCells::mark_anchors() {
   }
 }
 
+void TissueCells::make_room(std::size_t cubes) {
+  const std::size_t widest = cubes << (kKept - 1);  // cells; larger cubes are counted
+  cells_.reserve(widest * widest);
+}
+
 void TissueCells::plane(int m, int z, int first_x, int nx, int first_y, int ny, float* out) noexcept {
   const int edge = 1 << m;
   if (fills_box_) {

@@ -36,6 +36,8 @@ class TissueCells {
   [[nodiscard]] bool filled(const Place& p) const noexcept;
   [[nodiscard]] bool anchored(const Place& p) const noexcept;
 
+  // For plane() of so many cubes along an axis, so that it does not allocate.
+  void make_room(std::size_t cubes);
   // Of the cubes of 2^m cells an edge from number `first` on, in one plane z of such cubes: how many cells of
   // each are there. out: [y][x], `nx` to a row.
   void plane(int m, int z, int first_x, int nx, int first_y, int ny, float* out) noexcept;

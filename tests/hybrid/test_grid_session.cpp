@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Scenes whose soft object keeps its contact on a composite grid: which those are, and what graphics see.
+#include <algorithm>
+#include <glm/geometric.hpp>
+
+#include "hybrid/drawn_scene.h"
+#include "hybrid/fill_snapshot.h"
+#include "hybrid/live_surface.h"
+#include "tests/hybrid/touch.h"
+
+namespace {
+
+// A block of 64 voxels an edge, its top at z = 32 mm.
+std::string block(const std::string& more) {
+  return "format = 1\n[material.gel]\nyoung = 10000\npoisson = 0.3\nstretch = [0.9, 1.1]\nshear = 0.1\n"
+         "[material.stiff]\nyoung = 50000\npoisson = 0.3\n"
+         "[[soft]]\nname = \"block\"\nformula = \"block\"\nsize = [64, 64, 64]\nmaterial = \"gel\"\n" +
+         more + "[tool]\nradius = 8\n" + tests::unlimited + tests::some_path;
+}
+
+class GridSession : public tests::SceneFile {
+ protected:
+  // What the build says about where contacts are kept.
+  std::string note_of(const std::string& text) {
+    const hybrid::BuiltScene built = hybrid::build_scene(load(text));
+    for (const hybrid::BuildNote& note : built.notes) {
+      if (note.text.find("composite grid") != std::string::npos) return note.text;
+    }
+    return {};
+  }
+};
+
+TEST_F(GridSession, SaysWhereContactsAreKeptAndWhy) {
+  EXPECT_NE(note_of(block("spacing = 1\n")).find("kept on a composite grid"), std::string::npos);
+  EXPECT_EQ(note_of(block("spacing = 2\n")), "");
+  const std::string wall =
+      "spacing = 1\n[[rigid]]\nname = \"wall\"\nprimitive = \"box\"\nsize = [10, 90, 90]\nposition = [45, 0, "
+      "0]\n";
+  EXPECT_NE(note_of(block(wall)).find("other objects"), std::string::npos);
+}
+
+// A window is given nodes of boxes and finds the surface by them: where the object itself says that it is.
+TEST_F(GridSession, TheWindowShowsTheDent) {
+  const hybrid::Scene scene = load(block("spacing = 1\nposition = [5, 3, -2]\nrotation = [0, 0, 30]\n"));
+  const double top = 0.032 - 0.002 + 0.008;
+  tests::Touch touch(scene, {0.005, 0.003, top + 0.005}, true);
+  ASSERT_TRUE(touch.state().soft[0]->uses_grid());
+  touch.go({0.005, 0.003, top - 0.003}, 2e-4, 20);
+  const hybrid::DrawnScene drawn = hybrid::drawn_scene(scene, touch.built, "block");
+  const auto shown = [&] {
+    hybrid::Snapshot snapshot, live;
+    hybrid::fill_moved_near(touch.world(), touch.state(), snapshot);
+    hybrid::show_live(drawn, snapshot, {}, live);
+    return live.soft_moved_m[0];
+  };
+  const auto pressed = shown();
+  hybrid::Snapshot right;
+  hybrid::fill_moved(touch.world(), touch.state(), right);
+  ASSERT_EQ(pressed.size(), right.soft_moved_m[0].size());
+  float deepest = 0.0F, apart = 0.0F;
+  for (std::size_t v = 0; v < pressed.size(); ++v) {
+    deepest = std::max(deepest, -pressed[v].z);
+    apart = std::max(apart, glm::distance(pressed[v], right.soft_moved_m[0][v]));
+  }
+  EXPECT_GT(deepest, 2e-3F);
+  EXPECT_LT(apart, 1e-3F * deepest);
+  touch.go({0.005, 0.003, top + 0.02}, 1e-3, 5);
+  for (const glm::vec3& moved : shown()) ASSERT_EQ(moved, glm::vec3(0.0F));
+}
+
+// Slowly round a closed path, down, aside, up and back, tissue without friction gives the hand nothing.
+TEST_F(GridSession, ASlowClosedPathGivesTheHandNoEnergy) {
+  tests::Touch touch(load(block("spacing = 1\n")), {0.0, 0.0, 0.043}, true);
+  ASSERT_TRUE(touch.state().soft[0]->uses_grid());
+  double gained_J = 0.0, given_J = 0.0;
+  glm::dvec3 last_m(0.0, 0.0, 0.043), last_N(0.0);
+  const auto account = [&](const hybrid::TickResult& felt) {
+    const double work_J = 0.5 * glm::dot(last_N + felt.force_N, felt.device_m - last_m);
+    gained_J += work_J;
+    given_J += std::max(0.0, -work_J);
+    last_m = felt.device_m;
+    last_N = felt.force_N;
+  };
+  for (const glm::dvec3& corner : {glm::dvec3(0.0, 0.0, 0.037), glm::dvec3(0.005, 0.0, 0.037),
+                                   glm::dvec3(0.005, 0.0, 0.043), glm::dvec3(0.0, 0.0, 0.043)})
+    touch.go(corner, 2e-5, 0, account);
+  EXPECT_GT(given_J, 1e-4);
+  EXPECT_LT(gained_J, 1e-6);
+}
+
+}  // namespace
