@@ -251,7 +251,6 @@ class Builder {
             std::make_unique<voxel::Lattice>(std::move(volumes_[o]), options)));
         volumes_[o] = {};
         note_memory(d, soft_.back()->lattice());
-        note_without_slack(d, soft_.back()->lattice());
         for (const glm::dvec3& v : body.drawn.vertices) box_.add(body.to_scene(v));
         world_->soft.push_back(std::move(body));
       });
@@ -267,20 +266,6 @@ class Builder {
          fmt::format("touched everywhere it would take about {:.1f} GB, and this machine has {:.1f} GB; keep "
                      "the tool to a part of it, or give it a coarser spacing",
                      static_cast<double>(bytes) / 1e9, static_cast<double>(usable) / 1e9)});
-  }
-
-  // Where all of it is so, it stands on its anchors, and is felt as what it is: rigid.
-  void note_without_slack(const SoftDescription& d, const voxel::Lattice& lattice) {
-    const auto materials = lattice.materials().subspan(1);
-    const auto tied = std::count_if(materials.begin(), materials.end(), [](const voxel::LinkMaterial& m) {
-      return m.stretch_min >= 1.0 && m.stretch_max <= 1.0 && m.shear <= 0.0;
-    });
-    if (tied == 0 || tied == std::ssize(materials)) return;
-    built_.notes.push_back(
-        {d.name, polygon::Severity::warning,
-         "tissue without any slack (stretch = [1, 1], shear = 0) only moves as a whole, and where it lies on "
-         "softer tissue the tool pushes it away without feeling it; make it a rigid object, or give it some "
-         "slack, stretch = [0.95, 1.05] and shear = 0.05"});
   }
 
   void fill_map() {

@@ -78,7 +78,7 @@ bool ChainMail::stop_at(Displacement& state, std::span<const Obstacle> obstacles
   for (const RowId row : wave_.moved_rows()) {
     if (state.row_obstacles[row] == 0) continue;
     for (VoxelId v = row * kRow; v < (row + 1) * kRow; ++v) {
-      if (state.role[v] != Displacement::obstacle) continue;
+      if (!Displacement::at_obstacle(state.role[v])) continue;
       const Obstacle& o = obstacles[lattice_.surface_number(v)];
       if (o.moving && stop == Stop::at_standing) continue;
       const glm::dvec3 n(o.normal), before = state.at(v);

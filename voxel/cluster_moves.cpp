@@ -50,7 +50,8 @@ void ClusterMoves::forget(int axis) noexcept {
   }
 }
 
-bool ClusterMoves::gather(const Displacement& state, VoxelId v, int axis, bool upwards) noexcept {
+bool ClusterMoves::gather(const Multigrid& multigrid, const Displacement& state, VoxelId v, int axis,
+                          bool upwards) noexcept {
   const LazyArray<float>& u = state.u[static_cast<std::size_t>(axis)];
   const float tight = kTight * static_cast<float>(lattice_.min_spacing_m());
   cluster_.clear();
@@ -58,7 +59,9 @@ bool ClusterMoves::gather(const Displacement& state, VoxelId v, int axis, bool u
   mark_[v] |= kIn;
   for (std::size_t head = 0; head < cluster_.size(); ++head) {
     const VoxelId w = cluster_[head];
-    if (++looked_at_ > kMostLookedAt || lattice_.anchored(w) || state.role[w] != Displacement::free)
+    if (++looked_at_ > kMostLookedAt || lattice_.anchored(w)) return false;
+    const bool in_part = state.role[w] == Displacement::joined;
+    if (in_part ? multigrid.tool_holds_part(lattice_.part(w) - 1U) : state.role[w] != Displacement::free)
       return false;
     for (int d = 0; d < 3; ++d) {
       for (const bool up : {false, true}) {
@@ -74,13 +77,16 @@ bool ClusterMoves::gather(const Displacement& state, VoxelId v, int axis, bool u
   return true;
 }
 
-double ClusterMoves::move(Couplings& couplings, Displacement& state, VoxelId v, int axis,
+double ClusterMoves::move(Multigrid& multigrid, Displacement& state, VoxelId v, int axis,
                           double least_N) noexcept {
   if ((mark_[v] & (2U << axis)) != 0 || looked_at_ > kMostLookedAt) return 0.0;
-  const double own = link_force(couplings, state, v)[axis];
+  Couplings& couplings = multigrid.couplings();
+  const std::uint16_t part = lattice_.part(v);
+  const double own =
+      (part != 0 ? multigrid.part_force(part - 1U, state) : link_force(couplings, state, v))[axis];
   if (std::fabs(own) <= least_N) return 0.0;
   const bool upwards = own > 0.0;
-  const bool free = gather(state, v, axis, upwards);
+  const bool free = gather(multigrid, state, v, axis, upwards);
   if (!free) {
     forget(axis);
     return 0.0;

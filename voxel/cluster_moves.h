@@ -17,6 +17,7 @@
 #include "voxel/displacement.h"
 #include "voxel/lattice.h"
 #include "voxel/lazy_array.h"
+#include "voxel/multigrid.h"
 
 namespace voxel {
 
@@ -29,7 +30,8 @@ class ClusterMoves {
   // other way or is less than `least_N` a voxel, where it was looked at in another's cluster already, or when
   // the voxels looked at since begin() are too many.
   // Returns the force a voxel that moved them (N); 0: they stay.
-  double move(Couplings& couplings, Displacement& state, VoxelId v, int axis, double least_N) noexcept;
+  // Parts without slack come along as wholes, where the tool does not hold them.
+  double move(Multigrid& multigrid, Displacement& state, VoxelId v, int axis, double least_N) noexcept;
   // Voxels that the last move() moved.
   [[nodiscard]] const std::vector<VoxelId>& moved() const { return cluster_; }
 
@@ -38,7 +40,8 @@ class ClusterMoves {
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
-  bool gather(const Displacement& state, VoxelId v, int axis, bool upwards) noexcept;
+  bool gather(const Multigrid& multigrid, const Displacement& state, VoxelId v, int axis,
+              bool upwards) noexcept;
   void forget(int axis) noexcept;
 
   const Lattice& lattice_;

@@ -153,6 +153,8 @@ void Multigrid::balance_contacts(RowId row, Displacement& state, const ObstacleV
       for (int axis = 0; axis < 3 && force; ++axis)
         out[static_cast<std::size_t>(axis)][i] = static_cast<float>((*force)[axis]);
       by = force ? Holds::along(state.tool_normal[lattice_.surface_number(v)]) : Holds::kAll;
+    } else if (Displacement::in_part(state.role[v])) {
+      by = support_of_part(lattice_.part(v) - 1U);
     } else if (state.role[v] == Displacement::obstacle && blocked(obstacles, state, v, touching)) {
       const glm::vec3 n = obstacles.of(v).normal;
       const float into = out[0][i] * n.x + out[1][i] * n.y + out[2][i] * n.z;

@@ -48,9 +48,17 @@ struct Displacement {
     held = 1,      // near the tool or another soft object: moved by the contact solver only
     obstacle = 2,  // near a rigid surface: also subject to n·u >= c
     pressed = 3,   // on the tool, and nothing else: slides along it (see sliding.h)
+    // In a part without slack (whole_parts.h), and moved with that alone, whatever else it is; the second
+    // where it is also near a rigid surface. From construction on.
+    joined = 5,
+    joined_at_obstacle = 7,
   };
   // Those that stand while their rows are relaxed.
   [[nodiscard]] static bool stands(std::uint8_t role) noexcept { return (role & 1U) != 0; }
+  [[nodiscard]] static bool in_part(std::uint8_t role) noexcept { return role >= joined; }
+  [[nodiscard]] static bool at_obstacle(std::uint8_t role) noexcept {
+    return role == obstacle || role == joined_at_obstacle;
+  }
 
   explicit Displacement(const Lattice& lattice)
       : role(lattice.size()),
@@ -60,6 +68,11 @@ struct Displacement {
         rest(lattice),
         bricks(lattice) {
     for (auto& axis : u) axis = LazyArray<float>(lattice.size());
+    for (VoxelId v = 0; lattice.part_count() > 0 && v < lattice.size(); ++v) {
+      if (lattice.part(v) == 0) continue;
+      role[v] = joined;
+      ++row_standing[v / kRow];
+    }
   }
 
   std::array<LazyArray<float>, 3> u;                    // [axis][v] (unit: meter)
@@ -86,11 +99,15 @@ struct Displacement {
     for (int a = 0; a < 3; ++a) u[static_cast<std::size_t>(a)][v] = static_cast<float>(value[a]);
   }
   void set_role(VoxelId v, Role r) {
+    if (in_part(role[v])) {
+      if (r == held || r == pressed) return;
+      r = r == obstacle ? joined_at_obstacle : joined;
+    }
     if (role[v] == r) return;  // untouched tissue stays unwritten
     const RowId row = v / kRow;
     row_standing[row] = static_cast<std::uint8_t>(row_standing[row] + stands(r) - stands(role[v]));
     row_obstacles[row] =
-        static_cast<std::uint8_t>(row_obstacles[row] + (r == obstacle) - (role[v] == obstacle));
+        static_cast<std::uint8_t>(row_obstacles[row] + at_obstacle(r) - at_obstacle(role[v]));
     role[v] = r;
   }
 };

@@ -58,6 +58,7 @@ Lattice::Lattice(const LabelVolume& volume, const LatticeOptions& options, std::
   fill_force_scale();
   fill_anchors(volume, options);
   find_surface();
+  find_parts();
 }
 
 void Lattice::fill_labels(const LabelVolume& volume, std::uint8_t* give_back) {
@@ -323,6 +324,7 @@ void Lattice::fill_anchors(const LabelVolume& volume, const LatticeOptions& opti
     throw std::invalid_argument(
         "a free soft object has no equilibrium force: anchor a face, a label, or what touches bone");
   }
+  anchor_parts(lanes);
   list_anchors(lanes);
 }
 
@@ -421,7 +423,7 @@ glm::dvec3 Lattice::outward(VoxelId v) const noexcept {
 std::size_t Lattice::memory_bytes() const {
   return sizeof(*this) + label_.resident_bytes() + rows_.resident_bytes() + resident_bytes(listed_before_) +
          resident_bytes(anchored_) + resident_bytes(surface_) + resident_bytes(surface_before_) +
-         3 * limits_[0].size() * (sizeof(LinkLimit) + sizeof(float));
+         part_.resident_bytes() + 3 * limits_[0].size() * (sizeof(LinkLimit) + sizeof(float));
 }
 
 }  // namespace voxel

@@ -35,6 +35,11 @@ struct LinkMaterial {
   // Cells of which it is the softest are of the accurate energy (voxel/brick_loads.h), not of links.
   bool bricks = false;
 
+  // Voxels of such materials that are linked to one another only move as one.
+  [[nodiscard]] bool without_slack() const {
+    return stretch_min >= 1.0 && stretch_max <= 1.0 && shear <= 0.0;
+  }
+
   friend bool operator==(const LinkMaterial&, const LinkMaterial&) = default;
 };
 
@@ -155,6 +160,13 @@ class Lattice {
   // The materials by that number; of [0] nothing is true.
   [[nodiscard]] std::span<const LinkMaterial> materials() const { return materials_; }
   [[nodiscard]] bool has_bricks() const { return has_bricks_; }
+
+  // Parts without slack: voxels whose links to one another are of one length, two at least, and which so only
+  // move as one. Those that are anchored somewhere are anchored throughout. Of the others the kMostParts with
+  // most voxels have numbers from 1 on; 0: in none of these.
+  static constexpr std::size_t kMostParts = 1024;
+  [[nodiscard]] std::size_t part_count() const { return part_count_; }
+  [[nodiscard]] std::uint16_t part(VoxelId v) const { return part_count_ == 0 ? std::uint16_t{0} : part_[v]; }
   // Of a link in +d whose parallels (link_weight.h) leave voxels of materials `from` and end in `to`.
   [[nodiscard]] Spring spring_among(const std::array<std::uint8_t, 9>& from,
                                     const std::array<std::uint8_t, 9>& to, int d) const noexcept;
@@ -211,6 +223,15 @@ class Lattice {
   void fill_links(const LatticeOptions& options);
   void fill_force_scale();
   void find_surface();
+  // ---- parts without slack (lattice_parts.cpp) ----
+  [[nodiscard]] bool without_slack(VoxelId v) const {
+    return materials_[material_[label_[v]]].without_slack();
+  }
+  [[nodiscard]] bool any_without_slack() const;
+  template <class Enter>
+  void flood(std::vector<VoxelId>& voxels, const Enter& enter) const;
+  void anchor_parts(LazyArray<std::uint32_t>& lanes);
+  void find_parts();
   [[nodiscard]] std::uint32_t surface_from(VoxelId v) const noexcept;
 
   Grid grid_;
@@ -231,6 +252,8 @@ class Lattice {
   std::array<LinkLimit, 3> tightest_;
   std::array<std::vector<float>, 3> yield_m_;  // as limits_
   std::array<float, 3> first_yield_m_{};
+  LazyArray<std::uint16_t> part_;  // [v]; empty: there is none
+  std::size_t part_count_ = 0;
   std::vector<VoxelId> surface_;
   std::vector<std::uint32_t> surface_before_;  // [id / kSurfaceBlock] surface voxels with smaller ids
 };

@@ -2,6 +2,7 @@
 #include "voxel/multigrid.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "voxel/links.h"
@@ -13,6 +14,7 @@ constexpr int kMaxLevels = 10;
 constexpr int kSmallest = 3;                // cells across the coarsest level
 constexpr int kWrittenAtOnce = 5;           // from this level on springs are written out on construction
 constexpr std::size_t kMaxBalanced = 4096;  // rows; the contact of a tool has some hundred
+constexpr std::uint8_t kAllAxes = 7;
 constexpr std::size_t kMaxStopped = 65536;  // cells of all levels stopped at a time; more move a little
 
 }  // namespace
@@ -51,6 +53,21 @@ Multigrid::Multigrid(const Lattice& lattice) : lattice_(lattice), tiles_(lattice
   std::vector<Couplings*> couplings;
   for (const Level& level : levels_) couplings.push_back(level.couplings.get());
   holds_ = std::make_unique<Holds>(lattice, couplings);
+  if (lattice.part_count() == 0) return;
+  parts_ = std::make_unique<WholeParts>(lattice, couplings);
+  part_state_.resize(parts_->count());
+  for (PartState& p : part_state_) p.on.resize(levels_.size());
+  part_bounds_.reserve(kMostPartBounds);
+  // Rows are relaxed beside them, and they by themselves.
+  for (int l = 1; l < levels(); ++l) {
+    for (std::size_t p = 0; p < parts_->count(); ++p) {
+      for (const WholeParts::Run& run : parts_->on(l, p).rows) {
+        for (std::uint32_t lanes = run.lanes; lanes != 0; lanes &= lanes - 1)
+          at(l).stopped[run.row * kRow + static_cast<VoxelId>(std::countr_zero(lanes))] = kAllAxes;
+        mark(l, run.row, limited);
+      }
+    }
+  }
 }
 
 void Multigrid::prepare_level(int level) noexcept {
@@ -107,6 +124,7 @@ void Multigrid::stop_cells(VoxelId v, std::uint8_t bits) noexcept {
     }
     Level& level = at(l);
     const VoxelId cell = level.couplings->grid().at(c[0], c[1], c[2]);
+    if (parts_ != nullptr && l > 0 && parts_->of(l, cell) != 0) continue;
     if ((level.stopped[cell] & bits) == bits || stopped_.size() == stopped_.capacity()) return;
     level.stopped[cell] |= bits;
     mark(l, cell / kRow, limited);
@@ -128,7 +146,8 @@ void Multigrid::tie(VoxelId v, const glm::vec3& force_N) noexcept {
 void Multigrid::release_limited() noexcept {
   for (const StoppedCell& s : stopped_) {
     at(s.level).stopped[s.cell] = 0;
-    unmark(s.level, s.cell / kRow, limited);
+    if (parts_ == nullptr || s.level == 0 || !parts_->in_row(s.level, s.cell / kRow))
+      unmark(s.level, s.cell / kRow, limited);
   }
   stopped_.clear();
 }
@@ -167,6 +186,8 @@ void Multigrid::copy_from(const Multigrid& other) noexcept {
     Level& to = at(l);
     const Level& from = other.at(l);
     to.flags.copy_from(from.flags);
+    for (std::size_t p = 0; p < part_state_.size(); ++p)
+      part_state_[p].on[static_cast<std::size_t>(l)] = other.part_state_[p].on[static_cast<std::size_t>(l)];
     if (l == 0) continue;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       to.value[axis].copy_from(from.value[axis]);
@@ -219,6 +240,7 @@ void Multigrid::begin_anew() noexcept {
   drop_coarse();
   for (const RowId row : balanced_) balance_number_[row] = 0;
   balanced_.clear();
+  begin_parts_anew();
 }
 
 void Multigrid::keep_log() {
@@ -235,10 +257,10 @@ void Multigrid::keep_log() {
 
 std::size_t Multigrid::memory_bytes() const {
   std::size_t bytes = tiles_.memory_bytes() + log_.memory_bytes() + bricks_.memory_bytes() +
-                      holds_->memory_bytes() + hats_.memory_bytes() + resident_bytes(stopped_) +
-                      resident_bytes(still_stopped_) + row_tied_.resident_bytes() +
-                      balance_number_.resident_bytes() + balance_.resident_bytes() +
-                      resident_bytes(balanced_) + refused_.resident_bytes();
+                      (parts_ == nullptr ? 0 : parts_->memory_bytes()) + holds_->memory_bytes() +
+                      hats_.memory_bytes() + resident_bytes(stopped_) + resident_bytes(still_stopped_) +
+                      row_tied_.resident_bytes() + balance_number_.resident_bytes() +
+                      balance_.resident_bytes() + resident_bytes(balanced_) + refused_.resident_bytes();
   for (const auto& axis : tied_) bytes += axis.resident_bytes();
   for (const Level& l : levels_) {
     bytes += l.couplings->memory_bytes() + l.flags.resident_bytes() + l.stopped.resident_bytes();

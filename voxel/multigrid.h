@@ -24,6 +24,7 @@
 #include "voxel/row_kernels.h"
 #include "voxel/row_passes.h"
 #include "voxel/tile_queue.h"
+#include "voxel/whole_parts.h"
 
 namespace voxel {
 
@@ -146,6 +147,40 @@ class Multigrid {
   }
   void copy_from(const Multigrid& other) noexcept;
 
+  // ---- parts without slack (whole_parts.h, part_passes.cpp); part numbers begin with 0 ----
+  [[nodiscard]] bool has_parts() const { return parts_ != nullptr; }
+  [[nodiscard]] const WholeParts& parts() const { return *parts_; }
+  // On which pressed voxels of theirs the tool holds them, along its normals, until this is called again.
+  void set_part_contacts(const Displacement& state, std::span<const VoxelId> held) noexcept;
+  [[nodiscard]] bool tool_holds_part(std::size_t part) const { return part_state_[part].by_tool.count > 0; }
+  // What pulls a part (N): springs and loads, and what counts as balanced in it where that is asked for, too.
+  [[nodiscard]] glm::dvec3 part_force(std::size_t part, const Displacement& state) const noexcept;
+  [[nodiscard]] glm::dvec3 balance_of_part(std::size_t part) const noexcept {
+    return part_state_[part].balance;
+  }
+  // How far its links let it go, [axis][down, up] (m); no less than 0 up, no more down.
+  using PartRoom = std::array<std::array<double, 2>, 3>;
+  [[nodiscard]] PartRoom room_of_part(std::size_t part, const Displacement& state) const noexcept;
+  // Adds that to `bounds`, which has room for six more.
+  static void add_bounds(const PartRoom& room, std::vector<PartBound>& bounds);
+  // The same as far as its links and its obstacles let it, and along the tool where that holds it, or the
+  // tool is the caller's business; returns how far it went. What another found is not news to it.
+  enum class Tool : std::uint8_t { holds, is_seen_to };
+  enum class Note : std::uint8_t { in_log, nowhere };
+  glm::dvec3 move_part(std::size_t part, const glm::dvec3& way, Displacement& state,
+                       const ObstacleView& obstacles, Tool tool = Tool::holds,
+                       Note note = Note::in_log) noexcept;
+  // Those that meet a box of a level go to where the springs that leave them are in balance.
+  void smooth_parts(int level, const WholeParts::Box& box, Displacement& state,
+                    const ObstacleView& obstacles) noexcept;
+  // What pulls them is found, before the loads of the next coarser level are, and makes up the loads of what
+  // they are there afterwards. Returns the largest force a voxel (N); of level 0 only it is one of voxels.
+  float measure_parts(int level, const WholeParts::Box& box, Displacement& state,
+                      const ObstacleView& obstacles) noexcept;
+  void load_parts(int level, const WholeParts::Box& box) noexcept;
+  // What pulls them counts as balanced from now on, as with balance().
+  void balance_parts(const Displacement& state) noexcept;
+
   // ---- two of the same lattice that work on one object, in turns (replica.h) ----
   // From now on every row that is written is noted. Allocates.
   void keep_log();
@@ -211,6 +246,23 @@ class Multigrid {
   static constexpr float kTight = 1e-4F;      // of the spacing: nearer to its limit than this a link is at it
   static constexpr float kLeastLoad = 0.25F;  // of the tolerance: loads less wrong than this are right
 
+  // Of a part. What is of one level stands by level.
+  struct PartOnLevel {
+    glm::dvec3 left{0.0};    // what pulls it, as measured (N)
+    glm::dvec3 passed{0.0};  // of the level below, what its cells are pulled by (N)
+    glm::dvec3 load{0.0};    // (N)
+    glm::dvec3 untold{0.0};  // how far it went that the level below was not told (m)
+    glm::dvec3 sum{0.0};     // of what its cells are told (m)
+    bool active = false;     // in the cycle that goes on
+  };
+  struct PartState {
+    std::vector<PartOnLevel> on;   // [level]
+    HeldDirections by_tool, held;  // by it; and by obstacles
+    std::uint8_t stopped = 0;      // bits: of axes on which a limit holds it
+    glm::dvec3 balance{0.0};       // (N)
+  };
+  static constexpr std::size_t kMostPartBounds = 1024;
+
   [[nodiscard]] Level& at(int level) { return levels_[static_cast<std::size_t>(level)]; }
   [[nodiscard]] const Level& at(int level) const { return levels_[static_cast<std::size_t>(level)]; }
   void prepare_level(int level) noexcept;
@@ -249,6 +301,26 @@ class Multigrid {
   float smooth_tilted(int level, RowId row, const LevelRow& r, OctetSpan span) noexcept;
   void add_tilt(int level, RowId row, const LevelRow& r, OctetSpan span, RowVector& out) noexcept;
 
+  // ---- parts ----
+  template <class Visit>
+  void for_parts(int level, const WholeParts::Box& box, const Visit& visit) noexcept;
+  [[nodiscard]] glm::dvec3 part_pull(int level, std::size_t part, glm::dvec3& stiffness) noexcept;
+  [[nodiscard]] PartRoom room_with_others(std::size_t part, const glm::dvec3& way,
+                                          const Displacement& state) const noexcept;
+  void take_others_along(std::size_t part, Displacement& state) noexcept;
+  std::uint8_t add_what_comes_along(std::size_t part, const Displacement& state, glm::dvec3& pull) noexcept;
+  void shift_part(std::size_t part, const glm::dvec3& way, Displacement& state) noexcept;
+  void shift_cells(int level, std::size_t part, const glm::dvec3& way) noexcept;
+  void set_part_lanes(int level, RowId row, OctetSpan span, RowVector& out) const noexcept;
+  void pass_part_lanes(int level, RowId row, OctetSpan span, const RowVector& sums) noexcept;
+  void note_told_parts(int level, RowId row, OctetSpan span, const RowVector& way) noexcept;
+  void tell_parts(int level, Displacement& state, const ObstacleView& obstacles) noexcept;
+  void stop_at_obstacles(std::size_t part, const Displacement& state, const ObstacleView& obstacles,
+                         Tool tool) noexcept;
+  [[nodiscard]] Holds::Support support_of_part(std::size_t part) const noexcept;
+  void forget_untold_parts(int level, RowId row) noexcept;
+  void begin_parts_anew() noexcept;
+
   const Lattice& lattice_;
   TileQueue tiles_;
   ChangeLog log_;
@@ -267,6 +339,9 @@ class Multigrid {
   LazyVector<RowId> balanced_;
   LazyArray<float> balance_;                 // [as balanced_][axis][lane]
   LazyArray<std::uint16_t> balance_number_;  // [row] 1 + where; 0: none
+  std::unique_ptr<WholeParts> parts_;        // null: there is none
+  std::vector<PartState> part_state_;
+  std::vector<PartBound> part_bounds_;
   std::array<AxisLimits, 3> yield_limits_;
   bool all_visited_ = false;  // cycles look at all in their boxes: which rows are active nobody asks
   float tolerance_N_ = 0.0F, quiet_m_ = 0.0F, hold_ = 1.0F;

@@ -138,6 +138,7 @@ void Multigrid::keep_balanced(float part, const Displacement& state) noexcept {
       }
     }
   }
+  for (PartState& p : part_state_) p.balance *= static_cast<double>(part);
 }
 
 void Multigrid::add_ties(RowId row, LevelRow& r, RowVector& loads) noexcept {
@@ -204,6 +205,8 @@ float Multigrid::restrict_loads(int level, RowId row, Displacement& state, const
     RowVector residual;
     const RowResidual left = residual_of(level - 1, fine, state, obstacles, below, residual);
     worst = std::max(worst, left.most_N);
+    if (parts_ != nullptr && parts_->in_row(level - 1, fine))
+      set_part_lanes(level - 1, fine, below, residual);
     for (std::size_t axis = 0; axis < 3; ++axis)
       add_pairs(residual[axis].data(), below, sums[axis].data() + half * kRow / 2);
     if (!span.whole()) continue;
@@ -213,6 +216,7 @@ float Multigrid::restrict_loads(int level, RowId row, Displacement& state, const
     if (!at_rest) mark(level - 1, fine, active);
   }
   log_.note(level, row);
+  if (parts_ != nullptr && parts_->in_row(level, row)) pass_part_lanes(level, row, span, sums);
   take_loads(told_row(level, row), sums, loads(level, row), span);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::size_t begin =
@@ -261,6 +265,7 @@ void Multigrid::forget_untold(int level, RowId row, Displacement& state,
     std::fill_n(l.value[axis].data() + begin, kRow, 0.0F);
     std::fill_n(l.told[axis].data() + begin, kRow, 0.0F);
   }
+  if (parts_ != nullptr && parts_->in_row(level, row)) forget_untold_parts(level, row);
   restrict_values(level, row, state);
   restrict_loads(level, row, state, obstacles);
   unmark(level, row, changed);
@@ -351,6 +356,7 @@ void Multigrid::tell(int level, const Told& box, Displacement& state, const Obst
     }
   }
   if (again) tell_again(state, obstacles);
+  if (parts_ != nullptr) tell_parts(level, state, obstacles);
 }
 
 void Multigrid::tell_row(int level, RowId row, const std::array<HatRow, 4>& hats, Displacement& state,
@@ -364,6 +370,7 @@ void Multigrid::tell_row(int level, RowId row, const std::array<HatRow, 4>& hats
       correction[axis][i] /= 1.0F + nearer[i];
   }
   log_.note(level, row);
+  if (parts_ != nullptr && parts_->in_row(level, row)) note_told_parts(level, row, span, correction);
   Refused at_once;
   Refused& refused = again && refused_count_ < refused_.size() ? refused_[refused_count_] : at_once;
   correct(level, row, correction, state, obstacles, span, refused);

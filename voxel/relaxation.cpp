@@ -88,6 +88,7 @@ void Relaxation::give_away(Displacement& state, const ObstacleView& obstacles) n
         multigrid_.balance(g.row(c, j, k), state, obstacles);
     }
   }
+  multigrid_.balance_parts(state);
 }
 
 void Relaxation::stir_all() noexcept {
@@ -104,6 +105,7 @@ void Relaxation::hold_what_stands(const Displacement& state, std::span<const Vox
       standing_.push_back(v);
   }
   multigrid_.set_held(standing_);
+  multigrid_.set_part_contacts(state, held);
 }
 
 std::uint64_t Relaxation::run(Displacement& state, const ObstacleView& obstacles,
@@ -268,28 +270,33 @@ bool Relaxation::relax_limited(Displacement& state, const ObstacleView& obstacle
 // Which voxel is first goes round, so that all have their turn however few a round has time for.
 double Relaxation::move_clusters(Displacement& state, const ObstacleView& obstacles) noexcept {
   clusters_.begin();
-  std::uint64_t count = 0;
-  multigrid_.for_limited([&count](VoxelId, int) { ++count; });
-  if (count == 0) return 0.0;
-  const std::uint64_t first = cycles_ * kNextFirst % count;
   double most_N = 0.0;
   std::array<double, 3> went{};
   int moves = 0;
+  const auto move = [&](VoxelId v, int axis) {
+    const float from = state.u[static_cast<std::size_t>(axis)][v];
+    const double force = clusters_.move(multigrid_, state, v, axis, 0.5 * tolerance_N_);
+    if (force == 0.0) return;
+    most_N = std::max(most_N, force);
+    // Every such step lowers the energy, though it may be far from limit to limit to where the force falls.
+    const auto way = static_cast<double>(state.u[static_cast<std::size_t>(axis)][v] - from);
+    went[static_cast<std::size_t>(axis)] += way;
+    ++moves;
+    if (std::fabs(way) > kProgress * lattice_.min_spacing_m())
+      cycles_without_gain_ = std::min(cycles_without_gain_, kPatience / 2 + 1);
+    for (const VoxelId w : clusters_.moved()) multigrid_.stir(0, w / kRow);
+  };
+  // Parts without slack that limits hold, which are pulled otherwise than what holds them.
+  for (std::size_t p = 0; multigrid_.has_parts() && p < multigrid_.parts().count(); ++p) {
+    for (int axis = 0; axis < 3; ++axis) move(multigrid_.parts().first(p), axis);
+  }
+  std::uint64_t count = 0;
+  multigrid_.for_limited([&count](VoxelId, int) { ++count; });
+  const std::uint64_t first = count == 0 ? 0 : cycles_ * kNextFirst % count;
   for (const bool before : {false, true}) {
     std::uint64_t n = 0;
     multigrid_.for_limited([&](VoxelId v, int axis) {
-      if ((n++ < first) != before) return;
-      const float from = state.u[static_cast<std::size_t>(axis)][v];
-      const double force = clusters_.move(multigrid_.couplings(), state, v, axis, 0.5 * tolerance_N_);
-      if (force == 0.0) return;
-      most_N = std::max(most_N, force);
-      // Every such step lowers the energy, though it may be far from limit to limit to where the force falls.
-      const auto way = static_cast<double>(state.u[static_cast<std::size_t>(axis)][v] - from);
-      went[static_cast<std::size_t>(axis)] += way;
-      ++moves;
-      if (std::fabs(way) > kProgress * lattice_.min_spacing_m())
-        cycles_without_gain_ = std::min(cycles_without_gain_, kPatience / 2 + 1);
-      for (const VoxelId w : clusters_.moved()) multigrid_.stir(0, w / kRow);
+      if ((n++ < first) == before) move(v, axis);
     });
   }
   for (std::size_t axis = 0; axis < 3 && moves > 0 && obstacles.obstacles.empty(); ++axis) {
@@ -309,7 +316,7 @@ void Relaxation::end_round(Displacement& state, const ObstacleView& obstacles, d
   residual_N = std::max(residual_N, static_cast<double>(multigrid_.bricks().left_N()));
   // Only when nothing else moves any more: between other corrections they would undo one another (energy grew
   // 1.9 times within a cycle).
-  if (residual_N < kNearRest * tolerance_N_ || cycles_without_gain_ > kPatience / 2)
+  if (residual_N < kNearRest * tolerance_N_ || cycles_without_gain_ > kPatience / 2 || multigrid_.has_parts())
     residual_N = std::max(residual_N, move_clusters(state, obstacles));
   // While rounds gain nothing, what limits hold stays held for a few of them: let go of in every round, two
   // sets of voxels can take turns for ever.

@@ -201,6 +201,9 @@ class Relaxation {
   [[nodiscard]] RowBox clipped(int level, const RowBox& box) const noexcept;
   [[nodiscard]] int last_level() const noexcept;  // of a cycle
   [[nodiscard]] static std::size_t octets(const RowBox& box);
+  [[nodiscard]] static WholeParts::Box cells(const RowBox& b) {
+    return {{b.q0 * kOctet, b.j0, b.k0}, {b.q1 * kOctet + kOctet - 1, b.j1, b.k1}};
+  }
   [[nodiscard]] std::size_t octets_of_cycle() const noexcept;
   [[nodiscard]] LevelBoxes& boxes(int level) { return boxes_[static_cast<std::size_t>(level)]; }
 

@@ -181,22 +181,28 @@ void Relaxation::step(int n, Displacement& state, const ObstacleView& obstacles,
   // What coarse levels know and finer ones do not is told first: a step between voxels that were told and
   // others that were not would look like a force to the cells above it.
   for (int l = last_level() - 1; n == 0 && l >= 0; --l) tell_box(l, state, obstacles);
+  const WholeParts::Box box = cells(boxes(step.level).smoothed);
   switch (step.what) {
     case Step::smooths:
       if (smoothed) break;
       for (const int colour : {0, 1}) smooth_box(step.level, colour, state, obstacles, look);
+      multigrid_.smooth_parts(step.level, box, state, obstacles);
       break;
     case Step::passes_on:
       pass_on(step.level, state, obstacles, look);
       break;
     case Step::solves: {
       const int sweeps = apart_ ? kContactSweeps : kCoarsestSweeps;
-      for (int k = 0; k < 2 * sweeps; ++k) smooth_box(step.level, k & 1, state, obstacles, look);
+      for (int k = 0; k < 2 * sweeps; ++k) {
+        smooth_box(step.level, k & 1, state, obstacles, look);
+        if (k % 2 != 0) multigrid_.smooth_parts(step.level, box, state, obstacles);
+      }
       break;
     }
     case Step::tells:
       tell_box(step.level, state, obstacles);
       for (const int colour : {1, 0}) smooth_box(step.level, colour, state, obstacles, look);
+      multigrid_.smooth_parts(step.level, box, state, obstacles);
   }
 }
 
@@ -221,6 +227,7 @@ void Relaxation::pass_on(int l, Displacement& state, const ObstacleView& obstacl
     // Apart, coarse cells hold only what was moved since all was balanced, and know that from themselves.
     if (!apart_) multigrid_.restrict_values(l + 1, row, state, span);
   });
+  const float of_parts = multigrid_.measure_parts(l, cells(boxes(l).smoothed), state, obstacles);
   for_rows(l + 1, parents, [&](RowId row, OctetSpan span, int, int) {
     if (look == Look::active) {
       if (!multigrid_.has(l + 1, row, Multigrid::renewed)) return;
@@ -229,7 +236,10 @@ void Relaxation::pass_on(int l, Displacement& state, const ObstacleView& obstacl
     const float worst = multigrid_.restrict_loads(l + 1, row, state, obstacles, span);
     if (l == 0) running_residual_N_ = std::max(running_residual_N_, static_cast<double>(worst));
   });
-  if (l == 0) multigrid_.renew_holds();
+  multigrid_.load_parts(l + 1, cells(parents));
+  if (l > 0) return;
+  running_residual_N_ = std::max(running_residual_N_, static_cast<double>(of_parts));
+  multigrid_.renew_holds();
 }
 
 void Relaxation::lay_whole_boxes() noexcept {
@@ -250,9 +260,11 @@ void Relaxation::renew_coarse(Displacement& state, const ObstacleView& obstacles
   for (int l = 1; l < multigrid_.levels(); ++l) {
     for_rows(l, boxes(l).parents,
              [&](RowId row, OctetSpan span, int, int) { multigrid_.restrict_values(l, row, state, span); });
+    multigrid_.measure_parts(l - 1, cells(boxes(l - 1).smoothed), state, obstacles);
     for_rows(l, boxes(l).parents, [&](RowId row, OctetSpan span, int, int) {
       multigrid_.restrict_loads(l, row, state, obstacles, span);
     });
+    multigrid_.load_parts(l, cells(boxes(l).parents));
   }
 }
 

@@ -63,10 +63,12 @@ Replica::Replica(SoftObject& object)
       found_{Parcel(lattice_.grid().rows(), arrays_of(lattice_)),
              Parcel(lattice_.grid().rows(), arrays_of(lattice_))},
       again_(lattice_.grid().rows()) {
+  for (PartWays& ways : found_parts_) ways.assign(lattice_.part_count(), glm::dvec3(0.0));
   multigrid().keep_log();
   relaxation_.copy_from(object.relaxation_);
   object.relaxation_.leave_to_another();
-  least_m_ = multigrid().quiet_m();
+  // A part without slack sums what all round it are off by.
+  least_m_ = multigrid().has_parts() ? multigrid().passed_on_m() : multigrid().quiet_m();
   const std::size_t most_held = lattice_.surface().size() + SoftObject::kMaxTouched;
   held_.reserve(most_held);
   given_held_.reserve(most_held);
@@ -120,7 +122,7 @@ void Replica::give(SoftObject& object) noexcept {
   given_contacts_.clear();
   for (const VoxelId v : object.all_held_) {
     given_held_.push_back(v);
-    if (object.state_.role[v] == Displacement::pressed)
+    if (object.state_.role[v] == Displacement::pressed || Displacement::in_part(object.state_.role[v]))
       given_contacts_.push_back({v, object.state_.tool_normal[lattice_.surface_number(v)]});
   }
   near_ = given_held_.empty() ? Relaxation::NearRows{} : object.relaxation_.near_contact();
@@ -173,7 +175,11 @@ void Replica::open_given() noexcept {
     quick_ = kQuickResults;
     far_ = kQuickResults + kUnsettled;
   }
-  if (given_pressed_ == 0) quick_ = 0;
+  // What presses a part without slack moves tissue all round that, wherever the contact is.
+  const bool any_part =
+      std::any_of(held_.begin(), held_.begin() + static_cast<std::ptrdiff_t>(given_pressed_),
+                  [this](VoxelId v) { return lattice_.part(v) != 0; });
+  if (given_pressed_ == 0 || any_part) quick_ = 0;
 }
 
 void Replica::relax_quickly(const ObstacleView& obstacles) noexcept {
@@ -214,7 +220,7 @@ void Replica::relax() noexcept {
 Replica::Found Replica::found() const {
   const Parcel& parcel = found_[1 - taking_];
   const std::size_t floats = arrays_of(lattice_) * kRow;
-  Found result{{}, {}, near_count_, found_far_, at_rest_, residual_N_};
+  Found result{{}, {}, near_count_, found_far_, at_rest_, residual_N_, found_parts_[1 - taking_]};
   for (std::size_t n = 0; n < parcel.count(); ++n) {
     result.rows.push_back(parcel.row(n));
     result.values.insert(result.values.end(), parcel.values(n), parcel.values(n) + floats);
@@ -228,6 +234,7 @@ void Replica::find_again(const Found& found) noexcept {
   parcel.clear();
   for (std::size_t n = 0; n < found.rows.size(); ++n)
     std::copy_n(found.values.data() + n * floats, floats, parcel.add(found.rows[n]));
+  found_parts_[1 - taking_] = found.part_ways;
   near_count_ = found.near_count;
   found_far_ = found.far;
   at_rest_ = found.at_rest;
@@ -252,6 +259,7 @@ void Replica::pack_changes() noexcept {
   parcel.clear();
   at_rest_ = relaxation_.asleep();
   residual_N_ = relaxation_.residual_N();
+  pack_parts();
   sort_by_distance();
   near_count_ = 0;
   const std::size_t count = multigrid().log().rows(0).size();
@@ -267,6 +275,52 @@ void Replica::pack_changes() noexcept {
     if (n < near) near_count_ = parcel.count();
   }
   if (at_rest_) pack_kept_back();
+}
+
+// What of a row is of a part is then as it was, and so is no change of the row's.
+void Replica::pack_parts() noexcept {
+  PartWays& ways = found_parts_[1 - taking_];
+  for (std::size_t p = 0; p < ways.size(); ++p) {
+    const WholeParts& parts = multigrid().parts();
+    const VoxelId first = parts.first(p);
+    glm::vec3 way(0.0F);
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto ua = static_cast<std::size_t>(axis);
+      way[axis] = state_.u[ua][first] - before_[ua][first];
+    }
+    if (way == glm::vec3(0.0F)) {
+      ways[p] = glm::dvec3(0.0);
+      continue;
+    }
+    // Less than it takes to move it there it does not go here either.
+    if (std::max({std::fabs(way.x), std::fabs(way.y), std::fabs(way.z)}) <= multigrid().passed_on_m())
+      way = glm::vec3(0.0F);
+    ways[p] = glm::dvec3(way);
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto ua = static_cast<std::size_t>(axis);
+      const float to = before_[ua][first] + way[axis];
+      for (const WholeParts::Run& run : parts.on(0, p).rows) {
+        for (VoxelId v = run.row * kRow; v < (run.row + 1) * kRow; ++v) {
+          if ((run.lanes >> v % kRow & 1U) != 0) state_.u[ua][v] = before_[ua][v] = to;
+        }
+      }
+    }
+  }
+}
+
+// All of each at once, what else there is of the result near it or not: it has one place.
+void Replica::take_parts(SoftObject& object) noexcept {
+  const PartWays& ways = found_parts_[taking_];
+  Multigrid& to = object.relaxation_.multigrid();
+  for (std::size_t p = 0; p < ways.size(); ++p) {
+    if (ways[p] == glm::dvec3(0.0)) continue;
+    const VoxelId first = to.parts().first(p);
+    const glm::vec3 wanted(object.state_.at(first) + ways[p]);
+    to.move_part(p, ways[p], object.state_, object.obstacle_view(), Multigrid::Tool::is_seen_to,
+                 Multigrid::Note::nowhere);
+    if (glm::vec3(object.state_.at(first)) == wanted) continue;
+    for (const WholeParts::Run& run : to.parts().on(0, p).rows) to.log().note(0, run.row);
+  }
 }
 
 void Replica::keep_back(RowId row) noexcept {
@@ -375,6 +429,7 @@ bool Replica::take_row(SoftObject& object, std::size_t n, float part) noexcept {
 
 void Replica::take(SoftObject& object, int parts) noexcept {
   taking_ = 1 - taking_;
+  take_parts(object);
   again_.clear();
   in_turns_ = found_far_;
   drained_ = near_count_;

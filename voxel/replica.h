@@ -79,6 +79,7 @@ class Replica {
     std::size_t near_count = 0;
     bool far = false, at_rest = false;
     double residual_N = 0.0;
+    std::vector<glm::dvec3> part_ways;  // as PartWays
   };
   [[nodiscard]] Found found() const;
   void find_again(const Found& found) noexcept;
@@ -193,6 +194,9 @@ class Replica {
     Obstacle obstacle;
   };
 
+  // [part without slack] how far it went (m): of these not row by row, in which they could not follow.
+  using PartWays = std::vector<glm::dvec3>;
+
   [[nodiscard]] Multigrid& multigrid() { return relaxation_.multigrid(); }
   void note_motion(const SoftObject& object) noexcept;
   void open_given() noexcept;
@@ -200,6 +204,8 @@ class Replica {
   void sort_by_distance() noexcept;
   void pack_changes() noexcept;
   bool pack_row(RowId row, float least_m) noexcept;
+  void pack_parts() noexcept;
+  void take_parts(SoftObject& object) noexcept;
   void keep_back(RowId row) noexcept;
   void pack_kept_back() noexcept;
   bool take_row(SoftObject& object, std::size_t n, float part = 1.0F) noexcept;
@@ -230,6 +236,7 @@ class Replica {
   // ---- what goes over ----
   Parcel given_;
   std::array<Parcel, 2> found_;  // what is drained, and what is found meanwhile: ways, loads of bricks
+  std::array<PartWays, 2> found_parts_;  // as found_
   std::vector<GivenRole> given_roles_;
   std::vector<GivenObstacle> given_obstacles_;
   std::vector<VoxelId> given_held_;

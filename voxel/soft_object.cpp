@@ -76,6 +76,11 @@ SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice)
   roots_.reserve(kMaxTouched);
   carried_.reserve(kMaxCarried + kMaxTouched);
   hanging_.reserve(kMaxCarried + kMaxTouched);
+  if (lattice_->part_count() > 0) {
+    part_bounds_.reserve(2 * kMaxTouched);
+    bound_touch_.reserve(kMaxTouched);
+    part_seen_.resize(lattice_->part_count());
+  }
   if (lattice_->voxel_count() < kPreparedWhole) {
     state_.populate(relaxation_.couplings().rows_in_use());
     pair_held_.populate();
@@ -177,6 +182,7 @@ void SoftObject::touch(std::span<const VoxelId> near) noexcept {
     const bool kept = carried_mark_[v] != 0;
     if (kept) --pressed;
     touches_.push_back({v, lattice_->surface_number(v), kept, lattice_->rest(v)});
+    touches_.back().part = lattice_->part(v);
     if (!kept) continue;
     const Touch& before = touched_before_[carried_index_[v]];
     touches_.back().normal = before.normal;
@@ -261,12 +267,13 @@ bool SoftObject::push_out(const ToolInBody& tool) noexcept {
     if (g.distance >= 0.0) continue;
     any = true;
     t.pressed = true;
-    if (lattice_->anchored(t.v)) continue;
+    if (lattice_->anchored(t.v) || t.part != 0) continue;
     const glm::dvec3 before = state_.at(t.v);
     state_.set(t.v, before - g.distance * g.normal);
     sources_.push_back(t.v);
     moves_.emplace_back(state_.at(t.v) - before);
   }
+  if (!part_seen_.empty()) push_parts_out(tool);
   if (!sources_.empty()) settle_chain();
   return any;
 }
@@ -319,7 +326,7 @@ glm::dvec3 SoftObject::place_of(const ToolInBody& tool, const VoxelLinks& links,
 }
 
 void SoftObject::relax_touch(const ToolInBody& tool, Touch& t) noexcept {
-  if (lattice_->anchored(t.v)) return;
+  if (lattice_->anchored(t.v) || t.part != 0) return;
   const glm::dvec3 before = state_.at(t.v);
   const bool was_pressed = t.pressed;
   // While another relaxes the object, a voxel that the tool does not press is his.
@@ -377,6 +384,7 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
   tool_ = tool;
   for (int n = 0; n < cycles; ++n) {
     for (Touch& t : touches_) relax_touch(tool, t);
+    if (!part_seen_.empty()) relax_parts(tool);
     set_touch_roles();
     if (!cycle_due()) break;
     const bool again = ++cycles_since_touch_ > 1;
@@ -413,6 +421,7 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
       if (t.pressed == pressed) relax_touch(tool, t);
     }
   }
+  if (!part_seen_.empty()) relax_parts(tool);
   set_touch_roles();
   if (!any_pressed()) pressed_last_.clear();
   draw_along();
@@ -444,12 +453,13 @@ void SoftObject::follow(const glm::dvec3& delta) noexcept {
   sources_.clear();
   moves_.clear();
   for (const Touch& t : touches_) {
-    if (!t.pressed || lattice_->anchored(t.v)) continue;
+    if (!t.pressed || lattice_->anchored(t.v) || t.part != 0) continue;
     const glm::dvec3 before = state_.at(t.v);
     state_.set(t.v, before + glm::dot(delta, t.normal) * t.normal);
     sources_.push_back(t.v);
     moves_.emplace_back(state_.at(t.v) - before);
   }
+  if (!part_seen_.empty()) follow_parts(delta);
   if (!sources_.empty()) settle_chain();
 }
 
@@ -528,7 +538,7 @@ void SoftObject::give_away() noexcept {
   cold_ticks_ = kColdTicks;
   for (Touch& t : touches_) {
     t.left = glm::dvec3(0.0);
-    if (!t.pressed || lattice_->anchored(t.v)) continue;
+    if (!t.pressed || lattice_->anchored(t.v) || t.part != 0) continue;
     Touch here = t;
     const glm::dvec3 place = place_of(tool_, links_of(relaxation_.couplings(), state_, t.v), here);
     if (here.pressed) t.left = place - state_.at(t.v);

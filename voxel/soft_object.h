@@ -246,6 +246,7 @@ class SoftObject {
     bool beside = false;     // it was beside a punch then
     bool tight = false;      // some tight link hands part of its load to or from another voxel
     glm::dvec3 left{0.0};    // the way it had still to go when the object was given away (m)
+    std::uint16_t part = 0;  // without slack that it is in, plus one; 0: none
   };
   struct Gap {
     double distance = 0.0;  // of the voxel from the tool's surface along normal; negative: overlap
@@ -286,6 +287,17 @@ class SoftObject {
   [[nodiscard]] std::size_t left_of(std::size_t work) const noexcept;  // of a tick's; less while all is cold
   [[nodiscard]] glm::dvec3 place_of(const ToolInBody& tool, const VoxelLinks& links, Touch& touch) noexcept;
   void relax_touch(const ToolInBody& tool, Touch& touch) noexcept;
+  // ---- touched voxels of parts without slack, which move as one (part_contact.cpp) ----
+  template <class Visit>
+  void for_touched_parts(const Visit& visit) noexcept;
+  void bound_part(const ToolInBody& tool, std::uint16_t part, double within_m) noexcept;
+  void push_parts_out(const ToolInBody& tool) noexcept;
+  void follow_parts(const glm::dvec3& delta) noexcept;
+  void relax_parts(const ToolInBody& tool) noexcept;
+  void add_reaction_of_parts(const ToolInBody& tool, Reaction& reaction) noexcept;
+  [[nodiscard]] glm::dvec3 hanging_on_part(std::size_t part) noexcept;
+  void gather_load_with_parts(int axis) noexcept;
+  [[nodiscard]] bool any_pressed(std::uint16_t part) const noexcept;
   void add_stiffness(int axis, glm::dmat3& stiffness) noexcept;
   [[nodiscard]] glm::dvec3 load_on(VoxelId v) noexcept;
   [[nodiscard]] double load_on(VoxelId v, int axis) noexcept;
@@ -345,7 +357,10 @@ class SoftObject {
   LazyVector<VoxelId> all_held_;                // by the tool, too
   LazyVector<VoxelId> sources_;
   LazyVector<glm::vec3> moves_;
-  bool dragging_ = false;  // sources_ are what drag() moved, moves_ where they were
+  bool dragging_ = false;                   // sources_ are what drag() moved, moves_ where they were
+  std::vector<PartBound> part_bounds_;      // of one part without slack: of touches, then others
+  std::vector<std::uint32_t> bound_touch_;  // [as part_bounds_] of the first, index into touches_
+  std::vector<std::uint8_t> part_seen_;     // [part] 1: for_touched_parts() was there
   TightRows tight_rows_;
   DrawnRows drawn_rows_;
   std::vector<VoxelId> roots_;              // of these: what is pressed and not anchored

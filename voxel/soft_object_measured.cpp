@@ -79,7 +79,7 @@ bool SoftObject::settle(const ToolInBody& tool, double tolerance_N, int max_cycl
     relax_cycle();
     double worst = relaxation_.residual_N();
     for (const Touch& t : touches_) {
-      if (lattice_->anchored(t.v)) continue;
+      if (lattice_->anchored(t.v) || t.part != 0) continue;
       glm::dvec3 left = link_force(relaxation_.couplings(), state_, t.v);
       if (t.pressed) left -= std::min(0.0, glm::dot(left, t.normal)) * t.normal;
       worst = std::max(worst, glm::length(left));

@@ -18,7 +18,8 @@ void SoftObject::set_obstacle(std::size_t surface_number, const Obstacle& obstac
     obstacle_changed_[surface_number] = 1;
     changed_obstacles_.push_back(static_cast<std::uint32_t>(surface_number));
   }
-  if (Displacement::stands(state_.role[v]) || lattice_->anchored(v)) return;
+  const std::uint8_t role = state_.role[v];
+  if ((Displacement::stands(role) && !Displacement::in_part(role)) || lattice_->anchored(v)) return;
   state_.set_role(v, resting_role(v));
 }
 

@@ -106,7 +106,7 @@ void add_from_far_end(Hanging& hanging, std::size_t first, const Drops& drops, c
 void SoftObject::draw_along() noexcept {
   roots_.clear();
   for (const Touch& t : touches_) {
-    if (t.pressed && !lattice_->anchored(t.v)) roots_.push_back(t.v);
+    if (t.pressed && !lattice_->anchored(t.v) && t.part == 0) roots_.push_back(t.v);
   }
   if (!roots_.empty()) drawn_rows_.draw(relaxation_, state_, roots_, static_cast<float>(kStir));
 }
@@ -410,26 +410,31 @@ Reaction SoftObject::reaction(const ToolInBody& tool) noexcept {
   for (Touch& t : touches_) {
     t.tight = false;
     t.load = glm::dvec3(0.0);
-    if (!t.pressed) continue;
+    if (!t.pressed || t.part != 0) continue;
     t.normal = gap(tool, position(t)).normal;
     t.load = load_on(t.v);
   }
   glm::dvec3 hanging_N(0.0);
-  if (held_voxels_.empty()) hanging_N = gather_load(result.stiffness_N_per_m);
-  for (int axis = 0; axis < 3 && !held_voxels_.empty(); ++axis) {
-    gather_load_with_pairs(axis);
+  const bool by_rows = held_voxels_.empty() && part_seen_.empty();
+  if (by_rows) hanging_N = gather_load(result.stiffness_N_per_m);
+  for (int axis = 0; axis < 3 && !by_rows; ++axis) {
+    if (part_seen_.empty()) {
+      gather_load_with_pairs(axis);
+    } else {
+      gather_load_with_parts(axis);
+    }
     add_stiffness(axis, result.stiffness_N_per_m);
     let_go_of_carried();
   }
   // Tight links pass load between voxels, along and across their normals, and the sum of all is what is left
   // of it: within the sum the chain's own forces cancel, whichever voxel each is booked to.
   for (const Touch& t : touches_) {
-    if (t.pressed && t.tight) result.force_N += t.load;
+    if (t.pressed && t.tight && t.part == 0) result.force_N += t.load;
   }
   result.force_N += hanging_N;
   const glm::dvec3 through_links = result.force_N;
   for (const Touch& t : touches_) {
-    if (!t.pressed) continue;
+    if (!t.pressed || t.part != 0) continue;
     const double load = glm::dot(t.tight ? through_links : t.load, t.normal);
     if (!t.tight && load < 0.0) {
       // Frictionless: the tool feels what the voxel presses along the normal; what pulls is no contact.
@@ -437,6 +442,7 @@ Reaction SoftObject::reaction(const ToolInBody& tool) noexcept {
     }
     if (load < 0.0) ++result.pressed;
   }
+  if (!part_seen_.empty()) add_reaction_of_parts(tool, result);
   if (result.pressed == 0) result.force_N = glm::dvec3(0.0);  // what only pulls is no contact
   return result;
 }
@@ -449,7 +455,7 @@ bool SoftObject::held_fast(VoxelId v, const glm::dvec3& direction) noexcept {
   const auto& u = state_.u[static_cast<std::size_t>(axis)];
   const auto rests = [&](VoxelId w) {
     if (lattice_->anchored(w)) return true;
-    if (state_.role[w] != Displacement::obstacle) return false;
+    if (!Displacement::at_obstacle(state_.role[w])) return false;
     const Obstacle& o = obstacles_[lattice_->surface_number(w)];
     const double room = glm::dot(glm::dvec3(o.normal), state_.at(w)) - static_cast<double>(o.bound);
     return room <= static_cast<double>(kTight) * lattice_->min_spacing_m() &&

@@ -2,6 +2,9 @@
 #include "voxel/tight_rows.h"
 
 #include <bit>
+#include <bitset>
+
+#include "voxel/multigrid.h"
 
 namespace voxel {
 namespace {
@@ -17,6 +20,30 @@ double sum_of(const float* lanes, std::uint32_t bits) {
 
 }  // namespace
 
+struct TightRows::Gathering {
+  Couplings& couplings;
+  const Multigrid* multigrid;  // null: there are no parts without slack
+  std::bitset<Lattice::kMostParts> known;
+  std::array<double, Lattice::kMostParts> pull_N;  // of those known
+
+  // (By their own links its voxels are pulled this way and that, and an inclusion between the tool and the
+  // anchors, in tissue at its limits, ended what hangs on the tool: half of the force was lost.)
+  void pull_as_parts(const Displacement& state, RowId row, int axis, LinksAtLimits& links) {
+    for (VoxelId lane = 0; lane < kRow; ++lane) {
+      const std::uint16_t number = multigrid->parts().of(0, row * kRow + lane);
+      if (number == 0) continue;
+      const std::size_t part = number - 1U;
+      if (!known[part]) {
+        known.set(part);
+        pull_N[part] = multigrid->part_force(part, state)[axis];
+      }
+      const std::uint32_t bit = 1U << lane;
+      links.pulled_up = pull_N[part] > 0.0 ? links.pulled_up | bit : links.pulled_up & ~bit;
+      links.pulled_down = pull_N[part] < 0.0 ? links.pulled_down | bit : links.pulled_down & ~bit;
+    }
+  }
+};
+
 TightRows::TightRows(const Lattice& lattice) : lattice_(lattice), entry_(lattice.grid().rows()) {
   rows_.reserve(kMostRows);
   queue_.resize(kMostRows);
@@ -25,7 +52,7 @@ TightRows::TightRows(const Lattice& lattice) : lattice_(lattice), entry_(lattice
 // Null: nothing is in it, or too many were looked at.
 TightRows::Row* TightRows::look_at(RowId row) noexcept {
   if (entry_[row] != 0) return &rows_[entry_[row] - 1U];
-  if (rows_.size() == kMostRows || !couplings_->prepare(row)) return nullptr;
+  if (rows_.size() == kMostRows || !gathering_->couplings.prepare(row)) return nullptr;
   const Grid& g = lattice_.grid();
   const auto ua = static_cast<std::size_t>(axis_);
   LevelRow at;
@@ -33,12 +60,14 @@ TightRows::Row* TightRows::look_at(RowId row) noexcept {
   at.load[ua] = state_->load_of(row, axis_);
   at.z = static_cast<std::ptrdiff_t>(g.row_z) * kRow;
   at.x = static_cast<std::ptrdiff_t>(g.row_x) * kRow;
-  couplings_->all(row, at.springs);
+  gathering_->couplings.all(row, at.springs);
   std::array<float, 3> tight{};
   for (std::size_t d = 0; d < 3; ++d) tight[d] = kTight * static_cast<float>(lattice_.spacing_m()[d]);
   Row& out = rows_.emplace_back();
   out.row = row;
-  links_at_limits(at, couplings_->limits(row), ua, tight, out.links);
+  links_at_limits(at, gathering_->couplings.limits(row), ua, tight, out.links);
+  if (gathering_->multigrid != nullptr && gathering_->multigrid->parts().in_row(0, row))
+    gathering_->pull_as_parts(*state_, row, axis_, out.links);
   entry_[row] = static_cast<std::uint16_t>(rows_.size());
   return &out;
 }
@@ -74,9 +103,11 @@ void TightRows::ask(RowId row, std::uint32_t at_low, std::uint32_t at_high, End 
   if (more != 0) add(*to, more);
 }
 
-void TightRows::gather(Couplings& couplings, Displacement& state, std::span<const VoxelId> roots,
-                       int axis) noexcept {
-  couplings_ = &couplings;
+void TightRows::gather(Couplings& couplings, Displacement& state, std::span<const VoxelId> roots, int axis,
+                       const Multigrid* multigrid) noexcept {
+  const bool parts = multigrid != nullptr && multigrid->has_parts();
+  Gathering gathering{couplings, parts ? multigrid : nullptr, {}, {}};
+  gathering_ = &gathering;
   state_ = &state;
   axis_ = axis;
   for (const Row& r : rows_) entry_[r.row] = 0;
@@ -107,6 +138,7 @@ void TightRows::gather(Couplings& couplings, Displacement& state, std::span<cons
       ask(row.row - away, down_low << up, down_high << up, End::lower);
     }
   }
+  gathering_ = nullptr;
 }
 
 bool TightRows::tight(VoxelId root) const noexcept {

@@ -19,6 +19,8 @@
 
 namespace voxel {
 
+class Multigrid;
+
 class TightRows {
  public:
   static constexpr std::size_t kMostRows = 4096;  // that are looked at; what is further away hangs on nothing
@@ -30,7 +32,9 @@ class TightRows {
   // On one axis, all that hangs on `roots` (none anchored), one by another: a voxel does where a link to one
   // of these is at a limit and pushes it the way its own links, and what else pulls it, do not. One that its
   // link lets go neither way hangs on it in any case. What was found before is forgotten.
-  void gather(Couplings& couplings, Displacement& state, std::span<const VoxelId> roots, int axis) noexcept;
+  // A voxel of a part without slack is pulled as the whole of that is, where `multigrid` says how that is.
+  void gather(Couplings& couplings, Displacement& state, std::span<const VoxelId> roots, int axis,
+              const Multigrid* multigrid = nullptr) noexcept;
   // Is it one of them, or a root?
   [[nodiscard]] bool carried(VoxelId v) const noexcept {
     return (carried_in(v / kRow) >> v % kRow & 1U) != 0;
@@ -73,7 +77,8 @@ class TightRows {
   }
 
   const Lattice& lattice_;
-  Couplings* couplings_ = nullptr;  // while it gathers
+  struct Gathering;
+  Gathering* gathering_ = nullptr;  // while it gathers
   Displacement* state_ = nullptr;   // …, only read
   int axis_ = 0;
   LazyArray<std::uint16_t> entry_;  // [row] 1 + index into rows_; 0: not looked at

@@ -41,13 +41,17 @@ std::string validate_row(const Lattice& lattice, const Displacement& state, RowI
   int standing = 0, obstacles = 0;
   for (VoxelId v = row * kRow; v < (row + 1) * kRow; ++v) {
     const std::uint8_t role = state.role[v];
-    if (role > Displacement::pressed) return where(lattice, v) + " has a role that there is not";
+    if (role > Displacement::pressed && !Displacement::in_part(role))
+      return where(lattice, v) + " has a role that there is not";
     if (role != Displacement::free && !lattice.filled(v))
       return where(lattice, v) + " has a role and is empty";
-    if (role >= Displacement::obstacle && lattice.surface_number(v) == Lattice::kNoSurface)
+    if (Displacement::in_part(role) != (lattice.part(v) != 0))
+      return where(lattice, v) + " moves as one with a part it is not in, or not with that it is in";
+    if (role >= Displacement::obstacle && role != Displacement::joined &&
+        lattice.surface_number(v) == Lattice::kNoSurface)
       return where(lattice, v) + " lies inside and is pressed, or has an obstacle";
     standing += Displacement::stands(role) ? 1 : 0;
-    obstacles += role == Displacement::obstacle ? 1 : 0;
+    obstacles += Displacement::at_obstacle(role) ? 1 : 0;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const float u = state.u[axis][v];
       if (!std::isfinite(u)) return said(where(lattice, v), " is at ", u, " on axis ", axis);
