@@ -25,6 +25,7 @@
 
 #include "hybrid/denormals.h"
 #include "hybrid/session.h"
+#include "tests/hybrid/scene_file_fixture.h"
 
 namespace {
 
@@ -189,6 +190,28 @@ TEST(ServoPath, TheCountersCount) {
   EXPECT_EQ(calls.files, 1U);
 }
 
+void watch_ticks(const hybrid::Scene& scene, const hybrid::BuiltScene& built, bool apart) {
+  const auto device = hybrid::scene_device(scene, hybrid::scene_path(scene));
+  hybrid::flush_denormals();
+  hybrid::begin_session(scene, *built.world, *built.state, device->read().position_m);
+  // What the other thread does is done in the tick here, so that it is watched too.
+  if (apart) hybrid::relax_apart(*built.state, hybrid::Arrival::counted);
+  const double dt = 1.0 / scene.rate_hz;
+  std::size_t felt_ticks = 0;
+  calls = {};
+  watched = true;
+  for (int tick = 0; tick < kTicks; ++tick) {
+    const hybrid::TickResult felt = hybrid::haptic_tick(*built.world, *built.state, device->read(), dt);
+    device->write(felt.force_N, dt);
+    felt_ticks += felt.contacts != 0 ? 1 : 0;
+  }
+  watched = false;
+  EXPECT_EQ(calls, Calls{});
+  EXPECT_GT(felt_ticks, 500U) << "the path is meant to touch something";
+  EXPECT_EQ(built.state->nonfinite, 0U);
+  EXPECT_EQ(built.state->faults, 0U);
+}
+
 class ServoPathOf : public ::testing::TestWithParam<const char*> {
  protected:
   static void watch(bool apart);
@@ -198,7 +221,6 @@ TEST_P(ServoPathOf, AllItsTicks) {
   watch(false);
 }
 
-// What the other thread does is done in the tick here, so that it is watched too.
 TEST_P(ServoPathOf, AllItsTicksRelaxedApart) {
   watch(true);
 }
@@ -214,25 +236,39 @@ void ServoPathOf::watch(bool apart) {
     throw;
   }
   const hybrid::BuiltScene built = hybrid::build_scene(*scene);
-  const auto device = hybrid::scene_device(*scene, hybrid::scene_path(*scene));
-  hybrid::flush_denormals();
-  hybrid::begin_session(*scene, *built.world, *built.state, device->read().position_m);
   if (apart && built.state->soft.empty()) GTEST_SKIP() << "skipped: nothing soft in it";
-  if (apart) hybrid::relax_apart(*built.state, hybrid::Arrival::counted);
-  const double dt = 1.0 / scene->rate_hz;
-  std::size_t felt_ticks = 0;
-  calls = {};
-  watched = true;
-  for (int tick = 0; tick < kTicks; ++tick) {
-    const hybrid::TickResult felt = hybrid::haptic_tick(*built.world, *built.state, device->read(), dt);
-    device->write(felt.force_N, dt);
-    felt_ticks += felt.contacts != 0 ? 1 : 0;
+  watch_ticks(*scene, built, apart);
+}
+
+// What no shipped scene has.
+class ServoPathIn : public tests::SceneFile {
+ protected:
+  static std::string scene(const std::string& soft) {
+    return "format = 1\n[material.gel]\nyoung = 10000\npoisson = 0.3\nstretch = [0.9, 1.1]\nshear = 0.1\n"
+           "[material.plate]\nyoung = 10000\npoisson = 0.3\nstretch = [1, 1]\nshear = 0\n"
+           "[[soft]]\nname = \"block\"\nformula = \"block\"\nmaterial = \"gel\"\n" +
+           soft +
+           "[tool]\nradius = 8\n[path]\nkind = \"waypoints\"\nspeed = 100\npoints = [[0, 0, 50], [0, 0, 36], "
+           "[12, 5, 34], [12, 5, 50], [-9, 3, 36, 0.2], [-9, 3, 50], [0, 0, 36, 8]]\n";
   }
-  watched = false;
-  EXPECT_EQ(calls, Calls{});
-  EXPECT_GT(felt_ticks, 500U) << "the path is meant to touch something";
-  EXPECT_EQ(built.state->nonfinite, 0U);
-  EXPECT_EQ(built.state->faults, 0U);
+};
+
+TEST_F(ServoPathIn, AllTicksOfAContactOnACompositeGrid) {
+  const hybrid::Scene grid = load(scene("size = [64, 64, 64]\nspacing = 1\n"));
+  const hybrid::BuiltScene built = hybrid::build_scene(grid);
+  ASSERT_TRUE(built.state->soft[0]->uses_grid());
+  watch_ticks(grid, built, true);
+}
+
+TEST_F(ServoPathIn, AllTicksOfAPartWithoutSlack) {
+  const hybrid::Scene layers =
+      load(scene("size = [64, 64, 64]\nspacing = 4\nlabel = 1\nlayers = [{ thickness = 52, label = 1 }, { "
+                 "thickness = 12, label = 2 }]\nmaterials = { \"2\" = \"plate\" }\n"));
+  for (const bool apart : {false, true}) {
+    const hybrid::BuiltScene built = hybrid::build_scene(layers);
+    ASSERT_EQ(built.state->soft[0]->lattice().part_count(), 1U);
+    watch_ticks(layers, built, apart);
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(ShippedScenes, ServoPathOf,
