@@ -357,7 +357,6 @@ class SoftObject {
   LazyVector<VoxelId> all_held_;                // by the tool, too
   LazyVector<VoxelId> sources_;
   LazyVector<glm::vec3> moves_;
-  bool dragging_ = false;                   // sources_ are what drag() moved, moves_ where they were
   std::vector<PartBound> part_bounds_;      // of one part without slack: of touches, then others
   std::vector<std::uint32_t> bound_touch_;  // [as part_bounds_] of the first, index into touches_
   std::vector<std::uint8_t> part_seen_;     // [part] 1: for_touched_parts() was there
@@ -369,22 +368,23 @@ class SoftObject {
   LazyArray<std::uint8_t> carried_mark_;    // [v] 1: in carried_ (within touch(): was pressed)
   LazyArray<std::uint32_t> carried_index_;  // [v]
   double unrelaxed_m_ = 0.0;                // motion of pressed voxels since the background was last woken
-  int cycles_since_touch_ = 0;              // round the contact
-  std::size_t contact_work_ = 0;            // since touch(), of them
-  bool wide_cycle_ = false;                 // and one of them was wide
+  double unsettled_m_ = 0.0;                // how far the contact may be from the rest of the object
+  std::size_t contact_work_ = 0;            // since touch(), of cycles round the contact …
+  int cycles_since_touch_ = 0;              // of which there were so many
   int cold_ticks_ = 0;                      // for which what is near the contact is in no cache
+  bool wide_cycle_ = false;                 // one of those cycles was wide
   bool asked_to_rest_ = false;
-  bool rests_ = false;        // none of them is begun now, if that can wait
-  double unsettled_m_ = 0.0;  // how far the contact may be from the rest of the object
+  bool rests_ = false;     // none of them is begun now, if that can wait
+  bool dragging_ = false;  // sources_ are what drag() moved, moves_ where they were
   bool moved_ever_ = false;
   bool beside_bodies_ = false;           // that move
+  bool on_grid_ = false;                 // there is a contact, and it is on the composite grid
   std::unique_ptr<CompositeGrid> grid_;  // none: contacts are in state_
-  bool on_grid_ = false;                 // there is a contact, and it is there
   std::vector<VoxelId> near_on_grid_;
   std::array<int, 3> centre_{};                      // of the contact
+  std::uint32_t grid_cycles_ = 0;                    // since it began
   glm::dvec3 grid_force_N_{0.0}, grid_tool_m_{0.0};  // and where the tool was
   double nearest_m_ = 0.0;                           // of a voxel to the tool
-  std::uint32_t grid_cycles_ = 0;                    // since contact began
 };
 
 }  // namespace voxel
