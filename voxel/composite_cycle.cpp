@@ -64,9 +64,8 @@ void CompositeGrid::pass_on(std::size_t l, std::size_t a) noexcept {
   const bool any_stuck = fine.bounded[0] || fine.bounded[1] || fine.dragged;
   if (any_stuck) {
     if (!fine.dragged) std::fill(fine.drag.begin(), fine.drag.end(), 0.0F);
-    const composite::View& of = view;
-    if (fine.dragged) take_drags(l, a);
-    composite::drags_of_level(of);
+    take_drags(l, a);
+    composite::drags_of_level(view);
   }
   for (int k = first[2]; k <= last[2]; ++k) {
     for (int j = first[1]; j <= last[1]; ++j) {

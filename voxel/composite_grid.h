@@ -164,6 +164,10 @@ class CompositeGrid {
     [[nodiscard]] std::size_t node(int i, int j, int k) const {
       return row(j, k) + static_cast<std::size_t>(i);
     }
+    [[nodiscard]] std::array<int, 3> node_of(std::size_t number) const {  // from the first on
+      return {static_cast<int>(number % stride), static_cast<int>(number % plane / stride),
+              static_cast<int>(number / plane)};
+    }
     [[nodiscard]] int at(std::size_t d, int i) const { return line[d].begin + step * i; }
   };
   static constexpr std::size_t kPad = 8;

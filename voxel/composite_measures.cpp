@@ -33,9 +33,7 @@ double CompositeGrid::covered(std::size_t l, std::size_t d, int i) const noexcep
 // What anchors hold of a node (its number in its level) in direction d, and not of others.
 double CompositeGrid::part_of_hold(std::size_t l, std::size_t number, std::size_t d) const noexcept {
   const Level& level = levels_[l];
-  const Place node{static_cast<int>(number % level.stride),
-                   static_cast<int>(number % level.plane / level.stride),
-                   static_cast<int>(number / level.plane)};
+  const Place node = level.node_of(number);
   const std::size_t e = (d + 1) % 3, f = (d + 2) % 3;
   if (share_of(level, d, node[d]) < 1.0) return 0.0;
   const double under = covered(l, d, node[d]) == 1.0 ? covered(l, e, node[e]) * covered(l, f, node[f]) : 0.0;
@@ -45,9 +43,7 @@ double CompositeGrid::part_of_hold(std::size_t l, std::size_t number, std::size_
 // Likewise of the link up.
 double CompositeGrid::part_of_link(std::size_t l, std::size_t number, std::size_t d) const noexcept {
   const Level& level = levels_[l];
-  const Place node{static_cast<int>(number % level.stride),
-                   static_cast<int>(number % level.plane / level.stride),
-                   static_cast<int>(number / level.plane)};
+  const Place node = level.node_of(number);
   const std::size_t e = (d + 1) % 3, f = (d + 2) % 3;
   const bool inside = covered(l, d, node[d]) > 0.0 && covered(l, d, node[d] + 1) > 0.0;
   const double under = inside ? covered(l, e, node[e]) * covered(l, f, node[f]) : 0.0;

@@ -305,6 +305,8 @@ class Multigrid {
   template <class Visit>
   void for_parts(int level, const WholeParts::Box& box, const Visit& visit) noexcept;
   [[nodiscard]] glm::dvec3 part_pull(int level, std::size_t part, glm::dvec3& stiffness) noexcept;
+  template <class Room>
+  [[nodiscard]] PartRoom room_on_border(std::size_t part, const Room& room) const noexcept;
   [[nodiscard]] PartRoom room_with_others(std::size_t part, const glm::dvec3& way,
                                           const Displacement& state) const noexcept;
   void take_others_along(std::size_t part, Displacement& state) noexcept;

@@ -105,23 +105,25 @@ glm::dvec3 Multigrid::part_force(std::size_t part, const Displacement& state) co
   return force;
 }
 
-Multigrid::PartRoom Multigrid::room_of_part(std::size_t part, const Displacement& state) const noexcept {
+// The least that links of the border leave it, `room(link, axis, upwards)`.
+template <class Room>
+Multigrid::PartRoom Multigrid::room_on_border(std::size_t part, const Room& room) const noexcept {
   constexpr double kFar = 1e30;
-  PartRoom room{{{-kFar, kFar}, {-kFar, kFar}, {-kFar, kFar}}};
+  PartRoom all{{{-kFar, kFar}, {-kFar, kFar}, {-kFar, kFar}}};
   for (const WholeParts::Link& l : parts_->on(0, part).border) {
     for (int axis = 0; axis < 3; ++axis) {
-      const auto ua = static_cast<std::size_t>(axis);
-      const auto bounds = lattice_.bounds(l.up ? l.cell : l.beside, l.d, axis);
-      const float difference =
-          l.up ? state.u[ua][l.beside] - state.u[ua][l.cell] : state.u[ua][l.cell] - state.u[ua][l.beside];
-      const float low = l.up ? difference - bounds[1] : bounds[0] - difference,
-                  high = l.up ? difference - bounds[0] : bounds[1] - difference;
-      room[ua][0] = std::max(room[ua][0], static_cast<double>(low));
-      room[ua][1] = std::min(room[ua][1], static_cast<double>(high));
+      auto& of_axis = all[static_cast<std::size_t>(axis)];
+      of_axis[0] = std::max(of_axis[0], -room(l, axis, false));
+      of_axis[1] = std::min(of_axis[1], room(l, axis, true));
     }
   }
-  for (auto& of_axis : room) of_axis = {std::min(of_axis[0], 0.0), std::max(of_axis[1], 0.0)};
-  return room;
+  return all;
+}
+
+Multigrid::PartRoom Multigrid::room_of_part(std::size_t part, const Displacement& state) const noexcept {
+  return room_on_border(part, [&](const WholeParts::Link& l, int axis, bool upwards) {
+    return room_at(lattice_, state, l, axis, upwards);
+  });
 }
 
 void Multigrid::add_bounds(const PartRoom& room, std::vector<PartBound>& bounds) {
@@ -170,25 +172,11 @@ void Multigrid::stop_at_obstacles(std::size_t part, const Displacement& state, c
 // the way it is to go.
 Multigrid::PartRoom Multigrid::room_with_others(std::size_t part, const glm::dvec3& way,
                                                 const Displacement& state) const noexcept {
-  constexpr double kFar = 1e30;
-  PartRoom room{{{-kFar, kFar}, {-kFar, kFar}, {-kFar, kFar}}};
-  const auto number = static_cast<std::uint16_t>(part + 1);
-  for (const WholeParts::Link& l : parts_->on(0, part).border) {
-    for (int axis = 0; axis < 3; ++axis) {
-      auto& of_axis = room[static_cast<std::size_t>(axis)];
-      for (const bool upwards : {false, true}) {
-        double to = room_at(lattice_, state, l, axis, upwards);
-        if (to < (upwards ? way[axis] : -way[axis]))
-          to += room_beside(lattice_, state, l.beside, number, axis, upwards);
-        if (upwards) {
-          of_axis[1] = std::min(of_axis[1], to);
-        } else {
-          of_axis[0] = std::max(of_axis[0], -to);
-        }
-      }
-    }
-  }
-  return room;
+  return room_on_border(part, [&](const WholeParts::Link& l, int axis, bool upwards) {
+    const double own = room_at(lattice_, state, l, axis, upwards);
+    if (own >= (upwards ? way[axis] : -way[axis])) return own;
+    return own + room_beside(lattice_, state, l.beside, static_cast<std::uint16_t>(part + 1), axis, upwards);
+  });
 }
 
 // Brings what is beside a part within the limits of its links to it.

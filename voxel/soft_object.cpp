@@ -278,6 +278,22 @@ bool SoftObject::push_out(const ToolInBody& tool) noexcept {
   return any;
 }
 
+// Where the springs' energy is least on the tool's surface, so that sliding round the tool is free of
+// friction: in their own metric, the surface straightened at the last place (one step left 3e-4 of the force
+// scale of friction).
+glm::dvec3 SoftObject::onto_tool(const ToolInBody& tool, const glm::dvec3& rest, const glm::dvec3& wished,
+                                 const glm::dvec3& compliance, Gap& g) const noexcept {
+  glm::dvec3 place = wished;
+  for (int n = 0; n < kProjections && g.distance < voxel_radius(); ++n) {
+    const double denominator = glm::dot(g.normal, compliance * g.normal);
+    if (denominator <= 0.0) break;
+    place =
+        wished - ((g.distance + glm::dot(g.normal, wished - place)) / denominator) * compliance * g.normal;
+    g = gap(tool, rest + place);
+  }
+  return g.distance < 0.0 ? place - g.distance * g.normal : place;
+}
+
 // Where a touched voxel belongs, everything else where it is; `pressed`: by the tool.
 glm::dvec3 SoftObject::place_of(const ToolInBody& tool, const VoxelLinks& links, Touch& t) noexcept {
   const glm::dvec3 rest = t.rest, now = state_.at(t.v);
@@ -290,17 +306,7 @@ glm::dvec3 SoftObject::place_of(const ToolInBody& tool, const VoxelLinks& links,
     t.pressed = g.distance < 0.0;
   }
   if (t.pressed) {
-    // Where the springs' energy is least on the tool's surface, so that sliding round the tool is free of
-    // friction: in their own metric, the surface straightened at the last place (one step left 3e-4 of the
-    // force scale of friction).
-    const glm::dvec3 w = links.compliance, wished = wanted;
-    for (int n = 0; n < kProjections && g.distance < voxel_radius(); ++n) {
-      const double denominator = glm::dot(g.normal, w * g.normal);
-      if (denominator <= 0.0) break;
-      wanted = wished - ((g.distance + glm::dot(g.normal, wished - wanted)) / denominator) * w * g.normal;
-      g = gap(tool, rest + wanted);
-    }
-    if (g.distance < 0.0) wanted -= g.distance * g.normal;
+    wanted = onto_tool(tool, rest, wanted, links.compliance, g);
     t.normal = g.normal;
   }
   if (obstacles_.empty()) return clamp_to_links(links, wanted, now);
@@ -363,8 +369,7 @@ bool SoftObject::held_still() const noexcept {
 
 // Is a cycle round the contact due?
 bool SoftObject::cycle_due() const noexcept {
-  if (rests_ && any_pressed() && relaxation_.under_way()) return false;
-  if (relaxation_.under_way()) return cycles_since_touch_ == 0;
+  if (relaxation_.under_way()) return cycles_since_touch_ == 0 && !(rests_ && any_pressed());
   const double to_go = unsettled_m_ / lattice_->min_spacing_m();
   // A contact that stands still is the background's: it comes to rest with all the object, where a box comes
   // to rest with its surroundings held.

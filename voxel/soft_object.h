@@ -267,6 +267,10 @@ class SoftObject {
 
   [[nodiscard]] glm::dvec3 position(const Touch& t) const { return t.rest + displacement(t.v); }
   [[nodiscard]] Gap gap(const ToolInBody& tool, const glm::dvec3& position) const noexcept;
+  // Where a voxel that is in the tool goes, its links wishing it at `wished` (from its rest place); `g`: its
+  // gap there, and in the end its last one.
+  [[nodiscard]] glm::dvec3 onto_tool(const ToolInBody& tool, const glm::dvec3& rest, const glm::dvec3& wished,
+                                     const glm::dvec3& compliance, Gap& g) const noexcept;
   // Is the gap no overlap? Most that is near is far enough to be told so without a root: surely.
   [[nodiscard]] bool surely_clear_of(const ToolInBody& tool, const glm::dvec3& position) const noexcept;
   [[nodiscard]] bool clear_of(const ToolInBody& tool, const glm::dvec3& position) const noexcept;

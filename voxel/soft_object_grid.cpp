@@ -18,7 +18,6 @@ namespace {
 constexpr int kMargin = 6;             // of level 0, beyond the contact (voxels)
 constexpr double kFelt = 0.3;          // of the force: an axis with less is relaxed in every second tick
 constexpr std::uint32_t kAllAxes = 4;  // cycles of a contact that has just begun
-constexpr int kProjections = 3;        // of a pressed voxel onto the tool
 // So near the tool a voxel is pressed, and so far from it tissue that is on its way is felt still (spacings).
 constexpr double kPressed = 0.02, kOnItsWay = 0.5;
 // How much stiffer than its secant the tissue is taken to be for the proxy's next step, along its force and
@@ -210,17 +209,10 @@ void SoftObject::press_on_grid(const ToolInBody& tool) noexcept {
     normal[bound.axis] = bound.way;
     grid_->press(c, grid_->within_anchors(c, u), normal);
     // What is pressed aside is held aside: on the tool's surface where its links have it.
-    const glm::dvec3 wished = grid_->link_minimum(c), w = grid_->compliance(c);
-    glm::dvec3 place = wished;
-    Gap g = gap(tool, t.rest + place);
+    const glm::dvec3 wished = grid_->link_minimum(c);
+    Gap g = gap(tool, t.rest + wished);
     if (g.distance >= 0.0) continue;
-    for (int n = 0; n < kProjections && g.distance < voxel_radius(); ++n) {
-      const double denominator = glm::dot(g.normal, w * g.normal);
-      if (denominator <= 0.0) break;
-      place = wished - ((g.distance + glm::dot(g.normal, wished - place)) / denominator) * w * g.normal;
-      g = gap(tool, t.rest + place);
-    }
-    if (g.distance < 0.0) place -= g.distance * g.normal;
+    const glm::dvec3 place = onto_tool(tool, t.rest, wished, grid_->compliance(c), g);
     normal = g.normal;
     normal[bound.axis] = 0.0;
     grid_->press(c, grid_->within_anchors(c, place), normal);
