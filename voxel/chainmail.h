@@ -59,6 +59,8 @@ class ChainMail {
   [[nodiscard]] std::size_t moved_count() const noexcept;
   // Row updates of the last call.
   [[nodiscard]] std::uint64_t work() const { return wave_.work(); }
+  // The last wave came to anchors, which stay.
+  [[nodiscard]] bool pulled_anchors() const { return wave_.pulled_any(); }
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:

@@ -12,7 +12,8 @@ constexpr std::size_t kMost = 4096;  // voxels that move
 constexpr std::size_t kMostKnown = 8 * kMost;
 constexpr int kDeep = 3;                      // links from where it begins …
 constexpr int kFar = 12;                      // … and so many of them where they are at their limits
-constexpr int kSweeps = 30, kTickSweeps = 6;  // in a round of relaxation; in a tick
+constexpr int kSweeps = 30, kTickSweeps = 6;  // in a round of relaxation beside bodies; in a tick
+constexpr int kToolSweeps = 100;              // … under the tool, where rounds are nobody's tick
 constexpr std::uint64_t kOtherWork = 5;       // beside sweeps, in these
 constexpr std::uint32_t kRemembered = 8;      // calls
 // Of a link's own spring: that by which its multiplier is found, and likewise of a voxel's springs at its
@@ -24,6 +25,9 @@ constexpr double kNear = 0.4;      // of the spacing: and so near it may come to
 // Of the spacing, by which limits are tighter while the least energy is looked for: what is found is then
 // within them but for little.
 constexpr double kTighter = 2e-5;
+// … under the tool, where whole cycles and the tick go on from there to the limits themselves: at ten times
+// as much what the one moved the others moved back, by 5e-4 of a small force.
+constexpr double kTighterAtTool = 2e-6;
 constexpr double kSqueezed = 5e-3;  // of the spacing: what is deeper in an obstacle cannot leave it
 constexpr double kDeeper =
     1e-3;                   // of the spacing: no deeper than that it comes by going where it was found to
@@ -47,7 +51,7 @@ LimitedRegion::LimitedRegion(const Lattice& lattice)
   for (auto& of_axis : pressed_) of_axis = LazyArray<float>(lattice.size());
 }
 
-void LimitedRegion::prepare_all() {
+void LimitedRegion::prepare_lists() {
   const auto fill = [](auto& list) {
     list.resize(list.capacity());
     list.clear();
@@ -56,6 +60,10 @@ void LimitedRegion::prepare_all() {
   fill(members_);
   fill(links_);
   fill(known_);
+}
+
+void LimitedRegion::prepare_all() {
+  prepare_lists();
   number_.populate();
   asked_.populate();
   for (auto& of_axis : beyond_) of_axis.populate();
@@ -64,7 +72,7 @@ void LimitedRegion::prepare_all() {
 
 std::uint32_t LimitedRegion::add(VoxelId v) noexcept {
   if (number_[v] != 0) return number_[v] - 1;
-  members_.push_back({.v = v});
+  members_.emplace_back().v = v;
   number_[v] = static_cast<std::uint32_t>(members_.size());
   return number_[v] - 1;
 }
@@ -80,12 +88,12 @@ bool LimitedRegion::at_limit(const Displacement& state, VoxelId v, VoxelId up, i
   return false;
 }
 
-bool LimitedRegion::gather(const Multigrid& multigrid, const Displacement& state) noexcept {
+bool LimitedRegion::gather(const Multigrid& multigrid, const Displacement& state, bool with_tool) noexcept {
   for (const Member& m : members_) number_[m.v] = 0;
   members_.clear();
   const auto moves = [&](VoxelId v) {
     return members_.size() < kMost && lattice_.filled(v) && !lattice_.anchored(v) &&
-           !Displacement::stands(state.role[v]);
+           (!Displacement::stands(state.role[v]) || (with_tool && state.role[v] == Displacement::pressed));
   };
   multigrid.for_limited([&](VoxelId v, int) {
     if (moves(v)) members_[add(v)].moves = true;
@@ -129,7 +137,7 @@ void LimitedRegion::add_neighbours() noexcept {
 }
 
 double LimitedRegion::tighter(const Link& link, std::size_t axis) const noexcept {
-  return std::min(kTighter * spacing_m_, 0.25 * (link.high[axis] - link.low[axis]));
+  return std::min(tighter_m_, 0.25 * (link.high[axis] - link.low[axis]));
 }
 
 void LimitedRegion::prepare_links(Couplings& couplings) noexcept {
@@ -189,6 +197,12 @@ bool LimitedRegion::prepare(Multigrid& multigrid, const Displacement& state,
         sum[axis] += l.stiff_N_per_m[axis] * ((l.near >> axis & 1U) != 0 ? 1.0 + kOfLink : 1.0);
     });
     m.outside = state.role[m.v] == Displacement::obstacle;
+    if (m.outside) m.plane = obstacles.of(m.v);
+    if (state.role[m.v] == Displacement::pressed) {
+      m.outside = true;
+      m.plane.normal = state.tool_normal[lattice_.surface_number(m.v)];
+      m.plane.bound = static_cast<float>(glm::dot(glm::dvec3(m.plane.normal), state.at(m.v)));
+    }
     m.hold_N_per_m = m.outside ? (sum[0] + sum[1] + sum[2]) / 3.0 : 0.0;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       m.load_N[axis] = static_cast<double>(own[axis]) + balance[static_cast<int>(axis)];
@@ -197,8 +211,7 @@ bool LimitedRegion::prepare(Multigrid& multigrid, const Displacement& state,
       m.out[axis] = m.from[axis];
       m.pressed[axis] = static_cast<double>(pressed_[axis][m.v]) / m.hold_N_per_m;
     }
-    if (m.outside && depth_in_obstacle(obstacles.of(m.v), state.at(m.v)) > kSqueezed * spacing_m_)
-      return false;
+    if (m.outside && depth_in_obstacle(m.plane, state.at(m.v)) > kSqueezed * spacing_m_) return false;
   }
   return true;
 }
@@ -226,7 +239,7 @@ void LimitedRegion::sweep(bool forwards) noexcept {
   }
 }
 
-void LimitedRegion::set_multipliers(const ObstacleView& obstacles) noexcept {
+void LimitedRegion::set_multipliers() noexcept {
   for (std::size_t i = 0; i < members_.size(); ++i) {
     Member& m = members_[i];
     for (std::size_t d = 0; d < 3; ++d) {
@@ -244,9 +257,8 @@ void LimitedRegion::set_multipliers(const ObstacleView& obstacles) noexcept {
     for (std::size_t axis = 0; axis < 3; ++axis)
       is[static_cast<int>(axis)] =
           kFurther * m.found[axis] + (1.0 - kFurther) * m.out[axis] + m.pressed[axis];
-    const Obstacle& o = obstacles.of(m.v);
-    const double depth = depth_in_obstacle(o, is) + kTighter * spacing_m_;
-    const glm::dvec3 in = std::max(0.0, depth) * glm::dvec3(o.normal);
+    const double depth = depth_in_obstacle(m.plane, is) + tighter_m_;
+    const glm::dvec3 in = std::max(0.0, depth) * glm::dvec3(m.plane.normal);
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const int ia = static_cast<int>(axis);
       m.out[axis] = is[ia] + in[ia];
@@ -283,17 +295,16 @@ bool LimitedRegion::come_within(std::size_t axis, bool downwards) noexcept {
 }
 
 // Brings what was found within limits, and outside of obstacles as far as these let it.
-bool LimitedRegion::allow(const ObstacleView& obstacles) noexcept {
+bool LimitedRegion::allow() noexcept {
   for (int n = 0; n < kRounds; ++n) {
     bool deep = false;
     for (Member& m : members_) {
       if (!m.outside || !m.moves) continue;
-      const Obstacle& o = obstacles.of(m.v);
-      const double depth = depth_in_obstacle(o, {m.found[0], m.found[1], m.found[2]});
+      const double depth = depth_in_obstacle(m.plane, {m.found[0], m.found[1], m.found[2]});
       if (!(depth > 0.0)) continue;
       deep = true;
       for (std::size_t axis = 0; axis < 3; ++axis)
-        m.found[axis] += depth * static_cast<double>(o.normal[static_cast<int>(axis)]);
+        m.found[axis] += depth * static_cast<double>(m.plane.normal[static_cast<int>(axis)]);
     }
     if (n > 0 && !deep) break;
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -304,7 +315,7 @@ bool LimitedRegion::allow(const ObstacleView& obstacles) noexcept {
 }
 
 // The part of the way to what was found, at the end of which the energy is least.
-double LimitedRegion::share(const ObstacleView& obstacles) const noexcept {
+double LimitedRegion::share() const noexcept {
   double most = 1.0, slope = 0.0, curvature = 0.0;
   for (std::size_t i = 0; i < members_.size(); ++i) {
     const Member& m = members_[i];
@@ -321,9 +332,8 @@ double LimitedRegion::share(const ObstacleView& obstacles) const noexcept {
       }
     }
     if (!m.outside || !m.moves) continue;
-    const Obstacle& o = obstacles.of(m.v);
-    const double was = depth_in_obstacle(o, {m.from[0], m.from[1], m.from[2]}),
-                 is = depth_in_obstacle(o, {m.found[0], m.found[1], m.found[2]}),
+    const double was = depth_in_obstacle(m.plane, {m.from[0], m.from[1], m.from[2]}),
+                 is = depth_in_obstacle(m.plane, {m.found[0], m.found[1], m.found[2]}),
                  room = std::max(0.0, -was) + kDeeper * spacing_m_;
     if (is > was && most * (is - was) > room) most = room / (is - was);
   }
@@ -397,11 +407,12 @@ double LimitedRegion::relax(Multigrid& multigrid, Displacement& state, const Obs
                             std::span<const VoxelId> on_body) noexcept {
   looked_at_ = 0;
   found_ = false;
+  tighter_m_ = (obstacles.moving > 0 ? kTighter : kTighterAtTool) * spacing_m_;
   if (!on_body.empty()) {
     const std::span<const VoxelId> first = on_body.first(std::min(on_body.size(), kMost));
     on_body_.assign(first.begin(), first.end());
   }
-  if (!gather(multigrid, state)) {
+  if (!gather(multigrid, state, obstacles.moving == 0)) {
     pass(multigrid);
     return 0.0;
   }
@@ -410,14 +421,14 @@ double LimitedRegion::relax(Multigrid& multigrid, Displacement& state, const Obs
     forget(multigrid);
     return 0.0;
   }
-  const int sweeps = on_body.empty() ? kSweeps : kTickSweeps;
+  const int sweeps = !on_body.empty() ? kTickSweeps : obstacles.moving > 0 ? kSweeps : kToolSweeps;
   for (int n = 0; n < sweeps; ++n) {
     sweep(n % 2 == 0);
-    set_multipliers(obstacles);
+    set_multipliers();
   }
   looked_at_ = members_.size() * (static_cast<std::uint64_t>(sweeps) + kOtherWork);
   keep_multipliers(multigrid);
-  const double part = allow(obstacles) ? share(obstacles) : 0.0;
+  const double part = allow() ? share() : 0.0;
   if (!(part > 0.0)) return 0.0;
   double most_N = 0.0;
   for (const Member& m : members_) {

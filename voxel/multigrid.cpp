@@ -14,6 +14,7 @@ constexpr int kMaxLevels = 10;
 constexpr int kSmallest = 3;                // cells across the coarsest level
 constexpr int kWrittenAtOnce = 5;           // from this level on springs are written out on construction
 constexpr std::size_t kMaxBalanced = 4096;  // rows; the contact of a tool has some hundred
+constexpr std::size_t kMostInTick = 1024;   // rows that a tick adds together
 constexpr std::uint8_t kAllAxes = 7;
 constexpr std::size_t kMaxStopped = 65536;  // cells of all levels stopped at a time; more move a little
 
@@ -49,7 +50,7 @@ Multigrid::Multigrid(const Lattice& lattice) : lattice_(lattice), tiles_(lattice
   row_tied_ = LazyArray<std::uint16_t>(lattice.grid().rows());
   stopped_.reserve(kMaxStopped);
   still_stopped_.reserve(kMaxStopped);
-  refused_ = LazyArray<Refused>(std::min(kMostRefused, lattice.grid().rows()));
+  joint_ = JointMove(lattice.grid().rows());
   std::vector<Couplings*> couplings;
   for (const Level& level : levels_) couplings.push_back(level.couplings.get());
   holds_ = std::make_unique<Holds>(lattice, couplings);
@@ -90,6 +91,7 @@ void Multigrid::prepare_all() noexcept {
     level.flags.populate();
   }
   holds_->prepare_all();
+  joint_.populate(grid(0).rows(), kMostInTick);
 }
 
 void Multigrid::prepare_tied() noexcept {
@@ -260,7 +262,7 @@ std::size_t Multigrid::memory_bytes() const {
                       (parts_ == nullptr ? 0 : parts_->memory_bytes()) + holds_->memory_bytes() +
                       hats_.memory_bytes() + resident_bytes(stopped_) + resident_bytes(still_stopped_) +
                       row_tied_.resident_bytes() + balance_number_.resident_bytes() +
-                      balance_.resident_bytes() + resident_bytes(balanced_) + refused_.resident_bytes();
+                      balance_.resident_bytes() + resident_bytes(balanced_) + joint_.memory_bytes();
   for (const auto& axis : tied_) bytes += axis.resident_bytes();
   for (const Level& l : levels_) {
     bytes += l.couplings->memory_bytes() + l.flags.resident_bytes() + l.stopped.resident_bytes();

@@ -19,6 +19,7 @@
 #include "voxel/displacement.h"
 #include "voxel/hats.h"
 #include "voxel/holds.h"
+#include "voxel/joint_move.h"
 #include "voxel/lattice.h"
 #include "voxel/links.h"
 #include "voxel/row_kernels.h"
@@ -77,6 +78,9 @@ class Multigrid {
   void release_limited() noexcept;
   // The same, but for those in which a voxel is still pulled against the limit that holds it.
   void release_unlimited(const Displacement& state) noexcept;
+  // What pulls a voxel against its limit is passed on as well, until this is said again: for what a wave has
+  // just laid at its limits, and is to open altogether.
+  void pass_on_all(bool all) noexcept { passes_on_all_ = all; }
   // What links at their limits were found to pull a voxel by (N), until another is: so it balances what its
   // springs pull by, and the cells above it stand.
   void tie(VoxelId v, const glm::vec3& force_N) noexcept;
@@ -116,16 +120,14 @@ class Multigrid {
   // Tells the rows of a box on a level what cells above them have yet to tell (see hats.h): those of coarse
   // rows marked `telling`, from first to last along x. What links at their limits keep from following, the
   // cells take back: a cell whose voxels stayed behind would pull at the cells beside it, a little more every
-  // time, until it was kilometers away. `again`: what did not follow is told once more, the last row first,
-  // before cells take it back. (Row by row, each as far as the links to its neighbours let it, tissue that
-  // has far to go is in its own way: of 9,475 spacings that 3,044 rows did not follow when a cone of tight
-  // links was told how to open, 70 were left then.)
+  // time, until it was kilometers away. `jointly`: voxels all at once (joint_move.h), for tissue that
+  // has far to go: row by row it is in its own way.
   struct Told {
     int q0, q1, j0, j1, k0, k1;     // octets and rows of the level, all included
     int first_teller, last_teller;  // cells of the next coarser level along x
   };
   void tell(int level, const Told& box, Displacement& state, const ObstacleView& obstacles,
-            bool again = false) noexcept;
+            bool jointly = false) noexcept;
   // The most that any cell of a coarse row has yet to tell, of those in the octets that are also from first
   // to last in the row (m).
   [[nodiscard]] float untold(int level, RowId row, OctetSpan span = {}, int first = 0,
@@ -211,6 +213,21 @@ class Multigrid {
   }
   // Adds to a row of voxels what somebody else found, as far as its links allow.
   void add(RowId row, const RowVector& way, Displacement& state, const ObstacleView& obstacles) noexcept;
+  // The same to many rows at once, each given once before: as far as links to the others let it where those
+  // go. Where it may not be, it is added alone: it lies near obstacles, or there are too many.
+  [[nodiscard]] bool can_join(RowId row, const Displacement& state) noexcept {
+    return prepare(0, row) && state.row_obstacles[row] == 0 && !joint_.full();
+  }
+  void join(RowId row, const RowVector& way) noexcept { joint_.add(row, {}, way); }
+  void add_joined(Displacement& state) noexcept { go_jointly(state); }
+  // Was it? Then what of its way is left (m), and whether all that it was to go is gone.
+  [[nodiscard]] bool joined(RowId row, const Displacement& state, RowVector& left,
+                            bool& gone) const noexcept {
+    const JointMove::Row* r = joint_.find(row);
+    if (r != nullptr) gone = left_of(*r, state, left) == 0 && !r->cut;
+    return r != nullptr;
+  }
+  void forget_joined() noexcept { joint_.clear(); }
   // Finds all springs and takes all memory now, not when a tick first needs them.
   void prepare_all() noexcept;
   void prepare_tied() noexcept;  // what tie() writes to
@@ -235,14 +252,13 @@ class Multigrid {
     VoxelId v;
     std::uint8_t axes;  // bits
   };
-  // What a row of voxels was told and did not follow.
+  // What a row was told and did not follow.
   struct Refused {
     RowId row = 0;
     unsigned axes = 0;  // bits
     OctetSpan span;
     RowVector way;
   };
-  static constexpr std::size_t kMostRefused = 8192;  // rows at a time; of more, cells take it back at once
   static constexpr float kTight = 1e-4F;      // of the spacing: nearer to its limit than this a link is at it
   static constexpr float kLeastLoad = 0.25F;  // of the tolerance: loads less wrong than this are right
 
@@ -277,10 +293,15 @@ class Multigrid {
                           OctetSpan span, RowVector& out) noexcept;
   void spread_hats(int level, int j, int k, const Told& box) noexcept;
   void tell_row(int level, RowId row, const std::array<HatRow, 4>& hats, Displacement& state,
-                const ObstacleView& obstacles, OctetSpan span, bool again) noexcept;
+                const ObstacleView& obstacles, OctetSpan span, bool jointly) noexcept;
   void correct(int level, RowId row, const RowVector& correction, Displacement& state,
                const ObstacleView& obstacles, OctetSpan span, Refused& refused) noexcept;
-  void tell_again(Displacement& state, const ObstacleView& obstacles) noexcept;
+  void set_out(JointMove::Row& r, Displacement& state) noexcept;
+  void keep_aim(JointMove::Row& r, const Displacement& state) noexcept;
+  void draw_back(JointMove::Row& r, Displacement& state) noexcept;
+  void go_jointly(Displacement& state) noexcept;
+  void stay(Displacement& state) noexcept;
+  unsigned left_of(const JointMove::Row& r, const Displacement& state, RowVector& left) const noexcept;
   void take_back_refused(int level, const Refused& refused) noexcept;
 
   // ---- where something is touched (contact_passes.cpp) ----
@@ -334,8 +355,7 @@ class Multigrid {
   LazyVector<StoppedVoxel> still_stopped_;
   std::array<LazyArray<float>, 3> tied_;  // [axis][v] (N)
   LazyArray<std::uint16_t> row_tied_;     // [row] voxels that are
-  LazyArray<Refused> refused_;
-  std::size_t refused_count_ = 0;
+  JointMove joint_;
   // Rows in which something balances what pulls: that and their own load (N), one beside the other. (At their
   // voxels' places, each in pages of its own, a first give took up to 1.2 ms, most of it to get these.)
   LazyVector<RowId> balanced_;
@@ -346,6 +366,7 @@ class Multigrid {
   std::vector<PartBound> part_bounds_;
   std::array<AxisLimits, 3> yield_limits_;
   bool all_visited_ = false;  // cycles look at all in their boxes: which rows are active nobody asks
+  bool passes_on_all_ = false;
   float tolerance_N_ = 0.0F, quiet_m_ = 0.0F, hold_ = 1.0F;
 };
 

@@ -54,6 +54,7 @@ bool Multigrid::yield(RowId row, Displacement& state, bool keep) noexcept {
 
 void Multigrid::smooth(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
                        OctetSpan span) noexcept {
+  if (parts_ != nullptr && parts_->fill_row(level, row)) return;  // they go as one
   const LevelRow r = row_of(level, row, state);
   log_.note(level, row);
   if (level > 0) {
@@ -167,7 +168,7 @@ RowResidual Multigrid::residual_of(int level, RowId row, Displacement& state, co
   RowVector loads;
   const bool ties = row_tied_[row] != 0;
   if (ties) add_ties(row, r, loads);
-  RowResidual found = residual_row(r, &limits, tight, span, out);
+  RowResidual found = residual_row(r, passes_on_all_ ? nullptr : &limits, tight, span, out);
   if (state.row_obstacles[row] != 0 || state.row_standing[row] != 0 || holds_->supports(row)) {
     balance_contacts(row, state, obstacles, span, found, out);
     measure_row(r.springs, out, span, found);
@@ -202,8 +203,15 @@ float Multigrid::restrict_loads(int level, RowId row, Displacement& state, const
     const int half = static_cast<int>(child & 1U);
     const OctetSpan below = octets_below(span, half);
     if (below.first > below.last || !finer.prepare(fine)) continue;
-    RowVector residual;
-    const RowResidual left = residual_of(level - 1, fine, state, obstacles, below, residual);
+    // Parts have theirs from their borders.
+    if (parts_ != nullptr && parts_->fill_known_row(level - 1, fine)) {
+      if (span.whole()) unmark(level - 1, fine, active | dirty);
+      continue;
+    }
+    RowVector residual{};
+    RowResidual left;
+    if (parts_ == nullptr || !parts_->fill_row(level - 1, fine))
+      left = residual_of(level - 1, fine, state, obstacles, below, residual);
     worst = std::max(worst, left.most_N);
     if (parts_ != nullptr && parts_->in_row(level - 1, fine))
       set_part_lanes(level - 1, fine, below, residual);
@@ -324,7 +332,7 @@ void Multigrid::spread_hats(int level, int j, int k, const Told& box) noexcept {
 }
 
 void Multigrid::tell(int level, const Told& box, Displacement& state, const ObstacleView& obstacles,
-                     bool again) noexcept {
+                     bool jointly) noexcept {
   const Grid& g = grid(level);
   // Of the two cells around a voxel the lower one.
   const auto below = [](int x) { return (x + 1) / 2 - 1; };
@@ -351,16 +359,26 @@ void Multigrid::tell(int level, const Told& box, Displacement& state, const Obst
         if (!prepare(level, row)) continue;
         const int first = std::max(q0, c * kOctets), last = std::min(q1, c * kOctets + kOctets - 1);
         tell_row(level, row, hats(first), state, obstacles, {first - c * kOctets, last - c * kOctets},
-                 again && level == 0);
+                 jointly && level == 0);
       }
     }
   }
-  if (again) tell_again(state, obstacles);
+  if (jointly && level == 0) {
+    go_jointly(state);
+    for (const JointMove::Row& r : joint_.rows()) {
+      if (!r.aims) continue;
+      Refused refused{.row = r.row, .axes = 0, .span = r.span, .way = {}};
+      refused.axes = left_of(r, state, refused.way);
+      if (refused.axes != 0) take_back_refused(0, refused);
+    }
+    joint_.clear();
+  }
   if (parts_ != nullptr) tell_parts(level, state, obstacles);
 }
 
 void Multigrid::tell_row(int level, RowId row, const std::array<HatRow, 4>& hats, Displacement& state,
-                         const ObstacleView& obstacles, OctetSpan span, bool again) noexcept {
+                         const ObstacleView& obstacles, OctetSpan span, bool jointly) noexcept {
+  if (level == 0 && parts_ != nullptr && parts_->fill_known_row(level, row)) return;  // told as a whole
   RowVector correction;
   sum_hats(hats, span, correction);
   for (std::size_t axis = 0; axis < 3 && level > 0 && holds_->any(level, row); ++axis) {
@@ -371,15 +389,14 @@ void Multigrid::tell_row(int level, RowId row, const std::array<HatRow, 4>& hats
   }
   log_.note(level, row);
   if (parts_ != nullptr && parts_->in_row(level, row)) note_told_parts(level, row, span, correction);
-  Refused at_once;
-  Refused& refused = again && refused_count_ < refused_.size() ? refused_[refused_count_] : at_once;
-  correct(level, row, correction, state, obstacles, span, refused);
-  if (refused.axes == 0) return;
-  if (&refused != &at_once) {
-    ++refused_count_;
-  } else {
-    take_back_refused(level, refused);
+  // Near obstacles each goes for itself, before those that go together.
+  if (jointly && state.row_obstacles[row] == 0 && !joint_.full()) {
+    joint_.add(row, span, correction);
+    return;
   }
+  Refused refused;
+  correct(level, row, correction, state, obstacles, span, refused);
+  if (refused.axes != 0) take_back_refused(level, refused);
 }
 
 void Multigrid::correct(int level, RowId row, const RowVector& correction, Displacement& state,
@@ -397,20 +414,6 @@ void Multigrid::correct(int level, RowId row, const RowVector& correction, Displ
   refused.axes = done.refused;
   refused.span = span;
   note_change(level, row, done.most_m);
-}
-
-void Multigrid::tell_again(Displacement& state, const ObstacleView& obstacles) noexcept {
-  while (refused_count_ > 0) {
-    Refused& refused = refused_[--refused_count_];
-    RowVector left{};
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      if ((refused.axes >> axis & 1U) == 0) continue;
-      for (int i = refused.span.first * kOctet; i < (refused.span.last + 1) * kOctet; ++i)
-        left[axis][static_cast<std::size_t>(i)] = refused.way[axis][static_cast<std::size_t>(i)];
-    }
-    correct(0, refused.row, left, state, obstacles, refused.span, refused);
-    if (refused.axes != 0) take_back_refused(0, refused);
-  }
 }
 
 void Multigrid::take_back_refused(int level, const Refused& refused) noexcept {

@@ -27,6 +27,7 @@ constexpr double kDrift = 2e-5;
 // Spacings that a coarse cell may have to tell. Between a body and a plate cells ran away to 1e30 m in ten
 // ticks; with ten spacings, or four, some went on running to and fro when the body had left.
 constexpr float kFarthest = 2.0F;
+constexpr std::uint64_t kPatient = 200'000;          // voxel updates a call: more than a tick has
 constexpr std::uint64_t kNextFirst = 7919;           // of these voxels is looked at first in the next round
 constexpr int kContactMargin = 3, kWideMargin = 14;  // cells round a contact that are smoothed, on each level
 constexpr int kNear = 2;  // rows that a cycle round a contact reads beyond those it brings to rest
@@ -49,6 +50,20 @@ Relaxation::Relaxation(const Lattice& lattice)
 }
 
 Relaxation::~Relaxation() = default;
+
+bool Relaxation::limits_hold() const noexcept {
+  return limited_->found();
+}
+
+void Relaxation::relax_limited(Displacement& state, const ObstacleView& obstacles) noexcept {
+  if (!tool_presses_ || obstacles.moving > 0) return;
+  limited_->relax(multigrid_, state, obstacles, {});
+  multigrid_.release_unlimited(state);
+}
+
+void Relaxation::prepare_under_tool() {
+  limited_->prepare_lists();
+}
 
 void Relaxation::prepare_beside_bodies() {
   multigrid_.prepare_tied();
@@ -100,10 +115,15 @@ void Relaxation::stir_all() noexcept {
 // What the tool presses slides, and is held by where it does; see Multigrid.
 void Relaxation::hold_what_stands(const Displacement& state, std::span<const VoxelId> held) noexcept {
   standing_.clear();
+  bool others_hold = false;
+  tool_presses_ = false;
   for (const VoxelId v : held) {
+    tool_presses_ = tool_presses_ || state.role[v] == Displacement::pressed;
+    others_hold = others_hold || state.role[v] == Displacement::held;
     if (state.role[v] == Displacement::held && standing_.size() < standing_.capacity())
       standing_.push_back(v);
   }
+  tool_presses_ = tool_presses_ && !others_hold;
   multigrid_.set_held(standing_);
   multigrid_.set_part_contacts(state, held);
 }
@@ -111,6 +131,7 @@ void Relaxation::hold_what_stands(const Displacement& state, std::span<const Vox
 std::uint64_t Relaxation::run(Displacement& state, const ObstacleView& obstacles,
                               std::span<const VoxelId> held, std::uint64_t budget) noexcept {
   if (asleep_) return 0;
+  patient_ = budget >= kPatient;
   hold_what_stands(state, held);
   TileQueue& tiles = multigrid_.tiles();
   std::uint64_t spent = 0;
@@ -165,6 +186,7 @@ void Relaxation::run_cycle(Displacement& state, const ObstacleView& obstacles,
   running_residual_N_ = 0.0;
   lay_whole_boxes();
   cycle(state, obstacles, Look::active);
+  patient_ = true;
   end_round(state, obstacles, running_residual_N_);
 }
 
@@ -214,9 +236,9 @@ std::size_t Relaxation::relax_widely(Displacement& state, const ObstacleView& ob
   hold_what_stands(state, held);
   multigrid_.release_limited();
   lay_contact_boxes(pressed, kWideMargin);
-  tells_again_ = true;
+  tells_jointly_ = true;
   cycle(state, obstacles, Look::all);
-  tells_again_ = false;
+  tells_jointly_ = false;
   return octets_of_cycle();
 }
 
@@ -320,10 +342,12 @@ void Relaxation::end_round(Displacement& state, const ObstacleView& obstacles, d
     residual_N = std::max(residual_N, move_clusters(state, obstacles));
   // While rounds gain nothing, what limits hold stays held for a few of them: let go of in every round, two
   // sets of voxels can take turns for ever.
-  // Beside a body something moves in every tick, so that each round is as the first, and there what is still
-  // pulled against its limit stays held. (Let go of, coarse levels took it off the limit and back: under a
-  // ball at rest by 0.03 spacings, for ever. Kept everywhere, tissue that jumped stayed far from rest.)
-  if (obstacles.moving > 0) {
+  // What the tool presses, and all that hangs on it by links at their limits, goes together, too: a few
+  // hundred thousand voxel updates, which no tick has to spare. Beside a body something moves in every tick,
+  // so that each round is as the first, and there what is still pulled against its limit stays held. (Let go
+  // of, coarse levels took it off the limit and back: under a ball at rest by 0.03 spacings, for ever. Kept
+  // everywhere, tissue that jumped stayed far from rest.)
+  if (obstacles.moving > 0 || (tool_presses_ && patient_)) {
     residual_N = std::max(residual_N, limited_->relax(multigrid_, state, obstacles, {}));
     credit_ -= static_cast<std::int64_t>(limited_->looked_at());
     multigrid_.release_unlimited(state);

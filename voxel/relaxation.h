@@ -74,6 +74,14 @@ class Relaxation {
   // too much after two times four such cycles, and 69 % after two times six in which it stayed held.)
   std::size_t relax_widely(Displacement& state, const ObstacleView& obstacles, std::span<const VoxelId> held,
                            std::span<const VoxelId> pressed) noexcept;
+  // After a jump that moved tissue far: one cycle over all of it, in which the coarse levels first come to
+  // rest among themselves, and then tell all voxels at once. Returns octets, as a whole cycle's.
+  std::size_t run_thoroughly(Displacement& state, const ObstacleView& obstacles,
+                             std::span<const VoxelId> held) noexcept;
+  // What limits hold under the tool (see LimitedRegion), after cycles that are not of whole rounds.
+  void relax_limited(Displacement& state, const ObstacleView& obstacles) noexcept;
+  // A cycle round each part without slack that the tool presses: springs all about it are what is felt.
+  void relax_round_parts(Displacement& state, const ObstacleView& obstacles) noexcept;
   // Coarse levels tell every voxel what they know, and no more.
   void tell_all(Displacement& state, const ObstacleView& obstacles) noexcept;
 
@@ -89,6 +97,8 @@ class Relaxation {
   bool relax_limited(Displacement& state, const ObstacleView& obstacles,
                      std::span<const VoxelId> on_body) noexcept;
   [[nodiscard]] const LimitedRegion& limited() const { return *limited_; }
+  // Did links at their limits hold what the tool, or a body, presses, when they were last asked?
+  [[nodiscard]] bool limits_hold() const noexcept;
   // Something moved: relax until the residual is below the tolerance again.
   void wake() noexcept {
     asleep_ = false;
@@ -144,6 +154,7 @@ class Relaxation {
   [[nodiscard]] std::uint64_t cycles() const { return cycles_; }
   void prepare_all() noexcept { multigrid_.prepare_all(); }
   void prepare_beside_bodies();  // that move
+  void prepare_under_tool();     // for whole rounds there, which a replica has
   // Starts in the same state as `other`, of the same lattice …
   void copy_from(const Relaxation& other) noexcept;
   // … which was left to another, so that its coarse cells know next to nothing: they are found anew.
@@ -186,7 +197,7 @@ class Relaxation {
   [[nodiscard]] Step step_of(int n) const noexcept;
   [[nodiscard]] int steps() const noexcept { return 3 * last_level() + 1; }
   void cycle(Displacement& state, const ObstacleView& obstacles, Look look) noexcept {
-    for (int n = 0; n < steps(); ++n) step(n, state, obstacles, look, false);
+    run_steps_over(0, steps(), state, obstacles, look);
   }
   void step(int n, Displacement& state, const ObstacleView& obstacles, Look look, bool smoothed) noexcept;
   std::size_t run_steps(Displacement& state, const ObstacleView& obstacles, std::size_t at_once) noexcept;
@@ -195,6 +206,10 @@ class Relaxation {
   void smooth_box(int level, int colour, Displacement& state, const ObstacleView& obstacles,
                   Look look) noexcept;
   void tell_box(int level, Displacement& state, const ObstacleView& obstacles) noexcept;
+  void run_steps_over(int first, int last, Displacement& state, const ObstacleView& obstacles,
+                      Look look) noexcept {
+    for (int n = first; n < last; ++n) step(n, state, obstacles, look, false);
+  }
   [[nodiscard]] bool restrict_due(int level, RowId row) const noexcept;
   template <class Visit>
   void for_rows(int level, const RowBox& box, const Visit& visit) noexcept;
@@ -213,6 +228,8 @@ class Relaxation {
   std::unique_ptr<LimitedRegion> limited_;
   std::vector<LevelBoxes> boxes_;
   LazyVector<VoxelId> standing_;            // what the last cycle found held, on all axes
+  bool tool_presses_ = false;               // … or on the tool
+  bool patient_ = false;                    // rounds are nobody's tick
   std::int64_t credit_ = 0;                 // voxel updates that may be spent; negative: were spent too many
   std::size_t round_left_ = 0;              // tiles until this round ends
   std::size_t cursor_ = 0, looked_at_ = 0;  // tiles looked at for what coarse levels have to tell them
@@ -222,11 +239,11 @@ class Relaxation {
   NearRows near_;
   bool contact_relaxed_ = false;  // since run() last was
   bool wide_ = false;
-  int step_ = 0;              // the next one of a cycle round the contact, with its boxes in boxes_
-  bool smoothed_ = false;     // and on its way down nothing is smoothed
-  bool unkept_ = false;       // some link is beyond what it keeps
-  bool keeping_ = false;      // it is kept now
-  bool tells_again_ = false;  // what limits keep from following is told twice
+  int step_ = 0;                // the next one of a cycle round the contact, with its boxes in boxes_
+  bool smoothed_ = false;       // and on its way down nothing is smoothed
+  bool unkept_ = false;         // some link is beyond what it keeps
+  bool keeping_ = false;        // it is kept now
+  bool tells_jointly_ = false;  // voxels are told all at once
   double residual_N_ = 0.0, running_residual_N_ = 0.0, tolerance_N_ = 0.0, least_residual_N_ = 0.0;
   float hold_ = 1.0F;
   std::array<double, 3> drift_m_{}, furthest_m_{};  // of clusters at limits, since it was woken

@@ -16,6 +16,9 @@ constexpr int kContactSweeps = 4;  // of the coarsest level of a cycle round a c
 constexpr int kContactLevels = 5;
 // What octets take, in those that are told: smoothed; passed on.
 constexpr std::size_t kSmoothed = 2, kPassedOn = 3;
+// Cycles of all levels but the first before a thorough cycle tells voxels: those are an eighth of it each.
+constexpr int kCoarseCycles = 3;
+constexpr int kRoundParts = 8;  // voxels
 constexpr int kTileMargin = 3;  // cells round a tile that are smoothed, from level 1 on
 
 }  // namespace
@@ -155,7 +158,7 @@ void Relaxation::tell_box(int level, Displacement& state, const ObstacleView& ob
         multigrid_.untold(level + 1, row, span, b.first_teller - origin, b.last_teller - origin);
     if (most <= multigrid_.passed_on_m()) return;
     // Where links at their limits hold tissue between obstacles, coarse cells can run away.
-    if (!(most <= farthest_m_)) {
+    if (!(most <= farthest_m_) && !tells_jointly_) {
       multigrid_.forget_untold(level + 1, row, state, obstacles);
       return;
     }
@@ -165,7 +168,7 @@ void Relaxation::tell_box(int level, Displacement& state, const ObstacleView& ob
   if (!any) return;
   const RowBox& t = boxes(level).told;
   multigrid_.tell(level, {t.q0, t.q1, t.j0, t.j1, t.k0, t.k1, b.first_teller, b.last_teller}, state,
-                  obstacles, tells_again_);
+                  obstacles, tells_jointly_);
 }
 
 // Was anything that a coarse row holds moved since it was passed on?
@@ -247,11 +250,44 @@ void Relaxation::lay_whole_boxes() noexcept {
   lay_boxes({0, 0, 0}, {dims[0] - 1, dims[1] - 1, dims[2] - 1}, kNoContact, 0);
 }
 
+std::size_t Relaxation::run_thoroughly(Displacement& state, const ObstacleView& obstacles,
+                                       std::span<const VoxelId> held) noexcept {
+  hold_what_stands(state, held);
+  multigrid_.release_limited();
+  lay_whole_boxes();
+  tells_jointly_ = true;
+  multigrid_.pass_on_all(true);
+  const int first_coarse = 2,
+            last_step = steps() - 1;  // from where level 1 is smoothed to where voxels are told
+  run_steps_over(0, last_step, state, obstacles, Look::all);
+  for (int n = 0; n < kCoarseCycles; ++n)
+    run_steps_over(first_coarse, last_step, state, obstacles, Look::all);
+  step(last_step, state, obstacles, Look::all, false);
+  multigrid_.pass_on_all(false);
+  tells_jointly_ = false;
+  return octets_of_cycle();
+}
+
+void Relaxation::relax_round_parts(Displacement& state, const ObstacleView& obstacles) noexcept {
+  if (!multigrid_.has_parts()) return;
+  for (std::size_t p = 0; p < multigrid_.parts().count(); ++p) {
+    if (!multigrid_.tool_holds_part(p)) continue;
+    const WholeParts::Box& part = multigrid_.parts().on(0, p).box;
+    std::array<int, 3> low{}, high{};
+    for (std::size_t d = 0; d < 3; ++d) {
+      low[d] = std::max(part.first[d] - kRoundParts, 0);
+      high[d] = std::min(part.last[d] + kRoundParts, lattice_.grid().dims[d] - 1);
+    }
+    lay_boxes(low, high, kNoContact, 0);
+    cycle(state, obstacles, Look::all);
+  }
+}
+
 void Relaxation::tell_all(Displacement& state, const ObstacleView& obstacles) noexcept {
   lay_whole_boxes();
-  tells_again_ = true;
+  tells_jointly_ = true;
   for (int l = last_level() - 1; l >= 0; --l) tell_box(l, state, obstacles);
-  tells_again_ = false;
+  tells_jointly_ = false;
 }
 
 void Relaxation::renew_coarse(Displacement& state, const ObstacleView& obstacles) noexcept {

@@ -77,7 +77,7 @@ class Replica {
     std::vector<RowId> rows;
     std::vector<float> values;  // [row][array][lane], as in a parcel
     std::size_t near_count = 0;
-    bool far = false, at_rest = false;
+    bool far = false, limited = false, at_rest = false;
     double residual_N = 0.0;
     std::vector<glm::dvec3> part_ways;  // as PartWays
   };
@@ -208,7 +208,9 @@ class Replica {
   void take_parts(SoftObject& object) noexcept;
   void keep_back(RowId row) noexcept;
   void pack_kept_back() noexcept;
+  void way_of(SoftObject& object, std::size_t n, float part, RowVector& ways) noexcept;
   bool take_row(SoftObject& object, std::size_t n, float part = 1.0F) noexcept;
+  void take_jointly(SoftObject& object, std::size_t first, std::size_t last, float part) noexcept;
   void fetch_ahead(SoftObject& object, std::size_t n) const noexcept;
 
   const Lattice& lattice_;
@@ -219,11 +221,13 @@ class Replica {
   std::vector<VoxelId> held_;
   std::array<LazyArray<float>, 3> before_;  // [axis][voxel] what is here as the other state knows it
   std::size_t work_ = 0;
-  int quick_ = 0;           // results to come of wide boxes round the contact
-  bool was_quick_ = false;  // the last one was
-  int far_ = 0;             // results to come that move tissue far
-  bool found_far_ = false;  // the last one did
-  float least_m_ = 0.0F;    // smaller changes are not passed on
+  int quick_ = 0;               // results to come of wide boxes round the contact
+  bool was_quick_ = false;      // the last one was
+  int far_ = 0;                 // results to come that move tissue far
+  bool found_far_ = false;      // the last one did
+  bool found_limited_ = false;  // in the last one limits held what the tool presses
+  bool part_pressed_ = false;   // the tool presses a part without slack
+  float least_m_ = 0.0F;        // smaller changes are not passed on
   // Rows whose change waits until all is at rest; some that were passed on since are among them.
   LazyArray<RowId> rows_kept_back_;
   std::size_t kept_back_count_ = 0;
@@ -249,6 +253,7 @@ class Replica {
   std::size_t taking_ = 0, drained_ = 0;  // which of found_, and how many of its rows
   Again again_;                           // of these
   bool in_turns_ = false;                 // rows that do not follow have another turn
+  bool together_ = false;                 // those near the contact are added together
   std::size_t near_count_ = 0;            // of the other one's: they are near the contact
   int parts_left_ = 0;                    // in which these are still to be added
   bool at_rest_ = true;

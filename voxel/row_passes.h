@@ -104,5 +104,19 @@ struct RowCorrection {
 // in the lanes of the span; of what is held or anchored nothing is expected.
 RowCorrection correct_row(const LevelRow& row, const RowLimits* limits, OctetSpan span,
                           const RowVector& correction, RowVector& refused) noexcept;
+// `way` is added to a row whatever its links allow, but to what stands, and to what is stopped, on an axis;
+// `way` and where it was change places.
+struct SetOut {
+  float most_m = 0.0F;   // the most that any voxel was asked to move
+  bool cut = false;      // something that stands was to go
+  unsigned stopped = 0;  // bit of each axis on which something that is stopped was to; of these `refused` …
+};
+SetOut set_out_row(const LevelRow& row, OctetSpan span, RowVector& way, RowVector& refused) noexcept;
+// Bit of each axis on which links may be beyond their limits.
+unsigned axes_beyond(const LevelRow& row, const RowLimits& limits) noexcept;
+// On these axes voxels of a row that are beyond a limit of a link, by more than floats round, come back
+// towards `from`, as far as that asks and no further. True where any did.
+bool draw_back_row(const LevelRow& row, const RowLimits& limits, unsigned axes,
+                   const RowVector& from) noexcept;
 
 }  // namespace voxel

@@ -47,6 +47,35 @@ constexpr double kSlides = 0.1;  // sin² between tool and obstacle; where they 
 constexpr double kGiveWay = 0.01;  // of the voxel radius: less is left to the next push
 constexpr double kDeep = 0.05;     // of the voxel radius: less is an error of a tick, and is mended
 
+// The least force along `way` (m, of 1 N; no component against the normal) that brings `wished`, each axis
+// within its links' interval, to normal · u >= bound; where none does, one at which no axis goes any further.
+double least_force_N(const VoxelLinks& links, const glm::dvec3& wished, const glm::dvec3& way,
+                     const glm::dvec3& normal, double bound) {
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  double force_N = 0.0;
+  for (int n = 0; n < 7; ++n) {  // an axis begins to go once, and is stopped once
+    double reached = 0.0, rise = 0.0, next_N = kNone;
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto& in = links.interval[static_cast<std::size_t>(axis)];
+      const double low = static_cast<double>(in[0]), high = std::max(low, static_cast<double>(in[1]));
+      const double at = wished[axis] + force_N * way[axis];
+      reached += normal[axis] * std::clamp(at, low, high);
+      if (way[axis] == 0.0) continue;
+      const double begin_N = ((way[axis] > 0.0 ? low : high) - wished[axis]) / way[axis],
+                   end_N = ((way[axis] > 0.0 ? high : low) - wished[axis]) / way[axis];
+      if (force_N >= end_N) continue;
+      if (force_N >= begin_N) rise += normal[axis] * way[axis];
+      next_N = std::min(next_N, force_N >= begin_N ? end_N : begin_N);
+    }
+    if (reached >= bound) break;
+    const double to_N = rise > 0.0 ? force_N + (bound - reached) / rise : kNone;
+    if (to_N <= next_N && to_N < kNone) return to_N;
+    if (next_N == kNone) break;
+    force_N = next_N;
+  }
+  return force_N;
+}
+
 }  // namespace
 
 SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice)
@@ -160,6 +189,7 @@ void SoftObject::touch(std::span<const VoxelId> near) noexcept {
   if (cold_ticks_ > 0) --cold_ticks_;
   rests_ = std::exchange(asked_to_rest_, false);
   contact_work_ = 0;
+  moved_m_ = 0.0;
   wide_cycle_ = false;
   if (near.empty()) pressed_last_.clear();
   std::size_t pressed = 0;
@@ -233,11 +263,13 @@ void SoftObject::settle_chain() noexcept {
   for (const glm::vec3& move : moves_) most = std::max(most, glm::dot(move, move));
   unrelaxed_m_ += std::sqrt(static_cast<double>(most));
   unsettled_m_ += std::sqrt(static_cast<double>(most));
+  moved_m_ += std::sqrt(static_cast<double>(most));
   if (unrelaxed_m_ > kStir * lattice_->min_spacing_m()) {
     unrelaxed_m_ = 0.0;
     relaxation_.wake();
   }
   chain_.settle(state_, sources_, moves_, obstacles_);
+  anchors_pull_ = anchors_pull_ || chain_.pulled_anchors();
   contact_work_ += kWorkOfVisit * static_cast<std::size_t>(chain_.work());
   for (const RowId row : chain_.moved_rows()) relaxation_.stir(row);
   for (const RowId row : chain_.moved_rows()) note_moved(row);
@@ -258,6 +290,7 @@ bool SoftObject::push_out(const ToolInBody& tool) noexcept {
   if (grid_) return push_out_on_grid(tool);
   sources_.clear();
   moves_.clear();
+  anchors_pull_ = false;
   bool any = false;
   for (Touch& t : touches_) {
     const glm::dvec3 p = position(t);
@@ -294,11 +327,47 @@ glm::dvec3 SoftObject::onto_tool(const ToolInBody& tool, const glm::dvec3& rest,
   return g.distance < 0.0 ? place - g.distance * g.normal : place;
 }
 
+// Where links do not let a voxel out of the tool altogether it goes no deeper than it was.
+glm::dvec3 SoftObject::no_deeper_in(const ToolInBody& tool, const glm::dvec3& rest, const glm::dvec3& now,
+                                    const glm::dvec3& place) const noexcept {
+  const double was = std::min(gap(tool, rest + now).distance, voxel_radius());
+  glm::dvec3 to = place;
+  for (int n = 0; n < kProjections; ++n) {
+    const double is = gap(tool, rest + to).distance;
+    if (is >= 0.0 || is >= was) return to;
+    if (was <= 0.0) return now;
+    to = now + was / (was - is) * (to - now);
+  }
+  return to;
+}
+
+// The same where its links do not let it go there: the least energy on the tool within their limits. Given
+// the tool's force, each axis is for itself. (Brought onto the tool
+// and then within its limits, it stood a tenth of a spacing off the tool, or went into it, was pushed out by
+// the next tick, and what hangs on it with it: at a ball ten spacings deep 1.3 % of the energy in every tick,
+// for good.)
+glm::dvec3 SoftObject::onto_tool_within(const ToolInBody& tool, const VoxelLinks& links,
+                                        const glm::dvec3& wished, Touch& t) const noexcept {
+  const glm::dvec3 now = state_.at(t.v);
+  glm::dvec3 place = clamp_to_links(links, wished, now);
+  for (int n = 0; n < kProjections; ++n) {
+    const Gap g = gap(tool, t.rest + place);
+    t.normal = g.normal;
+    if (n == 0 && g.distance >= 0.0) break;
+    const glm::dvec3 way = links.compliance * g.normal;  // of 1 N
+    const double force_N =
+        least_force_N(links, wished, way, g.normal, glm::dot(g.normal, place) - g.distance);
+    place = clamp_to_links(links, wished + force_N * way, now);
+  }
+  return no_deeper_in(tool, t.rest, now, place);
+}
+
 // Where a touched voxel belongs, everything else where it is; `pressed`: by the tool.
 glm::dvec3 SoftObject::place_of(const ToolInBody& tool, const VoxelLinks& links, Touch& t) noexcept {
   const glm::dvec3 rest = t.rest, now = state_.at(t.v);
   glm::dvec3 wanted = links.minimum;
   if (pair_held(t)) wanted += links.compliance * glm::dvec3(pair_load_[t.surface]);
+  const glm::dvec3 wished = wanted;
   t.pressed = !surely_clear_of(tool, rest + wanted);
   Gap g;
   if (t.pressed) {
@@ -309,11 +378,18 @@ glm::dvec3 SoftObject::place_of(const ToolInBody& tool, const VoxelLinks& links,
     wanted = onto_tool(tool, rest, wanted, links.compliance, g);
     t.normal = g.normal;
   }
-  if (obstacles_.empty()) return clamp_to_links(links, wanted, now);
+  const glm::dvec3 n(obstacles_.empty() ? glm::vec3(0.0F) : obstacles_[t.surface].normal);
+  if (n == glm::dvec3(0.0)) {
+    const glm::dvec3 place = clamp_to_links(links, wanted, now);
+    // What other objects press, too, goes where its pairs have it; and of what anchors keep in the tool, that
+    // is to give way, not to part it as a wedge would.
+    const bool let_out = t.pressed && place != wanted && held_voxels_.empty() &&
+                         !(anchors_pull_ && gap(tool, rest + now).distance < -kGiveWay * voxel_radius());
+    return let_out ? onto_tool_within(tool, links, wished, t) : place;
+  }
   const Obstacle& o = obstacles_[t.surface];
-  const glm::dvec3 n(o.normal);
   const double depth = static_cast<double>(o.bound) - glm::dot(n, wanted);
-  if (depth > 0.0 && n != glm::dvec3(0.0)) {
+  if (depth > 0.0) {
     wanted += depth * n;
     // Where that takes it into the tool it slides along the obstacle, out of its way. (Left there, the tool
     // had to give way to tissue that bulged against the side of a bone: by 0.08 N of 1.1, in three ticks of
@@ -327,8 +403,7 @@ glm::dvec3 SoftObject::place_of(const ToolInBody& tool, const VoxelLinks& links,
       t.normal = g.normal;
     }
   }
-  const glm::dvec3 place = clamp_to_links(links, wanted, now);
-  return n == glm::dvec3(0.0) ? place : no_deeper(o, now, place);
+  return no_deeper(o, now, clamp_to_links(links, wanted, now));
 }
 
 void SoftObject::relax_touch(const ToolInBody& tool, Touch& t) noexcept {
@@ -365,6 +440,10 @@ bool SoftObject::any_pressed() const noexcept {
 
 bool SoftObject::held_still() const noexcept {
   return any_pressed() && relaxation_.wide() && unsettled_m_ < kJump * lattice_->min_spacing_m();
+}
+
+bool SoftObject::still_held() const noexcept {
+  return any_pressed() && moved_m_ < kContraction * kJump * lattice_->min_spacing_m();
 }
 
 // Is a cycle round the contact due?

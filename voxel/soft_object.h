@@ -119,6 +119,8 @@ class SoftObject {
   // Is the tool pressed into it, wide enough for cycles in parts, and hardly moves? A voxel that slips, or a
   // result on its way, is no motion.
   [[nodiscard]] bool held_still() const noexcept;
+  // … and while parts of a result come, which move it a little themselves, in each tick: does it still?
+  [[nodiscard]] bool still_held() const noexcept;
   // While the tool presses it, no cycle round the contact is begun, or goes on, in the next tick.
   void ask_to_rest() noexcept { asked_to_rest_ = true; }
   // Part of what it takes to be given to a replica, or to take what that found, done in the tick before it;
@@ -289,6 +291,10 @@ class SoftObject {
   [[nodiscard]] bool any_pressed() const noexcept;
   [[nodiscard]] bool cycle_due() const noexcept;
   [[nodiscard]] std::size_t left_of(std::size_t work) const noexcept;  // of a tick's; less while all is cold
+  [[nodiscard]] glm::dvec3 no_deeper_in(const ToolInBody& tool, const glm::dvec3& rest, const glm::dvec3& now,
+                                        const glm::dvec3& place) const noexcept;
+  [[nodiscard]] glm::dvec3 onto_tool_within(const ToolInBody& tool, const VoxelLinks& links,
+                                            const glm::dvec3& wished, Touch& touch) const noexcept;
   [[nodiscard]] glm::dvec3 place_of(const ToolInBody& tool, const VoxelLinks& links, Touch& touch) noexcept;
   void relax_touch(const ToolInBody& tool, Touch& touch) noexcept;
   // ---- touched voxels of parts without slack, which move as one (part_contact.cpp) ----
@@ -372,6 +378,7 @@ class SoftObject {
   LazyArray<std::uint8_t> carried_mark_;    // [v] 1: in carried_ (within touch(): was pressed)
   LazyArray<std::uint32_t> carried_index_;  // [v]
   double unrelaxed_m_ = 0.0;                // motion of pressed voxels since the background was last woken
+  double moved_m_ = 0.0;                    // of pressed voxels since touch(), by the tool
   double unsettled_m_ = 0.0;                // how far the contact may be from the rest of the object
   std::size_t contact_work_ = 0;            // since touch(), of cycles round the contact …
   int cycles_since_touch_ = 0;              // of which there were so many
@@ -381,6 +388,7 @@ class SoftObject {
   bool rests_ = false;     // none of them is begun now, if that can wait
   bool dragging_ = false;  // sources_ are what drag() moved, moves_ where they were
   bool moved_ever_ = false;
+  bool anchors_pull_ = false;            // since push_out(), a wave of the chain came to some, and they held
   bool beside_bodies_ = false;           // that move
   bool on_grid_ = false;                 // there is a contact, and it is on the composite grid
   std::unique_ptr<CompositeGrid> grid_;  // none: contacts are in state_

@@ -85,6 +85,7 @@ WholeParts::WholeParts(const Lattice& lattice, const std::vector<Couplings*>& le
   for (std::size_t v = 0; v < filled.size(); ++v) filled[v] = lattice.filled(static_cast<VoxelId>(v)) ? 1 : 0;
   for (int l = 1; l < static_cast<int>(levels.size()); ++l) find_cells(l, shares, filled);
   for (int l = 0; l < static_cast<int>(levels.size()); ++l) find_border(l);
+  for (int l = 0; l < static_cast<int>(levels.size()); ++l) find_filled_rows(l);
   if (lattice.has_bricks() || lattice.yields()) find_loaded();
 }
 
@@ -202,6 +203,22 @@ void WholeParts::find_border(int level) {
         }
       }
     }
+  }
+}
+
+void WholeParts::find_filled_rows(int level) {
+  const Couplings& couplings = *couplings_[static_cast<std::size_t>(level)];
+  const Grid& g = couplings.grid();
+  for (RowId row = 0; row < g.rows(); ++row) {
+    std::uint8_t& known = levels_[static_cast<std::size_t>(level)].row[row];
+    if (known == 0) continue;
+    bool all = true, above = level + 1 < static_cast<int>(levels_.size());
+    for (VoxelId v = row * kRow; v < (row + 1) * kRow && all; ++v) {
+      const std::uint16_t number = of(level, v);
+      all = number != 0 || !couplings.holds_any(g.coordinates(v));
+      above = above && (number == 0 || on(level + 1, number - 1U).count > 0);
+    }
+    if (all) known = above ? kFilledKnown : kFilled;
   }
 }
 

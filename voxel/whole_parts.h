@@ -96,6 +96,14 @@ class WholeParts {
   [[nodiscard]] bool in_row(int level, RowId row) const {
     return levels_[static_cast<std::size_t>(level)].row[row] != 0;
   }
+  // Is all that there is in it?
+  [[nodiscard]] bool fill_row(int level, RowId row) const {
+    return levels_[static_cast<std::size_t>(level)].row[row] >= kFilled;
+  }
+  // … and is it known on the next level, which so hears of it, and tells it, as a whole?
+  [[nodiscard]] bool fill_known_row(int level, RowId row) const {
+    return levels_[static_cast<std::size_t>(level)].row[row] == kFilledKnown;
+  }
   // Do coarse levels that do not know it hold it where it is?
   [[nodiscard]] bool sprawls(std::size_t part) const { return sprawls_[part] != 0; }
   // Voxels of the part that have loads beside their springs: bricks, or links that yield, of what is beside.
@@ -111,8 +119,9 @@ class WholeParts {
   struct Level {
     std::vector<OnLevel> parts;
     LazyArray<std::uint16_t> number;  // [cell]; empty on level 0
-    std::vector<std::uint8_t> row;    // [row] 1: cells of parts are in it
+    std::vector<std::uint8_t> row;    // [row] 1: cells of parts are in it; kFilled: and no others
   };
+  static constexpr std::uint8_t kFilled = 2, kFilledKnown = 3;
   // How many voxels a cell has, and how many of them are of a part.
   struct Share {
     VoxelId cell;
@@ -122,6 +131,7 @@ class WholeParts {
   void find_cells(int level, std::vector<std::vector<Share>>& shares, std::vector<std::uint32_t>& filled);
   [[nodiscard]] static bool compact(const Grid& grid, const std::vector<Share>& shares);
   void find_border(int level);
+  void find_filled_rows(int level);
   void find_loaded();
 
   const Lattice& lattice_;

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "voxel/joint_move.h"
+
+#include <algorithm>
+
+namespace voxel {
+
+JointMove::JointMove(std::size_t rows)
+    : rows_(std::min(kMost, rows)),
+      aims_(std::min(kMost, rows)),
+      number_(rows),
+      ring_(std::min(kMost, rows) + 1) {}
+
+void JointMove::add(RowId row, OctetSpan span, const RowVector& way) noexcept {
+  Row& r = rows_[count_++];
+  r.row = row;
+  r.span = span;
+  r.asked = r.cut = r.aims = false;
+  r.from = way;
+  number_[row] = static_cast<std::uint32_t>(count_);
+}
+
+void JointMove::clear() noexcept {
+  for (const Row& r : rows()) number_[r.row] = 0;
+  count_ = head_ = tail_ = 0;
+}
+
+void JointMove::ask(RowId row) noexcept {
+  if (number_[row] == 0) return;
+  Row& r = rows_[number_[row] - std::size_t{1}];
+  if (r.asked) return;
+  r.asked = true;
+  ring_[tail_] = number_[row] - 1;
+  tail_ = tail_ + 1 == ring_.size() ? 0 : tail_ + 1;
+}
+
+JointMove::Row* JointMove::next() noexcept {
+  if (head_ == tail_) return nullptr;
+  Row& r = rows_[ring_[head_]];
+  head_ = head_ + 1 == ring_.size() ? 0 : head_ + 1;
+  r.asked = false;
+  return &r;
+}
+
+}  // namespace voxel
