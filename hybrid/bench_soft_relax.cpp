@@ -103,9 +103,11 @@ class Pressed {
 // is.
 double settled_force_N(int edge, const Limits& limits) {
   Pressed pressed(edge, limits, Pressed::Relaxed::here);
-  pressed.touch();
-  const double scale_N = pressed.object().lattice().force_scale_N();
-  pressed.object().settle(pressed.tool(), kReferenceTolerance * scale_N, kReferenceCycles);
+  const double tolerance_N = kReferenceTolerance * pressed.object().lattice().force_scale_N();
+  for (int n = 0; n < kReferenceCycles; ++n) {
+    pressed.touch();  // other voxels are near than at first
+    if (pressed.object().settle(pressed.tool(), tolerance_N, 1)) break;
+  }
   return pressed.force_N();
 }
 

@@ -123,7 +123,9 @@ void Relaxation::hold_what_stands(const Displacement& state, std::span<const Vox
     if (state.role[v] == Displacement::held && standing_.size() < standing_.capacity())
       standing_.push_back(v);
   }
-  tool_presses_ = tool_presses_ && !others_hold;
+  // Loads of bricks follow a cycle later, and with ν towards 0.5 what they are not yet told of is more than
+  // the springs know: there the region went to and fro.
+  tool_presses_ = tool_presses_ && !others_hold && !lattice_.has_bricks();
   multigrid_.set_held(standing_);
   multigrid_.set_part_contacts(state, held);
 }
