@@ -11,13 +11,14 @@ JointMove::JointMove(std::size_t rows)
       number_(rows),
       ring_(std::min(kMost, rows) + 1) {}
 
-void JointMove::add(RowId row, OctetSpan span, const RowVector& way) noexcept {
+JointMove::Row& JointMove::add(RowId row, OctetSpan span, const RowVector& way) noexcept {
   Row& r = rows_[count_++];
   r.row = row;
   r.span = span;
-  r.asked = r.cut = r.aims = false;
+  r.asked = r.out = r.cut = r.aims = false;
   r.from = way;
   number_[row] = static_cast<std::uint32_t>(count_);
+  return r;
 }
 
 void JointMove::clear() noexcept {

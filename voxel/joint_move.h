@@ -31,6 +31,7 @@ class JointMove {
     OctetSpan span;
     float most_m = 0.0F;  // that any of it was asked to move
     bool asked = false;   // stands in the queue
+    bool out = false;     // has set out
     bool cut = false;     // some that do not move were to
     bool aims = false;    // its aim is not where it is
     RowVector from;       // where it was; before it sets out, its way (m)
@@ -49,7 +50,7 @@ class JointMove {
     number_.populate();
   }
   // Of `way` the lanes in the span; the others stay. Once a row, while it is not full.
-  void add(RowId row, OctetSpan span, const RowVector& way) noexcept;
+  Row& add(RowId row, OctetSpan span, const RowVector& way) noexcept;
   void clear() noexcept;
   // Where a row is to go, which is kept only of those that did not get there (m).
   [[nodiscard]] RowVector& aim(const Row& row) noexcept { return aims_[index(row)]; }

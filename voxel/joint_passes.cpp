@@ -38,6 +38,7 @@ void Multigrid::set_out(JointMove::Row& r, Displacement& state) noexcept {
     row.held = held.data();
   }
   RowVector refused;
+  r.out = true;
   const SetOut out = set_out_row(row, r.span, r.from, refused);
   r.cut = out.cut;
   r.most_m = out.most_m;
@@ -85,7 +86,9 @@ void Multigrid::draw_back(JointMove::Row& r, Displacement& state) noexcept {
 }
 
 void Multigrid::go_jointly(Displacement& state) noexcept {
-  for (JointMove::Row& r : joint_.rows()) set_out(r, state);
+  for (JointMove::Row& r : joint_.rows()) {
+    if (!r.out) set_out(r, state);
+  }
   for (JointMove::Row& r : joint_.rows()) draw_back(r, state);
   std::size_t visits = kMostVisits * joint_.rows().size();
   for (JointMove::Row* r = joint_.next(); r != nullptr; r = joint_.next()) {

@@ -218,7 +218,9 @@ class Multigrid {
   [[nodiscard]] bool can_join(RowId row, const Displacement& state) noexcept {
     return prepare(0, row) && state.row_obstacles[row] == 0 && !joint_.full();
   }
-  void join(RowId row, const RowVector& way) noexcept { joint_.add(row, {}, way); }
+  void join(RowId row, const RowVector& way, Displacement& state) noexcept {
+    set_out(joint_.add(row, {}, way), state);
+  }
   void add_joined(Displacement& state) noexcept { go_jointly(state); }
   // Was it? Then what of its way is left (m), and whether all that it was to go is gone.
   [[nodiscard]] bool joined(RowId row, const Displacement& state, RowVector& left,

@@ -391,7 +391,8 @@ void Multigrid::tell_row(int level, RowId row, const std::array<HatRow, 4>& hats
   if (parts_ != nullptr && parts_->in_row(level, row)) note_told_parts(level, row, span, correction);
   // Near obstacles each goes for itself, before those that go together.
   if (jointly && state.row_obstacles[row] == 0 && !joint_.full()) {
-    joint_.add(row, span, correction);
+    JointMove::Row& r = joint_.add(row, span, correction);
+    if (obstacles.obstacles.empty()) set_out(r, state);  // all are among them: none can be in the way of one
     return;
   }
   Refused refused;

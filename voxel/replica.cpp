@@ -468,7 +468,7 @@ void Replica::take_jointly(SoftObject& object, std::size_t first, std::size_t la
     const RowId row = found_[taking_].row(n);
     if (!to.can_join(row, object.state_)) continue;
     way_of(object, n, part, ways);
-    to.join(row, ways);
+    to.join(row, ways, object.state_);
   }
   to.add_joined(object.state_);
   for (std::size_t n = first; n < last; ++n) {

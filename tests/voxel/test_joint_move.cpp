@@ -58,7 +58,7 @@ void move(const Lattice& lattice, Displacement& state, const Ways& ways) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       for (std::size_t i = 0; i < kRow; ++i) way[axis][i] = ways[row * kRow + i][axis];
     }
-    multigrid.join(row, way);
+    multigrid.join(row, way, state);
   }
   multigrid.add_joined(state);
   multigrid.forget_joined();
