@@ -91,7 +91,7 @@ void exchange(WorldState& state, std::size_t o, std::uint64_t& arrived) noexcept
     arrived |= std::uint64_t{1} << o;
   }
   if (object.replica.in_parts()) {
-    object.replica.take_part(soft, !soft.still_held());
+    object.replica.take_part(soft, !soft.held_still());
     if (!object.replica.in_parts()) {
       object.next = state.tick + kOwnTicks;
     } else {

@@ -56,7 +56,7 @@ bool Relaxation::limits_hold() const noexcept {
 }
 
 void Relaxation::relax_limited(Displacement& state, const ObstacleView& obstacles) noexcept {
-  if (!tool_presses_ || obstacles.moving > 0) return;
+  if (!tool_presses_ || !obstacles.obstacles.empty()) return;
   limited_->relax(multigrid_, state, obstacles, {});
   multigrid_.release_unlimited(state);
 }
@@ -348,8 +348,9 @@ void Relaxation::end_round(Displacement& state, const ObstacleView& obstacles, d
   // hundred thousand voxel updates, which no tick has to spare. Beside a body something moves in every tick,
   // so that each round is as the first, and there what is still pulled against its limit stays held. (Let go
   // of, coarse levels took it off the limit and back: under a ball at rest by 0.03 spacings, for ever. Kept
-  // everywhere, tissue that jumped stayed far from rest.)
-  if (obstacles.moving > 0 || (tool_presses_ && patient_)) {
+  // everywhere, tissue that jumped stayed far from rest. Beside what stands, the contact's own solver knows
+  // nothing of such places, and took a brain back from them in every tick.)
+  if (obstacles.moving > 0 || (tool_presses_ && patient_ && obstacles.obstacles.empty())) {
     residual_N = std::max(residual_N, limited_->relax(multigrid_, state, obstacles, {}));
     credit_ -= static_cast<std::int64_t>(limited_->looked_at());
     multigrid_.release_unlimited(state);

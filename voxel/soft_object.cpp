@@ -189,7 +189,6 @@ void SoftObject::touch(std::span<const VoxelId> near) noexcept {
   if (cold_ticks_ > 0) --cold_ticks_;
   rests_ = std::exchange(asked_to_rest_, false);
   contact_work_ = 0;
-  moved_m_ = 0.0;
   wide_cycle_ = false;
   if (near.empty()) pressed_last_.clear();
   std::size_t pressed = 0;
@@ -263,7 +262,6 @@ void SoftObject::settle_chain() noexcept {
   for (const glm::vec3& move : moves_) most = std::max(most, glm::dot(move, move));
   unrelaxed_m_ += std::sqrt(static_cast<double>(most));
   unsettled_m_ += std::sqrt(static_cast<double>(most));
-  moved_m_ += std::sqrt(static_cast<double>(most));
   if (unrelaxed_m_ > kStir * lattice_->min_spacing_m()) {
     unrelaxed_m_ = 0.0;
     relaxation_.wake();
@@ -378,8 +376,7 @@ glm::dvec3 SoftObject::place_of(const ToolInBody& tool, const VoxelLinks& links,
     wanted = onto_tool(tool, rest, wanted, links.compliance, g);
     t.normal = g.normal;
   }
-  const glm::dvec3 n(obstacles_.empty() ? glm::vec3(0.0F) : obstacles_[t.surface].normal);
-  if (n == glm::dvec3(0.0)) {
+  if (obstacles_.empty()) {
     const glm::dvec3 place = clamp_to_links(links, wanted, now);
     // What other objects press, too, goes where its pairs have it; and of what anchors keep in the tool, that
     // is to give way, not to part it as a wedge would.
@@ -388,8 +385,9 @@ glm::dvec3 SoftObject::place_of(const ToolInBody& tool, const VoxelLinks& links,
     return let_out ? onto_tool_within(tool, links, wished, t) : place;
   }
   const Obstacle& o = obstacles_[t.surface];
+  const glm::dvec3 n(o.normal);
   const double depth = static_cast<double>(o.bound) - glm::dot(n, wanted);
-  if (depth > 0.0) {
+  if (depth > 0.0 && n != glm::dvec3(0.0)) {
     wanted += depth * n;
     // Where that takes it into the tool it slides along the obstacle, out of its way. (Left there, the tool
     // had to give way to tissue that bulged against the side of a bone: by 0.08 N of 1.1, in three ticks of
@@ -403,7 +401,8 @@ glm::dvec3 SoftObject::place_of(const ToolInBody& tool, const VoxelLinks& links,
       t.normal = g.normal;
     }
   }
-  return no_deeper(o, now, clamp_to_links(links, wanted, now));
+  const glm::dvec3 place = clamp_to_links(links, wanted, now);
+  return n == glm::dvec3(0.0) ? place : no_deeper(o, now, place);
 }
 
 void SoftObject::relax_touch(const ToolInBody& tool, Touch& t) noexcept {
@@ -440,10 +439,6 @@ bool SoftObject::any_pressed() const noexcept {
 
 bool SoftObject::held_still() const noexcept {
   return any_pressed() && relaxation_.wide() && unsettled_m_ < kJump * lattice_->min_spacing_m();
-}
-
-bool SoftObject::still_held() const noexcept {
-  return any_pressed() && moved_m_ < kContraction * kJump * lattice_->min_spacing_m();
 }
 
 // Is a cycle round the contact due?

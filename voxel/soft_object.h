@@ -119,8 +119,6 @@ class SoftObject {
   // Is the tool pressed into it, wide enough for cycles in parts, and hardly moves? A voxel that slips, or a
   // result on its way, is no motion.
   [[nodiscard]] bool held_still() const noexcept;
-  // … and while parts of a result come, which move it a little themselves, in each tick: does it still?
-  [[nodiscard]] bool still_held() const noexcept;
   // While the tool presses it, no cycle round the contact is begun, or goes on, in the next tick.
   void ask_to_rest() noexcept { asked_to_rest_ = true; }
   // Part of what it takes to be given to a replica, or to take what that found, done in the tick before it;
@@ -378,7 +376,6 @@ class SoftObject {
   LazyArray<std::uint8_t> carried_mark_;    // [v] 1: in carried_ (within touch(): was pressed)
   LazyArray<std::uint32_t> carried_index_;  // [v]
   double unrelaxed_m_ = 0.0;                // motion of pressed voxels since the background was last woken
-  double moved_m_ = 0.0;                    // of pressed voxels since touch(), by the tool
   double unsettled_m_ = 0.0;                // how far the contact may be from the rest of the object
   std::size_t contact_work_ = 0;            // since touch(), of cycles round the contact …
   int cycles_since_touch_ = 0;              // of which there were so many
