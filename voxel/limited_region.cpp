@@ -356,6 +356,7 @@ void LimitedRegion::forget(Multigrid& multigrid) noexcept {
   on_body_.clear();
   for (const VoxelId v : known_) forget(multigrid, v);
   known_.clear();
+  found_ = false;
 }
 
 void LimitedRegion::pass(Multigrid& multigrid) noexcept {
@@ -417,7 +418,6 @@ double LimitedRegion::relax(Multigrid& multigrid, Displacement& state, const Obs
     return 0.0;
   }
   if (!prepare(multigrid, state, obstacles)) {
-    found_ = false;
     forget(multigrid);
     return 0.0;
   }
