@@ -12,8 +12,8 @@
 // with a sweep of Gauss and Seidel's in place of the exact minimum. Multipliers are kept from call to call.
 // What was found is brought within the limits, and the tissue goes there as far as its energy falls.
 //
-// The same under the tool, as long as nothing else moves: what it presses slides on its tangent plane, and
-// what hangs on that by tight links goes along. (Without, a ball ten spacings deep in 10^6 voxels was felt
+// The same under the tool, in objects that lie beside nothing else: what it presses slides on its tangent
+// plane, and what hangs on that by tight links goes along. (Without, a ball ten spacings deep in 10^6 voxels was felt
 // by 2.3 % too much for good, and 1.4 % of the energy was left.)
 //
 // The multipliers are the forces of links at their limits and of obstacles: coarse levels know of the first

@@ -257,8 +257,8 @@ std::size_t Relaxation::run_thoroughly(Displacement& state, const ObstacleView& 
   lay_whole_boxes();
   tells_jointly_ = true;
   multigrid_.pass_on_all(true);
-  const int first_coarse = 2,
-            last_step = steps() - 1;  // from where level 1 is smoothed to where voxels are told
+  const int first_coarse = 2;         // level 1 is smoothed
+  const int last_step = steps() - 1;  // voxels are told
   run_steps_over(0, last_step, state, obstacles, Look::all);
   for (int n = 0; n < kCoarseCycles; ++n)
     run_steps_over(first_coarse, last_step, state, obstacles, Look::all);

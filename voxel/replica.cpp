@@ -207,7 +207,7 @@ void Replica::relax_quickly(const ObstacleView& obstacles) noexcept {
     told = multigrid().log().count();
     relax();
   }
-  // The last is followed by a whole round, which begins with it.
+  // Not after the last: a whole round comes next, which ends with it. (After that, too, was no nearer.)
   if (quick_ > 1) relaxation_.relax_limited(state_, obstacles);
   --quick_;
   work_ = octets / kOctetsOfRow + told / 3;  // telling is a third of it

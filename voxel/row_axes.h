@@ -29,6 +29,19 @@ HYBRID_INLINE void spring(Octet& k, const float* lanes, int octet) {
   load(k, kUniform ? lanes : lanes + octet * kOctet);
 }
 
+inline constexpr OctetMask kEven{-1, 0, -1, 0, -1, 0, -1, 0};
+
+// The octets of a span with one more at both ends; of those, only the lane that touches the span is true.
+struct Span {
+  std::array<Octet, kOctets + 2> at;
+};
+HYBRID_INLINE void ends_of(Span& s, const float* own, std::ptrdiff_t x, OctetSpan span) {
+  const float before = span.first > 0 ? own[span.first * kOctet - 1] : own[kRow - 1 - x];
+  const float after = span.last < kOctets - 1 ? own[(span.last + 1) * kOctet] : own[x];
+  s.at[0] = Octet{} + before;
+  s.at[static_cast<std::size_t>(span.last - span.first) + 2] = Octet{} + after;
+}
+
 // An octet of a row, and what stands around it.
 struct Around {
   Octet own, y_down, y_up, z_down, z_up;

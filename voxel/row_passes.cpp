@@ -11,19 +11,6 @@
 namespace voxel {
 namespace {
 
-constexpr OctetMask kEven{-1, 0, -1, 0, -1, 0, -1, 0};
-
-// The octets of a span with one more at both ends; of those, only the lane that touches the span is true.
-struct Span {
-  std::array<Octet, kOctets + 2> at;
-};
-HYBRID_INLINE void ends_of(Span& s, const float* own, std::ptrdiff_t x, OctetSpan span) {
-  const float before = span.first > 0 ? own[span.first * kOctet - 1] : own[kRow - 1 - x];
-  const float after = span.last < kOctets - 1 ? own[(span.last + 1) * kOctet] : own[x];
-  s.at[0] = Octet{} + before;
-  s.at[static_cast<std::size_t>(span.last - span.first) + 2] = Octet{} + after;
-}
-
 // Bit i for lane i.
 HYBRID_INLINE std::uint32_t lanes_set(const OctetMask& mask) {
   std::array<std::int32_t, kOctet> lanes;
@@ -504,70 +491,6 @@ HYBRID_INLINE void look_at_limits(const LevelRow& row, const AxisBounds& bounds,
   out.pulled_down = all_bits(pulled_down);
 }
 
-// One axis of it.
-template <bool kUniform, Limits kLimits>
-HYBRID_INLINE bool draw_back_axis(const LevelRow& row, const AxisBounds& bounds, std::size_t axis,
-                                  const float* from) {
-  constexpr float kRounding = 2.4e-7F;  // of a displacement: two of its last bits
-  const AxisSprings s(row.springs, axis);
-  float* own = row.u[axis];
-  Span u;
-  std::array<Interval, kOctets> allowed;
-  ends_of(u, own, row.x, {});
-#pragma GCC unroll 1
-  for (int octet = 0; octet < kOctets; ++octet) {
-    const auto n = static_cast<std::size_t>(octet);
-    Around at;
-    look_around(at, own + octet * kOctet, row.z);
-    u.at[n + 1] = at.own;
-    everywhere(allowed[n]);
-    narrow_beside<kUniform, kLimits>(allowed[n], at, s, bounds, octet);
-  }
-  OctetMask came{};
-#pragma GCC unroll 1
-  for (int colour = 0; colour < 2; ++colour) {
-#pragma GCC unroll 1
-    for (int octet = 0; octet < kOctets; ++octet) {
-      const auto n = static_cast<std::size_t>(octet);
-      const Octet now = u.at[n + 1];
-      Octet x_down, x_up, home, rounding = -now;
-      shift_down(x_down, u.at[n], now);
-      shift_up(x_up, now, u.at[n + 2]);
-      load(home, from + octet * kOctet);
-      Interval in = allowed[n];
-      narrow<kUniform, kLimits>(in, x_up, x_down, s, bounds, 0, octet);
-      take_largest(rounding, now);
-      rounding *= kRounding;
-      const OctetMask taken = colour == 0 ? kEven : ~kEven;
-      const OctetMask up = (now < in.low - rounding) & (home > now) & taken,
-                      down = (now > in.high + rounding) & (home < now) & taken;
-      take_least(in.low, home);
-      take_largest(in.high, home);
-      Octet to = up ? in.low : now;
-      to = down ? in.high : to;
-      came |= to != now;
-      u.at[n + 1] = to;
-    }
-  }
-  if (!any(came)) return false;
-#pragma GCC unroll 1
-  for (int octet = 0; octet < kOctets; ++octet)
-    store(own + octet * kOctet, u.at[static_cast<std::size_t>(octet) + 1]);
-  return true;
-}
-
-template <bool kUniform, Limits kLimits>
-HYBRID_INLINE bool draw_back_axes(const LevelRow& row, const RowLimits& limits, unsigned axes,
-                                  const RowVector& from) {
-  bool came = false;
-#pragma GCC unroll 1
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    if ((axes >> axis & 1U) != 0)
-      came |= draw_back_axis<kUniform, kLimits>(row, AxisBounds(limits, axis), axis, from[axis].data());
-  }
-  return came;
-}
-
 }  // namespace
 
 HYBRID_WIDE_AND_MANY void links_at_limits(const LevelRow& row, const RowLimits& limits, std::size_t axis,
@@ -632,58 +555,6 @@ HYBRID_WIDE_AND_MANY RowCorrection correct_row(const LevelRow& row, const RowLim
     return correct_axes<false, Limits::lanes>(row, limits, span, correction, refused);
   return row.springs.uniform ? correct_axes<true, Limits::row>(row, limits, span, correction, refused)
                              : correct_axes<false, Limits::row>(row, limits, span, correction, refused);
-}
-
-HYBRID_WIDE_AND_MANY SetOut set_out_row(const LevelRow& row, OctetSpan span, RowVector& way,
-                                        RowVector& refused) noexcept {
-  SetOut out;
-  Octet most{};
-  OctetMask cut{};
-#pragma GCC unroll 1
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    OctetMask any_stopped{};
-#pragma GCC unroll 1
-    for (int octet = 0; octet < kOctets; ++octet) {
-      float* const at = row.u[axis] + octet * kOctet;
-      float* const ways = way[axis].data() + octet * kOctet;
-      Octet now, go;
-      load(now, at);
-      load(go, ways);
-      store(ways, now);
-      if (octet < span.first || octet > span.last) continue;
-      OctetMask stands;
-      standing_by_bits(stands, row, axis, octet);
-      cut |= stands & (go != 0.0F);
-      go = stands ? Octet{} : go;
-      take_largest_size(most, go);
-      if (row.stopped != nullptr) {
-        OctetMask stopped;
-        bits_set(stopped, row.stopped + octet * kOctet, 1 << axis);
-        any_stopped |= stopped & (go != 0.0F);
-        store(refused[axis].data() + octet * kOctet, stopped ? go : Octet{});
-        go = stopped ? Octet{} : go;
-      }
-      store(at, now + go);
-    }
-    if (any(any_stopped)) out.stopped |= 1U << axis;
-  }
-  out.most_m = largest(most);
-  out.cut = any(cut);
-  return out;
-}
-
-HYBRID_WIDE_AND_MANY unsigned axes_beyond(const LevelRow& row, const RowLimits& limits) noexcept {
-  Axes u;
-  load_axes(u, row, {});
-  return row.springs.uniform && limits.lanes == nullptr ? beyond_band<true>(u, row, limits, {}, 0.0F)
-                                                        : beyond_band<false>(u, row, limits, {}, 0.0F);
-}
-
-HYBRID_WIDE_AND_MANY bool draw_back_row(const LevelRow& row, const RowLimits& limits, unsigned axes,
-                                        const RowVector& from) noexcept {
-  if (limits.lanes != nullptr) return draw_back_axes<false, Limits::lanes>(row, limits, axes, from);
-  return row.springs.uniform ? draw_back_axes<true, Limits::row>(row, limits, axes, from)
-                             : draw_back_axes<false, Limits::row>(row, limits, axes, from);
 }
 
 }  // namespace voxel

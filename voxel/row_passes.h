@@ -104,13 +104,15 @@ struct RowCorrection {
 // in the lanes of the span; of what is held or anchored nothing is expected.
 RowCorrection correct_row(const LevelRow& row, const RowLimits* limits, OctetSpan span,
                           const RowVector& correction, RowVector& refused) noexcept;
-// `way` is added to a row whatever its links allow, but to what stands, and to what is stopped, on an axis;
-// `way` and where it was change places.
+
+// ---- of a joint move (joint_rows.cpp) ----
 struct SetOut {
   float most_m = 0.0F;   // the most that any voxel was asked to move
   bool cut = false;      // something that stands was to go
-  unsigned stopped = 0;  // bit of each axis on which something that is stopped was to; of these `refused` …
+  unsigned stopped = 0;  // bit of each axis on which something that `row.stopped` stops was to
 };
+// Adds `way` to a row whatever its links allow, but to what stands and to what is stopped; in `way` stands
+// then where the row was. `refused`: where anything is stopped, the ways of that in the lanes of the span.
 SetOut set_out_row(const LevelRow& row, OctetSpan span, RowVector& way, RowVector& refused) noexcept;
 // Bit of each axis on which links may be beyond their limits.
 unsigned axes_beyond(const LevelRow& row, const RowLimits& limits) noexcept;

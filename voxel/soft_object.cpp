@@ -339,11 +339,10 @@ glm::dvec3 SoftObject::no_deeper_in(const ToolInBody& tool, const glm::dvec3& re
   return to;
 }
 
-// The same where its links do not let it go there: the least energy on the tool within their limits. Given
-// the tool's force, each axis is for itself. (Brought onto the tool
-// and then within its limits, it stood a tenth of a spacing off the tool, or went into it, was pushed out by
-// the next tick, and what hangs on it with it: at a ball ten spacings deep 1.3 % of the energy in every tick,
-// for good.)
+// As onto_tool(), where its links do not let it go there: the least energy on the tool within their limits.
+// Given the tool's force, each axis is for itself. (Brought onto the tool and then within its limits, it
+// stood a tenth of a spacing off the tool, or went into it, was pushed out by the next tick, and what hangs
+// on it with it: at a ball ten spacings deep 1.3 % of the energy in every tick, for good.)
 glm::dvec3 SoftObject::onto_tool_within(const ToolInBody& tool, const VoxelLinks& links,
                                         const glm::dvec3& wished, Touch& t) const noexcept {
   const glm::dvec3 now = state_.at(t.v);

@@ -289,6 +289,8 @@ class SoftObject {
   [[nodiscard]] bool any_pressed() const noexcept;
   [[nodiscard]] bool cycle_due() const noexcept;
   [[nodiscard]] std::size_t left_of(std::size_t work) const noexcept;  // of a tick's; less while all is cold
+  // From rest, all three: on the way to `place` no deeper in the tool than it is now; on the tool and within
+  // its links' limits; where a touched voxel belongs.
   [[nodiscard]] glm::dvec3 no_deeper_in(const ToolInBody& tool, const glm::dvec3& rest, const glm::dvec3& now,
                                         const glm::dvec3& place) const noexcept;
   [[nodiscard]] glm::dvec3 onto_tool_within(const ToolInBody& tool, const VoxelLinks& links,
