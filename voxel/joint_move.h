@@ -49,8 +49,9 @@ class JointMove {
     ring_.populate(std::min(some, ring_.size()), {true});
     number_.populate();
   }
-  // Of `way` the lanes in the span; the others stay. Once a row, while it is not full.
-  Row& add(RowId row, OctetSpan span, const RowVector& way) noexcept;
+  // Its way, of which the lanes in the span are gone, is to be written to `from`. Once a row, while it is not
+  // full.
+  Row& add(RowId row, OctetSpan span) noexcept;
   void clear() noexcept;
   // Where a row is to go, which is kept only of those that did not get there (m).
   [[nodiscard]] RowVector& aim(const Row& row) noexcept { return aims_[index(row)]; }
@@ -60,6 +61,8 @@ class JointMove {
   [[nodiscard]] const Row* find(RowId row) const noexcept {
     return number_[row] == 0 ? nullptr : &rows_[number_[row] - std::size_t{1}];
   }
+
+  [[nodiscard]] bool has(RowId row) const noexcept { return number_[row] != 0; }
 
   // ---- a queue of them ----
   // A row that is not in it is not asked.

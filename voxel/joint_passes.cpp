@@ -39,9 +39,16 @@ void Multigrid::set_out(JointMove::Row& r, Displacement& state) noexcept {
   }
   RowVector refused;
   r.out = true;
-  const SetOut out = set_out_row(row, r.span, r.from, refused);
+  // Links to others are looked at when the second of the two sets out.
+  unsigned sides = 0, side = 1;
+  for (const RowId to : beside(r.row)) {
+    if (const JointMove::Row* other = joint_.find(to); other != nullptr && other->out) sides |= side;
+    side *= 2;
+  }
+  const SetOut out = set_out_row(row, couplings().limits(r.row), r.span, sides, r.from, refused);
   r.cut = out.cut;
   r.most_m = out.most_m;
+  if (out.beyond) ask_round(r.row);
   if (out.stopped == 0) return;
   keep_aim(r, state);
   RowVector& aim = joint_.aim(r);
@@ -71,25 +78,42 @@ void Multigrid::stay(Displacement& state) noexcept {
   }
 }
 
-// Most rows have no link beyond its limits, and that is seen at once.
+// In the order of Side.
+std::array<RowId, 6> Multigrid::beside(RowId row) const noexcept {
+  const Grid& g = grid(0);
+  return {row - 1, row + 1, row - g.row_z, row + g.row_z, row - g.row_x, row + g.row_x};
+}
+
+void Multigrid::ask_round(RowId row) noexcept {
+  joint_.ask(row);
+  for (const RowId to : beside(row)) joint_.ask(to);
+}
+
+// Those that do not go along may hold one back, too.
+void Multigrid::look_at_others(const JointMove::Row& r, Displacement& state) noexcept {
+  unsigned sides = 0, side = 1;
+  for (const RowId to : beside(r.row)) {
+    if (!joint_.has(to) && lattice_.filled_in(to) != 0) sides |= side;
+    side *= 2;
+  }
+  if (sides != 0 && may_be_beyond(row_of(0, r.row, state), couplings().limits(r.row), sides))
+    joint_.ask(r.row);
+}
+
 void Multigrid::draw_back(JointMove::Row& r, Displacement& state) noexcept {
   const LevelRow row = row_of(0, r.row, state);
   const RowLimits limits = couplings().limits(r.row);
   const unsigned axes = axes_beyond(row, limits);
   if (axes == 0) return;
   keep_aim(r, state);
-  if (!draw_back_row(row, limits, axes, r.from)) return;
-  const Grid& g = grid(0);
-  for (const RowId beside :
-       {r.row, r.row - 1, r.row + 1, r.row - g.row_z, r.row + g.row_z, r.row - g.row_x, r.row + g.row_x})
-    joint_.ask(beside);
+  if (draw_back_row(row, limits, axes, r.from)) ask_round(r.row);
 }
 
 void Multigrid::go_jointly(Displacement& state) noexcept {
   for (JointMove::Row& r : joint_.rows()) {
     if (!r.out) set_out(r, state);
   }
-  for (JointMove::Row& r : joint_.rows()) draw_back(r, state);
+  for (const JointMove::Row& r : joint_.rows()) look_at_others(r, state);
   std::size_t visits = kMostVisits * joint_.rows().size();
   for (JointMove::Row* r = joint_.next(); r != nullptr; r = joint_.next()) {
     if (visits-- == 0) {

@@ -71,13 +71,53 @@ HYBRID_INLINE bool draw_back_axes(const LevelRow& row, const RowLimits& limits, 
   return came;
 }
 
+HYBRID_INLINE void take_largest_step(Octet& most, const std::array<Octet, kOctets + 2>& own,
+                                     const float* beside) {
+#pragma GCC unroll 4
+  for (std::size_t n = 0; n < kOctets; ++n) {
+    Octet there;
+    load(there, beside + n * kOctet);
+    take_largest_size(most, own[n + 1] - there);
+  }
+}
+
+// By the tightest limits, and what is not there taken for what is at rest: no spring is read. `u` without
+// what lies beside it along x.
+HYBRID_INLINE bool steps_beyond(Axes& u, const LevelRow& row, const RowLimits& limits, unsigned sides) {
+  OctetMask beyond{};
+#pragma GCC unroll 1
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const float* const own = row.u[axis];
+    auto& at = u[axis];
+    at[0] = Octet{} + ((sides & kXDown) != 0 ? own[kRow - 1 - row.x] : own[0]);
+    at[kOctets + 1] = Octet{} + ((sides & kXUp) != 0 ? own[row.x] : own[kRow - 1]);
+    Octet along_x{}, along_y{}, along_z{}, up;
+    shift_up(up, at[kOctets], at[kOctets + 1]);
+    take_largest_size(along_x, up - at[kOctets]);
+#pragma GCC unroll 4
+    for (std::size_t n = 1; n <= kOctets; ++n) {
+      Octet down;
+      shift_down(down, at[n - 1], at[n]);
+      take_largest_size(along_x, at[n] - down);
+    }
+    if ((sides & kYDown) != 0) take_largest_step(along_y, at, own - kRow);
+    if ((sides & kYUp) != 0) take_largest_step(along_y, at, own + kRow);
+    if ((sides & kZDown) != 0) take_largest_step(along_z, at, own - row.z);
+    if ((sides & kZUp) != 0) take_largest_step(along_z, at, own + row.z);
+    const Band band((*limits.of)[axis]);
+    beyond |= (along_x >= band.most[0]) | (along_y >= band.most[1]) | (along_z >= band.most[2]);
+  }
+  return any(beyond);
+}
+
 }  // namespace
 
-HYBRID_WIDE_AND_MANY SetOut set_out_row(const LevelRow& row, OctetSpan span, RowVector& way,
-                                        RowVector& refused) noexcept {
+HYBRID_WIDE_AND_MANY SetOut set_out_row(const LevelRow& row, const RowLimits& limits, OctetSpan span,
+                                        unsigned sides, RowVector& way, RowVector& refused) noexcept {
   SetOut out;
   Octet most{};
   OctetMask cut{};
+  Axes u;
 #pragma GCC unroll 1
   for (std::size_t axis = 0; axis < 3; ++axis) {
     OctetMask any_stopped{};
@@ -89,6 +129,7 @@ HYBRID_WIDE_AND_MANY SetOut set_out_row(const LevelRow& row, OctetSpan span, Row
       load(now, at);
       load(go, ways);
       store(ways, now);
+      u[axis][static_cast<std::size_t>(octet) + 1] = now;
       if (octet < span.first || octet > span.last) continue;
       OctetMask stands;
       standing_by_bits(stands, row, axis, octet);
@@ -102,13 +143,23 @@ HYBRID_WIDE_AND_MANY SetOut set_out_row(const LevelRow& row, OctetSpan span, Row
         store(refused[axis].data() + octet * kOctet, stopped ? go : Octet{});
         go = stopped ? Octet{} : go;
       }
-      store(at, now + go);
+      now += go;
+      store(at, now);
+      u[axis][static_cast<std::size_t>(octet) + 1] = now;
     }
     if (any(any_stopped)) out.stopped |= 1U << axis;
   }
   out.most_m = largest(most);
   out.cut = any(cut);
+  out.beyond = steps_beyond(u, row, limits, sides);
   return out;
+}
+
+HYBRID_WIDE_AND_MANY bool may_be_beyond(const LevelRow& row, const RowLimits& limits,
+                                        unsigned sides) noexcept {
+  Axes u;
+  load_axes(u, row, {});
+  return steps_beyond(u, row, limits, sides);
 }
 
 HYBRID_WIDE_AND_MANY unsigned axes_beyond(const LevelRow& row, const RowLimits& limits) noexcept {

@@ -405,7 +405,7 @@ void LimitedRegion::keep_multipliers(Multigrid& multigrid) noexcept {
 }
 
 double LimitedRegion::relax(Multigrid& multigrid, Displacement& state, const ObstacleView& obstacles,
-                            std::span<const VoxelId> on_body) noexcept {
+                            std::span<const VoxelId> on_body, bool briefly) noexcept {
   looked_at_ = 0;
   found_ = false;
   tighter_m_ = (obstacles.moving > 0 ? kTighter : kTighterAtTool) * spacing_m_;
@@ -421,7 +421,8 @@ double LimitedRegion::relax(Multigrid& multigrid, Displacement& state, const Obs
     forget(multigrid);
     return 0.0;
   }
-  const int sweeps = !on_body.empty() ? kTickSweeps : obstacles.moving > 0 ? kSweeps : kToolSweeps;
+  const int longest = obstacles.moving > 0 ? kSweeps : kToolSweeps;
+  const int sweeps = !on_body.empty() ? kTickSweeps : briefly ? longest / 2 : longest;
   for (int n = 0; n < sweeps; ++n) {
     sweep(n % 2 == 0);
     set_multipliers();

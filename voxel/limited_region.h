@@ -13,8 +13,8 @@
 // What was found is brought within the limits, and the tissue goes there as far as its energy falls.
 //
 // The same under the tool, in objects that lie beside nothing else: what it presses slides on its tangent
-// plane, and what hangs on that by tight links goes along. (Without, a ball ten spacings deep in 10^6 voxels was felt
-// by 2.3 % too much for good, and 1.4 % of the energy was left.)
+// plane, and what hangs on that by tight links goes along. (Without, a ball ten spacings deep in 10^6 voxels
+// was felt by 2.3 % too much for good, and 1.4 % of the energy was left.)
 //
 // The multipliers are the forces of links at their limits and of obstacles: coarse levels know of the first
 // (Multigrid::tie), or they would pull at what these hold, and a body that gives way feels the second.
@@ -44,9 +44,10 @@ class LimitedRegion {
   // Voxels round those that limits hold, or that lie `on_body`, and on from there along links at their
   // limits, go on towards their least energy. Empty: those that lay on a body the last time, and for longer.
   // Where no link is at its limit, or something is squeezed into an obstacle, which no multiplier balances,
-  // all is forgotten. Returns the largest force that moved one of them (N).
+  // all is forgotten. `briefly`: half as long, in tissue that is on its way. Returns the largest force that
+  // moved one of them (N).
   double relax(Multigrid& multigrid, Displacement& state, const ObstacleView& obstacles,
-               std::span<const VoxelId> on_body) noexcept;
+               std::span<const VoxelId> on_body, bool briefly = false) noexcept;
   // Was there any link at its limit?
   [[nodiscard]] bool found() const { return found_; }
   // What presses a voxel on its obstacle, as the last relax() left it (N).

@@ -103,6 +103,8 @@ class Multigrid {
   bool yield(RowId row, Displacement& state, bool keep) noexcept;
   // The children (bit 0: in x, 1: in y, 2: in z) of a coarse row on the level below; where the lattice ends,
   // rows of its empty border.
+  // Has a row's values fetched into the cache, to be read or written in a moment; any number.
+  void fetch(int level, RowId row, const Displacement& state) const noexcept;
   [[nodiscard]] std::array<RowId, 8> rows_below(int level, RowId row) const noexcept;
 
   // What follows works on the octets of `span` only; by default, on the whole row.
@@ -218,8 +220,12 @@ class Multigrid {
   [[nodiscard]] bool can_join(RowId row, const Displacement& state) noexcept {
     return prepare(0, row) && state.row_obstacles[row] == 0 && !joint_.full();
   }
-  void join(RowId row, const RowVector& way, Displacement& state) noexcept {
-    set_out(joint_.add(row, {}, way), state);
+  // `fill(way)` says where to.
+  template <class Fill>
+  void join(RowId row, Displacement& state, const Fill& fill) noexcept {
+    JointMove::Row& r = joint_.add(row, {});
+    fill(r.from);
+    set_out(r, state);
   }
   void add_joined(Displacement& state) noexcept { go_jointly(state); }
   // Was it? Then what of its way is left (m), and whether all that it was to go is gone.
@@ -301,6 +307,9 @@ class Multigrid {
   void set_out(JointMove::Row& r, Displacement& state) noexcept;
   void keep_aim(JointMove::Row& r, const Displacement& state) noexcept;
   void draw_back(JointMove::Row& r, Displacement& state) noexcept;
+  [[nodiscard]] std::array<RowId, 6> beside(RowId row) const noexcept;
+  void ask_round(RowId row) noexcept;
+  void look_at_others(const JointMove::Row& r, Displacement& state) noexcept;
   void go_jointly(Displacement& state) noexcept;
   void stay(Displacement& state) noexcept;
   unsigned left_of(const JointMove::Row& r, const Displacement& state, RowVector& left) const noexcept;

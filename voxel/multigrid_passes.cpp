@@ -5,6 +5,11 @@
 #include "voxel/multigrid.h"
 
 namespace voxel {
+namespace {
+
+constexpr int kAhead = 4;  // rows
+
+}  // namespace
 
 LevelRow Multigrid::row_of(int level, RowId row, Displacement& state) noexcept {
   Level& l = at(level);
@@ -208,10 +213,13 @@ float Multigrid::restrict_loads(int level, RowId row, Displacement& state, const
       if (span.whole()) unmark(level - 1, fine, active | dirty);
       continue;
     }
-    RowVector residual{};
+    RowVector residual;
     RowResidual left;
-    if (parts_ == nullptr || !parts_->fill_row(level - 1, fine))
+    if (parts_ == nullptr || !parts_->fill_row(level - 1, fine)) {
       left = residual_of(level - 1, fine, state, obstacles, below, residual);
+    } else {
+      residual = {};
+    }
     worst = std::max(worst, left.most_N);
     if (parts_ != nullptr && parts_->in_row(level - 1, fine))
       set_part_lanes(level - 1, fine, below, residual);
@@ -358,6 +366,7 @@ void Multigrid::tell(int level, const Told& box, Displacement& state, const Obst
         const RowId row = g.row(c + 1, j, k);
         if (!prepare(level, row)) continue;
         const int first = std::max(q0, c * kOctets), last = std::min(q1, c * kOctets + kOctets - 1);
+        if (j + kAhead <= box.j1) fetch(level, row + kAhead, state);
         tell_row(level, row, hats(first), state, obstacles, {first - c * kOctets, last - c * kOctets},
                  jointly && level == 0);
       }
@@ -376,10 +385,23 @@ void Multigrid::tell(int level, const Told& box, Displacement& state, const Obst
   if (parts_ != nullptr) tell_parts(level, state, obstacles);
 }
 
+// What rows are told is added to what stands in none of the nearer caches: to wait for that was half of it.
+void Multigrid::fetch(int level, RowId row, const Displacement& state) const noexcept {
+  constexpr std::size_t kLine = 16;  // floats
+  const std::size_t begin = static_cast<std::size_t>(row) * kRow;
+  for (const auto& axis : level == 0 ? state.u : at(level).value) {
+    for (std::size_t i = 0; i < kRow; i += kLine) __builtin_prefetch(axis.data() + begin + i, 1);
+  }
+}
+
 void Multigrid::tell_row(int level, RowId row, const std::array<HatRow, 4>& hats, Displacement& state,
                          const ObstacleView& obstacles, OctetSpan span, bool jointly) noexcept {
   if (level == 0 && parts_ != nullptr && parts_->fill_known_row(level, row)) return;  // told as a whole
-  RowVector correction;
+  // Near obstacles each goes for itself, before those that go together.
+  JointMove::Row* const together =
+      jointly && state.row_obstacles[row] == 0 && !joint_.full() ? &joint_.add(row, span) : nullptr;
+  RowVector alone;
+  RowVector& correction = together != nullptr ? together->from : alone;
   sum_hats(hats, span, correction);
   for (std::size_t axis = 0; axis < 3 && level > 0 && holds_->any(level, row); ++axis) {
     const float* nearer = holds_->nearer(level, row, axis);
@@ -389,10 +411,9 @@ void Multigrid::tell_row(int level, RowId row, const std::array<HatRow, 4>& hats
   }
   log_.note(level, row);
   if (parts_ != nullptr && parts_->in_row(level, row)) note_told_parts(level, row, span, correction);
-  // Near obstacles each goes for itself, before those that go together.
-  if (jointly && state.row_obstacles[row] == 0 && !joint_.full()) {
-    JointMove::Row& r = joint_.add(row, span, correction);
-    if (obstacles.obstacles.empty()) set_out(r, state);  // all are among them: none can be in the way of one
+  if (together != nullptr) {
+    // Where all are among them none can be in the way of one that goes alone.
+    if (obstacles.obstacles.empty()) set_out(*together, state);
     return;
   }
   Refused refused;

@@ -57,7 +57,7 @@ bool Relaxation::limits_hold() const noexcept {
 
 void Relaxation::relax_limited(Displacement& state, const ObstacleView& obstacles) noexcept {
   if (!tool_presses_ || !obstacles.obstacles.empty()) return;
-  limited_->relax(multigrid_, state, obstacles, {});
+  limited_->relax(multigrid_, state, obstacles, {}, true);
   multigrid_.release_unlimited(state);
 }
 

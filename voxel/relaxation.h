@@ -203,7 +203,8 @@ class Relaxation {
   std::size_t run_steps(Displacement& state, const ObstacleView& obstacles, std::size_t at_once) noexcept;
   [[nodiscard]] std::size_t work_of_step(int n) const noexcept;
   void pass_on(int level, Displacement& state, const ObstacleView& obstacles, Look look) noexcept;
-  void smooth_box(int level, int colour, Displacement& state, const ObstacleView& obstacles,
+  void fetch_ahead_below(int level, RowId row, const Displacement& state) const noexcept;
+  void smooth_box(int level, int first_colour, Displacement& state, const ObstacleView& obstacles,
                   Look look) noexcept;
   void tell_box(int level, Displacement& state, const ObstacleView& obstacles) noexcept;
   void run_steps_over(int first, int last, Displacement& state, const ObstacleView& obstacles,

@@ -19,6 +19,7 @@ constexpr std::size_t kSmoothed = 2, kPassedOn = 3;
 // Cycles of all levels but the first before a thorough cycle tells voxels: those are an eighth of it each.
 constexpr int kCoarseCycles = 3;
 constexpr int kRoundParts = 8;  // voxels
+constexpr RowId kAhead = 4;     // rows along y that are fetched before their turn
 constexpr int kTileMargin = 3;  // cells round a tile that are smoothed, from level 1 on
 
 }  // namespace
@@ -134,14 +135,35 @@ std::size_t Relaxation::work_of_step(int n) const noexcept {
   return octets(told) + kSmoothed * octets(b.smoothed);
 }
 
-// Rows of one colour, so that no two that are beside one another are of the same.
-void Relaxation::smooth_box(int level, int colour, Displacement& state, const ObstacleView& obstacles,
+// Rows of one colour, so that no two that are beside one another are of the same, then those of the other: by
+// planes, the other colour one behind, while what it reads is still in the cache. (The same bits as one
+// colour after the other: along x a row has neighbours of its own colour only, which come in the same order.)
+void Relaxation::smooth_box(int level, int first_colour, Displacement& state, const ObstacleView& obstacles,
                             Look look) noexcept {
-  for_rows(level, boxes(level).smoothed, [&](RowId row, OctetSpan span, int j, int k) {
-    if (((j + k + colour) & 1) != 0) return;
-    if (look == Look::active && !multigrid_.has(level, row, Multigrid::active)) return;
-    multigrid_.smooth(level, row, state, obstacles, span);
-  });
+  const RowBox& all = boxes(level).smoothed;
+  const RowId next_plane = multigrid_.grid(level).row_z;  // the planes before it are in the cache
+  const auto smooth = [&](const RowBox& plane, int colour) {
+    for_rows(level, plane, [&](RowId row, OctetSpan span, int j, int k) {
+      if (((j + k + colour) & 1) != 0) return;
+      if (colour == first_colour) {
+        multigrid_.fetch(level, row + next_plane + kAhead, state);
+        multigrid_.fetch(level, row + next_plane + kAhead + 1, state);
+      }
+      if (look == Look::active && !multigrid_.has(level, row, Multigrid::active)) return;
+      multigrid_.smooth(level, row, state, obstacles, span);
+    });
+  };
+  for (int c = all.q0 / kOctets; c <= all.q1 / kOctets && all.q0 <= all.q1; ++c) {
+    RowBox plane = all;
+    plane.q0 = std::max(all.q0, c * kOctets);
+    plane.q1 = std::min(all.q1, c * kOctets + kOctets - 1);
+    for (int k = all.k0; k <= all.k1 + 1; ++k) {
+      plane.k0 = plane.k1 = k;
+      if (k <= all.k1) smooth(plane, first_colour);
+      plane.k0 = plane.k1 = k - 1;
+      if (k > all.k0) smooth(plane, 1 - first_colour);
+    }
+  }
 }
 
 // Tells the rows of a level what the next coarser one knows, within the boxes: cells in the box and beside
@@ -188,7 +210,7 @@ void Relaxation::step(int n, Displacement& state, const ObstacleView& obstacles,
   switch (step.what) {
     case Step::smooths:
       if (smoothed) break;
-      for (const int colour : {0, 1}) smooth_box(step.level, colour, state, obstacles, look);
+      smooth_box(step.level, 0, state, obstacles, look);
       multigrid_.smooth_parts(step.level, box, state, obstacles);
       break;
     case Step::passes_on:
@@ -196,16 +218,27 @@ void Relaxation::step(int n, Displacement& state, const ObstacleView& obstacles,
       break;
     case Step::solves: {
       const int sweeps = apart_ ? kContactSweeps : kCoarsestSweeps;
-      for (int k = 0; k < 2 * sweeps; ++k) {
-        smooth_box(step.level, k & 1, state, obstacles, look);
-        if (k % 2 != 0) multigrid_.smooth_parts(step.level, box, state, obstacles);
+      for (int k = 0; k < sweeps; ++k) {
+        smooth_box(step.level, 0, state, obstacles, look);
+        multigrid_.smooth_parts(step.level, box, state, obstacles);
       }
       break;
     }
     case Step::tells:
       tell_box(step.level, state, obstacles);
-      for (const int colour : {1, 0}) smooth_box(step.level, colour, state, obstacles, look);
+      smooth_box(step.level, 1, state, obstacles, look);
       multigrid_.smooth_parts(step.level, box, state, obstacles);
+  }
+}
+
+// What two rows further along y will be passed on of the finer level's last two planes: those before are in
+// the cache.
+void Relaxation::fetch_ahead_below(int level, RowId row, const Displacement& state) const noexcept {
+  const Grid& finer = multigrid_.grid(level - 1);
+  const RowId first = multigrid_.rows_below(level, row)[0] + finer.row_z + kAhead;
+  for (const RowId beside : {RowId{0}, finer.row_x, finer.row_z, finer.row_x + finer.row_z}) {
+    multigrid_.fetch(level - 1, first + beside, state);
+    multigrid_.fetch(level - 1, first + beside + 1, state);
   }
 }
 
@@ -236,6 +269,7 @@ void Relaxation::pass_on(int l, Displacement& state, const ObstacleView& obstacl
       if (!multigrid_.has(l + 1, row, Multigrid::renewed)) return;
       multigrid_.unmark(l + 1, row, Multigrid::renewed);
     }
+    fetch_ahead_below(l + 1, row, state);
     const float worst = multigrid_.restrict_loads(l + 1, row, state, obstacles, span);
     if (l == 0) running_residual_N_ = std::max(running_residual_N_, static_cast<double>(worst));
   });

@@ -20,9 +20,9 @@ constexpr std::size_t kMostAtOnce = 1000;  // rows that a tick adds at once; a w
 // only in the next one, and a voxel that hardly touches the tool was let go and pressed in turns, with steps
 // of 30 mN.
 constexpr int kContactCycles = 4, kUnsettled = 4;
-// … and round a part without slack that is pressed; so many where it has jumped. (A whole cycle leaves 0.43
-// of the force's error at such a part.)
-constexpr int kPartCycles = 4, kFirstPartCycles = 8;
+// … and round a part without slack that is pressed. (A whole cycle leaves 0.43 of the force's error at such a
+// part.)
+constexpr int kPartCycles = 4;
 constexpr double kMoved = 0.1;
 // Far from the contact only what changed by so many times as much as rows are left alone with (1e-4 of the
 // spacing) is passed on, and the rest once all is at rest. Within so many rows of it everything is, and so is
@@ -191,7 +191,7 @@ void Replica::relax_quickly(const ObstacleView& obstacles) noexcept {
   std::size_t octets = 0;
   if (part_pressed_) {
     octets = relaxation_.run_thoroughly(state_, obstacles, held_);
-    for (int n = 0; n < kFirstPartCycles; ++n) relaxation_.relax_round_parts(state_, obstacles);
+    for (int n = 0; n < kPartCycles; ++n) relaxation_.relax_round_parts(state_, obstacles);
     --quick_;
     work_ = octets / kOctetsOfRow;
     return;
@@ -286,6 +286,7 @@ void Replica::pack_changes() noexcept {
   // What is near was laid out first, so it ends where the next distance began.
   const std::size_t near = near_.first[0] > near_.last[0] ? 0 : std::min<std::size_t>(begin_[0], kMostAtOnce);
   for (std::size_t n = 0; n < count; ++n) {
+    if (n + kAhead < count) fetch_change_ahead(by_distance_[n + kAhead]);
     const RowId row = by_distance_[n];
     const bool all = at_rest_ || n < begin_[kNearRows] || given_.find(row) != given_.count();
     if (!pack_row(row, all ? least_m_ : kFarther * least_m_)) {
@@ -363,12 +364,8 @@ bool Replica::pack_row(RowId row, float least_m) noexcept {
   float* way = found_[1 - taking_].add(row);
   float most = 0.0F;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const float* now = state_.u[axis].data() + at(row);
-    const float* was = before_[axis].data() + at(row);
-    for (std::size_t i = 0; i < kRow; ++i) {
-      way[axis * kRow + i] = now[i] - was[i];
-      most = std::max(most, std::fabs(way[axis * kRow + i]));
-    }
+    most = std::max(
+        most, row_way(state_.u[axis].data() + at(row), before_[axis].data() + at(row), way + axis * kRow));
   }
   const bool loads_changed = multigrid().bricks().take_changed(row);
   if (most <= least_m && !loads_changed) return false;
@@ -384,20 +381,35 @@ bool Replica::pack_row(RowId row, float least_m) noexcept {
   return true;
 }
 
+namespace {
+
+void fetch(const float* from, std::size_t floats) {
+  for (std::size_t i = 0; i < floats; i += kLine) __builtin_prefetch(from + i);
+}
+
+}  // namespace
+
+void Replica::fetch_change_ahead(RowId row) const noexcept {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    fetch(state_.u[axis].data() + at(row), kRow);
+    fetch(before_[axis].data() + at(row), kRow);
+  }
+}
+
 // Has what take_row() reads fetched while the rows before are added: what another core wrote, and rows that
 // no cache has kept since the last result. With nothing else on the machine that is where they are, and it
-// gains nothing; in real time a row takes 0.33 us in place of 0.54.
-void Replica::fetch_ahead(SoftObject& object, std::size_t n) const noexcept {
+// gains nothing; in real time a row takes 0.33 us in place of 0.54. (Of rows that are added together most
+// neighbours just were: what stands around is not fetched for them.)
+void Replica::fetch_ahead(SoftObject& object, std::size_t n, bool together) const noexcept {
   if (n >= found_[taking_].count()) return;
   const RowId row = found_[taking_].row(n);
   const Grid& g = lattice_.grid();
-  const auto fetch = [](const float* from, std::size_t floats) {
-    for (std::size_t i = 0; i < floats; i += kLine) __builtin_prefetch(from + i);
-  };
   fetch(found_[taking_].values(n), std::size_t{3} * kRow);
   for (const auto& axis : object.state_.u) {
     const float* u = axis.data();
-    for (const RowId r : {row - g.row_z, row - 1, row, row + 1, row + g.row_z}) fetch(u + at(r), kRow);
+    fetch(u + at(row), kRow);
+    if (together) continue;
+    for (const RowId r : {row - g.row_z, row - 1, row + 1, row + g.row_z}) fetch(u + at(r), kRow);
     fetch(u + at(row - g.row_x) + kRow - 1, 1);
     fetch(u + at(row + g.row_x), 1);
   }
@@ -462,13 +474,12 @@ bool Replica::take_row(SoftObject& object, std::size_t n, float part) noexcept {
 void Replica::take_jointly(SoftObject& object, std::size_t first, std::size_t last, float part) noexcept {
   Multigrid& to = object.relaxation_.multigrid();
   const bool whole = part == 1.0F;
-  RowVector ways, left;
+  RowVector left;
   for (std::size_t n = first; n < last; ++n) {
-    fetch_ahead(object, n + kAhead);
+    fetch_ahead(object, n + kAhead, true);
     const RowId row = found_[taking_].row(n);
     if (!to.can_join(row, object.state_)) continue;
-    way_of(object, n, part, ways);
-    to.join(row, ways, object.state_);
+    to.join(row, object.state_, [&](RowVector& ways) { way_of(object, n, part, ways); });
   }
   to.add_joined(object.state_);
   for (std::size_t n = first; n < last; ++n) {
@@ -525,7 +536,7 @@ void Replica::take_part(SoftObject& object, bool last) noexcept {
     take_jointly(object, 0, near_count_, part);
   } else {
     for (std::size_t n = 0; n < near_count_; ++n) {
-      fetch_ahead(object, n + kAhead);
+      fetch_ahead(object, n + kAhead, false);
       // By parts it is rounded otherwise than the other thread knows it.
       if (left > 1) object.relaxation_.multigrid().log().note(0, found_[taking_].row(n));
       if (take_row(object, n, part) && whole) again_.put(n);
@@ -545,7 +556,7 @@ void Replica::drain(SoftObject& object, std::size_t rows) noexcept {
     rows -= count;
   }
   for (; rows > 0 && drained_ < found_[taking_].count(); --rows, ++drained_) {
-    fetch_ahead(object, drained_ + kAhead);
+    fetch_ahead(object, drained_ + kAhead, false);
     if (take_row(object, drained_)) again_.put(drained_);
   }
   for (; rows > 0 && again_.count() > 0; --rows)

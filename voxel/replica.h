@@ -211,7 +211,8 @@ class Replica {
   void way_of(SoftObject& object, std::size_t n, float part, RowVector& ways) noexcept;
   bool take_row(SoftObject& object, std::size_t n, float part = 1.0F) noexcept;
   void take_jointly(SoftObject& object, std::size_t first, std::size_t last, float part) noexcept;
-  void fetch_ahead(SoftObject& object, std::size_t n) const noexcept;
+  void fetch_change_ahead(RowId row) const noexcept;
+  void fetch_ahead(SoftObject& object, std::size_t n, bool together) const noexcept;
 
   const Lattice& lattice_;
   Displacement state_;

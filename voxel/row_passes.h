@@ -84,6 +84,9 @@ void take_back(const RowVector& sums, const float* share, const std::array<float
 // The largest |a[i] − b[i]| of one axis, of the lanes of the span that lie in first … last.
 float row_difference(const float* a, const float* b, OctetSpan span, int first, int last) noexcept;
 
+// way = now − was of one axis of a row; returns the longest.
+float row_way(const float* now, const float* was, float* way) noexcept;
+
 // Links of a row of voxels on one axis, and what they pull at it; bits are lanes.
 struct LinksAtLimits {
   // [d] of the link up, and of the link down: the difference can be no less, no more.
@@ -106,14 +109,21 @@ RowCorrection correct_row(const LevelRow& row, const RowLimits* limits, OctetSpa
                           const RowVector& correction, RowVector& refused) noexcept;
 
 // ---- of a joint move (joint_rows.cpp) ----
+// What lies beside a row, bit by bit.
+enum Side : unsigned { kYDown = 1, kYUp = 2, kZDown = 4, kZUp = 8, kXDown = 16, kXUp = 32 };
+
 struct SetOut {
   float most_m = 0.0F;   // the most that any voxel was asked to move
   bool cut = false;      // something that stands was to go
+  bool beyond = false;   // links may be beyond their limits: within the row, or to one of its `sides`
   unsigned stopped = 0;  // bit of each axis on which something that `row.stopped` stops was to
 };
 // Adds `way` to a row whatever its links allow, but to what stands and to what is stopped; in `way` stands
 // then where the row was. `refused`: where anything is stopped, the ways of that in the lanes of the span.
-SetOut set_out_row(const LevelRow& row, OctetSpan span, RowVector& way, RowVector& refused) noexcept;
+SetOut set_out_row(const LevelRow& row, const RowLimits& limits, OctetSpan span, unsigned sides,
+                   RowVector& way, RowVector& refused) noexcept;
+// May links within a row, or to one of its sides, be beyond their limits?
+bool may_be_beyond(const LevelRow& row, const RowLimits& limits, unsigned sides) noexcept;
 // Bit of each axis on which links may be beyond their limits.
 unsigned axes_beyond(const LevelRow& row, const RowLimits& limits) noexcept;
 // On these axes voxels of a row that are beyond a limit of a link, by more than floats round, come back

@@ -193,4 +193,18 @@ HYBRID_WIDE_AND_MANY float row_difference(const float* a, const float* b, OctetS
   return largest(most);
 }
 
+HYBRID_WIDE float row_way(const float* now, const float* was, float* way) noexcept {
+  Octet most{};
+#pragma GCC unroll 4
+  for (int octet = 0; octet < kOctets; ++octet) {
+    Octet is, before;
+    load(is, now + octet * kOctet);
+    load(before, was + octet * kOctet);
+    is -= before;
+    store(way + octet * kOctet, is);
+    take_largest_size(most, is);
+  }
+  return largest(most);
+}
+
 }  // namespace voxel

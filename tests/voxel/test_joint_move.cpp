@@ -54,11 +54,11 @@ void move(const Lattice& lattice, Displacement& state, const Ways& ways) {
   voxel::Multigrid multigrid(lattice);
   for (RowId row = 0; row < lattice.grid().rows(); ++row) {
     if (!multigrid.can_join(row, state)) continue;
-    voxel::RowVector way;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      for (std::size_t i = 0; i < kRow; ++i) way[axis][i] = ways[row * kRow + i][axis];
-    }
-    multigrid.join(row, way, state);
+    multigrid.join(row, state, [&](voxel::RowVector& way) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        for (std::size_t i = 0; i < kRow; ++i) way[axis][i] = ways[row * kRow + i][axis];
+      }
+    });
   }
   multigrid.add_joined(state);
   multigrid.forget_joined();
