@@ -9,7 +9,8 @@ namespace voxel {
 namespace {
 
 constexpr int kObstaclePasses = 8;
-constexpr float kMargin = 2.4e-7F;  // four roundings of a float, relative
+// Three roundings of a float, relative: with four, what else is rounded left links beyond by more than six.
+constexpr float kMargin = 1.8e-7F;
 constexpr double kTouching = 1e-6;  // of the spacing: no deeper in its obstacle than this, a voxel lies on it
 
 }  // namespace
