@@ -145,11 +145,11 @@ void Relaxation::smooth_box(int level, int first_colour, Displacement& state, co
   const auto smooth = [&](const RowBox& plane, int colour) {
     for_rows(level, plane, [&](RowId row, OctetSpan span, int j, int k) {
       if (((j + k + colour) & 1) != 0) return;
+      if (look == Look::active && !multigrid_.has(level, row, Multigrid::active)) return;
       if (colour == first_colour) {
         multigrid_.fetch(level, row + next_plane + kAhead, state);
         multigrid_.fetch(level, row + next_plane + kAhead + 1, state);
       }
-      if (look == Look::active && !multigrid_.has(level, row, Multigrid::active)) return;
       multigrid_.smooth(level, row, state, obstacles, span);
     });
   };
