@@ -23,7 +23,7 @@ constexpr double kH = 1e-3;  // spacing (m)
 constexpr LinkMaterial kFirm{
     .young_Pa = 1e4, .poisson = 0.3, .stretch_min = 0.9, .stretch_max = 1.1, .shear = 0.1};
 
-// How far beyond its limits a link may be left: the chain lets three roundings of the largest move be, so that
+// How far beyond its limits a link may be left: the chain lets 3.5 roundings of the largest move be, so that
 // waves do not run for roundings, and a limit and the places of its ends are rounded once each. It does not
 // grow: 5 is the most that 25 sequences of 400 ticks leave, always from the chain.
 constexpr double kRoundings = 6.0;
