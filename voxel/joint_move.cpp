@@ -3,10 +3,12 @@
 
 #include <algorithm>
 
+#include "voxel/fetch.h"
+
 namespace voxel {
 namespace {
 
-constexpr std::size_t kAhead = 3, kLine = 64;  // rows; bytes
+constexpr std::size_t kAhead = 3;  // rows
 
 }  // namespace
 
@@ -18,9 +20,7 @@ JointMove::JointMove(std::size_t rows)
 
 JointMove::Row& JointMove::add(RowId row, OctetSpan span) noexcept {
   // Of those that come next, what is to be written: to wait for that was half of what it takes to set out.
-  const auto* next =
-      reinterpret_cast<const char*>(rows_.data() + std::min(count_ + kAhead, rows_.size() - 1));
-  for (std::size_t i = 0; i < sizeof(Row); i += kLine) __builtin_prefetch(next + i, 1);
+  fetch_lines(rows_.data() + std::min(count_ + kAhead, rows_.size() - 1), sizeof(Row));
   Row& r = rows_[count_++];
   r.row = row;
   r.span = span;

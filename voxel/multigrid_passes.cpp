@@ -2,6 +2,7 @@
 // The passes of which a cycle is made.
 #include <algorithm>
 
+#include "voxel/fetch.h"
 #include "voxel/multigrid.h"
 
 namespace voxel {
@@ -387,11 +388,8 @@ void Multigrid::tell(int level, const Told& box, Displacement& state, const Obst
 
 // What rows are told is added to what stands in none of the nearer caches: to wait for that was half of it.
 void Multigrid::fetch(int level, RowId row, const Displacement& state) const noexcept {
-  constexpr std::size_t kLine = 16;  // floats
-  const std::size_t begin = static_cast<std::size_t>(row) * kRow;
-  for (const auto& axis : level == 0 ? state.u : at(level).value) {
-    for (std::size_t i = 0; i < kRow; i += kLine) __builtin_prefetch(axis.data() + begin + i, 1);
-  }
+  for (const auto& axis : level == 0 ? state.u : at(level).value)
+    fetch_lines(axis.data() + static_cast<std::size_t>(row) * kRow, kRow * sizeof(float));
 }
 
 void Multigrid::tell_row(int level, RowId row, const std::array<HatRow, 4>& hats, Displacement& state,

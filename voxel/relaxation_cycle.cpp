@@ -19,7 +19,7 @@ constexpr std::size_t kSmoothed = 2, kPassedOn = 3;
 // Cycles of all levels but the first before a thorough cycle tells voxels: those are an eighth of it each.
 constexpr int kCoarseCycles = 3;
 constexpr int kRoundParts = 8;  // voxels
-constexpr RowId kAhead = 4;     // rows along y that are fetched before their turn
+constexpr int kAhead = 4;       // rows along y that are fetched before their turn
 constexpr int kTileMargin = 3;  // cells round a tile that are smoothed, from level 1 on
 
 }  // namespace
@@ -146,7 +146,7 @@ void Relaxation::smooth_box(int level, int first_colour, Displacement& state, co
     for_rows(level, plane, [&](RowId row, OctetSpan span, int j, int k) {
       if (((j + k + colour) & 1) != 0) return;
       if (look == Look::active && !multigrid_.has(level, row, Multigrid::active)) return;
-      if (colour == first_colour) {
+      if (colour == first_colour && j + kAhead <= all.j1) {
         multigrid_.fetch(level, row + next_plane + kAhead, state);
         multigrid_.fetch(level, row + next_plane + kAhead + 1, state);
       }
@@ -264,12 +264,12 @@ void Relaxation::pass_on(int l, Displacement& state, const ObstacleView& obstacl
     if (!apart_) multigrid_.restrict_values(l + 1, row, state, span);
   });
   const float of_parts = multigrid_.measure_parts(l, cells(boxes(l).smoothed), state, obstacles);
-  for_rows(l + 1, parents, [&](RowId row, OctetSpan span, int, int) {
+  for_rows(l + 1, parents, [&](RowId row, OctetSpan span, int j, int) {
     if (look == Look::active) {
       if (!multigrid_.has(l + 1, row, Multigrid::renewed)) return;
       multigrid_.unmark(l + 1, row, Multigrid::renewed);
     }
-    fetch_ahead_below(l + 1, row, state);
+    if (j + kAhead / 2 <= parents.j1) fetch_ahead_below(l + 1, row, state);
     const float worst = multigrid_.restrict_loads(l + 1, row, state, obstacles, span);
     if (l == 0) running_residual_N_ = std::max(running_residual_N_, static_cast<double>(worst));
   });

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "voxel/fetch.h"
+
 namespace voxel {
 namespace {
 
@@ -42,8 +44,8 @@ constexpr int kTurns = 16, kTurnsAtOnce = 8;
 // thorough: no box is wide enough. No bricks meanwhile: of tissue on its way they know little.
 constexpr float kJumped = 5.0F;
 constexpr int kQuickResults = 3, kWideCycles = 4;
-// Rows, and parts of a row's floats that are fetched at a time: lines of the cache.
-constexpr std::size_t kAhead = 4, kLine = 16;
+constexpr std::size_t kAhead = 4;  // rows that are fetched before their turn
+constexpr std::size_t kRowBytes = kRow * sizeof(float);
 constexpr std::size_t kOctetsOfRow = 12;  // a whole cycle smooths and tells as many of a row
 
 // Floats of a row that go over: ways, and where there are bricks their loads.
@@ -381,18 +383,10 @@ bool Replica::pack_row(RowId row, float least_m) noexcept {
   return true;
 }
 
-namespace {
-
-void fetch(const float* from, std::size_t floats) {
-  for (std::size_t i = 0; i < floats; i += kLine) __builtin_prefetch(from + i);
-}
-
-}  // namespace
-
 void Replica::fetch_change_ahead(RowId row) const noexcept {
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    fetch(state_.u[axis].data() + at(row), kRow);
-    fetch(before_[axis].data() + at(row), kRow);
+    fetch_lines(state_.u[axis].data() + at(row), kRowBytes);
+    fetch_lines(before_[axis].data() + at(row), kRowBytes);
   }
 }
 
@@ -404,14 +398,14 @@ void Replica::fetch_ahead(SoftObject& object, std::size_t n, bool together) cons
   if (n >= found_[taking_].count()) return;
   const RowId row = found_[taking_].row(n);
   const Grid& g = lattice_.grid();
-  fetch(found_[taking_].values(n), std::size_t{3} * kRow);
+  fetch_lines(found_[taking_].values(n), 3 * kRowBytes);
   for (const auto& axis : object.state_.u) {
     const float* u = axis.data();
-    fetch(u + at(row), kRow);
+    fetch_lines(u + at(row), kRowBytes);
     if (together) continue;
-    for (const RowId r : {row - g.row_z, row - 1, row + 1, row + g.row_z}) fetch(u + at(r), kRow);
-    fetch(u + at(row - g.row_x) + kRow - 1, 1);
-    fetch(u + at(row + g.row_x), 1);
+    for (const RowId r : {row - g.row_z, row - 1, row + 1, row + g.row_z}) fetch_lines(u + at(r), kRowBytes);
+    fetch_lines(u + at(row - g.row_x) + kRow - 1, sizeof(float));
+    fetch_lines(u + at(row + g.row_x), sizeof(float));
   }
   __builtin_prefetch(object.state_.role.data() + at(row));
   object.relaxation_.couplings().fetch_ahead(row);
