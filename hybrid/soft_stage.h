@@ -35,4 +35,12 @@ void prepare_grids(const World& world, WorldState& state, const glm::dvec3& poin
 // rest.
 void refresh_map(const World& world, WorldState& state) noexcept;
 
+// Has the displacement of a voxel of the surface, whose number may be any, fetched into the cache: what is
+// looked at in turns stands in none, and to wait for it was half of what that took.
+inline void fetch_surface_voxel(const voxel::SoftObject& object, std::uint32_t number) noexcept {
+  const auto surface = object.lattice().surface();
+  if (number >= surface.size()) return;
+  for (const auto& axis : object.state().u) __builtin_prefetch(axis.data() + surface[number]);
+}
+
 }  // namespace hybrid

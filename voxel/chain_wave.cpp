@@ -275,6 +275,20 @@ void ChainWave::wait(RowId row, std::uint8_t waves) noexcept {
   waits |= static_cast<std::uint8_t>(waves | kListed);
 }
 
+// Is any neighbour of a voxel to come along, or is the link to it at its limit, to a rounding? (Where only
+// those counted that are to come along, two bodies on tight links still moved at 0.18 mm/s after 3.6 s: what
+// roundings leave beyond is mended by the waves that pass.) Where there is no neighbour the limit has no end.
+bool ChainWave::asks(const Pass& p, VoxelId v) const noexcept {
+  const std::uint8_t label = lattice_.label(v);
+  for (int n = 0; n < kWays; ++n) {
+    const VoxelId to = n % 2 == 0 ? lattice_.up(v, n / 2) : lattice_.down(v, n / 2);
+    const float limit = p.limits.between(n, label, lattice_.label(to));
+    if (p.way == Way::raise ? p.u[v] - limit > p.u[to] - p.margin : p.u[v] + limit < p.u[to] + p.margin)
+      return true;
+  }
+  return false;
+}
+
 std::uint64_t ChainWave::spread(float* u, int axis, Way way, std::span<Source> sources, float margin,
                                 std::uint64_t most) noexcept {
   if (sources.empty()) return 0;
@@ -300,15 +314,23 @@ std::uint64_t ChainWave::spread(float* u, int axis, Way way, std::span<Source> s
     if (way == Way::raise ? s.u <= u[s.v] : s.u >= u[s.v]) continue;  // a stronger one took it along
     u[s.v] = s.u;
     sources[moves++] = s;
-    if (!cones) continue;
+    if (!cones || !asks(p, s.v)) continue;
     // One after the other.
     if (!whole || !cone(p, s.v, left())) {
       if (!whole || !sweep(p, {&s, 1}, left(), visits)) enqueue(s.v / kRow);
     }
     visits += run(p, left());
   }
-  if (!cones && moves > 0 && (!whole || !sweep(p, sources.first(moves), left(), visits))) {
-    for (const Source& s : sources.first(moves)) enqueue(s.v / kRow);
+  if (!cones) {
+    // A tool that hardly moves takes along next to nothing: of a hundred voxels that it presses few ask any.
+    // (Swept from all of them, and the rows beside theirs, that was a sixth of a tick.)
+    const std::span<Source> moving = sources.first(moves);
+    const auto asking = moving.first(static_cast<std::size_t>(
+        std::remove_if(moving.begin(), moving.end(), [&](const Source& s) { return !asks(p, s.v); }) -
+        moving.begin()));
+    if (!asking.empty() && (!whole || !sweep(p, asking, left(), visits))) {
+      for (const Source& s : asking) enqueue(s.v / kRow);
+    }
   }
   visits += run(p, left());
   work_ += cone_rows_ / kConeRows;

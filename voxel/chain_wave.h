@@ -137,6 +137,7 @@ class ChainWave {
   std::uint64_t run(const Pass& p, std::uint64_t most) noexcept;
   void wait(RowId row, std::uint8_t waves) noexcept;
   void fetch_around(const Pass& p, RowId row) const noexcept;
+  [[nodiscard]] bool asks(const Pass& p, VoxelId v) const noexcept;
   void ask_around(const Pass& p, RowId row) noexcept;
   Moved ask_along(const Pass& p, RowId row) noexcept;
   void ask_beside(const Pass& p, RowId row, RowId to, int direction) noexcept;

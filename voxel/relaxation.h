@@ -189,13 +189,14 @@ class Relaxation {
                  int contact_margin) noexcept;
   void lay_contact_boxes(std::span<const VoxelId> pressed, int margin) noexcept;
   void lay_whole_boxes() noexcept;
-  // In steps: on the way down a level is smoothed, then passed on; the coarsest; a level each on the way up.
+  // In steps: on the way down a level is smoothed, then passed on; the coarsest; on the way up it is told,
+  // then smoothed.
   struct Step {
     int level;
-    enum What : std::uint8_t { smooths, passes_on, solves, tells } what;
+    enum What : std::uint8_t { smooths, passes_on, solves, tells, smooths_after } what;
   };
   [[nodiscard]] Step step_of(int n) const noexcept;
-  [[nodiscard]] int steps() const noexcept { return 3 * last_level() + 1; }
+  [[nodiscard]] int steps() const noexcept { return 4 * last_level() + 1; }
   void cycle(Displacement& state, const ObstacleView& obstacles, Look look) noexcept {
     run_steps_over(0, steps(), state, obstacles, look);
   }

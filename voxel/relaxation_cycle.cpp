@@ -14,8 +14,9 @@ constexpr int kContactSweeps = 4;  // of the coarsest level of a cycle round a c
 // four, or as many as reach three radii of the contact, the force on the way into organs was 4 to 25 %
 // higher.)
 constexpr int kContactLevels = 5;
-// What octets take, in those that are told: smoothed; passed on.
-constexpr std::size_t kSmoothed = 2, kPassedOn = 3;
+// What octets take, in those of cells that are told: smoothed; passed on. Voxels, which have limits, and
+// obstacles, take twice as much.
+constexpr std::size_t kSmoothed = 2, kPassedOn = 3, kOfVoxels = 2;
 // Cycles of all levels but the first before a thorough cycle tells voxels: those are an eighth of it each.
 constexpr int kCoarseCycles = 3;
 constexpr int kRoundParts = 8;  // voxels
@@ -107,24 +108,28 @@ std::size_t Relaxation::octets_of_cycle() const noexcept {
   return sum;
 }
 
-// On the way down a level has two steps, smoothed and passed on; then the coarsest, and up a step each.
 Relaxation::Step Relaxation::step_of(int n) const noexcept {
   const int last = last_level();
   if (n < 2 * last) return {n / 2, n % 2 == 0 ? Step::smooths : Step::passes_on};
-  return n == 2 * last ? Step{last, Step::solves} : Step{3 * last - n, Step::tells};
+  if (n == 2 * last) return {last, Step::solves};
+  const int up = n - 2 * last - 1;
+  return {last - 1 - up / 2, up % 2 == 0 ? Step::tells : Step::smooths_after};
 }
 
 // In octets told.
 std::size_t Relaxation::work_of_step(int n) const noexcept {
   const Step step = step_of(n);
   const LevelBoxes& b = boxes_[static_cast<std::size_t>(step.level)];
+  const std::size_t each = step.level == 0 ? kOfVoxels : 1, smoothed = each * kSmoothed * octets(b.smoothed);
   switch (step.what) {
     case Step::smooths:
-      return smoothed_ ? 0 : kSmoothed * octets(b.smoothed);
+      return smoothed_ ? 0 : smoothed;
     case Step::passes_on:
-      return kPassedOn * octets(b.smoothed);
+      return each * kPassedOn * octets(b.smoothed);
     case Step::solves:
-      return kContactSweeps * kSmoothed * octets(b.smoothed);
+      return kContactSweeps * smoothed;
+    case Step::smooths_after:
+      return smoothed;
     case Step::tells:
       break;
   }
@@ -132,7 +137,7 @@ std::size_t Relaxation::work_of_step(int n) const noexcept {
   RowBox told = b.told;
   told.q0 = std::max(told.q0, b.smoothed.q0 - 1);
   told.q1 = std::min(told.q1, b.smoothed.q1 + 1);
-  return octets(told) + kSmoothed * octets(b.smoothed);
+  return each * octets(told);
 }
 
 // Rows of one colour, so that no two that are beside one another are of the same, then those of the other: by
@@ -226,6 +231,8 @@ void Relaxation::step(int n, Displacement& state, const ObstacleView& obstacles,
     }
     case Step::tells:
       tell_box(step.level, state, obstacles);
+      break;
+    case Step::smooths_after:
       smooth_box(step.level, 1, state, obstacles, look);
       multigrid_.smooth_parts(step.level, box, state, obstacles);
   }
@@ -292,11 +299,11 @@ std::size_t Relaxation::run_thoroughly(Displacement& state, const ObstacleView& 
   tells_jointly_ = true;
   multigrid_.pass_on_all(true);
   const int first_coarse = 2;         // level 1 is smoothed
-  const int last_step = steps() - 1;  // voxels are told
-  run_steps_over(0, last_step, state, obstacles, Look::all);
+  const int of_voxels = steps() - 2;  // they are told
+  run_steps_over(0, of_voxels, state, obstacles, Look::all);
   for (int n = 0; n < kCoarseCycles; ++n)
-    run_steps_over(first_coarse, last_step, state, obstacles, Look::all);
-  step(last_step, state, obstacles, Look::all, false);
+    run_steps_over(first_coarse, of_voxels, state, obstacles, Look::all);
+  run_steps_over(of_voxels, steps(), state, obstacles, Look::all);
   multigrid_.pass_on_all(false);
   tells_jointly_ = false;
   return octets_of_cycle();

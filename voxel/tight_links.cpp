@@ -168,23 +168,25 @@ void SoftObject::add_stiffness_of_touches(int axis, const glm::dvec3& way, glm::
   for (const Carried& c : carried_) {
     const glm::dvec3 q = touches_[c.touch].normal[axis] * touches_[c.touch].normal;
     const VoxelSprings springs = relaxation_.couplings().springs_of(c.v);
+    double to_others = 0.0;  // which do not come along
     for (int d = 0; d < 3; ++d) {
       for (const bool up : {false, true}) {
         const Spring& spring = (up ? springs.up : springs.down)[static_cast<std::size_t>(d)];
         const double stiff = static_cast<double>(spring.on(axis, d));
         if (stiff == 0.0) continue;
         const VoxelId w = up ? lattice_->up(c.v, d) : lattice_->down(c.v, d);
-        double share = 1.0;
-        glm::dvec3 beside(0.0);
         if (carried_mark_[w] != 0) {
-          beside = touches_[carried_index_[w]].normal[axis] * touches_[carried_index_[w]].normal;
-          share = 0.5;  // met from both its ends
+          const Touch& beside = touches_[carried_index_[w]];
+          const glm::dvec3 r = q - beside.normal[axis] * beside.normal;
+          stiffness += 0.5 * stiff * glm::outerProduct(r, r);  // met from both its ends
         } else if (tight_rows_.carried(w)) {
-          beside = way;
+          stiffness += stiff * glm::outerProduct(q - way, q - way);
+        } else {
+          to_others += stiff;
         }
-        stiffness += share * stiff * glm::outerProduct(q - beside, q - beside);
       }
     }
+    stiffness += to_others * glm::outerProduct(q, q);
   }
 }
 

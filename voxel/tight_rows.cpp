@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "voxel/tight_rows.h"
 
+#include <algorithm>
 #include <bit>
 #include <bitset>
 
@@ -9,7 +10,8 @@
 namespace voxel {
 namespace {
 
-constexpr float kTight = 1e-4F;  // of the spacing: nearer to its limit than this a link is tight
+constexpr float kTight = 1e-4F;        // of the spacing: nearer to its limit than this a link is tight
+constexpr float kNearlyTight = 2e-4F;  // further from it, a link surely is not
 
 // Sum over the lanes whose bits are set.
 double sum_of(const float* lanes, std::uint32_t bits) {
@@ -22,7 +24,8 @@ double sum_of(const float* lanes, std::uint32_t bits) {
 
 struct TightRows::Gathering {
   Couplings& couplings;
-  const Multigrid* multigrid;  // null: there are no parts without slack
+  std::span<const VoxelId> roots;  // sorted
+  const Multigrid* multigrid;      // null: there are no parts without slack
   std::bitset<Lattice::kMostParts> known;
   std::array<double, Lattice::kMostParts> pull_N;  // of those known
 
@@ -49,6 +52,24 @@ TightRows::TightRows(const Lattice& lattice) : lattice_(lattice), entry_(lattice
   queue_.resize(kMostRows);
 }
 
+// May a link of this voxel be at a limit? By the tightest limits of all: most often the answer is no, and
+// nothing can hang on it.
+bool TightRows::may_be_tight(VoxelId v) const noexcept {
+  const auto& u = state_->u[static_cast<std::size_t>(axis_)];
+  for (int d = 0; d < 3; ++d) {
+    const LinkLimit& l = lattice_.tightest(d);
+    const float tight = kNearlyTight * static_cast<float>(lattice_.spacing_m()[d]);
+    const float low = (axis_ == d ? l.along_low : -l.across) + tight,
+                high = (axis_ == d ? l.along_high : l.across) - tight;
+    const VoxelId up = lattice_.up(v, d), down = lattice_.down(v, d);
+    const float above = u[up] - u[v], below = u[v] - u[down];
+    if (((above <= low || above >= high) && lattice_.filled(up)) ||
+        ((below <= low || below >= high) && lattice_.filled(down)))
+      return true;
+  }
+  return false;
+}
+
 // Null: nothing is in it, or too many were looked at.
 TightRows::Row* TightRows::look_at(RowId row) noexcept {
   if (entry_[row] != 0) return &rows_[entry_[row] - 1U];
@@ -69,6 +90,11 @@ TightRows::Row* TightRows::look_at(RowId row) noexcept {
   if (gathering_->multigrid != nullptr && gathering_->multigrid->parts().in_row(0, row))
     gathering_->pull_as_parts(*state_, row, axis_, out.links);
   entry_[row] = static_cast<std::uint16_t>(rows_.size());
+  const auto& roots = gathering_->roots;
+  for (auto v = std::lower_bound(roots.begin(), roots.end(), row * kRow);
+       v != roots.end() && *v / kRow == row; ++v)
+    out.roots |= 1U << *v % kRow;
+  if (out.roots != 0) add(out, out.roots);
   return &out;
 }
 
@@ -106,7 +132,7 @@ void TightRows::ask(RowId row, std::uint32_t at_low, std::uint32_t at_high, End 
 void TightRows::gather(Couplings& couplings, Displacement& state, std::span<const VoxelId> roots, int axis,
                        const Multigrid* multigrid) noexcept {
   const bool parts = multigrid != nullptr && multigrid->has_parts();
-  Gathering gathering{couplings, parts ? multigrid : nullptr, {}, {}};
+  Gathering gathering{couplings, roots, parts ? multigrid : nullptr, {}, {}};
   gathering_ = &gathering;
   state_ = &state;
   axis_ = axis;
@@ -114,10 +140,7 @@ void TightRows::gather(Couplings& couplings, Displacement& state, std::span<cons
   rows_.clear();
   head_ = waiting_ = 0;
   for (const VoxelId v : roots) {
-    if (Row* row = look_at(v / kRow); row != nullptr) row->roots |= 1U << v % kRow;
-  }
-  for (const VoxelId v : roots) {
-    if (Row* row = look_at(v / kRow); row != nullptr && row->carried == 0) add(*row, row->roots);
+    if (may_be_tight(v)) look_at(v / kRow);
   }
   const Grid& g = lattice_.grid();
   while (waiting_ > 0) {
@@ -136,6 +159,14 @@ void TightRows::gather(Couplings& couplings, Displacement& state, std::span<cons
       const int up = d == 0 ? kRow - 1 : 0;
       ask(row.row + away, low >> up, high >> up, End::upper);
       ask(row.row - away, down_low << up, down_high << up, End::lower);
+    }
+  }
+  // Roots beside what hangs on others, so that links between these and those are known for such.
+  for (const VoxelId v : roots) {
+    if (rows_.empty()) break;
+    if (find(v / kRow) != nullptr) continue;
+    for (int n = 0; n < 6; ++n) {
+      if (carried(n % 2 == 0 ? lattice_.up(v, n / 2) : lattice_.down(v, n / 2))) look_at(v / kRow);
     }
   }
   gathering_ = nullptr;

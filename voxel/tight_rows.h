@@ -29,13 +29,14 @@ class TightRows {
   explicit TightRows(const Lattice& lattice);
 
   // ---- none of these allocates or throws ----
-  // On one axis, all that hangs on `roots` (none anchored), one by another: a voxel does where a link to one
-  // of these is at a limit and pushes it the way its own links, and what else pulls it, do not. One that its
-  // link lets go neither way hangs on it in any case. What was found before is forgotten.
-  // A voxel of a part without slack is pulled as the whole of that is, where `multigrid` says how that is.
+  // On one axis, all that hangs on `roots` (in the order of their ids, none anchored), one by another: a
+  // voxel does where a link to one of these is at a limit and pushes it the way its own links, and what else
+  // pulls it, do not. One that its link lets go neither way hangs on it in any case. What was found before is
+  // forgotten. A voxel of a part without slack is pulled as the whole of that is, where `multigrid` says how
+  // that is.
   void gather(Couplings& couplings, Displacement& state, std::span<const VoxelId> roots, int axis,
               const Multigrid* multigrid = nullptr) noexcept;
-  // Is it one of them, or a root?
+  // Is it one of them, or a root that they hang on? Of other roots it may say either.
   [[nodiscard]] bool carried(VoxelId v) const noexcept {
     return (carried_in(v / kRow) >> v % kRow & 1U) != 0;
   }
@@ -66,7 +67,8 @@ class TightRows {
   [[nodiscard]] const Row* find(RowId row) const noexcept {
     return entry_[row] == 0 ? nullptr : &rows_[entry_[row] - 1U];
   }
-  [[nodiscard]] Row* look_at(RowId row) noexcept;
+  [[nodiscard]] bool may_be_tight(VoxelId v) const noexcept;
+  Row* look_at(RowId row) noexcept;
   [[nodiscard]] static std::uint32_t pushed(const Row& row, std::uint32_t at_low, std::uint32_t at_high,
                                             End end) noexcept;
   void add(Row& row, std::uint32_t bits) noexcept;
