@@ -14,7 +14,6 @@ namespace hybrid {
 namespace {
 
 constexpr std::uint32_t kObstacleSlice = 256;  // surface voxels whose motion is looked at a tick
-constexpr std::uint32_t kAhead = 16;           // of these, one is fetched before its turn
 constexpr std::size_t kObstacleQueries = 24;   // exact queries a tick
 // … where a result arrived (1.9 % of a cell of overlap in `head`; with 64, which took 150 us, 2.1 %).
 constexpr std::size_t kArrivedQueries = 40;
@@ -218,7 +217,7 @@ void refresh_obstacles(const World& world, WorldState& state) noexcept {
       // What moves by itself, a little in each tick, is found in turns.
       const auto count = static_cast<std::uint32_t>(lattice.surface().size());
       for (std::uint32_t i = 0; i < std::min(kObstacleSlice, count); ++i) {
-        fetch_surface_voxel(object, state.obstacle_cursor[o] + kAhead);
+        fetch_surface_ahead(object, state.obstacle_cursor[o]);
         due.consider(state.obstacle_cursor[o]);
         if (++state.obstacle_cursor[o] == count) state.obstacle_cursor[o] = 0;
       }

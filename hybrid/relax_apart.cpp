@@ -32,9 +32,9 @@ Apart::~Apart() = default;
 namespace {
 
 constexpr std::size_t kMostApart = 64;  // bits of Apart::arrived
-// A tick: what a result is added to, about 100 us of it; beside a wide cycle round the contact as many
-// rows as that leaves work for, so much each, what they have to look for included, and some always: a result
-// that waits keeps the next one waiting. (With none, a brain had one every 125 ms in place of 65.)
+// A tick: what a result is added to, about 100 us of it; beside a wide cycle round the contact as many rows
+// as that leaves work for, so much each, what they have to look for included, and some always: a result that
+// waits keeps the next one waiting. (With none, a brain had one every 125 ms in place of 65.)
 constexpr std::size_t kRowsTaken = 250, kLeastRows = 100, kWorkOfRow = 16;
 // Parts of what is taken near a contact that is held still.
 constexpr int kParts = 8;

@@ -10,7 +10,6 @@ namespace {
 
 constexpr int kMaxHalvings = 6;           // of how far a crowded tool looks ahead
 constexpr std::uint32_t kMapSlice = 512;  // surface voxels of each object whose cell is looked at a tick
-constexpr std::uint32_t kAhead = 16;      // of these, one is fetched before its turn
 
 const glm::dvec3 kPunchAxis(0.0, 0.0, -1.0);  // a punch presses downwards in the scene
 
@@ -161,7 +160,7 @@ void refresh_map(const World& world, WorldState& state) noexcept {
     if (object.asleep() && state.cursor[o] == 0) continue;  // a whole round since it came to rest
     const auto count = static_cast<std::uint32_t>(surface.size());
     for (std::uint32_t i = 0; i < std::min(kMapSlice, count); ++i) {
-      fetch_surface_voxel(object, state.cursor[o] + kAhead);
+      fetch_surface_ahead(object, state.cursor[o]);
       look(state.cursor[o]);
       if (++state.cursor[o] == count) {
         state.cursor[o] = 0;

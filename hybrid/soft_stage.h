@@ -35,12 +35,13 @@ void prepare_grids(const World& world, WorldState& state, const glm::dvec3& poin
 // rest.
 void refresh_map(const World& world, WorldState& state) noexcept;
 
-// Has the displacement of a voxel of the surface, whose number may be any, fetched into the cache: what is
-// looked at in turns stands in none, and to wait for it was half of what that took.
-inline void fetch_surface_voxel(const voxel::SoftObject& object, std::uint32_t number) noexcept {
+// Where surface voxels are looked at in turns, and it is that of `number`: has the displacement of one whose
+// turn comes soon fetched into the cache. It stands in none, and to wait for it was half of what that took.
+inline void fetch_surface_ahead(const voxel::SoftObject& object, std::uint32_t number) noexcept {
+  constexpr std::uint32_t kAhead = 16;
   const auto surface = object.lattice().surface();
-  if (number >= surface.size()) return;
-  for (const auto& axis : object.state().u) __builtin_prefetch(axis.data() + surface[number]);
+  if (number + kAhead >= surface.size()) return;
+  for (const auto& axis : object.state().u) __builtin_prefetch(axis.data() + surface[number + kAhead]);
 }
 
 }  // namespace hybrid

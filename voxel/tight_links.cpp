@@ -8,6 +8,7 @@
 
 #include "voxel/limited_region.h"
 #include "voxel/links.h"
+#include "voxel/nearly_tight.h"
 #include "voxel/soft_object.h"
 
 namespace voxel {
@@ -59,24 +60,11 @@ void for_tight_neighbours(const Lattice& lattice, const LazyArray<float>& u, Vox
   });
 }
 
-// May any link of these be at a limit? By the tightest limits of all, which is a tenth of the cost of looking
-// at each link's own: most often the answer is no.
-bool may_be_tight(const Lattice& lattice, const Displacement& state, std::span<const VoxelId> voxels,
-                  float share) {
-  for (int d = 0; d < 3; ++d) {
-    const LinkLimit& l = lattice.tightest(d);
-    const float tight = share * static_cast<float>(lattice.spacing_m()[d]);
-    for (int axis = 0; axis < 3; ++axis) {
-      const auto& u = state.u[static_cast<std::size_t>(axis)];
-      const float low = (axis == d ? l.along_low : -l.across) + tight,
-                  high = (axis == d ? l.along_high : l.across) - tight;
-      for (const VoxelId v : voxels) {
-        const VoxelId up = lattice.up(v, d), down = lattice.down(v, d);
-        const float above = u[up] - u[v], below = u[v] - u[down];
-        if (((above <= low || above >= high) && lattice.filled(up)) ||
-            ((below <= low || below >= high) && lattice.filled(down)))
-          return true;
-      }
+bool any_may_be_tight(const Lattice& lattice, const Displacement& state, std::span<const VoxelId> voxels,
+                      float share) {
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const VoxelId v : voxels) {
+      if (may_be_tight(lattice, state, v, axis, share)) return true;
     }
   }
   return false;
@@ -296,7 +284,7 @@ void SoftObject::load_held(std::span<const VoxelId> held, std::size_t pressed,
 
 void SoftObject::relax_held(std::span<const VoxelId> pressed) noexcept {
   if (asleep() || !relaxation_.left_to_another()) return;
-  const bool tight = may_be_tight(*lattice_, state_, pressed, kTightBesideOthers);
+  const bool tight = any_may_be_tight(*lattice_, state_, pressed, kTightBesideOthers);
   relaxation_.relax_limited(state_, obstacle_view(), pressed.first(tight ? pressed.size() : 0));
 }
 
@@ -312,7 +300,7 @@ void SoftObject::find_hanging_on_pairs() noexcept {
     if (pair_roots_.size() == pair_roots_.capacity()) break;
     if (!lattice_->anchored(v) && pair_load(v) != glm::dvec3(0.0)) pair_roots_.push_back(v);
   }
-  if (!may_be_tight(*lattice_, state_, pair_roots_, kTightBesideOthers)) {
+  if (!any_may_be_tight(*lattice_, state_, pair_roots_, kTightBesideOthers)) {
     pair_roots_.clear();
     return;
   }

@@ -6,6 +6,7 @@
 #include <bitset>
 
 #include "voxel/multigrid.h"
+#include "voxel/nearly_tight.h"
 
 namespace voxel {
 namespace {
@@ -50,24 +51,6 @@ struct TightRows::Gathering {
 TightRows::TightRows(const Lattice& lattice) : lattice_(lattice), entry_(lattice.grid().rows()) {
   rows_.reserve(kMostRows);
   queue_.resize(kMostRows);
-}
-
-// May a link of this voxel be at a limit? By the tightest limits of all: most often the answer is no, and
-// nothing can hang on it.
-bool TightRows::may_be_tight(VoxelId v) const noexcept {
-  const auto& u = state_->u[static_cast<std::size_t>(axis_)];
-  for (int d = 0; d < 3; ++d) {
-    const LinkLimit& l = lattice_.tightest(d);
-    const float tight = kNearlyTight * static_cast<float>(lattice_.spacing_m()[d]);
-    const float low = (axis_ == d ? l.along_low : -l.across) + tight,
-                high = (axis_ == d ? l.along_high : l.across) - tight;
-    const VoxelId up = lattice_.up(v, d), down = lattice_.down(v, d);
-    const float above = u[up] - u[v], below = u[v] - u[down];
-    if (((above <= low || above >= high) && lattice_.filled(up)) ||
-        ((below <= low || below >= high) && lattice_.filled(down)))
-      return true;
-  }
-  return false;
 }
 
 // Null: nothing is in it, or too many were looked at.
@@ -140,7 +123,7 @@ void TightRows::gather(Couplings& couplings, Displacement& state, std::span<cons
   rows_.clear();
   head_ = waiting_ = 0;
   for (const VoxelId v : roots) {
-    if (may_be_tight(v)) look_at(v / kRow);
+    if (may_be_tight(lattice_, state, v, axis, kNearlyTight)) look_at(v / kRow);
   }
   const Grid& g = lattice_.grid();
   while (waiting_ > 0) {

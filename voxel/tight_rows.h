@@ -67,7 +67,6 @@ class TightRows {
   [[nodiscard]] const Row* find(RowId row) const noexcept {
     return entry_[row] == 0 ? nullptr : &rows_[entry_[row] - 1U];
   }
-  [[nodiscard]] bool may_be_tight(VoxelId v) const noexcept;
   Row* look_at(RowId row) noexcept;
   [[nodiscard]] static std::uint32_t pushed(const Row& row, std::uint32_t at_low, std::uint32_t at_high,
                                             End end) noexcept;
