@@ -92,6 +92,7 @@ void exchange(WorldState& state, std::size_t o, std::uint64_t& arrived) noexcept
   }
   if (object.replica.in_parts()) {
     object.replica.take_part(soft, !soft.held_still());
+    state.apart.took = true;
     if (!object.replica.in_parts()) {
       object.next = state.tick + kOwnTicks;
     } else {
@@ -122,6 +123,7 @@ void exchange(WorldState& state, std::size_t o, std::uint64_t& arrived) noexcept
     if (object.replica.in_parts()) soft.ask_to_rest();
     object.given = object.here = false;
     ++state.apart.results;
+    state.apart.took = true;
     object.next = state.tick + kOwnTicks;
   } else if (!drained) {
     const std::size_t beside = soft.work_left() / kWorkOfRow;
@@ -144,6 +146,7 @@ void relax_apart(WorldState& state, Arrival arrival) {
 void relax_background(const World& world, WorldState& state) noexcept {
   std::uint64_t arrived = 0;
   state.apart.elsewhere_us = 0.0;
+  state.apart.took = false;
   for (std::size_t o = 0; o < state.soft.size(); ++o) {
     if (state.apart.objects.empty() || state.apart.objects[o] == nullptr) {
       state.soft[o]->relax_background(world.soft[o].budget);

@@ -49,6 +49,7 @@ struct Apart {
   // said before the tick, else by it.
   std::uint64_t arrived = 0;
   std::uint64_t results = 0;  // taken so far
+  bool took = false;          // in the last tick a part of one, near the contact, or all of that
   // Of this tick's processor time, what a thread of its own would have had (us): not counted as the tick's.
   double elsewhere_us = 0.0;
 };
