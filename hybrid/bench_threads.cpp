@@ -145,7 +145,7 @@ class Bench {
     const FlushedDenormals flushed;
     BuiltScene built = build_scene(scene_);
     ResultTape tape(built.state->soft.size());
-    begin_session(scene_, *built.world, *built.state, felt.recording.front().device_m);
+    begin_session(scene_, *built.world, *built.state, felt.start_m);
     relax_apart(*built.state, Arrival::recorded);
     for (const RecordedTick& tick : felt.recording) {
       tick_again(built, tick);
@@ -158,7 +158,7 @@ class Bench {
   void play(const SessionResult& felt, ResultTape& tape) {
     const FlushedDenormals flushed;
     BuiltScene built = build_scene(scene_);
-    begin_session(scene_, *built.world, *built.state, felt.recording.front().device_m);
+    begin_session(scene_, *built.world, *built.state, felt.start_m);
     relax_apart(*built.state, Arrival::played);
     Apart& apart = built.state->apart;
     beside([&](const std::atomic<bool>& stop) { hog_memory(stop, [&] { tape.hand_out(apart); }); },
@@ -170,7 +170,7 @@ class Bench {
              std::uint64_t hash = kHashBegin;
              for (const RecordedTick& tick : felt.recording) {
                timer.wait();
-               apart.arrived = tick.arrived;
+               play_again(tick, *built.state);
                while (!ResultTape::ready(apart)) std::this_thread::yield();
                const TickResult again = tick_again(built, tick);
                hash = hash_tick(hash, again);
@@ -185,7 +185,7 @@ class Bench {
   }
 
   TickResult tick_again(BuiltScene& built, const RecordedTick& tick) const {
-    built.state->apart.arrived = tick.arrived;
+    play_again(tick, *built.state);
     return haptic_tick(*built.world, *built.state, {.position_m = tick.device_m, .fault = tick.fault},
                        1.0 / scene_.rate_hz);
   }

@@ -144,9 +144,9 @@ int run(const RunCommand& command) {
   if (!command.picture.empty())
     save_picture(command.picture, drawn_scene(scene, built, title), *result.moment);
   if (!command.record.empty()) {
-    save_recording(command.record,
-                   {std::filesystem::absolute(command.scene), read_text(command.scene), result.dt_s,
-                    scene_limits(scene), options.relax_apart, result.state_hash, result.recording});
+    save_recording(command.record, {std::filesystem::absolute(command.scene), read_text(command.scene),
+                                    result.dt_s, scene_limits(scene), options.relax_apart, result.state_hash,
+                                    result.start_m, result.recording});
   }
   if (!command.save_surface.empty()) save_surfaces(command.save_surface, built);
   std::vector<std::filesystem::path> volumes;

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
@@ -15,20 +16,24 @@ namespace hybrid {
 namespace {
 
 // Layout, little-endian: magic, sizes of path and text, tick count, dt, the device's greatest force,
-// resolution and friction, whether soft objects are relaxed apart, state hash, path, text, ticks of (x, y, z,
-// hash, fault of the device, results of relaxation taken).
-constexpr std::array<char, 8> kMagic{'h', 'y', 'b', 'r', 'i', 'd', 'R', '3'};
+// resolution and friction, whether soft objects are relaxed apart, state hash, where the device was before
+// the first tick, path, text, ticks of (x, y, z, hash, fault of the device, share of the contact's work,
+// results of relaxation taken).
+constexpr std::array<char, 8> kMagic{'h', 'y', 'b', 'r', 'i', 'd', 'R', '4'};
 struct Header {
   std::array<char, 8> magic;
   std::uint64_t path_bytes, text_bytes, ticks;
   double dt_s, max_force_N, resolution_m, friction_N;
   std::uint64_t relax_apart, state_hash;
+  std::array<double, 3> start;
 };
 struct Tick {
   std::array<double, 3> position;
-  std::uint64_t hash, fault, arrived;
+  std::uint64_t hash;
+  std::uint32_t fault, work_share;
+  std::uint64_t arrived;
 };
-static_assert(sizeof(Header) == 80 && sizeof(Tick) == 48, "the file's layout has no padding");
+static_assert(sizeof(Header) == 104 && sizeof(Tick) == 48, "the file's layout has no padding");
 
 std::string read_text(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
@@ -51,13 +56,17 @@ void save_recording(const std::filesystem::path& file, const Recording& recordin
                       recording.device.resolution_m,
                       recording.device.friction_N,
                       recording.relax_apart ? 1U : 0U,
-                      recording.state_hash};
+                      recording.state_hash,
+                      {recording.start_m.x, recording.start_m.y, recording.start_m.z}};
   out.write(reinterpret_cast<const char*>(&header), sizeof header);
   out.write(path.data(), static_cast<std::streamsize>(path.size()));
   out.write(recording.scene_text.data(), static_cast<std::streamsize>(recording.scene_text.size()));
   for (const RecordedTick& t : recording.ticks) {
-    const Tick tick{
-        {t.device_m.x, t.device_m.y, t.device_m.z}, t.hash, static_cast<std::uint64_t>(t.fault), t.arrived};
+    const Tick tick{{t.device_m.x, t.device_m.y, t.device_m.z},
+                    t.hash,
+                    static_cast<std::uint32_t>(t.fault),
+                    t.work_share,
+                    t.arrived};
     out.write(reinterpret_cast<const char*>(&tick), sizeof tick);
   }
   out.flush();
@@ -86,7 +95,8 @@ Recording load_recording(const std::filesystem::path& file) {
       sizeof header + header.path_bytes + header.text_bytes + header.ticks * sizeof(Tick) == size &&
       header.dt_s > 0.0 && std::isfinite(header.dt_s) && header.max_force_N >= 0.0 &&
       header.resolution_m >= 0.0 && std::isfinite(header.resolution_m) && header.friction_N >= 0.0 &&
-      std::isfinite(header.friction_N) && header.relax_apart <= 1;
+      std::isfinite(header.friction_N) && header.relax_apart <= 1 &&
+      std::all_of(header.start.begin(), header.start.end(), [](double x) { return std::isfinite(x); });
   if (!sane)
     throw std::runtime_error(
         fmt::format("{}: truncated or damaged ({} bytes); copy it again", file.string(), size));
@@ -102,6 +112,7 @@ Recording load_recording(const std::filesystem::path& file) {
   recording.device.friction_N = header.friction_N;
   recording.relax_apart = header.relax_apart != 0;
   recording.state_hash = header.state_hash;
+  recording.start_m = {header.start[0], header.start[1], header.start[2]};
   recording.ticks.resize(header.ticks);
   for (RecordedTick& t : recording.ticks) {
     Tick tick{};
@@ -109,7 +120,8 @@ Recording load_recording(const std::filesystem::path& file) {
     t = {{tick.position[0], tick.position[1], tick.position[2]},
          tick.hash,
          static_cast<device::DeviceFault>(tick.fault),
-         tick.arrived};
+         tick.arrived,
+         static_cast<std::uint8_t>(tick.work_share)};
   }
   if (!in) throw std::runtime_error(fmt::format("{}: could not be read to its end", file.string()));
   return recording;
@@ -132,13 +144,13 @@ ReplayResult replay(const Recording& recording, const Progress& progress) {
   result.equal = true;
   result.parts_at = result.ticks;
   if (recording.ticks.empty()) return result;
-  begin_session(scene, *built.world, *built.state, recording.ticks.front().device_m);
+  begin_session(scene, *built.world, *built.state, recording.start_m);
   if (recording.relax_apart) relax_apart(*built.state, Arrival::recorded);
   std::uint64_t hash = kHashBegin;
   for (std::size_t n = 0; n < recording.ticks.size(); ++n) {
     const device::DeviceState input{.position_m = recording.ticks[n].device_m,
                                     .fault = recording.ticks[n].fault};
-    built.state->apart.arrived = recording.ticks[n].arrived;
+    play_again(recording.ticks[n], *built.state);
     hash = hash_tick(hash, haptic_tick(*built.world, *built.state, input, recording.dt_s));
     if (hash == recording.ticks[n].hash || !result.equal) continue;
     result.equal = false;

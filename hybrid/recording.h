@@ -18,6 +18,7 @@ struct Recording {
   device::DeviceLimits device{};  // that it was felt with
   bool relax_apart = false;       // SessionOptions::relax_apart
   std::uint64_t state_hash = 0;   // after the last tick
+  glm::dvec3 start_m{0.0};        // SessionResult::start_m
   std::vector<RecordedTick> ticks;
 };
 

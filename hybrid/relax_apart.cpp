@@ -8,6 +8,7 @@
 #include <chrono>
 
 #include "hybrid/denormals.h"
+#include "hybrid/work_share.h"
 #include "hybrid/world.h"
 
 namespace hybrid {
@@ -126,8 +127,11 @@ void exchange(WorldState& state, std::size_t o, std::uint64_t& arrived) noexcept
     state.apart.took = true;
     object.next = state.tick + kOwnTicks;
   } else if (!drained) {
-    const std::size_t beside = soft.work_left() / kWorkOfRow;
-    object.replica.drain(soft, soft.wide_cycle() ? std::clamp(beside, kLeastRows, kRowsTaken) : kRowsTaken);
+    const auto shared = [&soft](std::size_t rows) {
+      return static_cast<std::size_t>(soft.work_share() * static_cast<double>(rows));
+    };
+    const std::size_t beside = soft.work_left() / kWorkOfRow, most = shared(kRowsTaken);
+    object.replica.drain(soft, soft.wide_cycle() ? std::clamp(beside, shared(kLeastRows), most) : most);
   }
 }
 
@@ -140,6 +144,12 @@ void relax_apart(WorldState& state, Arrival arrival) {
     const voxel::SoftObject& object = *state.soft[o];
     const bool apart = o < kMostApart && !object.lattice().yields() && !object.uses_grid();
     state.apart.objects.push_back(apart ? std::make_unique<RelaxedApart>(*state.soft[o]) : nullptr);
+  }
+}
+
+void give_work_share(WorldState& state, std::uint8_t steps) noexcept {
+  for (std::size_t o = 0; o < state.soft.size(); ++o) {
+    if (state.apart.has(o)) state.soft[o]->set_work_share(WorkShare::share(steps));
   }
 }
 

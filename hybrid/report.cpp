@@ -175,7 +175,10 @@ nlohmann::ordered_json run_report(const Scene& scene, const BuiltScene& built, S
   if (result.relaxed_apart > 0) j["threads"].push_back(thread("relaxation", result.relaxation_s));
   j["relaxed_apart"] = result.relaxed_apart;
   if (!result.realtime_note.empty()) {
-    j["realtime"] = {{"priority", result.realtime_note}, {"late_us", to_json(result.late_us)}};
+    j["realtime"] = {{"priority", result.realtime_note},
+                     {"late_us", to_json(result.late_us)},
+                     {"least_work_share", result.least_work_share},
+                     {"ticks_with_less_work", result.ticks_with_less_work}};
   }
   constexpr std::array kEnds{"finished", "stopped", "lost"};
   j["device"] = {{"name", result.device_name},
@@ -232,6 +235,13 @@ std::string run_summary(const BuiltScene& built, SessionResult& result) {
         "real time: {}\n  woken late by p50 {:.0f}, p99 {:.0f}, max {:.0f} us; {} deadlines missed\n",
         result.realtime_note, result.late_us.p50, result.late_us.p99, result.late_us.max,
         result.deadline_misses);
+    if (result.ticks_with_less_work > 0) {
+      text += fmt::format(
+          "  to be in time on this machine {} ticks did less than all of the contact's work, {:.0f} % at "
+          "least: "
+          "tissue follows the hand some ticks later\n",
+          result.ticks_with_less_work, 100.0 * result.least_work_share);
+    }
   }
   text += safety_words(built);
   for (const std::string& note : result.path_notes) text += fmt::format("path: {}\n", note);

@@ -15,6 +15,7 @@
 #include "hybrid/denormals.h"
 #include "hybrid/fill_snapshot.h"
 #include "hybrid/rigid_step.h"
+#include "hybrid/work_share.h"
 #include "voxel/composite_grid.h"
 
 namespace hybrid {
@@ -88,7 +89,9 @@ class Run {
         simulated_(options.real_device == nullptr ? scene_device(scene, path_) : nullptr),
         device_(options.real_device == nullptr ? *simulated_ : *options.real_device),
         realtime_(options.realtime || options.real_device != nullptr),
-        dt_(1.0 / scene.rate_hz) {
+        follows_machine_(realtime_ && options.relax_apart && !built.state->soft.empty()),
+        dt_(1.0 / scene.rate_hz),
+        work_share_(dt_) {
     const double usual = options.real_device == nullptr ? path_->duration_s() + kAfterPath_s : kWithHand_s;
     const double seconds = options.seconds.value_or(usual);
     result_.device_name = device_.name();
@@ -108,7 +111,8 @@ class Run {
   SessionResult go() {
     flush_denormals();
     start_clocks();
-    begin_session(scene_, world_, state_, device_.read().position_m);
+    result_.start_m = device_.read().position_m;
+    begin_session(scene_, world_, state_, result_.start_m);
     if (options_.relax_apart) relax_apart(state_, realtime_ ? Arrival::thread : Arrival::counted);
     std::optional<RelaxationThread> relaxation;
     if (options_.relax_apart && options_.relaxation_thread && realtime_ && !state_.soft.empty())
@@ -164,11 +168,13 @@ class Run {
   device::ServoAnswer answer(const device::ServoInput& input) {
     const FlushedDenormals flushed;
     const std::uint64_t tick = ticks_done_++;
+    if (follows_machine_) give_work_share(state_, work_share_.steps());
     const TickResult felt = haptic_tick(world_, state_, input.device, dt_);
     keep(felt, tick, input.device.fault);
     if (options_.black_box != nullptr) options_.black_box->add(black_box_row(input, felt, tick, state_));
     if (realtime_) {
       late_us_.add(input.late_s * 1e6);
+      if (follows_machine_) follow_machine(felt.tick_us);
     } else {
       if (sample_every_ != 0 && result_.error.samples < options_.reference_samples)
         sample(felt, sample_every_);
@@ -177,6 +183,14 @@ class Run {
       if (options_.progress && tick % 64 == 0) say_progress(tick);
     }
     return {.force_N = felt.force_N, .go_on = ticks_done_ < ticks_};
+  }
+
+  void follow_machine(double tick_us) {
+    if (work_share_.steps() > 0) ++result_.ticks_with_less_work;
+    result_.least_work_share = std::min(result_.least_work_share, WorkShare::share(work_share_.steps()));
+    const bool pressed = std::any_of(state_.reactions.begin(), state_.reactions.end(),
+                                     [](const voxel::Reaction& r) { return r.pressed > 0; });
+    work_share_.felt(tick_us, pressed);
   }
 
   void say_progress(std::uint64_t tick) {
@@ -190,7 +204,7 @@ class Run {
   void keep(const TickResult& felt, std::uint64_t tick, device::DeviceFault fault) {
     hash_ = hash_tick(hash_, felt);
     if (options_.keep_recording)
-      result_.recording.push_back({felt.device_m, hash_, fault, state_.apart.arrived});
+      result_.recording.push_back({felt.device_m, hash_, fault, state_.apart.arrived, work_share_.steps()});
     result_.tick_us.add(felt.tick_us);
     result_.servo_s += 1e-6 * felt.tick_us;
     result_.relaxation_s += 1e-6 * state_.apart.elsewhere_us;
@@ -253,8 +267,9 @@ class Run {
   std::shared_ptr<const device::Path> path_;
   std::unique_ptr<device::HapticDevice> simulated_;
   device::HapticDevice& device_;
-  bool realtime_;
+  bool realtime_, follows_machine_;
   double dt_;
+  WorkShare work_share_;
   TimeSpread late_us_;
   std::chrono::steady_clock::time_point said_ = std::chrono::steady_clock::now();
   std::uint64_t clearance_every_ = 1;
@@ -313,6 +328,11 @@ void begin_session(const Scene& scene, const World& world, WorldState& state, co
       fmt::format(
           "the path starts at ({:.4g}, {:.4g}, {:.4g}) m, inside something rigid; start it in free space",
           device_m.x, device_m.y, device_m.z));
+}
+
+void play_again(const RecordedTick& tick, WorldState& state) noexcept {
+  state.apart.arrived = tick.arrived;
+  give_work_share(state, tick.work_share);
 }
 
 SessionResult run_session(const Scene& scene, BuiltScene& built, const SessionOptions& options) {

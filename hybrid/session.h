@@ -28,8 +28,11 @@ struct RecordedTick {
   glm::dvec3 device_m{0.0};
   std::uint64_t hash = 0;
   device::DeviceFault fault = device::DeviceFault::none;
-  std::uint64_t arrived = 0;  // soft objects whose relaxation, apart, began to be taken in this tick
+  std::uint64_t arrived = 0;    // soft objects whose relaxation, apart, began to be taken in this tick
+  std::uint8_t work_share = 0;  // WorkShare::steps()
 };
+// Before a tick that is played again: what of it was the machine's doing.
+void play_again(const RecordedTick& tick, WorldState& state) noexcept;
 
 struct SessionOptions {
   std::optional<double> seconds;  // default: the path's length and half a second; a real device: a minute
@@ -75,6 +78,9 @@ struct SessionResult {
   ForceError error;
   std::optional<Snapshot> moment;       // of keep_picture
   std::vector<RecordedTick> recording;  // of keep_recording
+  // Where the device was as the session began, and the proxy with it: a first tick that comes late finds it
+  // elsewhere.
+  glm::dvec3 start_m{0.0};
   std::string device_name;
   device::ServoEnd end = device::ServoEnd::finished;
   std::vector<std::string> device_messages;  // what happened to the device, and what to do about it
@@ -85,6 +91,9 @@ struct SessionResult {
   // that would have done.
   double servo_s = 0.0, relaxation_s = 0.0;
   std::uint64_t relaxed_apart = 0;  // results that ticks took
+  // Of the contact's work, in real time: the least share that a tick had, and how many had less than all.
+  double least_work_share = 1.0;
+  std::uint64_t ticks_with_less_work = 0;
 };
 
 // Runs the scene's path to its end on its device. Throws SceneError: the tool starts inside something rigid.

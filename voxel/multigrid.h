@@ -127,6 +127,7 @@ class Multigrid {
   struct Told {
     int q0, q1, j0, j1, k0, k1;     // octets and rows of the level, all included
     int first_teller, last_teller;  // cells of the next coarser level along x
+    int from_k, to_k;               // of these planes now, after those before; no other box comes in between
   };
   void tell(int level, const Told& box, Displacement& state, const ObstacleView& obstacles,
             bool jointly = false) noexcept;

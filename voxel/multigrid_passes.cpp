@@ -345,12 +345,13 @@ void Multigrid::tell(int level, const Told& box, Displacement& state, const Obst
   const Grid& g = grid(level);
   // Of the two cells around a voxel the lower one.
   const auto below = [](int x) { return (x + 1) / 2 - 1; };
-  hats_.begin(box.q0 / 2, box.q1 / 2, below(box.j0), below(box.j1) + 1);
+  if (box.from_k == box.k0) hats_.begin(box.q0 / 2, box.q1 / 2, below(box.j0), below(box.j1) + 1);
   // Beyond these octets no hat reaches.
   const int q0 = std::max(box.q0, std::max(2 * box.first_teller - 1, 0) / kOctet);
   const int q1 = std::min(box.q1, (2 * box.last_teller + 2) / kOctet);
-  int spread = below(box.k0) - 1;  // plane of cells; the last that is
-  for (int k = box.k0; k <= box.k1; ++k) {
+  int spread =
+      box.from_k == box.k0 ? below(box.k0) - 1 : below(box.from_k - 1) + 1;  // the last plane of cells
+  for (int k = box.from_k; k <= box.to_k; ++k) {
     for (; spread <= below(k); ++spread) {
       for (int j = below(box.j0); j <= below(box.j1) + 1; ++j) spread_hats(level + 1, j, spread + 1, box);
     }
@@ -383,7 +384,7 @@ void Multigrid::tell(int level, const Told& box, Displacement& state, const Obst
     }
     joint_.clear();
   }
-  if (parts_ != nullptr) tell_parts(level, state, obstacles);
+  if (parts_ != nullptr && box.to_k == box.k1) tell_parts(level, state, obstacles);
 }
 
 // What rows are told is added to what stands in none of the nearer caches: to wait for that was half of it.

@@ -94,7 +94,7 @@ void Relaxation::leave_to_another() {
 
 void Relaxation::give_away(Displacement& state, const ObstacleView& obstacles) noexcept {
   asleep_ = away_ = true;
-  step_ = 0;
+  end_contact();
   multigrid_.begin_anew();
   const Grid& g = lattice_.grid();
   for (int c = near_.first[0]; c <= near_.last[0]; ++c) {
@@ -203,9 +203,9 @@ std::size_t Relaxation::relax_contact(Displacement& state, const ObstacleView& o
   near_.first = {b.q0 / kOctets + 1, std::max(b.j0 - kNear, 0), std::max(b.k0 - kNear, 0)};
   near_.last = {b.q1 / kOctets + 1, std::min(b.j1 + kNear, g.dims[1] - 1),
                 std::min(b.k1 + kNear, g.dims[2] - 1)};
-  step_ = 0;
+  end_contact();
   smoothed_ = apart_ && again;
-  wide_ = octets_of_cycle() > kNarrow;
+  wide_ = static_cast<double>(octets_of_cycle()) > narrow_share_ * static_cast<double>(kNarrow);
   return run_steps(state, obstacles, wide_ ? at_once : kWhole);
 }
 
@@ -218,17 +218,27 @@ std::size_t Relaxation::continue_contact(Displacement& state, const ObstacleView
 // Of what is left to do an equal part.
 std::size_t Relaxation::run_steps(Displacement& state, const ObstacleView& obstacles,
                                   std::size_t at_once) noexcept {
-  std::size_t left = 0, done = 0;
-  for (int n = step_; n < steps(); ++n) left += work_of_step(n);
+  std::size_t left = work_of_planes(step_, plane_), done = 0;
+  for (int n = step_ + 1; n < steps(); ++n) left += work_of_step(n);
   const std::size_t most = std::max<std::size_t>(at_once, 1);
   const std::size_t parts = left <= most ? 1 : std::max<std::size_t>(2, (left - 1) / most + 1);
-  const std::size_t part = left / parts;
-  do {
-    done += work_of_step(step_);
-    step(step_, state, obstacles, Look::all, smoothed_);
-    ++step_;
-  } while (step_ < steps() && (parts == 1 || done + work_of_step(step_) / 2 <= part));
-  if (step_ == steps()) step_ = 0;
+  const std::size_t part = parts == 1 ? left : left / parts;
+  while (step_ < steps()) {
+    const int planes = planes_of_step(step_);
+    const std::size_t of_plane = work_of_step(step_) / static_cast<std::size_t>(planes);
+    if (done > 0 && done + of_plane / 2 > part) return done;
+    int last = planes - 1;
+    if (parts > 1 && of_plane > 0) {
+      const std::size_t fit =
+          std::max<std::size_t>(1, (part - std::min(part, done) + of_plane / 2) / of_plane);
+      last = std::min(last, plane_ + static_cast<int>(fit) - 1);
+    }
+    done += work_of_planes(step_, plane_) - work_of_planes(step_, last + 1);
+    step(step_, {plane_, last}, state, obstacles, Look::all, smoothed_);
+    plane_ = last + 1 < planes ? last + 1 : 0;
+    if (plane_ == 0) ++step_;
+  }
+  end_contact();
   return done;
 }
 

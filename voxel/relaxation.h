@@ -61,12 +61,14 @@ class Relaxation {
   // them be. Between two of them everything may be moved.
   std::size_t continue_contact(Displacement& state, const ObstacleView& obstacles,
                                std::span<const VoxelId> held, std::size_t at_once) noexcept;
-  [[nodiscard]] bool under_way() const { return step_ > 0; }
+  [[nodiscard]] bool under_way() const { return step_ > 0 || plane_ > 0; }
   // Had the last one, or has this one, more than kNarrow octets to visit, on all levels?
   static constexpr std::size_t kNarrow = 2500;
+  // … or than this share of it: where a tick has less work, more goes in parts.
+  void set_narrow_share(double share) noexcept { narrow_share_ = share; }
   [[nodiscard]] bool wide() const { return wide_; }
   // What coarse levels have still to tell waits for the next cycle.
-  void end_contact() noexcept { step_ = 0; }
+  void end_contact() noexcept { step_ = plane_ = 0; }
 
   // The same in boxes wide enough for tissue that has spacings to go, for a thread that has the time for it:
   // 2.5 ms where a whole cycle of 10^6 voxels takes 50. What limits hold is let go of first: while most of
@@ -120,13 +122,13 @@ class Relaxation {
   // lost.
   [[nodiscard]] std::size_t rows_to_drop() const noexcept { return multigrid_.rows_to_drop(); }
   void drop_coarse() noexcept {
-    step_ = 0;
+    end_contact();
     multigrid_.drop_coarse();
   }
   // What it found is taken from here on; with that residual (N).
   void take_over(double residual_N) noexcept {
     away_ = false;
-    step_ = 0;
+    end_contact();
     residual_N_ = residual_N;
     multigrid_.begin_anew();
     multigrid_.release_limited();
@@ -196,21 +198,31 @@ class Relaxation {
     enum What : std::uint8_t { smooths, passes_on, solves, tells, smooths_after } what;
   };
   [[nodiscard]] Step step_of(int n) const noexcept;
+  // All but the coarsest level's may be done by planes along z, first … last of the box, beginning with 0.
+  struct Planes {
+    int first = 0, last = 0;
+  };
+  static constexpr Planes kAllPlanes{0, 1 << 24};
+  [[nodiscard]] int planes_of_step(int n) const noexcept;
   [[nodiscard]] int steps() const noexcept { return 4 * last_level() + 1; }
   void cycle(Displacement& state, const ObstacleView& obstacles, Look look) noexcept {
     run_steps_over(0, steps(), state, obstacles, look);
   }
-  void step(int n, Displacement& state, const ObstacleView& obstacles, Look look, bool smoothed) noexcept;
+  void step(int n, Planes planes, Displacement& state, const ObstacleView& obstacles, Look look,
+            bool smoothed) noexcept;
   std::size_t run_steps(Displacement& state, const ObstacleView& obstacles, std::size_t at_once) noexcept;
   [[nodiscard]] std::size_t work_of_step(int n) const noexcept;
-  void pass_on(int level, Displacement& state, const ObstacleView& obstacles, Look look) noexcept;
+  [[nodiscard]] std::size_t work_of_planes(int n, int first) const noexcept;  // of it, from that plane on
+  void pass_on(int level, Displacement& state, const ObstacleView& obstacles, Look look,
+               Planes planes) noexcept;
   void fetch_ahead_below(int level, RowId row, const Displacement& state) const noexcept;
-  void smooth_box(int level, int first_colour, Displacement& state, const ObstacleView& obstacles,
-                  Look look) noexcept;
-  void tell_box(int level, Displacement& state, const ObstacleView& obstacles) noexcept;
+  void smooth_box(int level, int first_colour, Displacement& state, const ObstacleView& obstacles, Look look,
+                  Planes planes) noexcept;
+  void tell_box(int level, Displacement& state, const ObstacleView& obstacles, Planes planes) noexcept;
+  bool mark_tellers(int level, Displacement& state, const ObstacleView& obstacles) noexcept;
   void run_steps_over(int first, int last, Displacement& state, const ObstacleView& obstacles,
                       Look look) noexcept {
-    for (int n = first; n < last; ++n) step(n, state, obstacles, look, false);
+    for (int n = first; n < last; ++n) step(n, kAllPlanes, state, obstacles, look, false);
   }
   [[nodiscard]] bool restrict_due(int level, RowId row) const noexcept;
   template <class Visit>
@@ -241,7 +253,10 @@ class Relaxation {
   NearRows near_;
   bool contact_relaxed_ = false;  // since run() last was
   bool wide_ = false;
+  double narrow_share_ = 1.0;
   int step_ = 0;                // the next one of a cycle round the contact, with its boxes in boxes_
+  int plane_ = 0;               // … and the next plane of that
+  bool any_tell_ = false;       // has a level of it anything to tell?
   bool smoothed_ = false;       // and on its way down nothing is smoothed
   bool unkept_ = false;         // some link is beyond what it keeps
   bool keeping_ = false;        // it is kept now

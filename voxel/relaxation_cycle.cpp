@@ -144,8 +144,9 @@ std::size_t Relaxation::work_of_step(int n) const noexcept {
 // planes, the other colour one behind, while what it reads is still in the cache. (The same bits as one
 // colour after the other: along x a row has neighbours of its own colour only, which come in the same order.)
 void Relaxation::smooth_box(int level, int first_colour, Displacement& state, const ObstacleView& obstacles,
-                            Look look) noexcept {
+                            Look look, Planes planes) noexcept {
   const RowBox& all = boxes(level).smoothed;
+  const int first = all.k0 + planes.first, last = std::min(all.k0 + planes.last, all.k1);
   const RowId next_plane = multigrid_.grid(level).row_z;  // the planes before it are in the cache
   const auto smooth = [&](const RowBox& plane, int colour) {
     for_rows(level, plane, [&](RowId row, OctetSpan span, int j, int k) {
@@ -162,12 +163,14 @@ void Relaxation::smooth_box(int level, int first_colour, Displacement& state, co
     RowBox plane = all;
     plane.q0 = std::max(all.q0, c * kOctets);
     plane.q1 = std::min(all.q1, c * kOctets + kOctets - 1);
-    for (int k = all.k0; k <= all.k1 + 1; ++k) {
+    for (int k = first; k <= last; ++k) {
       plane.k0 = plane.k1 = k;
-      if (k <= all.k1) smooth(plane, first_colour);
+      smooth(plane, first_colour);
       plane.k0 = plane.k1 = k - 1;
       if (k > all.k0) smooth(plane, 1 - first_colour);
     }
+    plane.k0 = plane.k1 = all.k1;
+    if (last == all.k1) smooth(plane, 1 - first_colour);
   }
 }
 
@@ -175,7 +178,19 @@ void Relaxation::smooth_box(int level, int first_colour, Displacement& state, co
 // it. Those beside it go along, however little they have to tell: nobody brings what they hold to rest, but
 // the box would feel it if they stayed behind, four times as much on each coarser level. (Letting those with
 // less than 2e-4 spacings to tell wait was rejected: energy grew without end where tissue hangs by little.)
-void Relaxation::tell_box(int level, Displacement& state, const ObstacleView& obstacles) noexcept {
+void Relaxation::tell_box(int level, Displacement& state, const ObstacleView& obstacles,
+                          Planes planes) noexcept {
+  if (planes.first == 0) any_tell_ = mark_tellers(level, state, obstacles);
+  if (!any_tell_) return;
+  const LevelBoxes& b = boxes(level + 1);
+  const RowBox& t = boxes(level).told;
+  multigrid_.tell(level,
+                  {t.q0, t.q1, t.j0, t.j1, t.k0, t.k1, b.first_teller, b.last_teller, t.k0 + planes.first,
+                   std::min(t.k0 + planes.last, t.k1)},
+                  state, obstacles, tells_jointly_);
+}
+
+bool Relaxation::mark_tellers(int level, Displacement& state, const ObstacleView& obstacles) noexcept {
   const LevelBoxes& b = boxes(level + 1);
   bool any = false;
   for_rows(level + 1, b.tellers, [&](RowId row, OctetSpan span, int, int) {
@@ -192,10 +207,7 @@ void Relaxation::tell_box(int level, Displacement& state, const ObstacleView& ob
     multigrid_.mark(level + 1, row, Multigrid::telling);
     any = true;
   });
-  if (!any) return;
-  const RowBox& t = boxes(level).told;
-  multigrid_.tell(level, {t.q0, t.q1, t.j0, t.j1, t.k0, t.k1, b.first_teller, b.last_teller}, state,
-                  obstacles, tells_jointly_);
+  return any;
 }
 
 // Was anything that a coarse row holds moved since it was passed on?
@@ -205,36 +217,62 @@ bool Relaxation::restrict_due(int level, RowId row) const noexcept {
                      [&](RowId child) { return multigrid_.has(level - 1, child, Multigrid::dirty); });
 }
 
-void Relaxation::step(int n, Displacement& state, const ObstacleView& obstacles, Look look,
+std::size_t Relaxation::work_of_planes(int n, int first) const noexcept {
+  const auto planes = static_cast<std::size_t>(planes_of_step(n));
+  return work_of_step(n) * (planes - static_cast<std::size_t>(first)) / planes;
+}
+
+int Relaxation::planes_of_step(int n) const noexcept {
+  const Step step = step_of(n);
+  const LevelBoxes& b = boxes_[static_cast<std::size_t>(step.level)];
+  switch (step.what) {
+    case Step::smooths:
+    case Step::smooths_after:
+      return std::max(1, b.smoothed.k1 - b.smoothed.k0 + 1);
+    case Step::passes_on: {
+      const RowBox& parents = boxes_[static_cast<std::size_t>(step.level) + 1].parents;
+      return std::max(1, parents.k1 - parents.k0 + 1);
+    }
+    case Step::tells:
+      return std::max(1, b.told.k1 - b.told.k0 + 1);
+    case Step::solves:
+      break;
+  }
+  return 1;
+}
+
+void Relaxation::step(int n, Planes planes, Displacement& state, const ObstacleView& obstacles, Look look,
                       bool smoothed) noexcept {
   const Step step = step_of(n);
   // What coarse levels know and finer ones do not is told first: a step between voxels that were told and
   // others that were not would look like a force to the cells above it.
-  for (int l = last_level() - 1; n == 0 && l >= 0; --l) tell_box(l, state, obstacles);
+  for (int l = last_level() - 1; n == 0 && planes.first == 0 && l >= 0; --l)
+    tell_box(l, state, obstacles, kAllPlanes);
   const WholeParts::Box box = cells(boxes(step.level).smoothed);
+  const bool ends = planes.last >= planes_of_step(n) - 1;
   switch (step.what) {
     case Step::smooths:
       if (smoothed) break;
-      smooth_box(step.level, 0, state, obstacles, look);
-      multigrid_.smooth_parts(step.level, box, state, obstacles);
+      smooth_box(step.level, 0, state, obstacles, look, planes);
+      if (ends) multigrid_.smooth_parts(step.level, box, state, obstacles);
       break;
     case Step::passes_on:
-      pass_on(step.level, state, obstacles, look);
+      pass_on(step.level, state, obstacles, look, planes);
       break;
     case Step::solves: {
       const int sweeps = apart_ ? kContactSweeps : kCoarsestSweeps;
       for (int k = 0; k < sweeps; ++k) {
-        smooth_box(step.level, 0, state, obstacles, look);
+        smooth_box(step.level, 0, state, obstacles, look, kAllPlanes);
         multigrid_.smooth_parts(step.level, box, state, obstacles);
       }
       break;
     }
     case Step::tells:
-      tell_box(step.level, state, obstacles);
+      tell_box(step.level, state, obstacles, planes);
       break;
     case Step::smooths_after:
-      smooth_box(step.level, 1, state, obstacles, look);
-      multigrid_.smooth_parts(step.level, box, state, obstacles);
+      smooth_box(step.level, 1, state, obstacles, look, planes);
+      if (ends) multigrid_.smooth_parts(step.level, box, state, obstacles);
   }
 }
 
@@ -249,15 +287,20 @@ void Relaxation::fetch_ahead_below(int level, RowId row, const Displacement& sta
   }
 }
 
-void Relaxation::pass_on(int l, Displacement& state, const ObstacleView& obstacles, Look look) noexcept {
+void Relaxation::pass_on(int l, Displacement& state, const ObstacleView& obstacles, Look look,
+                         Planes planes) noexcept {
+  const bool begins = planes.first == 0;
   // Before forces are summed, so that what is called the residual is that of links that yield.
-  if (l == 0 && lattice_.yields()) {
+  if (l == 0 && lattice_.yields() && begins) {
     for_rows(0, boxes(0).smoothed, [&](RowId row, OctetSpan, int, int) {
       if (look == Look::all || multigrid_.has(0, row, Multigrid::active | Multigrid::dirty))
         unkept_ = multigrid_.yield(row, state, false) || unkept_;
     });
   }
-  const RowBox& parents = boxes(l + 1).parents;
+  const RowBox& all = boxes(l + 1).parents;
+  RowBox parents = all;
+  parents.k0 = all.k0 + planes.first;
+  parents.k1 = std::min(all.k0 + planes.last, all.k1);
   const Grid& g = multigrid_.grid(l + 1);
   for_rows(l + 1, parents, [&](RowId row, OctetSpan span, int, int) {
     if (look == Look::active) {
@@ -270,7 +313,10 @@ void Relaxation::pass_on(int l, Displacement& state, const ObstacleView& obstacl
     // Apart, coarse cells hold only what was moved since all was balanced, and know that from themselves.
     if (!apart_) multigrid_.restrict_values(l + 1, row, state, span);
   });
-  const float of_parts = multigrid_.measure_parts(l, cells(boxes(l).smoothed), state, obstacles);
+  if (begins) {
+    const float of_parts = multigrid_.measure_parts(l, cells(boxes(l).smoothed), state, obstacles);
+    if (l == 0) running_residual_N_ = std::max(running_residual_N_, static_cast<double>(of_parts));
+  }
   for_rows(l + 1, parents, [&](RowId row, OctetSpan span, int j, int) {
     if (look == Look::active) {
       if (!multigrid_.has(l + 1, row, Multigrid::renewed)) return;
@@ -280,10 +326,9 @@ void Relaxation::pass_on(int l, Displacement& state, const ObstacleView& obstacl
     const float worst = multigrid_.restrict_loads(l + 1, row, state, obstacles, span);
     if (l == 0) running_residual_N_ = std::max(running_residual_N_, static_cast<double>(worst));
   });
-  multigrid_.load_parts(l + 1, cells(parents));
-  if (l > 0) return;
-  running_residual_N_ = std::max(running_residual_N_, static_cast<double>(of_parts));
-  multigrid_.renew_holds();
+  if (parents.k1 < all.k1) return;
+  multigrid_.load_parts(l + 1, cells(all));
+  if (l == 0) multigrid_.renew_holds();
 }
 
 void Relaxation::lay_whole_boxes() noexcept {
@@ -327,7 +372,7 @@ void Relaxation::relax_round_parts(Displacement& state, const ObstacleView& obst
 void Relaxation::tell_all(Displacement& state, const ObstacleView& obstacles) noexcept {
   lay_whole_boxes();
   tells_jointly_ = true;
-  for (int l = last_level() - 1; l >= 0; --l) tell_box(l, state, obstacles);
+  for (int l = last_level() - 1; l >= 0; --l) tell_box(l, state, obstacles, kAllPlanes);
   tells_jointly_ = false;
 }
 

@@ -450,7 +450,7 @@ bool SoftObject::cycle_due() const noexcept {
   if (to_go < kSettled || cycles_since_touch_ == kMostCycles) return false;
   const bool in_parts = relaxation_.left_to_another() && wide_cycle_;
   if (to_go >= kJump && !in_parts && !rests_) return true;
-  if (cycles_since_touch_ > 0) return in_parts ? left_of(kContactWork) >= kLeastWork : !wide_cycle_;
+  if (cycles_since_touch_ > 0) return in_parts ? left_of(kContactWork) >= shared(kLeastWork) : !wide_cycle_;
   // What was let go of has this tick only.
   return !rests_ || !any_pressed();
 }
@@ -588,8 +588,12 @@ std::size_t SoftObject::list_held() noexcept {
   return pressed;
 }
 
+std::size_t SoftObject::shared(std::size_t work) const noexcept {
+  return static_cast<std::size_t>(work_share_ * static_cast<double>(work));
+}
+
 std::size_t SoftObject::left_of(std::size_t work) const noexcept {
-  const std::size_t all = cold_ticks_ > 0 ? kColdWork : work;
+  const std::size_t all = shared(cold_ticks_ > 0 ? kColdWork : work);
   return all - std::min(all, contact_work_);
 }
 

@@ -115,6 +115,13 @@ class SoftObject {
   // Was there, since touch(), a wide cycle round the contact, or a part of one? What it leaves of a tick, as
   // Relaxation counts work.
   [[nodiscard]] bool wide_cycle() const { return wide_cycle_; }
+  // Of the counted work that a tick has for its contact, where another relaxes the object: 1, all of it, or
+  // less, for a machine on which that takes too long. What is not done in one tick is in the next ones.
+  void set_work_share(double share) noexcept {
+    work_share_ = share;
+    relaxation_.set_narrow_share(share);
+  }
+  [[nodiscard]] double work_share() const { return work_share_; }
   [[nodiscard]] std::size_t work_left() const noexcept;
   // Is the tool pressed into it, wide enough for cycles in parts, and hardly moves? A voxel that slips, or a
   // result on its way, is no motion.
@@ -288,6 +295,7 @@ class SoftObject {
   std::size_t list_held() noexcept;
   [[nodiscard]] bool any_pressed() const noexcept;
   [[nodiscard]] bool cycle_due() const noexcept;
+  [[nodiscard]] std::size_t shared(std::size_t work) const noexcept;
   [[nodiscard]] std::size_t left_of(std::size_t work) const noexcept;  // of a tick's; less while all is cold
   // From rest, all three: on the way to `place` no deeper in the tool than it is now; on the tool and within
   // its links' limits; where a touched voxel belongs.
@@ -382,7 +390,8 @@ class SoftObject {
   std::size_t contact_work_ = 0;            // since touch(), of cycles round the contact …
   int cycles_since_touch_ = 0;              // of which there were so many
   int cold_ticks_ = 0;                      // for which what is near the contact is in no cache
-  bool wide_cycle_ = false;                 // one of those cycles was wide
+  double work_share_ = 1.0;
+  bool wide_cycle_ = false;  // one of those cycles was wide
   bool asked_to_rest_ = false;
   bool rests_ = false;     // none of them is begun now, if that can wait
   bool dragging_ = false;  // sources_ are what drag() moved, moves_ where they were

@@ -10,6 +10,8 @@
 #include <glm/geometric.hpp>
 #include <sstream>
 
+#include "hybrid/denormals.h"
+#include "hybrid/work_share.h"
 #include "polygon/mesh_file.h"
 #include "polygon/primitives.h"
 #include "scene_file_fixture.h"
@@ -43,6 +45,7 @@ Recording record(const std::filesystem::path& file, std::optional<double> second
           .device = hybrid::scene_limits(scene),
           .relax_apart = apart,
           .state_hash = result.state_hash,
+          .start_m = result.start_m,
           .ticks = result.recording};
 }
 
@@ -112,6 +115,112 @@ TEST_F(RecordingFile, WithTheRelaxationThreadItIsTheSameToTheBit) {
   }
 }
 
+// A device that moves on between the beginning of a session and its first tick, as one does whose first tick
+// comes late.
+class MovesOn final : public device::HapticDevice {
+ public:
+  explicit MovesOn(std::shared_ptr<const device::Path> path) : path_(std::move(path)) {}
+  [[nodiscard]] device::DeviceState read() noexcept override {
+    const double late_s = reads_++ == 0 ? 0.0 : 0.019;
+    return {.position_m = path_->position(t_s_ + late_s)};
+  }
+  void write(const glm::dvec3& /*force_N*/, double dt_s) noexcept override { t_s_ += dt_s; }
+  [[nodiscard]] device::DeviceLimits limits() const noexcept override { return {.max_force_N = 8.0}; }
+  [[nodiscard]] std::string_view name() const noexcept override { return "moves on"; }
+
+ private:
+  std::shared_ptr<const device::Path> path_;
+  double t_s_ = 0.0;
+  int reads_ = 0;
+};
+
+TEST_F(RecordingFile, AFirstTickThatComesLateIsNoMatter) {
+  const auto file = small_scene();
+  const hybrid::Scene scene = hybrid::load_scene(file);
+  hybrid::BuiltScene built = hybrid::build_scene(scene);
+  MovesOn hand(hybrid::scene_path(scene));
+  hybrid::SessionOptions options;
+  options.real_device = &hand;
+  options.relax_apart = true;
+  options.seconds = 0.8;
+  const hybrid::SessionResult result = hybrid::run_session(scene, built, options);
+  EXPECT_NE(result.start_m, result.recording.front().device_m);
+  const Recording recorded{.scene_file = file,
+                           .scene_text = read(file),
+                           .dt_s = result.dt_s,
+                           .device = hybrid::scene_limits(scene),
+                           .relax_apart = true,
+                           .state_hash = result.state_hash,
+                           .start_m = result.start_m,
+                           .ticks = result.recording};
+  hybrid::save_recording(folder_ / "a.rec", recorded);
+  const hybrid::ReplayResult again = hybrid::replay(hybrid::load_recording(folder_ / "a.rec"), {});
+  EXPECT_TRUE(again.equal) << "parts at tick " << again.parts_at;
+}
+
+// So is how much of its work a tick had, which in real time follows the machine.
+TEST_F(RecordingFile, TheShareOfWorkThatTicksHadIsOnRecord) {
+  Recording recorded = record(tests::source_folder / "scenes" / "tissue.toml", std::nullopt, true);
+  const hybrid::Scene scene = hybrid::load_scene(recorded.scene_file);
+  const hybrid::BuiltScene built = hybrid::build_scene(scene);
+  hybrid::begin_session(scene, *built.world, *built.state, recorded.start_m);
+  hybrid::relax_apart(*built.state, hybrid::Arrival::recorded);
+  std::uint64_t hash = hybrid::kHashBegin;
+  {
+    const hybrid::FlushedDenormals flushed;
+    for (std::size_t n = 0; n < recorded.ticks.size(); ++n) {
+      hybrid::RecordedTick& tick = recorded.ticks[n];
+      tick.work_share = static_cast<std::uint8_t>(n / 40 % (hybrid::WorkShare::kMostSteps + 1));
+      hybrid::play_again(tick, *built.state);
+      hash = hybrid::hash_tick(hash, hybrid::haptic_tick(*built.world, *built.state,
+                                                         {.position_m = tick.device_m}, recorded.dt_s));
+      tick.hash = hash;
+    }
+  }
+  recorded.state_hash = hybrid::hash_state(hash, *built.state);
+  hybrid::save_recording(folder_ / "a.rec", recorded);
+  const Recording loaded = hybrid::load_recording(folder_ / "a.rec");
+  const hybrid::ReplayResult result = hybrid::replay(loaded, {});
+  EXPECT_TRUE(result.equal) << "parts at tick " << result.parts_at;
+  EXPECT_EQ(result.state_hash, recorded.state_hash);
+  for (hybrid::RecordedTick& tick : recorded.ticks) tick.work_share = 0;
+  EXPECT_FALSE(hybrid::replay(recorded, {}).equal);
+}
+
+TEST(WorkShare, FollowsWhatTicksTake) {
+  hybrid::WorkShare share(1e-3);
+  const auto felt = [&share](int ticks, double tick_us, bool pressed) {
+    for (int n = 0; n < ticks; ++n) share.felt(tick_us, pressed);
+    return static_cast<int>(share.steps());
+  };
+  EXPECT_EQ(felt(1000, 390.0, true), 0);
+  // Late: less at once, the sooner the later it was, and no less than a third.
+  EXPECT_EQ(felt(1, 450.0, true), 1);
+  EXPECT_EQ(felt(1, 800.0, true), 3);
+  EXPECT_EQ(felt(100, 5000.0, true), hybrid::WorkShare::kMostSteps);
+  EXPECT_NEAR(hybrid::WorkShare::share(share.steps()), 0.354, 1e-3);
+  // More again slowly, only where tissue is pressed, and only where there is room for it.
+  EXPECT_EQ(felt(10'000, 30.0, false), hybrid::WorkShare::kMostSteps);
+  EXPECT_EQ(felt(10'000, 350.0, true), hybrid::WorkShare::kMostSteps);
+  EXPECT_EQ(felt(59, 250.0, true), hybrid::WorkShare::kMostSteps);
+  EXPECT_EQ(felt(1, 250.0, true), hybrid::WorkShare::kMostSteps - 1);
+  EXPECT_EQ(felt(2000, 250.0, true), 0);
+}
+
+// A machine whose ticks take as long as their work does not go to and fro: what ticks take is in between.
+TEST(WorkShare, ComesToRestOnAMachineOfAnySpeed) {
+  for (const double slow : {0.5, 1.0, 2.0, 2.5}) {
+    hybrid::WorkShare share(1e-3);
+    int late = 0;
+    for (int n = 0; n < 20'000; ++n) {
+      const double tick_us = slow * (100.0 + 250.0 * hybrid::WorkShare::share(share.steps()));
+      if (tick_us > 500.0) ++late;
+      share.felt(tick_us, true);
+    }
+    EXPECT_LE(late, 5) << slow;
+  }
+}
+
 // All that goes from tick to tick besides tissue: a body on a path and one that is pushed, friction, shading,
 // damping and a relief, on meshes and primitives.
 TEST_F(RecordingFile, WithMotionAndSurfaceFeelItIsTheSameToTheBit) {
@@ -177,7 +286,7 @@ TEST_F(RecordingFile, WithPassivityControlDelayAndLateTicksItIsTheSameToTheBit) 
   // Ticks that came late, and a device that was gone for a while, are inputs.
   Recording faulty = record(file, std::nullopt);
   hybrid::BuiltScene again = hybrid::build_scene(scene);
-  hybrid::begin_session(scene, *again.world, *again.state, faulty.ticks.front().device_m);
+  hybrid::begin_session(scene, *again.world, *again.state, faulty.start_m);
   std::uint64_t hash = hybrid::kHashBegin;
   for (std::size_t n = 0; n < faulty.ticks.size(); ++n) {
     auto& tick = faulty.ticks[n];
