@@ -349,6 +349,7 @@ void expect_replays(const std::filesystem::path& file, double seconds) {
                                                        .device = hybrid::scene_limits(scene),
                                                        .relax_apart = true,
                                                        .state_hash = felt.state_hash,
+                                                       .start_m = felt.start_m,
                                                        .ticks = felt.recording},
                                                       {});
     EXPECT_TRUE(again.equal) << "parts at tick " << again.parts_at << (realtime ? ", in real time" : "");

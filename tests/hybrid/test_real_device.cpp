@@ -57,6 +57,7 @@ class RealDevice : public tests::SceneFile {
             .dt_s = played.result.dt_s,
             .device = hybrid::scene_limits(played.scene),
             .state_hash = played.result.state_hash,
+            .start_m = played.result.start_m,
             .ticks = played.result.recording};
   }
 
