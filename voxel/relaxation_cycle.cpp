@@ -302,7 +302,8 @@ void Relaxation::pass_on(int l, Displacement& state, const ObstacleView& obstacl
   parents.k0 = all.k0 + planes.first;
   parents.k1 = std::min(all.k0 + planes.last, all.k1);
   const Grid& g = multigrid_.grid(l + 1);
-  for_rows(l + 1, parents, [&](RowId row, OctetSpan span, int, int) {
+  // All of them before any load: a row's load is that of its neighbours where they are, too.
+  for_rows(l + 1, begins ? all : RowBox{}, [&](RowId row, OctetSpan span, int, int) {
     if (look == Look::active) {
       if (!restrict_due(l + 1, row)) return;
       // The load holds a row where it is beside its neighbours where they are.
