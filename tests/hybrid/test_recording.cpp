@@ -27,6 +27,18 @@ std::string read(const std::filesystem::path& file) {
   return text.str();
 }
 
+Recording recording_of(const std::filesystem::path& file, const hybrid::Scene& scene,
+                       const hybrid::SessionResult& result, bool apart) {
+  return {.scene_file = file,
+          .scene_text = read(file),
+          .dt_s = result.dt_s,
+          .device = hybrid::scene_limits(scene),
+          .relax_apart = apart,
+          .state_hash = result.state_hash,
+          .start_m = result.start_m,
+          .ticks = result.recording};
+}
+
 Recording record(const std::filesystem::path& file, std::optional<double> seconds, bool apart = false,
                  bool realtime = false) {
   const hybrid::Scene scene = hybrid::load_scene(file);
@@ -39,14 +51,7 @@ Recording record(const std::filesystem::path& file, std::optional<double> second
   const hybrid::SessionResult result = hybrid::run_session(scene, built, options);
   EXPECT_GT(result.contact_ticks, 50U);
   EXPECT_GE(result.relaxed_apart, apart ? 10U : 0U);
-  return {.scene_file = file,
-          .scene_text = read(file),
-          .dt_s = result.dt_s,
-          .device = hybrid::scene_limits(scene),
-          .relax_apart = apart,
-          .state_hash = result.state_hash,
-          .start_m = result.start_m,
-          .ticks = result.recording};
+  return recording_of(file, scene, result, apart);
 }
 
 class RecordingFile : public tests::SceneFile {
@@ -145,15 +150,7 @@ TEST_F(RecordingFile, AFirstTickThatComesLateIsNoMatter) {
   options.seconds = 0.8;
   const hybrid::SessionResult result = hybrid::run_session(scene, built, options);
   EXPECT_NE(result.start_m, result.recording.front().device_m);
-  const Recording recorded{.scene_file = file,
-                           .scene_text = read(file),
-                           .dt_s = result.dt_s,
-                           .device = hybrid::scene_limits(scene),
-                           .relax_apart = true,
-                           .state_hash = result.state_hash,
-                           .start_m = result.start_m,
-                           .ticks = result.recording};
-  hybrid::save_recording(folder_ / "a.rec", recorded);
+  hybrid::save_recording(folder_ / "a.rec", recording_of(file, scene, result, true));
   const hybrid::ReplayResult again = hybrid::replay(hybrid::load_recording(folder_ / "a.rec"), {});
   EXPECT_TRUE(again.equal) << "parts at tick " << again.parts_at;
 }
