@@ -343,16 +343,20 @@ std::size_t Relaxation::run_thoroughly(Displacement& state, const ObstacleView& 
   multigrid_.release_limited();
   lay_whole_boxes();
   tells_jointly_ = true;
+  run_coarse_first(state, obstacles);
+  tells_jointly_ = false;
+  return octets_of_cycle();
+}
+
+void Relaxation::run_coarse_first(Displacement& state, const ObstacleView& obstacles) noexcept {
   multigrid_.pass_on_all(true);
   const int first_coarse = 2;         // level 1 is smoothed
   const int of_voxels = steps() - 2;  // they are told
   run_steps_over(0, of_voxels, state, obstacles, Look::all);
   for (int n = 0; n < kCoarseCycles; ++n)
     run_steps_over(first_coarse, of_voxels, state, obstacles, Look::all);
-  run_steps_over(of_voxels, steps(), state, obstacles, Look::all);
+  run_steps_over(of_voxels, of_voxels + 1, state, obstacles, Look::all);
   multigrid_.pass_on_all(false);
-  tells_jointly_ = false;
-  return octets_of_cycle();
 }
 
 void Relaxation::relax_round_parts(Displacement& state, const ObstacleView& obstacles) noexcept {
@@ -368,13 +372,6 @@ void Relaxation::relax_round_parts(Displacement& state, const ObstacleView& obst
     lay_boxes(low, high, kNoContact, 0);
     cycle(state, obstacles, Look::all);
   }
-}
-
-void Relaxation::tell_all(Displacement& state, const ObstacleView& obstacles) noexcept {
-  lay_whole_boxes();
-  tells_jointly_ = true;
-  for (int l = last_level() - 1; l >= 0; --l) tell_box(l, state, obstacles, kAllPlanes);
-  tells_jointly_ = false;
 }
 
 void Relaxation::renew_coarse(Displacement& state, const ObstacleView& obstacles) noexcept {

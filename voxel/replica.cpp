@@ -24,7 +24,7 @@ constexpr std::size_t kMostAtOnce = 1000;  // rows that a tick adds at once; a w
 constexpr int kContactCycles = 4, kUnsettled = 4;
 // … and round a part without slack that is pressed. (A whole cycle leaves 0.43 of the force's error at such a
 // part.)
-constexpr int kPartCycles = 4;
+constexpr int kPartCycles = 4, kFirstPartCycles = 2;
 constexpr double kMoved = 0.1;
 // Far from the contact only what changed by so many times as much as rows are left alone with (1e-4 of the
 // spacing) is passed on, and the rest once all is at rest. Within so many rows of it everything is, and so is
@@ -38,12 +38,13 @@ constexpr float kFollows = 0.01F;
 // results of a jump, with 8 and 4 by 2 %, with these after three.
 constexpr int kTurns = 16, kTurnsAtOnce = 8;
 // Tissue that moved by as many spacings from one result to the next is far from all that is known of it. So
-// many results are then of so many cycles in wide boxes. In the first all else is told what these know, and
-// then there are as many again: where it stayed behind it would hold back what is in the boxes (by 17 % of
-// the force, where links are at their limits). Where a part without slack is pressed, there is one, which is
-// thorough: no box is wide enough. No bricks meanwhile: of tissue on its way they know little.
+// many results are then of so many cycles in wide boxes. In the first coarse levels come to rest first, what
+// is further away is told what they know, and then there are as many again: where it stayed behind it would
+// hold back what is in the boxes (by 17 % of the force, where links are at their limits). Where a part
+// without slack is pressed, there is one, which is thorough: no box is wide enough. No bricks meanwhile: of
+// tissue on its way they know little.
 constexpr float kJumped = 5.0F;
-constexpr int kQuickResults = 3, kWideCycles = 4;
+constexpr int kQuickResults = 3, kWideCycles = 4, kLastWideCycles = 3;
 constexpr std::size_t kAhead = 4;  // rows that are fetched before their turn
 constexpr std::size_t kRowBytes = kRow * sizeof(float);
 constexpr std::size_t kOctetsOfRow = 12;  // a whole cycle smooths and tells as many of a row
@@ -191,28 +192,25 @@ void Replica::open_given() noexcept {
 
 void Replica::relax_quickly(const ObstacleView& obstacles) noexcept {
   std::size_t octets = 0;
+  const bool first = quick_ == kQuickResults;
+  --quick_;
   if (part_pressed_) {
     octets = relaxation_.run_thoroughly(state_, obstacles, held_);
-    for (int n = 0; n < kPartCycles; ++n) relaxation_.relax_round_parts(state_, obstacles);
-    --quick_;
+    for (int n = 0; n < kFirstPartCycles; ++n) relaxation_.relax_round_parts(state_, obstacles);
     work_ = octets / kOctetsOfRow;
     return;
   }
-  const auto relax = [&] {
-    for (int n = 0; n < kWideCycles; ++n)
-      octets += relaxation_.relax_widely(state_, obstacles, held_, {held_.data(), given_pressed_});
-  };
-  relax();
-  std::size_t told = 0;
-  if (quick_ == kQuickResults) {
-    relaxation_.tell_all(state_, obstacles);
-    told = multigrid().log().count();
-    relax();
+  const std::span<const VoxelId> pressed{held_.data(), given_pressed_};
+  if (first) {
+    octets += relaxation_.relax_widely(state_, obstacles, held_, pressed, true);
+    octets += relaxation_.tell_widely(state_, obstacles, pressed);
   }
-  // Not after the last: a whole round comes next, which ends with it. (After that, too, was no nearer.)
-  if (quick_ > 1) relaxation_.relax_limited(state_, obstacles);
-  --quick_;
-  work_ = octets / kOctetsOfRow + told / 3;  // telling is a third of it
+  for (int n = 0; n < (quick_ > 0 ? kWideCycles : kLastWideCycles); ++n)
+    octets += relaxation_.relax_widely(state_, obstacles, held_, pressed, false);
+  // Not after the last, which a whole round comes after that ends with it; nor in the first, after which the
+  // tool presses other voxels. (In all three it was no nearer, in two as near.)
+  if (!first && quick_ > 0) relaxation_.relax_limited(state_, obstacles);
+  work_ = octets / kOctetsOfRow;
 }
 
 void Replica::relax() noexcept {

@@ -33,18 +33,31 @@ struct TightRows::Gathering {
   // (By their own links its voxels are pulled this way and that, and an inclusion between the tool and the
   // anchors, in tissue at its limits, ended what hangs on the tool: half of the force was lost.)
   void pull_as_parts(const Displacement& state, RowId row, int axis, LinksAtLimits& links) {
+    std::uint32_t of_parts = 0, up = 0, down = 0;
+    std::uint16_t last = 0;  // most rows have one
+    double pull = 0.0;
     for (VoxelId lane = 0; lane < kRow; ++lane) {
       const std::uint16_t number = multigrid->parts().of(0, row * kRow + lane);
       if (number == 0) continue;
-      const std::size_t part = number - 1U;
-      if (!known[part]) {
-        known.set(part);
-        pull_N[part] = multigrid->part_force(part, state)[axis];
+      if (number != last) {
+        last = number;
+        pull = pull_of(number - 1U, state, axis);
       }
       const std::uint32_t bit = 1U << lane;
-      links.pulled_up = pull_N[part] > 0.0 ? links.pulled_up | bit : links.pulled_up & ~bit;
-      links.pulled_down = pull_N[part] < 0.0 ? links.pulled_down | bit : links.pulled_down & ~bit;
+      of_parts |= bit;
+      up |= pull > 0.0 ? bit : 0U;
+      down |= pull < 0.0 ? bit : 0U;
     }
+    links.pulled_up = (links.pulled_up & ~of_parts) | up;
+    links.pulled_down = (links.pulled_down & ~of_parts) | down;
+  }
+
+  double pull_of(std::size_t part, const Displacement& state, int axis) {
+    if (!known[part]) {
+      known.set(part);
+      pull_N[part] = multigrid->part_force(part, state)[axis];
+    }
+    return pull_N[part];
   }
 };
 
