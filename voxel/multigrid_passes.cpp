@@ -389,6 +389,7 @@ void Multigrid::tell(int level, const Told& box, Displacement& state, const Obst
 
 // What rows are told is added to what stands in none of the nearer caches: to wait for that was half of it.
 void Multigrid::fetch(int level, RowId row, const Displacement& state) const noexcept {
+  if (parts_ != nullptr && parts_->fill_known_row(level, row)) return;  // not looked at row by row
   for (const auto& axis : level == 0 ? state.u : at(level).value)
     fetch_lines(axis.data() + static_cast<std::size_t>(row) * kRow, kRow * sizeof(float));
 }

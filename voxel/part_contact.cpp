@@ -81,10 +81,11 @@ void SoftObject::relax_parts(const ToolInBody& tool) noexcept {
   for_touched_parts([&](std::uint16_t part) {
     const std::size_t p = part - 1U;
     // With what only hangs on it: where links are at their limits, that is what presses it on the tool.
-    const glm::dvec3 force = grid.part_force(p, state_) + hanging_on_part(p),
+    const Multigrid::PartRoom room = grid.room_of_part(p, state_);
+    const glm::dvec3 force = grid.part_force(p, state_) + hanging_on_part(p, room),
                      stiffness = grid.parts().on(0, p).stiffness;
     bound_part(tool, part, lattice_->max_spacing_m());
-    Multigrid::add_bounds(grid.room_of_part(p, state_), part_bounds_);
+    Multigrid::add_bounds(room, part_bounds_);
     bool was = false, is = false;
     glm::dvec3 way = move_within(force, stiffness, part_bounds_);
     for (Touch& t : touches_) {
@@ -115,21 +116,15 @@ bool SoftObject::any_pressed(std::uint16_t part) const noexcept {
                      [part](const Touch& t) { return t.part == part && t.pressed; });
 }
 
-// What pulls tissue that hangs on a part by links at their limits (N).
-glm::dvec3 SoftObject::hanging_on_part(std::size_t part) noexcept {
+// What pulls tissue that hangs on a part, which has so much room, by links at their limits (N).
+glm::dvec3 SoftObject::hanging_on_part(std::size_t part, const Multigrid::PartRoom& room) noexcept {
   const Multigrid& grid = relaxation_.multigrid();
   const double tight = kTightPart * lattice_->min_spacing_m();
-  const Multigrid::PartRoom room = grid.room_of_part(part, state_);
   glm::dvec3 force(0.0);
   for (int axis = 0; axis < 3; ++axis) {
     const auto& of_axis = room[static_cast<std::size_t>(axis)];
     if (of_axis[0] < -tight && of_axis[1] > tight) continue;
-    roots_.clear();
-    for (const WholeParts::Link& l : grid.parts().on(0, part).border) {
-      if (roots_.size() == roots_.capacity()) break;
-      if (roots_.empty() || roots_.back() != l.cell) roots_.push_back(l.cell);
-    }
-    tight_rows_.gather(relaxation_.couplings(), state_, roots_, axis, &grid);
+    tight_rows_.gather_on_part(relaxation_.couplings(), state_, grid, part, axis);
     force[axis] = tight_rows_.hanging(relaxation_.couplings()).force_N;
   }
   return force;

@@ -16,6 +16,8 @@ constexpr double kTouching = 1e-6;     // of the spacing: nearer to its obstacle
 constexpr double kRounding = 1.2e-7;   // the last bit of a float, of its value
 constexpr double kNearObstacle = 2.0;  // spacings: obstacles further away are not looked at
 
+constexpr std::uint32_t kAllLanes = ~std::uint32_t{0};
+
 // `visit(cell, lane)` for the cells of a part in a run.
 template <class Visit>
 void for_cells(const WholeParts::Run& run, const Visit& visit) {
@@ -29,14 +31,15 @@ double along(const Spring& spring, int axis, int d) {
   return static_cast<double>(spring.on(axis, d));
 }
 
-// How far the voxel of a part at a link's end may go on an axis before the link stops it.
-double room_at(const Lattice& lattice, const Displacement& state, const WholeParts::Link& l, int axis,
-               bool upwards) {
+// How far the voxel of a part at a link's end may go on an axis before the link stops it: {down, up}.
+std::array<double, 2> room_at(const Lattice& lattice, const Displacement& state, const WholeParts::Link& l,
+                              int axis) {
   const auto& u = state.u[static_cast<std::size_t>(axis)];
   const auto bounds = lattice.bounds(l.up ? l.cell : l.beside, l.d, axis);
   const float difference = l.up ? u[l.beside] - u[l.cell] : u[l.cell] - u[l.beside];
-  const float room = l.up == upwards ? difference - bounds[0] : bounds[1] - difference;
-  return std::max(0.0, static_cast<double>(room));
+  const auto closer = std::max(0.0, static_cast<double>(difference - bounds[0])),
+             apart = std::max(0.0, static_cast<double>(bounds[1] - difference));
+  return l.up ? std::array<double, 2>{apart, closer} : std::array<double, 2>{closer, apart};
 }
 
 // And how much further by taking along the voxel at its other end, as far as all other links of that let it.
@@ -105,25 +108,25 @@ glm::dvec3 Multigrid::part_force(std::size_t part, const Displacement& state) co
   return force;
 }
 
-// The least that links of the border leave it, `room(link, axis, upwards)`.
+// The least that links of the border leave it, `room(link, axis)`: {down, up}.
 template <class Room>
 Multigrid::PartRoom Multigrid::room_on_border(std::size_t part, const Room& room) const noexcept {
   constexpr double kFar = 1e30;
   PartRoom all{{{-kFar, kFar}, {-kFar, kFar}, {-kFar, kFar}}};
   for (const WholeParts::Link& l : parts_->on(0, part).border) {
     for (int axis = 0; axis < 3; ++axis) {
+      const std::array<double, 2> at_link = room(l, axis);
       auto& of_axis = all[static_cast<std::size_t>(axis)];
-      of_axis[0] = std::max(of_axis[0], -room(l, axis, false));
-      of_axis[1] = std::min(of_axis[1], room(l, axis, true));
+      of_axis[0] = std::max(of_axis[0], -at_link[0]);
+      of_axis[1] = std::min(of_axis[1], at_link[1]);
     }
   }
   return all;
 }
 
 Multigrid::PartRoom Multigrid::room_of_part(std::size_t part, const Displacement& state) const noexcept {
-  return room_on_border(part, [&](const WholeParts::Link& l, int axis, bool upwards) {
-    return room_at(lattice_, state, l, axis, upwards);
-  });
+  return room_on_border(
+      part, [&](const WholeParts::Link& l, int axis) { return room_at(lattice_, state, l, axis); });
 }
 
 void Multigrid::add_bounds(const PartRoom& room, std::vector<PartBound>& bounds) {
@@ -143,8 +146,13 @@ void Multigrid::shift_part(std::size_t part, const glm::dvec3& way, Displacement
     // All stand where the first does, to the last bit.
     const float to =
         static_cast<float>(static_cast<double>(state.u[axis][first]) + way[static_cast<int>(axis)]);
-    for (const WholeParts::Run& run : parts_->on(0, part).rows)
-      for_cells(run, [&](VoxelId v, std::uint32_t) { state.u[axis][v] = to; });
+    for (const WholeParts::Run& run : parts_->on(0, part).rows) {
+      if (run.lanes == kAllLanes) {
+        std::fill_n(state.u[axis].data() + std::size_t{run.row} * kRow, kRow, to);
+      } else {
+        for_cells(run, [&](VoxelId v, std::uint32_t) { state.u[axis][v] = to; });
+      }
+    }
   }
   for (const WholeParts::Run& run : parts_->on(0, part).rows) note_change(0, run.row, most);
 }
@@ -172,10 +180,12 @@ void Multigrid::stop_at_obstacles(std::size_t part, const Displacement& state, c
 // the way it is to go.
 Multigrid::PartRoom Multigrid::room_with_others(std::size_t part, const glm::dvec3& way,
                                                 const Displacement& state) const noexcept {
-  return room_on_border(part, [&](const WholeParts::Link& l, int axis, bool upwards) {
-    const double own = room_at(lattice_, state, l, axis, upwards);
-    if (own >= (upwards ? way[axis] : -way[axis])) return own;
-    return own + room_beside(lattice_, state, l.beside, static_cast<std::uint16_t>(part + 1), axis, upwards);
+  const auto number = static_cast<std::uint16_t>(part + 1);
+  return room_on_border(part, [&](const WholeParts::Link& l, int axis) {
+    std::array<double, 2> room = room_at(lattice_, state, l, axis);
+    if (room[0] < -way[axis]) room[0] += room_beside(lattice_, state, l.beside, number, axis, false);
+    if (room[1] < way[axis]) room[1] += room_beside(lattice_, state, l.beside, number, axis, true);
+    return room;
   });
 }
 
@@ -210,7 +220,7 @@ std::uint8_t Multigrid::add_what_comes_along(std::size_t part, const Displacemen
     for (int axis = 0; axis < 3; ++axis) {
       if (own[axis] == 0.0 || (stopped >> axis & 1U) != 0) continue;
       const bool upwards = own[axis] > 0.0;
-      if (room_at(lattice_, state, l, axis, upwards) >= tight) continue;
+      if (room_at(lattice_, state, l, axis)[upwards ? 1 : 0] >= tight) continue;
       if (room_beside(lattice_, state, l.beside, number, axis, upwards) < tight) {
         stopped = static_cast<std::uint8_t>(stopped | 1U << axis);
       } else if (first_link(lattice_, l, number)) {

@@ -19,7 +19,7 @@ constexpr int kContactLevels = 5;
 constexpr std::size_t kSmoothed = 2, kPassedOn = 3, kOfVoxels = 2;
 // Cycles of all levels but the first before a thorough cycle tells voxels: those are an eighth of it each.
 constexpr int kCoarseCycles = 3;
-constexpr int kRoundParts = 8;  // voxels
+constexpr int kRoundParts = 4;  // voxels
 constexpr int kAhead = 4;       // rows along y that are fetched before their turn
 constexpr int kTileMargin = 3;  // cells round a tile that are smoothed, from level 1 on
 

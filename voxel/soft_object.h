@@ -313,7 +313,7 @@ class SoftObject {
   void follow_parts(const glm::dvec3& delta) noexcept;
   void relax_parts(const ToolInBody& tool) noexcept;
   void add_reaction_of_parts(const ToolInBody& tool, Reaction& reaction) noexcept;
-  [[nodiscard]] glm::dvec3 hanging_on_part(std::size_t part) noexcept;
+  [[nodiscard]] glm::dvec3 hanging_on_part(std::size_t part, const Multigrid::PartRoom& room) noexcept;
   void gather_load_with_parts(int axis) noexcept;
   [[nodiscard]] bool any_pressed(std::uint16_t part) const noexcept;
   void add_stiffness(int axis, glm::dmat3& stiffness) noexcept;

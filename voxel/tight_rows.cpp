@@ -27,17 +27,19 @@ struct TightRows::Gathering {
   Couplings& couplings;
   std::span<const VoxelId> roots;  // sorted
   const Multigrid* multigrid;      // null: there are no parts without slack
+  std::uint16_t root_part;         // number of the one whose voxels are the roots; 0: of none
+  bool border_known = false;       // all of that one's border was looked at
   std::bitset<Lattice::kMostParts> known;
   std::array<double, Lattice::kMostParts> pull_N;  // of those known
 
   // (By their own links its voxels are pulled this way and that, and an inclusion between the tool and the
   // anchors, in tissue at its limits, ended what hangs on the tool: half of the force was lost.)
-  void pull_as_parts(const Displacement& state, RowId row, int axis, LinksAtLimits& links) {
+  void pull_as_parts(const Displacement& state, int axis, Row& row) {
     std::uint32_t of_parts = 0, up = 0, down = 0;
     std::uint16_t last = 0;  // most rows have one
     double pull = 0.0;
     for (VoxelId lane = 0; lane < kRow; ++lane) {
-      const std::uint16_t number = multigrid->parts().of(0, row * kRow + lane);
+      const std::uint16_t number = multigrid->parts().of(0, row.row * kRow + lane);
       if (number == 0) continue;
       if (number != last) {
         last = number;
@@ -47,9 +49,10 @@ struct TightRows::Gathering {
       of_parts |= bit;
       up |= pull > 0.0 ? bit : 0U;
       down |= pull < 0.0 ? bit : 0U;
+      if (number == root_part) row.roots |= bit;
     }
-    links.pulled_up = (links.pulled_up & ~of_parts) | up;
-    links.pulled_down = (links.pulled_down & ~of_parts) | down;
+    row.links.pulled_up = (row.links.pulled_up & ~of_parts) | up;
+    row.links.pulled_down = (row.links.pulled_down & ~of_parts) | down;
   }
 
   double pull_of(std::size_t part, const Displacement& state, int axis) {
@@ -58,6 +61,15 @@ struct TightRows::Gathering {
       pull_N[part] = multigrid->part_force(part, state)[axis];
     }
     return pull_N[part];
+  }
+
+  // Is all that there is in a row of the part whose voxels are the roots?
+  [[nodiscard]] bool within_root_part(const Lattice& lattice, RowId row) const {
+    if (root_part == 0 || !multigrid->parts().fill_row(0, row)) return false;
+    for (VoxelId v = row * kRow; v < (row + 1) * kRow; ++v) {
+      if (lattice.filled(v) && multigrid->parts().of(0, v) != root_part) return false;
+    }
+    return true;
   }
 };
 
@@ -70,6 +82,8 @@ TightRows::TightRows(const Lattice& lattice) : lattice_(lattice), entry_(lattice
 TightRows::Row* TightRows::look_at(RowId row) noexcept {
   if (entry_[row] != 0) return &rows_[entry_[row] - 1U];
   if (rows_.size() == kMostRows || !gathering_->couplings.prepare(row)) return nullptr;
+  // The inside of a part whose border was looked at.
+  if (gathering_->border_known && gathering_->within_root_part(lattice_, row)) return nullptr;
   const Grid& g = lattice_.grid();
   const auto ua = static_cast<std::size_t>(axis_);
   LevelRow at;
@@ -84,7 +98,7 @@ TightRows::Row* TightRows::look_at(RowId row) noexcept {
   out.row = row;
   links_at_limits(at, gathering_->couplings.limits(row), ua, tight, out.links);
   if (gathering_->multigrid != nullptr && gathering_->multigrid->parts().in_row(0, row))
-    gathering_->pull_as_parts(*state_, row, axis_, out.links);
+    gathering_->pull_as_parts(*state_, axis_, out);
   entry_[row] = static_cast<std::uint16_t>(rows_.size());
   const auto& roots = gathering_->roots;
   for (auto v = std::lower_bound(roots.begin(), roots.end(), row * kRow);
@@ -125,19 +139,45 @@ void TightRows::ask(RowId row, std::uint32_t at_low, std::uint32_t at_high, End 
   if (more != 0) add(*to, more);
 }
 
-void TightRows::gather(Couplings& couplings, Displacement& state, std::span<const VoxelId> roots, int axis,
-                       const Multigrid* multigrid) noexcept {
-  const bool parts = multigrid != nullptr && multigrid->has_parts();
-  Gathering gathering{couplings, roots, parts ? multigrid : nullptr, {}, {}};
+void TightRows::begin(Gathering& gathering, Displacement& state, int axis) noexcept {
   gathering_ = &gathering;
   state_ = &state;
   axis_ = axis;
   for (const Row& r : rows_) entry_[r.row] = 0;
   rows_.clear();
   head_ = waiting_ = 0;
+}
+
+void TightRows::gather(Couplings& couplings, Displacement& state, std::span<const VoxelId> roots,
+                       int axis) noexcept {
+  Gathering gathering{couplings, roots, nullptr, 0, false, {}, {}};
+  begin(gathering, state, axis);
   for (const VoxelId v : roots) {
     if (may_be_tight(lattice_, state, v, axis, kNearlyTight)) look_at(v / kRow);
   }
+  find_all();
+  // Roots beside what hangs on others, so that links between these and those are known for such.
+  for (const VoxelId v : roots) {
+    if (rows_.empty()) break;
+    if (find(v / kRow) != nullptr) continue;
+    for (int n = 0; n < 6; ++n) {
+      if (carried(n % 2 == 0 ? lattice_.up(v, n / 2) : lattice_.down(v, n / 2))) look_at(v / kRow);
+    }
+  }
+  gathering_ = nullptr;
+}
+
+void TightRows::gather_on_part(Couplings& couplings, Displacement& state, const Multigrid& multigrid,
+                               std::size_t part, int axis) noexcept {
+  Gathering gathering{couplings, {}, &multigrid, static_cast<std::uint16_t>(part + 1), false, {}, {}};
+  begin(gathering, state, axis);
+  for (const WholeParts::Link& l : multigrid.parts().on(0, part).border) look_at(l.cell / kRow);
+  gathering.border_known = true;
+  find_all();
+  gathering_ = nullptr;
+}
+
+void TightRows::find_all() noexcept {
   const Grid& g = lattice_.grid();
   while (waiting_ > 0) {
     Row& row = rows_[queue_[head_]];  // rows_ never grows beyond what was reserved, so it stays where it is
@@ -157,15 +197,6 @@ void TightRows::gather(Couplings& couplings, Displacement& state, std::span<cons
       ask(row.row - away, down_low << up, down_high << up, End::lower);
     }
   }
-  // Roots beside what hangs on others, so that links between these and those are known for such.
-  for (const VoxelId v : roots) {
-    if (rows_.empty()) break;
-    if (find(v / kRow) != nullptr) continue;
-    for (int n = 0; n < 6; ++n) {
-      if (carried(n % 2 == 0 ? lattice_.up(v, n / 2) : lattice_.down(v, n / 2))) look_at(v / kRow);
-    }
-  }
-  gathering_ = nullptr;
 }
 
 bool TightRows::tight(VoxelId root) const noexcept {

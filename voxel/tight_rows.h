@@ -32,10 +32,11 @@ class TightRows {
   // On one axis, all that hangs on `roots` (in the order of their ids, none anchored), one by another: a
   // voxel does where a link to one of these is at a limit and pushes it the way its own links, and what else
   // pulls it, do not. One that its link lets go neither way hangs on it in any case. What was found before is
-  // forgotten. A voxel of a part without slack is pulled as the whole of that is, where `multigrid` says how
-  // that is.
-  void gather(Couplings& couplings, Displacement& state, std::span<const VoxelId> roots, int axis,
-              const Multigrid* multigrid = nullptr) noexcept;
+  // forgotten.
+  void gather(Couplings& couplings, Displacement& state, std::span<const VoxelId> roots, int axis) noexcept;
+  // The same of what hangs on a part without slack. A voxel of another one is pulled as the whole of that is.
+  void gather_on_part(Couplings& couplings, Displacement& state, const Multigrid& multigrid, std::size_t part,
+                      int axis) noexcept;
   // Is it one of them, or a root that they hang on? Of other roots it may say either.
   [[nodiscard]] bool carried(VoxelId v) const noexcept {
     return (carried_in(v / kRow) >> v % kRow & 1U) != 0;
@@ -54,6 +55,7 @@ class TightRows {
   }
 
  private:
+  struct Gathering;
   // Bits are lanes.
   struct Row {
     RowId row;
@@ -67,6 +69,8 @@ class TightRows {
   [[nodiscard]] const Row* find(RowId row) const noexcept {
     return entry_[row] == 0 ? nullptr : &rows_[entry_[row] - 1U];
   }
+  void begin(Gathering& gathering, Displacement& state, int axis) noexcept;
+  void find_all() noexcept;  // from the roots on, by which rows were looked at
   Row* look_at(RowId row) noexcept;
   [[nodiscard]] static std::uint32_t pushed(const Row& row, std::uint32_t at_low, std::uint32_t at_high,
                                             End end) noexcept;
@@ -78,7 +82,6 @@ class TightRows {
   }
 
   const Lattice& lattice_;
-  struct Gathering;
   Gathering* gathering_ = nullptr;  // while it gathers
   Displacement* state_ = nullptr;   // …, only read
   int axis_ = 0;
