@@ -26,13 +26,12 @@ constexpr double kJump = 0.1;
 // Where another thread relaxes the object, wide cycles have this much work of a tick (in octets of cells
 // told), some 150 us: what is left of one goes on in the next tick, and what one leaves of a tick begins the
 // next. (Whole, one took up to 450 us of a tick, and so had every other tick only. In parts of narrow ones a
-// cube of 24,000 voxels pressed at 200 mm/s was 2.2 just noticeable differences off in place of 0.6. With
-// three quarters of this the tick's p99.9 in an abdomen is a tenth less, and forces on the way into its
-// organs are 0.09 N off in place of 0.066; with a sixth more it is a fifteenth more, and they are 0.045 N
-// off.)
-constexpr std::size_t kContactWork = 5600, kLeastWork = 1300;
+// cube of 24,000 voxels pressed at 200 mm/s was 2.2 just noticeable differences off in place of 0.6. Forces
+// on the way into organs of an abdomen are 61 mN off, root of the mean square; with a tenth more, 59, with a
+// tenth less, 68.)
+constexpr std::size_t kContactWork = 5000, kLeastWork = 1000;
 // … and with what is added of results.
-constexpr std::size_t kTickWork = 6400;
+constexpr std::size_t kTickWork = 5600;
 // Waves of the chain count as well, so much a row that they visit: eight of them a tick, which took 160 us of
 // an organ that is pressed deep. (Uncounted, the slowest ticks had all three.)
 constexpr std::size_t kWorkOfVisit = 4;
@@ -40,7 +39,7 @@ constexpr std::size_t kWorkOfVisit = 4;
 // and until that is read again all takes up to twice as long: for so many ticks there is less work. The same
 // where the tool comes upon tissue that was not touched for long.
 constexpr int kColdTicks = 5;
-constexpr std::size_t kColdWork = 3500;
+constexpr std::size_t kColdWork = 2500;
 constexpr std::size_t kDropsApart =
     100;                         // rows of coarse cells: more of them are dropped in a tick of its own
 constexpr int kProjections = 3;  // of a pressed voxel onto the tool, in search of its least energy
