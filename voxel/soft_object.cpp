@@ -447,13 +447,12 @@ bool SoftObject::cycle_due() const noexcept {
   // A contact that stands still is the background's: it comes to rest with all the object, where a box comes
   // to rest with its surroundings held.
   if (to_go < kSettled || cycles_since_touch_ == kMostCycles) return false;
+  const bool apart = relaxation_.left_to_another(), in_parts = apart && wide_cycle_;
+  if (to_go >= kJump && !in_parts && !rests_) return true;
   // Where another brings the object to rest, one cycle a tick, but for what a wide one leaves of its work.
   // (With two narrow ones forces were no nearer to rest, nor as near, and ticks took half as long again.)
-  if (cycles_since_touch_ > 0 && relaxation_.left_to_another())
-    return wide_cycle_ && left_of(kContactWork) >= shared(kLeastWork);
-  const bool in_parts = relaxation_.left_to_another() && wide_cycle_;
-  if (to_go >= kJump && !in_parts && !rests_) return true;
-  if (cycles_since_touch_ > 0) return !wide_cycle_;
+  if (cycles_since_touch_ > 0)
+    return apart ? in_parts && left_of(kContactWork) >= shared(kLeastWork) : !wide_cycle_;
   // What was let go of has this tick only.
   return !rests_ || !any_pressed();
 }
