@@ -31,8 +31,8 @@ constexpr std::uint64_t kPatient = 200'000;  // voxel updates a call: more than 
 constexpr std::uint64_t kNextFirst = 7919;   // of these voxels is looked at first in the next round
 // Cells round a contact that are smoothed, on each level.
 constexpr int kContactMargin = 3, kWideMargin = 14;
-// … and told after a jump. (All of them: no nearer, and two fifths of the time until a ball pressed ten
-// spacings deep into 10^6 voxels felt what is right, since each has to go over to the tick, too.)
+// … and told after a jump. (All cells there are: no nearer, and of 10^6 voxels a third of the first result's
+// time, since each row has to go over to the tick, too. Within 16: what was told then disturbed later ones.)
 constexpr int kToldMargin = 24;
 constexpr int kNear = 2;  // rows that a cycle round a contact reads beyond those it brings to rest
 constexpr std::uint64_t kBesideContact = 2;  // this part of the budget is left beside cycles round a contact

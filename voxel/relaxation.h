@@ -81,8 +81,9 @@ class Relaxation {
   // Coarse levels tell what is round such boxes what they know, and no more. Returns octets.
   std::size_t tell_widely(Displacement& state, const ObstacleView& obstacles,
                           std::span<const VoxelId> pressed) noexcept;
-  // The same over all of the object, coarse levels first. Voxels were told last: they are smooth where
-  // relax_round_parts() follows. (Smoothed everywhere before that, a force was 0.9 % off in place of 0.2.)
+  // A cycle over all of the object, coarse levels first. Voxels are told last, and not smoothed:
+  // relax_round_parts() has to follow. (Smoothed everywhere before that, a force was 0.9 % off in place of
+  // 0.2.) Returns octets, as a whole cycle's.
   std::size_t run_thoroughly(Displacement& state, const ObstacleView& obstacles,
                              std::span<const VoxelId> held) noexcept;
   // What limits hold under the tool (see LimitedRegion), after cycles that are not of whole rounds.

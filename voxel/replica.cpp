@@ -207,8 +207,8 @@ void Replica::relax_quickly(const ObstacleView& obstacles) noexcept {
   }
   for (int n = 0; n < (quick_ > 0 ? kWideCycles : kLastWideCycles); ++n)
     octets += relaxation_.relax_widely(state_, obstacles, held_, pressed, false);
-  // Not after the last, which a whole round comes after that ends with it; nor in the first, after which the
-  // tool presses other voxels. (In all three it was no nearer, in two as near.)
+  // Not after the last: a whole round comes next, which ends with it; nor after the first, when the tool goes
+  // on to press other voxels. (There, too, it was no nearer.)
   if (!first && quick_ > 0) relaxation_.relax_limited(state_, obstacles);
   work_ = octets / kOctetsOfRow;
 }

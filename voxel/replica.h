@@ -25,10 +25,11 @@
 // Limits hold throughout: what a row cannot follow, by the links to its neighbours as they now are, is left
 // out, and what became of it is given the next time.
 //
-// After a jump of the tool the first results are of wide boxes round the contact, a fifth of a whole cycle
-// each: nothing else is nearly as far from rest. They move tissue by spacings, and there a row that cannot
-// follow waits until those beside it were added, and then has its turn again. (With one turn each, they were
-// lost for the most part. In all results, a brain came 4.8 % of a cell deep into its skull, and not 4.5 %.)
+// After a jump of the tool the first results are of wide boxes round the contact, a third of a whole cycle
+// each at most: nothing else is nearly as far from rest. They move tissue by spacings, and there a row that
+// cannot follow waits until those beside it were added, and then has its turn again. (With one turn each,
+// they were lost for the most part. In all results, a brain came 4.8 % of a cell deep into its skull, and
+// not 4.5 %.)
 //
 // Not for tissue that yields, whose rest lengths change too.
 #pragma once
