@@ -6,7 +6,8 @@
 // middle of the next coarser cell, half a link of its level further away, that spring is in series with
 // those: so a plane that is held stays where it is on every level, and a voxel held alone holds a large cell
 // by about what it takes to move it in a lattice without end (3.96 of its links; Cserti, Am. J. Phys. 68,
-// 2000). Each axis, and links in each direction, by themselves.
+// 2000). Each axis, and links in each direction, by themselves; but what slides along a surface holds along
+// the normal alone, of springs in series as of those to it, so that on each level the same ways are free.
 //
 // (Rejected: as a disc holds on to a half-space, in units of all springs of the cell, times what kept cycles
 // from swinging. Cycles left 0.85 of the error in a block of one material; and where a stiff piece was in the

@@ -50,6 +50,7 @@ Relaxation::Relaxation(const Lattice& lattice)
   set_tolerance(kMeasured * kRestingResidual * lattice.force_scale_N());
   farthest_m_ = kFarthest * static_cast<float>(lattice.max_spacing_m());
   boxes_.resize(static_cast<std::size_t>(multigrid_.levels()));
+  list_steps();
   standing_.reserve(lattice.surface().size());
 }
 
@@ -92,6 +93,7 @@ void Relaxation::copy_from(const Relaxation& other) noexcept {
 
 void Relaxation::leave_to_another() {
   apart_ = true;
+  list_steps();
   multigrid_.forget_coarse();
   multigrid_.keep_log();
 }
@@ -201,7 +203,7 @@ std::size_t Relaxation::relax_contact(Displacement& state, const ObstacleView& o
                                       bool again, std::size_t at_once) noexcept {
   contact_relaxed_ = true;
   hold_what_stands(state, held);
-  lay_contact_boxes(pressed, kContactMargin);
+  lay_contact_boxes(pressed, kContactMargin, Visits::once);
   const RowBox& b = boxes(0).smoothed;
   const Grid& g = lattice_.grid();
   near_.first = {b.q0 / kOctets + 1, std::max(b.j0 - kNear, 0), std::max(b.k0 - kNear, 0)};
@@ -251,7 +253,7 @@ std::size_t Relaxation::relax_widely(Displacement& state, const ObstacleView& ob
                                      bool coarse_first) noexcept {
   hold_what_stands(state, held);
   multigrid_.release_limited();
-  lay_contact_boxes(pressed, kWideMargin);
+  lay_contact_boxes(pressed, kWideMargin, Visits::twice);
   tells_jointly_ = true;
   if (coarse_first) {
     run_coarse_first(state, obstacles);
@@ -265,7 +267,7 @@ std::size_t Relaxation::relax_widely(Displacement& state, const ObstacleView& ob
 
 std::size_t Relaxation::tell_widely(Displacement& state, const ObstacleView& obstacles,
                                     std::span<const VoxelId> pressed) noexcept {
-  lay_contact_boxes(pressed, kToldMargin);
+  lay_contact_boxes(pressed, kToldMargin, Visits::once);
   tells_jointly_ = true;
   std::size_t told = 0;
   for (int l = last_level() - 1; l >= 0; --l) {
@@ -276,7 +278,7 @@ std::size_t Relaxation::tell_widely(Displacement& state, const ObstacleView& obs
   return told;
 }
 
-void Relaxation::lay_contact_boxes(std::span<const VoxelId> pressed, int margin) noexcept {
+void Relaxation::lay_contact_boxes(std::span<const VoxelId> pressed, int margin, Visits visits) noexcept {
   std::array<int, 3> low = lattice_.coordinates(pressed.front()), high = low;
   for (const VoxelId v : pressed) {
     const auto c = lattice_.coordinates(v);
@@ -292,7 +294,7 @@ void Relaxation::lay_contact_boxes(std::span<const VoxelId> pressed, int margin)
     high[d] = low[d] + kMaxNear;
   }
   const int wide = std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
-  lay_boxes(low, high, wide, margin);
+  lay_boxes(low, high, wide, margin, visits);
 }
 
 std::uint64_t Relaxation::relax_tile(Displacement& state, const ObstacleView& obstacles,
@@ -300,7 +302,8 @@ std::uint64_t Relaxation::relax_tile(Displacement& state, const ObstacleView& ob
   const TileQueue::Tile t = multigrid_.tiles().tile(number);
   constexpr int kSide = TileQueue::kSide;
   lay_boxes({t.column * kRow, t.j * kSide, t.k * kSide},
-            {(t.column + 1) * kRow - 1, (t.j + 1) * kSide - 1, (t.k + 1) * kSide - 1}, kNoContact, 0);
+            {(t.column + 1) * kRow - 1, (t.j + 1) * kSide - 1, (t.k + 1) * kSide - 1}, kNoContact, 0,
+            Visits::once);
   cycle(state, obstacles, Look::all);
   std::uint64_t updates = 0;
   for (const LevelBoxes& b : boxes_) {

@@ -191,24 +191,32 @@ class Relaxation {
 
   // ---- one cycle (relaxation_cycle.cpp) ----
   static constexpr int kNoContact = -1;
-  void lay_boxes(const std::array<int, 3>& low, const std::array<int, 3>& high, int wide,
-                 int contact_margin) noexcept;
-  void lay_contact_boxes(std::span<const VoxelId> pressed, int margin) noexcept;
+  // How often levels 2 and 3 are solved in a cycle, each time with all coarser ones. Of a whole object they
+  // have next to nothing: a sixty-fourth of it and less.
+  enum class Visits : std::uint8_t { once, twice };
+  void lay_boxes(const std::array<int, 3>& low, const std::array<int, 3>& high, int wide, int contact_margin,
+                 Visits visits) noexcept;
+  void lay_contact_boxes(std::span<const VoxelId> pressed, int margin, Visits visits) noexcept;
   void lay_whole_boxes() noexcept;
   // In steps: on the way down a level is smoothed, then passed on; the coarsest; on the way up it is told,
-  // then smoothed.
+  // then smoothed. A level that is solved again was smoothed last.
   struct Step {
     int level;
     enum What : std::uint8_t { smooths, passes_on, solves, tells, smooths_after } what;
   };
-  [[nodiscard]] Step step_of(int n) const noexcept;
+  void list_steps();  // of cycles of either kind; allocates
+  void add_steps(std::vector<Step>& to, int level, Visits visits, bool again) const;
+  [[nodiscard]] Step step_of(int n) const noexcept { return steps_now()[static_cast<std::size_t>(n)]; }
+  [[nodiscard]] const std::vector<Step>& steps_now() const noexcept {
+    return steps_[static_cast<std::size_t>(visits_)];
+  }
   // All but the coarsest level's may be done by planes along z, first … last of the box, beginning with 0.
   struct Planes {
     int first = 0, last = 0;
   };
   static constexpr Planes kAllPlanes{0, 1 << 24};
   [[nodiscard]] int planes_of_step(int n) const noexcept;
-  [[nodiscard]] int steps() const noexcept { return 4 * last_level() + 1; }
+  [[nodiscard]] int steps() const noexcept { return static_cast<int>(steps_now().size()); }
   void cycle(Displacement& state, const ObstacleView& obstacles, Look look) noexcept {
     run_steps_over(0, steps(), state, obstacles, look);
   }
@@ -247,6 +255,8 @@ class Relaxation {
   ClusterMoves clusters_;
   std::unique_ptr<LimitedRegion> limited_;
   std::vector<LevelBoxes> boxes_;
+  std::array<std::vector<Step>, 2> steps_;  // [Visits]
+  Visits visits_ = Visits::once;            // of the cycle whose boxes these are
   LazyVector<VoxelId> standing_;            // what the last cycle found held, on all axes
   bool tool_presses_ = false;               // … or on the tool
   bool patient_ = false;                    // rounds are nobody's tick

@@ -18,8 +18,12 @@ constexpr int kContactLevels = 5;
 // obstacles, take twice as much.
 constexpr std::size_t kSmoothed = 2, kPassedOn = 3, kOfVoxels = 2;
 // Cycles of all levels but the first before a thorough cycle tells voxels: those are an eighth of it each.
-constexpr int kCoarseCycles = 3;
+constexpr int kCoarseCycles = 2;
 constexpr int kRoundParts = 4;  // voxels
+// Solved once, coarse levels hand up what they still are off by, and a whole cycle leaves 0.65 of the error
+// round a held patch; with these twice 0.38, and deeper ones twice as well the same. (Level 1, too: 0.33, for
+// a seventh more of a whole cycle's time, and half as much again of a box's.)
+constexpr int kFirstTwice = 2, kLastTwice = 3;
 constexpr int kAhead = 4;       // rows along y that are fetched before their turn
 constexpr int kTileMargin = 3;  // cells round a tile that are smoothed, from level 1 on
 
@@ -54,7 +58,8 @@ Relaxation::RowBox Relaxation::clipped(int level, const RowBox& b) const noexcep
 // side as the way that a force at the middle is felt: `contact_margin` and a quarter of how `wide` it is, in
 // cells, or where there is none the voxels themselves and a little more of their cells.
 void Relaxation::lay_boxes(const std::array<int, 3>& low, const std::array<int, 3>& high, int wide,
-                           int contact_margin) noexcept {
+                           int contact_margin, Visits visits) noexcept {
+  visits_ = visits;
   const int last = multigrid_.levels() - 1;
   for (int l = 0; l <= last; ++l) {
     const int margin = wide != kNoContact ? contact_margin + (wide >> l) / 4 : l == 0 ? 0 : kTileMargin;
@@ -98,22 +103,49 @@ std::size_t Relaxation::octets(const RowBox& b) {
          static_cast<std::size_t>(b.k1 - b.k0 + 1);
 }
 
-// Smoothed, passed on and told; what of the boxes is empty counts too.
+// Smoothed and told; what of the boxes is empty counts too.
 std::size_t Relaxation::octets_of_cycle() const noexcept {
   std::size_t sum = 0;
-  for (int l = 0; l <= last_level(); ++l) {
-    const LevelBoxes& b = boxes_[static_cast<std::size_t>(l)];
-    sum += 2 * octets(b.smoothed) + (l < last_level() ? octets(b.told) : 0);
+  for (const Step& step : steps_now()) {
+    const LevelBoxes& b = boxes_[static_cast<std::size_t>(step.level)];
+    switch (step.what) {
+      case Step::passes_on:
+        break;
+      case Step::smooths:
+      case Step::smooths_after:
+        sum += octets(b.smoothed);
+        break;
+      case Step::solves:
+        sum += 2 * octets(b.smoothed);
+        break;
+      case Step::tells:
+        sum += octets(b.told);
+    }
   }
   return sum;
 }
 
-Relaxation::Step Relaxation::step_of(int n) const noexcept {
+void Relaxation::list_steps() {
+  for (const Visits visits : {Visits::once, Visits::twice}) {
+    std::vector<Step>& steps = steps_[static_cast<std::size_t>(visits)];
+    steps.clear();
+    add_steps(steps, 0, visits, false);
+  }
+}
+
+void Relaxation::add_steps(std::vector<Step>& to, int level, Visits visits, bool again) const {
   const int last = last_level();
-  if (n < 2 * last) return {n / 2, n % 2 == 0 ? Step::smooths : Step::passes_on};
-  if (n == 2 * last) return {last, Step::solves};
-  const int up = n - 2 * last - 1;
-  return {last - 1 - up / 2, up % 2 == 0 ? Step::tells : Step::smooths_after};
+  if (level == last) {
+    to.push_back({level, Step::solves});
+    return;
+  }
+  if (!again) to.push_back({level, Step::smooths});
+  to.push_back({level, Step::passes_on});
+  const int next = level + 1;
+  const bool twice = visits == Visits::twice && next >= kFirstTwice && next <= kLastTwice && next < last;
+  for (int n = 0; n < (twice ? 2 : 1); ++n) add_steps(to, next, visits, n > 0);
+  to.push_back({level, Step::tells});
+  to.push_back({level, Step::smooths_after});
 }
 
 // In octets told.
@@ -334,7 +366,7 @@ void Relaxation::pass_on(int l, Displacement& state, const ObstacleView& obstacl
 
 void Relaxation::lay_whole_boxes() noexcept {
   const auto& dims = lattice_.grid().dims;
-  lay_boxes({0, 0, 0}, {dims[0] - 1, dims[1] - 1, dims[2] - 1}, kNoContact, 0);
+  lay_boxes({0, 0, 0}, {dims[0] - 1, dims[1] - 1, dims[2] - 1}, kNoContact, 0, Visits::twice);
 }
 
 std::size_t Relaxation::run_thoroughly(Displacement& state, const ObstacleView& obstacles,
@@ -369,7 +401,7 @@ void Relaxation::relax_round_parts(Displacement& state, const ObstacleView& obst
       low[d] = std::max(part.first[d] - kRoundParts, 0);
       high[d] = std::min(part.last[d] + kRoundParts, lattice_.grid().dims[d] - 1);
     }
-    lay_boxes(low, high, kNoContact, 0);
+    lay_boxes(low, high, kNoContact, 0, Visits::twice);
     cycle(state, obstacles, Look::all);
   }
 }

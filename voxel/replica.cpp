@@ -24,7 +24,7 @@ constexpr std::size_t kMostAtOnce = 1000;  // rows that a tick adds at once; a w
 constexpr int kContactCycles = 4, kUnsettled = 4;
 // … and round a part without slack that is pressed. (A whole cycle leaves 0.43 of the force's error at such a
 // part.)
-constexpr int kPartCycles = 4, kFirstPartCycles = 2;
+constexpr int kPartCycles = 4;
 constexpr double kMoved = 0.1;
 // Far from the contact only what changed by so many times as much as rows are left alone with (1e-4 of the
 // spacing) is passed on, and the rest once all is at rest. Within so many rows of it everything is, and so is
@@ -38,13 +38,14 @@ constexpr float kFollows = 0.01F;
 // results of a jump, with 8 and 4 by 2 %, with these after three.
 constexpr int kTurns = 16, kTurnsAtOnce = 8;
 // Tissue that moved by as many spacings from one result to the next is far from all that is known of it. So
-// many results are then of so many cycles in wide boxes. In the first coarse levels come to rest first, what
-// is further away is told what they know, and then there are as many again: where it stayed behind it would
+// many results are then of so many cycles in wide boxes. In the first coarse levels come to rest before them,
+// and what is further away is told what they know: where it stayed behind it would
 // hold back what is in the boxes (by 17 % of the force, where links are at their limits). Where a part
 // without slack is pressed, there is one, which is thorough: no box is wide enough. No bricks meanwhile: of
 // tissue on its way they know little.
 constexpr float kJumped = 5.0F;
-constexpr int kQuickResults = 3, kWideCycles = 4, kLastWideCycles = 3;
+constexpr int kQuickResults = 3;
+constexpr std::array<int, kQuickResults> kWideCycles{3, 4, 2};
 constexpr std::size_t kAhead = 4;  // rows that are fetched before their turn
 constexpr std::size_t kRowBytes = kRow * sizeof(float);
 constexpr std::size_t kOctetsOfRow = 12;  // a whole cycle smooths and tells as many of a row
@@ -196,7 +197,7 @@ void Replica::relax_quickly(const ObstacleView& obstacles) noexcept {
   --quick_;
   if (part_pressed_) {
     octets = relaxation_.run_thoroughly(state_, obstacles, held_);
-    for (int n = 0; n < kFirstPartCycles; ++n) relaxation_.relax_round_parts(state_, obstacles);
+    relaxation_.relax_round_parts(state_, obstacles);
     work_ = octets / kOctetsOfRow;
     return;
   }
@@ -205,7 +206,8 @@ void Replica::relax_quickly(const ObstacleView& obstacles) noexcept {
     octets += relaxation_.relax_widely(state_, obstacles, held_, pressed, true);
     octets += relaxation_.tell_widely(state_, obstacles, pressed);
   }
-  for (int n = 0; n < (quick_ > 0 ? kWideCycles : kLastWideCycles); ++n)
+  const int cycles = kWideCycles[static_cast<std::size_t>(kQuickResults - 1 - quick_)];
+  for (int n = 0; n < cycles; ++n)
     octets += relaxation_.relax_widely(state_, obstacles, held_, pressed, false);
   // Not after the last: a whole round comes next, which ends with it; nor after the first, when the tool goes
   // on to press other voxels. (There, too, it was no nearer.)
