@@ -152,7 +152,8 @@ void Multigrid::balance_contacts(RowId row, Displacement& state, const ObstacleV
       const auto force = sliding_force(couplings(), state, v, balance_of(v, state));
       for (int axis = 0; axis < 3 && force; ++axis)
         out[static_cast<std::size_t>(axis)][i] = static_cast<float>((*force)[axis]);
-      by = force ? Holds::along(state.tool_normal[lattice_.surface_number(v)]) : Holds::kAll;
+      by = force ? Holds::along(state.tool_normal[lattice_.surface_number(v)], Holds::Support::By::tool)
+                 : Holds::kAll;
     } else if (Displacement::in_part(state.role[v])) {
       by = support_of_part(lattice_.part(v) - 1U);
     } else if (state.role[v] == Displacement::obstacle && blocked(obstacles, state, v, touching)) {
@@ -163,7 +164,7 @@ void Multigrid::balance_contacts(RowId row, Displacement& state, const ObstacleV
         found.resisted[ua] &= ~(1U << i);
         if (into < 0.0F) out[ua][i] -= into * n[axis];
       }
-      if (into < 0.0F) by = Holds::along(n);
+      if (into < 0.0F) by = Holds::along(n, Holds::Support::By::obstacle);
     }
     holds_->support(v, by);
   }

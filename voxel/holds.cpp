@@ -5,16 +5,12 @@
 #include <bit>
 #include <cmath>
 #include <cstdlib>
-#include <glm/geometric.hpp>
-#include <glm/mat3x3.hpp>
-#include <glm/matrix.hpp>
 
 namespace voxel {
 namespace {
 
 constexpr float kImmovable = 1e4F;        // a hold: all of the cell is held
 constexpr float kAllSlide = 16.0F;        // … all of it slides; of the voxels' own springs
-constexpr double kRigid = 1e-6;           // of a hold: one that is seen through nothing loses no more of it
 constexpr std::size_t kQueued = 65536;    // cells looked at together
 constexpr std::size_t kMostOfAVoxel = 7;  // cells that change with a voxel: its own, its neighbours'
 
@@ -249,8 +245,8 @@ void Holds::set_held(std::span<const VoxelId> held) noexcept {
   renew();
 }
 
-Holds::Support Holds::along(const glm::vec3& normal) noexcept {
-  Support by{Support::By::normal, {}};
+Holds::Support Holds::along(const glm::vec3& normal, Support::By what) noexcept {
+  Support by{what, {}};
   for (int axis = 0; axis < 3; ++axis)
     by.n[static_cast<std::size_t>(axis)] = static_cast<std::int8_t>(
         std::lround(static_cast<float>(kUnit) * std::clamp(normal[axis], -1.0F, 1.0F)));
@@ -284,25 +280,16 @@ namespace {
 // Pairs of axes, as tilt() has them.
 constexpr std::array<std::array<std::size_t, 2>, 3> kPairs{{{0, 1}, {0, 2}, {1, 2}}};
 
-// What keeps a voxel, or a cell, where it is: of each axis, and of pairs (N/m).
-struct Kept {
-  std::array<float, 3> axes{}, pairs{};
-
-  void add(const glm::vec3& n, float k) {  // a spring along n only
-    for (int axis = 0; axis < 3; ++axis) axes[static_cast<std::size_t>(axis)] += k * n[axis] * n[axis];
-    for (std::size_t p = 0; p < 3; ++p)
-      pairs[p] += k * n[static_cast<int>(kPairs[p][0])] * n[static_cast<int>(kPairs[p][1])];
-  }
-};
-
 glm::vec3 normal_of(const Holds::Support& by) {
-  return glm::vec3(by.n[0], by.n[1], by.n[2]) / static_cast<float>(Holds::kUnit);
+  constexpr float unit = 1.0F / Holds::kUnit;
+  return glm::vec3(by.n[0], by.n[1], by.n[2]) * unit;
 }
 
-// What is left of springs k (N/m) whose other end goes freely across n: along n alone, as in series.
-// (Schur complement of where it goes. With √k n on either side in place of n the direction that is free was
-// another where tissue is stiffer along a link than across it, and cycles left 0.74 of what a contact had
-// still to slide.)
+// What is left of springs k (N/m) whose other end goes freely across n: one along n, n nᵀ / (nᵀ k⁻¹ n), the
+// Schur complement of where that end goes. (With √k n nᵀ √k, as beside obstacles, other ways are free than
+// those along the tool where tissue is stiffer along links than across them, and a cycle left 0.74 of what a
+// pressed ball's voxels had still to slide, now 0.35 to 0.5. Beside obstacles this did no good: a body on
+// tight links, which came to rest to 0.1 mm/s, went on at 0.1 to 0.2.)
 float spring_along(const glm::vec3& n, const std::array<float, 3>& k) {
   float compliance = 0.0F;
   for (int axis = 0; axis < 3; ++axis) {
@@ -314,27 +301,33 @@ float spring_along(const glm::vec3& n, const std::array<float, 3>& k) {
   return compliance > 0.0F ? 1.0F / compliance : 0.0F;
 }
 
-// Of a voxel that is held as `own` is, by a link of springs k to one held as `other`.
-Kept kept_by(const Holds::Support& own, const Holds::Support& other, const std::array<float, 3>& k) {
+// Of a voxel that is held as `own` is, what a link to one held as `other` keeps from moving: of each axis,
+// and of pairs, in parts of the link's springs.
+struct Kept {
+  std::array<float, 3> axes, pairs;
+};
+Kept kept_by(const Holds::Support& own, const Holds::Support& other) {
   using By = Holds::Support::By;
-  const glm::vec3 stays = own.by == By::normal ? normal_of(own) : glm::vec3(0.0F);
-  Kept kept;
-  if (other.by == By::normal) {
-    const glm::vec3 n = normal_of(other);
-    kept.add(n - glm::dot(n, stays) * stays, spring_along(n, k));
+  Kept kept{};
+  if (other.by == By::all) {  // all that the voxel can do
+    kept.axes = {1.0F, 1.0F, 1.0F};
+    if (!own.slides()) return kept;
+    const glm::vec3 n = normal_of(own);
+    for (int axis = 0; axis < 3; ++axis)
+      kept.axes[static_cast<std::size_t>(axis)] = std::max(0.0F, 1.0F - n[axis] * n[axis]);
+    for (std::size_t p = 0; p < 3; ++p)
+      kept.pairs[p] = -n[static_cast<int>(kPairs[p][0])] * n[static_cast<int>(kPairs[p][1])];
     return kept;
   }
-  for (int axis = 0; axis < 3; ++axis) {  // all that the voxel can do
-    glm::vec3 way(0.0F);
-    way[axis] = 1.0F;
-    kept.add(way - stays[axis] * stays, k[static_cast<std::size_t>(axis)]);
+  glm::vec3 n = normal_of(other);  // along which the other one stays, as far as this one can go that way
+  if (own.slides()) {
+    const glm::vec3 stays = normal_of(own);
+    n -= (n.x * stays.x + n.y * stays.y + n.z * stays.z) * stays;
   }
+  for (int axis = 0; axis < 3; ++axis) kept.axes[static_cast<std::size_t>(axis)] = n[axis] * n[axis];
+  for (std::size_t p = 0; p < 3; ++p)
+    kept.pairs[p] = n[static_cast<int>(kPairs[p][0])] * n[static_cast<int>(kPairs[p][1])];
   return kept;
-}
-
-// What holds a cell, seen through springs k.
-glm::dmat3 in_series(const glm::dmat3& holds, const glm::dmat3& k) {
-  return k * glm::inverse(holds + k) * holds;
 }
 
 }  // namespace
@@ -400,7 +393,7 @@ void Holds::find_first(VoxelId cell, Found& found, Axes& all) const noexcept {
   const std::array<int, 3> place = at(1).couplings->grid().coordinates(cell);
   Through& through = found.through;
   std::array<float, 3>& tilt = found.tilt;
-  Kept sliding;  // what all that slide keep of themselves
+  std::array<float, 3> all_along{}, all_across{};
   std::array<int, 3> held{};
   int count = 0, supported = 0;
   for_children(g, place, [&](VoxelId v, const std::array<int, 3>& c) {
@@ -408,18 +401,23 @@ void Holds::find_first(VoxelId cell, Found& found, Axes& all) const noexcept {
     ++count;
     const Support own = support_of(v);
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const bool stays =
-          own.by == Support::By::all || (own.by == Support::By::normal && std::abs(own.n[axis]) == kUnit);
+      const bool stays = own.by == Support::By::all || (own.slides() && std::abs(own.n[axis]) == kUnit);
       held[axis] += stays ? 1 : 0;
     }
     supported += own.by == Support::By::nothing ? 0 : 1;
     if (own.by == Support::By::all) return;
     const VoxelSprings springs = couplings.find_springs(v);
-    if (own.by == Support::By::normal) {
-      std::array<float, 3> k{};
+    if (own.slides()) {
+      constexpr float unit = 1.0F / (kUnit * kUnit);
+      const auto k = [&springs](std::size_t axis) {
+        return springs.inverse[axis] > 0.0F ? 1.0F / springs.inverse[axis] : 0.0F;
+      };
       for (std::size_t axis = 0; axis < 3; ++axis)
-        k[axis] = springs.inverse[axis] > 0.0F ? 1.0F / springs.inverse[axis] : 0.0F;
-      sliding.add(normal_of(own), spring_along(normal_of(own), k));
+        all_along[axis] += unit * static_cast<float>(own.n[axis] * own.n[axis]) * k(axis);
+      for (std::size_t p = 0; p < 3; ++p) {
+        const auto [a, b] = kPairs[p];
+        all_across[p] += unit * static_cast<float>(own.n[a] * own.n[b]) * std::sqrt(k(a) * k(b));
+      }
     }
     for (std::size_t d = 0; d < 3; ++d) {
       for (const bool up : {false, true}) {
@@ -427,19 +425,26 @@ void Holds::find_first(VoxelId cell, Found& found, Axes& all) const noexcept {
         if (other.by == Support::By::nothing) continue;
         const bool within = up == ((c[d] & 1) == 0);
         const Spring& link = up ? springs.up[d] : springs.down[d];
-        std::array<float, 3> k{};
-        for (std::size_t axis = 0; axis < 3; ++axis)
-          k[axis] = (within ? 2.0F : 1.0F) * link.on(static_cast<int>(axis), static_cast<int>(d));
-        const Kept kept = kept_by(own, other, k);
-        for (std::size_t axis = 0; axis < 3; ++axis) through[axis][d] += kept.axes[axis];
-        for (std::size_t p = 0; p < 3; ++p) tilt[p] += kept.pairs[p];
+        const Kept kept = kept_by(own, other);
+        const auto k = [&](std::size_t axis) {
+          return (within ? 2.0F : 1.0F) * link.on(static_cast<int>(axis), static_cast<int>(d));
+        };
+        if (other.by == Support::By::tool) {
+          const float along = spring_along(normal_of(other), {k(0), k(1), k(2)});
+          for (std::size_t axis = 0; axis < 3; ++axis) through[axis][d] += kept.axes[axis] * along;
+          for (std::size_t p = 0; p < 3; ++p) tilt[p] += kept.pairs[p] * along;
+          continue;
+        }
+        for (std::size_t axis = 0; axis < 3; ++axis) through[axis][d] += kept.axes[axis] * k(axis);
+        for (std::size_t p = 0; p < 3; ++p)
+          tilt[p] += kept.pairs[p] * std::sqrt(k(kPairs[p][0]) * k(kPairs[p][1]));
       }
     }
   });
   // Of voxels that all slide, no link says that they do not go along their normals.
   if (supported == count) {
-    for (std::size_t axis = 0; axis < 3; ++axis) through[axis][axis] += kAllSlide * sliding.axes[axis];
-    for (std::size_t p = 0; p < 3; ++p) tilt[p] += kAllSlide * sliding.pairs[p];
+    for (std::size_t axis = 0; axis < 3; ++axis) through[axis][axis] += kAllSlide * all_along[axis];
+    for (std::size_t p = 0; p < 3; ++p) tilt[p] += kAllSlide * all_across[p];
   }
   for (std::size_t axis = 0; axis < 3; ++axis) all[axis] = held[axis] == count;
 }
@@ -460,46 +465,28 @@ void Holds::find_above(int level, VoxelId cell, Found& found, Axes& all) const n
     const Found child = stands(springs)       ? Found{}
                         : waits(level - 1, w) ? waiting(level - 1, w)
                                               : known(level - 1, w);
-    Through passed{};
-    glm::dmat3 holds(0.0), beyond(1.0);  // what holds the child, and what that is seen through
+    std::array<float, 3> passed{};  // of what holds the child, that part holds this one
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto a = static_cast<int>(axis);
-      double after = 0.0;
+      float before = 0.0F, after = 0.0F;
       const bool stays = springs.inverse[axis] == 0.0F || child.hold[axis] == kImmovable;
       held[axis] += stays ? 1 : 0;
       for (std::size_t d = 0; d < 3; ++d) {
-        const float k = to_sibling(springs, c, d).on(a, static_cast<int>(d));
+        const float k = to_sibling(springs, c, d).on(static_cast<int>(axis), static_cast<int>(d));
         const float own = child.through[axis][d];
         if (stays) {  // up to the middle of this one, but for half a voxel
           through[axis][d] += size * k;
         } else if (own > 0.0F) {
-          passed[axis][d] = k > 0.0F ? 2.0F * k * own / (2.0F * k + own) : own;
-          holds[a][a] += static_cast<double>(own);
-          after += static_cast<double>(passed[axis][d]);
+          const float series = k > 0.0F ? 2.0F * k * own / (2.0F * k + own) : own;
+          through[axis][d] += series;
+          before += own;
+          after += series;
         }
       }
-      if (holds[a][a] > 0.0)
-        beyond[a][a] = holds[a][a] * after / std::max(holds[a][a] - after, kRigid * holds[a][a]);
+      if (before > 0.0F) passed[axis] = after / before;
     }
-    if (child.tilt != std::array<float, 3>{}) {
-      // Together: axis by axis, what is free to go along a surface on this level was not on the next.
-      for (std::size_t p = 0; p < 3; ++p) {
-        const auto a = static_cast<int>(kPairs[p][0]), b = static_cast<int>(kPairs[p][1]);
-        if (holds[a][a] > 0.0 && holds[b][b] > 0.0)
-          holds[a][b] = holds[b][a] = static_cast<double>(child.tilt[p]);
-      }
-      const glm::dmat3 series = in_series(holds, beyond);
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const auto a = static_cast<int>(axis);
-        const float after = passed[axis][0] + passed[axis][1] + passed[axis][2];
-        for (float& of_link : passed[axis])
-          of_link *= after > 0.0F ? static_cast<float>(series[a][a]) / after : 0.0F;
-      }
-      for (std::size_t p = 0; p < 3; ++p)
-        tilt[p] += static_cast<float>(series[static_cast<int>(kPairs[p][0])][static_cast<int>(kPairs[p][1])]);
-    }
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      for (std::size_t d = 0; d < 3; ++d) through[axis][d] += passed[axis][d];
+    for (std::size_t p = 0; p < 3; ++p) {
+      if (child.tilt[p] != 0.0F)
+        tilt[p] += child.tilt[p] * std::sqrt(passed[kPairs[p][0]] * passed[kPairs[p][1]]);
     }
   });
   for (std::size_t axis = 0; axis < 3; ++axis) all[axis] = held[axis] == count;

@@ -6,8 +6,7 @@
 // middle of the next coarser cell, half a link of its level further away, that spring is in series with
 // those: so a plane that is held stays where it is on every level, and a voxel held alone holds a large cell
 // by about what it takes to move it in a lattice without end (3.96 of its links; Cserti, Am. J. Phys. 68,
-// 2000). Each axis, and links in each direction, by themselves; but what slides along a surface holds along
-// the normal alone, of springs in series as of those to it, so that on each level the same ways are free.
+// 2000). Each axis, and links in each direction, by themselves.
 //
 // (Rejected: as a disc holds on to a half-space, in units of all springs of the cell, times what kept cycles
 // from swinging. Cycles left 0.85 of the error in a block of one material; and where a stiff piece was in the
@@ -30,14 +29,16 @@ namespace voxel {
 
 class Holds {
  public:
-  // How a voxel is held: not, altogether, or along a normal, while it slides across that.
+  // How a voxel is held: not, altogether, or along a normal, while it slides across that, on the tool or on
+  // an obstacle.
   struct Support {
-    enum class By : std::uint8_t { nothing, normal, all } by = By::nothing;
+    enum class By : std::uint8_t { nothing, obstacle, tool, all } by = By::nothing;
     std::array<std::int8_t, 3> n{};  // in parts of kUnit, so that what hardly turns does not change
     bool operator==(const Support&) const = default;
+    [[nodiscard]] bool slides() const { return by == By::obstacle || by == By::tool; }
   };
   static constexpr int kUnit = 127;
-  [[nodiscard]] static Support along(const glm::vec3& normal) noexcept;
+  [[nodiscard]] static Support along(const glm::vec3& normal, Support::By what) noexcept;
   static constexpr Support kAll{Support::By::all, {}};
 
   // `levels`: level 0 first; kept by the caller. Allocates.

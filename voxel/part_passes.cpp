@@ -479,7 +479,7 @@ Holds::Support Multigrid::support_of_part(std::size_t part) const noexcept {
   if (parts_->sprawls(part)) return Holds::kAll;
   const HeldDirections& held = part_state_[part].held;
   if (held.count == 0) return {};
-  return held.count == 1 ? Holds::along(glm::vec3(held.of[0])) : Holds::kAll;
+  return held.count == 1 ? Holds::along(glm::vec3(held.of[0]), Holds::Support::By::obstacle) : Holds::kAll;
 }
 
 void Multigrid::balance_parts(const Displacement& state) noexcept {

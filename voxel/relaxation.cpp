@@ -192,7 +192,7 @@ void Relaxation::run_cycle(Displacement& state, const ObstacleView& obstacles,
   multigrid_.tiles().clear();
   round_left_ = 0;
   running_residual_N_ = 0.0;
-  lay_whole_boxes();
+  lay_whole_boxes(Visits::once);
   cycle(state, obstacles, Look::active);
   patient_ = true;
   end_round(state, obstacles, running_residual_N_);

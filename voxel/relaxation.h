@@ -197,7 +197,7 @@ class Relaxation {
   void lay_boxes(const std::array<int, 3>& low, const std::array<int, 3>& high, int wide, int contact_margin,
                  Visits visits) noexcept;
   void lay_contact_boxes(std::span<const VoxelId> pressed, int margin, Visits visits) noexcept;
-  void lay_whole_boxes() noexcept;
+  void lay_whole_boxes(Visits visits) noexcept;
   // In steps: on the way down a level is smoothed, then passed on; the coarsest; on the way up it is told,
   // then smoothed. A level that is solved again was smoothed last.
   struct Step {

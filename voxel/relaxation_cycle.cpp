@@ -364,16 +364,16 @@ void Relaxation::pass_on(int l, Displacement& state, const ObstacleView& obstacl
   if (l == 0) multigrid_.renew_holds();
 }
 
-void Relaxation::lay_whole_boxes() noexcept {
+void Relaxation::lay_whole_boxes(Visits visits) noexcept {
   const auto& dims = lattice_.grid().dims;
-  lay_boxes({0, 0, 0}, {dims[0] - 1, dims[1] - 1, dims[2] - 1}, kNoContact, 0, Visits::twice);
+  lay_boxes({0, 0, 0}, {dims[0] - 1, dims[1] - 1, dims[2] - 1}, kNoContact, 0, visits);
 }
 
 std::size_t Relaxation::run_thoroughly(Displacement& state, const ObstacleView& obstacles,
                                        std::span<const VoxelId> held) noexcept {
   hold_what_stands(state, held);
   multigrid_.release_limited();
-  lay_whole_boxes();
+  lay_whole_boxes(Visits::twice);
   tells_jointly_ = true;
   run_coarse_first(state, obstacles);
   tells_jointly_ = false;
@@ -407,7 +407,7 @@ void Relaxation::relax_round_parts(Displacement& state, const ObstacleView& obst
 }
 
 void Relaxation::renew_coarse(Displacement& state, const ObstacleView& obstacles) noexcept {
-  lay_whole_boxes();
+  lay_whole_boxes(Visits::once);
   stir_all();
   for (int l = 1; l < multigrid_.levels(); ++l) {
     for_rows(l, boxes(l).parents,

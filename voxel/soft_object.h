@@ -260,8 +260,9 @@ class SoftObject {
     glm::dvec3 normal{0.0};
   };
   static constexpr std::size_t kMaxCarried =
-      20'000;                            // voxels that may hang on the pressed ones by tight links
-  static constexpr double kStir = 1e-5;  // of the spacing: voxels that moved less wake nobody
+      20'000;                               // voxels that may hang on the pressed ones by tight links
+  static constexpr double kStir = 1e-5;     // of the spacing: voxels that moved less wake nobody
+  static constexpr double kGiveWay = 0.01;  // of the voxel radius: less is left to the next push
   struct Carried {
     VoxelId v;
     std::uint32_t touch;  // whose load it adds to

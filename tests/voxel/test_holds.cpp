@@ -98,11 +98,13 @@ TEST(Holds, DependOnWhatIsHeldAlone) {
     const std::vector<VoxelId> held = some();
     changed.set_held(held);
     const VoxelId pressed = some().front();
-    changed.support(pressed, Holds::along(glm::normalize(glm::vec3(0.0F, 0.5F, 1.0F))));
+    changed.support(pressed,
+                    Holds::along(glm::normalize(glm::vec3(0.0F, 0.5F, 1.0F)), Holds::Support::By::obstacle));
     changed.renew();
     Holds fresh(lattice, levels.pointers);
     fresh.set_held(held);
-    fresh.support(pressed, Holds::along(glm::normalize(glm::vec3(0.0F, 0.5F, 1.0F))));
+    fresh.support(pressed,
+                  Holds::along(glm::normalize(glm::vec3(0.0F, 0.5F, 1.0F)), Holds::Support::By::obstacle));
     fresh.renew();
     for (int level = 1; level < 4; ++level) {
       const voxel::Grid& g = levels.pointers[static_cast<std::size_t>(level)]->grid();
@@ -165,7 +167,8 @@ TEST(Holds, OfAnchorsAreTheSameWheneverTheyAreAskedFor) {
                                      static_cast<int>(random() % 36));
         if (lattice.filled(v)) held.push_back(v);
       }
-      const Holds::Support by = Holds::along(glm::normalize(glm::vec3(0.3F, -0.5F, 0.8F)));
+      const Holds::Support by =
+          Holds::along(glm::normalize(glm::vec3(0.3F, -0.5F, 0.8F)), Holds::Support::By::tool);
       for (Holds* holds : {&at_once, &later}) {
         holds->set_held(std::span(held).first(3));
         holds->support(held.back(), by);
@@ -198,42 +201,28 @@ TEST(Holds, WhatSlidesHoldsAlongItsNormalAlone) {
   Levels levels(lattice);
   Holds holds(lattice, levels.pointers);
   const glm::vec3 n = glm::normalize(glm::vec3(0.5F, -0.4F, 0.8F));
-  for (int j = 0; j < 20; ++j) {
-    for (int i = 0; i < 24; ++i) holds.support(lattice.grid().at(i, j, 17), Holds::along(n));
-  }
-  holds.renew();
   const voxel::Spring link = lattice.spring_within(1, 2);
   const VoxelId cell = levels.pointers[1]->grid().at(6, 5, 8);
   const auto k = [&link](int axis) { return 8.0 * static_cast<double>(link.on(axis, 2)); };
-  double compliance = 0.0;  // along the normal, of the springs of all three axes in series
+  double compliance = 0.0;  // along the normal, of the springs of all axes in series
   for (int axis = 0; axis < 3; ++axis) compliance += static_cast<double>(n[axis] * n[axis]) / k(axis);
-  constexpr std::array<std::array<int, 2>, 3> pairs{{{0, 1}, {0, 2}, {1, 2}}};
-  for (int axis = 0; axis < 3; ++axis) {
-    EXPECT_NEAR(levels.hold(holds, 1, cell, axis), static_cast<double>(n[axis] * n[axis]) / compliance,
-                0.02 * k(axis))
-        << axis;
-  }
-  for (std::size_t p = 0; p < 3; ++p) {
-    const auto [a, b] = pairs[p];
-    EXPECT_NEAR(static_cast<double>(holds.tilt(1, cell)[p]), static_cast<double>(n[a] * n[b]) / compliance,
-                0.02 * k(2))
-        << p;
-  }
-  // On coarser levels, too: whatever comes in between, that way is free.
-  for (int level = 1; level < 4; ++level) {
-    const voxel::Grid& g = levels.pointers[static_cast<std::size_t>(level)]->grid();
-    const VoxelId above = g.at(g.dims[0] / 2, g.dims[1] / 2, g.dims[2] - 1);
-    if (!holds.tilted(level, above / voxel::kRow)) continue;
-    const auto off = holds.tilt(level, above);
-    const std::array<double, 3> on{levels.hold(holds, level, above, 0), levels.hold(holds, level, above, 1),
-                                   levels.hold(holds, level, above, 2)};
-    const glm::dvec3 across = glm::normalize(glm::cross(glm::dvec3(n), glm::dvec3(0.0, 0.0, 1.0)));
-    for (const glm::dvec3& way : {across, glm::cross(glm::dvec3(n), across)}) {
-      const double back =
-          on[0] * way.x * way.x + on[1] * way.y * way.y + on[2] * way.z * way.z +
-          2.0 * (static_cast<double>(off[0]) * way.x * way.y + static_cast<double>(off[1]) * way.x * way.z +
-                 static_cast<double>(off[2]) * way.y * way.z);
-      EXPECT_NEAR(back, 0.0, 0.02 * (on[0] + on[1] + on[2])) << level;
+  for (const Holds::Support::By by : {Holds::Support::By::obstacle, Holds::Support::By::tool}) {
+    for (int j = 0; j < 20; ++j) {
+      for (int i = 0; i < 24; ++i) holds.support(lattice.grid().at(i, j, 17), Holds::along(n, by));
+    }
+    holds.renew();
+    const auto expected = [&](int row, int column) {
+      const double of_springs =
+          by == Holds::Support::By::tool ? 1.0 / compliance : std::sqrt(k(row) * k(column));
+      return of_springs * static_cast<double>(n[row] * n[column]);
+    };
+    for (int axis = 0; axis < 3; ++axis)
+      EXPECT_NEAR(levels.hold(holds, 1, cell, axis), expected(axis, axis), 0.02 * k(axis)) << axis;
+    constexpr std::array<std::array<int, 2>, 3> pairs{{{0, 1}, {0, 2}, {1, 2}}};
+    for (std::size_t p = 0; p < 3; ++p) {
+      EXPECT_NEAR(static_cast<double>(holds.tilt(1, cell)[p]), expected(pairs[p][0], pairs[p][1]),
+                  0.02 * k(2))
+          << p;
     }
   }
 }
@@ -251,7 +240,8 @@ TEST(Holds, NeverPush) {
   for (int j = 3; j < 17; ++j) {
     for (int i = 2; i < 22; ++i) {
       const glm::vec3 n = glm::normalize(glm::vec3(any(random), any(random), any(random)));
-      if (random() % 3 != 0) holds.support(lattice.grid().at(i, j, 17), Holds::along(n));
+      const auto by = random() % 2 == 0 ? Holds::Support::By::obstacle : Holds::Support::By::tool;
+      if (random() % 3 != 0) holds.support(lattice.grid().at(i, j, 17), Holds::along(n, by));
     }
   }
   holds.renew();
