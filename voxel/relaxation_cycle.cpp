@@ -21,8 +21,8 @@ constexpr std::size_t kSmoothed = 2, kPassedOn = 3, kOfVoxels = 2;
 constexpr int kCoarseCycles = 2;
 constexpr int kRoundParts = 4;  // voxels
 // Solved once, coarse levels hand up what they still are off by, and a whole cycle leaves 0.65 of the error
-// round a held patch; with these twice 0.38, and deeper ones twice as well the same. (Level 1, too: 0.33, for
-// a seventh more of a whole cycle's time, and half as much again of a box's.)
+// round a held patch; with these twice 0.38, and deeper ones twice as well the same. (Level 1, too: 0.33, but
+// the cycle of a box takes twice as long.)
 constexpr int kFirstTwice = 2, kLastTwice = 3;
 constexpr int kAhead = 4;       // rows along y that are fetched before their turn
 constexpr int kTileMargin = 3;  // cells round a tile that are smoothed, from level 1 on

@@ -26,8 +26,7 @@ constexpr double kJump = 0.1;
 // told), some 150 us: what is left of one goes on in the next tick, and what one leaves of a tick begins the
 // next. (Whole, one took up to 450 us of a tick, and so had every other tick only. In parts of narrow ones a
 // cube of 24,000 voxels pressed at 200 mm/s was 2.2 just noticeable differences off in place of 0.6. Forces
-// on the way into organs of an abdomen are 63 mN off, root of the mean square; with an eighth more, 60, with
-// a tenth or a fifth less, 63 to 73.)
+// on the way into organs of an abdomen are 67 mN off, root of the mean square, and 60 with an eighth more.)
 constexpr std::size_t kContactWork = 4400, kLeastWork = 1000;
 // … and with what is added of results.
 constexpr std::size_t kTickWork = 4900;
