@@ -429,15 +429,14 @@ void Holds::find_first(VoxelId cell, Found& found, Axes& all) const noexcept {
         const auto k = [&](std::size_t axis) {
           return (within ? 2.0F : 1.0F) * link.on(static_cast<int>(axis), static_cast<int>(d));
         };
-        if (other.by == Support::By::tool) {
-          const float along = spring_along(normal_of(other), {k(0), k(1), k(2)});
-          for (std::size_t axis = 0; axis < 3; ++axis) through[axis][d] += kept.axes[axis] * along;
-          for (std::size_t p = 0; p < 3; ++p) tilt[p] += kept.pairs[p] * along;
-          continue;
+        const bool on_tool = other.by == Support::By::tool;
+        const float along = on_tool ? spring_along(normal_of(other), {k(0), k(1), k(2)}) : 0.0F;
+        for (std::size_t axis = 0; axis < 3; ++axis)
+          through[axis][d] += kept.axes[axis] * (on_tool ? along : k(axis));
+        for (std::size_t p = 0; p < 3; ++p) {
+          const auto [a, b] = kPairs[p];
+          tilt[p] += kept.pairs[p] * (on_tool ? along : std::sqrt(k(a) * k(b)));
         }
-        for (std::size_t axis = 0; axis < 3; ++axis) through[axis][d] += kept.axes[axis] * k(axis);
-        for (std::size_t p = 0; p < 3; ++p)
-          tilt[p] += kept.pairs[p] * std::sqrt(k(kPairs[p][0]) * k(kPairs[p][1]));
       }
     }
   });

@@ -39,10 +39,10 @@ constexpr float kFollows = 0.01F;
 constexpr int kTurns = 16, kTurnsAtOnce = 8;
 // Tissue that moved by as many spacings from one result to the next is far from all that is known of it. So
 // many results are then of so many cycles in wide boxes. In the first coarse levels come to rest before them,
-// and what is further away is told what they know: where it stayed behind it would
-// hold back what is in the boxes (by 17 % of the force, where links are at their limits). Where a part
-// without slack is pressed, there is one, which is thorough: no box is wide enough. No bricks meanwhile: of
-// tissue on its way they know little.
+// and what is further away is told what they know: where it stayed behind it would hold back what is in the
+// boxes (by 17 % of the force, where links are at their limits). Where a part without slack is pressed, there
+// is one, which is thorough: no box is wide enough. No bricks meanwhile: of tissue on its way they know
+// little.
 constexpr float kJumped = 5.0F;
 constexpr int kQuickResults = 3;
 constexpr std::array<int, kQuickResults> kWideCycles{3, 4, 2};
