@@ -29,12 +29,35 @@ HYBRID_INLINE void load(const float* at, Floats& out) {
 HYBRID_INLINE void store(const Floats& value, float* at) {
   std::memcpy(at, &value, sizeof value);
 }
+HYBRID_INLINE void broadcast(float value, Floats& out) {
+  out = Floats{} + value;
+}
 // Lanes n − 1 …, and n + 1 …, of a row.
 HYBRID_INLINE void shift_up(const Floats& before, const Floats& value, Floats& out) {
   out = __builtin_shufflevector(before, value, 7, 8, 9, 10, 11, 12, 13, 14);
 }
 HYBRID_INLINE void shift_down(const Floats& value, const Floats& after, Floats& out) {
   out = __builtin_shufflevector(value, after, 1, 2, 3, 4, 5, 6, 7, 8);
+}
+// Lanes n − kBy …, n + kBy …, kBy a power of two.
+template <std::size_t kBy>
+HYBRID_INLINE void shift_up_by(const Floats& before, const Floats& value, Floats& out) {
+  static_assert(kBy < kWidth);
+  out = kBy == 0   ? value
+        : kBy == 1 ? __builtin_shufflevector(before, value, 7, 8, 9, 10, 11, 12, 13, 14)
+        : kBy == 2 ? __builtin_shufflevector(before, value, 6, 7, 8, 9, 10, 11, 12, 13)
+                   : __builtin_shufflevector(before, value, 4, 5, 6, 7, 8, 9, 10, 11);
+}
+template <std::size_t kBy>
+HYBRID_INLINE void shift_down_by(const Floats& value, const Floats& after, Floats& out) {
+  static_assert(kBy < kWidth);
+  out = kBy == 0   ? value
+        : kBy == 1 ? __builtin_shufflevector(value, after, 1, 2, 3, 4, 5, 6, 7, 8)
+        : kBy == 2 ? __builtin_shufflevector(value, after, 2, 3, 4, 5, 6, 7, 8, 9)
+                   : __builtin_shufflevector(value, after, 4, 5, 6, 7, 8, 9, 10, 11);
+}
+HYBRID_INLINE void select(const Masks& mask, const Floats& there, const Floats& elsewhere, Floats& out) {
+  out = mask ? there : elsewhere;
 }
 HYBRID_INLINE bool any_of(const Masks& mask) {
   std::array<std::int64_t, kWidth / 2> halves;
@@ -81,6 +104,10 @@ HYBRID_INLINE void look_up(const Table& table, const Indices& indices, std::size
 template <bool kRaise>
 HYBRID_INLINE void ask(const Floats& from, const Floats& limit, Floats& wanted) {
   wanted = kRaise ? from - limit : from + limit;
+}
+template <bool kRaise>
+HYBRID_INLINE void take_stronger(const Floats& wanted, Floats& now) {
+  now = (kRaise ? wanted > now : wanted < now) ? wanted : now;
 }
 template <bool kRaise>
 HYBRID_INLINE float asked(float from, float limit) {

@@ -4,406 +4,59 @@
 #include <array>
 
 #include "voxel/chain_lanes.h"
+#include "voxel/chain_lanes_512.h"
 #include "voxel/wide.h"
 
 namespace voxel {
 namespace {
 
+namespace narrow {
 using namespace lanes;
+#include "voxel/chain_pull_kernels.h"
+}  // namespace narrow
 
-using RowValues = std::array<Floats, kVectors>;
+#if HYBRID_LANES_512
+#undef HYBRID_INLINE
+#define HYBRID_INLINE HYBRID_INLINE_512
+namespace wide {
+using namespace lanes_512;
+#include "voxel/chain_pull_kernels.h"
+}  // namespace wide
 
-// That which moves nothing.
-constexpr float nobody_asks(bool raise) {
-  return raise ? -kNever : kNever;
+HYBRID_FOR_512 Pulled raise_pulled_512(const Pull& pull, int most_visits, Moved* moves) {
+  return wide::pulled_by_registers<true>(pull, most_visits, moves);
+}
+HYBRID_FOR_512 Pulled lower_pulled_512(const Pull& pull, int most_visits, Moved* moves) {
+  return wide::pulled_by_registers<false>(pull, most_visits, moves);
+}
+#endif
+
+HYBRID_WIDE Pulled raise_pulled_narrow(const Pull& pull, int most_visits, Moved* moves) {
+  return narrow::pulled_by_registers<true>(pull, most_visits, moves);
+}
+HYBRID_WIDE Pulled lower_pulled_narrow(const Pull& pull, int most_visits, Moved* moves) {
+  return narrow::pulled_by_registers<false>(pull, most_visits, moves);
 }
 
-template <bool kRaise>
-HYBRID_INLINE void take_stronger(const Floats& wanted, Floats& now) {
-  now = (kRaise ? wanted > now : wanted < now) ? wanted : now;
-}
-
-// Lanes n − kStep … of a row, 0 < kStep < kRow, `filler` where that is before its first.
-template <std::size_t kStep>
-HYBRID_INLINE void shift_row_up(const RowValues& row, const Floats& filler, RowValues& out) {
-  constexpr std::size_t whole = kStep / kWidth, k = kStep % kWidth;
-#pragma GCC unroll 4
-  for (std::size_t n = 0; n < kVectors; ++n) {
-    const Floats& high = n >= whole ? row[n - whole] : filler;
-    const Floats& low = n > whole ? row[n - whole - 1] : filler;
-    out[n] = k == 0   ? high
-             : k == 1 ? __builtin_shufflevector(low, high, 7, 8, 9, 10, 11, 12, 13, 14)
-             : k == 2 ? __builtin_shufflevector(low, high, 6, 7, 8, 9, 10, 11, 12, 13)
-                      : __builtin_shufflevector(low, high, 4, 5, 6, 7, 8, 9, 10, 11);
-  }
-}
-template <std::size_t kStep>
-HYBRID_INLINE void shift_row_down(const RowValues& row, const Floats& filler, RowValues& out) {
-  constexpr std::size_t whole = kStep / kWidth, k = kStep % kWidth;
-#pragma GCC unroll 4
-  for (std::size_t n = 0; n < kVectors; ++n) {
-    const Floats& low = n + whole < kVectors ? row[n + whole] : filler;
-    const Floats& high = n + whole + 1 < kVectors ? row[n + whole + 1] : filler;
-    out[n] = k == 0   ? low
-             : k == 1 ? __builtin_shufflevector(low, high, 1, 2, 3, 4, 5, 6, 7, 8)
-             : k == 2 ? __builtin_shufflevector(low, high, 2, 3, 4, 5, 6, 7, 8, 9)
-                      : __builtin_shufflevector(low, high, 4, 5, 6, 7, 8, 9, 10, 11);
-  }
-}
-
-template <bool kRaise, bool kUp, std::size_t kStep>
-HYBRID_INLINE void double_path(RowValues& now, RowValues& limit) {
-  const Floats nobody = Floats{} + nobody_asks(kRaise), never = Floats{} + kNever;
-  RowValues from, further;
-  if (kUp) {
-    shift_row_up<kStep>(now, nobody, from);
-    if (kStep < 16) shift_row_up<kStep>(limit, never, further);
-  } else {
-    shift_row_down<kStep>(now, nobody, from);
-    if (kStep < 16) shift_row_down<kStep>(limit, never, further);
-  }
-#pragma GCC unroll 4
-  for (std::size_t n = 0; n < kVectors; ++n) {
-    Floats wanted;
-    ask<kRaise>(from[n], limit[n], wanted);
-    take_stronger<kRaise>(wanted, now[n]);
-    if (kStep < 16) limit[n] += further[n];
-  }
-}
-// All paths of a row that lead up, or down, by doubling: over one link, over two, four, … Five steps, where
-// one link at a time takes up to 31. `limit`: between lanes n − 1 and n (up), n and n + 1 (down).
-template <bool kRaise, bool kUp>
-HYBRID_INLINE void all_paths(RowValues& now, RowValues& limit) {
-  double_path<kRaise, kUp, 1>(now, limit);
-  double_path<kRaise, kUp, 2>(now, limit);
-  double_path<kRaise, kUp, 4>(now, limit);
-  double_path<kRaise, kUp, 8>(now, limit);
-  double_path<kRaise, kUp, 16>(now, limit);
-}
-
-// Does any voxel ask one beside it?
-template <bool kRaise>
-HYBRID_INLINE bool any_asks(const RowValues& now, const RowValues& up, const RowValues& down, float margin) {
-  Masks any{};
-  RowValues left, right;
-  shift_row_up<1>(now, now[0], left);
-  shift_row_down<1>(now, now[kVectors - 1], right);
-#pragma GCC unroll 4
-  for (std::size_t n = 0; n < kVectors; ++n) {
-    Floats a, b;
-    Masks moves;
-    ask<kRaise>(left[n], up[n], a);
-    ask<kRaise>(right[n], down[n], b);
-    take_stronger<kRaise>(b, a);
-    compare<kRaise>(a, now[n], margin, moves);
-    any |= moves;
-  }
-  return any_of(any);
-}
-
-HYBRID_INLINE void fill(float value, RowValues& out) {
-#pragma GCC unroll 4
-  for (std::size_t n = 0; n < kVectors; ++n) out[n] = Floats{} + value;
-}
-HYBRID_INLINE void load_row(const float* at, RowValues& out) {
-#pragma GCC unroll 4
-  for (std::size_t n = 0; n < kVectors; ++n) load(at + n * kWidth, out[n]);
-}
-template <int kRegisters>
-HYBRID_INLINE void look_up_row(const float* half, const Indices& labels, RowValues& out) {
-  const Table table(half);
-#pragma GCC unroll 4
-  for (std::size_t n = 0; n < kVectors; ++n) look_up<kRegisters>(table, labels, n * kWidth, out[n]);
-}
-
-template <bool kRaise, class Limits>
-HYBRID_INLINE void take_from(const RowValues& from, const Limits& limits, RowValues& now) {
-#pragma GCC unroll 4
-  for (std::size_t n = 0; n < kVectors; ++n) {
-    Floats limit, by;
-    limits.in(n, limit);
-    ask<kRaise>(from[n], limit, by);
-    take_stronger<kRaise>(by, now[n]);
-  }
-}
-template <bool kRaise, class Limits>
-HYBRID_INLINE void ask_back(const RowValues& now, Limits& limits, const RowValues& from, float margin,
-                            Masks& any) {
-  limits.turn();
-#pragma GCC unroll 4
-  for (std::size_t n = 0; n < kVectors; ++n) {
-    Floats limit, by;
-    Masks moves;
-    limits.back(n, limit);
-    ask<kRaise>(now[n], limit, by);
-    compare<kRaise>(by, from[n], margin, moves);
-    any |= moves;
-  }
-}
-
-// Limits of the links between a row and the one before it, and as that one is asked in turn: where both are
-// of one label each, and by the labels of each voxel.
-struct AlikeLimits {
-  Floats in_, back_;
-  HYBRID_INLINE AlikeLimits(const PullHalves& half, std::uint8_t own, std::uint8_t other) {
-    in_ = Floats{} + (half.in[own] + half.in[other]);
-    back_ = Floats{} + (half.back[own] + half.back[other]);
-  }
-  HYBRID_INLINE void in(std::size_t, Floats& out) const { out = in_; }
-  HYBRID_INLINE void turn() {}
-  HYBRID_INLINE void back(std::size_t, Floats& out) const { out = back_; }
-};
-
-template <int kRegisters>
-struct LabelLimits {
-  const PullHalves& half;
-  const Indices& own;
-  Indices other;
-  RowValues now;
-  HYBRID_INLINE LabelLimits(const PullHalves& h, const Indices& own_labels, const std::uint8_t* labels)
-      : half(h), own(own_labels), other(labels) {
-    look_up(half.in);
-  }
-  HYBRID_INLINE void look_up(const float* table) {
-    RowValues a, b;
-    look_up_row<kRegisters>(table, own, a);
-    look_up_row<kRegisters>(table, other, b);
-#pragma GCC unroll 4
-    for (std::size_t n = 0; n < kVectors; ++n) now[n] = a[n] + b[n];
-  }
-  HYBRID_INLINE void in(std::size_t n, Floats& out) const {
-    out = now[n];
-  }
-  HYBRID_INLINE void turn() {
-    if (half.in != half.back) look_up(half.back);
-  }
-  HYBRID_INLINE void back(std::size_t n, Floats& out) const {
-    out = now[n];
-  }
-};
-
-template <bool kRaise, int kRegisters>
-HYBRID_INLINE void settle_along(const Pull& p, std::uint8_t label, const std::uint8_t* labels,
-                                const RowValues& before, RowValues& now, std::array<Masks, kVectors>& moves) {
-  RowValues up, down;
-  if (label != 0) {
-    fill(p.up[label] + p.up[label], up);
-    fill(p.down[label] + p.down[label], down);
-  } else {
-    const Indices own(labels);
-    RowValues half, other;
-    look_up_row<kRegisters>(p.up, own, half);
-    shift_row_up<1>(half, half[0], other);
-#pragma GCC unroll 4
-    for (std::size_t n = 0; n < kVectors; ++n) up[n] = half[n] + other[n];
-    if (p.up != p.down) look_up_row<kRegisters>(p.down, own, half);
-    shift_row_down<1>(half, half[0], other);
-#pragma GCC unroll 4
-    for (std::size_t n = 0; n < kVectors; ++n) down[n] = half[n] + other[n];
-  }
-  up[0][0] = down[kVectors - 1][kWidth - 1] = kNever;
-  if (!any_asks<kRaise>(now, up, down, p.margin)) return;
-  RowValues wanted = now;
-  all_paths<kRaise, true>(wanted, up);
-  all_paths<kRaise, false>(wanted, down);
-#pragma GCC unroll 4
-  for (std::size_t n = 0; n < kVectors; ++n) {
-    Masks more;
-    compare<kRaise>(wanted[n], now[n], p.margin, more);
-    now[n] = more ? wanted[n] : now[n];
-    compare<kRaise>(now[n], before[n], p.margin, moves[n]);
-  }
-}
-
-// A row that is being dealt with, and the end of one in x.
-struct RowNow {
-  float* u;
-  const std::uint8_t* labels;
-  std::uint8_t label;  // 0 where it is by label
-  bool has_y, has_z, has_x, closed;
-  const float* x;
-  std::uint8_t x_label;
-};
-
-template <bool kRaise>
-HYBRID_INLINE bool asks_x(const Pull& p, const RowNow& row) {
-  const std::size_t end = p.x_above ? kRow - 1 : 0;
-  const float* const half = p.along_x.back;
-  return beyond<kRaise>(asked<kRaise>(row.u[end], half[row.labels[end]] + half[row.x_label]), *row.x,
-                        p.margin);
-}
-
-// `y`: the row before in y; the row itself afterwards, where it moved.
-template <bool kRaise, int kRegisters, class Limits>
-HYBRID_INLINE Moved pull_row(const Pull& p, const RowNow& row, Limits& by_y, Limits& by_z, const RowValues& z,
-                             RowValues& y) {
-  const std::size_t end = p.x_above ? kRow - 1 : 0;
-  RowValues before, now;
-  load_row(row.u, before);
-  now = before;
-  take_from<kRaise>(y, by_y, now);
-  take_from<kRaise>(z, by_z, now);
-  bool closed = row.closed;
-  if (row.has_x) {
-    const float* const half = p.along_x.in;
-    const float wanted = asked<kRaise>(*row.x, half[row.labels[end]] + half[row.x_label]);
-    if (beyond<kRaise>(wanted, p.x_above ? now[kVectors - 1][kWidth - 1] : now[0][0], p.margin)) {
-      closed = false;
-      if (p.x_above)
-        now[kVectors - 1][kWidth - 1] = wanted;
-      else
-        now[0][0] = wanted;
-    }
-  }
-  std::array<Masks, kVectors> moves;
-  Masks any{};
-#pragma GCC unroll 4
-  for (std::size_t n = 0; n < kVectors; ++n) {
-    compare<kRaise>(now[n], before[n], p.margin, moves[n]);
-    any |= moves[n];
-    now[n] = moves[n] ? now[n] : before[n];
-  }
-  if (!any_of(any)) return kNothingMoved;
-  if (!closed) settle_along<kRaise, kRegisters>(p, row.label, row.labels, before, now, moves);
-#pragma GCC unroll 4
-  for (std::size_t n = 0; n < kVectors; ++n) store(now[n], row.u + n * kWidth);
-  Moved what = moved(moves.front(), moves.back());
-  Masks back_y{}, back_z{};
-  ask_back<kRaise>(now, by_y, y, p.margin, back_y);
-  ask_back<kRaise>(now, by_z, z, p.margin, back_z);
-  if (any_of(back_y | back_z)) {
-    if (row.has_y && any_of(back_y)) what |= kAsksY;
-    if (row.has_z && any_of(back_z)) what |= kAsksZ;
-  }
-  if (row.has_x && (what & (p.x_above ? kLastMoved : kFirstMoved)) != 0 && asks_x<kRaise>(p, row))
-    what |= kAsksX;
-  y = now;
-  return what;
-}
-
-// Within one label, or out of one whose limits allow less: the row's own links then allow whatever those
-// before it ask. Nor does it ask anything of the row before it in y: that has it from the row beside it in z,
-// which asked this row's, or its like before that one, by the same way. (One of the two must be looked at: to
-// leave out z as well would let each rely on the other.) False, and nothing done, where x asks more.
-template <bool kRaise>
-HYBRID_INLINE bool pull_smooth(const Pull& p, const RowNow& row, float limit_y, AlikeLimits& by_z,
-                               const RowValues& z, RowValues& y, Moved& what) {
-  const std::size_t end = p.x_above ? kRow - 1 : 0;
-  RowValues now;
-  std::array<Masks, kVectors> moves;
-  Masks any{};
-#pragma GCC unroll 4
-  for (std::size_t n = 0; n < kVectors; ++n) {
-    Floats before, from_y, from_z;
-    load(row.u + n * kWidth, before);
-    ask<kRaise>(y[n], Floats{} + limit_y, from_y);
-    ask<kRaise>(z[n], by_z.in_, from_z);
-    take_stronger<kRaise>(from_y, from_z);
-    compare<kRaise>(from_z, before, p.margin, moves[n]);
-    any |= moves[n];
-    now[n] = moves[n] ? from_z : before;
-  }
-  if (row.has_x) {
-    const float* const half = p.along_x.in;
-    const float wanted = asked<kRaise>(*row.x, half[row.labels[end]] + half[row.x_label]);
-    if (beyond<kRaise>(wanted, p.x_above ? now[kVectors - 1][kWidth - 1] : now[0][0], p.margin)) return false;
-  }
-  if (!any_of(any)) {
-    what = kNothingMoved;
-    return true;
-  }
-#pragma GCC unroll 4
-  for (std::size_t n = 0; n < kVectors; ++n) store(now[n], row.u + n * kWidth);
-  what = moved(moves.front(), moves.back());
-  Masks back_z{};
-  ask_back<kRaise>(now, by_z, z, p.margin, back_z);
-  if (any_of(back_z)) what |= kAsksZ;
-  if (row.has_x && (what & (p.x_above ? kLastMoved : kFirstMoved)) != 0 && asks_x<kRaise>(p, row))
-    what |= kAsksX;
-  y = now;
-  return true;
-}
-
-template <bool kRaise, int kRegisters>
-HYBRID_INLINE Pulled pulled(const Pull& p, int most_visits, Moved* moved_out) {
-  const std::ptrdiff_t step = p.step, values = step * kRow;
-  const bool has_z = p.z.u != nullptr, has_x = p.x.u != nullptr;
-  constexpr float nobody = nobody_asks(kRaise);
-  const std::ptrdiff_t x_end = p.x_above ? 0 : kRow - 1;
-
-  Pulled result;
-  RowValues y, z;
-  fill(nobody, y);
-  fill(nobody, z);
-  bool on = false;  // the row before moved, and stands in y
-  for (int k = 0; k < p.most && (on || k < p.count) && result.visits < most_visits; ++k) {
-    std::uint8_t& asked_by = p.asked[k * step];
-    moved_out[k] = kNothingMoved;
-    result.end = k + 1;
-    if (!on && (asked_by & p.by) == 0) continue;
-    const RowInfo* const info = p.own.info + k * step;
-    if (info->anchored || (p.y && (info - step)->anchored) || (has_z && p.z.info[k * step].anchored) ||
-        (has_x && p.x.info[k * step].anchored)) {
-      result.end = k;
-      return result;
-    }
-    ++result.visits;
-    asked_by &= static_cast<std::uint8_t>(~p.by);
-    RowNow row{
-        p.own.u + k * values, p.own.labels + k * values, info->label, p.y, has_z, has_x, false, nullptr, 0};
-    if (has_x) {
-      row.x = p.x.u + k * values + x_end;
-      row.x_label = p.x.labels[k * values + x_end];
-    }
-    if (p.y && !on) load_row(row.u - values, y);
-    if (has_z) load_row(p.z.u + k * values, z);
-    const std::uint8_t label = row.label, z_label = has_z ? p.z.info[k * step].label : label,
-                       y_label = p.y ? (info - step)->label : label;
-    if (label != 0 && y_label != 0 && z_label != 0) {
-      AlikeLimits by_y(p.along_y, label, y_label), by_z(p.along_z, label, z_label);
-      // Limits of one label may allow what another's do.
-      const auto allows = [&p, label](std::uint8_t other) {
-        return other == label || (p.up[other] <= p.up[label] && p.down[other] <= p.down[label]);
-      };
-      row.closed = allows(y_label) && allows(z_label);
-      const float* const in = p.along_y.in;
-      const float* const back = p.along_y.back;
-      const bool smooth = row.closed && p.y && has_z && label == y_label &&
-                          p.z.info[(k - 1) * step].label == z_label && in[z_label] <= in[label] &&
-                          back[z_label] <= back[label];
-      if (!smooth || !pull_smooth<kRaise>(p, row, in[label] + in[label], by_z, z, y, moved_out[k]))
-        moved_out[k] = pull_row<kRaise, kRegisters>(p, row, by_y, by_z, z, y);
-    } else {
-      row.label = 0;
-      const Indices own(row.labels);
-      LabelLimits<kRegisters> by_y(p.along_y, own, p.y ? row.labels - values : row.labels),
-          by_z(p.along_z, own, has_z ? p.z.labels + k * values : row.labels);
-      moved_out[k] = pull_row<kRaise, kRegisters>(p, row, by_y, by_z, z, y);
-    }
-    on = moved_out[k] != kNothingMoved;
-  }
-  return result;
-}
-
-template <bool kRaise>
-HYBRID_INLINE Pulled pulled_by_registers(const Pull& pull, int most_visits, Moved* moves) {
-  switch (pull.registers) {
-    case 1:
-      return pulled<kRaise, 1>(pull, most_visits, moves);
-    case 2:
-      return pulled<kRaise, 2>(pull, most_visits, moves);
-    default:
-      return pulled<kRaise, 0>(pull, most_visits, moves);
-  }
-}
+#if HYBRID_LANES_512
+constexpr std::array<PullKernels, 2> kKernels{PullKernels{raise_pulled_narrow, lower_pulled_narrow},
+                                              PullKernels{raise_pulled_512, lower_pulled_512}};
+const std::size_t kCount = lanes_512::has_lanes_512() ? 2 : 1;
+#else
+constexpr std::array<PullKernels, 1> kKernels{PullKernels{raise_pulled_narrow, lower_pulled_narrow}};
+constexpr std::size_t kCount = 1;
+#endif
 
 }  // namespace
 
-HYBRID_WIDE_AND_MANY Pulled raise_pulled(const Pull& pull, int most_visits, Moved* moves) noexcept {
-  return pulled_by_registers<true>(pull, most_visits, moves);
+std::span<const PullKernels> pull_kernels() noexcept {
+  return std::span(kKernels).first(kCount);
 }
-HYBRID_WIDE_AND_MANY Pulled lower_pulled(const Pull& pull, int most_visits, Moved* moves) noexcept {
-  return pulled_by_registers<false>(pull, most_visits, moves);
+Pulled raise_pulled(const Pull& pull, int most_visits, Moved* moves) noexcept {
+  return kKernels[kCount - 1].raise(pull, most_visits, moves);
+}
+Pulled lower_pulled(const Pull& pull, int most_visits, Moved* moves) noexcept {
+  return kKernels[kCount - 1].lower(pull, most_visits, moves);
 }
 
 }  // namespace voxel

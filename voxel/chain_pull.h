@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 #include "voxel/chain_rows.h"
 
@@ -72,5 +73,13 @@ struct Pulled {
 // that has, and after `most_visits`.
 Pulled raise_pulled(const Pull& pull, int most_visits, Moved* moves) noexcept;
 Pulled lower_pulled(const Pull& pull, int most_visits, Moved* moves) noexcept;
+
+// The same for each width of registers that this processor has, narrow ones first: those above are the last.
+// All give the same bits.
+struct PullKernels {
+  Pulled (*raise)(const Pull&, int, Moved*);
+  Pulled (*lower)(const Pull&, int, Moved*);
+};
+std::span<const PullKernels> pull_kernels() noexcept;
 
 }  // namespace voxel

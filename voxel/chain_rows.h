@@ -41,19 +41,29 @@ Moved lower_along(float* row, const std::uint8_t* labels, const HalfLimits& up, 
 Moved raise_along_alike(float* row, float up, float down, float margin) noexcept;
 Moved lower_along_alike(float* row, float up, float down, float margin) noexcept;
 
-// A cone over rows that follow one another, on kCone lanes of each: lane i of row n gets at least
-// apex − n·per_row − fall[i]. Ends before the first row in which lane `nearest`, that with the least fall, is
-// not raised by more than the margin; returns how many rows came before that.
-inline constexpr int kCone = 16;  // a line of the cache
-struct ConeRows {
-  float* first;
-  std::ptrdiff_t step;  // from one to the next (unit: float)
-  int most;
-  std::ptrdiff_t next;  // to that which is asked for soon, and fetched meanwhile (unit: float)
+// A cone over one column of rows that follow one another in y: lane i of row n gets at least
+// apex[n] − fall[i], raised; n is 0 in the row of the cone's apex, and apex falls both ways from there. Each
+// half of a row is a line of the cache, and ends before the first row in which its lane with the least fall
+// is not raised by more than the margin. Where no link was violated, it is raised the less the further it is
+// from the apex, so that is looked for from where it is thought to be.
+struct ConeColumn {
+  float* own = nullptr;     // row 0
+  std::ptrdiff_t next = 0;  // from a row to that which is asked for soon, and fetched meanwhile (unit: float)
+  int up = 0, down = 0;     // rows beyond the own one, at most
+  const float* apex = nullptr;  // [-down … up]
+  const float* fall = nullptr;  // [kRow]
+  int nearest = 0;              // the lane with the least fall
+  bool has_apex = false;        // that lane's half of the own row counts as raised
 };
-int raise_cone(const ConeRows& rows, double apex, double per_row, const float* fall, int nearest,
-               float margin) noexcept;
-int lower_cone(const ConeRows& rows, double apex, double per_row, const float* fall, int nearest,
-               float margin) noexcept;
+// Rows that are raised beyond the own one: of the half with the nearest lane, of the other, at most as many.
+// In the same order first where they are thought to end.
+struct ConeEnds {
+  int near_up = 0, near_down = 0, far_up = 0, far_down = 0;
+};
+// False: the own row is not raised, and none is.
+bool raise_cone(const ConeColumn& column, float margin, ConeEnds& ends) noexcept;
+bool lower_cone(const ConeColumn& column, float margin, ConeEnds& ends) noexcept;
+// out[n] = apex + n·by, n from `from` to `to`, both included.
+void fill_cone_line(double apex, double by, int from, int to, float* out) noexcept;
 
 }  // namespace voxel

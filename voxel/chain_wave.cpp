@@ -18,7 +18,7 @@ ChainWave::ChainWave(const Lattice& lattice)
       limits_(lattice),
       rows_(lattice.grid().rows()),
       ring_(lattice.grid().rows() + 1),
-      moved_(lattice.grid().rows() + 1),
+      moved_(lattice.grid().rows()),
       pulled_(lattice.grid().rows()),
       waiting_(lattice.grid().rows()),
       taken_(lattice.grid().rows()),
@@ -28,7 +28,10 @@ ChainWave::ChainWave(const Lattice& lattice)
                    (static_cast<std::size_t>(lattice.grid().dims[2]) + 2)),
       in_plane_(static_cast<std::size_t>(lattice.grid().columns)),
       moves_(static_cast<std::size_t>(lattice.grid().dims[1])),
-      fall_(static_cast<std::size_t>(lattice.grid().columns) * kRow) {
+      fall_(static_cast<std::size_t>(lattice.grid().columns) * kRow),
+      apexes_(static_cast<std::size_t>(lattice.grid().dims[1])),
+      own_ends_(static_cast<std::size_t>(lattice.grid().columns)),
+      ends_(static_cast<std::size_t>(lattice.grid().columns)) {
   const Grid& grid = lattice.grid();
   free_low_ = grid.dims;
   free_high_.fill(-1);
@@ -72,12 +75,12 @@ void ChainWave::prepare_all() noexcept {
 }
 
 void ChainWave::begin() noexcept {
-  for (std::size_t n = 0; n < moved_count_; ++n) rows_[moved_[n]].mark = 0;
+  moved_.clear();
   for (std::size_t n = 0; n < pulled_count_; ++n) {
     rows_[pulled_[n]].mark = 0;
     pulled_by_[pulled_[n]] = 0;
   }
-  moved_count_ = pulled_count_ = 0;
+  pulled_count_ = 0;
   work_ = 0;
 }
 
@@ -228,7 +231,7 @@ inline void ChainWave::fetch_around(const Pass& p, RowId row) const noexcept {
   const RowInfo info = rows_[row];
   const auto fetch = [&](RowId r) {
     __builtin_prefetch(row_at(p, r));
-    __builtin_prefetch(row_at(p, r) + kCone);
+    __builtin_prefetch(row_at(p, r) + kRow / 2);
   };
   __builtin_prefetch(&rows_[row - grid.row_z]);
   __builtin_prefetch(&rows_[row + grid.row_z]);
@@ -246,7 +249,7 @@ inline void ChainWave::fetch_around(const Pass& p, RowId row) const noexcept {
     __builtin_prefetch(lattice_.labels(row + grid.row_x));
   }
   if ((info.mark & first) != 0) {
-    __builtin_prefetch(row_at(p, row - grid.row_x) + kCone);
+    __builtin_prefetch(row_at(p, row - grid.row_x) + kRow / 2);
     __builtin_prefetch(&rows_[row - grid.row_x]);
     __builtin_prefetch(lattice_.labels(row - grid.row_x));
   }
@@ -380,7 +383,8 @@ std::size_t ChainWave::memory_bytes() const {
   return rows_.resident_bytes() + ring_.resident_bytes() + moved_.resident_bytes() +
          pulled_.resident_bytes() + pulled_by_.resident_bytes() + waiting_.resident_bytes() +
          taken_.resident_bytes() + asked_.resident_bytes() + resident_bytes(asked_spans_) +
-         resident_bytes(in_plane_) + resident_bytes(moves_) + resident_bytes(fall_);
+         resident_bytes(in_plane_) + resident_bytes(moves_) + resident_bytes(fall_) +
+         resident_bytes(apexes_) + resident_bytes(own_ends_) + resident_bytes(ends_);
 }
 
 }  // namespace voxel

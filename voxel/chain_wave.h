@@ -26,6 +26,7 @@
 #include "voxel/chain_rows.h"
 #include "voxel/lattice.h"
 #include "voxel/lazy_array.h"
+#include "voxel/row_runs.h"
 
 namespace voxel {
 
@@ -62,10 +63,9 @@ class ChainWave {
                                   std::uint64_t most = kUnlimited) noexcept;
   void put_back() noexcept;
 
-  void note_moved(RowId row) noexcept;
-  void note_moved(RowId from, int count) noexcept;
+  void note_moved(RowId row) noexcept { moved_.add(row); }
   // Rows that moved since begin(), each once; no order is promised.
-  [[nodiscard]] std::span<const RowId> moved_rows() const { return {moved_.data(), moved_count_}; }
+  [[nodiscard]] const RowRuns& moved_rows() const { return moved_; }
   [[nodiscard]] std::span<const RowId> waiting_rows() const { return {waiting_.data(), waiting_count_}; }
   [[nodiscard]] bool pulled_any() const { return pulled_count_ > 0; }
   [[nodiscard]] std::uint64_t work() const { return work_; }  // row updates since begin()
@@ -74,7 +74,7 @@ class ChainWave {
  private:
   static constexpr std::uint64_t kConeRows = 8;  // of a cone take about as long as one update of a row
   // first, last: since the row was last looked at, its first voxel moved, its last one.
-  enum Mark : std::uint8_t { first = kFirstMoved, last = kLastMoved, queued = 8, moved = 16 };
+  enum Mark : std::uint8_t { first = kFirstMoved, last = kLastMoved, queued = 8 };
   struct Pass {  // one wave
     float* u = nullptr;
     int axis = 0;
@@ -156,13 +156,12 @@ class ChainWave {
   void pull_rows(const Pass& p, Sweep& sweep, int step, const Span& span) noexcept;
   bool pull_by_anchor(const Pass& p, Sweep& sweep, Pull task, RowId row, int y) noexcept;
   void note_pulled_row(Sweep& sweep, RowId row, int y, Moved what) noexcept;
+  void note_asked(Sweep& sweep, RowId row, int y, Moved what) noexcept;
   void leave_sweep(const Pass& p, Sweep& sweep) noexcept;
   bool cone(const Pass& p, VoxelId apex, std::uint64_t most) noexcept;
   [[nodiscard]] Box reach(const Pass& p, VoxelId apex) noexcept;
   [[nodiscard]] bool full(const std::array<int, 3>& low, const std::array<int, 3>& high) noexcept;
   void write_cone(const Pass& p, VoxelId apex, const Box& box) noexcept;
-  int write_column(const Pass& p, RowId row, int nearest, bool has_apex, const Box& box, double base,
-                   const float* fall) noexcept;
   void enqueue_cut_faces(VoxelId apex, const Box& box) noexcept;
 
   const Lattice& lattice_;
@@ -172,14 +171,17 @@ class ChainWave {
   bool free_is_box_ = true;  // the free voxels fill that box
   LazyArray<RowId> ring_;    // queue; a row stands in it at most once
   std::size_t head_ = 0, tail_ = 0;
-  LazyArray<RowId> moved_, pulled_, waiting_, taken_;
-  std::size_t moved_count_ = 0, pulled_count_ = 0, waiting_count_ = 0, taken_count_ = 0;
+  RowRuns moved_;
+  LazyArray<RowId> pulled_, waiting_, taken_;
+  std::size_t pulled_count_ = 0, waiting_count_ = 0, taken_count_ = 0;
   LazyArray<std::uint8_t> pulled_by_;  // [row] bit of each wave that is to ask here for its anchors' sake
   LazyArray<std::uint8_t> asked_;      // [row] Asked bits; 0 between sweeps
   std::vector<Span> asked_spans_;      // [way][column][z + 1] rows among which some are; empty between sweeps
   std::vector<std::array<Span, 2>> in_plane_;  // [column] likewise, of the plane that is being swept
   std::vector<Moved> moves_;                   // [n] of rows that are being swept
-  std::vector<float> fall_;                    // [column][lane] of the cone that is being written
+  std::vector<float> fall_;                    // [column][lane] of the cone that is being written …
+  std::vector<float> apexes_;                  // [y] … how far its rows are moved at most
+  std::vector<ConeEnds> own_ends_, ends_;  // [column] … where it ends in the apex's plane, in the last one
   std::uint64_t work_ = 0, cone_rows_ = 0;
 };
 
@@ -190,27 +192,6 @@ inline void ChainWave::enqueue(RowId row, std::uint8_t ends) noexcept {
   if (waited) return;
   ring_[tail_] = row;
   tail_ = tail_ + 1 == ring_.size() ? 0 : tail_ + 1;
-}
-
-inline void ChainWave::note_moved(RowId row) noexcept {
-  std::uint8_t& mark = rows_[row].mark;
-  moved_[moved_count_] = row;  // one beyond, where it is there already
-  moved_count_ += (mark & moved) == 0 ? 1 : 0;
-  mark |= moved;
-}
-
-// Marks are bytes, which may be anything to the compiler: the count is kept out of their way.
-inline void ChainWave::note_moved(RowId from, int count) noexcept {
-  std::size_t at = moved_count_;
-  RowId* const list = moved_.data();
-  RowInfo* const rows = rows_.data() + from;
-  for (int n = 0; n < count; ++n) {
-    const std::uint8_t mark = rows[n].mark;
-    list[at] = from + static_cast<RowId>(n);
-    at += (mark & moved) == 0 ? 1 : 0;
-    rows[n].mark = mark | moved;
-  }
-  moved_count_ = at;
 }
 
 }  // namespace voxel

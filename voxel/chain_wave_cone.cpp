@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Of ChainWave: cones in closed form.
 #include <algorithm>
+#include <cstdlib>
 
 #include "voxel/chain_rows.h"
 #include "voxel/chain_wave.h"
@@ -14,17 +15,20 @@ constexpr std::uint32_t kAll = 0xFFFFFFFFU;
 
 // How far a cone gets along the three lines through its apex. Where nothing but free voxels is within, those
 // at which it ends included, it raises nothing beyond: what it raises there, it raises all along every
-// shortest way to it, and one of these leads over such a line.
+// shortest way to it, and one of these leads over such a line. (To look for the ends by halves does not do:
+// where a cone lies on an older one, roundings decide which voxels are raised, and it went on to the last.)
 ChainWave::Box ChainWave::reach(const Pass& p, VoxelId apex) noexcept {
   Box box;
   const Grid& grid = lattice_.grid();
+  const std::array<int, 3> at = lattice_.coordinates(apex);
   for (int n = 0; n < kWays; ++n) {
-    const auto un = static_cast<std::size_t>(n);
+    const auto un = static_cast<std::size_t>(n), d = un / 2;
     const double limit = p.limit[un];
+    const int most = n % 2 == 0 ? free_high_[d] - at[d] : at[d] - free_low_[d];
     VoxelId v = apex;
     for (int k = 1;; ++k) {
       v = n % 2 == 0 ? grid.up(v, n / 2) : grid.down(v, n / 2);
-      box.cut[un] = !free(v);
+      box.cut[un] = free_is_box_ ? k > most : !free(v);
       if (box.cut[un]) break;
       const double by =
           (static_cast<double>(p.u[apex]) - static_cast<double>(p.u[v])) * (p.way == Way::raise ? 1.0 : -1.0);
@@ -71,44 +75,13 @@ bool ChainWave::cone(const Pass& p, VoxelId apex, std::uint64_t most) noexcept {
   return true;
 }
 
-// Rows of one column and one z, from `row` up and down in y; lane `nearest` is that nearest to the apex.
-// Returns how many were raised; the apex's own counts as raised.
-int ChainWave::write_column(const Pass& p, RowId row, int nearest, bool has_apex, const Box& box, double base,
-                            const float* fall) noexcept {
-  const auto write = p.way == Way::raise ? raise_cone : lower_cone;
-  const double above = p.limit[2], below = p.limit[3], sign = p.way == Way::raise ? -1.0 : 1.0;
-  const int up = box.steps[2], down = box.steps[3];
-  const std::ptrdiff_t next = static_cast<std::ptrdiff_t>(lattice_.grid().row_z) * kRow;
-  // Where the nearest lane is not raised none is, and beyond no row; so for each half of the row.
-  int n = 0, m = 0;
-  const int half = nearest / kCone * kCone;
-  for (const int lanes : {half, kCone - half}) {
-    const int near = lanes == half ? nearest - half : lanes > half ? 0 : kCone - 1;
-    float* const at = row_at(p, row) + lanes;
-    const float* const f = fall + lanes;
-    const bool apex = has_apex && lanes == half;
-    int raised = 0;
-    if (apex) {
-      raised = write({at, kRow, 1, next}, base, 0.0, f, near, -ChainLimits::kNoLink);
-      raised += write({at + kRow, kRow, up, next}, base + sign * above, above, f, near, p.margin);
-    } else {
-      raised = write({at, kRow, up + 1, next}, base, above, f, near, p.margin);
-      if (raised == 0) break;
-    }
-    const int back = write({at - kRow, -kRow, down, next}, base + sign * below, below, f, near, p.margin);
-    n = std::max(n, raised);
-    m = std::max(m, back);
-  }
-  note_moved(row - static_cast<RowId>(m), n + m);
-  cone_rows_ += static_cast<std::uint64_t>(n + m);
-  return n + m;
-}
-
+// Plane by plane away from the apex, and in each column by column: where a column is not raised at all, none
+// beyond it is.
 void ChainWave::write_cone(const Pass& p, VoxelId apex, const Box& box) noexcept {
   const Grid& grid = lattice_.grid();
   const std::array<int, 3> at = lattice_.coordinates(apex);
   const int low_x = at[0] - box.steps[1], high_x = at[0] + box.steps[0];
-  const int column = at[0] / kRow + 1, low_column = low_x / kRow + 1, high_column = high_x / kRow + 1;
+  const int own_column = at[0] / kRow + 1, low_column = low_x / kRow + 1, high_column = high_x / kRow + 1;
   for (int c = low_column; c <= high_column; ++c) {
     for (int i = 0; i < kRow; ++i) {
       const int x = (c - 1) * kRow + i;
@@ -118,17 +91,59 @@ void ChainWave::write_cone(const Pass& p, VoxelId apex, const Box& box) noexcept
                                   : static_cast<float>(steps * p.limit[x < at[0] ? 1 : 0]);
     }
   }
+  const auto write = p.way == Way::raise ? raise_cone : lower_cone;
   const double sign = p.way == Way::raise ? -1.0 : 1.0, top = static_cast<double>(p.u[apex]);
-  for (int k = -box.steps[5]; k <= box.steps[4]; ++k) {
-    const double base = top + sign * (k < 0 ? -k * p.limit[5] : k * p.limit[4]);
-    const auto line = [&](int c) {
-      const int nearest = c == column ? at[0] % kRow : c > column ? 0 : kRow - 1;
-      return write_column(p, grid.row(c, at[1], at[2] + k), nearest, k == 0 && c == column, box, base,
-                          fall_.data() + static_cast<std::size_t>(c) * kRow);
-    };
-    for (int c = column; c <= high_column && line(c) > 0; ++c) {
+  float* const apexes = apexes_.data() + box.steps[3];
+  ConeColumn column{.up = box.steps[2], .down = box.steps[3], .apex = apexes};
+  // `ends`: first where this one is thought to end.
+  const auto write_column = [&](int c, int z, ConeEnds& ends) {
+    const RowId row = grid.row(c, at[1], z);
+    column.own = row_at(p, row);
+    column.fall = fall_.data() + static_cast<std::size_t>(c) * kRow;
+    column.nearest = c == own_column ? at[0] % kRow : c > own_column ? 0 : kRow - 1;
+    column.has_apex = z == at[2] && c == own_column;
+    if (!write(column, p.margin, ends)) return false;
+    const auto rows = static_cast<RowId>(ends.near_down + 1 + ends.near_up);
+    moved_.add(row - static_cast<RowId>(ends.near_down), rows);
+    cone_rows_ += rows;
+    return true;
+  };
+  const auto fewer = [](const ConeEnds& ends, int by) {
+    return ConeEnds{ends.near_up - by, ends.near_down - by, ends.far_up - by, ends.far_down - by};
+  };
+  const auto begin_plane = [&](int k, int next) {
+    column.next = next * static_cast<std::ptrdiff_t>(grid.row_z) * kRow;
+    const double base = top + sign * std::abs(k) * p.limit[k < 0 ? 5 : 4];
+    fill_cone_line(base, -sign * p.limit[3], -column.down, -1, apexes);
+    fill_cone_line(base, sign * p.limit[2], 0, column.up, apexes);
+  };
+  // The apex's own plane, whose columns end some kRow rows earlier than that before.
+  begin_plane(0, box.steps[4] > 0 ? 1 : -1);
+  const auto own_plane = [&](int from, int by, ConeEnds ends) {
+    for (int c = from; c >= low_column && c <= high_column; c += by) {
+      if (!write_column(c, at[2], ends)) break;
+      own_ends_[static_cast<std::size_t>(c)] = ends;
+      ends = fewer({ends.far_up, ends.far_down, ends.far_up, ends.far_down}, kRow / 2);
     }
-    for (int c = column - 1; c >= low_column && line(c) > 0; --c) {
+  };
+  for (int c = low_column; c <= high_column; ++c) own_ends_[static_cast<std::size_t>(c)] = {};
+  own_plane(own_column, 1, {box.steps[2], box.steps[3], box.steps[2], box.steps[3]});
+  own_plane(own_column - 1, -1, own_ends_[static_cast<std::size_t>(own_column)]);
+  // Those above and below it, whose columns go on to end as they did before.
+  for (const int by : {1, -1}) {
+    std::copy(own_ends_.begin() + low_column, own_ends_.begin() + high_column + 1,
+              ends_.begin() + low_column);
+    for (int k = 1; k <= box.steps[by > 0 ? 4 : 5]; ++k) {
+      begin_plane(by * k, by);
+      const auto go_on = [&](int c) {
+        ConeEnds& ends = ends_[static_cast<std::size_t>(c)];
+        ends = fewer(ends, 1);
+        return write_column(c, at[2] + by * k, ends);
+      };
+      for (int c = own_column; c <= high_column && go_on(c); ++c) {
+      }
+      for (int c = own_column - 1; c >= low_column && go_on(c); --c) {
+      }
     }
   }
 }

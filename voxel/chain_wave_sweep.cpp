@@ -74,10 +74,23 @@ bool ChainWave::begin_sweep(const Pass& p, std::span<const Source> sources, Swee
   return true;
 }
 
+// It moved, and asks the row after it in z, and whoever `what` says.
 inline void ChainWave::note_pulled_row(Sweep& sweep, RowId row, int y, Moved what) noexcept {
+  const Plane& plane = sweep.plane;
+  moved_.add(row);
+  const RowId next = row + static_cast<RowId>(plane.z) * lattice_.grid().row_z;
+  __builtin_prefetch(plane.u + std::size_t{next} * kRow);
+  __builtin_prefetch(plane.u + std::size_t{next} * kRow + kRow / 2);
+  __builtin_prefetch(lattice_.labels(next));
+  asked_[next] |= plane.z > 0 ? kFromBelowZ : kFromAboveZ;
+  sweep.next.add(y);
+  const int across = plane.x > 0 ? kLastMoved : kFirstMoved;
+  if ((what & (kAsksY | kAsksX | kAsksZ | across)) != 0) note_asked(sweep, row, y, what);
+}
+
+void ChainWave::note_asked(Sweep& sweep, RowId row, int y, Moved what) noexcept {
   const RowId row_x = lattice_.grid().row_x, row_z = lattice_.grid().row_z;
   const Plane& plane = sweep.plane;
-  note_moved(row);
   if ((what & kAsksY) != 0) {
     asked_[row - static_cast<RowId>(plane.step)] |= plane.step > 0 ? kFromAboveY : kFromBelowY;
     (plane.step > 0 ? sweep.down : sweep.up).add(y - plane.step);
@@ -92,12 +105,6 @@ inline void ChainWave::note_pulled_row(Sweep& sweep, RowId row, int y, Moved wha
   };
   if ((what & (plane.x > 0 ? kLastMoved : kFirstMoved)) != 0) ask_across(plane.x);
   if ((what & kAsksX) != 0) ask_across(-plane.x);
-  const RowId next = row + static_cast<RowId>(plane.z) * row_z;
-  __builtin_prefetch(sweep.plane.u + std::size_t{next} * kRow);
-  __builtin_prefetch(sweep.plane.u + std::size_t{next} * kRow + kRow / 2);
-  __builtin_prefetch(lattice_.labels(next));
-  asked_[next] |= plane.z > 0 ? kFromBelowZ : kFromAboveZ;
-  sweep.next.add(y);
   if ((what & kAsksZ) != 0) {
     asked_[row - static_cast<RowId>(plane.z) * row_z] |= plane.z > 0 ? kFromAboveZ : kFromBelowZ;
     sweep.back.add(y);
@@ -113,7 +120,7 @@ bool ChainWave::pull_by_anchor(const Pass& p, Sweep& sweep, Pull task, RowId row
   asked_[row] &= static_cast<std::uint8_t>(~task.by);
   if (rows_[row].anchored) {
     for (const RowId r : from) {
-      if ((rows_[r].mark & moved) != 0) enqueue(r);
+      if (moved_.has(r)) enqueue(r);
     }
     return false;
   }

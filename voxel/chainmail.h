@@ -54,7 +54,7 @@ class ChainMail {
   [[nodiscard]] std::span<const RowId> waiting_rows() const { return wave_.waiting_rows(); }
 
   // Rows that moved in the last call, those of the sources included; each once.
-  [[nodiscard]] std::span<const RowId> moved_rows() const { return wave_.moved_rows(); }
+  [[nodiscard]] const RowRuns& moved_rows() const { return wave_.moved_rows(); }
   // Voxels in these rows: what moved, and what stands beside it.
   [[nodiscard]] std::size_t moved_count() const noexcept;
   // Row updates of the last call.
