@@ -155,8 +155,7 @@ class ChainWave {
   void sweep_rows(const Pass& p, Sweep& sweep, int column, int x, const Span& span) noexcept;
   void pull_rows(const Pass& p, Sweep& sweep, int step, const Span& span) noexcept;
   bool pull_by_anchor(const Pass& p, Sweep& sweep, Pull task, RowId row, int y) noexcept;
-  void note_pulled_row(Sweep& sweep, RowId row, int y, Moved what) noexcept;
-  void note_asked(Sweep& sweep, RowId row, int y, Moved what) noexcept;
+  void note_pulled(Sweep& sweep, RowId row, int y, int count) noexcept;
   void leave_sweep(const Pass& p, Sweep& sweep) noexcept;
   bool cone(const Pass& p, VoxelId apex, std::uint64_t most) noexcept;
   [[nodiscard]] Box reach(const Pass& p, VoxelId apex) noexcept;

@@ -74,41 +74,58 @@ bool ChainWave::begin_sweep(const Pass& p, std::span<const Source> sources, Swee
   return true;
 }
 
-// It moved, and asks the row after it in z, and whoever `what` says.
-inline void ChainWave::note_pulled_row(Sweep& sweep, RowId row, int y, Moved what) noexcept {
+// Of `count` rows from `row` on, y upwards or downwards, those that moved ask the rows after them in z, and
+// whoever moves_ says.
+void ChainWave::note_pulled(Sweep& sweep, RowId row, int y, int count) noexcept {
   const Plane& plane = sweep.plane;
-  moved_.add(row);
-  const RowId next = row + static_cast<RowId>(plane.z) * lattice_.grid().row_z;
-  __builtin_prefetch(plane.u + std::size_t{next} * kRow);
-  __builtin_prefetch(plane.u + std::size_t{next} * kRow + kRow / 2);
-  __builtin_prefetch(lattice_.labels(next));
-  asked_[next] |= plane.z > 0 ? kFromBelowZ : kFromAboveZ;
-  sweep.next.add(y);
-  const int across = plane.x > 0 ? kLastMoved : kFirstMoved;
-  if ((what & (kAsksY | kAsksX | kAsksZ | across)) != 0) note_asked(sweep, row, y, what);
-}
-
-void ChainWave::note_asked(Sweep& sweep, RowId row, int y, Moved what) noexcept {
   const RowId row_x = lattice_.grid().row_x, row_z = lattice_.grid().row_z;
-  const Plane& plane = sweep.plane;
-  if ((what & kAsksY) != 0) {
-    asked_[row - static_cast<RowId>(plane.step)] |= plane.step > 0 ? kFromAboveY : kFromBelowY;
-    (plane.step > 0 ? sweep.down : sweep.up).add(y - plane.step);
+  const RowId next = static_cast<RowId>(plane.z) * row_z, beside = static_cast<RowId>(plane.x) * row_x;
+  const std::uint8_t from_z = plane.z > 0 ? kFromBelowZ : kFromAboveZ,
+                     back_z = plane.z > 0 ? kFromAboveZ : kFromBelowZ,
+                     from_x = plane.x > 0 ? kFromBelowX : kFromAboveX,
+                     back_x = plane.x > 0 ? kFromAboveX : kFromBelowX;
+  const int at_end = plane.x > 0 ? kLastMoved : kFirstMoved;
+  // All rows of a line are looked up together.
+  (void)info(row + beside);
+  (void)info(row - beside);
+  Span moved, asked_beside, asked_back;
+  for (int k = 0; k < count; ++k) {
+    const Moved what = moves_[static_cast<std::size_t>(k)];
+    if (what == kNothingMoved) continue;
+    const RowId r = row + static_cast<RowId>(k * plane.step);
+    const int at = y + k * plane.step;
+    moved_.add(r);
+    moved.add(at);
+    __builtin_prefetch(plane.u + std::size_t{r + next} * kRow);
+    __builtin_prefetch(plane.u + std::size_t{r + next} * kRow + kRow / 2);
+    __builtin_prefetch(lattice_.labels(r + next));
+    asked_[r + next] |= from_z;
+    if ((what & at_end) != 0 && rows_[r + beside].filled) {
+      asked_[r + beside] |= from_x;
+      asked_beside.add(at);
+    }
+    if ((what & (kAsksY | kAsksX | kAsksZ)) == 0) continue;
+    if ((what & kAsksY) != 0) {
+      asked_[r - static_cast<RowId>(plane.step)] |= plane.step > 0 ? kFromAboveY : kFromBelowY;
+      (plane.step > 0 ? sweep.down : sweep.up).add(at - plane.step);
+    }
+    if ((what & kAsksX) != 0 && rows_[r - beside].filled) {
+      asked_[r - beside] |= back_x;
+      asked_back.add(at);
+    }
+    if ((what & kAsksZ) != 0) {
+      asked_[r - next] |= back_z;
+      sweep.back.add(at);
+    }
   }
-  const auto ask_across = [&](int x) {
-    const RowId to = row + static_cast<RowId>(x) * row_x;
-    if (!info(to).filled) return;
-    asked_[to] |= x > 0 ? kFromBelowX : kFromAboveX;
-    const int column = plane.column + x;
-    in_plane_[static_cast<std::size_t>(column)][x > 0 ? 0 : 1].add(y);
-    sweep.columns.add(column);
+  sweep.next.add(moved);
+  const auto ask_column = [&](int x, const Span& span) {
+    if (span.empty()) return;
+    in_plane_[static_cast<std::size_t>(plane.column + x)][x > 0 ? 0 : 1].add(span);
+    sweep.columns.add(plane.column + x);
   };
-  if ((what & (plane.x > 0 ? kLastMoved : kFirstMoved)) != 0) ask_across(plane.x);
-  if ((what & kAsksX) != 0) ask_across(-plane.x);
-  if ((what & kAsksZ) != 0) {
-    asked_[row - static_cast<RowId>(plane.z) * row_z] |= plane.z > 0 ? kFromAboveZ : kFromBelowZ;
-    sweep.back.add(y);
-  }
+  ask_column(plane.x, asked_beside);
+  ask_column(-plane.x, asked_back);
 }
 
 // Beside anchors, or with one in it, a row is dealt with by itself, and what is asked of anchors by the
@@ -131,10 +148,9 @@ bool ChainWave::pull_by_anchor(const Pass& p, Sweep& sweep, Pull task, RowId row
   task.count = task.most = 1;
   std::uint8_t asked = 1;
   task.asked = &asked;
-  Moved what = kNothingMoved;
-  (p.way == Way::raise ? raise_pulled : lower_pulled)(task, 1, &what);
-  if (what == kNothingMoved) return false;
-  note_pulled_row(sweep, row, y, what);
+  (p.way == Way::raise ? raise_pulled : lower_pulled)(task, 1, moves_.data());
+  if (moves_.front() == kNothingMoved) return false;
+  note_pulled(sweep, row, y, 1);
   enqueue(row);
   return true;
 }
@@ -176,11 +192,7 @@ void ChainWave::pull_rows(const Pass& p, Sweep& sweep, int step, const Span& spa
       const std::uint64_t left = sweep.most - std::min(sweep.most, sweep.visits);
       const int most = static_cast<int>(std::min<std::uint64_t>(left, 1U << 30U));
       done = (p.way == Way::raise ? raise_pulled : lower_pulled)(task, most, moves_.data());
-      for (int k = 0; k < done.end; ++k) {
-        const Moved what = moves_[static_cast<std::size_t>(k)];
-        if (what != kNothingMoved)
-          note_pulled_row(sweep, row + static_cast<RowId>(k * step), y + k * step, what);
-      }
+      note_pulled(sweep, row, y, done.end);
       on = done.end > 0 && moves_[static_cast<std::size_t>(done.end - 1)] != kNothingMoved;
       if (done.visits >= most) sweep.stopped = true;
     }
