@@ -190,8 +190,9 @@ HYBRID_INLINE bool cone(const ConeColumn& c, float margin, ConeEnds& ends) {
     float* const row = c.own + n * kRow;
     __builtin_prefetch(row + c.next, 1);
     __builtin_prefetch(row + c.next + kHalf, 1);
-    __builtin_prefetch(row + kConeAhead * kRow, 1);
-    __builtin_prefetch(row + kConeAhead * kRow + kHalf, 1);
+    const float* const ahead = row + (both_to - n < kConeAhead ? both_to - n : kConeAhead) * kRow;
+    __builtin_prefetch(ahead, 1);
+    __builtin_prefetch(ahead + kHalf, 1);
     near.write<kRaise>(row, c.apex[n]);
     far.write<kRaise>(row, c.apex[n]);
   }
