@@ -121,8 +121,9 @@ void ChainWave::note_pulled(Sweep& sweep, RowId row, int y, int count) noexcept 
   sweep.next.add(moved);
   const auto ask_column = [&](int x, const Span& span) {
     if (span.empty()) return;
-    in_plane_[static_cast<std::size_t>(plane.column + x)][x > 0 ? 0 : 1].add(span);
-    sweep.columns.add(plane.column + x);
+    const int column = plane.column + x;
+    in_plane_[static_cast<std::size_t>(column)][x > 0 ? 0 : 1].add(span);
+    sweep.columns.add(column);
   };
   ask_column(plane.x, asked_beside);
   ask_column(-plane.x, asked_back);
