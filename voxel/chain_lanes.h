@@ -32,13 +32,6 @@ HYBRID_INLINE void store(const Floats& value, float* at) {
 HYBRID_INLINE void broadcast(float value, Floats& out) {
   out = Floats{} + value;
 }
-// Lanes n − 1 …, and n + 1 …, of a row.
-HYBRID_INLINE void shift_up(const Floats& before, const Floats& value, Floats& out) {
-  out = __builtin_shufflevector(before, value, 7, 8, 9, 10, 11, 12, 13, 14);
-}
-HYBRID_INLINE void shift_down(const Floats& value, const Floats& after, Floats& out) {
-  out = __builtin_shufflevector(value, after, 1, 2, 3, 4, 5, 6, 7, 8);
-}
 // Lanes n − kBy …, n + kBy …, kBy a power of two.
 template <std::size_t kBy>
 HYBRID_INLINE void shift_up_by(const Floats& before, const Floats& value, Floats& out) {

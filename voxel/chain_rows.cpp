@@ -57,8 +57,8 @@ HYBRID_INLINE Moved along(float* row, float margin, const Below& below, const Ab
 #pragma GCC unroll 4
     for (std::size_t n = 0; n < kVectors; ++n) {
       Floats left, right, a, b;
-      shift_up(now[n == 0 ? 0 : n - 1], now[n], left);
-      shift_down(now[n], now[n + 1 == kVectors ? n : n + 1], right);
+      shift_up_by<1>(now[n == 0 ? 0 : n - 1], now[n], left);
+      shift_down_by<1>(now[n], now[n + 1 == kVectors ? n : n + 1], right);
       ask<kRaise>(left, from_below[n], a);
       ask<kRaise>(right, from_above[n], b);
       wanted[n] = (kRaise ? a > b : a < b) ? a : b;
