@@ -17,6 +17,8 @@
 
 namespace voxel::lanes_512 {
 
+using lanes::asked;
+using lanes::beyond;
 using lanes::kNever;
 
 constexpr std::size_t kWidth = 16, kVectors = kRow / kWidth;
@@ -97,14 +99,6 @@ HYBRID_INLINE_512 void ask(const Floats& from, const Floats& limit, Floats& want
 template <bool kRaise>
 HYBRID_INLINE_512 void take_stronger(const Floats& wanted, Floats& now) {
   now = kRaise ? _mm512_maskz_max_ps(kAllLanes, wanted, now) : _mm512_maskz_min_ps(kAllLanes, wanted, now);
-}
-template <bool kRaise>
-HYBRID_INLINE_512 float asked(float from, float limit) {
-  return kRaise ? from - limit : from + limit;
-}
-template <bool kRaise>
-HYBRID_INLINE_512 bool beyond(float wanted, float now, float margin) {
-  return kRaise ? wanted > now + margin : wanted < now - margin;
 }
 template <bool kRaise>
 HYBRID_INLINE_512 void compare(const Floats& wanted, const Floats& now, float margin, Masks& moves) {

@@ -267,15 +267,15 @@ HYBRID_INLINE Moved pull_row(const Pull& p, const RowNow& row, Limits& by_y, Lim
 // Rows of one label that follow one another, beside rows of one label in z and in x (0: none there).
 struct SmoothRows {
   std::uint8_t label, z_label, x_label;
-  float limit_y, z_in, z_back, x_in, x_back;
+  AlikeLimits by_y, by_z;
+  float x_in, x_back;
 
   HYBRID_INLINE SmoothRows(const Pull& p, std::uint8_t own, std::uint8_t z, std::uint8_t x)
       : label(own),
         z_label(z),
         x_label(x),
-        limit_y(p.along_y.in[own] + p.along_y.in[own]),
-        z_in(p.along_z.in[own] + p.along_z.in[z]),
-        z_back(p.along_z.back[own] + p.along_z.back[z]),
+        by_y(p.along_y, own, own),
+        by_z(p.along_z, own, z),
         x_in(p.along_x.in[own] + p.along_x.in[x]),
         x_back(p.along_x.back[own] + p.along_x.back[x]) {}
   [[nodiscard]] static HYBRID_INLINE bool one_label(const RowInfo& info) {
@@ -293,8 +293,7 @@ struct SmoothRows {
 // which asked this row's, or its like before that one, by the same way. (One of the two must be looked at: to
 // leave out z as well would let each rely on the other.) False, and nothing done, where x asks more.
 template <bool kRaise>
-HYBRID_INLINE bool pull_smooth(const Pull& p, const SmoothRows& rows, std::ptrdiff_t k, RowValues& y,
-                               Moved& what) {
+HYBRID_INLINE bool pull_smooth(const Pull& p, SmoothRows& rows, std::ptrdiff_t k, RowValues& y, Moved& what) {
   const std::ptrdiff_t at = k * p.step * kRow;
   const std::size_t end = p.x_above ? kRow - 1 : 0;
   float* const u = p.own.u + at;
@@ -302,16 +301,13 @@ HYBRID_INLINE bool pull_smooth(const Pull& p, const SmoothRows& rows, std::ptrdi
   RowValues now, z;
   std::array<Masks, kVectors> moves;
   Masks any{};
-  Floats limit_y, z_in, z_back;
-  broadcast(rows.limit_y, limit_y);
-  broadcast(rows.z_in, z_in);
   load_row(p.z.u + at, z);
 #pragma GCC unroll 4
   for (std::size_t n = 0; n < kVectors; ++n) {
     Floats before, from_y, from_z;
     load(u + n * kWidth, before);
-    ask<kRaise>(y[n], limit_y, from_y);
-    ask<kRaise>(z[n], z_in, from_z);
+    ask<kRaise>(y[n], rows.by_y.in_, from_y);
+    ask<kRaise>(z[n], rows.by_z.in_, from_z);
     take_stronger<kRaise>(from_y, from_z);
     compare<kRaise>(from_z, before, p.margin, moves[n]);
     any |= moves[n];
@@ -325,16 +321,8 @@ HYBRID_INLINE bool pull_smooth(const Pull& p, const SmoothRows& rows, std::ptrdi
 #pragma GCC unroll 4
   for (std::size_t n = 0; n < kVectors; ++n) store(now[n], u + n * kWidth);
   what = moved(moves.front(), moves.back());
-  broadcast(rows.z_back, z_back);
   Masks back{};
-#pragma GCC unroll 4
-  for (std::size_t n = 0; n < kVectors; ++n) {
-    Floats by;
-    Masks asks;
-    ask<kRaise>(now[n], z_back, by);
-    compare<kRaise>(by, z[n], p.margin, asks);
-    back |= asks;
-  }
+  ask_back<kRaise>(now, rows.by_z, z, p.margin, back);
   if (any_of(back)) what |= kAsksZ;
   if ((what & (p.x_above ? kLastMoved : kFirstMoved)) != 0 &&
       beyond<kRaise>(asked<kRaise>(u[end], rows.x_back), x, p.margin))
@@ -387,7 +375,7 @@ HYBRID_INLINE Pulled pulled(const Pull& p, int most_visits, Moved* moved_out) {
         p.z.info[(k - 1) * step].label == z_label && SmoothRows::one_label(p.x.info[k * step]) &&
         p.along_y.in[z_label] <= p.along_y.in[label] && p.along_y.back[z_label] <= p.along_y.back[label]) {
       // As long as rows are of the same kind, and one after the other moves.
-      const SmoothRows rows(p, label, z_label, p.x.info[k * step].label);
+      SmoothRows rows(p, label, z_label, p.x.info[k * step].label);
       bool done = false;
       while (pull_smooth<kRaise>(p, rows, k, y, moved_out[k])) {
         on = moved_out[k] != kNothingMoved;

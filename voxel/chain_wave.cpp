@@ -76,10 +76,7 @@ void ChainWave::prepare_all() noexcept {
 
 void ChainWave::begin() noexcept {
   moved_.clear();
-  for (std::size_t n = 0; n < pulled_count_; ++n) {
-    rows_[pulled_[n]].mark = 0;
-    pulled_by_[pulled_[n]] = 0;
-  }
+  for (std::size_t n = 0; n < pulled_count_; ++n) pulled_by_[pulled_[n]] = 0;
   pulled_count_ = 0;
   work_ = 0;
 }
