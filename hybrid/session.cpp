@@ -147,8 +147,11 @@ class Run {
     result_.ticks = ticks_done_;
     result_.state_hash = hash_state(hash_, state_);
     if (ticks_done_ > 0) result_.rms_force_N = std::sqrt(sum_force2_ / static_cast<double>(ticks_done_));
-    if (result_.error.samples > 0)
+    if (result_.error.samples > 0) {
       result_.error.rms_N = std::sqrt(result_.error.rms_N / result_.error.samples);
+      result_.error.p99_N = percentiles(errors_N_).p99;
+      result_.error.p99_jnd = percentiles(errors_jnd_).p99;
+    }
     return std::move(result_);
   }
 
@@ -238,7 +241,10 @@ class Run {
     ++result_.error.samples;
     result_.error.max_N = std::max(result_.error.max_N, error);
     result_.error.rms_N += error * error;
-    result_.error.max_jnd = std::max(result_.error.max_jnd, jnd_of(raw, *reference, jnd_floor_N(scene_)));
+    const double jnd = jnd_of(raw, *reference, jnd_floor_N(scene_));
+    result_.error.max_jnd = std::max(result_.error.max_jnd, jnd);
+    errors_N_.push_back(error);
+    errors_jnd_.push_back(jnd);
   }
 
   void measure_clearance(std::uint64_t tick) {
@@ -271,6 +277,7 @@ class Run {
   double dt_;
   WorkShare work_share_;
   TimeSpread late_us_;
+  std::vector<double> errors_N_, errors_jnd_;  // of sampled ticks
   std::chrono::steady_clock::time_point said_ = std::chrono::steady_clock::now();
   std::uint64_t clearance_every_ = 1;
   std::uint64_t ticks_ = 0, ticks_done_ = 0, sample_every_ = 0, soft_ticks_ = 0, hash_ = kHashBegin;

@@ -60,7 +60,7 @@ struct SessionOptions {
 struct ForceError {  // of the tick's force against the equilibrium lattice with its limits, at the sampled
                      // ticks
   int samples = 0;
-  double max_N = 0.0, rms_N = 0.0, max_jnd = 0.0;
+  double max_N = 0.0, rms_N = 0.0, max_jnd = 0.0, p99_N = 0.0, p99_jnd = 0.0;
 };
 
 struct SessionResult {

@@ -17,32 +17,51 @@ std::size_t index(int i) {
 
 }  // namespace
 
-struct CompositeGrid::Passes {
-  static composite::View view(Level& level, std::size_t axis, const CompositeGrid& grid, bool finest) {
-    const std::size_t from = level.first_row();
-    composite::View v{};
-    v.u = level.u[axis].data() + from;
-    v.f = finest ? nullptr : level.f.data() + from;
-    v.least = level.bounded[0] ? level.bound[0].data() + from : nullptr;
-    v.most_negative = level.bounded[1] ? level.bound[1].data() + from : nullptr;
-    v.residual = level.residual.data() + from;
-    v.follows = level.follows.data() + from;
-    v.stuck = level.stuck.data() + from;
-    v.drag = level.drag.data() + from;
-    v.with_drag = level.dragged ? level.with_drag.data() + from : nullptr;
-    for (std::size_t d = 0; d < 3; ++d) {
-      v.link[d] = level.weight[d].data() + from;
-      v.spring[d] = grid.spring_[d][axis];
-      v.first[d] = level.line[d].first;
-      v.last[d] = level.line[d].last;
-    }
-    v.inverse = level.inverse[axis].data() + from;
-    v.all = level.all[axis].data() + from;
-    v.stride = level.stride;
-    v.plane = level.plane;
-    return v;
+composite::View CompositeGrid::view(std::size_t l, std::size_t axis) noexcept {
+  Level& level = levels_[l];
+  const std::size_t from = level.first_row();
+  composite::View v{};
+  v.u = level.u[axis].data() + from;
+  v.f = l == 0 ? nullptr : level.f.data() + from;
+  v.least = level.bounded[0] ? level.bound[0].data() + from : nullptr;
+  v.most_negative = level.bounded[1] ? level.bound[1].data() + from : nullptr;
+  v.residual = level.residual.data() + from;
+  v.follows = level.follows.data() + from;
+  v.stuck = level.stuck.data() + from;
+  v.drag = level.drag.data() + from;
+  v.with_drag = level.dragged ? level.with_drag.data() + from : nullptr;
+  for (std::size_t d = 0; d < 3; ++d) {
+    v.link[d] = level.weight[d].data() + from;
+    v.spring[d] = spring_[d][axis];
+    v.first[d] = level.line[d].first;
+    v.last[d] = level.line[d].last;
   }
-};
+  v.inverse = level.inverse[axis].data() + from;
+  v.all = level.all[axis].data() + from;
+  v.stride = level.stride;
+  v.plane = level.plane;
+  return v;
+}
+
+// Under a finer level a level has what that has.
+void CompositeGrid::take_from_finer(std::size_t l, std::size_t a) noexcept {
+  const Level& fine = levels_[l - 1];
+  Level& coarse = levels_[l];
+  const auto& line = fine.line;
+  // One that stands beyond the last node of the finer level has what that has.
+  const auto nearest = [&](std::size_t d, int c) {
+    return index(std::clamp(line[d].fine[index(c)], 0, line[d].count - 1));
+  };
+  for (int k = line[2].coarse_first; k <= line[2].coarse_last; ++k) {
+    for (int j = line[1].coarse_first; j <= line[1].coarse_last; ++j) {
+      const float* from =
+          fine.u[a].data() + fine.row(static_cast<int>(nearest(1, j)), static_cast<int>(nearest(2, k)));
+      float* to = coarse.u[a].data() + coarse.row(j, k);
+      for (int i = line[0].coarse_first; i <= line[0].coarse_last; ++i) to[i] = from[nearest(0, i)];
+    }
+  }
+  spread_to_ghosts(coarse, coarse.u[a].data());
+}
 
 // Under a level the next one has what it has, and loads with which it is as far from rest.
 void CompositeGrid::pass_on(std::size_t l, std::size_t a) noexcept {
@@ -54,31 +73,19 @@ void CompositeGrid::pass_on(std::size_t l, std::size_t a) noexcept {
     first[d] = line[d].coarse_first;
     last[d] = line[d].coarse_last;
   }
-  // One that stands beyond the last node of the finer level has what that has.
-  const auto nearest = [&](std::size_t d, int c) {
-    return index(std::clamp(line[d].fine[index(c)], 0, line[d].count - 1));
-  };
-  const composite::View view = Passes::view(fine, a, *this, l == 0);
-  composite::residual_of_level(view);
+  const composite::View here = view(l, a);
+  composite::residual_of_level(here);
   // Boxes end where something else is known of: what is stuck there is stuck here.
   const bool any_stuck = fine.bounded[0] || fine.bounded[1] || fine.dragged;
   if (any_stuck) {
     if (!fine.dragged) std::fill(fine.drag.begin(), fine.drag.end(), 0.0F);
     take_drags(l, a);
-    composite::drags_of_level(view);
+    composite::drags_of_level(here);
   }
-  for (int k = first[2]; k <= last[2]; ++k) {
-    for (int j = first[1]; j <= last[1]; ++j) {
-      const float* from =
-          fine.u[a].data() + fine.row(static_cast<int>(nearest(1, j)), static_cast<int>(nearest(2, k)));
-      float* to = coarse.u[a].data() + coarse.row(j, k);
-      for (int i = first[0]; i <= last[0]; ++i) to[i] = from[nearest(0, i)];
-    }
-  }
-  spread_to_ghosts(coarse, coarse.u[a].data());
+  take_from_finer(l + 1, a);
   const std::size_t begin = coarse.first_row(), floats = coarse.floats();
   std::fill_n(coarse.f.begin() + static_cast<std::ptrdiff_t>(begin), floats, 0.0F);
-  composite::links_of_level(Passes::view(coarse, a, *this, false), first, last);
+  composite::links_of_level(view(l + 1, a), first, last);
   restrict_to(coarse, fine, fine.residual.data(), coarse.f.data());
   for (int k = first[2]; k <= last[2]; ++k) {
     for (int j = first[1]; j <= last[1]; ++j) {
@@ -143,7 +150,7 @@ void CompositeGrid::restrict_to(Level& coarse, const Level& fine, const float* f
 void CompositeGrid::take_drags(std::size_t l, std::size_t a) noexcept {
   Level& level = levels_[l];
   if (!level.dragged) return;
-  composite::take_drags(Passes::view(level, a, *this, false), level.f.data() + level.first_row());
+  composite::take_drags(view(l, a), level.f.data() + level.first_row());
 }
 
 // A row of a level, as the next coarser one has it in `from`.
@@ -223,7 +230,7 @@ void CompositeGrid::cycle(const std::array<bool, 3>& axes) noexcept {
                                level.floats());
     }
     const auto smooth = [this, a](std::size_t l) {
-      composite::smooth_level(Passes::view(levels_[l], a, *this, l == 0));
+      composite::smooth_level(view(l, a));
       work_ += levels_[l].floats() / 8;
     };
     // Nothing is smoothed on the way down: from far away, as when a tool jumps, a level that follows its
@@ -244,6 +251,7 @@ void CompositeGrid::cycle(const std::array<bool, 3>& axes) noexcept {
                            bound(level, 0), bound(level, 1), level.floats());
     }
     spread_to_ghosts(levels_[0], levels_[0].u[a].data());
+    fit_far_field(a);
   }
 }
 

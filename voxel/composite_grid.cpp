@@ -87,14 +87,6 @@ void CompositeGrid::set_fine(const Place& voxel, const glm::dvec3& u) noexcept {
   for (std::size_t a = 0; a < 3; ++a) levels_[0].u[a][n] = static_cast<float>(u[static_cast<int>(a)]);
 }
 
-void CompositeGrid::scale(std::size_t axis, double factor) noexcept {
-  const auto by = static_cast<float>(factor);
-  for (Level& level : levels_) {
-    const std::size_t end = level.first_row() + level.floats();
-    for (std::size_t n = level.first_row(); n < end; ++n) level.u[axis][n] *= by;
-  }
-}
-
 glm::dvec3 CompositeGrid::link_minimum(const Place& voxel) const noexcept {
   const Level& level = levels_[0];
   const std::size_t n = fine_node(voxel);

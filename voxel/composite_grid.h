@@ -35,6 +35,9 @@
 #include "voxel/tissue_cells.h"
 
 namespace voxel {
+namespace composite {
+struct View;
+}
 
 class CompositeGrid {
  public:
@@ -69,8 +72,9 @@ class CompositeGrid {
   // The displacement nearest to `u` that the chain lets a voxel have, anchors standing still (m).
   [[nodiscard]] glm::dvec3 within_anchors(const Place& voxel, const glm::dvec3& u) const noexcept;
 
-  // All displacements along an axis times a factor.
-  void scale(std::size_t axis, double factor) noexcept;
+  // Before a cycle, of a contact that has gone on: displacements along an axis grow by this share of
+  // themselves, none by more than the contact did (m).
+  void grow(std::size_t axis, double share, double most_m) noexcept;
   // Before a cycle: nothing is pressed; then, each voxel of level 0 that is pressed along `normal`.
   void clear_pressed() noexcept { pressed_.clear(); }
   void press(const Place& voxel, const glm::dvec3& u, const glm::dvec3& normal) noexcept;
@@ -175,7 +179,6 @@ class CompositeGrid {
     Place node;
     glm::vec3 u, normal;
   };
-  struct Passes;  // innermost loops (composite_passes.cpp)
 
   [[nodiscard]] std::string wrong_somewhere();
   // Wide enough that a level holds the finer one wherever the contact is among their nodes.
@@ -220,12 +223,15 @@ class CompositeGrid {
                      const Place& high) const noexcept;
   void spread_round_gaps(Level& level, std::size_t axis, std::size_t kind) const noexcept;
   // ---- composite_cycle.cpp ----
+  [[nodiscard]] composite::View view(std::size_t l, std::size_t axis) noexcept;
+  void take_from_finer(std::size_t l, std::size_t axis) noexcept;
   void pass_on(std::size_t l, std::size_t axis) noexcept;
   void restrict_to(Level& coarse, const Level& fine, const float* from, float* to) const noexcept;
   void take_drags(std::size_t l, std::size_t axis) noexcept;
   void tell(std::size_t l, std::size_t axis) noexcept;
   void tell_row(Level& fine, const Level& coarse, std::size_t axis, const float* from, int j, int k,
                 bool adds) const noexcept;
+  void fit_far_field(std::size_t axis) noexcept;  // composite_far_field.cpp
   [[nodiscard]] glm::dvec3 interpolate(const Level& level, const std::array<double, 3>& place) const noexcept;
   [[nodiscard]] Place shifted(const Place& voxel) const {
     return {voxel[0] + cells_.offset()[0], voxel[1] + cells_.offset()[1], voxel[2] + cells_.offset()[2]};

@@ -324,4 +324,101 @@ HYBRID_WIDE void note_held(float* held, const float* u, const float* least, cons
   }
 }
 
+HYBRID_WIDE void beyond_bounds(const float* u, const float* least, const float* most_negative, float* beyond,
+                               std::size_t count) noexcept {
+  const Octet zero{};
+  for (std::size_t n = 0; n < count; n += kOctet) {
+    Octet x, low = zero, high = zero, bound;
+    load(x, u + n);
+    if (least != nullptr) {
+      load(bound, least + n);
+      low = bound > zero ? bound : zero;
+    }
+    if (most_negative != nullptr) {
+      load(bound, most_negative + n);
+      high = bound > zero ? -bound : zero;
+    }
+    // Above 0 what holds it below, under 0 what holds it above.
+    const Octet up = x - low, down = x - high;
+    store(beyond + n, x > zero ? (up > zero ? up : zero) : (down < zero ? down : zero));
+  }
+}
+
+HYBRID_WIDE Along along_mode(const View& v, const float* mode, const std::array<int, 3>& finer_first,
+                             const std::array<int, 3>& finer_last) noexcept {
+  const int octets = static_cast<int>(v.stride / kOctet);
+  // Along x, for rows that the finer box has some nodes of: 0 for these.
+  std::array<float, kMostOctets * kOctet> all_own, some_own;
+  for (std::size_t i = 0; i < v.stride; ++i) {
+    const int at = static_cast<int>(i);
+    all_own[i] = 1.0F;
+    some_own[i] = at >= finer_first[0] && at <= finer_last[0] ? 0.0F : 1.0F;
+  }
+  Along sum;
+  for (int k = v.first[2]; k <= v.last[2]; ++k) {
+    const bool under_k = k >= finer_first[2] && k <= finer_last[2];
+    Octet pull{}, stiffness{};
+    for (int j = v.first[1]; j <= v.last[1]; ++j) {
+      const std::size_t row = static_cast<std::size_t>(k) * v.plane + static_cast<std::size_t>(j) * v.stride;
+      const float* const own =
+          (under_k && j >= finer_first[1] && j <= finer_last[1] ? some_own : all_own).data();
+      for (int o = 0; o < octets; ++o) {
+        const std::size_t at = row + static_cast<std::size_t>(o * kOctet);
+        Octet here, m, all, inverse, x, g, counts;
+        load(here, v.u + at);
+        load(m, mode + at);
+        load(all, v.all + at);
+        load(inverse, v.inverse + at);
+        load(counts, own + o * kOctet);
+        Octet force = -all * here, resists = all * m;
+        const std::array<std::size_t, 3> by{1, v.stride, v.plane};
+        for (std::size_t d = 0; d < 3; ++d) {
+          const Octet spring = Octet{} + v.spring[d];
+          load(g, v.link[d] + at - by[d]);
+          g *= spring;
+          load(x, v.u + at - by[d]);
+          force += g * x;
+          load(x, mode + at - by[d]);
+          resists -= g * x;
+          load(g, v.link[d] + at);
+          g *= spring;
+          load(x, v.u + at + by[d]);
+          force += g * x;
+          load(x, mode + at + by[d]);
+          resists -= g * x;
+        }
+        const Octet zero{};
+        counts = inverse > zero ? counts : zero;
+        pull += counts * m * force;
+        stiffness += counts * m * resists;
+      }
+    }
+    for (int lane = 0; lane < kOctet; ++lane) {
+      sum.pull += static_cast<double>(pull[lane]);
+      sum.stiffness += static_cast<double>(stiffness[lane]);
+    }
+  }
+  return sum;
+}
+
+HYBRID_WIDE void go_along(float* u, const float* mode, float by, const float* least,
+                          const float* most_negative, std::size_t count) noexcept {
+  for (std::size_t n = 0; n < count; n += kOctet) {
+    Octet x, m, bound;
+    load(x, u + n);
+    load(m, mode + n);
+    x += by * m;
+    if (least != nullptr) {
+      load(bound, least + n);
+      x = x > bound ? x : bound;
+    }
+    if (most_negative != nullptr) {
+      load(bound, most_negative + n);
+      bound = -bound;
+      x = x < bound ? x : bound;
+    }
+    store(u + n, x);
+  }
+}
+
 }  // namespace voxel::composite

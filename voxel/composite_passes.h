@@ -63,4 +63,19 @@ void follow_bounds(float* u, const float* held, const float* least, const float*
 void note_held(float* held, const float* u, const float* least, const float* most_negative,
                std::size_t count) noexcept;
 
+// How far nodes are beyond what their bounds ask of them, towards where they have gone: 0 for what is held.
+void beyond_bounds(const float* u, const float* least, const float* most_negative, float* beyond,
+                   std::size_t count) noexcept;
+// Of a level's own nodes, without those strictly within the finer box (`finer` first … last, where it has
+// any): what pulls them along `mode` (N m per m²), how stiff they are there, and what their springs store
+// (J).
+struct Along {
+  double pull = 0.0, stiffness = 0.0, stored_J = 0.0;
+};
+Along along_mode(const View& view, const float* mode, const std::array<int, 3>& finer_first,
+                 const std::array<int, 3>& finer_last) noexcept;
+// … and there they go, within their bounds.
+void go_along(float* u, const float* mode, float by, const float* least, const float* most_negative,
+              std::size_t count) noexcept;
+
 }  // namespace voxel::composite
