@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Scenes whose soft object keeps its contact on a composite grid: which those are, and what graphics see.
 #include <algorithm>
+#include <cmath>
 #include <glm/geometric.hpp>
+#include <iostream>
 
 #include "hybrid/drawn_scene.h"
 #include "hybrid/fill_snapshot.h"
@@ -66,6 +68,22 @@ TEST_F(GridSession, TheWindowShowsTheDent) {
   EXPECT_LT(apart, 1e-3F * deepest);
   touch.go({0.005, 0.003, top + 0.02}, 1e-3, 5);
   for (const glm::vec3& moved : shown()) ASSERT_EQ(moved, glm::vec3(0.0F));
+}
+
+// What is far away comes along at once, inwards and outwards: a tick after a step of a tenth of a spacing, by
+// which the force changes by an eighth, it is where it will be at rest.
+TEST_F(GridSession, ATickAfterAStepTheForceIsThatAtRest) {
+  const hybrid::Scene scene = load(block("spacing = 1\n"));
+  for (const double step_m : {-1e-4, 1e-4}) {
+    tests::Touch touch(scene, {0.0, 0.0, 0.043}, true);
+    const double before = touch.go({0.0, 0.0, 0.0385}, 1e-4, 60).force_N.z;
+    const glm::dvec3 there(0.0, 0.0, 0.0385 + step_m);
+    touch.at(there);
+    const double felt = touch.at(there).force_N.z, at_rest = touch.go(there, 1e-4, 60).force_N.z;
+    std::cout << "[ measured ] from " << before << " to " << at_rest << " N, after a tick " << felt << " N\n";
+    EXPECT_GT(std::fabs(at_rest - before), 0.1 * before);
+    EXPECT_NEAR(felt, at_rest, 0.005 * at_rest);
+  }
 }
 
 // Round a closed path, slowly or not, tissue without friction gives the hand nothing: down and up, and down,
