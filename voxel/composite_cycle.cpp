@@ -253,6 +253,7 @@ void CompositeGrid::cycle(const std::array<bool, 3>& axes) noexcept {
     spread_to_ghosts(levels_[0], levels_[0].u[a].data());
     fit_far_field(a);
   }
+  box_moved_ = false;
 }
 
 }  // namespace voxel

@@ -252,6 +252,7 @@ class CompositeGrid {
   Level before_;           // of a level whose box moves
   std::size_t whole_ = 0;  // the first level that holds all of the object
   std::vector<Pressed> pressed_;
+  bool box_moved_ = false;  // since the last cycle
   std::size_t work_ = 0;
   std::array<Floats, 3> halves_;  // scratch of weigh(): half cells, a plane each
 };

@@ -115,6 +115,7 @@ bool CompositeGrid::centre_on(const Place& centre) noexcept {
   for (std::size_t l = whole_; l-- > 0;) {
     const bool due = (!any || all || !nested(l)) && !in_place(l);
     if (due) move(l);
+    box_moved_ = box_moved_ || due;
     if (due || joins) join(levels_[l], levels_[l + 1]);
     any = any || due;
     joins = due;
