@@ -342,7 +342,8 @@ void expect_replays(const std::filesystem::path& file, double seconds) {
     options.relax_apart = true;
     options.realtime = realtime;
     const hybrid::SessionResult felt = hybrid::run_session(scene, built, options);
-    EXPECT_GT(felt.relaxed_apart, 10U);
+    // How many come in a second of real time is the machine's doing.
+    EXPECT_GT(felt.relaxed_apart, realtime ? 0U : 10U);
     const hybrid::ReplayResult again = hybrid::replay({.scene_file = file,
                                                        .scene_text = text,
                                                        .dt_s = felt.dt_s,
