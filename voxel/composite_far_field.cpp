@@ -36,9 +36,6 @@ void CompositeGrid::grow(std::size_t a, double share, double most_m) noexcept {
 // far away, nothing of what is held. (Along the displacements of whatever is not held, links at its edge
 // would be all that is felt of it.)
 void CompositeGrid::fit_far_field(std::size_t a) noexcept {
-  const auto bound = [](Level& level, std::size_t kind) {
-    return level.bounded[kind] ? level.bound[kind].data() + level.first_row() : nullptr;
-  };
   composite::Along sum;
   for (std::size_t l = 0; l <= whole_; ++l) {
     Level& level = levels_[l];
@@ -50,11 +47,10 @@ void CompositeGrid::fit_far_field(std::size_t a) noexcept {
         finer_last[d] = levels_[l - 1].line[d].coarse_last;
       }
     }
-    float* const beyond = level.old.data();
-    composite::beyond_bounds(level.u[a].data() + level.first_row(), bound(level, 0), bound(level, 1),
-                             beyond + level.first_row(), level.floats());
-    const composite::Along own =
-        composite::along_mode(view(l, a), beyond + level.first_row(), finer_first, finer_last);
+    const composite::View v = view(l, a);
+    float* const beyond = level.old.data() + level.first_row();
+    composite::beyond_bounds(v.u, v.least, v.most_negative, beyond, level.floats());
+    const composite::Along own = composite::along_mode(v, beyond, finer_first, finer_last);
     sum.pull += own.pull;
     sum.stiffness += own.stiffness;
   }
@@ -63,8 +59,9 @@ void CompositeGrid::fit_far_field(std::size_t a) noexcept {
   const auto by = static_cast<float>(std::clamp(part * sum.pull / sum.stiffness, -kMost, kMost));
   for (std::size_t l = 0; l <= whole_; ++l) {
     Level& level = levels_[l];
-    composite::go_along(level.u[a].data() + level.first_row(), level.old.data() + level.first_row(), by,
-                        bound(level, 0), bound(level, 1), level.floats());
+    const composite::View v = view(l, a);
+    composite::go_along(v.u, level.old.data() + level.first_row(), by, v.least, v.most_negative,
+                        level.floats());
   }
 }
 

@@ -115,7 +115,6 @@ bool CompositeGrid::centre_on(const Place& centre) noexcept {
   for (std::size_t l = whole_; l-- > 0;) {
     const bool due = (!any || all || !nested(l)) && !in_place(l);
     if (due) move(l);
-    box_moved_ = box_moved_ || due;
     if (due || joins) join(levels_[l], levels_[l + 1]);
     any = any || due;
     joins = due;
@@ -125,6 +124,7 @@ bool CompositeGrid::centre_on(const Place& centre) noexcept {
 
 // A box goes on: what is new in it is interpolated.
 void CompositeGrid::move(std::size_t l) noexcept {
+  box_moved_ = true;
   Level& level = levels_[l];
   before_.line = level.line;  // assigned element by element: the same sizes, nothing is allocated
   before_.step = level.step;

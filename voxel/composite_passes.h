@@ -67,10 +67,9 @@ void note_held(float* held, const float* u, const float* least, const float* mos
 void beyond_bounds(const float* u, const float* least, const float* most_negative, float* beyond,
                    std::size_t count) noexcept;
 // Of a level's own nodes, without those strictly within the finer box (`finer` first … last, where it has
-// any): what pulls them along `mode` (N m per m²), how stiff they are there, and what their springs store
-// (J).
+// any): how hard links pull them along `mode` (J per unit of it), and how stiff they are there.
 struct Along {
-  double pull = 0.0, stiffness = 0.0, stored_J = 0.0;
+  double pull = 0.0, stiffness = 0.0;
 };
 Along along_mode(const View& view, const float* mode, const std::array<int, 3>& finer_first,
                  const std::array<int, 3>& finer_last) noexcept;
