@@ -9,8 +9,10 @@ namespace voxel {
 namespace {
 
 constexpr float kNone = -1e30F;  // no bound
-constexpr float kAlong = 0.25F;  // of a normal: an axis of which less is in it does not hold what is pressed
-constexpr int kRounds = 2;       // of sweeps where paths may bend
+// Of a normal: an axis of which less is in it does not hold what is pressed. (With a quarter, what a ball
+// pressed aside by little came back, axis by axis, and went to and fro.)
+constexpr float kAlong = 0.02F;
+constexpr int kRounds = 2;  // of sweeps where paths may bend
 
 std::size_t index(int i) {
   return static_cast<std::size_t>(i);

@@ -93,7 +93,7 @@ class SoftObject {
   // a tick costs the same for any depth and size, and state() is the object as it was before, at rest, while
   // displacement() is asked for what is felt. For objects that meet nothing but the tool. Returns what is in
   // the way of that, and it stays as it is; empty: nothing. Allocates.
-  static constexpr std::size_t kLeastOnGrid = 200'000;  // voxels
+  static constexpr std::size_t kLeastOnGrid = 10'000;  // voxels
   std::string use_composite_grid(const ToolInBody& tool);
   [[nodiscard]] bool uses_grid() const { return grid_ != nullptr; }
   // While something is pressed.
@@ -333,10 +333,12 @@ class SoftObject {
   // ---- on the composite grid (soft_object_grid.cpp) ----
   [[nodiscard]] glm::dvec3 displacement_on_grid(VoxelId v) const noexcept;
   [[nodiscard]] glm::dvec3 position_on_grid(VoxelId v) const noexcept;
+  [[nodiscard]] std::size_t most_in_box(int half_width) const;
   void list_near_on_grid() noexcept;
   void touch_on_grid(std::span<const VoxelId> near) noexcept;
   bool push_out_on_grid(const ToolInBody& tool) noexcept;
   void relax_on_grid(const ToolInBody& tool) noexcept;
+  void put_aside(const ToolInBody& tool) noexcept;
   void press_on_grid(const ToolInBody& tool) noexcept;
   void settle_on_grid(const ToolInBody& tool) noexcept;
   [[nodiscard]] std::array<bool, 3> axes_due() noexcept;

@@ -64,7 +64,7 @@ std::string SoftObject::use_composite_grid(const ToolInBody& tool) {
   std::string obstacle = CompositeGrid::obstacle_to(*lattice_);
   if (!obstacle.empty()) return obstacle;
   grid_ = std::make_unique<CompositeGrid>(*lattice_, half);
-  near_on_grid_.reserve(kMaxTouched);
+  near_on_grid_.reserve(most_in_box(half));
   return {};
 }
 
@@ -75,6 +75,7 @@ void SoftObject::widen_grid() {
   wide->begin(centre_);
   wide->take_from(*grid_);
   grid_ = std::move(wide);
+  near_on_grid_.reserve(most_in_box(CompositeGrid::kWideHalfWidth));
   list_near_on_grid();
 }
 
@@ -88,6 +89,12 @@ glm::dvec3 SoftObject::position_on_grid(VoxelId v) const noexcept {
   const glm::dvec3& h = lattice_->spacing_m();
   const glm::dvec3 u = grid_->in_fine_box(c) ? grid_->fine_at(c) : grid_->at(c);
   return glm::dvec3(c[0] * h.x, c[1] * h.y, c[2] * h.z) + u;
+}
+
+// As much of the surface as the box of level 0 may have in it.
+std::size_t SoftObject::most_in_box(int half_width) const {
+  const auto across = static_cast<std::size_t>(2 * half_width + 2);
+  return std::min(lattice_->surface().size(), across * across * across);
 }
 
 // The surface in the box of level 0, by rows.
@@ -193,10 +200,28 @@ SoftObject::Bound SoftObject::bound_by(const ToolInBody& tool, const Touch& t,
   return {axis, way, tool.centre[axis] + way * std::sqrt(square) - t.rest[axis], true};
 }
 
+// What is pressed goes to where its links have it on the tool, from voxel to voxel and back: how far each is
+// pushed aside hangs on those beside it, and the cycle moves none of them along the tool. (With wide limits,
+// 140 voxels pressed: the force 2.7 JND off at 0.1 m/s without it, 1.2 with it; to and fro twice no better.)
+void SoftObject::put_aside(const ToolInBody& tool) noexcept {
+  const auto put = [&](const Touch& t) {
+    const std::array<int, 3> c = lattice_->coordinates(t.v);
+    if (!grid_->in_fine_box(c)) return;
+    if (gap(tool, t.rest + grid_->fine_at(c)).distance > kPressed * lattice_->min_spacing_m()) return;
+    const glm::dvec3 wished = grid_->link_minimum(c);
+    Gap g = gap(tool, t.rest + wished);
+    if (g.distance >= 0.0) return;
+    grid_->set_fine(c, grid_->within_anchors(c, onto_tool(tool, t.rest, wished, grid_->compliance(c), g)));
+  };
+  std::for_each(touches_.begin(), touches_.end(), put);
+  std::for_each(touches_.rbegin(), touches_.rend(), put);
+}
+
 // Says what may not be in the tool. Whether or not a voxel is pressed its bound stands: let go of because
 // coarse levels had gone too far, all of a contact was pressed and let go of in turns.
 void SoftObject::press_on_grid(const ToolInBody& tool) noexcept {
   grid_->clear_pressed();
+  put_aside(tool);
   for (Touch& t : touches_) {
     const std::array<int, 3> c = lattice_->coordinates(t.v);
     if (!grid_->in_fine_box(c)) continue;
