@@ -26,7 +26,7 @@ constexpr double kInside = -1e-9;  // barycentric
 constexpr VoxelId kNone = std::numeric_limits<VoxelId>::max();
 
 struct End {
-  glm::dvec3 free_place;  // where links, what hangs on it and the other pairs would have it, scene frame
+  glm::dvec3 u;           // displacement to where links, what hangs on it and the other pairs would have it
   glm::dvec3 compliance;  // per body axis (m/N); 0 where it is anchored
 };
 
@@ -34,50 +34,41 @@ glm::dvec3 to_scene(const PosedObject& o, const glm::dvec3& in_body) noexcept {
   return o.pose.origin + o.pose.rotation * in_body;
 }
 glm::dvec3 to_body(const PosedObject& o, const glm::dvec3& in_scene) noexcept {
-  return glm::inverse(o.pose.rotation) * (in_scene - o.pose.origin);
+  return glm::conjugate(o.pose.rotation) * (in_scene - o.pose.origin);
 }
 glm::dvec3 place_of(const PosedObject& o, VoxelId v) noexcept {
   return to_scene(o, o.object.position(v));
 }
 
 // Per body axis (m/N), of a voxel and what hangs on it; 0 where it is anchored.
-glm::dvec3 compliance_of(const PosedObject& o, VoxelId v) noexcept {
-  glm::dvec3 w = o.object.compliance(v);
-  const HeldLoad hanging = o.object.hanging_on_pair(v);
+glm::dvec3 with_hanging(const glm::dvec3& own, const HeldLoad& hanging) noexcept {
+  glm::dvec3 w = own;
   for (int axis = 0; axis < 3; ++axis) {
     if (hanging.stiffness_N_per_m[axis] > 0.0) w[axis] = 1.0 / hanging.stiffness_N_per_m[axis];
   }
   return w;
 }
 
-End end_of(const PosedObject& o, VoxelId v) noexcept {
-  const glm::dvec3 own = o.object.compliance(v), w = compliance_of(o, v);
-  const HeldLoad hanging = o.object.hanging_on_pair(v);
+glm::dvec3 compliance_of(const PosedObject& o, VoxelId v, std::uint32_t number) noexcept {
+  return with_hanging(o.object.compliance(v), o.object.hanging_on_pair(number));
+}
+
+End end_of(const PosedObject& o, VoxelId v, std::uint32_t number) noexcept {
+  const glm::dvec3 own = o.object.compliance(v);
+  const HeldLoad hanging = o.object.hanging_on_pair(number);
+  const glm::dvec3 w = with_hanging(own, hanging);
   glm::dvec3 u = o.object.free_displacement(v);
   for (int axis = 0; axis < 3; ++axis) {
     if (!(hanging.stiffness_N_per_m[axis] > 0.0)) continue;
     const double now = o.object.state().at(v)[axis];
     u[axis] = now + w[axis] * ((u[axis] - now) / own[axis] + hanging.force_N[axis]);
   }
-  return {to_scene(o, o.object.lattice().rest(v) + u + w * o.object.pair_load(v)), w};
+  return {u + w * o.object.pair_load(number), w};
 }
 
-void place(const PosedObject& o, VoxelId v, const glm::dvec3& in_scene) noexcept {
-  o.object.move(v, to_body(o, in_scene) - o.object.lattice().rest(v));
-}
-
-void press(const PosedObject& o, VoxelId v, const glm::dvec3& force_N) noexcept {
-  o.object.add_pair_load(v, glm::inverse(o.pose.rotation) * force_N);
-}
-
-// How far a force of 1 N along `way` (scene frame) takes a voxel along it (m/N), and the way it goes (body).
-struct Yielding {
-  double along;
-  glm::dvec3 way;
-};
-Yielding yielding(const PosedObject& o, const glm::dvec3& compliance, const glm::dvec3& way) noexcept {
-  const glm::dvec3 in_body = glm::inverse(o.pose.rotation) * way;
-  return {glm::dot(in_body, compliance * in_body), compliance * in_body};
+// How far a force of 1 N along a way (body frame, unit) takes a voxel along it (m/N).
+double yielding(const glm::dvec3& compliance, const glm::dvec3& way) noexcept {
+  return glm::dot(way, compliance * way);
 }
 
 // A surface seen along one axis of its lattice: a height over the two others.
@@ -122,6 +113,12 @@ bool shares(const std::array<glm::dvec2, 3>& at, const glm::dvec2& p, std::array
   return out[0] >= kInside && out[1] >= kInside && out[2] >= kInside;
 }
 
+void set_facet(const SoftObject& object, const std::array<VoxelId, 3>& facet, PressedPair& pair) noexcept {
+  if (facet == pair.facet) return;  // 0 is no voxel of any surface
+  pair.facet = facet;
+  for (std::size_t i = 0; i < 3; ++i) pair.number[i] = object.surface_number(facet[i]);
+}
+
 // Of the facets round a surface voxel, split along the diagonal from the lower to the upper corner, that
 // under p.
 bool facet_round(const Surface& surface, VoxelId v, const glm::dvec3& p, PressedPair& pair) noexcept {
@@ -141,7 +138,7 @@ bool facet_round(const Surface& surface, VoxelId v, const glm::dvec3& p, Pressed
       std::array<glm::dvec2, 3> at;
       for (std::size_t i = 0; i < 3; ++i) at[i] = surface.flat(surface.object.position(voxels[i]));
       if (!shares(at, flat, pair.share)) continue;
-      pair.facet = voxels;
+      set_facet(surface.object, voxels, pair);
       return true;
     }
   }
@@ -164,8 +161,27 @@ glm::dvec3 middle(const PosedObject& b, const PressedPair& pair) noexcept {
   return sum;
 }
 
+// What overlap_of() goes by.
+void set_across(const PosedObject& a, const PosedObject& b, PressedPair& pair,
+                const glm::dvec3& across) noexcept {
+  pair.across = across;
+  pair.across_a = glm::conjugate(a.pose.rotation) * across;
+  pair.across_b = glm::conjugate(b.pose.rotation) * across;
+  pair.at_rest_m = pair.reach_m - glm::dot(b.pose.origin - a.pose.origin, across) +
+                   glm::dot(a.object.lattice().rest(pair.a), pair.across_a);
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (pair.share[i] > 0.0)
+      pair.at_rest_m -= pair.share[i] * glm::dot(b.object.lattice().rest(pair.facet[i]), pair.across_b);
+  }
+}
+
 double overlap_of(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept {
-  return pair.reach_m - glm::dot(middle(b, pair) - place_of(a, pair.a), pair.across);
+  double overlap = pair.at_rest_m + glm::dot(a.object.state().at(pair.a), pair.across_a);
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (pair.share[i] > 0.0)
+      overlap -= pair.share[i] * glm::dot(b.object.state().at(pair.facet[i]), pair.across_b);
+  }
+  return overlap;
 }
 
 template <class Visit>
@@ -177,36 +193,46 @@ void for_corners(const PressedPair& pair, const Visit& visit) noexcept {
 
 double yielding_of_facet(const PosedObject& b, const PressedPair& pair) noexcept {
   double sum = 0.0;
-  for_corners(pair, [&](VoxelId v, double share, std::size_t) {
-    sum += share * share * yielding(b, compliance_of(b, v), pair.across).along;
+  for_corners(pair, [&](VoxelId v, double share, std::size_t i) {
+    sum += share * share * yielding(compliance_of(b, v, pair.number[i]), pair.across_b);
   });
   return sum;
 }
 
 void press_more(const PosedObject& a, const PosedObject& b, PressedPair& pair, double more_N) noexcept {
-  PressedPair more = pair;
-  more.force_N = more_N * pair.across;
-  pair.force_N += more.force_N;
-  load_pair(a, b, more);
+  pair.force_N += more_N * pair.across;
+  a.object.add_pair_load(pair.number_a, -more_N * pair.across_a);
+  for_corners(pair, [&](VoxelId, double share, std::size_t i) {
+    b.object.add_pair_load(pair.number[i], share * more_N * pair.across_b);
+  });
+}
+
+void add_loads(const PosedObject& a, const PosedObject& b, const PressedPair& pair,
+               const glm::dvec3& force_N) noexcept {
+  a.object.add_pair_load(pair.number_a, -(glm::conjugate(a.pose.rotation) * force_N));
+  const glm::dvec3 in_b = glm::conjugate(b.pose.rotation) * force_N;
+  for_corners(pair, [&](VoxelId, double share, std::size_t i) {
+    b.object.add_pair_load(pair.number[i], share * in_b);
+  });
 }
 
 // What the chain of one object did not let it give way by, the other gives way by, and presses that much
 // harder.
-void push_the_rest(const PosedObject& a, const PosedObject& b, PressedPair& pair, double yielding_a,
-                   double yielding_b) noexcept {
+void push_the_rest(const PosedObject& a, const PosedObject& b, PressedPair& pair, const End& first,
+                   const std::array<End, 3>& corners, double yielding_a, double yielding_b) noexcept {
   const double least = kPushed * pair.reach_m;
   const double left = overlap_of(a, b, pair);
   if (left <= least) return;
   if (yielding_b > 0.0) {
-    for_corners(pair, [&](VoxelId v, double share, std::size_t) {
-      const glm::dvec3 way = yielding(b, compliance_of(b, v), pair.across).way;
+    for_corners(pair, [&](VoxelId v, double share, std::size_t i) {
+      const glm::dvec3 way = corners[i].compliance * pair.across_b;
       b.object.move(v, b.object.state().at(v) + (share * left / yielding_b) * way);
     });
     press_more(a, b, pair, std::max(left - overlap_of(a, b, pair), 0.0) / yielding_b);
   }
   const double rest = overlap_of(a, b, pair);
   if (rest > least && yielding_a > 0.0) {
-    const glm::dvec3 way = yielding(a, compliance_of(a, pair.a), pair.across).way;
+    const glm::dvec3 way = first.compliance * pair.across_a;
     a.object.move(pair.a, a.object.state().at(pair.a) - (rest / yielding_a) * way);
     press_more(a, b, pair, std::max(rest - overlap_of(a, b, pair), 0.0) / yielding_a);
   }
@@ -252,13 +278,13 @@ void lie_on_facet(const PosedObject& a, const PosedObject& b, PressedPair& pair)
   normal_of(at, pair.axis, !pair.upwards, across);
   const auto most = std::max_element(pair.share.begin(), pair.share.end());
   pair.b = pair.facet[static_cast<std::size_t>(most - pair.share.begin())];
-  pair.across = turned(a, b, pair, b.pose.rotation * across);
+  set_across(a, b, pair, turned(a, b, pair, b.pose.rotation * across));
 }
 
 }  // namespace
 
 PressedPair pair_of(const PosedObject& a, VoxelId in_a, const PosedObject& b, VoxelId in_b) noexcept {
-  PressedPair pair{.a = in_a, .b = in_b};
+  PressedPair pair{.a = in_a, .b = in_b, .number_a = a.object.surface_number(in_a)};
   const glm::dvec3 side =
       a.pose.rotation * a.object.lattice().outward(in_a) - b.pose.rotation * b.object.lattice().outward(in_b);
   const double length = glm::length(side);
@@ -309,11 +335,11 @@ void find_facet(const PosedObject& a, const PosedObject& b, PressedPair& pair) n
     return;
   }
   pair.reach_m = apart;
-  pair.facet = {pair.b, pair.b, pair.b};
+  set_facet(b.object, {pair.b, pair.b, pair.b}, pair);
   pair.share = {1.0, 0.0, 0.0};
   glm::dvec3 across(0.0);
   across[pair.axis] = pair.upwards ? -1.0 : 1.0;
-  pair.across = b.pose.rotation * across;
+  set_across(a, b, pair, b.pose.rotation * across);
 }
 
 bool left_facet(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept {
@@ -354,44 +380,38 @@ void release_pair(const PosedObject& a, const PosedObject& b, const PressedPair&
 }
 
 void clear_pair_load(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept {
-  a.object.clear_pair_load(pair.a);
-  for (const VoxelId v : pair.facet) b.object.clear_pair_load(v);
+  a.object.clear_pair_load(pair.number_a);
+  for (const std::uint32_t number : pair.number) b.object.clear_pair_load(number);
 }
 
 void load_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept {
-  press(a, pair.a, -pair.force_N);
-  for_corners(pair, [&](VoxelId v, double share, std::size_t) { press(b, v, share * pair.force_N); });
+  add_loads(a, b, pair, pair.force_N);
 }
 
 double relax_pair(const PosedObject& a, const PosedObject& b, PressedPair& pair) noexcept {
-  PressedPair own = pair;
-  own.force_N = -pair.force_N;
-  load_pair(a, b, own);  // its own share is found anew
+  add_loads(a, b, pair, -pair.force_N);  // its own share is found anew
   pair.force_N = glm::dvec3(0.0);
-  End first = end_of(a, pair.a);
+  End first = end_of(a, pair.a, pair.number_a);
   std::array<End, 3> corners;
-  glm::dvec3 free_middle(0.0);
+  double overlap = pair.at_rest_m + glm::dot(first.u, pair.across_a), of_facet = 0.0;
   for_corners(pair, [&](VoxelId v, double share, std::size_t i) {
-    corners[i] = end_of(b, v);
-    free_middle += share * corners[i].free_place;
+    corners[i] = end_of(b, v, pair.number[i]);
+    overlap -= share * glm::dot(corners[i].u, pair.across_b);
+    of_facet += share * share * yielding(corners[i].compliance, pair.across_b);
   });
-  const double overlap =
-      pair.over ? pair.reach_m - glm::dot(free_middle - first.free_place, pair.across) : 0.0;
-  const Yielding of_first = yielding(a, first.compliance, pair.across);
-  const double of_facet = yielding_of_facet(b, pair);
-  if (overlap > 0.0 && of_first.along + of_facet > 0.0) {
-    const double force = overlap / (of_first.along + of_facet);  // N, equal and opposite
-    first.free_place -= a.pose.rotation * (force * of_first.way);
+  const double of_first = yielding(first.compliance, pair.across_a);
+  if (pair.over && overlap > 0.0 && of_first + of_facet > 0.0) {
+    const double force = overlap / (of_first + of_facet);  // N, equal and opposite
+    first.u -= force * (first.compliance * pair.across_a);
     for_corners(pair, [&](VoxelId, double share, std::size_t i) {
-      corners[i].free_place +=
-          b.pose.rotation * (share * force * yielding(b, corners[i].compliance, pair.across).way);
+      corners[i].u += share * force * (corners[i].compliance * pair.across_b);
     });
     press_more(a, b, pair, force);
   }
-  place(a, pair.a, first.free_place);
-  for_corners(pair, [&](VoxelId v, double, std::size_t i) { place(b, v, corners[i].free_place); });
+  a.object.move(pair.a, first.u);
+  for_corners(pair, [&](VoxelId v, double, std::size_t i) { b.object.move(v, corners[i].u); });
   // Also where links at their limits keep them from getting where they would not overlap.
-  if (pair.over) push_the_rest(a, b, pair, of_first.along, of_facet);
+  if (pair.over) push_the_rest(a, b, pair, first, corners, of_first, of_facet);
   return gap_of_pair(a, b, pair);
 }
 
@@ -399,7 +419,7 @@ bool part_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pa
   if (!pair.over) return false;
   const double overlap = overlap_of(a, b, pair);
   if (overlap <= kParted * pair.reach_m) return false;
-  const double of_first = yielding(a, compliance_of(a, pair.a), pair.across).along;
+  const double of_first = yielding(compliance_of(a, pair.a, pair.number_a), pair.across_a);
   const double of_facet = yielding_of_facet(b, pair);
   const double first = who == GiveWay::second ? 0.0 : of_first;
   const double second = who == GiveWay::first ? 0.0 : of_facet;
@@ -410,7 +430,7 @@ bool part_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pa
   along[pair.axis] = pair.upwards ? -overlap : overlap;
   const glm::dvec3 in_scene = b.pose.rotation * along;
   if (first > 0.0)
-    a.object.drag(pair.a, glm::inverse(a.pose.rotation) * in_scene * (-first / (first + second)));
+    a.object.drag(pair.a, glm::conjugate(a.pose.rotation) * in_scene * (-first / (first + second)));
   if (second > 0.0) {
     double squares = 0.0;
     for (const double share : pair.share) squares += share * share;

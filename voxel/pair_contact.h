@@ -40,6 +40,12 @@ struct PressedPair {
   std::array<double, 3> share{};   // … and how much of the force each takes: barycentric
   glm::dvec3 across{0.0};          // gradient of the distance when the facet moves (scene frame)
   double reach_m = 0.0;            // that distance in contact
+  // Of these, until the facet is looked for again: the gradient in the bodies' frames, how deep the surfaces
+  // would overlap with both objects at rest, and surface numbers of the voxel and the corners.
+  glm::dvec3 across_a{0.0}, across_b{0.0};
+  double at_rest_m = 0.0;
+  std::uint32_t number_a = 0;
+  std::array<std::uint32_t, 3> number{};
 };
 
 // A voxel of the first and one of the second's surface that lies where it may press. `side` is 0 where the

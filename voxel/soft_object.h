@@ -180,9 +180,15 @@ class SoftObject {
   void release(VoxelId v) noexcept;
   // What other objects press it with (body frame, N): a tool under which the chain is tight down to it feels
   // that.
-  void clear_pair_load(VoxelId v) noexcept;
-  void add_pair_load(VoxelId v, const glm::dvec3& force_N) noexcept;
-  [[nodiscard]] glm::dvec3 pair_load(VoxelId v) const noexcept;
+  void clear_pair_load(std::uint32_t surface_number) noexcept {
+    pair_load_[surface_number] = glm::vec3(0.0F);
+  }
+  void add_pair_load(std::uint32_t surface_number, const glm::dvec3& force_N) noexcept {
+    pair_load_[surface_number] += glm::vec3(force_N);
+  }
+  [[nodiscard]] glm::dvec3 pair_load(std::uint32_t surface_number) const noexcept {
+    return glm::dvec3(pair_load_[surface_number]);
+  }
   // What hangs by tight links on the voxels that pairs press, kMaxTouched of them at most: as it is now,
   // until it is forgotten.
   void find_hanging_on_pairs() noexcept;
@@ -192,9 +198,9 @@ class SoftObject {
   void relax_near_pairs() noexcept;
   // Of one of them, what that pulls it by, without its own links, and the springs of them all; 0: nothing
   // hangs on it.
-  [[nodiscard]] HeldLoad hanging_on_pair(VoxelId v) const noexcept {
+  [[nodiscard]] HeldLoad hanging_on_pair(std::uint32_t surface_number) const noexcept {
     if (hanging_on_pairs_.empty()) return {};
-    const std::uint32_t entry = hanging_entry_[lattice_->surface_number(v)];
+    const std::uint32_t entry = hanging_entry_[surface_number];
     return entry == 0 ? HeldLoad{} : hanging_on_pairs_[entry - 1U];
   }
   // For the pair solver. Where its links alone would have a voxel, and how far a force of 1 N on it alone

@@ -75,18 +75,6 @@ void SoftObject::release(VoxelId v) noexcept {
   set_touch_roles();
 }
 
-void SoftObject::clear_pair_load(VoxelId v) noexcept {
-  pair_load_[lattice_->surface_number(v)] = glm::vec3(0.0F);
-}
-
-void SoftObject::add_pair_load(VoxelId v, const glm::dvec3& force_N) noexcept {
-  pair_load_[lattice_->surface_number(v)] += glm::vec3(force_N);
-}
-
-glm::dvec3 SoftObject::pair_load(VoxelId v) const noexcept {
-  return glm::dvec3(pair_load_[lattice_->surface_number(v)]);
-}
-
 glm::dvec3 SoftObject::free_displacement(VoxelId v) noexcept {
   return link_minimum(relaxation_.couplings(), state_, v);
 }

@@ -103,13 +103,13 @@ void SoftObject::draw_along() noexcept {
 glm::dvec3 SoftObject::load_on(VoxelId v) noexcept {
   const glm::dvec3 links = link_force(relaxation_.couplings(), state_, v);
   if (state_.role[v] != Displacement::held) return links;
-  return links + pair_load(v);
+  return links + pair_load(lattice_->surface_number(v));
 }
 
 double SoftObject::load_on(VoxelId v, int axis) noexcept {
   const double links = link_force(relaxation_.couplings(), state_, v, axis);
   if (state_.role[v] != Displacement::held) return links;
-  return links + pair_load(v)[axis];
+  return links + pair_load(lattice_->surface_number(v))[axis];
 }
 
 void SoftObject::carry(VoxelId v, std::uint32_t touch) noexcept {
@@ -298,14 +298,16 @@ void SoftObject::find_hanging_on_pairs() noexcept {
   forget_hanging_on_pairs();
   for (const VoxelId v : held_voxels_) {
     if (pair_roots_.size() == pair_roots_.capacity()) break;
-    if (!lattice_->anchored(v) && pair_load(v) != glm::dvec3(0.0)) pair_roots_.push_back(v);
+    if (!lattice_->anchored(v) && pair_load(lattice_->surface_number(v)) != glm::dvec3(0.0))
+      pair_roots_.push_back(v);
   }
   if (!any_may_be_tight(*lattice_, state_, pair_roots_, kTightBesideOthers)) {
     pair_roots_.clear();
     return;
   }
   std::sort(pair_roots_.begin(), pair_roots_.end(), [&](VoxelId v, VoxelId w) {
-    const glm::dvec3 of_v = pair_load(v), of_w = pair_load(w);
+    const glm::dvec3 of_v = pair_load(lattice_->surface_number(v)),
+                     of_w = pair_load(lattice_->surface_number(w));
     const double first = glm::dot(of_v, of_v), second = glm::dot(of_w, of_w);
     return first != second ? first > second : v < w;
   });
