@@ -7,6 +7,9 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <memory>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include "hybrid/bench_soft.h"
 #include "hybrid/bench_timer.h"
@@ -36,14 +39,17 @@ struct Limits {
   voxel::LinkMaterial top, base;  // the upper 40 % and the rest
 };
 
-const std::array<Limits, 5>& all_limits() {
+const std::array<Limits, 6>& all_limits() {
   constexpr voxel::LinkMaterial tissue{}, bricks{.bricks = true}, full{.poisson = 0.45, .bricks = true};
   constexpr voxel::LinkMaterial loose{.stretch_min = 0.05, .stretch_max = 10.0, .shear = 10.0};
+  constexpr voxel::LinkMaterial firm{
+      .young_Pa = 20e3, .stretch_min = 0.85, .stretch_max = 1.15, .shear = 0.15},
+      limp{.young_Pa = 5e3, .stretch_min = 0.85, .stretch_max = 1.15, .shear = 0.15};
   constexpr voxel::LinkMaterial tight{.stretch_min = 1.0, .stretch_max = 1.0, .shear = 0.0};
-  static const std::array<Limits, 5> kLimits{
-      Limits{"limits", 0.6, tissue, tissue}, Limits{"no limits", 0.95, loose, loose},
-      Limits{"slack 0", 0.0, tight, tissue}, Limits{"trilinear", 0.6, bricks, bricks},
-      Limits{"trilinear, 0.45", 0.6, full, full}};
+  static const std::array<Limits, 6> kLimits{
+      Limits{"limits", 0.6, tissue, tissue},    Limits{"no limits", 0.95, loose, loose},
+      Limits{"slack 0", 0.0, tight, tissue},    Limits{"tight, layers", 0.15, firm, limp},
+      Limits{"trilinear", 0.6, bricks, bricks}, Limits{"trilinear, 0.45", 0.6, full, full}};
   return kLimits;
 }
 
@@ -182,6 +188,80 @@ SoftRow relax_row(int edge, const Limits& limits) {
   return row;
 }
 
+// The same of one tissue whose chain is tight from the ball two thirds of the way to the anchors: on the
+// composite grid, where `run` keeps such a contact. A tick is all that is done, and nothing is left to
+// another thread.
+SoftRow tight_row(int edge) {
+  constexpr double kSlack = 0.15;
+  constexpr int kTicks = 400;
+  const TickTimer timer;
+  voxel::LabelVolume volume;
+  volume.dims = {edge, edge, edge};
+  volume.labels.assign(
+      static_cast<std::size_t>(edge) * static_cast<std::size_t>(edge) * static_cast<std::size_t>(edge), 1);
+  voxel::LatticeOptions options;
+  options.materials[1] = {.stretch_min = 1.0 - kSlack, .stretch_max = 1.0 + kSlack, .shear = kSlack};
+  options.anchor_faces = {"-z"};
+  const auto lattice = std::make_shared<const voxel::Lattice>(volume, options);
+  const double middle = 0.5 * (edge - 1) * kSpacing, top = (edge - 1) * kSpacing;
+  voxel::ToolInBody tool{.centre = {middle, middle, 0.0}, .radius = kRadius * kSpacing};
+  const auto pressed = [&](bool wide, const auto& look) {
+    voxel::SoftObject object(lattice);
+    std::string obstacle = object.use_composite_grid(tool);
+    if (!obstacle.empty()) return obstacle;
+    if (wide) object.widen_grid();
+    std::vector<voxel::VoxelId> near(lattice->surface().begin(), lattice->surface().end());
+    for (int n = 0; n < kTicks; ++n) {
+      // As a tick begins: what is near, or may be.
+      const double away = object.reach(tool.radius) + (n == 0 ? kDepth : 1.0) * kSpacing;
+      if (object.grid_in_use() != nullptr)
+        near.assign(object.near_on_grid().begin(), object.near_on_grid().end());
+      tool.centre.z = top + object.reach(tool.radius) - kDepth * kSpacing;
+      std::erase_if(near,
+                    [&](voxel::VoxelId v) { return glm::distance(object.position(v), tool.centre) >= away; });
+      const std::uint64_t before = TickTimer::begin();
+      object.touch(near);
+      object.push_out(tool);
+      object.relax_near(tool, kSweepsNear);
+      const double force_N = glm::length(object.reaction(tool).force_N);
+      look(timer.us(TickTimer::end() - before), force_N);
+    }
+    return obstacle;
+  };
+  SoftRow row{.test_case = "relax",
+              .voxels = lattice->voxel_count(),
+              .material = "tight, grid",
+              .depth_spacings = kDepth,
+              .slack = kSlack};
+  double reference_N = 0.0, us = 0.0, reached_us = 0.0;
+  std::optional<double> at_asked_N;
+  std::string obstacle = pressed(true, [&](double, double force_N) { reference_N = force_N; });
+  if (obstacle.empty()) {
+    obstacle = pressed(false, [&](double tick_us, double force_N) {
+      us += tick_us;
+      if (std::fabs(force_N - reference_N) > kConverged * reference_N) reached_us = us;
+      if (us <= kAsked_us) at_asked_N = force_N;
+    });
+  }
+  if (!obstacle.empty() || !(reference_N > 0.0)) {
+    row.note = obstacle.empty() ? "nothing pressed back at rest" : obstacle;
+    return row;
+  }
+  row.reference = fmt::format("the same press, after {} ticks on a grid of boxes 24 nodes wide", kTicks);
+  if (reached_us < us) {
+    row.time_us = Percentiles{reached_us, reached_us, reached_us, reached_us};
+    row.note = fmt::format("until within 1 % of {:.4f} N", reference_N);
+  } else {
+    row.note = fmt::format("not within 1 % of {:.4f} N after {:.0f} ms", reference_N, 1e-3 * us);
+  }
+  if (at_asked_N) {
+    row.force_error_N = std::fabs(*at_asked_N - reference_N);
+    row.force_error_jnd = *row.force_error_N / std::max(kJndShare * reference_N, kFloor_N);
+    row.note += "; error after 100 ms";
+  }
+  return row;
+}
+
 // Its relaxation never ends (Fig 22); what it costs to go round once.
 SoftRow classic_row(int edge) {
   const TickTimer timer;
@@ -229,6 +309,7 @@ void bench_relaxation(const SoftBenchOptions& options, const std::vector<SoftEng
         options.progress(fmt::format("relaxation of {0} voxels an edge, {1}", edge, limits.name));
       add(relax_row(edge, limits));
     }
+    add(tight_row(edge));
   }
 }
 
