@@ -103,6 +103,7 @@ std::unique_ptr<SoftObject> SoftObject::copy() const {
   if (grid_) {
     result->grid_ = std::make_unique<CompositeGrid>(*grid_);
     result->near_on_grid_.reserve(near_on_grid_.capacity());
+    result->touches_on_grid_.reserve(kMaxTouched);
     result->near_on_grid_.assign(near_on_grid_.begin(), near_on_grid_.end());
     result->on_grid_ = on_grid_;
     result->centre_ = centre_;

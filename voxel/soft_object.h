@@ -410,6 +410,12 @@ class SoftObject {
   bool on_grid_ = false;                 // there is a contact, and it is on the composite grid
   std::unique_ptr<CompositeGrid> grid_;  // none: contacts are in state_
   std::vector<VoxelId> near_on_grid_;
+  struct TouchOnGrid {  // of those in the box of level 0, near the tool as a cycle begins
+    std::uint32_t touch;
+    std::array<int, 3> voxel;
+    double gap_m;
+  };
+  std::vector<TouchOnGrid> touches_on_grid_;
   std::array<int, 3> centre_{};                      // of the contact
   std::uint32_t grid_cycles_ = 0;                    // since it began
   glm::dvec3 grid_force_N_{0.0}, grid_tool_m_{0.0};  // and where the tool was

@@ -65,6 +65,7 @@ std::string SoftObject::use_composite_grid(const ToolInBody& tool) {
   if (!obstacle.empty()) return obstacle;
   grid_ = std::make_unique<CompositeGrid>(*lattice_, half);
   near_on_grid_.reserve(most_in_box(half));
+  touches_on_grid_.reserve(kMaxTouched);
   return {};
 }
 
@@ -204,43 +205,47 @@ SoftObject::Bound SoftObject::bound_by(const ToolInBody& tool, const Touch& t,
 // pushed aside hangs on those beside it, and the cycle moves none of them along the tool. (With wide limits,
 // 140 voxels pressed: the force 2.7 JND off at 0.1 m/s without it, 1.2 with it; to and fro twice no better.)
 void SoftObject::put_aside(const ToolInBody& tool) noexcept {
-  const auto put = [&](const Touch& t) {
-    const std::array<int, 3> c = lattice_->coordinates(t.v);
-    if (!grid_->in_fine_box(c)) return;
-    if (gap(tool, t.rest + grid_->fine_at(c)).distance > kPressed * lattice_->min_spacing_m()) return;
-    const glm::dvec3 wished = grid_->link_minimum(c);
-    Gap g = gap(tool, t.rest + wished);
+  const auto put = [&](const TouchOnGrid& near) {
+    if (near.gap_m > kPressed * lattice_->min_spacing_m()) return;
+    const glm::dvec3 rest = touches_[near.touch].rest, wished = grid_->link_minimum(near.voxel);
+    Gap g = gap(tool, rest + wished);
     if (g.distance >= 0.0) return;
-    grid_->set_fine(c, grid_->within_anchors(c, onto_tool(tool, t.rest, wished, grid_->compliance(c), g)));
+    const glm::dvec3 place = onto_tool(tool, rest, wished, grid_->compliance(near.voxel), g);
+    grid_->set_fine(near.voxel, grid_->within_anchors(near.voxel, place));
   };
-  std::for_each(touches_.begin(), touches_.end(), put);
-  std::for_each(touches_.rbegin(), touches_.rend(), put);
+  std::for_each(touches_on_grid_.begin(), touches_on_grid_.end(), put);
+  std::for_each(touches_on_grid_.rbegin(), touches_on_grid_.rend(), put);
 }
 
 // Says what may not be in the tool. Whether or not a voxel is pressed its bound stands: let go of because
 // coarse levels had gone too far, all of a contact was pressed and let go of in turns.
 void SoftObject::press_on_grid(const ToolInBody& tool) noexcept {
   grid_->clear_pressed();
-  put_aside(tool);
-  for (Touch& t : touches_) {
-    const std::array<int, 3> c = lattice_->coordinates(t.v);
+  touches_on_grid_.clear();
+  for (std::uint32_t n = 0; n < touches_.size(); ++n) {
+    const std::array<int, 3> c = lattice_->coordinates(touches_[n].v);
     if (!grid_->in_fine_box(c)) continue;
-    glm::dvec3 u = grid_->fine_at(c);
-    if (gap(tool, t.rest + u).distance > kNear * lattice_->min_spacing_m()) continue;
+    const double away = gap(tool, touches_[n].rest + grid_->fine_at(c)).distance;
+    if (away <= kNear * lattice_->min_spacing_m()) touches_on_grid_.push_back({n, c, away});
+  }
+  put_aside(tool);
+  for (const TouchOnGrid& near : touches_on_grid_) {
+    const Touch& t = touches_[near.touch];
+    glm::dvec3 u = grid_->fine_at(near.voxel);
     const Bound bound = bound_by(tool, t, u);
     if (!bound.any) continue;
     u[bound.axis] = bound.u;
     glm::dvec3 normal(0.0);
     normal[bound.axis] = bound.way;
-    grid_->press(c, grid_->within_anchors(c, u), normal);
+    grid_->press(near.voxel, grid_->within_anchors(near.voxel, u), normal);
     // What is pressed aside is held aside: on the tool's surface where its links have it.
-    const glm::dvec3 wished = grid_->link_minimum(c);
+    const glm::dvec3 wished = grid_->link_minimum(near.voxel);
     Gap g = gap(tool, t.rest + wished);
     if (g.distance >= 0.0) continue;
-    const glm::dvec3 place = onto_tool(tool, t.rest, wished, grid_->compliance(c), g);
+    const glm::dvec3 place = onto_tool(tool, t.rest, wished, grid_->compliance(near.voxel), g);
     normal = g.normal;
     normal[bound.axis] = 0.0;
-    grid_->press(c, grid_->within_anchors(c, place), normal);
+    grid_->press(near.voxel, grid_->within_anchors(near.voxel, place), normal);
   }
 }
 
