@@ -94,7 +94,7 @@ glm::dvec3 SoftObject::position_on_grid(VoxelId v) const noexcept {
 
 // As much of the surface as the box of level 0 may have in it.
 std::size_t SoftObject::most_in_box(int half_width) const {
-  const auto across = static_cast<std::size_t>(2 * half_width + 2);
+  const std::size_t across = 2 * static_cast<std::size_t>(half_width) + 2;
   return std::min(lattice_->surface().size(), across * across * across);
 }
 
