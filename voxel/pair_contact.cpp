@@ -66,7 +66,7 @@ End end_of(const PosedObject& o, VoxelId v, std::uint32_t number) noexcept {
   return {u + w * o.object.pair_load(number), w};
 }
 
-// How far a force of 1 N along a way (body frame, unit) takes a voxel along it (m/N).
+// How far a force of 1 N times a way (body frame) takes a voxel along that way (m/N).
 double yielding(const glm::dvec3& compliance, const glm::dvec3& way) noexcept {
   return glm::dot(way, compliance * way);
 }
