@@ -33,6 +33,15 @@ constexpr int kCalmRounds = 30;               // … for so many rounds: there i
 constexpr double kReferenceTolerance = 1e-6;  // of the lattice's force scale
 constexpr int kReferenceCycles = 200;
 
+constexpr double kTightSlack = 0.15;
+constexpr voxel::LinkMaterial tight_tissue(double young_Pa) {
+  return {.young_Pa = young_Pa,
+          .stretch_min = 1.0 - kTightSlack,
+          .stretch_max = 1.0 + kTightSlack,
+          .shear = kTightSlack};
+}
+constexpr voxel::LinkMaterial kFirm = tight_tissue(20e3), kLimp = tight_tissue(5e3);
+
 struct Limits {
   const char* name;
   double slack;                   // in spacings, as the row has it; of the tightest material
@@ -42,13 +51,10 @@ struct Limits {
 const std::array<Limits, 6>& all_limits() {
   constexpr voxel::LinkMaterial tissue{}, bricks{.bricks = true}, full{.poisson = 0.45, .bricks = true};
   constexpr voxel::LinkMaterial loose{.stretch_min = 0.05, .stretch_max = 10.0, .shear = 10.0};
-  constexpr voxel::LinkMaterial firm{
-      .young_Pa = 20e3, .stretch_min = 0.85, .stretch_max = 1.15, .shear = 0.15},
-      limp{.young_Pa = 5e3, .stretch_min = 0.85, .stretch_max = 1.15, .shear = 0.15};
   constexpr voxel::LinkMaterial tight{.stretch_min = 1.0, .stretch_max = 1.0, .shear = 0.0};
   static const std::array<Limits, 6> kLimits{
       Limits{"limits", 0.6, tissue, tissue},    Limits{"no limits", 0.95, loose, loose},
-      Limits{"slack 0", 0.0, tight, tissue},    Limits{"tight, layers", 0.15, firm, limp},
+      Limits{"slack 0", 0.0, tight, tissue},    Limits{"tight, by links", 0.15, kFirm, kLimp},
       Limits{"trilinear", 0.6, bricks, bricks}, Limits{"trilinear, 0.45", 0.6, full, full}};
   return kLimits;
 }
@@ -58,6 +64,14 @@ voxel::LabelVolume cube(int edge) {
   volume.dims = {edge, edge, edge};
   const auto side = static_cast<std::size_t>(edge);
   volume.labels.assign(side * side * side, 1);
+  return volume;
+}
+
+// The upper 40 % of label 2.
+voxel::LabelVolume layered_cube(int edge) {
+  voxel::LabelVolume volume = cube(edge);
+  const std::size_t base = volume.index(0, 0, edge * 6 / 10);
+  std::fill(volume.labels.begin() + static_cast<std::ptrdiff_t>(base), volume.labels.end(), std::uint8_t{2});
   return volume;
 }
 
@@ -72,10 +86,7 @@ class Pressed {
   enum class Relaxed : std::uint8_t { apart, here };
 
   Pressed(int edge, const Limits& limits, Relaxed relaxed = Relaxed::apart) {
-    voxel::LabelVolume volume = cube(edge);
-    const std::size_t base = volume.index(0, 0, edge * 6 / 10);
-    std::fill(volume.labels.begin() + static_cast<std::ptrdiff_t>(base), volume.labels.end(),
-              std::uint8_t{2});
+    const voxel::LabelVolume volume = layered_cube(edge);
     voxel::LatticeOptions options;
     options.materials[1] = limits.base;
     options.materials[2] = limits.top;
@@ -195,17 +206,18 @@ SoftRow relax_row(int edge, const Limits& limits) {
   return row;
 }
 
-// The same of one tissue whose chain is tight from the ball two thirds of the way to the anchors: on the
-// composite grid, where `run` keeps such a contact. A tick is all that is done, and nothing is left to
-// another thread.
-SoftRow tight_row(int edge) {
-  constexpr double kSlack = 0.15;
+// The same where the chain is tight from the ball two thirds of the way to the anchors: on the composite
+// grid, where `run` keeps such a contact of tissue that nothing else is near. A tick is all that is done, and
+// nothing is left to another thread.
+SoftRow tight_row(int edge, bool layered) {
+  constexpr double kSlack = kTightSlack;
   constexpr int kTicks = 400;
   const double depth = std::min(kDepth, 0.7 * kSlack * (edge - 1));  // of a small cube the chain ends sooner
   const TickTimer timer;
-  const voxel::LabelVolume volume = cube(edge);
+  const voxel::LabelVolume volume = layered ? layered_cube(edge) : cube(edge);
   voxel::LatticeOptions options;
-  options.materials[1] = {.stretch_min = 1.0 - kSlack, .stretch_max = 1.0 + kSlack, .shear = kSlack};
+  options.materials[1] = layered ? kLimp : tight_tissue(voxel::LinkMaterial{}.young_Pa);
+  options.materials[2] = kFirm;
   options.anchor_faces = {"-z"};
   const auto lattice = std::make_shared<const voxel::Lattice>(volume, options);
   const double middle = 0.5 * (edge - 1) * kSpacing, top = (edge - 1) * kSpacing;
@@ -235,7 +247,7 @@ SoftRow tight_row(int edge) {
   };
   SoftRow row{.test_case = "relax",
               .voxels = lattice->voxel_count(),
-              .material = "tight, grid",
+              .material = layered ? "tight, layers" : "tight",
               .depth_spacings = depth,
               .slack = kSlack};
   double reference_N = 0.0, us = 0.0, reached_us = 0.0;
@@ -308,7 +320,7 @@ void bench_relaxation(const SoftBenchOptions& options, const std::vector<SoftEng
         options.progress(fmt::format("relaxation of {0} voxels an edge, {1}", edge, limits.name));
       add(relax_row(edge, limits));
     }
-    add(tight_row(edge));
+    for (const bool layered : {false, true}) add(tight_row(edge, layered));
   }
 }
 

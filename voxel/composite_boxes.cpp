@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The boxes of a composite grid: which nodes there are, and what links between them are worth.
+// The boxes of a composite grid: which nodes there are, what holds them, and what they have of the next
+// level.
 #include <algorithm>
 #include <cmath>
 
@@ -61,6 +62,12 @@ void CompositeGrid::make_room(Level& level, std::size_t l) const {
   for (Floats* array : {&level.f, &level.old, &level.residual, &level.follows, &level.stuck, &level.drag,
                         &level.with_drag, &level.bound[0], &level.bound[1]})
     array->assign(floats, 0.0F);
+  if (cells_.several()) {
+    for (auto* arrays : {&level.tissue, &level.reach, &level.link[0], &level.link[1], &level.link[2],
+                         &level.held_link[0], &level.held_link[1], &level.held_link[2]}) {
+      for (Floats& array : *arrays) array.assign(floats, 0.0F);
+    }
+  }
   // Nodes beside the object, about as many as on its surface.
   const std::size_t share = cells_.fills_box() ? kFewGhosts : 1;
   level.ghosts.reserve(floats / (8 * share));
@@ -88,6 +95,11 @@ void CompositeGrid::make_room_to_move() {
   }
   for (auto* arrays : {&before_.u, &before_.held}) {
     for (Floats& axis : *arrays) axis.assign(most, 0.0F);
+  }
+  for (std::size_t a = 0; cells_.several() && a < 3; ++a) {
+    for (auto* arrays : {&before_.link[a], &before_.held_link[a]}) {
+      for (Floats& axis : *arrays) axis.assign(most, 0.0F);
+    }
   }
 }
 
@@ -185,101 +197,12 @@ void CompositeGrid::lay(Level& level) noexcept {
   find_ghosts(level);
 }
 
-// Each link from the half cells of a level's nodes that lie round it: two along it, two by two across.
-void CompositeGrid::weigh(Level& level) noexcept {
-  if (cells_.fills_box()) return weigh_box(level);
-  const auto& line = level.line;
-  const int nx = line[0].count, ny = line[1].count, nz = line[2].count, step = level.step;
-  const int hx = 2 * nx, hy = 2 * ny;
-  int m = 0;  // half cells are cubes of 2^m cells; on level 0, halves of one
-  while (step > 2 << m) ++m;
-  const int edge = 1 << m;
-  const float scale = (step == 1 ? 0.125F : 1.0F) / static_cast<float>(step * step);
-  const auto area = index(hx + 2) * index(hy + 2);
-  for (Floats& plane : halves_) plane.resize(std::max(plane.size(), area));
-  Floats &below = halves_[0], &above = halves_[1], &cells = halves_[2];
-  const auto read = [&](int number, Floats& to) {
-    if (step > 1) {
-      cells_.plane(m, line[2].begin / edge + number - 1, line[0].begin / edge - 1, hx,
-                   line[1].begin / edge - 1, hy, to.data());
-      return;
-    }
-    cells_.plane(0, line[2].begin + (number + 1) / 2 - 1, line[0].begin - 1, nx + 1, line[1].begin - 1,
-                 ny + 1, cells.data());
-    for (int j = 0; j < hy; ++j) {
-      const float* from = cells.data() + ((j + 1) / 2) * (nx + 1);
-      for (int i = 0; i < hx; ++i) to[index(j * hx + i)] = from[(i + 1) / 2];
-    }
-  };
-  for (Floats& array : level.weight) std::fill(array.begin(), array.end(), 0.0F);
-  for (int k = 0; k < nz; ++k) {
-    // Halves of one cell are the same.
-    if (k > 0 && step == 1) {
-      std::swap(below, above);
-    } else {
-      read(2 * k, below);
-    }
-    read(2 * k + 1, above);
-    for (int j = 0; j < ny; ++j) {
-      for (int i = 0; i < nx; ++i) {
-        const std::size_t at = level.node(i, j, k);
-        const std::size_t h = index(2 * j * hx + 2 * i), g = h + index(hx);
-        const auto both = [&](std::size_t n) { return below[n] + above[n]; };
-        if (i + 1 < nx) level.weight[0][at] = scale * (both(h + 1) + both(h + 2) + both(g + 1) + both(g + 2));
-        if (j + 1 < ny) {
-          const std::size_t further = g + index(hx);
-          level.weight[1][at] = scale * (both(g) + both(g + 1) + both(further) + both(further + 1));
-        }
-        const auto of = [&](const Floats& p) { return scale * (p[h] + p[h + 1] + p[g] + p[g + 1]); };
-        if (k + 1 < nz) level.weight[2][at] += of(above);
-        if (k > 0) level.weight[2][at - level.plane] += of(below);
-      }
-    }
-  }
-}
-
-// The same where all is tissue: a length by two widths.
-void CompositeGrid::weigh_box(Level& level) noexcept {
-  const auto& line = level.line;
-  for (Floats& plane : halves_)
-    plane.resize(std::max(plane.size(), index(line[0].count + line[1].count + line[2].count)));
-  Floats &length = halves_[0], &width = halves_[1];  // axis after axis
-  const std::array<std::size_t, 3> from{0, index(line[0].count), index(line[0].count + line[1].count)};
-  for (std::size_t d = 0; d < 3; ++d) {
-    const auto within = [&](double low, double high) {
-      return static_cast<float>(
-          std::max(0.0, std::min<double>(high, cells_.high(d)) - std::max<double>(low, cells_.low(d))));
-    };
-    for (int i = 0; i < line[d].count; ++i) {
-      const double at = level.at(d, i), half = 0.5 * level.step;
-      length[from[d] + index(i)] = i + 1 < line[d].count ? within(at, at + level.step) : 0.0F;
-      width[from[d] + index(i)] = within(at - half, at + half);
-    }
-  }
-  for (Floats& array : level.weight) std::fill(array.begin(), array.end(), 0.0F);
-  const float scale = 1.0F / static_cast<float>(level.step * level.step);
-  const float *const lx = length.data(), *const wx = width.data();
-  for (int k = 0; k < line[2].count; ++k) {
-    const float lz = scale * length[from[2] + index(k)], wz = scale * width[from[2] + index(k)];
-    for (int j = 0; j < line[1].count; ++j) {
-      const float ly = length[from[1] + index(j)], wy = width[from[1] + index(j)];
-      const std::size_t row = level.row(j, k);
-      float *const x = level.weight[0].data() + row, *const y = level.weight[1].data() + row,
-                   *const z = level.weight[2].data() + row;
-      for (int i = 0; i < line[0].count; ++i) {
-        x[i] = lx[i] * wy * wz;
-        y[i] = wx[i] * ly * wz;
-        z[i] = wx[i] * wy * lz;
-      }
-    }
-  }
-}
-
 // Links that a gap or an anchor breaks, and what anchors hold.
 void CompositeGrid::find_holds(Level& level, bool near) noexcept {
   const auto& line = level.line;
   const int step = level.step;
   const auto whole = static_cast<float>(step);
+  const bool several = cells_.several();
   level.broken = false;
   level.held_area = 0.0;
   level.holds = false;
@@ -295,7 +218,8 @@ void CompositeGrid::find_holds(Level& level, bool near) noexcept {
         for (std::size_t d = 0; d < 3; ++d) {
           if (node[d] + 1 == line[d].count) continue;
           float& weight = level.weight[d][here];
-          if (weight < kLeast * whole) {
+          const float there = several ? level.tissue[d][here] : weight;
+          if (there < kLeast * whole) {
             weight = 0.0F;
             level.broken = level.broken || !cells_.fills_box();
             continue;
@@ -303,18 +227,23 @@ void CompositeGrid::find_holds(Level& level, bool near) noexcept {
           Place after = at;
           after[d] += step;
           // From either end as far as the first anchor on the way, by what of the tissue is there.
+          const float stiff = several ? weight / there : 1.0F;
           const TissueCells::Anchored anchors =
               anchors_near ? cells_.anchors_along(at, d, step) : TissueCells::Anchored{};
           const float part =
-              anchors.links > 0 ? std::min(1.0F, weight / static_cast<float>(anchors.links)) : 0.0F;
-          const auto held = [&](int links) { return part * whole * whole / static_cast<float>(links); };
+              anchors.links > 0 ? std::min(1.0F, there / static_cast<float>(anchors.links)) : 0.0F;
+          const auto held = [&](int links) {
+            return stiff * (part * whole * whole / static_cast<float>(links));
+          };
           const std::size_t by = d == 0 ? 1 : d == 1 ? level.stride : level.plane;
           if (anchors.ahead > 0) level.hold[d][here] += held(anchors.ahead);
           if (anchors.back > 0) level.hold[d][here + by] += held(anchors.back);
+          if (several && anchors.ahead > 0) level.reach[d][here] = static_cast<float>(anchors.ahead);
+          if (several && anchors.back > 0) level.reach[d][here + by] = static_cast<float>(-anchors.back);
           const int ends = (anchors.low_free && anchors.ahead > 0 ? 1 : 0) +
                            (anchors.high_free && anchors.back > 0 ? 1 : 0);
           level.held_area += ends * static_cast<double>(part * whole * whole);
-          const bool gap = step > 1 && weight < kAlmostAll * whole && cells_.filled(at) &&
+          const bool gap = step > 1 && there < kAlmostAll * whole && cells_.filled(at) &&
                            cells_.filled(after) && !cells_.unbroken(at, d, step);
           if (anchors.ahead == 0 && anchors.back == 0 && !gap) continue;
           weight = 0.0F;

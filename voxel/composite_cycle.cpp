@@ -31,7 +31,7 @@ composite::View CompositeGrid::view(std::size_t l, std::size_t axis) noexcept {
   v.drag = level.drag.data() + from;
   v.with_drag = level.dragged ? level.with_drag.data() + from : nullptr;
   for (std::size_t d = 0; d < 3; ++d) {
-    v.link[d] = level.weight[d].data() + from;
+    v.link[d] = links_on(level, axis)[d].data() + from;
     v.spring[d] = spring_[d][axis];
     v.first[d] = level.line[d].first;
     v.last[d] = level.line[d].last;
@@ -252,6 +252,7 @@ void CompositeGrid::cycle(const std::array<bool, 3>& axes) noexcept {
     }
     spread_to_ghosts(levels_[0], levels_[0].u[a].data());
     fit_far_field(a);
+    hold_links(a);
   }
   box_moved_ = false;
 }

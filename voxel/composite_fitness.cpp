@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <limits>
 
 #include "voxel/composite_grid.h"
 #include "voxel/link_weight.h"
@@ -15,6 +16,7 @@ constexpr int kTried = 10;                            // half width of level 0 w
 constexpr double kConverges = 0.85;                   // of what is left of rest stays in a cycle
 constexpr double kMostOff = 0.05;                     // of the force, where boxes twice as wide have it
 constexpr int kFromAnchors = 16;                      // voxels
+constexpr double kMostThin = 0.02;                    // of what links carry where tissues meet
 constexpr double kLeastSeen = 0.8, kMostSeen = 1.25;  // of what anchors hold
 
 std::size_t index(int i) {
@@ -44,10 +46,56 @@ bool has_thin_parts(const Lattice& lattice) {
   return false;
 }
 
+// Of what links carry where tissues meet, the share of those that are too thin to have a cell of their own
+// stiffness (LinkParts::thin), which a grid made of cells does not know. Of kRowsTried rows at most.
+double share_of_thin_tissue(const Lattice& lattice) {
+  constexpr RowId kRowsTried = 20000;
+  const Grid& g = lattice.grid();
+  RowId among = 0;
+  for (RowId row = 0; row < g.rows(); ++row) among += lattice.filled_in(row) > 0 && lattice.inside(row) == 0;
+  const RowId every = among / kRowsTried + 1;
+  double thin = 0.0, all = 0.0;
+  RowId number = 0;
+  const auto moduli_at = [&](const std::array<int, 3>& c) {
+    const std::uint8_t material = lattice.material(lattice.at(c[0], c[1], c[2]));
+    if (material == 0) return LinkModuli{};
+    const double young_Pa = lattice.materials()[material].young_Pa;
+    return LinkModuli{young_Pa, young_Pa};
+  };
+  for (RowId row = 0; row < g.rows(); ++row) {
+    if (lattice.filled_in(row) == 0 || lattice.inside(row) != 0 || number++ % every != 0) continue;
+    for (std::uint32_t lanes = lattice.filled_lanes(row); lanes != 0; lanes &= lanes - 1) {
+      const VoxelId v = row * kRow + static_cast<VoxelId>(std::countr_zero(lanes));
+      for (std::size_t d = 0; d < 3; ++d) {
+        if (!lattice.filled(lattice.up(v, static_cast<int>(d)))) continue;
+        std::array<LinkModuli, 9> links;
+        for (int n = 0; n < 9; ++n) {
+          auto from = lattice.coordinates(v);
+          from[(d + 1) % 3] += n % 3 - 1;
+          from[(d + 2) % 3] += n / 3 - 1;
+          auto to = from;
+          ++to[d];
+          links[index(n)] = softer(moduli_at(from), moduli_at(to));
+        }
+        const LinkParts parts = link_parts(links);
+        thin += parts.thin.along_Pa;
+        all += parts.thin.along_Pa + parts.cells.along_Pa;
+      }
+    }
+  }
+  return all > 0.0 ? thin / all : 0.0;
+}
+
+bool alike_in_poisson(std::span<const LinkMaterial> materials) {
+  return std::all_of(materials.begin(), materials.end(),
+                     [&](const LinkMaterial& m) { return m.poisson == materials.front().poisson; });
+}
+
 }  // namespace
 
 std::string CompositeGrid::obstacle_to(const Lattice& lattice) {
-  if (lattice.materials().size() != 2) return "it is of several materials";
+  if (!lattice.uniform_limits()) return "its materials have limits of their own";
+  if (!alike_in_poisson(lattice.materials().subspan(1))) return "its materials differ in Poisson's ratio";
   if (lattice.yields()) return "it keeps dents";
   if (lattice.has_bricks()) return "it is of the accurate energy";
   for (int d = 0; d < 3; ++d) {
@@ -55,6 +103,8 @@ std::string CompositeGrid::obstacle_to(const Lattice& lattice) {
     if (l.along_low >= 0.0F || l.along_high <= 0.0F || l.across <= 0.0F) return "its links have no slack";
   }
   if (has_thin_parts(lattice)) return "parts of it are one voxel thick";
+  if (lattice.materials().size() > 2 && share_of_thin_tissue(lattice) > kMostThin)
+    return "much of its stiffer tissue is one voxel thick";
   const CompositeGrid grid(lattice, kHalfWidth);
   // How far the chain lets tissue go beside other anchors, nothing tells a press.
   if (!grid.anchored_by_sides()) return "it is anchored otherwise than by whole sides";
@@ -73,6 +123,12 @@ std::string CompositeGrid::wrong_somewhere() {
   constexpr double kDepth = 1.0;  // spacings
   CompositeGrid wide(lattice_, 2 * kTried, 2 * kHalfWidth);
   const auto surface = lattice_.surface();
+  // From one node to the next, so that limits have no say.
+  float least = std::numeric_limits<float>::max();
+  for (const auto& d : room_) {
+    for (const auto& axis : d) least = std::min({least, axis[0], axis[1]});
+  }
+  const float most_m = 0.5F * least;
   for (std::size_t n = 0; n < kPlaces; ++n) {
     const VoxelId v = surface[(2 * n + 1) * surface.size() / (2 * kPlaces)];
     const Place place = lattice_.coordinates(v);
@@ -83,8 +139,9 @@ std::string CompositeGrid::wrong_somewhere() {
       for (std::size_t i = 0; i < level.inverse[0].size(); ++i) {
         for (std::size_t a = 0; a < 3; ++a) {
           random = random * 1664525U + 1013904223U;
-          level.u[a][i] =
-              level.inverse[a][i] > 0.0F ? static_cast<float>(random >> 8U) * 0x1p-24F - 0.3F : 0.0F;
+          level.u[a][i] = level.inverse[a][i] > 0.0F
+                              ? most_m * (static_cast<float>(random >> 8U) * 0x1p-24F - 0.3F)
+                              : 0.0F;
         }
       }
     }

@@ -48,7 +48,10 @@ CompositeGrid::CompositeGrid(const Lattice& lattice, int half_width, int coarse_
   for (const Level& level : levels_) {
     for (const Line& line : level.line) most = std::max(most, line.coarse.size());
   }
-  for (Floats& plane : halves_) plane.reserve((2 * most + 2) * (2 * most + 2));
+  for (Halves& plane : halves_) {
+    plane.cells.reserve((2 * most + 2) * (2 * most + 2));
+    for (Floats& axis : plane.stiff) axis.reserve(cells_.several() ? plane.cells.capacity() : 0);
+  }
   cells_.make_room(2 * most + 2);
   begin({dims[0] / 2, dims[1] / 2, dims[2] / 2});
 }
@@ -92,11 +95,12 @@ glm::dvec3 CompositeGrid::link_minimum(const Place& voxel) const noexcept {
   const std::size_t n = fine_node(voxel);
   glm::dvec3 place(0.0);
   for (std::size_t a = 0; a < 3; ++a) {
+    const auto& link = links_on(level, a);
     double sum = 0.0;
     for (std::size_t d = 0; d < 3; ++d) {
-      const std::size_t by = d == 0 ? 1 : d == 1 ? level.stride : level.plane;
-      sum += static_cast<double>(spring_[d][a] * (level.weight[d][n] * level.u[a][n + by] +
-                                                  level.weight[d][n - by] * level.u[a][n - by]));
+      const std::size_t by = level.by(d);
+      sum += static_cast<double>(spring_[d][a] *
+                                 (link[d][n] * level.u[a][n + by] + link[d][n - by] * level.u[a][n - by]));
     }
     place[static_cast<int>(a)] = sum * static_cast<double>(level.inverse[a][n]);
   }

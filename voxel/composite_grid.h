@@ -36,8 +36,9 @@
 
 namespace voxel {
 namespace composite {
+struct Limit;
 struct View;
-}
+}  // namespace composite
 
 class CompositeGrid {
  public:
@@ -149,7 +150,10 @@ class CompositeGrid {
     std::size_t stride = 8, plane = 0;
     std::array<Floats, 3> u, held;       // [axis] held: 1 at its least, −1 at its most
     std::array<Floats, 3> weight, hold;  // [d] of the link up, in those of a link between voxels; of anchors
-    std::array<Floats, 3> inverse, all;  // [axis] 1 / Σ springs, 0: does not move; Σ
+    std::array<Floats, 3> tissue;        // where tissues differ: the weight, were all of the reference's
+    std::array<Floats, 3> reach;         // likewise: voxels to the anchor, behind it < 0
+    std::array<std::array<Floats, 3>, 3> link, held_link;  // [axis][d] likewise, at limits: weight and hold
+    std::array<Floats, 3> inverse, all;                    // [axis] 1 / Σ springs, 0: does not move; Σ
     Floats f, old, residual, follows, stuck, drag, with_drag;  // of the axis that a cycle is on
     std::array<Floats, 2> bound;                               // 0: least u, 1: least −u; likewise
     std::array<bool, 2> bounded{};
@@ -172,6 +176,8 @@ class CompositeGrid {
       return {static_cast<int>(number % stride), static_cast<int>(number % plane / stride),
               static_cast<int>(number / plane)};
     }
+    // From a node's number to that of the next along d.
+    [[nodiscard]] std::size_t by(std::size_t d) const { return d == 0 ? 1 : d == 1 ? stride : plane; }
     [[nodiscard]] int at(std::size_t d, int i) const { return line[d].begin + step * i; }
   };
   static constexpr std::size_t kPad = 8;
@@ -207,8 +213,6 @@ class CompositeGrid {
   [[nodiscard]] Span span_of(std::size_t l, std::size_t d, int centre) const noexcept;
   void lay_lines(Level& level, std::size_t l, const Place& centre) const noexcept;
   void lay(Level& level) noexcept;
-  void weigh(Level& level) noexcept;
-  void weigh_box(Level& level) noexcept;
   // `near`: there may be anchors in it.
   void find_holds(Level& level, bool near) noexcept;
   void find_springs(Level& level, bool near) noexcept;
@@ -217,6 +221,14 @@ class CompositeGrid {
   void join(Level& fine, const Level& coarse) const noexcept;
   void spread_to_ghosts(const Level& level, float* values) const noexcept;
   void gather_from_ghosts(const Level& level, float* loads) const noexcept;
+  // ---- composite_weights.cpp ----
+  void weigh(Level& level) noexcept;
+  void weigh_shape(const Level& level, std::array<Floats, 3>& weight) noexcept;
+  void weigh_box(const Level& level, std::array<Floats, 3>& weight) noexcept;
+  void weigh_cells(const Level& level, std::array<Floats, 3>& weight, bool all_alike) noexcept;
+  void weigh_halves(const Level& level, std::array<Floats, 3>& weight) noexcept;
+  void weigh_tissues(Level& level) noexcept;
+  [[nodiscard]] static int half_cube(const Level& level) noexcept;
   // ---- composite_bounds.cpp ----
   void find_bounds(std::size_t axis) noexcept;
   void spread_bounds(Level& level, std::size_t axis, std::size_t kind, const Place& low,
@@ -232,6 +244,21 @@ class CompositeGrid {
   void tell_row(Level& fine, const Level& coarse, std::size_t axis, const float* from, int j, int k,
                 bool adds) const noexcept;
   void fit_far_field(std::size_t axis) noexcept;  // composite_far_field.cpp
+  // ---- composite_limits.cpp ----
+  void hold_links(std::size_t axis) noexcept;
+  float hold_anchored(Level& level, std::size_t axis, std::size_t d) noexcept;
+  void limits_from_finer(std::size_t l, std::size_t axis) noexcept;
+  void renew_springs(Level& level, std::size_t axis) const noexcept;
+  void let_go_of_links() noexcept;
+  void keep_limits(const Level& level) noexcept;
+  void take_limits(Level& level, const Place& by) noexcept;
+  [[nodiscard]] composite::Limit limit_of(const Level& level, std::size_t axis, std::size_t d) const noexcept;
+  [[nodiscard]] const std::array<Floats, 3>& links_on(const Level& level, std::size_t axis) const {
+    return at_limits_[axis] ? level.link[axis] : level.weight;
+  }
+  [[nodiscard]] const std::array<Floats, 3>& holds_on(const Level& level, std::size_t axis) const {
+    return at_limits_[axis] ? level.held_link[axis] : level.hold;
+  }
   [[nodiscard]] glm::dvec3 interpolate(const Level& level, const std::array<double, 3>& place) const noexcept;
   [[nodiscard]] Place shifted(const Place& voxel) const {
     return {voxel[0] + cells_.offset()[0], voxel[1] + cells_.offset()[1], voxel[2] + cells_.offset()[2]};
@@ -252,9 +279,14 @@ class CompositeGrid {
   Level before_;           // of a level whose box moves
   std::size_t whole_ = 0;  // the first level that holds all of the object
   std::vector<Pressed> pressed_;
-  bool box_moved_ = false;  // since the last cycle
+  bool box_moved_ = false;           // since the last cycle
+  std::array<bool, 3> at_limits_{};  // [axis] some links are held to their limits
   std::size_t work_ = 0;
-  std::array<Floats, 3> halves_;  // scratch of weigh(): half cells, a plane each
+  struct Halves {  // cells of a plane of half cells, and these times how stiff they are, by axis
+    Floats cells;
+    std::array<Floats, 3> stiff;
+  };
+  std::array<Halves, 2> halves_;  // scratch of weigh()
 };
 
 }  // namespace voxel

@@ -58,11 +58,15 @@ glm::dvec3 CompositeGrid::force_on_tool_N() const noexcept {
     const std::size_t first = level.first_row(), end = first + level.floats();
     for (std::size_t d = 0; d < 3; ++d) {
       const float* const hold = level.hold[d].data();
+      const std::array<const float*, 3> held{holds_on(level, 0)[d].data(), holds_on(level, 1)[d].data(),
+                                             holds_on(level, 2)[d].data()};
       for (std::size_t n = first; n < end; ++n) {
         if (hold[n] == 0.0F) continue;
         const double part = part_of_hold(l, n - first, d);
-        for (std::size_t a = 0; a < 3; ++a)
-          carried[static_cast<int>(a)] += part * static_cast<double>(hold[n] * spring_[d][a] * level.u[a][n]);
+        for (std::size_t a = 0; a < 3; ++a) {
+          carried[static_cast<int>(a)] +=
+              part * static_cast<double>(held[a][n] * spring_[d][a] * level.u[a][n]);
+        }
       }
     }
   }
@@ -197,7 +201,7 @@ std::size_t CompositeGrid::memory_bytes() const {
       levels_.capacity() * sizeof(Level) + pressed_.capacity() * sizeof(Pressed) + cells_.memory_bytes();
   const auto add = [&bytes](const Level& level) {
     for (const auto* arrays :
-         {&level.u, &level.held, &level.weight, &level.hold, &level.inverse, &level.all}) {
+         {&level.u, &level.held, &level.weight, &level.hold, &level.tissue, &level.inverse, &level.all}) {
       for (const Floats& array : *arrays) bytes += array.capacity() * sizeof(float);
     }
     for (const Floats* array : {&level.f, &level.old, &level.residual, &level.follows, &level.stuck,
@@ -205,9 +209,22 @@ std::size_t CompositeGrid::memory_bytes() const {
       bytes += array->capacity() * sizeof(float);
     bytes += level.ghosts.capacity() * sizeof(Ghost) + level.beside.capacity() * sizeof(std::uint32_t);
   };
-  for (const Level& level : levels_) add(level);
+  const auto add_limits = [&bytes](const Level& level) {
+    for (const auto* arrays : {&level.reach, &level.link[0], &level.link[1], &level.link[2],
+                               &level.held_link[0], &level.held_link[1], &level.held_link[2]}) {
+      for (const Floats& array : *arrays) bytes += array.capacity() * sizeof(float);
+    }
+  };
+  for (const Level& level : levels_) {
+    add(level);
+    add_limits(level);
+  }
   add(before_);
-  for (const Floats& plane : halves_) bytes += plane.capacity() * sizeof(float);
+  add_limits(before_);
+  for (const Halves& plane : halves_) {
+    for (const Floats* part : {&plane.cells, &plane.stiff[0], &plane.stiff[1], &plane.stiff[2]})
+      bytes += part->capacity() * sizeof(float);
+  }
   return bytes;
 }
 

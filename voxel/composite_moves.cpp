@@ -75,6 +75,7 @@ void CompositeGrid::prepare(const Place& centre) noexcept {
   bool moves = false;
   for (std::size_t d = 0; d < 3; ++d) moves = moves || std::abs(centre[d] - centre_[d]) >= kMoves;
   if (moves) aim_at(centre);
+  let_go_of_links();
   for (Level& level : levels_) {
     if (!level.moved) continue;
     put_to_rest(level);
@@ -97,6 +98,7 @@ void CompositeGrid::begin(const Place& centre) noexcept {
       if (!in_place(l)) lay_anew(l);
     }
   }
+  let_go_of_links();
   for (Level& level : levels_) {
     if (level.moved) put_to_rest(level);
     level.moved = true;
@@ -130,6 +132,7 @@ void CompositeGrid::move(std::size_t l) noexcept {
   before_.step = level.step;
   before_.stride = level.stride;
   before_.plane = level.plane;
+  keep_limits(level);
   lay_lines(level, l, shifted(centre_));
   const std::size_t floats = before_.first_row() + before_.floats() + kPad;
   for (std::size_t a = 0; a < 3; ++a) {
@@ -164,6 +167,7 @@ void CompositeGrid::move(std::size_t l) noexcept {
     }
   }
   lay(level);
+  take_limits(level, by);
 }
 
 }  // namespace voxel

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "voxel/composite_passes.h"
 
+#include <algorithm>
+
 namespace voxel::composite {
 namespace {
 
@@ -13,6 +15,9 @@ const std::array<float, kMostOctets* kOctet> kNoBound = [] {
 
 // Of what ties nodes to stuck ones: with all of it a contact that moves lags, with a third it wavers.
 constexpr float kDrags = 0.5F;
+
+// In a cycle a link gets this much stiffer at most, or softer.
+constexpr float kMostInACycle = 2.0F, kLeastInACycle = 0.25F;
 
 // Lanes of every second node, beginning with the first, with the second.
 struct Colours {
@@ -419,6 +424,64 @@ HYBRID_WIDE void go_along(float* u, const float* mode, float by, const float* le
     }
     store(u + n, x);
   }
+}
+
+HYBRID_WIDE float most_of_limit(const float* u, const float* link, std::size_t by, const Limit& limit,
+                                std::size_t count) noexcept {
+  Octet most{};
+  const Octet zero{};
+  for (std::size_t n = 0; n < count; n += kOctet) {
+    Octet own, next, g;
+    load(own, u + n);
+    load(next, u + n + by);
+    load(g, link + n);
+    const Octet longer = next - own, of_high = limit.per_longer * longer,
+                of_low = -limit.per_shorter * longer;
+    Octet of = of_high > of_low ? of_high : of_low;
+    of = g > zero ? of : zero;
+    take_largest(most, of);
+  }
+  float result = 0.0F;
+  for (int lane = 0; lane < kOctet; ++lane) result = most[lane] > result ? most[lane] : result;
+  return result;
+}
+
+HYBRID_WIDE float hold_to_limit(const float* u, const float* link, std::size_t by, const Limit& limit,
+                                float* held, std::size_t count) noexcept {
+  Octet most{};
+  const Octet zero{}, one = zero + 1.0F;
+  const float above = 1.0F + limit.tolerance, below = 1.0F - limit.tolerance;
+  for (std::size_t n = 0; n < count; n += kOctet) {
+    Octet own, next, g, h;
+    load(own, u + n);
+    load(next, u + n + by);
+    load(g, link + n);
+    load(h, held + n);
+    const Octet longer = next - own, of_high = limit.per_longer * longer,
+                of_low = -limit.per_shorter * longer;
+    const Octet of = of_high > of_low ? of_high : of_low;
+    Octet by_now = of * (0.5F + 0.5F * of);
+    by_now = by_now < kMostInACycle ? by_now : zero + kMostInACycle;
+    by_now = by_now > kLeastInACycle ? by_now : zero + kLeastInACycle;
+    by_now = ((of > above) | (of < below)) ? by_now : one;
+    h *= by_now;
+    const Octet stiffest = limit.most_stiffer * g;
+    h = h > g ? h : g;
+    h = h < stiffest ? h : stiffest;
+    store(held + n, h);
+    Octet times = h / g;
+    times = g > zero ? times : zero;
+    take_largest(most, times);
+  }
+  float result = 1.0F;
+  for (int lane = 0; lane < kOctet; ++lane) result = most[lane] > result ? most[lane] : result;
+  return result;
+}
+
+float held_to_limit(float held, float link, float of_limit, const Limit& limit) noexcept {
+  if (of_limit > 1.0F + limit.tolerance || of_limit < 1.0F - limit.tolerance)
+    held *= std::clamp(of_limit * (0.5F + 0.5F * of_limit), kLeastInACycle, kMostInACycle);
+  return std::clamp(held, link, limit.most_stiffer * link);
 }
 
 }  // namespace voxel::composite

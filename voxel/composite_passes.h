@@ -43,6 +43,18 @@ void take_drags(const View& view, float* f) noexcept;
 void links_of_level(const View& view, const std::array<int, 3>& first,
                     const std::array<int, 3>& last) noexcept;
 
+// Links up to a node `by` further on, and how far they are to their limits: 1 at one.
+struct Limit {
+  float per_longer, per_shorter;  // (1/m)
+  float tolerance, most_stiffer;
+};
+[[nodiscard]] float most_of_limit(const float* u, const float* link, std::size_t by, const Limit& limit,
+                                  std::size_t count) noexcept;
+// What each link is worth, `link` without limits and `held` at them; and how much stiffer the stiffest is.
+float hold_to_limit(const float* u, const float* link, std::size_t by, const Limit& limit, float* held,
+                    std::size_t count) noexcept;
+[[nodiscard]] float held_to_limit(float held, float link, float of_limit, const Limit& limit) noexcept;
+
 // A row as coarse ones have it: `rows` are those that weigh, from the coarse lane on by which lane 0 goes.
 struct Telling {
   std::array<const float*, 4> rows;

@@ -157,6 +157,7 @@ class Lattice {
   }
   // Number of a voxel's material; equal ones share it. 0: no voxel.
   [[nodiscard]] std::uint8_t material(VoxelId v) const { return material_[label_[v]]; }
+  [[nodiscard]] std::uint8_t material_of(std::uint8_t label) const { return material_[label]; }
   // The materials by that number; of [0] nothing is true.
   [[nodiscard]] std::span<const LinkMaterial> materials() const { return materials_; }
   [[nodiscard]] bool has_bricks() const { return has_bricks_; }

@@ -109,6 +109,7 @@ std::unique_ptr<SoftObject> SoftObject::copy() const {
     result->centre_ = centre_;
     result->grid_force_N_ = grid_force_N_;
     result->grid_tool_m_ = grid_tool_m_;
+    result->contact_energy_ = contact_energy_;
     result->nearest_m_ = nearest_m_;
     result->grid_cycles_ = grid_cycles_;
   }

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "voxel/chainmail.h"
+#include "voxel/contact_energy.h"
 #include "voxel/displacement.h"
 #include "voxel/drawn_rows.h"
 #include "voxel/lattice.h"
@@ -348,6 +349,7 @@ class SoftObject {
   void press_on_grid(const ToolInBody& tool) noexcept;
   void settle_on_grid(const ToolInBody& tool) noexcept;
   [[nodiscard]] std::array<bool, 3> axes_due() noexcept;
+  [[nodiscard]] double depth_on_grid() const noexcept;
   [[nodiscard]] Reaction reaction_on_grid(const ToolInBody& tool) const noexcept;
   [[nodiscard]] bool at_anchors_end(VoxelId v, const glm::dvec3& direction) const noexcept;
   // The axis along which a voxel is pressed, the way out of the tool, and where on it the tool's surface is.
@@ -419,7 +421,8 @@ class SoftObject {
   std::array<int, 3> centre_{};                      // of the contact
   std::uint32_t grid_cycles_ = 0;                    // since it began
   glm::dvec3 grid_force_N_{0.0}, grid_tool_m_{0.0};  // and where the tool was
-  double nearest_m_ = 0.0;                           // of a voxel to the tool
+  ContactEnergy contact_energy_;
+  double nearest_m_ = 0.0;  // of a voxel to the tool
 };
 
 }  // namespace voxel

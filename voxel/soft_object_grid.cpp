@@ -179,6 +179,7 @@ bool SoftObject::push_out_on_grid(const ToolInBody& tool) noexcept {
     list_near_on_grid();
     grid_cycles_ = 0;
     grid_force_N_ = glm::dvec3(0.0);
+    contact_energy_.begin();
   }
   return any;
 }
@@ -321,19 +322,26 @@ void SoftObject::relax_on_grid(const ToolInBody& tool) noexcept {
   contact_work_ += grid_->work_of_cycle();
   settle_on_grid(tool);
   grid_force_N_ = grid_->force_on_tool_N();
+  contact_energy_.account(tool.centre - grid_tool_m_, grid_force_N_, depth_on_grid());
   grid_tool_m_ = tool.centre;
   const bool away = nearest_m_ > kOnItsWay * lattice_->min_spacing_m();
   if (away && glm::length(grid_force_N_) < kAtRest_N) on_grid_ = false;
 }
 
+// Against the force.
+double SoftObject::depth_on_grid() const noexcept {
+  const double size = glm::length(grid_force_N_);
+  if (size == 0.0 || !grid_->in_fine_box(centre_)) return 0.0;
+  return -glm::dot(grid_->fine_at(centre_), grid_force_N_) / size;
+}
+
 Reaction SoftObject::reaction_on_grid(const ToolInBody& tool) const noexcept {
   Reaction result;
   if (!on_grid_) return result;
-  double depth = kLeastDepth * lattice_->min_spacing_m();
   const double size = glm::length(grid_force_N_);
   const glm::dvec3 n = size > 0.0 ? grid_force_N_ / size : glm::dvec3(0.0);
   for (const Touch& t : touches_) result.pressed += t.pressed ? 1U : 0U;
-  if (grid_->in_fine_box(centre_)) depth = std::max(depth, -glm::dot(grid_->fine_at(centre_), n));
+  const double depth = std::max(kLeastDepth * lattice_->min_spacing_m(), depth_on_grid());
   if (result.pressed == 0 && (size == 0.0 || nearest_m_ > kOnItsWay * lattice_->min_spacing_m()))
     return result;
   result.pressed = std::max(result.pressed, 1U);
@@ -350,6 +358,8 @@ Reaction SoftObject::reaction_on_grid(const ToolInBody& tool) const noexcept {
   // Until the next cycle it is what it was, and what the tool has moved since.
   result.force_N = grid_force_N_ - result.stiffness_N_per_m * (tool.centre - grid_tool_m_);
   if (glm::dot(result.force_N, n) < 0.0) result.force_N = glm::dvec3(0.0);
+  result.force_N *= contact_energy_.share();
+  result.stiffness_N_per_m *= contact_energy_.share();
   return result;
 }
 

@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What coarse levels of a composite grid know of an object's shape: how much tissue there is in a cube of
-// cells, and where anchors are.
+// What coarse levels of a composite grid know of an object: how much tissue there is in a cube of cells, how
+// stiff that is, and where anchors are.
 //
-// A cell lies between eight voxels and is there where all of them are. Counts of cubes of 4 cells an edge and
-// up are kept, a fiftieth of a byte a voxel, and none at all of an object that fills its box; smaller ones
-// are looked up among the labels.
+// A cell lies between eight voxels and is there where all of them are, as stiff as the softest of them
+// (link_weight.h). Counts of cubes of 4 cells an edge and up are kept, a fiftieth of a byte a voxel, and none
+// at all of an object that fills its box; smaller ones are looked up among the labels.
+//
+// Where tissues differ in stiffness, a cube is as stiff along an axis as its columns beside one another are,
+// each of its halves in series: the lower of the bounds of Cardwell & Parsons (Trans. AIME 160, 1945).
+// (Means over all cells instead have layers across a link carry what the stiffest alone would.) A fifth of a
+// byte a voxel, only where they do.
 //
 // Coordinates are those of the voxels and an offset, so that an end of the object at which nothing is
 // anchored is a node of every level.
@@ -24,8 +29,8 @@ class TissueCells {
 
   using Place = std::array<int, 3>;
   [[nodiscard]] const Place& offset() const { return offset_; }
-  // Of an object that fills its box: from now on the ends nearest to a voxel are nodes of every level; as it
-  // was along an axis where it is about as far from both. True: the offset changed.
+  // Of an object of one stiffness that fills its box: from now on the ends nearest to a voxel are nodes of
+  // every level; as it was along an axis where it is about as far from both. True: the offset changed.
   bool align_to(const Place& voxel) noexcept;
   // Of the outermost voxels, with the offset.
   [[nodiscard]] int low(std::size_t d) const { return offset_[d]; }
@@ -33,6 +38,8 @@ class TissueCells {
   // What part of the outermost voxels is anchored, 0: of the lowest along d, 1: of the highest?
   [[nodiscard]] double anchored_part(std::size_t d, std::size_t end) const { return anchored_part_[d][end]; }
   [[nodiscard]] bool fills_box() const { return fills_box_; }
+  // Are its tissues of more than one stiffness?
+  [[nodiscard]] bool several() const { return stiffness_.size() > 2; }
   [[nodiscard]] bool filled(const Place& p) const noexcept;
   [[nodiscard]] bool anchored(const Place& p) const noexcept;
 
@@ -41,6 +48,12 @@ class TissueCells {
   // Of the cubes of 2^m cells an edge from number `first` on, in one plane z of such cubes: how many cells of
   // each are there. out: [y][x], `nx` to a row.
   void plane(int m, int z, int first_x, int nx, int first_y, int ny, float* out) noexcept;
+  // Where tissues differ, of the same cubes: their cells times how stiff these are along axis d, as a share
+  // of the reference. out[d]: as above.
+  void stiff_plane(int m, int z, int first_x, int nx, int first_y, int ny,
+                   const std::array<float*, 3>& out) noexcept;
+  // Of single cells, from number `first` on: how stiff each is; 0 where there is none.
+  void cell_plane(int z, int first_x, int nx, int first_y, int ny, float* out) noexcept;
   // Along a line of `links` links from p in direction d, through tissue beside it where p is in none: voxels
   // to the first anchored one from either end, 0: there is none; and how many links there are.
   struct Anchored {
@@ -60,9 +73,10 @@ class TissueCells {
   static constexpr int kKept = 2;  // the first level of which counts are kept, in bytes
   struct Kept {
     Place dims{};
-    std::vector<std::uint8_t> small;     // of level kKept: 64 at most
-    std::vector<std::uint32_t> count;    // of others
-    std::vector<std::uint8_t> anchored;  // 1: some voxel of the cube is; from kAnchorBlocks on
+    std::vector<std::uint8_t> small;          // of level kKept: 64 at most
+    std::vector<std::uint32_t> count;         // of others
+    std::vector<std::uint8_t> anchored;       // 1: some voxel of the cube is; from kAnchorBlocks on
+    std::array<std::vector<float>, 3> stiff;  // [d] cells times stiffness along d; where tissues differ
     [[nodiscard]] bool in(const Place& b) const {
       for (std::size_t d = 0; d < 3; ++d) {
         if (b[d] < 0 || b[d] >= dims[d]) return false;
@@ -79,8 +93,12 @@ class TissueCells {
   static constexpr int kAnchorBlocks = 3;
   [[nodiscard]] int offset_of_high_end(std::size_t d) const noexcept;
   void choose_offset();
+  void rank_materials();
   void count_cells();
+  void weigh_cells();
+  void weigh_cubes_of_cubes(const Kept& below, Kept& coarse) const;
   void mark_anchors();
+  [[nodiscard]] float cells_in(const Kept& kept, int m, const Place& cube) const noexcept;
   void layer(int k, int x0, int nx, int y0, int ny, std::uint8_t* out) noexcept;
   void line(int x0, int nx, int j, int k, std::uint8_t* out) const noexcept;
   [[nodiscard]] Anchored anchors_in_box(const Place& p, std::size_t d, int links) const noexcept;
@@ -90,8 +108,11 @@ class TissueCells {
   Place dims_, offset_{};
   std::array<std::array<double, 2>, 3> anchored_part_{};
   bool fills_box_ = false;
+  std::array<std::uint8_t, 256> rank_{};     // [label] among stiffnesses, the softest 1; 0: no voxel
+  std::vector<float> stiffness_;             // [rank] share of the reference's
+  std::vector<float> pair_;                  // [rank · ranks + rank] two cells in series, times how many are
   std::vector<Kept> kept_;                   // [m]
-  std::vector<std::uint8_t> lines_, cells_;  // scratch of layer() and plane()
+  std::vector<std::uint8_t> lines_, cells_;  // scratch of layer() and what asks it
 };
 
 }  // namespace voxel

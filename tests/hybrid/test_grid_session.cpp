@@ -99,6 +99,37 @@ TEST_F(GridSession, ATightChainIsFeltAsAtRest) {
   }
 }
 
+// Skin, fat and muscle with a tight chain, in which the fat is squeezed to its limits between the others:
+// felt as it will be at rest, while the tool moves too. (Link by link: 10 JND off at 20 mm/s.)
+TEST_F(GridSession, LayersWithATightChainAreFeltAsAtRest) {
+  for (const char* play : {"[0.9, 1.1]\nshear = 0.1", "[0.8, 1.2]\nshear = 0.2", "[0.5, 1.5]\nshear = 0.5"}) {
+    std::string text;
+    for (const auto& [name, young] : {std::pair{"skin", 20000}, {"fat", 5000}, {"muscle", 10000}})
+      text += fmt::format("[material.{}]\nyoung = {}\npoisson = 0.3\nstretch = {}\n", name, young, play);
+    text = "format = 1\n" + text +
+           "[[soft]]\nname = \"block\"\nformula = \"block\"\nsize = [64, 64, 64]\nspacing = 1\nlabel = 1\n"
+           "layers = [{ thickness = 32, label = 3 }, { thickness = 28, label = 2 }, { thickness = 4, label = "
+           "1 }]\n"
+           "material = \"skin\"\nmaterials = { \"2\" = \"fat\", \"3\" = \"muscle\" }\n[tool]\nradius = 8\n" +
+           tests::unlimited + tests::some_path;
+    const double top = 0.032 + 0.008;
+    tests::Touch touch(load(text), {0.0, 0.0, top + 0.001}, true);
+    ASSERT_TRUE(touch.state().soft[0]->uses_grid());
+    for (const double depth : {2e-3, 4e-3, 1.5e-3}) {
+      for (const double step : {1e-4, 2e-5}) {
+        touch.go({0.0, 0.0, top - depth}, step, 0);
+        const double moving_N = touch.at({0.0, 0.0, top - depth}).force_N.z;
+        const auto at_rest = hybrid::equilibrium_force(touch.world(), touch.state());
+        ASSERT_TRUE(at_rest) << depth;
+        std::printf("%.1f mm deep: %.4f N, at rest in wide boxes %.4f N\n", 1e3 * depth, moving_N,
+                    at_rest->z);
+        EXPECT_NEAR(moving_N, at_rest->z, 0.35 * std::max(0.07 * at_rest->z, 0.04));
+        touch.go({0.0, 0.0, top - depth + 1e-3}, 1e-4, 0);
+      }
+    }
+  }
+}
+
 // A ball of two and a half spacings, four of them deep: felt as the same links are where they are relaxed one
 // by one, within wide limits and at them, and it holds still. (What is pressed aside by little was not held
 // aside at first: the ball's voxels went along x and y in turns, by 5 % of a spacing and 1.5 % of the force.)
@@ -159,11 +190,12 @@ TEST_F(GridSession, ATickAfterAStepTheForceIsThatAtRest) {
   }
 }
 
-// Round a closed path, slowly or not, tissue without friction gives the hand nothing: down and up, and down,
-// aside, up and back.
+// Round a closed path, slowly or not, tissue without friction gives the hand nothing: down and up; down,
+// aside, up and back; and the other way round, from where tissue is 1 % softer to where it is stiffer.
 TEST_F(GridSession, AClosedPathGivesTheHandNoEnergy) {
   const glm::dvec3 above(0.0, 0.0, 0.043), deep(0.0, 0.0, 0.037), aside(0.005, 0.0, 0.0);
-  const std::vector<std::vector<glm::dvec3>> paths{{deep, above}, {deep, deep + aside, above + aside, above}};
+  const std::vector<std::vector<glm::dvec3>> paths{
+      {deep, above}, {deep, deep + aside, above + aside, above}, {above + aside, deep + aside, deep, above}};
   const hybrid::Scene scene = load(block("spacing = 1\n"));
   for (const auto& path : paths) {
     for (const double step_m : {2e-5, 1e-4, 5e-4}) {

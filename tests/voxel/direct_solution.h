@@ -72,6 +72,8 @@ struct Problem {
   std::vector<int> unknown;  // [v] number, or −1 where the displacement is given
   int unknowns = 0;
   std::vector<double> u;  // [v]
+  // [link] of the limit, where links have any: > 0 resists stretching, < 0 resists shortening (N)
+  std::vector<double> limit_N = {};
 };
 
 inline Problem problem_of(const voxel::Lattice& lattice, const voxel::LatticeOptions& options,
@@ -137,8 +139,8 @@ inline void solve_without_limits(Problem& p) {
 // Augmented Lagrangian: multipliers on the links at a limit, until no link is violated by more than 1e-9 of
 // its length.
 inline void solve_with_limits(Problem& p, double spacing) {
-  std::vector<double> force(p.links.size(),
-                            0.0);  // of the limit: > 0 resists stretching, < 0 resists shortening
+  std::vector<double>& force = p.limit_N;
+  force.assign(p.links.size(), 0.0);
   for (int outer = 0; outer < 60; ++outer) {
     for (int inner = 0; inner < 60; ++inner) {
       std::vector<Push> push(p.links.size());

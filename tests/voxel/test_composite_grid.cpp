@@ -32,13 +32,15 @@ LinkMaterial slack(double play) {
       .young_Pa = 1e4, .poisson = 0.3, .stretch_min = 1.0 - play, .stretch_max = 1.0 + play, .shear = play};
 }
 
-// A body of one tissue; where it is and where it is anchored, by voxel.
+// A body; where it is and where it is anchored, by voxel. `tissue`: how stiff it is there, times the first
+// tissue; null: of one.
 struct Body {
   voxel::LatticeOptions options;
   std::shared_ptr<const Lattice> lattice;
 
   Body(const Place& dims, double play, const std::function<bool(const Place&)>& filled,
-       const std::function<bool(const Place&)>& anchored)
+       const std::function<bool(const Place&)>& anchored,
+       const std::function<int(const Place&)>& tissue = nullptr)
       : options(made_of(slack(play), nullptr)) {
     voxel::LabelVolume volume = block(dims, glm::dvec3(kSpacing));
     std::size_t n = 0;
@@ -46,6 +48,10 @@ struct Body {
       for (int j = 0; j < dims[1]; ++j) {
         for (int i = 0; i < dims[0]; ++i, ++n) {
           volume.labels[n] = filled({i, j, k}) ? 1 : 0;
+          if (tissue && volume.labels[n] != 0) {
+            volume.labels[n] = static_cast<std::uint8_t>(tissue({i, j, k}));
+            options.materials[volume.labels[n]].young_Pa = 1e4 * volume.labels[n];
+          }
           if (volume.labels[n] != 0 && anchored({i, j, k})) options.anchor_voxels.push_back(n);
         }
       }
@@ -101,9 +107,11 @@ tests::Problem solved_directly(const Body& body, const Patch& patch) {
 
 double force_of(const Body& body, const tests::Problem& problem) {
   double force = 0.0;
-  for (const tests::Link& l : problem.links) {
-    if (body.lattice->anchored(l.a) != body.lattice->anchored(l.b))
-      force -= l.k * (body.lattice->anchored(l.a) ? problem.u[l.b] : problem.u[l.a]);
+  for (std::size_t i = 0; i < problem.links.size(); ++i) {
+    const tests::Link& l = problem.links[i];
+    if (body.lattice->anchored(l.a) == body.lattice->anchored(l.b)) continue;
+    const double tension = l.k * (problem.u[l.b] - problem.u[l.a]) + problem.limit_N[i];
+    force += body.lattice->anchored(l.a) ? -tension : tension;
   }
   return force;
 }
@@ -174,6 +182,34 @@ TEST(CompositeGrid, HolesAndNotchesAreInTheLinks) {
   EXPECT_LT(d.force, 0.02);
 }
 
+// Layers and lumps of tissues that differ in stiffness, and what a soft layer between two stiff ones carries
+// when it is squeezed to its limits (contrast 4 and 10, depth a part of where the chain ends).
+int stiff_soft_stiff(const Place& p) {
+  return p[2] < 4 || p[2] >= 9 ? 4 : 1;
+}
+int soft_stiff_soft(const Place& p) {
+  return p[2] < 4 || p[2] >= 9 ? 1 : 10;
+}
+int stiffer_soft_stiffer(const Place& p) {
+  return p[2] < 4 || p[2] >= 9 ? 10 : 1;
+}
+int lumps(const Place& p) {
+  return 1 + 4 * (((p[0] + 2) / 5 + (p[1] + 1) / 4 + (p[2] + 2) / 5) % 3);
+}
+
+TEST(CompositeGrid, SeveralTissuesAreTheLatticeAtEquilibrium) {
+  const Place dims{13, 13, 13};
+  for (const auto& tissue : {stiff_soft_stiff, soft_stiff_soft, stiffer_soft_stiffer, lumps}) {
+    for (const double depth : {0.3, 0.7, 0.9}) {
+      const Body body(dims, 0.15, everywhere, below, tissue);
+      const Patch patch{{6, 6, 12}, 2, depth * 0.15 * 12 * kSpacing};
+      const Difference d = compare(body, patch, CompositeGrid::kWhole);
+      EXPECT_LT(d.displacement, 0.01);
+      EXPECT_LT(d.force, 0.01);
+    }
+  }
+}
+
 // Boxes against all voxels, of a patch as large as a tool's contact.
 double boxes_against_all(const Body& body, const Patch& patch) {
   CompositeGrid all(*body.lattice, CompositeGrid::kWhole), boxes(*body.lattice, 10);
@@ -203,6 +239,49 @@ TEST(CompositeGrid, BoxesOfOtherShapes) {
   EXPECT_LT(boxes_against_all(Body({n, n, n}, 0.1, notched, below), patch), 0.05);
   const auto hollow = [](const Place& p) { return std::hypot(p[0] - 30.0, p[2] - 22.0) > 9.0; };
   EXPECT_LT(boxes_against_all(Body({n, n, n}, 0.1, hollow, below), patch), 0.07);
+}
+
+TEST(CompositeGrid, BoxesOfSeveralTissues) {
+  const int n = 64;
+  const Patch patch{{n / 2, n / 2, n - 1}, 4, 2.5 * kSpacing};
+  const auto layers = [](const Place& p) { return p[2] < 32 ? 2 : p[2] < 60 ? 1 : 4; };
+  EXPECT_LT(boxes_against_all(Body({n, n, n}, 0.1, everywhere, below, layers), patch), 0.04);
+  const auto lumps = [](const Place& p) { return (p[0] / 9 + p[1] / 7 + p[2] / 8) % 2 == 0 ? 1 : 5; };
+  EXPECT_LT(boxes_against_all(Body({n, n, n}, 0.1, everywhere, below, lumps), patch), 0.05);
+  const auto core = [](const Place& p) {
+    return std::hypot(p[0] - 31.5, p[1] - 31.5, p[2] - 40.0) < 12.0 ? 10 : 1;
+  };
+  EXPECT_LT(boxes_against_all(Body({n, n, n}, 0.1, everywhere, below, core), patch), 0.04);
+}
+
+// What of a cube of cells is there, and how stiff it is, of cubes of any size: layers along an axis yield one
+// after the other, side by side they bear together.
+TEST(CompositeGrid, CubesAreAsStiffAsTheirLayers) {
+  const int n = 33;
+  const auto layers = [](const Place& p) { return p[2] <= 16 ? 1 : 4; };
+  const Body body({n, n, n}, 0.1, everywhere, below, layers);
+  voxel::TissueCells cells(*body.lattice);
+  cells.make_room(n + 1);
+  for (const int m : {0, 1, 2, 3, 4, 5}) {
+    const int edge = 1 << m, count = 32 / edge;
+    const auto area = static_cast<std::size_t>(count) * static_cast<std::size_t>(count);
+    std::array<std::vector<float>, 3> stiff;
+    for (auto& axis : stiff) axis.resize(area);
+    for (int z = 0; z < count; ++z) {
+      cells.stiff_plane(m, z, 0, count, 0, count, {stiff[0].data(), stiff[1].data(), stiff[2].data()});
+      // A cell between two layers is as stiff as the softer.
+      double across = 0.0, yields = 0.0;
+      for (int k = z * edge; k < (z + 1) * edge; ++k) {
+        across += k <= 16 ? 1.0 : 4.0;
+        yields += k <= 16 ? 1.0 : 0.25;
+      }
+      for (std::size_t c = 0; c < area; ++c) {
+        EXPECT_NEAR(stiff[0][c], edge * edge * across, 1e-5 * edge * edge * across);
+        EXPECT_NEAR(stiff[1][c], edge * edge * across, 1e-5 * edge * edge * across);
+        EXPECT_NEAR(stiff[2][c], std::pow(edge, 4) / yields, 1e-5 * std::pow(edge, 4) / yields) << m;
+      }
+    }
+  }
 }
 
 // Where boxes were, and how the tool came there, does not matter.
@@ -281,10 +360,20 @@ TEST(CompositeGrid, SaysWhatIsInItsWay) {
   const auto lump = [](const Place& p) { return p[0] > 10 && p[0] < 30 && p[1] > 10 && p[2] < 10; };
   EXPECT_NE(CompositeGrid::obstacle_to(*Body(dims, 0.1, everywhere, lump).lattice), "");
   voxel::LatticeOptions two = made_of(slack(0.1));
-  two.materials[2] = slack(0.2);
   voxel::LabelVolume volume = block(dims, glm::dvec3(kSpacing));
-  volume.labels[0] = 2;
-  EXPECT_NE(CompositeGrid::obstacle_to(Lattice(volume, two)), "");
+  std::fill_n(volume.labels.begin(), 40 * 40 * 20, std::uint8_t{2});
+  const auto obstacle_with = [&](const LinkMaterial& other) {
+    two.materials[2] = other;
+    return CompositeGrid::obstacle_to(Lattice(volume, two));
+  };
+  LinkMaterial stiff = slack(0.1);
+  stiff.young_Pa *= 5.0;
+  EXPECT_EQ(obstacle_with(stiff), "");
+  EXPECT_NE(obstacle_with(slack(0.2)), "");
+  stiff.poisson = 0.4;
+  EXPECT_NE(obstacle_with(stiff), "");
+  const auto skin = [](const Place& p) { return p[2] == 39 ? 20 : 1; };
+  EXPECT_NE(CompositeGrid::obstacle_to(*Body(dims, 0.1, everywhere, below, skin).lattice), "");
 }
 
 // ---- an object that has its contact there ----
