@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a deep push does to a large object of one tissue, in bounded work: a composite grid (fast adaptive
+// What a deep push does to a large object, in bounded work: a composite grid (fast adaptive
 // composite: McCormick 1989) of nested boxes round the contact.
 //
 // A pull reaches depth / slack voxels far, so a push 20 spacings deep at slack 0.1 moves 10^7 of them, and
@@ -11,7 +11,7 @@
 //
 // Shape. A link between two nodes is worth what of the tissue lies round it (tissue_cells.h): on level 0 that
 // is what its link is worth in the lattice, on others a mean. There is none across a gap. Anchors hold a node
-// at their distance.
+// at their distance. Tissues may differ in stiffness, but not in limits or Poisson's ratio.
 //
 // Limits. Where a body of one tissue is convex the equilibrium within chain limits is that of an obstacle
 // problem: each node between L = max(u(s) − dist(v→s)) and U = min(u(s) + dist(s→v)) over what is pressed, s
@@ -19,7 +19,8 @@
 // comparison with itself, shifted by a voxel (Brezis & Sibony 1971, of plastic torsion). So each node has
 // bounds of its own, and projected multigrid does not stall where the chain is tight, as it does with limits
 // from link to link. Round a notch, or the end of what is anchored, bounds are still right and no longer
-// enough: there links may be beyond their limits (see most_beyond_limits()).
+// enough: there links may be beyond their limits (see most_beyond_limits()). Where tissues differ they would
+// be, and links are held one by one as well (composite_limits.cpp).
 #pragma once
 
 #include <algorithm>

@@ -11,7 +11,7 @@ namespace {
 constexpr double kHeld = 1.0 / 3.0;  // of force times depth: what a contact holds at least
 constexpr double kLetGo = 0.97;      // of that: with less given, less is felt
 constexpr double kLeast = 0.8;       // share: what is counted wrongly is no worse than that
-constexpr double kStands = 1e-3;     // of what is held: with less work in a tick, the tool stands …
+constexpr double kStands = 1e-5;     // of what is held: with less work in a tick, the tool stands …
 constexpr double kComesBack = 0.02;  // … and so much of what is missing comes back
 constexpr double kRegained = 0.1;    // of that: so much work brings back a share that was taken away
 

@@ -90,7 +90,7 @@ class SoftObject {
   // between voxels is felt as one that just cannot slip between them.
   [[nodiscard]] double reach(double tool_radius) const;
 
-  // A large object of one tissue may keep what a tool does to it on a composite grid (composite_grid.h): then
+  // A large object may keep what a tool does to it on a composite grid (composite_grid.h): then
   // a tick costs the same for any depth and size, and state() is the object as it was before, at rest, while
   // displacement() is asked for what is felt. For objects that meet nothing but the tool. Returns what is in
   // the way of that, and it stays as it is; empty: nothing. Allocates.

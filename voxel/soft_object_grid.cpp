@@ -15,7 +15,9 @@
 namespace voxel {
 namespace {
 
-constexpr int kMargin = 6;             // of level 0, beyond the contact (voxels)
+// Of level 0, beyond the contact, and where the tool is so wide that this would be more than a tick has time
+// for (voxels).
+constexpr int kMargin = 6, kLeastMargin = 4;
 constexpr double kFelt = 0.3;          // of the force: an axis with less is relaxed in every second tick
 constexpr std::uint32_t kAllAxes = 4;  // cycles of a contact that has just begun
 // So near the tool a voxel is pressed, and so far from it tissue that is on its way is felt still (spacings).
@@ -59,8 +61,9 @@ std::string SoftObject::use_composite_grid(const ToolInBody& tool) {
   for (int d = 0; d < 3; ++d)
     steepest = std::max(steepest, static_cast<double>(lattice_->tightest(d).across) / h);
   const double share = tool.shape == ToolInBody::Shape::punch ? 1.0 : steepest / std::hypot(1.0, steepest);
-  const int half = static_cast<int>(std::ceil(share * reach(tool.radius) / h)) + kMargin;
-  if (half > CompositeGrid::kMostHalfWidth) return "the tool is many voxels wide";
+  const int contact = static_cast<int>(std::ceil(share * reach(tool.radius) / h));
+  if (contact + kLeastMargin > CompositeGrid::kMostHalfWidth) return "the tool is many voxels wide";
+  const int half = std::min(contact + kMargin, CompositeGrid::kMostHalfWidth);
   std::string obstacle = CompositeGrid::obstacle_to(*lattice_);
   if (!obstacle.empty()) return obstacle;
   grid_ = std::make_unique<CompositeGrid>(*lattice_, half);

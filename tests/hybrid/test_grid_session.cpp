@@ -130,6 +130,24 @@ TEST_F(GridSession, LayersWithATightChainAreFeltAsAtRest) {
   }
 }
 
+// A ball of nine spacings, pressed five deep where no limit is in the way, at 0.1 m/s: what it feels is what it
+// will at rest. (Link by link: 8 JND off.)
+TEST_F(GridSession, AWideToolIsFeltAsAtRest) {
+  std::string text = block("spacing = 1\n");
+  const auto put = [&](const std::string& what, const std::string& with) {
+    text.replace(text.find(what), what.size(), with);
+  };
+  put("[0.9, 1.1]\nshear = 0.1", "[0.01, 6]\nshear = 5");
+  put("radius = 8", "radius = 9");
+  const double top = 0.032 + 0.009;
+  tests::Touch touch(load(text), {0.0, 0.0, top + 0.002}, true);
+  ASSERT_TRUE(touch.state().soft[0]->uses_grid());
+  const double felt_N = touch.go({0.0, 0.0, top - 5e-3}, 1e-4, 0).force_N.z;
+  const auto at_rest = hybrid::equilibrium_force(touch.world(), touch.state());
+  ASSERT_TRUE(at_rest);
+  EXPECT_NEAR(felt_N, at_rest->z, 0.35 * 0.04);  // of what is just noticeable
+}
+
 // A ball of two and a half spacings, four of them deep: felt as the same links are where they are relaxed one
 // by one, within wide limits and at them, and it holds still. (What is pressed aside by little was not held
 // aside at first: the ball's voxels went along x and y in turns, by 5 % of a spacing and 1.5 % of the force.)
