@@ -240,7 +240,16 @@ void CompositeGrid::cycle(const std::array<bool, 3>& axes) noexcept {
     take_drags(last, a);
     for (int n = 0; n < kCoarsestSweeps; ++n) smooth(last);
     for (std::size_t l = last; l-- > 0;) {
-      tell(l, a);
+      // Interpolated across a jump in stiffness, a correction goes further on the soft side than its energy
+      // asks: of 1:31:3 and more cycles went away from rest, and leave 0.3 to 0.5 with this.
+      if (high_contrast_) {
+        Level& level = levels_[l];
+        std::copy(level.u[a].begin(), level.u[a].end(), level.residual.begin());
+        tell(l, a);
+        composite::shorten_correction(view(l, a), level.residual.data() + level.first_row());
+      } else {
+        tell(l, a);
+      }
       smooth(l);
       // Twice where the contact is. (Once, at some depths a contact was let go of and pressed in turns for
       // ever, with a tenth of its force.)

@@ -281,6 +281,7 @@ class CompositeGrid {
   std::size_t whole_ = 0;  // the first level that holds all of the object
   std::vector<Pressed> pressed_;
   bool box_moved_ = false;           // since the last cycle
+  bool high_contrast_ = false;       // of tissues: corrections by coarser levels may go too far
   std::array<bool, 3> at_limits_{};  // [axis] some links are held to their limits
   std::size_t work_ = 0;
   struct Halves {  // cells of a plane of half cells, and these times how stiff they are, by axis

@@ -19,6 +19,8 @@ constexpr float kDrags = 0.5F;
 // In a cycle a link gets this much stiffer at most, or softer.
 constexpr float kMostInACycle = 2.0F, kLeastInACycle = 0.25F;
 
+constexpr double kMostShortened = 0.9;
+
 // Lanes of every second node, beginning with the first, with the second.
 struct Colours {
   OctetMask even, odd;
@@ -404,6 +406,46 @@ HYBRID_WIDE Along along_mode(const View& v, const float* mode, const std::array<
     }
   }
   return sum;
+}
+
+HYBRID_WIDE void shorten_correction(const View& v, float* before) noexcept {
+  const std::size_t count = static_cast<std::size_t>(v.last[2] + 1) * v.plane;
+  for (std::size_t n = 0; n < count; n += kOctet) {
+    Octet x, was;
+    load(x, v.u + n);
+    load(was, before + n);
+    store(before + n, x - was);
+  }
+  // As it was: what pulls there is what pulls here and what the way itself resists with.
+  const Along sum = along_mode(v, before, {0, 0, 0}, {-1, -1, -1});
+  double loads = 0.0;
+  if (v.f != nullptr) {
+    for (int k = v.first[2]; k <= v.last[2]; ++k) {
+      for (int j = v.first[1]; j <= v.last[1]; ++j) {
+        const std::size_t row =
+            static_cast<std::size_t>(k) * v.plane + static_cast<std::size_t>(j) * v.stride;
+        float of_row = 0.0F;
+        for (std::size_t i = 0; i < v.stride; ++i) {
+          const std::size_t n = row + i;
+          of_row += v.inverse[n] > 0.0F ? v.f[n] * before[n] : 0.0F;
+        }
+        loads += static_cast<double>(of_row);
+      }
+    }
+  }
+  if (!(sum.stiffness > 0.0)) return;
+  const double too_far = -(sum.pull + loads) / sum.stiffness;
+  if (too_far <= 0.0) return;
+  const auto back = static_cast<float>(std::min(too_far, kMostShortened));
+  for (std::size_t n = 0; n < count; n += kOctet) {
+    Octet x, way, inverse;
+    load(x, v.u + n);
+    load(way, before + n);
+    load(inverse, v.inverse + n);
+    const Octet zero{};
+    way = inverse > zero ? way : zero;
+    store(v.u + n, x - back * way);
+  }
 }
 
 HYBRID_WIDE void go_along(float* u, const float* mode, float by, const float* least,
