@@ -130,8 +130,8 @@ TEST_F(GridSession, LayersWithATightChainAreFeltAsAtRest) {
   }
 }
 
-// A ball of nine spacings, pressed five deep where no limit is in the way, at 0.1 m/s: what it feels is what it
-// will at rest. (Link by link: 8 JND off.)
+// A ball of nine spacings, pressed five deep where no limit is in the way, at 0.1 m/s: what it feels is what
+// it will at rest. (Link by link: 8 JND off.)
 TEST_F(GridSession, AWideToolIsFeltAsAtRest) {
   std::string text = block("spacing = 1\n");
   const auto put = [&](const std::string& what, const std::string& with) {
