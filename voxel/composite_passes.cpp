@@ -409,7 +409,8 @@ HYBRID_WIDE Along along_mode(const View& v, const float* mode, const std::array<
 }
 
 HYBRID_WIDE void shorten_correction(const View& v, float* before) noexcept {
-  const std::size_t count = static_cast<std::size_t>(v.last[2] + 1) * v.plane;
+  // With the side beyond the last plane, which goes along too.
+  const std::size_t count = static_cast<std::size_t>(v.last[2] + 2) * v.plane;
   for (std::size_t n = 0; n < count; n += kOctet) {
     Octet x, was;
     load(x, v.u + n);

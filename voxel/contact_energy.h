@@ -25,7 +25,6 @@ class ContactEnergy {
   void account(const glm::dvec3& way_m, const glm::dvec3& force_N, double depth_m) noexcept;
   // Of the force, 0.8 to 1.
   [[nodiscard]] double share() const { return share_; }
-  [[nodiscard]] double given_J() const { return given_J_; }
 
  private:
   bool begun_ = false;
