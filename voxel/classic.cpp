@@ -358,7 +358,9 @@ void ClassicObject::relax_in_turn(std::uint64_t count) {
 }
 
 void ClassicObject::reset() {
-  for (Element& e : elements_) e.u = {};
+  for (Element& e : elements_) {
+    if (e.u != std::array<float, 3>{}) e.u = {};
+  }
   if (!map_.empty()) make_map();
 }
 
