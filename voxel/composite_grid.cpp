@@ -9,7 +9,6 @@ namespace {
 
 constexpr int kCoarsest = 5;  // nodes an edge
 constexpr std::size_t kMostPressed = 2048;
-constexpr float kHighContrast = 8.0F;
 
 std::size_t index(int i) {
   return static_cast<std::size_t>(i);
@@ -35,7 +34,6 @@ CompositeGrid::CompositeGrid(const Lattice& lattice, int half_width, int coarse_
     }
   }
   pressed_.reserve(kMostPressed);
-  high_contrast_ = cells_.contrast() > kHighContrast;
   const int largest = *std::max_element(dims.begin(), dims.end());
   const auto nodes = [largest](std::size_t l) { return (largest - 1 + (1 << l) - 1) / (1 << l) + 1; };
   while (half_width_ != kWhole && nodes(whole_) > 2 * half_width_of(whole_) + 1) ++whole_;

@@ -38,6 +38,7 @@
 namespace voxel {
 namespace composite {
 struct Limit;
+struct Telling;
 struct View;
 }  // namespace composite
 
@@ -245,6 +246,14 @@ class CompositeGrid {
   void tell_row(Level& fine, const Level& coarse, std::size_t axis, const float* from, int j, int k,
                 bool adds) const noexcept;
   void fit_far_field(std::size_t axis) noexcept;  // composite_far_field.cpp
+  // ---- composite_by_links.cpp ----
+  [[nodiscard]] static std::array<const float*, 2> links_beside(const Level& level, std::size_t d, int j,
+                                                                int k) noexcept;
+  static void tell_row_by_links(const composite::Telling& telling, const Level& fine, const Level& coarse,
+                                const float* from, int j, int k) noexcept;
+  [[nodiscard]] static float told_by_links(const Level& fine, const Level& coarse, const float* from, int i,
+                                           int j, int k) noexcept;
+  void restrict_by_links(Level& coarse, const Level& fine, const float* from, float* to) const noexcept;
   // ---- composite_limits.cpp ----
   void hold_links(std::size_t axis) noexcept;
   float hold_anchored(Level& level, std::size_t axis, std::size_t d) noexcept;
@@ -281,7 +290,6 @@ class CompositeGrid {
   std::size_t whole_ = 0;  // the first level that holds all of the object
   std::vector<Pressed> pressed_;
   bool box_moved_ = false;           // since the last cycle
-  bool high_contrast_ = false;       // of tissues: corrections by coarser levels may go too far
   std::array<bool, 3> at_limits_{};  // [axis] some links are held to their limits
   std::size_t work_ = 0;
   struct Halves {  // cells of a plane of half cells, and these times how stiff they are, by axis

@@ -19,7 +19,8 @@ constexpr float kDrags = 0.5F;
 // In a cycle a link gets this much stiffer at most, or softer.
 constexpr float kMostInACycle = 2.0F, kLeastInACycle = 0.25F;
 
-constexpr double kMostShortened = 0.9;
+// Of a correction, from where on its energy is more than without it; and what is left of it at least.
+constexpr double kTooFar = 0.5, kMostShortened = 0.9;
 
 // Lanes of every second node, beginning with the first, with the second.
 struct Colours {
@@ -246,47 +247,6 @@ HYBRID_WIDE void take_drags(const View& v, float* f) noexcept {
   }
 }
 
-HYBRID_WIDE void tell_row(const Telling& t) noexcept {
-  for (int o = 0; o < t.octets; ++o) {
-    Octet sum{};
-    for (int n = 0; n < t.count; ++n) {
-      Octet row;
-      load(row, t.rows[static_cast<std::size_t>(n)] + (kOctet / 2) * o);
-      sum += t.weights[static_cast<std::size_t>(n)] * row;
-    }
-    Octet before, after;
-    if (t.odd) {
-      before = __builtin_shufflevector(sum, sum, 0, 1, 1, 2, 2, 3, 3, 4);
-      after = __builtin_shufflevector(sum, sum, 1, 2, 2, 3, 3, 4, 4, 5);
-    } else {
-      before = __builtin_shufflevector(sum, sum, 0, 0, 1, 1, 2, 2, 3, 3);
-      after = __builtin_shufflevector(sum, sum, 1, 1, 2, 2, 3, 3, 4, 4);
-    }
-    const int at = o * kOctet;
-    Octet part, own;
-    load(part, t.along + at);
-    load(own, t.u + at);
-    Octet x = before + part * (after - before);
-    if (t.adds) {
-      Octet follows;
-      load(follows, t.follows + at);
-      x = own + follows * x;
-    }
-    if (t.least != nullptr) {
-      Octet low;
-      load(low, t.least + at);
-      x = x > low ? x : low;
-    }
-    if (t.most_negative != nullptr) {
-      Octet high;
-      load(high, t.most_negative + at);
-      high = -high;
-      x = x < high ? x : high;
-    }
-    store(t.u + at, x);
-  }
-}
-
 // Left where it was, a tight cone came after its bound by a node a sweep, since only where its planes meet
 // does anything pull at it, and the force was a fifth off, and then for good. What a bound goes beyond goes
 // with it, too: found by the cycle alone, on the way down the force was twice as far off.
@@ -436,7 +396,7 @@ HYBRID_WIDE void shorten_correction(const View& v, float* before) noexcept {
   }
   if (!(sum.stiffness > 0.0)) return;
   const double too_far = -(sum.pull + loads) / sum.stiffness;
-  if (too_far <= 0.0) return;
+  if (too_far <= kTooFar) return;
   const auto back = static_cast<float>(std::min(too_far, kMostShortened));
   for (std::size_t n = 0; n < count; n += kOctet) {
     Octet x, way, inverse;

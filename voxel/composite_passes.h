@@ -55,19 +55,6 @@ float hold_to_limit(const float* u, const float* link, std::size_t by, const Lim
                     std::size_t count) noexcept;
 [[nodiscard]] float held_to_limit(float held, float link, float of_limit, const Limit& limit) noexcept;
 
-// A row as coarse ones have it: `rows` are those that weigh, from the coarse lane on by which lane 0 goes.
-struct Telling {
-  std::array<const float*, 4> rows;
-  std::array<float, 4> weights;
-  int count = 0;
-  bool odd = false;
-  const float *along, *least, *most_negative, *follows;  // bounds null: none
-  float* u;
-  int octets;
-  bool adds;  // to nodes that follow; else all nodes become what is told
-};
-void tell_row(const Telling& telling) noexcept;
-
 // What a bound held, or goes beyond, goes along with it.
 void follow_bounds(float* u, const float* held, const float* least, const float* most_negative,
                    std::size_t count) noexcept;
@@ -85,8 +72,8 @@ struct Along {
 };
 Along along_mode(const View& view, const float* mode, const std::array<int, 3>& finer_first,
                  const std::array<int, 3>& finer_last) noexcept;
-// A level has just gone from `before` to u, which is further than its energy asks: back to where it is least
-// on the way. `before` becomes scratch.
+// A level has just gone from `before` to u. Where that is so far that its energy grew, back to where it is
+// least on the way. `before` becomes scratch.
 void shorten_correction(const View& view, float* before) noexcept;
 // … and there they go, within their bounds.
 void go_along(float* u, const float* mode, float by, const float* least, const float* most_negative,

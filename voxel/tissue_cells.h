@@ -40,8 +40,6 @@ class TissueCells {
   [[nodiscard]] bool fills_box() const { return fills_box_; }
   // Are its tissues of more than one stiffness?
   [[nodiscard]] bool several() const { return stiffness_.size() > 2; }
-  // The stiffest by the softest.
-  [[nodiscard]] float contrast() const { return stiffness_.back() / stiffness_[1]; }
   [[nodiscard]] bool filled(const Place& p) const noexcept;
   [[nodiscard]] bool anchored(const Place& p) const noexcept;
 

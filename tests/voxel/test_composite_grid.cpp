@@ -183,7 +183,7 @@ TEST(CompositeGrid, HolesAndNotchesAreInTheLinks) {
 }
 
 // Layers and lumps of tissues that differ in stiffness, and what a soft layer between two stiff ones carries
-// when it is squeezed to its limits (contrast 4 and 10, depth a part of where the chain ends).
+// when it is squeezed to its limits (contrast 4 to 200, depth a part of where the chain ends).
 int stiff_soft_stiff(const Place& p) {
   return p[2] < 4 || p[2] >= 9 ? 4 : 1;
 }
@@ -193,13 +193,20 @@ int soft_stiff_soft(const Place& p) {
 int stiffer_soft_stiffer(const Place& p) {
   return p[2] < 4 || p[2] >= 9 ? 10 : 1;
 }
+int skin_fat_muscle(const Place& p) {
+  return p[2] >= 9 ? 31 : p[2] >= 4 ? 1 : 3;
+}
+int lumps_of_200(const Place& p) {
+  return ((p[0] + 2) / 5 + (p[1] + 1) / 4 + (p[2] + 2) / 5) % 2 == 0 ? 200 : 1;
+}
 int lumps(const Place& p) {
   return 1 + 4 * (((p[0] + 2) / 5 + (p[1] + 1) / 4 + (p[2] + 2) / 5) % 3);
 }
 
 TEST(CompositeGrid, SeveralTissuesAreTheLatticeAtEquilibrium) {
   const Place dims{13, 13, 13};
-  for (const auto& tissue : {stiff_soft_stiff, soft_stiff_soft, stiffer_soft_stiffer, lumps}) {
+  for (const auto& tissue :
+       {stiff_soft_stiff, soft_stiff_soft, stiffer_soft_stiffer, lumps, skin_fat_muscle, lumps_of_200}) {
     for (const double depth : {0.3, 0.7, 0.9}) {
       const Body body(dims, 0.15, everywhere, below, tissue);
       const Patch patch{{6, 6, 12}, 2, depth * 0.15 * 12 * kSpacing};
@@ -252,6 +259,17 @@ TEST(CompositeGrid, BoxesOfSeveralTissues) {
     return std::hypot(p[0] - 31.5, p[1] - 31.5, p[2] - 40.0) < 12.0 ? 10 : 1;
   };
   EXPECT_LT(boxes_against_all(Body({n, n, n}, 0.1, everywhere, below, core), patch), 0.04);
+}
+
+// Skin on fat on muscle, and stiffer: what a cycle leaves, of any state, and what is felt.
+TEST(CompositeGrid, BoxesOfTissuesThatDifferMuch) {
+  const int n = 64;
+  const Patch patch{{n / 2, n / 2, n - 1}, 4, 2.5 * kSpacing};
+  for (const auto& [skin, fat, muscle] : {std::array{31, 1, 3}, {100, 1, 10}, {1, 100, 10}, {3, 200, 11}}) {
+    const auto layers = [=](const Place& p) { return p[2] < 32 ? muscle : p[2] < 60 ? fat : skin; };
+    EXPECT_LT(boxes_against_all(Body({n, n, n}, 0.1, everywhere, below, layers), patch), 0.05)
+        << skin << ":" << fat << ":" << muscle;
+  }
 }
 
 // What of a cube of cells is there, and how stiff it is, of cubes of any size: layers along an axis yield one
