@@ -129,6 +129,9 @@ std::string CompositeGrid::wrong_somewhere() {
     for (const auto& axis : d) least = std::min({least, axis[0], axis[1]});
   }
   const float most_m = 0.5F * least;
+  // Of several tissues they are held link by link, which in a patch may take a hundred cycles, and says
+  // nothing of shape.
+  const double depth_m = cells_.several() ? most_m : kDepth * lattice_.min_spacing_m();
   for (std::size_t n = 0; n < kPlaces; ++n) {
     const VoxelId v = surface[(2 * n + 1) * surface.size() / (2 * kPlaces)];
     const Place place = lattice_.coordinates(v);
@@ -165,7 +168,7 @@ std::string CompositeGrid::wrong_somewhere() {
       grid->begin(place);
       for (int c = 0; c < kPressedCycles; ++c) {
         grid->clear_pressed();
-        grid->press(place, kDepth * lattice_.min_spacing_m() * normal, normal);
+        grid->press(place, depth_m * normal, normal);
         grid->cycle(axes);
       }
       felt_N[grid == this ? 0 : 1] = glm::length(grid->force_on_tool_N());
