@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Of one cycle over a composite grid, what goes from level to level where tissues differ in stiffness: a node
-// between two coarse ones goes by its links (composite_transfer.h). Not by what these are worth at their
-// limits: where 200 : 1 is squeezed, that is no nearer to the equilibrium.
+// between two coarse ones goes by its links (composite_transfer.h), as stiff as they are at their limits. (By
+// what they are within these a tool that slid over squeezed fat felt steps of a quarter of its force.)
 #include <algorithm>
 
 #include "voxel/composite_grid.h"
@@ -18,16 +18,17 @@ std::size_t index(int i) {
 }  // namespace
 
 // Links to the rows before and after one, along d; null: not of this level.
-std::array<const float*, 2> CompositeGrid::links_beside(const Level& level, std::size_t d, int j,
-                                                        int k) noexcept {
+std::array<const float*, 2> CompositeGrid::links_beside(const Level& level, std::size_t axis, std::size_t d,
+                                                        int j, int k) const noexcept {
   if (j < 0 || k < 0 || j >= level.line[1].count || k >= level.line[2].count) return {};
-  const float* const own = level.weight[d].data() + level.row(j, k);
+  const float* const own = links_on(level, axis)[d].data() + level.row(j, k);
   return {(d == 1 ? j : k) > 0 ? own - level.by(d) : nullptr, own};
 }
 
 // What tell_row() does.
 void CompositeGrid::tell_row_by_links(const composite::Telling& telling, const Level& fine,
-                                      const Level& coarse, const float* from, int j, int k) noexcept {
+                                      const Level& coarse, std::size_t axis, const float* from, int j,
+                                      int k) const noexcept {
   const auto& line = fine.line;
   composite::TellingByLinks by{};
   by.between_y = line[1].part[index(j)] != 0.0F;
@@ -38,20 +39,20 @@ void CompositeGrid::tell_row_by_links(const composite::Telling& telling, const L
     by.rows[index(corner)] =
         from + coarse.row(line[1].coarse[index(j)] + dj, line[2].coarse[index(k)] + dk) + line[0].base;
     const int own_j = by.between_y ? j - 1 + 2 * dj : j, own_k = by.between_z ? k - 1 + 2 * dk : k;
-    by.along_x[index(corner)] = links_beside(fine, 0, own_j, own_k)[1];
-    if (dj == 0) by.along_y[index(dk)] = links_beside(fine, 1, j, own_k);
+    by.along_x[index(corner)] = links_beside(fine, axis, 0, own_j, own_k)[1];
+    if (dj == 0) by.along_y[index(dk)] = links_beside(fine, axis, 1, j, own_k);
   }
-  by.along_z = links_beside(fine, 2, j, k);
+  by.along_z = links_beside(fine, axis, 2, j, k);
   composite::tell_row_by_links(telling, by);
 }
 
 // What tell() does at the ends of a box along x.
-float CompositeGrid::told_by_links(const Level& fine, const Level& coarse, const float* from, int i, int j,
-                                   int k) noexcept {
+float CompositeGrid::told_by_links(const Level& fine, const Level& coarse, std::size_t axis,
+                                   const float* from, int i, int j, int k) const noexcept {
   const auto& line = fine.line;
   const bool between_y = line[1].part[index(j)] != 0.0F, between_z = line[2].part[index(k)] != 0.0F;
   const auto mean = [&](float before, float after, std::size_t d, int own_k) {
-    const auto [link_before, link_after] = links_beside(fine, d, j, own_k);
+    const auto [link_before, link_after] = links_beside(fine, axis, d, j, own_k);
     const float a = link_before != nullptr ? link_before[i] : 0.0F,
                 b = link_after != nullptr ? link_after[i] : 0.0F;
     const float part = a > 0.0F && b > 0.0F ? b / (a + b) : 0.5F;
@@ -68,7 +69,7 @@ float CompositeGrid::told_by_links(const Level& fine, const Level& coarse, const
 }
 
 // What restrict_to() does.
-void CompositeGrid::restrict_by_links(Level& coarse, const Level& fine, const float* from,
+void CompositeGrid::restrict_by_links(Level& coarse, const Level& fine, std::size_t axis, const float* from,
                                       float* to) const noexcept {
   const auto& line = fine.line;
   constexpr std::size_t kEnd = 8;  // lanes before the first and after the last
@@ -89,15 +90,15 @@ void CompositeGrid::restrict_by_links(Level& coarse, const Level& fine, const fl
       g.share_y = {line[1].from_low[index(j)], line[1].from_own[index(j)], line[1].from_high[index(j)]};
       for (int dj = -1; dj <= 1; ++dj) {
         const std::size_t y = index(dj + 1);
-        g.along_y[y] = links_beside(fine, 1, fj + dj, fk);
+        g.along_y[y] = links_beside(fine, axis, 1, fj + dj, fk);
         for (int dk = -1; dk <= 1; ++dk) {
           const std::size_t z = index(dk + 1);
-          const auto links = links_beside(fine, 2, fj + dj, fk + dk);
+          const auto links = links_beside(fine, axis, 2, fj + dj, fk + dk);
           g.along_z[z][y] = links;
           g.rows[z][y] = links[1] != nullptr ? from + fine.row(fj + dj, fk + dk) : nullptr;
         }
       }
-      g.along_x = links_beside(fine, 0, fj, fk)[1];
+      g.along_x = links_beside(fine, axis, 0, fj, fk)[1];
       composite::gather_by_links(g);
       float* f = to + coarse.row(j, k);
       for (int i = line[0].coarse_first; i <= line[0].coarse_last; ++i) {

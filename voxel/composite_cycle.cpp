@@ -87,7 +87,7 @@ void CompositeGrid::pass_on(std::size_t l, std::size_t a) noexcept {
   const std::size_t begin = coarse.first_row(), floats = coarse.floats();
   std::fill_n(coarse.f.begin() + static_cast<std::ptrdiff_t>(begin), floats, 0.0F);
   composite::links_of_level(view(l + 1, a), first, last);
-  restrict_to(coarse, fine, fine.residual.data(), coarse.f.data());
+  restrict_to(coarse, fine, a, fine.residual.data(), coarse.f.data());
   for (int k = first[2]; k <= last[2]; ++k) {
     for (int j = first[1]; j <= last[1]; ++j) {
       float* f = coarse.f.data() + coarse.row(j, k);
@@ -98,16 +98,16 @@ void CompositeGrid::pass_on(std::size_t l, std::size_t a) noexcept {
   coarse.dragged = any_stuck;
   if (any_stuck) {
     std::fill_n(coarse.drag.begin() + static_cast<std::ptrdiff_t>(begin), floats, 0.0F);
-    restrict_to(coarse, fine, fine.drag.data(), coarse.drag.data());
+    restrict_to(coarse, fine, a, fine.drag.data(), coarse.drag.data());
   }
   std::copy_n(coarse.u[a].begin() + static_cast<std::ptrdiff_t>(begin), floats,
               coarse.old.begin() + static_cast<std::ptrdiff_t>(begin));
 }
 
 // What nodes of a level carry, shared by those of the next as these are interpolated.
-void CompositeGrid::restrict_to(Level& coarse, const Level& fine, const float* from,
+void CompositeGrid::restrict_to(Level& coarse, const Level& fine, std::size_t axis, const float* from,
                                 float* to) const noexcept {
-  if (cells_.several()) return restrict_by_links(coarse, fine, from, to);
+  if (cells_.several()) return restrict_by_links(coarse, fine, axis, from, to);
   const auto& line = fine.line;
   Place first{}, last{};
   for (std::size_t d = 0; d < 3; ++d) {
@@ -169,7 +169,7 @@ void CompositeGrid::tell_row(Level& fine, const Level& coarse, std::size_t axis,
   t.u = fine.u[axis].data() + row;
   t.octets = static_cast<int>(fine.stride / 8);
   t.adds = adds;
-  if (cells_.several()) return tell_row_by_links(t, fine, coarse, from, j, k);
+  if (cells_.several()) return tell_row_by_links(t, fine, coarse, axis, from, j, k);
   for (int corner = 0; corner < 4; ++corner) {
     const int dj = corner & 1, dk = corner >> 1;
     const float pj = line[1].part[index(j)], pk = line[2].part[index(k)];
@@ -203,7 +203,7 @@ void CompositeGrid::tell(std::size_t l, std::size_t a) noexcept {
         const int i = high ? line[0].count - 1 : 0;
         // At its ends along x a box has nodes of the next level.
         const auto told = [&] {
-          if (cells_.several()) return told_by_links(fine, coarse, now, i, j, k);
+          if (cells_.several()) return told_by_links(fine, coarse, a, now, i, j, k);
           const float pj = line[1].part[index(j)], pk = line[2].part[index(k)];
           const std::size_t at =
               coarse.node(line[0].coarse[index(i)], line[1].coarse[index(j)], line[2].coarse[index(k)]);

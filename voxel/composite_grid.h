@@ -240,20 +240,22 @@ class CompositeGrid {
   [[nodiscard]] composite::View view(std::size_t l, std::size_t axis) noexcept;
   void take_from_finer(std::size_t l, std::size_t axis) noexcept;
   void pass_on(std::size_t l, std::size_t axis) noexcept;
-  void restrict_to(Level& coarse, const Level& fine, const float* from, float* to) const noexcept;
+  void restrict_to(Level& coarse, const Level& fine, std::size_t axis, const float* from,
+                   float* to) const noexcept;
   void take_drags(std::size_t l, std::size_t axis) noexcept;
   void tell(std::size_t l, std::size_t axis) noexcept;
   void tell_row(Level& fine, const Level& coarse, std::size_t axis, const float* from, int j, int k,
                 bool adds) const noexcept;
   void fit_far_field(std::size_t axis) noexcept;  // composite_far_field.cpp
   // ---- composite_by_links.cpp ----
-  [[nodiscard]] static std::array<const float*, 2> links_beside(const Level& level, std::size_t d, int j,
-                                                                int k) noexcept;
-  static void tell_row_by_links(const composite::Telling& telling, const Level& fine, const Level& coarse,
-                                const float* from, int j, int k) noexcept;
-  [[nodiscard]] static float told_by_links(const Level& fine, const Level& coarse, const float* from, int i,
-                                           int j, int k) noexcept;
-  void restrict_by_links(Level& coarse, const Level& fine, const float* from, float* to) const noexcept;
+  [[nodiscard]] std::array<const float*, 2> links_beside(const Level& level, std::size_t axis, std::size_t d,
+                                                         int j, int k) const noexcept;
+  void tell_row_by_links(const composite::Telling& telling, const Level& fine, const Level& coarse,
+                         std::size_t axis, const float* from, int j, int k) const noexcept;
+  [[nodiscard]] float told_by_links(const Level& fine, const Level& coarse, std::size_t axis,
+                                    const float* from, int i, int j, int k) const noexcept;
+  void restrict_by_links(Level& coarse, const Level& fine, std::size_t axis, const float* from,
+                         float* to) const noexcept;
   // ---- composite_limits.cpp ----
   void hold_links(std::size_t axis) noexcept;
   float hold_anchored(Level& level, std::size_t axis, std::size_t d) noexcept;

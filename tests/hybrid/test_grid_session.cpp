@@ -99,6 +99,20 @@ TEST_F(GridSession, ATightChainIsFeltAsAtRest) {
   }
 }
 
+// Four millimetres of skin on fat on muscle, 64 mm an edge, of these stiffnesses (Pa).
+std::string layers(const std::array<int, 3>& young, const char* play) {
+  std::string text;
+  for (const auto& [name, young_Pa] : {std::pair{"skin", young[0]}, {"fat", young[1]}, {"muscle", young[2]}})
+    text += fmt::format("[material.{}]\nyoung = {}\npoisson = 0.3\nstretch = {}\n", name, young_Pa, play);
+  text = "format = 1\n" + text +
+         "[[soft]]\nname = \"block\"\nformula = \"block\"\nsize = [64, 64, 64]\nspacing = 1\nlabel = 1\n"
+         "layers = [{ thickness = 32, label = 3 }, { thickness = 28, label = 2 }, { thickness = 4, label = "
+         "1 }]\n"
+         "material = \"skin\"\nmaterials = { \"2\" = \"fat\", \"3\" = \"muscle\" }\n[tool]\nradius = 8\n" +
+         tests::unlimited + tests::some_path;
+  return text;
+}
+
 // Skin, fat and muscle with a tight chain, in which the fat is squeezed to its limits between the others:
 // felt as it will be at rest, while the tool moves too. (Link by link: 10 JND off at 20 mm/s, where skin is
 // 31 times as stiff as fat 22.)
@@ -108,16 +122,7 @@ TEST_F(GridSession, LayersWithATightChainAreFeltAsAtRest) {
                                     {alike, "[0.8, 1.2]\nshear = 0.2"},
                                     {alike, "[0.5, 1.5]\nshear = 0.5"},
                                     {real, "[0.9, 1.1]\nshear = 0.1"}}) {
-    std::string text;
-    for (const auto& [name, young_Pa] :
-         {std::pair{"skin", young[0]}, {"fat", young[1]}, {"muscle", young[2]}})
-      text += fmt::format("[material.{}]\nyoung = {}\npoisson = 0.3\nstretch = {}\n", name, young_Pa, play);
-    text = "format = 1\n" + text +
-           "[[soft]]\nname = \"block\"\nformula = \"block\"\nsize = [64, 64, 64]\nspacing = 1\nlabel = 1\n"
-           "layers = [{ thickness = 32, label = 3 }, { thickness = 28, label = 2 }, { thickness = 4, label = "
-           "1 }]\n"
-           "material = \"skin\"\nmaterials = { \"2\" = \"fat\", \"3\" = \"muscle\" }\n[tool]\nradius = 8\n" +
-           tests::unlimited + tests::some_path;
+    const std::string text = layers(young, play);
     const double top = 0.032 + 0.008;
     tests::Touch touch(load(text), {0.0, 0.0, top + 0.001}, true);
     ASSERT_TRUE(touch.state().soft[0]->uses_grid());
@@ -240,6 +245,29 @@ TEST_F(GridSession, AClosedPathGivesTheHandNoEnergy) {
       EXPECT_GT(given_J, 1e-4);
       EXPECT_LT(gained_J, 1e-6);
     }
+  }
+}
+
+// Over fat that skin squeezes to its limits a tool slides without a step in its force: from tick to tick that
+// changes by no more than where it is pressed in as quickly.
+TEST_F(GridSession, ATightChainOfLayersIsSmoothToSlideOn) {
+  for (const auto& young : {std::array{20000, 5000, 10000}, {100000, 3250, 11100}}) {
+    const glm::dvec3 above(0.0, 0.0, 0.041), deep(0.0, 0.0, 0.036), aside(0.005, 0.0, 0.0);
+    tests::Touch touch(load(layers(young, "[0.9, 1.1]\nshear = 0.1")), above, true);
+    ASSERT_TRUE(touch.state().soft[0]->uses_grid());
+    glm::dvec3 last_N(0.0);
+    const auto most_of = [&](const glm::dvec3& to) {
+      double most_N = 0.0;
+      touch.go(to, 2e-5, 0, [&](const hybrid::TickResult& felt) {
+        most_N = std::max(most_N, glm::distance(felt.force_N, last_N));
+        last_N = felt.force_N;
+      });
+      return most_N;
+    };
+    const double in_N = most_of(deep), along_N = most_of(deep + aside);
+    std::cout << "[ measured ] steps of the force: pressed in " << 1e3 * in_N << " mN, along "
+              << 1e3 * along_N << " mN\n";
+    EXPECT_LT(along_N, 1.2 * in_N);
   }
 }
 

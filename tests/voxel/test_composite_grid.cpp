@@ -123,7 +123,7 @@ Difference compare(const Body& body, const Patch& patch, int half_width) {
   const tests::Problem direct = solved_directly(body, patch);
   CompositeGrid grid(*body.lattice, half_width);
   grid.begin(patch.middle);
-  press(grid, patch, 60);
+  press(grid, patch, 100);
   Difference most;
   for (std::size_t i = 0; i < body.lattice->size(); ++i) {
     const auto v = static_cast<VoxelId>(i);
