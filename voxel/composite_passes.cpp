@@ -19,7 +19,7 @@ constexpr float kDrags = 0.5F;
 // In a cycle a link gets this much stiffer at most, or softer.
 constexpr float kMostInACycle = 2.0F, kLeastInACycle = 0.25F;
 
-// Of a correction, from where on its energy is more than without it; and what is left of it at least.
+// Of a correction, what is too far: from where on its energy is more than without it, and taken back at most.
 constexpr double kTooFar = 0.5, kMostShortened = 0.9;
 
 // Lanes of every second node, beginning with the first, with the second.

@@ -79,10 +79,9 @@ HYBRID_WIDE void tell_row_by_links(const Telling& t, const TellingByLinks& by) n
     Octet along;
     load(along, t.along + at);
     const auto row = [&](std::size_t n, Octet & x) __attribute__((always_inline)) {
-      Octet coarse, before, after, part{};
+      Octet coarse, before, after, part = Octet{} + 0.5F;
       load(coarse, by.rows[n] + (kOctet / 2) * o);
       spread(coarse, t.odd, before, after);
-      part = Octet{} + 0.5F;
       if (by.along_x[n] != nullptr) part_between({by.along_x[n] - 1, by.along_x[n]}, at, part);
       const OctetMask between = along == Octet{} + 0.5F;
       part = between ? part : along;

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Between the levels of a composite grid, a row at a time: what a level is told by the next coarser one, and
 // what that is told of it. A node that stands between two coarse ones goes by the mean of the two; or, where
-// tissues differ much, by its links: in a stiff skin on soft fat it goes with the skin (Alcouffe, Brandt,
-// Dendy & Painter 1981, section 3, here one axis after the other).
+// tissues differ, by its links: in a stiff skin on soft fat it goes with the skin (Alcouffe, Brandt, Dendy &
+// Painter 1981, The multi-grid method for the diffusion equation with strongly discontinuous coefficients;
+// here one axis after the other, x first).
 #pragma once
 
 #include <array>
