@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <glm/common.hpp>
 #include <glm/vector_relational.hpp>
 #include <memory>
@@ -44,7 +45,7 @@ struct Samples {
 double share_of(std::vector<double>& values, double share) {
   if (values.empty()) return 0.0;
   std::sort(values.begin(), values.end());
-  const auto at = static_cast<std::size_t>(share * static_cast<double>(values.size() - 1) + 0.5);
+  const auto at = static_cast<std::size_t>(std::lround(share * static_cast<double>(values.size() - 1)));
   return values[std::min(at, values.size() - 1)];
 }
 

@@ -265,10 +265,13 @@ TEST(CompositeGrid, BoxesOfSeveralTissues) {
 TEST(CompositeGrid, BoxesOfTissuesThatDifferMuch) {
   const int n = 64;
   const Patch patch{{n / 2, n / 2, n - 1}, 4, 2.5 * kSpacing};
-  for (const auto& [skin, fat, muscle] : {std::array{31, 1, 3}, {100, 1, 10}, {1, 100, 10}, {3, 200, 11}}) {
-    const auto layers = [=](const Place& p) { return p[2] < 32 ? muscle : p[2] < 60 ? fat : skin; };
+  // Skin, fat, muscle.
+  for (const auto& stiff : {std::array{31, 1, 3}, {100, 1, 10}, {1, 100, 10}, {3, 200, 11}}) {
+    const auto layers = [&](const Place& p) {
+      return p[2] < 32 ? stiff[2] : p[2] < 60 ? stiff[1] : stiff[0];
+    };
     EXPECT_LT(boxes_against_all(Body({n, n, n}, 0.1, everywhere, below, layers), patch), 0.05)
-        << skin << ":" << fat << ":" << muscle;
+        << stiff[0] << ":" << stiff[1] << ":" << stiff[2];
   }
 }
 
