@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Of one cycle over a composite grid, what goes from level to level where tissues differ in stiffness: a node
 // between two coarse ones goes by its links (composite_transfer.h), as stiff as they are at their limits. (By
-// what they are within these a tool that slid over squeezed fat felt steps of a quarter of its force.)
+// what they are within these a tool that slid over squeezed fat felt steps of up to 0.34 N.)
 #include <algorithm>
 
 #include "voxel/composite_grid.h"
@@ -25,7 +25,7 @@ std::array<const float*, 2> CompositeGrid::links_beside(const Level& level, std:
   return {(d == 1 ? j : k) > 0 ? own - level.by(d) : nullptr, own};
 }
 
-// What tell_row() does.
+// What tell_row() does, by links.
 void CompositeGrid::tell_row_by_links(const composite::Telling& telling, const Level& fine,
                                       const Level& coarse, std::size_t axis, const float* from, int j,
                                       int k) const noexcept {
@@ -46,7 +46,7 @@ void CompositeGrid::tell_row_by_links(const composite::Telling& telling, const L
   composite::tell_row_by_links(telling, by);
 }
 
-// What tell() does at the ends of a box along x.
+// What tell() does at the ends of a box along x, by links.
 float CompositeGrid::told_by_links(const Level& fine, const Level& coarse, std::size_t axis,
                                    const float* from, int i, int j, int k) const noexcept {
   const auto& line = fine.line;
@@ -68,7 +68,7 @@ float CompositeGrid::told_by_links(const Level& fine, const Level& coarse, std::
   return between_z ? mean(in_plane(0), in_plane(1), 2, k) : in_plane(0);
 }
 
-// What restrict_to() does.
+// What restrict_to() does, by links.
 void CompositeGrid::restrict_by_links(Level& coarse, const Level& fine, std::size_t axis, const float* from,
                                       float* to) const noexcept {
   const auto& line = fine.line;

@@ -72,11 +72,11 @@ struct Along {
 };
 Along along_mode(const View& view, const float* mode, const std::array<int, 3>& finer_first,
                  const std::array<int, 3>& finer_last) noexcept;
-// A level has just gone from `before` to u. Where that is so far that its energy grew, back to where it is
-// least on the way. `before` becomes scratch.
-void shorten_correction(const View& view, float* before) noexcept;
 // … and there they go, within their bounds.
 void go_along(float* u, const float* mode, float by, const float* least, const float* most_negative,
               std::size_t count) noexcept;
+// A level has just gone from `before` to u. Where that is so far that its energy grew, back to where it is
+// least on the way. `before` becomes scratch.
+void shorten_correction(const View& view, float* before) noexcept;
 
 }  // namespace voxel::composite
