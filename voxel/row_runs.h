@@ -43,8 +43,12 @@ class RowRuns {
       const std::uint64_t below = word == last / kBits ? kAll >> (kBits - 1 - last % kBits) : kAll;
       return word == from / kBits ? below & kAll << (from % kBits) : below;
     };
-    std::uint64_t before = 0;
-    for (RowId word = from / kBits; word <= last / kBits; ++word) before |= noted_[word] & bits_of(word);
+    std::uint64_t before = 0, missing = 0;
+    for (RowId word = from / kBits; word <= last / kBits; ++word) {
+      before |= noted_[word] & bits_of(word);
+      missing |= ~noted_[word] & bits_of(word);
+    }
+    if (missing == 0) return;  // the same of another axis
     if (before != 0) {
       for (RowId row = from; row <= last; ++row) add(row);
       return;
