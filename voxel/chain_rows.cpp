@@ -132,6 +132,9 @@ constexpr int kHalf = kRow / 2;
 constexpr int kConeAhead = 12;    // rows
 constexpr float kSurely = 16.0F;  // margins
 using Line = float __attribute__((vector_size(4 * kHalf)));
+HYBRID_INLINE float apex_at(const ConeColumn& c, int n) {
+  return static_cast<float>(c.apex + n * (n < 0 ? c.by_down : c.by_up));
+}
 struct ConeHalf {
   Line fall;
   int first;    // lane
@@ -143,7 +146,7 @@ struct ConeHalf {
   }
   template <bool kRaise>
   [[nodiscard]] HYBRID_INLINE bool raised(const ConeColumn& c, int n, float margin) const {
-    return beyond<kRaise>(asked<kRaise>(c.apex[n], least), c.own[n * kRow + nearest], margin);
+    return beyond<kRaise>(asked<kRaise>(apex_at(c, n), least), c.own[n * kRow + nearest], margin);
   }
   // Rows that are raised one after the other, upwards or downwards. Where one is by more than roundings are,
   // so are those before it.
@@ -182,7 +185,7 @@ HYBRID_INLINE bool cone(const ConeColumn& c, float margin, ConeEnds& ends) {
     for (; n < to; ++n) {
       float* const row = c.own + n * kRow;
       __builtin_prefetch(row + c.next + near.first, 1);
-      near.write<kRaise>(row, c.apex[n]);
+      near.write<kRaise>(row, apex_at(c, n));
     }
   };
   write_near(-ends.near_down, both_from);
@@ -193,8 +196,9 @@ HYBRID_INLINE bool cone(const ConeColumn& c, float margin, ConeEnds& ends) {
     const float* const ahead = row + (both_to - n < kConeAhead ? both_to - n : kConeAhead) * kRow;
     __builtin_prefetch(ahead, 1);
     __builtin_prefetch(ahead + kHalf, 1);
-    near.write<kRaise>(row, c.apex[n]);
-    far.write<kRaise>(row, c.apex[n]);
+    const float apex = apex_at(c, n);
+    near.write<kRaise>(row, apex);
+    far.write<kRaise>(row, apex);
   }
   write_near(both_to + 1, ends.near_up + 1);
   return true;
@@ -270,8 +274,4 @@ HYBRID_WIDE_AND_MANY bool raise_cone(const ConeColumn& column, float margin, Con
 HYBRID_WIDE_AND_MANY bool lower_cone(const ConeColumn& column, float margin, ConeEnds& ends) noexcept {
   return cone<false>(column, margin, ends);
 }
-HYBRID_WIDE_AND_MANY void fill_cone_line(double apex, double by, int from, int to, float* out) noexcept {
-  for (int n = from; n <= to; ++n) out[n] = static_cast<float>(apex + n * by);
-}
-
 }  // namespace voxel

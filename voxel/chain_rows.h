@@ -42,18 +42,19 @@ Moved raise_along_alike(float* row, float up, float down, float margin) noexcept
 Moved lower_along_alike(float* row, float up, float down, float margin) noexcept;
 
 // A cone over one column of rows that follow one another in y: lane i of row n gets at least
-// apex[n] − fall[i], raised; n is 0 in the row of the cone's apex, and apex falls both ways from there. Each
-// half of a row is a line of the cache, and ends before the first row in which its lane with the least fall
-// is not raised by more than the margin. Where no link was violated, it is raised the less the further it is
-// from the apex, so that is looked for from where it is thought to be.
+// apex + n·by − fall[i], raised; n is 0 in the row of the cone's apex, and it falls both ways from there.
+// Each half of a row is a line of the cache, and ends before the first row in which its lane with the least
+// fall is not raised by more than the margin. Where no link was violated, it is raised the less the further
+// it is from the apex, so that is looked for from where it is thought to be.
 struct ConeColumn {
   float* own = nullptr;     // row 0
   std::ptrdiff_t next = 0;  // from a row to that which is asked for soon, and fetched meanwhile (unit: float)
   int up = 0, down = 0;     // rows beyond the own one, at most
-  const float* apex = nullptr;  // [-down … up]
-  const float* fall = nullptr;  // [kRow]
-  int nearest = 0;              // the lane with the least fall
-  bool has_apex = false;        // that lane's half of the own row counts as raised
+  double apex = 0.0;        // how far the own row goes at most (unit: meter)
+  double by_up = 0.0, by_down = 0.0;  // a row: of those with n above 0, below
+  const float* fall = nullptr;        // [kRow]
+  int nearest = 0;                    // the lane with the least fall
+  bool has_apex = false;              // that lane's half of the own row counts as raised
 };
 // Rows that are raised beyond the own one: of the half with the nearest lane, of the other, at most as many.
 // In the same order first where they are thought to end.
@@ -63,7 +64,5 @@ struct ConeEnds {
 // False: the own row is not raised, and none is.
 bool raise_cone(const ConeColumn& column, float margin, ConeEnds& ends) noexcept;
 bool lower_cone(const ConeColumn& column, float margin, ConeEnds& ends) noexcept;
-// out[n] = apex + n·by, n from `from` to `to`, both included.
-void fill_cone_line(double apex, double by, int from, int to, float* out) noexcept;
 
 }  // namespace voxel

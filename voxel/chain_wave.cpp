@@ -28,10 +28,7 @@ ChainWave::ChainWave(const Lattice& lattice)
                    (static_cast<std::size_t>(lattice.grid().dims[2]) + 2)),
       in_plane_(static_cast<std::size_t>(lattice.grid().columns)),
       moves_(static_cast<std::size_t>(lattice.grid().dims[1])),
-      fall_(static_cast<std::size_t>(lattice.grid().columns) * kRow),
-      apexes_(static_cast<std::size_t>(lattice.grid().dims[1])),
-      own_ends_(static_cast<std::size_t>(lattice.grid().columns)),
-      ends_(static_cast<std::size_t>(lattice.grid().columns)) {
+      fall_(static_cast<std::size_t>(lattice.grid().columns) * kRow) {
   const Grid& grid = lattice.grid();
   free_low_ = grid.dims;
   free_high_.fill(-1);
@@ -380,8 +377,7 @@ std::size_t ChainWave::memory_bytes() const {
   return rows_.resident_bytes() + ring_.resident_bytes() + moved_.resident_bytes() +
          pulled_.resident_bytes() + pulled_by_.resident_bytes() + waiting_.resident_bytes() +
          taken_.resident_bytes() + asked_.resident_bytes() + resident_bytes(asked_spans_) +
-         resident_bytes(in_plane_) + resident_bytes(moves_) + resident_bytes(fall_) +
-         resident_bytes(apexes_) + resident_bytes(own_ends_) + resident_bytes(ends_);
+         resident_bytes(in_plane_) + resident_bytes(moves_) + resident_bytes(fall_);
 }
 
 }  // namespace voxel

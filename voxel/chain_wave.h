@@ -178,9 +178,7 @@ class ChainWave {
   std::vector<Span> asked_spans_;      // [way][column][z + 1] rows among which some are; empty between sweeps
   std::vector<std::array<Span, 2>> in_plane_;  // [column] likewise, of the plane that is being swept
   std::vector<Moved> moves_;                   // [n] of rows that are being swept
-  std::vector<float> fall_;                    // [column][lane] of the cone that is being written …
-  std::vector<float> apexes_;                  // [y] … how far its rows are moved at most
-  std::vector<ConeEnds> own_ends_, ends_;  // [column] … where it ends in the apex's plane, in the last one
+  std::vector<float> fall_;                    // [column][lane] of the cone that is being written
   std::uint64_t work_ = 0, cone_rows_ = 0;
 };
 
