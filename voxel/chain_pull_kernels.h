@@ -32,56 +32,81 @@ HYBRID_INLINE void shift_row_down(const RowValues& row, const Floats& filler, Ro
   }
 }
 
+// Each lane's, and that of `kStep` lanes before it (up) or after it (down).
+template <bool kUp, std::size_t kStep>
+HYBRID_INLINE void double_limits(RowValues& limit) {
+  Floats never;
+  broadcast(kNever, never);
+  RowValues further;
+  if (kUp)
+    shift_row_up<kStep>(limit, never, further);
+  else
+    shift_row_down<kStep>(limit, never, further);
+#pragma GCC unroll 4
+  for (std::size_t n = 0; n < kVectors; ++n) limit[n] += further[n];
+}
 template <bool kRaise, bool kUp, std::size_t kStep>
 HYBRID_INLINE void double_path(RowValues& now, RowValues& limit) {
-  Floats nobody, never;
+  Floats nobody;
   broadcast(nobody_asks(kRaise), nobody);
-  broadcast(kNever, never);
-  RowValues from, further;
-  if (kUp) {
+  RowValues from;
+  if (kUp)
     shift_row_up<kStep>(now, nobody, from);
-    if (kStep < 16) shift_row_up<kStep>(limit, never, further);
-  } else {
+  else
     shift_row_down<kStep>(now, nobody, from);
-    if (kStep < 16) shift_row_down<kStep>(limit, never, further);
-  }
 #pragma GCC unroll 4
   for (std::size_t n = 0; n < kVectors; ++n) {
     Floats wanted;
     ask<kRaise>(from[n], limit[n], wanted);
     take_stronger<kRaise>(wanted, now[n]);
-    if (kStep < 16) limit[n] += further[n];
   }
-}
-// All paths of a row that lead up, or down, by doubling: over one link, over two, four, … Five steps, where
-// one link at a time takes up to 31. `limit`: between lanes n − 1 and n (up), n and n + 1 (down).
-template <bool kRaise, bool kUp>
-HYBRID_INLINE void all_paths(RowValues& now, RowValues& limit) {
-  double_path<kRaise, kUp, 1>(now, limit);
-  double_path<kRaise, kUp, 2>(now, limit);
-  double_path<kRaise, kUp, 4>(now, limit);
-  double_path<kRaise, kUp, 8>(now, limit);
-  double_path<kRaise, kUp, 16>(now, limit);
+  if (kStep < 16) double_limits<kUp, kStep>(limit);
 }
 
-// Does any voxel ask one beside it?
+// All paths within a row, by doubling: over one link, over two, four, … Five steps, where one link at a time
+// takes up to 31. Those that lead up and those that lead down are independent: who goes one way and back
+// arrives with less than who goes there at once. (One after the other, rows by label took a seventh longer:
+// each step waits for the one before.) `up`: limits between lanes n − 1 and n, `down`: between n and n + 1.
+// False, and `wanted` of no use, where no voxel asks one beside it.
 template <bool kRaise>
-HYBRID_INLINE bool any_asks(const RowValues& now, const RowValues& up, const RowValues& down, float margin) {
+HYBRID_INLINE bool all_paths(const RowValues& now, RowValues& up, RowValues& down, float margin,
+                             RowValues& wanted) {
   Masks any{};
-  RowValues left, right;
-  shift_row_up<1>(now, now[0], left);
-  shift_row_down<1>(now, now[kVectors - 1], right);
+  RowValues from_below, from_above;
+  shift_row_up<1>(now, now[0], from_below);
+  shift_row_down<1>(now, now[kVectors - 1], from_above);
 #pragma GCC unroll 4
   for (std::size_t n = 0; n < kVectors; ++n) {
-    Floats a, b;
     Masks moves;
-    ask<kRaise>(left[n], up[n], a);
-    ask<kRaise>(right[n], down[n], b);
-    take_stronger<kRaise>(b, a);
-    compare<kRaise>(a, now[n], margin, moves);
+    ask<kRaise>(from_below[n], up[n], from_below[n]);
+    ask<kRaise>(from_above[n], down[n], from_above[n]);
+    wanted[n] = from_above[n];
+    take_stronger<kRaise>(from_below[n], wanted[n]);
+    compare<kRaise>(wanted[n], now[n], margin, moves);
     any |= moves;
   }
-  return any_of(any);
+  if (!any_of(any)) return false;
+#pragma GCC unroll 4
+  for (std::size_t n = 0; n < kVectors; ++n) {
+    take_stronger<kRaise>(now[n], from_below[n]);
+    take_stronger<kRaise>(now[n], from_above[n]);
+  }
+  double_limits<true, 1>(up);
+  double_limits<false, 1>(down);
+  double_path<kRaise, true, 2>(from_below, up);
+  double_path<kRaise, false, 2>(from_above, down);
+  double_path<kRaise, true, 4>(from_below, up);
+  double_path<kRaise, false, 4>(from_above, down);
+  double_path<kRaise, true, 8>(from_below, up);
+  double_path<kRaise, false, 8>(from_above, down);
+  double_path<kRaise, true, 16>(from_below, up);
+  double_path<kRaise, false, 16>(from_above, down);
+#pragma GCC unroll 4
+  for (std::size_t n = 0; n < kVectors; ++n) {
+    wanted[n] = from_below[n];
+    take_stronger<kRaise>(from_above[n], wanted[n]);
+  }
+  return true;
 }
 
 HYBRID_INLINE void fill(float value, RowValues& out) {
@@ -185,10 +210,8 @@ HYBRID_INLINE void settle_along(const Pull& p, std::uint8_t label, const std::ui
     for (std::size_t n = 0; n < kVectors; ++n) down[n] = half[n] + other[n];
   }
   up[0][0] = down[kVectors - 1][kWidth - 1] = kNever;
-  if (!any_asks<kRaise>(now, up, down, p.margin)) return;
-  RowValues wanted = now;
-  all_paths<kRaise, true>(wanted, up);
-  all_paths<kRaise, false>(wanted, down);
+  RowValues wanted;
+  if (!all_paths<kRaise>(now, up, down, p.margin, wanted)) return;
 #pragma GCC unroll 4
   for (std::size_t n = 0; n < kVectors; ++n) {
     Masks more;

@@ -89,12 +89,22 @@ void ChainWave::note_pulled(Sweep& sweep, RowId row, int y, int count) noexcept 
   (void)info(row + beside);
   (void)info(row - beside);
   Span moved, asked_beside, asked_back;
+  int run = 0;  // rows one after the other that moved
+  const auto note_run = [&](int end) {
+    if (run > 0)
+      moved_.add(row + static_cast<RowId>((plane.step > 0 ? end - run : end - 1) * plane.step),
+                 static_cast<RowId>(run));
+    run = 0;
+  };
   for (int k = 0; k < count; ++k) {
     const Moved what = moves_[static_cast<std::size_t>(k)];
-    if (what == kNothingMoved) continue;
+    if (what == kNothingMoved) {
+      note_run(k);
+      continue;
+    }
+    ++run;
     const RowId r = row + static_cast<RowId>(k * plane.step);
     const int at = y + k * plane.step;
-    moved_.add(r);
     moved.add(at);
     __builtin_prefetch(plane.u + std::size_t{r + next} * kRow);
     __builtin_prefetch(plane.u + std::size_t{r + next} * kRow + kRow / 2);
@@ -118,6 +128,7 @@ void ChainWave::note_pulled(Sweep& sweep, RowId row, int y, int count) noexcept 
       sweep.back.add(at);
     }
   }
+  note_run(count);
   sweep.next.add(moved);
   const auto ask_column = [&](int x, const Span& span) {
     if (span.empty()) return;

@@ -43,18 +43,17 @@ class RowRuns {
       const std::uint64_t below = word == last / kBits ? kAll >> (kBits - 1 - last % kBits) : kAll;
       return word == from / kBits ? below & kAll << (from % kBits) : below;
     };
-    std::uint64_t before = 0, missing = 0;
     for (RowId word = from / kBits; word <= last / kBits; ++word) {
-      before |= noted_[word] & bits_of(word);
-      missing |= ~noted_[word] & bits_of(word);
+      std::uint64_t added = bits_of(word) & ~noted_[word];
+      noted_[word] |= added;
+      while (added != 0) {  // run by run
+        const auto first = static_cast<RowId>(__builtin_ctzll(added));
+        const std::uint64_t beyond = ~(added >> first);
+        const RowId length = beyond == 0 ? kBits : static_cast<RowId>(__builtin_ctzll(beyond));
+        append(word * kBits + first, length);
+        added &= first + length == kBits ? 0 : kAll << (first + length);
+      }
     }
-    if (missing == 0) return;  // the same of another axis
-    if (before != 0) {
-      for (RowId row = from; row <= last; ++row) add(row);
-      return;
-    }
-    for (RowId word = from / kBits; word <= last / kBits; ++word) noted_[word] |= bits_of(word);
-    append(from, rows);
   }
 
   [[nodiscard]] bool empty() const noexcept { return count_ == 0; }
