@@ -289,18 +289,18 @@ HYBRID_INLINE Moved pull_row(const Pull& p, const RowNow& row, Limits& by_y, Lim
 
 // Rows of one label that follow one another, beside rows of one label in z and in x (0: none there).
 struct SmoothRows {
-  std::uint8_t label, z_label, x_label;
   AlikeLimits by_y, by_z;
   float x_in, x_back;
+  std::uint8_t label, z_label, x_label;
 
   HYBRID_INLINE SmoothRows(const Pull& p, std::uint8_t own, std::uint8_t z, std::uint8_t x)
-      : label(own),
-        z_label(z),
-        x_label(x),
-        by_y(p.along_y, own, own),
+      : by_y(p.along_y, own, own),
         by_z(p.along_z, own, z),
         x_in(p.along_x.in[own] + p.along_x.in[x]),
-        x_back(p.along_x.back[own] + p.along_x.back[x]) {}
+        x_back(p.along_x.back[own] + p.along_x.back[x]),
+        label(own),
+        z_label(z),
+        x_label(x) {}
   [[nodiscard]] static HYBRID_INLINE bool one_label(const RowInfo& info) {
     return info.label != 0 || !info.filled;
   }
