@@ -21,7 +21,9 @@ double depth_for(int edge) {
   return std::min(kMostDepth, edge / 16.0);
 }
 
-// A cube of `edge` voxels, its top pressed again and again at 0.5 m/s, a little elsewhere each time.
+// A cube of `edge` voxels, its top pressed again and again at 0.5 m/s, a little elsewhere each time. How far
+// the tool goes up and aside is in proportion to how deep it presses, so that it is in contact for as much of
+// the time in cubes of all sizes: medians would tell that, not the size.
 Scene cube_scene(int edge, double seconds) {
   Scene scene;
   scene.file = fmt::format("cube of {} voxels an edge", edge);
@@ -43,8 +45,8 @@ Scene cube_scene(int edge, double seconds) {
                         .anchors = {},
                         .place = {},
                         .source_place = {}});
-  const double top = 0.5 * edge * kSpacing + kToolRadius, above = top + 5.0 * kSpacing;
-  const double low = top - depth_for(edge) * kSpacing, aside = edge * kSpacing / 16.0;
+  const double top = 0.5 * edge * kSpacing + kToolRadius, depth = depth_for(edge) * kSpacing;
+  const double above = top + 0.25 * depth, low = top - depth, aside = 0.5 * depth;
   device::WaypointPath path{.points = {}, .speed_m_per_s = kSpeed};
   const std::array<glm::dvec2, 4> places{glm::dvec2(0.0), glm::dvec2(aside, 0.0), glm::dvec2(aside, aside),
                                          glm::dvec2(-aside, 0.5 * aside)};
