@@ -88,43 +88,51 @@ void ChainWave::note_pulled(Sweep& sweep, RowId row, int y, int count) noexcept 
   // All rows of a line are looked up together.
   (void)info(row + beside);
   (void)info(row - beside);
+  // At hand here: after each byte that is written below, members would be read again.
+  std::uint8_t* const asked = asked_.data();
+  const Moved* const moves = moves_.data();
+  const int step = plane.step;
+  const RowId row_y = static_cast<RowId>(step);
+  const float* const u = plane.u;
+  const std::uint8_t* const labels = lattice_.labels(0);
   Span moved, asked_beside, asked_back;
   int run = 0;  // rows one after the other that moved
   const auto note_run = [&](int end) {
-    if (run > 0)
-      moved_.add(row + static_cast<RowId>((plane.step > 0 ? end - run : end - 1) * plane.step),
-                 static_cast<RowId>(run));
+    if (run == 0) return;
+    const int low = step > 0 ? end - run : end - 1;
+    moved_.add(row + static_cast<RowId>(low * step), static_cast<RowId>(run));
+    moved.add(y + (end - run) * step);
+    moved.add(y + (end - 1) * step);
     run = 0;
   };
   for (int k = 0; k < count; ++k) {
-    const Moved what = moves_[static_cast<std::size_t>(k)];
+    const Moved what = moves[k];
     if (what == kNothingMoved) {
       note_run(k);
       continue;
     }
     ++run;
-    const RowId r = row + static_cast<RowId>(k * plane.step);
-    const int at = y + k * plane.step;
-    moved.add(at);
-    __builtin_prefetch(plane.u + std::size_t{r + next} * kRow);
-    __builtin_prefetch(plane.u + std::size_t{r + next} * kRow + kRow / 2);
-    __builtin_prefetch(lattice_.labels(r + next));
-    asked_[r + next] |= from_z;
+    const RowId r = row + static_cast<RowId>(k) * row_y;
+    const int at = y + k * step;
+    __builtin_prefetch(u + std::size_t{r + next} * kRow);
+    __builtin_prefetch(u + std::size_t{r + next} * kRow + kRow / 2);
+    __builtin_prefetch(labels + std::size_t{r + next} * kRow);
+    asked[r + next] |= from_z;
     if ((what & at_end) != 0 && rows_[r + beside].filled) {
-      asked_[r + beside] |= from_x;
+      asked[r + beside] |= from_x;
       asked_beside.add(at);
     }
     if ((what & (kAsksY | kAsksX | kAsksZ)) == 0) continue;
     if ((what & kAsksY) != 0) {
-      asked_[r - static_cast<RowId>(plane.step)] |= plane.step > 0 ? kFromAboveY : kFromBelowY;
-      (plane.step > 0 ? sweep.down : sweep.up).add(at - plane.step);
+      asked[r - row_y] |= step > 0 ? kFromAboveY : kFromBelowY;
+      (step > 0 ? sweep.down : sweep.up).add(at - step);
     }
     if ((what & kAsksX) != 0 && rows_[r - beside].filled) {
-      asked_[r - beside] |= back_x;
+      asked[r - beside] |= back_x;
       asked_back.add(at);
     }
     if ((what & kAsksZ) != 0) {
-      asked_[r - next] |= back_z;
+      asked[r - next] |= back_z;
       sweep.back.add(at);
     }
   }
