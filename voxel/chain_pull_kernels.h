@@ -32,28 +32,28 @@ HYBRID_INLINE void shift_row_down(const RowValues& row, const Floats& filler, Ro
   }
 }
 
+template <bool kUp, std::size_t kStep>
+HYBRID_INLINE void shift_row(const RowValues& row, float beyond, RowValues& out) {
+  Floats filler;
+  broadcast(beyond, filler);
+  if (kUp)
+    shift_row_up<kStep>(row, filler, out);
+  else
+    shift_row_down<kStep>(row, filler, out);
+}
+
 // Each lane's, and that of `kStep` lanes before it (up) or after it (down).
 template <bool kUp, std::size_t kStep>
 HYBRID_INLINE void double_limits(RowValues& limit) {
-  Floats never;
-  broadcast(kNever, never);
   RowValues further;
-  if (kUp)
-    shift_row_up<kStep>(limit, never, further);
-  else
-    shift_row_down<kStep>(limit, never, further);
+  shift_row<kUp, kStep>(limit, kNever, further);
 #pragma GCC unroll 4
   for (std::size_t n = 0; n < kVectors; ++n) limit[n] += further[n];
 }
 template <bool kRaise, bool kUp, std::size_t kStep>
 HYBRID_INLINE void double_path(RowValues& now, RowValues& limit) {
-  Floats nobody;
-  broadcast(nobody_asks(kRaise), nobody);
   RowValues from;
-  if (kUp)
-    shift_row_up<kStep>(now, nobody, from);
-  else
-    shift_row_down<kStep>(now, nobody, from);
+  shift_row<kUp, kStep>(now, nobody_asks(kRaise), from);
 #pragma GCC unroll 4
   for (std::size_t n = 0; n < kVectors; ++n) {
     Floats wanted;
@@ -65,7 +65,7 @@ HYBRID_INLINE void double_path(RowValues& now, RowValues& limit) {
 
 // All paths within a row, by doubling: over one link, over two, four, … Five steps, where one link at a time
 // takes up to 31. Those that lead up and those that lead down are independent: who goes one way and back
-// arrives with less than who goes there at once. (One after the other, rows by label took a seventh longer:
+// arrives with less than who goes there at once. (One after the other, rows by label took a sixth longer:
 // each step waits for the one before.) `up`: limits between lanes n − 1 and n, `down`: between n and n + 1.
 // False, and `wanted` of no use, where no voxel asks one beside it.
 template <bool kRaise>

@@ -274,4 +274,5 @@ HYBRID_WIDE_AND_MANY bool raise_cone(const ConeColumn& column, float margin, Con
 HYBRID_WIDE_AND_MANY bool lower_cone(const ConeColumn& column, float margin, ConeEnds& ends) noexcept {
   return cone<false>(column, margin, ends);
 }
+
 }  // namespace voxel
