@@ -19,3 +19,17 @@ function(hybrid_target name)
     target_link_options(${name} PUBLIC -fsanitize=${HYBRID_SANITIZE})
   endif()
 endfunction()
+
+# hybrid_room(PART/ROOM SOURCES … LINKS … PRIVATE_LINKS …): the library of one folder, called hybrid::PART_ROOM, or hybrid::ROOM
+# where the part is hybrid itself. LINKS are rooms that its headers include; PRIVATE_LINKS are libraries of its sources alone.
+function(hybrid_room path)
+  cmake_parse_arguments(arg "" "" "SOURCES;LINKS;PRIVATE_LINKS" ${ARGN})
+  string(REGEX REPLACE "^[a-z]+/" "" folder "${path}")
+  string(REGEX REPLACE "^hybrid/" "" name "${path}")
+  string(REPLACE "/" "_" name "${name}")
+  list(TRANSFORM arg_SOURCES PREPEND "${folder}/" REGEX "^[^$]")
+  add_library(hybrid_${name} STATIC ${arg_SOURCES})
+  add_library(hybrid::${name} ALIAS hybrid_${name})
+  hybrid_target(hybrid_${name})
+  target_link_libraries(hybrid_${name} PUBLIC ${arg_LINKS} PRIVATE ${arg_PRIVATE_LINKS})
+endfunction()

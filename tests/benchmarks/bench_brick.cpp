@@ -7,8 +7,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "voxel/brick_force.h"
-#include "voxel/wide.h"
+#include "voxel/fem/hex_forces.h"
+#include "voxel/lattice/simd_dispatch.h"
 
 namespace {
 

@@ -23,13 +23,13 @@
 #include <string_view>
 #include <vector>
 
-#include "hybrid/build.h"
-#include "hybrid/denormals.h"
-#include "hybrid/process_memory.h"
-#include "hybrid/session.h"
-#include "hybrid/tick.h"
-#include "polygon/mesh_file.h"
-#include "polygon/primitives.h"
+#include "hybrid/build/build_world.h"
+#include "hybrid/base/flush_to_zero.h"
+#include "hybrid/base/process_memory.h"
+#include "hybrid/session/session.h"
+#include "hybrid/tick/tick.h"
+#include "polygon/files/mesh_file.h"
+#include "polygon/surface/primitives.h"
 
 namespace {
 

@@ -12,8 +12,8 @@
 #include <random>
 #include <vector>
 
-#include "hybrid/occupancy.h"
-#include "polygon/primitives.h"
+#include "hybrid/map/occupancy_map.h"
+#include "polygon/surface/primitives.h"
 
 namespace {
 

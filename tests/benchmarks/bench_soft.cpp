@@ -7,8 +7,8 @@
 #include <memory>
 #include <vector>
 
-#include "voxel/links.h"
-#include "voxel/soft_object.h"
+#include "voxel/lattice/voxel_links.h"
+#include "voxel/object/soft_object.h"
 
 namespace {
 

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "device/loop/passivity.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+namespace device {
+namespace {
+
+// What may be handed out beyond the worst tick, so that a tool can work its way out of a debt as large as
+// that: out of 1 µJ within 3 mm. With a hundredth of it that takes twice as long, and the difference is no
+// energy that anybody could measure.
+constexpr double kSpare_J = 1e-9;
+// What a force is trusted with before anything was taken in, should it throw back a tool at rest: enough for
+// every wall up to 2.5 kN/m at 1 kHz to begin as it is.
+constexpr double kSeed_J = 200e-6;
+constexpr double kStrideKept_s = 0.5;
+
+bool finite(const glm::dvec3& v) noexcept {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+// How far a tool at rest may go until the next tick. Never nothing, as it divides.
+double sudden_m(const PassivityOptions& options, double dt_s) noexcept {
+  constexpr double kLeast_m = 1e-9;
+  return std::max(kLeast_m, options.max_acceleration_m_per_s2 * dt_s * dt_s + options.resolution_m);
+}
+
+// And one that moves as it did of late, either way.
+double reach_m(const PassivityOptions& options, const PassivityState& state, double dt_s) noexcept {
+  return 2.0 * state.stride_m + sudden_m(options, dt_s);
+}
+
+// Counts what the last force did over `way`.
+void observe(const PassivityOptions& options, PassivityState& state, const glm::dvec3& way,
+             double dt_s) noexcept {
+  const double length = glm::length(way);
+  if (length > reach_m(options, state, dt_s)) ++state.jumps;
+  state.stride_m = std::max(length, state.stride_m * (1.0 - std::min(1.0, dt_s / kStrideKept_s)));
+  const double work = glm::dot(state.last_N, way);
+  state.given_J += work;
+  state.worst_tick_J = std::max(state.worst_tick_J, std::abs(work));
+  // After a jump: what was not foreseen is written off, or the force would never come back.
+  state.worst_tick_J = std::max(state.worst_tick_J, state.given_J - kSpare_J);
+  state.most_given_J = std::max(state.most_given_J, state.given_J);
+}
+
+}  // namespace
+
+glm::dvec3 keep_passive(const PassivityOptions& options, PassivityState& state, const glm::dvec3& force_N,
+                        const glm::dvec3& position_m, double dt_s) noexcept {
+  const double dt = std::isfinite(dt_s) && dt_s > 0.0 ? dt_s : 0.0;
+  if (!finite(force_N) || !finite(position_m)) {
+    state.last_N = glm::dvec3(0.0);
+    return state.last_N;
+  }
+  glm::dvec3 way(0.0);
+  if (state.started) {
+    way = position_m - state.last_m;
+    observe(options, state, way, dt);
+  } else {
+    state.started = true;
+    state.stride_m = 0.5 * options.max_speed_m_per_s * dt;
+  }
+  state.last_m = position_m;
+
+  const double size = glm::length(force_N);
+  const double foreseen_J = glm::dot(force_N, way);
+  if (foreseen_J < 0.0 || !(size > 0.0))
+    state.share = std::min(1.0, state.share + (options.release_s > 0.0 ? dt / options.release_s : 1.0));
+  if (!(size > 0.0)) {
+    if (state.given_J < 0.0) state.given_J *= 1.0 - std::min(1.0, dt / options.forget_s);
+    state.depth_m = 0.0;
+    state.last_N = force_N;
+    return force_N;
+  }
+  ++state.felt;
+  state.depth_m = std::max(0.0, state.depth_m - foreseen_J / size);
+  if (foreseen_J > 0.0) {
+    // A spring that ends where the force began holds half of what its force would do over the way back.
+    const double stored_J = std::max(0.0, -state.given_J);
+    const double asked_J = std::max(foreseen_J, 0.5 * size * state.depth_m);
+    if (asked_J > stored_J) state.share = std::min(state.share, stored_J / asked_J);
+  }
+  if (state.given_J <= 0.0) {
+    const double most_N = (kSeed_J - state.given_J) / sudden_m(options, dt);
+    if (size > most_N) state.share = std::min(state.share, most_N / size);
+  } else {
+    const double most_N = (state.worst_tick_J + kSpare_J - state.given_J) / reach_m(options, state, dt);
+    if (size > most_N) state.share = std::min(state.share, std::max(0.0, most_N) / size);
+  }
+
+  state.last_N = state.share < 1.0 ? state.share * force_N : force_N;
+  if (state.share < 1.0) {
+    ++state.acted;
+    const double taken_N = (1.0 - state.share) * size;
+    state.most_taken_N = std::max(state.most_taken_N, taken_N);
+    state.most_taken_jnd =
+        std::max(state.most_taken_jnd, taken_N / std::max(options.jnd_share * size, options.jnd_floor_N));
+    state.taken_sum_N2 += taken_N * taken_N;
+  }
+  return state.last_N;
+}
+
+}  // namespace device

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// One opened device of the driver: found, asked what it is, calibrated, its scheduler running; closed again
+// on every way out.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "device/phantom/libhd.h"
+#include "device/loop/workspace_fit.h"
+
+namespace device {
+
+struct PhantomInfo {
+  std::string library;  // file that was loaded
+  std::string name;     // as it was opened; empty: the driver's default
+  std::string model, serial, vendor, driver_version, api_version;
+  double firmware = 0.0;     // 0: not told
+  double rate_hz = 1000.0;   // of the servo loop, as granted
+  double max_force_N = 0.0;  // nominal; 0: not told
+  double continuous_force_N = 0.0;
+  double motor_temperature = 0.0;  // of the warmest, as it was opened: 0 cold to 1, the most it bears
+  Box workspace, reach;            // device frame, m: usable, and the most; empty: not told
+  int calibration_style = 0;       // bit mask of hd::kEncoderReset, kAutomatic, kInkwell
+  bool calibrated = false;
+  std::vector<std::string> notes;  // what was asked for and not granted, in words
+};
+
+struct HdOpenOptions {
+  std::filesystem::path library;  // as load_libhd() takes it
+  std::string name;               // empty: the driver's default device, by its several names
+  double rate_hz = 1000.0;
+  int attempts = 2;      // a device that was just let go of by another program needs a moment
+  double pause_s = 0.3;  // between two of them
+};
+
+class HdConnection {
+ public:
+  // Throws DeviceError with the remedy: no library, no device, no licence, no scheduler. A device that is
+  // not calibrated opens; the calibration that needs no hand is done.
+  explicit HdConnection(const HdOpenOptions& options);
+  ~HdConnection();
+  HdConnection(const HdConnection&) = delete;
+  HdConnection& operator=(const HdConnection&) = delete;
+  HdConnection(HdConnection&&) = delete;
+  HdConnection& operator=(HdConnection&&) = delete;
+
+  [[nodiscard]] const HdFunctions& call() const noexcept { return library_.call; }
+  [[nodiscard]] hd::Handle handle() const noexcept { return handle_; }
+  [[nodiscard]] const PhantomInfo& info() const noexcept { return info_; }
+
+  // Takes the present pose as the one of calibration, and says whether the device is calibrated now.
+  bool calibrate();
+  // Throws DeviceError: not calibrated, with what the hand must do.
+  void require_calibrated();
+  // Everything the driver has to say by now; the first of it, and no more than a bounded number is read.
+  [[nodiscard]] hd::ErrorInfo take_errors() const noexcept;
+
+ private:
+  void init(const HdOpenOptions& options);
+  void set_rate(double rate_hz);
+  void ask();
+  void start_scheduler();
+  void close() noexcept;
+  bool update_calibration(bool by_hand);
+  [[nodiscard]] std::string text(hd::Name name) const;
+  [[nodiscard]] double number(hd::Name name) const;
+  [[nodiscard]] Box box(hd::Name name) const;
+
+  HdLibrary library_;
+  hd::Handle handle_ = hd::kInvalidHandle;
+  bool scheduling_ = false;
+  PhantomInfo info_;
+};
+
+}  // namespace device

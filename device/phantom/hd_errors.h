@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the driver's errors mean to the person at the device, and what they mean to the servo loop.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "device/loop/haptic_device.h"
+#include "device/phantom/libhd.h"
+
+namespace device {
+
+enum class HdOutcome : std::uint8_t {
+  none,   // no error
+  rest,   // let go of the motors, and come back by a ramp
+  ended,  // the device is lost to this session
+};
+
+struct HdErrorText {
+  hd::Name code = 0;
+  HdOutcome outcome = HdOutcome::ended;
+  DeviceFault fault = DeviceFault::lost;
+  std::string_view name, what, remedy;
+};
+
+// The row of a code; an unknown one ends the session. Never allocates.
+const HdErrorText& hd_error_text(hd::Name code) noexcept;
+
+// "HD_COMM_ERROR (0x302): what; remedy", and the driver's internal code where it has one.
+std::string hd_error_in_words(const hd::ErrorInfo& error);
+
+// How to calibrate a device of this style (a bit mask of hd::kEncoderReset, kAutomatic, kInkwell).
+std::string_view calibration_remedy(int style) noexcept;
+
+}  // namespace device

@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "device/phantom/phantom.h"
+
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <ctime>
+#include <glm/common.hpp>
+#include <string_view>
+#include <thread>
+
+#include "device/phantom/hd_errors.h"
+#include "device/phantom/phantom_servo.h"
+#include "device/simulated/simulated.h"
+#include "device/loop/stop_signal.h"
+
+namespace device {
+namespace {
+
+using SteadyClock = std::chrono::steady_clock;
+
+std::int64_t monotonic_ns() noexcept {
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return now.tv_sec * 1'000'000'000 + now.tv_nsec;
+}
+
+// What the driver does not tell: as quoted for the model (device/README.md).
+DeviceLimits quoted_limits(std::string_view model) {
+  const auto says = [model](std::string_view part) { return model.find(part) != std::string_view::npos; };
+  if (says("Premium 1.5")) return device_limits(DeviceModel::premium_1_5);
+  if (says("Touch X") || says("Desktop")) return {};  // others than the Touch
+  if (says("Touch") || says("Omni")) return device_limits(DeviceModel::touch);
+  return {};
+}
+
+// One look at the device from outside of serve().
+struct Look {
+  const HdFunctions* call = nullptr;
+  hd::Handle handle = hd::kInvalidHandle;
+  std::array<double, 16> position{}, velocity{};
+  std::array<int, 16> buttons{};
+
+  static unsigned int on_tick(void* user) noexcept {
+    auto& look = *static_cast<Look*>(user);
+    look.call->begin_frame(look.handle);
+    look.call->get_doubles(hd::kPosition, look.position.data());
+    look.call->get_doubles(hd::kVelocity, look.velocity.data());
+    look.call->get_integers(hd::kButtons, look.buttons.data());
+    look.call->end_frame(look.handle);
+    return hd::kDone;
+  }
+};
+
+class Phantom final : public PhantomDevice {
+ public:
+  explicit Phantom(const PhantomOptions& options)
+      : options_(options),
+        connection_(options.open),
+        name_((info().model.empty() ? std::string("PHANToM") : info().model) +
+              (info().serial.empty() ? "" : " (serial " + info().serial + ")")),
+        limits_(quoted_limits(info().model)) {
+    if (options_.clock_ns == nullptr) options_.clock_ns = monotonic_ns;
+    if (info().max_force_N > 0.0) limits_.max_force_N = info().max_force_N;
+    const glm::dvec3 size = info().workspace.high_m - info().workspace.low_m;
+    if (size.x > 0.0) limits_.workspace_m = size;
+    std::array<unsigned char, 16> held{};
+    connection_.call().get_booleans(hd::kSafetySwitch, held.data());
+    has_safety_switch_ = connection_.take_errors().code == hd::kSuccess;
+  }
+
+  [[nodiscard]] const PhantomInfo& info() const noexcept override { return connection_.info(); }
+  void place(const WorkspaceFit& fit) noexcept override { fit_ = fit; }
+  bool calibrate() override { return connection_.calibrate(); }
+  [[nodiscard]] DeviceLimits limits() const noexcept override { return limits_; }
+  [[nodiscard]] std::string_view name() const noexcept override { return name_; }
+  void write(const glm::dvec3& /*force_N*/, double /*dt_s*/) noexcept override {}
+
+  DeviceState read() noexcept override {
+    constexpr double kMillimeter = 1e-3;
+    Look look{.call = &connection_.call(), .handle = connection_.handle()};
+    connection_.call().schedule_synchronous(Look::on_tick, &look, hd::kPriorityDefault);
+    DeviceState state;
+    state.position_m =
+        fit_.position(kMillimeter * glm::dvec3(look.position[0], look.position[1], look.position[2]));
+    state.velocity_m_per_s =
+        fit_.velocity(kMillimeter * glm::dvec3(look.velocity[0], look.velocity[1], look.velocity[2]));
+    state.buttons = static_cast<std::uint32_t>(look.buttons[0]);
+    return state;
+  }
+
+  ServoReport serve(ServoFunction tick, const ServoOptions& options) override {
+    connection_.require_calibrated();
+    const HdFunctions& call = connection_.call();
+    PhantomServo servo(call, connection_.handle(),
+                       {.gate = options_.gate,
+                        .deadline_s = options.deadline_s,
+                        .clock_ns = options_.clock_ns,
+                        .dt_s = 1.0 / info().rate_hz,
+                        .max_force_N = limits_.max_force_N,
+                        .fit = fit_,
+                        .has_safety_switch = has_safety_switch_},
+                       tick);
+    const StopOnSignal stop;
+    const OnCrash crash(PhantomServo::on_crash, &servo);
+    const hd::Schedule schedule = call.schedule_asynchronous(PhantomServo::on_tick, &servo, hd::kPriorityMax);
+    const hd::ErrorInfo error = connection_.take_errors();
+    if (schedule == hd::kInvalidHandle || schedule == ~hd::Schedule{0} || error.code == hd::kSchedulerFull) {
+      throw DeviceError("PHANToM: the driver takes no servo callback: " + hd_error_in_words(error));
+    }
+    // The driver has one stack of errors: this one may be the callback's.
+    if (error.code != hd::kSuccess) servo.tell(error);
+    const bool silent = !wait_for(servo);
+    if (silent) give_up(servo, schedule);
+    if (servo.thrown() != nullptr) std::rethrow_exception(servo.thrown());
+    ServoReport report = servo.report();
+    if (silent) {
+      report.end = ServoEnd::lost;
+      report.messages.emplace_back(
+          "the driver's servo loop fell silent: the session ended, and what was felt until then is kept; "
+          "switch the "
+          "device off and on, and start again");
+    }
+    return report;
+  }
+
+ private:
+  // False: the driver no longer ticks.
+  bool wait_for(PhantomServo& servo) const {
+    std::uint64_t seen = servo.ticks();
+    SteadyClock::time_point changed = SteadyClock::now();
+    while (!servo.done()) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      if (stop_signal() != 0) servo.stop();
+      const SteadyClock::time_point now = SteadyClock::now();
+      if (servo.ticks() != seen) {
+        seen = servo.ticks();
+        changed = now;
+      } else if (now - changed > std::chrono::duration<double>(options_.silence_s)) {
+        return servo.done();
+      }
+    }
+    return true;
+  }
+
+  // From this thread, as no other is left to do it.
+  void give_up(PhantomServo& servo, hd::Schedule schedule) const noexcept {
+    servo.stop();  // should it come back: let go, and compute nothing
+    constexpr std::array<double, 3> kNothing{};
+    const HdFunctions& call = connection_.call();
+    call.begin_frame(connection_.handle());
+    call.set_doubles(hd::kForce, kNothing.data());
+    call.end_frame(connection_.handle());
+    call.unschedule(schedule);
+  }
+
+  PhantomOptions options_;
+  HdConnection connection_;
+  std::string name_;
+  DeviceLimits limits_;
+  WorkspaceFit fit_;
+  bool has_safety_switch_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<PhantomDevice> open_phantom(const PhantomOptions& options) {
+  return std::make_unique<Phantom>(options);
+}
+
+}  // namespace device

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What runs in the driver's servo callback: one frame, one tick, one force.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <exception>
+#include <string>
+#include <vector>
+
+#include "device/loop/force_gate.h"
+#include "device/phantom/hd_connection.h"
+#include "device/loop/servo_loop.h"
+#include "device/loop/workspace_fit.h"
+
+namespace device {
+
+// The driver's errors by code, each with the first of its kind. Fixed in size: it is filled in the callback.
+class ErrorTally {
+ public:
+  void add(const hd::ErrorInfo& error) noexcept;
+  [[nodiscard]] std::vector<std::string> in_words() const;
+
+ private:
+  struct Row {
+    hd::ErrorInfo first;
+    std::uint64_t count = 0;
+  };
+  std::array<Row, 16> rows_{};
+  std::size_t size_ = 0;
+  std::uint64_t beyond_ = 0;
+};
+
+struct PhantomServoOptions {
+  ForceGateOptions gate;
+  double deadline_s = 10e-3;                      // from one tick to the next; a later one gets no force
+  std::int64_t (*clock_ns)() noexcept = nullptr;  // required
+  double dt_s = 1e-3;
+  double max_force_N = 0.0;  // 0: not known, and not clamped here
+  WorkspaceFit fit;
+  bool has_safety_switch = false;
+};
+
+// Lives for one serve(). on_tick() is for the driver's thread alone; the rest may be called from any.
+class PhantomServo {
+ public:
+  PhantomServo(const HdFunctions& call, hd::Handle handle, const PhantomServoOptions& options,
+               ServoFunction tick);
+
+  // The callback: never allocates, locks, throws or does I/O of its own.
+  static unsigned int on_tick(void* servo) noexcept;
+  // Of OnCrash: may do what a signal handler may.
+  static void on_crash(void* servo) noexcept;
+
+  void stop() noexcept { stop_.store(true); }
+  // An error that another thread got from the driver's one stack of errors.
+  void tell(const hd::ErrorInfo& error) noexcept;
+  [[nodiscard]] bool done() const noexcept { return done_.load(std::memory_order_acquire); }
+  [[nodiscard]] std::uint64_t ticks() const noexcept { return ticks_.load(std::memory_order_relaxed); }
+
+  // After done(), or when the driver went silent.
+  [[nodiscard]] ServoReport report() const;
+  [[nodiscard]] const std::exception_ptr& thrown() const noexcept { return thrown_; }
+
+ private:
+  enum class Reason : std::uint8_t { none, finished, stopped, error, calibration, thrown };
+
+  unsigned int tick() noexcept;
+  [[nodiscard]] bool begin() noexcept;  // false: nothing more to do than to let go
+  void read() noexcept;
+  void look_around() noexcept;
+  [[nodiscard]] ServoAnswer compute() noexcept;
+  void give(const glm::dvec3& force_device_N) noexcept;
+  unsigned int let_go() noexcept;
+  unsigned int idle() noexcept;
+  void take_errors() noexcept;
+  void note(const hd::ErrorInfo& error) noexcept;
+  void end_for(Reason reason) noexcept {
+    if (reason_ == Reason::none) reason_ = reason;
+  }
+
+  const HdFunctions call_;
+  const hd::Handle handle_;
+  const PhantomServoOptions options_;
+  const ServoFunction function_;
+
+  // The driver's thread alone, until done().
+  ForceGate gate_;
+  DeviceState state_;
+  std::int64_t last_ns_ = 0;
+  double late_s_ = 0.0, longest_late_s_ = 0.0, hottest_ = 0.0;
+  std::uint64_t late_ticks_ = 0, cut_ticks_ = 0, nonfinite_ = 0, open_switch_ticks_ = 0, recalibrated_ = 0;
+  ErrorTally errors_;
+  Reason reason_ = Reason::none;
+  std::exception_ptr thrown_;
+
+  std::atomic<bool> stop_{false}, done_{false}, crashed_{false}, crash_zeroed_{false};
+  std::atomic<std::uint64_t> ticks_{0};
+  std::atomic<hd::Name> told_code_{0};
+  std::atomic<int> told_internal_{0};
+  std::atomic<long> thread_{0};
+};
+
+}  // namespace device

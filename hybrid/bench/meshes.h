@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The meshes that `hybrid bench rigid` touches, by name, from a thousand triangles to ten million and more.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "polygon/mesh/mesh.h"
+
+namespace hybrid::bench {
+
+enum class BenchShape : std::uint8_t { sphere, cube, corner };
+
+struct BenchMesh {
+  std::string name;
+  BenchShape shape = BenchShape::sphere;
+  bool solid = true;                // closed: it has an inside
+  double inscribed_radius_m = 0.0;  // sphere and cube: least distance of a triangle's plane to the middle
+  polygon::TriangleMesh mesh;       // counter-clockwise seen from outside, each vertex once
+};
+
+// ico0 … ico9    a unit icosahedron with every triangle cut into four that often: 20·4ⁿ triangles
+// geo1 … geo1024 its faces cut into n² triangles each (707: 9,996,980), for sizes between and beyond
+// cube1 … cube1024, corner1 … corner1024: a cube, and three quarter planes that meet, of n quads an edge
+// Every vertex of a ball lies on the sphere of bench::kSphereRadius_m. All sizes are multiplied by `scale`.
+// Throws std::invalid_argument that says which names there are.
+BenchMesh make_bench_mesh(const std::string& name, double scale = 1.0);
+
+// What a name stands for, without making it; the same exception.
+BenchShape bench_mesh_shape(const std::string& name);
+std::size_t bench_mesh_triangles(const std::string& name);
+
+// The ball of geo<frequency>.
+polygon::TriangleMesh make_geodesic_mesh(double radius_m, int frequency);
+// The three quarter planes x = 0, y = 0, z = 0 over [0, size]², seen from where x, y and z are positive.
+polygon::TriangleMesh make_corner_mesh(double size_m, int quads_per_edge);
+
+}  // namespace hybrid::bench

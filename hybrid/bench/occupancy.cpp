@@ -1,0 +1,443 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/bench/occupancy.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/vector_relational.hpp>
+#include <memory>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "hybrid/bench/paths.h"
+#include "hybrid/bench/timer.h"
+#include "hybrid/map/occupancy_map.h"
+#include "polygon/reference/cgal_surface.h"
+
+namespace hybrid::bench {
+namespace {
+
+constexpr std::size_t kBatch = 64, kRounds = 3;
+constexpr std::size_t kMostFound = 4096;
+constexpr std::size_t kMostBrute = 1'000'000, kMostTreeOfAll = 1'000'000;
+constexpr std::array<OccupancyPattern, 3> kPatterns{OccupancyPattern::empty, OccupancyPattern::coherent,
+                                                    OccupancyPattern::random};
+constexpr std::array<int, 2> kBoxes{1, 5};  // cells along an edge: one cell; a tool's
+
+struct Box {
+  glm::dvec3 low, high;
+  // What the map is asked: of one cell of voxels a point in it, which is the same question.
+  glm::dvec3 map_low, map_high;
+};
+using Found = std::array<std::uint32_t, kMostFound>;
+
+// Samples of one operation, each the mean over a batch.
+struct Samples {
+  std::vector<double> ns;
+  std::size_t batch = kBatch;
+};
+
+double share_of(std::vector<double>& values, double share) {
+  if (values.empty()) return 0.0;
+  std::sort(values.begin(), values.end());
+  const auto at = static_cast<std::size_t>(std::lround(share * static_cast<double>(values.size() - 1)));
+  return values[std::min(at, values.size() - 1)];
+}
+
+// One ball in all engines.
+class Bench {
+ public:
+  Bench(const OccupancyBenchOptions& options, OccupancyBall ball)
+      : options_(options), ball_(std::move(ball)), index_(ball_.cell_m, glm::dvec3(0.0)) {}
+
+  void run(const std::function<void(OccupancyRow)>& add);
+
+ private:
+  [[nodiscard]] bool voxels() const { return ball_.what != OccupancyWhat::triangles; }
+  [[nodiscard]] std::size_t elements() const {
+    return voxels() ? ball_.points.size() : ball_.mesh.triangles.size();
+  }
+  [[nodiscard]] bool wanted(const char* op) const {
+    return options_.cases.empty() ||
+           std::find(options_.cases.begin(), options_.cases.end(), op) != options_.cases.end();
+  }
+  [[nodiscard]] bool wanted(OccupancyEngine engine) const {
+    return options_.engines.empty() ||
+           std::find(options_.engines.begin(), options_.engines.end(), engine) != options_.engines.end();
+  }
+  [[nodiscard]] OccupancyRow row(const char* op, OccupancyEngine engine, OccupancyPattern pattern,
+                                 Samples samples) const;
+  [[nodiscard]] std::unique_ptr<OccupancyMap> built_map() const;
+  [[nodiscard]] std::unique_ptr<polygon::BoxSearch> built_tree() const;
+  void build(const std::function<void(OccupancyRow)>& add);
+  void look_up(OccupancyPattern pattern, int box_cells, const std::function<void(OccupancyRow)>& add);
+  void check(OccupancyRow& row, std::span<const Box> boxes) const;
+  void update_voxels(const std::function<void(OccupancyRow)>& add);
+  void update_body(const std::function<void(OccupancyRow)>& add);
+
+  // Whole cells about a place: the same points lie in these for every engine.
+  [[nodiscard]] Box box_about(const glm::dvec3& p, int box_cells) const;
+  [[nodiscard]] std::size_t ask(OccupancyEngine engine, const Box& box, Found& out) const;
+  [[nodiscard]] std::size_t ask_brute(const Box& box, Found& out) const;
+
+  const OccupancyBenchOptions& options_;
+  OccupancyBall ball_;
+  BrickGrid index_;  // for its rounding
+  TickTimer timer_;
+  std::unique_ptr<OccupancyMap> map_;
+  mutable OccupancyMap::Trail trail_;  // as a tick asks; answers do not depend on it
+  std::unique_ptr<polygon::BoxSearch> tree_;
+  std::size_t cells_ = 0;
+  Samples tree_build_;
+};
+
+OccupancyRow Bench::row(const char* op, OccupancyEngine engine, OccupancyPattern pattern,
+                        Samples samples) const {
+  OccupancyRow r;
+  r.op = op;
+  r.engine = engine;
+  r.pattern = pattern;
+  r.what = ball_.what;
+  r.cells = cells_;
+  r.elements = elements();
+  r.object_voxels = ball_.object_voxels;
+  r.batch = samples.batch;
+  r.batches = samples.ns.size();
+  r.p50_ns = share_of(samples.ns, 0.5);
+  r.p99_ns = share_of(samples.ns, 0.99);
+  const std::size_t bytes = engine == OccupancyEngine::map                             ? map_->memory_bytes()
+                            : engine == OccupancyEngine::cgal_aabb && tree_ != nullptr ? tree_->memory_bytes()
+                                                                                       : 0;
+  r.bytes_per_cell = static_cast<double>(bytes) / static_cast<double>(std::max<std::size_t>(1, cells_));
+  return r;
+}
+
+std::unique_ptr<OccupancyMap> Bench::built_map() const {
+  auto map = std::make_unique<OccupancyMap>(ball_.cell_m, glm::dvec3(0.0));
+  if (voxels()) {
+    map->add_soft(static_cast<std::uint32_t>(ball_.points.size()));
+    for (std::uint32_t n = 0; n < ball_.points.size(); ++n) map->place(n, ball_.points[n]);
+  } else {
+    for (const auto& t : ball_.mesh.triangles)
+      map->add_triangle(0, ball_.mesh.vertices[t[0]], ball_.mesh.vertices[t[1]], ball_.mesh.vertices[t[2]]);
+  }
+  map->reserve_bricks(voxels() ? 2048 : 0);
+  return map;
+}
+
+std::unique_ptr<polygon::BoxSearch> Bench::built_tree() const {
+  return voxels() ? polygon::make_cgal_search(ball_.points) : polygon::make_cgal_search(ball_.mesh);
+}
+
+void Bench::build(const std::function<void(OccupancyRow)>& add) {
+  const std::size_t repeats = options_.quick ? 2 : elements() > 2'000'000 ? 1 : elements() > 200'000 ? 3 : 9;
+  Samples map_build{{}, 1};
+  tree_build_ = {{}, 1};
+  const bool tree = wanted(OccupancyEngine::cgal_aabb) &&
+                    (ball_.what != OccupancyWhat::voxels_all || elements() <= 2 * kMostTreeOfAll);
+  for (std::size_t n = 0; n < repeats; ++n) {
+    map_.reset();
+    std::uint64_t begin = TickTimer::begin();
+    map_ = built_map();
+    map_build.ns.push_back(1e3 * timer_.us(TickTimer::end() - begin));
+    if (!tree) continue;
+    tree_.reset();
+    begin = TickTimer::begin();
+    tree_ = built_tree();
+    tree_build_.ns.push_back(1e3 * timer_.us(TickTimer::end() - begin));
+  }
+  cells_ = map_->occupied_cells();
+  if (!wanted("rebuild")) return;
+  if (wanted(OccupancyEngine::map))
+    add(row("rebuild", OccupancyEngine::map, OccupancyPattern::coherent, map_build));
+  if (tree) add(row("rebuild", OccupancyEngine::cgal_aabb, OccupancyPattern::coherent, tree_build_));
+}
+
+Box Bench::box_about(const glm::dvec3& p, int box_cells) const {
+  const CellCoordinates c = index_.cell_of(p);
+  const double reach = 0.5 * (box_cells - 1);
+  // A hair within the cells' faces, where no voxel is.
+  const glm::dvec3 middle = ball_.cell_m * (glm::dvec3(c[0], c[1], c[2]) + 0.5),
+                   half(ball_.cell_m * (reach + 0.5 - 1e-3));
+  const Box box{middle - half, middle + half, middle - half, middle + half};
+  return box_cells == 1 && voxels() ? Box{box.low, box.high, middle, middle} : box;
+}
+
+std::size_t Bench::ask_brute(const Box& box, Found& out) const {
+  std::size_t count = 0;
+  for (std::uint32_t n = 0; n < ball_.points.size(); ++n) {
+    const glm::dvec3& p = ball_.points[n];
+    if (p.x < box.low.x || p.x > box.high.x || p.y < box.low.y || p.y > box.high.y || p.z < box.low.z ||
+        p.z > box.high.z || count == out.size())
+      continue;
+    out[count++] = n;
+  }
+  return count;
+}
+
+std::size_t Bench::ask(OccupancyEngine engine, const Box& box, Found& out) const {
+  if (engine == OccupancyEngine::brute) return ask_brute(box, out);
+  // Of triangles the map says whether there are any, and the tree ends with the first.
+  if (!voxels()) {
+    if (engine == OccupancyEngine::map) return map_->rigid_in(box.map_low, box.map_high, trail_) != 0 ? 1 : 0;
+    return tree_->in(box.low, box.high, std::span(out).first(1));
+  }
+  return engine == OccupancyEngine::map ? map_->soft_in(box.map_low, box.map_high, out, trail_)
+                                        : tree_->in(box.low, box.high, out);
+}
+
+void Bench::check(OccupancyRow& r, std::span<const Box> boxes) const {
+  const bool by_tree = tree_ != nullptr && r.engine != OccupancyEngine::cgal_aabb;
+  const bool by_map = !by_tree && r.engine != OccupancyEngine::map;
+  const OccupancyEngine other = by_tree  ? OccupancyEngine::cgal_aabb
+                                : by_map ? OccupancyEngine::map
+                                         : OccupancyEngine::brute;
+  if (other == OccupancyEngine::brute && !voxels()) return;  // asked for the map alone
+  r.reference = engine_name(other);
+  const std::size_t most = other == OccupancyEngine::brute ? 10 : options_.quick ? 200 : 2000;
+  static thread_local Found mine, theirs;
+  std::size_t found = 0;
+  const std::size_t step = std::max<std::size_t>(1, boxes.size() / most);
+  for (std::size_t n = 0; n < boxes.size(); n += step) {
+    const std::span a(mine.data(), ask(r.engine, boxes[n], mine));
+    const std::span b(theirs.data(), ask(other, boxes[n], theirs));
+    ++r.checked;
+    found += a.size();
+    if (!voxels()) {  // the map reports what lies within a cell of the box
+      const bool of_map = r.engine == OccupancyEngine::map ? !a.empty() : !b.empty();
+      const bool of_tree = r.engine == OccupancyEngine::map ? !b.empty() : !a.empty();
+      r.missed += of_tree && !of_map ? 1 : 0;
+      r.extra += of_map && !of_tree ? 1 : 0;
+      continue;
+    }
+    std::sort(a.begin(), a.end());
+    std::sort(b.begin(), b.end());
+    std::vector<std::uint32_t> only;
+    std::set_difference(b.begin(), b.end(), a.begin(), a.end(), std::back_inserter(only));
+    r.missed += only.size();
+    only.clear();
+    std::set_difference(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(only));
+    r.extra += only.size();
+  }
+  r.found_mean = static_cast<double>(found) / static_cast<double>(std::max<std::size_t>(1, r.checked));
+}
+
+void Bench::look_up(OccupancyPattern pattern, int box_cells, const std::function<void(OccupancyRow)>& add) {
+  std::vector<Box> boxes;
+  for (const glm::dvec3& p : places(ball_, pattern, kBatch * (options_.quick ? 50 : 1500)))
+    boxes.push_back(box_about(p, box_cells));
+  std::array<Samples, kOccupancyEngines.size()> samples;
+  std::array<std::size_t, kOccupancyEngines.size()> at{};
+  static thread_local Found out;
+  std::array<Box, kBatch> asked{};
+  volatile std::size_t keep = 0;
+  // In turns, so that whatever else the machine does meets all alike.
+  for (std::size_t round = 0; round < kRounds; ++round) {
+    for (const OccupancyEngine engine : kOccupancyEngines) {
+      const auto e = static_cast<std::size_t>(engine);
+      if (!wanted(engine) || (engine == OccupancyEngine::cgal_aabb && tree_ == nullptr)) continue;
+      if (engine == OccupancyEngine::brute && (!voxels() || elements() > 2 * kMostBrute)) continue;
+      samples[e].batch = engine == OccupancyEngine::brute ? 1 : kBatch;
+      const auto start = std::chrono::steady_clock::now();
+      const std::chrono::duration<double> limit(options_.quick ? 0.005 : 0.15);
+      for (std::size_t n = 0; n < boxes.size() / kBatch; ++n) {
+        // On from where the last round ended; the first batch of a round warms up.
+        const std::size_t first = at[e], count = samples[e].batch;
+        at[e] = (first + count) % boxes.size();
+        // Who asks has the question at hand. Read from a list of ten megabytes, one took 3 to 5 ns where
+        // another engine had been at the caches in between.
+        std::copy_n(boxes.begin() + static_cast<std::ptrdiff_t>(first), count, asked.begin());
+        const std::span questions(asked.data(), count);
+        std::size_t found = 0;
+        const std::uint64_t begin = TickTimer::begin();
+        switch (engine) {  // a loop of its own for each: none pays for the choice
+          case OccupancyEngine::map:
+            for (const Box& box : questions) found += ask(OccupancyEngine::map, box, out);
+            break;
+          case OccupancyEngine::cgal_aabb:
+            for (const Box& box : questions) found += ask(OccupancyEngine::cgal_aabb, box, out);
+            break;
+          case OccupancyEngine::brute:
+            for (const Box& box : questions) found += ask_brute(box, out);
+            break;
+        }
+        const double ns = 1e3 * timer_.us(TickTimer::end() - begin) / static_cast<double>(count);
+        keep = keep + found;
+        if (n > 0) samples[e].ns.push_back(ns);
+        if (n >= 5 && std::chrono::steady_clock::now() - start > limit) break;
+      }
+    }
+  }
+  for (const OccupancyEngine engine : kOccupancyEngines) {
+    Samples& s = samples[static_cast<std::size_t>(engine)];
+    if (s.ns.empty()) continue;
+    OccupancyRow r = row("lookup", engine, pattern, std::move(s));
+    r.box_cells = box_cells;
+    const std::size_t most = engine == OccupancyEngine::brute ? 20 : boxes.size();
+    check(r, std::span(boxes).first(std::min(most, boxes.size())));
+    add(r);
+  }
+}
+
+// Voxels move to the next cell outwards and come back, one after another in the lattice's order or anywhere.
+void Bench::update_voxels(const std::function<void(OccupancyRow)>& add) {
+  std::vector<glm::dvec3> moved = ball_.points;  // of brute force: all there is to update
+  SplitMix64 random(3);
+  for (const OccupancyPattern pattern : {OccupancyPattern::coherent, OccupancyPattern::random}) {
+    Samples map{{}, kBatch}, brute{{}, kBatch};
+    const std::size_t batches = options_.quick ? 50 : 1500;
+    std::array<std::uint32_t, kBatch> who{};
+    for (std::size_t b = 0; b < batches; ++b) {
+      for (std::size_t i = 0; i < kBatch; ++i) {
+        who[i] = static_cast<std::uint32_t>(
+            (pattern == OccupancyPattern::random ? random.next() : b * kBatch + i) % elements());
+      }
+      for (const double way : {1.0, 0.0}) {
+        std::array<glm::dvec3, kBatch> to{};
+        for (std::size_t i = 0; i < kBatch; ++i) {
+          const glm::dvec3& p = ball_.points[who[i]];
+          to[i] = p + way * ball_.cell_m * glm::sign(p) * glm::dvec3(1.0, 0.0, 0.0);
+        }
+        std::uint64_t begin = TickTimer::begin();
+        for (std::size_t i = 0; i < kBatch; ++i) map_->move(who[i], to[i]);
+        const double map_ns = 1e3 * timer_.us(TickTimer::end() - begin) / kBatch;
+        begin = TickTimer::begin();
+        for (std::size_t i = 0; i < kBatch; ++i) moved[who[i]] = to[i];
+        const double brute_ns = 1e3 * timer_.us(TickTimer::end() - begin) / kBatch;
+        if (b == 0) continue;
+        map.ns.push_back(map_ns);
+        brute.ns.push_back(brute_ns);
+      }
+    }
+    if (wanted(OccupancyEngine::map)) {
+      OccupancyRow r = row("update", OccupancyEngine::map, pattern, std::move(map));
+      r.reference = "a map built from scratch";
+      r.checked = map_->validate() && map_->overflows() == 0 && map_->occupied_cells() == cells_ ? 1 : 0;
+      r.missed = 1 - r.checked;
+      add(r);
+    }
+    if (tree_ != nullptr) {
+      OccupancyRow r = row("update", OccupancyEngine::cgal_aabb, pattern, tree_build_);
+      r.note = "the tree has no update: built anew";
+      add(r);
+    }
+    if (wanted(OccupancyEngine::brute) && elements() <= 2 * kMostBrute)
+      add(row("update", OccupancyEngine::brute, pattern, std::move(brute)));
+  }
+}
+
+// The whole ball moves: a fifth of a cell a time, or anywhere.
+void Bench::update_body(const std::function<void(OccupancyRow)>& add) {
+  auto cells = std::make_shared<SurfaceCells>(ball_.cell_m, glm::dvec3(0.0));
+  for (const auto& t : ball_.mesh.triangles)
+    cells->add_triangle(1, ball_.mesh.vertices[t[0]], ball_.mesh.vertices[t[1]], ball_.mesh.vertices[t[2]]);
+  cells->seal();
+  OccupancyMap map(ball_.cell_m, glm::dvec3(0.0));
+  map.add_moving(0, cells, glm::dvec3(0.0), glm::dquat(1.0, 0.0, 0.0, 0.0));
+  map.reserve_bricks(0);
+  SplitMix64 random(4);
+  glm::dvec3 at(0.0);
+  for (const OccupancyPattern pattern : {OccupancyPattern::coherent, OccupancyPattern::random}) {
+    Samples samples{{}, kBatch};
+    for (std::size_t b = 0; b < (options_.quick ? 50U : 1500U); ++b) {
+      std::array<glm::dvec3, kBatch> to{};
+      for (glm::dvec3& p : to) {
+        at = pattern == OccupancyPattern::random ? 10.0 * ball_.radius_m * random.direction()
+                                                 : at + glm::dvec3(0.2 * ball_.cell_m, 0.0, 0.0);
+        p = at;
+      }
+      const std::uint64_t begin = TickTimer::begin();
+      for (const glm::dvec3& p : to) map.move_body(0, p, glm::dquat(1.0, 0.0, 0.0, 0.0));
+      const double ns = 1e3 * timer_.us(TickTimer::end() - begin) / kBatch;
+      if (b > 0) samples.ns.push_back(ns);
+    }
+    if (wanted(OccupancyEngine::map)) {
+      OccupancyRow r = row("update", OccupancyEngine::map, pattern, std::move(samples));
+      r.bytes_per_cell = static_cast<double>(map.memory_bytes()) / static_cast<double>(cells_);
+      r.note = "a body moves";
+      r.reference = "the fixed map of the ball";
+      for (const glm::dvec3& p : places(ball_, OccupancyPattern::random, 200)) {
+        const Box box = box_about(p, 5);
+        ++r.checked;
+        const bool fixed = map_->rigid_in(box.low, box.high) != 0,
+                   moving = map.rigid_in(at + box.low, at + box.high) != 0;
+        r.missed += fixed && !moving ? 1 : 0;
+        r.extra += moving && !fixed ? 1 : 0;
+      }
+      add(r);
+    }
+    if (tree_ != nullptr) {
+      OccupancyRow r = row("update", OccupancyEngine::cgal_aabb, pattern, tree_build_);
+      r.note = "built anew; asked in the body's frame, as the map is, it would cost as little";
+      add(r);
+    }
+  }
+}
+
+void Bench::run(const std::function<void(OccupancyRow)>& add) {
+  build(add);
+  if (wanted("lookup")) {
+    for (const OccupancyPattern pattern : kPatterns) {
+      for (const int box_cells : kBoxes) look_up(pattern, box_cells, add);
+    }
+  }
+  if (!wanted("update")) return;
+  if (voxels()) {
+    update_voxels(add);
+  } else {
+    update_body(add);
+  }
+}
+
+}  // namespace
+
+const char* engine_name(OccupancyEngine engine) {
+  switch (engine) {
+    case OccupancyEngine::map:
+      return "map";
+    case OccupancyEngine::cgal_aabb:
+      return "cgal-aabb";
+    case OccupancyEngine::brute:
+      break;
+  }
+  return "brute";
+}
+
+const std::vector<std::string>& occupancy_cases() {
+  static const std::vector<std::string> kCases{"lookup", "update", "rebuild"};
+  return kCases;
+}
+
+std::vector<OccupancyRow> bench_occupancy(const OccupancyBenchOptions& options) {
+  std::vector<std::size_t> sizes = options.cells;
+  if (sizes.empty()) {
+    sizes = {1'000, 10'000};
+    if (!options.quick) sizes.insert(sizes.end(), {100'000, 1'000'000, 10'000'000});
+  }
+  std::vector<OccupancyRow> rows;
+  const auto add = [&](OccupancyRow row) {
+    if (options.on_row) options.on_row(row);
+    rows.push_back(std::move(row));
+  };
+  const auto say = [&options](const char* what, std::size_t count) {
+    if (options.progress) options.progress(fmt::format("{} {}", count, what));
+  };
+  for (const std::size_t count : sizes) {
+    for (const OccupancyWhat what :
+         {OccupancyWhat::voxels_surface, OccupancyWhat::triangles, OccupancyWhat::voxels_all}) {
+      say(what_name(what), count);
+      Bench(options, make_ball(what, count)).run(add);
+    }
+    // Beside the ball of all voxels, the same ball as a session has it.
+    say("voxels, of which the surface", count);
+    Bench(options, make_ball_surface_of(count)).run(add);
+  }
+  return rows;
+}
+
+}  // namespace hybrid::bench

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "hybrid/bench/occupancy.h"
+
+namespace hybrid::bench {
+namespace {
+
+std::string time_text(double ns) {
+  return ns < 100.0 ? fmt::format("{:.1f}", ns)
+         : ns < 1e5 ? fmt::format("{:.0f}", ns)
+         : ns < 1e7 ? fmt::format("{:.0f}k", ns / 1e3)
+                    : fmt::format("{:.4g}M", ns / 1e6);
+}
+
+// The row of another engine to the same question; nullptr: there is none.
+const OccupancyRow* beside(const std::vector<OccupancyRow>& rows, const OccupancyRow& row,
+                           OccupancyEngine engine) {
+  for (const OccupancyRow& other : rows) {
+    if (other.op == row.op && other.engine == engine && other.pattern == row.pattern &&
+        other.what == row.what && other.elements == row.elements && other.box_cells == row.box_cells)
+      return &other;
+  }
+  return nullptr;
+}
+
+std::string name_of(const OccupancyRow& row) {
+  const std::string box = row.box_cells > 0 ? fmt::format(", box of {}", row.box_cells) : std::string();
+  return fmt::format("{} {} of {} {}{}", row.op, pattern_name(row.pattern), row.elements, what_name(row.what),
+                     box);
+}
+
+// One line a size of the same ball with all its voxels, and with its surface only.
+std::string all_against_surface(const std::vector<OccupancyRow>& rows) {
+  const auto of_tool = [](const OccupancyRow& row) {
+    return row.engine == OccupancyEngine::map && row.op == "lookup" && row.box_cells == 5 &&
+           row.pattern == OccupancyPattern::coherent;
+  };
+  std::string text;
+  for (const OccupancyRow& all : rows) {
+    if (!of_tool(all) || all.what != OccupancyWhat::voxels_all) continue;
+    for (const OccupancyRow& surface : rows) {
+      if (!of_tool(surface) || surface.what != OccupancyWhat::voxels_surface ||
+          surface.object_voxels != all.object_voxels)
+        continue;
+      const double all_MB = 1e-6 * all.bytes_per_cell * static_cast<double>(all.cells),
+                   surface_MB = 1e-6 * surface.bytes_per_cell * static_cast<double>(surface.cells);
+      text += fmt::format(
+          "a ball of {} voxels: all in the map {:.3g} MB, its {} surface voxels {:.3g} MB ({:.2g} times "
+          "less); "
+          "a tool's box {:.0f} against {:.0f} ns, {:.0f} against {:.0f} voxels found\n",
+          all.elements, all_MB, surface.elements, surface_MB, all_MB / surface_MB, all.p50_ns, surface.p50_ns,
+          all.found_mean, surface.found_mean);
+      break;
+    }
+  }
+  return text;
+}
+
+}  // namespace
+
+nlohmann::ordered_json to_json(const OccupancyRow& row) {
+  nlohmann::ordered_json json;
+  json["op"] = row.op;
+  json["engine"] = engine_name(row.engine);
+  json["pattern"] = pattern_name(row.pattern);
+  json["cells"] = row.cells;
+  json["p50_ns"] = row.p50_ns;
+  json["p99_ns"] = row.p99_ns;
+  json["bytes_per_cell"] = row.bytes_per_cell;
+  json["what"] = what_name(row.what);
+  json["elements"] = row.elements;
+  if (row.object_voxels > 0) json["object_voxels"] = row.object_voxels;
+  json["batch"] = row.batch;
+  json["batches"] = row.batches;
+  if (row.box_cells > 0) {
+    json["box_cells"] = row.box_cells;
+    json["found_mean"] = row.found_mean;
+  }
+  json["reference"] =
+      row.reference.empty() ? nlohmann::ordered_json(nullptr) : nlohmann::ordered_json(row.reference);
+  if (!row.reference.empty()) {
+    json["checked"] = row.checked;
+    json["missed"] = row.missed;
+    json["extra"] = row.extra;
+  }
+  if (!row.note.empty()) json["note"] = row.note;
+  return json;
+}
+
+std::string occupancy_table_head() {
+  return fmt::format("{:<8}{:<10}{:<15}{:<9}{:>10}{:>10}{:>4}{:>10}{:>10}{:>8}{:>8}{:>8}{:>7}{:>7}\n", "op",
+                     "engine", "what", "pattern", "elements", "cells", "box", "p50", "p99", "B/cell", "found",
+                     "checked", "missed", "extra");
+}
+
+std::string occupancy_table_line(const OccupancyRow& row) {
+  const bool judged = !row.reference.empty();
+  const auto count = [judged](std::size_t n) { return judged ? fmt::format("{}", n) : std::string("-"); };
+  return fmt::format(
+      "{:<8}{:<10}{:<15}{:<9}{:>10}{:>10}{:>4}{:>10}{:>10}{:>8.1f}{:>8}{:>8}{:>7}{:>7}{}\n", row.op,
+      engine_name(row.engine), what_name(row.what), pattern_name(row.pattern), row.elements, row.cells,
+      row.box_cells > 0 ? fmt::format("{}", row.box_cells) : std::string("-"), time_text(row.p50_ns),
+      time_text(row.p99_ns), row.bytes_per_cell,
+      row.op == "lookup" ? fmt::format("{:.1f}", row.found_mean) : std::string("-"), count(row.checked),
+      count(row.missed), count(row.extra), row.note.empty() ? std::string() : "  " + row.note);
+}
+
+std::string occupancy_summary(const std::vector<OccupancyRow>& rows) {
+  std::string text = all_against_surface(rows), worse;
+  std::size_t missed = 0, compared = 0;
+  double least_memory = 1e300, most_memory = 0.0;
+  for (const OccupancyRow& row : rows) {
+    missed += row.missed;
+    if (row.engine != OccupancyEngine::map) continue;
+    for (const OccupancyEngine engine : {OccupancyEngine::cgal_aabb, OccupancyEngine::brute}) {
+      const OccupancyRow* other = beside(rows, row, engine);
+      if (other == nullptr) continue;
+      ++compared;
+      if (engine == OccupancyEngine::cgal_aabb && other->bytes_per_cell > 0.0 && row.op == "lookup") {
+        const double ratio = row.bytes_per_cell / other->bytes_per_cell;
+        least_memory = std::min(least_memory, ratio);
+        most_memory = std::max(most_memory, ratio);
+      }
+      if (row.p50_ns > other->p50_ns)
+        worse += fmt::format("  {}: {} ns, {} {} ns\n", name_of(row), time_text(row.p50_ns),
+                             engine_name(engine), time_text(other->p50_ns));
+    }
+  }
+  if (compared > 0)
+    text += worse.empty() ? fmt::format("the map is faster in all {} comparisons\n", compared)
+                          : fmt::format("of {} comparisons the map is slower in these:\n{}", compared, worse);
+  if (most_memory > 0.0)
+    text +=
+        fmt::format("memory of the map over that of the tree: {:.2g} to {:.2g}\n", least_memory, most_memory);
+  return rows.empty() ? text : text + fmt::format("missed: {}\n", missed);
+}
+
+}  // namespace hybrid::bench

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// `hybrid bench rigid`: the proxy along the paths of paths.h, over meshes of all sizes, beside
+// baselines, each time with its error.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "hybrid/bench/rigid_table.h"
+#include "hybrid/build/build_world.h"
+
+namespace hybrid::bench {
+
+// far, hover, slide, tap, edge, corner, corner_sym, cornerfast, moving
+const std::vector<std::string>& rigid_paths();
+
+struct RigidBenchOptions {
+  bool quick = false;              // a short piece of each path, small meshes, one speed
+  bool every_tick = false;         // the exact reference at every tick, however long that takes
+  std::vector<std::string> paths;  // empty: all
+  std::vector<std::string>
+      meshes;                   // empty: those of the default table; else exactly these, see meshes.h
+  std::vector<Engine> engines;  // empty: all, but CGAL's tree only up to kMostBaselineTriangles
+  std::filesystem::path trace;  // folder for one CSV a run; empty: none
+  Progress progress;
+  std::function<void(const RigidRow&)> on_row;  // as soon as there is one
+};
+
+inline constexpr std::size_t kMostBaselineTriangles = 2'000'000;
+
+// Throws std::invalid_argument (no such mesh, or nothing to do) and std::runtime_error (trace not writable).
+std::vector<RigidRow> bench_rigid(const RigidBenchOptions& options);
+
+}  // namespace hybrid::bench

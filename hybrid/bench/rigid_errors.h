@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a run along a bench path is worth: its distance from exact optima, and whether it ever was where no
+// tool may be. Everything here looks at the recorded positions; none of it shares code with the proxy.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "hybrid/bench/rigid_run.h"
+#include "polygon/reference/optimality.h"
+
+namespace hybrid::bench {
+
+struct Judgement {  // lengths in meters; empty: the figure has no meaning here
+  // Against the nearest place where the first-order conditions hold on the mesh, at `error_ticks` ticks.
+  std::optional<double> error_mesh_max, error_mesh_p99;
+  std::size_t error_ticks = 0, error_worst_tick = 0;
+  std::size_t lost_ticks = 0;           // of those, where there is no such place within the search radius
+  std::optional<double> clearance_min;  // tool to mesh, least at those ticks; negative: overlap
+  // Against the closed reference, at every tick: the ideal sphere, or cube and corner themselves.
+  std::optional<double> error_sphere_max, error_sphere_rms;
+  std::optional<double> error_closed_max, error_closed_rms;
+  // The mesh's own exact optimum against the ideal sphere, and the proxy's error at the same ticks.
+  std::optional<double> optimum_sphere_max, optimum_sphere_rms, error_sphere_there_max;
+  std::optional<double> force_step_p99_N;  // from tick to tick while in contact
+  std::size_t contact_ticks = 0, inside_ticks = 0, pop_throughs = 0;
+};
+
+// One path on one mesh, in a scene of one size and place: what all its runs are judged by.
+class Judge {
+ public:
+  // `path` is in the scene frame (see placed()), `reference` the exact one in the mesh's; it may be null (a
+  // mesh too large for it). Keeps references to all.
+  Judge(const BenchMesh& mesh, const GoalPath& path, const glm::dvec3& offset_m, double tool_radius_m,
+        double scale, const polygon::FirstOrderReference* reference);
+
+  // `budget_s` is what may be spent on exact references: at least 16 ticks, then every n-th as far as it
+  // lasts, or every tick when it is negative.
+  [[nodiscard]] Judgement judge(const TouchRun& run, double budget_s);
+
+ private:
+  struct Optimum {
+    std::size_t tick = 0;
+    double off_sphere_m = 0.0;
+  };
+  [[nodiscard]] glm::dvec3 in_body(const glm::dvec3& p, std::size_t tick) const;
+  [[nodiscard]] bool inside(const glm::dvec3& in_body) const;
+  [[nodiscard]] std::vector<std::size_t> ticks_to_judge(const TouchRun& run, double budget_s);
+  void judge_places(const TouchRun& run, Judgement& out) const;
+  void judge_forces(const TouchRun& run, Judgement& out) const;
+  void judge_closed(const TouchRun& run, Judgement& out) const;
+  void judge_exactly(const TouchRun& run, double budget_s, Judgement& out);
+  void judge_optimum(const TouchRun& run, double budget_s, Judgement& out);
+
+  const BenchMesh& mesh_;
+  const GoalPath& path_;
+  glm::dvec3 offset_m_;
+  double radius_m_, scale_;
+  const polygon::FirstOrderReference* reference_;
+  bool has_optimum_ = false;
+  std::vector<Optimum> optimum_;  // found once, for all runs
+};
+
+}  // namespace hybrid::bench

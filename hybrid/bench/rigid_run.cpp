@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/bench/rigid_run.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <stdexcept>
+
+#include "hybrid/tick/bodies/move_bodies.h"
+#include "hybrid/build/build_world.h"
+#include "hybrid/tick/proxy/proxy_step.h"
+#include "hybrid/tick/tick.h"
+#include "polygon/reference/cgal_surface.h"
+#include "polygon/surface/mesh_surface.h"
+
+namespace hybrid::bench {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::size_t kBlock = 2000;  // ticks an engine has the processor's caches for itself
+
+double ms_since(Clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+struct Box {
+  glm::dvec3 low, high;
+};
+
+// As the program fills it: cells of half the tool, or as many as its limit allows.
+OccupancyMap fill_map(const polygon::TriangleMesh& mesh, const Box& box, double tool_radius_m,
+                      const glm::dvec3& offset_m, bool moves) {
+  const glm::dvec3 size = box.high - box.low;
+  const double longest = std::max({size.x, size.y, size.z});
+  const double cell = rigid_cell_m(longest, tool_radius_m);
+  const glm::dvec3 middle = 0.5 * (box.low + box.high);
+  OccupancyMap map(cell, offset_m + middle);
+  if (moves) {
+    auto cells = std::make_shared<SurfaceCells>(cell, middle);
+    for (const auto& [a, b, c] : mesh.triangles)
+      cells->add_triangle(OccupancyMap::rigid_bit(0), mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]);
+    cells->seal();
+    map.add_moving(0, std::move(cells), offset_m, glm::dquat(1.0, 0.0, 0.0, 0.0));
+  } else {
+    for (const auto& [a, b, c] : mesh.triangles)
+      map.add_triangle(0, offset_m + mesh.vertices[a], offset_m + mesh.vertices[b],
+                       offset_m + mesh.vertices[c]);
+  }
+  map.reserve_bricks(0);
+  return map;
+}
+
+void prepare(TouchRun& run, const GoalPath& path) {
+  run.proxy_m.resize(path.goals.size());
+  run.force_N.resize(path.goals.size());
+  run.tick_us.resize(path.goals.size());
+  if (!path.body_m.empty()) run.pose_us.resize(path.goals.size());
+}
+
+// Ticks first … last − 1 of the path, or fewer when the time is up.
+void run_block(const GoalPath& path, std::size_t first, std::size_t last, TouchWorld& touch, double limit_s,
+               const glm::dvec3& rest_m, const TickTimer& timer, TouchRun& run) {
+  auto start = std::lower_bound(path.starts.begin(), path.starts.end(), first);
+  const bool moves = !path.body_m.empty();
+  for (std::size_t k = first; k < last; ++k) {
+    if (limit_s > 0.0 && run.spent_s > limit_s) return;
+    if (start != path.starts.end() && *start == k) {
+      touch.start(path.goals[k], moves ? path.body_m[k] : rest_m);
+      ++start;
+    } else if (moves) {
+      const std::uint64_t before = TickTimer::begin();
+      touch.move_body(path.body_m[k]);
+      run.pose_us[k] = static_cast<float>(timer.us(TickTimer::end() - before));
+    }
+    const glm::dvec3 goal = path.goals[k];
+    const std::uint64_t before = TickTimer::begin();
+    const RigidStep step = step_rigid(touch.world(), touch.state(), goal, kTick_s);
+    const double us = timer.us(TickTimer::end() - before);
+    run.proxy_m[k] = step.proxy_m;
+    run.force_N[k] = step.force_N;
+    run.tick_us[k] = static_cast<float>(us);
+    run.steps += step.steps;
+    run.surveys += step.surveys;
+    run.most_steps = std::max(run.most_steps, step.steps);
+    run.spent_s += 1e-6 * us;
+    run.ticks = k + 1;
+  }
+}
+
+}  // namespace
+
+const char* engine_name(Engine engine) {
+  switch (engine) {
+    case Engine::hybrid:
+      return "hybrid";
+    case Engine::cgal_aabb:
+      return "cgal-aabb";
+    case Engine::no_map:
+      return "no-map";
+  }
+  return "hybrid";
+}
+
+TimedSurface make_surface(const BenchMesh& mesh, Engine engine) {
+  const auto start = Clock::now();
+  TimedSurface made;
+  if (engine == Engine::cgal_aabb) {
+    made.surface = polygon::make_cgal_surface(mesh.mesh, mesh.solid);
+  } else {
+    made.surface = polygon::make_mesh_surface(mesh.mesh, mesh.solid);
+  }
+  made.build_ms = ms_since(start);
+  return made;
+}
+
+TouchWorld::TouchWorld(const BenchMesh& mesh, const TimedSurface& surface, Engine engine,
+                       double tool_radius_m, const glm::dvec3& offset_m, bool moves)
+    : moves_(moves), build_ms_(surface.build_ms) {
+  const Box box{surface.surface->lower(), surface.surface->upper()};
+  const auto start = Clock::now();
+  OccupancyMap map = engine == Engine::no_map ? OccupancyMap(1.0, offset_m)
+                                              : fill_map(mesh.mesh, box, tool_radius_m, offset_m, moves);
+  map_ms_ = engine == Engine::no_map ? 0.0 : ms_since(start);
+  build_ms_ += map_ms_;
+  world_.rigid.push_back(
+      {.name = mesh.name, .surface = surface.surface, .pose = {.position_m = offset_m}, .drawn = {}});
+  world_.tool = {
+      .shape = Tool::Shape::ball, .radius_m = tool_radius_m, .stiffness_N_per_m = kStiffness_N_per_m};
+  world_.limits = {.max_force_N = 1e12, .max_slew_N_per_s = 1e18, .soft_start_s = 0.0};
+  world_.use_map = engine != Engine::no_map;
+  world_.set_scale(offset_m + box.low, offset_m + box.high);
+  state_ = std::make_unique<WorldState>(world_, std::move(map));
+  state_->prepare(world_);
+}
+
+std::size_t TouchWorld::bytes() const {
+  return world_.rigid.front().surface->memory_bytes() + (world_.use_map ? state_->map.memory_bytes() : 0);
+}
+
+void TouchWorld::start(const glm::dvec3& goal_m, const glm::dvec3& body_m) {
+  if (moves_) move_body(body_m);
+  if (!start_proxy(world_, *state_, goal_m)) {
+    throw std::runtime_error(
+        fmt::format("the path on \"{}\" starts at ({:.6g}, {:.6g}, {:.6g}) m, where the tool is not free",
+                    world_.rigid.front().name, goal_m.x, goal_m.y, goal_m.z));
+  }
+}
+
+void TouchWorld::move_body(const glm::dvec3& body_m) {
+  set_rigid_pose(world_, *state_, 0, Pose{.position_m = body_m});
+}
+
+std::vector<TouchRun> run_engines(const GoalPath& path, std::span<const Engine> engines,
+                                  std::span<TouchWorld* const> worlds, std::span<const double> limit_s,
+                                  const glm::dvec3& offset_m, const TickTimer& timer) {
+  std::vector<TouchRun> runs(engines.size());
+  for (std::size_t e = 0; e < engines.size(); ++e) {
+    runs[e].engine = engines[e];
+    prepare(runs[e], path);
+  }
+  for (std::size_t first = 0, turn = 0; first < path.goals.size(); first += kBlock, ++turn) {
+    const std::size_t last = std::min(first + kBlock, path.goals.size());
+    for (std::size_t i = 0; i < engines.size(); ++i) {
+      const std::size_t e = (i + turn) % engines.size();
+      if (runs[e].ticks == first)
+        run_block(path, first, last, *worlds[e], limit_s[e], offset_m, timer, runs[e]);
+    }
+  }
+  return runs;
+}
+
+GoalPath placed(const GoalPath& path, double scale, const glm::dvec3& offset_m) {
+  GoalPath there = path;
+  for (glm::dvec3& g : there.goals) g = offset_m + scale * g;
+  for (glm::dvec3& r : there.reference) r = offset_m + scale * r;
+  for (glm::dvec3& b : there.body_m) b = offset_m + scale * b;
+  return there;
+}
+
+}  // namespace hybrid::bench

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Drives the rigid part of the tick along a path, with one engine after another in turns, and keeps what
+// every tick did and how long it took. Judging comes afterwards (rigid_errors.h), outside of the timing.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "hybrid/bench/meshes.h"
+#include "hybrid/bench/paths.h"
+#include "hybrid/bench/timer.h"
+#include "hybrid/world/world.h"
+
+namespace hybrid::bench {
+
+// What answers the proxy: the product; the product with CGAL's AABB tree in place of its own queries; the
+// product without the occupancy map.
+enum class Engine : std::uint8_t { hybrid, cgal_aabb, no_map };
+inline constexpr std::array kEngines{Engine::hybrid, Engine::cgal_aabb, Engine::no_map};
+const char* engine_name(Engine engine);
+
+inline constexpr double kStiffness_N_per_m = 1000.0;
+
+// A surface and what it took to build it; shared by all runs on the mesh.
+struct TimedSurface {
+  std::shared_ptr<const polygon::RigidSurface> surface;
+  double build_ms = 0.0;
+};
+TimedSurface make_surface(const BenchMesh& mesh, Engine engine);
+
+// One rigid object in a world of its own, at `offset_m` of the scene; `moves`: it need not stay there.
+class TouchWorld {
+ public:
+  TouchWorld(const BenchMesh& mesh, const TimedSurface& surface, Engine engine, double tool_radius_m,
+             const glm::dvec3& offset_m, bool moves);
+
+  [[nodiscard]] const World& world() const { return world_; }
+  [[nodiscard]] WorldState& state() { return *state_; }
+  [[nodiscard]] const WorldState& state() const { return *state_; }
+  [[nodiscard]] double build_ms() const { return build_ms_; }  // surface and map
+  [[nodiscard]] double map_ms() const { return map_ms_; }
+  [[nodiscard]] std::size_t bytes() const;
+
+  // Puts the proxy at a free place, and the body at rest where it is to be. Throws std::runtime_error when
+  // the place is not free.
+  void start(const glm::dvec3& goal_m, const glm::dvec3& body_m);
+  void move_body(const glm::dvec3& body_m);  // from one tick to the next
+
+ private:
+  World world_;
+  std::unique_ptr<WorldState> state_;
+  bool moves_ = false;
+  double build_ms_ = 0.0, map_ms_ = 0.0;
+};
+
+// One engine's way along a path, one entry a tick in every vector.
+struct TouchRun {
+  Engine engine = Engine::hybrid;
+  std::vector<glm::dvec3> proxy_m, force_N;  // scene frame
+  std::vector<float> tick_us;
+  std::vector<float> pose_us;            // moving the body; empty when it rests
+  std::size_t ticks = 0;                 // done: fewer than the path's when the time was up
+  std::uint64_t steps = 0, surveys = 0;  // of all ticks
+  std::uint32_t most_steps = 0;
+  double spent_s = 0.0;
+};
+
+// Runs all worlds along the path, each in turn for a block of ticks, so that whatever else the machine does
+// meets all alike. A world whose engine has spent `limit_s` (0: no limit) in steps is stopped there.
+// `path` is in the scene frame; its goals and bodies are used as they stand.
+std::vector<TouchRun> run_engines(const GoalPath& path, std::span<const Engine> engines,
+                                  std::span<TouchWorld* const> worlds, std::span<const double> limit_s,
+                                  const glm::dvec3& offset_m, const TickTimer& timer);
+
+// The path in a scene of another size and place.
+GoalPath placed(const GoalPath& path, double scale, const glm::dvec3& offset_m);
+
+}  // namespace hybrid::bench

@@ -1,0 +1,339 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A ball pressed ten spacings deep into a block, in steps and without relaxation; then how long until the
+// force on it is within 1 % of what it ends at.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "hybrid/bench/soft.h"
+#include "hybrid/bench/timer.h"
+#include "hybrid/session/session.h"
+#include "voxel/baseline/thesis_chainmail.h"
+#include "voxel/object/shadow_object.h"
+#include "voxel/object/soft_object.h"
+
+namespace hybrid::bench {
+namespace {
+
+constexpr double kSpacing = 1e-3;
+constexpr double kDepth = 10.0, kRadius = 10.0;  // (unit: spacing)
+constexpr int kSweepsNear = 2;
+constexpr double kConverged = 0.01;
+constexpr double kFloor_N = 0.04;    // of a JND: the least friction of a device
+constexpr double kAsked_us = 100e3;  // when the force error is stated
+constexpr int kMostRounds = 4000;
+constexpr double kCalm = 1e-4;                // of the force: it changes by less than this …
+constexpr int kCalmRounds = 30;               // … for so many rounds: there is nothing more to see
+constexpr double kReferenceTolerance = 1e-6;  // of the lattice's force scale
+constexpr int kReferenceCycles = 200;
+
+constexpr const char* kWideReference = "the same press, after 400 ticks on a grid of boxes 24 nodes wide";
+constexpr int kTicks = 400;
+constexpr double kTightSlack = 0.15;
+constexpr voxel::LinkMaterial tight_tissue(double young_Pa) {
+  return {.young_Pa = young_Pa,
+          .stretch_min = 1.0 - kTightSlack,
+          .stretch_max = 1.0 + kTightSlack,
+          .shear = kTightSlack};
+}
+constexpr voxel::LinkMaterial kFirm = tight_tissue(20e3), kLimp = tight_tissue(5e3);
+
+struct Limits {
+  const char* name;
+  double slack;                   // in spacings, as the row has it; of the tightest material
+  voxel::LinkMaterial top, base;  // the upper 40 % and the rest
+};
+
+const std::array<Limits, 6>& all_limits() {
+  constexpr voxel::LinkMaterial tissue{}, bricks{.bricks = true}, full{.poisson = 0.45, .bricks = true};
+  constexpr voxel::LinkMaterial loose{.stretch_min = 0.05, .stretch_max = 10.0, .shear = 10.0};
+  constexpr voxel::LinkMaterial tight{.stretch_min = 1.0, .stretch_max = 1.0, .shear = 0.0};
+  static const std::array<Limits, 6> kLimits{
+      Limits{"limits", 0.6, tissue, tissue},    Limits{"no limits", 0.95, loose, loose},
+      Limits{"slack 0", 0.0, tight, tissue},    Limits{"tight, by links", kTightSlack, kFirm, kLimp},
+      Limits{"trilinear", 0.6, bricks, bricks}, Limits{"trilinear, 0.45", 0.6, full, full}};
+  return kLimits;
+}
+
+voxel::LabelVolume cube(int edge) {
+  voxel::LabelVolume volume;
+  volume.dims = {edge, edge, edge};
+  const auto side = static_cast<std::size_t>(edge);
+  volume.labels.assign(side * side * side, 1);
+  return volume;
+}
+
+// The upper 40 % of label 2.
+voxel::LabelVolume layered_cube(int edge) {
+  voxel::LabelVolume volume = cube(edge);
+  const std::size_t base = volume.index(0, 0, edge * 6 / 10);
+  std::fill(volume.labels.begin() + static_cast<std::ptrdiff_t>(base), volume.labels.end(), std::uint8_t{2});
+  return volume;
+}
+
+void say_error_when_asked(SoftRow& row, double force_N, double reference_N) {
+  row.force_error_N = std::fabs(force_N - reference_N);
+  row.force_error_jnd = *row.force_error_N / std::max(kJndShare * reference_N, kFloor_N);
+  row.note += "; error after 100 ms";
+}
+
+class Pressed {
+ public:
+  enum class Relaxed : std::uint8_t { apart, here };
+
+  Pressed(int edge, const Limits& limits, Relaxed relaxed = Relaxed::apart) {
+    const voxel::LabelVolume volume = layered_cube(edge);
+    voxel::LatticeOptions options;
+    options.materials[1] = limits.base;
+    options.materials[2] = limits.top;
+    options.anchor_faces = {"-z"};
+    object_ = std::make_unique<voxel::SoftObject>(std::make_shared<voxel::Lattice>(volume, options));
+    if (relaxed == Relaxed::apart) replica_ = std::make_unique<voxel::Replica>(*object_);
+    const double middle = 0.5 * (edge - 1) * kSpacing, top = (edge - 1) * kSpacing;
+    tool_.radius = kRadius * kSpacing;
+    const double from = top + object_->reach(tool_.radius);
+    constexpr int steps = 40;
+    for (int n = 1; n <= steps; ++n) {
+      tool_.centre = {middle, middle, from - kDepth * kSpacing * n / steps};
+      touch();
+      if (n > 1) object_->follow({0.0, 0.0, -kDepth * kSpacing / steps});
+      object_->push_out(tool_);
+    }
+  }
+
+  // As a tick begins.
+  void touch() {
+    near_.clear();
+    for (const voxel::VoxelId v : object_->lattice().surface()) {
+      if (glm::distance(object_->position(v), tool_.centre) < object_->reach(tool_.radius) + kSpacing)
+        near_.push_back(v);
+    }
+    object_->touch(near_);
+  }
+
+  [[nodiscard]] voxel::SoftObject& object() { return *object_; }
+  [[nodiscard]] voxel::Replica& replica() { return *replica_; }
+  [[nodiscard]] const voxel::ToolInBody& tool() const { return tool_; }
+  [[nodiscard]] double force_N() { return glm::length(object_->reaction(tool_).force_N); }
+
+ private:
+  std::unique_ptr<voxel::SoftObject> object_;
+  std::unique_ptr<voxel::Replica> replica_;  // there from the start, as in a session: the press is news to it
+  voxel::ToolInBody tool_;
+  std::vector<voxel::VoxelId> near_;
+};
+
+// By whole cycles alone, on an object of its own: apart from another thread's, coarse levels know all there
+// is.
+double settled_force_N(int edge, const Limits& limits) {
+  Pressed pressed(edge, limits, Pressed::Relaxed::here);
+  const double tolerance_N = kReferenceTolerance * pressed.object().lattice().force_scale_N();
+  for (int n = 0; n < kReferenceCycles; ++n) {
+    pressed.touch();  // other voxels are near than at first
+    if (pressed.object().settle(pressed.tool(), tolerance_N, 1)) break;
+  }
+  return pressed.force_N();
+}
+
+// What the tick does with an object that stays pressed, and the thread that relaxes it, in turns on one core,
+// until nothing is left to do. `at_rest_N`: what it comes to, where that is known better than whole cycles
+// find it, which stall where a chain is tight.
+SoftRow relax_row(int edge, const Limits& limits, std::optional<double> at_rest_N) {
+  const TickTimer timer;
+  Pressed pressed(edge, limits);
+  voxel::SoftObject& object = pressed.object();
+  struct Moment {
+    double us, force_N;
+  };
+  std::vector<Moment> moments;
+  std::uint64_t updates = 0;
+  double us = 0.0, background_us = 0.0;
+  voxel::Replica& replica = pressed.replica();
+  int calm = 0;
+  for (int n = 0;
+       n < kMostRounds && (n == 0 || voxel::Replica::wanted(object)) && us < 60e6 && calm < kCalmRounds;
+       ++n) {
+    pressed.touch();
+    const std::uint64_t before = TickTimer::begin();
+    object.push_out(pressed.tool());
+    object.relax_near(pressed.tool(), kSweepsNear);
+    const double force = pressed.force_N();
+    const std::uint64_t between = TickTimer::begin();
+    if (voxel::Replica::wanted(object)) {
+      replica.give(object);
+      replica.relax();
+      replica.take(object);
+      while (!replica.drained()) replica.drain(object, object.lattice().grid().rows());
+      updates += replica.work() * voxel::kRow;
+    }
+    const std::uint64_t after = TickTimer::end();
+    calm = !moments.empty() && std::fabs(force - moments.back().force_N) <= kCalm * force ? calm + 1 : 0;
+    moments.push_back({us + timer.us(between - before), force});
+    us += timer.us(after - before);
+    background_us += timer.us(after - between);
+  }
+  const double reference = at_rest_N ? *at_rest_N : settled_force_N(edge, limits);
+  SoftRow row{.test_case = "relax",
+              .voxels = object.lattice().voxel_count(),
+              .material = limits.name,
+              .depth_spacings = kDepth,
+              .slack = limits.slack};
+  row.reference =
+      at_rest_N ? kWideReference
+                : "the same press, relaxed by whole cycles until no voxel feels a force, or 200 of them";
+  const auto off = [reference](const Moment& m) {
+    return std::fabs(m.force_N - reference) > kConverged * reference;
+  };
+  const auto last_off = std::find_if(moments.rbegin(), moments.rend(), off);
+  if (!(reference > 0.0)) {
+    row.note = "nothing pressed back, neither at first nor at rest";
+    return row;
+  }
+  if (last_off == moments.rbegin()) {
+    row.note = fmt::format("not within 1 % of {:.4f} N when relaxation ended, after {:.0f} ms: {:.4f} N",
+                           reference, 1e-3 * us, moments.back().force_N);
+  } else {
+    const double reached = last_off.base()->us;  // the moment after
+    row.time_us = Percentiles{reached, reached, reached, reached};
+    row.note = fmt::format("until within 1 % of {:.4f} N", reference);
+  }
+  const auto asked =
+      std::find_if(moments.rbegin(), moments.rend(), [](const Moment& m) { return m.us <= kAsked_us; });
+  if (asked != moments.rend()) say_error_when_asked(row, asked->force_N, reference);
+  if (updates > 0) row.ns_per_voxel_update = 1e3 * background_us / static_cast<double>(updates);
+  row.bytes_per_voxel = static_cast<double>(object.memory_bytes()) / static_cast<double>(row.voxels);
+  return row;
+}
+
+// The same where the chain is tight from the ball two thirds of the way to the anchors: on the composite
+// grid, where `run` keeps such a contact of tissue that nothing else is near. A tick is all that is done, and
+// nothing is left to another thread.
+struct TightRow {
+  SoftRow row;
+  double reference_N = 0.0;
+};
+TightRow tight_row(int edge, bool layered) {
+  constexpr double kSlack = kTightSlack;
+  const double depth = std::min(kDepth, 0.7 * kSlack * (edge - 1));  // of a small cube the chain ends sooner
+  const TickTimer timer;
+  const voxel::LabelVolume volume = layered ? layered_cube(edge) : cube(edge);
+  voxel::LatticeOptions options;
+  options.materials[1] = layered ? kLimp : tight_tissue(voxel::LinkMaterial{}.young_Pa);
+  options.materials[2] = kFirm;
+  options.anchor_faces = {"-z"};
+  const auto lattice = std::make_shared<const voxel::Lattice>(volume, options);
+  const double middle = 0.5 * (edge - 1) * kSpacing, top = (edge - 1) * kSpacing;
+  voxel::ToolInBody tool{.centre = {middle, middle, 0.0}, .radius = kRadius * kSpacing};
+  const auto pressed = [&](bool wide, const auto& look) {
+    voxel::SoftObject object(lattice);
+    std::string obstacle = object.use_composite_grid(tool);
+    if (!obstacle.empty()) return obstacle;
+    if (wide) object.widen_grid();
+    tool.centre.z = top + object.reach(tool.radius) - depth * kSpacing;
+    std::vector<voxel::VoxelId> near(lattice->surface().begin(), lattice->surface().end());
+    for (int n = 0; n < kTicks; ++n) {
+      // As a tick begins: what is near, or may be.
+      const double away = object.reach(tool.radius) + kSpacing;
+      if (object.grid_in_use() != nullptr)
+        near.assign(object.near_on_grid().begin(), object.near_on_grid().end());
+      std::erase_if(near,
+                    [&](voxel::VoxelId v) { return glm::distance(object.position(v), tool.centre) >= away; });
+      const std::uint64_t before = TickTimer::begin();
+      object.touch(near);
+      object.push_out(tool);
+      object.relax_near(tool, kSweepsNear);
+      const double force_N = glm::length(object.reaction(tool).force_N);
+      look(timer.us(TickTimer::end() - before), force_N);
+    }
+    return obstacle;
+  };
+  SoftRow row{.test_case = "relax",
+              .voxels = lattice->voxel_count(),
+              .material = layered ? "tight, layers" : "tight",
+              .depth_spacings = depth,
+              .slack = kSlack};
+  double reference_N = 0.0, us = 0.0, reached_us = 0.0;
+  std::optional<double> at_asked_N;
+  std::string obstacle = pressed(true, [&](double, double force_N) { reference_N = force_N; });
+  if (obstacle.empty()) {
+    obstacle = pressed(false, [&](double tick_us, double force_N) {
+      us += tick_us;
+      if (std::fabs(force_N - reference_N) > kConverged * reference_N) reached_us = us;
+      if (us <= kAsked_us) at_asked_N = force_N;
+    });
+  }
+  if (!obstacle.empty() || !(reference_N > 0.0)) {
+    row.note = obstacle.empty() ? "nothing pressed back at rest" : obstacle;
+    return {row, 0.0};
+  }
+  row.reference = kWideReference;
+  if (reached_us < us) {
+    row.time_us = Percentiles{reached_us, reached_us, reached_us, reached_us};
+    row.note = fmt::format("until within 1 % of {:.4f} N", reference_N);
+  } else {
+    row.note = fmt::format("not within 1 % of {:.4f} N after {:.0f} ms", reference_N, 1e-3 * us);
+  }
+  if (at_asked_N) say_error_when_asked(row, *at_asked_N, reference_N);
+  return {row, reference_N};
+}
+
+// Its relaxation never ends (Fig 22); what it costs to go round once.
+SoftRow classic_row(int edge) {
+  const TickTimer timer;
+  const voxel::LabelVolume volume = cube(edge);
+  voxel::LatticeOptions options;
+  options.anchor_faces = {"-z"};
+  voxel::ClassicObject object(volume, options);
+  const auto source = object.at(edge / 2, edge / 2, edge - 1);
+  const glm::vec3 move(0.0F, 0.0F, static_cast<float>(-kDepth * kSpacing));
+  object.move({&source, 1}, {&move, 1});
+  std::vector<double> us;
+  for (int n = 0; n < 5; ++n) {
+    const std::uint64_t before = TickTimer::begin();
+    object.relax_all();
+    us.push_back(timer.us(TickTimer::end() - before));
+  }
+  SoftRow row{.test_case = "relax",
+              .engine = SoftEngine::classic,
+              .voxels = volume.voxel_count(),
+              .material = "homogeneous",
+              .depth_spacings = kDepth};
+  row.repeats = us.size();
+  row.time_us = percentiles(us);
+  row.ns_per_voxel_update = 1e3 * row.time_us->p50 / static_cast<double>(row.voxels);
+  row.bytes_per_voxel = static_cast<double>(object.memory_bytes()) / static_cast<double>(row.voxels);
+  row.note = "one round; it has no end";
+  return row;
+}
+
+}  // namespace
+
+void bench_relaxation(const SoftBenchOptions& options, const std::vector<SoftEngine>& engines,
+                      const AddRow& add) {
+  const int edge = options.quick ? 40 : 100;
+  for (const SoftEngine engine : engines) {
+    if (engine == SoftEngine::classic) {
+      add(classic_row(edge));
+      continue;
+    }
+    add(tight_row(edge, false).row);
+    const TightRow layered = tight_row(edge, true);
+    add(layered.row);
+    for (const Limits& limits : all_limits()) {
+      if (limits.slack > 0.0 && limits.slack * (edge - 1) < kDepth) continue;  // the chain ends sooner
+      if (options.progress)
+        options.progress(fmt::format("relaxation of {0} voxels an edge, {1}", edge, limits.name));
+      std::optional<double> at_rest_N;
+      if (limits.slack == kTightSlack && layered.reference_N > 0.0) at_rest_N = layered.reference_N;
+      add(relax_row(edge, limits, at_rest_N));
+    }
+  }
+}
+
+}  // namespace hybrid::bench

@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Cubes of tissue, from the scene to the first touch, and pressed by a vigorous hand.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+#include "hybrid/bench/soft.h"
+#include "hybrid/session/session.h"
+
+namespace hybrid::bench {
+namespace {
+
+constexpr double kSpacing = 1e-3, kSlack = 0.1, kSpeed = 0.5, kToolRadius = 8.0 * kSpacing;
+constexpr double kMostDepth = 20.0;  // (unit: spacing)
+constexpr int kSamples = 100;  // of the force's error, fewer where tissue is pressed for part of the time
+
+// At slack 0.1 a push reaches ten times as far as it is deep, and no chain is longer than the cube: less deep
+// into the small ones, so that it is the tissue and not its anchor that is felt.
+double depth_for(int edge) {
+  return std::min(kMostDepth, edge / 16.0);
+}
+
+// A cube of `edge` voxels, its top pressed again and again at 0.5 m/s, a little elsewhere each time. How far
+// the tool goes up and aside is in proportion to how deep it presses, so that it is in contact for as much of
+// the time in cubes of all sizes: medians would tell that, not the size.
+Scene cube_scene(int edge, double seconds) {
+  Scene scene;
+  scene.file = fmt::format("cube of {} voxels an edge", edge);
+  scene.tool.radius_m = kToolRadius;
+  scene.device_model = device::DeviceModel::ideal;
+  scene.max_force_given = true;
+  scene.safety = {.max_force_N = 1e6, .max_slew_N_per_s = 1e12, .soft_start_s = 0.0};
+  scene.materials["tissue"] = {
+      .stretch_min = 1.0 - kSlack, .stretch_max = 1.0 + kSlack, .shear = kSlack, .place = {}};
+  voxel::Formula cube{.size_m = glm::dvec3(edge * kSpacing),
+                      .spacing_m = glm::dvec3(kSpacing),
+                      .layers = {},
+                      .inclusions = {}};
+  scene.soft.push_back({.name = "cube",
+                        .source = std::move(cube),
+                        .pose = {},
+                        .materials = {},
+                        .material = "tissue",
+                        .anchors = {},
+                        .place = {},
+                        .source_place = {}});
+  const double top = 0.5 * edge * kSpacing + kToolRadius, depth = depth_for(edge) * kSpacing;
+  const double above = top + 0.25 * depth, low = top - depth, aside = 0.5 * depth;
+  device::WaypointPath path{.points = {}, .speed_m_per_s = kSpeed};
+  const std::array<glm::dvec2, 4> places{glm::dvec2(0.0), glm::dvec2(aside, 0.0), glm::dvec2(aside, aside),
+                                         glm::dvec2(-aside, 0.5 * aside)};
+  double way = 0.0;
+  for (std::size_t n = 0; way < seconds * kSpeed || n < 2; ++n) {
+    const glm::dvec2 at = places[n % places.size()], next = places[(n + 1) % places.size()];
+    path.points.push_back({{at, above}, 0.0});
+    path.points.push_back({{at, low}, 0.0});
+    path.points.push_back({{at, above}, 0.0});
+    way += 2.0 * (above - low) + glm::length(next - at);
+  }
+  scene.path = std::move(path);
+  return scene;
+}
+
+SoftRow row_of(const char* name, int edge) {
+  return {.test_case = name,
+          .voxels = static_cast<std::size_t>(edge) * static_cast<std::size_t>(edge) *
+                    static_cast<std::size_t>(edge),
+          .material = "homogeneous",
+          .slack = kSlack};
+}
+
+std::size_t soft_bytes(const WorldState& state) {
+  std::size_t bytes = 0;
+  for (const auto& object : state.soft) bytes += object->memory_bytes();
+  return bytes;
+}
+
+SoftRow session_row(int edge, const Scene& scene, BuiltScene& built, const SoftBenchOptions& options) {
+  SoftRow row = row_of("session", edge);
+  row.depth_spacings = depth_for(edge);
+  const SessionResult result = run_session(scene, built,
+                                           {.seconds = options.session_s,
+                                            .keep_rows = false,
+                                            .keep_recording = false,
+                                            .reference_samples = options.quick ? 6 : kSamples,
+                                            .progress = {},
+                                            .relax_apart = true});
+  row.repeats = result.ticks;
+  row.time_us = result.tick_us.percentiles();
+  row.truncated_share = static_cast<double>(built.state->truncated_ticks) /
+                        static_cast<double>(std::max<std::uint64_t>(1, result.ticks));
+  if (result.error.samples > 0) {
+    row.force_error_N = result.error.p99_N;
+    row.force_error_jnd = result.error.p99_jnd;
+    row.reference = "the equilibrium lattice with its limits";
+  }
+  row.bytes_per_voxel = static_cast<double>(soft_bytes(*built.state)) / static_cast<double>(row.voxels);
+  row.note =
+      fmt::format("ticks; error's p99 of {}, at most {:.2f} JND", result.error.samples, result.error.max_jnd);
+  return row;
+}
+
+}  // namespace
+
+void bench_sessions(const SoftBenchOptions& options, bool sessions, bool loads, const AddRow& add) {
+  std::vector<int> sizes = options.sizes;
+  if (sizes.empty()) sizes = options.quick ? std::vector{32} : std::vector{64, 128};
+  for (const int edge : sizes) {
+    if (options.progress) options.progress(fmt::format("a session with {} voxels an edge", edge));
+    const Scene scene = cube_scene(edge, options.session_s);
+    SoftRow load = row_of("load", edge);
+    BuiltScene built;
+    try {
+      built = build_scene(scene);
+    } catch (const SceneError& refused) {
+      load.note = refused.what();
+      if (loads) add(std::move(load));
+      continue;
+    }
+    const double us = 1e6 * built.seconds;
+    load.time_us = Percentiles{us, us, us, us};
+    load.bytes_per_voxel = static_cast<double>(soft_bytes(*built.state)) / static_cast<double>(load.voxels);
+    load.note = "from the scene to ready";
+    if (loads) add(std::move(load));
+    if (sessions) add(session_row(edge, scene, built, options));
+  }
+}
+
+}  // namespace hybrid::bench

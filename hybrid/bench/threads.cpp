@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/bench/threads.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <atomic>
+#include <cstring>
+#include <memory>
+#include <thread>
+
+#include "device/loop/servo_timer.h"
+#include "hybrid/base/flush_to_zero.h"
+#include "hybrid/snapshot/fill_snapshot.h"
+#include "hybrid/session/session.h"
+
+namespace hybrid::bench {
+namespace {
+
+constexpr std::size_t kHogged = std::size_t{128} << 20U;  // bytes, of each of two
+constexpr std::size_t kPiece = std::size_t{1} << 20U;     // copied between two looks at what else there is
+constexpr double kAsOftenAsItCan_hz = 1e6;
+
+// Copies memory until it is told to stop; `meanwhile` is called every 0.1 ms or so.
+template <class Meanwhile>
+void hog_memory(const std::atomic<bool>& stop, const Meanwhile& meanwhile) {
+  take_ordinary_priority();
+  std::vector<char> a(kHogged, 1), b(kHogged, 2);
+  for (std::size_t at = 0; !stop.load(std::memory_order_relaxed);
+       at = at + kPiece == kHogged ? 0 : at + kPiece) {
+    if (at == 0) a.swap(b);
+    std::memcpy(a.data() + at, b.data() + at, kPiece);
+    meanwhile();
+  }
+}
+
+// Runs `load` beside `work`, and stops it.
+template <class Load, class Work>
+void beside(const Load& load, const Work& work) {
+  std::atomic<bool> stop{false};
+  std::thread thread([&] { load(stop); });
+  try {
+    work();
+  } catch (...) {
+    stop = true;
+    thread.join();
+    throw;
+  }
+  stop = true;
+  thread.join();
+}
+
+// Another session of the scene, as fast as it goes, its surfaces taken after each tick.
+void relax_and_snap(const Scene& scene, BuiltScene& built, const std::atomic<bool>& stop) {
+  take_ordinary_priority();
+  flush_denormals();
+  relax_apart(*built.state, Arrival::counted);
+  Snapshot snapshot;
+  while (!stop.load(std::memory_order_relaxed)) {
+    const auto device = scene_device(scene, scene_path(scene));
+    begin_session(scene, *built.world, *built.state, device->read().position_m);
+    const double dt_s = 1.0 / scene.rate_hz;
+    const double length_s = scene_path(scene)->duration_s();
+    for (double t = 0.0; t < length_s && !stop.load(std::memory_order_relaxed); t += dt_s) {
+      const TickResult felt = haptic_tick(*built.world, *built.state, device->read(), dt_s);
+      device->write(felt.force_N, dt_s);
+      fill_moved(*built.world, *built.state, snapshot);
+    }
+  }
+}
+
+// Of one scene.
+class Bench {
+ public:
+  Bench(const Scene& scene, const std::string& name) : scene_(scene) {
+    const std::array loads{"relaxation", "memory", "nothing relaxed"};
+    for (std::size_t n = 0; n < rows_.size(); ++n) {
+      rows_[n].scene = name;
+      rows_[n].load = loads[n];
+      rows_[n].same_ticks = n < 2;
+    }
+  }
+
+  // A path's length under each load, so that what else the machine does comes to all.
+  template <class Say>
+  void turn(const Say& say) {
+    say(rows_[0].load, seconds_[0]);
+    const SessionResult felt = run_relaxing();
+    say("finding what is handed out", seconds_[0]);
+    ResultTape tape = taped(felt);
+    say(rows_[1].load, seconds_[1]);
+    play(felt, tape);
+    say(rows_[2].load, seconds_[2]);
+    run_without_relaxation();
+  }
+  [[nodiscard]] double seconds() const { return seconds_[0]; }
+
+  [[nodiscard]] std::array<ThreadsRow, 3> rows() {
+    for (std::size_t n = 0; n < rows_.size(); ++n) {
+      rows_[n].tick_us = times_[n].percentiles();
+      rows_[n].relaxation_share = n == 0 ? relaxation_s_ / seconds_[0] : 0.0;
+    }
+    for (ThreadsRow& row : rows_) {
+      row.p99_ratio = row.tick_us.p99 / rows_[1].tick_us.p99;
+      row.p999_ratio = row.tick_us.p999 / rows_[1].tick_us.p999;
+    }
+    return rows_;
+  }
+
+ private:
+  SessionResult run(BuiltScene& built, bool relaxes) {
+    SessionOptions options;
+    options.realtime = options.relax_apart = true;
+    options.keep_rows = false;
+    options.keep_recording = options.relaxation_thread = relaxes;
+    options.surfaces_hz = kAsOftenAsItCan_hz;
+    return run_session(scene_, built, options);
+  }
+  void add(std::size_t n, const SessionResult& result) {
+    rows_[n].ticks += result.ticks;
+    rows_[n].late_ticks += result.deadline_misses;
+    rows_[n].results += result.relaxed_apart;
+    seconds_[n] += static_cast<double>(result.ticks) * result.dt_s;
+    times_[n].add(result.tick_us);
+  }
+
+  SessionResult run_relaxing() {
+    BuiltScene built = build_scene(scene_), other = build_scene(scene_);
+    SessionResult result;
+    beside([&](const std::atomic<bool>& stop) { relax_and_snap(scene_, other, stop); },
+           [&] { result = run(built, true); });
+    add(0, result);
+    relaxation_s_ += result.relaxation_s;
+    return result;
+  }
+
+  void run_without_relaxation() {
+    BuiltScene built = build_scene(scene_);
+    beside([](const std::atomic<bool>& stop) { hog_memory(stop, [] {}); },
+           [&] { add(2, run(built, false)); });
+  }
+
+  // The session again, as fast as it goes, its results found in the tick and kept.
+  ResultTape taped(const SessionResult& felt) {
+    const FlushedDenormals flushed;
+    BuiltScene built = build_scene(scene_);
+    ResultTape tape(built.state->soft.size());
+    begin_session(scene_, *built.world, *built.state, felt.start_m);
+    relax_apart(*built.state, Arrival::recorded);
+    for (const RecordedTick& tick : felt.recording) {
+      tick_again(built, tick);
+      tape.keep(built.state->apart);
+    }
+    return tape;
+  }
+
+  // And in real time, its results handed out.
+  void play(const SessionResult& felt, ResultTape& tape) {
+    const FlushedDenormals flushed;
+    BuiltScene built = build_scene(scene_);
+    begin_session(scene_, *built.world, *built.state, felt.start_m);
+    relax_apart(*built.state, Arrival::played);
+    Apart& apart = built.state->apart;
+    beside([&](const std::atomic<bool>& stop) { hog_memory(stop, [&] { tape.hand_out(apart); }); },
+           [&] {
+             SessionResult played;
+             played.dt_s = felt.dt_s;
+             device::ServoTimer timer(felt.dt_s);
+             timer.raise_priority();
+             std::uint64_t hash = kHashBegin;
+             for (const RecordedTick& tick : felt.recording) {
+               timer.wait();
+               play_again(tick, *built.state);
+               while (!ResultTape::ready(apart)) std::this_thread::yield();
+               const TickResult again = tick_again(built, tick);
+               hash = hash_tick(hash, again);
+               played.tick_us.add(again.tick_us);
+               ++played.ticks;
+             }
+             played.deadline_misses = timer.missed();
+             played.relaxed_apart = apart.results;
+             rows_[1].same_ticks = rows_[1].same_ticks && hash == felt.recording.back().hash;
+             add(1, played);
+           });
+  }
+
+  TickResult tick_again(BuiltScene& built, const RecordedTick& tick) const {
+    play_again(tick, *built.state);
+    return haptic_tick(*built.world, *built.state, {.position_m = tick.device_m, .fault = tick.fault},
+                       1.0 / scene_.rate_hz);
+  }
+
+  const Scene& scene_;
+  std::array<ThreadsRow, 3> rows_;
+  std::array<TimeSpread, 3> times_;
+  std::array<double, 3> seconds_{};
+  double relaxation_s_ = 0.0;
+};
+
+}  // namespace
+
+std::vector<ThreadsRow> bench_threads(const ThreadsBenchOptions& options) {
+  std::vector<ThreadsRow> rows;
+  for (const auto& file : options.scenes) {
+    const Scene scene = load_scene(file);
+    const std::string name =
+        file.filename() == "scene.toml" ? file.parent_path().filename().string() : file.stem().string();
+    Bench bench(scene, name);
+    while (bench.seconds() < options.seconds) {
+      bench.turn([&](const std::string& load, double seconds) {
+        if (options.progress)
+          options.progress(fmt::format("{}, {}: {:.0f} of {:.0f} s", name, load, seconds, options.seconds));
+      });
+    }
+    for (ThreadsRow& row : bench.rows()) rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+std::string threads_table(const std::vector<ThreadsRow>& rows) {
+  std::string text = fmt::format(
+      "{:<16} {:<15} {:>8} {:>7} {:>7} {:>7} {:>8} {:>10} {:>11} {:>6} {:>8} {:>5}\n", "scene", "load",
+      "ticks", "p50", "p99", "p99.9", "max", "p99 ratio", "p99.9 ratio", "late", "results", "same");
+  for (const ThreadsRow& r : rows) {
+    text += fmt::format(
+        "{:<16} {:<15} {:>8} {:>7.0f} {:>7.0f} {:>7.0f} {:>8.0f} {:>10.2f} {:>11.2f} {:>6} {:>8} {:>5}\n",
+        r.scene, r.load, r.ticks, r.tick_us.p50, r.tick_us.p99, r.tick_us.p999, r.tick_us.max, r.p99_ratio,
+        r.p999_ratio, r.late_ticks, r.results, r.same_ticks ? "yes" : "no");
+  }
+  return text;
+}
+
+nlohmann::ordered_json to_json(const ThreadsRow& row) {
+  return {{"scene", row.scene},
+          {"load", row.load},
+          {"ticks", row.ticks},
+          {"late_ticks", row.late_ticks},
+          {"results", row.results},
+          {"tick_us",
+           {{"p50", row.tick_us.p50},
+            {"p99", row.tick_us.p99},
+            {"p999", row.tick_us.p999},
+            {"max", row.tick_us.max}}},
+          {"p99_ratio", row.p99_ratio},
+          {"p999_ratio", row.p999_ratio},
+          {"relaxation_share", row.relaxation_share},
+          {"same_ticks", row.same_ticks}};
+}
+
+}  // namespace hybrid::bench

@@ -1,0 +1,412 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/build/build_world.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/vector_relational.hpp>
+
+#include "hybrid/tick/tissue/obstacles_and_pairs.h"
+#include "hybrid/tick/bodies/body_collisions.h"
+#include "hybrid/tick/bodies/bodies_press_tissue.h"
+#include "hybrid/build/build_objects.h"
+#include "hybrid/build/remove_overlap.h"
+#include "hybrid/geometry/surface_nets.h"
+#include "hybrid/base/process_memory.h"
+#include "hybrid/scene/read_feel.h"
+#include "hybrid/session/session.h"
+#include "hybrid/tick/tissue/press_tissue.h"
+#include "hybrid/build/thin_object.h"
+
+namespace hybrid {
+namespace {
+
+constexpr int kSurfaceSmoothing = 6;  // of a soft object's drawn surface
+// Cells along the scene's longest side, at most, unless the scene says otherwise: 64 bricks however they lie.
+constexpr double kMostCells = 504.0;
+constexpr double kRigidCells = 200.0;      // where nothing is soft: finer cells name no fewer objects
+constexpr std::size_t kMapReserve = 2048;  // bricks that motion may add
+
+struct Box {
+  glm::dvec3 low{1e300}, high{-1e300};
+  void add(const glm::dvec3& p) {
+    low = glm::min(low, p);
+    high = glm::max(high, p);
+  }
+};
+
+[[noreturn]] void refuse(const Scene& scene, SourcePlace place, const std::string& text) {
+  throw SceneError(scene.file, place, text);
+}
+
+// Runs a step whose exceptions are about what stands at `place` in the scene file.
+template <class Step>
+auto at_place(const Scene& scene, SourcePlace place, const std::string& name, Step&& step) {
+  try {
+    return step();
+  } catch (const SceneError&) {
+    throw;
+  } catch (const std::bad_alloc&) {
+    refuse(scene, place,
+           fmt::format("\"{}\" does not fit in memory; give it a coarser spacing or a smaller part", name));
+  } catch (const std::exception& e) {
+    refuse(scene, place, fmt::format("\"{}\": {}", name, e.what()));
+  }
+}
+
+double choose_cell(const Scene& scene, const Box& box, double soft_spacing) {
+  const glm::dvec3 size = box.high - box.low;
+  const double longest = std::max({size.x, size.y, size.z});
+  if (scene.occupancy_cell_m) {
+    // A flat sheet's worth of cells on each side is what surfaces take, a brick of 2.6 kB each in the worst
+    // case.
+    const double across = longest / *scene.occupancy_cell_m;
+    const double bytes = 6.0 * across * across / 64.0 * 2600.0;
+    if (bytes > 0.25 * static_cast<double>(usable_memory_bytes())) {
+      refuse(scene, scene.occupancy_place,
+             fmt::format("an occupancy cell of {:.3g} m over a scene of {:.3g} m needs about {:.1f} GB; "
+                         "use a larger [occupancy] cell or leave it out",
+                         *scene.occupancy_cell_m, longest, bytes / 1e9));
+    }
+    return *scene.occupancy_cell_m;
+  }
+  return soft_spacing > 0.0 ? std::max(soft_spacing, longest / kMostCells)
+                            : rigid_cell_m(longest, scene.tool.radius_m);
+}
+
+class Builder {
+ public:
+  Builder(const Scene& scene, const Progress& progress) : scene_(scene), progress_(progress) {}
+
+  BuiltScene build() {
+    const auto start = std::chrono::steady_clock::now();
+    if (scene_.tool.shape == Tool::Shape::punch && !scene_.rigid.empty()) {
+      refuse(scene_, scene_.rigid.front().place,
+             "a punch against rigid objects is not supported yet; use [tool] shape = \"ball\"");
+    }
+    for (const ModelNote& note : scene_.model_notes)
+      built_.notes.push_back({note.object, polygon::Severity::info, note.text});
+    for (const RigidDescription& d : scene_.rigid) add_rigid(d);
+    for (const SoftDescription& d : scene_.soft) read_soft(d);
+    settle_overlaps();
+    make_lattices();
+    fill_map();
+    finish_world();
+    for (std::size_t o = 0; o < built_.state->soft.size() && !world_->rigid.empty(); ++o) {
+      const std::size_t near = find_obstacles(*world_, *built_.state, o);
+      if (near == 0) continue;
+      built_.notes.push_back(
+          {world_->soft[o].name, polygon::Severity::info,
+           fmt::format("{} surface voxels lie near rigid objects, which will stop them", near)});
+    }
+    use_grids();
+    watch_bodies(*world_, *built_.state);
+    built_.world = std::move(world_);
+    give_back_freed_memory();
+    built_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    built_.held_bytes = held_memory_bytes();
+    built_.peak_bytes = peak_memory_bytes();
+    return std::move(built_);
+  }
+
+ private:
+  void say(const std::string& text) const {
+    if (progress_) progress_(text);
+  }
+
+  // What tissue has to leave the way of must have an inside.
+  void refuse_sheet_beside_soft(const RigidDescription& d, const RigidObject& object) const {
+    if (scene_.soft.empty() || !object.motion.moves() || object.surface->solid()) return;
+    refuse(scene_, d.motion_place,
+           fmt::format("\"{}\" moves and is an open sheet, and such rigid objects beside soft ones are not "
+                       "supported yet; close it, remove its motion, or the [[soft]] objects",
+                       d.name));
+  }
+
+  // Objects that meet nothing but the tool may have their contacts on a composite grid: where nothing moves,
+  // and nothing else comes nearer to one than a part of its size.
+  void use_grids() {
+    constexpr double kApart = 0.25;
+    const bool moves = std::any_of(world_->rigid.begin(), world_->rigid.end(),
+                                   [](const RigidObject& object) { return object.motion.moves(); });
+    std::vector<Box> boxes;
+    for (const RigidObject& object : world_->rigid) {
+      boxes.emplace_back();
+      for (const glm::dvec3& v : object.drawn->vertices) boxes.back().add(object.to_scene(v));
+    }
+    const std::size_t rigid = boxes.size();
+    for (std::size_t o = 0; o < world_->soft.size(); ++o) {
+      boxes.emplace_back();
+      const voxel::Lattice& lattice = built_.state->soft[o]->lattice();
+      const auto& dims = lattice.grid().dims;
+      for (int corner = 0; corner < 8; ++corner) {
+        const glm::dvec3 at(corner & 1 ? dims[0] : -1, corner & 2 ? dims[1] : -1, corner & 4 ? dims[2] : -1);
+        boxes.back().add(world_->soft[o].to_scene(at * lattice.spacing_m()));
+      }
+    }
+    for (std::size_t o = 0; o < world_->soft.size(); ++o) {
+      const Box& own = boxes[rigid + o];
+      const glm::dvec3 size = own.high - own.low;
+      const double apart = kApart * std::max({size.x, size.y, size.z});
+      const bool alone = !moves && std::none_of(boxes.begin(), boxes.end(), [&](const Box& other) {
+        return &other != &own && glm::all(glm::lessThan(other.low, own.high + apart)) &&
+               glm::all(glm::lessThan(own.low - apart, other.high));
+      });
+      voxel::SoftObject& object = *built_.state->soft[o];
+      if (object.lattice().voxel_count() < voxel::SoftObject::kLeastOnGrid) continue;
+      const voxel::ToolInBody tool = tool_in_body(*world_, world_->soft[o], glm::dvec3(0.0));
+      const std::string obstacle = alone ? object.use_composite_grid(tool) : "other objects may meet it";
+      built_.notes.push_back(
+          {world_->soft[o].name, polygon::Severity::info,
+           obstacle.empty()
+               ? std::string(
+                     "contacts are kept on a composite grid: a tick takes the same time for any depth "
+                     "and size")
+               : fmt::format("contacts are kept voxel by voxel, not on a composite grid: {}", obstacle)});
+    }
+  }
+
+  void add_rigid(const RigidDescription& d) {
+    say(fmt::format("reading rigid \"{}\"", d.name));
+    at_place(scene_, d.source_place, d.name, [&] { world_->rigid.push_back(build_rigid(d, built_.notes)); });
+    RigidObject& object = world_->rigid.back();
+    at_place(scene_, d.motion_place, d.name, [&] { object.motion = build_motion(d, object); });
+    refuse_sheet_beside_soft(d, object);
+    at_place(scene_, d.feel.texture ? d.feel.texture->place : d.place, d.name,
+             [&] { object.feel = build_feel(d.feel); });
+    for (const glm::dvec3& v : object.drawn->vertices) box_.add(object.to_scene(v));
+  }
+
+  void read_soft(const SoftDescription& d) {
+    say(fmt::format("reading soft \"{}\"", d.name));
+    at_place(scene_, d.source_place, d.name, [&] {
+      volumes_.push_back(build_volume(d, built_.notes));
+      const std::uint64_t bytes = soft_load_bytes(volumes_.back().dims);
+      if (bytes > usable_memory_bytes()) {
+        throw std::runtime_error(
+            fmt::format("a lattice of {} x {} x {} voxels needs about {:.1f} GB and this machine has "
+                        "{:.1f} GB; give it a coarser spacing",
+                        volumes_.back().dims[0], volumes_.back().dims[1], volumes_.back().dims[2],
+                        static_cast<double>(bytes) / 1e9, static_cast<double>(usable_memory_bytes()) / 1e9));
+      }
+    });
+  }
+
+  void settle_overlaps() {
+    anchored_.resize(volumes_.size());
+    for (std::size_t o = 0; o < volumes_.size(); ++o) {
+      const SoftDescription& d = scene_.soft[o];
+      std::size_t carved = 0;
+      if (!world_->rigid.empty()) {
+        say(fmt::format("looking where \"{}\" meets rigid objects", d.name));
+        carved = carve_by_rigid(world_->rigid, volumes_[o], d.anchors.rigid_within_m, anchored_[o]);
+        note_carved(d, carved, "rigid objects");
+      }
+      for (std::size_t later = o + 1; later < volumes_.size(); ++later) {
+        const std::size_t by_soft = carve_by_soft(volumes_[o], volumes_[later]);
+        note_carved(d, by_soft, "\"" + scene_.soft[later].name + "\"");
+        carved += by_soft;
+      }
+      const auto& labels = volumes_[o].labels;
+      const bool nothing = std::all_of(labels.begin(), labels.end(), [](auto label) { return label == 0; });
+      if (carved > 0 && nothing) {
+        refuse(
+            scene_, d.place,
+            fmt::format("nothing is left of \"{}\": other objects lie in all of its {} voxels, and carve it; "
+                        "move one of them",
+                        d.name, carved));
+      }
+    }
+  }
+
+  void note_carved(const SoftDescription& d, std::size_t carved, const std::string& by) {
+    if (carved == 0) return;
+    if (scene_.overlap == Overlap::refuse) {
+      refuse(scene_, d.place,
+             fmt::format("\"{}\" overlaps {} in {} voxels; move one of them, or say overlap = \"carve\"",
+                         d.name, by, carved));
+    }
+    built_.notes.push_back(
+        {d.name, polygon::Severity::info, fmt::format("{} voxels carved where {} lie", carved, by)});
+  }
+
+  void make_lattices() {
+    for (std::size_t o = 0; o < volumes_.size(); ++o) {
+      const SoftDescription& d = scene_.soft[o];
+      say(fmt::format("building the lattice of \"{}\"", d.name));
+      at_place(scene_, d.source_place, d.name, [&] {
+        voxel::LatticeOptions options = lattice_options(scene_, d);
+        options.anchor_voxels = anchored_[o];
+        SoftBody body{.name = d.name,
+                      .pose = {volumes_[o].origin_m, volumes_[o].rotation},
+                      .budget = d.budget,
+                      .drawn = {}};
+        body.drawn = surface_from_labels(volumes_[o], kSurfaceSmoothing);  // before the inside is thinned
+        if (d.thinning) thin_object(scene_, d, volumes_[o], options, body, built_.notes);
+        // The lattice has what it needs, and the volume's memory goes as that comes.
+        soft_.push_back(std::make_unique<voxel::SoftObject>(
+            std::make_unique<voxel::Lattice>(std::move(volumes_[o]), options)));
+        volumes_[o] = {};
+        note_memory(d, soft_.back()->lattice());
+        for (const glm::dvec3& v : body.drawn.vertices) box_.add(body.to_scene(v));
+        world_->soft.push_back(std::move(body));
+      });
+    }
+  }
+
+  // A scene that fits as long as only some of it is touched is no mistake.
+  void note_memory(const SoftDescription& d, const voxel::Lattice& lattice) {
+    const std::uint64_t bytes = soft_touched_bytes(lattice), usable = usable_memory_bytes();
+    if (bytes <= usable) return;
+    built_.notes.push_back(
+        {d.name, polygon::Severity::warning,
+         fmt::format("touched everywhere it would take about {:.1f} GB, and this machine has {:.1f} GB; keep "
+                     "the tool to a part of it, or give it a coarser spacing",
+                     static_cast<double>(bytes) / 1e9, static_cast<double>(usable) / 1e9)});
+  }
+
+  void fill_map() {
+    say("filling the occupancy map");
+    double spacing = 0.0;
+    for (const auto& object : soft_) {
+      const double h = object->lattice().min_spacing_m();
+      spacing = spacing == 0.0 ? h : std::min(spacing, h);
+    }
+    const glm::dvec3 middle = 0.5 * (box_.low + box_.high);
+    map_ = std::make_unique<OccupancyMap>(choose_cell(scene_, box_, spacing), middle);
+    for (std::uint32_t o = 0; o < world_->rigid.size(); ++o) put_rigid_in_map(o);
+    for (std::size_t o = 0; o < soft_.size(); ++o) {
+      SoftBody& body = world_->soft[o];
+      const auto surface = soft_[o]->lattice().surface();
+      body.first_number = map_->add_soft(static_cast<std::uint32_t>(surface.size()));
+      for (std::uint32_t s = 0; s < surface.size(); ++s) {
+        map_->place(body.first_number + s, body.to_scene(soft_[o]->position(surface[s])));
+      }
+    }
+    map_->reserve_bricks(soft_.empty() ? 0 : kMapReserve);
+  }
+
+  void put_rigid_in_map(std::uint32_t o) {
+    const RigidObject& object = world_->rigid[o];
+    const double margin = map_margin_m(scene_.rigid[o]);
+    const auto corner = [&object](const polygon::TriangleIndices& t, std::size_t c) {
+      return object.drawn->vertices[t[c]];
+    };
+    if (!object.motion.moves()) {
+      for (const polygon::TriangleIndices& t : object.drawn->triangles) {
+        map_->add_triangle(o, object.to_scene(corner(t, 0)), object.to_scene(corner(t, 1)),
+                           object.to_scene(corner(t, 2)), margin);
+      }
+      return;
+    }
+    const auto cells = std::make_shared<SurfaceCells>(
+        map_->cell_m(), 0.5 * (object.surface->lower() + object.surface->upper()));
+    for (const polygon::TriangleIndices& t : object.drawn->triangles)
+      cells->add_triangle(1, corner(t, 0), corner(t, 1), corner(t, 2), margin);
+    cells->seal();
+    map_->add_moving(o, cells, object.pose.position_m, object.pose.rotation);
+  }
+
+  void add_meetings() {
+    const auto spacing = [this](std::uint32_t o) { return soft_[o]->lattice().min_spacing_m(); };
+    for (std::uint32_t a = 0; a < soft_.size(); ++a) {
+      for (std::uint32_t b = a + 1; b < soft_.size(); ++b) {
+        if (spacing(a) < spacing(b)) {
+          world_->meeting.push_back({a, b});
+        } else {
+          world_->meeting.push_back({b, a});
+        }
+      }
+    }
+  }
+  void finish_world() {
+    world_->tool = scene_.tool;
+    world_->set_scale(box_.low, box_.high);
+    world_->limits = scene_.safety;
+    if (!scene_.max_force_given) {
+      const double most = scene_limits(scene_).max_force_N;
+      if (most > 0.0 && std::isfinite(most)) world_->limits.max_force_N = most;
+    }
+    world_->encoder_m = scene_limits(scene_).resolution_m;
+    world_->limits.deadline_s = scene_.deadline_periods / scene_.rate_hz;
+    // What is where its path is, whatever the force, takes no energy.
+    const bool ideal = is_ideal(scene_);
+    if (ideal && !scene_.max_energy_given)
+      world_->limits.max_energy_J = std::numeric_limits<double>::infinity();
+    if (scene_.passivity && !ideal) world_->passivity = passivity_options();
+    add_meetings();
+    for (RigidObject& object : world_->rigid) object.presses_tissue = object.motion.moves() && !soft_.empty();
+    add_surface_points();
+    built_.state = std::make_unique<WorldState>(*world_, std::move(*map_));
+    built_.state->soft = std::move(soft_);
+    built_.state->prepare(*world_);
+    prepare_collisions(*world_, *built_.state);
+    watch_collisions(*world_, *built_.state);
+    note_overlapping_bodies();
+  }
+
+  void note_overlapping_bodies() {
+    for (const PairOfBodies& pair : built_.state->collisions.pairs) {
+      const double deep_m = overlap_m(pair);
+      if (deep_m <= pair.skin_m) continue;
+      built_.notes.push_back(
+          {world_->rigid[pair.free].name, polygon::Severity::warning,
+           fmt::format("begins {:.3g} mm deep in \"{}\", and comes out of it by {:.2g} mm a tick; "
+                       "move one of them if that is not meant",
+                       1e3 * deep_m, world_->rigid[pair.other].name, 1e3 * pair.skin_m)});
+    }
+  }
+  void add_surface_points() {
+    const auto free = [](const RigidObject& object) {
+      return object.motion.kind() == RigidMotion::Kind::free;
+    };
+    if (world_->rigid.size() < 2 || std::none_of(world_->rigid.begin(), world_->rigid.end(), free)) return;
+    for (std::size_t o = 0; o < world_->rigid.size(); ++o)
+      world_->rigid[o].points = surface_points(scene_.rigid[o].source, *world_->rigid[o].drawn);
+  }
+
+  [[nodiscard]] device::PassivityOptions passivity_options() const {
+    return {.resolution_m = world_->encoder_m, .jnd_share = kJndShare, .jnd_floor_N = jnd_floor_N(scene_)};
+  }
+
+  const Scene& scene_;
+  const Progress& progress_;
+  BuiltScene built_;
+  std::unique_ptr<World> world_ = std::make_unique<World>();
+  std::vector<voxel::LabelVolume> volumes_;
+  std::vector<std::vector<std::size_t>> anchored_;
+  std::vector<std::unique_ptr<voxel::SoftObject>> soft_;
+  std::unique_ptr<OccupancyMap> map_;
+  Box box_;
+};
+
+}  // namespace
+
+double rigid_cell_m(double longest_m, double tool_radius_m) {
+  return std::max(0.5 * tool_radius_m, longest_m / kRigidCells);
+}
+
+BuiltScene build_scene(const Scene& scene, const Progress& progress) {
+  return Builder(scene, progress).build();
+}
+
+ObjectBox object_box(const World& world, std::size_t object) {
+  const std::size_t rigid = world.rigid.size();
+  const polygon::TriangleMesh& mesh =
+      object < rigid ? *world.rigid[object].drawn : world.soft[object - rigid].drawn;
+  Box box;
+  for (const glm::dvec3& v : mesh.vertices) {
+    box.add(object < rigid ? world.rigid[object].to_scene(v) : world.soft[object - rigid].to_scene(v));
+  }
+  return {box.low, box.high};
+}
+
+std::string in_words(const ObjectBox& box) {
+  return fmt::format("x {:.4g} to {:.4g}, y {:.4g} to {:.4g}, z {:.4g} to {:.4g} mm", 1e3 * box.low.x,
+                     1e3 * box.high.x, 1e3 * box.low.y, 1e3 * box.high.y, 1e3 * box.low.z, 1e3 * box.high.z);
+}
+
+}  // namespace hybrid

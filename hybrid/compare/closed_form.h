@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Closed forms of what a tool feels, in series with the coupling: the references of compare and of tests.
+#pragma once
+
+#include <glm/vec3.hpp>
+#include <optional>
+#include <string>
+
+#include "hybrid/scene/scene.h"
+
+namespace hybrid {
+
+// Depth of the device point in a shape grown by the tool's radius, and the way out. Negative: outside.
+struct Depth {
+  double depth_m = 0.0;
+  glm::dvec3 out{0.0, 0.0, 1.0};  // unit, scene frame
+};
+
+// A shape that has a closed form, from a description; empty where none does. `young_Pa` 0: rigid.
+struct ClosedForm {
+  enum class Shape : std::uint8_t { ball, box } shape = Shape::ball;
+  Pose pose;
+  glm::dvec3 half_size_m{0.0};  // of the box; x: radius of the ball
+  double young_Pa = 0.0, poisson = 0.3;
+  std::string caveat;  // what it leaves out
+};
+std::optional<ClosedForm> closed_form_of(const RigidDescription& rigid);
+std::optional<ClosedForm> closed_form_of(const Scene& scene, const SoftDescription& soft);
+
+Depth depth_in(const ClosedForm& form, const Tool& tool, const glm::dvec3& device_m);
+
+// Force on the hand at a device depth. Rigid: K·d. Ball tool on tissue: Hertz, F = 4/3·E*·√R·δ^1.5 with 1/R =
+// 1/R_tool + 1/R_object; flat punch: F = 2·a·E*·δ; both in series with the coupling, so δ solves K(d − δ) =
+// F(δ).
+double force_at(const ClosedForm& form, const Tool& tool, double depth_m);
+const char* law_of(const ClosedForm& form, const Tool& tool);
+
+}  // namespace hybrid

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/compose/tissue_table.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+
+namespace hybrid {
+namespace {
+
+constexpr std::string_view kArda = "shear-wave elastography, Arda et al. 2011, AJR 197:532";
+constexpr std::string_view kLim =
+    "shear modulus 0.64 kPa of the stomach, Lim et al. 2009, Surg Endosc 23:1298";
+
+constexpr Tissue bone(std::string_view name, std::string_view patterns) {
+  return {name, patterns, true, 0.0, 0.0, true, "rigid"};
+}
+
+constexpr std::array kTissues{
+    // clang-format off
+    // Before the bones, whose patterns would take them.
+    Tissue{"cartilage", "*cartilage* *menisc* *disc *intervertebral*", false, 7.0e5, 0.10, true,
+           "human femoral condyle, aggregate modulus 0.70 MPa, Athanasiou et al. 1991, J Orthop Res 9:330"},
+    Tissue{"spinal cord", "*spinal_cord* *spinal?cord* *medulla_spinalis*", false, 2.5e3, 0.45, false,
+           "as the brain's"},
+    bone("rib", "rib rib_* ribs* *_rib *_rib_* *_ribs"),
+    bone("vertebra", "vertebra* *_vertebra* *vertebrae"),
+    bone("sacrum", "sacrum* *coccyx*"),
+    bone("hip", "hip hip_* *_hip *pelvic_bone* *ilium* *ischium*"),
+    bone("femur", "femur* *_femur*"),
+    bone("humerus", "humerus* *_humerus*"),
+    bone("scapula", "scapula* *_scapula*"),
+    bone("clavicle", "clavicula* *_clavicula* clavicle* *_clavicle*"),
+    bone("sternum", "sternum*"),
+    bone("skull", "skull* *_skull* *cranium* *mandible* *maxilla*"),
+    bone("bone", "*bone* *tibia* *fibula* *patella* *radius* *ulna* *carpal* *tarsal* *phalan* *teeth* *tooth*"),
+    // Before the organs that they are named for.
+    Tissue{"vessel", "*aorta* *artery* *arteri* *vein* *vena* *cava* *vessel* *trunk*", false, 1.0e5, 0.45, false,
+           "a wall around blood: order of the aorta's pressure-strain modulus, 100 kPa"},
+    Tissue{"liver", "*liver* *hepat*", false, 5.5e3, 0.45, true,
+           "healthy adults, transient elastography, Roulot et al. 2008, J Hepatol 48:606"},
+    Tissue{"spleen", "*spleen* *splen*", false, 2.9e3, 0.45, true, kArda},
+    Tissue{"kidney", "*kidney* *renal_cortex*", false, 5.0e3, 0.45, true, kArda},
+    Tissue{"pancreas", "*pancreas*", false, 4.8e3, 0.45, true, kArda},
+    Tissue{"thyroid", "*thyroid*", false, 1.1e4, 0.45, true, kArda},
+    Tissue{"gland", "*adrenal* *gland* *prostate* *thymus*", false, 5.0e3, 0.45, false,
+           "no figure found; as the kidney's"},
+    Tissue{"stomach", "*stomach*", false, 1.9e3, 0.45, true, kLim},
+    Tissue{"bowel", "*bowel* *colon* *duodenum* *intestin* *rectum* *esophagus* *oesophagus*", false, 1.9e3, 0.45,
+           false, "as the stomach's"},
+    Tissue{"bladder", "*bladder*", false, 1.9e3, 0.45, false, "a wall around fluid; as the stomach's"},
+    Tissue{"lung", "*lung*", false, 1.0e3, 0.43, true,
+           "inflated dog lobes, E = 2 P by indentation, at P = 0.5 kPa, Lai-Fook et al. 1976, J Appl Physiol 40:508"},
+    Tissue{"airway", "*trachea* *bronch*", false, 1.0e5, 0.30, false, "no figure for a filled label; between vessel and cartilage"},
+    Tissue{"heart", "*heart* *atri* *ventricle_of_heart* *myocard*", false, 1.3e4, 0.45, true,
+           "diastolic myocardium, shear modulus 4.5 kPa (2.6 to 6.1 with age), Villemain et al. 2019, JACC Cardiovasc Imaging 12:1135"},
+    Tissue{"muscle", "*muscle* *muscul* *gluteus* *autochthon* *psoas* *erector* *quadriceps* *biceps* *rectus* "
+           "*oblique*", false, 1.11e4, 0.45, true, kArda},
+    Tissue{"skin", "*skin* *dermis* *cutis", false, 1.0e5, 0.45, true,
+           "forearm, optical coherence elastography, Liang & Boppart 2010, IEEE Trans Biomed Eng 57:953"},
+    Tissue{"fat", "*fat *fat_* *adipos* *subcutaneous*", false, 3.25e3, 0.45, true,
+           "breast fat, Samani et al. 2007, Phys Med Biol 52:1565"},
+    Tissue{"brain", "*brain* *cerebr* *cerebell* *cortex* *gyrus* *thalam* *white_matter* *grey_matter* *gray_matter*",
+           false, 2.5e3, 0.45, true, "shear modulus 0.84 kPa, Miller & Chinzei 2002, J Biomech 35:483"},
+    // clang-format on
+};
+
+constexpr Tissue kUnknown{
+    "tissue", "", false, 5.0e3, 0.45, false, "not in the table: 5 kPa, the middle of the organs that are"};
+
+char lower(char c) {
+  return static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+}
+
+}  // namespace
+
+std::span<const Tissue> tissue_table() {
+  return kTissues;
+}
+
+const Tissue& unknown_tissue() {
+  return kUnknown;
+}
+
+bool fits_pattern(std::string_view name, std::string_view pattern) {
+  // Where a star's share of the name turns out too short, it takes one character more: only the last star
+  // has to be tried again, so this takes at most the product of the lengths.
+  std::size_t n = 0, p = 0, star = std::string_view::npos, retry = 0;
+  while (n < name.size()) {
+    if (p < pattern.size() && pattern[p] == '*') {
+      star = p++;
+      retry = n;
+    } else if (p < pattern.size() && (pattern[p] == '?' || lower(pattern[p]) == lower(name[n]))) {
+      ++p;
+      ++n;
+    } else if (star != std::string_view::npos) {
+      p = star + 1;
+      n = ++retry;
+    } else {
+      return false;
+    }
+  }
+  while (p < pattern.size() && pattern[p] == '*') ++p;
+  return p == pattern.size();
+}
+
+const Tissue* find_tissue(std::string_view label_name) {
+  std::string name(label_name);
+  std::replace(name.begin(), name.end(), ' ', '_');
+  for (const Tissue& tissue : kTissues) {
+    std::string_view rest = tissue.patterns;
+    while (!rest.empty()) {
+      const std::size_t end = std::min(rest.find(' '), rest.size());
+      const std::string_view pattern = rest.substr(0, end);
+      if (!pattern.empty() && fits_pattern(name, pattern)) return &tissue;
+      rest.remove_prefix(std::min(end + 1, rest.size()));
+    }
+  }
+  return nullptr;
+}
+
+}  // namespace hybrid

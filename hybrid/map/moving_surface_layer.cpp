@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/map/moving_surface_layer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <utility>
+
+namespace hybrid {
+namespace {
+
+constexpr double kFarthestDistrict = 1e9;
+
+bool finite(const glm::dvec3& v) noexcept {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+double largest(const glm::dvec3& v) noexcept {
+  return std::max({std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)});
+}
+
+// How far a box of half sizes `half` reaches along each axis of another frame.
+glm::dvec3 reach(const glm::dmat3& m, const glm::dvec3& half) noexcept {
+  return glm::abs(m[0]) * half.x + glm::abs(m[1]) * half.y + glm::abs(m[2]) * half.z;
+}
+
+}  // namespace
+
+void MovingCells::add(std::uint32_t object, std::uint64_t object_bit,
+                      std::shared_ptr<const SurfaceCells> cells, const glm::dvec3& position,
+                      const glm::dquat& rotation) {
+  if (cells == nullptr || cells->empty()) return;
+  Body body;
+  body.bit = object_bit;
+  body.cells = cells.get();
+  body.object = object;
+  body.middle_in_body = 0.5 * (cells->low() + cells->high());
+  // No body is smaller than a cell, so that districts are not either.
+  body.radius_m = 0.5 * glm::length(cells->high() - cells->low()) + cells->cell_m();
+  body.owner = std::move(cells);
+  set_pose(body, position, rotation);
+  if (object >= body_of_object_.size()) body_of_object_.resize(object + 1, kNone);
+  body_of_object_[object] = static_cast<std::uint32_t>(bodies_.size());
+  district_m_ = std::max(district_m_, 2.0 * body.radius_m);
+  bodies_.push_back(std::move(body));
+  list_everything();
+}
+
+void MovingCells::set_pose(Body& body, const glm::dvec3& position, const glm::dquat& rotation) noexcept {
+  const glm::dmat3 to_scene = glm::mat3_cast(rotation);
+  body.to_body = glm::transpose(to_scene);
+  body.position = position;
+  const glm::dvec3 middle = position + to_scene * body.middle_in_body;
+  // Rounding of the position, of turning, and of a rotation that is a unit to the last bits only.
+  body.slack_m =
+      1e-9 * body.cells->cell_m() + 1e-15 * (largest(position) + largest(middle)) + 1e-14 * body.radius_m;
+  const glm::dvec3 half =
+      reach(to_scene, 0.5 * (body.cells->high() - body.cells->low())) + 2.0 * body.slack_m;
+  body.low = middle - half;
+  body.high = middle + half;
+}
+
+CellCoordinates MovingCells::district_of(const glm::dvec3& p) const noexcept {
+  CellCoordinates c{};
+  for (std::size_t d = 0; d < 3; ++d) {
+    const double x =
+        std::max(-kFarthestDistrict, std::min(p[static_cast<int>(d)] / district_m_, kFarthestDistrict));
+    c[d] = static_cast<std::int32_t>(std::floor(x));
+  }
+  return c;
+}
+
+CellRange MovingCells::districts_of(const Body& body) const noexcept {
+  // By the ball about the body and not by its box, so that turning on the spot changes none.
+  const glm::dvec3 middle = 0.5 * (body.low + body.high), ball(body.radius_m * (1.0 - 1e-12));
+  return {district_of(middle - ball), district_of(middle + ball)};
+}
+
+std::size_t MovingCells::bucket_of(const CellCoordinates& district) const noexcept {
+  std::uint64_t h = static_cast<std::uint32_t>(district[0]) * 0x9E3779B97F4A7C15ULL ^
+                    static_cast<std::uint32_t>(district[1]) * 0xC2B2AE3D27D4EB4FULL ^
+                    static_cast<std::uint32_t>(district[2]) * 0x165667B19E3779F9ULL;
+  h ^= h >> 29;
+  h *= 0xBF58476D1CE4E5B9ULL;
+  return static_cast<std::size_t>(h >> 32) & (buckets_.size() - 1);
+}
+
+void MovingCells::list_everything() {
+  std::size_t buckets = 16;
+  while (buckets < kSlots * bodies_.size()) buckets *= 2;
+  buckets_.assign(buckets, kNone);
+  nodes_.assign(kSlots * bodies_.size(), Node{});
+  for (std::uint32_t b = 0; b < bodies_.size(); ++b) relist(b);
+  changes_ = 0;
+}
+
+void MovingCells::list(std::uint32_t node, const CellCoordinates& district) noexcept {
+  std::uint32_t& head = buckets_[bucket_of(district)];
+  nodes_[node] = {district, head, true};
+  head = node;
+}
+
+void MovingCells::unlist(std::uint32_t node) noexcept {
+  std::uint32_t* link = &buckets_[bucket_of(nodes_[node].district)];
+  while (*link != node) link = &nodes_[*link].next;
+  *link = nodes_[node].next;
+  nodes_[node].listed = false;
+}
+
+void MovingCells::relist(std::uint32_t body) noexcept {
+  const CellRange now = districts_of(bodies_[body]);
+  bodies_[body].districts = now;
+  for (std::uint32_t slot = 0; slot < kSlots; ++slot) {
+    // Of two neighbours along an axis one is even: the district of the range that belongs in this slot, if
+    // any.
+    CellCoordinates district = now.low;
+    bool wanted = true;
+    for (std::size_t d = 0; d < 3; ++d) {
+      if ((static_cast<std::uint32_t>(district[d]) & 1U) != ((slot >> d) & 1U)) ++district[d];
+      wanted = wanted && district[d] <= now.high[d];
+    }
+    const auto node = static_cast<std::uint32_t>(kSlots * body + slot);
+    if (nodes_[node].listed == wanted && (!wanted || nodes_[node].district == district)) continue;
+    if (nodes_[node].listed) unlist(node);
+    if (wanted) list(node, district);
+    ++changes_;
+  }
+}
+
+void MovingCells::move(std::uint32_t object, const glm::dvec3& position,
+                       const glm::dquat& rotation) noexcept {
+  if (object >= body_of_object_.size() || body_of_object_[object] == kNone) return;
+  const bool usable = finite(position) && std::isfinite(rotation.w) && std::isfinite(rotation.x) &&
+                      std::isfinite(rotation.y) && std::isfinite(rotation.z);
+  if (!usable) return;
+  Body& body = bodies_[body_of_object_[object]];
+  set_pose(body, position, rotation);
+  const CellRange now = districts_of(body);
+  if (now.low != body.districts.low || now.high != body.districts.high) relist(body_of_object_[object]);
+}
+
+bool MovingCells::turned(const Body& body, const glm::dvec3& low, const glm::dvec3& high,
+                         glm::dvec3& low_in_body, glm::dvec3& high_in_body) noexcept {
+  const bool apart = !(low.x <= body.high.x && high.x >= body.low.x && low.y <= body.high.y &&
+                       high.y >= body.low.y && low.z <= body.high.z && high.z >= body.low.z);
+  if (apart) return false;
+  const glm::dvec3 centre = body.to_body * (0.5 * (low + high) - body.position);
+  const glm::dvec3 half = reach(body.to_body, 0.5 * (high - low)) * (1.0 + 1e-12) + body.slack_m;
+  low_in_body = centre - half;
+  high_in_body = centre + half;
+  return true;
+}
+
+template <class Visit>
+void MovingCells::each(const glm::dvec3& low, const glm::dvec3& high, Visit&& visit) const noexcept {
+  if (bodies_.empty()) return;
+  CellCoordinates a{}, b{};
+  bool all = bodies_.size() <= kFew;
+  if (!all) {
+    a = district_of(low);
+    b = district_of(high);
+    for (std::size_t d = 0; d < 3; ++d) all = all || b[d] - a[d] > 1;
+  }
+  if (all) {
+    for (const Body& body : bodies_) {
+      if (!visit(body)) return;
+    }
+    return;
+  }
+  CellCoordinates c{};
+  for (c[2] = a[2]; c[2] <= b[2]; ++c[2]) {
+    for (c[1] = a[1]; c[1] <= b[1]; ++c[1]) {
+      for (c[0] = a[0]; c[0] <= b[0]; ++c[0]) {
+        for (std::uint32_t n = buckets_[bucket_of(c)]; n != kNone; n = nodes_[n].next) {
+          if (nodes_[n].district == c && !visit(bodies_[n / kSlots])) return;
+        }
+      }
+    }
+  }
+}
+
+bool MovingCells::any_near(const glm::dvec3& low, const glm::dvec3& high) const noexcept {
+  bool any = false;
+  each(low, high, [&](const Body& body) {
+    glm::dvec3 l, h;
+    any = turned(body, low, high, l, h) && body.cells->any_near(l, h);
+    return !any;
+  });
+  return any;
+}
+
+std::uint64_t MovingCells::objects_in(const glm::dvec3& low, const glm::dvec3& high) const noexcept {
+  std::uint64_t objects = 0;
+  each(low, high, [&](const Body& body) {
+    glm::dvec3 l, h;
+    if ((objects & body.bit) != 0 || !turned(body, low, high, l, h)) return true;
+    if (body.cells->objects_in(l, h) != 0) objects |= body.bit;
+    return true;
+  });
+  return objects;
+}
+
+std::size_t MovingCells::occupied_cells() const noexcept {
+  std::size_t cells = 0;
+  for (const Body& body : bodies_) cells += body.cells->occupied_cells();
+  return cells;
+}
+
+std::size_t MovingCells::memory_bytes() const noexcept {
+  std::size_t bytes = bodies_.capacity() * sizeof(Body) + nodes_.capacity() * sizeof(Node) +
+                      (body_of_object_.capacity() + buckets_.capacity()) * sizeof(std::uint32_t);
+  for (const Body& body : bodies_) bytes += body.cells->memory_bytes();
+  return bytes;
+}
+
+bool MovingCells::validate() const {
+  std::size_t listed = 0, wanted = 0;
+  for (std::size_t bucket = 0; bucket < buckets_.size(); ++bucket) {
+    for (std::uint32_t n = buckets_[bucket]; n != kNone; n = nodes_[n].next) {
+      const CellRange range = districts_of(bodies_[n / kSlots]);
+      if (!nodes_[n].listed || bucket_of(nodes_[n].district) != bucket || ++listed > nodes_.size())
+        return false;
+      for (std::size_t d = 0; d < 3; ++d) {
+        if (nodes_[n].district[d] < range.low[d] || nodes_[n].district[d] > range.high[d]) return false;
+      }
+    }
+  }
+  for (const Body& body : bodies_) {
+    const CellRange range = districts_of(body);
+    std::size_t districts = 1;
+    for (std::size_t d = 0; d < 3; ++d)
+      districts *= static_cast<std::size_t>(range.high[d] - range.low[d] + 1);
+    if (districts > kSlots) return false;
+    wanted += districts;
+  }
+  return listed == wanted;
+}
+
+}  // namespace hybrid

@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <stdexcept>
+
+#include "hybrid/bench/occupancy.h"
+#include "hybrid/bench/rigid.h"
+#include "hybrid/bench/soft.h"
+#include "hybrid/bench/threads.h"
+#include "hybrid/program/commands.h"
+#include "hybrid/bench/occupancy_plot.h"
+#include "hybrid/session/report.h"
+#include "hybrid/bench/convergence_plot.h"
+
+namespace hybrid {
+namespace {
+
+constexpr int kSettlingRounds = 60;  // of the plot
+
+std::vector<bench::Engine> engines_of(const std::vector<std::string>& names) {
+  std::vector<bench::Engine> engines;
+  for (const bench::Engine engine : bench::kEngines) {
+    if (std::find(names.begin(), names.end(), bench::engine_name(engine)) != names.end())
+      engines.push_back(engine);
+  }
+  return engines;
+}
+
+// The product's own figures at a glance.
+std::string summary(const std::vector<bench::RigidRow>& rows) {
+  std::size_t runs = 0, inside = 0, pops = 0, lost = 0;
+  double worst = 0.0;
+  for (const bench::RigidRow& row : rows) {
+    if (row.engine != bench::Engine::hybrid) continue;
+    ++runs;
+    inside += row.judged.inside_ticks;
+    pops += row.judged.pop_throughs;
+    lost += row.judged.lost_ticks;
+    if (row.judged.error_mesh_max) worst = std::max(worst, *row.judged.error_mesh_max / row.scale);
+  }
+  if (runs == 0) return {};
+  return fmt::format(
+      "hybrid, {} runs: {} ticks inside, {} times popped through; error against the mesh at most {:.3g} um "
+      "(of a scene of size 1), {} ticks without an optimum nearby\n",
+      runs, inside, pops, 1e6 * worst, lost);
+}
+
+// What of the user's choice belongs to a suite.
+std::vector<std::string> chosen_of(const std::vector<std::string>& chosen,
+                                   const std::vector<std::string>& suite) {
+  std::vector<std::string> result;
+  for (const std::string& name : chosen) {
+    if (std::find(suite.begin(), suite.end(), name) != suite.end()) result.push_back(name);
+  }
+  return result;
+}
+
+nlohmann::ordered_json rigid_suite(const BenchCommand& command, std::FILE* words) {
+  bench::RigidBenchOptions options{.quick = command.quick,
+                                   .every_tick = command.every_tick,
+                                   .paths = chosen_of(command.only, bench::rigid_paths()),
+                                   .meshes = command.meshes,
+                                   .engines = engines_of(command.engines),
+                                   .trace = command.trace,
+                                   .progress = progress_on_terminal(),
+                                   .on_row = {}};
+  options.on_row = [words](const bench::RigidRow& row) {
+    end_progress();
+    fmt::print(words, "{}", bench::table_line(row));
+    std::fflush(words);
+  };
+  fmt::print(words,
+             "times in us, lengths in um (u) or mm (m), build in ms; 'mesh err' is the distance to the exact "
+             "optimum on the mesh, at so many ticks\n{}",
+             bench::table_head());
+  const std::vector<bench::RigidRow> rows = bench::bench_rigid(options);
+  end_progress();
+  fmt::print(words, "\n{}", summary(rows));
+  if (!rows.empty())
+    fmt::print(words, "an empty measurement shows {:.3f} us, which is in every time above\n",
+               rows.front().timer_overhead_us);
+  if (const std::string ratios = bench::ratio_table(rows); !ratios.empty())
+    fmt::print(words, "\nhybrid's own times, and how many times as long the baselines took:\n{}", ratios);
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (const bench::RigidRow& row : rows) json.push_back(bench::to_json(row));
+  return json;
+}
+
+// The rows, and beside them how work grows.
+nlohmann::ordered_json soft_suite(const BenchCommand& command, std::FILE* words,
+                                  nlohmann::ordered_json& growth) {
+  bench::SoftBenchOptions options{.quick = command.quick,
+                                  .cases = chosen_of(command.only, bench::soft_cases()),
+                                  .engines = {},
+                                  .depths = {},
+                                  .sizes = command.sizes,
+                                  .progress = progress_on_terminal(),
+                                  .on_row = {}};
+  if (command.session_s) options.session_s = *command.session_s;
+  for (const bench::SoftEngine engine : bench::kSoftEngines) {
+    if (!chosen_of(command.engines, {bench::engine_name(engine)}).empty()) options.engines.push_back(engine);
+  }
+  options.on_row = [words](const bench::SoftRow& row) {
+    end_progress();
+    fmt::print(words, "{}", bench::soft_table_line(row));
+    std::fflush(words);
+  };
+  fmt::print(words, "times in us, depth and slack in spacings; 'viol' are links beyond their limits\n{}",
+             bench::soft_table_head());
+  const std::vector<bench::SoftRow> rows = bench::bench_soft(options);
+  end_progress();
+  if (const auto found = bench::growth_of(rows)) {
+    fmt::print(words, "\n{}", bench::in_words(*found));
+    growth = bench::to_json(*found);
+  }
+  if (!command.plot.empty()) {
+    save_settling_plot(command.plot, bench::measure_settling(kSettlingRounds));
+    fmt::print(words, "plot: {}\n", command.plot.string());
+  }
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (const bench::SoftRow& row : rows) json.push_back(bench::to_json(row));
+  return json;
+}
+
+// Each suite's own name for the plot, where several write one.
+std::filesystem::path occupancy_plot(const BenchCommand& command) {
+  if (command.plot.empty() || command.suite != "all") return command.plot;
+  std::filesystem::path plot = command.plot;
+  return plot.replace_filename(plot.stem().string() + "-occupancy" + plot.extension().string());
+}
+
+nlohmann::ordered_json occupancy_suite(const BenchCommand& command, std::FILE* words) {
+  bench::OccupancyBenchOptions options{.quick = command.quick,
+                                       .cases = chosen_of(command.only, bench::occupancy_cases()),
+                                       .engines = {},
+                                       .cells = command.cells,
+                                       .progress = progress_on_terminal(),
+                                       .on_row = {}};
+  for (const bench::OccupancyEngine engine : bench::kOccupancyEngines) {
+    if (!chosen_of(command.engines, {bench::engine_name(engine)}).empty()) options.engines.push_back(engine);
+  }
+  options.on_row = [words](const bench::OccupancyRow& row) {
+    end_progress();
+    fmt::print(words, "{}", bench::occupancy_table_line(row));
+    std::fflush(words);
+  };
+  fmt::print(
+      words,
+      "times in ns (k us, M ms), each the mean over 64 operations, but of brute force's look-ups, of "
+      "rebuilds and of the tree's updates, which are timed alone; 'box' in cells an edge; 'extra' is what "
+      "lies within a cell of the box\n{}",
+      bench::occupancy_table_head());
+  const std::vector<bench::OccupancyRow> rows = bench::bench_occupancy(options);
+  end_progress();
+  fmt::print(words, "\n{}", bench::occupancy_summary(rows));
+  if (const std::filesystem::path plot = occupancy_plot(command); !plot.empty()) {
+    save_occupancy_plot(plot, rows);
+    fmt::print(words, "plot: {}\n", plot.string());
+  }
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (const bench::OccupancyRow& row : rows) json.push_back(bench::to_json(row));
+  return json;
+}
+
+nlohmann::ordered_json threads_suite(const BenchCommand& command, std::FILE* words) {
+  bench::ThreadsBenchOptions options{.scenes = command.scenes, .progress = progress_on_terminal()};
+  if (command.session_s) options.seconds = *command.session_s;
+  const std::vector<bench::ThreadsRow> rows = bench::bench_threads(options);
+  end_progress();
+  fmt::print(words,
+             "the servo thread's own processor time, in us, while the other cores relax and snap, and while "
+             "they copy memory\n{}",
+             bench::threads_table(rows));
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (const bench::ThreadsRow& row : rows) json.push_back(bench::to_json(row));
+  return json;
+}
+
+// A suite is left out of "all" where everything chosen belongs to others.
+bool has_work(const BenchCommand& command, const std::vector<std::string>& cases,
+              const std::vector<std::string>& engines) {
+  return (command.only.empty() || !chosen_of(command.only, cases).empty()) &&
+         (command.engines.empty() || !chosen_of(command.engines, engines).empty());
+}
+
+template <class Engines>
+std::vector<std::string> names_of(const Engines& engines) {
+  std::vector<std::string> names;
+  names.reserve(std::size(engines));
+  for (const auto engine : engines) names.emplace_back(bench::engine_name(engine));
+  return names;
+}
+
+std::string listed(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+}  // namespace
+
+const std::vector<std::string>& bench_suites() {
+  static const std::vector<std::string> kSuites{"rigid", "soft", "occupancy", "threads"};
+  return kSuites;
+}
+std::vector<std::string> bench_parts() {
+  std::vector<std::string> parts = bench::rigid_paths();
+  parts.insert(parts.end(), bench::soft_cases().begin(), bench::soft_cases().end());
+  parts.insert(parts.end(), bench::occupancy_cases().begin(), bench::occupancy_cases().end());
+  return parts;
+}
+std::vector<std::string> bench_engines() {
+  std::vector<std::string> names = names_of(bench::kEngines);
+  for (const auto& more : {names_of(bench::kSoftEngines), names_of(bench::kOccupancyEngines)}) {
+    for (const std::string& name : more) {
+      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+    }
+  }
+  return names;
+}
+std::string bench_mesh_error(const std::string& name) {
+  try {
+    bench::bench_mesh_shape(name);
+    return {};
+  } catch (const std::invalid_argument& e) {
+    return e.what();
+  }
+}
+
+int run_bench(const BenchCommand& command) {
+  std::FILE* words = command.json == "-" ? stderr : stdout;
+  nlohmann::ordered_json report = report_head("bench");
+  report["quick"] = command.quick;
+  report["suites"] = nlohmann::ordered_json::object();
+  const auto runs = [&command](const char* suite) {
+    return command.suite == "all" || command.suite == suite;
+  };
+  bool any = false;
+  if (runs("rigid") && has_work(command, bench::rigid_paths(), names_of(bench::kEngines))) {
+    report["suites"]["rigid"] = rigid_suite(command, words);
+    any = true;
+  }
+  if (runs("soft") && has_work(command, bench::soft_cases(), names_of(bench::kSoftEngines))) {
+    nlohmann::ordered_json growth;
+    report["suites"]["soft"] = soft_suite(command, words, growth);
+    report["growth"] = growth;
+    any = true;
+  }
+  if (runs("occupancy") && has_work(command, bench::occupancy_cases(), names_of(bench::kOccupancyEngines))) {
+    report["suites"]["occupancy"] = occupancy_suite(command, words);
+    any = true;
+  }
+  if (command.suite == "threads" && command.scenes.empty())
+    throw std::invalid_argument("bench threads: no scene; say which, as in --scenes scenes/cube.toml");
+  if (!command.scenes.empty() && runs("threads")) {
+    report["suites"]["threads"] = threads_suite(command, words);
+    any = true;
+  }
+  if (!any) {
+    throw std::invalid_argument(fmt::format(
+        "bench {}: nothing of --only or --engines belongs to it; paths and engines of rigid are {} and {}, "
+        "cases and engines of soft {} and {}, of occupancy {} and {}",
+        command.suite, listed(bench::rigid_paths()), listed(names_of(bench::kEngines)),
+        listed(bench::soft_cases()), listed(names_of(bench::kSoftEngines)), listed(bench::occupancy_cases()),
+        listed(names_of(bench::kOccupancyEngines))));
+  }
+  if (!command.json.empty()) save_json(command.json, report);
+  return 0;
+}
+
+}  // namespace hybrid

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <fmt/format.h>
+
+#include <cstdio>
+
+#include "hybrid/program/commands.h"
+#include "hybrid/compare/compare.h"
+#include "hybrid/plot/session_plot.h"
+#include "hybrid/session/report.h"
+
+namespace hybrid {
+namespace {
+
+nlohmann::ordered_json report(const Scene& scene, const Comparison& comparison) {
+  nlohmann::ordered_json j = report_head("compare");
+  j["scene"] = scene.file.string();
+  j["object"] = comparison.object;
+  if (!comparison.note.empty()) j["note"] = comparison.note;
+  j["jnd"] = {{"share", kJndShare}, {"floor_N", comparison.jnd_floor_N}};
+  j["models"] = nlohmann::ordered_json::array();
+  for (const ModelResult& m : comparison.models) {
+    nlohmann::ordered_json row{{"name", m.name}, {"reference", comparison.reference_text}};
+    row["force_error"] = {{"rms_N", m.rms_N},
+                          {"max_N", m.max_N},
+                          {"jnd_p50", m.jnd_p50},
+                          {"jnd_p99", m.jnd_p99},
+                          {"share_above_1_jnd", m.share_above_1_jnd}};
+    row["direction_error_deg"] = {{"p50", m.direction_p50_deg}, {"p99", m.direction_p99_deg}};
+    row["work_J"] = m.work_J;
+    row["tick_us"] = m.tick_us.max > 0.0 ? to_json(m.tick_us) : nlohmann::ordered_json(nullptr);
+    j["models"].push_back(row);
+  }
+  return j;
+}
+
+void print_models(std::FILE* words, const Comparison& comparison) {
+  fmt::print(words, "errors against: {}; 1 JND = max(7 %, {:.2f} N)\n\n", comparison.reference_text,
+             comparison.jnd_floor_N);
+  if (!comparison.note.empty()) fmt::print(words, "{}\n\n", comparison.note);
+  fmt::print(words, "{:<18} {:>8} {:>8} {:>8} {:>8} {:>7} {:>9} {:>9} {:>9} {:>9} {:>9}\n", "model", "rms N",
+             "max N", "JND p50", "JND p99", ">1 JND", "dir p99", "work J", "p50 us", "p99 us", "max us");
+  for (const ModelResult& m : comparison.models) {
+    fmt::print(words, "{:<18} {:>8.4f} {:>8.4f} {:>8.2f} {:>8.2f} {:>6.1f}% {:>8.2f}° {:>9.2g} ", m.name,
+               m.rms_N, m.max_N, m.jnd_p50, m.jnd_p99, 100.0 * m.share_above_1_jnd, m.direction_p99_deg,
+               m.work_J);
+    if (m.tick_us.max > 0.0) {
+      fmt::print(words, "{:>9.1f} {:>9.1f} {:>9.1f}\n", m.tick_us.p50, m.tick_us.p99, m.tick_us.max);
+    } else {
+      fmt::print(words, "{:>9} {:>9} {:>9}\n", "-", "-", "-");
+    }
+  }
+}
+
+void save_plot(const CompareCommand& command, const Scene& scene, const Comparison& comparison,
+               std::FILE* words) {
+  if (command.plot.empty()) return;
+  std::vector<ComparedModel> models;
+  for (const ModelResult& m : comparison.models) models.push_back({m.name, m.rows, m.depth_m});
+  save_compare_plot(
+      command.plot, models, {},
+      fmt::format("{}: {}", scene.title.empty() ? scene.file.stem().string() : scene.title,
+                  comparison.object),
+      {.reference = comparison.reference, .jnd_share = kJndShare, .jnd_floor_N = comparison.jnd_floor_N});
+  fmt::print(words, "\nplot: {}\n", command.plot.string());
+}
+
+int compare_with_measured(const CompareCommand& command, const Scene& scene) {
+  MeasuredOptions options = command.measured;
+  // The evaluation's files are in millimeters; a CSV without units follows the scene.
+  if (options.measured.file.extension() != ".traj") options.measured.unit_m = scene.unit_m;
+  const MeasuredComparison result = compare_measured(scene, options, progress_on_terminal());
+  end_progress();
+  for (const std::string& note : result.notes) std::fprintf(stderr, "note: %s\n", note.c_str());
+  std::FILE* words = command.json == "-" ? stderr : stdout;
+  const std::string file = options.measured.file.filename().string();
+  fmt::print(words, "{} along {}, {} ticks\n", scene.file.filename().string(),
+             options.along.empty() ? file : options.along.filename().string(), result.samples);
+  print_models(words, result.comparison);
+  fmt::print(words, "\nRMS force error over all ticks, in contact or not: {:.4f} N\n", result.rms_N);
+  if (result.in_gaps > 0)
+    fmt::print(words, "{} ticks lie in gaps of the measurement, and are left out\n", result.in_gaps);
+  save_plot(command, scene, result.comparison, words);
+  if (command.json.empty()) return 0;
+  nlohmann::ordered_json j = report(scene, result.comparison);
+  j["measured"] = {{"file", options.measured.file.string()},
+                   {"along", options.along.empty() ? nlohmann::ordered_json(nullptr)
+                                                   : nlohmann::ordered_json(options.along.string())},
+                   {"rms_N", result.rms_N},
+                   {"ticks", result.samples},
+                   {"ticks_in_gaps", result.in_gaps},
+                   {"notes", result.notes}};
+  save_json(command.json, j);
+  return 0;
+}
+
+}  // namespace
+
+int compare(const CompareCommand& command) {
+  const Scene scene = load_scene(command.scene);
+  if (!command.measured.measured.file.empty()) return compare_with_measured(command, scene);
+  const Comparison comparison = compare_models(scene, command.object, progress_on_terminal());
+  end_progress();
+  std::FILE* words = command.json == "-" ? stderr : stdout;
+  fmt::print(words, "\"{}\" along the path of {}\n", comparison.object, scene.file.filename().string());
+  print_models(words, comparison);
+  save_plot(command, scene, comparison, words);
+  if (!command.json.empty()) save_json(command.json, report(scene, comparison));
+  return 0;
+}
+
+}  // namespace hybrid

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdio>
+
+#include "hybrid/program/commands.h"
+#include "hybrid/session/report.h"
+#include "hybrid/scene/table_reader.h"
+
+namespace hybrid {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::size_t kMostSaid = 24;  // names in a line
+
+// An argument of a command line, as a shell takes it.
+std::string in_shell(const std::string& text) {
+  const bool plain = !text.empty() && text.find_first_not_of(
+                                          "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
+                                          "0123456789_-./+=@%,:") == std::string::npos;
+  if (plain) return text;
+  std::string quoted = "'";
+  for (const char c : text) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return quoted + "'";
+}
+
+void print_table(std::FILE* out, const std::vector<ComposedPart>& rows) {
+  std::size_t width = 4;
+  for (const ComposedPart& row : rows) width = std::max(width, row.name.size());
+  fmt::print(out, "{:<{}}  {:<5} {:>8} {:>9}  {:<21} {:>8} {:>5}  {}\n", "name", width, "as", "voxels",
+             "triangles", "size (mm)", "E (kPa)", "nu", "source");
+  for (const ComposedPart& row : rows) {
+    const glm::dvec3 mm = row.size_m * 1e3;
+    const auto number = [](std::size_t n) { return n == 0 ? std::string("-") : std::to_string(n); };
+    fmt::print(out, "{:<{}}  {:<5} {:>8} {:>9}  {:<21} {:>8} {:>5}  {}\n", row.name, width,
+               row.rigid ? "rigid" : "soft", number(row.voxels), number(row.triangles),
+               fmt::format("{:.4g} x {:.4g} x {:.4g}", mm.x, mm.y, mm.z),
+               row.rigid ? "-" : fmt::format("{:.4g}", row.young_Pa / 1e3),
+               row.rigid ? "-" : fmt::format("{:.2f}", row.poisson), row.source);
+  }
+}
+
+Json report(const Composed& composed) {
+  Json json = report_head("compose");
+  json["scene"] = composed.scene.string();
+  json["objects"] = Json::array();
+  for (const ComposedPart& row : composed.rows) {
+    Json object{{"name", row.name},
+                {"kind", row.rigid ? "rigid" : "soft"},
+                {"voxels", row.voxels},
+                {"triangles", row.triangles},
+                {"size_m", {row.size_m.x, row.size_m.y, row.size_m.z}}};
+    if (!row.rigid)
+      object.update({{"young_Pa", row.young_Pa}, {"poisson", row.poisson}, {"source", row.source}});
+    json["objects"].push_back(object);
+  }
+  json["presses"] = Json::array();
+  for (const Press& press : composed.path.presses)
+    json["presses"].push_back({{"what", press.what}, {"from", press.where}});
+  json["path_s"] = composed.path_s;
+  json["tool_radius_m"] = composed.tool_radius_m;
+  json["notes"] = composed.notes;
+  json["places"] = composed.places;
+  return json;
+}
+
+}  // namespace
+
+int compose(const ComposeCommand& command) {
+  const Composed composed = compose(command.options, progress_on_terminal());
+  end_progress();
+  std::FILE* words = command.json == "-" ? stderr : stdout;
+  for (const std::string& note : composed.notes) fmt::print(stderr, "note: {}\n", note);
+  if (!composed.rows.empty()) print_table(words, composed.rows);
+  if (!composed.places.empty()) fmt::print(words, "\n");
+  for (const std::string& place : composed.places) fmt::print(words, "{}\n", place);
+  if (!composed.path.presses.empty()) {
+    fmt::print(words, "\nthe path presses, with a ball of {:.3g} mm radius:\n", composed.tool_radius_m * 1e3);
+    for (const Press& press : composed.path.presses) fmt::print(words, "  {}, {}\n", press.what, press.where);
+  }
+  const std::vector<std::string>& hidden = composed.path.hidden;
+  if (!hidden.empty()) {
+    const std::size_t said = std::min(hidden.size(), kMostSaid);
+    fmt::print(words, "not pressed, as others lie before it on every side or are easier to reach: {}{}\n",
+               joined(std::vector<std::string_view>(hidden.begin(),
+                                                    hidden.begin() + static_cast<std::ptrdiff_t>(said))),
+               said < hidden.size() ? fmt::format(" and {} more", hidden.size() - said) : "");
+  }
+  const std::string scene = composed.scene.string();
+  fmt::print(words, "\n{}: written; its path takes {:.0f} s\nnext: hybrid run {} --picture {}\n", scene,
+             composed.path_s, in_shell(scene),
+             in_shell((composed.scene.parent_path() / "scene.png").string()));
+  if (!command.json.empty()) save_json(command.json, report(composed));
+  return 0;
+}
+
+}  // namespace hybrid

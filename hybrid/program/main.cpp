@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The `hybrid` program: how its commands and options are spelled. Exit status 0 done, 1 refused input, 2
+// usage.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+
+#include "hybrid/program/commands.h"
+
+namespace {
+
+constexpr const char* kAbout =
+    "Touch scenes of rigid and soft objects through a (simulated) force-feedback device.\n\n"
+    "  hybrid run scenes/head.toml --plot head.svg --picture head.png   feel a scene, see what was felt\n"
+    "  hybrid compare scenes/cube.toml --plot cube.svg                  proxy against voxels, same motion\n"
+    "  hybrid view scenes/head.toml                                     a window; drag the tool with the "
+    "mouse\n"
+    "  hybrid check skull.stl ct.nii.gz my-scene.toml                   what a file is, and what is wrong "
+    "with it\n"
+    "  hybrid compose --labels labels.nii.gz --names labels.csv --out body   a scene from a segmented "
+    "scan\n\n"
+    "A scene is one small text file; scenes/README.md describes its keys.\n"
+    "Exit status: 0 done, 1 input refused (with the place and the remedy), 2 wrong usage.";
+
+void add_device(CLI::App& sub, std::string& device) {
+  sub.add_option("--device", device, "use this one in place of the scene's")
+      ->check(CLI::IsMember({"phantom", "premium-1.5", "touch", "ideal"}));
+}
+
+void add_run(CLI::App& app, int& status) {
+  auto* sub =
+      app.add_subcommand("run", "A haptic session without a display: the scene's path, felt from end to end");
+  auto c = std::make_shared<hybrid::RunCommand>();
+  sub->add_option("SCENE", c->scene, "scene file (.toml)")->required();
+  sub->add_option("--seconds", c->seconds, "length of the session; default: the path and half a second")
+      ->check(CLI::PositiveNumber);
+  sub->add_flag("--realtime", c->realtime, "pace the loop with a real timer at the device's rate");
+  add_device(*sub, c->device);
+  sub->add_option(
+         "--samples", c->samples,
+         "how often the soft force is compared with its equilibrium (slow on large volumes); 0: never")
+      ->check(CLI::Range(0, 1000))
+      ->capture_default_str();
+  sub->add_option("--start-ticks", c->start_ticks,
+                  "begin with all clocks and counters as after so many ticks; nothing felt should differ");
+  sub->add_option(
+         "--relaxation", c->relaxation,
+         "where tissue away from the contact comes to rest: apart from the tick, in real time on a thread of "
+         "its own, or in the tick, by its budget")
+      ->check(CLI::IsMember({"apart", "tick"}))
+      ->capture_default_str();
+  sub->add_option("--trace", c->trace, "write every tick as CSV");
+  sub->add_option("--plot", c->plot, "write force over time with contacts as SVG");
+  sub->add_option("--picture", c->picture, "write a picture of the most telling moment as PNG");
+  sub->add_option("--record", c->record, "write a recording for `hybrid replay`");
+  sub->add_option("--black-box", c->black_box,
+                  "where the 2 s around the first fault go; default in real time: SCENE-fault.csv here");
+  sub->add_option("--save-surface", c->save_surface,
+                  "write all surfaces as they are at the end as one PLY (m, scene frame)");
+  sub->add_option("--save-volume", c->save_volume,
+                  "write each soft object's displacement and moved labels (.nii.gz, .nrrd, .mha)");
+  sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
+  sub->callback([c, &status] { status = hybrid::run(*c); });
+}
+
+void add_replay(CLI::App& app, int& status) {
+  auto* sub = app.add_subcommand(
+      "replay", "The same session again from a recording; says at which tick it parts, if it does");
+  auto c = std::make_shared<hybrid::ReplayCommand>();
+  sub->add_option("RECORDING", c->recording, "file written by `hybrid run --record`")->required();
+  sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
+  sub->callback([c, &status] { status = hybrid::replay(*c); });
+}
+
+void add_check(CLI::App& app, int& status) {
+  auto* sub = app.add_subcommand(
+      "check", "What a scene, mesh or volume is, what is wrong with it, and what it would cost");
+  auto c = std::make_shared<hybrid::CheckCommand>();
+  sub->add_option("FILE", c->files, "scene (.toml), mesh, volume, or folder of a DICOM series")->required();
+  sub->add_flag("--deep", c->deep, "also look for self-intersections (slow on large meshes)");
+  sub->add_flag(
+      "--repair", c->repair,
+      "also say what `repair = true` would do to a mesh, and what is left; the file stays as it is");
+  sub->add_option("--unit", c->unit_m, "length unit of mesh files in meters")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
+  sub->callback([c, &status] { status = hybrid::check(*c); });
+}
+
+void add_compose(CLI::App& app, int& status) {
+  auto* sub = app.add_subcommand(
+      "compose", "Writes a scene that runs: from a segmented volume, from meshes and volumes, or a starter");
+  auto c = std::make_shared<hybrid::ComposeCommand>();
+  hybrid::ComposeOptions& o = c->options;
+  sub->add_option(
+      "INPUT", o.inputs,
+      "meshes (mm), volumes, folders of a DICOM series; with --labels the scan they are of. None: a "
+      "starter scene");
+  sub->add_option("--out", o.out, "folder to write; scene.toml and the files that it reads")->required();
+  auto* labels = sub->add_option("--labels", o.labels, "label volume of a segmentation");
+  sub->add_option("--names", o.names, "of --labels: what they are called (CSV: number, name; or JSON)")
+      ->needs(labels);
+  sub->add_option("--rigid", o.rigid,
+                  "of --labels: names, patterns (rib_*) and numbers, with commas between, that become rigid "
+                  "surfaces; or none. Default: bones, by their names")
+      ->delimiter(',')
+      ->needs(labels);
+  sub->add_option("--soft", o.soft,
+                  "of --labels: those that become tissue; or none. Default: all that is not bone")
+      ->delimiter(',')
+      ->needs(labels);
+  sub->add_option("--place", o.place, "where an input lies: NAME=x,y,z[,rx,ry,rz] (mm, degrees); repeatable")
+      ->take_all();
+  sub->add_option_function<std::vector<double>>(
+         "--range",
+         [c](const std::vector<double>& v) {
+           c->options.range = {v.at(0), v.at(1)};
+         },
+         "intensities LO,HI that are tissue, of a volume without labels; default: above Otsu's threshold")
+      ->delimiter(',')
+      ->expected(2);
+  sub->add_option_function<double>(
+         "--spacing", [c](double mm) { c->options.spacing_m = mm * 1e-3; },
+         "voxel size of tissue in mm; default: the file's, coarser above 1.5 million voxels of tissue")
+      ->check(CLI::PositiveNumber);
+  sub->add_flag("--force", o.force, "write over a scene that is there");
+  sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
+  sub->callback([c, &status] { status = hybrid::compose(*c); });
+}
+
+void add_devices(CLI::App& app, int& status) {
+  auto* sub = app.add_subcommand("devices", "What device is connected, and if none, why");
+  auto c = std::make_shared<hybrid::DevicesCommand>();
+  sub->add_flag("--calibrate", c->calibrate,
+                "calibrate a device that is reset by hand, while you hold its arm");
+  sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
+  sub->callback([c, &status] { status = hybrid::devices(*c); });
+}
+
+void add_compare(CLI::App& app, int& status) {
+  auto* sub = app.add_subcommand(
+      "compare", "One object as mesh and proxy, as voxels, and in closed form, along the same path");
+  auto c = std::make_shared<hybrid::CompareCommand>();
+  sub->add_option("SCENE", c->scene, "scene file (.toml)")->required();
+  sub->add_option("--object", c->object, "name of the object; default: the first");
+  device::MeasuredFile& file = c->measured.measured;
+  auto* measured = sub->add_option(
+      "--measured", file.file, "compare the whole scene with forces measured along a motion (.traj, .csv)");
+  sub->add_option("--along", c->measured.along,
+                  "of --measured: the device's positions, from a file of their own")
+      ->needs(measured);
+  sub->add_option("--columns", file.columns,
+                  "of --measured: its columns, as in t_s,x_mm,y_mm,z_mm,fx_N,fy_N,fz_N")
+      ->needs(measured);
+  sub->add_option("--force", file.force,
+                  "of --measured: which force, by the first part of its columns' names")
+      ->needs(measured);
+  sub->add_option("--rate", file.rate_hz, "of --measured: samples a second, where it has no times")
+      ->check(CLI::PositiveNumber)
+      ->needs(measured);
+  sub->add_flag("--on-object", file.on_object, "of --measured: its forces are those on the object")
+      ->needs(measured);
+  sub->add_option("--plot", c->plot, "write force over time and depth as SVG");
+  sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
+  sub->callback([c, &status] { status = hybrid::compare(*c); });
+}
+
+void add_bench(CLI::App& app, int& status) {
+  auto* sub = app.add_subcommand("bench", "Times and errors beside baselines, over meshes of all sizes");
+  auto c = std::make_shared<hybrid::BenchCommand>();
+  std::vector<std::string> suites = hybrid::bench_suites();
+  suites.emplace_back("all");
+  sub->add_option("SUITE", c->suite, "what to time")->required()->check(CLI::IsMember(suites));
+  sub->add_flag("--quick", c->quick, "a short piece of each path on small meshes; a few seconds");
+  sub->add_flag("--every-tick", c->every_tick, "ask the exact reference at every tick; slow");
+  sub->add_option("--only", c->only, "paths of rigid, cases of soft and occupancy, with commas between")
+      ->delimiter(',')
+      ->check(CLI::IsMember(hybrid::bench_parts()));
+  sub->add_option("--meshes", c->meshes,
+                  "of rigid: meshes, with commas between: ico0 to ico9 (20 x 4^n triangles), geo1 to geo1024 "
+                  "(20 x n^2), cube1 to cube1024, corner1 to corner1024")
+      ->delimiter(',')
+      ->check(CLI::Validator(hybrid::bench_mesh_error, "MESH"));
+  sub->add_option("--sizes", c->sizes, "of soft: voxels an edge of sessions and loads, with commas between")
+      ->delimiter(',')
+      ->check(CLI::Range(16, 1024));
+  sub->add_option("--cells", c->cells, "of occupancy: occupied cells, about, with commas between")
+      ->delimiter(',')
+      ->check(CLI::Range(100, 20'000'000));
+  sub->add_option("--scenes", c->scenes, "of threads: scene files, with commas between")
+      ->delimiter(',')
+      ->check(CLI::ExistingFile);
+  sub->add_option("--seconds", c->session_s,
+                  "of soft: simulated time of a session; of threads: real time of each load (60)")
+      ->check(CLI::Range(0.1, 3600.0));
+  sub->add_option("--engines", c->engines, "engines, with commas between")
+      ->delimiter(',')
+      ->check(CLI::IsMember(hybrid::bench_engines()));
+  sub->add_option("--trace", c->trace, "write every run as CSV into this folder");
+  sub->add_option("--plot", c->plot,
+                  "as SVG: of soft relaxation round by round, classic's and ours; of occupancy look-ups over "
+                  "cells (with all: beside it, NAME-occupancy.svg)");
+  sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
+  sub->callback([c, &status] { status = hybrid::run_bench(*c); });
+}
+
+void add_stability(CLI::App& app, int& status) {
+  auto* sub = app.add_subcommand(
+      "stability", "Up to which stiffness the loop is stable, passive and calm: measured, beside theory");
+  auto c = std::make_shared<hybrid::StabilityCommand>();
+  auto e = std::make_shared<hybrid::ExtremesCommand>();
+  e->table = false;
+  sub->add_option("SCENE", c->scene, "scene file (.toml), such as scenes/wall.toml")->required();
+  sub->add_option("--plot", c->plot, "write stiffness over damping and rate as SVG (rigid scenes)");
+  sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
+  auto* table = sub->add_flag("--extremes", e->table,
+                              "instead: rigid, soft and mixed scenes with every setting taken to its end");
+  sub->add_flag("--quick", e->quick, "of --extremes: a share of the table; a few seconds")->needs(table);
+  auto* ticks =
+      sub->add_option("--fuzz-ticks", e->fuzz_ticks, "instead: so many ticks of random device input");
+  sub->add_option("--seed", e->seed, "of --fuzz-ticks")->needs(ticks)->capture_default_str();
+  sub->add_flag("--apart", e->relax_apart, "with --fuzz-ticks: tissue is relaxed apart from the tick")
+      ->needs(ticks);
+  sub->callback([c, e, &status] {
+    e->scene = c->scene;
+    e->json = c->json;
+    status = e->table || e->fuzz_ticks > 0 ? hybrid::extremes(*e) : hybrid::stability(*c);
+  });
+}
+
+void add_view(CLI::App& app, int& status) {
+  auto* sub = app.add_subcommand(
+      "view", "A window: the simulated hand plays, or the mouse drags the tool (right button)");
+  auto c = std::make_shared<hybrid::ViewCommand>();
+  sub->add_option("SCENE", c->scene, "scene file (.toml)")->required();
+  sub->add_option("--frames", c->frames, "close after this many frames")->check(CLI::PositiveNumber);
+  sub->add_option("--out", c->out, "write each frame as PNG into this folder");
+  add_device(*sub, c->device);
+  sub->add_option("--drag", c->drag, "drag the tool along a CSV (t_s, x_m, y_m, z_m) instead of the mouse");
+  sub->callback([c, &status] { status = hybrid::view(*c); });
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app(kAbout, "hybrid");
+  app.require_subcommand(1);
+  app.set_version_flag("--version", HYBRID_VERSION);
+  int status = 0;
+  add_run(app, status);
+  add_replay(app, status);
+  add_check(app, status);
+  add_compose(app, status);
+  add_devices(app, status);
+  add_compare(app, status);
+  add_bench(app, status);
+  add_stability(app, status);
+  add_view(app, status);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : 2;
+  } catch (const std::bad_alloc&) {
+    hybrid::end_progress();
+    std::fputs("hybrid: out of memory; use a coarser spacing or a smaller part of the data\n", stderr);
+    return 1;
+  } catch (const std::exception& e) {
+    hybrid::end_progress();
+    std::fprintf(stderr, "%s\n", e.what());
+    return 1;
+  }
+  return status;
+}

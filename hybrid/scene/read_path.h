@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The [path] table of a scene file.
+#pragma once
+
+#include "device/paths/path.h"
+#include "hybrid/scene/table_reader.h"
+
+namespace hybrid {
+
+// Checks all but the contents of a CSV file. A path that would take longer than a day is refused.
+device::PathDescription read_path(const TableReader& table);
+
+}  // namespace hybrid

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/session/recording.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+
+#include "hybrid/base/flush_to_zero.h"
+
+namespace hybrid {
+namespace {
+
+// Layout, little-endian: magic, sizes of path and text, tick count, dt, the device's greatest force,
+// resolution and friction, whether soft objects are relaxed apart, state hash, where the device was before
+// the first tick, path, text, ticks of (x, y, z, hash, fault of the device, share of the contact's work,
+// results of relaxation taken).
+constexpr std::array<char, 8> kMagic{'h', 'y', 'b', 'r', 'i', 'd', 'R', '4'};
+struct Header {
+  std::array<char, 8> magic;
+  std::uint64_t path_bytes, text_bytes, ticks;
+  double dt_s, max_force_N, resolution_m, friction_N;
+  std::uint64_t relax_apart, state_hash;
+  std::array<double, 3> start;
+};
+struct Tick {
+  std::array<double, 3> position;
+  std::uint64_t hash;
+  std::uint32_t fault, work_share;
+  std::uint64_t arrived;
+};
+static_assert(sizeof(Header) == 104 && sizeof(Tick) == 48, "the file's layout has no padding");
+
+std::string read_text(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+}  // namespace
+
+void save_recording(const std::filesystem::path& file, const Recording& recording) {
+  std::ofstream out(file, std::ios::binary);
+  const std::string path = recording.scene_file.string();
+  const Header header{kMagic,
+                      path.size(),
+                      recording.scene_text.size(),
+                      recording.ticks.size(),
+                      recording.dt_s,
+                      recording.device.max_force_N,
+                      recording.device.resolution_m,
+                      recording.device.friction_N,
+                      recording.relax_apart ? 1U : 0U,
+                      recording.state_hash,
+                      {recording.start_m.x, recording.start_m.y, recording.start_m.z}};
+  out.write(reinterpret_cast<const char*>(&header), sizeof header);
+  out.write(path.data(), static_cast<std::streamsize>(path.size()));
+  out.write(recording.scene_text.data(), static_cast<std::streamsize>(recording.scene_text.size()));
+  for (const RecordedTick& t : recording.ticks) {
+    const Tick tick{{t.device_m.x, t.device_m.y, t.device_m.z},
+                    t.hash,
+                    static_cast<std::uint32_t>(t.fault),
+                    t.work_share,
+                    t.arrived};
+    out.write(reinterpret_cast<const char*>(&tick), sizeof tick);
+  }
+  out.flush();
+  if (!out)
+    throw std::runtime_error(
+        fmt::format("{}: cannot be written; check the folder and the space left", file.string()));
+}
+
+Recording load_recording(const std::filesystem::path& file) {
+  std::error_code error;
+  const std::uint64_t size = std::filesystem::file_size(file, error);
+  std::ifstream in(file, std::ios::binary);
+  if (error || !in)
+    throw std::runtime_error(
+        fmt::format("{}: cannot be read; give a file written by `hybrid run --record`", file.string()));
+  Header header{};
+  in.read(reinterpret_cast<char*>(&header), sizeof header);
+  if (!in || header.magic != kMagic) {
+    throw std::runtime_error(fmt::format(
+        "{}: not a recording of this version; record the session again with `hybrid run --record`",
+        file.string()));
+  }
+  // Each size is checked alone first, so that their sum cannot wrap.
+  const bool sane =
+      header.path_bytes <= size && header.text_bytes <= size && header.ticks <= size / sizeof(Tick) &&
+      sizeof header + header.path_bytes + header.text_bytes + header.ticks * sizeof(Tick) == size &&
+      header.dt_s > 0.0 && std::isfinite(header.dt_s) && header.max_force_N >= 0.0 &&
+      header.resolution_m >= 0.0 && std::isfinite(header.resolution_m) && header.friction_N >= 0.0 &&
+      std::isfinite(header.friction_N) && header.relax_apart <= 1 &&
+      std::all_of(header.start.begin(), header.start.end(), [](double x) { return std::isfinite(x); });
+  if (!sane)
+    throw std::runtime_error(
+        fmt::format("{}: truncated or damaged ({} bytes); copy it again", file.string(), size));
+  Recording recording;
+  std::string path(header.path_bytes, '\0');
+  recording.scene_text.resize(header.text_bytes);
+  in.read(path.data(), static_cast<std::streamsize>(path.size()));
+  in.read(recording.scene_text.data(), static_cast<std::streamsize>(header.text_bytes));
+  recording.scene_file = path;
+  recording.dt_s = header.dt_s;
+  recording.device.max_force_N = header.max_force_N;
+  recording.device.resolution_m = header.resolution_m;
+  recording.device.friction_N = header.friction_N;
+  recording.relax_apart = header.relax_apart != 0;
+  recording.state_hash = header.state_hash;
+  recording.start_m = {header.start[0], header.start[1], header.start[2]};
+  recording.ticks.resize(header.ticks);
+  for (RecordedTick& t : recording.ticks) {
+    Tick tick{};
+    in.read(reinterpret_cast<char*>(&tick), sizeof tick);
+    t = {{tick.position[0], tick.position[1], tick.position[2]},
+         tick.hash,
+         static_cast<device::DeviceFault>(tick.fault),
+         tick.arrived,
+         static_cast<std::uint8_t>(tick.work_share)};
+  }
+  if (!in) throw std::runtime_error(fmt::format("{}: could not be read to its end", file.string()));
+  return recording;
+}
+
+ReplayResult replay(const Recording& recording, const Progress& progress) {
+  flush_denormals();
+  if (read_text(recording.scene_file) != recording.scene_text) {
+    throw std::runtime_error(
+        fmt::format("{}: the scene is not what was recorded (changed or moved); put the recorded text back, "
+                    "or record again",
+                    recording.scene_file.string()));
+  }
+  Scene scene = load_scene(recording.scene_file);
+  scene.opened_limits = recording.device;  // it may have been felt with one that is not here now
+  if (1.0 / scene.rate_hz != recording.dt_s) scene.rate_hz = 1.0 / recording.dt_s;  // its driver's
+  const BuiltScene built = build_scene(scene, progress);
+  ReplayResult result;
+  result.ticks = recording.ticks.size();
+  result.equal = true;
+  result.parts_at = result.ticks;
+  if (recording.ticks.empty()) return result;
+  begin_session(scene, *built.world, *built.state, recording.start_m);
+  if (recording.relax_apart) relax_apart(*built.state, Arrival::recorded);
+  std::uint64_t hash = kHashBegin;
+  for (std::size_t n = 0; n < recording.ticks.size(); ++n) {
+    const device::DeviceState input{.position_m = recording.ticks[n].device_m,
+                                    .fault = recording.ticks[n].fault};
+    play_again(recording.ticks[n], *built.state);
+    hash = hash_tick(hash, haptic_tick(*built.world, *built.state, input, recording.dt_s));
+    if (hash == recording.ticks[n].hash || !result.equal) continue;
+    result.equal = false;
+    result.parts_at = n;
+  }
+  result.state_hash = hash_state(hash, *built.state);
+  result.equal = result.equal && result.state_hash == recording.state_hash;
+  return result;
+}
+
+}  // namespace hybrid

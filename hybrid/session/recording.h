@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A session on file: the scene's text, every input and a running hash a tick, so that a bug report is a file.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "hybrid/session/session.h"
+
+namespace hybrid {
+
+struct Recording {
+  std::filesystem::path scene_file;  // where the scene was; replay reads it again from there
+  std::string scene_text;            // as it was, so that a changed scene is noticed
+  double dt_s = 1e-3;
+  device::DeviceLimits device{};  // that it was felt with
+  bool relax_apart = false;       // SessionOptions::relax_apart
+  std::uint64_t state_hash = 0;   // after the last tick
+  glm::dvec3 start_m{0.0};        // SessionResult::start_m
+  std::vector<RecordedTick> ticks;
+};
+
+// Both throw std::runtime_error in words: not writable; not a recording, truncated, of another version.
+void save_recording(const std::filesystem::path& file, const Recording& recording);
+Recording load_recording(const std::filesystem::path& file);
+
+struct ReplayResult {
+  std::uint64_t ticks = 0, state_hash = 0;
+  bool equal = false;
+  std::uint64_t parts_at = 0;  // first tick whose hash differs; ticks when only the end does
+};
+
+// The same inputs through a freshly built scene. Throws SceneError, std::runtime_error (scene changed since).
+ReplayResult replay(const Recording& recording, const Progress& progress);
+
+}  // namespace hybrid

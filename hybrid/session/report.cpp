@@ -1,0 +1,299 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/session/report.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <thread>
+
+#include "hybrid/base/process_memory.h"
+
+namespace hybrid {
+namespace {
+
+std::string processor() {
+  std::ifstream in("/proc/cpuinfo");
+  for (std::string line; std::getline(in, line);) {
+    if (line.rfind("model name", 0) == 0 && line.find(':') != std::string::npos)
+      return line.substr(line.find(':') + 2);
+  }
+  return "unknown processor";
+}
+
+struct ObjectRow {
+  std::string name, kind, motion{};  // motion: empty for what stays
+  glm::dvec3 position_m{0.0};        // of what moves, at the end
+  std::size_t triangles = 0, voxels = 0, surface_voxels = 0, memory_bytes = 0;
+  std::uint64_t contact_ticks = 0;
+  double max_force_N = 0.0;
+};
+
+std::vector<ObjectRow> object_rows(const BuiltScene& built, const SessionResult& result) {
+  std::vector<ObjectRow> rows;
+  for (std::size_t o = 0; o < built.world->rigid.size(); ++o) {
+    const RigidObject& object = built.world->rigid[o];
+    const bool free = object.motion.kind() == RigidMotion::Kind::free;
+    rows.push_back({.name = object.name,
+                    .kind = "rigid",
+                    .motion = object.motion.moves() ? (free ? "free" : "path") : "",
+                    .position_m = built.state->rigid[o].pose.position_m,
+                    .triangles = object.drawn->triangles.size(),
+                    .memory_bytes = object.memory_bytes()});
+  }
+  for (std::size_t o = 0; o < built.world->soft.size(); ++o) {
+    const voxel::SoftObject& object = *built.state->soft[o];
+    rows.push_back({.name = built.world->soft[o].name,
+                    .kind = "soft",
+                    .voxels = object.lattice().voxel_count(),
+                    .surface_voxels = object.lattice().surface().size(),
+                    .memory_bytes = object.memory_bytes()});
+  }
+  for (std::size_t o = 0; o < rows.size(); ++o) {
+    rows[o].contact_ticks = result.object_contact_ticks[o];
+    rows[o].max_force_N = result.object_max_force_N[o];
+  }
+  return rows;
+}
+
+// What the controller took away, over the ticks in which there was a force to take from.
+double rms_taken_N(const device::PassivityState& passive) {
+  return passive.felt > 0 ? std::sqrt(passive.taken_sum_N2 / static_cast<double>(passive.felt)) : 0.0;
+}
+
+nlohmann::ordered_json safety_json(const Scene& scene, const BuiltScene& built) {
+  const device::ForceLimitState& limit = built.state->limit;
+  nlohmann::ordered_json j{{"nonfinite", limit.nonfinite}, {"clamped", limit.clamped},
+                           {"slewed", limit.slewed},       {"late", limit.late},
+                           {"lost", limit.lost},           {"energy_limited", limit.energy_limited}};
+  j["passivity"] = nullptr;
+  if (!built.world->passivity) return j;
+  const device::PassivityState& passive = built.state->passive;
+  j["passivity"] = {{"acted_ticks", passive.acted},
+                    {"felt_ticks", passive.felt},
+                    {"taken_rms_N", rms_taken_N(passive)},
+                    {"taken_max_N", passive.most_taken_N},
+                    {"taken_max_jnd", passive.most_taken_jnd},
+                    {"jnd_floor_N", jnd_floor_N(scene)},
+                    {"given_max_J", passive.most_given_J},
+                    {"worst_tick_J", passive.worst_tick_J},
+                    {"jumps", passive.jumps}};
+  return j;
+}
+
+std::string safety_words(const BuiltScene& built) {
+  const device::ForceLimitState& limit = built.state->limit;
+  std::string text;
+  if (limit.late + limit.lost + limit.energy_limited > 0) {
+    text += fmt::format(
+        "the motors were let go: in {} ticks that came too late, {} in which the device was not there, {} "
+        "after more "
+        "than {:.3g} J went to the hand within {:.3g} s\n",
+        limit.late, limit.lost, limit.energy_limited, built.world->limits.max_energy_J,
+        built.world->limits.energy_window_s);
+  }
+  if (!built.world->passivity) return text;
+  const device::PassivityState& passive = built.state->passive;
+  text += fmt::format(
+      "passivity: at most {:.3g} mJ given out beyond what was taken in (one tick's worst: {:.3g} mJ); it "
+      "took force in "
+      "{} of {} ticks, {:.3f} N rms, at most {:.3f} N ({:.2f} JND)\n",
+      1e3 * passive.most_given_J, 1e3 * passive.worst_tick_J, passive.acted, passive.felt,
+      rms_taken_N(passive), passive.most_taken_N, passive.most_taken_jnd);
+  return text;
+}
+
+}  // namespace
+
+nlohmann::ordered_json report_head(const std::string& command) {
+  nlohmann::ordered_json j;
+  j["command"] = command;
+  j["version"] = HYBRID_VERSION;
+  j["machine"] = fmt::format("{}, {} threads", processor(), std::thread::hardware_concurrency());
+  return j;
+}
+
+nlohmann::ordered_json to_json(const Percentiles& p) {
+  return {{"p50", p.p50}, {"p99", p.p99}, {"p999", p.p999}, {"max", p.max}};
+}
+
+nlohmann::ordered_json run_report(const Scene& scene, const BuiltScene& built, SessionResult& result) {
+  nlohmann::ordered_json j = report_head("run");
+  j["scene"] = scene.file.string();
+  j["ticks"] = result.ticks;
+  j["dt_s"] = result.dt_s;
+  j["seconds"] = static_cast<double>(result.ticks) * result.dt_s;
+  j["state_hash"] = fmt::format("{:016x}", result.state_hash);
+  j["nonfinite"] = built.state->nonfinite;
+  j["deadline_misses"] = result.deadline_misses;
+  j["contact_ticks"] = result.contact_ticks;
+  j["tick_us"] = to_json(result.tick_us.percentiles());
+  for (std::size_t s = 0; s < kStages; ++s)
+    j["stage_us"][kStageNames[s]] = to_json(result.stage_us[s].percentiles());
+  j["force_N"] = {{"max", result.max_force_N}, {"rms", result.rms_force_N}};
+  j["objects"] = nlohmann::ordered_json::array();
+  for (const ObjectRow& row : object_rows(built, result)) {
+    nlohmann::ordered_json o{{"name", row.name}, {"kind", row.kind}};
+    if (row.kind == "rigid") {
+      o["triangles"] = row.triangles;
+    } else {
+      o["voxels"] = row.voxels;
+      o["surface_voxels"] = row.surface_voxels;
+    }
+    o["memory_bytes"] = row.memory_bytes;
+    o["contact_ticks"] = row.contact_ticks;
+    o["max_force_N"] = row.max_force_N;
+    if (!row.motion.empty()) {
+      o["motion"] = row.motion;
+      o["position_m"] = {row.position_m.x, row.position_m.y, row.position_m.z};
+    }
+    j["objects"].push_back(o);
+  }
+  j["occupancy"] = {{"cells", built.state->map.occupied_cells()},
+                    {"bytes", built.state->map.memory_bytes()},
+                    {"cell_m", built.state->map.cell_m()}};
+  const bool measured = result.error.samples > 0;
+  const nlohmann::ordered_json none = nullptr;
+  j["budget"] = {{"truncated_ticks", built.state->truncated_ticks},
+                 {"force_error_N", measured ? nlohmann::ordered_json(result.error.max_N) : none},
+                 {"force_error_rms_N", measured ? nlohmann::ordered_json(result.error.rms_N) : none},
+                 {"force_error_jnd", measured ? nlohmann::ordered_json(result.error.max_jnd) : none},
+                 {"samples", result.error.samples},
+                 {"reference",
+                  measured ? "equilibrium lattice with its limits, at the sampled ticks"
+                           : "not measured (no soft contact at a sampled tick, real time, or --samples 0)"}};
+  j["safety"] = safety_json(scene, built);
+  const double seconds = static_cast<double>(result.ticks) * result.dt_s;
+  const auto thread = [&](const char* name, double cpu_s) {
+    return nlohmann::ordered_json{
+        {"name", name}, {"cpu_s", cpu_s}, {"share", seconds > 0.0 ? cpu_s / seconds : 0.0}};
+  };
+  j["threads"] = nlohmann::ordered_json::array({thread("servo", result.servo_s)});
+  if (result.relaxed_apart > 0) j["threads"].push_back(thread("relaxation", result.relaxation_s));
+  j["relaxed_apart"] = result.relaxed_apart;
+  if (!result.realtime_note.empty()) {
+    j["realtime"] = {{"priority", result.realtime_note},
+                     {"late_us", to_json(result.late_us)},
+                     {"least_work_share", result.least_work_share},
+                     {"ticks_with_less_work", result.ticks_with_less_work}};
+  }
+  constexpr std::array kEnds{"finished", "stopped", "lost"};
+  j["device"] = {{"name", result.device_name},
+                 {"end", kEnds[static_cast<std::size_t>(result.end)]},
+                 {"messages", result.device_messages}};
+  j["path_notes"] = result.path_notes;
+  j["faults"] = fault_texts(built.state->faults);
+  j["build_s"] = built.seconds;
+  j["load"] = {{"seconds", built.seconds},
+               {"held_memory_bytes", built.held_bytes},
+               {"peak_memory_bytes", built.peak_bytes}};
+  j["peak_memory_bytes"] = peak_memory_bytes();
+  return j;
+}
+
+std::string run_summary(const BuiltScene& built, SessionResult& result) {
+  const Percentiles tick = result.tick_us.percentiles();
+  std::string text =
+      fmt::format("{} ticks of {:.3g} ms ({:.2f} s), {} in contact; force at most {:.3f} N\n", result.ticks,
+                  result.dt_s * 1e3, static_cast<double>(result.ticks) * result.dt_s, result.contact_ticks,
+                  result.max_force_N);
+  text += fmt::format("tick: p50 {:.1f}, p99 {:.1f}, p99.9 {:.1f}, max {:.1f} us\n", tick.p50, tick.p99,
+                      tick.p999, tick.max);
+  for (const ObjectRow& row : object_rows(built, result)) {
+    text += fmt::format("  {:<16} {:<5} {:>9} {:<9} felt in {} ticks, at most {:.3f} N\n", row.name, row.kind,
+                        row.kind == "rigid" ? row.triangles : row.voxels,
+                        row.kind == "rigid" ? "triangles" : "voxels", row.contact_ticks, row.max_force_N);
+  }
+  if (result.contact_ticks == 0) {
+    text += "nothing was touched: does the [path] lead to an object? They lie in\n";
+    for (std::size_t o = 0; o < built.world->object_count(); ++o) {
+      const std::size_t rigid = built.world->rigid.size();
+      text += fmt::format("  {:<16} {}\n",
+                          o < rigid ? built.world->rigid[o].name : built.world->soft[o - rigid].name,
+                          in_words(object_box(*built.world, o)));
+    }
+  }
+  if (result.error.samples > 0) {
+    text += fmt::format(
+        "force error against the equilibrium lattice at {} sampled ticks: at most {:.4f} N ({:.2f} JND), rms "
+        "{:.4f} N\n",
+        result.error.samples, result.error.max_N, result.error.max_jnd, result.error.rms_N);
+  }
+  if (result.relaxed_apart > 0) {
+    const double seconds = static_cast<double>(result.ticks) * result.dt_s;
+    text += fmt::format(
+        "processor time by thread: servo {:.1f} %, relaxation {:.1f} % of the session's{}; its results were "
+        "taken {} times\n",
+        100.0 * result.servo_s / seconds, 100.0 * result.relaxation_s / seconds,
+        result.realtime_note.empty() ? " (simulated: one core did both in turns)" : "", result.relaxed_apart);
+  }
+  if (!result.realtime_note.empty()) {
+    text += fmt::format(
+        "real time: {}\n  woken late by p50 {:.0f}, p99 {:.0f}, max {:.0f} us; {} deadlines missed\n",
+        result.realtime_note, result.late_us.p50, result.late_us.p99, result.late_us.max,
+        result.deadline_misses);
+    if (result.ticks_with_less_work > 0) {
+      text += fmt::format(
+          "  to be in time on this machine {} ticks did less than all of the contact's work, {:.0f} % at "
+          "least: "
+          "tissue follows the hand some ticks later\n",
+          result.ticks_with_less_work, 100.0 * result.least_work_share);
+    }
+  }
+  text += safety_words(built);
+  for (const std::string& note : result.path_notes) text += fmt::format("path: {}\n", note);
+  for (const std::string& message : result.device_messages) text += fmt::format("device: {}\n", message);
+  for (const std::string& fault : fault_texts(built.state->faults)) text += fmt::format("fault: {}\n", fault);
+  text += fmt::format("state hash {:016x}\n", result.state_hash);
+  return text;
+}
+
+std::vector<std::string> fault_texts(std::uint32_t faults) {
+  std::vector<std::string> texts;
+  const auto say = [&](FaultBit bit, const char* text) {
+    if ((faults & bit) != 0) texts.emplace_back(text);
+  };
+  say(fault_nonfinite_input, "the device gave a position that is not finite; the last good one was held");
+  say(fault_touch_overflow,
+      "more soft voxels near the tool than fit; use a smaller tool or a coarser spacing");
+  say(fault_triangle_overflow,
+      "more triangles near the proxy than fit; repair the mesh (coincident triangles) or coarsen it");
+  say(fault_map_overflow,
+      "the occupancy map had no room for a voxel that moved; use a larger [occupancy] cell");
+  say(fault_pair_overflow, "more soft voxels press on one another than fit; use a coarser spacing");
+  say(fault_nonfinite_body,
+      "a free body was pushed by a force that is not finite, and stood still for that tick");
+  say(fault_body_squeezed,
+      "tissue could not leave the way of a rigid object that moves, for anchors, bone or links at their "
+      "limits, "
+      "and they overlapped; let it press less deep, or let the tissue stretch further");
+  say(fault_body_crowded,
+      "a rigid object that moves came to more soft voxels than a tick looks at, and may have overlapped "
+      "some; "
+      "use a coarser spacing, or a smaller or slower object");
+  say(fault_bodies_overlap,
+      "a free body was squeezed between rigid objects, or began in one, and they overlapped; give it room, "
+      "or "
+      "a path that leaves it some");
+  say(fault_infeasible, "rigid surfaces left the tool no room; use a smaller tool radius");
+  return texts;
+}
+
+void save_json(const std::string& file, const nlohmann::ordered_json& report) {
+  const std::string text = report.dump(2);
+  if (file == "-") {
+    fmt::print("{}\n", text);
+    std::fflush(stdout);
+    return;
+  }
+  std::ofstream out(file);
+  out << text << '\n';
+  out.flush();
+  if (!out)
+    throw std::runtime_error(fmt::format("{}: cannot be written; check the folder and the space left", file));
+}
+
+}  // namespace hybrid

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Reports as JSON (keys are stable, more may be added) and as words.
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "hybrid/session/session.h"
+
+namespace hybrid {
+
+// Starts every report: command, version, machine.
+nlohmann::ordered_json report_head(const std::string& command);
+nlohmann::ordered_json to_json(const Percentiles& p);
+nlohmann::ordered_json run_report(const Scene& scene, const BuiltScene& built, SessionResult& result);
+
+// The same as a person would read it.
+std::string run_summary(const BuiltScene& built, SessionResult& result);
+
+// Names of the fault bits that are set, with what to do; empty when none.
+std::vector<std::string> fault_texts(std::uint32_t faults);
+
+// Writes to a file, or to standard output for "-". Throws std::runtime_error: not writable.
+void save_json(const std::string& file, const nlohmann::ordered_json& report);
+
+}  // namespace hybrid

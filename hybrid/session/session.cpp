@@ -1,0 +1,450 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/session/session.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <chrono>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+
+#include "device/simulated/simulated.h"
+#include "hybrid/tick/bodies/body_collisions.h"
+#include "hybrid/base/flush_to_zero.h"
+#include "hybrid/snapshot/fill_snapshot.h"
+#include "hybrid/tick/proxy/proxy_step.h"
+#include "hybrid/tick/tissue/work_budget.h"
+#include "voxel/composite/grid.h"
+
+namespace hybrid {
+namespace {
+
+constexpr double kAfterPath_s = 0.5;
+constexpr double kWithHand_s = 60.0;  // a real device has no path that ends
+constexpr double kJndFloor_N = 0.04;
+constexpr std::uint64_t kMomentEvery = 20;  // ticks between two looks for a more telling moment
+constexpr std::uint64_t kClearances =
+    1000;                           // moments of a session at which it is looked how near objects are
+constexpr int kSettleTicks = 1200;  // of equilibrium_force(), and
+constexpr int kCalmTicks = 40;      // ticks over which its force may change by the tolerance
+constexpr std::uint32_t kSettleBudget = 400'000;
+
+std::uint64_t mix(std::uint64_t hash, std::uint64_t bits) noexcept {  // FNV-1a, eight bytes at a time
+  return (hash ^ bits) * 0x100000001B3ULL;
+}
+std::uint64_t mix(std::uint64_t hash, const glm::dvec3& v) noexcept {
+  for (int d = 0; d < 3; ++d) hash = mix(hash, std::bit_cast<std::uint64_t>(v[d]));
+  return hash;
+}
+
+std::uint64_t mix(std::uint64_t hash, const glm::dquat& q) noexcept {
+  for (const double x : {q.w, q.x, q.y, q.z}) hash = mix(hash, std::bit_cast<std::uint64_t>(x));
+  return hash;
+}
+
+// How much a moment says about the scene: different objects felt at once first, then force.
+double telling(const World& world, const WorldState& state) {
+  double score = 0.0;
+  bool rigid = false, soft = false;
+  for (std::size_t o = 0; o < state.feel.size(); ++o) {
+    if (!state.feel[o].contact) continue;
+    (o < world.rigid.size() ? rigid : soft) = true;
+    score += std::min(1.0, state.feel[o].force_N);
+  }
+  return score + (rigid && soft ? 10.0 : 0.0);
+}
+
+// A path that begins later.
+class LaterPath final : public device::Path {
+ public:
+  LaterPath(std::shared_ptr<const device::Path> path, double later_s)
+      : path_(std::move(path)), later_s_(later_s) {}
+  [[nodiscard]] glm::dvec3 position(double t_s) const noexcept override {
+    return path_->position(t_s - later_s_);
+  }
+  [[nodiscard]] double duration_s() const noexcept override { return path_->duration_s(); }
+  [[nodiscard]] const std::vector<std::string>& notes() const noexcept override { return path_->notes(); }
+
+ private:
+  std::shared_ptr<const device::Path> path_;
+  double later_s_;
+};
+
+std::shared_ptr<const device::Path> later(std::shared_ptr<const device::Path> path, double later_s) {
+  if (later_s == 0.0) return path;
+  return std::make_shared<LaterPath>(std::move(path), later_s);
+}
+
+class Run {
+ public:
+  Run(const Scene& scene, BuiltScene& built, const SessionOptions& options)
+      : scene_(scene),
+        world_(*built.world),
+        state_(*built.state),
+        options_(options),
+        path_(later(options.path ? options.path : scene_path(scene),
+                    static_cast<double>(options.start_ticks) / scene.rate_hz)),
+        simulated_(options.real_device == nullptr ? scene_device(scene, path_) : nullptr),
+        device_(options.real_device == nullptr ? *simulated_ : *options.real_device),
+        realtime_(options.realtime || options.real_device != nullptr),
+        follows_machine_(realtime_ && options.relax_apart && !built.state->soft.empty()),
+        dt_(1.0 / scene.rate_hz),
+        work_share_(dt_) {
+    const double usual = options.real_device == nullptr ? path_->duration_s() + kAfterPath_s : kWithHand_s;
+    const double seconds = options.seconds.value_or(usual);
+    result_.device_name = device_.name();
+    result_.path_notes = path_->notes();
+    ticks_ = static_cast<std::uint64_t>(std::llround(seconds * scene.rate_hz));
+    result_.dt_s = dt_;
+    clearance_every_ = std::max<std::uint64_t>(1, ticks_ / kClearances);
+    if (options.keep_recording) result_.recording.reserve(ticks_);
+    result_.object_contact_ticks.assign(world_.object_count(), 0);
+    result_.object_max_force_N.assign(world_.object_count(), 0.0);
+    if (!options.keep_rows) return;
+    result_.rows.reserve(ticks_);
+    result_.object_force_N.resize(world_.object_count());
+    for (auto& column : result_.object_force_N) column.reserve(ticks_);
+  }
+
+  SessionResult go() {
+    flush_denormals();
+    start_clocks();
+    result_.start_m = device_.read().position_m;
+    begin_session(scene_, world_, state_, result_.start_m);
+    if (options_.relax_apart) relax_apart(state_, realtime_ ? Arrival::thread : Arrival::counted);
+    std::optional<RelaxationThread> relaxation;
+    if (options_.relax_apart && options_.relaxation_thread && realtime_ && !state_.soft.empty())
+      relaxation.emplace(world_, state_.apart, options_.surfaces_hz);
+    if (options_.reference_samples > 0 && !realtime_) {
+      sample_every_ =
+          std::max<std::uint64_t>(1, ticks_ / static_cast<std::uint64_t>(2 * options_.reference_samples));
+    }
+    auto tick = [this](const device::ServoInput& input) { return answer(input); };
+    device::ServoReport served;
+    if (ticks_ > 0) {
+      served = device::run_servo(
+          device_, {.rate_hz = scene_.rate_hz, .realtime = realtime_, .deadline_s = world_.limits.deadline_s},
+          tick);
+    }
+    if (options_.keep_picture && !result_.moment) {
+      TickResult last;
+      last.device_m = state_.device_m;
+      last.proxy_m = state_.proxy_m;
+      result_.moment = take_snapshot(world_, state_, last, static_cast<double>(ticks_done_) * dt_);
+    }
+    if (realtime_) {
+      result_.realtime_note = served.priority;
+      result_.deadline_misses = served.late_ticks;
+      result_.late_us = late_us_.percentiles();
+    }
+    if (relaxation) result_.relaxation_s = relaxation->busy_s();
+    relaxation.reset();
+    result_.relaxed_apart = state_.apart.results;
+    result_.end = served.end;
+    result_.device_messages = std::move(served.messages);
+    result_.ticks = ticks_done_;
+    result_.state_hash = hash_state(hash_, state_);
+    if (ticks_done_ > 0) result_.rms_force_N = std::sqrt(sum_force2_ / static_cast<double>(ticks_done_));
+    if (result_.error.samples > 0) {
+      result_.error.rms_N = std::sqrt(result_.error.rms_N / result_.error.samples);
+      result_.error.p99_N = percentiles(errors_N_).p99;
+      result_.error.p99_jnd = percentiles(errors_jnd_).p99;
+    }
+    return std::move(result_);
+  }
+
+ private:
+  void start_clocks() {
+    if (options_.start_ticks == 0) return;
+    const double now_s = static_cast<double>(options_.start_ticks) * dt_;
+    device_.hold(now_s);
+    state_.tick = options_.start_ticks;
+    state_.clock = device::Clock(now_s);
+    state_.limit.elapsed_s = now_s;
+    state_.limit.clamped = state_.limit.slewed = state_.truncated_ticks = options_.start_ticks;
+  }
+
+  // On the driver's thread where the device has one. In real time nothing may make the next tick late: no
+  // allocation (every column has its room), no look for a picture, no reference.
+  device::ServoAnswer answer(const device::ServoInput& input) {
+    const FlushedDenormals flushed;
+    const std::uint64_t tick = ticks_done_++;
+    if (follows_machine_) give_work_share(state_, work_share_.steps());
+    const TickResult felt = haptic_tick(world_, state_, input.device, dt_);
+    keep(felt, tick, input.device.fault);
+    if (options_.black_box != nullptr) options_.black_box->add(black_box_row(input, felt, tick, state_));
+    if (realtime_) {
+      late_us_.add(input.late_s * 1e6);
+      if (follows_machine_) follow_machine(felt.tick_us);
+    } else {
+      if (sample_every_ != 0 && result_.error.samples < options_.reference_samples)
+        sample(felt, sample_every_);
+      if (options_.keep_picture && tick % kMomentEvery == 0) look(felt, tick);
+      if (options_.keep_clearance && tick % clearance_every_ == 0) measure_clearance(tick);
+      if (options_.progress && tick % 64 == 0) say_progress(tick);
+    }
+    return {.force_N = felt.force_N, .go_on = ticks_done_ < ticks_};
+  }
+
+  void follow_machine(double tick_us) {
+    if (work_share_.steps() > 0) ++result_.ticks_with_less_work;
+    result_.least_work_share = std::min(result_.least_work_share, WorkShare::share(work_share_.steps()));
+    const bool pressed = std::any_of(state_.reactions.begin(), state_.reactions.end(),
+                                     [](const voxel::Reaction& r) { return r.pressed > 0; });
+    work_share_.felt(tick_us, pressed);
+  }
+
+  void say_progress(std::uint64_t tick) {
+    const auto now = std::chrono::steady_clock::now();
+    if (now - said_ <= std::chrono::milliseconds(500)) return;
+    said_ = now;
+    options_.progress(fmt::format("tick {} of {} ({:.0f} %)", tick, ticks_,
+                                  100.0 * static_cast<double>(tick) / static_cast<double>(ticks_)));
+  }
+
+  void keep(const TickResult& felt, std::uint64_t tick, device::DeviceFault fault) {
+    hash_ = hash_tick(hash_, felt);
+    if (options_.keep_recording)
+      result_.recording.push_back({felt.device_m, hash_, fault, state_.apart.arrived, work_share_.steps()});
+    result_.tick_us.add(felt.tick_us);
+    result_.servo_s += 1e-6 * felt.tick_us;
+    result_.relaxation_s += 1e-6 * state_.apart.elsewhere_us;
+    for (std::size_t s = 0; s < kStages; ++s) result_.stage_us[s].add(static_cast<double>(felt.stage_us[s]));
+    const double force = glm::length(felt.force_N);
+    result_.max_force_N = std::max(result_.max_force_N, force);
+    sum_force2_ += force * force;
+    if (felt.contacts != 0) ++result_.contact_ticks;
+    for (std::size_t o = 0; o < state_.feel.size(); ++o) {
+      if (state_.feel[o].contact) ++result_.object_contact_ticks[o];
+      result_.object_max_force_N[o] = std::max(result_.object_max_force_N[o], state_.feel[o].force_N);
+      if (options_.keep_rows) result_.object_force_N[o].push_back(state_.feel[o].force_N);
+    }
+    if (!options_.keep_rows) return;
+    result_.rows.push_back({static_cast<double>(tick) * dt_, felt.device_m, felt.proxy_m, felt.force_N,
+                            glm::length(felt.rigid_N), glm::length(felt.soft_N), felt.contacts,
+                            felt.tick_us});
+  }
+
+  // Evenly over the time in which something soft is felt.
+  void sample(const TickResult& felt, std::uint64_t every) {
+    bool soft = false;
+    for (const voxel::Reaction& r : state_.reactions) soft = soft || r.pressed > 0;
+    if (!soft || ++soft_ticks_ % every != every / 2) return;
+    if (options_.progress)
+      options_.progress(fmt::format("comparing the force at tick {} with its equilibrium", state_.tick));
+    const auto reference = equilibrium_force(world_, state_);
+    if (!reference) return;
+    const glm::dvec3 raw = world_.tool.stiffness_N_per_m * (felt.proxy_m - felt.device_m);
+    const double error = glm::length(raw - *reference);
+    ++result_.error.samples;
+    result_.error.max_N = std::max(result_.error.max_N, error);
+    result_.error.rms_N += error * error;
+    const double jnd = jnd_of(raw, *reference, jnd_floor_N(scene_));
+    result_.error.max_jnd = std::max(result_.error.max_jnd, jnd);
+    errors_N_.push_back(error);
+    errors_jnd_.push_back(jnd);
+  }
+
+  void measure_clearance(std::uint64_t tick) {
+    if (state_.soft.empty()) return;
+    ClearanceCourse& course = result_.clearance;
+    const Clearance now = clearance(world_, state_);
+    course.t_s.push_back(static_cast<double>(tick) * dt_);
+    course.rigid_m.push_back(now.rigid_m);
+    course.soft_m.push_back(now.soft_m);
+    course.cell_m = std::numeric_limits<double>::infinity();
+    for (const auto& object : state_.soft)
+      course.cell_m = std::min(course.cell_m, object->lattice().min_spacing_m());
+  }
+
+  void look(const TickResult& felt, std::uint64_t tick) {
+    const double score = telling(world_, state_);
+    if (score <= best_ * 1.02) return;
+    best_ = score;
+    result_.moment = take_snapshot(world_, state_, felt, static_cast<double>(tick) * dt_);
+  }
+
+  const Scene& scene_;
+  const World& world_;
+  WorldState& state_;
+  const SessionOptions& options_;
+  std::shared_ptr<const device::Path> path_;
+  std::unique_ptr<device::HapticDevice> simulated_;
+  device::HapticDevice& device_;
+  bool realtime_, follows_machine_;
+  double dt_;
+  WorkShare work_share_;
+  TimeSpread late_us_;
+  std::vector<double> errors_N_, errors_jnd_;  // of sampled ticks
+  std::chrono::steady_clock::time_point said_ = std::chrono::steady_clock::now();
+  std::uint64_t clearance_every_ = 1;
+  std::uint64_t ticks_ = 0, ticks_done_ = 0, sample_every_ = 0, soft_ticks_ = 0, hash_ = kHashBegin;
+  double sum_force2_ = 0.0, best_ = 0.0;
+  SessionResult result_;
+};
+
+}  // namespace
+
+BlackBoxRow black_box_row(const device::ServoInput& input, const TickResult& felt, std::uint64_t tick,
+                          const WorldState& state) noexcept {
+  return {.tick = tick,
+          .said_m = input.device.position_m,
+          .said = input.device.fault,
+          .faults = state.faults,
+          .nonfinite = state.nonfinite,
+          .late_us = static_cast<float>(input.late_s * 1e6),
+          .felt = felt};
+}
+
+Percentiles percentiles(std::vector<double>& values) {
+  if (values.empty()) return {};
+  std::sort(values.begin(), values.end());
+  const auto at = [&values](double share) {
+    const auto i = static_cast<std::size_t>(share * static_cast<double>(values.size()));
+    return values[std::min(i, values.size() - 1)];
+  };
+  return {at(0.5), at(0.99), at(0.999), values.back()};
+}
+
+std::shared_ptr<const device::Path> scene_path(const Scene& scene) {
+  try {
+    return device::make_path(scene.path);
+  } catch (const device::PathError& e) {
+    throw SceneError(scene.file, scene.path_place, e.what());
+  }
+}
+
+std::unique_ptr<device::HapticDevice> scene_device(const Scene& scene,
+                                                   std::shared_ptr<const device::Path> path) {
+  if (scene.device_model == device::DeviceModel::ideal)
+    return device::make_simulated_device(scene.device_model, scene.hand, std::move(path));
+  return device::make_simulated_device({.mechanism = device::mechanism(scene.device_model),
+                                        .hand = scene.hand,
+                                        .tremor = scene.tremor,
+                                        .delay_ticks = scene.delay_ticks,
+                                        .watchdog_s = scene.watchdog_s},
+                                       std::move(path));
+}
+
+void begin_session(const Scene& scene, const World& world, WorldState& state, const glm::dvec3& device_m) {
+  if (start_proxy(world, state, device_m)) return;
+  throw SceneError(
+      scene.file, scene.path_place,
+      fmt::format(
+          "the path starts at ({:.4g}, {:.4g}, {:.4g}) m, inside something rigid; start it in free space",
+          device_m.x, device_m.y, device_m.z));
+}
+
+void play_again(const RecordedTick& tick, WorldState& state) noexcept {
+  state.apart.arrived = tick.arrived;
+  give_work_share(state, tick.work_share);
+}
+
+SessionResult run_session(const Scene& scene, BuiltScene& built, const SessionOptions& options) {
+  return Run(scene, built, options).go();
+}
+
+std::uint64_t hash_tick(std::uint64_t before, const TickResult& tick) noexcept {
+  return mix(mix(mix(before, tick.proxy_m), tick.force_N), tick.contacts);
+}
+
+std::uint64_t hash_state(std::uint64_t before, const WorldState& state) noexcept {
+  std::uint64_t hash = mix(before, state.limit.last_N);
+  for (const double x : {state.limit.elapsed_s, state.limit.handed.sum_J(), state.passive.given_J,
+                         state.passive.worst_tick_J, state.passive.stride_m, state.passive.share})
+    hash = mix(hash, std::bit_cast<std::uint64_t>(x));
+  for (const RigidNear& body : state.rigid) {
+    hash = mix(mix(hash, body.pose.position_m), body.pose.rotation);
+    hash = mix(mix(hash, body.free.centre_m), body.free.rotation);
+    hash = mix(mix(hash, body.free.velocity_m_per_s), body.free.spin_rad_per_s);
+  }
+  for (const auto& object : state.soft) {
+    for (const auto& axis : object->state().u) {
+      for (const float u : axis) hash = mix(hash, std::bit_cast<std::uint32_t>(u));
+    }
+    if (object->grid_in_use() == nullptr) continue;
+    object->grid_in_use()->for_values(
+        [&hash](float u) { hash = mix(hash, std::bit_cast<std::uint32_t>(u)); });
+  }
+  return hash;
+}
+
+Snapshot take_snapshot(const World& world, const WorldState& state, const TickResult& tick, double t_s) {
+  Snapshot snapshot{.tick = state.tick,
+                    .t_s = t_s,
+                    .device_m = tick.device_m,
+                    .proxy_m = tick.proxy_m,
+                    .force_N = tick.force_N,
+                    .feel = state.feel,
+                    .soft_moved_m = {},
+                    .rigid_place = {},
+                    .tick_us = tick.tick_us};
+  fill_moved(world, state, snapshot);
+  return snapshot;
+}
+
+std::unique_ptr<WorldState> copy_state(const World& world, const WorldState& state) {
+  auto copy = std::make_unique<WorldState>(world, OccupancyMap(state.map));
+  for (const auto& object : state.soft) copy->soft.push_back(object->copy());
+  copy->prepare(world);
+  prepare_collisions(world, *copy);
+  copy->map.reserve_bricks(1024);
+  static_cast<CarriedState&>(*copy) = static_cast<const CarriedState&>(state);
+  return copy;
+}
+
+namespace {
+
+// Do anchors carry what is felt of each object that nothing but the tool presses? Far from rest an object may
+// be calm: with links at their limits all about a deep push, nothing moves from one cycle to the next, and
+// half of what presses has not reached the anchors, or is not felt. (Of a cube of 257 voxels an edge, 16
+// spacings deep, 8.9 N were felt for good where 15.8 are right.)
+bool carried_by_anchors(const World& world, const WorldState& state) noexcept {
+  constexpr double kShare = 0.01, kLeast_N = 1e-3;
+  if (!world.meeting.empty()) return true;
+  for (std::size_t o = 0; o < state.soft.size(); ++o) {
+    const voxel::SoftObject& object = *state.soft[o];
+    if (state.reactions[o].pressed == 0 || !object.obstacles().empty() || object.lattice().yields() ||
+        object.lattice().has_bricks())
+      continue;
+    const auto carried = object.carried_by_anchors_N();
+    if (!carried) continue;
+    const glm::dvec3 felt = glm::inverse(world.soft[o].pose.rotation) * state.reactions[o].force_N;
+    if (glm::length(felt + *carried) > std::max(kLeast_N, kShare * glm::length(felt))) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+std::optional<glm::dvec3> equilibrium_force(const World& world, const WorldState& state, double tolerance_N) {
+  const std::unique_ptr<WorldState> copy = copy_state(world, state);
+  // The same physics with a generous budget: only how soon it settles may differ, not where.
+  World patient = world;
+  for (SoftBody& body : patient.soft) body.budget = kSettleBudget;
+  for (RigidObject& object : patient.rigid) object.motion = {};  // what moves stands still meanwhile
+  std::fill(copy->body_moved_m.begin(), copy->body_moved_m.end(), 0.0);
+  for (const auto& object : copy->soft) object->widen_grid();
+  const device::DeviceState still{.position_m = state.device_m};
+  glm::dvec3 before(0.0);
+  for (int n = 1; n <= kSettleTicks; ++n) {
+    const TickResult felt = haptic_tick(patient, *copy, still, 1e-3);
+    if (n % kCalmTicks != 0) continue;
+    const glm::dvec3 force = world.tool.stiffness_N_per_m * (felt.proxy_m - felt.device_m);
+    if (glm::length(force - before) < tolerance_N && carried_by_anchors(patient, *copy)) return force;
+    before = force;
+  }
+  return std::nullopt;
+}
+
+double jnd_of(const glm::dvec3& force, const glm::dvec3& reference, double floor_N) {
+  return glm::length(force - reference) / std::max(kJndShare * glm::length(reference), floor_N);
+}
+
+double jnd_floor_N(const Scene& scene) {
+  return std::max(kJndFloor_N, scene_limits(scene).friction_N);
+}
+
+}  // namespace hybrid

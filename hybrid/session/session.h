@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A haptic session: a built scene, a device, and ticks until the path ends. One scene builder and one session
+// serve the program, the tests and the benchmarks.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "device/loop/haptic_device.h"
+#include "device/paths/path.h"
+#include "device/loop/servo_loop.h"
+#include "hybrid/session/black_box.h"
+#include "hybrid/build/build_world.h"
+#include "hybrid/session/clearance.h"
+#include "hybrid/tick/tick.h"
+#include "hybrid/base/histogram.h"
+
+namespace hybrid {
+
+// Of the values given; all zero when there are none. Reorders them.
+Percentiles percentiles(std::vector<double>& values);
+
+// One tick of a recording: the input, and the running hash of everything felt up to and including it.
+struct RecordedTick {
+  glm::dvec3 device_m{0.0};
+  std::uint64_t hash = 0;
+  device::DeviceFault fault = device::DeviceFault::none;
+  std::uint64_t arrived = 0;    // soft objects whose relaxation, apart, began to be taken in this tick
+  std::uint8_t work_share = 0;  // WorkShare::steps()
+};
+// Before a tick that is played again: what of it was the machine's doing.
+void play_again(const RecordedTick& tick, WorldState& state) noexcept;
+
+struct SessionOptions {
+  std::optional<double> seconds;  // default: the path's length and half a second; a real device: a minute
+  bool realtime = false;          // paced by a real timer; else fixed-step, as fast as it goes
+  // A real one, open, placed in the scene and out of anything rigid; always in real time. None: the scene's
+  // simulated one.
+  device::HapticDevice* real_device = nullptr;
+  bool keep_rows = true;        // trace rows and per-object forces
+  bool keep_recording = true;   // every input, 48 bytes a tick: without it and the rows memory stays flat
+  bool keep_clearance = false;  // how near objects come, at a thousand moments
+  bool keep_picture = false;    // remember the most telling moment
+  int reference_samples = 0;    // how often the force is compared with its equilibrium; 0 in real time
+  // Clocks and counters begin as after so many ticks, and the path so much later; nothing felt may differ. (A
+  // soft start is over by then.)
+  std::uint64_t start_ticks = 0;
+  Progress progress;
+  // Tissue away from the contact is relaxed apart from the tick: in real time on a thread of its own.
+  bool relax_apart = false;
+  bool relaxation_thread = true;  // false: nothing is relaxed apart; for benchmarks
+  double surfaces_hz = 0.0;       // how often that thread says where surfaces are, for whoever draws
+  BlackBox* black_box = nullptr;  // every tick is added to it
+  std::shared_ptr<const device::Path> path{};  // of the hand, in place of the scene's
+};
+
+struct ForceError {  // of the tick's force against the equilibrium lattice with its limits, at the sampled
+                     // ticks
+  int samples = 0;
+  double max_N = 0.0, rms_N = 0.0, max_jnd = 0.0, p99_N = 0.0, p99_jnd = 0.0;
+};
+
+struct SessionResult {
+  std::uint64_t ticks = 0, contact_ticks = 0, deadline_misses = 0;
+  double dt_s = 0.0;
+  std::uint64_t state_hash = 0;
+  std::vector<TraceRow> rows;
+  std::vector<std::vector<double>> object_force_N;  // [object][row]
+  ClearanceCourse clearance;                        // of keep_clearance, where anything is soft
+  std::vector<std::uint64_t> object_contact_ticks;  // [object]
+  std::vector<double> object_max_force_N;           // [object]
+  TimeSpread tick_us;
+  std::array<TimeSpread, kStages> stage_us;
+  double max_force_N = 0.0, rms_force_N = 0.0;
+  ForceError error;
+  std::optional<Snapshot> moment;       // of keep_picture
+  std::vector<RecordedTick> recording;  // of keep_recording
+  // Where the device was as the session began, and the proxy with it: a first tick that comes late finds it
+  // elsewhere.
+  glm::dvec3 start_m{0.0};
+  std::string device_name;
+  device::ServoEnd end = device::ServoEnd::finished;
+  std::vector<std::string> device_messages;  // what happened to the device, and what to do about it
+  std::vector<std::string> path_notes;       // what the path's reader noticed: gaps, repeated times
+  std::string realtime_note;                 // what priority was granted
+  Percentiles late_us;                       // how late the machine woke the loop; not part of the tick
+  // Processor time of the ticks, and of relaxation apart from them: of its thread in real time, else of what
+  // that would have done.
+  double servo_s = 0.0, relaxation_s = 0.0;
+  std::uint64_t relaxed_apart = 0;  // results that ticks took
+  // Of the contact's work, in real time: the least share that a tick had, and how many had less than all.
+  double least_work_share = 1.0;
+  std::uint64_t ticks_with_less_work = 0;
+};
+
+// Runs the scene's path to its end on its device. Throws SceneError: the tool starts inside something rigid.
+SessionResult run_session(const Scene& scene, BuiltScene& built, const SessionOptions& options);
+
+// The pieces, for callers that drive the loop themselves.
+std::shared_ptr<const device::Path> scene_path(const Scene& scene);
+std::unique_ptr<device::HapticDevice> scene_device(const Scene& scene,
+                                                   std::shared_ptr<const device::Path> path);
+// Starts the proxy or throws SceneError.
+void begin_session(const Scene& scene, const World& world, WorldState& state, const glm::dvec3& device_m);
+
+// Of tick number `tick` of the session, which has just been felt.
+BlackBoxRow black_box_row(const device::ServoInput& input, const TickResult& felt, std::uint64_t tick,
+                          const WorldState& state) noexcept;
+
+// Hashes. The running one takes what is felt, the final one also every displacement, where every rigid
+// body is and how it moves, and what the limits on the force remember.
+inline constexpr std::uint64_t kHashBegin = 0xCBF29CE484222325ULL;
+std::uint64_t hash_tick(std::uint64_t before, const TickResult& tick) noexcept;
+std::uint64_t hash_state(std::uint64_t before, const WorldState& state) noexcept;
+
+// A snapshot of now.
+Snapshot take_snapshot(const World& world, const WorldState& state, const TickResult& tick, double t_s);
+
+// The state again, sharing nothing that moves.
+std::unique_ptr<WorldState> copy_state(const World& world, const WorldState& state);
+
+// The force that the present device position would be answered with once everything soft has come to rest
+// (N), found on a copy of the state, until it changes by less than `tolerance_N` over dozens of whole
+// relaxation cycles, and the anchors carry it; bodies that move stand still meanwhile. Empty when it does not
+// settle.
+std::optional<glm::dvec3> equilibrium_force(const World& world, const WorldState& state,
+                                            double tolerance_N = 1e-4);
+
+// |a − b| in just noticeable differences: 7 % of the reference, and no less than the floor (N).
+inline constexpr double kJndShare = 0.07;
+double jnd_of(const glm::dvec3& force, const glm::dvec3& reference, double floor_N);
+// The floor for a scene's device: its friction, and 0.04 N at least.
+double jnd_floor_N(const Scene& scene);
+
+}  // namespace hybrid

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/snapshot/fill_snapshot.h"
+
+#include <glm/gtc/quaternion.hpp>
+
+#include "voxel/composite/grid.h"
+
+namespace hybrid {
+namespace {
+
+void fill_places(const World& world, const WorldState& state, Snapshot& snapshot) {
+  snapshot.rigid_place.resize(world.rigid.size());
+  for (std::size_t o = 0; o < world.rigid.size(); ++o) {
+    const Pose &before = world.rigid[o].pose, &now = state.rigid[o].pose;
+    RigidPlace& place = snapshot.rigid_place[o];
+    place.moved = now.position_m != before.position_m || now.rotation != before.rotation;
+    place.about_m = before.position_m;
+    place.way_m = now.position_m - before.position_m;
+    place.turn = now.rotation * glm::conjugate(before.rotation);
+  }
+}
+
+void fill_surface(const SoftBody& body, const voxel::SoftObject& object, std::vector<glm::vec3>& moved) {
+  moved.resize(body.drawn.vertices.size());
+  for (std::size_t v = 0; v < moved.size(); ++v)
+    moved[v] = glm::vec3(body.pose.rotation * object.displacement_at(body.drawn.vertices[v]));
+}
+
+// The nodes as they are: a few hundred kilobytes, however large the object. (Its surface, vertex by vertex,
+// is a hundred milliseconds of a tick.)
+void fill_dent(const SoftBody& body, const voxel::SoftObject& object, SoftDent& dent) {
+  dent.used = true;
+  dent.count = 0;
+  const voxel::CompositeGrid* const grid = object.grid_in_use();
+  if (grid == nullptr) return;
+  dent.to_scene = glm::mat3_cast(body.pose.rotation);
+  dent.origin_m = body.pose.origin;
+  dent.spacing_m = object.lattice().spacing_m();
+  dent.count = grid->boxes();
+  if (dent.boxes.size() < dent.count) dent.boxes.resize(dent.count);
+  for (std::size_t n = 0; n < dent.count; ++n) {
+    const voxel::CompositeGrid::Nodes nodes = grid->nodes_of(n);
+    SoftDent::Box& box = dent.boxes[n];
+    box.first = nodes.first;
+    box.count = nodes.count;
+    box.step = nodes.step;
+    box.open_low = nodes.open_low;
+    box.open_high = nodes.open_high;
+    box.stride = nodes.stride;
+    box.plane = nodes.plane;
+    const std::size_t size = nodes.plane * static_cast<std::size_t>(nodes.count[2]);
+    for (std::size_t a = 0; a < 3; ++a) box.moved_m[a].assign(nodes.u[a], nodes.u[a] + size);
+  }
+}
+
+}  // namespace
+
+void fill_moved(const World& world, const WorldState& state, Snapshot& snapshot) {
+  fill_places(world, state, snapshot);
+  snapshot.soft_moved_m.resize(world.object_count());
+  for (std::size_t o = 0; o < world.soft.size(); ++o)
+    fill_surface(world.soft[o], *state.soft[o], snapshot.soft_moved_m[world.rigid.size() + o]);
+}
+
+void fill_moved_near(const World& world, const WorldState& state, Snapshot& snapshot) {
+  fill_places(world, state, snapshot);
+  snapshot.soft_moved_m.resize(world.object_count());
+  snapshot.patches.resize(world.object_count());
+  snapshot.dents.resize(world.object_count());
+  for (std::size_t o = 0; o < world.soft.size(); ++o) {
+    const SoftBody& body = world.soft[o];
+    const voxel::SoftObject& object = *state.soft[o];
+    const std::size_t number = world.rigid.size() + o;
+    if (object.uses_grid()) {
+      fill_dent(body, object, snapshot.dents[number]);
+      continue;
+    }
+    if (!state.apart.has(o)) {
+      fill_surface(body, object, snapshot.soft_moved_m[number]);
+      continue;
+    }
+    SoftPatch& patch = snapshot.patches[number];
+    patch.at_rest_m.clear();
+    patch.moved_m.clear();
+    for (const voxel::VoxelId v : object.touched()) {
+      patch.at_rest_m.emplace_back(body.to_scene(object.lattice().rest(v)));
+      patch.moved_m.emplace_back(body.pose.rotation * object.displacement(v));
+    }
+  }
+}
+
+}  // namespace hybrid

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/snapshot/make_drawn_scene.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <map>
+#include <span>
+
+namespace hybrid {
+namespace {
+
+constexpr double kDrawnPoint = 0.004;  // of the scene: a tool is drawn no smaller
+constexpr const char* kUnnamed = "default material";
+
+// Which material each label is of, as a number and by name.
+struct MaterialsOfLabels {
+  std::array<std::uint8_t, 256> of_label{};
+  std::vector<std::string> names;
+};
+
+MaterialsOfLabels materials_of_labels(const SoftDescription& description, const SoftBody& body) {
+  MaterialsOfLabels result;
+  std::map<std::string, std::uint8_t> number;
+  const auto number_of = [&](const std::string& name) {
+    const auto [at, fresh] = number.try_emplace(name, static_cast<std::uint8_t>(number.size()));
+    if (fresh) result.names.push_back(name);
+    return at->second;
+  };
+  for (std::size_t label = 1; label < 256; ++label) {
+    const auto own = description.materials.find(static_cast<std::uint8_t>(label));
+    const std::string& name = own != description.materials.end() ? own->second : description.material;
+    result.of_label[label] = number_of(name.empty() ? kUnnamed : name);
+  }
+  // A strut is of the tissue that it stands for.
+  for (const auto& [strut, label] : body.struts) result.of_label[strut] = result.of_label[label];
+  return result;
+}
+
+// The material of most of the voxels about a vertex. A vertex of the surface lies within one cube between
+// eight voxel centres, of which at least one is filled; of as many, the one that was named first.
+std::uint8_t material_beneath(const voxel::Lattice& lattice, const MaterialsOfLabels& materials,
+                              const glm::dvec3& vertex_m) {
+  std::array<int, 3> cell{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    const auto axis = static_cast<glm::length_t>(a);
+    const double at = std::floor(vertex_m[axis] / lattice.spacing_m()[axis]);
+    cell[a] = static_cast<int>(std::clamp(at, -1.0, lattice.grid().dims[a] - 1.0));
+  }
+  std::array<std::uint8_t, 8> seen{};
+  std::size_t count = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const voxel::VoxelId v =
+        lattice.at(cell[0] + (corner & 1), cell[1] + ((corner >> 1) & 1), cell[2] + (corner >> 2));
+    if (lattice.filled(v)) seen[count++] = materials.of_label[lattice.label(v)];
+  }
+  std::sort(seen.begin(), seen.begin() + static_cast<std::ptrdiff_t>(count));
+  std::uint8_t best = 0;
+  std::size_t most = 0;
+  for (std::size_t i = 0, run = 0; i < count; ++i) {
+    run = i > 0 && seen[i] == seen[i - 1] ? run + 1 : 1;
+    if (run <= most) continue;
+    most = run;
+    best = seen[i];
+  }
+  return best;
+}
+
+// Area of the surface that is of each material (m²): a triangle is shared by its corners.
+std::vector<double> area_of_materials(const polygon::TriangleMesh& mesh,
+                                      std::span<const std::uint8_t> vertex_material, std::size_t count) {
+  std::vector<double> area(count, 0.0);
+  for (const polygon::TriangleIndices& t : mesh.triangles) {
+    const glm::dvec3& a = mesh.vertices[t[0]];
+    const double twice = glm::length(glm::cross(mesh.vertices[t[1]] - a, mesh.vertices[t[2]] - a));
+    for (const std::uint32_t v : t) area[vertex_material[v]] += twice / 6.0;
+  }
+  return area;
+}
+
+void add_materials(DrawnObject& drawn, const SoftDescription& description, const SoftBody& body,
+                   const voxel::Lattice& lattice) {
+  const MaterialsOfLabels materials = materials_of_labels(description, body);
+  if (materials.names.size() < 2) return;
+  std::vector<std::uint8_t> of_vertex;
+  of_vertex.reserve(body.drawn.vertices.size());
+  for (const glm::dvec3& v : body.drawn.vertices)
+    of_vertex.push_back(material_beneath(lattice, materials, v));
+  const std::vector<double> area = area_of_materials(body.drawn, of_vertex, materials.names.size());
+  std::vector<std::uint8_t> order;
+  for (std::size_t m = 0; m < area.size(); ++m) {
+    if (area[m] > 0.0) order.push_back(static_cast<std::uint8_t>(m));
+  }
+  if (order.size() < 2) return;  // one material to be seen is the object's own colour
+  std::stable_sort(order.begin(), order.end(), [&](auto a, auto b) { return area[a] > area[b]; });
+  std::array<std::uint8_t, 256> rank{};
+  for (std::size_t r = 0; r < order.size(); ++r) {
+    rank[order[r]] = static_cast<std::uint8_t>(r);
+    drawn.materials.push_back(materials.names[order[r]]);
+  }
+  for (std::uint8_t& m : of_vertex) m = rank[m];
+  drawn.vertex_material = std::move(of_vertex);
+}
+
+}  // namespace
+
+DrawnScene drawn_scene(const Scene& scene, const BuiltScene& built, const std::string& title) {
+  const World& world = *built.world;
+  DrawnScene drawn{.title = title,
+                   .objects = {},
+                   .tool_is_punch = world.tool.shape == Tool::Shape::punch,
+                   .tool_radius_m = std::max(world.tool.radius_m, kDrawnPoint * world.extent_m),
+                   .max_force_N = world.limits.max_force_N};
+  for (const RigidObject& object : world.rigid) {
+    drawn.objects.push_back({object.name, false, *object.drawn});
+    for (glm::dvec3& v : drawn.objects.back().surface.vertices) v = object.to_scene(v);
+  }
+  for (std::size_t o = 0; o < world.soft.size(); ++o) {
+    const SoftBody& body = world.soft[o];
+    drawn.objects.push_back({body.name, true, body.drawn});
+    DrawnObject& object = drawn.objects.back();
+    add_materials(object, scene.soft[o], body, built.state->soft[o]->lattice());
+    for (glm::dvec3& v : object.surface.vertices) v = body.to_scene(v);
+  }
+  return drawn;
+}
+
+}  // namespace hybrid

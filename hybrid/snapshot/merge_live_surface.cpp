@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/snapshot/merge_live_surface.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
+
+namespace hybrid {
+namespace {
+
+// Vertices that the patch surrounds go along with its points near them, by the inverse of their distance.
+void lay_patch(const polygon::TriangleMesh& surface, const SoftPatch& patch, std::vector<glm::vec3>& moved) {
+  glm::vec3 low = patch.at_rest_m.front(), high = low;
+  for (const glm::vec3& at : patch.at_rest_m) {
+    low = glm::min(low, at);
+    high = glm::max(high, at);
+  }
+  // A patch of n points over an area: about so far apart.
+  const glm::vec3 size = high - low;
+  const float apart = std::max({size.x, size.y, size.z}) /
+                      std::sqrt(static_cast<float>(std::max<std::size_t>(patch.at_rest_m.size(), 1)));
+  const float reach = 1.5F * apart;
+  for (std::size_t v = 0; v < moved.size(); ++v) {
+    const glm::vec3 at(surface.vertices[v]);
+    if (glm::any(glm::lessThan(at, low - reach)) || glm::any(glm::greaterThan(at, high + reach))) continue;
+    glm::vec3 sum(0.0F);
+    float weights = 0.0F;
+    for (std::size_t p = 0; p < patch.at_rest_m.size(); ++p) {
+      const float distance = glm::distance(at, patch.at_rest_m[p]);
+      if (distance > reach) continue;
+      const float weight = 1.0F / std::max(distance * distance, 1e-4F * reach * reach);
+      sum += weight * patch.moved_m[p];
+      weights += weight;
+    }
+    if (weights > 0.0F) moved[v] = sum / weights;
+  }
+}
+
+}  // namespace
+
+// Between the nodes of the finest box that it is in.
+glm::vec3 SoftDent::at(const glm::dvec3& at_rest_m) const noexcept {
+  const glm::dvec3 point = ((at_rest_m - origin_m) * to_scene) / spacing_m;  // v · R is Rᵀ v
+  for (std::size_t n = 0; n < count; ++n) {
+    const Box& box = boxes[n];
+    std::array<std::size_t, 3> node{};
+    std::array<double, 3> part{};
+    bool inside = true;
+    for (std::size_t d = 0; d < 3; ++d) {
+      const double steps = (point[static_cast<int>(d)] - box.first[d]) / box.step, last = box.count[d] - 1.0;
+      inside = inside && (!box.open_low[d] || steps >= 0.0) && (!box.open_high[d] || steps <= last);
+      const double at = std::clamp(steps, 0.0, last),
+                   low = std::clamp(std::floor(at), 0.0, std::max(0.0, last - 1.0));
+      node[d] = static_cast<std::size_t>(low);
+      part[d] = at - low;
+    }
+    if (!inside && n + 1 < count) continue;
+    glm::dvec3 sum(0.0);
+    for (unsigned corner = 0; corner < 8; ++corner) {
+      double weight = 1.0;
+      std::size_t from = 0;
+      for (std::size_t d = 0; d < 3; ++d) {
+        const bool high = (corner >> d & 1U) != 0;
+        weight *= high ? part[d] : 1.0 - part[d];
+        from += (node[d] + (high ? 1U : 0U)) * (d == 0 ? 1 : d == 1 ? box.stride : box.plane);
+      }
+      if (weight == 0.0) continue;
+      for (std::size_t a = 0; a < 3; ++a)
+        sum[static_cast<int>(a)] += weight * static_cast<double>(box.moved_m[a][from]);
+    }
+    return glm::vec3(to_scene * sum);
+  }
+  return glm::vec3(0.0F);
+}
+
+void show_live(const DrawnScene& scene, const Snapshot& snapshot, const RelaxationThread::Moved& surfaces,
+               Snapshot& shown) {
+  shown = snapshot;
+  for (std::size_t o = 0; o < std::min(shown.dents.size(), shown.soft_moved_m.size()); ++o) {
+    const SoftDent& dent = shown.dents[o];
+    if (!dent.used) continue;
+    const auto& at_rest = scene.objects[o].surface.vertices;
+    shown.soft_moved_m[o].assign(at_rest.size(), glm::vec3(0.0F));
+    if (dent.count == 0) continue;
+    for (std::size_t v = 0; v < at_rest.size(); ++v) shown.soft_moved_m[o][v] = dent.at(at_rest[v]);
+  }
+  for (std::size_t o = 0; o < std::min(surfaces.size(), shown.soft_moved_m.size()); ++o) {
+    if (surfaces[o].empty()) continue;
+    shown.soft_moved_m[o] = surfaces[o];
+    if (o < shown.patches.size() && !shown.patches[o].at_rest_m.empty())
+      lay_patch(scene.objects[o].surface, shown.patches[o], shown.soft_moved_m[o]);
+  }
+}
+
+}  // namespace hybrid

@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/tick/proxy/proxy_surroundings.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+namespace hybrid {
+namespace {
+
+constexpr int kMaxShrinks = 60;             // of a survey that found too much
+constexpr int kCrowded = 5;                 // so many shrinks do not help where a fan has its pole
+constexpr std::uint32_t kManySurveys = 12;  // of one sweep: then larger ones
+constexpr double kAhead = 0.6;              // of its margin a survey is made ahead of the proxy
+// A survey is good that finds so many elements: fewer are soon left, more are long to read. A ball has more
+// under it than a point before it is free to move at all.
+constexpr double kGoodCount = 16.0, kGoodUnderBall = 104.0;
+constexpr double kCrowdStays = 0.7;  // of the count, when about half of the margin still finds it: a pole
+constexpr double kHalfOrSo = 0.6;
+constexpr double kFurtherLook = 4.0;  // times as far, when the look ends a step
+
+double max_component(const glm::dvec3& v) noexcept {
+  return std::max({v.x, v.y, v.z});
+}
+
+}  // namespace
+
+// The proxy came here by another way than the last sweep's: a plane between it and an element may have it
+// on the wrong side.
+void Surroundings::see_afresh(const glm::dvec3& from) noexcept {
+  for (std::uint32_t o = 0; o < world_.rigid.size(); ++o) {
+    if (scope_.kind != Scope::Kind::all && (scope_.kind == Scope::Kind::only) != (o == scope_.object))
+      continue;
+    RigidNear& near = state_.rigid[o];
+    near.near.see_from(*world_.rigid[o].surface, near.frame.to_body(from), radius_, rounding_);
+  }
+}
+
+// Which objects are near, and that what is known of them covers the proxy.
+bool Surroundings::look_from(const glm::dvec3& point) noexcept {
+  point_ = point;
+  const double room = state_.look_m - radius_ - max_component(glm::abs(point_ - state_.look_at));
+  if (scope_.kind == Scope::Kind::only) {
+    state_.look_m = -1.0;  // what the map said of the scene is not what is asked
+  } else if (state_.look_m < 0.0 || room < 0.0 || look_ended_) {
+    if (look_ended_) look_cells_ *= kFurtherLook;  // too short-sighted for this motion
+    state_.look_at = point_;
+    state_.look_m = radius_ + look_cells_ * state_.map.cell_m();
+    state_.look_mask =
+        world_.use_map ? state_.map.rigid_in(point_ - state_.look_m, point_ + state_.look_m, state_.map_trail)
+                       : ~std::uint64_t{0};
+    look_ended_ = false;
+    // Unasked, a neighbourhood does not follow the proxy, which may come back on another side.
+    for (std::uint32_t o = 0; o < world_.rigid.size(); ++o) {
+      if (!asked(o) && !(scope_.kind == Scope::Kind::all_but && o == scope_.object))
+        state_.rigid[o].near.forget();
+    }
+  }
+  for (std::uint32_t o = 0; o < world_.rigid.size(); ++o) {
+    if (!asked(o)) continue;
+    const glm::dvec3 view = state_.rigid[o].frame.to_body(point_);
+    const bool ended = ended_ == o + 1;
+    if (!ended && state_.rigid[o].near.room(view) > 0.0) continue;
+    if (!survey(o, view, ended)) return false;
+  }
+  ended_ = 0;
+  return true;
+}
+
+bool Surroundings::survey(std::uint32_t o, const glm::dvec3& view, bool moving) noexcept {
+  RigidNear& near = state_.rigid[o];
+  const polygon::RigidSurface& surface = *world_.rigid[o].surface;
+  const double smallest = 1e-6 * radius_ + 1e2 * rounding_;
+  if (surveys_ > 1) near.margin_m *= 2.0;  // too short-sighted for this motion
+  const double longest = glm::length(surface.upper() - surface.lower()) + radius_;
+  near.margin_m = std::clamp(near.margin_m, std::min(4.0 * smallest, longest), longest);
+  // From afar as far as there is nothing.
+  const glm::dvec3 outside =
+      glm::max(glm::max(surface.lower() - view, view - surface.upper()), glm::dvec3(0.0));
+  const double apart = (glm::length(outside) - radius_) * (1.0 - 1e-9) - 4.0 * rounding_;
+  if (apart > 2.0 * near.margin_m) {
+    ++surveys_;
+    return near.near.survey(surface, view, apart, radius_, view);
+  }
+  const double margin = near.margin_m;
+  for (int n = 0; n < kMaxShrinks; ++n) {
+    if (n == kCrowded) near.margin_m = margin;
+    if (n >= kCrowded && near.margin_m < smallest) break;
+    const glm::dvec3 ahead = glm::transpose(near.frame.rotation) * direction_ * (kAhead * near.margin_m);
+    ++surveys_;
+    if (near.near.survey(surface, moving ? view + ahead : view, near.margin_m, radius_, view,
+                         n >= kCrowded || surveys_ > kManySurveys)) {
+      adapt_margin(near);
+      return true;
+    }
+    near.margin_m *= 0.5;
+  }
+  near.margin_m = radius_ + 1e3 * rounding_;
+  state_.faults |= fault_triangle_overflow;
+  return false;
+}
+
+// Of the next survey: so that it finds neither too few elements nor too many, if that is in its power.
+void Surroundings::adapt_margin(RigidNear& near) const noexcept {
+  const double count = std::max(1.0, static_cast<double>(near.near.size()));
+  const double good = kGoodCount + kGoodUnderBall * radius_ / (radius_ + near.margin_m);
+  const bool pole = count > good && count >= kCrowdStays * near.counted &&
+                    near.margin_m < kHalfOrSo * near.margin_counted_m;
+  near.counted = count;
+  near.margin_counted_m = near.margin_m;
+  if (pole) {
+    near.margin_m *= 2.0;
+  } else if (surveys_ < 3 || count < good) {  // else the way of this tick is what needs it
+    near.margin_m *= std::clamp(std::sqrt(good / count), 0.5, 1.5);
+  }
+}
+
+// Of the straight way to q, the part within everything that was looked at.
+double Surroundings::clear_part(const glm::dvec3& q) noexcept {
+  double part = 1.0;
+  ended_ = 0;
+  look_ended_ = false;
+  direction_ = q - point_;
+  const double length = glm::length(direction_);
+  if (length > 0.0) direction_ /= length;
+  for (int d = 0; d < 3 && scope_.kind != Scope::Kind::only; ++d) {
+    const double to = q[d] - point_[d];
+    const double most = state_.look_m - radius_;
+    const double ahead =
+        to > 0.0 ? state_.look_at[d] + most - point_[d] : point_[d] - state_.look_at[d] + most;
+    if (std::abs(to) * part > ahead) {
+      part = std::max(0.0, ahead / std::abs(to));
+      look_ended_ = true;
+    }
+  }
+  for (std::uint32_t o = 0; o < world_.rigid.size(); ++o) {
+    if (!asked(o)) continue;
+    const RigidNear& near = state_.rigid[o];
+    const glm::dvec3 a = near.frame.to_body(point_) - near.near.centre();
+    const glm::dvec3 way = near.frame.to_body(q) - near.near.centre() - a;
+    const double margin = near.near.margin();
+    // |a + f way| = margin
+    const double aa = glm::dot(way, way), ab = glm::dot(a, way), bb = glm::dot(a, a) - margin * margin;
+    if (aa * part * part + 2.0 * ab * part + bb <= 0.0) continue;
+    const double root = std::sqrt(std::max(0.0, ab * ab - aa * bb));
+    const double f = std::max(0.0, (root - ab) / aa) * (1.0 - 1e-9);
+    if (f >= part) continue;
+    part = f;
+    ended_ = o + 1;
+    look_ended_ = false;
+  }
+  return part;
+}
+
+// The element that the first `part` of the way to q meets first; kNobody when that is clear.
+HeldElement Surroundings::first_in_the_way(const glm::dvec3& q, double part,
+                                           std::span<const HeldElement> held) noexcept {
+  HeldElement first{kNobody, 0, {}, true};
+  double soonest = 2.0;
+  for (std::uint32_t o = 0; o < world_.rigid.size(); ++o) {
+    if (asked(o)) first_of(o, q, part, held, first, soonest);
+  }
+  return first;
+}
+
+// Planes seen from elsewhere say too soon rather than too late: so the soonest is seen from here instead,
+// until the soonest is one that was.
+void Surroundings::first_of(std::uint32_t o, const glm::dvec3& q, double part,
+                            std::span<const HeldElement> held, HeldElement& first, double& soonest) noexcept {
+  using Broken = polygon::Neighbourhood::Broken;
+  RigidNear& near = state_.rigid[o];
+  const glm::dvec3 view = near.frame.to_body(point_), goal = near.frame.to_body(q);
+  const glm::dvec3 end = part == 1.0 ? goal : view + part * (goal - view);
+  const double tolerance = 2.0 * rounding_;
+  std::span<Broken> broken = near.near.broken(view, end, tolerance);
+  while (!broken.empty()) {
+    std::size_t n = 0;
+    for (std::size_t i = 1; i < broken.size(); ++i) {
+      if (broken[i].part < broken[n].part ||
+          (broken[i].part == broken[n].part &&
+           near.near.element(broken[i].index) < near.near.element(broken[n].index)))
+        n = i;
+    }
+    if (broken[n].part >= soonest) return;
+    HeldElement candidate{o, near.near.element(broken[n].index), {}, true};
+    if (broken[n].fresh) {
+      soonest = broken[n].part;
+      first = candidate;
+      first.in_body = near.near.plane(broken[n].index);
+      return;
+    }
+    if (!covered(candidate, held))
+      candidate.in_body = polygon::separate(*world_.rigid[o].surface, candidate.element, view, radius_);
+    near.near.set_plane(broken[n].index, candidate.in_body);
+    // A plane that only the first part of the way breaks, by what rounding did to where the proxy stands,
+    // is being left.
+    const double depth = candidate.in_body.offset - glm::dot(candidate.in_body.normal, end);
+    const double at_goal = candidate.in_body.offset - glm::dot(candidate.in_body.normal, goal);
+    if (depth > tolerance && at_goal > tolerance) {
+      broken[n].fresh = true;
+      broken[n].part = polygon::Neighbourhood::part_before(candidate.in_body, view, end);
+    } else {
+      broken[n] = broken.back();
+      broken = broken.first(broken.size() - 1);
+    }
+  }
+}
+
+// Does a plane that holds already keep the proxy from this element as well? On a convex surface one plane
+// covers everything, and the proxy need not stop at each edge.
+bool Surroundings::covered(HeldElement& candidate, std::span<const HeldElement> held_planes) const noexcept {
+  const polygon::RigidSurface& surface = *world_.rigid[candidate.object].surface;
+  for (const HeldElement& held : held_planes) {
+    if (held.object != candidate.object) continue;
+    if (held.element != candidate.element && !(surface.support(candidate.element, held.in_body.normal) <=
+                                               held.in_body.offset - radius_ + rounding_))
+      continue;
+    candidate.in_body = held.in_body;
+    return true;
+  }
+  return false;
+}
+
+}  // namespace hybrid

@@ -1,0 +1,406 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/tick/proxy/proxy_sweep.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "hybrid/tick/proxy/proxy_surroundings.h"
+#include "polygon/proxy/round_contact.h"
+
+namespace hybrid {
+namespace {
+
+constexpr std::uint32_t kMaxSteps = 64;
+constexpr std::uint32_t kMaxExchanges = 64;  // planes that join or are made anew in one step
+constexpr std::uint32_t kMaxCrossings = 16;  // of nearly flat edges, in one sweep
+// A step shorter than this, of the way to the target and of the ball, is the end.
+constexpr double kConvergedWay = 1e-9, kConvergedBall = 1e-7;
+constexpr double kShortLook = 0.05, kLongerLook = 32.0, kLeastLook = 1e-9;
+// Round an edge or a corner, of the ball: how far beyond the minimum over its planes a step goes, and over
+// which way their turning is measured.
+constexpr double kRoundStep = 0.5, kTurnStep = 1e-4;
+
+class Sweeper {
+ public:
+  Sweeper(const World& world, WorldState& state, const glm::dvec3& target, const glm::dmat3& metric,
+          Scope scope = {}) noexcept
+      : world_(world),
+        state_(state),
+        target_(target),
+        metric_(metric),
+        factored_(metric),
+        held_(state.held),
+        scope_(scope),
+        around_(world, state, scope),
+        isotropic_(metric == glm::dmat3(metric[0][0])),
+        radius_(world.contact_radius_m()),
+        rounding_(world.rounding_m) {}
+
+  Sweep go(const glm::dvec3& from, double travel) noexcept {
+    Sweep sweep;
+    sweep.point = from;
+    sweep.arrived = false;
+    state_.trail_count = 0;
+    const bool goes_on = from == state_.swept_to_m;
+    if (!goes_on) around_.see_afresh(from);
+    for (std::uint32_t n = 0; n < state_.active_count && scope_.kind == Scope::Kind::all; ++n) {
+      const ActiveElement& active = state_.active[n];
+      const HeldElement& last = held_[n];
+      // Held as the last sweep left it, unless something else used the list since.
+      if (!goes_on || last.object != active.object || last.element != active.element)
+        held_[n] = {active.object, active.element, {}, true};
+      ++held_count_;
+    }
+    for (; sweep.steps < kMaxSteps; ++sweep.steps) {
+      point_ = sweep.point;
+      leave_trail(point_);
+      if (!around_.look_from(point_)) break;
+      if (sweep.steps == 0 &&
+          goes_on) {  // on the triangle that held it last: to the next, without a look here
+        const Crossing crossing = cross_ridges(sweep.point, travel);
+        if (crossing == Crossing::moved) continue;
+        sweep.arrived = crossing == Crossing::arrived;
+        if (sweep.arrived) break;
+      }
+      if (!solve()) break;
+      const glm::dvec3 move = minimum_.point - point_;
+      const double length = glm::length(move);
+      const double still =
+          kConvergedWay * glm::length(target_ - point_) + kConvergedBall * radius_ + rounding_;
+      if (round_.taken && !round_step_paid()) {
+        if (state_.trail_count > 0) --state_.trail_count;  // it never was there
+        sweep.point = round_.instead;
+        continue;
+      }
+      if (take_round_step(still, travel)) {
+        sweep.point = round_.to;
+        travel -= glm::length(round_.to - point_);
+        continue;
+      }
+      if (length <= still && fraction_ == 1.0) {
+        if (loosen_false_contacts()) continue;
+        sweep.point = minimum_.point;
+        keep_active();
+        if (cross_ridges(sweep.point, travel) == Crossing::moved) continue;
+        sweep.arrived = true;
+        break;
+      }
+      double part = fraction_;
+      if (part * length > travel) part = travel / length;
+      sweep.point = part == 1.0 ? minimum_.point : point_ + part * move;
+      travel -= part * length;
+      stepped_ = part * length;
+      keep_active();
+      if (fraction_ == 1.0 && part == 1.0) {
+        const Crossing crossing = cross_ridges(sweep.point, travel);
+        if (crossing == Crossing::arrived || (crossing == Crossing::none && held_flatly(sweep.point))) {
+          sweep.arrived = true;
+          break;
+        }
+      }
+      if (travel <= 0.0) break;
+    }
+    sweep.surveys = around_.surveys();
+    state_.swept_to_m = sweep.point;
+    if (scope_.kind == Scope::Kind::all) publish(sweep);
+    return sweep;
+  }
+
+ private:
+  [[nodiscard]] double cost(const glm::dvec3& q) const noexcept {
+    return glm::dot(q - target_, metric_ * (q - target_));
+  }
+
+  // Held by something round, the proxy goes on to where the minimum will be when the planes have turned. That
+  // is a way uphill, and must pay with the next step.
+  bool take_round_step(double still, double travel) noexcept {
+    if (round_.waits > 0) --round_.waits;
+    if (round_.waits > 0 || round_.taken || fraction_ != 1.0 || minimum_.active_count == 0 ||
+        glm::length(minimum_.point - point_) > radius_) {
+      round_.taken = false;
+      return false;
+    }
+    round_.taken = false;
+    std::array<polygon::TurningPlane, 3> planes;
+    bool turns = false;
+    for (std::uint32_t n = 0; n < minimum_.active_count; ++n) {
+      const HeldElement& held = held_[minimum_.active[n]];
+      planes[n] = {state_.planes[minimum_.active[n]].normal, minimum_.multiplier[n]};
+      if (held.flat) continue;
+      const BodyFrame& frame = state_.rigid[held.object].frame;
+      const glm::dvec3 view = frame.to_body(point_);
+      const glm::dvec3 on_plane =
+          view + (held.in_body.offset - glm::dot(held.in_body.normal, view)) * held.in_body.normal;
+      planes[n].turning = frame.rotation *
+                          polygon::turning_of(*world_.rigid[held.object].surface, held.element, on_plane,
+                                              kTurnStep * radius_) *
+                          glm::transpose(frame.rotation);
+      turns = true;
+    }
+    if (!turns) return false;
+    round_.instead = minimum_.point;
+    round_.to = polygon::minimum_on_turning_planes(
+        point_, minimum_.point, metric_, {planes.data(), minimum_.active_count}, kRoundStep * radius_);
+    const bool clear = glm::length(round_.to - round_.instead) > still &&
+                       glm::length(round_.to - point_) < travel && around_.is_clear(round_.to, held_planes());
+    around_.forget_end();
+    if (!clear) return false;
+    stepped_ = glm::length(round_.to - point_);
+    round_.taken = true;
+    keep_active();
+    return true;
+  }
+
+  // Is what was reached better than the minimum that was left for it? If not, back to that, and on without
+  // for a while.
+  bool round_step_paid() noexcept {
+    const glm::dvec3 reached = point_ + fraction_ * (minimum_.point - point_);
+    constexpr double kSame = 1.0 + 1e-14;
+    if (cost(reached) <= kSame * cost(round_.instead)) return true;
+    round_.taken = false;
+    round_.waits = round_.patience *= 2;
+    held_count_ = 0;
+    around_.see_afresh(round_.instead);
+    return false;
+  }
+
+  // The proxy is at the minimum on one triangle's plane. When the next one's is nearer to the target, and
+  // only a nearly flat edge lies between, there, over that edge; and so on.
+  enum class Crossing : std::uint8_t { none, moved, arrived };
+  Crossing cross_ridges(glm::dvec3& point, double& travel) noexcept {
+    if (held_count_ != 1 || !held_[0].flat || scope_.kind != Scope::Kind::all || !isotropic_)
+      return Crossing::none;
+    HeldElement& held = held_[0];
+    RigidNear& near = state_.rigid[held.object];
+    const polygon::RigidSurface& surface = *world_.rigid[held.object].surface;
+    const glm::dvec3 target = near.frame.to_body(target_);
+    bool moved = false;
+    while (crossings_ < kMaxCrossings) {
+      if (near.ridges.element != held.element || near.ridges.plane != held.in_body)
+        near.ridges = polygon::ridges_of(surface, held.element, held.in_body, radius_, rounding_);
+      const polygon::Ridges::Side* side = polygon::nearer_side(near.ridges, target);
+      if (side == nullptr) break;
+      ++crossings_;
+      const polygon::RidgeCrossing crossing = polygon::cross_ridge(near.ridges, *side, target);
+      const glm::dvec3 top = near.frame.to_scene(crossing.top), end = near.frame.to_scene(crossing.end);
+      const double length = glm::length(top - point) + glm::length(end - top);
+      const HeldElement from = held;
+      stand_at(point);
+      bool clear = length < travel && around_.is_clear(top, held_planes());
+      if (clear) {
+        stand_at(top);
+        held = {from.object, side->element, side->plane, true, true, false};
+        clear = around_.is_clear(end, held_planes());
+      }
+      if (!clear) {
+        held = from;
+        stand_at(point);
+        around_.see_afresh(point);
+        // Not far enough looked ahead: that comes first.
+        if (around_.ended()) return Crossing::moved;
+        break;
+      }
+      for (const glm::dvec3& corner : {point, top, end}) leave_trail(corner);
+      moved = true;
+      point = end;
+      travel -= length;
+      stepped_ = length;
+    }
+    if (!moved) return Crossing::none;
+    held.touching = touches(held, point);
+    if (!held.touching) return Crossing::moved;
+    state_.planes.assign(1, in_scene(held));
+    minimum_ = {};
+    minimum_.point = point;
+    minimum_.active_count = 1;
+    minimum_.multiplier[0] = metric_[0][0] * glm::length(point - target_);
+    return Crossing::arrived;
+  }
+
+  // The minimum over the planes in the way, and how much of the way there is known to be clear.
+  bool solve() noexcept {
+    state_.planes.clear();
+    // Of those that held the proxy before, the ones that it still touches, and those found not to.
+    std::uint32_t kept = 0;
+    for (std::uint32_t i = 0; i < held_count_; ++i) {
+      if (!around_.asked(held_[i].object) ||
+          (held_[i].own_plane && !held_[i].touching && !touches(held_[i], point_)))
+        continue;
+      held_[kept] = held_[i];
+      if (!held_[kept].flat) make_plane(held_[kept]);
+      ++kept;
+    }
+    held_count_ = kept;
+    for (std::uint32_t i = 0; i < held_count_; ++i) state_.planes.push_back(in_scene(held_[i]));
+    for (std::uint32_t n = 0; n < kMaxExchanges; ++n) {
+      minimum_ = polygon::minimise_on_planes(target_, factored_, state_.planes, rounding_);
+      if (!minimum_.feasible) {
+        state_.faults |= fault_infeasible;
+        return false;  // stay: the place before was outside everything
+      }
+      fraction_ = around_.clear_part(minimum_.point);
+      // Nothing holds the proxy just after it slid off what did: what is next is near, and short looks see
+      // few elements.
+      HeldElement first{Surroundings::kNobody, 0, {}, true};
+      for (double part = held_count_ == 0 ? short_look(minimum_.point) : 1.0;; part *= kLongerLook) {
+        const double share = std::min(part, 1.0) * fraction_;
+        first = around_.first_in_the_way(minimum_.point, share, held_planes());
+        if (first.object != Surroundings::kNobody || part >= 1.0) break;
+      }
+      if (first.object == Surroundings::kNobody) return true;
+      if (held_count_ == kMaxHeld || n + 1 == kMaxExchanges) {
+        stop_before(first);
+        return true;
+      }
+      // Found by the plane across its closest point, which says soonest what is really met; held by its own,
+      // which lets the proxy come up to it at once, not by halves.
+      make_plane(first);
+      held_[held_count_++] = first;
+      state_.planes.push_back(in_scene(first));
+    }
+    return true;
+  }
+
+  // Too many planes for one step: the way to the minimum over those known ends at the next, by the plane that
+  // found it. (Its own would be reached later, and others that nobody has looked at yet stand before that.)
+  void stop_before(const HeldElement& next) noexcept {
+    const BodyFrame& frame = state_.rigid[next.object].frame;
+    const glm::dvec3 end = point_ + fraction_ * (minimum_.point - point_);
+    fraction_ *= polygon::Neighbourhood::part_before(next.in_body, frame.to_body(point_), frame.to_body(end));
+    around_.forget_end();
+  }
+
+  // Of the way to q, a part as long as a twentieth of the last step.
+  [[nodiscard]] double short_look(const glm::dvec3& q) const noexcept {
+    const double way = glm::length(q - point_);
+    if (!(stepped_ > 0.0 && way > 0.0)) return 1.0;
+    const double part = kShortLook * stepped_ / way;
+    return part > kLeastLook ? part : kLeastLook;  // nor nothing, however far q is
+  }
+
+  void make_plane(HeldElement& held) noexcept {
+    const glm::dvec3 view = state_.rigid[held.object].frame.to_body(point_);
+    const polygon::RigidSurface& surface = *world_.rigid[held.object].surface;
+    held.flat = held.own_plane &&
+                polygon::separate_flatly(surface, held.element, view, radius_, rounding_, held.in_body);
+    if (!held.flat) held.in_body = polygon::separate(surface, held.element, view, radius_);
+  }
+
+  // An element's own plane reaches beyond the element: a proxy that rests where the element is not rests on
+  // nothing. True when there was one, and the step must be done again.
+  bool loosen_false_contacts() noexcept {
+    bool any = false;
+    for (std::uint32_t n = 0; n < minimum_.active_count; ++n) {
+      HeldElement& held = held_[minimum_.active[n]];
+      if (!held.own_plane || touches(held, point_)) continue;
+      held.own_plane = false;
+      held.flat = false;
+      any = true;
+    }
+    return any;
+  }
+
+  // Held by nothing, or by elements' own planes alone where the elements are: no plane would change if it
+  // were seen from `point`, so the minimum is the minimum.
+  [[nodiscard]] bool held_flatly(const glm::dvec3& point) noexcept {
+    for (std::uint32_t n = 0; n < held_count_; ++n) {
+      held_[n].touching = held_[n].flat && touches(held_[n], point);
+      if (!held_[n].touching) return false;
+    }
+    return true;
+  }
+
+  [[nodiscard]] bool touches(const HeldElement& held, const glm::dvec3& point) const noexcept {
+    const glm::dvec3 view = state_.rigid[held.object].frame.to_body(point);
+    const polygon::NearPoint near = world_.rigid[held.object].surface->closest(held.element, view);
+    if (!held.flat) return near.distance <= radius_ * (1.0 + kConvergedBall) + 4.0 * rounding_;
+    // The foot on the plane must be the closest point: by distance alone, a ball would lie on a triangle
+    // whose edge it had passed by a root of the tolerance.
+    const glm::dvec3 away = view - near.point;
+    const glm::dvec3 aside = away - glm::dot(away, held.in_body.normal) * held.in_body.normal;
+    return glm::length(aside) <= 4.0 * rounding_;
+  }
+
+  // Only what holds the proxy goes on to the next step.
+  void keep_active() noexcept {
+    // In place: an active one may stand before or after where it goes.
+    std::array<std::uint32_t, 3> from = minimum_.active;
+    held_count_ = std::min<std::uint32_t>(minimum_.active_count, 3);
+    for (std::uint32_t n = 0; n < held_count_; ++n) {
+      std::swap(held_[n], held_[from[n]]);
+      for (std::uint32_t m = n + 1; m < held_count_; ++m) {
+        if (from[m] == n) from[m] = from[n];
+      }
+      held_[n].own_plane = true;
+      held_[n].touching = false;
+    }
+  }
+
+  void publish(Sweep& sweep) noexcept {
+    std::fill(state_.rigid_force_N.begin(), state_.rigid_force_N.end(), glm::dvec3(0.0));
+    for (std::uint32_t n = 0; n < minimum_.active_count && n < held_count_; ++n) {
+      // After a whole step the held ones are the active ones, in their order; before, they are named by
+      // index.
+      const polygon::ContactPlane& plane = state_.planes[minimum_.active[n]];
+      const glm::dvec3 force = minimum_.multiplier[n] * plane.normal;
+      sweep.force_N += force;
+      state_.rigid_force_N[plane.object] += force;
+      state_.active[n] = {plane.object, plane.element, force};
+    }
+    state_.active_count = minimum_.active_count;
+  }
+
+  [[nodiscard]] std::span<const HeldElement> held_planes() const noexcept {
+    return {held_.data(), held_count_};
+  }
+  void leave_trail(const glm::dvec3& corner) noexcept {
+    if (state_.trail_count < state_.trail.size()) state_.trail[state_.trail_count++] = corner;
+  }
+  void stand_at(const glm::dvec3& point) noexcept {
+    point_ = point;
+    around_.stand_at(point);
+  }
+  [[nodiscard]] polygon::ContactPlane in_scene(const HeldElement& held) const noexcept {
+    const BodyFrame& frame = state_.rigid[held.object].frame;
+    const glm::dvec3 normal = frame.rotation * held.in_body.normal;
+    return {normal, held.in_body.offset + glm::dot(normal, frame.position_m), held.object, held.element};
+  }
+
+  const World& world_;
+  WorldState& state_;
+  const glm::dvec3 target_;
+  const glm::dmat3 metric_;
+  const polygon::Metric factored_;
+  std::array<HeldElement, kMaxHeld>& held_;
+  const Scope scope_;
+  Surroundings around_;
+  const bool isotropic_;
+  const double radius_, rounding_;
+  glm::dvec3 point_{0.0};  // feasible; where everything is seen from
+  std::uint32_t held_count_ = 0;
+  polygon::PlaneMinimum minimum_;
+  struct RoundStep {
+    bool taken = false;                     // the last step was one
+    std::uint32_t waits = 0, patience = 1;  // steps until the next, since one did not pay
+    glm::dvec3 instead{0.0}, to{0.0};
+  } round_;
+  std::uint32_t crossings_ = 0;
+  double stepped_ = 0.0;   // how long the last step was
+  double fraction_ = 1.0;  // of the way to the minimum that is known to be clear
+};
+
+}  // namespace
+
+Sweep sweep_proxy(const World& world, WorldState& state, const glm::dvec3& from, const glm::dvec3& target,
+                  const glm::dmat3& metric, double travel) noexcept {
+  return Sweeper(world, state, target, metric).go(from, travel);
+}
+
+Sweep sweep_past(const World& world, WorldState& state, std::uint32_t object, bool but,
+                 const glm::dvec3& from, const glm::dvec3& target) noexcept {
+  const Scope scope{but ? Scope::Kind::all_but : Scope::Kind::only, object};
+  return Sweeper(world, state, target, glm::dmat3(1.0), scope).go(from, std::numeric_limits<double>::max());
+}
+
+}  // namespace hybrid

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Soft against rigid and soft against soft: who stops whom.
+#pragma once
+
+#include "hybrid/world/world.h"
+
+namespace hybrid {
+
+// How near a rigid surface must be to a surface voxel, in spacings, to become its obstacle.
+inline constexpr double kObstacleRange = 4.0;
+
+// On load: gives every surface voxel near a rigid surface the half-space it may not leave. At rest nothing
+// presses: a voxel that already overlaps keeps the depth it has. Returns how many voxels have one.
+std::size_t find_obstacles(const World& world, WorldState& state, std::size_t soft);
+
+// In the tick: voxels that moved look again for rigid surfaces, so many a tick, those first that are nearest
+// to meeting one they have not seen. Looked through are what the tool touches, the rows that waves moved, and
+// a slice of all. (By turns, and each whenever it had moved a quarter of its spacing, voxels far from
+// everything took the looks of those that arrived: tissue thrown at a plate at 1 m/s went in by its spacing.)
+void refresh_obstacles(const World& world, WorldState& state) noexcept;
+// The same where what was relaxed apart arrived in this tick, which may be far from where it was. What is in
+// a surface that it did not know leaves it at once. (Left to the next result, a brain that came down on the
+// skull was in it by a tenth of a cell.)
+void refresh_arrived(const World& world, WorldState& state) noexcept;
+
+// In the tick: finds pairs of voxels of different objects that meet (a slice of the surface a tick), relaxes
+// all pairs, and lets go of those that parted.
+void relax_pairs(const World& world, WorldState& state) noexcept;
+
+}  // namespace hybrid

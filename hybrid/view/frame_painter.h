@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// One whole frame: the scene, the nearer view of the contact, and the words. Picture and window show the
+// same.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "hybrid/view/camera.h"
+#include "hybrid/view/overlay.h"
+#include "hybrid/view/renderer.h"
+#include "hybrid/snapshot/snapshot.h"
+
+namespace hybrid {
+
+struct FrameOptions {
+  int width = 0, height = 0;  // (pixels)
+  bool inset = true;          // a nearer view of the contact, where the tool is small in the whole
+  std::vector<ForceSample> history;
+  std::string help;
+  bool paused = false;
+};
+
+// Needs a current OpenGL context for its whole life. Keeps a reference to the scene.
+class FramePainter {
+ public:
+  FramePainter(const DrawnScene& scene, Samples samples, int height);
+
+  // Draws the frame off screen; then present() or read_rgb().
+  void paint(const Snapshot& snapshot, const Camera& camera, const FrameOptions& options);
+  void present(int width, int height) { renderer_.present(width, height); }
+  [[nodiscard]] std::vector<std::uint8_t> read_rgb() { return renderer_.read_rgb(); }
+
+ private:
+  const DrawnScene& scene_;
+  Renderer renderer_;
+  Overlay overlay_;
+};
+
+}  // namespace hybrid

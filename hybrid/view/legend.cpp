@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/view/legend.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+#include "hybrid/view/overlay.h"
+#include "hybrid/view/palette.h"
+
+namespace hybrid {
+namespace {
+
+constexpr std::size_t kMostSingly = 6;  // rigid objects that nothing touches, each with a row of its own
+constexpr std::size_t kMostMaterials = palette::material.size() + 1;  // rows of one object's materials
+constexpr std::size_t kMostStripes = 4;                               // colours of one swatch
+
+bool finite(const glm::dvec3& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+std::string and_more(std::size_t count) {
+  return "and " + std::to_string(count) + " more";
+}
+
+ObjectFeel feel_of(const Snapshot& snapshot, std::size_t object) {
+  return object < snapshot.feel.size() ? snapshot.feel[object] : ObjectFeel{};
+}
+
+// The first few colours that differ.
+std::vector<glm::vec3> stripes(std::span<const glm::vec3> colours) {
+  std::vector<glm::vec3> few;
+  for (const glm::vec3& c : colours) {
+    if (few.size() < kMostStripes && std::ranges::find(few, c) == few.end()) few.push_back(c);
+  }
+  return few;
+}
+
+// The material of the surface's vertex that is nearest to the tool; empty where the object is not touched.
+std::optional<std::size_t> material_touched(const DrawnScene& scene, const Snapshot& snapshot,
+                                            std::size_t object) {
+  const DrawnObject& drawn = scene.objects[object];
+  const auto& rest = drawn.surface.vertices;
+  if (!feel_of(snapshot, object).contact || drawn.vertex_material.size() != rest.size()) return {};
+  const bool moved =
+      object < snapshot.soft_moved_m.size() && snapshot.soft_moved_m[object].size() == rest.size();
+  std::optional<std::size_t> nearest;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t v = 0; v < rest.size(); ++v) {
+    const glm::dvec3 at = moved ? rest[v] + glm::dvec3(snapshot.soft_moved_m[object][v]) : rest[v];
+    const glm::dvec3 way = at - snapshot.proxy_m;
+    const double squared = glm::dot(way, way);
+    if (!(squared < least)) continue;
+    least = squared;
+    nearest = drawn.vertex_material[v];
+  }
+  return nearest;
+}
+
+// The objects with a row of their own, in the order of their rows, and what one row says of the rigid others.
+struct ShownObjects {
+  std::vector<std::size_t> singly, grouped;
+};
+
+ShownObjects choose_objects(const DrawnScene& scene, const Snapshot& snapshot, std::size_t most) {
+  ShownObjects shown;
+  const auto untouched_rigid = [&](std::size_t i) {
+    return !scene.objects[i].soft && !feel_of(snapshot, i).contact;
+  };
+  std::size_t quiet = 0;
+  for (std::size_t i = 0; i < scene.objects.size(); ++i) quiet += untouched_rigid(i) ? 1U : 0U;
+  const bool group = quiet > kMostSingly || (quiet > 1 && scene.objects.size() > most);
+  for (std::size_t i = 0; i < scene.objects.size(); ++i)
+    (group && untouched_rigid(i) ? shown.grouped : shown.singly).push_back(i);
+  if (!group && shown.singly.size() <= most) return shown;
+  // A list that is not complete begins with what is touched, and what is soft.
+  const auto rank = [&](std::size_t i) {
+    return feel_of(snapshot, i).contact ? 0 : scene.objects[i].soft ? 1 : 2;
+  };
+  std::ranges::stable_sort(shown.singly, {}, rank);
+  return shown;
+}
+
+void add_object(std::vector<LegendRow>& rows, const DrawnScene& scene, const Snapshot& snapshot,
+                std::size_t object, std::size_t material_rows) {
+  const DrawnObject& drawn = scene.objects[object];
+  const ObjectFeel feel = feel_of(snapshot, object);
+  const std::vector<glm::vec3> colours = palette::of_materials(scene, object);
+  rows.push_back({.swatch = stripes(colours),
+                  .name = drawn.name,
+                  .kind = drawn.soft ? "soft" : "rigid",
+                  .force = feel.contact ? force_text(feel.force_N) : "-",
+                  .touched = feel.contact});
+  const std::size_t count = drawn.materials.size();
+  const std::size_t listed =
+      count <= material_rows ? count : material_rows - std::min<std::size_t>(material_rows, 1);
+  if (listed == 0) return;
+  // What is touched is listed, in the place of the last if need be.
+  std::vector<std::size_t> order(count);
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  const std::optional<std::size_t> touched = material_touched(scene, snapshot, object);
+  if (touched && *touched >= listed && *touched < count) std::swap(order[listed - 1], order[*touched]);
+  for (std::size_t row = 0; row < listed; ++row) {
+    const std::size_t m = order[row];
+    rows.push_back(
+        {.swatch = {colours[m]}, .name = drawn.materials[m], .touched = touched == m, .within = true});
+  }
+  if (count == listed) return;
+  std::vector<glm::vec3> rest;
+  for (std::size_t row = listed; row < count; ++row) rest.push_back(colours[order[row]]);
+  rows.push_back({.swatch = stripes(rest), .name = and_more(count - listed), .within = true});
+}
+
+void add_tool(std::vector<LegendRow>& rows, const DrawnScene& scene, const Snapshot& snapshot) {
+  const glm::dvec3 off = snapshot.device_m - snapshot.proxy_m;
+  rows.push_back({.swatch = {palette::tool},
+                  .name = "tool, as felt (proxy)",
+                  .kind = scene.tool_is_punch ? "punch" : "ball"});
+  rows.push_back({.swatch = {palette::device},
+                  .name = "tool, where the device is",
+                  .force = finite(off) ? length_text(glm::length(off)) + " off" : "not finite",
+                  .alpha = 0.45F});
+  rows.push_back({.swatch = {palette::force},
+                  .name = "force on the hand",
+                  .force = force_text(glm::length(snapshot.force_N))});
+}
+
+// Rigid objects in one row: the first by its name.
+LegendRow grouped_row(const DrawnScene& scene, std::span<const std::size_t> objects) {
+  std::vector<glm::vec3> colours;
+  for (const std::size_t i : objects.first(std::min(objects.size(), 2 * palette::rigid.size())))
+    colours.push_back(palette::of_object(scene, i));
+  return {.swatch = stripes(colours),
+          .name = scene.objects[objects.front()].name,
+          .more = objects.size() > 1 ? " " + and_more(objects.size() - 1) : "",
+          .kind = "rigid",
+          .force = "-"};
+}
+
+float covered(const PixelBox& a, const PixelBox& b) {
+  const glm::vec2 both = glm::min(a.high, b.high) - glm::max(a.low, b.low);
+  return std::max(both.x, 0.0F) * std::max(both.y, 0.0F);
+}
+
+}  // namespace
+
+std::vector<LegendRow> legend_rows(const DrawnScene& scene, const Snapshot& snapshot, std::size_t most) {
+  std::vector<LegendRow> rows, tool;
+  add_tool(tool, scene, snapshot);
+  const std::size_t room = std::max<std::size_t>(most, tool.size() + 1) - tool.size();
+  const ShownObjects shown = choose_objects(scene, snapshot, room);
+  const std::size_t group_rows = shown.grouped.empty() ? 0 : 1;
+  std::size_t objects = shown.singly.size();
+  if (objects + group_rows > room) objects = room - std::min(room, group_rows + 1);
+  const bool cut = objects < shown.singly.size();
+  std::size_t left = room - std::min(room, objects + group_rows + (cut ? 1 : 0));
+  for (std::size_t n = 0; n < objects; ++n) {
+    const std::size_t before = rows.size() + 1;
+    add_object(rows, scene, snapshot, shown.singly[n], std::min(left, kMostMaterials));
+    left -= rows.size() - before;
+  }
+  if (group_rows > 0) rows.push_back(grouped_row(scene, shown.grouped));
+  if (cut) rows.push_back({.name = and_more(shown.singly.size() - objects)});
+  rows.insert(rows.end(), tool.begin(), tool.end());
+  return rows;
+}
+
+std::size_t choose_place(std::span<const PixelBox> places, std::span<const PixelBox> clear,
+                         std::optional<std::size_t> last) {
+  const auto cover = [&](std::size_t place) {
+    float sum = 0.0F;
+    for (const PixelBox& box : clear) sum += covered(places[place], box);
+    return sum;
+  };
+  if (last && *last < places.size() && !(cover(*last) > 0.0F)) return *last;
+  std::size_t best = 0;
+  for (std::size_t place = 1; place < places.size(); ++place) {
+    if (cover(place) < cover(best)) best = place;
+  }
+  return best;
+}
+
+}  // namespace hybrid

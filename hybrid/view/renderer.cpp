@@ -1,0 +1,514 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/view/renderer.h"
+
+#include <epoxy/gl.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <glm/geometric.hpp>
+#include <glm/gtc/type_ptr.hpp>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+#include "hybrid/view/unit_shapes.h"
+#include "hybrid/view/tool_and_arrow.h"
+#include "hybrid/view/palette.h"
+#include "hybrid/view/renderer_shaders.h"
+
+namespace hybrid {
+namespace {
+
+void check_gl(const char* doing) {
+  const GLenum error = glGetError();
+  if (error == GL_NO_ERROR) return;
+  for (int i = 0; i < 16 && glGetError() != GL_NO_ERROR; ++i) {
+  }
+  if (error == GL_OUT_OF_MEMORY) {
+    throw std::runtime_error(std::string("the graphics memory is full while ") + doing +
+                             "; use a smaller picture or a coarser mesh");
+  }
+  throw std::runtime_error("OpenGL error " + std::to_string(error) + " while " + doing +
+                           "; update the graphics driver, or set LIBGL_ALWAYS_SOFTWARE=1 to draw without it");
+}
+
+GLuint compile(GLenum kind, const char* source) {
+  const GLuint shader = glCreateShader(kind);
+  glShaderSource(shader, 1, &source, nullptr);
+  glCompileShader(shader);
+  GLint good = GL_FALSE;
+  glGetShaderiv(shader, GL_COMPILE_STATUS, &good);
+  if (good != GL_TRUE) {
+    std::string log(1024, '\0');
+    GLsizei length = 0;
+    glGetShaderInfoLog(shader, static_cast<GLsizei>(log.size()), &length, log.data());
+    log.resize(static_cast<std::size_t>(std::max(length, 0)));
+    throw std::runtime_error("the graphics driver refuses a shader: " + log +
+                             "; set LIBGL_ALWAYS_SOFTWARE=1 to draw without it");
+  }
+  return shader;
+}
+
+GLuint link(const char* vertex, const char* fragment) {
+  const GLuint program = glCreateProgram();
+  const GLuint parts[] = {compile(GL_VERTEX_SHADER, vertex), compile(GL_FRAGMENT_SHADER, fragment)};
+  for (const GLuint part : parts) {
+    glAttachShader(program, part);
+    glDeleteShader(part);
+  }
+  glLinkProgram(program);
+  GLint good = GL_FALSE;
+  glGetProgramiv(program, GL_LINK_STATUS, &good);
+  if (good != GL_TRUE) throw std::runtime_error("the graphics driver cannot link a shader; update it");
+  return program;
+}
+
+const void* offset(std::size_t bytes) {
+  return reinterpret_cast<const void*>(bytes);  // NOLINT(performance-no-int-to-ptr): how OpenGL wants it
+}
+
+struct Mesh {
+  GLuint array = 0, vertices = 0, indices = 0, colours = 0;
+  GLsizei count = 0;
+
+  void upload(const DrawMesh& mesh, GLenum usage) {
+    if (mesh.indices.size() > static_cast<std::size_t>(std::numeric_limits<GLsizei>::max())) {
+      throw std::runtime_error("a surface of " + std::to_string(mesh.indices.size() / 3) +
+                               " triangles is more than one draw call holds; simplify the mesh");
+    }
+    glGenVertexArrays(1, &array);
+    glGenBuffers(1, &vertices);
+    glGenBuffers(1, &indices);
+    glBindVertexArray(array);
+    glBindBuffer(GL_ARRAY_BUFFER, vertices);
+    glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(mesh.vertices.size() * sizeof(DrawVertex)),
+                 mesh.vertices.data(), usage);
+    glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, indices);
+    glBufferData(GL_ELEMENT_ARRAY_BUFFER,
+                 static_cast<GLsizeiptr>(mesh.indices.size() * sizeof(std::uint32_t)), mesh.indices.data(),
+                 GL_STATIC_DRAW);
+    constexpr auto stride = static_cast<GLsizei>(sizeof(DrawVertex));
+    glVertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, stride, offset(offsetof(DrawVertex, position)));
+    glVertexAttribPointer(1, 3, GL_FLOAT, GL_FALSE, stride, offset(offsetof(DrawVertex, normal)));
+    glVertexAttribPointer(2, 1, GL_FLOAT, GL_FALSE, stride, offset(offsetof(DrawVertex, displacement_m)));
+    for (GLuint i = 0; i < 3; ++i) glEnableVertexAttribArray(i);
+    count = static_cast<GLsizei>(mesh.indices.size());
+  }
+  // A colour a vertex, sRGB, once.
+  void upload_colours(const std::vector<VertexColour>& of_vertex) {
+    glGenBuffers(1, &colours);
+    glBindVertexArray(array);
+    glBindBuffer(GL_ARRAY_BUFFER, colours);
+    glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(of_vertex.size() * sizeof(VertexColour)),
+                 of_vertex.data(), GL_STATIC_DRAW);
+    glVertexAttribPointer(3, 4, GL_UNSIGNED_BYTE, GL_TRUE, 0, offset(0));
+    glEnableVertexAttribArray(3);
+  }
+  // Orphans the old storage, so that the card need not wait for the last frame.
+  void stream(const DrawMesh& mesh) const {
+    const auto bytes = static_cast<GLsizeiptr>(mesh.vertices.size() * sizeof(DrawVertex));
+    glBindBuffer(GL_ARRAY_BUFFER, vertices);
+    glBufferData(GL_ARRAY_BUFFER, bytes, nullptr, GL_STREAM_DRAW);
+    glBufferSubData(GL_ARRAY_BUFFER, 0, bytes, mesh.vertices.data());
+  }
+  void draw() const {
+    glBindVertexArray(array);
+    glDrawElements(GL_TRIANGLES, count, GL_UNSIGNED_INT, nullptr);
+  }
+};
+
+struct Object {
+  Mesh mesh;
+  DrawMesh moving;  // kept for a soft object only
+  bool soft = false;
+  glm::vec3 colour{1.0F};
+  SceneBounds bounds;      // at rest
+  glm::mat4 placed{1.0F};  // from where it was uploaded to where it is
+};
+
+bool finite(const glm::dvec3& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+constexpr int most_pixels = 8192;
+
+}  // namespace
+
+struct Renderer::State {
+  GLuint mesh_program = 0, depth_program = 0, overlay_program = 0;
+  GLuint program = 0;  // the one in use, of mesh and depth
+  std::vector<Object> objects;
+  Mesh ball, cylinder, cone, disc;
+  GLuint overlay_array = 0, overlay_vertices = 0, overlay_indices = 0, font = 0;
+  GLuint scene_frame = 0, scene_colour = 0, scene_depth = 0;
+  GLuint shown_frame = 0, shown_depth = 0;
+  GLuint final_frame = 0, final_colour = 0;
+  int width = 0, height = 0, factor = 1, wanted_factor = 1, built_width = 0, built_height = 0;
+  SceneBounds bounds;        // at rest
+  glm::dvec3 origin_m{0.0};  // what the card's floats are relative to
+  double most_moved_m = 0.0;
+
+  void use(GLuint which, const glm::mat4& clip) {
+    program = which;
+    glUseProgram(program);
+    glUniformMatrix4fv(glGetUniformLocation(program, "clip_from_scene"), 1, GL_FALSE, glm::value_ptr(clip));
+    uniform("shown_depth", 0);
+  }
+  void uniform(const char* name, float value) const {
+    glUniform1f(glGetUniformLocation(program, name), value);
+  }
+  void uniform(const char* name, int value) const { glUniform1i(glGetUniformLocation(program, name), value); }
+  void uniform(const char* name, const glm::vec3& value) const {
+    glUniform3fv(glGetUniformLocation(program, name), 1, glm::value_ptr(value));
+  }
+  void place(const glm::mat4& scene_from_mesh) const {
+    // Normals of the unit shapes survive a transpose-inverse; the identity's is itself.
+    const glm::mat3 normal = glm::transpose(glm::inverse(glm::mat3(scene_from_mesh)));
+    glUniformMatrix4fv(glGetUniformLocation(program, "scene_from_mesh"), 1, GL_FALSE,
+                       glm::value_ptr(scene_from_mesh));
+    glUniformMatrix3fv(glGetUniformLocation(program, "normal_from_mesh"), 1, GL_FALSE,
+                       glm::value_ptr(normal));
+  }
+  void build_targets();
+  void draw_objects(bool soft, int pass) const;
+  void draw_tool(const DrawnScene& scene, const glm::dvec3& at) const;
+  void draw_arrow(const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera) const;
+};
+
+namespace {
+
+GLuint make_target(GLenum inner, GLenum outer, GLenum type, int width, int height) {
+  GLuint texture = 0;
+  glGenTextures(1, &texture);
+  glBindTexture(GL_TEXTURE_2D, texture);
+  glTexImage2D(GL_TEXTURE_2D, 0, static_cast<GLint>(inner), width, height, 0, outer, type, nullptr);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+  return texture;
+}
+
+void attach(GLuint frame, GLuint colour, GLuint depth) {
+  glBindFramebuffer(GL_FRAMEBUFFER, frame);
+  glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, colour, 0);
+  glFramebufferTexture2D(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_TEXTURE_2D, depth, 0);
+  const GLenum buffer = colour != 0 ? GL_COLOR_ATTACHMENT0 : GL_NONE;
+  glDrawBuffers(1, &buffer);
+  glReadBuffer(buffer);
+  if (glCheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE) {
+    throw std::runtime_error(
+        "the graphics driver cannot draw into a picture of this size; ask for a smaller one");
+  }
+}
+
+}  // namespace
+
+void Renderer::State::build_targets() {
+  const int w = width * factor;
+  const int h = height * factor;
+  if (w == built_width && h == built_height) return;
+  const GLuint old[] = {scene_colour, scene_depth, shown_depth, final_colour};
+  glDeleteTextures(4, old);
+  scene_colour = make_target(GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE, w, h);
+  scene_depth = make_target(GL_DEPTH_COMPONENT32F, GL_DEPTH_COMPONENT, GL_FLOAT, w, h);
+  shown_depth = make_target(GL_DEPTH_COMPONENT32F, GL_DEPTH_COMPONENT, GL_FLOAT, w, h);
+  final_colour = make_target(GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE, width, height);
+  attach(scene_frame, scene_colour, scene_depth);
+  attach(shown_frame, 0, shown_depth);
+  attach(final_frame, final_colour, 0);
+  built_width = w;
+  built_height = h;
+}
+
+void Renderer::State::draw_objects(bool soft, int pass) const {
+  uniform("pass", pass);
+  uniform("alpha", 1.0F);
+  uniform("shine", soft ? 0.10F : 0.05F);
+  for (const Object& object : objects) {
+    if (object.soft != soft || object.mesh.count == 0) continue;
+    place(object.placed);
+    uniform("own_colour", object.colour);
+    uniform("coloured_vertices", object.mesh.colours != 0 ? 1 : 0);
+    uniform("moved_scale", soft ? static_cast<float>(most_moved_m) : 0.0F);
+    object.mesh.draw();
+  }
+  uniform("moved_scale", 0.0F);
+  uniform("coloured_vertices", 0);
+  uniform("pass", 0);
+}
+
+void Renderer::State::draw_tool(const DrawnScene& scene, const glm::dvec3& at) const {
+  place(place_tool(scene, at, origin_m));
+  (scene.tool_is_punch ? cylinder : ball).draw();
+}
+
+void Renderer::State::draw_arrow(const DrawnScene& scene, const Snapshot& snapshot,
+                                 const Camera& camera) const {
+  const ArrowPlacement arrow = place_arrow(scene, snapshot, camera, origin_m);
+  if (!arrow.visible) return;
+  place(arrow.shaft);
+  cylinder.draw();
+  place(arrow.head);
+  cone.draw();
+}
+
+Renderer::Renderer(const DrawnScene& scene, Samples samples) : state_(std::make_unique<State>()) {
+  State& s = *state_;
+  if (epoxy_gl_version() < 33) {
+    throw std::runtime_error("drawing needs OpenGL 3.3, and this one is " +
+                             std::to_string(epoxy_gl_version() / 10) + "." +
+                             std::to_string(epoxy_gl_version() % 10) +
+                             "; set LIBGL_ALWAYS_SOFTWARE=1 to draw without the graphics card");
+  }
+  const auto* name = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
+  const bool software = name != nullptr && std::string_view(name).find("llvmpipe") != std::string_view::npos;
+  s.wanted_factor = software && samples == Samples::fast ? 1 : 2;
+  s.mesh_program = link(shaders::mesh_vertex, shaders::mesh_fragment);
+  s.depth_program = link(shaders::mesh_vertex, shaders::depth_fragment);
+  s.overlay_program = link(shaders::overlay_vertex, shaders::overlay_fragment);
+  s.bounds = bounds_of(scene);
+  s.origin_m = s.bounds.centre_m;
+  s.objects.resize(scene.objects.size());
+  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+    Object& object = s.objects[i];
+    object.soft = scene.objects[i].soft;
+    object.colour = palette::of_object(scene, i);
+    object.bounds = bounds_of(scene.objects[i].surface);
+    DrawMesh mesh = object.soft ? make_moving_mesh(scene.objects[i].surface, s.origin_m)
+                                : make_draw_mesh(scene.objects[i].surface, s.origin_m);
+    object.mesh.upload(mesh, object.soft ? GL_STREAM_DRAW : GL_STATIC_DRAW);
+    const std::vector<VertexColour> colours = colours_of_vertices(scene, i);
+    if (object.soft && colours.size() == mesh.vertices.size() && !colours.empty())
+      object.mesh.upload_colours(colours);
+    if (object.soft) object.moving = std::move(mesh);
+  }
+  s.ball.upload(make_unit_ball(), GL_STATIC_DRAW);
+  s.cylinder.upload(make_unit_cylinder(), GL_STATIC_DRAW);
+  s.cone.upload(make_unit_cone(), GL_STATIC_DRAW);
+  s.disc.upload(make_unit_disc(), GL_STATIC_DRAW);
+
+  glGenVertexArrays(1, &s.overlay_array);
+  glGenBuffers(1, &s.overlay_vertices);
+  glGenBuffers(1, &s.overlay_indices);
+  glBindVertexArray(s.overlay_array);
+  glBindBuffer(GL_ARRAY_BUFFER, s.overlay_vertices);
+  glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, s.overlay_indices);
+  constexpr auto stride = static_cast<GLsizei>(sizeof(OverlayVertex));
+  glVertexAttribPointer(0, 2, GL_FLOAT, GL_FALSE, stride, offset(offsetof(OverlayVertex, x)));
+  glVertexAttribPointer(1, 2, GL_FLOAT, GL_FALSE, stride, offset(offsetof(OverlayVertex, u)));
+  glVertexAttribPointer(2, 4, GL_UNSIGNED_BYTE, GL_TRUE, stride, offset(offsetof(OverlayVertex, colour)));
+  for (GLuint i = 0; i < 3; ++i) glEnableVertexAttribArray(i);
+  glGenFramebuffers(1, &s.scene_frame);
+  glGenFramebuffers(1, &s.shown_frame);
+  glGenFramebuffers(1, &s.final_frame);
+  check_gl("uploading the scene");
+}
+
+// The context goes with its picture or window, and takes every object with it.
+Renderer::~Renderer() = default;
+
+void Renderer::set_font(const FontAtlas& atlas) {
+  glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+  glGenTextures(1, &state_->font);
+  glBindTexture(GL_TEXTURE_2D, state_->font);
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_R8, atlas.width, atlas.height, 0, GL_RED, GL_UNSIGNED_BYTE,
+               atlas.alpha.data());
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  check_gl("uploading the font");
+}
+
+void Renderer::begin(const DrawnScene& scene, const Snapshot& snapshot, int width, int height) {
+  State& s = *state_;
+  if (width < 1 || height < 1 || width > most_pixels || height > most_pixels) {
+    throw std::runtime_error("a picture of " + std::to_string(width) + " x " + std::to_string(height) +
+                             " pixels cannot be drawn; each side must be from 1 to " +
+                             std::to_string(most_pixels));
+  }
+  GLint most = 0;
+  glGetIntegerv(GL_MAX_TEXTURE_SIZE, &most);
+  s.width = width;
+  s.height = height;
+  s.factor = s.wanted_factor;
+  while (s.factor > 1 && std::max(width, height) * s.factor > std::min(most, most_pixels)) --s.factor;
+  s.build_targets();
+  for (std::size_t i = 0; i < s.objects.size(); ++i) {
+    Object& object = s.objects[i];
+    object.placed = place_rigid(snapshot.place_of(i), s.origin_m);
+    if (!object.soft || i >= snapshot.soft_moved_m.size() || i >= scene.objects.size()) continue;
+    const auto& rest = scene.objects[i].surface.vertices;
+    if (snapshot.soft_moved_m[i].size() != rest.size() || rest.size() != object.moving.vertices.size())
+      continue;
+    const float moved = move_vertices(object.moving, rest, snapshot.soft_moved_m[i], s.origin_m);
+    object.mesh.stream(object.moving);
+    // What moved by less than a thousandth of the tool has not moved to the eye: rounding is not to be a
+    // pattern.
+    const double least = 1e-3 * scene.tool_radius_m;
+    if (static_cast<double>(moved) > std::max(s.most_moved_m, least)) {
+      // A round number at or above, never falling.
+      const double power = std::pow(10.0, std::floor(std::log10(static_cast<double>(moved))));
+      for (const double step : {1.0, 2.0, 5.0, 10.0}) {
+        s.most_moved_m = step * power;
+        if (s.most_moved_m >= static_cast<double>(moved) * (1.0 - 1e-6)) break;
+      }
+    }
+  }
+  glBindFramebuffer(GL_FRAMEBUFFER, s.scene_frame);
+  glDisable(GL_SCISSOR_TEST);
+  glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+  glClearColor(palette::background.r, palette::background.g, palette::background.b, 1.0F);
+  glClear(GL_COLOR_BUFFER_BIT);
+}
+
+void Renderer::draw(const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera,
+                    const PixelRect& where) {
+  State& s = *state_;
+  if (where.width < 1 || where.height < 1) return;
+  const bool tool_known = finite(snapshot.proxy_m) && scene.tool_radius_m > 0.0;
+  double radius = 1.1 * s.bounds.radius_m;
+  for (const glm::dvec3& at : {snapshot.proxy_m, snapshot.device_m, arrow_tip(scene, snapshot, camera)}) {
+    if (finite(at))
+      radius = std::max(radius, glm::length(at - s.bounds.centre_m) + 4.0 * scene.tool_radius_m);
+  }
+  for (std::size_t i = 0; i < s.objects.size(); ++i) {
+    const RigidPlace place = snapshot.place_of(i);
+    const glm::dvec3 at = place(s.objects[i].bounds.centre_m);
+    if (place.moved && finite(at))
+      radius = std::max(radius, glm::length(at - s.bounds.centre_m) + 1.1 * s.objects[i].bounds.radius_m);
+  }
+  const glm::mat4 clip(camera.clip_from_scene(static_cast<double>(where.width) / where.height, s.origin_m,
+                                              s.bounds.centre_m, radius));
+  s.use(s.mesh_program, clip);
+  s.uniform("eye", glm::vec3(camera.eye_m() - s.origin_m));
+  s.uniform("light_right", glm::vec3(camera.right()));
+  s.uniform("light_up", glm::vec3(camera.up()));
+  s.uniform("moved_half", palette::moved_half);
+  s.uniform("moved_most", palette::moved_most);
+  glActiveTexture(GL_TEXTURE0);
+  glBindTexture(GL_TEXTURE_2D, 0);
+  const int bottom = s.height - where.y - where.height;
+  glViewport(where.x * s.factor, bottom * s.factor, where.width * s.factor, where.height * s.factor);
+  glScissor(where.x * s.factor, bottom * s.factor, where.width * s.factor, where.height * s.factor);
+  glEnable(GL_SCISSOR_TEST);
+  glEnable(GL_DEPTH_TEST);
+  glDisable(GL_BLEND);
+  glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
+  glDepthFunc(GL_LEQUAL);
+  glDepthMask(GL_TRUE);
+
+  // Depth of what must not be hidden: soft objects, and a disc about the tool a little larger than it.
+  s.use(s.depth_program, clip);
+  glBindFramebuffer(GL_FRAMEBUFFER, s.shown_frame);
+  glClear(GL_DEPTH_BUFFER_BIT);
+  s.draw_objects(true, 0);
+  if (tool_known) {
+    s.place(place_tool_disc(scene, snapshot.proxy_m, camera, s.origin_m));
+    s.disc.draw();
+    s.draw_arrow(scene, snapshot, camera);
+  }
+
+  s.use(s.mesh_program, clip);
+  glBindFramebuffer(GL_FRAMEBUFFER, s.scene_frame);
+  glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+  s.draw_objects(true, 0);
+  const auto draw_felt = [&](float alpha) {
+    s.uniform("alpha", alpha);
+    s.uniform("shine", 0.45F);
+    s.uniform("own_colour", palette::tool);
+    s.draw_tool(scene, snapshot.proxy_m);
+    s.uniform("shine", 0.1F);
+    s.uniform("own_colour", palette::force);
+    s.draw_arrow(scene, snapshot, camera);
+  };
+  if (tool_known) draw_felt(1.0F);
+  glBindTexture(GL_TEXTURE_2D, s.shown_depth);
+  s.draw_objects(false, 1);
+
+  glEnable(GL_BLEND);
+  glEnable(GL_CULL_FACE);  // closed shapes: without it a see-through one is blended twice
+  glDepthMask(GL_FALSE);
+  if (tool_known) {
+    glDepthFunc(GL_GREATER);
+    draw_felt(0.28F);
+    glDepthFunc(GL_LEQUAL);
+    const bool apart = glm::length(snapshot.device_m - snapshot.proxy_m) > 0.03 * scene.tool_radius_m;
+    if (apart && finite(snapshot.device_m)) {
+      glDepthFunc(GL_ALWAYS);  // the device point lies within what the proxy may not enter
+      s.uniform("pass", 3);
+      s.uniform("own_colour", palette::device);
+      s.draw_tool(scene, snapshot.device_m);
+      s.uniform("pass", 0);
+      glDepthFunc(GL_LEQUAL);
+    }
+  }
+  glDisable(GL_CULL_FACE);
+  // Rigid surfaces before what must be seen: only the nearest of them is blended, found by depth alone first.
+  glDepthMask(GL_TRUE);
+  glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
+  s.use(s.depth_program, clip);
+  s.draw_objects(false, 2);
+  s.use(s.mesh_program, clip);
+  glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+  s.draw_objects(false, 2);
+  glDisable(GL_BLEND);
+  glDisable(GL_SCISSOR_TEST);
+}
+
+void Renderer::finish(const OverlayMesh& overlay) {
+  State& s = *state_;
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, s.scene_frame);
+  glBindFramebuffer(GL_DRAW_FRAMEBUFFER, s.final_frame);
+  glBlitFramebuffer(0, 0, s.width * s.factor, s.height * s.factor, 0, 0, s.width, s.height,
+                    GL_COLOR_BUFFER_BIT, s.factor == 1 ? GL_NEAREST : GL_LINEAR);
+  glBindFramebuffer(GL_FRAMEBUFFER, s.final_frame);
+  glViewport(0, 0, s.width, s.height);
+  glDisable(GL_DEPTH_TEST);
+  glEnable(GL_BLEND);
+  glUseProgram(s.overlay_program);
+  glUniform2f(glGetUniformLocation(s.overlay_program, "size"), static_cast<float>(s.width),
+              static_cast<float>(s.height));
+  glUniform1i(glGetUniformLocation(s.overlay_program, "font"), 0);
+  glBindTexture(GL_TEXTURE_2D, s.font);
+  glBindVertexArray(s.overlay_array);
+  glBindBuffer(GL_ARRAY_BUFFER, s.overlay_vertices);
+  glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(overlay.vertices.size() * sizeof(OverlayVertex)),
+               overlay.vertices.data(), GL_STREAM_DRAW);
+  glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, s.overlay_indices);
+  glBufferData(GL_ELEMENT_ARRAY_BUFFER,
+               static_cast<GLsizeiptr>(overlay.indices.size() * sizeof(std::uint32_t)),
+               overlay.indices.data(), GL_STREAM_DRAW);
+  glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(overlay.indices.size()), GL_UNSIGNED_INT, nullptr);
+  glDisable(GL_BLEND);
+  check_gl("drawing the scene");
+}
+
+void Renderer::present(int width, int height) {
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, state_->final_frame);
+  glBindFramebuffer(GL_DRAW_FRAMEBUFFER, 0);
+  glBlitFramebuffer(0, 0, state_->width, state_->height, 0, 0, width, height, GL_COLOR_BUFFER_BIT,
+                    GL_NEAREST);
+  check_gl("showing a frame");
+}
+
+std::vector<std::uint8_t> Renderer::read_rgb() {
+  const State& s = *state_;
+  const auto row = static_cast<std::size_t>(s.width) * 3;
+  std::vector<std::uint8_t> up(row * static_cast<std::size_t>(s.height));
+  std::vector<std::uint8_t> down(up.size());
+  glBindFramebuffer(GL_FRAMEBUFFER, s.final_frame);
+  glPixelStorei(GL_PACK_ALIGNMENT, 1);
+  glReadPixels(0, 0, s.width, s.height, GL_RGB, GL_UNSIGNED_BYTE, up.data());
+  check_gl("reading a frame");
+  for (std::size_t y = 0; y < static_cast<std::size_t>(s.height); ++y) {
+    std::copy_n(up.end() - static_cast<std::ptrdiff_t>((y + 1) * row), row,
+                down.begin() + static_cast<std::ptrdiff_t>(y * row));
+  }
+  return down;
+}
+
+double Renderer::displacement_scale_m() const {
+  return state_->most_moved_m;
+}
+
+}  // namespace hybrid

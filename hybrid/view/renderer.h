@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Draws a scene and a snapshot with OpenGL 3.3. Picture and window use this one implementation; each brings
+// its own context, which must be current on the calling thread for every call here.
+//
+// How hidden things are shown: rigid objects are opaque, except where they stand in front of a soft object,
+// the tool, or the neighbourhood of the tool: there only their nearest surface is drawn, thin in the middle
+// and dense at its rim. The tool and the arrow show faintly through tissue.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "hybrid/view/camera.h"
+#include "hybrid/snapshot/snapshot.h"
+
+namespace hybrid {
+
+// Rectangle of the picture (pixels, y down from the top).
+struct PixelRect {
+  int x = 0, y = 0, width = 0, height = 0;
+};
+
+// The overlay's triangles: pixels (y down), texture coordinates in the font atlas, colour 0xAABBGGRR.
+struct OverlayVertex {
+  float x = 0.0F, y = 0.0F, u = 0.0F, v = 0.0F;
+  std::uint32_t colour = 0;
+};
+struct OverlayMesh {
+  std::vector<OverlayVertex> vertices;
+  std::vector<std::uint32_t> indices;
+};
+struct FontAtlas {
+  int width = 0, height = 0;
+  std::span<const std::uint8_t> alpha;  // width × height
+};
+
+// Four samples a pixel always, or one where the context draws without a graphics card.
+enum class Samples : std::uint8_t { fine, fast };
+
+class Renderer {
+ public:
+  // Uploads what never moves. Throws std::runtime_error: context older than 3.3, out of memory, mesh beyond
+  // what one draw call may hold. The scene is not needed afterwards, except by the caller for later calls.
+  explicit Renderer(const DrawnScene& scene, Samples samples);
+  Renderer(const Renderer&) = delete;
+  Renderer& operator=(const Renderer&) = delete;
+  Renderer(Renderer&&) = delete;
+  Renderer& operator=(Renderer&&) = delete;
+  ~Renderer();
+
+  void set_font(const FontAtlas& atlas);
+
+  // Starts a frame of this many pixels (1 to 8192 each; throws std::runtime_error otherwise) and takes the
+  // snapshot's moving vertices. `scene` is the scene it was made from.
+  void begin(const DrawnScene& scene, const Snapshot& snapshot, int width, int height);
+  // Draws the scene into a part of the frame, over what is there.
+  void draw(const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera, const PixelRect& where);
+  // Draws the overlay, and ends the frame. Throws std::runtime_error on an OpenGL error anywhere in it.
+  void finish(const OverlayMesh& overlay);
+
+  // Copies the finished frame to the context's own framebuffer (a window).
+  void present(int width, int height);
+  // The finished frame, rows from the top, three bytes (RGB) a pixel.
+  [[nodiscard]] std::vector<std::uint8_t> read_rgb();
+
+  // Displacement that has the colour scale's last colour (unit: meter): a round number, never falling, so
+  // that colours keep their meaning from frame to frame.
+  [[nodiscard]] double displacement_scale_m() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace hybrid

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The velocities that free bodies end a step with, all contacts answering to them: one convex problem for all
+// of them (free_body.h says which).
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <span>
+
+#include "hybrid/world/free_body.h"
+
+namespace hybrid {
+
+// Velocity and spin, or force and torque, as one.
+struct Twist {
+  glm::dvec3 linear{0.0}, angular{0.0};
+  [[nodiscard]] double operator[](std::size_t i) const noexcept {
+    return i < 3 ? linear[static_cast<int>(i)] : angular[static_cast<int>(i) - 3];
+  }
+};
+
+struct SolveScratch {                // of n bodies
+  std::span<double> matrix, twists;  // 36 n², 18 n
+  std::span<std::uint32_t> first;    // n
+  std::span<ContactOnWay> ways;      // kMaxOneSided
+};
+
+// Writes each body's twist after a step of dt (> 0), six numbers a body, to the beginning of scratch.twists.
+// Contacts of bodies that are `stopped` count for nobody. Bounded, allocates nothing. False when they would
+// not be finite.
+[[nodiscard]] bool solve_velocities(std::span<const SteppedBody> bodies,
+                                    std::span<const BodyContact> contacts, const SolveScratch& scratch,
+                                    double dt) noexcept;
+
+[[nodiscard]] inline Twist twist_of(std::span<const double> twists, std::uint32_t body) noexcept {
+  const double* v = &twists[6 * std::size_t{body}];
+  return {{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
+}
+
+}  // namespace hybrid

@@ -1,0 +1,306 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "polygon/files/mesh_file.h"
+
+#include <OpenMesh/Core/IO/IOManager.hh>
+#include <OpenMesh/Core/IO/importer/BaseImporter.hh>
+#include <OpenMesh/Core/System/omstream.hh>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <istream>
+#include <mutex>
+#include <new>
+#include <span>
+#include <streambuf>
+
+#include "polygon/files/file_bytes.h"
+#include "polygon/files/prescan.h"
+
+namespace polygon {
+namespace {
+
+namespace io = OpenMesh::IO;
+
+// Collects what OpenMesh reads as a soup: unlike its own meshes, which lose faces that are not manifold. Of
+// the many things that a file may say, only points and faces concern us.
+class SoupImporter final : public io::BaseImporter {
+ public:
+  // `keeps_points` = false: they are counted and no more, because the screen has them as doubles.
+  SoupImporter(bool keeps_points, std::size_t faces) : keeps_points_(keeps_points) {
+    corners.reserve(3 * faces);
+    face_begin.reserve(faces + 1);
+  }
+  std::vector<glm::dvec3> points;
+  std::vector<std::uint32_t> corners;        // of all faces, one after another
+  std::vector<std::uint32_t> face_begin{0};  // where each face's corners begin, and the end
+
+  using VH = OpenMesh::VertexHandle;
+  using HH = OpenMesh::HalfedgeHandle;
+  using EH = OpenMesh::EdgeHandle;
+  using FH = OpenMesh::FaceHandle;
+
+  VH add_vertex(const OpenMesh::Vec3f& p) override { return add_vertex(OpenMesh::Vec3d(p[0], p[1], p[2])); }
+  VH add_vertex(const OpenMesh::Vec3d& p) override {
+    if (keeps_points_) points.emplace_back(p[0], p[1], p[2]);
+    return VH(static_cast<int>(vertices_++));
+  }
+  VH add_vertex() override { return add_vertex(OpenMesh::Vec3f(0.0F, 0.0F, 0.0F)); }
+  FH add_face(const VHandles& indices) override {
+    for (const VH& v : indices)
+      corners.push_back(static_cast<std::uint32_t>(v.idx()));  // -1: out of any range
+    face_begin.push_back(static_cast<std::uint32_t>(corners.size()));
+    return FH(static_cast<int>(face_begin.size()) - 2);
+  }
+  void set_point(VH v, const OpenMesh::Vec3f& p) override {
+    if (keeps_points_) points.at(static_cast<std::size_t>(v.idx())) = {p[0], p[1], p[2]};
+  }
+
+  [[nodiscard]] size_t n_vertices() const override { return vertices_; }
+  [[nodiscard]] size_t n_faces() const override { return face_begin.size() - 1; }
+  [[nodiscard]] size_t n_edges() const override { return 0; }
+
+  HH add_edge(VH, VH) override { return HH(); }
+  FH add_face(HH) override { return FH(); }
+  void add_face_texcoords(FH, VH, const std::vector<OpenMesh::Vec2f>&) override {}
+  void add_face_texcoords(FH, VH, const std::vector<OpenMesh::Vec3f>&) override {}
+  void set_face_texindex(FH, int) override {}
+  void set_halfedge(VH, HH) override {}
+  void set_normal(VH, const OpenMesh::Vec3f&) override {}
+  void set_normal(VH, const OpenMesh::Vec3d&) override {}
+  void set_color(VH, const OpenMesh::Vec3uc&) override {}
+  void set_color(VH, const OpenMesh::Vec4uc&) override {}
+  void set_color(VH, const OpenMesh::Vec3f&) override {}
+  void set_color(VH, const OpenMesh::Vec4f&) override {}
+  void set_texcoord(VH, const OpenMesh::Vec2f&) override {}
+  void set_status(VH, const OpenMesh::Attributes::StatusInfo&) override {}
+  void set_next(HH, HH) override {}
+  void set_face(HH, FH) override {}
+  void request_face_texcoords2D() override {}
+  void set_texcoord(HH, const OpenMesh::Vec2f&) override {}
+  void set_texcoord(VH, const OpenMesh::Vec3f&) override {}
+  void set_texcoord(HH, const OpenMesh::Vec3f&) override {}
+  void set_status(HH, const OpenMesh::Attributes::StatusInfo&) override {}
+  void set_color(EH, const OpenMesh::Vec3uc&) override {}
+  void set_color(EH, const OpenMesh::Vec4uc&) override {}
+  void set_color(EH, const OpenMesh::Vec3f&) override {}
+  void set_color(EH, const OpenMesh::Vec4f&) override {}
+  void set_status(EH, const OpenMesh::Attributes::StatusInfo&) override {}
+  void set_normal(FH, const OpenMesh::Vec3f&) override {}
+  void set_normal(FH, const OpenMesh::Vec3d&) override {}
+  void set_color(FH, const OpenMesh::Vec3uc&) override {}
+  void set_color(FH, const OpenMesh::Vec4uc&) override {}
+  void set_color(FH, const OpenMesh::Vec3f&) override {}
+  void set_color(FH, const OpenMesh::Vec4f&) override {}
+  void set_status(FH, const OpenMesh::Attributes::StatusInfo&) override {}
+  void add_texture_information(int, std::string) override {}
+
+ private:
+  bool keeps_points_;
+  std::size_t vertices_ = 0;
+};
+
+// A stream over bytes in memory, without a copy of them; OpenMesh's OBJ reader goes back to the beginning
+// once.
+class MemoryBuffer final : public std::streambuf {
+ public:
+  explicit MemoryBuffer(std::string& bytes) { setg(bytes.data(), bytes.data(), bytes.data() + bytes.size()); }
+
+ protected:
+  pos_type seekoff(off_type offset, std::ios_base::seekdir from, std::ios_base::openmode which) override {
+    if ((which & std::ios_base::in) == 0) return {off_type(-1)};
+    const off_type base = from == std::ios_base::beg   ? 0
+                          : from == std::ios_base::cur ? gptr() - eback()
+                                                       : egptr() - eback();
+    const off_type target = base + offset;
+    if (target < 0 || target > egptr() - eback()) return {off_type(-1)};
+    setg(eback(), eback() + target, egptr());
+    return {target};
+  }
+  pos_type seekpos(pos_type position, std::ios_base::openmode which) override {
+    return seekoff(off_type(position), std::ios_base::beg, which);
+  }
+};
+
+SoupImporter read_by_openmesh(const std::filesystem::path& file, ScreenedFile& screened) {
+  // OpenMesh's readers are globals that keep what they learnt of a file while they read it.
+  static std::mutex one_at_a_time;
+  const std::lock_guard lock(one_at_a_time);
+  omerr().disable();
+  omlog().disable();
+  omout().disable();
+  MemoryBuffer buffer(screened.dialect);
+  std::istream in(&buffer);
+  SoupImporter soup(screened.binary, screened.faces);
+  io::Options options(screened.binary ? io::Options::Binary : io::Options::Default);
+  const bool read = io::IOManager().read(in, screened.openmesh_extension, soup, options);
+  const bool vertices_agree = soup.n_vertices() >= screened.coordinates.size();
+  const bool faces_agree =
+      screened.may_drop ? soup.n_faces() <= screened.faces : soup.n_faces() == screened.faces;
+  if (!read || !vertices_agree || !faces_agree) {
+    refuse_mesh(file, "OpenMesh reads " + std::to_string(soup.n_vertices()) + " vertices and " +
+                          std::to_string(soup.n_faces()) + " faces where the file has " +
+                          std::to_string(screened.coordinates.size()) + " and " +
+                          std::to_string(screened.faces) + "; export it as binary PLY");
+  }
+  std::string().swap(screened.dialect);  // it has been read
+  return soup;
+}
+
+void report(std::vector<Finding>& findings, const char* id, Severity severity, std::size_t count,
+            const std::string& text) {
+  if (count > 0) findings.push_back({id, severity, count, text});
+}
+
+// Fans of triangles from polygons, what cannot be used left out and reported.
+MeshFile assemble(ScreenedFile& screened, SoupImporter& soup, double scale) {
+  MeshFile result;
+  std::vector<glm::dvec3>& vertices = result.mesh.vertices;
+  vertices.swap(screened.binary ? soup.points : screened.coordinates);  // STL has welded vertices, and floats
+  std::vector<bool> usable(vertices.size());
+  std::size_t unusable_vertices = 0;
+  std::size_t first_unusable = 0;
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    usable[i] = is_usable(vertices[i]) && is_usable(vertices[i] * scale);
+    if (usable[i]) continue;
+    if (unusable_vertices++ == 0) first_unusable = i;
+  }
+
+  std::size_t out_of_range = 0, first_out_of_range = 0, nonfinite = screened.nonfinite_facets;
+  std::size_t repeated = screened.faces - soup.n_faces();
+  std::size_t polygons = 0;
+  const std::size_t fewer = 2 * soup.n_faces();
+  result.mesh.triangles.reserve(soup.corners.size() > fewer ? soup.corners.size() - fewer : 0);
+  for (std::size_t f = 0; f + 1 < soup.face_begin.size(); ++f) {
+    const std::span<const std::uint32_t> face(soup.corners.data() + soup.face_begin[f],
+                                              soup.face_begin[f + 1] - soup.face_begin[f]);
+    if (std::any_of(face.begin(), face.end(), [&](std::uint32_t v) { return v >= vertices.size(); })) {
+      if (out_of_range++ == 0) first_out_of_range = f;
+    } else if (std::any_of(face.begin(), face.end(), [&](std::uint32_t v) { return !usable[v]; })) {
+      ++nonfinite;
+    } else if (face.size() < 3) {
+      ++repeated;
+    } else {
+      if (face.size() > 3) ++polygons;
+      for (std::size_t c = 1; c + 1 < face.size(); ++c) {
+        result.mesh.triangles.push_back({face[0], face[c], face[c + 1]});
+      }
+    }
+  }
+
+  if (unusable_vertices > 0) {  // squeezed out: all vertices of a mesh are finite
+    std::vector<std::uint32_t> moved(vertices.size(), 0);
+    std::uint32_t kept = 0;
+    for (std::size_t i = 0; i < vertices.size(); ++i) {
+      if (!usable[i]) continue;
+      moved[i] = kept;
+      vertices[kept++] = vertices[i];
+    }
+    vertices.resize(kept);
+    for (TriangleIndices& t : result.mesh.triangles) t = {moved[t[0]], moved[t[1]], moved[t[2]]};
+  }
+  for (glm::dvec3& v : vertices) v *= scale;
+
+  std::vector<Finding>& findings = result.findings;
+  report(findings, "F01-nonfinite-vertices", Severity::error, unusable_vertices,
+         "vertices are not finite numbers, or beyond 1e12 (first: vertex " + std::to_string(first_unusable) +
+             ", counted from 0); they and the faces that use them are left out: export the mesh again");
+  report(findings, "F02-nonfinite-faces", Severity::error, nonfinite,
+         "faces have a corner that is not finite, or beyond 1e12" +
+             (screened.nonfinite_facets > 0 ? " (first: " + screened.first_nonfinite_facet + ")"
+                                            : std::string()) +
+             ", and are left out, which leaves holes: export the mesh again, or close it elsewhere");
+  report(findings, "F03-index-out-of-range", Severity::error, out_of_range,
+         "faces use vertices that the file does not have (first: face " + std::to_string(first_out_of_range) +
+             ", counted from 0 without shorter ones), and are left out, which leaves holes: export the mesh "
+             "again");
+  report(findings, "F04-short-faces", Severity::warning, screened.short_faces,
+         "faces have fewer than three corners (first: " + screened.first_short_face +
+             ") and are left out: points and lines cannot be touched");
+  report(findings, "F05-repeated-corners", Severity::warning, repeated,
+         "faces use a corner twice, have no area and are left out: nothing is lost to touch");
+  report(findings, "F06-polygons", Severity::info, polygons,
+         "faces have more than three corners and are cut into triangles from their first: where one is not "
+         "convex, "
+         "triangulate it before");
+  report(findings, "F07-trailing-bytes", Severity::warning, screened.trailing_bytes,
+         "bytes follow the end of the mesh and are ignored: the file may be damaged");
+  return result;
+}
+
+std::string lower_case(std::string text) {
+  for (char& c : text) {
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  }
+  return text;
+}
+
+}  // namespace
+
+MeshFile load_mesh(const std::filesystem::path& file, const MeshFileOptions& options) {
+  if (!(std::isfinite(options.scale) && options.scale > 0.0)) {
+    refuse_mesh(file,
+                "its length unit is " + std::to_string(options.scale) + " m; it must be finite and > 0");
+  }
+  std::string extension = lower_case(file.extension().string());
+  const bool packed = extension == ".gz";
+  if (packed) extension = lower_case(file.stem().extension().string());
+  using Screen = ScreenedFile (*)(const std::filesystem::path&, std::string_view);
+  struct Kind {
+    std::string_view extension;
+    Screen screen;
+  };
+  static constexpr std::array<Kind, 4> kKinds{
+      {{".obj", screen_obj}, {".ply", screen_ply}, {".stl", screen_stl}, {".off", screen_off}}};
+  const auto* kind =
+      std::find_if(kKinds.begin(), kKinds.end(), [&](const Kind& k) { return k.extension == extension; });
+  if (kind == kKinds.end()) {
+    refuse_mesh(file, "'" + extension +
+                          "' is no mesh format known here; use .obj, .ply, .stl or .off, or one with .gz");
+  }
+  try {
+    ScreenedFile screened = [&] {
+      const std::string bytes = read_file_bytes(file, packed, options.max_bytes);
+      return kind->screen(file, bytes);
+    }();
+    SoupImporter soup = read_by_openmesh(file, screened);
+    MeshFile result = assemble(screened, soup, options.scale);
+    if (result.mesh.empty()) {
+      std::string why;
+      for (const Finding& f : result.findings) why += "; " + std::to_string(f.count) + " " + f.text;
+      refuse_mesh(file, "has no triangle that can be used; export a mesh with faces" + why);
+    }
+    return result;
+  } catch (const std::bad_alloc&) {
+    refuse_mesh(file, "does not fit into memory; simplify the mesh");
+  }
+}
+
+void save_ply(const std::filesystem::path& file, const TriangleMesh& mesh) {
+  std::ofstream out(file, std::ios::binary);
+  if (!out) refuse_mesh(file, "cannot be written; check that the folder exists and that you may write there");
+  // Doubles, and so not by OpenMesh, which writes floats: what is saved is what was computed.
+  out << "ply\nformat binary_little_endian 1.0\ncomment coordinates in meters\nelement vertex "
+      << mesh.vertices.size() << "\nproperty double x\nproperty double y\nproperty double z\nelement face "
+      << mesh.triangles.size() << "\nproperty list uchar int vertex_indices\nend_header\n";
+  std::string bytes;
+  const auto flush_above = [&](std::size_t limit) {
+    if (bytes.size() < limit) return;
+    out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    bytes.clear();
+  };
+  for (const glm::dvec3& v : mesh.vertices) {
+    for (int i = 0; i < 3; ++i) append_raw(bytes, v[i]);
+    flush_above(1U << 16U);
+  }
+  for (const TriangleIndices& t : mesh.triangles) {
+    append_raw(bytes, std::uint8_t{3});
+    for (const std::uint32_t corner : t) append_raw(bytes, corner);
+    flush_above(1U << 16U);
+  }
+  flush_above(0);
+  out.close();
+  if (!out) refuse_mesh(file, "could not be written to the end; check the space on the disk");
+}
+
+}  // namespace polygon

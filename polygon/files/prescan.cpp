@@ -1,0 +1,412 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "polygon/files/prescan.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <glm/common.hpp>
+#include <limits>
+#include <system_error>
+
+#include "polygon/files/mesh_file.h"
+
+namespace polygon {
+namespace {
+
+static_assert(std::endian::native == std::endian::little,
+              "OpenMesh's binary dialects are written in native order");
+
+constexpr std::int64_t kMostElements =
+    std::numeric_limits<std::int32_t>::max();  // OpenMesh's handles are ints
+
+bool is_space(char c) {
+  return c == ' ' || c == '\t' || c == '\r' || c == '\n' || c == '\v' || c == '\f';
+}
+
+std::string at_line(std::size_t line) {
+  return "line " + std::to_string(line);
+}
+
+// A word of a file in a message: short, and printable.
+std::string quoted(std::string_view word) {
+  std::string text = "'";
+  for (const char c : word.substr(0, 24)) text += (c >= ' ' && c < 127) ? c : '?';
+  return text + (word.size() > 24 ? "…'" : "'");
+}
+
+glm::dvec3 take_coordinates(const std::filesystem::path& file, std::string_view& line, std::size_t number) {
+  glm::dvec3 v(0.0);
+  for (int i = 0; i < 3; ++i) {
+    const std::string_view word = take_word(line);
+    double value = 0.0;
+    if (!parse_number(word, value)) {
+      refuse_mesh(file, at_line(number) + ": a vertex needs three numbers, but has " +
+                            (word.empty() ? "only " + std::to_string(i) : quoted(word)) +
+                            "; export the mesh again");
+    }
+    v[i] = value;
+  }
+  return v;
+}
+
+// ---- OBJ
+// -------------------------------------------------------------------------------------------------------
+
+// One line, with those a '\' at its end continues. `joined` holds it when there are any.
+std::string_view logical_line(TextCursor& text, std::string& joined) {
+  std::string_view line = text.next_line();
+  if (!line.ends_with('\\')) return line;
+  joined.clear();
+  while (line.ends_with('\\')) {
+    line.remove_suffix(1);
+    joined.append(line).push_back(' ');
+    line = text.next_line();
+  }
+  joined.append(line);
+  return joined;
+}
+
+}  // namespace
+
+ScreenedFile screen_obj(const std::filesystem::path& file, std::string_view bytes) {
+  ScreenedFile screened;
+  screened.openmesh_extension = "obj";
+  screened.may_drop = true;
+  screened.dialect = "v 0 0 0\n";  // the one more, see below
+  std::string joined;
+  // Vertices first: a face may use vertices that come after it. OpenMesh only counts them ("v 0 0 0"); the
+  // coordinates it would round to floats are kept here.
+  for (TextCursor text(bytes); !text.at_end();) {
+    const std::size_t number = text.line();
+    std::string_view line = logical_line(text, joined);
+    if (take_word(line) != "v") continue;
+    screened.coordinates.push_back(take_coordinates(file, line, number));
+    screened.dialect += "v 0 0 0\n";
+  }
+  const auto vertices = static_cast<std::int64_t>(screened.coordinates.size());
+  if (vertices >= kMostElements) refuse_mesh(file, "has more than 2^31 - 1 vertices; split it");
+
+  std::int64_t so_far = 0;  // what a negative index counts from
+  std::string face;
+  for (TextCursor text(bytes); !text.at_end();) {
+    const std::size_t number = text.line();
+    std::string_view line = logical_line(text, joined);
+    const std::string_view keyword = take_word(line);
+    if (keyword == "v") ++so_far;
+    if (keyword != "f" && keyword != "fo") continue;  // fo: the same, in files of the nineties
+    face.assign("f");
+    std::size_t corners = 0;
+    for (std::string_view word = take_word(line); !word.empty(); word = take_word(line), ++corners) {
+      std::int64_t index = 0;
+      if (word.front() == '#') break;
+      if (!parse_integer(word.substr(0, word.find('/')), index)) {
+        refuse_mesh(file,
+                    at_line(number) + ": " + quoted(word) +
+                        " is no corner of a face (vertex, vertex/texture/normal); export the mesh again");
+      }
+      if (index < 0) index += so_far + 1;
+      // OpenMesh looks a vertex up without asking whether it is there, and drops a corner that repeats; so
+      // what is not there becomes one vertex more than there are, which the importer knows, and reports.
+      const bool exists = index >= 1 && index <= vertices;
+      face.push_back(' ');
+      append_integer(face, exists ? index : vertices + 1);
+    }
+    if (corners < 3) {
+      if (screened.short_faces++ == 0) screened.first_short_face = at_line(number);
+      continue;
+    }
+    screened.dialect.append(face).push_back('\n');
+    ++screened.faces;
+  }
+  return screened;
+}
+
+// ---- OFF
+// -------------------------------------------------------------------------------------------------------
+
+ScreenedFile screen_off(const std::filesystem::path& file, std::string_view bytes) {
+  ScreenedFile screened;
+  screened.openmesh_extension = "off";
+  TextCursor text(bytes);
+  std::size_t number = 0;
+  // The next line with something on it, without its comment.
+  const auto content_line = [&]() -> std::string_view {
+    while (!text.at_end()) {
+      number = text.line();
+      std::string_view line = text.next_line();
+      line = line.substr(0, line.find('#'));
+      std::string_view rest = line;
+      if (!take_word(rest).empty()) return line;
+    }
+    return {};
+  };
+
+  std::string_view line = content_line();
+  std::string_view kind = take_word(line);
+  if (!kind.ends_with("OFF")) refuse_mesh(file, "does not begin with 'OFF'; is it another kind of file?");
+  kind.remove_suffix(3);
+  for (const std::string_view extra : {"ST", "C", "N"}) {  // texture, colour, normal: after the coordinates
+    if (kind.starts_with(extra)) kind.remove_prefix(extra.size());
+  }
+  if (!kind.empty()) {
+    refuse_mesh(file, "has vertices that are not three-dimensional ('" + std::string(kind.substr(0, 8)) +
+                          "OFF'); export it as plain OFF");
+  }
+  std::string_view counts = line;
+  std::string_view first = take_word(counts);
+  if (first == "BINARY")
+    refuse_mesh(file, "is binary OFF, which is not read; export it as text OFF or as PLY");
+  if (first.empty()) line = content_line();
+  std::array<std::int64_t, 2> count{};
+  for (std::int64_t& c : count) {
+    // A vertex takes at least six bytes, a face two: what the file cannot hold is not believed.
+    const std::string_view word = take_word(line);
+    if (!parse_integer(word, c) || c < 0) {
+      refuse_mesh(file, at_line(number) + ": " + quoted(word) +
+                            " is no count; the numbers of vertices, faces and edges are needed");
+    }
+    if (c > static_cast<std::int64_t>(text.remaining())) {
+      refuse_mesh(file, at_line(number) + ": announces " + std::to_string(count[0]) + " vertices and " +
+                            std::to_string(count[1]) + " faces, more than its " +
+                            std::to_string(bytes.size()) +
+                            " bytes can hold; it is cut short or damaged: copy or export it again");
+    }
+  }
+  if (count[0] >= kMostElements) refuse_mesh(file, "has more than 2^31 - 1 vertices; split it");
+  screened.coordinates.reserve(static_cast<std::size_t>(count[0]));
+  screened.dialect = "OFF\n";
+  append_integer(screened.dialect, count[0]);
+  screened.dialect.push_back(' ');
+  const std::size_t face_count_at = screened.dialect.size();
+  const auto cut_short = [&](const char* what, std::int64_t have, std::int64_t announced) {
+    refuse_mesh(file, "ends after " + std::to_string(have) + " of the " + std::to_string(announced) + " " +
+                          what + " it announces; it is cut short: copy or export it again");
+  };
+  for (std::int64_t i = 0; i < count[0]; ++i) {
+    line = content_line();
+    if (line.empty()) cut_short("vertices", i, count[0]);
+    screened.coordinates.push_back(take_coordinates(file, line, number));
+    screened.dialect += "0 0 0\n";
+  }
+  for (std::int64_t i = 0; i < count[1]; ++i) {
+    line = content_line();
+    if (line.empty()) cut_short("faces", i, count[1]);
+    std::int64_t corners = 0;
+    std::string_view word = take_word(line);
+    if (!parse_integer(word, corners) || corners < 0) {
+      refuse_mesh(file,
+                  at_line(number) + ": " + quoted(word) + " is no number of corners; export the mesh again");
+    }
+    if (corners < 3) {
+      if (screened.short_faces++ == 0) screened.first_short_face = at_line(number);
+      continue;
+    }
+    append_integer(screened.dialect, corners);
+    for (std::int64_t c = 0; c < corners; ++c) {
+      std::int64_t index = 0;
+      word = take_word(line);
+      if (!parse_integer(word, index)) {
+        refuse_mesh(file, at_line(number) + ": a face announces " + std::to_string(corners) +
+                              " corners but has " +
+                              (word.empty() ? "only " + std::to_string(c) : quoted(word)) +
+                              "; export the mesh again");
+      }
+      screened.dialect.push_back(' ');
+      append_integer(screened.dialect, index >= 0 && index < count[0] ? index : count[0]);
+    }
+    screened.dialect.push_back('\n');
+    ++screened.faces;
+  }
+  std::string face_count;
+  append_integer(face_count, static_cast<std::int64_t>(screened.faces));
+  screened.dialect.insert(face_count_at, face_count + " 0\n");
+  return screened;
+}
+
+// ---- STL
+// -------------------------------------------------------------------------------------------------------
+
+namespace {
+
+constexpr std::size_t kStlHeader = 84;  // 80 free bytes and the number of facets
+constexpr std::size_t kStlFacet = 50;   // normal, three corners, two free bytes
+
+void begin_stl(ScreenedFile& screened) {
+  screened.openmesh_extension = "stl";
+  screened.may_drop = true;
+  screened.binary = true;
+  screened.dialect.assign(kStlHeader, '\0');
+}
+
+// OpenMesh welds the corners of its facets in a tree that a NaN would break, so facets with one never reach
+// it.
+void add_facet(ScreenedFile& screened, const std::array<glm::dvec3, 3>& corners, const std::string& place) {
+  if (!std::all_of(corners.begin(), corners.end(), is_usable)) {
+    if (screened.nonfinite_facets++ == 0) screened.first_nonfinite_facet = place;
+    return;
+  }
+  for (int i = 0; i < 3; ++i) append_raw(screened.dialect, 0.0F);
+  for (const glm::dvec3& corner : corners) {
+    for (int i = 0; i < 3; ++i) append_raw(screened.dialect, static_cast<float>(corner[i]));
+  }
+  append_raw(screened.dialect, std::uint16_t{0});
+  ++screened.faces;
+}
+
+void end_stl(ScreenedFile& screened) {
+  const auto count = static_cast<std::uint32_t>(screened.faces);
+  std::memcpy(screened.dialect.data() + kStlHeader - sizeof(count), &count, sizeof(count));
+}
+
+void screen_stl_text(const std::filesystem::path& file, std::string_view bytes, ScreenedFile& screened) {
+  TextCursor text(bytes);
+  std::array<glm::dvec3, 3> corners{};
+  std::size_t have = 0;
+  bool open = false;  // inside a facet
+  bool ended = false;
+  while (!text.at_end()) {
+    const std::size_t number = text.line();
+    std::string_view line = text.next_line();
+    const std::string_view word = take_word(line);
+    ended = ended || word == "endsolid" || word == "ENDSOLID";
+    if (word == "facet" || word == "FACET") {
+      open = true;
+      have = 0;
+    } else if (word == "vertex" || word == "VERTEX") {
+      if (!open || have == 3) {
+        refuse_mesh(
+            file, at_line(number) + ": a vertex that belongs to no facet, or is its fourth; export it again");
+      }
+      corners[have++] = take_coordinates(file, line, number);
+    } else if (word == "endfacet" || word == "ENDFACET") {
+      if (!open || have != 3) {
+        refuse_mesh(file, at_line(number) + ": a facet ends with " + std::to_string(have) +
+                              " vertices where three are needed; export the mesh again");
+      }
+      add_facet(screened, corners, at_line(number));
+      open = false;
+    }
+  }
+  if (open || !ended) {
+    refuse_mesh(file, "ends without 'endsolid' after " + std::to_string(screened.faces) +
+                          " facets; it is cut short: copy or export it again");
+  }
+}
+
+void screen_stl_binary(std::string_view bytes, std::uint64_t count, ScreenedFile& screened) {
+  screened.trailing_bytes = bytes.size() - kStlHeader - count * kStlFacet;
+  screened.dialect.reserve(kStlHeader + count * kStlFacet);
+  for (std::uint64_t i = 0; i < count; ++i) {
+    const char* facet = bytes.data() + kStlHeader + i * kStlFacet + 3 * sizeof(float);
+    std::array<glm::dvec3, 3> corners{};
+    for (std::size_t c = 0; c < 9; ++c) {
+      float value = 0.0F;
+      std::memcpy(&value, facet + c * sizeof(float), sizeof(float));
+      corners[c / 3][static_cast<int>(c % 3)] = value;
+    }
+    add_facet(screened, corners, "facet " + std::to_string(i + 1));
+  }
+}
+
+}  // namespace
+
+ScreenedFile screen_stl(const std::filesystem::path& file, std::string_view bytes) {
+  ScreenedFile screened;
+  begin_stl(screened);
+  std::uint32_t count = 0;
+  if (bytes.size() >= kStlHeader)
+    std::memcpy(&count, bytes.data() + kStlHeader - sizeof(count), sizeof(count));
+  const std::uint64_t expected = kStlHeader + static_cast<std::uint64_t>(count) * kStlFacet;
+  std::string_view first_line = bytes.substr(0, 256);
+  const std::string_view first_word = take_word(first_line);
+  const bool says_solid = first_word == "solid" || first_word == "SOLID";
+  // Many binary files begin with 'solid' too, so the size decides first.
+  if (says_solid && expected != bytes.size()) {
+    screen_stl_text(file, bytes, screened);
+  } else if (bytes.size() < kStlHeader) {
+    refuse_mesh(file,
+                "has " + std::to_string(bytes.size()) +
+                    " bytes, fewer than the header of a binary STL (84), and does not begin with 'solid'; "
+                    "it is cut short or another kind of file");
+  } else if (expected > bytes.size()) {
+    refuse_mesh(file, "announces " + std::to_string(count) + " facets, which need " +
+                          std::to_string(expected) + " bytes, but has " + std::to_string(bytes.size()) +
+                          "; it is cut short or damaged: copy or export it again");
+  } else {
+    screen_stl_binary(bytes, count, screened);
+  }
+  end_stl(screened);
+  return screened;
+}
+
+// ---- shared
+// ----------------------------------------------------------------------------------------------------
+
+void refuse_mesh(const std::filesystem::path& file, const std::string& what_and_remedy) {
+  throw MeshError(file.string() + ": " + what_and_remedy);
+}
+
+bool is_usable(const glm::dvec3& v) {
+  return std::abs(v.x) <= kLargestCoordinate && std::abs(v.y) <= kLargestCoordinate &&
+         std::abs(v.z) <= kLargestCoordinate;  // false for NaN
+}
+
+std::string_view TextCursor::next_line() {
+  const std::size_t end = rest_.find('\n');
+  std::string_view line = rest_.substr(0, end);
+  rest_.remove_prefix(end == std::string_view::npos ? rest_.size() : end + 1);
+  ++line_;
+  if (line.ends_with('\r')) line.remove_suffix(1);
+  return line;
+}
+
+std::string_view TextCursor::next_word() {
+  std::size_t begin = 0;
+  for (; begin < rest_.size() && is_space(rest_[begin]); ++begin) line_ += rest_[begin] == '\n' ? 1 : 0;
+  std::size_t end = begin;
+  while (end < rest_.size() && !is_space(rest_[end])) ++end;
+  const std::string_view word = rest_.substr(begin, end - begin);
+  rest_.remove_prefix(end);
+  return word;
+}
+
+std::string_view take_word(std::string_view& line) {
+  std::size_t begin = 0;
+  while (begin < line.size() && is_space(line[begin])) ++begin;
+  std::size_t end = begin;
+  while (end < line.size() && !is_space(line[end])) ++end;
+  const std::string_view word = line.substr(begin, end - begin);
+  line.remove_prefix(end);
+  return word;
+}
+
+bool parse_number(std::string_view word, double& value) {
+  if (word.starts_with('+')) word.remove_prefix(1);
+  const char* end = word.data() + word.size();
+  const auto [stop, error] = std::from_chars(word.data(), end, value);
+  if (stop != end || error == std::errc::invalid_argument) return false;
+  if (error == std::errc::result_out_of_range) {
+    const bool tiny = word.find("e-") != std::string_view::npos || word.find("E-") != std::string_view::npos;
+    value = tiny ? 0.0 : std::numeric_limits<double>::infinity();
+  }
+  return true;
+}
+
+bool parse_integer(std::string_view word, std::int64_t& value) {
+  if (word.starts_with('+')) word.remove_prefix(1);
+  const char* end = word.data() + word.size();
+  const auto [stop, error] = std::from_chars(word.data(), end, value);
+  return error == std::errc() && stop == end;
+}
+
+void append_integer(std::string& text, std::int64_t value) {
+  std::array<char, 24> digits{};
+  const auto [end, error] = std::to_chars(digits.data(), digits.data() + digits.size(), value);
+  (void)error;  // 24 digits hold any
+  text.append(digits.data(), end);
+}
+
+}  // namespace polygon

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Exact answers about a triangle mesh, from CGAL: which side, how far, what is crossed. For references and
+// tests, not for the servo thread: it allocates, and one exact distance costs some microseconds.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "polygon/mesh/mesh.h"
+
+namespace polygon {
+
+// base + offset, not rounded: places a point nearer to a surface than doubles of that size can.
+struct FinePoint {
+  glm::dvec3 base{0.0};                 // (unit: meter)
+  std::array<long double, 3> offset{};  // (unit: meter)
+};
+
+class ExactMesh {
+ public:
+  // Keeps a copy of the triangles. Throws std::invalid_argument for an empty mesh, an index out of range or a
+  // vertex that is not finite (or beyond 1e12 m).
+  explicit ExactMesh(const TriangleMesh& mesh);
+  ExactMesh(const ExactMesh&) = delete;
+  ExactMesh& operator=(const ExactMesh&) = delete;
+  ExactMesh(ExactMesh&&) = delete;
+  ExactMesh& operator=(ExactMesh&&) = delete;
+  ~ExactMesh();
+
+  [[nodiscard]] double size() const;      // diagonal of the bounds (unit: meter)
+  [[nodiscard]] double furthest() const;  // largest coordinate's magnitude (unit: meter)
+  [[nodiscard]] std::array<glm::dvec3, 3> corners(std::uint32_t triangle) const;
+
+  // Triangles whose bounds come within `radius` of the point, or of some point of the segment: all that do
+  // themselves, and some others. Replaces what `out` held.
+  void near_point(const glm::dvec3& point, double radius, std::vector<std::uint32_t>& out) const;
+  void near_segment(const glm::dvec3& from, const glm::dvec3& to, double radius,
+                    std::vector<std::uint32_t>& out) const;
+
+  // Exact, rounded once at the end.
+  [[nodiscard]] double distance(const FinePoint& point, std::uint32_t triangle) const;
+  [[nodiscard]] double segment_distance(const glm::dvec3& from, const glm::dvec3& to,
+                                        std::uint32_t triangle) const;
+
+  // Does the closed segment meet the triangle? Never, for one without area.
+  [[nodiscard]] bool crosses(const glm::dvec3& from, const glm::dvec3& to, std::uint32_t triangle) const;
+
+  struct Closest {
+    std::uint32_t triangle = 0;
+    double distance = 0.0;
+  };
+  [[nodiscard]] Closest closest(const glm::dvec3& point) const;
+
+  // Parity of the crossings of a segment to beyond the bounds; false on the surface.
+  [[nodiscard]] bool inside(const glm::dvec3& point) const;
+
+  [[nodiscard]] std::size_t memory_bytes() const;
+
+ private:
+  struct Data;
+  std::unique_ptr<Data> data_;
+};
+
+}  // namespace polygon

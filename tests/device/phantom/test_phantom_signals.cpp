@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A session that is told to stop, or crashes, lets go of the motors.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <csignal>
+#include <cstdlib>
+#include <new>
+#include <thread>
+
+#include "tests/device/phantom/phantom_rig.h"
+
+namespace {
+
+using tests::PhantomRig;
+
+TEST(PhantomSignals, InterruptAndTerminateEndTheSessionWithZeroForce) {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    const PhantomRig rig;
+    device::ServoReport report;
+    {
+      const auto phantom = device::open_phantom(rig.options());
+      std::uint64_t n = 0;
+      auto push = [&](const device::ServoInput& /*input*/) {
+        if (++n == 1000) raise(signal);
+        return device::ServoAnswer{.force_N = {0, 0, 1}};
+      };
+      report = device::run_servo(*phantom, {}, push);
+    }
+    EXPECT_EQ(report.end, device::ServoEnd::stopped);
+    EXPECT_GE(report.ticks, 1000U);
+    EXPECT_EQ(rig.given_N(rig.hd->forces.size() - 1), 0.0);
+    EXPECT_GT(rig.given_N(rig.hd->forces.size() - 2), 0.0);
+    EXPECT_EQ(rig.hd->open_devices, 0);
+    EXPECT_THAT(tests::all(report.messages), testing::HasSubstr("stopped by a signal"));
+  }
+}
+
+// What a child process, which dies of it, last gave to the motors; `crash` is called with the number of the
+// tick, on the servo thread, and beside it on the child's main thread where `from_main` says so.
+double last_force_of_crash(void (*crash)(), bool from_main, int& died_of) {
+  void* page =
+      mmap(nullptr, sizeof(std::atomic<double>), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  auto* last = new (page) std::atomic<double>(-1.0);
+  const pid_t child = fork();
+  if (child == 0) {
+    for (const int signal : {SIGSEGV, SIGABRT, SIGFPE}) std::signal(signal, SIG_DFL);
+    const PhantomRig rig;
+    rig.hd->paced = true;
+    rig.hd->last_force = last;
+    device::PhantomOptions options = rig.options();
+    options.clock_ns = nullptr;
+    options.gate.ramp_s = 0.0;
+    const auto phantom = device::open_phantom(options);
+    std::uint64_t n = 0;
+    std::atomic<bool> go{false};
+    auto push = [&](const device::ServoInput& /*input*/) {
+      if (++n == 100) {
+        if (!from_main) crash();
+        go = true;
+      }
+      return device::ServoAnswer{.force_N = {0, 0, 1}};
+    };
+    // Another thread of the session, as the window's would be.
+    const std::jthread other([&] {
+      while (!go) usleep(500);
+      if (last->load() < 0.9) _exit(3);  // no force was given: the test would show nothing
+      crash();
+    });
+    device::run_servo(*phantom, {.deadline_s = 60.0}, push);  // a busy machine is not what is tested
+    _exit(4);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  died_of = WIFSIGNALED(status) ? WTERMSIG(status) : -WEXITSTATUS(status);
+  const double force = last->load();
+  munmap(page, sizeof(std::atomic<double>));
+  return force;
+}
+
+TEST(PhantomSignals, ACrashBesideTheServoThreadEndsInZeroForce) {
+  int died_of = 0;
+  EXPECT_EQ(last_force_of_crash([] { raise(SIGSEGV); }, true, died_of), 0.0);
+  EXPECT_EQ(died_of, SIGSEGV);
+  EXPECT_EQ(last_force_of_crash([] { std::abort(); }, true, died_of), 0.0);
+  EXPECT_EQ(died_of, SIGABRT);
+}
+
+// The frame that was open is ended with zero; whether a real driver still sends it is not in our hands.
+TEST(PhantomSignals, ACrashOfTheServoThreadEndsItsFrameWithZero) {
+  int died_of = 0;
+  EXPECT_EQ(last_force_of_crash([] { std::abort(); }, false, died_of), 0.0);
+  EXPECT_EQ(died_of, SIGABRT);
+}
+
+}  // namespace

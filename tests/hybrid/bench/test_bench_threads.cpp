@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What `hybrid bench threads` says: that it compares ticks which do the same, to the last bit. How fast
+// anything is, is not asked here.
+#include "hybrid/bench/threads.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/hybrid/fixtures/touch.h"
+
+namespace {
+
+using hybrid::bench::ThreadsRow;
+
+TEST(BenchThreads, WhatIsHandedOutIsFeltAsWhatWasRelaxed) {
+  hybrid::bench::ThreadsBenchOptions options;
+  options.scenes = {tests::source_folder / "tests/hybrid/tick/arbitration/kept.toml",
+                    tests::source_folder / "tests/hybrid/tick/arbitration/soft_on_soft.toml"};
+  options.seconds = 0.1;  // a path's length is longer
+  const std::vector<ThreadsRow> rows = hybrid::bench::bench_threads(options);
+  ASSERT_EQ(rows.size(), 6U);
+  for (std::size_t scene = 0; scene < rows.size(); scene += 3) {
+    const ThreadsRow &relaxed = rows[scene], &handed = rows[scene + 1], &without = rows[scene + 2];
+    SCOPED_TRACE(hybrid::bench::threads_table({relaxed, handed, without}));
+    EXPECT_EQ(relaxed.load, "relaxation");
+    EXPECT_EQ(handed.load, "memory");
+    EXPECT_EQ(without.load, "nothing relaxed");
+    EXPECT_GT(relaxed.results, 0U);
+    EXPECT_EQ(handed.results, relaxed.results);
+    EXPECT_EQ(without.results, 0U);
+    EXPECT_EQ(handed.ticks, relaxed.ticks);
+    EXPECT_TRUE(handed.same_ticks);
+    EXPECT_FALSE(without.same_ticks);
+    EXPECT_EQ(handed.p99_ratio, 1.0);
+    EXPECT_GT(relaxed.p99_ratio, 0.0);
+    EXPECT_EQ(hybrid::bench::to_json(handed)["same_ticks"], true);
+  }
+}
+
+}  // namespace

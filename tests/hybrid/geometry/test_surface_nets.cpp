@@ -1,0 +1,515 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/geometry/surface_nets.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <functional>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <iostream>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <random>
+#include <stdexcept>
+#include <string>
+
+namespace {
+
+using polygon::TriangleMesh;
+using voxel::LabelVolume;
+
+LabelVolume empty_volume(int nx, int ny, int nz, glm::dvec3 spacing = glm::dvec3(1.0)) {
+  LabelVolume volume;
+  volume.dims = {nx, ny, nz};
+  volume.spacing_m = spacing;
+  volume.labels.assign(
+      static_cast<std::size_t>(nx) * static_cast<std::size_t>(ny) * static_cast<std::size_t>(nz), 0);
+  return volume;
+}
+
+template <typename Inside>
+LabelVolume filled(LabelVolume volume, Inside inside) {
+  for (int k = 0; k < volume.dims[2]; ++k) {
+    for (int j = 0; j < volume.dims[1]; ++j) {
+      for (int i = 0; i < volume.dims[0]; ++i) {
+        if (inside(i, j, k)) volume.labels[volume.index(i, j, k)] = 1;
+      }
+    }
+  }
+  return volume;
+}
+
+LabelVolume ball(int n, double radius, glm::dvec3 spacing) {
+  const glm::dvec3 middle = 0.5 * (n - 1) * spacing;
+  return filled(empty_volume(n, n, n, spacing), [&](int i, int j, int k) {
+    return glm::length(glm::dvec3(i, j, k) * spacing - middle) <= radius;
+  });
+}
+
+LabelVolume noise(int nx, int ny, int nz, double share, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  return filled(empty_volume(nx, ny, nz), [&](int, int, int) { return unit(random) < share; });
+}
+
+std::size_t count(const LabelVolume& volume) {
+  return volume.labels.size() -
+         static_cast<std::size_t>(std::count(volume.labels.begin(), volume.labels.end(), 0));
+}
+
+double cell_volume(const LabelVolume& v) {
+  return v.spacing_m.x * v.spacing_m.y * v.spacing_m.z;
+}
+
+double signed_volume(const TriangleMesh& mesh) {
+  double sum = 0.0;
+  for (const auto& t : mesh.triangles) {
+    sum += glm::dot(mesh.vertices[t[0]], glm::cross(mesh.vertices[t[1]], mesh.vertices[t[2]]));
+  }
+  return sum / 6.0;
+}
+
+// Each directed edge once, with its opposite once: closed, oriented, and without an edge of more than two
+// triangles. Each vertex one fan: its triangles, stepped through from edge to edge, are all met in one round.
+void expect_manifold(const TriangleMesh& mesh) {
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> next;  // directed edge to the third vertex
+  std::vector<std::size_t> triangles_at(mesh.vertices.size());
+  for (const auto& t : mesh.triangles) {
+    for (std::size_t n = 0; n < 3; ++n) {
+      ASSERT_TRUE(next.emplace(std::pair{t[n], t[(n + 1) % 3]}, t[(n + 2) % 3]).second)
+          << "an edge used twice";
+      ++triangles_at[t[n]];
+    }
+  }
+  std::vector<bool> seen(mesh.vertices.size());
+  for (const auto& [edge, third] : next) {
+    ASSERT_TRUE(next.contains({edge.second, edge.first})) << "an open edge";
+    if (seen[edge.first]) continue;
+    seen[edge.first] = true;
+    std::size_t steps = 0;
+    std::uint32_t rim = edge.second;
+    do {  // triangle (v, rim, third): the next one of the fan starts at v → third
+      rim = next.at({edge.first, rim});
+      ++steps;
+    } while (rim != edge.second && steps <= triangles_at[edge.first]);
+    ASSERT_EQ(steps, triangles_at[edge.first]) << "a vertex with two fans";
+  }
+}
+
+std::string refusal(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return {};
+}
+
+// ---- surface_from_labels
+
+TEST(LabelSurface, OneVoxelIsItsCube) {
+  const LabelVolume volume =
+      filled(empty_volume(1, 1, 1, {1.0, 2.0, 3.0}), [](int, int, int) { return true; });
+  const TriangleMesh mesh = hybrid::surface_from_labels(volume, 0);
+  EXPECT_EQ(mesh.vertices.size(), 8U);
+  EXPECT_EQ(mesh.triangles.size(), 12U);
+  expect_manifold(mesh);
+  EXPECT_DOUBLE_EQ(signed_volume(mesh), 6.0);
+  for (const glm::dvec3& p : mesh.vertices) {
+    EXPECT_DOUBLE_EQ(std::abs(p.x), 0.5);
+    EXPECT_DOUBLE_EQ(std::abs(p.y), 1.0);
+    EXPECT_DOUBLE_EQ(std::abs(p.z), 1.5);
+  }
+}
+
+TEST(LabelSurface, WithoutSmoothingTheVolumeIsThatOfTheVoxels) {
+  const LabelVolume volume = ball(24, 0.0105, {1e-3, 1e-3, 1.5e-3});
+  const TriangleMesh mesh = hybrid::surface_from_labels(volume, 0);
+  expect_manifold(mesh);
+  const double expected = static_cast<double>(count(volume)) * cell_volume(volume);
+  EXPECT_NEAR(signed_volume(mesh), expected, 1e-9 * expected);
+}
+
+TEST(LabelSurface, BallKeepsItsVolumeAndRadiusWhenSmoothed) {
+  for (const double radius : {5.0, 10.0, 20.0}) {
+    const int n = static_cast<int>(2 * radius) + 6;
+    const LabelVolume volume = ball(n, radius, glm::dvec3(1.0));
+    const double expected = static_cast<double>(count(volume));
+    for (const int passes : {1, 2, 5, 10, 20}) {
+      const TriangleMesh mesh = hybrid::surface_from_labels(volume, passes);
+      expect_manifold(mesh);
+      EXPECT_NEAR(signed_volume(mesh), expected, 0.04 * expected) << radius << ' ' << passes;
+      double worst = 0.0;
+      double sum = 0.0;
+      for (const glm::dvec3& p : mesh.vertices) {
+        const double error = std::abs(glm::length(p - 0.5 * (n - 1)) - radius);
+        worst = std::max(worst, error);
+        sum += error * error;
+      }
+      EXPECT_LT(worst, 1.0) << radius << ' ' << passes;  // of a spacing
+      const double rms = std::sqrt(sum / static_cast<double>(mesh.vertices.size()));
+      EXPECT_LT(rms, passes < 5 ? 0.4 : 0.25) << radius << ' ' << passes;
+    }
+  }
+}
+
+TEST(LabelSurface, SmoothingKeepsEachVertexInItsCell) {
+  const LabelVolume volume = noise(12, 11, 10, 0.4, 7);
+  const TriangleMesh rough = hybrid::surface_from_labels(volume, 0);
+  const TriangleMesh smooth = hybrid::surface_from_labels(volume, 30);
+  ASSERT_EQ(rough.vertices.size(), smooth.vertices.size());
+  for (std::size_t v = 0; v < rough.vertices.size(); ++v) {
+    for (int axis = 0; axis < 3; ++axis) {
+      EXPECT_EQ(std::floor(rough.vertices[v][axis]), std::floor(smooth.vertices[v][axis]));
+    }
+  }
+}
+
+TEST(LabelSurface, IsManifoldForEveryNeighbourhoodOfEightAndForNoise) {
+  for (unsigned bits = 0; bits < 256; ++bits) {
+    const LabelVolume volume = filled(empty_volume(2, 2, 2), [&](int i, int j, int k) {
+      return ((bits >> (i + 2 * j + 4 * k)) & 1U) != 0;
+    });
+    expect_manifold(hybrid::surface_from_labels(volume, 0));
+  }
+  for (unsigned bits = 0; bits < 4096; ++bits) {  // two cells that share a face, solid and hollow around them
+    for (const bool shell : {false, true}) {
+      const LabelVolume volume = filled(empty_volume(4, 4, 5), [&](int i, int j, int k) {
+        if (i < 1 || i > 2 || j < 1 || j > 2 || k < 1 || k > 3) return shell;
+        return ((bits >> ((i - 1) + 2 * (j - 1) + 4 * (k - 1))) & 1U) != 0;
+      });
+      expect_manifold(hybrid::surface_from_labels(volume, 0));
+      if (HasFatalFailure()) FAIL() << bits << ' ' << shell;
+    }
+  }
+  for (unsigned seed = 0; seed < 60; ++seed) {
+    const LabelVolume volume = noise(9, 8, 7, 0.1 + 0.8 * seed / 60.0, seed);
+    for (const int passes : {0, 3}) {
+      const TriangleMesh mesh = hybrid::surface_from_labels(volume, passes);
+      expect_manifold(mesh);
+      EXPECT_GT(signed_volume(mesh), 0.0);
+    }
+  }
+}
+
+TEST(LabelSurface, NoTwoVerticesCoincide) {
+  for (const int passes : {0, 1, 8}) {
+    TriangleMesh mesh = hybrid::surface_from_labels(noise(10, 10, 10, 0.5, 3), passes);
+    const auto less = [](const glm::dvec3& a, const glm::dvec3& b) {
+      return std::array{a.x, a.y, a.z} < std::array{b.x, b.y, b.z};
+    };
+    std::sort(mesh.vertices.begin(), mesh.vertices.end(), less);
+    EXPECT_EQ(std::adjacent_find(mesh.vertices.begin(), mesh.vertices.end()), mesh.vertices.end()) << passes;
+  }
+}
+
+TEST(LabelSurface, EmptyVolumesGiveEmptyMeshes) {
+  EXPECT_TRUE(hybrid::surface_from_labels({}, 2).empty());
+  EXPECT_TRUE(hybrid::surface_from_labels(empty_volume(4, 4, 4), 2).empty());
+  LabelVolume wrong = empty_volume(4, 4, 4);
+  wrong.labels.pop_back();
+  EXPECT_NE(refusal([&] { hybrid::surface_from_labels(wrong, 0); }).find("63 labels"), std::string::npos);
+}
+
+// ---- keep_largest_piece
+
+// Flood fill with an explicit stack, the slow and plain way.
+std::vector<int> pieces_by_flood(const LabelVolume& volume, bool empty, std::vector<std::size_t>& sizes) {
+  std::vector<int> piece(volume.labels.size(), -1);
+  for (int k = 0; k < volume.dims[2]; ++k) {
+    for (int j = 0; j < volume.dims[1]; ++j) {
+      for (int i = 0; i < volume.dims[0]; ++i) {
+        const auto wanted = [&](std::size_t at) {
+          return (volume.labels[at] == 0) == empty && piece[at] < 0;
+        };
+        if (!wanted(volume.index(i, j, k))) continue;
+        const int number = static_cast<int>(sizes.size());
+        sizes.push_back(0);
+        std::vector<std::array<int, 3>> stack{{i, j, k}};
+        piece[volume.index(i, j, k)] = number;
+        while (!stack.empty()) {
+          const std::array<int, 3> at = stack.back();
+          stack.pop_back();
+          ++sizes.back();
+          for (std::size_t axis = 0; axis < 3; ++axis) {
+            for (const int step : {-1, 1}) {
+              std::array<int, 3> to = at;
+              to[axis] += step;
+              if (to[axis] < 0 || to[axis] >= volume.dims[axis]) continue;
+              const std::size_t index = volume.index(to[0], to[1], to[2]);
+              if (!wanted(index)) continue;
+              piece[index] = number;
+              stack.push_back(to);
+            }
+          }
+        }
+      }
+    }
+  }
+  return piece;
+}
+
+TEST(KeepLargestPiece, AgreesWithAFloodFill) {
+  for (unsigned seed = 0; seed < 80; ++seed) {
+    LabelVolume volume = noise(11, 9, 10, 0.2 + 0.7 * seed / 80.0, seed);
+    std::vector<std::size_t> sizes;
+    const std::vector<int> piece = pieces_by_flood(volume, false, sizes);
+    const int largest = static_cast<int>(std::max_element(sizes.begin(), sizes.end()) - sizes.begin());
+    LabelVolume expected = volume;
+    for (std::size_t n = 0; n < piece.size(); ++n) expected.labels[n] = piece[n] == largest ? 1 : 0;
+    LabelVolume kept = volume;
+    hybrid::keep_largest_piece(kept, false);
+    EXPECT_EQ(kept.labels, expected.labels) << seed;
+
+    std::vector<std::size_t> holes;
+    const std::vector<int> hole = pieces_by_flood(expected, true, holes);
+    std::vector<bool> open(holes.size());
+    for (int k = 0; k < 10; ++k) {
+      for (int j = 0; j < 9; ++j) {
+        for (int i = 0; i < 11; ++i) {
+          const int number = hole[expected.index(i, j, k)];
+          const bool border = i == 0 || j == 0 || k == 0 || i == 10 || j == 8 || k == 9;
+          if (number >= 0 && border) open[static_cast<std::size_t>(number)] = true;
+        }
+      }
+    }
+    for (std::size_t n = 0; n < hole.size(); ++n) {
+      if (hole[n] >= 0 && !open[static_cast<std::size_t>(hole[n])]) expected.labels[n] = 1;
+    }
+    hybrid::keep_largest_piece(volume, true);
+    EXPECT_EQ(volume.labels, expected.labels) << seed;
+  }
+}
+
+TEST(KeepLargestPiece, KeepsLabelsAndNeedsNoMaterial) {
+  LabelVolume volume = empty_volume(6, 1, 1);
+  volume.labels = {3, 4, 5, 0, 9, 9};
+  hybrid::keep_largest_piece(volume, true);
+  EXPECT_EQ(volume.labels, (std::vector<std::uint8_t>{3, 4, 5, 0, 0, 0}));
+  LabelVolume nothing = empty_volume(3, 3, 3);
+  hybrid::keep_largest_piece(nothing, true);
+  EXPECT_EQ(count(nothing), 0U);
+  LabelVolume none;
+  hybrid::keep_largest_piece(none, true);
+}
+
+// ---- grow_labels
+
+TEST(GrowLabels, AgreesWithBruteForceOnAnyLattice) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  for (unsigned seed = 0; seed < 40; ++seed) {
+    LabelVolume volume = noise(7, 6, 5, 0.02 + 0.1 * unit(random), seed);
+    if (count(volume) == 0) continue;
+    volume.spacing_m = {0.5 + unit(random), 0.5 + unit(random), 0.5 + unit(random)};
+    volume.origin_m = {1.0, -2.0, 3.0};
+    volume.rotation = glm::angleAxis(0.7, glm::normalize(glm::dvec3(1.0, 2.0, 3.0)));
+    for (auto& label : volume.labels) label = label != 0 ? 5 : 0;
+    const double distance = 2.5 * unit(random);
+    const LabelVolume grown = hybrid::grow_labels(volume, distance);
+    std::vector<glm::dvec3> sources;
+    for (int k = 0; k < 5; ++k) {
+      for (int j = 0; j < 6; ++j) {
+        for (int i = 0; i < 7; ++i) {
+          if (volume.labels[volume.index(i, j, k)] == 0) continue;
+          sources.push_back(volume.origin_m + volume.rotation * (glm::dvec3(i, j, k) * volume.spacing_m));
+        }
+      }
+    }
+    bool at_border = false;
+    for (int k = 0; k < grown.dims[2]; ++k) {
+      for (int j = 0; j < grown.dims[1]; ++j) {
+        for (int i = 0; i < grown.dims[0]; ++i) {
+          const glm::dvec3 p = grown.origin_m + grown.rotation * (glm::dvec3(i, j, k) * grown.spacing_m);
+          double nearest = std::numeric_limits<double>::infinity();
+          for (const glm::dvec3& s : sources) nearest = std::min(nearest, glm::length(p - s));
+          const int label = grown.labels[grown.index(i, j, k)];
+          if (std::abs(nearest - distance) < 1e-5) continue;
+          ASSERT_EQ(label, nearest < 1e-9 ? 5 : nearest <= distance ? 1 : 0) << nearest << ' ' << distance;
+          at_border = at_border || (label != 0 && i == 0);
+        }
+      }
+    }
+    // One more layer anywhere would add nothing.
+    EXPECT_EQ(count(hybrid::grow_labels(grown, 0.0)), count(grown));
+    for (int axis = 0; axis < 3; ++axis) {
+      const int steps = static_cast<int>(std::floor(distance / volume.spacing_m[axis]));
+      EXPECT_LE(grown.dims[static_cast<std::size_t>(axis)],
+                volume.dims[static_cast<std::size_t>(axis)] + 2 * steps);
+    }
+  }
+}
+
+TEST(GrowLabels, OneVoxelBecomesABall) {
+  const LabelVolume one = filled(empty_volume(1, 1, 1, glm::dvec3(1e-3)), [](int, int, int) { return true; });
+  const LabelVolume grown = hybrid::grow_labels(one, 20e-3);
+  EXPECT_EQ(grown.dims, (std::array{41, 41, 41}));  // centres exactly at the distance belong to it
+  EXPECT_EQ(grown.labels[grown.index(0, 20, 20)], 1);
+  const double exact = 4.0 / 3.0 * std::numbers::pi * 8000.0;
+  EXPECT_NEAR(static_cast<double>(count(grown)), exact, 0.01 * exact);
+  EXPECT_NEAR(grown.origin_m.x, -20e-3, 1e-15);
+}
+
+TEST(GrowLabels, RefusesWhatCannotBe) {
+  const LabelVolume one = filled(empty_volume(1, 1, 1, glm::dvec3(1e-3)), [](int, int, int) { return true; });
+  EXPECT_NE(refusal([&] { hybrid::grow_labels(one, -1.0); }), "");
+  EXPECT_NE(refusal([&] { hybrid::grow_labels(one, std::numeric_limits<double>::quiet_NaN()); }), "");
+  EXPECT_NE(refusal([&] { hybrid::grow_labels(one, 1e6); }).find("voxels"), std::string::npos);
+  EXPECT_NE(refusal([&] { hybrid::grow_labels(one, 1e300); }), "");
+  EXPECT_EQ(count(hybrid::grow_labels(empty_volume(3, 3, 3), 1e300)), 0U);
+}
+
+// ---- voxelise_mesh
+
+TriangleMesh box_mesh(glm::dvec3 low, glm::dvec3 high) {
+  TriangleMesh mesh;
+  for (int c = 0; c < 8; ++c) {
+    mesh.vertices.emplace_back((c & 1) != 0 ? high.x : low.x, (c & 2) != 0 ? high.y : low.y,
+                               (c & 4) != 0 ? high.z : low.z);
+  }
+  mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                    {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+  return mesh;
+}
+
+TEST(VoxeliseMesh, AlignedBoxIsExact) {
+  const TriangleMesh mesh = box_mesh({0.1, -0.2, 0.3}, {0.1 + 0.012, -0.2 + 0.02, 0.3 + 0.007});
+  const LabelVolume volume = hybrid::voxelise_mesh(mesh, glm::dvec3(1e-3), 4, 1'000'000);
+  EXPECT_EQ(volume.dims, (std::array{12, 20, 7}));
+  EXPECT_EQ(count(volume), 12U * 20U * 7U);
+  EXPECT_NEAR(volume.origin_m.x, 0.1005, 1e-12);
+  EXPECT_EQ(volume.labels[0], 4);
+}
+
+TEST(VoxeliseMesh, RowsThroughEdgesAndVerticesCountRight) {
+  // An octahedron whose equator, edges and tips all lie on rows of centres.
+  TriangleMesh mesh;
+  mesh.vertices = {{4, 0, 0}, {-4, 0, 0}, {0, 4, 0},          {0, -4, 0},
+                   {0, 0, 4}, {0, 0, -4}, {-4.5, -4.5, -4.5}, {4.5, 4.5, 4.5}};
+  for (const std::uint32_t z : {4U, 5U}) {
+    mesh.triangles.push_back({0, 2, z});
+    mesh.triangles.push_back({2, 1, z});
+    mesh.triangles.push_back({1, 3, z});
+    mesh.triangles.push_back({3, 0, z});
+  }
+  mesh.triangles.push_back(
+      {6, 6, 7});  // of no area: only widens the lattice so that centres are whole numbers
+  mesh.triangles.push_back({6, 6, 7});
+  const LabelVolume volume = hybrid::voxelise_mesh(mesh, glm::dvec3(1.0), 1, 100'000);
+  ASSERT_EQ(volume.dims, (std::array{9, 9, 9}));
+  for (int k = 0; k < 9; ++k) {
+    for (int j = 0; j < 9; ++j) {
+      for (int i = 0; i < 9; ++i) {
+        const int distance = std::abs(i - 4) + std::abs(j - 4) + std::abs(k - 4);
+        if (distance == 4) continue;  // on the surface: either, as long as the parity of the row is right
+        ASSERT_EQ(volume.labels[volume.index(i, j, k)], distance < 4 ? 1 : 0) << i << j << k;
+      }
+    }
+  }
+}
+
+TEST(VoxeliseMesh, SurfaceOfLabelsGivesTheLabelsBack) {
+  for (unsigned seed = 0; seed < 30; ++seed) {
+    LabelVolume volume = noise(8, 7, 6, 0.3, seed);
+    volume.spacing_m = {1e-3, 2e-3, 0.5e-3};
+    const TriangleMesh mesh = hybrid::surface_from_labels(volume, 0);
+    // The lattice is centred on the mesh, whose box is a whole number of voxels, so centres meet centres...
+    // where no sheets share a cell, which moves a vertex; those stay well clear of the centres.
+    const LabelVolume back = hybrid::voxelise_mesh(mesh, volume.spacing_m, 1, 1'000'000);
+    EXPECT_EQ(count(back), count(volume)) << seed;
+  }
+}
+
+TEST(VoxeliseMesh, TurnedBallHasItsVolume) {
+  const TriangleMesh rough = hybrid::surface_from_labels(ball(40, 17.3, glm::dvec3(1.0)), 4);
+  for (unsigned seed = 0; seed < 5; ++seed) {
+    TriangleMesh mesh = rough;
+    const glm::dquat turn = glm::angleAxis(0.3 + seed, glm::normalize(glm::dvec3(1.0, seed, 2.0)));
+    for (glm::dvec3& p : mesh.vertices) p = turn * p;
+    const LabelVolume volume = hybrid::voxelise_mesh(mesh, {0.7, 0.9, 0.8}, 1, 10'000'000);
+    const double expected = signed_volume(mesh);
+    EXPECT_NEAR(static_cast<double>(count(volume)) * cell_volume(volume), expected, 0.005 * expected);
+    // Parity at fault shows as a row filled to its end: the border of the box must be nearly empty.
+    for (int k = 0; k < volume.dims[2]; ++k) {
+      EXPECT_EQ(volume.labels[volume.index(volume.dims[0] - 1, 0, k)], 0);
+    }
+  }
+}
+
+TEST(VoxeliseMesh, InsideOutAndSoupsAreClosedToo) {
+  TriangleMesh mesh = box_mesh(glm::dvec3(0.0), glm::dvec3(0.01));
+  for (auto& t : mesh.triangles) std::swap(t[0], t[1]);
+  EXPECT_EQ(count(hybrid::voxelise_mesh(mesh, glm::dvec3(1e-3), 1, 10'000)), 1000U);
+  TriangleMesh soup;
+  for (const auto& t : mesh.triangles) {
+    for (const auto v : t) soup.vertices.push_back(mesh.vertices[v]);
+    const auto n = static_cast<std::uint32_t>(soup.vertices.size());
+    soup.triangles.push_back({n - 3, n - 2, n - 1});
+  }
+  EXPECT_EQ(count(hybrid::voxelise_mesh(soup, glm::dvec3(1e-3), 1, 10'000)), 1000U);
+  for (int copies = 0; copies < 4; ++copies) {  // coincident triangles cancel in pairs
+    soup.triangles.push_back(soup.triangles[0]);
+    soup.triangles.push_back(soup.triangles[0]);
+  }
+  EXPECT_EQ(count(hybrid::voxelise_mesh(soup, glm::dvec3(1e-3), 1, 10'000)), 1000U);
+}
+
+TEST(VoxeliseMesh, FarAwayAndMixedSpacings) {
+  const double far = 1e6;  // 1,000 km: a double still resolves 0.1 nm there
+  const TriangleMesh mesh = box_mesh({far, -far, far}, {far + 0.01, -far + 0.02, far + 0.03});
+  EXPECT_EQ(count(hybrid::voxelise_mesh(mesh, {1e-3, 2e-3, 3e-3}, 1, 10'000)), 1000U);
+  const TriangleMesh sheet = box_mesh({0, 0, 0}, {0.1, 0.1, 1e-4});
+  EXPECT_EQ(count(hybrid::voxelise_mesh(sheet, glm::dvec3(1e-3), 1, 100'000)), 10'000U);
+}
+
+TEST(VoxeliseMesh, RefusesWithTheNumbers) {
+  TriangleMesh open = box_mesh(glm::dvec3(0.0), glm::dvec3(0.01));
+  open.triangles.pop_back();
+  const auto voxelise = [](const TriangleMesh& mesh, double spacing, std::size_t most,
+                           std::uint8_t label = 1) {
+    return refusal([&] { hybrid::voxelise_mesh(mesh, glm::dvec3(spacing), label, most); });
+  };
+  EXPECT_NE(voxelise(open, 1e-3, 10'000).find("not closed: 3 of its edges"), std::string::npos);
+  const TriangleMesh box = box_mesh(glm::dvec3(0.0), glm::dvec3(0.01));
+  EXPECT_NE(voxelise(box, 1e-3, 999).find("10 x 10 x 10"), std::string::npos);
+  EXPECT_NE(voxelise(box, 1e-300, 1'000'000), "");
+  EXPECT_NE(voxelise(box, 0.0, 1'000), "");
+  EXPECT_NE(voxelise(box, std::numeric_limits<double>::quiet_NaN(), 1'000), "");
+  EXPECT_NE(voxelise(box, 1e-3, 1'000, 0), "");
+  EXPECT_NE(voxelise({}, 1e-3, 1'000), "");
+  TriangleMesh flat = box_mesh(glm::dvec3(0.0), {0.01, 0.01, 0.0});
+  EXPECT_NE(voxelise(flat, 1e-3, 1'000).find("no voxel centre lies inside"), std::string::npos);
+  TriangleMesh broken = box;
+  broken.vertices[3].y = std::numeric_limits<double>::infinity();
+  EXPECT_NE(voxelise(broken, 1e-3, 1'000).find("vertex 3"), std::string::npos);
+  broken = box;
+  broken.triangles[5][1] = 77;
+  EXPECT_NE(voxelise(broken, 1e-3, 1'000).find("triangle 5"), std::string::npos);
+}
+
+// ---- time
+
+TEST(LabelSurface, SevenMillionVoxelsTakeAboutASecond) {
+  const LabelVolume volume = ball(192, 90.0, glm::dvec3(1.0));
+  const auto timed = [&](const char* what, const auto& call) {
+    const auto start = std::chrono::steady_clock::now();
+    call();
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    RecordProperty(what, std::to_string(seconds));
+    std::cout << what << ' ' << seconds << " s\n";
+    return seconds;
+  };
+  TriangleMesh mesh;
+  double total = timed("surface", [&] { mesh = hybrid::surface_from_labels(volume, 5); });
+  LabelVolume kept = volume;
+  total += timed("pieces", [&] { hybrid::keep_largest_piece(kept, true); });
+  total += timed("grow", [&] { hybrid::grow_labels(volume, 5.0); });
+  total += timed("voxelise", [&] { hybrid::voxelise_mesh(mesh, glm::dvec3(1.0), 1, 10'000'000); });
+  EXPECT_LT(total, 60.0);  // generous: sanitizers and shared machines; the figures are printed
+}
+
+}  // namespace

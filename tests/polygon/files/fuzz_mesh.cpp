@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Fuzzes mesh files: fuzz_mesh --seconds N --seed S [--keep DIR] [FILE…]. Files named are tried as they are,
+// and nothing else is done. Otherwise inputs are mutated in batches, each in a process of its own: one that
+// crashes, breaks a promise or takes too long is written to DIR, and the next batch goes on. What behaves as
+// nothing before it did (other findings, another refusal) becomes an input to mutate further. The same seed
+// makes the same inputs. Build it with the sanitizers (preset asan), or their half of the promises is not
+// looked at.
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <ctime>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <new>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "tests/polygon/files/fuzz_seeds.h"
+#include "tests/polygon/files/fuzz_target.h"
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr unsigned kLimit_s = 60;      // for one input, sanitizers included
+constexpr unsigned kBatch = 500;       // inputs a process
+constexpr std::size_t kMaxPool = 400;  // inputs kept to be mutated further
+constexpr std::size_t kSlots = 1U << 16U;
+
+// Shared between the processes: survives a crash.
+struct Shared {
+  std::uint64_t executions = 0, loaded = 0, triangles = 0;
+  double slowest_s = 0.0;
+  std::uint64_t slowest_bytes = 0, slowest_triangles = 0;
+  std::uint64_t signatures = 0;
+  char name[512] = {};  // of the input being tried
+  bool seen[kSlots] = {};
+};
+
+// Of this process: a busy machine makes nothing slow.
+double processor_s() {
+  return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
+}
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+struct Fuzzer {
+  std::filesystem::path folder, keep;
+  std::vector<tests::FuzzInput> pool;
+  Shared* shared = nullptr;
+
+  void try_one(const tests::FuzzInput& input, std::mt19937_64& random) {
+    const std::string name = "input" + input.extension + (input.packed ? ".gz" : "");
+    const std::filesystem::path file = folder / name;
+    std::string bytes = input.packed ? tests::packed_bytes(input.bytes) : input.bytes;
+    if (input.packed && random() % 8 == 0) bytes = tests::mutated({bytes, ""}, {bytes, ""}, random).bytes;
+    std::ofstream(file, std::ios::binary) << bytes;
+    std::strncpy(shared->name, file.c_str(), sizeof(shared->name) - 1);
+    ::alarm(kLimit_s);
+    const double start_s = processor_s();
+    const tests::FuzzOutcome outcome = tests::fuzz_mesh_file(file);
+    const double took = processor_s() - start_s;
+    ::alarm(0);
+    ++shared->executions;
+    shared->loaded += outcome.loaded ? 1 : 0;
+    shared->triangles += outcome.triangles;
+    if (took > shared->slowest_s) {
+      shared->slowest_s = took;
+      shared->slowest_bytes = bytes.size();
+      shared->slowest_triangles = outcome.triangles;
+      std::filesystem::copy_file(file, keep / ("slowest-" + name),
+                                 std::filesystem::copy_options::overwrite_existing);
+    }
+    bool& seen = shared->seen[std::hash<std::string>{}(input.extension + outcome.signature) % kSlots];
+    if (!seen) {
+      seen = true;
+      ++shared->signatures;
+      // Written by this process, read by the next batch.
+      std::ofstream(folder / ("new-" + std::to_string(shared->signatures) + input.extension +
+                              (input.packed ? ".packed" : ".plain")),
+                    std::ios::binary)
+          << input.bytes;
+    }
+  }
+
+  // What the last batch found takes a place in the pool: the oldest but the seeds give way.
+  void take_new(std::size_t seeds, std::mt19937_64& random) {
+    std::vector<std::filesystem::path> found;
+    for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+      if (entry.path().filename().string().starts_with("new-")) found.push_back(entry.path());
+    }
+    std::sort(found.begin(), found.end());
+    for (const std::filesystem::path& path : found) {
+      std::ifstream in(path, std::ios::binary);
+      tests::FuzzInput input{{std::istreambuf_iterator<char>(in), {}},
+                             path.stem().extension().string(),
+                             path.extension() == ".packed"};
+      std::filesystem::remove(path);
+      if (pool.size() < kMaxPool) {
+        pool.push_back(std::move(input));
+      } else {
+        pool[seeds + random() % (kMaxPool - seeds)] = std::move(input);
+      }
+    }
+  }
+};
+
+int fuzz(double seconds, std::uint64_t seed, const std::filesystem::path& keep) {
+  Fuzzer fuzzer;
+  fuzzer.folder = std::filesystem::temp_directory_path() / ("hybrid-fuzz-" + std::to_string(::getpid()));
+  fuzzer.keep = keep.empty() ? fuzzer.folder : keep;
+  std::filesystem::create_directories(fuzzer.folder);
+  std::filesystem::create_directories(fuzzer.keep);
+  void* memory = ::mmap(nullptr, sizeof(Shared), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  if (memory == MAP_FAILED) return 2;
+  fuzzer.shared = new (memory) Shared;
+  fuzzer.pool = tests::fuzz_seeds();
+  const std::size_t seeds = fuzzer.pool.size();
+  const Clock::time_point start = Clock::now();
+  double said_s = 0.0;
+  std::uint64_t failures = 0;
+  for (std::uint64_t batch = 0; seconds_since(start) < seconds; ++batch) {
+    std::mt19937_64 random(seed * 1000003 + batch);
+    std::fflush(nullptr);
+    const pid_t child = ::fork();
+    if (child < 0) return 2;
+    if (child == 0) {
+      for (unsigned i = 0; i < kBatch && seconds_since(start) < seconds; ++i) {
+        const tests::FuzzInput& base = fuzzer.pool[random() % fuzzer.pool.size()];
+        const tests::FuzzInput& other = fuzzer.pool[random() % fuzzer.pool.size()];
+        fuzzer.try_one(batch == 0 && i < seeds ? fuzzer.pool[i] : tests::mutated(base, other, random),
+                       random);
+      }
+      std::_Exit(0);  // without leak checks and destructors: they are the program's, once, at its end
+    }
+    int status = 0;
+    ::waitpid(child, &status, 0);
+    if (status != 0) {
+      ++failures;
+      const std::filesystem::path input = fuzzer.shared->name;
+      const bool slow = WIFSIGNALED(status) && WTERMSIG(status) == SIGALRM;
+      const std::filesystem::path kept =
+          fuzzer.keep /
+          ((slow ? "slow-" : "crash-") + std::to_string(failures) + "-" + input.filename().string());
+      std::error_code ignored;
+      std::filesystem::copy_file(input, kept, std::filesystem::copy_options::overwrite_existing, ignored);
+      std::printf("%s in batch %llu: %s\n", slow ? "TOO SLOW" : "CRASH",
+                  static_cast<unsigned long long>(batch), kept.c_str());
+    }
+    fuzzer.take_new(seeds, random);
+    const double now_s = seconds_since(start);
+    if (now_s - said_s > 60.0 || now_s >= seconds) {
+      said_s = now_s;
+      const Shared& s = *fuzzer.shared;
+      std::printf(
+          "%6.0f s: %llu inputs, %llu loaded, %llu triangles, %llu behaviours, %llu failures; slowest "
+          "%.2f s (%llu bytes, %llu triangles)\n",
+          now_s, static_cast<unsigned long long>(s.executions), static_cast<unsigned long long>(s.loaded),
+          static_cast<unsigned long long>(s.triangles), static_cast<unsigned long long>(s.signatures),
+          static_cast<unsigned long long>(failures), s.slowest_s,
+          static_cast<unsigned long long>(s.slowest_bytes),
+          static_cast<unsigned long long>(s.slowest_triangles));
+    }
+    std::fflush(stdout);
+  }
+  if (fuzzer.keep != fuzzer.folder || failures == 0) std::filesystem::remove_all(fuzzer.folder);
+  return failures == 0 ? 0 : 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  double seconds = 10.0;
+  std::uint64_t seed = 1;
+  std::filesystem::path keep;
+  bool named = false;
+  for (int i = 1; i < argc; ++i) {
+    const std::string option = argv[i];
+    if (option.starts_with("--") && i + 1 < argc) {
+      const char* value = argv[++i];
+      if (option == "--seconds") seconds = std::strtod(value, nullptr);
+      if (option == "--seed") seed = std::strtoull(value, nullptr, 10);
+      if (option == "--keep") keep = value;
+    } else {
+      named = true;
+      const Clock::time_point start = Clock::now();
+      const tests::FuzzOutcome outcome = tests::fuzz_mesh_file(option);
+      std::printf("%s: %s, %zu triangles, %.3f s, %s\n", option.c_str(),
+                  outcome.loaded ? "loaded" : "refused", outcome.triangles, seconds_since(start),
+                  outcome.signature.c_str());
+    }
+  }
+  return named ? 0 : fuzz(seconds, seed, keep);
+}

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "voxel/lattice/plasticity.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <vector>
+
+namespace {
+
+using voxel::link_energy_J;
+using voxel::yield_link;
+
+TEST(Yield, IsElasticUpToItsStrainAndPerfectlyPlasticBeyond) {
+  const double y = 2e-4;
+  for (const double side : {-1.0, 1.0}) {
+    const auto held = yield_link(side * 1.9e-4, 0.0, y);
+    EXPECT_EQ(held.elastic, side * 1.9e-4);
+    EXPECT_EQ(held.offset, 0.0);
+    const auto gone = yield_link(side * 5e-4, 0.0, y);
+    EXPECT_DOUBLE_EQ(gone.elastic, side * y);
+    EXPECT_DOUBLE_EQ(gone.offset, side * 3e-4);
+    // Unloaded, it is at rest where its offset is; loaded again as far, nothing is new.
+    EXPECT_EQ(yield_link(gone.offset, gone.offset, y).elastic, 0.0);
+    EXPECT_NEAR(yield_link(side * 5e-4, gone.offset, y).offset, gone.offset, 1e-19);
+  }
+  const double never = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(yield_link(1e3, 0.0, never).elastic, 1e3);
+  EXPECT_EQ(yield_link(1e3, 0.0, never).offset, 0.0);
+}
+
+TEST(Yield, LeavesNoLimitOfTheChain) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<float> number(-1.0F, 1.0F);
+  for (int trial = 0; trial < 100'000; ++trial) {
+    const float low = std::min(number(random), 0.0F), high = std::max(number(random), 0.0F);
+    const auto inside = [&] { return std::clamp(number(random), low, high); };
+    const float before = inside(), difference = inside(), yield = std::fabs(number(random)) * 0.3F;
+    const auto link = yield_link(difference, before, yield);
+    EXPECT_GE(link.offset, std::min(before, difference) - 1e-7F);
+    EXPECT_LE(link.offset, std::max(before, difference) + 1e-7F);
+    EXPECT_LE(std::fabs(link.elastic), yield);
+    // Twice the same is once, but for the last place of a strain of up to 2.
+    const auto again = yield_link(difference, link.offset, yield);
+    EXPECT_NEAR(again.offset, link.offset, 2.4e-7F);
+  }
+}
+
+TEST(Yield, ForceIsTheSlopeOfItsEnergy) {
+  const double k = 30.0, y = 1e-4, offset = 5e-5, step = 1e-9;
+  for (int at = -30; at <= 30; ++at) {
+    const double difference = 1.31e-5 * at;
+    const double slope =
+        (link_energy_J(k, difference + step, offset, y) - link_energy_J(k, difference - step, offset, y)) /
+        (2 * step);
+    EXPECT_NEAR(slope, k * yield_link(difference, offset, y).elastic, 1e-6 * k * y);
+  }
+}
+
+// However many steps, as long as they only load, the offset is that of one; and after a turn, that of the
+// turn.
+TEST(Yield, IsTheSameForAnyNumberOfSteps) {
+  const double y = 1e-4;
+  for (const int steps : {1, 7, 1000}) {
+    double offset = 0.0;
+    const auto go = [&](double from, double to) {
+      for (int s = 1; s <= steps; ++s) offset = yield_link(from + (to - from) * s / steps, offset, y).offset;
+    };
+    go(0.0, 7e-4);
+    EXPECT_NEAR(offset, 6e-4, 1e-15);
+    go(7e-4, -2e-4);
+    EXPECT_NEAR(offset, -1e-4, 1e-15);
+  }
+}
+
+// A round trip of a link costs what the closed form of perfect plasticity says: 4·k·y·(amplitude − y) a
+// cycle.
+TEST(Yield, SpendsTheAreaOfItsLoop) {
+  const double k = 30.0, y = 1e-4, amplitude = 5e-4;
+  double offset = 0.0, work = 0.0, last = 0.0, last_force = 0.0;
+  constexpr int kSteps = 4000;
+  for (int cycle = 0; cycle < 3; ++cycle) {
+    work = 0.0;
+    for (int s = 1; s <= kSteps; ++s) {
+      const double phase = 4.0 * s / kSteps;  // 0 → 1 → 0 → −1 → 0
+      const double difference = amplitude * (phase < 1 ? phase : phase < 3 ? 2 - phase : phase - 4);
+      const auto link = yield_link(difference, offset, y);
+      work += 0.5 * (k * link.elastic + last_force) * (difference - last);
+      offset = link.offset;
+      last = difference;
+      last_force = k * link.elastic;
+    }
+  }
+  EXPECT_NEAR(work, 4 * k * y * (amplitude - y), 1e-3 * work);
+}
+
+// A bar: links in a row between a wall and a hand. Gauss-Seidel on the energy of the step; each voxel goes to
+// the place where its two links' forces are equal, found by bisection.
+struct Bar {
+  std::vector<double> k, y, offset, u;
+
+  Bar(std::vector<double> stiffness, std::vector<double> yield)
+      : k(std::move(stiffness)), y(std::move(yield)), offset(k.size(), 0.0), u(k.size() + 1, 0.0) {}
+  [[nodiscard]] double force(std::size_t link) const {
+    return k[link] * yield_link(u[link + 1] - u[link], offset[link], y[link]).elastic;
+  }
+  void sweep() {
+    for (std::size_t v = 1; v + 1 < u.size(); ++v) {
+      double low = std::min(u[v - 1], u[v + 1]) - 1.0, high = std::max(u[v - 1], u[v + 1]) + 1.0;
+      for (int s = 0; s < 60; ++s) {
+        u[v] = 0.5 * (low + high);
+        (force(v - 1) < force(v) ? low : high) = u[v];
+      }
+    }
+  }
+  void keep() {
+    for (std::size_t l = 0; l < k.size(); ++l)
+      offset[l] = yield_link(u[l + 1] - u[l], offset[l], y[l]).offset;
+  }
+  // The hand goes there; the offsets move when the bar has settled, or with every sweep.
+  void pull(double to, int sweeps, bool keep_on_the_way = false) {
+    u.back() = to;
+    for (int s = 0; s < sweeps; ++s) {
+      sweep();
+      if (keep_on_the_way) keep();
+    }
+    keep();
+  }
+};
+
+// Links of 10, 20 and 40 N/m in a row, each of which yields at a strain of its own; the weakest, at 3 N,
+// takes all.
+TEST(Yield, ABarKeepsWhatItsWeakestLinkDoes) {
+  const std::vector<double> k{10, 20, 40}, y{0.5, 0.15, 0.2};
+  const double series = 1 / (1.0 / 10 + 1.0 / 20 + 1.0 / 40), weakest = 3.0;
+  for (const int sweeps : {200, 2000}) {
+    for (const int steps : {1, 5}) {
+      Bar bar(k, y);
+      for (int s = 1; s <= steps; ++s) bar.pull(1.0 * s / steps, sweeps);
+      EXPECT_NEAR(bar.force(0), weakest, 1e-9);
+      EXPECT_NEAR(bar.offset[1], 1.0 - weakest / series, 1e-9);
+      EXPECT_EQ(bar.offset[0], 0.0);
+      EXPECT_EQ(bar.offset[2], 0.0);
+      // Let go: pulled back until no force is left, it is longer by just that.
+      bar.pull(1.0 - weakest / series, sweeps);
+      EXPECT_NEAR(bar.force(0), 0.0, 1e-9);
+      EXPECT_NEAR(bar.offset[1], 1.0 - weakest / series, 1e-9);
+    }
+  }
+}
+
+// Why the offset waits: just after a pull all of the strain is in the last link.
+TEST(Yield, OffsetsKeptOnTheWayKeepTheWayToo) {
+  const std::vector<double> k(8, 10.0), y(8, 0.2);
+  Bar waits(k, y), hurries(k, y);
+  waits.pull(1.2, 3000);  // 0.15 a link: nothing yields
+  hurries.pull(1.2, 3000, true);
+  for (const double p : waits.offset) EXPECT_EQ(p, 0.0);
+  EXPECT_GT(hurries.offset.back(), 0.1);
+}
+
+}  // namespace

@@ -1,0 +1,345 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Relaxed apart: the same rest, never more energy, no limit broken, whatever the tick does meanwhile.
+#include "voxel/object/shadow_object.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <vector>
+
+#include "tests/voxel/fixtures/soft_press.h"
+#include "voxel/object/validate.h"
+
+namespace {
+
+using tests::elastic;
+using tests::SoftBlock;
+using voxel::LinkMaterial;
+using voxel::Replica;
+using voxel::ToolInBody;
+
+constexpr double kH = 1e-3;  // spacing (m)
+constexpr LinkMaterial kFirm{
+    .young_Pa = 1e4, .poisson = 0.3, .stretch_min = 0.9, .stretch_max = 1.1, .shear = 0.1};
+
+// How far beyond its limits a link may be left: the chain lets 3.5 roundings of the largest move be, so that
+// waves do not run for roundings, and a limit and the places of its ends are rounded once each. It does not
+// grow: 5 is the most that 25 sequences of 400 ticks leave, always from the chain.
+constexpr double kRoundings = 6.0;
+
+// One exchange as ticks make it; `rows` a tick.
+void exchange(Replica& replica, SoftBlock& soft, std::size_t rows) {
+  replica.give(*soft.object);
+  replica.relax();
+  replica.take(*soft.object);
+  while (!replica.drained()) replica.drain(*soft.object, rows);
+}
+
+void press_and_let_go(Replica& replica, SoftBlock& soft) {
+  const ToolInBody tool = soft.ball(6 * kH, 3 * kH);
+  soft.touch(tool, 9 * kH);
+  for (int n = 0; n < 10; ++n) {
+    soft.object->push_out(tool);
+    soft.object->relax_near(tool, 1);
+    exchange(replica, soft, 1000);
+  }
+  soft.object->touch({});
+}
+
+double largest_difference(const voxel::SoftObject& a, const voxel::SoftObject& b) {
+  double most = 0.0;
+  for (voxel::VoxelId v = 0; v < a.lattice().size(); ++v) {
+    if (a.lattice().filled(v)) most = std::max(most, glm::distance(a.state().at(v), b.state().at(v)));
+  }
+  return most;
+}
+
+TEST(Replica, AHeldContactComesToTheSameRest) {
+  for (const LinkMaterial& material : {elastic(1e4, 0.3), kFirm}) {
+    SoftBlock apart({41, 37, 25}, kH, material), there({41, 37, 25}, kH, material);
+    const ToolInBody tool = apart.ball(6 * kH, 1.5 * kH);
+    const voxel::Reaction wanted = there.press(tool, 9 * kH, 1e-5, 2000);
+    Replica replica(*apart.object);
+    apart.touch(tool, 9 * kH);
+    voxel::Reaction felt;
+    for (int n = 0; n < 60; ++n) {
+      apart.object->push_out(tool);
+      apart.object->relax_near(tool, 1);
+      felt = apart.object->reaction(tool);
+      exchange(replica, apart, 333);
+    }
+    EXPECT_NEAR(felt.force_N.z, wanted.force_N.z, 2e-3 * wanted.force_N.z);
+    EXPECT_LT(largest_difference(*apart.object, *there.object), 0.02 * kH);
+    EXPECT_EQ(voxel::validate(*apart.lattice, apart.object->state(), kRoundings), "");
+  }
+}
+
+// For as long as one likes: what the one and the other find are parts of the same way, not the same way
+// twice. (When they were, the force wavered by its own size.)
+TEST(Replica, AHeldContactStaysAtRest) {
+  SoftBlock soft({41, 37, 25}, kH, kFirm);
+  Replica replica(*soft.object);
+  const ToolInBody tool = soft.ball(6 * kH, 2 * kH);
+  std::vector<double> felt;
+  for (int n = 0; n < 400; ++n) {
+    for (int tick = 0; tick < 2; ++tick) {
+      soft.touch(tool, 9 * kH);
+      soft.object->push_out(tool);
+      soft.object->relax_near(tool, 1);
+      felt.push_back(soft.object->reaction(tool).force_N.z);
+      if (tick == 0) {
+        replica.give(*soft.object);
+        replica.relax();
+      }
+    }
+    replica.take(*soft.object);
+    while (!replica.drained()) replica.drain(*soft.object, 250);
+  }
+  const auto [low, high] = std::minmax_element(felt.begin() + 200, felt.end());
+  EXPECT_LT(*high - *low, 1e-3 * felt.back());
+}
+
+// A result that comes in parts while the tool is held: on the way nothing pulls by itself, so the force goes
+// from what it was to what it is at once in even steps, and ends there.
+// (Pressed so little that no link is at its limits: what these do not let a row follow depends on how it
+// comes.)
+TEST(Replica, AResultInPartsIsFeltInEvenSteps) {
+  constexpr int parts = 8;
+  SoftBlock whole({41, 37, 25}, kH, elastic(1e4, 0.3)), some({41, 37, 25}, kH, elastic(1e4, 0.3));
+  const ToolInBody tool = whole.ball(6 * kH, 0.3 * kH);
+  const auto feel = [&](SoftBlock& soft) {
+    soft.object->push_out(tool);
+    soft.object->relax_near(tool, 1);
+    return soft.object->reaction(tool).force_N.z;
+  };
+  Replica of_whole(*whole.object), of_some(*some.object);
+  double before = 0.0, after = 0.0;
+  std::vector<double> felt;
+  for (SoftBlock* soft : {&whole, &some}) {
+    Replica& replica = soft == &whole ? of_whole : of_some;
+    soft->touch(tool, 9 * kH);
+    before = feel(*soft);
+    replica.give(*soft->object);
+    replica.relax();
+    replica.take(*soft->object, soft == &whole ? 1 : parts);
+    EXPECT_EQ(replica.in_parts(), soft == &some);
+    for (int n = 1; n < parts && soft == &some; ++n) {
+      EXPECT_FALSE(replica.drained());
+      felt.push_back(feel(*soft));
+      replica.take_part(*soft->object, false);
+    }
+    EXPECT_FALSE(replica.in_parts());
+    while (!replica.drained()) replica.drain(*soft->object, 1000);
+    const double now = feel(*soft);
+    if (soft == &whole) after = now;
+    felt.push_back(now);
+  }
+  felt.erase(felt.begin());  // of the one that came at once
+  const double step = (after - before) / parts;
+  ASSERT_EQ(felt.size(), static_cast<std::size_t>(parts));
+  EXPECT_LT(after, 0.99 * before) << "a result that changes something";
+  for (std::size_t n = 0; n < felt.size(); ++n)
+    EXPECT_NEAR(felt[n], before + step * static_cast<double>(n + 1), 0.5 * std::fabs(step)) << n;
+  EXPECT_LT(largest_difference(*whole.object, *some.object), 0.01 * kH);
+}
+
+// And one that is cut short, as when the tool moves, has come whole.
+TEST(Replica, AResultInPartsThatIsCutShortHasComeWhole) {
+  SoftBlock whole({41, 37, 25}, kH, elastic(1e4, 0.3)), some({41, 37, 25}, kH, elastic(1e4, 0.3));
+  for (SoftBlock* soft : {&whole, &some}) {
+    const ToolInBody tool = soft->ball(6 * kH, 0.3 * kH);
+    Replica replica(*soft->object);
+    soft->touch(tool, 9 * kH);
+    soft->object->push_out(tool);
+    soft->object->relax_near(tool, 1);
+    replica.give(*soft->object);
+    replica.relax();
+    replica.take(*soft->object, soft == &whole ? 1 : 8);
+    if (soft == &some) {
+      replica.take_part(*soft->object, false);
+      replica.take_part(*soft->object, true);
+    }
+    EXPECT_FALSE(replica.in_parts());
+    while (!replica.drained()) replica.drain(*soft->object, 1000);
+  }
+  EXPECT_LT(largest_difference(*whole.object, *some.object), 1e-5 * kH);
+}
+
+TEST(Replica, WhatTheToolLeftComesToRestAndIsLeftAlone) {
+  SoftBlock soft({41, 37, 25}, kH, elastic(1e4, 0.3));
+  Replica replica(*soft.object);
+  press_and_let_go(replica, soft);
+  int exchanges = 0;
+  for (; exchanges < 200 && Replica::wanted(*soft.object); ++exchanges) exchange(replica, soft, 1000);
+  EXPECT_LT(exchanges, 60);
+  double most = 0.0;
+  for (voxel::VoxelId v = 0; v < soft.lattice->size(); ++v)
+    most = std::max(most, glm::length(soft.object->state().at(v)));
+  EXPECT_LT(most, 1e-3 * kH);
+}
+
+// Ten spacings deep, in steps and without a cycle between them, as a tool that jumps finds it: everything
+// that moved is at its limits, and has spacings to go.
+ToolInBody press_at_once(SoftBlock& soft) {
+  ToolInBody tool;
+  constexpr int steps = 40;
+  for (int n = 1; n <= steps; ++n) {
+    tool = soft.ball(10 * kH, 10 * kH * n / steps);
+    soft.touch(tool, 13 * kH);
+    if (n > 1) soft.object->follow({0.0, 0.0, -10 * kH / steps});
+    soft.object->push_out(tool);
+  }
+  return tool;
+}
+
+constexpr std::array<int, 3> kWide{75, 73, 57};
+constexpr LinkMaterial kLoose{.stretch_min = 0.05, .stretch_max = 10.0, .shear = 10.0};
+
+TEST(Replica, AJumpIsFeltRightAfterThreeResults) {
+  for (const LinkMaterial& material : {LinkMaterial{}, kLoose}) {
+    SoftBlock soft(kWide, kH, material), there(kWide, kH, material);
+    Replica replica(*soft.object);
+    const ToolInBody tool = press_at_once(soft);
+    const double wanted = there.press(tool, 13 * kH, 1e-5, 200).force_N.z;
+    for (int n = 0; n < 3; ++n) {
+      soft.object->relax_near(tool, 2);
+      exchange(replica, soft, 250);
+      soft.touch(tool, 13 * kH);
+      soft.object->push_out(tool);
+    }
+    soft.object->relax_near(tool, 2);
+    EXPECT_NEAR(soft.object->reaction(tool).force_N.z, wanted, 0.05 * wanted);
+    EXPECT_EQ(voxel::validate(*soft.lattice, soft.object->state(), kRoundings), "");
+  }
+}
+
+// A result moves rows by spacings, and none can go there before those beside it: all get there all the same.
+TEST(Replica, WhatMovesFarIsAddedWhole) {
+  for (const LinkMaterial& material : {LinkMaterial{}, kLoose}) {
+    SoftBlock soft(kWide, kH, material);
+    Replica replica(*soft.object);
+    const ToolInBody tool = press_at_once(soft);
+    soft.object->relax_near(tool, 2);
+    exchange(replica, soft, 250);
+    std::size_t moved = 0, behind = 0;
+    for (voxel::VoxelId v = 0; v < soft.lattice->size(); ++v) {
+      if (!soft.lattice->filled(v)) continue;
+      const glm::dvec3 here = soft.object->state().at(v),
+                       there = replica.displacement_at(soft.lattice->rest(v));
+      moved += glm::length(there) > 0.1 * kH ? 1 : 0;
+      behind += glm::distance(here, there) > 0.1 * kH ? 1 : 0;
+    }
+    EXPECT_GT(moved, 50'000U);
+    EXPECT_LT(behind, moved / 100);
+  }
+}
+
+// Far from the contact small changes wait, but not for ever: at rest both know the same.
+TEST(Replica, WhatWasKeptBackIsPassedOnAtRest) {
+  SoftBlock soft({41, 65, 65}, kH, elastic(1e4, 0.3));
+  Replica replica(*soft.object);
+  const ToolInBody tool = soft.ball(6 * kH, 2 * kH);
+  soft.touch(tool, 9 * kH);
+  soft.object->push_out(tool);
+  for (int n = 0; n < 300 && Replica::wanted(*soft.object); ++n) exchange(replica, soft, 1000);
+  ASSERT_FALSE(Replica::wanted(*soft.object));
+  double most = 0.0;
+  for (voxel::VoxelId v = 0; v < soft.lattice->size(); ++v) {
+    if (!soft.lattice->filled(v)) continue;
+    const glm::dvec3 known = replica.displacement_at(soft.lattice->rest(v));
+    most = std::max(most, glm::distance(soft.object->state().at(v), known));
+  }
+  EXPECT_LT(most, voxel::kRestingResidual * kH);
+}
+
+// Draining what was found takes longer than the next is given: what a tick moves meanwhile is given without
+// what it has yet to go, and must not go that twice. The block comes loose and is to come to rest.
+TEST(Replica, WhatIsGivenWhileItIsDrainedGoesItsWayOnce) {
+  SoftBlock soft({41, 37, 25}, kH, elastic(1e4, 0.3));
+  Replica replica(*soft.object);
+  press_and_let_go(replica, soft);
+  const double first = soft.object->energy_J();
+  // Voxels that somebody moves by nothing, so that their rows are given each time.
+  const voxel::VoxelId stirred = soft.lattice->grid().at(20, 18, 12);
+  for (int n = 0; n < 40; ++n) {
+    replica.give(*soft.object);
+    replica.relax();
+    while (!replica.drained()) {
+      replica.drain(*soft.object, 40);
+      soft.object->move(stirred, soft.object->state().at(stirred));
+    }
+    replica.take(*soft.object);
+    for (voxel::VoxelId v = 0; v < soft.lattice->size(); v += 7 * voxel::kRow) {
+      if (soft.lattice->filled(v)) soft.object->move(v, soft.object->state().at(v));
+    }
+  }
+  EXPECT_LT(soft.object->energy_J(), 1e-6 * first);
+}
+
+// The tool stands still, and in turns the tick has its cycles round the contact and the replica its own, of a
+// state that is so many ticks old. What voxels the tool presses changes, so energy is compared with the
+// tool's work left out: of the same pressed voxels in the same places.
+TEST(Replica, TheSumNeverHasMoreEnergyThanWhatWasGiven) {
+  for (const LinkMaterial& material : {elastic(1e4, 0.3), kFirm}) {
+    SoftBlock soft({41, 37, 25}, kH, material);
+    Replica replica(*soft.object);
+    const ToolInBody tool = soft.ball(6 * kH, 2 * kH);
+    soft.touch(tool, 9 * kH);
+    soft.object->push_out(tool);
+    double before = soft.object->energy_J();
+    const double first = before;
+    double worst = 0.0;
+    for (int n = 0; n < 40; ++n) {
+      replica.give(*soft.object);
+      replica.relax();
+      for (int tick = 0; tick < n % 4; ++tick) soft.object->relax_near(tool, 1);
+      replica.take(*soft.object);
+      while (!replica.drained()) {
+        replica.drain(*soft.object, 100);
+        if (n % 2 == 1) soft.object->relax_near(tool, 1);
+      }
+      const double now = soft.object->energy_J();
+      worst = std::max(worst, (now - before) / first);
+      before = now;
+    }
+    EXPECT_LT(worst, 1e-4);
+    EXPECT_LT(before, 0.6 * first);
+    EXPECT_EQ(voxel::validate(*soft.lattice, soft.object->state(), kRoundings), "");
+  }
+}
+
+// A tool that moves on while results are old, deep where the chain is tight: limits hold after every slice.
+TEST(Replica, NoLinkLeavesItsLimitsInBetween) {
+  SoftBlock soft({31, 29, 19}, kH, kFirm);
+  Replica replica(*soft.object);
+  std::mt19937_64 random(7);
+  const auto uniform = [&random](double low, double high) {
+    return low + (high - low) * (static_cast<double>(random() >> 11) * 0x1.0p-53);
+  };
+  bool given = false;
+  for (int tick = 0; tick < 600; ++tick) {
+    ToolInBody tool = soft.ball(5 * kH, 0.0);
+    tool.centre += glm::dvec3(4 * kH * std::sin(0.031 * tick), 3 * kH * std::sin(0.017 * tick),
+                              2 * kH * std::sin(0.05 * tick) - 1.2 * kH);
+    soft.touch(tool, 9 * kH);
+    soft.object->push_out(tool);
+    soft.object->relax_near(tool, 1);
+    if (!replica.drained()) {
+      replica.drain(*soft.object, 50);
+    } else if (given && uniform(0.0, 1.0) < 0.2) {
+      replica.take(*soft.object);
+      given = false;
+    }
+    if (!given && Replica::wanted(*soft.object)) {
+      replica.give(*soft.object);
+      replica.relax();
+      given = true;
+    }
+    if (tick % 7 == 0) {
+      ASSERT_EQ(voxel::validate(*soft.lattice, soft.object->state(), kRoundings), "") << "tick " << tick;
+    }
+  }
+}
+
+}  // namespace

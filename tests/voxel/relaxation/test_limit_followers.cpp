@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What is brought along with voxels that it hangs on, against the same done voxel by voxel.
+#include "voxel/relaxation/limit_followers.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iostream>
+#include <set>
+
+#include "tests/voxel/fixtures/lattice_scenes.h"
+#include "voxel/chain/chainmail.h"
+#include "voxel/lattice/voxel_links.h"
+
+namespace {
+
+using tests::Random;
+using voxel::Displacement;
+using voxel::Lattice;
+using voxel::VoxelId;
+
+constexpr float kNearlyTight = 0.1F, kTight = 1e-4F;  // of the spacing, as there
+constexpr float kStir = 1e-5F;
+constexpr std::size_t kMostRoots = 64;
+
+// How far the link of two neighbours along d is from its limits.
+float room(const Lattice& lattice, const Displacement& state, VoxelId v, VoxelId w, int d, bool up,
+           int axis) {
+  const auto& u = state.u[static_cast<std::size_t>(axis)];
+  const auto b = lattice.bounds(up ? v : w, d, axis);
+  const float difference = u[w] - u[v];
+  return std::min(difference - (up ? b[0] : -b[1]), (up ? b[1] : -b[0]) - difference);
+}
+
+float place_of(voxel::Relaxation& relaxation, const Displacement& state, VoxelId v, int axis) {
+  glm::dvec3 rest = link_minimum(relaxation.couplings(), state, v);
+  if (relaxation.away())
+    rest += link_compliance(relaxation.couplings(), v) * relaxation.multigrid().balance_of(v, state);
+  return voxel::clamp_to(link_interval(relaxation.couplings().lattice(), state, v, axis),
+                         static_cast<float>(rest[axis]), state.u[static_cast<std::size_t>(axis)][v]);
+}
+
+// Brings along what hangs on `roots`; which voxels moved far enough to stir their rows.
+std::set<VoxelId> draw(voxel::Relaxation& relaxation, Displacement& state, const std::vector<VoxelId>& roots,
+                       int axis, std::size_t& drawn) {
+  const Lattice& lattice = relaxation.couplings().lattice();
+  auto& u = state.u[static_cast<std::size_t>(axis)];
+  std::set<VoxelId> known(roots.begin(), roots.end()), stirred;
+  std::vector<VoxelId> carried = roots;
+  const std::size_t most = roots.size() + voxel::DrawnRows::kMostDrawn;
+  for (std::size_t head = 0; head < carried.size() && carried.size() < most; ++head) {
+    for (int n = 0; n < 6; ++n) {
+      const int d = n / 2;
+      const bool up = n % 2 != 0;
+      const VoxelId v = carried[head], w = up ? lattice.up(v, d) : lattice.down(v, d);
+      if (!lattice.filled(w) || lattice.anchored(w) || known.contains(w) ||
+          state.role[w] != Displacement::free)
+        continue;
+      const auto spacing = static_cast<float>(lattice.spacing_m()[d]);
+      if (room(lattice, state, v, w, d, up, axis) > kNearlyTight * spacing) continue;
+      const float before = u[w];
+      u[w] = place_of(relaxation, state, w, axis);
+      if (std::abs(u[w] - before) > kStir * spacing) stirred.insert(w);
+      if (room(lattice, state, v, w, d, up, axis) > kTight * spacing) continue;
+      known.insert(w);
+      carried.push_back(w);
+    }
+  }
+  drawn += carried.size() - roots.size();
+  return stirred;
+}
+
+struct Counts {
+  std::size_t drawn = 0, moved = 0, most = 0;
+};
+
+// Some voxels of a lattice, pushed so far that others come along, and then taken back a little. `apart`:
+// while somebody else relaxes it.
+void compare(const voxel::LabelVolume& volume, const voxel::LatticeOptions& options,
+             const std::vector<std::size_t>& filled, bool apart, Random& random, Counts& counts) {
+  const Lattice lattice(volume, options);
+  Displacement state(lattice);
+  voxel::Relaxation relaxation(lattice);
+  voxel::ChainMail chain(lattice);
+  const auto any = [&] {
+    return tests::voxel_of(lattice, volume,
+                           filled[static_cast<std::size_t>(random.below(static_cast<int>(filled.size())))]);
+  };
+  std::vector<VoxelId> roots;
+  std::vector<glm::vec3> moves;
+  for (int n = 1 + random.below(4); n > 0; --n) {
+    const VoxelId v = any();
+    if (lattice.anchored(v) || std::find(roots.begin(), roots.end(), v) != roots.end()) continue;
+    glm::dvec3 move(0.0);
+    for (int axis = 0; axis < 3; ++axis) move[axis] = random.between(-3.0, 3.0) * lattice.min_spacing_m();
+    state.set(v, move);
+    roots.push_back(v);
+    moves.emplace_back(move);
+  }
+  if (roots.empty()) return;
+  chain.settle(state, roots, moves, {});
+  for (const voxel::RowId row : chain.moved_rows()) relaxation.stir(row);
+  if (lattice.has_bricks()) relaxation.multigrid().renew_bricks(state, lattice.grid().rows());
+  // What lies on a tool is not moved by this, whether it is a root or not.
+  for (const VoxelId v : roots) {
+    if (lattice.surface_number(v) != Lattice::kNoSurface) state.set_role(v, Displacement::held);
+  }
+  if (const VoxelId v = any(); lattice.surface_number(v) != Lattice::kNoSurface)
+    state.set_role(v, Displacement::held);
+  if (apart) {
+    relaxation.leave_to_another();
+    relaxation.give_away(state, {});
+    for (const voxel::RowId row : chain.moved_rows()) relaxation.multigrid().balance(row, state, {});
+  }
+  const auto back = static_cast<float>(random.between(-0.05, 0.05));
+  for (const VoxelId v : roots) {
+    for (auto& axis : state.u) axis[v] += back * axis[v];
+  }
+  relaxation.multigrid().log().clear();
+
+  Displacement simple = state;
+  std::set<VoxelId> stirred;
+  std::size_t drawn = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::size_t on_axis = 0;
+    stirred.merge(draw(relaxation, simple, roots, axis, on_axis));
+    drawn += on_axis;
+    counts.most = std::max(counts.most, on_axis);
+  }
+  std::vector<VoxelId> moved;
+  for (const std::size_t index : filled) {
+    const VoxelId v = tests::voxel_of(lattice, volume, index);
+    if (simple.at(v) != state.at(v)) moved.push_back(v);
+  }
+  voxel::DrawnRows rows(lattice, kMostRoots);
+  rows.draw(relaxation, state, roots, kStir);
+  for (const std::size_t index : filled) {
+    const VoxelId v = tests::voxel_of(lattice, volume, index);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      ASSERT_EQ(state.u[axis][v], simple.u[axis][v]) << "voxel " << v << ", axis " << axis;
+  }
+  for (const VoxelId v : stirred)
+    EXPECT_TRUE(relaxation.multigrid().has(0, v / voxel::kRow, voxel::Multigrid::active));
+  for (const VoxelId v : moved) EXPECT_TRUE(!apart || relaxation.multigrid().log().has(0, v / voxel::kRow));
+  counts.drawn += drawn;
+  counts.moved += moved.size();
+}
+
+std::ostream& operator<<(std::ostream& out, const Counts& counts) {
+  return out << counts.drawn << " voxels drawn along, " << counts.most << " at most on an axis, "
+             << counts.moved << " moved";
+}
+
+TEST(DrawnRows, GoWhereTheyGoVoxelByVoxelInRandomScenes) {
+  Random random(21);
+  Counts counts;
+  for (int n = 0; n < 400; ++n) {
+    tests::RandomScene scene = tests::random_scene(random);
+    for (auto& material : scene.options.materials) {
+      if (n % 4 == 1) material.yield = random.between(0.02, 0.3);
+      if (n % 4 == 2) material.bricks = random.below(2) != 0;
+    }
+    compare(scene.volume, scene.options, scene.filled, n % 8 < 4, random, counts);
+  }
+  std::cout << counts << '\n';
+  EXPECT_GT(counts.drawn, 1000U);
+  EXPECT_GT(counts.moved, 1000U);
+}
+
+TEST(DrawnRows, GoOnFromRowToRow) {
+  // Wider than a row of 32, of one label, whose rows share their springs, and of three; as many as are drawn
+  // at most in some.
+  Random random(22);
+  Counts counts;
+  for (int n = 0; n < 100; ++n) {
+    voxel::LabelVolume volume = tests::block({100, 9, 8}, glm::dvec3(1e-3));
+    voxel::LatticeOptions options;
+    for (std::size_t label = 1; label <= 3; ++label) {
+      const double slack = n % 3 == 0 ? 0.01 : random.between(0.02, 0.1);
+      options.materials[label] = {.young_Pa = random.between(1e3, 1e4),
+                                  .poisson = 0.3,
+                                  .stretch_min = 1.0 - slack,
+                                  .stretch_max = 1.0 + slack,
+                                  .shear = slack};
+    }
+    if (n % 2 != 0) {
+      for (auto& label : volume.labels) label = static_cast<std::uint8_t>(1 + random.below(3));
+    }
+    if (n % 3 == 0) {
+      options.anchor_voxels = {0};
+    } else {
+      options.anchor_faces = {"-z"};
+    }
+    std::vector<std::size_t> filled(volume.labels.size());
+    for (std::size_t i = 0; i < filled.size(); ++i) filled[i] = i;
+    compare(volume, options, filled, n % 4 < 2, random, counts);
+  }
+  std::cout << counts << '\n';
+  EXPECT_GE(counts.most, voxel::DrawnRows::kMostDrawn);
+}
+
+}  // namespace

@@ -1,0 +1,489 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Volumes with one thing wrong each, made by hand: each is read right, or refused with the words that say
+// what it is. And the same files with random bytes changed or cut off: a volume or a refusal, nothing else.
+#include <gtest/gtest.h>
+
+#include <zlib.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <functional>
+#include <iostream>
+#include <limits>
+#include <map>
+#include <random>
+#include <vector>
+
+#include "tests/voxel/volume/dicom_slices.h"
+#include "tests/voxel/volume/volume_folder.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using tests::DicomSlice;
+using tests::refusal_of;
+using voxel::LabelVolume;
+
+class VolumeCorpus : public tests::VolumeFolder {};
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+
+// A NIfTI of 4 x 3 x 2 voxels that hold 0, 1, 2, …; what the cases change is public.
+struct Nifti {
+  std::vector<std::int16_t> dims{4, 3, 2};
+  std::int16_t type = 2, bits = 8;
+  std::array<float, 3> spacing{1.0F, 1.0F, 1.0F};
+  std::array<float, 12> sform{};
+  bool has_sform = false, has_qform = false, big_endian = false;
+  float offset = 352.0F, slope = 0.0F;
+  std::string magic = "n+1";
+  std::int32_t header_bytes = 348;
+
+  [[nodiscard]] std::string text() const {
+    std::string out(352, '\0');
+    const auto put = [&](std::size_t at, auto value) {
+      std::array<char, sizeof(value)> bytes{};
+      std::memcpy(bytes.data(), &value, sizeof(value));
+      if (big_endian) std::reverse(bytes.begin(), bytes.end());
+      out.replace(at, sizeof(value), bytes.data(), sizeof(value));
+    };
+    put(0, header_bytes);
+    put(40, static_cast<std::int16_t>(dims.size()));
+    for (std::size_t n = 0; n < 7; ++n) put(42 + 2 * n, n < dims.size() ? dims[n] : std::int16_t{1});
+    put(70, type);
+    put(72, bits);
+    for (std::size_t n = 0; n < 8; ++n) put(76 + 4 * n, n >= 1 && n <= 3 ? spacing[n - 1] : 1.0F);
+    put(108, offset);
+    put(112, slope);
+    put(252, static_cast<std::int16_t>(has_qform));
+    put(254, static_cast<std::int16_t>(has_sform));
+    for (std::size_t n = 0; n < 12; ++n) put(280 + 4 * n, sform[n]);
+    out.replace(344, magic.size(), magic);
+    std::size_t voxels = 1;
+    for (const std::int16_t n : dims) voxels *= static_cast<std::size_t>(std::max<std::int16_t>(n, 1));
+    const std::size_t at = out.size();
+    out.resize(at + voxels * static_cast<std::size_t>(bits / 8));
+    for (std::size_t n = 0; n < voxels; ++n) {
+      if (type == 2) out[at + n] = static_cast<char>(n);
+      if (type == 4) put(at + 2 * n, static_cast<std::int16_t>(n));
+      if (type == 8) put(at + 4 * n, static_cast<std::int32_t>(n));
+      if (type == 16) put(at + 4 * n, static_cast<float>(n));
+      if (type == 64) put(at + 8 * n, static_cast<double>(n));
+    }
+    return out;
+  }
+};
+
+std::string gzip(const std::string& text) {
+  z_stream stream{};
+  deflateInit2(&stream, 6, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY);
+  std::string out(text.size() + 200, '\0'), in = text;
+  stream.next_in = reinterpret_cast<unsigned char*>(in.data());
+  stream.avail_in = static_cast<uInt>(in.size());
+  stream.next_out = reinterpret_cast<unsigned char*>(out.data());
+  stream.avail_out = static_cast<uInt>(out.size());
+  deflate(&stream, Z_FINISH);
+  out.resize(stream.total_out);
+  deflateEnd(&stream);
+  return out;
+}
+
+std::string counting() {
+  std::string out;
+  for (int n = 0; n < 24; ++n) out.push_back(static_cast<char>(n));
+  return out;
+}
+
+std::string meta(const std::map<std::string, std::string>& changed, const std::string& data = counting()) {
+  std::string out;
+  const std::vector<std::array<std::string, 2>> lines{{"ObjectType", "Image"},
+                                                      {"NDims", "3"},
+                                                      {"BinaryData", "True"},
+                                                      {"BinaryDataByteOrderMSB", "False"},
+                                                      {"TransformMatrix", "1 0 0 0 1 0 0 0 1"},
+                                                      {"Offset", "0 0 0"},
+                                                      {"ElementSpacing", "1 1 1"},
+                                                      {"DimSize", "4 3 2"},
+                                                      {"ElementNumberOfChannels", "1"},
+                                                      {"ElementType", "MET_UCHAR"},
+                                                      {"ElementDataFile", "LOCAL"}};
+  for (const auto& [key, value] : lines) {
+    const auto other = changed.find(key);
+    const std::string& is = other == changed.end() ? value : other->second;
+    if (!is.empty()) out.append(key).append(" = ").append(is).append("\n");
+  }
+  return out + data;
+}
+
+std::string nrrd(const std::map<std::string, std::string>& changed, const std::string& data = counting()) {
+  std::map<std::string, std::string> lines{{"type", "uint8"},
+                                           {"dimension", "3"},
+                                           {"space", "left-posterior-superior"},
+                                           {"sizes", "4 3 2"},
+                                           {"space directions", "(1,0,0) (0,1,0) (0,0,1)"},
+                                           {"space origin", "(0,0,0)"},
+                                           {"endian", "little"},
+                                           {"encoding", "raw"}};
+  for (const auto& [key, value] : changed) lines[key] = value;
+  std::string out = "NRRD0004\n";
+  // The order matters to the format: how many axes there are comes before what they are.
+  for (const char* key : {"type", "dimension", "space", "sizes", "spacings", "space directions", "kinds",
+                          "endian", "encoding", "space origin", "byte skip", "line skip"}) {
+    const auto line = lines.find(key);
+    if (line != lines.end() && !line->second.empty())
+      out.append(key).append(": ").append(line->second).append("\n");
+  }
+  return out + "\n" + data;
+}
+
+template <typename T>
+std::string swapped_bytes() {
+  std::string out;
+  for (int n = 0; n < 24; ++n) {
+    const T value = static_cast<T>(n);
+    std::array<char, sizeof(T)> bytes{};
+    std::memcpy(bytes.data(), &value, sizeof(T));
+    std::reverse(bytes.begin(), bytes.end());
+    out.append(bytes.data(), bytes.size());
+  }
+  return out;
+}
+
+struct Case {
+  std::string name, bytes;
+  std::string refusal;  // a part of its words; empty: it is read, as 0, 1, 2, …
+  std::string note{};   // and this is said of it
+};
+
+Nifti with(const std::function<void(Nifti&)>& change) {
+  Nifti n;
+  change(n);
+  return n;
+}
+
+std::vector<Case> corpus() {
+  std::vector<Case> all;
+  const auto nifti = [&](const char* refusal, const std::function<void(Nifti&)>& change,
+                         const char* note = "") {
+    all.push_back({"v.nii", with(change).text(), refusal, note});
+  };
+  // Sizes.
+  nifti("", [](Nifti&) {});
+  nifti("0 voxels", [](Nifti& n) { n.dims = {4, 0, 2}; });
+  nifti("-3 voxels", [](Nifti& n) { n.dims = {4, -3, 2}; });
+  nifti("4 axes", [](Nifti& n) { n.dims = {4, 3, 2, 5}; });
+  nifti("", [](Nifti& n) { n.dims = {4, 3, 2, 1}; });
+  nifti("9 axes", [](Nifti& n) { n.dims = {4, 3, 2, 1, 1, 1, 1, 1, 1}; });
+  all.push_back({"v.nii", Nifti{}.text() + "more", "", "4 bytes behind"});
+  all.push_back({"v.nii", Nifti{}.text().substr(0, 370), "has only"});
+  all.push_back({"v.mha", meta({{"DimSize", "4 3 2000000000"}}), "1,000,000 along each"});
+  all.push_back({"v.mha", meta({{"DimSize", "9999 9999 9999"}}), "has only"});
+  all.push_back({"v.mha", meta({{"DimSize", "4 3"}}), "header cannot be read"});
+  all.push_back({"v.nrrd", nrrd({{"sizes", "4 3"}}), "header cannot be read"});
+  // Spacing.
+  nifti("spacing of 0", [](Nifti& n) { n.spacing[1] = 0.0F; });
+  nifti("spacing of -1", [](Nifti& n) { n.spacing[1] = -1.0F; });
+  nifti("nan", [](Nifti& n) { n.spacing[1] = kNan; });
+  nifti("inf", [](Nifti& n) { n.spacing[1] = std::numeric_limits<float>::infinity(); });
+  nifti("1 nm", [](Nifti& n) { n.spacing[1] = 1e-20F; });
+  for (const char* bad : {"0 1 1", "-1 1 1", "nan 1 1", "inf 1 1"})
+    all.push_back({"v.mha", meta({{"ElementSpacing", bad}}), "v.mha"});
+  all.push_back({"v.mha", meta({{"ElementSpacing", ""}}), "", "no voxel spacing"});
+  const std::string none;
+  all.push_back({"v.nrrd", nrrd({{"space", none}, {"space directions", none}, {"space origin", none}}), "",
+                 "no voxel spacing"});
+  all.push_back(
+      {"v.nrrd",
+       nrrd({{"space", none}, {"space directions", none}, {"space origin", none}, {"spacings", "1 nan 1"}}),
+       "nan"});
+  all.push_back({"v.nrrd", nrrd({{"space directions", "(0,0,0) (0,1,0) (0,0,1)"}}), "spacing of 0"});
+  all.push_back({"v.nrrd", nrrd({{"space directions", "none (0,1,0) (0,0,1)"}}), "no direction"});
+  // Axes.
+  all.push_back({"v.mha", meta({{"TransformMatrix", "1 0 0 0.5 1 0 0 0 1"}}), "right angles"});
+  all.push_back({"v.mha", meta({{"TransformMatrix", "2 0 0 0 2 0 0 0 2"}}), "right angles"});
+  all.push_back({"v.nrrd", nrrd({{"space directions", "(1,0,0) (0.5,1,0) (0,0,1)"}}), "right angles"});
+  nifti("right angles", [](Nifti& n) {
+    n.has_sform = true;
+    n.sform = {1, 0.5F, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+  });
+  nifti("as long as", [](Nifti& n) {
+    n.has_sform = true;
+    n.sform = {2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0};
+  });
+  nifti(
+      "",
+      [](Nifti& n) {
+        n.has_sform = n.has_qform = true;
+        n.sform = {1, 0, 0, 30, 0, 1, 0, 0, 0, 0, 1, 0};
+      },
+      "different places");
+  // What a voxel is.
+  nifti("one channel", [](Nifti& n) { n.type = 128, n.bits = 24; });
+  nifti("", [](Nifti& n) { n.type = 16, n.bits = 32; });
+  nifti("", [](Nifti& n) { n.type = 64, n.bits = 64; });
+  nifti("not a label", [](Nifti& n) { n.type = 4, n.bits = 16, n.slope = 0.5F; });
+  nifti("", [](Nifti& n) { n.type = 4, n.bits = 16, n.slope = 1.0F; });
+  all.push_back({"v.mha", meta({{"ElementNumberOfChannels", "3"}, {"DimSize", "4 2 1"}}), "one channel"});
+  all.push_back({"v.nrrd",
+                 nrrd({{"dimension", "4"},
+                       {"sizes", "3 4 2 1"},
+                       {"space directions", "none (1,0,0) (0,1,0) (0,0,1)"},
+                       {"kinds", "vector domain domain domain"}}),
+                 "one channel"});
+  all.push_back({"v.nrrd", nrrd({{"type", "quaternion"}}), "header cannot be read"});
+  // The other byte order.
+  for (const std::int16_t type : {std::int16_t{2}, std::int16_t{4}, std::int16_t{8}, std::int16_t{16}}) {
+    nifti("", [&](Nifti& n) {
+      n.big_endian = true;
+      n.type = type;
+      n.bits = static_cast<std::int16_t>(type == 2 ? 8 : type == 4 ? 16 : 32);
+    });
+  }
+  all.push_back({"v.mha",
+                 meta({{"BinaryDataByteOrderMSB", "True"}, {"ElementType", "MET_SHORT"}},
+                      swapped_bytes<std::int16_t>()),
+                 ""});
+  all.push_back(
+      {"v.mha",
+       meta({{"BinaryDataByteOrderMSB", "True"}, {"ElementType", "MET_DOUBLE"}}, swapped_bytes<double>()),
+       ""});
+  all.push_back({"v.nrrd", nrrd({{"endian", "big"}, {"type", "int32"}}, swapped_bytes<std::int32_t>()), ""});
+  all.push_back({"v.nrrd", nrrd({{"endian", none}, {"type", "int16"}}, swapped_bytes<std::int16_t>()),
+                 "header cannot be read"});
+  // Where the voxels are, and how they are packed.
+  nifti("byte", [](Nifti& n) { n.offset = -5.0F; });
+  nifti("byte", [](Nifti& n) { n.offset = kNan; });
+  nifti("byte", [](Nifti& n) { n.offset = 1e9F; });
+  all.push_back({"v.nrrd", nrrd({{"byte skip", "3"}}, "abc" + counting()), ""});
+  all.push_back({"v.nrrd", nrrd({{"byte skip", "-1"}}, "abcd" + counting()), ""});
+  all.push_back({"v.nrrd", nrrd({{"line skip", "1"}}, "hello\n" + counting()), ""});
+  all.push_back({"v.nrrd", nrrd({{"encoding", "gzip"}}, gzip(counting())), ""});
+  all.push_back({"v.nrrd", nrrd({{"encoding", "gzip"}}, gzip(counting()).substr(0, 30)), "v.nrrd"});
+  all.push_back({"v.nrrd", nrrd({{"encoding", "zstd"}}), "encoding"});
+  all.push_back(
+      {"v.nrrd",
+       nrrd({{"encoding", "ascii"}}, "0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23"), ""});
+  all.push_back(
+      {"v.mha",
+       meta({{"BinaryData", "False"}}, "0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23 "),
+       ""});
+  const std::string packed = gzip(Nifti{}.text());
+  all.push_back({"v.nii.gz", packed, ""});
+  all.push_back({"v.nii.gz", packed + "tail", ""});
+  all.push_back({"v.nii.gz", gzip(Nifti{}.text().substr(0, 100)) + gzip(Nifti{}.text().substr(100)), ""});
+  for (const std::size_t cut : {std::size_t{1}, std::size_t{10}, std::size_t{20}, packed.size() / 2,
+                                packed.size() - 9, packed.size() - 8, packed.size() - 4, packed.size() - 1})
+    all.push_back({"v.nii.gz", packed.substr(0, cut), "v.nii.gz"});
+  std::string sum = packed;
+  sum[sum.size() - 6] = static_cast<char>(sum[sum.size() - 6] ^ 1);
+  all.push_back({"v.nii.gz", sum, "v.nii.gz"});
+  // Other kinds of file.
+  all.push_back({"v.nii", packed, ".nii.gz"});
+  all.push_back({"v.nii.gz", Nifti{}.text(), "end in .nii"});
+  nifti("NIfTI-2", [](Nifti& n) { n.header_bytes = 540; });
+  nifti(".img", [](Nifti& n) { n.magic = "ni1"; });
+  nifti("not a NIfTI-1 file", [](Nifti& n) { n.magic = "xyz"; });
+  return all;
+}
+
+TEST_F(VolumeCorpus, EachIsReadRightOrRefusedInWords) {
+  ::testing::internal::CaptureStderr();  // the libraries talk while they fail
+  std::size_t number = 0;
+  for (const Case& c : corpus()) {
+    fs::remove(in_folder(c.name));
+    const fs::path path = write(c.name, c.bytes);
+    const std::string where = "case " + std::to_string(number++) + ", " + c.name;
+    try {
+      std::vector<std::string> notes;
+      const LabelVolume v = voxel::load_volume(path, {}, &notes);
+      EXPECT_EQ(c.refusal, "") << where << " was read";
+      ASSERT_EQ(v.labels.size(), 24U) << where;
+      // NIfTI's frames come out turned, never mirrored: the order of voxels stays.
+      for (std::size_t n = 0; n < 24; ++n) EXPECT_EQ(v.labels[n], n) << where;
+      std::string said;
+      for (const std::string& note : notes) said += note + "\n";
+      EXPECT_NE(said.find(c.note), std::string::npos) << where << ": " << said;
+    } catch (const voxel::VolumeError& error) {
+      EXPECT_NE(c.refusal, "") << where << ": " << error.what();
+      EXPECT_NE(std::string(error.what()).find(c.refusal), std::string::npos)
+          << where << ": " << error.what();
+    }
+  }
+  ::testing::internal::GetCapturedStderr();
+  EXPECT_GT(number, 60U);
+}
+
+// ---- DICOM
+
+class DicomCorpus : public tests::VolumeFolder {
+ protected:
+  // A folder with these slices; the name of each says its number.
+  fs::path folder(const std::string& name, const std::vector<DicomSlice>& slices) const {
+    fs::create_directories(in_folder(name));
+    for (std::size_t n = 0; n < slices.size(); ++n)
+      (void)write(name + "/" + std::to_string(n), tests::dicom(slices[n]));
+    return in_folder(name);
+  }
+  static std::vector<DicomSlice> stack(std::size_t count) {
+    std::vector<DicomSlice> slices(count);
+    for (std::size_t n = 0; n < count; ++n) {
+      slices[n].position[2] = 2.0 * static_cast<double>(n);
+      slices[n].value = static_cast<std::int16_t>(n + 1);
+    }
+    return slices;
+  }
+};
+
+TEST_F(DicomCorpus, AStackIsReadInTheOrderOfItsPlaces) {
+  std::vector<DicomSlice> slices = stack(5);
+  std::swap(slices[0], slices[3]);  // names say nothing
+  const LabelVolume v = voxel::load_volume(folder("a", slices), {});
+  EXPECT_EQ(v.dims, (std::array{4, 3, 5}));
+  EXPECT_NEAR(v.spacing_m.z, 2e-3, 1e-12);
+  for (int k = 0; k < 5; ++k) EXPECT_EQ(v.labels[v.index(1, 1, k)], k + 1);
+}
+
+TEST_F(DicomCorpus, RunLengthsAreUnpacked) {
+  std::vector<DicomSlice> slices = stack(4);
+  for (DicomSlice& slice : slices) slice.syntax = tests::kRunLengths;
+  slices[2].columns = slices[1].columns = slices[0].columns = slices[3].columns = 37;  // more than one run
+  slices[2].value = 0x123;                                                             // both bytes
+  voxel::VolumeFileOptions options;
+  options.rules = {{0x123, 0x123, 9}, {1, 4, 1}};
+  const LabelVolume v = voxel::load_volume(folder("a", slices), options);
+  ASSERT_EQ(v.dims, (std::array{37, 3, 4}));
+  for (std::size_t n = 0; n < v.labels.size(); ++n) EXPECT_EQ(v.labels[n], n / (37 * 3) == 2 ? 9 : 1);
+}
+
+TEST_F(DicomCorpus, WhatIsNotOneWholeSeriesIsRefusedInWords) {
+  const auto said = [&](const std::string& name,
+                        const std::function<void(std::vector<DicomSlice>&)>& change) {
+    std::vector<DicomSlice> slices = stack(6);
+    change(slices);
+    return refusal_of(folder(name, slices));
+  };
+  using Slices = std::vector<DicomSlice>;
+  EXPECT_EQ(said("whole", [](Slices&) {}), "");
+  EXPECT_SAYS(said("missing", [](Slices& s) { s.erase(s.begin() + 2); }), "missing (about 1)");
+  EXPECT_SAYS(said("twice", [](Slices& s) { s.push_back(s[2]); }), "same place");
+  EXPECT_SAYS(said("uneven", [](Slices& s) { s[5].position[2] += 0.7; }), "uneven");
+  EXPECT_SAYS(said("tilted",
+                   [](Slices& s) {
+                     for (std::size_t n = 0; n < 6; ++n) s[n].position[1] = 0.5 * static_cast<double>(n);
+                   }),
+              "sideways");
+  EXPECT_SAYS(said("mixed_series", [](Slices& s) { s[1].series = "1.2.4"; }), "2 DICOM series");
+  EXPECT_SAYS(said("mixed_turn", [](Slices& s) { s[4].orientation = {0, 1, 0, 0, 0, 1}; }), "orientation");
+  EXPECT_SAYS(said("mirrored", [](Slices& s) { s[4].orientation = {-1, 0, 0, 0, 1, 0}; }), "orientation");
+  EXPECT_SAYS(said("mixed_size", [](Slices& s) { s[3].rows = 5; }), "size");
+  EXPECT_SAYS(said("mixed_spacing", [](Slices& s) { s[3].spacing[0] = 1.5; }), "spacing");
+  EXPECT_SAYS(said("zero_spacing",
+                   [](Slices& s) {
+                     for (DicomSlice& slice : s) slice.spacing = {0.0, 0.0};
+                   }),
+              "spacing");
+  EXPECT_SAYS(said("colour",
+                   [](Slices& s) {
+                     for (DicomSlice& slice : s) slice.samples = 3;
+                   }),
+              "single intensities");
+  EXPECT_SAYS(said("deflated", [](Slices& s) { s[0].syntax = "1.2.840.10008.1.2.1.99"; }), "deflated");
+  EXPECT_SAYS(said("unknown_syntax",
+                   [](Slices& s) {
+                     for (DicomSlice& slice : s) slice.syntax = "1.2.3.4";
+                   }),
+              "unknown_syntax");
+}
+
+TEST_F(DicomCorpus, AMissingPixelSpacingIsSaid) {
+  std::vector<DicomSlice> slices = stack(3);
+  EXPECT_TRUE(voxel::read_volume_header(folder("said", slices)).notes.empty());
+  for (DicomSlice& slice : slices) slice.spacing = {-1.0, -1.0};
+  const auto notes = voxel::read_volume_header(folder("unsaid", slices)).notes;
+  ASSERT_EQ(notes.size(), 1U);
+  EXPECT_SAYS(notes[0], "pixels");
+}
+
+// ---- random damage
+
+// A second and a half, or HYBRID_FUZZ_SECONDS of it, from HYBRID_FUZZ_SEED.
+TEST_F(DicomCorpus, DamagedFilesEndInAVolumeOrARefusal) {
+  const char* given = std::getenv("HYBRID_FUZZ_SECONDS");
+  const char* seed = std::getenv("HYBRID_FUZZ_SEED");
+  const double seconds = given == nullptr ? 1.5 : std::atof(given);
+  std::mt19937 random(seed == nullptr ? 11U : static_cast<unsigned>(std::atoi(seed)));
+  std::vector<Case> originals = corpus();
+  DicomSlice packed;
+  packed.syntax = tests::kRunLengths;
+  for (int n = 0; n < 4; ++n) {
+    originals.push_back({"slices/0", tests::dicom(DicomSlice{}), ""});
+    originals.push_back({"slices/0", tests::dicom(packed), ""});
+  }
+  fs::create_directories(in_folder("slices"));
+  voxel::VolumeFileOptions options;
+  options.max_bytes = 16U << 20U;
+  options.rules = {{1, 255, 1}};
+  std::size_t inputs = 0, loaded = 0;
+  const auto start = std::chrono::steady_clock::now();
+  const auto late = [&] {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() > seconds;
+  };
+  ::testing::internal::CaptureStdout();
+  ::testing::internal::CaptureStderr();
+  while (!late()) {
+    const Case& from = originals[random() % originals.size()];
+    std::string bytes = from.bytes;
+    for (unsigned change = 1 + random() % 4; change > 0 && !bytes.empty(); --change) {
+      const std::size_t at = random() % bytes.size();
+      switch (random() % 7) {
+        case 0:
+          bytes[at] = static_cast<char>(random());
+          break;
+        case 1:
+          bytes[at] = static_cast<char>(bytes[at] ^ (1U << random() % 8));
+          break;
+        case 2:
+          bytes[at] = "0123456789-. e"[random() % 14];
+          break;
+        case 3:
+          bytes.insert(at, 1 + random() % 4, "09-x \n"[random() % 6]);
+          break;
+        case 4:
+          bytes.erase(at, 1 + random() % 8);
+          break;
+        case 5:
+          bytes.replace(at, std::min<std::size_t>(4, bytes.size() - at), 4,
+                        static_cast<char>(random() % 2 * 255));
+          break;
+        default:
+          bytes.resize(at);
+      }
+    }
+    const fs::path path = in_folder(from.name);
+    fs::remove(path);
+    std::ofstream(path, std::ios::binary) << bytes;
+    const fs::path what = from.name == "slices/0" ? in_folder("slices") : path;
+    ++inputs;
+    try {
+      const LabelVolume v = voxel::load_volume(what, options);
+      ASSERT_EQ(v.labels.size(), static_cast<std::size_t>(v.dims[0]) * static_cast<std::size_t>(v.dims[1]) *
+                                     static_cast<std::size_t>(v.dims[2]));
+      for (int axis = 0; axis < 3; ++axis) {
+        ASSERT_TRUE(std::isfinite(v.spacing_m[axis]) && v.spacing_m[axis] > 0.0);
+        ASSERT_TRUE(std::isfinite(v.origin_m[axis]));
+      }
+      ++loaded;
+    } catch (const voxel::VolumeError& error) {
+      ASSERT_NE(std::string(error.what()), "");
+    }
+  }
+  ::testing::internal::GetCapturedStdout();
+  ::testing::internal::GetCapturedStderr();
+  std::cout << inputs << " inputs, " << loaded << " loaded\n";
+}
+
+}  // namespace

@@ -1,0 +1,278 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "voxel/chain/row_kernels.h"
+
+#include <array>
+
+#include "voxel/chain/lanes8.h"
+#include "voxel/lattice/simd_dispatch.h"
+
+namespace voxel {
+namespace {
+
+using namespace lanes;
+
+// `limit_of(i, out)`: limits of the links of lanes i to i + kWidth.
+template <bool kRaise, class LimitOf>
+HYBRID_INLINE Moved beside(const float* from, float* to, float margin, const LimitOf& limit_of) {
+  std::array<Floats, kVectors> result;
+  std::array<Masks, kVectors> moves;
+  Masks any{};
+#pragma GCC unroll 4
+  for (std::size_t n = 0; n < kVectors; ++n) {
+    const std::size_t i = n * kWidth;
+    Floats own, now, limit, wanted;
+    load(from + i, own);
+    load(to + i, now);
+    limit_of(i, limit);
+    ask<kRaise>(own, limit, wanted);
+    compare<kRaise>(wanted, now, margin, moves[n]);
+    any |= moves[n];
+    result[n] = moves[n] ? wanted : now;
+  }
+  if (!any_of(any)) return kNothingMoved;
+#pragma GCC unroll 4
+  for (std::size_t n = 0; n < kVectors; ++n) store(result[n], to + n * kWidth);
+  return moved(moves.front(), moves.back());
+}
+
+// Each voxel asks the next one on either side, all at once, until none moves: most rows have what they need
+// from the rows beside them, and a glance or two show it. A walk from end to end, one voxel after the other,
+// takes longer even where a wave runs all along the row. `below(i, out)`: limits between lanes i − 1 … and
+// i …, `above`: between i … and i + 1 ….
+template <bool kRaise, class Below, class Above>
+HYBRID_INLINE Moved along(float* row, float margin, const Below& below, const Above& above) {
+  std::array<Floats, kVectors> now, from_below, from_above;
+#pragma GCC unroll 4
+  for (std::size_t n = 0; n < kVectors; ++n) {
+    load(row + n * kWidth, now[n]);
+    below(n * kWidth, from_below[n]);
+    above(n * kWidth, from_above[n]);
+  }
+  from_below[0][0] = from_above[kVectors - 1][kWidth - 1] = kNever;
+  Masks front{}, back{};
+  for (bool first = true;; first = false) {
+    std::array<Floats, kVectors> wanted;
+    std::array<Masks, kVectors> moves;
+    Masks any{};
+#pragma GCC unroll 4
+    for (std::size_t n = 0; n < kVectors; ++n) {
+      Floats left, right, a, b;
+      shift_up_by<1>(now[n == 0 ? 0 : n - 1], now[n], left);
+      shift_down_by<1>(now[n], now[n + 1 == kVectors ? n : n + 1], right);
+      ask<kRaise>(left, from_below[n], a);
+      ask<kRaise>(right, from_above[n], b);
+      wanted[n] = (kRaise ? a > b : a < b) ? a : b;
+      compare<kRaise>(wanted[n], now[n], margin, moves[n]);
+      any |= moves[n];
+    }
+    if (!any_of(any)) {
+      if (first) return kNothingMoved;
+      break;
+    }
+    front |= moves[0];
+    back |= moves[kVectors - 1];
+#pragma GCC unroll 4
+    for (std::size_t n = 0; n < kVectors; ++n) now[n] = moves[n] ? wanted[n] : now[n];
+  }
+#pragma GCC unroll 4
+  for (std::size_t n = 0; n < kVectors; ++n) store(now[n], row + n * kWidth);
+  return moved(front, back);
+}
+
+template <bool kRaise, int kRegisters>
+HYBRID_INLINE Moved beside_by_label(const float* from, const std::uint8_t* from_labels, float* to,
+                                    const std::uint8_t* to_labels, const float* half, float margin) {
+  const Table table(half);
+  const Indices own(from_labels), others(to_labels);
+  return beside<kRaise>(
+      from, to, margin, [&](std::size_t i, Floats & limit) __attribute__((always_inline)) {
+        Floats other;
+        look_up<kRegisters>(table, own, i, limit);
+        look_up<kRegisters>(table, others, i, other);
+        limit += other;
+      });
+}
+
+template <bool kRaise, int kRegisters>
+HYBRID_INLINE Moved along_by_label(float* row, const std::uint8_t* labels, const float* up, const float* down,
+                                   float margin) {
+  const Table table_up(up), table_down(down);
+  const Indices left(labels - 1), own(labels), right(labels + 1);
+  return along<kRaise>(
+      row, margin,
+      [&](std::size_t i, Floats & limit) __attribute__((always_inline)) {
+        Floats other;
+        look_up<kRegisters>(table_up, left, i, limit);
+        look_up<kRegisters>(table_up, own, i, other);
+        limit += other;
+      },
+      [&](std::size_t i, Floats & limit) __attribute__((always_inline)) {
+        Floats other;
+        look_up<kRegisters>(table_down, own, i, limit);
+        look_up<kRegisters>(table_down, right, i, other);
+        limit += other;
+      });
+}
+
+template <bool kRaise>
+HYBRID_INLINE Moved beside_alike(const float* from, float* to, float limit, float margin) {
+  return beside<kRaise>(
+      from, to,
+      margin, [limit](std::size_t, Floats & out) __attribute__((always_inline)) { out = Floats{} + limit; });
+}
+template <bool kRaise>
+HYBRID_INLINE Moved along_alike(float* row, float up, float down, float margin) {
+  return along<kRaise>(
+      row, margin, [up](std::size_t, Floats & out) __attribute__((always_inline)) { out = Floats{} + up; },
+      [down](std::size_t, Floats & out) __attribute__((always_inline)) { out = Floats{} + down; });
+}
+
+// Half a row: a line of the cache, and a register where there are such.
+constexpr int kHalf = kRow / 2;
+constexpr int kConeAhead = 12;    // rows
+constexpr float kSurely = 16.0F;  // margins
+using Line = float __attribute__((vector_size(4 * kHalf)));
+HYBRID_INLINE float apex_at(const ConeColumn& c, int n) {
+  return static_cast<float>(c.apex + n * (n < 0 ? c.by_down : c.by_up));
+}
+struct ConeHalf {
+  Line fall;
+  int first;    // lane
+  float least;  // fall …
+  int nearest;  // … of this lane
+  HYBRID_INLINE ConeHalf(const float* falls, int lane, int nearest_lane)
+      : first(lane), least(falls[nearest_lane]), nearest(nearest_lane) {
+    std::memcpy(&fall, falls + lane, sizeof fall);
+  }
+  template <bool kRaise>
+  [[nodiscard]] HYBRID_INLINE bool raised(const ConeColumn& c, int n, float margin) const {
+    return beyond<kRaise>(asked<kRaise>(apex_at(c, n), least), c.own[n * kRow + nearest], margin);
+  }
+  // Rows that are raised one after the other, upwards or downwards. Where one is by more than roundings are,
+  // so are those before it.
+  template <bool kRaise, int kStep>
+  [[nodiscard]] HYBRID_INLINE int end(const ConeColumn& c, int thought, int most, float margin) const {
+    int n = thought > most ? most : thought;
+    if (n < 0 || !raised<kRaise>(c, n * kStep, kSurely * margin)) n = 0;
+    while (n < most && raised<kRaise>(c, (n + 1) * kStep, margin)) ++n;
+    return n;
+  }
+  template <bool kRaise>
+  HYBRID_INLINE void write(float* row, float apex) const {
+    Line now;
+    std::memcpy(&now, row + first, sizeof now);
+    const Line wanted = kRaise ? (Line{} + apex) - fall : (Line{} + apex) + fall;
+    now = (kRaise ? wanted > now : wanted < now) ? wanted : now;
+    std::memcpy(row + first, &now, sizeof now);
+  }
+};
+
+// From end to end, both halves of a row one after the other: so the processor sees what will be asked for.
+// (Outwards from the apex, up and then down, a wave took a sixth longer where it waits for memory.)
+template <bool kRaise>
+HYBRID_INLINE bool cone(const ConeColumn& c, float margin, ConeEnds& ends) {
+  const bool in_upper = c.nearest >= kHalf;
+  const ConeHalf near(c.fall, in_upper ? kHalf : 0, c.nearest),
+      far(c.fall, in_upper ? 0 : kHalf, in_upper ? kHalf - 1 : kHalf);
+  if (!c.has_apex && !near.raised<kRaise>(c, 0, margin)) return false;
+  const bool both = far.raised<kRaise>(c, 0, margin);
+  ends.near_up = near.end<kRaise, 1>(c, ends.near_up, c.up, margin);
+  ends.near_down = near.end<kRaise, -1>(c, ends.near_down, c.down, margin);
+  ends.far_up = both ? far.end<kRaise, 1>(c, ends.far_up, ends.near_up, margin) : 0;
+  ends.far_down = both ? far.end<kRaise, -1>(c, ends.far_down, ends.near_down, margin) : 0;
+  const int both_from = both ? -ends.far_down : ends.near_up + 1, both_to = both ? ends.far_up : ends.near_up;
+  const auto write_near = [&](int n, int to) __attribute__((always_inline)) {
+    for (; n < to; ++n) {
+      float* const row = c.own + n * kRow;
+      __builtin_prefetch(row + c.next + near.first, 1);
+      near.write<kRaise>(row, apex_at(c, n));
+    }
+  };
+  write_near(-ends.near_down, both_from);
+  for (int n = both_from; n <= both_to; ++n) {
+    float* const row = c.own + n * kRow;
+    __builtin_prefetch(row + c.next, 1);
+    __builtin_prefetch(row + c.next + kHalf, 1);
+    const float* const ahead = row + (both_to - n < kConeAhead ? both_to - n : kConeAhead) * kRow;
+    __builtin_prefetch(ahead, 1);
+    __builtin_prefetch(ahead + kHalf, 1);
+    const float apex = apex_at(c, n);
+    near.write<kRaise>(row, apex);
+    far.write<kRaise>(row, apex);
+  }
+  write_near(both_to + 1, ends.near_up + 1);
+  return true;
+}
+
+}  // namespace
+
+HYBRID_WIDE_AND_MANY Moved raise_beside(const float* from, const std::uint8_t* from_labels, float* to,
+                                        const std::uint8_t* to_labels, const HalfLimits& half,
+                                        float margin) noexcept {
+  switch (half.registers) {
+    case 1:
+      return beside_by_label<true, 1>(from, from_labels, to, to_labels, half.table, margin);
+    case 2:
+      return beside_by_label<true, 2>(from, from_labels, to, to_labels, half.table, margin);
+    default:
+      return beside_by_label<true, 0>(from, from_labels, to, to_labels, half.table, margin);
+  }
+}
+HYBRID_WIDE_AND_MANY Moved lower_beside(const float* from, const std::uint8_t* from_labels, float* to,
+                                        const std::uint8_t* to_labels, const HalfLimits& half,
+                                        float margin) noexcept {
+  switch (half.registers) {
+    case 1:
+      return beside_by_label<false, 1>(from, from_labels, to, to_labels, half.table, margin);
+    case 2:
+      return beside_by_label<false, 2>(from, from_labels, to, to_labels, half.table, margin);
+    default:
+      return beside_by_label<false, 0>(from, from_labels, to, to_labels, half.table, margin);
+  }
+}
+HYBRID_WIDE_AND_MANY Moved raise_beside_alike(const float* from, float* to, float limit,
+                                              float margin) noexcept {
+  return beside_alike<true>(from, to, limit, margin);
+}
+HYBRID_WIDE_AND_MANY Moved lower_beside_alike(const float* from, float* to, float limit,
+                                              float margin) noexcept {
+  return beside_alike<false>(from, to, limit, margin);
+}
+
+HYBRID_WIDE_AND_MANY Moved raise_along(float* row, const std::uint8_t* labels, const HalfLimits& up,
+                                       const HalfLimits& down, float margin) noexcept {
+  switch (up.registers) {
+    case 1:
+      return along_by_label<true, 1>(row, labels, up.table, down.table, margin);
+    case 2:
+      return along_by_label<true, 2>(row, labels, up.table, down.table, margin);
+    default:
+      return along_by_label<true, 0>(row, labels, up.table, down.table, margin);
+  }
+}
+HYBRID_WIDE_AND_MANY Moved lower_along(float* row, const std::uint8_t* labels, const HalfLimits& up,
+                                       const HalfLimits& down, float margin) noexcept {
+  switch (up.registers) {
+    case 1:
+      return along_by_label<false, 1>(row, labels, up.table, down.table, margin);
+    case 2:
+      return along_by_label<false, 2>(row, labels, up.table, down.table, margin);
+    default:
+      return along_by_label<false, 0>(row, labels, up.table, down.table, margin);
+  }
+}
+HYBRID_WIDE_AND_MANY Moved raise_along_alike(float* row, float up, float down, float margin) noexcept {
+  return along_alike<true>(row, up, down, margin);
+}
+HYBRID_WIDE_AND_MANY Moved lower_along_alike(float* row, float up, float down, float margin) noexcept {
+  return along_alike<false>(row, up, down, margin);
+}
+
+HYBRID_WIDE_AND_MANY bool raise_cone(const ConeColumn& column, float margin, ConeEnds& ends) noexcept {
+  return cone<true>(column, margin, ends);
+}
+HYBRID_WIDE_AND_MANY bool lower_cone(const ConeColumn& column, float margin, ConeEnds& ends) noexcept {
+  return cone<false>(column, margin, ends);
+}
+
+}  // namespace voxel

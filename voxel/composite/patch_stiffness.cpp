@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What links between the nodes of a composite grid are worth.
+#include <algorithm>
+
+#include "voxel/composite/grid.h"
+
+namespace voxel {
+namespace {
+
+std::size_t index(int i) {
+  return static_cast<std::size_t>(i);
+}
+
+// Of two halves of a link, one after the other: their cells and these times how stiff they are.
+float in_series(float cells_a, float stiff_a, float cells_b, float stiff_b) {
+  if (cells_a == 0.0F || cells_b == 0.0F) return stiff_a + stiff_b;
+  const float cells = cells_a + cells_b;
+  return cells * cells / (cells_a * cells_a / stiff_a + cells_b * cells_b / stiff_b);
+}
+
+}  // namespace
+
+void CompositeGrid::weigh(Level& level) noexcept {
+  if (cells_.several()) {
+    weigh_shape(level, level.tissue);
+    weigh_tissues(level);
+  } else {
+    weigh_shape(level, level.weight);
+  }
+}
+
+// By how much tissue there is alone.
+void CompositeGrid::weigh_shape(const Level& level, std::array<Floats, 3>& weight) noexcept {
+  if (cells_.fills_box()) {
+    weigh_box(level, weight);
+  } else if (level.step == 1) {
+    weigh_cells(level, weight, true);
+  } else {
+    weigh_halves(level, weight);
+  }
+}
+
+// Links between voxels: the mean of the four cells round each. `all_alike`: as if of one stiffness.
+void CompositeGrid::weigh_cells(const Level& level, std::array<Floats, 3>& weight, bool all_alike) noexcept {
+  const auto& line = level.line;
+  const int nx = line[0].count, ny = line[1].count, nz = line[2].count, wide = nx + 1;
+  const auto area = index(wide) * index(ny + 1);
+  Floats &below = halves_[0].cells, &above = halves_[1].cells;
+  below.resize(std::max(below.size(), area));
+  above.resize(std::max(above.size(), area));
+  const auto read = [&](int z, Floats& to) {
+    cells_.cell_plane(z, line[0].begin - 1, wide, line[1].begin - 1, ny + 1, to.data());
+    if (!all_alike) return;
+    for (std::size_t n = 0; n < area; ++n) to[n] = to[n] > 0.0F ? 1.0F : 0.0F;
+  };
+  for (Floats& array : weight) std::fill(array.begin(), array.end(), 0.0F);
+  read(line[2].begin - 1, below);
+  for (int k = 0; k < nz; ++k) {
+    read(line[2].begin + k, above);
+    for (int j = 0; j < ny; ++j) {
+      const float *const low = below.data() + j * wide, *const low_next = low + wide;
+      const float *const high = above.data() + j * wide, *const high_next = high + wide;
+      const std::size_t row = level.row(j, k);
+      float *const x = weight[0].data() + row, *const y = weight[1].data() + row,
+                   *const z = weight[2].data() + row;
+      for (int i = 0; i + 1 < nx; ++i)
+        x[i] = 0.25F * (low[i + 1] + low_next[i + 1] + high[i + 1] + high_next[i + 1]);
+      if (j + 1 < ny) {
+        for (int i = 0; i < nx; ++i)
+          y[i] = 0.25F * (low_next[i] + low_next[i + 1] + high_next[i] + high_next[i + 1]);
+      }
+      if (k + 1 < nz) {
+        for (int i = 0; i < nx; ++i) z[i] = 0.25F * (high[i] + high[i + 1] + high_next[i] + high_next[i + 1]);
+      }
+    }
+    std::swap(below, above);
+  }
+}
+
+// Cubes of which two lie along half a link and two across it.
+int CompositeGrid::half_cube(const Level& level) noexcept {
+  int m = 0;
+  while (level.step > 2 << m) ++m;
+  return m;
+}
+
+// Each link from the half cells of a level's nodes that lie round it: two along it, two by two across.
+void CompositeGrid::weigh_halves(const Level& level, std::array<Floats, 3>& weight) noexcept {
+  const auto& line = level.line;
+  const int nx = line[0].count, ny = line[1].count, nz = line[2].count;
+  const int hx = 2 * nx, hy = 2 * ny, m = half_cube(level), edge = 1 << m;
+  const float scale = 1.0F / static_cast<float>(level.step * level.step);
+  const auto area = index(hx) * index(hy);
+  Floats &below = halves_[0].cells, &above = halves_[1].cells;
+  const auto read = [&](int number, Floats& to) {
+    to.resize(std::max(to.size(), area));
+    cells_.plane(m, line[2].begin / edge + number - 1, line[0].begin / edge - 1, hx, line[1].begin / edge - 1,
+                 hy, to.data());
+  };
+  for (Floats& array : weight) std::fill(array.begin(), array.end(), 0.0F);
+  for (int k = 0; k < nz; ++k) {
+    read(2 * k, below);
+    read(2 * k + 1, above);
+    for (int j = 0; j < ny; ++j) {
+      for (int i = 0; i < nx; ++i) {
+        const std::size_t at = level.node(i, j, k);
+        const std::size_t h = index(2 * j * hx + 2 * i), g = h + index(hx);
+        const auto both = [&](std::size_t n) { return below[n] + above[n]; };
+        if (i + 1 < nx) weight[0][at] = scale * (both(h + 1) + both(h + 2) + both(g + 1) + both(g + 2));
+        if (j + 1 < ny) {
+          const std::size_t further = g + index(hx);
+          weight[1][at] = scale * (both(g) + both(g + 1) + both(further) + both(further + 1));
+        }
+        const auto of = [&](const Floats& p) { return scale * (p[h] + p[h + 1] + p[g] + p[g + 1]); };
+        if (k + 1 < nz) weight[2][at] += of(above);
+        if (k > 0) weight[2][at - level.plane] += of(below);
+      }
+    }
+  }
+}
+
+// The same where tissues differ: in each half of a link what lies side by side bears together, and one half
+// after the other.
+void CompositeGrid::weigh_tissues(Level& level) noexcept {
+  if (level.step == 1) return weigh_cells(level, level.weight, false);
+  const auto& line = level.line;
+  const int nx = line[0].count, ny = line[1].count, nz = line[2].count;
+  const int hx = 2 * nx, hy = 2 * ny, m = half_cube(level), edge = 1 << m;
+  const float scale = 1.0F / static_cast<float>(level.step * level.step);
+  const auto area = index(hx) * index(hy);
+  const auto read = [&](int number, Halves& to) {
+    for (Floats* const plane : {&to.cells, &to.stiff[0], &to.stiff[1], &to.stiff[2]})
+      plane->resize(std::max(plane->size(), area));
+    const int z = line[2].begin / edge + number - 1;
+    const int x = line[0].begin / edge - 1, y = line[1].begin / edge - 1;
+    cells_.plane(m, z, x, hx, y, hy, to.cells.data());
+    cells_.stiff_plane(m, z, x, hx, y, hy, {to.stiff[0].data(), to.stiff[1].data(), to.stiff[2].data()});
+  };
+  Halves &below = halves_[0], &above = halves_[1];
+  for (Floats& array : level.weight) std::fill(array.begin(), array.end(), 0.0F);
+  for (int k = 0; k < nz; ++k) {
+    read(2 * k, below);
+    // The half before it, of the links up to this plane.
+    const Floats &cells_before = above.cells, &stiff_before = above.stiff[2];
+    for (int j = 0; k > 0 && j < ny; ++j) {
+      for (int i = 0; i < nx; ++i) {
+        const std::size_t h = index(2 * j * hx + 2 * i), g = h + index(hx);
+        const auto of = [&](const Floats& p) { return p[h] + p[h + 1] + p[g] + p[g + 1]; };
+        level.weight[2][level.node(i, j, k - 1)] =
+            scale * in_series(of(cells_before), of(stiff_before), of(below.cells), of(below.stiff[2]));
+      }
+    }
+    read(2 * k + 1, above);
+    for (int j = 0; j < ny; ++j) {
+      for (int i = 0; i < nx; ++i) {
+        const std::size_t at = level.node(i, j, k);
+        const std::size_t h = index(2 * j * hx + 2 * i), g = h + index(hx);
+        // Two of one half cell's plane and the two beyond.
+        const auto of = [](const Floats& a, const Floats& b, std::size_t one, std::size_t other) {
+          return a[one] + a[other] + b[one] + b[other];
+        };
+        const auto link = [&](std::size_t d, std::array<std::size_t, 2> near,
+                              std::array<std::size_t, 2> far) {
+          return scale * in_series(of(below.cells, above.cells, near[0], near[1]),
+                                   of(below.stiff[d], above.stiff[d], near[0], near[1]),
+                                   of(below.cells, above.cells, far[0], far[1]),
+                                   of(below.stiff[d], above.stiff[d], far[0], far[1]));
+        };
+        if (i + 1 < nx) level.weight[0][at] = link(0, {h + 1, g + 1}, {h + 2, g + 2});
+        if (j + 1 < ny) {
+          const std::size_t further = g + index(hx);
+          level.weight[1][at] = link(1, {g, g + 1}, {further, further + 1});
+        }
+      }
+    }
+  }
+}
+
+// Where all of a box is tissue: a length by two widths.
+void CompositeGrid::weigh_box(const Level& level, std::array<Floats, 3>& weight) noexcept {
+  const auto& line = level.line;
+  Floats &length = halves_[0].cells, &width = halves_[1].cells;  // axis after axis
+  for (Floats* const plane : {&length, &width})
+    plane->resize(std::max(plane->size(), index(line[0].count + line[1].count + line[2].count)));
+  const std::array<std::size_t, 3> from{0, index(line[0].count), index(line[0].count + line[1].count)};
+  for (std::size_t d = 0; d < 3; ++d) {
+    const auto within = [&](double low, double high) {
+      return static_cast<float>(
+          std::max(0.0, std::min<double>(high, cells_.high(d)) - std::max<double>(low, cells_.low(d))));
+    };
+    for (int i = 0; i < line[d].count; ++i) {
+      const double at = level.at(d, i), half = 0.5 * level.step;
+      length[from[d] + index(i)] = i + 1 < line[d].count ? within(at, at + level.step) : 0.0F;
+      width[from[d] + index(i)] = within(at - half, at + half);
+    }
+  }
+  for (Floats& array : weight) std::fill(array.begin(), array.end(), 0.0F);
+  const float scale = 1.0F / static_cast<float>(level.step * level.step);
+  const float *const lx = length.data(), *const wx = width.data();
+  for (int k = 0; k < line[2].count; ++k) {
+    const float lz = scale * length[from[2] + index(k)], wz = scale * width[from[2] + index(k)];
+    for (int j = 0; j < line[1].count; ++j) {
+      const float ly = length[from[1] + index(j)], wy = width[from[1] + index(j)];
+      const std::size_t row = level.row(j, k);
+      float *const x = weight[0].data() + row, *const y = weight[1].data() + row,
+                   *const z = weight[2].data() + row;
+      for (int i = 0; i < line[0].count; ++i) {
+        x[i] = lx[i] * wy * wz;
+        y[i] = wx[i] * ly * wz;
+        z[i] = wx[i] * wy * lz;
+      }
+    }
+  }
+}
+
+}  // namespace voxel

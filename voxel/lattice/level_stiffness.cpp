@@ -1,0 +1,463 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "voxel/lattice/level_stiffness.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <type_traits>
+
+namespace voxel {
+
+Couplings::Couplings(const Lattice& lattice, const Couplings* finer)
+    : lattice_(lattice),
+      finer_(finer),
+      level_(finer == nullptr ? 0 : finer->level_ + 1),
+      grid_(finer == nullptr ? lattice.grid() : coarsened(finer->grid_)),
+      kind_(grid_.rows()),
+      label_(grid_.rows()),
+      written_at_(grid_.rows()),
+      written_(grid_.rows()),
+      written_cells_(finer == nullptr ? 0 : grid_.rows()),
+      written_stands_(grid_.rows()),
+      written_by_hash_(std::bit_ceil(2 * grid_.rows())) {
+  if (finer_ == nullptr) {
+    if (!lattice.uniform_limits()) written_limits_ = LazyArray<RowLimits::Written>(grid_.rows());
+    for (std::size_t label = 0; label < 256; ++label) {
+      std::array<LinkLimit, 3> links;
+      for (int d = 0; d < 3; ++d) {
+        const auto l = static_cast<std::uint8_t>(label);
+        links[static_cast<std::size_t>(d)] =
+            lattice.uniform_limits() ? lattice.tightest(d) : lattice.limit_between(l, l, d);
+      }
+      for (int axis = 0; axis < 3; ++axis)
+        label_limits_[label][static_cast<std::size_t>(axis)] = AxisLimits(links, axis);
+    }
+  }
+  ones_.fill(1.0F);
+  eighths_.fill(0.125F);
+  for (Lanes& lanes : zeros_) lanes.fill(0.0F);
+  movable_.fill(0);
+  immovable_.fill(7);
+  std::array<bool, 256> used{};
+  if (finer_ == nullptr) {
+    for (RowId row = 0; row < grid_.rows(); ++row) {
+      if (lattice_.filled_in(row) == 0) continue;
+      const std::uint8_t* at = lattice_.labels(row);
+      for (int i = 0; i < kRow; ++i) used[at[i]] = true;
+    }
+    used[0] = false;
+  }
+  const auto scale = static_cast<float>(std::ldexp(1.0, level_));
+  for (std::size_t label = 1; label < 256; ++label) {
+    if (finer_ == nullptr ? !used[label] : finer_->constant_[label] == nullptr) continue;
+    constant_[label] = std::make_unique<Constant>();
+    Constant& c = *constant_[label];
+    std::array<Spring, 3> springs;
+    for (std::size_t d = 0; d < 3; ++d) {
+      springs[d] = lattice_.spring_within(static_cast<std::uint8_t>(label), static_cast<int>(d));
+      c.along[d].fill(scale * springs[d].along);
+      c.across[d].fill(scale * springs[d].across);
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+      float sum = 0.0F;
+      for (std::size_t d = 0; d < 3; ++d) sum += 2.0F * scale * springs[d].on(axis, static_cast<int>(d));
+      c.inverse[static_cast<std::size_t>(axis)].fill(1.0F / sum);
+    }
+  }
+  if (level_ >= kKept) keep_cells();
+}
+
+void Couplings::keep_cells() {
+  content_ = LazyArray<std::uint8_t>(grid_.size());
+  for (auto& links : link_) links = LazyArray<Spring>(grid_.size());
+  for (int k = 0; k < grid_.dims[2]; ++k) {
+    for (int j = 0; j < grid_.dims[1]; ++j) {
+      for (int i = 0; i < grid_.dims[0]; ++i) {
+        const std::array<int, 3> cell{i, j, k};
+        const Content all = content_from_finer(cell);
+        if (all == nothing) continue;
+        const VoxelId at = grid_.at(i, j, k);
+        content_[at] = all;
+        for (int d = 0; d < 3; ++d) link_[static_cast<std::size_t>(d)][at] = link_from_finer(cell, d);
+      }
+    }
+  }
+}
+
+// What a cell holds: it is held where all it holds is. Where only some is, that holds on to it (see
+// Multigrid::hold_cells).
+Couplings::Content Couplings::content(const std::array<int, 3>& cell) const noexcept {
+  const auto [i, j, k] = cell;
+  if (level_ == 0) {
+    const VoxelId v = grid_.at(i, j, k);
+    return !lattice_.filled(v) ? nothing : lattice_.anchored(v) ? held : some;
+  }
+  return level_ >= kKept ? static_cast<Content>(content_[grid_.at(i, j, k)]) : content_from_finer(cell);
+}
+
+Couplings::Content Couplings::content_from_finer(const std::array<int, 3>& cell) const noexcept {
+  const auto [i, j, k] = cell;
+  Content all = nothing;
+  for (int corner = 0; corner < 8 && all != some; ++corner) {
+    const std::array<int, 3> fine{2 * i + (corner & 1), 2 * j + (corner >> 1 & 1), 2 * k + (corner >> 2)};
+    if (fine[0] >= finer_->grid_.dims[0] || fine[1] >= finer_->grid_.dims[1] ||
+        fine[2] >= finer_->grid_.dims[2])
+      continue;
+    all = together(all, finer_->content(fine));
+  }
+  return all;
+}
+
+// The link of a cell to its upper neighbour in d: what was or will be written for it, to the last bit.
+Spring Couplings::link(const std::array<int, 3>& cell, int d) const noexcept {
+  const auto ud = static_cast<std::size_t>(d);
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (cell[a] < 0 || cell[a] >= grid_.dims[a]) return {};
+  }
+  const VoxelId v = grid_.at(cell[0], cell[1], cell[2]);
+  const RowId row = v / kRow;
+  if (level_ >= kKept) return link_[ud][v];
+  if (kind(row) == one_label || kind(row) == mixed) {
+    const float *along = nullptr, *across = nullptr;
+    find_up(row, ud, along, across);
+    return {along[v % kRow], across[v % kRow]};
+  }
+  if (kind(row) == empty) return {};
+  return level_ == 0 ? lattice_.spring(v, d) : link_from_finer(cell, d);
+}
+
+Spring Couplings::link_from_finer(const std::array<int, 3>& cell, int d) const noexcept {
+  const auto ud = static_cast<std::size_t>(d);
+  const std::size_t p = (ud + 1) % 3, q = (ud + 2) % 3;
+  std::array<Spring, 4> fine;
+  for (std::size_t n = 0; n < 4; ++n) {
+    std::array<int, 3> at{};
+    at[ud] = 2 * cell[ud] + 1;  // the last layer of this cell; the link crosses to the next one's first
+    at[p] = 2 * cell[p] + static_cast<int>(n & 1);
+    at[q] = 2 * cell[q] + static_cast<int>(n >> 1);
+    fine[n] = finer_->link(at, d);
+  }
+  // In pairs, so that four equal springs are exactly four times one.
+  return {0.5F * ((fine[0].along + fine[1].along) + (fine[2].along + fine[3].along)),
+          0.5F * ((fine[0].across + fine[1].across) + (fine[2].across + fine[3].across))};
+}
+
+bool Couplings::is_one_label(RowId row, std::uint8_t& label) const noexcept {
+  if (level_ == 0) {
+    label = lattice_.inside(row);
+    if (label == 0) return false;
+    return lattice_.anchored_lanes(row) == 0;
+  }
+  const std::array<int, 3> c = grid_.row_coordinates(row);
+  label = 0;
+  for (int child = 0; child < 8; ++child) {
+    const int j = 2 * c[1] + (child >> 1 & 1), k = 2 * c[2] + (child >> 2);
+    const int column = 2 * (c[0] - 1) + 1 + (child & 1);
+    if (j >= finer_->grid_.dims[1] || k >= finer_->grid_.dims[2] || column + 1 >= finer_->grid_.columns)
+      return false;
+    const RowId fine = finer_->grid_.row(column, j, k);
+    std::uint8_t fine_label = 0;
+    if (finer_->kind(fine) == one_label) {
+      fine_label = finer_->label_[fine];
+    } else if (finer_->kind(fine) != unknown || !finer_->is_one_label(fine, fine_label)) {
+      return false;
+    }
+    if (child == 0) label = fine_label;
+    if (fine_label != label) return false;
+  }
+  return true;
+}
+
+void Couplings::make_ready(RowId row) noexcept {
+  if (kind(row) == unknown) find(row);
+  for (std::size_t d = 1; d < 3 && kind(row) == mixed; ++d) {
+    if (kind(below(row, d)) == unknown) find(below(row, d));
+  }
+  kind_[row] |= ready;
+}
+
+void Couplings::find(RowId row) noexcept {
+  const std::array<int, 3> c = grid_.row_coordinates(row);
+  std::uint8_t label = 0;
+  Kind found = empty;
+  const bool outside = c[0] < 1 || c[0] + 1 >= grid_.columns || c[1] < 0 || c[1] >= grid_.dims[1] ||
+                       c[2] < 0 || c[2] >= grid_.dims[2];
+  const bool any = !outside && (level_ > 0 || lattice_.filled_in(row) != 0);
+  if (any && is_one_label(row, label)) {
+    found = one_label;
+    label_[row] = label;
+  } else if (any && write_out(row)) {
+    found = mixed;
+    if (written_limits_.size() > 0) write_limits(row, written_limits_[written_count_]);
+    written_at_[row] = find_written();
+    written_count_ = std::max(written_count_, written_at_[row] + 1);
+  }
+  kind_[row] = found;
+}
+
+namespace {
+
+// FNV-1a, by words.
+template <class T>
+void add_to_hash(std::uint64_t& hash, const T& what) {
+  static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % sizeof(std::uint64_t) == 0);
+  constexpr std::uint64_t kPrime = 0x100000001b3;
+  const auto* at = reinterpret_cast<const char*>(&what);
+  for (std::size_t n = 0; n < sizeof(T); n += sizeof(std::uint64_t)) {
+    std::uint64_t word = 0;
+    std::memcpy(&word, at + n, sizeof word);
+    hash = (hash ^ word) * kPrime;
+  }
+}
+
+template <class T>
+bool same_bits(const T& a, const T& b) {
+  const auto* bytes = reinterpret_cast<const char*>(&a);
+  return std::equal(bytes, bytes + sizeof(T), reinterpret_cast<const char*>(&b));
+}
+
+}  // namespace
+
+// Where what was just written after all others stands: there, or where the same was written before.
+std::uint32_t Couplings::find_written() noexcept {
+  const std::uint32_t last = written_count_;
+  std::uint64_t hash = 0xcbf29ce484222325;
+  add_to_hash(hash, written_[last]);
+  add_to_hash(hash, written_stands_[last]);
+  if (written_cells_.size() > 0) add_to_hash(hash, written_cells_[last]);
+  if (written_limits_.size() > 0) add_to_hash(hash, written_limits_[last]);
+  const std::size_t mask = written_by_hash_.size() - 1;
+  // What is hashed last changes the high bits most.
+  for (std::size_t n = (hash ^ hash >> 32U) & mask;; n = (n + 1) & mask) {
+    if (written_by_hash_[n] == 0) {
+      written_by_hash_[n] = last + 1;
+      return last;
+    }
+    const std::uint32_t other = written_by_hash_[n] - 1;
+    if (same_bits(written_[other], written_[last]) &&
+        same_bits(written_stands_[other], written_stands_[last]) &&
+        (written_cells_.size() == 0 || same_bits(written_cells_[other], written_cells_[last])) &&
+        (written_limits_.size() == 0 || same_bits(written_limits_[other], written_limits_[last])))
+      return other;
+  }
+}
+
+// After all that was written. False where there is nothing in the row.
+bool Couplings::write_out(RowId row) noexcept {
+  Written& out = written_[written_count_];
+  LaneBits& stands = written_stands_[written_count_];
+  return level_ == 0 ? write_voxels(row, out, stands)
+                     : write_cells(row, out, stands, written_cells_[written_count_]);
+}
+
+void Couplings::write_lane(std::size_t i, const VoxelSprings& springs, Written& out,
+                           LaneBits& stands) noexcept {
+  unsigned bits = 0;
+  for (std::size_t d = 0; d < 3; ++d) {
+    const std::size_t at = Written::kBefore + d * kRow + i;
+    out.along[at] = springs.up[d].along;
+    out.across[at] = springs.up[d].across;
+    out.inverse[d][i] = springs.inverse[d];
+    if (springs.inverse[d] == 0.0F) bits |= 1U << d;
+  }
+  stands[i] = static_cast<std::uint8_t>(bits);
+  if (i > 0) return;
+  out.along[Written::kBefore - 1] = springs.down[0].along;
+  out.across[Written::kBefore - 1] = springs.down[0].across;
+}
+
+bool Couplings::write_voxels(RowId row, Written& out, LaneBits& stands) const noexcept {
+  // Materials around the row, [lane + 1][z][y]: those at one place along the row stand together.
+  using Slice = std::array<std::uint8_t, 9>;
+  std::array<Slice, kRow + 2> around{};
+  for (std::size_t n = 0; n < 9; ++n) {
+    const RowId r =
+        row - grid_.row_z - 1 + static_cast<RowId>(n / 3) * grid_.row_z + static_cast<RowId>(n % 3);
+    const VoxelId first = r * kRow;
+    around[0][n] = lattice_.material(grid_.down(first, 0));
+    for (VoxelId i = 0; i < kRow; ++i) around[i + 1][n] = lattice_.material(first + i);
+    around[kRow + 1][n] = lattice_.material(grid_.up(first + kRow - 1, 0));
+  }
+  // The link in +d of the voxel at (y, z) of slice x; y and z are 0 (one back), 1 or 2.
+  const auto along_x = [&](std::size_t x) { return lattice_.spring_among(around[x], around[x + 1], 0); };
+  const auto in_slices = [&](std::size_t x, std::size_t from, int d) {
+    Slice a{}, b{};
+    const std::size_t along = d == 1 ? 1 : 3, across = d == 1 ? 3 : 1;
+    for (std::size_t n = 0; n < 9; ++n) {
+      // In the order of Lattice::spring(): sums round alike.
+      const std::size_t beside = d == 1 ? n / 3 : n % 3,
+                        at = (d == 1 ? n % 3 : n / 3) * across + from * along;
+      a[n] = around[x - 1 + beside][at];
+      b[n] = around[x - 1 + beside][at + along];
+    }
+    return lattice_.spring_among(a, b, d);
+  };
+  VoxelSprings springs;
+  bool anchored = false, any = false;
+  for (std::size_t i = 0; i < kRow; ++i) {
+    const std::size_t x = i + 1;
+    const auto v = static_cast<VoxelId>(row * kRow + i);
+    any = any || around[x][4] != 0;
+    // Along a row little changes: mostly the links are those of the voxel before.
+    const bool as_before = i > 0 && around[x + 1] == around[x] && around[x] == around[x - 1] &&
+                           around[x - 1] == around[x - 2] && anchored == lattice_.anchored(v);
+    if (!as_before) {
+      anchored = lattice_.anchored(v);
+      springs.down[0] = i > 0 ? springs.up[0] : along_x(0);
+      springs.up[0] = along_x(x);
+      for (const int d : {1, 2}) {
+        springs.down[static_cast<std::size_t>(d)] = in_slices(x, 0, d);
+        springs.up[static_cast<std::size_t>(d)] = in_slices(x, 1, d);
+      }
+      springs.inverse = {};
+      if (!anchored) springs.set_inverse();
+    }
+    write_lane(i, springs, out, stands);
+  }
+  return any;
+}
+
+void Couplings::write_limits(RowId row, RowLimits::Written& out) const noexcept {
+  constexpr float kFar = std::numeric_limits<float>::max();
+  constexpr LinkLimit kNone{-kFar, kFar, kFar};
+  std::array<LinkLimit, 3> tightest{kNone, kNone, kNone};
+  for (std::size_t i = 0; i < kRow; ++i) {
+    const auto v = static_cast<VoxelId>(row * kRow + i);
+    for (int d = 0; d < 3; ++d) {
+      const auto ud = static_cast<std::size_t>(d);
+      const VoxelId up = grid_.up(v, d), down = grid_.down(v, d);
+      const bool here = lattice_.filled(v);
+      const LinkLimit above = here && lattice_.filled(up) ? lattice_.limit(v, d) : kNone,
+                      below = here && lattice_.filled(down) ? lattice_.limit(down, d) : kNone;
+      out.up_low[ud][i] = above.along_low;
+      out.up_high[ud][i] = above.along_high;
+      out.up_across[ud][i] = above.across;
+      out.down_low[ud][i] = below.along_low;
+      out.down_high[ud][i] = below.along_high;
+      out.down_across[ud][i] = below.across;
+      for (const LinkLimit& l : {above, below}) {
+        LinkLimit& t = tightest[ud];
+        t.along_low = std::max(t.along_low, l.along_low);
+        t.along_high = std::min(t.along_high, l.along_high);
+        t.across = std::min(t.across, l.across);
+      }
+    }
+  }
+  for (int axis = 0; axis < 3; ++axis)
+    out.tightest[static_cast<std::size_t>(axis)] = AxisLimits(tightest, axis);
+}
+
+RowLimits Couplings::limits(RowId row) const noexcept {
+  RowLimits out{&label_limits_[label_[row]], nullptr};
+  if (written_limits_.size() > 0 && kind(row) == mixed) {
+    out.lanes = &written_limits_[written_at_[row]];
+    out.of = &out.lanes->tightest;
+  }
+  return out;
+}
+
+bool Couplings::write_cells(RowId row, Written& out, LaneBits& stands, Cells& cells) const noexcept {
+  const std::array<int, 3> c = grid_.row_coordinates(row);
+  bool any = false;
+  for (int lane = 0; lane < kRow; ++lane) {
+    const std::array<int, 3> cell{(c[0] - 1) * kRow + lane, c[1], c[2]};
+    const Content inside = cell[0] < grid_.dims[0] ? content(cell) : nothing;
+    const VoxelSprings springs = springs_by_links(cell, inside);
+    int below = 0;
+    for (int corner = 0; inside != nothing && corner < 8; ++corner) {
+      const std::array<int, 3> fine{2 * cell[0] + (corner & 1), 2 * cell[1] + (corner >> 1 & 1),
+                                    2 * cell[2] + (corner >> 2)};
+      const auto& dims = finer_->grid_.dims;
+      if (fine[0] < dims[0] && fine[1] < dims[1] && fine[2] < dims[2] && finer_->content(fine) != nothing)
+        ++below;
+    }
+    any = any || inside != nothing;
+    cells.share[static_cast<std::size_t>(lane)] = below > 0 ? 1.0F / static_cast<float>(below) : 0.0F;
+    cells.filled[static_cast<std::size_t>(lane)] = inside == nothing ? 0.0F : 1.0F;
+    write_lane(static_cast<std::size_t>(lane), springs, out, stands);
+  }
+  return any;
+}
+
+VoxelSprings Couplings::springs_by_links(const std::array<int, 3>& cell, Content inside) const noexcept {
+  VoxelSprings springs;
+  if (inside == nothing) return springs;
+  for (std::size_t d = 0; d < 3; ++d) {
+    std::array<int, 3> below = cell;
+    --below[d];
+    springs.up[d] = link(cell, static_cast<int>(d));
+    springs.down[d] = link(below, static_cast<int>(d));
+  }
+  if (inside != held) springs.set_inverse();
+  return springs;
+}
+
+VoxelSprings Couplings::springs_of(VoxelId cell) noexcept {
+  return prepare(cell / kRow) ? known_springs(cell) : VoxelSprings{};
+}
+
+VoxelSprings Couplings::find_springs(VoxelId cell) const noexcept {
+  const RowId row = cell / kRow;
+  if ((kind_[row] & ready) != 0 || kind(row) == empty) return known_springs(cell);
+  if (level_ == 0) return lattice_.springs_of(cell);
+  const std::array<int, 3> at = grid_.coordinates(cell);
+  return springs_by_links(at, content(at));
+}
+
+VoxelSprings Couplings::known_springs(VoxelId cell) const noexcept {
+  VoxelSprings out;
+  const RowId row = cell / kRow;
+  if (kind(row) == empty) return out;
+  RowCouplings s;
+  all(row, s);
+  const std::size_t i = cell % kRow;
+  for (std::size_t d = 0; d < 3; ++d) {
+    out.up[d] = {s.up_along[d * kRow + i], s.up_across[d * kRow + i]};
+    out.down[d] = {s.down_along[d][i], s.down_across[d][i]};
+    out.inverse[d] = s.inverse[d * kRow + i];
+  }
+  return out;
+}
+
+RowSprings Couplings::springs(RowId row, int axis) const noexcept {
+  RowCouplings s;
+  all(row, s);
+  const auto ua = static_cast<std::size_t>(axis);
+  RowSprings out;
+  for (std::size_t d = 0; d < 3; ++d) {
+    out.up[d] = (ua == d ? s.up_along : s.up_across) + d * kRow;
+    out.down[d] = (ua == d ? s.down_along : s.down_across)[d];
+  }
+  out.inverse = s.inverse + ua * kRow;
+  return out;
+}
+
+std::size_t Couplings::memory_bytes() const {
+  std::size_t bytes = sizeof(*this) + kind_.resident_bytes() + label_.resident_bytes() +
+                      content_.resident_bytes() + written_at_.resident_bytes() + written_.resident_bytes() +
+                      written_cells_.resident_bytes() + written_stands_.resident_bytes() +
+                      written_limits_.resident_bytes() + written_by_hash_.resident_bytes();
+  for (const auto& links : link_) bytes += links.resident_bytes();
+  for (const auto& constant : constant_) bytes += constant != nullptr ? sizeof(Constant) : 0;
+  return bytes;
+}
+
+std::vector<bool> Couplings::rows_in_use() {
+  std::vector<bool> rows(grid_.rows());
+  for (int c = 1; c + 1 < grid_.columns; ++c) {
+    for (int k = 0; k < grid_.dims[2]; ++k) {
+      for (int j = 0; j < grid_.dims[1]; ++j) {
+        const RowId row = grid_.row(c, j, k);
+        if (!prepare(row)) continue;
+        for (const RowId r : {row, row - 1, row + 1, row - grid_.row_z, row + grid_.row_z, row - grid_.row_x,
+                              row + grid_.row_x})
+          rows[r] = true;
+      }
+    }
+  }
+  return rows;
+}
+
+}  // namespace voxel

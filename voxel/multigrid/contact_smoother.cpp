@@ -1,0 +1,292 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The passes of a cycle where something is touched: voxels that the tool presses slide, voxels beside rigid
+// surfaces stay out of them, and what either of them holds is held on the coarse levels too.
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
+
+#include "voxel/multigrid/fas.h"
+#include "voxel/multigrid/tangential_contact.h"
+
+namespace voxel {
+namespace {
+
+constexpr double kTouching = 1e-6;  // of the spacing: nearer to its obstacle than this a voxel lies on it
+constexpr int kObstacleRounds = 3;  // of a row, in which more voxels each time stay out of their obstacles
+
+// Bit i: lane i of a row is near a rigid surface. Eight lanes at a time: asked one by one, few of them being
+// so, they took a third of what it takes to add a row of results.
+std::uint32_t obstacle_lanes(const Displacement& state, RowId row) {
+  constexpr std::uint64_t kOnes = 0x0101010101010101U, kLow = 0x7F * kOnes;
+  static_assert(std::endian::native == std::endian::little);
+  std::uint32_t lanes = 0;
+  for (std::size_t n = 0; n < kRow; n += 8) {
+    std::uint64_t roles;
+    std::memcpy(&roles, state.role.data() + static_cast<std::size_t>(row) * kRow + n, sizeof roles);
+    const std::uint64_t other = roles ^ (Displacement::obstacle * kOnes);  // 0 in each byte that is one
+    const std::uint64_t is = ~(((other & kLow) + kLow) | other) & ~kLow;   // 0x80 in it, 0 in all others
+    lanes |= static_cast<std::uint32_t>((is >> 7U) * 0x0102040810204080U >> 56U) << n;  // its bit in one byte
+  }
+  return lanes;
+}
+
+// `visit(v, lane)` for those of the lanes whose bits are set, the first first.
+template <class Visit>
+void for_lanes(RowId row, std::uint32_t lanes, const Visit& visit) {
+  for (; lanes != 0; lanes &= lanes - 1) {
+    const auto lane = static_cast<std::size_t>(std::countr_zero(lanes));
+    visit(static_cast<VoxelId>(row * kRow + lane), lane);
+  }
+}
+
+// `visit(v, lane)` for the voxels of a row, in the octets of a span, that the tool presses.
+template <class Visit>
+void for_pressed(const Displacement& state, RowId row, OctetSpan span, const Visit& visit) {
+  if (state.row_standing[row] == 0) return;
+  const auto first = static_cast<std::size_t>(span.first) * kOctet,
+             last = static_cast<std::size_t>(span.last) * kOctet + kOctet;
+  for (std::size_t lane = first; lane < last; ++lane) {
+    const auto v = static_cast<VoxelId>(row * kRow + lane);
+    if (state.role[v] == Displacement::pressed) visit(v, lane);
+  }
+}
+
+}  // namespace
+
+float Multigrid::slide_pressed(RowId row, Displacement& state, OctetSpan span) noexcept {
+  float most = 0.0F;
+  for_pressed(state, row, span, [&](VoxelId v, std::size_t) {
+    most = std::max(most, slide(couplings(), state, v, balance_of(v, state)));
+  });
+  return most;
+}
+
+float Multigrid::slide_pressed_by(RowId row, const RowVector& way, Displacement& state,
+                                  OctetSpan span) noexcept {
+  float most = 0.0F;
+  for_pressed(state, row, span, [&](VoxelId v, std::size_t i) {
+    most = std::max(most, slide_by(couplings(), state, v, {way[0][i], way[1][i], way[2][i]}));
+  });
+  return most;
+}
+
+// A row is moved at once, and what that takes into its obstacle has to stay while the others are: put back
+// afterwards, it would find that the voxels beside it followed it in there as far as the links let them, and
+// hold it there.
+template <class Move>
+std::uint32_t Multigrid::move_outside(LevelRow r, RowId row, Displacement& state,
+                                      const ObstacleView& obstacles, const Move& move) noexcept {
+  if (obstacles.obstacles.empty() || state.row_obstacles[row] == 0) {
+    move(r);
+    return 0;
+  }
+  RowVector before;
+  for (std::size_t axis = 0; axis < 3; ++axis) std::copy_n(r.u[axis], kRow, before[axis].begin());
+  std::array<std::uint8_t, kRow> stays{};
+  if (r.stopped != nullptr) std::copy_n(r.stopped, kRow, stays.begin());
+  std::uint32_t blocked_lanes = 0;
+  const std::uint32_t near = obstacle_lanes(state, row);
+  for (int n = 0; n < kObstacleRounds; ++n) {
+    move(r);
+    std::uint32_t more = 0;
+    for_lanes(row, near & ~blocked_lanes, [&](VoxelId v, std::size_t lane) {
+      if (blocked(obstacles, state, v, 0.0)) more |= 1U << lane;
+    });
+    if (more == 0) break;
+    blocked_lanes |= more;
+    if (n + 1 == kObstacleRounds) break;
+    for (std::size_t axis = 0; axis < 3; ++axis) std::copy_n(before[axis].begin(), kRow, r.u[axis]);
+    for_lanes(row, blocked_lanes, [&](VoxelId, std::size_t lane) { stays[lane] = 7; });
+    r.stopped = stays.data();
+  }
+  for_lanes(row, blocked_lanes, [&](VoxelId v, std::size_t) {
+    relax_obstacle(couplings(), state, obstacles, v, balance_of(v, state));
+  });
+  return blocked_lanes;
+}
+
+float Multigrid::smooth_voxels(const LevelRow& r, RowId row, Displacement& state,
+                               const ObstacleView& obstacles, OctetSpan span) noexcept {
+  const RowLimits limits = couplings().limits(row);
+  float change = 0.0F;
+  move_outside(r, row, state, obstacles,
+               [&](const LevelRow& way) { change = std::max(change, smooth_row(way, &limits, span)); });
+  return std::max(change, slide_pressed(row, state, span));
+}
+
+// Corrects a row of voxels as far as links and obstacles allow. What an obstacle keeps from following is not
+// refused: a voxel that slides along it goes on with its neighbours, and cells that took its part back in
+// every cycle swung between two states (a block pressed onto a plate: 0.26 to 0.68 N, where 0.40 is right).
+RowCorrection Multigrid::correct_voxels(const LevelRow& r, RowId row, const RowVector& correction,
+                                        Displacement& state, const ObstacleView& obstacles, OctetSpan span,
+                                        RowVector& refused) noexcept {
+  const RowLimits limits = couplings().limits(row);
+  RowCorrection done;
+  const std::uint32_t kept_out = move_outside(r, row, state, obstacles, [&](const LevelRow& way) {
+    done = correct_row(way, &limits, span, correction, refused);
+  });
+  for_lanes(row, kept_out, [&](VoxelId, std::size_t lane) {
+    const unsigned stopped = r.stopped == nullptr ? 0U : r.stopped[lane];
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if ((stopped >> axis & 1U) == 0) refused[axis][lane] = 0.0F;
+    }
+  });
+  done.most_m = std::max(done.most_m, slide_pressed_by(row, correction, state, span));
+  return done;
+}
+
+// What presses a voxel against its obstacle, or the tool, is balanced by it, and the cells above are held by
+// it.
+void Multigrid::balance_contacts(RowId row, Displacement& state, const ObstacleView& obstacles,
+                                 OctetSpan span, RowResidual& found, RowVector& out) noexcept {
+  const double touching = kTouching * lattice_.min_spacing_m();
+  const auto first = static_cast<std::size_t>(span.first) * kOctet,
+             last = static_cast<std::size_t>(span.last) * kOctet + kOctet;
+  for (std::size_t i = first; i < last; ++i) {
+    const auto v = static_cast<VoxelId>(row * kRow + i);
+    Holds::Support by{};
+    if (state.role[v] == Displacement::pressed) {
+      const auto force = sliding_force(couplings(), state, v, balance_of(v, state));
+      for (int axis = 0; axis < 3 && force; ++axis)
+        out[static_cast<std::size_t>(axis)][i] = static_cast<float>((*force)[axis]);
+      by = force ? Holds::along(state.tool_normal[lattice_.surface_number(v)], Holds::Support::By::tool)
+                 : Holds::kAll;
+    } else if (Displacement::in_part(state.role[v])) {
+      by = support_of_part(lattice_.part(v) - 1U);
+    } else if (state.role[v] == Displacement::obstacle && blocked(obstacles, state, v, touching)) {
+      const glm::vec3 n = obstacles.of(v).normal;
+      const float into = out[0][i] * n.x + out[1][i] * n.y + out[2][i] * n.z;
+      for (int axis = 0; axis < 3; ++axis) {
+        const auto ua = static_cast<std::size_t>(axis);
+        found.resisted[ua] &= ~(1U << i);
+        if (into < 0.0F) out[ua][i] -= into * n[axis];
+      }
+      if (into < 0.0F) by = Holds::along(n, Holds::Support::By::obstacle);
+    }
+    holds_->support(v, by);
+  }
+}
+
+// What the other found is no deeper in its obstacles than it was, but for rounding. (Taken for a voxel that
+// was moved into its obstacle, one would look for its place again, beside others that have not come along
+// yet, and the other, told of that, would find it pulled: they disagreed about the underside of a brain by a
+// little more in each exchange.)
+void Multigrid::add(RowId row, const RowVector& way, Displacement& state,
+                    const ObstacleView& obstacles) noexcept {
+  if (!prepare(0, row)) return;
+  RowVector refused, before;
+  const LevelRow r = row_of(0, row, state);
+  if (obstacles.obstacles.empty() || state.row_obstacles[row] == 0) {
+    note_change(0, row, correct_voxels(r, row, way, state, obstacles, {}, refused).most_m);
+    return;
+  }
+  for (std::size_t axis = 0; axis < 3; ++axis) std::copy_n(r.u[axis], kRow, before[axis].begin());
+  const RowLimits limits = couplings().limits(row);
+  RowCorrection done = correct_row(r, &limits, {}, way, refused);
+  done.most_m = std::max(done.most_m, slide_pressed_by(row, way, state, {}));
+  const double touching = kTouching * lattice_.min_spacing_m();
+  bool deeper = false;
+  for_lanes(row, obstacle_lanes(state, row), [&](VoxelId v, std::size_t lane) {
+    if (deeper) return;
+    const Obstacle& o = obstacles.of(v);
+    const double depth = depth_in_obstacle(o, state.at(v));
+    if (depth <= touching) return;
+    const glm::dvec3 was(before[0][lane], before[1][lane], before[2][lane]);
+    deeper = depth > std::max(depth_in_obstacle(o, was), 0.0) + touching;
+  });
+  if (deeper) {
+    for (std::size_t axis = 0; axis < 3; ++axis) std::copy_n(before[axis].begin(), kRow, r.u[axis]);
+    done = correct_voxels(r, row, way, state, obstacles, {}, refused);
+  }
+  note_change(0, row, done.most_m);
+}
+
+namespace {
+
+// What holds a cell, off the diagonal: for x, of y and z, and so on.
+glm::vec3 across(const std::array<float, 3>& tilt, const glm::vec3& way) {
+  return {tilt[0] * way.y + tilt[1] * way.z, tilt[0] * way.x + tilt[2] * way.z,
+          tilt[1] * way.x + tilt[2] * way.y};
+}
+
+}  // namespace
+
+template <class Visit>
+void Multigrid::for_tilted(int level, RowId row, const LevelRow& r, OctetSpan span,
+                           const Visit& visit) noexcept {
+  const auto first = static_cast<std::size_t>(span.first) * kOctet,
+             last = static_cast<std::size_t>(span.last) * kOctet + kOctet;
+  for (std::size_t i = first; i < last; ++i) {
+    const auto cell = static_cast<VoxelId>(row * kRow + i);
+    const std::array<float, 3> tilt = holds_->tilt(level, cell);
+    if (tilt[0] == 0.0F && tilt[1] == 0.0F && tilt[2] == 0.0F) continue;
+    // A cell that a limit stops, or that does not move on an axis, is held by that.
+    bool moves = r.stopped == nullptr || r.stopped[i] == 0;
+    std::array<float, 3> hold{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const float inverse = r.springs.inverse[axis * kRow + (r.springs.uniform ? 0 : i)];
+      moves = moves && inverse > 0.0F;
+      hold[axis] = moves ? r.hold_times * r.hold[axis][i] / inverse : 0.0F;
+    }
+    if (!moves) continue;
+    visit(cell, i, tilt, hold);
+  }
+}
+
+// Cells on inclined surfaces, whose axes are not by themselves: each where its energy is least.
+float Multigrid::smooth_tilted(int level, RowId row, const LevelRow& r, OctetSpan span) noexcept {
+  Level& l = at(level);
+  const Grid& g = l.couplings->grid();
+  float most = 0.0F;
+  for_tilted(
+      level, row, r, span,
+      [&](VoxelId cell, std::size_t i, const std::array<float, 3>& tilt, const std::array<float, 3>& hold) {
+        const VoxelSprings springs = l.couplings->springs_of(cell);
+        glm::dmat3 stiffness(0.0);  // whose determinant a float may not hold
+        glm::dvec3 pull(0.0);       // from where the cell is held
+        for (int axis = 0; axis < 3; ++axis) {
+          const auto ua = static_cast<std::size_t>(axis);
+          const float told = r.held_at[ua][i];
+          float sum = 0.0F, all = r.load[ua][i];
+          for (int d = 0; d < 3; ++d) {
+            const auto ud = static_cast<std::size_t>(d);
+            const float up = springs.up[ud].on(axis, d), down = springs.down[ud].on(axis, d);
+            all += up * (l.value[ua][g.up(cell, d)] - told) + down * (l.value[ua][g.down(cell, d)] - told);
+            sum += up + down;
+          }
+          stiffness[axis][axis] = static_cast<double>(sum + hold[ua]);
+          pull[axis] = static_cast<double>(all);
+        }
+        const glm::dvec3 off = r.hold_times * glm::vec3(tilt[0], tilt[1], tilt[2]);
+        stiffness[0][1] = stiffness[1][0] = off[0];
+        stiffness[0][2] = stiffness[2][0] = off[1];
+        stiffness[1][2] = stiffness[2][1] = off[2];
+        const glm::dvec3 way = glm::inverse(stiffness) * pull;
+        for (int axis = 0; axis < 3; ++axis) {
+          const auto ua = static_cast<std::size_t>(axis);
+          const float to = r.held_at[ua][i] + static_cast<float>(way[axis]);
+          most = std::max(most, std::fabs(to - r.u[ua][i]));
+          r.u[ua][i] = to;
+        }
+      });
+  return most;
+}
+
+// Adds to the residual of a coarse row what inclined surfaces pull across.
+void Multigrid::add_tilt(int level, RowId row, const LevelRow& r, OctetSpan span, RowVector& out) noexcept {
+  for_tilted(level, row, r, span,
+             [&](VoxelId, std::size_t i, const std::array<float, 3>& tilt, const std::array<float, 3>&) {
+               glm::vec3 back(0.0F);
+               for (int axis = 0; axis < 3; ++axis) {
+                 const auto ua = static_cast<std::size_t>(axis);
+                 back[axis] = r.held_at[ua][i] - r.u[ua][i];
+               }
+               const glm::vec3 pull = r.hold_times * across(tilt, back);
+               for (int axis = 0; axis < 3; ++axis) out[static_cast<std::size_t>(axis)][i] += pull[axis];
+             });
+}
+
+}  // namespace voxel

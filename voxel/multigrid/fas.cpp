@@ -1,0 +1,276 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "voxel/multigrid/fas.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "voxel/lattice/voxel_links.h"
+
+namespace voxel {
+namespace {
+
+constexpr int kMaxLevels = 10;
+constexpr int kSmallest = 3;                // cells across the coarsest level
+constexpr int kWrittenAtOnce = 5;           // from this level on springs are written out on construction
+constexpr std::size_t kMaxBalanced = 4096;  // rows; the contact of a tool has some hundred
+constexpr std::size_t kMostInTick = 1024;   // rows that a tick adds together
+constexpr std::uint8_t kAllAxes = 7;
+constexpr std::size_t kMaxStopped = 65536;  // cells of all levels stopped at a time; more move a little
+
+}  // namespace
+
+Multigrid::Multigrid(const Lattice& lattice) : lattice_(lattice), tiles_(lattice.grid()), bricks_(lattice) {
+  for (AxisLimits& axis : yield_limits_) {
+    for (std::size_t d = 0; d < 3; ++d) {
+      axis.high[d] = lattice.first_yield_m(static_cast<int>(d));
+      axis.low[d] = -axis.high[d];
+    }
+  }
+  levels_.reserve(kMaxLevels);
+  while (levels() < kMaxLevels) {
+    Level level;
+    const Couplings* finer = levels_.empty() ? nullptr : levels_.back().couplings.get();
+    level.couplings = std::make_unique<Couplings>(lattice, finer);
+    const Grid& g = level.couplings->grid();
+    if (finer != nullptr) {
+      for (auto* arrays : {&level.value, &level.told, &level.load, &level.loaded_at}) {
+        for (auto& array : *arrays) array = LazyArray<float>(g.size());
+      }
+    }
+    level.stopped = LazyArray<std::uint8_t>(g.size());
+    level.flags = LazyArray<std::uint8_t>(g.rows());
+    levels_.push_back(std::move(level));
+    // One coarse level at least: it is where residuals are measured.
+    if (levels() > 1 && *std::max_element(g.dims.begin(), g.dims.end()) <= kSmallest) break;
+  }
+  for (int l = kWrittenAtOnce; l < levels(); ++l) prepare_level(l);
+  hats_ = Hats(lattice.grid());
+  for (auto& axis : tied_) axis = LazyArray<float>(lattice.size());
+  row_tied_ = LazyArray<std::uint16_t>(lattice.grid().rows());
+  stopped_.reserve(kMaxStopped);
+  still_stopped_.reserve(kMaxStopped);
+  joint_ = JointMove(lattice.grid().rows());
+  std::vector<Couplings*> couplings;
+  for (const Level& level : levels_) couplings.push_back(level.couplings.get());
+  holds_ = std::make_unique<Holds>(lattice, couplings);
+  if (lattice.part_count() == 0) return;
+  parts_ = std::make_unique<WholeParts>(lattice, couplings);
+  part_state_.resize(parts_->count());
+  for (PartState& p : part_state_) p.on.resize(levels_.size());
+  part_bounds_.reserve(kMostPartBounds);
+  // Rows are relaxed beside them, and they by themselves.
+  for (int l = 1; l < levels(); ++l) {
+    for (std::size_t p = 0; p < parts_->count(); ++p) {
+      for (const WholeParts::Run& run : parts_->on(l, p).rows) {
+        for (std::uint32_t lanes = run.lanes; lanes != 0; lanes &= lanes - 1)
+          at(l).stopped[run.row * kRow + static_cast<VoxelId>(std::countr_zero(lanes))] = kAllAxes;
+        mark(l, run.row, limited);
+      }
+    }
+  }
+}
+
+void Multigrid::prepare_level(int level) noexcept {
+  const Grid& g = grid(level);
+  for (int c = 1; c + 1 < g.columns; ++c) {
+    for (int k = 0; k < g.dims[2]; ++k) {
+      for (int j = 0; j < g.dims[1]; ++j) prepare(level, g.row(c, j, k));
+    }
+  }
+}
+
+void Multigrid::prepare_all() noexcept {
+  for (int l = 0; l < levels(); ++l) {
+    Level& level = at(l);
+    const std::vector<bool> rows = level.couplings->rows_in_use();  // which finds all springs
+    for (auto* arrays : {&level.value, &level.told, &level.load, &level.loaded_at}) {
+      for (auto& array : *arrays) array.populate(kRow, rows);
+    }
+    level.stopped.populate(kRow, rows);
+    level.flags.populate();
+  }
+  holds_->prepare_all();
+  joint_.populate(grid(0).rows(), kMostInTick);
+}
+
+void Multigrid::prepare_tied() noexcept {
+  for (auto& axis : tied_) axis.populate();
+  row_tied_.populate();
+}
+
+// Marks a row and the rows beside it.
+void Multigrid::spread(int level, RowId row, std::uint8_t flags) noexcept {
+  if (all_visited_) return;
+  Level& l = at(level);
+  const Grid& g = l.couplings->grid();
+  for (const RowId r : {row, row - 1, row + 1, row - g.row_z, row + g.row_z, row - g.row_x, row + g.row_x})
+    l.flags[r] |= flags;
+  if (level == 0 && (flags & active) != 0) tiles_.stir(g.row_coordinates(row));
+}
+
+// A row was moved by as much. What is too little for a sweep is still passed on: a small force on each of
+// many voxels is a large one on the cell that holds them, four times as large on each level.
+void Multigrid::note_change(int level, RowId row, float change) noexcept {
+  if (change <= passed_on_m()) return;
+  if (level == 0) bricks_.look_at(row);
+  spread(level, row, change > quiet_m_ ? active | dirty : dirty);
+  if (level > 0) mark(level, row, changed);
+}
+
+void Multigrid::stop_cells(VoxelId v, std::uint8_t bits) noexcept {
+  auto c = lattice_.coordinates(v);
+  for (int l = 0; l < levels(); ++l) {
+    if (l > 0) {
+      for (int& x : c) x /= 2;
+    }
+    Level& level = at(l);
+    const VoxelId cell = level.couplings->grid().at(c[0], c[1], c[2]);
+    if (parts_ != nullptr && l > 0 && parts_->of(l, cell) != 0) continue;
+    if ((level.stopped[cell] & bits) == bits || stopped_.size() == stopped_.capacity()) return;
+    level.stopped[cell] |= bits;
+    mark(l, cell / kRow, limited);
+    stopped_.push_back({static_cast<std::uint8_t>(l), cell});
+  }
+}
+
+void Multigrid::tie(VoxelId v, const glm::vec3& force_N) noexcept {
+  const auto tied = [&] { return tied_[0][v] != 0.0F || tied_[1][v] != 0.0F || tied_[2][v] != 0.0F; };
+  const bool was = tied();
+  if (!was && force_N == glm::vec3(0.0F)) return;
+  for (int axis = 0; axis < 3; ++axis) tied_[static_cast<std::size_t>(axis)][v] = force_N[axis];
+  const bool is = tied();
+  if (was == is) return;
+  std::uint16_t& count = row_tied_[v / kRow];
+  count = static_cast<std::uint16_t>(is ? count + 1 : count - 1);
+}
+
+void Multigrid::release_limited() noexcept {
+  for (const StoppedCell& s : stopped_) {
+    at(s.level).stopped[s.cell] = 0;
+    if (parts_ == nullptr || s.level == 0 || !parts_->in_row(s.level, s.cell / kRow))
+      unmark(s.level, s.cell / kRow, limited);
+  }
+  stopped_.clear();
+}
+
+void Multigrid::release_unlimited(const Displacement& state) noexcept {
+  const float tight = kTight * static_cast<float>(lattice_.min_spacing_m());
+  const auto pulled_against_limit = [&](VoxelId v, int axis) {
+    const float at = state.u[static_cast<std::size_t>(axis)][v];
+    const std::array<float, 2> interval = link_interval(lattice_, state, v, axis);
+    const bool low = at <= interval[0] + tight, high = at >= interval[1] - tight;
+    if (!low && !high) return false;
+    const double force = link_force(couplings(), state, v, axis);
+    return force > 0.0 ? high : low && force < 0.0;
+  };
+  still_stopped_.clear();
+  for (const StoppedCell& s : stopped_) {
+    if (s.level != 0) continue;
+    std::uint8_t bits = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto bit = static_cast<std::uint8_t>(1U << axis);
+      if ((at(0).stopped[s.cell] & bit) != 0 && pulled_against_limit(s.cell, axis)) bits |= bit;
+    }
+    if (bits == 0) continue;
+    // Listed once for each time that axes were added: the first is enough.
+    at(0).stopped[s.cell] = 0;
+    still_stopped_.push_back({s.cell, bits});
+  }
+  release_limited();
+  for (const StoppedVoxel& s : still_stopped_) stop_cells(s.v, s.axes);
+}
+
+void Multigrid::copy_from(const Multigrid& other) noexcept {
+  tiles_ = other.tiles_;
+  bricks_.look_at_all_of(other.bricks_);
+  for (int l = 0; l < levels(); ++l) {
+    Level& to = at(l);
+    const Level& from = other.at(l);
+    to.flags.copy_from(from.flags);
+    for (std::size_t p = 0; p < part_state_.size(); ++p)
+      part_state_[p].on[static_cast<std::size_t>(l)] = other.part_state_[p].on[static_cast<std::size_t>(l)];
+    if (l == 0) continue;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      to.value[axis].copy_from(from.value[axis]);
+      to.told[axis].copy_from(from.told[axis]);
+      to.loaded_at[axis].copy_from(from.loaded_at[axis]);
+      to.load[axis].copy_from(from.load[axis]);
+    }
+  }
+}
+
+void Multigrid::forget_coarse() {
+  bricks_.leave_to_another();
+  all_visited_ = true;
+  for (int l = 1; l < levels(); ++l) {
+    Level& level = at(l);
+    for (auto* arrays : {&level.value, &level.told, &level.load, &level.loaded_at}) {
+      for (auto& array : *arrays) array = LazyArray<float>(level.couplings->grid().size());
+    }
+  }
+}
+
+std::size_t Multigrid::renew_bricks(Displacement& state, std::size_t most_rows) noexcept {
+  return bricks_.renew(state, most_rows, [this](RowId row) {
+    log_.note(0, row);
+    spread(0, row, active | dirty);
+  });
+}
+
+std::size_t Multigrid::rows_to_drop() const noexcept {
+  std::size_t rows = 0;
+  for (int l = 1; l < levels(); ++l) rows += log_.rows(l).size();
+  return rows;
+}
+
+void Multigrid::drop_coarse() noexcept {
+  for (int l = 1; l < levels(); ++l) {
+    Level& level = at(l);
+    for (const RowId row : log_.rows(l)) {
+      for (auto* arrays : {&level.value, &level.told, &level.load, &level.loaded_at}) {
+        for (auto& array : *arrays)
+          std::fill_n(array.data() + static_cast<std::size_t>(row) * kRow, kRow, 0.0F);
+      }
+      unmark(l, row, static_cast<std::uint8_t>(~limited));
+    }
+    log_.clear(l);
+  }
+}
+
+void Multigrid::begin_anew() noexcept {
+  drop_coarse();
+  for (const RowId row : balanced_) balance_number_[row] = 0;
+  balanced_.clear();
+  begin_parts_anew();
+}
+
+void Multigrid::keep_log() {
+  std::vector<std::size_t> rows;
+  rows.reserve(levels_.size());
+  for (int l = 0; l < levels(); ++l) rows.push_back(grid(l).rows());
+  log_.begin(rows);
+  const std::size_t most = std::min(kMaxBalanced, grid(0).rows());
+  balanced_.reserve(most);
+  balance_ = LazyArray<float>(most * 3 * kRow);
+  balance_.populate();
+  balance_number_ = LazyArray<std::uint16_t>(grid(0).rows());
+}
+
+std::size_t Multigrid::memory_bytes() const {
+  std::size_t bytes = tiles_.memory_bytes() + log_.memory_bytes() + bricks_.memory_bytes() +
+                      (parts_ == nullptr ? 0 : parts_->memory_bytes()) + holds_->memory_bytes() +
+                      hats_.memory_bytes() + resident_bytes(stopped_) + resident_bytes(still_stopped_) +
+                      row_tied_.resident_bytes() + balance_number_.resident_bytes() +
+                      balance_.resident_bytes() + resident_bytes(balanced_) + joint_.memory_bytes();
+  for (const auto& axis : tied_) bytes += axis.resident_bytes();
+  for (const Level& l : levels_) {
+    bytes += l.couplings->memory_bytes() + l.flags.resident_bytes() + l.stopped.resident_bytes();
+    for (const auto* arrays : {&l.value, &l.told, &l.load, &l.loaded_at}) {
+      for (const auto& array : *arrays) bytes += array.resident_bytes();
+    }
+  }
+  return bytes;
+}
+
+}  // namespace voxel

@@ -1,0 +1,464 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The passes of which a cycle is made.
+#include <algorithm>
+
+#include "voxel/lattice/prefetch.h"
+#include "voxel/multigrid/fas.h"
+
+namespace voxel {
+namespace {
+
+constexpr int kAhead = 4;  // rows
+
+}  // namespace
+
+LevelRow Multigrid::row_of(int level, RowId row, Displacement& state) noexcept {
+  Level& l = at(level);
+  const Grid& g = l.couplings->grid();
+  const std::size_t begin = static_cast<std::size_t>(row) * kRow;
+  LevelRow r;
+  l.couplings->all(row, r.springs);
+  r.z = static_cast<std::ptrdiff_t>(g.row_z) * kRow;
+  r.x = static_cast<std::ptrdiff_t>(g.row_x) * kRow;
+  if (level == 0) {
+    const float* const balanced = balance_of(row, 0);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      r.u[axis] = state.u[axis].data() + begin;
+      r.load[axis] =
+          balanced != nullptr ? balanced + axis * kRow : state.load_of(row, static_cast<int>(axis));
+    }
+    if (state.row_standing[row] != 0) r.held = state.role.data() + begin;
+    return r;
+  }
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    r.u[axis] = l.value[axis].data() + begin;
+    r.load[axis] = l.load[axis].data() + begin;
+    r.held_at[axis] = l.loaded_at[axis].data() + begin;
+  }
+  if (holds_->any(level, row)) {
+    for (std::size_t axis = 0; axis < 3; ++axis) r.hold[axis] = holds_->hold(level, row, axis);
+  }
+  r.hold_times = hold_;
+  if (has(level, row, limited)) r.stopped = l.stopped.data() + begin;
+  return r;
+}
+
+bool Multigrid::yield(RowId row, Displacement& state, bool keep) noexcept {
+  if (state.rest.row[row] == 0) {
+    bool beyond = false;
+    for (int axis = 0; axis < 3 && !beyond; ++axis) {
+      const auto ua = static_cast<std::size_t>(axis);
+      const RowView view(lattice_.grid(), state.u[ua].data(), row);
+      beyond = row_near_limits(couplings().springs(row, axis), view, yield_limits_[ua], 1.0F, view.own);
+    }
+    if (!beyond) return false;
+  }
+  const RowYield found = yield_row(couplings(), state, row, keep);
+  note_change(0, row, found.moved_m);
+  return found.unkept;
+}
+
+void Multigrid::smooth(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
+                       OctetSpan span) noexcept {
+  if (parts_ != nullptr && parts_->fill_row(level, row)) return;  // they go as one
+  const LevelRow r = row_of(level, row, state);
+  log_.note(level, row);
+  if (level > 0) {
+    float change = smooth_row(r, nullptr, span);
+    if (holds_->tilted(level, row)) change = std::max(change, smooth_tilted(level, row, r, span));
+    note_change(level, row, change);
+    return;
+  }
+  note_change(0, row, smooth_voxels(r, row, state, obstacles, span));
+}
+
+std::array<RowId, 8> Multigrid::rows_below(int level, RowId row) const noexcept {
+  const Grid& g = grid(level - 1);
+  const auto c = grid(level).row_coordinates(row);
+  const RowId first = g.row(2 * (c[0] - 1) + 1, 2 * c[1], 2 * c[2]);
+  std::array<RowId, 8> below;
+  for (RowId child = 0; child < 8; ++child)
+    below[child] = first + (child & 1U) * g.row_x + (child >> 1U & 1U) + (child >> 2U) * g.row_z;
+  return below;
+}
+
+namespace {
+
+// The octets of the half-th finer row that octets of a coarse row hold; none: first > last.
+OctetSpan octets_below(OctetSpan coarse, int half) {
+  const int from = half * kOctets / 2;
+  return {2 * (std::max(coarse.first, from) - from),
+          2 * (std::min(coarse.last, from + kOctets / 2 - 1) - from) + 1};
+}
+
+}  // namespace
+
+void Multigrid::restrict_values(int level, RowId row, Displacement& state, OctetSpan span) noexcept {
+  Level& l = at(level);
+  log_.note(level, row);
+  const std::size_t begin = static_cast<std::size_t>(row) * kRow;
+  RowVector sums{};
+  std::array<float*, 3> value{}, told{};
+  const std::array<RowId, 8> rows = rows_below(level, row);
+  for (std::size_t child = 0; child < 8; ++child) {
+    const int half = static_cast<int>(child & 1U);
+    const OctetSpan below = octets_below(span, half);
+    if (below.first > below.last) continue;
+    const std::size_t fine = static_cast<std::size_t>(rows[child]) * kRow;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const float* u = (level == 1 ? state.u : at(level - 1).value)[axis].data() + fine;
+      add_pairs(u, below, sums[axis].data() + half * kRow / 2);
+    }
+  }
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    value[axis] = l.value[axis].data() + begin;
+    told[axis] = l.told[axis].data() + begin;
+  }
+  take_means(sums, l.couplings->share(row), value, told, span);
+}
+
+void Multigrid::balance(RowId row, Displacement& state, const ObstacleView& obstacles,
+                        OctetSpan span) noexcept {
+  if (!prepare(0, row) || balanced_.size() == balanced_.capacity()) return;
+  RowVector left;
+  residual_of(0, row, state, obstacles, span, left);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    float* to = balance_.data() + (balanced_.size() * 3 + axis) * kRow;
+    const float* own = state.load_of(row, static_cast<int>(axis));
+    for (std::size_t i = 0; i < kRow; ++i) to[i] = own == nullptr ? 0.0F : own[i];
+    for (std::size_t i = static_cast<std::size_t>(span.first) * kOctet;
+         i < static_cast<std::size_t>(span.last + 1) * kOctet; ++i)
+      to[i] -= left[axis][i];
+  }
+  balanced_.push_back(row);
+  balance_number_[row] = static_cast<std::uint16_t>(balanced_.size());
+}
+
+void Multigrid::keep_balanced(float part, const Displacement& state) noexcept {
+  for (std::size_t n = 0; n < balanced_.size(); ++n) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      float* of_row = balance_.data() + (n * 3 + axis) * kRow;
+      const float* own = state.load_of(balanced_[n], static_cast<int>(axis));
+      for (std::size_t i = 0; i < kRow; ++i) {
+        const float beside = own == nullptr ? 0.0F : own[i];
+        of_row[i] = beside + part * (of_row[i] - beside);
+      }
+    }
+  }
+  for (PartState& p : part_state_) p.balance *= static_cast<double>(part);
+}
+
+void Multigrid::add_ties(RowId row, LevelRow& r, RowVector& loads) noexcept {
+  const std::size_t begin = static_cast<std::size_t>(row) * kRow;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (std::size_t i = 0; i < kRow; ++i)
+      loads[axis][i] = tied_[axis][begin + i] + (r.load[axis] == nullptr ? 0.0F : r.load[axis][i]);
+    r.load[axis] = loads[axis].data();
+  }
+}
+
+// What pulls the voxels, or cells, of a row that are free to follow.
+RowResidual Multigrid::residual_of(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
+                                   OctetSpan span, RowVector& out) noexcept {
+  LevelRow r = row_of(level, row, state);
+  if (level > 0) {
+    RowResidual found = residual_row(r, nullptr, 0.0F, span, out);
+    if (holds_->tilted(level, row)) {
+      add_tilt(level, row, r, span, out);
+      measure_row(r.springs, out, span, found);
+    }
+    return found;
+  }
+  const RowLimits limits = couplings().limits(row);
+  const float tight = kTight * static_cast<float>(lattice_.min_spacing_m());
+  RowVector loads;
+  const bool ties = row_tied_[row] != 0;
+  if (ties) add_ties(row, r, loads);
+  RowResidual found = residual_row(r, passes_on_all_ ? nullptr : &limits, tight, span, out);
+  if (state.row_obstacles[row] != 0 || state.row_standing[row] != 0 || holds_->supports(row)) {
+    balance_contacts(row, state, obstacles, span, found, out);
+    measure_row(r.springs, out, span, found);
+  }
+  for (std::size_t axis = 0; axis < 3 && ties; ++axis) {
+    const float* tied = tied_[axis].data() + static_cast<std::size_t>(row) * kRow;
+    for (std::size_t i = static_cast<std::size_t>(span.first) * kOctet;
+         i < static_cast<std::size_t>(span.last + 1) * kOctet; ++i) {
+      if (tied[i] != 0.0F)
+        stop_cells(static_cast<VoxelId>(row * kRow + i), static_cast<std::uint8_t>(1U << axis));
+    }
+  }
+  // What the chain holds is balanced by it. Passed on, its residual would drive the coarse levels against
+  // links that do not give, and the sweeps after would undo it.
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (std::size_t i = 0; i < kRow && found.resisted[axis] >> i != 0; ++i) {
+      if ((found.resisted[axis] >> i & 1U) != 0)
+        stop_cells(static_cast<VoxelId>(row * kRow + i), static_cast<std::uint8_t>(1U << axis));
+    }
+  }
+  return found;
+}
+
+float Multigrid::restrict_loads(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
+                                OctetSpan span) noexcept {
+  Couplings& finer = *at(level - 1).couplings;
+  float worst = 0.0F;
+  RowVector sums{};
+  const std::array<RowId, 8> rows = rows_below(level, row);
+  for (std::size_t child = 0; child < 8; ++child) {
+    const RowId fine = rows[child];
+    const int half = static_cast<int>(child & 1U);
+    const OctetSpan below = octets_below(span, half);
+    if (below.first > below.last || !finer.prepare(fine)) continue;
+    // Parts have theirs from their borders.
+    if (parts_ != nullptr && parts_->fill_known_row(level - 1, fine)) {
+      if (span.whole()) unmark(level - 1, fine, active | dirty);
+      continue;
+    }
+    RowVector residual;
+    RowResidual left;
+    if (parts_ == nullptr || !parts_->fill_row(level - 1, fine)) {
+      left = residual_of(level - 1, fine, state, obstacles, below, residual);
+    } else {
+      residual = {};
+    }
+    worst = std::max(worst, left.most_N);
+    if (parts_ != nullptr && parts_->in_row(level - 1, fine))
+      set_part_lanes(level - 1, fine, below, residual);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      add_pairs(residual[axis].data(), below, sums[axis].data() + half * kRow / 2);
+    if (!span.whole()) continue;
+    // Of voxels as a force, of cells as a displacement, whose threshold is the same on all levels.
+    const bool at_rest = level == 1 ? left.most_N < tolerance_N_ : left.most_way_m < quiet_m_;
+    unmark(level - 1, fine, at_rest ? active | dirty : dirty);
+    if (!at_rest) mark(level - 1, fine, active);
+  }
+  log_.note(level, row);
+  if (parts_ != nullptr && parts_->in_row(level, row)) pass_part_lanes(level, row, span, sums);
+  take_loads(told_row(level, row), sums, loads(level, row), span);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::size_t begin =
+        static_cast<std::size_t>(row) * kRow + static_cast<std::size_t>(span.first) * kOctet;
+    std::copy_n(at(level).told[axis].data() + begin, (span.last - span.first + 1) * kOctet,
+                at(level).loaded_at[axis].data() + begin);
+  }
+  spread(level, row, active | dirty);
+  return worst;
+}
+
+LevelRow Multigrid::told_row(int level, RowId row) noexcept {
+  Level& l = at(level);
+  const Grid& g = l.couplings->grid();
+  LevelRow r;
+  l.couplings->all(row, r.springs);
+  r.z = static_cast<std::ptrdiff_t>(g.row_z) * kRow;
+  r.x = static_cast<std::ptrdiff_t>(g.row_x) * kRow;
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    r.u[axis] = l.told[axis].data() + static_cast<std::size_t>(row) * kRow;
+  return r;
+}
+
+std::array<float*, 3> Multigrid::loads(int level, RowId row) noexcept {
+  Level& l = at(level);
+  const std::size_t begin = static_cast<std::size_t>(row) * kRow;
+  return {l.load[0].data() + begin, l.load[1].data() + begin, l.load[2].data() + begin};
+}
+
+float Multigrid::untold(int level, RowId row, OctetSpan span, int first, int last) const noexcept {
+  const Level& l = at(level);
+  const std::size_t begin = static_cast<std::size_t>(row) * kRow;
+  float most = 0.0F;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    most = std::max(
+        most, row_difference(l.value[axis].data() + begin, l.told[axis].data() + begin, span, first, last));
+  }
+  return most;
+}
+
+void Multigrid::forget_untold(int level, RowId row, Displacement& state,
+                              const ObstacleView& obstacles) noexcept {
+  Level& l = at(level);
+  const std::size_t begin = static_cast<std::size_t>(row) * kRow;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::fill_n(l.value[axis].data() + begin, kRow, 0.0F);
+    std::fill_n(l.told[axis].data() + begin, kRow, 0.0F);
+  }
+  if (parts_ != nullptr && parts_->in_row(level, row)) forget_untold_parts(level, row);
+  restrict_values(level, row, state);
+  restrict_loads(level, row, state, obstacles);
+  unmark(level, row, changed);
+}
+
+// Reads what the cells of one row, all along x, have to tell, and with that they have told it.
+void Multigrid::spread_hats(int level, int j, int k, const Told& box) noexcept {
+  Level& l = at(level);
+  const Grid& g = l.couplings->grid();
+  bool tells = false, whole = true;
+  const int before = hats_.first() - 1, after = hats_.first() + hats_.octets();
+  for (int q = before; q <= after; ++q) {
+    const int column = (q + kOctets) / kOctets;  // the empty one before the first included
+    const RowId row = g.row(column, j, k);
+    tells = tells || (q > before && q < after && has(level, row, telling));
+    whole = whole && l.couplings->prepare(row) && l.couplings->uniform(row);
+  }
+  const auto add = [this](std::size_t which, int q) {
+    return hats_.cells(which) + static_cast<std::ptrdiff_t>(q - hats_.first()) * kOctet;
+  };
+  const Octet none{};
+  for (int q = before; q <= after && (tells || !whole); ++q) {
+    const int column = (q + kOctets) / kOctets;
+    const RowId row = g.row(column, j, k);
+    const int octet = (q + kOctets) % kOctets;
+    const bool any = l.couplings->prepare(row);
+    if (!whole) {
+      if (any) {
+        std::copy_n(l.couplings->filled(row) + octet * kOctet, kOctet, add(3, q));
+      } else {
+        store(add(3, q), none);
+      }
+    }
+    const bool here = any && q > before && q < after && has(level, row, telling);
+    const int origin = (column - 1) * kRow;
+    const std::size_t begin = static_cast<std::size_t>(row) * kRow;
+    for (std::size_t axis = 0; axis < 3 && tells; ++axis) {
+      if (here) {
+        take_untold(l.value[axis].data() + begin, l.told[axis].data() + begin, l.couplings->filled(row),
+                    {octet, octet}, box.first_teller - origin, box.last_teller - origin, add(axis, q));
+      } else {
+        store(add(axis, q), none);
+      }
+    }
+  }
+  if (tells) {
+    for (int c = hats_.first() / kOctets; c <= (after - 1) / kOctets; ++c) {
+      const RowId row = g.row(c + 1, j, k);
+      if (!has(level, row, telling)) continue;
+      unmark(level, row, telling);
+      log_.note(level, row);
+      if (untold(level, row) == 0.0F) unmark(level, row, changed);
+    }
+  }
+  hats_.spread(j, k, tells, whole);
+}
+
+void Multigrid::tell(int level, const Told& box, Displacement& state, const ObstacleView& obstacles,
+                     bool jointly) noexcept {
+  const Grid& g = grid(level);
+  // Of the two cells around a voxel the lower one.
+  const auto below = [](int x) { return (x + 1) / 2 - 1; };
+  if (box.from_k == box.k0) hats_.begin(box.q0 / 2, box.q1 / 2, below(box.j0), below(box.j1) + 1);
+  // Beyond these octets no hat reaches.
+  const int q0 = std::max(box.q0, std::max(2 * box.first_teller - 1, 0) / kOctet);
+  const int q1 = std::min(box.q1, (2 * box.last_teller + 2) / kOctet);
+  int spread =
+      box.from_k == box.k0 ? below(box.k0) - 1 : below(box.from_k - 1) + 1;  // the last plane of cells
+  for (int k = box.from_k; k <= box.to_k; ++k) {
+    for (; spread <= below(k); ++spread) {
+      for (int j = below(box.j0); j <= below(box.j1) + 1; ++j) spread_hats(level + 1, j, spread + 1, box);
+    }
+    const int own_k = k / 2, near_k = (k & 1) != 0 ? own_k + 1 : own_k - 1;
+    for (int j = box.j0; j <= box.j1; ++j) {
+      const int own_j = j / 2, near_j = (j & 1) != 0 ? own_j + 1 : own_j - 1;
+      const auto hats = [&](int octet) {
+        return std::array<HatRow, 4>{hats_.row(own_j, own_k, octet), hats_.row(near_j, own_k, octet),
+                                     hats_.row(own_j, near_k, octet), hats_.row(near_j, near_k, octet)};
+      };
+      const auto here = hats(q0);
+      if (std::none_of(here.begin(), here.end(), [](const HatRow& r) { return r.tells; })) continue;
+      for (int c = q0 / kOctets; c <= q1 / kOctets; ++c) {
+        const RowId row = g.row(c + 1, j, k);
+        if (!prepare(level, row)) continue;
+        const int first = std::max(q0, c * kOctets), last = std::min(q1, c * kOctets + kOctets - 1);
+        if (j + kAhead <= box.j1) fetch(level, row + kAhead, state);
+        tell_row(level, row, hats(first), state, obstacles, {first - c * kOctets, last - c * kOctets},
+                 jointly && level == 0);
+      }
+    }
+  }
+  if (jointly && level == 0) {
+    go_jointly(state);
+    for (const JointMove::Row& r : joint_.rows()) {
+      if (!r.aims) continue;
+      Refused refused{.row = r.row, .axes = 0, .span = r.span, .way = {}};
+      refused.axes = left_of(r, state, refused.way);
+      if (refused.axes != 0) take_back_refused(0, refused);
+    }
+    joint_.clear();
+  }
+  if (parts_ != nullptr && box.to_k == box.k1) tell_parts(level, state, obstacles);
+}
+
+// What rows are told is added to what stands in none of the nearer caches: to wait for that was half of it.
+void Multigrid::fetch(int level, RowId row, const Displacement& state) const noexcept {
+  if (parts_ != nullptr && parts_->fill_known_row(level, row)) return;  // not looked at row by row
+  for (const auto& axis : level == 0 ? state.u : at(level).value)
+    fetch_lines(axis.data() + static_cast<std::size_t>(row) * kRow, kRow * sizeof(float));
+}
+
+void Multigrid::tell_row(int level, RowId row, const std::array<HatRow, 4>& hats, Displacement& state,
+                         const ObstacleView& obstacles, OctetSpan span, bool jointly) noexcept {
+  if (level == 0 && parts_ != nullptr && parts_->fill_known_row(level, row)) return;  // told as a whole
+  // Near obstacles each goes for itself, before those that go together.
+  JointMove::Row* const together =
+      jointly && state.row_obstacles[row] == 0 && !joint_.full() ? &joint_.add(row, span) : nullptr;
+  RowVector alone;
+  RowVector& correction = together != nullptr ? together->from : alone;
+  sum_hats(hats, span, correction);
+  for (std::size_t axis = 0; axis < 3 && level > 0 && holds_->any(level, row); ++axis) {
+    const float* nearer = holds_->nearer(level, row, axis);
+    for (std::size_t i = static_cast<std::size_t>(span.first) * kOctet;
+         i < static_cast<std::size_t>(span.last + 1) * kOctet; ++i)
+      correction[axis][i] /= 1.0F + nearer[i];
+  }
+  log_.note(level, row);
+  if (parts_ != nullptr && parts_->in_row(level, row)) note_told_parts(level, row, span, correction);
+  if (together != nullptr) {
+    // Where all are among them none can be in the way of one that goes alone.
+    if (obstacles.obstacles.empty()) set_out(*together, state);
+    return;
+  }
+  Refused refused;
+  correct(level, row, correction, state, obstacles, span, refused);
+  if (refused.axes != 0) take_back_refused(level, refused);
+}
+
+void Multigrid::correct(int level, RowId row, const RowVector& correction, Displacement& state,
+                        const ObstacleView& obstacles, OctetSpan span, Refused& refused) noexcept {
+  LevelRow r = row_of(level, row, state);
+  RowCorrection done;
+  if (level > 0) {
+    done = correct_row(r, nullptr, span, correction, refused.way);
+  } else {
+    // A voxel that pulls against a link at its limit stays, until the limit lets go of it.
+    if (has(0, row, limited)) r.stopped = at(0).stopped.data() + static_cast<std::size_t>(row) * kRow;
+    done = correct_voxels(r, row, correction, state, obstacles, span, refused.way);
+  }
+  refused.row = row;
+  refused.axes = done.refused;
+  refused.span = span;
+  note_change(level, row, done.most_m);
+}
+
+void Multigrid::take_back_refused(int level, const Refused& refused) noexcept {
+  const OctetSpan span = refused.span;
+  Level& coarse = at(level + 1);
+  const auto c = grid(level).row_coordinates(refused.row);
+  const RowId above = coarse.couplings->grid().row((c[0] - 1) / 2 + 1, c[1] / 2, c[2] / 2);
+  log_.note(level + 1, above);
+  const int half = (c[0] - 1) % 2;
+  const OctetSpan pairs{span.first & ~1, span.last | 1};
+  RowVector sums{}, lanes{};
+  std::array<float*, 3> value{}, told{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    value[axis] = coarse.value[axis].data() + static_cast<std::size_t>(above) * kRow;
+    told[axis] = coarse.told[axis].data() + static_cast<std::size_t>(above) * kRow;
+    if ((refused.axes >> axis & 1U) == 0) continue;
+    std::copy_n(refused.way[axis].begin() + span.first * kOctet, (span.last - span.first + 1) * kOctet,
+                lanes[axis].begin() + span.first * kOctet);
+    add_pairs(lanes[axis].data(), pairs, sums[axis].data() + half * kRow / 2);
+  }
+  take_back(sums, coarse.couplings->share(above), value, told,
+            {half * kOctets / 2 + pairs.first / 2, half * kOctets / 2 + pairs.last / 2});
+  spread(level + 1, above, active | dirty);
+}
+
+}  // namespace voxel

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What coarse cells have to tell the voxels around them, on its way: two planes of cells at a time, spread
+// along x.
+//
+// What a cell tells is told as a hat: all of it to the voxels nearest to its middle, less and less to those
+// up to the middles of the cells beside it. Sixteen rows of voxels want each row of cells; so it is read,
+// and spread along x, once.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "voxel/lattice/row_grid.h"
+#include "voxel/lattice/lazy_array.h"
+#include "voxel/lattice/simd8.h"
+#include "voxel/multigrid/row_smoother.h"
+
+namespace voxel {
+
+class Hats {
+ public:
+  Hats() = default;
+  // For any box of this grid, the finer of two.
+  explicit Hats(const Grid& fine);
+
+  [[nodiscard]] std::size_t memory_bytes() const {
+    return cells_.resident_bytes() + lanes_of_.resident_bytes() + resident_bytes(spread_);
+  }
+
+  // Coarse octets first … last along x, and coarse rows j0 … j1 of every plane.
+  void begin(int first, int last, int j0, int j1) noexcept;
+  [[nodiscard]] int first() const { return first_; }
+  [[nodiscard]] int octets() const { return octets_; }
+
+  // Room for the cells of a row before they are spread: of each axis, and (3) which of them there are, from
+  // coarse octet first() on. Of the octets before and after, too.
+  [[nodiscard]] float* cells(std::size_t which) noexcept {
+    return cells_.data() + which * cell_lanes_ + kOctet;
+  }
+  // Spreads what is in cells(): `whole`, nothing is missing there.
+  void spread(int j, int k, bool tells, bool whole) noexcept;
+  // A row of the finer level's lanes from its octet `octet` on, of all octets along x.
+  [[nodiscard]] HatRow row(int j, int k, int octet) const noexcept {
+    const std::size_t at = slot(j, k);
+    const float* lanes =
+        lanes_of_.data() + at * 4 * lanes_ + static_cast<std::size_t>(octet - 2 * first_) * kOctet;
+    HatRow out;
+    out.tells = spread_[at].tells;
+    if (!spread_[at].whole) out.weight = lanes + 3 * lanes_;
+    for (std::size_t axis = 0; axis < 3; ++axis) out.sum[axis] = lanes + axis * lanes_;
+    return out;
+  }
+
+ private:
+  struct Spread {
+    bool tells = false, whole = true;
+  };
+  [[nodiscard]] std::size_t slot(int j, int k) const {
+    return static_cast<std::size_t>(k & 1) * rows_ + static_cast<std::size_t>(j - j0_);
+  }
+
+  std::size_t rows_ = 0, lanes_ = 0, cell_lanes_ = 0;  // room for
+  int first_ = 0, octets_ = 0, j0_ = 0;
+  LazyArray<float> cells_, lanes_of_;  // [axis, or 3][lane]; [slot][axis, or 3][lane]
+  std::vector<Spread> spread_;         // [slot]
+};
+
+}  // namespace voxel

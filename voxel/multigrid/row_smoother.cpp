@@ -1,0 +1,560 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// On one level.
+#include "voxel/multigrid/row_smoother.h"
+
+#include <cstring>
+
+#include "voxel/multigrid/row_stencil.h"
+#include "voxel/multigrid/row_limits.h"
+#include "voxel/lattice/simd_dispatch.h"
+
+namespace voxel {
+namespace {
+
+// Bit i for lane i.
+HYBRID_INLINE std::uint32_t lanes_set(const OctetMask& mask) {
+  std::array<std::int32_t, kOctet> lanes;
+  std::memcpy(lanes.data(), &mask, sizeof mask);
+  std::uint32_t bits = 0;
+  for (std::uint32_t i = 0; i < kOctet; ++i) bits |= (lanes[i] != 0 ? 1U : 0U) << i;
+  return bits;
+}
+
+// One axis of a row where limits matter; cells, which have none, never come here.
+template <bool kUniform, Limits kLimits>
+HYBRID_INLINE void smooth_axis(const LevelRow& row, const AxisBounds& bounds, std::size_t axis,
+                               OctetSpan span, Octet& most) {
+  const AxisSprings s(row.springs, axis);
+  float* own = row.u[axis];
+  Span u;
+  std::array<Octet, kOctets> beside;
+  std::array<OctetMask, kOctets> stays;
+  std::array<Interval, kOctets> allowed;
+  ends_of(u, own, row.x, span);
+  const int count = span.last - span.first + 1;
+#pragma GCC unroll 1
+  for (int n = 0; n < count; ++n) {
+    const int octet = span.first + n;
+    const auto un = static_cast<std::size_t>(n);
+    Around at;
+    look_around(at, own + octet * kOctet, row.z);
+    u.at[un + 1] = at.own;
+    Octet kyd, kyu, kzd, kzu, inverse;
+    spring<kUniform>(kyd, s.down[1], octet);
+    spring<kUniform>(kyu, s.up[1], octet);
+    spring<kUniform>(kzd, s.down[2], octet);
+    spring<kUniform>(kzu, s.up[2], octet);
+    spring<kUniform>(inverse, s.inverse, octet);
+    Octet sum = kyd * at.y_down + kyu * at.y_up + kzd * at.z_down + kzu * at.z_up;
+    if (row.load[axis] != nullptr) {
+      Octet force;
+      load(force, row.load[axis] + octet * kOctet);
+      sum += force;
+    }
+    beside[un] = sum;
+    staying(stays[un], row, inverse, axis, octet);
+    everywhere(allowed[un]);
+    narrow_beside<kUniform, kLimits>(allowed[un], at, s, bounds, octet);
+  }
+#pragma GCC unroll 1
+  for (int colour = 0; colour < 2; ++colour) {
+#pragma GCC unroll 1
+    for (int n = 0; n < count; ++n) {
+      const int octet = span.first + n;
+      const auto un = static_cast<std::size_t>(n);
+      const Octet now = u.at[un + 1];
+      Octet x_down, x_up, kxd, kxu, inverse;
+      shift_down(x_down, u.at[un], now);
+      shift_up(x_up, now, u.at[un + 2]);
+      spring<kUniform>(kxd, s.down[0], octet);
+      spring<kUniform>(kxu, s.up[0], octet);
+      spring<kUniform>(inverse, s.inverse, octet);
+      Octet wanted = (kxd * x_down + kxu * x_up + beside[un]) * inverse;
+      Interval in = allowed[un];
+      narrow<kUniform, kLimits>(in, x_up, x_down, s, bounds, 0, octet);
+      bring_into(wanted, in, now);
+      const OctetMask taken = (colour == 0 ? kEven : ~kEven) & ~stays[un];
+      select(u.at[un + 1], taken, wanted, now);
+    }
+  }
+#pragma GCC unroll 1
+  for (int n = 0; n < count; ++n) {
+    float* to = own + (span.first + n) * kOctet;
+    Octet before;
+    load(before, to);
+    take_largest_size(most, u.at[static_cast<std::size_t>(n) + 1] - before);
+    store(to, u.at[static_cast<std::size_t>(n) + 1]);
+  }
+}
+
+// Smooths the axes on which no limit comes near; returns the others, bit by bit, left as they were.
+template <bool kUniform, bool kLook>
+HYBRID_INLINE unsigned smooth_freely(const LevelRow& row, const RowLimits* limits, OctetSpan span,
+                                     Octet& most) {
+  const RowCouplings& s = row.springs;
+  Axes u, beside;
+  std::array<std::array<OctetMask, kOctets>, 3> stays;
+  load_axes(u, row, span);
+#pragma GCC unroll 1
+  for (int octet = span.first; octet <= span.last; ++octet) {
+    const auto n = static_cast<std::size_t>(octet - span.first);
+#pragma GCC unroll 3
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const float* own = row.u[axis] + octet * kOctet;
+      Octet k, value, sum;
+      spring_down<kUniform>(k, s, axis, 1, octet);
+      load(value, own - kRow);
+      sum = k * value;
+      spring_up<kUniform>(k, s, axis, 1, octet);
+      load(value, own + kRow);
+      sum += k * value;
+      spring_down<kUniform>(k, s, axis, 2, octet);
+      load(value, own - row.z);
+      sum += k * value;
+      spring_up<kUniform>(k, s, axis, 2, octet);
+      load(value, own + row.z);
+      sum += k * value;
+      if (row.load[axis] != nullptr) {
+        load(value, row.load[axis] + octet * kOctet);
+        sum += value;
+      }
+      beside[axis][n] = sum;
+      inverse_of<kUniform>(k, s, axis, octet);
+      staying(stays[axis][n], row, k, axis, octet);
+    }
+  }
+#pragma GCC unroll 1
+  for (int colour = 0; colour < 2; ++colour) {
+    const OctetMask own_colour = colour == 0 ? kEven : ~kEven;
+#pragma GCC unroll 1
+    for (int octet = span.first; octet <= span.last; ++octet) {
+      const auto n = static_cast<std::size_t>(octet - span.first);
+#pragma GCC unroll 3
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const Octet now = u[axis][n + 1];
+        Octet x_down, x_up, kxd, kxu, inverse;
+        shift_down(x_down, u[axis][n], now);
+        shift_up(x_up, now, u[axis][n + 2]);
+        spring_down<kUniform>(kxd, s, axis, 0, octet);
+        spring_up<kUniform>(kxu, s, axis, 0, octet);
+        inverse_of<kUniform>(inverse, s, axis, octet);
+        Octet wanted = (kxd * x_down + kxu * x_up + beside[axis][n]) * inverse;
+        if (row.hold[axis] != nullptr) {
+          Octet told, hold;
+          load(told, row.held_at[axis] + octet * kOctet);
+          load(hold, row.hold[axis] + octet * kOctet);
+          hold *= row.hold_times;
+          wanted += (told - wanted) * (hold / (1.0F + hold));
+        }
+        select(u[axis][n + 1], own_colour & ~stays[axis][n], wanted, now);
+      }
+    }
+  }
+  unsigned beyond = 0;
+  if constexpr (kLook) beyond = beyond_band<kUniform>(u, row, *limits, span, 0.0F);
+#pragma GCC unroll 1
+  for (int octet = span.first; octet <= span.last; ++octet) {
+    const auto n = static_cast<std::size_t>(octet - span.first);
+#pragma GCC unroll 3
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (kLook && (beyond >> axis & 1U) != 0) continue;
+      float* to = row.u[axis] + octet * kOctet;
+      Octet before;
+      load(before, to);
+      take_largest_size(most, u[axis][n + 1] - before);
+      store(to, u[axis][n + 1]);
+    }
+  }
+  return beyond;
+}
+
+// First as if there were no limits, and again with them where they matter.
+template <bool kUniform, Limits kLimits>
+HYBRID_INLINE float smooth_axes(const LevelRow& row, const RowLimits* limits, OctetSpan span) {
+  Octet most{};
+  const unsigned beyond = smooth_freely<kUniform, clamps(kLimits)>(row, limits, span, most);
+  if constexpr (clamps(kLimits)) {
+#pragma GCC unroll 1
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if ((beyond >> axis & 1U) == 0) continue;
+      const AxisBounds bounds = bounds_of(limits, axis);
+      smooth_axis<kUniform, kLimits>(row, bounds, axis, span, most);
+    }
+  }
+  return largest(most);
+}
+
+template <bool kUniform, Limits kLimits>
+HYBRID_INLINE void residual_axis(RowResidual& result, const LevelRow& row, const AxisBounds& bounds,
+                                 std::size_t axis, float tight, OctetSpan span, float* out, Octet& most_N,
+                                 Octet& most_m) {
+  const AxisSprings s(row.springs, axis);
+  const float* own = row.u[axis];
+  Span u;
+  const Band band(bounds.row, tight);
+  ends_of(u, own, row.x, span);
+  const int count = span.last - span.first + 1;
+#pragma GCC unroll 1
+  for (int n = 0; n < count; ++n)
+    load(u.at[static_cast<std::size_t>(n) + 1], own + (span.first + n) * kOctet);
+#pragma GCC unroll 1
+  for (int n = 0; n < count; ++n) {
+    const int octet = span.first + n;
+    const auto un = static_cast<std::size_t>(n);
+    Around at;
+    look_around(at, own + octet * kOctet, row.z);
+    Octet x_down, x_up, kxd, kxu, kyd, kyu, kzd, kzu, inverse;
+    shift_down(x_down, u.at[un], at.own);
+    shift_up(x_up, at.own, u.at[un + 2]);
+    spring<kUniform>(kxd, s.down[0], octet);
+    spring<kUniform>(kxu, s.up[0], octet);
+    spring<kUniform>(kyd, s.down[1], octet);
+    spring<kUniform>(kyu, s.up[1], octet);
+    spring<kUniform>(kzd, s.down[2], octet);
+    spring<kUniform>(kzu, s.up[2], octet);
+    spring<kUniform>(inverse, s.inverse, octet);
+    Octet r = kxd * (x_down - at.own) + kxu * (x_up - at.own) + kyd * (at.y_down - at.own) +
+              kyu * (at.y_up - at.own) + kzd * (at.z_down - at.own) + kzu * (at.z_up - at.own);
+    if (row.load[axis] != nullptr) {
+      Octet force;
+      load(force, row.load[axis] + octet * kOctet);
+      r += force;
+    }
+    if (row.hold[axis] != nullptr) {
+      Octet hold, told;
+      load(hold, row.hold[axis] + octet * kOctet);
+      load(told, row.held_at[axis] + octet * kOctet);
+      const Octet safe = inverse == 0.0F ? Octet{} + 1.0F : inverse;
+      r += row.hold_times * hold / safe * (told - at.own);
+    }
+    OctetMask stays;
+    staying(stays, row, inverse, axis, octet);
+    r = stays ? Octet{} : r;
+    if constexpr (clamps(kLimits)) {
+      OctetMask beyond{};
+      note_beyond<kUniform>(beyond, at.own, x_down, x_up, at, s, band, octet);
+      if (any(beyond)) {
+        Interval in;
+        everywhere(in);
+        narrow_beside<kUniform, kLimits>(in, at, s, bounds, octet);
+        narrow<kUniform, kLimits>(in, x_up, x_down, s, bounds, 0, octet);
+        const OctetMask resisted =
+            ((r > 0.0F) & (at.own >= in.high - tight)) | ((r < 0.0F) & (at.own <= in.low + tight));
+        r = resisted ? Octet{} : r;
+        result.resisted[axis] |= lanes_set(resisted) << (octet * kOctet);
+      }
+    }
+    store(out + octet * kOctet, r);
+    take_largest_size(most_N, r);
+    take_largest_size(most_m, r * inverse);
+  }
+}
+
+template <bool kUniform, Limits kLimits>
+HYBRID_INLINE void residual_axes(RowResidual& result, const LevelRow& row, const RowLimits* limits,
+                                 float tight, OctetSpan span, RowVector& out) {
+  Octet most_N{}, most_m{};
+#pragma GCC unroll 1
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    residual_axis<kUniform, kLimits>(result, row, bounds_of(limits, axis), axis, tight, span,
+                                     out[axis].data(), most_N, most_m);
+  }
+  result.most_N = largest(most_N);
+  result.most_way_m = largest(most_m);
+}
+
+template <bool kUniform, Limits kLimits>
+HYBRID_INLINE void correct_axis(const LevelRow& row, const AxisBounds& bounds, std::size_t axis,
+                                OctetSpan span, const float* correction, float* refused, Octet& most) {
+  const AxisSprings s(row.springs, axis);
+  float* own = row.u[axis];
+  const int count = span.last - span.first + 1;
+  Span u;
+  std::array<Octet, kOctets> target;
+  std::array<OctetMask, kOctets> stays;
+  ends_of(u, own, row.x, span);
+#pragma GCC unroll 1
+  for (int n = 0; n < count; ++n) {
+    const int octet = span.first + n;
+    const auto un = static_cast<std::size_t>(n);
+    Octet now, way, inverse;
+    load(now, own + octet * kOctet);
+    load(way, correction + octet * kOctet);
+    spring<kUniform>(inverse, s.inverse, octet);
+    staying(stays[un], row, inverse, axis, octet);
+    take_largest_size(most, way);
+    target[un] = stays[un] ? now : now + way;
+    u.at[un + 1] = now;
+  }
+  std::array<Interval, kOctets> allowed;
+#pragma GCC unroll 1
+  for (int n = 0; n < count; ++n) {
+    const int octet = span.first + n;
+    Around at;
+    look_around(at, own + octet * kOctet, row.z);
+    everywhere(allowed[static_cast<std::size_t>(n)]);
+    narrow_beside<kUniform, kLimits>(allowed[static_cast<std::size_t>(n)], at, s, bounds, octet);
+  }
+  // Every second voxel at a time: beside neighbours that stand still, a limit is a plain interval.
+#pragma GCC unroll 1
+  for (int colour = 0; colour < 2; ++colour) {
+#pragma GCC unroll 1
+    for (int n = 0; n < count; ++n) {
+      const int octet = span.first + n;
+      const auto un = static_cast<std::size_t>(n);
+      const Octet now = u.at[un + 1];
+      Octet x_down, x_up, wanted = target[un];
+      shift_down(x_down, u.at[un], now);
+      shift_up(x_up, now, u.at[un + 2]);
+      Interval in = allowed[un];
+      narrow<kUniform, kLimits>(in, x_up, x_down, s, bounds, 0, octet);
+      bring_into(wanted, in, now);
+      const OctetMask taken = (colour == 0 ? kEven : ~kEven) & ~stays[un];
+      select(u.at[un + 1], taken, wanted, now);
+    }
+  }
+#pragma GCC unroll 1
+  for (int n = 0; n < count; ++n) {
+    const int octet = span.first + n;
+    const auto un = static_cast<std::size_t>(n);
+    Octet now, way, inverse;
+    load(now, own + octet * kOctet);
+    load(way, correction + octet * kOctet);
+    spring<kUniform>(inverse, s.inverse, octet);
+    OctetMask fixed;
+    standing(fixed, row, inverse, octet);
+    const Octet left = now + way - u.at[un + 1];
+    store(refused + octet * kOctet, fixed ? Octet{} : left);
+    store(own + octet * kOctet, u.at[un + 1]);
+  }
+}
+
+// What stopped voxels do not take of a correction. Returns the axes on which there is any.
+template <bool kUniform>
+HYBRID_INLINE unsigned note_stopped(const LevelRow& row, OctetSpan span, const RowVector& correction,
+                                    RowVector& refused) {
+  unsigned refusing = 0;
+#pragma GCC unroll 1
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    OctetMask some{};
+#pragma GCC unroll 1
+    for (int octet = span.first; octet <= span.last; ++octet) {
+      Octet way, inverse;
+      OctetMask fixed, stopped;
+      load(way, correction[axis].data() + octet * kOctet);
+      inverse_of<kUniform>(inverse, row.springs, axis, octet);
+      standing(fixed, row, inverse, octet);
+      bits_set(stopped, row.stopped + octet * kOctet, 1 << axis);
+      way = (stopped & ~fixed) ? way : Octet{};
+      some |= way != 0.0F;
+      store(refused[axis].data() + octet * kOctet, way);
+    }
+    if (any(some)) refusing |= 1U << axis;
+  }
+  return refusing;
+}
+
+// Adds corrections on the axes on which no limit comes near; returns the others, bit by bit, left as they
+// were.
+template <bool kUniform, bool kLook>
+HYBRID_INLINE unsigned correct_freely(const LevelRow& row, const RowLimits* limits, OctetSpan span,
+                                      const RowVector& correction, RowVector& refused, unsigned& refusing,
+                                      Octet& most) {
+  Axes u;
+  if (row.stopped != nullptr) refusing = note_stopped<kUniform>(row, span, correction, refused);
+  if (kLook) {
+    load_axes(u, row, span);
+  }
+#pragma GCC unroll 1
+  for (int octet = span.first; octet <= span.last; ++octet) {
+    const auto n = static_cast<std::size_t>(octet - span.first);
+#pragma GCC unroll 3
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      Octet now, way;
+      OctetMask stays;
+      load(now, row.u[axis] + octet * kOctet);
+      load(way, correction[axis].data() + octet * kOctet);
+      standing_by_bits(stays, row, axis, octet);
+      if (row.stopped != nullptr) {
+        OctetMask stopped;
+        bits_set(stopped, row.stopped + octet * kOctet, 1 << axis);
+        stays |= stopped;
+      }
+      take_largest_size(most, way);
+      u[axis][n + 1] = stays ? now : now + way;
+    }
+  }
+  unsigned beyond = 0;
+  if constexpr (kLook) beyond = beyond_band<kUniform>(u, row, *limits, span, 0.0F);
+#pragma GCC unroll 1
+  for (int octet = span.first; octet <= span.last; ++octet) {
+    const auto n = static_cast<std::size_t>(octet - span.first);
+#pragma GCC unroll 3
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (!kLook || (beyond >> axis & 1U) == 0) store(row.u[axis] + octet * kOctet, u[axis][n + 1]);
+    }
+  }
+  return beyond;
+}
+
+template <bool kUniform, Limits kLimits>
+HYBRID_INLINE RowCorrection correct_axes(const LevelRow& row, const RowLimits* limits, OctetSpan span,
+                                         const RowVector& correction, RowVector& refused) {
+  Octet most{};
+  unsigned refusing = 0;
+  const unsigned beyond =
+      correct_freely<kUniform, clamps(kLimits)>(row, limits, span, correction, refused, refusing, most);
+  if constexpr (clamps(kLimits)) {
+#pragma GCC unroll 1
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if ((beyond >> axis & 1U) == 0) continue;
+      correct_axis<kUniform, kLimits>(row, bounds_of(limits, axis), axis, span, correction[axis].data(),
+                                      refused[axis].data(), most);
+    }
+  }
+  return {largest(most), refusing | beyond};
+}
+
+// Bit i of any lane.
+HYBRID_INLINE std::uint32_t all_bits(const OctetMask& bits) {
+  const OctetMask half = bits | __builtin_shufflevector(bits, bits, 4, 5, 6, 7, 0, 1, 2, 3);
+  const OctetMask pair = half | __builtin_shufflevector(half, half, 2, 3, 0, 1, 2, 3, 0, 1);
+  return static_cast<std::uint32_t>(pair[0] | pair[1]);
+}
+
+template <bool kUniform, Limits kLimits>
+HYBRID_INLINE void look_at_limits(const LevelRow& row, const AxisBounds& bounds, std::size_t axis,
+                                  const std::array<float, 3>& tight, LinksAtLimits& out) {
+  const AxisSprings s(row.springs, axis);
+  const float* own = row.u[axis];
+  Span u;
+  ends_of(u, own, row.x, {});
+#pragma GCC unroll 1
+  for (int octet = 0; octet < kOctets; ++octet)
+    load(u.at[static_cast<std::size_t>(octet) + 1], own + octet * kOctet);
+  // Each lane sets its own bit: gathered lane by lane in every octet, they took longer than all else.
+  OctetMask bit{1, 2, 4, 8, 16, 32, 64, 128};
+  std::array<OctetMask, 3> at_low{}, at_high{}, down_at_low{}, down_at_high{};
+  OctetMask pulled_up{}, pulled_down{}, movable{};
+#pragma GCC unroll 1
+  for (int octet = 0; octet < kOctets; ++octet, bit <<= kOctet) {
+    const auto n = static_cast<std::size_t>(octet);
+    const int lane = octet * kOctet;
+    Around at;
+    look_around(at, own + lane, row.z);
+    Octet x_down, x_up, k, inverse;
+    shift_down(x_down, u.at[n], at.own);
+    shift_up(x_up, at.own, u.at[n + 2]);
+    const std::array<Octet, 3> up{x_up - at.own, at.y_up - at.own, at.z_up - at.own},
+        down{at.own - x_down, at.own - at.y_down, at.own - at.z_down};
+    Octet pull{};
+#pragma GCC unroll 3
+    for (std::size_t d = 0; d < 3; ++d) {
+      Octet low = Octet{} + bounds.row.low[d], high = Octet{} + bounds.row.high[d];
+      if constexpr (kLimits == Limits::lanes) {
+        load(low, bounds.down_low[d] + lane);
+        low *= bounds.sign[d];
+        load(high, bounds.down_high[d] + lane);
+      }
+      spring<kUniform>(k, s.down[d], octet);
+      pull -= k * down[d];
+      down_at_low[d] |= (k > 0.0F) & (down[d] <= low + tight[d]) & bit;
+      down_at_high[d] |= (k > 0.0F) & (down[d] >= high - tight[d]) & bit;
+      if constexpr (kLimits == Limits::lanes) {
+        load(low, bounds.up_low[d] + lane);
+        low *= bounds.sign[d];
+        load(high, bounds.up_high[d] + lane);
+      }
+      spring<kUniform>(k, s.up[d], octet);
+      pull += k * up[d];
+      at_low[d] |= (k > 0.0F) & (up[d] <= low + tight[d]) & bit;
+      at_high[d] |= (k > 0.0F) & (up[d] >= high - tight[d]) & bit;
+    }
+    if (row.load[axis] != nullptr) {
+      load(k, row.load[axis] + lane);
+      pull += k;
+    }
+    spring<kUniform>(inverse, s.inverse, octet);
+    movable |= (inverse != 0.0F) & bit;
+    pulled_up |= (pull > 0.0F) & bit;
+    pulled_down |= (pull < 0.0F) & bit;
+    store(out.pull_N.data() + lane, pull);
+  }
+  for (std::size_t d = 0; d < 3; ++d) {
+    out.at_low[d] = all_bits(at_low[d]);
+    out.at_high[d] = all_bits(at_high[d]);
+    out.down_at_low[d] = all_bits(down_at_low[d]);
+    out.down_at_high[d] = all_bits(down_at_high[d]);
+  }
+  out.movable = all_bits(movable);
+  out.pulled_up = all_bits(pulled_up);
+  out.pulled_down = all_bits(pulled_down);
+}
+
+}  // namespace
+
+HYBRID_WIDE_AND_MANY void links_at_limits(const LevelRow& row, const RowLimits& limits, std::size_t axis,
+                                          const std::array<float, 3>& tight_m, LinksAtLimits& out) noexcept {
+  const AxisBounds bounds(limits, axis);
+  if (limits.lanes != nullptr) {
+    look_at_limits<false, Limits::lanes>(row, bounds, axis, tight_m, out);
+  } else {
+    row.springs.uniform ? look_at_limits<true, Limits::row>(row, bounds, axis, tight_m, out)
+                        : look_at_limits<false, Limits::row>(row, bounds, axis, tight_m, out);
+  }
+}
+
+HYBRID_WIDE_AND_MANY float smooth_row(const LevelRow& row, const RowLimits* limits, OctetSpan span) noexcept {
+  const bool uniform = row.springs.uniform;
+  if (limits == nullptr)
+    return uniform ? smooth_axes<true, Limits::none>(row, limits, span)
+                   : smooth_axes<false, Limits::none>(row, limits, span);
+  if (limits->lanes != nullptr) return smooth_axes<false, Limits::lanes>(row, limits, span);
+  return uniform ? smooth_axes<true, Limits::row>(row, limits, span)
+                 : smooth_axes<false, Limits::row>(row, limits, span);
+}
+
+HYBRID_WIDE_AND_MANY RowResidual residual_row(const LevelRow& row, const RowLimits* limits, float tight_m,
+                                              OctetSpan span, RowVector& out) noexcept {
+  RowResidual result;
+  const bool uniform = row.springs.uniform;
+  if (limits == nullptr) {
+    uniform ? residual_axes<true, Limits::none>(result, row, limits, tight_m, span, out)
+            : residual_axes<false, Limits::none>(result, row, limits, tight_m, span, out);
+  } else if (limits->lanes != nullptr) {
+    residual_axes<false, Limits::lanes>(result, row, limits, tight_m, span, out);
+  } else {
+    uniform ? residual_axes<true, Limits::row>(result, row, limits, tight_m, span, out)
+            : residual_axes<false, Limits::row>(result, row, limits, tight_m, span, out);
+  }
+  return result;
+}
+
+HYBRID_WIDE_AND_MANY void measure_row(const RowCouplings& springs, const RowVector& residual, OctetSpan span,
+                                      RowResidual& out) noexcept {
+  Octet most_N{}, most_m{};
+#pragma GCC unroll 1
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+#pragma GCC unroll 1
+    for (int octet = span.first; octet <= span.last; ++octet) {
+      Octet r, inverse;
+      load(r, residual[axis].data() + octet * kOctet);
+      load(inverse, springs.inverse + axis * kRow + octet * kOctet);
+      take_largest_size(most_N, r);
+      take_largest_size(most_m, r * inverse);
+    }
+  }
+  out.most_N = largest(most_N);
+  out.most_way_m = largest(most_m);
+}
+
+HYBRID_WIDE_AND_MANY RowCorrection correct_row(const LevelRow& row, const RowLimits* limits, OctetSpan span,
+                                               const RowVector& correction, RowVector& refused) noexcept {
+  if (limits == nullptr) return correct_axes<false, Limits::none>(row, limits, span, correction, refused);
+  if (limits->lanes != nullptr)
+    return correct_axes<false, Limits::lanes>(row, limits, span, correction, refused);
+  return row.springs.uniform ? correct_axes<true, Limits::row>(row, limits, span, correction, refused)
+                             : correct_axes<false, Limits::row>(row, limits, span, correction, refused);
+}
+
+}  // namespace voxel

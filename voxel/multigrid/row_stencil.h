@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Inside of the row passes: an octet of a row, what stands around it and the springs between them.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+
+#include "voxel/lattice/simd8.h"
+#include "voxel/multigrid/row_smoother.h"
+
+namespace voxel {
+
+// The springs of one axis of a row: lanes apart, or (kUniform) one for all.
+struct AxisSprings {
+  std::array<const float*, 3> up, down;
+  const float* inverse;
+
+  AxisSprings(const RowCouplings& s, std::size_t axis) : inverse(s.inverse + axis * kRow) {
+    for (std::size_t d = 0; d < 3; ++d) {
+      up[d] = (d == axis ? s.up_along : s.up_across) + d * kRow;
+      down[d] = (d == axis ? s.down_along : s.down_across)[d];
+    }
+  }
+};
+template <bool kUniform>
+HYBRID_INLINE void spring(Octet& k, const float* lanes, int octet) {
+  load(k, kUniform ? lanes : lanes + octet * kOctet);
+}
+
+inline constexpr OctetMask kEven{-1, 0, -1, 0, -1, 0, -1, 0};
+
+// The octets of a span with one more at both ends; of those, only the lane that touches the span is true.
+struct Span {
+  std::array<Octet, kOctets + 2> at;
+};
+HYBRID_INLINE void ends_of(Span& s, const float* own, std::ptrdiff_t x, OctetSpan span) {
+  const float before = span.first > 0 ? own[span.first * kOctet - 1] : own[kRow - 1 - x];
+  const float after = span.last < kOctets - 1 ? own[(span.last + 1) * kOctet] : own[x];
+  s.at[0] = Octet{} + before;
+  s.at[static_cast<std::size_t>(span.last - span.first) + 2] = Octet{} + after;
+}
+
+// An octet of a row, and what stands around it.
+struct Around {
+  Octet own, y_down, y_up, z_down, z_up;
+};
+HYBRID_INLINE void look_around(Around& at, const float* own, std::ptrdiff_t z) {
+  load(at.own, own);
+  load(at.y_down, own - kRow);
+  load(at.y_up, own + kRow);
+  load(at.z_down, own - z);
+  load(at.z_up, own + z);
+}
+HYBRID_INLINE bool any(const OctetMask& mask) {
+  std::array<std::uint64_t, 4> words;
+  std::memcpy(words.data(), &mask, sizeof words);
+  return (words[0] | words[1] | words[2] | words[3]) != 0;
+}
+
+// Lanes that are anchored, or held.
+HYBRID_INLINE void standing(OctetMask& stands, const LevelRow& row, const Octet& inverse, int octet) {
+  stands = inverse == 0.0F;
+  if (row.held != nullptr) {
+    OctetMask bits;
+    bits_set(bits, row.held + octet * kOctet, 1);
+    stands |= bits;
+  }
+}
+// The same of an axis, read from bits.
+HYBRID_INLINE void standing_by_bits(OctetMask& stands, const LevelRow& row, std::size_t axis, int octet) {
+  bits_set(stands, row.springs.stands + octet * kOctet, 1 << axis);
+  if (row.held != nullptr) {
+    OctetMask bits;
+    bits_set(bits, row.held + octet * kOctet, 1);
+    stands |= bits;
+  }
+}
+// Lanes of an axis that do not move.
+HYBRID_INLINE void staying(OctetMask& stays, const LevelRow& row, const Octet& inverse, std::size_t axis,
+                           int octet) {
+  standing(stays, row, inverse, octet);
+  if (row.stopped != nullptr) {
+    OctetMask bits;
+    bits_set(bits, row.stopped + octet * kOctet, 1 << axis);
+    stays |= bits;
+  }
+}
+
+// One spring of an octet; `axis` and `d` are known when this is compiled.
+template <bool kUniform>
+HYBRID_INLINE void spring_up(Octet& k, const RowCouplings& s, std::size_t axis, std::size_t d, int octet) {
+  load(k, (d == axis ? s.up_along : s.up_across) + d * kRow + (kUniform ? 0 : octet * kOctet));
+}
+template <bool kUniform>
+HYBRID_INLINE void spring_down(Octet& k, const RowCouplings& s, std::size_t axis, std::size_t d, int octet) {
+  load(k, (d == axis ? s.down_along : s.down_across)[d] + (kUniform ? 0 : octet * kOctet));
+}
+template <bool kUniform>
+HYBRID_INLINE void inverse_of(Octet& inverse, const RowCouplings& s, std::size_t axis, int octet) {
+  load(inverse, s.inverse + axis * kRow + (kUniform ? 0 : octet * kOctet));
+}
+// The axes side by side: each alone is a chain of operations that wait for one another.
+using Axes = std::array<std::array<Octet, kOctets + 2>, 3>;
+
+HYBRID_INLINE void load_axes(Axes& u, const LevelRow& row, OctetSpan span) {
+  const int count = span.last - span.first + 1;
+#pragma GCC unroll 3
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const float* own = row.u[axis];
+    const float before = span.first > 0 ? own[span.first * kOctet - 1] : own[kRow - 1 - row.x];
+    const float after = span.last < kOctets - 1 ? own[(span.last + 1) * kOctet] : own[row.x];
+    u[axis][0] = Octet{} + before;
+    u[axis][static_cast<std::size_t>(count) + 1] = Octet{} + after;
+  }
+#pragma GCC unroll 1
+  for (int n = 0; n < count; ++n) {
+#pragma GCC unroll 3
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      load(u[axis][static_cast<std::size_t>(n) + 1], row.u[axis] + (span.first + n) * kOctet);
+  }
+}
+
+}  // namespace voxel

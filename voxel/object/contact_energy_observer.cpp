@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "voxel/object/contact_energy_observer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+namespace voxel {
+namespace {
+
+constexpr double kHeld = 1.0 / 3.0;  // of force times depth: what a contact holds at least
+constexpr double kLetGo = 0.97;      // of that: with less given, less is felt
+constexpr double kLeast = 0.8;       // share: what is counted wrongly is no worse than that
+constexpr double kStands = 1e-5;     // of what is held: with less work in a tick, the tool stands …
+constexpr double kComesBack = 0.02;  // … and so much of what is missing comes back
+constexpr double kRegained = 0.1;    // of that: so much work brings back a share that was taken away
+
+}  // namespace
+
+void ContactEnergy::account(const glm::dvec3& way_m, const glm::dvec3& force_N, double depth_m) noexcept {
+  const double force = glm::length(force_N), held_J = kHeld * force * std::max(depth_m, 0.0);
+  if (!begun_ || force == 0.0) {
+    given_J_ = held_J;
+    share_ = 1.0;
+    begun_ = true;
+  } else {
+    given_J_ -= 0.5 * glm::dot(felt_N_ + share_ * force_N, way_m);
+    const double pressed_J = -glm::dot(force_N, way_m);
+    if (std::abs(pressed_J) < kStands * held_J) {
+      share_ += kComesBack * (1.0 - share_);
+    } else if (pressed_J > 0.0) {
+      share_ += (1.0 - share_) * pressed_J / (kRegained * held_J + pressed_J);
+    } else if (given_J_ < kLetGo * held_J) {
+      share_ = std::min(share_, std::max(given_J_ / (kLetGo * held_J), kLeast));
+    }
+  }
+  felt_N_ = share_ * force_N;
+}
+
+}  // namespace voxel

@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The tool on parts without slack: a part is one body of three unknowns, pressed where any of its voxels is,
+// and what it presses back with is all that pulls it.
+#include <algorithm>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include "voxel/object/soft_object.h"
+
+namespace voxel {
+namespace {
+
+constexpr double kTightPart = 1e-4;     // of the spacing: nearer to its limit than this a link is at it
+constexpr double kTightHanging = 1e-3;  // the same for what may be left behind a little as the tool withdraws
+
+}  // namespace
+
+// `visit(part)`, numbers from 1 on, for those of which any voxel is touched, in the order of the touches.
+template <class Visit>
+void SoftObject::for_touched_parts(const Visit& visit) noexcept {
+  for (const Touch& t : touches_) {
+    if (t.part == 0 || part_seen_[t.part - 1U] != 0) continue;
+    part_seen_[t.part - 1U] = 1;
+    visit(t.part);
+  }
+  for (const Touch& t : touches_) {
+    if (t.part != 0) part_seen_[t.part - 1U] = 0;
+  }
+}
+
+// Where the tool lets a part go, straightened where each of its touched voxels is; those that are further
+// away than `within_m` do not count.
+void SoftObject::bound_part(const ToolInBody& tool, std::uint16_t part, double within_m) noexcept {
+  part_bounds_.clear();
+  bound_touch_.clear();
+  for (std::size_t i = 0; i < touches_.size(); ++i) {
+    if (touches_[i].part != part) continue;
+    const Gap g = gap(tool, position(touches_[i]));
+    if (g.distance > within_m) continue;
+    part_bounds_.push_back({g.normal, g.distance, false, 0.0});
+    bound_touch_.push_back(static_cast<std::uint32_t>(i));
+  }
+}
+
+// The shortest way out of the tool; one of its voxels says to the chain where all of it is to go.
+void SoftObject::push_parts_out(const ToolInBody& tool) noexcept {
+  for_touched_parts([&](std::uint16_t part) {
+    bound_part(tool, part, voxel_radius());
+    const auto in = std::find_if(part_bounds_.begin(), part_bounds_.end(),
+                                 [](const PartBound& b) { return b.room_m < 0.0; });
+    if (in == part_bounds_.end()) return;
+    const VoxelId v = touches_[bound_touch_[static_cast<std::size_t>(in - part_bounds_.begin())]].v;
+    const glm::dvec3 before = state_.at(v);
+    state_.set(v, before + move_within(glm::dvec3(0.0), glm::dvec3(1.0), part_bounds_));
+    sources_.push_back(v);
+    moves_.emplace_back(state_.at(v) - before);
+  });
+}
+
+void SoftObject::follow_parts(const glm::dvec3& delta) noexcept {
+  for_touched_parts([&](std::uint16_t part) {
+    HeldDirections pressed;
+    const Touch* first = nullptr;
+    for (const Touch& t : touches_) {
+      if (t.part != part || !t.pressed) continue;
+      pressed.add(t.normal);
+      if (first == nullptr) first = &t;
+    }
+    if (first == nullptr) return;
+    const glm::dvec3 before = state_.at(first->v);
+    state_.set(first->v, before + delta - pressed.free_part(delta));
+    sources_.push_back(first->v);
+    moves_.emplace_back(state_.at(first->v) - before);
+  });
+}
+
+// A part goes to the least energy of the springs that leave it, outside of the tool and within its limits. It
+// is pressed where that takes a force of the tool's.
+void SoftObject::relax_parts(const ToolInBody& tool) noexcept {
+  Multigrid& grid = relaxation_.multigrid();
+  for_touched_parts([&](std::uint16_t part) {
+    const std::size_t p = part - 1U;
+    // With what only hangs on it: where links are at their limits, that is what presses it on the tool.
+    const Multigrid::PartRoom room = grid.room_of_part(p, state_);
+    const glm::dvec3 force = grid.part_force(p, state_) + hanging_on_part(p, room),
+                     stiffness = grid.parts().on(0, p).stiffness;
+    bound_part(tool, part, lattice_->max_spacing_m());
+    Multigrid::add_bounds(room, part_bounds_);
+    bool was = false, is = false;
+    glm::dvec3 way = move_within(force, stiffness, part_bounds_);
+    for (Touch& t : touches_) {
+      if (t.part != part) continue;
+      was = was || t.pressed;
+      t.pressed = false;
+    }
+    for (std::size_t i = 0; i < bound_touch_.size(); ++i) {
+      Touch& t = touches_[bound_touch_[i]];
+      t.pressed = part_bounds_[i].force_N > 0.0;
+      t.normal = part_bounds_[i].normal;
+      is = is || t.pressed;
+    }
+    // While another relaxes the object it is his, but for what was moved since.
+    if (relaxation_.away()) way = move_within(force + grid.balance_of_part(p), stiffness, part_bounds_);
+    const glm::dvec3 went = grid.move_part(p, way, state_, obstacle_view(), Multigrid::Tool::is_seen_to);
+    const double far = glm::length(went);
+    if (was != is) unsettled_m_ += far;
+    unrelaxed_m_ += far;
+    if (unrelaxed_m_ <= kStir * lattice_->min_spacing_m()) return;
+    unrelaxed_m_ = 0.0;
+    relaxation_.wake();
+  });
+}
+
+bool SoftObject::any_pressed(std::uint16_t part) const noexcept {
+  return std::any_of(touches_.begin(), touches_.end(),
+                     [part](const Touch& t) { return t.part == part && t.pressed; });
+}
+
+// What pulls tissue that hangs on a part, which has so much room, by links at their limits (N).
+glm::dvec3 SoftObject::hanging_on_part(std::size_t part, const Multigrid::PartRoom& room) noexcept {
+  const Multigrid& grid = relaxation_.multigrid();
+  const double tight = kTightPart * lattice_->min_spacing_m();
+  glm::dvec3 force(0.0);
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto& of_axis = room[static_cast<std::size_t>(axis)];
+    if (of_axis[0] < -tight && of_axis[1] > tight) continue;
+    tight_rows_.gather_on_part(relaxation_.couplings(), state_, grid, part, axis);
+    force[axis] = tight_rows_.hanging(relaxation_.couplings()).force_N;
+  }
+  return force;
+}
+
+// As gather_load_with_pairs(), where a part is one of what hangs on one another, pulled as a whole. What
+// pulls a single voxel says nothing of which way it passes a load on: between the tool and an inclusion,
+// tissue at its limits is pulled down, and carries what presses the inclusion up. (Found by rows, voxel by
+// voxel, half of the force was lost.)
+void SoftObject::gather_load_with_parts(int axis) noexcept {
+  const Multigrid& grid = relaxation_.multigrid();
+  const auto& u = state_.u[static_cast<std::size_t>(axis)];
+  const auto tight = static_cast<float>(kTightHanging * lattice_->min_spacing_m());
+  // A part is where its first voxel is.
+  const auto whole = [&](VoxelId v) {
+    const std::uint16_t part = lattice_->part(v);
+    return part == 0 ? v : grid.parts().first(part - 1U);
+  };
+  carried_.clear();
+  for (std::size_t i = 0; i < touches_.size(); ++i) {
+    if (!touches_[i].pressed || lattice_->anchored(touches_[i].v)) continue;
+    const VoxelId v = whole(touches_[i].v);
+    if (carried_mark_[v] == 0) carry(v, static_cast<std::uint32_t>(i));
+  }
+  const std::size_t pressed = carried_.size();
+  hanging_.assign(pressed, Hanging{});
+  const auto look_at = [&](std::size_t head, VoxelId from, VoxelId to, int d, bool up) {
+    if (!lattice_->filled(to) || lattice_->anchored(to)) return;
+    const auto b = lattice_->bounds(up ? from : to, d, axis);
+    const float is = u[to] - u[from], low = up ? b[0] : -b[1], high = up ? b[1] : -b[0];
+    const bool pushed_up = is <= low + tight, pushed_down = is >= high - tight;
+    if (!pushed_up && !pushed_down) return;
+    const std::uint32_t touch = carried_[head].touch;
+    touches_[touch].tight = true;
+    const VoxelId v = whole(to);
+    if (carried_mark_[v] != 0 || carried_.size() >= kMaxCarried) return;
+    carry(v, touch);
+    const std::uint16_t part = lattice_->part(v);
+    const double load = part != 0 ? grid.part_force(part - 1U, state_)[axis] : load_on(v, axis);
+    hanging_.push_back({static_cast<std::uint32_t>(head), pushed_up, pushed_down, load});
+  };
+  for (std::size_t head = 0; head < carried_.size(); ++head) {
+    const VoxelId v = carried_[head].v;
+    const std::uint16_t part = lattice_->part(v);
+    if (part != 0) {
+      for (const WholeParts::Link& l : grid.parts().on(0, part - 1U).border)
+        look_at(head, l.cell, l.beside, l.d, l.up);
+      continue;
+    }
+    for (int n = 0; n < 6; ++n) {
+      const bool up = n % 2 != 0;
+      look_at(head, v, up ? lattice_->up(v, n / 2) : lattice_->down(v, n / 2), n / 2, up);
+    }
+  }
+  // Pulled away from what it was found by, it may rest on something else that is carried: then it counts all
+  // the same. Within the sum it does not matter through which of its links.
+  const auto rests = [&](std::size_t i) {
+    const VoxelId v = carried_[i].v, by = carried_[hanging_[i].from].v;
+    for (int n = 0; n < 6 && lattice_->part(v) == 0; ++n) {
+      const bool up = n % 2 != 0;
+      const VoxelId w = up ? lattice_->up(v, n / 2) : lattice_->down(v, n / 2);
+      if (!lattice_->filled(w) || whole(w) == by || carried_mark_[whole(w)] == 0) continue;
+      const auto b = lattice_->bounds(up ? v : w, n / 2, axis);
+      const float is = u[v] - u[w], low = up ? -b[1] : b[0], high = up ? -b[0] : b[1];
+      if (hanging_[i].load < 0.0 ? is <= low + tight : is >= high - tight) return true;
+    }
+    return false;
+  };
+  for (std::size_t i = hanging_.size(); i-- > pressed;) {
+    const Hanging& h = hanging_[i];
+    if (!((h.up && h.load < 0.0) || (h.down && h.load > 0.0)) && !rests(i)) {
+      carried_mark_[carried_[i].v] = 0;
+    } else if (h.from < pressed) {
+      touches_[carried_[h.from].touch].load[axis] += h.load;
+    } else {
+      hanging_[h.from].load += h.load;
+    }
+  }
+}
+
+void SoftObject::add_reaction_of_parts(const ToolInBody& tool, Reaction& reaction) noexcept {
+  const Multigrid& grid = relaxation_.multigrid();
+  for_touched_parts([&](std::uint16_t part) {
+    const std::size_t p = part - 1U;
+    if (!any_pressed(part)) return;
+    bound_part(tool, part, lattice_->max_spacing_m());
+    const glm::dvec3 stiffness = grid.parts().on(0, p).stiffness;
+    glm::dvec3 force = grid.part_force(p, state_);
+    for (const Touch& t : touches_) {
+      if (t.part == part && t.pressed) force += t.load;
+    }
+    move_within(force, stiffness, part_bounds_);
+    HeldDirections held;
+    for (const PartBound& b : part_bounds_) {
+      if (!(b.force_N > 0.0)) continue;
+      reaction.force_N -= b.force_N * b.normal;
+      ++reaction.pressed;
+      held.add(b.normal);
+    }
+    // It goes along with the tool in the directions in which that holds it.
+    glm::dmat3 along(0.0), springs(0.0);
+    for (std::size_t n = 0; n < held.count; ++n) along += glm::outerProduct(held.of[n], held.of[n]);
+    for (int axis = 0; axis < 3; ++axis) springs[axis][axis] = stiffness[axis];
+    reaction.stiffness_N_per_m += along * springs * along;
+  });
+}
+
+}  // namespace voxel

@@ -1,0 +1,572 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "voxel/object/shadow_object.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "voxel/lattice/prefetch.h"
+
+namespace voxel {
+namespace {
+
+std::size_t at(RowId row) {
+  return static_cast<std::size_t>(row) * kRow;
+}
+
+constexpr std::size_t kMostAtOnce = 1000;  // rows that a tick adds at once; a wider contact sees steps go by
+// After a whole cycle, of which little reaches the contact (0.75 of its error is left in a brain), so many
+// round it, while the tool moves by so many spacings from one result to the next and some results longer: a
+// brain that felt 0.28 N on the way to 0.15 feels 0.22, and is within a twentieth of it after 0.2 s instead
+// of 0.6. At rest they are left out: beyond their boxes coarse cells know of the whole cycle's last sweeps
+// only in the next one, and a voxel that hardly touches the tool was let go and pressed in turns, with steps
+// of 30 mN.
+constexpr int kContactCycles = 4, kUnsettled = 4;
+// … and round a part without slack that is pressed. (A whole cycle leaves 0.43 of the force's error at such a
+// part.)
+constexpr int kPartCycles = 4;
+constexpr double kMoved = 0.1;
+// Far from the contact only what changed by so many times as much as rows are left alone with (1e-4 of the
+// spacing) is passed on, and the rest once all is at rest. Within so many rows of it everything is, and so is
+// what the tick itself moved: given again, it would lose what was kept back.
+constexpr float kFarther = 20.0F;
+constexpr std::size_t kNearRows = 3;
+// What a row cannot follow waits for its next turn where that is more than this of the spacing; less is what
+// any contact at its limits has in every result.
+constexpr float kFollows = 0.01F;
+// Turns in all, and of what is near the contact at once: with 4 and 2 the force was 43 % off after four
+// results of a jump, with 8 and 4 by 2 %, with these after three.
+constexpr int kTurns = 16, kTurnsAtOnce = 8;
+// Tissue that moved by as many spacings from one result to the next is far from all that is known of it. So
+// many results are then of so many cycles in wide boxes. In the first coarse levels come to rest before them,
+// and what is further away is told what they know: where it stayed behind it would hold back what is in the
+// boxes (by 17 % of the force, where links are at their limits). Where a part without slack is pressed, there
+// is one, which is thorough: no box is wide enough. No bricks meanwhile: of tissue on its way they know
+// little.
+constexpr float kJumped = 5.0F;
+constexpr int kQuickResults = 3;
+constexpr std::array<int, kQuickResults> kWideCycles{3, 4, 2};
+constexpr std::size_t kAhead = 4;  // rows that are fetched before their turn
+constexpr std::size_t kRowBytes = kRow * sizeof(float);
+constexpr std::size_t kOctetsOfRow = 12;  // a whole cycle smooths and tells as many of a row
+
+// Floats of a row that go over: ways, and where there are bricks their loads.
+std::size_t arrays_of(const Lattice& lattice) {
+  return lattice.has_bricks() ? 6 : 3;
+}
+
+}  // namespace
+
+Replica::Replica(SoftObject& object)
+    : lattice_(object.lattice()),
+      state_(object.state_),
+      relaxation_(lattice_),
+      obstacles_(object.obstacles_),
+      moving_obstacles_(object.moving_obstacles_),
+      rows_kept_back_(lattice_.grid().rows()),
+      kept_back_(lattice_.grid().rows()),
+      distance_(lattice_.grid().rows()),
+      by_distance_(lattice_.grid().rows()),
+      given_(lattice_.grid().rows()),
+      found_{Parcel(lattice_.grid().rows(), arrays_of(lattice_)),
+             Parcel(lattice_.grid().rows(), arrays_of(lattice_))},
+      again_(lattice_.grid().rows()) {
+  for (PartWays& ways : found_parts_) ways.assign(lattice_.part_count(), glm::dvec3(0.0));
+  multigrid().keep_log();
+  relaxation_.copy_from(object.relaxation_);
+  object.relaxation_.leave_to_another();
+  // A part without slack sums what all round it are off by.
+  least_m_ = multigrid().has_parts() ? multigrid().passed_on_m() : multigrid().quiet_m();
+  const std::size_t most_held = lattice_.surface().size() + SoftObject::kMaxTouched;
+  held_.reserve(most_held);
+  given_held_.reserve(most_held);
+  given_contacts_.reserve(SoftObject::kMaxTouched);
+  given_roles_.reserve(2 * most_held);
+  given_obstacles_.reserve(lattice_.surface().size());
+  object.changed_obstacles_.reserve(lattice_.surface().size());
+  object.obstacle_changed_.assign(object.obstacles_.size(), 0);
+  for (std::size_t axis = 0; axis < 3; ++axis) before_[axis] = state_.u[axis];
+  if (lattice_.voxel_count() >= SoftObject::kPreparedWhole) return;
+  relaxation_.prepare_all();
+  relaxation_.prepare_under_tool();
+  object.relaxation_.prepare_all();
+  if (object.beside_bodies_) relaxation_.prepare_beside_bodies();
+  const std::vector<bool> rows = relaxation_.couplings().rows_in_use();
+  state_.populate(rows);
+  for (auto& axis : before_) axis.populate(kRow, rows);
+  const auto most = static_cast<std::size_t>(std::count(rows.begin(), rows.end(), true));
+  given_.populate(most);
+  for (Parcel& parcel : found_) parcel.populate(most);
+  again_.populate();
+}
+
+void Replica::give(SoftObject& object) noexcept {
+  ChangeLog& log = object.relaxation_.multigrid().log();
+  given_.clear();
+  const Parcel& found = found_[taking_];
+  for (const RowId row : log.rows(0)) {
+    float* to = given_.add(row);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      std::copy_n(object.state_.u[axis].data() + at(row), kRow, to + axis * kRow);
+    // As it will be once it is drained: without that, a row would be torn from those around it, which are
+    // known here with what they have yet to go; it would be mended, and so go that way twice. (The better a
+    // cycle was, the longer that went to and fro: a brain that hung free swung by a millimeter for ever.)
+    const std::size_t n = found.find(row);
+    if (n == found.count() || (n < drained_ && !again_.waits(n))) continue;
+    for (std::size_t i = 0; i < std::size_t{3} * kRow; ++i) to[i] += found.values(n)[i];
+  }
+  given_roles_.clear();
+  given_obstacles_.clear();
+  for (const std::uint32_t s : object.changed_obstacles_) {
+    object.obstacle_changed_[s] = 0;
+    given_obstacles_.push_back({s, object.obstacles_[s]});
+    const VoxelId v = lattice_.surface()[s];
+    given_roles_.push_back({v, object.resting_role(v)});
+  }
+  object.changed_obstacles_.clear();
+  for (const VoxelId v : given_held_) given_roles_.push_back({v, object.resting_role(v)});
+  given_pressed_ = object.list_held();
+  note_motion(object);
+  given_held_.clear();
+  given_contacts_.clear();
+  for (const VoxelId v : object.all_held_) {
+    given_held_.push_back(v);
+    if (object.state_.role[v] == Displacement::pressed || Displacement::in_part(object.state_.role[v]))
+      given_contacts_.push_back({v, object.state_.tool_normal[lattice_.surface_number(v)]});
+  }
+  near_ = given_held_.empty() ? Relaxation::NearRows{} : object.relaxation_.near_contact();
+  object.give_away();
+  log.clear();
+}
+
+void Replica::note_motion(const SoftObject& object) noexcept {
+  const double way = glm::distance(object.tool_.centre, given_tool_m_);
+  given_tool_m_ = object.tool_.centre;
+  if (way > kMoved * lattice_.min_spacing_m()) unsettled_ = kUnsettled;
+  settle_contact_ = unsettled_ > 0 && given_pressed_ > 0;
+  if (unsettled_ > 0) --unsettled_;
+}
+
+void Replica::open_given() noexcept {
+  Multigrid& to = multigrid();
+  float moved_m = 0.0F;
+  for (std::size_t n = 0; n < given_.count(); ++n) {
+    const RowId row = given_.row(n);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const float* now = given_.values(n) + axis * kRow;
+      const float* was = before_[axis].data() + at(row);
+      for (std::size_t i = 0; i < kRow; ++i) moved_m = std::max(moved_m, std::fabs(now[i] - was[i]));
+      std::copy_n(given_.values(n) + axis * kRow, kRow, state_.u[axis].data() + at(row));
+      std::copy_n(given_.values(n) + axis * kRow, kRow, before_[axis].data() + at(row));
+    }
+    to.stir(0, row);
+  }
+  for (const GivenObstacle& given : given_obstacles_) {
+    Obstacle& o = obstacles_[given.surface_number];
+    moving_obstacles_ = moving_obstacles_ + (given.obstacle.moving ? 1 : 0) - (o.moving ? 1 : 0);
+    o = given.obstacle;
+    to.stir(0, lattice_.surface()[given.surface_number] / kRow);
+  }
+  for (const GivenRole& given : given_roles_) state_.set_role(given.v, given.role);
+  held_.clear();
+  for (const VoxelId v : given_held_) {
+    held_.push_back(v);
+    state_.set_role(v, Displacement::held);
+  }
+  for (const GivenContact& given : given_contacts_) {
+    state_.set_role(given.v, Displacement::pressed);
+    state_.tool_normal[lattice_.surface_number(given.v)] = given.normal;
+  }
+  if (given_.count() > 0 || !given_obstacles_.empty()) relaxation_.wake();
+  to.log().clear();
+  // One whole cycle at least between two jumps: all else has its turn, however long the tool goes on.
+  if (moved_m > kJumped * static_cast<float>(lattice_.min_spacing_m()) && quick_ == 0 && !was_quick_) {
+    quick_ = kQuickResults;
+    far_ = kQuickResults + kUnsettled;
+  }
+  // What presses a part without slack moves tissue all round that, wherever the contact is.
+  part_pressed_ = std::any_of(held_.begin(), held_.begin() + static_cast<std::ptrdiff_t>(given_pressed_),
+                              [this](VoxelId v) { return lattice_.part(v) != 0; });
+  if (given_pressed_ == 0) quick_ = 0;
+  if (part_pressed_) quick_ = std::min(quick_, 1);
+}
+
+void Replica::relax_quickly(const ObstacleView& obstacles) noexcept {
+  std::size_t octets = 0;
+  const bool first = quick_ == kQuickResults;
+  --quick_;
+  if (part_pressed_) {
+    octets = relaxation_.run_thoroughly(state_, obstacles, held_);
+    relaxation_.relax_round_parts(state_, obstacles);
+    work_ = octets / kOctetsOfRow;
+    return;
+  }
+  const std::span<const VoxelId> pressed{held_.data(), given_pressed_};
+  if (first) {
+    octets += relaxation_.relax_widely(state_, obstacles, held_, pressed, true);
+    octets += relaxation_.tell_widely(state_, obstacles, pressed);
+  }
+  const int cycles = kWideCycles[static_cast<std::size_t>(kQuickResults - 1 - quick_)];
+  for (int n = 0; n < cycles; ++n)
+    octets += relaxation_.relax_widely(state_, obstacles, held_, pressed, false);
+  // Not after the last: a whole round comes next, which ends with it; nor after the first, when the tool goes
+  // on to press other voxels. (There, too, it was no nearer.)
+  if (!first && quick_ > 0) relaxation_.relax_limited(state_, obstacles);
+  work_ = octets / kOctetsOfRow;
+}
+
+void Replica::relax() noexcept {
+  open_given();
+  const ObstacleView obstacles{obstacles_, &lattice_, moving_obstacles_};
+  was_quick_ = quick_ > 0;
+  found_limited_ = false;
+  found_far_ = far_ > 0;
+  if (found_far_) --far_;
+  if (was_quick_) {
+    relax_quickly(obstacles);
+  } else {
+    relaxation_.run_cycle(state_, obstacles, held_);
+    found_limited_ = relaxation_.limits_hold();
+    for (int n = 0; n < kPartCycles && settle_contact_ && part_pressed_; ++n)
+      relaxation_.relax_round_parts(state_, obstacles);
+    for (int n = 0; n < kContactCycles && settle_contact_; ++n)
+      relaxation_.relax_contact(state_, obstacles, held_, {held_.data(), given_pressed_});
+    work_ = multigrid().log().count();
+  }
+  pack_changes();
+  ++times_relaxed_;
+}
+
+Replica::Found Replica::found() const {
+  const Parcel& parcel = found_[1 - taking_];
+  const std::size_t floats = arrays_of(lattice_) * kRow;
+  Found result{
+      {}, {}, near_count_, found_far_, found_limited_, at_rest_, residual_N_, found_parts_[1 - taking_]};
+  for (std::size_t n = 0; n < parcel.count(); ++n) {
+    result.rows.push_back(parcel.row(n));
+    result.values.insert(result.values.end(), parcel.values(n), parcel.values(n) + floats);
+  }
+  return result;
+}
+
+void Replica::find_again(const Found& found) noexcept {
+  Parcel& parcel = found_[1 - taking_];
+  const std::size_t floats = arrays_of(lattice_) * kRow;
+  parcel.clear();
+  for (std::size_t n = 0; n < found.rows.size(); ++n)
+    std::copy_n(found.values.data() + n * floats, floats, parcel.add(found.rows[n]));
+  found_parts_[1 - taking_] = found.part_ways;
+  near_count_ = found.near_count;
+  found_far_ = found.far;
+  found_limited_ = found.limited;
+  at_rest_ = found.at_rest;
+  residual_N_ = found.residual_N;
+}
+
+// Counted and laid out (there are few distances): the order within one distance is that of the log.
+void Replica::sort_by_distance() noexcept {
+  const auto rows = multigrid().log().rows(0);
+  begin_.fill(0);
+  for (std::size_t n = 0; n < rows.size(); ++n) {
+    const int away = near_.distance(lattice_.grid().row_coordinates(rows[n]));
+    distance_[n] = static_cast<std::uint8_t>(std::min(away, kDistances - 1));
+    ++begin_[distance_[n] + 1U];
+  }
+  for (std::size_t d = 1; d < begin_.size(); ++d) begin_[d] += begin_[d - 1];
+  for (std::size_t n = 0; n < rows.size(); ++n) by_distance_[begin_[distance_[n]]++] = rows[n];
+}
+
+void Replica::pack_changes() noexcept {
+  Parcel& parcel = found_[1 - taking_];
+  parcel.clear();
+  at_rest_ = relaxation_.asleep();
+  residual_N_ = relaxation_.residual_N();
+  pack_parts();
+  sort_by_distance();
+  near_count_ = 0;
+  const std::size_t count = multigrid().log().rows(0).size();
+  // What is near was laid out first, so it ends where the next distance began.
+  const std::size_t near = near_.first[0] > near_.last[0] ? 0 : std::min<std::size_t>(begin_[0], kMostAtOnce);
+  for (std::size_t n = 0; n < count; ++n) {
+    if (n + kAhead < count) fetch_change_ahead(by_distance_[n + kAhead]);
+    const RowId row = by_distance_[n];
+    const bool all = at_rest_ || n < begin_[kNearRows] || given_.find(row) != given_.count();
+    if (!pack_row(row, all ? least_m_ : kFarther * least_m_)) {
+      parcel.drop_last();
+      if (!all) keep_back(row);
+    }
+    if (n < near) near_count_ = parcel.count();
+  }
+  if (at_rest_) pack_kept_back();
+}
+
+// What of a row is of a part is then as it was, and so is no change of the row's.
+void Replica::pack_parts() noexcept {
+  PartWays& ways = found_parts_[1 - taking_];
+  for (std::size_t p = 0; p < ways.size(); ++p) {
+    const WholeParts& parts = multigrid().parts();
+    const VoxelId first = parts.first(p);
+    glm::vec3 way(0.0F);
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto ua = static_cast<std::size_t>(axis);
+      way[axis] = state_.u[ua][first] - before_[ua][first];
+    }
+    if (way == glm::vec3(0.0F)) {
+      ways[p] = glm::dvec3(0.0);
+      continue;
+    }
+    // Less than it takes to move it there it does not go here either.
+    if (std::max({std::fabs(way.x), std::fabs(way.y), std::fabs(way.z)}) <= multigrid().passed_on_m())
+      way = glm::vec3(0.0F);
+    ways[p] = glm::dvec3(way);
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto ua = static_cast<std::size_t>(axis);
+      const float to = before_[ua][first] + way[axis];
+      for (const WholeParts::Run& run : parts.on(0, p).rows) {
+        for (VoxelId v = run.row * kRow; v < (run.row + 1) * kRow; ++v) {
+          if ((run.lanes >> v % kRow & 1U) != 0) state_.u[ua][v] = before_[ua][v] = to;
+        }
+      }
+    }
+  }
+}
+
+// All of each at once, what else there is of the result near it or not: it has one place.
+void Replica::take_parts(SoftObject& object) noexcept {
+  const PartWays& ways = found_parts_[taking_];
+  Multigrid& to = object.relaxation_.multigrid();
+  for (std::size_t p = 0; p < ways.size(); ++p) {
+    if (ways[p] == glm::dvec3(0.0)) continue;
+    const VoxelId first = to.parts().first(p);
+    const glm::vec3 wanted(object.state_.at(first) + ways[p]);
+    to.move_part(p, ways[p], object.state_, object.obstacle_view(), Multigrid::Tool::is_seen_to,
+                 Multigrid::Note::nowhere);
+    if (glm::vec3(object.state_.at(first)) == wanted) continue;
+    for (const WholeParts::Run& run : to.parts().on(0, p).rows) to.log().note(0, run.row);
+  }
+}
+
+void Replica::keep_back(RowId row) noexcept {
+  if (kept_back_[row] != 0) return;
+  kept_back_[row] = 1;
+  rows_kept_back_[kept_back_count_++] = row;
+}
+
+void Replica::pack_kept_back() noexcept {
+  for (std::size_t n = 0; n < kept_back_count_; ++n) {
+    const RowId row = rows_kept_back_[n];
+    kept_back_[row] = 0;
+    if (!multigrid().log().has(0, row) && !pack_row(row, least_m_)) found_[1 - taking_].drop_last();
+  }
+  kept_back_count_ = 0;
+}
+
+// False where no voxel changed by more than `least_m`: it waits until it is more.
+bool Replica::pack_row(RowId row, float least_m) noexcept {
+  float* way = found_[1 - taking_].add(row);
+  float most = 0.0F;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    most = std::max(
+        most, row_way(state_.u[axis].data() + at(row), before_[axis].data() + at(row), way + axis * kRow));
+  }
+  const bool loads_changed = multigrid().bricks().take_changed(row);
+  if (most <= least_m && !loads_changed) return false;
+  // The same sum as the tick's, to the last bit.
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    float* now = state_.u[axis].data() + at(row);
+    float* was = before_[axis].data() + at(row);
+    for (std::size_t i = 0; i < kRow; ++i) was[i] += way[axis * kRow + i];
+    std::copy_n(was, kRow, now);
+    if (state_.bricks.row.size() > 0)
+      std::copy_n(state_.bricks.load[axis].data() + at(row), kRow, way + (3 + axis) * kRow);
+  }
+  return true;
+}
+
+void Replica::fetch_change_ahead(RowId row) const noexcept {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    fetch_lines(state_.u[axis].data() + at(row), kRowBytes);
+    fetch_lines(before_[axis].data() + at(row), kRowBytes);
+  }
+}
+
+// Has what take_row() reads fetched while the rows before are added: what another core wrote, and rows that
+// no cache has kept since the last result. With nothing else on the machine that is where they are, and it
+// gains nothing; in real time a row takes 0.33 us in place of 0.54. (Of rows that are added together most
+// neighbours just were: what stands around is not fetched for them.)
+void Replica::fetch_ahead(SoftObject& object, std::size_t n, bool together) const noexcept {
+  if (n >= found_[taking_].count()) return;
+  const RowId row = found_[taking_].row(n);
+  const Grid& g = lattice_.grid();
+  fetch_lines(found_[taking_].values(n), 3 * kRowBytes);
+  for (const auto& axis : object.state_.u) {
+    const float* u = axis.data();
+    fetch_lines(u + at(row), kRowBytes);
+    if (together) continue;
+    for (const RowId r : {row - g.row_z, row - 1, row + 1, row + g.row_z}) fetch_lines(u + at(r), kRowBytes);
+    fetch_lines(u + at(row - g.row_x) + kRow - 1, sizeof(float));
+    fetch_lines(u + at(row + g.row_x), sizeof(float));
+  }
+  __builtin_prefetch(object.state_.role.data() + at(row));
+  object.relaxation_.couplings().fetch_ahead(row);
+}
+
+// Where the nth row of the parcel is to go, or a part of it, which is then left less.
+void Replica::way_of(SoftObject& object, std::size_t n, float part, RowVector& ways) noexcept {
+  const RowId row = found_[taking_].row(n);
+  float* way = found_[taking_].values(n);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (std::size_t i = 0; i < kRow; ++i) {
+      ways[axis][i] = part * way[axis * kRow + i];
+      if (part < 1.0F) way[axis * kRow + i] -= ways[axis][i];
+    }
+  }
+  if (BrickLoad& bricks = object.state_.bricks; bricks.row.size() > 0) {
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      std::copy_n(way + (3 + axis) * kRow, kRow, bricks.load[axis].data() + at(row));
+    bricks.row[row] = 1;
+  }
+}
+
+// True where free voxels did not follow; then what is left stands in the parcel.
+bool Replica::take_row(SoftObject& object, std::size_t n, float part) noexcept {
+  Multigrid& to = object.relaxation_.multigrid();
+  const RowId row = found_[taking_].row(n);
+  float* way = found_[taking_].values(n);
+  RowVector ways, wanted;
+  way_of(object, n, part, ways);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const float* there = object.state_.u[axis].data() + at(row);
+    for (std::size_t i = 0; i < kRow; ++i) wanted[axis][i] = there[i] + ways[axis][i];
+  }
+  to.add(row, ways, object.state_, object.obstacle_view());
+  object.note_moved(row);
+  unsigned others = 0;  // all are counted: sought one by one, the first of them took longer than it spares
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const float* there = object.state_.u[axis].data() + at(row);
+    for (std::size_t i = 0; i < kRow; ++i) others += wanted[axis][i] != there[i] ? 1U : 0U;
+  }
+  if (others == 0) return false;
+  to.log().note(0, row);
+  if (!in_turns_) return false;
+  float most = 0.0F;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const float* there = object.state_.u[axis].data() + at(row);
+    for (std::size_t i = 0; i < kRow; ++i) {
+      const bool blocked = object.state_.role[at(row) + i] == Displacement::obstacle;
+      const float left = blocked ? 0.0F : wanted[axis][i] - there[i];
+      way[axis * kRow + i] = left;
+      most = std::max(most, std::fabs(left));
+    }
+  }
+  return most > kFollows * static_cast<float>(lattice_.min_spacing_m());
+}
+
+// The rows first … before last of the parcel, each as far as its links to the others let it where those go.
+// (One after the other, what limits tie together stayed where it was. Where no limit holds there is nothing
+// in the way, and each by itself takes half as long.)
+void Replica::take_jointly(SoftObject& object, std::size_t first, std::size_t last, float part) noexcept {
+  Multigrid& to = object.relaxation_.multigrid();
+  const bool whole = part == 1.0F;
+  RowVector left;
+  for (std::size_t n = first; n < last; ++n) {
+    fetch_ahead(object, n + kAhead, true);
+    const RowId row = found_[taking_].row(n);
+    if (!to.can_join(row, object.state_)) continue;
+    to.join(row, object.state_, [&](RowVector& ways) { way_of(object, n, part, ways); });
+  }
+  to.add_joined(object.state_);
+  for (std::size_t n = first; n < last; ++n) {
+    const RowId row = found_[taking_].row(n);
+    // By parts it is rounded otherwise than the other thread knows it.
+    if (!whole) to.log().note(0, row);
+    bool gone = false;
+    if (!to.joined(row, object.state_, left, gone)) {
+      if (take_row(object, n, part) && whole) again_.put(n);
+      continue;
+    }
+    object.note_moved(row);
+    if (gone) continue;
+    to.log().note(0, row);
+    if (!in_turns_ || !whole) continue;
+    float* way = found_[taking_].values(n);
+    float most = 0.0F;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      for (std::size_t i = 0; i < kRow; ++i) {
+        way[axis * kRow + i] = left[axis][i];
+        most = std::max(most, std::fabs(left[axis][i]));
+      }
+    }
+    if (most > kFollows * static_cast<float>(lattice_.min_spacing_m())) again_.put(n);
+  }
+  to.forget_joined();
+}
+
+void Replica::take(SoftObject& object, int parts) noexcept {
+  taking_ = 1 - taking_;
+  take_parts(object);
+  again_.clear();
+  in_turns_ = found_far_;
+  together_ = found_far_ || found_limited_;
+  drained_ = near_count_;
+  parts_left_ = parts;
+  // Loads of bricks come whole, so their ways do.
+  take_part(object, parts <= 1 || in_turns_ || lattice_.has_bricks());
+}
+
+// While parts are left, as much of what was given counts as balanced as has not come yet: the two ends of a
+// way are both at rest, and where forces are linear so is what lies between.
+void Replica::take_part(SoftObject& object, bool last) noexcept {
+  const int left = std::max(parts_left_, 1);
+  const bool whole = last || left == 1;
+  parts_left_ = whole ? 0 : left - 1;
+  const float part = whole ? 1.0F : 1.0F / static_cast<float>(left);
+  if (whole) {
+    object.relaxation_.take_over(residual_N_);
+  } else {
+    object.keep_away(static_cast<float>(left - 1) / static_cast<float>(left));
+  }
+  if (together_) {
+    take_jointly(object, 0, near_count_, part);
+  } else {
+    for (std::size_t n = 0; n < near_count_; ++n) {
+      fetch_ahead(object, n + kAhead, false);
+      // By parts it is rounded otherwise than the other thread knows it.
+      if (left > 1) object.relaxation_.multigrid().log().note(0, found_[taking_].row(n));
+      if (take_row(object, n, part) && whole) again_.put(n);
+    }
+  }
+  if (!whole) return;
+  while (again_.count() > 0 && again_.turn() < kTurnsAtOnce)
+    again_.take(kTurns, [&](std::size_t n) { return take_row(object, n); });
+  if (!at_rest_ || !drained()) object.relaxation_.wake();
+}
+
+void Replica::drain(SoftObject& object, std::size_t rows) noexcept {
+  if (in_turns_) {
+    const std::size_t count = std::min(rows, found_[taking_].count() - drained_);
+    if (count > 0) take_jointly(object, drained_, drained_ + count, 1.0F);
+    drained_ += count;
+    rows -= count;
+  }
+  for (; rows > 0 && drained_ < found_[taking_].count(); --rows, ++drained_) {
+    fetch_ahead(object, drained_ + kAhead, false);
+    if (take_row(object, drained_)) again_.put(drained_);
+  }
+  for (; rows > 0 && again_.count() > 0; --rows)
+    again_.take(kTurns, [&](std::size_t n) { return take_row(object, n); });
+}
+
+std::size_t Replica::memory_bytes() const {
+  std::size_t bytes = relaxation_.memory_bytes() + obstacles_.size() * sizeof(Obstacle) +
+                      state_.role.resident_bytes() + state_.row_standing.resident_bytes() +
+                      state_.row_obstacles.resident_bytes() + given_.memory_bytes() +
+                      distance_.resident_bytes() + by_distance_.resident_bytes() +
+                      kept_back_.resident_bytes() + rows_kept_back_.resident_bytes() + again_.memory_bytes();
+  for (const Parcel& parcel : found_) bytes += parcel.memory_bytes();
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    bytes += state_.u[axis].resident_bytes() + before_[axis].resident_bytes();
+  return bytes;
+}
+
+}  // namespace voxel

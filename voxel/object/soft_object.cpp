@@ -1,0 +1,497 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "voxel/object/soft_object.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <utility>
+
+#include "voxel/composite/grid.h"
+#include "voxel/lattice/voxel_links.h"
+
+namespace voxel {
+namespace {
+
+constexpr double kSettled = 2e-3;     // of the spacing: a contact off by less is left to the background
+constexpr double kContraction = 0.5;  // of that, by a cycle round the contact
+// Cycles round the contact a tick: of a ball pressed at 0.2 m/s into 24,000 voxels one leaves 0.7, two 0.24
+// just noticeable differences of the force (60 samples), for 470 and 650 us.
+constexpr int kMostCycles = 2;
+// … where the first is not a wide one (Relaxation::wide): there the second brought little and took what the
+// tick did not have: a brain that is pressed feels the same within 2 %, and of 6,750 ticks in real time 91
+// missed their deadlines in place of 278. Unless the contact has as many spacings to go still.
+constexpr double kJump = 0.1;
+// Where another thread relaxes the object, wide cycles have this much work of a tick (in octets of cells
+// told), some 150 us: what is left of one goes on in the next tick, and what one leaves of a tick begins the
+// next. (Whole, one took up to 450 us of a tick, and so had every other tick only. In parts of narrow ones a
+// cube of 24,000 voxels pressed at 200 mm/s was 2.2 just noticeable differences off in place of 0.6. Forces
+// on the way into organs of an abdomen are 67 mN off, root of the mean square, and 60 with an eighth more.)
+constexpr std::size_t kContactWork = 4400, kLeastWork = 1000;
+// … and with what is added of results.
+constexpr std::size_t kTickWork = 4900;
+// Waves of the chain count as well, so much a row that they visit: eight of them a tick, which took 160 us of
+// an organ that is pressed deep. (Uncounted, the slowest ticks had all three.)
+constexpr std::size_t kWorkOfVisit = 4;
+// A whole cycle, in the same thread or beside it in the same cache, leaves nothing of the contact in there,
+// and until that is read again all takes up to twice as long: for so many ticks there is less work. The same
+// where the tool comes upon tissue that was not touched for long.
+constexpr int kColdTicks = 5;
+constexpr std::size_t kColdWork = 2500;
+constexpr std::size_t kDropsApart =
+    100;                        // rows of coarse cells: more of them are dropped in a tick of its own
+constexpr double kDeep = 0.05;  // of the voxel radius: less is an error of a tick, and is mended
+
+}  // namespace
+
+SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice)
+    : lattice_(std::move(lattice)),
+      state_(*lattice_),
+      chain_(*lattice_),
+      relaxation_(*lattice_),
+      pair_held_(lattice_->surface().size()),
+      pair_load_(lattice_->surface().size()),
+      hanging_entry_(lattice_->surface().size()),
+      tight_rows_(*lattice_),
+      drawn_rows_(*lattice_, kMaxTouched),
+      carried_mark_(lattice_->size()),
+      carried_index_(lattice_->size()) {
+  const auto surface = lattice_->surface();
+  touches_.reserve(kMaxTouched);
+  pressed_last_.reserve(kMaxTouched);
+  touched_before_.reserve(kMaxTouched);
+  touched_voxels_.reserve(kMaxTouched);
+  touched_numbers_.reserve(kMaxTouched);
+  sources_.reserve(surface.size());
+  moves_.reserve(surface.size());
+  held_voxels_.reserve(surface.size());
+  all_held_.reserve(surface.size() + kMaxTouched);
+  pair_roots_.reserve(kMaxTouched);
+  hanging_on_pairs_.reserve(kMaxTouched);
+  roots_.reserve(kMaxTouched);
+  carried_.reserve(kMaxCarried + kMaxTouched);
+  hanging_.reserve(kMaxCarried + kMaxTouched);
+  if (lattice_->part_count() > 0) {
+    part_bounds_.reserve(2 * kMaxTouched);
+    bound_touch_.reserve(kMaxTouched);
+    part_seen_.resize(lattice_->part_count());
+  }
+  if (lattice_->voxel_count() < kPreparedWhole) {
+    state_.populate(relaxation_.couplings().rows_in_use());
+    pair_held_.populate();
+    chain_.prepare_all();
+    relaxation_.prepare_all();
+  }
+}
+
+SoftObject::~SoftObject() = default;
+
+std::unique_ptr<SoftObject> SoftObject::copy() const {
+  auto result = std::make_unique<SoftObject>(lattice_);
+  result->state_ = state_;
+  if (!obstacles_.empty()) result->reserve_obstacles();
+  result->obstacles_ = obstacles_;
+  result->moving_obstacles_ = moving_obstacles_;
+  result->pair_held_ = pair_held_;
+  result->pair_load_.copy_from(pair_load_);
+  for (const VoxelId v : held_voxels_) result->held_voxels_.push_back(v);
+  for (const Touch& t : touches_) result->touches_.push_back(t);
+  result->touched_voxels_.assign(touched_voxels_.begin(), touched_voxels_.end());
+  result->touched_numbers_.assign(touched_numbers_.begin(), touched_numbers_.end());
+  result->moved_ever_ = moved_ever_;
+  result->relaxation_.copy_from(relaxation_);
+  if (grid_) {
+    result->grid_ = std::make_unique<CompositeGrid>(*grid_);
+    result->near_on_grid_.reserve(near_on_grid_.capacity());
+    result->touches_on_grid_.reserve(kMaxTouched);
+    result->near_on_grid_.assign(near_on_grid_.begin(), near_on_grid_.end());
+    result->on_grid_ = on_grid_;
+    result->centre_ = centre_;
+    result->grid_force_N_ = grid_force_N_;
+    result->grid_tool_m_ = grid_tool_m_;
+    result->contact_energy_ = contact_energy_;
+    result->nearest_m_ = nearest_m_;
+    result->grid_cycles_ = grid_cycles_;
+  }
+  if (relaxation_.left_to_another())
+    result->relaxation_.renew_coarse(result->state_, result->obstacle_view());
+  return result;
+}
+
+double SoftObject::reach(double tool_radius) const {
+  // Half a cell's diagonal would do for voxels at rest; pressed, they part. From a spacing and a half on none
+  // lets go (a test presses tools of a hundredth of a spacing three spacings deep).
+  return std::max(tool_radius + voxel_radius(), 1.5 * lattice_->max_spacing_m());
+}
+
+SoftObject::Gap SoftObject::gap(const ToolInBody& tool, const glm::dvec3& position) const noexcept {
+  const glm::dvec3 d = position - tool.centre;
+  if (tool.shape == ToolInBody::Shape::punch) {
+    const double along = glm::dot(d, tool.axis);
+    const double across2 = glm::dot(d, d) - along * along;
+    // Only what lies under the face, and not behind it, is pressed by it.
+    const bool under = across2 <= tool.radius * tool.radius && along > -4.0 * lattice_->max_spacing_m();
+    return {under ? along - voxel_radius() : std::numeric_limits<double>::max(), tool.axis};
+  }
+  const double distance = glm::length(d);
+  // The tool's centre exactly on a voxel: any direction serves; back along the punch axis is one.
+  const glm::dvec3 normal = distance > 0.0 ? d / distance : tool.axis;
+  return {distance - reach(tool.radius), normal};
+}
+
+bool SoftObject::surely_clear_of(const ToolInBody& tool, const glm::dvec3& position) const noexcept {
+  constexpr double kSurely = 1.0 + 1e-9;  // much more than rounding
+  const glm::dvec3 d = position - tool.centre;
+  const double away = kSurely * reach(tool.radius);
+  return tool.shape == ToolInBody::Shape::ball && glm::dot(d, d) > away * away;
+}
+
+bool SoftObject::clear_of(const ToolInBody& tool, const glm::dvec3& position) const noexcept {
+  return surely_clear_of(tool, position) || gap(tool, position).distance >= 0.0;
+}
+
+void SoftObject::touch(std::span<const VoxelId> near) noexcept {
+  if (grid_) return touch_on_grid(near);
+  cycles_since_touch_ = 0;
+  if (near.empty()) relaxation_.end_contact();
+  if (cold_ticks_ > 0) --cold_ticks_;
+  rests_ = std::exchange(asked_to_rest_, false);
+  contact_work_ = 0;
+  wide_cycle_ = false;
+  if (near.empty()) pressed_last_.clear();
+  std::size_t pressed = 0;
+  touched_before_.clear();
+  for (const Touch& t : touches_) {
+    if (!t.pressed) continue;
+    carried_mark_[t.v] = 1;
+    carried_index_[t.v] = static_cast<std::uint32_t>(touched_before_.size());
+    touched_before_.push_back(t);
+    ++pressed;
+  }
+  for (const Touch& t : touches_) state_.set_role(t.v, resting_role_at(t.surface));
+  // What the tool leaves behind springs back, however long it was at rest.
+  for (const Touch& t : touches_) {
+    if (t.pressed) relaxation_.stir(t.v / kRow);
+  }
+  touches_.clear();
+  for (const VoxelId v : near) {
+    if (touches_.size() == kMaxTouched) break;
+    const bool kept = carried_mark_[v] != 0;
+    if (kept) --pressed;
+    touches_.push_back({v, lattice_->surface_number(v), kept, lattice_->rest(v)});
+    touches_.back().part = lattice_->part(v);
+    if (!kept) continue;
+    const Touch& before = touched_before_[carried_index_[v]];
+    touches_.back().normal = before.normal;
+    touches_.back().left = before.left;
+  }
+  for (const VoxelId v : touched_voxels_) carried_mark_[v] = 0;
+  touched_voxels_.clear();
+  touched_numbers_.clear();
+  for (const Touch& t : touches_) {
+    touched_voxels_.push_back(t.v);
+    touched_numbers_.push_back(t.surface);
+  }
+  if (pressed > 0) relaxation_.wake();
+  set_touch_roles();
+}
+
+Displacement::Role SoftObject::resting_role(VoxelId v) const noexcept {
+  if (held_voxels_.empty() && obstacles_.empty()) return Displacement::free;
+  return resting_role_at(lattice_->surface_number(v));
+}
+
+Displacement::Role SoftObject::resting_role_at(std::uint32_t surface) const noexcept {
+  if (held_voxels_.empty() && obstacles_.empty()) return Displacement::free;
+  if (pair_held_[surface] != 0) return Displacement::held;
+  return obstacles_.empty() || obstacles_[surface].normal == glm::vec3(0.0F) ? Displacement::free
+                                                                             : Displacement::obstacle;
+}
+
+// Only what carries load is kept from the background. A voxel that is merely near the tool must move with its
+// neighbours, or a correction of the coarse levels tears at it (which grew from cycle to cycle when all were
+// held).
+void SoftObject::set_touch_roles() noexcept {
+  for (const Touch& t : touches_) {
+    const Displacement::Role resting = resting_role_at(t.surface);
+    if (!t.pressed || lattice_->anchored(t.v)) {
+      state_.set_role(t.v, t.pressed ? Displacement::held : resting);
+      continue;
+    }
+    // What the tool and something else hold is the contact solver's alone.
+    state_.set_role(t.v, resting == Displacement::free ? Displacement::pressed : Displacement::held);
+    state_.tool_normal[t.surface] = glm::vec3(t.normal);
+  }
+}
+
+void SoftObject::settle_chain() noexcept {
+  moved_ever_ = true;
+  float most = 0.0F;
+  for (const glm::vec3& move : moves_) most = std::max(most, glm::dot(move, move));
+  unrelaxed_m_ += std::sqrt(static_cast<double>(most));
+  unsettled_m_ += std::sqrt(static_cast<double>(most));
+  if (unrelaxed_m_ > kStir * lattice_->min_spacing_m()) {
+    unrelaxed_m_ = 0.0;
+    relaxation_.wake();
+  }
+  chain_.settle(state_, sources_, moves_, obstacles_);
+  anchors_pull_ = anchors_pull_ || chain_.pulled_anchors();
+  contact_work_ += kWorkOfVisit * static_cast<std::size_t>(chain_.work());
+  for (const RowId row : chain_.moved_rows()) relaxation_.stir(row);
+  for (const RowId row : chain_.moved_rows()) note_moved(row);
+}
+
+void SoftObject::note_moved(RowId row) noexcept {
+  if (obstacles_.empty() || moved_rows_.size() == moved_rows_.capacity() || row_moved_[row] != 0) return;
+  row_moved_[row] = 1;
+  moved_rows_.push_back(row);
+}
+
+void SoftObject::forget_moved_rows() noexcept {
+  for (const RowId row : moved_rows_) row_moved_[row] = 0;
+  moved_rows_.clear();
+}
+
+bool SoftObject::push_out(const ToolInBody& tool) noexcept {
+  if (grid_) return push_out_on_grid(tool);
+  sources_.clear();
+  moves_.clear();
+  anchors_pull_ = false;
+  bool any = false;
+  for (Touch& t : touches_) {
+    const glm::dvec3 p = position(t);
+    if (!t.pressed && clear_of(tool, p)) continue;
+    const Gap g = gap(tool, p);
+    t.normal = g.normal;
+    if (g.distance >= 0.0) continue;
+    any = true;
+    t.pressed = true;
+    if (lattice_->anchored(t.v) || t.part != 0) continue;
+    const glm::dvec3 before = state_.at(t.v);
+    state_.set(t.v, before - g.distance * g.normal);
+    sources_.push_back(t.v);
+    moves_.emplace_back(state_.at(t.v) - before);
+  }
+  if (!part_seen_.empty()) push_parts_out(tool);
+  if (!sources_.empty()) settle_chain();
+  return any;
+}
+
+bool SoftObject::any_pressed() const noexcept {
+  return std::any_of(touches_.begin(), touches_.end(), [](const Touch& t) { return t.pressed; });
+}
+
+bool SoftObject::held_still() const noexcept {
+  return any_pressed() && relaxation_.wide() && unsettled_m_ < kJump * lattice_->min_spacing_m();
+}
+
+// Is a cycle round the contact due?
+bool SoftObject::cycle_due() const noexcept {
+  if (relaxation_.under_way()) return cycles_since_touch_ == 0 && !(rests_ && any_pressed());
+  const double to_go = unsettled_m_ / lattice_->min_spacing_m();
+  // A contact that stands still is the background's: it comes to rest with all the object, where a box comes
+  // to rest with its surroundings held.
+  if (to_go < kSettled || cycles_since_touch_ == kMostCycles) return false;
+  const bool apart = relaxation_.left_to_another(), in_parts = apart && wide_cycle_;
+  if (to_go >= kJump && !in_parts && !rests_) return true;
+  // Where another brings the object to rest, one cycle a tick then, but for what a wide one leaves of its
+  // work. (With two narrow ones forces were no nearer to rest, and ticks took up to half as long again. Never
+  // two, with a jump still to go either: tissue beside bone was left 5.8 % of a cell deep in it at 1 m/s.)
+  if (cycles_since_touch_ > 0)
+    return apart ? in_parts && left_of(kContactWork) >= shared(kLeastWork) : !wide_cycle_;
+  // What was let go of has this tick only.
+  return !rests_ || !any_pressed();
+}
+
+void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
+  if (grid_) {
+    for (int n = 0; n < cycles; ++n) relax_on_grid(tool);
+    return;
+  }
+  tool_ = tool;
+  for (int n = 0; n < cycles; ++n) {
+    for (Touch& t : touches_) relax_touch(tool, t);
+    if (!part_seen_.empty()) relax_parts(tool);
+    set_touch_roles();
+    if (!cycle_due()) break;
+    const bool again = ++cycles_since_touch_ > 1;
+    if (!relaxation_.under_way()) unsettled_m_ *= kContraction;
+    // They are in the order of their ids, so those of a row follow one another.
+    for (std::size_t i = 0; i < touches_.size(); ++i) {
+      const RowId row = touches_[i].v / kRow;
+      if (i == 0 || touches_[i - 1].v / kRow != row) relaxation_.stir(row);
+    }
+    const std::size_t pressed = list_held();
+    if (pressed > 0 && pressed_last_.empty()) cold_ticks_ = kColdTicks;
+    if (pressed > 0)
+      pressed_last_.assign(all_held_.begin(), all_held_.begin() + static_cast<std::ptrdiff_t>(pressed));
+    const std::size_t left = left_of(kContactWork);
+    if (relaxation_.under_way()) {
+      contact_work_ += relaxation_.continue_contact(state_, obstacle_view(), all_held_, left);
+      wide_cycle_ = true;
+      continue;
+    }
+    // What the tool just let go of follows it, this once. (Left to the other thread, tissue that a quick tool
+    // was drawn along hung back by a twenty-fifth of a spacing for up to six ticks: of 5,000 strokes 12 lost
+    // contact by it.)
+    if (pressed_last_.empty()) continue;
+    const bool in_parts = relaxation_.left_to_another() && pressed > 0;
+    contact_work_ += relaxation_.relax_contact(state_, obstacle_view(), all_held_, pressed_last_, again,
+                                               in_parts ? left : Relaxation::kWhole);
+    wide_cycle_ = relaxation_.wide();
+  }
+  // Last, so that what the tool feels is measured with its voxels where they belong; what is pressed first,
+  // because what hangs on it by a tight link counts where that is tight still. (In the order of the list half
+  // of a ring of such voxels was left a micron behind, and the force lost them in one tick out of three.)
+  for (const bool pressed : {true, false}) {
+    for (Touch& t : touches_) {
+      if (t.pressed == pressed) relax_touch(tool, t);
+    }
+  }
+  if (!part_seen_.empty()) relax_parts(tool);
+  set_touch_roles();
+  if (!any_pressed()) pressed_last_.clear();
+  draw_along();
+}
+
+// Pairs go to their places while all else stands, and where chains are tight in both objects that lifts the
+// tool, which comes back in the next tick. (With only results of every fourth tick to follow the pairs, that
+// went on for ever, with no result as well: the proxy went 0.5 mm in and 0.4 mm out in every tick, and the
+// hand felt 1.2 to 1.7 N where 0.92 is right.)
+void SoftObject::relax_near_pairs() noexcept {
+  if (touches_.empty()) {  // no touch() was before
+    contact_work_ = 0;
+    wide_cycle_ = false;
+  }
+  if (hanging_on_pairs_.empty() || any_pressed() || !relaxation_.left_to_another()) return;
+  const bool goes_on = relaxation_.under_way();
+  if (std::exchange(asked_to_rest_, false)) return;
+  const std::size_t left = left_of(kContactWork);
+  for (const VoxelId v : pair_roots_) relaxation_.stir(v / kRow);
+  list_held();
+  contact_work_ +=
+      goes_on ? relaxation_.continue_contact(state_, obstacle_view(), all_held_, left)
+              : relaxation_.relax_contact(state_, obstacle_view(), all_held_, pair_roots_, false, left);
+  wide_cycle_ = relaxation_.wide();
+}
+
+void SoftObject::follow(const glm::dvec3& delta) noexcept {
+  if (grid_) return;  // it goes along in the next cycle
+  sources_.clear();
+  moves_.clear();
+  for (const Touch& t : touches_) {
+    if (!t.pressed || lattice_->anchored(t.v) || t.part != 0) continue;
+    const glm::dvec3 before = state_.at(t.v);
+    state_.set(t.v, before + glm::dot(delta, t.normal) * t.normal);
+    sources_.push_back(t.v);
+    moves_.emplace_back(state_.at(t.v) - before);
+  }
+  if (!part_seen_.empty()) follow_parts(delta);
+  if (!sources_.empty()) settle_chain();
+}
+
+std::size_t SoftObject::give_way(const ToolInBody& tool, std::span<ToolBound> out) const noexcept {
+  const bool flat = tool.shape == ToolInBody::Shape::punch;
+  std::size_t count = 0;
+  for (const Touch& t : touches_) {
+    if (count == out.size()) break;
+    if (on_grid_ && !t.pressed) continue;  // all that are in the tool are
+    const glm::dvec3 p = position(t);
+    if (clear_of(tool, p)) continue;
+    const Gap g = gap(tool, p);
+    if (g.distance >= -kGiveWay * voxel_radius()) continue;
+    if (t.beside && -g.distance > kDeep * voxel_radius()) {
+      const glm::dvec3 from = p - tool.centre, across = from - glm::dot(from, tool.axis) * tool.axis;
+      const double distance = glm::length(across);
+      if (distance > 0.0) {
+        out[count++] = {-across / distance, tool.radius - glm::dot(across / distance, p), t.v};
+        continue;
+      }
+    }
+    const double away = flat ? voxel_radius() : reach(tool.radius);
+    out[count++] = {-g.normal, glm::dot(-g.normal, p) + away - t.noted, t.v};
+  }
+  return count;
+}
+
+void SoftObject::note_depths(const ToolInBody& tool) noexcept {
+  const bool flat = tool.shape == ToolInBody::Shape::punch;
+  if (on_grid_ && !flat) return;  // as each cycle ends nothing is in it that could be elsewhere
+  for (Touch& t : touches_) {
+    const glm::dvec3 from = position(t) - tool.centre;
+    const double along = glm::dot(from, tool.axis), distance = glm::length(from);
+    t.beside = flat && distance * distance - along * along > tool.radius * tool.radius;
+    const double depth = flat ? voxel_radius() - along : reach(tool.radius) - distance;
+    t.noted = depth > kDeep * voxel_radius() ? depth : 0.0;
+  }
+}
+
+std::size_t SoftObject::list_held() noexcept {
+  all_held_.clear();
+  for (const Touch& t : touches_) {
+    if (t.pressed) all_held_.push_back(t.v);
+  }
+  const std::size_t pressed = all_held_.size();
+  for (const VoxelId v : held_voxels_) all_held_.push_back(v);
+  return pressed;
+}
+
+std::size_t SoftObject::shared(std::size_t work) const noexcept {
+  return static_cast<std::size_t>(work_share_ * static_cast<double>(work));
+}
+
+std::size_t SoftObject::left_of(std::size_t work) const noexcept {
+  const std::size_t all = shared(cold_ticks_ > 0 ? kColdWork : work);
+  return all - std::min(all, contact_work_);
+}
+
+std::size_t SoftObject::work_left() const noexcept {
+  return left_of(kTickWork);
+}
+
+std::uint64_t SoftObject::relax_background(std::uint64_t budget) noexcept {
+  if (relaxation_.asleep()) return 0;
+  list_held();
+  return relaxation_.run(state_, obstacle_view(), all_held_, budget);
+}
+
+bool SoftObject::prepare_exchange() noexcept {
+  if (relaxation_.rows_to_drop() < kDropsApart) return false;
+  relaxation_.drop_coarse();
+  return true;
+}
+
+// What pressed voxels would do now they do not: they follow the tool, and once between two results they look
+// for their places. (Sliding while their neighbours were on their way elsewhere, ever so little more each
+// time, they never came to rest.)
+void SoftObject::give_away() noexcept {
+  relaxation_.give_away(state_, obstacle_view());
+  cold_ticks_ = kColdTicks;
+  for (Touch& t : touches_) {
+    t.left = glm::dvec3(0.0);
+    if (!t.pressed || lattice_->anchored(t.v) || t.part != 0) continue;
+    Touch here = t;
+    const glm::dvec3 place = place_of(tool_, links_of(relaxation_.couplings(), state_, t.v), here);
+    if (here.pressed) t.left = place - state_.at(t.v);
+  }
+}
+
+void SoftObject::keep_away(float part) noexcept {
+  relaxation_.multigrid().keep_balanced(part, state_);
+  for (Touch& t : touches_) t.left *= static_cast<double>(part);
+}
+
+void SoftObject::relax_cycle() noexcept {
+  list_held();
+  relaxation_.run_cycle(state_, obstacle_view(), all_held_);
+}
+
+glm::dvec3 SoftObject::displacement_at(const glm::dvec3& rest_point) const noexcept {
+  if (on_grid_) {
+    const glm::dvec3 at = rest_point / lattice_->spacing_m();
+    return grid_->at_point({at.x, at.y, at.z});
+  }
+  return moved_ever_ ? voxel::displacement_at(*lattice_, state_, rest_point) : glm::dvec3(0.0);
+}
+
+}  // namespace voxel

@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "voxel/relaxation/limit_followers.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "voxel/lattice/voxel_links.h"
+#include "voxel/lattice/plastic_offsets.h"
+
+namespace voxel {
+namespace {
+
+// Lanes of a row whose voxels are not there, are anchored, or are moved by somebody else.
+std::uint32_t staying(const Lattice& lattice, const Displacement& state, RowId row) {
+  const std::size_t first = static_cast<std::size_t>(row) * kRow;
+  const std::uint8_t* role = state.role.data() + first;
+  std::uint32_t bits = ~lattice.filled_lanes(row) | lattice.anchored_lanes(row);
+  for (std::size_t i = 0; i < kRow; ++i)
+    bits |= static_cast<std::uint32_t>(role[i] != Displacement::free) << i;
+  return bits;
+}
+
+// b0 <= u(up) − u(down) <= b1 of the link of a voxel on axis kAxis to its neighbour further up, or down, in
+// kD.
+template <std::size_t kAxis, std::size_t kD, bool kUp>
+std::array<float, 2> bounds_of(const RowLimits& limits, std::size_t lane) {
+  if (limits.lanes == nullptr) {
+    const AxisLimits& l = (*limits.of)[kAxis];
+    return {l.low[kD], l.high[kD]};
+  }
+  const RowLimits::Written& w = *limits.lanes;
+  if constexpr (kAxis == kD) {
+    return {(kUp ? w.up_low : w.down_low)[kD][lane], (kUp ? w.up_high : w.down_high)[kD][lane]};
+  } else {
+    const float across = (kUp ? w.up_across : w.down_across)[kD][lane];
+    return {-across, across};
+  }
+}
+
+// The links of a voxel in kD: what they pull it with, and where they let it be.
+template <std::size_t kAxis, std::size_t kD>
+void add_links(const RowCouplings& springs, const RowLimits& limits, std::size_t lane, float up, float down,
+               float& pull, std::array<float, 2>& interval) {
+  const std::size_t at = kD * kRow + lane;
+  const float k_up = (kAxis == kD ? springs.up_along : springs.up_across)[at],
+              k_down = (kAxis == kD ? springs.down_along : springs.down_across)[kD][lane];
+  pull += k_up * up + k_down * down;
+  const std::array<float, 2> above = bounds_of<kAxis, kD, true>(limits, lane),
+                             below = bounds_of<kAxis, kD, false>(limits, lane);
+  // Where a row has one set of limits for all its links, those that are not there have it too.
+  if (k_up > 0.0F) {
+    interval[0] = std::max(interval[0], up - above[1]);
+    interval[1] = std::min(interval[1], up - above[0]);
+  }
+  if (k_down > 0.0F) {
+    interval[0] = std::max(interval[0], down + below[0]);
+    interval[1] = std::min(interval[1], down + below[1]);
+  }
+}
+
+}  // namespace
+
+DrawnRows::DrawnRows(const Lattice& lattice, std::size_t most_roots)
+    : lattice_(lattice), yields_(lattice.yields()), entry_(lattice.grid().rows()) {
+  for (std::size_t d = 0; d < 3; ++d)
+    spacing_m_[d] = static_cast<float>(lattice.spacing_m()[static_cast<int>(d)]);
+  rows_.reserve(std::min(kMostRows, lattice.grid().rows()));
+  drawn_.reserve(most_roots + kMostDrawn + 6);
+}
+
+// Null: nothing is in it, or too many were looked at.
+DrawnRows::Row* DrawnRows::look_at(RowId row) noexcept {
+  if (entry_[row] != 0) return &rows_[entry_[row] - 1U];
+  Couplings& couplings = relaxation_->couplings();
+  if (rows_.size() == rows_.capacity() || !couplings.prepare(row)) return nullptr;
+  Row& out = rows_.emplace_back();
+  entry_[row] = static_cast<std::uint16_t>(rows_.size());
+  out.row = row;
+  out.stays = out.closed = staying(lattice_, *state_, row);
+  couplings.all(row, out.springs);
+  out.limits = couplings.limits(row);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (state_->bricks.has(row))
+      out.bricks[axis] = state_->bricks.load[axis].data() + static_cast<std::size_t>(row) * kRow;
+    if (relaxation_->away()) out.balance[axis] = relaxation_->multigrid().balance_of(row, axis);
+  }
+  return &out;
+}
+
+void DrawnRows::draw(Relaxation& relaxation, Displacement& state, std::span<const VoxelId> roots,
+                     float stir) noexcept {
+  relaxation_ = &relaxation;
+  state_ = &state;
+  stir_ = stir;
+  for (const Row& r : rows_) entry_[r.row] = 0;
+  rows_.clear();
+  draw_on<0>(roots);
+  draw_on<1>(roots);
+  draw_on<2>(roots);
+}
+
+template <std::size_t kAxis>
+void DrawnRows::draw_on(std::span<const VoxelId> roots) noexcept {
+  for (Row& r : rows_) r.closed = r.stays;
+  drawn_.clear();
+  for (const VoxelId v : roots) {
+    if (Row* row = look_at(v / kRow); row != nullptr) add(*row, v);
+  }
+  const std::size_t most = drawn_.size() + kMostDrawn;
+  for (std::size_t head = 0; head < drawn_.size() && drawn_.size() < most; ++head) {
+    const VoxelId v = drawn_[head];
+    look_from<kAxis, 0, false>(v, lattice_.down(v, 0));
+    look_from<kAxis, 0, true>(v, lattice_.up(v, 0));
+    look_from<kAxis, 1, false>(v, lattice_.down(v, 1));
+    look_from<kAxis, 1, true>(v, lattice_.up(v, 1));
+    look_from<kAxis, 2, false>(v, lattice_.down(v, 2));
+    look_from<kAxis, 2, true>(v, lattice_.up(v, 2));
+  }
+}
+
+// At a voxel from the one below it in kD (kUp), or from the one above.
+template <std::size_t kAxis, std::size_t kD, bool kUp>
+void DrawnRows::look_from(VoxelId from, VoxelId at) noexcept {
+  Row* row = look_at(at / kRow);
+  const std::size_t lane = at % kRow;
+  if (row == nullptr || (row->closed >> lane & 1U) != 0) return;
+  auto& u = state_->u[kAxis];
+  const std::array<float, 2> b = bounds_of<kAxis, kD, !kUp>(row->limits, lane);
+  const float low = kUp ? b[0] : -b[1], high = kUp ? b[1] : -b[0], before = u[at];
+  const auto room = [&](float now) { return std::min(now - u[from] - low, high - (now - u[from])); };
+  if (room(before) > kNearlyTight * spacing_m_[kD]) return;
+  const float place = place_of<kAxis>(*row, at);
+  u[at] = place;
+  if (!row->stirred && std::fabs(place - before) > stir_ * spacing_m_[kD]) {
+    row->stirred = true;
+    relaxation_->stir(row->row);
+  }
+  if (!row->noted) {
+    row->noted = true;
+    relaxation_->multigrid().log().note(0, row->row);
+  }
+  if (room(place) <= kTight * spacing_m_[kD]) add(*row, at);
+}
+
+// Where a voxel would be if all else stood still.
+template <std::size_t kAxis>
+float DrawnRows::place_of(const Row& row, VoxelId v) const noexcept {
+  const std::size_t lane = v % kRow;
+  const float* u = state_->u[kAxis].data();
+  const auto at = [&](VoxelId w) { return u[w]; };
+  float pull = row.bricks[kAxis] != nullptr ? row.bricks[kAxis][lane] : 0.0F;
+  if (yields_) pull = yielded_load(lattice_, *state_, relaxation_->couplings().springs_of(v), v)[kAxis];
+  constexpr float kFar = std::numeric_limits<float>::max();
+  std::array<float, 2> interval{-kFar, kFar};
+  add_links<kAxis, 0>(row.springs, row.limits, lane, at(lattice_.up(v, 0)), at(lattice_.down(v, 0)), pull,
+                      interval);
+  add_links<kAxis, 1>(row.springs, row.limits, lane, at(lattice_.up(v, 1)), at(lattice_.down(v, 1)), pull,
+                      interval);
+  add_links<kAxis, 2>(row.springs, row.limits, lane, at(lattice_.up(v, 2)), at(lattice_.down(v, 2)), pull,
+                      interval);
+  const float inverse = row.springs.inverse[kAxis * kRow + lane];
+  auto wanted = static_cast<double>(pull * inverse);
+  if (row.balance[kAxis] != nullptr) {
+    const float own = row.bricks[kAxis] != nullptr ? row.bricks[kAxis][lane] : 0.0F;
+    wanted += static_cast<double>(inverse) * static_cast<double>(row.balance[kAxis][lane] - own);
+  }
+  return clamp_to(interval, static_cast<float>(wanted), u[v]);
+}
+
+}  // namespace voxel

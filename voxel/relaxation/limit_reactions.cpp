@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "voxel/relaxation/limit_reactions.h"
+
+#include <algorithm>
+#include <bit>
+#include <bitset>
+
+#include "voxel/multigrid/fas.h"
+#include "voxel/lattice/near_limit.h"
+
+namespace voxel {
+namespace {
+
+constexpr float kTight = 1e-4F;        // of the spacing: nearer to its limit than this a link is tight
+constexpr float kNearlyTight = 2e-4F;  // further from it, a link surely is not
+
+// Sum over the lanes whose bits are set.
+double sum_of(const float* lanes, std::uint32_t bits) {
+  double sum = 0.0;
+  for (; bits != 0; bits &= bits - 1U) sum += static_cast<double>(lanes[std::countr_zero(bits)]);
+  return sum;
+}
+
+}  // namespace
+
+struct TightRows::Gathering {
+  Couplings& couplings;
+  std::span<const VoxelId> roots;  // sorted
+  const Multigrid* multigrid;      // null: there are no parts without slack
+  std::uint16_t root_part;         // number of the one whose voxels are the roots; 0: of none
+  bool border_known = false;       // all of that one's border was looked at
+  std::bitset<Lattice::kMostParts> known;
+  std::array<double, Lattice::kMostParts> pull_N;  // of those known
+
+  // (By their own links its voxels are pulled this way and that, and an inclusion between the tool and the
+  // anchors, in tissue at its limits, ended what hangs on the tool: half of the force was lost.)
+  void pull_as_parts(const Displacement& state, int axis, Row& row) {
+    std::uint32_t of_parts = 0, up = 0, down = 0;
+    std::uint16_t last = 0;  // most rows have one
+    double pull = 0.0;
+    for (VoxelId lane = 0; lane < kRow; ++lane) {
+      const std::uint16_t number = multigrid->parts().of(0, row.row * kRow + lane);
+      if (number == 0) continue;
+      if (number != last) {
+        last = number;
+        pull = pull_of(number - 1U, state, axis);
+      }
+      const std::uint32_t bit = 1U << lane;
+      of_parts |= bit;
+      up |= pull > 0.0 ? bit : 0U;
+      down |= pull < 0.0 ? bit : 0U;
+      if (number == root_part) row.roots |= bit;
+    }
+    row.links.pulled_up = (row.links.pulled_up & ~of_parts) | up;
+    row.links.pulled_down = (row.links.pulled_down & ~of_parts) | down;
+  }
+
+  double pull_of(std::size_t part, const Displacement& state, int axis) {
+    if (!known[part]) {
+      known.set(part);
+      pull_N[part] = multigrid->part_force(part, state)[axis];
+    }
+    return pull_N[part];
+  }
+
+  // Is all that there is in a row of the part whose voxels are the roots?
+  [[nodiscard]] bool within_root_part(const Lattice& lattice, RowId row) const {
+    if (root_part == 0 || !multigrid->parts().fill_row(0, row)) return false;
+    for (VoxelId v = row * kRow; v < (row + 1) * kRow; ++v) {
+      if (lattice.filled(v) && multigrid->parts().of(0, v) != root_part) return false;
+    }
+    return true;
+  }
+};
+
+TightRows::TightRows(const Lattice& lattice) : lattice_(lattice), entry_(lattice.grid().rows()) {
+  rows_.reserve(kMostRows);
+  queue_.resize(kMostRows);
+}
+
+// Null: nothing is in it, or too many were looked at.
+TightRows::Row* TightRows::look_at(RowId row) noexcept {
+  if (entry_[row] != 0) return &rows_[entry_[row] - 1U];
+  if (rows_.size() == kMostRows || !gathering_->couplings.prepare(row)) return nullptr;
+  // The inside of a part whose border was looked at.
+  if (gathering_->border_known && gathering_->within_root_part(lattice_, row)) return nullptr;
+  const Grid& g = lattice_.grid();
+  const auto ua = static_cast<std::size_t>(axis_);
+  LevelRow at;
+  at.u[ua] = state_->u[ua].data() + static_cast<std::size_t>(row) * kRow;
+  at.load[ua] = state_->load_of(row, axis_);
+  at.z = static_cast<std::ptrdiff_t>(g.row_z) * kRow;
+  at.x = static_cast<std::ptrdiff_t>(g.row_x) * kRow;
+  gathering_->couplings.all(row, at.springs);
+  std::array<float, 3> tight{};
+  for (std::size_t d = 0; d < 3; ++d) tight[d] = kTight * static_cast<float>(lattice_.spacing_m()[d]);
+  Row& out = rows_.emplace_back();
+  out.row = row;
+  links_at_limits(at, gathering_->couplings.limits(row), ua, tight, out.links);
+  if (gathering_->multigrid != nullptr && gathering_->multigrid->parts().in_row(0, row))
+    gathering_->pull_as_parts(*state_, axis_, out);
+  entry_[row] = static_cast<std::uint16_t>(rows_.size());
+  const auto& roots = gathering_->roots;
+  for (auto v = std::lower_bound(roots.begin(), roots.end(), row * kRow);
+       v != roots.end() && *v / kRow == row; ++v)
+    out.roots |= 1U << *v % kRow;
+  if (out.roots != 0) add(out, out.roots);
+  return &out;
+}
+
+// Voxels of a row that links at their limits push against what pulls them; of the links whose upper, or
+// lower, ends they are.
+std::uint32_t TightRows::pushed(const Row& row, std::uint32_t at_low, std::uint32_t at_high,
+                                End end) noexcept {
+  const std::uint32_t up = end == End::upper ? at_low : at_high, down = end == End::upper ? at_high : at_low;
+  return (up & row.links.pulled_down) | (down & row.links.pulled_up) | (up & down);
+}
+
+// And what hangs on these in the row itself.
+void TightRows::add(Row& row, std::uint32_t bits) noexcept {
+  const std::uint32_t before = row.carried, low = row.links.at_low[0], high = row.links.at_high[0];
+  row.carried |= bits;
+  const std::uint32_t upwards = pushed(row, low << 1U, high << 1U, End::upper) & row.links.movable,
+                      downwards = pushed(row, low, high, End::lower) & row.links.movable;
+  for (std::uint32_t more = ~0U; more != 0; row.carried |= more)
+    more = ((row.carried << 1U & upwards) | (row.carried >> 1U & downwards)) & ~row.carried;
+  row.fresh |= row.carried & ~before;
+  if (row.fresh == 0 || row.queued) return;
+  row.queued = true;
+  queue_[(head_ + waiting_++) % kMostRows] = static_cast<std::uint32_t>(&row - rows_.data());
+}
+
+// What of a row hangs on voxels beside it, by links at their limits whose `end` it is.
+void TightRows::ask(RowId row, std::uint32_t at_low, std::uint32_t at_high, End end) noexcept {
+  if ((at_low | at_high) == 0) return;
+  Row* to = look_at(row);
+  if (to == nullptr) return;
+  const std::uint32_t more = pushed(*to, at_low, at_high, end) & to->links.movable & ~to->carried;
+  if (more != 0) add(*to, more);
+}
+
+void TightRows::begin(Gathering& gathering, Displacement& state, int axis) noexcept {
+  gathering_ = &gathering;
+  state_ = &state;
+  axis_ = axis;
+  for (const Row& r : rows_) entry_[r.row] = 0;
+  rows_.clear();
+  head_ = waiting_ = 0;
+}
+
+void TightRows::gather(Couplings& couplings, Displacement& state, std::span<const VoxelId> roots,
+                       int axis) noexcept {
+  Gathering gathering{couplings, roots, nullptr, 0, false, {}, {}};
+  begin(gathering, state, axis);
+  for (const VoxelId v : roots) {
+    if (may_be_tight(lattice_, state, v, axis, kNearlyTight)) look_at(v / kRow);
+  }
+  find_all();
+  // Roots beside what hangs on others, so that links between these and those are known for such.
+  for (const VoxelId v : roots) {
+    if (rows_.empty()) break;
+    if (find(v / kRow) != nullptr) continue;
+    for (int n = 0; n < 6; ++n) {
+      if (carried(n % 2 == 0 ? lattice_.up(v, n / 2) : lattice_.down(v, n / 2))) look_at(v / kRow);
+    }
+  }
+  gathering_ = nullptr;
+}
+
+void TightRows::gather_on_part(Couplings& couplings, Displacement& state, const Multigrid& multigrid,
+                               std::size_t part, int axis) noexcept {
+  Gathering gathering{couplings, {}, &multigrid, static_cast<std::uint16_t>(part + 1), false, {}, {}};
+  begin(gathering, state, axis);
+  for (const WholeParts::Link& l : multigrid.parts().on(0, part).border) look_at(l.cell / kRow);
+  gathering.border_known = true;
+  find_all();
+  gathering_ = nullptr;
+}
+
+void TightRows::find_all() noexcept {
+  const Grid& g = lattice_.grid();
+  while (waiting_ > 0) {
+    Row& row = rows_[queue_[head_]];  // rows_ never grows beyond what was reserved, so it stays where it is
+    head_ = (head_ + 1) % kMostRows;
+    --waiting_;
+    const std::uint32_t fresh = row.fresh;
+    row.fresh = 0;
+    row.queued = false;
+    const LinksAtLimits& links = row.links;
+    for (std::size_t d = 0; d < 3; ++d) {
+      const std::uint32_t low = links.at_low[d] & fresh, high = links.at_high[d] & fresh,
+                          down_low = links.down_at_low[d] & fresh, down_high = links.down_at_high[d] & fresh;
+      const RowId away = d == 0 ? g.row_x : d == 1 ? 1U : g.row_z;
+      // Along x only the last voxel, and the first, have their neighbours in other rows.
+      const int up = d == 0 ? kRow - 1 : 0;
+      ask(row.row + away, low >> up, high >> up, End::upper);
+      ask(row.row - away, down_low << up, down_high << up, End::lower);
+    }
+  }
+}
+
+bool TightRows::tight(VoxelId root) const noexcept {
+  const Row* own = find(root / kRow);
+  if (own == nullptr) return false;
+  const VoxelId lane = root % kRow;
+  for (int d = 0; d < 3; ++d) {
+    const auto ud = static_cast<std::size_t>(d);
+    const LinksAtLimits& l = own->links;
+    if (((l.at_low[ud] | l.at_high[ud]) >> lane & 1U) != 0 && !lattice_.anchored(lattice_.up(root, d)))
+      return true;
+    if (((l.down_at_low[ud] | l.down_at_high[ud]) >> lane & 1U) != 0 &&
+        !lattice_.anchored(lattice_.down(root, d)))
+      return true;
+  }
+  return false;
+}
+
+TightRows::Hanging TightRows::hanging(const Couplings& couplings) const noexcept {
+  Hanging sum;
+  const RowId row_z = lattice_.grid().row_z, row_x = lattice_.grid().row_x;
+  for (const Row& r : rows_) {
+    const std::uint32_t hangs = r.carried & ~r.roots;
+    if (hangs == 0) continue;
+    sum.force_N += sum_of(r.links.pull_N.data(), hangs);
+    RowCouplings s;
+    couplings.all(r.row, s);
+    const std::array<std::uint32_t, 3> up{r.carried >> 1U | carried_in(r.row + row_x) << (kRow - 1),
+                                          carried_in(r.row + 1), carried_in(r.row + row_z)};
+    const std::array<std::uint32_t, 3> down{r.carried << 1U | carried_in(r.row - row_x) >> (kRow - 1),
+                                            carried_in(r.row - 1), carried_in(r.row - row_z)};
+    for (std::size_t d = 0; d < 3; ++d) {
+      const bool along = static_cast<int>(d) == axis_;
+      sum.stiffness_N_per_m += sum_of((along ? s.up_along : s.up_across) + d * kRow, hangs & ~up[d]) +
+                               sum_of((along ? s.down_along : s.down_across)[d], hangs & ~down[d]);
+    }
+  }
+  return sum;
+}
+
+}  // namespace voxel

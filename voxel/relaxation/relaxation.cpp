@@ -1,0 +1,464 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "voxel/relaxation/relaxation.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "voxel/relaxation/admm_region.h"
+
+namespace voxel {
+namespace {
+
+constexpr std::uint64_t kLetGoEvery = 8;  // rounds
+constexpr int kPatience = 40;             // cycles without gain before an object counts as resting
+constexpr double kWorse = 1.05;
+constexpr float kHarder = 8.0F, kSofter = 0.97F, kHardest = 1e4F;
+// A residual is what a cycle finds before its coarse levels correct it: round what is a hundred times stiffer
+// more than that can be left afterwards. (Another sweep where links differ left less, but some tissue at its
+// limits, or hanging by little, did not come to rest with it.)
+constexpr double kMeasured = 0.5;
+constexpr double kGain = 0.98;      // of the least residual so far: less is a gain
+constexpr double kNearRest = 10.0;  // times the tolerance: what limits hold moves together from here on
+constexpr double kProgress = 1e-3;  // of the spacing: clusters that move further are on their way
+// … and where links have next to no slack, those that all went this much further than ever in a round; not
+// between surfaces, where what is squeezed would be on its way for long. (Taken for what their steps free of
+// energy, it was for ever.)
+constexpr double kDrift = 2e-5;
+// Spacings that a coarse cell may have to tell. Between a body and a plate cells ran away to 1e30 m in ten
+// ticks; with ten spacings, or four, some went on running to and fro when the body had left.
+constexpr float kFarthest = 2.0F;
+constexpr std::uint64_t kPatient = 200'000;  // voxel updates a call: more than a tick has
+constexpr std::uint64_t kNextFirst = 7919;   // of these voxels is looked at first in the next round
+// Cells round a contact that are smoothed, on each level.
+constexpr int kContactMargin = 3, kWideMargin = 14;
+// … and told after a jump. (All cells there are: no nearer, and of 10^6 voxels a third of the first result's
+// time, since each row has to go over to the tick, too. Within 16: what was told then disturbed later ones.)
+constexpr int kToldMargin = 24;
+constexpr int kNear = 2;  // rows that a cycle round a contact reads beyond those it brings to rest
+constexpr std::uint64_t kBesideContact = 2;  // this part of the budget is left beside cycles round a contact
+// Loads of bricks: what a row of them takes, in voxel updates, and what part of a budget they may have.
+constexpr std::uint64_t kBrickUpdates = 4 * kRow, kBrickShare = 2;
+constexpr int kLooksAtOnce = 256;  // tiles looked at for what coarse levels have to tell them, a call
+
+}  // namespace
+
+Relaxation::Relaxation(const Lattice& lattice)
+    : lattice_(lattice),
+      multigrid_(lattice),
+      clusters_(lattice),
+      limited_(std::make_unique<LimitedRegion>(lattice)) {
+  set_tolerance(kMeasured * kRestingResidual * lattice.force_scale_N());
+  farthest_m_ = kFarthest * static_cast<float>(lattice.max_spacing_m());
+  boxes_.resize(static_cast<std::size_t>(multigrid_.levels()));
+  list_steps();
+  standing_.reserve(lattice.surface().size());
+}
+
+Relaxation::~Relaxation() = default;
+
+bool Relaxation::limits_hold() const noexcept {
+  return limited_->found();
+}
+
+void Relaxation::relax_limited(Displacement& state, const ObstacleView& obstacles) noexcept {
+  if (!tool_presses_ || !obstacles.obstacles.empty()) return;
+  limited_->relax(multigrid_, state, obstacles, {}, true);
+  multigrid_.release_unlimited(state);
+}
+
+void Relaxation::prepare_under_tool() {
+  limited_->prepare_lists();
+}
+
+void Relaxation::prepare_beside_bodies() {
+  multigrid_.prepare_tied();
+  limited_->prepare_all();
+}
+
+void Relaxation::set_tolerance(double tolerance_N) noexcept {
+  tolerance_N_ = tolerance_N;
+  // A motion below this changes no force by more than the tolerance.
+  const double scale = lattice_.force_scale_N();
+  multigrid_.set_quiet(
+      static_cast<float>(tolerance_N),
+      scale > 0.0 ? static_cast<float>(tolerance_N / scale * lattice_.min_spacing_m()) : 0.0F);
+}
+
+void Relaxation::copy_from(const Relaxation& other) noexcept {
+  multigrid_.copy_from(other.multigrid_);
+  set_tolerance(other.tolerance_N_);
+  unkept_ = other.unkept_;
+  wake();
+}
+
+void Relaxation::leave_to_another() {
+  apart_ = true;
+  list_steps();
+  multigrid_.forget_coarse();
+  multigrid_.keep_log();
+}
+
+void Relaxation::give_away(Displacement& state, const ObstacleView& obstacles) noexcept {
+  asleep_ = away_ = true;
+  end_contact();
+  multigrid_.begin_anew();
+  const Grid& g = lattice_.grid();
+  for (int c = near_.first[0]; c <= near_.last[0]; ++c) {
+    for (int k = near_.first[2]; k <= near_.last[2]; ++k) {
+      for (int j = near_.first[1]; j <= near_.last[1]; ++j)
+        multigrid_.balance(g.row(c, j, k), state, obstacles);
+    }
+  }
+  multigrid_.balance_parts(state);
+}
+
+void Relaxation::stir_all() noexcept {
+  for (RowId row = 0; row < lattice_.grid().rows(); ++row) {
+    if (lattice_.filled_in(row) != 0) multigrid_.stir(0, row);
+  }
+}
+
+// What the tool presses slides, and is held by where it does; see Multigrid.
+void Relaxation::hold_what_stands(const Displacement& state, std::span<const VoxelId> held) noexcept {
+  standing_.clear();
+  bool others_hold = false;
+  tool_presses_ = false;
+  for (const VoxelId v : held) {
+    tool_presses_ = tool_presses_ || state.role[v] == Displacement::pressed;
+    others_hold = others_hold || state.role[v] == Displacement::held;
+    if (state.role[v] == Displacement::held && standing_.size() < standing_.capacity())
+      standing_.push_back(v);
+  }
+  // Loads of bricks follow a cycle later, and with ν towards 0.5 what they are not yet told of is more than
+  // the springs know: there the region went to and fro.
+  tool_presses_ = tool_presses_ && !others_hold && !lattice_.has_bricks();
+  multigrid_.set_held(standing_);
+  multigrid_.set_part_contacts(state, held);
+}
+
+std::uint64_t Relaxation::run(Displacement& state, const ObstacleView& obstacles,
+                              std::span<const VoxelId> held, std::uint64_t budget) noexcept {
+  if (asleep_) return 0;
+  patient_ = budget >= kPatient;
+  hold_what_stands(state, held);
+  TileQueue& tiles = multigrid_.tiles();
+  std::uint64_t spent = 0;
+  credit_ += static_cast<std::int64_t>(contact_relaxed_ ? budget / kBesideContact : budget);
+  contact_relaxed_ = false;
+  const auto spend = [&](std::uint64_t updates) {
+    credit_ -= static_cast<std::int64_t>(updates);
+    spent += updates;
+  };
+  spend(kBrickUpdates * multigrid_.renew_bricks(state, 1 + budget / (kBrickShare * kBrickUpdates)));
+  while (!asleep_ && credit_ > 0) {
+    if (keeping_) {
+      spend(keep_yielded(state, static_cast<std::uint64_t>(credit_)));
+      continue;
+    }
+    if (round_left_ == 0) round_left_ = tiles.waiting();
+    if (tiles.waiting() > 0) {
+      looked_at_ = 0;
+      spend(relax_tile(state, obstacles, tiles.pop()));
+      if (round_left_ > 0 && --round_left_ == 0) end_round(state, obstacles, running_residual_N_);
+      continue;
+    }
+    // Nothing was stirred: what coarse levels know may still have to be told somewhere.
+    for (int n = 0; n < kLooksAtOnce && looked_at_ < tiles.tiles() && tiles.waiting() == 0;
+         ++n, ++looked_at_) {
+      if (tile_waits_for_coarse(cursor_)) tiles.push(cursor_);
+      cursor_ = (cursor_ + 1) % tiles.tiles();
+    }
+    spend(kLooksAtOnce * 4);
+    if (looked_at_ >= tiles.tiles() && tiles.waiting() == 0) {
+      looked_at_ = 0;
+      running_residual_N_ = 0.0;
+      end_round(state, obstacles, std::min(residual_N_, 0.99 * tolerance_N_));
+    }
+  }
+  // What was not needed is not saved up for a tick that has enough to do.
+  credit_ = std::min<std::int64_t>(credit_, 0);
+  return spent;
+}
+
+void Relaxation::run_cycle(Displacement& state, const ObstacleView& obstacles,
+                           std::span<const VoxelId> held) noexcept {
+  if (asleep_) return;
+  if (keeping_) {
+    while (keeping_) keep_yielded(state, ~std::uint64_t{0});
+    return;
+  }
+  hold_what_stands(state, held);
+  multigrid_.renew_bricks(state, multigrid_.grid(0).rows());
+  multigrid_.tiles().clear();
+  round_left_ = 0;
+  running_residual_N_ = 0.0;
+  lay_whole_boxes(Visits::once);
+  cycle(state, obstacles, Look::active);
+  patient_ = true;
+  end_round(state, obstacles, running_residual_N_);
+}
+
+std::size_t Relaxation::relax_contact(Displacement& state, const ObstacleView& obstacles,
+                                      std::span<const VoxelId> held, std::span<const VoxelId> pressed,
+                                      bool again, std::size_t at_once) noexcept {
+  contact_relaxed_ = true;
+  hold_what_stands(state, held);
+  lay_contact_boxes(pressed, kContactMargin, Visits::once);
+  const RowBox& b = boxes(0).smoothed;
+  const Grid& g = lattice_.grid();
+  near_.first = {b.q0 / kOctets + 1, std::max(b.j0 - kNear, 0), std::max(b.k0 - kNear, 0)};
+  near_.last = {b.q1 / kOctets + 1, std::min(b.j1 + kNear, g.dims[1] - 1),
+                std::min(b.k1 + kNear, g.dims[2] - 1)};
+  end_contact();
+  smoothed_ = apart_ && again;
+  wide_ = static_cast<double>(octets_of_cycle()) > narrow_share_ * static_cast<double>(kNarrow);
+  return run_steps(state, obstacles, wide_ ? at_once : kWhole);
+}
+
+std::size_t Relaxation::continue_contact(Displacement& state, const ObstacleView& obstacles,
+                                         std::span<const VoxelId> held, std::size_t at_once) noexcept {
+  hold_what_stands(state, held);
+  return run_steps(state, obstacles, at_once);
+}
+
+// Of what is left to do an equal part.
+std::size_t Relaxation::run_steps(Displacement& state, const ObstacleView& obstacles,
+                                  std::size_t at_once) noexcept {
+  std::size_t left = work_of_planes(step_, plane_), done = 0;
+  for (int n = step_ + 1; n < steps(); ++n) left += work_of_step(n);
+  const std::size_t most = std::max<std::size_t>(at_once, 1);
+  const std::size_t parts = left <= most ? 1 : std::max<std::size_t>(2, (left - 1) / most + 1);
+  const std::size_t part = parts == 1 ? left : left / parts;
+  while (step_ < steps()) {
+    const int planes = planes_of_step(step_);
+    const std::size_t of_plane = work_of_step(step_) / static_cast<std::size_t>(planes);
+    if (done > 0 && done + of_plane / 2 > part) return done;
+    int last = planes - 1;
+    if (parts > 1 && of_plane > 0) {
+      const std::size_t fit =
+          std::max<std::size_t>(1, (part - std::min(part, done) + of_plane / 2) / of_plane);
+      last = std::min(last, plane_ + static_cast<int>(fit) - 1);
+    }
+    done += work_of_planes(step_, plane_) - work_of_planes(step_, last + 1);
+    step(step_, {plane_, last}, state, obstacles, Look::all, smoothed_);
+    plane_ = last + 1 < planes ? last + 1 : 0;
+    if (plane_ == 0) ++step_;
+  }
+  end_contact();
+  return done;
+}
+
+std::size_t Relaxation::relax_widely(Displacement& state, const ObstacleView& obstacles,
+                                     std::span<const VoxelId> held, std::span<const VoxelId> pressed,
+                                     bool coarse_first) noexcept {
+  hold_what_stands(state, held);
+  multigrid_.release_limited();
+  lay_contact_boxes(pressed, kWideMargin, Visits::twice);
+  tells_jointly_ = true;
+  if (coarse_first) {
+    run_coarse_first(state, obstacles);
+    run_steps_over(steps() - 1, steps(), state, obstacles, Look::all);
+  } else {
+    cycle(state, obstacles, Look::all);
+  }
+  tells_jointly_ = false;
+  return octets_of_cycle();
+}
+
+std::size_t Relaxation::tell_widely(Displacement& state, const ObstacleView& obstacles,
+                                    std::span<const VoxelId> pressed) noexcept {
+  lay_contact_boxes(pressed, kToldMargin, Visits::once);
+  tells_jointly_ = true;
+  std::size_t told = 0;
+  for (int l = last_level() - 1; l >= 0; --l) {
+    tell_box(l, state, obstacles, kAllPlanes);
+    told += octets(boxes(l).told);
+  }
+  tells_jointly_ = false;
+  return told;
+}
+
+void Relaxation::lay_contact_boxes(std::span<const VoxelId> pressed, int margin, Visits visits) noexcept {
+  std::array<int, 3> low = lattice_.coordinates(pressed.front()), high = low;
+  for (const VoxelId v : pressed) {
+    const auto c = lattice_.coordinates(v);
+    for (std::size_t d = 0; d < 3; ++d) {
+      low[d] = std::min(low[d], c[d]);
+      high[d] = std::max(high[d], c[d]);
+    }
+  }
+  for (std::size_t d = 0; d < 3; ++d) {
+    const int beyond = high[d] - low[d] - kMaxNear;
+    if (beyond <= 0) continue;
+    low[d] += beyond / 2;
+    high[d] = low[d] + kMaxNear;
+  }
+  const int wide = std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
+  lay_boxes(low, high, wide, margin, visits);
+}
+
+std::uint64_t Relaxation::relax_tile(Displacement& state, const ObstacleView& obstacles,
+                                     std::size_t number) noexcept {
+  const TileQueue::Tile t = multigrid_.tiles().tile(number);
+  constexpr int kSide = TileQueue::kSide;
+  lay_boxes({t.column * kRow, t.j * kSide, t.k * kSide},
+            {(t.column + 1) * kRow - 1, (t.j + 1) * kSide - 1, (t.k + 1) * kSide - 1}, kNoContact, 0,
+            Visits::once);
+  cycle(state, obstacles, Look::all);
+  std::uint64_t updates = 0;
+  for (const LevelBoxes& b : boxes_) {
+    updates += static_cast<std::uint64_t>(b.smoothed.q1 - b.smoothed.q0 + 1) * kOctet *
+               static_cast<std::uint64_t>(b.smoothed.j1 - b.smoothed.j0 + 1) *
+               static_cast<std::uint64_t>(b.smoothed.k1 - b.smoothed.k0 + 1);
+  }
+  return 2 * updates;
+}
+
+bool Relaxation::relax_limited(Displacement& state, const ObstacleView& obstacles,
+                               std::span<const VoxelId> on_body) noexcept {
+  if (on_body.empty()) {
+    limited_->pass(multigrid_);
+    return false;
+  }
+  const double most_N = limited_->relax(multigrid_, state, obstacles, on_body);
+  if (most_N > tolerance_N_) wake();
+  return limited_->found();
+}
+
+// What limits held in this round moves with what it pulls on; returns the largest force a voxel that did (N).
+// Which voxel is first goes round, so that all have their turn however few a round has time for.
+double Relaxation::move_clusters(Displacement& state, const ObstacleView& obstacles) noexcept {
+  clusters_.begin();
+  double most_N = 0.0;
+  std::array<double, 3> went{};
+  int moves = 0;
+  const auto move = [&](VoxelId v, int axis) {
+    const float from = state.u[static_cast<std::size_t>(axis)][v];
+    const double force = clusters_.move(multigrid_, state, v, axis, 0.5 * tolerance_N_);
+    if (force == 0.0) return;
+    most_N = std::max(most_N, force);
+    // Every such step lowers the energy, though it may be far from limit to limit to where the force falls.
+    const auto way = static_cast<double>(state.u[static_cast<std::size_t>(axis)][v] - from);
+    went[static_cast<std::size_t>(axis)] += way;
+    ++moves;
+    if (std::fabs(way) > kProgress * lattice_.min_spacing_m())
+      cycles_without_gain_ = std::min(cycles_without_gain_, kPatience / 2 + 1);
+    for (const VoxelId w : clusters_.moved()) multigrid_.stir(0, w / kRow);
+  };
+  // Parts without slack that limits hold, which are pulled otherwise than what holds them.
+  for (std::size_t p = 0; multigrid_.has_parts() && p < multigrid_.parts().count(); ++p) {
+    for (int axis = 0; axis < 3; ++axis) move(multigrid_.parts().first(p), axis);
+  }
+  std::uint64_t count = 0;
+  multigrid_.for_limited([&count](VoxelId, int) { ++count; });
+  const std::uint64_t first = count == 0 ? 0 : cycles_ * kNextFirst % count;
+  for (const bool before : {false, true}) {
+    std::uint64_t n = 0;
+    multigrid_.for_limited([&](VoxelId v, int axis) {
+      if ((n++ < first) == before) move(v, axis);
+    });
+  }
+  for (std::size_t axis = 0; axis < 3 && moves > 0 && obstacles.obstacles.empty(); ++axis) {
+    drift_m_[axis] += went[axis] / moves;
+    const double further = std::fabs(drift_m_[axis]) - furthest_m_[axis];
+    if (further <= 0.0) continue;
+    furthest_m_[axis] += further;
+    if (further > kDrift * lattice_.min_spacing_m())
+      cycles_without_gain_ = std::min(cycles_without_gain_, kPatience / 2 + 1);
+  }
+  credit_ -= static_cast<std::int64_t>(clusters_.looked_at());
+  return most_N;
+}
+
+// A round has looked at all that moves: is it at rest?
+void Relaxation::end_round(Displacement& state, const ObstacleView& obstacles, double residual_N) noexcept {
+  residual_N = std::max(residual_N, static_cast<double>(multigrid_.bricks().left_N()));
+  // Only when nothing else moves any more: between other corrections they would undo one another (energy grew
+  // 1.9 times within a cycle).
+  if (residual_N < kNearRest * tolerance_N_ || cycles_without_gain_ > kPatience / 2 || multigrid_.has_parts())
+    residual_N = std::max(residual_N, move_clusters(state, obstacles));
+  // While rounds gain nothing, what limits hold stays held for a few of them: let go of in every round, two
+  // sets of voxels can take turns for ever.
+  // What the tool presses, and all that hangs on it by links at their limits, goes together, too: a few
+  // hundred thousand voxel updates, which no tick has to spare. Beside a body something moves in every tick,
+  // so that each round is as the first, and there what is still pulled against its limit stays held. (Let go
+  // of, coarse levels took it off the limit and back: under a ball at rest by 0.03 spacings, for ever. Kept
+  // everywhere, tissue that jumped stayed far from rest. Beside what stands, the contact's own solver knows
+  // nothing of such places, and took a brain back from them in every tick.)
+  if (obstacles.moving > 0 || (tool_presses_ && patient_ && obstacles.obstacles.empty())) {
+    residual_N = std::max(residual_N, limited_->relax(multigrid_, state, obstacles, {}));
+    credit_ -= static_cast<std::int64_t>(limited_->looked_at());
+    multigrid_.release_unlimited(state);
+  } else {
+    limited_->forget(multigrid_);
+    if (cycles_without_gain_ <= 1 || cycles_ % kLetGoEvery == 0) multigrid_.release_limited();
+  }
+  // Scattered voxels hold a cell harder than a patch of them does. A cycle that ends worse than it began says
+  // so.
+  if (residual_N > kWorse * residual_N_ && cycles_without_gain_ > 0) {
+    hold_ = std::min(hold_ * kHarder, kHardest);
+  } else {
+    hold_ = std::max(1.0F, hold_ * kSofter);
+  }
+  multigrid_.set_hold(hold_);
+  residual_N_ = residual_N;
+  running_residual_N_ = 0.0;
+  ++cycles_;
+  if (cycles_without_gain_ == 0 || residual_N_ < kGain * least_residual_N_) {
+    least_residual_N_ = residual_N_;
+    cycles_without_gain_ = 0;
+  }
+  ++cycles_without_gain_;
+  const bool at_rest =
+      (residual_N_ < tolerance_N_ && multigrid_.bricks().round_ended()) || cycles_without_gain_ > kPatience;
+  if (!at_rest) return;
+  // What yielded is kept at rest, and then there is a new rest to be found.
+  if (unkept_) {
+    keeping_ = true;
+    unkept_ = false;
+    keep_row_ = 0;
+    return;
+  }
+  if (multigrid_.tiles().waiting() > 0 && cycles_without_gain_ <= kPatience) return;
+  multigrid_.tiles().clear();
+  asleep_ = true;
+}
+
+std::uint64_t Relaxation::keep_yielded(Displacement& state, std::uint64_t budget) noexcept {
+  std::uint64_t spent = 0;
+  const auto rows = static_cast<RowId>(lattice_.grid().rows());
+  for (; keep_row_ < rows && spent < budget; ++keep_row_, ++spent) {
+    if (state.rest.row[keep_row_] == 0 || !multigrid_.prepare(0, keep_row_)) continue;
+    multigrid_.yield(keep_row_, state, true);
+    spent += kRow;
+  }
+  keeping_ = keep_row_ < rows;
+  return spent;
+}
+
+// Have the cells above a tile anything to tell it?
+bool Relaxation::tile_waits_for_coarse(std::size_t number) const noexcept {
+  constexpr int kSide = TileQueue::kSide;
+  const TileQueue::Tile t = multigrid_.tiles().tile(number);
+  for (int level = 1; level < multigrid_.levels(); ++level) {
+    const Grid& g = multigrid_.grid(level);
+    const int column = (t.column >> level) + 1, rows = std::max(1, kSide >> level);
+    const int j0 = t.j * kSide >> level, k0 = t.k * kSide >> level;
+    for (int k = k0; k < std::min(k0 + rows, g.dims[2]); ++k) {
+      for (int j = j0; j < std::min(j0 + rows, g.dims[1]); ++j) {
+        const RowId row = g.row(column, j, k);
+        if (multigrid_.has(level, row, Multigrid::changed) &&
+            multigrid_.untold(level, row) > multigrid_.quiet_m())
+          return true;
+      }
+    }
+  }
+  return false;
+}
+
+std::size_t Relaxation::memory_bytes() const {
+  return multigrid_.memory_bytes() + clusters_.memory_bytes() + limited_->memory_bytes() +
+         boxes_.capacity() * sizeof(LevelBoxes) + resident_bytes(standing_);
+}
+
+}  // namespace voxel

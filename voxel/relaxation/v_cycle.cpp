@@ -1,0 +1,423 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// One cycle: its boxes, and its passes in their order.
+#include <algorithm>
+
+#include "voxel/relaxation/relaxation.h"
+
+namespace voxel {
+namespace {
+
+constexpr int kCoarsestSweeps = 8;
+constexpr int kContactSweeps = 4;  // of the coarsest level of a cycle round a contact, apart
+// Levels of a cycle round a contact where another relaxes the object: what is further away is his. (With all
+// of them both moved the coarsest cells, and a brain held for a minute wavered by a tenth of its force. With
+// four, or as many as reach three radii of the contact, the force on the way into organs was 4 to 25 %
+// higher.)
+constexpr int kContactLevels = 5;
+// What octets take, in those of cells that are told: smoothed; passed on. Voxels, which have limits, and
+// obstacles, take twice as much.
+constexpr std::size_t kSmoothed = 2, kPassedOn = 3, kOfVoxels = 2;
+// Cycles of all levels but the first before a thorough cycle tells voxels: those are an eighth of it each.
+constexpr int kCoarseCycles = 2;
+constexpr int kRoundParts = 4;  // voxels
+// Solved once, coarse levels hand up what they still are off by, and a whole cycle leaves 0.65 of the error
+// round a held patch; with these twice 0.38, and deeper ones twice as well the same. (Level 1, too: 0.33, but
+// the cycle of a box takes twice as long.)
+constexpr int kFirstTwice = 2, kLastTwice = 3;
+constexpr int kAhead = 4;       // rows along y that are fetched before their turn
+constexpr int kTileMargin = 3;  // cells round a tile that are smoothed, from level 1 on
+
+}  // namespace
+
+int Relaxation::last_level() const noexcept {
+  return std::min(multigrid_.levels(), apart_ ? kContactLevels : multigrid_.levels()) - 1;
+}
+
+template <class Visit>
+void Relaxation::for_rows(int level, const RowBox& box, const Visit& visit) noexcept {
+  const Grid& g = multigrid_.grid(level);
+  for (int c = box.q0 / kOctets; c <= box.q1 / kOctets && box.q0 <= box.q1; ++c) {
+    const OctetSpan span{std::max(box.q0 - c * kOctets, 0), std::min(box.q1 - c * kOctets, kOctets - 1)};
+    for (int k = box.k0; k <= box.k1; ++k) {
+      for (int j = box.j0; j <= box.j1; ++j) {
+        const RowId row = g.row(c + 1, j, k);
+        if (multigrid_.prepare(level, row)) visit(row, span, j, k);
+      }
+    }
+  }
+}
+
+Relaxation::RowBox Relaxation::clipped(int level, const RowBox& b) const noexcept {
+  const Grid& g = multigrid_.grid(level);
+  return {std::max(b.q0, 0), std::min(b.q1, (g.columns - 2) * kOctets - 1),
+          std::max(b.j0, 0), std::min(b.j1, g.dims[1] - 1),
+          std::max(b.k0, 0), std::min(b.k1, g.dims[2] - 1)};
+}
+
+// The boxes of a cycle that is to bring voxels low … high to rest: on each level so many cells more on every
+// side as the way that a force at the middle is felt: `contact_margin` and a quarter of how `wide` it is, in
+// cells, or where there is none the voxels themselves and a little more of their cells.
+void Relaxation::lay_boxes(const std::array<int, 3>& low, const std::array<int, 3>& high, int wide,
+                           int contact_margin, Visits visits) noexcept {
+  visits_ = visits;
+  const int last = multigrid_.levels() - 1;
+  for (int l = 0; l <= last; ++l) {
+    const int margin = wide != kNoContact ? contact_margin + (wide >> l) / 4 : l == 0 ? 0 : kTileMargin;
+    std::array<int, 3> from{}, to{};
+    for (std::size_t d = 0; d < 3; ++d) {
+      from[d] = std::max(0, (low[d] >> l) - margin);
+      to[d] = std::min(multigrid_.grid(l).dims[d] - 1, (high[d] >> l) + margin);
+    }
+    // Whole cells of the next level, so that each of them is passed on once all it holds is smooth. Along x,
+    // where voxels come by the vector, those of a contact hold some that are not, passed on as they are:
+    // twice as wide it took a twelfth longer and brought nothing. (On coarser levels that gains nothing.)
+    const bool narrow = wide != kNoContact && l == 0;
+    const int pair = narrow ? 0 : 1;
+    RowBox& s = boxes(l).smoothed;
+    s = clipped(l, {(from[0] / kOctet) & ~pair, (to[0] / kOctet) | pair, from[1] & ~1, to[1] | 1,
+                    from[2] & ~1, to[2] | 1});
+    if (l == last) break;
+    const RowBox p{s.q0 / 2, s.q1 / 2, s.j0 / 2, s.j1 / 2, s.k0 / 2, s.k1 / 2};
+    boxes(l + 1).parents = p;
+    // They and the cells beside them tell all they hold what they know, and the voxels beside those their
+    // part of it.
+    boxes(l + 1).tellers = clipped(l + 1, {p.q0 - 1, p.q1 + 1, p.j0 - 1, p.j1 + 1, p.k0 - 1, p.k1 + 1});
+    const RowBox& t = boxes(l + 1).tellers;
+    RowBox& told = boxes(l).told;
+    told = clipped(l, {2 * p.q0 - 2, 2 * p.q1 + 3, 2 * t.j0 - 1, 2 * t.j1 + 2, 2 * t.k0 - 1, 2 * t.k1 + 2});
+    boxes(l + 1).first_teller = std::max(p.q0 * kOctet - 1, 0);
+    boxes(l + 1).last_teller = p.q1 * kOctet + kOctet;
+    if (!narrow) continue;
+    // Of a contact along x those of what is smoothed, and one on either side. (Not fewer: where a vector was
+    // smoothed and only half told, that mended what the other half was still to be told, and what a spleen
+    // pressed with ran away to twice as much.)
+    told.q0 = std::max(told.q0, s.q0 - 1);
+    told.q1 = std::min(told.q1, s.q1 + 1);
+    boxes(l + 1).first_teller = std::max(s.q0 * kOctet / 2 - 1, 0);
+    boxes(l + 1).last_teller = (s.q1 + 1) * kOctet / 2;
+  }
+}
+
+std::size_t Relaxation::octets(const RowBox& b) {
+  return static_cast<std::size_t>(b.q1 - b.q0 + 1) * static_cast<std::size_t>(b.j1 - b.j0 + 1) *
+         static_cast<std::size_t>(b.k1 - b.k0 + 1);
+}
+
+// Smoothed and told; what of the boxes is empty counts too.
+std::size_t Relaxation::octets_of_cycle() const noexcept {
+  std::size_t sum = 0;
+  for (const Step& step : steps_now()) {
+    const LevelBoxes& b = boxes_[static_cast<std::size_t>(step.level)];
+    switch (step.what) {
+      case Step::passes_on:
+        break;
+      case Step::smooths:
+      case Step::smooths_after:
+        sum += octets(b.smoothed);
+        break;
+      case Step::solves:
+        sum += 2 * octets(b.smoothed);
+        break;
+      case Step::tells:
+        sum += octets(b.told);
+    }
+  }
+  return sum;
+}
+
+void Relaxation::list_steps() {
+  for (const Visits visits : {Visits::once, Visits::twice}) {
+    std::vector<Step>& steps = steps_[static_cast<std::size_t>(visits)];
+    steps.clear();
+    add_steps(steps, 0, visits, false);
+  }
+}
+
+void Relaxation::add_steps(std::vector<Step>& to, int level, Visits visits, bool again) const {
+  const int last = last_level();
+  if (level == last) {
+    to.push_back({level, Step::solves});
+    return;
+  }
+  if (!again) to.push_back({level, Step::smooths});
+  to.push_back({level, Step::passes_on});
+  const int next = level + 1;
+  const bool twice = visits == Visits::twice && next >= kFirstTwice && next <= kLastTwice && next < last;
+  for (int n = 0; n < (twice ? 2 : 1); ++n) add_steps(to, next, visits, n > 0);
+  to.push_back({level, Step::tells});
+  to.push_back({level, Step::smooths_after});
+}
+
+// In octets told.
+std::size_t Relaxation::work_of_step(int n) const noexcept {
+  const Step step = step_of(n);
+  const LevelBoxes& b = boxes_[static_cast<std::size_t>(step.level)];
+  const std::size_t each = step.level == 0 ? kOfVoxels : 1, smoothed = each * kSmoothed * octets(b.smoothed);
+  switch (step.what) {
+    case Step::smooths:
+      return smoothed_ ? 0 : smoothed;
+    case Step::passes_on:
+      return each * kPassedOn * octets(b.smoothed);
+    case Step::solves:
+      return kContactSweeps * smoothed;
+    case Step::smooths_after:
+      return smoothed;
+    case Step::tells:
+      break;
+  }
+  // Along x no hat reaches more than an octet further.
+  RowBox told = b.told;
+  told.q0 = std::max(told.q0, b.smoothed.q0 - 1);
+  told.q1 = std::min(told.q1, b.smoothed.q1 + 1);
+  return each * octets(told);
+}
+
+// Rows of one colour, so that no two that are beside one another are of the same, then those of the other: by
+// planes, the other colour one behind, while what it reads is still in the cache. (The same bits as one
+// colour after the other: along x a row has neighbours of its own colour only, which come in the same order.)
+void Relaxation::smooth_box(int level, int first_colour, Displacement& state, const ObstacleView& obstacles,
+                            Look look, Planes planes) noexcept {
+  const RowBox& all = boxes(level).smoothed;
+  const int first = all.k0 + planes.first, last = std::min(all.k0 + planes.last, all.k1);
+  const RowId next_plane = multigrid_.grid(level).row_z;  // the planes before it are in the cache
+  const auto smooth = [&](const RowBox& plane, int colour) {
+    for_rows(level, plane, [&](RowId row, OctetSpan span, int j, int k) {
+      if (((j + k + colour) & 1) != 0) return;
+      if (look == Look::active && !multigrid_.has(level, row, Multigrid::active)) return;
+      if (colour == first_colour && j + kAhead <= all.j1) {
+        multigrid_.fetch(level, row + next_plane + kAhead, state);
+        multigrid_.fetch(level, row + next_plane + kAhead + 1, state);
+      }
+      multigrid_.smooth(level, row, state, obstacles, span);
+    });
+  };
+  for (int c = all.q0 / kOctets; c <= all.q1 / kOctets && all.q0 <= all.q1; ++c) {
+    RowBox plane = all;
+    plane.q0 = std::max(all.q0, c * kOctets);
+    plane.q1 = std::min(all.q1, c * kOctets + kOctets - 1);
+    for (int k = first; k <= last; ++k) {
+      plane.k0 = plane.k1 = k;
+      smooth(plane, first_colour);
+      plane.k0 = plane.k1 = k - 1;
+      if (k > all.k0) smooth(plane, 1 - first_colour);
+    }
+    plane.k0 = plane.k1 = all.k1;
+    if (last == all.k1) smooth(plane, 1 - first_colour);
+  }
+}
+
+// Tells the rows of a level what the next coarser one knows, within the boxes: cells in the box and beside
+// it. Those beside it go along, however little they have to tell: nobody brings what they hold to rest, but
+// the box would feel it if they stayed behind, four times as much on each coarser level. (Letting those with
+// less than 2e-4 spacings to tell wait was rejected: energy grew without end where tissue hangs by little.)
+void Relaxation::tell_box(int level, Displacement& state, const ObstacleView& obstacles,
+                          Planes planes) noexcept {
+  if (planes.first == 0) any_tell_ = mark_tellers(level, state, obstacles);
+  if (!any_tell_) return;
+  const LevelBoxes& b = boxes(level + 1);
+  const RowBox& t = boxes(level).told;
+  multigrid_.tell(level,
+                  {t.q0, t.q1, t.j0, t.j1, t.k0, t.k1, b.first_teller, b.last_teller, t.k0 + planes.first,
+                   std::min(t.k0 + planes.last, t.k1)},
+                  state, obstacles, tells_jointly_);
+}
+
+bool Relaxation::mark_tellers(int level, Displacement& state, const ObstacleView& obstacles) noexcept {
+  const LevelBoxes& b = boxes(level + 1);
+  bool any = false;
+  for_rows(level + 1, b.tellers, [&](RowId row, OctetSpan span, int, int) {
+    if (!multigrid_.has(level + 1, row, Multigrid::changed)) return;
+    const int origin = (multigrid_.grid(level + 1).row_coordinates(row)[0] - 1) * kRow;
+    const float most =
+        multigrid_.untold(level + 1, row, span, b.first_teller - origin, b.last_teller - origin);
+    if (most <= multigrid_.passed_on_m()) return;
+    // Where links at their limits hold tissue between obstacles, coarse cells can run away.
+    if (!(most <= farthest_m_) && !tells_jointly_) {
+      multigrid_.forget_untold(level + 1, row, state, obstacles);
+      return;
+    }
+    multigrid_.mark(level + 1, row, Multigrid::telling);
+    any = true;
+  });
+  return any;
+}
+
+// Was anything that a coarse row holds moved since it was passed on?
+bool Relaxation::restrict_due(int level, RowId row) const noexcept {
+  const std::array<RowId, 8> below = multigrid_.rows_below(level, row);
+  return std::any_of(below.begin(), below.end(),
+                     [&](RowId child) { return multigrid_.has(level - 1, child, Multigrid::dirty); });
+}
+
+std::size_t Relaxation::work_of_planes(int n, int first) const noexcept {
+  const auto planes = static_cast<std::size_t>(planes_of_step(n));
+  return work_of_step(n) * (planes - static_cast<std::size_t>(first)) / planes;
+}
+
+int Relaxation::planes_of_step(int n) const noexcept {
+  const Step step = step_of(n);
+  const LevelBoxes& b = boxes_[static_cast<std::size_t>(step.level)];
+  switch (step.what) {
+    case Step::smooths:
+    case Step::smooths_after:
+      return std::max(1, b.smoothed.k1 - b.smoothed.k0 + 1);
+    case Step::passes_on: {
+      const RowBox& parents = boxes_[static_cast<std::size_t>(step.level) + 1].parents;
+      return std::max(1, parents.k1 - parents.k0 + 1);
+    }
+    case Step::tells:
+      return std::max(1, b.told.k1 - b.told.k0 + 1);
+    case Step::solves:
+      break;
+  }
+  return 1;
+}
+
+void Relaxation::step(int n, Planes planes, Displacement& state, const ObstacleView& obstacles, Look look,
+                      bool smoothed) noexcept {
+  const Step step = step_of(n);
+  // What coarse levels know and finer ones do not is told first: a step between voxels that were told and
+  // others that were not would look like a force to the cells above it.
+  for (int l = last_level() - 1; n == 0 && planes.first == 0 && l >= 0; --l)
+    tell_box(l, state, obstacles, kAllPlanes);
+  const WholeParts::Box box = cells(boxes(step.level).smoothed);
+  const bool ends = planes.last >= planes_of_step(n) - 1;
+  switch (step.what) {
+    case Step::smooths:
+      if (smoothed) break;
+      smooth_box(step.level, 0, state, obstacles, look, planes);
+      if (ends) multigrid_.smooth_parts(step.level, box, state, obstacles);
+      break;
+    case Step::passes_on:
+      pass_on(step.level, state, obstacles, look, planes);
+      break;
+    case Step::solves: {
+      const int sweeps = apart_ ? kContactSweeps : kCoarsestSweeps;
+      for (int k = 0; k < sweeps; ++k) {
+        smooth_box(step.level, 0, state, obstacles, look, kAllPlanes);
+        multigrid_.smooth_parts(step.level, box, state, obstacles);
+      }
+      break;
+    }
+    case Step::tells:
+      tell_box(step.level, state, obstacles, planes);
+      break;
+    case Step::smooths_after:
+      smooth_box(step.level, 1, state, obstacles, look, planes);
+      if (ends) multigrid_.smooth_parts(step.level, box, state, obstacles);
+  }
+}
+
+// What two rows further along y will be passed on of the finer level's last two planes: those before are in
+// the cache.
+void Relaxation::fetch_ahead_below(int level, RowId row, const Displacement& state) const noexcept {
+  const Grid& finer = multigrid_.grid(level - 1);
+  const RowId first = multigrid_.rows_below(level, row)[0] + finer.row_z + kAhead;
+  for (const RowId beside : {RowId{0}, finer.row_x, finer.row_z, finer.row_x + finer.row_z}) {
+    multigrid_.fetch(level - 1, first + beside, state);
+    multigrid_.fetch(level - 1, first + beside + 1, state);
+  }
+}
+
+void Relaxation::pass_on(int l, Displacement& state, const ObstacleView& obstacles, Look look,
+                         Planes planes) noexcept {
+  const bool begins = planes.first == 0;
+  // Before forces are summed, so that what is called the residual is that of links that yield.
+  if (l == 0 && lattice_.yields() && begins) {
+    for_rows(0, boxes(0).smoothed, [&](RowId row, OctetSpan, int, int) {
+      if (look == Look::all || multigrid_.has(0, row, Multigrid::active | Multigrid::dirty))
+        unkept_ = multigrid_.yield(row, state, false) || unkept_;
+    });
+  }
+  const RowBox& all = boxes(l + 1).parents;
+  RowBox parents = all;
+  parents.k0 = all.k0 + planes.first;
+  parents.k1 = std::min(all.k0 + planes.last, all.k1);
+  const Grid& g = multigrid_.grid(l + 1);
+  // All of them before any load: a row's load is that of its neighbours where they are, too.
+  for_rows(l + 1, begins ? all : RowBox{}, [&](RowId row, OctetSpan span, int, int) {
+    if (look == Look::active) {
+      if (!restrict_due(l + 1, row)) return;
+      // The load holds a row where it is beside its neighbours where they are.
+      for (const RowId r :
+           {row, row - 1, row + 1, row - g.row_z, row + g.row_z, row - g.row_x, row + g.row_x})
+        multigrid_.mark(l + 1, r, Multigrid::renewed);
+    }
+    // Apart, coarse cells hold only what was moved since all was balanced, and know that from themselves.
+    if (!apart_) multigrid_.restrict_values(l + 1, row, state, span);
+  });
+  if (begins) {
+    const float of_parts = multigrid_.measure_parts(l, cells(boxes(l).smoothed), state, obstacles);
+    if (l == 0) running_residual_N_ = std::max(running_residual_N_, static_cast<double>(of_parts));
+  }
+  for_rows(l + 1, parents, [&](RowId row, OctetSpan span, int j, int) {
+    if (look == Look::active) {
+      if (!multigrid_.has(l + 1, row, Multigrid::renewed)) return;
+      multigrid_.unmark(l + 1, row, Multigrid::renewed);
+    }
+    if (j + kAhead / 2 <= parents.j1) fetch_ahead_below(l + 1, row, state);
+    const float worst = multigrid_.restrict_loads(l + 1, row, state, obstacles, span);
+    if (l == 0) running_residual_N_ = std::max(running_residual_N_, static_cast<double>(worst));
+  });
+  if (parents.k1 < all.k1) return;
+  multigrid_.load_parts(l + 1, cells(all));
+  if (l == 0) multigrid_.renew_holds();
+}
+
+void Relaxation::lay_whole_boxes(Visits visits) noexcept {
+  const auto& dims = lattice_.grid().dims;
+  lay_boxes({0, 0, 0}, {dims[0] - 1, dims[1] - 1, dims[2] - 1}, kNoContact, 0, visits);
+}
+
+std::size_t Relaxation::run_thoroughly(Displacement& state, const ObstacleView& obstacles,
+                                       std::span<const VoxelId> held) noexcept {
+  hold_what_stands(state, held);
+  multigrid_.release_limited();
+  lay_whole_boxes(Visits::twice);
+  tells_jointly_ = true;
+  run_coarse_first(state, obstacles);
+  tells_jointly_ = false;
+  return octets_of_cycle();
+}
+
+void Relaxation::run_coarse_first(Displacement& state, const ObstacleView& obstacles) noexcept {
+  multigrid_.pass_on_all(true);
+  const int first_coarse = 2;         // level 1 is smoothed
+  const int of_voxels = steps() - 2;  // they are told
+  run_steps_over(0, of_voxels, state, obstacles, Look::all);
+  for (int n = 0; n < kCoarseCycles; ++n)
+    run_steps_over(first_coarse, of_voxels, state, obstacles, Look::all);
+  run_steps_over(of_voxels, of_voxels + 1, state, obstacles, Look::all);
+  multigrid_.pass_on_all(false);
+}
+
+void Relaxation::relax_round_parts(Displacement& state, const ObstacleView& obstacles) noexcept {
+  if (!multigrid_.has_parts()) return;
+  for (std::size_t p = 0; p < multigrid_.parts().count(); ++p) {
+    if (!multigrid_.tool_holds_part(p)) continue;
+    const WholeParts::Box& part = multigrid_.parts().on(0, p).box;
+    std::array<int, 3> low{}, high{};
+    for (std::size_t d = 0; d < 3; ++d) {
+      low[d] = std::max(part.first[d] - kRoundParts, 0);
+      high[d] = std::min(part.last[d] + kRoundParts, lattice_.grid().dims[d] - 1);
+    }
+    lay_boxes(low, high, kNoContact, 0, Visits::twice);
+    cycle(state, obstacles, Look::all);
+  }
+}
+
+void Relaxation::renew_coarse(Displacement& state, const ObstacleView& obstacles) noexcept {
+  lay_whole_boxes(Visits::once);
+  stir_all();
+  for (int l = 1; l < multigrid_.levels(); ++l) {
+    for_rows(l, boxes(l).parents,
+             [&](RowId row, OctetSpan span, int, int) { multigrid_.restrict_values(l, row, state, span); });
+    multigrid_.measure_parts(l - 1, cells(boxes(l - 1).smoothed), state, obstacles);
+    for_rows(l, boxes(l).parents, [&](RowId row, OctetSpan span, int, int) {
+      multigrid_.restrict_loads(l, row, state, obstacles, span);
+    });
+    multigrid_.load_parts(l, cells(boxes(l).parents));
+  }
+}
+
+}  // namespace voxel

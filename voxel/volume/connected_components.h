@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Which voxels of a volume hang together, by runs along its rows: memory grows with the runs, not the voxels.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "voxel/volume/label_volume.h"
+
+namespace voxel {
+
+// The pieces, connected by faces, of the voxels whose label is in `chosen`.
+class ConnectedRuns {
+ public:
+  struct Run {
+    int first = 0, last = 0;  // voxels of the row, inclusive
+    std::uint32_t piece = 0;
+  };
+  ConnectedRuns(const LabelVolume& volume, const std::vector<bool>& chosen);
+
+  [[nodiscard]] std::uint32_t pieces() const { return pieces_; }
+  [[nodiscard]] const std::vector<Run>& runs() const { return runs_; }
+  // Row of a run: j + k·dims[1].
+  [[nodiscard]] std::size_t row_begin(std::size_t row) const { return row_begin_[row]; }
+  [[nodiscard]] std::size_t rows() const { return row_begin_.size() - 1; }
+  static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
+  // The piece that a voxel belongs to; kNone where it was not chosen.
+  [[nodiscard]] std::uint32_t piece_of(int i, std::size_t row) const;
+
+ private:
+  std::vector<Run> runs_;
+  std::vector<std::size_t> row_begin_;
+  std::uint32_t pieces_ = 0;
+};
+
+// Sets with a member each at first, joined one by one; the smallest member stands for all.
+class DisjointSets {
+ public:
+  std::uint32_t add() {
+    parent_.push_back(static_cast<std::uint32_t>(parent_.size()));
+    return parent_.back();
+  }
+  std::uint32_t find(std::uint32_t a) {
+    while (parent_[a] != a) a = parent_[a] = parent_[parent_[a]];
+    return a;
+  }
+  void join(std::uint32_t a, std::uint32_t b) {
+    a = find(a);
+    b = find(b);
+    parent_[a < b ? b : a] = a < b ? a : b;
+  }
+
+ private:
+  std::vector<std::uint32_t> parent_;
+};
+
+}  // namespace voxel

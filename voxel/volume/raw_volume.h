@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A volume as its file holds it, between reading and labelling. Internal to volume_file: knows neither ITK
+// nor a format.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <glm/mat3x3.hpp>
+#include <span>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "voxel/volume/read_volume.h"
+
+namespace voxel {
+
+enum class Component : std::uint8_t {
+  uint8,
+  int8,
+  uint16,
+  int16,
+  uint32,
+  int32,
+  uint64,
+  int64,
+  float32,
+  float64
+};
+
+const char* name_of(Component component);
+std::size_t size_of(Component component);  // (unit: byte)
+
+struct VolumeData {
+  VolumeHeader header;
+  Component component = Component::uint8;
+  bool reversed = false;  // the header's first axis runs against the file's
+
+  [[nodiscard]] std::size_t slice_bytes() const {
+    return header.bytes / static_cast<std::size_t>(header.dims[2]);
+  }
+};
+
+// Gives the next slice of voxels: components in the file's order, x fastest, valid until the next call. So
+// that a volume never lies in memory in its file's type, which may be eight times that of its labels.
+using NextSlice = std::function<std::span<const std::byte>()>;
+
+// Throws VolumeError: the file, what is wrong with it, and the parts' text put together.
+template <typename... Parts>
+[[noreturn]] void refuse_volume(const std::filesystem::path& path, const Parts&... parts) {
+  std::ostringstream text;
+  text.precision(9);
+  text << path.string() << ": ";
+  (text << ... << parts);
+  throw VolumeError(text.str());
+}
+
+// What a file says about its lattice, in the file's length unit.
+struct FileFrame {
+  std::array<double, 3> dims{0.0, 0.0, 0.0};
+  glm::dvec3 spacing{1.0}, origin{0.0};
+  glm::dmat3 direction{1.0};  // columns are the axes of the lattice
+};
+
+// Checks the frame and fills the header's dims, spacing, origin, rotation, component and bytes.
+void set_frame(const std::filesystem::path& path, const FileFrame& frame, Component component, double unit_m,
+               VolumeData& data);
+
+// Refuses, with the numbers, what would need more than max_bytes. `copies` of the voxels are in memory at a
+// time, and a slice.
+void check_memory(const std::filesystem::path& path, const VolumeData& data, double copies,
+                  const std::optional<glm::dvec3>& spacing_m, std::uint64_t max_bytes);
+
+// Labels of the voxels, resampled where asked. Asks for every slice.
+LabelVolume label_voxels(const std::filesystem::path& path, const VolumeData& data, const NextSlice& next,
+                         const VolumeFileOptions& options);
+
+VolumeStatistics statistics_of(const VolumeData& data, const NextSlice& next);
+
+// The voxels, each as a double.
+std::vector<std::byte> as_doubles(Component component, std::span<const std::byte> voxels);
+
+// Refuses rules, spacing, unit or limit that no file could meet.
+void check_options(const std::filesystem::path& path, const VolumeFileOptions& options);
+
+}  // namespace voxel
