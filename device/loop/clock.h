@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Simulated time: the sum of very many steps.
+// Simulated time as a compensated sum of many steps.
 #pragma once
 
 namespace device {
 
-// A plain sum of 1 ms steps is 6 us off after 10^7 of them, and hundreds after a day. Here what each addition
-// rounds away is kept and given back (Knuth, The Art of Computer Programming, vol. 2, 4.2.2), so that the
-// time after n steps is n·dt but for the rounding of that one number, however large n is.
+// Compensated summation (Knuth, The Art of Computer Programming, vol. 2, 4.2.2): the rounding error of each
+// addition is carried into the next. So after n steps the time is n·dt, rounded once, for any n. A plain sum
+// would drift by microseconds within hours.
 class Clock {
  public:
   Clock() = default;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Lets go of the motors at once, and takes hold again slowly.
+// Switches the force off at once, and on again gradually.
 #pragma once
 
 #include <algorithm>
@@ -7,12 +7,12 @@
 namespace device {
 
 struct ForceGateOptions {
-  double rest_s = 0.25;  // after the last reason to close
-  double ramp_s = 0.5;   // from nothing to the whole force
+  double rest_s = 0.25;  // zero force for this long after the last call of close()
+  double ramp_s = 0.5;   // from zero to the whole force
 };
 
-// A force is multiplied by pass(): 0 from the tick in which the gate was closed, and again 1 after rest and
-// ramp. It starts with the ramp. Never throws, never allocates.
+// The force is multiplied by pass(). It is 0 from the tick in which close() was called, and 1 again after
+// rest and ramp. A new gate starts with the ramp. Never throws, never allocates.
 class ForceGate {
  public:
   explicit ForceGate(const ForceGateOptions& options = {}) : options_(options) {}
@@ -23,7 +23,7 @@ class ForceGate {
     closed_now_ = true;
   }
 
-  // Once a tick of dt_s > 0: the share of the force that goes through, 0 to 1.
+  // Call once per tick of dt_s > 0. Returns the share of the force that passes, 0 to 1.
   double pass(double dt_s) noexcept {
     const double share = share_;
     if (closed_now_) {

@@ -12,14 +12,14 @@ bool finite(const glm::dvec3& v) noexcept {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
-// A limit that is not a number, or negative, lets nothing through.
+// A limit that is NaN or negative lets nothing through.
 double usable_limit(double limit) noexcept {
   return limit > 0.0 ? limit : 0.0;
 }
 
-// `v` no longer than `limit`; `cut` says whether it was. The length is taken of the vector divided by its
-// largest component, so that no command is large or small enough to overflow or vanish in a square. A cut
-// vector is made shorter by 5 ulp, because rounding must not put it above the limit.
+// `v` shortened to `limit`; `cut` tells whether it was longer. The vector is divided by its largest component
+// first, so that no square overflows or vanishes. A cut vector is shortened by 5 ulp more, so that rounding
+// cannot put it above the limit.
 glm::dvec3 no_longer_than(const glm::dvec3& v, double limit, bool& cut) noexcept {
   const double largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
   cut = false;
@@ -31,9 +31,9 @@ glm::dvec3 no_longer_than(const glm::dvec3& v, double limit, bool& cut) noexcept
   return scaled * (limit / scaled_length * (1.0 - 1e-15));
 }
 
-// Counts what the last force did to the tool since.
-void count_energy(const ForceLimits& limits, ForceLimitState& state, const glm::dvec3& position_m,
-                  double dt_s) noexcept {
+// Adds the work of the last force on the tool since the last tick.
+void count_work(const ForceLimits& limits, ForceLimitState& state, const glm::dvec3& position_m,
+                double dt_s) noexcept {
   if (!finite(position_m)) return;
   const double work = state.placed ? glm::dot(state.last_N, position_m - state.last_m) : 0.0;
   state.handed.add(std::max(0.0, work), dt_s, limits.energy_window_s);
@@ -41,7 +41,8 @@ void count_energy(const ForceLimits& limits, ForceLimitState& state, const glm::
   state.placed = true;
 }
 
-glm::dvec3 let_go(ForceLimitState& state, std::uint64_t& counter) noexcept {
+// Zero force, counted by its reason.
+glm::dvec3 cut_force(ForceLimitState& state, std::uint64_t& counter) noexcept {
   ++counter;
   state.last_N = glm::dvec3(0.0);
   return state.last_N;
@@ -57,7 +58,7 @@ void EnergyWindow::add(double energy_J, double dt_s, double window_s) noexcept {
     newest_ = (newest_ + 1) % kSlots;
     energy_J_[newest_] = 0.0;
   }
-  if (!(in_slot_s_ < slot_s)) in_slot_s_ = 0.0;  // longer than the window: it is all gone
+  if (!(in_slot_s_ < slot_s)) in_slot_s_ = 0.0;  // longer than the window: all slots are empty now
   energy_J_[newest_] += energy_J;
 }
 
@@ -70,15 +71,15 @@ double EnergyWindow::sum_J() const noexcept {
 glm::dvec3 limit_force(const ForceLimits& limits, ForceLimitState& state, const glm::dvec3& command_N,
                        const DeviceState& tool, double dt_s) noexcept {
   const double dt = std::isfinite(dt_s) && dt_s > 0.0 ? dt_s : 0.0;
-  count_energy(limits, state, tool.position_m, dt);
+  count_work(limits, state, tool.position_m, dt);
   const double fade = limits.soft_start_s > 0.0 ? std::min(1.0, state.elapsed_s / limits.soft_start_s) : 1.0;
-  // A clock that stops where nothing asks any more is the same after a second and after a month.
+  // Saturated, because only values below the soft start matter.
   state.elapsed_s = std::min(state.elapsed_s + dt, std::max(0.0, limits.soft_start_s));
 
-  // Caught first: what is not finite must not reach the slew's memory. The motor is let go at once; the way
-  // back is slewed from zero.
-  if (!finite(command_N)) return let_go(state, state.nonfinite);
-  // Written so that a limit that is not a number lets nothing through.
+  // Checked first, because a value that is not finite must not reach the slew rate's memory. The force is
+  // zero at once, and the slew rate starts from zero again.
+  if (!finite(command_N)) return cut_force(state, state.nonfinite);
+  // Written so that a limit that is NaN lets nothing through.
   std::uint64_t* reason = nullptr;
   if (tool.fault == DeviceFault::late || !(dt <= limits.deadline_s)) {
     reason = &state.late;
@@ -89,22 +90,21 @@ glm::dvec3 limit_force(const ForceLimits& limits, ForceLimitState& state, const 
   }
   if (reason != nullptr) {
     state.elapsed_s = 0.0;
-    return let_go(state, *reason);
+    return cut_force(state, *reason);
   }
 
   bool cut = false;
   const glm::dvec3 wanted = command_N * fade;
   const glm::dvec3 step =
       no_longer_than(wanted - state.last_N, usable_limit(limits.max_slew_N_per_s) * dt, cut);
-  // Not slewed: the command itself, and not last + (command - last), which rounds.
+  // Within the slew rate the command itself is used: last + (command − last) would round.
   glm::dvec3 force = cut ? state.last_N + step : wanted;
   if (cut) ++state.slewed;
 
   force = no_longer_than(force, usable_limit(limits.max_force_N), cut);
   if (cut) ++state.clamped;
 
-  if (!finite(force))
-    force = glm::dvec3(0.0);  // two finite commands whose difference is not, with no clamp set
+  if (!finite(force)) force = glm::dvec3(0.0);  // the difference of two finite commands can overflow
   state.last_N = force;
   return force;
 }

@@ -8,12 +8,11 @@
 namespace device {
 namespace {
 
-// What may be handed out beyond the worst tick, so that a tool can work its way out of a debt as large as
-// that: out of 1 µJ within 3 mm. With a hundredth of it that takes twice as long, and the difference is no
-// energy that anybody could measure.
+// Energy allowed beyond the worst tick, too small to be measured. Without it a tool whose debt equals the
+// worst tick could not work its way out.
 constexpr double kSpare_J = 1e-9;
-// What a force is trusted with before anything was taken in, should it throw back a tool at rest: enough for
-// every wall up to 2.5 kN/m at 1 kHz to begin as it is.
+// Energy that a force may give before any was stored, if it throws back a tool at rest. Enough for every wall
+// up to 2.5 kN/m at 1 kHz to start unreduced.
 constexpr double kSeed_J = 200e-6;
 constexpr double kStrideKept_s = 0.5;
 
@@ -21,18 +20,18 @@ bool finite(const glm::dvec3& v) noexcept {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
-// How far a tool at rest may go until the next tick. Never nothing, as it divides.
+// Longest step of a tool at rest until the next tick. It is a divisor, so never 0.
 double sudden_m(const PassivityOptions& options, double dt_s) noexcept {
   constexpr double kLeast_m = 1e-9;
   return std::max(kLeast_m, options.max_acceleration_m_per_s2 * dt_s * dt_s + options.resolution_m);
 }
 
-// And one that moves as it did of late, either way.
+// The same for a tool that moves as it did recently, in either direction.
 double reach_m(const PassivityOptions& options, const PassivityState& state, double dt_s) noexcept {
   return 2.0 * state.stride_m + sudden_m(options, dt_s);
 }
 
-// Counts what the last force did over `way`.
+// Accounts for the work of the last force over `way`.
 void observe(const PassivityOptions& options, PassivityState& state, const glm::dvec3& way,
              double dt_s) noexcept {
   const double length = glm::length(way);
@@ -41,7 +40,7 @@ void observe(const PassivityOptions& options, PassivityState& state, const glm::
   const double work = glm::dot(state.last_N, way);
   state.given_J += work;
   state.worst_tick_J = std::max(state.worst_tick_J, std::abs(work));
-  // After a jump: what was not foreseen is written off, or the force would never come back.
+  // After a step that the bound excludes, the excess is written off; otherwise the force would never recover.
   state.worst_tick_J = std::max(state.worst_tick_J, state.given_J - kSpare_J);
   state.most_given_J = std::max(state.most_given_J, state.given_J);
 }
@@ -66,8 +65,8 @@ glm::dvec3 keep_passive(const PassivityOptions& options, PassivityState& state, 
   state.last_m = position_m;
 
   const double size = glm::length(force_N);
-  const double foreseen_J = glm::dot(force_N, way);
-  if (foreseen_J < 0.0 || !(size > 0.0))
+  const double expected_J = glm::dot(force_N, way);
+  if (expected_J < 0.0 || !(size > 0.0))
     state.share = std::min(1.0, state.share + (options.release_s > 0.0 ? dt / options.release_s : 1.0));
   if (!(size > 0.0)) {
     if (state.given_J < 0.0) state.given_J *= 1.0 - std::min(1.0, dt / options.forget_s);
@@ -76,12 +75,12 @@ glm::dvec3 keep_passive(const PassivityOptions& options, PassivityState& state, 
     return force_N;
   }
   ++state.felt;
-  state.depth_m = std::max(0.0, state.depth_m - foreseen_J / size);
-  if (foreseen_J > 0.0) {
-    // A spring that ends where the force began holds half of what its force would do over the way back.
+  state.depth_m = std::max(0.0, state.depth_m - expected_J / size);
+  if (expected_J > 0.0) {
+    // A spring that ends where the force began stores half of (force · depth).
     const double stored_J = std::max(0.0, -state.given_J);
-    const double asked_J = std::max(foreseen_J, 0.5 * size * state.depth_m);
-    if (asked_J > stored_J) state.share = std::min(state.share, stored_J / asked_J);
+    const double needed_J = std::max(expected_J, 0.5 * size * state.depth_m);
+    if (needed_J > stored_J) state.share = std::min(state.share, stored_J / needed_J);
   }
   if (state.given_J <= 0.0) {
     const double most_N = (kSeed_J - state.given_J) / sudden_m(options, dt);
@@ -94,11 +93,11 @@ glm::dvec3 keep_passive(const PassivityOptions& options, PassivityState& state, 
   state.last_N = state.share < 1.0 ? state.share * force_N : force_N;
   if (state.share < 1.0) {
     ++state.acted;
-    const double taken_N = (1.0 - state.share) * size;
-    state.most_taken_N = std::max(state.most_taken_N, taken_N);
+    const double removed_N = (1.0 - state.share) * size;
+    state.most_taken_N = std::max(state.most_taken_N, removed_N);
     state.most_taken_jnd =
-        std::max(state.most_taken_jnd, taken_N / std::max(options.jnd_share * size, options.jnd_floor_N));
-    state.taken_sum_N2 += taken_N * taken_N;
+        std::max(state.most_taken_jnd, removed_N / std::max(options.jnd_share * size, options.jnd_floor_N));
+    state.taken_sum_N2 += removed_N * removed_N;
   }
   return state.last_N;
 }

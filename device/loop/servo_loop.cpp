@@ -9,15 +9,15 @@
 namespace device {
 namespace {
 
-// Lets go of the motors, however the loop ends.
-class LetGo {
+// Writes zero force however the loop ends.
+class ZeroForceAtEnd {
  public:
-  LetGo(HapticDevice& device, double dt_s) : device_(device), dt_s_(dt_s) {}
-  LetGo(const LetGo&) = delete;
-  LetGo& operator=(const LetGo&) = delete;
-  LetGo(LetGo&&) = delete;
-  LetGo& operator=(LetGo&&) = delete;
-  ~LetGo() { device_.write(glm::dvec3(0.0), dt_s_); }
+  ZeroForceAtEnd(HapticDevice& device, double dt_s) : device_(device), dt_s_(dt_s) {}
+  ZeroForceAtEnd(const ZeroForceAtEnd&) = delete;
+  ZeroForceAtEnd& operator=(const ZeroForceAtEnd&) = delete;
+  ZeroForceAtEnd(ZeroForceAtEnd&&) = delete;
+  ZeroForceAtEnd& operator=(ZeroForceAtEnd&&) = delete;
+  ~ZeroForceAtEnd() { device_.write(glm::dvec3(0.0), dt_s_); }
 
  private:
   HapticDevice& device_;
@@ -38,13 +38,13 @@ ServoReport run_servo(HapticDevice& device, const ServoOptions& options, ServoFu
     stop.emplace();
     report.priority = timer->raise_priority();
   }
-  const LetGo at_the_end(device, dt_s);
+  const ZeroForceAtEnd at_the_end(device, dt_s);
   while (true) {
     ServoInput input{.device = {}, .dt_s = dt_s};
     if (timer) {
       const std::uint64_t missed = timer->missed();
       input.late_s = timer->wait();
-      device.hold(static_cast<double>(timer->missed() - missed) * dt_s);
+      device.delay(static_cast<double>(timer->missed() - missed) * dt_s);
       if (stop_signal() != 0) {
         report.end = ServoEnd::stopped;
         report.messages.emplace_back("stopped by a signal; what was felt until then is kept");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One loop for all devices: a simulated one is ticked by the calling thread, as fast as it goes or paced by a
-// timer; a real one by its driver's servo thread.
+// One servo loop for all devices. A simulated device is ticked by the calling thread, at full speed or paced
+// by a timer. A real device is ticked by its driver's servo thread.
 #pragma once
 
 #include <cstdint>
@@ -16,17 +16,18 @@ namespace device {
 
 struct ServoInput {
   DeviceState device;
-  double dt_s = 1e-3;   // of the rate, not of the clock: a session can be played again
-  double late_s = 0.0;  // how late this tick came; 0 where nothing paces it
+  double dt_s = 1e-3;   // nominal period, not measured time, so that a session can be replayed
+  double late_s = 0.0;  // how late this tick started; 0 without a pacer
 };
 
 struct ServoAnswer {
   glm::dvec3 force_N{0.0};  // on the hand, scene frame
-  bool go_on = true;        // false: this was the last tick, and its force is not given
-  bool skip = false;  // no tick, as in a pause: a simulated device stands still, a real one gets no force
+  bool go_on = true;        // false: this was the last tick, and its force is not sent
+  // No tick, as in a pause: a simulated device stands still, a real one gets zero force.
+  bool skip = false;
 };
 
-// A reference to what computes a tick; it must outlive the loop. Costs no allocation.
+// Non-owning reference to the function that computes a tick. It must outlive the loop. Allocates nothing.
 class ServoFunction {
  public:
   template <typename Callable>
@@ -42,27 +43,28 @@ class ServoFunction {
 };
 
 enum class ServoEnd : std::uint8_t {
-  finished,  // the function said so
-  stopped,   // a signal did
-  lost,      // the device is gone or refuses to go on
+  finished,  // the function ended it
+  stopped,   // a signal ended it
+  lost,      // the device is gone or failed
 };
 
 struct ServoReport {
   ServoEnd end = ServoEnd::finished;
   std::uint64_t ticks = 0;
-  std::uint64_t late_ticks = 0;       // by more than half a period (driver), or periods left out (timer)
-  std::string priority;               // what the thread was granted, in words; empty where nothing paces it
-  std::vector<std::string> messages;  // what happened, and what to do about it; empty when nothing did
+  std::uint64_t late_ticks = 0;  // late by over half a period (driver), or skipped periods (timer)
+  // The scheduling that the thread got, in words; empty without a pacer.
+  std::string priority;
+  std::vector<std::string> messages;  // what happened and what to do about it
 };
 
 struct ServoOptions {
   double rate_hz = 1000.0;
-  bool realtime = false;  // pace a simulated device with a timer, and stop on a signal
-  // From one tick to the next; a later one is told as DeviceFault::late, which is recorded, as it is felt.
+  bool realtime = false;  // paces a simulated device with a timer, and stops on a signal
+  // Longest time between ticks. A later tick is reported as DeviceFault::late, which is recorded and felt.
   double deadline_s = 10e-3;
 };
 
-// A device whose driver has the servo thread.
+// A device whose driver owns the servo thread.
 class ServoDriver {
  public:
   ServoDriver() = default;
@@ -71,13 +73,13 @@ class ServoDriver {
   ServoDriver(ServoDriver&&) = delete;
   ServoDriver& operator=(ServoDriver&&) = delete;
   virtual ~ServoDriver() = default;
-  // Calls `tick` from the driver's thread until it ends, is stopped or the device is lost; the motors are let
-  // go before it returns. An exception of `tick` lets go of them too, and comes out here.
+  // Calls `tick` on the driver's thread until `tick` ends it, a signal stops it or the device is lost. The
+  // motors are off before it returns. An exception of `tick` also turns them off, and is rethrown here.
   virtual ServoReport serve(ServoFunction tick, const ServoOptions& options) = 0;
 };
 
-// Reads, ticks and writes until the function ends it, or a signal does. The last force written is zero, also
-// when the function throws.
+// Reads, ticks and writes until the function or a signal ends it. The last force written is zero, also if the
+// function throws.
 ServoReport run_servo(HapticDevice& device, const ServoOptions& options, ServoFunction tick);
 
 }  // namespace device

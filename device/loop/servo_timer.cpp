@@ -17,7 +17,7 @@ namespace device {
 namespace {
 
 constexpr std::int64_t kNanosecondsPerSecond = 1'000'000'000;
-constexpr int kServoPriority = 80;  // above ordinary interrupt threads (50), below the kernel's own (99)
+constexpr int kServoPriority = 80;  // above interrupt threads (50), below the kernel's own (99)
 
 std::int64_t now_ns() noexcept {
   timespec now{};
@@ -26,8 +26,8 @@ std::int64_t now_ns() noexcept {
 }
 
 std::string lock_memory() {
-  // MCL_FUTURE under a finite limit would make a later, ordinary allocation fail. So future pages are locked
-  // only where there is no limit, which a privileged process may ask for.
+  // With MCL_FUTURE under a finite limit, a later ordinary allocation would fail. So future pages are locked
+  // only without a limit, which a privileged process may request.
   rlimit unlimited{RLIM_INFINITY, RLIM_INFINITY};
   rlimit limit{};
   const bool no_limit = setrlimit(RLIMIT_MEMLOCK, &unlimited) == 0 ||
@@ -48,7 +48,7 @@ std::string take_servo_priority() {
   int failed = pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);
   rlimit limit{};
   if (failed == EPERM && getrlimit(RLIMIT_RTPRIO, &limit) == 0 && limit.rlim_cur > 0) {
-    // The user may have some real-time priority, but not this much.
+    // The user may be allowed some real-time priority, but not this much.
     parameters.sched_priority = static_cast<int>(std::min<rlim_t>(limit.rlim_cur, kServoPriority));
     failed = pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);
   }
@@ -72,7 +72,7 @@ ServoTimer::ServoTimer(double period_s) {
 }
 
 std::string ServoTimer::raise_priority() {
-  // Memory first: its pages are then fetched before the thread may starve others.
+  // Memory first, so that its pages are loaded before the thread can starve others.
   const std::string memory = lock_memory();
   return take_servo_priority() + memory;
 }

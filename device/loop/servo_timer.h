@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Paces a loop at a fixed rate on the monotonic clock, and says how late the machine made it.
+// Paces a loop at a fixed rate on the monotonic clock, and reports how late each wake-up was.
 #pragma once
 
 #include <cstdint>
@@ -10,10 +10,11 @@ namespace device {
 class ServoTimer {
  public:
   explicit ServoTimer(double period_s);
-  // Asks for SCHED_FIFO and locked memory for the calling thread; says in words what was and was not granted.
+  // Requests SCHED_FIFO and locked memory for the calling thread. Returns in words what was granted and what
+  // was not.
   std::string raise_priority();
-  // Sleeps until the next period begins; returns how late this thread woke (unit: second). After a wake later
-  // than a whole period the missed periods are counted and skipped, not made up in a burst.
+  // Sleeps until the next period begins. Returns how late the thread woke (unit: second). Periods that were
+  // missed entirely are counted and skipped, not made up in a burst.
   double wait() noexcept;
   [[nodiscard]] std::uint64_t missed() const noexcept { return missed_; }
 

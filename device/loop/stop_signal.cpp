@@ -14,38 +14,38 @@ namespace {
 constexpr std::array kStops{SIGINT, SIGTERM, SIGHUP};
 constexpr std::array kCrashes{SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
 
-std::atomic<int> asked{0};
+std::atomic<int> stop_requested{0};
 struct CrashAct {
   std::atomic<OnCrash::Act> act{nullptr};
   std::atomic<void*> user{nullptr};
 };
 std::array<CrashAct, OnCrash::kMost> crash_acts{};
-std::size_t crash_count = 0;  // of the thread that makes them
+std::size_t crash_count = 0;  // used by the thread that creates them
 static_assert(std::atomic<int>::is_always_lock_free && std::atomic<void*>::is_always_lock_free);
 
-// What the signals did before; written before the handlers are installed, and read by them.
+// Previous actions; written before the handlers are installed, and read by them.
 std::array<struct sigaction, kStops.size()> stops_before{};
 std::array<struct sigaction, kCrashes.size()> crashes_before{};
 
 extern "C" void hybrid_on_stop(int signal) {
-  asked.store(signal);
+  stop_requested.store(signal);
 }
 
 extern "C" void hybrid_on_crash(int signal) {
-  // Once: a crash of an act itself must not come back to it, but to those that are left.
+  // Each act runs once: if one crashes itself, the handler continues with those that are left.
   for (std::size_t i = crash_acts.size(); i-- > 0;) {
     if (const OnCrash::Act act = crash_acts[i].act.exchange(nullptr)) act(crash_acts[i].user.load());
   }
   for (std::size_t i = 0; i < kCrashes.size(); ++i) {
     if (kCrashes[i] == signal) sigaction(signal, &crashes_before[i], nullptr);
   }
-  raise(signal);  // delivered when this handler returns, also where the signal was sent and not caused
+  raise(signal);  // delivered when this handler returns, whether the signal was caused or sent
 }
 
 }  // namespace
 
 StopOnSignal::StopOnSignal() {
-  asked.store(0);
+  stop_requested.store(0);
   struct sigaction action {};
   action.sa_handler = hybrid_on_stop;
   action.sa_flags = static_cast<int>(SA_RESETHAND);
@@ -58,7 +58,7 @@ StopOnSignal::~StopOnSignal() {
 }
 
 int stop_signal() noexcept {
-  return asked.load(std::memory_order_relaxed);
+  return stop_requested.load(std::memory_order_relaxed);
 }
 
 OnCrash::OnCrash(Act act, void* user) {

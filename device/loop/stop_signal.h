@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A session that is told to stop, or crashes, lets go of the motors first.
+// Signals: a session that is told to stop, or that crashes, turns the motors off first.
 #pragma once
 
 #include <cstddef>
 
 namespace device {
 
-// While one lives, SIGINT, SIGTERM and SIGHUP ask the servo loop to end; a second one of the same kind kills
-// as usual. One at a time in a program.
+// While an object exists, SIGINT, SIGTERM and SIGHUP ask the servo loop to end. A second signal of the same
+// kind kills as usual. At most one object at a time.
 class StopOnSignal {
  public:
   StopOnSignal();
@@ -18,14 +18,13 @@ class StopOnSignal {
   StopOnSignal& operator=(StopOnSignal&&) = delete;
 };
 
-// The signal that asked, 0 while there was none. Lock-free.
+// The signal that was received, or 0. Lock-free.
 int stop_signal() noexcept;
 
-// While one lives, SIGSEGV, SIGBUS, SIGFPE, SIGILL and SIGABRT call `act(user)` on the thread that crashed,
-// and then do what they did before. `act` may do what a signal handler may. A stack that overflowed, SIGKILL
-// and a machine that stops leave no time for it. Of several the last made acts first; if it crashes, the
-// others still act. They end in the reverse order that they are made in. Throws std::logic_error: more than
-// kMost.
+// While an object exists, SIGSEGV, SIGBUS, SIGFPE, SIGILL and SIGABRT call `act(user)` on the thread that
+// crashed, and then take their previous effect. `act` must be safe in a signal handler. Not covered: a stack
+// overflow, SIGKILL and a machine that stops. Of several objects the newest acts first; if it crashes, the
+// others still act. They must be destroyed in reverse order. Throws std::logic_error for more than kMost.
 class OnCrash {
  public:
   static constexpr std::size_t kMost = 4;

@@ -7,7 +7,7 @@
 namespace device {
 namespace {
 
-// Extents of the workspace along the scene's axes.
+// Size of the workspace along the scene's axes.
 glm::dvec3 turned_size(const Box& workspace) noexcept {
   return glm::abs(device_to_scene_axes(workspace.high_m - workspace.low_m));
 }

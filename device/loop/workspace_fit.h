@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Where a device's workspace lies in the scene.
+// Maps a device's workspace into the scene.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -20,11 +20,11 @@ inline glm::dvec3 scene_to_device_axes(const glm::dvec3& v) noexcept {
   return {v.x, v.z, -v.y};
 }
 
-// scene = scene_centre + scale · turned(device − device_centre). A scale above 1 makes the hand's motion
-// larger in the scene; forces are then made smaller by it, so that the hand feels no more stiffness than the
-// scene has. A scale below 1 leaves forces as they are. They are never made larger.
+// scene = scene_centre + scale · rotated(device − device_centre). A scale above 1 enlarges the hand's motion;
+// forces are then divided by it, so that the hand feels no more stiffness than the scene has. A scale below 1
+// leaves forces unchanged. Forces are never enlarged.
 struct WorkspaceFit {
-  double scale = 1.0;  // > 0; scene meters a device meter
+  double scale = 1.0;  // scene meters per device meter; > 0
   glm::dvec3 device_centre_m{0.0}, scene_centre_m{0.0};
 
   [[nodiscard]] glm::dvec3 position(const glm::dvec3& in_device_m) const noexcept {
@@ -38,10 +38,11 @@ struct WorkspaceFit {
   }
 };
 
-// Centre to centre. Without a scale the least is taken, 1 or more, with which the workspace (device frame)
-// covers what is wanted (scene frame). Both boxes are finite, and the workspace has an extent on every axis.
+// Maps centre to centre. Without a given scale, the smallest one of at least 1 is chosen for which the
+// workspace (device frame) covers `wanted` (scene frame). Both boxes must be finite, and the workspace must
+// have an extent on every axis.
 WorkspaceFit fit_workspace(const Box& workspace, const Box& wanted, std::optional<double> scale) noexcept;
-// The workspace covers what is wanted, on every axis.
+// Whether the workspace covers `wanted` on every axis.
 bool covers(const WorkspaceFit& fit, const Box& workspace, const Box& wanted) noexcept;
 
 }  // namespace device

@@ -55,7 +55,7 @@ void LineReader::refuse(const std::string& what) const {
 
 bool LineReader::next_raw(std::string_view& line) {
   const bool got = gzgets(zlib(stream_), buffer_.data(), static_cast<int>(buffer_.size())) != nullptr;
-  // Asked also when there is a line: the last one of a file that is cut short is a part of a line.
+  // Checked also if a line was read, because a truncated file ends with a partial line.
   int error = Z_OK;
   gzerror(zlib(stream_), &error);
   if (error != Z_OK) {
@@ -77,7 +77,7 @@ bool LineReader::next_raw(std::string_view& line) {
 double LineReader::number(std::string_view field) const {
   std::string_view digits = field;
   if (digits.size() > 1 && digits[0] == '+' && digits[1] != '-')
-    digits.remove_prefix(1);  // from_chars knows no '+'
+    digits.remove_prefix(1);  // from_chars accepts no '+'
   double value = 0.0;
   const char* const end = digits.data() + digits.size();
   const auto [stopped, error] = std::from_chars(digits.data(), end, value);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reading numbers in columns from a text file, plain or compressed by gzip, with the place of every refusal.
+// Reads columns of numbers from a text file, plain or gzip. Every error names file and line.
 #pragma once
 
 #include <array>
@@ -16,7 +16,7 @@
 
 namespace device {
 
-// Lines of a text file. Throws PathError: no such file, not readable, cut short, no text.
+// The lines of a text file. Throws PathError: no such file, unreadable, truncated, not text.
 class LineReader {
  public:
   explicit LineReader(const std::filesystem::path& file);
@@ -26,15 +26,15 @@ class LineReader {
   LineReader& operator=(LineReader&&) = delete;
   ~LineReader();
 
-  // The next line that says something, without blanks at its ends; false at the end of the file. What begins
-  // with '#' is a comment, and kept as the last one.
+  // The next line that is not empty, trimmed; false at the end of the file. A line that begins with '#' is a
+  // comment; the last one is kept.
   bool next(std::string_view& line);
-  // "file:line: what"
+  // Throws PathError "file:line: what".
   [[noreturn]] void refuse(const std::string& what) const;
   [[nodiscard]] std::size_t line() const { return line_; }
-  // The last comment before the line that was read, without its '#'; empty when there was none.
+  // The last comment before the current line, without its '#'; empty if there was none.
   [[nodiscard]] const std::string& comment() const { return comment_; }
-  // A finite number, or refused.
+  // A finite number; otherwise refuse().
   [[nodiscard]] double number(std::string_view field) const;
 
  private:
@@ -48,11 +48,11 @@ class LineReader {
   std::array<char, kMaxLineLength + 2> buffer_{};
 };
 
-// Without blanks and quotation marks at its ends.
+// Without blanks and quotation marks at both ends.
 std::string_view trimmed(std::string_view text);
-// Between commas.
+// The fields between commas.
 std::vector<std::string_view> comma_fields(std::string_view line);
-// Four digits, for a message.
+// Four digits, for messages.
 std::string short_number(double value);
 
 struct Unit {
@@ -61,17 +61,17 @@ struct Unit {
 };
 inline constexpr std::array<Unit, 4> kTimeUnits{{{"_s", 1.0}, {"_ms", 1e-3}, {"_us", 1e-6}, {"_ns", 1e-9}}};
 inline constexpr std::array<Unit, 4> kLengthUnits{{{"_m", 1.0}, {"_cm", 1e-2}, {"_mm", 1e-3}, {"_um", 1e-6}}};
-// Of the suffix of a column's name; none where it has none of these.
+// The unit given by the suffix of a column's name; empty if it has no known suffix.
 std::optional<double> unit_of(std::string_view name, std::span<const Unit> units);
 
-// Steps of more than ten usual (median) ones, as an index of the sample before each.
+// Time steps longer than ten median steps, each by the index of the sample before it.
 struct Gaps {
   std::vector<std::size_t> before;
   double limit_s = 0.0, longest_s = 0.0;
   std::size_t longest_before = 0;
 };
 Gaps find_gaps(const std::vector<double>& t_s);
-// In words for a note; empty when there are none.
+// For a note; empty if there are no gaps.
 std::string gaps_in_words(const std::string& file, const std::vector<double>& t_s, const Gaps& gaps);
 
 }  // namespace device

@@ -25,12 +25,13 @@ void require_speed(double speed_m_per_s) {
                   " m/s; a speed must be a number above 0");
 }
 
-void require_hold(double hold_s) {
+void require_duration(double hold_s) {
   if (hold_s >= 0.0 && std::isfinite(hold_s)) return;
   throw PathError("path: a hold of " + std::to_string(hold_s) + " s; it must be a number not below 0");
 }
 
-// Positions at rising times, linear between them; the whole `repeat` times (it then ends where it begins).
+// Positions at ascending times, linear in between, `repeat` times over. Repeated polylines end where they
+// begin.
 class PolylinePath final : public Path {
  public:
   explicit PolylinePath(Trajectory trajectory, int repeat = 1)
@@ -43,12 +44,13 @@ class PolylinePath final : public Path {
   [[nodiscard]] glm::dvec3 position(double t_s) const noexcept override {
     const std::vector<double>& times = trajectory_.t_s;
     const std::vector<glm::dvec3>& positions = trajectory_.position_m;
-    if (!(t_s > 0.0)) return positions.front();  // and when it is not a number
+    if (!(t_s > 0.0)) return positions.front();  // also for NaN
     if (t_s >= duration_s_) return positions.back();
     const double in_cycle_s = std::fmod(t_s, cycle_s_);
     const auto after = std::upper_bound(times.begin(), times.end(), in_cycle_s);
     if (after == times.end()) return positions.back();
-    const auto i = static_cast<std::size_t>(after - times.begin());  // not 0: the first time is 0
+    // Not 0, because the first time is 0.
+    const auto i = static_cast<std::size_t>(after - times.begin());
     const double share = (in_cycle_s - times[i - 1]) / (times[i] - times[i - 1]);
     return positions[i - 1] + (positions[i] - positions[i - 1]) * share;
   }
@@ -78,7 +80,8 @@ class LissajousCurve final : public Path {
   std::vector<std::string> notes_;
 };
 
-// Grows a polyline by straight legs and holds. What takes no time is left out, so that times rise.
+// Builds a polyline from straight legs and stays. Legs of no duration are left out, so that times are
+// strictly ascending.
 class PolylineBuilder {
  public:
   PolylineBuilder(const glm::dvec3& start_m, double speed_m_per_s) : speed_(speed_m_per_s) {
@@ -92,7 +95,7 @@ class PolylineBuilder {
     return add(glm::length(to_m - polyline_.position_m.back()) / speed_, to_m);
   }
   PolylineBuilder& hold(double hold_s) {
-    require_hold(hold_s);
+    require_duration(hold_s);
     return add(hold_s, polyline_.position_m.back());
   }
   [[nodiscard]] std::unique_ptr<Path> build(int repeat = 1) {
@@ -106,7 +109,7 @@ class PolylineBuilder {
       polyline_.t_s.push_back(t_s);
       polyline_.position_m.push_back(position_m);
     } else {
-      polyline_.position_m.back() = position_m;  // a leg too short to take time
+      polyline_.position_m.back() = position_m;  // a leg of no duration
     }
     return *this;
   }
@@ -147,7 +150,7 @@ std::unique_ptr<Path> make(const LissajousPath& curve) {
   require_finite(curve.phase_rad, "the phase");
   require_finite(curve.centre_m + glm::abs(curve.amplitude_m), "the farthest point");
   require_finite(curve.frequency_hz * (glm::two_pi<double>() * curve.duration_s), "frequency times duration");
-  require_hold(curve.duration_s);
+  require_duration(curve.duration_s);
   return std::make_unique<LissajousCurve>(curve);
 }
 

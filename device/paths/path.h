@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Where a simulated hand wants the tool to be, over time: press, slide, waypoints, Lissajous or a CSV
-// trajectory.
+// Target of a simulated hand over time: press, slide, waypoints, Lissajous figure or recorded trajectory.
 #pragma once
 
 #include <filesystem>
@@ -18,7 +17,7 @@ class PathError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-// From `from` move to `to` at `speed`, hold there `hold_s`, and back to `from` at `speed`; `repeat` times.
+// From `from` to `to` at `speed`, a stay of `hold_s`, and back to `from` at `speed`; `repeat` times.
 struct PressPath {
   glm::dvec3 from_m{0.0}, to_m{0.0};
   double speed_m_per_s = 0.05;
@@ -26,14 +25,14 @@ struct PressPath {
   int repeat = 1;
 };
 
-// Down from `from` + `lift` to `from`, straight to `to`, up to `to` + `lift`: one stroke over a surface.
+// From `from` + `lift` down to `from`, straight to `to`, up to `to` + `lift`: one stroke over a surface.
 struct SlidePath {
   glm::dvec3 from_m{0.0}, to_m{0.0};
   glm::dvec3 lift_m{0.0};
   double speed_m_per_s = 0.05;
 };
 
-// Straight legs at `speed`; a waypoint's hold is spent there.
+// Straight legs at `speed`, with a stay of hold_s at each waypoint.
 struct Waypoint {
   glm::dvec3 position_m{0.0};
   double hold_s = 0.0;
@@ -49,10 +48,9 @@ struct LissajousPath {
   double duration_s = 10.0;
 };
 
-// Columns t, x, y, z of a CSV (also .gz), any rate, linear between samples; the first column of the header
-// that begins with "t", "x", "y", "z" (e.g. t_s, x_mm). The unit is taken from the header's suffix (_m, _cm,
-// _mm, _um; time _s, _ms, _us, _ns), else from `unit_m` (time: seconds). The first sample's time is taken as
-// 0.
+// Columns t, x, y, z of a CSV file (also .gz) at any rate, linear between samples. Each is the first column
+// whose name begins with that letter (e.g. t_s, x_mm). The unit comes from the name's suffix (_m, _cm, _mm,
+// _um; time _s, _ms, _us, _ns), otherwise from `unit_m` (time: seconds). Time starts at the first sample.
 struct CsvPath {
   std::filesystem::path file;
   double unit_m = 1.0;
@@ -61,8 +59,8 @@ struct CsvPath {
 
 using PathDescription = std::variant<PressPath, SlidePath, WaypointPath, LissajousPath, CsvPath>;
 
-// A path ready to be followed. position() is pure, allocates nothing and holds its ends before 0 and after
-// duration.
+// A path ready to be followed. position() is pure and allocates nothing. Before 0 and after the duration it
+// returns the end points.
 class Path {
  public:
   Path() = default;
@@ -73,7 +71,7 @@ class Path {
   virtual ~Path() = default;
   [[nodiscard]] virtual glm::dvec3 position(double t_s) const noexcept = 0;  // (unit: meter)
   [[nodiscard]] virtual double duration_s() const noexcept = 0;
-  // What a reader should know: samples that repeat a time, gaps; empty when there is nothing to say.
+  // Remarks for the user, such as repeated times or gaps; may be empty.
   [[nodiscard]] virtual const std::vector<std::string>& notes() const noexcept = 0;
 };
 

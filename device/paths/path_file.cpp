@@ -19,7 +19,7 @@ struct Column {
   double in_si = 1.0;
 };
 
-// The four columns t, x, y, z of a header.
+// The columns t, x, y, z of a header.
 std::array<Column, 4> find_columns(const LineReader& reader, std::string_view header, double unit_m,
                                    std::vector<std::string>& notes) {
   constexpr std::array<char, 4> kInitials{'t', 'x', 'y', 'z'};
@@ -34,10 +34,11 @@ std::array<Column, 4> find_columns(const LineReader& reader, std::string_view he
       reader.refuse(std::string("the header has no column whose name begins with '") + kInitials[i] +
                     "'; it must name t, x, y and z, with their units, as in t_s,x_mm,y_mm,z_mm");
     }
-    const std::optional<double> told = unit_of(*found, i == 0 ? kTimeUnits : kLengthUnits);
-    columns[i] = {static_cast<std::size_t>(found - names.begin()), told.value_or(i == 0 ? 1.0 : unit_m)};
-    // 'x' alone says nothing of a unit; 'x_inch' says one that would be passed over in silence.
-    if (!told && found->find('_') != std::string_view::npos) {
+    const std::optional<double> unit = unit_of(*found, i == 0 ? kTimeUnits : kLengthUnits);
+    columns[i] = {static_cast<std::size_t>(found - names.begin()), unit.value_or(i == 0 ? 1.0 : unit_m)};
+    // A name without '_' states no unit. An unknown suffix such as in 'x_inch' is reported instead of
+    // ignored.
+    if (!unit && found->find('_') != std::string_view::npos) {
       notes.push_back("column '" + std::string(*found) + "' names no known unit: taken as " +
                       short_number(columns[i].in_si) + (i == 0 ? " s" : " m"));
     }

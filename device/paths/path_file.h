@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reads a recorded trajectory from a CSV file, plain or compressed by gzip.
+// Reads a recorded trajectory from a CSV file, plain or gzip.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -11,18 +11,17 @@
 namespace device {
 
 struct Trajectory {
-  std::vector<double> t_s;             // strictly rising, begins at 0; at least one
-  std::vector<glm::dvec3> position_m;  // one a time, offset included
-  std::vector<std::string> notes;      // repeated times, gaps, a unit that had to be assumed
+  std::vector<double> t_s;             // strictly ascending from 0; at least one
+  std::vector<glm::dvec3> position_m;  // [sample] offset included
+  std::vector<std::string> notes;      // repeated times, gaps, assumed units
 };
 
-// Throws PathError, with file and line where there is one, when the file is missing, not readable, not a CSV
-// with the columns t, x, y, z, has no rows or too many, a number that is none, or time running backwards. A
-// sample that repeats the time of the one before replaces it. Empty lines and lines that begin with '#' are
-// left out.
+// Throws PathError, with file and line if there is one: file missing or unreadable, no columns t, x, y, z, no
+// rows or too many, not a number, time running backwards. A sample that repeats the time of the one before
+// replaces it. Empty lines and lines that begin with '#' are ignored.
 Trajectory read_trajectory(const CsvPath& csv);
 
-// Along a trajectory at hand. Throws PathError: no samples.
+// A path along the trajectory. Throws PathError if it has no samples.
 std::shared_ptr<const Path> make_path(Trajectory trajectory);
 
 }  // namespace device

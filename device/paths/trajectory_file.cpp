@@ -31,7 +31,7 @@ std::string lower(std::string_view text) {
   return out;
 }
 
-// Between commas where there is one, else between blanks or semicolons.
+// Fields between commas if there is one, otherwise between blanks or semicolons.
 std::vector<std::string_view> fields_of(std::string_view line) {
   if (line.find(',') != std::string_view::npos) return comma_fields(line);
   std::vector<std::string_view> fields;
@@ -50,7 +50,7 @@ bool is_number(std::string_view text) {
   return error == std::errc() && stopped == text.data() + text.size();
 }
 
-// The axis (0 to 2) of a name such as fx, force_x, giver_fx or f_x, and what stands before it.
+// The axis (0 to 2) of a name such as fx, force_x, giver_fx or f_x, and the prefix before it.
 std::optional<std::size_t> force_axis(std::string_view stem, std::string& of_what) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     for (const std::string_view kind : {"force_"sv, "f_"sv, "f"sv}) {
@@ -76,7 +76,7 @@ class ColumnFinder {
     return columns_;
   }
 
-  // Rows of numbers without any word about them.
+  // Columns of numbers without names.
   Columns by_count(std::size_t count) {
     constexpr std::array<std::pair<std::size_t, std::string_view>, 4> kLayouts{
         {{5, "t_s,x_mm,y_mm,z_mm,fn_N"},
@@ -134,7 +134,7 @@ class ColumnFinder {
     }
   }
 
-  // The one asked for, the one without a name, or the only one.
+  // The requested force, the one without a prefix, or the only one.
   void choose_force() {
     const auto whole = [](const Force& f) { return f.columns[0] && f.columns[1] && f.columns[2]; };
     std::erase_if(forces_, [&](const Force& f) { return !whole(f); });
@@ -164,7 +164,7 @@ class ColumnFinder {
   std::vector<Force> forces_;
 };
 
-// The columns, and where the first row is read already, that row.
+// The columns; `is_row` tells whether the first line is already a row of numbers.
 Columns find_columns(const MeasuredFile& measured, const LineReader& reader, std::string_view first,
                      bool& is_row, std::vector<std::string>& notes) {
   ColumnFinder finder(measured, reader, notes);
@@ -223,14 +223,14 @@ MeasuredTrajectory read_measured(const MeasuredFile& measured) {
     const auto value = [&](std::size_t role) {
       return columns[role] ? reader.number(fields[columns[role]->index]) * columns[role]->in_si : 0.0;
     };
-    const double told_s = columns[time] ? value(time) : static_cast<double>(rows) / measured.rate_hz;
-    if (rows == 0) first_t_s = told_s;
-    const double t_s = told_s - first_t_s;
+    const double file_time_s = columns[time] ? value(time) : static_cast<double>(rows) / measured.rate_hz;
+    if (rows == 0) first_t_s = file_time_s;
+    const double t_s = file_time_s - first_t_s;
     if (!result.t_s.empty() && t_s < result.t_s.back()) {
       reader.refuse("time runs backwards, by " + short_number(result.t_s.back() - t_s) +
                     " s; sort the rows by time, or cut the file where a new recording begins");
     }
-    if (!result.t_s.empty() && t_s == result.t_s.back()) {  // the later one stands in its place
+    if (!result.t_s.empty() && t_s == result.t_s.back()) {  // the later sample replaces the earlier
       ++repeated;
       result.t_s.pop_back();
       result.position_m.pop_back();

@@ -14,15 +14,13 @@
 namespace device {
 namespace {
 
-constexpr int kMostErrors = 16;          // read at a time: the driver's stack of errors is no endless one
-constexpr std::size_t kMostValues = 16;  // a parameter has; arrays of this size are safe for all of them
 constexpr const char* kOpenHints =
     "switch the device on and plug it in; run the maker's setup program once; be a user who may open the "
     "port "
     "(groups dialout, plugdev); delete a stale configuration in the home folder, or name the right one by "
     "GTDD_HOME";
 
-// The driver knows its default device by no name and, by edition, by these.
+// The driver's default device is opened without a name or, in some editions, by one of these.
 constexpr std::array<const char*, 3> kDefaultNames{nullptr, "Default Device", "Default PHANToM"};
 
 std::string quoted(const char* name) {
@@ -37,7 +35,7 @@ struct CalibrationCall {
   hd::Name found = hd::kNeedsHand;
 };
 
-// On the driver's thread.
+// Runs on the driver's thread.
 unsigned int check_calibration(void* user) noexcept {
   auto& wish = *static_cast<CalibrationCall*>(user);
   wish.call->begin_frame(wish.handle);
@@ -57,7 +55,7 @@ HdConnection::HdConnection(const HdOpenOptions& options) : library_(load_libhd(o
   init(options);
   try {
     set_rate(options.rate_hz);
-    ask();
+    read_info();
     start_scheduler();
     info_.calibrated = update_calibration(false);
   } catch (...) {
@@ -79,7 +77,7 @@ void HdConnection::close() noexcept {
 
 hd::ErrorInfo HdConnection::take_errors() const noexcept {
   hd::ErrorInfo first;
-  for (int i = 0; i < kMostErrors; ++i) {
+  for (int i = 0; i < hd::kMaxErrors; ++i) {
     const hd::ErrorInfo error = call().get_error();
     if (error.code == hd::kSuccess) break;
     if (first.code == hd::kSuccess) first = error;
@@ -88,7 +86,7 @@ hd::ErrorInfo HdConnection::take_errors() const noexcept {
 }
 
 void HdConnection::init(const HdOpenOptions& options) {
-  (void)take_errors();  // whatever was before is none of ours
+  (void)take_errors();  // errors from before are not ours
   std::string said;
   for (int attempt = 0; attempt < options.attempts; ++attempt) {
     if (attempt > 0) std::this_thread::sleep_for(std::chrono::duration<double>(options.pause_s));
@@ -104,7 +102,7 @@ void HdConnection::init(const HdOpenOptions& options) {
         return;
       }
       if (handle != hd::kInvalidHandle) call().disable_device(handle);
-      // Without a licence no name and no patience helps.
+      // Without a licence no other name and no retry helps.
       if (error.code == hd::kInvalidLicense) throw DeviceError("PHANToM: " + hd_error_in_words(error));
       const std::string why = error.code == hd::kSuccess ? "no such device" : hd_error_in_words(error);
       said += "\n  " + quoted(name) + ": " + why;
@@ -118,10 +116,10 @@ void HdConnection::init(const HdOpenOptions& options) {
 void HdConnection::set_rate(double rate_hz) {
   call().set_rate(static_cast<unsigned long>(std::lround(rate_hz)));
   const bool refused = take_errors().code != hd::kSuccess;
-  std::array<int, kMostValues> told{};
-  call().get_integers(hd::kUpdateRate, told.data());
-  const bool known = take_errors().code == hd::kSuccess && told[0] > 0;
-  info_.rate_hz = known ? told[0] : (refused ? 1000.0 : std::round(rate_hz));
+  std::array<int, hd::kMaxValues> reported{};
+  call().get_integers(hd::kUpdateRate, reported.data());
+  const bool known = take_errors().code == hd::kSuccess && reported[0] > 0;
+  info_.rate_hz = known ? reported[0] : (refused ? 1000.0 : std::round(rate_hz));
   if (info_.rate_hz == rate_hz) return;
   info_.notes.push_back("the driver runs the servo loop at " + std::to_string(std::lround(info_.rate_hz)) +
                         " Hz and not at " + std::to_string(std::lround(rate_hz)) +
@@ -129,23 +127,22 @@ void HdConnection::set_rate(double rate_hz) {
 }
 
 std::string HdConnection::text(hd::Name name) const {
-  const char* told = call().get_string(name);
-  return take_errors().code == hd::kSuccess && told != nullptr ? told : "";
+  const char* reported = call().get_string(name);
+  return take_errors().code == hd::kSuccess && reported != nullptr ? reported : "";
 }
 
 double HdConnection::number(hd::Name name) const {
-  std::array<double, kMostValues> told{};
-  call().get_doubles(name, told.data());
-  return take_errors().code == hd::kSuccess && std::isfinite(told[0]) ? told[0] : 0.0;
+  std::array<double, hd::kMaxValues> reported{};
+  call().get_doubles(name, reported.data());
+  return take_errors().code == hd::kSuccess && std::isfinite(reported[0]) ? reported[0] : 0.0;
 }
 
 Box HdConnection::box(hd::Name name) const {
-  constexpr double kMillimeter = 1e-3;
-  std::array<double, kMostValues> told{};
-  call().get_doubles(name, told.data());
+  std::array<double, hd::kMaxValues> reported{};
+  call().get_doubles(name, reported.data());
   if (take_errors().code != hd::kSuccess) return {};
-  const Box found{kMillimeter * glm::dvec3(told[0], told[1], told[2]),
-                  kMillimeter * glm::dvec3(told[3], told[4], told[5])};
+  const Box found{hd::kMillimeter * glm::dvec3(reported[0], reported[1], reported[2]),
+                  hd::kMillimeter * glm::dvec3(reported[3], reported[4], reported[5])};
   for (int axis = 0; axis < 3; ++axis) {
     if (!(found.low_m[axis] < found.high_m[axis]) || !std::isfinite(found.high_m[axis] - found.low_m[axis])) {
       return {};
@@ -154,7 +151,7 @@ Box HdConnection::box(hd::Name name) const {
   return found;
 }
 
-void HdConnection::ask() {
+void HdConnection::read_info() {
   info_.model = text(hd::kModel);
   info_.serial = text(hd::kSerial);
   info_.vendor = text(hd::kVendor);
@@ -165,15 +162,15 @@ void HdConnection::ask() {
   info_.continuous_force_N = number(hd::kContinuousForce);
   info_.workspace = box(hd::kWorkspace);
   info_.reach = box(hd::kMaxWorkspace);
-  std::array<double, kMostValues> temperature{};
+  std::array<double, hd::kMaxValues> temperature{};
   call().get_doubles(hd::kMotorTemperature, temperature.data());
   if (take_errors().code == hd::kSuccess) {
     info_.motor_temperature = *std::max_element(temperature.begin(), temperature.end());
   }
-  std::array<int, kMostValues> style{};
+  std::array<int, hd::kMaxValues> style{};
   call().get_integers(hd::kCalibrationStyle, style.data());
   if (take_errors().code == hd::kSuccess) info_.calibration_style = style[0];
-  // The driver's own guards beside ours: it clamps, and it ramps after it was let go.
+  // The driver's own guards in addition: it clamps the force, and ramps it after an interruption.
   for (const hd::Name guard : {hd::kForceClamping, hd::kForceRamping}) {
     call().enable(guard);
     (void)take_errors();  // not every device has them
@@ -196,7 +193,7 @@ void HdConnection::start_scheduler() {
 bool HdConnection::update_calibration(bool by_hand) {
   const int style = info_.calibration_style;
   CalibrationCall wish{.call = &call(), .handle = handle_, .style = 0, .by_hand = by_hand};
-  // Of several styles the one that asks least of the hand.
+  // Of several styles the one that asks least of the user; the last match wins.
   for (const int one : {hd::kEncoderReset, hd::kInkwell, hd::kAutomatic}) {
     if ((style & one) != 0) wish.style = static_cast<hd::Name>(one);
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One opened device of the driver: found, asked what it is, calibrated, its scheduler running; closed again
-// on every way out.
+// An open device of the driver: identified, calibrated if possible, with its scheduler running. It is closed
+// however the object ends.
 #pragma once
 
 #include <cstdint>
@@ -8,38 +8,38 @@
 #include <string>
 #include <vector>
 
-#include "device/phantom/libhd.h"
 #include "device/loop/workspace_fit.h"
+#include "device/phantom/libhd.h"
 
 namespace device {
 
 struct PhantomInfo {
   std::string library;  // file that was loaded
-  std::string name;     // as it was opened; empty: the driver's default
+  std::string name;     // as opened; empty: the driver's default
   std::string model, serial, vendor, driver_version, api_version;
-  double firmware = 0.0;     // 0: not told
+  double firmware = 0.0;     // 0: not reported
   double rate_hz = 1000.0;   // of the servo loop, as granted
-  double max_force_N = 0.0;  // nominal; 0: not told
+  double max_force_N = 0.0;  // nominal; 0: not reported
   double continuous_force_N = 0.0;
-  double motor_temperature = 0.0;  // of the warmest, as it was opened: 0 cold to 1, the most it bears
-  Box workspace, reach;            // device frame, m: usable, and the most; empty: not told
+  double motor_temperature = 0.0;  // of the warmest motor at opening: 0 cold to 1 maximum
+  Box workspace, reach;            // device frame, m: usable, and maximum; empty: not reported
   int calibration_style = 0;       // bit mask of hd::kEncoderReset, kAutomatic, kInkwell
   bool calibrated = false;
-  std::vector<std::string> notes;  // what was asked for and not granted, in words
+  std::vector<std::string> notes;  // requests that were not granted, in words
 };
 
 struct HdOpenOptions {
   std::filesystem::path library;  // as load_libhd() takes it
   std::string name;               // empty: the driver's default device, by its several names
   double rate_hz = 1000.0;
-  int attempts = 2;      // a device that was just let go of by another program needs a moment
-  double pause_s = 0.3;  // between two of them
+  int attempts = 2;      // a device just released by another program needs a moment
+  double pause_s = 0.3;  // between attempts
 };
 
 class HdConnection {
  public:
-  // Throws DeviceError with the remedy: no library, no device, no licence, no scheduler. A device that is
-  // not calibrated opens; the calibration that needs no hand is done.
+  // Throws DeviceError with the remedy: no library, no device, no licence, no scheduler. A device that is not
+  // calibrated can be opened; a calibration that needs no hand is done.
   explicit HdConnection(const HdOpenOptions& options);
   ~HdConnection();
   HdConnection(const HdConnection&) = delete;
@@ -51,17 +51,17 @@ class HdConnection {
   [[nodiscard]] hd::Handle handle() const noexcept { return handle_; }
   [[nodiscard]] const PhantomInfo& info() const noexcept { return info_; }
 
-  // Takes the present pose as the one of calibration, and says whether the device is calibrated now.
+  // Takes the present pose as that of calibration. Returns whether the device is calibrated now.
   bool calibrate();
-  // Throws DeviceError: not calibrated, with what the hand must do.
+  // Throws DeviceError if not calibrated, with what the user must do.
   void require_calibrated();
-  // Everything the driver has to say by now; the first of it, and no more than a bounded number is read.
+  // Empties the driver's error stack, up to a bounded number, and returns the first error.
   [[nodiscard]] hd::ErrorInfo take_errors() const noexcept;
 
  private:
   void init(const HdOpenOptions& options);
   void set_rate(double rate_hz);
-  void ask();
+  void read_info();
   void start_scheduler();
   void close() noexcept;
   bool update_calibration(bool by_hand);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the driver's errors mean to the person at the device, and what they mean to the servo loop.
+// The driver's errors: what each means for the user at the device, and for the servo loop.
 #pragma once
 
 #include <cstdint>
@@ -13,8 +13,8 @@ namespace device {
 
 enum class HdOutcome : std::uint8_t {
   none,   // no error
-  rest,   // let go of the motors, and come back by a ramp
-  ended,  // the device is lost to this session
+  rest,   // zero force, then back by a ramp
+  ended,  // the device is lost for this session
 };
 
 struct HdErrorText {
@@ -24,13 +24,13 @@ struct HdErrorText {
   std::string_view name, what, remedy;
 };
 
-// The row of a code; an unknown one ends the session. Never allocates.
+// The entry for a code; an unknown code ends the session. Never allocates.
 const HdErrorText& hd_error_text(hd::Name code) noexcept;
 
-// "HD_COMM_ERROR (0x302): what; remedy", and the driver's internal code where it has one.
+// "HD_COMM_ERROR (0x302): what; remedy", with the driver's internal code if there is one.
 std::string hd_error_in_words(const hd::ErrorInfo& error);
 
-// How to calibrate a device of this style (a bit mask of hd::kEncoderReset, kAutomatic, kInkwell).
+// How to calibrate a device of this style (bit mask of hd::kEncoderReset, kAutomatic, kInkwell).
 std::string_view calibration_remedy(int style) noexcept;
 
 }  // namespace device

@@ -26,8 +26,7 @@ bool says(const std::string& text, std::string_view part) {
   return text.find(part) != std::string::npos;
 }
 
-// The loader was asked for `name` itself and did not find it, which is not the same as one of the libraries
-// that it needs.
+// True if the loader did not find `name` itself, as opposed to one of its dependencies.
 bool is_absent(const std::string& words, const std::string& name) {
   return words.starts_with(name + ":") && says(words, "No such file");
 }
@@ -76,7 +75,7 @@ void* open_usual(std::string& file) {
     std::string words;
     file = name;
     if (void* library = open(name, words)) return library;
-    // A library that is there and does not load is the one that was meant.
+    // A library that exists but does not load is the intended one.
     if (!is_absent(words, name)) refuse_broken(file, words);
     tried.append(tried.empty() ? "" : ", ").append(file);
   }

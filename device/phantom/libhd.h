@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The driver's own library (libHD of OpenHaptics), loaded at run time: nothing of it is needed to build, and
-// a machine without it says what to install.
+// The driver's own library (libHD of OpenHaptics), loaded at run time. The build needs nothing of it, and on
+// a machine without it the error says what to install.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <stdexcept>
@@ -10,13 +11,13 @@
 
 namespace device {
 
-// A device that cannot be used: what is wrong, and what to do about it.
+// A device that cannot be used; what() says why, and what to do about it.
 class DeviceError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-// As the driver's C interface has them on x86-64 Linux (OpenHaptics 3.30).
+// Types and constants of the driver's C interface on x86-64 Linux (OpenHaptics 3.30).
 namespace hd {
 
 using Handle = unsigned int;
@@ -31,11 +32,16 @@ struct ErrorInfo {
 };
 static_assert(sizeof(ErrorInfo) == 12, "returned by value: its size is part of the calling convention");
 
+inline constexpr double kMillimeter = 1e-3;  // the driver's unit of length, in meters
+// Read at once; the driver may report errors without end.
+inline constexpr int kMaxErrors = 16;
+inline constexpr std::size_t kMaxValues = 16;  // array size that holds any parameter
+
 inline constexpr Handle kInvalidHandle = 0xFFFFFFFF;
 inline constexpr unsigned int kDone = 0, kContinue = 1;
 inline constexpr unsigned short kPriorityDefault = 32767, kPriorityMax = 65535;
 
-// What can be asked for; the unit stands behind it.
+// Parameters, with type and unit.
 inline constexpr Name kButtons = 0x2000, kSafetySwitch = 0x2001, kInkwellSwitch = 0x2002;
 inline constexpr Name kPosition = 0x2050;  // 3 doubles, mm
 inline constexpr Name kVelocity = 0x2051;  // 3 doubles, mm/s
@@ -47,11 +53,11 @@ inline constexpr Name kMaxWorkspace = 0x2550, kWorkspace = 0x2551;  // 6 doubles
 inline constexpr Name kCalibrationStyle = 0x2555;                   // int
 inline constexpr Name kUpdateRate = 0x2600;                         // int, Hz
 inline constexpr Name kMaxForce = 0x2603, kContinuousForce = 0x2604;  // double, N
-inline constexpr Name kMotorTemperature = 0x2605;                     // double a motor, 0 to 1
+inline constexpr Name kMotorTemperature = 0x2605;                     // one double per motor, 0 to 1
 inline constexpr Name kForceOutput = 0x4000, kForceClamping = 0x4001, kForceRamping = 0x4002;
 
 inline constexpr Name kCalibrated = 0x5000, kNeedsUpdate = 0x5001, kNeedsHand = 0x5002;
-inline constexpr int kEncoderReset = 1, kAutomatic = 2, kInkwell = 4;  // styles
+inline constexpr int kEncoderReset = 1, kAutomatic = 2, kInkwell = 4;  // calibration styles
 
 inline constexpr Name kSuccess = 0, kBadHandle = 0x104;
 inline constexpr Name kWarmMotors = 0x200, kExceededForce = 0x201, kExceededImpulse = 0x202,
@@ -62,7 +68,7 @@ inline constexpr Name kSchedulerFull = 0x501, kInvalidLicense = 0x600;
 
 }  // namespace hd
 
-// The functions of the library that are used, all of them there.
+// The functions of the library that are used. All are present after loading.
 struct HdFunctions {
   hd::Handle (*init_device)(const char* name) = nullptr;
   void (*disable_device)(hd::Handle) = nullptr;
@@ -89,13 +95,13 @@ struct HdFunctions {
 
 struct HdLibrary {
   HdFunctions call;
-  std::string file;  // as it was asked for
+  std::string file;  // as requested
 };
 
-// Loads `file`, else the one that the environment's HYBRID_LIBHD names, else libHD.so, libHD.so.3.4,
-// libHD.so.3.0. One that was named and does not load is refused, not replaced by another. The library stays
-// loaded to the end of the program, as the driver keeps threads in it. Throws DeviceError: none found, one
-// of its own libraries missing, a function missing.
+// Loads `file`, otherwise the file that the environment variable HYBRID_LIBHD names, otherwise libHD.so,
+// libHD.so.3.4 or libHD.so.3.0. A named file that does not load is an error; no other is tried. The library
+// stays loaded to the end of the program, because the driver keeps threads in it. Throws DeviceError: none
+// found, a dependency missing, a function missing.
 HdLibrary load_libhd(const std::filesystem::path& file = {});
 
 }  // namespace device

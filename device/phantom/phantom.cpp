@@ -9,10 +9,10 @@
 #include <string_view>
 #include <thread>
 
+#include "device/loop/stop_signal.h"
 #include "device/phantom/hd_errors.h"
 #include "device/phantom/phantom_servo.h"
 #include "device/simulated/simulated.h"
-#include "device/loop/stop_signal.h"
 
 namespace device {
 namespace {
@@ -25,29 +25,29 @@ std::int64_t monotonic_ns() noexcept {
   return now.tv_sec * 1'000'000'000 + now.tv_nsec;
 }
 
-// What the driver does not tell: as quoted for the model (device/README.md).
+// Properties that the driver does not report, as quoted for the model (device/README.md).
 DeviceLimits quoted_limits(std::string_view model) {
   const auto says = [model](std::string_view part) { return model.find(part) != std::string_view::npos; };
   if (says("Premium 1.5")) return device_limits(DeviceModel::premium_1_5);
-  if (says("Touch X") || says("Desktop")) return {};  // others than the Touch
+  if (says("Touch X") || says("Desktop")) return {};  // different from the Touch
   if (says("Touch") || says("Omni")) return device_limits(DeviceModel::touch);
   return {};
 }
 
-// One look at the device from outside of serve().
-struct Look {
+// One read of the device outside of serve().
+struct DeviceReading {
   const HdFunctions* call = nullptr;
   hd::Handle handle = hd::kInvalidHandle;
-  std::array<double, 16> position{}, velocity{};
-  std::array<int, 16> buttons{};
+  std::array<double, hd::kMaxValues> position{}, velocity{};
+  std::array<int, hd::kMaxValues> buttons{};
 
   static unsigned int on_tick(void* user) noexcept {
-    auto& look = *static_cast<Look*>(user);
-    look.call->begin_frame(look.handle);
-    look.call->get_doubles(hd::kPosition, look.position.data());
-    look.call->get_doubles(hd::kVelocity, look.velocity.data());
-    look.call->get_integers(hd::kButtons, look.buttons.data());
-    look.call->end_frame(look.handle);
+    auto& reading = *static_cast<DeviceReading*>(user);
+    reading.call->begin_frame(reading.handle);
+    reading.call->get_doubles(hd::kPosition, reading.position.data());
+    reading.call->get_doubles(hd::kVelocity, reading.velocity.data());
+    reading.call->get_integers(hd::kButtons, reading.buttons.data());
+    reading.call->end_frame(reading.handle);
     return hd::kDone;
   }
 };
@@ -64,7 +64,7 @@ class Phantom final : public PhantomDevice {
     if (info().max_force_N > 0.0) limits_.max_force_N = info().max_force_N;
     const glm::dvec3 size = info().workspace.high_m - info().workspace.low_m;
     if (size.x > 0.0) limits_.workspace_m = size;
-    std::array<unsigned char, 16> held{};
+    std::array<unsigned char, hd::kMaxValues> held{};
     connection_.call().get_booleans(hd::kSafetySwitch, held.data());
     has_safety_switch_ = connection_.take_errors().code == hd::kSuccess;
   }
@@ -77,15 +77,14 @@ class Phantom final : public PhantomDevice {
   void write(const glm::dvec3& /*force_N*/, double /*dt_s*/) noexcept override {}
 
   DeviceState read() noexcept override {
-    constexpr double kMillimeter = 1e-3;
-    Look look{.call = &connection_.call(), .handle = connection_.handle()};
-    connection_.call().schedule_synchronous(Look::on_tick, &look, hd::kPriorityDefault);
+    DeviceReading reading{.call = &connection_.call(), .handle = connection_.handle()};
+    connection_.call().schedule_synchronous(DeviceReading::on_tick, &reading, hd::kPriorityDefault);
     DeviceState state;
-    state.position_m =
-        fit_.position(kMillimeter * glm::dvec3(look.position[0], look.position[1], look.position[2]));
-    state.velocity_m_per_s =
-        fit_.velocity(kMillimeter * glm::dvec3(look.velocity[0], look.velocity[1], look.velocity[2]));
-    state.buttons = static_cast<std::uint32_t>(look.buttons[0]);
+    state.position_m = fit_.position(
+        hd::kMillimeter * glm::dvec3(reading.position[0], reading.position[1], reading.position[2]));
+    state.velocity_m_per_s = fit_.velocity(
+        hd::kMillimeter * glm::dvec3(reading.velocity[0], reading.velocity[1], reading.velocity[2]));
+    state.buttons = static_cast<std::uint32_t>(reading.buttons[0]);
     return state;
   }
 
@@ -108,8 +107,8 @@ class Phantom final : public PhantomDevice {
     if (schedule == hd::kInvalidHandle || schedule == ~hd::Schedule{0} || error.code == hd::kSchedulerFull) {
       throw DeviceError("PHANToM: the driver takes no servo callback: " + hd_error_in_words(error));
     }
-    // The driver has one stack of errors: this one may be the callback's.
-    if (error.code != hd::kSuccess) servo.tell(error);
+    // The driver has one error stack for all threads: this error may be the callback's.
+    if (error.code != hd::kSuccess) servo.report_error(error);
     const bool silent = !wait_for(servo);
     if (silent) give_up(servo, schedule);
     if (servo.thrown() != nullptr) std::rethrow_exception(servo.thrown());
@@ -143,9 +142,9 @@ class Phantom final : public PhantomDevice {
     return true;
   }
 
-  // From this thread, as no other is left to do it.
+  // Sends zero force from this thread, as the driver's no longer runs.
   void give_up(PhantomServo& servo, hd::Schedule schedule) const noexcept {
-    servo.stop();  // should it come back: let go, and compute nothing
+    servo.stop();  // should the driver resume: zero force, no computation
     constexpr std::array<double, 3> kNothing{};
     const HdFunctions& call = connection_.call();
     call.begin_frame(connection_.handle());

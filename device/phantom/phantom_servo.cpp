@@ -16,11 +16,8 @@
 namespace device {
 namespace {
 
-constexpr int kMostErrors = 16;           // read at a time
-constexpr std::size_t kMostValues = 16;   // of one parameter
-constexpr std::uint64_t kLookEvery = 64;  // ticks between two looks at the motors' temperature
-constexpr double kMillimeter = 1e-3;
-constexpr double kWarm = 0.8;  // of what the motors bear: worth a word
+constexpr std::uint64_t kTemperatureEvery = 64;  // ticks between readings
+constexpr double kWarm = 0.8;  // fraction of the permitted temperature that is worth a message
 
 bool finite(const glm::dvec3& v) noexcept {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
@@ -71,23 +68,23 @@ unsigned int PhantomServo::on_tick(void* servo) noexcept {
 }
 
 unsigned int PhantomServo::tick() noexcept {
-  if (crashed_.load()) return idle();
-  if (!begin()) return let_go();
+  if (crashed_.load()) return hold_zero_force();
+  if (!begin()) return end_with_zero_force();
   read();
-  look_around();
+  check_device();
   take_errors();
-  if (reason_ != Reason::none) return let_go();
+  if (reason_ != Reason::none) return end_with_zero_force();
   const ServoAnswer answer = compute();
-  if (!answer.go_on) return let_go();
+  if (!answer.go_on) return end_with_zero_force();
   if (answer.skip) gate_.close();
   const double share = gate_.pass(options_.dt_s);
   if (share > 0.0) state_.fault = DeviceFault::none;
-  give(share * options_.fit.force(answer.force_N));
+  set_force(share * options_.fit.force(answer.force_N));
   call_.end_frame(handle_);
-  take_errors();  // what the driver says of this force: the next tick answers it, unless it is the end
+  take_errors();  // errors from this force are handled in the next tick, unless they end the session
   if (reason_ == Reason::none) return hd::kContinue;
   call_.begin_frame(handle_);
-  return let_go();
+  return end_with_zero_force();
 }
 
 // The frame is open when this returns.
@@ -106,45 +103,46 @@ bool PhantomServo::begin() noexcept {
   }
   call_.begin_frame(handle_);
   if (stop_.load()) end_for(Reason::stopped);
-  if (const hd::Name told = told_code_.exchange(0)) note({told, told_internal_.load(), handle_});
+  if (const hd::Name reported = reported_code_.exchange(0))
+    note({reported, reported_internal_.load(), handle_});
   take_errors();
   return reason_ == Reason::none;
 }
 
 void PhantomServo::read() noexcept {
-  std::array<double, kMostValues> position{}, velocity{};
-  std::array<int, kMostValues> buttons{};
+  std::array<double, hd::kMaxValues> position{}, velocity{};
+  std::array<int, hd::kMaxValues> buttons{};
   call_.get_doubles(hd::kPosition, position.data());
   call_.get_doubles(hd::kVelocity, velocity.data());
   call_.get_integers(hd::kButtons, buttons.data());
   const glm::dvec3 p(position[0], position[1], position[2]), v(velocity[0], velocity[1], velocity[2]);
   state_.buttons = static_cast<std::uint32_t>(buttons[0]);
   if (finite(p) && finite(v)) {
-    state_.position_m = options_.fit.position(kMillimeter * p);
-    state_.velocity_m_per_s = options_.fit.velocity(kMillimeter * v);
-  } else {  // the last good one is held, and nothing is pushed by it
+    state_.position_m = options_.fit.position(hd::kMillimeter * p);
+    state_.velocity_m_per_s = options_.fit.velocity(hd::kMillimeter * v);
+  } else {  // keep the last valid position, with zero force
     ++nonfinite_;
     state_.velocity_m_per_s = glm::dvec3(0.0);
     gate_.close();
   }
   if (!options_.has_safety_switch) return;
-  std::array<unsigned char, kMostValues> held{};
+  std::array<unsigned char, hd::kMaxValues> held{};
   call_.get_booleans(hd::kSafetySwitch, held.data());
   if (held[0] != 0) return;
   ++open_switch_ticks_;
   gate_.close();
 }
 
-void PhantomServo::look_around() noexcept {
+void PhantomServo::check_device() noexcept {
   const hd::Name calibration = call_.check_calibration();
   if (calibration == hd::kNeedsHand) end_for(Reason::calibration);
-  if (calibration == hd::kNeedsUpdate) {  // the position may jump by it
+  if (calibration == hd::kNeedsUpdate) {  // the position may jump
     ++recalibrated_;
     gate_.close();
     call_.update_calibration(hd::kAutomatic);
   }
-  if (ticks() % kLookEvery != 0) return;
-  std::array<double, kMostValues> temperature{};
+  if (ticks() % kTemperatureEvery != 0) return;
+  std::array<double, hd::kMaxValues> temperature{};
   call_.get_doubles(hd::kMotorTemperature, temperature.data());
   for (const double one : temperature) {
     if (std::isfinite(one)) hottest_ = std::max(hottest_, one);
@@ -164,7 +162,7 @@ ServoAnswer PhantomServo::compute() noexcept {
   }
 }
 
-void PhantomServo::give(const glm::dvec3& force_device_N) noexcept {
+void PhantomServo::set_force(const glm::dvec3& force_device_N) noexcept {
   const double strength = glm::length(force_device_N);
   glm::dvec3 force = force_device_N;
   if (!std::isfinite(strength)) {
@@ -177,26 +175,26 @@ void PhantomServo::give(const glm::dvec3& force_device_N) noexcept {
   call_.set_doubles(hd::kForce, values.data());
 }
 
-// The last frame, which is open: zero.
-unsigned int PhantomServo::let_go() noexcept {
-  give(glm::dvec3(0.0));
+// Ends the open frame with zero force; it is the last one.
+unsigned int PhantomServo::end_with_zero_force() noexcept {
+  set_force(glm::dvec3(0.0));
   call_.end_frame(handle_);
   take_errors();
   done_.store(true, std::memory_order_release);
   return hd::kDone;
 }
 
-// The program is about to die of a crash: zero, and never done, so that nobody goes on with what is broken.
-unsigned int PhantomServo::idle() noexcept {
+// The program is crashing: zero force in every tick, and never done, so that no other thread continues.
+unsigned int PhantomServo::hold_zero_force() noexcept {
   call_.begin_frame(handle_);
-  give(glm::dvec3(0.0));
+  set_force(glm::dvec3(0.0));
   call_.end_frame(handle_);
   crash_zeroed_.store(true);
   return hd::kContinue;
 }
 
 void PhantomServo::take_errors() noexcept {
-  for (int i = 0; i < kMostErrors; ++i) {
+  for (int i = 0; i < hd::kMaxErrors; ++i) {
     const hd::ErrorInfo error = call_.get_error();
     if (error.code == hd::kSuccess) return;
     note(error);
@@ -210,23 +208,23 @@ void PhantomServo::note(const hd::ErrorInfo& error) noexcept {
   if (hd_error_text(error.code).outcome == HdOutcome::ended) end_for(Reason::error);
 }
 
-void PhantomServo::tell(const hd::ErrorInfo& error) noexcept {
-  told_internal_.store(error.internal_code);
-  told_code_.store(error.code);
+void PhantomServo::report_error(const hd::ErrorInfo& error) noexcept {
+  reported_internal_.store(error.internal_code);
+  reported_code_.store(error.code);
 }
 
 void PhantomServo::on_crash(void* servo) noexcept {
   auto& self = *static_cast<PhantomServo*>(servo);
   self.crashed_.store(true);
   if (self.thread_.load() == thread_number()) {
-    // The servo thread itself: its frame may be open. The driver hands a force to the motors after the
-    // callback, which will not return, so this may be in vain.
+    // The servo thread itself crashed, perhaps within a frame. The driver sends forces after the callback,
+    // which will not return, so this may have no effect.
     constexpr std::array<double, 3> kNothing{};
     self.call_.set_doubles(hd::kForce, kNothing.data());
     self.call_.end_frame(self.handle_);
     return;
   }
-  // Its next tick lets go; some ticks are given to it.
+  // The next tick sends zero force; wait a few ticks for it.
   for (int i = 0; i < 20 && !self.crash_zeroed_.load() && !self.done(); ++i) {
     constexpr timespec kHalfMillisecond{0, 500'000};
     nanosleep(&kHalfMillisecond, nullptr);

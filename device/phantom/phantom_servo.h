@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What runs in the driver's servo callback: one frame, one tick, one force.
+// The servo callback in the driver's thread: one frame, one tick, one force.
 #pragma once
 
 #include <array>
@@ -11,13 +11,14 @@
 #include <vector>
 
 #include "device/loop/force_gate.h"
-#include "device/phantom/hd_connection.h"
 #include "device/loop/servo_loop.h"
 #include "device/loop/workspace_fit.h"
+#include "device/phantom/hd_connection.h"
 
 namespace device {
 
-// The driver's errors by code, each with the first of its kind. Fixed in size: it is filled in the callback.
+// Counts the driver's errors by code and keeps the first of each. Of fixed size, because the callback fills
+// it.
 class ErrorTally {
  public:
   void add(const hd::ErrorInfo& error) noexcept;
@@ -35,32 +36,33 @@ class ErrorTally {
 
 struct PhantomServoOptions {
   ForceGateOptions gate;
-  double deadline_s = 10e-3;                      // from one tick to the next; a later one gets no force
+  // Longest time between ticks; a later tick gets zero force.
+  double deadline_s = 10e-3;
   std::int64_t (*clock_ns)() noexcept = nullptr;  // required
   double dt_s = 1e-3;
-  double max_force_N = 0.0;  // 0: not known, and not clamped here
+  double max_force_N = 0.0;  // 0: unknown, not clamped here
   WorkspaceFit fit;
   bool has_safety_switch = false;
 };
 
-// Lives for one serve(). on_tick() is for the driver's thread alone; the rest may be called from any.
+// Exists for one serve(). on_tick() belongs to the driver's thread; the rest may be called from any thread.
 class PhantomServo {
  public:
   PhantomServo(const HdFunctions& call, hd::Handle handle, const PhantomServoOptions& options,
                ServoFunction tick);
 
-  // The callback: never allocates, locks, throws or does I/O of its own.
+  // The callback. It never allocates, locks, throws or does I/O of its own.
   static unsigned int on_tick(void* servo) noexcept;
-  // Of OnCrash: may do what a signal handler may.
+  // For OnCrash: safe in a signal handler.
   static void on_crash(void* servo) noexcept;
 
   void stop() noexcept { stop_.store(true); }
-  // An error that another thread got from the driver's one stack of errors.
-  void tell(const hd::ErrorInfo& error) noexcept;
+  // Passes on an error that another thread took from the driver's error stack.
+  void report_error(const hd::ErrorInfo& error) noexcept;
   [[nodiscard]] bool done() const noexcept { return done_.load(std::memory_order_acquire); }
   [[nodiscard]] std::uint64_t ticks() const noexcept { return ticks_.load(std::memory_order_relaxed); }
 
-  // After done(), or when the driver went silent.
+  // Valid after done(), or once the driver is silent.
   [[nodiscard]] ServoReport report() const;
   [[nodiscard]] const std::exception_ptr& thrown() const noexcept { return thrown_; }
 
@@ -68,13 +70,13 @@ class PhantomServo {
   enum class Reason : std::uint8_t { none, finished, stopped, error, calibration, thrown };
 
   unsigned int tick() noexcept;
-  [[nodiscard]] bool begin() noexcept;  // false: nothing more to do than to let go
+  [[nodiscard]] bool begin() noexcept;  // false: only zero force is left to send
   void read() noexcept;
-  void look_around() noexcept;
+  void check_device() noexcept;
   [[nodiscard]] ServoAnswer compute() noexcept;
-  void give(const glm::dvec3& force_device_N) noexcept;
-  unsigned int let_go() noexcept;
-  unsigned int idle() noexcept;
+  void set_force(const glm::dvec3& force_device_N) noexcept;
+  unsigned int end_with_zero_force() noexcept;
+  unsigned int hold_zero_force() noexcept;
   void take_errors() noexcept;
   void note(const hd::ErrorInfo& error) noexcept;
   void end_for(Reason reason) noexcept {
@@ -86,7 +88,7 @@ class PhantomServo {
   const PhantomServoOptions options_;
   const ServoFunction function_;
 
-  // The driver's thread alone, until done().
+  // The driver's thread only, until done().
   ForceGate gate_;
   DeviceState state_;
   std::int64_t last_ns_ = 0;
@@ -98,8 +100,8 @@ class PhantomServo {
 
   std::atomic<bool> stop_{false}, done_{false}, crashed_{false}, crash_zeroed_{false};
   std::atomic<std::uint64_t> ticks_{0};
-  std::atomic<hd::Name> told_code_{0};
-  std::atomic<int> told_internal_{0};
+  std::atomic<hd::Name> reported_code_{0};
+  std::atomic<int> reported_internal_{0};
   std::atomic<long> thread_{0};
 };
 

@@ -19,12 +19,11 @@
 namespace device {
 namespace {
 
-// Velocity as a driver makes it: the encoders' way over the last `span_s`, divided by its time. Between two
-// encoder steps there is nothing to see, so a shorter span is noisier (step / span) and a longer one is later
-// (half the span).
+// Velocity as a driver estimates it: the change of the encoders over the last `span_s`, divided by the time.
+// A shorter span is noisier (step / span), a longer one lags more (half the span).
 class VelocityEstimate {
  public:
-  // Less a nanosecond: eight ticks of 1 kHz are 8 ms, whatever way their sum rounds.
+  // One nanosecond less, so that eight ticks of 1 kHz count as 8 ms despite rounding.
   explicit VelocityEstimate(double span_s) : span_s_(span_s - 1e-9) {}
   void start(const glm::dvec3& position_m) noexcept { samples_[0] = {0.0, position_m}; }
 
@@ -33,7 +32,7 @@ class VelocityEstimate {
     samples_[++newest_ % kSize] = {now_s, position_m};
     if (newest_ - oldest_ >= kSize) oldest_ = newest_ - kSize + 1;
     while (oldest_ + 1 < newest_ && samples_[(oldest_ + 1) % kSize].t_s <= now_s - span_s_) ++oldest_;
-    // Only differences count. After a month a nanosecond would be lost in the rounding of the time itself.
+    // Times are shifted back, because only differences count and large times lose digits.
     if (now_s <= kRewind_s) return;
     for (std::size_t i = oldest_; i <= newest_; ++i) samples_[i % kSize].t_s -= now_s;
   }
@@ -46,8 +45,8 @@ class VelocityEstimate {
   }
 
  private:
-  static constexpr std::size_t kSize = 512;   // enough for 8 ms up to 64 kHz
-  static constexpr double kRewind_s = 100.0;  // times are counted anew after so long
+  static constexpr std::size_t kSize = 512;   // enough for 8 ms at up to 64 kHz
+  static constexpr double kRewind_s = 100.0;  // times are shifted back after this
   struct Sample {
     double t_s = 0.0;
     glm::dvec3 position_m{0.0};
@@ -57,13 +56,13 @@ class VelocityEstimate {
   std::size_t oldest_ = 0, newest_ = 0;
 };
 
-// Exactly where the path is, whatever the force.
+// Follows the path exactly, whatever the force.
 class IdealDevice final : public HapticDevice {
  public:
   explicit IdealDevice(std::shared_ptr<const Path> path) : path_(std::move(path)) {}
 
   DeviceState read() noexcept override {
-    constexpr double kHalf_s = 0.1e-3;  // of the central difference: a tenth of the usual tick
+    constexpr double kHalf_s = 0.1e-3;  // half step of the central difference
     DeviceState state;
     const double now_s = clock_.now_s();
     state.position_m = path_->position(now_s);
@@ -74,7 +73,7 @@ class IdealDevice final : public HapticDevice {
   void write(const glm::dvec3& /*force_N*/, double dt_s) noexcept override {
     if (dt_s > 0.0 && std::isfinite(dt_s)) clock_.add(dt_s);
   }
-  void hold(double extra_s) noexcept override { write(glm::dvec3(0.0), extra_s); }
+  void delay(double extra_s) noexcept override { write(glm::dvec3(0.0), extra_s); }
   [[nodiscard]] DeviceLimits limits() const noexcept override { return device_limits(DeviceModel::ideal); }
   [[nodiscard]] std::string_view name() const noexcept override { return device_name(DeviceModel::ideal); }
 
@@ -108,34 +107,34 @@ class SimulatedDevice final : public HapticDevice {
   void write(const glm::dvec3& force_N, double dt_s) noexcept override {
     if (!(dt_s > 0.0) || !std::isfinite(dt_s)) return;
     const auto slots = static_cast<std::size_t>(options_.delay_ticks) + 1;
-    on_their_way_[written_ % slots] = force_N;
+    delayed_forces_[written_ % slots] = force_N;
     ++written_;
-    play(on_their_way_[written_ % slots], dt_s);  // the oldest
+    drive_motors(delayed_forces_[written_ % slots], dt_s);  // the oldest
     since_write_s_ = 0.0;
-    pass(dt_s);
+    elapse(dt_s);
   }
 
-  void hold(double extra_s) noexcept override {
-    if (extra_s > 0.0 && std::isfinite(extra_s)) pass(extra_s);
+  void delay(double extra_s) noexcept override {
+    if (extra_s > 0.0 && std::isfinite(extra_s)) elapse(extra_s);
   }
 
   [[nodiscard]] DeviceLimits limits() const noexcept override { return options_.mechanism.limits; }
   [[nodiscard]] std::string_view name() const noexcept override { return options_.mechanism.name; }
 
  private:
-  // Where the hand wants the tool to be.
+  // Target of the hand: path plus tremor.
   [[nodiscard]] glm::dvec3 target(double t_s) const noexcept {
     const HandTremor& tremor = options_.tremor;
     if (tremor.amplitude_m <= 0.0) return path_->position(t_s);
     constexpr double kTurn = 2.0 * std::numbers::pi;
     const double phase = kTurn * tremor.frequency_hz * t_s;
     const glm::dvec3 circle(std::sin(phase), std::sin(phase + kTurn / 3.0),
-                            std::sin(phase + 2.0 * kTurn / 3.0));  // of radius sqrt(3/2)
+                            std::sin(phase + 2.0 * kTurn / 3.0));  // radius sqrt(3/2)
     return path_->position(t_s) + tremor.amplitude_m / std::sqrt(1.5) * circle;
   }
 
-  // The motors' amplifiers saturate; what is not a number they do not play at all.
-  void play(const glm::dvec3& force_N, double dt_s) noexcept {
+  // Amplifier saturation and slew rate. A force that is not finite is not applied.
+  void drive_motors(const glm::dvec3& force_N, double dt_s) noexcept {
     const double most_N = options_.mechanism.limits.max_force_N;
     const double strength = glm::length(force_N);
     glm::dvec3 wanted(0.0);
@@ -145,8 +144,8 @@ class SimulatedDevice final : public HapticDevice {
     motor_N_ = length > longest ? motor_N_ + step * (longest / length) : wanted;
   }
 
-  // Time goes by under the motors' force, until the watchdog ends that.
-  void pass(double dt_s) noexcept {
+  // Advances the time under the motors' force, until the watchdog switches them off.
+  void elapse(double dt_s) noexcept {
     const double watchdog_s = options_.watchdog_s.value_or(std::numeric_limits<double>::infinity());
     const double driven_s = std::clamp(watchdog_s - since_write_s_, 0.0, dt_s);
     const glm::dvec3 from = target(clock_.now_s());
@@ -170,9 +169,10 @@ class SimulatedDevice final : public HapticDevice {
   SimulatedDeviceOptions options_;
   std::shared_ptr<const Path> path_;
   ToolIntegrator mechanics_;
-  ToolMotion tool_;  // where the tool truly is
+  ToolMotion tool_;  // the true position
   VelocityEstimate velocity_;
-  std::array<glm::dvec3, kMaxDelayTicks + 1> on_their_way_{};  // written forces that the motors wait for
+  // Written forces that have not reached the motors yet.
+  std::array<glm::dvec3, kMaxDelayTicks + 1> delayed_forces_{};
   std::size_t written_ = 0;
   glm::dvec3 motor_N_{0.0};
   double since_write_s_ = 0.0;
@@ -236,10 +236,10 @@ std::unique_ptr<HapticDevice> make_simulated_device(DeviceModel model, const Han
   return std::make_unique<IdealDevice>(std::move(path));
 }
 
-// device/README.md gives the source of each figure.
+// device/README.md gives the source of each value.
 const Mechanism& mechanism(DeviceModel model) noexcept {
   constexpr double kNone = std::numeric_limits<double>::infinity();
-  // No maker states it; it is small beside a hand's 4 to 7 N·s/m.
+  // No maker states it; it is small compared with a hand's 4 to 7 N·s/m.
   constexpr double kViscous_N_s_per_m = 0.005;
   static constexpr Mechanism kIdeal{"ideal device (simulated)", {kNone, kNone, 0.0, 0.0}, 0.0, 0.0};
   static constexpr Mechanism kPremium{"PHANToM Premium 1.5 (simulated)",

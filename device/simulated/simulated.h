@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A simulated PHANToM held by a simulated hand, so that the loop is closed and stability is real.
+// A simulated PHANToM held by a simulated hand. The loop is closed, so instabilities appear as they would on
+// a device.
 #pragma once
 
 #include <cstdint>
@@ -14,37 +15,37 @@
 namespace device {
 
 enum class DeviceModel : std::uint8_t {
-  ideal,        // follows the path exactly, any force: to test models, not loops
+  ideal,        // follows the path exactly under any force: tests models, not loops
   premium_1_5,  // 8.5 N, 3.5 N/mm, 0.03 mm, 75 g, 0.04 N
   touch,        // 3.3 N, 0.055 mm, 45 g, 0.26 N
 };
 
-// What a mechanism is, as data. A linear one (for loops that theory answers) has an infinite max_force_N,
-// and resolution_m and friction_N 0.
+// A mechanism as data. A linear one (for comparison with theory) has an infinite max_force_N, and
+// resolution_m and friction_N of 0.
 struct Mechanism {
   std::string_view name;
   DeviceLimits limits;
   double apparent_mass_kg = 0.0;
-  double viscous_N_s_per_m = 0.0;  // of the mechanism, against the ground
-  // How fast the amplifiers change the motors' force; no maker states it.
+  double viscous_N_s_per_m = 0.0;  // of the mechanism, relative to the ground
+  // Slew rate of the motors' force; no maker states it.
   double motor_slew_N_per_s = std::numeric_limits<double>::infinity();
 };
-// The ideal device has no limit: force and stiffness are infinite, mass, resolution and friction 0.
+// The ideal device has infinite force and stiffness; mass, resolution and friction are 0.
 [[nodiscard]] const Mechanism& mechanism(DeviceModel model) noexcept;
 
-struct HandModel {  // mass-damper-spring about the moving target; Hajian & Howe give 3.5–8.7 g, 4–7.4 N·s/m,
-                    // 255–1255 N/m
+// Mass, damper and spring about the moving target. Hajian & Howe: 3.5–8.7 g, 4–7.4 N·s/m, 255–1255 N/m.
+struct HandModel {
   double mass_kg = 0.006;
   double damping_N_s_per_m = 5.0;
   double stiffness_N_per_m = 600.0;
 };
 enum class Grip : std::uint8_t { loose, medium, firm };
-// The ends of those ranges, and the default between them.
+// The ends of those ranges (loose, firm), and the default (medium).
 [[nodiscard]] HandModel hand_of(Grip grip) noexcept;
 
-// Physiological tremor is 8 to 12 Hz; at rest a fingertip shakes by some 0.1 mm.
+// Physiological tremor has 8 to 12 Hz. A resting fingertip shakes by about 0.1 mm.
 struct HandTremor {
-  double amplitude_m = 0.0;  // the target runs round a circle of this radius, in the plane across (1, 1, 1)
+  double amplitude_m = 0.0;  // radius of the target's circle, in the plane normal to (1, 1, 1)
   double frequency_hz = 10.0;
 };
 
@@ -52,22 +53,21 @@ struct SimulatedDeviceOptions {
   Mechanism mechanism = device::mechanism(DeviceModel::premium_1_5);
   HandModel hand{};
   HandTremor tremor{};
-  // Whole ticks (writes) between a written force and the motors, at most kMaxDelayTicks. A delay of the
-  // measurement would sit between encoders and read(); a loop cannot tell the two apart but for the first
-  // ticks, so it is added here too.
+  // Whole ticks (writes) between a written force and the motors, at most kMaxDelayTicks. Add a delay of the
+  // measurement here too: apart from the first ticks a loop cannot tell the two apart.
   int delay_ticks = 0;
-  // The motors let go when no write has come for this long. Empty: none.
+  // The motors switch off if no write has come for this long. Empty: no watchdog.
   std::optional<double> watchdog_s{};
-  double velocity_span_s = 8e-3;  // over which the driver's velocity is a mean
+  double velocity_span_s = 8e-3;  // the driver's velocity is a mean over this time
 };
 inline constexpr int kMaxDelayTicks = 64;
 
-// The mechanics are those of tool_mechanics.h. The tool starts at rest at the path's first position. Throws
-// std::invalid_argument in words: no path, no mass at all, a figure below 0 or not finite (max_force_N,
-// max_stiffness_N_per_m, motor_slew_N_per_s and workspace_m may be infinite), a delay out of range.
+// A device with the mechanics of tool_mechanics.h. The tool starts at rest at the path's first position.
+// Throws std::invalid_argument in words: no path, no mass at all, a delay out of range, a value below 0 or
+// not finite (max_force_N, max_stiffness_N_per_m, motor_slew_N_per_s and workspace_m may be infinite).
 std::unique_ptr<HapticDevice> make_simulated_device(const SimulatedDeviceOptions& options,
                                                     std::shared_ptr<const Path> path);
-// The same with the figures of a model; `ideal` is where its path is, whatever the force and the hand.
+// The same with the values of a model. `ideal` follows its path whatever the force and the hand.
 std::unique_ptr<HapticDevice> make_simulated_device(DeviceModel model, const HandModel& hand,
                                                     std::shared_ptr<const Path> path);
 

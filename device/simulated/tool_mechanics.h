@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The mechanics of a simulated tool: one mass between a hand that pulls it along and motors that push it.
+// Mechanics of a simulated tool: one mass, pulled by a hand and pushed by motors.
 #pragma once
 
 #include <array>
@@ -11,8 +11,8 @@
 namespace device {
 
 struct ToolMechanics {
-  double mass_kg = 0.0;            // apparent mass of the mechanism and mass of the hand; > 0
-  double viscous_N_s_per_m = 0.0;  // of the mechanism, against the ground
+  double mass_kg = 0.0;            // apparent mass of mechanism and hand; > 0
+  double viscous_N_s_per_m = 0.0;  // of the mechanism, relative to the ground
   double coulomb_N = 0.0;          // of the mechanism
   double hand_damping_N_s_per_m = 0.0;
   double hand_stiffness_N_per_m = 0.0;
@@ -23,43 +23,43 @@ struct ToolMotion {
   glm::dvec3 velocity_m_per_s{0.0};
 };
 
-// The longest substep where there is Coulomb friction (unit: second).
+// The longest substep under Coulomb friction (unit: second).
 inline constexpr double kToolSubstep_s = 1e-4;
 
-// Moves the tool under a constant motor force while the hand's target moves evenly.
+// Moves the tool under a constant motor force, while the hand's target moves at constant velocity.
 //
-// Mass, springs and dampers follow their closed form, so without friction any time is one step, exact.
-// Coulomb friction is constant in size and against the motion; its direction is frozen over a substep, at
-// that of the substep's middle. What is left is again linear with a constant force, so
-//   - along a straight line friction is exact too, up to the moment of stopping, which is found;
-//   - on a curve the error falls with the substep's square;
-//   - friction brings a motion to a stop exactly, never turns it round, and at rest holds it to the last bit
-//     until what pulls exceeds it, at a moment that is solved for;
-//   - no energy comes from nothing: the flow has none to give, and friction's work is checked in every
+// Mass, spring and damper follow their closed form, so without friction a step of any length is exact.
+// Coulomb friction has a constant magnitude and opposes the motion. Its direction is frozen over a substep,
+// at that of the substep's middle. The rest is linear with a constant force, so
+//   - along a straight line friction is exact too, up to the moment of stopping, which is solved for;
+//   - on a curve the error falls with the square of the substep;
+//   - friction stops a motion exactly, never reverses it, and holds a tool at rest to the last bit,
+//     until the pull exceeds it at a moment that is solved for;
+//   - no energy is created: the linear flow creates none, and the work of friction is checked in each
 //     substep.
-// Backward Euler, in substeps of 0.02 ms, was rejected: it adds damping of its own (0.006 N·s/m at 600 N/m,
-// and 0.25 with a wall of 25 kN/m), enough to move a stability boundary.
+// Backward Euler is no alternative, because its numerical damping would move the stability boundary.
 class ToolIntegrator {
  public:
   explicit ToolIntegrator(const ToolMechanics& mechanics, double max_substep_s = kToolSubstep_s)
       : mechanics_(mechanics), max_substep_s_(max_substep_s) {}
 
-  // By dt_s; not above zero or not finite moves nothing. A longer time than five seconds is cut into 50,000
-  // longer substeps: late, not hung.
+  // Advances by dt_s. A dt_s that is not positive and finite moves nothing. A time above five seconds is
+  // divided into 50,000 longer substeps, so that the call stays bounded.
   void advance(ToolMotion& motion, const glm::dvec3& target_start_m, const glm::dvec3& target_end_m,
                const glm::dvec3& motor_force_N, double dt_s) noexcept;
 
  private:
-  struct Pull;  // what acts on the tool
+  struct AppliedForces;  // the forces on the tool
   [[nodiscard]] LinearFlow new_flow(double time_s) const noexcept;
-  [[nodiscard]] const LinearFlow& flow(double time_s) noexcept;  // known from before, or kept for later
-  void rub(ToolMotion& motion, const Pull& pull, double dt_s) noexcept;
-  // Returns the time until the tool stopped, or all of it.
-  double slip(ToolMotion& motion, const Pull& pull, double at_s, const LinearFlow& step) const noexcept;
+  [[nodiscard]] const LinearFlow& flow(double time_s) noexcept;  // cached
+  void advance_with_friction(ToolMotion& motion, const AppliedForces& pull, double dt_s) noexcept;
+  // Returns the time until the tool stopped, or the whole substep.
+  double slip(ToolMotion& motion, const AppliedForces& pull, double at_s,
+              const LinearFlow& step) const noexcept;
 
   ToolMechanics mechanics_;
   double max_substep_s_;
-  // The coefficients of the last few times: ticks are alike.
+  // Coefficients of the last few step lengths, which repeat from tick to tick.
   std::array<LinearFlow, 4> flows_{};
   std::size_t oldest_ = 0;
 };

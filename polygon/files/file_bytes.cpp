@@ -24,9 +24,10 @@ std::string too_large(std::uint64_t max_bytes) {
          " bytes; simplify the mesh, or raise max_bytes when the memory is there";
 }
 
-// What a gzip file says of its unpacked size at its end (RFC 1952), as far as that can be: it is only a hint.
+// Unpacked size that a gzip file announces in its last four bytes (RFC 1952), limited by what deflate can
+// achieve. It is only a hint.
 std::uint64_t announced_size(const std::filesystem::path& file) {
-  constexpr std::uint64_t kMostPacked = 1032;  // times, by deflate
+  constexpr std::uint64_t kMostPacked = 1032;  // largest ratio that deflate reaches
   std::ifstream in(file, std::ios::binary | std::ios::ate);
   const std::streamoff packed = in.tellg();
   std::uint32_t size = 0;
@@ -42,7 +43,7 @@ std::string unpack(const std::filesystem::path& file, std::uint64_t max_bytes) {
   gzbuffer(in.get(), 1U << 17U);
   std::string bytes;
   bytes.reserve(std::min(announced_size(file), max_bytes) + 1);
-  std::vector<char> chunk(1U << 18U);  // of a size that stays in the cache
+  std::vector<char> chunk(1U << 18U);  // small enough to stay in the cache
   for (;;) {
     const std::size_t before = bytes.size();
     const int got = gzread(in.get(), chunk.data(), static_cast<unsigned>(chunk.size()));

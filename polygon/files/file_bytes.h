@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The bytes of a file, unpacked when it is gzip, never more than asked for.
+// Reads the bytes of a file, unpacks gzip, and never holds more than a given limit.
 #pragma once
 
 #include <cstdint>
@@ -8,8 +8,9 @@
 
 namespace polygon {
 
-// `packed`: the file must be gzip. Throws MeshError: missing, not a regular file, unreadable, damaged, or
-// larger than max_bytes (of what is on the disk, and of what it unpacks to; no more than that is ever held).
+// `packed`: the file must be gzip. Throws MeshError if the file is missing, not a regular file, unreadable,
+// damaged, or larger than max_bytes. The limit holds for the size on disk and for the unpacked size, and is
+// checked before more memory is taken.
 std::string read_file_bytes(const std::filesystem::path& file, bool packed, std::uint64_t max_bytes);
 
 }  // namespace polygon

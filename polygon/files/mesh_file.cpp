@@ -16,24 +16,25 @@
 
 #include "polygon/files/file_bytes.h"
 #include "polygon/files/prescan.h"
+#include "polygon/mesh/mesh_bounds.h"
 
 namespace polygon {
 namespace {
 
 namespace io = OpenMesh::IO;
 
-// Collects what OpenMesh reads as a soup: unlike its own meshes, which lose faces that are not manifold. Of
-// the many things that a file may say, only points and faces concern us.
+// Collects the points and faces that OpenMesh reads as a soup, because OpenMesh's own meshes lose
+// non-manifold faces. Everything else in a file is ignored.
 class SoupImporter final : public io::BaseImporter {
  public:
-  // `keeps_points` = false: they are counted and no more, because the screen has them as doubles.
+  // `keeps_points` = false: points are only counted, because the prescan keeps them as doubles.
   SoupImporter(bool keeps_points, std::size_t faces) : keeps_points_(keeps_points) {
     corners.reserve(3 * faces);
     face_begin.reserve(faces + 1);
   }
   std::vector<glm::dvec3> points;
-  std::vector<std::uint32_t> corners;        // of all faces, one after another
-  std::vector<std::uint32_t> face_begin{0};  // where each face's corners begin, and the end
+  std::vector<std::uint32_t> corners;        // of all faces, concatenated
+  std::vector<std::uint32_t> face_begin{0};  // start of each face's corners, then the end
 
   using VH = OpenMesh::VertexHandle;
   using HH = OpenMesh::HalfedgeHandle;
@@ -48,7 +49,7 @@ class SoupImporter final : public io::BaseImporter {
   VH add_vertex() override { return add_vertex(OpenMesh::Vec3f(0.0F, 0.0F, 0.0F)); }
   FH add_face(const VHandles& indices) override {
     for (const VH& v : indices)
-      corners.push_back(static_cast<std::uint32_t>(v.idx()));  // -1: out of any range
+      corners.push_back(static_cast<std::uint32_t>(v.idx()));  // -1 is out of any range
     face_begin.push_back(static_cast<std::uint32_t>(corners.size()));
     return FH(static_cast<int>(face_begin.size()) - 2);
   }
@@ -100,7 +101,7 @@ class SoupImporter final : public io::BaseImporter {
   std::size_t vertices_ = 0;
 };
 
-// A stream over bytes in memory, without a copy of them; OpenMesh's OBJ reader goes back to the beginning
+// A stream over bytes in memory that does not copy them. It can seek, because OpenMesh's OBJ reader rewinds
 // once.
 class MemoryBuffer final : public std::streambuf {
  public:
@@ -122,28 +123,28 @@ class MemoryBuffer final : public std::streambuf {
   }
 };
 
-SoupImporter read_by_openmesh(const std::filesystem::path& file, ScreenedFile& screened) {
-  // OpenMesh's readers are globals that keep what they learnt of a file while they read it.
+SoupImporter read_by_openmesh(const std::filesystem::path& file, PrescannedFile& prescanned) {
+  // OpenMesh's readers are global objects that keep state while they read a file.
   static std::mutex one_at_a_time;
   const std::lock_guard lock(one_at_a_time);
   omerr().disable();
   omlog().disable();
   omout().disable();
-  MemoryBuffer buffer(screened.dialect);
+  MemoryBuffer buffer(prescanned.dialect);
   std::istream in(&buffer);
-  SoupImporter soup(screened.binary, screened.faces);
-  io::Options options(screened.binary ? io::Options::Binary : io::Options::Default);
-  const bool read = io::IOManager().read(in, screened.openmesh_extension, soup, options);
-  const bool vertices_agree = soup.n_vertices() >= screened.coordinates.size();
+  SoupImporter soup(prescanned.binary, prescanned.faces);
+  io::Options options(prescanned.binary ? io::Options::Binary : io::Options::Default);
+  const bool read = io::IOManager().read(in, prescanned.openmesh_extension, soup, options);
+  const bool vertices_agree = soup.n_vertices() >= prescanned.coordinates.size();
   const bool faces_agree =
-      screened.may_drop ? soup.n_faces() <= screened.faces : soup.n_faces() == screened.faces;
+      prescanned.may_drop ? soup.n_faces() <= prescanned.faces : soup.n_faces() == prescanned.faces;
   if (!read || !vertices_agree || !faces_agree) {
     refuse_mesh(file, "OpenMesh reads " + std::to_string(soup.n_vertices()) + " vertices and " +
                           std::to_string(soup.n_faces()) + " faces where the file has " +
-                          std::to_string(screened.coordinates.size()) + " and " +
-                          std::to_string(screened.faces) + "; export it as binary PLY");
+                          std::to_string(prescanned.coordinates.size()) + " and " +
+                          std::to_string(prescanned.faces) + "; export it as binary PLY");
   }
-  std::string().swap(screened.dialect);  // it has been read
+  std::string().swap(prescanned.dialect);  // no longer needed
   return soup;
 }
 
@@ -152,11 +153,12 @@ void report(std::vector<Finding>& findings, const char* id, Severity severity, s
   if (count > 0) findings.push_back({id, severity, count, text});
 }
 
-// Fans of triangles from polygons, what cannot be used left out and reported.
-MeshFile assemble(ScreenedFile& screened, SoupImporter& soup, double scale) {
+// Cuts polygons into fans of triangles. Leaves out unusable elements and reports them.
+MeshFile assemble(PrescannedFile& prescanned, SoupImporter& soup, double scale) {
   MeshFile result;
   std::vector<glm::dvec3>& vertices = result.mesh.vertices;
-  vertices.swap(screened.binary ? soup.points : screened.coordinates);  // STL has welded vertices, and floats
+  // STL: vertices welded by OpenMesh, floats.
+  vertices.swap(prescanned.binary ? soup.points : prescanned.coordinates);
   std::vector<bool> usable(vertices.size());
   std::size_t unusable_vertices = 0;
   std::size_t first_unusable = 0;
@@ -166,8 +168,8 @@ MeshFile assemble(ScreenedFile& screened, SoupImporter& soup, double scale) {
     if (unusable_vertices++ == 0) first_unusable = i;
   }
 
-  std::size_t out_of_range = 0, first_out_of_range = 0, nonfinite = screened.nonfinite_facets;
-  std::size_t repeated = screened.faces - soup.n_faces();
+  std::size_t out_of_range = 0, first_out_of_range = 0, nonfinite = prescanned.nonfinite_facets;
+  std::size_t repeated = prescanned.faces - soup.n_faces();
   std::size_t polygons = 0;
   const std::size_t fewer = 2 * soup.n_faces();
   result.mesh.triangles.reserve(soup.corners.size() > fewer ? soup.corners.size() - fewer : 0);
@@ -188,7 +190,7 @@ MeshFile assemble(ScreenedFile& screened, SoupImporter& soup, double scale) {
     }
   }
 
-  if (unusable_vertices > 0) {  // squeezed out: all vertices of a mesh are finite
+  if (unusable_vertices > 0) {  // removed, because all vertices of a mesh are finite
     std::vector<std::uint32_t> moved(vertices.size(), 0);
     std::uint32_t kept = 0;
     for (std::size_t i = 0; i < vertices.size(); ++i) {
@@ -207,15 +209,15 @@ MeshFile assemble(ScreenedFile& screened, SoupImporter& soup, double scale) {
              ", counted from 0); they and the faces that use them are left out: export the mesh again");
   report(findings, "F02-nonfinite-faces", Severity::error, nonfinite,
          "faces have a corner that is not finite, or beyond 1e12" +
-             (screened.nonfinite_facets > 0 ? " (first: " + screened.first_nonfinite_facet + ")"
-                                            : std::string()) +
+             (prescanned.nonfinite_facets > 0 ? " (first: " + prescanned.first_nonfinite_facet + ")"
+                                              : std::string()) +
              ", and are left out, which leaves holes: export the mesh again, or close it elsewhere");
   report(findings, "F03-index-out-of-range", Severity::error, out_of_range,
          "faces use vertices that the file does not have (first: face " + std::to_string(first_out_of_range) +
              ", counted from 0 without shorter ones), and are left out, which leaves holes: export the mesh "
              "again");
-  report(findings, "F04-short-faces", Severity::warning, screened.short_faces,
-         "faces have fewer than three corners (first: " + screened.first_short_face +
+  report(findings, "F04-short-faces", Severity::warning, prescanned.short_faces,
+         "faces have fewer than three corners (first: " + prescanned.first_short_face +
              ") and are left out: points and lines cannot be touched");
   report(findings, "F05-repeated-corners", Severity::warning, repeated,
          "faces use a corner twice, have no area and are left out: nothing is lost to touch");
@@ -223,7 +225,7 @@ MeshFile assemble(ScreenedFile& screened, SoupImporter& soup, double scale) {
          "faces have more than three corners and are cut into triangles from their first: where one is not "
          "convex, "
          "triangulate it before");
-  report(findings, "F07-trailing-bytes", Severity::warning, screened.trailing_bytes,
+  report(findings, "F07-trailing-bytes", Severity::warning, prescanned.trailing_bytes,
          "bytes follow the end of the mesh and are ignored: the file may be damaged");
   return result;
 }
@@ -245,13 +247,13 @@ MeshFile load_mesh(const std::filesystem::path& file, const MeshFileOptions& opt
   std::string extension = lower_case(file.extension().string());
   const bool packed = extension == ".gz";
   if (packed) extension = lower_case(file.stem().extension().string());
-  using Screen = ScreenedFile (*)(const std::filesystem::path&, std::string_view);
+  using Prescan = PrescannedFile (*)(const std::filesystem::path&, std::string_view);
   struct Kind {
     std::string_view extension;
-    Screen screen;
+    Prescan prescan;
   };
   static constexpr std::array<Kind, 4> kKinds{
-      {{".obj", screen_obj}, {".ply", screen_ply}, {".stl", screen_stl}, {".off", screen_off}}};
+      {{".obj", prescan_obj}, {".ply", prescan_ply}, {".stl", prescan_stl}, {".off", prescan_off}}};
   const auto* kind =
       std::find_if(kKinds.begin(), kKinds.end(), [&](const Kind& k) { return k.extension == extension; });
   if (kind == kKinds.end()) {
@@ -259,12 +261,12 @@ MeshFile load_mesh(const std::filesystem::path& file, const MeshFileOptions& opt
                           "' is no mesh format known here; use .obj, .ply, .stl or .off, or one with .gz");
   }
   try {
-    ScreenedFile screened = [&] {
+    PrescannedFile prescanned = [&] {
       const std::string bytes = read_file_bytes(file, packed, options.max_bytes);
-      return kind->screen(file, bytes);
+      return kind->prescan(file, bytes);
     }();
-    SoupImporter soup = read_by_openmesh(file, screened);
-    MeshFile result = assemble(screened, soup, options.scale);
+    SoupImporter soup = read_by_openmesh(file, prescanned);
+    MeshFile result = assemble(prescanned, soup, options.scale);
     if (result.mesh.empty()) {
       std::string why;
       for (const Finding& f : result.findings) why += "; " + std::to_string(f.count) + " " + f.text;
@@ -279,7 +281,7 @@ MeshFile load_mesh(const std::filesystem::path& file, const MeshFileOptions& opt
 void save_ply(const std::filesystem::path& file, const TriangleMesh& mesh) {
   std::ofstream out(file, std::ios::binary);
   if (!out) refuse_mesh(file, "cannot be written; check that the folder exists and that you may write there");
-  // Doubles, and so not by OpenMesh, which writes floats: what is saved is what was computed.
+  // Written here as doubles; OpenMesh would write floats.
   out << "ply\nformat binary_little_endian 1.0\ncomment coordinates in meters\nelement vertex "
       << mesh.vertices.size() << "\nproperty double x\nproperty double y\nproperty double z\nelement face "
       << mesh.triangles.size() << "\nproperty list uchar int vertex_indices\nend_header\n";

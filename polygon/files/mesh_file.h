@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Mesh files in and out. The only part of the project that knows OpenMesh.
+// Reads and writes mesh files. This is the only part of the project that knows OpenMesh. Every file is
+// prescanned first (prescan.h), and nothing that is left out goes unreported.
 #pragma once
 
 #include <cstdint>
@@ -11,25 +12,26 @@
 
 namespace polygon {
 
-// A file that cannot be used: what() says what is wrong, where, and what to do next.
+// A file that cannot be used. what() says what is wrong, where, and what to do.
 class MeshError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
 struct MeshFileOptions {
-  double scale = 1.0;                                   // file unit to meter, e.g. 0.001 for mm
-  std::uint64_t max_bytes = 4ULL * 1024 * 1024 * 1024;  // refused above, with the numbers, before allocation
+  double scale = 1.0;  // meters per file unit, e.g. 0.001 for mm
+  // Larger files are refused before memory is taken.
+  std::uint64_t max_bytes = 4ULL * 1024 * 1024 * 1024;
 };
 
 struct MeshFile {
-  TriangleMesh mesh;              // meters; unusable elements left out, each kind reported below
-  std::vector<Finding> findings;  // what the file had that could not be kept as it was, never silent
+  TriangleMesh mesh;              // meters; unusable elements are left out and reported below
+  std::vector<Finding> findings;  // everything that could not be kept as it was in the file
 };
 
-// OBJ, PLY, STL and OFF, each also as .gz; extension case-insensitive. Non-manifold faces are kept (the mesh
-// is a soup). Elements that cannot be kept (vertices not finite, indices out of range) are left out and
-// reported. Throws MeshError: missing, unreadable, unknown kind, truncated, no triangle left, larger than
+// OBJ, PLY, STL and OFF, each also as .gz; the extension is case-insensitive. Non-manifold faces are kept.
+// Elements that cannot be kept (vertices that are not finite, indices out of range) are left out and
+// reported. Throws MeshError: missing, unreadable, unknown format, truncated, no triangle left, larger than
 // max_bytes.
 MeshFile load_mesh(const std::filesystem::path& file, const MeshFileOptions& options = {});
 

@@ -12,6 +12,7 @@
 #include <system_error>
 
 #include "polygon/files/mesh_file.h"
+#include "polygon/mesh/mesh_bounds.h"
 
 namespace polygon {
 namespace {
@@ -30,7 +31,7 @@ std::string at_line(std::size_t line) {
   return "line " + std::to_string(line);
 }
 
-// A word of a file in a message: short, and printable.
+// A word of the file for a message: shortened and printable.
 std::string quoted(std::string_view word) {
   std::string text = "'";
   for (const char c : word.substr(0, 24)) text += (c >= ' ' && c < 127) ? c : '?';
@@ -53,9 +54,8 @@ glm::dvec3 take_coordinates(const std::filesystem::path& file, std::string_view&
 }
 
 // ---- OBJ
-// -------------------------------------------------------------------------------------------------------
 
-// One line, with those a '\' at its end continues. `joined` holds it when there are any.
+// One line, joined with the lines that a '\' at its end continues. `joined` holds the text if there are any.
 std::string_view logical_line(TextCursor& text, std::string& joined) {
   std::string_view line = text.next_line();
   if (!line.ends_with('\\')) return line;
@@ -71,25 +71,25 @@ std::string_view logical_line(TextCursor& text, std::string& joined) {
 
 }  // namespace
 
-ScreenedFile screen_obj(const std::filesystem::path& file, std::string_view bytes) {
-  ScreenedFile screened;
-  screened.openmesh_extension = "obj";
-  screened.may_drop = true;
-  screened.dialect = "v 0 0 0\n";  // the one more, see below
+PrescannedFile prescan_obj(const std::filesystem::path& file, std::string_view bytes) {
+  PrescannedFile prescanned;
+  prescanned.openmesh_extension = "obj";
+  prescanned.may_drop = true;
+  prescanned.dialect = "v 0 0 0\n";  // the additional vertex, see below
   std::string joined;
-  // Vertices first: a face may use vertices that come after it. OpenMesh only counts them ("v 0 0 0"); the
-  // coordinates it would round to floats are kept here.
+  // First pass: vertices, because a face may use vertices that come later in the file. OpenMesh gets dummies
+  // to count ("v 0 0 0"). The true coordinates are kept here, because OpenMesh would round them to floats.
   for (TextCursor text(bytes); !text.at_end();) {
     const std::size_t number = text.line();
     std::string_view line = logical_line(text, joined);
     if (take_word(line) != "v") continue;
-    screened.coordinates.push_back(take_coordinates(file, line, number));
-    screened.dialect += "v 0 0 0\n";
+    prescanned.coordinates.push_back(take_coordinates(file, line, number));
+    prescanned.dialect += "v 0 0 0\n";
   }
-  const auto vertices = static_cast<std::int64_t>(screened.coordinates.size());
+  const auto vertices = static_cast<std::int64_t>(prescanned.coordinates.size());
   if (vertices >= kMostElements) refuse_mesh(file, "has more than 2^31 - 1 vertices; split it");
 
-  std::int64_t so_far = 0;  // what a negative index counts from
+  std::int64_t so_far = 0;  // vertices so far; negative indices count back from here
   std::string face;
   for (TextCursor text(bytes); !text.at_end();) {
     const std::size_t number = text.line();
@@ -97,7 +97,7 @@ ScreenedFile screen_obj(const std::filesystem::path& file, std::string_view byte
     const std::string_view keyword = take_word(line);
     if (keyword == "v") ++so_far;
     if (keyword != "f" && keyword != "fo") continue;  // fo: the same, in files of the nineties
-    face.assign("f");
+    face.assign(1, 'f');
     std::size_t corners = 0;
     for (std::string_view word = take_word(line); !word.empty(); word = take_word(line), ++corners) {
       std::int64_t index = 0;
@@ -108,31 +108,30 @@ ScreenedFile screen_obj(const std::filesystem::path& file, std::string_view byte
                         " is no corner of a face (vertex, vertex/texture/normal); export the mesh again");
       }
       if (index < 0) index += so_far + 1;
-      // OpenMesh looks a vertex up without asking whether it is there, and drops a corner that repeats; so
-      // what is not there becomes one vertex more than there are, which the importer knows, and reports.
+      // OpenMesh does not check indices, and drops repeated corners. So an index out of range is mapped to
+      // one additional vertex, which the importer recognises and reports.
       const bool exists = index >= 1 && index <= vertices;
       face.push_back(' ');
       append_integer(face, exists ? index : vertices + 1);
     }
     if (corners < 3) {
-      if (screened.short_faces++ == 0) screened.first_short_face = at_line(number);
+      if (prescanned.short_faces++ == 0) prescanned.first_short_face = at_line(number);
       continue;
     }
-    screened.dialect.append(face).push_back('\n');
-    ++screened.faces;
+    prescanned.dialect.append(face).push_back('\n');
+    ++prescanned.faces;
   }
-  return screened;
+  return prescanned;
 }
 
 // ---- OFF
-// -------------------------------------------------------------------------------------------------------
 
-ScreenedFile screen_off(const std::filesystem::path& file, std::string_view bytes) {
-  ScreenedFile screened;
-  screened.openmesh_extension = "off";
+PrescannedFile prescan_off(const std::filesystem::path& file, std::string_view bytes) {
+  PrescannedFile prescanned;
+  prescanned.openmesh_extension = "off";
   TextCursor text(bytes);
   std::size_t number = 0;
-  // The next line with something on it, without its comment.
+  // The next line that is not empty, without its comment.
   const auto content_line = [&]() -> std::string_view {
     while (!text.at_end()) {
       number = text.line();
@@ -148,7 +147,8 @@ ScreenedFile screen_off(const std::filesystem::path& file, std::string_view byte
   std::string_view kind = take_word(line);
   if (!kind.ends_with("OFF")) refuse_mesh(file, "does not begin with 'OFF'; is it another kind of file?");
   kind.remove_suffix(3);
-  for (const std::string_view extra : {"ST", "C", "N"}) {  // texture, colour, normal: after the coordinates
+  // Texture, colour, normal: they follow the coordinates.
+  for (const std::string_view extra : {"ST", "C", "N"}) {
     if (kind.starts_with(extra)) kind.remove_prefix(extra.size());
   }
   if (!kind.empty()) {
@@ -162,7 +162,7 @@ ScreenedFile screen_off(const std::filesystem::path& file, std::string_view byte
   if (first.empty()) line = content_line();
   std::array<std::int64_t, 2> count{};
   for (std::int64_t& c : count) {
-    // A vertex takes at least six bytes, a face two: what the file cannot hold is not believed.
+    // A vertex takes at least six bytes and a face two. A count that the file cannot hold is refused.
     const std::string_view word = take_word(line);
     if (!parse_integer(word, c) || c < 0) {
       refuse_mesh(file, at_line(number) + ": " + quoted(word) +
@@ -176,11 +176,11 @@ ScreenedFile screen_off(const std::filesystem::path& file, std::string_view byte
     }
   }
   if (count[0] >= kMostElements) refuse_mesh(file, "has more than 2^31 - 1 vertices; split it");
-  screened.coordinates.reserve(static_cast<std::size_t>(count[0]));
-  screened.dialect = "OFF\n";
-  append_integer(screened.dialect, count[0]);
-  screened.dialect.push_back(' ');
-  const std::size_t face_count_at = screened.dialect.size();
+  prescanned.coordinates.reserve(static_cast<std::size_t>(count[0]));
+  prescanned.dialect = "OFF\n";
+  append_integer(prescanned.dialect, count[0]);
+  prescanned.dialect.push_back(' ');
+  const std::size_t face_count_at = prescanned.dialect.size();
   const auto cut_short = [&](const char* what, std::int64_t have, std::int64_t announced) {
     refuse_mesh(file, "ends after " + std::to_string(have) + " of the " + std::to_string(announced) + " " +
                           what + " it announces; it is cut short: copy or export it again");
@@ -188,8 +188,8 @@ ScreenedFile screen_off(const std::filesystem::path& file, std::string_view byte
   for (std::int64_t i = 0; i < count[0]; ++i) {
     line = content_line();
     if (line.empty()) cut_short("vertices", i, count[0]);
-    screened.coordinates.push_back(take_coordinates(file, line, number));
-    screened.dialect += "0 0 0\n";
+    prescanned.coordinates.push_back(take_coordinates(file, line, number));
+    prescanned.dialect += "0 0 0\n";
   }
   for (std::int64_t i = 0; i < count[1]; ++i) {
     line = content_line();
@@ -201,10 +201,10 @@ ScreenedFile screen_off(const std::filesystem::path& file, std::string_view byte
                   at_line(number) + ": " + quoted(word) + " is no number of corners; export the mesh again");
     }
     if (corners < 3) {
-      if (screened.short_faces++ == 0) screened.first_short_face = at_line(number);
+      if (prescanned.short_faces++ == 0) prescanned.first_short_face = at_line(number);
       continue;
     }
-    append_integer(screened.dialect, corners);
+    append_integer(prescanned.dialect, corners);
     for (std::int64_t c = 0; c < corners; ++c) {
       std::int64_t index = 0;
       word = take_word(line);
@@ -214,54 +214,53 @@ ScreenedFile screen_off(const std::filesystem::path& file, std::string_view byte
                               (word.empty() ? "only " + std::to_string(c) : quoted(word)) +
                               "; export the mesh again");
       }
-      screened.dialect.push_back(' ');
-      append_integer(screened.dialect, index >= 0 && index < count[0] ? index : count[0]);
+      prescanned.dialect.push_back(' ');
+      append_integer(prescanned.dialect, index >= 0 && index < count[0] ? index : count[0]);
     }
-    screened.dialect.push_back('\n');
-    ++screened.faces;
+    prescanned.dialect.push_back('\n');
+    ++prescanned.faces;
   }
   std::string face_count;
-  append_integer(face_count, static_cast<std::int64_t>(screened.faces));
-  screened.dialect.insert(face_count_at, face_count + " 0\n");
-  return screened;
+  append_integer(face_count, static_cast<std::int64_t>(prescanned.faces));
+  prescanned.dialect.insert(face_count_at, face_count + " 0\n");
+  return prescanned;
 }
 
 // ---- STL
-// -------------------------------------------------------------------------------------------------------
 
 namespace {
 
-constexpr std::size_t kStlHeader = 84;  // 80 free bytes and the number of facets
-constexpr std::size_t kStlFacet = 50;   // normal, three corners, two free bytes
+constexpr std::size_t kStlHeader = 84;  // 80 unused bytes and the number of facets
+constexpr std::size_t kStlFacet = 50;   // normal, three corners, two unused bytes
 
-void begin_stl(ScreenedFile& screened) {
-  screened.openmesh_extension = "stl";
-  screened.may_drop = true;
-  screened.binary = true;
-  screened.dialect.assign(kStlHeader, '\0');
+void begin_stl(PrescannedFile& prescanned) {
+  prescanned.openmesh_extension = "stl";
+  prescanned.may_drop = true;
+  prescanned.binary = true;
+  prescanned.dialect.assign(kStlHeader, '\0');
 }
 
-// OpenMesh welds the corners of its facets in a tree that a NaN would break, so facets with one never reach
-// it.
-void add_facet(ScreenedFile& screened, const std::array<glm::dvec3, 3>& corners, const std::string& place) {
+// OpenMesh welds corners in a search tree that a NaN would break, so such facets are not passed on.
+void add_facet(PrescannedFile& prescanned, const std::array<glm::dvec3, 3>& corners,
+               const std::string& place) {
   if (!std::all_of(corners.begin(), corners.end(), is_usable)) {
-    if (screened.nonfinite_facets++ == 0) screened.first_nonfinite_facet = place;
+    if (prescanned.nonfinite_facets++ == 0) prescanned.first_nonfinite_facet = place;
     return;
   }
-  for (int i = 0; i < 3; ++i) append_raw(screened.dialect, 0.0F);
+  for (int i = 0; i < 3; ++i) append_raw(prescanned.dialect, 0.0F);
   for (const glm::dvec3& corner : corners) {
-    for (int i = 0; i < 3; ++i) append_raw(screened.dialect, static_cast<float>(corner[i]));
+    for (int i = 0; i < 3; ++i) append_raw(prescanned.dialect, static_cast<float>(corner[i]));
   }
-  append_raw(screened.dialect, std::uint16_t{0});
-  ++screened.faces;
+  append_raw(prescanned.dialect, std::uint16_t{0});
+  ++prescanned.faces;
 }
 
-void end_stl(ScreenedFile& screened) {
-  const auto count = static_cast<std::uint32_t>(screened.faces);
-  std::memcpy(screened.dialect.data() + kStlHeader - sizeof(count), &count, sizeof(count));
+void end_stl(PrescannedFile& prescanned) {
+  const auto count = static_cast<std::uint32_t>(prescanned.faces);
+  std::memcpy(prescanned.dialect.data() + kStlHeader - sizeof(count), &count, sizeof(count));
 }
 
-void screen_stl_text(const std::filesystem::path& file, std::string_view bytes, ScreenedFile& screened) {
+void prescan_stl_text(const std::filesystem::path& file, std::string_view bytes, PrescannedFile& prescanned) {
   TextCursor text(bytes);
   std::array<glm::dvec3, 3> corners{};
   std::size_t have = 0;
@@ -286,19 +285,19 @@ void screen_stl_text(const std::filesystem::path& file, std::string_view bytes, 
         refuse_mesh(file, at_line(number) + ": a facet ends with " + std::to_string(have) +
                               " vertices where three are needed; export the mesh again");
       }
-      add_facet(screened, corners, at_line(number));
+      add_facet(prescanned, corners, at_line(number));
       open = false;
     }
   }
   if (open || !ended) {
-    refuse_mesh(file, "ends without 'endsolid' after " + std::to_string(screened.faces) +
+    refuse_mesh(file, "ends without 'endsolid' after " + std::to_string(prescanned.faces) +
                           " facets; it is cut short: copy or export it again");
   }
 }
 
-void screen_stl_binary(std::string_view bytes, std::uint64_t count, ScreenedFile& screened) {
-  screened.trailing_bytes = bytes.size() - kStlHeader - count * kStlFacet;
-  screened.dialect.reserve(kStlHeader + count * kStlFacet);
+void prescan_stl_binary(std::string_view bytes, std::uint64_t count, PrescannedFile& prescanned) {
+  prescanned.trailing_bytes = bytes.size() - kStlHeader - count * kStlFacet;
+  prescanned.dialect.reserve(kStlHeader + count * kStlFacet);
   for (std::uint64_t i = 0; i < count; ++i) {
     const char* facet = bytes.data() + kStlHeader + i * kStlFacet + 3 * sizeof(float);
     std::array<glm::dvec3, 3> corners{};
@@ -307,15 +306,15 @@ void screen_stl_binary(std::string_view bytes, std::uint64_t count, ScreenedFile
       std::memcpy(&value, facet + c * sizeof(float), sizeof(float));
       corners[c / 3][static_cast<int>(c % 3)] = value;
     }
-    add_facet(screened, corners, "facet " + std::to_string(i + 1));
+    add_facet(prescanned, corners, "facet " + std::to_string(i + 1));
   }
 }
 
 }  // namespace
 
-ScreenedFile screen_stl(const std::filesystem::path& file, std::string_view bytes) {
-  ScreenedFile screened;
-  begin_stl(screened);
+PrescannedFile prescan_stl(const std::filesystem::path& file, std::string_view bytes) {
+  PrescannedFile prescanned;
+  begin_stl(prescanned);
   std::uint32_t count = 0;
   if (bytes.size() >= kStlHeader)
     std::memcpy(&count, bytes.data() + kStlHeader - sizeof(count), sizeof(count));
@@ -325,7 +324,7 @@ ScreenedFile screen_stl(const std::filesystem::path& file, std::string_view byte
   const bool says_solid = first_word == "solid" || first_word == "SOLID";
   // Many binary files begin with 'solid' too, so the size decides first.
   if (says_solid && expected != bytes.size()) {
-    screen_stl_text(file, bytes, screened);
+    prescan_stl_text(file, bytes, prescanned);
   } else if (bytes.size() < kStlHeader) {
     refuse_mesh(file,
                 "has " + std::to_string(bytes.size()) +
@@ -336,22 +335,16 @@ ScreenedFile screen_stl(const std::filesystem::path& file, std::string_view byte
                           std::to_string(expected) + " bytes, but has " + std::to_string(bytes.size()) +
                           "; it is cut short or damaged: copy or export it again");
   } else {
-    screen_stl_binary(bytes, count, screened);
+    prescan_stl_binary(bytes, count, prescanned);
   }
-  end_stl(screened);
-  return screened;
+  end_stl(prescanned);
+  return prescanned;
 }
 
 // ---- shared
-// ----------------------------------------------------------------------------------------------------
 
 void refuse_mesh(const std::filesystem::path& file, const std::string& what_and_remedy) {
   throw MeshError(file.string() + ": " + what_and_remedy);
-}
-
-bool is_usable(const glm::dvec3& v) {
-  return std::abs(v.x) <= kLargestCoordinate && std::abs(v.y) <= kLargestCoordinate &&
-         std::abs(v.z) <= kLargestCoordinate;  // false for NaN
 }
 
 std::string_view TextCursor::next_line() {
@@ -405,7 +398,7 @@ bool parse_integer(std::string_view word, std::int64_t& value) {
 void append_integer(std::string& text, std::int64_t value) {
   std::array<char, 24> digits{};
   const auto [end, error] = std::to_chars(digits.data(), digits.data() + digits.size(), value);
-  (void)error;  // 24 digits hold any
+  (void)error;  // 24 digits are always enough
   text.append(digits.data(), end);
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// PLY, text and binary of either byte order, any scalar types, any further elements and lists.
+// Prescan of PLY: text, or binary in either byte order, with any scalar types and any further elements and
+// lists.
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -19,7 +20,7 @@ struct Property {
   std::string name;
   Scalar value = Scalar::float32;
   bool is_list = false;
-  Scalar count = Scalar::uint8;  // of a list
+  Scalar count = Scalar::uint8;  // type of a list's length
 };
 
 struct Element {
@@ -70,7 +71,7 @@ bool is_integer(Scalar type) {
   return type != Scalar::float32 && type != Scalar::float64;
 }
 
-// Reads the header and leaves `text` behind it.
+// Reads the header and moves `text` past it.
 Header read_header(const std::filesystem::path& file, TextCursor& text) {
   Header header;
   std::string_view line = text.next_line();
@@ -123,13 +124,13 @@ Header read_header(const std::filesystem::path& file, TextCursor& text) {
       }
       header.elements.back().properties.push_back(std::move(property));
     }
-    // comment, obj_info and what else there may be: of no concern
+    // comment, obj_info and other lines are ignored
   }
   if (!has_format) refuse_mesh(file, "the PLY header has no 'format' line; export the mesh again");
   return header;
 }
 
-// The values of the body one after another, never past its end.
+// The values of the body in sequence, never read past its end.
 class Body {
  public:
   Body(const std::filesystem::path& file, Encoding encoding, std::string_view bytes, std::size_t line)
@@ -138,7 +139,7 @@ class Body {
   [[nodiscard]] std::size_t remaining() const {
     return encoding_ == Encoding::text ? text_.remaining() : bytes_.size();
   }
-  // Fewest bytes that a value can take.
+  // Fewest bytes that a value takes.
   [[nodiscard]] std::size_t least_bytes(Scalar type) const {
     return encoding_ == Encoding::text ? 2 : size_of(type);
   }
@@ -177,7 +178,7 @@ class Body {
 
   std::int64_t integer(Scalar type) {
     const double value = number(type);
-    // Every 32-bit integer is a double; a text may say anything.
+    // Every 32-bit integer is exact in a double; in a text any number may stand here.
     if (!(value >= -9e15 && value <= 9e15)) return -1;
     return static_cast<std::int64_t>(value);
   }
@@ -193,7 +194,7 @@ class Body {
     }
   }
 
-  // Checked against what is left of the file before anybody believes it.
+  // Checked against the rest of the file before it is used.
   std::int64_t list_length(const Property& property) {
     const std::int64_t length = integer(property.count);
     if (length < 0 || static_cast<std::uint64_t>(length) > remaining() / least_bytes(property.value) + 1) {
@@ -239,7 +240,7 @@ class Body {
 };
 
 void read_vertices(const Element& element, Body& body, std::vector<glm::dvec3>& coordinates) {
-  // Which coordinate each property is, or -1.
+  // [property] coordinate 0 to 2, or -1.
   std::vector<int> axis(element.properties.size(), -1);
   for (std::size_t p = 0; p < axis.size(); ++p) {
     const Property& property = element.properties[p];
@@ -266,9 +267,9 @@ bool holds_corners(const Property& property) {
   return property.is_list && (property.name == "vertex_indices" || property.name == "vertex_index");
 }
 
-void read_faces(const Element& element, Body& body, std::string& faces, ScreenedFile& screened) {
-  // As triangles, which they mostly are; the count was checked, yet a text is trusted with no more than twice
-  // itself.
+void read_faces(const Element& element, Body& body, std::string& faces, PrescannedFile& prescanned) {
+  // Room for triangles, the usual case. The count has been checked, but in a text it may still be far too
+  // large, so no more than twice the rest of the file is reserved.
   constexpr std::size_t kTriangle = 4 * sizeof(std::int32_t);
   faces.reserve(std::min(element.count * kTriangle, 2 * body.remaining()));
   for (std::uint64_t i = 0; i < element.count; ++i) {
@@ -279,7 +280,7 @@ void read_faces(const Element& element, Body& body, std::string& faces, Screened
       }
       const std::int64_t corners = body.list_length(property);
       if (corners < 3) {
-        if (screened.short_faces++ == 0) screened.first_short_face = "face " + std::to_string(i);
+        if (prescanned.short_faces++ == 0) prescanned.first_short_face = "face " + std::to_string(i);
         for (std::int64_t c = 0; c < corners; ++c) body.integer(property.value);
         continue;
       }
@@ -289,7 +290,7 @@ void read_faces(const Element& element, Body& body, std::string& faces, Screened
         const bool fits = index >= 0 && index < std::numeric_limits<std::int32_t>::max();
         append_raw(faces, static_cast<std::int32_t>(fits ? index : -1));
       }
-      ++screened.faces;
+      ++prescanned.faces;
     }
   }
 }
@@ -326,7 +327,7 @@ void check_element(const std::filesystem::path& file, const Element& element, co
 
 }  // namespace
 
-ScreenedFile screen_ply(const std::filesystem::path& file, std::string_view bytes) {
+PrescannedFile prescan_ply(const std::filesystem::path& file, std::string_view bytes) {
   TextCursor text(bytes);
   const Header header = read_header(file, text);
   Body body(file, header.encoding, bytes.substr(bytes.size() - text.remaining()), text.line());
@@ -339,35 +340,35 @@ ScreenedFile screen_ply(const std::filesystem::path& file, std::string_view byte
     }
   }
 
-  ScreenedFile screened;
-  screened.openmesh_extension = "ply";
+  PrescannedFile prescanned;
+  prescanned.openmesh_extension = "ply";
   std::string faces;
   for (const Element& element : header.elements) {
     check_element(file, element, body);
     if (element.name == "vertex") {
-      read_vertices(element, body, screened.coordinates);
+      read_vertices(element, body, prescanned.coordinates);
     } else if (element.name == "face") {
-      read_faces(element, body, faces, screened);
+      read_faces(element, body, faces, prescanned);
     } else if (!element.properties.empty()) {
       for (std::uint64_t i = 0; i < element.count; ++i) {
         for (const Property& property : element.properties) body.skip(property);
       }
     }
   }
-  if (header.encoding != Encoding::text) screened.trailing_bytes = body.remaining();
+  if (header.encoding != Encoding::text) prescanned.trailing_bytes = body.remaining();
 
-  // OpenMesh counts the vertices and reads the faces; the coordinates, which it would make floats, are kept
-  // here, and what it passes over is as short as can be.
+  // OpenMesh counts the vertices and reads the faces. The coordinates, which it would round to floats, are
+  // kept here. One byte stands for each vertex.
   constexpr std::size_t kHeader = 256;
-  screened.dialect.reserve(kHeader + screened.coordinates.size() + faces.size());
-  screened.dialect += "ply\nformat binary_little_endian 1.0\nelement vertex ";
-  append_integer(screened.dialect, static_cast<std::int64_t>(screened.coordinates.size()));
-  screened.dialect += "\nproperty uchar nothing\nelement face ";
-  append_integer(screened.dialect, static_cast<std::int64_t>(screened.faces));
-  screened.dialect += "\nproperty list int int vertex_indices\nend_header\n";
-  screened.dialect.append(screened.coordinates.size(), '\0');
-  screened.dialect += faces;
-  return screened;
+  prescanned.dialect.reserve(kHeader + prescanned.coordinates.size() + faces.size());
+  prescanned.dialect += "ply\nformat binary_little_endian 1.0\nelement vertex ";
+  append_integer(prescanned.dialect, static_cast<std::int64_t>(prescanned.coordinates.size()));
+  prescanned.dialect += "\nproperty uchar nothing\nelement face ";
+  append_integer(prescanned.dialect, static_cast<std::int64_t>(prescanned.faces));
+  prescanned.dialect += "\nproperty list int int vertex_indices\nend_header\n";
+  prescanned.dialect.append(prescanned.coordinates.size(), '\0');
+  prescanned.dialect += faces;
+  return prescanned;
 }
 
 }  // namespace polygon

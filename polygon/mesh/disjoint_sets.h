@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What is connected with what, found by uniting pairs.
+// Union-find over the numbers 0 to n − 1.
 #pragma once
 
 #include <algorithm>
@@ -10,8 +10,8 @@
 
 namespace polygon {
 
-// Sets of the numbers below n, at first each by itself; the lowest of a set stands for it, so that names of
-// sets do not depend on the order of unions.
+// Each number starts as a set of its own. A set is named by its lowest member, so names do not depend on the
+// order of unions.
 class DisjointSets {
  public:
   explicit DisjointSets(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0U); }

@@ -13,7 +13,7 @@ std::string point_in_words(const glm::dvec3& p) {
   return text.str();
 }
 
-void Found::add(const glm::dvec3& where, std::optional<std::uint32_t> triangle) {
+void FindingTally::add(const glm::dvec3& where, std::optional<std::uint32_t> triangle) {
   if (count++ == 0) {
     place = {.first_m = where, .lower_m = where, .upper_m = where, .triangle = triangle};
   } else {
@@ -22,7 +22,7 @@ void Found::add(const glm::dvec3& where, std::optional<std::uint32_t> triangle) 
   }
 }
 
-void add_finding(std::vector<Finding>& findings, const char* id, Severity severity, const Found& found,
+void add_finding(std::vector<Finding>& findings, const char* id, Severity severity, const FindingTally& found,
                  const std::string& text) {
   if (found.count == 0) return;
   const FindingPlace& place = found.place;

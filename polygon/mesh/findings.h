@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Counts what a check finds or a repair does, with where.
+// Tallies what a check finds or a repair changes: how often and where.
 #pragma once
 
 #include <cstddef>
@@ -13,18 +13,20 @@
 
 namespace polygon {
 
-// "(0.01, -0.2, 3) m": enough digits to find the place in any viewer.
+// "(0.01, -0.2, 3) m", with enough digits to find the place in any viewer.
 [[nodiscard]] std::string point_in_words(const glm::dvec3& p);
 
-struct Found {
+// How often one finding occurred, and where.
+struct FindingTally {
   std::size_t count = 0;
   FindingPlace place;
 
   void add(const glm::dvec3& where, std::optional<std::uint32_t> triangle = std::nullopt);
 };
 
-// The finding, its place in its words too; nothing when the count is 0. `text` follows the count.
-void add_finding(std::vector<Finding>& findings, const char* id, Severity severity, const Found& found,
+// Appends the finding, with its place in the text too. Does nothing when the tally's count is 0. `text` reads
+// as the continuation of the count.
+void add_finding(std::vector<Finding>& findings, const char* id, Severity severity, const FindingTally& found,
                  const std::string& text);
 
 }  // namespace polygon

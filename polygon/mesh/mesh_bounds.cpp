@@ -12,22 +12,20 @@
 namespace polygon {
 namespace {
 
-constexpr std::size_t kMost = 0xffffffffU;
-constexpr double kFurthestVertex = 1e12;  // (unit: meter)
-
-// False for what is not a number.
-bool is_usable(const glm::dvec3& v) {
-  return std::abs(v.x) <= kFurthestVertex && std::abs(v.y) <= kFurthestVertex &&
-         std::abs(v.z) <= kFurthestVertex;
-}
+constexpr std::size_t kMaxCount = 0xffffffffU;
 
 }  // namespace
+
+bool is_usable(const glm::dvec3& v) {
+  return std::abs(v.x) <= kLargestCoordinate && std::abs(v.y) <= kLargestCoordinate &&
+         std::abs(v.z) <= kLargestCoordinate;
+}
 
 MeshBounds checked_bounds(const TriangleMesh& mesh) {
   if (mesh.triangles.empty()) {
     throw std::invalid_argument("the mesh has no triangle; a surface needs at least one");
   }
-  if (mesh.triangles.size() >= kMost || mesh.vertices.size() >= kMost) {
+  if (mesh.triangles.size() >= kMaxCount || mesh.vertices.size() >= kMaxCount) {
     throw std::invalid_argument("the mesh has " + std::to_string(mesh.triangles.size()) +
                                 " triangles, more than 2^32 - 2; split it");
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What has to be known of a mesh as a whole before it can be felt.
+// Checks that a mesh can be used at all, and two properties of the whole mesh: its bounds and its winding.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -8,16 +8,22 @@
 
 namespace polygon {
 
+// Largest accepted coordinate (file units, and meters after scaling). Squares and products of such
+// coordinates are far from overflow, and the coordinate itself fits a float.
+inline constexpr double kLargestCoordinate = 1e12;
+// Whether every coordinate is within the limit; false for NaN.
+[[nodiscard]] bool is_usable(const glm::dvec3& coordinates);
+
 struct MeshBounds {
   glm::dvec3 low{0.0}, high{0.0};  // of the vertices that triangles use (unit: meter)
 };
 
-// Throws std::invalid_argument: no triangle, 2^32 - 1 of them or more, an index out of range, a vertex that
-// is not finite or beyond 1e12 m (which keeps every square and product far from overflow).
+// Bounds of the vertices that triangles use. Throws std::invalid_argument for no triangle, 2^32 - 1 triangles
+// or more, an index out of range, or a vertex that is not finite or beyond 1e12 m.
 [[nodiscard]] MeshBounds checked_bounds(const TriangleMesh& mesh);
 
-// Is the point inside a closed mesh, by the solid angle of all of it (van Oosterom and Strackee 1983)? Right
-// whatever the nearest triangles look like, but it visits every one.
+// Whether the point is inside a closed mesh, by the total solid angle (van Oosterom & Strackee 1983). The
+// result does not depend on the shape of the nearest triangles, but every triangle is visited.
 [[nodiscard]] bool winds_around(const TriangleMesh& mesh, const glm::dvec3& point) noexcept;
 
 }  // namespace polygon

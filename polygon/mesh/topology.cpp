@@ -12,8 +12,6 @@
 namespace polygon {
 namespace {
 
-constexpr std::uint32_t kNone = 0xffffffffU;
-
 std::uint64_t hash_of(const glm::dvec3& v) {
   // + 0.0 turns -0 into 0, so that equal coordinates have equal bits.
   std::uint64_t h = 0x9e3779b97f4a7c15ULL;
@@ -25,20 +23,20 @@ std::uint64_t hash_of(const glm::dvec3& v) {
   return h;
 }
 
-// A counting sort keeps building linear in the number of triangles, where sorting them all takes seconds at a
-// million. Counts go in two places further up; once summed, place b + 1 is where bucket b begins, and is
-// moved on as it is filled, so that in the end bucket b runs from place b to place b + 1.
+// Counting sort, linear in the number of triangles. Counts are stored two places further up. After summing,
+// place b + 1 is the start of bucket b. next() advances it, so that finally bucket b runs from place b to
+// place b + 1.
 class Buckets {
  public:
   explicit Buckets(std::uint32_t buckets) : places_(static_cast<std::size_t>(buckets) + 2, 0) {}
   void count(std::uint32_t bucket) { ++places_[static_cast<std::size_t>(bucket) + 2]; }
-  // Returns how many there are.
+  // Returns the number of entries.
   std::size_t sum() {
     for (std::size_t i = 1; i < places_.size(); ++i) places_[i] += places_[i - 1];
     return places_.back();
   }
   std::size_t next(std::uint32_t bucket) { return places_[static_cast<std::size_t>(bucket) + 1]++; }
-  // Of each bucket, and the end of the last.
+  // The start of each bucket, followed by the end of the last.
   std::vector<std::size_t> starts() && {
     places_.pop_back();
     return std::move(places_);
@@ -48,7 +46,7 @@ class Buckets {
   std::vector<std::size_t> places_;
 };
 
-// Most buckets hold a handful.
+// Buckets of at most this size are sorted by insertion; most hold a handful.
 constexpr std::size_t kFew = 16;
 
 TriangleIndices in_order(TriangleIndices t) {
@@ -62,11 +60,11 @@ WeldedVertices weld_vertices(std::span<const glm::dvec3> vertices) {
   WeldedVertices welded;
   welded.point_of.resize(vertices.size());
   const std::size_t slots = std::bit_ceil(std::max<std::size_t>(vertices.size() * 2, 16));
-  std::vector<std::uint32_t> table(slots, kNone);  // first vertex of each point
+  std::vector<std::uint32_t> table(slots, kNoIndex);  // first vertex of each point
   for (std::size_t i = 0; i < vertices.size(); ++i) {
     std::size_t slot = hash_of(vertices[i]) & (slots - 1);
-    while (table[slot] != kNone && vertices[table[slot]] != vertices[i]) slot = (slot + 1) & (slots - 1);
-    if (table[slot] == kNone) {
+    while (table[slot] != kNoIndex && vertices[table[slot]] != vertices[i]) slot = (slot + 1) & (slots - 1);
+    if (table[slot] == kNoIndex) {
       table[slot] = static_cast<std::uint32_t>(i);
       welded.point_of[i] = welded.points++;
     } else {
@@ -146,7 +144,7 @@ std::vector<std::uint32_t> first_duplicates(std::span<const TriangleIndices> tri
   const std::vector<std::size_t> starts = std::move(by_low).starts();
 
   std::vector<std::uint32_t> first(triangles.size());
-  // The other two corners, and the triangle.
+  // The other two corners in ascending order, then the triangle's index.
   using Key = std::pair<std::uint64_t, std::uint32_t>;
   const auto key_of = [&](std::uint32_t triangle) {
     const TriangleIndices t = in_order(triangles[triangle]);

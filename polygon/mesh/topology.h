@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What is connected with what in a triangle soup, by exactly equal coordinates. The soup itself is not
-// changed.
+// Connectivity of a triangle soup. Vertices with exactly equal coordinates are one point. The soup itself is
+// not changed.
 #pragma once
 
 #include <cstdint>
@@ -12,29 +12,30 @@
 
 namespace polygon {
 
-// Vertices of exactly equal coordinates (0 and -0 are equal) become one point.
+// Vertices with exactly equal coordinates (0 and -0 are equal) become one point.
 struct WeldedVertices {
-  std::vector<std::uint32_t> point_of;  // one a vertex: its point, numbered in order of first appearance
+  std::vector<std::uint32_t> point_of;  // [vertex] its point, numbered in order of first appearance
   std::uint32_t points = 0;
 };
 [[nodiscard]] WeldedVertices weld_vertices(std::span<const glm::dvec3> vertices);
 
-// The mesh's triangles with points for corners.
+// The mesh's triangles, with point indices as corners.
 [[nodiscard]] std::vector<TriangleIndices> welded_triangles(const TriangleMesh& mesh,
                                                             const WeldedVertices& welded);
 
-// Fewer than three different corners: it has no inside, and takes no part in what is connected.
+// True if two corners are the same point. Such a triangle has no interior and takes no part in connectivity.
 [[nodiscard]] inline bool has_repeated_corner(const TriangleIndices& t) {
   return t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
 }
 
-// The sides of all triangles without repeated corners, by edge: 8 bytes a side, in linear time.
+// The sides of all triangles without repeated corners, grouped by edge. 8 bytes per side; built in linear
+// time.
 class EdgeTable {
  public:
-  // std::invalid_argument at 2^31 triangles and more.
+  // Throws std::invalid_argument for 2^31 triangles or more.
   EdgeTable(std::span<const TriangleIndices> triangles, std::uint32_t points);
 
-  // One triangle at an edge.
+  // One triangle that has the edge.
   class Use {
    public:
     Use() = default;
@@ -42,9 +43,7 @@ class EdgeTable {
         : bits_(std::uint64_t{high} << 32U | std::uint64_t{triangle} << 1U | (forward ? 1U : 0U)) {}
     [[nodiscard]] std::uint32_t high() const { return static_cast<std::uint32_t>(bits_ >> 32U); }
     [[nodiscard]] std::uint32_t triangle() const { return static_cast<std::uint32_t>(bits_) >> 1U; }
-    [[nodiscard]] bool forward() const {
-      return (bits_ & 1U) != 0;
-    }  // it runs from the low to the high point
+    [[nodiscard]] bool forward() const { return (bits_ & 1U) != 0; }  // runs from the low to the high point
     [[nodiscard]] std::uint64_t order() const { return bits_; }
 
    private:
@@ -71,11 +70,11 @@ class EdgeTable {
   [[nodiscard]] bool empty() const { return uses_.empty(); }
 
  private:
-  std::vector<std::size_t> starts_;  // [point] where the sides that have it for their low end begin
+  std::vector<std::size_t> starts_;  // [point] start of the sides whose low end it is
   std::vector<Use> uses_;
 };
 
-// One side of one triangle. Edge i runs from corner i to corner (i + 1) % 3.
+// One side of one triangle. Side i runs from corner i to corner (i + 1) % 3.
 struct EdgeUse {
   std::uint32_t low = 0, high = 0;  // points, low < high
   std::uint32_t triangle = 0;
@@ -83,27 +82,27 @@ struct EdgeUse {
   bool forward = false;  // the triangle runs from low to high
 };
 
-// All sides of all triangles without repeated corners, those of the same edge next to one another, in
-// ascending order of (low, high, triangle).
+// All sides of all triangles without repeated corners, in ascending order of (low, high, triangle). Sides of
+// the same edge are neighbours in the list.
 [[nodiscard]] std::vector<EdgeUse> sorted_edges(std::span<const TriangleIndices> triangles,
                                                 std::uint32_t points);
 
-// One a triangle: the lowest triangle with the same three points, whatever their order; itself when it is the
+// [triangle] the lowest triangle with the same three points in any order; the triangle itself if it is the
 // first.
 [[nodiscard]] std::vector<std::uint32_t> first_duplicates(std::span<const TriangleIndices> triangles,
                                                           std::uint32_t points);
 
-inline constexpr std::uint32_t kNoTriangle = 0xffffffffU;
+inline constexpr std::uint32_t kNoTriangle = kNoIndex;
 
-// The triangle on the other side of each edge: [triangle][i] across the edge from corner i to (i + 1) % 3.
-// kNoTriangle where there is none, or more than one, and at triangles with a repeated corner.
+// [triangle][i] the triangle across the edge from corner i to (i + 1) % 3. kNoTriangle if there is none or
+// more than one, and for triangles with a repeated corner.
 [[nodiscard]] std::vector<TriangleIndices> triangles_across(std::span<const TriangleIndices> triangles,
                                                             std::uint32_t points);
 
-// What a surface needs to know of its mesh, by the corners' coordinates.
+// Connectivity that a surface needs of its mesh. Corners are compared by their coordinates.
 struct Connections {
-  std::vector<std::uint32_t> distinct;  // triangles that repeat no earlier one's corners, in ascending order;
-                                        // empty when that is all of them
+  std::vector<std::uint32_t> distinct;  // ascending: triangles without an earlier duplicate; empty if that is
+                                        // all of them
   std::vector<TriangleIndices> across;  // triangles_across()
 };
 [[nodiscard]] Connections connect_triangles(const TriangleMesh& mesh);

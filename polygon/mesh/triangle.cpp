@@ -7,16 +7,14 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
-#include "polygon/surface/mesh_surface.h"
-
 namespace polygon {
 namespace {
 
-constexpr double kSmallestSquare = 1e-200;  // of a cross product, that still has all its digits
+constexpr double kSmallestSquare = 1e-200;  // of a cross product; below it digits are lost
 constexpr double kDegenerateSineSquared = 1e-28;
-// A normal is off by rounding / sine, and a foot along it by that share of the triangle's length: 0.5 % at a
-// sine of 4e-14. Below this sine the edges, half a width away at most, are nearer the truth where they are
-// nearer the point.
+// Rounding turns a normal by about (epsilon / sine), and shifts a foot point by that fraction of the
+// triangle's length: 0.5 % at a sine of 4e-14. Below this sine the edges, which are at most half the
+// triangle's width away, are compared too.
 constexpr double kNeedleSineSquared = 1e-12;
 
 bool sine_is_below(double sine_squared, const glm::dvec3& n, const glm::dvec3& ab, const glm::dvec3& ac) {
@@ -26,7 +24,7 @@ bool normal_is_rounding(const glm::dvec3& n, const glm::dvec3& ab, const glm::dv
   return sine_is_below(kDegenerateSineSquared, n, ab, ac);
 }
 
-// Closest point of the segment; a segment of no length is its first end.
+// Closest point of the segment; a segment of zero length is its first end.
 void improve_with_segment(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b, int edge,
                           TrianglePoint& best) {
   const glm::dvec3 ab = b - a;
@@ -59,7 +57,8 @@ glm::dvec3 unit_normal(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec
   if (normal_is_rounding(n, b - a, c - a)) return glm::dvec3(0.0);
   const double square = glm::dot(n, n);
   if (square > kSmallestSquare) return n * (1.0 / std::sqrt(square));
-  // Scaled first: the cross product of two nanometer edges has a length whose square is denormal.
+  // The edges are normalised first: the squared length of the cross product of two nanometer edges is
+  // denormal.
   return glm::normalize(glm::cross(glm::normalize(b - a), glm::normalize(c - a)));
 }
 
@@ -67,10 +66,10 @@ double corner_angle(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& 
   return std::atan2(glm::length(glm::cross(b - a, c - a)), glm::dot(b - a, c - a));
 }
 
-// Ericson's form (Real-Time Collision Detection, section 5.1.5) decides by products of four lengths, whose
-// rounding grows with 1/area²; the edge functions below are triple products with the normal, whose rounding
-// grows with 1/area, which is what slivers need. The closest point of a convex set lies on an edge that the
-// point is beyond (or on the corner of one), so only those edges are looked at.
+// Ericson's form (Real-Time Collision Detection, section 5.1.5) compares products of four lengths, whose
+// rounding error grows with 1/area². The edge functions below are triple products with the normal, whose
+// rounding error grows only with 1/area; slivers need that. The closest point of a convex set lies on an edge
+// that the query point is beyond, so only those edges are tested.
 TrianglePoint closest_on_triangle(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b,
                                   const glm::dvec3& c) noexcept {
   const glm::dvec3 ab = b - a;
@@ -95,12 +94,12 @@ TrianglePoint closest_on_triangle(const glm::dvec3& p, const glm::dvec3& a, cons
   TrianglePoint best;
   best.squared_distance = std::numeric_limits<double>::infinity();
   best.point = a;
-  // Degenerate: a segment, or a point, is the union of its edges, so every edge is looked at.
+  // A degenerate triangle (a segment or a point) is the union of its edges, so every edge is tested.
   if (needle || !(beyond[0] > 0.0)) improve_with_segment(p, a, b, 0, best);
   if (needle || !(beyond[1] > 0.0)) improve_with_segment(p, b, c, 1, best);
   if (needle || !(beyond[2] > 0.0)) improve_with_segment(p, c, a, 2, best);
   if (above) {
-    // A mean of the corners: a point of the triangle however the normal was rounded.
+    // A convex combination of the corners, so that it lies in the triangle however the normal was rounded.
     TrianglePoint face;
     face.point = (beyond[1] * a + beyond[2] * b + beyond[0] * c) / (beyond[0] + beyond[1] + beyond[2]);
     face.squared_distance = glm::dot(p - face.point, p - face.point);

@@ -1,48 +1,48 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Where a convex surface bends a little, at the edges of its triangles. A ball pressed into such a surface
-// has a minimum on every triangle that the way to its goal passes through; which of them it is in would
-// depend on how it came, and the hand would feel the tessellation as a catch at every edge. So a proxy
-// crosses to a nearer minimum when only a nearly flat edge lies between. At a sharp edge it stays: there,
-// going over is what the hand would have to do.
+// Crossing of nearly flat edges. A ball pressed into a convex tessellated surface has a local minimum on each
+// of several triangles. Which one it is in would depend on the path, and the hand would feel a catch at every
+// edge. So the proxy crosses to a neighbouring minimum that is nearer to the goal if only a nearly flat edge
+// lies between. At a sharp edge it stays, because there the hand itself has to go around.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <glm/vec3.hpp>
 
-#include "polygon/surface/rigid_surface.h"
 #include "polygon/proxy/neighbourhood.h"
+#include "polygon/surface/rigid_surface.h"
 
 namespace polygon {
 
-// The triangles beside one that touches the ball, across edges that bend away from the ball by at most 30
-// degrees.
-struct Ridges {
+// The neighbours of a touching triangle, across edges that bend away from the ball by at most 30 degrees.
+struct CrossableEdges {
   struct Side {
     std::uint32_t element = kNoElement;
-    SeparatingPlane plane;  // the element's own, for the ball's centre, on the ball's side
+    SeparatingPlane plane;  // of that element's face, for the ball's centre, on the ball's side
     double bend = 0.0;      // 1 − cosine of the angle between the normals
   };
-  std::uint32_t element = kNoElement;  // the one that touches
+  std::uint32_t element = kNoElement;  // the touching triangle
   SeparatingPlane plane;
   std::uint32_t count = 0;
   std::array<Side, 3> sides;
 };
 
-// `plane` is the element's own, on the ball's side.
-Ridges ridges_of(const RigidSurface& surface, std::uint32_t element, const SeparatingPlane& plane,
-                 double radius, double rounding) noexcept;
+// `plane` is the element's face plane on the ball's side (body frame). `radius` is the ball's, and `rounding`
+// the tolerance of the convexity test (unit: meter).
+CrossableEdges crossable_edges_of(const RigidSurface& surface, std::uint32_t element,
+                                  const SeparatingPlane& plane, double radius, double rounding) noexcept;
 
-// The side on whose plane the goal's ball would be least deep, if that is less than on the element itself by
-// more than a twentieth of what the bend can make of it; nullptr when it is not. (With less than that, the
-// noise of an encoder would make a proxy over an edge go to and fro.)
-const Ridges::Side* nearer_side(const Ridges& ridges, const glm::dvec3& goal) noexcept;
+// The side whose plane the goal violates least, or nullptr if none is better than the element itself. The
+// improvement must exceed a twentieth of what the bend can account for. This hysteresis keeps encoder noise
+// from moving a proxy back and forth over an edge.
+const CrossableEdges::Side* nearer_side(const CrossableEdges& edges, const glm::dvec3& goal) noexcept;
 
-// The points of the two planes' intersection and of the side's plane that are nearest to the goal: the way
-// across lies in the element's plane to `top`, and in the side's to `end`.
-struct RidgeCrossing {
+// Path across an edge, nearest to the goal: within the element's plane to `top` on the line where the planes
+// meet, then within the side's plane to `end`.
+struct EdgeCrossing {
   glm::dvec3 top{0.0}, end{0.0};
 };
-RidgeCrossing cross_ridge(const Ridges& ridges, const Ridges::Side& side, const glm::dvec3& goal) noexcept;
+EdgeCrossing cross_edge(const CrossableEdges& edges, const CrossableEdges::Side& side,
+                        const glm::dvec3& goal) noexcept;
 
 }  // namespace polygon

@@ -10,18 +10,18 @@ namespace polygon {
 namespace {
 
 constexpr int kMaxExchanges = 64;
-// Planes nearer to parallel than this (sine of the angle between one and the span of the others) are one
-// plane: where two such planes meet is rounding.
+// Planes closer to parallel than this count as one: the sine of the angle between one normal and the span of
+// the others. Their intersection would be rounding error.
 constexpr double kParallel = 1e-9;
-// Of the way from the target: a plane broken by less is met, as exactly as three planes at a blunt corner can
-// be solved.
+// Relative to the distance from the target: a smaller violation counts as satisfied. Three planes at a blunt
+// corner cannot be solved more exactly.
 constexpr double kRounding = 1e-12;
 
-// In coordinates y = Lᵀ(q − t), where A = L Lᵀ, the cost is |y|² and a plane says unit · y >= distance.
+// In coordinates y = Lᵀ(q − t), with A = L Lᵀ, the cost is |y|² and a plane reads unit · y >= distance.
 struct Whitened {
   glm::dvec3 unit{0.0};
   double distance = 0.0;
-  double length = 0.0;  // of L⁻¹ n, by which unit and distance were divided
+  double length = 0.0;  // |L⁻¹ n|, by which unit and distance were divided
 };
 
 struct Subset {
@@ -35,8 +35,8 @@ struct Candidate {
   double cost = 0.0;
 };
 
-// Lower triangle L of a symmetric positive definite matrix, A = L Lᵀ (Golub & Van Loan, Matrix
-// Computations, 4.2), inverted.
+// The inverse of the lower triangular Cholesky factor L, A = L Lᵀ (Golub & Van Loan, Matrix Computations,
+// 4.2).
 glm::dmat3 inverse_cholesky_of(const glm::dmat3& a) noexcept {
   const double l00 = std::sqrt(a[0][0]), l10 = a[0][1] / l00, l20 = a[0][2] / l00;
   const double l11 = std::sqrt(a[1][1] - l10 * l10), l21 = (a[1][2] - l20 * l10) / l11;
@@ -57,9 +57,9 @@ Whitened whiten(const glm::dmat3& inverse_l, const glm::dvec3& target, const Con
   return {m / length, (plane.offset - glm::dot(plane.normal, target)) / length, length};
 }
 
-// Shortest y with unit · y = distance on all planes of a subset, by Gram-Schmidt: solving for the multipliers
-// first would square the condition, and lose a micrometre where two triangles meet at a millionth of a
-// radian. False: they are dependent.
+// Shortest y with unit · y = distance on all planes of a subset, by Gram-Schmidt. Solving for the multipliers
+// first would square the condition number, and lose a micrometre where two triangles meet at a millionth of a
+// radian. False if the planes are dependent.
 bool solve_subset(const glm::dmat3& inverse_l, const glm::dvec3& target, std::span<const ContactPlane> planes,
                   const Subset& subset, Candidate& out) noexcept {
   std::array<Whitened, 3> white;
@@ -69,7 +69,7 @@ bool solve_subset(const glm::dmat3& inverse_l, const glm::dvec3& target, std::sp
   for (std::uint32_t i = 0; i < subset.count; ++i) {
     white[i] = whiten(inverse_l, target, planes[subset.plane[i]]);
     glm::dvec3 rest = white[i].unit;
-    for (int pass = 0; pass < 2; ++pass) {  // the second removes what rounding left of the first
+    for (int pass = 0; pass < 2; ++pass) {  // the second pass removes the first one's rounding error
       for (std::uint32_t j = 0; j < i; ++j) {
         const double along = glm::dot(basis[j], rest);
         r[j][i] += along;
@@ -113,17 +113,17 @@ PlaneMinimum minimise_on_planes(const glm::dvec3& target, const Metric& metric,
   for (int exchange = 0; exchange < kMaxExchanges; ++exchange) {
     std::uint32_t worst = 0;
     double depth = tolerance + kRounding * glm::length(way);
-    bool broken = false;
+    bool violated = false;
     for (std::uint32_t i = 0; i < planes.size(); ++i) {
       const double d = planes[i].offset - glm::dot(planes[i].normal, result.point);
       if (!(d > depth)) continue;
       depth = d;
       worst = i;
-      broken = true;
+      violated = true;
     }
-    if (!broken) return result;
+    if (!violated) return result;
 
-    // Subsets of the old active planes, each with the new one added.
+    // All subsets of the old active planes, each with the violated plane added.
     Candidate best;
     best.cost = std::numeric_limits<double>::max();
     Subset best_subset;
@@ -141,7 +141,7 @@ PlaneMinimum minimise_on_planes(const glm::dvec3& target, const Metric& metric,
       if (!solve_subset(inverse_l, target, planes, subset, c)) continue;
       bool valid = c.cost < best.cost;
       for (std::uint32_t i = 0; i < subset.count; ++i) valid = valid && c.multiplier[i] >= 0.0;
-      // Those of the subset are met by construction.
+      // Planes of the subset are satisfied by construction.
       for (std::uint32_t i = 0; i < result.active_count && valid; ++i) {
         if ((mask >> i & 1U) != 0U) continue;
         const ContactPlane& p = planes[result.active[i]];
@@ -153,8 +153,8 @@ PlaneMinimum minimise_on_planes(const glm::dvec3& target, const Metric& metric,
       }
     }
     if (best_subset.count == 0) {
-      // A plane that is parallel to those that hold the point, and broken by no more than their angle, is met
-      // by them.
+      // If the plane is parallel to the active ones and its violation is within their angle, it counts as
+      // satisfied.
       result.feasible = depth <= tolerance + kParallel * glm::length(way);
       return result;
     }

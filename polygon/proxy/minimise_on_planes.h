@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The proxy's constrained minimum: where a ball goes that wants to be elsewhere and may not enter anything
-// rigid. God-object (Zilles & Salisbury 1995) with a finite radius (Ruspini, Kolarov & Khatib 1997).
+// The proxy's constrained minimum: the feasible point nearest to a target, for a ball that may not enter
+// rigid objects. God-object (Zilles & Salisbury 1995) with a finite radius (Ruspini, Kolarov & Khatib 1997).
+// Exact, bounded and free of allocation.
 #pragma once
 
 #include <array>
@@ -11,20 +12,21 @@
 
 namespace polygon {
 
-// The ball's centre q must satisfy normal · q >= offset (unit: meter).
+// Constraint on the ball's centre q: normal · q >= offset (unit: meter).
 struct ContactPlane {
   glm::dvec3 normal{0.0};
   double offset = 0.0;
-  std::uint32_t object = 0;   // who says so
+  std::uint32_t object = 0;   // the object that gives the plane
   std::uint32_t element = 0;  // triangle, 0 for a primitive
 };
 
 struct PlaneMinimum {
   glm::dvec3 point{0.0};
-  std::uint32_t active_count = 0;         // planes that hold the point, at most three
-  std::array<std::uint32_t, 3> active{};  // their indices
+  std::uint32_t active_count = 0;         // active planes, at most three
+  std::array<std::uint32_t, 3> active{};  // their indices in the input
   std::array<double, 3> multiplier{};     // >= 0, in units of metric · meter
-  bool feasible = true;                   // false: the planes leave no room, `point` breaks the last one
+  // False: the half-spaces do not intersect, and `point` violates a plane.
+  bool feasible = true;
 };
 
 // A symmetric positive definite metric A, factored once for many problems.
@@ -38,11 +40,11 @@ class Metric {
   glm::dmat3 inverse_l_;
 };
 
-// The point nearest to `target` in the metric (q − t)ᵀ A (q − t), A symmetric positive definite, in the
-// intersection of the planes' half-spaces. Exact: the most violated plane joins, and of the subsets of at
-// most three planes that contain it the one with non-negative multipliers is kept; the distance grows each
-// time, so it ends (an LP-type problem, Sharir & Welzl 1992). A plane counts as violated beyond `tolerance`
-// (unit: meter). Bounded, allocates nothing.
+// The point nearest to `target` in the metric (q − t)ᵀ A (q − t), with A symmetric positive definite, in the
+// intersection of the planes' half-spaces. An LP-type problem (Sharir & Welzl 1992), solved exactly: the most
+// violated plane is added, and of all subsets of at most three planes that contain it, the cheapest valid one
+// with non-negative multipliers is kept. The distance grows with each exchange, so the loop ends; the number
+// of exchanges is bounded. A plane counts as violated beyond `tolerance` (unit: meter). Allocates nothing.
 PlaneMinimum minimise_on_planes(const glm::dvec3& target, const Metric& metric,
                                 std::span<const ContactPlane> planes, double tolerance) noexcept;
 inline PlaneMinimum minimise_on_planes(const glm::dvec3& target, const glm::dmat3& metric,

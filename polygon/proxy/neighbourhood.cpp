@@ -9,9 +9,11 @@
 namespace polygon {
 namespace {
 
-HYBRID_WIDE double measure(const double* x, const double* y, const double* z, const double* offset, double px,
-                           double py, double pz, double* depth, std::uint32_t count) noexcept {
-  // Four maxima side by side: one would wait for itself.
+// Depth of the point p below each plane; returns the largest.
+HYBRID_WIDE double plane_depths(const double* x, const double* y, const double* z, const double* offset,
+                                double px, double py, double pz, double* depth,
+                                std::uint32_t count) noexcept {
+  // Four independent maxima, because a single one would serialise the loop.
   double most[4] = {-1e300, -1e300, -1e300, -1e300};
   const std::uint32_t whole = count & ~3U;
   for (std::uint32_t i = 0; i < whole; i += 4) {
@@ -32,14 +34,14 @@ HYBRID_WIDE double measure(const double* x, const double* y, const double* z, co
 }  // namespace
 
 Neighbourhood::Neighbourhood(std::size_t elements)
-    : x_(std::min<std::size_t>(elements, kCrowded)),
+    : x_(std::min<std::size_t>(elements, kCrowdedCapacity)),
       y_(x_.size()),
       z_(x_.size()),
       offset_(x_.size()),
       depth_(x_.size()),
       element_(x_.size()),
-      seen_(x_.size()),
-      broken_(x_.size()) {}
+      surveyed_(x_.size()),
+      violations_(x_.size()) {}
 
 void Neighbourhood::set_plane(std::uint32_t i, const SeparatingPlane& plane) noexcept {
   x_[i] = plane.normal.x;
@@ -50,7 +52,7 @@ void Neighbourhood::set_plane(std::uint32_t i, const SeparatingPlane& plane) noe
 
 bool Neighbourhood::survey(const RigidSurface& surface, const glm::dvec3& centre, double margin,
                            double radius, const glm::dvec3& view, bool crowded) noexcept {
-  std::span<SeenElement> room(seen_);
+  std::span<ElementPlane> room(surveyed_);
   if (!crowded && room.size() > kCapacity) room = room.first(kCapacity);
   const GatherResult result = surface.survey(centre, radius + margin, view, room);
   if (!result.complete) {
@@ -61,56 +63,56 @@ bool Neighbourhood::survey(const RigidSurface& surface, const glm::dvec3& centre
   margin_ = margin;
   count_ = result.count;
   for (std::uint32_t i = 0; i < count_; ++i) {
-    const SeenElement& seen = seen_[i];
-    element_[i] = seen.element;
-    // Too near for a rough plane to pass between: an exact one.
-    const bool clear = glm::dot(seen.normal, view) >= seen.reach + radius;
-    set_plane(i, clear ? SeparatingPlane{seen.normal, seen.reach + radius}
-                       : separate(surface, seen.element, view, radius));
+    const ElementPlane& candidate = surveyed_[i];
+    element_[i] = candidate.element;
+    // Too near for the approximate plane: use the exact one.
+    const bool clear = glm::dot(candidate.normal, view) >= candidate.support + radius;
+    set_plane(i, clear ? SeparatingPlane{candidate.normal, candidate.support + radius}
+                       : separating_plane(surface, candidate.element, view, radius));
   }
   return true;
 }
 
-void Neighbourhood::see_from(const RigidSurface& surface, const glm::dvec3& view, double radius,
-                             double rounding) noexcept {
+void Neighbourhood::refresh_planes(const RigidSurface& surface, const glm::dvec3& view, double radius,
+                                   double rounding) noexcept {
   if (!known()) return;
-  const double deepest =
-      measure(x_.data(), y_.data(), z_.data(), offset_.data(), view.x, view.y, view.z, depth_.data(), count_);
+  const double deepest = plane_depths(x_.data(), y_.data(), z_.data(), offset_.data(), view.x, view.y, view.z,
+                                      depth_.data(), count_);
   if (!(deepest > rounding)) return;
   for (std::uint32_t i = 0; i < count_; ++i) {
-    if (depth_[i] > rounding) set_plane(i, separate(surface, element_[i], view, radius));
+    if (depth_[i] > rounding) set_plane(i, separating_plane(surface, element_[i], view, radius));
   }
 }
 
-std::span<Neighbourhood::Broken> Neighbourhood::broken(const glm::dvec3& from, const glm::dvec3& to,
-                                                       double tolerance) noexcept {
+std::span<Neighbourhood::Violation> Neighbourhood::violated(const glm::dvec3& from, const glm::dvec3& to,
+                                                            double tolerance) noexcept {
   const double deepest =
-      measure(x_.data(), y_.data(), z_.data(), offset_.data(), to.x, to.y, to.z, depth_.data(), count_);
+      plane_depths(x_.data(), y_.data(), z_.data(), offset_.data(), to.x, to.y, to.z, depth_.data(), count_);
   if (!(deepest > tolerance)) return {};
   std::size_t count = 0;
   for (std::uint32_t i = 0; i < count_; ++i) {
     if (!(depth_[i] > tolerance)) continue;
-    broken_[count++] = {part_before(plane(i), from, to), i, false};
+    violations_[count++] = {fraction_before(plane(i), from, to), i, false};
   }
-  return {broken_.data(), count};
+  return {violations_.data(), count};
 }
 
-SeparatingPlane separate(const RigidSurface& surface, std::uint32_t element, const glm::dvec3& view,
-                         double radius) noexcept {
+SeparatingPlane separating_plane(const RigidSurface& surface, std::uint32_t element, const glm::dvec3& view,
+                                 double radius) noexcept {
   const NearPoint near = surface.closest(element, view);
-  if (!(near.distance > 0.0)) return {};  // fulfilled everywhere: its neighbours decide
+  if (!(near.distance > 0.0)) return {};  // always satisfied; neighbouring elements decide
   const glm::dvec3 normal = (view - near.point) / near.distance;
-  // By the element's furthest corner, not by the closest point: so near a surface, rounding turns the normal,
-  // and over a long triangle that is more than the distance.
-  const double reach = surface.support(element, normal);
-  return {normal, (std::isfinite(reach) ? reach : glm::dot(normal, near.point)) + radius};
+  // The offset comes from the element's support and not from the closest point. So near to the surface the
+  // normal has rounding error, which over a long triangle exceeds the distance.
+  const double support = surface.support(element, normal);
+  return {normal, (std::isfinite(support) ? support : glm::dot(normal, near.point)) + radius};
 }
 
-bool separate_flatly(const RigidSurface& surface, std::uint32_t element, const glm::dvec3& view,
-                     double radius, double rounding, SeparatingPlane& plane) noexcept {
+bool separating_face_plane(const RigidSurface& surface, std::uint32_t element, const glm::dvec3& view,
+                           double radius, double rounding, SeparatingPlane& plane) noexcept {
   const glm::dvec3 normal = surface.face_normal(element);
   if (normal == glm::dvec3(0.0)) return false;
-  // The whole element lies in its plane: the furthest of its corners along either side is on it.
+  // All corners of a flat element have the same height along its normal.
   const double level = surface.support(element, normal);
   const double height = glm::dot(normal, view) - level;
   if (!(std::abs(height) >= radius - rounding) || height == 0.0) return false;

@@ -12,11 +12,11 @@
 namespace polygon {
 namespace {
 
-// A goal from which the surface turns away as fast as it draws nearer has no minimum there: the model is kept
-// this far from flat.
-constexpr double kFlattest = 1.0 / 64.0;
+// The reduced Hessian of the Lagrangian is kept at this fraction of the metric at least. Otherwise the model
+// has no minimum where the surface curves away as fast as the goal draws nearer.
+constexpr double kMinCurvature = 1.0 / 64.0;
 
-// Two unit vectors across n, and each other.
+// Two unit vectors perpendicular to n and to each other.
 std::array<glm::dvec3, 2> across(const glm::dvec3& n) noexcept {
   const glm::dvec3 some = std::abs(n.x) < 0.6 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
   const glm::dvec3 first = glm::normalize(glm::cross(n, some));
@@ -25,26 +25,26 @@ std::array<glm::dvec3, 2> across(const glm::dvec3& n) noexcept {
 
 }  // namespace
 
-glm::dmat3 turning_of(const RigidSurface& surface, std::uint32_t element, const glm::dvec3& view,
-                      double step) noexcept {
+glm::dmat3 distance_hessian(const RigidSurface& surface, std::uint32_t element, const glm::dvec3& view,
+                            double step) noexcept {
   const NearPoint here = surface.closest(element, view);
   if (!(here.distance > 0.0)) return glm::dmat3(0.0);
   const glm::dvec3 normal = (view - here.point) / here.distance;
-  glm::dmat3 turning(0.0);
+  glm::dmat3 hessian(0.0);
   for (const glm::dvec3& side : across(normal)) {
-    // The closest point goes along with the view over a face, along an edge only along it, from a corner
-    // nowhere.
+    // The closest point moves with the viewpoint over a face, along an edge only in the edge's direction, and
+    // at a corner not at all.
     const glm::dvec3 carried = (surface.closest(element, view + step * side).point - here.point) / step;
     glm::dvec3 turned = (side - carried) / here.distance;
     turned -= glm::dot(turned, normal) * normal;
-    turning += glm::outerProduct(turned, side);
+    hessian += glm::outerProduct(turned, side);
   }
-  return 0.5 * (turning + glm::transpose(turning));
+  return 0.5 * (hessian + glm::transpose(hessian));
 }
 
-glm::dvec3 minimum_on_turning_planes(const glm::dvec3& from, const glm::dvec3& minimum,
-                                     const glm::dmat3& metric, std::span<const TurningPlane> planes,
-                                     double furthest) noexcept {
+glm::dvec3 minimum_on_curved_constraints(const glm::dvec3& from, const glm::dvec3& minimum,
+                                         const glm::dmat3& metric, std::span<const CurvedConstraint> planes,
+                                         double furthest) noexcept {
   if (planes.empty() || planes.size() > 2) return minimum;
   std::array<glm::dvec3, 2> way{};
   if (planes.size() == 1) {
@@ -53,33 +53,34 @@ glm::dvec3 minimum_on_turning_planes(const glm::dvec3& from, const glm::dvec3& m
     const glm::dvec3 line = glm::cross(planes[0].normal, planes[1].normal);
     const double sine = glm::length(line);
     if (!(sine > 0.0)) return minimum;
-    way[0] = line / sine;  // and nowhere else
+    way[0] = line / sine;  // the only free direction
   }
-  glm::dmat3 turning(0.0);
-  for (const TurningPlane& plane : planes) turning += plane.multiplier * plane.turning;
-  glm::dmat2 flat(0.0), bent(0.0);
-  glm::dvec2 went;
+  glm::dmat3 hessian(0.0);
+  for (const CurvedConstraint& plane : planes) hessian += plane.multiplier * plane.hessian;
+  glm::dmat2 reduced_metric(0.0), reduced_hessian(0.0);
+  glm::dvec2 travelled;
   for (int i = 0; i < 2; ++i) {
     const auto a = static_cast<std::size_t>(i);
-    went[i] = glm::dot(way[a], minimum - from);
+    travelled[i] = glm::dot(way[a], minimum - from);
     for (int j = 0; j < 2; ++j) {
       const auto b = static_cast<std::size_t>(j);
-      flat[j][i] = glm::dot(way[a], metric * way[b]);
-      bent[j][i] = glm::dot(way[a], turning * way[b]);
+      reduced_metric[j][i] = glm::dot(way[a], metric * way[b]);
+      reduced_hessian[j][i] = glm::dot(way[a], hessian * way[b]);
     }
   }
-  if (planes.size() == 2) flat[1][1] = 1.0;
-  // The largest share of the metric that the turning takes away.
-  const glm::dmat2 share = glm::inverse(flat) * bent;
-  const double half = 0.5 * (share[0][0] + share[1][1]);
-  const double most = half + std::sqrt(std::max(0.0, half * half - glm::determinant(share)));
-  if (!(most > 0.0)) return minimum;
-  if (most > 1.0 - kFlattest) bent *= (1.0 - kFlattest) / most;
-  glm::dvec2 more = glm::inverse(flat - bent) * (flat * went) - went;
-  const double length = glm::length(more);
+  if (planes.size() == 2) reduced_metric[1][1] = 1.0;
+  // The largest eigenvalue of the Hessian relative to the metric.
+  const glm::dmat2 ratio = glm::inverse(reduced_metric) * reduced_hessian;
+  const double half = 0.5 * (ratio[0][0] + ratio[1][1]);
+  const double largest = half + std::sqrt(std::max(0.0, half * half - glm::determinant(ratio)));
+  if (!(largest > 0.0)) return minimum;
+  if (largest > 1.0 - kMinCurvature) reduced_hessian *= (1.0 - kMinCurvature) / largest;
+  glm::dvec2 correction =
+      glm::inverse(reduced_metric - reduced_hessian) * (reduced_metric * travelled) - travelled;
+  const double length = glm::length(correction);
   if (!std::isfinite(length)) return minimum;
-  if (length > furthest) more *= furthest / length;
-  return minimum + more.x * way[0] + more.y * way[1];
+  if (length > furthest) correction *= furthest / length;
+  return minimum + correction.x * way[0] + correction.y * way[1];
 }
 
 }  // namespace polygon

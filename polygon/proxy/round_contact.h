@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A ball on an edge or a corner: the plane that holds it turns as it moves. A proxy that goes from minimum to
-// minimum over such planes creeps where its goal lies near the edge, the more the nearer: what is left of the
-// way shrinks by no more than h/r a step, h from the edge to the goal, r the ball's radius. With the turning
-// in the model (Newton's method for the constrained minimum: Nocedal & Wright, Numerical Optimization, 18.1)
-// one step gets there.
+// Second-order step for a ball on an edge or a corner, where the constraint plane turns as the ball moves. A
+// sequence of minima over fixed planes creeps if the goal is near the edge: each step reduces the remaining
+// distance by no more than the fraction h/r, with h the distance from edge to goal and r the ball's radius.
+// With the curvature in the model (Newton's method for the constrained minimum: Nocedal & Wright, Numerical
+// Optimization, 18.1) one step suffices.
 #pragma once
 
 #include <glm/mat3x3.hpp>
@@ -14,23 +14,25 @@
 
 namespace polygon {
 
-// A plane that holds the proxy, as PlaneMinimum says.
-struct TurningPlane {
+// An active plane of PlaneMinimum, with its curvature.
+struct CurvedConstraint {
   glm::dvec3 normal{0.0};
   double multiplier = 0.0;
-  glm::dmat3 turning{0.0};  // how the normal changes as the proxy moves (unit: 1/meter); zero for a flat one
+  // Derivative of the normal by the proxy's position (unit: 1/meter); zero for a flat constraint.
+  glm::dmat3 hessian{0.0};
 };
 
-// Of the unit normal from an element to `view`, which is at some distance from it; symmetric, along the plane
-// across that normal. `step`: over which it is measured (unit: meter).
-glm::dmat3 turning_of(const RigidSurface& surface, std::uint32_t element, const glm::dvec3& view,
-                      double step) noexcept;
+// Hessian of the distance to an element at `view`, which is the derivative of the unit normal. It is
+// symmetric, and acts across the normal. Measured by differences over `step` (unit: meter). Zero if `view`
+// lies on the element.
+glm::dmat3 distance_hessian(const RigidSurface& surface, std::uint32_t element, const glm::dvec3& view,
+                            double step) noexcept;
 
-// Where the minimum lies when the one or two planes that hold it turn: on those planes, at most `furthest`
-// from `minimum`, which is the minimum over the planes as they stand, seen from `from`. `minimum` itself when
-// nothing turns, or three planes leave no way to go.
-glm::dvec3 minimum_on_turning_planes(const glm::dvec3& from, const glm::dvec3& minimum,
-                                     const glm::dmat3& metric, std::span<const TurningPlane> planes,
-                                     double furthest) noexcept;
+// The minimum under one or two active constraints with curvature. `minimum` is the minimum under the flat
+// planes, reached from `from`. The result lies on those planes, at most `furthest` from `minimum` (unit:
+// meter). It is `minimum` itself if nothing curves, or if three planes leave no freedom.
+glm::dvec3 minimum_on_curved_constraints(const glm::dvec3& from, const glm::dvec3& minimum,
+                                         const glm::dmat3& metric, std::span<const CurvedConstraint> planes,
+                                         double furthest) noexcept;
 
 }  // namespace polygon

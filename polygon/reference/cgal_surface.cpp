@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "polygon/reference/cgal_surface.h"
 
-// CGAL's own checks walk every box twice; who times CGAL builds without them.
+// CGAL's own checks would walk every box twice; timings of CGAL are taken without them.
 #define CGAL_NDEBUG
 #include <CGAL/AABB_traits.h>
 #include <CGAL/AABB_tree.h>
@@ -28,9 +28,7 @@ namespace {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 
-constexpr std::uint32_t kNone = 0xffffffffU;
-constexpr double kFurthestQuery = 1e18;   // (unit: meter)
-constexpr double kRelativeSlack = 1e-12;  // of the roundings between a box's distance and a triangle's
+constexpr double kRelativeSlack = 1e-12;  // for rounding between a box's distance and a triangle's
 
 struct Corners {
   const std::vector<glm::dvec3>* vertices = nullptr;
@@ -41,7 +39,7 @@ struct Corners {
   }
 };
 
-// A model of AABBPrimitiveWithSharedData that is four bytes: the tree holds no second copy of the geometry.
+// A model of AABBPrimitiveWithSharedData of four bytes, so that the tree does not store the geometry again.
 class IndexedTriangle {
  public:
   using Id = std::uint32_t;
@@ -80,8 +78,8 @@ double squared_distance(const glm::dvec3& p, const CGAL::Bbox_3& box) {
   return squared_distance(p, {box.xmin(), box.ymin(), box.zmin()}, {box.xmax(), box.ymax(), box.zmax()});
 }
 
-// Traversal_traits of CGAL's tree: boxes within `squared_radius` of `point` are opened, Leaf decides the rest
-// and may shrink the radius.
+// Traversal traits for CGAL's tree: opens boxes within `squared_radius` of `point`. The leaf decides the
+// rest, and may reduce the radius.
 template <typename Leaf>
 class Visit {
  public:
@@ -105,7 +103,8 @@ class Visit {
   Leaf& leaf_;
 };
 
-// Counts what a ray passes through, with exact predicates. Triangles without area enclose nothing.
+// Counts the triangles that a ray crosses, with exact predicates. Degenerate triangles enclose nothing and do
+// not count.
 class Crossings {
  public:
   Crossings(const Kernel::Ray_3& ray, const Corners& corners) : ray_(ray), corners_(corners) {}
@@ -137,7 +136,7 @@ class CgalSurface final : public RigidSurface {
                                     std::span<NearPoint> out) const noexcept override;
   [[nodiscard]] bool nearest(const glm::dvec3& point, double radius, NearPoint& out) const noexcept override;
   [[nodiscard]] GatherResult survey(const glm::dvec3& centre, double radius, const glm::dvec3& view,
-                                    std::span<SeenElement> out) const noexcept override;
+                                    std::span<ElementPlane> out) const noexcept override;
   [[nodiscard]] NearPoint closest(std::uint32_t element, const glm::dvec3& point) const noexcept override;
   [[nodiscard]] glm::dvec3 face_normal(std::uint32_t element) const noexcept override;
   [[nodiscard]] double support(std::uint32_t element, const glm::dvec3& normal) const noexcept override;
@@ -154,7 +153,7 @@ class CgalSurface final : public RigidSurface {
   [[nodiscard]] std::size_t memory_bytes() const noexcept override;
 
  private:
-  // In coordinates from centre_, as all geometry here.
+  // In coordinates relative to centre_, as all geometry here.
   [[nodiscard]] NearPoint closest_local(std::uint32_t element, const glm::dvec3& local) const {
     const TrianglePoint found =
         closest_on_triangle(local, corners_(element, 0), corners_(element, 1), corners_(element, 2));
@@ -167,8 +166,8 @@ class CgalSurface final : public RigidSurface {
 
   bool solid_;
   glm::dvec3 centre_{0.0};
-  glm::dvec3 lower_{0.0}, upper_{0.0};  // from centre_
-  std::vector<glm::dvec3> vertices_;    // from centre_
+  glm::dvec3 lower_{0.0}, upper_{0.0};  // relative to centre_
+  std::vector<glm::dvec3> vertices_;    // relative to centre_
   std::vector<TriangleIndices> triangles_, across_;
   std::vector<glm::vec3> vertex_normals_;  // solid only
   Corners corners_;
@@ -196,7 +195,7 @@ CgalSurface::CgalSurface(const TriangleMesh& mesh, bool solid) : solid_(solid), 
       if (first[i] == i) elements.push_back(i);
     }
   }
-  // The bounded search starts from its radius, so CGAL's k-d tree of hints would never be asked.
+  // The bounded search starts from its radius, so CGAL's k-d tree of hints would never be used.
   tree_.do_not_accelerate_distance_queries();
   tree_.insert(elements.cbegin(), elements.cend(), corners_);
   tree_.build();
@@ -215,7 +214,7 @@ GatherResult CgalSurface::gather(const glm::dvec3& point, double radius,
       if (result.count == out.size()) std::make_heap(out.begin(), out.end(), nearer);
       return;
     }
-    // Full: keep the nearest, and look no further than the furthest of them.
+    // Full: keep the nearest, and shrink the radius to the furthest of them.
     result.complete = false;
     if (out.empty()) {
       squared_radius = -1.0;
@@ -240,8 +239,8 @@ GatherResult CgalSurface::gather(const glm::dvec3& point, double radius,
 bool CgalSurface::nearest(const glm::dvec3& point, double radius, NearPoint& out) const noexcept {
   if (!answerable(point, radius)) return false;
   const glm::dvec3 local = point - centre_;
-  // An element above all others: the radius itself still counts.
-  NearPoint best{{}, radius, kNone};
+  // An element number above all others, so that an element at exactly `radius` counts.
+  NearPoint best{{}, radius, kNoElement};
   auto leaf = [&](std::uint32_t element, double& squared_radius) {
     const NearPoint found = closest_local(element, local);
     if (!nearer(found, best)) return;
@@ -250,30 +249,30 @@ bool CgalSurface::nearest(const glm::dvec3& point, double radius, NearPoint& out
   };
   Visit visit(local, reach_squared(radius), leaf);
   tree_.traversal_with_priority(0, visit);
-  if (best.element == kNone) return false;
+  if (best.element == kNoElement) return false;
   out = best;
   out.point += centre_;
   return true;
 }
 
 GatherResult CgalSurface::survey(const glm::dvec3& centre, double radius, const glm::dvec3& view,
-                                 std::span<SeenElement> out) const noexcept {
+                                 std::span<ElementPlane> out) const noexcept {
   GatherResult result;
   if (!answerable(centre, radius)) return result;
   const glm::dvec3 local = centre - centre_;
   auto leaf = [&](std::uint32_t element, double& squared_radius) {
-    TriangleSight sight;
-    if (!see_triangle(local, radius, view - centre_, corners_(element, 0), corners_(element, 1),
-                      corners_(element, 2), sight))
+    TrianglePlane plane;
+    if (!triangle_plane_within(local, radius, view - centre_, corners_(element, 0), corners_(element, 1),
+                               corners_(element, 2), plane))
       return;
     if (result.count == out.size()) {
       result.complete = false;
       squared_radius = -1.0;
       return;
     }
-    out[result.count++] = {sight.normal, sight.reach + glm::dot(sight.normal, centre_), element};
+    out[result.count++] = {plane.normal, plane.support + glm::dot(plane.normal, centre_), element};
   };
-  // No slack: minima, maxima and differences keep the order of a box and what lies in it.
+  // No slack is needed: minima, maxima and differences are monotonic under rounding.
   Visit visit(local, radius * radius, leaf);
   tree_.traversal(0, visit);
   return result;
@@ -312,8 +311,8 @@ glm::dvec3 CgalSurface::shaded_normal(std::uint32_t element, const glm::dvec3& p
   return glm::dot(shaded, away) < 0.0 ? -shaded : shaded;
 }
 
-// Parity, with exact predicates. A ray through an edge or a corner would count twice; three rays that are
-// parallel to nothing do not all do that.
+// Parity of ray crossings, with exact predicates. A ray through an edge or a corner would be counted twice,
+// so three rays in general directions vote.
 bool CgalSurface::inside(const glm::dvec3& point) const noexcept {
   if (!solid_ || !answerable(point, 0.0)) return false;
   const glm::dvec3 local = point - centre_;
@@ -339,7 +338,7 @@ std::size_t CgalSurface::memory_bytes() const noexcept {
          vertex_normals_.capacity() * sizeof(glm::vec3);
 }
 
-// A point that is an index, as IndexedTriangle is for triangles.
+// A point given by its index, as IndexedTriangle is for triangles.
 class IndexedPoint {
  public:
   using Id = std::uint32_t;

@@ -29,7 +29,7 @@ using Traits = CGAL::AABB_traits<Kernel, Primitive>;
 using Tree = CGAL::AABB_tree<Traits>;
 using Node = CGAL::AABB_node<Traits>;
 
-constexpr double kRelativeSlack = 1e-12;  // of a few roundings in double
+constexpr double kRelativeSlack = 1e-12;  // for a few roundings in double
 constexpr std::size_t kMostEquallyNear = 64;
 constexpr int kMostRays = 32;
 
@@ -41,7 +41,7 @@ glm::dvec3 to_glm(const Kernel::Point_3& p) {
   return {p.x(), p.y(), p.z()};
 }
 
-// A long double is the sum of two doubles, without rest.
+// A long double is exactly the sum of two doubles.
 Rational rational(double base, long double offset) {
   const auto high = static_cast<double>(offset);
   return Rational(base) + Rational(high) + Rational(static_cast<double>(offset - high));
@@ -67,7 +67,7 @@ double squared_distance(const glm::dvec3& p, const CGAL::Bbox_3& box) {
   return glm::dot(out, out);
 }
 
-// Does the segment come into the box, widened by `margin`? (Kay and Kajiya's slabs.)
+// Whether the segment meets the box widened by `margin` (slab test of Kay & Kajiya).
 bool enters(const glm::dvec3& from, const glm::dvec3& way, const CGAL::Bbox_3& box, double margin) {
   const glm::dvec3 low = low_corner(box) - margin, high = high_corner(box) + margin;
   double first = 0.0, last = 1.0;
@@ -83,8 +83,8 @@ bool enters(const glm::dvec3& from, const glm::dvec3& way, const CGAL::Bbox_3& b
   return first <= last + kRelativeSlack;
 }
 
-// Traversal_traits of CGAL's tree: whatever box `opens`, and then each triangle is `found`. A better bound
-// found on the way narrows what opens, because both may share state.
+// Traversal traits for CGAL's tree: descends into a box if opens(box), and calls found(triangle) at each
+// leaf. The two may share state, so a bound that improves narrows the traversal.
 template <typename Opens, typename Found>
 class Visit {
  public:
@@ -105,7 +105,7 @@ class Visit {
 
 enum class Crossing : std::uint8_t { no, yes, touches, through_start };
 
-// How the segment from `start` to `end` (off the triangle's plane, if it matters) passes the triangle.
+// How the segment from `start` to `end` crosses the triangle.
 Crossing crossing(const Kernel::Point_3& start, const Kernel::Point_3& end, const Kernel::Triangle_3& t) {
   if (t.is_degenerate()) return Crossing::no;
   const CGAL::Orientation below = CGAL::orientation(t[0], t[1], t[2], start);
@@ -211,7 +211,7 @@ double ExactMesh::segment_distance(const glm::dvec3& from, const glm::dvec3& to,
   const Exact::Point_3 a = to_exact(to_cgal(from)), b = to_exact(to_cgal(to));
   Rational least = std::min(CGAL::squared_distance(a, t), CGAL::squared_distance(b, t));
   for (int i = 0; i < 3 && a != b; ++i) {
-    if (t[i] == t[(i + 1) % 3]) continue;  // the other two sides have its ends
+    if (t[i] == t[(i + 1) % 3]) continue;  // zero length: its points belong to the other two sides
     const Exact::Segment_3 side(t[i], t[(i + 1) % 3]);
     least = std::min(least, Rational(CGAL::squared_distance(Exact::Segment_3(a, b), side)));
   }
@@ -224,7 +224,7 @@ bool ExactMesh::crosses(const glm::dvec3& from, const glm::dvec3& to, std::uint3
   return CGAL::do_intersect(Kernel::Segment_3(to_cgal(from), to_cgal(to)), t);
 }
 
-// In double first; those that are nearest but for rounding are compared exactly.
+// First in double; candidates that tie within rounding are compared exactly.
 ExactMesh::Closest ExactMesh::closest(const glm::dvec3& point) const {
   const Kernel::Point_3 p = to_cgal(point);
   double least = std::numeric_limits<double>::infinity();
@@ -261,8 +261,8 @@ ExactMesh::Closest ExactMesh::closest(const glm::dvec3& point) const {
 bool ExactMesh::inside(const glm::dvec3& point) const {
   if (squared_distance(point, data_->box) > 0.0) return false;
   const Kernel::Point_3 start = to_cgal(point);
-  // A segment that touches an edge or a corner says nothing: another way is tried. The ways are a spiral on
-  // the ball, parallel to nothing that people model.
+  // A segment that touches an edge or a corner decides nothing, so another direction is tried. The directions
+  // form a spiral on the sphere, parallel to nothing that people model.
   for (int ray = 0; ray < kMostRays; ++ray) {
     const double height = 1.0 - 2.0 * (ray + 0.5141592) / kMostRays, turn = 2.3999632 * ray + 0.7182818;
     const double across = std::sqrt(1.0 - height * height);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Exact answers about a triangle mesh, from CGAL: which side, how far, what is crossed. For references and
-// tests, not for the servo thread: it allocates, and one exact distance costs some microseconds.
+// Exact queries of a triangle mesh, by CGAL: inside, distance, crossing. For references and tests only: it
+// allocates, and an exact distance costs microseconds.
 #pragma once
 
 #include <array>
@@ -15,7 +15,7 @@
 
 namespace polygon {
 
-// base + offset, not rounded: places a point nearer to a surface than doubles of that size can.
+// base + offset, unrounded: can place a point nearer to a surface than the spacing of doubles of that size.
 struct FinePoint {
   glm::dvec3 base{0.0};                 // (unit: meter)
   std::array<long double, 3> offset{};  // (unit: meter)
@@ -36,8 +36,8 @@ class ExactMesh {
   [[nodiscard]] double furthest() const;  // largest coordinate's magnitude (unit: meter)
   [[nodiscard]] std::array<glm::dvec3, 3> corners(std::uint32_t triangle) const;
 
-  // Triangles whose bounds come within `radius` of the point, or of some point of the segment: all that do
-  // themselves, and some others. Replaces what `out` held.
+  // Triangles whose bounds come within `radius` of the point or segment: all that come so near themselves,
+  // and some others. Replaces the contents of `out`.
   void near_point(const glm::dvec3& point, double radius, std::vector<std::uint32_t>& out) const;
   void near_segment(const glm::dvec3& from, const glm::dvec3& to, double radius,
                     std::vector<std::uint32_t>& out) const;
@@ -47,7 +47,7 @@ class ExactMesh {
   [[nodiscard]] double segment_distance(const glm::dvec3& from, const glm::dvec3& to,
                                         std::uint32_t triangle) const;
 
-  // Does the closed segment meet the triangle? Never, for one without area.
+  // Whether the closed segment meets the triangle; false for a degenerate one.
   [[nodiscard]] bool crosses(const glm::dvec3& from, const glm::dvec3& to, std::uint32_t triangle) const;
 
   struct Closest {
@@ -56,7 +56,7 @@ class ExactMesh {
   };
   [[nodiscard]] Closest closest(const glm::dvec3& point) const;
 
-  // Parity of the crossings of a segment to beyond the bounds; false on the surface.
+  // Parity of crossings along a segment that ends beyond the bounds; false on the surface.
   [[nodiscard]] bool inside(const glm::dvec3& point) const;
 
   [[nodiscard]] std::size_t memory_bytes() const;

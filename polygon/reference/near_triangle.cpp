@@ -28,20 +28,20 @@ NearTriangle near_triangle(std::uint32_t id, const std::array<glm::dvec3, 3>& co
     t.side[i] = unit(side);
   }
   const FineVec n = glm::cross(t.side[0], t.side[1]);
-  t.flat = glm::length(n) > kNoArea && glm::length(glm::cross(t.side[1], t.side[2])) > kNoArea;
-  if (t.flat) t.normal = unit(n);
-  t.distance = place_on(t, FineVec(0.0L)).distance;
+  t.has_area = glm::length(n) > kNoArea && glm::length(glm::cross(t.side[1], t.side[2])) > kNoArea;
+  if (t.has_area) t.normal = unit(n);
+  t.distance = closest_on(t, FineVec(0.0L)).distance;
   return t;
 }
 
-Place place_on_side(const NearTriangle& t, std::size_t i, const FineVec& x) {
+ClosestPoint closest_on_side(const NearTriangle& t, std::size_t i, const FineVec& x) {
   const FineReal along = std::clamp(glm::dot(x - t.corner[i], t.side[i]), 0.0L, t.length[i]);
   const FineVec point = t.corner[i] + along * t.side[i];
   return {point, glm::length(x - point)};
 }
 
-Place place_on(const NearTriangle& t, const FineVec& x) {
-  bool within = t.flat;
+ClosestPoint closest_on(const NearTriangle& t, const FineVec& x) {
+  bool within = t.has_area;
   for (std::size_t i = 0; i < 3 && within; ++i) {
     within = glm::dot(t.normal, glm::cross(t.side[i], x - t.corner[i])) >= 0.0L;
   }
@@ -49,9 +49,9 @@ Place place_on(const NearTriangle& t, const FineVec& x) {
     const FineReal height = glm::dot(t.normal, x - t.corner[0]);
     return {x - height * t.normal, std::abs(height)};
   }
-  Place best = place_on_side(t, 0, x);
+  ClosestPoint best = closest_on_side(t, 0, x);
   for (std::size_t i = 1; i < 3; ++i) {
-    const Place other = place_on_side(t, i, x);
+    const ClosestPoint other = closest_on_side(t, i, x);
     if (other.distance < best.distance) best = other;
   }
   return best;

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How far a proxy is from where it should be: the reference that every rigid error of this project is
-// measured against. It shares nothing with the proxy: its own search tree (CGAL), its own closest points (in
-// long double, then exact), its own solution of the conditions.
+// How far a proxy is from the true constrained optimum. Every rigid error of this project is measured against
+// this reference. It shares nothing with the proxy: it has its own search tree (CGAL), its own closest points
+// (long double, then exact), and its own solution of the optimality conditions.
 //
-// A ball of radius r whose centre q wants to be at `goal` minimises |q − goal|² subject to
-// distance(q, triangle) >= r for every triangle. Each of these distances is differentiable outside its
-// triangle, so q* is optimal to first order (Karush, Kuhn and Tucker) when it is feasible and
-// q* − goal = Σ λᵢ nᵢ, λᵢ >= 0, with nᵢ the unit vectors to q* from the closest points of triangles that
-// touch there. Three of them are enough (Caratheodory), so points where one, two or three offset features
-// (plane of a face, cylinder about an edge, ball about a corner) meet are all there is to try.
+// A ball of radius r with centre q and a target `goal` minimises |q − goal|² subject to distance(q, triangle)
+// >= r for every triangle. Each distance is differentiable outside its triangle. So q* satisfies the
+// first-order conditions (Karush, Kuhn and Tucker) if it is feasible and q* − goal = Σ λᵢ nᵢ, λᵢ >= 0. Here
+// nᵢ are the unit vectors to q* from the closest points of touching triangles. At most three of them are
+// needed (Carathéodory). So the candidates are the points where one, two or three offset features meet: the
+// plane of a face, the cylinder about an edge, the ball about a corner.
 #pragma once
 
 #include <cstddef>
@@ -20,44 +20,44 @@
 namespace polygon {
 
 struct NearestOptimum {
-  bool found = false;        // within the search radius, or the goal itself
-  glm::dvec3 point{0.0};     // q*; the proxy itself when nothing was found (unit: meter)
-  double error_m = 0.0;      // |q* − proxy|; the search radius when nothing was found
-  double clearance_m = 0.0;  // distance(proxy, mesh) − radius, below zero when the ball is in the surface
+  bool found = false;        // an optimum within the search radius, or the goal itself
+  glm::dvec3 point{0.0};     // q*; the proxy itself if not found (unit: meter)
+  double error_m = 0.0;      // |q* − proxy|; the search radius if not found
+  double clearance_m = 0.0;  // distance(proxy, mesh) − radius; negative if the ball penetrates
 };
 
-class FirstOrderReference {
+class OptimalityReference {
  public:
-  // Keeps its own copy of the mesh. Throws std::invalid_argument for an empty mesh, an index out of range or
-  // a vertex that is not finite (or beyond 1e12 m).
-  explicit FirstOrderReference(const TriangleMesh& mesh);
-  FirstOrderReference(const FirstOrderReference&) = delete;
-  FirstOrderReference& operator=(const FirstOrderReference&) = delete;
-  FirstOrderReference(FirstOrderReference&&) = delete;
-  FirstOrderReference& operator=(FirstOrderReference&&) = delete;
-  ~FirstOrderReference();
+  // Copies the mesh. Throws std::invalid_argument for an empty mesh, an index out of range, or a vertex that
+  // is not finite or beyond 1e12 m.
+  explicit OptimalityReference(const TriangleMesh& mesh);
+  OptimalityReference(const OptimalityReference&) = delete;
+  OptimalityReference& operator=(const OptimalityReference&) = delete;
+  OptimalityReference(OptimalityReference&&) = delete;
+  OptimalityReference& operator=(OptimalityReference&&) = delete;
+  ~OptimalityReference();
 
-  // The point nearest to `proxy` where the first-order conditions hold. All points in the body frame.
+  // The point nearest to `proxy` that satisfies the first-order conditions. All points are in the body frame.
   //
-  // A radius below 1e-9 of the mesh's size is that skin: the limit r → 0+, and the side of a sheet on which a
-  // point stands is well defined. A point across the surface from the proxy does not count: the straight way
-  // there, or one that bows out over a convex edge, must not cross a triangle. The goal itself is optimal
-  // when the ball can go there straight (then nothing holds it, however far it is).
-  // Where several points tie, the first found is given. `search_radius_m` bounds how far is looked. Work is
-  // bounded too: for a proxy that is off by many features, the error may be that of a point further than the
-  // nearest, never of a nearer one. A goal or proxy that is not finite: not found, the error infinite.
-  // std::invalid_argument for a radius or a search radius below zero.
+  // A radius below 1e-9 of the mesh's size is replaced by that skin: the limit r → 0+, in which the side of a
+  // sheet that a point is on is defined. A point across the surface from the proxy does not count: the
+  // straight path there, or a path that arches over a convex edge, must not cross a triangle. The goal itself
+  // is optimal if the ball can go there straight, at any distance. Of several points at the same distance the
+  // first one found is returned. `search_radius_m` bounds the search, and the amount of work is bounded too.
+  // So for a proxy that is off by many features, the error may belong to a point further away than the
+  // nearest optimum, but it is never too small. A goal or proxy that is not finite gives found == false and
+  // an infinite error. Throws std::invalid_argument for a negative radius or search radius.
   [[nodiscard]] NearestOptimum nearest_optimum(const glm::dvec3& goal, const glm::dvec3& proxy, double radius,
                                                double search_radius_m) const;
 
-  // To the nearest triangle (exact, rounded once).
+  // Distance to the nearest triangle, exact and rounded once (unit: meter).
   [[nodiscard]] double distance(const glm::dvec3& point) const;
 
-  // Exact, by parity; false on the surface. Means nothing for an open mesh.
+  // Exact, by parity of crossings; false on the surface. Undefined for an open mesh.
   [[nodiscard]] bool inside(const glm::dvec3& point) const;
 
-  // For a closed convex mesh: the global optimum. A goal inside is pushed through the nearest face, a goal
-  // nearer than the radius is pushed away, any other stays.
+  // The global optimum for a closed convex mesh. A goal inside is pushed out through the nearest face, a goal
+  // nearer than the radius is pushed away, and any other goal is returned.
   [[nodiscard]] glm::dvec3 convex_optimum(const glm::dvec3& goal, double radius) const;
 
   [[nodiscard]] std::size_t memory_bytes() const;

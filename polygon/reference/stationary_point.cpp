@@ -8,15 +8,17 @@ namespace polygon {
 namespace {
 
 constexpr int kMostIterations = 24;
-// Sine of the angle between normals, below which they count as one: their common line is rounding, and a
+// Normals whose angle has a smaller sine count as dependent: their common line would be rounding error. The
 // subset without one of them is tried anyway.
 constexpr FineReal kDependent = 1e-9L;
-constexpr FineReal kConverged = 1e-14L;  // a step, of radius and reach; Newton's next one would be its square
-constexpr FineReal kFlat = 1e-12L;       // curvature along the common line, below which nothing is stationary
-constexpr FineReal kOnAxis = 1e-15L;     // of the radius: a goal that has no direction from the feature
+// Step relative to radius + reach; Newton's next one would be its square.
+constexpr FineReal kConverged = 1e-14L;
+// Smaller curvature along the common line: nothing is stationary.
+constexpr FineReal kFlat = 1e-12L;
+// Of the radius; a nearer goal has no direction from the feature.
+constexpr FineReal kOnAxis = 1e-15L;
 
-// Distance of a point from a feature's plane, line or point, its gradient, and its second derivative along
-// a direction: nᵢ turns by (part of the step across axis and normal) / distance.
+// Distance of a point from a feature's plane, line or point, and its gradient.
 struct Local {
   FineReal distance = 0.0L;
   FineVec normal{0.0L};
@@ -30,8 +32,8 @@ Local local(const OffsetFeature& feature, const FineVec& q) {
   return {distance, distance > 0.0L ? away / distance : FineVec(0.0L)};
 }
 
-// (∇²distance) · v
-FineVec bent(const OffsetFeature& feature, const Local& here, const FineVec& v) {
+// ∇²distance · v. The normal turns by the component of v across axis and normal, divided by the distance.
+FineVec hessian_times(const OffsetFeature& feature, const Local& here, const FineVec& v) {
   if (feature.kind == FeatureKind::face) return FineVec(0.0L);
   FineVec across = v - glm::dot(v, here.normal) * here.normal;
   if (feature.kind == FeatureKind::edge) across -= glm::dot(v, feature.along) * feature.along;
@@ -49,14 +51,14 @@ bool step_on_two(std::span<const OffsetFeature> features, const std::array<Local
   const FineVec cross = glm::cross(n0, n1);
   const FineReal sine2 = glm::dot(cross, cross);
   if (!(sine2 > kDependent * kDependent)) return false;
-  // Dual vectors by cross products: n0 − (n0·n1)·n1 would lose what nearly parallel normals differ by.
+  // Dual vectors by cross products. n0 − (n0·n1)·n1 would cancel the difference of nearly parallel normals.
   const FineVec dual0 = glm::cross(n1, cross) / sine2, dual1 = glm::cross(cross, n0) / sine2;
   step.multiplier = {glm::dot(pull, dual0), glm::dot(pull, dual1), 0.0L};
   const FineVec tangent = cross / std::sqrt(sine2);
   const FineVec back = (radius - here[0].distance) * dual0 + (radius - here[1].distance) * dual1;
   const auto hessian = [&](const FineVec& v) {
-    return v - step.multiplier[0] * bent(features[0], here[0], v) -
-           step.multiplier[1] * bent(features[1], here[1], v);
+    return v - step.multiplier[0] * hessian_times(features[0], here[0], v) -
+           step.multiplier[1] * hessian_times(features[1], here[1], v);
   };
   const FineReal curvature = glm::dot(tangent, hessian(tangent));
   if (!(std::abs(curvature) > kFlat)) return false;
@@ -106,7 +108,8 @@ int stationary_on_one(const OffsetFeature& feature, const FineVec& goal, FineRea
 
 bool stationary_on_several(std::span<const OffsetFeature> features, const FineVec& goal, FineReal radius,
                            const FineVec& start, FineReal reach, StationaryPoint& out) {
-  // A surface of large radius hardly bends within the reach: a step that leaves it will not come back.
+  // If the radius is large, the surface hardly curves within the reach, and a step that leaves it will not
+  // return.
   const FineReal stray = 4.0L * (radius < reach ? reach + radius : reach);
   FineVec q = start;
   std::array<Local, 3> here;

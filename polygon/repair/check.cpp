@@ -11,20 +11,20 @@
 
 #include "polygon/mesh/disjoint_sets.h"
 #include "polygon/mesh/findings.h"
-#include "polygon/repair/self_intersections.h"
 #include "polygon/mesh/topology.h"
 #include "polygon/mesh/triangle.h"
+#include "polygon/repair/self_intersections.h"
 
 namespace polygon {
 namespace {
 
-// The mesh as it is connected.
+// The mesh with coincident vertices welded.
 struct Connected {
   const TriangleMesh* mesh = nullptr;
   WeldedVertices welded;
-  std::span<const glm::dvec3> points;          // one a welded point
-  std::span<const TriangleIndices> triangles;  // corners are points
-  // What those look at where coincident vertices were welded; else it is the mesh itself.
+  std::span<const glm::dvec3> points;          // [point]
+  std::span<const TriangleIndices> triangles;  // with point indices as corners
+  // Storage of `points` and `triangles` if vertices were welded; otherwise these refer to the mesh.
   std::vector<glm::dvec3> own_points;
   std::vector<TriangleIndices> own_triangles;
 };
@@ -52,7 +52,7 @@ glm::dvec3 middle(const Connected& c, std::uint32_t triangle) {
 }
 
 void check_triangles(const Connected& c, MeshCheck& check) {
-  Found repeated, flat, duplicates;
+  FindingTally repeated, flat, duplicates;
   for (std::uint32_t i = 0; i < c.triangles.size(); ++i) {
     const TriangleIndices& t = c.triangles[i];
     if (has_repeated_corner(t)) {
@@ -81,7 +81,7 @@ void check_vertices(const Connected& c, MeshCheck& check) {
   for (const TriangleIndices& t : c.mesh->triangles) {
     for (const std::uint32_t corner : t) used[corner] = true;
   }
-  Found coincident, unused;
+  FindingTally coincident, unused;
   std::vector<bool> seen(c.points.size(), false);
   for (std::size_t i = 0; i < vertices.size(); ++i) {
     if (!used[i]) unused.add(vertices[i]);
@@ -95,7 +95,7 @@ void check_vertices(const Connected& c, MeshCheck& check) {
 }
 
 struct EdgeCounts {
-  Found boundary, nonmanifold, against;
+  FindingTally boundary, nonmanifold, against;
 };
 
 EdgeCounts check_edges(const Connected& c, const EdgeTable& edges, MeshCheck& check) {
@@ -122,7 +122,8 @@ EdgeCounts check_edges(const Connected& c, const EdgeTable& edges, MeshCheck& ch
   return counts;
 }
 
-// Triangles around a point that hang together by their edges are one fan; a manifold point has one.
+// Triangles around a point that are connected through shared edges form one fan. A manifold point has one
+// fan.
 void check_points(const Connected& c, const EdgeTable& edges, MeshCheck& check) {
   DisjointSets corners(c.triangles.size() * 3);
   edges.for_each([&](const EdgeTable::Edge& edge) {
@@ -145,7 +146,7 @@ void check_points(const Connected& c, const EdgeTable& edges, MeshCheck& check) 
       if (corners.find(i * 3 + k) == i * 3 + k && n < 2) ++n;
     }
   }
-  Found nonmanifold;
+  FindingTally nonmanifold;
   for (std::size_t p = 0; p < fans.size(); ++p) {
     if (fans[p] > 1) nonmanifold.add(c.points[p]);
   }
@@ -153,12 +154,12 @@ void check_points(const Connected& c, const EdgeTable& edges, MeshCheck& check) 
               "vertices join parts that share no edge there. Repair gives each part its own");
 }
 
-// Boundary edges that hang together are one loop (loops that touch in a point count as one).
+// Connected boundary edges form one loop. Loops that touch in a point count as one.
 void check_boundary(const Connected& c, const EdgeTable& edges, const EdgeCounts& counts, MeshCheck& check) {
   if (counts.boundary.count == 0) return;
   struct Loop {
     std::size_t edges = 0;
-    std::uint32_t triangle = 0;  // one at it
+    std::uint32_t triangle = 0;  // one triangle at the loop
     glm::dvec3 low{std::numeric_limits<double>::infinity()}, high{-std::numeric_limits<double>::infinity()};
     [[nodiscard]] glm::dvec3 middle() const { return 0.5 * (low + high); }
   };
@@ -169,7 +170,8 @@ void check_boundary(const Connected& c, const EdgeTable& edges, const EdgeCounts
     });
   };
   for_each_boundary_edge([&](const EdgeTable::Edge& e) { ends.unite(e.low, e.high); });
-  std::vector<std::uint32_t> loop_at(c.points.size(), 0);  // of the point that names it, counted from 1
+  // [point that names the set] index + 1 of its loop.
+  std::vector<std::uint32_t> loop_at(c.points.size(), 0);
   std::vector<Loop> loops;
   for_each_boundary_edge([&](const EdgeTable::Edge& e) {
     std::uint32_t& number = loop_at[ends.find(e.low)];
@@ -184,8 +186,8 @@ void check_boundary(const Connected& c, const EdgeTable& edges, const EdgeCounts
   });
   const auto longest = std::max_element(loops.begin(), loops.end(),
                                         [](const Loop& a, const Loop& b) { return a.edges < b.edges; });
-  std::iter_swap(loops.begin(), longest);  // its place is the one that is said
-  Found found;
+  std::iter_swap(loops.begin(), longest);  // the finding's place is that of the first loop
+  FindingTally found;
   for (const Loop& loop : loops) found.add(loop.middle(), loop.triangle);
   add_finding(check.findings, "M09-boundary-loops", Severity::info, found,
               "holes or rims, of " + std::to_string(counts.boundary.count) +
@@ -194,8 +196,8 @@ void check_boundary(const Connected& c, const EdgeTable& edges, const EdgeCounts
                   " large: the mesh is open, is touched as a two-sided sheet, and has no inside");
 }
 
-// Pieces that share no point, and the signed volume of each about the mesh's own middle (about the origin, a
-// mesh far from it would lose the digits of its volume).
+// Pieces that share no point, and the signed volume of each. Volumes are taken about the mesh's centre,
+// because far from the origin they would lose their digits.
 void check_pieces(const Connected& c, MeshCheck& check) {
   DisjointSets pieces(c.points.size());
   glm::dvec3 low(std::numeric_limits<double>::infinity()), high(-std::numeric_limits<double>::infinity());
@@ -216,7 +218,7 @@ void check_pieces(const Connected& c, MeshCheck& check) {
     const glm::dvec3 p = c.points[t[0]] - centre, q = c.points[t[1]] - centre, r = c.points[t[2]] - centre;
     volume[piece] += glm::dot(p, glm::cross(q, r)) / 6.0;
   }
-  Found all, negative;
+  FindingTally all, negative;
   for (std::uint32_t i = 0; i < c.triangles.size(); ++i) {
     const std::uint32_t p = pieces.find(c.triangles[i][0]);
     if (!is_piece[p]) continue;
@@ -257,7 +259,7 @@ void check_intersections(const Connected& c, MeshCheck& check) {
   const SelfIntersections found = find_self_intersections(c.points, proper);
   if (found.pairs == 0) return;
   const std::uint32_t at = number[found.first];
-  const Found pairs{found.pairs, {middle(c, at), found.lower, found.upper, at}};
+  const FindingTally pairs{found.pairs, {middle(c, at), found.lower, found.upper, at}};
   add_finding(check.findings, "M12-self-intersections", Severity::warning, pairs,
               std::string("pairs of triangles cut one another") +
                   (found.complete ? "" : " at least (the search was ended there)") +
@@ -282,7 +284,8 @@ MeshCheck check_mesh(const TriangleMesh& mesh, bool deep) {
     check_points(c, edges, check);
     check_boundary(c, edges, counts, check);
     check.closed = !edges.empty() && counts.boundary.count == 0 && counts.nonmanifold.count == 0;
-    check.oriented = check.closed && counts.against.count == 0;  // outward or not, check_pieces tells
+    // Check_pieces decides whether it is outward.
+    check.oriented = check.closed && counts.against.count == 0;
   }
   check_pieces(c, check);
   if (deep) check_intersections(c, check);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Numbered checks of a mesh and its repair. README.md lists the findings, and what is left for people to
-// mend. What takes more than counting is done by CGAL's exact predicates and its polygon mesh processing
-// (repair.cpp, self_intersections.cpp).
+// Numbered checks of a mesh, and its repair. README.md lists the findings and the defects that people must
+// mend. Anything beyond counting uses CGAL: exact predicates (self_intersections.cpp) and polygon mesh
+// processing (repair.cpp).
 #pragma once
 
 #include "polygon/mesh/mesh.h"
@@ -9,34 +9,34 @@
 namespace polygon {
 
 struct MeshCheck {
-  std::vector<Finding> findings;  // cheap to dear, each with a count and a place
-  bool closed = false;            // every edge has exactly two triangles, coincident vertices taken as one
-  bool oriented = false;          // closed and consistently oriented, outward (positive volume)
-  double volume_m3 = 0.0;         // signed; 0 when not closed or not consistently oriented
+  std::vector<Finding> findings;  // from cheap to expensive checks, each with a count and a place
+  bool closed = false;            // every edge has exactly two triangles, after welding
+  bool oriented = false;          // closed, consistently oriented and outward (positive volume)
+  double volume_m3 = 0.0;         // signed; 0 unless closed and consistently oriented
 };
 
-// `deep` also looks for self-intersections (seconds at a million triangles).
+// `deep` also searches for self-intersections (seconds for a million triangles).
 MeshCheck check_mesh(const TriangleMesh& mesh, bool deep = false);
 
 struct RepairOptions {
-  // Vertices of borders this near to one another, as a share of the diagonal of the mesh's box, are merged
-  // where that joins two border edges and does nothing else. Exporters that round to six digits need 1e-6.
+  // Border vertices within this fraction of the mesh's diagonal are merged, if that joins two border edges
+  // and changes nothing else. Exporters that round to six digits need 1e-6.
   double crack_share = 1e-6;
-  // A hole is small, and filled, when its loop has at most this many edges and its box a diagonal of at most
-  // this share of that of its piece's box. The rim of a sheet is larger, and stays.
+  // A hole is small, and is filled, if its loop has at most `hole_edges` edges and the diagonal of the loop's
+  // box is at most `hole_share` of the diagonal of its piece's box. The rim of a sheet is larger and stays.
   std::size_t hole_edges = 64;
   double hole_share = 0.3;
 };
 
 struct RepairedMesh {
   TriangleMesh mesh;
-  std::vector<Finding> changes;  // what was changed, in that order: how many and where; and how it ended
+  std::vector<Finding> changes;  // in order of the changes: how many and where; then the outcome
 };
 
-// Merges vertices, drops repeated triangles and those without area, joins cracks, fills small holes, orients,
-// stitches, and turns closed pieces outward. Keeps everything that has an area: what it cannot mend (large
-// holes, triangles that cut one another) is left and reported. Ends on anything, in time that grows with the
-// triangles and not with how they lie. Never called unless the user asks for it.
+// Merges vertices, drops repeated and degenerate triangles, closes cracks, fills small holes, orients,
+// stitches, and turns closed pieces outward. Triangles with an area are kept. Defects that it cannot mend
+// (large holes, self-intersections) are left and reported. It always ends, and its time grows with the number
+// of triangles, whatever their arrangement. Called only if the user asks for it.
 RepairedMesh repair_mesh(const TriangleMesh& mesh, const RepairOptions& options = {});
 
 }  // namespace polygon

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Closes cracks: merges border vertices within a tolerance where that joins two border edges and does no
+// harm.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -12,14 +14,13 @@
 #include <vector>
 
 #include "polygon/mesh/disjoint_sets.h"
-#include "polygon/repair/repair_soup.h"
 #include "polygon/mesh/topology.h"
+#include "polygon/repair/repair_soup.h"
 
 namespace polygon {
 namespace {
 
-constexpr std::uint32_t kNone = 0xffffffffU;
-// A border edge shorter than this many times the gap beside it is not told from the gap.
+// A border edge must be this many times longer than the gap to count as an edge of its own.
 constexpr double kEdgePerGap = 10.0;
 
 // Edges that exactly one triangle has.
@@ -34,8 +35,8 @@ std::vector<EdgeUse> border_of(const std::vector<EdgeUse>& edges) {
   return border;
 }
 
-// Each point joins the nearest leader within the tolerance, or becomes one: leaders lie further apart than
-// the tolerance, so that a cell holds few of them whatever the points are.
+// Leader clustering: each point joins the nearest leader within the tolerance, or becomes a leader. Leaders
+// are further apart than the tolerance, so a grid cell holds few of them for any input.
 class Leaders {
  public:
   Leaders(const std::vector<glm::dvec3>& points, const glm::dvec3& low, double tolerance)
@@ -43,28 +44,28 @@ class Leaders {
 
   std::uint32_t join(std::uint32_t p) {
     const glm::dvec3 cell = glm::floor((points_[p] - low_) / tolerance_);
-    std::uint32_t best = kNone;
+    std::uint32_t best = kNoIndex;
     double nearest = tolerance_;
     for (int i = 0; i < 27; ++i) {
       const auto found = first_.find(key(cell + glm::dvec3(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1)));
       if (found == first_.end()) continue;
-      for (std::uint32_t at = found->second; at != kNone; at = leaders_[at].next) {
+      for (std::uint32_t at = found->second; at != kNoIndex; at = leaders_[at].next) {
         const double distance = glm::length(points_[leaders_[at].point] - points_[p]);
-        if (distance > nearest || (distance == nearest && best != kNone)) continue;
+        if (distance > nearest || (distance == nearest && best != kNoIndex)) continue;
         nearest = distance;
         best = leaders_[at].point;
       }
     }
-    if (best != kNone) return best;
+    if (best != kNoIndex) return best;
     const auto number = static_cast<std::uint32_t>(leaders_.size());
     const auto [at, is_new] = first_.try_emplace(key(cell), number);
-    leaders_.push_back({p, is_new ? kNone : at->second});
+    leaders_.push_back({p, is_new ? kNoIndex : at->second});
     at->second = number;
     return p;
   }
 
  private:
-  // 21 bits an axis: exact as long as the tolerance is no less than 1e-6 of the box, and merely slower below.
+  // 21 bits per axis: exact if the tolerance is at least 1e-6 of the box; below, collisions only cost time.
   static std::uint64_t key(const glm::dvec3& cell) {
     std::uint64_t k = 0;
     for (int i = 0; i < 3; ++i) {
@@ -82,7 +83,7 @@ class Leaders {
   std::vector<Leader> leaders_;
 };
 
-// Two border edges that lie side by side: xa meets ya, and xb yb.
+// Two border edges side by side: xa is merged with ya, xb with yb.
 struct Match {
   std::uint32_t xa, ya, xb, yb;
 };
@@ -91,7 +92,7 @@ std::vector<Match> match_edges(const std::vector<glm::dvec3>& points, const std:
                                const std::vector<std::uint32_t>& leader, double tolerance) {
   struct Side {
     std::uint32_t a, b;    // leaders, a < b
-    std::uint32_t pa, pb;  // the points that joined them
+    std::uint32_t pa, pb;  // points of the clusters a and b
   };
   std::vector<Side> sides;
   for (const EdgeUse& e : border) {
@@ -124,7 +125,7 @@ std::vector<TriangleIndices> moved(const std::vector<TriangleIndices>& triangles
   return result;
 }
 
-// Each point with the one that it becomes.
+// Maps each point to the one that replaces it.
 DisjointSets merged(const std::vector<Match>& matches, std::uint32_t points) {
   DisjointSets target(points);
   for (const Match& m : matches) {
@@ -134,8 +135,8 @@ DisjointSets merged(const std::vector<Match>& matches, std::uint32_t points) {
   return target;
 }
 
-// Leaves out matches at points whose merging would cost a triangle or crowd an edge. One pass is enough: what
-// fewer merges do wrong, more merges did wrong too, at the same points.
+// Removes matches at points whose merging would lose a triangle or give an edge a third one. One pass is
+// enough: a defect that remains with fewer merges was already there with all of them, at the same points.
 void drop_harmful(std::vector<Match>& matches, const std::vector<TriangleIndices>& triangles,
                   std::uint32_t points) {
   DisjointSets target = merged(matches, points);
@@ -169,7 +170,7 @@ ClosedCracks close_cracks(RepairSoup& soup, double tolerance_m) {
   const std::vector<EdgeUse> border = border_of(sorted_edges(soup.mesh.triangles, count));
   if (border.empty() || !(tolerance_m > 0.0)) return closed;
 
-  std::vector<std::uint32_t> leader(count, kNone);
+  std::vector<std::uint32_t> leader(count, kNoIndex);
   glm::dvec3 low(std::numeric_limits<double>::infinity());
   for (const EdgeUse& e : border) {
     low = glm::min(low, glm::min(points[e.low], points[e.high]));
@@ -177,13 +178,13 @@ ClosedCracks close_cracks(RepairSoup& soup, double tolerance_m) {
   }
   Leaders leaders(points, low, tolerance_m);
   for (std::uint32_t p = 0; p < count; ++p) {
-    if (leader[p] != kNone) leader[p] = leaders.join(p);
+    if (leader[p] != kNoIndex) leader[p] = leaders.join(p);
   }
   std::vector<Match> matches = match_edges(points, border, leader, tolerance_m);
   drop_harmful(matches, soup.mesh.triangles, count);
   DisjointSets target = merged(matches, count);
 
-  // What was a border edge and is one no more; each joined pair is met twice and counted once.
+  // Border edges that are borders no more. Each joined pair is met twice and counted once.
   std::vector<TriangleIndices> after = moved(soup.mesh.triangles, target);
   const auto before = [](const EdgeUse& a, const EdgeUse& b) {
     return std::tie(a.triangle, a.edge) < std::tie(b.triangle, b.edge);

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Fills small holes: loops of border edges are triangulated by dynamic programming (Barequet & Sharir,
+// Filling gaps in the boundary of a polyhedron, 1995). Fills that would intersect the mesh or one another are
+// dropped.
 #include <algorithm>
 #include <array>
 #include <cstddef>
@@ -11,16 +14,15 @@
 #include <vector>
 
 #include "polygon/mesh/disjoint_sets.h"
-#include "polygon/repair/repair_soup.h"
-#include "polygon/repair/self_intersections.h"
 #include "polygon/mesh/topology.h"
 #include "polygon/mesh/triangle.h"
+#include "polygon/repair/repair_soup.h"
+#include "polygon/repair/self_intersections.h"
 
 namespace polygon {
 namespace {
 
-constexpr std::uint32_t kNone = 0xffffffffU;
-// Filling n edges takes n³ steps: in all at most this many (about a minute), whatever the mesh.
+// Triangulating n edges takes n³ steps. This bounds the sum over all loops (about a minute).
 constexpr double kMostSteps = 3e8;
 
 struct Box {
@@ -33,11 +35,11 @@ struct Box {
   [[nodiscard]] double diagonal() const { return glm::length(high - low); }
 };
 
-// A loop of border edges, in the direction in which a fill that agrees with the first edge's triangle runs.
+// A loop of border edges, in the direction of a fill that agrees with the triangle at its first edge.
 struct Loop {
   std::vector<std::uint32_t> points;
-  std::vector<std::uint32_t> triangles;  // at points[i], points[i + 1]
-  bool branching = false;                // more than two border edges meet in one of its points
+  std::vector<std::uint32_t> triangles;  // [i] at the edge from points[i] to points[i + 1]
+  bool branching = false;                // more than two border edges meet at one of its points
   Box box;
 };
 
@@ -48,7 +50,7 @@ std::uint64_t edge_key(std::uint32_t a, std::uint32_t b) {
 class Border {
  public:
   Border(const TriangleMesh& mesh, const std::vector<EdgeUse>& edges)
-      : mesh_(mesh), degree_(mesh.vertices.size(), 0), at_(mesh.vertices.size(), {kNone, kNone}) {
+      : mesh_(mesh), degree_(mesh.vertices.size(), 0), at_(mesh.vertices.size(), {kNoIndex, kNoIndex}) {
     for (std::size_t begin = 0, end = 0; begin < edges.size(); begin = end) {
       end = begin + 1;
       while (end < edges.size() && edges[end].low == edges[begin].low && edges[end].high == edges[begin].high)
@@ -68,19 +70,19 @@ class Border {
     for (std::uint32_t first = 0; first < border_.size(); ++first) {
       if (used[first]) continue;
       Loop loop;
-      // The triangle runs one way, its fill the other.
+      // The fill runs opposite to the triangle.
       std::uint32_t from = border_[first].forward ? border_[first].high : border_[first].low;
       for (std::uint32_t edge = first;;) {
         used[edge] = true;
         add(loop, from, border_[edge]);
         const std::uint32_t to = border_[edge].low == from ? border_[edge].high : border_[edge].low;
-        const std::uint32_t next = degree_[to] != 2 ? kNone : at_[to][0] == edge ? at_[to][1] : at_[to][0];
-        if (next == kNone) {
+        const std::uint32_t next = degree_[to] != 2 ? kNoIndex : at_[to][0] == edge ? at_[to][1] : at_[to][0];
+        if (next == kNoIndex) {
           loop.branching = true;
           loop.points.push_back(to);
           break;
         }
-        if (used[next]) break;  // round
+        if (used[next]) break;  // closed
         edge = next;
         from = to;
       }
@@ -97,8 +99,7 @@ class Border {
     loop.box.add(mesh_.vertices[e.high]);
   }
 
-  // What branches was followed in pieces, from where it was met to where it branched: those that hang
-  // together are one.
+  // Branching loops were followed piece by piece, from a start to a branch. Connected pieces become one loop.
   [[nodiscard]] std::vector<Loop> with_branches_joined(std::vector<Loop> loops) const {
     DisjointSets ends(mesh_.vertices.size());
     for (const Loop& loop : loops) {
@@ -128,7 +129,7 @@ class Border {
   std::vector<EdgeUse> border_;
 };
 
-// Diagonal of the box of the piece that a point belongs to.
+// Diagonal of the bounding box of the piece that contains a point.
 class Pieces {
  public:
   explicit Pieces(const TriangleMesh& mesh) : sets_(mesh.vertices.size()), boxes_(mesh.vertices.size()) {
@@ -147,17 +148,18 @@ class Pieces {
   std::vector<Box> boxes_;
 };
 
-// Three points on one line: a vertex on another triangle's edge, and a gap without width. A triangle without
-// area closes it, and is dissolved with the others of its kind.
+// Three points on one line: a vertex on another triangle's edge, and a gap without width. A degenerate
+// triangle closes it, and is dissolved later with the others of its kind.
 bool is_split_edge(const Loop& loop, const std::vector<glm::dvec3>& points) {
   return loop.points.size() == 3 &&
          is_degenerate(points[loop.points[0]], points[loop.points[1]], points[loop.points[2]]);
 }
 
-// The triangles of least cost between the loop's points, by dynamic programming over its chords (Barequet &
-// Sharir 1995): total area, so that nothing folds over, and a little for long edges, which decides where the
-// loop lies in a plane and every triangulation has one area. A triangle without area, or an inner edge that
-// the mesh has already (its third triangle!), is never taken. Empty when there is no way.
+// The triangulation of least cost, by dynamic programming over the loop's chords (Barequet & Sharir 1995).
+// The cost is the total area, so that nothing folds over, plus a small term for long edges. That term decides
+// in a flat loop, where every triangulation has the same area. Degenerate triangles are excluded, and so are
+// inner edges that the mesh already has, because they would get a third triangle. Empty if no triangulation
+// is left.
 class Triangulation {
  public:
   Triangulation(const Loop& loop, const std::vector<glm::dvec3>& points,
@@ -211,7 +213,7 @@ class Triangulation {
   const Loop& loop_;
   const std::vector<glm::dvec3>& points_;
   std::size_t n_;
-  std::vector<double> cost_;       // [first][last] of the chord's side away from the loop's ends
+  std::vector<double> cost_;       // [first][last] cost of the part of the loop between a chord's ends
   std::vector<std::size_t> apex_;  // [first][last]
 };
 
@@ -219,7 +221,7 @@ std::vector<TriangleIndices> triangulated(const Loop& loop, const std::vector<gl
                                           const std::unordered_set<std::uint64_t>& old_edges) {
   const bool lone = std::all_of(loop.triangles.begin(), loop.triangles.end(),
                                 [&](std::uint32_t t) { return t == loop.triangles[0]; });
-  if (lone) return {};  // the rim of a single triangle: a second one on it would be no fill
+  if (lone) return {};  // the rim of a single triangle would be covered by a copy of it
   if (is_split_edge(loop, points)) return {{loop.points[0], loop.points[1], loop.points[2]}};
   return Triangulation(loop, points, old_edges).triangles();
 }
@@ -230,7 +232,7 @@ struct Fill {
   bool flat = false;  // no area: closes a gap without width
 };
 
-// Leaves out fills that cut the mesh or one another, and returns their loops.
+// Removes fills that intersect the mesh or one another, and returns their loops.
 std::vector<const Loop*> drop_cutting(std::vector<Fill>& fills, const TriangleMesh& mesh) {
   std::vector<TriangleIndices> all;
   for (const TriangleIndices& t : mesh.triangles) {
@@ -279,16 +281,16 @@ FilledHoles fill_holes(RepairSoup& soup, std::size_t most_edges, double most_sha
   std::vector<Fill> fills;
   std::vector<const Loop*> left;
   double steps = 0.0;
-  for (auto loop = loops.rbegin(); loop != loops.rend(); ++loop) {  // the short ones first
+  for (auto loop = loops.rbegin(); loop != loops.rend(); ++loop) {  // short ones first
     const auto n = static_cast<double>(loop->points.size());
     const bool flat = is_split_edge(*loop, mesh.vertices);
     std::size_t* reason = nullptr;
     if (loop->branching) {
       reason = &result.branching;
     } else if (loop->points.size() > most_edges || steps + n * n * n > kMostSteps) {
-      reason = &result.long_ones;
+      reason = &result.too_long;
     } else if (!flat && loop->box.diagonal() > most_share * pieces.diagonal(loop->points[0])) {
-      reason = &result.large_ones;
+      reason = &result.too_large;
     }
     Fill fill{.loop = &*loop, .triangles = {}, .flat = flat};
     if (reason == nullptr) {

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// The repair pipeline: merging, cracks and holes, then CGAL's orientation, stitching and degenerate faces.
+// Each step reports what it changed.
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Polygon_mesh_processing/connected_components.h>
 #include <CGAL/Polygon_mesh_processing/orient_polygon_soup.h>
@@ -21,11 +23,11 @@
 #include <string>
 #include <vector>
 
+#include "polygon/mesh/topology.h"
+#include "polygon/mesh/triangle.h"
 #include "polygon/repair/check.h"
 #include "polygon/repair/repair_soup.h"
 #include "polygon/repair/self_intersections.h"
-#include "polygon/mesh/topology.h"
-#include "polygon/mesh/triangle.h"
 
 namespace polygon {
 namespace {
@@ -84,12 +86,12 @@ std::string in_words(double value) {
   return text.str();
 }
 
-// Equal vertices become one, and of equal triangles the first stays.
+// Merges equal vertices and keeps the first of equal triangles.
 RepairSoup merge_equal(const TriangleMesh& mesh, Changes& changes) {
   const WeldedVertices welded = weld_vertices(mesh.vertices);
   RepairSoup soup;
   soup.mesh.vertices.resize(welded.points);
-  Found unused, merged, repeated, duplicates;
+  FindingTally unused, merged, repeated, duplicates;
   std::vector<bool> used(mesh.vertices.size(), false);
   for (const TriangleIndices& t : mesh.triangles) {
     for (const std::uint32_t corner : t) used[corner] = true;
@@ -149,15 +151,16 @@ void mend_borders(RepairSoup& soup, const RepairOptions& options, Changes& chang
   const auto because = [&](std::size_t count, const std::string& reason) {
     if (count > 0) why += (why.empty() ? "" : ", ") + std::to_string(count) + " " + reason;
   };
-  because(holes.long_ones, "of more than " + std::to_string(options.hole_edges) + " edges");
-  because(holes.large_ones, "larger than " + in_words(options.hole_share) + " of their piece");
+  because(holes.too_long, "of more than " + std::to_string(options.hole_edges) + " edges");
+  because(holes.too_large, "larger than " + in_words(options.hole_share) + " of their piece");
   because(holes.branching, "whose rims branch");
   because(holes.unfillable, "that no fill fits without cutting the mesh");
   add_finding(changes, "R14-holes-left", Severity::warning, holes.left,
               "holes or rims were not filled: " + why);
 }
 
-// Same corners in the same sense, by coordinates: orienting may have given a triangle copies of its corners.
+// Compares corners and their cyclic order by coordinates, because orienting may give a triangle copies of its
+// corners.
 bool same_sense(const CgalSoup& before, const CgalSoup& after, std::size_t i) {
   const Polygon& a = before.polygons[i];
   const Polygon& b = after.polygons[i];
@@ -172,7 +175,7 @@ bool same_sense(const CgalSoup& before, const CgalSoup& after, std::size_t i) {
 void orient(CgalSoup& soup, const RepairSoup& origin, Changes& changes) {
   const CgalSoup before = soup;
   pmp::orient_polygon_soup(soup.points, soup.polygons);
-  Found turned, split;
+  FindingTally turned, split;
   for (std::size_t i = 0; i < soup.polygons.size(); ++i) {
     if (origin.number[i] == RepairSoup::kFilled || same_sense(before, soup, i)) continue;
     turned.add(middle(origin.mesh.vertices, origin.mesh.triangles[i]), origin.number[i]);
@@ -201,11 +204,11 @@ void stitch(Surface& surface, Changes& changes) {
     if (surface.is_border(h)) border.emplace_back(h, middle(surface, h));
   }
   pmp::stitch_borders(surface);
-  Found stitched;
+  FindingTally stitched;
   for (const auto& [h, where] : border) {
     if (surface.is_removed(h) || !surface.is_border(h)) stitched.add(where);
   }
-  stitched.count = (stitched.count + 1) / 2;  // an edge has two borders
+  stitched.count = (stitched.count + 1) / 2;  // each edge was counted from both sides
   add_finding(changes, "R06-stitched-borders", Severity::info, stitched,
               "pairs of coincident border edges stitched together");
 }
@@ -214,7 +217,7 @@ void dissolve_flat(Surface& surface, Changes& changes) {
   std::vector<Surface::Face_index> flat;
   pmp::degenerate_faces(surface, std::back_inserter(flat));
   if (flat.empty()) return;
-  Found found;
+  FindingTally found;
   for (const auto f : flat) found.add(middle(surface, f));
   const bool all = pmp::remove_degenerate_faces(surface);
   add_finding(changes, "R07-degenerate-triangles", all ? Severity::info : Severity::warning, found,
@@ -222,7 +225,7 @@ void dissolve_flat(Surface& surface, Changes& changes) {
                   : "triangles have three corners on one line; not all of them could be dissolved");
 }
 
-// What the mesh as a whole cuts of itself, coincident vertices taken as one.
+// Self-intersections of the whole mesh, after welding.
 SelfIntersections intersections_of(const TriangleMesh& mesh) {
   const WeldedVertices welded = weld_vertices(mesh.vertices);
   std::vector<glm::dvec3> points(welded.points);
@@ -236,9 +239,9 @@ SelfIntersections intersections_of(const TriangleMesh& mesh) {
 }
 
 struct PieceSides {
-  std::vector<double> volume;              // one a piece, about the mesh's own middle
-  std::vector<Surface::Face_index> first;  // one face of each
-  std::vector<std::size_t> piece_of;       // one a face
+  std::vector<double> volume;              // [piece] signed, about the mesh's centre
+  std::vector<Surface::Face_index> first;  // [piece] one of its faces
+  std::vector<std::size_t> piece_of;       // [face]
 };
 
 PieceSides sides_of(const Surface& surface) {
@@ -266,7 +269,7 @@ PieceSides sides_of(const Surface& surface) {
   return sides;
 }
 
-// Every piece outward; where pieces are nested and nothing cuts, the inner ones become cavities.
+// Turns every piece outward. If pieces are nested and nothing intersects, inner ones become cavities.
 void turn_outward(Surface& surface, bool cuts_itself, Changes& changes) {
   const PieceSides before = sides_of(surface);
   if (before.volume.size() > 1 && !cuts_itself) {
@@ -279,7 +282,7 @@ void turn_outward(Surface& surface, bool cuts_itself, Changes& changes) {
     pmp::reverse_face_orientations(inward, surface);
   }
   const PieceSides after = sides_of(surface);
-  Found turned;
+  FindingTally turned;
   for (std::size_t piece = 0; piece < before.volume.size(); ++piece) {
     const double now = after.volume[after.piece_of[before.first[piece]]];
     if (now * before.volume[piece] < 0.0) turned.add(middle(surface, before.first[piece]));
@@ -289,7 +292,7 @@ void turn_outward(Surface& surface, bool cuts_itself, Changes& changes) {
 }
 
 void say_how_it_ended(const Surface& surface, Changes& changes) {
-  Found border;
+  FindingTally border;
   for (const auto h : surface.halfedges()) {
     if (surface.is_border(h)) border.add(middle(surface, h));
   }
@@ -306,8 +309,7 @@ void say_how_it_ended(const Surface& surface, Changes& changes) {
 RepairedMesh repair_mesh(const TriangleMesh& mesh, const RepairOptions& options) {
   RepairedMesh repaired;
   RepairSoup merged = merge_equal(mesh, repaired.changes);
-  // Should CGAL refuse a step on some freak of a mesh, what was done until then stands, and the report says
-  // so.
+  // If CGAL refuses a step, the result of the steps before is kept, and the report says so.
   const char* done = "merged, but not oriented, stitched nor turned outward";
   try {
     mend_borders(merged, options, repaired.changes);
@@ -332,7 +334,7 @@ RepairedMesh repair_mesh(const TriangleMesh& mesh, const RepairOptions& options)
     }
     repaired.mesh = std::move(whole);
     if (cuts.pairs > 0) {
-      const Found pairs{cuts.pairs, {0.5 * (cuts.lower + cuts.upper), cuts.lower, cuts.upper, {}}};
+      const FindingTally pairs{cuts.pairs, {0.5 * (cuts.lower + cuts.upper), cuts.lower, cuts.upper, {}}};
       add_finding(repaired.changes, "R15-self-intersections", Severity::warning, pairs,
                   std::string("pairs of triangles cut one another") + (cuts.complete ? "" : " at least") +
                       " and are left so: no way to part them keeps every surface where it is");

@@ -24,7 +24,7 @@ class PairTest {
       : points_(points), triangles_(triangles) {}
 
   [[nodiscard]] bool intersect(std::uint32_t first, std::uint32_t second) const {
-    // Shared corners to the front of both, in the same order.
+    // Moves shared corners to the front of both, in the same order.
     TriangleIndices a = triangles_[first];
     TriangleIndices b = triangles_[second];
     std::size_t shared = 0;
@@ -79,7 +79,7 @@ std::size_t most_tests(std::size_t triangles) {
   return 1'000'000 + kMaxTestsPerTriangle * triangles;
 }
 
-struct EnoughTests {};  // thrown through CGAL's search, which has no other way to end early
+struct EnoughTests {};  // thrown through CGAL's search, which offers no other early exit
 
 }  // namespace
 
@@ -98,7 +98,7 @@ SelfIntersections find_self_intersections(std::span<const glm::dvec3> points,
       if (++tests > most_tests(triangles.size())) throw EnoughTests{};
       const auto [first, second] = std::minmax({x.info(), y.info()});
       if (!test.intersect(first, second)) return;
-      // The lowest pair, so that the order of CGAL's search does not show.
+      // Keeps the lowest pair, so that the result does not depend on the order of CGAL's search.
       if (result.pairs == 0) result.lower = result.upper = middle(first);
       if (result.pairs++ == 0 || std::pair(first, second) < std::pair(result.first, result.second)) {
         result.first = first;

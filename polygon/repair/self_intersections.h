@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Pairs of triangles that cut one another, by CGAL's exact predicates.
+// Finds triangles that intersect one another, with CGAL's exact predicates. The number of tests is bounded.
 #pragma once
 
 #include <cstddef>
@@ -14,23 +14,25 @@ namespace polygon {
 
 struct SelfIntersections {
   std::size_t pairs = 0;
-  std::uint32_t first = 0, second = 0;  // the lowest such pair, when there is any
-  glm::dvec3 lower{0.0}, upper{0.0};    // box of the middles of all triangles in such pairs
-  bool complete = true;                 // false: ended by a bound; there may be more, and a lower one
+  std::uint32_t first = 0, second = 0;  // the lowest pair, if there is any
+  glm::dvec3 lower{0.0}, upper{0.0};    // box around the centres of all triangles in such pairs
+  // False: the bound ended the search; there may be more pairs, and a lower one.
+  bool complete = true;
 };
 
-// A million triangles that all cut one another have 5e11 pairs: the search ends after this many tests for
-// each triangle on average. (A closed mesh needs about ten: its neighbours.)
+// A million mutually intersecting triangles have 5e11 pairs. The search ends after this many tests per
+// triangle on average. A closed mesh needs about ten, for the neighbours.
 inline constexpr std::size_t kMaxTestsPerTriangle = 100;
 
-// `points`: no two equal; `triangles`: none without area. Two triangles that share an edge intersect when
-// they are folded onto one another, two that share a corner when they meet elsewhere too; triangles with the
-// same three corners do not count.
+// `points`: all different; `triangles`: none degenerate. Two triangles with a common edge intersect if they
+// are folded onto one another. Two with a common corner intersect if they also meet elsewhere. Triangles with
+// the same three corners do not count.
 SelfIntersections find_self_intersections(std::span<const glm::dvec3> points,
                                           std::span<const TriangleIndices> triangles);
 
-// Those of the triangles from `first_new` on that cut a triangle before them, in ascending order. When the
-// bound on tests ends the search, all of them: what was not seen to be free is not called free.
+// Triangles with an index of at least `first_new` that intersect a triangle with a lower index, ascending. If
+// the bound on tests ends the search, all new triangles are returned, because none is known to be free of
+// intersections.
 std::vector<std::uint32_t> new_triangles_that_cut(std::span<const glm::dvec3> points,
                                                   std::span<const TriangleIndices> triangles,
                                                   std::uint32_t first_new);

@@ -11,20 +11,20 @@
 namespace polygon {
 namespace {
 
-constexpr std::size_t kLargeTree = 1U << 18U;  // boxes
+constexpr std::size_t kLargeTree = 1U << 18U;  // boxes; above it the fast build is used
 
 float rounded_down(double x) {
   const auto f = static_cast<float>(x);
   return static_cast<double>(f) <= x ? f : std::nextafterf(f, -std::numeric_limits<float>::infinity());
 }
 
-using BoxOf = std::function<BoxTree::Box(std::uint32_t)>;
+using BoxOf = std::function<Bvh::Box(std::uint32_t)>;
 
 struct Build {
   const BoxOf& box_of;
 };
 void bounds_of(const RTCBoundsFunctionArguments* args) {
-  const BoxTree::Box box = static_cast<const Build*>(args->geometryUserPtr)->box_of(args->primID);
+  const Bvh::Box box = static_cast<const Build*>(args->geometryUserPtr)->box_of(args->primID);
   args->bounds_o->lower_x = rounded_down(box.low.x);
   args->bounds_o->lower_y = rounded_down(box.low.y);
   args->bounds_o->lower_z = rounded_down(box.low.z);
@@ -38,17 +38,17 @@ bool count_memory(void* bytes_held, ssize_t bytes, bool /*post*/) {
   return true;
 }
 
-struct Asked {
-  BoxTree::Visit visit;
-  void* asker;
+struct VisitContext {
+  Bvh::Visit visit;
+  void* user;
 };
-bool hand_on(RTCPointQueryFunctionArguments* args) {
-  const Asked& asked = *static_cast<const Asked*>(args->userPtr);
-  return asked.visit(asked.asker, args->primID, args->query->radius);
+bool forward_to_visit(RTCPointQueryFunctionArguments* args) {
+  const VisitContext& call = *static_cast<const VisitContext*>(args->userPtr);
+  return call.visit(call.user, args->primID, args->query->radius);
 }
 
-// The thread sanitizer does not see how Embree's threads wait for one another, as neither it nor oneTBB is
-// built with it: every box that one of them read would be a race with whoever wrote it.
+// The thread sanitizer cannot see the synchronisation inside Embree and oneTBB, which are built without it,
+// and would report every box as a race.
 #ifdef __SANITIZE_THREAD__
 constexpr const char* kDevice = "threads=1";
 #else
@@ -57,7 +57,7 @@ constexpr const char* kDevice = nullptr;
 
 }  // namespace
 
-BoxTree::BoxTree(std::size_t count, const BoxOf& box_of) {
+Bvh::Bvh(std::size_t count, const BoxOf& box_of) {
   device_ = rtcNewDevice(kDevice);
   if (device_ == nullptr) {
     throw std::runtime_error("Embree cannot start on this machine (error " +
@@ -67,11 +67,11 @@ BoxTree::BoxTree(std::size_t count, const BoxOf& box_of) {
   rtcSetDeviceMemoryMonitorFunction(device_, &count_memory, &embree_bytes_);
   scene_ = rtcNewScene(device_);
   rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_ROBUST);
-  // Of a large mesh, queries wait for memory, and Embree's fast build is as quick to ask, takes a third of
-  // the memory and half of the time; of a small one its looser boxes would cost a fifth of a query.
+  // Queries in a large tree wait for memory. There Embree's fast build is as quick to query, and takes less
+  // memory and time to build. In a small tree its looser boxes would slow the queries.
   rtcSetSceneBuildQuality(scene_, count > kLargeTree ? RTC_BUILD_QUALITY_LOW : RTC_BUILD_QUALITY_MEDIUM);
-  // User geometry, not Embree's triangles: its boxes are rounded outward here, which Embree's own float
-  // vertices are not, and it holds no second copy of the vertices.
+  // User geometry instead of Embree's triangles: the boxes are rounded outwards here, which Embree's float
+  // vertices are not, and the vertices are not stored twice.
   RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_USER);
   rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(count));
   Build build{box_of};
@@ -91,12 +91,12 @@ BoxTree::BoxTree(std::size_t count, const BoxOf& box_of) {
   }
 }
 
-BoxTree::~BoxTree() {
+Bvh::~Bvh() {
   rtcReleaseScene(scene_);
   rtcReleaseDevice(device_);
 }
 
-float BoxTree::aim(const glm::dvec3& point, double radius, double slack, Query& query) {
+float Bvh::set_query(const glm::dvec3& point, double radius, double slack, Query& query) {
   query.x = static_cast<float>(point.x);
   query.y = static_cast<float>(point.y);
   query.z = static_cast<float>(point.z);
@@ -105,7 +105,7 @@ float BoxTree::aim(const glm::dvec3& point, double radius, double slack, Query& 
   return float_error;
 }
 
-void BoxTree::ask(const Query& query, Visit visit, void* asker) const noexcept {
+void Bvh::visit_near(const Query& query, Visit visit, void* user) const noexcept {
   RTCPointQuery at{};
   at.x = query.x;
   at.y = query.y;
@@ -113,11 +113,11 @@ void BoxTree::ask(const Query& query, Visit visit, void* asker) const noexcept {
   at.radius = query.radius;
   RTCPointQueryContext context{};
   rtcInitPointQueryContext(&context);
-  Asked asked{visit, asker};
-  rtcPointQuery(scene_, &at, &context, &hand_on, &asked);
+  VisitContext call{visit, user};
+  rtcPointQuery(scene_, &at, &context, &forward_to_visit, &call);
 }
 
-std::size_t BoxTree::memory_bytes() const noexcept {
+std::size_t Bvh::memory_bytes() const noexcept {
   return static_cast<std::size_t>(std::max<std::int64_t>(embree_bytes_.load(), 0));
 }
 

@@ -13,17 +13,17 @@
 #include <utility>
 #include <vector>
 
-#include "polygon/surface/bvh.h"
 #include "polygon/mesh/mesh_bounds.h"
 #include "polygon/mesh/topology.h"
 #include "polygon/mesh/triangle.h"
 #include "polygon/mesh/vertex_normals.h"
+#include "polygon/surface/bvh.h"
 
 namespace polygon {
 namespace {
 
-constexpr std::uint32_t kNone = 0xffffffffU;
-constexpr double kFarAway = 700.0;  // radii of the mesh: where the rounding of floats, and a lens, cost least
+constexpr double kFarAway = 700.0;  // radii of the mesh: there the rounding of floats and the lens together
+                                    // cost least
 
 bool is_finite(const glm::dvec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
@@ -42,7 +42,7 @@ class MeshSurface final : public RigidSurface {
                                     std::span<NearPoint> out) const noexcept override;
   [[nodiscard]] bool nearest(const glm::dvec3& point, double radius, NearPoint& out) const noexcept override;
   [[nodiscard]] GatherResult survey(const glm::dvec3& centre, double radius, const glm::dvec3& view,
-                                    std::span<SeenElement> out) const noexcept override;
+                                    std::span<ElementPlane> out) const noexcept override;
   [[nodiscard]] NearPoint closest(std::uint32_t element, const glm::dvec3& point) const noexcept override;
   [[nodiscard]] glm::dvec3 face_normal(std::uint32_t element) const noexcept override {
     return normal(element);
@@ -63,17 +63,17 @@ class MeshSurface final : public RigidSurface {
  private:
   struct GatherQuery {
     const MeshSurface* surface;
-    glm::dvec3 point;  // from centre_, as all geometry here
+    glm::dvec3 point;  // relative to centre_, as all geometry here
     double radius;
-    float float_error;  // how far the float query point lies from `point`, and its slack
+    float float_error;  // distance of the float query point from `point`, plus slack
     std::span<NearPoint> out;
     GatherResult result;
   };
   struct SurveyQuery {
     const MeshSurface* surface;
-    glm::dvec3 centre, view;  // from centre_
+    glm::dvec3 centre, view;  // relative to centre_
     double radius;
-    std::span<SeenElement> out;
+    std::span<ElementPlane> out;
     GatherResult result;
   };
   struct NearestQuery {
@@ -84,11 +84,10 @@ class MeshSurface final : public RigidSurface {
     NearPoint best;
     TriangleFeature feature;
     bool found;
-    glm::dvec3
-        asked_from;  // where the hierarchy is asked: `point`, or for a far one somewhere on the way to it
-    double lens;     // 0, or the share of the way that is left
+    glm::dvec3 query_origin;  // `point`, or for a far point a place on the line to it
+    double lens;              // 0, or the fraction of the line that lies beyond query_origin
   };
-  // The sum of normals at a corner (from == to) or an edge, over the elements that have it.
+  // Sum of the normals at a corner (from == to) or an edge, over the elements that share it.
   struct PseudonormalQuery {
     const MeshSurface* surface;
     glm::dvec3 from, to;
@@ -96,10 +95,10 @@ class MeshSurface final : public RigidSurface {
     std::uint32_t elements = 0, flat = 0;
   };
 
-  static bool on_gather(void* asker, std::uint32_t box, float& radius);
-  static bool on_survey(void* asker, std::uint32_t box, float& radius);
-  static bool on_nearest(void* asker, std::uint32_t box, float& radius);
-  static bool on_pseudonormal(void* asker, std::uint32_t box, float& radius);
+  static bool on_gather(void* user, std::uint32_t box, float& radius);
+  static bool on_survey(void* user, std::uint32_t box, float& radius);
+  static bool on_nearest(void* user, std::uint32_t box, float& radius);
+  static bool on_pseudonormal(void* user, std::uint32_t box, float& radius);
 
   [[nodiscard]] TrianglePoint closest(const glm::dvec3& local, std::uint32_t triangle) const {
     const TriangleIndices& t = triangles_[triangle];
@@ -111,7 +110,7 @@ class MeshSurface final : public RigidSurface {
   }
   [[nodiscard]] glm::dvec3 normal(std::uint32_t triangle) const;
   [[nodiscard]] bool prepare(const glm::dvec3& point, double radius, glm::dvec3& local, float& float_error,
-                             BoxTree::Query& query) const;
+                             Bvh::Query& query) const;
   [[nodiscard]] double lens_radius(const NearPoint& x, const NearestQuery& query) const;
   [[nodiscard]] bool find_nearest(const glm::dvec3& point, double radius, NearestQuery& query) const;
   [[nodiscard]] PseudonormalQuery pseudonormal(const glm::dvec3& from, const glm::dvec3& to) const;
@@ -120,12 +119,13 @@ class MeshSurface final : public RigidSurface {
   std::span<const TriangleIndices> triangles_;  // of mesh_
   bool solid_;
   glm::dvec3 centre_{0.0};
-  glm::dvec3 lower_{0.0}, upper_{0.0};     // from centre_
+  glm::dvec3 lower_{0.0}, upper_{0.0};     // relative to centre_
   std::vector<TriangleIndices> across_;    // [triangle][edge]
-  std::vector<std::uint32_t> elements_;    // what the hierarchy holds: no duplicates; empty: all triangles
-  std::vector<glm::vec3> vertex_normals_;  // only when asked for
-  double slack_ = 0.0;                     // of taking coordinates from centre_ (unit: meter)
-  std::optional<BoxTree> tree_;            // of elements; always there
+  std::vector<std::uint32_t> elements_;    // [box] its element; duplicates left out; empty: every triangle is
+                                           // an element
+  std::vector<glm::vec3> vertex_normals_;  // only if asked for
+  double slack_ = 0.0;                     // rounding error of coordinates relative to centre_ (unit: meter)
+  std::optional<Bvh> tree_;                // of elements; always set
 };
 
 MeshSurface::MeshSurface(std::shared_ptr<const TriangleMesh> mesh, const SurfaceOptions& options)
@@ -144,7 +144,7 @@ MeshSurface::MeshSurface(std::shared_ptr<const TriangleMesh> mesh, const Surface
   tree_.emplace(elements_.empty() ? triangles_.size() : elements_.size(), [this](std::uint32_t box) {
     const TriangleIndices& t = triangles_[element_of(box)];
     const glm::dvec3 a = vertex(t[0]), b = vertex(t[1]), c = vertex(t[2]);
-    return BoxTree::Box{glm::min(glm::min(a, b), c), glm::max(glm::max(a, b), c)};
+    return Bvh::Box{glm::min(glm::min(a, b), c), glm::max(glm::max(a, b), c)};
   });
 }
 
@@ -153,21 +153,21 @@ glm::dvec3 MeshSurface::normal(std::uint32_t triangle) const {
   return unit_normal(vertex(t[0]), vertex(t[1]), vertex(t[2]));
 }
 
-// The hierarchy checks nothing, so everything is checked here. False: nothing can be found.
+// Embree checks nothing, so every argument is checked here. False: nothing can be found.
 bool MeshSurface::prepare(const glm::dvec3& point, double radius, glm::dvec3& local, float& float_error,
-                          BoxTree::Query& query) const {
+                          Bvh::Query& query) const {
   if (!is_finite(point) || !(radius >= 0.0)) return false;
   local = point - centre_;
   if (!(glm::length(local) < kFurthestQuery)) return false;
   const glm::dvec3 outside = glm::max(glm::max(lower_ - local, local - upper_), glm::dvec3(0.0));
   const double slack = slack_ + 1e-15 * glm::length(point);
   if (glm::length(outside) > radius * (1.0 + 1e-12) + slack) return false;
-  float_error = BoxTree::aim(local, radius, slack, query);
+  float_error = Bvh::set_query(local, radius, slack, query);
   return true;
 }
 
-bool MeshSurface::on_gather(void* asker, std::uint32_t box, float& radius) {
-  auto& q = *static_cast<GatherQuery*>(asker);
+bool MeshSurface::on_gather(void* user, std::uint32_t box, float& radius) {
+  auto& q = *static_cast<GatherQuery*>(user);
   const std::uint32_t element = q.surface->element_of(box);
   const TrianglePoint closest = q.surface->closest(q.point, element);
   const NearPoint found{closest.point, std::sqrt(closest.squared_distance), element};
@@ -177,7 +177,7 @@ bool MeshSurface::on_gather(void* asker, std::uint32_t box, float& radius) {
     if (q.result.count == q.out.size()) std::make_heap(q.out.begin(), q.out.end(), nearer);
     return false;
   }
-  // Full: keep the nearest, and look no further than the furthest of them.
+  // Full: keep the nearest, and shrink the radius to the furthest of them.
   q.result.complete = false;
   if (q.out.empty()) {
     radius = 0.0F;
@@ -195,9 +195,9 @@ bool MeshSurface::on_gather(void* asker, std::uint32_t box, float& radius) {
 GatherResult MeshSurface::gather(const glm::dvec3& point, double radius,
                                  std::span<NearPoint> out) const noexcept {
   GatherQuery q{this, {}, radius, 0.0F, out, {}};
-  BoxTree::Query query;
+  Bvh::Query query;
   if (!prepare(point, radius, q.point, q.float_error, query)) return {};
-  tree_->ask(query, &MeshSurface::on_gather, &q);
+  tree_->visit_near(query, &MeshSurface::on_gather, &q);
   const std::span<NearPoint> found = out.first(q.result.count);
   std::sort(found.begin(), found.end(),
             [](const NearPoint& a, const NearPoint& b) { return a.element < b.element; });
@@ -205,31 +205,31 @@ GatherResult MeshSurface::gather(const glm::dvec3& point, double radius,
   return q.result;
 }
 
-bool MeshSurface::on_survey(void* asker, std::uint32_t box, float& radius) {
-  auto& q = *static_cast<SurveyQuery*>(asker);
+bool MeshSurface::on_survey(void* user, std::uint32_t box, float& radius) {
+  auto& q = *static_cast<SurveyQuery*>(user);
   const MeshSurface& self = *q.surface;
   const std::uint32_t element = self.element_of(box);
   const TriangleIndices& t = self.triangles_[element];
-  TriangleSight sight;
-  if (!see_triangle(q.centre, q.radius, q.view, self.vertex(t[0]), self.vertex(t[1]), self.vertex(t[2]),
-                    sight))
+  TrianglePlane plane;
+  if (!triangle_plane_within(q.centre, q.radius, q.view, self.vertex(t[0]), self.vertex(t[1]),
+                             self.vertex(t[2]), plane))
     return false;
   if (q.result.count == q.out.size()) {
     q.result.complete = false;
     radius = 0.0F;
     return true;
   }
-  q.out[q.result.count++] = {sight.normal, sight.reach + glm::dot(sight.normal, self.centre_), element};
+  q.out[q.result.count++] = {plane.normal, plane.support + glm::dot(plane.normal, self.centre_), element};
   return false;
 }
 
 GatherResult MeshSurface::survey(const glm::dvec3& centre, double radius, const glm::dvec3& view,
-                                 std::span<SeenElement> out) const noexcept {
+                                 std::span<ElementPlane> out) const noexcept {
   SurveyQuery q{this, {}, view - centre_, radius, out, {}};
-  BoxTree::Query query;
+  Bvh::Query query;
   float float_error = 0.0F;
   if (!prepare(centre, radius, q.centre, float_error, query)) return {};
-  tree_->ask(query, &MeshSurface::on_survey, &q);
+  tree_->visit_near(query, &MeshSurface::on_survey, &q);
   return q.result;
 }
 
@@ -250,8 +250,8 @@ glm::dvec3 MeshSurface::shaded_normal(std::uint32_t element, const glm::dvec3& p
   const glm::dvec3 face = normal(element);
   glm::dvec3 shaded = face;
   if (!vertex_normals_.empty() && face != glm::dvec3(0.0)) {
-    // Barycentric coordinates by areas seen along the face's normal (Ericson, Real-Time Collision Detection,
-    // 3.4).
+    // Barycentric coordinates by areas projected along the face's normal (Ericson, Real-Time Collision
+    // Detection, 3.4).
     const glm::dvec3 a = vertex(t[0]), b = vertex(t[1]), c = vertex(t[2]);
     const glm::dvec3 p = point - centre_;
     const double wa = std::max(0.0, glm::dot(face, glm::cross(c - b, p - b)));
@@ -264,8 +264,8 @@ glm::dvec3 MeshSurface::shaded_normal(std::uint32_t element, const glm::dvec3& p
   return glm::dot(shaded, away) < 0.0 ? -shaded : shaded;
 }
 
-bool MeshSurface::on_nearest(void* asker, std::uint32_t box, float& radius) {
-  auto& q = *static_cast<NearestQuery*>(asker);
+bool MeshSurface::on_nearest(void* user, std::uint32_t box, float& radius) {
+  auto& q = *static_cast<NearestQuery*>(user);
   const std::uint32_t element = q.surface->element_of(box);
   if (q.skip_degenerate) {
     const TriangleIndices& t = q.surface->triangles_[element];
@@ -275,10 +275,11 @@ bool MeshSurface::on_nearest(void* asker, std::uint32_t box, float& radius) {
   const TrianglePoint closest = q.surface->closest(q.point, element);
   const NearPoint found{closest.point, std::sqrt(closest.squared_distance), element};
   if (q.lens > 0.0) {
-    // Whether or not it is near enough to be an answer, nothing beyond it needs to be looked at.
+    // Elements further away than this one need no visit, whether or not it is within the search radius.
     radius = std::min(radius, conservative(q.surface->lens_radius(found, q), q.float_error));
   }
-  // best.distance starts as the radius, with an element above all others: the radius itself still counts.
+  // best.distance starts as the radius, with an element number above all others, so an element at exactly
+  // that distance counts.
   if (!nearer(found, q.best)) return q.lens > 0.0;
   q.best = found;
   q.feature = closest.feature;
@@ -289,32 +290,32 @@ bool MeshSurface::on_nearest(void* asker, std::uint32_t box, float& radius) {
   return true;
 }
 
-// From far away the float distances of all triangles are equal, and the hierarchy would hand out every one of
-// them. So it is asked from a place on the way, s from the centre where the point is S. Of the ball B about
-// the mesh, of radius L, all that is as near to the point as x lies within
-// √(|x − place|² + (L² − |x|²)(1 − s/S)) of that place (the ball around the point, written in terms of x and
-// cut with B), which for s ≫ L is hardly more than x's own distance.
+// Radius of the query that replaces one from far away. From afar the float distances of all triangles are
+// equal, and Embree would return every triangle. So a far point at distance S from the centre is replaced by
+// a place on the line to it, at distance s. The mesh lies in a ball B of radius L. The points of B that are
+// as near to the far point as x form a lens, the intersection of two balls. That lens lies within √(|x −
+// place|² + (L² − |x|²)(1 − s/S)) of the place, which for s ≫ L hardly exceeds |x − place|.
 double MeshSurface::lens_radius(const NearPoint& x, const NearestQuery& q) const {
-  const glm::dvec3 away = x.point - q.asked_from;
+  const glm::dvec3 away = x.point - q.query_origin;
   const double within = glm::dot(upper_, upper_) - glm::dot(x.point, x.point);
   return std::sqrt(glm::dot(away, away) + std::max(0.0, within) * q.lens);
 }
 
 bool MeshSurface::find_nearest(const glm::dvec3& point, double radius, NearestQuery& q) const {
   q.surface = this;
-  q.best = {{}, radius, kNone};
+  q.best = {{}, radius, kNoElement};
   q.found = false;
-  BoxTree::Query query;
+  Bvh::Query query;
   if (!prepare(point, radius, q.point, q.float_error, query)) return false;
-  q.asked_from = q.point;
+  q.query_origin = q.point;
   q.lens = 0.0;
   const double distance = glm::length(q.point), far = kFarAway * glm::length(upper_);
   if (distance > far && far > 0.0) {
-    q.asked_from = q.point * (far / distance);
+    q.query_origin = q.point * (far / distance);
     q.lens = 1.0 - far / distance;
-    q.float_error = BoxTree::aim(q.asked_from, std::numeric_limits<double>::infinity(), slack_, query);
+    q.float_error = Bvh::set_query(q.query_origin, std::numeric_limits<double>::infinity(), slack_, query);
   }
-  tree_->ask(query, &MeshSurface::on_nearest, &q);
+  tree_->visit_near(query, &MeshSurface::on_nearest, &q);
   return q.found;
 }
 
@@ -343,7 +344,7 @@ bool MeshSurface::inside(const glm::dvec3& point) const noexcept {
     normal_here = normal(q.best.element);
   } else if (feature >= 3) {
     const PseudonormalQuery edge = pseudonormal(v[t[feature - 3]], v[t[(feature - 2) % 3]]);
-    // A sliver across the edge has no normal to give, and neither side of it decides alone.
+    // A degenerate triangle at the edge has no normal, and the other one alone does not decide the sign.
     if (edge.elements != 2 || edge.flat != 0) return winds_around(*mesh_, point);
     normal_here = edge.sum;
   } else {
@@ -351,17 +352,17 @@ bool MeshSurface::inside(const glm::dvec3& point) const noexcept {
   }
   const glm::dvec3 away = (local - q.best.point) / q.best.distance;
   const double side = glm::dot(away, normal_here);
-  // At a fold so sharp that the normals cancel, the sign would be rounding.
+  // At a fold so sharp that the normals cancel, the sign would be rounding error.
   if (std::abs(side) < 1e-9) return winds_around(*mesh_, point);
   return side < 0.0;
 }
 
-// Angle-weighted pseudonormals (Baerentzen and Aanaes, Signed distance computation using the angle weighted
-// pseudonormal, 2005): at an edge or a corner the sign of the distance must not depend on which of the
-// triangles there was found first. They are found when they are needed: kept for every vertex and edge they
-// would take as much memory as the mesh itself.
-bool MeshSurface::on_pseudonormal(void* asker, std::uint32_t box, float& /*radius*/) {
-  auto& q = *static_cast<PseudonormalQuery*>(asker);
+// Angle-weighted pseudonormals (Baerentzen & Aanaes, Signed distance computation using the angle weighted
+// pseudonormal, 2005). At an edge or a corner the sign of the distance must not depend on which triangle was
+// found first. They are computed on demand; stored for every vertex and edge they would take as much memory
+// as the mesh.
+bool MeshSurface::on_pseudonormal(void* user, std::uint32_t box, float& /*radius*/) {
+  auto& q = *static_cast<PseudonormalQuery*>(user);
   const TriangleIndices& t = q.surface->triangles_[q.surface->element_of(box)];
   const std::vector<glm::dvec3>& v = q.surface->mesh_->vertices;
   const glm::dvec3 &a = v[t[0]], &b = v[t[1]], &c = v[t[2]];
@@ -383,11 +384,11 @@ bool MeshSurface::on_pseudonormal(void* asker, std::uint32_t box, float& /*radiu
 
 MeshSurface::PseudonormalQuery MeshSurface::pseudonormal(const glm::dvec3& from, const glm::dvec3& to) const {
   PseudonormalQuery q{.surface = this, .from = from, .to = to};
-  BoxTree::Query query;
+  Bvh::Query query;
   glm::dvec3 local(0.0);
   float float_error = 0.0F;
   if (!prepare(from, 0.0, local, float_error, query)) return q;
-  tree_->ask(query, &MeshSurface::on_pseudonormal, &q);
+  tree_->visit_near(query, &MeshSurface::on_pseudonormal, &q);
   return q;
 }
 

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Tessellations of the primitives: watertight meshes in which each vertex occurs once.
 #include <cmath>
 #include <cstdint>
 #include <glm/geometric.hpp>
@@ -7,8 +8,8 @@
 #include <stdexcept>
 #include <unordered_map>
 
-#include "polygon/surface/primitives.h"
 #include "polygon/mesh/topology.h"
+#include "polygon/surface/primitives.h"
 
 namespace polygon {
 namespace {
@@ -38,7 +39,8 @@ TriangleMesh icosahedron() {
   return mesh;
 }
 
-// Each triangle into four, new vertices on the unit sphere, one for the two triangles that share an edge.
+// Splits each triangle into four. New vertices lie on the unit sphere, one for the two triangles that share
+// an edge.
 void subdivide(TriangleMesh& mesh) {
   std::unordered_map<std::uint64_t, std::uint32_t> middles;
   middles.reserve(mesh.triangles.size() * 3 / 2);
@@ -62,7 +64,7 @@ void subdivide(TriangleMesh& mesh) {
   mesh.triangles = std::move(finer);
 }
 
-// n × n quads over corner + s·u + t·v, s and t in 0..1, seen counter-clockwise from u × v.
+// n × n quads over corner + s·u + t·v, s and t in 0..1, counter-clockwise seen from the side of u × v.
 void add_grid(TriangleMesh& mesh, const glm::dvec3& corner, const glm::dvec3& u, const glm::dvec3& v, int n) {
   const auto base = static_cast<std::uint32_t>(mesh.vertices.size());
   const auto row = static_cast<std::uint32_t>(n) + 1;
@@ -98,8 +100,8 @@ TriangleMesh make_box_mesh(const glm::dvec3& half_size, int quads_per_edge) {
   require_size("the box's half size along y", half_size.y);
   require_size("the box's half size along z", half_size.z);
   require_count("the number of quads an edge", quads_per_edge, 1, 1024);
-  // On the lattice -n..n in steps of 2 first, where the edges that faces share are exactly equal and can be
-  // welded.
+  // Built on the integer lattice -n..n in steps of 2 first: there the edges shared by two faces are exactly
+  // equal and can be welded.
   TriangleMesh faces;
   const double n = quads_per_edge;
   for (int axis = 0; axis < 3; ++axis) {
@@ -127,8 +129,8 @@ TriangleMesh make_capsule_mesh(double radius, double half_length, int segments) 
   require_size("the capsule's radius", radius);
   require_size("the capsule's half length", half_length, true);
   require_count("the number of segments", segments, 3, 1024);
-  // Rings from the lower pole to the upper: the quarter circles as finely divided as the ring, one band
-  // between.
+  // Rings from the lower pole to the upper one. The quarter circles are divided as finely as the rings, with
+  // one band between the equators.
   const int quarter = std::max(1, segments / 4);
   const auto around = static_cast<std::uint32_t>(segments);
   TriangleMesh mesh;
@@ -144,7 +146,7 @@ TriangleMesh make_capsule_mesh(double radius, double half_length, int segments) 
   std::uint32_t rings = 0;
   for (int i = 1; i <= quarter; ++i, ++rings)
     add_ring((static_cast<double>(i) / quarter - 1.0) * 0.5 * std::numbers::pi, -half_length);
-  // Without a cylinder the two equators would be one ring twice.
+  // Without a cylinder the two equators would be the same ring.
   for (int i = half_length > 0.0 ? 0 : 1; i < quarter; ++i, ++rings)
     add_ring(static_cast<double>(i) / quarter * 0.5 * std::numbers::pi, half_length);
   const auto top = static_cast<std::uint32_t>(mesh.vertices.size());

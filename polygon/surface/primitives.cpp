@@ -24,7 +24,7 @@ void require_size(const char* what, double value, bool zero_allowed = false) {
   throw std::invalid_argument(text.str());
 }
 
-// What a shape says of a query point: the nearest point of its surface, and whether the query is inside.
+// Nearest point of the shape's surface, and whether the query point is inside.
 struct SurfacePoint {
   glm::dvec3 point{0.0};
   bool inside = false;
@@ -34,7 +34,7 @@ struct Ball {
   double radius;
   [[nodiscard]] SurfacePoint closest(const glm::dvec3& p) const {
     const double length = glm::length(p);
-    // At the very centre every direction is as near as any other.
+    // At the centre every direction is equally near.
     const glm::dvec3 direction = length > 0.0 ? p / length : glm::dvec3(0.0, 0.0, 1.0);
     return {direction * radius, length < radius};
   }
@@ -64,7 +64,7 @@ struct Capsule {
     const glm::dvec3 on_axis(0.0, 0.0, std::clamp(p.z, -half_length, half_length));
     const glm::dvec3 away = p - on_axis;
     const double length = glm::length(away);
-    // On the segment itself every direction across it is as near; at its ends too.
+    // On the axis every direction across it is equally near, at its ends too.
     const glm::dvec3 direction = length > 0.0 ? away / length : glm::dvec3(1.0, 0.0, 0.0);
     return {on_axis + direction * radius, length < radius};
   }
@@ -102,9 +102,9 @@ class PrimitiveSurface final : public RigidSurface {
     return true;
   }
 
-  // One convex element, as near from anywhere.
+  // One convex element, exact from every side.
   [[nodiscard]] GatherResult survey(const glm::dvec3& centre, double radius, const glm::dvec3& view,
-                                    std::span<SeenElement> out) const noexcept override {
+                                    std::span<ElementPlane> out) const noexcept override {
     NearPoint seen;
     if (!nearest(centre, radius, seen)) return {};
     if (out.empty()) return {0, false};
@@ -128,7 +128,7 @@ class PrimitiveSurface final : public RigidSurface {
     return {kNoElement, kNoElement, kNoElement};
   }
 
-  // Never below a plane of its own: there is no second element that could cover it.
+  // Never below a plane, because there is no second element that could cover it.
   [[nodiscard]] double support(std::uint32_t /*element*/,
                                const glm::dvec3& /*normal*/) const noexcept override {
     return std::numeric_limits<double>::infinity();
@@ -136,7 +136,7 @@ class PrimitiveSurface final : public RigidSurface {
 
   [[nodiscard]] glm::dvec3 shaded_normal(std::uint32_t /*element*/, const glm::dvec3& /*point*/,
                                          const glm::dvec3& away) const noexcept override {
-    return away;  // a primitive's own normal is smooth already
+    return away;  // a primitive's own normal is already smooth
   }
 
   [[nodiscard]] bool inside(const glm::dvec3& point) const noexcept override {

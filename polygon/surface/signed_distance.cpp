@@ -9,7 +9,8 @@
 namespace polygon {
 namespace {
 
-// Of the largest coordinate: nearer to the surface than this, the difference has no direction but rounding.
+// Relative to the largest coordinate: closer to the surface than this, the direction of the difference is
+// rounding error.
 constexpr double kOnSurface = 1e-13;
 
 }  // namespace
@@ -18,7 +19,8 @@ bool signed_distance(const RigidSurface& surface, const glm::dvec3& point, doubl
                      const glm::dvec3& known, SignedDistance& out) noexcept {
   NearPoint near;
   if (!surface.nearest(point, radius, near)) return false;
-  // A solid primitive says 0 from within, and still where its surface is nearest.
+  // From inside a solid primitive nearest() reports distance 0, whatever the radius, so the distance is
+  // checked here.
   const glm::dvec3 away = point - near.point;
   const double length = glm::length(away);
   if (!(length <= radius)) return false;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How far a point is from a rigid surface and which way is out of it, from within a solid too.
+// Signed distance to a rigid surface and the direction out of it, also from inside a solid.
 #pragma once
 
 #include <cstdint>
@@ -10,15 +10,14 @@
 namespace polygon {
 
 struct SignedDistance {
-  glm::dvec3 normal{0.0};  // unit, out of the solid; of a sheet, towards the point
-  double distance = 0.0;   // along it (unit: meter); negative within a solid
+  glm::dvec3 normal{0.0};  // unit, out of the solid; for a sheet, towards the point
+  double distance = 0.0;   // along the normal (unit: meter); negative inside a solid
   std::uint32_t element = 0;
 };
 
-// The nearest place of the surface within `radius` of the point (body frame). `known` is the normal that the
-// point had a moment ago, or zero: where the surface is still seen from that side, a mesh is not asked for
-// its inside, and on the surface itself, where there is no way out to be seen, it stays. False when nothing
-// is so near, or no normal is to be had.
+// The nearest place of the surface within `radius` of the point (body frame). `known` is the point's normal
+// at an earlier query, or zero. If the point is still on the side of `known`, inside() is not evaluated; on
+// the surface itself, `known` is kept. False if nothing is within `radius`, or no normal exists.
 [[nodiscard]] bool signed_distance(const RigidSurface& surface, const glm::dvec3& point, double radius,
                                    const glm::dvec3& known, SignedDistance& out) noexcept;
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a node's force costs in either energy, on one thread: a lattice that fits a cache and one that does
-// not.
+// Cost of the force on a node under either energy, on one thread, for a lattice that fits the cache and one
+// that does not.
 #include <benchmark/benchmark.h>
 
 #include <array>
@@ -90,7 +90,7 @@ void bricks_by_brick(benchmark::State& state) {
   field.report(state);
 }
 
-// The baseline: six links of one material.
+// Baseline: six links of one material.
 HYBRID_WIDE void six_link_row(const voxel::NodeField& field, std::size_t first, std::size_t count,
                               const std::array<float*, 3>& force) {
   for (std::size_t c = 0; c < 3; ++c) {

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// From a mesh file to the first touch: how long, and how much memory. A row a file, each in a process of its
-// own.
+// Time and memory from a mesh file to the first touch. One row per file, each measured in its own process.
 //
 //   bench_load [--threads N] [--unit METERS] FILE…   touches each from above, at its highest vertex
-//   bench_load --sphere EDGE FILE.ply                writes a sphere of 12·EDGE² triangles to be touched
+//   bench_load --sphere EDGE FILE.ply                writes a sphere of 12·EDGE² triangles
 //
-// `peak` is the most that the process ever had resident, `held` what it has at the first touch; `object` and
-// `map` are parts of `held` as the program itself accounts for them. `cpu` is the time of all threads
-// together.
+// `peak` is the largest resident memory of the process, and `held` the resident memory at the first touch.
+// `object` and `map` are parts of `held`, as the program accounts for them. `cpu` is the CPU time of all
+// threads.
 #include <sched.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -23,9 +22,9 @@
 #include <string_view>
 #include <vector>
 
-#include "hybrid/build/build_world.h"
 #include "hybrid/base/flush_to_zero.h"
 #include "hybrid/base/process_memory.h"
+#include "hybrid/build/build_world.h"
 #include "hybrid/session/session.h"
 #include "hybrid/tick/tick.h"
 #include "polygon/files/mesh_file.h"
@@ -34,7 +33,7 @@
 namespace {
 
 struct Options {
-  int threads = 0;  // processors to run on; 0: all
+  int threads = 0;  // processors to use; 0: all
   double unit_m = 1e-3;
 };
 

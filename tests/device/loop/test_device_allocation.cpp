@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Nothing that runs on the servo thread allocates. This program counts every call of operator new.
+// Nothing on the servo thread allocates. This program counts every call of operator new.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -10,15 +10,15 @@
 
 #include "device/loop/force_limit.h"
 #include "device/loop/passivity.h"
-#include "device/phantom/phantom_servo.h"
 #include "device/loop/servo_timer.h"
+#include "device/phantom/phantom_servo.h"
 #include "device/simulated/simulated.h"
 
 namespace {
 std::atomic<std::size_t> allocations{0};
 }  // namespace
 
-// Not inlined: where the compiler sees free() meet new it takes them for a mismatch.
+// Not inlined, because the compiler would report free() of memory from new as a mismatch.
 [[gnu::noinline]] void* operator new(std::size_t size) {
   ++allocations;
   if (void* memory = std::malloc(size == 0 ? 1 : size)) return memory;
@@ -58,7 +58,7 @@ TEST(DeviceAllocation, ATickOfEveryDeviceAllocatesNothing) {
         const device::DeviceState read = device->read();
         const glm::dvec3 force = limit_force({}, state, -500.0 * read.position_m, read, 1e-3);
         device->write(keep_passive({}, passive, force, read.position_m, 1e-3), 1e-3);
-        device->hold(1e-4);
+        device->delay(1e-4);
         (void)device->limits();
         (void)device->name();
         if (tick % 100 == 0) timer.wait();
@@ -68,7 +68,7 @@ TEST(DeviceAllocation, ATickOfEveryDeviceAllocatesNothing) {
   }
 }
 
-// The driver's callback, on a driver that does nothing: with errors, without, and when it ends.
+// A driver that does nothing, for the callback: with errors, without, and at its end.
 device::HdFunctions idle_driver() {
   device::HdFunctions call;
   call.begin_frame = [](unsigned) {};
@@ -96,8 +96,8 @@ TEST(DeviceAllocation, ATickOfTheRealDevicesCallbackAllocatesNothing) {
                              tick);
   const std::size_t before = allocations;
   for (int i = 0; i < 4000 && !servo.done(); ++i) {
-    if (i == 1000) servo.tell({device::hd::kWarmMotors, 0, 1});
-    if (i == 2000) servo.tell({device::hd::kExceededForce, 0, 1});
+    if (i == 1000) servo.report_error({device::hd::kWarmMotors, 0, 1});
+    if (i == 2000) servo.report_error({device::hd::kExceededForce, 0, 1});
     device::PhantomServo::on_tick(&servo);
   }
   EXPECT_EQ(allocations, before);

@@ -25,7 +25,7 @@ bool finite(const glm::dvec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
-// Commands of every size a double has, with NaN and infinities among them.
+// Commands of any magnitude that a double has, NaN and infinities included.
 glm::dvec3 wild_command(std::mt19937_64& random) {
   std::uniform_real_distribution<double> exponent(-320.0, 308.0), sign(-1.0, 1.0);
   std::uniform_int_distribution<int> kind(0, 39);
@@ -143,7 +143,8 @@ TEST(ForceLimit, LimitsThatMakeNoSenseLetNothingThrough) {
     const ForceLimits limits{.max_slew_N_per_s = bad, .soft_start_s = 0.0};
     EXPECT_EQ(limit_force(limits, state, {1.0, 1.0, 1.0}, 1e-3), glm::dvec3(0.0));
   }
-  for (const double bad_dt_s : {kNaN, -1.0, kInfinity}) {  // no time passes, so the force may not change
+  // No time passes, so the force must not change.
+  for (const double bad_dt_s : {kNaN, -1.0, kInfinity}) {
     ForceLimitState state;
     EXPECT_EQ(limit_force({.soft_start_s = 0.0}, state, {1.0, 1.0, 1.0}, bad_dt_s), glm::dvec3(0.0));
     EXPECT_EQ(state.elapsed_s, 0.0);
@@ -183,7 +184,7 @@ TEST(ForceLimit, AFaultOfTheDeviceLetsGoForAsLongAsItLasts) {
   }
 }
 
-// Hurled along by a force that never ends.
+// A force that never ends accelerates the tool.
 TEST(ForceLimit, NoMoreEnergyThanTheLimitIsHandedOutInAnyWindow) {
   std::mt19937_64 random(4);
   std::uniform_real_distribution<double> unit(-1.0, 1.0), dt(1e-4, 3e-3);
@@ -192,7 +193,7 @@ TEST(ForceLimit, NoMoreEnergyThanTheLimitIsHandedOutInAnyWindow) {
         .max_slew_N_per_s = kInfinity, .soft_start_s = 0.0, .max_energy_J = most_J, .energy_window_s = 0.05};
     ForceLimitState state;
     glm::dvec3 position(0.0), force(0.0);
-    std::vector<std::pair<double, double>> handed;  // when, J
+    std::vector<std::pair<double, double>> handed;  // time, energy (J)
     double now_s = 0.0, most_window_J = 0.0, most_tick_J = 0.0;
     for (int tick = 0; tick < 5000; ++tick) {
       const double dt_s = dt(random);

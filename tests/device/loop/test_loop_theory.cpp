@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The theory of the sampled wall, against what can be worked out by hand or is printed in papers.
+// The theory of the sampled wall against closed forms by hand and formulas from papers.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -12,9 +12,9 @@ namespace {
 
 using device::SampledLoop;
 
-// Without delay, wall damping and hand the map of (x, v) is 2 by 2 and its determinant says it all:
+// Without delay, wall damping and hand the map of (x, v) is a 2×2 matrix, and trace and determinant decide:
 //   x' = x + α·v − K·β·x,  v' = γ·v − K·α/m·x,  γ = e^(−bT/m), α = (1 − γ)·m/b, β = (T − α)/b.
-// det = 1 is the boundary by oscillation, 1 + trace + det = 0 that by alternation.
+// det = 1 is the boundary by oscillation, 1 + trace + det = 0 the boundary by alternation.
 double by_hand(double m, double b, double T) {
   const double gamma = std::exp(-b * T / m), alpha = -std::expm1(-b * T / m) * m / b, beta = (T - alpha) / b;
   const double spiral = alpha * alpha / m - gamma * beta;  // det = γ + K·(α²/m − γβ)
@@ -49,8 +49,8 @@ TEST(LoopStability, AMassThatHardlyCountsLeavesAnIntegrator) {
 }
 
 TEST(LoopStability, SlowLoopsFollowGil) {
-  // Gil, Sanchez, Hulin, Preusche & Hirzinger (2009): K < (b + B) / (T/2 + delay), for a mass that is large
-  // beside what the damping stops within a period.
+  // Gil, Sanchez, Hulin, Preusche & Hirzinger (2009): K < (b + B) / (T/2 + delay), if the mass is large
+  // compared with what the damping stops within a period.
   const double b = 0.4, T = 1e-3;
   for (const double B : {0.0, 1.0, 4.0}) {
     for (int d = 0; d <= 2; ++d) {
@@ -74,7 +74,8 @@ TEST(LoopStability, TooMuchSampledDampingIsUnstableByItself) {
             0.0);
 }
 
-// The mechanics step by step with a hand's spring, in the closed form of the underdamped oscillator.
+// Simulates the mechanics with a hand's spring step by step, with the closed form of the underdamped
+// oscillator.
 TEST(LoopStability, RadiusIsTheRateAtWhichAMotionGrows) {
   const double m = 0.08, b = 5.0, k_hand = 600.0, T = 1e-3, decay = 0.5 * b / m;
   const double omega = std::sqrt(k_hand / m - decay * decay);
@@ -103,7 +104,7 @@ TEST(LoopStability, RadiusIsTheRateAtWhichAMotionGrows) {
         const double rest = queue[delay] / k_hand, away = x - rest;
         x = rest + e * (away * (c + decay * s) + v * s);
         v = e * (v * (c - decay * s) - away * (k_hand / m) * s);
-        if (n % 100 == 99) {  // kept within range; the law is linear
+        if (n % 100 == 99) {  // rescaled; the law is linear
           const double scale = 1.0 / std::hypot(x * 300.0, v);
           log_size -= std::log(scale);
           for (double* value : {&x, &v, &before, &queue[0], &queue[1], &queue[2]}) *value *= scale;
@@ -144,7 +145,7 @@ TEST(LoopPassivity, LargestStiffnessIsTheInverse) {
             0.0);
 }
 
-// The formula as it is printed, with complex numbers, at each angle.
+// The published formula with complex numbers, angle by angle.
 TEST(LoopPassivity, AngleByAngleAsPrinted) {
   const double T = 2e-3, K = 1500.0, B = 1.2;
   for (int delay = 0; delay <= 3; ++delay) {

@@ -21,9 +21,9 @@ using device::PassivityOptions;
 using device::PassivityState;
 
 constexpr double kTick_s = 1e-3;
-constexpr double kSpare_J = 1e-7;  // as promised
+constexpr double kSpare_J = 1e-7;  // as the header guarantees
 
-// Counts for itself what goes out, and how much of it was ever given beyond one tick's worst.
+// Independent account of the energy given, and of its excess over one tick's worst.
 class Ledger {
  public:
   void tick(const glm::dvec3& position_m, const glm::dvec3& force_N) {
@@ -55,7 +55,7 @@ TEST(Passivity, RandomForcesOnRandomMotionsNeverGiveMoreThanOneTicksWorst) {
     const double way_m = std::pow(10.0, size(random));  // 0.1 µm to 4 mm a tick
     const double force_N = std::pow(10.0, 3.0 * unit(random));
     const double dt_s = run % 3 == 0 ? 1e-4 : run % 3 == 1 ? 1e-3 : 1e-2;
-    const bool chasing = run % 2 == 0;  // the worst tool there is goes along with the force, when it can
+    const bool chasing = run % 2 == 0;  // the worst case moves along with the force
     const double step_m = run % 5 == 0 ? 0.03e-3 : 0.0;
     if (way_m > 2.0 * dt_s) continue;  // no tool is that fast
     PassivityState state;
@@ -106,7 +106,7 @@ struct Press {
   std::uint64_t jumps = 0;
 };
 
-// Presses 8 mm into a wall at 50 mm/s, holds, twice.
+// Presses 8 mm into a wall at 50 mm/s and stays, twice.
 Press press(DeviceModel model, device::Grip grip, double stiffness, int delay_ticks, bool control) {
   device::SimulatedDeviceOptions options;
   options.mechanism = device::mechanism(model);
@@ -176,7 +176,7 @@ TEST(Passivity, AWallThatBuzzesIsHeldAsASofterOne) {
 }
 
 TEST(Passivity, WhereTheLoopIsPassiveItCostsLittle) {
-  // Under a just noticeable difference: 7 % of the 3 N that are pressed with.
+  // Less than a just noticeable difference: 7 % of the 3 N of pressing.
   for (const DeviceModel model : {DeviceModel::premium_1_5, DeviceModel::touch}) {
     for (const device::Grip grip : {device::Grip::loose, device::Grip::medium, device::Grip::firm}) {
       for (const double stiffness : {100.0, 300.0, 1000.0}) {
@@ -191,7 +191,7 @@ TEST(Passivity, WhereTheLoopIsPassiveItCostsLittle) {
 }
 
 TEST(Passivity, AForceThatIsPressedInAndHandedBackPassesUnchangedWhereNothingIsLostToSampling) {
-  // Friction alone: always against the motion, so never anything to take.
+  // Friction alone opposes every motion, so there is nothing to remove.
   PassivityState state;
   double x = 0.0;
   for (int tick = 0; tick < 3000; ++tick) {
@@ -206,7 +206,7 @@ TEST(Passivity, AForceThatIsPressedInAndHandedBackPassesUnchangedWhereNothingIsL
 }
 
 TEST(Passivity, AForceThatLostItsFirstTickComesBackWithinThreeMillimetres) {
-  // Thrown back by one encoder step at the very beginning, and pressed in after that.
+  // The tool is thrown back by one encoder step at the very start, and then pressed in.
   PassivityState state;
   const auto wall = [](double x) { return glm::dvec3(x < 0.0 ? -1000.0 * x : 0.0, 0, 0); };
   const PassivityOptions options{.resolution_m = 0.03e-3};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The loop on the calling thread: simulated devices.
+// The loop on the calling thread, with simulated devices.
 #include "device/loop/servo_loop.h"
 
 #include <gtest/gtest.h>

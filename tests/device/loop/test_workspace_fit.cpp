@@ -13,13 +13,13 @@ using device::WorkspaceFit;
 const Box kTouch{{-0.08, -0.06, -0.035}, {0.08, 0.06, 0.035}};
 
 TEST(WorkspaceFit, TheFramesDifferByAQuarterTurn) {
-  // Right is right, up is up, and towards the user is towards the user: against the scene's y.
+  // Right stays right and up stays up; towards the user is the scene's −y.
   EXPECT_EQ(device::device_to_scene_axes({1, 0, 0}), glm::dvec3(1, 0, 0));
   EXPECT_EQ(device::device_to_scene_axes({0, 1, 0}), glm::dvec3(0, 0, 1));
   EXPECT_EQ(device::device_to_scene_axes({0, 0, 1}), glm::dvec3(0, -1, 0));
   const glm::dvec3 a(0.3, -1.2, 2.5), b(-0.7, 0.4, 1.1);
   EXPECT_EQ(device::scene_to_device_axes(device::device_to_scene_axes(a)), a);
-  // A rotation: lengths, angles and handedness stay.
+  // A rotation: lengths, angles and handedness are kept.
   EXPECT_DOUBLE_EQ(glm::dot(device::device_to_scene_axes(a), device::device_to_scene_axes(b)),
                    glm::dot(a, b));
   EXPECT_EQ(glm::cross(device::device_to_scene_axes({1, 0, 0}), device::device_to_scene_axes({0, 1, 0})),
@@ -38,13 +38,13 @@ TEST(WorkspaceFit, ASceneThatIsTooLargeIsToldAndCanBeFitted) {
   const Box wanted{{-0.1, -0.07, 0.0}, {0.1, 0.07, 0.06}};  // 200 x 140 x 60 mm, the device 160 x 70 x 120
   EXPECT_FALSE(covers(fit_workspace(kTouch, wanted, 1.0), kTouch, wanted));
   const WorkspaceFit fitted = fit_workspace(kTouch, wanted, {});
-  EXPECT_DOUBLE_EQ(fitted.scale, 2.0);  // of 140 mm over 70
+  EXPECT_DOUBLE_EQ(fitted.scale, 2.0);  // 140 mm over 70 mm
   EXPECT_TRUE(covers(fitted, kTouch, wanted));
-  // A small scene is not blown up: that is for the user to ask.
+  // A small scene is not enlarged unless the user asks for it.
   EXPECT_EQ(fit_workspace(kTouch, {{0, 0, 0}, {0.01, 0.01, 0.01}}, {}).scale, 1.0);
 }
 
-// Power is the same on both sides where motion is made larger, and nowhere is the force.
+// Where motion is enlarged, power is equal on both sides; the force is enlarged nowhere.
 TEST(WorkspaceFit, ForcesAreNeverMadeLarger) {
   const glm::dvec3 force(1, -2, 3), velocity(0.1, 0.3, -0.2);
   for (const double scale : {0.1, 0.5, 1.0, 2.0, 10.0}) {
@@ -58,7 +58,7 @@ TEST(WorkspaceFit, ForcesAreNeverMadeLarger) {
     }
     EXPECT_GE(hand_W * scene_W, 0.0) << scale;
   }
-  // The stiffness that the hand feels: of a scene's 1000 N/m no more than that.
+  // The hand feels at most the scene's 1000 N/m.
   for (const double scale : {0.5, 1.0, 4.0}) {
     WorkspaceFit fit;
     fit.scale = scale;

@@ -38,7 +38,7 @@ class PathFile : public testing::Test {
     std::ofstream(file, std::ios::binary) << text;
     return {.file = file};
   }
-  // What reading says when it refuses; empty when it does not.
+  // The error text of reading; empty if the file is accepted.
   static std::string refusal(const CsvPath& path) {
     try {
       read_trajectory(path);
@@ -69,7 +69,7 @@ TEST_F(PathFile, WithoutAUnitTheCallersHolds) {
   const Trajectory read = read_trajectory(path);
   EXPECT_LE(glm::length(read.position_m[0] - glm::dvec3(1.001, 0.002, 0.003)), 1e-15);
   EXPECT_THAT(read.notes, IsEmpty());
-  // A unit that is named but not known is not passed over in silence.
+  // An unknown unit is reported, not ignored.
   EXPECT_THAT(read_trajectory(csv("t,x_inch,y_m,z_m\n0,1,2,3\n")).notes, ElementsAre(HasSubstr("x_inch")));
 }
 
@@ -156,7 +156,7 @@ TEST(PathFileData, RecordedTrajectoriesAreFollowed) {
     std::size_t samples;
     double duration_s;
     glm::dvec3 first_m, range_m;
-    double longest_gap_s;  // 0: none to be reported
+    double longest_gap_s;  // 0: no gap expected
   };
   const Expected recordings[] = {
       {"desk_taurus_S3_T2_right.csv.gz",

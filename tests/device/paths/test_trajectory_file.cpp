@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Measured trajectories: what each layout is taken for, and what is refused.
+// Measured trajectories: how each layout is interpreted, and what is refused.
 #include "device/paths/trajectory_file.h"
 
 #include <gmock/gmock.h>
@@ -73,7 +73,7 @@ TEST(TrajectoryFile, AHeaderACommentOrTheUserNamesTheColumns) {
       read("g.traj", "9 1 2 3 4 5 6\n", {.columns = "-,fx_N,fy_N,fz_N,x_m,y_m,z_m", .on_object = true});
   EXPECT_EQ(user.position_m[0], glm::dvec3(4, 5, 6));
   EXPECT_EQ(user.force_N[0], glm::dvec3(-1, -2, -3));
-  // A trace of this program is a measurement too.
+  // A trace of this program can be read as a measurement.
   const auto trace = read("h.csv",
                           "t_s,device_x_m,device_y_m,device_z_m,proxy_x_m,force_x_N,force_y_N,force_z_N\n"
                           "0,1,2,3,9,4,5,6\n");
@@ -106,7 +106,7 @@ TEST(TrajectoryFile, WhatDoesNotFitIsRefusedWithItsPlace) {
 TEST(TrajectoryFile, GapsAndRepeatedTimesAreToldAndGapsAreNoMeasurement) {
   std::string text = "t_s,x_m,y_m,z_m,fx_N,fy_N,fz_N\n";
   for (int i = 0; i < 20; ++i) text += std::to_string(0.001 * i) + ",0,0,0,1,0,0\n";
-  text += "0.019,0,0,0,3,0,0\n";  // again
+  text += "0.019,0,0,0,3,0,0\n";  // repeated time
   for (int i = 0; i < 20; ++i) text += std::to_string(0.5 + 0.001 * i) + ",0,0,0,1,0,0\n";
   const auto found = read("r.csv", text);
   ASSERT_EQ(found.notes.size(), 2U);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A PHANToM on the double of its driver's library.
+// A PHANToM on the test double of its driver's library.
 #pragma once
 
 #include <dlfcn.h>
@@ -32,7 +32,8 @@ class PhantomRig {
     return options;
   }
 
-  // Opens, serves `ticks` ticks of a steady 2 N upwards in the scene (device y), and closes.
+  // Opens the device, serves `ticks` ticks with a constant 2 N upwards in the scene (device y), and closes
+  // it.
   device::ServoReport serve(std::uint64_t ticks) const { return serve(ticks, options()); }
   device::ServoReport serve(std::uint64_t ticks, const device::PhantomOptions& with) const {
     const auto phantom = device::open_phantom(with);
@@ -43,12 +44,12 @@ class PhantomRig {
     return device::run_servo(*phantom, {}, push);
   }
 
-  // The strength of each force that was given, and the tick it belongs to.
+  // Magnitude of the i-th force that was sent, and the tick that it belongs to.
   [[nodiscard]] double given_N(std::size_t i) const {
     const auto& f = hd->forces.at(i).newton;
     return std::hypot(f[0], f[1], f[2]);
   }
-  // Of the last frame of a tick.
+  // In the last frame of a tick.
   [[nodiscard]] double at_tick_N(std::uint64_t tick) const {
     double found = -1.0;
     for (std::size_t i = 0; i < hd->forces.size(); ++i) {
@@ -74,7 +75,7 @@ inline std::string all(const std::vector<std::string>& messages) {
   return text;
 }
 
-// What `call` refuses with; empty when it does not.
+// The error text of `call`; empty if it throws nothing.
 template <typename Call>
 std::string refusal(const Call& call) {
   try {

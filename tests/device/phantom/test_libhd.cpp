@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Every way in which the driver's library can be missing says what to do.
+// For every way in which the driver's library can be missing, the error says what to do.
 #include "device/phantom/libhd.h"
 
 #include <gmock/gmock.h>
@@ -48,7 +48,7 @@ TEST(LibHd, ANamedOneThatIsNotThereIsNotReplacedByAnother) {
   const std::string words = refusal([] { (void)device::load_libhd(); });
   EXPECT_THAT(words, HasSubstr("/nowhere/libHD.so (named by HYBRID_LIBHD)"));
   EXPECT_THAT(words, HasSubstr("correct the path"));
-  // What the program was told comes before what the environment says.
+  // An explicit file takes precedence over the environment.
   EXPECT_EQ(device::load_libhd(FAKE_LIBHD).file, FAKE_LIBHD);
 }
 
@@ -81,7 +81,7 @@ TEST(HdErrors, EachHasItsNameAndARemedy) {
     EXPECT_NE(text.fault, device::DeviceFault::none) << code;
   }
   EXPECT_EQ(device::hd_error_text(0).outcome, device::HdOutcome::none);
-  // Only what a hand or a setting can mend comes back by itself.
+  // Only faults that a hand or a setting can remedy recover by themselves.
   for (const unsigned code : {0x200U, 0x201U, 0x202U, 0x203U, 0x204U}) {
     EXPECT_EQ(device::hd_error_text(code).outcome, device::HdOutcome::rest) << code;
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A PHANToM on the double of its library, when all goes well.
+// A PHANToM on the test double of its library, in normal operation.
 #include "device/phantom/phantom.h"
 
 #include <gmock/gmock.h>
@@ -25,7 +25,7 @@ TEST(Phantom, SaysWhatItIs) {
   EXPECT_EQ(info.driver_version, "double 1.0");
   EXPECT_EQ(info.firmware, 192.0);
   EXPECT_TRUE(info.calibrated);
-  EXPECT_DOUBLE_EQ(info.workspace.high_m.x, 0.08);  // told in millimeters
+  EXPECT_DOUBLE_EQ(info.workspace.high_m.x, 0.08);  // reported in millimeters
   EXPECT_TRUE(info.notes.empty());
   EXPECT_EQ(phantom->limits().max_force_N, 3.3);
   EXPECT_DOUBLE_EQ(phantom->limits().workspace_m.y, 0.12);
@@ -170,13 +170,13 @@ TEST(Phantom, AMillionTicksWithoutAFault) {
     const auto phantom = device::open_phantom(rig.options());
     std::uint64_t n = 0;
     auto wall = [&](const ServoInput& input) {
-      // The double's hand in closed form: 20 mm at 1 Hz, up and down.
+      // Motion of the double's hand in closed form: 20 mm at 1 Hz, vertically.
       const double expected_m = 0.02 * std::sin(2.0 * std::numbers::pi * 1e-3 * static_cast<double>(n));
       worst_m = std::max(worst_m, std::abs(input.device.position_m.z - expected_m));
       const double z = input.device.position_m.z;
       return ServoAnswer{.force_N = {0, 0, z < 0 ? -100.0 * z : 0.0}, .go_on = ++n < kTicks};
     };
-    // The clock begins with the first tick.
+    // The clock starts with the first tick.
     report = device::run_servo(*phantom, {}, wall);
   }
   EXPECT_EQ(report.end, device::ServoEnd::finished);

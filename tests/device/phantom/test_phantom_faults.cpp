@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What can go wrong with a PHANToM, one by one. Each ends in zero force within one tick, and in a message
-// that says what to do.
+// Faults of a PHANToM, one by one. Each leads to zero force within one tick, and to a message that says what
+// to do.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -15,9 +15,9 @@ namespace {
 using testing::HasSubstr;
 using tests::PhantomRig;
 
-constexpr std::uint64_t kAt = 2000;  // long after the ramp: the force is whole until then
+constexpr std::uint64_t kAt = 2000;  // long after the ramp, so that the full force acts until then
 
-// ---- before any force was given
+// ---- before any force was sent
 struct OpeningFault {
   std::string name;
   std::function<void(FakeHd&)> happen;
@@ -80,7 +80,7 @@ TEST(PhantomOpens, OneFailureIsTriedAgain) {
     rig.hd->failing_inits = failures;
     EXPECT_EQ(rig.serve(1000).ticks, 1000U) << failures;
   }
-  const PhantomRig rig;  // a device that was named has one name only
+  const PhantomRig rig;  // a named device has only that name
   rig.hd->failing_inits = 1;
   device::PhantomOptions options = rig.options();
   options.open.name = "left";
@@ -108,12 +108,12 @@ TEST(PhantomOpens, AnEncoderResetIsDoneWhenTheHandHoldsTheArm) {
   EXPECT_EQ(rig.hd->updates, std::vector<unsigned>{1});
 }
 
-// ---- while forces are given
+// ---- while forces are sent
 struct RunningFault {
   std::string name;
   std::function<void(FakeHd&)> happen;
-  bool ends = false;          // the session; else the force comes back
-  std::uint64_t zero_by = 0;  // ticks after it happened
+  bool ends = false;          // the session ends; false: the force returns
+  std::uint64_t zero_by = 0;  // ticks after the fault
   std::string what, remedy;
 };
 std::ostream& operator<<(std::ostream& out, const RunningFault& fault) {
@@ -199,7 +199,7 @@ INSTANTIATE_TEST_SUITE_P(
                      "1 positions were not numbers", "check the cable"}),
     [](const auto& fault) { return fault.param.name; });
 
-// A session that goes on is told where the tool truly was, and never what is no number.
+// A session that continues sees only valid positions.
 TEST(PhantomRuns, APositionThatIsNoNumberIsNotSeen) {
   const PhantomRig rig;
   rig.hd->nan_at = 5;
@@ -233,7 +233,8 @@ TEST(PhantomRuns, AFaultIsToldToTheTickWhileItLasts) {
   EXPECT_EQ(seen.back(), device::DeviceFault::none);
 }
 
-// A driver whose thread died takes no force from its own thread any more; what can be done from ours is.
+// If the driver's thread has died, its last force is not replaced from there. The session sends zero from its
+// own thread.
 TEST(PhantomRuns, ASilentDriverEndsTheSession) {
   const PhantomRig rig;
   rig.hd->silent_at = kAt;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A session that is told to stop, or crashes, lets go of the motors.
+// A session that is told to stop, or that crashes, ends with zero force.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/mman.h>
@@ -40,8 +40,8 @@ TEST(PhantomSignals, InterruptAndTerminateEndTheSessionWithZeroForce) {
   }
 }
 
-// What a child process, which dies of it, last gave to the motors; `crash` is called with the number of the
-// tick, on the servo thread, and beside it on the child's main thread where `from_main` says so.
+// The last force that a child process sent to the motors before it died of a crash. `crash` is called after
+// 100 ticks: on another thread of the child if `from_main` is set, otherwise on the servo thread.
 double last_force_of_crash(void (*crash)(), bool from_main, int& died_of) {
   void* page =
       mmap(nullptr, sizeof(std::atomic<double>), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
@@ -65,13 +65,14 @@ double last_force_of_crash(void (*crash)(), bool from_main, int& died_of) {
       }
       return device::ServoAnswer{.force_N = {0, 0, 1}};
     };
-    // Another thread of the session, as the window's would be.
+    // Another thread of the session, such as the window's.
     const std::jthread other([&] {
       while (!go) usleep(500);
-      if (last->load() < 0.9) _exit(3);  // no force was given: the test would show nothing
+      if (last->load() < 0.9) _exit(3);  // no force was sent, so the test would show nothing
       crash();
     });
-    device::run_servo(*phantom, {.deadline_s = 60.0}, push);  // a busy machine is not what is tested
+    // A long deadline, because a busy machine is not the subject.
+    device::run_servo(*phantom, {.deadline_s = 60.0}, push);
     _exit(4);
   }
   int status = 0;
@@ -90,7 +91,7 @@ TEST(PhantomSignals, ACrashBesideTheServoThreadEndsInZeroForce) {
   EXPECT_EQ(died_of, SIGABRT);
 }
 
-// The frame that was open is ended with zero; whether a real driver still sends it is not in our hands.
+// The open frame ends with zero force. Whether a real driver still sends it cannot be influenced.
 TEST(PhantomSignals, ACrashOfTheServoThreadEndsItsFrameWithZero) {
   int died_of = 0;
   EXPECT_EQ(last_force_of_crash([] { std::abort(); }, false, died_of), 0.0);

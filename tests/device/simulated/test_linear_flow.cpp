@@ -23,8 +23,8 @@ Matrix product(const Matrix& a, const Matrix& b) {
   return c;
 }
 
-// exp of [[0 1 0] [−q −p 1] [0 0 0]]·t: another way to the same figures, by halving the time until the series
-// is short, with 11 more bits.
+// exp of [[0 1 0] [−q −p 1] [0 0 0]]·t, an independent computation: the time is halved until the series is
+// short, with 11 more bits.
 Matrix by_squaring(long double p, long double q, long double t) {
   int halvings = 0;
   while ((p + std::sqrt(q) + 1.0L) * t > 0.01L) {
@@ -47,7 +47,7 @@ Matrix by_squaring(long double p, long double q, long double t) {
 }
 
 TEST(LinearFlow, IsTheMatrixExponential) {
-  // Through every branch: short, oscillating, near critical (0.081 kg, 600 N/m: 13.94 N·s/m), overdamped.
+  // Covers every branch: short, oscillating, near critical (0.081 kg, 600 N/m: 13.94 N·s/m), overdamped.
   for (const double mass : {0.02, 0.081, 5.0}) {
     for (const double stiffness : {0.0, 1e-6, 1.0, 255.0, 600.0, 25e3, 1e6}) {
       const double critical = 2.0 * std::sqrt(mass * stiffness);
@@ -56,11 +56,10 @@ TEST(LinearFlow, IsTheMatrixExponential) {
         for (const double time : {1e-9, 2e-5, 1e-4, 1e-3, 3e-3, 1e-2, 0.03, 0.1}) {
           const LinearFlow flow = linear_flow(mass, damping, stiffness, time);
           const Matrix exact = by_squaring(damping / mass, stiffness / mass, time);
-          // Beside the size that each has in the time: where it passes through zero there is nothing to
-          // divide by.
-          const double sum_error = std::abs(static_cast<double>(flow.from_pull_s2 - exact[0][2]));
-          const double speed_error = std::abs(static_cast<double>(flow.from_speed_s - exact[0][1]));
-          const double keep_error = std::abs(static_cast<double>(flow.keep - exact[1][1]));
+          // Relative to the size that each coefficient has over the time, because each passes through zero.
+          const double sum_error = std::abs(static_cast<double>(flow.from_acceleration_s2 - exact[0][2]));
+          const double speed_error = std::abs(static_cast<double>(flow.from_velocity_s - exact[0][1]));
+          const double keep_error = std::abs(static_cast<double>(flow.velocity_factor - exact[1][1]));
           ASSERT_LE(sum_error, 1e-12 * std::abs(static_cast<double>(exact[0][2])))
               << mass << ' ' << stiffness << ' ' << damping << ' ' << time;
           ASSERT_LE(speed_error, 1e-12 * time) << mass << ' ' << stiffness << ' ' << damping << ' ' << time;
@@ -76,15 +75,15 @@ TEST(LinearFlow, TheExtremesAreFinite) {
     for (const double damping : {0.0, 1e-300, 1e150}) {
       for (const double time : {1e-300, 1e-3, 1e12}) {
         const LinearFlow flow = linear_flow(0.08, damping, stiffness, time);
-        EXPECT_TRUE(std::isfinite(flow.from_speed_s) && std::isfinite(flow.keep))
+        EXPECT_TRUE(std::isfinite(flow.from_velocity_s) && std::isfinite(flow.velocity_factor))
             << stiffness << ' ' << damping << ' ' << time;
-        EXPECT_LE(std::abs(flow.keep), 1.0 + 1e-9);
+        EXPECT_LE(std::abs(flow.velocity_factor), 1.0 + 1e-9);
       }
     }
   }
   const LinearFlow none = linear_flow(0.08, 5.0, 600.0, 0.0);
-  EXPECT_EQ(none.keep, 1.0);
-  EXPECT_EQ(none.from_speed_s, 0.0);
+  EXPECT_EQ(none.velocity_factor, 1.0);
+  EXPECT_EQ(none.from_velocity_s, 0.0);
 }
 
 }  // namespace

@@ -33,7 +33,7 @@ std::shared_ptr<const Path> leg(const glm::dvec3& from, const glm::dvec3& to, do
   return make_path(WaypointPath{.points = {{from, 0.0}, {to, 0.0}}, .speed_m_per_s = speed});
 }
 
-// A wall at z = 0, one-sided, as the simplest environment there is.
+// The simplest environment: a one-sided wall at z = 0.
 glm::dvec3 wall(const DeviceState& state, double stiffness) {
   return {0.0, 0.0, state.position_m.z < 0.0 ? -stiffness * state.position_m.z : 0.0};
 }
@@ -79,7 +79,7 @@ TEST(SimulatedDevice, TheHandGivesWayByForceOverStiffnessAndMotorsSaturate) {
   const HandModel hand{.mass_kg = 0.006, .damping_N_s_per_m = 5.0, .stiffness_N_per_m = 600.0};
   for (const DeviceModel model : {DeviceModel::premium_1_5, DeviceModel::touch}) {
     const device::DeviceLimits limits = device_limits(model);
-    // Friction holds the tool anywhere within its own stretch of the spring.
+    // Friction holds the tool anywhere within friction / stiffness.
     const double tolerance = limits.friction_N / hand.stiffness_N_per_m + limits.resolution_m;
     for (const double force_N : {1.0, 3.0, 100.0, 1e6}) {
       const auto device = make_simulated_device(model, hand, stay_at({0, 0, 0}));
@@ -108,10 +108,10 @@ TEST(SimulatedDevice, TheVelocityEstimateIsTheMeanOfTheLastMillisecondsWithinAnE
   for (int tick = 0; tick < 1000; ++tick) device->write({0, 0, 0}, kTick_s);
   for (int tick = 0; tick < 500; ++tick) {
     device->write({0, 0, 0}, kTick_s);
-    // 0.03 mm in 8 ms: what an encoder can tell of a speed.
+    // 0.03 mm in 8 ms is the velocity resolution of the encoder.
     ASSERT_NEAR(device->read().velocity_m_per_s.x, 0.1, 0.03e-3 / 8e-3 + 1e-6);
   }
-  for (int tick = 0; tick < 3000; ++tick) device->write({0, 0, 0}, kTick_s);  // the path's end
+  for (int tick = 0; tick < 3000; ++tick) device->write({0, 0, 0}, kTick_s);  // to the end of the path
   EXPECT_EQ(device->read().velocity_m_per_s, glm::dvec3(0.0)) << "at rest there is no speed left over";
 }
 
@@ -125,7 +125,8 @@ TEST(SimulatedDevice, TheVelocityEstimateHoldsAtAnyRateAndAfterStalls) {
 }
 
 TEST(SimulatedDevice, ASoftWallIsHeldAndAFarTooStiffOneBuzzes) {
-  // The loop is closed: the hand presses 10 mm into walls on both sides of what a sampled loop can render.
+  // Closed loop: the hand presses 10 mm into walls below and above the stiffness that a sampled loop can
+  // render.
   const auto unrest_m = [](double stiffness) {
     const auto device =
         make_simulated_device(DeviceModel::premium_1_5, {}, leg({0, 0, 0.01}, {0, 0, -0.01}, 0.05));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the simulated device does to a loop: the boundary of its stability, delay, watchdog, slew, tremor.
+// Effects of the simulated device on a loop: stability boundary, delay, watchdog, slew rate, tremor.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -30,8 +30,8 @@ SimulatedDeviceOptions linear(double mass_kg = 0.075) {
   return options;
 }
 
-// How much larger the swing about its mean is at the end of `ticks` than at their beginning, against a spring
-// of `stiffness` on both sides that is struck once.
+// Growth of an oscillation over `ticks`: the ratio of the swing about its mean at the end to that at the
+// start, after one impulse against a two-sided spring of `stiffness`.
 double growth(const SimulatedDeviceOptions& options, double stiffness, double dt_s, int ticks) {
   const auto device = make_simulated_device(options, stay_at({0, 0, 0}));
   double early = 0.0, late = 0.0;
@@ -46,13 +46,14 @@ double growth(const SimulatedDeviceOptions& options, double stiffness, double dt
   return late / early;
 }
 
-// The stiffness at which the determinant of the sampled loop's 2×2 matrix passes 1 (Jury), where the mass
-// swings between samples.
+// The stiffness at which the determinant of the sampled loop's 2×2 matrix exceeds 1 (Jury), if the mass
+// oscillates between samples.
 double unstable_above(const SimulatedDeviceOptions& options, double dt_s) {
   const double mass = options.mechanism.apparent_mass_kg + options.hand.mass_kg;
   const double damping = options.hand.damping_N_s_per_m + options.mechanism.viscous_N_s_per_m;
   const device::LinearFlow f = device::linear_flow(mass, damping, options.hand.stiffness_N_per_m, dt_s);
-  return (1.0 - f.keep) * mass / (f.from_speed_s * f.from_speed_s - f.from_pull_s2 * f.keep) -
+  return (1.0 - f.velocity_factor) * mass /
+             (f.from_velocity_s * f.from_velocity_s - f.from_acceleration_s2 * f.velocity_factor) -
          options.hand.stiffness_N_per_m;
 }
 
@@ -103,28 +104,28 @@ TEST(SimulatedLoop, DelayMakesTheWallUnstableEarlier) {
 }
 
 TEST(SimulatedLoop, TheWatchdogLetsGoOfTheMotors) {
-  // Pushed for 5 ms of a 50 ms stall, and free after that: the same as being told so.
+  // Pushed for the first 5 ms of a 50 ms stall and free afterwards, as if so commanded.
   SimulatedDeviceOptions options;
   options.watchdog_s = 5e-3;
   const auto watched = make_simulated_device(options, stay_at({0, 0, 0}));
   watched->write({0, 0, 4}, 50e-3);
   options.watchdog_s.reset();
-  const auto told = make_simulated_device(options, stay_at({0, 0, 0}));
-  told->write({0, 0, 4}, 5e-3);
-  told->write({0, 0, 0}, 45e-3);
-  EXPECT_EQ(watched->read().position_m, told->read().position_m);
-  // A late tick is the same as a long one, and the next write ends the silence.
+  const auto commanded = make_simulated_device(options, stay_at({0, 0, 0}));
+  commanded->write({0, 0, 4}, 5e-3);
+  commanded->write({0, 0, 0}, 45e-3);
+  EXPECT_EQ(watched->read().position_m, commanded->read().position_m);
+  // A late tick equals a long one, and the next write restarts the watchdog.
   options.watchdog_s = 5e-3;
   const auto late = make_simulated_device(options, stay_at({0, 0, 0}));
   late->write({0, 0, 4}, 1e-3);
-  late->hold(49e-3);
-  EXPECT_LE(glm::length(late->read().position_m - told->read().position_m), 0.03e-3);
+  late->delay(49e-3);
+  EXPECT_LE(glm::length(late->read().position_m - commanded->read().position_m), 0.03e-3);
   const double before = late->read().position_m.z;
   late->write({0, 0, 4}, 5e-3);
   EXPECT_GT(late->read().position_m.z, before + 0.1e-3);
-  late->hold(-1.0);
-  late->hold(std::nan(""));
-  // Without one the force stays.
+  late->delay(-1.0);
+  late->delay(std::nan(""));
+  // Without a watchdog the force stays.
   options.watchdog_s.reset();
   const auto pushed = make_simulated_device(options, stay_at({0, 0, 0}));
   pushed->write({0, 0, 4}, 0.5);
@@ -145,7 +146,7 @@ TEST(SimulatedLoop, AmplifiersAreAsFastAsTheySay) {
 }
 
 TEST(SimulatedLoop, TremorShakesTheToolAsItsHandAllows) {
-  // At 10 Hz the hand's spring and damper move the tool almost as they are moved: (k + iωd)/(k − mω² + iωd).
+  // Transfer function from target to tool at 10 Hz: (k + iωd)/(k − mω² + iωd), close to 1.
   SimulatedDeviceOptions options = linear();
   options.tremor = {.amplitude_m = 1e-4, .frequency_hz = 10.0};
   const auto device = make_simulated_device(options, stay_at({0.1, 0.2, 0.3}));
@@ -159,7 +160,7 @@ TEST(SimulatedLoop, TremorShakesTheToolAsItsHandAllows) {
   }
   const double w = 2.0 * M_PI * 10.0, m = 0.081;
   const double gain = std::hypot(600.0, w * 5.0) / std::hypot(600.0 - m * w * w, w * 5.0);
-  // The target goes straight within a tick, which cuts the circle's corners by (ωT)²/12.
+  // The target moves straight within a tick, which shortens the radius by (ωT)²/12.
   EXPECT_NEAR(least, gain * 1e-4, 1e-3 * gain * 1e-4);
   EXPECT_NEAR(most, gain * 1e-4, 1e-3 * gain * 1e-4);
 }

@@ -73,8 +73,8 @@ TEST(ToolMechanics, AMovingTargetIsFollowedWithoutALagAtConstantSpeed) {
   EXPECT_NEAR(motion.velocity_m_per_s.x, 0.1, 1e-9);
 }
 
-// A brisk hand that circles, is pushed aside by the motors and jumps, with each device's friction: the
-// furthest that the tool is from where steps of half the length put it.
+// A brisk hand that circles and jumps, with motors that push aside. Returns the largest change of the tool's
+// position when the substep is halved.
 double changed_by_halving_m(double mass_kg, double coulomb_N, double substep_s) {
   const ToolMechanics mechanics{.mass_kg = mass_kg,
                                 .viscous_N_s_per_m = 0.005,
@@ -98,7 +98,7 @@ double changed_by_halving_m(double mass_kg, double coulomb_N, double substep_s) 
 }
 
 TEST(ToolMechanics, HalvingTheSubstepChangesNothingThatMatters) {
-  // The steps of the encoders are 30 µm (with 0.04 N) and 55 µm.
+  // The encoder steps are 30 µm (0.04 N) and 55 µm (0.26 N).
   EXPECT_LT(changed_by_halving_m(0.081, 0.04, device::kToolSubstep_s), 0.005e-6);
   EXPECT_LT(changed_by_halving_m(0.051, 0.26, device::kToolSubstep_s), 0.05e-6);
   for (const auto& [mass_kg, coulomb_N] : {std::pair{0.081, 0.04}, std::pair{0.051, 0.26}}) {
@@ -112,7 +112,7 @@ TEST(ToolMechanics, HalvingTheSubstepChangesNothingThatMatters) {
 }
 
 TEST(ToolMechanics, AlongALineTheSubstepHardlyMatters) {
-  // Stops, holds and turns included: only a stop's moment depends on it.
+  // With stops, sticking and reversals: only the moment of a stop depends on the substep.
   const ToolMechanics mechanics{.mass_kg = 0.051,
                                 .viscous_N_s_per_m = 0.005,
                                 .coulomb_N = 0.26,
@@ -149,15 +149,16 @@ TEST(ToolMechanics, ATargetThatMovesAwayTakesTheToolAlongWhenItPullsMoreThanFric
     }
     for (; t < 0.1 - 1e-9; t += dt_s)
       integrator.advance(motion, t * speed, (t + dt_s) * speed, {0, 0, 0}, dt_s);
-    // From there on linear, with friction constant: rest, pulled by what grows beyond 0.26 N.
+    // From then on linear, with constant friction: starts at rest, pulled by the growth beyond 0.26 N.
     const device::LinearFlow flow = device::linear_flow(0.081, 5.0, 600.0, t - gives_way_s);
-    const double went_m = 0.01 * (flow.time_s - flow.from_speed_s) - flow.from_pull_s2 * 5.0 * 0.01 / 0.081;
+    const double went_m =
+        0.01 * (flow.time_s - flow.from_velocity_s) - flow.from_acceleration_s2 * 5.0 * 0.01 / 0.081;
     EXPECT_LE(glm::length(motion.position_m - went_m * glm::normalize(speed)), 1e-12) << dt_s;
   }
 }
 
 TEST(ToolMechanics, CoulombFrictionStopsASlideWhereItsEnergyIsSpent) {
-  // Nobody holds the tool: ½·m·v² = f·distance, in a straight line, and then rest to the last bit.
+  // Without a hand: ½·m·v² = f·distance along a straight line, and then rest to the last bit.
   const ToolMechanics loose{.mass_kg = 0.075, .coulomb_N = 0.04};
   ToolMotion motion;
   motion.velocity_m_per_s = {0.06, -0.08, 0.0};
@@ -184,7 +185,7 @@ TEST(ToolMechanics, BelowTheFrictionNothingCreepsAndAboveItEverythingMoves) {
   mechanics.coulomb_N = 0.26;
   ToolMotion motion;
   for (int tick = 0; tick < 5000; ++tick) {
-    // Together 0.24 N: from the hand 0.1 N, from the motors 0.22 N at a right angle.
+    // 0.24 N in total: 0.1 N from the hand and 0.22 N from the motors, at a right angle.
     advance_about(mechanics, motion, {0.1 / 600.0, 0, 0}, {0, 0.22, 0}, kTick_s);
     ASSERT_EQ(motion.position_m, glm::dvec3(0.0));
   }
@@ -193,7 +194,8 @@ TEST(ToolMechanics, BelowTheFrictionNothingCreepsAndAboveItEverythingMoves) {
 }
 
 TEST(ToolMechanics, NoEnergyComesFromNothing) {
-  // Hand's target at rest, no motor: kinetic and spring energy never rise, from the softest to the stiffest.
+  // With the target at rest and no motor force, kinetic plus spring energy never rises, for soft and stiff
+  // springs.
   std::mt19937_64 random(7);
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
   for (const double stiffness : {0.0, 1.0, 600.0, 25e3, 1e7}) {

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Fuzzes mesh files: fuzz_mesh --seconds N --seed S [--keep DIR] [FILE…]. Files named are tried as they are,
-// and nothing else is done. Otherwise inputs are mutated in batches, each in a process of its own: one that
-// crashes, breaks a promise or takes too long is written to DIR, and the next batch goes on. What behaves as
-// nothing before it did (other findings, another refusal) becomes an input to mutate further. The same seed
-// makes the same inputs. Build it with the sanitizers (preset asan), or their half of the promises is not
-// looked at.
+// Fuzzes mesh files: fuzz_mesh --seconds N --seed S [--keep DIR] [FILE…]. Named files are tried unchanged,
+// and nothing else is done. Otherwise inputs are mutated in batches, each in its own process. An input that
+// crashes, violates an invariant or takes too long is written to DIR, and the next batch continues. An input
+// with new behaviour (other findings, another error) joins the pool and is mutated further. The same seed
+// makes the same inputs. Build with sanitizers (preset asan), because memory errors show only there.
 #include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -34,21 +33,21 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr unsigned kLimit_s = 60;      // for one input, sanitizers included
-constexpr unsigned kBatch = 500;       // inputs a process
-constexpr std::size_t kMaxPool = 400;  // inputs kept to be mutated further
+constexpr unsigned kBatch = 500;       // inputs per process
+constexpr std::size_t kMaxPool = 400;  // inputs kept for further mutation
 constexpr std::size_t kSlots = 1U << 16U;
 
-// Shared between the processes: survives a crash.
+// Shared between the processes, so that it survives a crash.
 struct Shared {
   std::uint64_t executions = 0, loaded = 0, triangles = 0;
   double slowest_s = 0.0;
   std::uint64_t slowest_bytes = 0, slowest_triangles = 0;
   std::uint64_t signatures = 0;
-  char name[512] = {};  // of the input being tried
+  char name[512] = {};  // of the current input
   bool seen[kSlots] = {};
 };
 
-// Of this process: a busy machine makes nothing slow.
+// CPU time of this process, so that a busy machine does not count as slow.
 double processor_s() {
   return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
 }
@@ -88,7 +87,7 @@ struct Fuzzer {
     if (!seen) {
       seen = true;
       ++shared->signatures;
-      // Written by this process, read by the next batch.
+      // Written by this process and read by the next batch.
       std::ofstream(folder / ("new-" + std::to_string(shared->signatures) + input.extension +
                               (input.packed ? ".packed" : ".plain")),
                     std::ios::binary)
@@ -96,7 +95,7 @@ struct Fuzzer {
     }
   }
 
-  // What the last batch found takes a place in the pool: the oldest but the seeds give way.
+  // Takes the last batch's new inputs into the pool. They replace the oldest ones that are not seeds.
   void take_new(std::size_t seeds, std::mt19937_64& random) {
     std::vector<std::filesystem::path> found;
     for (const auto& entry : std::filesystem::directory_iterator(folder)) {
@@ -144,7 +143,7 @@ int fuzz(double seconds, std::uint64_t seed, const std::filesystem::path& keep) 
         fuzzer.try_one(batch == 0 && i < seeds ? fuzzer.pool[i] : tests::mutated(base, other, random),
                        random);
       }
-      std::_Exit(0);  // without leak checks and destructors: they are the program's, once, at its end
+      std::_Exit(0);  // leak checks and destructors run once, at the end of the parent
     }
     int status = 0;
     ::waitpid(child, &status, 0);

@@ -134,7 +134,7 @@ std::vector<TriangleMesh> small_meshes() {
   TriangleMesh crossing = make_box_mesh(glm::dvec3(0.5), 1);
   append(crossing, make_box_mesh(glm::dvec3(0.5), 1), {0.3, 0.2, 0.1});
   meshes.push_back(crossing);
-  TriangleMesh soup;  // no two triangles share a vertex; one missing, one twice, one turned over
+  TriangleMesh soup;  // separate triangles: one missing, one repeated, one turned over
   const TriangleMesh ball = make_ball_mesh(1.0, 1);
   for (std::size_t i = 1; i < ball.triangles.size(); ++i) {
     const TriangleIndices& t = ball.triangles[i];
@@ -159,7 +159,7 @@ class Mutator {
 
   void one_change(std::string& bytes, const std::string& other) {
     if (bytes.empty()) return;
-    // Half of the changes in the first 200 bytes, where the headers are.
+    // Half of the changes go to the first 200 bytes, where the headers are.
     const std::size_t at = below(below(2) == 0 ? std::min<std::size_t>(200, bytes.size()) : bytes.size());
     switch (below(16)) {
       case 0:
@@ -183,7 +183,7 @@ class Mutator {
       case 6:
         bytes.insert(at, other.substr(below(other.size()), below(200)));
         break;
-      case 7:  // the end of another file
+      case 7:  // append the end of another file
         bytes.replace(at, std::string::npos, other.substr(std::min(at, other.size())));
         break;
       case 8:
@@ -200,7 +200,7 @@ class Mutator {
   }
 
  private:
-  // Binary values that mean something, where values lie.
+  // Writes special binary values at positions of values.
   void word(std::string& bytes, std::size_t at) {
     static constexpr std::array<std::uint32_t, 12> kWords{0,           1,           3,           0x7fffffffU,
                                                           0x80000000U, 0xffffffffU, 0x7fc00000U, 0x7f800000U,
@@ -210,7 +210,7 @@ class Mutator {
     if (below(2) == 0) {
       const std::uint32_t value = kWords[below(kWords.size())];
       std::memcpy(bytes.data() + at, &value, 4);
-    } else {  // one vertex, or one facet's, onto another
+    } else {  // copies one vertex or facet over another
       static constexpr std::array<std::size_t, 4> kLengths{1, 4, 8, 12};
       const std::size_t length = kLengths[below(4)];
       const std::string copy = bytes.substr(below(bytes.size() - length), length);
@@ -218,7 +218,7 @@ class Mutator {
     }
   }
 
-  // Lines are vertices and faces: gone, doubled, or moved, the file stays well-formed.
+  // Removes, repeats or moves a line, which is a vertex or a face. The file stays well-formed.
   void line(std::string& bytes) {
     const auto around = [&](std::size_t at) {
       const std::size_t before = bytes.rfind('\n', at == 0 ? 0 : at - 1);
@@ -242,7 +242,7 @@ class Mutator {
     }
   }
 
-  // One number or word of a text for another.
+  // Replaces one number or word by another.
   void token(std::string& bytes, const std::string& other) {
     static constexpr std::array<std::string_view, 24> kTokens{
         "nan", "-inf",  "1e308",      "-1e12",      "1e13",       "1e-320",     "0",
@@ -272,7 +272,7 @@ class Mutator {
         text = bytes.substr(from, to - from);
         break;
       }
-      default: {  // a crack: the last digits
+      default: {  // a crack: changes the last digits
         text = bytes.substr(begin, end - begin);
         if (!text.empty() && text.back() >= '0' && text.back() <= '9')
           text.back() = static_cast<char>('0' + below(10));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Small meshes in every format that is read, made in code, and the ways to damage them.
+// Small meshes in every supported format, made in code, and mutations that damage them.
 #pragma once
 
 #include <random>
@@ -9,17 +9,17 @@
 namespace tests {
 
 struct FuzzInput {
-  std::string bytes;      // never packed
+  std::string bytes;      // not packed
   std::string extension;  // ".ply"; packed on writing when `packed`
   bool packed = false;
 };
 
 std::vector<FuzzInput> fuzz_seeds();
 
-// One to a few changes, the same for the same random state. `other`: where pieces are taken from.
+// Applies one or a few changes, determined by the random state. Pieces are taken from `other`.
 FuzzInput mutated(FuzzInput input, const FuzzInput& other, std::mt19937_64& random);
 
-// gzip of the bytes.
+// The bytes packed with gzip.
 std::string packed_bytes(const std::string& bytes);
 
 }  // namespace tests

@@ -12,19 +12,21 @@
 #include <limits>
 #include <vector>
 
-#include "polygon/repair/check.h"
 #include "polygon/files/mesh_file.h"
-#include "polygon/surface/mesh_surface.h"
 #include "polygon/mesh/triangle.h"
+#include "polygon/repair/check.h"
+#include "polygon/surface/mesh_surface.h"
 
 namespace tests {
 namespace {
 
 using namespace polygon;
 
-// What a file may unpack to: enough for every seed, and soon reached by a file that lies about its size.
+// Limit on the unpacked size: enough for every seed, and small enough to stop a file that lies about its
+// size.
 constexpr std::uint64_t kMaxBytes = 4U << 20U;
-constexpr double kLost = 1e-5;  // of the box's diagonal: a triangle further than this from the repaired mesh
+// Of the box's diagonal; a triangle further than this from the repaired mesh is lost.
+constexpr double kLost = 1e-5;
 
 void must(bool holds, const char* what) {
   if (holds) return;
@@ -93,7 +95,7 @@ void touch(const TriangleMesh& mesh, bool solid) {
   }
 }
 
-// Repair may drop what has no area, and what another triangle covers; nothing else.
+// Repair may drop degenerate triangles and those that another triangle covers, and no others.
 void must_keep(const TriangleMesh& before, const TriangleMesh& after) {
   const Box box = box_of(before);
   const double lost = kLost * glm::length(box.high - box.low);
@@ -125,7 +127,8 @@ FuzzOutcome fuzz_mesh_file(const std::filesystem::path& file) {
     must(words.starts_with(file.string()), "a refusal names the file");
     for (const char c : words.substr(file.string().size())) {
       const bool letter = std::isalpha(static_cast<unsigned char>(c)) != 0;
-      if (letter && outcome.signature.size() < 40) outcome.signature += c;  // further on it quotes the file
+      // Further on it quotes the file.
+      if (letter && outcome.signature.size() < 40) outcome.signature += c;
     }
     return outcome;
   }
@@ -148,7 +151,8 @@ FuzzOutcome fuzz_mesh_file(const std::filesystem::path& file) {
   add(outcome.signature, after.findings);
   const bool doubled = std::any_of(before.findings.begin(), before.findings.end(),
                                    [](const Finding& f) { return f.id.starts_with("M03"); });
-  // Of a sheet with a face on either side one face is taken: what was closed on paper is a sheet.
+  // If a sheet has a face on either side, only one is kept: a mesh that was closed by counting edges becomes
+  // a sheet.
   must(after.closed || !before.closed || doubled, "repair opens no closed mesh");
   touch(repaired.mesh, after.oriented);
   return outcome;

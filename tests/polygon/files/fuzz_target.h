@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What is done with every file that the fuzzers make: load, check, repair, check again, touch; and what must
-// hold of it.
+// What the fuzzers do with every file: load, check, repair, check again, touch. It aborts if an invariant is
+// violated.
 #pragma once
 
 #include <cstddef>
@@ -10,14 +10,14 @@
 namespace tests {
 
 struct FuzzOutcome {
-  bool loaded = false;        // false: refused with a MeshError
+  bool loaded = false;        // false: MeshError
   std::size_t triangles = 0;  // as loaded
-  // What the file made the code do: ids of findings and of repairs, or the refusal without its numbers. Two
-  // inputs with the same signature are much the same test.
+  // Summary of the behaviour: ids of findings and repairs, or the error text without its numbers. Two inputs
+  // with the same signature test much the same.
   std::string signature;
 };
 
-// Aborts, with words on standard error, when anything that must hold does not.
+// Aborts with a message on standard error if an invariant is violated.
 FuzzOutcome fuzz_mesh_file(const std::filesystem::path& file);
 
 }  // namespace tests

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Reading and writing of mesh files: every format, everything that is left out or refused, and the data sets.
 #include "polygon/files/mesh_file.h"
 
 #include <gtest/gtest.h>
@@ -17,7 +18,7 @@ namespace {
 
 using namespace polygon;
 
-// Files of one test, gone with it.
+// A folder for the files of one test, removed with it.
 class MeshFiles : public testing::Test {
  protected:
   void SetUp() override {
@@ -42,7 +43,7 @@ class MeshFiles : public testing::Test {
     return path(name);
   }
 
-  // The text of the refusal; empty when the file was accepted.
+  // The error text; empty if the file was accepted.
   static std::string refusal(const std::filesystem::path& file, const MeshFileOptions& options = {}) {
     try {
       (void)load_mesh(file, options);
@@ -85,7 +86,7 @@ constexpr const char* kTetrahedronStl =
     "facet normal -1 0 0\nouter loop\nvertex 0 0 0\nvertex 0 0 1\nvertex 0 1 0\nendloop\nendfacet\nendsolid "
     "t\n";
 
-// The tetrahedron, whatever the order in which a format keeps its vertices.
+// Accepts any order of vertices, because formats differ.
 void expect_tetrahedron(const MeshFile& file, double scale = 1.0) {
   ASSERT_EQ(file.mesh.vertices.size(), 4U);
   ASSERT_EQ(file.mesh.triangles.size(), 4U);
@@ -291,13 +292,13 @@ TEST_F(MeshFiles, LimitsHoldBeforeMemoryIsTaken) {
   const auto plain = write("a.obj", kTetrahedronObj);
   const std::string text = refusal(plain, {.max_bytes = 100});
   EXPECT_NE(text.find("100 bytes"), std::string::npos) << text;
-  // A bomb: 200 MB of spaces in 200 kB.
+  // A compression bomb: 200 MB of spaces in 200 kB.
   std::string spaces;
   spaces.resize(200'000'000, ' ');
   const auto bomb = write_gz("bomb.obj.gz", spaces);
   EXPECT_LT(std::filesystem::file_size(bomb), 1'000'000U);
   EXPECT_NE(refusal(bomb, {.max_bytes = 10'000'000}).find("unpacks to more than"), std::string::npos);
-  // And one cut short.
+  // A truncated file.
   const auto cut = write_gz("cut.obj.gz", std::string(kTetrahedronObj) + std::string(100'000, 'x'));
   std::filesystem::resize_file(cut, std::filesystem::file_size(cut) - 20);
   EXPECT_NE(refusal(cut).find("gzip data are damaged or cut short"), std::string::npos) << refusal(cut);
@@ -310,7 +311,7 @@ TEST_F(MeshFiles, SavingSaysWhyItCannot) {
   }
 }
 
-// Documented in the data sets' own list, and counted there by another program.
+// The expected counts are those of the data sets' own list, made by another program.
 TEST(SharedMeshes, LoadWithTheirDocumentedCounts) {
   const auto folder = tests::shared_data("data");
   SKIP_WITHOUT(folder);

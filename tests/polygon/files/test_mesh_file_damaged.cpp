@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Files damaged in every way that a fixed seed thinks of: each ends in a mesh or in a MeshError.
+// Randomly damaged files, with a fixed seed: each ends in a mesh or in a MeshError.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -90,7 +90,7 @@ std::string damaged(std::string bytes, std::mt19937_64& random) {
   };
   const std::size_t changes = 1 + below(4);
   for (std::size_t i = 0; i < changes && !bytes.empty(); ++i) {
-    // Half of the changes in the first 200 bytes, where the headers are.
+    // Half of the changes go to the first 200 bytes, where the headers are.
     const std::size_t at = below(random() % 2 == 0 ? std::min<std::size_t>(200, bytes.size()) : bytes.size());
     switch (random() % 6) {
       case 0:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The constrained minimum against brute force: of all subsets of at most three planes, the feasible one that
-// costs least is the answer (in three dimensions no more than three independent planes hold a point).
+// The constrained minimum against brute force. The reference is the cheapest feasible point over all subsets
+// of at most three planes, because in three dimensions no more than three independent planes are active.
 #include "polygon/proxy/minimise_on_planes.h"
 
 #include <gtest/gtest.h>
@@ -59,7 +59,7 @@ double worst_depth(const dvec3& q, const std::vector<ContactPlane>& planes) {
   return worst;
 }
 
-// The minimum on the intersection of the planes of a subset, by elimination in long double. Empty when they
+// The minimum on the intersection of a subset's planes, by elimination in long double. Empty if the planes
 // are dependent.
 std::optional<dvec3> on_subset(const dvec3& target, const dmat3& metric,
                                const std::vector<ContactPlane>& planes,
@@ -99,7 +99,8 @@ std::optional<dvec3> on_subset(const dvec3& target, const dmat3& metric,
   return q;
 }
 
-// Least cost over all subsets whose minimum breaks no plane by more than `allowed`. Empty: there is none.
+// The least cost over all subsets whose minimum violates no plane by more than `allowed`. Empty if there is
+// none.
 std::optional<dvec3> brute_force(const dvec3& target, const dmat3& metric,
                                  const std::vector<ContactPlane>& planes, double allowed) {
   std::optional<dvec3> best;
@@ -119,7 +120,7 @@ std::optional<dvec3> brute_force(const dvec3& target, const dmat3& metric,
   return best;
 }
 
-// Feasible, held by its active planes with multipliers that push, and its gradient is their sum.
+// Feasible; on its active planes; non-negative multipliers; the gradient is the multipliers' sum of normals.
 void expect_first_order(const PlaneMinimum& found, const dvec3& target, const dmat3& metric,
                         const std::vector<ContactPlane>& planes, double size) {
   ASSERT_LE(found.active_count, 3U);
@@ -139,7 +140,7 @@ class MinimiseOnPlanes : public ::testing::Test {
  protected:
   std::mt19937_64 random{20240607};
 
-  // Planes that all leave room for one point, as those round a proxy do.
+  // Planes with a common feasible point, like those around a proxy.
   std::vector<ContactPlane> planes_around(const dvec3& inside, int count, double size) {
     std::uniform_real_distribution<double> slack(0.0, size);
     std::vector<ContactPlane> planes;
@@ -178,7 +179,7 @@ TEST_F(MinimiseOnPlanes, OnOnePlaneGoesStraightInAnIsotropicMetricAndObliquelyIn
   ASSERT_EQ(straight.active_count, 1U);
   EXPECT_NEAR(straight.multiplier[0], 500.0, 1e-9);
 
-  dmat3 metric(1.0);  // x and z coupled: the minimum slips sideways, q = t + λ A⁻¹ n
+  dmat3 metric(1.0);  // x and z are coupled, so the minimum moves sideways: q = t + λ A⁻¹ n
   metric[0][2] = metric[2][0] = 0.5;
   const PlaneMinimum oblique = minimise_on_planes({0.0, 0.0, -1.0}, metric, floor, kTolerance);
   EXPECT_LE(glm::length(oblique.point - dvec3(-0.5, 0.0, 0.0)), 1e-12);
@@ -199,12 +200,12 @@ TEST_F(MinimiseOnPlanes, IsWhatBruteForceFinds) {
 }
 
 TEST_F(MinimiseOnPlanes, PlanesThroughTheProxyItselfHoldItAsBruteForceSays) {
-  // In contact every plane passes through the proxy: the most degenerate case, and the usual one.
+  // In contact every plane passes through the proxy. This is the most degenerate case, and the usual one.
   for (int n = 0; n < 2000; ++n) {
     const dvec3 proxy = random_vector(random, 1e-2);
     std::vector<ContactPlane> planes;
     for (int i = 0; i < 3 + n % 8; ++i) {
-      // In one half-space, so that there is a way out.
+      // All in one half-space, so that a free direction exists.
       dvec3 normal = random_direction(random);
       normal.z = std::fabs(normal.z) + 0.01;
       normal = glm::normalize(normal);
@@ -238,8 +239,8 @@ TEST_F(MinimiseOnPlanes, OfParallelPlanesTheOuterOneHolds) {
   EXPECT_LE(glm::length(found.point - dvec3(1.0, 1.0, 0.3)), 1e-15);
 }
 
-// The foot of a ball that slides over a flat mesh comes as near to every edge as it likes; just before the
-// edge, the two triangles' planes differ by as small an angle.
+// The foot of a ball that slides over a flat mesh comes arbitrarily near to every edge. Just before the edge,
+// the planes of the two triangles differ by an arbitrarily small angle.
 TEST_F(MinimiseOnPlanes, PlanesThatAreNearlyParallelAreNoDeadEnd) {
   for (int n = 0; n < 4000; ++n) {
     const double angle = std::pow(10.0, -17.0 + 0.004 * n);  // 1e-17 to 0.1
@@ -251,12 +252,12 @@ TEST_F(MinimiseOnPlanes, PlanesThatAreNearlyParallelAreNoDeadEnd) {
                                             glm::dot(glm::normalize(normal + angle * across), proxy), 0, 1},
                                            {glm::normalize(normal - angle * across),
                                             glm::dot(glm::normalize(normal - angle * across), proxy), 0, 2}};
-    // Pressed into the wedge between them.
+    // The target is in the wedge between them.
     std::uniform_real_distribution<double> share(-1.0, 1.0);
     const dvec3 target = proxy - 3e-3 * normal + 3e-3 * share(random) * angle * across;
     const PlaneMinimum found = minimise_on_planes(target, dmat3(1000.0), planes, 1e-15);
     ASSERT_TRUE(found.feasible) << "angle " << angle;
-    // Whatever is rounding at such an angle, the point is where the planes hold it to a nanometre.
+    // Despite rounding at such an angle, the point satisfies the planes to a nanometre.
     EXPECT_LE(worst_depth(found.point, planes), 1e-9) << "angle " << angle;
     EXPECT_LE(glm::length(found.point - proxy), 3e-3 * angle + 1e-9) << "angle " << angle;
   }
@@ -267,7 +268,7 @@ TEST_F(MinimiseOnPlanes, SaysThatOppositePlanesLeaveNoRoom) {
                                       {{0, 0, -1}, 0.1, 0, 1}};  // z >= 0.1 and z <= -0.1
   EXPECT_FALSE(minimise_on_planes({0, 0, 0}, dmat3(1.0), gap, kTolerance).feasible);
   EXPECT_FALSE(minimise_on_planes({5, 0, -3}, dmat3(1.0), gap, kTolerance).feasible);
-  // Four planes that cut one another's room off, though any three leave some.
+  // Four planes without a common feasible point, although any three have one.
   const double s = 1.0 / std::sqrt(3.0);
   const std::vector<ContactPlane> tetrahedron{
       {{s, s, s}, 1, 0, 0}, {{s, -s, -s}, 1, 0, 1}, {{-s, s, -s}, 1, 0, 2}, {{-s, -s, s}, 1, 0, 3}};

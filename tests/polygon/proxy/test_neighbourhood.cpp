@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a proxy knows around it, against brute force over all triangles: nothing that could be touched is
-// missing, and every plane has its triangle wholly behind it.
+// The neighbourhood against brute force over all triangles: no triangle that could be touched is missing, and
+// every plane has its triangle on one side.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,8 +8,9 @@
 #include <random>
 #include <set>
 
-#include "polygon/surface/mesh_surface.h"
+#include "polygon/mesh/triangle.h"
 #include "polygon/proxy/neighbourhood.h"
+#include "polygon/surface/mesh_surface.h"
 #include "polygon/surface/primitives.h"
 
 namespace {
@@ -56,7 +57,7 @@ TEST_P(NeighbourhoodTest, MissesNothingThatABallCouldTouchInIt) {
   }
 }
 
-// A place that breaks no plane is clear of every element, and so is the straight way there.
+// A point that violates no plane is clear of every element, and so is the straight step there.
 TEST_P(NeighbourhoodTest, WhatBreaksNoPlaneIsClear) {
   Neighbourhood near;
   int clear = 0;
@@ -66,7 +67,7 @@ TEST_P(NeighbourhoodTest, WhatBreaksNoPlaneIsClear) {
     ASSERT_TRUE(near.survey(*surface_, view, margin, radius(), view));
     for (int k = 0; k < 50; ++k) {
       const dvec3 to = view + direction() * uniform(0.0, margin);
-      if (!near.broken(view, to, 1e-15).empty()) continue;
+      if (!near.violated(view, to, 1e-15).empty()) continue;
       ++clear;
       for (const double part : {0.25, 0.5, 0.75, 1.0}) {
         const dvec3 p = view + part * (to - view);
@@ -83,16 +84,16 @@ TEST_P(NeighbourhoodTest, SeparatingPlanesHaveTheirElementBehindThem) {
     const dvec3 view = direction() * (0.05 + radius() + uniform(1e-6, 0.01));
     const auto t = static_cast<std::uint32_t>(uniform(0.0, static_cast<double>(mesh_.triangles.size())));
     polygon::SeparatingPlane own;
-    const polygon::SeparatingPlane plane = polygon::separate(*surface_, t, view, radius());
+    const polygon::SeparatingPlane plane = polygon::separating_plane(*surface_, t, view, radius());
     EXPECT_NEAR(glm::length(plane.normal), 1.0, 1e-12);
-    const bool flat = polygon::separate_flatly(*surface_, t, view, radius(), 1e-15, own);
+    const bool flat = polygon::separating_face_plane(*surface_, t, view, radius(), 1e-15, own);
     for (const std::uint32_t corner : mesh_.triangles[t]) {
       EXPECT_LE(glm::dot(plane.normal, mesh_.vertices[corner]) + radius(), plane.offset + 1e-15);
       if (flat) {
         EXPECT_LE(glm::dot(own.normal, mesh_.vertices[corner]) + radius(), own.offset + 1e-15);
       }
     }
-    // Across the shortest way the plane is as far as a plane can be: the ball would just touch.
+    // Perpendicular to the shortest line the plane is as far away as possible: the ball would just touch.
     EXPECT_NEAR(plane.offset - radius(), glm::dot(plane.normal, view) - distance(t, view), 1e-12);
     if (flat) {
       EXPECT_GE(glm::dot(own.normal, view), own.offset - 1e-15);
@@ -106,19 +107,19 @@ TEST_P(NeighbourhoodTest, SeenFromElsewhereItsPlanesHoldThere) {
     const dvec3 view = direction() * (0.05 + radius() + 1e-3);
     ASSERT_TRUE(near.survey(*surface_, view, 8e-3, radius(), view));
     const dvec3 other = glm::normalize(view + direction() * 4e-3) * (0.05 + radius() + 1e-4);
-    near.see_from(*surface_, other, radius(), 1e-15);
-    EXPECT_TRUE(near.broken(other, other, 1e-14).empty());
+    near.refresh_planes(*surface_, other, radius(), 1e-15);
+    EXPECT_TRUE(near.violated(other, other, 1e-14).empty());
   }
 }
 
 TEST(Neighbourhood, KnowsNothingUntilAskedAndHowMuchRoomThereIs) {
   Neighbourhood near;
   EXPECT_FALSE(near.known());
-  EXPECT_LT(near.room(dvec3(0.0)), 0.0);
+  EXPECT_LT(near.margin_left(dvec3(0.0)), 0.0);
   const auto ball = polygon::make_ball_surface(0.02);
   ASSERT_TRUE(near.survey(*ball, dvec3(0, 0, 0.03), 0.005, 1e-3, dvec3(0, 0, 0.03)));
   EXPECT_EQ(near.size(), 0U);  // further than 6 mm
-  EXPECT_DOUBLE_EQ(near.room(dvec3(0, 0, 0.032)), 0.003);
+  EXPECT_DOUBLE_EQ(near.margin_left(dvec3(0, 0, 0.032)), 0.003);
   ASSERT_TRUE(near.survey(*ball, dvec3(0, 0, 0.025), 0.005, 1e-3, dvec3(0, 0, 0.025)));
   EXPECT_EQ(near.size(), 1U);
   near.forget();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// CGAL's tree must find what looking at every triangle finds, and what Embree's finds.
+// CGAL's tree against brute force over all triangles, and against Embree.
 #include "polygon/reference/cgal_surface.h"
 
 #include <gtest/gtest.h>
@@ -117,8 +117,10 @@ TEST_P(CgalSurfacePlaced, SurveyMissesNothingAndIsEmbreesToo) {
   for (const TriangleMesh& mesh : meshes()) {
     const auto surface = make_cgal_surface(mesh, false);
     const auto other = make_mesh_surface(mesh, false);
-    std::vector<SeenElement> out(mesh.triangles.size()), others(mesh.triangles.size());
-    const auto by_element = [](const SeenElement& a, const SeenElement& b) { return a.element < b.element; };
+    std::vector<ElementPlane> out(mesh.triangles.size()), others(mesh.triangles.size());
+    const auto by_element = [](const ElementPlane& a, const ElementPlane& b) {
+      return a.element < b.element;
+    };
     for (int i = 0; i < 40; ++i) {
       const dvec3 centre = random_place(random);
       const double radius = 0.5 * GetParam().scale * (i % 5) / 4.0;
@@ -132,7 +134,7 @@ TEST_P(CgalSurfacePlaced, SurveyMissesNothingAndIsEmbreesToo) {
         ASSERT_EQ(out[k].element, others[k].element);
         ASSERT_FALSE(seen[out[k].element]) << "each once";
         seen[out[k].element] = true;
-        ASSERT_NEAR(surface->support(out[k].element, out[k].normal), out[k].reach, 4.0 * tolerance());
+        ASSERT_NEAR(surface->support(out[k].element, out[k].normal), out[k].support, 4.0 * tolerance());
         ASSERT_NEAR(glm::length(out[k].normal), 1.0, 1e-14);
       }
       for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Every check on meshes with known defects, and on the data sets.
 #include "polygon/repair/check.h"
 
 #include <gtest/gtest.h>
@@ -6,10 +7,10 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
-#include "tests/polygon/fixtures/findings.h"
 #include "polygon/files/mesh_file.h"
 #include "polygon/surface/primitives.h"
 #include "tests/polygon/fixtures/brute_force.h"
+#include "tests/polygon/fixtures/findings.h"
 #include "tests/shared_data.h"
 
 namespace {
@@ -93,7 +94,7 @@ TEST(CheckMesh, EachDefectIsCountedAndPlaced) {
   }
 }
 
-// The place of each defect is where it was made.
+// Each defect is reported where it was made.
 TEST(CheckMesh, PlacesAreWhereTheDefectsAre) {
   const TriangleMesh ball = make_ball_mesh(1.0, 3);
   const auto middle = [&](std::size_t i) {
@@ -110,7 +111,7 @@ TEST(CheckMesh, PlacesAreWhereTheDefectsAre) {
   EXPECT_LT(glm::length(duplicate->place->first_m - middle(77)), 1e-15);
   EXPECT_EQ(tests::find_finding(findings, "M01")->place->triangle, ball.triangles.size() + 1);
 
-  TriangleMesh holed = ball;  // two holes; the place is the larger's
+  TriangleMesh holed = ball;  // two holes; the reported place is that of the larger one
   const auto [a, b, c] = ball.triangles[100];
   std::erase_if(holed.triangles, [&, corner = a](const TriangleIndices& t) {
     return t[0] == corner || t[1] == corner || t[2] == corner || t == ball.triangles[500];
@@ -193,10 +194,10 @@ struct Documented {
   bool closed, consistent;
   std::size_t boundary_edges, nonmanifold_edges, doubly_directed, pieces, duplicates, coincident,
       intersections;
-  double volume;  // signed; compared when closed and consistent
+  double volume;  // signed; compared if closed and consistent
 };
 
-// As the data sets' own list says, counted there by another program with exact predicates.
+// From the data sets' own list, made by another program with exact predicates.
 const std::vector<Documented>& documented() {
   static const std::vector<Documented> list{
       {"meshes/adis16480_cad.stl.gz", true, true, 0, 0, 0, 1, 0, 0, 0, 2.819e-05},

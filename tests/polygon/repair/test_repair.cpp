@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Each step of a repair against a mesh whose sound form is known, and what it must leave alone.
+// Each repair step against a mesh whose intact form is known, and against meshes that must stay unchanged.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -8,13 +8,13 @@
 #include <glm/geometric.hpp>
 #include <random>
 
-#include "tests/polygon/fixtures/findings.h"
+#include "polygon/mesh/triangle.h"
 #include "polygon/repair/check.h"
-#include "polygon/surface/primitives.h"
 #include "polygon/repair/repair_soup.h"
 #include "polygon/repair/self_intersections.h"
-#include "polygon/mesh/triangle.h"
+#include "polygon/surface/primitives.h"
 #include "tests/polygon/fixtures/brute_force.h"
+#include "tests/polygon/fixtures/findings.h"
 
 namespace {
 
@@ -22,7 +22,7 @@ using namespace polygon;
 using tests::count_of;
 using tests::find_finding;
 
-// Each triangle with corners of its own, moved by at most `gap` in each coordinate.
+// Separates all triangles, and moves each corner by at most `gap` per coordinate.
 TriangleMesh cracked(const TriangleMesh& mesh, double gap, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> off(-0.5 * gap, 0.5 * gap);
@@ -63,8 +63,8 @@ TEST(RepairCracks, WiderOnesStayOpenAndNothingMoves) {
   EXPECT_EQ(count_of(repaired.changes, "R14"), ball.triangles.size()) << "every triangle has its own rim";
 }
 
-// Two sheets that lie nearer to one another than the tolerance, edge beside edge: which belongs to which is
-// clear only in part, and no triangle may be lost to it.
+// Two sheets closer together than the tolerance, edge beside edge. The pairing of edges is partly ambiguous,
+// and no triangle may be lost.
 TEST(RepairCracks, NoTriangleIsLostWhereSheetsLieTogether) {
   for (std::uint64_t seed = 0; seed < 200; ++seed) {
     std::mt19937_64 random(seed);
@@ -94,7 +94,7 @@ TEST(RepairCracks, NoTriangleIsLostWhereSheetsLieTogether) {
   }
 }
 
-// A vertex on the middle of the neighbour's edge: a gap without width.
+// A vertex at the middle of the neighbour's edge: a gap without width.
 TEST(RepairHoles, ATJunctionIsClosedByAnEdge) {
   TriangleMesh box = make_box_mesh(glm::dvec3(0.5), 1);
   const auto [a, b, c] = box.triangles[0];
@@ -129,7 +129,7 @@ TEST(RepairHoles, SmallOnesAreFilledAndSaid) {
   EXPECT_TRUE(check.findings.empty()) << tests::in_short(check.findings);
   EXPECT_EQ(count_of(repaired.changes, "R13"), 2U);
   EXPECT_EQ(count_of(repaired.changes, "R04"), 0U) << "fills agree with the triangles they meet";
-  // A cap of radius 0.2 is 0.02 high: flat fills lose two hundredths of a percent of the ball.
+  // A cap of radius 0.2 is 0.02 high, so flat fills lose two hundredths of a percent of the ball's volume.
   EXPECT_NEAR(check.volume_m3, tests::signed_volume(ball), 2e-3);
   EXPECT_LT(check.volume_m3, tests::signed_volume(ball));
   const Finding* filled = find_finding(repaired.changes, "R13");
@@ -166,14 +166,14 @@ TEST(RepairHoles, AFillThatWouldCutTheMeshIsLeft) {
   EXPECT_EQ(repaired.mesh.triangles.size(), holed.triangles.size());
 }
 
-// Of all ways to fill a flat loop that is not convex, only those inside it have its area.
+// Of all fills of a flat non-convex loop, only those inside it have its area.
 TEST(RepairHoles, AFlatLoopThatIsNotConvexIsFilledInside) {
   const TriangleMesh plane = make_plane_mesh(0.5, 16);
   TriangleMesh holed = plane;
   std::erase_if(holed.triangles, [&](const TriangleIndices& t) {
     const glm::dvec3 m = (plane.vertices[t[0]] + plane.vertices[t[1]] + plane.vertices[t[2]]) / 3.0;
     const bool in = std::abs(m.x) < 0.125 && std::abs(m.y) < 0.125;
-    return in && !(m.x > 0.0 && std::abs(m.y) < 0.0625);  // a C
+    return in && !(m.x > 0.0 && std::abs(m.y) < 0.0625);  // shaped like a C
   });
   ASSERT_LT(holed.triangles.size(), plane.triangles.size());
   const RepairedMesh repaired = repair_mesh(holed);
@@ -200,7 +200,7 @@ TEST(RepairMesh, NestedAndOverlappingPiecesAreTurnedEachForItself) {
   EXPECT_NEAR(check.volume_m3, 2.0, 1e-12);
 }
 
-// Every pair cuts: the search and the repair end all the same.
+// Every pair of triangles intersects, and still the search and the repair end.
 TEST(RepairMesh, EndsWhereEverythingCutsEverything) {
   TriangleMesh mesh;
   std::mt19937_64 random(8);
@@ -219,7 +219,7 @@ TEST(RepairMesh, EndsWhereEverythingCutsEverything) {
   EXPECT_NE(cuts->text.find("at least"), std::string::npos);
 }
 
-// What the fuzzer found: the foot on a needle 2.7e8 long and 1e-5 wide was 1e5 off.
+// Found by fuzzing: a needle 2.7e8 long and 1e-5 wide, whose normal is mostly rounding error.
 TEST(ClosestOnTriangle, NeedlesAreNotMissedByTheRoundingOfTheirNormal) {
   std::mt19937_64 random(9);
   std::uniform_real_distribution<double> unit(0.0, 1.0);

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Queries of a mesh surface against brute force over all triangles, at several scales and offsets.
 #include "polygon/surface/mesh_surface.h"
 
 #include <gtest/gtest.h>
@@ -32,7 +33,7 @@ struct Placement {
 
 class MeshSurfacePlaced : public testing::TestWithParam<Placement> {
  protected:
-  // What coordinates of that size can resolve, a few roundings over.
+  // Resolution of coordinates of that size, with a few roundings.
   [[nodiscard]] double tolerance() const {
     return 8e-16 * (glm::length(GetParam().offset) + 4.0 * GetParam().scale);
   }
@@ -130,7 +131,8 @@ TEST_P(MeshSurfacePlaced, NearestFromFarAwayIsBruteForce) {
 TEST_P(MeshSurfacePlaced, InsideIsTheWindingNumber) {
   const auto [scale, offset] = GetParam();
   std::mt19937_64 random(3);
-  // A spiky star: acute edges and corners, where a face's own normal has the wrong sign for nearby points.
+  // A star with spikes. At its acute edges and corners a face's own normal has the wrong sign for nearby
+  // points.
   TriangleMesh star = make_ball_mesh(1.0, 2);
   for (std::size_t i = 0; i < star.vertices.size(); ++i) star.vertices[i] *= i % 3 == 0 ? 1.0 : 0.3;
   for (const TriangleMesh& shape :
@@ -147,7 +149,7 @@ TEST_P(MeshSurfacePlaced, InsideIsTheWindingNumber) {
       ASSERT_FALSE(sheet->inside(p)) << "an open sheet has no inside";
     }
     EXPECT_GT(in, 3);
-    // Straight out of and into every corner and edge, the places that need pseudonormals.
+    // Straight out of and into every corner and edge, where pseudonormals are needed.
     for (const glm::dvec3& v : mesh.vertices) {
       const glm::dvec3 d = (v - offset) * 1e-4;
       ASSERT_FALSE(surface->inside(v + d));
@@ -225,7 +227,7 @@ TEST(MeshSurface, FullOutputKeepsTheNearest) {
         EXPECT_LT(few[k - 1].element, few[k].element);
       }
     }
-    // Exactly as many as there is room for is complete.
+    // An output that fits exactly is complete.
     std::vector<NearPoint> exact(count);
     EXPECT_TRUE(surface->gather(p, 0.6, exact).complete);
     const GatherResult none = surface->gather(p, 0.6, {});
@@ -280,7 +282,7 @@ TEST(MeshSurface, AMillionCoincidentTrianglesAreOneElement) {
 }
 
 TEST(MeshSurface, SliverAcrossAnEdgeDoesNotHideTheInside) {
-  // A box of which one edge carries a triangle without area (a T-junction closed by a flat triangle).
+  // A box with a degenerate triangle at one edge (a T-junction that a flat triangle closes).
   TriangleMesh mesh = make_box_mesh(glm::dvec3(1.0), 1);
   const TriangleIndices t = mesh.triangles[0];
   const auto middle = static_cast<std::uint32_t>(mesh.vertices.size());

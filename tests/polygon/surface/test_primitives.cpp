@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Primitives and their tessellations against one another, and against their volumes.
 #include "polygon/surface/primitives.h"
 
 #include <gtest/gtest.h>
@@ -24,7 +25,7 @@ struct Shape {
   const char* name;
   std::unique_ptr<RigidSurface> exact;
   TriangleMesh mesh;
-  double tessellation_error;  // furthest that the mesh lies from the shape
+  double tessellation_error;  // largest distance of the mesh from the shape
   bool solid;
 };
 
@@ -58,7 +59,7 @@ TEST(Primitives, AgreeWithTheirTessellation) {
       } else {
         ASSERT_NEAR(exact.distance, glm::length(p - exact.point), 1e-15);
       }
-      // The point is on the surface: no distance from the shape, and not inside it.
+      // The point is on the surface: at distance 0 from the shape and not inside it.
       NearPoint again;
       ASSERT_TRUE(shape.exact->nearest(exact.point, 1e-15, again));
     }
