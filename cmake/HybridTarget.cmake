@@ -20,16 +20,31 @@ function(hybrid_target name)
   endif()
 endfunction()
 
-# hybrid_room(PART/ROOM SOURCES … LINKS … PRIVATE_LINKS …): the library of one folder, called hybrid::PART_ROOM, or hybrid::ROOM
-# where the part is hybrid itself. LINKS are rooms that its headers include; PRIVATE_LINKS are libraries of its sources alone.
+# hybrid_headers(NAME HEADERS… LINKS …): headers that many rooms include, compiled once; rooms reuse them by name. A source still
+# names each header that it uses: CMAKE_DISABLE_PRECOMPILE_HEADERS builds without them.
+function(hybrid_headers name)
+  cmake_parse_arguments(arg "" "" "HEADERS;LINKS" ${ARGN})
+  file(GENERATE OUTPUT ${CMAKE_CURRENT_BINARY_DIR}/${name}.cpp CONTENT "// Holds the precompiled headers ${name}.\n")
+  add_library(${name} OBJECT ${CMAKE_CURRENT_BINARY_DIR}/${name}.cpp)
+  hybrid_target(${name})
+  target_link_libraries(${name} PRIVATE ${arg_LINKS})
+  target_precompile_headers(${name} PRIVATE ${arg_HEADERS})
+endfunction()
+
+# hybrid_room(PART/ROOM SOURCES … LINKS … PRIVATE_LINKS … HEADERS NAME): the library of one folder, called hybrid::PART_ROOM, or
+# hybrid::ROOM where the part is hybrid itself. LINKS are rooms that its headers include; PRIVATE_LINKS are libraries of its
+# sources alone; HEADERS are precompiled ones.
 function(hybrid_room path)
-  cmake_parse_arguments(arg "" "" "SOURCES;LINKS;PRIVATE_LINKS" ${ARGN})
-  string(REGEX REPLACE "^[a-z]+/" "" folder "${path}")
-  string(REGEX REPLACE "^hybrid/" "" name "${path}")
+  cmake_parse_arguments(arg "" "HEADERS" "SOURCES;LINKS;PRIVATE_LINKS" ${ARGN})
+  string(REGEX REPLACE "^[a-z]+/(.*)$" "\\1" folder "${path}")
+  string(REGEX REPLACE "^hybrid/(.*)$" "\\1" name "${path}")
   string(REPLACE "/" "_" name "${name}")
   list(TRANSFORM arg_SOURCES PREPEND "${folder}/" REGEX "^[^$]")
   add_library(hybrid_${name} STATIC ${arg_SOURCES})
   add_library(hybrid::${name} ALIAS hybrid_${name})
   hybrid_target(hybrid_${name})
   target_link_libraries(hybrid_${name} PUBLIC ${arg_LINKS} PRIVATE ${arg_PRIVATE_LINKS})
+  if(arg_HEADERS)
+    target_precompile_headers(hybrid_${name} REUSE_FROM ${arg_HEADERS})
+  endif()
 endfunction()

@@ -9,6 +9,9 @@ set -euo pipefail
 hybrid_root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd)
 readonly hybrid_root
 hybrid_install=yes
+hybrid_flags=()      # options of the script that sources this one, and a line of help for each
+hybrid_flag_help=()
+hybrid_given=' '
 hybrid_stage_name=''
 hybrid_stage_start=0
 
@@ -40,18 +43,32 @@ read_options() {
     case $argument in
       --no-install) hybrid_install=no ;;
       -h | --help)
-        say "usage: bash $(basename -- "$0") [--no-install]"
+        usage
         say "$purpose"
         say '  --no-install  build with what is installed; never call apt-get'
+        if ((${#hybrid_flag_help[@]})); then printf '  %s\n' "${hybrid_flag_help[@]}"; fi
         exit 0
         ;;
       *)
-        printf 'error: unknown option %s\nusage: bash %s [--no-install]\n' "$argument" "$(basename -- "$0")" >&2
-        exit 2
+        if [[ " ${hybrid_flags[*]-} " != *" $argument "* ]]; then
+          printf 'error: unknown option %s\n' "$argument" >&2
+          usage >&2
+          exit 2
+        fi
+        hybrid_given+="$argument "
         ;;
     esac
   done
 }
+
+usage() {
+  local flag line="usage: bash $(basename -- "$0") [--no-install]"
+  for flag in "${hybrid_flags[@]}"; do line+=" [$flag]"; done
+  say "$line"
+}
+
+# given FLAG: was the script called with it?
+given() { [[ $hybrid_given == *" $1 "* ]]; }
 
 # The packages of packages.txt, one a line.
 listed_packages() { sed -e 's/#.*//' -e 's/[[:space:]]//g' -e '/^$/d' -- "$hybrid_root/packages.txt"; }

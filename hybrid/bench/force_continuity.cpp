@@ -22,7 +22,6 @@ constexpr double kSpacing = 1e-3, kTick = 1e-3;
 constexpr int kWide = 36, kHigh = 20;  // voxels of a block; a ball is as wide
 constexpr double kYoung = 1e5;         // Pa: forces of newtons, so that a JND is a share of them
 constexpr double kAway = 0.5;          // spacings above the surface, where strokes begin and end
-constexpr double kFloor_N = 0.04;      // of a JND: the least friction of a device
 constexpr double kTolerance = 1e-4;    // of the lattice's force scale: a reference is at rest
 constexpr int kReferenceCycles = 60;
 
@@ -150,7 +149,7 @@ StrokeResult measure_stroke(const Scene& scene, const std::vector<glm::dvec3>& c
   along(corners, speed_m_per_s, [&](const glm::dvec3& device) {
     const TickResult t = haptic_tick(*built.world, *built.state, {.position_m = device}, kTick);
     const glm::dvec3 felt = t.rigid_N + t.soft_N, rest = equilibrium.at(t.proxy_m);
-    const double jnd = std::max(kJndShare * glm::length(rest), kFloor_N);
+    const double jnd = std::max(kJndShare * glm::length(rest), kJndFloor_N);
     const double beyond = std::max(0.0, glm::length(felt - felt_before) - glm::length(rest - rest_before));
     if (t.contacts != 0 || felt_before != glm::dvec3(0.0)) {
       ++result.ticks;

@@ -135,7 +135,7 @@ class Workshop {
       : options_(options), scale_(first.scale), mesh_(make_bench_mesh(first.mesh, first.scale)) {
     if (mesh_.mesh.triangles.size() <= kMostReferenceTriangles) {
       say("building the exact reference");
-      reference_ = std::make_unique<polygon::FirstOrderReference>(mesh_.mesh);
+      reference_ = std::make_unique<polygon::OptimalityReference>(mesh_.mesh);
     }
     for (const Engine engine : kEngines) {
       const bool too_large =
@@ -265,7 +265,7 @@ class Workshop {
   double scale_;
   BenchMesh mesh_;
   std::vector<Engine> engines_;
-  std::unique_ptr<polygon::FirstOrderReference> reference_;
+  std::unique_ptr<polygon::OptimalityReference> reference_;
   TimedSurface own_, cgal_;
   std::map<std::tuple<Engine, double, double, bool>, std::unique_ptr<TouchWorld>> worlds_;
 };

@@ -66,7 +66,7 @@ std::size_t affordable(std::size_t all, std::size_t done, double spent_s, double
 }  // namespace
 
 Judge::Judge(const BenchMesh& mesh, const GoalPath& path, const glm::dvec3& offset_m, double tool_radius_m,
-             double scale, const polygon::FirstOrderReference* reference)
+             double scale, const polygon::OptimalityReference* reference)
     : mesh_(mesh),
       path_(path),
       offset_m_(offset_m),

@@ -34,7 +34,7 @@ class Judge {
   // `path` is in the scene frame (see placed()), `reference` the exact one in the mesh's; it may be null (a
   // mesh too large for it). Keeps references to all.
   Judge(const BenchMesh& mesh, const GoalPath& path, const glm::dvec3& offset_m, double tool_radius_m,
-        double scale, const polygon::FirstOrderReference* reference);
+        double scale, const polygon::OptimalityReference* reference);
 
   // `budget_s` is what may be spent on exact references: at least 16 ticks, then every n-th as far as it
   // lasts, or every tick when it is negative.
@@ -58,7 +58,7 @@ class Judge {
   const GoalPath& path_;
   glm::dvec3 offset_m_;
   double radius_m_, scale_;
-  const polygon::FirstOrderReference* reference_;
+  const polygon::OptimalityReference* reference_;
   bool has_optimum_ = false;
   std::vector<Optimum> optimum_;  // found once, for all runs
 };

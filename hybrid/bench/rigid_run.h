@@ -13,7 +13,7 @@
 #include "hybrid/bench/meshes.h"
 #include "hybrid/bench/paths.h"
 #include "hybrid/bench/timer.h"
-#include "hybrid/world/world.h"
+#include "hybrid/world/world_state.h"
 
 namespace hybrid::bench {
 

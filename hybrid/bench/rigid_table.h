@@ -2,7 +2,7 @@
 // The rows of `hybrid bench rigid`: as JSON, as a table to read, and engine beside engine.
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 

@@ -25,7 +25,6 @@ constexpr double kSpacing = 1e-3;
 constexpr double kDepth = 10.0, kRadius = 10.0;  // (unit: spacing)
 constexpr int kSweepsNear = 2;
 constexpr double kConverged = 0.01;
-constexpr double kFloor_N = 0.04;    // of a JND: the least friction of a device
 constexpr double kAsked_us = 100e3;  // when the force error is stated
 constexpr int kMostRounds = 4000;
 constexpr double kCalm = 1e-4;                // of the force: it changes by less than this …
@@ -79,7 +78,7 @@ voxel::LabelVolume layered_cube(int edge) {
 
 void say_error_when_asked(SoftRow& row, double force_N, double reference_N) {
   row.force_error_N = std::fabs(force_N - reference_N);
-  row.force_error_jnd = *row.force_error_N / std::max(kJndShare * reference_N, kFloor_N);
+  row.force_error_jnd = *row.force_error_N / std::max(kJndShare * reference_N, kJndFloor_N);
   row.note += "; error after 100 ms";
 }
 

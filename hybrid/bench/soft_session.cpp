@@ -85,7 +85,7 @@ SoftRow session_row(int edge, const Scene& scene, BuiltScene& built, const SoftB
                                             .keep_recording = false,
                                             .reference_samples = options.quick ? 6 : kSamples,
                                             .progress = {},
-                                            .relax_apart = true});
+                                            .async_relaxation = true});
   row.repeats = result.ticks;
   row.time_us = result.tick_us.percentiles();
   row.truncated_share = static_cast<double>(built.state->truncated_ticks) /

@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "hybrid/bench/threads.h"
+#include "hybrid/session/relaxation_thread.h"
+#include "hybrid/session/result_tape.h"
+#include "hybrid/tick/tissue/async_relaxation.h"
 
 #include <fmt/format.h>
 
@@ -7,12 +10,13 @@
 #include <atomic>
 #include <cstring>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <thread>
 
 #include "device/loop/servo_timer.h"
 #include "hybrid/base/flush_to_zero.h"
-#include "hybrid/snapshot/fill_snapshot.h"
 #include "hybrid/session/session.h"
+#include "hybrid/snapshot/fill_snapshot.h"
 
 namespace hybrid::bench {
 namespace {
@@ -54,7 +58,7 @@ void beside(const Load& load, const Work& work) {
 void relax_and_snap(const Scene& scene, BuiltScene& built, const std::atomic<bool>& stop) {
   take_ordinary_priority();
   flush_denormals();
-  relax_apart(*built.state, Arrival::counted);
+  start_async_relaxation(*built.state, Arrival::counted);
   Snapshot snapshot;
   while (!stop.load(std::memory_order_relaxed)) {
     const auto device = scene_device(scene, scene_path(scene));
@@ -110,7 +114,7 @@ class Bench {
  private:
   SessionResult run(BuiltScene& built, bool relaxes) {
     SessionOptions options;
-    options.realtime = options.relax_apart = true;
+    options.realtime = options.async_relaxation = true;
     options.keep_rows = false;
     options.keep_recording = options.relaxation_thread = relaxes;
     options.surfaces_hz = kAsOftenAsItCan_hz;
@@ -146,10 +150,10 @@ class Bench {
     BuiltScene built = build_scene(scene_);
     ResultTape tape(built.state->soft.size());
     begin_session(scene_, *built.world, *built.state, felt.start_m);
-    relax_apart(*built.state, Arrival::recorded);
+    start_async_relaxation(*built.state, Arrival::recorded);
     for (const RecordedTick& tick : felt.recording) {
       tick_again(built, tick);
-      tape.keep(built.state->apart);
+      tape.keep(built.state->async);
     }
     return tape;
   }
@@ -159,8 +163,8 @@ class Bench {
     const FlushedDenormals flushed;
     BuiltScene built = build_scene(scene_);
     begin_session(scene_, *built.world, *built.state, felt.start_m);
-    relax_apart(*built.state, Arrival::played);
-    Apart& apart = built.state->apart;
+    start_async_relaxation(*built.state, Arrival::played);
+    AsyncRelaxation& apart = built.state->async;
     beside([&](const std::atomic<bool>& stop) { hog_memory(stop, [&] { tape.hand_out(apart); }); },
            [&] {
              SessionResult played;

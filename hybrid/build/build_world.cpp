@@ -9,7 +9,7 @@
 #include <glm/common.hpp>
 #include <glm/vector_relational.hpp>
 
-#include "hybrid/tick/tissue/obstacles_and_pairs.h"
+#include "hybrid/tick/tissue/obstacles.h"
 #include "hybrid/tick/bodies/body_collisions.h"
 #include "hybrid/tick/bodies/bodies_press_tissue.h"
 #include "hybrid/build/build_objects.h"
@@ -17,7 +17,6 @@
 #include "hybrid/geometry/surface_nets.h"
 #include "hybrid/base/process_memory.h"
 #include "hybrid/scene/read_feel.h"
-#include "hybrid/session/session.h"
 #include "hybrid/tick/tissue/press_tissue.h"
 #include "hybrid/build/thin_object.h"
 
@@ -315,9 +314,9 @@ class Builder {
     for (std::uint32_t a = 0; a < soft_.size(); ++a) {
       for (std::uint32_t b = a + 1; b < soft_.size(); ++b) {
         if (spacing(a) < spacing(b)) {
-          world_->meeting.push_back({a, b});
+          world_->soft_pairs.push_back({a, b});
         } else {
-          world_->meeting.push_back({b, a});
+          world_->soft_pairs.push_back({b, a});
         }
       }
     }
@@ -349,7 +348,7 @@ class Builder {
   }
 
   void note_overlapping_bodies() {
-    for (const PairOfBodies& pair : built_.state->collisions.pairs) {
+    for (const BodyPair& pair : built_.state->collisions.pairs) {
       const double deep_m = overlap_m(pair);
       if (deep_m <= pair.skin_m) continue;
       built_.notes.push_back(

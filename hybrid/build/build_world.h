@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "hybrid/scene/scene.h"
-#include "hybrid/world/world.h"
+#include "hybrid/world/world_state.h"
 #include "polygon/mesh/mesh.h"
 
 namespace hybrid {

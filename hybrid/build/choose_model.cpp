@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "hybrid/session/session.h"
+#include "hybrid/feel/just_noticeable.h"
 
 namespace hybrid {
 namespace {

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "hybrid/world/world.h"
+#include "hybrid/world/world_state.h"
 #include "voxel/volume/label_volume.h"
 
 namespace hybrid {

@@ -10,8 +10,8 @@
 #include <sstream>
 #include <string_view>
 
-#include "hybrid/scene/table_reader.h"
 #include "hybrid/compose/tissue_table.h"
+#include "hybrid/scene/table_reader.h"
 
 namespace hybrid {
 namespace {

@@ -3,16 +3,17 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "hybrid/bench/convergence_plot.h"
 #include "hybrid/bench/occupancy.h"
+#include "hybrid/bench/occupancy_plot.h"
 #include "hybrid/bench/rigid.h"
 #include "hybrid/bench/soft.h"
 #include "hybrid/bench/threads.h"
 #include "hybrid/program/commands.h"
-#include "hybrid/bench/occupancy_plot.h"
 #include "hybrid/session/report.h"
-#include "hybrid/bench/convergence_plot.h"
 
 namespace hybrid {
 namespace {

@@ -4,13 +4,14 @@
 #include <algorithm>
 #include <cstdio>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <utility>
 
-#include "hybrid/program/commands.h"
 #include "hybrid/base/process_memory.h"
+#include "hybrid/program/commands.h"
 #include "hybrid/session/report.h"
-#include "polygon/repair/check.h"
 #include "polygon/files/mesh_file.h"
+#include "polygon/repair/check.h"
 #include "polygon/surface/mesh_surface.h"
 #include "voxel/volume/read_volume.h"
 

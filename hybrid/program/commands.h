@@ -96,7 +96,7 @@ struct ExtremesCommand {
   bool table = true;
   bool quick = false;
   std::uint64_t fuzz_ticks = 0, seed = 1;  // 0: none
-  bool relax_apart = false;                // of fuzz_ticks
+  bool async_relaxation = false;                // of fuzz_ticks
   std::string json;
 };
 int extremes(const ExtremesCommand& command);

@@ -2,10 +2,11 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
-#include "hybrid/program/commands.h"
 #include "hybrid/compare/compare.h"
 #include "hybrid/plot/session_plot.h"
+#include "hybrid/program/commands.h"
 #include "hybrid/session/report.h"
 
 namespace hybrid {

@@ -3,10 +3,11 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
 #include "hybrid/program/commands.h"
-#include "hybrid/session/report.h"
 #include "hybrid/scene/table_reader.h"
+#include "hybrid/session/report.h"
 
 namespace hybrid {
 namespace {

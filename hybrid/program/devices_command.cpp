@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
 #include "device/phantom/hd_errors.h"
 #include "device/phantom/phantom.h"

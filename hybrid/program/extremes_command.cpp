@@ -3,11 +3,12 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
 #include "hybrid/program/commands.h"
+#include "hybrid/session/report.h"
 #include "hybrid/stress/extremes.h"
 #include "hybrid/stress/fuzz_ticks.h"
-#include "hybrid/session/report.h"
 
 namespace hybrid {
 namespace {
@@ -16,7 +17,7 @@ nlohmann::ordered_json fuzz(const ExtremesCommand& command, std::FILE* words, bo
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();
   const FuzzOptions options{.ticks = command.fuzz_ticks,
                             .seed = command.seed,
-                            .relax_apart = command.relax_apart,
+                            .async_relaxation = command.async_relaxation,
                             .progress = progress_on_terminal()};
   for (const FuzzResult& r : fuzz_ticks(options)) {
     end_progress();

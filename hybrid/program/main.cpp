@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
+#include <nlohmann/json.hpp>
 
 #include "hybrid/program/commands.h"
 
@@ -220,7 +221,7 @@ void add_stability(CLI::App& app, int& status) {
   auto* ticks =
       sub->add_option("--fuzz-ticks", e->fuzz_ticks, "instead: so many ticks of random device input");
   sub->add_option("--seed", e->seed, "of --fuzz-ticks")->needs(ticks)->capture_default_str();
-  sub->add_flag("--apart", e->relax_apart, "with --fuzz-ticks: tissue is relaxed apart from the tick")
+  sub->add_flag("--apart", e->async_relaxation, "with --fuzz-ticks: tissue is relaxed apart from the tick")
       ->needs(ticks);
   sub->callback([c, e, &status] {
     e->scene = c->scene;

@@ -5,18 +5,19 @@
 #include <chrono>
 #include <cstdio>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "hybrid/program/commands.h"
-#include "hybrid/snapshot/make_drawn_scene.h"
-#include "hybrid/view/picture.h"
 #include "hybrid/plot/session_plot.h"
+#include "hybrid/program/commands.h"
+#include "hybrid/session/export_shapes.h"
 #include "hybrid/session/real_device.h"
 #include "hybrid/session/recording.h"
 #include "hybrid/session/report.h"
-#include "hybrid/session/export_shapes.h"
 #include "hybrid/session/session.h"
 #include "hybrid/session/trace_file.h"
+#include "hybrid/snapshot/make_drawn_scene.h"
+#include "hybrid/view/picture.h"
 
 namespace hybrid {
 namespace {
@@ -123,7 +124,7 @@ int run(const RunCommand& command) {
                          .reference_samples = command.samples,
                          .start_ticks = command.start_ticks,
                          .progress = progress,
-                         .relax_apart = command.relaxation == "apart",
+                         .async_relaxation = command.relaxation == "apart",
                          .black_box = kept ? &kept->box() : nullptr};
   SessionResult result = run_session(scene, built, options);
   end_progress();
@@ -145,8 +146,8 @@ int run(const RunCommand& command) {
     save_picture(command.picture, drawn_scene(scene, built, title), *result.moment);
   if (!command.record.empty()) {
     save_recording(command.record, {std::filesystem::absolute(command.scene), read_text(command.scene),
-                                    result.dt_s, scene_limits(scene), options.relax_apart, result.state_hash,
-                                    result.start_m, result.recording});
+                                    result.dt_s, scene_limits(scene), options.async_relaxation,
+                                    result.state_hash, result.start_m, result.recording});
   }
   if (!command.save_surface.empty()) save_surfaces(command.save_surface, built);
   std::vector<std::filesystem::path> volumes;

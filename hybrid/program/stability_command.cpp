@@ -2,12 +2,13 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <nlohmann/json.hpp>
 #include <stdexcept>
 
 #include "hybrid/program/commands.h"
 #include "hybrid/session/report.h"
-#include "hybrid/stability/stability.h"
 #include "hybrid/stability/plot.h"
+#include "hybrid/stability/stability.h"
 #include "hybrid/stability/table.h"
 
 namespace hybrid {

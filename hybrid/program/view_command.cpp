@@ -11,14 +11,16 @@
 
 #include "device/loop/servo_loop.h"
 #include "device/simulated/simulated.h"
-#include "hybrid/program/commands.h"
 #include "hybrid/base/flush_to_zero.h"
-#include "hybrid/snapshot/make_drawn_scene.h"
-#include "hybrid/snapshot/fill_snapshot.h"
 #include "hybrid/base/triple_buffer.h"
-#include "hybrid/snapshot/merge_live_surface.h"
+#include "hybrid/program/commands.h"
 #include "hybrid/session/real_device.h"
+#include "hybrid/session/relaxation_thread.h"
 #include "hybrid/session/session.h"
+#include "hybrid/snapshot/fill_snapshot.h"
+#include "hybrid/snapshot/make_drawn_scene.h"
+#include "hybrid/snapshot/merge_live_surface.h"
+#include "hybrid/tick/tissue/async_relaxation.h"
 #include "hybrid/view/window.h"
 
 namespace hybrid {
@@ -123,8 +125,8 @@ class Player {
   // From now on tissue is relaxed by a thread, which the caller runs.
   [[nodiscard]] std::unique_ptr<RelaxationThread> go_live() {
     live_ = true;
-    relax_apart(*built_.state, Arrival::thread);
-    return std::make_unique<RelaxationThread>(*built_.world, built_.state->apart, 1.0 / kSnapshotEvery_s);
+    start_async_relaxation(*built_.state, Arrival::thread);
+    return std::make_unique<RelaxationThread>(*built_.world, built_.state->async, 1.0 / kSnapshotEvery_s);
   }
 
  private:
@@ -242,7 +244,7 @@ int view(const ViewCommand& command) {
   }
   Player player(scene, built, real.get());
   if (command.frames) {
-    relax_apart(*built.state, Arrival::counted);
+    start_async_relaxation(*built.state, Arrival::counted);
     play_frames(command, player, window);
     return 0;
   }

@@ -9,7 +9,6 @@
 #include <new>
 #include <set>
 
-#include "hybrid/build/choose_model.h"
 #include "hybrid/scene/scene.h"
 #include "hybrid/scene/table_reader.h"
 #include "hybrid/scene/read_rigid.h"
@@ -340,7 +339,7 @@ void read_objects(const SceneSource& source, const TableReader& root, Scene& sce
   check_names(source, scene);
 }
 
-Scene read_scene(const std::filesystem::path& file) {
+Scene read_whole(const std::filesystem::path& file) {
   static constexpr std::string_view keys[] = {"format",   "units",  "title", "overlap", "occupancy",
                                               "tool",     "device", "hand",  "safety",  "path",
                                               "material", "rigid",  "soft"};
@@ -374,7 +373,6 @@ Scene read_scene(const std::filesystem::path& file) {
   read_once(root, "material", [&](const TableReader& table) { read_materials(table, scene); });
   read_objects(source, root, scene);
   check_point_tool(source, scene, tool_radius);
-  choose_models(scene);
   if (!root.has("path")) {
     source.refuse({1, 1}, "the scene has no [path], so the hand would not move",
                   "add [path] with kind = \"press\", from and to (see scenes/README.md)");
@@ -409,9 +407,9 @@ std::size_t max_lattice_voxels() {
   return static_cast<std::size_t>(std::min(most, bytes / static_cast<double>(lattice_bytes_per_voxel)));
 }
 
-Scene load_scene(const std::filesystem::path& file) {
+Scene read_scene(const std::filesystem::path& file) {
   try {
-    return read_scene(file);
+    return read_whole(file);
   } catch (const std::bad_alloc&) {
     throw SceneError(file, {},
                      "the file needs more memory than there is; name meshes and volumes by their file");

@@ -3,9 +3,9 @@
 // nowhere else; scenes/README.md describes the same keys in words.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <filesystem>
-#include <glm/gtc/quaternion.hpp>
 #include <glm/vec3.hpp>
 #include <limits>
 #include <map>
@@ -19,6 +19,9 @@
 #include "device/paths/path.h"
 #include "device/simulated/simulated.h"
 #include "hybrid/feel/height_texture.h"
+#include "hybrid/feel/just_noticeable.h"
+#include "hybrid/geometry/pose.h"
+#include "hybrid/scene/tool.h"
 #include "voxel/volume/analytic_shapes.h"
 #include "voxel/volume/read_volume.h"
 
@@ -33,13 +36,6 @@ struct SourcePlace {
 class SceneError : public std::runtime_error {
  public:
   SceneError(const std::filesystem::path& file, SourcePlace place, const std::string& what_and_remedy);
-};
-
-struct Pose {  // body frame to scene frame
-  glm::dvec3 position_m{0.0};
-  glm::dquat rotation{1.0, 0.0, 0.0, 0.0};
-
-  bool operator==(const Pose&) const = default;
 };
 
 // Of tissue: springs between neighbours, or elastic bricks between eight voxels (voxel/fem/deferred_correction.h).
@@ -195,12 +191,6 @@ struct SoftDescription {
 
 // ---- the rest
 // ----------------------------------------------------------------------------------------------
-struct Tool {
-  enum class Shape : std::uint8_t { ball, punch } shape = Shape::ball;
-  double radius_m = 2e-3;             // 0: a point, for rigid objects
-  double stiffness_N_per_m = 1000.0;  // of the virtual coupling
-};
-
 // A real PHANToM, by its driver's library.
 struct RealDevice {
   std::string name;  // as the driver knows it; empty: its default
@@ -262,8 +252,13 @@ inline device::DeviceLimits scene_limits(const Scene& scene) {
   return scene.opened_limits.value_or(device::device_limits(scene.device_model));
 }
 
-// Reads and checks a scene file. Nothing outside the file is opened except to see that it exists.
-// Throws SceneError.
-Scene load_scene(const std::filesystem::path& file);
+// The floor of a just noticeable difference (N) for the scene's device: its friction, and kJndFloor_N at least.
+inline double jnd_floor_N(const Scene& scene) {
+  return std::max(kJndFloor_N, scene_limits(scene).friction_N);
+}
+
+// Reads and checks a scene file. Nothing outside the file is opened except to see that it exists. The model of
+// an object is as the file says; load_scene() of hybrid/build also decides "auto". Throws SceneError.
+[[nodiscard]] Scene read_scene(const std::filesystem::path& file);
 
 }  // namespace hybrid

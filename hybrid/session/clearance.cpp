@@ -51,8 +51,8 @@ Clearance clearance(const World& world, const WorldState& state) noexcept {
       }
     }
   }
-  for (const VoxelPair& pair : state.pairs) {
-    const auto [a, b] = world.meeting[pair.meeting];
+  for (const FacetContact& pair : state.facet_contacts) {
+    const auto [a, b] = world.soft_pairs[pair.soft_pair];
     soft = std::min(soft, voxel::gap_of_pair({*state.soft[a], world.soft[a].pose},
                                              {*state.soft[b], world.soft[b].pose}, pair.pressed));
   }

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "hybrid/world/world.h"
+#include "hybrid/world/world_state.h"
 
 namespace hybrid {
 

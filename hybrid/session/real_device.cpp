@@ -8,8 +8,8 @@
 #include <glm/common.hpp>
 #include <thread>
 
-#include "hybrid/tick/proxy/proxy_step.h"
 #include "hybrid/session/session.h"
+#include "hybrid/tick/proxy/proxy_step.h"
 
 namespace hybrid {
 namespace {

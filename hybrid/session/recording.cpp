@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include "hybrid/base/flush_to_zero.h"
+#include "hybrid/tick/tissue/async_relaxation.h"
 
 namespace hybrid {
 namespace {
@@ -24,7 +25,7 @@ struct Header {
   std::array<char, 8> magic;
   std::uint64_t path_bytes, text_bytes, ticks;
   double dt_s, max_force_N, resolution_m, friction_N;
-  std::uint64_t relax_apart, state_hash;
+  std::uint64_t async_relaxation, state_hash;
   std::array<double, 3> start;
 };
 struct Tick {
@@ -55,7 +56,7 @@ void save_recording(const std::filesystem::path& file, const Recording& recordin
                       recording.device.max_force_N,
                       recording.device.resolution_m,
                       recording.device.friction_N,
-                      recording.relax_apart ? 1U : 0U,
+                      recording.async_relaxation ? 1U : 0U,
                       recording.state_hash,
                       {recording.start_m.x, recording.start_m.y, recording.start_m.z}};
   out.write(reinterpret_cast<const char*>(&header), sizeof header);
@@ -95,7 +96,7 @@ Recording load_recording(const std::filesystem::path& file) {
       sizeof header + header.path_bytes + header.text_bytes + header.ticks * sizeof(Tick) == size &&
       header.dt_s > 0.0 && std::isfinite(header.dt_s) && header.max_force_N >= 0.0 &&
       header.resolution_m >= 0.0 && std::isfinite(header.resolution_m) && header.friction_N >= 0.0 &&
-      std::isfinite(header.friction_N) && header.relax_apart <= 1 &&
+      std::isfinite(header.friction_N) && header.async_relaxation <= 1 &&
       std::all_of(header.start.begin(), header.start.end(), [](double x) { return std::isfinite(x); });
   if (!sane)
     throw std::runtime_error(
@@ -110,7 +111,7 @@ Recording load_recording(const std::filesystem::path& file) {
   recording.device.max_force_N = header.max_force_N;
   recording.device.resolution_m = header.resolution_m;
   recording.device.friction_N = header.friction_N;
-  recording.relax_apart = header.relax_apart != 0;
+  recording.async_relaxation = header.async_relaxation != 0;
   recording.state_hash = header.state_hash;
   recording.start_m = {header.start[0], header.start[1], header.start[2]};
   recording.ticks.resize(header.ticks);
@@ -145,7 +146,7 @@ ReplayResult replay(const Recording& recording, const Progress& progress) {
   result.parts_at = result.ticks;
   if (recording.ticks.empty()) return result;
   begin_session(scene, *built.world, *built.state, recording.start_m);
-  if (recording.relax_apart) relax_apart(*built.state, Arrival::recorded);
+  if (recording.async_relaxation) start_async_relaxation(*built.state, Arrival::recorded);
   std::uint64_t hash = kHashBegin;
   for (std::size_t n = 0; n < recording.ticks.size(); ++n) {
     const device::DeviceState input{.position_m = recording.ticks[n].device_m,

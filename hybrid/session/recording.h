@@ -16,7 +16,7 @@ struct Recording {
   std::string scene_text;            // as it was, so that a changed scene is noticed
   double dt_s = 1e-3;
   device::DeviceLimits device{};  // that it was felt with
-  bool relax_apart = false;       // SessionOptions::relax_apart
+  bool async_relaxation = false;  // SessionOptions::async_relaxation
   std::uint64_t state_hash = 0;   // after the last tick
   glm::dvec3 start_m{0.0};        // SessionResult::start_m
   std::vector<RecordedTick> ticks;

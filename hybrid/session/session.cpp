@@ -11,10 +11,12 @@
 #include <limits>
 
 #include "device/simulated/simulated.h"
-#include "hybrid/tick/bodies/body_collisions.h"
 #include "hybrid/base/flush_to_zero.h"
+#include "hybrid/session/relaxation_thread.h"
 #include "hybrid/snapshot/fill_snapshot.h"
+#include "hybrid/tick/bodies/body_collisions.h"
 #include "hybrid/tick/proxy/proxy_step.h"
+#include "hybrid/tick/tissue/async_relaxation.h"
 #include "hybrid/tick/tissue/work_budget.h"
 #include "voxel/composite/grid.h"
 
@@ -22,8 +24,7 @@ namespace hybrid {
 namespace {
 
 constexpr double kAfterPath_s = 0.5;
-constexpr double kWithHand_s = 60.0;  // a real device has no path that ends
-constexpr double kJndFloor_N = 0.04;
+constexpr double kWithHand_s = 60.0;        // a real device has no path that ends
 constexpr std::uint64_t kMomentEvery = 20;  // ticks between two looks for a more telling moment
 constexpr std::uint64_t kClearances =
     1000;                           // moments of a session at which it is looked how near objects are
@@ -89,7 +90,7 @@ class Run {
         simulated_(options.real_device == nullptr ? scene_device(scene, path_) : nullptr),
         device_(options.real_device == nullptr ? *simulated_ : *options.real_device),
         realtime_(options.realtime || options.real_device != nullptr),
-        follows_machine_(realtime_ && options.relax_apart && !built.state->soft.empty()),
+        follows_machine_(realtime_ && options.async_relaxation && !built.state->soft.empty()),
         dt_(1.0 / scene.rate_hz),
         work_share_(dt_) {
     const double usual = options.real_device == nullptr ? path_->duration_s() + kAfterPath_s : kWithHand_s;
@@ -113,10 +114,11 @@ class Run {
     start_clocks();
     result_.start_m = device_.read().position_m;
     begin_session(scene_, world_, state_, result_.start_m);
-    if (options_.relax_apart) relax_apart(state_, realtime_ ? Arrival::thread : Arrival::counted);
+    if (options_.async_relaxation)
+      start_async_relaxation(state_, realtime_ ? Arrival::thread : Arrival::counted);
     std::optional<RelaxationThread> relaxation;
-    if (options_.relax_apart && options_.relaxation_thread && realtime_ && !state_.soft.empty())
-      relaxation.emplace(world_, state_.apart, options_.surfaces_hz);
+    if (options_.async_relaxation && options_.relaxation_thread && realtime_ && !state_.soft.empty())
+      relaxation.emplace(world_, state_.async, options_.surfaces_hz);
     if (options_.reference_samples > 0 && !realtime_) {
       sample_every_ =
           std::max<std::uint64_t>(1, ticks_ / static_cast<std::uint64_t>(2 * options_.reference_samples));
@@ -141,7 +143,7 @@ class Run {
     }
     if (relaxation) result_.relaxation_s = relaxation->busy_s();
     relaxation.reset();
-    result_.relaxed_apart = state_.apart.results;
+    result_.relaxed_apart = state_.async.results;
     result_.end = served.end;
     result_.device_messages = std::move(served.messages);
     result_.ticks = ticks_done_;
@@ -159,7 +161,7 @@ class Run {
   void start_clocks() {
     if (options_.start_ticks == 0) return;
     const double now_s = static_cast<double>(options_.start_ticks) * dt_;
-    device_.hold(now_s);
+    device_.delay(now_s);
     state_.tick = options_.start_ticks;
     state_.clock = device::Clock(now_s);
     state_.limit.elapsed_s = now_s;
@@ -207,10 +209,10 @@ class Run {
   void keep(const TickResult& felt, std::uint64_t tick, device::DeviceFault fault) {
     hash_ = hash_tick(hash_, felt);
     if (options_.keep_recording)
-      result_.recording.push_back({felt.device_m, hash_, fault, state_.apart.arrived, work_share_.steps()});
+      result_.recording.push_back({felt.device_m, hash_, fault, state_.async.arrived, work_share_.steps()});
     result_.tick_us.add(felt.tick_us);
     result_.servo_s += 1e-6 * felt.tick_us;
-    result_.relaxation_s += 1e-6 * state_.apart.elsewhere_us;
+    result_.relaxation_s += 1e-6 * state_.async.other_thread_us;
     for (std::size_t s = 0; s < kStages; ++s) result_.stage_us[s].add(static_cast<double>(felt.stage_us[s]));
     const double force = glm::length(felt.force_N);
     result_.max_force_N = std::max(result_.max_force_N, force);
@@ -338,7 +340,7 @@ void begin_session(const Scene& scene, const World& world, WorldState& state, co
 }
 
 void play_again(const RecordedTick& tick, WorldState& state) noexcept {
-  state.apart.arrived = tick.arrived;
+  state.async.arrived = tick.arrived;
   give_work_share(state, tick.work_share);
 }
 
@@ -355,7 +357,7 @@ std::uint64_t hash_state(std::uint64_t before, const WorldState& state) noexcept
   for (const double x : {state.limit.elapsed_s, state.limit.handed.sum_J(), state.passive.given_J,
                          state.passive.worst_tick_J, state.passive.stride_m, state.passive.share})
     hash = mix(hash, std::bit_cast<std::uint64_t>(x));
-  for (const RigidNear& body : state.rigid) {
+  for (const RigidState& body : state.rigid) {
     hash = mix(mix(hash, body.pose.position_m), body.pose.rotation);
     hash = mix(mix(hash, body.free.centre_m), body.free.rotation);
     hash = mix(mix(hash, body.free.velocity_m_per_s), body.free.spin_rad_per_s);
@@ -403,7 +405,7 @@ namespace {
 // spacings deep, 8.9 N were felt for good where 15.8 are right.)
 bool carried_by_anchors(const World& world, const WorldState& state) noexcept {
   constexpr double kShare = 0.01, kLeast_N = 1e-3;
-  if (!world.meeting.empty()) return true;
+  if (!world.soft_pairs.empty()) return true;
   for (std::size_t o = 0; o < state.soft.size(); ++o) {
     const voxel::SoftObject& object = *state.soft[o];
     if (state.reactions[o].pressed == 0 || !object.obstacles().empty() || object.lattice().yields() ||
@@ -437,14 +439,6 @@ std::optional<glm::dvec3> equilibrium_force(const World& world, const WorldState
     before = force;
   }
   return std::nullopt;
-}
-
-double jnd_of(const glm::dvec3& force, const glm::dvec3& reference, double floor_N) {
-  return glm::length(force - reference) / std::max(kJndShare * glm::length(reference), floor_N);
-}
-
-double jnd_floor_N(const Scene& scene) {
-  return std::max(kJndFloor_N, scene_limits(scene).friction_N);
 }
 
 }  // namespace hybrid

@@ -10,13 +10,15 @@
 #include <vector>
 
 #include "device/loop/haptic_device.h"
-#include "device/paths/path.h"
 #include "device/loop/servo_loop.h"
-#include "hybrid/session/black_box.h"
-#include "hybrid/build/build_world.h"
-#include "hybrid/session/clearance.h"
-#include "hybrid/tick/tick.h"
+#include "device/paths/path.h"
 #include "hybrid/base/histogram.h"
+#include "hybrid/build/build_world.h"
+#include "hybrid/build/load_scene.h"
+#include "hybrid/session/black_box.h"
+#include "hybrid/session/clearance.h"
+#include "hybrid/snapshot/snapshot.h"
+#include "hybrid/tick/tick.h"
 
 namespace hybrid {
 
@@ -50,7 +52,7 @@ struct SessionOptions {
   std::uint64_t start_ticks = 0;
   Progress progress;
   // Tissue away from the contact is relaxed apart from the tick: in real time on a thread of its own.
-  bool relax_apart = false;
+  bool async_relaxation = false;
   bool relaxation_thread = true;  // false: nothing is relaxed apart; for benchmarks
   double surfaces_hz = 0.0;       // how often that thread says where surfaces are, for whoever draws
   BlackBox* black_box = nullptr;  // every tick is added to it
@@ -128,11 +130,5 @@ std::unique_ptr<WorldState> copy_state(const World& world, const WorldState& sta
 // settle.
 std::optional<glm::dvec3> equilibrium_force(const World& world, const WorldState& state,
                                             double tolerance_N = 1e-4);
-
-// |a − b| in just noticeable differences: 7 % of the reference, and no less than the floor (N).
-inline constexpr double kJndShare = 0.07;
-double jnd_of(const glm::dvec3& force, const glm::dvec3& reference, double floor_N);
-// The floor for a scene's device: its friction, and 0.04 N at least.
-double jnd_floor_N(const Scene& scene);
 
 }  // namespace hybrid

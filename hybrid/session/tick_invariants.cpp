@@ -38,7 +38,7 @@ Spring spring_of(const World& world, const glm::dvec3& proxy_m, const glm::dvec3
 }
 
 bool finite(const WorldState& state) {
-  for (const RigidNear& body : state.rigid) {
+  for (const RigidState& body : state.rigid) {
     const glm::dquat& q = body.pose.rotation;
     const bool good = finite(body.pose.position_m) && std::isfinite(q.w + q.x + q.y + q.z) &&
                       finite(body.free.centre_m) && finite(body.free.velocity_m_per_s) &&
@@ -51,7 +51,7 @@ bool finite(const WorldState& state) {
     }
   }
   return std::isfinite(state.clock.now_s()) && std::isfinite(state.limit.elapsed_s) &&
-         finite(state.limit.last_N) && std::isfinite(state.hidden_stiffness_N_per_m) &&
+         finite(state.limit.last_N) && std::isfinite(state.learnt_stiffness_N_per_m) &&
          std::isfinite(state.damping.balance_J);
 }
 

@@ -75,7 +75,7 @@ void fill_moved_near(const World& world, const WorldState& state, Snapshot& snap
       fill_dent(body, object, snapshot.dents[number]);
       continue;
     }
-    if (!state.apart.has(o)) {
+    if (!state.async.has(o)) {
       fill_surface(body, object, snapshot.soft_moved_m[number]);
       continue;
     }

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "hybrid/snapshot/snapshot.h"
-#include "hybrid/world/world.h"
+#include "hybrid/world/world_state.h"
 
 namespace hybrid {
 

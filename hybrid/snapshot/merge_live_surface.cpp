@@ -75,7 +75,7 @@ glm::vec3 SoftDent::at(const glm::dvec3& at_rest_m) const noexcept {
   return glm::vec3(0.0F);
 }
 
-void show_live(const DrawnScene& scene, const Snapshot& snapshot, const RelaxationThread::Moved& surfaces,
+void show_live(const DrawnScene& scene, const Snapshot& snapshot, const MovedSurfaces& surfaces,
                Snapshot& shown) {
   shown = snapshot;
   for (std::size_t o = 0; o < std::min(shown.dents.size(), shown.soft_moved_m.size()); ++o) {

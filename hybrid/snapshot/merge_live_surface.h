@@ -3,13 +3,12 @@
 // and round the tool, where that may be some ticks old, what the tick said.
 #pragma once
 
-#include "hybrid/tick/tissue/async_relaxation.h"
 #include "hybrid/snapshot/snapshot.h"
 
 namespace hybrid {
 
 // Fills in `shown` what `snapshot`, of fill_moved_near(), leaves to `surfaces`. For the thread that draws.
-void show_live(const DrawnScene& scene, const Snapshot& snapshot, const RelaxationThread::Moved& surfaces,
+void show_live(const DrawnScene& scene, const Snapshot& snapshot, const MovedSurfaces& surfaces,
                Snapshot& shown);
 
 }  // namespace hybrid

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "hybrid/world/object_feel.h"
 #include "polygon/mesh/mesh.h"
 
 namespace hybrid {
@@ -32,11 +33,6 @@ struct DrawnScene {
   bool tool_is_punch = false;
   double tool_radius_m = 0.0;
   double max_force_N = 0.0;  // scale of the force arrow
-};
-
-struct ObjectFeel {
-  bool contact = false;
-  double force_N = 0.0;  // what this object contributes
 };
 
 // Where a rigid object is now, against where it lies at rest: a turn about a point that goes along with it.
@@ -77,6 +73,9 @@ struct SoftDent {
   [[nodiscard]] glm::vec3 at(const glm::dvec3& at_rest_m) const noexcept;
 };
 
+// [object][vertex of its surface] displacement (scene frame, meters); empty for a rigid object.
+using MovedSurfaces = std::vector<std::vector<glm::vec3>>;
+
 struct Snapshot {
   std::uint64_t tick = 0;
   double t_s = 0.0;
@@ -85,7 +84,7 @@ struct Snapshot {
   // One an object: empty for a rigid one; for a soft one how far each vertex of its surface is from rest
   // (scene frame, meters). Displacements, because a float position 1,000 km from the origin is off by
   // centimeters.
-  std::vector<std::vector<glm::vec3>> soft_moved_m;
+  MovedSurfaces soft_moved_m;
   // One an object; of those whose tissue is relaxed on a thread of its own, which says where the rest is.
   std::vector<SoftPatch> patches{};
   // One an object, or none at all: of those whose contact is on a composite grid, in place of soft_moved_m.

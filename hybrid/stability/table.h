@@ -2,7 +2,7 @@
 // What was measured of stability, as JSON and as a person would read it.
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "hybrid/stability/stability.h"

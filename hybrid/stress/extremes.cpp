@@ -13,11 +13,12 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <string_view>
 #include <variant>
 
-#include "hybrid/stress/cases.h"
 #include "hybrid/base/process_memory.h"
+#include "hybrid/stress/cases.h"
 #include "polygon/files/mesh_file.h"
 #include "polygon/surface/primitives.h"
 

@@ -15,10 +15,11 @@
 #include <random>
 
 #include "hybrid/base/flush_to_zero.h"
-#include "hybrid/stress/drive.h"
-#include "hybrid/stress/scenes.h"
 #include "hybrid/session/session.h"
 #include "hybrid/session/tick_invariants.h"
+#include "hybrid/stress/drive.h"
+#include "hybrid/stress/scenes.h"
+#include "hybrid/tick/tissue/async_relaxation.h"
 
 namespace hybrid {
 namespace {
@@ -214,7 +215,7 @@ class Fuzz {
         state_(*built_.state),
         input_(seed) {
     result_.scene = which.name;
-    if (apart) relax_apart(state_, Arrival::counted);
+    if (apart) start_async_relaxation(state_, Arrival::counted);
   }
 
   FuzzResult run(std::uint64_t ticks) {
@@ -327,7 +328,7 @@ std::vector<FuzzResult> fuzz_ticks(const FuzzOptions& options) {
   for (const FuzzScene& which : scenes()) {
     if (!options.only.empty() && which.name != options.only) continue;
     if (options.progress) options.progress(fmt::format("fuzzing ticks: {}", which.name));
-    results.push_back(Fuzz(which, folder, options.seed, options.relax_apart)
+    results.push_back(Fuzz(which, folder, options.seed, options.async_relaxation)
                           .run(std::max<std::uint64_t>(1, options.ticks / scenes().size())));
   }
   std::error_code none;

@@ -13,7 +13,7 @@ namespace hybrid {
 struct FuzzOptions {
   std::uint64_t ticks = 20'000;  // over all scenes, a little more
   std::uint64_t seed = 1;
-  bool relax_apart = false;  // as SessionOptions::relax_apart says, by counted work
+  bool async_relaxation = false;  // as SessionOptions::async_relaxation says, by counted work
   std::string only{};        // of the scenes, by its name; empty: all of them
   Progress progress{};
 };

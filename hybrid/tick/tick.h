@@ -6,14 +6,23 @@
 #include <cstdint>
 
 #include "device/loop/haptic_device.h"
-#include "hybrid/world/world.h"
+#include "hybrid/world/world_state.h"
 
 namespace hybrid {
 
-enum class Stage : std::uint8_t { bodies, broad_phase, contact, arbitration, background, map, force };
+// The stages in the order in which haptic_tick() calls them.
+enum class Stage : std::uint8_t {
+  bodies,       // bodies that move go on, and carry or push the proxy
+  broad_phase,  // what the occupancy map says of the proxy's neighbourhood
+  contact,      // bodies press tissue; proxy, rigid planes and tissue answer one another
+  background,   // tissue away from the contact goes on to its equilibrium
+  arbitration,  // soft objects, tool and bodies give way to one another
+  map,          // the occupancy map learns where surface voxels are
+  force,        // the force is made safe and published
+};
 inline constexpr std::size_t kStages = 7;
 inline constexpr std::array<const char*, kStages> kStageNames{
-    "bodies", "broad_phase", "contact", "arbitration", "background", "map", "force"};
+    "bodies", "broad_phase", "contact", "background", "arbitration", "map", "force"};
 
 struct TickResult {
   glm::dvec3 device_m{0.0};  // scene frame, as used (the last good input)

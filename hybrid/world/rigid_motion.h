@@ -7,8 +7,8 @@
 #include <optional>
 
 #include "device/paths/path.h"
-#include "hybrid/world/free_body.h"
 #include "hybrid/scene/scene.h"
+#include "hybrid/world/free_body.h"
 #include "polygon/mesh/mesh.h"
 
 namespace hybrid {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "hybrid/world/world.h"
+#include "hybrid/world/world_state.h"
 
 #include <algorithm>
 
@@ -13,7 +13,7 @@ constexpr double kFirstMargin = 1.0 / 64.0;  // of an object's extent, of the pr
 WorldState::WorldState(const World& world, OccupancyMap occupancy) : map(std::move(occupancy)) {
   feel.resize(world.object_count());
   rigid_force_N.resize(world.rigid.size());
-  near.resize(world.rigid.empty() ? 0 : kMaxNear);
+  scratch.near.resize(world.rigid.empty() ? 0 : kMaxNear);
   rigid.reserve(world.rigid.size());
   for (const RigidObject& object : world.rigid) {
     const double extent = glm::length(object.surface->upper() - object.surface->lower());
@@ -23,35 +23,35 @@ WorldState::WorldState(const World& world, OccupancyMap occupancy) : map(std::mo
                      .before = object.pose,
                      .near = polygon::Neighbourhood(object.surface->element_count()),
                      .margin_m = kFirstMargin * extent,
-                     .ridges = {}});
+                     .crossable_edges = {}});
     if (object.motion.kind() == RigidMotion::Kind::free)
       rigid.back().free = state_at(object.motion.free_body(), object.pose);
   }
-  planes.reserve(kMaxPlanes);
+  scratch.planes.reserve(kMaxPlanes);
 }
 
 void WorldState::prepare(const World& world) {
   reactions.resize(soft.size());
-  obstacle_seen.resize(soft.size());
+  obstacle_queries.resize(soft.size());
   cursor.assign(soft.size(), 0);
   obstacle_cursor.assign(soft.size(), 0);
-  touched.resize(soft.size());
-  for (auto& list : touched) list.reserve(voxel::SoftObject::kMaxTouched);
+  scratch.touched.resize(soft.size());
+  for (auto& list : scratch.touched) list.reserve(voxel::SoftObject::kMaxTouched);
   if (!soft.empty()) {
-    bounds.resize(kMaxPlanes / 2);
-    blocked.reserve(kMaxPlanes);
-    found.resize(kMaxFound);
+    scratch.bounds.resize(kMaxPlanes / 2);
+    jammed.reserve(kMaxPlanes);
+    scratch.map_hits.resize(kMaxMapHits);
   }
-  prepare_beside_bodies(world);
-  pair_cursor.assign(world.meeting.size(), 0);
-  paired.resize(world.meeting.size());
-  for (std::size_t m = 0; m < world.meeting.size(); ++m) {
-    paired[m].assign(soft[world.meeting[m][0]]->lattice().surface().size(), 0);
+  prepare_body_obstacles(world);
+  pair_cursor.assign(world.soft_pairs.size(), 0);
+  paired.resize(world.soft_pairs.size());
+  for (std::size_t m = 0; m < world.soft_pairs.size(); ++m) {
+    paired[m].assign(soft[world.soft_pairs[m][0]]->lattice().surface().size(), 0);
   }
-  pairs.reserve(world.meeting.empty() ? 0 : kMaxPairs);
+  facet_contacts.reserve(world.soft_pairs.empty() ? 0 : kMaxFacetContacts);
 }
 
-void WorldState::prepare_beside_bodies(const World& world) {
+void WorldState::prepare_body_obstacles(const World& world) {
   const auto presses = [](const RigidObject& object) { return object.presses_tissue; };
   if (std::none_of(world.rigid.begin(), world.rigid.end(), presses)) return;
   body_travel_m.assign(world.rigid.size(), 0.0);
@@ -61,28 +61,28 @@ void WorldState::prepare_beside_bodies(const World& world) {
     object->prepare_beside_bodies();
     const std::size_t count = object->lattice().surface().size();
     most = std::max(most, count);
-    BesideBodies beside;
+    BodyObstacles beside;
     beside.standing.resize(count);
     beside.moving.resize(count);
-    beside.whose.assign(count, BesideBodies::kNobody);
+    beside.whose.assign(count, BodyObstacles::kNobody);
     beside.listed.assign(count, 0);
-    beside.blocked.assign(count, 0);
+    beside.jammed.assign(count, 0);
     for (const RigidObject& rigid_object : world.rigid)
-      beside.sights.emplace_back(rigid_object.presses_tissue ? count : 0);
-    beside_bodies.push_back(std::move(beside));
-    beside_bodies.back().near.reserve(count);
+      beside.queries.emplace_back(rigid_object.presses_tissue ? count : 0);
+    body_obstacles.push_back(std::move(beside));
+    body_obstacles.back().near.reserve(count);
   }
   const auto bodies =
       static_cast<std::size_t>(std::count_if(world.rigid.begin(), world.rigid.end(), presses));
-  due.reserve(most * bodies);
-  in_the_way.reserve(most);
-  held_by_body.reserve(voxel::SoftObject::kMaxTouched);
+  scratch.due.reserve(most * bodies);
+  scratch.in_the_way.reserve(most);
+  scratch.held_by_body.reserve(voxel::SoftObject::kMaxTouched);
   const auto free = [](const RigidObject& object) {
     return object.presses_tissue && object.motion.kind() == RigidMotion::Kind::free;
   };
   if (std::none_of(world.rigid.begin(), world.rigid.end(), free)) return;
-  at_body.reserve(voxel::SoftObject::kMaxTouched);
-  held_loads.resize(voxel::SoftObject::kMaxTouched);
+  scratch.at_body.reserve(voxel::SoftObject::kMaxTouched);
+  scratch.held_loads.resize(voxel::SoftObject::kMaxTouched);
 }
 
 }  // namespace hybrid

@@ -59,7 +59,7 @@ class TissueAtBodies {
         state_(state),
         body_(world.soft[soft]),
         object_(*state.soft[soft]),
-        beside_(state.beside_bodies[soft]),
+        beside_(state.body_obstacles[soft]),
         spacing_m_(object_.lattice().min_spacing_m()),
         watched_m_(kWatched * object_.lattice().max_spacing_m()),
         moment_(moment) {}
@@ -80,12 +80,13 @@ class TissueAtBodies {
     glm::dvec3 reach(watched_m_ + moved + object_.voxel_radius() + 2.0 * state_.map.cell_m());
     for (int axis = 0; axis < 3; ++axis) reach += glm::abs(frame.rotation[axis]) * half[axis];
     const glm::dvec3 middle = frame.to_scene(0.5 * (surface.upper() + surface.lower()));
-    const std::size_t count = state_.map.soft_in(middle - reach, middle + reach, state_.found);
-    if (count == state_.found.size()) state_.faults |= fault_body_crowded;
+    const std::size_t count = state_.map.soft_in(middle - reach, middle + reach, state_.scratch.map_hits);
+    if (count == state_.scratch.map_hits.size()) state_.faults |= fault_body_crowded;
     const std::size_t surface_count = object_.lattice().surface().size();
     for (std::size_t i = 0; i < count; ++i) {
-      const std::uint32_t s = state_.found[i] - body_.first_number;
-      if (state_.found[i] < body_.first_number || s >= surface_count || beside_.whose[s] == b) continue;
+      const std::uint32_t s = state_.scratch.map_hits[i] - body_.first_number;
+      if (state_.scratch.map_hits[i] < body_.first_number || s >= surface_count || beside_.whose[s] == b)
+        continue;
       const double left_m = left(b, s);
       if (left_m <= moved) add(left_m, b, s);
     }
@@ -93,7 +94,7 @@ class TissueAtBodies {
 
   // Looks at what was listed, those nearest first as far as the budget goes.
   void look() noexcept {
-    auto& due = state_.due;
+    auto& due = state_.scratch.due;
     const std::size_t most = meshes_ ? kMeshLooks : kLooks;
     if (due.size() > most) {
       const auto end = due.begin() + static_cast<std::ptrdiff_t>(most);
@@ -105,21 +106,21 @@ class TissueAtBodies {
       due.resize(most);
     }
     // The map's lists are in the order of motion; sorted, the result does not depend on history.
-    std::sort(due.begin(), due.end(), [](const BodyLook& a, const BodyLook& b) {
+    std::sort(due.begin(), due.end(), [](const DueQuery& a, const DueQuery& b) {
       return a.body != b.body ? a.body < b.body : a.surface_number < b.surface_number;
     });
-    for (const BodyLook& d : due) look(d.body, d.surface_number);
+    for (const DueQuery& d : due) look(d.body, d.surface_number);
   }
 
   // Each voxel that a body is near to gets the half-space of that or of what stands, and leaves it.
   void press() noexcept {
-    auto& in_the_way = state_.in_the_way;
+    auto& in_the_way = state_.scratch.in_the_way;
     in_the_way.clear();
     std::size_t kept = 0;
     for (const std::uint32_t s : beside_.near) {
       choose(s);
       if (leads_out(s)) in_the_way.push_back(s);
-      if (beside_.whose[s] != BesideBodies::kNobody) {
+      if (beside_.whose[s] != BodyObstacles::kNobody) {
         beside_.near[kept++] = s;
       } else {
         beside_.listed[s] = 0;
@@ -175,14 +176,14 @@ class TissueAtBodies {
   // Is tissue deeper in a body than it should be? Anchors count: they do not leave its way.
   [[nodiscard]] bool squeezed() noexcept {
     double worst = -kSqueezed * spacing_m_;
-    std::uint32_t where = BesideBodies::kNobody;
+    std::uint32_t where = BodyObstacles::kNobody;
     for (const std::uint32_t s : beside_.near) {
       const double here = slack(beside_.moving[s], displacement(s));
       if (here >= worst) continue;
       worst = here;
       where = s;
     }
-    if (where == BesideBodies::kNobody) return false;
+    if (where == BodyObstacles::kNobody) return false;
     polygon::SignedDistance near;
     const double radius = object_.voxel_radius();
     return distance(beside_.whose[where], where, radius, near) &&
@@ -195,7 +196,7 @@ class TissueAtBodies {
   void give_up() noexcept {
     for (const std::uint32_t s : beside_.near) {
       // A free body gives way itself.
-      if (beside_.whose[s] == BesideBodies::kNobody || is_free(world_, beside_.whose[s])) continue;
+      if (beside_.whose[s] == BodyObstacles::kNobody || is_free(world_, beside_.whose[s])) continue;
       if (slack(beside_.moving[s], displacement(s)) >= -kGivenUp * spacing_m_) continue;
       sight(beside_.whose[s], s).given_up = true;
       forget(s);
@@ -233,27 +234,28 @@ class TissueAtBodies {
   // those beside it, by links at their limits, into the body, they it, and of two that are drawn apart the
   // wave favours one. Four voxels under a ball of 10 kg went aside before it so, for ever, at 4 mm/s.
   [[nodiscard]] double lets_in_m(std::uint32_t s) const noexcept {
-    return beside_.blocked[s] != 0 ? kProbe * spacing_m_ : 0.0;
+    return beside_.jammed[s] != 0 ? kJammedProbe * spacing_m_ : 0.0;
   }
   void let_in(std::uint32_t s) noexcept {
     voxel::Obstacle o = object_.obstacles()[s];
-    if (beside_.blocked[s] == 0 || !o.moving) return;
+    if (beside_.jammed[s] == 0 || !o.moving) return;
     o.bound -= static_cast<float>(lets_in_m(s));
     object_.set_obstacle(s, o);
   }
   [[nodiscard]] glm::dvec3 displacement(std::uint32_t s) const noexcept {
     return object_.state().at(object_.lattice().surface()[s]);
   }
-  [[nodiscard]] BodySight& sight(std::uint32_t b, std::uint32_t s) const noexcept {
-    return beside_.sights[b][s];
+  [[nodiscard]] BodyQuery& sight(std::uint32_t b, std::uint32_t s) const noexcept {
+    return beside_.queries[b][s];
   }
   // How far body and voxel may still move, at least, before the voxel is within what is watched (m).
   [[nodiscard]] double left(std::uint32_t b, std::uint32_t s) const noexcept {
-    const BodySight& seen = sight(b, s);
+    const BodyQuery& seen = sight(b, s);
     return seen.until_m - state_.body_travel_m[b] - glm::distance(displacement(s), glm::dvec3(seen.u));
   }
   void add(double left_m, std::uint32_t b, std::uint32_t s) noexcept {
-    if (state_.due.size() < state_.due.capacity()) state_.due.push_back({left_m, b, s});
+    if (state_.scratch.due.size() < state_.scratch.due.capacity())
+      state_.scratch.due.push_back({left_m, b, s});
   }
 
   [[nodiscard]] const BodyFrame& frame_of(std::uint32_t b) noexcept {
@@ -295,7 +297,7 @@ class TissueAtBodies {
       if (whose == b) forget(s);
       return;
     }
-    if (whose != BesideBodies::kNobody && whose != b && slack(beside_.moving[s], u) <= gap) return;
+    if (whose != BodyObstacles::kNobody && whose != b && slack(beside_.moving[s], u) <= gap) return;
     const glm::dvec3 n = glm::inverse(body_.pose.rotation) * (frame_of(b).rotation * near.normal);
     // What lies deep, because it was squeezed, comes out bit by bit.
     const double depth = std::min(-gap, moved + kComesOut * spacing_m_);
@@ -306,27 +308,27 @@ class TissueAtBodies {
     beside_.near.push_back(s);
   }
   void forget(std::uint32_t s) noexcept {
-    beside_.whose[s] = BesideBodies::kNobody;
+    beside_.whose[s] = BodyObstacles::kNobody;
     beside_.moving[s] = {};
-    beside_.blocked[s] = 0;
+    beside_.jammed[s] = 0;
   }
 
   const World& world_;
   WorldState& state_;
   const SoftBody& body_;
   voxel::SoftObject& object_;
-  BesideBodies& beside_;
+  BodyObstacles& beside_;
   double spacing_m_, watched_m_;
   Moment moment_;
   BodyFrame frame_;  // of the body that was asked for last
-  std::uint32_t frame_of_ = BesideBodies::kNobody;
+  std::uint32_t frame_of_ = BodyObstacles::kNobody;
   bool meshes_ = false;  // among the bodies
 };
 
 }  // namespace
 
 void watch_bodies(const World& world, WorldState& state) {
-  for (std::size_t o = 0; o < state.beside_bodies.size(); ++o) {
+  for (std::size_t o = 0; o < state.body_obstacles.size(); ++o) {
     TissueAtBodies tissue(world, state, o);
     for (std::uint32_t b = 0; b < world.rigid.size(); ++b) {
       if (world.rigid[b].presses_tissue) tissue.first_look(b);
@@ -338,9 +340,9 @@ namespace {
 
 // Bodies are where they are at that moment, having moved by body_moved_m since the last step.
 void press_once(const World& world, WorldState& state, const Moment& moment) noexcept {
-  for (std::size_t o = 0; o < state.beside_bodies.size(); ++o) {
+  for (std::size_t o = 0; o < state.body_obstacles.size(); ++o) {
     TissueAtBodies tissue(world, state, o, moment);
-    state.due.clear();
+    state.scratch.due.clear();
     for (std::uint32_t b = 0; b < world.rigid.size(); ++b) {
       if (world.rigid[b].presses_tissue) tissue.list(b);
     }
@@ -355,7 +357,7 @@ void stop_in_tissue(const World& world, WorldState& state, std::uint32_t b, cons
   Pose pose = pose_at(world, state, b, moment);
   double limit = moment.to_come > 0.0 ? kNoFurther : kTooDeep;
   for (int n = 0; n < kMostRounds && give_way_to_tissue(world, state, b, pose, limit, dt_s); ++n) {
-    for (std::size_t o = 0; o < state.beside_bodies.size(); ++o) TissueAtBodies(world, state, o).press();
+    for (std::size_t o = 0; o < state.body_obstacles.size(); ++o) TissueAtBodies(world, state, o).press();
     pose = state.rigid[b].pose;
     limit = kTooDeep;
   }
@@ -363,8 +365,8 @@ void stop_in_tissue(const World& world, WorldState& state, std::uint32_t b, cons
 
 }  // namespace
 
-void press_by_bodies(const World& world, WorldState& state, double dt_s) noexcept {
-  if (state.beside_bodies.empty()) return;
+void press_bodies_into_tissue(const World& world, WorldState& state, double dt_s) noexcept {
+  if (state.body_obstacles.empty()) return;
   double steps = 1.0;
   for (const double moved : state.body_moved_m) {
     for (const auto& object : state.soft)
@@ -391,27 +393,27 @@ void press_by_bodies(const World& world, WorldState& state, double dt_s) noexcep
 }
 
 void look_again(const World& world, WorldState& state, std::uint32_t b) noexcept {
-  for (std::size_t o = 0; o < state.beside_bodies.size(); ++o) TissueAtBodies(world, state, o).look_again(b);
+  for (std::size_t o = 0; o < state.body_obstacles.size(); ++o) TissueAtBodies(world, state, o).look_again(b);
 }
 
-void judge_bodies(const World& world, WorldState& state) noexcept {
-  for (std::size_t o = 0; o < state.beside_bodies.size(); ++o) {
+void flag_squeezed_bodies(const World& world, WorldState& state) noexcept {
+  for (std::size_t o = 0; o < state.body_obstacles.size(); ++o) {
     if (TissueAtBodies(world, state, o).squeezed()) state.faults |= fault_body_squeezed;
   }
 }
 
 const voxel::Obstacle& standing_obstacle(const WorldState& state, std::size_t soft, std::size_t s) noexcept {
-  return state.beside_bodies.empty() ? state.soft[soft]->obstacles()[s]
-                                     : state.beside_bodies[soft].standing[s];
+  return state.body_obstacles.empty() ? state.soft[soft]->obstacles()[s]
+                                      : state.body_obstacles[soft].standing[s];
 }
 
 void set_standing_obstacle(WorldState& state, std::size_t soft, std::size_t s,
                            const voxel::Obstacle& obstacle) noexcept {
-  if (state.beside_bodies.empty()) {
+  if (state.body_obstacles.empty()) {
     state.soft[soft]->set_obstacle(s, obstacle);
     return;
   }
-  BesideBodies& beside = state.beside_bodies[soft];
+  BodyObstacles& beside = state.body_obstacles[soft];
   beside.standing[s] = obstacle;
   if (!exists(beside.moving[s])) state.soft[soft]->set_obstacle(s, obstacle);
 }

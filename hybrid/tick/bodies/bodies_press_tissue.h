@@ -12,7 +12,7 @@
 // be near: so nearly all exact queries are of voxels that are near.
 #pragma once
 
-#include "hybrid/world/world.h"
+#include "hybrid/world/world_state.h"
 
 namespace hybrid {
 
@@ -22,13 +22,13 @@ void watch_bodies(const World& world, WorldState& state);
 // In the tick, after the bodies moved by dt_s and before the tool looks for its place. Those that moved by
 // more than half a spacing come in steps of that: an edge that went further in one would push voxels beside
 // one another different ways.
-void press_by_bodies(const World& world, WorldState& state, double dt_s) noexcept;
+void press_bodies_into_tissue(const World& world, WorldState& state, double dt_s) noexcept;
 
 // Body b was moved since: the voxels beside it are looked at again.
 void look_again(const World& world, WorldState& state, std::uint32_t b) noexcept;
 
 // At its end: sets a fault where tissue could not leave a body's way.
-void judge_bodies(const World& world, WorldState& state) noexcept;
+void flag_squeezed_bodies(const World& world, WorldState& state) noexcept;
 
 // What fixed surfaces ask of surface voxel s of a soft object. Where no body presses tissue, that is its
 // obstacle; else its obstacle is that, or what the nearest body asks.

@@ -59,17 +59,17 @@ class Collisions {
 
   void look_at_all() noexcept {
     place_now();
-    for (PairOfBodies& pair : all_.pairs)
-      for_points(pair, [&](Side side, std::size_t i, PointSight& sight) { look_now(pair, side, i, sight); });
+    for (BodyPair& pair : all_.pairs)
+      for_points(pair, [&](Side side, std::size_t i, PointQuery& sight) { look_now(pair, side, i, sight); });
   }
 
   void add_stops(std::uint32_t b, double stiffness) noexcept {
     place_now();
-    for (PairOfBodies& pair : all_.pairs) {
+    for (BodyPair& pair : all_.pairs) {
       if (pair.free != b && pair.other != b) continue;
       const double near_m = kBesides * pair.size_m;
       if (far_apart(pair, near_m)) continue;
-      for_points(pair, [&](Side side, std::size_t i, PointSight& sight) {
+      for_points(pair, [&](Side side, std::size_t i, PointQuery& sight) {
         if (sight.gap_m - drift(pair, sight) > near_m) return;
         look_now(pair, side, i, sight);
         if (sight.gap_m > near_m) return;
@@ -88,39 +88,39 @@ class Collisions {
  private:
   using Side = std::size_t;  // 0: points of the free one at the other's surface; 1: the other way round
 
-  static std::uint32_t whose(const PairOfBodies& pair, Side side) noexcept {
+  static std::uint32_t whose(const BodyPair& pair, Side side) noexcept {
     return side == 0 ? pair.free : pair.other;
   }
-  static std::uint32_t at_whose(const PairOfBodies& pair, Side side) noexcept {
+  static std::uint32_t at_whose(const BodyPair& pair, Side side) noexcept {
     return side == 0 ? pair.other : pair.free;
   }
-  [[nodiscard]] const SurfacePoint& point(const PairOfBodies& pair, Side side, std::size_t i) const noexcept {
+  [[nodiscard]] const SurfacePoint& point(const BodyPair& pair, Side side, std::size_t i) const noexcept {
     return world_.rigid[whose(pair, side)].points[i];
   }
   // Where the point is on its object's surface now, in the object's own frame.
-  [[nodiscard]] static glm::dvec3 place(const SurfacePoint& p, const PointSight& sight) noexcept {
+  [[nodiscard]] static glm::dvec3 place(const SurfacePoint& p, const PointQuery& sight) noexcept {
     return p.at_m + sight.slid_m * p.along;
   }
-  [[nodiscard]] glm::dvec3 place(const PairOfBodies& pair, Side side, std::size_t i) const noexcept {
-    return place(point(pair, side, i), pair.sights[side][i]);
+  [[nodiscard]] glm::dvec3 place(const BodyPair& pair, Side side, std::size_t i) const noexcept {
+    return place(point(pair, side, i), pair.queries[side][i]);
   }
   template <class Visit>
-  void for_points(PairOfBodies& pair, const Visit& visit) noexcept {
+  void for_points(BodyPair& pair, const Visit& visit) noexcept {
     for (Side side = 0; side < 2; ++side) {
-      for (std::size_t i = 0; i < pair.sights[side].size(); ++i) visit(side, i, pair.sights[side][i]);
+      for (std::size_t i = 0; i < pair.queries[side].size(); ++i) visit(side, i, pair.queries[side][i]);
     }
   }
 
   // How far both have moved since the session began, as the last tick left them.
-  [[nodiscard]] double travel(const PairOfBodies& pair) const noexcept {
+  [[nodiscard]] double travel(const BodyPair& pair) const noexcept {
     return all_.travel_m[pair.free] + all_.travel_m[pair.other];
   }
-  [[nodiscard]] double drift(const PairOfBodies& pair, const PointSight& sight) const noexcept {
+  [[nodiscard]] double drift(const BodyPair& pair, const PointQuery& sight) const noexcept {
     return travel(pair) - sight.seen_m;
   }
 
   // Both have hardly moved since: what is at rest is not looked at for ever.
-  [[nodiscard]] bool is_current(const PairOfBodies& pair, const PointSight& sight) const noexcept {
+  [[nodiscard]] bool is_current(const BodyPair& pair, const PointQuery& sight) const noexcept {
     return drift(pair, sight) <= kStillSeen * pair.skin_m;
   }
 
@@ -140,16 +140,16 @@ class Collisions {
     if (all_.pairs.empty()) return;
     place_now();
     std::fill(member_.begin(), member_.end(), BodyContact::kNone);
-    for (std::uint32_t m = 0; m < state_.colliding.stepped.size(); ++m)
-      member_[state_.colliding.object[m]] = m;
+    for (std::uint32_t m = 0; m < state_.scratch.free_bodies.stepped.size(); ++m)
+      member_[state_.scratch.free_bodies.object[m]] = m;
     place_after();
   }
   void place_after() noexcept {
     for (std::uint32_t o = 0; o < world_.rigid.size(); ++o) {
       const std::uint32_t m = member_[o];
-      next_[o] = m == BodyContact::kNone
-                     ? state_.rigid[o].pose
-                     : pose_of(*state_.colliding.stepped[m].body, state_.colliding.stepped[m].state);
+      next_[o] = m == BodyContact::kNone ? state_.rigid[o].pose
+                                         : pose_of(*state_.scratch.free_bodies.stepped[m].body,
+                                                   state_.scratch.free_bodies.stepped[m].state);
       after_[o] = BodyFrame(next_[o]);
       moves_[o] =
           next_[o] != all_.last[o] ? world_.rigid[o].motion.displacement_bound(all_.last[o], next_[o]) : 0.0;
@@ -157,7 +157,7 @@ class Collisions {
   }
 
   // Nothing of the one is nearer than `range` to the other. (False also where that was not looked for again.)
-  bool far_apart(PairOfBodies& pair, double range) noexcept {
+  bool far_apart(BodyPair& pair, double range) noexcept {
     if (pair.until_m - travel(pair) > range) return true;
     if (travel(pair) - pair.seen_m < kLookAgain * pair.size_m) return false;
     const RigidObject &free = world_.rigid[pair.free], &other = world_.rigid[pair.other];
@@ -174,8 +174,8 @@ class Collisions {
 
   // Looks from place `x` in the other one's frame. A point that came no further than `jump_m`, is nearer than
   // that to the surface, and sees it from the other side than before, went through it.
-  [[nodiscard]] SeenSurface look_from(const PairOfBodies& pair, Side side, const glm::dvec3& x,
-                                      double radius_m, const glm::dvec3& known, double jump_m) noexcept {
+  [[nodiscard]] NearestSurface look_from(const BodyPair& pair, Side side, const glm::dvec3& x,
+                                         double radius_m, const glm::dvec3& known, double jump_m) noexcept {
     const polygon::RigidSurface& surface = *world_.rigid[at_whose(pair, side)].surface;
     const double range = radius_m + kLookFar * pair.size_m;
     polygon::SignedDistance near;
@@ -198,19 +198,19 @@ class Collisions {
     return {near.normal, at, near.distance - radius_m};
   }
   // A point whose last ways were all shorter than its distance is seen afresh, from wherever it is.
-  void look_now(const PairOfBodies& pair, Side side, std::size_t i, PointSight& sight) noexcept {
+  void look_now(const BodyPair& pair, Side side, std::size_t i, PointQuery& sight) noexcept {
     if (is_current(pair, sight)) return;
     const SurfacePoint& p = point(pair, side, i);
     const glm::dvec3 x =
         now_[at_whose(pair, side)].to_body(now_[whose(pair, side)].to_scene(place(p, sight)));
-    static_cast<SeenSurface&>(sight) = look_from(pair, side, x, p.radius_m, glm::dvec3(0.0), 0.0);
+    static_cast<NearestSurface&>(sight) = look_from(pair, side, x, p.radius_m, glm::dvec3(0.0), 0.0);
     sight.seen_m = travel(pair);
   }
 
   // The contact that a point, where `of` has it, makes with what it saw of the other surface, where `at` has
   // that. Without force.
-  [[nodiscard]] BodyContact contact_at(const PairOfBodies& pair, Side side, std::size_t i,
-                                       const SeenSurface& sight, const std::vector<BodyFrame>& of,
+  [[nodiscard]] BodyContact contact_at(const BodyPair& pair, Side side, std::size_t i,
+                                       const NearestSurface& sight, const std::vector<BodyFrame>& of,
                                        const std::vector<BodyFrame>& at) const noexcept {
     const SurfacePoint& p = point(pair, side, i);
     BodyContact contact;
@@ -244,16 +244,16 @@ class Collisions {
     add_contact(state_, contact);
   }
   [[nodiscard]] double mass_of(std::uint32_t member) const noexcept {
-    return state_.colliding.stepped[member].body->mass.mass_kg;
+    return state_.scratch.free_bodies.stepped[member].body->mass.mass_kg;
   }
 
   // What is touched as the tick begins.
   void add_touching() noexcept {
-    for (PairOfBodies& pair : all_.pairs) {
+    for (BodyPair& pair : all_.pairs) {
       if (!in_motion(pair)) continue;
       const double near_m = kTouching * pair.skin_m, slides_m = kSlides * pair.size_m;
       if (far_apart(pair, slides_m)) continue;
-      for_points(pair, [&](Side side, std::size_t i, PointSight& sight) {
+      for_points(pair, [&](Side side, std::size_t i, PointQuery& sight) {
         const double watched_m = point(pair, side, i).has_ends() ? slides_m : near_m;
         if (sight.gap_m - drift(pair, sight) > watched_m || looks_ > kLooks) return;
         look_now(pair, side, i, sight);
@@ -266,7 +266,7 @@ class Collisions {
   }
   // To where its edge is nearest to the other object: where it crosses an edge, and does not begin to
   // overlap.
-  void slide(const PairOfBodies& pair, Side side, std::size_t i, PointSight& sight) noexcept {
+  void slide(const BodyPair& pair, Side side, std::size_t i, PointQuery& sight) noexcept {
     const SurfacePoint& p = point(pair, side, i);
     if (!p.has_ends() || !(sight.gap_m > 0.0)) return;
     const glm::dvec3 along =
@@ -274,19 +274,19 @@ class Collisions {
     const double to_m =
         std::clamp(sight.slid_m - sight.gap_m * glm::dot(sight.normal, along), -p.reach_m, p.reach_m);
     if (std::abs(to_m - sight.slid_m) < kSlidEnough * p.reach_m) return;
-    PointSight there = sight;
+    PointQuery there = sight;
     there.slid_m = to_m;
     there.seen_m = -std::numeric_limits<double>::infinity();
     look_now(pair, side, i, there);
     if (there.gap_m > 0.0) sight = there;
   }
   // Those beside it on its edge are contacts with the same plane.
-  [[nodiscard]] bool is_implied(const PairOfBodies& pair, Side side, std::size_t i) const noexcept {
+  [[nodiscard]] bool is_implied(const BodyPair& pair, Side side, std::size_t i) const noexcept {
     const std::vector<SurfacePoint>& points = world_.rigid[whose(pair, side)].points;
     const SurfacePoint& p = points[i];
     if (!p.has_ends()) return false;
     const auto touches_too = [&](std::size_t n) {
-      const PointSight &beside = pair.sights[side][n], &own = pair.sights[side][i];
+      const PointQuery &beside = pair.queries[side][n], &own = pair.queries[side][i];
       return is_current(pair, beside) && beside.gap_m <= kTouching * pair.skin_m &&
              glm::dot(beside.normal, own.normal) > 1.0 - kSamePlane;
     };
@@ -294,14 +294,15 @@ class Collisions {
                goes_on = i + 1 < points.size() && points[i + 1].ends == p.ends;
     return touches_too(follows ? i - 1 : p.ends[0]) && touches_too(goes_on ? i + 1 : p.ends[1]);
   }
-  [[nodiscard]] bool in_motion(const PairOfBodies& pair) const noexcept {
+  [[nodiscard]] bool in_motion(const BodyPair& pair) const noexcept {
     return member_[pair.free] != BodyContact::kNone || member_[pair.other] != BodyContact::kNone;
   }
 
   void take_step() noexcept {
-    for (std::uint32_t m = 0; m < state_.colliding.stepped.size(); ++m)
-      state_.colliding.stepped[m].state = state_.rigid[state_.colliding.object[m]].free;
-    step_free_bodies(state_.colliding.stepped, state_.body_contacts, state_.colliding.system, dt_s_);
+    for (std::uint32_t m = 0; m < state_.scratch.free_bodies.stepped.size(); ++m)
+      state_.scratch.free_bodies.stepped[m].state = state_.rigid[state_.scratch.free_bodies.object[m]].free;
+    step_free_bodies(state_.scratch.free_bodies.stepped, state_.scratch.body_contacts,
+                     state_.scratch.free_bodies.system, dt_s_);
   }
 
   // Is every point's way free? Where one is not, it becomes a contact; in the last round its body stands
@@ -310,18 +311,18 @@ class Collisions {
     bool all_free = true;
     ++all_.round;
     least_ = kNotLess * (1.0 - static_cast<double>(round) / (kRounds + 1));
-    for (PairOfBodies& pair : all_.pairs) {
+    for (BodyPair& pair : all_.pairs) {
       if (!in_motion(pair)) continue;
       const double moved = moves_[pair.free] + moves_[pair.other];
       if (moved == 0.0 || far_apart(pair, moved + pair.skin_m)) continue;
-      for_points(pair, [&](Side side, std::size_t i, PointSight& sight) {
+      for_points(pair, [&](Side side, std::size_t i, PointQuery& sight) {
         if (sight.gap_m - drift(pair, sight) > moved + pair.skin_m) return;
         if (looks_ > kLooks) {
           state_.faults |= fault_body_crowded;
           return;
         }
         look_now(pair, side, i, sight);
-        SeenSurface met = static_cast<const SeenSurface&>(sight);
+        NearestSurface met = static_cast<const NearestSurface&>(sight);
         bool looked = false;
         if (way_is_free(pair, side, i, met, looked)) {
           if (looked) {
@@ -345,14 +346,14 @@ class Collisions {
   struct Way {
     glm::dvec3 from, to;
   };
-  [[nodiscard]] Way way_of(const PairOfBodies& pair, Side side, std::size_t i) const noexcept {
+  [[nodiscard]] Way way_of(const BodyPair& pair, Side side, std::size_t i) const noexcept {
     const std::uint32_t a = whose(pair, side), b = at_whose(pair, side);
     const glm::dvec3 at = place(pair, side, i);
     return {now_[b].to_body(now_[a].to_scene(at)), after_[b].to_body(after_[a].to_scene(at))};
   }
   // Follows a point in the other's frame; `met`: what it saw as the tick began, then what it came too near
   // to.
-  bool way_is_free(const PairOfBodies& pair, Side side, std::size_t i, SeenSurface& met,
+  bool way_is_free(const BodyPair& pair, Side side, std::size_t i, NearestSurface& met,
                    bool& looked) noexcept {
     const SurfacePoint& p = point(pair, side, i);
     const auto [from, to] = way_of(pair, side, i);
@@ -366,7 +367,7 @@ class Collisions {
     while (done < way) {
       const double ahead = std::min(way - done, std::max(gap - least, stride));
       done += ahead;
-      const SeenSurface before = met;
+      const NearestSurface before = met;
       met = look_from(pair, side, glm::mix(from, to, done / way), p.radius_m, before.normal,
                       before.gap_m < ahead ? ahead : 0.0);
       looked = true;
@@ -380,7 +381,7 @@ class Collisions {
     return true;
   }
   // The half-space that a point met on its way is kept, as seen from where the last solution took it.
-  void add_met(PairOfBodies& pair, Side side, std::size_t i, const SeenSurface& met) noexcept {
+  void add_met(BodyPair& pair, Side side, std::size_t i, const NearestSurface& met) noexcept {
     const SurfacePoint& p = point(pair, side, i);
     const auto [from, to] = way_of(pair, side, i);
     const BodyContact contact = contact_at(pair, side, i, met, now_, after_);
@@ -389,7 +390,7 @@ class Collisions {
     // Where it began nearer than that, nobody is thrown back.
     add(contact, before + std::max(0.0, pair.skin_m - in_front(met, from, p)));
   }
-  [[nodiscard]] static double in_front(const SeenSurface& met, const glm::dvec3& place,
+  [[nodiscard]] static double in_front(const NearestSurface& met, const glm::dvec3& place,
                                        const SurfacePoint& p) noexcept {
     return glm::dot(met.normal, place - met.at_m) - p.radius_m;
   }
@@ -399,14 +400,15 @@ class Collisions {
   }
   [[nodiscard]] double speed_of(std::uint32_t member, const BodyContact& contact) const noexcept {
     if (member == BodyContact::kNone) return 0.0;
-    const FreeBodyState& after = state_.colliding.stepped[member].state;
-    const glm::dvec3 arm = contact.point_m - state_.rigid[state_.colliding.object[member]].free.centre_m;
+    const FreeBodyState& after = state_.scratch.free_bodies.stepped[member].state;
+    const glm::dvec3 arm =
+        contact.point_m - state_.rigid[state_.scratch.free_bodies.object[member]].free.centre_m;
     return glm::dot(contact.normal, after.velocity_m_per_s + glm::cross(after.spin_rad_per_s, arm));
   }
   void stand_still(std::uint32_t o) noexcept {
     const std::uint32_t m = member_[o];
     if (m == BodyContact::kNone) return;
-    FreeBodyState& stepped = state_.colliding.stepped[m].state;
+    FreeBodyState& stepped = state_.scratch.free_bodies.stepped[m].state;
     stepped = state_.rigid[o].free;
     stepped.velocity_m_per_s = stepped.spin_rad_per_s = glm::dvec3(0.0);
   }
@@ -415,11 +417,11 @@ class Collisions {
   void finish() noexcept {
     arrive();
     bool overlaps = false;
-    for (PairOfBodies& pair : all_.pairs) {
+    for (BodyPair& pair : all_.pairs) {
       if (far_apart_now(pair)) continue;
-      for_points(pair, [&](Side /*side*/, std::size_t /*i*/, PointSight& sight) {
+      for_points(pair, [&](Side /*side*/, std::size_t /*i*/, PointQuery& sight) {
         if (sight.followed == all_.round) {
-          static_cast<SeenSurface&>(sight) = sight.end;
+          static_cast<NearestSurface&>(sight) = sight.end;
           sight.seen_m = travel(pair);
         }
         overlaps = overlaps || sight.gap_m < kOverlaps * pair.skin_m;
@@ -430,10 +432,10 @@ class Collisions {
   }
   // Overlaps are taken back by moving bodies, and not by their speed: no energy comes of it but weight's.
   void take_back() noexcept {
-    const std::size_t own = state_.body_contacts.size();
-    for (PairOfBodies& pair : all_.pairs) {
+    const std::size_t own = state_.scratch.body_contacts.size();
+    for (BodyPair& pair : all_.pairs) {
       if (!in_motion(pair) || far_apart_now(pair)) continue;
-      for_points(pair, [&](Side side, std::size_t i, PointSight& sight) {
+      for_points(pair, [&](Side side, std::size_t i, PointQuery& sight) {
         if (sight.gap_m > kTouching * pair.skin_m) return;
         BodyContact contact = contact_at(pair, side, i, sight, after_, after_);
         contact.carried_m_per_s = glm::dvec3(0.0);
@@ -441,17 +443,18 @@ class Collisions {
         add(contact, std::max(sight.gap_m - pair.skin_m, -kBack * pair.skin_m));
       });
     }
-    auto& still = state_.colliding.still;
-    for (std::size_t m = 0; m < state_.colliding.stepped.size(); ++m) {
-      still[m].state = state_.colliding.stepped[m].state;
+    auto& still = state_.scratch.free_bodies.still;
+    for (std::size_t m = 0; m < state_.scratch.free_bodies.stepped.size(); ++m) {
+      still[m].state = state_.scratch.free_bodies.stepped[m].state;
       still[m].state.velocity_m_per_s = still[m].state.spin_rad_per_s = glm::dvec3(0.0);
     }
-    step_free_bodies(still, std::span(state_.body_contacts).subspan(own), state_.colliding.system, dt_s_);
-    for (std::size_t m = 0; m < state_.colliding.stepped.size(); ++m) {
-      state_.colliding.stepped[m].state.centre_m = still[m].state.centre_m;
-      state_.colliding.stepped[m].state.rotation = still[m].state.rotation;
+    step_free_bodies(still, std::span(state_.scratch.body_contacts).subspan(own),
+                     state_.scratch.free_bodies.system, dt_s_);
+    for (std::size_t m = 0; m < state_.scratch.free_bodies.stepped.size(); ++m) {
+      state_.scratch.free_bodies.stepped[m].state.centre_m = still[m].state.centre_m;
+      state_.scratch.free_bodies.stepped[m].state.rotation = still[m].state.rotation;
     }
-    state_.body_contacts.resize(own);
+    state_.scratch.body_contacts.resize(own);
     place_after();
     arrive();
   }
@@ -462,7 +465,7 @@ class Collisions {
       all_.last[o] = next_[o];
     }
   }
-  [[nodiscard]] bool far_apart_now(const PairOfBodies& pair) const noexcept {
+  [[nodiscard]] bool far_apart_now(const BodyPair& pair) const noexcept {
     return pair.until_m - travel(pair) > 0.0;
   }
 
@@ -472,10 +475,10 @@ class Collisions {
   double dt_s_;
   std::size_t looks_ = 0;
   double least_ = kNotLess;  // skins; less from round to round, because a way is not quite straight
-  std::vector<BodyFrame>&now_ = state_.colliding.before, &after_ = state_.colliding.after;
-  std::vector<Pose>& next_ = state_.colliding.next;
-  std::vector<double>& moves_ = state_.colliding.moves_m;
-  std::vector<std::uint32_t>& member_ = state_.colliding.member;
+  std::vector<BodyFrame>&now_ = state_.scratch.free_bodies.before, &after_ = state_.scratch.free_bodies.after;
+  std::vector<Pose>& next_ = state_.scratch.free_bodies.next;
+  std::vector<double>& moves_ = state_.scratch.free_bodies.moves_m;
+  std::vector<std::uint32_t>& member_ = state_.scratch.free_bodies.member;
 };
 
 }  // namespace
@@ -485,7 +488,7 @@ void prepare_collisions(const World& world, WorldState& state) {
   std::uint32_t free = 0;
   for (std::uint32_t o = 0; o < count; ++o) free += is_free(world, o) ? 1 : 0;
   if (free == 0) return;
-  Colliding& colliding = state.colliding;
+  FreeBodyStep& colliding = state.scratch.free_bodies;
   colliding.stepped.reserve(free);
   colliding.object.reserve(free);
   colliding.own.reserve(free);
@@ -495,7 +498,7 @@ void prepare_collisions(const World& world, WorldState& state) {
     colliding.alone.push_back(alone(world.rigid[o].motion.free_body()));
   }
   for (const FreeBody& body : colliding.alone) colliding.still.push_back({.body = &body, .state = {}});
-  state.body_contacts.reserve(kMaxOneSided);
+  state.scratch.body_contacts.reserve(kMaxOneSided);
   BodyCollisions& all = state.collisions;
   const auto size = [&](std::uint32_t o) {
     return glm::length(world.rigid[o].surface->upper() - world.rigid[o].surface->lower());
@@ -503,20 +506,20 @@ void prepare_collisions(const World& world, WorldState& state) {
   for (std::uint32_t a = 0; a < count; ++a) {
     for (std::uint32_t b = 0; b < count; ++b) {
       if (a == b || !is_free(world, a) || (is_free(world, b) && b < a)) continue;
-      PairOfBodies pair;
+      BodyPair pair;
       pair.free = a;
       pair.other = b;
       pair.size_m = std::min(size(a), size(b));
       pair.skin_m = std::max(kSkin * pair.size_m, world.skin_m);
       pair.friction = std::sqrt(world.rigid[a].feel.dynamic_friction * world.rigid[b].feel.dynamic_friction);
-      pair.sights[0].resize(world.rigid[a].points.size());
-      pair.sights[1].resize(world.rigid[b].points.size());
+      pair.queries[0].resize(world.rigid[a].points.size());
+      pair.queries[1].resize(world.rigid[b].points.size());
       all.pairs.push_back(std::move(pair));
     }
   }
   if (all.pairs.empty()) return;
   all.travel_m.assign(count, 0.0);
-  for (const RigidNear& near : state.rigid) all.last.push_back(near.pose);
+  for (const RigidState& near : state.rigid) all.last.push_back(near.pose);
   colliding.before.resize(count);
   colliding.after.resize(count);
   colliding.next.resize(count);
@@ -528,10 +531,10 @@ void watch_collisions(const World& world, WorldState& state) {
   if (!state.collisions.pairs.empty()) Collisions(world, state, 1.0).look_at_all();
 }
 
-double overlap_m(const PairOfBodies& pair) noexcept {
+double overlap_m(const BodyPair& pair) noexcept {
   double least = std::numeric_limits<double>::max();
-  for (const auto& sights : pair.sights) {
-    for (const PointSight& sight : sights) least = std::min(least, sight.gap_m);
+  for (const auto& queries : pair.queries) {
+    for (const PointQuery& sight : queries) least = std::min(least, sight.gap_m);
   }
   return -least;
 }

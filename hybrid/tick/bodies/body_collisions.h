@@ -12,7 +12,7 @@
 // Nothing bounces. Friction is Coulomb's, with the mean (geometric) of both dynamic coefficients.
 #pragma once
 
-#include "hybrid/world/world.h"
+#include "hybrid/world/world_state.h"
 
 namespace hybrid {
 
@@ -23,14 +23,15 @@ void prepare_collisions(const World& world, WorldState& state);
 void watch_collisions(const World& world, WorldState& state);
 
 // How deep the two are in one another, as their points see it (m); negative: so far apart.
-[[nodiscard]] double overlap_m(const PairOfBodies& pair) noexcept;
+[[nodiscard]] double overlap_m(const BodyPair& pair) noexcept;
 
 // In the tick, when objects on paths were moved and before free ones are: takes state.stepped[i], as it is
-// now, to where it is after dt_s, under state.body_contacts (the index in state.stepped as `body`) and what
-// it collides with, which is appended there.
+// now, to where it is after dt_s, under state.scratch.body_contacts (the index in state.stepped as `body`)
+// and what it collides with, which is appended there.
 void step_past_rigid(const World& world, WorldState& state, double dt_s) noexcept;
 
-// Appends to state.body_contacts, as body 0, what keeps free body `b` from going further into anything rigid.
+// Appends to state.scratch.body_contacts, as body 0, what keeps free body `b` from going further into
+// anything rigid.
 void add_collision_stops(const World& world, WorldState& state, std::uint32_t b, double stiffness) noexcept;
 
 }  // namespace hybrid

@@ -80,7 +80,7 @@ void turn_contacts(WorldState& state, std::uint32_t object, const glm::dmat3& tu
 }  // namespace
 
 void set_rigid_pose(const World& world, WorldState& state, std::uint32_t object, const Pose& pose) noexcept {
-  RigidNear& near = state.rigid[object];
+  RigidState& near = state.rigid[object];
   const RigidMotion& motion = world.rigid[object].motion;
   const double reach = world.contact_radius_m() + motion.displacement_bound(near.pose, pose);
   const bool within = !world.use_map || (state.map.rigid_in(state.proxy_m - reach, state.proxy_m + reach) &
@@ -133,10 +133,11 @@ OwnContacts list_contacts(const World& world, WorldState& state, std::uint32_t o
                           double dt_s) noexcept {
   std::array<BodyContact, 4> of_tool;
   const std::size_t count = contacts_of(world, state, o, of_tool);
-  OwnContacts own{.first = state.body_contacts.size()};
+  OwnContacts own{.first = state.scratch.body_contacts.size()};
   for (std::size_t n = 0; n < count; ++n) own.springs += add_contact(state, of_tool[n]) ? 1 : 0;
   if (world.rigid[o].presses_tissue) own.springs += add_tissue_contacts(world, state, o, dt_s);
-  for (std::size_t n = own.first; n < state.body_contacts.size(); ++n) state.body_contacts[n].body = member;
+  for (std::size_t n = own.first; n < state.scratch.body_contacts.size(); ++n)
+    state.scratch.body_contacts[n].body = member;
   return own;
 }
 
@@ -144,9 +145,9 @@ OwnContacts list_contacts(const World& world, WorldState& state, std::uint32_t o
 bool rests(const World& world, WorldState& state, std::uint32_t o, const FreeBodyState& next,
            const OwnContacts& own, double dt_s) noexcept {
   const RigidMotion& motion = world.rigid[o].motion;
-  RigidNear& near = state.rigid[o];
+  RigidState& near = state.rigid[o];
   const double most = near.calm_ticks == kCalmTicks ? kRoused : 1.0;
-  const auto springs = std::span(state.body_contacts).subspan(own.first, own.springs);
+  const auto springs = std::span(state.scratch.body_contacts).subspan(own.first, own.springs);
   const bool calm = state.body_moved_m[o] <= most * kCalmWay * least_spacing_m(state) &&
                     is_calm(motion.free_body(), near.free, next, springs, dt_s, most * kCalmForce);
   near.calm_ticks = calm ? std::min(near.calm_ticks + 1, kCalmTicks) : 0;
@@ -154,11 +155,11 @@ bool rests(const World& world, WorldState& state, std::uint32_t o, const FreeBod
 }
 
 void move_free_bodies(const World& world, WorldState& state, double dt_s) noexcept {
-  Colliding& all = state.colliding;
+  FreeBodyStep& all = state.scratch.free_bodies;
   all.stepped.clear();
   all.object.clear();
   all.own.clear();
-  state.body_contacts.clear();
+  state.scratch.body_contacts.clear();
   for (std::uint32_t o = 0; o < world.rigid.size(); ++o) {
     if (!is_free(world, o)) continue;
     all.own.push_back(list_contacts(world, state, o, static_cast<std::uint32_t>(all.stepped.size()), dt_s));
@@ -169,7 +170,7 @@ void move_free_bodies(const World& world, WorldState& state, double dt_s) noexce
   step_past_rigid(world, state, dt_s);
   for (std::size_t n = 0; n < all.stepped.size(); ++n) {
     const std::uint32_t o = all.object[n];
-    RigidNear& near = state.rigid[o];
+    RigidState& near = state.rigid[o];
     const SteppedBody& stepped = all.stepped[n];
     if (stepped.stopped) state.faults |= fault_nonfinite_body;
     const Pose pose = pose_of(*stepped.body, stepped.state);

@@ -2,7 +2,7 @@
 // Rigid bodies that move in the tick, and the proxy that they push or carry.
 #pragma once
 
-#include "hybrid/world/world.h"
+#include "hybrid/world/world_state.h"
 
 namespace hybrid {
 

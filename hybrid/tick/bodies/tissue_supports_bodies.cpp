@@ -8,9 +8,9 @@
 #include <glm/matrix.hpp>
 #include <span>
 
+#include "hybrid/tick/bodies/bodies_press_tissue.h"
 #include "hybrid/tick/bodies/body_collisions.h"
 #include "hybrid/tick/bodies/move_bodies.h"
-#include "hybrid/tick/bodies/bodies_press_tissue.h"
 #include "voxel/lattice/voxel_links.h"
 
 namespace hybrid {
@@ -35,7 +35,7 @@ struct Held {
   double gap_m;       // negative: it is in the body
 };
 
-Held held_of(const voxel::SoftObject& object, const BesideBodies& beside, std::uint32_t s) noexcept {
+Held held_of(const voxel::SoftObject& object, const BodyObstacles& beside, std::uint32_t s) noexcept {
   const voxel::Obstacle& o = beside.moving[s];
   const glm::dvec3 n(o.normal);
   return {n, glm::dot(n, object.state().at(object.lattice().surface()[s])) - static_cast<double>(o.bound)};
@@ -43,7 +43,7 @@ Held held_of(const voxel::SoftObject& object, const BesideBodies& beside, std::u
 
 // The contact that it is, without force: where the body's surface was nearest to it when it was looked at.
 // (Since then it may have moved along its half-space, and forces from there would turn a ball.)
-BodyContact contact_at(const SoftBody& body, const voxel::SoftObject& object, const BodySight& sight,
+BodyContact contact_at(const SoftBody& body, const voxel::SoftObject& object, const BodyQuery& sight,
                        std::uint32_t s, const Held& held) noexcept {
   const glm::dvec3 out = body.pose.rotation * held.normal;
   const glm::dvec3 u(sight.u), at = body.to_scene(object.lattice().rest(object.lattice().surface()[s]) + u);
@@ -51,12 +51,12 @@ BodyContact contact_at(const SoftBody& body, const voxel::SoftObject& object, co
   return {at - (object.voxel_radius() + held.gap_m - moved) * out, -out, 0.0, 0.0};
 }
 
-// Every voxel that body b is the nearest one to: visit(soft object, its BesideBodies, surface number).
+// Every voxel that body b is the nearest one to: visit(soft object, its BodyObstacles, surface number).
 template <class Visit>
 void for_voxels_at(const WorldState& state, std::uint32_t b, const Visit& visit) noexcept {
-  for (std::size_t o = 0; o < state.beside_bodies.size(); ++o) {
-    for (const std::uint32_t s : state.beside_bodies[o].near) {
-      if (state.beside_bodies[o].whose[s] == b) visit(o, s);
+  for (std::size_t o = 0; o < state.body_obstacles.size(); ++o) {
+    for (const std::uint32_t s : state.body_obstacles[o].near) {
+      if (state.body_obstacles[o].whose[s] == b) visit(o, s);
     }
   }
 }
@@ -67,7 +67,7 @@ double rigid_stiffness(const FreeBody& body, double dt_s) noexcept {
 
 bool as_good_as_rigid(const WorldState& state, std::size_t o, std::uint32_t s) noexcept {
   const voxel::Lattice& lattice = state.soft[o]->lattice();
-  return state.beside_bodies[o].blocked[s] != 0 || lattice.anchored(lattice.surface()[s]);
+  return state.body_obstacles[o].jammed[s] != 0 || lattice.anchored(lattice.surface()[s]);
 }
 
 // The body may come to voxels of which `which` says so, and no nearer.
@@ -77,9 +77,9 @@ void add_stops(const World& world, WorldState& state, std::uint32_t b, double st
   for_voxels_at(state, b, [&](std::size_t o, std::uint32_t s) {
     if (!which(o, s)) return;
     const voxel::SoftObject& object = *state.soft[o];
-    const Held held = held_of(object, state.beside_bodies[o], s);
-    BodyContact contact = contact_at(world.soft[o], object, state.beside_bodies[o].sights[b][s], s, held);
-    const double left = held.gap_m + kProbe * object.lattice().min_spacing_m();
+    const Held held = held_of(object, state.body_obstacles[o], s);
+    BodyContact contact = contact_at(world.soft[o], object, state.body_obstacles[o].queries[b][s], s, held);
+    const double left = held.gap_m + kJammedProbe * object.lattice().min_spacing_m();
     contact.force_N = -stiffness * std::max(left, 0.0);
     contact.stiffness_N_per_m = stiffness;
     add_contact(state, contact);
@@ -105,24 +105,25 @@ bool presses(voxel::SoftObject& object, std::uint32_t s, const Held& held) noexc
 // Of one object the voxels at body b that move, those that press on it first. Returns how many these are.
 std::size_t list_pressing(WorldState& state, std::uint32_t b, std::size_t o) noexcept {
   voxel::SoftObject& object = *state.soft[o];
-  const BesideBodies& beside = state.beside_bodies[o];
+  const BodyObstacles& beside = state.body_obstacles[o];
   std::size_t pressed = 0;
-  state.at_body.clear();
+  state.scratch.at_body.clear();
   for (const bool on : {true, false}) {
     for (const std::uint32_t s : beside.near) {
       if (beside.whose[s] != b || !object.obstacles()[s].moving) continue;
       if (object.lattice().anchored(object.lattice().surface()[s])) continue;
       if (presses(object, s, held_of(object, beside, s)) != on) continue;
-      if (state.at_body.size() == state.at_body.capacity()) {
+      if (state.scratch.at_body.size() == state.scratch.at_body.capacity()) {
         state.faults |= fault_body_crowded;
         break;
       }
-      state.at_body.push_back(s);
+      state.scratch.at_body.push_back(s);
     }
-    if (on) pressed = state.at_body.size();
+    if (on) pressed = state.scratch.at_body.size();
   }
-  state.held_by_body.clear();
-  for (const std::uint32_t s : state.at_body) state.held_by_body.push_back(object.lattice().surface()[s]);
+  state.scratch.held_by_body.clear();
+  for (const std::uint32_t s : state.scratch.at_body)
+    state.scratch.held_by_body.push_back(object.lattice().surface()[s]);
   return pressed;
 }
 
@@ -145,26 +146,26 @@ double way_to_body(const voxel::SoftObject& object, std::uint32_t s, const Held&
 // balance all, they press with that: the share above has no torque that a box could rest by.
 void add_pressing(const World& world, WorldState& state, std::uint32_t b, std::size_t o) noexcept {
   const voxel::SoftObject& object = *state.soft[o];
-  const BesideBodies& beside = state.beside_bodies[o];
+  const BodyObstacles& beside = state.body_obstacles[o];
   const auto pressed = [&](std::size_t n, const glm::dvec3& normal) {
-    return std::max(0.0, -glm::dot(normal, state.held_loads[n].force_N));
+    return std::max(0.0, -glm::dot(normal, state.scratch.held_loads[n].force_N));
   };
   glm::dvec3 lacking_N(0.0);
   glm::dmat3 normals(0.0);
-  for (std::size_t n = 0; n < state.at_body.size(); ++n) {
-    if (!state.held_loads[n].tight) continue;
-    const glm::dvec3 normal(beside.moving[state.at_body[n]].normal);
-    lacking_N += -state.held_loads[n].force_N - pressed(n, normal) * normal;
+  for (std::size_t n = 0; n < state.scratch.at_body.size(); ++n) {
+    if (!state.scratch.held_loads[n].tight) continue;
+    const glm::dvec3 normal(beside.moving[state.scratch.at_body[n]].normal);
+    lacking_N += -state.scratch.held_loads[n].force_N - pressed(n, normal) * normal;
     normals += glm::outerProduct(normal, normal);
   }
   const double most = normals[0][0] + normals[1][1] + normals[2][2];
   const glm::dvec3 share =
       most > 0.0 ? glm::inverse(normals + glm::dmat3(kAcross * most)) * lacking_N : glm::dvec3(0.0);
-  for (std::size_t n = 0; n < state.at_body.size(); ++n) {
-    const std::uint32_t s = state.at_body[n];
-    const voxel::HeldLoad& load = state.held_loads[n];
+  for (std::size_t n = 0; n < state.scratch.at_body.size(); ++n) {
+    const std::uint32_t s = state.scratch.at_body[n];
+    const voxel::HeldLoad& load = state.scratch.held_loads[n];
     const Held held = held_of(object, beside, s);
-    BodyContact contact = contact_at(world.soft[o], object, beside.sights[b][s], s, held);
+    BodyContact contact = contact_at(world.soft[o], object, beside.queries[b][s], s, held);
     const double springs = glm::dot(held.normal, load.stiffness_N_per_m * held.normal);
     contact.stiffness_N_per_m = kDamping * springs;
     contact.force_N =
@@ -190,13 +191,13 @@ void add_pressing(const World& world, WorldState& state, std::uint32_t b, std::s
 
 std::size_t add_tissue_contacts(const World& world, WorldState& state, std::uint32_t b,
                                 double dt_s) noexcept {
-  const std::size_t before = state.body_contacts.size();
-  for (std::size_t o = 0; o < state.beside_bodies.size(); ++o) {
+  const std::size_t before = state.scratch.body_contacts.size();
+  for (std::size_t o = 0; o < state.body_obstacles.size(); ++o) {
     const std::size_t pressed = list_pressing(state, b, o);
-    state.soft[o]->load_held(state.held_by_body, pressed, state.held_loads);
+    state.soft[o]->load_held(state.scratch.held_by_body, pressed, state.scratch.held_loads);
     add_pressing(world, state, b, o);
   }
-  const std::size_t links = state.body_contacts.size();
+  const std::size_t links = state.scratch.body_contacts.size();
   add_rigid_contacts(world, state, b, rigid_stiffness(world.rigid[b].motion.free_body(), dt_s));
   return links - before;
 }
@@ -207,20 +208,20 @@ namespace {
 bool list_overlaps(const World& world, WorldState& state, std::uint32_t b, double limit,
                    double stiffness) noexcept {
   bool any = false;
-  state.body_contacts.clear();
+  state.scratch.body_contacts.clear();
   for_voxels_at(state, b, [&](std::size_t o, std::uint32_t s) {
     const voxel::SoftObject& object = *state.soft[o];
     const double h = object.lattice().min_spacing_m();
-    const Held held = held_of(object, state.beside_bodies[o], s);
-    std::uint8_t& blocked = state.beside_bodies[o].blocked[s];
+    const Held held = held_of(object, state.body_obstacles[o], s);
+    std::uint8_t& jammed = state.body_obstacles[o].jammed[s];
     if (-held.gap_m > limit * h) {
       any = true;
-      blocked = 1;
+      jammed = 1;
     }
-    if (-held.gap_m <= kProbe * h) return;
-    BodyContact contact = contact_at(world.soft[o], object, state.beside_bodies[o].sights[b][s], s, held);
+    if (-held.gap_m <= kJammedProbe * h) return;
+    BodyContact contact = contact_at(world.soft[o], object, state.body_obstacles[o].queries[b][s], s, held);
     contact.stiffness_N_per_m = stiffness;
-    contact.force_N = stiffness * (-held.gap_m - kProbe * h);
+    contact.force_N = stiffness * (-held.gap_m - kJammedProbe * h);
     add_contact(state, contact);
   });
   return any;
@@ -258,13 +259,13 @@ bool give_way_to_tissue(const World& world, WorldState& state, std::uint32_t b, 
   if (!(dt_s > 0.0)) return false;
   const RigidMotion& motion = world.rigid[b].motion;
   const FreeBody body = alone(motion.free_body());
-  RigidNear& near = state.rigid[b];
+  RigidState& near = state.rigid[b];
   const double stiffness = rigid_stiffness(body, dt_s);
   if (!list_overlaps(world, state, b, limit, stiffness)) return false;
-  const std::size_t overlaps = state.body_contacts.size();
+  const std::size_t overlaps = state.scratch.body_contacts.size();
   add_rigid_contacts(world, state, b, stiffness);
   add_collision_stops(world, state, b, stiffness);
-  const std::size_t rigid = state.body_contacts.size();
+  const std::size_t rigid = state.scratch.body_contacts.size();
   // Into other tissue only as far as it has to: the least motion of its mass may be a turn that goes far.
   add_stops(world, state, b, kOthers * stiffness,
             [&](std::size_t o, std::uint32_t s) { return !as_good_as_rigid(state, o, s); });
@@ -273,10 +274,10 @@ bool give_way_to_tissue(const World& world, WorldState& state, std::uint32_t b, 
   before.velocity_m_per_s = near.free.velocity_m_per_s;
   before.spin_rad_per_s = near.free.spin_rad_per_s;
   FreeBodyState stopped = before;
-  const bool found = step_free_body(body, out, state.body_contacts, dt_s);
+  const bool found = step_free_body(body, out, state.scratch.body_contacts, dt_s);
   // … and what it came in with ends.
-  for (std::size_t n = 0; n < overlaps; ++n) state.body_contacts[n].force_N = 0.0;
-  if (!found || !step_free_body(body, stopped, std::span(state.body_contacts).first(rigid), dt_s)) {
+  for (std::size_t n = 0; n < overlaps; ++n) state.scratch.body_contacts[n].force_N = 0.0;
+  if (!found || !step_free_body(body, stopped, std::span(state.scratch.body_contacts).first(rigid), dt_s)) {
     state.faults |= fault_nonfinite_body;
     return false;
   }
@@ -293,34 +294,34 @@ bool give_way_to_tissue(const World& world, WorldState& state, std::uint32_t b, 
 }
 
 void relax_under_paths(const World& world, WorldState& state) noexcept {
-  for (std::size_t o = 0; o < state.beside_bodies.size(); ++o) {
+  for (std::size_t o = 0; o < state.body_obstacles.size(); ++o) {
     voxel::SoftObject& object = *state.soft[o];
-    const BesideBodies& beside = state.beside_bodies[o];
-    state.held_by_body.clear();
+    const BodyObstacles& beside = state.body_obstacles[o];
+    state.scratch.held_by_body.clear();
     for (const std::uint32_t s : beside.near) {
       const std::uint32_t b = beside.whose[s];
-      if (b == BesideBodies::kNobody || is_free(world, b) || !object.obstacles()[s].moving) continue;
+      if (b == BodyObstacles::kNobody || is_free(world, b) || !object.obstacles()[s].moving) continue;
       if (held_of(object, beside, s).gap_m >= kOnBody * object.lattice().min_spacing_m()) continue;
-      if (state.held_by_body.size() == state.held_by_body.capacity()) break;
-      state.held_by_body.push_back(object.lattice().surface()[s]);
+      if (state.scratch.held_by_body.size() == state.scratch.held_by_body.capacity()) break;
+      state.scratch.held_by_body.push_back(object.lattice().surface()[s]);
     }
-    if (!state.held_by_body.empty()) object.relax_held(state.held_by_body);
+    if (!state.scratch.held_by_body.empty()) object.relax_held(state.scratch.held_by_body);
   }
 }
 
-void keep_out_of_tissue(const World& world, WorldState& state, double dt_s) noexcept {
-  if (state.beside_bodies.empty()) return;
+void push_bodies_out_of_tissue(const World& world, WorldState& state, double dt_s) noexcept {
+  if (state.body_obstacles.empty()) return;
   for (std::uint32_t b = 0; b < world.rigid.size(); ++b) {
     if (!world.rigid[b].presses_tissue || !is_free(world, b)) continue;
     give_way_to_tissue(world, state, b, state.rigid[b].pose, kTooDeep, dt_s);
     for_voxels_at(state, b, [&](std::size_t o, std::uint32_t s) {
       const voxel::SoftObject& object = *state.soft[o];
-      const double gap_m = held_of(object, state.beside_bodies[o], s).gap_m;
+      const double gap_m = held_of(object, state.body_obstacles[o], s).gap_m;
       const double spacing_m = object.lattice().min_spacing_m();
-      std::uint8_t& blocked = state.beside_bodies[o].blocked[s];
-      if (gap_m > -kUnblocked * spacing_m) blocked = 0;
+      std::uint8_t& jammed = state.body_obstacles[o].jammed[s];
+      if (gap_m > -kUnblocked * spacing_m) jammed = 0;
       // Not only once it is too deep: bodies that went from voxel to voxel, lifted out of each, never rested.
-      if (gap_m < -kProbe * spacing_m) blocked = 1;
+      if (gap_m < -kJammedProbe * spacing_m) jammed = 1;
     });
   }
 }

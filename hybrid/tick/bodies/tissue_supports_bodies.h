@@ -14,7 +14,7 @@
 // is too deep then goes back.
 #pragma once
 
-#include "hybrid/world/world.h"
+#include "hybrid/world/world_state.h"
 
 namespace hybrid {
 
@@ -22,13 +22,13 @@ namespace hybrid {
 inline constexpr double kTooDeep = 0.02;
 
 // Of the spacing: a blocked voxel lets a body in by this, so that it is seen when it is blocked no more.
-inline constexpr double kProbe = 0.01;
+inline constexpr double kJammedProbe = 0.01;
 
 // Of all soft objects, of which there is one (m).
 [[nodiscard]] double least_spacing_m(const WorldState& state) noexcept;
 
-// Appends to state.body_contacts what tissue presses free body `b` with, as far as there is room. Returns how
-// many of them are links; after them come those that are as good as rigid.
+// Appends to state.scratch.body_contacts what tissue presses free body `b` with, as far as there is room.
+// Returns how many of them are links; after them come those that are as good as rigid.
 std::size_t add_tissue_contacts(const World& world, WorldState& state, std::uint32_t b, double dt_s) noexcept;
 
 // Free body `b`, at `pose` in this tick, is in tissue deeper than by `limit` (spacings): it goes back from
@@ -40,6 +40,6 @@ bool give_way_to_tissue(const World& world, WorldState& state, std::uint32_t b, 
 void relax_under_paths(const World& world, WorldState& state) noexcept;
 
 // As a tick ends, after all that moves tissue: so for every free body, and notes which voxels are blocked.
-void keep_out_of_tissue(const World& world, WorldState& state, double dt_s) noexcept;
+void push_bodies_out_of_tissue(const World& world, WorldState& state, double dt_s) noexcept;
 
 }  // namespace hybrid

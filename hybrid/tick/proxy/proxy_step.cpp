@@ -16,19 +16,19 @@ constexpr int kMaxFreePieces = 512;  // of the way through free space looked at 
 }  // namespace
 
 double gather_planes(const World& world, WorldState& state, const glm::dvec3& point, double radius) noexcept {
-  state.planes.clear();
+  state.scratch.planes.clear();
   const std::uint64_t mask = state.map.rigid_in(point - radius, point + radius, state.map_trail);
   double known = radius;
   for (std::uint32_t o = 0; o < world.rigid.size(); ++o) {
     if ((mask & OccupancyMap::rigid_bit(o)) == 0) continue;
     const BodyFrame& frame = state.rigid[o].frame;
     const polygon::GatherResult found =
-        world.rigid[o].surface->gather(frame.to_body(point), radius, state.near);
+        world.rigid[o].surface->gather(frame.to_body(point), radius, state.scratch.near);
     double furthest = 0.0;
     for (std::uint32_t i = 0; i < found.count; ++i) {
-      const polygon::NearPoint& near = state.near[i];
+      const polygon::NearPoint& near = state.scratch.near[i];
       furthest = std::max(furthest, near.distance);
-      if (state.planes.size() == state.planes.capacity()) {
+      if (state.scratch.planes.size() == state.scratch.planes.capacity()) {
         known = std::min(known, near.distance);
         continue;
       }
@@ -38,7 +38,7 @@ double gather_planes(const World& world, WorldState& state, const glm::dvec3& po
       if (!(distance > 0.0))
         continue;  // on the surface itself, where no side is right: its neighbours decide
       const glm::dvec3 normal = away / distance;
-      state.planes.push_back(
+      state.scratch.planes.push_back(
           {normal, glm::dot(normal, on_surface) + world.contact_radius_m(), o, near.element});
     }
     if (!found.complete) known = std::min(known, furthest);
@@ -90,7 +90,7 @@ bool start_proxy(const World& world, WorldState& state, const glm::dvec3& device
   state.stuck = state.sliding = false;
   state.look_m = -1.0;
   state.swept_to_m = glm::dvec3(std::numeric_limits<double>::quiet_NaN());
-  for (RigidNear& near : state.rigid) near.near.forget();
+  for (RigidState& near : state.rigid) near.near.forget();
   for (int n = 0; n < 64; ++n) {
     glm::dvec3 away(0.0);
     double deepest = 0.0;

@@ -16,8 +16,8 @@ bool advance_through_free_space(const World& world, WorldState& state, const glm
 // there is no such place: the session must not start there.
 bool start_proxy(const World& world, WorldState& state, const glm::dvec3& device_m) noexcept;
 
-// Half-spaces of the rigid elements within `radius` of `point`, into state.planes: the nearest, when there
-// are too many. Returns how far from `point` there are no others (m).
+// Half-spaces of the rigid elements within `radius` of `point`, into state.scratch.planes: the nearest, when
+// there are too many. Returns how far from `point` there are no others (m).
 double gather_planes(const World& world, WorldState& state, const glm::dvec3& point, double radius) noexcept;
 
 // The rigid part of the tick and nothing else: map, contact, proxy, coupling. What `bench rigid` times.

@@ -32,8 +32,8 @@ void Surroundings::see_afresh(const glm::dvec3& from) noexcept {
   for (std::uint32_t o = 0; o < world_.rigid.size(); ++o) {
     if (scope_.kind != Scope::Kind::all && (scope_.kind == Scope::Kind::only) != (o == scope_.object))
       continue;
-    RigidNear& near = state_.rigid[o];
-    near.near.see_from(*world_.rigid[o].surface, near.frame.to_body(from), radius_, rounding_);
+    RigidState& near = state_.rigid[o];
+    near.near.refresh_planes(*world_.rigid[o].surface, near.frame.to_body(from), radius_, rounding_);
   }
 }
 
@@ -61,7 +61,7 @@ bool Surroundings::look_from(const glm::dvec3& point) noexcept {
     if (!asked(o)) continue;
     const glm::dvec3 view = state_.rigid[o].frame.to_body(point_);
     const bool ended = ended_ == o + 1;
-    if (!ended && state_.rigid[o].near.room(view) > 0.0) continue;
+    if (!ended && state_.rigid[o].near.margin_left(view) > 0.0) continue;
     if (!survey(o, view, ended)) return false;
   }
   ended_ = 0;
@@ -69,7 +69,7 @@ bool Surroundings::look_from(const glm::dvec3& point) noexcept {
 }
 
 bool Surroundings::survey(std::uint32_t o, const glm::dvec3& view, bool moving) noexcept {
-  RigidNear& near = state_.rigid[o];
+  RigidState& near = state_.rigid[o];
   const polygon::RigidSurface& surface = *world_.rigid[o].surface;
   const double smallest = 1e-6 * radius_ + 1e2 * rounding_;
   if (surveys_ > 1) near.margin_m *= 2.0;  // too short-sighted for this motion
@@ -102,7 +102,7 @@ bool Surroundings::survey(std::uint32_t o, const glm::dvec3& view, bool moving) 
 }
 
 // Of the next survey: so that it finds neither too few elements nor too many, if that is in its power.
-void Surroundings::adapt_margin(RigidNear& near) const noexcept {
+void Surroundings::adapt_margin(RigidState& near) const noexcept {
   const double count = std::max(1.0, static_cast<double>(near.near.size()));
   const double good = kGoodCount + kGoodUnderBall * radius_ / (radius_ + near.margin_m);
   const bool pole = count > good && count >= kCrowdStays * near.counted &&
@@ -118,7 +118,7 @@ void Surroundings::adapt_margin(RigidNear& near) const noexcept {
 
 // Of the straight way to q, the part within everything that was looked at.
 double Surroundings::clear_part(const glm::dvec3& q) noexcept {
-  double part = 1.0;
+  double fraction = 1.0;
   ended_ = 0;
   look_ended_ = false;
   direction_ = q - point_;
@@ -129,89 +129,89 @@ double Surroundings::clear_part(const glm::dvec3& q) noexcept {
     const double most = state_.look_m - radius_;
     const double ahead =
         to > 0.0 ? state_.look_at[d] + most - point_[d] : point_[d] - state_.look_at[d] + most;
-    if (std::abs(to) * part > ahead) {
-      part = std::max(0.0, ahead / std::abs(to));
+    if (std::abs(to) * fraction > ahead) {
+      fraction = std::max(0.0, ahead / std::abs(to));
       look_ended_ = true;
     }
   }
   for (std::uint32_t o = 0; o < world_.rigid.size(); ++o) {
     if (!asked(o)) continue;
-    const RigidNear& near = state_.rigid[o];
+    const RigidState& near = state_.rigid[o];
     const glm::dvec3 a = near.frame.to_body(point_) - near.near.centre();
     const glm::dvec3 way = near.frame.to_body(q) - near.near.centre() - a;
     const double margin = near.near.margin();
     // |a + f way| = margin
     const double aa = glm::dot(way, way), ab = glm::dot(a, way), bb = glm::dot(a, a) - margin * margin;
-    if (aa * part * part + 2.0 * ab * part + bb <= 0.0) continue;
+    if (aa * fraction * fraction + 2.0 * ab * fraction + bb <= 0.0) continue;
     const double root = std::sqrt(std::max(0.0, ab * ab - aa * bb));
     const double f = std::max(0.0, (root - ab) / aa) * (1.0 - 1e-9);
-    if (f >= part) continue;
-    part = f;
+    if (f >= fraction) continue;
+    fraction = f;
     ended_ = o + 1;
     look_ended_ = false;
   }
-  return part;
+  return fraction;
 }
 
 // The element that the first `part` of the way to q meets first; kNobody when that is clear.
-HeldElement Surroundings::first_in_the_way(const glm::dvec3& q, double part,
-                                           std::span<const HeldElement> held) noexcept {
-  HeldElement first{kNobody, 0, {}, true};
+ProxyPlane Surroundings::first_in_the_way(const glm::dvec3& q, double fraction,
+                                          std::span<const ProxyPlane> held) noexcept {
+  ProxyPlane first{kNobody, 0, {}, true};
   double soonest = 2.0;
   for (std::uint32_t o = 0; o < world_.rigid.size(); ++o) {
-    if (asked(o)) first_of(o, q, part, held, first, soonest);
+    if (asked(o)) first_of(o, q, fraction, held, first, soonest);
   }
   return first;
 }
 
 // Planes seen from elsewhere say too soon rather than too late: so the soonest is seen from here instead,
 // until the soonest is one that was.
-void Surroundings::first_of(std::uint32_t o, const glm::dvec3& q, double part,
-                            std::span<const HeldElement> held, HeldElement& first, double& soonest) noexcept {
-  using Broken = polygon::Neighbourhood::Broken;
-  RigidNear& near = state_.rigid[o];
+void Surroundings::first_of(std::uint32_t o, const glm::dvec3& q, double fraction,
+                            std::span<const ProxyPlane> held, ProxyPlane& first, double& soonest) noexcept {
+  using Violation = polygon::Neighbourhood::Violation;
+  RigidState& near = state_.rigid[o];
   const glm::dvec3 view = near.frame.to_body(point_), goal = near.frame.to_body(q);
-  const glm::dvec3 end = part == 1.0 ? goal : view + part * (goal - view);
+  const glm::dvec3 end = fraction == 1.0 ? goal : view + fraction * (goal - view);
   const double tolerance = 2.0 * rounding_;
-  std::span<Broken> broken = near.near.broken(view, end, tolerance);
-  while (!broken.empty()) {
+  std::span<Violation> violated = near.near.violated(view, end, tolerance);
+  while (!violated.empty()) {
     std::size_t n = 0;
-    for (std::size_t i = 1; i < broken.size(); ++i) {
-      if (broken[i].part < broken[n].part ||
-          (broken[i].part == broken[n].part &&
-           near.near.element(broken[i].index) < near.near.element(broken[n].index)))
+    for (std::size_t i = 1; i < violated.size(); ++i) {
+      if (violated[i].fraction < violated[n].fraction ||
+          (violated[i].fraction == violated[n].fraction &&
+           near.near.element(violated[i].index) < near.near.element(violated[n].index)))
         n = i;
     }
-    if (broken[n].part >= soonest) return;
-    HeldElement candidate{o, near.near.element(broken[n].index), {}, true};
-    if (broken[n].fresh) {
-      soonest = broken[n].part;
+    if (violated[n].fraction >= soonest) return;
+    ProxyPlane candidate{o, near.near.element(violated[n].index), {}, true};
+    if (violated[n].fresh) {
+      soonest = violated[n].fraction;
       first = candidate;
-      first.in_body = near.near.plane(broken[n].index);
+      first.in_body = near.near.plane(violated[n].index);
       return;
     }
     if (!covered(candidate, held))
-      candidate.in_body = polygon::separate(*world_.rigid[o].surface, candidate.element, view, radius_);
-    near.near.set_plane(broken[n].index, candidate.in_body);
+      candidate.in_body = polygon::separating_plane(*world_.rigid[o].surface, candidate.element, view, radius_);
+    near.near.set_plane(violated[n].index, candidate.in_body);
     // A plane that only the first part of the way breaks, by what rounding did to where the proxy stands,
     // is being left.
     const double depth = candidate.in_body.offset - glm::dot(candidate.in_body.normal, end);
     const double at_goal = candidate.in_body.offset - glm::dot(candidate.in_body.normal, goal);
     if (depth > tolerance && at_goal > tolerance) {
-      broken[n].fresh = true;
-      broken[n].part = polygon::Neighbourhood::part_before(candidate.in_body, view, end);
+      violated[n].fresh = true;
+      violated[n].fraction = polygon::Neighbourhood::fraction_before(candidate.in_body, view, end);
     } else {
-      broken[n] = broken.back();
-      broken = broken.first(broken.size() - 1);
+      violated[n] = violated.back();
+      violated = violated.first(violated.size() - 1);
     }
   }
 }
 
 // Does a plane that holds already keep the proxy from this element as well? On a convex surface one plane
 // covers everything, and the proxy need not stop at each edge.
-bool Surroundings::covered(HeldElement& candidate, std::span<const HeldElement> held_planes) const noexcept {
+bool Surroundings::covered(ProxyPlane& candidate, std::span<const ProxyPlane> held_planes) const noexcept {
   const polygon::RigidSurface& surface = *world_.rigid[candidate.object].surface;
-  for (const HeldElement& held : held_planes) {
+  for (const ProxyPlane& held : held_planes) {
     if (held.object != candidate.object) continue;
     if (held.element != candidate.element && !(surface.support(candidate.element, held.in_body.normal) <=
                                                held.in_body.offset - radius_ + rounding_))

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <span>
 
-#include "hybrid/world/world.h"
+#include "hybrid/world/world_state.h"
 
 namespace hybrid {
 
@@ -53,10 +53,10 @@ class Surroundings {
   // The element that the first `part` of the way to q meets first, with the plane that says so; object
   // kNobody when that is clear. `held` are planes that hold the proxy anyway: what is behind one of them is
   // no obstacle of its own.
-  HeldElement first_in_the_way(const glm::dvec3& q, double part, std::span<const HeldElement> held) noexcept;
+  ProxyPlane first_in_the_way(const glm::dvec3& q, double part, std::span<const ProxyPlane> held) noexcept;
 
   // The whole straight way to q, as far as it was looked at.
-  bool is_clear(const glm::dvec3& q, std::span<const HeldElement> held) noexcept {
+  bool is_clear(const glm::dvec3& q, std::span<const ProxyPlane> held) noexcept {
     return clear_part(q) == 1.0 && first_in_the_way(q, 1.0, held).object == kNobody;
   }
 
@@ -70,10 +70,10 @@ class Surroundings {
 
  private:
   bool survey(std::uint32_t o, const glm::dvec3& view, bool moving) noexcept;
-  void adapt_margin(RigidNear& near) const noexcept;
-  void first_of(std::uint32_t o, const glm::dvec3& q, double part, std::span<const HeldElement> held,
-                HeldElement& first, double& soonest) noexcept;
-  [[nodiscard]] bool covered(HeldElement& candidate, std::span<const HeldElement> held) const noexcept;
+  void adapt_margin(RigidState& near) const noexcept;
+  void first_of(std::uint32_t o, const glm::dvec3& q, double part, std::span<const ProxyPlane> held,
+                ProxyPlane& first, double& soonest) noexcept;
+  [[nodiscard]] bool covered(ProxyPlane& candidate, std::span<const ProxyPlane> held) const noexcept;
 
   const World& world_;
   WorldState& state_;

@@ -30,7 +30,7 @@ class Sweeper {
         target_(target),
         metric_(metric),
         factored_(metric),
-        held_(state.held),
+        held_(state.scratch.proxy_planes),
         scope_(scope),
         around_(world, state, scope),
         isotropic_(metric == glm::dmat3(metric[0][0])),
@@ -46,7 +46,7 @@ class Sweeper {
     if (!goes_on) around_.see_afresh(from);
     for (std::uint32_t n = 0; n < state_.active_count && scope_.kind == Scope::Kind::all; ++n) {
       const ActiveElement& active = state_.active[n];
-      const HeldElement& last = held_[n];
+      const ProxyPlane& last = held_[n];
       // Held as the last sweep left it, unless something else used the list since.
       if (!goes_on || last.object != active.object || last.element != active.element)
         held_[n] = {active.object, active.element, {}, true};
@@ -58,7 +58,7 @@ class Sweeper {
       if (!around_.look_from(point_)) break;
       if (sweep.steps == 0 &&
           goes_on) {  // on the triangle that held it last: to the next, without a look here
-        const Crossing crossing = cross_ridges(sweep.point, travel);
+        const Crossing crossing = cross_edges(sweep.point, travel);
         if (crossing == Crossing::moved) continue;
         sweep.arrived = crossing == Crossing::arrived;
         if (sweep.arrived) break;
@@ -82,7 +82,7 @@ class Sweeper {
         if (loosen_false_contacts()) continue;
         sweep.point = minimum_.point;
         keep_active();
-        if (cross_ridges(sweep.point, travel) == Crossing::moved) continue;
+        if (cross_edges(sweep.point, travel) == Crossing::moved) continue;
         sweep.arrived = true;
         break;
       }
@@ -93,7 +93,7 @@ class Sweeper {
       stepped_ = part * length;
       keep_active();
       if (fraction_ == 1.0 && part == 1.0) {
-        const Crossing crossing = cross_ridges(sweep.point, travel);
+        const Crossing crossing = cross_edges(sweep.point, travel);
         if (crossing == Crossing::arrived || (crossing == Crossing::none && held_flatly(sweep.point))) {
           sweep.arrived = true;
           break;
@@ -122,25 +122,25 @@ class Sweeper {
       return false;
     }
     round_.taken = false;
-    std::array<polygon::TurningPlane, 3> planes;
+    std::array<polygon::CurvedConstraint, 3> planes;
     bool turns = false;
     for (std::uint32_t n = 0; n < minimum_.active_count; ++n) {
-      const HeldElement& held = held_[minimum_.active[n]];
-      planes[n] = {state_.planes[minimum_.active[n]].normal, minimum_.multiplier[n]};
+      const ProxyPlane& held = held_[minimum_.active[n]];
+      planes[n] = {state_.scratch.planes[minimum_.active[n]].normal, minimum_.multiplier[n]};
       if (held.flat) continue;
       const BodyFrame& frame = state_.rigid[held.object].frame;
       const glm::dvec3 view = frame.to_body(point_);
       const glm::dvec3 on_plane =
           view + (held.in_body.offset - glm::dot(held.in_body.normal, view)) * held.in_body.normal;
-      planes[n].turning = frame.rotation *
-                          polygon::turning_of(*world_.rigid[held.object].surface, held.element, on_plane,
+      planes[n].hessian = frame.rotation *
+                          polygon::distance_hessian(*world_.rigid[held.object].surface, held.element, on_plane,
                                               kTurnStep * radius_) *
                           glm::transpose(frame.rotation);
       turns = true;
     }
     if (!turns) return false;
     round_.instead = minimum_.point;
-    round_.to = polygon::minimum_on_turning_planes(
+    round_.to = polygon::minimum_on_curved_constraints(
         point_, minimum_.point, metric_, {planes.data(), minimum_.active_count}, kRoundStep * radius_);
     const bool clear = glm::length(round_.to - round_.instead) > still &&
                        glm::length(round_.to - point_) < travel && around_.is_clear(round_.to, held_planes());
@@ -168,24 +168,24 @@ class Sweeper {
   // The proxy is at the minimum on one triangle's plane. When the next one's is nearer to the target, and
   // only a nearly flat edge lies between, there, over that edge; and so on.
   enum class Crossing : std::uint8_t { none, moved, arrived };
-  Crossing cross_ridges(glm::dvec3& point, double& travel) noexcept {
+  Crossing cross_edges(glm::dvec3& point, double& travel) noexcept {
     if (held_count_ != 1 || !held_[0].flat || scope_.kind != Scope::Kind::all || !isotropic_)
       return Crossing::none;
-    HeldElement& held = held_[0];
-    RigidNear& near = state_.rigid[held.object];
+    ProxyPlane& held = held_[0];
+    RigidState& near = state_.rigid[held.object];
     const polygon::RigidSurface& surface = *world_.rigid[held.object].surface;
     const glm::dvec3 target = near.frame.to_body(target_);
     bool moved = false;
     while (crossings_ < kMaxCrossings) {
-      if (near.ridges.element != held.element || near.ridges.plane != held.in_body)
-        near.ridges = polygon::ridges_of(surface, held.element, held.in_body, radius_, rounding_);
-      const polygon::Ridges::Side* side = polygon::nearer_side(near.ridges, target);
+      if (near.crossable_edges.element != held.element || near.crossable_edges.plane != held.in_body)
+        near.crossable_edges = polygon::crossable_edges_of(surface, held.element, held.in_body, radius_, rounding_);
+      const polygon::CrossableEdges::Side* side = polygon::nearer_side(near.crossable_edges, target);
       if (side == nullptr) break;
       ++crossings_;
-      const polygon::RidgeCrossing crossing = polygon::cross_ridge(near.ridges, *side, target);
+      const polygon::EdgeCrossing crossing = polygon::cross_edge(near.crossable_edges, *side, target);
       const glm::dvec3 top = near.frame.to_scene(crossing.top), end = near.frame.to_scene(crossing.end);
       const double length = glm::length(top - point) + glm::length(end - top);
-      const HeldElement from = held;
+      const ProxyPlane from = held;
       stand_at(point);
       bool clear = length < travel && around_.is_clear(top, held_planes());
       if (clear) {
@@ -210,7 +210,7 @@ class Sweeper {
     if (!moved) return Crossing::none;
     held.touching = touches(held, point);
     if (!held.touching) return Crossing::moved;
-    state_.planes.assign(1, in_scene(held));
+    state_.scratch.planes.assign(1, in_scene(held));
     minimum_ = {};
     minimum_.point = point;
     minimum_.active_count = 1;
@@ -220,7 +220,7 @@ class Sweeper {
 
   // The minimum over the planes in the way, and how much of the way there is known to be clear.
   bool solve() noexcept {
-    state_.planes.clear();
+    state_.scratch.planes.clear();
     // Of those that held the proxy before, the ones that it still touches, and those found not to.
     std::uint32_t kept = 0;
     for (std::uint32_t i = 0; i < held_count_; ++i) {
@@ -232,9 +232,9 @@ class Sweeper {
       ++kept;
     }
     held_count_ = kept;
-    for (std::uint32_t i = 0; i < held_count_; ++i) state_.planes.push_back(in_scene(held_[i]));
+    for (std::uint32_t i = 0; i < held_count_; ++i) state_.scratch.planes.push_back(in_scene(held_[i]));
     for (std::uint32_t n = 0; n < kMaxExchanges; ++n) {
-      minimum_ = polygon::minimise_on_planes(target_, factored_, state_.planes, rounding_);
+      minimum_ = polygon::minimise_on_planes(target_, factored_, state_.scratch.planes, rounding_);
       if (!minimum_.feasible) {
         state_.faults |= fault_infeasible;
         return false;  // stay: the place before was outside everything
@@ -242,14 +242,14 @@ class Sweeper {
       fraction_ = around_.clear_part(minimum_.point);
       // Nothing holds the proxy just after it slid off what did: what is next is near, and short looks see
       // few elements.
-      HeldElement first{Surroundings::kNobody, 0, {}, true};
+      ProxyPlane first{Surroundings::kNobody, 0, {}, true};
       for (double part = held_count_ == 0 ? short_look(minimum_.point) : 1.0;; part *= kLongerLook) {
         const double share = std::min(part, 1.0) * fraction_;
         first = around_.first_in_the_way(minimum_.point, share, held_planes());
         if (first.object != Surroundings::kNobody || part >= 1.0) break;
       }
       if (first.object == Surroundings::kNobody) return true;
-      if (held_count_ == kMaxHeld || n + 1 == kMaxExchanges) {
+      if (held_count_ == kMaxProxyPlanes || n + 1 == kMaxExchanges) {
         stop_before(first);
         return true;
       }
@@ -257,17 +257,17 @@ class Sweeper {
       // which lets the proxy come up to it at once, not by halves.
       make_plane(first);
       held_[held_count_++] = first;
-      state_.planes.push_back(in_scene(first));
+      state_.scratch.planes.push_back(in_scene(first));
     }
     return true;
   }
 
   // Too many planes for one step: the way to the minimum over those known ends at the next, by the plane that
   // found it. (Its own would be reached later, and others that nobody has looked at yet stand before that.)
-  void stop_before(const HeldElement& next) noexcept {
+  void stop_before(const ProxyPlane& next) noexcept {
     const BodyFrame& frame = state_.rigid[next.object].frame;
     const glm::dvec3 end = point_ + fraction_ * (minimum_.point - point_);
-    fraction_ *= polygon::Neighbourhood::part_before(next.in_body, frame.to_body(point_), frame.to_body(end));
+    fraction_ *= polygon::Neighbourhood::fraction_before(next.in_body, frame.to_body(point_), frame.to_body(end));
     around_.forget_end();
   }
 
@@ -279,12 +279,12 @@ class Sweeper {
     return part > kLeastLook ? part : kLeastLook;  // nor nothing, however far q is
   }
 
-  void make_plane(HeldElement& held) noexcept {
+  void make_plane(ProxyPlane& held) noexcept {
     const glm::dvec3 view = state_.rigid[held.object].frame.to_body(point_);
     const polygon::RigidSurface& surface = *world_.rigid[held.object].surface;
     held.flat = held.own_plane &&
-                polygon::separate_flatly(surface, held.element, view, radius_, rounding_, held.in_body);
-    if (!held.flat) held.in_body = polygon::separate(surface, held.element, view, radius_);
+                polygon::separating_face_plane(surface, held.element, view, radius_, rounding_, held.in_body);
+    if (!held.flat) held.in_body = polygon::separating_plane(surface, held.element, view, radius_);
   }
 
   // An element's own plane reaches beyond the element: a proxy that rests where the element is not rests on
@@ -292,7 +292,7 @@ class Sweeper {
   bool loosen_false_contacts() noexcept {
     bool any = false;
     for (std::uint32_t n = 0; n < minimum_.active_count; ++n) {
-      HeldElement& held = held_[minimum_.active[n]];
+      ProxyPlane& held = held_[minimum_.active[n]];
       if (!held.own_plane || touches(held, point_)) continue;
       held.own_plane = false;
       held.flat = false;
@@ -311,7 +311,7 @@ class Sweeper {
     return true;
   }
 
-  [[nodiscard]] bool touches(const HeldElement& held, const glm::dvec3& point) const noexcept {
+  [[nodiscard]] bool touches(const ProxyPlane& held, const glm::dvec3& point) const noexcept {
     const glm::dvec3 view = state_.rigid[held.object].frame.to_body(point);
     const polygon::NearPoint near = world_.rigid[held.object].surface->closest(held.element, view);
     if (!held.flat) return near.distance <= radius_ * (1.0 + kConvergedBall) + 4.0 * rounding_;
@@ -342,7 +342,7 @@ class Sweeper {
     for (std::uint32_t n = 0; n < minimum_.active_count && n < held_count_; ++n) {
       // After a whole step the held ones are the active ones, in their order; before, they are named by
       // index.
-      const polygon::ContactPlane& plane = state_.planes[minimum_.active[n]];
+      const polygon::ContactPlane& plane = state_.scratch.planes[minimum_.active[n]];
       const glm::dvec3 force = minimum_.multiplier[n] * plane.normal;
       sweep.force_N += force;
       state_.rigid_force_N[plane.object] += force;
@@ -351,7 +351,7 @@ class Sweeper {
     state_.active_count = minimum_.active_count;
   }
 
-  [[nodiscard]] std::span<const HeldElement> held_planes() const noexcept {
+  [[nodiscard]] std::span<const ProxyPlane> held_planes() const noexcept {
     return {held_.data(), held_count_};
   }
   void leave_trail(const glm::dvec3& corner) noexcept {
@@ -361,7 +361,7 @@ class Sweeper {
     point_ = point;
     around_.stand_at(point);
   }
-  [[nodiscard]] polygon::ContactPlane in_scene(const HeldElement& held) const noexcept {
+  [[nodiscard]] polygon::ContactPlane in_scene(const ProxyPlane& held) const noexcept {
     const BodyFrame& frame = state_.rigid[held.object].frame;
     const glm::dvec3 normal = frame.rotation * held.in_body.normal;
     return {normal, held.in_body.offset + glm::dot(normal, frame.position_m), held.object, held.element};
@@ -372,7 +372,7 @@ class Sweeper {
   const glm::dvec3 target_;
   const glm::dmat3 metric_;
   const polygon::Metric factored_;
-  std::array<HeldElement, kMaxHeld>& held_;
+  std::array<ProxyPlane, kMaxProxyPlanes>& held_;
   const Scope scope_;
   Surroundings around_;
   const bool isotropic_;

@@ -2,7 +2,7 @@
 // The rigid stage of the tick: moves the proxy, never through anything, to its constrained minimum.
 #pragma once
 
-#include "hybrid/world/world.h"
+#include "hybrid/world/world_state.h"
 
 namespace hybrid {
 

@@ -37,19 +37,19 @@ namespace {
 // than fit.
 bool list_touched(const World& world, WorldState& state, const glm::dvec3& point, double range,
                   std::size_t count) noexcept {
-  for (auto& list : state.touched) list.clear();
+  for (auto& list : state.scratch.touched) list.clear();
   bool fits = true;
   const auto take = [&](std::size_t o, voxel::VoxelId v) {
     const voxel::SoftObject& object = *state.soft[o];
     const glm::dvec3 away = world.soft[o].to_scene(object.position(v)) - point;
     const double reach = object.reach(world.tool.radius_m) + range;
     if (glm::dot(away, away) > reach * reach) return true;
-    if (state.touched[o].size() == voxel::SoftObject::kMaxTouched) return false;
-    state.touched[o].push_back(v);
+    if (state.scratch.touched[o].size() == voxel::SoftObject::kMaxTouched) return false;
+    state.scratch.touched[o].push_back(v);
     return true;
   };
   for (std::size_t i = 0; i < count; ++i) {
-    const std::uint32_t number = state.found[i];
+    const std::uint32_t number = state.scratch.map_hits[i];
     std::size_t o = world.soft.size() - 1;
     while (world.soft[o].first_number > number) --o;
     const voxel::SoftObject& object = *state.soft[o];
@@ -66,12 +66,14 @@ bool list_touched(const World& world, WorldState& state, const glm::dvec3& point
 
 }  // namespace
 
-bool touch_soft(const World& world, WorldState& state, const glm::dvec3& point, double& range) noexcept {
+bool find_touched_voxels(const World& world, WorldState& state, const glm::dvec3& point,
+                         double& range) noexcept {
   bool any = false;
   // A voxel may have moved since the map last looked at it, by much less than a cell.
   const glm::dvec3 box(soft_reach(world, state) + range + 0.5 * state.map.cell_m());
-  const std::size_t count = state.map.soft_in(point - box, point + box, state.found, state.map_trail);
-  bool fits = count < state.found.size() && list_touched(world, state, point, range, count);
+  const std::size_t count =
+      state.map.soft_in(point - box, point + box, state.scratch.map_hits, state.map_trail);
+  bool fits = count < state.scratch.map_hits.size() && list_touched(world, state, point, range, count);
   // A tool of many spacings: it looks less far ahead, and so goes less far in a tick.
   for (int n = 0; n < kMaxHalvings && !fits; ++n) {
     range *= 0.5;
@@ -80,17 +82,17 @@ bool touch_soft(const World& world, WorldState& state, const glm::dvec3& point, 
   if (!fits) state.faults |= fault_touch_overflow;
   for (std::size_t o = 0; o < state.soft.size(); ++o) {
     // The map's lists are in the order of motion; sorted, the result does not depend on history.
-    std::sort(state.touched[o].begin(), state.touched[o].end());
-    if (state.touched[o].empty() && state.soft[o]->touched().empty()) continue;
-    state.soft[o]->touch(state.touched[o]);
+    std::sort(state.scratch.touched[o].begin(), state.scratch.touched[o].end());
+    if (state.scratch.touched[o].empty() && state.soft[o]->touched().empty()) continue;
+    state.soft[o]->touch(state.scratch.touched[o]);
     state.soft[o]->note_depths(tool_in_body(world, world.soft[o], point));
-    any = any || !state.touched[o].empty();
+    any = any || !state.scratch.touched[o].empty();
   }
   return any;
 }
 
-void press_soft(const World& world, WorldState& state, const glm::dvec3& point, const glm::dvec3& delta,
-                int sweeps) noexcept {
+void press_tissue(const World& world, WorldState& state, const glm::dvec3& point, const glm::dvec3& delta,
+                  int sweeps) noexcept {
   for (std::size_t o = 0; o < state.soft.size(); ++o) {
     voxel::SoftObject& object = *state.soft[o];
     state.reactions[o] = {};
@@ -111,16 +113,16 @@ void press_soft(const World& world, WorldState& state, const glm::dvec3& point, 
   }
 }
 
-std::size_t soft_bounds(const World& world, WorldState& state, const glm::dvec3& point, bool fast,
+std::size_t tool_bounds(const World& world, WorldState& state, const glm::dvec3& point, bool fast,
                         std::vector<polygon::ContactPlane>& out) noexcept {
   std::size_t added = 0;
   for (std::uint32_t o = 0; o < state.soft.size(); ++o) {
     voxel::SoftObject& object = *state.soft[o];
     if (object.touched().empty()) continue;
     const SoftBody& body = world.soft[o];
-    const std::size_t count = object.give_way(tool_in_body(world, body, point), state.bounds);
+    const std::size_t count = object.give_way(tool_in_body(world, body, point), state.scratch.bounds);
     for (std::size_t i = 0; i < count && out.size() < out.capacity(); ++i) {
-      const voxel::ToolBound& bound = state.bounds[i];
+      const voxel::ToolBound& bound = state.scratch.bounds[i];
       if (fast && !object.held_fast(bound.voxel, -bound.normal)) continue;
       const glm::dvec3 normal = body.pose.rotation * bound.normal;
       out.push_back({normal, bound.offset + glm::dot(normal, body.pose.origin),
@@ -131,12 +133,12 @@ std::size_t soft_bounds(const World& world, WorldState& state, const glm::dvec3&
   return added;
 }
 
-bool contact_on_grid(const WorldState& state) noexcept {
+bool contact_on_patches(const WorldState& state) noexcept {
   return std::any_of(state.soft.begin(), state.soft.end(),
                      [](const auto& object) { return object->grid_in_use() != nullptr; });
 }
 
-void prepare_grids(const World& world, WorldState& state, const glm::dvec3& point) noexcept {
+void prepare_patches(const World& world, WorldState& state, const glm::dvec3& point) noexcept {
   for (std::size_t o = 0; o < state.soft.size(); ++o) {
     if (!state.soft[o]->uses_grid()) continue;
     state.soft[o]->come_near_on_grid(tool_in_body(world, world.soft[o], point));
@@ -154,8 +156,8 @@ void refresh_map(const World& world, WorldState& state) noexcept {
       state.map.move(body.first_number + number, body.to_scene(object.position(surface[number])));
     };
     for (const std::uint32_t number : object.touched_numbers()) look(number);
-    if (!state.beside_bodies.empty()) {
-      for (const std::uint32_t number : state.beside_bodies[o].near) look(number);
+    if (!state.body_obstacles.empty()) {
+      for (const std::uint32_t number : state.body_obstacles[o].near) look(number);
     }
     if (object.asleep() && state.cursor[o] == 0) continue;  // a whole round since it came to rest
     const auto count = static_cast<std::uint32_t>(surface.size());

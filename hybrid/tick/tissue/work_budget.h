@@ -52,8 +52,8 @@ class WorkShare {
   int calm_ = 0;
 };
 
-// From now on soft objects of `state` that are relaxed apart (async_relaxation.cpp, which knows them) have this
-// share of their work at a contact.
+// From now on soft objects of `state` that are relaxed apart (async_relaxation.cpp, which knows them) have
+// this share of their work at a contact.
 void give_work_share(WorldState& state, std::uint8_t steps) noexcept;
 
 }  // namespace hybrid

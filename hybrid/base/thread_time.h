@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Processor time of the calling thread.
+#pragma once
+
+#include <time.h>
+
+namespace hybrid {
+
+// Since the thread began (s). Pre-emption by other threads and processes does not count.
+[[nodiscard]] inline double thread_time_s() noexcept {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + static_cast<double>(now.tv_nsec) * 1e-9;
+}
+
+}  // namespace hybrid

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A scene file, read and with the model of each object decided.
+#pragma once
+
+#include <filesystem>
+
+#include "hybrid/scene/scene.h"
+
+namespace hybrid {
+
+// read_scene(), then choose_models(). Throws SceneError.
+[[nodiscard]] Scene load_scene(const std::filesystem::path& file);
+
+}  // namespace hybrid

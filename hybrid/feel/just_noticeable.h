@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The just noticeable difference (JND) of a force: the unit of every force error of this project.
+// |force - reference| / max(kJndShare * |reference|, floor), the floor being that of the device (jnd_floor_N()).
+// Source: the thesis, Table 1 (steady force at the elbow, 7 %).
+#pragma once
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
+
+namespace hybrid {
+
+inline constexpr double kJndShare = 0.07;     // of the reference
+inline constexpr double kJndFloor_N = 0.04;  // least difference that is noticed, of a device without friction
+
+// How many just noticeable differences `force` (N) is from `reference` (N).
+[[nodiscard]] inline double jnd_of(const glm::dvec3& force, const glm::dvec3& reference,
+                                   double floor_N) noexcept {
+  return glm::length(force - reference) / std::max(kJndShare * glm::length(reference), floor_N);
+}
+
+}  // namespace hybrid

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// All results of asynchronous relaxation in a session. Replayed from the tape, the session's ticks are the
+// same to the last bit, whatever the other cores do meanwhile.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "hybrid/world/async_relaxation.h"
+
+namespace hybrid {
+
+class ResultTape {
+ public:
+  explicit ResultTape(std::size_t objects) : found_(objects), next_(objects, 0) {}
+
+  // After each tick of a session of Arrival::recorded.
+  void keep(const AsyncRelaxation& async);
+  // By another thread, in a session of Arrival::played: states submitted since the last call get their
+  // results.
+  void hand_out(AsyncRelaxation& async) noexcept;
+  // Are the results that the next tick applies ready?
+  [[nodiscard]] static bool ready(const AsyncRelaxation& async) noexcept;
+
+ private:
+  std::vector<std::vector<voxel::Replica::Found>> found_;  // [soft]
+  std::vector<std::size_t> next_;                          // [soft] to be handed out
+};
+
+}  // namespace hybrid

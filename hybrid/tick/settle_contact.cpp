@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/tick/settle_contact.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <limits>
+
+#include "hybrid/tick/proxy/feel_stage.h"
+#include "hybrid/tick/proxy/proxy_step.h"
+#include "hybrid/tick/tissue/press_tissue.h"
+
+namespace hybrid {
+namespace {
+
+struct ContactSettings {
+  int passes = 3;           // proxy and tissue answer one another at most this often in a tick
+  int sweeps = 1;           // relaxations of the contact's neighbourhood in each pass
+  double soft_step = 0.25;  // longest step of the proxy against tissue in one pass (unit: the tool's reach)
+  double arrived = 1e-2;    // a second pass that moves the proxy less is the last (unit: the tool's radius)
+  double still = 1e-5;      // a pass that moves the proxy less teaches nothing (unit: the tool's radius)
+  // Learnt stiffness: the share kept from pass to pass, the least overshoot that counts (unit: the pull
+  // before the step), the most that one step is believed, and the most that is learnt (unit: the model's
+  // stiffness).
+  double kept = 0.9, least_overshoot = 0.25, most_overshoot = 3.0, most_learnt = 50.0;
+  double probe = 0.005;  // how far each tick looks into jammed tissue (unit: the tool's radius)
+  // How far from the proxy rigid planes are looked for when tissue stops it (unit: the tool's radius). The
+  // second radius is tried only where the first is not enough.
+  std::array<double, 2> planes_within{1.25, 2.0};
+};
+constexpr ContactSettings kSettings;
+
+// Force on the proxy apart from rigid surfaces: coupling and tissue (N).
+glm::dvec3 pull_on_proxy(const World& world, const WorldState& state, const glm::dvec3& device) noexcept {
+  glm::dvec3 pull = world.tool.stiffness_N_per_m * (device - state.proxy_m);
+  for (const voxel::Reaction& reaction : state.reactions) pull += reaction.force_N;
+  return pull;
+}
+
+// The tissue's model is the stiffness of the voxels that are pressed now. A chain that tightens as the proxy
+// moves, or voxels that are newly met, answer stiffer. A step by the model alone would then alternate for
+// ever between two places. When a step overshot, so that the pull changed sign, the stiffness that would have
+// landed right is learnt, and forgotten over some passes. Steps that did not overshoot teach nothing: tissue
+// that relaxes meanwhile looks arbitrarily stiff on a short step.
+void learn_stiffness(const World& world, WorldState& state, const glm::dvec3& delta, const glm::dvec3& before,
+                     const glm::dvec3& after, const glm::dmat3& model, const glm::dmat3& used) noexcept {
+  state.learnt_stiffness_N_per_m *= kSettings.kept;
+  const double square = glm::dot(delta, delta), still = kSettings.still * world.contact_radius_m();
+  const double wanted = glm::dot(before, delta);
+  if (square < still * still || wanted <= 0.0) return;
+  const double overshoot = std::min(-glm::dot(after, delta) / wanted, kSettings.most_overshoot);
+  if (overshoot < kSettings.least_overshoot) return;
+  const double along_model = glm::dot(delta, model * delta) / square,
+               along_used = glm::dot(delta, used * delta) / square;
+  const double learnt =
+      std::min(along_used * (1.0 + overshoot) - along_model, kSettings.most_learnt * along_model);
+  state.learnt_stiffness_N_per_m = std::max(state.learnt_stiffness_N_per_m, learnt);
+}
+
+struct OutsideRigid {
+  polygon::PlaneMinimum minimum;
+  std::size_t rigid = 0;  // the number of rigid planes, which come first in scratch.planes
+  bool sure = false;      // feasible, and no rigid plane that was not looked for can change it
+};
+
+// The minimum of the metric about `target`, outside rigid objects near the proxy and outside the planes that
+// add_others() appends to scratch.planes. A rigid plane that was not found is further from the proxy than the
+// search radius. So a minimum that is nearer than that is the minimum among all planes.
+template <class AddOthers>
+OutsideRigid minimise_outside_rigid(const World& world, WorldState& state, const glm::dvec3& target,
+                                    const polygon::Metric& metric, AddOthers&& add_others) noexcept {
+  const double radius = world.contact_radius_m();
+  OutsideRigid least;
+  for (const double within : kSettings.planes_within) {
+    const double known = gather_planes(world, state, state.proxy_m, within * radius);
+    least.rigid = state.scratch.planes.size();
+    add_others();
+    least.minimum = polygon::minimise_on_planes(target, metric, state.scratch.planes, 1e-9 * radius);
+    least.sure = least.minimum.feasible && glm::length(least.minimum.point - state.proxy_m) <= known - radius;
+    if (!least.minimum.feasible || least.sure || known < within * radius) break;
+  }
+  return least;
+}
+
+// Tissue that cannot leave the tool's way is as good as rigid, and the proxy stops there. A tool that was
+// pressed further in every pass, and taken back at the end of the tick, would be a wedge: it would drive
+// voxels aside and gain energy that it never gave. A probe asks once a tick whether the voxels still cannot
+// leave.
+glm::dvec3 stop_at_jammed(const World& world, WorldState& state, const glm::dvec3& target,
+                          const glm::dmat3& metric, bool probe) noexcept {
+  if (state.jammed.empty()) return target;
+  if (probe) {
+    for (polygon::ContactPlane& plane : state.jammed)
+      plane.offset -= kSettings.probe * world.contact_radius_m();
+  }
+  const OutsideRigid least = minimise_outside_rigid(world, state, target, polygon::Metric(metric), [&state] {
+    for (const polygon::ContactPlane& plane : state.jammed) {
+      if (state.scratch.planes.size() == state.scratch.planes.capacity()) break;
+      state.scratch.planes.push_back(plane);
+    }
+  });
+  const polygon::PlaneMinimum& stop = least.minimum;
+  if (!stop.feasible) return target;
+  // The sweep meets the rigid planes itself, so only the multipliers of jammed tissue are added here.
+  glm::dvec3 jammed_N(0.0);
+  for (std::uint32_t i = 0; i < stop.active_count; ++i) {
+    if (stop.active[i] >= least.rigid)
+      jammed_N += stop.multiplier[i] * state.scratch.planes[stop.active[i]].normal;
+  }
+  return target + glm::inverse(metric) * jammed_N;
+}
+
+// One pass: the proxy goes to the minimum of ½K|q − x|² plus the tissue's quadratic model, outside everything
+// rigid; then the tissue answers. Returns how far the proxy went (m).
+double move_proxy(const World& world, WorldState& state, const glm::dvec3& device, bool near_soft,
+                  double travel, bool first_pass, Sweep& sweep) noexcept {
+  const double k = world.tool.stiffness_N_per_m;
+  glm::dmat3 model(k);
+  for (const voxel::Reaction& reaction : state.reactions) model += reaction.stiffness_N_per_m;
+  // The learnt stiffness applies only in contact; free, the proxy goes to the device at once.
+  const bool pressed = model != glm::dmat3(k);
+  const glm::dmat3 metric = pressed ? model + glm::dmat3(state.learnt_stiffness_N_per_m) : model;
+  const glm::dvec3 pull = pull_on_proxy(world, state, device);
+  // Without tissue the target is the device, to the last bit.
+  const glm::dvec3 target =
+      near_soft
+          ? stop_at_jammed(world, state, state.proxy_m + glm::inverse(metric) * pull, metric, first_pass)
+          : device;
+  sweep = sweep_with_feel(world, state, target, metric, travel, first_pass);
+  const glm::dvec3 delta = sweep.point - state.proxy_m;
+  state.proxy_m = sweep.point;
+  if (near_soft) {
+    press_tissue(world, state, state.proxy_m, delta, kSettings.sweeps);
+    // On nested patches the model is that of the equilibrium: there is nothing to learn.
+    if (!contact_on_patches(state))
+      learn_stiffness(world, state, delta, pull, pull_on_proxy(world, state, device), model, metric);
+    if (first_pass) state.jammed.clear();
+    tool_bounds(world, state, state.proxy_m, true, state.jammed);
+  }
+  return glm::length(delta);
+}
+
+// How deep a tool at `point` is in the last `count` planes, at most (m).
+double deepest(const WorldState& state, std::size_t count, const glm::dvec3& point) noexcept {
+  double most = 0.0;
+  for (std::size_t i = state.scratch.planes.size() - count; i < state.scratch.planes.size(); ++i)
+    most = std::max(most, state.scratch.planes[i].offset - glm::dot(state.scratch.planes[i].normal, point));
+  return most;
+}
+
+// Is last tick's reaction still valid? Then the first pass goes by it; asking again is a quarter of a contact
+// tick. An asynchronous result that was applied since makes the reaction stale, and patches solve the contact
+// as a whole.
+bool reaction_is_current(WorldState& state) noexcept {
+  bool any = false;
+  for (std::size_t o = 0; o < state.soft.size(); ++o) {
+    if (state.soft[o]->touched().empty()) state.reactions[o] = {};
+    any = any || state.reactions[o].pressed > 0;
+  }
+  return any && !state.async.applied && !contact_on_patches(state);
+}
+
+}  // namespace
+
+double contact_range_m(const World& world, const WorldState& state) noexcept {
+  if (state.soft.empty()) return std::numeric_limits<double>::max();
+  return kSettings.passes * kSettings.soft_step * soft_reach(world, state);
+}
+
+Sweep settle_contact(const World& world, WorldState& state, const glm::dvec3& device,
+                     const Neighbourhood& around) noexcept {
+  Sweep sweep;
+  std::fill(state.rigid_force_N.begin(), state.rigid_force_N.end(), glm::dvec3(0.0));
+  if (!around.near_soft) {
+    std::fill(state.reactions.begin(), state.reactions.end(), voxel::Reaction{});
+    state.learnt_stiffness_N_per_m = 0.0;
+    state.jammed.clear();
+  } else if (!reaction_is_current(state)) {
+    press_tissue(world, state, state.proxy_m, glm::dvec3(0.0), 0);
+  }
+  const double travel = around.near_soft ? around.range_m / kSettings.passes : around.range_m;
+  for (int pass = 0; pass < kSettings.passes && !around.free; ++pass) {
+    const double moved = move_proxy(world, state, device, around.near_soft, travel, pass == 0, sweep);
+    if (!around.near_soft || (pass > 0 && moved < kSettings.arrived * world.contact_radius_m())) break;
+  }
+  if (!sweep.arrived) ++state.truncated_ticks;
+  return sweep;
+}
+
+void give_way(const World& world, WorldState& state, const glm::dvec3& before, Sweep& sweep) noexcept {
+  state.scratch.planes.clear();
+  std::size_t bounds = tool_bounds(world, state, state.proxy_m, false, state.scratch.planes);
+  if (bounds == 0) return;
+  const auto least = minimise_outside_rigid(
+      world, state, state.proxy_m, polygon::Metric(glm::dmat3(1.0)),
+      [&] { bounds = tool_bounds(world, state, state.proxy_m, false, state.scratch.planes); });
+  // If no exit is found, return to the start of the tick, unless the tool was deeper there.
+  if (least.sure) {
+    state.proxy_m = least.minimum.point;
+  } else if (deepest(state, bounds, before) <= deepest(state, bounds, state.proxy_m)) {
+    state.proxy_m = before;
+  }
+  sweep.point = state.proxy_m;
+}
+
+}  // namespace hybrid

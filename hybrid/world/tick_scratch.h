@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Buffers of one tick. Nothing in them is read in a later tick, so copying or recording a state leaves them
+// out. They are sized when the world is built, and never after.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "hybrid/world/free_body.h"
+#include "hybrid/world/world.h"
+#include "polygon/proxy/minimise_on_planes.h"
+#include "polygon/proxy/neighbourhood.h"
+#include "polygon/surface/rigid_surface.h"
+#include "voxel/object/soft_object.h"
+
+namespace hybrid {
+
+// One plane of the proxy's minimisation, and its owner.
+struct ProxyPlane {
+  std::uint32_t object = 0, element = 0;
+  polygon::SeparatingPlane in_body;
+  bool own_plane = true;  // the element's own plane may be used
+  bool flat = false;      // the element's plane is `in_body`, from wherever it is seen
+  bool touching = false;  // the proxy, where the last sweep left it, is known to lie on it
+};
+inline constexpr std::uint32_t kMaxProxyPlanes = 32;
+
+// Range of one body's contacts in TickScratch::body_contacts; the first `springs` of them are tissue.
+struct OwnContacts {
+  std::size_t first = 0, springs = 0;
+};
+// Free bodies that step together.
+struct FreeBodyStep {
+  std::vector<SteppedBody> stepped;
+  std::vector<OwnContacts> own;          // [stepped]
+  std::vector<std::uint32_t> object;     // [stepped] the rigid object
+  std::vector<std::uint32_t> member;     // [rigid] index into `stepped`
+  std::vector<BodyFrame> before, after;  // [rigid]
+  std::vector<Pose> next;                // [rigid]
+  std::vector<double> moves_m;           // [rigid]
+  std::vector<FreeBody> alone;           // each by itself: nothing but contacts acts on it
+  std::vector<SteppedBody> still;        // … and it has no speed
+  BodySystem system;
+};
+
+// A surface voxel that is due for a distance query to a body; those with the least left come first.
+struct DueQuery {
+  double left_m = 0.0;  // travel that is left before the body may be near
+  std::uint32_t body = 0, surface_number = 0;
+  bool operator<(const DueQuery& other) const noexcept {
+    if (left_m != other.left_m) return left_m < other.left_m;
+    return body != other.body ? body < other.body : surface_number < other.surface_number;
+  }
+};
+
+struct TickScratch {
+  // ---- proxy ----
+  std::vector<polygon::NearPoint> near;
+  std::array<ProxyPlane, kMaxProxyPlanes> proxy_planes{};
+  std::vector<polygon::ContactPlane> planes;
+
+  // ---- soft objects ----
+  std::vector<voxel::ToolBound> bounds;
+  std::vector<std::uint32_t> map_hits;               // entries that the last look-up in the map returned
+  std::vector<std::vector<voxel::VoxelId>> touched;  // [soft] surface voxels near the tool
+
+  // ---- bodies that move ----
+  std::vector<DueQuery> due;
+  std::vector<std::uint32_t> in_the_way;     // surface voxels inside a body
+  std::vector<BodyContact> body_contacts;    // everything that presses on free bodies
+  FreeBodyStep free_bodies;                  // the free bodies that they press on
+  std::vector<std::uint32_t> at_body;        // surface voxels of one object that press on a free body
+  std::vector<voxel::VoxelId> held_by_body;  // their voxels
+  std::vector<voxel::HeldLoad> held_loads;   // their loads
+};
+
+}  // namespace hybrid
