@@ -12,6 +12,7 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace {
@@ -133,6 +134,126 @@ TEST(HouseRules, PolygonVoxelAndDeviceKnowNothingOfOneAnotherNorOfHybrid) {
   });
 }
 
+// ---- Rooms: the folders of a part, and the rooms that each of them may include. ----
+
+struct Room {
+  const char* name;
+  std::vector<const char*> below;  // rooms that it may include; theirs count as well
+};
+
+const std::map<std::string, std::vector<Room>>& rooms() {
+  static const std::map<std::string, std::vector<Room>> kRooms{
+      {"polygon",
+       {{"mesh", {}},
+        {"surface", {"mesh"}},
+        {"repair", {"surface"}},
+        {"files", {"repair"}},
+        {"proxy", {"files"}},
+        {"reference", {"proxy"}}}},
+      {"voxel",
+       {{"volume", {}},
+        {"lattice", {"volume"}},
+        {"fem", {"lattice"}},
+        {"chain", {"lattice"}},
+        {"composite", {"lattice"}},
+        {"baseline", {"lattice"}},
+        {"multigrid", {"fem"}},
+        {"relaxation", {"multigrid"}},
+        {"object", {"relaxation", "chain", "composite", "baseline"}}}},
+      {"device", {{"loop", {}}, {"paths", {}}, {"simulated", {"loop", "paths"}}, {"phantom", {"simulated"}}}},
+      {"hybrid",
+       {{"base", {}},
+        {"geometry", {"base"}},
+        {"feel", {"base"}},
+        {"map", {"base"}},
+        {"scene", {"geometry", "feel", "map"}},
+        {"world", {"scene"}},
+        {"tick/proxy", {"world"}},
+        {"tick/bodies", {"tick/proxy"}},
+        {"tick/tissue", {"tick/bodies"}},
+        {"tick", {"tick/tissue"}},
+        {"build", {"tick"}},
+        {"snapshot", {"build"}},
+        {"session", {"snapshot"}},
+        {"view", {"snapshot"}},
+        {"plot", {"session", "view"}},
+        {"compare", {"session", "view"}},
+        {"compose", {"session", "view"}},
+        {"stress", {"session", "view"}},
+        {"bench", {"plot", "compare", "compose", "stress"}},
+        {"stability", {"plot", "compare", "compose", "stress"}},
+        {"program", {"bench", "stability"}}}},
+  };
+  return kRooms;
+}
+
+// "hybrid" and "tick/proxy" of "hybrid/tick/proxy/name.h"; empty where the path is not of a part.
+std::pair<std::string, std::string> room_of(const std::string& path) {
+  const std::size_t first = path.find('/'), last = path.rfind('/');
+  if (first == std::string::npos || !rooms().contains(path.substr(0, first))) return {};
+  return {path.substr(0, first), last == first ? "" : path.substr(first + 1, last - first - 1)};
+}
+
+// Whether the room may include the other one; false also for a room that does not exist.
+bool may_include(const std::string& part, const std::string& room, const std::string& other) {
+  if (room == other) return true;
+  for (const Room& candidate : rooms().at(part)) {
+    if (room != candidate.name) continue;
+    return std::any_of(candidate.below.begin(), candidate.below.end(),
+                       [&](const char* below) { return may_include(part, below, other); });
+  }
+  return false;
+}
+
+TEST(HouseRules, EverySourceLiesInARoom) {
+  for (const SourceFile& file : tree()) {
+    if (!is_cpp(file)) continue;
+    const auto [part, room] = room_of(file.path);
+    if (part.empty()) continue;
+    const auto& known = rooms().at(part);
+    EXPECT_TRUE(std::any_of(known.begin(), known.end(), [&](const Room& r) { return room == r.name; }))
+        << file.path << ":1: " << part << "/" << room << " is no room of " << part
+        << ": move the file into one, or add the room to the table in this test, with the rooms below it";
+  }
+}
+
+TEST(HouseRules, RoomsIncludeOnlyRoomsBelowThem) {
+  for_each_include([](const SourceFile& file, std::size_t line, const std::string& included) {
+    const auto [part, room] = room_of(file.path);
+    const auto [other_part, other] = room_of(included);
+    if (part.empty() || part != other_part) return;
+    EXPECT_TRUE(may_include(part, room, other))
+        << place(file, line) << part << "/" << room << " includes " << included
+        << ", which is not below it: move "
+        << "what both need into a room below both, or hand it in from above (an argument, a callback)";
+  });
+}
+
+TEST(HouseRules, TestsMirrorTheRooms) {
+  for (const SourceFile& file : tree()) {
+    if (!is_cpp(file) || !is_in(file, "tests")) continue;
+    const auto [part, room] = room_of(file.path.substr(std::string_view("tests/").size()));
+    if (part.empty() || room == "fixtures" || room == "phantom/fake_libhd") continue;
+    const auto& known = rooms().at(part);
+    EXPECT_TRUE(std::any_of(known.begin(), known.end(), [&](const Room& r) { return room == r.name; }))
+        << file.path << ":1: tests of a room lie in the folder of its name; what several share, in fixtures/";
+  }
+}
+
+constexpr std::size_t kMostLines = 450, kMostSources = 40;
+
+TEST(HouseRules, FilesAndRoomsAreSmallEnoughToKnow) {
+  std::map<std::string, std::size_t> sources;
+  for (const SourceFile& file : tree()) {
+    if (!is_cpp(file)) continue;
+    EXPECT_LE(file.lines.size(), kMostLines)
+        << file.path << ":" << kMostLines << ": split it into files of one notion each";
+    ++sources[fs::path(file.path).parent_path().generic_string()];
+  }
+  for (const auto& [folder, count] : sources)
+    EXPECT_LE(count, kMostSources) << folder << " has more sources than can be known: split the room";
+}
+
 TEST(HouseRules, NothingButTestsIncludesHybridFromOutside) {
   for_each_include([](const SourceFile& file, std::size_t line, const std::string& included) {
     if (!included.starts_with("hybrid/")) return;
@@ -196,6 +317,14 @@ TEST(HouseRules, NoTextNamesAPlaceOnSomeonesMachine) {
             << place(file, i) << "names " << word << ": use a path from the project's root";
       }
     }
+  }
+}
+
+TEST(HouseRules, PartsKeepWhatWasDecided) {
+  for (const char* part : kParts) {
+    const fs::path decisions = fs::path(HYBRID_SOURCE_DIR) / part / "DECISIONS.md";
+    EXPECT_TRUE(fs::is_regular_file(decisions))
+        << part << "/DECISIONS.md is missing: what was tried and rejected, with its figures";
   }
 }
 

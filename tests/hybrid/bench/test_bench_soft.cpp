@@ -6,10 +6,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <set>
 
-#include "hybrid/bench/soft_engines.h"
 #include "hybrid/bench/soft_convergence.h"
+#include "hybrid/bench/soft_engines.h"
 
 namespace {
 

@@ -4,6 +4,7 @@
 #include "hybrid/bench/threads.h"
 
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "tests/hybrid/fixtures/touch.h"
 

@@ -12,6 +12,7 @@
 #include <functional>
 #include <glm/geometric.hpp>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
 

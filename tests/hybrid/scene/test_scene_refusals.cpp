@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "hybrid/build/load_scene.h"
 #include "hybrid/scene/scene.h"
 #include "hybrid/scene/table_reader.h"
 #include "tests/hybrid/fixtures/scene_file_fixture.h"

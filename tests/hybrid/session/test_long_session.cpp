@@ -15,6 +15,8 @@
 #include <thread>
 #include <vector>
 
+#include "hybrid/session/relaxation_thread.h"
+#include "hybrid/session/result_tape.h"
 #include "hybrid/tick/tissue/async_relaxation.h"
 #include "tests/hybrid/fixtures/touch.h"
 
@@ -139,16 +141,16 @@ LongSession feel(std::size_t ticks, Relaxed relaxed, Arrivals& arrivals) {
   tests::Touch touch(hybrid::load_scene(tests::source_folder / "tests/hybrid/session/vigorous.toml"),
                      dvec3(0, 0, 0.06));
   hybrid::WorldState& state = touch.state();
-  hybrid::relax_apart(state, plays ? hybrid::Arrival::recorded : hybrid::Arrival::thread);
+  hybrid::start_async_relaxation(state, plays ? hybrid::Arrival::recorded : hybrid::Arrival::thread);
   LongSession result;
   std::optional<hybrid::RelaxationThread> thread;
-  if (!plays) thread.emplace(touch.world(), state.apart, 60.0);
+  if (!plays) thread.emplace(touch.world(), state.async, 60.0);
   WildHand hand(11);
   std::uint64_t hash = hybrid::kHashBegin;
   for (std::size_t n = 0; n < ticks; ++n) {
-    if (plays && !arrivals.wait_for(n, state.apart.arrived)) return result;
+    if (plays && !arrivals.wait_for(n, state.async.arrived)) return result;
     const hybrid::TickResult felt = touch.at(hand.next(), kDt_s);
-    if (!plays) arrivals.say(n, state.apart.arrived);
+    if (!plays) arrivals.say(n, state.async.arrived);
     hash = hybrid::hash_tick(hash, felt);
     if (felt.contacts != 0) ++result.contact_ticks;
     if (!tests::finite(felt.force_N) || !tests::finite(felt.proxy_m)) {
@@ -163,10 +165,10 @@ LongSession feel(std::size_t ticks, Relaxed relaxed, Arrivals& arrivals) {
   }
   EXPECT_EQ(state.nonfinite, 0U);
   EXPECT_EQ(state.faults, 0U);
-  result.results = state.apart.results;
+  result.results = state.async.results;
   // Let go of, until the map's slices have been all round.
   for (int n = 0; n < 3000; ++n) {
-    if (plays) state.apart.arrived = 0;
+    if (plays) state.async.arrived = 0;
     touch.at({0, 0, 0.2});
   }
   expect_exact(touch.world(), state);

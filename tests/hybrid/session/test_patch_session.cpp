@@ -8,8 +8,8 @@
 #include <glm/geometric.hpp>
 #include <iostream>
 
-#include "hybrid/snapshot/make_drawn_scene.h"
 #include "hybrid/snapshot/fill_snapshot.h"
+#include "hybrid/snapshot/make_drawn_scene.h"
 #include "hybrid/snapshot/merge_live_surface.h"
 #include "tests/hybrid/fixtures/touch.h"
 

@@ -12,8 +12,8 @@
 
 #include "hybrid/session/recording.h"
 #include "hybrid/session/session.h"
-#include "tests/hybrid/fixtures/scene_file_fixture.h"
 #include "tests/device/phantom/phantom_rig.h"
+#include "tests/hybrid/fixtures/scene_file_fixture.h"
 
 namespace {
 

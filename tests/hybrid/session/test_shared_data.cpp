@@ -12,8 +12,8 @@
 
 #include "polygon/files/mesh_file.h"
 
-#include "tests/shared_data.h"
 #include "tests/hybrid/fixtures/touch.h"
+#include "tests/shared_data.h"
 
 namespace {
 

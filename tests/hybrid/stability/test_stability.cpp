@@ -7,14 +7,15 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <numbers>
 #include <sstream>
 #include <string>
 #include <vector>
 
 #include "hybrid/base/find_threshold.h"
-#include "hybrid/stability/stability.h"
 #include "hybrid/stability/plot.h"
+#include "hybrid/stability/stability.h"
 #include "hybrid/stability/table.h"
 #include "tests/hybrid/fixtures/scene_file_fixture.h"
 

@@ -12,7 +12,8 @@
 #include <sstream>
 #include <vector>
 
-#include "hybrid/tick/tissue/obstacles_and_pairs.h"
+#include "hybrid/tick/tissue/obstacles.h"
+#include "hybrid/tick/tissue/soft_contacts.h"
 #include "hybrid/session/tick_invariants.h"
 #include "polygon/files/mesh_file.h"
 #include "polygon/surface/primitives.h"

@@ -194,7 +194,7 @@ TEST_F(VolumeDataSets, DicomFoldersThatAreNotOneWholeSeriesAreRefused) {
 
 TEST_F(VolumeDataSets, TemplatesOfMricronLoad) {
   const fs::path path = "/usr/share/mricron/templates/ch2bet.nii.gz";
-  if (!fs::exists(path)) GTEST_SKIP() << "skipped: the package mricron-data is not installed";
+  NEED_DATA(fs::exists(path), "the package mricron-data is not installed");
   VolumeFileOptions options;
   options.spacing_m = glm::dvec3(2e-3);
   options.rules = {{20, 255, 3}};
