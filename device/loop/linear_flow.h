@@ -18,7 +18,7 @@ struct LinearFlow {
 };
 
 // For mass > 0, damping >= 0, stiffness >= 0 and a finite time >= 0. The relative error is below 1e-12 for
-// values of any size (tests/device/simulated/test_linear_flow.cpp).
+// values of any size (tests/device/loop/test_linear_flow.cpp).
 LinearFlow linear_flow(double mass_kg, double damping_N_s_per_m, double stiffness_N_per_m,
                        double time_s) noexcept;
 

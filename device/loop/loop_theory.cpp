@@ -5,7 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <unsupported/Eigen/MatrixFunctions>
+
+#include "device/loop/linear_flow.h"
 
 namespace device {
 namespace {
@@ -17,13 +18,14 @@ struct SampledMechanics {
 };
 
 SampledMechanics sample_mechanics(const SampledLoop& loop) {
-  Eigen::Matrix3d rate = Eigen::Matrix3d::Zero();  // of (x, v, u), with u constant
-  rate(0, 1) = 1.0;
-  rate(1, 0) = -loop.hand_stiffness_N_per_m / loop.mass_kg;
-  rate(1, 1) = -loop.damping_N_s_per_m / loop.mass_kg;
-  rate(1, 2) = 1.0 / loop.mass_kg;
-  const Eigen::Matrix3d map = (rate * loop.period_s).exp();
-  return {map.topLeftCorner<2, 2>(), map.topRightCorner<2, 1>()};
+  const LinearFlow flow =
+      linear_flow(loop.mass_kg, loop.damping_N_s_per_m, loop.hand_stiffness_N_per_m, loop.period_s);
+  const double pull_per_s2 = loop.hand_stiffness_N_per_m / loop.mass_kg;
+  SampledMechanics mechanics;
+  mechanics.state << 1.0 - flow.from_acceleration_s2 * pull_per_s2, flow.from_velocity_s,
+      -flow.from_velocity_s * pull_per_s2, flow.velocity_factor;
+  mechanics.force << flow.from_acceleration_s2 / loop.mass_kg, flow.from_velocity_s / loop.mass_kg;
+  return mechanics;
 }
 
 double radius_of(const SampledLoop& loop, const SampledMechanics& mechanics, double stiffness) {

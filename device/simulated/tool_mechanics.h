@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <glm/vec3.hpp>
 
-#include "device/simulated/linear_flow.h"
+#include "device/loop/linear_flow.h"
 
 namespace device {
 

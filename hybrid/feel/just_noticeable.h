@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The just noticeable difference (JND) of a force: the unit of every force error of this project.
 // |force - reference| / max(kJndShare * |reference|, floor), the floor being that of the device (jnd_floor_N()).
-// Source: the thesis, Table 1 (steady force at the elbow, 7 %).
+// Source: the thesis, Table 4 (force at the elbow, 7 %).
 #pragma once
 
 #include <algorithm>

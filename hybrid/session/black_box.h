@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The last seconds of a session, always kept, and written when something went wrong.
+// The last seconds of a session: always kept in memory, and written to a file after a fault.
 #pragma once
 
 #include <cstdint>
@@ -15,10 +15,10 @@
 
 namespace hybrid {
 
-// One tick, as said by the device and as answered.
+// One tick: the input of the device, and the answer.
 struct BlackBoxRow {
   std::uint64_t tick = 0;  // of the session
-  glm::dvec3 said_m{0.0};  // by the device, be it a place or not; scene frame
+  glm::dvec3 said_m{0.0};  // position that the device reported, valid or not; scene frame
   device::DeviceFault said = device::DeviceFault::none;
   std::uint32_t faults = 0;     // FaultBit, of the session so far
   std::uint64_t nonfinite = 0;  // inputs and forces held back so far
@@ -26,9 +26,9 @@ struct BlackBoxRow {
   TickResult felt{};
 };
 
-// A ring of rows in a room that is there from the start: add() allocates nothing and waits for nobody, so it
-// belongs to the servo thread. At the first fault (the device's, a tick's, or a number that is none) it goes
-// on for a quarter of the time and then stands still, so that it holds what led there and what came of it.
+// A ring of rows, allocated in the constructor. add() allocates nothing and never waits, so the servo thread
+// may call it. At the first fault (of the device, of a tick, or a non-finite number) the ring records for a
+// quarter of its length more, and then stops. So it holds the ticks before the fault and those after it.
 class BlackBox {
  public:
   static constexpr double kSeconds = 2.0;
@@ -39,10 +39,10 @@ class BlackBox {
 
   // The first fault in words, with its time; none: there was none.
   [[nodiscard]] std::optional<std::string> fault() const;
-  // Columns t_s, x_m, y_m, z_m (where the device was taken to be: the file is a path that can be felt again),
-  // said_*_m (where it said to be), proxy_*_m, force_*_N, rigid_N, soft_N, contacts, device_fault, faults,
-  // nonfinite, late_us, tick_us, and a column for each stage. Returns false: not all was written. What a
-  // signal handler may do.
+  // Columns t_s, x_m, y_m, z_m (the position that was used, so that the file can be felt again as a path),
+  // said_*_m (the position that the device reported), proxy_*_m, force_*_N, rigid_N, soft_N, contacts,
+  // device_fault, faults, nonfinite, late_us, tick_us, and a column for each stage. Returns false when not
+  // all was written. Async-signal-safe.
   bool write_to(int descriptor) const noexcept;
 
  private:
@@ -51,20 +51,20 @@ class BlackBox {
 
   double dt_s_;
   std::vector<BlackBoxRow> rows_;
-  std::uint64_t added_ = 0, left_;  // rows, and how many more after a fault
+  std::uint64_t added_ = 0, left_;  // rows added, and rows that are still recorded after a fault
   Cause cause_ = Cause::none;
   BlackBoxRow at_fault_{};
   std::uint32_t faults_ = 0;
   std::uint64_t nonfinite_ = 0;
 };
 
-// A box, and the file that it goes to: on a crash from its handler, after a fault when the session has ended.
+// A black box and its file. A crash writes it from the signal handler, a fault at the end of the session.
 class KeptBox {
  public:
   KeptBox(double rate_hz, std::filesystem::path file);
 
   [[nodiscard]] BlackBox& box() { return box_; }
-  // Writes the file when there was a fault, and says so; empty: there was none, and no file.
+  // After a fault writes the file and returns its name; empty without a fault.
   [[nodiscard]] std::string save_on_fault() const;
 
  private:
@@ -75,8 +75,8 @@ class KeptBox {
   device::OnCrash on_crash_;
 };
 
-// What cannot be run again to look closer is kept: `asked`, or where that is empty and the session is `live`,
-// SCENE-fault.csv in the current folder. None: a session that can be run again.
+// The file of a session that cannot be run again: `asked`, or SCENE-fault.csv in the current folder when
+// `asked` is empty and the session is `live`. None for a session that can be run again.
 std::unique_ptr<KeptBox> keep_box(const std::filesystem::path& asked, const std::filesystem::path& scene,
                                   bool live, double rate_hz);
 

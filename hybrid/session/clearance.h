@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How near to one another the objects of a scene come, for plots: looked at between ticks, never in one.
+// Distances between the objects of a scene, for plots. They are measured between ticks, never within one.
 #pragma once
 
 #include <vector>
@@ -8,8 +8,8 @@
 
 namespace hybrid {
 
-// Between the surfaces of voxels, each a ball of half its spacing, and what is nearest to one of them (m).
-// Negative: how deep they overlap. Not a number: nothing is near.
+// Least distance between surface voxels, each a ball of half its spacing, and any other surface (m).
+// Negative: the depth of the overlap. NaN: nothing is near.
 struct Clearance {
   double rigid_m, soft_m;
 };

@@ -12,20 +12,19 @@ namespace hybrid {
 
 // The names that `--device` takes.
 inline constexpr const char* kDeviceNames[] = {"phantom", "premium-1.5", "touch", "ideal"};
-// The scene with another device than it says. `name` is one of those.
+// Gives the scene another device. `name` is one of those names.
 void use_device(Scene& scene, const std::string& name);
 
-// Opens the scene's real device; the scene takes its rate and its limits. Nothing where the scene has a
-// simulated one. Throws SceneError: what is missing, the remedy, and that the scene also runs with a
-// simulated device.
+// Opens the scene's real device; the scene takes over its rate and its limits. Null for a simulated device.
+// Throws SceneError with the missing part and the remedy, and says that the scene also runs with a simulated
+// device.
 std::unique_ptr<device::PhantomDevice> open_real_device(Scene& scene, device::PhantomOptions options = {});
 
-// Lays the device's workspace over the scene's objects and its path, centre to centre; says how, and what is
-// out of its reach.
+// Maps the device's workspace onto the scene's objects and its path, centre to centre. Returns words about
+// the mapping and about objects out of reach.
 std::string place_real_device(const Scene& scene, const World& world, device::PhantomDevice& device);
 
-// Waits until the hand has the tool out of everything rigid, at most so long. Throws SceneError when it has
-// not.
+// Waits until the hand has moved the tool out of all rigid objects. Throws SceneError after the given time.
 void await_free_tool(const Scene& scene, const World& world, WorldState& state, device::HapticDevice& device,
                      const Progress& progress, double most_s = 30.0);
 

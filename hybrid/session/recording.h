@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A session on file: the scene's text, every input and a running hash a tick, so that a bug report is a file.
+// A session as a file: the scene's text, every input, and a running hash for each tick. A bug report is such
+// a file.
 #pragma once
 
 #include <cstdint>
@@ -13,9 +14,9 @@ namespace hybrid {
 
 struct Recording {
   std::filesystem::path scene_file;  // where the scene was; replay reads it again from there
-  std::string scene_text;            // as it was, so that a changed scene is noticed
+  std::string scene_text;            // at the time of recording, so that a changed scene is noticed
   double dt_s = 1e-3;
-  device::DeviceLimits device{};  // that it was felt with
+  device::DeviceLimits device{};  // limits of the device that was used
   bool async_relaxation = false;  // SessionOptions::async_relaxation
   std::uint64_t state_hash = 0;   // after the last tick
   glm::dvec3 start_m{0.0};        // SessionResult::start_m
@@ -29,10 +30,12 @@ Recording load_recording(const std::filesystem::path& file);
 struct ReplayResult {
   std::uint64_t ticks = 0, state_hash = 0;
   bool equal = false;
-  std::uint64_t parts_at = 0;  // first tick whose hash differs; ticks when only the end does
+  std::uint64_t parts_at =
+      0;  // first tick whose hash differs; the number of ticks when only the final hash differs
 };
 
-// The same inputs through a freshly built scene. Throws SceneError, std::runtime_error (scene changed since).
+// Runs the same inputs through a freshly built scene. Throws SceneError, std::runtime_error (scene changed
+// since).
 ReplayResult replay(const Recording& recording, const Progress& progress);
 
 }  // namespace hybrid

@@ -15,10 +15,10 @@ nlohmann::ordered_json report_head(const std::string& command);
 nlohmann::ordered_json to_json(const Percentiles& p);
 nlohmann::ordered_json run_report(const Scene& scene, const BuiltScene& built, SessionResult& result);
 
-// The same as a person would read it.
+// The same for a person to read.
 std::string run_summary(const BuiltScene& built, SessionResult& result);
 
-// Names of the fault bits that are set, with what to do; empty when none.
+// The faults that are set, in words, each with its remedy where there is one; empty when none is set.
 std::vector<std::string> fault_texts(std::uint32_t faults);
 
 // Writes to a file, or to standard output for "-". Throws std::runtime_error: not writable.

@@ -22,45 +22,45 @@
 
 namespace hybrid {
 
-// Of the values given; all zero when there are none. Reorders them.
+// Percentiles of `values`; all zero when there are none. Reorders them.
 Percentiles percentiles(std::vector<double>& values);
 
-// One tick of a recording: the input, and the running hash of everything felt up to and including it.
+// One tick of a recording: its input, and the running hash of all forces up to and including it.
 struct RecordedTick {
   glm::dvec3 device_m{0.0};
   std::uint64_t hash = 0;
   device::DeviceFault fault = device::DeviceFault::none;
-  std::uint64_t arrived = 0;    // soft objects whose relaxation, apart, began to be taken in this tick
+  std::uint64_t arrived = 0;    // bit per soft object whose asynchronous result arrived in this tick
   std::uint8_t work_share = 0;  // WorkShare::steps()
 };
-// Before a tick that is played again: what of it was the machine's doing.
+// Call before a replayed tick: restores what depended on the machine (arrival of results, work budget).
 void play_again(const RecordedTick& tick, WorldState& state) noexcept;
 
 struct SessionOptions {
   std::optional<double> seconds;  // default: the path's length and half a second; a real device: a minute
   bool realtime = false;          // paced by a real timer; else fixed-step, as fast as it goes
-  // A real one, open, placed in the scene and out of anything rigid; always in real time. None: the scene's
-  // simulated one.
+  // A real device: open, placed in the scene, the tool outside all rigid objects; always in real time. Null:
+  // the scene's simulated device.
   device::HapticDevice* real_device = nullptr;
   bool keep_rows = true;        // trace rows and per-object forces
   bool keep_recording = true;   // every input, 48 bytes a tick: without it and the rows memory stays flat
-  bool keep_clearance = false;  // how near objects come, at a thousand moments
-  bool keep_picture = false;    // remember the most telling moment
-  int reference_samples = 0;    // how often the force is compared with its equilibrium; 0 in real time
-  // Clocks and counters begin as after so many ticks, and the path so much later; nothing felt may differ. (A
-  // soft start is over by then.)
+  bool keep_clearance = false;  // distances between objects, at a thousand moments
+  bool keep_picture = false;    // keep the snapshot with the most contact
+  int reference_samples = 0;    // comparisons of the force with its equilibrium; 0 in real time
+  // Clocks, counters and path begin as after this many ticks, when a soft start is over. The forces do not
+  // depend on it.
   std::uint64_t start_ticks = 0;
   Progress progress;
-  // Tissue away from the contact is relaxed apart from the tick: in real time on a thread of its own.
+  // Tissue away from the contact is relaxed asynchronously: in real time on a thread of its own.
   bool async_relaxation = false;
-  bool relaxation_thread = true;  // false: nothing is relaxed apart; for benchmarks
-  double surfaces_hz = 0.0;       // how often that thread says where surfaces are, for whoever draws
-  BlackBox* black_box = nullptr;  // every tick is added to it
-  std::shared_ptr<const device::Path> path{};  // of the hand, in place of the scene's
+  bool relaxation_thread = true;               // false: submitted states are never relaxed; for benchmarks
+  double surfaces_hz = 0.0;                    // how often that thread publishes surfaces for drawing
+  BlackBox* black_box = nullptr;               // every tick is added to it
+  std::shared_ptr<const device::Path> path{};  // of the hand; null: the scene's path
 };
 
-struct ForceError {  // of the tick's force against the equilibrium lattice with its limits, at the sampled
-                     // ticks
+struct ForceError {  // of the tick's force at the sampled ticks; reference: the equilibrium lattice with its
+                     // limits
   int samples = 0;
   double max_N = 0.0, rms_N = 0.0, max_jnd = 0.0, p99_N = 0.0, p99_jnd = 0.0;
 };
@@ -80,20 +80,20 @@ struct SessionResult {
   ForceError error;
   std::optional<Snapshot> moment;       // of keep_picture
   std::vector<RecordedTick> recording;  // of keep_recording
-  // Where the device was as the session began, and the proxy with it: a first tick that comes late finds it
-  // elsewhere.
+  // Position of device and proxy as the session began. A late first tick may find the device elsewhere.
   glm::dvec3 start_m{0.0};
   std::string device_name;
   device::ServoEnd end = device::ServoEnd::finished;
-  std::vector<std::string> device_messages;  // what happened to the device, and what to do about it
-  std::vector<std::string> path_notes;       // what the path's reader noticed: gaps, repeated times
-  std::string realtime_note;                 // what priority was granted
+  std::vector<std::string> device_messages;  // events of the device, each with its remedy
+  std::vector<std::string> path_notes;       // findings of the path's reader: gaps, repeated times
+  std::string realtime_note;                 // the priority that was granted, in words
   Percentiles late_us;                       // how late the machine woke the loop; not part of the tick
-  // Processor time of the ticks, and of relaxation apart from them: of its thread in real time, else of what
-  // that would have done.
+  // CPU time of the ticks, and of asynchronous relaxation: of its thread in real time, else of the work that
+  // a thread would have done.
   double servo_s = 0.0, relaxation_s = 0.0;
-  std::uint64_t relaxed_apart = 0;  // results that ticks took
-  // Of the contact's work, in real time: the least share that a tick had, and how many had less than all.
+  std::uint64_t relaxed_apart = 0;  // asynchronous results that ticks applied
+  // Work budget of the contact in real time: the least share of any tick, and the number of ticks with less
+  // than all.
   double least_work_share = 1.0;
   std::uint64_t ticks_with_less_work = 0;
 };
@@ -108,12 +108,12 @@ std::unique_ptr<device::HapticDevice> scene_device(const Scene& scene,
 // Starts the proxy or throws SceneError.
 void begin_session(const Scene& scene, const World& world, WorldState& state, const glm::dvec3& device_m);
 
-// Of tick number `tick` of the session, which has just been felt.
+// The row of tick number `tick`, which has just ended.
 BlackBoxRow black_box_row(const device::ServoInput& input, const TickResult& felt, std::uint64_t tick,
                           const WorldState& state) noexcept;
 
-// Hashes. The running one takes what is felt, the final one also every displacement, where every rigid
-// body is and how it moves, and what the limits on the force remember.
+// Hashes. The running one covers the forces; the final one also every displacement, the pose and motion of
+// every rigid body, and the state of the force limits.
 inline constexpr std::uint64_t kHashBegin = 0xCBF29CE484222325ULL;
 std::uint64_t hash_tick(std::uint64_t before, const TickResult& tick) noexcept;
 std::uint64_t hash_state(std::uint64_t before, const WorldState& state) noexcept;
@@ -121,13 +121,12 @@ std::uint64_t hash_state(std::uint64_t before, const WorldState& state) noexcept
 // A snapshot of now.
 Snapshot take_snapshot(const World& world, const WorldState& state, const TickResult& tick, double t_s);
 
-// The state again, sharing nothing that moves.
+// A deep copy of the state; the constant lattices are shared.
 std::unique_ptr<WorldState> copy_state(const World& world, const WorldState& state);
 
-// The force that the present device position would be answered with once everything soft has come to rest
-// (N), found on a copy of the state, until it changes by less than `tolerance_N` over dozens of whole
-// relaxation cycles, and the anchors carry it; bodies that move stand still meanwhile. Empty when it does not
-// settle.
+// The force at the present device position once all tissue is at rest (N). A copy of the state is relaxed
+// until the force changes by less than `tolerance_N` over dozens of whole relaxation cycles and the anchors
+// carry it; moving bodies stand still meanwhile. Empty when the force does not settle.
 std::optional<glm::dvec3> equilibrium_force(const World& world, const WorldState& state,
                                             double tolerance_N = 1e-4);
 

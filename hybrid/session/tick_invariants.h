@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Watches ticks from outside for what must hold of every one of them, whatever the scene and the input.
+// Invariants of every tick, for any scene and any input, checked from outside.
 #pragma once
 
 #include <cstdint>
@@ -10,57 +10,58 @@
 
 namespace hybrid {
 
-// What must hold:
+// The invariants:
 //
-// finite. Every number that a tick gives out, and every one that it keeps (proxy, poses, displacements), is.
+// finite. Every result of a tick and every number of its state (proxy, poses, displacements) is finite.
 //
-// limits. The force is no longer than ForceLimits::max_force_N, and changes by no more than max_slew_N_per_s
-// times the tick, but to zero.
+// limits. The force is at most ForceLimits::max_force_N. It changes by at most max_slew_N_per_s times the
+// tick, except to zero.
 //
-// energy. Of rigid objects that stay and have no friction, damping or texture, and of tissue. What coupling
-// and tissue store as the watch begins may be given to the hand. Let U(x) be the least energy of the coupling
-// (and of the tissue) that the proxy can reach from where it is when the device is at x. The proxy of the
-// tick before can stay, so the new energy is at most
+// energy. It holds for tissue and for standing rigid objects without friction, damping or texture. The energy
+// that coupling and tissue store when the checks begin may be given to the hand. Let U(x) be the least energy
+// of coupling and tissue that the proxy can reach when the device is at x. The proxy of the tick before can
+// stay where it is, so the new energy is at most
 //     U' <= ½K|x' − q|² = U − F·(x' − x) + ½K|x' − x|²,    F = K (q − x) the force,
-// whatever the surface: the work F·(x' − x) that the held force does on the hand is what was stored, and no
-// more than ½K|Δx|² a tick beside it. That much is what holding a force for a tick costs (Colgate & Schenkel
-// 1997, K·T/2), and an engine that adds nothing of its own stays within it, stable or not: a coupling stiffer
-// than the loop can hold buzzes on this share alone. With the clamp the same holds of the clamped spring's
-// energy. A limit on the slew is a delay, and may give |ΔF|·|Δx| more, ΔF what it changed; so that is added
-// to what is allowed, and is zero wherever the slew did not cut. Tissue is not solved to equilibrium within a
-// tick: a wave may store in it what the hand has not paid for, and give it back. With tissue, kTissueShare of
-// all the work that went to and fro is let pass; that bounds this engine's error, and is no theorem.
+// for any surface. So the work F·(x' − x) of the held force on the hand is at most the energy that was
+// stored, plus ½K|Δx|² in each tick. This share is the cost of holding a force for a tick (Colgate & Schenkel
+// 1997, K·T/2). An engine that adds no energy stays within it, stable or not: a coupling that is too stiff
+// for the loop buzzes on this share alone. With the clamp the same holds for the energy of the clamped
+// spring. A slew limit is a delay that changes the force by ΔF and may give |ΔF|·|Δx| more; this is added to
+// the allowed energy, and is zero where the limit did not act. Tissue is not solved to equilibrium within a
+// tick: a wave may store energy in it that the hand has not paid for, and return it. With tissue,
+// kTissueShare of all work in either direction is allowed. That bounds this engine's error and is no theorem.
 //
-// outside. The proxy's ball is not in a rigid object, nor nearer than its radius, but for rounding.
+// outside. The proxy's centre is no nearer to a rigid object than its radius, within rounding.
 class TickWatch {
  public:
   static constexpr double kTissueShare = 0.005;
 
-  // Both as a session begins. `world` is to outlive the watch.
+  // Call as the session begins. `world` must outlive this object.
   TickWatch(const World& world, const WorldState& state);
 
   // After each tick.
   void see(const WorldState& state, const TickResult& felt, double dt_s);
-  // Every displacement and pose; see() looks at them now and then.
+  // Checks every displacement and pose; see() does so for some ticks only.
   void see_all(const WorldState& state);
 
   [[nodiscard]] std::uint64_t ticks() const { return ticks_; }
   [[nodiscard]] std::uint64_t not_finite() const { return not_finite_; }
   [[nodiscard]] double most_N() const { return most_N_; }
-  // Beyond the limits (N); 0: within.
+  // Excess over the limits (N); 0: within.
   [[nodiscard]] double over_force_N() const { return over_force_N_; }
   [[nodiscard]] double over_slew_N() const { return over_slew_N_; }
-  // The most by which what was given to the hand and is stored still exceeded what is allowed (J), and what
-  // that is to be compared with: rounding, and the tissue's share.
+  // The largest excess of given plus stored energy over the allowed energy (J), and its bound: rounding and
+  // the tissue's share.
   [[nodiscard]] double excess_J() const { return excess_J_; }
   [[nodiscard]] double tolerance_J() const;
-  [[nodiscard]] double moved_J() const { return moved_J_; }  // to and fro
+  [[nodiscard]] double moved_J() const { return moved_J_; }  // work in either direction
   [[nodiscard]] double given_J() const { return given_J_; }  // to the hand, by the end
-  // The most that was ever given, and the largest work of any one tick: what a passivity controller compares.
+  // The most that was ever given, and the largest work of a single tick: a passivity controller compares the
+  // two.
   [[nodiscard]] double most_given_J() const { return most_given_J_; }
   [[nodiscard]] double worst_tick_J() const { return worst_tick_J_; }
   [[nodiscard]] double allowed_J() const { return allowed_J_; }  // by the end
-  // The most by which the proxy's ball was in something rigid (m).
+  // Largest depth of the proxy's ball in a rigid object (m).
   [[nodiscard]] double inside_m() const { return inside_m_; }
   [[nodiscard]] double slowest_us() const { return slowest_us_; }
   [[nodiscard]] std::uint64_t hash() const { return hash_; }
@@ -75,7 +76,7 @@ class TickWatch {
   double most_given_J_ = 0.0, worst_tick_J_ = 0.0;
   double given_J_ = 0.0, allowed_J_ = 0.0, excess_J_ = 0.0, moved_J_ = 0.0, stored_J_ = 0.0;
   glm::dvec3 force_N_{0.0}, device_m_{0.0};
-  double slewed_N_ = 0.0;  // how far the force was from the clamped one
+  double slewed_N_ = 0.0;  // distance of the force from the clamped one
 };
 
 }  // namespace hybrid

@@ -37,7 +37,7 @@ struct FacetContact {
   bool held = false;  // near enough to press: the contact alone moves its voxels
 };
 
-// Named faults of a tick. Each names the setting to raise.
+// Named faults of a tick; the report says each in words, with the setting to raise where there is one.
 enum FaultBit : std::uint32_t {
   fault_nonfinite_input = 1,  // the device gave a position that is not finite: the last good one held
   fault_touch_overflow =

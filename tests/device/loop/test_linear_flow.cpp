@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "device/simulated/linear_flow.h"
+#include "device/loop/linear_flow.h"
 
 #include <gtest/gtest.h>
 

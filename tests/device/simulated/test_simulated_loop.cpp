@@ -8,7 +8,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "device/simulated/linear_flow.h"
+#include "device/loop/linear_flow.h"
 #include "device/simulated/simulated.h"
 
 namespace {
