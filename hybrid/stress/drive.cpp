@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <optional>
@@ -175,6 +176,13 @@ glm::dvec3 no_position(std::uint64_t number) noexcept {
 double largest_displacement_m(const WorldState& state) {
   float most = 0.0F;
   for (const auto& object : state.soft) {
+    if (object->grid_in_use() != nullptr) {  // its displacements are on nested patches, the state is at rest
+      for (const voxel::VoxelId v : object->lattice().surface()) {
+        const glm::vec3 u = glm::abs(glm::vec3(object->displacement(v)));
+        most = std::max({most, u.x, u.y, u.z});
+      }
+      continue;
+    }
     for (const auto& axis : object->state().u) {
       for (const float u : axis) most = std::max(most, std::abs(u));
     }

@@ -11,7 +11,6 @@ namespace {
 constexpr int kObstaclePasses = 8;
 // Three and a half roundings of a float, relative: with four, what else is rounded left links beyond by 6.7.
 constexpr float kMargin = 2.1e-7F;
-constexpr double kTouching = 1e-6;  // of the spacing: no deeper in its obstacle than this, a voxel lies on it
 
 }  // namespace
 

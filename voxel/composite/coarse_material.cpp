@@ -18,7 +18,7 @@ std::size_t index(int i) {
 
 }  // namespace
 
-TissueCells::TissueCells(const Lattice& lattice) : lattice_(lattice), dims_(lattice.grid().dims) {
+CoarseMaterial::CoarseMaterial(const Lattice& lattice) : lattice_(lattice), dims_(lattice.grid().dims) {
   fills_box_ = lattice.voxel_count() == index(dims_[0]) * index(dims_[1]) * index(dims_[2]);
   rank_materials();
   choose_offset();
@@ -35,7 +35,7 @@ TissueCells::TissueCells(const Lattice& lattice) : lattice_(lattice), dims_(latt
 }
 
 // The reference is what the first voxel of the surface is of.
-void TissueCells::rank_materials() {
+void CoarseMaterial::rank_materials() {
   std::vector<double> young_Pa{0.0};
   for (const LinkMaterial& m : lattice_.materials().subspan(1)) young_Pa.push_back(m.young_Pa);
   std::sort(young_Pa.begin(), young_Pa.end());
@@ -62,12 +62,12 @@ void TissueCells::rank_materials() {
 
 // The low end of the box is at 0, or, where more voxels are anchored there than at the high end, that one at
 // a node of all levels.
-void TissueCells::choose_offset() {
+void CoarseMaterial::choose_offset() {
   for (std::size_t d = 0; d < 3; ++d) {
     const std::size_t e = (d + 1) % 3, f = (d + 2) % 3;
     std::array<double, 2> anchors{};
     for (const int end : {0, 1}) {
-      Place p{};
+      Index3 p{};
       double voxels = 0.0;
       p[d] = end == 0 ? 0 : dims_[d] - 1;
       for (p[e] = 0; p[e] < dims_[e]; ++p[e]) {
@@ -84,15 +84,15 @@ void TissueCells::choose_offset() {
   }
 }
 
-int TissueCells::offset_of_high_end(std::size_t d) const noexcept {
+int CoarseMaterial::offset_of_high_end(std::size_t d) const noexcept {
   int whole = 1;
   while (whole < dims_[d] - 1) whole *= 2;
   return whole - (dims_[d] - 1);
 }
 
-bool TissueCells::align_to(const Place& voxel) noexcept {
+bool CoarseMaterial::align_to(const Index3& voxel) noexcept {
   if (!fills_box_ || several()) return false;
-  const Place before = offset_;
+  const Index3 before = offset_;
   for (std::size_t d = 0; d < 3; ++d) {
     const int last = dims_[d] - 1, middle = 2 * voxel[d] - last;
     if (std::abs(middle) * kNearerEnd > last) offset_[d] = middle > 0 ? offset_of_high_end(d) : 0;
@@ -100,14 +100,14 @@ bool TissueCells::align_to(const Place& voxel) noexcept {
   return offset_ != before;
 }
 
-bool TissueCells::filled(const Place& p) const noexcept {
+bool CoarseMaterial::filled(const Index3& p) const noexcept {
   for (std::size_t d = 0; d < 3; ++d) {
     if (p[d] < low(d) || p[d] > high(d)) return false;
   }
   return lattice_.filled(lattice_.at(p[0] - offset_[0], p[1] - offset_[1], p[2] - offset_[2]));
 }
 
-bool TissueCells::anchored(const Place& p) const noexcept {
+bool CoarseMaterial::anchored(const Index3& p) const noexcept {
   for (std::size_t d = 0; d < 3; ++d) {
     if (p[d] < low(d) || p[d] > high(d)) return false;
   }
@@ -115,7 +115,7 @@ bool TissueCells::anchored(const Place& p) const noexcept {
 }
 
 // How stiff voxels of a line along x are, as a rank; 0 where there is none. Without the offset.
-void TissueCells::line(int x0, int nx, int j, int k, std::uint8_t* out) const noexcept {
+void CoarseMaterial::line(int x0, int nx, int j, int k, std::uint8_t* out) const noexcept {
   std::fill_n(out, nx, std::uint8_t{0});
   if (j < 0 || j >= dims_[1] || k < 0 || k >= dims_[2]) return;
   const int first = std::max(x0, 0), last = std::min(x0 + nx, dims_[0]);
@@ -133,7 +133,7 @@ void TissueCells::line(int x0, int nx, int j, int k, std::uint8_t* out) const no
 }
 
 // The same of cells, in a layer of them: the softest of the voxels round each. With the offset.
-void TissueCells::layer(int k, int x0, int nx, int y0, int ny, std::uint8_t* out) noexcept {
+void CoarseMaterial::layer(int k, int x0, int nx, int y0, int ny, std::uint8_t* out) noexcept {
   const int width = nx + 1;
   lines_.resize(3 * index(width));
   std::uint8_t *before = lines_.data(), *here = before + width, *above = here + width;
@@ -150,7 +150,7 @@ void TissueCells::layer(int k, int x0, int nx, int y0, int ny, std::uint8_t* out
   }
 }
 
-void TissueCells::count_cells() {
+void CoarseMaterial::count_cells() {
   Kept& fine = kept_[kKept];
   constexpr int kEdge = 1 << kKept;
   fine.small.assign(index(fine.dims[0]) * index(fine.dims[1]) * index(fine.dims[2]), 0);
@@ -185,7 +185,7 @@ void TissueCells::count_cells() {
 
 // Of the smallest cubes that are kept, columns of 4 cells in series along each axis: of each how many cells
 // there are, squared, by the sum of what they yield.
-void TissueCells::weigh_cells() {
+void CoarseMaterial::weigh_cells() {
   Kept& fine = kept_[kKept];
   constexpr int kEdge = 1 << kKept;
   const std::size_t cubes = index(fine.dims[0]) * index(fine.dims[1]) * index(fine.dims[2]);
@@ -229,7 +229,7 @@ void TissueCells::weigh_cells() {
 }
 
 // How many cells a cube of 2^m an edge has.
-float TissueCells::cells_in(const Kept& kept, int m, const Place& cube) const noexcept {
+float CoarseMaterial::cells_in(const Kept& kept, int m, const Index3& cube) const noexcept {
   if (!kept.in(cube)) return 0.0F;
   if (!fills_box_)
     return m == kKept ? static_cast<float>(kept.small[kept.at(cube)])
@@ -242,19 +242,19 @@ float TissueCells::cells_in(const Kept& kept, int m, const Place& cube) const no
   return cells;
 }
 
-// Along an axis the two of a column in series, the four columns beside one another.
-void TissueCells::weigh_cubes_of_cubes(const Kept& below, Kept& coarse) const {
+// ModeResponse an axis the two of a column in series, the four columns beside one another.
+void CoarseMaterial::weigh_cubes_of_cubes(const Kept& below, Kept& coarse) const {
   const int m = static_cast<int>(&below - kept_.data());
   const std::size_t cubes = index(coarse.dims[0]) * index(coarse.dims[1]) * index(coarse.dims[2]);
   for (auto& axis : coarse.stiff) axis.assign(cubes, 0.0F);
-  Place b{};
+  Index3 b{};
   for (b[2] = 0; b[2] < coarse.dims[2]; ++b[2]) {
     for (b[1] = 0; b[1] < coarse.dims[1]; ++b[1]) {
       for (b[0] = 0; b[0] < coarse.dims[0]; ++b[0]) {
         for (std::size_t d = 0; d < 3; ++d) {
           float sum = 0.0F;
           for (int column = 0; column < 4; ++column) {
-            Place at{2 * b[0], 2 * b[1], 2 * b[2]};
+            Index3 at{2 * b[0], 2 * b[1], 2 * b[2]};
             at[(d + 1) % 3] += column & 1;
             at[(d + 2) % 3] += column >> 1;
             float cells = 0.0F, yields = 0.0F;
@@ -273,7 +273,7 @@ void TissueCells::weigh_cubes_of_cubes(const Kept& below, Kept& coarse) const {
   }
 }
 
-void TissueCells::mark_anchors() {
+void CoarseMaterial::mark_anchors() {
   for (std::size_t m = kAnchorBlocks; m < kept_.size(); ++m)
     kept_[m].anchored.assign(index(kept_[m].dims[0]) * index(kept_[m].dims[1]) * index(kept_[m].dims[2]), 0);
   const Grid& g = lattice_.grid();
@@ -283,7 +283,7 @@ void TissueCells::mark_anchors() {
     const auto c = g.row_coordinates(row);
     for (int i = 0; i < kRow; ++i) {
       if ((lanes >> i & 1U) == 0) continue;
-      const Place p{(c[0] - 1) * kRow + i, c[1], c[2]};
+      const Index3 p{(c[0] - 1) * kRow + i, c[1], c[2]};
       for (std::size_t m = kAnchorBlocks; m < kept_.size(); ++m) {
         std::uint8_t& mark = kept_[m].anchored[kept_[m].at({p[0] >> m, p[1] >> m, p[2] >> m})];
         if (mark != 0) break;
@@ -293,12 +293,12 @@ void TissueCells::mark_anchors() {
   }
 }
 
-void TissueCells::make_room(std::size_t cubes) {
+void CoarseMaterial::make_room(std::size_t cubes) {
   const std::size_t widest = cubes << (kKept - 1);  // cells; larger cubes are counted
   cells_.reserve(2 * widest * widest);
 }
 
-void TissueCells::plane(int m, int z, int first_x, int nx, int first_y, int ny, float* out) noexcept {
+void CoarseMaterial::plane(int m, int z, int first_x, int nx, int first_y, int ny, float* out) noexcept {
   const int edge = 1 << m;
   if (fills_box_) {
     // How much of a cube is in the box, axis by axis.
@@ -317,7 +317,7 @@ void TissueCells::plane(int m, int z, int first_x, int nx, int first_y, int ny, 
     const Kept& kept = kept_[index(std::min(m, kLevels - 1))];
     for (int j = 0; j < ny; ++j) {
       for (int i = 0; i < nx; ++i) {
-        const Place b{first_x + i, first_y + j, z};
+        const Index3 b{first_x + i, first_y + j, z};
         out[j * nx + i] = !kept.in(b)  ? 0.0F
                           : m == kKept ? static_cast<float>(kept.small[kept.at(b)])
                                        : static_cast<float>(kept.count[kept.at(b)]);
@@ -338,7 +338,7 @@ void TissueCells::plane(int m, int z, int first_x, int nx, int first_y, int ny, 
   }
 }
 
-void TissueCells::cell_plane(int z, int first_x, int nx, int first_y, int ny, float* out) noexcept {
+void CoarseMaterial::cell_plane(int z, int first_x, int nx, int first_y, int ny, float* out) noexcept {
   const std::size_t area = index(nx) * index(ny);
   cells_.resize(area);
   layer(z, first_x, nx, first_y, ny, cells_.data());
@@ -349,7 +349,7 @@ void TissueCells::cell_plane(int z, int first_x, int nx, int first_y, int ny, fl
   }
 }
 
-void TissueCells::stiff_plane(int m, int z, int first_x, int nx, int first_y, int ny,
+void CoarseMaterial::stiff_plane(int m, int z, int first_x, int nx, int first_y, int ny,
                               const std::array<float*, 3>& out) noexcept {
   const std::size_t area = index(nx) * index(ny);
   if (m == 0) {
@@ -361,7 +361,7 @@ void TissueCells::stiff_plane(int m, int z, int first_x, int nx, int first_y, in
     const Kept& kept = kept_[index(std::min(m, kLevels - 1))];
     for (int j = 0; j < ny; ++j) {
       for (int i = 0; i < nx; ++i) {
-        const Place b{first_x + i, first_y + j, z};
+        const Index3 b{first_x + i, first_y + j, z};
         const bool in = kept.in(b);
         const std::size_t at = in ? kept.at(b) : 0;
         for (std::size_t d = 0; d < 3; ++d) out[d][j * nx + i] = in ? kept.stiff[d][at] : 0.0F;
@@ -401,11 +401,11 @@ void TissueCells::stiff_plane(int m, int z, int first_x, int nx, int first_y, in
   }
 }
 
-bool TissueCells::anchor_near(const Place& p, const Place& q, int span) const noexcept {
+bool CoarseMaterial::anchor_near(const Index3& p, const Index3& q, int span) const noexcept {
   std::size_t m = kAnchorBlocks;
   while ((1 << m) < span && m + 1 < kept_.size()) ++m;
   const Kept& kept = kept_[m];
-  Place first{}, last{};
+  Index3 first{}, last{};
   for (std::size_t d = 0; d < 3; ++d) {
     first[d] = std::max((std::min(p[d], q[d]) - offset_[d] - span / 2) >> m, 0);
     last[d] = std::min((std::max(p[d], q[d]) - offset_[d] + span / 2) >> m, kept.dims[d] - 1);
@@ -421,21 +421,21 @@ bool TissueCells::anchor_near(const Place& p, const Place& q, int span) const no
 }
 
 // The nearest line along d, no further away than half of its links, that has tissue in it.
-TissueCells::Place TissueCells::in_tissue(const Place& p, std::size_t d, int links) const noexcept {
-  const auto any = [&](Place q) {
+CoarseMaterial::Index3 CoarseMaterial::in_tissue(const Index3& p, std::size_t d, int links) const noexcept {
+  const auto any = [&](Index3 q) {
     for (int t = 0; t <= links; ++t, ++q[d]) {
       if (filled(q)) return true;
     }
     return false;
   };
   const std::size_t e = (d + 1) % 3, f = (d + 2) % 3;
-  Place at = p;
+  Index3 at = p;
   at[e] = std::clamp(at[e], low(e), high(e));
   at[f] = std::clamp(at[f], low(f), high(f));
   if (any(at)) return at;
   for (int away = 1; away <= links / 2; away *= 2) {
     for (int n = 0; n < 9; ++n) {
-      Place q = at;
+      Index3 q = at;
       q[e] += (n % 3 - 1) * away;
       q[f] += (n / 3 - 1) * away;
       if (any(q)) return q;
@@ -444,13 +444,13 @@ TissueCells::Place TissueCells::in_tissue(const Place& p, std::size_t d, int lin
   return at;
 }
 
-TissueCells::Anchored TissueCells::anchors_along(const Place& p, std::size_t d, int links) const noexcept {
+CoarseMaterial::Anchored CoarseMaterial::anchors_along(const Index3& p, std::size_t d, int links) const noexcept {
   Anchored found;
-  Place end = p;
+  Index3 end = p;
   end[d] += links;
   if (!anchor_near(p, end, links)) return found;
   if (fills_box_) return anchors_in_box(p, d, links);
-  Place q = in_tissue(p, d, links);
+  Index3 q = in_tissue(p, d, links);
   bool before = false;
   for (int t = 0; t <= links; ++t, ++q[d]) {
     const bool here = filled(q);
@@ -471,9 +471,9 @@ TissueCells::Anchored TissueCells::anchors_along(const Place& p, std::size_t d, 
 
 // The same where all is tissue: how much of the line there is needs no look, and of cubes without an anchor
 // none of their voxels.
-TissueCells::Anchored TissueCells::anchors_in_box(const Place& p, std::size_t d, int links) const noexcept {
+CoarseMaterial::Anchored CoarseMaterial::anchors_in_box(const Index3& p, std::size_t d, int links) const noexcept {
   Anchored found;
-  Place q = p;
+  Index3 q = p;
   for (const std::size_t e : {(d + 1) % 3, (d + 2) % 3}) q[e] = std::clamp(q[e], low(e), high(e));
   const int first = std::max(low(d) - p[d], 0), last = std::min(high(d) - p[d], links);
   found.links = std::max(last - first, 0);
@@ -487,7 +487,7 @@ TissueCells::Anchored TissueCells::anchors_in_box(const Place& p, std::size_t d,
   const auto scan = [&](int from, int to, int way) {
     for (int t = from; way > 0 ? t <= to : t >= to;) {
       const int at = p[d] + t - offset_[d];
-      Place cube{};
+      Index3 cube{};
       for (std::size_t e = 0; e < 3; ++e) cube[e] = (q[e] - offset_[e]) >> kAnchorBlocks;
       cube[d] = at >> kAnchorBlocks;
       if (kept.anchored[kept.at(cube)] == 0) {
@@ -509,14 +509,14 @@ TissueCells::Anchored TissueCells::anchors_in_box(const Place& p, std::size_t d,
   return found;
 }
 
-bool TissueCells::unbroken(Place p, std::size_t d, int count) const noexcept {
+bool CoarseMaterial::unbroken(Index3 p, std::size_t d, int count) const noexcept {
   for (int t = 0; t < count; ++t, ++p[d]) {
     if (!filled(p)) return false;
   }
   return true;
 }
 
-std::size_t TissueCells::memory_bytes() const {
+std::size_t CoarseMaterial::memory_bytes() const {
   std::size_t bytes = sizeof(*this);
   for (const Kept& k : kept_) {
     bytes += k.small.capacity() + k.count.capacity() * sizeof(std::uint32_t) + k.anchored.capacity();

@@ -23,15 +23,15 @@
 
 namespace voxel {
 
-class TissueCells {
+class CoarseMaterial {
  public:
-  explicit TissueCells(const Lattice& lattice);
+  explicit CoarseMaterial(const Lattice& lattice);
 
-  using Place = std::array<int, 3>;
-  [[nodiscard]] const Place& offset() const { return offset_; }
+  using Index3 = std::array<int, 3>;
+  [[nodiscard]] const Index3& offset() const { return offset_; }
   // Of an object of one stiffness that fills its box: from now on the ends nearest to a voxel are nodes of
   // every level; as it was along an axis where it is about as far from both. True: the offset changed.
-  bool align_to(const Place& voxel) noexcept;
+  bool align_to(const Index3& voxel) noexcept;
   // Of the outermost voxels, with the offset.
   [[nodiscard]] int low(std::size_t d) const { return offset_[d]; }
   [[nodiscard]] int high(std::size_t d) const { return offset_[d] + dims_[d] - 1; }
@@ -40,8 +40,8 @@ class TissueCells {
   [[nodiscard]] bool fills_box() const { return fills_box_; }
   // Are its tissues of more than one stiffness?
   [[nodiscard]] bool several() const { return stiffness_.size() > 2; }
-  [[nodiscard]] bool filled(const Place& p) const noexcept;
-  [[nodiscard]] bool anchored(const Place& p) const noexcept;
+  [[nodiscard]] bool filled(const Index3& p) const noexcept;
+  [[nodiscard]] bool anchored(const Index3& p) const noexcept;
 
   // For plane() of so many cubes along an axis, so that it does not allocate.
   void make_room(std::size_t cubes);
@@ -54,36 +54,36 @@ class TissueCells {
                    const std::array<float*, 3>& out) noexcept;
   // Of single cells, from number `first` on: how stiff each is; 0 where there is none.
   void cell_plane(int z, int first_x, int nx, int first_y, int ny, float* out) noexcept;
-  // Along a line of `links` links from p in direction d, through tissue beside it where p is in none: voxels
+  // ModeResponse a line of `links` links from p in direction d, through tissue beside it where p is in none: voxels
   // to the first anchored one from either end, 0: there is none; and how many links there are.
   struct Anchored {
     int ahead = 0, back = 0, links = 0;
     bool low_free = false, high_free = false;  // at that end there is tissue that is not anchored
   };
-  [[nodiscard]] Anchored anchors_along(const Place& p, std::size_t d, int links) const noexcept;
+  [[nodiscard]] Anchored anchors_along(const Index3& p, std::size_t d, int links) const noexcept;
   // May there be an anchored voxel between p and q, no further than `span` apart, or half of that beside
   // them?
-  [[nodiscard]] bool anchor_near(const Place& p, const Place& q, int span) const noexcept;
+  [[nodiscard]] bool anchor_near(const Index3& p, const Index3& q, int span) const noexcept;
   // Is every voxel from p on in direction d filled, `count` of them?
-  [[nodiscard]] bool unbroken(Place p, std::size_t d, int count) const noexcept;
+  [[nodiscard]] bool unbroken(Index3 p, std::size_t d, int count) const noexcept;
 
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
   static constexpr int kKept = 2;  // the first level of which counts are kept, in bytes
   struct Kept {
-    Place dims{};
+    Index3 dims{};
     std::vector<std::uint8_t> small;          // of level kKept: 64 at most
     std::vector<std::uint32_t> count;         // of others
     std::vector<std::uint8_t> anchored;       // 1: some voxel of the cube is; from kAnchorBlocks on
     std::array<std::vector<float>, 3> stiff;  // [d] cells times stiffness along d; where tissues differ
-    [[nodiscard]] bool in(const Place& b) const {
+    [[nodiscard]] bool in(const Index3& b) const {
       for (std::size_t d = 0; d < 3; ++d) {
         if (b[d] < 0 || b[d] >= dims[d]) return false;
       }
       return true;
     }
-    [[nodiscard]] std::size_t at(const Place& b) const {
+    [[nodiscard]] std::size_t at(const Index3& b) const {
       return (static_cast<std::size_t>(b[2]) * static_cast<std::size_t>(dims[1]) +
               static_cast<std::size_t>(b[1])) *
                  static_cast<std::size_t>(dims[0]) +
@@ -98,14 +98,14 @@ class TissueCells {
   void weigh_cells();
   void weigh_cubes_of_cubes(const Kept& below, Kept& coarse) const;
   void mark_anchors();
-  [[nodiscard]] float cells_in(const Kept& kept, int m, const Place& cube) const noexcept;
+  [[nodiscard]] float cells_in(const Kept& kept, int m, const Index3& cube) const noexcept;
   void layer(int k, int x0, int nx, int y0, int ny, std::uint8_t* out) noexcept;
   void line(int x0, int nx, int j, int k, std::uint8_t* out) const noexcept;
-  [[nodiscard]] Anchored anchors_in_box(const Place& p, std::size_t d, int links) const noexcept;
-  [[nodiscard]] Place in_tissue(const Place& p, std::size_t d, int links) const noexcept;
+  [[nodiscard]] Anchored anchors_in_box(const Index3& p, std::size_t d, int links) const noexcept;
+  [[nodiscard]] Index3 in_tissue(const Index3& p, std::size_t d, int links) const noexcept;
 
   const Lattice& lattice_;
-  Place dims_, offset_{};
+  Index3 dims_, offset_{};
   std::array<std::array<double, 2>, 3> anchored_part_{};
   bool fills_box_ = false;
   std::array<std::uint8_t, 256> rank_{};     // [label] among stiffnesses, the softest 1; 0: no voxel

@@ -8,7 +8,7 @@ namespace voxel {
 namespace {
 
 constexpr int kCoarsest = 5;  // nodes an edge
-constexpr std::size_t kMostPressed = 2048;
+constexpr std::size_t kMaxPressed = 2048;
 
 std::size_t index(int i) {
   return static_cast<std::size_t>(i);
@@ -19,7 +19,7 @@ std::size_t index(int i) {
 CompositeGrid::CompositeGrid(const Lattice& lattice, int half_width, int coarse_half_width)
     : lattice_(lattice),
       cells_(lattice),
-      half_width_(half_width == kWhole ? kWhole : std::max((half_width + 1) / 2 * 2, kHalfWidth)),
+      half_width_(half_width == kRefineAll ? kRefineAll : std::max((half_width + 1) / 2 * 2, kHalfWidth)),
       coarse_half_width_(std::max((coarse_half_width + 1) / 2 * 2, kHalfWidth)) {
   const auto& dims = lattice.grid().dims;
   const std::uint8_t label = lattice.label(lattice.surface().front());
@@ -28,35 +28,35 @@ CompositeGrid::CompositeGrid(const Lattice& lattice, int half_width, int coarse_
     const Spring& spring = lattice.spring_within(label, d);
     const LinkLimit& limit = lattice.limit_between(label, label, d);
     for (int axis = 0; axis < 3; ++axis) {
-      spring_[dd][index(axis)] = spring.on(axis, d);
-      room_[dd][index(axis)] = axis == d ? std::array<float, 2>{-limit.along_low, limit.along_high}
+      spring_N_per_m_[dd][index(axis)] = spring.on(axis, d);
+      limit_m_[dd][index(axis)] = axis == d ? std::array<float, 2>{-limit.along_low, limit.along_high}
                                          : std::array<float, 2>{limit.across, limit.across};
     }
   }
-  pressed_.reserve(kMostPressed);
+  pressed_.reserve(kMaxPressed);
   const int largest = *std::max_element(dims.begin(), dims.end());
   const auto nodes = [largest](std::size_t l) { return (largest - 1 + (1 << l) - 1) / (1 << l) + 1; };
-  while (half_width_ != kWhole && nodes(whole_) > 2 * half_width_of(whole_) + 1) ++whole_;
-  std::size_t count = whole_ + 1;
+  while (half_width_ != kRefineAll && nodes(covering_level_) > 2 * half_width_of(covering_level_) + 1) ++covering_level_;
+  std::size_t count = covering_level_ + 1;
   while (nodes(count - 1) > kCoarsest) ++count;
   levels_.resize(count);
-  for (std::size_t l = 0; l < count; ++l) make_room(levels_[l], l);
-  if (whole_ > 0) make_room_to_move();
+  for (std::size_t l = 0; l < count; ++l) allocate(levels_[l], l);
+  if (covering_level_ > 0) allocate_for_moves();
   // What weighing a level takes: its half cells, two a node and axis and one on either side, a plane at a
   // time.
   std::size_t most = 0;
   for (const Level& level : levels_) {
-    for (const Line& line : level.line) most = std::max(most, line.coarse.size());
+    for (const AxisNodes& line : level.line) most = std::max(most, line.coarse.size());
   }
-  for (Halves& plane : halves_) {
+  for (HalfCells& plane : half_cells_) {
     plane.cells.reserve((2 * most + 2) * (2 * most + 2));
     for (Floats& axis : plane.stiff) axis.reserve(cells_.several() ? plane.cells.capacity() : 0);
   }
-  cells_.make_room(2 * most + 2);
+  cells_.allocate(2 * most + 2);
   begin({dims[0] / 2, dims[1] / 2, dims[2] / 2});
 }
 
-void CompositeGrid::fine_box(Place& low, Place& high) const noexcept {
+void CompositeGrid::fine_patch(Index3& low, Index3& high) const noexcept {
   const auto& line = levels_[0].line;
   for (std::size_t d = 0; d < 3; ++d) {
     low[d] = std::max(line[d].begin + line[d].first - cells_.offset()[d], 0);
@@ -64,8 +64,8 @@ void CompositeGrid::fine_box(Place& low, Place& high) const noexcept {
   }
 }
 
-bool CompositeGrid::in_fine_box(const Place& voxel) const noexcept {
-  const Place p = shifted(voxel);
+bool CompositeGrid::in_fine_patch(const Index3& voxel) const noexcept {
+  const Index3 p = shifted(voxel);
   const Level& level = levels_[0];
   for (std::size_t d = 0; d < 3; ++d) {
     const int i = p[d] - level.line[d].begin;
@@ -74,32 +74,32 @@ bool CompositeGrid::in_fine_box(const Place& voxel) const noexcept {
   return level.inverse[0][fine_node(voxel)] != 0.0F;
 }
 
-std::size_t CompositeGrid::fine_node(const Place& voxel) const {
-  const Place p = shifted(voxel);
+std::size_t CompositeGrid::fine_node(const Index3& voxel) const {
+  const Index3 p = shifted(voxel);
   const Level& level = levels_[0];
   return level.node(p[0] - level.line[0].begin, p[1] - level.line[1].begin, p[2] - level.line[2].begin);
 }
 
-glm::dvec3 CompositeGrid::fine_at(const Place& voxel) const noexcept {
+glm::dvec3 CompositeGrid::fine_at(const Index3& voxel) const noexcept {
   const std::size_t n = fine_node(voxel);
   return {levels_[0].u[0][n], levels_[0].u[1][n], levels_[0].u[2][n]};
 }
 
-void CompositeGrid::set_fine(const Place& voxel, const glm::dvec3& u) noexcept {
+void CompositeGrid::set_fine(const Index3& voxel, const glm::dvec3& u) noexcept {
   const std::size_t n = fine_node(voxel);
   for (std::size_t a = 0; a < 3; ++a) levels_[0].u[a][n] = static_cast<float>(u[static_cast<int>(a)]);
 }
 
-glm::dvec3 CompositeGrid::link_minimum(const Place& voxel) const noexcept {
+glm::dvec3 CompositeGrid::unconstrained_minimum(const Index3& voxel) const noexcept {
   const Level& level = levels_[0];
   const std::size_t n = fine_node(voxel);
   glm::dvec3 place(0.0);
   for (std::size_t a = 0; a < 3; ++a) {
-    const auto& link = links_on(level, a);
+    const auto& link = weights_on(level, a);
     double sum = 0.0;
     for (std::size_t d = 0; d < 3; ++d) {
       const std::size_t by = level.by(d);
-      sum += static_cast<double>(spring_[d][a] *
+      sum += static_cast<double>(spring_N_per_m_[d][a] *
                                  (link[d][n] * level.u[a][n + by] + link[d][n - by] * level.u[a][n - by]));
     }
     place[static_cast<int>(a)] = sum * static_cast<double>(level.inverse[a][n]);
@@ -107,12 +107,12 @@ glm::dvec3 CompositeGrid::link_minimum(const Place& voxel) const noexcept {
   return place;
 }
 
-glm::dvec3 CompositeGrid::compliance(const Place& voxel) const noexcept {
+glm::dvec3 CompositeGrid::compliance(const Index3& voxel) const noexcept {
   const std::size_t n = fine_node(voxel);
   return {levels_[0].inverse[0][n], levels_[0].inverse[1][n], levels_[0].inverse[2][n]};
 }
 
-glm::dvec3 CompositeGrid::within_anchors(const Place& voxel, const glm::dvec3& u) const noexcept {
+glm::dvec3 CompositeGrid::clamp_to_anchors(const Index3& voxel, const glm::dvec3& u) const noexcept {
   glm::dvec3 result = u;
   const auto& dims = lattice_.grid().dims;
   for (std::size_t d = 0; d < 3; ++d) {
@@ -121,8 +121,8 @@ glm::dvec3 CompositeGrid::within_anchors(const Place& voxel, const glm::dvec3& u
       const int links = end == 1 ? dims[d] - 1 - voxel[d] : voxel[d];
       for (std::size_t a = 0; a < 3; ++a) {
         // Beyond the low face u = u(b) − u(a) of a chain of links, beyond the high one the reverse.
-        const double shorter = links * static_cast<double>(room_[d][a][0]),
-                     longer = links * static_cast<double>(room_[d][a][1]);
+        const double shorter = links * static_cast<double>(limit_m_[d][a][0]),
+                     longer = links * static_cast<double>(limit_m_[d][a][1]);
         double& at = result[static_cast<int>(a)];
         at = std::clamp(at, end == 1 ? -longer : -shorter, end == 1 ? shorter : longer);
       }
@@ -131,9 +131,9 @@ glm::dvec3 CompositeGrid::within_anchors(const Place& voxel, const glm::dvec3& u
   return result;
 }
 
-void CompositeGrid::press(const Place& voxel, const glm::dvec3& u, const glm::dvec3& normal) noexcept {
-  if (pressed_.size() == kMostPressed) return;
-  const Place p = shifted(voxel);
+void CompositeGrid::press(const Index3& voxel, const glm::dvec3& u, const glm::dvec3& normal) noexcept {
+  if (pressed_.size() == kMaxPressed) return;
+  const Index3 p = shifted(voxel);
   const auto& line = levels_[0].line;
   pressed_.push_back(
       {{p[0] - line[0].begin, p[1] - line[1].begin, p[2] - line[2].begin}, glm::vec3(u), glm::vec3(normal)});

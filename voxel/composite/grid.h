@@ -19,7 +19,7 @@
 // comparison with itself, shifted by a voxel (Brezis & Sibony 1971, of plastic torsion). So each node has
 // bounds of its own, and projected multigrid does not stall where the chain is tight, as it does with limits
 // from link to link. Round a notch, or the end of what is anchored, bounds are still right and no longer
-// enough: there links may be beyond their limits (see most_beyond_limits()). Where tissues differ they would
+// enough: there links may be beyond their limits (see worst_violation()). Where tissues differ they would
 // be, and links are held one by one as well (link_limits.cpp).
 #pragma once
 
@@ -37,71 +37,71 @@
 
 namespace voxel {
 namespace composite {
-struct Limit;
-struct Telling;
-struct View;
+struct LinkMultiplier;
+struct ProlongArgs;
+struct LevelView;
 }  // namespace composite
 
 class CompositeGrid {
  public:
   // Why an object's contacts cannot be on such a grid; empty: they can.
-  static std::string obstacle_to(const Lattice& lattice);
-  static constexpr int kWhole = -1, kHalfWidth = 6, kMostHalfWidth = 14, kWideHalfWidth = 24;
-  // `half_width`: of level 0, voxels, and of other levels' boxes, nodes; kWhole: level 0 is all of the
+  static std::string reason_unsuitable(const Lattice& lattice);
+  static constexpr int kRefineAll = -1, kHalfWidth = 6, kMaxHalfWidth = 14, kReferenceHalfWidth = 24;
+  // `half_width`: of level 0, voxels, and of other levels' boxes, nodes; kRefineAll: level 0 is all of the
   // object, for references. Allocates.
   CompositeGrid(const Lattice& lattice, int half_width, int coarse_half_width = kHalfWidth);
   // All nodes go where another grid of the object has them.
-  void take_from(const CompositeGrid& other) noexcept;
+  void interpolate_from(const CompositeGrid& other) noexcept;
 
   // ---- none of these allocates, locks or throws ----
-  using Place = std::array<int, 3>;
+  using Index3 = std::array<int, 3>;
   // Ahead of a contact, once a tick: what begin() does about this voxel, of one level.
-  void prepare(const Place& centre) noexcept;
+  void prepare(const Index3& centre) noexcept;
   // At rest, boxes round voxel (i, j, k); where they have it well inside already, they stay.
-  void begin(const Place& centre) noexcept;
+  void begin(const Index3& centre) noexcept;
   // Once a tick: boxes go along with the contact, one at a time but where that would be too late.
   // True where the box of level 0 did.
-  bool centre_on(const Place& centre) noexcept;
+  bool centre_on(const Index3& centre) noexcept;
   // Voxels of it: the first and the last that may be moved.
-  void fine_box(Place& low, Place& high) const noexcept;
+  void fine_patch(Index3& low, Index3& high) const noexcept;
   // May this voxel's place be found by level 0, and moved there?
-  [[nodiscard]] bool in_fine_box(const Place& voxel) const noexcept;
+  [[nodiscard]] bool in_fine_patch(const Index3& voxel) const noexcept;
 
   // Of a voxel in level 0: where it is; where its links alone would have it; how far 1 N moves it (m, m/N).
-  [[nodiscard]] glm::dvec3 fine_at(const Place& voxel) const noexcept;
-  [[nodiscard]] glm::dvec3 link_minimum(const Place& voxel) const noexcept;
-  [[nodiscard]] glm::dvec3 compliance(const Place& voxel) const noexcept;
-  void set_fine(const Place& voxel, const glm::dvec3& u) noexcept;
+  [[nodiscard]] glm::dvec3 fine_at(const Index3& voxel) const noexcept;
+  [[nodiscard]] glm::dvec3 unconstrained_minimum(const Index3& voxel) const noexcept;
+  [[nodiscard]] glm::dvec3 compliance(const Index3& voxel) const noexcept;
+  void set_fine(const Index3& voxel, const glm::dvec3& u) noexcept;
   // The displacement nearest to `u` that the chain lets a voxel have, anchors standing still (m).
-  [[nodiscard]] glm::dvec3 within_anchors(const Place& voxel, const glm::dvec3& u) const noexcept;
+  [[nodiscard]] glm::dvec3 clamp_to_anchors(const Index3& voxel, const glm::dvec3& u) const noexcept;
 
   // Before a cycle, of a contact that has gone on: displacements along an axis grow by this share of
   // themselves, none by more than the contact did (m).
-  void grow(std::size_t axis, double share, double most_m) noexcept;
+  void extrapolate(std::size_t axis, double share, double most_m) noexcept;
   // Before a cycle: nothing is pressed; then, each voxel of level 0 that is pressed along `normal`.
   void clear_pressed() noexcept { pressed_.clear(); }
-  void press(const Place& voxel, const glm::dvec3& u, const glm::dvec3& normal) noexcept;
+  void press(const Index3& voxel, const glm::dvec3& u, const glm::dvec3& normal) noexcept;
   // One multigrid cycle over all levels, on these axes.
   void cycle(const std::array<bool, 3>& axes = {true, true, true}) noexcept;
   // What the anchors carry (N): what the object does to whatever presses it.
   [[nodiscard]] glm::dvec3 force_on_tool_N() const noexcept;
   // By how much a link of level 0 is beyond its limit at most (m).
-  [[nodiscard]] double most_beyond_limits() const noexcept;
+  [[nodiscard]] double worst_violation() const noexcept;
   // What the springs store (J).
   [[nodiscard]] double energy_J() const noexcept;
 
   // Displacement of any voxel, or point in units of voxels (m).
   [[nodiscard]] glm::dvec3 at_point(const std::array<double, 3>& point) const noexcept;
-  [[nodiscard]] glm::dvec3 at(const Place& voxel) const noexcept;
+  [[nodiscard]] glm::dvec3 at(const Index3& voxel) const noexcept;
   // For whoever draws: the nodes of its boxes, the finest first.
   struct Nodes {
-    Place first{}, count{};                       // the voxel at which node (0, 0, 0) is; how many
+    Index3 first{}, count{};                       // the voxel at which node (0, 0, 0) is; how many
     int step = 1;                                 // voxels from one to the next
     std::array<bool, 3> open_low{}, open_high{};  // does the object go on beyond it there?
     std::size_t stride = 0, plane = 0;
     std::array<const float*, 3> u{};  // [axis][k · plane + j · stride + i] (m)
   };
-  [[nodiscard]] std::size_t boxes() const noexcept { return whole_ + 1; }
+  [[nodiscard]] std::size_t boxes() const noexcept { return covering_level_ + 1; }
   [[nodiscard]] Nodes nodes_of(std::size_t box) const noexcept;
   [[nodiscard]] std::size_t work_of_cycle() const noexcept { return work_; }  // octets relaxed
   [[nodiscard]] std::size_t memory_bytes() const;
@@ -116,14 +116,14 @@ class CompositeGrid {
   // Is all that is anchored in sides of the object that are anchored as a whole?
   [[nodiscard]] bool anchored_by_sides() const noexcept;
   // Is nothing anchored within some voxels of it, as far as a contact should be from that?
-  [[nodiscard]] bool far_from_anchors(const Place& voxel) const noexcept;
+  [[nodiscard]] bool far_from_anchors(const Index3& voxel) const noexcept;
   // How much of what anchors hold, as links count it, coarse levels see: 1 where all.
-  [[nodiscard]] double anchors_seen() const noexcept;
+  [[nodiscard]] double anchor_area_ratio() const noexcept;
 
  private:
   static constexpr int kOutside = -2;
   // Nodes of a level along one axis.
-  struct Line {
+  struct AxisNodes {
     int count = 0, begin = 0;                  // nodes; coordinate of the first
     int first = 0, last = -1;                  // those within the box, both included
     bool open_low = false, open_high = false;  // the box ends within the object
@@ -146,9 +146,9 @@ class CompositeGrid {
   };
   struct Level {
     int step = 1;
-    bool laid = false;   // with the present offset of coordinates
+    bool is_built = false;   // with the present offset of coordinates
     bool moved = false;  // since it was put to rest
-    std::array<Line, 3> line;
+    std::array<AxisNodes, 3> line;
     std::size_t stride = 8, plane = 0;
     std::array<Floats, 3> u, held;       // [axis] held: 1 at its least, −1 at its most
     std::array<Floats, 3> weight, hold;  // [d] of the link up, in those of a link between voxels; of anchors
@@ -156,11 +156,11 @@ class CompositeGrid {
     std::array<Floats, 3> reach;         // likewise: voxels to the anchor, behind it < 0
     std::array<std::array<Floats, 3>, 3> link, held_link;  // [axis][d] likewise, at limits: weight and hold
     std::array<Floats, 3> inverse, all;                    // [axis] 1 / Σ springs, 0: does not move; Σ
-    Floats f, old, residual, follows, stuck, drag, with_drag;  // of the axis that a cycle is on
+    Floats f, old, residual, is_free, is_active, active_stiffness, inverse_with_active;  // of the axis that a cycle is on
     std::array<Floats, 2> bound;                               // 0: least u, 1: least −u; likewise
     std::array<bool, 2> bounded{};
-    bool dragged = false;    // by what is stuck on finer levels; likewise
-    double held_area = 0.0;  // by anchors (unit: face of a voxel)
+    bool has_active_stiffness = false;    // by what is stuck on finer levels; likewise
+    double anchored_area = 0.0;  // by anchors (unit: face of a voxel)
     bool holds = false;      // some anchor holds some node
     bool broken = false;     // some link within the box is missing
     std::vector<Ghost> ghosts;
@@ -184,7 +184,7 @@ class CompositeGrid {
   };
   static constexpr std::size_t kPad = 8;
   struct Pressed {
-    Place node;
+    Index3 node;
     glm::vec3 u, normal;
   };
 
@@ -198,29 +198,29 @@ class CompositeGrid {
   // ---- patch_placement.cpp ----
   [[nodiscard]] bool in_place(std::size_t l) const noexcept;
   [[nodiscard]] bool nested(std::size_t l) const noexcept;
-  [[nodiscard]] bool off_centre(const Place& centre) const noexcept;
-  void aim_at(const Place& centre) noexcept;
-  void lay_anew(std::size_t l) noexcept;
+  [[nodiscard]] bool off_centre(const Index3& centre) const noexcept;
+  void recentre(const Index3& centre) noexcept;
+  void rebuild(std::size_t l) noexcept;
   void put_to_rest(Level& level) noexcept;
-  void move(std::size_t l) noexcept;
+  void move_patch(std::size_t l) noexcept;
   // ---- patches.cpp ----
-  void make_room(Level& level, std::size_t l) const;
-  void make_room_to_move();
+  void allocate(Level& level, std::size_t l) const;
+  void allocate_for_moves();
   // The nodes of a level along d, first and last, its box round the coordinate `centre`.
-  struct Span {
+  struct NodeRange {
     int low, high;
     bool open_low, open_high;
     [[nodiscard]] int count(int step) const { return (high - low) / step + 1; }
   };
-  [[nodiscard]] Span span_of(std::size_t l, std::size_t d, int centre) const noexcept;
-  void lay_lines(Level& level, std::size_t l, const Place& centre) const noexcept;
-  void lay(Level& level) noexcept;
+  [[nodiscard]] NodeRange node_range(std::size_t l, std::size_t d, int centre) const noexcept;
+  void place_nodes(Level& level, std::size_t l, const Index3& centre) const noexcept;
+  void assemble(Level& level) noexcept;
   // `near`: there may be anchors in it.
-  void find_holds(Level& level, bool near) noexcept;
-  void find_springs(Level& level, bool near) noexcept;
+  void find_anchor_weights(Level& level, bool near) noexcept;
+  void find_diagonal(Level& level, bool near) noexcept;
   [[nodiscard]] bool row_near_anchors(const Level& level, int j, int k) const noexcept;
   void find_ghosts(Level& level) noexcept;
-  void join(Level& fine, const Level& coarse) const noexcept;
+  void set_up_transfer(Level& fine, const Level& coarse) const noexcept;
   void spread_to_ghosts(const Level& level, float* values) const noexcept;
   void gather_from_ghosts(const Level& level, float* loads) const noexcept;
   // ---- patch_stiffness.cpp ----
@@ -233,72 +233,72 @@ class CompositeGrid {
   [[nodiscard]] static int half_cube(const Level& level) noexcept;
   // ---- node_bounds.cpp ----
   void find_bounds(std::size_t axis) noexcept;
-  void spread_bounds(Level& level, std::size_t axis, std::size_t kind, const Place& low,
-                     const Place& high) const noexcept;
+  void spread_bounds(Level& level, std::size_t axis, std::size_t kind, const Index3& low,
+                     const Index3& high) const noexcept;
   void spread_round_gaps(Level& level, std::size_t axis, std::size_t kind) const noexcept;
   // ---- fac_cycle.cpp ----
-  [[nodiscard]] composite::View view(std::size_t l, std::size_t axis) noexcept;
-  void take_from_finer(std::size_t l, std::size_t axis) noexcept;
-  void pass_on(std::size_t l, std::size_t axis) noexcept;
-  void restrict_to(Level& coarse, const Level& fine, std::size_t axis, const float* from,
+  [[nodiscard]] composite::LevelView view(std::size_t l, std::size_t axis) noexcept;
+  void inject_from_finer(std::size_t l, std::size_t axis) noexcept;
+  void restrict_residual(std::size_t l, std::size_t axis) noexcept;
+  void restrict_values(Level& coarse, const Level& fine, std::size_t axis, const float* from,
                    float* to) const noexcept;
-  void take_drags(std::size_t l, std::size_t axis) noexcept;
-  void tell(std::size_t l, std::size_t axis) noexcept;
-  void tell_row(Level& fine, const Level& coarse, std::size_t axis, const float* from, int j, int k,
+  void add_active_stiffness(std::size_t l, std::size_t axis) noexcept;
+  void prolong(std::size_t l, std::size_t axis) noexcept;
+  void prolong_row(Level& fine, const Level& coarse, std::size_t axis, const float* from, int j, int k,
                 bool adds) const noexcept;
   void fit_far_field(std::size_t axis) noexcept;  // far_field.cpp
   // ---- operator_interpolation.cpp ----
-  [[nodiscard]] std::array<const float*, 2> links_beside(const Level& level, std::size_t axis, std::size_t d,
+  [[nodiscard]] std::array<const float*, 2> weights_beside(const Level& level, std::size_t axis, std::size_t d,
                                                          int j, int k) const noexcept;
-  void tell_row_by_links(const composite::Telling& telling, const Level& fine, const Level& coarse,
+  void prolong_row_by_links(const composite::ProlongArgs& args, const Level& fine, const Level& coarse,
                          std::size_t axis, const float* from, int j, int k) const noexcept;
-  [[nodiscard]] float told_by_links(const Level& fine, const Level& coarse, std::size_t axis,
+  [[nodiscard]] float prolonged_by_links(const Level& fine, const Level& coarse, std::size_t axis,
                                     const float* from, int i, int j, int k) const noexcept;
   void restrict_by_links(Level& coarse, const Level& fine, std::size_t axis, const float* from,
                          float* to) const noexcept;
   // ---- link_limits.cpp ----
-  void hold_links(std::size_t axis) noexcept;
-  float hold_anchored(Level& level, std::size_t axis, std::size_t d) noexcept;
-  void limits_from_finer(std::size_t l, std::size_t axis) noexcept;
-  void renew_springs(Level& level, std::size_t axis) const noexcept;
-  void let_go_of_links() noexcept;
-  void keep_limits(const Level& level) noexcept;
-  void take_limits(Level& level, const Place& by) noexcept;
-  [[nodiscard]] composite::Limit limit_of(const Level& level, std::size_t axis, std::size_t d) const noexcept;
-  [[nodiscard]] const std::array<Floats, 3>& links_on(const Level& level, std::size_t axis) const {
-    return at_limits_[axis] ? level.link[axis] : level.weight;
+  void update_multipliers(std::size_t axis) noexcept;
+  float update_anchor_multipliers(Level& level, std::size_t axis, std::size_t d) noexcept;
+  void restrict_multipliers(std::size_t l, std::size_t axis) noexcept;
+  void update_diagonal(Level& level, std::size_t axis) const noexcept;
+  void release_multipliers() noexcept;
+  void save_multipliers(const Level& level) noexcept;
+  void restore_multipliers(Level& level, const Index3& by) noexcept;
+  [[nodiscard]] composite::LinkMultiplier link_multiplier(const Level& level, std::size_t axis, std::size_t d) const noexcept;
+  [[nodiscard]] const std::array<Floats, 3>& weights_on(const Level& level, std::size_t axis) const {
+    return multipliers_active_[axis] ? level.link[axis] : level.weight;
   }
-  [[nodiscard]] const std::array<Floats, 3>& holds_on(const Level& level, std::size_t axis) const {
-    return at_limits_[axis] ? level.held_link[axis] : level.hold;
+  [[nodiscard]] const std::array<Floats, 3>& anchor_weights_on(const Level& level, std::size_t axis) const {
+    return multipliers_active_[axis] ? level.held_link[axis] : level.hold;
   }
   [[nodiscard]] glm::dvec3 interpolate(const Level& level, const std::array<double, 3>& place) const noexcept;
-  [[nodiscard]] Place shifted(const Place& voxel) const {
+  [[nodiscard]] Index3 shifted(const Index3& voxel) const {
     return {voxel[0] + cells_.offset()[0], voxel[1] + cells_.offset()[1], voxel[2] + cells_.offset()[2]};
   }
-  [[nodiscard]] std::size_t fine_node(const Place& voxel) const;
-  [[nodiscard]] static double share_of(const Level& level, std::size_t d, int i) noexcept;
-  [[nodiscard]] double covered(std::size_t l, std::size_t d, int i) const noexcept;
-  [[nodiscard]] double part_of_hold(std::size_t l, std::size_t number, std::size_t d) const noexcept;
-  [[nodiscard]] double part_of_link(std::size_t l, std::size_t number, std::size_t d) const noexcept;
+  [[nodiscard]] std::size_t fine_node(const Index3& voxel) const;
+  [[nodiscard]] static double inside_share(const Level& level, std::size_t d, int i) noexcept;
+  [[nodiscard]] double covered_share(std::size_t l, std::size_t d, int i) const noexcept;
+  [[nodiscard]] double anchor_share(std::size_t l, std::size_t number, std::size_t d) const noexcept;
+  [[nodiscard]] double link_share(std::size_t l, std::size_t number, std::size_t d) const noexcept;
 
   const Lattice& lattice_;
-  TissueCells cells_;
-  std::array<std::array<float, 3>, 3> spring_{};               // [d][axis] of a link between voxels (N/m)
-  std::array<std::array<std::array<float, 2>, 3>, 3> room_{};  // [d][axis][0: shorter, 1: longer] (m), >= 0
+  CoarseMaterial cells_;
+  std::array<std::array<float, 3>, 3> spring_N_per_m_{};               // [d][axis] of a link between voxels (N/m)
+  std::array<std::array<std::array<float, 2>, 3>, 3> limit_m_{};  // [d][axis][0: shorter, 1: longer] (m), >= 0
   int half_width_, coarse_half_width_;
-  Place centre_{};
+  Index3 centre_{};
   std::vector<Level> levels_;
-  Level before_;           // of a level whose box moves
-  std::size_t whole_ = 0;  // the first level that holds all of the object
+  Level before_move_;           // of a level whose box moves
+  std::size_t covering_level_ = 0;  // the first level that holds all of the object
   std::vector<Pressed> pressed_;
-  bool box_moved_ = false;           // since the last cycle
-  std::array<bool, 3> at_limits_{};  // [axis] some links are held to their limits
+  bool patch_moved_ = false;           // since the last cycle
+  std::array<bool, 3> multipliers_active_{};  // [axis] some links are held to their limits
   std::size_t work_ = 0;
-  struct Halves {  // cells of a plane of half cells, and these times how stiff they are, by axis
+  struct HalfCells {  // cells of a plane of half cells, and these times how stiff they are, by axis
     Floats cells;
     std::array<Floats, 3> stiff;
   };
-  std::array<Halves, 2> halves_;  // scratch of weigh()
+  std::array<HalfCells, 2> half_cells_;  // scratch of weigh()
 };
 
 }  // namespace voxel

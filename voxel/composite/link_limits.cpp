@@ -17,7 +17,7 @@
 namespace voxel {
 namespace {
 
-constexpr float kMostStiffer = 1e3F;
+constexpr float kMaxFactor = 1e3F;
 constexpr float kTolerance = 2e-3F;  // of a limit
 
 std::size_t index(int i) {
@@ -26,27 +26,27 @@ std::size_t index(int i) {
 
 }  // namespace
 
-composite::Limit CompositeGrid::limit_of(const Level& level, std::size_t a, std::size_t d) const noexcept {
+composite::LinkMultiplier CompositeGrid::link_multiplier(const Level& level, std::size_t a, std::size_t d) const noexcept {
   const auto step = static_cast<float>(level.step);
-  return {1.0F / (step * room_[d][a][1]), 1.0F / (step * room_[d][a][0]), kTolerance, kMostStiffer};
+  return {1.0F / (step * limit_m_[d][a][1]), 1.0F / (step * limit_m_[d][a][0]), kTolerance, kMaxFactor};
 }
 
 // After a cycle.
-void CompositeGrid::hold_links(std::size_t a) noexcept {
+void CompositeGrid::update_multipliers(std::size_t a) noexcept {
   if (!cells_.several()) return;
-  if (!at_limits_[a]) {
+  if (!multipliers_active_[a]) {
     float most = 0.0F;
-    for (std::size_t l = 0; l <= whole_; ++l) {
+    for (std::size_t l = 0; l <= covering_level_; ++l) {
       const Level& level = levels_[l];
       const std::size_t from = level.first_row();
       for (std::size_t d = 0; d < 3; ++d) {
         most =
-            std::max(most, composite::most_of_limit(level.u[a].data() + from, level.weight[d].data() + from,
-                                                    level.by(d), limit_of(level, a, d), level.floats()));
+            std::max(most, composite::largest_limit_ratio(level.u[a].data() + from, level.weight[d].data() + from,
+                                                    level.by(d), link_multiplier(level, a, d), level.floats()));
       }
     }
     if (most <= 1.0F + kTolerance) return;
-    at_limits_[a] = true;
+    multipliers_active_[a] = true;
     for (Level& level : levels_) {
       for (std::size_t d = 0; d < 3; ++d) {
         std::copy(level.weight[d].begin(), level.weight[d].end(), level.link[a][d].begin());
@@ -55,27 +55,27 @@ void CompositeGrid::hold_links(std::size_t a) noexcept {
     }
   }
   float most = 0.0F;
-  for (std::size_t l = 0; l <= whole_; ++l) {
+  for (std::size_t l = 0; l <= covering_level_; ++l) {
     Level& level = levels_[l];
     const std::size_t from = level.first_row();
     for (std::size_t d = 0; d < 3; ++d) {
-      const composite::Limit limit = limit_of(level, a, d);
+      const composite::LinkMultiplier limit = link_multiplier(level, a, d);
       most = std::max(
-          most, composite::hold_to_limit(level.u[a].data() + from, level.weight[d].data() + from, level.by(d),
+          most, composite::update_row_weights(level.u[a].data() + from, level.weight[d].data() + from, level.by(d),
                                          limit, level.link[a][d].data() + from, level.floats()));
-      most = std::max(most, hold_anchored(level, a, d));
+      most = std::max(most, update_anchor_multipliers(level, a, d));
     }
   }
   if (most > 1.0F) {
-    for (std::size_t l = 1; l < levels_.size(); ++l) limits_from_finer(l, a);
+    for (std::size_t l = 1; l < levels_.size(); ++l) restrict_multipliers(l, a);
   } else {
-    at_limits_[a] = false;
+    multipliers_active_[a] = false;
   }
-  for (Level& level : levels_) renew_springs(level, a);
+  for (Level& level : levels_) update_diagonal(level, a);
 }
 
 // Links to anchors, likewise.
-float CompositeGrid::hold_anchored(Level& level, std::size_t a, std::size_t d) noexcept {
+float CompositeGrid::update_anchor_multipliers(Level& level, std::size_t a, std::size_t d) noexcept {
   float most = 1.0F;
   if (!level.holds) return most;
   const std::size_t from = level.first_row(), end = from + level.floats();
@@ -86,15 +86,15 @@ float CompositeGrid::hold_anchored(Level& level, std::size_t a, std::size_t d) n
     if (hold[n] == 0.0F) continue;
     // Longer by −u where the anchor is ahead.
     const float longer = -u[n] / reach[n];
-    const float of_limit = std::max(longer / room_[d][a][1], -longer / room_[d][a][0]);
-    held[n] = composite::held_to_limit(held[n], hold[n], of_limit, limit_of(level, a, d));
+    const float of_limit = std::max(longer / limit_m_[d][a][1], -longer / limit_m_[d][a][0]);
+    held[n] = composite::updated_weight(held[n], hold[n], of_limit, link_multiplier(level, a, d));
     most = std::max(most, held[n] / hold[n]);
   }
   return most;
 }
 
 // Under a finer level, what its two links on the way are worth one after the other.
-void CompositeGrid::limits_from_finer(std::size_t l, std::size_t a) noexcept {
+void CompositeGrid::restrict_multipliers(std::size_t l, std::size_t a) noexcept {
   const Level& fine = levels_[l - 1];
   Level& coarse = levels_[l];
   const auto& line = fine.line;
@@ -105,7 +105,7 @@ void CompositeGrid::limits_from_finer(std::size_t l, std::size_t a) noexcept {
   for (int k = line[2].coarse_first; k <= line[2].coarse_last; ++k) {
     for (int j = line[1].coarse_first; j <= line[1].coarse_last; ++j) {
       for (int i = line[0].coarse_first; i <= line[0].coarse_last; ++i) {
-        const Place c{i, j, k};
+        const Index3 c{i, j, k};
         if (!within(0, i) || !within(1, j) || !within(2, k)) continue;
         const std::size_t at =
             fine.node(line[0].fine[index(i)], line[1].fine[index(j)], line[2].fine[index(k)]);
@@ -125,11 +125,11 @@ void CompositeGrid::limits_from_finer(std::size_t l, std::size_t a) noexcept {
 }
 
 // What all links of a node are worth on an axis.
-void CompositeGrid::renew_springs(Level& level, std::size_t a) const noexcept {
+void CompositeGrid::update_diagonal(Level& level, std::size_t a) const noexcept {
   const auto& line = level.line;
-  const auto& link = links_on(level, a);
-  const auto& hold = holds_on(level, a);
-  const float sx = spring_[0][a], sy = spring_[1][a], sz = spring_[2][a];
+  const auto& link = weights_on(level, a);
+  const auto& hold = anchor_weights_on(level, a);
+  const float sx = spring_N_per_m_[0][a], sy = spring_N_per_m_[1][a], sz = spring_N_per_m_[2][a];
   for (int k = line[2].first; k <= line[2].last; ++k) {
     for (int j = line[1].first; j <= line[1].last; ++j) {
       const std::size_t row = level.row(j, k);
@@ -151,33 +151,33 @@ void CompositeGrid::renew_springs(Level& level, std::size_t a) const noexcept {
 }
 
 // Of a contact that is over.
-void CompositeGrid::let_go_of_links() noexcept {
+void CompositeGrid::release_multipliers() noexcept {
   for (std::size_t a = 0; a < 3; ++a) {
-    if (!at_limits_[a]) continue;
-    at_limits_[a] = false;
-    for (Level& level : levels_) renew_springs(level, a);
+    if (!multipliers_active_[a]) continue;
+    multipliers_active_[a] = false;
+    for (Level& level : levels_) update_diagonal(level, a);
   }
 }
 
-// Of a level whose box moves: how many times stiffer its links are, into before_.
-void CompositeGrid::keep_limits(const Level& level) noexcept {
+// Of a level whose box moves: how many times stiffer its links are, into before_move_.
+void CompositeGrid::save_multipliers(const Level& level) noexcept {
   for (std::size_t a = 0; a < 3; ++a) {
-    if (!at_limits_[a]) continue;
+    if (!multipliers_active_[a]) continue;
     for (std::size_t d = 0; d < 3; ++d) {
       const auto keep = [](const Floats& held, const Floats& link, Floats& to) {
         for (std::size_t n = 0; n < held.size(); ++n) to[n] = link[n] > 0.0F ? held[n] / link[n] : 1.0F;
       };
-      keep(level.link[a][d], level.weight[d], before_.link[a][d]);
-      keep(level.held_link[a][d], level.hold[d], before_.held_link[a][d]);
+      keep(level.link[a][d], level.weight[d], before_move_.link[a][d]);
+      keep(level.held_link[a][d], level.hold[d], before_move_.held_link[a][d]);
     }
   }
 }
 
 // … and in the box where it is now, `by` nodes further on.
-void CompositeGrid::take_limits(Level& level, const Place& by) noexcept {
+void CompositeGrid::restore_multipliers(Level& level, const Index3& by) noexcept {
   const auto& line = level.line;
   for (std::size_t a = 0; a < 3; ++a) {
-    if (!at_limits_[a]) continue;
+    if (!multipliers_active_[a]) continue;
     for (std::size_t d = 0; d < 3; ++d) {
       std::copy(level.weight[d].begin(), level.weight[d].end(), level.link[a][d].begin());
       std::copy(level.hold[d].begin(), level.hold[d].end(), level.held_link[a][d].begin());
@@ -185,19 +185,19 @@ void CompositeGrid::take_limits(Level& level, const Place& by) noexcept {
     for (int k = 0; k < line[2].count; ++k) {
       for (int j = 0; j < line[1].count; ++j) {
         for (int i = 0; i < line[0].count; ++i) {
-          const Place was{i + by[0], j + by[1], k + by[2]};
+          const Index3 was{i + by[0], j + by[1], k + by[2]};
           bool known = true;
-          for (std::size_t d = 0; d < 3; ++d) known = known && was[d] >= 0 && was[d] < before_.line[d].count;
+          for (std::size_t d = 0; d < 3; ++d) known = known && was[d] >= 0 && was[d] < before_move_.line[d].count;
           if (!known) continue;
-          const std::size_t to = level.node(i, j, k), from = before_.node(was[0], was[1], was[2]);
+          const std::size_t to = level.node(i, j, k), from = before_move_.node(was[0], was[1], was[2]);
           for (std::size_t d = 0; d < 3; ++d) {
-            level.link[a][d][to] *= before_.link[a][d][from];
-            level.held_link[a][d][to] *= before_.held_link[a][d][from];
+            level.link[a][d][to] *= before_move_.link[a][d][from];
+            level.held_link[a][d][to] *= before_move_.held_link[a][d][from];
           }
         }
       }
     }
-    renew_springs(level, a);
+    update_diagonal(level, a);
   }
 }
 

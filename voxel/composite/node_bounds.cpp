@@ -8,7 +8,7 @@
 namespace voxel {
 namespace {
 
-constexpr float kNone = -1e30F;  // no bound
+constexpr float kNoBound = -1e30F;  // no bound
 // Of a normal: an axis of which less is in it does not hold what is pressed. (With a quarter, what a ball
 // pressed aside by little came back, axis by axis, and went to and fro.)
 constexpr float kAlong = 0.02F;
@@ -22,13 +22,13 @@ std::size_t index(int i) {
 
 // From the nodes of a box, low … high, which are right among themselves, to all nodes: where all links are
 // there the shortest path goes axis by axis.
-void CompositeGrid::spread_bounds(Level& level, std::size_t a, std::size_t kind, const Place& low,
-                                  const Place& high) const noexcept {
+void CompositeGrid::spread_bounds(Level& level, std::size_t a, std::size_t kind, const Index3& low,
+                                  const Index3& high) const noexcept {
   float* const bound = level.bound[kind].data();
   const auto& line = level.line;
   const auto step = static_cast<float>(level.step);
   // u(b) >= u(a) − shorter, and u(a) >= u(b) − longer; of −u the reverse.
-  const auto fall = [&](std::size_t d, bool up) { return room_[d][a][(up ? 0U : 1U) ^ kind] * step; };
+  const auto fall = [&](std::size_t d, bool up) { return limit_m_[d][a][(up ? 0U : 1U) ^ kind] * step; };
   for (int k = low[2]; k <= high[2]; ++k) {
     for (int j = low[1]; j <= high[1]; ++j) {
       float* row = bound + level.row(j, k);
@@ -61,11 +61,11 @@ void CompositeGrid::spread_round_gaps(Level& level, std::size_t a, std::size_t k
   float* const bound = level.bound[kind].data();
   const auto& line = level.line;
   const auto step = static_cast<float>(level.step);
-  const auto fall = [&](std::size_t d, bool up) { return room_[d][a][(up ? 0U : 1U) ^ kind] * step; };
+  const auto fall = [&](std::size_t d, bool up) { return limit_m_[d][a][(up ? 0U : 1U) ^ kind] * step; };
   const std::size_t lanes = level.stride;
   const auto from_row = [lanes](float* to, const float* from, const float* link, float by) {
     for (std::size_t i = 0; i < lanes; ++i) {
-      const float asked = link[i] > 0.0F ? from[i] - by : kNone;
+      const float asked = link[i] > 0.0F ? from[i] - by : kNoBound;
       to[i] = std::max(to[i], asked);
     }
   };
@@ -117,16 +117,16 @@ void CompositeGrid::find_bounds(std::size_t a) noexcept {
     const float sign = kind == 0 ? 1.0F : -1.0F;
     for (Level& level : levels_) level.bounded[kind] = false;
     const auto holds = [&](const Pressed& p) { return sign * p.normal[axis] > kAlong; };
-    float most = kNone;
+    float most = kNoBound;
     for (const Pressed& p : pressed_) {
       if (holds(p)) most = std::max(most, sign * p.u[axis]);
     }
-    if (most == kNone) continue;
-    Place low{1 << 20, 1 << 20, 1 << 20}, high{-1, -1, -1};
+    if (most == kNoBound) continue;
+    Index3 low{1 << 20, 1 << 20, 1 << 20}, high{-1, -1, -1};
     for (std::size_t l = 0; l < levels_.size(); ++l) {
       Level& level = levels_[l];
       Floats& bound = level.bound[kind];
-      std::fill_n(bound.begin(), level.first_row() + level.floats() + kPad, kNone);
+      std::fill_n(bound.begin(), level.first_row() + level.floats() + kPad, kNoBound);
       level.bounded[kind] = true;
       if (l == 0) {
         for (const Pressed& p : pressed_) {

@@ -18,19 +18,19 @@ std::size_t index(int i) {
 }  // namespace
 
 // Links to the rows before and after one, along d; null: not of this level.
-std::array<const float*, 2> CompositeGrid::links_beside(const Level& level, std::size_t axis, std::size_t d,
+std::array<const float*, 2> CompositeGrid::weights_beside(const Level& level, std::size_t axis, std::size_t d,
                                                         int j, int k) const noexcept {
   if (j < 0 || k < 0 || j >= level.line[1].count || k >= level.line[2].count) return {};
-  const float* const own = links_on(level, axis)[d].data() + level.row(j, k);
+  const float* const own = weights_on(level, axis)[d].data() + level.row(j, k);
   return {(d == 1 ? j : k) > 0 ? own - level.by(d) : nullptr, own};
 }
 
-// What tell_row() does, by links.
-void CompositeGrid::tell_row_by_links(const composite::Telling& telling, const Level& fine,
+// What prolong_row() does, by links.
+void CompositeGrid::prolong_row_by_links(const composite::ProlongArgs& args, const Level& fine,
                                       const Level& coarse, std::size_t axis, const float* from, int j,
                                       int k) const noexcept {
   const auto& line = fine.line;
-  composite::TellingByLinks by{};
+  composite::ProlongByLinksArgs by{};
   by.between_y = line[1].part[index(j)] != 0.0F;
   by.between_z = line[2].part[index(k)] != 0.0F;
   for (int corner = 0; corner < 4; ++corner) {
@@ -39,20 +39,20 @@ void CompositeGrid::tell_row_by_links(const composite::Telling& telling, const L
     by.rows[index(corner)] =
         from + coarse.row(line[1].coarse[index(j)] + dj, line[2].coarse[index(k)] + dk) + line[0].base;
     const int own_j = by.between_y ? j - 1 + 2 * dj : j, own_k = by.between_z ? k - 1 + 2 * dk : k;
-    by.along_x[index(corner)] = links_beside(fine, axis, 0, own_j, own_k)[1];
-    if (dj == 0) by.along_y[index(dk)] = links_beside(fine, axis, 1, j, own_k);
+    by.along_x[index(corner)] = weights_beside(fine, axis, 0, own_j, own_k)[1];
+    if (dj == 0) by.along_y[index(dk)] = weights_beside(fine, axis, 1, j, own_k);
   }
-  by.along_z = links_beside(fine, axis, 2, j, k);
-  composite::tell_row_by_links(telling, by);
+  by.along_z = weights_beside(fine, axis, 2, j, k);
+  composite::prolong_row_by_links(args, by);
 }
 
 // What tell() does at the ends of a box along x, by links.
-float CompositeGrid::told_by_links(const Level& fine, const Level& coarse, std::size_t axis,
+float CompositeGrid::prolonged_by_links(const Level& fine, const Level& coarse, std::size_t axis,
                                    const float* from, int i, int j, int k) const noexcept {
   const auto& line = fine.line;
   const bool between_y = line[1].part[index(j)] != 0.0F, between_z = line[2].part[index(k)] != 0.0F;
   const auto mean = [&](float before, float after, std::size_t d, int own_k) {
-    const auto [link_before, link_after] = links_beside(fine, axis, d, j, own_k);
+    const auto [link_before, link_after] = weights_beside(fine, axis, d, j, own_k);
     const float a = link_before != nullptr ? link_before[i] : 0.0F,
                 b = link_after != nullptr ? link_after[i] : 0.0F;
     const float part = a > 0.0F && b > 0.0F ? b / (a + b) : 0.5F;
@@ -68,13 +68,13 @@ float CompositeGrid::told_by_links(const Level& fine, const Level& coarse, std::
   return between_z ? mean(in_plane(0), in_plane(1), 2, k) : in_plane(0);
 }
 
-// What restrict_to() does, by links.
+// What restrict_values() does, by links.
 void CompositeGrid::restrict_by_links(Level& coarse, const Level& fine, std::size_t axis, const float* from,
                                       float* to) const noexcept {
   const auto& line = fine.line;
   constexpr std::size_t kEnd = 8;  // lanes before the first and after the last
-  std::array<float, std::size_t{composite::kMostOctets} * kOctet + 2 * kEnd> sum, part;
-  composite::Gathering g{};
+  std::array<float, std::size_t{composite::kMaxOctets} * kOctet + 2 * kEnd> sum, part;
+  composite::RestrictArgs g{};
   g.octets = static_cast<int>(fine.stride / kOctet);
   g.sum = sum.data() + kEnd;
   g.part = part.data() + kEnd;
@@ -90,16 +90,16 @@ void CompositeGrid::restrict_by_links(Level& coarse, const Level& fine, std::siz
       g.share_y = {line[1].from_low[index(j)], line[1].from_own[index(j)], line[1].from_high[index(j)]};
       for (int dj = -1; dj <= 1; ++dj) {
         const std::size_t y = index(dj + 1);
-        g.along_y[y] = links_beside(fine, axis, 1, fj + dj, fk);
+        g.along_y[y] = weights_beside(fine, axis, 1, fj + dj, fk);
         for (int dk = -1; dk <= 1; ++dk) {
           const std::size_t z = index(dk + 1);
-          const auto links = links_beside(fine, axis, 2, fj + dj, fk + dk);
+          const auto links = weights_beside(fine, axis, 2, fj + dj, fk + dk);
           g.along_z[z][y] = links;
           g.rows[z][y] = links[1] != nullptr ? from + fine.row(fj + dj, fk + dk) : nullptr;
         }
       }
-      g.along_x = links_beside(fine, axis, 0, fj, fk)[1];
-      composite::gather_by_links(g);
+      g.along_x = weights_beside(fine, axis, 0, fj, fk)[1];
+      composite::restrict_row_by_links(g);
       float* f = to + coarse.row(j, k);
       for (int i = line[0].coarse_first; i <= line[0].coarse_last; ++i) {
         const int at = line[0].fine[index(i)];

@@ -16,9 +16,9 @@ constexpr int kOffCentre = 4;  // of the finest box, from the contact: further, 
 
 bool CompositeGrid::in_place(std::size_t l) const noexcept {
   const Level& level = levels_[l];
-  if (!level.laid) return false;
+  if (!level.is_built) return false;
   for (std::size_t d = 0; d < 3; ++d) {
-    const Span wanted = span_of(l, d, shifted(centre_)[d]);
+    const NodeRange wanted = node_range(l, d, shifted(centre_)[d]);
     if (wanted.low != level.line[d].begin || wanted.count(level.step) != level.line[d].count) return false;
   }
   return true;
@@ -28,7 +28,7 @@ bool CompositeGrid::in_place(std::size_t l) const noexcept {
 bool CompositeGrid::nested(std::size_t l) const noexcept {
   const Level &fine = levels_[l], &coarse = levels_[l + 1];
   for (std::size_t d = 0; d < 3; ++d) {
-    const Line &in = fine.line[d], &out = coarse.line[d];
+    const AxisNodes &in = fine.line[d], &out = coarse.line[d];
     if (in.open_low && out.open_low && in.begin < out.begin + coarse.step) return false;
     if (in.open_high && out.open_high && fine.at(d, in.count - 1) > coarse.at(d, out.count - 1) - coarse.step)
       return false;
@@ -36,9 +36,9 @@ bool CompositeGrid::nested(std::size_t l) const noexcept {
   return true;
 }
 
-bool CompositeGrid::off_centre(const Place& centre) const noexcept {
+bool CompositeGrid::off_centre(const Index3& centre) const noexcept {
   const auto& line = levels_[0].line;
-  const Place at = shifted(centre);
+  const Index3 at = shifted(centre);
   for (std::size_t d = 0; d < 3; ++d) {
     const int low = at[d] - line[d].begin, high = levels_[0].at(d, line[d].count - 1) - at[d];
     if (line[d].open_low && low < half_width_ - kOffCentre) return true;
@@ -48,13 +48,13 @@ bool CompositeGrid::off_centre(const Place& centre) const noexcept {
 }
 
 // Of a grid at rest.
-void CompositeGrid::lay_anew(std::size_t l) noexcept {
+void CompositeGrid::rebuild(std::size_t l) noexcept {
   Level& level = levels_[l];
-  lay_lines(level, l, shifted(centre_));
-  lay(level);
-  level.laid = true;
-  if (l + 1 < levels_.size()) join(level, levels_[l + 1]);
-  if (l > 0) join(levels_[l - 1], level);
+  place_nodes(level, l, shifted(centre_));
+  assemble(level);
+  level.is_built = true;
+  if (l + 1 < levels_.size()) set_up_transfer(level, levels_[l + 1]);
+  if (l > 0) set_up_transfer(levels_[l - 1], level);
 }
 
 void CompositeGrid::put_to_rest(Level& level) noexcept {
@@ -65,17 +65,17 @@ void CompositeGrid::put_to_rest(Level& level) noexcept {
   level.moved = false;
 }
 
-void CompositeGrid::aim_at(const Place& centre) noexcept {
+void CompositeGrid::recentre(const Index3& centre) noexcept {
   centre_ = centre;
   if (!cells_.align_to(centre)) return;
-  for (Level& level : levels_) level.laid = false;
+  for (Level& level : levels_) level.is_built = false;
 }
 
-void CompositeGrid::prepare(const Place& centre) noexcept {
+void CompositeGrid::prepare(const Index3& centre) noexcept {
   bool moves = false;
   for (std::size_t d = 0; d < 3; ++d) moves = moves || std::abs(centre[d] - centre_[d]) >= kMoves;
-  if (moves) aim_at(centre);
-  let_go_of_links();
+  if (moves) recentre(centre);
+  release_multipliers();
   for (Level& level : levels_) {
     if (!level.moved) continue;
     put_to_rest(level);
@@ -83,22 +83,22 @@ void CompositeGrid::prepare(const Place& centre) noexcept {
   }
   for (std::size_t l = levels_.size(); l-- > 0;) {
     if (in_place(l)) continue;
-    lay_anew(l);
+    rebuild(l);
     break;
   }
 }
 
-void CompositeGrid::begin(const Place& centre) noexcept {
+void CompositeGrid::begin(const Index3& centre) noexcept {
   bool ready = !off_centre(centre);
   for (std::size_t l = 0; l < levels_.size(); ++l)
-    ready = ready && levels_[l].laid && (l == whole_ || l + 1 == levels_.size() || nested(l));
+    ready = ready && levels_[l].is_built && (l == covering_level_ || l + 1 == levels_.size() || nested(l));
   if (!ready) {
-    aim_at(centre);
+    recentre(centre);
     for (std::size_t l = levels_.size(); l-- > 0;) {
-      if (!in_place(l)) lay_anew(l);
+      if (!in_place(l)) rebuild(l);
     }
   }
-  let_go_of_links();
+  release_multipliers();
   for (Level& level : levels_) {
     if (level.moved) put_to_rest(level);
     level.moved = true;
@@ -106,18 +106,18 @@ void CompositeGrid::begin(const Place& centre) noexcept {
   pressed_.clear();
 }
 
-bool CompositeGrid::centre_on(const Place& centre) noexcept {
-  if (whole_ == 0) return false;
+bool CompositeGrid::centre_on(const Index3& centre) noexcept {
+  if (covering_level_ == 0) return false;
   bool moves = false;
   for (std::size_t d = 0; d < 3; ++d) moves = moves || std::abs(centre[d] - centre_[d]) >= kMoves;
   if (moves) centre_ = centre;
   // The coarsest that is due, and with it those that it would hold no more.
   const bool all = off_centre(centre);
   bool any = false, joins = false;
-  for (std::size_t l = whole_; l-- > 0;) {
+  for (std::size_t l = covering_level_; l-- > 0;) {
     const bool due = (!any || all || !nested(l)) && !in_place(l);
-    if (due) move(l);
-    if (due || joins) join(levels_[l], levels_[l + 1]);
+    if (due) move_patch(l);
+    if (due || joins) set_up_transfer(levels_[l], levels_[l + 1]);
     any = any || due;
     joins = due;
   }
@@ -125,37 +125,37 @@ bool CompositeGrid::centre_on(const Place& centre) noexcept {
 }
 
 // A box goes on: what is new in it is interpolated.
-void CompositeGrid::move(std::size_t l) noexcept {
-  box_moved_ = true;
+void CompositeGrid::move_patch(std::size_t l) noexcept {
+  patch_moved_ = true;
   Level& level = levels_[l];
-  before_.line = level.line;  // assigned element by element: the same sizes, nothing is allocated
-  before_.step = level.step;
-  before_.stride = level.stride;
-  before_.plane = level.plane;
-  keep_limits(level);
-  lay_lines(level, l, shifted(centre_));
-  const std::size_t floats = before_.first_row() + before_.floats() + kPad;
+  before_move_.line = level.line;  // assigned element by element: the same sizes, nothing is allocated
+  before_move_.step = level.step;
+  before_move_.stride = level.stride;
+  before_move_.plane = level.plane;
+  save_multipliers(level);
+  place_nodes(level, l, shifted(centre_));
+  const std::size_t floats = before_move_.first_row() + before_move_.floats() + kPad;
   for (std::size_t a = 0; a < 3; ++a) {
-    std::copy_n(level.u[a].begin(), floats, before_.u[a].begin());
-    std::copy_n(level.held[a].begin(), floats, before_.held[a].begin());
+    std::copy_n(level.u[a].begin(), floats, before_move_.u[a].begin());
+    std::copy_n(level.held[a].begin(), floats, before_move_.held[a].begin());
     std::fill(level.u[a].begin(), level.u[a].end(), 0.0F);
     std::fill(level.held[a].begin(), level.held[a].end(), 0.0F);
   }
   const auto& line = level.line;
-  Place by{};
-  for (std::size_t d = 0; d < 3; ++d) by[d] = (line[d].begin - before_.line[d].begin) / level.step;
+  Index3 by{};
+  for (std::size_t d = 0; d < 3; ++d) by[d] = (line[d].begin - before_move_.line[d].begin) / level.step;
   for (int k = 0; k < line[2].count; ++k) {
     for (int j = 0; j < line[1].count; ++j) {
       for (int i = 0; i < line[0].count; ++i) {
-        const Place was{i + by[0], j + by[1], k + by[2]};
+        const Index3 was{i + by[0], j + by[1], k + by[2]};
         bool known = true;
-        for (std::size_t d = 0; d < 3; ++d) known = known && was[d] >= 0 && was[d] < before_.line[d].count;
+        for (std::size_t d = 0; d < 3; ++d) known = known && was[d] >= 0 && was[d] < before_move_.line[d].count;
         const std::size_t to = level.node(i, j, k);
         if (known) {
-          const std::size_t from = before_.node(was[0], was[1], was[2]);
+          const std::size_t from = before_move_.node(was[0], was[1], was[2]);
           for (std::size_t a = 0; a < 3; ++a) {
-            level.u[a][to] = before_.u[a][from];
-            level.held[a][to] = before_.held[a][from];
+            level.u[a][to] = before_move_.u[a][from];
+            level.held[a][to] = before_move_.held[a][from];
           }
           continue;
         }
@@ -166,8 +166,8 @@ void CompositeGrid::move(std::size_t l) noexcept {
       }
     }
   }
-  lay(level);
-  take_limits(level, by);
+  assemble(level);
+  restore_multipliers(level, by);
 }
 
 }  // namespace voxel

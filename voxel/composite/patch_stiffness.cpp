@@ -45,7 +45,7 @@ void CompositeGrid::weigh_cells(const Level& level, std::array<Floats, 3>& weigh
   const auto& line = level.line;
   const int nx = line[0].count, ny = line[1].count, nz = line[2].count, wide = nx + 1;
   const auto area = index(wide) * index(ny + 1);
-  Floats &below = halves_[0].cells, &above = halves_[1].cells;
+  Floats &below = half_cells_[0].cells, &above = half_cells_[1].cells;
   below.resize(std::max(below.size(), area));
   above.resize(std::max(above.size(), area));
   const auto read = [&](int z, Floats& to) {
@@ -91,7 +91,7 @@ void CompositeGrid::weigh_halves(const Level& level, std::array<Floats, 3>& weig
   const int hx = 2 * nx, hy = 2 * ny, m = half_cube(level), edge = 1 << m;
   const float scale = 1.0F / static_cast<float>(level.step * level.step);
   const auto area = index(hx) * index(hy);
-  Floats &below = halves_[0].cells, &above = halves_[1].cells;
+  Floats &below = half_cells_[0].cells, &above = half_cells_[1].cells;
   const auto read = [&](int number, Floats& to) {
     to.resize(std::max(to.size(), area));
     cells_.plane(m, line[2].begin / edge + number - 1, line[0].begin / edge - 1, hx, line[1].begin / edge - 1,
@@ -128,7 +128,7 @@ void CompositeGrid::weigh_tissues(Level& level) noexcept {
   const int hx = 2 * nx, hy = 2 * ny, m = half_cube(level), edge = 1 << m;
   const float scale = 1.0F / static_cast<float>(level.step * level.step);
   const auto area = index(hx) * index(hy);
-  const auto read = [&](int number, Halves& to) {
+  const auto read = [&](int number, HalfCells& to) {
     for (Floats* const plane : {&to.cells, &to.stiff[0], &to.stiff[1], &to.stiff[2]})
       plane->resize(std::max(plane->size(), area));
     const int z = line[2].begin / edge + number - 1;
@@ -136,7 +136,7 @@ void CompositeGrid::weigh_tissues(Level& level) noexcept {
     cells_.plane(m, z, x, hx, y, hy, to.cells.data());
     cells_.stiff_plane(m, z, x, hx, y, hy, {to.stiff[0].data(), to.stiff[1].data(), to.stiff[2].data()});
   };
-  Halves &below = halves_[0], &above = halves_[1];
+  HalfCells &below = half_cells_[0], &above = half_cells_[1];
   for (Floats& array : level.weight) std::fill(array.begin(), array.end(), 0.0F);
   for (int k = 0; k < nz; ++k) {
     read(2 * k, below);
@@ -179,7 +179,7 @@ void CompositeGrid::weigh_tissues(Level& level) noexcept {
 // Where all of a box is tissue: a length by two widths.
 void CompositeGrid::weigh_box(const Level& level, std::array<Floats, 3>& weight) noexcept {
   const auto& line = level.line;
-  Floats &length = halves_[0].cells, &width = halves_[1].cells;  // axis after axis
+  Floats &length = half_cells_[0].cells, &width = half_cells_[1].cells;  // axis after axis
   for (Floats* const plane : {&length, &width})
     plane->resize(std::max(plane->size(), index(line[0].count + line[1].count + line[2].count)));
   const std::array<std::size_t, 3> from{0, index(line[0].count), index(line[0].count + line[1].count)};

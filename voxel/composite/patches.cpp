@@ -37,13 +37,13 @@ int floored(int at, int step) {
 
 }  // namespace
 
-void CompositeGrid::make_room(Level& level, std::size_t l) const {
+void CompositeGrid::allocate(Level& level, std::size_t l) const {
   level.step = 1 << l;
   std::array<std::size_t, 3> most{};
   for (std::size_t d = 0; d < 3; ++d) {
     const int all = (cells_.high(d) - cells_.low(d)) / level.step + 3;
     const int half = half_width_of(l);
-    most[d] = index(half == kWhole || l >= whole_ ? all : std::min(all, 2 * half + 2));
+    most[d] = index(half == kRefineAll || l >= covering_level_ ? all : std::min(all, 2 * half + 2));
     level.line[d].coarse.resize(most[d]);
     // A row is read in octets.
     level.line[d].part.resize(most[d] + 16);
@@ -59,8 +59,8 @@ void CompositeGrid::make_room(Level& level, std::size_t l) const {
   for (auto* arrays : {&level.u, &level.held, &level.weight, &level.hold, &level.inverse, &level.all}) {
     for (Floats& array : *arrays) array.assign(floats, 0.0F);
   }
-  for (Floats* array : {&level.f, &level.old, &level.residual, &level.follows, &level.stuck, &level.drag,
-                        &level.with_drag, &level.bound[0], &level.bound[1]})
+  for (Floats* array : {&level.f, &level.old, &level.residual, &level.is_free, &level.is_active, &level.active_stiffness,
+                        &level.inverse_with_active, &level.bound[0], &level.bound[1]})
     array->assign(floats, 0.0F);
   if (cells_.several()) {
     for (auto* arrays : {&level.tissue, &level.reach, &level.link[0], &level.link[1], &level.link[2],
@@ -74,15 +74,15 @@ void CompositeGrid::make_room(Level& level, std::size_t l) const {
   level.beside.reserve(floats / share);
 }
 
-// Of before_: where the nodes of the largest box that moves were.
-void CompositeGrid::make_room_to_move() {
+// Of before_move_: where the nodes of the largest box that moves were.
+void CompositeGrid::allocate_for_moves() {
   std::size_t most = 0;
-  for (std::size_t l = 0; l < whole_; ++l) {
+  for (std::size_t l = 0; l < covering_level_; ++l) {
     most = std::max(most, levels_[l].u[0].size());
     for (std::size_t d = 0; d < 3; ++d) {
       // As large as lines of any level, which are assigned to them.
-      Line& line = before_.line[d];
-      const Line& of = levels_[l].line[d];
+      AxisNodes& line = before_move_.line[d];
+      const AxisNodes& of = levels_[l].line[d];
       const auto grow = [](auto& room, const auto& like) { room.resize(std::max(room.size(), like.size())); };
       grow(line.coarse, of.coarse);
       grow(line.part, of.part);
@@ -93,25 +93,25 @@ void CompositeGrid::make_room_to_move() {
       grow(line.from_high, of.from_high);
     }
   }
-  for (auto* arrays : {&before_.u, &before_.held}) {
+  for (auto* arrays : {&before_move_.u, &before_move_.held}) {
     for (Floats& axis : *arrays) axis.assign(most, 0.0F);
   }
   for (std::size_t a = 0; cells_.several() && a < 3; ++a) {
-    for (auto* arrays : {&before_.link[a], &before_.held_link[a]}) {
+    for (auto* arrays : {&before_move_.link[a], &before_move_.held_link[a]}) {
       for (Floats& axis : *arrays) axis.assign(most, 0.0F);
     }
   }
 }
 
 // A node is where its cell has a part in the box of all voxels.
-CompositeGrid::Span CompositeGrid::span_of(std::size_t l, std::size_t d, int centre) const noexcept {
+CompositeGrid::NodeRange CompositeGrid::node_range(std::size_t l, std::size_t d, int centre) const noexcept {
   const int step = levels_[l].step, half = half_width_of(l) * step;
   const int start = cells_.low(d), end = cells_.high(d);
   // Where something is anchored they go as far as that: what holds is found between two of them.
-  Span span{floored(cells_.anchored_part(d, 0) > kHeld ? start : start + step / 2, step),
+  NodeRange span{floored(cells_.anchored_part(d, 0) > kHeld ? start : start + step / 2, step),
             floored(end + (cells_.anchored_part(d, 1) > kHeld ? step - 1 : (step - 1) / 2), step), false,
             false};
-  if (l >= whole_ || half < 0) return span;
+  if (l >= covering_level_ || half < 0) return span;
   // Its sides are nodes of the next level.
   const int middle = floored(centre + step, 2 * step);
   span.open_low = middle - half > start;
@@ -121,10 +121,10 @@ CompositeGrid::Span CompositeGrid::span_of(std::size_t l, std::size_t d, int cen
   return span;
 }
 
-void CompositeGrid::lay_lines(Level& level, std::size_t l, const Place& centre) const noexcept {
+void CompositeGrid::place_nodes(Level& level, std::size_t l, const Index3& centre) const noexcept {
   for (std::size_t d = 0; d < 3; ++d) {
-    const Span span = span_of(l, d, centre[d]);
-    Line& line = level.line[d];
+    const NodeRange span = node_range(l, d, centre[d]);
+    AxisNodes& line = level.line[d];
     line.open_low = span.open_low;
     line.open_high = span.open_high;
     line.begin = span.low;
@@ -136,10 +136,10 @@ void CompositeGrid::lay_lines(Level& level, std::size_t l, const Place& centre) 
   level.plane = level.stride * index(level.line[1].count);
 }
 
-void CompositeGrid::join(Level& fine, const Level& coarse) const noexcept {
+void CompositeGrid::set_up_transfer(Level& fine, const Level& coarse) const noexcept {
   for (std::size_t d = 0; d < 3; ++d) {
-    Line& line = fine.line[d];
-    const Line& to = coarse.line[d];
+    AxisNodes& line = fine.line[d];
+    const AxisNodes& to = coarse.line[d];
     std::fill(line.part.begin(), line.part.end(), 0.0F);
     for (int i = 0; i < line.count; ++i) {
       const int away = fine.at(d, i) - to.begin;
@@ -184,27 +184,27 @@ void CompositeGrid::join(Level& fine, const Level& coarse) const noexcept {
   }
 }
 
-void CompositeGrid::lay(Level& level) noexcept {
+void CompositeGrid::assemble(Level& level) noexcept {
   weigh(level);
-  Place low{}, high{};
+  Index3 low{}, high{};
   for (std::size_t d = 0; d < 3; ++d) {
     low[d] = level.at(d, 0);
     high[d] = level.at(d, level.line[d].count - 1);
   }
   const bool near = cells_.anchor_near(low, high, 2 * level.step);
-  find_holds(level, near);
-  find_springs(level, near);
+  find_anchor_weights(level, near);
+  find_diagonal(level, near);
   find_ghosts(level);
 }
 
 // Links that a gap or an anchor breaks, and what anchors hold.
-void CompositeGrid::find_holds(Level& level, bool near) noexcept {
+void CompositeGrid::find_anchor_weights(Level& level, bool near) noexcept {
   const auto& line = level.line;
   const int step = level.step;
   const auto whole = static_cast<float>(step);
   const bool several = cells_.several();
   level.broken = false;
-  level.held_area = 0.0;
+  level.anchored_area = 0.0;
   level.holds = false;
   for (Floats& hold : level.hold) std::fill(hold.begin(), hold.end(), 0.0F);
   for (int k = 0; k < line[2].count; ++k) {
@@ -213,7 +213,7 @@ void CompositeGrid::find_holds(Level& level, bool near) noexcept {
       const bool anchors_near = near && row_near_anchors(level, j, k);
       if (!anchors_near && cells_.fills_box()) continue;
       for (int i = 0; i < line[0].count; ++i) {
-        const Place node{i, j, k}, at{level.at(0, i), level.at(1, j), level.at(2, k)};
+        const Index3 node{i, j, k}, at{level.at(0, i), level.at(1, j), level.at(2, k)};
         const std::size_t here = level.node(i, j, k);
         for (std::size_t d = 0; d < 3; ++d) {
           if (node[d] + 1 == line[d].count) continue;
@@ -224,12 +224,12 @@ void CompositeGrid::find_holds(Level& level, bool near) noexcept {
             level.broken = level.broken || !cells_.fills_box();
             continue;
           }
-          Place after = at;
+          Index3 after = at;
           after[d] += step;
           // From either end as far as the first anchor on the way, by what of the tissue is there.
           const float stiff = several ? weight / there : 1.0F;
-          const TissueCells::Anchored anchors =
-              anchors_near ? cells_.anchors_along(at, d, step) : TissueCells::Anchored{};
+          const CoarseMaterial::Anchored anchors =
+              anchors_near ? cells_.anchors_along(at, d, step) : CoarseMaterial::Anchored{};
           const float part =
               anchors.links > 0 ? std::min(1.0F, there / static_cast<float>(anchors.links)) : 0.0F;
           const auto held = [&](int links) {
@@ -242,7 +242,7 @@ void CompositeGrid::find_holds(Level& level, bool near) noexcept {
           if (several && anchors.back > 0) level.reach[d][here + by] = static_cast<float>(-anchors.back);
           const int ends = (anchors.low_free && anchors.ahead > 0 ? 1 : 0) +
                            (anchors.high_free && anchors.back > 0 ? 1 : 0);
-          level.held_area += ends * static_cast<double>(part * whole * whole);
+          level.anchored_area += ends * static_cast<double>(part * whole * whole);
           const bool gap = step > 1 && there < kAlmostAll * whole && cells_.filled(at) &&
                            cells_.filled(after) && !cells_.unbroken(at, d, step);
           if (anchors.ahead == 0 && anchors.back == 0 && !gap) continue;
@@ -256,13 +256,13 @@ void CompositeGrid::find_holds(Level& level, bool near) noexcept {
 }
 
 bool CompositeGrid::row_near_anchors(const Level& level, int j, int k) const noexcept {
-  Place from{level.at(0, 0), level.at(1, j), level.at(2, k)}, to = from;
+  Index3 from{level.at(0, 0), level.at(1, j), level.at(2, k)}, to = from;
   to[0] = level.at(0, level.line[0].count - 1);
   return cells_.anchor_near(from, to, 2 * level.step);
 }
 
 // What all links of a node are worth; nothing where it may not move.
-void CompositeGrid::find_springs(Level& level, bool near) noexcept {
+void CompositeGrid::find_diagonal(Level& level, bool near) noexcept {
   const auto& line = level.line;
   const std::size_t by_y = level.stride, by_z = level.plane;
   for (std::size_t a = 0; a < 3; ++a) {
@@ -278,7 +278,7 @@ void CompositeGrid::find_springs(Level& level, bool near) noexcept {
                            *const z = level.weight[2].data() + row;
         for (std::size_t a = 0; a < 3; ++a) {
           float *const all = level.all[a].data() + row, *const inverse = level.inverse[a].data() + row;
-          const float sx = spring_[0][a], sy = spring_[1][a], sz = spring_[2][a];
+          const float sx = spring_N_per_m_[0][a], sy = spring_N_per_m_[1][a], sz = spring_N_per_m_[2][a];
           for (std::ptrdiff_t i = line[0].first; i <= line[0].last; ++i) {
             all[i] = sx * (x[i] + x[i - 1]) + sy * (y[i] + y[i - static_cast<std::ptrdiff_t>(by_y)]) +
                      sz * (z[i] + z[i - static_cast<std::ptrdiff_t>(by_z)]);
@@ -295,7 +295,7 @@ void CompositeGrid::find_springs(Level& level, bool near) noexcept {
         if (links[0] + links[1] + links[2] == 0.0F) continue;
         if (anchors_near && cells_.anchored({level.at(0, i), level.at(1, j), level.at(2, k)})) continue;
         for (std::size_t a = 0; a < 3; ++a) {
-          const float sum = links[0] * spring_[0][a] + links[1] * spring_[1][a] + links[2] * spring_[2][a];
+          const float sum = links[0] * spring_N_per_m_[0][a] + links[1] * spring_N_per_m_[1][a] + links[2] * spring_N_per_m_[2][a];
           level.all[a][n] = sum;
           level.inverse[a][n] = 1.0F / sum;
         }

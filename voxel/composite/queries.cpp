@@ -16,56 +16,56 @@ std::size_t index(int i) {
 }  // namespace
 
 // What of a node's cell across d lies within its level's box: beyond a side there is half of it.
-double CompositeGrid::share_of(const Level& level, std::size_t d, int i) noexcept {
-  const Line& line = level.line[d];
+double CompositeGrid::inside_share(const Level& level, std::size_t d, int i) noexcept {
+  const AxisNodes& line = level.line[d];
   return (i < line.first && line.open_low) || (i > line.last && line.open_high) ? 0.5 : 1.0;
 }
 
 // … and within the finer level's.
-double CompositeGrid::covered(std::size_t l, std::size_t d, int i) const noexcept {
+double CompositeGrid::covered_share(std::size_t l, std::size_t d, int i) const noexcept {
   if (l == 0) return 0.0;
-  const Line& fine = levels_[l - 1].line[d];
+  const AxisNodes& fine = levels_[l - 1].line[d];
   const int here = fine.fine[index(i)];
   if (here == kOutside) return 0.0;
   return (here < fine.first && fine.open_low) || (here > fine.last && fine.open_high) ? 0.5 : 1.0;
 }
 
 // What anchors hold of a node (its number in its level) in direction d, and not of others.
-double CompositeGrid::part_of_hold(std::size_t l, std::size_t number, std::size_t d) const noexcept {
+double CompositeGrid::anchor_share(std::size_t l, std::size_t number, std::size_t d) const noexcept {
   const Level& level = levels_[l];
-  const Place node = level.node_of(number);
+  const Index3 node = level.node_of(number);
   const std::size_t e = (d + 1) % 3, f = (d + 2) % 3;
-  if (share_of(level, d, node[d]) < 1.0) return 0.0;
-  const double under = covered(l, d, node[d]) == 1.0 ? covered(l, e, node[e]) * covered(l, f, node[f]) : 0.0;
-  return share_of(level, e, node[e]) * share_of(level, f, node[f]) * (1.0 - under);
+  if (inside_share(level, d, node[d]) < 1.0) return 0.0;
+  const double under = covered_share(l, d, node[d]) == 1.0 ? covered_share(l, e, node[e]) * covered_share(l, f, node[f]) : 0.0;
+  return inside_share(level, e, node[e]) * inside_share(level, f, node[f]) * (1.0 - under);
 }
 
 // Likewise of the link up.
-double CompositeGrid::part_of_link(std::size_t l, std::size_t number, std::size_t d) const noexcept {
+double CompositeGrid::link_share(std::size_t l, std::size_t number, std::size_t d) const noexcept {
   const Level& level = levels_[l];
-  const Place node = level.node_of(number);
+  const Index3 node = level.node_of(number);
   const std::size_t e = (d + 1) % 3, f = (d + 2) % 3;
-  const bool inside = covered(l, d, node[d]) > 0.0 && covered(l, d, node[d] + 1) > 0.0;
-  const double under = inside ? covered(l, e, node[e]) * covered(l, f, node[f]) : 0.0;
-  return share_of(level, e, node[e]) * share_of(level, f, node[f]) * (1.0 - under);
+  const bool inside = covered_share(l, d, node[d]) > 0.0 && covered_share(l, d, node[d] + 1) > 0.0;
+  const double under = inside ? covered_share(l, e, node[e]) * covered_share(l, f, node[f]) : 0.0;
+  return inside_share(level, e, node[e]) * inside_share(level, f, node[f]) * (1.0 - under);
 }
 
 glm::dvec3 CompositeGrid::force_on_tool_N() const noexcept {
   glm::dvec3 carried(0.0);
-  for (std::size_t l = 0; l <= whole_; ++l) {
+  for (std::size_t l = 0; l <= covering_level_; ++l) {
     const Level& level = levels_[l];
     if (!level.holds) continue;
     const std::size_t first = level.first_row(), end = first + level.floats();
     for (std::size_t d = 0; d < 3; ++d) {
       const float* const hold = level.hold[d].data();
-      const std::array<const float*, 3> held{holds_on(level, 0)[d].data(), holds_on(level, 1)[d].data(),
-                                             holds_on(level, 2)[d].data()};
+      const std::array<const float*, 3> held{anchor_weights_on(level, 0)[d].data(), anchor_weights_on(level, 1)[d].data(),
+                                             anchor_weights_on(level, 2)[d].data()};
       for (std::size_t n = first; n < end; ++n) {
         if (hold[n] == 0.0F) continue;
-        const double part = part_of_hold(l, n - first, d);
+        const double part = anchor_share(l, n - first, d);
         for (std::size_t a = 0; a < 3; ++a) {
           carried[static_cast<int>(a)] +=
-              part * static_cast<double>(held[a][n] * spring_[d][a] * level.u[a][n]);
+              part * static_cast<double>(held[a][n] * spring_N_per_m_[d][a] * level.u[a][n]);
         }
       }
     }
@@ -73,7 +73,7 @@ glm::dvec3 CompositeGrid::force_on_tool_N() const noexcept {
   return -carried;
 }
 
-double CompositeGrid::anchors_seen() const noexcept {
+double CompositeGrid::anchor_area_ratio() const noexcept {
   double all = 0.0;
   for (RowId row = 0; row < lattice_.grid().rows(); ++row) {
     std::uint32_t lanes = lattice_.anchored_lanes(row);
@@ -85,10 +85,10 @@ double CompositeGrid::anchors_seen() const noexcept {
       }
     }
   }
-  return all > 0.0 ? levels_[whole_].held_area / all : 0.0;
+  return all > 0.0 ? levels_[covering_level_].anchored_area / all : 0.0;
 }
 
-double CompositeGrid::most_beyond_limits() const noexcept {
+double CompositeGrid::worst_violation() const noexcept {
   const Level& level = levels_[0];
   const auto& line = level.line;
   double most = 0.0;
@@ -102,7 +102,7 @@ double CompositeGrid::most_beyond_limits() const noexcept {
           for (std::size_t a = 0; a < 3; ++a) {
             const float longer = level.u[a][n + by] - level.u[a][n];
             most = std::max(most,
-                            static_cast<double>(std::max(longer - room_[d][a][1], -longer - room_[d][a][0])));
+                            static_cast<double>(std::max(longer - limit_m_[d][a][1], -longer - limit_m_[d][a][0])));
           }
         }
       }
@@ -113,7 +113,7 @@ double CompositeGrid::most_beyond_limits() const noexcept {
 
 double CompositeGrid::energy_J() const noexcept {
   double energy = 0.0;
-  for (std::size_t l = 0; l <= whole_; ++l) {
+  for (std::size_t l = 0; l <= covering_level_; ++l) {
     const Level& level = levels_[l];
     const std::size_t first = level.first_row(), end = first + level.floats();
     for (std::size_t d = 0; d < 3; ++d) {
@@ -124,12 +124,12 @@ double CompositeGrid::energy_J() const noexcept {
         double of_link = 0.0, of_hold = 0.0;
         for (std::size_t a = 0; a < 3; ++a) {
           const float* u = level.u[a].data() + n;
-          const double k = 0.5 * static_cast<double>(spring_[d][a]), longer = static_cast<double>(u[by] - *u);
+          const double k = 0.5 * static_cast<double>(spring_N_per_m_[d][a]), longer = static_cast<double>(u[by] - *u);
           of_link += k * static_cast<double>(link[n]) * longer * longer;
           of_hold += k * static_cast<double>(hold[n] * *u * *u);
         }
-        if (of_link != 0.0) energy += of_link * part_of_link(l, n - first, d);
-        if (of_hold != 0.0) energy += of_hold * part_of_hold(l, n - first, d);
+        if (of_link != 0.0) energy += of_link * link_share(l, n - first, d);
+        if (of_hold != 0.0) energy += of_hold * anchor_share(l, n - first, d);
       }
     }
   }
@@ -141,7 +141,7 @@ glm::dvec3 CompositeGrid::interpolate(const Level& level, const std::array<doubl
   std::array<int, 3> node{};
   std::array<float, 3> part{};
   for (std::size_t d = 0; d < 3; ++d) {
-    const Line& line = level.line[d];
+    const AxisNodes& line = level.line[d];
     const double steps = (place[d] - line.begin) / level.step;
     node[d] = std::clamp(static_cast<int>(steps), 0, std::max(0, line.count - 2));
     part[d] = static_cast<float>(std::clamp(steps - node[d], 0.0, line.count > 1 ? 1.0 : 0.0));
@@ -162,20 +162,20 @@ glm::dvec3 CompositeGrid::interpolate(const Level& level, const std::array<doubl
 glm::dvec3 CompositeGrid::at_point(const std::array<double, 3>& point) const noexcept {
   const std::array<double, 3> place{point[0] + cells_.offset()[0], point[1] + cells_.offset()[1],
                                     point[2] + cells_.offset()[2]};
-  for (std::size_t l = 0; l < whole_; ++l) {
+  for (std::size_t l = 0; l < covering_level_; ++l) {
     const Level& level = levels_[l];
     bool inside = true;
     for (std::size_t d = 0; d < 3; ++d) {
-      const Line& line = level.line[d];
+      const AxisNodes& line = level.line[d];
       inside = inside && (!line.open_low || place[d] >= line.begin) &&
                (!line.open_high || place[d] <= level.at(d, line.count - 1));
     }
     if (inside) return interpolate(level, place);
   }
-  return interpolate(levels_[whole_], place);
+  return interpolate(levels_[covering_level_], place);
 }
 
-glm::dvec3 CompositeGrid::at(const Place& voxel) const noexcept {
+glm::dvec3 CompositeGrid::at(const Index3& voxel) const noexcept {
   return at_point(
       {static_cast<double>(voxel[0]), static_cast<double>(voxel[1]), static_cast<double>(voxel[2])});
 }
@@ -204,8 +204,8 @@ std::size_t CompositeGrid::memory_bytes() const {
          {&level.u, &level.held, &level.weight, &level.hold, &level.tissue, &level.inverse, &level.all}) {
       for (const Floats& array : *arrays) bytes += array.capacity() * sizeof(float);
     }
-    for (const Floats* array : {&level.f, &level.old, &level.residual, &level.follows, &level.stuck,
-                                &level.drag, &level.with_drag, &level.bound[0], &level.bound[1]})
+    for (const Floats* array : {&level.f, &level.old, &level.residual, &level.is_free, &level.is_active,
+                                &level.active_stiffness, &level.inverse_with_active, &level.bound[0], &level.bound[1]})
       bytes += array->capacity() * sizeof(float);
     bytes += level.ghosts.capacity() * sizeof(Ghost) + level.beside.capacity() * sizeof(std::uint32_t);
   };
@@ -219,16 +219,16 @@ std::size_t CompositeGrid::memory_bytes() const {
     add(level);
     add_limits(level);
   }
-  add(before_);
-  add_limits(before_);
-  for (const Halves& plane : halves_) {
+  add(before_move_);
+  add_limits(before_move_);
+  for (const HalfCells& plane : half_cells_) {
     for (const Floats* part : {&plane.cells, &plane.stiff[0], &plane.stiff[1], &plane.stiff[2]})
       bytes += part->capacity() * sizeof(float);
   }
   return bytes;
 }
 
-void CompositeGrid::take_from(const CompositeGrid& other) noexcept {
+void CompositeGrid::interpolate_from(const CompositeGrid& other) noexcept {
   for (Level& level : levels_) {
     const auto& line = level.line;
     for (int k = 0; k < line[2].count; ++k) {

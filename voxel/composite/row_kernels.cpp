@@ -7,20 +7,20 @@ namespace voxel::composite {
 namespace {
 
 // A row that bounds nothing.
-const std::array<float, kMostOctets* kOctet> kNoBound = [] {
-  std::array<float, kMostOctets * kOctet> row{};
-  row.fill(kNone);
+const std::array<float, kMaxOctets* kOctet> kNoBoundRow = [] {
+  std::array<float, kMaxOctets * kOctet> row{};
+  row.fill(kNoBound);
   return row;
 }();
 
 // Of what ties nodes to stuck ones: with all of it a contact that moves lags, with a third it wavers.
-constexpr float kDrags = 0.5F;
+constexpr float kActiveStiffness = 0.5F;
 
 // In a cycle a link gets this much stiffer at most, or softer.
-constexpr float kMostInACycle = 2.0F, kLeastInACycle = 0.25F;
+constexpr float kMaxCycleFactor = 2.0F, kMinCycleFactor = 0.25F;
 
 // Of a correction, what is too far: from where on its energy is more than without it, and taken back at most.
-constexpr double kTooFar = 0.5, kMostShortened = 0.9;
+constexpr double kMinOvershoot = 0.5, kMaxShortening = 0.9;
 
 // Lanes of every second node, beginning with the first, with the second.
 struct Colours {
@@ -33,17 +33,17 @@ HYBRID_INLINE void find_colours(Colours& c) {
 
 // `kOctetsOfRow` 0: as many as the row has.
 template <int kOctetsOfRow>
-HYBRID_INLINE void smooth_row(const View& v, int j, int k) {
-  constexpr int kRoom = kOctetsOfRow == 0 ? kMostOctets : kOctetsOfRow;
+HYBRID_INLINE void smooth_row(const LevelView& v, int j, int k) {
+  constexpr int kRoom = kOctetsOfRow == 0 ? kMaxOctets : kOctetsOfRow;
   const int octets = kOctetsOfRow == 0 ? static_cast<int>(v.stride / kOctet) : kOctetsOfRow;
   const std::size_t row = static_cast<std::size_t>(k) * v.plane + static_cast<std::size_t>(j) * v.stride;
   float* const u = v.u + row;
   const float* const gy = v.link[1] + row;
   const float* const gz = v.link[2] + row;
   const float* const gx = v.link[0] + row;
-  const float* const lo = v.least != nullptr ? v.least + row : kNoBound.data();
-  const float* const hi = v.most_negative != nullptr ? v.most_negative + row : kNoBound.data();
-  const float* const of_all = v.with_drag != nullptr ? v.with_drag : v.inverse;
+  const float* const lo = v.least != nullptr ? v.least + row : kNoBoundRow.data();
+  const float* const hi = v.most_negative != nullptr ? v.most_negative + row : kNoBoundRow.data();
+  const float* const of_all = v.inverse_with_active != nullptr ? v.inverse_with_active : v.inverse;
   Octet own[kRoom], pull[kRoom];
   for (int o = 0; o < octets; ++o) {
     const int at = o * kOctet;
@@ -92,7 +92,7 @@ HYBRID_INLINE void smooth_row(const View& v, int j, int k) {
 }
 
 template <int kOctetsOfRow>
-HYBRID_INLINE void smooth(const View& v) {
+HYBRID_INLINE void smooth(const LevelView& v) {
   for (int colour = 0; colour < 2; ++colour) {
     for (int k = v.first[2]; k <= v.last[2]; ++k) {
       const int from = v.first[1] + ((v.first[1] + k + colour) & 1);
@@ -102,7 +102,7 @@ HYBRID_INLINE void smooth(const View& v) {
 }
 
 template <bool kLinks>
-HYBRID_INLINE void residual(const View& v, const std::array<int, 3>& first, const std::array<int, 3>& last) {
+HYBRID_INLINE void residual(const LevelView& v, const std::array<int, 3>& first, const std::array<int, 3>& last) {
   const int octets = static_cast<int>(v.stride / kOctet);
   for (int k = first[2]; k <= last[2]; ++k) {
     for (int j = first[1]; j <= last[1]; ++j) {
@@ -144,23 +144,23 @@ HYBRID_INLINE void residual(const View& v, const std::array<int, 3>& first, cons
         r = inverse > zero ? r : zero;
         if constexpr (!kLinks) {
           const Octet one = zero + 1.0F;
-          Octet follows = inverse > zero ? one : zero, stuck{};
+          Octet is_free = inverse > zero ? one : zero, is_active{};
           if (v.least != nullptr) {
             load(x, v.least + row + at);
             const OctetMask held = (own <= x) & (r < zero);
             r = held ? zero : r;
-            follows = held ? zero : follows;
-            stuck = held ? one : stuck;
+            is_free = held ? zero : is_free;
+            is_active = held ? one : is_active;
           }
           if (v.most_negative != nullptr) {
             load(x, v.most_negative + row + at);
             const OctetMask held = (own >= -x) & (r > zero);
             r = held ? zero : r;
-            follows = held ? zero : follows;
-            stuck = held ? one : stuck;
+            is_free = held ? zero : is_free;
+            is_active = held ? one : is_active;
           }
-          store(v.follows + row + at, follows);
-          store(v.stuck + row + at, stuck);
+          store(v.is_free + row + at, is_free);
+          store(v.is_active + row + at, is_active);
         }
         store(v.residual + row + at, r);
       }
@@ -170,7 +170,7 @@ HYBRID_INLINE void residual(const View& v, const std::array<int, 3>& first, cons
 
 }  // namespace
 
-HYBRID_WIDE void smooth_level(const View& v) noexcept {
+HYBRID_WIDE void smooth_level(const LevelView& v) noexcept {
   switch (v.stride) {
     case 8:
       smooth<1>(v);
@@ -189,16 +189,16 @@ HYBRID_WIDE void smooth_level(const View& v) noexcept {
   }
 }
 
-HYBRID_WIDE void residual_of_level(const View& v) noexcept {
+HYBRID_WIDE void residual_of_level(const LevelView& v) noexcept {
   residual<false>(v, v.first, v.last);
 }
 
-HYBRID_WIDE void links_of_level(const View& v, const std::array<int, 3>& first,
+HYBRID_WIDE void link_forces_of_level(const LevelView& v, const std::array<int, 3>& first,
                                 const std::array<int, 3>& last) noexcept {
   residual<true>(v, first, last);
 }
 
-HYBRID_WIDE void drags_of_level(const View& v) noexcept {
+HYBRID_WIDE void find_active_stiffness(const LevelView& v) noexcept {
   const int octets = static_cast<int>(v.stride / kOctet);
   for (int k = v.first[2]; k <= v.last[2]; ++k) {
     for (int j = v.first[1]; j <= v.last[1]; ++j) {
@@ -208,40 +208,40 @@ HYBRID_WIDE void drags_of_level(const View& v) noexcept {
         Octet x, g, sum, ties{}, own;
         const std::array<std::size_t, 3> by{1, v.stride, v.plane};
         for (std::size_t d = 0; d < 3; ++d) {
-          load(x, v.stuck + at - by[d]);
+          load(x, v.is_active + at - by[d]);
           load(g, v.link[d] + at - by[d]);
           sum = g * x;
-          load(x, v.stuck + at + by[d]);
+          load(x, v.is_active + at + by[d]);
           load(g, v.link[d] + at);
           ties += v.spring[d] * (sum + g * x);
         }
-        load(own, v.drag + at);
-        load(x, v.follows + at);
-        store(v.drag + at, x * (own + kDrags * ties));
+        load(own, v.active_stiffness + at);
+        load(x, v.is_free + at);
+        store(v.active_stiffness + at, x * (own + kActiveStiffness * ties));
       }
     }
   }
 }
 
-HYBRID_WIDE void take_drags(const View& v, float* f) noexcept {
+HYBRID_WIDE void add_active_stiffness(const LevelView& v, float* f) noexcept {
   const int octets = static_cast<int>(v.stride / kOctet);
   for (int k = v.first[2]; k <= v.last[2]; ++k) {
     for (int j = v.first[1]; j <= v.last[1]; ++j) {
       const std::size_t row = static_cast<std::size_t>(k) * v.plane + static_cast<std::size_t>(j) * v.stride;
       for (int o = 0; o < octets; ++o) {
         const std::size_t at = row + static_cast<std::size_t>(o * kOctet);
-        Octet drag, own, load_f, all, inverse;
-        load(drag, v.drag + at);
+        Octet active_stiffness, own, load_f, all, inverse;
+        load(active_stiffness, v.active_stiffness + at);
         load(own, v.u + at);
         load(load_f, f + at);
         load(all, v.all + at);
         load(inverse, v.inverse + at);
-        store(f + at, load_f + drag * own);
+        store(f + at, load_f + active_stiffness * own);
         const Octet zero{}, one = zero + 1.0F;
-        Octet sum = all + drag;
+        Octet sum = all + active_stiffness;
         sum = inverse > zero ? sum : one;
         const Octet with = one / sum;
-        store(v.with_drag + at, inverse > zero ? with : zero);
+        store(v.inverse_with_active + at, inverse > zero ? with : zero);
       }
     }
   }
@@ -256,7 +256,7 @@ HYBRID_WIDE void follow_bounds(float* u, const float* held, const float* least, 
     Octet x, h;
     load(x, u + n);
     load(h, held + n);
-    const Octet none = Octet{} + 0.5F * kNone, zero{};
+    const Octet none = Octet{} + 0.5F * kNoBound, zero{};
     if (least != nullptr) {
       Octet low;
       load(low, least + n);
@@ -272,7 +272,7 @@ HYBRID_WIDE void follow_bounds(float* u, const float* held, const float* least, 
   }
 }
 
-HYBRID_WIDE void note_held(float* held, const float* u, const float* least, const float* most_negative,
+HYBRID_WIDE void note_at_bound(float* held, const float* u, const float* least, const float* most_negative,
                            std::size_t count) noexcept {
   for (std::size_t n = 0; n < count; n += kOctet) {
     Octet x, bound;
@@ -311,17 +311,17 @@ HYBRID_WIDE void beyond_bounds(const float* u, const float* least, const float* 
   }
 }
 
-HYBRID_WIDE Along along_mode(const View& v, const float* mode, const std::array<int, 3>& finer_first,
+HYBRID_WIDE ModeResponse mode_response(const LevelView& v, const float* mode, const std::array<int, 3>& finer_first,
                              const std::array<int, 3>& finer_last) noexcept {
   const int octets = static_cast<int>(v.stride / kOctet);
-  // Along x, for rows that the finer box has some nodes of: 0 for these.
-  std::array<float, kMostOctets * kOctet> all_own, some_own;
+  // ModeResponse x, for rows that the finer box has some nodes of: 0 for these.
+  std::array<float, kMaxOctets * kOctet> all_own, some_own;
   for (std::size_t i = 0; i < v.stride; ++i) {
     const int at = static_cast<int>(i);
     all_own[i] = 1.0F;
     some_own[i] = at >= finer_first[0] && at <= finer_last[0] ? 0.0F : 1.0F;
   }
-  Along sum;
+  ModeResponse sum;
   for (int k = v.first[2]; k <= v.last[2]; ++k) {
     const bool under_k = k >= finer_first[2] && k <= finer_last[2];
     Octet pull{}, stiffness{};
@@ -368,7 +368,7 @@ HYBRID_WIDE Along along_mode(const View& v, const float* mode, const std::array<
   return sum;
 }
 
-HYBRID_WIDE void shorten_correction(const View& v, float* before) noexcept {
+HYBRID_WIDE void shorten_correction(const LevelView& v, float* before) noexcept {
   // With the side beyond the last plane, which goes along too.
   const std::size_t count = static_cast<std::size_t>(v.last[2] + 2) * v.plane;
   for (std::size_t n = 0; n < count; n += kOctet) {
@@ -378,7 +378,7 @@ HYBRID_WIDE void shorten_correction(const View& v, float* before) noexcept {
     store(before + n, x - was);
   }
   // As it was: what pulls there is what pulls here and what the way itself resists with.
-  const Along sum = along_mode(v, before, {0, 0, 0}, {-1, -1, -1});
+  const ModeResponse sum = mode_response(v, before, {0, 0, 0}, {-1, -1, -1});
   double loads = 0.0;
   if (v.f != nullptr) {
     for (int k = v.first[2]; k <= v.last[2]; ++k) {
@@ -396,8 +396,8 @@ HYBRID_WIDE void shorten_correction(const View& v, float* before) noexcept {
   }
   if (!(sum.stiffness > 0.0)) return;
   const double too_far = -(sum.pull + loads) / sum.stiffness;
-  if (too_far <= kTooFar) return;
-  const auto back = static_cast<float>(std::min(too_far, kMostShortened));
+  if (too_far <= kMinOvershoot) return;
+  const auto back = static_cast<float>(std::min(too_far, kMaxShortening));
   for (std::size_t n = 0; n < count; n += kOctet) {
     Octet x, way, inverse;
     load(x, v.u + n);
@@ -409,7 +409,7 @@ HYBRID_WIDE void shorten_correction(const View& v, float* before) noexcept {
   }
 }
 
-HYBRID_WIDE void go_along(float* u, const float* mode, float by, const float* least,
+HYBRID_WIDE void step_along_mode(float* u, const float* mode, float by, const float* least,
                           const float* most_negative, std::size_t count) noexcept {
   for (std::size_t n = 0; n < count; n += kOctet) {
     Octet x, m, bound;
@@ -429,7 +429,7 @@ HYBRID_WIDE void go_along(float* u, const float* mode, float by, const float* le
   }
 }
 
-HYBRID_WIDE float most_of_limit(const float* u, const float* link, std::size_t by, const Limit& limit,
+HYBRID_WIDE float largest_limit_ratio(const float* u, const float* link, std::size_t by, const LinkMultiplier& limit,
                                 std::size_t count) noexcept {
   Octet most{};
   const Octet zero{};
@@ -449,7 +449,7 @@ HYBRID_WIDE float most_of_limit(const float* u, const float* link, std::size_t b
   return result;
 }
 
-HYBRID_WIDE float hold_to_limit(const float* u, const float* link, std::size_t by, const Limit& limit,
+HYBRID_WIDE float update_row_weights(const float* u, const float* link, std::size_t by, const LinkMultiplier& limit,
                                 float* held, std::size_t count) noexcept {
   Octet most{};
   const Octet zero{}, one = zero + 1.0F;
@@ -464,11 +464,11 @@ HYBRID_WIDE float hold_to_limit(const float* u, const float* link, std::size_t b
                 of_low = -limit.per_shorter * longer;
     const Octet of = of_high > of_low ? of_high : of_low;
     Octet by_now = of * (0.5F + 0.5F * of);
-    by_now = by_now < kMostInACycle ? by_now : zero + kMostInACycle;
-    by_now = by_now > kLeastInACycle ? by_now : zero + kLeastInACycle;
+    by_now = by_now < kMaxCycleFactor ? by_now : zero + kMaxCycleFactor;
+    by_now = by_now > kMinCycleFactor ? by_now : zero + kMinCycleFactor;
     by_now = ((of > above) | (of < below)) ? by_now : one;
     h *= by_now;
-    const Octet stiffest = limit.most_stiffer * g;
+    const Octet stiffest = limit.max_factor * g;
     h = h > g ? h : g;
     h = h < stiffest ? h : stiffest;
     store(held + n, h);
@@ -481,10 +481,10 @@ HYBRID_WIDE float hold_to_limit(const float* u, const float* link, std::size_t b
   return result;
 }
 
-float held_to_limit(float held, float link, float of_limit, const Limit& limit) noexcept {
+float updated_weight(float held, float link, float of_limit, const LinkMultiplier& limit) noexcept {
   if (of_limit > 1.0F + limit.tolerance || of_limit < 1.0F - limit.tolerance)
-    held *= std::clamp(of_limit * (0.5F + 0.5F * of_limit), kLeastInACycle, kMostInACycle);
-  return std::clamp(held, link, limit.most_stiffer * link);
+    held *= std::clamp(of_limit * (0.5F + 0.5F * of_limit), kMinCycleFactor, kMaxCycleFactor);
+  return std::clamp(held, link, limit.max_factor * link);
 }
 
 }  // namespace voxel::composite

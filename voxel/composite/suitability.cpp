@@ -93,7 +93,7 @@ bool alike_in_poisson(std::span<const LinkMaterial> materials) {
 
 }  // namespace
 
-std::string CompositeGrid::obstacle_to(const Lattice& lattice) {
+std::string CompositeGrid::reason_unsuitable(const Lattice& lattice) {
   if (!lattice.uniform_limits()) return "its materials have limits of their own";
   if (!alike_in_poisson(lattice.materials().subspan(1))) return "its materials differ in Poisson's ratio";
   if (lattice.yields()) return "it keeps dents";
@@ -108,7 +108,7 @@ std::string CompositeGrid::obstacle_to(const Lattice& lattice) {
   const CompositeGrid grid(lattice, kHalfWidth);
   // How far the chain lets tissue go beside other anchors, nothing tells a press.
   if (!grid.anchored_by_sides()) return "it is anchored otherwise than by whole sides";
-  const double seen = grid.anchors_seen();
+  const double seen = grid.anchor_area_ratio();
   if (seen < kLeastSeen || seen > kMostSeen) return "coarse levels do not see what anchors hold";
   return CompositeGrid(lattice, kTried).wrong_somewhere();
 }
@@ -125,7 +125,7 @@ std::string CompositeGrid::wrong_somewhere() {
   const auto surface = lattice_.surface();
   // From one node to the next, so that limits have no say.
   float least = std::numeric_limits<float>::max();
-  for (const auto& d : room_) {
+  for (const auto& d : limit_m_) {
     for (const auto& axis : d) least = std::min({least, axis[0], axis[1]});
   }
   const float most_m = 0.5F * least;
@@ -134,7 +134,7 @@ std::string CompositeGrid::wrong_somewhere() {
   const double depth_m = cells_.several() ? most_m : kDepth * lattice_.min_spacing_m();
   for (std::size_t n = 0; n < kPlaces; ++n) {
     const VoxelId v = surface[(2 * n + 1) * surface.size() / (2 * kPlaces)];
-    const Place place = lattice_.coordinates(v);
+    const Index3 place = lattice_.coordinates(v);
     if (lattice_.anchored(v)) continue;
     begin(place);
     std::uint32_t random = 1;
@@ -183,7 +183,7 @@ bool CompositeGrid::anchored_by_sides() const noexcept {
   const auto& dims = lattice_.grid().dims;
   for (RowId row = 0; row < lattice_.grid().rows(); ++row) {
     for (std::uint32_t lanes = lattice_.anchored_lanes(row); lanes != 0; lanes &= lanes - 1) {
-      const Place at = lattice_.coordinates(row * kRow + static_cast<VoxelId>(std::countr_zero(lanes)));
+      const Index3 at = lattice_.coordinates(row * kRow + static_cast<VoxelId>(std::countr_zero(lanes)));
       bool in_side = false;
       for (std::size_t d = 0; d < 3; ++d) {
         in_side = in_side || (at[d] == 0 && cells_.anchored_part(d, 0) == 1.0) ||
@@ -195,7 +195,7 @@ bool CompositeGrid::anchored_by_sides() const noexcept {
   return true;
 }
 
-bool CompositeGrid::far_from_anchors(const Place& voxel) const noexcept {
+bool CompositeGrid::far_from_anchors(const Index3& voxel) const noexcept {
   return !cells_.anchor_near(shifted(voxel), shifted(voxel), 2 * kFromAnchors);
 }
 

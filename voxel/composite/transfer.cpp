@@ -31,13 +31,13 @@ HYBRID_INLINE void part_between(const std::array<const float*, 2>& links, int at
   part_between(before, after, part);
 }
 
-HYBRID_INLINE void finish(const Telling& t, int at, Octet& x) {
+HYBRID_INLINE void finish(const ProlongArgs& t, int at, Octet& x) {
   Octet own;
   load(own, t.u + at);
   if (t.adds) {
-    Octet follows;
-    load(follows, t.follows + at);
-    x = own + follows * x;
+    Octet is_free;
+    load(is_free, t.is_free + at);
+    x = own + is_free * x;
   }
   if (t.least != nullptr) {
     Octet low;
@@ -55,7 +55,7 @@ HYBRID_INLINE void finish(const Telling& t, int at, Octet& x) {
 
 }  // namespace
 
-HYBRID_WIDE void tell_row(const Telling& t) noexcept {
+HYBRID_WIDE void prolong_row(const ProlongArgs& t) noexcept {
   for (int o = 0; o < t.octets; ++o) {
     Octet sum{};
     for (int n = 0; n < t.count; ++n) {
@@ -73,7 +73,7 @@ HYBRID_WIDE void tell_row(const Telling& t) noexcept {
   }
 }
 
-HYBRID_WIDE void tell_row_by_links(const Telling& t, const TellingByLinks& by) noexcept {
+HYBRID_WIDE void prolong_row_by_links(const ProlongArgs& t, const ProlongByLinksArgs& by) noexcept {
   for (int o = 0; o < t.octets; ++o) {
     const int at = o * kOctet;
     Octet along;
@@ -107,7 +107,7 @@ HYBRID_WIDE void tell_row_by_links(const Telling& t, const TellingByLinks& by) n
   }
 }
 
-HYBRID_WIDE void gather_by_links(const Gathering& g) noexcept {
+HYBRID_WIDE void restrict_row_by_links(const RestrictArgs& g) noexcept {
   for (int o = 0; o < g.octets; ++o) {
     const int at = o * kOctet;
     // Of a row before it is the second of the two that one stands between.

@@ -15,20 +15,20 @@
 namespace voxel::composite {
 
 // A row as coarse ones have it: `rows` are those that weigh, from the coarse lane on by which lane 0 goes.
-struct Telling {
+struct ProlongArgs {
   std::array<const float*, 4> rows;
   std::array<float, 4> weights;
   int count = 0;
   bool odd = false;
-  const float *along, *least, *most_negative, *follows;  // bounds null: none
+  const float *along, *least, *most_negative, *is_free;  // bounds null: none
   float* u;
   int octets;
   bool adds;  // to nodes that follow; else all nodes become what is told
 };
-void tell_row(const Telling& telling) noexcept;
+void prolong_row(const ProlongArgs& args) noexcept;
 
 // The same by links. A row stands between two in y, in z, in both or in none.
-struct TellingByLinks {
+struct ProlongByLinksArgs {
   std::array<const float*, 4> rows;  // of the coarser level; [0]: before in both, 1: after in y, 2: in z, 3
   std::array<const float*, 4> along_x;  // links in x of the fine rows that stand there
   // Links to the row before and after, of rows that stand between two in y (where before in z, after), in z.
@@ -36,11 +36,11 @@ struct TellingByLinks {
   std::array<const float*, 2> along_z;
   bool between_y, between_z;
 };
-void tell_row_by_links(const Telling& telling, const TellingByLinks& by) noexcept;
+void prolong_row_by_links(const ProlongArgs& args, const ProlongByLinksArgs& by) noexcept;
 
 // What a coarse row is told: of up to nine rows, itself in the middle, what each node carries, shared as it
 // is told. [z][y] before, own, after; null: nothing. Where a share is one half links decide how much it is.
-struct Gathering {
+struct RestrictArgs {
   std::array<std::array<const float*, 3>, 3> rows;
   std::array<float, 3> share_y, share_z;
   // Links to the row before and after.
@@ -52,6 +52,6 @@ struct Gathering {
   // after it.
   float *sum, *part;
 };
-void gather_by_links(const Gathering& gathering) noexcept;
+void restrict_row_by_links(const RestrictArgs& gathering) noexcept;
 
 }  // namespace voxel::composite

@@ -116,6 +116,9 @@ struct Displacement {
 [[nodiscard]] glm::dvec3 displacement_at(const Lattice& lattice, const Displacement& state,
                                          const glm::dvec3& rest_point) noexcept;
 
+// Of the smallest spacing: a voxel that is no deeper in its obstacle than this lies on it.
+inline constexpr double kTouching = 1e-6;
+
 // A half-space that one surface voxel may not leave: normal · u >= bound, u its displacement.
 struct Obstacle {
   glm::vec3 normal{0.0F};

@@ -222,15 +222,22 @@ void relax_obstacle(Couplings& couplings, Displacement& state, const ObstacleVie
                     const glm::dvec3& load_N) noexcept {
   const Obstacle& o = view.of(v);
   const glm::dvec3 n(o.normal), before = state.at(v), w = link_compliance(couplings, v);
-  glm::dvec3 wanted = link_minimum(couplings, state, v) + w * load_N;
+  const glm::dvec3 wanted = link_minimum(couplings, state, v) + w * load_N;
   if (!o.moving) {
     // What stands is not carried by the tissue, and a projection in the metric of the springs does, which
     // lowers the energy along the surface. (With what follows a brain came back into its skull 43 um short of
     // where it had been, in the time in which it is 40 um at most.)
     const double depth = depth_in_obstacle(o, wanted), denominator = glm::dot(n, w * n);
-    if (depth > 0.0 && denominator > 0.0) wanted += (depth / denominator) * w * n;
-    state.set(v, no_deeper(o, before, clamp_to_links(couplings.lattice(), state, v, wanted)));
-    return;
+    const glm::dvec3 projected =
+        depth > 0.0 && denominator > 0.0 ? wanted + (depth / denominator) * w * n : wanted;
+    const glm::dvec3 within = clamp_to_links(couplings.lattice(), state, v, projected);
+    const double now = depth_in_obstacle(o, before);
+    // A voxel in the obstacle that its limits keep from the projection takes the least energy of all places that
+    // limits and obstacle allow. Otherwise it would stay where it is for good.
+    if (now <= kTouching * couplings.lattice().min_spacing_m() || depth_in_obstacle(o, within) <= now) {
+      state.set(v, no_deeper(o, before, within));
+      return;
+    }
   }
   glm::dvec3 low, high;
   for (int axis = 0; axis < 3; ++axis) {

@@ -14,7 +14,6 @@
 namespace voxel {
 namespace {
 
-constexpr double kTouching = 1e-6;  // of the spacing: nearer to its obstacle than this a voxel lies on it
 constexpr int kObstacleRounds = 3;  // of a row, in which more voxels each time stay out of their obstacles
 
 // Bit i: lane i of a row is near a rigid surface. Eight lanes at a time: asked one by one, few of them being

@@ -12,7 +12,6 @@
 namespace voxel {
 namespace {
 
-constexpr double kTouching = 1e-6;     // of the spacing: nearer to its obstacle than this a part lies on it
 constexpr double kRounding = 1.2e-7;   // the last bit of a float, of its value
 constexpr double kNearObstacle = 2.0;  // spacings: obstacles further away are not looked at
 

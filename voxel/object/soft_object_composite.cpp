@@ -40,13 +40,13 @@ constexpr double kFlat = 1.5;       // spacings differ by no more than this wher
 // it, and pressed that and all behind it in again.)
 void go_along(CompositeGrid& grid, const std::array<int, 3>& centre, const glm::dvec3& force_N,
               const glm::dvec3& way_m, double spacing_m) noexcept {
-  if (!grid.in_fine_box(centre)) return;
+  if (!grid.in_fine_patch(centre)) return;
   const glm::dvec3 size = glm::abs(force_N);
   const int axis = size.z >= size.x && size.z >= size.y ? 2 : size.y >= size.x ? 1 : 0;
   const double inwards = force_N[axis] > 0.0 ? -1.0 : 1.0, depth_m = inwards * grid.fine_at(centre)[axis];
   if (depth_m < kLeastToScale * spacing_m) return;
   const double part = std::clamp(inwards * way_m[axis] / depth_m, -kMostScaled, kMostScaled);
-  grid.grow(static_cast<std::size_t>(axis), std::pow(1.0 + part, kWithDepth) - 1.0, std::abs(part) * depth_m);
+  grid.extrapolate(static_cast<std::size_t>(axis), std::pow(1.0 + part, kWithDepth) - 1.0, std::abs(part) * depth_m);
 }
 
 }  // namespace
@@ -62,9 +62,9 @@ std::string SoftObject::use_composite_grid(const ToolInBody& tool) {
     steepest = std::max(steepest, static_cast<double>(lattice_->tightest(d).across) / h);
   const double share = tool.shape == ToolInBody::Shape::punch ? 1.0 : steepest / std::hypot(1.0, steepest);
   const int contact = static_cast<int>(std::ceil(share * reach(tool.radius) / h));
-  if (contact + kLeastMargin > CompositeGrid::kMostHalfWidth) return "the tool is many voxels wide";
-  const int half = std::min(contact + kMargin, CompositeGrid::kMostHalfWidth);
-  std::string obstacle = CompositeGrid::obstacle_to(*lattice_);
+  if (contact + kLeastMargin > CompositeGrid::kMaxHalfWidth) return "the tool is many voxels wide";
+  const int half = std::min(contact + kMargin, CompositeGrid::kMaxHalfWidth);
+  std::string obstacle = CompositeGrid::reason_unsuitable(*lattice_);
   if (!obstacle.empty()) return obstacle;
   grid_ = std::make_unique<CompositeGrid>(*lattice_, half);
   near_on_grid_.reserve(most_in_box(half));
@@ -74,24 +74,24 @@ std::string SoftObject::use_composite_grid(const ToolInBody& tool) {
 
 void SoftObject::widen_grid() {
   if (!grid_) return;
-  auto wide = std::make_unique<CompositeGrid>(*lattice_, CompositeGrid::kWideHalfWidth,
-                                              CompositeGrid::kWideHalfWidth);
+  auto wide = std::make_unique<CompositeGrid>(*lattice_, CompositeGrid::kReferenceHalfWidth,
+                                              CompositeGrid::kReferenceHalfWidth);
   wide->begin(centre_);
-  wide->take_from(*grid_);
+  wide->interpolate_from(*grid_);
   grid_ = std::move(wide);
-  near_on_grid_.reserve(most_in_box(CompositeGrid::kWideHalfWidth));
+  near_on_grid_.reserve(most_in_box(CompositeGrid::kReferenceHalfWidth));
   list_near_on_grid();
 }
 
 glm::dvec3 SoftObject::displacement_on_grid(VoxelId v) const noexcept {
   const std::array<int, 3> c = lattice_->coordinates(v);
-  return grid_->in_fine_box(c) ? grid_->fine_at(c) : grid_->at(c);
+  return grid_->in_fine_patch(c) ? grid_->fine_at(c) : grid_->at(c);
 }
 
 glm::dvec3 SoftObject::position_on_grid(VoxelId v) const noexcept {
   const std::array<int, 3> c = lattice_->coordinates(v);
   const glm::dvec3& h = lattice_->spacing_m();
-  const glm::dvec3 u = grid_->in_fine_box(c) ? grid_->fine_at(c) : grid_->at(c);
+  const glm::dvec3 u = grid_->in_fine_patch(c) ? grid_->fine_at(c) : grid_->at(c);
   return glm::dvec3(c[0] * h.x, c[1] * h.y, c[2] * h.z) + u;
 }
 
@@ -105,7 +105,7 @@ std::size_t SoftObject::most_in_box(int half_width) const {
 void SoftObject::list_near_on_grid() noexcept {
   near_on_grid_.clear();
   std::array<int, 3> low{}, high{};
-  grid_->fine_box(low, high);
+  grid_->fine_patch(low, high);
   const Grid& g = lattice_->grid();
   for (int k = low[2]; k <= high[2]; ++k) {
     for (int j = low[1]; j <= high[1]; ++j) {
@@ -211,11 +211,11 @@ SoftObject::Bound SoftObject::bound_by(const ToolInBody& tool, const Touch& t,
 void SoftObject::put_aside(const ToolInBody& tool) noexcept {
   const auto put = [&](const TouchOnGrid& near) {
     if (near.gap_m > kPressed * lattice_->min_spacing_m()) return;
-    const glm::dvec3 rest = touches_[near.touch].rest, wished = grid_->link_minimum(near.voxel);
+    const glm::dvec3 rest = touches_[near.touch].rest, wished = grid_->unconstrained_minimum(near.voxel);
     Gap g = gap(tool, rest + wished);
     if (g.distance >= 0.0) return;
     const glm::dvec3 place = onto_tool(tool, rest, wished, grid_->compliance(near.voxel), g);
-    grid_->set_fine(near.voxel, grid_->within_anchors(near.voxel, place));
+    grid_->set_fine(near.voxel, grid_->clamp_to_anchors(near.voxel, place));
   };
   std::for_each(touches_on_grid_.begin(), touches_on_grid_.end(), put);
   std::for_each(touches_on_grid_.rbegin(), touches_on_grid_.rend(), put);
@@ -228,7 +228,7 @@ void SoftObject::press_on_grid(const ToolInBody& tool) noexcept {
   touches_on_grid_.clear();
   for (std::uint32_t n = 0; n < touches_.size(); ++n) {
     const std::array<int, 3> c = lattice_->coordinates(touches_[n].v);
-    if (!grid_->in_fine_box(c)) continue;
+    if (!grid_->in_fine_patch(c)) continue;
     const double away = gap(tool, touches_[n].rest + grid_->fine_at(c)).distance;
     if (away <= kNear * lattice_->min_spacing_m()) touches_on_grid_.push_back({n, c, away});
   }
@@ -241,15 +241,15 @@ void SoftObject::press_on_grid(const ToolInBody& tool) noexcept {
     u[bound.axis] = bound.u;
     glm::dvec3 normal(0.0);
     normal[bound.axis] = bound.way;
-    grid_->press(near.voxel, grid_->within_anchors(near.voxel, u), normal);
+    grid_->press(near.voxel, grid_->clamp_to_anchors(near.voxel, u), normal);
     // What is pressed aside is held aside: on the tool's surface where its links have it.
-    const glm::dvec3 wished = grid_->link_minimum(near.voxel);
+    const glm::dvec3 wished = grid_->unconstrained_minimum(near.voxel);
     Gap g = gap(tool, t.rest + wished);
     if (g.distance >= 0.0) continue;
     const glm::dvec3 place = onto_tool(tool, t.rest, wished, grid_->compliance(near.voxel), g);
     normal = g.normal;
     normal[bound.axis] = 0.0;
-    grid_->press(near.voxel, grid_->within_anchors(near.voxel, place), normal);
+    grid_->press(near.voxel, grid_->clamp_to_anchors(near.voxel, place), normal);
   }
 }
 
@@ -268,7 +268,7 @@ void SoftObject::settle_on_grid(const ToolInBody& tool) noexcept {
       nearest = &t;
     }
     const std::array<int, 3> c = lattice_->coordinates(t.v);
-    if (!grid_->in_fine_box(c)) continue;
+    if (!grid_->in_fine_patch(c)) continue;
     glm::dvec3 u = grid_->fine_at(c);
     Gap g = gap(tool, t.rest + u);
     nearest_m_ = std::min(nearest_m_, g.distance);
@@ -276,7 +276,7 @@ void SoftObject::settle_on_grid(const ToolInBody& tool) noexcept {
     if (g.distance < 0.0) {
       const Bound bound = bound_by(tool, t, u);
       if (bound.any) u[bound.axis] = bound.u;
-      u = grid_->within_anchors(c, u);
+      u = grid_->clamp_to_anchors(c, u);
       grid_->set_fine(c, u);
     }
     t.pressed = true;
@@ -334,7 +334,7 @@ void SoftObject::relax_on_grid(const ToolInBody& tool) noexcept {
 // Against the force.
 double SoftObject::depth_on_grid() const noexcept {
   const double size = glm::length(grid_force_N_);
-  if (size == 0.0 || !grid_->in_fine_box(centre_)) return 0.0;
+  if (size == 0.0 || !grid_->in_fine_patch(centre_)) return 0.0;
   return -glm::dot(grid_->fine_at(centre_), grid_force_N_) / size;
 }
 
@@ -350,7 +350,7 @@ Reaction SoftObject::reaction_on_grid(const ToolInBody& tool) const noexcept {
   result.pressed = std::max(result.pressed, 1U);
   if (size == 0.0) {
     // Nothing has reached the anchors yet.
-    if (!grid_->in_fine_box(centre_)) return result;
+    if (!grid_->in_fine_patch(centre_)) return result;
     const glm::dvec3 springs = static_cast<double>(result.pressed) / grid_->compliance(centre_);
     for (int d = 0; d < 3; ++d) result.stiffness_N_per_m[d][d] = springs[d];
   } else {
@@ -374,7 +374,7 @@ bool SoftObject::at_anchors_end(VoxelId v, const glm::dvec3& direction) const no
   glm::dvec3 further = displacement(v);
   const double step = (direction[axis] > 0.0 ? 1e-3 : -1e-3) * lattice_->min_spacing_m();
   further[axis] += step;
-  return grid_->within_anchors(c, further)[axis] != further[axis];
+  return grid_->clamp_to_anchors(c, further)[axis] != further[axis];
 }
 
 }  // namespace voxel

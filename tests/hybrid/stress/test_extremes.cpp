@@ -16,19 +16,10 @@ namespace {
 
 using tests::Touch;
 
-// Where links have slack in one direction only, the relaxation of tissue stalls: what was moved stays where
-// it is, and the tool is led aside by it. device/README.md has the figures.
-bool known_shortfall(const hybrid::ExtremeRow& row) {
-  const bool one_way =
-      row.setting == "no slack along, some across" || row.setting == "no slack across, some along";
-  return one_way && (row.oracle == "settled" || row.oracle == "energy");
-}
-
 TEST(Extremes, AShareOfTheTable) {
   std::set<std::string> oracles;
   std::size_t refused = 0;
   for (const hybrid::ExtremeRow& row : hybrid::run_extremes({.quick = true})) {
-    if (!row.ok && known_shortfall(row)) continue;
     EXPECT_TRUE(row.ok) << row.test_case << " | " << row.setting << " | " << row.oracle << ": "
                         << row.outcome;
     oracles.insert(row.oracle);

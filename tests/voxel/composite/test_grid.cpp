@@ -23,7 +23,7 @@ using voxel::CompositeGrid;
 using voxel::Lattice;
 using voxel::LinkMaterial;
 using voxel::VoxelId;
-using Place = CompositeGrid::Place;
+using Index3 = CompositeGrid::Index3;
 
 constexpr double kSpacing = 1e-3;
 
@@ -38,9 +38,9 @@ struct Body {
   voxel::LatticeOptions options;
   std::shared_ptr<const Lattice> lattice;
 
-  Body(const Place& dims, double play, const std::function<bool(const Place&)>& filled,
-       const std::function<bool(const Place&)>& anchored,
-       const std::function<int(const Place&)>& tissue = nullptr)
+  Body(const Index3& dims, double play, const std::function<bool(const Index3&)>& filled,
+       const std::function<bool(const Index3&)>& anchored,
+       const std::function<int(const Index3&)>& tissue = nullptr)
       : options(made_of(slack(play), nullptr)) {
     voxel::LabelVolume volume = block(dims, glm::dvec3(kSpacing));
     std::size_t n = 0;
@@ -60,23 +60,23 @@ struct Body {
   }
 };
 
-bool everywhere(const Place&) {
+bool everywhere(const Index3&) {
   return true;
 }
-bool below(const Place& p) {
+bool below(const Index3& p) {
   return p[2] == 0;
 }
 
 // A square patch of the top pressed down by `depth`.
 struct Patch {
-  Place middle;
+  Index3 middle;
   int half;
   double depth;
 
   template <class Visit>
   void for_voxels(const Visit& visit) const {
     for (int j = -half; j <= half; ++j) {
-      for (int i = -half; i <= half; ++i) visit(Place{middle[0] + i, middle[1] + j, middle[2]});
+      for (int i = -half; i <= half; ++i) visit(Index3{middle[0] + i, middle[1] + j, middle[2]});
     }
   }
 };
@@ -84,7 +84,7 @@ struct Patch {
 void press(CompositeGrid& grid, const Patch& patch, int cycles) {
   for (int n = 0; n < cycles; ++n) {
     grid.clear_pressed();
-    patch.for_voxels([&](const Place& p) {
+    patch.for_voxels([&](const Index3& p) {
       grid.press(p, glm::dvec3(0.0, 0.0, -patch.depth), glm::dvec3(0.0, 0.0, -1.0));
     });
     grid.cycle({false, false, true});
@@ -95,7 +95,7 @@ void press(CompositeGrid& grid, const Patch& patch, int cycles) {
 // The patch is stuck to the tool; that is no difference, since all of it is pulled up.
 tests::Problem solved_directly(const Body& body, const Patch& patch) {
   voxel::Displacement state(*body.lattice);
-  patch.for_voxels([&](const Place& p) {
+  patch.for_voxels([&](const Index3& p) {
     const VoxelId v = body.lattice->at(p[0], p[1], p[2]);
     state.u[2][v] = static_cast<float>(-patch.depth);
     state.set_role(v, voxel::Displacement::held);
@@ -134,18 +134,18 @@ Difference compare(const Body& body, const Patch& patch, int half_width) {
   const double force = force_of(body, direct);
   most.force = std::fabs(grid.force_on_tool_N().z - force) / force;
   std::cout << "[ measured ] " << force << " N; off by " << most.displacement << " of the depth, "
-            << most.force << " of the force; links beyond by " << grid.most_beyond_limits() / kSpacing
+            << most.force << " of the force; links beyond by " << grid.worst_violation() / kSpacing
             << " spacings\n";
   return most;
 }
 
 // Without boxes it is the lattice, whatever its sides are.
 TEST(CompositeGrid, AllVoxelsAreTheLatticeAtEquilibrium) {
-  for (const Place& dims : {Place{13, 13, 11}, Place{12, 15, 10}, Place{9, 16, 14}}) {
+  for (const Index3& dims : {Index3{13, 13, 11}, Index3{12, 15, 10}, Index3{9, 16, 14}}) {
     for (const double depth : {0.3, 1.0}) {
       const Body body(dims, 0.15, everywhere, below);
       const Patch patch{{dims[0] / 2, dims[1] / 2, dims[2] - 1}, 2, depth * kSpacing};
-      const Difference d = compare(body, patch, CompositeGrid::kWhole);
+      const Difference d = compare(body, patch, CompositeGrid::kRefineAll);
       EXPECT_LT(d.displacement, 1e-3);
       EXPECT_LT(d.force, 2e-3);
     }
@@ -153,64 +153,64 @@ TEST(CompositeGrid, AllVoxelsAreTheLatticeAtEquilibrium) {
 }
 
 TEST(CompositeGrid, AnchorsAreHeldWhereverTheyAre) {
-  const Place dims{15, 13, 12};
+  const Index3 dims{15, 13, 12};
   const Patch patch{{7, 6, 11}, 2, 0.8 * kSpacing};
   const Body sides(dims, 0.2, everywhere,
-                   [](const Place& p) { return p[0] == 0 || p[0] == 14 || p[1] == 0; });
-  Difference d = compare(sides, patch, CompositeGrid::kWhole);
+                   [](const Index3& p) { return p[0] == 0 || p[0] == 14 || p[1] == 0; });
+  Difference d = compare(sides, patch, CompositeGrid::kRefineAll);
   EXPECT_LT(d.displacement, 2e-3);
   EXPECT_LT(d.force, 5e-3);
-  const Body lump(dims, 0.2, everywhere, [](const Place& p) { return p[0] < 5 && p[1] > 7 && p[2] < 6; });
+  const Body lump(dims, 0.2, everywhere, [](const Index3& p) { return p[0] < 5 && p[1] > 7 && p[2] < 6; });
   // At the edge of what is anchored links would go beyond their limits, which bounds do not say.
-  d = compare(lump, patch, CompositeGrid::kWhole);
+  d = compare(lump, patch, CompositeGrid::kRefineAll);
   EXPECT_LT(d.displacement, 0.06);
   EXPECT_LT(d.force, 0.03);
 }
 
 TEST(CompositeGrid, HolesAndNotchesAreInTheLinks) {
-  const Place dims{15, 14, 13};
+  const Index3 dims{15, 14, 13};
   const Patch patch{{7, 7, 12}, 2, 0.8 * kSpacing};
   const Body hole(
-      dims, 0.2, [](const Place& p) { return std::hypot(p[0] - 7.0, p[2] - 6.0) > 2.5; }, below);
-  Difference d = compare(hole, patch, CompositeGrid::kWhole);
+      dims, 0.2, [](const Index3& p) { return std::hypot(p[0] - 7.0, p[2] - 6.0) > 2.5; }, below);
+  Difference d = compare(hole, patch, CompositeGrid::kRefineAll);
   EXPECT_LT(d.displacement, 0.01);
   EXPECT_LT(d.force, 0.01);
   const Body notch(
-      dims, 0.2, [](const Place& p) { return p[2] < 8 || p[0] < 11 || p[0] > 11; }, below);
-  d = compare(notch, patch, CompositeGrid::kWhole);
+      dims, 0.2, [](const Index3& p) { return p[2] < 8 || p[0] < 11 || p[0] > 11; }, below);
+  d = compare(notch, patch, CompositeGrid::kRefineAll);
   EXPECT_LT(d.displacement, 0.02);
   EXPECT_LT(d.force, 0.02);
 }
 
 // Layers and lumps of tissues that differ in stiffness, and what a soft layer between two stiff ones carries
 // when it is squeezed to its limits (contrast 4 to 200, depth a part of where the chain ends).
-int stiff_soft_stiff(const Place& p) {
+int stiff_soft_stiff(const Index3& p) {
   return p[2] < 4 || p[2] >= 9 ? 4 : 1;
 }
-int soft_stiff_soft(const Place& p) {
+int soft_stiff_soft(const Index3& p) {
   return p[2] < 4 || p[2] >= 9 ? 1 : 10;
 }
-int stiffer_soft_stiffer(const Place& p) {
+int stiffer_soft_stiffer(const Index3& p) {
   return p[2] < 4 || p[2] >= 9 ? 10 : 1;
 }
-int skin_fat_muscle(const Place& p) {
+int skin_fat_muscle(const Index3& p) {
   return p[2] >= 9 ? 31 : p[2] >= 4 ? 1 : 3;
 }
-int lumps_of_200(const Place& p) {
+int lumps_of_200(const Index3& p) {
   return ((p[0] + 2) / 5 + (p[1] + 1) / 4 + (p[2] + 2) / 5) % 2 == 0 ? 200 : 1;
 }
-int lumps(const Place& p) {
+int lumps(const Index3& p) {
   return 1 + 4 * (((p[0] + 2) / 5 + (p[1] + 1) / 4 + (p[2] + 2) / 5) % 3);
 }
 
 TEST(CompositeGrid, SeveralTissuesAreTheLatticeAtEquilibrium) {
-  const Place dims{13, 13, 13};
+  const Index3 dims{13, 13, 13};
   for (const auto& tissue :
        {stiff_soft_stiff, soft_stiff_soft, stiffer_soft_stiffer, lumps, skin_fat_muscle, lumps_of_200}) {
     for (const double depth : {0.3, 0.7, 0.9}) {
       const Body body(dims, 0.15, everywhere, below, tissue);
       const Patch patch{{6, 6, 12}, 2, depth * 0.15 * 12 * kSpacing};
-      const Difference d = compare(body, patch, CompositeGrid::kWhole);
+      const Difference d = compare(body, patch, CompositeGrid::kRefineAll);
       EXPECT_LT(d.displacement, 0.01);
       EXPECT_LT(d.force, 0.01);
     }
@@ -219,7 +219,7 @@ TEST(CompositeGrid, SeveralTissuesAreTheLatticeAtEquilibrium) {
 
 // Boxes against all voxels, of a patch as large as a tool's contact.
 double boxes_against_all(const Body& body, const Patch& patch) {
-  CompositeGrid all(*body.lattice, CompositeGrid::kWhole), boxes(*body.lattice, 10);
+  CompositeGrid all(*body.lattice, CompositeGrid::kRefineAll), boxes(*body.lattice, 10);
   all.begin(patch.middle);
   boxes.begin(patch.middle);
   press(all, patch, 25);
@@ -240,22 +240,22 @@ TEST(CompositeGrid, BoxesAreWithinAFewPartsInAHundredOfAllVoxels) {
 TEST(CompositeGrid, BoxesOfOtherShapes) {
   const int n = 60;
   const Patch patch{{n / 2, n / 2, n - 1}, 4, 2.0 * kSpacing};
-  const auto sides = [](const Place& p) { return p[0] == 0 || p[0] == 59 || p[1] == 0 || p[1] == 59; };
+  const auto sides = [](const Index3& p) { return p[0] == 0 || p[0] == 59 || p[1] == 0 || p[1] == 59; };
   EXPECT_LT(boxes_against_all(Body({n, n, n}, 0.1, everywhere, sides), patch), 0.05);
-  const auto notched = [](const Place& p) { return p[2] < 40 || p[0] < 42 || p[0] > 46; };
+  const auto notched = [](const Index3& p) { return p[2] < 40 || p[0] < 42 || p[0] > 46; };
   EXPECT_LT(boxes_against_all(Body({n, n, n}, 0.1, notched, below), patch), 0.05);
-  const auto hollow = [](const Place& p) { return std::hypot(p[0] - 30.0, p[2] - 22.0) > 9.0; };
+  const auto hollow = [](const Index3& p) { return std::hypot(p[0] - 30.0, p[2] - 22.0) > 9.0; };
   EXPECT_LT(boxes_against_all(Body({n, n, n}, 0.1, hollow, below), patch), 0.07);
 }
 
 TEST(CompositeGrid, BoxesOfSeveralTissues) {
   const int n = 64;
   const Patch patch{{n / 2, n / 2, n - 1}, 4, 2.5 * kSpacing};
-  const auto layers = [](const Place& p) { return p[2] < 32 ? 2 : p[2] < 60 ? 1 : 4; };
+  const auto layers = [](const Index3& p) { return p[2] < 32 ? 2 : p[2] < 60 ? 1 : 4; };
   EXPECT_LT(boxes_against_all(Body({n, n, n}, 0.1, everywhere, below, layers), patch), 0.04);
-  const auto lumps = [](const Place& p) { return (p[0] / 9 + p[1] / 7 + p[2] / 8) % 2 == 0 ? 1 : 5; };
+  const auto lumps = [](const Index3& p) { return (p[0] / 9 + p[1] / 7 + p[2] / 8) % 2 == 0 ? 1 : 5; };
   EXPECT_LT(boxes_against_all(Body({n, n, n}, 0.1, everywhere, below, lumps), patch), 0.05);
-  const auto core = [](const Place& p) {
+  const auto core = [](const Index3& p) {
     return std::hypot(p[0] - 31.5, p[1] - 31.5, p[2] - 40.0) < 12.0 ? 10 : 1;
   };
   EXPECT_LT(boxes_against_all(Body({n, n, n}, 0.1, everywhere, below, core), patch), 0.04);
@@ -267,7 +267,7 @@ TEST(CompositeGrid, BoxesOfTissuesThatDifferMuch) {
   const Patch patch{{n / 2, n / 2, n - 1}, 4, 2.5 * kSpacing};
   // Skin, fat, muscle.
   for (const auto& stiff : {std::array{31, 1, 3}, {100, 1, 10}, {1, 100, 10}, {3, 200, 11}}) {
-    const auto layers = [&](const Place& p) {
+    const auto layers = [&](const Index3& p) {
       return p[2] < 32 ? stiff[2] : p[2] < 60 ? stiff[1] : stiff[0];
     };
     EXPECT_LT(boxes_against_all(Body({n, n, n}, 0.1, everywhere, below, layers), patch), 0.05)
@@ -279,9 +279,9 @@ TEST(CompositeGrid, BoxesOfTissuesThatDifferMuch) {
 // after the other, side by side they bear together.
 TEST(CompositeGrid, CubesAreAsStiffAsTheirLayers) {
   const int n = 33;
-  const auto layers = [](const Place& p) { return p[2] <= 16 ? 1 : 4; };
+  const auto layers = [](const Index3& p) { return p[2] <= 16 ? 1 : 4; };
   const Body body({n, n, n}, 0.1, everywhere, below, layers);
-  voxel::TissueCells cells(*body.lattice);
+  voxel::CoarseMaterial cells(*body.lattice);
   cells.make_room(n + 1);
   for (const int m : {0, 1, 2, 3, 4, 5}) {
     const int edge = 1 << m, count = 32 / edge;
@@ -355,10 +355,10 @@ TEST(CompositeGrid, TheFinestBoxHasTheContactAtEachTick) {
   const Body body({n, n, n}, 0.1, everywhere, below);
   CompositeGrid grid(*body.lattice, 8);
   grid.begin({20, 20, n - 1});
-  const auto has_all_round = [&](const Place& at) {
+  const auto has_all_round = [&](const Index3& at) {
     for (int j = -3; j <= 3; ++j) {
       for (int i = -3; i <= 3; ++i) {
-        if (!grid.in_fine_box({at[0] + i, at[1] + j, at[2]})) return false;
+        if (!grid.in_fine_patch({at[0] + i, at[1] + j, at[2]})) return false;
       }
     }
     return true;
@@ -372,20 +372,20 @@ TEST(CompositeGrid, TheFinestBoxHasTheContactAtEachTick) {
 }
 
 TEST(CompositeGrid, SaysWhatIsInItsWay) {
-  const Place dims{40, 40, 40};
-  EXPECT_EQ(CompositeGrid::obstacle_to(*Body(dims, 0.1, everywhere, below).lattice), "");
-  const auto sheet = [](const Place& p) { return p[2] < 20 || p[0] == 20; };
-  EXPECT_NE(CompositeGrid::obstacle_to(*Body(dims, 0.1, sheet, below).lattice), "");
-  const auto specks = [](const Place& p) { return p[0] % 8 == 4 && p[1] % 8 == 4 && p[2] == 20; };
-  EXPECT_NE(CompositeGrid::obstacle_to(*Body(dims, 0.1, everywhere, specks).lattice), "");
-  const auto lump = [](const Place& p) { return p[0] > 10 && p[0] < 30 && p[1] > 10 && p[2] < 10; };
-  EXPECT_NE(CompositeGrid::obstacle_to(*Body(dims, 0.1, everywhere, lump).lattice), "");
+  const Index3 dims{40, 40, 40};
+  EXPECT_EQ(CompositeGrid::reason_unsuitable(*Body(dims, 0.1, everywhere, below).lattice), "");
+  const auto sheet = [](const Index3& p) { return p[2] < 20 || p[0] == 20; };
+  EXPECT_NE(CompositeGrid::reason_unsuitable(*Body(dims, 0.1, sheet, below).lattice), "");
+  const auto specks = [](const Index3& p) { return p[0] % 8 == 4 && p[1] % 8 == 4 && p[2] == 20; };
+  EXPECT_NE(CompositeGrid::reason_unsuitable(*Body(dims, 0.1, everywhere, specks).lattice), "");
+  const auto lump = [](const Index3& p) { return p[0] > 10 && p[0] < 30 && p[1] > 10 && p[2] < 10; };
+  EXPECT_NE(CompositeGrid::reason_unsuitable(*Body(dims, 0.1, everywhere, lump).lattice), "");
   voxel::LatticeOptions two = made_of(slack(0.1));
   voxel::LabelVolume volume = block(dims, glm::dvec3(kSpacing));
   std::fill_n(volume.labels.begin(), 40 * 40 * 20, std::uint8_t{2});
   const auto obstacle_with = [&](const LinkMaterial& other) {
     two.materials[2] = other;
-    return CompositeGrid::obstacle_to(Lattice(volume, two));
+    return CompositeGrid::reason_unsuitable(Lattice(volume, two));
   };
   LinkMaterial stiff = slack(0.1);
   stiff.young_Pa *= 5.0;
@@ -393,8 +393,8 @@ TEST(CompositeGrid, SaysWhatIsInItsWay) {
   EXPECT_NE(obstacle_with(slack(0.2)), "");
   stiff.poisson = 0.4;
   EXPECT_NE(obstacle_with(stiff), "");
-  const auto skin = [](const Place& p) { return p[2] == 39 ? 20 : 1; };
-  EXPECT_NE(CompositeGrid::obstacle_to(*Body(dims, 0.1, everywhere, below, skin).lattice), "");
+  const auto skin = [](const Index3& p) { return p[2] == 39 ? 20 : 1; };
+  EXPECT_NE(CompositeGrid::reason_unsuitable(*Body(dims, 0.1, everywhere, below, skin).lattice), "");
 }
 
 // ---- an object that has its contact there ----
