@@ -4,6 +4,13 @@
 set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 set(HYBRID_SANITIZE "" CACHE STRING "Sanitizers for every target, e.g. address,undefined")
 
+# The widest vectors of this machine, for sanitized builds: they cannot pick a width at start-up (simd_dispatch.h).
+if(HYBRID_SANITIZE)
+  include(CheckCXXSourceRuns)
+  check_cxx_source_runs("int main() { return __builtin_cpu_supports(\"avx2\") ? 0 : 1; }" HYBRID_HAS_AVX2)
+  check_cxx_source_runs("int main() { return __builtin_cpu_supports(\"x86-64-v4\") ? 0 : 1; }" HYBRID_HAS_512)
+endif()
+
 # hybrid_target(NAME): C++20, warnings as errors, folder path is include path.
 # -ffp-contract=off: a product and a sum stay two roundings, so release and debug, and every
 # processor, compute the same bits. -ffast-math is never used for the same reason.
@@ -19,6 +26,8 @@ function(hybrid_target name)
     target_compile_options(${name} PUBLIC -fsanitize=${HYBRID_SANITIZE} -fno-omit-frame-pointer
                                           -fno-sanitize-recover=all)
     target_link_options(${name} PUBLIC -fsanitize=${HYBRID_SANITIZE})
+    target_compile_definitions(${name} PRIVATE $<$<BOOL:${HYBRID_HAS_AVX2}>:HYBRID_SANITIZED_AVX2>
+                                               $<$<BOOL:${HYBRID_HAS_512}>:HYBRID_SANITIZED_512>)
   endif()
 endfunction()
 
@@ -35,9 +44,9 @@ endfunction()
 
 # hybrid_room(PART/ROOM SOURCES … LINKS … PRIVATE_LINKS … HEADERS NAME): the library of one folder, called hybrid::PART_ROOM, or
 # hybrid::ROOM where the part is hybrid itself. LINKS are rooms that its headers include; PRIVATE_LINKS are libraries of its
-# sources alone; HEADERS are precompiled ones.
+# sources alone; HEADERS are precompiled ones. COLD: nothing in it runs in a tick or is timed, so it is compiled with -O1.
 function(hybrid_room path)
-  cmake_parse_arguments(arg "" "HEADERS" "SOURCES;LINKS;PRIVATE_LINKS" ${ARGN})
+  cmake_parse_arguments(arg "COLD" "HEADERS" "SOURCES;LINKS;PRIVATE_LINKS" ${ARGN})
   string(REGEX REPLACE "^[a-z]+/(.*)$" "\\1" folder "${path}")
   string(REGEX REPLACE "^hybrid/(.*)$" "\\1" name "${path}")
   string(REPLACE "/" "_" name "${name}")
@@ -46,6 +55,9 @@ function(hybrid_room path)
   add_library(hybrid::${name} ALIAS hybrid_${name})
   hybrid_target(hybrid_${name})
   target_link_libraries(hybrid_${name} PUBLIC ${arg_LINKS} PRIVATE ${arg_PRIVATE_LINKS})
+  if(arg_COLD)
+    target_compile_options(hybrid_${name} PRIVATE $<$<CONFIG:Release>:-O1>)
+  endif()
   if(arg_HEADERS)
     target_precompile_headers(hybrid_${name} REUSE_FROM ${arg_HEADERS})
   endif()

@@ -6,20 +6,18 @@
 
 #include "voxel/chain/lanes8.h"
 
-// Not under sanitizers: they are told nothing of these.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__)
-#define HYBRID_LANES_512 1
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+#define HYBRID_LANES16 1
 #include <immintrin.h>
 
-#define HYBRID_FOR_512 __attribute__((target("arch=x86-64-v4")))
+#define HYBRID_TARGET_512 __attribute__((target("arch=x86-64-v4")))
 #define HYBRID_INLINE_512 inline __attribute__((always_inline, target("arch=x86-64-v4")))
 
-namespace voxel::lanes_512 {
+namespace voxel::lanes16 {
 
-using lanes::asked;
-using lanes::beyond;
-using lanes::kNever;
+using lanes8::required_value;
+using lanes8::exceeds;
+using lanes8::kNever;
 
 constexpr std::size_t kWidth = 16, kVectors = kRow / kWidth;
 using Floats = float __attribute__((vector_size(4 * kWidth)));
@@ -27,7 +25,7 @@ using Masks = __mmask16;
 constexpr Masks kAllLanes = 0xFFFF;  // (without a mask GCC 12 warns of its own headers)
 
 // Whether this processor has them, and the system saves them.
-inline bool has_lanes_512() {
+inline bool has_lanes16() {
   return __builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512bw") != 0 &&
          __builtin_cpu_supports("avx512dq") != 0 && __builtin_cpu_supports("avx512vl") != 0 &&
          __builtin_cpu_supports("avx512cd") != 0 && __builtin_cpu_supports("bmi2") != 0;
@@ -93,22 +91,22 @@ HYBRID_INLINE_512 void look_up(const Table& table, const Indices& indices, std::
 }
 
 template <bool kRaise>
-HYBRID_INLINE_512 void ask(const Floats& from, const Floats& limit, Floats& wanted) {
-  wanted = kRaise ? from - limit : from + limit;
+HYBRID_INLINE_512 void require(const Floats& from, const Floats& limit, Floats& required) {
+  required = kRaise ? from - limit : from + limit;
 }
 template <bool kRaise>
-HYBRID_INLINE_512 void take_stronger(const Floats& wanted, Floats& now) {
-  now = kRaise ? _mm512_maskz_max_ps(kAllLanes, wanted, now) : _mm512_maskz_min_ps(kAllLanes, wanted, now);
+HYBRID_INLINE_512 void take_stronger(const Floats& required, Floats& now) {
+  now = kRaise ? _mm512_maskz_max_ps(kAllLanes, required, now) : _mm512_maskz_min_ps(kAllLanes, required, now);
 }
 template <bool kRaise>
-HYBRID_INLINE_512 void compare(const Floats& wanted, const Floats& now, float margin, Masks& moves) {
-  moves = kRaise ? _mm512_cmp_ps_mask(wanted, now + margin, _CMP_GT_OQ)
-                 : _mm512_cmp_ps_mask(wanted, now - margin, _CMP_LT_OQ);
+HYBRID_INLINE_512 void compare(const Floats& required, const Floats& now, float margin, Masks& moves) {
+  moves = kRaise ? _mm512_cmp_ps_mask(required, now + margin, _CMP_GT_OQ)
+                 : _mm512_cmp_ps_mask(required, now - margin, _CMP_LT_OQ);
 }
 HYBRID_INLINE_512 Moved moved(const Masks& front, const Masks& back) {
   return static_cast<Moved>(kAnyMoved | ((front & 1U) != 0 ? kFirstMoved : 0) |
                             ((back >> (kWidth - 1)) != 0 ? kLastMoved : 0));
 }
 
-}  // namespace voxel::lanes_512
+}  // namespace voxel::lanes16
 #endif

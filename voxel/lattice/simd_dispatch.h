@@ -1,15 +1,23 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-// The same source for several widths of vector, chosen when the program starts. All give the same bits: the
-// operations are element by element, and contraction is off. Not under sanitizers, whose start-up does not
-// stand ifunc resolvers.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || defined(__clang__) || \
-    !defined(__x86_64__)
+// Compiles a function for several vector widths; the loader picks one when the program starts. All give the same
+// bits, because the operations are element-wise and contraction is off. The start-up of sanitizers does not support
+// ifunc resolvers, so there the build names the one width that its machine has (cmake/HybridTarget.cmake).
+#if defined(__clang__) || !defined(__x86_64__)
+#define HYBRID_WIDE
+#define HYBRID_WIDE_AND_MANY
+#elif defined(HYBRID_SANITIZED_512)
+#define HYBRID_WIDE __attribute__((target("avx2")))
+#define HYBRID_WIDE_AND_MANY __attribute__((target("arch=x86-64-v4")))
+#elif defined(HYBRID_SANITIZED_AVX2)
+#define HYBRID_WIDE __attribute__((target("avx2")))
+#define HYBRID_WIDE_AND_MANY __attribute__((target("avx2")))
+#elif defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define HYBRID_WIDE
 #define HYBRID_WIDE_AND_MANY
 #else
 #define HYBRID_WIDE __attribute__((target_clones("default", "avx2")))
-// Where twice as many registers (AVX-512 has 32) save what would go to the stack and back.
+// For functions that need many registers: AVX-512 has 32 and saves spills to the stack.
 #define HYBRID_WIDE_AND_MANY __attribute__((target_clones("default", "avx2", "arch=x86-64-v4")))
 #endif
