@@ -11,8 +11,8 @@
 namespace voxel {
 namespace {
 
-constexpr std::size_t kMostElements = std::size_t{1} << 29;  // the queue keeps a direction in three bits
-constexpr std::size_t kAhead = 24;                           // candidates
+constexpr std::size_t kMaxElements = std::size_t{1} << 29;  // the queue needs three bits for a direction
+constexpr std::size_t kPrefetchCandidates = 24;
 constexpr int kMapMargin = 8;  // cells of the map on each side of the object at rest
 
 bool same(const LinkMaterial& a, const LinkMaterial& b) {
@@ -26,15 +26,15 @@ double in_series(double a, double b) {
 
 }  // namespace
 
-ClassicObject::ClassicObject(const LabelVolume& volume, const LatticeOptions& options,
-                             const ClassicOptions& classic)
+ThesisChainMail::ThesisChainMail(const LabelVolume& volume, const LatticeOptions& options,
+                                 const ThesisChainMailOptions& classic)
     : options_(classic), spacing_m_(volume.spacing_m) {
   fill(volume, options);
   fill_anchors(volume, options);
   queue_.resize(std::size_t{1} << 16);
 }
 
-void ClassicObject::fill(const LabelVolume& volume, const LatticeOptions& options) {
+void ThesisChainMail::fill(const LabelVolume& volume, const LatticeOptions& options) {
   std::size_t cells = 1, voxels = 1;
   for (std::size_t d = 0; d < 3; ++d) {
     dims_[d] = volume.dims[d] + 2;
@@ -45,8 +45,8 @@ void ClassicObject::fill(const LabelVolume& volume, const LatticeOptions& option
   }
   if (volume.labels.size() != voxels)
     throw std::invalid_argument("a label volume must hold one label a voxel");
-  if (cells >= kMostElements) {
-    throw std::invalid_argument("the classic object holds at most " + std::to_string(kMostElements) +
+  if (cells >= kMaxElements) {
+    throw std::invalid_argument("the classic object holds at most " + std::to_string(kMaxElements) +
                                 " cells, and this one has " + std::to_string(cells) +
                                 "; give it a coarser spacing");
   }
@@ -82,7 +82,7 @@ void ClassicObject::fill(const LabelVolume& volume, const LatticeOptions& option
   }
 }
 
-void ClassicObject::fill_tables(const std::vector<LinkMaterial>& materials) {
+void ThesisChainMail::fill_tables(const std::vector<LinkMaterial>& materials) {
   classes_ = materials.size();
   const glm::dvec3 h = spacing_m_;
   for (std::uint32_t direction = 0; direction < kDirections; ++direction) {
@@ -90,7 +90,7 @@ void ClassicObject::fill_tables(const std::vector<LinkMaterial>& materials) {
     const double length = h[d], area = h.x * h.y * h.z / length;
     for (const LinkMaterial& a : materials) {
       for (const LinkMaterial& b : materials) {
-        // A link of two materials is half of each: limits are their means, springs stand in series.
+        // Half of a link belongs to each material: limits are means, springs are in series.
         const double shortest = (0.5 * (a.stretch_min + b.stretch_min) - 1.0) * length;
         const double longest = (0.5 * (a.stretch_max + b.stretch_max) - 1.0) * length;
         const double across = 0.5 * (a.shear + b.shear) * length;
@@ -115,7 +115,7 @@ void ClassicObject::fill_tables(const std::vector<LinkMaterial>& materials) {
   }
 }
 
-void ClassicObject::fill_anchors(const LabelVolume& volume, const LatticeOptions& options) {
+void ThesisChainMail::fill_anchors(const LabelVolume& volume, const LatticeOptions& options) {
   std::array<int, 3> low = volume.dims, high{-1, -1, -1};
   const auto each = [&volume](const auto& visit) {
     for (int k = 0; k < volume.dims[2]; ++k)
@@ -132,12 +132,12 @@ void ClassicObject::fill_anchors(const LabelVolume& volume, const LatticeOptions
   std::array<bool, 256> by_label{};
   for (const std::uint8_t label : options.anchor_labels) by_label[label] = true;
   each([&](const std::array<int, 3>& c) {
-    bool held = by_label[volume.labels[volume.index(c[0], c[1], c[2])]];
+    bool anchored_here = by_label[volume.labels[volume.index(c[0], c[1], c[2])]];
     for (const std::string& face : options.anchor_faces) {
       const auto d = static_cast<std::size_t>(face.at(1) - 'x');
-      held = held || c.at(d) == (face[0] == '-' ? low.at(d) : high.at(d));
+      anchored_here = anchored_here || c.at(d) == (face[0] == '-' ? low.at(d) : high.at(d));
     }
-    if (held) elements_[at(c[0], c[1], c[2])].info |= kAnchored;
+    if (anchored_here) elements_[at(c[0], c[1], c[2])].info |= kAnchored;
   });
   const auto nx = static_cast<std::size_t>(volume.dims[0]), ny = static_cast<std::size_t>(volume.dims[1]);
   for (const std::size_t index : options.anchor_voxels) {
@@ -147,35 +147,35 @@ void ClassicObject::fill_anchors(const LabelVolume& volume, const LatticeOptions
   }
 }
 
-ClassicObject::ElementId ClassicObject::at(int i, int j, int k) const {
+ThesisChainMail::ElementId ThesisChainMail::at(int i, int j, int k) const {
   return static_cast<ElementId>((i + 1) + (j + 1) * step_[2] + (k + 1) * step_[4]);
 }
 
-glm::dvec3 ClassicObject::rest(ElementId v) const {
+glm::dvec3 ThesisChainMail::rest(ElementId v) const {
   const auto nx = static_cast<ElementId>(dims_[0]), ny = static_cast<ElementId>(dims_[1]);
   const ElementId i = v % nx, j = v / nx % ny, k = v / (nx * ny);
   return spacing_m_ * (glm::dvec3(i, j, k) - 1.0);  // the padding comes first
 }
 
-void ClassicObject::grow_queue() {  // full: head and tail are the same place
+void ThesisChainMail::grow_queue() {  // the full queue has head == tail
   std::rotate(queue_.begin(), queue_.begin() + static_cast<std::ptrdiff_t>(head_), queue_.end());
   head_ = 0;
   tail_ = queue_.size();
   queue_.resize(2 * queue_.size());
 }
 
-// The neighbours of v, but the one it came from, become candidates.
-inline void ClassicObject::sponsor(ElementId v, std::uint32_t but) {
+// Makes the neighbours of v candidates, except the one in direction `except`.
+inline void ThesisChainMail::sponsor(ElementId v, std::uint32_t except) {
   for (std::uint32_t d = 0; d < kDirections; ++d) {
-    if (d == but) continue;
+    if (d == except) continue;
     queue_[tail_] = static_cast<std::uint32_t>(v + step_[d]) << 3U | d;
     tail_ = (tail_ + 1) & (queue_.size() - 1);
     if (tail_ == head_) grow_queue();
   }
 }
 
-void ClassicObject::spread() {
-  const std::uint64_t most = kMostRounds * kDirections * elements_.size();
+void ThesisChainMail::spread() {
+  const std::uint64_t most = kMaxRounds * kDirections * elements_.size();
   while (head_ != tail_) {
     if (candidates_ == most) {
       gave_up_ = true;
@@ -183,8 +183,8 @@ void ClassicObject::spread() {
       return;
     }
     const std::uint32_t entry = queue_[head_];
-    // What stands further back in the queue is fetched meanwhile; past its end, whatever was there before.
-    __builtin_prefetch(&elements_[queue_[(head_ + kAhead) & (queue_.size() - 1)] >> 3U]);
+    // Prefetches a later candidate; beyond the end of the queue a stale one, which is harmless.
+    __builtin_prefetch(&elements_[queue_[(head_ + kPrefetchCandidates) & (queue_.size() - 1)] >> 3U]);
     head_ = (head_ + 1) & (queue_.size() - 1);
     ++candidates_;
     const std::uint32_t direction = entry & 7U;
@@ -207,14 +207,14 @@ void ClassicObject::spread() {
   }
 }
 
-void ClassicObject::set(ElementId v, const std::array<float, 3>& u) {
+void ThesisChainMail::set(ElementId v, const std::array<float, 3>& u) {
   const bool mapped = !map_.empty() && (elements_[v].info & kSurface) != 0;
   if (mapped) leave_map(v);
   elements_[v].u = u;
   if (mapped) enter_in_map(v);
 }
 
-void ClassicObject::move(std::span<const ElementId> sources, std::span<const glm::vec3> moves) {
+void ThesisChainMail::move(std::span<const ElementId> sources, std::span<const glm::vec3> moves) {
   candidates_ = 0;
   gave_up_ = false;
   for (std::size_t i = 0; i < sources.size(); ++i) {
@@ -227,14 +227,14 @@ void ClassicObject::move(std::span<const ElementId> sources, std::span<const glm
   spread();
 }
 
-void ClassicObject::make_map() {
+void ThesisChainMail::make_map() {
   std::size_t cells = 1;
   for (const int n : dims_) cells *= static_cast<std::size_t>(n + 2 * kMapMargin);
   map_.assign(cells, kNone);
   for (const ElementId v : surface_) enter_in_map(v);
 }
 
-std::size_t ClassicObject::cell_of(const glm::dvec3& position) const {
+std::size_t ThesisChainMail::cell_of(const glm::dvec3& position) const {
   std::size_t cell = 0, stride = 1;
   for (int d = 0; d < 3; ++d) {
     const int n = dims_[static_cast<std::size_t>(d)] + 2 * kMapMargin;
@@ -246,17 +246,17 @@ std::size_t ClassicObject::cell_of(const glm::dvec3& position) const {
   return cell;
 }
 
-// A cell has room for one: who comes later is the one that is found there.
-void ClassicObject::enter_in_map(ElementId v) {
+// A cell holds one element: the last one that entered.
+void ThesisChainMail::enter_in_map(ElementId v) {
   const std::size_t cell = cell_of(position(v));
   if (cell < map_.size()) map_[cell] = v;
 }
-void ClassicObject::leave_map(ElementId v) {
+void ThesisChainMail::leave_map(ElementId v) {
   const std::size_t cell = cell_of(position(v));
   if (cell < map_.size() && map_[cell] == v) map_[cell] = kNone;
 }
 
-ClassicObject::ElementId ClassicObject::element_at(const glm::dvec3& point) const {
+ThesisChainMail::ElementId ThesisChainMail::element_at(const glm::dvec3& point) const {
   const std::size_t cell = cell_of(point);
   if (cell >= map_.size()) return kNone;
   if (map_[cell] != kNone) return map_[cell];
@@ -271,7 +271,7 @@ ClassicObject::ElementId ClassicObject::element_at(const glm::dvec3& point) cons
   return kNone;
 }
 
-ClassicObject::Touch ClassicObject::touch(const glm::dvec3& centre, double radius) {
+ThesisChainMail::Touch ThesisChainMail::touch(const glm::dvec3& centre, double radius) {
   if (map_.empty()) make_map();
   const int points = options_.six_points ? 7 : 1;
   for (int p = 0; p < points; ++p) {
@@ -292,7 +292,7 @@ ClassicObject::Touch ClassicObject::touch(const glm::dvec3& centre, double radiu
   return {};
 }
 
-glm::dvec3 ClassicObject::force_N(ElementId v) const {
+glm::dvec3 ThesisChainMail::force_N(ElementId v) const {
   glm::dvec3 force(0.0);
   for (std::uint32_t d = 0; d < kDirections; ++d) {
     ElementId a = v;
@@ -308,8 +308,8 @@ glm::dvec3 ClassicObject::force_N(ElementId v) const {
   return force;
 }
 
-std::array<float, 3> ClassicObject::relaxed(ElementId v) const {
-  // Each link asks the element to stand at its rest length from the other end: at the other's displacement.
+std::array<float, 3> ThesisChainMail::relaxed(ElementId v) const {
+  // A link at rest has equal displacements at both ends; so it requires the other end's displacement.
   const std::array<float, 3>& u = elements_[v].u;
   std::array<double, 3> asked{}, weight{};
   for (std::uint32_t d = 0; d < kDirections; ++d) {
@@ -317,7 +317,8 @@ std::array<float, 3> ClassicObject::relaxed(ElementId v) const {
     if (!filled(other)) continue;
     const std::array<float, 3>& k = springs_[pair(d, v, other)];
     for (std::size_t a = 0; a < 3; ++a) {
-      const double by = options_.movement == ClassicOptions::Movement::mean ? static_cast<double>(k[a]) : 1.0;
+      const double by =
+          options_.movement == ThesisChainMailOptions::Movement::mean ? static_cast<double>(k[a]) : 1.0;
       asked[a] += by * (static_cast<double>(elements_[other].u[a]) - static_cast<double>(u[a]));
       weight[a] += by;
     }
@@ -325,13 +326,13 @@ std::array<float, 3> ClassicObject::relaxed(ElementId v) const {
   std::array<float, 3> next = u;
   for (std::size_t a = 0; a < 3; ++a) {
     if (!(weight[a] > 0.0)) continue;
-    const double part = options_.movement == ClassicOptions::Movement::mean ? weight[a] : 1.0;
+    const double part = options_.movement == ThesisChainMailOptions::Movement::mean ? weight[a] : 1.0;
     next[a] = static_cast<float>(static_cast<double>(u[a]) + options_.damping * asked[a] / part);
   }
   return next;
 }
 
-void ClassicObject::relax_all() {
+void ThesisChainMail::relax_all() {
   relaxed_.resize(elements_.size());
   const auto moves = [this](ElementId v) { return (elements_[v].info & (kFilled | kAnchored)) == kFilled; };
   const auto count = static_cast<ElementId>(elements_.size());
@@ -343,28 +344,28 @@ void ClassicObject::relax_all() {
   }
 }
 
-void ClassicObject::relax_in_turn(std::uint64_t count) {
-  std::size_t seen = 0;
-  while (count > 0 && seen < elements_.size()) {
+void ThesisChainMail::relax_in_turn(std::uint64_t count) {
+  std::size_t skipped = 0;
+  while (count > 0 && skipped < elements_.size()) {
     if (++next_ >= elements_.size()) next_ = 0;
-    ++seen;
+    ++skipped;
     if ((elements_[next_].info & (kFilled | kAnchored)) != kFilled) continue;
     std::unique_lock<std::mutex> lock;
     if (options_.lock) lock = std::unique_lock(mutex_);
     set(next_, relaxed(next_));
-    seen = 0;
+    skipped = 0;
     --count;
   }
 }
 
-void ClassicObject::reset() {
+void ThesisChainMail::reset() {
   for (Element& e : elements_) {
     if (e.u != std::array<float, 3>{}) e.u = {};
   }
   if (!map_.empty()) make_map();
 }
 
-std::size_t ClassicObject::memory_bytes() const {
+std::size_t ThesisChainMail::memory_bytes() const {
   return elements_.size() * sizeof(Element) + limits_.size() * (sizeof(Limits) + sizeof(springs_[0])) +
          (surface_.size() + map_.size() + queue_.size()) * sizeof(ElementId) +
          relaxed_.size() * sizeof(relaxed_[0]);

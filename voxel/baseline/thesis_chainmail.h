@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The thesis's own soft object, kept as the baseline: for tests, `compare` and `bench`, never for a session.
+// The soft object of the thesis, kept as a baseline for tests, `compare` and `bench`; sessions do not use it.
 //
-// ChainMail by a first-come queue of candidates with their sponsors (Figs 6 to 9), a point and six-direction
-// contact check on a dense occupancy map (Fig 16), a force from the lines of links through the touched
-// element (getForce), and a relaxation in which each element goes where its links ask, damped or not. It is a
-// competent one: dense arrays, an element in 16 bytes, a queue that does not allocate once it has grown. Two
-// things it has that the thesis had not, so that neither rounding nor units count against it: displacements
-// from rest in place of absolute positions, and springs of the moduli of `Lattice` (whole ones everywhere:
-// that those on a border weigh half is not the thesis's).
+// ChainMail by a first-come queue of candidates with their sponsors (Figs 6 to 9), contact by a point and six
+// directions on a dense occupancy map (Fig 16), a force from the lines of links through the touched element
+// (getForce), and a relaxation in which each element moves as its links require, damped or not. The
+// implementation is efficient: dense arrays, 16 bytes per element, a queue that stops allocating once it has
+// grown. In two respects it differs from the thesis, so that neither rounding nor units count against it: it
+// stores displacements from rest instead of absolute positions, and its springs have the moduli of `Lattice`.
+// (Springs on a border are whole ones, as in the thesis; `Lattice` halves them.)
 #pragma once
 
 #include <array>
@@ -22,22 +22,24 @@
 
 namespace voxel {
 
-struct ClassicOptions {
-  // What an element moves by when it is relaxed, given what its links ask. `mean`: to their mean, weighted by
-  // stiffness. `sum`: by the sum of what each asks, as the thesis first had it (Fig 22).
+struct ThesisChainMailOptions {
+  // How far a relaxed element moves. `mean`: to the mean of the places that its links require, weighted by
+  // stiffness. `sum`: by the sum of the moves that its links require, as in the thesis's first version (Fig
+  // 22).
   enum class Movement : std::uint8_t { mean, sum } movement = Movement::mean;
-  double damping = 1.0;    // of that movement; 1: undamped. The thesis's remedy is "some small value"
+  double damping = 1.0;    // factor on that movement; 1: undamped. The thesis's remedy is "some small value"
   bool six_points = true;  // else the tool is a point (the thesis before Figs 20 and 21)
-  bool lock = false;       // the object is locked for each element that is looked at (Fig 23)
+  bool lock = false;       // locks the object for each element that is visited (Fig 23)
 };
 
-class ClassicObject {
+class ThesisChainMail {
  public:
   using ElementId = std::uint32_t;  // index into a grid with a border of one
 
-  // Throws std::invalid_argument: a volume whose labels do not fit its size, or of 2^29 cells and more. The
-  // materials are taken as valid: see Lattice, which checks them.
-  ClassicObject(const LabelVolume& volume, const LatticeOptions& options, const ClassicOptions& classic = {});
+  // Throws std::invalid_argument if the number of labels does not fit the volume's size, or if it has 2^29
+  // cells or more. Materials are not checked (Lattice checks them).
+  ThesisChainMail(const LabelVolume& volume, const LatticeOptions& options,
+                  const ThesisChainMailOptions& classic = {});
 
   [[nodiscard]] ElementId at(int i, int j, int k) const;  // voxel of the volume
   [[nodiscard]] bool filled(ElementId v) const { return (elements_[v].info & kFilled) != 0; }
@@ -50,31 +52,30 @@ class ClassicObject {
   [[nodiscard]] glm::dvec3 position(ElementId v) const { return rest(v) + glm::dvec3(displacement(v)); }
   [[nodiscard]] std::span<const ElementId> surface() const { return surface_; }
 
-  // Sources, moved by `moves` (unit: meter), and the chain after them. Anchored elements stay, and hand
-  // nothing on. The queue may grow, and so allocate. Sources that ask for what cannot be would chase one
-  // another for ever: after as many candidates as kMostRounds times all links the rest is dropped, and
-  // gave_up() says so.
+  // Moves the sources by `moves` (m), and the chain after them. Anchored elements stay and sponsor no
+  // candidates. The queue may grow, and so allocate. Incompatible sources would push one another endlessly:
+  // after kMaxRounds times as many candidates as there are links the rest is dropped, and gave_up() is true.
   void move(std::span<const ElementId> sources, std::span<const glm::vec3> moves);
   // Of the last move().
   [[nodiscard]] std::uint64_t candidates() const { return candidates_; }
   [[nodiscard]] bool gave_up() const { return gave_up_; }
-  static constexpr std::uint64_t kMostRounds = 20;
+  static constexpr std::uint64_t kMaxRounds = 20;
 
-  // One round of the haptic thread (Fig 16), volume frame: the tool's centre, then the six points a radius
-  // from it, are looked up; the first that finds an element, or a nearer one linked to that, takes it along.
-  // The others are ignored.
+  // One round of the haptic thread (Fig 16), volume frame (m). Looks up the tool's centre, then six points at
+  // `radius` from it. The first point that finds an element moves it, or a nearer element linked to it, to
+  // that point. The other points are ignored.
   struct Touch {
     bool contact = false;
     ElementId element = 0;
     glm::dvec3 force_N{0.0};
   };
   Touch touch(const glm::dvec3& centre, double radius);
-  // The thesis names getForce and its cost, linear in the object's dimension, and not its formula. Here: over
-  // the three lines of links through the element, each link's spring force by how far it is from rest.
+  // The thesis names getForce and its cost, which is linear in the object's dimension, but not its formula.
+  // Here it is the sum of the spring forces of all links on the three lines through the element.
   [[nodiscard]] glm::dvec3 force_N(ElementId v) const;
 
-  void relax_all();                         // every element once, all at once
-  void relax_in_turn(std::uint64_t count);  // the next so many, one after another (Fig 17)
+  void relax_all();                         // every element once, all at the same time (Jacobi)
+  void relax_in_turn(std::uint64_t count);  // the next `count` elements, one after another (Fig 17)
 
   void reset();  // to rest
   [[nodiscard]] std::size_t memory_bytes() const;
@@ -100,7 +101,7 @@ class ClassicObject {
   void fill(const LabelVolume& volume, const LatticeOptions& options);
   void fill_anchors(const LabelVolume& volume, const LatticeOptions& options);
   void fill_tables(const std::vector<LinkMaterial>& materials);
-  void sponsor(ElementId v, std::uint32_t but);
+  void sponsor(ElementId v, std::uint32_t except);
   void spread();
   void grow_queue();
   [[nodiscard]] std::array<float, 3> relaxed(ElementId v) const;
@@ -109,11 +110,11 @@ class ClassicObject {
   [[nodiscard]] std::size_t cell_of(const glm::dvec3& position) const;  // the map's size: outside of it
   void enter_in_map(ElementId v);
   void leave_map(ElementId v);
-  // Of the cell, or one in a cell beside it whose own half spacing reaches the point: without these every
-  // border between cells is a place to lose contact. kNone: none.
+  // The element in the point's cell, or one in a neighbouring cell within half a spacing of the point on each
+  // axis. Without neighbouring cells contact would be lost at every border between cells. kNone: no element.
   [[nodiscard]] ElementId element_at(const glm::dvec3& point) const;
 
-  ClassicOptions options_;
+  ThesisChainMailOptions options_;
   std::array<int, 3> dims_{};  // padded by one empty element on each side
   std::array<std::int64_t, kDirections> step_{};
   glm::dvec3 spacing_m_;
@@ -122,9 +123,9 @@ class ClassicObject {
   std::vector<Limits> limits_;                 // [direction][class of sponsor][class of candidate]
   std::vector<std::array<float, 3>> springs_;  // the same: stiffness on each axis (N/m)
   std::vector<ElementId> surface_;
-  std::vector<std::uint32_t> queue_;  // ring: candidate · 8 + direction from its sponsor
+  std::vector<std::uint32_t> queue_;  // ring buffer: candidate · 8 + direction from its sponsor
   std::size_t head_ = 0, tail_ = 0;
-  std::vector<ElementId> map_;                 // [cell] the element there; empty until the first touch()
+  std::vector<ElementId> map_;                 // [cell] an element in it; empty until the first touch()
   std::vector<std::array<float, 3>> relaxed_;  // of relax_all()
   ElementId next_ = 0;
   std::uint64_t candidates_ = 0;

@@ -9,7 +9,8 @@ namespace voxel {
 namespace {
 
 constexpr int kObstaclePasses = 8;
-// Three and a half roundings of a float, relative: with four, what else is rounded left links beyond by 6.7.
+// Margin of a wave (row_kernels.h) relative to the largest source: 3.5 roundings of a float. Other roundings
+// add to the violations that a wave leaves.
 constexpr float kMargin = 2.1e-7F;
 
 }  // namespace
@@ -46,31 +47,31 @@ void ChainMail::spread_moves(Displacement& state, std::span<const VoxelId> voxel
         raised_[raised++] = {u[v], v};
       else
         lowered_[lowered++] = {u[v], v};
-      u[v] -= move;  // until it is its turn, where no link is violated
+      u[v] -= move;  // back to where no link is violated; the wave moves it again
     }
-    // What an axis leaves of its share is the next one's.
-    const std::uint64_t share = std::max(kNearest, left_ / static_cast<std::uint64_t>(3 - axis));
+    // Axes share the budget; what one leaves goes to the next.
+    const std::uint64_t share = std::max(kNearest, budget_left_ / static_cast<std::uint64_t>(3 - axis));
     const std::uint64_t used = wave_.spread(u, axis, Way::raise, {raised_.data(), raised}, margin, share);
-    take(used);
-    take(wave_.spread(u, axis, Way::lower, {lowered_.data(), lowered}, margin,
-                      std::max(kNearest, share - std::min(share, used))));
+    spend(used);
+    spend(wave_.spread(u, axis, Way::lower, {lowered_.data(), lowered}, margin,
+                       std::max(kNearest, share - std::min(share, used))));
   }
 }
 
 void ChainMail::spread_waiting(Displacement& state) noexcept {
-  if (wave_.waiting_rows().empty() || left_ == 0) return;
+  if (wave_.waiting_rows().empty() || budget_left_ == 0) return;
   wave_.take_waiting();
   for (int axis = 0; axis < 3; ++axis) {
     float* const u = state.u[static_cast<std::size_t>(axis)].data();
     const float margin = margin_[static_cast<std::size_t>(axis)];
     for (const Way way : {Way::raise, Way::lower}) {
-      if (left_ > 0) take(wave_.spread_from_taken(u, axis, way, margin, left_));
+      if (budget_left_ > 0) spend(wave_.spread_from_taken(u, axis, way, margin, budget_left_));
     }
   }
   wave_.put_back();
 }
 
-// What went into its obstacle is put back onto the surface. True when any was.
+// Puts voxels that moved into their obstacles back onto the surface. True if there was any.
 bool ChainMail::stop_at(Displacement& state, std::span<const Obstacle> obstacles, Stop stop) noexcept {
   stopped_.clear();
   stops_.clear();
@@ -97,27 +98,29 @@ void ChainMail::settle(Displacement& state, std::span<const VoxelId> sources,
                        std::span<const glm::vec3> moves, std::span<const Obstacle> obstacles,
                        std::uint64_t budget) noexcept {
   wave_.begin();
-  left_ = budget;
+  budget_left_ = budget;
   if (wave_.waiting_rows().empty()) margin_.fill(0.0F);
   for (const VoxelId v : sources) wave_.note_moved(v / kRow);
-  // The sources move what hangs on them; anchors stay, and are remembered where they were pulled.
+  // Neighbours follow the sources. Anchors stay; rows with pulled anchors are noted.
   spread_moves(state, sources, moves);
-  give_way(state, obstacles);
+  enforce_obstacles_and_anchors(state, obstacles);
 }
 
 void ChainMail::finish(Displacement& state, std::span<const Obstacle> obstacles,
                        std::uint64_t budget) noexcept {
   wave_.begin();
-  left_ = budget;
-  give_way(state, obstacles);
+  budget_left_ = budget;
+  enforce_obstacles_and_anchors(state, obstacles);
 }
 
-void ChainMail::give_way(Displacement& state, std::span<const Obstacle> obstacles) noexcept {
+void ChainMail::enforce_obstacles_and_anchors(Displacement& state,
+                                              std::span<const Obstacle> obstacles) noexcept {
   spread_waiting(state);
 
-  // What the wave pushed into bone is stopped at its surface, and the tool's voxels give way. At rest
-  // everything is clear, so along an axis what is stopped never meets another obstacle; one oblique to the
-  // lattice moves its voxel on axes where it was in nobody's way, and may need to be asked again.
+  // Voxels that the wave pushed into obstacles are put back onto them, and the sources yield. An obstacle
+  // along an axis needs one pass: at rest all voxels are clear, so the correction leads away from other
+  // obstacles. A correction onto an oblique obstacle has components on other axes too, and may need further
+  // passes.
   bool clear = obstacles.empty();
   const auto stop = [&](Stop which) {
     for (int n = 0; n < kObstaclePasses && !clear; ++n) {
@@ -127,15 +130,15 @@ void ChainMail::give_way(Displacement& state, std::span<const Obstacle> obstacle
   };
   stopped_by_moving_ = false;
   stop(Stop::at_all);
-  // Squeezed between what moves and what stands, tissue stays out of what stands.
+  // Tissue squeezed between a moving and a standing obstacle stays out of the standing one.
   if (stopped_by_moving_) stop(Stop::at_standing);
 
-  // Anchors are mutually feasible, so what gives way to those that were pulled leaves no link violated.
+  // Anchors are mutually feasible, so waves from the pulled ones leave no link violated.
   for (int axis = 0; axis < 3 && wave_.pulled_any(); ++axis) {
     float* const u = state.u[static_cast<std::size_t>(axis)].data();
     const float margin = margin_[static_cast<std::size_t>(axis)];
     for (const Way way : {Way::raise, Way::lower})
-      take(wave_.spread_from_pulled(u, axis, way, margin, std::max(kNearest, left_)));
+      spend(wave_.spread_from_pulled(u, axis, way, margin, std::max(kNearest, budget_left_)));
   }
 }
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Exact ChainMail.
+// Exact ChainMail: difference constraints closed by shortest paths.
 //
-// Per axis the limits are difference constraints lo <= u(b) − u(a) <= hi on linked voxels, and the axes are
-// independent. After some voxels (the sources) moved, the new state is clamp(u, L, U), where
-// L(v) = max over sources of u(s) − dist(v→s), U(v) = min over sources of u(s) + dist(s→v), and dist is the
-// shortest path with an arc a→b of length hi and an arc b→a of length −lo for each link. It violates no link
-// if the old state violated none. First everything is raised, then everything lowered (see wave.h),
-// then what gives way to obstacles and to anchors does: two waves each. (A first-come queue, as in Gibson
-// 1997, ends elsewhere; Schill's violation order, 1998, is Dijkstra on these paths.)
+// On each axis the limits are difference constraints lo <= u(b) − u(a) <= hi on linked voxels, and the axes
+// are independent. After the sources have moved, the new state is clamp(u, L, U) with L(v) = max over sources
+// s of u(s) − dist(v→s) and U(v) = min over sources s of u(s) + dist(s→v). dist is the shortest path in a
+// graph with an arc a→b of length hi and an arc b→a of length −lo for each link. The new state violates no
+// link if the old one violated none. One wave raises and one lowers (wave.h); then two waves each for voxels
+// stopped by obstacles and for anchors. A first-come queue (Gibson 1997) gives a different result; Schill's
+// order of violation (1998) is Dijkstra's algorithm on these paths.
 #pragma once
 
 #include <algorithm>
@@ -27,39 +27,39 @@ class ChainMail {
  public:
   explicit ChainMail(const Lattice& lattice);
 
-  // Looks up what waves need of the lattice now, not when one first comes there.
+  // Looks up now what waves need of the lattice; else it is looked up at the first use.
   void prepare_all() noexcept { wave_.prepare_all(); }
 
   static constexpr std::uint64_t kUnlimited = ChainWave::kUnlimited;
-  // Row updates that a wave takes in any case, so that what is around a contact is always settled: a row is
-  // 32 voxels along x, and rows are taken in the order of their distance.
+  // Row updates that a wave may take in any case, so that the surroundings of a contact are always settled. A
+  // row is 32 voxels along x; rows are taken in the order of their distance.
   static constexpr std::uint64_t kNearest = 64;
 
-  // Restores every link after the voxels in `sources` were moved in `state` by `moves` (unit: meter), which
-  // violated no link before they were. Sources give way to anchors and obstacles (indexed by surface number;
-  // empty: none), those that cannot all be where they were put to one another: afterwards no link is violated
-  // by more than floats round, whatever was asked. Each source is given once; their order changes no bit.
-  // Rounding does not add up over calls: a link is violated by a few roundings of its ends at most, however
-  // old the state. Allocates nothing.
+  // Restores the limits of all links after the voxels `sources` were moved in `state` by `moves` (m). Before
+  // these moves no link was violated. Sources yield to anchors and obstacles (indexed by surface number;
+  // empty: none), and to one another if their places are infeasible together. Afterwards no link is violated
+  // by more than rounding, whatever the moves. Each source is given once; their order does not change a bit
+  // of the result. Rounding does not accumulate over calls: a link is violated by a few roundings of its ends
+  // at most. Allocates nothing.
   //
-  // With a budget (unit: row update, about 0.1 us), what is beyond it waits, and is finished by later calls
-  // of either function; waiting_rows() says where. Meanwhile a link is violated only if one of its ends is in
-  // a row that waits. What may move a voxel within the limits of its links, where these leave it any room,
-  // may do so in between. When nothing waits any more, no link is violated.
+  // Row updates beyond `budget` (one is about 0.1 us) wait, and later calls of either function finish them.
+  // Until then a link is violated only if one of its ends is in a row of waiting_rows(). Between calls voxels
+  // may be moved within the limits of their links, where these are feasible. When no row waits, no link is
+  // violated.
   void settle(Displacement& state, std::span<const VoxelId> sources, std::span<const glm::vec3> moves,
               std::span<const Obstacle> obstacles, std::uint64_t budget = kUnlimited) noexcept;
-  // Goes on with what waits.
+  // Continues with the waiting rows.
   void finish(Displacement& state, std::span<const Obstacle> obstacles,
               std::uint64_t budget = kUnlimited) noexcept;
   [[nodiscard]] std::span<const RowId> waiting_rows() const { return wave_.waiting_rows(); }
 
-  // Rows that moved in the last call, those of the sources included; each once.
-  [[nodiscard]] const RowRuns& moved_rows() const { return wave_.moved_rows(); }
-  // Voxels in these rows: what moved, and what stands beside it.
+  // Rows that moved in the last call, including those of the sources; each once.
+  [[nodiscard]] const RowSet& moved_rows() const { return wave_.moved_rows(); }
+  // Voxels in these rows, moved or not.
   [[nodiscard]] std::size_t moved_count() const noexcept;
   // Row updates of the last call.
   [[nodiscard]] std::uint64_t work() const { return wave_.work(); }
-  // The last wave came to anchors, which stay.
+  // Did the last call require an anchor to move? Anchors stay.
   [[nodiscard]] bool pulled_anchors() const { return wave_.pulled_any(); }
   [[nodiscard]] std::size_t memory_bytes() const;
 
@@ -69,23 +69,23 @@ class ChainMail {
   void spread_moves(Displacement& state, std::span<const VoxelId> voxels,
                     std::span<const glm::vec3> moves) noexcept;
   void spread_waiting(Displacement& state) noexcept;
-  void give_way(Displacement& state, std::span<const Obstacle> obstacles) noexcept;
-  void take(std::uint64_t updates) noexcept { left_ -= std::min(left_, updates); }
-  enum class Stop : std::uint8_t { at_all, at_standing };  // obstacles that move are passed over
+  void enforce_obstacles_and_anchors(Displacement& state, std::span<const Obstacle> obstacles) noexcept;
+  void spend(std::uint64_t updates) noexcept { budget_left_ -= std::min(budget_left_, updates); }
+  enum class Stop : std::uint8_t { at_all, at_standing };  // at_standing: ignores obstacles that move
   bool stop_at(Displacement& state, std::span<const Obstacle> obstacles, Stop stop) noexcept;
 
   const Lattice& lattice_;
   ChainWave wave_;
-  std::uint64_t left_ = 0;  // of the budget
-  std::array<float, 3>
-      margin_{};  // of this settle(), and those before of which something waits (unit: meter)
+  std::uint64_t budget_left_ = 0;
+  // [axis] of this settle(), and of earlier ones with rows that still wait (m).
+  std::array<float, 3> margin_{};
   LazyArray<ChainWave::Source> raised_, lowered_;
-  bool stopped_by_moving_ = false;  // since settle() began, some voxel was
-  LazyVector<VoxelId> stopped_;     // voxels put back onto their obstacles, and by how much
+  bool stopped_by_moving_ = false;  // a moving obstacle has stopped some voxel in this call
+  LazyVector<VoxelId> stopped_;     // voxels that were put back onto their obstacles, and the corrections (m)
   LazyVector<glm::vec3> stops_;
 };
 
-// The most by which any link exceeds its limits (unit: meter), over the whole lattice; for tests.
+// The most by which any link of the lattice exceeds its limits (m); for tests.
 double worst_violation(const Lattice& lattice, const Displacement& state);
 
 }  // namespace voxel

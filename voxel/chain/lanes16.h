@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The lanes of lanes8.h where registers hold sixteen values, and comparisons leave their answer in a
-// mask: half as many operations on a row, and whether any lane moves is one question. (Written as sixteen
-// lanes of the compiler's own vectors, sweeps took 1.8 times as long as with eight.) To the same bits.
+// The functions of lanes8.h for AVX-512: registers of 16 floats, and comparisons that give a mask. This
+// halves the operations on a row, and the test whether any lane moves is a single one. Results are the same
+// to the last bit. Written in intrinsics, because the compiler's generic vectors of 16 are slower than those
+// of 8.
 #pragma once
 
 #include "voxel/chain/lanes8.h"
@@ -15,16 +16,16 @@
 
 namespace voxel::lanes16 {
 
-using lanes8::required_value;
 using lanes8::exceeds;
-using lanes8::kNever;
+using lanes8::required_value;
 
 constexpr std::size_t kWidth = 16, kVectors = kRow / kWidth;
 using Floats = float __attribute__((vector_size(4 * kWidth)));
 using Masks = __mmask16;
-constexpr Masks kAllLanes = 0xFFFF;  // (without a mask GCC 12 warns of its own headers)
+constexpr Masks kAllLanes =
+    0xFFFF;  // masked forms throughout: GCC 12 warns of its headers for the unmasked ones
 
-// Whether this processor has them, and the system saves them.
+// Does this processor have AVX-512, and does the system save its registers?
 inline bool has_lanes16() {
   return __builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512bw") != 0 &&
          __builtin_cpu_supports("avx512dq") != 0 && __builtin_cpu_supports("avx512vl") != 0 &&
@@ -96,7 +97,8 @@ HYBRID_INLINE_512 void require(const Floats& from, const Floats& limit, Floats& 
 }
 template <bool kRaise>
 HYBRID_INLINE_512 void take_stronger(const Floats& required, Floats& now) {
-  now = kRaise ? _mm512_maskz_max_ps(kAllLanes, required, now) : _mm512_maskz_min_ps(kAllLanes, required, now);
+  now =
+      kRaise ? _mm512_maskz_max_ps(kAllLanes, required, now) : _mm512_maskz_min_ps(kAllLanes, required, now);
 }
 template <bool kRaise>
 HYBRID_INLINE_512 void compare(const Floats& required, const Floats& now, float margin, Masks& moves) {

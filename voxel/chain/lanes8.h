@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Rows of the chain in vectors: what row_kernels.cpp and sweep_kernel.cpp are written in. Not for others.
+// Rows of the chain in vectors of 8 floats, for row_kernels.cpp and sweep_kernel.cpp alone. lanes16.h has the
+// same functions for vectors of 16.
 #pragma once
 
 #include <array>
@@ -10,18 +11,16 @@
 #include "voxel/chain/row_kernels.h"
 #include "voxel/lattice/row_grid.h"
 
-// Inlined into both widths, whatever the compiler thinks of its size.
+// Inlined into the functions of every width, whatever their size.
 #define HYBRID_INLINE inline __attribute__((always_inline))
 
-namespace voxel::lanes {
+namespace voxel::lanes8 {
 
-// Vectors by name, since the compiler finds neither the look-up in registers nor the question whether any
-// lane moves in plain loops. Where registers are narrower, it takes them apart.
+// Explicit vectors: from plain loops the compiler generates neither table look-ups in registers nor the test
+// whether any lane moves. Where registers are narrower, it splits these vectors.
 constexpr std::size_t kWidth = 8, kVectors = kRow / kWidth;
 using Floats = float __attribute__((vector_size(4 * kWidth)));
 using Masks = std::int32_t __attribute__((vector_size(4 * kWidth)));
-
-constexpr float kNever = 1e30F;
 
 HYBRID_INLINE void load(const float* at, Floats& out) {
   std::memcpy(&out, at, sizeof out);
@@ -32,7 +31,7 @@ HYBRID_INLINE void store(const Floats& value, float* at) {
 HYBRID_INLINE void broadcast(float value, Floats& out) {
   out = Floats{} + value;
 }
-// Lanes n − kBy …, n + kBy …, kBy a power of two.
+// out: lanes n − kBy …, n + kBy … of two consecutive vectors; kBy is 0, 1, 2 or 4.
 template <std::size_t kBy>
 HYBRID_INLINE void shift_up_by(const Floats& before, const Floats& value, Floats& out) {
   static_assert(kBy < kWidth);
@@ -58,7 +57,7 @@ HYBRID_INLINE bool any_of(const Masks& mask) {
   return (halves[0] | halves[1] | halves[2] | halves[3]) != 0;
 }
 
-// A table of half limits, in registers where it fits.
+// A table of half limits; its first 16 values in registers.
 struct Table {
   const float* values;
   Floats low, high;
@@ -69,7 +68,7 @@ struct Table {
   }
 };
 
-// Labels of a row, as wide as what they stand for.
+// Labels of a row, widened to the width of the values that they look up.
 struct Indices {
   alignas(32) std::array<std::int32_t, kRow> at;
 
@@ -95,28 +94,28 @@ HYBRID_INLINE void look_up(const Table& table, const Indices& indices, std::size
 }
 
 template <bool kRaise>
-HYBRID_INLINE void ask(const Floats& from, const Floats& limit, Floats& wanted) {
-  wanted = kRaise ? from - limit : from + limit;
+HYBRID_INLINE void require(const Floats& from, const Floats& limit, Floats& required) {
+  required = kRaise ? from - limit : from + limit;
 }
 template <bool kRaise>
-HYBRID_INLINE void take_stronger(const Floats& wanted, Floats& now) {
-  now = (kRaise ? wanted > now : wanted < now) ? wanted : now;
+HYBRID_INLINE void take_stronger(const Floats& required, Floats& now) {
+  now = (kRaise ? required > now : required < now) ? required : now;
 }
 template <bool kRaise>
-HYBRID_INLINE float asked(float from, float limit) {
+HYBRID_INLINE float required_value(float from, float limit) {
   return kRaise ? from - limit : from + limit;
 }
 template <bool kRaise>
-HYBRID_INLINE bool beyond(float wanted, float now, float margin) {
-  return kRaise ? wanted > now + margin : wanted < now - margin;
+HYBRID_INLINE bool exceeds(float required, float now, float margin) {
+  return kRaise ? required > now + margin : required < now - margin;
 }
 template <bool kRaise>
-HYBRID_INLINE void compare(const Floats& wanted, const Floats& now, float margin, Masks& moves) {
-  moves = kRaise ? wanted > now + margin : wanted < now - margin;
+HYBRID_INLINE void compare(const Floats& required, const Floats& now, float margin, Masks& moves) {
+  moves = kRaise ? required > now + margin : required < now - margin;
 }
 
 HYBRID_INLINE Moved moved(const Masks& front, const Masks& back) {
   return static_cast<Moved>(kAnyMoved | (front[0] & kFirstMoved) | (back[kWidth - 1] & kLastMoved));
 }
 
-}  // namespace voxel::lanes
+}  // namespace voxel::lanes8

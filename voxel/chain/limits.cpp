@@ -13,7 +13,7 @@ ChainLimits::ChainLimits(const Lattice& lattice) {
   for (std::size_t d = 0; d < 3; ++d) {
     for (std::size_t label = 0; label < 256; ++label) {
       if (label == 0 || !used[label]) {
-        shorter_[d][label] = longer_[d][label] = across_[d][label] = kNoLink;
+        shorter_[d][label] = longer_[d][label] = across_[d][label] = kUnbounded;
         continue;
       }
       const auto l = static_cast<std::uint8_t>(label);
@@ -26,14 +26,14 @@ ChainLimits::ChainLimits(const Lattice& lattice) {
   }
 }
 
-ChainLimits::Pass ChainLimits::pass(int axis, Way way) const {
-  Pass result;
-  for (int n = 0; n < kWays; ++n) {
+ChainLimits::WaveLimits ChainLimits::for_wave(int axis, Way way) const {
+  WaveLimits result;
+  for (int n = 0; n < kDirections; ++n) {
     const auto d = static_cast<std::size_t>(n / 2);
     const bool up = n % 2 == 0;
-    // The upper neighbour of a raised voxel may come nearer, the lower one may fall behind; of a lowered one,
-    // the other way round.
-    const Halves& along = up == (way == Way::raise) ? shorter_[d] : longer_[d];
+    // Below a raised voxel the links get longer, above it they get shorter; round a lowered voxel the
+    // reverse.
+    const HalfLimitTable& along = up == (way == Way::raise) ? shorter_[d] : longer_[d];
     result.half[static_cast<std::size_t>(n)] = axis == n / 2 ? along.data() : across_[d].data();
   }
   return result;

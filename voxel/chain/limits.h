@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How far a voxel may stay behind a neighbour that was raised, or lowered, by the labels of the two.
+// Limits of the links for a wave, by the labels of their two voxels.
+//
+// The limit of a link between two labels is the mean of the limits within each (Lattice). So each label
+// contributes half a limit, and a wave needs tables by label alone.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <span>
 
+#include "voxel/chain/row_kernels.h"
 #include "voxel/lattice/lattice.h"
 
 namespace voxel {
@@ -13,33 +17,32 @@ namespace voxel {
 enum class Way : std::uint8_t { raise, lower };
 
 // Directions from a voxel: 2·d towards +, 2·d + 1 towards −.
-inline constexpr int kWays = 6;
+inline constexpr int kDirections = 6;
 
 class ChainLimits {
  public:
   explicit ChainLimits(const Lattice& lattice);
 
-  // The limit of a link is the mean of what its two labels allow (see Lattice), so each brings its half:
-  // [label], kNoLink where there is no voxel.
-  static constexpr float kNoLink = 1e30F;
-  using Halves = std::array<float, 256>;
+  // [label] (m); kUnbounded for label 0 and for labels that no voxel has.
+  using HalfLimitTable = std::array<float, 256>;
 
-  // On one axis: a voxel raised to u leaves its neighbour in direction n no lower than u − limit, one lowered
-  // to u no higher than u + limit, limit = half[n][its label] + half[n][the neighbour's label] >= 0.
-  struct Pass {
-    std::array<const float*, kWays> half{};
+  // Of a wave on one axis. A voxel raised to u requires its neighbour in direction n to be at least u −
+  // limit; one lowered to u requires at most u + limit. limit = half[n][label] + half[n][the neighbour's
+  // label] >= 0.
+  struct WaveLimits {
+    std::array<const float*, kDirections> half{};
 
     [[nodiscard]] float between(int n, std::uint8_t a, std::uint8_t b) const {
       const float* const table = half[static_cast<std::size_t>(n)];
       return table[a] + table[b];
     }
   };
-  [[nodiscard]] Pass pass(int axis, Way way) const;
-  // Registers of eight values that hold a table up to the greatest label in use: 1, 2, or 0 for more.
+  [[nodiscard]] WaveLimits for_wave(int axis, Way way) const;
+  // Registers of 8 floats that hold a table up to the largest label in use: 1, 2, or 0 for more.
   [[nodiscard]] int registers() const { return registers_; }
 
  private:
-  std::array<Halves, 3> shorter_{}, longer_{}, across_{};  // [d]
+  std::array<HalfLimitTable, 3> shorter_{}, longer_{}, across_{};  // [d]
   int registers_ = 1;
 };
 

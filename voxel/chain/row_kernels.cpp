@@ -9,9 +9,9 @@
 namespace voxel {
 namespace {
 
-using namespace lanes;
+using namespace lanes8;
 
-// `limit_of(i, out)`: limits of the links of lanes i to i + kWidth.
+// `limit_of(i, out)`: limits of the links of lanes i … i + kWidth − 1.
 template <bool kRaise, class LimitOf>
 HYBRID_INLINE Moved beside(const float* from, float* to, float margin, const LimitOf& limit_of) {
   std::array<Floats, kVectors> result;
@@ -20,14 +20,14 @@ HYBRID_INLINE Moved beside(const float* from, float* to, float margin, const Lim
 #pragma GCC unroll 4
   for (std::size_t n = 0; n < kVectors; ++n) {
     const std::size_t i = n * kWidth;
-    Floats own, now, limit, wanted;
+    Floats own, now, limit, required;
     load(from + i, own);
     load(to + i, now);
     limit_of(i, limit);
-    ask<kRaise>(own, limit, wanted);
-    compare<kRaise>(wanted, now, margin, moves[n]);
+    require<kRaise>(own, limit, required);
+    compare<kRaise>(required, now, margin, moves[n]);
     any |= moves[n];
-    result[n] = moves[n] ? wanted : now;
+    result[n] = moves[n] ? required : now;
   }
   if (!any_of(any)) return kNothingMoved;
 #pragma GCC unroll 4
@@ -35,10 +35,10 @@ HYBRID_INLINE Moved beside(const float* from, float* to, float margin, const Lim
   return moved(moves.front(), moves.back());
 }
 
-// Each voxel asks the next one on either side, all at once, until none moves: most rows have what they need
-// from the rows beside them, and a glance or two show it. A walk from end to end, one voxel after the other,
-// takes longer even where a wave runs all along the row. `below(i, out)`: limits between lanes i − 1 … and
-// i …, `above`: between i … and i + 1 ….
+// Relaxes all links of the row at once, until no voxel moves. Most rows have their values from the rows
+// beside them already, so one or two rounds suffice. A sequential pass from end to end takes longer even if a
+// wave runs along the whole row. `below(i, out)`: limits between lanes i − 1 … and i …, `above`: between i …
+// and i + 1 ….
 template <bool kRaise, class Below, class Above>
 HYBRID_INLINE Moved along(float* row, float margin, const Below& below, const Above& above) {
   std::array<Floats, kVectors> now, from_below, from_above;
@@ -48,10 +48,10 @@ HYBRID_INLINE Moved along(float* row, float margin, const Below& below, const Ab
     below(n * kWidth, from_below[n]);
     above(n * kWidth, from_above[n]);
   }
-  from_below[0][0] = from_above[kVectors - 1][kWidth - 1] = kNever;
+  from_below[0][0] = from_above[kVectors - 1][kWidth - 1] = kUnbounded;
   Masks front{}, back{};
   for (bool first = true;; first = false) {
-    std::array<Floats, kVectors> wanted;
+    std::array<Floats, kVectors> required;
     std::array<Masks, kVectors> moves;
     Masks any{};
 #pragma GCC unroll 4
@@ -59,10 +59,10 @@ HYBRID_INLINE Moved along(float* row, float margin, const Below& below, const Ab
       Floats left, right, a, b;
       shift_up_by<1>(now[n == 0 ? 0 : n - 1], now[n], left);
       shift_down_by<1>(now[n], now[n + 1 == kVectors ? n : n + 1], right);
-      ask<kRaise>(left, from_below[n], a);
-      ask<kRaise>(right, from_above[n], b);
-      wanted[n] = (kRaise ? a > b : a < b) ? a : b;
-      compare<kRaise>(wanted[n], now[n], margin, moves[n]);
+      require<kRaise>(left, from_below[n], a);
+      require<kRaise>(right, from_above[n], b);
+      required[n] = (kRaise ? a > b : a < b) ? a : b;
+      compare<kRaise>(required[n], now[n], margin, moves[n]);
       any |= moves[n];
     }
     if (!any_of(any)) {
@@ -72,7 +72,7 @@ HYBRID_INLINE Moved along(float* row, float margin, const Below& below, const Ab
     front |= moves[0];
     back |= moves[kVectors - 1];
 #pragma GCC unroll 4
-    for (std::size_t n = 0; n < kVectors; ++n) now[n] = moves[n] ? wanted[n] : now[n];
+    for (std::size_t n = 0; n < kVectors; ++n) now[n] = moves[n] ? required[n] : now[n];
   }
 #pragma GCC unroll 4
   for (std::size_t n = 0; n < kVectors; ++n) store(now[n], row + n * kWidth);
@@ -127,55 +127,57 @@ HYBRID_INLINE Moved along_alike(float* row, float up, float down, float margin) 
       [down](std::size_t, Floats & out) __attribute__((always_inline)) { out = Floats{} + down; });
 }
 
-// Half a row: a line of the cache, and a register where there are such.
+// Half a row: one cache line, and one register of AVX-512.
 constexpr int kHalf = kRow / 2;
-constexpr int kConeAhead = 12;    // rows
-constexpr float kSurely = 16.0F;  // margins
+constexpr int kConePrefetchRows = 12;
+// A row that is raised by so many margins is raised by clearly more than rounding.
+constexpr float kClearMargins = 16.0F;
 using Line = float __attribute__((vector_size(4 * kHalf)));
 HYBRID_INLINE float apex_at(const ConeColumn& c, int n) {
-  return static_cast<float>(c.apex + n * (n < 0 ? c.by_down : c.by_up));
+  return static_cast<float>(c.apex + n * (n < 0 ? c.slope_down : c.slope_up));
 }
 struct ConeHalf {
   Line fall;
-  int first;    // lane
-  float least;  // fall …
-  int nearest;  // … of this lane
+  int first;  // lane
+  float least_fall;
+  int nearest;  // lane with the least fall
   HYBRID_INLINE ConeHalf(const float* falls, int lane, int nearest_lane)
-      : first(lane), least(falls[nearest_lane]), nearest(nearest_lane) {
+      : first(lane), least_fall(falls[nearest_lane]), nearest(nearest_lane) {
     std::memcpy(&fall, falls + lane, sizeof fall);
   }
   template <bool kRaise>
-  [[nodiscard]] HYBRID_INLINE bool raised(const ConeColumn& c, int n, float margin) const {
-    return beyond<kRaise>(asked<kRaise>(apex_at(c, n), least), c.own[n * kRow + nearest], margin);
+  [[nodiscard]] HYBRID_INLINE bool is_raised(const ConeColumn& c, int n, float margin) const {
+    return exceeds<kRaise>(required_value<kRaise>(apex_at(c, n), least_fall), c.own[n * kRow + nearest],
+                           margin);
   }
-  // Rows that are raised one after the other, upwards or downwards. Where one is by more than roundings are,
-  // so are those before it.
+  // Number of consecutive rows raised, upwards or downwards from row 0. If a row is raised by clearly more
+  // than rounding, so are the rows before it; so the search may begin there.
   template <bool kRaise, int kStep>
-  [[nodiscard]] HYBRID_INLINE int end(const ConeColumn& c, int thought, int most, float margin) const {
-    int n = thought > most ? most : thought;
-    if (n < 0 || !raised<kRaise>(c, n * kStep, kSurely * margin)) n = 0;
-    while (n < most && raised<kRaise>(c, (n + 1) * kStep, margin)) ++n;
+  [[nodiscard]] HYBRID_INLINE int end(const ConeColumn& c, int guess, int most, float margin) const {
+    int n = guess > most ? most : guess;
+    if (n < 0 || !is_raised<kRaise>(c, n * kStep, kClearMargins * margin)) n = 0;
+    while (n < most && is_raised<kRaise>(c, (n + 1) * kStep, margin)) ++n;
     return n;
   }
   template <bool kRaise>
   HYBRID_INLINE void write(float* row, float apex) const {
     Line now;
     std::memcpy(&now, row + first, sizeof now);
-    const Line wanted = kRaise ? (Line{} + apex) - fall : (Line{} + apex) + fall;
-    now = (kRaise ? wanted > now : wanted < now) ? wanted : now;
+    const Line required = kRaise ? (Line{} + apex) - fall : (Line{} + apex) + fall;
+    now = (kRaise ? required > now : required < now) ? required : now;
     std::memcpy(row + first, &now, sizeof now);
   }
 };
 
-// From end to end, both halves of a row one after the other: so the processor sees what will be asked for.
-// (Outwards from the apex, up and then down, a wave took a sixth longer where it waits for memory.)
+// Rows are written from one end to the other, the two halves of a row together, so that the hardware
+// prefetcher can follow.
 template <bool kRaise>
 HYBRID_INLINE bool cone(const ConeColumn& c, float margin, ConeEnds& ends) {
   const bool in_upper = c.nearest >= kHalf;
   const ConeHalf near(c.fall, in_upper ? kHalf : 0, c.nearest),
       far(c.fall, in_upper ? 0 : kHalf, in_upper ? kHalf - 1 : kHalf);
-  if (!c.has_apex && !near.raised<kRaise>(c, 0, margin)) return false;
-  const bool both = far.raised<kRaise>(c, 0, margin);
+  if (!c.has_apex && !near.is_raised<kRaise>(c, 0, margin)) return false;
+  const bool both = far.is_raised<kRaise>(c, 0, margin);
   ends.near_up = near.end<kRaise, 1>(c, ends.near_up, c.up, margin);
   ends.near_down = near.end<kRaise, -1>(c, ends.near_down, c.down, margin);
   ends.far_up = both ? far.end<kRaise, 1>(c, ends.far_up, ends.near_up, margin) : 0;
@@ -193,7 +195,8 @@ HYBRID_INLINE bool cone(const ConeColumn& c, float margin, ConeEnds& ends) {
     float* const row = c.own + n * kRow;
     __builtin_prefetch(row + c.next, 1);
     __builtin_prefetch(row + c.next + kHalf, 1);
-    const float* const ahead = row + (both_to - n < kConeAhead ? both_to - n : kConeAhead) * kRow;
+    const float* const ahead =
+        row + (both_to - n < kConePrefetchRows ? both_to - n : kConePrefetchRows) * kRow;
     __builtin_prefetch(ahead, 1);
     __builtin_prefetch(ahead + kHalf, 1);
     const float apex = apex_at(c, n);

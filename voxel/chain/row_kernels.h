@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The innermost loops of the chain: one axis of one row at a time, in vectors. Each function comes as raise_…
-// and lower_…, its mirror image: raising, a voxel goes up to its neighbour minus the link's limit.
+// Innermost loops of the chain: relaxation of the links of one row on one axis, in vectors.
 //
-// `margin` (unit: meter) is the rounding that states carry from earlier waves: what asks for no more moves
-// nothing, or else every wave would mend the last bits of every one before it.
+// Relaxing a link (as in Bellman-Ford) moves one of its voxels as far as the link's limit requires, given the
+// other voxel. Each function comes as raise_… and as lower_…, its mirror image. Raising, a voxel goes up to
+// its neighbour's displacement minus the limit.
+//
+// `margin` (m) is the rounding that a state carries from earlier waves. A required move of no more than the
+// margin moves nothing. Otherwise every wave would correct the last bits of all waves before it.
 #pragma once
 
 #include <cstddef>
@@ -13,17 +16,20 @@
 
 namespace voxel {
 
+// A limit or displacement that never requires anything, such as the half limit of a label without voxels (m).
+inline constexpr float kUnbounded = 1e30F;
+
 // Half limits by label; see ChainLimits.
 struct HalfLimits {
   const float* table;
-  int registers;  // of eight values that hold the table up to its greatest label in use; 0: more than two
+  int registers;  // of 8 floats, for the values up to the largest label in use: 1, 2, or 0 for more
 };
 
-// What of a row moved: any voxel, its first one, its last one.
+// Bits: some voxel of the row moved, its first one did, its last one did.
 using Moved = std::uint8_t;
 inline constexpr Moved kNothingMoved = 0, kAnyMoved = 1, kFirstMoved = 2, kLastMoved = 4;
 
-// What row `from` asks of row `to` beside it; by labels, or with one limit for all links.
+// Relaxes the links from row `from` to row `to` beside it: by labels, or with one limit for all links.
 Moved raise_beside(const float* from, const std::uint8_t* from_labels, float* to,
                    const std::uint8_t* to_labels, const HalfLimits& half, float margin) noexcept;
 Moved lower_beside(const float* from, const std::uint8_t* from_labels, float* to,
@@ -31,9 +37,8 @@ Moved lower_beside(const float* from, const std::uint8_t* from_labels, float* to
 Moved raise_beside_alike(const float* from, float* to, float limit, float margin) noexcept;
 Moved lower_beside_alike(const float* from, float* to, float limit, float margin) noexcept;
 
-// What the voxels of a row ask of one another, until nothing is asked. `up`: limits of the links as the lower
-// voxel asks, `down`: as the upper one does. Reads, and makes no use of, one value and label beyond both
-// ends.
+// Relaxes the links within a row until no voxel moves. `up`: limits from the lower voxel of a link to the
+// upper one, `down`: the reverse. Reads one value and label beyond both ends, without effect.
 Moved raise_along(float* row, const std::uint8_t* labels, const HalfLimits& up, const HalfLimits& down,
                   float margin) noexcept;
 Moved lower_along(float* row, const std::uint8_t* labels, const HalfLimits& up, const HalfLimits& down,
@@ -41,27 +46,27 @@ Moved lower_along(float* row, const std::uint8_t* labels, const HalfLimits& up, 
 Moved raise_along_alike(float* row, float up, float down, float margin) noexcept;
 Moved lower_along_alike(float* row, float up, float down, float margin) noexcept;
 
-// A cone over one column of rows that follow one another in y: lane i of row n gets at least
-// apex + n·by − fall[i], raised; n is 0 in the row of the cone's apex, and it falls both ways from there.
-// Each half of a row is a line of the cache, and ends before the first row in which its lane with the least
-// fall is not raised by more than the margin. Where no link was violated, it is raised the less the further
-// it is from the apex, so that is looked for from where it is thought to be.
+// A cone over one column of rows consecutive in y. Raised, lane i of row n gets at least apex + n·slope −
+// fall[i]; n is 0 in the row of the cone's apex. The cone is written in half rows (a cache line each). Its
+// half rows end before the first row in which the lane with the least fall is not raised by more than the
+// margin. In a state without violations voxels are raised less the further they are from the apex; so the end
+// is searched from a guess.
 struct ConeColumn {
-  float* own = nullptr;     // row 0
-  std::ptrdiff_t next = 0;  // from a row to that which is asked for soon, and fetched meanwhile (unit: float)
-  int up = 0, down = 0;     // rows beyond the own one, at most
-  double apex = 0.0;        // how far the own row goes at most (unit: meter)
-  double by_up = 0.0, by_down = 0.0;  // a row: of those with n above 0, below
-  const float* fall = nullptr;        // [kRow]
-  int nearest = 0;                    // the lane with the least fall
-  bool has_apex = false;              // that lane's half of the own row counts as raised
+  float* own = nullptr;                     // row 0
+  std::ptrdiff_t next = 0;                  // offset from a row to the one to prefetch (floats)
+  int up = 0, down = 0;                     // most rows above and below row 0
+  double apex = 0.0;                        // the cone's value in row 0 without fall (m)
+  double slope_up = 0.0, slope_down = 0.0;  // change per row for n > 0, for n < 0 (m)
+  const float* fall = nullptr;              // [kRow] (m), >= 0
+  int nearest = 0;                          // the lane with the least fall
+  bool has_apex = false;                    // the half of row 0 with this lane counts as raised
 };
-// Rows that are raised beyond the own one: of the half with the nearest lane, of the other, at most as many.
-// In the same order first where they are thought to end.
+// Rows raised above and below row 0: in the half with the nearest lane, in the other half (never more). As
+// input: guesses of these numbers.
 struct ConeEnds {
   int near_up = 0, near_down = 0, far_up = 0, far_down = 0;
 };
-// False: the own row is not raised, and none is.
+// False if row 0 is not raised; then no row is.
 bool raise_cone(const ConeColumn& column, float margin, ConeEnds& ends) noexcept;
 bool lower_cone(const ConeColumn& column, float margin, ConeEnds& ends) noexcept;
 

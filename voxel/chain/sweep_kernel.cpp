@@ -1,62 +1,63 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// The sweep kernel, compiled once for each width of registers.
 #include "voxel/chain/sweep_kernel.h"
 
 #include <array>
 
-#include "voxel/chain/lanes8.h"
 #include "voxel/chain/lanes16.h"
+#include "voxel/chain/lanes8.h"
 #include "voxel/lattice/simd_dispatch.h"
 
 namespace voxel {
 namespace {
 
-namespace narrow {
-using namespace lanes;
+namespace kernel8 {
+using namespace lanes8;
 #include "voxel/chain/sweep_kernel_body.h"
-}  // namespace narrow
+}  // namespace kernel8
 
-#if HYBRID_LANES_512
+#if HYBRID_LANES16
 #undef HYBRID_INLINE
 #define HYBRID_INLINE HYBRID_INLINE_512
-namespace wide {
-using namespace lanes_512;
+namespace kernel16 {
+using namespace lanes16;
 #include "voxel/chain/sweep_kernel_body.h"
-}  // namespace wide
+}  // namespace kernel16
 
-HYBRID_FOR_512 Pulled raise_pulled_512(const Pull& pull, int most_visits, Moved* moves) {
-  return wide::pulled_by_registers<true>(pull, most_visits, moves);
+HYBRID_TARGET_512 SweepResult sweep_raise16(const SweepTask& task, int most_visits, Moved* moves) {
+  return kernel16::sweep_by_registers<true>(task, most_visits, moves);
 }
-HYBRID_FOR_512 Pulled lower_pulled_512(const Pull& pull, int most_visits, Moved* moves) {
-  return wide::pulled_by_registers<false>(pull, most_visits, moves);
+HYBRID_TARGET_512 SweepResult sweep_lower16(const SweepTask& task, int most_visits, Moved* moves) {
+  return kernel16::sweep_by_registers<false>(task, most_visits, moves);
 }
 #endif
 
-HYBRID_WIDE Pulled raise_pulled_narrow(const Pull& pull, int most_visits, Moved* moves) {
-  return narrow::pulled_by_registers<true>(pull, most_visits, moves);
+HYBRID_WIDE SweepResult sweep_raise8(const SweepTask& task, int most_visits, Moved* moves) {
+  return kernel8::sweep_by_registers<true>(task, most_visits, moves);
 }
-HYBRID_WIDE Pulled lower_pulled_narrow(const Pull& pull, int most_visits, Moved* moves) {
-  return narrow::pulled_by_registers<false>(pull, most_visits, moves);
+HYBRID_WIDE SweepResult sweep_lower8(const SweepTask& task, int most_visits, Moved* moves) {
+  return kernel8::sweep_by_registers<false>(task, most_visits, moves);
 }
 
-#if HYBRID_LANES_512
-constexpr std::array<PullKernels, 2> kKernels{PullKernels{raise_pulled_narrow, lower_pulled_narrow},
-                                              PullKernels{raise_pulled_512, lower_pulled_512}};
-const std::size_t kCount = lanes_512::has_lanes_512() ? 2 : 1;
+#if HYBRID_LANES16
+constexpr std::array<SweepKernels, 2> kKernels{SweepKernels{sweep_raise8, sweep_lower8},
+                                               SweepKernels{sweep_raise16, sweep_lower16}};
+const std::size_t kCount = lanes16::has_lanes16() ? 2 : 1;
 #else
-constexpr std::array<PullKernels, 1> kKernels{PullKernels{raise_pulled_narrow, lower_pulled_narrow}};
+constexpr std::array<SweepKernels, 1> kKernels{SweepKernels{sweep_raise8, sweep_lower8}};
 constexpr std::size_t kCount = 1;
 #endif
 
 }  // namespace
 
-std::span<const PullKernels> pull_kernels() noexcept {
+std::span<const SweepKernels> sweep_kernels() noexcept {
   return std::span(kKernels).first(kCount);
 }
-Pulled raise_pulled(const Pull& pull, int most_visits, Moved* moves) noexcept {
-  return kKernels[kCount - 1].raise(pull, most_visits, moves);
+SweepResult sweep_raise(const SweepTask& task, int most_visits, Moved* moves) noexcept {
+  return kKernels[kCount - 1].raise(task, most_visits, moves);
 }
-Pulled lower_pulled(const Pull& pull, int most_visits, Moved* moves) noexcept {
-  return kKernels[kCount - 1].lower(pull, most_visits, moves);
+SweepResult sweep_lower(const SweepTask& task, int most_visits, Moved* moves) noexcept {
+  return kKernels[kCount - 1].lower(task, most_visits, moves);
 }
 
 }  // namespace voxel

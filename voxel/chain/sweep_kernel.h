@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The innermost loop of a sweep: on one axis, rows that follow one another in y take what the rows before
-// them ask, those before in y, in z and in x.
+// Innermost loop of a sweep (wave_sweep.cpp): relaxes, on one axis, the links to a strip of rows from the
+// rows before them in y, z and x. A strip is a sequence of rows consecutive in y; "before" is the side that
+// the sweep comes from.
 #pragma once
 
 #include <cstddef>
@@ -11,75 +12,79 @@
 
 namespace voxel {
 
-// What decides how a row is dealt with, together, since one visit looks at several of them.
+inline constexpr std::uint32_t kFullRow = 0xFFFFFFFFU;  // RowInfo::free of a row of free voxels
+
+// All that decides how a row is relaxed, together, because a visit reads it of several rows.
 struct RowInfo {
-  std::uint32_t free = 0;     // bit of each lane
+  std::uint32_t free = 0;     // bit of each lane: a voxel that is not anchored
   std::uint8_t label = 0;     // of a row full of free voxels of one label; else 0
   bool filled : 1 = false;    // has any voxel
   bool anchored : 1 = false;  // has any anchor
-  bool known : 1 = false;     // all of this was looked up
+  bool known : 1 = false;     // the fields above are set
   std::uint8_t mark = 0;      // ChainWave::Mark bits
-  std::uint8_t waits = 0;     // bit of each wave that is still to ask from here; ChainWave::kListed
+  std::uint8_t waits = 0;     // bit of each wave that has yet to relax this row's links; ChainWave::kListed
 };
 static_assert(sizeof(RowInfo) == 8);
 
-// Rows that the same number of rows separates from one another.
+// Rows at equal distances in memory; each pointer is to the first of them.
 struct RowStrip {
-  float* u = nullptr;  // null: none
+  float* u = nullptr;  // null: no rows
   const std::uint8_t* labels = nullptr;
   const RowInfo* info = nullptr;
 };
 
-// Half limits by label, of links as the row asks that the wave comes from, and as it is asked in turn.
-struct PullHalves {
+// Half limits by label, of links into the row from the row before it, and of the same links in reverse.
+struct LinkHalves {
   const float* in = nullptr;
   const float* back = nullptr;
 };
 
-// What a row that is asked is asked by: bits.
-enum Asked : std::uint8_t {
-  kFromBelowY = 1,  // the row before it in y; the one after it; and so on
-  kFromAboveY = 2,
+// Bits: the neighbours of a row that have moved and whose links to the row are yet to be relaxed.
+enum Pending : std::uint8_t {
+  kFromBelowY = 1,  // the neighbour at y − 1
+  kFromAboveY = 2,  // the neighbour at y + 1; likewise for x and z
   kFromBelowX = 4,
   kFromAboveX = 8,
   kFromBelowZ = 16,
   kFromAboveZ = 32,
 };
 
-struct Pull {
-  RowStrip own, z, x;  // z.u, x.u null: nobody asks from there
-  std::uint8_t* asked = nullptr;
-  std::uint8_t by = 0;  // rows that have one of these bits are dealt with, and lose them …
-  int step = 1;         // rows from one to the next: 1 or -1
-  int count = 0;        // … among so many, and those that come after a row that moved
-  int most = 0;         // but no row beyond these
-  bool y = true;        // do the rows before them in y ask, too
-  PullHalves along_y, along_z, along_x;
-  const float* up = nullptr;  // between the row's own voxels, as in raise_along()
+struct SweepTask {
+  RowStrip own, z, x;  // the strip, and the strips before it in z and x (u null: none)
+  std::uint8_t* pending = nullptr;
+  // Rows with one of these Pending bits are relaxed, among the first `count`; and rows that follow a row that
+  // moved, among the first `max_rows`. Relaxed rows lose the bits.
+  std::uint8_t mask = 0;
+  int step = 1;  // rows from one to the next: 1 or −1
+  int count = 0;
+  int max_rows = 0;
+  bool y = true;  // relax the links from the rows before them in y, too
+  LinkHalves along_y, along_z, along_x;
+  const float* up = nullptr;  // within the row, as in raise_along()
   const float* down = nullptr;
   int registers = 1;
-  bool x_above = false;  // the row in x comes after the last voxel, not before the first one
+  bool x_above = false;  // the strip before in x is on the side of the last lane, not of the first
   float margin = 0.0F;
 };
 
-// Further bits of Moved: it moved so far that the row before it in y, in z, in x is asked in turn.
-inline constexpr Moved kAsksY = 8, kAsksZ = 16, kAsksX = 32;
+// Further bits of Moved: the row's move requires a move of the row before it in y, in z, in x.
+inline constexpr Moved kRevisitY = 8, kRevisitZ = 16, kRevisitX = 32;
 
-struct Pulled {
-  int end = 0;     // rows that need not be looked at again
-  int visits = 0;  // those that were dealt with
+struct SweepResult {
+  int end = 0;     // rows that are done
+  int visits = 0;  // rows that were relaxed
 };
-// `moves`: what of each of these rows moved. Ends early before a row that has an anchor, or is asked by one
-// that has, and after `most_visits`.
-Pulled raise_pulled(const Pull& pull, int most_visits, Moved* moves) noexcept;
-Pulled lower_pulled(const Pull& pull, int most_visits, Moved* moves) noexcept;
+// moves[n]: Moved bits of row n, for the rows up to `end`. Ends early before a row that has an anchor or is
+// beside a row with one, and after `most_visits` visits.
+SweepResult sweep_raise(const SweepTask& task, int most_visits, Moved* moves) noexcept;
+SweepResult sweep_lower(const SweepTask& task, int most_visits, Moved* moves) noexcept;
 
-// The same for each width of registers that this processor has, narrow ones first: those above are the last.
-// All give the same bits.
-struct PullKernels {
-  Pulled (*raise)(const Pull&, int, Moved*);
-  Pulled (*lower)(const Pull&, int, Moved*);
+// The same for each register width that this processor has, in ascending order; the functions above use the
+// last. All give the same bits.
+struct SweepKernels {
+  SweepResult (*raise)(const SweepTask&, int, Moved*);
+  SweepResult (*lower)(const SweepTask&, int, Moved*);
 };
-std::span<const PullKernels> pull_kernels() noexcept;
+std::span<const SweepKernels> sweep_kernels() noexcept;
 
 }  // namespace voxel

@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The innermost loop of a sweep, in whatever lanes the place that includes this has named: sweep_kernel.cpp
-// does so once for each width of registers. Hence no guard, and no namespace of its own.
+// Innermost loop of a sweep, written in the functions of lanes8.h or lanes16.h. sweep_kernel.cpp includes
+// this file once for each width, within a namespace that uses one of the two. Hence it has no guard and no
+// namespace.
 // NOLINTBEGIN(llvm-header-guard)
 
 using RowValues = std::array<Floats, kVectors>;
 
-// That which moves nothing.
-constexpr float nobody_asks(bool raise) {
-  return raise ? -kNever : kNever;
+// A displacement that requires no move.
+constexpr float no_requirement(bool raise) {
+  return raise ? -kUnbounded : kUnbounded;
 }
 
-// Lanes n − kStep … of a row, 0 < kStep < kRow, `filler` where that is before its first.
+// out[n] = row[n − kStep] by lane, 0 < kStep < kRow; `filler` before the first lane.
 template <std::size_t kStep>
 HYBRID_INLINE void shift_row_up(const RowValues& row, const Floats& filler, RowValues& out) {
   constexpr std::size_t whole = kStep / kWidth, k = kStep % kWidth;
@@ -42,35 +43,35 @@ HYBRID_INLINE void shift_row(const RowValues& row, float beyond, RowValues& out)
     shift_row_down<kStep>(row, filler, out);
 }
 
-// Each lane's, and that of `kStep` lanes before it (up) or after it (down).
+// Limits of paths twice as long: each lane's plus that of the lane kStep before it (up) or after it (down).
 template <bool kUp, std::size_t kStep>
 HYBRID_INLINE void double_limits(RowValues& limit) {
   RowValues further;
-  shift_row<kUp, kStep>(limit, kNever, further);
+  shift_row<kUp, kStep>(limit, kUnbounded, further);
 #pragma GCC unroll 4
   for (std::size_t n = 0; n < kVectors; ++n) limit[n] += further[n];
 }
 template <bool kRaise, bool kUp, std::size_t kStep>
 HYBRID_INLINE void double_path(RowValues& now, RowValues& limit) {
   RowValues from;
-  shift_row<kUp, kStep>(now, nobody_asks(kRaise), from);
+  shift_row<kUp, kStep>(now, no_requirement(kRaise), from);
 #pragma GCC unroll 4
   for (std::size_t n = 0; n < kVectors; ++n) {
-    Floats wanted;
-    ask<kRaise>(from[n], limit[n], wanted);
-    take_stronger<kRaise>(wanted, now[n]);
+    Floats required;
+    require<kRaise>(from[n], limit[n], required);
+    take_stronger<kRaise>(required, now[n]);
   }
   if (kStep < 16) double_limits<kUp, kStep>(limit);
 }
 
-// All paths within a row, by doubling: over one link, over two, four, … Five steps, where one link at a time
-// takes up to 31. Those that lead up and those that lead down are independent: who goes one way and back
-// arrives with less than who goes there at once. (One after the other, rows by label took a sixth longer:
-// each step waits for the one before.) `up`: limits between lanes n − 1 and n, `down`: between n and n + 1.
-// False, and `wanted` of no use, where no voxel asks one beside it.
+// All paths within a row, by doubling their length: over one link, two, four, … Five steps suffice, where
+// single links would take up to 31. Paths upwards and downwards are independent, because a detour is never
+// stronger than the direct path. They are interleaved, because each step waits for the one before. `up`:
+// limits between lanes n − 1 and n, `down`: between n and n + 1. False, and `required` undefined, if no voxel
+// requires a move of its neighbour.
 template <bool kRaise>
 HYBRID_INLINE bool all_paths(const RowValues& now, RowValues& up, RowValues& down, float margin,
-                             RowValues& wanted) {
+                             RowValues& required) {
   Masks any{};
   RowValues from_below, from_above;
   shift_row_up<1>(now, now[0], from_below);
@@ -78,11 +79,11 @@ HYBRID_INLINE bool all_paths(const RowValues& now, RowValues& up, RowValues& dow
 #pragma GCC unroll 4
   for (std::size_t n = 0; n < kVectors; ++n) {
     Masks moves;
-    ask<kRaise>(from_below[n], up[n], from_below[n]);
-    ask<kRaise>(from_above[n], down[n], from_above[n]);
-    wanted[n] = from_above[n];
-    take_stronger<kRaise>(from_below[n], wanted[n]);
-    compare<kRaise>(wanted[n], now[n], margin, moves);
+    require<kRaise>(from_below[n], up[n], from_below[n]);
+    require<kRaise>(from_above[n], down[n], from_above[n]);
+    required[n] = from_above[n];
+    take_stronger<kRaise>(from_below[n], required[n]);
+    compare<kRaise>(required[n], now[n], margin, moves);
     any |= moves;
   }
   if (!any_of(any)) return false;
@@ -103,8 +104,8 @@ HYBRID_INLINE bool all_paths(const RowValues& now, RowValues& up, RowValues& dow
   double_path<kRaise, false, 16>(from_above, down);
 #pragma GCC unroll 4
   for (std::size_t n = 0; n < kVectors; ++n) {
-    wanted[n] = from_below[n];
-    take_stronger<kRaise>(from_above[n], wanted[n]);
+    required[n] = from_below[n];
+    take_stronger<kRaise>(from_above[n], required[n]);
   }
   return true;
 }
@@ -125,35 +126,35 @@ HYBRID_INLINE void look_up_row(const float* half, const Indices& labels, RowValu
 }
 
 template <bool kRaise, class Limits>
-HYBRID_INLINE void take_from(const RowValues& from, const Limits& limits, RowValues& now) {
+HYBRID_INLINE void relax_from(const RowValues& from, const Limits& limits, RowValues& now) {
 #pragma GCC unroll 4
   for (std::size_t n = 0; n < kVectors; ++n) {
     Floats limit, by;
     limits.in(n, limit);
-    ask<kRaise>(from[n], limit, by);
+    require<kRaise>(from[n], limit, by);
     take_stronger<kRaise>(by, now[n]);
   }
 }
 template <bool kRaise, class Limits>
-HYBRID_INLINE void ask_back(const RowValues& now, Limits& limits, const RowValues& from, float margin,
-                            Masks& any) {
+HYBRID_INLINE void find_revisits(const RowValues& now, Limits& limits, const RowValues& from, float margin,
+                                 Masks& any) {
   limits.turn();
 #pragma GCC unroll 4
   for (std::size_t n = 0; n < kVectors; ++n) {
     Floats limit, by;
     Masks moves;
     limits.back(n, limit);
-    ask<kRaise>(now[n], limit, by);
+    require<kRaise>(now[n], limit, by);
     compare<kRaise>(by, from[n], margin, moves);
     any |= moves;
   }
 }
 
-// Limits of the links between a row and the one before it, and as that one is asked in turn: where both are
-// of one label each, and by the labels of each voxel.
+// Limits of the links between a row and the row before it, into the row (in) and in reverse (back, after
+// turn()): AlikeLimits if both rows have one label each, LabelLimits by the label of each voxel.
 struct AlikeLimits {
   Floats in_, back_;
-  HYBRID_INLINE AlikeLimits(const PullHalves& half, std::uint8_t own, std::uint8_t other) {
+  HYBRID_INLINE AlikeLimits(const LinkHalves& half, std::uint8_t own, std::uint8_t other) {
     broadcast(half.in[own] + half.in[other], in_);
     broadcast(half.back[own] + half.back[other], back_);
   }
@@ -164,11 +165,11 @@ struct AlikeLimits {
 
 template <int kRegisters>
 struct LabelLimits {
-  const PullHalves& half;
+  const LinkHalves& half;
   const Indices& own;
   Indices other;
   RowValues now;
-  HYBRID_INLINE LabelLimits(const PullHalves& h, const Indices& own_labels, const std::uint8_t* labels)
+  HYBRID_INLINE LabelLimits(const LinkHalves& h, const Indices& own_labels, const std::uint8_t* labels)
       : half(h), own(own_labels), other(labels) {
     look_up(half.in);
   }
@@ -191,8 +192,8 @@ struct LabelLimits {
 };
 
 template <bool kRaise, int kRegisters>
-HYBRID_INLINE void settle_along(const Pull& p, std::uint8_t label, const std::uint8_t* labels,
-                                const RowValues& before, RowValues& now, std::array<Masks, kVectors>& moves) {
+HYBRID_INLINE void relax_along(const SweepTask& p, std::uint8_t label, const std::uint8_t* labels,
+                               const RowValues& before, RowValues& now, std::array<Masks, kVectors>& moves) {
   RowValues up, down;
   if (label != 0) {
     fill(p.up[label] + p.up[label], up);
@@ -209,56 +210,56 @@ HYBRID_INLINE void settle_along(const Pull& p, std::uint8_t label, const std::ui
 #pragma GCC unroll 4
     for (std::size_t n = 0; n < kVectors; ++n) down[n] = half[n] + other[n];
   }
-  up[0][0] = down[kVectors - 1][kWidth - 1] = kNever;
-  RowValues wanted;
-  if (!all_paths<kRaise>(now, up, down, p.margin, wanted)) return;
+  up[0][0] = down[kVectors - 1][kWidth - 1] = kUnbounded;
+  RowValues required;
+  if (!all_paths<kRaise>(now, up, down, p.margin, required)) return;
 #pragma GCC unroll 4
   for (std::size_t n = 0; n < kVectors; ++n) {
     Masks more;
-    compare<kRaise>(wanted[n], now[n], p.margin, more);
-    select(more, wanted[n], now[n], now[n]);
+    compare<kRaise>(required[n], now[n], p.margin, more);
+    select(more, required[n], now[n], now[n]);
     compare<kRaise>(now[n], before[n], p.margin, moves[n]);
   }
 }
 
-// A row that is being dealt with, and the end of one in x.
+// The row that is being relaxed, and the end of the row before it in x.
 struct RowNow {
   float* u;
   const std::uint8_t* labels;
-  std::uint8_t label;  // 0 where it is by label
+  std::uint8_t label;  // 0: voxel by voxel
   bool has_y, has_z, has_x, closed;
   const float* x;
   std::uint8_t x_label;
 };
 
 template <bool kRaise>
-HYBRID_INLINE bool asks_x(const Pull& p, const RowNow& row) {
+HYBRID_INLINE bool revisits_x(const SweepTask& p, const RowNow& row) {
   const std::size_t end = p.x_above ? kRow - 1 : 0;
   const float* const half = p.along_x.back;
-  return beyond<kRaise>(asked<kRaise>(row.u[end], half[row.labels[end]] + half[row.x_label]), *row.x,
-                        p.margin);
+  return exceeds<kRaise>(required_value<kRaise>(row.u[end], half[row.labels[end]] + half[row.x_label]),
+                         *row.x, p.margin);
 }
 
-// `y`: the row before in y; the row itself afterwards, where it moved.
+// `y`: the row before in y; becomes the row itself if it moved.
 template <bool kRaise, int kRegisters, class Limits>
-HYBRID_INLINE Moved pull_row(const Pull& p, const RowNow& row, Limits& by_y, Limits& by_z, const RowValues& z,
-                             RowValues& y) {
+HYBRID_INLINE Moved sweep_row(const SweepTask& p, const RowNow& row, Limits& by_y, Limits& by_z,
+                              const RowValues& z, RowValues& y) {
   const std::size_t end = p.x_above ? kRow - 1 : 0;
   RowValues before, now;
   load_row(row.u, before);
   now = before;
-  take_from<kRaise>(y, by_y, now);
-  take_from<kRaise>(z, by_z, now);
+  relax_from<kRaise>(y, by_y, now);
+  relax_from<kRaise>(z, by_z, now);
   bool closed = row.closed;
   if (row.has_x) {
     const float* const half = p.along_x.in;
-    const float wanted = asked<kRaise>(*row.x, half[row.labels[end]] + half[row.x_label]);
-    if (beyond<kRaise>(wanted, p.x_above ? now[kVectors - 1][kWidth - 1] : now[0][0], p.margin)) {
+    const float required = required_value<kRaise>(*row.x, half[row.labels[end]] + half[row.x_label]);
+    if (exceeds<kRaise>(required, p.x_above ? now[kVectors - 1][kWidth - 1] : now[0][0], p.margin)) {
       closed = false;
       if (p.x_above)
-        now[kVectors - 1][kWidth - 1] = wanted;
+        now[kVectors - 1][kWidth - 1] = required;
       else
-        now[0][0] = wanted;
+        now[0][0] = required;
     }
   }
   std::array<Masks, kVectors> moves;
@@ -270,30 +271,30 @@ HYBRID_INLINE Moved pull_row(const Pull& p, const RowNow& row, Limits& by_y, Lim
     select(moves[n], now[n], before[n], now[n]);
   }
   if (!any_of(any)) return kNothingMoved;
-  if (!closed) settle_along<kRaise, kRegisters>(p, row.label, row.labels, before, now, moves);
+  if (!closed) relax_along<kRaise, kRegisters>(p, row.label, row.labels, before, now, moves);
 #pragma GCC unroll 4
   for (std::size_t n = 0; n < kVectors; ++n) store(now[n], row.u + n * kWidth);
   Moved what = moved(moves.front(), moves.back());
   Masks back_y{}, back_z{};
-  ask_back<kRaise>(now, by_y, y, p.margin, back_y);
-  ask_back<kRaise>(now, by_z, z, p.margin, back_z);
+  find_revisits<kRaise>(now, by_y, y, p.margin, back_y);
+  find_revisits<kRaise>(now, by_z, z, p.margin, back_z);
   if (any_of(back_y | back_z)) {
-    if (row.has_y && any_of(back_y)) what |= kAsksY;
-    if (row.has_z && any_of(back_z)) what |= kAsksZ;
+    if (row.has_y && any_of(back_y)) what |= kRevisitY;
+    if (row.has_z && any_of(back_z)) what |= kRevisitZ;
   }
-  if (row.has_x && (what & (p.x_above ? kLastMoved : kFirstMoved)) != 0 && asks_x<kRaise>(p, row))
-    what |= kAsksX;
+  if (row.has_x && (what & (p.x_above ? kLastMoved : kFirstMoved)) != 0 && revisits_x<kRaise>(p, row))
+    what |= kRevisitX;
   y = now;
   return what;
 }
 
-// Rows of one label that follow one another, beside rows of one label in z and in x (0: none there).
-struct SmoothRows {
+// Consecutive rows of one label, whose rows before in z and in x have one label each (0: no row).
+struct UniformRows {
   AlikeLimits by_y, by_z;
   float x_in, x_back;
   std::uint8_t label, z_label, x_label;
 
-  HYBRID_INLINE SmoothRows(const Pull& p, std::uint8_t own, std::uint8_t z, std::uint8_t x)
+  HYBRID_INLINE UniformRows(const SweepTask& p, std::uint8_t own, std::uint8_t z, std::uint8_t x)
       : by_y(p.along_y, own, own),
         by_z(p.along_z, own, z),
         x_in(p.along_x.in[own] + p.along_x.in[x]),
@@ -304,19 +305,21 @@ struct SmoothRows {
   [[nodiscard]] static HYBRID_INLINE bool one_label(const RowInfo& info) {
     return info.label != 0 || !info.filled;
   }
-  // Is row k one of them? One of one label has no anchor.
-  [[nodiscard]] HYBRID_INLINE bool has(const Pull& p, std::ptrdiff_t k) const {
+  // Is row k of the same kind? Rows of one label have no anchors.
+  [[nodiscard]] HYBRID_INLINE bool has(const SweepTask& p, std::ptrdiff_t k) const {
     const RowInfo &x = p.x.info[k * p.step], &z = p.z.info[k * p.step];
     return p.own.info[k * p.step].label == label && z.label == z_label && x.label == x_label && one_label(x);
   }
 };
 
-// Within one label, or out of one whose limits allow less: the row's own links then allow whatever those
-// before it ask. Nor does it ask anything of the row before it in y: that has it from the row beside it in z,
-// which asked this row's, or its like before that one, by the same way. (One of the two must be looked at: to
-// leave out z as well would let each rely on the other.) False, and nothing done, where x asks more.
+// Relaxes a row within one label, or next to labels with tighter limits. The links within the row then allow
+// whatever the rows before it require. The row requires nothing of the row before it in y either: that row
+// already has its value through the row before both in z, along a path of equal length. The reverse links in
+// z must still be checked, because the same argument for z relies on y. False, and nothing done, if the row
+// in x requires more.
 template <bool kRaise>
-HYBRID_INLINE bool pull_smooth(const Pull& p, SmoothRows& rows, std::ptrdiff_t k, RowValues& y, Moved& what) {
+HYBRID_INLINE bool sweep_uniform(const SweepTask& p, UniformRows& rows, std::ptrdiff_t k, RowValues& y,
+                                 Moved& what) {
   const std::ptrdiff_t at = k * p.step * kRow;
   const std::size_t end = p.x_above ? kRow - 1 : 0;
   float* const u = p.own.u + at;
@@ -329,15 +332,15 @@ HYBRID_INLINE bool pull_smooth(const Pull& p, SmoothRows& rows, std::ptrdiff_t k
   for (std::size_t n = 0; n < kVectors; ++n) {
     Floats before, from_y, from_z;
     load(u + n * kWidth, before);
-    ask<kRaise>(y[n], rows.by_y.in_, from_y);
-    ask<kRaise>(z[n], rows.by_z.in_, from_z);
+    require<kRaise>(y[n], rows.by_y.in_, from_y);
+    require<kRaise>(z[n], rows.by_z.in_, from_z);
     take_stronger<kRaise>(from_y, from_z);
     compare<kRaise>(from_z, before, p.margin, moves[n]);
     any |= moves[n];
     select(moves[n], from_z, before, now[n]);
   }
-  if (beyond<kRaise>(asked<kRaise>(x, rows.x_in), p.x_above ? now[kVectors - 1][kWidth - 1] : now[0][0],
-                     p.margin))
+  if (exceeds<kRaise>(required_value<kRaise>(x, rows.x_in),
+                      p.x_above ? now[kVectors - 1][kWidth - 1] : now[0][0], p.margin))
     return false;
   what = kNothingMoved;
   if (!any_of(any)) return true;
@@ -345,32 +348,32 @@ HYBRID_INLINE bool pull_smooth(const Pull& p, SmoothRows& rows, std::ptrdiff_t k
   for (std::size_t n = 0; n < kVectors; ++n) store(now[n], u + n * kWidth);
   what = moved(moves.front(), moves.back());
   Masks back{};
-  ask_back<kRaise>(now, rows.by_z, z, p.margin, back);
-  if (any_of(back)) what |= kAsksZ;
+  find_revisits<kRaise>(now, rows.by_z, z, p.margin, back);
+  if (any_of(back)) what |= kRevisitZ;
   if ((what & (p.x_above ? kLastMoved : kFirstMoved)) != 0 &&
-      beyond<kRaise>(asked<kRaise>(u[end], rows.x_back), x, p.margin))
-    what |= kAsksX;
+      exceeds<kRaise>(required_value<kRaise>(u[end], rows.x_back), x, p.margin))
+    what |= kRevisitX;
   y = now;
   return true;
 }
 
 template <bool kRaise, int kRegisters>
-HYBRID_INLINE Pulled pulled(const Pull& p, int most_visits, Moved* moved_out) {
+HYBRID_INLINE SweepResult sweep_rows(const SweepTask& p, int most_visits, Moved* moved_out) {
   const std::ptrdiff_t step = p.step, values = step * kRow;
   const bool has_z = p.z.u != nullptr, has_x = p.x.u != nullptr;
-  constexpr float nobody = nobody_asks(kRaise);
+  constexpr float nothing = no_requirement(kRaise);
   const std::ptrdiff_t x_end = p.x_above ? 0 : kRow - 1;
 
-  Pulled result;
+  SweepResult result;
   RowValues y, z;
-  fill(nobody, y);
-  fill(nobody, z);
-  bool on = false;  // the row before moved, and stands in y
-  for (int k = 0; k < p.most && (on || k < p.count) && result.visits < most_visits; ++k) {
-    std::uint8_t& asked_by = p.asked[k * step];
+  fill(nothing, y);
+  fill(nothing, z);
+  bool moved_before = false;  // the row before moved, and is in `y`
+  for (int k = 0; k < p.max_rows && (moved_before || k < p.count) && result.visits < most_visits; ++k) {
+    std::uint8_t& pending = p.pending[k * step];
     moved_out[k] = kNothingMoved;
     result.end = k + 1;
-    if (!on && (asked_by & p.by) == 0) continue;
+    if (!moved_before && (pending & p.mask) == 0) continue;
     const RowInfo* const info = p.own.info + k * step;
     if (info->anchored || (p.y && (info - step)->anchored) || (has_z && p.z.info[k * step].anchored) ||
         (has_x && p.x.info[k * step].anchored)) {
@@ -378,36 +381,36 @@ HYBRID_INLINE Pulled pulled(const Pull& p, int most_visits, Moved* moved_out) {
       return result;
     }
     ++result.visits;
-    asked_by &= static_cast<std::uint8_t>(~p.by);
+    pending &= static_cast<std::uint8_t>(~p.mask);
     RowNow row{
         p.own.u + k * values, p.own.labels + k * values, info->label, p.y, has_z, has_x, false, nullptr, 0};
     if (has_x) {
       row.x = p.x.u + k * values + x_end;
       row.x_label = p.x.labels[k * values + x_end];
     }
-    if (p.y && !on) load_row(row.u - values, y);
+    if (p.y && !moved_before) load_row(row.u - values, y);
     const std::uint8_t label = row.label, z_label = has_z ? p.z.info[k * step].label : label,
                        y_label = p.y ? (info - step)->label : label;
-    // Limits of one label may allow what another's do.
+    // Does this label allow within a row whatever the other label allows?
     const auto allows = [&p, label](std::uint8_t other) {
       return other == label || (p.up[other] <= p.up[label] && p.down[other] <= p.down[label]);
     };
     const bool alike = label != 0 && y_label != 0 && z_label != 0;
     row.closed = alike && allows(y_label) && allows(z_label);
     if (row.closed && p.y && has_z && has_x && label == y_label &&
-        p.z.info[(k - 1) * step].label == z_label && SmoothRows::one_label(p.x.info[k * step]) &&
+        p.z.info[(k - 1) * step].label == z_label && UniformRows::one_label(p.x.info[k * step]) &&
         p.along_y.in[z_label] <= p.along_y.in[label] && p.along_y.back[z_label] <= p.along_y.back[label]) {
-      // As long as rows are of the same kind, and one after the other moves.
-      SmoothRows rows(p, label, z_label, p.x.info[k * step].label);
+      // As long as rows are of the same kind and each of them moves.
+      UniformRows rows(p, label, z_label, p.x.info[k * step].label);
       bool done = false;
-      while (pull_smooth<kRaise>(p, rows, k, y, moved_out[k])) {
-        on = moved_out[k] != kNothingMoved;
-        done = !on || k + 1 == p.most || result.visits == most_visits || !rows.has(p, k + 1);
+      while (sweep_uniform<kRaise>(p, rows, k, y, moved_out[k])) {
+        moved_before = moved_out[k] != kNothingMoved;
+        done = !moved_before || k + 1 == p.max_rows || result.visits == most_visits || !rows.has(p, k + 1);
         if (done) break;
         ++k;
         ++result.visits;
         result.end = k + 1;
-        p.asked[k * step] &= static_cast<std::uint8_t>(~p.by);
+        p.pending[k * step] &= static_cast<std::uint8_t>(~p.mask);
       }
       if (done) continue;
       row.u = p.own.u + k * values;
@@ -418,28 +421,28 @@ HYBRID_INLINE Pulled pulled(const Pull& p, int most_visits, Moved* moved_out) {
     if (has_z) load_row(p.z.u + k * values, z);
     if (alike) {
       AlikeLimits by_y(p.along_y, label, y_label), by_z(p.along_z, label, z_label);
-      moved_out[k] = pull_row<kRaise, kRegisters>(p, row, by_y, by_z, z, y);
+      moved_out[k] = sweep_row<kRaise, kRegisters>(p, row, by_y, by_z, z, y);
     } else {
       row.label = 0;
       const Indices own(row.labels);
       LabelLimits<kRegisters> by_y(p.along_y, own, p.y ? row.labels - values : row.labels),
           by_z(p.along_z, own, has_z ? p.z.labels + k * values : row.labels);
-      moved_out[k] = pull_row<kRaise, kRegisters>(p, row, by_y, by_z, z, y);
+      moved_out[k] = sweep_row<kRaise, kRegisters>(p, row, by_y, by_z, z, y);
     }
-    on = moved_out[k] != kNothingMoved;
+    moved_before = moved_out[k] != kNothingMoved;
   }
   return result;
 }
 
 template <bool kRaise>
-HYBRID_INLINE Pulled pulled_by_registers(const Pull& pull, int most_visits, Moved* moves) {
-  switch (pull.registers) {
+HYBRID_INLINE SweepResult sweep_by_registers(const SweepTask& task, int most_visits, Moved* moves) {
+  switch (task.registers) {
     case 1:
-      return pulled<kRaise, 1>(pull, most_visits, moves);
+      return sweep_rows<kRaise, 1>(task, most_visits, moves);
     case 2:
-      return pulled<kRaise, 2>(pull, most_visits, moves);
+      return sweep_rows<kRaise, 2>(task, most_visits, moves);
     default:
-      return pulled<kRaise, 0>(pull, most_visits, moves);
+      return sweep_rows<kRaise, 0>(task, most_visits, moves);
   }
 }
 

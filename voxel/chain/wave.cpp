@@ -7,9 +7,8 @@
 namespace voxel {
 namespace {
 
-constexpr std::uint32_t kAll = 0xFFFFFFFFU;
-constexpr std::size_t kAhead = 12;  // rows
-constexpr std::size_t kMostCones = 4;
+constexpr std::size_t kPrefetchRows = 12;
+constexpr std::size_t kMaxCones = 4;  // sources that are spread by a cone each; more by one sweep
 
 }  // namespace
 
@@ -23,10 +22,10 @@ ChainWave::ChainWave(const Lattice& lattice)
       waiting_(lattice.grid().rows()),
       taken_(lattice.grid().rows()),
       pulled_by_(lattice.grid().rows()),
-      asked_(lattice.grid().rows()),
-      asked_spans_(2 * static_cast<std::size_t>(lattice.grid().columns) *
-                   (static_cast<std::size_t>(lattice.grid().dims[2]) + 2)),
-      in_plane_(static_cast<std::size_t>(lattice.grid().columns)),
+      pending_(lattice.grid().rows()),
+      pending_ranges_(2 * static_cast<std::size_t>(lattice.grid().columns) *
+                      (static_cast<std::size_t>(lattice.grid().dims[2]) + 2)),
+      pending_in_plane_(static_cast<std::size_t>(lattice.grid().columns)),
       moves_(static_cast<std::size_t>(lattice.grid().dims[1])),
       fall_(static_cast<std::size_t>(lattice.grid().columns) * kRow) {
   const Grid& grid = lattice.grid();
@@ -60,7 +59,7 @@ void ChainWave::look_up(RowId row) noexcept {
     out.filled = filled != 0;
     out.anchored = anchors != 0;
     out.known = true;
-    if (out.free != kAll) continue;
+    if (out.free != kFullRow) continue;
     if (lattice_.inside(r) != 0 || std::count(labels, labels + kRow, labels[0]) == kRow)
       out.label = labels[0];
   }
@@ -78,55 +77,55 @@ void ChainWave::begin() noexcept {
   work_ = 0;
 }
 
-// What is raised too far for an anchor has to be lowered again, and the reverse.
-void ChainWave::note_pulled(const Pass& p, RowId row) noexcept {
+// A pulled anchor stays. So what a raising wave raised too far for it must be lowered again, and the reverse.
+void ChainWave::note_pulled(const WaveArgs& p, RowId row) noexcept {
   std::uint8_t& by = pulled_by_[row];
   if (by == 0) pulled_[pulled_count_++] = row;
   by |= wave_bit(p.axis, p.way == Way::raise ? Way::lower : Way::raise);
 }
 
-// The voxel beyond the end of a row.
-void ChainWave::ask_across(const Pass& p, RowId row, RowId to, int direction) noexcept {
+// Relaxes the link across the end of a row, to the first voxel of the next row along x.
+void ChainWave::relax_across(const WaveArgs& p, RowId row, RowId to, int direction) noexcept {
   const RowInfo &own = info(row), &other = info(to);
   if (!other.filled) return;
   const VoxelId end = kRow - 1, from = row * kRow + (direction == 0 ? end : 0),
                 at = to * kRow + (direction == 0 ? 0 : end);
   if (own.label == 0 || other.label == 0) {
-    if (lattice_.filled(from)) ask_voxel(p, from, at, direction);
+    if (lattice_.filled(from)) relax_link(p, from, at, direction);
     return;
   }
   const float limit = p.limits.between(direction, own.label, other.label);
-  const float wanted = p.way == Way::raise ? p.u[from] - limit : p.u[from] + limit;
-  if (p.way == Way::raise ? !(wanted > p.u[at] + p.margin) : !(wanted < p.u[at] - p.margin)) return;
-  p.u[at] = wanted;
+  const float required = p.way == Way::raise ? p.u[from] - limit : p.u[from] + limit;
+  if (p.way == Way::raise ? !(required > p.u[at] + p.margin) : !(required < p.u[at] - p.margin)) return;
+  p.u[at] = required;
   note_moved(to);
   enqueue(to, direction == 0 ? first : last);
 }
 
-void ChainWave::ask_voxel(const Pass& p, VoxelId from, VoxelId to, int direction) noexcept {
+void ChainWave::relax_link(const WaveArgs& p, VoxelId from, VoxelId to, int direction) noexcept {
   const RowId row = to / kRow;
   if (!lattice_.filled(to)) return;
   const float limit = p.limits.between(direction, lattice_.label(from), lattice_.label(to));
-  const float wanted = p.way == Way::raise ? p.u[from] - limit : p.u[from] + limit;
-  if (p.way == Way::raise ? !(wanted > p.u[to] + p.margin) : !(wanted < p.u[to] - p.margin)) return;
+  const float required = p.way == Way::raise ? p.u[from] - limit : p.u[from] + limit;
+  if (p.way == Way::raise ? !(required > p.u[to] + p.margin) : !(required < p.u[to] - p.margin)) return;
   if (!free(to)) {
     note_pulled(p, row);
     return;
   }
-  p.u[to] = wanted;
+  p.u[to] = required;
   note_moved(row);
   enqueue(row);
 }
 
-void ChainWave::ask_beside(const Pass& p, RowId row, RowId to, int direction) noexcept {
+void ChainWave::relax_beside(const WaveArgs& p, RowId row, RowId to, int direction) noexcept {
   const RowInfo& other_row = info(to);
   if (!other_row.filled) return;
   float* const own = row_at(p, row);
   float* other = row_at(p, to);
-  std::array<float, kRow> asked;
+  std::array<float, kRow> required;
   if (other_row.anchored) {
-    std::copy_n(other, kRow, asked.data());
-    other = asked.data();
+    std::copy_n(other, kRow, required.data());
+    other = required.data();
   }
   const float* const half = p.limits.half[static_cast<std::size_t>(direction)];
   const std::uint8_t a = info(row).label, b = other_row.label;
@@ -141,34 +140,35 @@ void ChainWave::ask_beside(const Pass& p, RowId row, RowId to, int direction) no
                                 : lower_beside(own, la, other, lb, h, p.margin);
   }
   if (moves == kNothingMoved) return;
-  if (other_row.anchored) moves = move_free(p, to, asked.data());
+  if (other_row.anchored) moves = move_free(p, to, required.data());
   if (moves == kNothingMoved) return;
   note_moved(to);
   enqueue(to, moves & (first | last));
 }
 
-// Of a row in which something is anchored, what is free goes where it is asked; the rest is pulled.
-Moved ChainWave::move_free(const Pass& p, RowId row, const float* asked) noexcept {
+// In a row with anchors: moves the free voxels to `required`. Anchors that it would move are pulled.
+Moved ChainWave::move_free(const WaveArgs& p, RowId row, const float* required) noexcept {
   float* const u = row_at(p, row);
   const std::uint32_t free = info(row).free;
   std::uint32_t moves = 0;
-  for (std::uint32_t i = 0; i < kRow; ++i) moves |= asked[i] != u[i] ? 1U << i : 0U;
+  for (std::uint32_t i = 0; i < kRow; ++i) moves |= required[i] != u[i] ? 1U << i : 0U;
   if ((moves & ~free) != 0) note_pulled(p, row);
   moves &= free;
   for (std::uint32_t left = moves; left != 0; left &= left - 1) {
     const int i = __builtin_ctz(left);
-    u[i] = asked[i];
+    u[i] = required[i];
   }
   return static_cast<Moved>((moves != 0 ? kAnyMoved : kNothingMoved) | ((moves & 1U) != 0 ? kFirstMoved : 0) |
                             (moves >> (kRow - 1) != 0 ? kLastMoved : 0));
 }
 
-// The same within it, while nothing anchored is pulled: or what that asks in turn is asked voxel by voxel.
-Moved ChainWave::ask_along_anchors(const Pass& p, RowId row) noexcept {
-  std::array<float, kRow + 2> asked;  // one beyond both ends, as kernels read them
-  std::copy_n(row_at(p, row) - 1, asked.size(), asked.data());
-  float* const own = asked.data() + 1;
-  const Moved moves = ask_along_labels(p, row, own);
+// relax_within() of a row with anchors. As long as no anchor is pulled the row is relaxed as a whole;
+// otherwise voxel by voxel, because nothing may move on account of an anchor that stays.
+Moved ChainWave::relax_within_anchored(const WaveArgs& p, RowId row) noexcept {
+  std::array<float, kRow + 2> required;  // with one value beyond both ends, which the kernels read
+  std::copy_n(row_at(p, row) - 1, required.size(), required.data());
+  float* const own = required.data() + 1;
+  const Moved moves = relax_within_by_label(p, row, own);
   if (moves == kNothingMoved) return moves;
   std::uint32_t lanes = 0;
   for (std::uint32_t i = 0; i < kRow; ++i) lanes |= own[i] != row_at(p, row)[i] ? 1U << i : 0U;
@@ -179,48 +179,48 @@ Moved ChainWave::ask_along_anchors(const Pass& p, RowId row) noexcept {
   }
   const VoxelId begin = row * kRow, end = begin + kRow - 1;
   for (VoxelId v = begin; v < end; ++v) {
-    if (lattice_.filled(v)) ask_voxel(p, v, v + 1, 0);
+    if (lattice_.filled(v)) relax_link(p, v, v + 1, 0);
   }
   for (VoxelId v = end; v > begin; --v) {
-    if (lattice_.filled(v)) ask_voxel(p, v, v - 1, 1);
+    if (lattice_.filled(v)) relax_link(p, v, v - 1, 1);
   }
   return kFirstMoved | kLastMoved;
 }
 
-Moved ChainWave::ask_along(const Pass& p, RowId row) noexcept {
+Moved ChainWave::relax_within(const WaveArgs& p, RowId row) noexcept {
   float* const own = row_at(p, row);
-  if (info(row).anchored) return ask_along_anchors(p, row);
+  if (info(row).anchored) return relax_within_anchored(p, row);
   const std::uint8_t label = rows_[row].label;
   if (label != 0) {
     const float up = p.limits.between(0, label, label), down = p.limits.between(1, label, label);
     return p.way == Way::raise ? raise_along_alike(own, up, down, p.margin)
                                : lower_along_alike(own, up, down, p.margin);
   }
-  return ask_along_labels(p, row, own);
+  return relax_within_by_label(p, row, own);
 }
 
-Moved ChainWave::ask_along_labels(const Pass& p, RowId row, float* u) noexcept {
+Moved ChainWave::relax_within_by_label(const WaveArgs& p, RowId row, float* u) noexcept {
   const HalfLimits up{p.limits.half[0], limits_.registers()}, down{p.limits.half[1], limits_.registers()};
   return p.way == Way::raise ? raise_along(u, lattice_.labels(row), up, down, p.margin)
                              : lower_along(u, lattice_.labels(row), up, down, p.margin);
 }
 
-void ChainWave::ask_around(const Pass& p, RowId row) noexcept {
+void ChainWave::relax_neighbours(const WaveArgs& p, RowId row) noexcept {
   const Grid& grid = lattice_.grid();
-  // Before it asks: with anchors in it, a row may put itself into the queue again.
+  // Cleared first, because a row with anchors may enqueue itself again.
   std::uint8_t ends = rows_[row].mark & (first | last);
   rows_[row].mark &= static_cast<std::uint8_t>(~(queued | first | last));
-  ends |= ask_along(p, row);
-  ask_beside(p, row, row + 1, 2);
-  ask_beside(p, row, row - 1, 3);
-  ask_beside(p, row, row + grid.row_z, 4);
-  ask_beside(p, row, row - grid.row_z, 5);
-  if ((ends & last) != 0) ask_across(p, row, row + grid.row_x, 0);
-  if ((ends & first) != 0) ask_across(p, row, row - grid.row_x, 1);
+  ends |= relax_within(p, row);
+  relax_beside(p, row, row + 1, 2);
+  relax_beside(p, row, row - 1, 3);
+  relax_beside(p, row, row + grid.row_z, 4);
+  relax_beside(p, row, row - grid.row_z, 5);
+  if ((ends & last) != 0) relax_across(p, row, row + grid.row_x, 0);
+  if ((ends & first) != 0) relax_across(p, row, row - grid.row_x, 1);
 }
 
-// A row's neighbours lie in as many places; what stands further back in the queue is fetched meanwhile.
-inline void ChainWave::fetch_around(const Pass& p, RowId row) const noexcept {
+// Prefetches the neighbours of a row further back in the queue; they lie at six places in memory.
+inline void ChainWave::prefetch_around(const WaveArgs& p, RowId row) const noexcept {
   const Grid& grid = lattice_.grid();
   const RowInfo info = rows_[row];
   const auto fetch = [&](RowId r) {
@@ -249,35 +249,34 @@ inline void ChainWave::fetch_around(const Pass& p, RowId row) const noexcept {
   }
 }
 
-std::uint64_t ChainWave::run(const Pass& p, std::uint64_t most) noexcept {
+std::uint64_t ChainWave::run_queue(const WaveArgs& p, std::uint64_t most) noexcept {
   std::uint64_t visits = 0;
   for (; head_ != tail_ && visits < most; ++visits) {
     const RowId row = ring_[head_];
-    const std::size_t ahead = head_ + kAhead < ring_.size() ? head_ + kAhead : 0;
-    fetch_around(p, ring_[ahead]);  // past the queue's end, whatever was there before
+    const std::size_t ahead = head_ + kPrefetchRows < ring_.size() ? head_ + kPrefetchRows : 0;
+    prefetch_around(p, ring_[ahead]);  // beyond the queue's end: a stale row, which is harmless
     head_ = head_ + 1 == ring_.size() ? 0 : head_ + 1;
-    ask_around(p, row);
+    relax_neighbours(p, row);
   }
   for (; head_ != tail_; head_ = head_ + 1 == ring_.size() ? 0 : head_ + 1) {
     rows_[ring_[head_]].mark &= static_cast<std::uint8_t>(~(queued | first | last));
-    wait(ring_[head_], wave_bit(p.axis, p.way));
+    postpone(ring_[head_], wave_bit(p.axis, p.way));
   }
   work_ += visits;
   return visits;
 }
 
-void ChainWave::wait(RowId row, std::uint8_t waves) noexcept {
+void ChainWave::postpone(RowId row, std::uint8_t waves) noexcept {
   std::uint8_t& waits = rows_[row].waits;
   if ((waits & kListed) == 0) waiting_[waiting_count_++] = row;
   waits |= static_cast<std::uint8_t>(waves | kListed);
 }
 
-// Is any neighbour of a voxel to come along, or is the link to it at its limit, to a rounding? (Where only
-// those counted that are to come along, two bodies on tight links still moved at 0.18 mm/s after 3.6 s: what
-// roundings leave beyond is mended by the waves that pass.) Where there is no neighbour the limit has no end.
-bool ChainWave::asks(const Pass& p, VoxelId v) const noexcept {
+// Is any link of a voxel violated, or at its limit within the margin? Links within the margin count too, so
+// that the waves that pass repair violations by rounding. Without a neighbour the limit is unbounded.
+bool ChainWave::has_binding_link(const WaveArgs& p, VoxelId v) const noexcept {
   const std::uint8_t label = lattice_.label(v);
-  for (int n = 0; n < kWays; ++n) {
+  for (int n = 0; n < kDirections; ++n) {
     const VoxelId to = n % 2 == 0 ? lattice_.up(v, n / 2) : lattice_.down(v, n / 2);
     const float limit = p.limits.between(n, label, lattice_.label(to));
     if (p.way == Way::raise ? p.u[v] - limit > p.u[to] - p.margin : p.u[v] + limit < p.u[to] + p.margin)
@@ -289,59 +288,60 @@ bool ChainWave::asks(const Pass& p, VoxelId v) const noexcept {
 std::uint64_t ChainWave::spread(float* u, int axis, Way way, std::span<Source> sources, float margin,
                                 std::uint64_t most) noexcept {
   if (sources.empty()) return 0;
-  Pass p{u, axis, way, margin, limits_.pass(axis, way), {}};
-  // The one that goes furthest first: what it takes along needs no second visit.
+  WaveArgs p{u, axis, way, margin, limits_.for_wave(axis, way), {}};
+  // The strongest source first: what follows it needs no second visit.
   std::sort(sources.begin(), sources.end(), [way](const Source& a, const Source& b) {
     if (a.u != b.u) return way == Way::raise ? a.u > b.u : a.u < b.u;
     return a.v < b.v;
   });
-  const bool cones = lattice_.uniform_limits() && sources.size() <= kMostCones;
+  const bool cones = lattice_.uniform_limits() && sources.size() <= kMaxCones;
   const std::uint8_t label = lattice_.label(sources.front().v);
-  for (int n = 0; n < kWays; ++n)
+  for (int n = 0; n < kDirections; ++n)
     p.limit[static_cast<std::size_t>(n)] = static_cast<double>(p.limits.between(n, label, label));
   cone_rows_ = 0;
   std::uint64_t visits = 0;
-  const auto taken = [&] { return visits + cone_rows_ / kConeRows; };
-  const auto left = [&] { return taken() < most ? most - taken() : 0; };
-  // Cones and sweeps start from a state that violates nothing: no row waits.
-  const bool whole = waiting_count_ == 0;
+  const auto used = [&] { return visits + cone_rows_ / kConeRows; };
+  const auto left = [&] { return used() < most ? most - used() : 0; };
+  // Cones and sweeps require a state without violations, so no row may wait.
+  const bool no_row_waits = waiting_count_ == 0;
   std::size_t moves = 0;
   for (const Source& s : sources) {
     note_moved(s.v / kRow);
-    if (way == Way::raise ? s.u <= u[s.v] : s.u >= u[s.v]) continue;  // a stronger one took it along
+    if (way == Way::raise ? s.u <= u[s.v] : s.u >= u[s.v])
+      continue;  // a stronger source has moved it already
     u[s.v] = s.u;
     sources[moves++] = s;
-    if (!cones || !asks(p, s.v)) continue;
-    // One after the other.
-    if (!whole || !cone(p, s.v, left())) {
-      if (!whole || !sweep(p, {&s, 1}, left(), visits)) enqueue(s.v / kRow);
+    if (!cones || !has_binding_link(p, s.v)) continue;
+    // One source after another.
+    if (!no_row_waits || !cone(p, s.v, left())) {
+      if (!no_row_waits || !sweep(p, {&s, 1}, left(), visits)) enqueue(s.v / kRow);
     }
-    visits += run(p, left());
+    visits += run_queue(p, left());
   }
   if (!cones) {
-    // A tool that hardly moves takes along next to nothing: of a hundred voxels that it presses few ask any.
-    // (Swept from all of them, and the rows beside theirs, that was a sixth of a tick.)
+    // Only from sources with a binding link: when a tool hardly moves, few of its pressed voxels have one.
     const std::span<Source> moving = sources.first(moves);
-    const auto asking = moving.first(static_cast<std::size_t>(
-        std::remove_if(moving.begin(), moving.end(), [&](const Source& s) { return !asks(p, s.v); }) -
-        moving.begin()));
-    if (!asking.empty() && (!whole || !sweep(p, asking, left(), visits))) {
-      for (const Source& s : asking) enqueue(s.v / kRow);
+    const auto binding = moving.first(
+        static_cast<std::size_t>(std::remove_if(moving.begin(), moving.end(),
+                                                [&](const Source& s) { return !has_binding_link(p, s.v); }) -
+                                 moving.begin()));
+    if (!binding.empty() && (!no_row_waits || !sweep(p, binding, left(), visits))) {
+      for (const Source& s : binding) enqueue(s.v / kRow);
     }
   }
-  visits += run(p, left());
+  visits += run_queue(p, left());
   work_ += cone_rows_ / kConeRows;
-  return taken();
+  return used();
 }
 
 std::uint64_t ChainWave::spread_from_pulled(float* u, int axis, Way way, float margin,
                                             std::uint64_t most) noexcept {
-  const Pass p{u, axis, way, margin, limits_.pass(axis, way), {}};
+  const WaveArgs p{u, axis, way, margin, limits_.for_wave(axis, way), {}};
   const std::uint8_t bit = wave_bit(axis, way);
   for (std::size_t n = 0; n < pulled_count_; ++n) {
     if ((pulled_by_[pulled_[n]] & bit) != 0) enqueue(pulled_[n]);
   }
-  return run(p, most);
+  return run_queue(p, most);
 }
 
 void ChainWave::take_waiting() noexcept {
@@ -353,7 +353,7 @@ void ChainWave::take_waiting() noexcept {
 
 std::uint64_t ChainWave::spread_from_taken(float* u, int axis, Way way, float margin,
                                            std::uint64_t most) noexcept {
-  const Pass p{u, axis, way, margin, limits_.pass(axis, way), {}};
+  const WaveArgs p{u, axis, way, margin, limits_.for_wave(axis, way), {}};
   const std::uint8_t bit = wave_bit(axis, way);
   std::uint64_t count = 0;
   for (std::size_t n = 0; n < taken_count_ && count < most; ++n) {
@@ -363,12 +363,12 @@ std::uint64_t ChainWave::spread_from_taken(float* u, int axis, Way way, float ma
     enqueue(taken_[n]);
     ++count;
   }
-  return run(p, most);
+  return run_queue(p, most);
 }
 
 void ChainWave::put_back() noexcept {
   for (std::size_t n = 0; n < taken_count_; ++n) {
-    if (rows_[taken_[n]].waits != 0) wait(taken_[n], 0);
+    if (rows_[taken_[n]].waits != 0) postpone(taken_[n], 0);
   }
   taken_count_ = 0;
 }
@@ -376,8 +376,8 @@ void ChainWave::put_back() noexcept {
 std::size_t ChainWave::memory_bytes() const {
   return rows_.resident_bytes() + ring_.resident_bytes() + moved_.resident_bytes() +
          pulled_.resident_bytes() + pulled_by_.resident_bytes() + waiting_.resident_bytes() +
-         taken_.resident_bytes() + asked_.resident_bytes() + resident_bytes(asked_spans_) +
-         resident_bytes(in_plane_) + resident_bytes(moves_) + resident_bytes(fall_);
+         taken_.resident_bytes() + pending_.resident_bytes() + resident_bytes(pending_ranges_) +
+         resident_bytes(pending_in_plane_) + resident_bytes(moves_) + resident_bytes(fall_);
 }
 
 }  // namespace voxel

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Of ChainWave: cones in closed form.
+// Cones of ChainWave, written in closed form.
 #include <algorithm>
 #include <cstdlib>
 
@@ -7,21 +7,15 @@
 #include "voxel/chain/wave.h"
 
 namespace voxel {
-namespace {
-
-constexpr std::uint32_t kAll = 0xFFFFFFFFU;
-
-}  // namespace
-
-// How far a cone gets along the three lines through its apex. Where nothing but free voxels is within, those
-// at which it ends included, it raises nothing beyond: what it raises there, it raises all along every
-// shortest way to it, and one of these leads over such a line. (To look for the ends by halves does not do:
-// where a cone lies on an older one, roundings decide which voxels are raised, and it went on to the last.)
-ChainWave::Box ChainWave::reach(const Pass& p, VoxelId apex) noexcept {
-  Box box;
+// Extent of a cone along the three lines through its apex. If the box of these extents, with one voxel beyond
+// each end, holds free voxels only, the cone raises nothing outside: a raised voxel is raised all along every
+// shortest path to it, and one of these paths runs along such a line. Bisection for the ends would be wrong:
+// rounding decides which voxels are raised where a cone lies on an older one.
+ChainWave::ConeBox ChainWave::cone_box(const WaveArgs& p, VoxelId apex) noexcept {
+  ConeBox box;
   const Grid& grid = lattice_.grid();
   const std::array<int, 3> at = lattice_.coordinates(apex);
-  for (int n = 0; n < kWays; ++n) {
+  for (int n = 0; n < kDirections; ++n) {
     const auto un = static_cast<std::size_t>(n), d = un / 2;
     const double limit = p.limit[un];
     const int most = n % 2 == 0 ? free_high_[d] - at[d] : at[d] - free_low_[d];
@@ -39,17 +33,17 @@ ChainWave::Box ChainWave::reach(const Pass& p, VoxelId apex) noexcept {
   return box;
 }
 
-bool ChainWave::full(const std::array<int, 3>& low, const std::array<int, 3>& high) noexcept {
+bool ChainWave::is_full(const std::array<int, 3>& low, const std::array<int, 3>& high) noexcept {
   if (free_is_box_) return true;
   const Grid& grid = lattice_.grid();
   for (int c = low[0] / kRow + 1; c <= high[0] / kRow + 1; ++c) {
     const int x = (c - 1) * kRow;
-    std::uint32_t needed = kAll;
-    if (low[0] > x) needed &= kAll << (low[0] - x);
-    if (high[0] < x + kRow - 1) needed &= kAll >> (x + kRow - 1 - high[0]);
+    std::uint32_t needed = kFullRow;
+    if (low[0] > x) needed &= kFullRow << (low[0] - x);
+    if (high[0] < x + kRow - 1) needed &= kFullRow >> (x + kRow - 1 - high[0]);
     for (int z = low[2]; z <= high[2]; ++z) {
       const RowInfo* const row = &info(grid.row(c, low[1], z));
-      std::uint32_t all = kAll;
+      std::uint32_t all = kFullRow;
       for (int n = 0; n <= high[1] - low[1]; ++n) all &= row[n].free;
       if ((all & needed) != needed) return false;
     }
@@ -57,29 +51,28 @@ bool ChainWave::full(const std::array<int, 3>& low, const std::array<int, 3>& hi
   return true;
 }
 
-bool ChainWave::cone(const Pass& p, VoxelId apex, std::uint64_t most) noexcept {
+bool ChainWave::cone(const WaveArgs& p, VoxelId apex, std::uint64_t most) noexcept {
   if (lattice_.anchored(apex)) return false;
-  const Box box = reach(p, apex);
+  const ConeBox box = cone_box(p, apex);
   const std::array<int, 3> at = lattice_.coordinates(apex);
   std::array<int, 3> low{}, high{};
   for (std::size_t d = 0; d < 3; ++d) {
-    // With the first voxels that it does not raise: only if there is no gap among these does it end there.
+    // With the first voxels that the cone does not raise: it ends there only if there is no gap among them.
     low[d] = at[d] - box.steps[2 * d + 1] - (box.cut[2 * d + 1] ? 0 : 1);
     high[d] = at[d] + box.steps[2 * d] + (box.cut[2 * d] ? 0 : 1);
   }
-  // An octahedron in this box takes no more than half of its rows.
+  // The cone is an octahedron and takes at most half of the rows of this box.
   const auto size = [&](std::size_t d) { return static_cast<std::uint64_t>(high[d] - low[d]) + 1; };
-  if ((size(0) / kRow + 2) * size(1) * size(2) / 2 / kConeRows > most || !full(low, high)) return false;
+  if ((size(0) / kRow + 2) * size(1) * size(2) / 2 / kConeRows > most || !is_full(low, high)) return false;
   write_cone(p, apex, box);
   enqueue_cut_faces(apex, box);
   return true;
 }
 
-// Column by column away from the apex, and each plane by plane: what is written lies nearly one after the
-// other in memory. Where a plane of a column is not raised at all, none beyond it is, and no column beyond
-// one whose plane of the apex is not. (All columns of a plane before the next: a fifth slower where it waits
-// for memory.)
-void ChainWave::write_cone(const Pass& p, VoxelId apex, const Box& box) noexcept {
+// Writes column by column away from the apex, and within a column plane by plane, so that writes are nearly
+// sequential in memory. If no row of a plane is raised, no plane beyond it is. If the apex plane of a column
+// is not raised, no column beyond it is.
+void ChainWave::write_cone(const WaveArgs& p, VoxelId apex, const ConeBox& box) noexcept {
   const Grid& grid = lattice_.grid();
   const std::array<int, 3> at = lattice_.coordinates(apex);
   const int low_x = at[0] - box.steps[1], high_x = at[0] + box.steps[0];
@@ -89,15 +82,16 @@ void ChainWave::write_cone(const Pass& p, VoxelId apex, const Box& box) noexcept
       const int x = (c - 1) * kRow + i;
       const double steps = x < at[0] ? at[0] - x : x - at[0];
       fall_[static_cast<std::size_t>(c) * kRow + static_cast<std::size_t>(i)] =
-          x < low_x || x > high_x ? ChainLimits::kNoLink
-                                  : static_cast<float>(steps * p.limit[x < at[0] ? 1 : 0]);
+          x < low_x || x > high_x ? kUnbounded : static_cast<float>(steps * p.limit[x < at[0] ? 1 : 0]);
     }
   }
   const auto write = p.way == Way::raise ? raise_cone : lower_cone;
   const double sign = p.way == Way::raise ? -1.0 : 1.0, top = static_cast<double>(p.u[apex]);
-  ConeColumn column{
-      .up = box.steps[2], .down = box.steps[3], .by_up = sign * p.limit[2], .by_down = -sign * p.limit[3]};
-  // Plane k of column c; next: where the one after it is.
+  ConeColumn column{.up = box.steps[2],
+                    .down = box.steps[3],
+                    .slope_up = sign * p.limit[2],
+                    .slope_down = -sign * p.limit[3]};
+  // Plane k of column c; `next`: direction of the plane after it.
   const auto write_plane = [&](int c, int k, int next, ConeEnds& ends) {
     const RowId row = grid.row(c, at[1], at[2] + k);
     column.own = row_at(p, row);
@@ -113,13 +107,13 @@ void ChainWave::write_cone(const Pass& p, VoxelId apex, const Box& box) noexcept
   const auto fewer = [](const ConeEnds& ends, int by) {
     return ConeEnds{ends.near_up - by, ends.near_down - by, ends.far_up - by, ends.far_down - by};
   };
-  // `ends`: first where its plane of the apex is thought to end, then where that does.
+  // `ends`: of the column's apex plane; as input a guess.
   const auto write_column = [&](int c, ConeEnds& ends) {
     column.fall = fall_.data() + static_cast<std::size_t>(c) * kRow;
     column.nearest = c == own_column ? at[0] % kRow : c > own_column ? 0 : kRow - 1;
     if (!write_plane(c, 0, box.steps[4] > 0 ? 1 : -1, ends)) return false;
     for (const int by : {1, -1}) {
-      ConeEnds here = ends;  // planes go on to end as they did before
+      ConeEnds here = ends;  // guess: each plane ends one row before the last one
       for (int k = 1; k <= box.steps[by > 0 ? 4 : 5]; ++k) {
         here = fewer(here, 1);
         if (!write_plane(c, by * k, by, here)) break;
@@ -132,18 +126,18 @@ void ChainWave::write_cone(const Pass& p, VoxelId apex, const Box& box) noexcept
   for (const int by : {1, -1}) {
     ConeEnds ends = own;
     for (int c = own_column + by; c >= low_column && c <= high_column; c += by) {
-      // A column ends some kRow rows earlier than that before.
+      // Guess: the column ends about kRow rows before the last one.
       ends = fewer({ends.far_up, ends.far_down, ends.far_up, ends.far_down}, kRow / 2);
       if (!write_column(c, ends)) break;
     }
   }
 }
 
-// Where the box ends at something that is no free voxel, the wave may go on beside it, or pull an anchor.
-void ChainWave::enqueue_cut_faces(VoxelId apex, const Box& box) noexcept {
+// Where the box ends at a voxel that is not free, the wave may continue round it, or pull an anchor.
+void ChainWave::enqueue_cut_faces(VoxelId apex, const ConeBox& box) noexcept {
   const Grid& grid = lattice_.grid();
   const std::array<int, 3> at = lattice_.coordinates(apex);
-  for (int n = 0; n < kWays; ++n) {
+  for (int n = 0; n < kDirections; ++n) {
     const auto un = static_cast<std::size_t>(n), d = un / 2;
     if (!box.cut[un]) continue;
     std::array<int, 3> low{}, high{};

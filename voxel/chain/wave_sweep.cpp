@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Of ChainWave: sweeps away from the sources.
+// Sweeps of ChainWave away from the sources: fast sweeping (Zhao 2005).
 //
-// Plane by plane (z), and in each column by column and row by row, outwards from the sources, rows take what
-// the rows before them ask: fast sweeping (Zhao 2005), in the order that paths without detour have. What
-// detours add shows when a row asks one before it: then it is that one's turn again, within a plane at once,
-// until nothing is asked there any more, and between planes on the way back. A row is read once and written
-// once for each visit; in the queue it is read by each of its neighbours, and a detour found late runs
-// through all that was done since.
+// Planes (z), in each plane columns, and in each column rows are relaxed outwards from the sources, each row
+// from the rows before it. This is the order of paths without detours. If a row requires a move of a row
+// before it, a path has a detour, and that row is visited again: within a plane until nothing is pending,
+// between planes on the way back. A visit reads and writes a row once. In a queue each neighbour reads it,
+// and a detour found late invalidates everything done since.
 #include <algorithm>
 #include <utility>
 
@@ -15,39 +14,40 @@
 
 namespace voxel {
 
-inline void ChainWave::Span::add(int n) noexcept {
+inline void ChainWave::IntRange::add(int n) noexcept {
   low = std::min(low, n);
   high = std::max(high, n);
 }
-inline void ChainWave::Span::add(const Span& other) noexcept {
+inline void ChainWave::IntRange::add(const IntRange& other) noexcept {
   low = std::min(low, other.low);
   high = std::max(high, other.high);
 }
 
-// Rows of this column and plane that are asked from below (0) or above (1), or from within the plane.
-inline ChainWave::Span& ChainWave::asked_span(int way, int column, int z) noexcept {
+// Pending rows of this column and plane, for sweeps upwards (sense 0) or downwards (1) in z.
+inline ChainWave::IntRange& ChainWave::pending_range(int sense, int column, int z) noexcept {
   const Grid& grid = lattice_.grid();
-  return asked_spans_[(static_cast<std::size_t>(way) * static_cast<std::size_t>(grid.columns) +
-                       static_cast<std::size_t>(column)) *
-                          (static_cast<std::size_t>(grid.dims[2]) + 2) +
-                      static_cast<std::size_t>(z + 1)];
+  return pending_ranges_[(static_cast<std::size_t>(sense) * static_cast<std::size_t>(grid.columns) +
+                          static_cast<std::size_t>(column)) *
+                             (static_cast<std::size_t>(grid.dims[2]) + 2) +
+                         static_cast<std::size_t>(z + 1)];
 }
 
-// It is this row's turn when its plane is next swept upwards (0) or downwards (1).
-void ChainWave::ask_row(Sweep& sweep, int way, const std::array<int, 3>& at, std::uint8_t by) noexcept {
+// Marks a row as pending when its plane is next swept upwards (sense 0) or downwards (1).
+void ChainWave::mark_pending(Sweep& sweep, int sense, const std::array<int, 3>& at,
+                             std::uint8_t by) noexcept {
   const RowId row = lattice_.grid().row(at[0], at[1], at[2]);
   if (!info(row).filled) return;
-  asked_[row] |= by;
-  asked_span(way, at[0], at[2]).add(at[1]);
-  sweep.planes[static_cast<std::size_t>(way)].add(at[2]);
+  pending_[row] |= by;
+  pending_range(sense, at[0], at[2]).add(at[1]);
+  sweep.planes[static_cast<std::size_t>(sense)].add(at[2]);
   sweep.columns.add(at[0]);
 }
 
-// The sources' own rows, and whom they ask. False where no sweep may begin: an anchor is among them, or they
-// are far apart.
-bool ChainWave::begin_sweep(const Pass& p, std::span<const Source> sources, Sweep& sweep) noexcept {
+// Relaxes the sources' own rows and marks their neighbours as pending. False if a source's row has an anchor;
+// then no sweep can start.
+bool ChainWave::start_sweep(const WaveArgs& p, std::span<const Source> sources, Sweep& sweep) noexcept {
   const Grid& grid = lattice_.grid();
-  std::array<Span, 3> box;
+  std::array<IntRange, 3> box;
   for (const Source& s : sources) {
     if (info(s.v / kRow).anchored) return false;
     const std::array<int, 3> at = grid.row_coordinates(s.v / kRow);
@@ -58,25 +58,25 @@ bool ChainWave::begin_sweep(const Pass& p, std::span<const Source> sources, Swee
   sweep.sources = box[2];
   for (const Source& s : sources) {
     const RowId row = s.v / kRow;
-    ask_along(p, row);
+    relax_within(p, row);
     const std::array<int, 3> at = grid.row_coordinates(row);
     constexpr int down = 1;
     for (std::size_t d = 0; d < 3; ++d) {
       for (const int by : {1, -1}) {
         std::array<int, 3> to = at;
         to[d] += by;
-        // Bits of x stand after those of y.
+        // Pending bits: y first, then x, then z.
         const int bit = (d == 0 ? 2 : d == 1 ? 0 : 4) + (by > 0 ? 0 : 1);
-        ask_row(sweep, d == 2 && by > 0 ? 0 : down, to, static_cast<std::uint8_t>(1U << bit));
+        mark_pending(sweep, d == 2 && by > 0 ? 0 : down, to, static_cast<std::uint8_t>(1U << bit));
       }
     }
   }
   return true;
 }
 
-// Of `count` rows from `row` on, y upwards or downwards, those that moved ask the rows after them in z, and
-// whoever moves_ says.
-void ChainWave::note_pulled(Sweep& sweep, RowId row, int y, int count) noexcept {
+// Notes a swept strip of `count` rows from `row` (at y) on. Rows after a moved row in z become pending, and
+// the rows beside and before it according to moves_.
+void ChainWave::note_swept(Sweep& sweep, RowId row, int y, int count) noexcept {
   const Plane& plane = sweep.plane;
   const RowId row_x = lattice_.grid().row_x, row_z = lattice_.grid().row_z;
   const RowId next = static_cast<RowId>(plane.z) * row_z, beside = static_cast<RowId>(plane.x) * row_x;
@@ -85,18 +85,18 @@ void ChainWave::note_pulled(Sweep& sweep, RowId row, int y, int count) noexcept 
                      from_x = plane.x > 0 ? kFromBelowX : kFromAboveX,
                      back_x = plane.x > 0 ? kFromAboveX : kFromBelowX;
   const int at_end = plane.x > 0 ? kLastMoved : kFirstMoved;
-  // All rows of a line are looked up together.
+  // All rows of a line in y are looked up together.
   (void)info(row + beside);
   (void)info(row - beside);
-  // At hand here: after each byte that is written below, members would be read again.
-  std::uint8_t* const asked = asked_.data();
+  // Local copies: the compiler would reload members after each byte that is written below.
+  std::uint8_t* const pending = pending_.data();
   const Moved* const moves = moves_.data();
   const int step = plane.step;
   const RowId row_y = static_cast<RowId>(step);
   const float* const u = plane.u;
   const std::uint8_t* const labels = lattice_.labels(0);
-  Span moved, asked_beside, asked_back;
-  int run = 0;  // rows one after the other that moved
+  IntRange moved, pending_beside, pending_back;
+  int run = 0;  // consecutive rows that moved
   const auto note_run = [&](int end) {
     if (run == 0) return;
     const int low = step > 0 ? end - run : end - 1;
@@ -117,44 +117,45 @@ void ChainWave::note_pulled(Sweep& sweep, RowId row, int y, int count) noexcept 
     __builtin_prefetch(u + std::size_t{r + next} * kRow);
     __builtin_prefetch(u + std::size_t{r + next} * kRow + kRow / 2);
     __builtin_prefetch(labels + std::size_t{r + next} * kRow);
-    asked[r + next] |= from_z;
+    pending[r + next] |= from_z;
     if ((what & at_end) != 0 && rows_[r + beside].filled) {
-      asked[r + beside] |= from_x;
-      asked_beside.add(at);
+      pending[r + beside] |= from_x;
+      pending_beside.add(at);
     }
-    if ((what & (kAsksY | kAsksX | kAsksZ)) == 0) continue;
-    if ((what & kAsksY) != 0) {
-      asked[r - row_y] |= step > 0 ? kFromAboveY : kFromBelowY;
+    if ((what & (kRevisitY | kRevisitX | kRevisitZ)) == 0) continue;
+    if ((what & kRevisitY) != 0) {
+      pending[r - row_y] |= step > 0 ? kFromAboveY : kFromBelowY;
       (step > 0 ? sweep.down : sweep.up).add(at - step);
     }
-    if ((what & kAsksX) != 0 && rows_[r - beside].filled) {
-      asked[r - beside] |= back_x;
-      asked_back.add(at);
+    if ((what & kRevisitX) != 0 && rows_[r - beside].filled) {
+      pending[r - beside] |= back_x;
+      pending_back.add(at);
     }
-    if ((what & kAsksZ) != 0) {
-      asked[r - next] |= back_z;
+    if ((what & kRevisitZ) != 0) {
+      pending[r - next] |= back_z;
       sweep.back.add(at);
     }
   }
   note_run(count);
   sweep.next.add(moved);
-  const auto ask_column = [&](int x, const Span& span) {
+  const auto mark_column = [&](int x, const IntRange& span) {
     if (span.empty()) return;
     const int column = plane.column + x;
-    in_plane_[static_cast<std::size_t>(column)][x > 0 ? 0 : 1].add(span);
+    pending_in_plane_[static_cast<std::size_t>(column)][x > 0 ? 0 : 1].add(span);
     sweep.columns.add(column);
   };
-  ask_column(plane.x, asked_beside);
-  ask_column(-plane.x, asked_back);
+  mark_column(plane.x, pending_beside);
+  mark_column(-plane.x, pending_back);
 }
 
-// Beside anchors, or with one in it, a row is dealt with by itself, and what is asked of anchors by the
-// queue. True where it moved.
-bool ChainWave::pull_by_anchor(const Pass& p, Sweep& sweep, Pull task, RowId row, int y) noexcept {
+// Relaxes a single row that has anchors or lies beside a row with anchors. Links to rows with anchors are
+// left to the queue. True if the row moved.
+bool ChainWave::sweep_beside_anchor(const WaveArgs& p, Sweep& sweep, SweepTask task, RowId row,
+                                    int y) noexcept {
   const auto number = [this](const RowInfo* info) { return static_cast<RowId>(info - rows_.data()); };
   const std::array<RowId, 3> from{number(task.own.info - task.step),
                                   task.z.u != nullptr ? number(task.z.info) : 0, number(task.x.info)};
-  asked_[row] &= static_cast<std::uint8_t>(~task.by);
+  pending_[row] &= static_cast<std::uint8_t>(~task.mask);
   if (rows_[row].anchored) {
     for (const RowId r : from) {
       if (moved_.has(r)) enqueue(r);
@@ -164,35 +165,35 @@ bool ChainWave::pull_by_anchor(const Pass& p, Sweep& sweep, Pull task, RowId row
   task.y = !rows_[from[0]].anchored;
   if (rows_[from[1]].anchored) task.z = {};
   if (rows_[from[2]].anchored) task.x = {};
-  task.by = 0xFF;
-  task.count = task.most = 1;
-  std::uint8_t asked = 1;
-  task.asked = &asked;
-  (p.way == Way::raise ? raise_pulled : lower_pulled)(task, 1, moves_.data());
+  task.mask = 0xFF;
+  task.count = task.max_rows = 1;
+  std::uint8_t pending = 1;
+  task.pending = &pending;
+  (p.way == Way::raise ? sweep_raise : sweep_lower)(task, 1, moves_.data());
   if (moves_.front() == kNothingMoved) return false;
-  note_pulled(sweep, row, y, 1);
+  note_swept(sweep, row, y, 1);
   enqueue(row);
   return true;
 }
 
-// Rows of `span` that are asked, and those after a row that moved, upwards or downwards in y.
-void ChainWave::pull_rows(const Pass& p, Sweep& sweep, int step, const Span& span) noexcept {
+// Relaxes the pending rows of `span`, and rows that follow a moved row, upwards or downwards in y.
+void ChainWave::sweep_strip(const WaveArgs& p, Sweep& sweep, int step, const IntRange& span) noexcept {
   if (span.empty()) return;
   const Grid& grid = lattice_.grid();
   Plane& plane = sweep.plane;
   plane.step = step;
-  Pull task = sweep.task;
+  SweepTask task = sweep.task;
   task.step = step;
   const auto half = [&p](int n) { return p.limits.half[static_cast<std::size_t>(n)]; };
-  task.along_y = step > 0 ? PullHalves{half(2), half(3)} : PullHalves{half(3), half(2)};
-  task.by = static_cast<std::uint8_t>((step > 0 ? kFromBelowY : kFromAboveY) |
-                                      (plane.x > 0 ? kFromBelowX : kFromAboveX) |
-                                      (plane.z > 0 ? kFromBelowZ : kFromAboveZ));
+  task.along_y = step > 0 ? LinkHalves{half(2), half(3)} : LinkHalves{half(3), half(2)};
+  task.mask = static_cast<std::uint8_t>((step > 0 ? kFromBelowY : kFromAboveY) |
+                                        (plane.x > 0 ? kFromBelowX : kFromAboveX) |
+                                        (plane.z > 0 ? kFromBelowZ : kFromAboveZ));
   int y = step > 0 ? span.low : span.high;
-  bool on = false;
+  bool moved_before = false;
   task.count = span.high - span.low + 1;
-  task.most = step > 0 ? grid.dims[1] - y : y + 1;
-  while (task.most > 0 && (on || task.count > 0)) {
+  task.max_rows = step > 0 ? grid.dims[1] - y : y + 1;
+  while (task.max_rows > 0 && (moved_before || task.count > 0)) {
     const RowId row = grid.row(plane.column, y, plane.at);
     const auto strip = [&](RowId r) { return RowStrip{row_at(p, r), lattice_.labels(r), &info(r)}; };
     task.own = strip(row);
@@ -200,89 +201,91 @@ void ChainWave::pull_rows(const Pass& p, Sweep& sweep, int step, const Span& spa
     task.z = from_z >= 0 && from_z < grid.dims[2] ? strip(row - static_cast<RowId>(plane.z) * grid.row_z)
                                                   : RowStrip{};
     task.x = strip(row - static_cast<RowId>(plane.x) * grid.row_x);
-    task.asked = &asked_[row];
+    task.pending = &pending_[row];
     const bool by_anchor = task.own.info->anchored || (task.z.u != nullptr && task.z.info->anchored) ||
                            task.x.info->anchored || (task.own.info - step)->anchored;
-    Pulled done{1, 1};
-    if (by_anchor && (on || (asked_[row] & task.by) != 0)) {
-      on = pull_by_anchor(p, sweep, task, row, y);
+    SweepResult done{1, 1};
+    if (by_anchor && (moved_before || (pending_[row] & task.mask) != 0)) {
+      moved_before = sweep_beside_anchor(p, sweep, task, row, y);
     } else {
-      // A row that comes after one that moved is asked, too.
-      if (on) asked_[row] |= task.by;
+      // A row after a moved row is pending, too.
+      if (moved_before) pending_[row] |= task.mask;
       const std::uint64_t left = sweep.most - std::min(sweep.most, sweep.visits);
       const int most = static_cast<int>(std::min<std::uint64_t>(left, 1U << 30U));
-      done = (p.way == Way::raise ? raise_pulled : lower_pulled)(task, most, moves_.data());
-      note_pulled(sweep, row, y, done.end);
-      on = done.end > 0 && moves_[static_cast<std::size_t>(done.end - 1)] != kNothingMoved;
+      done = (p.way == Way::raise ? sweep_raise : sweep_lower)(task, most, moves_.data());
+      note_swept(sweep, row, y, done.end);
+      moved_before = done.end > 0 && moves_[static_cast<std::size_t>(done.end - 1)] != kNothingMoved;
       if (done.visits >= most) sweep.stopped = true;
     }
     sweep.visits += static_cast<std::uint64_t>(done.visits);
     task.count -= done.end;
-    task.most -= done.end;
+    task.max_rows -= done.end;
     y += done.end * step;
     if (sweep.stopped) {
-      if (on && task.most > 0) asked_[grid.row(plane.column, y, plane.at)] |= task.by;
+      if (moved_before && task.max_rows > 0) pending_[grid.row(plane.column, y, plane.at)] |= task.mask;
       sweep.rest.add({std::min(span.low, y), std::max(span.high, y)});
       return;
     }
   }
 }
 
-// The rows of one column in a plane: from where the sources stand up and down in y, and again where one is
-// asked by the next, until none is.
-void ChainWave::sweep_rows(const Pass& p, Sweep& sweep, int column, int x, const Span& span) noexcept {
+// The rows of one column in a plane: from the middle of the sources upwards and downwards in y, repeated
+// until none is pending.
+void ChainWave::sweep_column(const WaveArgs& p, Sweep& sweep, int column, int x,
+                             const IntRange& span) noexcept {
   Plane& plane = sweep.plane;
   plane.column = column;
   plane.x = x;
   const auto half = [&p](int n) { return p.limits.half[static_cast<std::size_t>(n)]; };
-  sweep.task.along_x = x > 0 ? PullHalves{half(0), half(1)} : PullHalves{half(1), half(0)};
+  sweep.task.along_x = x > 0 ? LinkHalves{half(0), half(1)} : LinkHalves{half(1), half(0)};
   sweep.task.x_above = x < 0;
   sweep.next = sweep.back = {};
-  // Beside the sources, rows may be asked by any neighbour; elsewhere only by the plane or column before.
+  // Beside the sources any neighbour may have moved; elsewhere only those in the plane or column before.
   const bool at_sources = plane.at >= sweep.sources.low - 1 && plane.at <= sweep.sources.high + 1;
   sweep.up = {};
   sweep.down = {span.low, at_sources ? span.high : std::min(sweep.y - 1, span.high)};
   if (at_sources) sweep.up = span;
-  pull_rows(p, sweep, 1, {std::max(sweep.y, span.low), span.high});
+  sweep_strip(p, sweep, 1, {std::max(sweep.y, span.low), span.high});
   while (!sweep.stopped && !(sweep.up.empty() && sweep.down.empty())) {
-    pull_rows(p, sweep, -1, std::exchange(sweep.down, {}));
+    sweep_strip(p, sweep, -1, std::exchange(sweep.down, {}));
     if (sweep.stopped) break;
-    pull_rows(p, sweep, 1, std::exchange(sweep.up, {}));
+    sweep_strip(p, sweep, 1, std::exchange(sweep.up, {}));
   }
   if (sweep.stopped) {
     sweep.rest.add(sweep.up);
     sweep.rest.add(sweep.down);
     sweep.rest.add(span);
-    asked_span(plane.z > 0 ? 0 : 1, column, plane.at).add(sweep.rest);
+    pending_range(plane.z > 0 ? 0 : 1, column, plane.at).add(sweep.rest);
     sweep.planes[plane.z > 0 ? 0 : 1].add(plane.at);
   }
-  const auto hand_on = [&](int z, int way, const Span& rows) {
+  const auto pass_to_plane = [&](int z, int sense, const IntRange& rows) {
     if (rows.empty() || z < 0 || z >= lattice_.grid().dims[2]) return;
-    asked_span(way, column, z).add(rows);
-    sweep.planes[static_cast<std::size_t>(way)].add(z);
+    pending_range(sense, column, z).add(rows);
+    sweep.planes[static_cast<std::size_t>(sense)].add(z);
   };
-  hand_on(plane.at + plane.z, plane.z > 0 ? 0 : 1, sweep.next);
-  hand_on(plane.at - plane.z, plane.z > 0 ? 1 : 0, sweep.back);
+  pass_to_plane(plane.at + plane.z, plane.z > 0 ? 0 : 1, sweep.next);
+  pass_to_plane(plane.at - plane.z, plane.z > 0 ? 1 : 0, sweep.back);
 }
 
-// The columns of one plane, likewise.
-void ChainWave::sweep_plane(const Pass& p, Sweep& sweep, int z, int by) noexcept {
-  const int way = by > 0 ? 0 : 1;
+// The columns of one plane, outwards in x and repeated until none is pending.
+void ChainWave::sweep_plane(const WaveArgs& p, Sweep& sweep, int z, int by) noexcept {
+  const int sense = by > 0 ? 0 : 1;
   sweep.plane.at = z;
   sweep.plane.z = by;
   const auto half = [&p](int n) { return p.limits.half[static_cast<std::size_t>(n)]; };
-  sweep.task.along_z = by > 0 ? PullHalves{half(4), half(5)} : PullHalves{half(5), half(4)};
+  sweep.task.along_z = by > 0 ? LinkHalves{half(4), half(5)} : LinkHalves{half(5), half(4)};
   int begin = std::clamp(sweep.column, sweep.columns.low, sweep.columns.high);
   const bool at_sources = z >= sweep.sources.low - 1 && z <= sweep.sources.high + 1;
   for (int c = sweep.columns.low; c <= sweep.columns.high; ++c) {
-    const Span span = std::exchange(asked_span(way, c, z), {});
-    in_plane_[static_cast<std::size_t>(c)] = {at_sources || c >= begin ? span : Span{},
-                                              at_sources || c < begin ? span : Span{}};
+    const IntRange span = std::exchange(pending_range(sense, c, z), {});
+    pending_in_plane_[static_cast<std::size_t>(c)] = {at_sources || c >= begin ? span : IntRange{},
+                                                      at_sources || c < begin ? span : IntRange{}};
   }
   const auto swept = [&](int column, int x) {
-    const Span span = std::exchange(in_plane_[static_cast<std::size_t>(column)][x > 0 ? 0 : 1], {});
+    const IntRange span =
+        std::exchange(pending_in_plane_[static_cast<std::size_t>(column)][x > 0 ? 0 : 1], {});
     if (span.empty()) return false;
-    sweep_rows(p, sweep, column, x, span);
+    sweep_column(p, sweep, column, x, span);
     return true;
   };
   for (bool any = true; any && !sweep.stopped; begin = sweep.columns.low) {
@@ -291,40 +294,41 @@ void ChainWave::sweep_plane(const Pass& p, Sweep& sweep, int z, int by) noexcept
     for (int c = sweep.columns.high; c >= sweep.columns.low && !sweep.stopped; --c) any = swept(c, -1) || any;
   }
   for (int c = sweep.columns.low; sweep.stopped && c <= sweep.columns.high; ++c) {
-    for (Span& span : in_plane_[static_cast<std::size_t>(c)])
-      asked_span(way, c, z).add(std::exchange(span, {}));
+    for (IntRange& span : pending_in_plane_[static_cast<std::size_t>(c)])
+      pending_range(sense, c, z).add(std::exchange(span, {}));
   }
-  if (sweep.stopped) sweep.planes[static_cast<std::size_t>(way)].add(z);
+  if (sweep.stopped) sweep.planes[static_cast<std::size_t>(sense)].add(z);
 }
 
-// Of a sweep that was stopped: the rows wait that are still to ask.
-void ChainWave::leave_sweep(const Pass& p, Sweep& sweep) noexcept {
+// After a sweep that was stopped: rows whose links to a pending row are yet to be relaxed wait.
+void ChainWave::stop_sweep(const WaveArgs& p, Sweep& sweep) noexcept {
   const Grid& grid = lattice_.grid();
   const std::array<RowId, 6> from{1, ~RowId{0}, grid.row_x, ~grid.row_x + 1, grid.row_z, ~grid.row_z + 1};
-  for (int way = 0; way < 2; ++way) {
-    const Span planes = sweep.planes[static_cast<std::size_t>(way)];
+  for (int sense = 0; sense < 2; ++sense) {
+    const IntRange planes = sweep.planes[static_cast<std::size_t>(sense)];
     for (int z = planes.low; z <= planes.high; ++z) {
       for (int c = sweep.columns.low; c <= sweep.columns.high; ++c) {
-        const Span span = std::exchange(asked_span(way, c, z), {});
+        const IntRange span = std::exchange(pending_range(sense, c, z), {});
         for (int y = std::max(span.low, 0); y <= std::min(span.high, grid.dims[1] - 1); ++y) {
           const RowId row = grid.row(c, y, z);
           for (std::size_t n = 0; n < from.size(); ++n) {
-            if ((asked_[row] >> n & 1U) != 0 && info(row - from[n]).filled)
-              wait(row - from[n], wave_bit(p.axis, p.way));
+            if ((pending_[row] >> n & 1U) != 0 && info(row - from[n]).filled)
+              postpone(row - from[n], wave_bit(p.axis, p.way));
           }
-          asked_[row] = 0;
+          pending_[row] = 0;
         }
       }
     }
   }
 }
 
-// Moves what hangs on the sources, which stand where they are to go. False where the queue is to do it.
-bool ChainWave::sweep(const Pass& p, std::span<const Source> sources, std::uint64_t most,
+// Moves the voxels that must follow the sources, which are at their new places already. False if the queue
+// must do it.
+bool ChainWave::sweep(const WaveArgs& p, std::span<const Source> sources, std::uint64_t most,
                       std::uint64_t& visits) noexcept {
   Sweep sweep;
-  if (most < kLeastSwept || !begin_sweep(p, sources, sweep)) return false;
-  sweep.most = most - kLeastSwept / 2;
+  if (most < kMinSweepBudget || !start_sweep(p, sources, sweep)) return false;
+  sweep.most = most - kMinSweepBudget / 2;
   sweep.task.margin = p.margin;
   sweep.plane.u = p.u;
   sweep.task.registers = limits_.registers();
@@ -332,8 +336,8 @@ bool ChainWave::sweep(const Pass& p, std::span<const Source> sources, std::uint6
   sweep.task.down = p.limits.half[1];
   while (!sweep.stopped && !(sweep.planes[0].empty() && sweep.planes[1].empty())) {
     for (const int by : {-1, 1}) {
-      const std::size_t way = by > 0 ? 0 : 1;
-      Span& planes = sweep.planes[way];
+      const std::size_t sense = by > 0 ? 0 : 1;
+      IntRange& planes = sweep.planes[sense];
       for (int z = by > 0 ? planes.low : planes.high; !sweep.stopped && z >= planes.low && z <= planes.high;
            z += by)
         sweep_plane(p, sweep, z, by);
@@ -343,10 +347,10 @@ bool ChainWave::sweep(const Pass& p, std::span<const Source> sources, std::uint6
   visits += sweep.visits;
   work_ += sweep.visits;
   if (sweep.stopped) {
-    leave_sweep(p, sweep);
-    // What is around the sources is settled in any case.
+    stop_sweep(p, sweep);
+    // The surroundings of the sources are settled in any case.
     for (const Source& s : sources) enqueue(s.v / kRow);
-    visits += run(p, kLeastSwept / 2);
+    visits += run_queue(p, kMinSweepBudget / 2);
   }
   return true;
 }

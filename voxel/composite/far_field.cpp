@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What is far from a contact, on a composite grid: taken along before a cycle, and fitted after it.
+// Displacements far from the contact: extrapolated before a cycle, fitted after it.
 //
-// Cycles alone are slow to tell what is far away: what moves with its bound stands still as coarser levels
-// see it, and of what pulls at its neighbours half goes to it on every level, so that of what displacements
-// lack there each cycle leaves 0.6 or so. But all of it lacks nearly the same share. So after a cycle one
-// number is found: by how much what is free goes along itself, for the least energy.
+// A cycle reduces the error there slowly (to about 0.6 of it), because active nodes do not move on coarser
+// levels and hold the free nodes linked to them. But the error is nearly the same share of the displacement
+// everywhere. So one number per axis and cycle is found after the cycle: the multiple of the unprescribed
+// part of u that minimises the energy.
 #include <algorithm>
 
 #include "voxel/composite/grid.h"
@@ -13,14 +13,14 @@
 namespace voxel {
 namespace {
 
-// Of the way to the least energy. What a cycle leaves is more than what lies along the mode: near the edge of
-// what is held it is a constant, and holds the rest back. (1: twice the error in tissue that a tool is drawn
-// out of; from 2 on energy may grow.)
+// Step along the mode, by the step to the least energy. Above 1, because part of the error does not lie along
+// the mode and holds the rest back: near the edge of the active nodes the error is constant. From 2 on the
+// energy may grow.
 constexpr double kOverrelaxation = 1.5;
-// … where what is new in a box was interpolated, and pulls at its surroundings for that: with all of it a
-// tool that slid at 0.1 m/s felt a step of 0.09 of what is just noticeable each time.
+// The same after a patch has moved. Its new nodes are interpolated, and their residual is not an error of the
+// far field: a full step would be felt by a sliding tool.
 constexpr double kAfterMove = 0.5;
-constexpr double kMaxStep = 0.5;  // of displacements, in one cycle
+constexpr double kMaxStep = 0.5;  // of the mode, in one cycle
 
 }  // namespace
 
@@ -32,9 +32,8 @@ void CompositeGrid::extrapolate(std::size_t a, double share, double most_m) noex
   }
 }
 
-// A line search, once per axis and cycle, along how far each node is beyond its bound: all of a displacement
-// far away, nothing of what is held. (ModeResponse the displacements of whatever is not held, links at its edge
-// would be all that is felt of it.)
+// Line search along beyond_bounds(), which is all of u far away, and 0 at a bound. Masking u to the free
+// nodes would not do: the links at the edge of the mask would dominate the response.
 void CompositeGrid::fit_far_field(std::size_t a) noexcept {
   composite::ModeResponse sum;
   for (std::size_t l = 0; l <= covering_level_; ++l) {
@@ -43,25 +42,25 @@ void CompositeGrid::fit_far_field(std::size_t a) noexcept {
     if (l > 0) {
       inject_from_finer(l, a);
       for (std::size_t d = 0; d < 3; ++d) {
-        finer_first[d] = levels_[l - 1].line[d].coarse_first;
-        finer_last[d] = levels_[l - 1].line[d].coarse_last;
+        finer_first[d] = levels_[l - 1].nodes[d].coarse_first;
+        finer_last[d] = levels_[l - 1].nodes[d].coarse_last;
       }
     }
     const composite::LevelView v = view(l, a);
-    float* const beyond = level.old.data() + level.first_row();
-    composite::beyond_bounds(v.u, v.least, v.most_negative, beyond, level.floats());
+    float* const beyond = level.restricted_u.data() + level.first_row();
+    composite::beyond_bounds(v.u, v.lower, v.negated_upper, beyond, level.floats());
     const composite::ModeResponse own = composite::mode_response(v, beyond, finer_first, finer_last);
-    sum.pull += own.pull;
+    sum.force += own.force;
     sum.stiffness += own.stiffness;
   }
   if (!(sum.stiffness > 0.0)) return;
   const double part = patch_moved_ ? kAfterMove : kOverrelaxation;
-  const auto by = static_cast<float>(std::clamp(part * sum.pull / sum.stiffness, -kMaxStep, kMaxStep));
+  const auto by = static_cast<float>(std::clamp(part * sum.force / sum.stiffness, -kMaxStep, kMaxStep));
   for (std::size_t l = 0; l <= covering_level_; ++l) {
     Level& level = levels_[l];
     const composite::LevelView v = view(l, a);
-    composite::step_along_mode(v.u, level.old.data() + level.first_row(), by, v.least, v.most_negative,
-                        level.floats());
+    composite::step_along_mode(v.u, level.restricted_u.data() + level.first_row(), by, v.lower,
+                               v.negated_upper, level.floats());
   }
 }
 

@@ -7,18 +7,16 @@
 namespace voxel {
 namespace {
 
-constexpr int kCoarsest = 5;  // nodes an edge
-constexpr std::size_t kMaxPressed = 2048;
+using composite::index;
 
-std::size_t index(int i) {
-  return static_cast<std::size_t>(i);
-}
+constexpr int kCoarsest = 5;  // nodes along the longest edge of the coarsest level
+constexpr std::size_t kMaxPressed = 2048;
 
 }  // namespace
 
 CompositeGrid::CompositeGrid(const Lattice& lattice, int half_width, int coarse_half_width)
     : lattice_(lattice),
-      cells_(lattice),
+      material_(lattice),
       half_width_(half_width == kRefineAll ? kRefineAll : std::max((half_width + 1) / 2 * 2, kHalfWidth)),
       coarse_half_width_(std::max((coarse_half_width + 1) / 2 * 2, kHalfWidth)) {
   const auto& dims = lattice.grid().dims;
@@ -30,37 +28,38 @@ CompositeGrid::CompositeGrid(const Lattice& lattice, int half_width, int coarse_
     for (int axis = 0; axis < 3; ++axis) {
       spring_N_per_m_[dd][index(axis)] = spring.on(axis, d);
       limit_m_[dd][index(axis)] = axis == d ? std::array<float, 2>{-limit.along_low, limit.along_high}
-                                         : std::array<float, 2>{limit.across, limit.across};
+                                            : std::array<float, 2>{limit.across, limit.across};
     }
   }
   pressed_.reserve(kMaxPressed);
   const int largest = *std::max_element(dims.begin(), dims.end());
-  const auto nodes = [largest](std::size_t l) { return (largest - 1 + (1 << l) - 1) / (1 << l) + 1; };
-  while (half_width_ != kRefineAll && nodes(covering_level_) > 2 * half_width_of(covering_level_) + 1) ++covering_level_;
+  const auto nodes_across = [largest](std::size_t l) { return (largest - 1 + (1 << l) - 1) / (1 << l) + 1; };
+  while (half_width_ != kRefineAll && nodes_across(covering_level_) > 2 * half_width_of(covering_level_) + 1)
+    ++covering_level_;
   std::size_t count = covering_level_ + 1;
-  while (nodes(count - 1) > kCoarsest) ++count;
+  while (nodes_across(count - 1) > kCoarsest) ++count;
   levels_.resize(count);
   for (std::size_t l = 0; l < count; ++l) allocate(levels_[l], l);
   if (covering_level_ > 0) allocate_for_moves();
-  // What weighing a level takes: its half cells, two a node and axis and one on either side, a plane at a
-  // time.
+  // Scratch of weigh(): one plane of half cells, two a node and axis and one on either side.
   std::size_t most = 0;
   for (const Level& level : levels_) {
-    for (const AxisNodes& line : level.line) most = std::max(most, line.coarse.size());
+    for (const AxisNodes& axis : level.nodes) most = std::max(most, axis.coarse.size());
   }
   for (HalfCells& plane : half_cells_) {
     plane.cells.reserve((2 * most + 2) * (2 * most + 2));
-    for (Floats& axis : plane.stiff) axis.reserve(cells_.several() ? plane.cells.capacity() : 0);
+    for (Floats& axis : plane.stiffness)
+      axis.reserve(material_.is_heterogeneous() ? plane.cells.capacity() : 0);
   }
-  cells_.allocate(2 * most + 2);
+  material_.reserve_planes(2 * most + 2);
   begin({dims[0] / 2, dims[1] / 2, dims[2] / 2});
 }
 
 void CompositeGrid::fine_patch(Index3& low, Index3& high) const noexcept {
-  const auto& line = levels_[0].line;
+  const auto& nodes = levels_[0].nodes;
   for (std::size_t d = 0; d < 3; ++d) {
-    low[d] = std::max(line[d].begin + line[d].first - cells_.offset()[d], 0);
-    high[d] = std::min(line[d].begin + line[d].last - cells_.offset()[d], lattice_.grid().dims[d] - 1);
+    low[d] = std::max(nodes[d].begin + nodes[d].first - material_.offset()[d], 0);
+    high[d] = std::min(nodes[d].begin + nodes[d].last - material_.offset()[d], lattice_.grid().dims[d] - 1);
   }
 }
 
@@ -68,16 +67,16 @@ bool CompositeGrid::in_fine_patch(const Index3& voxel) const noexcept {
   const Index3 p = shifted(voxel);
   const Level& level = levels_[0];
   for (std::size_t d = 0; d < 3; ++d) {
-    const int i = p[d] - level.line[d].begin;
-    if (i < level.line[d].first || i > level.line[d].last) return false;
+    const int i = p[d] - level.nodes[d].begin;
+    if (i < level.nodes[d].first || i > level.nodes[d].last) return false;
   }
-  return level.inverse[0][fine_node(voxel)] != 0.0F;
+  return level.inverse_diagonal[0][fine_node(voxel)] != 0.0F;
 }
 
 std::size_t CompositeGrid::fine_node(const Index3& voxel) const {
   const Index3 p = shifted(voxel);
   const Level& level = levels_[0];
-  return level.node(p[0] - level.line[0].begin, p[1] - level.line[1].begin, p[2] - level.line[2].begin);
+  return level.node(p[0] - level.nodes[0].begin, p[1] - level.nodes[1].begin, p[2] - level.nodes[2].begin);
 }
 
 glm::dvec3 CompositeGrid::fine_at(const Index3& voxel) const noexcept {
@@ -95,21 +94,22 @@ glm::dvec3 CompositeGrid::unconstrained_minimum(const Index3& voxel) const noexc
   const std::size_t n = fine_node(voxel);
   glm::dvec3 place(0.0);
   for (std::size_t a = 0; a < 3; ++a) {
-    const auto& link = weights_on(level, a);
+    const auto& weight = weights_on(level, a);
     double sum = 0.0;
     for (std::size_t d = 0; d < 3; ++d) {
-      const std::size_t by = level.by(d);
-      sum += static_cast<double>(spring_N_per_m_[d][a] *
-                                 (link[d][n] * level.u[a][n + by] + link[d][n - by] * level.u[a][n - by]));
+      const std::size_t by = level.stride_along(d);
+      sum += static_cast<double>(spring_N_per_m_[d][a] * (weight[d][n] * level.u[a][n + by] +
+                                                          weight[d][n - by] * level.u[a][n - by]));
     }
-    place[static_cast<int>(a)] = sum * static_cast<double>(level.inverse[a][n]);
+    place[static_cast<int>(a)] = sum * static_cast<double>(level.inverse_diagonal[a][n]);
   }
   return place;
 }
 
 glm::dvec3 CompositeGrid::compliance(const Index3& voxel) const noexcept {
   const std::size_t n = fine_node(voxel);
-  return {levels_[0].inverse[0][n], levels_[0].inverse[1][n], levels_[0].inverse[2][n]};
+  return {levels_[0].inverse_diagonal[0][n], levels_[0].inverse_diagonal[1][n],
+          levels_[0].inverse_diagonal[2][n]};
 }
 
 glm::dvec3 CompositeGrid::clamp_to_anchors(const Index3& voxel, const glm::dvec3& u) const noexcept {
@@ -117,10 +117,10 @@ glm::dvec3 CompositeGrid::clamp_to_anchors(const Index3& voxel, const glm::dvec3
   const auto& dims = lattice_.grid().dims;
   for (std::size_t d = 0; d < 3; ++d) {
     for (const std::size_t end : {std::size_t{0}, std::size_t{1}}) {
-      if (cells_.anchored_part(d, end) < 1.0) continue;
+      if (material_.anchored_share(d, end) < 1.0) continue;
       const int links = end == 1 ? dims[d] - 1 - voxel[d] : voxel[d];
       for (std::size_t a = 0; a < 3; ++a) {
-        // Beyond the low face u = u(b) − u(a) of a chain of links, beyond the high one the reverse.
+        // Above the low face u is the extension of the chain of links; below the high face −u is.
         const double shorter = links * static_cast<double>(limit_m_[d][a][0]),
                      longer = links * static_cast<double>(limit_m_[d][a][1]);
         double& at = result[static_cast<int>(a)];
@@ -134,9 +134,10 @@ glm::dvec3 CompositeGrid::clamp_to_anchors(const Index3& voxel, const glm::dvec3
 void CompositeGrid::press(const Index3& voxel, const glm::dvec3& u, const glm::dvec3& normal) noexcept {
   if (pressed_.size() == kMaxPressed) return;
   const Index3 p = shifted(voxel);
-  const auto& line = levels_[0].line;
-  pressed_.push_back(
-      {{p[0] - line[0].begin, p[1] - line[1].begin, p[2] - line[2].begin}, glm::vec3(u), glm::vec3(normal)});
+  const auto& nodes = levels_[0].nodes;
+  pressed_.push_back({{p[0] - nodes[0].begin, p[1] - nodes[1].begin, p[2] - nodes[2].begin},
+                      glm::vec3(u),
+                      glm::vec3(normal)});
 }
 
 }  // namespace voxel

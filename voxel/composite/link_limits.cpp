@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Links of a composite grid that bounds of its nodes do not hold.
+// Multipliers of links at their limits, where bounds of nodes do not suffice.
 //
-// In a body of one tissue bounds are enough (grid.h). Where a soft tissue lies between stiffer ones
-// it would be squeezed beyond its limits while these hardly yield: what a link then carries over and above
-// its spring has to be known, link by link. It is known as a stiffness: a link beyond its limit is taken to
-// be that much stiffer, cycle by cycle, until it is at its limit, and one that is within it again softens
-// until it is its spring alone. At rest that is the multiplier of the limit (u is the least of the energy
-// within limits: force along the link, only at its limit, and never the other way), and since all that is
-// asked of a level is what its links are worth, cycles stay what they are. What the springs store does not
-// count it.
+// In a body of one tissue bounds suffice (grid.h). A soft tissue between stiffer ones would be compressed
+// beyond its limits. There each link at its limit carries a reaction beside its spring: the multiplier of the
+// limit. It is stored as additional stiffness. After each cycle links beyond their limit become stiffer, and
+// links within it softer again, but never softer than their spring. In equilibrium this is the optimum within
+// the limits: a reaction acts along its link, only at the limit, and only against the limit. Cycles need no
+// change, because a level knows its links by their weights alone. The energy of the springs does not count
+// multipliers.
 #include <algorithm>
 
 #include "voxel/composite/grid.h"
@@ -17,40 +16,40 @@
 namespace voxel {
 namespace {
 
-constexpr float kMaxFactor = 1e3F;
-constexpr float kTolerance = 2e-3F;  // of a limit
+using composite::index;
 
-std::size_t index(int i) {
-  return static_cast<std::size_t>(i);
-}
+constexpr float kMaxFactor = 1e3F;
+constexpr float kTolerance = 2e-3F;  // relative to a limit
 
 }  // namespace
 
-composite::LinkMultiplier CompositeGrid::link_multiplier(const Level& level, std::size_t a, std::size_t d) const noexcept {
+composite::LinkMultiplier CompositeGrid::link_multiplier(const Level& level, std::size_t a,
+                                                         std::size_t d) const noexcept {
   const auto step = static_cast<float>(level.step);
   return {1.0F / (step * limit_m_[d][a][1]), 1.0F / (step * limit_m_[d][a][0]), kTolerance, kMaxFactor};
 }
 
-// After a cycle.
+// After a cycle on axis `a`.
 void CompositeGrid::update_multipliers(std::size_t a) noexcept {
-  if (!cells_.several()) return;
+  if (!material_.is_heterogeneous()) return;
   if (!multipliers_active_[a]) {
     float most = 0.0F;
     for (std::size_t l = 0; l <= covering_level_; ++l) {
       const Level& level = levels_[l];
       const std::size_t from = level.first_row();
       for (std::size_t d = 0; d < 3; ++d) {
-        most =
-            std::max(most, composite::largest_limit_ratio(level.u[a].data() + from, level.weight[d].data() + from,
-                                                    level.by(d), link_multiplier(level, a, d), level.floats()));
+        most = std::max(most, composite::largest_limit_ratio(
+                                  level.u[a].data() + from, level.weight[d].data() + from,
+                                  level.stride_along(d), link_multiplier(level, a, d), level.floats()));
       }
     }
     if (most <= 1.0F + kTolerance) return;
     multipliers_active_[a] = true;
     for (Level& level : levels_) {
       for (std::size_t d = 0; d < 3; ++d) {
-        std::copy(level.weight[d].begin(), level.weight[d].end(), level.link[a][d].begin());
-        std::copy(level.hold[d].begin(), level.hold[d].end(), level.held_link[a][d].begin());
+        std::copy(level.weight[d].begin(), level.weight[d].end(), level.limited_weight[a][d].begin());
+        std::copy(level.anchor_weight[d].begin(), level.anchor_weight[d].end(),
+                  level.limited_anchor_weight[a][d].begin());
       }
     }
   }
@@ -60,9 +59,10 @@ void CompositeGrid::update_multipliers(std::size_t a) noexcept {
     const std::size_t from = level.first_row();
     for (std::size_t d = 0; d < 3; ++d) {
       const composite::LinkMultiplier limit = link_multiplier(level, a, d);
-      most = std::max(
-          most, composite::update_row_weights(level.u[a].data() + from, level.weight[d].data() + from, level.by(d),
-                                         limit, level.link[a][d].data() + from, level.floats()));
+      most =
+          std::max(most, composite::update_row_weights(
+                             level.u[a].data() + from, level.weight[d].data() + from, level.stride_along(d),
+                             limit, level.limited_weight[a][d].data() + from, level.floats()));
       most = std::max(most, update_anchor_multipliers(level, a, d));
     }
   }
@@ -74,72 +74,75 @@ void CompositeGrid::update_multipliers(std::size_t a) noexcept {
   for (Level& level : levels_) update_diagonal(level, a);
 }
 
-// Links to anchors, likewise.
+// The same update of the links to anchors. Returns the largest factor, >= 1.
 float CompositeGrid::update_anchor_multipliers(Level& level, std::size_t a, std::size_t d) noexcept {
   float most = 1.0F;
-  if (!level.holds) return most;
+  if (!level.has_anchors) return most;
   const std::size_t from = level.first_row(), end = from + level.floats();
-  const float *const hold = level.hold[d].data(), *const reach = level.reach[d].data();
+  const float *const weight = level.anchor_weight[d].data(), *const distance =
+                                                                 level.anchor_distance[d].data();
   const float* const u = level.u[a].data();
-  float* const held = level.held_link[a][d].data();
+  float* const limited = level.limited_anchor_weight[a][d].data();
   for (std::size_t n = from; n < end; ++n) {
-    if (hold[n] == 0.0F) continue;
-    // Longer by −u where the anchor is ahead.
-    const float longer = -u[n] / reach[n];
-    const float of_limit = std::max(longer / limit_m_[d][a][1], -longer / limit_m_[d][a][0]);
-    held[n] = composite::updated_weight(held[n], hold[n], of_limit, link_multiplier(level, a, d));
-    most = std::max(most, held[n] / hold[n]);
+    if (weight[n] == 0.0F) continue;
+    // The link's extension is −u if the anchor is ahead, u if it is behind.
+    const float longer = -u[n] / distance[n];
+    const float limit_ratio = std::max(longer / limit_m_[d][a][1], -longer / limit_m_[d][a][0]);
+    limited[n] = composite::updated_weight(limited[n], weight[n], limit_ratio, link_multiplier(level, a, d));
+    most = std::max(most, limited[n] / weight[n]);
   }
   return most;
 }
 
-// Under a finer level, what its two links on the way are worth one after the other.
+// Under the finer level a link gets the factor by which its two fine links, in series, have become stiffer.
 void CompositeGrid::restrict_multipliers(std::size_t l, std::size_t a) noexcept {
   const Level& fine = levels_[l - 1];
   Level& coarse = levels_[l];
-  const auto& line = fine.line;
+  const auto& nodes = fine.nodes;
   const auto within = [&](std::size_t d, int c) {
-    const int here = line[d].fine[index(c)];
-    return here >= 0 && here < line[d].count;
+    const int here = nodes[d].fine[index(c)];
+    return here >= 0 && here < nodes[d].count;
   };
-  for (int k = line[2].coarse_first; k <= line[2].coarse_last; ++k) {
-    for (int j = line[1].coarse_first; j <= line[1].coarse_last; ++j) {
-      for (int i = line[0].coarse_first; i <= line[0].coarse_last; ++i) {
+  for (int k = nodes[2].coarse_first; k <= nodes[2].coarse_last; ++k) {
+    for (int j = nodes[1].coarse_first; j <= nodes[1].coarse_last; ++j) {
+      for (int i = nodes[0].coarse_first; i <= nodes[0].coarse_last; ++i) {
         const Index3 c{i, j, k};
         if (!within(0, i) || !within(1, j) || !within(2, k)) continue;
         const std::size_t at =
-            fine.node(line[0].fine[index(i)], line[1].fine[index(j)], line[2].fine[index(k)]);
+            fine.node(nodes[0].fine[index(i)], nodes[1].fine[index(j)], nodes[2].fine[index(k)]);
         const std::size_t here = coarse.node(i, j, k);
         for (std::size_t d = 0; d < 3; ++d) {
-          if (line[d].fine[index(c[d])] + 2 >= line[d].count) continue;
-          const std::size_t next = at + fine.by(d);
+          if (nodes[d].fine[index(c[d])] + 2 >= nodes[d].count) continue;
+          const std::size_t next = at + fine.stride_along(d);
           const float one = fine.weight[d][at], other = fine.weight[d][next];
-          const float one_held = fine.link[a][d][at], other_held = fine.link[a][d][next];
+          const float one_limited = fine.limited_weight[a][d][at],
+                      other_limited = fine.limited_weight[a][d][next];
           if (one <= 0.0F || other <= 0.0F) continue;
-          const float stiffer = (1.0F / one + 1.0F / other) / (1.0F / one_held + 1.0F / other_held);
-          coarse.link[a][d][here] = stiffer * coarse.weight[d][here];
+          const float stiffer = (1.0F / one + 1.0F / other) / (1.0F / one_limited + 1.0F / other_limited);
+          coarse.limited_weight[a][d][here] = stiffer * coarse.weight[d][here];
         }
       }
     }
   }
 }
 
-// What all links of a node are worth on an axis.
+// Diagonal and its inverse from the weights that now hold on axis `a`.
 void CompositeGrid::update_diagonal(Level& level, std::size_t a) const noexcept {
-  const auto& line = level.line;
-  const auto& link = weights_on(level, a);
-  const auto& hold = anchor_weights_on(level, a);
+  const auto& nodes = level.nodes;
+  const auto& weight = weights_on(level, a);
+  const auto& anchor_weight = anchor_weights_on(level, a);
   const float sx = spring_N_per_m_[0][a], sy = spring_N_per_m_[1][a], sz = spring_N_per_m_[2][a];
-  for (int k = line[2].first; k <= line[2].last; ++k) {
-    for (int j = line[1].first; j <= line[1].last; ++j) {
+  for (int k = nodes[2].first; k <= nodes[2].last; ++k) {
+    for (int j = nodes[1].first; j <= nodes[1].last; ++j) {
       const std::size_t row = level.row(j, k);
-      const float *const x = link[0].data() + row, *const y = link[1].data() + row,
-                         *const z = link[2].data() + row;
+      const float *const x = weight[0].data() + row, *const y = weight[1].data() + row,
+                         *const z = weight[2].data() + row;
       const float *const back_x = x - 1, *const back_y = y - level.stride, *const back_z = z - level.plane;
-      const float *const hx = hold[0].data() + row, *const hy = hold[1].data() + row,
-                         *const hz = hold[2].data() + row;
-      float *const all = level.all[a].data() + row, *const inverse = level.inverse[a].data() + row;
-      for (int i = line[0].first; i <= line[0].last; ++i) {
+      const float *const hx = anchor_weight[0].data() + row, *const hy = anchor_weight[1].data() + row,
+                         *const hz = anchor_weight[2].data() + row;
+      float *const all = level.diagonal[a].data() + row, *const inverse =
+                                                             level.inverse_diagonal[a].data() + row;
+      for (int i = nodes[0].first; i <= nodes[0].last; ++i) {
         const float sum = sx * (x[i] + back_x[i] + hx[i]) + sy * (y[i] + back_y[i] + hy[i]) +
                           sz * (z[i] + back_z[i] + hz[i]);
         const bool moves = inverse[i] > 0.0F;
@@ -150,7 +153,7 @@ void CompositeGrid::update_diagonal(Level& level, std::size_t a) const noexcept 
   }
 }
 
-// Of a contact that is over.
+// Drops all multipliers when a contact ends.
 void CompositeGrid::release_multipliers() noexcept {
   for (std::size_t a = 0; a < 3; ++a) {
     if (!multipliers_active_[a]) continue;
@@ -159,40 +162,44 @@ void CompositeGrid::release_multipliers() noexcept {
   }
 }
 
-// Of a level whose box moves: how many times stiffer its links are, into before_move_.
+// Saves into before_move_ by which factor the links of a level are stiffer.
 void CompositeGrid::save_multipliers(const Level& level) noexcept {
   for (std::size_t a = 0; a < 3; ++a) {
     if (!multipliers_active_[a]) continue;
     for (std::size_t d = 0; d < 3; ++d) {
-      const auto keep = [](const Floats& held, const Floats& link, Floats& to) {
-        for (std::size_t n = 0; n < held.size(); ++n) to[n] = link[n] > 0.0F ? held[n] / link[n] : 1.0F;
+      const auto save = [](const Floats& limited, const Floats& weight, Floats& to) {
+        for (std::size_t n = 0; n < limited.size(); ++n)
+          to[n] = weight[n] > 0.0F ? limited[n] / weight[n] : 1.0F;
       };
-      keep(level.link[a][d], level.weight[d], before_move_.link[a][d]);
-      keep(level.held_link[a][d], level.hold[d], before_move_.held_link[a][d]);
+      save(level.limited_weight[a][d], level.weight[d], before_move_.limited_weight[a][d]);
+      save(level.limited_anchor_weight[a][d], level.anchor_weight[d],
+           before_move_.limited_anchor_weight[a][d]);
     }
   }
 }
 
-// … and in the box where it is now, `by` nodes further on.
+// Restores these factors in the patch at its new place, `by` nodes further on.
 void CompositeGrid::restore_multipliers(Level& level, const Index3& by) noexcept {
-  const auto& line = level.line;
+  const auto& nodes = level.nodes;
   for (std::size_t a = 0; a < 3; ++a) {
     if (!multipliers_active_[a]) continue;
     for (std::size_t d = 0; d < 3; ++d) {
-      std::copy(level.weight[d].begin(), level.weight[d].end(), level.link[a][d].begin());
-      std::copy(level.hold[d].begin(), level.hold[d].end(), level.held_link[a][d].begin());
+      std::copy(level.weight[d].begin(), level.weight[d].end(), level.limited_weight[a][d].begin());
+      std::copy(level.anchor_weight[d].begin(), level.anchor_weight[d].end(),
+                level.limited_anchor_weight[a][d].begin());
     }
-    for (int k = 0; k < line[2].count; ++k) {
-      for (int j = 0; j < line[1].count; ++j) {
-        for (int i = 0; i < line[0].count; ++i) {
+    for (int k = 0; k < nodes[2].count; ++k) {
+      for (int j = 0; j < nodes[1].count; ++j) {
+        for (int i = 0; i < nodes[0].count; ++i) {
           const Index3 was{i + by[0], j + by[1], k + by[2]};
           bool known = true;
-          for (std::size_t d = 0; d < 3; ++d) known = known && was[d] >= 0 && was[d] < before_move_.line[d].count;
+          for (std::size_t d = 0; d < 3; ++d)
+            known = known && was[d] >= 0 && was[d] < before_move_.nodes[d].count;
           if (!known) continue;
           const std::size_t to = level.node(i, j, k), from = before_move_.node(was[0], was[1], was[2]);
           for (std::size_t d = 0; d < 3; ++d) {
-            level.link[a][d][to] *= before_move_.link[a][d][from];
-            level.held_link[a][d][to] *= before_move_.held_link[a][d][from];
+            level.limited_weight[a][d][to] *= before_move_.limited_weight[a][d][from];
+            level.limited_anchor_weight[a][d][to] *= before_move_.limited_anchor_weight[a][d][from];
           }
         }
       }

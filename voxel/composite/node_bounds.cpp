@@ -1,38 +1,38 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The bounds of a composite grid's nodes: cones of what is pressed, along the links there are.
+// Bounds of the nodes of a CompositeGrid: cones from the pressed voxels, along existing links (grid.h).
 #include <algorithm>
 #include <cmath>
 
 #include "voxel/composite/grid.h"
+#include "voxel/composite/row_kernels.h"
 
 namespace voxel {
 namespace {
 
-constexpr float kNoBound = -1e30F;  // no bound
-// Of a normal: an axis of which less is in it does not hold what is pressed. (With a quarter, what a ball
-// pressed aside by little came back, axis by axis, and went to and fro.)
-constexpr float kAlong = 0.02F;
-constexpr int kRounds = 2;  // of sweeps where paths may bend
+using composite::index;
 
-std::size_t index(int i) {
-  return static_cast<std::size_t>(i);
-}
+using composite::kNoBound;
+
+// A pressed voxel gets bounds on the axes on which its normal has more than this. A larger value would let
+// voxels that a ball presses aside slightly move back, and the contact would oscillate.
+constexpr float kAlong = 0.02F;
+constexpr int kSweepRounds = 2;
 
 }  // namespace
 
-// From the nodes of a box, low … high, which are right among themselves, to all nodes: where all links are
-// there the shortest path goes axis by axis.
-void CompositeGrid::spread_bounds(Level& level, std::size_t a, std::size_t kind, const Index3& low,
-                                  const Index3& high) const noexcept {
+// Propagates bounds from the nodes low … high, whose bounds are consistent, to all nodes of a level without
+// gaps. There a shortest path takes one axis after another.
+void CompositeGrid::propagate_bounds(Level& level, std::size_t a, std::size_t kind, const Index3& low,
+                                     const Index3& high) const noexcept {
   float* const bound = level.bound[kind].data();
-  const auto& line = level.line;
+  const auto& nodes = level.nodes;
   const auto step = static_cast<float>(level.step);
-  // u(b) >= u(a) − shorter, and u(a) >= u(b) − longer; of −u the reverse.
+  // For a link from a up to b: u(b) >= u(a) − limit[0] and u(a) >= u(b) − limit[1]; for −u the reverse.
   const auto fall = [&](std::size_t d, bool up) { return limit_m_[d][a][(up ? 0U : 1U) ^ kind] * step; };
   for (int k = low[2]; k <= high[2]; ++k) {
     for (int j = low[1]; j <= high[1]; ++j) {
       float* row = bound + level.row(j, k);
-      for (int i = low[0] + 1; i < line[0].count; ++i) row[i] = std::max(row[i], row[i - 1] - fall(0, true));
+      for (int i = low[0] + 1; i < nodes[0].count; ++i) row[i] = std::max(row[i], row[i - 1] - fall(0, true));
       for (int i = high[0] - 1; i >= 0; --i) row[i] = std::max(row[i], row[i + 1] - fall(0, false));
     }
   }
@@ -41,25 +41,27 @@ void CompositeGrid::spread_bounds(Level& level, std::size_t a, std::size_t kind,
     for (std::size_t i = 0; i < lanes; ++i) to[i] = std::max(to[i], from[i] - by);
   };
   for (int k = low[2]; k <= high[2]; ++k) {
-    for (int j = low[1] + 1; j < line[1].count; ++j)
+    for (int j = low[1] + 1; j < nodes[1].count; ++j)
       from_row(bound + level.row(j, k), bound + level.row(j - 1, k), fall(1, true));
     for (int j = high[1] - 1; j >= 0; --j)
       from_row(bound + level.row(j, k), bound + level.row(j + 1, k), fall(1, false));
   }
-  for (int k = low[2] + 1; k < line[2].count; ++k) {
-    for (int j = 0; j < line[1].count; ++j)
+  for (int k = low[2] + 1; k < nodes[2].count; ++k) {
+    for (int j = 0; j < nodes[1].count; ++j)
       from_row(bound + level.row(j, k), bound + level.row(j, k - 1), fall(2, true));
   }
   for (int k = high[2] - 1; k >= 0; --k) {
-    for (int j = 0; j < line[1].count; ++j)
+    for (int j = 0; j < nodes[1].count; ++j)
       from_row(bound + level.row(j, k), bound + level.row(j, k + 1), fall(2, false));
   }
 }
 
-// The same where links are missing: sweeps to and fro, no path bends more often than they do.
-void CompositeGrid::spread_round_gaps(Level& level, std::size_t a, std::size_t kind) const noexcept {
+// Propagates bounds where links are missing, by alternating sweeps. It misses shortest paths with more bends
+// than kSweepRounds rounds of sweeps can follow.
+void CompositeGrid::propagate_bounds_round_gaps(Level& level, std::size_t a,
+                                                std::size_t kind) const noexcept {
   float* const bound = level.bound[kind].data();
-  const auto& line = level.line;
+  const auto& nodes = level.nodes;
   const auto step = static_cast<float>(level.step);
   const auto fall = [&](std::size_t d, bool up) { return limit_m_[d][a][(up ? 0U : 1U) ^ kind] * step; };
   const std::size_t lanes = level.stride;
@@ -69,8 +71,8 @@ void CompositeGrid::spread_round_gaps(Level& level, std::size_t a, std::size_t k
       to[i] = std::max(to[i], asked);
     }
   };
-  const int nx = line[0].count, ny = line[1].count, nz = line[2].count;
-  for (int round = 0; round < kRounds; ++round) {
+  const int nx = nodes[0].count, ny = nodes[1].count, nz = nodes[2].count;
+  for (int round = 0; round < kSweepRounds; ++round) {
     for (int k = 0; k < nz; ++k) {
       for (int j = 0; j < ny; ++j) {
         float* row = bound + level.row(j, k);
@@ -116,12 +118,12 @@ void CompositeGrid::find_bounds(std::size_t a) noexcept {
   for (std::size_t kind = 0; kind < 2; ++kind) {
     const float sign = kind == 0 ? 1.0F : -1.0F;
     for (Level& level : levels_) level.bounded[kind] = false;
-    const auto holds = [&](const Pressed& p) { return sign * p.normal[axis] > kAlong; };
-    float most = kNoBound;
+    const auto constrains = [&](const Pressed& p) { return sign * p.normal[axis] > kAlong; };
+    float strongest = kNoBound;
     for (const Pressed& p : pressed_) {
-      if (holds(p)) most = std::max(most, sign * p.u[axis]);
+      if (constrains(p)) strongest = std::max(strongest, sign * p.u[axis]);
     }
-    if (most == kNoBound) continue;
+    if (strongest == kNoBound) continue;
     Index3 low{1 << 20, 1 << 20, 1 << 20}, high{-1, -1, -1};
     for (std::size_t l = 0; l < levels_.size(); ++l) {
       Level& level = levels_[l];
@@ -130,7 +132,7 @@ void CompositeGrid::find_bounds(std::size_t a) noexcept {
       level.bounded[kind] = true;
       if (l == 0) {
         for (const Pressed& p : pressed_) {
-          if (!holds(p)) continue;
+          if (!constrains(p)) continue;
           float& at = bound[level.node(p.node[0], p.node[1], p.node[2])];
           at = std::max(at, sign * p.u[axis]);
           for (std::size_t d = 0; d < 3; ++d) {
@@ -140,14 +142,14 @@ void CompositeGrid::find_bounds(std::size_t a) noexcept {
         }
       } else {
         const Level& fine = levels_[l - 1];
-        const auto& line = fine.line;
-        // Nodes of this level that are nodes of that.
+        const auto& nodes = fine.nodes;
+        // Nodes of this level that coincide with nodes of the finer level take their bounds.
         for (std::size_t d = 0; d < 3; ++d) {
-          low[d] = level.line[d].count;
+          low[d] = level.nodes[d].count;
           high[d] = -1;
-          for (int c = 0; c < level.line[d].count; ++c) {
-            const int here = line[d].fine[index(c)];
-            if (here < 0 || here >= line[d].count) continue;
+          for (int c = 0; c < level.nodes[d].count; ++c) {
+            const int here = nodes[d].fine[index(c)];
+            if (here < 0 || here >= nodes[d].count) continue;
             low[d] = std::min(low[d], c);
             high[d] = std::max(high[d], c);
           }
@@ -155,16 +157,16 @@ void CompositeGrid::find_bounds(std::size_t a) noexcept {
         for (int k = low[2]; k <= high[2]; ++k) {
           for (int j = low[1]; j <= high[1]; ++j) {
             const float* from =
-                fine.bound[kind].data() + fine.row(line[1].fine[index(j)], line[2].fine[index(k)]);
+                fine.bound[kind].data() + fine.row(nodes[1].fine[index(j)], nodes[2].fine[index(k)]);
             float* to = bound.data() + level.row(j, k);
-            for (int i = low[0]; i <= high[0]; ++i) to[i] = from[line[0].fine[index(i)]];
+            for (int i = low[0]; i <= high[0]; ++i) to[i] = from[nodes[0].fine[index(i)]];
           }
         }
       }
-      if (level.broken) {
-        spread_round_gaps(level, a, kind);
+      if (level.has_gaps) {
+        propagate_bounds_round_gaps(level, a, kind);
       } else {
-        spread_bounds(level, a, kind, low, high);
+        propagate_bounds(level, a, kind, low, high);
       }
     }
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Where the boxes of a composite grid are. To lay one costs a tenth of a tick's work and more, so they are
-// laid one a tick: ahead of a contact, while the tool comes near, and one after another as a contact moves.
+// Where the patches of a CompositeGrid are. Building a level costs a tenth of a tick's work or more. So
+// levels are built one a tick: before a contact, while the tool approaches, and one after another while a
+// contact moves.
 #include <algorithm>
 #include <cstdlib>
 
@@ -9,8 +10,8 @@
 namespace voxel {
 namespace {
 
-constexpr int kMoves = 2;      // voxels that a contact goes before boxes follow it
-constexpr int kOffCentre = 4;  // of the finest box, from the contact: further, and all move at once
+constexpr int kFollowDistance = 2;  // voxels that a contact moves before patches follow it
+constexpr int kMaxOffCentre = 4;  // voxels from the contact to the middle of level 0; beyond, all levels move
 
 }  // namespace
 
@@ -19,16 +20,16 @@ bool CompositeGrid::in_place(std::size_t l) const noexcept {
   if (!level.is_built) return false;
   for (std::size_t d = 0; d < 3; ++d) {
     const NodeRange wanted = node_range(l, d, shifted(centre_)[d]);
-    if (wanted.low != level.line[d].begin || wanted.count(level.step) != level.line[d].count) return false;
+    if (wanted.low != level.nodes[d].begin || wanted.count(level.step) != level.nodes[d].count) return false;
   }
   return true;
 }
 
-// Does the next coarser box, as it is, have unknowns all round this one?
+// Does the next coarser patch, where it is now, have unknowns all round this one?
 bool CompositeGrid::nested(std::size_t l) const noexcept {
   const Level &fine = levels_[l], &coarse = levels_[l + 1];
   for (std::size_t d = 0; d < 3; ++d) {
-    const AxisNodes &in = fine.line[d], &out = coarse.line[d];
+    const AxisNodes &in = fine.nodes[d], &out = coarse.nodes[d];
     if (in.open_low && out.open_low && in.begin < out.begin + coarse.step) return false;
     if (in.open_high && out.open_high && fine.at(d, in.count - 1) > coarse.at(d, out.count - 1) - coarse.step)
       return false;
@@ -37,17 +38,17 @@ bool CompositeGrid::nested(std::size_t l) const noexcept {
 }
 
 bool CompositeGrid::off_centre(const Index3& centre) const noexcept {
-  const auto& line = levels_[0].line;
+  const auto& nodes = levels_[0].nodes;
   const Index3 at = shifted(centre);
   for (std::size_t d = 0; d < 3; ++d) {
-    const int low = at[d] - line[d].begin, high = levels_[0].at(d, line[d].count - 1) - at[d];
-    if (line[d].open_low && low < half_width_ - kOffCentre) return true;
-    if (line[d].open_high && high < half_width_ - kOffCentre) return true;
+    const int low = at[d] - nodes[d].begin, high = levels_[0].at(d, nodes[d].count - 1) - at[d];
+    if (nodes[d].open_low && low < half_width_ - kMaxOffCentre) return true;
+    if (nodes[d].open_high && high < half_width_ - kMaxOffCentre) return true;
   }
   return false;
 }
 
-// Of a grid at rest.
+// Builds a level round centre_. Displacements are not kept.
 void CompositeGrid::rebuild(std::size_t l) noexcept {
   Level& level = levels_[l];
   place_nodes(level, l, shifted(centre_));
@@ -58,7 +59,7 @@ void CompositeGrid::rebuild(std::size_t l) noexcept {
 }
 
 void CompositeGrid::put_to_rest(Level& level) noexcept {
-  for (auto* arrays : {&level.u, &level.held}) {
+  for (auto* arrays : {&level.u, &level.at_bound}) {
     for (Floats& axis : *arrays) std::fill(axis.begin(), axis.end(), 0.0F);
   }
   level.bounded = {};
@@ -67,13 +68,13 @@ void CompositeGrid::put_to_rest(Level& level) noexcept {
 
 void CompositeGrid::recentre(const Index3& centre) noexcept {
   centre_ = centre;
-  if (!cells_.align_to(centre)) return;
+  if (!material_.align_to(centre)) return;
   for (Level& level : levels_) level.is_built = false;
 }
 
 void CompositeGrid::prepare(const Index3& centre) noexcept {
   bool moves = false;
-  for (std::size_t d = 0; d < 3; ++d) moves = moves || std::abs(centre[d] - centre_[d]) >= kMoves;
+  for (std::size_t d = 0; d < 3; ++d) moves = moves || std::abs(centre[d] - centre_[d]) >= kFollowDistance;
   if (moves) recentre(centre);
   release_multipliers();
   for (Level& level : levels_) {
@@ -109,9 +110,9 @@ void CompositeGrid::begin(const Index3& centre) noexcept {
 bool CompositeGrid::centre_on(const Index3& centre) noexcept {
   if (covering_level_ == 0) return false;
   bool moves = false;
-  for (std::size_t d = 0; d < 3; ++d) moves = moves || std::abs(centre[d] - centre_[d]) >= kMoves;
+  for (std::size_t d = 0; d < 3; ++d) moves = moves || std::abs(centre[d] - centre_[d]) >= kFollowDistance;
   if (moves) centre_ = centre;
-  // The coarsest that is due, and with it those that it would hold no more.
+  // The coarsest level that is due, and the finer levels that would no longer be nested in it.
   const bool all = off_centre(centre);
   bool any = false, joins = false;
   for (std::size_t l = covering_level_; l-- > 0;) {
@@ -124,11 +125,11 @@ bool CompositeGrid::centre_on(const Index3& centre) noexcept {
   return joins;
 }
 
-// A box goes on: what is new in it is interpolated.
+// Moves the patch of a level to centre_. Its new nodes are interpolated from the next coarser level.
 void CompositeGrid::move_patch(std::size_t l) noexcept {
   patch_moved_ = true;
   Level& level = levels_[l];
-  before_move_.line = level.line;  // assigned element by element: the same sizes, nothing is allocated
+  before_move_.nodes = level.nodes;  // does not allocate: allocate_for_moves() has made room
   before_move_.step = level.step;
   before_move_.stride = level.stride;
   before_move_.plane = level.plane;
@@ -137,25 +138,26 @@ void CompositeGrid::move_patch(std::size_t l) noexcept {
   const std::size_t floats = before_move_.first_row() + before_move_.floats() + kPad;
   for (std::size_t a = 0; a < 3; ++a) {
     std::copy_n(level.u[a].begin(), floats, before_move_.u[a].begin());
-    std::copy_n(level.held[a].begin(), floats, before_move_.held[a].begin());
+    std::copy_n(level.at_bound[a].begin(), floats, before_move_.at_bound[a].begin());
     std::fill(level.u[a].begin(), level.u[a].end(), 0.0F);
-    std::fill(level.held[a].begin(), level.held[a].end(), 0.0F);
+    std::fill(level.at_bound[a].begin(), level.at_bound[a].end(), 0.0F);
   }
-  const auto& line = level.line;
+  const auto& nodes = level.nodes;
   Index3 by{};
-  for (std::size_t d = 0; d < 3; ++d) by[d] = (line[d].begin - before_move_.line[d].begin) / level.step;
-  for (int k = 0; k < line[2].count; ++k) {
-    for (int j = 0; j < line[1].count; ++j) {
-      for (int i = 0; i < line[0].count; ++i) {
+  for (std::size_t d = 0; d < 3; ++d) by[d] = (nodes[d].begin - before_move_.nodes[d].begin) / level.step;
+  for (int k = 0; k < nodes[2].count; ++k) {
+    for (int j = 0; j < nodes[1].count; ++j) {
+      for (int i = 0; i < nodes[0].count; ++i) {
         const Index3 was{i + by[0], j + by[1], k + by[2]};
         bool known = true;
-        for (std::size_t d = 0; d < 3; ++d) known = known && was[d] >= 0 && was[d] < before_move_.line[d].count;
+        for (std::size_t d = 0; d < 3; ++d)
+          known = known && was[d] >= 0 && was[d] < before_move_.nodes[d].count;
         const std::size_t to = level.node(i, j, k);
         if (known) {
           const std::size_t from = before_move_.node(was[0], was[1], was[2]);
           for (std::size_t a = 0; a < 3; ++a) {
             level.u[a][to] = before_move_.u[a][from];
-            level.held[a][to] = before_move_.held[a][from];
+            level.at_bound[a][to] = before_move_.at_bound[a][from];
           }
           continue;
         }

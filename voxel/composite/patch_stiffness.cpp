@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What links between the nodes of a composite grid are worth.
+// Weights of the links between the nodes of a CompositeGrid, from the cells of tissue round them.
 #include <algorithm>
 
 #include "voxel/composite/grid.h"
@@ -7,11 +7,9 @@
 namespace voxel {
 namespace {
 
-std::size_t index(int i) {
-  return static_cast<std::size_t>(i);
-}
+using composite::index;
 
-// Of two halves of a link, one after the other: their cells and these times how stiff they are.
+// Two halves of a link in series, each given by its cells and its cells times stiffness.
 float in_series(float cells_a, float stiff_a, float cells_b, float stiff_b) {
   if (cells_a == 0.0F || cells_b == 0.0F) return stiff_a + stiff_b;
   const float cells = cells_a + cells_b;
@@ -21,17 +19,17 @@ float in_series(float cells_a, float stiff_a, float cells_b, float stiff_b) {
 }  // namespace
 
 void CompositeGrid::weigh(Level& level) noexcept {
-  if (cells_.several()) {
-    weigh_shape(level, level.tissue);
+  if (material_.is_heterogeneous()) {
+    weigh_shape(level, level.shape_weight);
     weigh_tissues(level);
   } else {
     weigh_shape(level, level.weight);
   }
 }
 
-// By how much tissue there is alone.
+// Weights by the amount of tissue alone, as if all had the reference stiffness.
 void CompositeGrid::weigh_shape(const Level& level, std::array<Floats, 3>& weight) noexcept {
-  if (cells_.fills_box()) {
+  if (material_.fills_box()) {
     weigh_box(level, weight);
   } else if (level.step == 1) {
     weigh_cells(level, weight, true);
@@ -40,23 +38,23 @@ void CompositeGrid::weigh_shape(const Level& level, std::array<Floats, 3>& weigh
   }
 }
 
-// Links between voxels: the mean of the four cells round each. `all_alike`: as if of one stiffness.
+// Links between voxels: the mean of the four cells round each. `all_alike`: as if all had the same stiffness.
 void CompositeGrid::weigh_cells(const Level& level, std::array<Floats, 3>& weight, bool all_alike) noexcept {
-  const auto& line = level.line;
-  const int nx = line[0].count, ny = line[1].count, nz = line[2].count, wide = nx + 1;
+  const auto& nodes = level.nodes;
+  const int nx = nodes[0].count, ny = nodes[1].count, nz = nodes[2].count, wide = nx + 1;
   const auto area = index(wide) * index(ny + 1);
   Floats &below = half_cells_[0].cells, &above = half_cells_[1].cells;
   below.resize(std::max(below.size(), area));
   above.resize(std::max(above.size(), area));
   const auto read = [&](int z, Floats& to) {
-    cells_.cell_plane(z, line[0].begin - 1, wide, line[1].begin - 1, ny + 1, to.data());
+    material_.cell_stiffness(z, nodes[0].begin - 1, wide, nodes[1].begin - 1, ny + 1, to.data());
     if (!all_alike) return;
     for (std::size_t n = 0; n < area; ++n) to[n] = to[n] > 0.0F ? 1.0F : 0.0F;
   };
   for (Floats& array : weight) std::fill(array.begin(), array.end(), 0.0F);
-  read(line[2].begin - 1, below);
+  read(nodes[2].begin - 1, below);
   for (int k = 0; k < nz; ++k) {
-    read(line[2].begin + k, above);
+    read(nodes[2].begin + k, above);
     for (int j = 0; j < ny; ++j) {
       const float *const low = below.data() + j * wide, *const low_next = low + wide;
       const float *const high = above.data() + j * wide, *const high_next = high + wide;
@@ -77,25 +75,25 @@ void CompositeGrid::weigh_cells(const Level& level, std::array<Floats, 3>& weigh
   }
 }
 
-// Cubes of which two lie along half a link and two across it.
+// Level m of the half cells: cubes of which two lie along a link.
 int CompositeGrid::half_cube(const Level& level) noexcept {
   int m = 0;
   while (level.step > 2 << m) ++m;
   return m;
 }
 
-// Each link from the half cells of a level's nodes that lie round it: two along it, two by two across.
+// Each link from the half cells round it: two along it, two by two across it.
 void CompositeGrid::weigh_halves(const Level& level, std::array<Floats, 3>& weight) noexcept {
-  const auto& line = level.line;
-  const int nx = line[0].count, ny = line[1].count, nz = line[2].count;
+  const auto& nodes = level.nodes;
+  const int nx = nodes[0].count, ny = nodes[1].count, nz = nodes[2].count;
   const int hx = 2 * nx, hy = 2 * ny, m = half_cube(level), edge = 1 << m;
   const float scale = 1.0F / static_cast<float>(level.step * level.step);
   const auto area = index(hx) * index(hy);
   Floats &below = half_cells_[0].cells, &above = half_cells_[1].cells;
   const auto read = [&](int number, Floats& to) {
     to.resize(std::max(to.size(), area));
-    cells_.plane(m, line[2].begin / edge + number - 1, line[0].begin / edge - 1, hx, line[1].begin / edge - 1,
-                 hy, to.data());
+    material_.cell_counts(m, nodes[2].begin / edge + number - 1, nodes[0].begin / edge - 1, hx,
+                          nodes[1].begin / edge - 1, hy, to.data());
   };
   for (Floats& array : weight) std::fill(array.begin(), array.end(), 0.0F);
   for (int k = 0; k < nz; ++k) {
@@ -119,35 +117,35 @@ void CompositeGrid::weigh_halves(const Level& level, std::array<Floats, 3>& weig
   }
 }
 
-// The same where tissues differ: in each half of a link what lies side by side bears together, and one half
-// after the other.
+// Where tissues differ: half cells side by side in parallel, the two halves of the link in series.
 void CompositeGrid::weigh_tissues(Level& level) noexcept {
   if (level.step == 1) return weigh_cells(level, level.weight, false);
-  const auto& line = level.line;
-  const int nx = line[0].count, ny = line[1].count, nz = line[2].count;
+  const auto& nodes = level.nodes;
+  const int nx = nodes[0].count, ny = nodes[1].count, nz = nodes[2].count;
   const int hx = 2 * nx, hy = 2 * ny, m = half_cube(level), edge = 1 << m;
   const float scale = 1.0F / static_cast<float>(level.step * level.step);
   const auto area = index(hx) * index(hy);
   const auto read = [&](int number, HalfCells& to) {
-    for (Floats* const plane : {&to.cells, &to.stiff[0], &to.stiff[1], &to.stiff[2]})
+    for (Floats* const plane : {&to.cells, &to.stiffness[0], &to.stiffness[1], &to.stiffness[2]})
       plane->resize(std::max(plane->size(), area));
-    const int z = line[2].begin / edge + number - 1;
-    const int x = line[0].begin / edge - 1, y = line[1].begin / edge - 1;
-    cells_.plane(m, z, x, hx, y, hy, to.cells.data());
-    cells_.stiff_plane(m, z, x, hx, y, hy, {to.stiff[0].data(), to.stiff[1].data(), to.stiff[2].data()});
+    const int z = nodes[2].begin / edge + number - 1;
+    const int x = nodes[0].begin / edge - 1, y = nodes[1].begin / edge - 1;
+    material_.cell_counts(m, z, x, hx, y, hy, to.cells.data());
+    material_.cube_stiffness(m, z, x, hx, y, hy,
+                             {to.stiffness[0].data(), to.stiffness[1].data(), to.stiffness[2].data()});
   };
   HalfCells &below = half_cells_[0], &above = half_cells_[1];
   for (Floats& array : level.weight) std::fill(array.begin(), array.end(), 0.0F);
   for (int k = 0; k < nz; ++k) {
     read(2 * k, below);
-    // The half before it, of the links up to this plane.
-    const Floats &cells_before = above.cells, &stiff_before = above.stiff[2];
+    // The lower halves of the links up to this plane; `above` still holds those of the plane before.
+    const Floats &cells_before = above.cells, &stiff_before = above.stiffness[2];
     for (int j = 0; k > 0 && j < ny; ++j) {
       for (int i = 0; i < nx; ++i) {
         const std::size_t h = index(2 * j * hx + 2 * i), g = h + index(hx);
         const auto of = [&](const Floats& p) { return p[h] + p[h + 1] + p[g] + p[g + 1]; };
         level.weight[2][level.node(i, j, k - 1)] =
-            scale * in_series(of(cells_before), of(stiff_before), of(below.cells), of(below.stiff[2]));
+            scale * in_series(of(cells_before), of(stiff_before), of(below.cells), of(below.stiffness[2]));
       }
     }
     read(2 * k + 1, above);
@@ -155,16 +153,16 @@ void CompositeGrid::weigh_tissues(Level& level) noexcept {
       for (int i = 0; i < nx; ++i) {
         const std::size_t at = level.node(i, j, k);
         const std::size_t h = index(2 * j * hx + 2 * i), g = h + index(hx);
-        // Two of one half cell's plane and the two beyond.
+        // Sum over two half cells in each of the planes below and above.
         const auto of = [](const Floats& a, const Floats& b, std::size_t one, std::size_t other) {
           return a[one] + a[other] + b[one] + b[other];
         };
         const auto link = [&](std::size_t d, std::array<std::size_t, 2> near,
                               std::array<std::size_t, 2> far) {
           return scale * in_series(of(below.cells, above.cells, near[0], near[1]),
-                                   of(below.stiff[d], above.stiff[d], near[0], near[1]),
+                                   of(below.stiffness[d], above.stiffness[d], near[0], near[1]),
                                    of(below.cells, above.cells, far[0], far[1]),
-                                   of(below.stiff[d], above.stiff[d], far[0], far[1]));
+                                   of(below.stiffness[d], above.stiffness[d], far[0], far[1]));
         };
         if (i + 1 < nx) level.weight[0][at] = link(0, {h + 1, g + 1}, {h + 2, g + 2});
         if (j + 1 < ny) {
@@ -176,35 +174,36 @@ void CompositeGrid::weigh_tissues(Level& level) noexcept {
   }
 }
 
-// Where all of a box is tissue: a length by two widths.
+// In an object that fills its box a link's weight is the product of a length and two widths.
 void CompositeGrid::weigh_box(const Level& level, std::array<Floats, 3>& weight) noexcept {
-  const auto& line = level.line;
-  Floats &length = half_cells_[0].cells, &width = half_cells_[1].cells;  // axis after axis
+  const auto& nodes = level.nodes;
+  Floats &length = half_cells_[0].cells,
+         &width = half_cells_[1].cells;  // of all three axes, one after another
   for (Floats* const plane : {&length, &width})
-    plane->resize(std::max(plane->size(), index(line[0].count + line[1].count + line[2].count)));
-  const std::array<std::size_t, 3> from{0, index(line[0].count), index(line[0].count + line[1].count)};
+    plane->resize(std::max(plane->size(), index(nodes[0].count + nodes[1].count + nodes[2].count)));
+  const std::array<std::size_t, 3> from{0, index(nodes[0].count), index(nodes[0].count + nodes[1].count)};
   for (std::size_t d = 0; d < 3; ++d) {
     const auto within = [&](double low, double high) {
       return static_cast<float>(
-          std::max(0.0, std::min<double>(high, cells_.high(d)) - std::max<double>(low, cells_.low(d))));
+          std::max(0.0, std::min<double>(high, material_.high(d)) - std::max<double>(low, material_.low(d))));
     };
-    for (int i = 0; i < line[d].count; ++i) {
+    for (int i = 0; i < nodes[d].count; ++i) {
       const double at = level.at(d, i), half = 0.5 * level.step;
-      length[from[d] + index(i)] = i + 1 < line[d].count ? within(at, at + level.step) : 0.0F;
+      length[from[d] + index(i)] = i + 1 < nodes[d].count ? within(at, at + level.step) : 0.0F;
       width[from[d] + index(i)] = within(at - half, at + half);
     }
   }
   for (Floats& array : weight) std::fill(array.begin(), array.end(), 0.0F);
   const float scale = 1.0F / static_cast<float>(level.step * level.step);
   const float *const lx = length.data(), *const wx = width.data();
-  for (int k = 0; k < line[2].count; ++k) {
+  for (int k = 0; k < nodes[2].count; ++k) {
     const float lz = scale * length[from[2] + index(k)], wz = scale * width[from[2] + index(k)];
-    for (int j = 0; j < line[1].count; ++j) {
+    for (int j = 0; j < nodes[1].count; ++j) {
       const float ly = length[from[1] + index(j)], wy = width[from[1] + index(j)];
       const std::size_t row = level.row(j, k);
       float *const x = weight[0].data() + row, *const y = weight[1].data() + row,
                    *const z = weight[2].data() + row;
-      for (int i = 0; i < line[0].count; ++i) {
+      for (int i = 0; i < nodes[0].count; ++i) {
         x[i] = lx[i] * wy * wz;
         y[i] = wx[i] * ly * wz;
         z[i] = wx[i] * wy * lz;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The boxes of a composite grid: which nodes there are, what holds them, and what they have of the next
+// The patches of a CompositeGrid: their nodes, anchor weights, ghosts and the transfer to the next coarser
 // level.
 #include <algorithm>
 #include <cmath>
@@ -9,10 +9,13 @@
 namespace voxel {
 namespace {
 
-constexpr std::size_t kFewGhosts = 16;  // times fewer of them has an object that fills its box
-constexpr double kHeld = 0.25;          // of a side of the box
-constexpr float kLeast = 1e-3F;         // of a whole link: what is worth less is none
-constexpr float kAlmostAll = 0.999F;    // of one: through less of it there may be a gap
+using composite::index;
+
+constexpr std::size_t kFewerGhosts = 16;  // an object that fills its box has so many times fewer ghosts
+// A side with more than this share of anchors gets a node at or beyond it.
+constexpr double kAnchoredSide = 0.25;
+constexpr float kMinWeight = 1e-3F;   // of a full link: a link of less weight is missing
+constexpr float kAlmostAll = 0.999F;  // of a full link: through a link of less weight there may be a gap
 constexpr std::array<std::array<int, 3>, 26> kAround = [] {
   std::array<std::array<int, 3>, 26> around{};
   std::size_t n = 0;
@@ -26,12 +29,8 @@ constexpr std::array<std::array<int, 3>, 26> kAround = [] {
   return around;
 }();
 
-std::size_t index(int i) {
-  return static_cast<std::size_t>(i);
-}
-
-// The multiple of `step` at or below.
-int floored(int at, int step) {
+// The largest multiple of `step` that is <= at.
+int floor_to_multiple(int at, int step) {
   return at >= 0 ? at / step * step : -((-at + step - 1) / step) * step;
 }
 
@@ -41,79 +40,85 @@ void CompositeGrid::allocate(Level& level, std::size_t l) const {
   level.step = 1 << l;
   std::array<std::size_t, 3> most{};
   for (std::size_t d = 0; d < 3; ++d) {
-    const int all = (cells_.high(d) - cells_.low(d)) / level.step + 3;
+    const int all = (material_.high(d) - material_.low(d)) / level.step + 3;
     const int half = half_width_of(l);
     most[d] = index(half == kRefineAll || l >= covering_level_ ? all : std::min(all, 2 * half + 2));
-    level.line[d].coarse.resize(most[d]);
-    // A row is read in octets.
-    level.line[d].part.resize(most[d] + 16);
-    level.line[d].along.resize(most[d] + 16);
-    // By nodes of the next level, which may be all there are.
+    level.nodes[d].coarse.resize(most[d]);
+    // Rows are read in vectors of 8, and beyond their end.
+    level.nodes[d].weight_after.resize(most[d] + 16);
+    level.nodes[d].lane_weight.resize(most[d] + 16);
+    // Indexed by nodes of the next level, which may span the whole object.
     const std::size_t next = most[d] + 4 * index(half_width_of(l + 1));
-    for (auto* by_node : {&level.line[d].from_low, &level.line[d].from_own, &level.line[d].from_high})
+    for (auto* by_node :
+         {&level.nodes[d].restrict_low, &level.nodes[d].restrict_own, &level.nodes[d].restrict_high})
       by_node->resize(next);
-    level.line[d].fine.resize(next);
+    level.nodes[d].fine.resize(next);
   }
   const std::size_t stride = (most[0] + 7) / 8 * 8, plane = stride * most[1];
   const std::size_t floats = plane * most[2] + 2 * (plane + stride + kPad) + 64;
-  for (auto* arrays : {&level.u, &level.held, &level.weight, &level.hold, &level.inverse, &level.all}) {
+  for (auto* arrays : {&level.u, &level.at_bound, &level.weight, &level.anchor_weight,
+                       &level.inverse_diagonal, &level.diagonal}) {
     for (Floats& array : *arrays) array.assign(floats, 0.0F);
   }
-  for (Floats* array : {&level.f, &level.old, &level.residual, &level.is_free, &level.is_active, &level.active_stiffness,
-                        &level.inverse_with_active, &level.bound[0], &level.bound[1]})
+  for (Floats* array :
+       {&level.f, &level.restricted_u, &level.residual, &level.is_free, &level.is_active,
+        &level.active_stiffness, &level.inverse_with_active, &level.bound[0], &level.bound[1]})
     array->assign(floats, 0.0F);
-  if (cells_.several()) {
-    for (auto* arrays : {&level.tissue, &level.reach, &level.link[0], &level.link[1], &level.link[2],
-                         &level.held_link[0], &level.held_link[1], &level.held_link[2]}) {
+  if (material_.is_heterogeneous()) {
+    for (auto* arrays : {&level.shape_weight, &level.anchor_distance, &level.limited_weight[0],
+                         &level.limited_weight[1], &level.limited_weight[2], &level.limited_anchor_weight[0],
+                         &level.limited_anchor_weight[1], &level.limited_anchor_weight[2]}) {
       for (Floats& array : *arrays) array.assign(floats, 0.0F);
     }
   }
-  // Nodes beside the object, about as many as on its surface.
-  const std::size_t share = cells_.fills_box() ? kFewGhosts : 1;
+  // There are about as many ghosts as surface nodes.
+  const std::size_t share = material_.fills_box() ? kFewerGhosts : 1;
   level.ghosts.reserve(floats / (8 * share));
-  level.beside.reserve(floats / share);
+  level.ghost_neighbours.reserve(floats / share);
 }
 
-// Of before_move_: where the nodes of the largest box that moves were.
+// before_move_ has room for any level that moves.
 void CompositeGrid::allocate_for_moves() {
   std::size_t most = 0;
   for (std::size_t l = 0; l < covering_level_; ++l) {
     most = std::max(most, levels_[l].u[0].size());
     for (std::size_t d = 0; d < 3; ++d) {
-      // As large as lines of any level, which are assigned to them.
-      AxisNodes& line = before_move_.line[d];
-      const AxisNodes& of = levels_[l].line[d];
+      // So that assigning the nodes of any level does not allocate.
+      AxisNodes& nodes = before_move_.nodes[d];
+      const AxisNodes& of = levels_[l].nodes[d];
       const auto grow = [](auto& room, const auto& like) { room.resize(std::max(room.size(), like.size())); };
-      grow(line.coarse, of.coarse);
-      grow(line.part, of.part);
-      grow(line.along, of.along);
-      grow(line.fine, of.fine);
-      grow(line.from_low, of.from_low);
-      grow(line.from_own, of.from_own);
-      grow(line.from_high, of.from_high);
+      grow(nodes.coarse, of.coarse);
+      grow(nodes.weight_after, of.weight_after);
+      grow(nodes.lane_weight, of.lane_weight);
+      grow(nodes.fine, of.fine);
+      grow(nodes.restrict_low, of.restrict_low);
+      grow(nodes.restrict_own, of.restrict_own);
+      grow(nodes.restrict_high, of.restrict_high);
     }
   }
-  for (auto* arrays : {&before_move_.u, &before_move_.held}) {
+  for (auto* arrays : {&before_move_.u, &before_move_.at_bound}) {
     for (Floats& axis : *arrays) axis.assign(most, 0.0F);
   }
-  for (std::size_t a = 0; cells_.several() && a < 3; ++a) {
-    for (auto* arrays : {&before_move_.link[a], &before_move_.held_link[a]}) {
+  for (std::size_t a = 0; material_.is_heterogeneous() && a < 3; ++a) {
+    for (auto* arrays : {&before_move_.limited_weight[a], &before_move_.limited_anchor_weight[a]}) {
       for (Floats& axis : *arrays) axis.assign(most, 0.0F);
     }
   }
 }
 
-// A node is where its cell has a part in the box of all voxels.
+// A node exists if its cell overlaps the bounding box of the voxels.
 CompositeGrid::NodeRange CompositeGrid::node_range(std::size_t l, std::size_t d, int centre) const noexcept {
   const int step = levels_[l].step, half = half_width_of(l) * step;
-  const int start = cells_.low(d), end = cells_.high(d);
-  // Where something is anchored they go as far as that: what holds is found between two of them.
-  NodeRange span{floored(cells_.anchored_part(d, 0) > kHeld ? start : start + step / 2, step),
-            floored(end + (cells_.anchored_part(d, 1) > kHeld ? step - 1 : (step - 1) / 2), step), false,
-            false};
+  const int start = material_.low(d), end = material_.high(d);
+  // At an anchored side the nodes include the side: anchors are searched on the links between nodes.
+  NodeRange span{
+      floor_to_multiple(material_.anchored_share(d, 0) > kAnchoredSide ? start : start + step / 2, step),
+      floor_to_multiple(end + (material_.anchored_share(d, 1) > kAnchoredSide ? step - 1 : (step - 1) / 2),
+                        step),
+      false, false};
   if (l >= covering_level_ || half < 0) return span;
-  // Its sides are nodes of the next level.
-  const int middle = floored(centre + step, 2 * step);
+  // The sides of the patch coincide with nodes of the next level.
+  const int middle = floor_to_multiple(centre + step, 2 * step);
   span.open_low = middle - half > start;
   span.open_high = middle + half < end;
   if (span.open_low) span.low = middle - half;
@@ -124,62 +129,62 @@ CompositeGrid::NodeRange CompositeGrid::node_range(std::size_t l, std::size_t d,
 void CompositeGrid::place_nodes(Level& level, std::size_t l, const Index3& centre) const noexcept {
   for (std::size_t d = 0; d < 3; ++d) {
     const NodeRange span = node_range(l, d, centre[d]);
-    AxisNodes& line = level.line[d];
-    line.open_low = span.open_low;
-    line.open_high = span.open_high;
-    line.begin = span.low;
-    line.count = span.count(level.step);
-    line.first = line.open_low ? 1 : 0;
-    line.last = line.count - (line.open_high ? 2 : 1);
+    AxisNodes& nodes = level.nodes[d];
+    nodes.open_low = span.open_low;
+    nodes.open_high = span.open_high;
+    nodes.begin = span.low;
+    nodes.count = span.count(level.step);
+    nodes.first = nodes.open_low ? 1 : 0;
+    nodes.last = nodes.count - (nodes.open_high ? 2 : 1);
   }
-  level.stride = index((level.line[0].count + 7) / 8 * 8);
-  level.plane = level.stride * index(level.line[1].count);
+  level.stride = index((level.nodes[0].count + 7) / 8 * 8);
+  level.plane = level.stride * index(level.nodes[1].count);
 }
 
 void CompositeGrid::set_up_transfer(Level& fine, const Level& coarse) const noexcept {
   for (std::size_t d = 0; d < 3; ++d) {
-    AxisNodes& line = fine.line[d];
-    const AxisNodes& to = coarse.line[d];
-    std::fill(line.part.begin(), line.part.end(), 0.0F);
-    for (int i = 0; i < line.count; ++i) {
+    AxisNodes& nodes = fine.nodes[d];
+    const AxisNodes& to = coarse.nodes[d];
+    std::fill(nodes.weight_after.begin(), nodes.weight_after.end(), 0.0F);
+    for (int i = 0; i < nodes.count; ++i) {
       const int away = fine.at(d, i) - to.begin;
-      // Beyond its ends there is nothing to go by: as at the last node.
-      const int before = std::clamp(floored(away, coarse.step) / coarse.step, 0, to.count - 1);
-      line.coarse[index(i)] = before;
+      // Beyond the ends of the coarse level its end node is extrapolated.
+      const int before = std::clamp(floor_to_multiple(away, coarse.step) / coarse.step, 0, to.count - 1);
+      nodes.coarse[index(i)] = before;
       const bool between = away > before * coarse.step && before + 1 < to.count;
-      line.part[index(i)] = between ? 0.5F : 0.0F;
+      nodes.weight_after[index(i)] = between ? 0.5F : 0.0F;
     }
-    std::copy(line.part.begin(), line.part.end(), line.along.begin());
+    std::copy(nodes.weight_after.begin(), nodes.weight_after.end(), nodes.lane_weight.begin());
     const int way = fine.at(d, 0) - to.begin;
-    line.base = floored(way, coarse.step) / coarse.step;
-    line.odd = way != line.base * coarse.step;
-    if (line.base < 0) line.along[0] = 1.0F;  // before the first there is none
-    std::fill(line.fine.begin(), line.fine.end(), kOutside);
-    line.coarse_first = to.count;
-    line.coarse_last = -1;
+    nodes.base = floor_to_multiple(way, coarse.step) / coarse.step;
+    nodes.odd = way != nodes.base * coarse.step;
+    if (nodes.base < 0) nodes.lane_weight[0] = 1.0F;  // there is no coarse node before the first one
+    std::fill(nodes.fine.begin(), nodes.fine.end(), kOutside);
+    nodes.coarse_first = to.count;
+    nodes.coarse_last = -1;
     for (int c = 0; c < to.count; ++c) {
       const int at = coarse.at(d, c);
-      int here = (at - line.begin) / fine.step;
-      const bool below = at < line.begin, above = here >= line.count;
-      if ((below && line.open_low) || (above && line.open_high)) continue;
-      // One node may stand beyond the last of the finer level, its cell ending in the object.
+      int here = (at - nodes.begin) / fine.step;
+      const bool below = at < nodes.begin, above = here >= nodes.count;
+      if ((below && nodes.open_low) || (above && nodes.open_high)) continue;
+      // A coarse node may lie one node beyond the finer level, with its cell ending in the object.
       if (below) here = -1;
-      if (above) here = line.count;
+      if (above) here = nodes.count;
       const auto n = index(c);
-      line.fine[n] = here;
-      if (here < line.first && line.open_low) continue;
-      if (here > line.last && line.open_high) continue;
-      line.coarse_first = std::min(line.coarse_first, c);
-      line.coarse_last = std::max(line.coarse_last, c);
-      // What a fine node carries is shared as it is interpolated.
+      nodes.fine[n] = here;
+      if (here < nodes.first && nodes.open_low) continue;
+      if (here > nodes.last && nodes.open_high) continue;
+      nodes.coarse_first = std::min(nodes.coarse_first, c);
+      nodes.coarse_last = std::max(nodes.coarse_last, c);
+      // Restriction uses the transposed interpolation weights.
       const auto share = [&](int i) {
-        if (i < line.first || i > line.last) return 0.0F;
-        const float part = line.part[index(i)];
-        return line.coarse[index(i)] == c ? 1.0F - part : line.coarse[index(i)] + 1 == c ? part : 0.0F;
+        if (i < nodes.first || i > nodes.last) return 0.0F;
+        const float part = nodes.weight_after[index(i)];
+        return nodes.coarse[index(i)] == c ? 1.0F - part : nodes.coarse[index(i)] + 1 == c ? part : 0.0F;
       };
-      line.from_low[n] = share(here - 1);
-      line.from_own[n] = share(here);
-      line.from_high[n] = share(here + 1);
+      nodes.restrict_low[n] = share(here - 1);
+      nodes.restrict_own[n] = share(here);
+      nodes.restrict_high[n] = share(here + 1);
     }
   }
 }
@@ -189,66 +194,68 @@ void CompositeGrid::assemble(Level& level) noexcept {
   Index3 low{}, high{};
   for (std::size_t d = 0; d < 3; ++d) {
     low[d] = level.at(d, 0);
-    high[d] = level.at(d, level.line[d].count - 1);
+    high[d] = level.at(d, level.nodes[d].count - 1);
   }
-  const bool near = cells_.anchor_near(low, high, 2 * level.step);
+  const bool near = material_.anchor_near(low, high, 2 * level.step);
   find_anchor_weights(level, near);
   find_diagonal(level, near);
   find_ghosts(level);
 }
 
-// Links that a gap or an anchor breaks, and what anchors hold.
+// Removes links that a gap or an anchor interrupts, and finds the weights of the links to anchors.
 void CompositeGrid::find_anchor_weights(Level& level, bool near) noexcept {
-  const auto& line = level.line;
+  const auto& nodes = level.nodes;
   const int step = level.step;
   const auto whole = static_cast<float>(step);
-  const bool several = cells_.several();
-  level.broken = false;
+  const bool is_heterogeneous = material_.is_heterogeneous();
+  level.has_gaps = false;
   level.anchored_area = 0.0;
-  level.holds = false;
-  for (Floats& hold : level.hold) std::fill(hold.begin(), hold.end(), 0.0F);
-  for (int k = 0; k < line[2].count; ++k) {
-    for (int j = 0; j < line[1].count; ++j) {
-      // Most rows are a full box's, far from anchors.
+  level.has_anchors = false;
+  for (Floats& weight : level.anchor_weight) std::fill(weight.begin(), weight.end(), 0.0F);
+  for (int k = 0; k < nodes[2].count; ++k) {
+    for (int j = 0; j < nodes[1].count; ++j) {
+      // In an object that fills its box most rows have nothing to look for.
       const bool anchors_near = near && row_near_anchors(level, j, k);
-      if (!anchors_near && cells_.fills_box()) continue;
-      for (int i = 0; i < line[0].count; ++i) {
+      if (!anchors_near && material_.fills_box()) continue;
+      for (int i = 0; i < nodes[0].count; ++i) {
         const Index3 node{i, j, k}, at{level.at(0, i), level.at(1, j), level.at(2, k)};
         const std::size_t here = level.node(i, j, k);
         for (std::size_t d = 0; d < 3; ++d) {
-          if (node[d] + 1 == line[d].count) continue;
+          if (node[d] + 1 == nodes[d].count) continue;
           float& weight = level.weight[d][here];
-          const float there = several ? level.tissue[d][here] : weight;
-          if (there < kLeast * whole) {
+          const float there = is_heterogeneous ? level.shape_weight[d][here] : weight;
+          if (there < kMinWeight * whole) {
             weight = 0.0F;
-            level.broken = level.broken || !cells_.fills_box();
+            level.has_gaps = level.has_gaps || !material_.fills_box();
             continue;
           }
           Index3 after = at;
           after[d] += step;
-          // From either end as far as the first anchor on the way, by what of the tissue is there.
-          const float stiff = several ? weight / there : 1.0F;
-          const CoarseMaterial::Anchored anchors =
-              anchors_near ? cells_.anchors_along(at, d, step) : CoarseMaterial::Anchored{};
+          // The first anchor from either end on holds the node at that end, through the tissue of the link.
+          const float stiff = is_heterogeneous ? weight / there : 1.0F;
+          const CoarseMaterial::AnchorSearch anchors =
+              anchors_near ? material_.anchors_along(at, d, step) : CoarseMaterial::AnchorSearch{};
           const float part =
               anchors.links > 0 ? std::min(1.0F, there / static_cast<float>(anchors.links)) : 0.0F;
-          const auto held = [&](int links) {
+          const auto weight_at = [&](int links) {
             return stiff * (part * whole * whole / static_cast<float>(links));
           };
           const std::size_t by = d == 0 ? 1 : d == 1 ? level.stride : level.plane;
-          if (anchors.ahead > 0) level.hold[d][here] += held(anchors.ahead);
-          if (anchors.back > 0) level.hold[d][here + by] += held(anchors.back);
-          if (several && anchors.ahead > 0) level.reach[d][here] = static_cast<float>(anchors.ahead);
-          if (several && anchors.back > 0) level.reach[d][here + by] = static_cast<float>(-anchors.back);
+          if (anchors.ahead > 0) level.anchor_weight[d][here] += weight_at(anchors.ahead);
+          if (anchors.back > 0) level.anchor_weight[d][here + by] += weight_at(anchors.back);
+          if (is_heterogeneous && anchors.ahead > 0)
+            level.anchor_distance[d][here] = static_cast<float>(anchors.ahead);
+          if (is_heterogeneous && anchors.back > 0)
+            level.anchor_distance[d][here + by] = static_cast<float>(-anchors.back);
           const int ends = (anchors.low_free && anchors.ahead > 0 ? 1 : 0) +
                            (anchors.high_free && anchors.back > 0 ? 1 : 0);
           level.anchored_area += ends * static_cast<double>(part * whole * whole);
-          const bool gap = step > 1 && there < kAlmostAll * whole && cells_.filled(at) &&
-                           cells_.filled(after) && !cells_.unbroken(at, d, step);
+          const bool gap = step > 1 && there < kAlmostAll * whole && material_.is_filled(at) &&
+                           material_.is_filled(after) && !material_.is_unbroken(at, d, step);
           if (anchors.ahead == 0 && anchors.back == 0 && !gap) continue;
           weight = 0.0F;
-          level.holds = level.holds || !gap || anchors.ahead > 0 || anchors.back > 0;
-          level.broken = level.broken || gap;
+          level.has_anchors = level.has_anchors || !gap || anchors.ahead > 0 || anchors.back > 0;
+          level.has_gaps = level.has_gaps || gap;
         }
       }
     }
@@ -257,29 +264,30 @@ void CompositeGrid::find_anchor_weights(Level& level, bool near) noexcept {
 
 bool CompositeGrid::row_near_anchors(const Level& level, int j, int k) const noexcept {
   Index3 from{level.at(0, 0), level.at(1, j), level.at(2, k)}, to = from;
-  to[0] = level.at(0, level.line[0].count - 1);
-  return cells_.anchor_near(from, to, 2 * level.step);
+  to[0] = level.at(0, level.nodes[0].count - 1);
+  return material_.anchor_near(from, to, 2 * level.step);
 }
 
-// What all links of a node are worth; nothing where it may not move.
+// Diagonal of the stiffness matrix and its inverse; 0 for nodes that do not move.
 void CompositeGrid::find_diagonal(Level& level, bool near) noexcept {
-  const auto& line = level.line;
+  const auto& nodes = level.nodes;
   const std::size_t by_y = level.stride, by_z = level.plane;
   for (std::size_t a = 0; a < 3; ++a) {
-    std::fill(level.inverse[a].begin(), level.inverse[a].end(), 0.0F);
-    std::fill(level.all[a].begin(), level.all[a].end(), 0.0F);
+    std::fill(level.inverse_diagonal[a].begin(), level.inverse_diagonal[a].end(), 0.0F);
+    std::fill(level.diagonal[a].begin(), level.diagonal[a].end(), 0.0F);
   }
-  for (int k = line[2].first; k <= line[2].last; ++k) {
-    for (int j = line[1].first; j <= line[1].last; ++j) {
+  for (int k = nodes[2].first; k <= nodes[2].last; ++k) {
+    for (int j = nodes[1].first; j <= nodes[1].last; ++j) {
       const bool anchors_near = near && row_near_anchors(level, j, k);
-      if (!anchors_near && cells_.fills_box()) {
+      if (!anchors_near && material_.fills_box()) {
         const std::size_t row = level.row(j, k);
         const float *const x = level.weight[0].data() + row, *const y = level.weight[1].data() + row,
                            *const z = level.weight[2].data() + row;
         for (std::size_t a = 0; a < 3; ++a) {
-          float *const all = level.all[a].data() + row, *const inverse = level.inverse[a].data() + row;
+          float *const all = level.diagonal[a].data() + row, *const inverse =
+                                                                 level.inverse_diagonal[a].data() + row;
           const float sx = spring_N_per_m_[0][a], sy = spring_N_per_m_[1][a], sz = spring_N_per_m_[2][a];
-          for (std::ptrdiff_t i = line[0].first; i <= line[0].last; ++i) {
+          for (std::ptrdiff_t i = nodes[0].first; i <= nodes[0].last; ++i) {
             all[i] = sx * (x[i] + x[i - 1]) + sy * (y[i] + y[i - static_cast<std::ptrdiff_t>(by_y)]) +
                      sz * (z[i] + z[i - static_cast<std::ptrdiff_t>(by_z)]);
             inverse[i] = all[i] > 0.0F ? 1.0F / all[i] : 0.0F;
@@ -287,51 +295,54 @@ void CompositeGrid::find_diagonal(Level& level, bool near) noexcept {
         }
         continue;
       }
-      for (int i = line[0].first; i <= line[0].last; ++i) {
+      for (int i = nodes[0].first; i <= nodes[0].last; ++i) {
         const std::size_t n = level.node(i, j, k);
-        const std::array<float, 3> links{level.weight[0][n] + level.weight[0][n - 1] + level.hold[0][n],
-                                         level.weight[1][n] + level.weight[1][n - by_y] + level.hold[1][n],
-                                         level.weight[2][n] + level.weight[2][n - by_z] + level.hold[2][n]};
+        const std::array<float, 3> links{
+            level.weight[0][n] + level.weight[0][n - 1] + level.anchor_weight[0][n],
+            level.weight[1][n] + level.weight[1][n - by_y] + level.anchor_weight[1][n],
+            level.weight[2][n] + level.weight[2][n - by_z] + level.anchor_weight[2][n]};
         if (links[0] + links[1] + links[2] == 0.0F) continue;
-        if (anchors_near && cells_.anchored({level.at(0, i), level.at(1, j), level.at(2, k)})) continue;
+        if (anchors_near && material_.is_anchored({level.at(0, i), level.at(1, j), level.at(2, k)})) continue;
         for (std::size_t a = 0; a < 3; ++a) {
-          const float sum = links[0] * spring_N_per_m_[0][a] + links[1] * spring_N_per_m_[1][a] + links[2] * spring_N_per_m_[2][a];
-          level.all[a][n] = sum;
-          level.inverse[a][n] = 1.0F / sum;
+          const float sum = links[0] * spring_N_per_m_[0][a] + links[1] * spring_N_per_m_[1][a] +
+                            links[2] * spring_N_per_m_[2][a];
+          level.diagonal[a][n] = sum;
+          level.inverse_diagonal[a][n] = 1.0F / sum;
         }
       }
     }
   }
 }
 
-// Nodes that are none, beside some that are: what finer levels interpolate between these and those.
+// Nodes outside the tissue that have nodes of the tissue beside them. Finer levels interpolate between both,
+// so ghosts take the mean of these neighbours.
 void CompositeGrid::find_ghosts(Level& level) noexcept {
-  const auto& line = level.line;
+  const auto& nodes = level.nodes;
   level.ghosts.clear();
-  level.beside.clear();
+  level.ghost_neighbours.clear();
   const auto is_node = [&](int i, int j, int k) {
     const std::size_t n = level.node(i, j, k);
-    if (level.inverse[0][n] != 0.0F) return true;
+    if (level.inverse_diagonal[0][n] != 0.0F) return true;
     for (std::size_t d = 0; d < 3; ++d) {
       const std::size_t by = d == 0 ? 1 : d == 1 ? level.stride : level.plane;
-      if (level.weight[d][n] != 0.0F || level.weight[d][n - by] != 0.0F || level.hold[d][n] != 0.0F)
+      if (level.weight[d][n] != 0.0F || level.weight[d][n - by] != 0.0F || level.anchor_weight[d][n] != 0.0F)
         return true;
     }
-    return cells_.anchored({level.at(0, i), level.at(1, j), level.at(2, k)});
+    return material_.is_anchored({level.at(0, i), level.at(1, j), level.at(2, k)});
   };
-  for (int k = 0; k < line[2].count; ++k) {
-    for (int j = 0; j < line[1].count; ++j) {
-      for (int i = 0; i < line[0].count; ++i) {
+  for (int k = 0; k < nodes[2].count; ++k) {
+    for (int j = 0; j < nodes[1].count; ++j) {
+      for (int i = 0; i < nodes[0].count; ++i) {
         if (is_node(i, j, k)) continue;
-        const auto first = static_cast<std::uint32_t>(level.beside.size());
+        const auto first = static_cast<std::uint32_t>(level.ghost_neighbours.size());
         for (const auto& way : kAround) {
           const int x = i + way[0], y = j + way[1], z = k + way[2];
-          if (x < 0 || y < 0 || z < 0 || x >= line[0].count || y >= line[1].count || z >= line[2].count)
+          if (x < 0 || y < 0 || z < 0 || x >= nodes[0].count || y >= nodes[1].count || z >= nodes[2].count)
             continue;
-          if (is_node(x, y, z) && level.beside.size() < level.beside.capacity())
-            level.beside.push_back(static_cast<std::uint32_t>(level.node(x, y, z)));
+          if (is_node(x, y, z) && level.ghost_neighbours.size() < level.ghost_neighbours.capacity())
+            level.ghost_neighbours.push_back(static_cast<std::uint32_t>(level.node(x, y, z)));
         }
-        const auto count = static_cast<std::uint32_t>(level.beside.size()) - first;
+        const auto count = static_cast<std::uint32_t>(level.ghost_neighbours.size()) - first;
         if (count > 0 && level.ghosts.size() < level.ghosts.capacity())
           level.ghosts.push_back({static_cast<std::uint32_t>(level.node(i, j, k)), first, count});
       }
@@ -339,20 +350,20 @@ void CompositeGrid::find_ghosts(Level& level) noexcept {
   }
 }
 
-void CompositeGrid::spread_to_ghosts(const Level& level, float* values) const noexcept {
+void CompositeGrid::fill_ghosts(const Level& level, float* values) const noexcept {
   for (const Ghost& g : level.ghosts) {
     float sum = 0.0F;
-    for (std::uint32_t n = g.first; n < g.first + g.count; ++n) sum += values[level.beside[n]];
+    for (std::uint32_t n = g.first; n < g.first + g.count; ++n) sum += values[level.ghost_neighbours[n]];
     values[g.at] = sum / static_cast<float>(g.count);
   }
 }
 
-void CompositeGrid::gather_from_ghosts(const Level& level, float* loads) const noexcept {
+void CompositeGrid::distribute_ghost_loads(const Level& level, float* loads) const noexcept {
   for (const Ghost& g : level.ghosts) {
     const float share = loads[g.at] / static_cast<float>(g.count);
     loads[g.at] = 0.0F;
     if (share == 0.0F) continue;
-    for (std::uint32_t n = g.first; n < g.first + g.count; ++n) loads[level.beside[n]] += share;
+    for (std::uint32_t n = g.first; n < g.first + g.count; ++n) loads[level.ghost_neighbours[n]] += share;
   }
 }
 

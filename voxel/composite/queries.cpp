@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What is asked of a composite grid between cycles: places, the force, the energy.
+// Queries to a CompositeGrid between cycles: displacements, force, energy, memory.
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -9,38 +9,38 @@
 namespace voxel {
 namespace {
 
-std::size_t index(int i) {
-  return static_cast<std::size_t>(i);
-}
+using composite::index;
 
 }  // namespace
 
-// What of a node's cell across d lies within its level's box: beyond a side there is half of it.
+// Share of a node's cell, along d, that lies within its level's patch; on an open side one half.
 double CompositeGrid::inside_share(const Level& level, std::size_t d, int i) noexcept {
-  const AxisNodes& line = level.line[d];
-  return (i < line.first && line.open_low) || (i > line.last && line.open_high) ? 0.5 : 1.0;
+  const AxisNodes& nodes = level.nodes[d];
+  return (i < nodes.first && nodes.open_low) || (i > nodes.last && nodes.open_high) ? 0.5 : 1.0;
 }
 
-// … and within the finer level's.
+// The same share within the next finer level's patch.
 double CompositeGrid::covered_share(std::size_t l, std::size_t d, int i) const noexcept {
   if (l == 0) return 0.0;
-  const AxisNodes& fine = levels_[l - 1].line[d];
+  const AxisNodes& fine = levels_[l - 1].nodes[d];
   const int here = fine.fine[index(i)];
   if (here == kOutside) return 0.0;
   return (here < fine.first && fine.open_low) || (here > fine.last && fine.open_high) ? 0.5 : 1.0;
 }
 
-// What anchors hold of a node (its number in its level) in direction d, and not of others.
+// Share of a node's anchor weight along d that counts on this level and not on a finer one. `number`: of the
+// node, from first_row() on.
 double CompositeGrid::anchor_share(std::size_t l, std::size_t number, std::size_t d) const noexcept {
   const Level& level = levels_[l];
   const Index3 node = level.node_of(number);
   const std::size_t e = (d + 1) % 3, f = (d + 2) % 3;
   if (inside_share(level, d, node[d]) < 1.0) return 0.0;
-  const double under = covered_share(l, d, node[d]) == 1.0 ? covered_share(l, e, node[e]) * covered_share(l, f, node[f]) : 0.0;
+  const double under =
+      covered_share(l, d, node[d]) == 1.0 ? covered_share(l, e, node[e]) * covered_share(l, f, node[f]) : 0.0;
   return inside_share(level, e, node[e]) * inside_share(level, f, node[f]) * (1.0 - under);
 }
 
-// Likewise of the link up.
+// The same share of the link from the node to the next one along d.
 double CompositeGrid::link_share(std::size_t l, std::size_t number, std::size_t d) const noexcept {
   const Level& level = levels_[l];
   const Index3 node = level.node_of(number);
@@ -51,26 +51,27 @@ double CompositeGrid::link_share(std::size_t l, std::size_t number, std::size_t 
 }
 
 glm::dvec3 CompositeGrid::force_on_tool_N() const noexcept {
-  glm::dvec3 carried(0.0);
+  glm::dvec3 reaction(0.0);
   for (std::size_t l = 0; l <= covering_level_; ++l) {
     const Level& level = levels_[l];
-    if (!level.holds) continue;
+    if (!level.has_anchors) continue;
     const std::size_t first = level.first_row(), end = first + level.floats();
     for (std::size_t d = 0; d < 3; ++d) {
-      const float* const hold = level.hold[d].data();
-      const std::array<const float*, 3> held{anchor_weights_on(level, 0)[d].data(), anchor_weights_on(level, 1)[d].data(),
-                                             anchor_weights_on(level, 2)[d].data()};
+      const float* const weight = level.anchor_weight[d].data();
+      const std::array<const float*, 3> limited{anchor_weights_on(level, 0)[d].data(),
+                                                anchor_weights_on(level, 1)[d].data(),
+                                                anchor_weights_on(level, 2)[d].data()};
       for (std::size_t n = first; n < end; ++n) {
-        if (hold[n] == 0.0F) continue;
-        const double part = anchor_share(l, n - first, d);
+        if (weight[n] == 0.0F) continue;
+        const double share = anchor_share(l, n - first, d);
         for (std::size_t a = 0; a < 3; ++a) {
-          carried[static_cast<int>(a)] +=
-              part * static_cast<double>(held[a][n] * spring_N_per_m_[d][a] * level.u[a][n]);
+          reaction[static_cast<int>(a)] +=
+              share * static_cast<double>(limited[a][n] * spring_N_per_m_[d][a] * level.u[a][n]);
         }
       }
     }
   }
-  return -carried;
+  return -reaction;
 }
 
 double CompositeGrid::anchor_area_ratio() const noexcept {
@@ -90,19 +91,19 @@ double CompositeGrid::anchor_area_ratio() const noexcept {
 
 double CompositeGrid::worst_violation() const noexcept {
   const Level& level = levels_[0];
-  const auto& line = level.line;
+  const auto& nodes = level.nodes;
   double most = 0.0;
-  for (int k = line[2].first; k <= line[2].last; ++k) {
-    for (int j = line[1].first; j <= line[1].last; ++j) {
-      for (int i = line[0].first; i <= line[0].last; ++i) {
+  for (int k = nodes[2].first; k <= nodes[2].last; ++k) {
+    for (int j = nodes[1].first; j <= nodes[1].last; ++j) {
+      for (int i = nodes[0].first; i <= nodes[0].last; ++i) {
         const std::size_t n = level.node(i, j, k);
         for (std::size_t d = 0; d < 3; ++d) {
           if (level.weight[d][n] == 0.0F) continue;
           const std::size_t by = d == 0 ? 1 : d == 1 ? level.stride : level.plane;
           for (std::size_t a = 0; a < 3; ++a) {
             const float longer = level.u[a][n + by] - level.u[a][n];
-            most = std::max(most,
-                            static_cast<double>(std::max(longer - limit_m_[d][a][1], -longer - limit_m_[d][a][0])));
+            most = std::max(
+                most, static_cast<double>(std::max(longer - limit_m_[d][a][1], -longer - limit_m_[d][a][0])));
           }
         }
       }
@@ -118,33 +119,35 @@ double CompositeGrid::energy_J() const noexcept {
     const std::size_t first = level.first_row(), end = first + level.floats();
     for (std::size_t d = 0; d < 3; ++d) {
       const std::size_t by = d == 0 ? 1 : d == 1 ? level.stride : level.plane;
-      const float *const link = level.weight[d].data(), *const hold = level.hold[d].data();
+      const float *const weight = level.weight[d].data(), *const anchor_weight =
+                                                              level.anchor_weight[d].data();
       for (std::size_t n = first; n < end; ++n) {
-        if (link[n] == 0.0F && hold[n] == 0.0F) continue;
-        double of_link = 0.0, of_hold = 0.0;
+        if (weight[n] == 0.0F && anchor_weight[n] == 0.0F) continue;
+        double of_link = 0.0, of_anchor = 0.0;
         for (std::size_t a = 0; a < 3; ++a) {
           const float* u = level.u[a].data() + n;
-          const double k = 0.5 * static_cast<double>(spring_N_per_m_[d][a]), longer = static_cast<double>(u[by] - *u);
-          of_link += k * static_cast<double>(link[n]) * longer * longer;
-          of_hold += k * static_cast<double>(hold[n] * *u * *u);
+          const double k = 0.5 * static_cast<double>(spring_N_per_m_[d][a]),
+                       longer = static_cast<double>(u[by] - *u);
+          of_link += k * static_cast<double>(weight[n]) * longer * longer;
+          of_anchor += k * static_cast<double>(anchor_weight[n] * *u * *u);
         }
         if (of_link != 0.0) energy += of_link * link_share(l, n - first, d);
-        if (of_hold != 0.0) energy += of_hold * anchor_share(l, n - first, d);
+        if (of_anchor != 0.0) energy += of_anchor * anchor_share(l, n - first, d);
       }
     }
   }
   return energy;
 }
 
-// At a place of which a node is near.
+// Trilinear interpolation at coordinates within the level, or at its edge beyond it.
 glm::dvec3 CompositeGrid::interpolate(const Level& level, const std::array<double, 3>& place) const noexcept {
   std::array<int, 3> node{};
   std::array<float, 3> part{};
   for (std::size_t d = 0; d < 3; ++d) {
-    const AxisNodes& line = level.line[d];
-    const double steps = (place[d] - line.begin) / level.step;
-    node[d] = std::clamp(static_cast<int>(steps), 0, std::max(0, line.count - 2));
-    part[d] = static_cast<float>(std::clamp(steps - node[d], 0.0, line.count > 1 ? 1.0 : 0.0));
+    const AxisNodes& nodes = level.nodes[d];
+    const double steps = (place[d] - nodes.begin) / level.step;
+    node[d] = std::clamp(static_cast<int>(steps), 0, std::max(0, nodes.count - 2));
+    part[d] = static_cast<float>(std::clamp(steps - node[d], 0.0, nodes.count > 1 ? 1.0 : 0.0));
   }
   const std::size_t first = level.node(node[0], node[1], node[2]);
   std::array<float, 3> sum{};
@@ -160,15 +163,15 @@ glm::dvec3 CompositeGrid::interpolate(const Level& level, const std::array<doubl
 }
 
 glm::dvec3 CompositeGrid::at_point(const std::array<double, 3>& point) const noexcept {
-  const std::array<double, 3> place{point[0] + cells_.offset()[0], point[1] + cells_.offset()[1],
-                                    point[2] + cells_.offset()[2]};
+  const std::array<double, 3> place{point[0] + material_.offset()[0], point[1] + material_.offset()[1],
+                                    point[2] + material_.offset()[2]};
   for (std::size_t l = 0; l < covering_level_; ++l) {
     const Level& level = levels_[l];
     bool inside = true;
     for (std::size_t d = 0; d < 3; ++d) {
-      const AxisNodes& line = level.line[d];
-      inside = inside && (!line.open_low || place[d] >= line.begin) &&
-               (!line.open_high || place[d] <= level.at(d, line.count - 1));
+      const AxisNodes& nodes = level.nodes[d];
+      inside = inside && (!nodes.open_low || place[d] >= nodes.begin) &&
+               (!nodes.open_high || place[d] <= level.at(d, nodes.count - 1));
     }
     if (inside) return interpolate(level, place);
   }
@@ -182,36 +185,39 @@ glm::dvec3 CompositeGrid::at(const Index3& voxel) const noexcept {
 
 CompositeGrid::Nodes CompositeGrid::nodes_of(std::size_t box) const noexcept {
   const Level& level = levels_[box];
-  Nodes nodes;
-  nodes.step = level.step;
-  nodes.stride = level.stride;
-  nodes.plane = level.plane;
+  Nodes result;
+  result.step = level.step;
+  result.stride = level.stride;
+  result.plane = level.plane;
   for (std::size_t d = 0; d < 3; ++d) {
-    nodes.first[d] = level.line[d].begin - cells_.offset()[d];
-    nodes.count[d] = level.line[d].count;
-    nodes.open_low[d] = level.line[d].open_low;
-    nodes.open_high[d] = level.line[d].open_high;
-    nodes.u[d] = level.u[d].data() + level.first_row();
+    result.first[d] = level.nodes[d].begin - material_.offset()[d];
+    result.count[d] = level.nodes[d].count;
+    result.open_low[d] = level.nodes[d].open_low;
+    result.open_high[d] = level.nodes[d].open_high;
+    result.u[d] = level.u[d].data() + level.first_row();
   }
-  return nodes;
+  return result;
 }
 
 std::size_t CompositeGrid::memory_bytes() const {
   std::size_t bytes =
-      levels_.capacity() * sizeof(Level) + pressed_.capacity() * sizeof(Pressed) + cells_.memory_bytes();
+      levels_.capacity() * sizeof(Level) + pressed_.capacity() * sizeof(Pressed) + material_.memory_bytes();
   const auto add = [&bytes](const Level& level) {
-    for (const auto* arrays :
-         {&level.u, &level.held, &level.weight, &level.hold, &level.tissue, &level.inverse, &level.all}) {
+    for (const auto* arrays : {&level.u, &level.at_bound, &level.weight, &level.anchor_weight,
+                               &level.shape_weight, &level.inverse_diagonal, &level.diagonal}) {
       for (const Floats& array : *arrays) bytes += array.capacity() * sizeof(float);
     }
-    for (const Floats* array : {&level.f, &level.old, &level.residual, &level.is_free, &level.is_active,
-                                &level.active_stiffness, &level.inverse_with_active, &level.bound[0], &level.bound[1]})
+    for (const Floats* array :
+         {&level.f, &level.restricted_u, &level.residual, &level.is_free, &level.is_active,
+          &level.active_stiffness, &level.inverse_with_active, &level.bound[0], &level.bound[1]})
       bytes += array->capacity() * sizeof(float);
-    bytes += level.ghosts.capacity() * sizeof(Ghost) + level.beside.capacity() * sizeof(std::uint32_t);
+    bytes +=
+        level.ghosts.capacity() * sizeof(Ghost) + level.ghost_neighbours.capacity() * sizeof(std::uint32_t);
   };
   const auto add_limits = [&bytes](const Level& level) {
-    for (const auto* arrays : {&level.reach, &level.link[0], &level.link[1], &level.link[2],
-                               &level.held_link[0], &level.held_link[1], &level.held_link[2]}) {
+    for (const auto* arrays : {&level.anchor_distance, &level.limited_weight[0], &level.limited_weight[1],
+                               &level.limited_weight[2], &level.limited_anchor_weight[0],
+                               &level.limited_anchor_weight[1], &level.limited_anchor_weight[2]}) {
       for (const Floats& array : *arrays) bytes += array.capacity() * sizeof(float);
     }
   };
@@ -222,7 +228,7 @@ std::size_t CompositeGrid::memory_bytes() const {
   add(before_move_);
   add_limits(before_move_);
   for (const HalfCells& plane : half_cells_) {
-    for (const Floats* part : {&plane.cells, &plane.stiff[0], &plane.stiff[1], &plane.stiff[2]})
+    for (const Floats* part : {&plane.cells, &plane.stiffness[0], &plane.stiffness[1], &plane.stiffness[2]})
       bytes += part->capacity() * sizeof(float);
   }
   return bytes;
@@ -230,16 +236,16 @@ std::size_t CompositeGrid::memory_bytes() const {
 
 void CompositeGrid::interpolate_from(const CompositeGrid& other) noexcept {
   for (Level& level : levels_) {
-    const auto& line = level.line;
-    for (int k = 0; k < line[2].count; ++k) {
-      for (int j = 0; j < line[1].count; ++j) {
-        for (int i = 0; i < line[0].count; ++i) {
+    const auto& nodes = level.nodes;
+    for (int k = 0; k < nodes[2].count; ++k) {
+      for (int j = 0; j < nodes[1].count; ++j) {
+        for (int i = 0; i < nodes[0].count; ++i) {
           const std::size_t n = level.node(i, j, k);
-          const auto& offset = cells_.offset();
+          const auto& offset = material_.offset();
           const glm::dvec3 u =
               other.at({level.at(0, i) - offset[0], level.at(1, j) - offset[1], level.at(2, k) - offset[2]});
           for (std::size_t a = 0; a < 3; ++a)
-            level.u[a][n] = level.inverse[a][n] != 0.0F || line[a].open_low || line[a].open_high
+            level.u[a][n] = level.inverse_diagonal[a][n] != 0.0F || nodes[a].open_low || nodes[a].open_high
                                 ? static_cast<float>(u[static_cast<int>(a)])
                                 : 0.0F;
         }

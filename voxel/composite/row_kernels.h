@@ -1,5 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Innermost loops of a composite grid, in octets of nodes along x.
+// Innermost loops over one axis of one level of a CompositeGrid, in vectors of 8 nodes along x.
+//
+// Arrays are those of a level: one float a node, rows along x padded to a multiple of 8. Rows beside a
+// level's rows, and nodes beside a row's nodes, may be read: links there have weight 0. Smoothing and
+// residual are in row_kernels.cpp, bounds and multipliers in constraint_kernels.cpp, line searches in
+// line_search_kernels.cpp.
 #pragma once
 
 #include <array>
@@ -11,72 +16,85 @@
 
 namespace voxel::composite {
 
-inline constexpr float kNoBound = -1e30F;  // no bound
-inline constexpr int kMaxOctets = 80;  // of a row
+inline constexpr float kNoBound = -1e30F;  // value of a bound array where there is no bound
+inline constexpr int kMaxVectors = 80;     // vectors of a row
 
-// One axis of one level. Rows beside a box's, and nodes beside a row's, may be read: links there are worth 0.
+// One axis of one level, from its first row on.
 struct LevelView {
   float* u;
-  const float* f;                      // null: 0
-  const float *least, *most_negative;  // bounds; null: none
-  // 1 or 0: a node does what coarser levels say; it does not, because it is pulled against its bound.
+  const float* f;                      // load (N); null: 0
+  const float *lower, *negated_upper;  // least u, least −u; null: no such bounds
+  // Of residual_of_level(). A node is active if it is at its bound and pulled against the bound. It is free
+  // if it may move and is not active. Both arrays hold 1 or 0.
   float *residual, *is_free, *is_active;
-  float *active_stiffness, *inverse_with_active;           // a spring to where it was, and 1 / Σ springs with that; null: none
-  std::array<const float*, 3> link;  // [d] of the link up, without springs
-  const float *inverse, *all;
-  std::array<float, 3> spring;
-  std::array<int, 3> first, last;
-  std::size_t stride, plane;
+  // Spring that active nodes of finer levels add to a node, and 1 / (diagonal + this spring); null: none.
+  float *active_stiffness, *inverse_with_active;
+  std::array<const float*, 3> weight;  // [d] of the link to the next node along d (unit: link between voxels)
+  const float *inverse_diagonal, *diagonal;  // of the stiffness matrix; inverse 0: the node does not move
+  std::array<float, 3> spring;               // [d] of a link between voxels (N/m)
+  std::array<int, 3> first, last;            // unknowns
+  std::size_t stride, plane;                 // to the next node along y, along z
 };
 
-// Each node to the minimum of its energy given all others, within its bounds; every second row first, and in
-// a row every second node.
+// ---- row_kernels.cpp ----
+
+// One projected Gauss-Seidel sweep: each node moves to the minimum of its energy within its bounds. Rows in
+// two colours of (j + k), nodes of a row in two colours of i.
 void smooth_level(const LevelView& view) noexcept;
-// What is left of f; 0 for what does not move, and for what is pulled against the bound that holds it: that
-// does not follow coarser levels either.
+// residual = f − K u, with is_free and is_active. The residual is 0 for fixed and for active nodes. Active
+// nodes take no correction from coarser levels either.
 void residual_of_level(const LevelView& view) noexcept;
-// What nodes that follow are tied with to those that are stuck, and what they are dragged by: into drag.
+// active_stiffness of a free node: its own plus a share of its links to active nodes. Of other nodes: 0.
 void find_active_stiffness(const LevelView& view) noexcept;
-// From now on a node's drag holds it where it is.
+// Adds a spring of active_stiffness that holds each node where it is now: to f, and as inverse_with_active.
 void add_active_stiffness(const LevelView& view, float* f) noexcept;
-// Of these rows, without f and bounds: what links pull with.
+// residual = −K u on the nodes first … last, both included; without f and bounds.
 void link_forces_of_level(const LevelView& view, const std::array<int, 3>& first,
-                    const std::array<int, 3>& last) noexcept;
+                          const std::array<int, 3>& last) noexcept;
 
-// Links up to a node `by` further on, and how far they are to their limits: 1 at one.
+// ---- constraint_kernels.cpp ----
+
+// Limits of the links along one direction. The limit ratio of a link is its change of length by its limit; at
+// the limit it is 1.
 struct LinkMultiplier {
-  float per_longer, per_shorter;  // (1/m)
-  float tolerance, max_factor;
+  float per_longer, per_shorter;  // 1 / limit (1/m)
+  float tolerance;                // ratios of 1 ± this count as at the limit
+  float max_factor;               // limited weight by weight, at most
 };
-[[nodiscard]] float largest_limit_ratio(const float* u, const float* link, std::size_t by, const LinkMultiplier& limit,
-                                  std::size_t count) noexcept;
-// What each link is worth, `link` without limits and `held` at them; and how much stiffer the stiffest is.
-float update_row_weights(const float* u, const float* link, std::size_t by, const LinkMultiplier& limit, float* held,
-                    std::size_t count) noexcept;
-[[nodiscard]] float updated_weight(float held, float link, float of_limit, const LinkMultiplier& limit) noexcept;
+// Of links to the node `by` floats further on.
+[[nodiscard]] float largest_limit_ratio(const float* u, const float* weight, std::size_t by,
+                                        const LinkMultiplier& limit, std::size_t count) noexcept;
+// Updates `limited`, the weights of links with their multipliers. Returns the largest limited / weight, >= 1.
+float update_row_weights(const float* u, const float* weight, std::size_t by, const LinkMultiplier& limit,
+                         float* limited, std::size_t count) noexcept;
+// The same update of a single link.
+[[nodiscard]] float updated_weight(float limited, float weight, float limit_ratio,
+                                   const LinkMultiplier& limit) noexcept;
 
-// What a bound held, or goes beyond, goes along with it.
-void follow_bounds(float* u, const float* held, const float* least, const float* most_negative,
+// Moves nodes onto their bound that are at it by `at_bound`, and nodes that are beyond it.
+void follow_bounds(float* u, const float* at_bound, const float* lower, const float* negated_upper,
                    std::size_t count) noexcept;
-// 1: at its least, −1: at its most.
-void note_at_bound(float* held, const float* u, const float* least, const float* most_negative,
-               std::size_t count) noexcept;
+// at_bound: 1 at the lower bound, −1 at the upper bound, else 0.
+void note_at_bound(float* at_bound, const float* u, const float* lower, const float* negated_upper,
+                   std::size_t count) noexcept;
 
-// How far nodes are beyond what their bounds ask of them, towards where they have gone: 0 for what is held.
-void beyond_bounds(const float* u, const float* least, const float* most_negative, float* beyond,
+// ---- line_search_kernels.cpp ----
+
+// The part of u that its bounds do not prescribe: u minus the bound (or 0) between u and 0, and 0 at a bound.
+void beyond_bounds(const float* u, const float* lower, const float* negated_upper, float* beyond,
                    std::size_t count) noexcept;
-// Of a level's own nodes, without those strictly within the finer box (`finer` first … last, where it has
-// any): how hard links pull them along `mode` (J per unit of it), and how stiff they are there.
+// Force of the links along `mode` (J per unit of the mode) and stiffness along it, summed over the unknowns
+// that are not strictly within the finer patch finer_first … finer_last (none: last < first).
 struct ModeResponse {
-  double pull = 0.0, stiffness = 0.0;
+  double force = 0.0, stiffness = 0.0;
 };
 ModeResponse mode_response(const LevelView& view, const float* mode, const std::array<int, 3>& finer_first,
-                 const std::array<int, 3>& finer_last) noexcept;
-// … and there they go, within their bounds.
-void step_along_mode(float* u, const float* mode, float by, const float* least, const float* most_negative,
-              std::size_t count) noexcept;
-// A level has just gone from `before` to u. Where that is so far that its energy grew, back to where it is
-// least on the way. `before` becomes scratch.
+                           const std::array<int, 3>& finer_last) noexcept;
+// u += by · mode, within the bounds.
+void step_along_mode(float* u, const float* mode, float by, const float* lower, const float* negated_upper,
+                     std::size_t count) noexcept;
+// u is `before` plus a correction. If the correction raised the energy, it is shortened to the least energy
+// along it. `before` becomes scratch.
 void shorten_correction(const LevelView& view, float* before) noexcept;
 
 }  // namespace voxel::composite

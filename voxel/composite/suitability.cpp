@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which objects a composite grid is right for.
+// Which objects can be solved on a CompositeGrid: by their materials and anchors, and by trial contacts.
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -12,18 +12,16 @@
 namespace voxel {
 namespace {
 
-constexpr int kTried = 10;                            // half width of level 0 where an object is tried
-constexpr double kConverges = 0.85;                   // of what is left of rest stays in a cycle
-constexpr double kMostOff = 0.05;                     // of the force, where boxes twice as wide have it
-constexpr int kFromAnchors = 16;                      // voxels
-constexpr double kMostThin = 0.02;                    // of what links carry where tissues meet
-constexpr double kLeastSeen = 0.8, kMostSeen = 1.25;  // of what anchors hold
+using composite::index;
 
-std::size_t index(int i) {
-  return static_cast<std::size_t>(i);
-}
+constexpr int kTrialHalfWidth = 10;      // of level 0 in trials
+constexpr double kConverges = 0.85;      // largest convergence factor of the displacement per cycle
+constexpr double kMaxForceError = 0.05;  // relative to the force on patches twice as wide
+constexpr int kFromAnchors = 16;         // voxels that a contact keeps from anchors
+constexpr double kMaxThinShare = 0.02;   // of the stiffness of links where tissues meet
+constexpr double kMinAreaRatio = 0.8, kMaxAreaRatio = 1.25;  // of anchor_area_ratio()
 
-// Has every link a cell on some side? One in a sheet, or a row, of single voxels has none.
+// Is there a link without a cell on any side? Links in a sheet or a row of single voxels have none.
 bool has_thin_parts(const Lattice& lattice) {
   for (const VoxelId v : lattice.surface()) {
     const auto c = lattice.coordinates(v);
@@ -46,9 +44,9 @@ bool has_thin_parts(const Lattice& lattice) {
   return false;
 }
 
-// Of what links carry where tissues meet, the share of those that are too thin to have a cell of their own
-// stiffness (LinkParts::thin), which a grid made of cells does not know. Of kRowsTried rows at most.
-double share_of_thin_tissue(const Lattice& lattice) {
+// Where tissues meet: share of the links' stiffness that belongs to tissue too thin to have a cell of its own
+// stiffness (LinkParts::thin). CoarseMaterial knows cells only. Samples kRowsTried rows at most.
+double thin_tissue_share(const Lattice& lattice) {
   constexpr RowId kRowsTried = 20000;
   const Grid& g = lattice.grid();
   RowId among = 0;
@@ -103,35 +101,35 @@ std::string CompositeGrid::reason_unsuitable(const Lattice& lattice) {
     if (l.along_low >= 0.0F || l.along_high <= 0.0F || l.across <= 0.0F) return "its links have no slack";
   }
   if (has_thin_parts(lattice)) return "parts of it are one voxel thick";
-  if (lattice.materials().size() > 2 && share_of_thin_tissue(lattice) > kMostThin)
+  if (lattice.materials().size() > 2 && thin_tissue_share(lattice) > kMaxThinShare)
     return "much of its stiffer tissue is one voxel thick";
   const CompositeGrid grid(lattice, kHalfWidth);
-  // How far the chain lets tissue go beside other anchors, nothing tells a press.
+  // clamp_to_anchors() knows anchored sides only.
   if (!grid.anchored_by_sides()) return "it is anchored otherwise than by whole sides";
   const double seen = grid.anchor_area_ratio();
-  if (seen < kLeastSeen || seen > kMostSeen) return "coarse levels do not see what anchors hold";
-  return CompositeGrid(lattice, kTried).wrong_somewhere();
+  if (seen < kMinAreaRatio || seen > kMaxAreaRatio) return "coarse levels do not see what anchors hold";
+  return CompositeGrid(lattice, kTrialHalfWidth).trial_failure();
 }
 
-// Asked of places all over the surface: from any state without a tool cycles come to rest, and a patch that
-// is pressed feels what it does in boxes twice as wide. (Where a slot or an inclusion is as wide as the
-// spacing of a level, what that is told to do may stretch links across it that it knows nothing of: such
-// objects fail here.)
-std::string CompositeGrid::wrong_somewhere() {
+// Trials at places all over the surface. From a random state without a tool, cycles must converge to rest; a
+// pressed voxel must feel the same force as with patches twice as wide. Objects fail if a slot or an
+// inclusion is as wide as the spacing of a level: a prolonged correction may then stretch links that the
+// level does not see.
+std::string CompositeGrid::trial_failure() {
   constexpr std::size_t kPlaces = 12;
   constexpr int kCycles = 10, kFirst = 2, kPressedCycles = 24;
   constexpr double kDepth = 1.0;  // spacings
-  CompositeGrid wide(lattice_, 2 * kTried, 2 * kHalfWidth);
+  CompositeGrid wide(lattice_, 2 * kTrialHalfWidth, 2 * kHalfWidth);
   const auto surface = lattice_.surface();
-  // From one node to the next, so that limits have no say.
+  // Random differences between neighbours stay below every limit, so that limits play no part.
   float least = std::numeric_limits<float>::max();
   for (const auto& d : limit_m_) {
     for (const auto& axis : d) least = std::min({least, axis[0], axis[1]});
   }
   const float most_m = 0.5F * least;
-  // Of several tissues they are held link by link, which in a patch may take a hundred cycles, and says
-  // nothing of shape.
-  const double depth_m = cells_.several() ? most_m : kDepth * lattice_.min_spacing_m();
+  // In heterogeneous objects multipliers may take a hundred cycles to converge, and say nothing about the
+  // shape: so the press stays within limits.
+  const double depth_m = material_.is_heterogeneous() ? most_m : kDepth * lattice_.min_spacing_m();
   for (std::size_t n = 0; n < kPlaces; ++n) {
     const VoxelId v = surface[(2 * n + 1) * surface.size() / (2 * kPlaces)];
     const Index3 place = lattice_.coordinates(v);
@@ -139,10 +137,10 @@ std::string CompositeGrid::wrong_somewhere() {
     begin(place);
     std::uint32_t random = 1;
     for (Level& level : levels_) {
-      for (std::size_t i = 0; i < level.inverse[0].size(); ++i) {
+      for (std::size_t i = 0; i < level.inverse_diagonal[0].size(); ++i) {
         for (std::size_t a = 0; a < 3; ++a) {
           random = random * 1664525U + 1013904223U;
-          level.u[a][i] = level.inverse[a][i] > 0.0F
+          level.u[a][i] = level.inverse_diagonal[a][i] > 0.0F
                               ? most_m * (static_cast<float>(random >> 8U) * 0x1p-24F - 0.3F)
                               : 0.0F;
         }
@@ -173,7 +171,7 @@ std::string CompositeGrid::wrong_somewhere() {
       }
       felt_N[grid == this ? 0 : 1] = glm::length(grid->force_on_tool_N());
     }
-    if (!(std::fabs(felt_N[0] - felt_N[1]) < kMostOff * felt_N[1]))
+    if (!(std::fabs(felt_N[0] - felt_N[1]) < kMaxForceError * felt_N[1]))
       return "coarse levels know too little of its shape";
   }
   return {};
@@ -186,8 +184,8 @@ bool CompositeGrid::anchored_by_sides() const noexcept {
       const Index3 at = lattice_.coordinates(row * kRow + static_cast<VoxelId>(std::countr_zero(lanes)));
       bool in_side = false;
       for (std::size_t d = 0; d < 3; ++d) {
-        in_side = in_side || (at[d] == 0 && cells_.anchored_part(d, 0) == 1.0) ||
-                  (at[d] == dims[d] - 1 && cells_.anchored_part(d, 1) == 1.0);
+        in_side = in_side || (at[d] == 0 && material_.anchored_share(d, 0) == 1.0) ||
+                  (at[d] == dims[d] - 1 && material_.anchored_share(d, 1) == 1.0);
       }
       if (!in_side) return false;
     }
@@ -196,7 +194,7 @@ bool CompositeGrid::anchored_by_sides() const noexcept {
 }
 
 bool CompositeGrid::far_from_anchors(const Index3& voxel) const noexcept {
-  return !cells_.anchor_near(shifted(voxel), shifted(voxel), 2 * kFromAnchors);
+  return !material_.anchor_near(shifted(voxel), shifted(voxel), 2 * kFromAnchors);
 }
 
 }  // namespace voxel

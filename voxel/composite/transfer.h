@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Between the levels of a composite grid, a row at a time: what a level is told by the next coarser one, and
-// what that is told of it. A node that stands between two coarse ones goes by the mean of the two; or, where
-// tissues differ, by its links: in a stiff skin on soft fat it goes with the skin (Alcouffe, Brandt, Dendy &
-// Painter 1981, The multi-grid method for the diffusion equation with strongly discontinuous coefficients;
-// here one axis after the other, x first).
+// Prolongation and restriction between two levels of a CompositeGrid, a row at a time.
+//
+// A node between two coarse nodes is interpolated along x, then y, then z. In tissue of one stiffness its
+// weights are one half each. Where stiffness differs they are proportional to the links on either side, so
+// that a stiff skin on soft fat moves with the skin (operator interpolation: Alcouffe, Brandt, Dendy &
+// Painter 1981, The multi-grid method for the diffusion equation with strongly discontinuous coefficients).
+// Restriction uses the transposed weights.
 #pragma once
 
 #include <array>
@@ -14,44 +16,48 @@
 
 namespace voxel::composite {
 
-// A row as coarse ones have it: `rows` are those that weigh, from the coarse lane on by which lane 0 goes.
+// Prolongation of one fine row. `rows`: the coarse rows that contribute, each from the coarse lane of fine
+// lane 0 on, with their weights.
 struct ProlongArgs {
   std::array<const float*, 4> rows;
   std::array<float, 4> weights;
   int count = 0;
-  bool odd = false;
-  const float *along, *least, *most_negative, *is_free;  // bounds null: none
+  bool odd = false;  // lane 0 is between two coarse lanes
+  // By fine lane: weight of the coarse lane after it.
+  const float *lane_weight, *lower, *negated_upper, *is_free;  // bounds null: none
   float* u;
-  int octets;
-  bool adds;  // to nodes that follow; else all nodes become what is told
+  int vectors;
+  bool adds;  // adds a correction to the free nodes; else sets all nodes
 };
 void prolong_row(const ProlongArgs& args) noexcept;
 
-// The same by links. A row stands between two in y, in z, in both or in none.
+// Operator interpolation of one fine row, which lies between coarse rows in y, in z, in both or in none.
 struct ProlongByLinksArgs {
-  std::array<const float*, 4> rows;  // of the coarser level; [0]: before in both, 1: after in y, 2: in z, 3
-  std::array<const float*, 4> along_x;  // links in x of the fine rows that stand there
-  // Links to the row before and after, of rows that stand between two in y (where before in z, after), in z.
-  std::array<std::array<const float*, 2>, 2> along_y;
-  std::array<const float*, 2> along_z;
+  std::array<const float*, 4> rows;  // coarse; [0]: before in y and z, +1: after in y, +2: after in z
+  // Links along x of the fine rows at the same places.
+  std::array<const float*, 4> link_x;
+  // Links along y before and after the row between them; [0]: at the row before in z, [1]: at the row after.
+  std::array<std::array<const float*, 2>, 2> link_y;
+  std::array<const float*, 2> link_z;  // links along z before and after the row itself
   bool between_y, between_z;
 };
 void prolong_row_by_links(const ProlongArgs& args, const ProlongByLinksArgs& by) noexcept;
 
-// What a coarse row is told: of up to nine rows, itself in the middle, what each node carries, shared as it
-// is told. [z][y] before, own, after; null: nothing. Where a share is one half links decide how much it is.
+// Transposed operator interpolation onto one coarse row, from the fine row at its place and up to eight rows
+// around it. Index [z][y]: 0 before, 1 own, 2 after. A share of one half stands for a row between two coarse
+// rows; its links decide the actual share.
 struct RestrictArgs {
-  std::array<std::array<const float*, 3>, 3> rows;
+  std::array<std::array<const float*, 3>, 3> rows;  // null: no such row
   std::array<float, 3> share_y, share_z;
-  // Links to the row before and after.
-  std::array<std::array<std::array<const float*, 2>, 3>, 3> along_z;  // [z][y]
-  std::array<std::array<const float*, 2>, 3> along_y;                 // [y], own in z
-  const float* along_x;                                               // of the own row
-  int octets;
-  // What nodes of the own row get of others across it; and of what a node in x gets, the share of the node
-  // after it.
-  float *sum, *part;
+  // Links before and after the row.
+  std::array<std::array<std::array<const float*, 2>, 3>, 3> link_z;  // [z][y]
+  std::array<std::array<const float*, 2>, 3> link_y;                 // [y], of the rows at the own z
+  const float* link_x;                                               // of the own row
+  int vectors;
+  // Results by fine lane: the sum over the rows, and the share of it that the coarse node after it in x
+  // receives if the lane lies between two.
+  float *sum, *upper_share;
 };
-void restrict_row_by_links(const RestrictArgs& gathering) noexcept;
+void restrict_row_by_links(const RestrictArgs& args) noexcept;
 
 }  // namespace voxel::composite

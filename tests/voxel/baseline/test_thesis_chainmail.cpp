@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The thesis's own algorithm: right where it is known to be right, and with the faults that it is known for,
-// each beside the product, which has none of them.
+// The thesis's algorithm: correct where it is known to be, and with its known faults. Each fault is shown
+// beside the project's own tissue, which does not have it.
 #include "voxel/baseline/thesis_chainmail.h"
 
 #include <gtest/gtest.h>
@@ -19,11 +19,11 @@ using tests::make_tissue;
 using tests::MakeTissue;
 using tests::Random;
 using tests::SoftTissue;
-using voxel::ClassicObject;
-using voxel::ClassicOptions;
-using ElementId = ClassicObject::ElementId;
+using voxel::ThesisChainMail;
+using voxel::ThesisChainMailOptions;
+using ElementId = ThesisChainMail::ElementId;
 
-// How many random strokes; 10,000 is what the product is held to.
+// Number of random strokes. The project's own tissue must pass 10,000.
 int strokes() {
   const char* said = std::getenv("HYBRID_STROKES");
   return said != nullptr ? std::max(1, std::atoi(said)) : 200;
@@ -37,7 +37,7 @@ voxel::LatticeOptions of_slack(double slack) {
                          .shear = slack});
 }
 
-// ---- where it is right
+// ---- where it is correct
 
 // A push into a homogeneous block moves the octahedron |x|+|y|+|z| < depth/slack, each by depth − slack·L1.
 TEST(Classic, OnePushMovesTheOctahedron) {
@@ -46,7 +46,7 @@ TEST(Classic, OnePushMovesTheOctahedron) {
     for (const double depth : {0.55, 1.05}) {
       const auto reach = static_cast<int>(depth / slack) + 1;
       const std::array<int, 3> dims{2 * reach + 3, 2 * reach + 3, reach + 3};
-      ClassicObject object(tests::block(dims, glm::dvec3(h)), of_slack(slack));
+      ThesisChainMail object(tests::block(dims, glm::dvec3(h)), of_slack(slack));
       const std::array<int, 3> source{reach + 1, reach + 1, reach + 2};
       const ElementId v = object.at(source[0], source[1], source[2]);
       const glm::vec3 move(depth * h, -depth * h, -depth * h);
@@ -72,7 +72,7 @@ TEST(Classic, OnePushMovesTheOctahedron) {
 }
 
 TEST(Classic, AnchoredElementsStayAndResetGoesToRest) {
-  ClassicObject object(tests::block({9, 9, 5}, glm::dvec3(1e-3)), of_slack(0.1));
+  ThesisChainMail object(tests::block({9, 9, 5}, glm::dvec3(1e-3)), of_slack(0.1));
   const ElementId v = object.at(4, 4, 4);
   const glm::vec3 move(0.0F, 0.0F, -2e-3F);
   object.move({&v, 1}, {&move, 1});
@@ -83,11 +83,11 @@ TEST(Classic, AnchoredElementsStayAndResetGoesToRest) {
   for (int k = 0; k < 5; ++k) EXPECT_EQ(object.displacement(object.at(4, 4, k)), glm::vec3(0.0F));
 }
 
-// The lines through an element of a homogeneous block: whatever lies between, the links of a line add up to
-// its spring times how far its end is from the other.
+// In a homogeneous block the links of a line through an element add up to one spring times the relative
+// displacement of the line's ends.
 TEST(Classic, ForceOfTheLinesIsTheirSpringsTimesTheDisplacement) {
   const double h = 1e-3, E = 1e4, nu = 0.3;
-  ClassicObject object(tests::block({21, 21, 11}, glm::dvec3(h)), of_slack(0.3));
+  ThesisChainMail object(tests::block({21, 21, 11}, glm::dvec3(h)), of_slack(0.3));
   const ElementId v = object.at(10, 10, 10);
   const glm::vec3 move(0.0F, 0.0F, -1e-3F);
   object.move({&v, 1}, {&move, 1});
@@ -96,7 +96,7 @@ TEST(Classic, ForceOfTheLinesIsTheirSpringsTimesTheDisplacement) {
   EXPECT_NEAR(object.force_N(v).x, 0.0, 1e-9);
 }
 
-// Damped or in turn, relaxation ends where the product's does: the springs are the same.
+// Damped or in turn, relaxation converges to the equilibrium of its springs, here at rest.
 TEST(Classic, DampedRelaxationReachesTheEquilibriumOfItsSprings) {
   Random random(3);
   auto volume = tests::block({4, 3, 4}, {1e-3, 1.5e-3, 2e-3});
@@ -106,7 +106,7 @@ TEST(Classic, DampedRelaxationReachesTheEquilibriumOfItsSprings) {
   options.materials[3].poisson = 0.1;
   options.anchor_faces = {"-z", "+z"};
   for (const double damping : {0.5, 1.0}) {
-    ClassicObject object(volume, options, {.damping = damping});
+    ThesisChainMail object(volume, options, {.damping = damping});
     const ElementId v = object.at(2, 1, 2);
     const glm::vec3 move(1e-3F, 0.5e-3F, -1e-3F);
     object.move({&v, 1}, {&move, 1});
@@ -123,8 +123,8 @@ TEST(Classic, DampedRelaxationReachesTheEquilibriumOfItsSprings) {
 }
 
 TEST(Classic, ALockChangesNothingThatIsFelt) {
-  ClassicObject plain(tests::block({9, 9, 9}, glm::dvec3(1e-3)), of_slack(0.1));
-  ClassicObject locked(tests::block({9, 9, 9}, glm::dvec3(1e-3)), of_slack(0.1), {.lock = true});
+  ThesisChainMail plain(tests::block({9, 9, 9}, glm::dvec3(1e-3)), of_slack(0.1));
+  ThesisChainMail locked(tests::block({9, 9, 9}, glm::dvec3(1e-3)), of_slack(0.1), {.lock = true});
   for (int n = 0; n < 20; ++n) {
     const glm::dvec3 centre(4e-3, 4.2e-3, (9.5 - 0.1 * n) * 1e-3);
     const auto a = plain.touch(centre, 1e-3), b = locked.touch(centre, 1e-3);
@@ -135,10 +135,10 @@ TEST(Classic, ALockChangesNothingThatIsFelt) {
   }
 }
 
-// ---- the faults it is known for
+// ---- its known faults
 
-// A block of random materials, sources that can all be had, and beside it an anchored voxel that has no
-// link to it (a lattice must be held somewhere).
+// A block of random materials with compatible sources. Beside it, without a link to it, is an anchored layer,
+// because a lattice must have anchors.
 struct Sources {
   voxel::LabelVolume volume = tests::block({9, 6, 5}, glm::dvec3(1e-3));
   voxel::LatticeOptions options;
@@ -156,7 +156,7 @@ std::array<double, 2> bounds(const Sources& c, std::size_t a, std::size_t b, boo
           (0.5 * (m.stretch_max + n.stretch_max) - 1.0) * h};
 }
 
-// L and U of sources at displacement u, by Bellman and Ford.
+// L and U of sources at displacement u, by Bellman-Ford.
 void paths_from(const Sources& c, int axis, std::size_t source, double u, std::vector<double>& low,
                 std::vector<double>& high) {
   low[source] = std::max(low[source], u);
@@ -206,7 +206,7 @@ Sources random_sources(Random& random, bool homogeneous, std::size_t count) {
     std::vector<double> low(c.volume.labels.size(), -1e300), high(c.volume.labels.size(), 1e300);
     for (std::size_t s = 0; s < count; ++s) {
       const std::size_t v = c.volume.index(c.at[s][0], c.at[s][1], c.at[s][2]);
-      // The second where the first leaves it, and mostly the other way.
+      // The second source is within the interval that the first leaves, and mostly in the opposite direction.
       const double wanted = (s == 0 ? 1.0 : -0.9) * random.between(0.0, 2e-3);
       const double u = std::clamp(wanted, low[v] + 1e-9, high[v] - 1e-9);
       c.move[s][axis] = static_cast<float>(u);
@@ -232,7 +232,7 @@ bool elsewhere(const Sources& c, const Place& place) {
 }
 
 bool classic_ends_elsewhere(const Sources& c) {
-  ClassicObject object(c.volume, c.options);
+  ThesisChainMail object(c.volume, c.options);
   std::vector<ElementId> sources;
   for (const auto& at : c.at) sources.push_back(object.at(at[0], at[1], at[2]));
   object.move(sources, c.move);
@@ -253,9 +253,10 @@ bool chain_ends_elsewhere(const Sources& c) {
       c, [&](int i, int j, int k) { return glm::vec3(state.at(tests::voxel_at(lattice, i, j, k))); });
 }
 
-// One source is enough where materials differ: a voxel that a slow way has reached first pulls back what a
-// fast way has moved further, the source too (Schill, Gibson, Bauer & Männer, Biomechanical simulation of the
-// vitreous humor in the eye using an Enhanced ChainMail Algorithm, 1998).
+// Where materials differ one source suffices. A voxel that the queue reaches first along a path that moves it
+// less pulls back voxels that another path has moved further, even the source (Schill, Gibson, Bauer &
+// Männer, Biomechanical simulation of the vitreous humor in the eye using an Enhanced ChainMail Algorithm,
+// 1998).
 TEST(ClassicFaults, SourcesEndElsewhereThanTheirDefinition) {
   for (const std::size_t sources : {1U, 2U}) {
     for (const bool homogeneous : {true, false}) {
@@ -319,8 +320,8 @@ TEST(ClassicFaults, FallsThroughAThinSheet) {  // Figs 18 and 19, for voxels
   EXPECT_EQ(soft, 0);
 }
 
-// Fig 22: a corner of a plate, all else held. Two links ask for the same step each, and the corner takes
-// both.
+// Fig 22: a corner of a plate, all else anchored. Two links require the same step, and the corner moves by
+// their sum.
 TEST(ClassicFaults, UndampedRelaxationOscillatesForEver) {
   const auto volume = tests::block({4, 4, 1}, glm::dvec3(1e-3));
   voxel::LatticeOptions options = of_slack(0.5);
@@ -328,14 +329,15 @@ TEST(ClassicFaults, UndampedRelaxationOscillatesForEver) {
   for (std::size_t n = 1; n < volume.labels.size(); ++n) options.anchor_voxels.push_back(n);
   const glm::vec3 by(0.25e-3F, -0.125e-3F, 0.3e-3F);
 
-  ClassicObject undamped(volume, options, {.movement = ClassicOptions::Movement::sum});
+  ThesisChainMail undamped(volume, options, {.movement = ThesisChainMailOptions::Movement::sum});
   const ElementId corner = undamped.at(0, 0, 0);
   undamped.move({&corner, 1}, {&by, 1});
   for (int n = 1; n <= 1000; ++n) {
     undamped.relax_all();
     ASSERT_EQ(undamped.displacement(corner), n % 2 == 1 ? -by : by) << "after " << n << " rounds";
   }
-  ClassicObject damped(volume, options, {.movement = ClassicOptions::Movement::sum, .damping = 0.2});
+  ThesisChainMail damped(volume, options,
+                         {.movement = ThesisChainMailOptions::Movement::sum, .damping = 0.2});
   damped.move({&corner, 1}, {&by, 1});
   for (int n = 0; n < 100; ++n) damped.relax_all();
   EXPECT_LT(glm::length(damped.displacement(corner)), 1e-9F) << "the thesis's remedy";
@@ -347,9 +349,9 @@ TEST(ClassicFaults, UndampedRelaxationOscillatesForEver) {
   EXPECT_LT(glm::length(soft.state().at(v)), 1e-7);
 }
 
-// The same all at once and by the mean of the links: an element and its neighbours take turns.
+// All elements at the same time, each to the mean of its links: an element and its neighbours alternate.
 TEST(ClassicFaults, MeansAllAtOnceTakeTurns) {
-  ClassicObject object(tests::block({9, 9, 9}, glm::dvec3(1e-3)), of_slack(0.9));
+  ThesisChainMail object(tests::block({9, 9, 9}, glm::dvec3(1e-3)), of_slack(0.9));
   const ElementId v = object.at(4, 4, 6);
   const glm::vec3 by(0.0F, 0.0F, 0.5e-3F);
   object.move({&v, 1}, {&by, 1});

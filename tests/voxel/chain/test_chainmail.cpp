@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// ChainMail against its definition: per axis the new state is clamp(u, L, U), with L and U from shortest
+// ChainMail against its definition: on each axis the new state is clamp(u, L, U), with L and U from shortest
 // paths in the graph of the limits (voxel/chain/chainmail.h).
 #include "voxel/chain/chainmail.h"
 
@@ -30,7 +30,7 @@ TEST(ChainMail, IsTheClampOfItsDefinition) {
     const Lattice lattice(scene.volume, scene.options);
     ChainMail chain(lattice);
     Displacement state(lattice);
-    // From rest first, then from wherever the last pull left the chain: any feasible state is a start.
+    // First from rest, then from the state that the last round left: any feasible state may be the start.
     for (int round = 0; round < 4; ++round) {
       const Displacement before = state;
       Intervals allowed = held_by_anchors(lattice);
@@ -49,7 +49,7 @@ TEST(ChainMail, IsTheClampOfItsDefinition) {
       moved += chain.moved_count();
       sources_in_all += sources.size();
 
-      // The sources the other way round: not a bit changes, nor where their paths are equally long.
+      // With the sources in reverse order not a bit changes, even where their paths are equally long.
       Displacement again = before;
       std::reverse(sources.begin(), sources.end());
       pull(lattice, chain, again, sources);
@@ -77,7 +77,7 @@ TEST(ChainMail, WhatCannotBeReachedGivesWayToAnchors) {
       std::vector<Source> sources;
       Intervals ignored = held_by_anchors(lattice);
       for (const Source& s : feasible_sources(scene, lattice, random, 4, false, ignored)) {
-        // Anywhere: beyond the chain, and against one another.
+        // Anywhere: beyond the end of the chain, and incompatible with one another.
         glm::vec3 place;
         for (int a = 0; a < 3; ++a) {
           place[a] = static_cast<float>(random.between(-30, 30) * lattice.max_spacing_m());
@@ -116,7 +116,7 @@ TEST(ChainMail, ASourceThatPullsTooFarEndsWhereTheChainEnds) {
   }
 }
 
-// Scenes with half-spaces over surface voxels, which the voxels are clear of at rest.
+// Half-spaces as obstacles of surface voxels, which are clear of them at rest.
 struct ObstacleScene {
   std::vector<Obstacle> obstacles;
 };
@@ -169,7 +169,7 @@ void push_into_obstacles(const RandomScene& scene, const Lattice& lattice, const
   if (depth > 1e-5) ++tally.deep_settles;
 }
 
-void tell(const char* what, const Tally& tally) {
+void print_tally(const char* what, const Tally& tally) {
   std::cout << what << ": " << tally.settles << " settles; " << tally.deep_settles
             << " leave a voxel in its surface, the deepest by " << tally.worst_depth
             << " spacings; largest violation " << tally.worst_link << " spacings\n";
@@ -183,15 +183,15 @@ TEST(ChainMail, WhatIsPushedIntoASurfaceAlongAnAxisIsStoppedThere) {
     const Lattice lattice(scene.volume, scene.options);
     push_into_obstacles(scene, lattice, random_obstacles(lattice, random, false, 0.3), random, tally);
   }
-  tell("along an axis", tally);
+  print_tally("along an axis", tally);
   EXPECT_LE(tally.worst_link, 1e-5);
   EXPECT_LE(tally.worst_depth, 2e-6);
 }
 
 TEST(ChainMail, NoObliqueSurfaceBreaksALink) {
-  // The axes of the chain are independent, those of an oblique half-space are not: a voxel put back onto it
-  // moves on all three, where an anchor may hold it. Then it stays in the surface, and relaxation takes it
-  // out.
+  // The chain treats axes independently. A voxel that is put back onto an oblique half-space moves on all
+  // three axes, and an anchor may prevent that on one of them. Then the voxel stays in the obstacle until it
+  // is relaxed.
   Random random(14);
   Tally any, plane;
   for (int n = 0; n < 400; ++n) {
@@ -210,15 +210,15 @@ TEST(ChainMail, NoObliqueSurfaceBreaksALink) {
     }
     push_into_obstacles(scene, lattice, bone, random, plane);
   }
-  tell("each voxel its own surface", any);
-  tell("one plane", plane);
+  print_tally("each voxel its own surface", any);
+  print_tally("one plane", plane);
   EXPECT_LE(any.worst_link, 1e-5);
   EXPECT_LE(plane.worst_link, 1e-5);
 }
 
 TEST(ChainMail, ADeepPushMovesAnOctahedron) {
-  // With the same slack along and across, what moves is everything nearer than depth / slack in steps of the
-  // lattice: (2n+1)(2n²+2n+3)/3 voxels, so the cube of the depth.
+  // With equal slack along and across links, all voxels nearer than depth / slack (in steps of the lattice)
+  // move: (2n+1)(2n²+2n+3)/3 voxels, which grows with the cube of the depth.
   const double h = 1e-3;
   const LatticeOptions options = tests::made_of({.stretch_min = 0.5, .stretch_max = 1.5, .shear = 0.5}, "-x");
   const Lattice lattice(block({31, 31, 31}, glm::dvec3(h)), options);
@@ -232,8 +232,7 @@ TEST(ChainMail, ADeepPushMovesAnOctahedron) {
     std::vector<RowId> once(chain.moved_rows().begin(), chain.moved_rows().end());
     std::sort(once.begin(), once.end());
     EXPECT_EQ(std::adjacent_find(once.begin(), once.end()), once.end());
-    // Rows along x, one for each y and z of the octahedron, and what it takes to see that the next do not
-    // move.
+    // Rows along x, one for each y and z of the octahedron.
     EXPECT_EQ(once.size(), static_cast<std::size_t>(2 * n * n + 2 * n + 1));
     EXPECT_EQ(chain.moved_count(), 31 * once.size());
     EXPECT_LE(chain.work(), once.size());

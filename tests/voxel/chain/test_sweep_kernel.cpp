@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Rows of a sweep, in registers of every width that this processor has.
+// The sweep kernel in every register width that this processor has, and the set of moved rows.
 #include "voxel/chain/sweep_kernel.h"
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@
 namespace voxel {
 namespace {
 
-// A strip of rows, and those before them in z and in x, with an empty row on either side.
+// A strip of rows, and the strips before it in z and in x, each with an empty row at both ends.
 struct Strips {
   static constexpr int kRows = 12;
   static constexpr std::size_t kAll = kRows + 2;
@@ -22,14 +22,14 @@ struct Strips {
   std::array<std::vector<float>, 3> u;  // own, z, x
   std::array<std::vector<std::uint8_t>, 3> labels;
   std::array<std::vector<RowInfo>, 3> info;
-  std::vector<std::uint8_t> asked;
+  std::vector<std::uint8_t> pending;
 
-  Strips(std::mt19937& random, int materials, bool layers) : asked(kAll) {
+  Strips(std::mt19937& random, int materials, bool layers) : pending(kAll) {
     std::uniform_real_distribution<float> displacement(-1.0F, 1.0F);
     std::uniform_int_distribution<int> label(1, materials), any(0, 9);
     for (std::size_t s = 0; s < 3; ++s) {
       u[s].resize(kAll * kRow);
-      labels[s].resize(kAll * kRow + kRow);  // looked up a register at a time
+      labels[s].resize(kAll * kRow + kRow);  // the kernel reads labels a register at a time, beyond the end
       info[s].resize(kAll);
       const int of_strip = label(random);
       for (std::size_t row = 1; row <= kRows; ++row) {
@@ -46,12 +46,12 @@ struct Strips {
       }
     }
     for (std::size_t row = 1; row <= kRows; ++row)
-      asked[row] = static_cast<std::uint8_t>(any(random) < 3 ? kFromBelowZ : 0);
-    asked[1] = kFromBelowY;
+      pending[row] = static_cast<std::uint8_t>(any(random) < 3 ? kFromBelowZ : 0);
+    pending[1] = kFromBelowY;
   }
 };
 
-// Half limits of up to 16 labels, 0 for none.
+// Random half limits of labels 1 to 39; label 0 has no links.
 std::vector<float> halves(std::mt19937& random) {
   std::uniform_real_distribution<float> limit(0.01F, 0.2F);
   std::vector<float> out(256, 1e30F);
@@ -59,11 +59,11 @@ std::vector<float> halves(std::mt19937& random) {
   return out;
 }
 
-TEST(ChainPull, AllWidthsOfRegistersGiveTheSameBits) {
-  const auto kernels = pull_kernels();
+TEST(SweepKernel, AllWidthsOfRegistersGiveTheSameBits) {
+  const auto kernels = sweep_kernels();
   if (kernels.size() < 2) GTEST_SKIP() << "this processor has one width of registers for sweeps";
   std::mt19937 random(5);
-  int moved = 0, asked_back = 0;
+  int moved = 0, revisits = 0;
   for (int n = 0; n < 4000; ++n) {
     const bool layers = n % 2 == 0, raise = n % 4 < 2;
     const int registers = n % 3, materials = registers == 1 ? 7 : registers == 2 ? 15 : 30;
@@ -73,56 +73,56 @@ TEST(ChainPull, AllWidthsOfRegistersGiveTheSameBits) {
     const bool has_z = n % 5 != 0, downwards = n % 7 == 0, x_above = n % 11 == 0;
     std::vector<Strips> ends;
     std::vector<std::array<Moved, Strips::kRows>> moves;
-    std::vector<Pulled> done;
-    for (const PullKernels& kernel : kernels) {
+    std::vector<SweepResult> done;
+    for (const SweepKernels& kernel : kernels) {
       Strips strips = start;
       const std::size_t first = downwards ? Strips::kRows : 1;
       const auto strip = [&](std::size_t s) {
         return RowStrip{strips.u[s].data() + first * kRow, strips.labels[s].data() + first * kRow,
                         strips.info[s].data() + first};
       };
-      Pull pull;
-      pull.own = strip(0);
-      if (has_z) pull.z = strip(1);
-      pull.x = strip(2);
-      pull.asked = strips.asked.data() + first;
-      pull.by = kFromBelowY | kFromBelowX | kFromBelowZ;
-      pull.step = downwards ? -1 : 1;
-      pull.count = pull.most = Strips::kRows;
-      pull.along_y = {y_in.data(), y_back.data()};
-      pull.along_z = {z_in.data(), z_back.data()};
-      pull.along_x = {x_in.data(), x_back.data()};
-      pull.up = x_in.data();
-      pull.down = x_back.data();
-      pull.registers = registers;
-      pull.x_above = x_above;
-      pull.margin = 1e-6F;
+      SweepTask task;
+      task.own = strip(0);
+      if (has_z) task.z = strip(1);
+      task.x = strip(2);
+      task.pending = strips.pending.data() + first;
+      task.mask = kFromBelowY | kFromBelowX | kFromBelowZ;
+      task.step = downwards ? -1 : 1;
+      task.count = task.max_rows = Strips::kRows;
+      task.along_y = {y_in.data(), y_back.data()};
+      task.along_z = {z_in.data(), z_back.data()};
+      task.along_x = {x_in.data(), x_back.data()};
+      task.up = x_in.data();
+      task.down = x_back.data();
+      task.registers = registers;
+      task.x_above = x_above;
+      task.margin = 1e-6F;
       std::array<Moved, Strips::kRows> what{};
-      done.push_back((raise ? kernel.raise : kernel.lower)(pull, 100, what.data()));
+      done.push_back((raise ? kernel.raise : kernel.lower)(task, 100, what.data()));
       ends.push_back(std::move(strips));
       moves.push_back(what);
     }
     for (std::size_t k = 1; k < ends.size(); ++k) {
       ASSERT_EQ(ends[k].u, ends[0].u) << n;
-      ASSERT_EQ(ends[k].asked, ends[0].asked) << n;
+      ASSERT_EQ(ends[k].pending, ends[0].pending) << n;
       ASSERT_EQ(moves[k], moves[0]) << n;
       ASSERT_EQ(done[k].end, done[0].end) << n;
       ASSERT_EQ(done[k].visits, done[0].visits) << n;
     }
     for (const Moved m : moves[0]) {
       moved += m != kNothingMoved ? 1 : 0;
-      asked_back += (m & (kAsksX | kAsksY | kAsksZ)) != 0 ? 1 : 0;
+      revisits += (m & (kRevisitX | kRevisitY | kRevisitZ)) != 0 ? 1 : 0;
     }
   }
   EXPECT_GT(moved, 4000);
-  EXPECT_GT(asked_back, 1000);
+  EXPECT_GT(revisits, 1000);
 }
 
-TEST(RowRuns, HoldsEachRowOnceInTheOrderInWhichTheyCame) {
+TEST(RowSet, HoldsEachRowOnceInTheOrderInWhichTheyCame) {
   constexpr RowId kRows = 1000;
   std::mt19937 random(9);
   std::uniform_int_distribution<RowId> any(0, kRows - 1), count(1, 200);
-  RowRuns runs(kRows);
+  RowSet runs(kRows);
   for (int n = 0; n < 300; ++n) {
     runs.clear();
     EXPECT_TRUE(runs.empty());

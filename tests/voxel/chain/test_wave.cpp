@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The ways in which the chain spreads (voxel/chain/wave.h): cones, sweeps, rounding over a session, budgets.
+// The methods of a wave (voxel/chain/wave.h): cones and sweeps, rounding over a session, budgets.
 #include "voxel/chain/wave.h"
 
 #include <gtest/gtest.h>
@@ -22,8 +22,8 @@ using namespace tests;
 using voxel::LatticeOptions;
 using voxel::RowId;
 
-// Blocks and balls of one material, larger than a row, pushed at their surface: cones in closed form, cut by
-// faces, by anchors, and where the body is no box.
+// Blocks and lenses of one material, larger than a row, pushed at their surface: cones in closed form, cut by
+// faces and anchors, also in bodies that are no boxes.
 TEST(ChainMail, ConesAreTheClampToo) {
   Random random(15);
   double worst = 0.0;
@@ -59,8 +59,8 @@ TEST(ChainMail, ConesAreTheClampToo) {
   std::cout << "largest error " << worst << " of the largest displacement\n";
 }
 
-// Blocks of many materials over several rows, in layers, in lumps and at random, with holes and anchors: rows
-// of one label and of many, in more labels than one register or two of limits hold.
+// Blocks of many materials over several rows, in layers, in lumps and at random, with holes and anchors. Rows
+// have one label or many, and some scenes have more labels than two registers of half limits hold.
 TEST(ChainMail, SweepsAreTheClampToo) {
   Random random(18);
   double worst = 0.0;
@@ -99,7 +99,7 @@ TEST(ChainMail, SweepsAreTheClampToo) {
 }
 
 TEST(ChainMail, RoundingDoesNotAddUpOverASession) {
-  // Thousands of small strokes, forth and back, over tissue of one and of three materials.
+  // Thousands of small strokes in random directions, over tissue of one and of three materials.
   for (const int materials : {1, 3}) {
     Random random(16);
     auto volume = block({40, 12, 12}, glm::dvec3(1e-3));
@@ -134,7 +134,7 @@ TEST(ChainMail, RoundingDoesNotAddUpOverASession) {
   }
 }
 
-// Links beyond their limits by more than `tolerance` none of whose ends lies in a row that waits.
+// Number of links that exceed their limits by more than `tolerance` and have no end in a waiting row.
 std::size_t unexplained(const std::array<std::vector<Arc>, 3>& arcs, const Displacement& state,
                         const ChainMail& chain, double tolerance) {
   const auto waiting = chain.waiting_rows();
@@ -155,7 +155,7 @@ TEST(ChainMail, WhatIsBeyondABudgetWaitsAndIsFinished) {
   Random random(17);
   std::size_t partial = 0, stopped = 0, calls = 0, sweeping_calls = 0;
   for (int n = 0; n < scenes(40); ++n) {
-    // Too little for a sweep, and enough for one to begin.
+    // A budget too small for a sweep, or large enough for a sweep to begin.
     const bool sweeps = n % 4 == 3;
     const std::uint64_t budget = sweeps ? 1540 : 100;
     const int least = sweeps ? 24 : 10;
@@ -170,7 +170,7 @@ TEST(ChainMail, WhatIsBeyondABudgetWaitsAndIsFinished) {
     ChainMail chain(lattice), whole(lattice);
     Displacement state(lattice), reference(lattice);
     const int nx = volume.dims[0], ny = volume.dims[1], nz = volume.dims[2];
-    const double far = 0.1e-3 * (nz - 1);  // no anchor holds it back
+    const double far = 0.1e-3 * (nz - 1);  // within the chain's length from the anchors
     double asked = 0.0;
     for (int round = 0; round < 4; ++round) {
       const VoxelId v = voxel_at(lattice, random.below(nx), random.below(ny), nz - 1);
@@ -194,7 +194,7 @@ TEST(ChainMail, WhatIsBeyondABudgetWaitsAndIsFinished) {
       (sweeps ? stopped : partial) += waits;
       ASSERT_EQ(unexplained(arcs, state, chain, tolerance), 0U) << "scene " << n << ", round " << round;
       if (round == 0) {
-        // The contact is where it was put, and its own links hold, whatever else waits.
+        // The source is where it was put, and its own links keep their limits, whatever else waits.
         EXPECT_EQ(state.at(v), glm::dvec3(place));
         for (int axis = 0; axis < 3; ++axis) {
           const auto interval = voxel::link_interval(lattice, state, v, axis);
@@ -214,7 +214,7 @@ TEST(ChainMail, WhatIsBeyondABudgetWaitsAndIsFinished) {
         }
         continue;
       }
-      // Some of it, or nothing, before the next stroke meets what still waits.
+      // Finishes some of the waiting rows, or none, before the next stroke.
       for (int more = random.below(4); more > 0; --more) {
         chain.finish(state, {}, 30);
         ASSERT_EQ(unexplained(arcs, state, chain, tolerance), 0U) << "scene " << n << ", round " << round;
