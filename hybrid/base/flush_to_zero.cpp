@@ -10,15 +10,15 @@ constexpr unsigned int kFlushAndZero = 0x8040U;  // FTZ and DAZ
 
 }  // namespace
 
-void flush_denormals() noexcept {
+void set_flush_to_zero() noexcept {
   _mm_setcsr(_mm_getcsr() | kFlushAndZero);
 }
 
-FlushedDenormals::FlushedDenormals() noexcept : before_(_mm_getcsr()) {
-  flush_denormals();
+ScopedFlushToZero::ScopedFlushToZero() noexcept : before_(_mm_getcsr()) {
+  set_flush_to_zero();
 }
 
-FlushedDenormals::~FlushedDenormals() {
+ScopedFlushToZero::~ScopedFlushToZero() {
   _mm_setcsr(before_);
 }
 

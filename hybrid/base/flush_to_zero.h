@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Denormals: numbers so small that a processor takes much longer for them.
+// Avoids denormal numbers, which slow a processor down.
 #pragma once
 
 namespace hybrid {
 
 // Flush-to-zero on the calling thread.
-void flush_denormals() noexcept;
-// The same while it lives: on a thread that is the driver's.
-class FlushedDenormals {
+void set_flush_to_zero() noexcept;
+// The same for the lifetime of the object: for a thread that belongs to the driver.
+class ScopedFlushToZero {
  public:
-  FlushedDenormals() noexcept;
-  ~FlushedDenormals();
-  FlushedDenormals(const FlushedDenormals&) = delete;
-  FlushedDenormals& operator=(const FlushedDenormals&) = delete;
-  FlushedDenormals(FlushedDenormals&&) = delete;
-  FlushedDenormals& operator=(FlushedDenormals&&) = delete;
+  ScopedFlushToZero() noexcept;
+  ~ScopedFlushToZero();
+  ScopedFlushToZero(const ScopedFlushToZero&) = delete;
+  ScopedFlushToZero& operator=(const ScopedFlushToZero&) = delete;
+  ScopedFlushToZero(ScopedFlushToZero&&) = delete;
+  ScopedFlushToZero& operator=(ScopedFlushToZero&&) = delete;
 
  private:
   unsigned int before_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How long ticks took, of any number of them, in a fixed room.
+// Latency histogram: durations of any number of ticks in constant memory.
 #pragma once
 
 #include <algorithm>
@@ -14,17 +14,17 @@ struct Percentiles {
   double p50 = 0.0, p99 = 0.0, p999 = 0.0, max = 0.0;
 };
 
-// Counts in bins that are 1/64 of an octave wide, so that a percentile is within 0.8 % of the value that a
-// list of all would give; the greatest is exact. A list of a day's ticks would take gigabytes.
-class TimeSpread {
+// Counts in bins of 1/64 of an octave, so that a percentile is within 0.8 % of the exact one; the maximum is
+// exact. A list of a day's ticks would take gigabytes.
+class LatencyHistogram {
  public:
-  // Allocates nothing. (unit: microsecond) What is negative or not a number counts as 0.
+  // Allocates nothing. Negative values and NaN count as 0.
   void add(double time_us) noexcept {
     ++bins_[bin_of(time_us)];
     ++count_;
     max_ = std::max(max_, time_us);
   }
-  void add(const TimeSpread& other) noexcept {
+  void add(const LatencyHistogram& other) noexcept {
     for (std::size_t b = 0; b < bins_.size(); ++b) bins_[b] += other.bins_[b];
     count_ += other.count_;
     max_ = std::max(max_, other.max_);

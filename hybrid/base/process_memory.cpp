@@ -13,7 +13,7 @@
 
 namespace hybrid {
 
-std::uint64_t held_memory_bytes() {
+std::uint64_t resident_memory_bytes() {
   std::ifstream in("/proc/self/statm");
   std::uint64_t whole = 0, resident = 0;
   in >> whole >> resident;
@@ -41,7 +41,7 @@ std::uint64_t available_memory_bytes() {
   return 0;
 }
 
-void give_back_freed_memory() {
+void return_freed_memory() {
 #ifdef __GLIBC__
   malloc_trim(0);
 #endif

@@ -1,24 +1,24 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the whole program takes of the machine's memory, and how much there is.
+// Memory use of the whole program, and the memory of the machine.
 #pragma once
 
 #include <cstdint>
 
 namespace hybrid {
 
-// Resident now; 0 where the system does not say.
-[[nodiscard]] std::uint64_t held_memory_bytes();
-// The most that ever was resident.
+// Resident now (bytes); 0 if the system does not tell.
+[[nodiscard]] std::uint64_t resident_memory_bytes();
+// Peak of the resident memory (bytes).
 [[nodiscard]] std::uint64_t peak_memory_bytes();
 
-// Bytes of physical memory that can be used at all (what one object may take at most).
+// Bytes of physical memory that the program can use at all.
 [[nodiscard]] std::uint64_t usable_memory_bytes();
 
-// What the machine could give now without putting anything aside; 0 where the system does not say.
+// Memory that the machine could give now without swapping (bytes); 0 if the system does not tell.
 [[nodiscard]] std::uint64_t available_memory_bytes();
 
-// After a large step of loading: what it freed goes back to the system. The C library would keep it for
-// itself, and the next step's memory would come on top.
-void give_back_freed_memory();
+// Returns freed memory to the system after a large step of loading. The C library would keep it, and the next
+// step's memory would come on top.
+void return_freed_memory();
 
 }  // namespace hybrid

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Processor time of the calling thread.
+// CPU time of the calling thread.
 #pragma once
 
 #include <time.h>
 
 namespace hybrid {
 
-// Since the thread began (s). Pre-emption by other threads and processes does not count.
+// Since the thread began (s). Pre-emption does not count.
 [[nodiscard]] inline double thread_time_s() noexcept {
   timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Wait-free hand-over of the latest value from one thread to one other: a triple buffer.
+// Triple buffer: wait-free transfer of the latest value from one thread to another.
 #pragma once
 
 #include <array>
@@ -8,11 +8,11 @@
 
 namespace hybrid {
 
-// The writer fills back() and publishes; the reader takes the latest. Neither waits, neither allocates here
-// (values keep what they own when a slot comes round again). std::atomic<std::shared_ptr> was rejected: not
-// always lock-free.
+// The writer fills back() and publishes; the reader takes the latest value. Neither waits, and neither
+// allocates here (slots are reused with their capacity). It uses no std::atomic<std::shared_ptr>, which is
+// not always lock-free.
 template <class T>
-class HandOver {
+class TripleBuffer {
  public:
   // ---- writer ----
   [[nodiscard]] T& back() { return slots_[back_]; }
@@ -21,7 +21,7 @@ class HandOver {
   }
 
   // ---- reader ----
-  // The latest published value; what was taken before when there is none newer.
+  // The latest published value; the previous one if there is none newer.
   [[nodiscard]] const T& take() noexcept {
     if ((middle_.load(std::memory_order_relaxed) & kFresh) != 0) {
       front_ = middle_.exchange(front_, std::memory_order_acq_rel) & kIndex;

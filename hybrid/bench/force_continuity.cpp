@@ -138,7 +138,7 @@ std::vector<glm::dvec3> stroke_corners(const StrokeCase& stroke) {
 
 StrokeResult measure_stroke(const Scene& scene, const std::vector<glm::dvec3>& corners,
                             double speed_m_per_s) {
-  const FlushedDenormals flushed;
+  const ScopedFlushToZero flushed;
   BuiltScene built = build_scene(scene);
   begin_session(scene, *built.world, *built.state, corners.front());
   Equilibrium equilibrium(*built.world, *built.state);
@@ -175,7 +175,7 @@ StrokeResult measure_stroke(const Scene& scene, const std::vector<glm::dvec3>& c
 }
 
 double work_of_stroke(const Scene& scene, const std::vector<glm::dvec3>& corners, double speed_m_per_s) {
-  const FlushedDenormals flushed;
+  const ScopedFlushToZero flushed;
   BuiltScene built = build_scene(scene);
   begin_session(scene, *built.world, *built.state, corners.front());
   double work = 0.0;

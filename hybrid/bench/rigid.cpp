@@ -279,7 +279,7 @@ const std::vector<std::string>& rigid_paths() {
 }
 
 std::vector<RigidRow> bench_rigid(const RigidBenchOptions& options) {
-  flush_denormals();
+  set_flush_to_zero();
   std::vector<Case> cases = Plan(options).take();
   if (cases.empty()) {
     throw std::invalid_argument(

@@ -20,11 +20,11 @@ struct Object {
   voxel::LabelVolume volume;
   voxel::LatticeOptions options;
   std::array<int, 3> pushed;
-  voxel::ClassicOptions::Movement movement;
+  voxel::ThesisChainMailOptions::Movement movement;
 };
 
 Object object_of(const std::array<int, 3>& dims, const std::array<int, 3>& pushed,
-                 voxel::ClassicOptions::Movement movement) {
+                 voxel::ThesisChainMailOptions::Movement movement) {
   Object object;
   object.volume.dims = dims;
   object.volume.spacing_m = glm::dvec3(kSpacing);
@@ -36,21 +36,21 @@ Object object_of(const std::array<int, 3>& dims, const std::array<int, 3>& pushe
 
 // The corner of a plate, all else held: two links ask for the same step each, and the corner takes both.
 Object corner() {
-  Object object = object_of({4, 4, 1}, {0, 0, 0}, voxel::ClassicOptions::Movement::sum);
+  Object object = object_of({4, 4, 1}, {0, 0, 0}, voxel::ThesisChainMailOptions::Movement::sum);
   for (std::size_t n = 1; n < object.volume.labels.size(); ++n) object.options.anchor_voxels.push_back(n);
   return object;
 }
 
 // All at once and by the mean of its links, a voxel and its neighbours take turns. (By the sum it explodes.)
 Object block() {
-  Object object = object_of({15, 15, 8}, {7, 7, 7}, voxel::ClassicOptions::Movement::mean);
+  Object object = object_of({15, 15, 8}, {7, 7, 7}, voxel::ThesisChainMailOptions::Movement::mean);
   object.options.anchor_faces = {"-z"};
   return object;
 }
 
 SettlingCurve of_classic(const Object& object, const char* name, double damping, int rounds) {
-  voxel::ClassicObject classic(object.volume, object.options,
-                               {.movement = object.movement, .damping = damping});
+  voxel::ThesisChainMail classic(object.volume, object.options,
+                                 {.movement = object.movement, .damping = damping});
   const auto pushed = classic.at(object.pushed[0], object.pushed[1], object.pushed[2]);
   const glm::vec3 by(0.0F, 0.0F, kPush);
   classic.move({&pushed, 1}, {&by, 1});

@@ -6,8 +6,8 @@
 #include <limits>
 
 #include "hybrid/bench/timer.h"
-#include "voxel/chain/chainmail.h"
 #include "voxel/baseline/thesis_chainmail.h"
+#include "voxel/chain/chainmail.h"
 
 namespace hybrid::bench {
 namespace {
@@ -75,7 +75,7 @@ class ClassicEngine : public WaveEngine {
   void prepare(const voxel::LabelVolume& volume, const voxel::LatticeOptions& options,
                const Push& push) override {
     dims_ = volume.dims;
-    object_ = std::make_unique<voxel::ClassicObject>(volume, options);
+    object_ = std::make_unique<voxel::ThesisChainMail>(volume, options);
     sources_.clear();
     for (const auto& s : push.sources) sources_.push_back(object_->at(s[0], s[1], s[2]));
     moves_ = push.moves;
@@ -97,8 +97,8 @@ class ClassicEngine : public WaveEngine {
 
  private:
   std::array<int, 3> dims_{};
-  std::unique_ptr<voxel::ClassicObject> object_;
-  std::vector<voxel::ClassicObject::ElementId> sources_;
+  std::unique_ptr<voxel::ThesisChainMail> object_;
+  std::vector<voxel::ThesisChainMail::ElementId> sources_;
   std::vector<glm::vec3> moves_;
 };
 

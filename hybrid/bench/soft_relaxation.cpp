@@ -93,7 +93,7 @@ class Pressed {
     options.materials[2] = limits.top;
     options.anchor_faces = {"-z"};
     object_ = std::make_unique<voxel::SoftObject>(std::make_shared<voxel::Lattice>(volume, options));
-    if (relaxed == Relaxed::apart) replica_ = std::make_unique<voxel::Replica>(*object_);
+    if (relaxed == Relaxed::apart) replica_ = std::make_unique<voxel::ShadowObject>(*object_);
     const double middle = 0.5 * (edge - 1) * kSpacing, top = (edge - 1) * kSpacing;
     tool_.radius = kRadius * kSpacing;
     const double from = top + object_->reach(tool_.radius);
@@ -117,13 +117,14 @@ class Pressed {
   }
 
   [[nodiscard]] voxel::SoftObject& object() { return *object_; }
-  [[nodiscard]] voxel::Replica& replica() { return *replica_; }
+  [[nodiscard]] voxel::ShadowObject& replica() { return *replica_; }
   [[nodiscard]] const voxel::ToolInBody& tool() const { return tool_; }
   [[nodiscard]] double force_N() { return glm::length(object_->reaction(tool_).force_N); }
 
  private:
   std::unique_ptr<voxel::SoftObject> object_;
-  std::unique_ptr<voxel::Replica> replica_;  // there from the start, as in a session: the press is news to it
+  std::unique_ptr<voxel::ShadowObject>
+      replica_;  // there from the start, as in a session: the press is news to it
   voxel::ToolInBody tool_;
   std::vector<voxel::VoxelId> near_;
 };
@@ -153,10 +154,10 @@ SoftRow relax_row(int edge, const Limits& limits, std::optional<double> at_rest_
   std::vector<Moment> moments;
   std::uint64_t updates = 0;
   double us = 0.0, background_us = 0.0;
-  voxel::Replica& replica = pressed.replica();
+  voxel::ShadowObject& replica = pressed.replica();
   int calm = 0;
   for (int n = 0;
-       n < kMostRounds && (n == 0 || voxel::Replica::wanted(object)) && us < 60e6 && calm < kCalmRounds;
+       n < kMostRounds && (n == 0 || voxel::ShadowObject::wanted(object)) && us < 60e6 && calm < kCalmRounds;
        ++n) {
     pressed.touch();
     const std::uint64_t before = TickTimer::begin();
@@ -164,7 +165,7 @@ SoftRow relax_row(int edge, const Limits& limits, std::optional<double> at_rest_
     object.relax_near(pressed.tool(), kSweepsNear);
     const double force = pressed.force_N();
     const std::uint64_t between = TickTimer::begin();
-    if (voxel::Replica::wanted(object)) {
+    if (voxel::ShadowObject::wanted(object)) {
       replica.give(object);
       replica.relax();
       replica.take(object);
@@ -233,13 +234,13 @@ TightRow tight_row(int edge, bool layered) {
     voxel::SoftObject object(lattice);
     std::string obstacle = object.use_composite_grid(tool);
     if (!obstacle.empty()) return obstacle;
-    if (wide) object.widen_grid();
+    if (wide) object.widen_patches();
     tool.centre.z = top + object.reach(tool.radius) - depth * kSpacing;
     std::vector<voxel::VoxelId> near(lattice->surface().begin(), lattice->surface().end());
     for (int n = 0; n < kTicks; ++n) {
       // As a tick begins: what is near, or may be.
       const double away = object.reach(tool.radius) + kSpacing;
-      if (object.grid_in_use() != nullptr)
+      if (object.patches_in_use() != nullptr)
         near.assign(object.near_on_grid().begin(), object.near_on_grid().end());
       std::erase_if(near,
                     [&](voxel::VoxelId v) { return glm::distance(object.position(v), tool.centre) >= away; });
@@ -288,7 +289,7 @@ SoftRow classic_row(int edge) {
   const voxel::LabelVolume volume = cube(edge);
   voxel::LatticeOptions options;
   options.anchor_faces = {"-z"};
-  voxel::ClassicObject object(volume, options);
+  voxel::ThesisChainMail object(volume, options);
   const auto source = object.at(edge / 2, edge / 2, edge - 1);
   const glm::vec3 move(0.0F, 0.0F, static_cast<float>(-kDepth * kSpacing));
   object.move({&source, 1}, {&move, 1});

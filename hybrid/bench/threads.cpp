@@ -57,7 +57,7 @@ void beside(const Load& load, const Work& work) {
 // Another session of the scene, as fast as it goes, its surfaces taken after each tick.
 void relax_and_snap(const Scene& scene, BuiltScene& built, const std::atomic<bool>& stop) {
   take_ordinary_priority();
-  flush_denormals();
+  set_flush_to_zero();
   start_async_relaxation(*built.state, Arrival::counted);
   Snapshot snapshot;
   while (!stop.load(std::memory_order_relaxed)) {
@@ -123,7 +123,7 @@ class Bench {
   void add(std::size_t n, const SessionResult& result) {
     rows_[n].ticks += result.ticks;
     rows_[n].late_ticks += result.deadline_misses;
-    rows_[n].results += result.relaxed_apart;
+    rows_[n].results += result.async_results;
     seconds_[n] += static_cast<double>(result.ticks) * result.dt_s;
     times_[n].add(result.tick_us);
   }
@@ -146,7 +146,7 @@ class Bench {
 
   // The session again, as fast as it goes, its results found in the tick and kept.
   ResultTape taped(const SessionResult& felt) {
-    const FlushedDenormals flushed;
+    const ScopedFlushToZero flushed;
     BuiltScene built = build_scene(scene_);
     ResultTape tape(built.state->soft.size());
     begin_session(scene_, *built.world, *built.state, felt.start_m);
@@ -160,7 +160,7 @@ class Bench {
 
   // And in real time, its results handed out.
   void play(const SessionResult& felt, ResultTape& tape) {
-    const FlushedDenormals flushed;
+    const ScopedFlushToZero flushed;
     BuiltScene built = build_scene(scene_);
     begin_session(scene_, *built.world, *built.state, felt.start_m);
     start_async_relaxation(*built.state, Arrival::played);
@@ -174,7 +174,7 @@ class Bench {
              std::uint64_t hash = kHashBegin;
              for (const RecordedTick& tick : felt.recording) {
                timer.wait();
-               play_again(tick, *built.state);
+               restore_tick_timing(tick, *built.state);
                while (!ResultTape::ready(apart)) std::this_thread::yield();
                const TickResult again = tick_again(built, tick);
                hash = hash_tick(hash, again);
@@ -182,21 +182,21 @@ class Bench {
                ++played.ticks;
              }
              played.deadline_misses = timer.missed();
-             played.relaxed_apart = apart.results;
+             played.async_results = apart.results;
              rows_[1].same_ticks = rows_[1].same_ticks && hash == felt.recording.back().hash;
              add(1, played);
            });
   }
 
   TickResult tick_again(BuiltScene& built, const RecordedTick& tick) const {
-    play_again(tick, *built.state);
+    restore_tick_timing(tick, *built.state);
     return haptic_tick(*built.world, *built.state, {.position_m = tick.device_m, .fault = tick.fault},
                        1.0 / scene_.rate_hz);
   }
 
   const Scene& scene_;
   std::array<ThreadsRow, 3> rows_;
-  std::array<TimeSpread, 3> times_;
+  std::array<LatencyHistogram, 3> times_;
   std::array<double, 3> seconds_{};
   double relaxation_s_ = 0.0;
 };

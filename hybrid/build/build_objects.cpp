@@ -9,10 +9,10 @@
 #include <memory>
 #include <stdexcept>
 
-#include "hybrid/geometry/surface_nets.h"
 #include "hybrid/base/process_memory.h"
-#include "polygon/repair/check.h"
+#include "hybrid/geometry/surface_nets.h"
 #include "polygon/files/mesh_file.h"
+#include "polygon/repair/check.h"
 #include "polygon/surface/mesh_surface.h"
 #include "polygon/surface/primitives.h"
 #include "voxel/volume/read_volume.h"
@@ -20,9 +20,9 @@
 namespace hybrid {
 namespace {
 
-constexpr int kBallSubdivisions = 4;  // 5,120 triangles: for drawing and the map only, contact is exact
-// Measured, 160³ voxels (of one label 61 bytes, four labels in layers 96, mixed voxel by voxel 179, with
-// yield 228; bricks 24 more).
+constexpr int kBallSubdivisions = 4;  // 5,120 triangles for drawing and the map; contact is exact
+// Bytes a voxel once touched, measured with 160³ voxels: 61 with one label, 96 with four labels in layers,
+// 179 with labels mixed voxel by voxel, 228 with plasticity; 24 more with bricks.
 constexpr double kTouchedBytes = 60.0, kTouchedMixedBytes = 180.0, kYieldBytes = 50.0, kBrickBytes = 25.0;
 
 std::string in_words(const polygon::Finding& f) {
@@ -51,11 +51,11 @@ std::shared_ptr<const polygon::TriangleMesh> kept(polygon::TriangleMesh mesh) {
   return std::make_shared<const polygon::TriangleMesh>(std::move(mesh));
 }
 
-// What is felt and what is drawn share one mesh.
+// The rendered surface and the drawn mesh share one mesh.
 RigidObject surface_object(const RigidDescription& d, const Pose& pose, polygon::TriangleMesh mesh,
                            bool solid) {
   RigidObject object{.name = d.name, .surface = nullptr, .pose = pose, .drawn = kept(std::move(mesh))};
-  give_back_freed_memory();
+  return_freed_memory();
   object.surface =
       polygon::make_mesh_surface(object.drawn, {.solid = solid, .vertex_normals = d.feel.shading});
   object.surface_is_drawn = true;
@@ -76,7 +76,7 @@ voxel::VolumeFileOptions volume_options(const std::vector<voxel::LabelRule>& rul
   return {.unit_m = unit_m, .rules = rules, .spacing_m = spacing, .max_bytes = usable_memory_bytes() / 4};
 }
 
-// What the file's reader put right is news to whoever built on it.
+// Repairs by the file's reader are reported to the user.
 voxel::LabelVolume read_volume(const std::string& object, const std::filesystem::path& file,
                                const voxel::VolumeFileOptions& options, std::vector<BuildNote>& notes) {
   std::vector<std::string> of_file;
@@ -104,7 +104,7 @@ RigidObject volume_surface_object(const RigidDescription& d, const VolumeSurface
       throw std::runtime_error(
           "the cuts leave nothing of this surface; a cut removes the side its normal points to");
   }
-  // An opened surface is a sheet by intent: that it is not closed is no news.
+  // A cut surface is open by intent, so this is not reported.
   if (s.cuts.empty()) return mesh_object(d, frame, std::move(mesh), notes);
   return surface_object(d, frame, std::move(mesh), false);
 }
@@ -166,14 +166,14 @@ RigidObject build_rigid(const RigidDescription& description, std::vector<BuildNo
 }
 
 RigidMotion build_motion(const RigidDescription& description, const RigidObject& object) {
-  // Whether a mesh is closed matters to the mass of a free body alone.
+  // Closedness matters only for the mass of a free body.
   const bool closed =
       std::holds_alternative<FreeMotion>(description.motion) && polygon::check_mesh(*object.drawn).oriented;
   return {description, object.pose, *object.drawn, closed};
 }
 
 double map_margin_m(const RigidDescription& description) {
-  // The chords of the tessellations below: a ball's triangles of 4 degrees, a capsule's of 11.
+  // Sagitta of the tessellations: triangles of 4 degrees on a ball, of 11 degrees on a capsule.
   if (const auto* ball = std::get_if<BallPrimitive>(&description.source)) return 1.5e-3 * ball->radius_m;
   if (const auto* capsule = std::get_if<CapsulePrimitive>(&description.source))
     return 1.2e-2 * capsule->radius_m;
@@ -221,7 +221,8 @@ polygon::TriangleMesh cut_mesh(const polygon::TriangleMesh& mesh, const Pose& to
     };
     polygon::TriangleMesh kept;
     std::vector<std::uint32_t> renumbered(result.vertices.size(), 0xFFFFFFFFU);
-    std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> crossings;  // one new vertex a cut edge
+    // One new vertex per cut edge.
+    std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> crossings;
     std::vector<double> heights(result.vertices.size());
     for (std::size_t v = 0; v < heights.size(); ++v) heights[v] = height(result.vertices[v]);
     const auto keep = [&](std::uint32_t v) {

@@ -9,25 +9,25 @@
 #include <glm/common.hpp>
 #include <glm/vector_relational.hpp>
 
-#include "hybrid/tick/tissue/obstacles.h"
-#include "hybrid/tick/bodies/body_collisions.h"
-#include "hybrid/tick/bodies/bodies_press_tissue.h"
+#include "hybrid/base/process_memory.h"
 #include "hybrid/build/build_objects.h"
 #include "hybrid/build/remove_overlap.h"
-#include "hybrid/geometry/surface_nets.h"
-#include "hybrid/base/process_memory.h"
-#include "hybrid/scene/read_feel.h"
-#include "hybrid/tick/tissue/press_tissue.h"
 #include "hybrid/build/thin_object.h"
+#include "hybrid/geometry/surface_nets.h"
+#include "hybrid/scene/read_feel.h"
+#include "hybrid/tick/bodies/bodies_press_tissue.h"
+#include "hybrid/tick/bodies/body_collisions.h"
+#include "hybrid/tick/tissue/obstacles.h"
+#include "hybrid/tick/tissue/press_tissue.h"
 
 namespace hybrid {
 namespace {
 
 constexpr int kSurfaceSmoothing = 6;  // of a soft object's drawn surface
-// Cells along the scene's longest side, at most, unless the scene says otherwise: 64 bricks however they lie.
+// Default bound of cells along the scene's longest side: 64 bricks at any alignment.
 constexpr double kMostCells = 504.0;
-constexpr double kRigidCells = 200.0;      // where nothing is soft: finer cells name no fewer objects
-constexpr std::size_t kMapReserve = 2048;  // bricks that motion may add
+constexpr double kRigidCells = 200.0;      // if nothing is soft: finer cells exclude no further objects
+constexpr std::size_t kMapReserve = 2048;  // spare bricks for motion
 
 struct Box {
   glm::dvec3 low{1e300}, high{-1e300};
@@ -41,7 +41,7 @@ struct Box {
   throw SceneError(scene.file, place, text);
 }
 
-// Runs a step whose exceptions are about what stands at `place` in the scene file.
+// Runs a step; its exceptions are reported at `place` in the scene file.
 template <class Step>
 auto at_place(const Scene& scene, SourcePlace place, const std::string& name, Step&& step) {
   try {
@@ -60,8 +60,8 @@ double choose_cell(const Scene& scene, const Box& box, double soft_spacing) {
   const glm::dvec3 size = box.high - box.low;
   const double longest = std::max({size.x, size.y, size.z});
   if (scene.occupancy_cell_m) {
-    // A flat sheet's worth of cells on each side is what surfaces take, a brick of 2.6 kB each in the worst
-    // case.
+    // Surfaces occupy about one sheet of cells on each side of the scene, with a brick of 2.6 kB each in the
+    // worst case.
     const double across = longest / *scene.occupancy_cell_m;
     const double bytes = 6.0 * across * across / 64.0 * 2600.0;
     if (bytes > 0.25 * static_cast<double>(usable_memory_bytes())) {
@@ -90,7 +90,7 @@ class Builder {
       built_.notes.push_back({note.object, polygon::Severity::info, note.text});
     for (const RigidDescription& d : scene_.rigid) add_rigid(d);
     for (const SoftDescription& d : scene_.soft) read_soft(d);
-    settle_overlaps();
+    remove_overlaps();
     make_lattices();
     fill_map();
     finish_world();
@@ -101,22 +101,22 @@ class Builder {
           {world_->soft[o].name, polygon::Severity::info,
            fmt::format("{} surface voxels lie near rigid objects, which will stop them", near)});
     }
-    use_grids();
-    watch_bodies(*world_, *built_.state);
+    use_patches();
+    query_bodies(*world_, *built_.state);
     built_.world = std::move(world_);
-    give_back_freed_memory();
+    return_freed_memory();
     built_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    built_.held_bytes = held_memory_bytes();
+    built_.resident_bytes = resident_memory_bytes();
     built_.peak_bytes = peak_memory_bytes();
     return std::move(built_);
   }
 
  private:
-  void say(const std::string& text) const {
+  void report_progress(const std::string& text) const {
     if (progress_) progress_(text);
   }
 
-  // What tissue has to leave the way of must have an inside.
+  // A moving object pushes tissue out, so it must have an inside.
   void refuse_sheet_beside_soft(const RigidDescription& d, const RigidObject& object) const {
     if (scene_.soft.empty() || !object.motion.moves() || object.surface->solid()) return;
     refuse(scene_, d.motion_place,
@@ -125,10 +125,10 @@ class Builder {
                        d.name));
   }
 
-  // Objects that meet nothing but the tool may have their contacts on a composite grid: where nothing moves,
-  // and nothing else comes nearer to one than a part of its size.
-  void use_grids() {
-    constexpr double kApart = 0.25;
+  // Gives contacts on nested patches to objects that can meet nothing but the tool: nothing in the scene
+  // moves, and no other object is nearer than a fraction of the object's size.
+  void use_patches() {
+    constexpr double kClearance = 0.25;
     const bool moves = std::any_of(world_->rigid.begin(), world_->rigid.end(),
                                    [](const RigidObject& object) { return object.motion.moves(); });
     std::vector<Box> boxes;
@@ -149,7 +149,7 @@ class Builder {
     for (std::size_t o = 0; o < world_->soft.size(); ++o) {
       const Box& own = boxes[rigid + o];
       const glm::dvec3 size = own.high - own.low;
-      const double apart = kApart * std::max({size.x, size.y, size.z});
+      const double apart = kClearance * std::max({size.x, size.y, size.z});
       const bool alone = !moves && std::none_of(boxes.begin(), boxes.end(), [&](const Box& other) {
         return &other != &own && glm::all(glm::lessThan(other.low, own.high + apart)) &&
                glm::all(glm::lessThan(own.low - apart, other.high));
@@ -169,7 +169,7 @@ class Builder {
   }
 
   void add_rigid(const RigidDescription& d) {
-    say(fmt::format("reading rigid \"{}\"", d.name));
+    report_progress(fmt::format("reading rigid \"{}\"", d.name));
     at_place(scene_, d.source_place, d.name, [&] { world_->rigid.push_back(build_rigid(d, built_.notes)); });
     RigidObject& object = world_->rigid.back();
     at_place(scene_, d.motion_place, d.name, [&] { object.motion = build_motion(d, object); });
@@ -180,7 +180,7 @@ class Builder {
   }
 
   void read_soft(const SoftDescription& d) {
-    say(fmt::format("reading soft \"{}\"", d.name));
+    report_progress(fmt::format("reading soft \"{}\"", d.name));
     at_place(scene_, d.source_place, d.name, [&] {
       volumes_.push_back(build_volume(d, built_.notes));
       const std::uint64_t bytes = soft_load_bytes(volumes_.back().dims);
@@ -194,48 +194,48 @@ class Builder {
     });
   }
 
-  void settle_overlaps() {
+  void remove_overlaps() {
     anchored_.resize(volumes_.size());
     for (std::size_t o = 0; o < volumes_.size(); ++o) {
       const SoftDescription& d = scene_.soft[o];
-      std::size_t carved = 0;
+      std::size_t removed = 0;
       if (!world_->rigid.empty()) {
-        say(fmt::format("looking where \"{}\" meets rigid objects", d.name));
-        carved = carve_by_rigid(world_->rigid, volumes_[o], d.anchors.rigid_within_m, anchored_[o]);
-        note_carved(d, carved, "rigid objects");
+        report_progress(fmt::format("looking where \"{}\" meets rigid objects", d.name));
+        removed = remove_rigid_overlap(world_->rigid, volumes_[o], d.anchors.rigid_within_m, anchored_[o]);
+        note_carved(d, removed, "rigid objects");
       }
       for (std::size_t later = o + 1; later < volumes_.size(); ++later) {
-        const std::size_t by_soft = carve_by_soft(volumes_[o], volumes_[later]);
+        const std::size_t by_soft = remove_soft_overlap(volumes_[o], volumes_[later]);
         note_carved(d, by_soft, "\"" + scene_.soft[later].name + "\"");
-        carved += by_soft;
+        removed += by_soft;
       }
       const auto& labels = volumes_[o].labels;
       const bool nothing = std::all_of(labels.begin(), labels.end(), [](auto label) { return label == 0; });
-      if (carved > 0 && nothing) {
+      if (removed > 0 && nothing) {
         refuse(
             scene_, d.place,
             fmt::format("nothing is left of \"{}\": other objects lie in all of its {} voxels, and carve it; "
                         "move one of them",
-                        d.name, carved));
+                        d.name, removed));
       }
     }
   }
 
-  void note_carved(const SoftDescription& d, std::size_t carved, const std::string& by) {
-    if (carved == 0) return;
+  void note_carved(const SoftDescription& d, std::size_t removed, const std::string& by) {
+    if (removed == 0) return;
     if (scene_.overlap == Overlap::refuse) {
       refuse(scene_, d.place,
              fmt::format("\"{}\" overlaps {} in {} voxels; move one of them, or say overlap = \"carve\"",
-                         d.name, by, carved));
+                         d.name, by, removed));
     }
     built_.notes.push_back(
-        {d.name, polygon::Severity::info, fmt::format("{} voxels carved where {} lie", carved, by)});
+        {d.name, polygon::Severity::info, fmt::format("{} voxels carved where {} lie", removed, by)});
   }
 
   void make_lattices() {
     for (std::size_t o = 0; o < volumes_.size(); ++o) {
       const SoftDescription& d = scene_.soft[o];
-      say(fmt::format("building the lattice of \"{}\"", d.name));
+      report_progress(fmt::format("building the lattice of \"{}\"", d.name));
       at_place(scene_, d.source_place, d.name, [&] {
         voxel::LatticeOptions options = lattice_options(scene_, d);
         options.anchor_voxels = anchored_[o];
@@ -243,9 +243,9 @@ class Builder {
                       .pose = {volumes_[o].origin_m, volumes_[o].rotation},
                       .budget = d.budget,
                       .drawn = {}};
-        body.drawn = surface_from_labels(volumes_[o], kSurfaceSmoothing);  // before the inside is thinned
+        body.drawn = surface_from_labels(volumes_[o], kSurfaceSmoothing);  // before the interior is thinned
         if (d.thinning) thin_object(scene_, d, volumes_[o], options, body, built_.notes);
-        // The lattice has what it needs, and the volume's memory goes as that comes.
+        // The volume's memory is freed as soon as the lattice has its data.
         soft_.push_back(std::make_unique<voxel::SoftObject>(
             std::make_unique<voxel::Lattice>(std::move(volumes_[o]), options)));
         volumes_[o] = {};
@@ -256,7 +256,7 @@ class Builder {
     }
   }
 
-  // A scene that fits as long as only some of it is touched is no mistake.
+  // No error: the scene fits as long as only a part of it is touched.
   void note_memory(const SoftDescription& d, const voxel::Lattice& lattice) {
     const std::uint64_t bytes = soft_touched_bytes(lattice), usable = usable_memory_bytes();
     if (bytes <= usable) return;
@@ -268,7 +268,7 @@ class Builder {
   }
 
   void fill_map() {
-    say("filling the occupancy map");
+    report_progress("filling the occupancy map");
     double spacing = 0.0;
     for (const auto& object : soft_) {
       const double h = object->lattice().min_spacing_m();
@@ -331,7 +331,7 @@ class Builder {
     }
     world_->encoder_m = scene_limits(scene_).resolution_m;
     world_->limits.deadline_s = scene_.deadline_periods / scene_.rate_hz;
-    // What is where its path is, whatever the force, takes no energy.
+    // A device that follows its path whatever the force absorbs no energy.
     const bool ideal = is_ideal(scene_);
     if (ideal && !scene_.max_energy_given)
       world_->limits.max_energy_J = std::numeric_limits<double>::infinity();
@@ -343,7 +343,7 @@ class Builder {
     built_.state->soft = std::move(soft_);
     built_.state->prepare(*world_);
     prepare_collisions(*world_, *built_.state);
-    watch_collisions(*world_, *built_.state);
+    query_collisions(*world_, *built_.state);
     note_overlapping_bodies();
   }
 

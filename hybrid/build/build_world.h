@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// From a scene as written to a world that can be touched: files read, surfaces built, overlaps carved, map
-// filled.
+// Builds a world that can be touched from a scene as written: reads files, builds surfaces, removes overlaps
+// and fills the map.
 #pragma once
 
 #include <array>
@@ -16,7 +16,7 @@
 namespace hybrid {
 
 struct BuildNote {
-  std::string object;  // empty: of the scene
+  std::string object;  // empty: the whole scene
   polygon::Severity severity = polygon::Severity::info;
   std::string text;
 };
@@ -24,36 +24,35 @@ struct BuildNote {
 struct BuiltScene {
   std::unique_ptr<const World> world;
   std::unique_ptr<WorldState> state;  // at rest, not started: see start_proxy()
-  std::vector<BuildNote> notes;       // what a person should know: findings, repairs, voxels carved
-  double seconds = 0.0;               // from the files to ready to be touched
-  // Of the whole program, when that was done: resident, and the most that ever was.
-  std::uint64_t held_bytes = 0, peak_bytes = 0;
+  std::vector<BuildNote> notes;       // for the user: findings, repairs, removed voxels
+  double seconds = 0.0;               // time to build
+  // Resident memory of the whole program after that, and its peak.
+  std::uint64_t resident_bytes = 0, peak_bytes = 0;
 };
 
-// `progress` is told what begins, in words; may be empty.
+// Gets a message at the start of each step; may be empty.
 using Progress = std::function<void(const std::string&)>;
 
-// The occupancy map's cell (m) for a scene of rigid objects alone that is so long, unless it says otherwise.
+// Default cell of the occupancy map (m) for a scene of rigid objects alone with the given longest side.
 double rigid_cell_m(double longest_m, double tool_radius_m);
 
-// Throws SceneError: a file that cannot be used, nothing left after carving, too large for the memory (with
-// the numbers, before it is allocated), objects that overlap where the scene asks to refuse that.
+// Throws SceneError if a file cannot be used, if no voxels are left after overlap removal, if the memory is
+// too small (with the numbers, before allocation), or if objects overlap and the scene refuses that.
 BuiltScene build_scene(const Scene& scene, const Progress& progress = {});
 
-// Where an object lies at rest (scene frame, meters), rigid ones first; in words: "x 1.2 to 3.4, y …, z …
-// mm".
+// Box of an object at rest (scene frame, m), rigid objects first; in words: "x 1.2 to 3.4, y …, z … mm".
 struct ObjectBox {
   glm::dvec3 low{0.0}, high{0.0};
 };
 ObjectBox object_box(const World& world, std::size_t object);
 std::string in_words(const ObjectBox& box);
 
-// The most that a soft object of so many voxels takes until it is touched: what it is read into, its lattice
-// (2.5 bytes a voxel at their most), its surface and its part of the map.
+// Largest memory of a soft object with these dimensions before it is touched: its file's contents, its
+// lattice (at most 2.5 bytes a voxel), its surface and its part of the map.
 std::uint64_t soft_load_bytes(const std::array<int, 3>& dims);
-// And once something has moved everywhere in it: state and coarse levels, and springs where they are not all
-// of one label. In a session that is as far as the tool went and relaxation followed.
-std::uint64_t soft_touched_bytes(const std::array<int, 3>& dims);  // of one label
+// The same after everything in it has moved: state and coarse levels, and link stiffness if there are several
+// labels. A session needs this only as far as the tool went and relaxation followed.
+std::uint64_t soft_touched_bytes(const std::array<int, 3>& dims);  // for a single label
 std::uint64_t soft_touched_bytes(const voxel::Lattice& lattice);
 
 }  // namespace hybrid

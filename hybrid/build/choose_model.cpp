@@ -12,10 +12,10 @@
 namespace hybrid {
 namespace {
 
-// From here on a hand takes a surface for rigid: Tan, Srinivasan, Eberman & Cheng, "Human factors for the
-// design of force-reflecting haptic interfaces" (1994), 153 to 415 N/cm.
+// Stiffness from which on a hand takes a surface for rigid: 153 to 415 N/cm in Tan, Srinivasan, Eberman &
+// Cheng, "Human factors for the design of force-reflecting haptic interfaces" (1994).
 constexpr double kRigidToAHand_N_per_m = 25e3;
-// Of a device that sets no limit, that of the largest one known here.
+// For a device without a limit, that of the largest device known here.
 constexpr double kStrongForce_N = 37.5;
 
 struct Stiffness {
@@ -23,7 +23,7 @@ struct Stiffness {
   std::string material;
 };
 
-// Of the softest material that the object may have: what stands for all of it must not be softer.
+// The softest material of the object decides, because the choice must hold everywhere on it.
 Stiffness softest(const Scene& scene, const SoftDescription& soft, double force_N) {
   std::vector<std::string> names{soft.material};
   for (const auto& [label, name] : soft.materials) names.push_back(name);
@@ -41,8 +41,8 @@ struct Choice {
   std::string reason;
 };
 
-// What is felt is the tissue in series with the coupling, and no more than the device renders or a hand can
-// tell. Where that is within a just noticeable difference of what a rigid surface gives, voxels are waste.
+// The hand feels tissue and coupling in series, limited by what the device renders and a hand can tell. If
+// that is within a just noticeable difference of a rigid surface, voxels are not needed.
 Choice choose(const Scene& scene, const SoftDescription& soft) {
   if (scene.tool.shape == Tool::Shape::punch) return {false, "a punch is felt by voxels alone"};
   const device::DeviceLimits limits = scene_limits(scene);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A scene file, read and with the model of each object decided.
+// Reads a scene file and decides the model of each object.
 #pragma once
 
 #include <filesystem>

@@ -9,9 +9,9 @@
 namespace hybrid {
 namespace {
 
-constexpr double kFarthestLook = 32.0;  // spacings that one distance query may clear of carving
+constexpr double kQueryAhead = 32.0;  // spacings beyond the decision range that one distance query can settle
 
-// Distance to the nearest rigid surface within `range`, to the nearest that stays, and whether the point is
+// Distance to the nearest rigid surface within `range`, to the nearest fixed one, and whether the point is
 // inside a rigid solid.
 struct RigidDistance {
   double distance, fixed;
@@ -35,19 +35,19 @@ RigidDistance rigid_distance(const std::vector<RigidObject>& rigid, const glm::d
 
 }  // namespace
 
-std::size_t carve_by_rigid(const std::vector<RigidObject>& rigid, voxel::LabelVolume& volume, double anchor_m,
-                           std::vector<std::size_t>& anchored) {
+std::size_t remove_rigid_overlap(const std::vector<RigidObject>& rigid, voxel::LabelVolume& volume,
+                                 double anchor_m, std::vector<std::size_t>& anchored) {
   const double h = std::min({volume.spacing_m.x, volume.spacing_m.y, volume.spacing_m.z});
   const double clear = std::max(0.5 * h, anchor_m);
-  std::size_t carved = 0;
+  std::size_t removed = 0;
   for (int k = 0; k < volume.dims[2]; ++k) {
     for (int j = 0; j < volume.dims[1]; ++j) {
       for (int i = 0; i < volume.dims[0]; ++i) {
         if (volume.labels[volume.index(i, j, k)] == 0) continue;
         const glm::dvec3 p = volume.origin_m + volume.rotation * (glm::dvec3(i, j, k) * volume.spacing_m);
-        const RigidDistance near = rigid_distance(rigid, p, clear + kFarthestLook * h);
-        // Everything nearer to p than the surface lies on the same side of it: voxels of the row that are
-        // further from it than `clear` need no look of their own.
+        const RigidDistance near = rigid_distance(rigid, p, clear + kQueryAhead * h);
+        // No surface is nearer to p than near.distance. Voxels of the row that are further from the surface
+        // than `clear` get the same result without a query.
         const int run = std::max(0, static_cast<int>((near.distance - clear) / volume.spacing_m.x));
         const int last = std::min(volume.dims[0] - 1, i + run);
         for (; i <= last; ++i) {
@@ -55,7 +55,7 @@ std::size_t carve_by_rigid(const std::vector<RigidObject>& rigid, voxel::LabelVo
           if (label == 0) continue;
           if (near.inside || (run == 0 && near.distance < 0.5 * h)) {
             label = 0;
-            ++carved;
+            ++removed;
           } else if (run == 0 && near.fixed <= anchor_m) {
             anchored.push_back(volume.index(i, j, k));
           }
@@ -64,11 +64,11 @@ std::size_t carve_by_rigid(const std::vector<RigidObject>& rigid, voxel::LabelVo
       }
     }
   }
-  return carved;
+  return removed;
 }
 
-std::size_t carve_by_soft(voxel::LabelVolume& first, const voxel::LabelVolume& later) {
-  std::size_t carved = 0;
+std::size_t remove_soft_overlap(voxel::LabelVolume& first, const voxel::LabelVolume& later) {
+  std::size_t removed = 0;
   const glm::dquat to_later = glm::inverse(later.rotation) * first.rotation;
   const glm::dvec3 shift = glm::inverse(later.rotation) * (first.origin_m - later.origin_m);
   for (int k = 0; k < first.dims[2]; ++k) {
@@ -86,11 +86,11 @@ std::size_t carve_by_soft(voxel::LabelVolume& first, const voxel::LabelVolume& l
             0)
           continue;
         label = 0;
-        ++carved;
+        ++removed;
       }
     }
   }
-  return carved;
+  return removed;
 }
 
 }  // namespace hybrid

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Where objects overlap as a scene places them: who gives way, before lattices are made.
+// Removal of overlaps between the objects of a scene, before lattices are made.
 #pragma once
 
 #include <cstddef>
@@ -10,13 +10,13 @@
 
 namespace hybrid {
 
-// Takes out voxels that lie in a rigid solid or nearer than half a spacing to a rigid surface, so that
-// nothing is felt before contact; and gathers those within `anchor_m` of one that stays, which will hold
-// them. Returns how many were carved.
-std::size_t carve_by_rigid(const std::vector<RigidObject>& rigid, voxel::LabelVolume& volume, double anchor_m,
-                           std::vector<std::size_t>& anchored);
+// Removes voxels inside a rigid solid, or nearer than half a spacing to a rigid surface, so that there is no
+// force before contact. Appends to `anchored` the voxels within `anchor_m` of a fixed rigid surface, which
+// become anchors. Returns how many voxels were removed.
+std::size_t remove_rigid_overlap(const std::vector<RigidObject>& rigid, voxel::LabelVolume& volume,
+                                 double anchor_m, std::vector<std::size_t>& anchored);
 
-// Voxels of `first` that lie in filled voxels of `later` are taken out of it. Returns how many.
-std::size_t carve_by_soft(voxel::LabelVolume& first, const voxel::LabelVolume& later);
+// Removes from `first` the voxels whose centres lie in filled voxels of `later`. Returns how many.
+std::size_t remove_soft_overlap(voxel::LabelVolume& first, const voxel::LabelVolume& later);
 
 }  // namespace hybrid

@@ -11,7 +11,7 @@
 namespace hybrid {
 namespace {
 
-// Labels of the volume whose material is stiff enough.
+// Labels of the volume whose material is at least as stiff as the threshold.
 std::vector<std::uint8_t> stiff_labels(const voxel::LabelVolume& volume, const voxel::LatticeOptions& options,
                                        double above_Pa) {
   std::array<bool, 256> used{};
@@ -52,7 +52,7 @@ void thin_object(const Scene& scene, const SoftDescription& description, voxel::
   for (std::size_t label = 1; label < 256; ++label) {
     const std::uint8_t strut = thinned.strut_label[label];
     if (strut == 0) continue;
-    options.materials[label].bricks = false;  // struts are links that are longer
+    options.materials[label].bricks = false;  // struts are longer links
     options.materials[strut] = options.materials[label];
     options.materials[strut].young_Pa *= static_cast<double>(thinning.every) * thinning.every;
     auto& anchors = options.anchor_labels;

@@ -3,8 +3,8 @@
 
 #include <chrono>
 
-#include "hybrid/build/build_objects.h"
 #include "hybrid/base/flush_to_zero.h"
+#include "hybrid/build/build_objects.h"
 #include "voxel/baseline/thesis_chainmail.h"
 
 namespace hybrid {
@@ -19,11 +19,11 @@ ModelResult classic_voxels(const Scene& scene, const SoftDescription& soft,
   using Clock = std::chrono::steady_clock;
   std::vector<BuildNote> notes;
   const voxel::LabelVolume volume = build_volume(soft, notes);
-  voxel::ClassicObject object(volume, lattice_options(scene, soft), {.damping = kDamping});
+  voxel::ThesisChainMail object(volume, lattice_options(scene, soft), {.damping = kDamping});
   const glm::dquat to_body = glm::conjugate(volume.rotation);
   ModelResult model{.name = "classic", .rows = {}, .depth_m = {}, .tick_us = {}};
-  const FlushedDenormals flushed;  // as a session has it
-  TimeSpread times;
+  const ScopedFlushToZero flushed;  // as a session has it
+  LatencyHistogram times;
   object.touch(glm::dvec3(1e9), 0.0);  // touches nothing, and builds the map outside of the first tick
   for (const TraceRow& row : like) {
     const Clock::time_point start = Clock::now();

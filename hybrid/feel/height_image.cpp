@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// PNG files in, as heights.
+// Reads PNG files as heights.
 #include <png.h>
 
 #include <algorithm>
@@ -42,7 +42,7 @@ std::vector<unsigned char> read_bytes(const std::filesystem::path& file) {
   return bytes;
 }
 
-// Without what says how bright the values look (gamma, profile): libpng would turn heights by it.
+// Drops chunks about brightness (gamma, profile), by which libpng would change the heights.
 std::vector<unsigned char> without_colour_space(const std::vector<unsigned char>& png) {
   static constexpr std::array<const char*, 4> kDropped{"gAMA", "cHRM", "sRGB", "iCCP"};
   std::vector<unsigned char> out(png.begin(), png.begin() + kSignature.size());
@@ -52,7 +52,7 @@ std::vector<unsigned char> without_colour_space(const std::vector<unsigned char>
     const std::size_t length = std::size_t{png[at]} << 24U | std::size_t{png[at + 1]} << 16U |
                                std::size_t{png[at + 2]} << 8U | std::size_t{png[at + 3]};
     const std::size_t whole = length + 12;
-    if (whole > png.size() - at) break;  // cut short: the rest as it is, for libpng to complain of
+    if (whole > png.size() - at) break;  // cut short: the rest is kept, for libpng to report
     const auto* type = png.data() + at + 4;
     const bool dropped = std::any_of(kDropped.begin(), kDropped.end(),
                                      [type](const char* name) { return std::memcmp(name, type, 4) == 0; });
@@ -77,10 +77,10 @@ template <typename Value>
 std::vector<float> read_grey(Image& image, const std::filesystem::path& file, unsigned format, float full) {
   image.format = format;
   std::vector<Value> values(static_cast<std::size_t>(image.width) * image.height);
-  const png_color black{0, 0, 0};  // what is transparent
+  const png_color black{0, 0, 0};  // colour of transparent pixels
   const bool linear = (format & PNG_FORMAT_FLAG_LINEAR) != 0;
   const bool good = png_image_finish_read(&image, linear ? nullptr : &black, values.data(), 0, nullptr) != 0;
-  // A warning (a checksum that is wrong, data cut short) leaves an image with holes: no height to trust.
+  // A warning (a wrong checksum, data cut short) means an image with holes, whose heights cannot be trusted.
   if (!good || (image.warning_or_error & PNG_IMAGE_WARNING) != 0)
     refuse(file, "the image is damaged (" + image.why() + "); save it again");
   std::vector<float> grey(values.size());

@@ -29,11 +29,11 @@ void check(const TextureMapping& mapping) {
 struct Wave {
   double value, slope;
 };
-// A smooth hill with its top at whole numbers, 0 to 1.
+// A smooth hill with its maximum 1 at whole numbers, minimum 0.
 Wave hill(double x) noexcept {
   return {0.5 + 0.5 * std::cos(kTau * x), -0.5 * kTau * std::sin(kTau * x)};
 }
-// A hill made narrow: a line.
+// A narrow hill: a line.
 Wave line(double x) noexcept {
   const Wave h = hill(x);
   const double most = std::pow(h.value, kLinePower - 1);
@@ -46,7 +46,7 @@ HeightSample sample_pattern(TexturePattern pattern, double u, double v) noexcept
       const Wave a = hill(u), b = hill(v);
       return {a.value * b.value, {a.slope * b.value, a.value * b.slope}};
     }
-    case TexturePattern::grid: {  // either line, without a crease where they cross
+    case TexturePattern::grid: {  // the larger of both lines, without a crease where they cross
       const Wave a = line(u), b = line(v);
       return {1.0 - (1.0 - a.value) * (1.0 - b.value),
               {a.slope * (1.0 - b.value), b.slope * (1.0 - a.value)}};
@@ -70,13 +70,13 @@ Spline spline(double t) noexcept {
           .slope = {-0.5 * s * s, (3.0 * t * t - 4.0 * t) / 2.0, (4.0 * s - 3.0 * s * s) / 2.0, 0.5 * t * t}};
 }
 
-// A coordinate in pixels: the four around it, wrapped, and how far it is between the middle two.
+// A coordinate in pixels: its four neighbours, wrapped, and its position between the middle two.
 struct PixelPlace {
   std::array<std::size_t, 4> index{};
   double share = 0.0;
 };
 PixelPlace pixel_place(double unit, int count) noexcept {
-  const double at = (unit - std::floor(unit)) * count - 0.5;  // pixels stand at their middle
+  const double at = (unit - std::floor(unit)) * count - 0.5;  // pixel values are at pixel centres
   const double below = std::floor(at);
   PixelPlace place{.share = at - below};
   for (int i = 0; i < 4; ++i) {
@@ -87,8 +87,8 @@ PixelPlace pixel_place(double unit, int count) noexcept {
   return place;
 }
 
-// The map seen along one axis, upright as from its positive end: its height and gradient (m) in the body
-// frame.
+// The map projected along one axis, upright when seen from its positive end: height and gradient (m) in the
+// body frame.
 Relief relief_along(const HeightTexture& texture, const glm::dvec3& point, glm::length_t axis) noexcept {
   const glm::length_t u = (axis + 1) % 3, v = (axis + 2) % 3;
   const TextureMapping& m = texture.mapping();
@@ -137,7 +137,7 @@ HeightSample HeightTexture::sample(double u, double v) const noexcept {
     out.slope.x += y.weight[j] * slope;
     out.slope.y += y.slope[j] * value;
   }
-  out.slope *= image_.width;  // pixels a unit, the same both ways
+  out.slope *= image_.width;  // pixels per unit, the same in both directions
   return out;
 }
 
@@ -153,15 +153,15 @@ Relief relief_at(const HeightTexture& texture, const glm::dvec3& point, const gl
     default:
       break;
   }
-  // Fourth powers: an axis 45° away counts half, one 60° away a ninth. The weights follow the normal alone,
-  // so on a flat surface they are constant and the gradient is exact.
+  // Fourth powers: an axis 45° away has half of the weight, one 60° away a ninth. The weights follow the
+  // normal alone, so they are constant on a flat surface and the gradient is exact.
   const glm::dvec3 square = normal * normal, weight = square * square;
   const double whole = weight.x + weight.y + weight.z;
   Relief out;
   if (!(whole > 0.0)) return out;
   for (glm::length_t axis = 0; axis < 3; ++axis) {
     const double share = weight[axis] / whole;
-    if (share < 1e-6) continue;  // an axis-aligned face costs one look
+    if (share < 1e-6) continue;  // an axis-aligned face costs one look-up
     const Relief one = relief_along(texture, point, axis);
     out.height_m += share * one.height_m;
     out.gradient += share * one.gradient;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Relief that is felt on a smooth surface: a periodic height map from an image or a formula, as a force added
-// to the contact's own (thesis, Fig 4; Minsky et al. 1990; Morgenbesser & Srinivasan 1996).
+// Relief on a smooth surface: a periodic height map from an image or a formula, as a force that is added to
+// the contact's own (thesis, Fig 4; Minsky et al. 1990; Morgenbesser & Srinivasan 1996).
 #pragma once
 
 #include <cstdint>
@@ -15,13 +15,13 @@ enum class TextureKind : std::uint8_t { height, shading };
 enum class TextureAlong : std::uint8_t { x, y, z, box };
 enum class TexturePattern : std::uint8_t { waves, grid, bumps };
 
-// How the map lies on an object, in its body frame.
+// Placement of the map on an object, in its body frame.
 struct TextureMapping {
   TextureKind kind = TextureKind::height;
-  // Seen along this axis; box: along the axis nearest to the surface's normal, blended between them.
+  // Projected along this axis; box: along the axis nearest to the surface's normal, blended between them.
   TextureAlong along = TextureAlong::box;
   double size_m = 0.01;    // period along u; along v by the image's shape (a pattern is square)
-  double height_m = 5e-4;  // from the darkest to the brightest there can be
+  double height_m = 5e-4;  // between the darkest and the brightest possible value
 };
 
 // Grey levels from 0 to 1, rows from the top.
@@ -30,16 +30,16 @@ struct GreyImage {
   std::vector<float> grey;
 };
 
-inline constexpr int kMostTexturePixels = 4096;  // a side
+inline constexpr int kMostTexturePixels = 4096;  // along each side
 
-// A PNG of 8 or 16 bits, grey or coloured (then its luminance), values as they stand in the file: no gamma is
-// applied, a height is no light. What is transparent is 0. Throws std::runtime_error in words: not readable,
-// not a PNG, damaged, larger than kMostTexturePixels a side.
+// Reads a PNG of 8 or 16 bits, grey or coloured (then its luminance). Values are used as they are in the
+// file, without gamma, because a height is no light. Transparent pixels are 0. Throws std::runtime_error with
+// a message: not readable, not a PNG, damaged, larger than kMostTexturePixels along a side.
 GreyImage load_grey_png(const std::filesystem::path& file);
 
 struct HeightSample {
   double height = 0.0;    // 0 to 1
-  glm::dvec2 slope{0.0};  // its derivative by u and v
+  glm::dvec2 slope{0.0};  // its derivatives by u and v
 };
 
 class HeightTexture {
@@ -51,21 +51,21 @@ class HeightTexture {
   [[nodiscard]] const TextureMapping& mapping() const noexcept { return mapping_; }
   [[nodiscard]] std::size_t memory_bytes() const noexcept { return image_.grey.capacity() * sizeof(float); }
 
-  // Over the unit square, which repeats without end. An image is a uniform cubic B-spline through its pixels:
-  // its slope is continuous (C2), it never leaves the range of the pixels (an interpolating spline overshoots
-  // at every step), and steps between 8-bit levels are rounded; what is finer than about four pixels is
-  // smoothed away. v grows downward in the image.
+  // Over the unit square, repeated periodically. An image is a uniform cubic B-spline through its pixels. Its
+  // slope is continuous (C2), its values stay within the range of the pixels (an interpolating spline
+  // overshoots at every step), and steps between 8-bit levels are rounded. Details finer than about four
+  // pixels are smoothed away. v grows downward in the image.
   [[nodiscard]] HeightSample sample(double u, double v) const noexcept;
 
  private:
-  GreyImage image_;  // of an image; empty: a pattern
+  GreyImage image_;  // for an image; empty: a pattern
   TexturePattern pattern_ = TexturePattern::waves;
   TextureMapping mapping_;
 };
 
-// Height over the surface (m) and its gradient at a point, body frame. It lies between −height_m and 0: the
-// brightest places are the surface itself, dark ones lie deeper. (Raising bright places above the surface
-// instead would make the force jump on first contact, because contact begins at the surface.)
+// Height over the surface (m) and its gradient at a point, body frame. The height is between −height_m and 0:
+// the brightest places are the surface itself, dark places lie deeper. Raising bright places above the
+// surface instead would make the force jump at first contact, because contact begins at the surface.
 struct Relief {
   double height_m = 0.0;
   glm::dvec3 gradient{0.0};
@@ -79,12 +79,12 @@ struct TexturedContact {
   double stiffness_N_per_m = 0.0;    // of the coupling
 };
 
-// What texture adds to the contact's own force K·d·n (N, body frame).
+// Texture force, added to the contact's own force K·d·n (N, body frame).
 //   height:  F = K·max(0, d + h)·(n − ∇h), ∇h within the surface: the derivative of ½K·max(0, d + h)², so on
 //            a flat surface no closed path gains or loses anything. Sideways it is as stiff as
 //            K·(∇h² + (d + h)·h''): finer or steeper texture needs a softer coupling.
 //   shading: F = K·d·(n − ∇h)/|n − ∇h|: the direction turns, the size stays (thesis, Fig 4).
-// Zero without contact or where anything is not finite.
+// Zero without contact or if any input is not finite.
 glm::dvec3 texture_force(const HeightTexture& texture, const TexturedContact& contact) noexcept;
 
 }  // namespace hybrid

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The just noticeable difference (JND) of a force: the unit of every force error of this project.
-// |force - reference| / max(kJndShare * |reference|, floor), the floor being that of the device (jnd_floor_N()).
-// Source: the thesis, Table 4 (force at the elbow, 7 %).
+// The just noticeable difference (JND) of a force, the unit of every force error of this project: |force -
+// reference| / max(kJndShare * |reference|, floor), with the floor of the device (jnd_floor_N()). Source: the
+// thesis, Table 4 (force at the elbow, 7 %).
 #pragma once
 
 #include <algorithm>
@@ -10,10 +10,10 @@
 
 namespace hybrid {
 
-inline constexpr double kJndShare = 0.07;     // of the reference
-inline constexpr double kJndFloor_N = 0.04;  // least difference that is noticed, of a device without friction
+inline constexpr double kJndShare = 0.07;    // of the reference
+inline constexpr double kJndFloor_N = 0.04;  // floor for a device without friction
 
-// How many just noticeable differences `force` (N) is from `reference` (N).
+// Difference between `force` (N) and `reference` (N) in just noticeable differences.
 [[nodiscard]] inline double jnd_of(const glm::dvec3& force, const glm::dvec3& reference,
                                    double floor_N) noexcept {
   return glm::length(force - reference) / std::max(kJndShare * glm::length(reference), floor_N);

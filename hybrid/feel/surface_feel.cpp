@@ -11,16 +11,16 @@ namespace hybrid {
 namespace {
 
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-constexpr double kAside =
-    1e-4;  // how freely a shaded proxy goes beside the normals, of how freely along them
-constexpr double kSameNormal =
-    1e-6;  // of the compliance: what of a normal lies outside the span of the others
+// Compliance of a shaded proxy across the normals, relative to that along them.
+constexpr double kAside = 1e-4;
+// Of the compliance: least part of a normal outside the span of the others.
+constexpr double kSameNormal = 1e-6;
 
 double largest(const glm::dvec3& v) noexcept {
   return std::max({std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)});
 }
 
-// The force that rounding of the positions alone can make: a proxy on the cone up to this is on the cone.
+// The force that rounding of positions alone can make; a proxy this near to the cone is on the cone.
 double rounding_N(const glm::dvec3& a, const glm::dvec3& b, const glm::dmat3& metric) noexcept {
   return 8.0 * kEpsilon * (largest(a) + largest(b)) * (metric[0][0] + metric[1][1] + metric[2][2]);
 }
@@ -62,23 +62,24 @@ FrictionStep friction_target(const glm::dvec3& proxy, const glm::dvec3& target, 
     return step;
   }
   // The slide moves the proxy by C (f_t − μN û), C the compliance A⁻¹ within the plane, and so changes the
-  // pressure by −a of that force, a = n·A⁻¹û / n·A⁻¹n. With N the pressure after it: N (1 − μa) = N₀ − a f_t.
+  // normal force by −a of that force, a = n·A⁻¹û / n·A⁻¹n. With N the normal force after it: N (1 − μa) = N₀
+  // − a f_t.
   step.sliding = true;
   const glm::dvec3 along = tangential / step.tangential_N;
   const glm::dmat3 compliance = glm::inverse(metric);
   const glm::dvec3 back = compliance * along;
   const double a = glm::dot(normal, back) / glm::dot(normal, compliance * normal);
   const double room = 1.0 - dynamic_friction * a, pressed = step.normal_N - a * step.tangential_N;
-  if (!(room > 0.0)) {  // friction jams: each slide would press harder than it is pulled
+  if (!(room > 0.0)) {  // friction jams: each slide would press harder than the pull
     step.target = proxy;
-  } else if (pressed > 0.0) {  // else the slide lifts it off, and nothing holds it
+  } else if (pressed > 0.0) {  // else the slide lifts the proxy off, and there is no friction
     step.target = target - (dynamic_friction * pressed / room) * back;
   }
   return step;
 }
 
-bool friction_spends(const glm::dvec3& before, const glm::dvec3& after, const glm::dvec3& target,
-                     const glm::dmat3& metric) noexcept {
+bool friction_dissipates(const glm::dvec3& before, const glm::dvec3& after, const glm::dvec3& target,
+                         const glm::dmat3& metric) noexcept {
   const double stored = energy(before, target, metric);
   const double slack = rounding_N(before, target, metric) * glm::length(target - before);
   return energy(after, target, metric) <= stored + slack;
@@ -89,7 +90,7 @@ double DepthRate::add(double depth_m, double dt_s, double noise_m) noexcept {
     count_ = 0;
     return 0.0;
   }
-  const std::size_t kept = std::min(count_, kMost - 1);
+  const std::size_t kept = std::min(count_, kMaxValues - 1);
   for (std::size_t i = kept; i > 0; --i) {
     depth_m_[i] = depth_m_[i - 1];
     age_s_[i] = age_s_[i - 1] + dt_s;
@@ -118,12 +119,12 @@ double damping_force(DampingState& state, double normal_N, double depth_m, doubl
       state.balance_J = state.balance_J * std::max(0.0, 1.0 - dt_s / kDampingMemory_s) + work_J;
       if (state.balance_J < 0.0) {
         state.felt = false;
-        state.toll_J = 2.0 * std::max(state.toll_J, -state.balance_J);
+        state.resume_at_J = 2.0 * std::max(state.resume_at_J, -state.balance_J);
         state.earned_J = 0.0;
       }
     } else {
       state.earned_J += work_J;
-      if (state.earned_J >= state.toll_J) {
+      if (state.earned_J >= state.resume_at_J) {
         state.felt = true;
         state.balance_J = 0.0;
       }
@@ -148,7 +149,7 @@ glm::dvec3 limit_shaded_normal(const glm::dvec3& shaded, const glm::dvec3& norma
   if (cosine >= least_cosine) return shaded / std::sqrt(square);
   const glm::dvec3 aside = shaded - cosine * normal;
   const double length = glm::length(aside);
-  if (!(length > 1e-6)) return normal;  // its opposite: no side to turn to
+  if (!(length > 1e-6)) return normal;  // the opposite: no direction to turn to
   const double sine = std::sqrt(std::max(0.0, 1.0 - least_cosine * least_cosine));
   return least_cosine * normal + (sine / length) * aside;
 }
@@ -157,7 +158,7 @@ glm::dmat3 shading_metric(const glm::dmat3& metric, std::span<const glm::dvec3> 
   if (shaded_normals.empty()) return metric;
   const glm::dmat3 compliance = glm::inverse(metric);
   const double size = compliance[0][0] + compliance[1][1] + compliance[2][2];
-  glm::dmat3 rest = compliance, along(0.0);  // rest: of the ways that no normal before spans
+  glm::dmat3 rest = compliance, along(0.0);  // rest: compliance outside the span of the previous normals
   for (const glm::dvec3& normal : shaded_normals) {
     const glm::dvec3 way = rest * normal;
     const double square = glm::dot(way, normal);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a rigid surface feels like beyond being there: friction, damping, shading, texture. Pure functions of
-// the tick; each is off unless the scene asks for it.
+// The feel of a rigid surface beyond its shape: friction, damping, shading, texture. Pure functions of the
+// tick; each is off unless the scene enables it.
 #pragma once
 
 #include <array>
@@ -27,7 +27,7 @@ struct SurfaceFeel {  // of one rigid object
   }
 };
 
-// What a contact with several objects feels like: each counts by its share of the force that presses.
+// The feel of a contact with several objects: each is weighted by its share of the contact force.
 struct FeltSurface {
   const SurfaceFeel* feel = nullptr;
   double force_N = 0.0;  // of this object on the proxy, >= 0
@@ -37,46 +37,45 @@ struct MixedFeel {
 };
 MixedFeel mix_feel(std::span<const FeltSurface> surfaces) noexcept;
 
-// ---- Coulomb friction, the cone on the proxy and not on the force (Ruspini, Kolarov & Khatib 1997; Harwin &
-// Melder 2002) --------------------------------------------------------------------------------------------
+// ---- Coulomb friction, with the cone on the proxy and not on the force ----
+// Ruspini, Kolarov & Khatib 1997; Harwin & Melder 2002.
 
 struct FrictionStep {
-  glm::dvec3 target{0.0};  // where the proxy wants to go now, in place of the target without friction
-  bool sliding = false;    // hand it to the next tick
+  glm::dvec3 target{0.0};  // new target of the proxy, instead of the frictionless one
+  bool sliding = false;    // pass it to the next tick
   double normal_N = 0.0,
-         tangential_N = 0.0;  // of the pull on the proxy before it moves; normal_N > 0 presses
+         tangential_N = 0.0;  // of the pull on the proxy before it moves; normal_N > 0: it presses
 };
 
-// The proxy (feasible, and carried with the surface since the last tick) is pulled by f = A (target − proxy)
-// against a surface with the unit normal `normal`. It stays where it is while the pull lies in the cone: the
-// static one if it was at rest; the dynamic one if it was sliding, because only there does it come to rest by
-// itself. Else the target is moved back by what friction holds, A⁻¹ μN û, with û the pull's tangential
-// direction and N the pressure after the slide (with A = K·1 that before it is the same). So at the end of
-// the slide the tangential force is exactly μN, and the proxy moves by nothing where the pull is on the
-// dynamic cone: what is felt is continuous there.
+// The proxy is feasible, and was carried along with the surface since the last tick. It is pulled by f = A
+// (target − proxy) against a surface with the unit normal `normal`. It stays while the pull is in the
+// friction cone: the static cone if it was at rest, the dynamic cone if it was sliding, because only there
+// does it come to rest by itself. Otherwise the target is moved back by the friction force, A⁻¹ μN û, with û
+// the pull's tangential direction and N the normal force after the slide (for A = K·1 equal to that before).
+// At the end of the slide the tangential force is exactly μN. The proxy does not move if the pull is on the
+// dynamic cone, so that the force is continuous there.
 //
-// On a plane, ½ (target − q)ᵀ A (target − q) never grows by the step: the step ends between the proxy and the
-// minimum without friction, so what the hand puts in is stored or lost. Where the surface curves the way can
-// be longer; `friction_spends` says whether it spent energy, and a proxy for which it did not stays.
+// On a plane, ½ (target − q)ᵀ A (target − q) never grows by the step, which ends between the proxy and the
+// frictionless minimum: the work of the hand is stored or lost. On a curved surface the way can be longer.
+// `friction_dissipates` tells whether the step lost energy; if not, the proxy stays.
 //
-// In a tick of several passes a proxy that slid in one of them is told to the later ones, and to the next
+// A proxy that slid in one pass of a tick is passed to the later passes and to the next tick as sliding.
 // tick, as sliding.
 FrictionStep friction_target(const glm::dvec3& proxy, const glm::dvec3& target, const glm::dmat3& metric,
                              const glm::dvec3& normal, double static_friction, double dynamic_friction,
                              bool sliding) noexcept;
 
-bool friction_spends(const glm::dvec3& before, const glm::dvec3& after, const glm::dvec3& target,
-                     const glm::dmat3& metric) noexcept;
+bool friction_dissipates(const glm::dvec3& before, const glm::dvec3& after, const glm::dvec3& target,
+                         const glm::dmat3& metric) noexcept;
 
-// ---- damping along the normal (thesis, eq 1 and 2)
-// ---------------------------------------------------------
+// ---- damping along the normal (thesis, eq 1 and 2) ----
 
-// How fast a depth grows, from its values at the ticks. A difference over one tick of 1 ms turns an encoder
-// step of 0.03 mm into 30 mm/s, and a fixed low-pass that hides this is late in an impact, where damping is
-// wanted. So the window adapts (Janabi-Sharifi, Hayward & Chen 2000, end-fit first order): the longest one in
-// which every value lies within one encoder step of the straight line through its ends. An impact takes a
-// window of one tick, a tool at rest one of kMost. Exact for a depth that is linear in time; later by half
-// the window otherwise. With noise 0 it is the difference over one tick.
+// Rate of growth of a depth, from its values at the ticks. A difference over one tick of 1 ms turns an
+// encoder step of 0.03 mm into 30 mm/s, and a fixed low-pass filter is late in an impact, when damping is
+// wanted. The window is therefore adaptive (Janabi-Sharifi, Hayward & Chen 2000, end-fit first order): the
+// longest one in which every value lies within one encoder step of the straight line through its ends. In an
+// impact it is one tick, for a tool at rest kMaxValues ticks. Exact for a depth that is linear in time;
+// otherwise late by half the window. With noise 0 it is the difference over one tick.
 class DepthRate {
  public:
   // Returns the rate (m/s); 0 for the first value.
@@ -84,30 +83,30 @@ class DepthRate {
   void clear() noexcept { count_ = 0; }
 
  private:
-  static constexpr std::size_t kMost = 16;         // values held
-  std::array<double, kMost> depth_m_{}, age_s_{};  // [0] is the newest; its age is 0
+  static constexpr std::size_t kMaxValues = 16;         // number of values kept
+  std::array<double, kMaxValues> depth_m_{}, age_s_{};  // [0] is the newest; its age is 0
   std::size_t count_ = 0;
 };
 
-// What a contact remembers of its damping.
+// State of a contact's damping.
 struct DampingState {
   DepthRate rate;
   double depth_m = 0.0;
-  double wanted_N = 0.0;   // of the last tick, whether or not it was felt
-  double balance_J = 0.0;  // what the hand has put into the damping, of late
-  double earned_J = 0.0;   // and would have since it was left out,
-  double toll_J = 0.0;     // until which it stays out
+  double wanted_N = 0.0;     // of the last tick, whether or not it was applied
+  double balance_J = 0.0;    // recent work of the hand on the damper
+  double earned_J = 0.0;     // work since damping was suspended, had it been applied
+  double resume_at_J = 0.0;  // work at which it resumes
   bool touching = false, felt = true;
 };
 
-// B·rate, kept such that the normal force as a whole never pulls the tool in: at least −normal_N, the force
-// of the spring. It resists on the way in and out. Sampled damping is not passive by nature (Colgate &
-// Schenkel 1997), so an account is kept of what the hand put into it, forgotten over kDampingMemory_s: when
-// it has given back more than that, it is left out until it has earned as much on paper, and twice as much
-// each time after. So it cannot feed an oscillation, however long the contact; the next contact starts
-// afresh.
+// The damping force B·rate, bounded so that the whole normal force never pulls the tool in: at least
+// −normal_N, the spring's force. It resists motion in both directions. Sampled damping is not passive by
+// nature (Colgate & Schenkel 1997), so the work of the hand on the damper is accounted, with an exponential
+// memory of kDampingMemory_s. If the damper has returned more than it received, it is suspended until it
+// would have earned as much, and twice as much each time after. It therefore cannot feed an oscillation,
+// however long the contact. The next contact starts with an empty account.
 inline constexpr double kDampingMemory_s = 0.05;
-// With `account` false it is felt whatever it gives back, as sampled damping is without such care.
+// With `account` false damping is always applied, as plain sampled damping.
 double damping_force(DampingState& state, double normal_N, double depth_m, double damping_N_s_per_m,
                      double dt_s, double noise_m, bool account = true) noexcept;
 // Call in every tick without contact.
@@ -115,26 +114,23 @@ inline void end_damping(DampingState& state) noexcept {
   state = DampingState{};
 }
 
-// ---- force shading (thesis, Fig 5; Morgenbesser & Srinivasan 1996)
-// -----------------------------------------
+// ---- force shading (thesis, Fig 5; Morgenbesser & Srinivasan 1996) ----
 
-// A shaded normal further from the surface's own than this is turned back to this angle: at the silhouette of
-// a coarse mesh, or over a sharp edge that stands for itself, the force must still push out.
+// A shaded normal further than this from the surface's own is turned back to this angle: at the silhouette of
+// a coarse mesh, or over a true sharp edge, the force must still push out.
 inline constexpr double kLeastShadedCosine = 0.5;  // 60°
 
-// `shaded` turned towards `normal` (both unit) until shaded·normal >= least_cosine. `normal` where `shaded`
-// is not a unit vector or is its opposite. Continuous but there.
+// `shaded` turned towards `normal` (both unit) until shaded·normal >= least_cosine. Returns `normal` if
+// `shaded` is not a unit vector or is opposite. Continuous except there.
 glm::dvec3 limit_shaded_normal(const glm::dvec3& shaded, const glm::dvec3& normal,
                                double least_cosine = kLeastShadedCosine) noexcept;
 
-// The metric in which the proxy goes freely along the pull of the shaded normals, and hardly beside it: its
-// step to the minimum of (q − goal)ᵀ M (q − goal) on the true planes is then to where the ways back from the
-// goal along those normals meet the surface, so that A (goal − q) lies in their span. To repeat with the
-// shaded normals at q until q stays: each pass brings it nearer by a factor of depth / (radius of curvature
-// that the normals pretend + tool radius), below 1 wherever the depth is below that radius. (Ruspini's two
-// passes, a goal level with the proxy and then the step towards it, were rejected: held by the true normals,
-// the goal is thrown over a convex edge and back by the depth times the angle between the facets.) At most
-// three normals count; `metric` when there are none.
+// The metric in which the proxy moves freely along the pull of the shaded normals, and hardly beside it. The
+// step to the minimum of (q − goal)ᵀ M (q − goal) on the true planes ends where lines from the goal along
+// those normals meet the surface, so that A (goal − q) lies in their span. Repeat with the shaded normals at
+// q until q stays: each pass reduces the distance by the factor depth / (radius of curvature that the normals
+// suggest + tool radius), which is below 1 if the depth is below that radius. At most three normals count;
+// returns `metric` if there are none.
 glm::dmat3 shading_metric(const glm::dmat3& metric, std::span<const glm::dvec3> shaded_normals) noexcept;
 
 }  // namespace hybrid

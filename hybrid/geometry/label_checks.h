@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the functions of surface_nets.h refuse alike.
+// Argument checks that the functions of surface_nets.h share.
 #pragma once
 
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Pieces of a label volume, and growing it.
+// Connected pieces of a label volume, and growing it.
 #include "hybrid/geometry/surface_nets.h"
 
 #include <algorithm>
@@ -16,12 +16,12 @@ namespace {
 
 using voxel::LabelVolume;
 
-// Runs of wanted voxels along x, joined by union-find where they touch: memory and time follow the runs, and
-// nothing recurses.
+// Runs of wanted voxels along x, joined by union-find if they touch. Memory and time follow the number of
+// runs, and nothing recurses.
 struct Run {
   int j = 0, k = 0;
   int first = 0, last = 0;  // inclusive
-  std::size_t piece = 0;    // index of a run of the same piece; of itself at the root
+  std::size_t piece = 0;    // index of a run of the same piece; its own at the root
 };
 
 std::size_t root_of(std::vector<Run>& runs, std::size_t run) {
@@ -121,7 +121,7 @@ constexpr double kMostVoxels = 536'870'912.0;  // 2^29, about 3 GB while growing
 constexpr float kFar = std::numeric_limits<float>::infinity();
 
 // One line of the exact squared Euclidean distance transform (Felzenszwalb & Huttenlocher 2012): the lower
-// envelope of the parabolas f(q) + (h·(x - q))². Lines without a finite value stay as they are; values above
+// envelope of the parabolas f(q) + (h·(x - q))². Lines without a finite value stay unchanged; values above
 // `limit` are dropped.
 class DistanceLine {
  public:
@@ -163,7 +163,7 @@ class DistanceLine {
  private:
   std::vector<double> value_;
   std::vector<int> vertex_;
-  std::vector<double> from_;  // where each parabola of the envelope begins
+  std::vector<double> from_;  // start of each parabola of the envelope
 };
 
 struct Box {
@@ -217,10 +217,11 @@ LabelVolume padded(const LabelVolume& volume, const std::array<int, 3>& before,
   return result;
 }
 
-// Labels 1 what is empty and within `distance_m` of what is not, inside `box`.
+// Sets label 1 on empty voxels within `distance_m` of filled ones, inside `box`.
 void label_near(LabelVolume& volume, const Box& box, double distance_m) {
-  // Lengths in units of the smallest spacing, so that their squares keep clear of the ends of a float's
-  // range. Rounding must not decide about a centre that lies exactly at the distance: floats carry 6e-8.
+  // Lengths in units of the smallest spacing, so that their squares stay within a float's range. The
+  // tolerance is above the 6e-8 of float rounding, which must not decide about a centre exactly at the
+  // distance.
   const double unit_m = std::min({volume.spacing_m.x, volume.spacing_m.y, volume.spacing_m.z});
   const glm::dvec3 h = volume.spacing_m / unit_m;
   const double limit = distance_m / unit_m * (distance_m / unit_m) * (1.0 + 1e-6);

@@ -26,9 +26,9 @@ void check_density(double density) {
 MassProperties mass_of_mesh(const polygon::TriangleMesh& mesh, double density_kg_per_m3) {
   check_density(density_kg_per_m3);
   if (mesh.empty()) throw std::invalid_argument("the mesh has no triangles, so it has no mass");
-  // Integrals over the tetrahedra between each triangle and a point amid the mesh: far from the origin of the
-  // frame they would cancel. For a tetrahedron 0, a, b, c of volume V the integral of x xᵀ is V/20 · (a aᵀ +
-  // b bᵀ + c cᵀ + s sᵀ), s = a + b + c.
+  // Integrals over the tetrahedra between each triangle and a point amid the mesh; with a distant origin they
+  // would cancel. For a tetrahedron 0, a, b, c of volume V the integral of x xᵀ is V/20 · (a aᵀ + b bᵀ + c cᵀ
+  // + s sᵀ), s = a + b + c.
   glm::dvec3 low(1e300), high(-1e300);
   for (const glm::dvec3& v : mesh.vertices) {
     low = glm::min(low, v);

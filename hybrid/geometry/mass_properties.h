@@ -15,9 +15,10 @@ struct MassProperties {
   glm::dmat3 inertia_kg_m2{0.0};  // about the centre, along the axes of the body frame
 };
 
-// Of what a closed, outward oriented mesh encloses (any positive volume is accepted: that the mesh is closed
-// is for the caller to know), by the divergence theorem (Mirtich 1996; Eberly, 'Polyhedral Mass Properties',
-// 2002). Throws std::invalid_argument in words: no volume, a density that is not positive, values not finite.
+// Of the volume in a closed mesh with outward orientation, by the divergence theorem (Mirtich 1996; Eberly,
+// 'Polyhedral Mass Properties', 2002). Any positive volume is accepted: the caller must know that the mesh is
+// closed. Throws std::invalid_argument with a message: no volume, a density that is not positive, values not
+// finite.
 MassProperties mass_of_mesh(const polygon::TriangleMesh& mesh, double density_kg_per_m3);
 
 // Exact shapes, centred on the body origin; the capsule lies along z. Sizes in meters.
@@ -25,11 +26,11 @@ MassProperties mass_of_ball(double radius, double density_kg_per_m3);
 MassProperties mass_of_box(const glm::dvec3& size, double density_kg_per_m3);
 MassProperties mass_of_capsule(double radius, double length, double density_kg_per_m3);
 
-// The same body with another mass in the same shape.
+// The same shape with another mass.
 MassProperties with_mass(const MassProperties& properties, double mass_kg);
 
-// May a rigid body have these moments of inertia about its own axes? Each is positive, and none is greater
-// than the sum of the others (a little rounding is forgiven).
+// Are these possible moments of inertia about a rigid body's own axes? Each is positive, and none exceeds the
+// sum of the others (except for rounding).
 bool possible_inertia(const glm::dvec3& moments);
 
 }  // namespace hybrid

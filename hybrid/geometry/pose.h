@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Where a body is.
+// Pose of a body.
 #pragma once
 
 #include <glm/gtc/quaternion.hpp>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The surface of labels. The rest of surface_nets.h is in label_morphology.cpp (pieces, growing) and
-// voxelise_mesh.cpp.
+// The surface of labels. label_morphology.cpp (pieces, growing) and voxelise_mesh.cpp have the other
+// functions of surface_nets.h.
 #include "hybrid/geometry/surface_nets.h"
 
 #include <algorithm>
@@ -19,11 +19,11 @@ namespace {
 
 using voxel::LabelVolume;
 
-// A cell is the cube between eight voxel centres; corner bit c is x + 2y + 4z. Cell (i, j, k) has voxel
-// (i, j, k) as its corner 0 and runs from -1, because outside the lattice is empty. Plain surface nets
-// (Gibson 1998) put one vertex in each cell on the boundary and so pinch where solids touch along an edge or
-// at a corner; here a cell has one vertex for each sheet of surface that passes through it (dual marching
-// cubes, Nielson 2004), so that each edge of the result has exactly two triangles and each vertex one fan.
+// A cell is the cube between eight voxel centres; corner bit c is x + 2y + 4z. Cell (i, j, k) has voxel (i,
+// j, k) as its corner 0. Cells begin at -1, because outside the lattice is empty. Plain surface nets (Gibson
+// 1998) put one vertex in each boundary cell and so pinch where solids touch along an edge or at a corner.
+// Here a cell has one vertex for each sheet of surface that passes through it (dual marching cubes, Nielson
+// 2004), so that each edge of the result has exactly two triangles and each vertex one fan.
 
 // Edge of a cell: along `axis`, at side u of axis + 1 and side v of axis + 2 (modulo 3).
 constexpr int edge_id(int axis, int u, int v) {
@@ -33,7 +33,7 @@ constexpr int corner_at(int axis, int along, int u, int v) {
   return (along << axis) | (u << ((axis + 1) % 3)) | (v << ((axis + 2) % 3));
 }
 
-// Which sheet (0..3) each of the twelve edges of a cell is on, two bits an edge.
+// Sheet (0..3) of each of the twelve edges of a cell, two bits an edge.
 struct Sheets {
   std::uint32_t edges = 0;
   int count = 0;
@@ -42,8 +42,8 @@ struct Sheets {
 
 struct CellTables {
   std::array<Sheets, 256> sheets;  // with solids that touch diagonally across a face kept apart
-  std::array<std::uint8_t, 256>
-      touching{};  // faces (bit axis*2+side) whose two diagonal sheets are one in this cell
+  // Faces (bit axis*2+side) whose two diagonal sheets are the same in this cell.
+  std::array<std::uint8_t, 256> touching{};
 };
 
 bool solid(unsigned corners, int corner) {
@@ -69,8 +69,8 @@ bool ambiguous(unsigned corners, const Face& face) {
          solid(corners, face.corners[0]) != solid(corners, face.corners[1]);
 }
 
-// Follows the surface from crossed edge to crossed edge through the six faces. On an ambiguous face, two
-// solid corners are cut apart, or joined where `joined` has the face's bit.
+// Follows the surface from crossed edge to crossed edge through the six faces. On an ambiguous face the two
+// solid corners are separated, or joined if `joined` has the face's bit.
 Sheets trace_sheets(unsigned corners, unsigned joined) {
   std::array<int, 12> sheet{};
   for (int edge = 0; edge < 12; ++edge) sheet[edge] = edge;
@@ -82,7 +82,7 @@ Sheets trace_sheets(unsigned corners, unsigned joined) {
   for (int f = 0; f < 6; ++f) {
     const Face face = face_of(f / 2, f % 2);
     if (ambiguous(corners, face)) {
-      const bool around = ((joined >> f) & 1U) == 0;  // the kind of corner that is cut off by itself
+      const bool around = ((joined >> f) & 1U) == 0;  // the kind of corner that is cut off alone
       for (int n = 0; n < 4; ++n) {
         if (solid(corners, face.corners[n]) == around) unite(face.edges[n], face.edges[(n + 3) % 4]);
       }
@@ -149,8 +149,8 @@ class NetBuilder {
     const std::size_t layer = row_length_ * (static_cast<std::size_t>(n[1]) + 1);
     below_.resize(layer);
     here_.resize(layer);
-    // Twice what the sides of a full lattice take. Room that is not used takes no memory; to grow would take
-    // half as much again as there is, beside it, while the labels are there, too.
+    // Twice the number for the sides of a full lattice. Unused capacity takes no memory, whereas growing
+    // would take half as much again during the copy, while the labels are in memory too.
     const auto area = [&n](std::size_t a, std::size_t b) {
       return (static_cast<std::size_t>(n[a]) + 1) * (static_cast<std::size_t>(n[b]) + 1);
     };
@@ -171,7 +171,7 @@ class NetBuilder {
     Sheets sheets;
   };
 
-  // Row of labels, or null where it lies outside and is empty.
+  // A row of labels; null if it lies outside the lattice and is empty.
   [[nodiscard]] const std::uint8_t* row(int j, int k) const {
     const bool inside = j >= 0 && j < volume_.dims[1] && k >= 0 && k < volume_.dims[2];
     return inside ? &volume_.labels[volume_.index(0, j, k)] : nullptr;
@@ -187,9 +187,9 @@ class NetBuilder {
     return corners;
   }
 
-  // Two cells that share an ambiguous face, each with one sheet through both of its diagonals, would give an
-  // edge with four triangles; joining the solids across that face splits the sheet in both cells (Wenger
-  // 2013, 'Isosurfaces', 3.3).
+  // Two cells that share an ambiguous face, each with one sheet through both diagonals, would give an edge
+  // with four triangles. Joining the solids across that face splits the sheet in both cells (Wenger 2013,
+  // 'Isosurfaces', 3.3).
   [[nodiscard]] Sheets sheets_of(unsigned corners, int i, int j, int k) const {
     const CellTables& tables = cell_tables();
     unsigned joined = 0;
@@ -226,8 +226,8 @@ class NetBuilder {
              volume_.dims[2], " voxels has more than 4 billion vertices; load it with a larger spacing");
     }
     cell.first_vertex = static_cast<std::uint32_t>(net_.positions.size());
-    // At the centre the surface is the voxels' own boundary and its volume is theirs; sheets that share a
-    // cell start apart, each a quarter of the way to its own edges, so that no two vertices coincide.
+    // Vertices at cell centres give exactly the voxels' own boundary and volume. Sheets that share a cell
+    // start apart, each a quarter of the way to its own edges, so that no two vertices coincide.
     for (int sheet = 0; sheet < cell.sheets.count; ++sheet) {
       glm::dvec3 position = glm::dvec3(i, j, k) + 0.5;
       if (cell.sheets.count > 1) position += 0.25 * towards_edges(corners, cell.sheets, sheet);
@@ -279,11 +279,11 @@ class NetBuilder {
 };
 
 // Moves each vertex by `share` of the way to the mean of its neighbours, within its cell. All vertices move
-// at once, so the result does not depend on their order. Every edge of the net lies in two quads, so the sum
-// over quads counts each neighbour twice and its mean is the mean of the neighbours.
+// at once, so that their order does not matter. Every edge of the net is in two quads: a sum over quads
+// counts each neighbour twice, and its mean is the mean of the neighbours.
 void relax(Net& net, double share, std::vector<glm::dvec3>& sum, std::vector<std::uint32_t>& count) {
-  constexpr double kReach =
-      0.49;  // (unit: spacing) short of the cell's wall, where vertices of two cells could meet
+  // (unit: spacing) short of the cell's wall, where vertices of two cells could meet.
+  constexpr double kReach = 0.49;
   sum.assign(net.positions.size(), glm::dvec3(0.0));
   count.assign(net.positions.size(), 0);
   for (const Quad& quad : net.quads) {
@@ -299,9 +299,8 @@ void relax(Net& net, double share, std::vector<glm::dvec3>& sum, std::vector<std
   }
 }
 
-// Plain Laplacian passes shrink: a ball of ten voxels' radius loses 10 % of its volume in twenty. So each
-// pass shrinks and then grows again by a little more, which leaves long waves as they were (Taubin 1995, pass
-// band 0.1).
+// Plain Laplacian passes shrink: a ball of ten voxels' radius loses 10 % of its volume in twenty passes. Each
+// pass therefore shrinks and then expands slightly more, which keeps long waves (Taubin 1995, pass band 0.1).
 void smooth(Net& net, int passes) {
   std::vector<glm::dvec3> sum;
   std::vector<std::uint32_t> count;

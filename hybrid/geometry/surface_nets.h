@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What crosses polygon/ and voxel/: a surface from labels, labels from a surface, and growing labels.
+// Conversions between label volumes and meshes: a surface from labels, labels from a surface, and growing
+// labels.
 #pragma once
 
 #include <cstddef>
@@ -9,18 +10,18 @@
 
 namespace hybrid {
 
-// Surface of all voxels whose label is not 0, in the volume frame (meters), closed, outward, by surface nets
-// (Gibson 1998): one vertex a boundary cell, quads split into triangles, then `smoothing` constrained
-// Laplacian passes in which a vertex stays within its cell.
+// Surface of all voxels whose label is not 0, in the volume frame (m): closed, oriented outward, by surface
+// nets (Gibson 1998). Boundary cells have one vertex per sheet, and quads are split into triangles. Then
+// follow `smoothing` constrained smoothing passes, in which a vertex stays within its cell.
 polygon::TriangleMesh surface_from_labels(const voxel::LabelVolume& volume, int smoothing);
 
 // Keeps the largest 6-connected piece; `fill_cavities` also labels (1) enclosed empty space.
 void keep_largest_piece(voxel::LabelVolume& volume, bool fill_cavities);
 
-// Adds `distance_m` (Euclidean) of label 1 around what is not empty; the lattice is enlarged as needed.
+// Adds label 1 within `distance_m` (Euclidean) of filled voxels; the lattice is enlarged as needed.
 voxel::LabelVolume grow_labels(const voxel::LabelVolume& volume, double distance_m);
 
-// Fills a closed mesh (body frame = volume frame up to origin_m) with `label` where a voxel centre is inside
+// Fills a closed mesh (body frame = volume frame up to origin_m) with `label` at every voxel centre inside it
 // (parity along lattice rows). Throws std::invalid_argument with the numbers: mesh not closed, lattice above
 // max_voxels, nothing inside.
 voxel::LabelVolume voxelise_mesh(const polygon::TriangleMesh& mesh, const glm::dvec3& spacing_m,

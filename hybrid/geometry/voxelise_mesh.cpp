@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A closed mesh filled with voxels.
+// Fills a closed mesh with voxels.
 #include "hybrid/geometry/surface_nets.h"
 
 #include <algorithm>
@@ -17,19 +17,18 @@ namespace {
 
 using voxel::LabelVolume;
 
-// A mesh prepared for counting crossings along x. Two coordinates of each vertex are rounded to a grid so
-// fine that nobody sees it (2^-18 of the spacing at 4,096 rows) and so coarse that the side of an edge on
-// which a row lies is an exact 64-bit integer. With a row that meets an edge or vertex exactly taken as if it
-// lay a trifle further along y and a far smaller one along z (simulation of simplicity, Edelsbrunner & Mücke
-// 1990), each row crosses a closed mesh an even number of times, whatever its shape.
+// A mesh prepared for counting crossings along x. Two coordinates of each vertex are rounded to a grid. The
+// grid is fine enough to be invisible (2^-18 of the spacing at 4,096 rows), and coarse enough that the side
+// of an edge on which a row lies is an exact 64-bit integer. A row that meets an edge or vertex exactly is
+// treated as if it lay slightly further along y and far less along z (simulation of simplicity, Edelsbrunner
+// & Mücke 1990). Each row then crosses a closed mesh an even number of times, whatever its shape.
 struct Crossings {
   std::vector<double> x;                        // (unit: spacing), per vertex
   std::vector<std::array<std::int64_t, 2>> yz;  // (unit: spacing / scale), per vertex
   std::int64_t scale = 1;
 };
 
-// The same number for vertices in the same place, so that a soup of separate triangles counts as closed where
-// it is.
+// Gives vertices at the same place the same number, so that separate triangles that match count as closed.
 std::vector<std::uint32_t> weld(const std::vector<glm::dvec3>& vertices) {
   std::vector<std::uint32_t> order(vertices.size());
   for (std::size_t v = 0; v < order.size(); ++v) order[v] = static_cast<std::uint32_t>(v);
@@ -61,7 +60,7 @@ void check_mesh(const polygon::TriangleMesh& mesh) {
   }
 }
 
-// Parity along a row is defined where every edge has an even number of triangles.
+// Parity along a row is defined if every edge has an even number of triangles.
 void check_closed(const std::vector<polygon::TriangleIndices>& triangles,
                   const std::vector<glm::dvec3>& vertices) {
   std::vector<std::uint64_t> edges;
@@ -120,7 +119,7 @@ LabelVolume lattice_around(const polygon::TriangleMesh& mesh, const glm::dvec3& 
   }
   const glm::dvec3 counts = glm::max(glm::ceil((high - low) / spacing_m - 1e-6), glm::dvec3(1.0));
   const double total = counts.x * counts.y * counts.z;
-  constexpr double kLongest = 1e8;  // an axis must leave the crossings' grid some bits
+  constexpr double kLongest = 1e8;  // an axis must leave some bits for the crossings' grid
   if (!(total <= static_cast<double>(max_voxels)) || std::max({counts.x, counts.y, counts.z}) > kLongest) {
     refuse("voxelising the mesh needs ", counts.x, " x ", counts.y, " x ", counts.z, " = ", total,
            " voxels, above the limit of ", max_voxels, "; use a larger spacing");
@@ -159,7 +158,7 @@ std::int64_t side_of(const Point& a, const Point& b, const Point& p) {
   return (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
 }
 
-// Whether p, moved a trifle along the first axis and far less along the second, lies left of a→b. `side` is
+// Does p, moved slightly along the first axis and far less along the second, lie left of a→b? `side` is
 // side_of.
 bool left_of(std::int64_t side, const Point& a, const Point& b) {
   if (side != 0) return side > 0;

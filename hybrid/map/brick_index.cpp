@@ -12,7 +12,7 @@ BrickGrid::BrickGrid(double cell_m, const glm::dvec3& origin)
     throw std::invalid_argument("an occupancy cell must be positive");
 }
 
-void BrickGrid::span(const CellCoordinates& low, const CellCoordinates& high) {
+void BrickGrid::reset_bitmap(const CellCoordinates& low, const CellCoordinates& high) {
   const auto fits = [&low, &high](int shift) {
     for (std::size_t d = 0; d < 3; ++d) {
       if ((high[d] >> shift) - (low[d] >> shift) >= kUnits) return false;
@@ -26,7 +26,7 @@ void BrickGrid::span(const CellCoordinates& low, const CellCoordinates& high) {
   bitmap_.assign(static_cast<std::size_t>(kUnits) * kUnits, 0);
 }
 
-void BrickGrid::mark(const CellCoordinates& brick) noexcept {
+void BrickGrid::set_bit(const CellCoordinates& brick) noexcept {
   if (bitmap_.empty()) return;
   const CellCoordinates cell{brick[0] * kEdge, brick[1] * kEdge, brick[2] * kEdge};
   bitmap_[word(unit_of(cell, 2), unit_of(cell, 1))] |= 1ULL << unit_of(cell, 0);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which bricks of 8×8×8 cells exist, sparsely: what every layer of the occupancy map stands on.
+// A sparse set of bricks of 8×8×8 cells, the basis of every layer of the occupancy map.
 //
-// A hash table leads from a brick's coordinates to what a layer knows of it (cell_table.h).
-// In front of the table stands a bitmap of 64×64×64 units, each one brick or a power of two of them along an
-// edge, over all that exists (32 kB, so that it stays in the first cache): where nothing is, a question ends
+// A hash table maps a brick's coordinates to a layer's entry (cell_table.h). In front of the table is a
+// bitmap of 64×64×64 units over all existing bricks; a unit is one brick or a power of two of them along each
+// edge. The bitmap has 32 kB, so that it stays in the first-level cache. A query of an empty region ends
 // after one to four words.
 #pragma once
 
@@ -25,30 +25,32 @@ struct CellRange {  // both inclusive
   CellCoordinates low{}, high{};
 };
 
-// Where cells and bricks lie, and the bitmap.
+// The geometry of cells and bricks, and the bitmap.
 class BrickGrid {
  public:
   static constexpr int kShift = 3, kEdge = 1 << kShift, kCells = kEdge * kEdge * kEdge;
 
-  // `cell_m` > 0 and finite, else std::invalid_argument; `origin` near what is put in, so that cells are
-  // exact far from the world's origin.
+  // `cell_m` must be positive and finite, else std::invalid_argument. `origin`: a point near the contents, so
+  // that cells are exact far from the world's origin.
   BrickGrid(double cell_m, const glm::dvec3& origin);
 
   [[nodiscard]] double cell_m() const noexcept { return cell_m_; }
   [[nodiscard]] const glm::dvec3& origin() const noexcept { return origin_; }
 
-  // The same rounding for what is put in and for what is asked. What lies further out than the farthest cell
-  // (and what is not a number) is in the outermost cells, where questions from out there find it.
+  // Rounds insertions and queries alike. Positions beyond the farthest cell, and NaN, are in the outermost
+  // cells, where queries from out there find them.
   [[nodiscard]] CellCoordinates cell_of(const glm::dvec3& p) const noexcept {
 #if defined(__x86_64__)
-    // The same, x and y at once: of a look-up along a path rounding is a large part.
+    // The same with x and y at once: rounding is a large part of a look-up along a path.
     const __m128d per_cell = _mm_set1_pd(per_cell_);
-    const __m128i xy = below(_mm_mul_pd(_mm_sub_pd(_mm_loadu_pd(&p.x), _mm_loadu_pd(&origin_.x)), per_cell)),
-                  z = below(_mm_mul_sd(_mm_sub_sd(_mm_load_sd(&p.z), _mm_load_sd(&origin_.z)), per_cell));
+    const __m128i xy = floor_cells(
+                      _mm_mul_pd(_mm_sub_pd(_mm_loadu_pd(&p.x), _mm_loadu_pd(&origin_.x)), per_cell)),
+                  z = floor_cells(
+                      _mm_mul_sd(_mm_sub_sd(_mm_load_sd(&p.z), _mm_load_sd(&origin_.z)), per_cell));
     const auto both = static_cast<std::uint64_t>(_mm_cvtsi128_si64(xy));
     return {static_cast<std::int32_t>(both), static_cast<std::int32_t>(both >> 32), _mm_cvtsi128_si32(z)};
 #else
-    return {along(p.x - origin_.x), along(p.y - origin_.y), along(p.z - origin_.z)};
+    return {floor_cell(p.x - origin_.x), floor_cell(p.y - origin_.y), floor_cell(p.z - origin_.z)};
 #endif
   }
   [[nodiscard]] CellRange cells_of(const glm::dvec3& low, const glm::dvec3& high) const noexcept {
@@ -59,7 +61,7 @@ class BrickGrid {
     return {cell[0] >> kShift, cell[1] >> kShift, cell[2] >> kShift};
   }
 
-  // Of a layer of a brick (one z), bit x + 8 y: the cells x low to high and y low to high of a part of it.
+  // Bit x + 8 y: of one z-layer of a brick, the cells of the range `part`, which must lie in the brick.
   [[nodiscard]] static std::uint64_t layer_mask(const CellRange& part) noexcept {
     constexpr std::int32_t in_brick = kEdge - 1;
     const std::int32_t x0 = part.low[0] & in_brick, x1 = part.high[0] & in_brick, y0 = part.low[1] & in_brick,
@@ -68,8 +70,9 @@ class BrickGrid {
     const std::uint64_t rows = (~0ULL << (8 * y0)) & (~0ULL >> (8 * (in_brick - y1)));
     return row * 0x0101010101010101ULL & rows;
   }
-  // The cells of a range that lie in a brick.
-  [[nodiscard]] static CellRange part_in(const CellRange& cells, const CellCoordinates& brick) noexcept {
+  // The part of a range of cells that lies in a brick.
+  [[nodiscard]] static CellRange range_in_brick(const CellRange& cells,
+                                                const CellCoordinates& brick) noexcept {
     CellRange part;
     for (std::size_t d = 0; d < 3; ++d) {
       part.low[d] = std::max(cells.low[d], brick[d] * kEdge);
@@ -78,8 +81,8 @@ class BrickGrid {
     return part;
   }
 
-  // False: no brick that these cells touch exists. True: perhaps one does.
-  [[nodiscard]] bool perhaps(const CellRange& cells) const noexcept {
+  // False: no brick that these cells touch exists. True: one may exist.
+  [[nodiscard]] bool may_exist(const CellRange& cells) const noexcept {
     if (bitmap_.empty()) return true;
     const std::int32_t x0 = unit_of(cells.low, 0), x1 = unit_of(cells.high, 0), y0 = unit_of(cells.low, 1),
                        y1 = unit_of(cells.high, 1), z0 = unit_of(cells.low, 2), z1 = unit_of(cells.high, 2);
@@ -91,23 +94,23 @@ class BrickGrid {
     }
     return false;
   }
-  [[nodiscard]] bool perhaps(const CellCoordinates& cell) const noexcept {
+  [[nodiscard]] bool may_exist(const CellCoordinates& cell) const noexcept {
     return bitmap_.empty() ||
            (bitmap_[word(unit_of(cell, 2), unit_of(cell, 1))] >> unit_of(cell, 0) & 1U) != 0;
   }
-  [[nodiscard]] bool perhaps_brick(const CellCoordinates& brick) const noexcept {
-    return perhaps(CellCoordinates{brick[0] * kEdge, brick[1] * kEdge, brick[2] * kEdge});
+  [[nodiscard]] bool brick_may_exist(const CellCoordinates& brick) const noexcept {
+    return may_exist(CellCoordinates{brick[0] * kEdge, brick[1] * kEdge, brick[2] * kEdge});
   }
 
  protected:
-  // The bitmap anew, over bricks within these; then mark() each.
-  void span(const CellCoordinates& low, const CellCoordinates& high);
-  void mark(const CellCoordinates& brick) noexcept;
-  // `exists(brick)`: does it still?
+  // Makes an empty bitmap over bricks within these bounds; call mark() for each afterwards.
+  void reset_bitmap(const CellCoordinates& low, const CellCoordinates& high);
+  void set_bit(const CellCoordinates& brick) noexcept;
+  // Call after a brick was removed. `exists(brick)`: is it still in the table?
   template <class Exists>
-  void unmark(const CellCoordinates& brick, Exists&& exists) noexcept {
-    // A bit too many costs a probe of the table and no more. It stays where finding out would cost many: in
-    // units of many bricks, and in the outermost, which are also all that lies further out.
+  void clear_bit(const CellCoordinates& brick, Exists&& exists) noexcept {
+    // A superfluous bit costs one probe of the table. It stays where clearing needs many probes: in units of
+    // many bricks, and in the outermost units, which also stand for everything further out.
     constexpr int kMostShift = 2;
     const int shift = unit_shift_ - kShift;
     if (bitmap_.empty() || shift > kMostShift) return;
@@ -136,17 +139,17 @@ class BrickGrid {
   static constexpr double kFarthestCell = 1e9;
   static constexpr std::int32_t kUnits = 64;  // of the bitmap, along an edge
 
-  // The greatest whole number that is not above: std::floor is a call where the processor's newer
-  // instructions may not be assumed. Written so that what is not a number becomes the highest cell.
+  // The floor as an integer, without a call of std::floor, which older instruction sets need. NaN becomes the
+  // highest cell.
 #if defined(__x86_64__)
-  [[nodiscard]] static __m128i below(__m128d scaled) noexcept {  // of two
+  [[nodiscard]] static __m128i floor_cells(__m128d scaled) noexcept {  // of two values
     const __m128d x = _mm_max_pd(_mm_min_pd(scaled, _mm_set1_pd(kFarthestCell)), _mm_set1_pd(-kFarthestCell));
     const __m128i cell = _mm_cvttpd_epi32(x);
-    const __m128i above = _mm_castpd_si128(_mm_cmpgt_pd(_mm_cvtepi32_pd(cell), x));  // 64 bits each, or none
+    const __m128i above = _mm_castpd_si128(_mm_cmpgt_pd(_mm_cvtepi32_pd(cell), x));  // 64 bits each
     return _mm_add_epi32(cell, _mm_shuffle_epi32(above, 0x08));
   }
 #else
-  [[nodiscard]] std::int32_t along(double offset_m) const noexcept {
+  [[nodiscard]] std::int32_t floor_cell(double offset_m) const noexcept {
     const double scaled = offset_m * per_cell_, low = scaled < kFarthestCell ? scaled : kFarthestCell,
                  x = low > -kFarthestCell ? low : -kFarthestCell;
     const auto cell = static_cast<std::int32_t>(x);
@@ -164,21 +167,21 @@ class BrickGrid {
   glm::dvec3 origin_;
   std::vector<std::uint64_t> bitmap_;  // [z][y], bit x; empty until sealed
   CellCoordinates first_unit_{};
-  int unit_shift_ = kShift;  // from cells to units
+  int unit_shift_ = kShift;  // right shift from cells to units
 };
 
-// The bricks of a layer. Brick: what it knows of one, an entry of CellTable.
+// The bricks of one layer. Brick: the layer's entry, with the members that CellTable needs.
 template <class Brick>
 class BrickIndex : public BrickGrid {
  public:
   static constexpr std::uint32_t kNone = CellTable<Brick>::kNone;
   using BrickGrid::BrickGrid;
 
-  // Numbers are valid until a brick is added that makes room by allocating.
+  // Indices are valid until a brick is added with allocation.
   [[nodiscard]] std::uint32_t find(const CellCoordinates& brick) const noexcept { return table_.find(brick); }
   [[nodiscard]] std::uint32_t find(const CellCoordinates& brick, CellTrail& trail) const noexcept {
     const std::uint32_t hinted = table_.hinted(brick, trail);
-    return hinted != kNone || !perhaps_brick(brick) ? hinted : table_.find(brick, trail);
+    return hinted != kNone || !brick_may_exist(brick) ? hinted : table_.find(brick, trail);
   }
   [[nodiscard]] Brick& operator[](std::uint32_t number) noexcept { return table_[number]; }
   [[nodiscard]] const Brick& operator[](std::uint32_t number) const noexcept { return table_[number]; }
@@ -186,23 +189,24 @@ class BrickIndex : public BrickGrid {
   [[nodiscard]] bool has_room() const noexcept { return table_.has_room(); }
   [[nodiscard]] const CellTable<Brick>& table() const noexcept { return table_; }
 
-  // kNone only when it may not allocate and there is no room. moved(brick, its new number): the table grew.
+  // kNone only if there is no room and allocation is not allowed. moved(brick, its new index) is called for
+  // all bricks if the table grew.
   template <class Moved>
   std::uint32_t find_or_add(const CellCoordinates& brick, bool may_allocate, Moved&& moved) {
     const std::size_t before = table_.size();
     const std::uint32_t number = table_.find_or_add(brick, may_allocate, moved);
-    if (table_.size() != before) mark(brick);
+    if (table_.size() != before) set_bit(brick);
     return number;
   }
-  // The brick is no more, and its room is any other's. Allocates nothing.
+  // Removes the brick and frees its place. Allocates nothing.
   void release(std::uint32_t number) noexcept {
     const CellCoordinates at = table_[number].at;
     table_.erase(number);
-    unmark(at, [this](const CellCoordinates& c) { return find(c) != kNone; });
+    clear_bit(at, [this](const CellCoordinates& c) { return find(c) != kNone; });
   }
 
-  // Room for so many more bricks without allocating, and the bitmap over those that exist. Bricks may be
-  // added later; those beyond the bitmap's edge share its outermost units.
+  // Makes room for `more` bricks without allocation, and the bitmap over the existing ones. Bricks added
+  // later beyond the bitmap share its outermost units.
   template <class Moved>
   void seal(std::size_t more, Moved&& moved) {
     table_.seal(more, moved);
@@ -216,36 +220,36 @@ class BrickIndex : public BrickGrid {
         high[d] = std::max(high[d], b.at[d]);
       }
     });
-    span(low, high);
-    table_.each([this](const Brick& b, std::uint32_t) { mark(b.at); });
+    reset_bitmap(low, high);
+    table_.each([this](const Brick& b, std::uint32_t) { set_bit(b.at); });
   }
 
-  // Calls visit(brick, the cells of the box in it) for each existing brick that the box touches, until it
-  // returns false: along x first, then y, then z; of a box of more bricks than there are places, in the order
-  // of places. Looks at no more bricks than those.
+  // Calls visit(brick, cells of the range in it) for each existing brick that the range touches, until it
+  // returns false: along x first, then y, then z. A range of more bricks than the table has places goes
+  // through the places in their order.
   template <class Visit>
   void each(const CellRange& cells, CellTrail& trail, Visit&& visit) const noexcept {
     if (table_.size() == 0) return;
     const CellCoordinates a = brick_of(cells.low), b = brick_of(cells.high);
-    if (same(a, b)) {  // one brick: a point, and most small boxes
-      const Brick* brick = table_.still_in(a, trail);
-      if (brick == nullptr && perhaps_brick(a)) {
-        const std::uint32_t n = table_.find_and_look_ahead(a, trail);
+    if (same(a, b)) {  // one brick: a point, or most small boxes
+      const Brick* brick = table_.last_entry_at(a, trail);
+      if (brick == nullptr && brick_may_exist(a)) {
+        const std::uint32_t n = table_.find_ahead(a, trail);
         brick = n != kNone ? &table_[n] : nullptr;
       }
       if (brick != nullptr) visit(*brick, cells);
       return;
     }
-    if (!perhaps(cells)) return;
+    if (!may_exist(cells)) return;
     double bricks = 1.0;
     for (std::size_t d = 0; d < 3; ++d) bricks *= std::max(0.0, static_cast<double>(b[d]) - a[d] + 1.0);
     if (bricks > static_cast<double>(table_.places())) {
       for (std::uint32_t n = 0; n < table_.places(); ++n) {
-        if (!table_.holds(n)) continue;
+        if (!table_.is_used(n)) continue;
         const CellCoordinates& c = table_[n].at;
         bool within = true;
         for (std::size_t d = 0; d < 3; ++d) within = within && c[d] >= a[d] && c[d] <= b[d];
-        if (within && !visit(table_[n], part_in(cells, c))) return;
+        if (within && !visit(table_[n], range_in_brick(cells, c))) return;
       }
       return;
     }
@@ -254,7 +258,7 @@ class BrickIndex : public BrickGrid {
       for (c[2] = a[2]; c[2] <= b[2]; ++c[2]) {
         for (c[1] = a[1]; c[1] <= b[1]; ++c[1]) {
           for (c[0] = a[0]; c[0] <= b[0]; ++c[0]) {
-            if (table_.hinted(c, trail) == kNone && perhaps_brick(c)) table_.fetch(c);
+            if (table_.hinted(c, trail) == kNone && brick_may_exist(c)) table_.prefetch(c);
           }
         }
       }
@@ -263,7 +267,7 @@ class BrickIndex : public BrickGrid {
       for (c[1] = a[1]; c[1] <= b[1]; ++c[1]) {
         for (c[0] = a[0]; c[0] <= b[0]; ++c[0]) {
           const std::uint32_t n = find(c, trail);
-          if (n != kNone && !visit(table_[n], part_in(cells, c))) return;
+          if (n != kNone && !visit(table_[n], range_in_brick(cells, c))) return;
         }
       }
     }

@@ -11,8 +11,7 @@ namespace hybrid {
 namespace {
 
 constexpr int kEdge = BrickGrid::kEdge;
-// Longer triangles are halved until each spans few cells: else the box of an oblique one would be all there
-// is to look at.
+// Longer triangles are halved until each spans few cells, because the box of an oblique one is mostly empty.
 constexpr double kLongestPiece = 8.0;  // cells
 
 // Does the triangle touch the box? Separating axes (Akenine-Möller 2001): three box axes, the plane, nine
@@ -76,7 +75,7 @@ void SurfaceCells::add_triangle(std::uint64_t object_bit, const glm::dvec3& a, c
 void SurfaceCells::add_piece(std::uint64_t object_bit, const std::array<glm::dvec3, 3>& t, double margin_m) {
   const auto [a, b] = index_.cells_of(glm::min(t[0], glm::min(t[1], t[2])) - margin_m,
                                       glm::max(t[0], glm::max(t[1], t[2])) + margin_m);
-  // In one cell, or in cells of one row: the triangle is connected, so it touches all of them.
+  // In one cell, or in the cells of one row: the triangle is connected, so it touches all of them.
   int axes = 0;
   double farthest = 1.0;
   for (std::size_t d = 0; d < 3; ++d) {
@@ -84,8 +83,8 @@ void SurfaceCells::add_piece(std::uint64_t object_bit, const std::array<glm::dve
     farthest = std::max({farthest, std::fabs(a[d]), std::fabs(b[d])});
   }
   const bool ask = axes > 1;
-  // Relative to the map's origin, as cells are. A little larger than the cell, so that what lies in the face
-  // between two cells by rounding is in both.
+  // Relative to the map's origin, as cells are. The box is slightly larger than the cell, so that a triangle
+  // in the face between two cells is in both despite rounding.
   const std::array<glm::dvec3, 3> local{t[0] - index_.origin(), t[1] - index_.origin(),
                                         t[2] - index_.origin()};
   const glm::dvec3 far = glm::abs(t[0]);
@@ -95,8 +94,8 @@ void SurfaceCells::add_piece(std::uint64_t object_bit, const std::array<glm::dve
   for (c[2] = a[2]; c[2] <= b[2]; ++c[2]) {
     for (c[1] = a[1]; c[1] <= b[1]; ++c[1]) {
       for (c[0] = a[0]; c[0] <= b[0]; ++c[0]) {
-        // A fine mesh has many triangles in a cell: the exact question is asked only until one is known.
-        if (ask && !known(c, object_bit) &&
+        // A fine mesh has many triangles in a cell: the exact test is made only until the cell is occupied.
+        if (ask && !is_occupied_in_last_brick(c, object_bit) &&
             !triangle_touches_box(local, cell_m() * (glm::dvec3(c[0], c[1], c[2]) + 0.5), half))
           continue;
         Brick& brick = brick_at(c);
@@ -107,7 +106,8 @@ void SurfaceCells::add_piece(std::uint64_t object_bit, const std::array<glm::dve
   }
 }
 
-bool SurfaceCells::known(const CellCoordinates& cell, std::uint64_t object_bit) const noexcept {
+bool SurfaceCells::is_occupied_in_last_brick(const CellCoordinates& cell,
+                                             std::uint64_t object_bit) const noexcept {
   if (last_ == kNone || index_[last_].at != BrickGrid::brick_of(cell)) return false;
   const Brick& brick = index_[last_];
   return (brick.objects & object_bit) != 0 && (brick.layer[layer_of(cell)] & bit_in_layer(cell)) != 0;

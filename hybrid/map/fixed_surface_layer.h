@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Rigid surfaces rasterised conservatively into cells that never change: one bit a cell. The fixed objects of
-// a scene share one such set in the scene's frame; every moving body carries one in its own.
+// Rigid surfaces rasterised conservatively into constant cells, one bit a cell. The fixed objects of a scene
+// share one such set in the scene's frame; every moving body has one in its own frame.
 #pragma once
 
 #include <array>
@@ -15,14 +15,14 @@ class SurfaceCells {
  public:
   SurfaceCells(double cell_m, const glm::dvec3& origin) : index_(cell_m, origin) {}
 
-  // Every cell that comes within `margin_m` of the triangle (along each axis). A margin is for triangles that
-  // stand for a curved surface near them. `object_bit` is one bit of what objects_in() answers.
+  // Occupies every cell within `margin_m` of the triangle (along each axis). A margin is for triangles that
+  // approximate a curved surface. `object_bit`: the object's bit in the result of objects_in().
   void add_triangle(std::uint64_t object_bit, const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c,
                     double margin_m = 0.0);
-  // After the last triangle: frees what is too much, and makes questions cheap.
+  // After the last triangle: frees spare memory, and makes the bitmap for fast queries.
   void seal();
 
-  // Is there surface in a brick that this box touches?
+  // Is there surface in a brick that the box touches?
   [[nodiscard]] bool any_near(const glm::dvec3& low, const glm::dvec3& high) const noexcept;
   // Bits of the objects with surface in a brick of which the box touches an occupied cell.
   [[nodiscard]] std::uint64_t objects_in(const glm::dvec3& low, const glm::dvec3& high,
@@ -32,7 +32,7 @@ class SurfaceCells {
     return objects_in(low, high, trail);
   }
 
-  // Bounds of what was added; low > high when nothing was.
+  // Bounds of all triangles; low > high if there are none.
   [[nodiscard]] const glm::dvec3& low() const noexcept { return low_; }
   [[nodiscard]] const glm::dvec3& high() const noexcept { return high_; }
   [[nodiscard]] bool empty() const noexcept { return index_.size() == 0; }
@@ -56,11 +56,12 @@ class SurfaceCells {
   }
   void add_piece(std::uint64_t object_bit, const std::array<glm::dvec3, 3>& t, double margin_m);
   Brick& brick_at(const CellCoordinates& cell);
-  // Is the cell occupied already, in the brick that was added to last?
-  [[nodiscard]] bool known(const CellCoordinates& cell, std::uint64_t object_bit) const noexcept;
+  // Is the cell already occupied, in the brick of the last insertion?
+  [[nodiscard]] bool is_occupied_in_last_brick(const CellCoordinates& cell,
+                                               std::uint64_t object_bit) const noexcept;
 
   BrickIndex<Brick> index_;
-  std::uint32_t last_ = kNone;  // the brick that was added to last: mostly the next one too
+  std::uint32_t last_ = kNone;  // brick of the last insertion, mostly the next one's too
   glm::dvec3 low_{1e300}, high_{-1e300};
 };
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An allocator for large arrays that are read in no order: on pages of 2 MB, where the system has them. On
-// pages of 4 kB nearly every such read also misses the TLB, and in a virtual machine the walk that follows is
-// of two page tables.
+// An allocator for large arrays with random access, on pages of 2 MB if the system has them. With pages of 4
+// kB nearly every access also misses the TLB, and in a virtual machine the walk passes two page tables.
 #pragma once
 
 #include <cstddef>
@@ -26,7 +25,7 @@ struct HugePages {
     if (bytes < kLeast) return static_cast<T*>(::operator new(bytes, kSmall));
     void* at = ::operator new(bytes, kLarge);
 #ifdef MADV_HUGEPAGE
-    // Whole pages only: what lies behind the array is another's. It is advice, and may be refused.
+    // Whole pages only: memory behind the array belongs to others. The system may refuse the advice.
     (void)::madvise(at, bytes / kPage * kPage, MADV_HUGEPAGE);
 #endif
     return static_cast<T*>(at);

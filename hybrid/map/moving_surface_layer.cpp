@@ -21,23 +21,23 @@ double largest(const glm::dvec3& v) noexcept {
   return std::max({std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)});
 }
 
-// How far a box of half sizes `half` reaches along each axis of another frame.
+// Half sizes, along the axes of another frame, of the box of a box with half sizes `half`.
 glm::dvec3 reach(const glm::dmat3& m, const glm::dvec3& half) noexcept {
   return glm::abs(m[0]) * half.x + glm::abs(m[1]) * half.y + glm::abs(m[2]) * half.z;
 }
 
 }  // namespace
 
-void MovingCells::add(std::uint32_t object, std::uint64_t object_bit,
-                      std::shared_ptr<const SurfaceCells> cells, const glm::dvec3& position,
-                      const glm::dquat& rotation) {
+void MovingSurfaceLayer::add(std::uint32_t object, std::uint64_t object_bit,
+                             std::shared_ptr<const SurfaceCells> cells, const glm::dvec3& position,
+                             const glm::dquat& rotation) {
   if (cells == nullptr || cells->empty()) return;
   Body body;
   body.bit = object_bit;
   body.cells = cells.get();
   body.object = object;
   body.middle_in_body = 0.5 * (cells->low() + cells->high());
-  // No body is smaller than a cell, so that districts are not either.
+  // A lower bound of one cell, so that districts are no smaller than that.
   body.radius_m = 0.5 * glm::length(cells->high() - cells->low()) + cells->cell_m();
   body.owner = std::move(cells);
   set_pose(body, position, rotation);
@@ -45,15 +45,17 @@ void MovingCells::add(std::uint32_t object, std::uint64_t object_bit,
   body_of_object_[object] = static_cast<std::uint32_t>(bodies_.size());
   district_m_ = std::max(district_m_, 2.0 * body.radius_m);
   bodies_.push_back(std::move(body));
-  list_everything();
+  list_all();
 }
 
-void MovingCells::set_pose(Body& body, const glm::dvec3& position, const glm::dquat& rotation) noexcept {
+void MovingSurfaceLayer::set_pose(Body& body, const glm::dvec3& position,
+                                  const glm::dquat& rotation) noexcept {
   const glm::dmat3 to_scene = glm::mat3_cast(rotation);
   body.to_body = glm::transpose(to_scene);
   body.position = position;
   const glm::dvec3 middle = position + to_scene * body.middle_in_body;
-  // Rounding of the position, of turning, and of a rotation that is a unit to the last bits only.
+  // Rounding of the position, of the transformation, and of a rotation that is a unit only up to its last
+  // bits.
   body.slack_m =
       1e-9 * body.cells->cell_m() + 1e-15 * (largest(position) + largest(middle)) + 1e-14 * body.radius_m;
   const glm::dvec3 half =
@@ -62,7 +64,7 @@ void MovingCells::set_pose(Body& body, const glm::dvec3& position, const glm::dq
   body.high = middle + half;
 }
 
-CellCoordinates MovingCells::district_of(const glm::dvec3& p) const noexcept {
+CellCoordinates MovingSurfaceLayer::district_of(const glm::dvec3& p) const noexcept {
   CellCoordinates c{};
   for (std::size_t d = 0; d < 3; ++d) {
     const double x =
@@ -72,13 +74,13 @@ CellCoordinates MovingCells::district_of(const glm::dvec3& p) const noexcept {
   return c;
 }
 
-CellRange MovingCells::districts_of(const Body& body) const noexcept {
-  // By the ball about the body and not by its box, so that turning on the spot changes none.
+CellRange MovingSurfaceLayer::districts_of(const Body& body) const noexcept {
+  // By the body's bounding ball instead of its box, so that turning in place changes no district.
   const glm::dvec3 middle = 0.5 * (body.low + body.high), ball(body.radius_m * (1.0 - 1e-12));
   return {district_of(middle - ball), district_of(middle + ball)};
 }
 
-std::size_t MovingCells::bucket_of(const CellCoordinates& district) const noexcept {
+std::size_t MovingSurfaceLayer::bucket_of(const CellCoordinates& district) const noexcept {
   std::uint64_t h = static_cast<std::uint32_t>(district[0]) * 0x9E3779B97F4A7C15ULL ^
                     static_cast<std::uint32_t>(district[1]) * 0xC2B2AE3D27D4EB4FULL ^
                     static_cast<std::uint32_t>(district[2]) * 0x165667B19E3779F9ULL;
@@ -87,7 +89,7 @@ std::size_t MovingCells::bucket_of(const CellCoordinates& district) const noexce
   return static_cast<std::size_t>(h >> 32) & (buckets_.size() - 1);
 }
 
-void MovingCells::list_everything() {
+void MovingSurfaceLayer::list_all() {
   std::size_t buckets = 16;
   while (buckets < kSlots * bodies_.size()) buckets *= 2;
   buckets_.assign(buckets, kNone);
@@ -96,20 +98,20 @@ void MovingCells::list_everything() {
   changes_ = 0;
 }
 
-void MovingCells::list(std::uint32_t node, const CellCoordinates& district) noexcept {
+void MovingSurfaceLayer::list(std::uint32_t node, const CellCoordinates& district) noexcept {
   std::uint32_t& head = buckets_[bucket_of(district)];
   nodes_[node] = {district, head, true};
   head = node;
 }
 
-void MovingCells::unlist(std::uint32_t node) noexcept {
+void MovingSurfaceLayer::unlist(std::uint32_t node) noexcept {
   std::uint32_t* link = &buckets_[bucket_of(nodes_[node].district)];
   while (*link != node) link = &nodes_[*link].next;
   *link = nodes_[node].next;
   nodes_[node].listed = false;
 }
 
-void MovingCells::relist(std::uint32_t body) noexcept {
+void MovingSurfaceLayer::relist(std::uint32_t body) noexcept {
   const CellRange now = districts_of(bodies_[body]);
   bodies_[body].districts = now;
   for (std::uint32_t slot = 0; slot < kSlots; ++slot) {
@@ -129,8 +131,8 @@ void MovingCells::relist(std::uint32_t body) noexcept {
   }
 }
 
-void MovingCells::move(std::uint32_t object, const glm::dvec3& position,
-                       const glm::dquat& rotation) noexcept {
+void MovingSurfaceLayer::move(std::uint32_t object, const glm::dvec3& position,
+                              const glm::dquat& rotation) noexcept {
   if (object >= body_of_object_.size() || body_of_object_[object] == kNone) return;
   const bool usable = finite(position) && std::isfinite(rotation.w) && std::isfinite(rotation.x) &&
                       std::isfinite(rotation.y) && std::isfinite(rotation.z);
@@ -141,8 +143,8 @@ void MovingCells::move(std::uint32_t object, const glm::dvec3& position,
   if (now.low != body.districts.low || now.high != body.districts.high) relist(body_of_object_[object]);
 }
 
-bool MovingCells::turned(const Body& body, const glm::dvec3& low, const glm::dvec3& high,
-                         glm::dvec3& low_in_body, glm::dvec3& high_in_body) noexcept {
+bool MovingSurfaceLayer::box_in_body(const Body& body, const glm::dvec3& low, const glm::dvec3& high,
+                                     glm::dvec3& low_in_body, glm::dvec3& high_in_body) noexcept {
   const bool apart = !(low.x <= body.high.x && high.x >= body.low.x && low.y <= body.high.y &&
                        high.y >= body.low.y && low.z <= body.high.z && high.z >= body.low.z);
   if (apart) return false;
@@ -154,10 +156,10 @@ bool MovingCells::turned(const Body& body, const glm::dvec3& low, const glm::dve
 }
 
 template <class Visit>
-void MovingCells::each(const glm::dvec3& low, const glm::dvec3& high, Visit&& visit) const noexcept {
+void MovingSurfaceLayer::each(const glm::dvec3& low, const glm::dvec3& high, Visit&& visit) const noexcept {
   if (bodies_.empty()) return;
   CellCoordinates a{}, b{};
-  bool all = bodies_.size() <= kFew;
+  bool all = bodies_.size() <= kTestAll;
   if (!all) {
     a = district_of(low);
     b = district_of(high);
@@ -181,41 +183,41 @@ void MovingCells::each(const glm::dvec3& low, const glm::dvec3& high, Visit&& vi
   }
 }
 
-bool MovingCells::any_near(const glm::dvec3& low, const glm::dvec3& high) const noexcept {
+bool MovingSurfaceLayer::any_near(const glm::dvec3& low, const glm::dvec3& high) const noexcept {
   bool any = false;
   each(low, high, [&](const Body& body) {
     glm::dvec3 l, h;
-    any = turned(body, low, high, l, h) && body.cells->any_near(l, h);
+    any = box_in_body(body, low, high, l, h) && body.cells->any_near(l, h);
     return !any;
   });
   return any;
 }
 
-std::uint64_t MovingCells::objects_in(const glm::dvec3& low, const glm::dvec3& high) const noexcept {
+std::uint64_t MovingSurfaceLayer::objects_in(const glm::dvec3& low, const glm::dvec3& high) const noexcept {
   std::uint64_t objects = 0;
   each(low, high, [&](const Body& body) {
     glm::dvec3 l, h;
-    if ((objects & body.bit) != 0 || !turned(body, low, high, l, h)) return true;
+    if ((objects & body.bit) != 0 || !box_in_body(body, low, high, l, h)) return true;
     if (body.cells->objects_in(l, h) != 0) objects |= body.bit;
     return true;
   });
   return objects;
 }
 
-std::size_t MovingCells::occupied_cells() const noexcept {
+std::size_t MovingSurfaceLayer::occupied_cells() const noexcept {
   std::size_t cells = 0;
   for (const Body& body : bodies_) cells += body.cells->occupied_cells();
   return cells;
 }
 
-std::size_t MovingCells::memory_bytes() const noexcept {
+std::size_t MovingSurfaceLayer::memory_bytes() const noexcept {
   std::size_t bytes = bodies_.capacity() * sizeof(Body) + nodes_.capacity() * sizeof(Node) +
                       (body_of_object_.capacity() + buckets_.capacity()) * sizeof(std::uint32_t);
   for (const Body& body : bodies_) bytes += body.cells->memory_bytes();
   return bytes;
 }
 
-bool MovingCells::validate() const {
+bool MovingSurfaceLayer::validate() const {
   std::size_t listed = 0, wanted = 0;
   for (std::size_t bucket = 0; bucket < buckets_.size(); ++bucket) {
     for (std::uint32_t n = buckets_[bucket]; n != kNone; n = nodes_[n].next) {

@@ -1,16 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The moving half of the occupancy map: rigid bodies that change their place in a session.
+// The moving rigid surfaces of the occupancy map.
 //
-// A body's surface cells are rasterised once, in its own frame, and go with it: what the map knows of a
-// moving surface is never stale, at any speed, and no cell of it is ever written again. In the scene only
-// *where bodies are* is kept: districts (cells as large as the largest body, so that each body lies in at
-// most eight) list the bodies whose bounds touch them, and when a body moves only the districts that it
-// leaves or enters change. A question looks up its district, compares bounds, and turns its box into the
-// frame of those few bodies.
-//
-// Rejected: samples of the surface kept one by one in the scene's own cells, as soft voxels are. A body of
-// 30,000 surface cells takes 0.6 ms to move once, and a bounded slice of it a tick leaves samples that are
-// tens of cells stale at 1 m/s, so that a question would have to look as far as the body is large.
+// A body's surface cells are rasterised once, in its own frame, and move with it. They are never stale, at
+// any speed, and never rewritten. The scene keeps only the positions of bodies. Districts (cells as large as
+// the largest body, so that each body lies in at most eight) list the bodies whose bounds touch them; a move
+// changes only the districts that the body leaves or enters. A query looks up its district, compares bounds,
+// and transforms its box into the frames of those few bodies.
 #pragma once
 
 #include <array>
@@ -25,20 +20,20 @@
 
 namespace hybrid {
 
-class MovingCells {
+class MovingSurfaceLayer {
  public:
-  // `object_bit` is one bit of what objects_in() answers. Allocates; on load.
+  // `object_bit`: the object's bit in the result of objects_in(). Allocates; on load.
   void add(std::uint32_t object, std::uint64_t object_bit, std::shared_ptr<const SurfaceCells> cells,
            const glm::dvec3& position, const glm::dquat& rotation);
 
-  // Body `object` is there now. O(1), allocates nothing. Unknown objects, and poses that are not finite,
+  // Sets the pose of body `object`. O(1), allocates nothing. Unknown objects and poses that are not finite
   // change nothing.
   void move(std::uint32_t object, const glm::dvec3& position, const glm::dquat& rotation) noexcept;
 
   [[nodiscard]] bool empty() const noexcept { return bodies_.empty(); }
-  // Is there moving surface in a brick (of its body's own cells) that this box touches?
+  // Is there moving surface in a brick (of its body's own cells) that the box touches?
   [[nodiscard]] bool any_near(const glm::dvec3& low, const glm::dvec3& high) const noexcept;
-  // Bits of the moving objects with surface in cells that the box touches: never too few.
+  // Bits of the moving objects with surface in cells that the box touches: a superset of the exact answer.
   [[nodiscard]] std::uint64_t objects_in(const glm::dvec3& low, const glm::dvec3& high) const noexcept;
 
   [[nodiscard]] std::size_t occupied_cells() const noexcept;
@@ -50,20 +45,20 @@ class MovingCells {
 
  private:
   static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
-  static constexpr std::size_t kSlots = 8;  // districts of a body: two along each axis at most
-  static constexpr std::size_t kFew = 4;    // bodies that are looked at one by one
+  static constexpr std::size_t kSlots = 8;    // districts of a body: at most two along each axis
+  static constexpr std::size_t kTestAll = 4;  // up to this many bodies are tested one by one
 
   struct Body {
-    // Read by every question:
+    // Read by every query:
     glm::dvec3 low{0.0}, high{0.0};  // bounds, scene frame
     std::uint64_t bit = 0;
     const SurfaceCells* cells = nullptr;
     glm::dvec3 position{0.0};
-    glm::dmat3 to_body{1.0};  // of directions
-    double slack_m = 0.0;     // rounding of what is turned into the body's frame
-    // Read when it moves:
+    glm::dmat3 to_body{1.0};  // rotates directions
+    double slack_m = 0.0;     // rounding error of positions in the body's frame
+    // Read when the body moves:
     std::uint32_t object = 0;
-    double radius_m = 0.0;  // of the ball about its middle that holds it
+    double radius_m = 0.0;  // of the bounding ball about its middle
     glm::dvec3 middle_in_body{0.0};
     CellRange districts;
     std::shared_ptr<const SurfaceCells> owner;
@@ -75,24 +70,24 @@ class MovingCells {
   };
 
   static void set_pose(Body& body, const glm::dvec3& position, const glm::dquat& rotation) noexcept;
-  // Lists every body anew, in districts of their present size.
-  void list_everything();
+  // Lists every body again, in districts of the present size.
+  void list_all();
   void list(std::uint32_t node, const CellCoordinates& district) noexcept;
   void unlist(std::uint32_t node) noexcept;
-  // Lists the body where it now is: only what changed is touched.
+  // Updates the lists for the body's present position; changes only the nodes that differ.
   void relist(std::uint32_t body) noexcept;
   [[nodiscard]] CellRange districts_of(const Body& body) const noexcept;
   [[nodiscard]] CellCoordinates district_of(const glm::dvec3& p) const noexcept;
   [[nodiscard]] std::size_t bucket_of(const CellCoordinates& district) const noexcept;
-  // The box in the frame of the body; false when it does not touch the body's bounds.
-  [[nodiscard]] static bool turned(const Body& body, const glm::dvec3& low, const glm::dvec3& high,
-                                   glm::dvec3& low_in_body, glm::dvec3& high_in_body) noexcept;
-  // Calls visit(body) for each body that may touch the box, some of them twice, until it returns false.
+  // Transforms the box into the body's frame; false if it does not touch the body's bounds.
+  [[nodiscard]] static bool box_in_body(const Body& body, const glm::dvec3& low, const glm::dvec3& high,
+                                        glm::dvec3& low_in_body, glm::dvec3& high_in_body) noexcept;
+  // Calls visit(body) for each body that may touch the box, possibly twice, until it returns false.
   template <class Visit>
   void each(const glm::dvec3& low, const glm::dvec3& high, Visit&& visit) const noexcept;
 
   std::vector<Body> bodies_;
-  std::vector<std::uint32_t> body_of_object_;  // [object], kNone: it does not move
+  std::vector<std::uint32_t> body_of_object_;  // [object] index into bodies_; kNone: it does not move
   double district_m_ = 0.0;
   std::vector<Node> nodes_;
   std::vector<std::uint32_t> buckets_;  // [hash of a district] first node

@@ -2,11 +2,11 @@
 // The soft layer of the occupancy map: surface voxels, one by one, each in the list of its cell, moved in
 // O(1).
 //
-// Blocks of 4×4×4 cells lie in a hash table of two cache lines each, with the first voxel of every occupied
-// cell packed in the order of cells: a surface passes through 10 to 20 of 64. So one cell is looked up in one
-// wait for the memory, where a table of bricks that lead to blocks that lead to lists waits three times. A
-// block too full for that has an array of its own. Bricks of 2×2×2 blocks say where their blocks lie, for
-// boxes, for what moves from one to another and for what only asks whether anything is near.
+// Blocks of 4×4×4 cells are in a hash table, two cache lines each, with the first voxel of every occupied
+// cell packed in the order of cells; a surface occupies 10 to 20 of the 64. A query of one cell therefore
+// waits for memory once, where a chain of bricks, blocks and lists waits three times. A block with too many
+// occupied cells has an array of its own. Bricks of 2×2×2 blocks have the places of their blocks: for boxes,
+// for voxels that move between blocks, and for queries that only ask whether anything is near.
 #pragma once
 
 #include <array>
@@ -19,28 +19,28 @@
 
 namespace hybrid {
 
-class SoftCells {
+class VoxelLayer {
  public:
   static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
   struct Trail {
     CellTrail blocks, bricks;
   };
 
-  SoftCells(double cell_m, const glm::dvec3& origin) : bricks_(cell_m, origin) {}
+  VoxelLayer(double cell_m, const glm::dvec3& origin) : bricks_(cell_m, origin) {}
 
   // ---- on load; these allocate ----
   std::uint32_t add(std::uint32_t count);  // returns the first of their numbers
   void place(std::uint32_t number, const glm::dvec3& position);
-  // Room for so many more bricks, four blocks in each, and as many blocks that are full.
+  // Makes room for this many more bricks, each with four blocks, and for as many full blocks.
   void seal(std::size_t more_bricks);
 
   // ---- in the tick ----
-  // Without room the voxel stays known where it was, and overflows() counts it.
+  // Without room the voxel stays known at its last cell, and overflows() counts it.
   void move(std::uint32_t number, const glm::dvec3& position) noexcept;
   // Is there a voxel in a brick that the box touches?
   [[nodiscard]] bool any_near(const glm::dvec3& low, const glm::dvec3& high) const noexcept;
-  // Voxels of the cells that the box touches: bricks along x, y, z, in these blocks, in these cells, in these
-  // the last that came first.
+  // Voxels of the cells that the box touches, in the order of bricks along x, y, z, then blocks, then cells;
+  // in a cell the latest insertion comes first.
   [[nodiscard]] std::size_t in(const glm::dvec3& low, const glm::dvec3& high, std::span<std::uint32_t> out,
                                Trail& trail) const noexcept;
 
@@ -48,25 +48,25 @@ class SoftCells {
   [[nodiscard]] std::uint64_t overflows() const noexcept { return overflows_; }
   [[nodiscard]] std::size_t memory_bytes() const noexcept;
   template <class Visit>
-  void each_cell(Visit&& visit) const;  // visit(cell), of every occupied one
+  void each_cell(Visit&& visit) const;  // visit(cell) for every occupied cell
   [[nodiscard]] bool validate() const;
 
  private:
   static constexpr int kBlockShift = 2, kBlockEdge = 4, kBlockCells = 64;
   static constexpr std::size_t kPacked = 25;
-  // Fewer than so many cells and an array of its own is given back.
-  static constexpr std::size_t kFew = 17;
-  // A link is a voxel's number and whether there is another after it: then next_ has the link to that one,
-  // and where a voxel is alone in its cell, as nearly all are, next_ is not read.
+  // With fewer occupied cells a full block's array is freed.
+  static constexpr std::size_t kUnpackBelow = 17;
+  // A link is a voxel's number and a flag: kMore means that next_ has the link to another voxel of the cell.
+  // For a voxel that is alone in its cell, as nearly all are, next_ is not read.
   static constexpr std::uint32_t kMore = 0x80000000U, kNumber = kMore - 1;
 
   struct alignas(64) Block {
     CellCoordinates at{kNoPlace, 0, 0};
-    std::uint32_t full = kNone;  // number in full_; kNone: packed
-    std::uint64_t occupied = 0;  // bit x + 4 y + 16 z: the cell is
+    std::uint32_t full = kNone;  // index into full_; kNone: packed
+    std::uint64_t occupied = 0;  // bit x + 4 y + 16 z of occupied cells
     std::uint32_t brick = kNone;
-    std::array<std::uint32_t, kPacked> links;  // as many as cells are occupied; the rest has no meaning
-    Block() noexcept {}                        // NOLINT: links stay as they are, a cache line of memory
+    std::array<std::uint32_t, kPacked> links;  // one per occupied cell; the rest is undefined
+    Block() noexcept {}                        // NOLINT: links stay uninitialised, a cache line of memory
     void start(const CellCoordinates& block) noexcept {
       at = block;
       full = kNone;
@@ -77,13 +77,13 @@ class SoftCells {
   struct Brick {
     CellCoordinates at{kNoPlace, 0, 0};
     std::uint32_t blocks = 0;              // bit x + 2 y + 4 z: the block exists
-    std::array<std::uint32_t, 8> place{};  // [x + 2 y + 4 z], of those that do
+    std::array<std::uint32_t, 8> place{};  // [x + 2 y + 4 z] place of an existing block
     void start(const CellCoordinates& brick) noexcept {
       at = brick;
       blocks = 0;
     }
   };
-  using Full = std::array<std::uint32_t, kBlockCells>;  // [cell] link; free: [0] is the next free one
+  using Full = std::array<std::uint32_t, kBlockCells>;  // [cell] link; if free: [0] is the next free one
 
   [[nodiscard]] static CellCoordinates block_of(const CellCoordinates& cell) noexcept {
     return {cell[0] >> kBlockShift, cell[1] >> kBlockShift, cell[2] >> kBlockShift};
@@ -97,8 +97,18 @@ class SoftCells {
   [[nodiscard]] static std::uint32_t cell_in_block(const CellCoordinates& cell) noexcept {
     return static_cast<std::uint32_t>((cell[0] & 3) + 4 * (cell[1] & 3) + 16 * (cell[2] & 3));
   }
-  [[nodiscard]] static std::size_t rank(const Block& block, std::uint64_t bit) noexcept;
-  // Of an occupied cell.
+  // std::popcount is a call on older instruction sets.
+  [[nodiscard]] static std::size_t bits_in(std::uint64_t x) noexcept {
+    x -= x >> 1 & 0x5555555555555555ULL;
+    x = (x & 0x3333333333333333ULL) + (x >> 2 & 0x3333333333333333ULL);
+    x = (x + (x >> 4)) & 0x0F0F0F0F0F0F0F0FULL;
+    return static_cast<std::size_t>(x * 0x0101010101010101ULL >> 56);
+  }
+  // Number of occupied cells before that of `bit`.
+  [[nodiscard]] static std::size_t rank(const Block& block, std::uint64_t bit) noexcept {
+    return bits_in(block.occupied & (bit - 1));
+  }
+  // For an occupied cell.
   [[nodiscard]] const std::uint32_t& link_at(const Block& block, std::uint32_t cell) const noexcept {
     return block.full == kNone ? block.links[rank(block, 1ULL << cell)] : full_[block.full][cell];
   }
@@ -106,27 +116,26 @@ class SoftCells {
     return block.full == kNone ? block.links[rank(block, 1ULL << cell)] : full_[block.full][cell];
   }
 
-  void put(std::uint32_t number, const glm::dvec3& position, bool may_allocate);
-  // False, and nothing is changed: there are others in one of the two cells.
+  void insert(std::uint32_t number, const glm::dvec3& position, bool may_allocate);
+  // False if another voxel is in one of the two cells; nothing is changed then.
   bool move_within(std::uint32_t number, Block& block, std::uint32_t from, std::uint32_t to) noexcept;
-  // Out of its cell; the block may then be empty.
-  void take_out(std::uint32_t number, Block& block, std::uint32_t cell) noexcept;
-  // A block that is empty, and a brick that then is, are room again.
+  // Removes the voxel from its cell; the block may be empty afterwards.
+  void remove(std::uint32_t number, Block& block, std::uint32_t cell) noexcept;
+  // Frees an empty block, and its brick if that is empty too.
   void remove_block(std::uint32_t place) noexcept;
-  // False: there is no room, and nothing was changed. `hint`: the block's brick, or kNone where it is not
-  // known.
-  bool put_in(std::uint32_t number, const CellCoordinates& block, std::uint32_t cell, std::uint32_t hint,
-              bool may_allocate);
-  bool link_in(std::uint32_t number, std::uint32_t place, std::uint32_t cell, bool may_allocate);
+  // False if there is no room; nothing is changed then. `hint`: the block's brick, or kNone if unknown.
+  bool insert_in_block(std::uint32_t number, const CellCoordinates& block, std::uint32_t cell,
+                       std::uint32_t hint, bool may_allocate);
+  bool insert_in_cell(std::uint32_t number, std::uint32_t place, std::uint32_t cell, bool may_allocate);
   [[nodiscard]] std::uint32_t hinted_brick(const CellCoordinates& brick) const noexcept;
-  void put_next_to(const Block& block) noexcept;
+  void remember_brick(const Block& block) noexcept;
   [[nodiscard]] std::uint32_t add_block(const CellCoordinates& at, bool may_allocate);
   bool add_cell(Block& block, std::uint32_t cell, std::uint32_t link, bool may_allocate);
   void remove_cell(Block& block, std::uint32_t cell, std::uint32_t* link) noexcept;
-  void now_at(const Block& block, std::uint32_t place) noexcept;
-  void now_at(const Brick& brick, std::uint32_t place) noexcept;
+  void set_place(const Block& block, std::uint32_t place) noexcept;
+  void set_place(const Brick& brick, std::uint32_t place) noexcept;
 
-  // What in() rarely comes to, apart: so that what it mostly does is short and needs no stack.
+  // The rare parts of in() are separate functions, so that its common path is short and needs no stack.
   [[nodiscard, gnu::noinline]] std::size_t in_other_block(const CellCoordinates& cell,
                                                           std::span<std::uint32_t> out,
                                                           Trail& trail) const noexcept;
@@ -134,29 +143,29 @@ class SoftCells {
                                                   std::span<std::uint32_t> out, Trail& trail) const noexcept;
   [[nodiscard, gnu::always_inline]] std::size_t in_cell(const Block& block, std::uint32_t cell,
                                                         std::span<std::uint32_t> out) const noexcept;
-  // All of a list but the first, which is written.
-  [[nodiscard, gnu::noinline]] std::size_t follow(std::uint32_t link,
-                                                  std::span<std::uint32_t> out) const noexcept;
-  // Writes what the cells of these bits hold, all of which are occupied.
-  void list(const Block& block, std::uint64_t bits, std::span<std::uint32_t> out,
-            std::size_t& count) const noexcept;
+  // Writes the rest of a list whose first voxel is written already.
+  [[nodiscard, gnu::noinline]] std::size_t write_rest(std::uint32_t link,
+                                                      std::span<std::uint32_t> out) const noexcept;
+  // Writes the voxels of the cells in `bits`, all of which are occupied.
+  void write_cells(const Block& block, std::uint64_t bits, std::span<std::uint32_t> out,
+                   std::size_t& count) const noexcept;
 
   BrickIndex<Brick> bricks_;
   CellTable<Block> blocks_;
   std::vector<Full, HugePages<Full>> full_;
   std::uint32_t free_full_ = kNone;
   std::vector<std::uint32_t, HugePages<std::uint32_t>> next_;  // [number] link to the next in its cell
-  std::vector<std::uint32_t, HugePages<std::uint32_t>>
-      cell_;  // [number] place of block · 64 + cell, or kNone
+  // [number] place of block · 64 + cell, or kNone.
+  std::vector<std::uint32_t, HugePages<std::uint32_t>> cell_;
   std::vector<std::uint64_t, HugePages<std::uint64_t>> key_;  // [number] the cell's coordinates in one word
-  // Bricks that were put into last, mostly the next one's too: of a surface whose two sides are numbered in
-  // turns, the last but one.
-  std::array<std::uint32_t, 2> last_put_{};
+  // Bricks of the last insertions, mostly the next one's too. Two, because the sides of a thin surface are
+  // numbered in turns.
+  std::array<std::uint32_t, 2> last_bricks_{};
   std::uint64_t overflows_ = 0;
 };
 
 template <class Visit>
-void SoftCells::each_cell(Visit&& visit) const {
+void VoxelLayer::each_cell(Visit&& visit) const {
   blocks_.each([&visit](const Block& block, std::uint32_t) {
     for (std::int32_t cell = 0; cell < kBlockCells; ++cell) {
       if ((block.occupied >> cell & 1U) == 0) continue;

@@ -21,8 +21,8 @@ void add_gap(std::vector<PlotPoint>& out, double x) {
 
 }  // namespace
 
-std::vector<PlotPoint> decimate_columns(std::span<const double> x, std::span<const double> y, double x_from,
-                                        double x_to, std::size_t columns) {
+std::vector<PlotPoint> downsample_columns(std::span<const double> x, std::span<const double> y, double x_from,
+                                          double x_to, std::size_t columns) {
   std::vector<PlotPoint> out;
   const std::size_t n = std::min(x.size(), y.size());
   const double width = x_to - x_from;
@@ -43,7 +43,7 @@ std::vector<PlotPoint> decimate_columns(std::span<const double> x, std::span<con
       ++i;
       continue;
     }
-    // A run of finite samples in one column.
+    // One run of finite samples in the same column.
     const std::size_t column = column_of(x[i]);
     const std::size_t first = i;
     std::size_t lowest = i;
@@ -61,13 +61,13 @@ std::vector<PlotPoint> decimate_columns(std::span<const double> x, std::span<con
   return out;
 }
 
-std::vector<PlotPoint> decimate_path(std::span<const PlotPoint> path, double tolerance, std::size_t most) {
+std::vector<PlotPoint> downsample_path(std::span<const PlotPoint> path, double tolerance, std::size_t most) {
   std::vector<PlotPoint> out;
-  // Each doubling at least halves what a dense path keeps; a drawing is some thousand units wide, so this
-  // ends.
+  // Each doubling at least halves the points of a dense path. A drawing is some thousand units wide, so the
+  // loop ends.
   for (int round = 0; round < 40; ++round, tolerance *= 2.0) {
     out.clear();
-    PlotPoint skipped{gap, gap};  // the last one left out, so that ends of lines stay where they are
+    PlotPoint skipped{gap, gap};  // last point left out, so that the ends of lines keep their place
     for (const PlotPoint& point : path) {
       if (is_gap(point)) {
         if (!is_gap(skipped)) out.push_back(skipped);
@@ -86,7 +86,7 @@ std::vector<PlotPoint> decimate_path(std::span<const PlotPoint> path, double tol
     if (!is_gap(skipped)) out.push_back(skipped);
     if (out.size() <= most) return out;
   }
-  out.resize(std::min(out.size(), most));  // only gaps are left to thin: nothing better to do
+  out.resize(std::min(out.size(), most));  // only gaps are left, which cannot be thinned
   return out;
 }
 

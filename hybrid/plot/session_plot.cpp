@@ -26,7 +26,7 @@ std::string text_of(double value, const char* format) {
   return text.data();
 }
 
-// A contact lasts from its tick to the next one.
+// A contact lasts from its tick to the next tick.
 Intervals contact_intervals(std::span<const TraceRow> rows, std::uint32_t mask) {
   Intervals intervals;
   bool on = false;
@@ -62,7 +62,7 @@ std::vector<double> forces(std::span<const TraceRow> rows) {
   return force;
 }
 
-// "largest 2.31 N at 0.412 s", or that there is none.
+// "largest 2.31 N at 0.412 s", or a text for no force.
 std::string largest(std::span<const TraceRow> rows) {
   double most = -1.0;
   double when = 0.0;
@@ -87,7 +87,8 @@ std::uint32_t bit_of(std::size_t object) {
   return 1U << std::min<std::size_t>(object, 31);
 }
 
-// y at each of `at`, linear between samples; a gap outside them, and beside samples that are not finite.
+// y at each of `at`, linear between samples; a gap outside the range of x and beside samples that are not
+// finite.
 std::vector<double> sampled(std::span<const double> x, std::span<const double> y,
                             std::span<const double> at) {
   std::vector<double> out;
@@ -107,7 +108,7 @@ std::vector<double> sampled(std::span<const double> x, std::span<const double> y
   return out;
 }
 
-// Where contact begins in any model, and against which direction depth counts.
+// The origin of depth (the first contact in any model) and its direction.
 struct DepthFrame {
   glm::dvec3 start_m{0.0};
   glm::dvec3 into{0.0, 0.0, -1.0};
@@ -135,17 +136,18 @@ DepthFrame depth_frame(std::span<const ComparedModel> models, const ComparedMode
   return frame;
 }
 
-constexpr double kTurned_deg = 15.0;  // a model whose force turns further from the reference shows its angle
+constexpr double kTurned_deg =
+    15.0;  // a model's angle is shown if its force turns further than this from the reference
 
-// Angle between two forces (degrees); a gap where either is too small to have a direction.
+// Angle between two forces (degrees); a gap if either force is too small to have a direction.
 double angle_between(const glm::dvec3& a, const glm::dvec3& b, double floor_N) {
   const double size = glm::length(a) * glm::length(b);
   if (!(glm::length(a) > floor_N) || !(glm::length(b) > floor_N) || !std::isfinite(size)) return gap;
   return std::acos(std::clamp(glm::dot(a, b) / size, -1.0, 1.0)) * 180.0 / std::numbers::pi;
 }
 
-// How far each model's force points away from the reference's, at the reference's ticks (those of models with
-// times of their own: the last before). Without series where none turns enough to be looked at.
+// Angle of each model's force to the reference's force, at the reference's ticks. A model with its own times
+// contributes its last tick before. No series if no model turns far enough.
 Panel direction_panel(std::span<const ComparedModel> models, const ComparedModel& reference, double floor_N) {
   Panel panel;
   panel.title = "Direction: angle to the force of " + reference.name;
@@ -169,9 +171,10 @@ Panel direction_panel(std::span<const ComparedModel> models, const ComparedModel
   return panel;
 }
 
-// Does some model push against the reference's largest force, by more than a tenth of it?
-bool some_turn_round(std::span<const ComparedModel> models, const ComparedModel& reference,
-                     const glm::dvec3& into) {
+// True if some model pushes against the direction of the reference's largest force by more than a tenth of
+// that force.
+bool any_model_reverses(std::span<const ComparedModel> models, const ComparedModel& reference,
+                        const glm::dvec3& into) {
   double floor_N = 0.0;
   for (const TraceRow& row : reference.rows) floor_N = std::max(floor_N, -0.1 * glm::dot(row.force_N, into));
   return std::ranges::any_of(models, [&](const ComparedModel& model) {
@@ -180,7 +183,7 @@ bool some_turn_round(std::span<const ComparedModel> models, const ComparedModel&
   });
 }
 
-// How near tissue comes to what is rigid, and to other tissue. Without series where it never comes near.
+// Clearance of tissue to rigid objects and to other tissue. No series if nothing comes near.
 Panel clearance_panel(const ClearanceCourse& near) {
   Panel panel;
   panel.title = "Between objects (0: they touch; below: they overlap)";
@@ -233,11 +236,11 @@ void save_session_plot(const std::filesystem::path& svg, std::span<const TraceRo
   force.bands.push_back({"in contact", any, touched_colour});
   std::vector<double> rigid;
   std::vector<double> soft;
-  std::vector<double> apart;
+  std::vector<double> distance_mm;
   for (const TraceRow& row : rows) {
     rigid.push_back(row.rigid_N);
     soft.push_back(row.soft_N);
-    apart.push_back(glm::length(row.device_m - row.proxy_m) * 1e3);
+    distance_mm.push_back(glm::length(row.device_m - row.proxy_m) * 1e3);
   }
   force.series.push_back({"total", t, forces(rows), "#000000", 2.2});
   const auto has = [&](bool is_soft) {
@@ -246,7 +249,8 @@ void save_session_plot(const std::filesystem::path& svg, std::span<const TraceRo
   };
   if (has(false)) force.series.push_back({"rigid objects", t, rigid, series_colour(0)});
   if (has(true)) force.series.push_back({"soft objects", t, soft, series_colour(1)});
-  // Objects of their own lines where a kind has more than one; dashed, as parts of the sums above.
+  // Objects get lines of their own if a kind has more than one; dashed, because they are parts of the sums
+  // above.
   std::size_t colour = 2;
   for (const PlottedObject& object : objects) {
     const auto same =
@@ -272,7 +276,7 @@ void save_session_plot(const std::filesystem::path& svg, std::span<const TraceRo
   depth.height = 150.0;
   depth.from_zero = true;
   depth.bands.push_back({"", any, touched_colour});
-  depth.series.push_back({"", t, apart, series_colour(2)});
+  depth.series.push_back({"", t, distance_mm, series_colour(2)});
 
   PanelGroup group;
   group.x_label = "time (s)";
@@ -296,9 +300,9 @@ void save_compare_plot(const std::filesystem::path& svg, std::span<const Compare
   const ComparedModel& reference = models[options.reference];
   const std::vector<double> t = times(reference.rows);
   const DepthFrame frame = depth_frame(models, reference);
-  // A force that turns round is only seen with its sign: then the part along the reference's largest is
+  // A force that reverses shows only with its sign: then the component along the reference's largest force is
   // drawn.
-  const bool with_sign = some_turn_round(models, reference, frame.into);
+  const bool with_sign = any_model_reverses(models, reference, frame.into);
   const auto drawn = [&](std::span<const TraceRow> rows) {
     std::vector<double> out = forces(rows);
     for (std::size_t i = 0; with_sign && i < out.size(); ++i) out[i] = -glm::dot(rows[i].force_N, frame.into);

@@ -11,20 +11,20 @@
 #include <limits>
 #include <optional>
 #include <stdexcept>
-#include <string_view>
 #include <system_error>
 
 #include "hybrid/plot/downsample.h"
+#include "hybrid/plot/svg_canvas.h"
 
 namespace hybrid {
 namespace {
 
 constexpr double letter = 6.4;          // mean width of a letter at 12 pixels, on the wide side
-constexpr double most_points = 18'000;  // of all lines together: about 12 bytes each
+constexpr double most_points = 18'000;  // of all lines together; about 12 bytes each
 constexpr double lane_height = 22.0;
 constexpr std::size_t most_lanes = 24;
 
-// Beyond this, differences would overflow; such a value is no measurement.
+// Larger values would overflow in differences; no measurement is that large.
 bool plottable(double v) {
   return std::isfinite(v) && std::abs(v) < 1e150;
 }
@@ -40,76 +40,7 @@ struct Range {
   [[nodiscard]] bool empty() const { return !(from <= to); }
 };
 
-std::string escaped(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      case '\'':
-        out += "&apos;";
-        break;
-      default:
-        // XML has no way to write most control characters.
-        out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
-    }
-  }
-  return out;
-}
-
-std::size_t letters(std::string_view text) {
-  return static_cast<std::size_t>(
-      std::ranges::count_if(text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
-}
-
-std::string shortened(const std::string& text, std::size_t most) {
-  if (letters(text) <= most || most < 4) return text;
-  std::string out;
-  std::size_t count = 0;
-  for (const char c : text) {
-    const bool starts = (static_cast<unsigned char>(c) & 0xC0U) != 0x80U;
-    if (starts && ++count > most - 1) break;
-    out += c;
-  }
-  return out + "…";
-}
-
-std::string fixed(double v) {
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.1f", std::clamp(v, -99999.0, 99999.0));
-  std::string out = text.data();
-  if (out.ends_with(".0")) out.resize(out.size() - 2);
-  return out == "-0" ? "0" : out;
-}
-
-class Svg {
- public:
-  std::string body;
-  void text(double x, double y, const std::string& words, const char* style) {
-    body +=
-        "<text x=\"" + fixed(x) + "\" y=\"" + fixed(y) + "\" " + style + ">" + escaped(words) + "</text>\n";
-  }
-  void line(double x1, double y1, double x2, double y2, const std::string& colour, const char* more = "") {
-    body += "<path d=\"M" + fixed(x1) + " " + fixed(y1) + "L" + fixed(x2) + " " + fixed(y2) + "\" stroke=\"" +
-            escaped(colour) + "\" " + more + "/>\n";
-  }
-  void rect(double x, double y, double w, double h, const std::string& fill, const char* more = "") {
-    body += "<rect x=\"" + fixed(x) + "\" y=\"" + fixed(y) + "\" width=\"" + fixed(std::max(w, 0.0)) +
-            "\" height=\"" + fixed(std::max(h, 0.0)) + "\" fill=\"" + escaped(fill) + "\" " + more + "/>\n";
-  }
-};
-
-// Where a panel's data lie on the page.
+// Maps a panel's data to the page.
 struct Axes {
   double left, top, width, height;
   Range x, y;
@@ -117,9 +48,10 @@ struct Axes {
   [[nodiscard]] double py(double v) const { return top + height - (v - y.from) / (y.to - y.from) * height; }
 };
 
-// Neighbouring intervals nearer than half a pixel are one; those outside are cut.
-std::vector<std::pair<double, double>> on_page(const std::vector<std::pair<double, double>>& intervals,
-                                               const Axes& axes) {
+// Intervals on the page (pixels): neighbours nearer than half a pixel are merged, and intervals are cut to
+// the axes.
+std::vector<std::pair<double, double>> page_intervals(const std::vector<std::pair<double, double>>& intervals,
+                                                      const Axes& axes) {
   std::vector<std::pair<double, double>> out;
   for (const auto& [from, to] : intervals) {
     if (!plottable(from) || !plottable(to) || to < axes.x.from || from > axes.x.to) continue;
@@ -150,7 +82,7 @@ std::string path_of(const std::vector<PlotPoint>& page) {
       continue;
     }
     add_point(d, drawing ? 'L' : 'M', p.x, p.y);
-    // A sample alone between two gaps is shown as a dot.
+    // A single sample between two gaps is drawn as a dot.
     if (!drawing) d += "h0";
     drawing = true;
   }
@@ -167,8 +99,8 @@ void draw_series(Svg& svg, const Series& series, const Axes& axes, std::size_t p
   for (std::size_t i = 1; i < n && forward; ++i) forward = !(series.x[i] < series.x[i - 1]);
   std::vector<PlotPoint> page;
   if (forward) {
-    page = decimate_columns(series.x, y, axes.x.from, axes.x.to,
-                            std::clamp<std::size_t>(points / 4, 40, static_cast<std::size_t>(axes.width)));
+    page = downsample_columns(series.x, y, axes.x.from, axes.x.to,
+                              std::clamp<std::size_t>(points / 4, 40, static_cast<std::size_t>(axes.width)));
     for (PlotPoint& p : page) p = {axes.px(p.x), std::isfinite(p.y) ? axes.py(p.y) : p.y};
   } else {
     std::vector<PlotPoint> all;
@@ -177,7 +109,7 @@ void draw_series(Svg& svg, const Series& series, const Axes& axes, std::size_t p
       all.push_back({plottable(series.x[i]) ? axes.px(series.x[i]) : std::numeric_limits<double>::quiet_NaN(),
                      std::isfinite(y[i]) ? axes.py(y[i]) : y[i]});
     }
-    page = decimate_path(all, 0.4, std::max<std::size_t>(points, 40));
+    page = downsample_path(all, 0.4, std::max<std::size_t>(points, 40));
   }
   svg.body += "<path d=\"" + path_of(page) + "\" stroke=\"" + escaped(series.colour) + "\" stroke-width=\"" +
               fixed(series.width) + "\" stroke-linejoin=\"round\" stroke-linecap=\"round\"" +
@@ -187,8 +119,8 @@ void draw_series(Svg& svg, const Series& series, const Axes& axes, std::size_t p
 void draw_area(Svg& svg, const Area& area, const Axes& axes, std::size_t points) {
   const std::size_t columns =
       std::clamp<std::size_t>(points / 8, 20, static_cast<std::size_t>(axes.width) / 2);
-  const auto low = decimate_columns(area.x, area.low, axes.x.from, axes.x.to, columns);
-  const auto high = decimate_columns(area.x, area.high, axes.x.from, axes.x.to, columns);
+  const auto low = downsample_columns(area.x, area.low, axes.x.from, axes.x.to, columns);
+  const auto high = downsample_columns(area.x, area.high, axes.x.from, axes.x.to, columns);
   std::string d;
   const auto add = [&](const PlotPoint& p) {
     if (!plottable(p.y)) return;
@@ -220,7 +152,7 @@ double entry_width(const LegendEntry& e) {
   return 40.0 + letter * static_cast<double>(letters(e.name));
 }
 
-// Draws (or, with no page, only measures) the legend's rows; returns their height.
+// Draws the legend's rows (or only measures them, if `svg` is null); returns their height.
 double draw_legend(Svg* svg, const std::vector<LegendEntry>& entries, double left, double top, double width) {
   double x = left;
   double y = top;
@@ -269,7 +201,7 @@ void draw_lanes(Svg& svg, const Panel& panel, const Axes& axes, std::size_t show
     const double y = axes.top + lane_height * static_cast<double>(l);
     if (l > 0) svg.line(axes.left, y, axes.left + axes.width, y, "#e4e4e4");
     svg.text(axes.left - 8.0, y + 15.0, shortened(lane.name, 22), "class=\"t\" text-anchor=\"end\"");
-    for (const auto& [a, b] : on_page(lane.intervals, axes)) {
+    for (const auto& [a, b] : page_intervals(lane.intervals, axes)) {
       svg.rect(a, y + 5.0, std::max(b - a, 0.8), lane_height - 10.0, lane.colour);
     }
     svg.text(axes.left + axes.width + 8.0, y + 15.0, lane.note, "class=\"t p\"");
@@ -279,7 +211,7 @@ void draw_lanes(Svg& svg, const Panel& panel, const Axes& axes, std::size_t show
 void draw_panel(Svg& svg, const Panel& panel, Axes axes, std::size_t points, std::size_t lanes) {
   const bool has_lanes = !panel.lanes.empty();
   for (const Bands& bands : panel.bands) {
-    for (const auto& [a, b] : on_page(bands.intervals, axes)) {
+    for (const auto& [a, b] : page_intervals(bands.intervals, axes)) {
       svg.rect(a, axes.top, std::max(b - a, 0.6), axes.height, bands.colour);
     }
   }
@@ -361,7 +293,7 @@ Range x_range(const PanelGroup& group) {
 std::string to_svg(const Figure& figure) {
   double left = 76.0;
   double right = 28.0;
-  double lines = 1.0;  // how many share the points
+  double lines = 1.0;  // number of lines that share the points
   for (const PanelGroup& group : figure.groups) {
     for (const Panel& panel : group.panels) {
       lines += static_cast<double>(panel.series.size() + panel.areas.size());

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Figures as SVG: panels stacked under each other, those of a group with one x axis. Values that are not
-// finite leave a gap; names may contain anything. A file stays below 300 kB however many samples it was made
-// from.
+// Figures as SVG: panels stacked under each other; the panels of a group share one x axis. Values that are
+// not finite leave a gap. Names may contain any characters. A file stays below 300 kB for any number of
+// samples.
 #pragma once
 
 #include <filesystem>
@@ -49,13 +49,13 @@ struct Lane {
 struct Panel {
   std::string title;
   std::string y_label;     // with its unit
-  double height = 200.0;   // (pixels); with lanes: as many as they need
+  double height = 200.0;   // (pixels); ignored with lanes
   bool from_zero = false;  // the y axis contains 0
   std::vector<Bands> bands;
   std::vector<Area> areas;
   std::vector<Series> series;
   std::vector<ReferenceLine> lines;
-  std::vector<Lane> lanes;  // then nothing else is drawn but bands
+  std::vector<Lane> lanes;  // if not empty, only bands are drawn besides
 };
 
 struct PanelGroup {
@@ -70,7 +70,7 @@ struct Figure {
   double width = 960.0;  // (pixels)
 };
 
-// Colours that stay apart for colour-blind readers (Okabe & Ito 2008), on white; repeats after seven.
+// Colours that colour-blind readers can distinguish (Okabe & Ito 2008), on white; repeats after seven.
 std::string series_colour(std::size_t index);
 
 std::string to_svg(const Figure& figure);
@@ -78,10 +78,10 @@ std::string to_svg(const Figure& figure);
 // Throws std::runtime_error: file not writable, disk full.
 void save_svg(const std::filesystem::path& file, const Figure& figure);
 
-// Round numbers (1, 2, 5 · 10^n apart) within [from, to], about `wanted` of them. At most 64.
+// Round numbers at a pitch of 1, 2 or 5 · 10^n within [from, to], about `wanted` of them and at most 64.
 std::vector<double> nice_ticks(double from, double to, int wanted);
 
-// A tick's number, with as many decimals as its neighbours' distance needs.
+// Text of a tick, with as many decimals as the pitch needs.
 std::string tick_text(double value, double step);
 
 }  // namespace hybrid

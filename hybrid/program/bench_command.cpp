@@ -18,7 +18,7 @@
 namespace hybrid {
 namespace {
 
-constexpr int kSettlingRounds = 60;  // of the plot
+constexpr int kSettlingRounds = 60;  // of the relaxation plot
 
 std::vector<bench::Engine> engines_of(const std::vector<std::string>& names) {
   std::vector<bench::Engine> engines;
@@ -29,7 +29,7 @@ std::vector<bench::Engine> engines_of(const std::vector<std::string>& names) {
   return engines;
 }
 
-// The product's own figures at a glance.
+// The product's own figures in one table.
 std::string summary(const std::vector<bench::RigidRow>& rows) {
   std::size_t runs = 0, inside = 0, pops = 0, lost = 0;
   double worst = 0.0;
@@ -48,9 +48,9 @@ std::string summary(const std::vector<bench::RigidRow>& rows) {
       runs, inside, pops, 1e6 * worst, lost);
 }
 
-// What of the user's choice belongs to a suite.
-std::vector<std::string> chosen_of(const std::vector<std::string>& chosen,
-                                   const std::vector<std::string>& suite) {
+// The chosen names that belong to a suite.
+std::vector<std::string> chosen_in_suite(const std::vector<std::string>& chosen,
+                                         const std::vector<std::string>& suite) {
   std::vector<std::string> result;
   for (const std::string& name : chosen) {
     if (std::find(suite.begin(), suite.end(), name) != suite.end()) result.push_back(name);
@@ -61,7 +61,7 @@ std::vector<std::string> chosen_of(const std::vector<std::string>& chosen,
 nlohmann::ordered_json rigid_suite(const BenchCommand& command, std::FILE* words) {
   bench::RigidBenchOptions options{.quick = command.quick,
                                    .every_tick = command.every_tick,
-                                   .paths = chosen_of(command.only, bench::rigid_paths()),
+                                   .paths = chosen_in_suite(command.only, bench::rigid_paths()),
                                    .meshes = command.meshes,
                                    .engines = engines_of(command.engines),
                                    .trace = command.trace,
@@ -89,11 +89,11 @@ nlohmann::ordered_json rigid_suite(const BenchCommand& command, std::FILE* words
   return json;
 }
 
-// The rows, and beside them how work grows.
+// Returns the rows; `growth` receives the growth of work with size.
 nlohmann::ordered_json soft_suite(const BenchCommand& command, std::FILE* words,
                                   nlohmann::ordered_json& growth) {
   bench::SoftBenchOptions options{.quick = command.quick,
-                                  .cases = chosen_of(command.only, bench::soft_cases()),
+                                  .cases = chosen_in_suite(command.only, bench::soft_cases()),
                                   .engines = {},
                                   .depths = {},
                                   .sizes = command.sizes,
@@ -101,7 +101,8 @@ nlohmann::ordered_json soft_suite(const BenchCommand& command, std::FILE* words,
                                   .on_row = {}};
   if (command.session_s) options.session_s = *command.session_s;
   for (const bench::SoftEngine engine : bench::kSoftEngines) {
-    if (!chosen_of(command.engines, {bench::engine_name(engine)}).empty()) options.engines.push_back(engine);
+    if (!chosen_in_suite(command.engines, {bench::engine_name(engine)}).empty())
+      options.engines.push_back(engine);
   }
   options.on_row = [words](const bench::SoftRow& row) {
     end_progress();
@@ -125,7 +126,7 @@ nlohmann::ordered_json soft_suite(const BenchCommand& command, std::FILE* words,
   return json;
 }
 
-// Each suite's own name for the plot, where several write one.
+// With all suites, each plot gets its suite's name, because several suites write one.
 std::filesystem::path occupancy_plot(const BenchCommand& command) {
   if (command.plot.empty() || command.suite != "all") return command.plot;
   std::filesystem::path plot = command.plot;
@@ -134,13 +135,14 @@ std::filesystem::path occupancy_plot(const BenchCommand& command) {
 
 nlohmann::ordered_json occupancy_suite(const BenchCommand& command, std::FILE* words) {
   bench::OccupancyBenchOptions options{.quick = command.quick,
-                                       .cases = chosen_of(command.only, bench::occupancy_cases()),
+                                       .cases = chosen_in_suite(command.only, bench::occupancy_cases()),
                                        .engines = {},
                                        .cells = command.cells,
                                        .progress = progress_on_terminal(),
                                        .on_row = {}};
   for (const bench::OccupancyEngine engine : bench::kOccupancyEngines) {
-    if (!chosen_of(command.engines, {bench::engine_name(engine)}).empty()) options.engines.push_back(engine);
+    if (!chosen_in_suite(command.engines, {bench::engine_name(engine)}).empty())
+      options.engines.push_back(engine);
   }
   options.on_row = [words](const bench::OccupancyRow& row) {
     end_progress();
@@ -179,11 +181,11 @@ nlohmann::ordered_json threads_suite(const BenchCommand& command, std::FILE* wor
   return json;
 }
 
-// A suite is left out of "all" where everything chosen belongs to others.
+// Whether a suite has anything to do: in "all" it is left out if every chosen name belongs to other suites.
 bool has_work(const BenchCommand& command, const std::vector<std::string>& cases,
               const std::vector<std::string>& engines) {
-  return (command.only.empty() || !chosen_of(command.only, cases).empty()) &&
-         (command.engines.empty() || !chosen_of(command.engines, engines).empty());
+  return (command.only.empty() || !chosen_in_suite(command.only, cases).empty()) &&
+         (command.engines.empty() || !chosen_in_suite(command.engines, engines).empty());
 }
 
 template <class Engines>

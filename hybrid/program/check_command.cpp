@@ -51,13 +51,13 @@ void add_finding(Json& file, const polygon::Finding& f) {
   file["findings"].push_back(to_json(f));
 }
 
-// A mesh's findings are worded to follow their count.
+// The text of a mesh's finding is worded to follow its count.
 Json counted(polygon::Finding f) {
   f.text = fmt::format("{} {}", f.count, f.text);
   return to_json(f);
 }
 
-// What `repair = true` would change, and what a check finds after it.
+// The changes that `repair = true` would make, and the findings that remain after it.
 Json would_repair(const polygon::TriangleMesh& mesh, bool deep) {
   const polygon::RepairedMesh repaired = polygon::repair_mesh(mesh);
   const polygon::MeshCheck checked = polygon::check_mesh(repaired.mesh, deep);

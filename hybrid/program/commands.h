@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the program's commands do, apart from how their options are spelled (main.cpp). Each returns the exit
-// status, and throws where an input is refused.
+// The program's commands, without the spelling of their options (main.cpp). Each returns the exit status and
+// throws on a refused input.
 #pragma once
 
 #include <filesystem>
@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "hybrid/session/black_box.h"
 #include "hybrid/build/build_world.h"
 #include "hybrid/compare/compare_measured.h"
 #include "hybrid/compose/compose.h"
+#include "hybrid/session/black_box.h"
 
 namespace hybrid {
 
@@ -19,13 +19,13 @@ struct RunCommand {
   std::filesystem::path scene;
   std::optional<double> seconds;
   bool realtime = false;
-  std::string device;  // in place of the scene's; empty: the scene's
+  std::string device;  // replaces the scene's device; empty: the scene's
   int samples = 6;
   std::uint64_t start_ticks = 0;
   std::string relaxation = "apart";  // or "tick": where tissue away from the contact is relaxed
   std::filesystem::path trace, plot, picture, record, save_surface, save_volume;  // empty: not written
-  std::filesystem::path black_box;                                                // empty: see keep_box()
-  std::string json;                                                               // "-": standard output
+  std::filesystem::path black_box;  // empty: see open_black_box_file()
+  std::string json;                 // "-": standard output
 };
 int run(const RunCommand& command);
 
@@ -38,7 +38,7 @@ int replay(const ReplayCommand& command);
 struct CheckCommand {
   std::vector<std::filesystem::path> files;
   bool deep = false;
-  bool repair = false;  // also say what `repair = true` would do to a mesh
+  bool repair = false;  // also report the changes that `repair = true` would make
   double unit_m = 1.0;  // of mesh files
   std::string json;
 };
@@ -51,15 +51,15 @@ struct ComposeCommand {
 int compose(const ComposeCommand& command);
 
 struct DevicesCommand {
-  bool calibrate = false;  // take the pose in which the hand holds the arm as the one of calibration
+  bool calibrate = false;  // take the present pose of the arm as the calibration pose
   std::string json;
 };
 int devices(const DevicesCommand& command);
 
 struct CompareCommand {
   std::filesystem::path scene;
-  std::string object;        // empty: the first that can be compared
-  MeasuredOptions measured;  // its file empty: no measurement
+  std::string object;        // empty: the first suitable object
+  MeasuredOptions measured;  // empty file: no measurement
   std::filesystem::path plot;
   std::string json;
 };
@@ -78,44 +78,45 @@ struct BenchCommand {
   std::string json;
 };
 int run_bench(const BenchCommand& command);
-// What may be asked for, so that a wrong word is refused with the right ones.
+// The names that may be chosen, so that a wrong name is refused with the valid ones.
 const std::vector<std::string>& bench_suites();
 std::vector<std::string> bench_parts();  // paths of rigid, cases of soft and occupancy
 std::vector<std::string> bench_engines();
-std::string bench_mesh_error(const std::string& name);  // empty: there is such a mesh
+std::string bench_mesh_error(const std::string& name);  // empty: the mesh exists
 
 struct StabilityCommand {
   std::filesystem::path scene, plot;
   std::string json;
 };
 int stability(const StabilityCommand& command);
-// `hybrid stability SCENE --extremes`, `--fuzz-ticks N`: the suite of extremes.h, and fuzz_ticks.h. The
-// status is 0 also when something fell short: the report says so.
+// `hybrid stability SCENE --extremes` and `--fuzz-ticks N`: the suites of extremes.h and fuzz_ticks.h. The
+// exit status is 1 if an invariant was violated; the report gives the details.
 struct ExtremesCommand {
   std::filesystem::path scene;
   bool table = true;
   bool quick = false;
   std::uint64_t fuzz_ticks = 0, seed = 1;  // 0: none
-  bool async_relaxation = false;                // of fuzz_ticks
+  bool async_relaxation = false;           // of fuzz_ticks
   std::string json;
 };
 int extremes(const ExtremesCommand& command);
 
 struct ViewCommand {
   std::filesystem::path scene;
-  std::optional<std::uint64_t> frames;  // then closes; each written to `out` when that is given
+  std::optional<std::uint64_t>
+      frames;  // the window closes after this many; each is written to `out` if that is given
   std::filesystem::path out;
-  std::filesystem::path drag;  // CSV of goals that stand for the mouse: t, x, y, z
-  std::string device;          // in place of the scene's; empty: the scene's
+  std::filesystem::path drag;  // CSV of goals that replace the mouse: t, x, y, z
+  std::string device;          // replaces the scene's device; empty: the scene's
 };
 int view(const ViewCommand& command);
 
-// Progress on standard error, one line that is overwritten on a terminal, and nothing when standard error is
-// no terminal and less than a second has passed.
+// Progress on standard error. A terminal shows one line that is overwritten. Otherwise, after the first
+// second, a line is written at most every two seconds.
 Progress progress_on_terminal();
 void end_progress();
-// On standard error: what the build noticed; where the seconds around a fault are, if there was one.
+// Both write to standard error: the notes of the build, and the file with the seconds around a fault.
 void print_notes(const BuiltScene& built);
-void print_fault(const KeptBox& kept);
+void print_fault(const BlackBoxFile& kept);
 
 }  // namespace hybrid

@@ -67,7 +67,7 @@ void save_plot(const CompareCommand& command, const Scene& scene, const Comparis
 
 int compare_with_measured(const CompareCommand& command, const Scene& scene) {
   MeasuredOptions options = command.measured;
-  // The evaluation's files are in millimeters; a CSV without units follows the scene.
+  // .traj files of the evaluation are in millimeters; a CSV without units follows the scene.
   if (options.measured.file.extension() != ".traj") options.measured.unit_m = scene.unit_m;
   const MeasuredComparison result = compare_measured(scene, options, progress_on_terminal());
   end_progress();

@@ -14,9 +14,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::size_t kMostSaid = 24;  // names in a line
+constexpr std::size_t kMostNamed = 24;  // most names in one line
 
-// An argument of a command line, as a shell takes it.
+// Quotes an argument for a shell.
 std::string in_shell(const std::string& text) {
   const bool plain = !text.empty() && text.find_first_not_of(
                                           "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
@@ -83,11 +83,11 @@ int compose(const ComposeCommand& command) {
   }
   const std::vector<std::string>& hidden = composed.path.hidden;
   if (!hidden.empty()) {
-    const std::size_t said = std::min(hidden.size(), kMostSaid);
+    const std::size_t listed_names = std::min(hidden.size(), kMostNamed);
     fmt::print(words, "not pressed, as others lie before it on every side or are easier to reach: {}{}\n",
-               joined(std::vector<std::string_view>(hidden.begin(),
-                                                    hidden.begin() + static_cast<std::ptrdiff_t>(said))),
-               said < hidden.size() ? fmt::format(" and {} more", hidden.size() - said) : "");
+               joined(std::vector<std::string_view>(
+                   hidden.begin(), hidden.begin() + static_cast<std::ptrdiff_t>(listed_names))),
+               listed_names < hidden.size() ? fmt::format(" and {} more", hidden.size() - listed_names) : "");
   }
   const std::string scene = composed.scene.string();
   fmt::print(words, "\n{}: written; its path takes {:.0f} s\nnext: hybrid run {} --picture {}\n", scene,

@@ -17,16 +17,16 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// JSON has no infinity; what is not told is 0, which is null here too.
-Json known(double value) {
+// JSON has no infinity. Zero stands for an unknown value; both become null.
+Json null_if_unknown(double value) {
   return std::isfinite(value) && value > 0.0 ? Json(value) : Json(nullptr);
 }
 
 Json to_json(const device::DeviceLimits& limits) {
-  return {{"max_force_N", known(limits.max_force_N)},
-          {"max_stiffness_N_per_m", known(limits.max_stiffness_N_per_m)},
-          {"resolution_m", known(limits.resolution_m)},
-          {"friction_N", known(limits.friction_N)}};
+  return {{"max_force_N", null_if_unknown(limits.max_force_N)},
+          {"max_stiffness_N_per_m", null_if_unknown(limits.max_stiffness_N_per_m)},
+          {"resolution_m", null_if_unknown(limits.resolution_m)},
+          {"friction_N", null_if_unknown(limits.friction_N)}};
 }
 
 Json to_json(const device::Box& box) {
@@ -35,7 +35,7 @@ Json to_json(const device::Box& box) {
           {"high_m", {box.high_m.x, box.high_m.y, box.high_m.z}}};
 }
 
-// Asks the person to hold the arm, where there is one to ask.
+// Asks the person to hold the arm, if standard input is a terminal.
 void calibrate(device::PhantomDevice& phantom) {
   if (isatty(STDIN_FILENO) != 0) {
     std::fprintf(stderr,
@@ -64,10 +64,10 @@ Json phantom_row(const DevicesCommand& command, std::string& text) {
     row["vendor"] = info.vendor;
     row["driver_version"] = info.driver_version;
     row["api_version"] = info.api_version;
-    row["firmware"] = known(info.firmware);
+    row["firmware"] = null_if_unknown(info.firmware);
     row["rate_hz"] = info.rate_hz;
     row["limits"] = to_json(phantom->limits());
-    row["continuous_force_N"] = known(info.continuous_force_N);
+    row["continuous_force_N"] = null_if_unknown(info.continuous_force_N);
     row["workspace"] = to_json(info.workspace);
     row["reach"] = to_json(info.reach);
     row["motor_temperature"] = info.motor_temperature;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The `hybrid` program: how its commands and options are spelled. Exit status 0 done, 1 refused input, 2
-// usage.
+// The `hybrid` program: the spelling of its commands and options. Exit status: 0 done, 1 refused input, an
+// unequal replay or a violated invariant, 2 usage.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>

@@ -27,7 +27,7 @@ bool& progress_shown() {
   return shown;
 }
 
-// Words for people go to standard output, unless the report does.
+// Text goes to standard output, unless the report goes there.
 std::FILE* words_for(const std::string& json) {
   return json == "-" ? stderr : stdout;
 }
@@ -39,7 +39,7 @@ std::string read_text(const std::filesystem::path& file) {
   return text.str();
 }
 
-// An output that cannot be written is better known before a long run than after it.
+// Finds an output that cannot be written before a long run, not after it.
 void check_writable(const std::filesystem::path& file) {
   if (file.empty()) return;
   if (file.has_parent_path()) {
@@ -85,7 +85,7 @@ void print_notes(const BuiltScene& built) {
   }
 }
 
-void print_fault(const KeptBox& kept) {
+void print_fault(const BlackBoxFile& kept) {
   const std::string said = kept.save_on_fault();
   if (!said.empty()) std::fprintf(stderr, "warning: %s\n", said.c_str());
 }
@@ -113,7 +113,7 @@ int run(const RunCommand& command) {
     std::fprintf(stderr, "note: in touch now; Ctrl-C ends the session and keeps it\n");
   }
   const bool realtime = command.realtime || real;
-  const auto kept = keep_box(command.black_box, command.scene, realtime, scene.rate_hz);
+  const auto kept = open_black_box_file(command.black_box, command.scene, realtime, scene.rate_hz);
   SessionOptions options{.seconds = command.seconds,
                          .realtime = command.realtime,
                          .real_device = real.get(),
@@ -173,14 +173,14 @@ int replay(const ReplayCommand& command) {
     j["ticks"] = result.ticks;
     j["state_hash"] = fmt::format("{:016x}", result.state_hash);
     j["equal"] = result.equal;
-    if (!result.equal) j["parts_at_tick"] = result.parts_at;
+    if (!result.equal) j["parts_at_tick"] = result.first_difference;
     save_json(command.json, j);
   }
   fmt::print(words_for(command.json), "{}\n",
              result.equal
                  ? fmt::format("equal: {} ticks, state hash {:016x}", result.ticks, result.state_hash)
                  : fmt::format("parts at tick {} of {}: this build does not feel what was recorded",
-                               result.parts_at, result.ticks));
+                               result.first_difference, result.ticks));
   return result.equal ? 0 : 1;
 }
 

@@ -57,7 +57,8 @@ std::vector<BoundaryGroup> figure_of(const StabilityReport& report) {
         panel.curves.push_back(std::move(curve));
       }
       if (panel.curves.empty()) continue;
-      // The wall's damping takes far from passive before it is unstable: axes of their own.
+      // The sweep of the wall's damping reaches far beyond the passive range before it is unstable; it needs
+      // axes of its own.
       if (groups.empty() || groups.back().x_label != plotted.x_label ||
           plotted.sweep == StabilitySweep::wall_damping)
         groups.push_back({.x_label = plotted.x_label, .panels = {}});

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The viewer: a window beside a session, each on its own thread. The session publishes snapshots and takes
+// The viewer: a window and a session, each on its own thread. The session publishes snapshots and takes
 // goals; neither waits for the other.
 #include <fmt/format.h>
 
@@ -27,43 +27,43 @@ namespace hybrid {
 namespace {
 
 constexpr double kSnapshotEvery_s = 1.0 / 60.0;
-constexpr double kScriptFrame_s = 1.0 / 30.0;  // session time that one frame of a scripted view stands for
+constexpr double kScriptFrame_s = 1.0 / 30.0;  // session time of one frame of a scripted view
 
-// What the window asks of the session.
-struct Wish {
+// Requests of the window to the session.
+struct WindowRequest {
   bool dragging = false, paused = false;
   std::uint32_t restarts = 0;
   glm::dvec3 goal_m{0.0};
 };
 
-// The target of the simulated hand: the scene's path, or where the mouse pulls. Read by the device within a
+// Target of the simulated hand: the scene's path, or the goal of the mouse. The device reads it within a
 // tick.
 class SteeredPath final : public device::Path {
  public:
   explicit SteeredPath(std::shared_ptr<const device::Path> path) : path_(std::move(path)) {}
   [[nodiscard]] glm::dvec3 position(double t_s) const noexcept override {
-    return held_ ? goal_m_ : path_->position(std::fmod(t_s - start_s_, path_->duration_s() + 1.0));
+    return dragged_ ? goal_m_ : path_->position(std::fmod(t_s - start_s_, path_->duration_s() + 1.0));
   }
   [[nodiscard]] double duration_s() const noexcept override { return path_->duration_s(); }
   [[nodiscard]] const std::vector<std::string>& notes() const noexcept override { return path_->notes(); }
 
-  void hold(const glm::dvec3& goal_m) {
-    held_ = true;
+  void drag_to(const glm::dvec3& goal_m) {
+    dragged_ = true;
     goal_m_ = goal_m;
   }
   void restart(double now_s) {
-    held_ = false;
+    dragged_ = false;
     start_s_ = now_s;
   }
 
  private:
   std::shared_ptr<const device::Path> path_;
-  bool held_ = false;
+  bool dragged_ = false;
   glm::dvec3 goal_m_{0.0};
   double start_s_ = 0.0;
 };
 
-// The session's side. Once the mouse has taken the tool it keeps it where it was let go, until a restart.
+// The session's side. After a drag the tool stays at its last goal until a restart.
 class Player {
  public:
   Player(const Scene& scene, BuiltScene& built, device::HapticDevice* real_device)
@@ -73,25 +73,25 @@ class Player {
         device_(real_device == nullptr ? *simulated_ : *real_device),
         rate_hz_(scene.rate_hz),
         dt_(1.0 / scene.rate_hz) {
-    flush_denormals();
+    set_flush_to_zero();
     goal_m_ = device_.read().position_m;
     begin_session(scene, *built.world, *built.state, goal_m_);
   }
 
-  TickResult tick(const Wish& wish, const device::DeviceState& input) {
-    if (wish.restarts != restarts_) {
-      restarts_ = wish.restarts;
+  TickResult tick(const WindowRequest& request, const device::DeviceState& input) {
+    if (request.restarts != restarts_) {
+      restarts_ = request.restarts;
       path_->restart(t_s());
     }
-    // The mouse pulls faster than a hand would: the goal follows it at no more than a brisk hand's speed.
-    if (wish.dragging) {
-      const glm::dvec3 way = wish.goal_m - goal_m_;
-      const double length = glm::length(way), most = kHandSpeed_m_per_s * dt_;
-      goal_m_ = length > most ? goal_m_ + way * (most / length) : wish.goal_m;
-      path_->hold(goal_m_);
+    // The mouse is faster than a hand: the goal follows it at most at the speed of a brisk hand.
+    if (request.dragging) {
+      const glm::dvec3 delta = request.goal_m - goal_m_;
+      const double length = glm::length(delta), most = kHandSpeed_m_per_s * dt_;
+      goal_m_ = length > most ? goal_m_ + delta * (most / length) : request.goal_m;
+      path_->drag_to(goal_m_);
     }
     const TickResult felt = haptic_tick(*built_.world, *built_.state, input, dt_);
-    if (!wish.dragging) goal_m_ = felt.device_m;
+    if (!request.dragging) goal_m_ = felt.device_m;
     ++ticks_;
     return felt;
   }
@@ -102,9 +102,9 @@ class Player {
   [[nodiscard]] double rate_hz() const { return rate_hz_; }
   [[nodiscard]] double deadline_s() const { return built_.world->limits.deadline_s; }
   [[nodiscard]] device::HapticDevice& device() { return device_; }
-  // A tick of no real time, on this thread.
-  TickResult step(const Wish& wish) {
-    const TickResult felt = tick(wish, device_.read());
+  // One tick on this thread, without real time.
+  TickResult step(const WindowRequest& request) {
+    const TickResult felt = tick(request, device_.read());
     device_.write(felt.force_N, dt_);
     return felt;
   }
@@ -122,7 +122,7 @@ class Player {
       fill_moved(*built_.world, *built_.state, out);
     }
   }
-  // From now on tissue is relaxed by a thread, which the caller runs.
+  // From now on a thread relaxes the tissue; the caller runs that thread.
   [[nodiscard]] std::unique_ptr<RelaxationThread> go_live() {
     live_ = true;
     start_async_relaxation(*built_.state, Arrival::thread);
@@ -146,21 +146,21 @@ std::filesystem::path frame_file(const std::filesystem::path& folder, std::uint6
   return folder / fmt::format("frame-{:05}.png", n);
 }
 
-// Every frame stands for a fixed stretch of session time, whatever the machine: pictures that can be made
-// again.
+// Plays frames that each stand for a fixed stretch of session time, so that the pictures are reproducible on
+// any machine.
 void play_frames(const ViewCommand& command, Player& player, Window& window) {
   std::shared_ptr<const device::Path> drag;
   if (!command.drag.empty()) drag = device::make_path(device::CsvPath{.file = command.drag});
   Snapshot snapshot;
   for (std::uint64_t n = 0; n < *command.frames; ++n) {
-    Wish wish;
+    WindowRequest request;
     TickResult felt;
     for (double end = player.t_s() + kScriptFrame_s; player.t_s() < end;) {
       if (drag) {
-        wish.dragging = true;
-        wish.goal_m = drag->position(player.t_s());
+        request.dragging = true;
+        request.goal_m = drag->position(player.t_s());
       }
-      felt = player.step(wish);
+      felt = player.step(request);
     }
     player.snapshot(felt, snapshot);
     if (!window.frame(snapshot)) return;
@@ -169,21 +169,21 @@ void play_frames(const ViewCommand& command, Player& player, Window& window) {
   if (!command.out.empty()) fmt::print("{} frames in {}\n", *command.frames, command.out.string());
 }
 
-// The window on this thread, the session on another. Says what happened to the device, if anything did.
+// Runs the window on this thread and the session on another. Returns the device's events.
 device::ServoReport play_live(const DrawnScene& drawn, Player& player, Window& window, BlackBox& box) {
-  HandOver<Snapshot> snapshots;
-  HandOver<Wish> wishes;
+  TripleBuffer<Snapshot> snapshots;
+  TripleBuffer<WindowRequest> requests;
   std::atomic<bool> stop{false}, ended{false};
   device::ServoReport report;
   const std::unique_ptr<RelaxationThread> relaxation = player.go_live();
   std::jthread session([&] {
     double next = 0.0;
     auto tick = [&](const device::ServoInput& input) -> device::ServoAnswer {
-      const FlushedDenormals flushed;
+      const ScopedFlushToZero flushed;
       const bool go_on = !stop.load(std::memory_order_relaxed);
-      const Wish& wish = wishes.take();
-      if (wish.paused || !go_on) return {.go_on = go_on, .skip = true};
-      const TickResult felt = player.tick(wish, input.device);
+      const WindowRequest& request = requests.take();
+      if (request.paused || !go_on) return {.go_on = go_on, .skip = true};
+      const TickResult felt = player.tick(request, input.device);
       box.add(player.row(input, felt));
       if (player.t_s() >= next) {
         next = player.t_s() + kSnapshotEvery_s;
@@ -202,17 +202,17 @@ device::ServoReport play_live(const DrawnScene& drawn, Player& player, Window& w
     }
     ended = true;
   });
-  Wish wish;
+  WindowRequest request;
   Snapshot shown;
   do {
     const WindowInput input = window.take_input();
-    wish.dragging = input.dragged_goal_m.has_value();
-    if (input.dragged_goal_m) wish.goal_m = *input.dragged_goal_m;
-    wish.paused = input.paused;
-    if (input.restart) ++wish.restarts;
-    wishes.back() = wish;
-    wishes.publish();
-    show_live(drawn, snapshots.take(), relaxation->surfaces(), shown);
+    request.dragging = input.dragged_goal_m.has_value();
+    if (input.dragged_goal_m) request.goal_m = *input.dragged_goal_m;
+    request.paused = input.paused;
+    if (input.restart) ++request.restarts;
+    requests.back() = request;
+    requests.publish();
+    merge_live_surface(drawn, snapshots.take(), relaxation->surfaces(), shown);
   } while (window.frame(shown) && !ended);
   stop = true;
   session.join();
@@ -224,7 +224,7 @@ device::ServoReport play_live(const DrawnScene& drawn, Player& player, Window& w
 int view(const ViewCommand& command) {
   Scene scene = load_scene(command.scene);
   if (!command.device.empty()) use_device(scene, command.device);
-  // Frames are pictures that can be made again, and so need a hand that can.
+  // Frames are reproducible pictures, which a real device cannot give.
   if (command.frames && scene.real_device) {
     throw SceneError(scene.file, scene.real_device->place,
                      "--frames needs a simulated device; add --device premium-1.5");
@@ -248,7 +248,7 @@ int view(const ViewCommand& command) {
     play_frames(command, player, window);
     return 0;
   }
-  const auto kept = keep_box({}, command.scene, true, scene.rate_hz);
+  const auto kept = open_black_box_file({}, command.scene, true, scene.rate_hz);
   const device::ServoReport report = play_live(drawn, player, window, kept->box());
   print_fault(*kept);
   for (const std::string& message : report.messages) std::fprintf(stderr, "device: %s\n", message.c_str());

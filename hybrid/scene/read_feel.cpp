@@ -6,7 +6,7 @@
 namespace hybrid {
 namespace {
 
-// Steeper than this, of the period, and the flanks of a texture are walls that a tool does not slide over.
+// Steeper flanks of a texture (height per period) would be walls that a tool cannot slide over.
 constexpr double kMostHeight = 0.5;
 
 constexpr std::string_view keys_of_feel[] = {"damping", "friction", "shading", "texture"};

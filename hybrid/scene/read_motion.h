@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The keys of a [[rigid]] table that say how it moves.
+// The keys of a [[rigid]] table that describe its motion.
 #pragma once
 
 #include <span>
@@ -10,10 +10,10 @@
 
 namespace hybrid {
 
-// All of them, whatever the motion.
+// The keys of all kinds of motion.
 std::span<const std::string_view> motion_keys();
 
-// Refuses keys that do not go with the motion that the table names.
+// Refuses keys that do not belong to the kind of motion that the table names.
 MotionDescription read_motion(const TableReader& table, const Pose& pose);
 
 }  // namespace hybrid

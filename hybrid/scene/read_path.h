@@ -7,7 +7,7 @@
 
 namespace hybrid {
 
-// Checks all but the contents of a CSV file. A path that would take longer than a day is refused.
+// Checks everything but the contents of a CSV file. Refuses a path longer than a day.
 device::PathDescription read_path(const TableReader& table);
 
 }  // namespace hybrid

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What both kinds of object share, and the rigid ones.
+// The common keys of all objects, and the [[rigid]] tables.
 #include "hybrid/scene/read_rigid.h"
 
 #include <algorithm>
@@ -19,7 +19,7 @@ namespace {
 constexpr std::size_t longest_name = 64;
 constexpr std::size_t most_labels = 254;
 
-constexpr LaterKey rigid_later[] = {
+constexpr UnsupportedKey rigid_later[] = {
     {"stiffness", "remove it: the stiffness of every rigid contact is [tool] stiffness for now"},
     {"model", "remove it; what may be felt either way is a [[soft]] object with model = \"auto\""},
 };
@@ -39,7 +39,7 @@ glm::dquat rotation_from_degrees(const glm::dvec3& degrees) {
   return about_z * about_y * about_x;
 }
 
-// The keys of one kind of source, and those that every rigid object may have.
+// The keys of one kind of source, and the keys that every rigid object may have.
 std::vector<std::string_view> with_common(std::span<const std::string_view> keys) {
   std::vector<std::string_view> all(keys.begin(), keys.end());
   const auto motion = motion_keys();

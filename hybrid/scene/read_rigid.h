@@ -11,22 +11,23 @@
 
 namespace hybrid {
 
-// Each checks all that one table says by itself; what concerns other tables (names, materials) is left to
-// load_scene. `number` counts the tables of the kind from 1, for messages about one that has no name.
+// Each checks everything that one table contains by itself. References to other tables (names, materials) are
+// checked by the caller. `number` counts the tables of the kind from 1, for messages about a table without a
+// name.
 RigidDescription read_rigid(const SceneSource& source, const TreeNode& table, std::size_t number);
 SoftDescription read_soft(const SceneSource& source, const TreeNode& table, std::size_t number);
 
-// What both kinds share.
+// Common parts of both kinds.
 TableReader object_table(const SceneSource& source, const TreeNode& table, const std::string& kind,
                          std::size_t number);
 std::string read_name(const TableReader& table);
 Pose read_pose(const TableReader& table);
 MeshSource read_mesh_source(const TableReader& table);
-// `energy` of an object or a material; nothing where it does not say.
+// `energy` of an object or a material; empty if absent.
 std::optional<Energy> read_energy(const TableReader& table);
-// `labels` or `range` (and `ranges` where each may become its own label); none of them: no rules.
+// Rules from `labels` or `range` (and `ranges` if each may become its own label); empty without these keys.
 std::vector<voxel::LabelRule> read_label_rules(const TableReader& table, bool keep_labels);
-// Which one of the keys names the source; exactly one must.
+// The key that names the source; exactly one must be present.
 std::string_view source_key(const TableReader& table, std::span<const std::string_view> keys);
 
 }  // namespace hybrid

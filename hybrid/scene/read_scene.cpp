@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A scene file into a Scene: the tables that stand once, and what concerns several tables at a time.
+// Reads a scene file into a Scene: tables that occur once, and checks that involve several tables.
 #include <unistd.h>
 
 #include <algorithm>
@@ -9,30 +9,30 @@
 #include <new>
 #include <set>
 
+#include "hybrid/scene/read_path.h"
+#include "hybrid/scene/read_rigid.h"
 #include "hybrid/scene/scene.h"
 #include "hybrid/scene/table_reader.h"
-#include "hybrid/scene/read_rigid.h"
-#include "hybrid/scene/read_path.h"
 #include "hybrid/scene/toml_tree.h"
 
 namespace hybrid {
 namespace {
 
-constexpr LaterKey material_later[] = {
+constexpr UnsupportedKey material_later[] = {
     {"elastic", "remove it: every material is elastic up to its yield"},
     {"plastic", "say from which strain on: yield = 0.2"},
     {"damping", "remove it: tissue is quasi-static for now"},
     {"density", "remove it: tissue has no mass here"},
 };
-constexpr LaterKey device_later[] = {
+constexpr UnsupportedKey device_later[] = {
     {"delay", "say it in ticks: delay_ticks = 1"},
     {"watchdog", "say it in ms: watchdog_ms = 20"},
 };
-constexpr LaterKey models_later[] = {
+constexpr UnsupportedKey models_later[] = {
     {"mouse", "use model = \"ideal\" and a [path]"},
     {"replay", "use [path] kind = \"csv\" to follow a recorded motion"},
 };
-constexpr LaterKey tool_later[] = {
+constexpr UnsupportedKey tool_later[] = {
     {"damping", "remove it: the coupling has no damping for now"},
     {"friction", "remove it: all surfaces are smooth for now"},
 };
@@ -74,7 +74,7 @@ const std::vector<TreeNode>& object_tables(const TableReader& root, std::string_
   return entry->value.items;
 }
 
-// A table that stands once; calls `read` with it when it is there.
+// Reads a table that occurs once: calls `read` with it if it is present.
 template <typename Read>
 void read_once(const TableReader& root, std::string_view key, const Read& read) {
   const TreeEntry* entry = root.find(key);
@@ -239,8 +239,9 @@ Material read_material(const TableReader& table) {
     table.refuse("energy", words(table.what(), " has both a yield and the trilinear energy"),
                  "take one of them away: what yields is of links");
   }
-  // Rows of voxels that are rigid one way and free the other: relaxation moves voxels and blocks of them, and
-  // neither can move without breaking the row, so such tissue would stay as it was pressed.
+  // Rows of voxels that are rigid along one axis and free along another are refused. Relaxation moves voxels
+  // and blocks of them, and neither can move without breaking such a row, so the tissue would stay as it was
+  // pressed.
   const bool stretches = out.stretch_max > out.stretch_min, slips = out.shear > 0.0;
   if (stretches != slips) {
     table.refuse(
@@ -298,7 +299,7 @@ void check_names(const SceneSource& source, const Scene& scene) {
   for (const SoftDescription& soft : scene.soft) take(soft.name, soft.place);
 }
 
-// Held by rigid objects alone, and there is none to hold it.
+// Its anchors are near rigid objects only, and there are none.
 void check_anchors(const TableReader& table, const Scene& scene, const SoftDescription& soft) {
   const bool only_by_rigid = soft.anchors.faces.empty() && soft.anchors.labels.empty();
   if (!only_by_rigid || !scene.rigid.empty()) return;
@@ -309,7 +310,7 @@ void check_anchors(const TableReader& table, const Scene& scene, const SoftDescr
                "add a face or a label to its anchors, or a [[rigid]] object");
 }
 
-// A voxel is felt by the ball that it is in; a point is in none.
+// The tool must be large enough to touch a voxel: voxels are felt as balls, and a point touches none.
 void check_point_tool(const SceneSource& source, const Scene& scene, SourcePlace place) {
   if (scene.tool.radius_m > 0.0 || scene.soft.empty()) return;
   source.refuse(place, "a tool of radius 0 is a point, which cannot press soft objects",
@@ -398,7 +399,7 @@ SceneError::SceneError(const std::filesystem::path& file, SourcePlace place,
 
 std::size_t max_lattice_voxels() {
   const long pages = sysconf(_SC_PHYS_PAGES), page_bytes = sysconf(_SC_PAGESIZE);
-  // A system that does not say gets what the smallest machine of today has.
+  // If the system does not report its memory, assume that of the smallest machine of today.
   const double bytes = pages > 0 && page_bytes > 0
                            ? static_cast<double>(pages) * static_cast<double>(page_bytes)
                            : 4.0 * 1024 * 1024 * 1024;

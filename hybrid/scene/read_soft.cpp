@@ -10,19 +10,19 @@
 namespace hybrid {
 namespace {
 
-constexpr LaterKey soft_later[] = {
+constexpr UnsupportedKey soft_later[] = {
     {"sweeps", "remove it; budget = N bounds the work of a tick"},
     {"friction", "remove it: soft surfaces are smooth for now"},
     {"damping", "remove it: soft contact is quasi-static for now"},
     {"motion", "remove it: a soft object stays where position and rotation put it"},
 };
 
-constexpr LaterKey energies_later[] = {
+constexpr UnsupportedKey energies_later[] = {
     {"eighteen-link", "write energy = \"trilinear\", which is as accurate"},
     {"18-link", "write energy = \"trilinear\", which is as accurate"},
 };
 
-// Most voxels along one axis: indices stay far inside an int, and a row inside a cache.
+// Largest number of voxels along one axis: indices stay far inside an int, and a row inside a cache.
 constexpr double most_voxels_per_axis = 100'000.0;
 
 voxel::Layer read_layer(const TableReader& table) {
@@ -127,7 +127,7 @@ VolumeSource read_volume(const TableReader& table) {
   return out;
 }
 
-// The labels an object is known to have; empty when only the volume file can tell.
+// The labels that an object is known to have; empty if only the volume file can tell.
 std::set<int> known_labels(const SoftSource& source) {
   std::set<int> labels;
   if (const auto* formula = std::get_if<voxel::Formula>(&source)) {
@@ -178,11 +178,11 @@ Anchors read_anchors(const TableReader& soft, const std::set<int>& known) {
   if (!soft.has("anchors")) return out;
   const TableReader table = soft.table("anchors");
   table.allow(keys);
-  out.faces.clear();  // who names anchors names all of them
+  out.faces.clear();  // named anchors replace the default
   const TreeEntry* listed_faces = table.find("faces");
   const bool no_faces =
       listed_faces != nullptr && listed_faces->value.kind == TreeNode::Kind::array &&
-      listed_faces->value.items.empty();  // said out loud, and reported below when it matters
+      listed_faces->value.items.empty();  // an explicit empty list; reported below if it matters
   if (listed_faces != nullptr && !no_faces) {
     for (const TreeNode& face : table.list("faces", "[\"-z\"]").items) {
       if (face.kind != TreeNode::Kind::string ||

@@ -10,7 +10,7 @@
 namespace hybrid {
 namespace {
 
-// Sizes between an atom and a planet, so that no product of three of them leaves the range of a double.
+// Sizes between an atom and a planet, so that a product of three stays within the range of a double.
 constexpr double smallest_size_m = 1e-9;
 constexpr double largest_length_m = 1e9;
 
@@ -97,11 +97,11 @@ TableReader::TableReader(const SceneSource& source, const TreeNode& table, Sourc
   }
 }
 
-void TableReader::allow(std::span<const std::string_view> keys, std::span<const LaterKey> later,
+void TableReader::allow(std::span<const std::string_view> keys, std::span<const UnsupportedKey> later,
                         std::span<const std::string_view> elsewhere, std::string_view condition) const {
   for (const TreeEntry& entry : table_.entries) {
     if (contains(keys, entry.key)) continue;
-    const auto is_later = [&entry](const LaterKey& key) { return key.name == entry.key; };
+    const auto is_later = [&entry](const UnsupportedKey& key) { return key.name == entry.key; };
     if (const auto found = std::find_if(later.begin(), later.end(), is_later); found != later.end()) {
       source_.refuse(entry.place, words(in_quotes(entry.key), " in ", what_, " is not supported yet"),
                      std::string(found->meanwhile));
@@ -152,7 +152,7 @@ double TableReader::number_at(const TreeNode& node, SourcePlace place, const std
                               const Quantity& quantity) const {
   if (!is_number(node)) wrong_type(place, name, node.kind, quantity.what, quantity.example);
   const double value = node.number * quantity.scale;
-  // Written so that what is not a number is refused too.
+  // Written so that NaN is refused too.
   if (!(value >= quantity.lower && value <= quantity.upper)) {
     const std::string bounds = words(" (", in_words(quantity.lower / quantity.scale), " to ",
                                      in_words(quantity.upper / quantity.scale), ")");
@@ -242,13 +242,14 @@ std::string TableReader::text(std::string_view key, std::string_view example) co
 }
 
 std::size_t TableReader::choice(std::string_view key, std::span<const std::string_view> options,
-                                std::optional<std::size_t> fallback, std::span<const LaterKey> later) const {
+                                std::optional<std::size_t> fallback,
+                                std::span<const UnsupportedKey> later) const {
   if (fallback && !has(key)) return *fallback;
   const std::string value = text(key, options.front());
   const auto found = std::find(options.begin(), options.end(), value);
   if (found != options.end()) return static_cast<std::size_t>(found - options.begin());
   const std::string said = words(key, " = \"", printable(value, 60), "\" in ", what_);
-  for (const LaterKey& option : later) {
+  for (const UnsupportedKey& option : later) {
     if (option.name == value)
       refuse(key, words(said, " is not supported yet"), std::string(option.meanwhile));
   }

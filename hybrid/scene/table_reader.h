@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reading the keys of one table of a scene file: types, units, bounds and unknown keys, every refusal with
-// its place.
+// Reads the keys of one table of a scene file: types, units, bounds and unknown keys. Every refusal names its
+// place.
 #pragma once
 
 #include <cstddef>
@@ -17,15 +17,15 @@
 
 namespace hybrid {
 
-// What a number must be. Bounds are inclusive and in SI, after `scale`.
+// Requirements on a number. Bounds are inclusive and in SI, after `scale`.
 struct Quantity {
   std::string what;     // "a length above 0, in mm"
-  std::string example;  // as it may stand in the file
+  std::string example;  // an example for the message
   double scale = 1.0;   // file unit to SI
   double lower = 0.0, upper = 0.0;
 };
 
-// What holds for the whole file while it is read.
+// Properties of the whole file during reading.
 struct SceneSource {
   std::filesystem::path file;
   double unit_m = 1e-3;
@@ -38,15 +38,15 @@ struct SceneSource {
   [[nodiscard]] Quantity speed() const;     // above 0, lengths a second
 };
 
-// A key or a value whose part of the program comes later.
-struct LaterKey {
+// A key or a value that is not supported yet.
+struct UnsupportedKey {
   std::string_view name;
   std::string_view meanwhile;  // what to do until then
 };
 
-// Optimal string alignment distance (a swap of neighbours is one edit), capitals ignored.
+// Optimal string alignment distance (a swap of neighbours is one edit), ignoring case.
 std::size_t edit_distance(std::string_view a, std::string_view b);
-// The candidate with the least distance; the first of equals. Empty when there are none.
+// The candidate with the smallest distance, the first of equals; empty if there are none.
 std::string_view nearest_name(std::string_view name, std::span<const std::string_view> candidates);
 std::string joined(std::span<const std::string_view> names);
 
@@ -55,10 +55,10 @@ class TableReader {
   // `what` names the table in messages: "[tool]", "[[soft]] 'brain'".
   TableReader(const SceneSource& source, const TreeNode& table, SourcePlace place, std::string what);
 
-  // Refuses every key that is neither in `keys` nor in `elsewhere`, keys of `later` with their own words,
-  // and keys of `elsewhere` as not used with `condition`. Called first, so that a misspelt key
-  // is reported as that and not as a missing one.
-  void allow(std::span<const std::string_view> keys, std::span<const LaterKey> later = {},
+  // Refuses every key that is neither in `keys` nor in `elsewhere`. Keys of `later` get their own message,
+  // and keys of `elsewhere` are reported as unused with `condition`. Call it first, so that a misspelt key is
+  // reported as such and not as a missing one.
+  void allow(std::span<const std::string_view> keys, std::span<const UnsupportedKey> later = {},
              std::span<const std::string_view> elsewhere = {}, std::string_view condition = {}) const;
 
   [[nodiscard]] const TreeEntry* find(std::string_view key) const;
@@ -66,12 +66,12 @@ class TableReader {
   [[nodiscard]] bool has(std::string_view key) const { return find(key) != nullptr; }
   [[nodiscard]] const TreeEntry& require(std::string_view key, std::string_view example) const;
   [[nodiscard]] SourcePlace place() const { return place_; }
-  [[nodiscard]] SourcePlace place_of(std::string_view key) const;  // of the table when the key is absent
+  [[nodiscard]] SourcePlace place_of(std::string_view key) const;  // place of the table if the key is absent
   [[nodiscard]] const std::string& what() const { return what_; }
   [[nodiscard]] const SceneSource& source() const { return source_; }
   [[noreturn]] void refuse(std::string_view key, const std::string& what, const std::string& remedy) const;
 
-  // Each of these takes its fallback when the key is absent; without one the key is required.
+  // Each of these returns its fallback if the key is absent; without a fallback the key is required.
   [[nodiscard]] double number(std::string_view key, const Quantity& quantity,
                               std::optional<double> fallback = {}) const;
   [[nodiscard]] glm::dvec3 vector(std::string_view key, const Quantity& quantity,
@@ -86,13 +86,13 @@ class TableReader {
   // The index of the option that the key names.
   [[nodiscard]] std::size_t choice(std::string_view key, std::span<const std::string_view> options,
                                    std::optional<std::size_t> fallback = {},
-                                   std::span<const LaterKey> later = {}) const;
+                                   std::span<const UnsupportedKey> later = {}) const;
   // A length unit by its name, in meters.
   [[nodiscard]] double unit(std::string_view key, double fallback_m) const;
-  // A file that exists, resolved against the scene's folder; a folder too where one may stand (DICOM).
+  // A file that exists, resolved against the scene's folder; also a folder if `may_be_folder` (DICOM).
   [[nodiscard]] std::filesystem::path file(std::string_view key, bool may_be_folder) const;
 
-  // A list (not empty), and its items as tables, vectors, whole numbers.
+  // A list (not empty), and its items as tables, vectors or whole numbers.
   [[nodiscard]] const TreeNode& list(std::string_view key, std::string_view example) const;
   [[nodiscard]] TableReader table(std::string_view key) const;
   [[nodiscard]] std::vector<TableReader> tables(std::string_view key, std::string_view example) const;
@@ -101,7 +101,7 @@ class TableReader {
   // [lower, upper] of plain numbers, lower <= upper.
   [[nodiscard]] std::pair<double, double> range(std::string_view key) const;
 
-  // A number that stands at `node`, which messages call `name`.
+  // The number at `node`, which messages call `name`.
   [[nodiscard]] double number_at(const TreeNode& node, SourcePlace place, const std::string& name,
                                  const Quantity& quantity) const;
 

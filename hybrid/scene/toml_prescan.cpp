@@ -15,8 +15,8 @@ bool is_blank(char c) {
   return c == ' ' || (c >= '\t' && c <= '\r');
 }
 
-// Walks over strings and comments as TOML 1.0 delimits them, and looks at the rest. Where the text is no TOML
-// the walk may differ from the parser's, but only behind the place where the parser stops.
+// Scans over strings and comments as TOML 1.0 delimits them, and examines the rest. If the text is no valid
+// TOML the scan may differ from the parser's, but only after the place where the parser stops.
 class Screen {
  public:
   Screen(std::string_view text, const std::filesystem::path& file) : text_(text), file_(file) {}
@@ -65,7 +65,8 @@ class Screen {
     }
   }
 
-  // Behind a backslash. At the end of a line of a long string it takes all blanks up to the next character.
+  // After a backslash. At the end of a line of a multi-line string it skips all blanks up to the next
+  // character.
   void skip_escape(bool is_long) {
     const std::size_t start = at_;
     while (is_long && at_ < text_.size() && is_blank(text_[at_])) ++at_;
@@ -112,12 +113,12 @@ SourcePlace place_in_text(std::string_view text, std::size_t at) {
   const std::string_view line = last == std::string_view::npos ? before : before.substr(last + 1);
   const auto is_first = [](char c) {
     return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U;
-  };  // byte of a character
+  };  // continuation byte of a character
   return {static_cast<std::uint32_t>(1 + std::count(before.begin(), before.end(), '\n')),
           static_cast<std::uint32_t>(1 + std::count_if(line.begin(), line.end(), is_first))};
 }
 
-void screen_scene_text(std::string_view text, const std::filesystem::path& file) {
+void prescan_scene_text(std::string_view text, const std::filesystem::path& file) {
   if (text.empty()) {
     throw SceneError(file, {1, 1},
                      "the file is empty; a scene begins with format = 1 (see scenes/README.md)");

@@ -11,9 +11,8 @@
 
 #include "hybrid/scene/toml_prescan.h"
 
-// toml++ 3.3 asserts on some malformed files where it should report (a header "[=" for one), and without
-// asserts takes the condition for granted, which is undefined behaviour. Here a failed one is an error of the
-// file.
+// On some malformed files (a header "[=" for one) toml++ 3.3 asserts instead of reporting, and has undefined
+// behaviour without asserts. Here a failed assertion becomes an error of the file.
 namespace {
 struct ParserGaveUp {};
 [[noreturn]] void give_up() {
@@ -22,8 +21,8 @@ struct ParserGaveUp {};
 }  // namespace
 #undef NDEBUG
 #define TOML_ASSERT(expr) (static_cast<bool>(expr) ? static_cast<void>(0) : give_up())
-// Together with most_key_parts this keeps the recursion of parser, conversion and destructors shallow
-// enough for any stack: at most this many values nested, each behind a dotted key of at most so many parts.
+// Bounds the nesting of values; together with most_key_parts it keeps the recursion of parser, conversion and
+// destructors shallow enough for any stack.
 #define TOML_MAX_NESTED_VALUES 32
 #define TOML_HEADER_ONLY 1
 #define TOML_ENABLE_FORMATTERS 0
@@ -83,7 +82,7 @@ std::string remedy_for(std::string_view description) {
   return "correct the TOML there: one key = value a line, text in \"quotes\", lists in [brackets]";
 }
 
-// The parser's own words, without what only its authors can use.
+// The parser's message, without the parts that concern its authors alone.
 std::string_view said_by(std::string_view description) {
   if (description.starts_with("Error while parsing ")) {
     const std::size_t colon = description.find(": ");
@@ -103,8 +102,7 @@ bool parser_gives_up(std::string_view text) {
   return false;
 }
 
-// The parser reads from front to back, so the shortest beginning of the text on which it gives up ends with
-// the culprit.
+// The parser reads from front to back, so the shortest prefix of the text that fails ends with the culprit.
 SourcePlace where_parser_gives_up(std::string_view text) {
   std::size_t good = 0, bad = text.size();
   while (bad - good > 1) {
@@ -176,7 +174,7 @@ std::string in_quotes(std::string_view name) {
 }
 
 TreeNode parse_tree(std::string_view text, const std::filesystem::path& file) {
-  screen_scene_text(text, file);
+  prescan_scene_text(text, file);
   try {
     const toml::table table = toml::parse(text);
     return convert(table);

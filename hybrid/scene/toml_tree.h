@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The text of a scene file as a tree of values that know where they stand. Nothing else of the project sees
-// the TOML parser: the rest reads this tree, in the order of the file.
+// The text of a scene file as a tree of values with their places. The TOML parser is hidden behind it: all
+// other code reads this tree, in the order of the file.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ struct TreeEntry;
 
 struct TreeNode {
   enum class Kind : std::uint8_t { table, array, string, integer, real, boolean, date } kind = Kind::table;
-  SourcePlace place;               // of the value; of a [table]: its header
+  SourcePlace place;               // of the value; for a [table] of its header
   std::string text;                // string
   double number = 0.0;             // integer and real; may be infinite or not a number
   std::int64_t integer = 0;        // integer
@@ -33,20 +33,20 @@ struct TreeEntry {
   TreeNode value;
 };
 
-// What a value is, for a message: "a string", "a table", ...
+// The kind of a value for a message: "a string", "a table", ...
 std::string_view kind_in_words(TreeNode::Kind kind);
 
-// Text made safe to print on one line: control characters and bytes outside ASCII that are not UTF-8 become
-// '?', and what is longer than `longest` bytes is cut.
+// Text made safe to print on one line: control characters and invalid UTF-8 bytes become '?', and text longer
+// than `longest` bytes is cut.
 std::string printable(std::string_view text, std::size_t longest = 200);
 
-// A name of the file for a message: printable, short, in 'quotes'.
+// A name from the file for a message: printable, short, in 'quotes'.
 std::string in_quotes(std::string_view name);
 
-// A number as a person would write it, at most 6 digits.
+// A number in everyday notation, at most 6 digits.
 std::string in_words(double number);
 
-// The parts of a message one after the other: text as it is, numbers in words.
+// Concatenates the parts of a message: text as it is, numbers in words.
 template <typename... Parts>
 std::string words(const Parts&... parts) {
   std::string out;
@@ -66,7 +66,7 @@ std::string words(const Parts&... parts) {
 // Reads and parses a file. Throws SceneError: missing, a folder, too large, empty, not UTF-8, not TOML.
 TreeNode read_tree(const std::filesystem::path& file);
 
-// The same from text already read; `file` only names it in messages.
+// The same for text in memory; `file` is used in messages only.
 TreeNode parse_tree(std::string_view text, const std::filesystem::path& file);
 
 }  // namespace hybrid

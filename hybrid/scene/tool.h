@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the hand touches with.
+// The shape and coupling of the tool.
 #pragma once
 
 #include <cstdint>

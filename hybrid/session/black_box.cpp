@@ -18,14 +18,14 @@
 namespace hybrid {
 namespace {
 
-constexpr double kAfter = 0.25;            // of the ring
-constexpr std::size_t kLongestRow = 1024;  // characters; 30 numbers of at most 24 fit
+constexpr double kShareAfterFault = 0.25;  // share of the ring
+constexpr std::size_t kLongestRow = 1024;  // characters; holds 30 numbers of at most 24
 
-constexpr std::array<std::string_view, 7> kSaid{
+constexpr std::array<std::string_view, 7> kFaultWords{
     "none", "lost", "not_calibrated", "warm_motors", "force_limit", "velocity_limit", "late"};
 
 std::string_view word(device::DeviceFault fault) noexcept {
-  return kSaid[std::min(static_cast<std::size_t>(fault), kSaid.size() - 1)];
+  return kFaultWords[std::min(static_cast<std::size_t>(fault), kFaultWords.size() - 1)];
 }
 
 bool write_all(int descriptor, std::string_view text) noexcept {
@@ -37,7 +37,7 @@ bool write_all(int descriptor, std::string_view text) noexcept {
   return true;
 }
 
-// Appends to a row of fixed room, without a locale and without memory.
+// Appends to a row of fixed capacity, without locale or allocation.
 class Row {
  public:
   template <typename T>
@@ -53,7 +53,7 @@ class Row {
     for (int d = 0; d < 3; ++d) add(v[d]);
   }
   [[nodiscard]] std::string_view line() noexcept {
-    end_[-1] = '\n';  // in place of the last comma
+    end_[-1] = '\n';  // replaces the last comma
     return {text_.data(), static_cast<std::size_t>(end_ - text_.data())};
   }
 
@@ -74,10 +74,10 @@ bool write_file(const BlackBox& box, const char* file) noexcept {
 BlackBox::BlackBox(double rate_hz)
     : dt_s_(1.0 / rate_hz),
       rows_(static_cast<std::size_t>(std::ceil(kSeconds * rate_hz))),
-      left_(static_cast<std::uint64_t>(kAfter * static_cast<double>(rows_.size()))) {}
+      left_(static_cast<std::uint64_t>(kShareAfterFault * static_cast<double>(rows_.size()))) {}
 
 BlackBox::Cause BlackBox::cause_of(const BlackBoxRow& row) const noexcept {
-  if (row.said != device::DeviceFault::none) return Cause::device;
+  if (row.reported != device::DeviceFault::none) return Cause::device;
   if (row.nonfinite > nonfinite_) return Cause::nonfinite;
   return (row.faults & ~faults_) != 0 ? Cause::tick : Cause::none;
 }
@@ -106,7 +106,7 @@ std::optional<std::string> BlackBox::fault() const {
     case Cause::none:
       break;
     case Cause::device:
-      return fmt::format("the device said '{}' at {:.3f} s", word(at_fault_.said), t_s);
+      return fmt::format("the device said '{}' at {:.3f} s", word(at_fault_.reported), t_s);
     case Cause::nonfinite:
       return fmt::format("a number that is none was held back at {:.3f} s", t_s);
     case Cause::tick:
@@ -130,11 +130,11 @@ bool BlackBox::write_to(int descriptor) const noexcept {
     const BlackBoxRow& r = rows_[n % rows_.size()];
     Row row;
     row.add(static_cast<double>(r.tick) * dt_s_);
-    for (const glm::dvec3& v : {r.felt.device_m, r.said_m, r.felt.proxy_m, r.felt.force_N}) row.add(v);
+    for (const glm::dvec3& v : {r.felt.device_m, r.reported_m, r.felt.proxy_m, r.felt.force_N}) row.add(v);
     row.add(glm::length(r.felt.rigid_N));
     row.add(glm::length(r.felt.soft_N));
     row.add(r.felt.contacts);
-    row.add(word(r.said));
+    row.add(word(r.reported));
     row.add(r.faults);
     row.add(r.nonfinite);
     row.add(r.late_us);
@@ -145,15 +145,15 @@ bool BlackBox::write_to(int descriptor) const noexcept {
   return written;
 }
 
-KeptBox::KeptBox(double rate_hz, std::filesystem::path file)
+BlackBoxFile::BlackBoxFile(double rate_hz, std::filesystem::path file)
     : box_(rate_hz), file_(std::move(file)), on_crash_(save_now, this) {}
 
-void KeptBox::save_now(void* self) noexcept {
-  const auto* const me = static_cast<const KeptBox*>(self);
+void BlackBoxFile::save_now(void* self) noexcept {
+  const auto* const me = static_cast<const BlackBoxFile*>(self);
   write_file(me->box_, me->file_.c_str());
 }
 
-std::string KeptBox::save_on_fault() const {
+std::string BlackBoxFile::save_on_fault() const {
   const std::optional<std::string> fault = box_.fault();
   if (!fault) return {};
   if (!write_file(box_, file_.c_str()))
@@ -162,10 +162,11 @@ std::string KeptBox::save_on_fault() const {
   return fmt::format("{}; the {:g} s around it are in {}", *fault, BlackBox::kSeconds, file_.string());
 }
 
-std::unique_ptr<KeptBox> keep_box(const std::filesystem::path& asked, const std::filesystem::path& scene,
-                                  bool live, double rate_hz) {
+std::unique_ptr<BlackBoxFile> open_black_box_file(const std::filesystem::path& asked,
+                                                  const std::filesystem::path& scene, bool live,
+                                                  double rate_hz) {
   if (asked.empty() && !live) return nullptr;
-  return std::make_unique<KeptBox>(
+  return std::make_unique<BlackBoxFile>(
       rate_hz, asked.empty() ? std::filesystem::path(scene.stem().string() + "-fault.csv") : asked);
 }
 

@@ -17,9 +17,9 @@ namespace hybrid {
 
 // One tick: the input of the device, and the answer.
 struct BlackBoxRow {
-  std::uint64_t tick = 0;  // of the session
-  glm::dvec3 said_m{0.0};  // position that the device reported, valid or not; scene frame
-  device::DeviceFault said = device::DeviceFault::none;
+  std::uint64_t tick = 0;      // of the session
+  glm::dvec3 reported_m{0.0};  // position that the device reported, valid or not; scene frame
+  device::DeviceFault reported = device::DeviceFault::none;
   std::uint32_t faults = 0;     // FaultBit, of the session so far
   std::uint64_t nonfinite = 0;  // inputs and forces held back so far
   float late_us = 0.0F;         // how late the machine woke the loop
@@ -59,9 +59,9 @@ class BlackBox {
 };
 
 // A black box and its file. A crash writes it from the signal handler, a fault at the end of the session.
-class KeptBox {
+class BlackBoxFile {
  public:
-  KeptBox(double rate_hz, std::filesystem::path file);
+  BlackBoxFile(double rate_hz, std::filesystem::path file);
 
   [[nodiscard]] BlackBox& box() { return box_; }
   // After a fault writes the file and returns its name; empty without a fault.
@@ -77,7 +77,8 @@ class KeptBox {
 
 // The file of a session that cannot be run again: `asked`, or SCENE-fault.csv in the current folder when
 // `asked` is empty and the session is `live`. None for a session that can be run again.
-std::unique_ptr<KeptBox> keep_box(const std::filesystem::path& asked, const std::filesystem::path& scene,
-                                  bool live, double rate_hz);
+std::unique_ptr<BlackBoxFile> open_black_box_file(const std::filesystem::path& asked,
+                                                  const std::filesystem::path& scene, bool live,
+                                                  double rate_hz);
 
 }  // namespace hybrid

@@ -9,9 +9,9 @@
 namespace hybrid {
 namespace {
 
-constexpr double kExact = 1.0;  // spacings: what a voxel's half-space says beyond this is near enough
+constexpr double kExactWithin = 1.0;  // spacings; beyond this the half-space's distance is exact enough
 
-// Of the ball of a voxel, by the surfaces themselves.
+// Distance from a voxel's ball to the rigid surfaces themselves, at most `range_m`.
 double rigid_gap(const World& world, const WorldState& state, const glm::dvec3& at, double radius_m,
                  double range_m) noexcept {
   double gap = range_m;
@@ -37,14 +37,14 @@ Clearance clearance(const World& world, const WorldState& state) noexcept {
     const voxel::SoftObject& object = *state.soft[o];
     const auto surface = object.lattice().surface();
     const auto obstacles = object.obstacles();
-    const double exact_m = kExact * object.lattice().max_spacing_m();
+    const double exact_m = kExactWithin * object.lattice().max_spacing_m();
     for (std::size_t s = 0; s < surface.size() && s < obstacles.size(); ++s) {
       const voxel::Obstacle& obstacle = obstacles[s];
       if (obstacle.normal == glm::vec3(0.0F) || object.lattice().anchored(surface[s])) continue;
-      const double room = glm::dot(glm::dvec3(obstacle.normal), object.state().at(surface[s])) -
-                          static_cast<double>(obstacle.bound);
-      if (room > exact_m) {
-        rigid = std::min(rigid, room);
+      const double bound_gap = glm::dot(glm::dvec3(obstacle.normal), object.state().at(surface[s])) -
+                               static_cast<double>(obstacle.bound);
+      if (bound_gap > exact_m) {
+        rigid = std::min(rigid, bound_gap);
       } else {
         rigid = std::min(rigid, rigid_gap(world, state, world.soft[o].to_scene(object.position(surface[s])),
                                           object.voxel_radius(), exact_m));
@@ -56,10 +56,10 @@ Clearance clearance(const World& world, const WorldState& state) noexcept {
     soft = std::min(soft, voxel::gap_of_pair({*state.soft[a], world.soft[a].pose},
                                              {*state.soft[b], world.soft[b].pose}, pair.pressed));
   }
-  const auto or_nothing = [](double gap) {
+  const auto nan_if_infinite = [](double gap) {
     return std::isfinite(gap) ? gap : std::numeric_limits<double>::quiet_NaN();
   };
-  return {or_nothing(rigid), or_nothing(soft)};
+  return {nan_if_infinite(rigid), nan_if_infinite(soft)};
 }
 
 }  // namespace hybrid

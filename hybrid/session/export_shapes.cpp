@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A soft object as a volume in its own frame, slice by slice.
+// A soft object as a volume in the frame of its source, slice by slice.
 class SoftSlices {
  public:
   SoftSlices(const SoftBody& body, const Pose& pose, const voxel::SoftObject& object) : object_(object) {
@@ -39,7 +39,7 @@ class SoftSlices {
   void labels(int k, std::span<std::uint8_t> out) const {
     for_each(k, [&](std::size_t n, voxel::VoxelId v) { out[n] = label_[object_.lattice().label(v)]; });
   }
-  // Along the axes of the volume; 0 where there is no tissue. (unit: meter)
+  // Displacement along the volume's axes (unit: meter); 0 where there is no tissue.
   void displacement(int k, std::span<glm::vec3> out) const {
     for_each(k, [&](std::size_t n, voxel::VoxelId v) {
       out[n] = object_.lattice().filled(v) ? glm::vec3(object_.displacement(v)) : glm::vec3(0.0F);
@@ -57,7 +57,7 @@ class SoftSlices {
 
   const voxel::SoftObject& object_;
   voxel::VolumeFrame frame_;
-  std::array<std::uint8_t, 256> label_{};  // as the object's source has it
+  std::array<std::uint8_t, 256> label_{};  // label in the source of each lattice label
 };
 
 std::string as_file_name(std::string name) {

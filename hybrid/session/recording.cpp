@@ -16,10 +16,9 @@
 namespace hybrid {
 namespace {
 
-// Layout, little-endian: magic, sizes of path and text, tick count, dt, the device's greatest force,
-// resolution and friction, whether soft objects are relaxed apart, state hash, where the device was before
-// the first tick, path, text, ticks of (x, y, z, hash, fault of the device, share of the contact's work,
-// results of relaxation taken).
+// Layout, little-endian: magic, sizes of path and text, number of ticks, dt, the device's force limit,
+// resolution and friction, flag for asynchronous relaxation, state hash, device position before the first
+// tick, path, text, ticks. A tick: x, y, z, hash, device fault, work share, arrived asynchronous results.
 constexpr std::array<char, 8> kMagic{'h', 'y', 'b', 'r', 'i', 'd', 'R', '4'};
 struct Header {
   std::array<char, 8> magic;
@@ -90,7 +89,7 @@ Recording load_recording(const std::filesystem::path& file) {
         "{}: not a recording of this version; record the session again with `hybrid run --record`",
         file.string()));
   }
-  // Each size is checked alone first, so that their sum cannot wrap.
+  // Each size is checked by itself first, so that the sum cannot wrap.
   const bool sane =
       header.path_bytes <= size && header.text_bytes <= size && header.ticks <= size / sizeof(Tick) &&
       sizeof header + header.path_bytes + header.text_bytes + header.ticks * sizeof(Tick) == size &&
@@ -129,7 +128,7 @@ Recording load_recording(const std::filesystem::path& file) {
 }
 
 ReplayResult replay(const Recording& recording, const Progress& progress) {
-  flush_denormals();
+  set_flush_to_zero();
   if (read_text(recording.scene_file) != recording.scene_text) {
     throw std::runtime_error(
         fmt::format("{}: the scene is not what was recorded (changed or moved); put the recorded text back, "
@@ -137,13 +136,13 @@ ReplayResult replay(const Recording& recording, const Progress& progress) {
                     recording.scene_file.string()));
   }
   Scene scene = load_scene(recording.scene_file);
-  scene.opened_limits = recording.device;  // it may have been felt with one that is not here now
-  if (1.0 / scene.rate_hz != recording.dt_s) scene.rate_hz = 1.0 / recording.dt_s;  // its driver's
+  scene.opened_limits = recording.device;  // the recording device may not be connected now
+  if (1.0 / scene.rate_hz != recording.dt_s) scene.rate_hz = 1.0 / recording.dt_s;  // the driver's rate
   const BuiltScene built = build_scene(scene, progress);
   ReplayResult result;
   result.ticks = recording.ticks.size();
   result.equal = true;
-  result.parts_at = result.ticks;
+  result.first_difference = result.ticks;
   if (recording.ticks.empty()) return result;
   begin_session(scene, *built.world, *built.state, recording.start_m);
   if (recording.async_relaxation) start_async_relaxation(*built.state, Arrival::recorded);
@@ -151,11 +150,11 @@ ReplayResult replay(const Recording& recording, const Progress& progress) {
   for (std::size_t n = 0; n < recording.ticks.size(); ++n) {
     const device::DeviceState input{.position_m = recording.ticks[n].device_m,
                                     .fault = recording.ticks[n].fault};
-    play_again(recording.ticks[n], *built.state);
+    restore_tick_timing(recording.ticks[n], *built.state);
     hash = hash_tick(hash, haptic_tick(*built.world, *built.state, input, recording.dt_s));
     if (hash == recording.ticks[n].hash || !result.equal) continue;
     result.equal = false;
-    result.parts_at = n;
+    result.first_difference = n;
   }
   result.state_hash = hash_state(hash, *built.state);
   result.equal = result.equal && result.state_hash == recording.state_hash;

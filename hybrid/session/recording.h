@@ -30,7 +30,7 @@ Recording load_recording(const std::filesystem::path& file);
 struct ReplayResult {
   std::uint64_t ticks = 0, state_hash = 0;
   bool equal = false;
-  std::uint64_t parts_at =
+  std::uint64_t first_difference =
       0;  // first tick whose hash differs; the number of ticks when only the final hash differs
 };
 

@@ -31,7 +31,7 @@ bool RelaxationThread::relax_submitted() noexcept {
   return any;
 }
 
-// Of its own state, which the tick never writes.
+// Reads only the thread's own state, which the tick never writes.
 void RelaxationThread::publish_surfaces() {
   MovedSurfaces& moved = surfaces_.back();
   moved.resize(world_.object_count());
@@ -49,12 +49,12 @@ void RelaxationThread::publish_surfaces() {
 
 void take_ordinary_priority() noexcept {
   const sched_param none{};
-  (void)sched_setscheduler(0, SCHED_OTHER, &none);  // giving up a right is never refused
+  (void)sched_setscheduler(0, SCHED_OTHER, &none);  // lowering the priority is always permitted
 }
 
 void RelaxationThread::run() {
   take_ordinary_priority();
-  flush_denormals();  // as the tick does: it is to be the same to the last bit when it is played again
+  set_flush_to_zero();  // like the tick: a replay must be equal bit by bit
   using Clock = std::chrono::steady_clock;
   Clock::time_point next = Clock::now();
   while (!stop_.load(std::memory_order_relaxed)) {

@@ -39,7 +39,7 @@ class RelaxationThread {
   const World& world_;
   AsyncRelaxation& async_;
   double surfaces_hz_;
-  HandOver<MovedSurfaces> surfaces_;
+  TripleBuffer<MovedSurfaces> surfaces_;
   std::atomic<bool> stop_{false};
   std::atomic<double> busy_s_{0.0};
   std::thread thread_;

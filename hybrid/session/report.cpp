@@ -26,8 +26,8 @@ std::string processor() {
 }
 
 struct ObjectRow {
-  std::string name, kind, motion{};  // motion: empty for what stays
-  glm::dvec3 position_m{0.0};        // of what moves, at the end
+  std::string name, kind, motion{};  // motion: empty if the object stays
+  glm::dvec3 position_m{0.0};        // of a moving object, at the end
   std::size_t triangles = 0, voxels = 0, surface_voxels = 0, memory_bytes = 0;
   std::uint64_t contact_ticks = 0;
   double max_force_N = 0.0;
@@ -60,7 +60,7 @@ std::vector<ObjectRow> object_rows(const BuiltScene& built, const SessionResult&
   return rows;
 }
 
-// What the controller took away, over the ticks in which there was a force to take from.
+// RMS of the force that the passivity controller removed, over the ticks with a force.
 double rms_taken_N(const device::PassivityState& passive) {
   return passive.felt > 0 ? std::sqrt(passive.taken_sum_N2 / static_cast<double>(passive.felt)) : 0.0;
 }
@@ -173,8 +173,8 @@ nlohmann::ordered_json run_report(const Scene& scene, const BuiltScene& built, S
         {"name", name}, {"cpu_s", cpu_s}, {"share", seconds > 0.0 ? cpu_s / seconds : 0.0}};
   };
   j["threads"] = nlohmann::ordered_json::array({thread("servo", result.servo_s)});
-  if (result.relaxed_apart > 0) j["threads"].push_back(thread("relaxation", result.relaxation_s));
-  j["relaxed_apart"] = result.relaxed_apart;
+  if (result.async_results > 0) j["threads"].push_back(thread("relaxation", result.relaxation_s));
+  j["relaxed_apart"] = result.async_results;
   if (!result.realtime_note.empty()) {
     j["realtime"] = {{"priority", result.realtime_note},
                      {"late_us", to_json(result.late_us)},
@@ -189,7 +189,7 @@ nlohmann::ordered_json run_report(const Scene& scene, const BuiltScene& built, S
   j["faults"] = fault_texts(built.state->faults);
   j["build_s"] = built.seconds;
   j["load"] = {{"seconds", built.seconds},
-               {"held_memory_bytes", built.held_bytes},
+               {"held_memory_bytes", built.resident_bytes},
                {"peak_memory_bytes", built.peak_bytes}};
   j["peak_memory_bytes"] = peak_memory_bytes();
   return j;
@@ -223,13 +223,13 @@ std::string run_summary(const BuiltScene& built, SessionResult& result) {
         "{:.4f} N\n",
         result.error.samples, result.error.max_N, result.error.max_jnd, result.error.rms_N);
   }
-  if (result.relaxed_apart > 0) {
+  if (result.async_results > 0) {
     const double seconds = static_cast<double>(result.ticks) * result.dt_s;
     text += fmt::format(
         "processor time by thread: servo {:.1f} %, relaxation {:.1f} % of the session's{}; its results were "
         "taken {} times\n",
         100.0 * result.servo_s / seconds, 100.0 * result.relaxation_s / seconds,
-        result.realtime_note.empty() ? " (simulated: one core did both in turns)" : "", result.relaxed_apart);
+        result.realtime_note.empty() ? " (simulated: one core did both in turns)" : "", result.async_results);
   }
   if (!result.realtime_note.empty()) {
     text += fmt::format(

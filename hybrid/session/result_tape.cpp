@@ -17,7 +17,7 @@ void ResultTape::hand_out(AsyncRelaxation& async) noexcept {
     if (object.phase.load(std::memory_order_acquire) != AsyncObject::Phase::thread ||
         next_[o] == found_[o].size())
       continue;
-    object.replica.find_again(found_[o][next_[o]++]);
+    object.replica.replay_result(found_[o][next_[o]++]);
     object.phase.store(AsyncObject::Phase::tick, std::memory_order_release);
   }
 }

@@ -24,29 +24,28 @@ namespace hybrid {
 namespace {
 
 constexpr double kAfterPath_s = 0.5;
-constexpr double kWithHand_s = 60.0;        // a real device has no path that ends
-constexpr std::uint64_t kMomentEvery = 20;  // ticks between two looks for a more telling moment
-constexpr std::uint64_t kClearances =
-    1000;                           // moments of a session at which it is looked how near objects are
-constexpr int kSettleTicks = 1200;  // of equilibrium_force(), and
-constexpr int kCalmTicks = 40;      // ticks over which its force may change by the tolerance
+constexpr double kWithHand_s = 60.0;         // a real device has no path that ends
+constexpr std::uint64_t kMomentEvery = 20;   // ticks between two candidates for the kept snapshot
+constexpr std::uint64_t kClearances = 1000;  // samples of the clearance in a session
+constexpr int kSettleTicks = 1200;           // most ticks of equilibrium_force()
+constexpr int kStillTicks = 40;              // ticks over which its force must stay within the tolerance
 constexpr std::uint32_t kSettleBudget = 400'000;
 
-std::uint64_t mix(std::uint64_t hash, std::uint64_t bits) noexcept {  // FNV-1a, eight bytes at a time
+std::uint64_t hash_in(std::uint64_t hash, std::uint64_t bits) noexcept {  // FNV-1a, eight bytes at a time
   return (hash ^ bits) * 0x100000001B3ULL;
 }
-std::uint64_t mix(std::uint64_t hash, const glm::dvec3& v) noexcept {
-  for (int d = 0; d < 3; ++d) hash = mix(hash, std::bit_cast<std::uint64_t>(v[d]));
+std::uint64_t hash_in(std::uint64_t hash, const glm::dvec3& v) noexcept {
+  for (int d = 0; d < 3; ++d) hash = hash_in(hash, std::bit_cast<std::uint64_t>(v[d]));
   return hash;
 }
 
-std::uint64_t mix(std::uint64_t hash, const glm::dquat& q) noexcept {
-  for (const double x : {q.w, q.x, q.y, q.z}) hash = mix(hash, std::bit_cast<std::uint64_t>(x));
+std::uint64_t hash_in(std::uint64_t hash, const glm::dquat& q) noexcept {
+  for (const double x : {q.w, q.x, q.y, q.z}) hash = hash_in(hash, std::bit_cast<std::uint64_t>(x));
   return hash;
 }
 
-// How much a moment says about the scene: different objects felt at once first, then force.
-double telling(const World& world, const WorldState& state) {
+// Score of a moment for the kept snapshot: rigid and soft contact together first, then force.
+double moment_score(const World& world, const WorldState& state) {
   double score = 0.0;
   bool rigid = false, soft = false;
   for (std::size_t o = 0; o < state.feel.size(); ++o) {
@@ -57,7 +56,7 @@ double telling(const World& world, const WorldState& state) {
   return score + (rigid && soft ? 10.0 : 0.0);
 }
 
-// A path that begins later.
+// A path that begins `later_s` later.
 class LaterPath final : public device::Path {
  public:
   LaterPath(std::shared_ptr<const device::Path> path, double later_s)
@@ -109,8 +108,8 @@ class Run {
     for (auto& column : result_.object_force_N) column.reserve(ticks_);
   }
 
-  SessionResult go() {
-    flush_denormals();
+  SessionResult run() {
+    set_flush_to_zero();
     start_clocks();
     result_.start_m = device_.read().position_m;
     begin_session(scene_, world_, state_, result_.start_m);
@@ -143,7 +142,7 @@ class Run {
     }
     if (relaxation) result_.relaxation_s = relaxation->busy_s();
     relaxation.reset();
-    result_.relaxed_apart = state_.async.results;
+    result_.async_results = state_.async.results;
     result_.end = served.end;
     result_.device_messages = std::move(served.messages);
     result_.ticks = ticks_done_;
@@ -168,14 +167,14 @@ class Run {
     state_.limit.clamped = state_.limit.slewed = state_.truncated_ticks = options_.start_ticks;
   }
 
-  // On the driver's thread where the device has one. In real time nothing may make the next tick late: no
-  // allocation (every column has its room), no look for a picture, no reference.
+  // Runs on the driver's thread if the device has one. In real time nothing may delay the next tick: no
+  // allocation (every column is reserved), no snapshot, no reference force.
   device::ServoAnswer answer(const device::ServoInput& input) {
-    const FlushedDenormals flushed;
+    const ScopedFlushToZero flushed;
     const std::uint64_t tick = ticks_done_++;
     if (follows_machine_) give_work_share(state_, work_share_.steps());
     const TickResult felt = haptic_tick(world_, state_, input.device, dt_);
-    keep(felt, tick, input.device.fault);
+    record_tick(felt, tick, input.device.fault);
     if (options_.black_box != nullptr) options_.black_box->add(black_box_row(input, felt, tick, state_));
     if (realtime_) {
       late_us_.add(input.late_s * 1e6);
@@ -183,9 +182,9 @@ class Run {
     } else {
       if (sample_every_ != 0 && result_.error.samples < options_.reference_samples)
         sample(felt, sample_every_);
-      if (options_.keep_picture && tick % kMomentEvery == 0) look(felt, tick);
+      if (options_.keep_picture && tick % kMomentEvery == 0) maybe_keep_snapshot(felt, tick);
       if (options_.keep_clearance && tick % clearance_every_ == 0) measure_clearance(tick);
-      if (options_.progress && tick % 64 == 0) say_progress(tick);
+      if (options_.progress && tick % 64 == 0) report_progress(tick);
     }
     return {.force_N = felt.force_N, .go_on = ticks_done_ < ticks_};
   }
@@ -195,18 +194,18 @@ class Run {
     result_.least_work_share = std::min(result_.least_work_share, WorkShare::share(work_share_.steps()));
     const bool pressed = std::any_of(state_.reactions.begin(), state_.reactions.end(),
                                      [](const voxel::Reaction& r) { return r.pressed > 0; });
-    work_share_.felt(tick_us, pressed);
+    work_share_.observe(tick_us, pressed);
   }
 
-  void say_progress(std::uint64_t tick) {
+  void report_progress(std::uint64_t tick) {
     const auto now = std::chrono::steady_clock::now();
-    if (now - said_ <= std::chrono::milliseconds(500)) return;
-    said_ = now;
+    if (now - last_report_ <= std::chrono::milliseconds(500)) return;
+    last_report_ = now;
     options_.progress(fmt::format("tick {} of {} ({:.0f} %)", tick, ticks_,
                                   100.0 * static_cast<double>(tick) / static_cast<double>(ticks_)));
   }
 
-  void keep(const TickResult& felt, std::uint64_t tick, device::DeviceFault fault) {
+  void record_tick(const TickResult& felt, std::uint64_t tick, device::DeviceFault fault) {
     hash_ = hash_tick(hash_, felt);
     if (options_.keep_recording)
       result_.recording.push_back({felt.device_m, hash_, fault, state_.async.arrived, work_share_.steps()});
@@ -229,7 +228,7 @@ class Run {
                             felt.tick_us});
   }
 
-  // Evenly over the time in which something soft is felt.
+  // Compares the force with its equilibrium at moments spread evenly over the time of soft contact.
   void sample(const TickResult& felt, std::uint64_t every) {
     bool soft = false;
     for (const voxel::Reaction& r : state_.reactions) soft = soft || r.pressed > 0;
@@ -261,10 +260,10 @@ class Run {
       course.cell_m = std::min(course.cell_m, object->lattice().min_spacing_m());
   }
 
-  void look(const TickResult& felt, std::uint64_t tick) {
-    const double score = telling(world_, state_);
-    if (score <= best_ * 1.02) return;
-    best_ = score;
+  void maybe_keep_snapshot(const TickResult& felt, std::uint64_t tick) {
+    const double score = moment_score(world_, state_);
+    if (score <= best_score_ * 1.02) return;
+    best_score_ = score;
     result_.moment = take_snapshot(world_, state_, felt, static_cast<double>(tick) * dt_);
   }
 
@@ -278,12 +277,12 @@ class Run {
   bool realtime_, follows_machine_;
   double dt_;
   WorkShare work_share_;
-  TimeSpread late_us_;
-  std::vector<double> errors_N_, errors_jnd_;  // of sampled ticks
-  std::chrono::steady_clock::time_point said_ = std::chrono::steady_clock::now();
+  LatencyHistogram late_us_;
+  std::vector<double> errors_N_, errors_jnd_;  // of the sampled ticks
+  std::chrono::steady_clock::time_point last_report_ = std::chrono::steady_clock::now();
   std::uint64_t clearance_every_ = 1;
   std::uint64_t ticks_ = 0, ticks_done_ = 0, sample_every_ = 0, soft_ticks_ = 0, hash_ = kHashBegin;
-  double sum_force2_ = 0.0, best_ = 0.0;
+  double sum_force2_ = 0.0, best_score_ = 0.0;
   SessionResult result_;
 };
 
@@ -292,8 +291,8 @@ class Run {
 BlackBoxRow black_box_row(const device::ServoInput& input, const TickResult& felt, std::uint64_t tick,
                           const WorldState& state) noexcept {
   return {.tick = tick,
-          .said_m = input.device.position_m,
-          .said = input.device.fault,
+          .reported_m = input.device.position_m,
+          .reported = input.device.fault,
           .faults = state.faults,
           .nonfinite = state.nonfinite,
           .late_us = static_cast<float>(input.late_s * 1e6),
@@ -339,36 +338,36 @@ void begin_session(const Scene& scene, const World& world, WorldState& state, co
           device_m.x, device_m.y, device_m.z));
 }
 
-void play_again(const RecordedTick& tick, WorldState& state) noexcept {
+void restore_tick_timing(const RecordedTick& tick, WorldState& state) noexcept {
   state.async.arrived = tick.arrived;
   give_work_share(state, tick.work_share);
 }
 
 SessionResult run_session(const Scene& scene, BuiltScene& built, const SessionOptions& options) {
-  return Run(scene, built, options).go();
+  return Run(scene, built, options).run();
 }
 
 std::uint64_t hash_tick(std::uint64_t before, const TickResult& tick) noexcept {
-  return mix(mix(mix(before, tick.proxy_m), tick.force_N), tick.contacts);
+  return hash_in(hash_in(hash_in(before, tick.proxy_m), tick.force_N), tick.contacts);
 }
 
 std::uint64_t hash_state(std::uint64_t before, const WorldState& state) noexcept {
-  std::uint64_t hash = mix(before, state.limit.last_N);
+  std::uint64_t hash = hash_in(before, state.limit.last_N);
   for (const double x : {state.limit.elapsed_s, state.limit.handed.sum_J(), state.passive.given_J,
                          state.passive.worst_tick_J, state.passive.stride_m, state.passive.share})
-    hash = mix(hash, std::bit_cast<std::uint64_t>(x));
+    hash = hash_in(hash, std::bit_cast<std::uint64_t>(x));
   for (const RigidState& body : state.rigid) {
-    hash = mix(mix(hash, body.pose.position_m), body.pose.rotation);
-    hash = mix(mix(hash, body.free.centre_m), body.free.rotation);
-    hash = mix(mix(hash, body.free.velocity_m_per_s), body.free.spin_rad_per_s);
+    hash = hash_in(hash_in(hash, body.pose.position_m), body.pose.rotation);
+    hash = hash_in(hash_in(hash, body.free.centre_m), body.free.rotation);
+    hash = hash_in(hash_in(hash, body.free.velocity_m_per_s), body.free.spin_rad_per_s);
   }
   for (const auto& object : state.soft) {
     for (const auto& axis : object->state().u) {
-      for (const float u : axis) hash = mix(hash, std::bit_cast<std::uint32_t>(u));
+      for (const float u : axis) hash = hash_in(hash, std::bit_cast<std::uint32_t>(u));
     }
-    if (object->grid_in_use() == nullptr) continue;
-    object->grid_in_use()->for_values(
-        [&hash](float u) { hash = mix(hash, std::bit_cast<std::uint32_t>(u)); });
+    if (object->patches_in_use() == nullptr) continue;
+    object->patches_in_use()->for_values(
+        [&hash](float u) { hash = hash_in(hash, std::bit_cast<std::uint32_t>(u)); });
   }
   return hash;
 }
@@ -399,10 +398,9 @@ std::unique_ptr<WorldState> copy_state(const World& world, const WorldState& sta
 
 namespace {
 
-// Do anchors carry what is felt of each object that nothing but the tool presses? Far from rest an object may
-// be calm: with links at their limits all about a deep push, nothing moves from one cycle to the next, and
-// half of what presses has not reached the anchors, or is not felt. (Of a cube of 257 voxels an edge, 16
-// spacings deep, 8.9 N were felt for good where 15.8 are right.)
+// True if the anchors carry the felt force of each object that nothing but the tool presses. Far from rest an
+// object can stand still: with active limits all around a deep push, nothing moves from one cycle to the
+// next, although half of the load has not reached the anchors, or is not felt.
 bool carried_by_anchors(const World& world, const WorldState& state) noexcept {
   constexpr double kShare = 0.01, kLeast_N = 1e-3;
   if (!world.soft_pairs.empty()) return true;
@@ -423,19 +421,19 @@ bool carried_by_anchors(const World& world, const WorldState& state) noexcept {
 
 std::optional<glm::dvec3> equilibrium_force(const World& world, const WorldState& state, double tolerance_N) {
   const std::unique_ptr<WorldState> copy = copy_state(world, state);
-  // The same physics with a generous budget: only how soon it settles may differ, not where.
-  World patient = world;
-  for (SoftBody& body : patient.soft) body.budget = kSettleBudget;
-  for (RigidObject& object : patient.rigid) object.motion = {};  // what moves stands still meanwhile
+  // The same physics with a large budget: the budget changes only the time to settle, not the rest state.
+  World settling = world;
+  for (SoftBody& body : settling.soft) body.budget = kSettleBudget;
+  for (RigidObject& object : settling.rigid) object.motion = {};  // moving bodies stand still meanwhile
   std::fill(copy->body_moved_m.begin(), copy->body_moved_m.end(), 0.0);
-  for (const auto& object : copy->soft) object->widen_grid();
+  for (const auto& object : copy->soft) object->widen_patches();
   const device::DeviceState still{.position_m = state.device_m};
   glm::dvec3 before(0.0);
   for (int n = 1; n <= kSettleTicks; ++n) {
-    const TickResult felt = haptic_tick(patient, *copy, still, 1e-3);
-    if (n % kCalmTicks != 0) continue;
+    const TickResult felt = haptic_tick(settling, *copy, still, 1e-3);
+    if (n % kStillTicks != 0) continue;
     const glm::dvec3 force = world.tool.stiffness_N_per_m * (felt.proxy_m - felt.device_m);
-    if (glm::length(force - before) < tolerance_N && carried_by_anchors(patient, *copy)) return force;
+    if (glm::length(force - before) < tolerance_N && carried_by_anchors(settling, *copy)) return force;
     before = force;
   }
   return std::nullopt;

@@ -33,8 +33,9 @@ struct RecordedTick {
   std::uint64_t arrived = 0;    // bit per soft object whose asynchronous result arrived in this tick
   std::uint8_t work_share = 0;  // WorkShare::steps()
 };
-// Call before a replayed tick: restores what depended on the machine (arrival of results, work budget).
-void play_again(const RecordedTick& tick, WorldState& state) noexcept;
+// Call before a replayed tick: restores the inputs that depended on the machine (arrival of results, work
+// budget).
+void restore_tick_timing(const RecordedTick& tick, WorldState& state) noexcept;
 
 struct SessionOptions {
   std::optional<double> seconds;  // default: the path's length and half a second; a real device: a minute
@@ -74,8 +75,8 @@ struct SessionResult {
   ClearanceCourse clearance;                        // of keep_clearance, where anything is soft
   std::vector<std::uint64_t> object_contact_ticks;  // [object]
   std::vector<double> object_max_force_N;           // [object]
-  TimeSpread tick_us;
-  std::array<TimeSpread, kStages> stage_us;
+  LatencyHistogram tick_us;
+  std::array<LatencyHistogram, kStages> stage_us;
   double max_force_N = 0.0, rms_force_N = 0.0;
   ForceError error;
   std::optional<Snapshot> moment;       // of keep_picture
@@ -91,7 +92,7 @@ struct SessionResult {
   // CPU time of the ticks, and of asynchronous relaxation: of its thread in real time, else of the work that
   // a thread would have done.
   double servo_s = 0.0, relaxation_s = 0.0;
-  std::uint64_t relaxed_apart = 0;  // asynchronous results that ticks applied
+  std::uint64_t async_results = 0;  // asynchronous results that ticks applied
   // Work budget of the contact in real time: the least share of any tick, and the number of ticks with less
   // than all.
   double least_work_share = 1.0;

@@ -12,19 +12,19 @@
 namespace hybrid {
 namespace {
 
-constexpr std::uint64_t kLookEvery = 64;  // ticks between two looks at every displacement
-constexpr double kRounding = 1e-12;       // of all the work that was done, to and fro
+constexpr std::uint64_t kStateCheckEvery = 64;  // ticks between two checks of every displacement
+constexpr double kRounding = 1e-12;             // share of the sum of absolute work
 
 bool finite(const glm::dvec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
-// Also of what is too long to be squared.
+// Safe for vectors too long to be squared.
 double length(const glm::dvec3& v) {
   return std::hypot(v.x, v.y, v.z);
 }
 
-// The coupling, clamped: ½K d² is stored up to the clamp, and the clamp's work beyond it.
+// The clamped coupling: ½K d² is stored up to the clamp, and the clamp's work beyond it.
 struct Spring {
   glm::dvec3 clamped_N{0.0};
   double stored_J = 0.0;
@@ -57,48 +57,48 @@ bool finite(const WorldState& state) {
 
 }  // namespace
 
-TickWatch::TickWatch(const World& world, const WorldState& state)
+TickInvariants::TickInvariants(const World& world, const WorldState& state)
     : world_(world), hash_(kHashBegin), force_N_(state.limit.last_N), device_m_(state.device_m) {
   const Spring spring = spring_of(world, state.proxy_m, state.device_m);
-  allowed_J_ = stored_J_ = spring.stored_J;  // what is there already may be given
+  allowed_J_ = stored_J_ = spring.stored_J;  // energy that is stored already may be given
   for (const auto& object : state.soft) {
     if (object->moved_ever()) allowed_J_ += object->energy_J();
   }
   slewed_N_ = length(force_N_ - spring.clamped_N);
 }
 
-double TickWatch::tolerance_J() const {
+double TickInvariants::tolerance_J() const {
   return (world_.soft.empty() ? kRounding : kTissueShare) * moved_J_ +
          8.0 * world_.tool.stiffness_N_per_m * world_.rounding_m * world_.rounding_m;
 }
 
-void TickWatch::see_all(const WorldState& state) {
+void TickInvariants::check_state(const WorldState& state) {
   if (!finite(state)) ++not_finite_;
 }
 
-void TickWatch::account(const TickResult& felt) {
+void TickInvariants::account_energy(const TickResult& felt) {
   const double k = world_.tool.stiffness_N_per_m, most = world_.limits.max_force_N;
   const Spring spring = spring_of(world_, felt.proxy_m, felt.device_m);
   const double stored = spring.stored_J;
-  const glm::dvec3 way = felt.device_m - device_m_;
-  const double moved = length(way), work = glm::dot(force_N_, way);
+  const glm::dvec3 delta = felt.device_m - device_m_;
+  const double moved = length(delta), work = glm::dot(force_N_, delta);
   given_J_ += work;
   most_given_J_ = std::max(most_given_J_, given_J_);
   worst_tick_J_ = std::max(worst_tick_J_, std::abs(work));
   moved_J_ += std::abs(work);
   if (stored > 0.0 || stored_J_ > 0.0)
-    allowed_J_ += std::min(0.5 * k * moved, 2.0 * most) * moved;  // a clamped spring turns by no more
+    allowed_J_ += std::min(0.5 * k * moved, 2.0 * most) * moved;  // a clamped force changes by 2·most at most
   allowed_J_ += slewed_N_ * moved;
   moved_J_ += stored;
   excess_J_ = std::max(excess_J_, given_J_ + stored - allowed_J_);
   stored_J_ = stored;
   device_m_ = felt.device_m;
   force_N_ = felt.force_N;
-  const double apart = length(felt.force_N - spring.clamped_N);
-  slewed_N_ = apart > 1e-9 * most ? apart : 0.0;
+  const double difference = length(felt.force_N - spring.clamped_N);
+  slewed_N_ = difference > 1e-9 * most ? difference : 0.0;
 }
 
-void TickWatch::look_outside(const WorldState& state, const glm::dvec3& proxy) {
+void TickInvariants::check_outside(const WorldState& state, const glm::dvec3& proxy) {
   const double radius = world_.contact_radius_m();
   for (std::size_t o = 0; o < world_.rigid.size(); ++o) {
     const polygon::RigidSurface& surface = *world_.rigid[o].surface;
@@ -109,7 +109,7 @@ void TickWatch::look_outside(const WorldState& state, const glm::dvec3& proxy) {
   }
 }
 
-void TickWatch::see(const WorldState& state, const TickResult& felt, double dt_s) {
+void TickInvariants::check_tick(const WorldState& state, const TickResult& felt, double dt_s) {
   const bool good = finite(felt.device_m) && finite(felt.proxy_m) && finite(felt.force_N) &&
                     finite(felt.rigid_N) && finite(felt.soft_N);
   if (!good) {
@@ -123,11 +123,11 @@ void TickWatch::see(const WorldState& state, const TickResult& felt, double dt_s
   const double step = length(felt.force_N - force_N_);
   if (force > 0.0)
     over_slew_N_ = std::max(over_slew_N_, step - world_.limits.max_slew_N_per_s * dt * (1.0 + 1e-9) - 1e-12);
-  account(felt);
-  look_outside(state, felt.proxy_m);
+  account_energy(felt);
+  check_outside(state, felt.proxy_m);
   slowest_us_ = std::max(slowest_us_, felt.tick_us);
   hash_ = hash_tick(hash_, felt);
-  if (ticks_ % kLookEvery == 0) see_all(state);
+  if (ticks_ % kStateCheckEvery == 0) check_state(state);
   ++ticks_;
 }
 

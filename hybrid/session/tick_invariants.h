@@ -32,17 +32,17 @@ namespace hybrid {
 // kTissueShare of all work in either direction is allowed. That bounds this engine's error and is no theorem.
 //
 // outside. The proxy's centre is no nearer to a rigid object than its radius, within rounding.
-class TickWatch {
+class TickInvariants {
  public:
   static constexpr double kTissueShare = 0.005;
 
   // Call as the session begins. `world` must outlive this object.
-  TickWatch(const World& world, const WorldState& state);
+  TickInvariants(const World& world, const WorldState& state);
 
   // After each tick.
-  void see(const WorldState& state, const TickResult& felt, double dt_s);
-  // Checks every displacement and pose; see() does so for some ticks only.
-  void see_all(const WorldState& state);
+  void check_tick(const WorldState& state, const TickResult& felt, double dt_s);
+  // Checks every displacement and pose; check_tick() does so for some ticks only.
+  void check_state(const WorldState& state);
 
   [[nodiscard]] std::uint64_t ticks() const { return ticks_; }
   [[nodiscard]] std::uint64_t not_finite() const { return not_finite_; }
@@ -67,8 +67,8 @@ class TickWatch {
   [[nodiscard]] std::uint64_t hash() const { return hash_; }
 
  private:
-  void account(const TickResult& felt);
-  void look_outside(const WorldState& state, const glm::dvec3& proxy);
+  void account_energy(const TickResult& felt);
+  void check_outside(const WorldState& state, const glm::dvec3& proxy);
 
   const World& world_;
   std::uint64_t ticks_ = 0, not_finite_ = 0, hash_;

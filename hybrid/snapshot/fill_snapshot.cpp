@@ -15,7 +15,7 @@ void fill_places(const World& world, const WorldState& state, Snapshot& snapshot
     RigidPlace& place = snapshot.rigid_place[o];
     place.moved = now.position_m != before.position_m || now.rotation != before.rotation;
     place.about_m = before.position_m;
-    place.way_m = now.position_m - before.position_m;
+    place.shift_m = now.position_m - before.position_m;
     place.turn = now.rotation * glm::conjugate(before.rotation);
   }
 }
@@ -26,17 +26,17 @@ void fill_surface(const SoftBody& body, const voxel::SoftObject& object, std::ve
     moved[v] = glm::vec3(body.pose.rotation * object.displacement_at(body.drawn.vertices[v]));
 }
 
-// The nodes as they are: a few hundred kilobytes, however large the object. (Its surface, vertex by vertex,
-// is a hundred milliseconds of a tick.)
+// Copies the nodes: a few hundred kilobytes, however large the object. Its surface, vertex by vertex, would
+// take a hundred milliseconds.
 void fill_dent(const SoftBody& body, const voxel::SoftObject& object, SoftDent& dent) {
   dent.used = true;
   dent.count = 0;
-  const voxel::CompositeGrid* const grid = object.grid_in_use();
+  const voxel::CompositeGrid* const grid = object.patches_in_use();
   if (grid == nullptr) return;
   dent.to_scene = glm::mat3_cast(body.pose.rotation);
   dent.origin_m = body.pose.origin;
   dent.spacing_m = object.lattice().spacing_m();
-  dent.count = grid->boxes();
+  dent.count = grid->patch_count();
   if (dent.boxes.size() < dent.count) dent.boxes.resize(dent.count);
   for (std::size_t n = 0; n < dent.count; ++n) {
     const voxel::CompositeGrid::Nodes nodes = grid->nodes_of(n);
@@ -71,7 +71,7 @@ void fill_moved_near(const World& world, const WorldState& state, Snapshot& snap
     const SoftBody& body = world.soft[o];
     const voxel::SoftObject& object = *state.soft[o];
     const std::size_t number = world.rigid.size() + o;
-    if (object.uses_grid()) {
+    if (object.uses_patches()) {
       fill_dent(body, object, snapshot.dents[number]);
       continue;
     }

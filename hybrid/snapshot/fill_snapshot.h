@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// From a world that is touched to what graphics may know of what moves in it (make_drawn_scene.h has what stays).
+// Writes the moving parts of a world to a snapshot for graphics (make_drawn_scene.h has the fixed parts).
 #pragma once
 
 #include "hybrid/snapshot/snapshot.h"
@@ -7,9 +7,10 @@
 
 namespace hybrid {
 
-// Where what moves is, filled in place: no allocation once its vectors have their size.
+// Fills the places of everything that moves. Allocates nothing once the vectors have their sizes.
 void fill_moved(const World& world, const WorldState& state, Snapshot& snapshot);
-// The same from within a tick that must not wait: of a soft object relaxed apart, only what is near the tool.
+// The same from within a tick that must not wait: for a soft object under asynchronous relaxation only the
+// neighbourhood of the tool.
 void fill_moved_near(const World& world, const WorldState& state, Snapshot& snapshot);
 
 }  // namespace hybrid

@@ -11,10 +11,10 @@
 namespace hybrid {
 namespace {
 
-constexpr double kDrawnPoint = 0.004;  // of the scene: a tool is drawn no smaller
+constexpr double kDrawnPoint = 0.004;  // of the scene: smallest drawn radius of a tool
 constexpr const char* kUnnamed = "default material";
 
-// Which material each label is of, as a number and by name.
+// The material of each label, as a number and by name.
 struct MaterialsOfLabels {
   std::array<std::uint8_t, 256> of_label{};
   std::vector<std::string> names;
@@ -33,13 +33,13 @@ MaterialsOfLabels materials_of_labels(const SoftDescription& description, const 
     const std::string& name = own != description.materials.end() ? own->second : description.material;
     result.of_label[label] = number_of(name.empty() ? kUnnamed : name);
   }
-  // A strut is of the tissue that it stands for.
+  // A strut has the tissue that it replaces.
   for (const auto& [strut, label] : body.struts) result.of_label[strut] = result.of_label[label];
   return result;
 }
 
-// The material of most of the voxels about a vertex. A vertex of the surface lies within one cube between
-// eight voxel centres, of which at least one is filled; of as many, the one that was named first.
+// The material of most voxels around a vertex. A vertex lies within one cube between eight voxel centres, of
+// which at least one is filled. Ties go to the material that was named first.
 std::uint8_t material_beneath(const voxel::Lattice& lattice, const MaterialsOfLabels& materials,
                               const glm::dvec3& vertex_m) {
   std::array<int, 3> cell{};
@@ -67,7 +67,7 @@ std::uint8_t material_beneath(const voxel::Lattice& lattice, const MaterialsOfLa
   return best;
 }
 
-// Area of the surface that is of each material (m²): a triangle is shared by its corners.
+// Surface area of each material (m²); a triangle is divided among its corners.
 std::vector<double> area_of_materials(const polygon::TriangleMesh& mesh,
                                       std::span<const std::uint8_t> vertex_material, std::size_t count) {
   std::vector<double> area(count, 0.0);
@@ -92,7 +92,7 @@ void add_materials(DrawnObject& drawn, const SoftDescription& description, const
   for (std::size_t m = 0; m < area.size(); ++m) {
     if (area[m] > 0.0) order.push_back(static_cast<std::uint8_t>(m));
   }
-  if (order.size() < 2) return;  // one material to be seen is the object's own colour
+  if (order.size() < 2) return;  // a single visible material has the object's own colour
   std::stable_sort(order.begin(), order.end(), [&](auto a, auto b) { return area[a] > area[b]; });
   std::array<std::uint8_t, 256> rank{};
   for (std::size_t r = 0; r < order.size(); ++r) {

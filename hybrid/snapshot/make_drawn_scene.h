@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// From a scene that is built to what graphics may know of it.
+// Makes the fixed parts of a built scene for graphics.
 #pragma once
 
 #include <string>
@@ -10,9 +10,9 @@
 
 namespace hybrid {
 
-// Surfaces at rest, with the materials beneath those of soft objects. The labels are read from the lattices:
-// a scene that is not drawn carries nothing for it, and one that is drawn a byte a vertex of an object that
-// shows several materials. `built` must be of `scene`.
+// Surfaces at rest; for soft objects with the materials beneath them. Labels are read from the lattices, so a
+// scene that is not drawn stores nothing for this, and a drawn one stores a byte per vertex of an object with
+// several visible materials. `built` must be of `scene`.
 DrawnScene drawn_scene(const Scene& scene, const BuiltScene& built, const std::string& title);
 
 }  // namespace hybrid

@@ -10,14 +10,14 @@
 namespace hybrid {
 namespace {
 
-// Vertices that the patch surrounds go along with its points near them, by the inverse of their distance.
+// Vertices within the patch follow the near points of the tick, weighted by inverse distance.
 void lay_patch(const polygon::TriangleMesh& surface, const SoftPatch& patch, std::vector<glm::vec3>& moved) {
   glm::vec3 low = patch.at_rest_m.front(), high = low;
   for (const glm::vec3& at : patch.at_rest_m) {
     low = glm::min(low, at);
     high = glm::max(high, at);
   }
-  // A patch of n points over an area: about so far apart.
+  // Mean distance between n points on an area.
   const glm::vec3 size = high - low;
   const float apart = std::max({size.x, size.y, size.z}) /
                       std::sqrt(static_cast<float>(std::max<std::size_t>(patch.at_rest_m.size(), 1)));
@@ -40,7 +40,7 @@ void lay_patch(const polygon::TriangleMesh& surface, const SoftPatch& patch, std
 
 }  // namespace
 
-// Between the nodes of the finest box that it is in.
+// Interpolated between the nodes of the finest box that contains the point.
 glm::vec3 SoftDent::at(const glm::dvec3& at_rest_m) const noexcept {
   const glm::dvec3 point = ((at_rest_m - origin_m) * to_scene) / spacing_m;  // v · R is Rᵀ v
   for (std::size_t n = 0; n < count; ++n) {
@@ -75,8 +75,8 @@ glm::vec3 SoftDent::at(const glm::dvec3& at_rest_m) const noexcept {
   return glm::vec3(0.0F);
 }
 
-void show_live(const DrawnScene& scene, const Snapshot& snapshot, const MovedSurfaces& surfaces,
-               Snapshot& shown) {
+void merge_live_surface(const DrawnScene& scene, const Snapshot& snapshot, const MovedSurfaces& surfaces,
+                        Snapshot& shown) {
   shown = snapshot;
   for (std::size_t o = 0; o < std::min(shown.dents.size(), shown.soft_moved_m.size()); ++o) {
     const SoftDent& dent = shown.dents[o];

@@ -179,13 +179,13 @@ bool comes_to_rest(PressedScene& scene, const LoopSetting& setting, double stiff
 
 std::optional<double> measured_stable_stiffness(PressedScene& scene, const LoopSetting& setting) {
   if (setting.linear()) {
-    return first_not_so(kSoftest_N_per_m, kStiffest_N_per_m, 2.0, 1e-3,
-                        [&](double stiffness) { return envelope_growth(scene, setting, stiffness) < 0.0; });
+    return find_threshold(kSoftest_N_per_m, kStiffest_N_per_m, 2.0, 1e-3,
+                          [&](double stiffness) { return envelope_growth(scene, setting, stiffness) < 0.0; });
   }
   // A press that is hardly more than friction does not say where the tool rests.
   const double softest = std::max(kSoftest_N_per_m, 10.0 * setting.friction_N() / kDeepest_m);
-  return first_not_so(softest, kStiffest_N_per_m, 1.3, 5e-3,
-                      [&](double stiffness) { return comes_to_rest(scene, setting, stiffness); });
+  return find_threshold(softest, kStiffest_N_per_m, 1.3, 5e-3,
+                        [&](double stiffness) { return comes_to_rest(scene, setting, stiffness); });
 }
 
 Vibration pressed_vibration(PressedScene& scene, const LoopSetting& setting, double stiffness_N_per_m) {
@@ -203,12 +203,12 @@ Buzz measured_buzz(PressedScene& scene, const LoopSetting& setting) {
   const bool soft = !scene.world().soft.empty();
   Buzz buzz;
   buzz.stiffest_N_per_m = soft ? 1e5 : 2e5;
-  buzz.begins_N_per_m = first_not_so(kSoftestBuzz_N_per_m, buzz.stiffest_N_per_m, soft ? 1.6 : 1.15, 1e-2,
-                                     [&](double stiffness) {
-                                       const Vibration now = pressed_vibration(scene, setting, stiffness);
-                                       if (now.felt > 1.0) buzz.vibration = now;
-                                       return now.felt <= 1.0;
-                                     });
+  buzz.begins_N_per_m = find_threshold(kSoftestBuzz_N_per_m, buzz.stiffest_N_per_m, soft ? 1.6 : 1.15, 1e-2,
+                                       [&](double stiffness) {
+                                         const Vibration now = pressed_vibration(scene, setting, stiffness);
+                                         if (now.felt > 1.0) buzz.vibration = now;
+                                         return now.felt <= 1.0;
+                                       });
   return buzz;
 }
 

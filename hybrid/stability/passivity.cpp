@@ -100,7 +100,7 @@ std::optional<double> measured_passive_stiffness(PressedScene& scene, const Loop
     }
     return true;
   };
-  return first_not_so(kSoftest_N_per_m, kStiffest_N_per_m, 2.0, kPassiveStep, passive);
+  return find_threshold(kSoftest_N_per_m, kStiffest_N_per_m, 2.0, kPassiveStep, passive);
 }
 
 }  // namespace hybrid

@@ -76,7 +76,7 @@ device::SampledLoop held_loop(const LoopSetting& setting) {
 
 PressedScene::PressedScene(const Scene& scene, const Progress& progress)
     : built_(build_scene(scene, progress)), world_(*built_.world) {
-  flush_denormals();
+  set_flush_to_zero();
   const std::unique_ptr<WorldState> rest = copy_state(world_, *built_.state);
   const FirstTouch first = find_touch(scene, built_);
   touch_m_ = first.touch_m;

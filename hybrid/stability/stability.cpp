@@ -221,7 +221,7 @@ Scene with_young(Scene scene, double young_Pa) {
 void measure_modulus(const Scene& scene, StabilityRow& row) {
   constexpr double kSoftest_Pa = 1e3, kStiffest_Pa = 1e8;
   row.stiffest = kStiffest_Pa;
-  row.measured = first_not_so(kSoftest_Pa, kStiffest_Pa, 1.6, 2e-2, [&](double young) {
+  row.measured = find_threshold(kSoftest_Pa, kStiffest_Pa, 1.6, 2e-2, [&](double young) {
     PressedScene pressed(with_young(scene, young));
     const Vibration now = pressed_vibration(pressed, row.setting, *row.coupling_N_per_m);
     if (now.felt > 1.0) row.vibration = now;

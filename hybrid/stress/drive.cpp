@@ -10,9 +10,9 @@
 #include <random>
 
 #include "hybrid/base/flush_to_zero.h"
-#include "hybrid/stress/scenes.h"
 #include "hybrid/session/session.h"
 #include "hybrid/session/tick_invariants.h"
+#include "hybrid/stress/scenes.h"
 
 namespace hybrid {
 namespace {
@@ -31,7 +31,7 @@ class Drive {
       : scene_(scene), world_(*built.world), state_(*built.state), middle_m_(middle_m), unit_m_(unit_m) {}
 
   DriveResult go(Motion motion) {
-    flush_denormals();
+    set_flush_to_zero();
     if (motion == Motion::jumps) {
       jump();
     } else if (motion == Motion::through) {
@@ -51,7 +51,7 @@ class Drive {
   }
   TickResult tick(const glm::dvec3& device_m, double dt_s) {
     const TickResult felt = haptic_tick(world_, state_, {.position_m = device_m}, dt_s);
-    watch_->see(state_, felt, dt_s);
+    watch_->check_tick(state_, felt, dt_s);
     if (felt.contacts != 0) ++result_.contact_ticks;
     if (watch_->ticks() % kLookEvery == 0)
       result_.most_moved_m = std::max(result_.most_moved_m, largest_displacement_m(state_));
@@ -111,11 +111,11 @@ class Drive {
       felt = tick(away, 1e-3);
       rested = all_asleep(state_) ? rested + 1 : 0;
     }
-    result_.left_N = glm::length(felt.force_N);
+    result_.unbalanced_N = glm::length(felt.force_N);
   }
 
   void finish() {
-    watch_->see_all(state_);
+    watch_->check_state(state_);
     result_.ticks = watch_->ticks();
     result_.not_finite = watch_->not_finite();
     result_.hash = hash_state(watch_->hash(), state_);
@@ -139,7 +139,7 @@ class Drive {
   const Scene& scene_;
   const World& world_;
   WorldState& state_;
-  std::optional<TickWatch> watch_;
+  std::optional<TickInvariants> watch_;
   glm::dvec3 middle_m_;
   double unit_m_;
   DriveResult result_;
@@ -176,7 +176,8 @@ glm::dvec3 no_position(std::uint64_t number) noexcept {
 double largest_displacement_m(const WorldState& state) {
   float most = 0.0F;
   for (const auto& object : state.soft) {
-    if (object->grid_in_use() != nullptr) {  // its displacements are on nested patches, the state is at rest
+    if (object->patches_in_use() !=
+        nullptr) {  // its displacements are on nested patches, the state is at rest
       for (const voxel::VoxelId v : object->lattice().surface()) {
         const glm::vec3 u = glm::abs(glm::vec3(object->displacement(v)));
         most = std::max({most, u.x, u.y, u.z});

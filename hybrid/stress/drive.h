@@ -28,11 +28,12 @@ std::string_view name_of(Motion motion);
 struct DriveResult {
   std::uint64_t ticks = 0, contact_ticks = 0, not_finite = 0, hash = 0;
   double most_N = 0.0, over_force_N = 0.0, over_slew_N = 0.0;
-  double excess_J = 0.0, tolerance_J = 0.0, given_J = 0.0, allowed_J = 0.0, moved_J = 0.0;  // of TickWatch
+  double excess_J = 0.0, tolerance_J = 0.0, given_J = 0.0, allowed_J = 0.0,
+         moved_J = 0.0;  // of TickInvariants
   double most_given_J = 0.0, worst_tick_J = 0.0;
   double inside_m = 0.0, slowest_us = 0.0;
   double lowest_m = 0.0;      // of the proxy, above the middle of the scene, of Motion::through
-  double left_N = 0.0;        // when the tool has been away for long: force,
+  double unbalanced_N = 0.0;  // when the tool has been away for long: force,
   double left_moved_m = 0.0;  // largest displacement,
   double most_moved_m = 0.0;  // and the largest that was seen before
   bool asleep = true;         // and nothing soft is being relaxed

@@ -218,14 +218,15 @@ class Suite {
   void judge_settled(const DriveCase& c, const DriveResult& r) {
     const bool back = r.left_moved_m <= kBack * 2.0 * c.scene.unit_m;
     if (c.scene.kind == SceneKind::rigid) {
-      say("settled", r.left_N == 0.0, fmt::format("{:.3g} N left, of {:.3g}", r.left_N, r.most_N));
+      say("settled", r.unbalanced_N == 0.0,
+          fmt::format("{:.3g} N left, of {:.3g}", r.unbalanced_N, r.most_N));
       return;
     }
     // What 512 voxels a side still have to relax is a matter of the budget.
     const bool rests =
         c.scene.shape == BlockShape::large ? r.left_moved_m < 0.1 * r.most_moved_m : r.asleep && back;
-    say("settled", r.left_N == 0.0 && rests,
-        fmt::format("{:.3g} N left; {:.3g} spacings left of {:.3g}{}", r.left_N,
+    say("settled", r.unbalanced_N == 0.0 && rests,
+        fmt::format("{:.3g} N left; {:.3g} spacings left of {:.3g}{}", r.unbalanced_N,
                     r.left_moved_m / (2.0 * c.scene.unit_m), r.most_moved_m / (2.0 * c.scene.unit_m),
                     r.asleep ? "" : ", still moving"));
   }

@@ -33,7 +33,7 @@ struct ExtremeRow {
 //   hash     a second run gives the same bits
 //   time     no tick takes long
 //   refused  file, line and column, what is wrong and what to do
-// TickWatch says exactly what is meant by the first four.
+// TickInvariants says exactly what is meant by the first four.
 //
 // A coupling stiffer than the sampled loop can hold buzzes: that is physics, and no row falls short for it.
 // What must hold then is that the buzz is fed by the sampling alone (energy), stays within the device's

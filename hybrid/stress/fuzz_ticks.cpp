@@ -219,7 +219,7 @@ class Fuzz {
   }
 
   FuzzResult run(std::uint64_t ticks) {
-    flush_denormals();
+    set_flush_to_zero();
     begin_session(scene_, world_, state_, glm::dvec3(0.0, 0.0, 60.0 * kUnit_m));
     while (result_.ticks < ticks) {
       episode();
@@ -249,14 +249,14 @@ class Fuzz {
 
   TickResult tick(const device::DeviceState& input, double dt_s) {
     const TickResult felt = haptic_tick(world_, state_, input, dt_s);
-    watch_->see(state_, felt, dt_s);
+    watch_->check_tick(state_, felt, dt_s);
     ++result_.ticks;
     if (felt.contacts != 0) ++result_.contact_ticks;
     return felt;
   }
 
   void judge() {
-    watch_->see_all(state_);
+    watch_->check_state(state_);
     if (watch_->not_finite() > 0) fail(fmt::format("{} ticks not finite", watch_->not_finite()));
     if (watch_->over_force_N() > 0.0) fail(fmt::format("{:.3g} N over the limit", watch_->over_force_N()));
     if (watch_->over_slew_N() > 0.0) fail(fmt::format("{:.3g} N over the slew", watch_->over_slew_N()));
@@ -314,7 +314,7 @@ class Fuzz {
   const World& world_;
   WorldState& state_;
   Input input_;
-  std::optional<TickWatch> watch_;
+  std::optional<TickInvariants> watch_;
   FuzzResult result_;
 };
 

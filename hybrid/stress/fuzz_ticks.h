@@ -14,7 +14,7 @@ struct FuzzOptions {
   std::uint64_t ticks = 20'000;  // over all scenes, a little more
   std::uint64_t seed = 1;
   bool async_relaxation = false;  // as SessionOptions::async_relaxation says, by counted work
-  std::string only{};        // of the scenes, by its name; empty: all of them
+  std::string only{};             // of the scenes, by its name; empty: all of them
   Progress progress{};
 };
 
@@ -33,10 +33,10 @@ struct FuzzResult {
 
 // Episodes of 1,000 ticks. Positions: a walk over the surfaces in steps of 1e-9 to 1e-2 m, jumps of a metre,
 // NaN, infinities, denormals, and magnitudes of 1e-300 to 1e300; velocities likewise. dt: 0.1 to 10 ms,
-// stalls of up to 100 ms, 0, negative, NaN, infinite. Each tick is watched (TickWatch): finite and within
-// limits always, outside what is rigid and within the account of energy where that is defined. After each
-// episode the tool is led away, and everything must come to rest without force. Throws std::runtime_error: no
-// folder for temporary files.
+// stalls of up to 100 ms, 0, negative, NaN, infinite. Each tick is watched (TickInvariants): finite and
+// within limits always, outside what is rigid and within the account of energy where that is defined. After
+// each episode the tool is led away, and everything must come to rest without force. Throws
+// std::runtime_error: no folder for temporary files.
 std::vector<FuzzResult> fuzz_ticks(const FuzzOptions& options);
 
 }  // namespace hybrid

@@ -16,18 +16,18 @@ namespace hybrid {
 namespace {
 
 struct ContactSettings {
-  int passes = 3;           // proxy and tissue answer one another at most this often in a tick
+  int passes = 3;           // proxy and tissue answer each other at most this often in a tick
   int sweeps = 1;           // relaxations of the contact's neighbourhood in each pass
   double soft_step = 0.25;  // longest step of the proxy against tissue in one pass (unit: the tool's reach)
   double arrived = 1e-2;    // a second pass that moves the proxy less is the last (unit: the tool's radius)
-  double still = 1e-5;      // a pass that moves the proxy less teaches nothing (unit: the tool's radius)
-  // Learnt stiffness: the share kept from pass to pass, the least overshoot that counts (unit: the pull
-  // before the step), the most that one step is believed, and the most that is learnt (unit: the model's
-  // stiffness).
+  double still = 1e-5;      // a pass that moves the proxy less gives no secant (unit: the tool's radius)
+  // Learnt stiffness. kept: share kept from pass to pass. least_overshoot: smaller ones are ignored (unit:
+  // the pull before the step). most_overshoot: larger ones are clamped. most_learnt: bound of the result
+  // (unit: the model's stiffness).
   double kept = 0.9, least_overshoot = 0.25, most_overshoot = 3.0, most_learnt = 50.0;
-  double probe = 0.005;  // how far each tick looks into jammed tissue (unit: the tool's radius)
-  // How far from the proxy rigid planes are looked for when tissue stops it (unit: the tool's radius). The
-  // second radius is tried only where the first is not enough.
+  double probe = 0.005;  // how far the proxy probes jammed tissue once a tick (unit: the tool's radius)
+  // Search radii for rigid planes when tissue stops the proxy (unit: the tool's radius). The second radius is
+  // tried only if the first is not enough.
   std::array<double, 2> planes_within{1.25, 2.0};
 };
 constexpr ContactSettings kSettings;
@@ -39,11 +39,11 @@ glm::dvec3 pull_on_proxy(const World& world, const WorldState& state, const glm:
   return pull;
 }
 
-// The tissue's model is the stiffness of the voxels that are pressed now. A chain that tightens as the proxy
-// moves, or voxels that are newly met, answer stiffer. A step by the model alone would then alternate for
-// ever between two places. When a step overshot, so that the pull changed sign, the stiffness that would have
-// landed right is learnt, and forgotten over some passes. Steps that did not overshoot teach nothing: tissue
-// that relaxes meanwhile looks arbitrarily stiff on a short step.
+// The tissue's model is the stiffness of the voxels that are pressed now. The true stiffness is larger when a
+// chain tightens as the proxy moves, or when the tool meets further voxels. Steps by the model alone could
+// then alternate between two places without end. If a step overshoots (the pull changes sign), the secant
+// stiffness that would have landed right is learnt. It decays over the next passes. Steps that do not
+// overshoot teach nothing, because tissue that relaxes meanwhile looks arbitrarily stiff on a short step.
 void learn_stiffness(const World& world, WorldState& state, const glm::dvec3& delta, const glm::dvec3& before,
                      const glm::dvec3& after, const glm::dmat3& model, const glm::dmat3& used) noexcept {
   state.learnt_stiffness_N_per_m *= kSettings.kept;
@@ -62,12 +62,12 @@ void learn_stiffness(const World& world, WorldState& state, const glm::dvec3& de
 struct OutsideRigid {
   polygon::PlaneMinimum minimum;
   std::size_t rigid = 0;  // the number of rigid planes, which come first in scratch.planes
-  bool sure = false;      // feasible, and no rigid plane that was not looked for can change it
+  bool sure = false;      // feasible, and no rigid plane beyond the search radius can change it
 };
 
 // The minimum of the metric about `target`, outside rigid objects near the proxy and outside the planes that
-// add_others() appends to scratch.planes. A rigid plane that was not found is further from the proxy than the
-// search radius. So a minimum that is nearer than that is the minimum among all planes.
+// add_others() appends to scratch.planes. Every rigid plane that the search missed is further from the proxy
+// than the search radius. A minimum nearer than that is therefore the minimum among all planes.
 template <class AddOthers>
 OutsideRigid minimise_outside_rigid(const World& world, WorldState& state, const glm::dvec3& target,
                                     const polygon::Metric& metric, AddOthers&& add_others) noexcept {
@@ -84,10 +84,10 @@ OutsideRigid minimise_outside_rigid(const World& world, WorldState& state, const
   return least;
 }
 
-// Tissue that cannot leave the tool's way is as good as rigid, and the proxy stops there. A tool that was
-// pressed further in every pass, and taken back at the end of the tick, would be a wedge: it would drive
-// voxels aside and gain energy that it never gave. A probe asks once a tick whether the voxels still cannot
-// leave.
+// Tissue that cannot leave the tool's way is as good as rigid, and the proxy stops there. A tool that is
+// pressed further in every pass and taken back at the end of the tick would act as a wedge: it would drive
+// voxels aside and gain energy. Once a tick the planes recede by `probe`, to find out whether the voxels
+// still cannot leave.
 glm::dvec3 stop_at_jammed(const World& world, WorldState& state, const glm::dvec3& target,
                           const glm::dmat3& metric, bool probe) noexcept {
   if (state.jammed.empty()) return target;
@@ -113,7 +113,7 @@ glm::dvec3 stop_at_jammed(const World& world, WorldState& state, const glm::dvec
 }
 
 // One pass: the proxy goes to the minimum of ½K|q − x|² plus the tissue's quadratic model, outside everything
-// rigid; then the tissue answers. Returns how far the proxy went (m).
+// rigid; then the tissue responds. Returns how far the proxy went (m).
 double move_proxy(const World& world, WorldState& state, const glm::dvec3& device, bool near_soft,
                   double travel, bool first_pass, Sweep& sweep) noexcept {
   const double k = world.tool.stiffness_N_per_m;
@@ -150,9 +150,9 @@ double deepest(const WorldState& state, std::size_t count, const glm::dvec3& poi
   return most;
 }
 
-// Is last tick's reaction still valid? Then the first pass goes by it; asking again is a quarter of a contact
-// tick. An asynchronous result that was applied since makes the reaction stale, and patches solve the contact
-// as a whole.
+// Is last tick's reaction still valid? If so, the first pass uses it, which saves a quarter of a contact
+// tick. An asynchronous result that was applied since makes the reaction stale. Patches solve the contact as
+// a whole, so their reaction is always computed anew.
 bool reaction_is_current(WorldState& state) noexcept {
   bool any = false;
   for (std::size_t o = 0; o < state.soft.size(); ++o) {

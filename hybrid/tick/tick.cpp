@@ -22,7 +22,7 @@ namespace hybrid {
 namespace {
 
 constexpr double kFarthestDevice_m = 1e12;   // a thousand times the largest scene
-constexpr double kLongestTick_s = 86'400.0;  // a day: times stay finite however often it is added
+constexpr double kLongestTick_s = 86'400.0;  // a day: times stay finite however many ticks are added
 
 // Stages use the wall clock, which is cheap. The whole tick uses thread CPU time, so that pre-emption does
 // not count.
@@ -35,8 +35,7 @@ class StageClock {
         std::chrono::duration<float, std::micro>(now - last_).count();
     last_ = now;
   }
-  // Excludes time that a separate thread would have spent, from the stage that was just done and from the
-  // tick.
+  // Excludes time that a separate thread would have spent from the finished stage and from the tick.
   void leave_out(Stage stage, double us) noexcept {
     float& of_stage = result_.stage_us[static_cast<std::size_t>(stage)];
     of_stage = std::max(0.0F, of_stage - static_cast<float>(us));
@@ -76,11 +75,11 @@ double check_time(double dt_s) noexcept {
   return dt_s > 0.0 && std::isfinite(dt_s) ? std::min(dt_s, kLongestTick_s) : 0.0;
 }
 
-// Free space is crossed at once. Otherwise the voxels that the tool may touch in this tick are listed for the
-// contact, and objects on nested patches get ready for it.
+// Crosses free space at once. Otherwise lists the voxels that the tool may touch in this tick, and prepares
+// objects on nested patches for contact.
 Neighbourhood broad_phase(const World& world, WorldState& state, const glm::dvec3& device) noexcept {
   Neighbourhood around{.range_m = contact_range_m(world, state)};
-  // The map knows an object on pressed patches only at rest, so the way is not asked of it.
+  // The map has an object on pressed patches only at rest, so it cannot decide that the way is free.
   around.free = !contact_on_patches(state) &&
                 advance_through_free_space(world, state, device, soft_reach(world, state));
   if (around.free) state.active_count = 0;
@@ -95,7 +94,7 @@ Neighbourhood broad_phase(const World& world, WorldState& state, const glm::dvec
   return around;
 }
 
-// Tissue away from the contact relaxes, and its surface voxels learn the rigid surfaces that they came near.
+// Tissue away from the contact relaxes; surface voxels that came near rigid surfaces get their obstacles.
 void relax_tissue(const World& world, WorldState& state, StageClock& clock) noexcept {
   relax_background(world, state);
   refresh_obstacles_of_arrived_rows(world, state);
@@ -103,10 +102,10 @@ void relax_tissue(const World& world, WorldState& state, StageClock& clock) noex
   clock.leave_out(Stage::background, state.async.other_thread_us);
 }
 
-// The last operations on the force, in the order that device/README.md gives reasons for.
+// The last operations on the force, in the order that device/README.md justifies.
 glm::dvec3 make_safe(const World& world, WorldState& state, const glm::dvec3& force_N,
                      const device::DeviceState& input, double dt_s) noexcept {
-  // Where the tool is said to be; what is no place was taken for the last good one.
+  // The gate gets the position in use: an invalid input was replaced by the last valid one.
   const device::DeviceState tool{.position_m = state.device_m, .fault = input.fault};
   const std::uint64_t bad = state.limit.nonfinite;
   const glm::dvec3 limited = device::limit_force(world.limits, state.limit, force_N, tool, dt_s);
@@ -115,7 +114,7 @@ glm::dvec3 make_safe(const World& world, WorldState& state, const glm::dvec3& fo
   return device::keep_passive(*world.passivity, state.passive, limited, state.device_m, dt_s);
 }
 
-// The hand feels the coupling and nothing else; its parts, and who is felt, are for the record.
+// The hand feels the coupling, damping and texture alone; the parts and contacts are for the record.
 void publish_force(const World& world, WorldState& state, const Sweep& sweep,
                    const device::DeviceState& input, double dt_s, TickResult& result) noexcept {
   const glm::dvec3 coupling = world.tool.stiffness_N_per_m * (state.proxy_m - result.device_m);
@@ -155,7 +154,7 @@ TickResult haptic_tick(const World& world, WorldState& state, const device::Devi
   clock.done(Stage::contact);
 
   // Soft objects that meet may push one another back into the tool's way, so the tool gives way after them.
-  // Tissue that meets no other relaxes after the tool.
+  // Tissue that cannot meet other tissue relaxes after the tool.
   const bool may_meet = !world.soft_pairs.empty();
   if (may_meet) {
     relax_tissue(world, state, clock);
@@ -165,7 +164,7 @@ TickResult haptic_tick(const World& world, WorldState& state, const device::Devi
   clock.done(Stage::arbitration);
   if (!may_meet) relax_tissue(world, state, clock);
 
-  // Last of all that moves tissue: no body overlaps it as the tick ends.
+  // Last of all that moves tissue, so that no body overlaps tissue at the end of the tick.
   push_bodies_out_of_tissue(world, state, dt_s);
   flag_squeezed_bodies(world, state);
   clock.done(Stage::arbitration);

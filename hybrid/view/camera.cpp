@@ -19,8 +19,8 @@ bool finite(const Vector& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
-// Every `stride`-th finite vertex of the scene as it is now; so many that a big mesh costs no more than a
-// small one.
+// Visits every `stride`-th finite vertex of the scene in its present state. The stride bounds the cost: a
+// large mesh costs no more than a small one.
 template <class Visit>
 void for_some_vertices(const DrawnScene& scene, const Snapshot& snapshot, const Visit& visit) {
   constexpr std::size_t at_most = 100'000;
@@ -36,7 +36,7 @@ void for_some_vertices(const DrawnScene& scene, const Snapshot& snapshot, const 
   }
 }
 
-// Of finite points.
+// Bounding box of the points that are finite.
 struct Bounds {
   glm::dvec3 lower{std::numeric_limits<double>::infinity()}, upper{-std::numeric_limits<double>::infinity()};
 
@@ -50,7 +50,7 @@ struct Bounds {
     if (!(lower.x <= upper.x)) return bounds;  // nothing finite: an empty picture about the origin
     bounds.centre_m = 0.5 * (lower + upper);
     bounds.radius_m = 0.5 * glm::length(upper - lower);
-    // A scene that is one point still needs a view of some size.
+    // A scene that is a single point still needs a view of some size.
     if (!(bounds.radius_m > 0.0)) bounds.radius_m = std::max(1e-3, 1e-9 * glm::length(bounds.centre_m));
     return bounds;
   }
@@ -59,10 +59,11 @@ struct Bounds {
 struct Candidate {
   double azimuth, elevation;
   glm::dvec3 toward_eye;
-  double hidden = 0.0;  // share of the view cone that something covers, weighted
+  double hidden = 0.0;  // weighted share of the view cone that is covered
 };
 
-// Solid angle that triangles cover within a cone about each candidate direction, seen from the tool.
+// Adds to each candidate direction the solid angle that triangles cover within a cone about it, seen from the
+// tool.
 void add_hidden(const DrawnScene& scene, const Snapshot& snapshot, std::span<Candidate> candidates) {
   constexpr double cone = 12.0 * degree;
   constexpr std::size_t at_most = 60'000;
@@ -70,7 +71,7 @@ void add_hidden(const DrawnScene& scene, const Snapshot& snapshot, std::span<Can
   const double cone_angle = 2.0 * std::numbers::pi * (1.0 - cos_cone);
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
     const DrawnObject& object = scene.objects[i];
-    // A rigid object in front is drawn transparent, so it matters less than tissue.
+    // A rigid object in front is drawn transparent, so it weighs less than tissue.
     const double weight = object.soft ? 1.0 : 0.35;
     const auto& vertices = object.surface.vertices;
     const RigidPlace place = snapshot.place_of(i);
@@ -183,8 +184,8 @@ Camera frame_scene(const DrawnScene& scene, const Snapshot& snapshot, double asp
   }
   if (finite(snapshot.proxy_m)) add_hidden(scene, snapshot, candidates);
 
-  // Rather from the side the force points to (the tool is there), but oblique, so that depth shows; rather
-  // from a little above; rather from the front.
+  // Preferred: the side that the force points to (the tool is there), but oblique, so that depth shows; a
+  // little above the horizon; the front.
   const auto cost = [&](const Candidate& candidate) {
     return std::min(candidate.hidden, 1.5) + 0.8 * std::abs(glm::dot(candidate.toward_eye, pushed) - 0.4) +
            0.004 * std::abs(candidate.elevation / degree - 25.0) +
@@ -194,7 +195,7 @@ Camera frame_scene(const DrawnScene& scene, const Snapshot& snapshot, double asp
   camera.azimuth_rad = best->azimuth;
   camera.elevation_rad = best->elevation;
 
-  // As near as everything still fits, with room for the legend.
+  // The shortest distance at which everything still fits, with room for the legend.
   const double tan_y = 0.86 * std::tan(0.5 * camera.fov_y_rad);
   const double tan_x = 0.86 * std::tan(0.5 * camera.fov_y_rad) * std::max(aspect, 0.1);
   double distance = 0.0;
@@ -216,9 +217,10 @@ Camera frame_contact(const DrawnScene& scene, const Snapshot& snapshot, const Ca
   Camera camera = overview;
   if (!finite(snapshot.proxy_m)) return camera;
   camera.target_m = snapshot.proxy_m;
-  double apart = glm::length(snapshot.device_m - snapshot.proxy_m);
-  if (!std::isfinite(apart)) apart = 0.0;
-  const double half_height = std::max({5.0 * scene.tool_radius_m, 1.6 * apart, 1e-6 * overview.distance_m});
+  double offset_m = glm::length(snapshot.device_m - snapshot.proxy_m);
+  if (!std::isfinite(offset_m)) offset_m = 0.0;
+  const double half_height =
+      std::max({5.0 * scene.tool_radius_m, 1.6 * offset_m, 1e-6 * overview.distance_m});
   camera.distance_m = half_height / std::tan(0.5 * camera.fov_y_rad);
   return camera;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Where a scene is looked at from, and a choice of view that a person would have made.
+// The camera of pictures and window, and an automatic choice of view.
 #pragma once
 
 #include <glm/mat4x4.hpp>
@@ -14,7 +14,7 @@ namespace hybrid {
 // Orbits a target in the scene frame, +z up. All finite, distance_m > 0.
 struct Camera {
   glm::dvec3 target_m{0.0};
-  double distance_m = 1.0;     // from eye to target
+  double distance_m = 1.0;     // eye to target
   double azimuth_rad = 0.0;    // of the eye about the target, from +x towards +y
   double elevation_rad = 0.0;  // of the eye above the horizontal plane, within ±89°
   double fov_y_rad = 0.6;      // full vertical angle of view
@@ -27,21 +27,22 @@ struct Camera {
   // Height that the view covers at the target (unit: meter).
   [[nodiscard]] double view_height_m() const;
 
-  // Pixel (x right, y down, of a view width × height) of a point; empty when it lies behind the eye.
+  // Pixel (x right, y down) of a point in a view of width × height; empty when the point lies behind the eye.
   [[nodiscard]] std::optional<glm::dvec2> pixel(const glm::dvec3& point_m, double width, double height) const;
 
-  // The point seen at a pixel, in the plane through `through_m` that faces the camera.
+  // Point seen at a pixel, in the plane through `through_m` that faces the camera.
   [[nodiscard]] glm::dvec3 point_at(const glm::dvec2& pixel, double width, double height,
                                     const glm::dvec3& through_m) const;
 
-  // Projection · view for points relative to `origin_m` (floats keep their precision however far the scene is
-  // from its own origin), with the depth range around a ball of `radius_m` about `centre_m`.
+  // Projection · view for points relative to `origin_m`, with the depth range around a ball of `radius_m`
+  // about `centre_m`. Relative points keep the precision of floats however far the scene is from its own
+  // origin.
   [[nodiscard]] glm::dmat4 clip_from_scene(double aspect, const glm::dvec3& origin_m,
                                            const glm::dvec3& centre_m, double radius_m) const;
 };
 
-// Ball that contains every finite vertex of the scene at rest; radius > 0 always. With a snapshot rigid
-// objects where they are then, and also the tool where the proxy and the device are.
+// Ball that contains every finite vertex of the scene at rest; radius > 0 always. With a snapshot: rigid
+// objects at their poses in it, and the tool at the proxy and at the device.
 struct SceneBounds {
   glm::dvec3 centre_m{0.0};
   double radius_m = 1.0;
@@ -49,11 +50,11 @@ struct SceneBounds {
 SceneBounds bounds_of(const polygon::TriangleMesh& surface);
 SceneBounds bounds_of(const DrawnScene& scene, const Snapshot* snapshot = nullptr);
 
-// The whole scene, seen from the side where least stands between eye and tool, at an angle to the force that
-// shows how deep the tool presses. `aspect` is width / height.
+// View of the whole scene. The direction minimises the cover between eye and tool and stands at an angle to
+// the force, so that the tool's depth shows. `aspect` is width / height.
 Camera frame_scene(const DrawnScene& scene, const Snapshot& snapshot, double aspect = 4.0 / 3.0);
 
-// The same direction of view, close to the tool: some tool radii around it.
+// The same direction of view, close to the tool: some tool radii around the tool.
 Camera frame_contact(const DrawnScene& scene, const Snapshot& snapshot, const Camera& overview);
 
 }  // namespace hybrid

@@ -22,7 +22,7 @@ void FramePainter::paint(const Snapshot& snapshot, const Camera& camera, const F
   content.paused = options.paused;
 
   renderer_.draw(scene_, snapshot, camera, {0, 0, options.width, options.height});
-  // A tool smaller than a twelfth of the view cannot be judged in it.
+  // A tool smaller than a twelfth of the view is too small to judge without the inset.
   const bool small = 2.0 * scene_.tool_radius_m < camera.view_height_m() / 12.0;
   const Camera near = frame_contact(scene_, snapshot, camera);
   if (options.inset && small && scene_.tool_radius_m > 0.0 && near.distance_m < 0.7 * camera.distance_m) {

@@ -1,21 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One whole frame: the scene, the nearer view of the contact, and the words. Picture and window show the
-// same.
+// Paints one whole frame: the scene, the inset of the contact, and the overlay's text. Picture and window
+// show the same frame.
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
+#include "hybrid/snapshot/snapshot.h"
 #include "hybrid/view/camera.h"
 #include "hybrid/view/overlay.h"
 #include "hybrid/view/renderer.h"
-#include "hybrid/snapshot/snapshot.h"
 
 namespace hybrid {
 
 struct FrameOptions {
   int width = 0, height = 0;  // (pixels)
-  bool inset = true;          // a nearer view of the contact, where the tool is small in the whole
+  bool inset = true;          // draw a nearer view of the contact when the tool is small in the whole view
   std::vector<ForceSample> history;
   std::string help;
   bool paused = false;

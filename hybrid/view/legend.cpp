@@ -15,7 +15,7 @@
 namespace hybrid {
 namespace {
 
-constexpr std::size_t kMostSingly = 6;  // rigid objects that nothing touches, each with a row of its own
+constexpr std::size_t kMostSingly = 6;  // untouched rigid objects that get a row each
 constexpr std::size_t kMostMaterials = palette::material.size() + 1;  // rows of one object's materials
 constexpr std::size_t kMostStripes = 4;                               // colours of one swatch
 
@@ -31,7 +31,7 @@ ObjectFeel feel_of(const Snapshot& snapshot, std::size_t object) {
   return object < snapshot.feel.size() ? snapshot.feel[object] : ObjectFeel{};
 }
 
-// The first few colours that differ.
+// The first few distinct colours.
 std::vector<glm::vec3> stripes(std::span<const glm::vec3> colours) {
   std::vector<glm::vec3> few;
   for (const glm::vec3& c : colours) {
@@ -40,7 +40,7 @@ std::vector<glm::vec3> stripes(std::span<const glm::vec3> colours) {
   return few;
 }
 
-// The material of the surface's vertex that is nearest to the tool; empty where the object is not touched.
+// Material of the surface vertex nearest to the tool; empty when the object is not touched.
 std::optional<std::size_t> material_touched(const DrawnScene& scene, const Snapshot& snapshot,
                                             std::size_t object) {
   const DrawnObject& drawn = scene.objects[object];
@@ -61,7 +61,7 @@ std::optional<std::size_t> material_touched(const DrawnScene& scene, const Snaps
   return nearest;
 }
 
-// The objects with a row of their own, in the order of their rows, and what one row says of the rigid others.
+// The objects that get a row each, in row order, and the rigid objects that share one row.
 struct ShownObjects {
   std::vector<std::size_t> singly, grouped;
 };
@@ -77,7 +77,7 @@ ShownObjects choose_objects(const DrawnScene& scene, const Snapshot& snapshot, s
   for (std::size_t i = 0; i < scene.objects.size(); ++i)
     (group && untouched_rigid(i) ? shown.grouped : shown.singly).push_back(i);
   if (!group && shown.singly.size() <= most) return shown;
-  // A list that is not complete begins with what is touched, and what is soft.
+  // A list that is cut off begins with touched objects, then soft ones.
   const auto rank = [&](std::size_t i) {
     return feel_of(snapshot, i).contact ? 0 : scene.objects[i].soft ? 1 : 2;
   };
@@ -99,7 +99,7 @@ void add_object(std::vector<LegendRow>& rows, const DrawnScene& scene, const Sna
   const std::size_t listed =
       count <= material_rows ? count : material_rows - std::min<std::size_t>(material_rows, 1);
   if (listed == 0) return;
-  // What is touched is listed, in the place of the last if need be.
+  // A touched material is always listed, in the place of the last one if necessary.
   std::vector<std::size_t> order(count);
   std::iota(order.begin(), order.end(), std::size_t{0});
   const std::optional<std::size_t> touched = material_touched(scene, snapshot, object);
@@ -129,7 +129,7 @@ void add_tool(std::vector<LegendRow>& rows, const DrawnScene& scene, const Snaps
                   .force = force_text(glm::length(snapshot.force_N))});
 }
 
-// Rigid objects in one row: the first by its name.
+// One row for several rigid objects; it names the first.
 LegendRow grouped_row(const DrawnScene& scene, std::span<const std::size_t> objects) {
   std::vector<glm::vec3> colours;
   for (const std::size_t i : objects.first(std::min(objects.size(), 2 * palette::rigid.size())))

@@ -20,9 +20,8 @@ struct Overlay::State {
   FontAtlas atlas;
   std::optional<std::size_t> legend_place;
 
-  // A font of the system where there is one that is known to be good (legible at any size, and it knows more
-  // than Latin letters); else the embedded one, which is drawn for 13 pixels and sharp only at multiples of
-  // it.
+  // Takes a system font that is known to be legible at any size and to have more than Latin letters. Without
+  // one, takes the embedded font, which is drawn for 13 pixels and sharp only at multiples of 13.
   void choose_fonts(int height) {
     ImFontAtlas& fonts = *ImGui::GetIO().Fonts;
     ImFontConfig config;
@@ -55,7 +54,8 @@ Overlay::Overlay(int height) : state_(std::make_unique<State>()) {
   ImGuiIO& io = ImGui::GetIO();
   io.IniFilename = nullptr;  // leaves no file behind
   io.LogFilename = nullptr;
-  io.BackendFlags |= ImGuiBackendFlags_RendererHasVtxOffset;  // build() adds the offsets: no limit of 65,536
+  io.BackendFlags |= ImGuiBackendFlags_RendererHasVtxOffset;  // build() adds the offsets, so that more than
+                                                              // 65,536 vertices work
   state_->choose_fonts(height);
   unsigned char* pixels = nullptr;
   io.Fonts->GetTexDataAsAlpha8(&pixels, &state_->atlas.width, &state_->atlas.height);

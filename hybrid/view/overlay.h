@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The words on a picture: title, time, legend, colour scale, scale bar, labels, and in the window a strip of
-// force and a line of help. The only part of the project that knows Dear ImGui; it uses its draw lists and
-// its font (text_painter.cpp), and no backend: what it makes is triangles in pixels. Its parts are in
-// overlay_parts.h.
+// The text and charts on a picture: title, time, legend, colour scale, scale bar and labels; in the window
+// also a strip chart of the force and a help line. The only part of the project that knows Dear ImGui. It
+// uses ImGui's draw lists and font (text_painter.cpp) without a backend: the output is triangles in pixels.
+// Its parts are in overlay_parts.h.
 #pragma once
 
 #include <functional>
@@ -12,9 +12,9 @@
 #include <string>
 #include <vector>
 
+#include "hybrid/snapshot/snapshot.h"
 #include "hybrid/view/camera.h"
 #include "hybrid/view/renderer.h"
-#include "hybrid/snapshot/snapshot.h"
 
 namespace hybrid {
 
@@ -26,13 +26,13 @@ struct ForceSample {
 struct OverlayContent {
   int width = 0, height = 0;  // of the picture (pixels)
   Camera camera;
-  struct Inset {  // a second, nearer view of the contact
+  struct Inset {  // second, nearer view of the contact
     Camera camera;
     PixelRect where;
   };
   std::optional<Inset> inset;
-  double displacement_scale_m = 0.0;  // 0: nothing soft, no colour scale
-  // Of the window only:
+  double displacement_scale_m = 0.0;  // 0: nothing soft has moved, no colour scale
+  // Window only:
   std::vector<ForceSample> history;  // in order of time
   std::string help;                  // one line; empty: none
   bool paused = false;
@@ -40,7 +40,7 @@ struct OverlayContent {
 
 class Overlay {
  public:
-  // Sizes text for a picture of this height.
+  // Sizes the text for a picture of this height.
   explicit Overlay(int height);
   Overlay(const Overlay&) = delete;
   Overlay& operator=(const Overlay&) = delete;
@@ -48,7 +48,7 @@ class Overlay {
   Overlay& operator=(Overlay&&) = delete;
   ~Overlay();
 
-  [[nodiscard]] FontAtlas font() const;  // lives as long as the overlay
+  [[nodiscard]] FontAtlas font() const;  // valid as long as the overlay lives
   [[nodiscard]] OverlayMesh build(const DrawnScene& scene, const Snapshot& snapshot,
                                   const OverlayContent& content);
 
@@ -57,16 +57,16 @@ class Overlay {
   std::unique_ptr<State> state_;
 };
 
-// "12 mm", "0.5 µm", "3 m": at most three digits, in the unit a person would say.
+// "12 mm", "0.5 µm", "3 m": at most three digits, in the unit that suits the size.
 std::string length_text(double length_m);
 
-// "1.20 N": three digits where there are so many, to a thousandth of a newton.
+// "1.20 N": three significant digits, at most three decimals.
 std::string force_text(double force_N);
 
-// A number in a printf format that has one %g or %f.
+// Formats a number; `format` is a printf format with one %g or %f.
 std::string number_text(double value, const char* format);
 
-// Largest of 1, 2, 5 · 10^n that is at most `value`; 0 when value is not positive or not finite.
+// Largest of 1, 2, 5 · 10^n that is at most `value`; 0 when the value is not positive or not finite.
 double round_down(double value);
 
 }  // namespace hybrid

@@ -4,16 +4,16 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include "hybrid/view/tool_and_arrow.h"
 #include "hybrid/view/overlay_parts.h"
+#include "hybrid/view/tool_and_arrow.h"
 
 namespace hybrid {
 namespace {
 
-constexpr float kLine = 1.6F;         // from row to row (em)
-constexpr float kShareOfView = 0.5F;  // most of the view's height that the legend takes
+constexpr float kLine = 1.6F;         // row pitch (em)
+constexpr float kShareOfView = 0.5F;  // largest share of the view's height for the legend
 
-// Columns of the legend, as wide as what stands in them.
+// Column widths of the legend (pixels).
 struct Columns {
   float name = 0.0F, kind = 0.0F, force = 0.0F, width = 0.0F;
 };
@@ -61,7 +61,7 @@ void draw_rows(const Pen& pen, const glm::vec2& low, std::span<const LegendRow> 
   }
 }
 
-// About the tool where it is felt and where the device is, the arrow, and what stands beside its tip.
+// Boxes around the tool at the proxy and at the device, the arrow, and the label at its tip.
 std::vector<PixelBox> boxes_to_keep_clear(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
                                           const OverlayContent& content) {
   const double per_pixel = content.camera.view_height_m() / content.height;
@@ -85,8 +85,8 @@ std::vector<PixelBox> boxes_to_keep_clear(const Pen& pen, const DrawnScene& scen
   return boxes;
 }
 
-// Top left, bottom left, then the right corners, the emptier first; beside what stands there already, and on
-// the picture as far as it fits.
+// Candidate places: top left, bottom left, then the right corners, first the one without the inset. They keep
+// off the colour scale, the scale bar and the history, and stay on the picture if they fit.
 std::vector<PixelBox> corners(const Pen& pen, const Furniture& furniture, const OverlayContent& content,
                               const glm::vec2& size) {
   const float em = pen.em;

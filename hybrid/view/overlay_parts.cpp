@@ -5,8 +5,8 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "hybrid/view/tool_and_arrow.h"
 #include "hybrid/view/palette.h"
+#include "hybrid/view/tool_and_arrow.h"
 
 namespace hybrid {
 namespace {
@@ -15,7 +15,8 @@ bool finite(const glm::dvec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
-// Of what is soft, as far as six bars go: each object's first, then the materials with the most surface.
+// Colours of the soft objects, at most six: the first of each object, then the materials with the most
+// surface.
 std::vector<glm::vec3> colours_at_rest(const DrawnScene& scene) {
   constexpr std::size_t most = 6;
   std::vector<std::vector<glm::vec3>> of_object;
@@ -43,7 +44,7 @@ float draw_heading(const Pen& pen, const DrawnScene& scene, const Snapshot& snap
   const float x = em;
   float y = 0.8F * em;
   std::string title = scene.title.empty() ? "untitled scene" : scene.title;
-  // The head font is twice the body's: fit() measures the body's.
+  // The head font is twice the body's, and fit() measures with the body's.
   title = pen.fit(title, (static_cast<float>(content.width) - 2.0F * em) / 2.0F);
   pen.text(x, y, kInk, title, true);
   y += 2.2F * em;
@@ -118,7 +119,8 @@ std::optional<ForceLabel> force_label(const Pen& pen, const DrawnScene& scene, c
   const std::string words = force_text(force);
   const float most_x = static_cast<float>(where.width) - pen.width(words) - 0.6F * pen.em;
   const float most_y = static_cast<float>(where.height) - 2.0F * pen.em;
-  // Beyond the tip of an arrow to the left: beside it, the words would lie on the arrow.
+  // For an arrow that points left, the label goes to the left of the tip: on the right it would cover the
+  // arrow.
   const auto base = camera.pixel(snapshot.proxy_m, where.width, where.height);
   const bool left = base && base->x - tip->x > 0.5 * std::abs(base->y - tip->y);
   const float aside = left ? -0.8F * pen.em - pen.width(words) : 0.8F * pen.em;
@@ -139,7 +141,7 @@ void draw_inset_frame(const Pen& pen, const Snapshot& snapshot, const OverlayCon
   const PixelRect& r = content.inset->where;
   const glm::vec2 a(static_cast<float>(r.x), static_cast<float>(r.y));
   const glm::vec2 b(a.x + static_cast<float>(r.width), a.y + static_cast<float>(r.height));
-  // What the inset shows is ringed in the large view, and tied to it.
+  // A ring in the large view marks the region that the inset shows; a line connects the two.
   if (const auto at = content.camera.pixel(snapshot.proxy_m, content.width, content.height)) {
     const double per_pixel = content.camera.view_height_m() / content.height;
     const auto radius =
@@ -148,10 +150,10 @@ void draw_inset_frame(const Pen& pen, const Snapshot& snapshot, const OverlayCon
     const glm::vec2 corner(std::clamp(centre.x, a.x, b.x), std::clamp(centre.y, a.y, b.y));
     const float dx = corner.x - centre.x;
     const float dy = corner.y - centre.y;
-    const float apart = std::sqrt(dx * dx + dy * dy);
+    const float distance = std::sqrt(dx * dx + dy * dy);
     pen.circle(centre, radius, kInk, 1.5F);
-    if (apart > radius) {
-      pen.line({centre.x + dx / apart * radius, centre.y + dy / apart * radius}, corner, kInk, 1.5F);
+    if (distance > radius) {
+      pen.line({centre.x + dx / distance * radius, centre.y + dy / distance * radius}, corner, kInk, 1.5F);
     }
   }
   pen.frame(a, b, kInk, 0.0F, 2.0F);
@@ -171,7 +173,8 @@ std::optional<PixelBox> draw_history(const Pen& pen, const OverlayContent& conte
   for (const ForceSample& sample : content.history) {
     if (std::isfinite(sample.force_N)) most = std::max(most, sample.force_N);
   }
-  // The end of the axis: twice the largest round number below, or that number where it is enough.
+  // End of the axis: the largest round number not above the maximum, or twice that number if the maximum
+  // exceeds it.
   double top = most > 0.0 ? round_down(most) : 1.0;
   while (top < most) top += round_down(most);
   pen.plate(x0, y0, w, h);
@@ -181,7 +184,7 @@ std::optional<PixelBox> draw_history(const Pen& pen, const OverlayContent& conte
   const float high = y0 + 1.9F * em;
   pen.line({x0 + 2.0F, high}, {x0 + w - 2.0F, high}, kEdge);
   pen.line({x0 + 2.0F, low}, {x0 + w - 2.0F, low}, kEdge);
-  // The largest force in each pixel column; a gap where it was not finite.
+  // Largest force in each pixel column; a gap where it is not finite.
   const auto columns = static_cast<std::size_t>(w) - 4;
   std::vector<double> column(columns, -1.0);
   for (const ForceSample& sample : content.history) {

@@ -35,7 +35,7 @@ EGLDisplay initialised(EGLDisplay display) {
 }
 
 EGLDisplay open_display() {
-  // The function loader ends the program when these are missing; so look first.
+  // libepoxy ends the program when these libraries are missing, so they are looked for first.
   if (!library_exists("libEGL.so.1"))
     throw std::runtime_error(std::string("libEGL.so.1 is not here") + remedy);
   if (!library_exists("libOpenGL.so.0") && !library_exists("libGL.so.1")) {
@@ -51,7 +51,7 @@ EGLDisplay open_display() {
   }
   if (display == EGL_NO_DISPLAY && has("EGL_EXT_platform_base") && has("EGL_EXT_platform_device") &&
       has("EGL_EXT_device_enumeration")) {
-    // A vendor's driver without Mesa: the first device it names.
+    // A vendor's driver without Mesa: take its first device.
     EGLDeviceEXT device = nullptr;
     EGLint count = 0;
     if (eglQueryDevicesEXT(1, &device, &count) == EGL_TRUE && count > 0) {
@@ -64,12 +64,12 @@ EGLDisplay open_display() {
   return display;
 }
 
-// A context with no surface, current on this thread while it lives.
+// An EGL context without a surface, current on this thread during its life.
 class OffscreenContext {
  public:
   OffscreenContext() {
-    // Opened once and never closed: the driver stays loaded, and a second picture starts at once. A failure
-    // is tried again.
+    // Opened once and never closed: the driver stays loaded, and the next picture starts without delay. A
+    // failure is tried again.
     static const EGLDisplay opened = open_display();
     display_ = opened;
     if (eglBindAPI(EGL_OPENGL_API) != EGL_TRUE) {

@@ -1,29 +1,29 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A picture of a session without a display: an EGL context that has no surface, drawn by Mesa in software
-// where there is no graphics card.
+// A picture of a session without a display: an EGL context without a surface. On a machine without a graphics
+// card, Mesa draws in software.
 #pragma once
 
 #include <filesystem>
 #include <memory>
 #include <optional>
 
-#include "hybrid/view/camera.h"
 #include "hybrid/snapshot/snapshot.h"
+#include "hybrid/view/camera.h"
 
 namespace hybrid {
 
 struct PictureOptions {
   int width = 1280, height = 960;  // (pixels), 1 to 8192 each
   std::optional<Camera> camera;    // default: frame_scene()
-  bool inset = true;               // a nearer view of the contact, where the tool is small in the whole
+  bool inset = true;  // draw a nearer view of the contact when the tool is small in the whole view
 };
 
-// Throws std::runtime_error, with what to do: no EGL or OpenGL on this machine, size out of range, file not
-// writable.
+// Throws std::runtime_error that names the remedy: no EGL or OpenGL on this machine, size out of range, file
+// not writable.
 void save_picture(const std::filesystem::path& png, const DrawnScene& scene, const Snapshot& snapshot,
                   const PictureOptions& options = {});
 
-// The same for many snapshots of one scene: surfaces are uploaded once. Keeps a reference to the scene; the
+// The same for many snapshots of one scene: surfaces are uploaded once. Keeps a reference to the scene. The
 // context is current on the thread that made it, and only that thread may call save().
 class PictureMaker {
  public:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// PNG files out. With height_image.cpp, which reads them, the only part of the project that knows libpng.
+// Writes PNG files. Only this file and height_image.cpp, which reads PNG files, know libpng.
 #pragma once
 
 #include <cstdint>
@@ -8,8 +8,9 @@
 
 namespace hybrid {
 
-// Rows from the top, three bytes (RGB) a pixel, 3·width·height of them. Throws std::runtime_error: not
-// writable, disk full. A file that could not be finished is removed.
+// `rgb`: rows from the top, three bytes (RGB) a pixel, 3·width·height in all. Throws std::runtime_error: not
+// writable, disk full. An unfinished file is removed. Throws std::invalid_argument when the number of pixels
+// does not match the size.
 void save_png(const std::filesystem::path& file, int width, int height, std::span<const std::uint8_t> rgb);
 
 }  // namespace hybrid

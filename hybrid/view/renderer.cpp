@@ -13,119 +13,22 @@
 #include <string>
 #include <string_view>
 
-#include "hybrid/view/unit_shapes.h"
-#include "hybrid/view/tool_and_arrow.h"
+#include "hybrid/view/gl_objects.h"
 #include "hybrid/view/palette.h"
 #include "hybrid/view/renderer_shaders.h"
+#include "hybrid/view/tool_and_arrow.h"
+#include "hybrid/view/unit_shapes.h"
 
 namespace hybrid {
 namespace {
 
-void check_gl(const char* doing) {
-  const GLenum error = glGetError();
-  if (error == GL_NO_ERROR) return;
-  for (int i = 0; i < 16 && glGetError() != GL_NO_ERROR; ++i) {
-  }
-  if (error == GL_OUT_OF_MEMORY) {
-    throw std::runtime_error(std::string("the graphics memory is full while ") + doing +
-                             "; use a smaller picture or a coarser mesh");
-  }
-  throw std::runtime_error("OpenGL error " + std::to_string(error) + " while " + doing +
-                           "; update the graphics driver, or set LIBGL_ALWAYS_SOFTWARE=1 to draw without it");
-}
-
-GLuint compile(GLenum kind, const char* source) {
-  const GLuint shader = glCreateShader(kind);
-  glShaderSource(shader, 1, &source, nullptr);
-  glCompileShader(shader);
-  GLint good = GL_FALSE;
-  glGetShaderiv(shader, GL_COMPILE_STATUS, &good);
-  if (good != GL_TRUE) {
-    std::string log(1024, '\0');
-    GLsizei length = 0;
-    glGetShaderInfoLog(shader, static_cast<GLsizei>(log.size()), &length, log.data());
-    log.resize(static_cast<std::size_t>(std::max(length, 0)));
-    throw std::runtime_error("the graphics driver refuses a shader: " + log +
-                             "; set LIBGL_ALWAYS_SOFTWARE=1 to draw without it");
-  }
-  return shader;
-}
-
-GLuint link(const char* vertex, const char* fragment) {
-  const GLuint program = glCreateProgram();
-  const GLuint parts[] = {compile(GL_VERTEX_SHADER, vertex), compile(GL_FRAGMENT_SHADER, fragment)};
-  for (const GLuint part : parts) {
-    glAttachShader(program, part);
-    glDeleteShader(part);
-  }
-  glLinkProgram(program);
-  GLint good = GL_FALSE;
-  glGetProgramiv(program, GL_LINK_STATUS, &good);
-  if (good != GL_TRUE) throw std::runtime_error("the graphics driver cannot link a shader; update it");
-  return program;
-}
-
-const void* offset(std::size_t bytes) {
-  return reinterpret_cast<const void*>(bytes);  // NOLINT(performance-no-int-to-ptr): how OpenGL wants it
-}
-
-struct Mesh {
-  GLuint array = 0, vertices = 0, indices = 0, colours = 0;
-  GLsizei count = 0;
-
-  void upload(const DrawMesh& mesh, GLenum usage) {
-    if (mesh.indices.size() > static_cast<std::size_t>(std::numeric_limits<GLsizei>::max())) {
-      throw std::runtime_error("a surface of " + std::to_string(mesh.indices.size() / 3) +
-                               " triangles is more than one draw call holds; simplify the mesh");
-    }
-    glGenVertexArrays(1, &array);
-    glGenBuffers(1, &vertices);
-    glGenBuffers(1, &indices);
-    glBindVertexArray(array);
-    glBindBuffer(GL_ARRAY_BUFFER, vertices);
-    glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(mesh.vertices.size() * sizeof(DrawVertex)),
-                 mesh.vertices.data(), usage);
-    glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, indices);
-    glBufferData(GL_ELEMENT_ARRAY_BUFFER,
-                 static_cast<GLsizeiptr>(mesh.indices.size() * sizeof(std::uint32_t)), mesh.indices.data(),
-                 GL_STATIC_DRAW);
-    constexpr auto stride = static_cast<GLsizei>(sizeof(DrawVertex));
-    glVertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, stride, offset(offsetof(DrawVertex, position)));
-    glVertexAttribPointer(1, 3, GL_FLOAT, GL_FALSE, stride, offset(offsetof(DrawVertex, normal)));
-    glVertexAttribPointer(2, 1, GL_FLOAT, GL_FALSE, stride, offset(offsetof(DrawVertex, displacement_m)));
-    for (GLuint i = 0; i < 3; ++i) glEnableVertexAttribArray(i);
-    count = static_cast<GLsizei>(mesh.indices.size());
-  }
-  // A colour a vertex, sRGB, once.
-  void upload_colours(const std::vector<VertexColour>& of_vertex) {
-    glGenBuffers(1, &colours);
-    glBindVertexArray(array);
-    glBindBuffer(GL_ARRAY_BUFFER, colours);
-    glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(of_vertex.size() * sizeof(VertexColour)),
-                 of_vertex.data(), GL_STATIC_DRAW);
-    glVertexAttribPointer(3, 4, GL_UNSIGNED_BYTE, GL_TRUE, 0, offset(0));
-    glEnableVertexAttribArray(3);
-  }
-  // Orphans the old storage, so that the card need not wait for the last frame.
-  void stream(const DrawMesh& mesh) const {
-    const auto bytes = static_cast<GLsizeiptr>(mesh.vertices.size() * sizeof(DrawVertex));
-    glBindBuffer(GL_ARRAY_BUFFER, vertices);
-    glBufferData(GL_ARRAY_BUFFER, bytes, nullptr, GL_STREAM_DRAW);
-    glBufferSubData(GL_ARRAY_BUFFER, 0, bytes, mesh.vertices.data());
-  }
-  void draw() const {
-    glBindVertexArray(array);
-    glDrawElements(GL_TRIANGLES, count, GL_UNSIGNED_INT, nullptr);
-  }
-};
-
 struct Object {
-  Mesh mesh;
+  GlMesh mesh;
   DrawMesh moving;  // kept for a soft object only
   bool soft = false;
   glm::vec3 colour{1.0F};
   SceneBounds bounds;      // at rest
-  glm::mat4 placed{1.0F};  // from where it was uploaded to where it is
+  glm::mat4 placed{1.0F};  // from the uploaded pose to the present pose
 };
 
 bool finite(const glm::dvec3& v) {
@@ -138,16 +41,16 @@ constexpr int most_pixels = 8192;
 
 struct Renderer::State {
   GLuint mesh_program = 0, depth_program = 0, overlay_program = 0;
-  GLuint program = 0;  // the one in use, of mesh and depth
+  GLuint program = 0;  // in use: the mesh's or the depth's
   std::vector<Object> objects;
-  Mesh ball, cylinder, cone, disc;
+  GlMesh ball, cylinder, cone, disc;
   GLuint overlay_array = 0, overlay_vertices = 0, overlay_indices = 0, font = 0;
   GLuint scene_frame = 0, scene_colour = 0, scene_depth = 0;
   GLuint shown_frame = 0, shown_depth = 0;
   GLuint final_frame = 0, final_colour = 0;
   int width = 0, height = 0, factor = 1, wanted_factor = 1, built_width = 0, built_height = 0;
   SceneBounds bounds;        // at rest
-  glm::dvec3 origin_m{0.0};  // what the card's floats are relative to
+  glm::dvec3 origin_m{0.0};  // uploaded floats are relative to this point
   double most_moved_m = 0.0;
 
   void use(GLuint which, const glm::mat4& clip) {
@@ -164,7 +67,7 @@ struct Renderer::State {
     glUniform3fv(glGetUniformLocation(program, name), 1, glm::value_ptr(value));
   }
   void place(const glm::mat4& scene_from_mesh) const {
-    // Normals of the unit shapes survive a transpose-inverse; the identity's is itself.
+    // The inverse transpose keeps normals perpendicular under non-uniform scale.
     const glm::mat3 normal = glm::transpose(glm::inverse(glm::mat3(scene_from_mesh)));
     glUniformMatrix4fv(glGetUniformLocation(program, "scene_from_mesh"), 1, GL_FALSE,
                        glm::value_ptr(scene_from_mesh));
@@ -177,46 +80,19 @@ struct Renderer::State {
   void draw_arrow(const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera) const;
 };
 
-namespace {
-
-GLuint make_target(GLenum inner, GLenum outer, GLenum type, int width, int height) {
-  GLuint texture = 0;
-  glGenTextures(1, &texture);
-  glBindTexture(GL_TEXTURE_2D, texture);
-  glTexImage2D(GL_TEXTURE_2D, 0, static_cast<GLint>(inner), width, height, 0, outer, type, nullptr);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
-  return texture;
-}
-
-void attach(GLuint frame, GLuint colour, GLuint depth) {
-  glBindFramebuffer(GL_FRAMEBUFFER, frame);
-  glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, colour, 0);
-  glFramebufferTexture2D(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_TEXTURE_2D, depth, 0);
-  const GLenum buffer = colour != 0 ? GL_COLOR_ATTACHMENT0 : GL_NONE;
-  glDrawBuffers(1, &buffer);
-  glReadBuffer(buffer);
-  if (glCheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE) {
-    throw std::runtime_error(
-        "the graphics driver cannot draw into a picture of this size; ask for a smaller one");
-  }
-}
-
-}  // namespace
-
 void Renderer::State::build_targets() {
   const int w = width * factor;
   const int h = height * factor;
   if (w == built_width && h == built_height) return;
   const GLuint old[] = {scene_colour, scene_depth, shown_depth, final_colour};
   glDeleteTextures(4, old);
-  scene_colour = make_target(GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE, w, h);
-  scene_depth = make_target(GL_DEPTH_COMPONENT32F, GL_DEPTH_COMPONENT, GL_FLOAT, w, h);
-  shown_depth = make_target(GL_DEPTH_COMPONENT32F, GL_DEPTH_COMPONENT, GL_FLOAT, w, h);
-  final_colour = make_target(GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE, width, height);
-  attach(scene_frame, scene_colour, scene_depth);
-  attach(shown_frame, 0, shown_depth);
-  attach(final_frame, final_colour, 0);
+  scene_colour = make_texture_target(GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE, w, h);
+  scene_depth = make_texture_target(GL_DEPTH_COMPONENT32F, GL_DEPTH_COMPONENT, GL_FLOAT, w, h);
+  shown_depth = make_texture_target(GL_DEPTH_COMPONENT32F, GL_DEPTH_COMPONENT, GL_FLOAT, w, h);
+  final_colour = make_texture_target(GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE, width, height);
+  attach_targets(scene_frame, scene_colour, scene_depth);
+  attach_targets(shown_frame, 0, shown_depth);
+  attach_targets(final_frame, final_colour, 0);
   built_width = w;
   built_height = h;
 }
@@ -264,9 +140,9 @@ Renderer::Renderer(const DrawnScene& scene, Samples samples) : state_(std::make_
   const auto* name = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
   const bool software = name != nullptr && std::string_view(name).find("llvmpipe") != std::string_view::npos;
   s.wanted_factor = software && samples == Samples::fast ? 1 : 2;
-  s.mesh_program = link(shaders::mesh_vertex, shaders::mesh_fragment);
-  s.depth_program = link(shaders::mesh_vertex, shaders::depth_fragment);
-  s.overlay_program = link(shaders::overlay_vertex, shaders::overlay_fragment);
+  s.mesh_program = link_program(shaders::mesh_vertex, shaders::mesh_fragment);
+  s.depth_program = link_program(shaders::mesh_vertex, shaders::depth_fragment);
+  s.overlay_program = link_program(shaders::overlay_vertex, shaders::overlay_fragment);
   s.bounds = bounds_of(scene);
   s.origin_m = s.bounds.centre_m;
   s.objects.resize(scene.objects.size());
@@ -295,9 +171,10 @@ Renderer::Renderer(const DrawnScene& scene, Samples samples) : state_(std::make_
   glBindBuffer(GL_ARRAY_BUFFER, s.overlay_vertices);
   glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, s.overlay_indices);
   constexpr auto stride = static_cast<GLsizei>(sizeof(OverlayVertex));
-  glVertexAttribPointer(0, 2, GL_FLOAT, GL_FALSE, stride, offset(offsetof(OverlayVertex, x)));
-  glVertexAttribPointer(1, 2, GL_FLOAT, GL_FALSE, stride, offset(offsetof(OverlayVertex, u)));
-  glVertexAttribPointer(2, 4, GL_UNSIGNED_BYTE, GL_TRUE, stride, offset(offsetof(OverlayVertex, colour)));
+  glVertexAttribPointer(0, 2, GL_FLOAT, GL_FALSE, stride, buffer_offset(offsetof(OverlayVertex, x)));
+  glVertexAttribPointer(1, 2, GL_FLOAT, GL_FALSE, stride, buffer_offset(offsetof(OverlayVertex, u)));
+  glVertexAttribPointer(2, 4, GL_UNSIGNED_BYTE, GL_TRUE, stride,
+                        buffer_offset(offsetof(OverlayVertex, colour)));
   for (GLuint i = 0; i < 3; ++i) glEnableVertexAttribArray(i);
   glGenFramebuffers(1, &s.scene_frame);
   glGenFramebuffers(1, &s.shown_frame);
@@ -305,7 +182,7 @@ Renderer::Renderer(const DrawnScene& scene, Samples samples) : state_(std::make_
   check_gl("uploading the scene");
 }
 
-// The context goes with its picture or window, and takes every object with it.
+// Destroying the context (owned by picture or window) frees every OpenGL object.
 Renderer::~Renderer() = default;
 
 void Renderer::set_font(const FontAtlas& atlas) {
@@ -342,11 +219,11 @@ void Renderer::begin(const DrawnScene& scene, const Snapshot& snapshot, int widt
       continue;
     const float moved = move_vertices(object.moving, rest, snapshot.soft_moved_m[i], s.origin_m);
     object.mesh.stream(object.moving);
-    // What moved by less than a thousandth of the tool has not moved to the eye: rounding is not to be a
+    // Motion below a thousandth of the tool's radius does not start a scale: rounding must not show as a
     // pattern.
     const double least = 1e-3 * scene.tool_radius_m;
     if (static_cast<double>(moved) > std::max(s.most_moved_m, least)) {
-      // A round number at or above, never falling.
+      // A round number at or above the motion; it never falls.
       const double power = std::pow(10.0, std::floor(std::log10(static_cast<double>(moved))));
       for (const double step : {1.0, 2.0, 5.0, 10.0}) {
         s.most_moved_m = step * power;
@@ -397,7 +274,8 @@ void Renderer::draw(const DrawnScene& scene, const Snapshot& snapshot, const Cam
   glDepthFunc(GL_LEQUAL);
   glDepthMask(GL_TRUE);
 
-  // Depth of what must not be hidden: soft objects, and a disc about the tool a little larger than it.
+  // Depth of the things that must not be hidden: soft objects, the arrow, and a disc a little larger than the
+  // tool.
   s.use(s.depth_program, clip);
   glBindFramebuffer(GL_FRAMEBUFFER, s.shown_frame);
   glClear(GL_DEPTH_BUFFER_BIT);
@@ -426,15 +304,15 @@ void Renderer::draw(const DrawnScene& scene, const Snapshot& snapshot, const Cam
   s.draw_objects(false, 1);
 
   glEnable(GL_BLEND);
-  glEnable(GL_CULL_FACE);  // closed shapes: without it a see-through one is blended twice
+  glEnable(GL_CULL_FACE);  // closed transparent shapes would otherwise be blended twice
   glDepthMask(GL_FALSE);
   if (tool_known) {
     glDepthFunc(GL_GREATER);
     draw_felt(0.28F);
     glDepthFunc(GL_LEQUAL);
-    const bool apart = glm::length(snapshot.device_m - snapshot.proxy_m) > 0.03 * scene.tool_radius_m;
-    if (apart && finite(snapshot.device_m)) {
-      glDepthFunc(GL_ALWAYS);  // the device point lies within what the proxy may not enter
+    const bool device_is_off = glm::length(snapshot.device_m - snapshot.proxy_m) > 0.03 * scene.tool_radius_m;
+    if (device_is_off && finite(snapshot.device_m)) {
+      glDepthFunc(GL_ALWAYS);  // the device point lies inside an object
       s.uniform("pass", 3);
       s.uniform("own_colour", palette::device);
       s.draw_tool(scene, snapshot.device_m);
@@ -443,7 +321,7 @@ void Renderer::draw(const DrawnScene& scene, const Snapshot& snapshot, const Cam
     }
   }
   glDisable(GL_CULL_FACE);
-  // Rigid surfaces before what must be seen: only the nearest of them is blended, found by depth alone first.
+  // Rigid surfaces in front of those: only the nearest is blended; a depth-only pass finds it first.
   glDepthMask(GL_TRUE);
   glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
   s.use(s.depth_program, clip);

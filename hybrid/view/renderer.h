@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Draws a scene and a snapshot with OpenGL 3.3. Picture and window use this one implementation; each brings
 // its own context, which must be current on the calling thread for every call here.
-//
-// How hidden things are shown: rigid objects are opaque, except where they stand in front of a soft object,
-// the tool, or the neighbourhood of the tool: there only their nearest surface is drawn, thin in the middle
-// and dense at its rim. The tool and the arrow show faintly through tissue.
+// Hidden things: rigid objects are opaque, except in front of a soft object, the tool, or the neighbourhood
+// of the tool. There only their nearest surface is drawn, thin in the middle and dense at its rim. The tool
+// and the arrow show faintly through tissue.
 #pragma once
 
 #include <cstdint>
@@ -12,8 +11,8 @@
 #include <span>
 #include <vector>
 
-#include "hybrid/view/camera.h"
 #include "hybrid/snapshot/snapshot.h"
+#include "hybrid/view/camera.h"
 
 namespace hybrid {
 
@@ -36,13 +35,13 @@ struct FontAtlas {
   std::span<const std::uint8_t> alpha;  // width × height
 };
 
-// Four samples a pixel always, or one where the context draws without a graphics card.
+// Samples per pixel: always four (fine), or one if the context draws without a graphics card (fast).
 enum class Samples : std::uint8_t { fine, fast };
 
 class Renderer {
  public:
-  // Uploads what never moves. Throws std::runtime_error: context older than 3.3, out of memory, mesh beyond
-  // what one draw call may hold. The scene is not needed afterwards, except by the caller for later calls.
+  // Uploads the static meshes. Throws std::runtime_error: context older than 3.3, out of memory, mesh too
+  // large for one draw call. Keeps no reference to the scene; later calls take it again.
   explicit Renderer(const DrawnScene& scene, Samples samples);
   Renderer(const Renderer&) = delete;
   Renderer& operator=(const Renderer&) = delete;
@@ -52,21 +51,21 @@ class Renderer {
 
   void set_font(const FontAtlas& atlas);
 
-  // Starts a frame of this many pixels (1 to 8192 each; throws std::runtime_error otherwise) and takes the
-  // snapshot's moving vertices. `scene` is the scene it was made from.
+  // Starts a frame of this many pixels (1 to 8192 each; throws std::runtime_error otherwise) and uploads the
+  // snapshot's moving vertices. `scene` must be the scene that the renderer was made from.
   void begin(const DrawnScene& scene, const Snapshot& snapshot, int width, int height);
-  // Draws the scene into a part of the frame, over what is there.
+  // Draws the scene into a part of the frame, over its content.
   void draw(const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera, const PixelRect& where);
-  // Draws the overlay, and ends the frame. Throws std::runtime_error on an OpenGL error anywhere in it.
+  // Draws the overlay and ends the frame. Throws std::runtime_error on an OpenGL error anywhere in the frame.
   void finish(const OverlayMesh& overlay);
 
-  // Copies the finished frame to the context's own framebuffer (a window).
+  // Copies the finished frame to the context's default framebuffer (a window).
   void present(int width, int height);
-  // The finished frame, rows from the top, three bytes (RGB) a pixel.
+  // Returns the finished frame: rows from the top, three bytes (RGB) a pixel.
   [[nodiscard]] std::vector<std::uint8_t> read_rgb();
 
-  // Displacement that has the colour scale's last colour (unit: meter): a round number, never falling, so
-  // that colours keep their meaning from frame to frame.
+  // Displacement at the end of the colour scale (unit: meter): a round number that never falls, so that
+  // colours keep their meaning from frame to frame.
   [[nodiscard]] double displacement_scale_m() const;
 
  private:

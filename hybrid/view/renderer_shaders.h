@@ -27,9 +27,9 @@ void main() {
 }
 )";
 
-// pass 0: lit, opaque or with one alpha. pass 1: rigid, only where nothing to be shown lies behind.
-// pass 2: rigid, only where something does: dense at the rim, thin where it faces the eye. pass 3: like
-// glass.
+// pass 0: lit, opaque or with one alpha. pass 1: rigid, only in pixels without a soft object or tool behind.
+// pass 2: rigid, only in the other pixels: dense at the rim, thin in the part that faces the eye. pass 3:
+// like glass.
 inline constexpr const char* mesh_fragment = R"(#version 330 core
 in vec3 scene_position;
 in vec3 scene_normal;
@@ -94,7 +94,7 @@ void main() {
 }
 )";
 
-// Depth alone, where lighting would be thrown away: all fragments (pass 0), or those of pass 2 above.
+// Depth only, without lighting: all fragments (pass 0), or those of pass 2 above.
 inline constexpr const char* depth_fragment = R"(#version 330 core
 uniform int pass;
 uniform sampler2D shown_depth;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the overlay draws with: lines, plates and words in pixels (y down), of one list and two fonts.
+// Drawing primitives of the overlay: lines, plates and text in pixels (y down), on one draw list with two
+// fonts.
 #pragma once
 
 #include <cstdint>
@@ -32,7 +33,7 @@ struct Pen {
 
   [[nodiscard]] float width(const std::string& text, bool large = false) const;
   void text(float x, float y, Ink ink, const std::string& words, bool large = false) const;
-  // On a light plate, for words over the scene.
+  // Text on a light plate, for use over the scene.
   void label(float x, float y, Ink ink, const std::string& words) const;
   void plate(float x, float y, float w, float h) const;
   void fill(const glm::vec2& low, const glm::vec2& high, Ink ink, float round = 0.0F) const;
@@ -40,7 +41,7 @@ struct Pen {
              float thick = 1.0F) const;
   void line(const glm::vec2& from, const glm::vec2& to, Ink ink, float thick = 1.0F) const;
   void circle(const glm::vec2& centre, float radius, Ink ink, float thick) const;
-  // Shortened at the end so that it is at most `most` pixels wide; cuts between UTF-8 characters.
+  // Shortens text at the end to at most `most` pixels; cuts between UTF-8 characters.
   [[nodiscard]] std::string fit(std::string words, float most) const;
 };
 

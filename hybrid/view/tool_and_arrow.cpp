@@ -9,7 +9,7 @@
 namespace hybrid {
 namespace {
 
-constexpr double punch_height = 3.0;  // of the body drawn above its face, in radii
+constexpr double punch_height = 3.0;  // height of the body above the face, in radii
 
 glm::mat4 placed(const glm::dvec3& at, const glm::dmat3& axes) {
   glm::dmat4 m(axes);
@@ -30,7 +30,7 @@ glm::dvec3 arrow_tip(const DrawnScene& scene, const Snapshot& snapshot, const Ca
   if (!(force > 1e-3) || !std::isfinite(force)) return snapshot.proxy_m;
   const double full = scene.max_force_N > 0.0 ? scene.max_force_N : force;
   const double length = arrow_share_of_view * camera.view_height_m() * std::min(force / full, 1.0);
-  // The part within the tool is not seen: the arrow's length counts from its surface.
+  // The part within the tool is hidden: the arrow's length counts from the tool's surface.
   const glm::dvec3 along = snapshot.force_N / force;
   double inside = scene.tool_radius_m;
   if (scene.tool_is_punch) {
@@ -47,7 +47,7 @@ ArrowPlacement place_arrow(const DrawnScene& scene, const Snapshot& snapshot, co
   const glm::dvec3 along = arrow_tip(scene, snapshot, camera) - snapshot.proxy_m;
   const double length = glm::length(along);
   if (!(length > 0.0) || !std::isfinite(length)) return arrow;
-  // Thinner than the tool it springs from, unless it would then not be seen.
+  // Thinner than the tool, but never too thin to be seen.
   const double thick =
       std::clamp(0.4 * scene.tool_radius_m, 0.0035 * camera.view_height_m(), 0.007 * camera.view_height_m());
   const double head = std::min(0.5 * length, 5.0 * thick);
@@ -72,7 +72,7 @@ glm::mat4 place_rigid(const RigidPlace& place, const glm::dvec3& origin_m) {
   const glm::dmat3 turn = glm::mat3_cast(place.turn);
   const glm::dvec3 about = place.about_m - origin_m;
   glm::dmat4 placed(turn);
-  placed[3] = glm::dvec4(about + place.way_m - turn * about, 1.0);
+  placed[3] = glm::dvec4(about + place.shift_m - turn * about, 1.0);
   return glm::mat4(placed);
 }
 

@@ -27,8 +27,8 @@ glm::vec3 unit_or_zero(const glm::vec3& v) {
   return length > 0.0F && std::isfinite(length) ? v / length : glm::vec3(0.0F);
 }
 
-// Area-weighted normals of shared vertices. Areas are taken in units of the mesh's own size: a
-// micrometer-wide triangle's area would leave the range of floats.
+// Area-weighted normals of shared vertices. Areas are in units of the mesh's own size: the area of a
+// micrometer-wide triangle would leave the range of floats.
 void set_shared_normals(DrawMesh& draw) {
   for (DrawVertex& vertex : draw.vertices) vertex.normal = glm::vec3(0.0F);
   for (std::size_t t = 0; t + 2 < draw.indices.size(); t += 3) {
@@ -38,7 +38,8 @@ void set_shared_normals(DrawMesh& draw) {
     const glm::vec3 u = b.position - a.position;
     const glm::vec3 v = c.position - a.position;
     const float size = std::max(std::max(glm::length(u), glm::length(v)), 1e-30F);
-    // sqrt-of-area weighting would do too; weighting by the area over the longest edge keeps exponents small.
+    // The weight is area over longest edge: it keeps exponents small. (The square root of the area would also
+    // do.)
     const glm::vec3 normal = glm::cross(u / size, v / size) * size;
     a.normal += normal;
     b.normal += normal;
@@ -61,8 +62,8 @@ DrawMesh shared_mesh(const polygon::TriangleMesh& mesh, const glm::dvec3& origin
   return draw;
 }
 
-// Every triangle has its own three vertices; a corner's normal is the mean over those neighbours that turn by
-// less than the crease angle.
+// Every triangle gets three vertices of its own. A corner's normal is the mean over those neighbours whose
+// normal differs by less than the crease angle.
 DrawMesh creased_mesh(const polygon::TriangleMesh& mesh, const glm::dvec3& origin_m) {
   constexpr double crease = 40.0 * std::numbers::pi / 180.0;
   const double cos_crease = std::cos(crease);
@@ -88,7 +89,8 @@ DrawMesh creased_mesh(const polygon::TriangleMesh& mesh, const glm::dvec3& origi
   DrawMesh draw;
   draw.vertices.reserve(3 * kept.size());
   draw.indices.reserve(3 * kept.size());
-  // A vertex shared by very many triangles (a soup's worst case) must not make this quadratic.
+  // Bounds the cost for a vertex that very many triangles share (worst case of a triangle soup), which would
+  // be quadratic.
   constexpr std::uint32_t at_most = 64;
   for (std::size_t t = 0; t < kept.size(); ++t) {
     const double own = glm::length(area[t]);
@@ -112,7 +114,7 @@ DrawMesh creased_mesh(const polygon::TriangleMesh& mesh, const glm::dvec3& origi
 
 constexpr std::uint32_t sides = 48;
 
-// Rings of `sides` vertices about z, joined in order; each ring gives radius, height and normal (radial,
+// Rings of `sides` vertices about z, joined in order. Each ring has a radius, a height and a normal (radial,
 // axial).
 struct Ring {
   float radius, z, normal_radial, normal_z;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Meshes as a graphics card wants them: floats about an origin, with normals. Knows no graphics library.
+// Meshes in the layout of the graphics card: floats relative to an origin, with normals. Knows no graphics
+// library.
 #pragma once
 
 #include <array>
@@ -15,37 +16,37 @@
 namespace hybrid {
 
 struct DrawVertex {
-  glm::vec3 position{0.0F};  // relative to the origin it was made about (unit: meter)
-  glm::vec3 normal{0.0F};    // unit; zero where the mesh does not tell (degenerate, inconsistently oriented)
+  glm::vec3 position{0.0F};     // relative to the mesh's origin (unit: meter)
+  glm::vec3 normal{0.0F};       // unit; zero if undefined (degenerate or inconsistently oriented)
   float displacement_m = 0.0F;  // from rest; 0 for a rigid object
 };
 static_assert(sizeof(DrawVertex) == 28, "uploaded as it stands");
 
 struct DrawMesh {
   std::vector<DrawVertex> vertices;
-  std::vector<std::uint32_t> indices;  // three a triangle, all in range
+  std::vector<std::uint32_t> indices;  // three per triangle, all in range
 };
 
-// A surface that never moves. Small meshes (boxes) get their sharp edges split, so that they look sharp;
-// above 30,000 triangles neighbours are smaller than what is seen, and normals are shared. Triangles with an
+// A surface that never moves. Meshes of up to 30,000 triangles get their sharp edges split, so that edges
+// look sharp. Larger ones share normals: their triangles are smaller than the eye resolves. Triangles with an
 // index out of range or a vertex that is not finite are left out.
 DrawMesh make_draw_mesh(const polygon::TriangleMesh& mesh, const glm::dvec3& origin_m);
 
-// One vertex a mesh vertex, in the mesh's order, so that move_vertices() can follow.
+// One vertex per mesh vertex, in the mesh's order, as move_vertices() needs it.
 DrawMesh make_moving_mesh(const polygon::TriangleMesh& mesh, const glm::dvec3& origin_m);
 
-// Colours (sRGB) of the materials beneath an object's vertices, in the mesh's order; empty where it has one
+// Colours (sRGB) of the materials at an object's vertices, in the mesh's order; empty if the object has one
 // colour.
 using VertexColour = std::array<std::uint8_t, 4>;
 std::vector<VertexColour> colours_of_vertices(const DrawnScene& scene, std::size_t index);
 
-// Puts the vertices of a moving mesh where they are now, `moved_m` from rest; normals and displacements
-// follow. Vertices whose displacement is not finite stay at rest. Returns the largest displacement (unit:
-// meter). `moved_m` must have as many entries as `rest`.
+// Moves the vertices of a moving mesh to `moved_m` (meters) from rest and updates normals and displacements.
+// Vertices whose displacement is not finite stay at rest. Returns the largest displacement (unit: meter).
+// `moved_m` must have as many entries as `rest`.
 float move_vertices(DrawMesh& draw, std::span<const glm::dvec3> rest, std::span<const glm::vec3> moved_m,
                     const glm::dvec3& origin_m);
 
-// Shapes of size one, outward, for tool and arrow.
+// Shapes of unit size for tool and arrow, normals outward.
 DrawMesh make_unit_ball();      // radius 1 about the origin
 DrawMesh make_unit_cylinder();  // radius 1 about z, from z = 0 to z = 1, closed
 DrawMesh make_unit_cone();      // radius 1 at z = 0, tip at z = 1, closed

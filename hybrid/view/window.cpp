@@ -60,15 +60,15 @@ struct Window::State {
   std::optional<FramePainter> painter;
   double history_s;
   Camera camera;
-  bool framed = false;  // the view was chosen (with the first snapshot, which tells where the tool is)
+  bool framed = false;  // the view has been chosen (needs the first snapshot: it has the tool's position)
   bool wants_frame = false, painted = false;
   Drag drag = Drag::none;
   double x = 0.0, y = 0.0;  // of the pointer (pixels of the framebuffer)
-  glm::dvec3 grip_m{0.0};   // from the point under the pointer to the tool, when it was taken hold of
-  // Where the tool was then: the plane of the drag stays there. Were it to follow the device, contact could
-  // push the goal itself away.
-  glm::dvec3 held_m{0.0};
-  glm::dvec3 device_m{0.0};  // where the device was last shown
+  glm::dvec3 grip_m{0.0};   // from the point under the pointer to the tool, at the start of the drag
+  // Tool's position at the start of the drag; the plane of the drag stays there. If the plane followed the
+  // device, contact could push the goal away.
+  glm::dvec3 drag_plane_m{0.0};
+  glm::dvec3 device_m{0.0};  // device position in the last frame
   WindowInput input;
   std::deque<ForceSample> history;
   int width = 0, height = 0;
@@ -77,7 +77,7 @@ struct Window::State {
 
   static State& of(GLFWwindow* handle) { return *static_cast<State*>(glfwGetWindowUserPointer(handle)); }
 
-  // Pointer positions come in screen units, drawing is in pixels; on some displays they differ.
+  // Pointer positions are in screen units, drawing is in pixels; on some displays they differ.
   void pointer(double screen_x, double screen_y) {
     int screen_width = 0;
     int screen_height = 0;
@@ -102,7 +102,7 @@ struct Window::State {
         break;
       }
       case Drag::tool:
-        input.dragged_goal_m = camera.point_at({x, y}, width, height, held_m) + grip_m;
+        input.dragged_goal_m = camera.point_at({x, y}, width, height, drag_plane_m) + grip_m;
         break;
       case Drag::none:
         break;
@@ -120,10 +120,10 @@ struct Window::State {
       drag = Drag::pan;
     } else if (which == GLFW_MOUSE_BUTTON_RIGHT || (which == GLFW_MOUSE_BUTTON_LEFT && shift)) {
       drag = Drag::tool;
-      // Taken hold of where it is: the tool does not jump to the pointer.
-      held_m = device_m;
-      grip_m = held_m - camera.point_at({x, y}, width, height, held_m);
-      input.dragged_goal_m = held_m;
+      // The drag starts from the tool's position: the tool does not jump to the pointer.
+      drag_plane_m = device_m;
+      grip_m = drag_plane_m - camera.point_at({x, y}, width, height, drag_plane_m);
+      input.dragged_goal_m = drag_plane_m;
     } else if (which == GLFW_MOUSE_BUTTON_LEFT) {
       drag = Drag::orbit;
     }
@@ -139,7 +139,7 @@ struct Window::State {
 
   void remember(const Snapshot& snapshot) {
     if (!std::isfinite(snapshot.t_s)) return;
-    if (!history.empty() && snapshot.t_s < history.back().t_s) history.clear();  // the session began anew
+    if (!history.empty() && snapshot.t_s < history.back().t_s) history.clear();  // the session was restarted
     if (!history.empty() && snapshot.t_s <= history.back().t_s) return;          // paused
     history.push_back({snapshot.t_s, glm::length(snapshot.force_N)});
     while (history.size() > 1 && history.front().t_s < snapshot.t_s - history_s) history.pop_front();
@@ -148,7 +148,7 @@ struct Window::State {
 };
 
 Window::Window(const DrawnScene& scene, const WindowOptions& options) {
-  glfwSetErrorCallback(nullptr);  // errors are asked for, not printed
+  glfwSetErrorCallback(nullptr);  // errors are polled (glfw_reason), not printed
   state_ = std::make_unique<State>(scene, options);
   State& s = *state_;
   glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);

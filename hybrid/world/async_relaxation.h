@@ -3,9 +3,9 @@
 // tick (voxel/object/shadow_object.h). The tick's stage is hybrid/tick/tissue/async_relaxation.h, the thread
 // hybrid/session/relaxation_thread.h.
 //
-// The tick submits displacements and applies results; it never waits. When a result is ready depends on the
-// machine, and nothing else does. So the tick that first applies a result is recorded, and a replayed session
-// applies it in the same tick.
+// The tick submits displacements and applies results; it never waits. Only the time at which a result is
+// ready depends on the machine. The tick that first applies a result is therefore recorded, and a replayed
+// session applies it in the same tick.
 #pragma once
 
 #include <atomic>
@@ -20,37 +20,39 @@ namespace hybrid {
 
 // When a submitted state is relaxed, and when its result is applied.
 enum class Arrival : std::uint8_t {
-  counted,   // relaxed at once; applied after as many ticks as its work is worth: for fixed-step sessions
+  counted,   // relaxed at once; applied after a number of ticks that its work determines: for fixed-step
+             // sessions
   thread,    // relaxed by the thread; applied when it is done
   recorded,  // relaxed at once; applied in the tick that `arrived` names
   played,    // not relaxed: another thread hands out recorded results; `arrived` names the tick
 };
 
-// One soft object's shadow, and whose turn it is.
+// One soft object's shadow copy, and which side has it now.
 struct AsyncObject {
   explicit AsyncObject(voxel::SoftObject& object) : replica(object) {}
   enum class Phase : std::uint8_t { tick, thread };
 
-  voxel::Replica replica;
+  voxel::ShadowObject replica;
   std::atomic<Phase> phase{Phase::tick};
-  // ---- the tick's ----
+  // Fields below are the tick's.
   bool submitted = false;
-  std::uint64_t due = 0;   // tick in which the result arrives; of Arrival::counted
-  std::uint64_t next = 0;  // tick from which on the object is submitted again
+  std::uint64_t due = 0;   // tick in which the result arrives; for Arrival::counted
+  std::uint64_t next = 0;  // earliest tick of the next submission
   bool arrived = false;    // the result is ready
   int waited = 0;          // ticks for which a submission or a result has been put off
 };
 
+// Objects under asynchronous relaxation, and the results of this tick.
 struct AsyncRelaxation {
   [[nodiscard]] bool has(std::size_t o) const { return o < objects.size() && objects[o] != nullptr; }
 
   Arrival arrival = Arrival::counted;
   std::vector<std::unique_ptr<AsyncObject>> objects;  // [soft]; null, or empty: relaxed in the tick
-  // Bit o: the result of soft object o arrived in this tick. With Arrival::recorded and ::played set before
-  // the tick, else by it.
+  // Bit o: the result of soft object o arrived in this tick. An input with Arrival::recorded and ::played,
+  // else an output.
   std::uint64_t arrived = 0;
   std::uint64_t results = 0;  // applied so far
-  bool applied = false;       // in the last tick a result, or a part of one, was applied near the contact
+  bool applied = false;       // a result, or a part of one, was applied near the contact in the last tick
   // CPU time (us) of this tick that a separate thread would have spent; excluded from tick_us.
   double other_thread_us = 0.0;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// State of rigid bodies that move: what tissue and other bodies know of them from tick to tick.
+// State of moving rigid bodies that goes from tick to tick: distance queries of tissue and of other bodies.
 #pragma once
 
 #include <array>
@@ -15,12 +15,12 @@ namespace hybrid {
 // A surface voxel's last distance query to one body.
 struct BodyQuery {
   glm::vec3 u{0.0F};      // displacement of the voxel at the query (m)
-  bool given_up = false;  // the voxel is deep in the body, and is left alone until it is out of it
-  // No query is needed until the body's travel reaches this (m), or the voxel moves.
+  bool given_up = false;  // the voxel is deep in the body, and is left alone until it is outside
+  // No query is needed until the body's travel plus the voxel's motion reach this (m).
   double until_m = 0.0;
 };
 
-// Obstacles that moving bodies are to one soft object (hybrid/tick/bodies/bodies_press_tissue.h).
+// Obstacles that moving bodies give one soft object (hybrid/tick/bodies/bodies_press_tissue.h).
 struct BodyObstacles {
   static constexpr std::uint32_t kNobody = 0xFFFFFFFFU;
   std::vector<voxel::Obstacle> standing;  // [surface voxel] half-space of fixed surfaces
@@ -35,30 +35,30 @@ struct BodyObstacles {
 // Another object's surface nearest to a point, in that object's frame.
 struct NearestSurface {
   glm::dvec3 normal{0.0};  // outward
-  glm::dvec3 at_m{0.0};    // the nearest place
+  glm::dvec3 at_m{0.0};    // the nearest point
   double gap_m = 0.0;      // negative: the point is inside
 };
 // A contact point's last query, and its way in this tick.
 struct PointQuery : NearestSurface {
-  double seen_m = -1e300;      // travel of both objects at the query
-  double slid_m = 0.0;         // along the point's edge
-  NearestSurface end;          // where its way ends in this tick
-  std::uint64_t followed = 0;  // the round in which that way was followed
+  double queried_at_m = -1e300;  // sum of both objects' travel at the query
+  double slid_m = 0.0;           // along the point's edge
+  NearestSurface end;            // result at the end of the point's way in this tick
+  std::uint64_t followed = 0;    // round in which that way was followed
 };
 
-// A free rigid body and another one that it may collide with (hybrid/tick/bodies/body_collisions.h).
+// A free rigid body and another object that it may collide with (hybrid/tick/bodies/body_collisions.h).
 struct BodyPair {
   std::uint32_t free = 0, other = 0;
-  double size_m = 0.0, skin_m = 0.0;  // of the smaller one; the distance at which they are kept
+  double size_m = 0.0, skin_m = 0.0;  // of the smaller object; distance at which surfaces are kept
   double friction = 0.0;              // Coulomb's coefficient
-  // Travel of both in sum: up to `until_m` they do not touch; the last query was at `seen_m`.
-  double until_m = -1e300, seen_m = -1e300;
-  std::array<std::vector<PointQuery>, 2> queries;  // of the points of the one, then of the other
+  // Sum of both objects' travel: they do not touch before `until_m`; the last query was at `queried_at_m`.
+  double until_m = -1e300, queried_at_m = -1e300;
+  std::array<std::vector<PointQuery>, 2> queries;  // of the points of `free`, then of those of `other`
 };
 struct BodyCollisions {
   std::vector<BodyPair> pairs;
-  std::vector<double> travel_m;  // [rigid] no point of it has moved further since the session began
-  std::vector<Pose> last;        // [rigid] as the last tick left them
+  std::vector<double> travel_m;  // [rigid] bound on the motion of any of its points since the session began
+  std::vector<Pose> last;        // [rigid] at the end of the last tick
   std::uint64_t round = 0;
 };
 

@@ -16,20 +16,20 @@ namespace hybrid {
 namespace {
 
 constexpr double kEdgeSteps = 40.0;  // points along an edge as long as the shape's diagonal
-constexpr double kAlongAxis = 0.5;   // of a capsule's radius: how far apart its points are
-constexpr double kSharp = 0.03;      // an edge of more than that is sharp
-constexpr double kFlat = 1e-6;       // a vertex between edges of less in sum is none
+constexpr double kAlongAxis = 0.5;   // of a capsule's radius: distance between points
+constexpr double kSharp = 0.03;      // sharpness beyond which an edge gets points
+constexpr double kFlat = 1e-6;       // summed sharpness of its edges up to which a vertex gets no point
 
 struct Weighed {
   glm::dvec3 at{0.0};
-  double sharpness = 0.0;  // 0: flat; a boundary or a corner most
+  double sharpness = 0.0;  // 0: flat; largest at a boundary or a corner
   std::array<std::uint32_t, 2> ends{};
   glm::dvec3 step{0.0};  // to the next point of the edge
 };
 
 struct Edge {
   std::uint32_t low, high, triangle;
-  double sharpness = 0.0;  // 1 − cosine between its faces; 2 where there are not two
+  double sharpness = 0.0;  // 1 − cosine between its two faces; 2 if there are not two
   bool operator<(const Edge& other) const {
     return std::tie(low, high, triangle) < std::tie(other.low, other.high, other.triangle);
   }
@@ -112,7 +112,7 @@ class SharpPlaces {
   double step_m_ = 0.0;
 };
 
-// One point a cell, the sharpest; cells grow until few enough are left.
+// Keeps the sharpest point of each cell; cells grow until few enough points are left.
 std::vector<SurfacePoint> thinned(std::vector<Weighed> points, double cell_m) {
   using Cell = std::tuple<double, double, double>;
   const bool whole = points.size() <= kMostSurfacePoints;
@@ -170,7 +170,7 @@ std::vector<SurfacePoint> surface_points(const RigidSource& source, const polygo
     }
     return result;
   }
-  // Those of a box are drawn of many triangles, and edges of many pieces.
+  // The drawn meshes of boxes and sheets have many triangles, whose edges are cut into pieces.
   if (const auto* box = std::get_if<BoxPrimitive>(&source))
     return points_of(polygon::make_box_mesh(0.5 * box->size_m, 1));
   if (const auto* sheet = std::get_if<PlanePrimitive>(&source))

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Points that stand for the surface of a rigid object where it meets that of another.
+// Points that represent the surface of a rigid object in contact with another.
 //
-// Two surfaces that are kept apart at all points of the one and all points of the other overlap nowhere by
-// more than what lies between points: nothing for a ball (its centre, with its radius) and for a corner or a
-// face on anything; up to half of the points' distance where two edges cross, which is why those on edges
-// slide to where they cross. So points are needed where a surface is not flat: at vertices and along sharp
-// edges, and none inside faces.
+// If all points of one surface and all points of the other are outside the other object, the surfaces overlap
+// at most between points. The error is zero for a ball (its centre with its radius), and for a corner or a
+// face on anything. It is up to half of the points' distance where two edges cross, which is why points on
+// edges slide to the crossing. Points are therefore needed where a surface is not flat: at vertices and along
+// sharp edges, and none inside faces.
 #pragma once
 
 #include <array>
@@ -22,8 +22,8 @@ namespace hybrid {
 struct SurfacePoint {
   glm::dvec3 at_m{0.0};   // body frame
   double radius_m = 0.0;  // a ball of this radius is part of the object
-  // Between two other points, earlier in the list, on a straight edge, of which the points stand in the list
-  // in order. It may slide along that, this far either way.
+  // The neighbours on the same straight edge, earlier in the list; points of one edge stand in order. The
+  // point may slide along the edge, this far in either direction.
   std::array<std::uint32_t, 2> ends{};
   glm::dvec3 along{0.0};  // unit
   double reach_m = 0.0;
@@ -32,9 +32,9 @@ struct SurfacePoint {
 
 inline constexpr std::size_t kMostSurfacePoints = 800;
 
-// Of an object whose surface is `shape` (body frame). A ball is its centre, a capsule lies along its axis;
-// of everything else they are the shape's vertices and points along its sharp edges. Beyond
-// kMostSurfacePoints they are thinned evenly, the sharpest kept. Deterministic.
+// Points of an object whose surface is `shape` (body frame): the centre of a ball, points on the axis of a
+// capsule, and otherwise the shape's vertices and points along its sharp edges. Beyond kMostSurfacePoints
+// they are thinned evenly, and the sharpest are kept. Deterministic.
 [[nodiscard]] std::vector<SurfacePoint> surface_points(const RigidSource& source,
                                                        const polygon::TriangleMesh& shape);
 

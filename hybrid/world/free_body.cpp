@@ -12,8 +12,8 @@
 namespace hybrid {
 namespace {
 
-constexpr int kMaxNewton = 12;          // of the midpoint's turning
-constexpr double kLongestStep_s = 1.0;  // a program that stood still for longer does not make it up
+constexpr int kMaxNewton = 12;          // Newton steps of the midpoint rule
+constexpr double kLongestStep_s = 1.0;  // a longer pause is not made up for
 constexpr double kMostTurn = 1.0;       // rad a step: beyond it the midpoint rule has more than one solution
 
 bool finite(const glm::dvec3& v) noexcept {
@@ -24,8 +24,8 @@ glm::dmat3 cross_matrix(const glm::dvec3& v) noexcept {
   return {0.0, v.z, -v.y, -v.z, 0.0, v.x, v.y, -v.x, 0.0};  // columns
 }
 
-// Turns the body by itself: implicit midpoint in its own frame, π' = π × I⁻¹π, solved by Newton, and the
-// rotation that goes with it. `spin` in scene frame before and after.
+// Torque-free rotation: implicit midpoint rule in the body frame, π' = π × I⁻¹π, solved by Newton, with the
+// matching Cayley rotation. `spin` is in the scene frame before and after.
 void turn(const FreeBody& body, glm::dquat& rotation, glm::dvec3& spin, double dt) noexcept {
   const glm::dmat3& inertia = body.mass.inertia_kg_m2;
   const glm::dvec3 before = glm::inverse(rotation) * spin;
@@ -42,7 +42,7 @@ void turn(const FreeBody& body, glm::dquat& rotation, glm::dvec3& spin, double d
     if (glm::length(step) <= 1e-15 * scale) break;
   }
   glm::dvec3 after = 2.0 * middle - before;
-  // Both hold but for rounding when Newton has converged; when it has not, nothing is gained.
+  // Energy and momentum are exact to rounding if Newton converged; otherwise energy must not grow.
   const double energy = glm::dot(before, momentum), gained = glm::dot(after, inertia * after);
   if (!finite(after)) {
     middle = after = before;
@@ -59,7 +59,7 @@ glm::dvec3 at_most(const glm::dvec3& v, double most) noexcept {
   return length > most ? v * (most / length) : v;
 }
 
-// Where the body is after the step; false when that would not be finite.
+// Advances the body by its twist; false if the result would not be finite.
 bool advance(const FreeBody& body, FreeBodyState& state, const Twist& after, double dt) noexcept {
   FreeBodyState next = state;
   next.velocity_m_per_s = at_most(after.linear, body.max_speed_m_per_s);
@@ -106,7 +106,7 @@ void step(std::span<SteppedBody> bodies, std::span<const BodyContact> contacts, 
 
 }  // namespace
 
-FreeBody alone(const FreeBody& body) noexcept {
+FreeBody without_external_loads(const FreeBody& body) noexcept {
   FreeBody result = body;
   result.gravity_m_per_s2 = glm::dvec3(0.0);
   result.drag_N_s_per_m = result.angular_drag_N_m_s = 0.0;
@@ -128,12 +128,12 @@ BodySystem::BodySystem(std::size_t most_bodies)
     : matrix_(36 * most_bodies * most_bodies),
       twists_(18 * most_bodies),
       first_(most_bodies),
-      ways_(most_bodies == 0 ? 0 : kMaxOneSided) {}
+      lines_(most_bodies == 0 ? 0 : kMaxOneSided) {}
 
 void step_free_bodies(std::span<SteppedBody> bodies, std::span<const BodyContact> contacts,
                       BodySystem& system, double dt_s) noexcept {
   step(bodies.first(std::min(bodies.size(), system.most_bodies())), contacts,
-       {system.matrix_, system.twists_, system.first_, system.ways_}, dt_s);
+       {system.matrix_, system.twists_, system.first_, system.lines_}, dt_s);
 }
 
 bool step_free_body(const FreeBody& body, FreeBodyState& state, std::span<const BodyContact> contacts,
@@ -141,11 +141,11 @@ bool step_free_body(const FreeBody& body, FreeBodyState& state, std::span<const 
   std::array<double, 36> matrix{};
   std::array<double, 18> twists{};
   std::array<std::uint32_t, 1> first{};
-  std::array<ContactOnWay, kMaxOneSided> ways;  // NOLINT(*-member-init): 100 kB that few steps need
-  SteppedBody alone{&body, state};
-  step({&alone, 1}, contacts, {matrix, twists, first, ways}, dt_s);
-  state = alone.state;
-  return !alone.stopped;
+  std::array<ContactOnLine, kMaxOneSided> ways;  // NOLINT(*-member-init): 100 kB that few steps need
+  SteppedBody stepped{&body, state};
+  step({&stepped, 1}, contacts, {matrix, twists, first, ways}, dt_s);
+  state = stepped.state;
+  return !stepped.stopped;
 }
 
 double kinetic_energy_J(const FreeBody& body, const FreeBodyState& state) noexcept {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What one object adds to the force that is felt.
+// One object's part of the force on the hand.
 #pragma once
 
 namespace hybrid {

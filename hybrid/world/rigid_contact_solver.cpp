@@ -11,24 +11,23 @@
 namespace hybrid {
 namespace {
 
-constexpr int kMaxSolves = 16;                   // contacts let go, and solved again
-constexpr int kMaxRubbed = 16;                   // … where there is friction
-constexpr double kSticks = 1e-5;                 // m/s: what slides no faster than this, friction may hold
-constexpr double kSlips = 0.01, kPresses = 0.1;  // of themselves: slips and pressures that are near enough
+constexpr int kMaxSolves = 16;          // Newton steps without friction
+constexpr int kMaxFrictionSolves = 16;  // … with friction
+constexpr double kStickSpeed = 1e-5;    // m/s: regularises Coulomb's law; slower sliding counts as sticking
+constexpr double kSlipTolerance = 0.01, kForceTolerance = 0.1;  // relative tolerances of slip and pressure
 constexpr int kHalvings = 40;
-constexpr double kFlatEnough = 0.1;  // of the slope where a way begins
+constexpr double kFlatEnough = 0.1;  // of the slope at the beginning of the line search
 
 double dot(const Twist& a, const Twist& b) noexcept {
   return glm::dot(a.linear, b.linear) + glm::dot(a.angular, b.angular);
 }
 
-// Symmetric positive definite, six rows a body, by Cholesky in place. Of each body's rows nothing before the
-// first body that it has a contact with is looked at: bodies that do not touch cost no more than each by
-// itself. Rows and columns of very different units are no trouble: the factorisation is the same for any
-// scaling of them.
-class System {
+// Symmetric positive definite matrix, six rows a body, solved by Cholesky in place. Each body's rows begin at
+// the first body that it has a contact with, so that bodies that do not touch cost no more than each alone.
+// The factorisation does not depend on the scaling of rows and columns, so different units do no harm.
+class BlockCholesky {
  public:
-  System(std::span<double> matrix, std::span<const std::uint32_t> first) : a_(matrix), first_(first) {
+  BlockCholesky(std::span<double> matrix, std::span<const std::uint32_t> first) : a_(matrix), first_(first) {
     for (std::size_t r = 0; r < rows(); ++r) {
       for (std::size_t c = begin(r); c <= r; ++c) at(r, c) = 0.0;
     }
@@ -39,14 +38,14 @@ class System {
         at(from + i, from + j) += m[static_cast<int>(j)][static_cast<int>(i)];
     }
   }
-  // k times the product of what two bodies (the first no earlier than the second) see of a contact.
+  // Adds k times the outer product of a contact's levers on two bodies (`body` no earlier than `other`).
   void add_outer(std::size_t body, const Twist& j, std::size_t other, const Twist& i, double k) noexcept {
     for (std::size_t r = 0; r < 6; ++r) {
       const std::size_t end = body == other ? r + 1 : 6;
       for (std::size_t c = 0; c < end; ++c) at(6 * body + r, 6 * other + c) += k * j[r] * i[c];
     }
   }
-  // False when it is not positive definite, or not finite.
+  // False if the matrix is not positive definite, or not finite.
   [[nodiscard]] bool solve(std::span<double> x) noexcept {
     for (std::size_t r = 0; r < rows(); ++r) {
       for (std::size_t c = begin(r); c <= r; ++c) {
@@ -80,59 +79,60 @@ class System {
   std::span<const std::uint32_t> first_;
 };
 
-// How a contact sees a body: its point moves along `way` by j · twist.
+// Lever of a contact on a body: its point moves along `way` by j · twist.
 Twist lever(const BodyContact& contact, const glm::dvec3& way, const FreeBodyState& state) noexcept {
   return {way, glm::cross(contact.point_m - state.centre_m, way)};
 }
 
-// The bodies of a step, their velocities at its end, and the contacts that answer to these.
-class Push {
+// The convex problem of one step: bodies, their velocities at the end of the step, and contacts that depend
+// on these.
+class ContactSolver {
  public:
-  Push(std::span<const SteppedBody> bodies, std::span<const BodyContact> contacts,
-       const SolveScratch& scratch, double dt)
+  ContactSolver(std::span<const SteppedBody> bodies, std::span<const BodyContact> contacts,
+                const SolveScratch& scratch, double dt)
       : bodies_(bodies),
         contacts_(contacts),
         matrix_(scratch.matrix),
         x_(scratch.twists.first(6 * bodies.size())),
         before_(scratch.twists.subspan(6 * bodies.size(), 6 * bodies.size())),
-        pressed_in_(scratch.twists.subspan(12 * bodies.size(), 6 * bodies.size())),
+        friction_basis_(scratch.twists.subspan(12 * bodies.size(), 6 * bodies.size())),
         first_(scratch.first.first(bodies.size())),
         one_sided_(std::min(contacts.size(), kMaxOneSided)),
         dt_(dt),
-        ways_(scratch.ways) {
+        lines_(scratch.ways) {
     for (std::size_t b = 0; b < bodies.size(); ++b) first_[b] = static_cast<std::uint32_t>(b);
     for (const BodyContact& c : contacts) {
       if (c.other == BodyContact::kNone) continue;
       const auto [low, high] = std::minmax(c.body, c.other);
       first_[high] = std::min(first_[high], low);
     }
-    rubs_ =
+    has_friction_ =
         std::any_of(contacts.begin(), contacts.end(), [](const BodyContact& c) { return c.friction > 0.0; });
   }
 
-  // False when they would not be finite. The energy is convex in the velocities: a quadratic, pressing
-  // contacts that are let go, and what friction takes of sliding. From each solution the way to the next is
-  // followed as far as the energy falls (a semi-smooth Newton method with line search, which cannot go in
-  // circles). Should it not be found in time, contacts may pull a little. What friction is a share of is
-  // taken from the solution before.
+  // False if the velocities would not be finite. The energy is convex in the velocities: a quadratic,
+  // unilateral contacts, and dissipation by friction. From each solution the line search goes towards the
+  // next as far as the energy falls (a semi-smooth Newton method, which cannot cycle). If the iterations run
+  // out, contacts may pull a little. Friction bounds use the normal forces of the previous solution.
   bool solve() noexcept {
     std::fill(x_.begin(), x_.end(), 0.0);
-    for (std::size_t c = 0; c < one_sided_; ++c) pressing_[c] = !(contacts_[c].force_N < 0.0);
-    bool rubbing = false;
-    for (int n = 0; n < (rubs_ ? kMaxRubbed : kMaxSolves); ++n) {
+    for (std::size_t c = 0; c < one_sided_; ++c) active_[c] = !(contacts_[c].force_N < 0.0);
+    bool friction_on = false;
+    for (int n = 0; n < (has_friction_ ? kMaxFrictionSolves : kMaxSolves); ++n) {
       std::copy(x_.begin(), x_.end(), before_.begin());
-      if (!solve_once(rubbing)) return false;
-      const bool confirmed = set_confirmed();
-      if (confirmed && (!rubs_ || (rubbing && slips_confirmed()))) break;
-      if (rubbing || !confirmed) go_back(best_share(rubbing));
-      press_where_pressed();
-      if (!rubs_ || !(confirmed || rubbing)) continue;
-      std::copy(x_.begin(), x_.end(), pressed_in_.begin());
-      // From how it was before: what was at rest is held from the beginning, and what slides is known to.
-      if (!rubbing) {
-        for (std::uint32_t b = 0; b < bodies_.size(); ++b) put(x_, b, twist_before(b));
+      if (!solve_once(friction_on)) return false;
+      const bool confirmed = active_set_confirmed();
+      if (confirmed && (!has_friction_ || (friction_on && slips_confirmed()))) break;
+      if (friction_on || !confirmed) scale_step(line_search(friction_on));
+      update_active_set();
+      if (!has_friction_ || !(confirmed || friction_on)) continue;
+      std::copy(x_.begin(), x_.end(), friction_basis_.begin());
+      // Starts from the velocities before the step: resting contacts stick from the beginning, and sliding
+      // ones have their direction.
+      if (!friction_on) {
+        for (std::uint32_t b = 0; b < bodies_.size(); ++b) set_twist(x_, b, twist_before(b));
       }
-      rubbing = true;
+      friction_on = true;
     }
     return true;
   }
@@ -142,10 +142,10 @@ class Push {
   [[nodiscard]] Twist twist_before(std::uint32_t body) const noexcept {
     return {bodies_[body].state.velocity_m_per_s, bodies_[body].state.spin_rad_per_s};
   }
-  static void put(std::span<double> all, std::uint32_t body, const Twist& twist) noexcept {
+  static void set_twist(std::span<double> all, std::uint32_t body, const Twist& twist) noexcept {
     for (std::size_t i = 0; i < 6; ++i) all[6 * std::size_t{body} + i] = twist[i];
   }
-  // Speed of the body's point along `way`, less that of what it is in contact with.
+  // Speed of the body's point along `way`, relative to the other body.
   [[nodiscard]] double speed(const BodyContact& c, const glm::dvec3& way, Twists all) const noexcept {
     double result = dot(lever(c, way, bodies_[c.body].state), twist_of(all, c.body));
     if (c.other != BodyContact::kNone)
@@ -158,7 +158,7 @@ class Push {
   [[nodiscard]] double pressed_N(const BodyContact& c, Twists all) const noexcept {
     return c.force_N - dt_ * c.stiffness_N_per_m * speed(c, c.normal, all);
   }
-  // Two ways along the surface.
+  // Two tangents of the surface.
   [[nodiscard]] static std::array<glm::dvec3, 2> along(const BodyContact& c) noexcept {
     const glm::dvec3 size = glm::abs(c.normal);
     const glm::dvec3 least = size.x <= size.y && size.x <= size.z ? glm::dvec3(1, 0, 0)
@@ -167,34 +167,33 @@ class Push {
     const glm::dvec3 first = glm::normalize(glm::cross(c.normal, least));
     return {first, glm::cross(c.normal, first)};
   }
-  // How fast the body's point slides along the surface.
+  // Sliding velocity of the body's point along the surface.
   [[nodiscard]] std::array<double, 2> slip(const BodyContact& c, Twists all) const noexcept {
     const std::array<glm::dvec3, 2> ways = along(c);
     return {speed(c, ways[0], all) - glm::dot(ways[0], c.carried_m_per_s),
             speed(c, ways[1], all) - glm::dot(ways[1], c.carried_m_per_s)};
   }
-  // What friction takes off a contact that slides at such a speed is this much times the root of its square
-  // and that of kSticks (N).
+  // Bound of the contact's friction (N). Its dissipated power is this bound times sqrt(slip² + kSticks²).
   [[nodiscard]] double friction_N(const BodyContact& c) const noexcept {
-    return c.friction > 0.0 && !stopped(c) ? c.friction * std::max(0.0, pressed_N(c, pressed_in_)) : 0.0;
+    return c.friction > 0.0 && !stopped(c) ? c.friction * std::max(0.0, pressed_N(c, friction_basis_)) : 0.0;
   }
-  // Its slope and curvature where it slides as in before_.
-  void add_friction(System& system, const BodyContact& c) noexcept {
+  // Adds its slope and curvature at the slip of before_.
+  void add_friction(BlockCholesky& system, const BodyContact& c) noexcept {
     const double most_N = friction_N(c);
     if (!(most_N > 0.0)) return;
     const auto [u, v] = slip(c, before_);
-    const double s = std::sqrt(u * u + v * v + kSticks * kSticks), k = most_N / s;
-    const double q = std::hypot(u, v), flat = k * (kSticks * kSticks) / (s * s);
-    // Its axes are the way it slides and that across it.
+    const double s = std::sqrt(u * u + v * v + kStickSpeed * kStickSpeed), k = most_N / s;
+    const double q = std::hypot(u, v), flat = k * (kStickSpeed * kStickSpeed) / (s * s);
+    // Its principal axes are the direction of sliding and the one across.
     const std::array<glm::dvec3, 2> ways = along(c);
     const glm::dvec3 on = q > 0.0 ? (u * ways[0] + v * ways[1]) / q : ways[0],
                      across = q > 0.0 ? (u * ways[1] - v * ways[0]) / q : ways[1];
     add(system, c, on, dt_ * flat);
-    push(c, on, dt_ * (flat * speed(c, on, before_) - k * q));
+    add_impulse(c, on, dt_ * (flat * speed(c, on, before_) - k * q));
     add(system, c, across, dt_ * k);
-    push(c, across, dt_ * k * speed(c, across, before_));
+    add_impulse(c, across, dt_ * k * speed(c, across, before_));
   }
-  void add(System& system, const BodyContact& c, const glm::dvec3& way, double k) noexcept {
+  void add(BlockCholesky& system, const BodyContact& c, const glm::dvec3& way, double k) noexcept {
     const Twist j = lever(c, way, bodies_[c.body].state);
     system.add_outer(c.body, j, c.body, j, k);
     if (c.other == BodyContact::kNone) return;
@@ -206,37 +205,37 @@ class Push {
       system.add_outer(c.other, i, c.body, j, -k);
     }
   }
-  void push(const BodyContact& c, const glm::dvec3& way, double impulse) noexcept {
-    push(c.body, lever(c, way, bodies_[c.body].state), impulse);
-    if (c.other != BodyContact::kNone) push(c.other, lever(c, way, bodies_[c.other].state), -impulse);
+  void add_impulse(const BodyContact& c, const glm::dvec3& way, double impulse) noexcept {
+    add_impulse(c.body, lever(c, way, bodies_[c.body].state), impulse);
+    if (c.other != BodyContact::kNone) add_impulse(c.other, lever(c, way, bodies_[c.other].state), -impulse);
   }
-  void push(std::uint32_t body, const Twist& j, double impulse) noexcept {
+  void add_impulse(std::uint32_t body, const Twist& j, double impulse) noexcept {
     for (std::size_t i = 0; i < 6; ++i) x_[6 * std::size_t{body} + i] += impulse * j[i];
   }
   bool solve_once(bool with_friction) noexcept {
-    System system(matrix_, first_);
+    BlockCholesky system(matrix_, first_);
     for (std::uint32_t b = 0; b < bodies_.size(); ++b) {
-      const Inert inert = inert_of(b);
+      const FreeTerm inert = free_term(b);
       system.add_block(6 * std::size_t{b}, glm::dmat3(inert.mass));
       system.add_block(6 * std::size_t{b} + 3, inert.inertia);
-      put(x_, b, inert.momentum);
+      set_twist(x_, b, inert.momentum);
     }
     for (std::size_t n = 0; n < contacts_.size(); ++n) {
       const BodyContact& c = contacts_[n];
-      if ((n < one_sided_ && !pressing_[n]) || stopped(c)) continue;
+      if ((n < one_sided_ && !active_[n]) || stopped(c)) continue;
       add(system, c, c.normal, dt_ * dt_ * c.stiffness_N_per_m);
-      push(c, c.normal, dt_ * c.force_N);
+      add_impulse(c, c.normal, dt_ * c.force_N);
       if (with_friction) add_friction(system, c);
     }
     return system.solve(x_);
   }
-  // A body by itself: (mass, inertia) · its twist after the step = momentum; drag counts as mass.
-  struct Inert {
+  // A body without contacts: (mass, inertia) · twist after the step = momentum; drag counts as mass.
+  struct FreeTerm {
     double mass = 0.0;
     glm::dmat3 inertia{0.0};
     Twist momentum;
   };
-  [[nodiscard]] Inert inert_of(std::uint32_t b) const noexcept {
+  [[nodiscard]] FreeTerm free_term(std::uint32_t b) const noexcept {
     const FreeBody& body = *bodies_[b].body;
     const FreeBodyState& state = bodies_[b].state;
     const glm::dmat3 rotation = glm::mat3_cast(state.rotation);
@@ -246,15 +245,15 @@ class Push {
             {body.mass.mass_kg * (state.velocity_m_per_s + dt_ * body.gravity_m_per_s2),
              inertia * state.spin_rad_per_s}};
   }
-  void go_back(double share) noexcept {
+  void scale_step(double share) noexcept {
     for (std::size_t i = 0; i < x_.size(); ++i) x_[i] = before_[i] + share * (x_[i] - before_[i]);
   }
-  // Of the way from `before_` to `x_`, as far as the energy falls. What pressing and letting go add to its
-  // slope is linear between places, and only grows.
-  [[nodiscard]] double best_share(bool with_friction) noexcept {
-    double slope = 0.0, curvature = 0.0;  // of all but the contacts, at before_
+  // Line search: the fraction of the way from `before_` to `x_` up to which the energy falls. The contacts'
+  // part of the slope is piecewise linear and grows monotonically.
+  [[nodiscard]] double line_search(bool with_friction) noexcept {
+    double slope = 0.0, curvature = 0.0;  // without the contacts, at before_
     for (std::uint32_t b = 0; b < bodies_.size(); ++b) {
-      const Inert inert = inert_of(b);
+      const FreeTerm inert = free_term(b);
       const Twist from = twist_of(before_, b), to = twist_of(x_, b);
       const Twist way{to.linear - from.linear, to.angular - from.angular};
       const Twist along{inert.mass * way.linear, inert.inertia * way.angular};
@@ -264,35 +263,35 @@ class Push {
     for (std::size_t n = 0; n < contacts_.size(); ++n) {
       const BodyContact& c = contacts_[n];
       const double from_N = pressed_N(c, before_);
-      const ContactOnWay on_way{from_N,
-                                pressed_N(c, x_) - from_N,
-                                dt_ * (speed(c, c.normal, x_) - speed(c, c.normal, before_)),
-                                0.0,
-                                {},
-                                {}};
+      const ContactOnLine on_line{from_N,
+                                  pressed_N(c, x_) - from_N,
+                                  dt_ * (speed(c, c.normal, x_) - speed(c, c.normal, before_)),
+                                  0.0,
+                                  {},
+                                  {}};
       const bool counts = !stopped(c);
       if (n < one_sided_) {
-        ways_[n] = counts ? on_way : ContactOnWay{};
+        lines_[n] = counts ? on_line : ContactOnLine{};
       } else if (counts) {
-        slope -= on_way.from_N * on_way.way_m;
-        curvature -= on_way.more_N * on_way.way_m;
+        slope -= on_line.from_N * on_line.moved_m;
+        curvature -= on_line.more_N * on_line.moved_m;
       }
       if (n >= one_sided_) continue;
-      ways_[n].friction_N = with_friction ? friction_N(c) : 0.0;
-      if (!(ways_[n].friction_N > 0.0)) continue;
-      ways_[n].slip = slip(c, before_);
+      lines_[n].friction_N = with_friction ? friction_N(c) : 0.0;
+      if (!(lines_[n].friction_N > 0.0)) continue;
+      lines_[n].slip = slip(c, before_);
       const std::array<double, 2> after = slip(c, x_);
-      ways_[n].more_slip = {after[0] - ways_[n].slip[0], after[1] - ways_[n].slip[1]};
+      lines_[n].more_slip = {after[0] - lines_[n].slip[0], after[1] - lines_[n].slip[1]};
     }
     const auto slope_at = [&](double share) {
       double sum = slope + share * curvature;
       for (std::size_t n = 0; n < one_sided_; ++n) {
-        const ContactOnWay& way = ways_[n];
-        sum -= std::max(0.0, way.from_N + share * way.more_N) * way.way_m;
+        const ContactOnLine& way = lines_[n];
+        sum -= std::max(0.0, way.from_N + share * way.more_N) * way.moved_m;
         if (!(way.friction_N > 0.0)) continue;
         const double u = way.slip[0] + share * way.more_slip[0], v = way.slip[1] + share * way.more_slip[1];
         sum += dt_ * way.friction_N * (u * way.more_slip[0] + v * way.more_slip[1]) /
-               std::sqrt(u * u + v * v + kSticks * kSticks);
+               std::sqrt(u * u + v * v + kStickSpeed * kStickSpeed);
       }
       return sum;
     };
@@ -308,43 +307,43 @@ class Push {
     }
     return middle;
   }
-  void press_where_pressed() noexcept {
-    for (std::size_t c = 0; c < one_sided_; ++c) pressing_[c] = pressed_N(contacts_[c], x_) > 0.0;
+  void update_active_set() noexcept {
+    for (std::size_t c = 0; c < one_sided_; ++c) active_[c] = pressed_N(contacts_[c], x_) > 0.0;
   }
-  [[nodiscard]] bool set_confirmed() const noexcept {
+  [[nodiscard]] bool active_set_confirmed() const noexcept {
     for (std::size_t c = 0; c < one_sided_; ++c) {
-      if (pressing_[c] != (pressed_N(contacts_[c], x_) > 0.0)) return false;
+      if (active_[c] != (pressed_N(contacts_[c], x_) > 0.0)) return false;
     }
     return true;
   }
-  // Does everything slide as it was taken to, and press where it does?
+  // Do all contacts slide and press as assumed in the friction terms?
   [[nodiscard]] bool slips_confirmed() const noexcept {
     return std::all_of(contacts_.begin(), contacts_.end(), [&](const BodyContact& c) {
       const double most_N = friction_N(c);
       if (!(most_N > 0.0)) return true;
       const std::array<double, 2> taken = slip(c, before_), is = slip(c, x_);
       return std::hypot(is[0] - taken[0], is[1] - taken[1]) <=
-                 kSlips * (std::hypot(is[0], is[1]) + kSticks) &&
-             std::abs(c.friction * pressed_N(c, x_) - most_N) <= kPresses * most_N;
+                 kSlipTolerance * (std::hypot(is[0], is[1]) + kStickSpeed) &&
+             std::abs(c.friction * pressed_N(c, x_) - most_N) <= kForceTolerance * most_N;
     });
   }
 
   std::span<const SteppedBody> bodies_;
   std::span<const BodyContact> contacts_;
-  std::span<double> matrix_, x_, before_, pressed_in_;
+  std::span<double> matrix_, x_, before_, friction_basis_;
   std::span<std::uint32_t> first_;
   std::size_t one_sided_;
   double dt_;
-  bool rubs_ = false;
-  std::bitset<kMaxOneSided> pressing_;
-  std::span<ContactOnWay> ways_;
+  bool has_friction_ = false;
+  std::bitset<kMaxOneSided> active_;
+  std::span<ContactOnLine> lines_;
 };
 
 }  // namespace
 
 bool solve_velocities(std::span<const SteppedBody> bodies, std::span<const BodyContact> contacts,
                       const SolveScratch& scratch, double dt) noexcept {
-  return Push(bodies, contacts, scratch, dt).solve();
+  return ContactSolver(bodies, contacts, scratch, dt).solve();
 }
 
 }  // namespace hybrid

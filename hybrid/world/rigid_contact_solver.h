@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The velocities that free bodies end a step with, all contacts answering to them: one convex problem for all
-// of them (free_body.h says which).
+// The velocities of free bodies at the end of a step, with implicit contact forces and friction: one convex
+// problem for all bodies (equation in free_body.h).
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@
 
 namespace hybrid {
 
-// Velocity and spin, or force and torque, as one.
+// Velocity and spin, or force and torque, in one vector.
 struct Twist {
   glm::dvec3 linear{0.0}, angular{0.0};
   [[nodiscard]] double operator[](std::size_t i) const noexcept {
@@ -24,12 +24,12 @@ struct Twist {
 struct SolveScratch {                // of n bodies
   std::span<double> matrix, twists;  // 36 n², 18 n
   std::span<std::uint32_t> first;    // n
-  std::span<ContactOnWay> ways;      // kMaxOneSided
+  std::span<ContactOnLine> ways;     // kMaxOneSided
 };
 
 // Writes each body's twist after a step of dt (> 0), six numbers a body, to the beginning of scratch.twists.
-// Contacts of bodies that are `stopped` count for nobody. Bounded, allocates nothing. False when they would
-// not be finite.
+// Contacts of bodies that are `stopped` are ignored. Bounded, allocates nothing. False if a result would not
+// be finite.
 [[nodiscard]] bool solve_velocities(std::span<const SteppedBody> bodies,
                                     std::span<const BodyContact> contacts, const SolveScratch& scratch,
                                     double dt) noexcept;

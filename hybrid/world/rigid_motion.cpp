@@ -16,7 +16,7 @@
 namespace hybrid {
 namespace {
 
-// Mass properties at density 1, where the shape has a volume.
+// Mass properties at density 1, if the shape has a volume.
 struct EvenlyFilled {
   const polygon::TriangleMesh& shape;
   bool closed;
@@ -64,7 +64,7 @@ FreeBody free_body_of(const RigidDescription& description, const FreeMotion& mot
     body.mass.inertia_kg_m2 = {i.x, 0.0, 0.0, 0.0, i.y, 0.0, 0.0, 0.0, i.z};
   }
   if (motion.centre_m) {
-    // Steiner: the moments that were said hold about the centre that was said; computed ones are moved there.
+    // Steiner: given moments hold about the given centre; computed moments are moved there.
     if (!motion.inertia_kg_m2) {
       const glm::dvec3 d = *motion.centre_m - body.mass.centre_m;
       body.mass.inertia_kg_m2 += body.mass.mass_kg * (glm::dmat3(glm::dot(d, d)) - glm::outerProduct(d, d));
@@ -132,8 +132,8 @@ double RigidMotion::duration_s() const noexcept {
 double RigidMotion::displacement_bound(const Pose& before, const Pose& after) const noexcept {
   const glm::dvec3 moved = after.position_m - before.position_m + after.rotation * middle_in_body_ -
                            before.rotation * middle_in_body_;
-  // A point at the end of the lever goes along a chord of 2 sin(θ/2) lever; sin(θ/2) is the vector part of
-  // the rotation between.
+  // A point at the end of the lever moves along a chord of 2 sin(θ/2) lever. sin(θ/2) is the length of the
+  // vector part of the relative rotation.
   const glm::dquat between = glm::conjugate(before.rotation) * after.rotation;
   const double half_sine = glm::length(glm::dvec3(between.x, between.y, between.z));
   return (glm::length(moved) + 2.0 * half_sine * lever_m_) * (1.0 + 1e-12);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // How a rigid object moves: the constant half, made once from the scene. A path is a pure function of
-// simulated time; a free body has its state (FreeBodyState) with whoever runs the session.
+// simulated time. A free body's state (FreeBodyState) belongs to the session's state.
 #pragma once
 
 #include <memory>
@@ -18,9 +18,9 @@ class RigidMotion {
   enum class Kind : std::uint8_t { fixed, path, free };
 
   RigidMotion() = default;  // fixed at the scene's origin
-  // `start`: the pose in which the object is built. `shape`: its surface in its own frame; `closed`: it
-  // encloses a volume and looks outward. Throws std::exception in words: a path that cannot be followed, a
-  // mass or inertia that cannot be had.
+  // `start`: the pose in which the object is built. `shape`: its surface in its own frame. `closed`: the
+  // surface encloses a volume and is oriented outward. Throws std::exception with a message if a path cannot
+  // be followed, or if mass or inertia are impossible.
   RigidMotion(const RigidDescription& description, const Pose& start, const polygon::TriangleMesh& shape,
               bool closed);
 
@@ -28,16 +28,16 @@ class RigidMotion {
   [[nodiscard]] bool moves() const noexcept { return kind_ != Kind::fixed; }
   [[nodiscard]] const Pose& start() const noexcept { return start_; }
 
-  // The pose at simulated time `t_s`: exactly start() at 0 and for anything but a path. Pure, allocates
+  // The pose at simulated time `t_s`: exactly start() at 0 and for every motion but a path. Pure, allocates
   // nothing.
   [[nodiscard]] Pose pose_at(double t_s) const noexcept;
-  // Until the path ends; infinite for a spin, 0 for what has no path.
+  // Time until the path ends; infinite for a spin, 0 without a path.
   [[nodiscard]] double duration_s() const noexcept;
 
-  // No point of the object moves further between the two poses (straight, in meters).
+  // Bound on the straight distance that any point of the object moves between the two poses (m).
   [[nodiscard]] double displacement_bound(const Pose& before, const Pose& after) const noexcept;
 
-  // Of Kind::free.
+  // For Kind::free.
   [[nodiscard]] const FreeBody& free_body() const noexcept { return free_; }
 
  private:
@@ -47,7 +47,7 @@ class RigidMotion {
   std::optional<SpinDescription> spin_;
   FreeBody free_;
   glm::dvec3 middle_in_body_{0.0};  // of the object's box
-  double lever_m_ = 0.0;            // farthest point of the object from there
+  double lever_m_ = 0.0;            // distance of the object's farthest point from there
 };
 
 }  // namespace hybrid

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Buffers of one tick. Nothing in them is read in a later tick, so copying or recording a state leaves them
-// out. They are sized when the world is built, and never after.
+// Buffers of one tick. Nothing in them is read in a later tick, so copies and recordings of a state leave
+// them out. They are sized when the world is built and never grow afterwards.
 #pragma once
 
 #include <array>
@@ -21,12 +21,13 @@ struct ProxyPlane {
   std::uint32_t object = 0, element = 0;
   polygon::SeparatingPlane in_body;
   bool own_plane = true;  // the element's own plane may be used
-  bool flat = false;      // the element's plane is `in_body`, from wherever it is seen
-  bool touching = false;  // the proxy, where the last sweep left it, is known to lie on it
+  bool flat = false;      // the element's plane is `in_body` from every viewpoint
+  bool touching = false;  // the proxy is known to lie on it at the end of the last sweep
 };
 inline constexpr std::uint32_t kMaxProxyPlanes = 32;
 
-// Range of one body's contacts in TickScratch::body_contacts; the first `springs` of them are tissue.
+// Range of one body's contacts in TickScratch::body_contacts; the first `springs` of them are springs (tool
+// and tissue links).
 struct OwnContacts {
   std::size_t first = 0, springs = 0;
 };
@@ -39,14 +40,15 @@ struct FreeBodyStep {
   std::vector<BodyFrame> before, after;  // [rigid]
   std::vector<Pose> next;                // [rigid]
   std::vector<double> moves_m;           // [rigid]
-  std::vector<FreeBody> alone;           // each by itself: nothing but contacts acts on it
-  std::vector<SteppedBody> still;        // … and it has no speed
+  // [stepped] copy without gravity and drag, so that contacts alone act on it.
+  std::vector<FreeBody> contacts_only;
+  std::vector<SteppedBody> still;  // [stepped] the same, with zero velocity
   BodySystem system;
 };
 
-// A surface voxel that is due for a distance query to a body; those with the least left come first.
+// A surface voxel that is due for a distance query to a body; the smallest remaining travel comes first.
 struct DueQuery {
-  double left_m = 0.0;  // travel that is left before the body may be near
+  double left_m = 0.0;  // travel that remains before the body may be near
   std::uint32_t body = 0, surface_number = 0;
   bool operator<(const DueQuery& other) const noexcept {
     if (left_m != other.left_m) return left_m < other.left_m;
@@ -67,12 +69,12 @@ struct TickScratch {
 
   // ---- bodies that move ----
   std::vector<DueQuery> due;
-  std::vector<std::uint32_t> in_the_way;     // surface voxels inside a body
-  std::vector<BodyContact> body_contacts;    // everything that presses on free bodies
-  FreeBodyStep free_bodies;                  // the free bodies that they press on
-  std::vector<std::uint32_t> at_body;        // surface voxels of one object that press on a free body
-  std::vector<voxel::VoxelId> held_by_body;  // their voxels
-  std::vector<voxel::HeldLoad> held_loads;   // their loads
+  std::vector<std::uint32_t> in_the_way;            // surface voxels inside a body
+  std::vector<BodyContact> body_contacts;           // all contacts of free bodies
+  FreeBodyStep free_bodies;                         // the free bodies of these contacts
+  std::vector<std::uint32_t> body_surface_numbers;  // surface voxels of one object that press on a free body
+  std::vector<voxel::VoxelId> body_voxels;          // their voxels
+  std::vector<voxel::HeldLoad> body_loads;          // their loads
 };
 
 }  // namespace hybrid

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A scene that is ready to be touched: the half that never changes in a session. The other half is WorldState
-// (world_state.h). The tick takes `World` as const.
+// A scene ready to be touched: the half that never changes in a session. WorldState (world_state.h) is the
+// other half. The tick takes `World` as const.
 #pragma once
 
 #include <algorithm>
@@ -31,13 +31,13 @@ namespace hybrid {
 struct RigidObject {
   std::string name;
   std::shared_ptr<const polygon::RigidSurface> surface;  // body frame; never changes
-  Pose pose;                                             // body to scene; of a moving object, where it begins
+  Pose pose;                                             // body to scene; at the start if the object moves
   std::shared_ptr<const polygon::TriangleMesh> drawn;    // body frame; the mesh that is rasterised and drawn
-  RigidMotion motion{};                                  // fixed unless the scene says otherwise
-  SurfaceFeel feel{};                                    // hard and smooth unless the scene says otherwise
+  RigidMotion motion{};                                  // fixed by default
+  SurfaceFeel feel{};                                    // hard and smooth by default
   bool surface_is_drawn = false;                         // `surface` is made of `drawn` and shares its memory
   bool presses_tissue = false;                           // it moves, and the scene has soft objects
-  std::vector<SurfacePoint> points{};  // contact points with other rigid objects; empty where no body is free
+  std::vector<SurfacePoint> points{};  // contact points with other rigid objects; empty if no body is free
 
   [[nodiscard]] glm::dvec3 to_body(const glm::dvec3& in_scene) const {
     return glm::inverse(pose.rotation) * (in_scene - pose.position_m);
@@ -52,7 +52,7 @@ struct RigidObject {
   }
 };
 
-struct SoftBody {  // the constant half of a soft object; the other one is in WorldState::soft
+struct SoftBody {  // the constant half of a soft object; WorldState::soft is the other one
   std::string name;
   voxel::BodyPose pose;                               // volume frame to scene
   std::uint32_t first_number = 0;                     // of its surface voxels in the occupancy map
@@ -69,7 +69,7 @@ struct SoftBody {  // the constant half of a soft object; the other one is in Wo
   }
 };
 
-// Where a rigid body is now: body to scene. A matrix, because the tick transforms many points.
+// A rigid body's present pose, body to scene. A matrix, because the tick transforms many points.
 struct BodyFrame {
   glm::dmat3 rotation{1.0};
   glm::dvec3 position_m{0.0};
@@ -91,15 +91,16 @@ struct World {
   Tool tool;
   device::ForceLimits limits;
   std::optional<device::PassivityOptions> passivity;  // empty: no controller
-  // A point tool is a ball of this radius: 1e-7 of the scene, far above rounding and far below anything felt.
+  // Radius of the ball that a point tool becomes: 1e-7 of the scene, far above rounding and far below
+  // anything felt.
   double skin_m = 0.0;
-  double extent_m = 0.0;    // diagonal of all objects' box
+  double extent_m = 0.0;    // diagonal of the box of all objects
   double rounding_m = 0.0;  // bound of the rounding error of a scene coordinate
   double encoder_m = 0.0;   // resolution of the device's position
-  bool use_map = true;      // false: every object is queried in every tick; the baseline of the map's timing
-  bool damping_account = true;  // false: sampled damping without correction; the baseline that has a theory
-  // Pairs of soft objects that may meet: surface voxels of the first, the finer one, meet the surface of the
-  // second.
+  bool use_map = true;      // false: every object is queried in every tick; the baseline for the map's timing
+  bool damping_account = true;  // false: sampled damping without correction; the baseline with a known theory
+  // Pairs of soft objects that may meet: surface voxels of the first (the finer one) against the surface of
+  // the second.
   std::vector<std::array<std::uint32_t, 2>> soft_pairs;
 
   [[nodiscard]] std::size_t object_count() const { return rigid.size() + soft.size(); }

@@ -6,7 +6,7 @@
 namespace hybrid {
 namespace {
 
-constexpr double kFirstMargin = 1.0 / 64.0;  // of an object's extent, of the proxy's first survey
+constexpr double kFirstMargin = 1.0 / 64.0;  // margin of the proxy's first survey, of the object's extent
 
 }  // namespace
 
@@ -76,13 +76,13 @@ void WorldState::prepare_body_obstacles(const World& world) {
       static_cast<std::size_t>(std::count_if(world.rigid.begin(), world.rigid.end(), presses));
   scratch.due.reserve(most * bodies);
   scratch.in_the_way.reserve(most);
-  scratch.held_by_body.reserve(voxel::SoftObject::kMaxTouched);
+  scratch.body_voxels.reserve(voxel::SoftObject::kMaxTouched);
   const auto free = [](const RigidObject& object) {
     return object.presses_tissue && object.motion.kind() == RigidMotion::Kind::free;
   };
   if (std::none_of(world.rigid.begin(), world.rigid.end(), free)) return;
-  scratch.at_body.reserve(voxel::SoftObject::kMaxTouched);
-  scratch.held_loads.resize(voxel::SoftObject::kMaxTouched);
+  scratch.body_surface_numbers.reserve(voxel::SoftObject::kMaxTouched);
+  scratch.body_loads.resize(voxel::SoftObject::kMaxTouched);
 }
 
 }  // namespace hybrid

@@ -2,14 +2,15 @@
 #pragma once
 
 // Compiles a function for two vector widths; the loader picks one when the program starts. Both give the same
-// bits, because the operations are element-wise and contraction is off. The start-up of sanitizers does not support
-// ifunc resolvers, so there the build names the one width that its machine has (cmake/HybridTarget.cmake).
+// bits, because the operations are element-wise and contraction is off. The start-up of sanitizers does not
+// support ifunc resolvers, so there the build names the one width that its machine has
+// (cmake/HybridTarget.cmake).
 #if defined(__clang__) || !defined(__x86_64__)
-#define HYBRID_WIDE
+#define HYBRID_MULTIVERSIONED
 #elif defined(HYBRID_SANITIZED_AVX2)
-#define HYBRID_WIDE __attribute__((target("avx2")))
+#define HYBRID_MULTIVERSIONED __attribute__((target("avx2")))
 #elif defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define HYBRID_WIDE
+#define HYBRID_MULTIVERSIONED
 #else
-#define HYBRID_WIDE __attribute__((target_clones("default", "avx2")))
+#define HYBRID_MULTIVERSIONED __attribute__((target_clones("default", "avx2")))
 #endif

@@ -10,9 +10,9 @@ namespace polygon {
 namespace {
 
 // Depth of the point p below each plane; returns the largest.
-HYBRID_WIDE double plane_depths(const double* x, const double* y, const double* z, const double* offset,
-                                double px, double py, double pz, double* depth,
-                                std::uint32_t count) noexcept {
+HYBRID_MULTIVERSIONED double plane_depths(const double* x, const double* y, const double* z,
+                                          const double* offset, double px, double py, double pz,
+                                          double* depth, std::uint32_t count) noexcept {
   // Four independent maxima, because a single one would serialise the loop.
   double most[4] = {-1e300, -1e300, -1e300, -1e300};
   const std::uint32_t whole = count & ~3U;

@@ -91,8 +91,8 @@ void bricks_by_brick(benchmark::State& state) {
 }
 
 // Baseline: six links of one material.
-HYBRID_WIDE void six_link_row(const voxel::NodeField& field, std::size_t first, std::size_t count,
-                              const std::array<float*, 3>& force) {
+HYBRID_MULTIVERSIONED void six_link_row(const voxel::NodeField& field, std::size_t first, std::size_t count,
+                                        const std::array<float*, 3>& force) {
   for (std::size_t c = 0; c < 3; ++c) {
     const float* __restrict u = field.u[c] + first;
     float* __restrict out = force[c];

@@ -65,7 +65,7 @@ int touch(const std::string& file, const Options& options) {
   glm::dvec3 top(0.0, 0.0, -1e300);
   for (const glm::dvec3& v : object.drawn->vertices) top = v.z > top.z ? v : top;
 
-  hybrid::flush_denormals();
+  hybrid::set_flush_to_zero();
   glm::dvec3 tool = top + glm::dvec3(0.0, 0.0, 2.0 * scene.tool.radius_m);
   hybrid::begin_session(scene, *built.world, *built.state, tool);
   bool touched = false;
@@ -82,7 +82,7 @@ int touch(const std::string& file, const Options& options) {
   std::printf("| %-26.26s | %9zu | %7.3f | %7.3f | %7.1f | %7.1f | %7.1f | %6.1f | %s |\n",
               file.substr(file.find_last_of('/') + 1).c_str(), object.drawn->triangles.size(), wall, worked,
               1e-6 * static_cast<double>(hybrid::peak_memory_bytes()),
-              1e-6 * static_cast<double>(hybrid::held_memory_bytes()),
+              1e-6 * static_cast<double>(hybrid::resident_memory_bytes()),
               1e-6 * static_cast<double>(object.memory_bytes()),
               1e-6 * static_cast<double>(built.state->map.memory_bytes()),
               touched ? (std::to_string(tick_us) + " us").c_str() : "not touched");

@@ -209,9 +209,9 @@ HYBRID_INLINE bool cone(const ConeColumn& c, float margin, ConeEnds& ends) {
 
 }  // namespace
 
-HYBRID_WIDE_AND_MANY Moved raise_beside(const float* from, const std::uint8_t* from_labels, float* to,
-                                        const std::uint8_t* to_labels, const HalfLimits& half,
-                                        float margin) noexcept {
+HYBRID_MULTIVERSIONED_512 Moved raise_beside(const float* from, const std::uint8_t* from_labels, float* to,
+                                             const std::uint8_t* to_labels, const HalfLimits& half,
+                                             float margin) noexcept {
   switch (half.registers) {
     case 1:
       return beside_by_label<true, 1>(from, from_labels, to, to_labels, half.table, margin);
@@ -221,9 +221,9 @@ HYBRID_WIDE_AND_MANY Moved raise_beside(const float* from, const std::uint8_t* f
       return beside_by_label<true, 0>(from, from_labels, to, to_labels, half.table, margin);
   }
 }
-HYBRID_WIDE_AND_MANY Moved lower_beside(const float* from, const std::uint8_t* from_labels, float* to,
-                                        const std::uint8_t* to_labels, const HalfLimits& half,
-                                        float margin) noexcept {
+HYBRID_MULTIVERSIONED_512 Moved lower_beside(const float* from, const std::uint8_t* from_labels, float* to,
+                                             const std::uint8_t* to_labels, const HalfLimits& half,
+                                             float margin) noexcept {
   switch (half.registers) {
     case 1:
       return beside_by_label<false, 1>(from, from_labels, to, to_labels, half.table, margin);
@@ -233,17 +233,17 @@ HYBRID_WIDE_AND_MANY Moved lower_beside(const float* from, const std::uint8_t* f
       return beside_by_label<false, 0>(from, from_labels, to, to_labels, half.table, margin);
   }
 }
-HYBRID_WIDE_AND_MANY Moved raise_beside_alike(const float* from, float* to, float limit,
-                                              float margin) noexcept {
+HYBRID_MULTIVERSIONED_512 Moved raise_beside_alike(const float* from, float* to, float limit,
+                                                   float margin) noexcept {
   return beside_alike<true>(from, to, limit, margin);
 }
-HYBRID_WIDE_AND_MANY Moved lower_beside_alike(const float* from, float* to, float limit,
-                                              float margin) noexcept {
+HYBRID_MULTIVERSIONED_512 Moved lower_beside_alike(const float* from, float* to, float limit,
+                                                   float margin) noexcept {
   return beside_alike<false>(from, to, limit, margin);
 }
 
-HYBRID_WIDE_AND_MANY Moved raise_along(float* row, const std::uint8_t* labels, const HalfLimits& up,
-                                       const HalfLimits& down, float margin) noexcept {
+HYBRID_MULTIVERSIONED_512 Moved raise_along(float* row, const std::uint8_t* labels, const HalfLimits& up,
+                                            const HalfLimits& down, float margin) noexcept {
   switch (up.registers) {
     case 1:
       return along_by_label<true, 1>(row, labels, up.table, down.table, margin);
@@ -253,8 +253,8 @@ HYBRID_WIDE_AND_MANY Moved raise_along(float* row, const std::uint8_t* labels, c
       return along_by_label<true, 0>(row, labels, up.table, down.table, margin);
   }
 }
-HYBRID_WIDE_AND_MANY Moved lower_along(float* row, const std::uint8_t* labels, const HalfLimits& up,
-                                       const HalfLimits& down, float margin) noexcept {
+HYBRID_MULTIVERSIONED_512 Moved lower_along(float* row, const std::uint8_t* labels, const HalfLimits& up,
+                                            const HalfLimits& down, float margin) noexcept {
   switch (up.registers) {
     case 1:
       return along_by_label<false, 1>(row, labels, up.table, down.table, margin);
@@ -264,17 +264,17 @@ HYBRID_WIDE_AND_MANY Moved lower_along(float* row, const std::uint8_t* labels, c
       return along_by_label<false, 0>(row, labels, up.table, down.table, margin);
   }
 }
-HYBRID_WIDE_AND_MANY Moved raise_along_alike(float* row, float up, float down, float margin) noexcept {
+HYBRID_MULTIVERSIONED_512 Moved raise_along_alike(float* row, float up, float down, float margin) noexcept {
   return along_alike<true>(row, up, down, margin);
 }
-HYBRID_WIDE_AND_MANY Moved lower_along_alike(float* row, float up, float down, float margin) noexcept {
+HYBRID_MULTIVERSIONED_512 Moved lower_along_alike(float* row, float up, float down, float margin) noexcept {
   return along_alike<false>(row, up, down, margin);
 }
 
-HYBRID_WIDE_AND_MANY bool raise_cone(const ConeColumn& column, float margin, ConeEnds& ends) noexcept {
+HYBRID_MULTIVERSIONED_512 bool raise_cone(const ConeColumn& column, float margin, ConeEnds& ends) noexcept {
   return cone<true>(column, margin, ends);
 }
-HYBRID_WIDE_AND_MANY bool lower_cone(const ConeColumn& column, float margin, ConeEnds& ends) noexcept {
+HYBRID_MULTIVERSIONED_512 bool lower_cone(const ConeColumn& column, float margin, ConeEnds& ends) noexcept {
   return cone<false>(column, margin, ends);
 }
 

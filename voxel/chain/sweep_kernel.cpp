@@ -32,10 +32,10 @@ HYBRID_TARGET_512 SweepResult sweep_lower16(const SweepTask& task, int most_visi
 }
 #endif
 
-HYBRID_WIDE SweepResult sweep_raise8(const SweepTask& task, int most_visits, Moved* moves) {
+HYBRID_MULTIVERSIONED SweepResult sweep_raise8(const SweepTask& task, int most_visits, Moved* moves) {
   return kernel8::sweep_by_registers<true>(task, most_visits, moves);
 }
-HYBRID_WIDE SweepResult sweep_lower8(const SweepTask& task, int most_visits, Moved* moves) {
+HYBRID_MULTIVERSIONED SweepResult sweep_lower8(const SweepTask& task, int most_visits, Moved* moves) {
   return kernel8::sweep_by_registers<false>(task, most_visits, moves);
 }
 

@@ -17,7 +17,7 @@ using composite::index;
 
 constexpr int kCoarsestSweeps = 10;
 constexpr std::size_t kMaxAcross =
-    std::size_t{composite::kMaxVectors} * kOctet;  // nodes of a row, one further on either side
+    std::size_t{composite::kMaxVectors} * kLanes;  // nodes of a row, one further on either side
 
 }  // namespace
 

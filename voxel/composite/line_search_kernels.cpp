@@ -14,11 +14,11 @@ constexpr double kMinOvershoot = 0.5, kMaxShortening = 0.9;
 
 }  // namespace
 
-HYBRID_WIDE void beyond_bounds(const float* u, const float* lower, const float* negated_upper, float* beyond,
-                               std::size_t count) noexcept {
-  const Octet zero{};
-  for (std::size_t n = 0; n < count; n += kOctet) {
-    Octet x, low = zero, high = zero, bound;
+HYBRID_MULTIVERSIONED void beyond_bounds(const float* u, const float* lower, const float* negated_upper,
+                                         float* beyond, std::size_t count) noexcept {
+  const Float8 zero{};
+  for (std::size_t n = 0; n < count; n += kLanes) {
+    Float8 x, low = zero, high = zero, bound;
     load(x, u + n);
     if (lower != nullptr) {
       load(bound, lower + n);
@@ -29,17 +29,17 @@ HYBRID_WIDE void beyond_bounds(const float* u, const float* lower, const float* 
       high = bound > zero ? -bound : zero;
     }
     // A displacement above 0 is measured from the lower bound, one below 0 from the upper bound.
-    const Octet up = x - low, down = x - high;
+    const Float8 up = x - low, down = x - high;
     store(beyond + n, x > zero ? (up > zero ? up : zero) : (down < zero ? down : zero));
   }
 }
 
-HYBRID_WIDE ModeResponse mode_response(const LevelView& v, const float* mode,
-                                       const std::array<int, 3>& finer_first,
-                                       const std::array<int, 3>& finer_last) noexcept {
-  const int vectors = static_cast<int>(v.stride / kOctet);
+HYBRID_MULTIVERSIONED ModeResponse mode_response(const LevelView& v, const float* mode,
+                                                 const std::array<int, 3>& finer_first,
+                                                 const std::array<int, 3>& finer_last) noexcept {
+  const int vectors = static_cast<int>(v.stride / kLanes);
   // Masks along x. In rows that cross the finer patch the nodes inside that patch count 0.
-  std::array<float, kMaxVectors * kOctet> all_own, some_own;
+  std::array<float, kMaxVectors * kLanes> all_own, some_own;
   for (std::size_t i = 0; i < v.stride; ++i) {
     const int at = static_cast<int>(i);
     all_own[i] = 1.0F;
@@ -48,23 +48,23 @@ HYBRID_WIDE ModeResponse mode_response(const LevelView& v, const float* mode,
   ModeResponse sum;
   for (int k = v.first[2]; k <= v.last[2]; ++k) {
     const bool under_k = k >= finer_first[2] && k <= finer_last[2];
-    Octet plane_force{}, plane_stiffness{};
+    Float8 plane_force{}, plane_stiffness{};
     for (int j = v.first[1]; j <= v.last[1]; ++j) {
       const std::size_t row = static_cast<std::size_t>(k) * v.plane + static_cast<std::size_t>(j) * v.stride;
       const float* const own =
           (under_k && j >= finer_first[1] && j <= finer_last[1] ? some_own : all_own).data();
       for (int o = 0; o < vectors; ++o) {
-        const std::size_t at = row + static_cast<std::size_t>(o * kOctet);
-        Octet here, m, all, inverse, x, g, counts;
+        const std::size_t at = row + static_cast<std::size_t>(o * kLanes);
+        Float8 here, m, all, inverse, x, g, counts;
         load(here, v.u + at);
         load(m, mode + at);
         load(all, v.diagonal + at);
         load(inverse, v.inverse_diagonal + at);
-        load(counts, own + o * kOctet);
-        Octet force = -all * here, stiffness = all * m;
+        load(counts, own + o * kLanes);
+        Float8 force = -all * here, stiffness = all * m;
         const std::array<std::size_t, 3> by{1, v.stride, v.plane};
         for (std::size_t d = 0; d < 3; ++d) {
-          const Octet spring = Octet{} + v.spring[d];
+          const Float8 spring = Float8{} + v.spring[d];
           load(g, v.weight[d] + at - by[d]);
           g *= spring;
           load(x, v.u + at - by[d]);
@@ -78,13 +78,13 @@ HYBRID_WIDE ModeResponse mode_response(const LevelView& v, const float* mode,
           load(x, mode + at + by[d]);
           stiffness -= g * x;
         }
-        const Octet zero{};
+        const Float8 zero{};
         counts = inverse > zero ? counts : zero;
         plane_force += counts * m * force;
         plane_stiffness += counts * m * stiffness;
       }
     }
-    for (int lane = 0; lane < kOctet; ++lane) {
+    for (int lane = 0; lane < kLanes; ++lane) {
       sum.force += static_cast<double>(plane_force[lane]);
       sum.stiffness += static_cast<double>(plane_stiffness[lane]);
     }
@@ -92,11 +92,11 @@ HYBRID_WIDE ModeResponse mode_response(const LevelView& v, const float* mode,
   return sum;
 }
 
-HYBRID_WIDE void shorten_correction(const LevelView& v, float* before) noexcept {
+HYBRID_MULTIVERSIONED void shorten_correction(const LevelView& v, float* before) noexcept {
   // Up to and including the side plane beyond the last plane of unknowns: prolongation moved that plane too.
   const std::size_t count = static_cast<std::size_t>(v.last[2] + 2) * v.plane;
-  for (std::size_t n = 0; n < count; n += kOctet) {
-    Octet x, was;
+  for (std::size_t n = 0; n < count; n += kLanes) {
+    Float8 x, was;
     load(x, v.u + n);
     load(was, before + n);
     store(before + n, x - was);
@@ -122,21 +122,21 @@ HYBRID_WIDE void shorten_correction(const LevelView& v, float* before) noexcept 
   const double overshoot = -(sum.force + loads) / sum.stiffness;
   if (overshoot <= kMinOvershoot) return;
   const auto back = static_cast<float>(std::min(overshoot, kMaxShortening));
-  for (std::size_t n = 0; n < count; n += kOctet) {
-    Octet x, correction, inverse;
+  for (std::size_t n = 0; n < count; n += kLanes) {
+    Float8 x, correction, inverse;
     load(x, v.u + n);
     load(correction, before + n);
     load(inverse, v.inverse_diagonal + n);
-    const Octet zero{};
+    const Float8 zero{};
     correction = inverse > zero ? correction : zero;
     store(v.u + n, x - back * correction);
   }
 }
 
-HYBRID_WIDE void step_along_mode(float* u, const float* mode, float by, const float* lower,
-                                 const float* negated_upper, std::size_t count) noexcept {
-  for (std::size_t n = 0; n < count; n += kOctet) {
-    Octet x, m, bound;
+HYBRID_MULTIVERSIONED void step_along_mode(float* u, const float* mode, float by, const float* lower,
+                                           const float* negated_upper, std::size_t count) noexcept {
+  for (std::size_t n = 0; n < count; n += kLanes) {
+    Float8 x, m, bound;
     load(x, u + n);
     load(m, mode + n);
     x += by * m;

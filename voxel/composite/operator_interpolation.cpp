@@ -72,9 +72,9 @@ void CompositeGrid::restrict_by_links(Level& coarse, const Level& fine, std::siz
                                       float* to) const noexcept {
   const auto& nodes = fine.nodes;
   constexpr std::size_t kEnd = 8;  // padding lanes before the first and after the last
-  std::array<float, std::size_t{composite::kMaxVectors} * kOctet + 2 * kEnd> sum, upper_share;
+  std::array<float, std::size_t{composite::kMaxVectors} * kLanes + 2 * kEnd> sum, upper_share;
   composite::RestrictArgs g{};
-  g.vectors = static_cast<int>(fine.stride / kOctet);
+  g.vectors = static_cast<int>(fine.stride / kLanes);
   g.sum = sum.data() + kEnd;
   g.upper_share = upper_share.data() + kEnd;
   std::fill_n(sum.begin(), kEnd, 0.0F);

@@ -8,8 +8,8 @@ namespace voxel::composite {
 namespace {
 
 // A row of bounds that bound nothing.
-const std::array<float, kMaxVectors* kOctet> kNoBoundRow = [] {
-  std::array<float, kMaxVectors * kOctet> row{};
+const std::array<float, kMaxVectors* kLanes> kNoBoundRow = [] {
+  std::array<float, kMaxVectors * kLanes> row{};
   row.fill(kNoBound);
   return row;
 }();
@@ -20,18 +20,18 @@ constexpr float kActiveStiffness = 0.5F;
 
 // Masks of every second lane: from the first on, from the second on.
 struct Colours {
-  OctetMask even, odd;
+  Mask8 even, odd;
 };
 HYBRID_INLINE void find_colours(Colours& c) {
-  c.even = OctetMask{-1, 0, -1, 0, -1, 0, -1, 0};
-  c.odd = OctetMask{0, -1, 0, -1, 0, -1, 0, -1};
+  c.even = Mask8{-1, 0, -1, 0, -1, 0, -1, 0};
+  c.odd = Mask8{0, -1, 0, -1, 0, -1, 0, -1};
 }
 
 // kVectorsOfRow: vectors of a row, so that they stay in registers; 0: as many as the level has.
 template <int kVectorsOfRow>
 HYBRID_INLINE void smooth_row(const LevelView& v, int j, int k) {
   constexpr int kRoom = kVectorsOfRow == 0 ? kMaxVectors : kVectorsOfRow;
-  const int vectors = kVectorsOfRow == 0 ? static_cast<int>(v.stride / kOctet) : kVectorsOfRow;
+  const int vectors = kVectorsOfRow == 0 ? static_cast<int>(v.stride / kLanes) : kVectorsOfRow;
   const std::size_t row = static_cast<std::size_t>(k) * v.plane + static_cast<std::size_t>(j) * v.stride;
   float* const u = v.u + row;
   const float* const gy = v.weight[1] + row;
@@ -41,10 +41,10 @@ HYBRID_INLINE void smooth_row(const LevelView& v, int j, int k) {
   const float* const hi = v.negated_upper != nullptr ? v.negated_upper + row : kNoBoundRow.data();
   const float* const inverse_of_row =
       v.inverse_with_active != nullptr ? v.inverse_with_active : v.inverse_diagonal;
-  Octet own[kRoom], force[kRoom];
+  Float8 own[kRoom], force[kRoom];
   for (int o = 0; o < vectors; ++o) {
-    const int at = o * kOctet;
-    Octet x, g, sum{};
+    const int at = o * kLanes;
+    Float8 x, g, sum{};
     load(own[o], u + at);
     load(x, u + at - v.stride);
     load(g, gy + at - v.stride);
@@ -52,7 +52,7 @@ HYBRID_INLINE void smooth_row(const LevelView& v, int j, int k) {
     load(x, u + at + v.stride);
     load(g, gy + at);
     sum = v.spring[1] * (sum + g * x);
-    Octet other{};
+    Float8 other{};
     load(x, u + at - v.plane);
     load(g, gz + at - v.plane);
     other = g * x;
@@ -67,10 +67,10 @@ HYBRID_INLINE void smooth_row(const LevelView& v, int j, int k) {
   Colours colours;
   find_colours(colours);
   for (int parity = 0; parity < 2; ++parity) {
-    const OctetMask& colour = parity == 0 ? colours.even : colours.odd;
+    const Mask8& colour = parity == 0 ? colours.even : colours.odd;
     for (int o = 0; o < vectors; ++o) {
-      const int at = o * kOctet;
-      Octet down, up, low, high, back, ahead, inverse;
+      const int at = o * kLanes;
+      Float8 down, up, low, high, back, ahead, inverse;
       shift_down(down, own[o > 0 ? o - 1 : 0], own[o]);
       shift_up(up, own[o], own[o + 1 < vectors ? o + 1 : o]);
       load(back, gx + at - 1);
@@ -78,14 +78,14 @@ HYBRID_INLINE void smooth_row(const LevelView& v, int j, int k) {
       load(inverse, inverse_of_row + row + at);
       load(low, lo + at);
       load(high, hi + at);
-      Octet x = (force[o] + v.spring[0] * (back * down + ahead * up)) * inverse;
+      Float8 x = (force[o] + v.spring[0] * (back * down + ahead * up)) * inverse;
       x = x > low ? x : low;
       high = -high;
       x = x < high ? x : high;
-      own[o] = (colour & (inverse > Octet{})) ? x : own[o];
+      own[o] = (colour & (inverse > Float8{})) ? x : own[o];
     }
   }
-  for (int o = 0; o < vectors; ++o) store(u + o * kOctet, own[o]);
+  for (int o = 0; o < vectors; ++o) store(u + o * kLanes, own[o]);
 }
 
 template <int kVectorsOfRow>
@@ -101,15 +101,15 @@ HYBRID_INLINE void smooth(const LevelView& v) {
 template <bool kLinksOnly>
 HYBRID_INLINE void residual(const LevelView& v, const std::array<int, 3>& first,
                             const std::array<int, 3>& last) {
-  const int vectors = static_cast<int>(v.stride / kOctet);
+  const int vectors = static_cast<int>(v.stride / kLanes);
   for (int k = first[2]; k <= last[2]; ++k) {
     for (int j = first[1]; j <= last[1]; ++j) {
       const std::size_t row = static_cast<std::size_t>(k) * v.plane + static_cast<std::size_t>(j) * v.stride;
       const float* const u = v.u + row;
       const float *const gx = v.weight[0] + row, *const gy = v.weight[1] + row, *const gz = v.weight[2] + row;
       for (int o = 0; o < vectors; ++o) {
-        const int at = o * kOctet;
-        Octet own, x, g, r, along, all, inverse;
+        const int at = o * kLanes;
+        Float8 own, x, g, r, along, all, inverse;
         load(own, u + at);
         load(x, u + at - v.stride);
         load(g, gy + at - v.stride);
@@ -132,7 +132,7 @@ HYBRID_INLINE void residual(const LevelView& v, const std::array<int, 3>& first,
         load(all, v.diagonal + row + at);
         load(inverse, v.inverse_diagonal + row + at);
         r -= all * own;
-        const Octet zero{};
+        const Float8 zero{};
         if constexpr (!kLinksOnly) {
           if (v.f != nullptr) {
             load(x, v.f + row + at);
@@ -141,18 +141,18 @@ HYBRID_INLINE void residual(const LevelView& v, const std::array<int, 3>& first,
         }
         r = inverse > zero ? r : zero;
         if constexpr (!kLinksOnly) {
-          const Octet one = zero + 1.0F;
-          Octet is_free = inverse > zero ? one : zero, is_active{};
+          const Float8 one = zero + 1.0F;
+          Float8 is_free = inverse > zero ? one : zero, is_active{};
           if (v.lower != nullptr) {
             load(x, v.lower + row + at);
-            const OctetMask held = (own <= x) & (r < zero);
+            const Mask8 held = (own <= x) & (r < zero);
             r = held ? zero : r;
             is_free = held ? zero : is_free;
             is_active = held ? one : is_active;
           }
           if (v.negated_upper != nullptr) {
             load(x, v.negated_upper + row + at);
-            const OctetMask held = (own >= -x) & (r > zero);
+            const Mask8 held = (own >= -x) & (r > zero);
             r = held ? zero : r;
             is_free = held ? zero : is_free;
             is_active = held ? one : is_active;
@@ -168,7 +168,7 @@ HYBRID_INLINE void residual(const LevelView& v, const std::array<int, 3>& first,
 
 }  // namespace
 
-HYBRID_WIDE void smooth_level(const LevelView& v) noexcept {
+HYBRID_MULTIVERSIONED void smooth_level(const LevelView& v) noexcept {
   switch (v.stride) {
     case 8:
       smooth<1>(v);
@@ -187,23 +187,23 @@ HYBRID_WIDE void smooth_level(const LevelView& v) noexcept {
   }
 }
 
-HYBRID_WIDE void residual_of_level(const LevelView& v) noexcept {
+HYBRID_MULTIVERSIONED void residual_of_level(const LevelView& v) noexcept {
   residual<false>(v, v.first, v.last);
 }
 
-HYBRID_WIDE void link_forces_of_level(const LevelView& v, const std::array<int, 3>& first,
-                                      const std::array<int, 3>& last) noexcept {
+HYBRID_MULTIVERSIONED void link_forces_of_level(const LevelView& v, const std::array<int, 3>& first,
+                                                const std::array<int, 3>& last) noexcept {
   residual<true>(v, first, last);
 }
 
-HYBRID_WIDE void find_active_stiffness(const LevelView& v) noexcept {
-  const int vectors = static_cast<int>(v.stride / kOctet);
+HYBRID_MULTIVERSIONED void find_active_stiffness(const LevelView& v) noexcept {
+  const int vectors = static_cast<int>(v.stride / kLanes);
   for (int k = v.first[2]; k <= v.last[2]; ++k) {
     for (int j = v.first[1]; j <= v.last[1]; ++j) {
       const std::size_t row = static_cast<std::size_t>(k) * v.plane + static_cast<std::size_t>(j) * v.stride;
       for (int o = 0; o < vectors; ++o) {
-        const std::size_t at = row + static_cast<std::size_t>(o * kOctet);
-        Octet x, g, sum, to_active{}, own;
+        const std::size_t at = row + static_cast<std::size_t>(o * kLanes);
+        Float8 x, g, sum, to_active{}, own;
         const std::array<std::size_t, 3> by{1, v.stride, v.plane};
         for (std::size_t d = 0; d < 3; ++d) {
           load(x, v.is_active + at - by[d]);
@@ -221,24 +221,24 @@ HYBRID_WIDE void find_active_stiffness(const LevelView& v) noexcept {
   }
 }
 
-HYBRID_WIDE void add_active_stiffness(const LevelView& v, float* f) noexcept {
-  const int vectors = static_cast<int>(v.stride / kOctet);
+HYBRID_MULTIVERSIONED void add_active_stiffness(const LevelView& v, float* f) noexcept {
+  const int vectors = static_cast<int>(v.stride / kLanes);
   for (int k = v.first[2]; k <= v.last[2]; ++k) {
     for (int j = v.first[1]; j <= v.last[1]; ++j) {
       const std::size_t row = static_cast<std::size_t>(k) * v.plane + static_cast<std::size_t>(j) * v.stride;
       for (int o = 0; o < vectors; ++o) {
-        const std::size_t at = row + static_cast<std::size_t>(o * kOctet);
-        Octet active_stiffness, own, load_f, all, inverse;
+        const std::size_t at = row + static_cast<std::size_t>(o * kLanes);
+        Float8 active_stiffness, own, load_f, all, inverse;
         load(active_stiffness, v.active_stiffness + at);
         load(own, v.u + at);
         load(load_f, f + at);
         load(all, v.diagonal + at);
         load(inverse, v.inverse_diagonal + at);
         store(f + at, load_f + active_stiffness * own);
-        const Octet zero{}, one = zero + 1.0F;
-        Octet sum = all + active_stiffness;
+        const Float8 zero{}, one = zero + 1.0F;
+        Float8 sum = all + active_stiffness;
         sum = inverse > zero ? sum : one;
-        const Octet with = one / sum;
+        const Float8 with = one / sum;
         store(v.inverse_with_active + at, inverse > zero ? with : zero);
       }
     }

@@ -22,7 +22,7 @@ constexpr double kMaxThinShare = 0.02;   // of the stiffness of links where tiss
 constexpr double kMinAreaRatio = 0.8, kMaxAreaRatio = 1.25;  // of anchor_area_ratio()
 
 // Is there a link without a cell on any side? Links in a sheet or a row of single voxels have none.
-bool has_thin_parts(const Lattice& lattice) {
+bool has_thin_blocks(const Lattice& lattice) {
   for (const VoxelId v : lattice.surface()) {
     const auto c = lattice.coordinates(v);
     std::uint32_t filled = 0;
@@ -75,7 +75,7 @@ double thin_tissue_share(const Lattice& lattice) {
           ++to[d];
           links[index(n)] = softer(moduli_at(from), moduli_at(to));
         }
-        const LinkParts parts = link_parts(links);
+        const LinkParts parts = link_blocks(links);
         thin += parts.thin.along_Pa;
         all += parts.thin.along_Pa + parts.cells.along_Pa;
       }
@@ -100,7 +100,7 @@ std::string CompositeGrid::reason_unsuitable(const Lattice& lattice) {
     const LinkLimit& l = lattice.tightest(d);
     if (l.along_low >= 0.0F || l.along_high <= 0.0F || l.across <= 0.0F) return "its links have no slack";
   }
-  if (has_thin_parts(lattice)) return "parts of it are one voxel thick";
+  if (has_thin_blocks(lattice)) return "parts of it are one voxel thick";
   if (lattice.materials().size() > 2 && thin_tissue_share(lattice) > kMaxThinShare)
     return "much of its stiffer tissue is one voxel thick";
   const CompositeGrid grid(lattice, kHalfWidth);

@@ -47,7 +47,7 @@ BrickLoads::BrickLoads(const Lattice& lattice) : lattice_(lattice) {
   for (auto& axis : step_) axis = LazyArray<float>(lattice.size());
   const std::size_t rows = lattice.grid().rows();
   mark_ = LazyArray<std::uint8_t>(rows);
-  for (Rows* list : {&moved_, &due_, &again_}) list->row = LazyArray<RowId>(rows);
+  for (Rows* list : {&moved_, &due_, &retry_}) list->row = LazyArray<RowId>(rows);
 }
 
 void BrickLoads::look_at_all_of(const BrickLoads& other) noexcept {
@@ -59,14 +59,14 @@ void BrickLoads::look_at_all_of(const BrickLoads& other) noexcept {
 
 // What is around rows that moved is due, and what was not right yet.
 bool BrickLoads::begin_round() noexcept {
-  if (moved_.count + again_.count == 0) return false;
+  if (moved_.count + retry_.count == 0) return false;
   due_.count = next_ = 0;
   worst_N_ = 0.0F;
-  for (std::size_t n = 0; n < again_.count; ++n) {
-    mark_[again_.row[n]] &= static_cast<std::uint8_t>(~kAgain);
-    put(due_, again_.row[n], kDue);
+  for (std::size_t n = 0; n < retry_.count; ++n) {
+    mark_[retry_.row[n]] &= static_cast<std::uint8_t>(~kAgain);
+    put(due_, retry_.row[n], kDue);
   }
-  again_.count = 0;
+  retry_.count = 0;
   const Grid& grid = lattice_.grid();
   for (std::size_t n = 0; n < moved_.count; ++n) {
     const RowId row = moved_.row[n];
@@ -128,7 +128,7 @@ bool BrickLoads::renew_row(RowId row, Displacement& state) noexcept {
   mark_[row] |= kStepped;
   state.bricks.row[row] = 1;
   mark_[row] |= kChanged;
-  if ((mark_[row] & kAgain) == 0) put(again_, row, kAgain);
+  if ((mark_[row] & kAgain) == 0) put(retry_, row, kAgain);
   return true;
 }
 
@@ -230,7 +230,7 @@ void BrickLoads::mixed_loads(RowId row, const NodeField& field, std::array<Lanes
 
 std::size_t BrickLoads::memory_bytes() const {
   return mark_.resident_bytes() + moved_.row.resident_bytes() + due_.row.resident_bytes() +
-         again_.row.resident_bytes() + 3 * step_[0].resident_bytes() + kind_.size() * sizeof(Kind);
+         retry_.row.resident_bytes() + 3 * step_[0].resident_bytes() + kind_.size() * sizeof(Kind);
 }
 
 }  // namespace voxel

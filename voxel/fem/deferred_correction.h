@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The accurate energy in a lattice whose solver knows links: what its bricks (voxel/fem/hex_element.h) pull at
-// a voxel beyond what the links of their cells do, as a load on that voxel.
+// The accurate energy in a lattice whose solver knows links: what its bricks (voxel/fem/hex_element.h) pull
+// at a voxel beyond what the links of their cells do, as a load on that voxel.
 //
 // Deferred correction (Stetter 1978; Trottenberg, Oosterlee & Schüller, Multigrid, section 5.4): with the
 // load kept, links come to rest by everything that knows links - contact, limits, coarse levels -, then the
@@ -20,10 +20,10 @@
 #include <vector>
 
 #include "voxel/fem/hex_forces.h"
-#include "voxel/lattice/level_stiffness.h"
 #include "voxel/lattice/displacement.h"
 #include "voxel/lattice/lattice.h"
 #include "voxel/lattice/lazy_array.h"
+#include "voxel/lattice/level_stiffness.h"
 
 namespace voxel {
 
@@ -66,7 +66,7 @@ class BrickLoads {
   // All that was due when the last round began was looked at.
   [[nodiscard]] bool round_ended() const { return next_ == due_.count; }
   // How wrong the worst was when the last whole round looked at it (N).
-  [[nodiscard]] float left_N() const { return left_N_; }
+  [[nodiscard]] float unbalanced_N() const { return left_N_; }
 
   // What bricks pull the voxels of a row with beyond what the links of their cells do, where those are now
   // (N). False: nothing.
@@ -109,7 +109,7 @@ class BrickLoads {
   float least_left_N_ = 0.0F;     // since the contact was last somewhere else
   int without_gain_ = 0;          // rounds
   LazyArray<std::uint8_t> mark_;  // [row]
-  Rows moved_, due_, again_;      // again_: still wrong when they were looked at in this round
+  Rows moved_, due_, retry_;      // retry_: still wrong when they were looked at in this round
   std::size_t next_ = 0;          // of due_
 };
 

@@ -59,8 +59,8 @@ template <std::size_t... o>
 
 }  // namespace
 
-HYBRID_WIDE void row_forces(const NodeStencil& inside, const NodeField& field, std::size_t first,
-                            std::size_t count, const std::array<float*, 3>& force) {
+HYBRID_MULTIVERSIONED void row_forces(const NodeStencil& inside, const NodeField& field, std::size_t first,
+                                      std::size_t count, const std::array<float*, 3>& force) {
   // The last ones with some before them once more: one by one they took a tenth of a block's whole cycle.
   for (std::size_t done = 0; done < count && count >= kLanes; done += kLanes) {
     const std::size_t from = std::min(done, count - kLanes);

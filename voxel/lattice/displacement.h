@@ -55,7 +55,7 @@ struct Displacement {
   };
   // Those that stand while their rows are relaxed.
   [[nodiscard]] static bool stands(std::uint8_t role) noexcept { return (role & 1U) != 0; }
-  [[nodiscard]] static bool in_part(std::uint8_t role) noexcept { return role >= joined; }
+  [[nodiscard]] static bool in_block(std::uint8_t role) noexcept { return role >= joined; }
   [[nodiscard]] static bool at_obstacle(std::uint8_t role) noexcept {
     return role == obstacle || role == joined_at_obstacle;
   }
@@ -68,7 +68,7 @@ struct Displacement {
         rest(lattice),
         bricks(lattice) {
     for (auto& axis : u) axis = LazyArray<float>(lattice.size());
-    for (VoxelId v = 0; lattice.part_count() > 0 && v < lattice.size(); ++v) {
+    for (VoxelId v = 0; lattice.block_count() > 0 && v < lattice.size(); ++v) {
       if (lattice.part(v) == 0) continue;
       role[v] = joined;
       ++row_standing[v / kRow];
@@ -99,7 +99,7 @@ struct Displacement {
     for (int a = 0; a < 3; ++a) u[static_cast<std::size_t>(a)][v] = static_cast<float>(value[a]);
   }
   void set_role(VoxelId v, Role r) {
-    if (in_part(role[v])) {
+    if (in_block(role[v])) {
       if (r == held || r == pressed) return;
       r = r == obstacle ? joined_at_obstacle : joined;
     }

@@ -58,7 +58,7 @@ Lattice::Lattice(const LabelVolume& volume, const LatticeOptions& options, std::
   fill_force_scale();
   fill_anchors(volume, options);
   find_surface();
-  find_parts();
+  find_blocks();
 }
 
 void Lattice::fill_labels(const LabelVolume& volume, std::uint8_t* give_back) {
@@ -324,7 +324,7 @@ void Lattice::fill_anchors(const LabelVolume& volume, const LatticeOptions& opti
     throw std::invalid_argument(
         "a free soft object has no equilibrium force: anchor a face, a label, or what touches bone");
   }
-  anchor_parts(lanes);
+  anchor_blocks(lanes);
   list_anchors(lanes);
 }
 

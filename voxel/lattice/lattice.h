@@ -2,8 +2,9 @@
 // The constant half of a soft object: which voxels there are, how stiff each link is, how far each link
 // may stretch, what is anchored. Nothing here changes while a person touches it.
 //
-// A voxel costs its label: a link's stiffness follows from the labels around it (voxel/lattice/link_stiffness.h), its
-// limits from those at its two ends, and rest positions from the index (see row_grid.h).
+// A voxel costs its label: a link's stiffness follows from the labels around it
+// (voxel/lattice/link_stiffness.h), its limits from those at its two ends, and rest positions from the index
+// (see row_grid.h).
 #pragma once
 
 #include <algorithm>
@@ -16,9 +17,9 @@
 #include <string>
 #include <vector>
 
-#include "voxel/lattice/row_grid.h"
 #include "voxel/lattice/lazy_array.h"
 #include "voxel/lattice/link_stiffness.h"
+#include "voxel/lattice/row_grid.h"
 #include "voxel/volume/label_volume.h"
 
 namespace voxel {
@@ -32,7 +33,8 @@ struct LinkMaterial {
   double shear = 0.6;        // most slip across the link, in its rest length
   // Strain beyond which a link keeps what is beyond (voxel/lattice/plasticity.h), of its rest length.
   double yield = std::numeric_limits<double>::infinity();
-  // Cells of which it is the softest are of the accurate energy (voxel/fem/deferred_correction.h), not of links.
+  // Cells of which it is the softest are of the accurate energy (voxel/fem/deferred_correction.h), not of
+  // links.
   bool bricks = false;
 
   // Voxels of such materials that are linked to one another only move as one.
@@ -144,7 +146,7 @@ class Lattice {
   [[nodiscard]] glm::dvec3 outward(VoxelId v) const noexcept;
 
   // Of the link v → up(v, d); nothing where an end is missing. It looks at up to eighteen labels: what a tick
-  // asks for, it asks of Couplings.
+  // asks for, it asks of LevelStiffness.
   [[nodiscard]] Spring spring(VoxelId v, int d) const noexcept;
   [[nodiscard]] VoxelSprings springs_of(VoxelId v) const noexcept;
   // The label that a row, the eight rows beside it and the voxels beyond all their ends are of, all of them;
@@ -163,11 +165,13 @@ class Lattice {
   [[nodiscard]] bool has_bricks() const { return has_bricks_; }
 
   // Parts without slack: voxels whose links to one another are of one length, two at least, and which so only
-  // move as one. Those that are anchored somewhere are anchored throughout. Of the others the kMostParts with
+  // move as one. Those that are anchored somewhere are anchored throughout. Of the others the kMaxBlocks with
   // most voxels have numbers from 1 on; 0: in none of these.
-  static constexpr std::size_t kMostParts = 1024;
-  [[nodiscard]] std::size_t part_count() const { return part_count_; }
-  [[nodiscard]] std::uint16_t part(VoxelId v) const { return part_count_ == 0 ? std::uint16_t{0} : part_[v]; }
+  static constexpr std::size_t kMaxBlocks = 1024;
+  [[nodiscard]] std::size_t block_count() const { return block_count_; }
+  [[nodiscard]] std::uint16_t part(VoxelId v) const {
+    return block_count_ == 0 ? std::uint16_t{0} : part_[v];
+  }
   // Of a link in +d whose parallels (link_stiffness.h) leave voxels of materials `from` and end in `to`.
   [[nodiscard]] Spring spring_among(const std::array<std::uint8_t, 9>& from,
                                     const std::array<std::uint8_t, 9>& to, int d) const noexcept;
@@ -231,8 +235,8 @@ class Lattice {
   [[nodiscard]] bool any_without_slack() const;
   template <class Enter>
   void flood(std::vector<VoxelId>& voxels, const Enter& enter) const;
-  void anchor_parts(LazyArray<std::uint32_t>& lanes);
-  void find_parts();
+  void anchor_blocks(LazyArray<std::uint32_t>& lanes);
+  void find_blocks();
   [[nodiscard]] std::uint32_t surface_from(VoxelId v) const noexcept;
 
   Grid grid_;
@@ -254,7 +258,7 @@ class Lattice {
   std::array<std::vector<float>, 3> yield_m_;  // as limits_
   std::array<float, 3> first_yield_m_{};
   LazyArray<std::uint16_t> part_;  // [v]; empty: there is none
-  std::size_t part_count_ = 0;
+  std::size_t block_count_ = 0;
   std::vector<VoxelId> surface_;
   std::vector<std::uint32_t> surface_before_;  // [id / kSurfaceBlock] surface voxels with smaller ids
 };

@@ -10,7 +10,7 @@
 
 namespace voxel {
 
-Couplings::Couplings(const Lattice& lattice, const Couplings* finer)
+LevelStiffness::LevelStiffness(const Lattice& lattice, const LevelStiffness* finer)
     : lattice_(lattice),
       finer_(finer),
       level_(finer == nullptr ? 0 : finer->level_ + 1),
@@ -69,7 +69,7 @@ Couplings::Couplings(const Lattice& lattice, const Couplings* finer)
   if (level_ >= kKept) keep_cells();
 }
 
-void Couplings::keep_cells() {
+void LevelStiffness::keep_cells() {
   content_ = LazyArray<std::uint8_t>(grid_.size());
   for (auto& links : link_) links = LazyArray<Spring>(grid_.size());
   for (int k = 0; k < grid_.dims[2]; ++k) {
@@ -88,7 +88,7 @@ void Couplings::keep_cells() {
 
 // What a cell holds: it is held where all it holds is. Where only some is, that holds on to it (see
 // Multigrid::hold_cells).
-Couplings::Content Couplings::content(const std::array<int, 3>& cell) const noexcept {
+LevelStiffness::Content LevelStiffness::content(const std::array<int, 3>& cell) const noexcept {
   const auto [i, j, k] = cell;
   if (level_ == 0) {
     const VoxelId v = grid_.at(i, j, k);
@@ -97,7 +97,7 @@ Couplings::Content Couplings::content(const std::array<int, 3>& cell) const noex
   return level_ >= kKept ? static_cast<Content>(content_[grid_.at(i, j, k)]) : content_from_finer(cell);
 }
 
-Couplings::Content Couplings::content_from_finer(const std::array<int, 3>& cell) const noexcept {
+LevelStiffness::Content LevelStiffness::content_from_finer(const std::array<int, 3>& cell) const noexcept {
   const auto [i, j, k] = cell;
   Content all = nothing;
   for (int corner = 0; corner < 8 && all != some; ++corner) {
@@ -111,7 +111,7 @@ Couplings::Content Couplings::content_from_finer(const std::array<int, 3>& cell)
 }
 
 // The link of a cell to its upper neighbour in d: what was or will be written for it, to the last bit.
-Spring Couplings::link(const std::array<int, 3>& cell, int d) const noexcept {
+Spring LevelStiffness::link(const std::array<int, 3>& cell, int d) const noexcept {
   const auto ud = static_cast<std::size_t>(d);
   for (std::size_t a = 0; a < 3; ++a) {
     if (cell[a] < 0 || cell[a] >= grid_.dims[a]) return {};
@@ -128,7 +128,7 @@ Spring Couplings::link(const std::array<int, 3>& cell, int d) const noexcept {
   return level_ == 0 ? lattice_.spring(v, d) : link_from_finer(cell, d);
 }
 
-Spring Couplings::link_from_finer(const std::array<int, 3>& cell, int d) const noexcept {
+Spring LevelStiffness::link_from_finer(const std::array<int, 3>& cell, int d) const noexcept {
   const auto ud = static_cast<std::size_t>(d);
   const std::size_t p = (ud + 1) % 3, q = (ud + 2) % 3;
   std::array<Spring, 4> fine;
@@ -144,7 +144,7 @@ Spring Couplings::link_from_finer(const std::array<int, 3>& cell, int d) const n
           0.5F * ((fine[0].across + fine[1].across) + (fine[2].across + fine[3].across))};
 }
 
-bool Couplings::is_one_label(RowId row, std::uint8_t& label) const noexcept {
+bool LevelStiffness::is_one_label(RowId row, std::uint8_t& label) const noexcept {
   if (level_ == 0) {
     label = lattice_.inside(row);
     if (label == 0) return false;
@@ -170,7 +170,7 @@ bool Couplings::is_one_label(RowId row, std::uint8_t& label) const noexcept {
   return true;
 }
 
-void Couplings::make_ready(RowId row) noexcept {
+void LevelStiffness::make_ready(RowId row) noexcept {
   if (kind(row) == unknown) find(row);
   for (std::size_t d = 1; d < 3 && kind(row) == mixed; ++d) {
     if (kind(below(row, d)) == unknown) find(below(row, d));
@@ -178,7 +178,7 @@ void Couplings::make_ready(RowId row) noexcept {
   kind_[row] |= ready;
 }
 
-void Couplings::find(RowId row) noexcept {
+void LevelStiffness::find(RowId row) noexcept {
   const std::array<int, 3> c = grid_.row_coordinates(row);
   std::uint8_t label = 0;
   Kind found = empty;
@@ -221,7 +221,7 @@ bool same_bits(const T& a, const T& b) {
 }  // namespace
 
 // Where what was just written after all others stands: there, or where the same was written before.
-std::uint32_t Couplings::find_written() noexcept {
+std::uint32_t LevelStiffness::find_written() noexcept {
   const std::uint32_t last = written_count_;
   std::uint64_t hash = 0xcbf29ce484222325;
   add_to_hash(hash, written_[last]);
@@ -245,15 +245,15 @@ std::uint32_t Couplings::find_written() noexcept {
 }
 
 // After all that was written. False where there is nothing in the row.
-bool Couplings::write_out(RowId row) noexcept {
+bool LevelStiffness::write_out(RowId row) noexcept {
   Written& out = written_[written_count_];
   LaneBits& stands = written_stands_[written_count_];
   return level_ == 0 ? write_voxels(row, out, stands)
                      : write_cells(row, out, stands, written_cells_[written_count_]);
 }
 
-void Couplings::write_lane(std::size_t i, const VoxelSprings& springs, Written& out,
-                           LaneBits& stands) noexcept {
+void LevelStiffness::write_lane(std::size_t i, const VoxelSprings& springs, Written& out,
+                                LaneBits& stands) noexcept {
   unsigned bits = 0;
   for (std::size_t d = 0; d < 3; ++d) {
     const std::size_t at = Written::kBefore + d * kRow + i;
@@ -268,7 +268,7 @@ void Couplings::write_lane(std::size_t i, const VoxelSprings& springs, Written& 
   out.across[Written::kBefore - 1] = springs.down[0].across;
 }
 
-bool Couplings::write_voxels(RowId row, Written& out, LaneBits& stands) const noexcept {
+bool LevelStiffness::write_voxels(RowId row, Written& out, LaneBits& stands) const noexcept {
   // Materials around the row, [lane + 1][z][y]: those at one place along the row stand together.
   using Slice = std::array<std::uint8_t, 9>;
   std::array<Slice, kRow + 2> around{};
@@ -319,7 +319,7 @@ bool Couplings::write_voxels(RowId row, Written& out, LaneBits& stands) const no
   return any;
 }
 
-void Couplings::write_limits(RowId row, RowLimits::Written& out) const noexcept {
+void LevelStiffness::write_limits(RowId row, RowLimits::Written& out) const noexcept {
   constexpr float kFar = std::numeric_limits<float>::max();
   constexpr LinkLimit kNone{-kFar, kFar, kFar};
   std::array<LinkLimit, 3> tightest{kNone, kNone, kNone};
@@ -349,7 +349,7 @@ void Couplings::write_limits(RowId row, RowLimits::Written& out) const noexcept 
     out.tightest[static_cast<std::size_t>(axis)] = AxisLimits(tightest, axis);
 }
 
-RowLimits Couplings::limits(RowId row) const noexcept {
+RowLimits LevelStiffness::limits(RowId row) const noexcept {
   RowLimits out{&label_limits_[label_[row]], nullptr};
   if (written_limits_.size() > 0 && kind(row) == mixed) {
     out.lanes = &written_limits_[written_at_[row]];
@@ -358,7 +358,7 @@ RowLimits Couplings::limits(RowId row) const noexcept {
   return out;
 }
 
-bool Couplings::write_cells(RowId row, Written& out, LaneBits& stands, Cells& cells) const noexcept {
+bool LevelStiffness::write_cells(RowId row, Written& out, LaneBits& stands, Cells& cells) const noexcept {
   const std::array<int, 3> c = grid_.row_coordinates(row);
   bool any = false;
   for (int lane = 0; lane < kRow; ++lane) {
@@ -381,7 +381,7 @@ bool Couplings::write_cells(RowId row, Written& out, LaneBits& stands, Cells& ce
   return any;
 }
 
-VoxelSprings Couplings::springs_by_links(const std::array<int, 3>& cell, Content inside) const noexcept {
+VoxelSprings LevelStiffness::springs_by_links(const std::array<int, 3>& cell, Content inside) const noexcept {
   VoxelSprings springs;
   if (inside == nothing) return springs;
   for (std::size_t d = 0; d < 3; ++d) {
@@ -394,11 +394,11 @@ VoxelSprings Couplings::springs_by_links(const std::array<int, 3>& cell, Content
   return springs;
 }
 
-VoxelSprings Couplings::springs_of(VoxelId cell) noexcept {
+VoxelSprings LevelStiffness::springs_of(VoxelId cell) noexcept {
   return prepare(cell / kRow) ? known_springs(cell) : VoxelSprings{};
 }
 
-VoxelSprings Couplings::find_springs(VoxelId cell) const noexcept {
+VoxelSprings LevelStiffness::find_springs(VoxelId cell) const noexcept {
   const RowId row = cell / kRow;
   if ((kind_[row] & ready) != 0 || kind(row) == empty) return known_springs(cell);
   if (level_ == 0) return lattice_.springs_of(cell);
@@ -406,11 +406,11 @@ VoxelSprings Couplings::find_springs(VoxelId cell) const noexcept {
   return springs_by_links(at, content(at));
 }
 
-VoxelSprings Couplings::known_springs(VoxelId cell) const noexcept {
+VoxelSprings LevelStiffness::known_springs(VoxelId cell) const noexcept {
   VoxelSprings out;
   const RowId row = cell / kRow;
   if (kind(row) == empty) return out;
-  RowCouplings s;
+  RowStiffness s;
   all(row, s);
   const std::size_t i = cell % kRow;
   for (std::size_t d = 0; d < 3; ++d) {
@@ -421,8 +421,8 @@ VoxelSprings Couplings::known_springs(VoxelId cell) const noexcept {
   return out;
 }
 
-RowSprings Couplings::springs(RowId row, int axis) const noexcept {
-  RowCouplings s;
+RowSprings LevelStiffness::springs(RowId row, int axis) const noexcept {
+  RowStiffness s;
   all(row, s);
   const auto ua = static_cast<std::size_t>(axis);
   RowSprings out;
@@ -434,7 +434,7 @@ RowSprings Couplings::springs(RowId row, int axis) const noexcept {
   return out;
 }
 
-std::size_t Couplings::memory_bytes() const {
+std::size_t LevelStiffness::memory_bytes() const {
   std::size_t bytes = sizeof(*this) + kind_.resident_bytes() + label_.resident_bytes() +
                       content_.resident_bytes() + written_at_.resident_bytes() + written_.resident_bytes() +
                       written_cells_.resident_bytes() + written_stands_.resident_bytes() +
@@ -444,7 +444,7 @@ std::size_t Couplings::memory_bytes() const {
   return bytes;
 }
 
-std::vector<bool> Couplings::rows_in_use() {
+std::vector<bool> LevelStiffness::rows_in_use() {
   std::vector<bool> rows(grid_.rows());
   for (int c = 1; c + 1 < grid_.columns; ++c) {
     for (int k = 0; k < grid_.dims[2]; ++k) {

@@ -13,9 +13,9 @@
 #include <memory>
 #include <vector>
 
-#include "voxel/lattice/row_grid.h"
 #include "voxel/lattice/lattice.h"
 #include "voxel/lattice/lazy_array.h"
+#include "voxel/lattice/row_grid.h"
 
 namespace voxel {
 
@@ -28,7 +28,7 @@ struct RowSprings {
 
 // Those of all axes: [d][lane], what the link in d weighs on its own axis and on the two others. Links down
 // are those up of the row below, and read from there.
-struct RowCouplings {  // all is written by who finds them: with zeros before that, a row took a tenth longer
+struct RowStiffness {  // all is written by who finds them: with zeros before that, a row took a tenth longer
   const float *up_along, *up_across;
   std::array<const float*, 3> down_along, down_across;  // [d], each of [lane]
   const float* inverse;                                 // [axis][lane]
@@ -66,7 +66,7 @@ struct RowLimits {
   const Written* lanes = nullptr;                 // null: all are as tight as that
 };
 
-class Couplings {
+class LevelStiffness {
  public:
   // The first level whose links and contents are kept for all cells. To find one of its rows from those below
   // took a millisecond where tissues mix; written out as inner loops want them (1.5 kB a row), they took
@@ -74,7 +74,7 @@ class Couplings {
   static constexpr int kKept = 3;
 
   // `finer`: the level below, kept by the caller; none for level 0.
-  Couplings(const Lattice& lattice, const Couplings* finer);
+  LevelStiffness(const Lattice& lattice, const LevelStiffness* finer);
 
   [[nodiscard]] const Grid& grid() const { return grid_; }
   [[nodiscard]] int level() const { return level_; }
@@ -91,7 +91,7 @@ class Couplings {
   [[nodiscard]] RowSprings springs(RowId row, int axis) const noexcept;
   // By reference, and member by member: returned by value it was written and read back at once in pieces of
   // different sizes, which took longer than to smooth an octet.
-  void all(RowId row, RowCouplings& out) const noexcept {
+  void all(RowId row, RowStiffness& out) const noexcept {
     const Kind what = kind(row);
     if (what == one_label) {
       const Constant& c = *constant_[label_[row]];
@@ -217,7 +217,7 @@ class Couplings {
   [[nodiscard]] VoxelSprings known_springs(VoxelId cell) const noexcept;
 
   const Lattice& lattice_;
-  const Couplings* finer_;
+  const LevelStiffness* finer_;
   int level_;
   Grid grid_;
   LazyArray<std::uint8_t> kind_, label_;   // [row]

@@ -83,7 +83,7 @@ struct LinkParts {
   LinkModuli thin;
 };
 
-[[nodiscard]] constexpr LinkParts link_parts(const std::array<LinkModuli, 9>& links) {
+[[nodiscard]] constexpr LinkParts link_blocks(const std::array<LinkModuli, 9>& links) {
   const LinkModuli& own = links[kLinkItself];
   LinkParts out;
   bool thick = false;
@@ -105,14 +105,14 @@ struct LinkParts {
 
 // The springs of the six-link energy.
 [[nodiscard]] constexpr LinkModuli link_moduli(const std::array<LinkModuli, 9>& links) {
-  const LinkParts parts = link_parts(links);
+  const LinkParts parts = link_blocks(links);
   return {parts.cells.along_Pa + parts.thin.along_Pa, parts.cells.across_Pa + parts.thin.across_Pa};
 }
 
-// The springs that stand beside the bricks of the accurate energy (voxel/fem/hex_element.h): the cells are the
-// bricks', what is too thin for a brick keeps its links, and both hold the same voxels.
+// The springs that stand beside the bricks of the accurate energy (voxel/fem/hex_element.h): the cells are
+// the bricks', what is too thin for a brick keeps its links, and both hold the same voxels.
 [[nodiscard]] constexpr LinkModuli link_moduli_beside_bricks(const std::array<LinkModuli, 9>& links) {
-  return link_parts(links).thin;
+  return link_blocks(links).thin;
 }
 
 }  // namespace voxel

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "voxel/lattice/level_stiffness.h"
 #include "voxel/lattice/displacement.h"
 #include "voxel/lattice/lattice.h"
+#include "voxel/lattice/level_stiffness.h"
 #include "voxel/lattice/plasticity.h"
 
 namespace voxel {
@@ -46,7 +46,7 @@ void for_links(const Lattice& lattice, const Displacement& state, VoxelId v, con
       for (std::size_t axis = 0; axis < 3; ++axis) {
         const LazyArray<float>& u = state.u[axis];
         const float before = state.rest.offset_of(a, d, axis);
-        const float after = yield_link(u[b] - u[a], before, yield).offset;
+        const float after = plastic_link(u[b] - u[a], before, yield).offset;
         visit(d, axis, up, before, after, spring.on(static_cast<int>(axis), id));
       }
     }
@@ -55,7 +55,7 @@ void for_links(const Lattice& lattice, const Displacement& state, VoxelId v, con
 
 }  // namespace
 
-std::array<float, 3> yielded_load(const Lattice& lattice, const Displacement& state,
+std::array<float, 3> plastic_load(const Lattice& lattice, const Displacement& state,
                                   const VoxelSprings& springs, VoxelId v) noexcept {
   std::array<float, 3> load{};
   if (state.rest.row.size() == 0 || !lattice.filled(v)) return load;
@@ -66,10 +66,10 @@ std::array<float, 3> yielded_load(const Lattice& lattice, const Displacement& st
   return load;
 }
 
-RowYield yield_row(Couplings& couplings, Displacement& state, RowId row, bool keep) noexcept {
+RowPlasticity plastic_row(LevelStiffness& couplings, Displacement& state, RowId row, bool keep) noexcept {
   const Lattice& lattice = couplings.lattice();
   RestOffsets& rest = state.rest;
-  RowYield out;
+  RowPlasticity out;
   for (VoxelId v = row * kRow; v < (row + 1) * kRow; ++v) {
     if (!lattice.filled(v)) continue;
     const VoxelSprings springs = couplings.springs_of(v);

@@ -2,19 +2,19 @@
 // What yielded links keep, and how they pull meanwhile.
 //
 // A step goes from one state of rest to the next. Within it a link beyond its yield pulls no harder, which is
-// an extra load on its two ends; the state of rest is that of the convex energy of voxel/lattice/plasticity.h, whatever
-// the way there. When it is reached, the offsets are moved.
+// an extra load on its two ends; the state of rest is that of the convex energy of
+// voxel/lattice/plasticity.h, whatever the way there. When it is reached, the offsets are moved.
 #pragma once
 
 #include <array>
 #include <cstdint>
 
-#include "voxel/lattice/row_grid.h"
 #include "voxel/lattice/lazy_array.h"
+#include "voxel/lattice/row_grid.h"
 
 namespace voxel {
 
-class Couplings;
+class LevelStiffness;
 class Lattice;
 struct Displacement;
 struct VoxelSprings;
@@ -44,15 +44,15 @@ struct RestOffsets {
 // What offsets, and yielding, add to the force of its springs on a voxel where it and its neighbours are now
 // (N, per axis). Rows keep what they were told last; a contact wants to know it now, or a held tool and its
 // tissue answer one another's last round for ever.
-std::array<float, 3> yielded_load(const Lattice& lattice, const Displacement& state,
+std::array<float, 3> plastic_load(const Lattice& lattice, const Displacement& state,
                                   const VoxelSprings& springs, VoxelId v) noexcept;
 
-struct RowYield {
+struct RowPlasticity {
   float moved_m = 0.0F;  // how far the change of its load would move a voxel of the row
   bool unkept = false;   // some link is beyond what it keeps
 };
 
 // Renews the loads of a row; `keep`: its links also keep what is beyond their yield. `couplings`: of level 0.
-RowYield yield_row(Couplings& couplings, Displacement& state, RowId row, bool keep) noexcept;
+RowPlasticity plastic_row(LevelStiffness& couplings, Displacement& state, RowId row, bool keep) noexcept;
 
 }  // namespace voxel

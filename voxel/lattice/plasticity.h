@@ -21,7 +21,7 @@
 namespace voxel {
 
 template <std::floating_point T>
-struct YieldedLink {
+struct PlasticLink {
   T elastic;  // part of the difference that the spring carries (m)
   T offset;   // rest difference from now on (m)
 };
@@ -31,7 +31,7 @@ struct YieldedLink {
 // the difference: where both keep the chain's limits, which are counted from the first rest length, so does
 // the unloaded link. No strain beyond yield: the offset stays to the last bit.
 template <std::floating_point T>
-[[nodiscard]] constexpr YieldedLink<T> yield_link(T difference, T offset, T yield) {
+[[nodiscard]] constexpr PlasticLink<T> plastic_link(T difference, T offset, T yield) {
   const T strain = difference - offset;
   const T elastic = std::clamp(strain, -yield, yield);
   return {elastic, offset + (strain - elastic)};
@@ -41,7 +41,7 @@ template <std::floating_point T>
 // spent.
 template <std::floating_point T>
 [[nodiscard]] constexpr T link_energy_J(T stiffness_N_per_m, T difference, T offset, T yield) {
-  const T elastic = yield_link(difference, offset, yield).elastic;
+  const T elastic = plastic_link(difference, offset, yield).elastic;
   return stiffness_N_per_m * elastic * (difference - offset - elastic / 2);
 }
 

@@ -26,7 +26,7 @@ void Lattice::flood(std::vector<VoxelId>& voxels, const Enter& enter) const {
 }
 
 // What hangs on an anchor without slack cannot move either.
-void Lattice::anchor_parts(LazyArray<std::uint32_t>& lanes) {
+void Lattice::anchor_blocks(LazyArray<std::uint32_t>& lanes) {
   if (!any_without_slack()) return;
   std::vector<VoxelId> voxels;
   for (RowId row = 0; row < grid_.rows(); ++row) {
@@ -45,7 +45,7 @@ void Lattice::anchor_parts(LazyArray<std::uint32_t>& lanes) {
   anchored_count_ += voxels.size() - before;
 }
 
-void Lattice::find_parts() {
+void Lattice::find_blocks() {
   if (!any_without_slack()) return;
   LazyArray<std::uint32_t> found(grid_.size());  // 1 + number; 0: in none
   std::vector<std::size_t> sizes;
@@ -71,10 +71,10 @@ void Lattice::find_parts() {
                    [&](std::uint32_t a, std::uint32_t b) { return sizes[a] > sizes[b]; });
   std::vector<std::uint16_t> number_of(sizes.size() + 1, 0);
   for (const std::uint32_t n : order) {
-    if (part_count_ == kMostParts || sizes[n] < 2) break;
-    number_of[n + 1] = static_cast<std::uint16_t>(++part_count_);
+    if (block_count_ == kMaxBlocks || sizes[n] < 2) break;
+    number_of[n + 1] = static_cast<std::uint16_t>(++block_count_);
   }
-  if (part_count_ == 0) return;
+  if (block_count_ == 0) return;
   part_ = LazyArray<std::uint16_t>(grid_.size());
   for (RowId row = 0; row < grid_.rows(); ++row) {
     if (filled_in(row) == 0) continue;

@@ -13,7 +13,7 @@ namespace {
 // What pulls a voxel beside its springs: bricks, or links that yielded. No object has both.
 std::array<float, 3> load_beside_springs(const Lattice& lattice, const Displacement& state,
                                          const VoxelSprings& springs, VoxelId v) noexcept {
-  return lattice.has_bricks() ? state.bricks.at(v) : yielded_load(lattice, state, springs, v);
+  return lattice.has_bricks() ? state.bricks.at(v) : plastic_load(lattice, state, springs, v);
 }
 
 glm::dvec3 force_of(const VoxelSprings& springs, const Lattice& lattice, const Displacement& state,
@@ -59,7 +59,7 @@ float clamp_to(const std::array<float, 2>& interval, float wanted, float now) no
   return interval[0] > interval[1] ? now : std::clamp(wanted, interval[0], interval[1]);
 }
 
-glm::dvec3 link_minimum(Couplings& couplings, const Displacement& state, VoxelId v) noexcept {
+glm::dvec3 unconstrained_minimum(LevelStiffness& couplings, const Displacement& state, VoxelId v) noexcept {
   const VoxelSprings springs = couplings.springs_of(v);
   const Grid& grid = couplings.grid();
   std::array<float, 3> sum = load_beside_springs(couplings.lattice(), state, springs, v);
@@ -87,7 +87,7 @@ glm::dvec3 clamp_to_links(const Lattice& lattice, const Displacement& state, Vox
   return result;
 }
 
-VoxelLinks links_of(Couplings& couplings, const Displacement& state, VoxelId v) noexcept {
+VoxelLinks links_of(LevelStiffness& couplings, const Displacement& state, VoxelId v) noexcept {
   const Lattice& lattice = couplings.lattice();
   const VoxelSprings springs = couplings.springs_of(v);
   std::array<float, 3> sum = load_beside_springs(lattice, state, springs, v), low, high;
@@ -134,11 +134,11 @@ glm::dvec3 clamp_to_links(const VoxelLinks& links, const glm::dvec3& wanted, con
   return result;
 }
 
-glm::dvec3 link_force(Couplings& couplings, const Displacement& state, VoxelId v) noexcept {
+glm::dvec3 link_force(LevelStiffness& couplings, const Displacement& state, VoxelId v) noexcept {
   return force_of(couplings.springs_of(v), couplings.lattice(), state, v);
 }
 
-double link_force(Couplings& couplings, const Displacement& state, VoxelId v, int axis) noexcept {
+double link_force(LevelStiffness& couplings, const Displacement& state, VoxelId v, int axis) noexcept {
   const VoxelSprings springs = couplings.springs_of(v);
   const Lattice& lattice = couplings.lattice();
   const auto ua = static_cast<std::size_t>(axis);
@@ -156,7 +156,7 @@ glm::dvec3 link_force(const Lattice& lattice, const Displacement& state, VoxelId
   return force_of(lattice.springs_of(v), lattice, state, v);
 }
 
-glm::dvec3 link_compliance(Couplings& couplings, VoxelId v) noexcept {
+glm::dvec3 link_compliance(LevelStiffness& couplings, VoxelId v) noexcept {
   const std::array<float, 3> inverse = couplings.springs_of(v).inverse;
   return {inverse[0], inverse[1], inverse[2]};
 }
@@ -165,7 +165,7 @@ double depth_in_obstacle(const Obstacle& o, const glm::dvec3& u) noexcept {
   return static_cast<double>(o.bound) - glm::dot(glm::dvec3(o.normal), u);
 }
 
-bool blocked(const ObstacleView& view, const Displacement& state, VoxelId v, double margin) noexcept {
+bool is_jammed(const ObstacleView& view, const Displacement& state, VoxelId v, double margin) noexcept {
   const Obstacle& o = view.of(v);
   return glm::dot(glm::dvec3(o.normal), state.at(v)) < static_cast<double>(o.bound) + margin;
 }
@@ -218,11 +218,11 @@ glm::dvec3 least_outside(const Obstacle& o, const glm::dvec3& w, const glm::dvec
 
 }  // namespace
 
-void relax_obstacle(Couplings& couplings, Displacement& state, const ObstacleView& view, VoxelId v,
+void relax_obstacle(LevelStiffness& couplings, Displacement& state, const ObstacleView& view, VoxelId v,
                     const glm::dvec3& load_N) noexcept {
   const Obstacle& o = view.of(v);
   const glm::dvec3 n(o.normal), before = state.at(v), w = link_compliance(couplings, v);
-  const glm::dvec3 wanted = link_minimum(couplings, state, v) + w * load_N;
+  const glm::dvec3 wanted = unconstrained_minimum(couplings, state, v) + w * load_N;
   if (!o.moving) {
     // What stands is not carried by the tissue, and a projection in the metric of the springs does, which
     // lowers the energy along the surface. (With what follows a brain came back into its skull 43 um short of
@@ -232,8 +232,8 @@ void relax_obstacle(Couplings& couplings, Displacement& state, const ObstacleVie
         depth > 0.0 && denominator > 0.0 ? wanted + (depth / denominator) * w * n : wanted;
     const glm::dvec3 within = clamp_to_links(couplings.lattice(), state, v, projected);
     const double now = depth_in_obstacle(o, before);
-    // A voxel in the obstacle that its limits keep from the projection takes the least energy of all places that
-    // limits and obstacle allow. Otherwise it would stay where it is for good.
+    // A voxel in the obstacle that its limits keep from the projection takes the least energy of all places
+    // that limits and obstacle allow. Otherwise it would stay where it is for good.
     if (now <= kTouching * couplings.lattice().min_spacing_m() || depth_in_obstacle(o, within) <= now) {
       state.set(v, no_deeper(o, before, within));
       return;

@@ -7,9 +7,9 @@
 #include <glm/vec3.hpp>
 #include <span>
 
-#include "voxel/lattice/level_stiffness.h"
 #include "voxel/lattice/displacement.h"
 #include "voxel/lattice/lattice.h"
+#include "voxel/lattice/level_stiffness.h"
 
 namespace voxel {
 
@@ -17,7 +17,7 @@ namespace voxel {
 
 // Where voxel v would go if only its links pulled, and the interval its links allow it, per axis (unit:
 // meter).
-glm::dvec3 link_minimum(Couplings& couplings, const Displacement& state, VoxelId v) noexcept;
+glm::dvec3 unconstrained_minimum(LevelStiffness& couplings, const Displacement& state, VoxelId v) noexcept;
 std::array<float, 2> link_interval(const Lattice& lattice, const Displacement& state, VoxelId v,
                                    int axis) noexcept;
 glm::dvec3 clamp_to_links(const Lattice& lattice, const Displacement& state, VoxelId v,
@@ -25,20 +25,20 @@ glm::dvec3 clamp_to_links(const Lattice& lattice, const Displacement& state, Vox
 // The value nearest to `wanted` in the interval. An empty interval can only be a rounding wide: `now` then.
 float clamp_to(const std::array<float, 2>& interval, float wanted, float now) noexcept;
 // Force of its links on voxel v (unit: newton); of a lattice's own springs slowly, for references.
-glm::dvec3 link_force(Couplings& couplings, const Displacement& state, VoxelId v) noexcept;
+glm::dvec3 link_force(LevelStiffness& couplings, const Displacement& state, VoxelId v) noexcept;
 glm::dvec3 link_force(const Lattice& lattice, const Displacement& state, VoxelId v) noexcept;
 // The same along one axis, in a third of the time.
-double link_force(Couplings& couplings, const Displacement& state, VoxelId v, int axis) noexcept;
+double link_force(LevelStiffness& couplings, const Displacement& state, VoxelId v, int axis) noexcept;
 // How far a force of 1 N on voxel v alone moves it, per axis (unit: m/N); 0 where it is anchored.
-glm::dvec3 link_compliance(Couplings& couplings, VoxelId v) noexcept;
+glm::dvec3 link_compliance(LevelStiffness& couplings, VoxelId v) noexcept;
 
 // The three of them together, which take twice as long one by one: what a touched voxel is asked six times a
 // tick.
 struct VoxelLinks {
-  glm::dvec3 minimum{0.0}, compliance{0.0};        // link_minimum(), link_compliance()
+  glm::dvec3 minimum{0.0}, compliance{0.0};        // unconstrained_minimum(), link_compliance()
   std::array<std::array<float, 2>, 3> interval{};  // link_interval(), [axis]
 };
-VoxelLinks links_of(Couplings& couplings, const Displacement& state, VoxelId v) noexcept;
+VoxelLinks links_of(LevelStiffness& couplings, const Displacement& state, VoxelId v) noexcept;
 // clamp_to_links()
 glm::dvec3 clamp_to_links(const VoxelLinks& links, const glm::dvec3& wanted, const glm::dvec3& now) noexcept;
 
@@ -53,13 +53,13 @@ struct ObstacleView {
 // How deep a voxel displaced by `u` is in its obstacle (m; negative: clear of it).
 double depth_in_obstacle(const Obstacle& o, const glm::dvec3& u) noexcept;
 // Is a voxel whose role is obstacle within `margin` of it, or in it (unit: meter)?
-bool blocked(const ObstacleView& view, const Displacement& state, VoxelId v, double margin) noexcept;
+bool is_jammed(const ObstacleView& view, const Displacement& state, VoxelId v, double margin) noexcept;
 // The way of a voxel that must go no deeper into its obstacle than it was: as far as that, however links
 // clamped it (each axis is held by its own).
 glm::dvec3 no_deeper(const Obstacle& o, const glm::dvec3& before, const glm::dvec3& after) noexcept;
 // Takes a voxel whose role is obstacle where its links would have it, on this side of the obstacle. One that
 // is in it comes out as far as its links allow, and no deeper.
-void relax_obstacle(Couplings& couplings, Displacement& state, const ObstacleView& view, VoxelId v,
+void relax_obstacle(LevelStiffness& couplings, Displacement& state, const ObstacleView& view, VoxelId v,
                     const glm::dvec3& load_N) noexcept;
 
 }  // namespace voxel

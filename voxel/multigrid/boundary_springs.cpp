@@ -47,7 +47,7 @@ std::uint32_t lanes_above(std::uint32_t lanes) {
 
 }  // namespace
 
-Holds::Holds(const Lattice& lattice, const std::vector<Couplings*>& levels)
+BoundarySprings::BoundarySprings(const Lattice& lattice, const std::vector<LevelStiffness*>& levels)
     : lattice_(lattice),
       levels_(levels.size()),
       held_mark_(lattice.size()),
@@ -75,7 +75,7 @@ Holds::Holds(const Lattice& lattice, const std::vector<Couplings*>& levels)
 }
 
 // Rows with a cell that anchors may hold, on each level.
-void Holds::wait_for_anchors() {
+void BoundarySprings::wait_for_anchors() {
   const auto above = [this](int level, RowId row) {
     const std::array<int, 3> c = at(level - 1).couplings->grid().row_coordinates(row);
     at(level).row_held[at(level).couplings->grid().row((c[0] - 1) / 2 + 1, c[1] / 2, c[2] / 2)] |= kWaits;
@@ -93,11 +93,11 @@ void Holds::wait_for_anchors() {
     for (RowId row = 0; row < at(level).couplings->grid().rows(); ++row) {
       if (level + 1 < static_cast<int>(levels_.size()) && at(level).row_held[row] != 0) above(level + 1, row);
     }
-    if (level >= Couplings::kKept) keep_records(level);
+    if (level >= LevelStiffness::kKept) keep_records(level);
   }
 }
 
-void Holds::keep_records(int level) {
+void BoundarySprings::keep_records(int level) {
   Level& l = at(level);
   for (RowId row = 0; row < l.couplings->grid().rows(); ++row) {
     if (l.row_held[row] == 0) continue;
@@ -124,7 +124,7 @@ void Holds::keep_records(int level) {
 }
 
 // Lanes of voxels that are anchored or linked to one that is.
-std::uint32_t Holds::voxels_at_anchors(RowId row) const noexcept {
+std::uint32_t BoundarySprings::voxels_at_anchors(RowId row) const noexcept {
   const Grid& g = lattice_.grid();
   const std::uint32_t filled = lattice_.filled_lanes(row), own = lattice_.anchored_lanes(row);
   if (filled == 0) return 0;
@@ -137,7 +137,7 @@ std::uint32_t Holds::voxels_at_anchors(RowId row) const noexcept {
 }
 
 // Lanes of the cells of a row that hold such a voxel.
-std::uint32_t Holds::cells_at_anchors(int level, RowId row) const noexcept {
+std::uint32_t BoundarySprings::cells_at_anchors(int level, RowId row) const noexcept {
   const Grid& finer = at(level - 1).couplings->grid();
   const std::array<int, 3> c = at(level).couplings->grid().row_coordinates(row);
   std::uint32_t lanes = 0;
@@ -147,7 +147,7 @@ std::uint32_t Holds::cells_at_anchors(int level, RowId row) const noexcept {
     if (column + 1 >= finer.columns || j >= finer.dims[1] || k >= finer.dims[2]) continue;
     const RowId below = finer.row(column, j, k);
     std::uint32_t cells = 0;
-    if (level > Couplings::kKept) {
+    if (level > LevelStiffness::kKept) {
       for (const Record& record : records_in(level - 1, below)) cells |= 1U << record.cell % kRow;
     } else {
       cells = level == 1 ? voxels_at_anchors(below) : cells_at_anchors(level - 1, below);
@@ -157,7 +157,7 @@ std::uint32_t Holds::cells_at_anchors(int level, RowId row) const noexcept {
   return lanes;
 }
 
-std::span<const Holds::Record> Holds::records_in(int level, RowId row) const noexcept {
+std::span<const BoundarySprings::Record> BoundarySprings::records_in(int level, RowId row) const noexcept {
   const std::vector<Record>& records = at(level).records;
   const auto from = [&records](VoxelId cell) {
     return std::lower_bound(records.begin(), records.end(), cell,
@@ -166,7 +166,7 @@ std::span<const Holds::Record> Holds::records_in(int level, RowId row) const noe
   return {from(row * kRow), from((row + 1) * kRow)};
 }
 
-Holds::Found Holds::recorded(int level, const Record& record) const noexcept {
+BoundarySprings::Found BoundarySprings::recorded(int level, const Record& record) const noexcept {
   Found found;
   Axes all{};
   const float* value = at(level).values.data() + record.first;
@@ -181,17 +181,17 @@ Holds::Found Holds::recorded(int level, const Record& record) const noexcept {
 }
 
 // Of a cell that waits.
-Holds::Found Holds::waiting(int level, VoxelId cell) const noexcept {
-  if (level < Couplings::kKept) return find(level, cell);
+BoundarySprings::Found BoundarySprings::waiting(int level, VoxelId cell) const noexcept {
+  if (level < LevelStiffness::kKept) return find(level, cell);
   for (const Record& record : records_in(level, cell / kRow)) {
     if (record.cell == cell) return recorded(level, record);
   }
   return {};
 }
 
-void Holds::find_waiting(int level, RowId row) noexcept {
+void BoundarySprings::find_waiting(int level, RowId row) noexcept {
   Level& l = at(level);
-  if (level >= Couplings::kKept) {
+  if (level >= LevelStiffness::kKept) {
     for (const Record& record : records_in(level, row)) {
       if (waits(level, record.cell)) set(level, record.cell, recorded(level, record));
     }
@@ -204,7 +204,7 @@ void Holds::find_waiting(int level, RowId row) noexcept {
   l.row_held[row] &= static_cast<std::uint8_t>(~kWaits);
 }
 
-void Holds::queue(int level, VoxelId cell) noexcept {
+void BoundarySprings::queue(int level, VoxelId cell) noexcept {
   Level& l = at(level);
   if (l.queued[cell] != 0) return;
   l.queued[cell] = 1;
@@ -212,7 +212,7 @@ void Holds::queue(int level, VoxelId cell) noexcept {
 }
 
 // What holds voxel v changed, and with that its cell and those of its neighbours.
-void Holds::look_at(VoxelId v) noexcept {
+void BoundarySprings::look_at(VoxelId v) noexcept {
   if (queue_[1].size() + kMostOfAVoxel > queue_[1].capacity()) renew();
   const Grid &g = lattice_.grid(), &above = at(1).couplings->grid();
   const auto cell_of = [&](VoxelId w) {
@@ -227,7 +227,7 @@ void Holds::look_at(VoxelId v) noexcept {
   }
 }
 
-void Holds::set_held(std::span<const VoxelId> held) noexcept {
+void BoundarySprings::set_held(std::span<const VoxelId> held) noexcept {
   if (std::equal(held.begin(), held.end(), held_.begin(), held_.end())) return;
   held = held.first(std::min(held.size(), held_.capacity()));
   constexpr std::uint8_t was = 1, stays = 2, is_new = 3;
@@ -245,7 +245,7 @@ void Holds::set_held(std::span<const VoxelId> held) noexcept {
   renew();
 }
 
-Holds::Support Holds::along(const glm::vec3& normal, Support::By what) noexcept {
+BoundarySprings::Support BoundarySprings::along(const glm::vec3& normal, Support::By what) noexcept {
   Support by{what, {}};
   for (int axis = 0; axis < 3; ++axis)
     by.n[static_cast<std::size_t>(axis)] = static_cast<std::int8_t>(
@@ -253,14 +253,14 @@ Holds::Support Holds::along(const glm::vec3& normal, Support::By what) noexcept 
   return by;
 }
 
-void Holds::support(VoxelId v, const Support& by) noexcept {
+void BoundarySprings::support(VoxelId v, const Support& by) noexcept {
   if (supported_[v] == by) return;
   supported_[v] = by;
   row_supported_[v / kRow] = 1;
   look_at(v);
 }
 
-void Holds::renew() noexcept {
+void BoundarySprings::renew() noexcept {
   const int last = static_cast<int>(levels_.size()) - 1;
   for (int level = 1; level <= last; ++level) {
     auto& cells = queue_[static_cast<std::size_t>(level & 1)];
@@ -280,8 +280,8 @@ namespace {
 // Pairs of axes, as tilt() has them.
 constexpr std::array<std::array<std::size_t, 2>, 3> kPairs{{{0, 1}, {0, 2}, {1, 2}}};
 
-glm::vec3 normal_of(const Holds::Support& by) {
-  constexpr float unit = 1.0F / Holds::kUnit;
+glm::vec3 normal_of(const BoundarySprings::Support& by) {
+  constexpr float unit = 1.0F / BoundarySprings::kUnit;
   return glm::vec3(by.n[0], by.n[1], by.n[2]) * unit;
 }
 
@@ -306,8 +306,8 @@ float spring_along(const glm::vec3& n, const std::array<float, 3>& k) {
 struct Kept {
   std::array<float, 3> axes, pairs;
 };
-Kept kept_by(const Holds::Support& own, const Holds::Support& other) {
-  using By = Holds::Support::By;
+Kept kept_by(const BoundarySprings::Support& own, const BoundarySprings::Support& other) {
+  using By = BoundarySprings::Support::By;
   Kept kept{};
   if (other.by == By::all) {  // all that the voxel can do
     kept.axes = {1.0F, 1.0F, 1.0F};
@@ -332,14 +332,14 @@ Kept kept_by(const Holds::Support& own, const Holds::Support& other) {
 
 }  // namespace
 
-void Holds::renew(int level, VoxelId cell) noexcept {
+void BoundarySprings::renew(int level, VoxelId cell) noexcept {
   // What is below it is kept from now on: a tool that moves asks for it again and again.
   if (level > 1) {
     const Level& finer = at(level - 1);
     for_children(finer.couplings->grid(), at(level).couplings->grid().coordinates(cell),
                  [&](VoxelId w, const std::array<int, 3>&) {
                    if (!waits(level - 1, w) || stands(finer.couplings->find_springs(w))) return;
-                   if (level - 1 >= Couplings::kKept) {
+                   if (level - 1 >= LevelStiffness::kKept) {
                      set(level - 1, w, waiting(level - 1, w));
                    } else {
                      renew(level - 1, w);
@@ -349,7 +349,7 @@ void Holds::renew(int level, VoxelId cell) noexcept {
   set(level, cell, find(level, cell));
 }
 
-Holds::Found Holds::find(int level, VoxelId cell) const noexcept {
+BoundarySprings::Found BoundarySprings::find(int level, VoxelId cell) const noexcept {
   Found found;
   Axes all{};
   level == 1 ? find_first(cell, found, all) : find_above(level, cell, found, all);
@@ -357,8 +357,8 @@ Holds::Found Holds::find(int level, VoxelId cell) const noexcept {
   return found;
 }
 
-void Holds::complete(int level, VoxelId cell, const Axes& all, Found& found) const noexcept {
-  const Couplings& couplings = *at(level).couplings;
+void BoundarySprings::complete(int level, VoxelId cell, const Axes& all, Found& found) const noexcept {
+  const LevelStiffness& couplings = *at(level).couplings;
   const std::array<int, 3> place = couplings.grid().coordinates(cell);
   const VoxelSprings own = couplings.find_springs(cell);
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -372,7 +372,7 @@ void Holds::complete(int level, VoxelId cell, const Axes& all, Found& found) con
   }
 }
 
-Holds::Found Holds::known(int level, VoxelId cell) const noexcept {
+BoundarySprings::Found BoundarySprings::known(int level, VoxelId cell) const noexcept {
   const Level& l = at(level);
   const RowId row = cell / kRow;
   Found out;
@@ -387,9 +387,9 @@ Holds::Found Holds::known(int level, VoxelId cell) const noexcept {
 
 // Voxels of a cell that are free, by their links to others that are not: in the same cell, these are half a
 // link from its middle.
-void Holds::find_first(VoxelId cell, Found& found, Axes& all) const noexcept {
+void BoundarySprings::find_first(VoxelId cell, Found& found, Axes& all) const noexcept {
   const Grid& g = lattice_.grid();
-  const Couplings& couplings = *at(0).couplings;
+  const LevelStiffness& couplings = *at(0).couplings;
   const std::array<int, 3> place = at(1).couplings->grid().coordinates(cell);
   Through& through = found.through;
   std::array<float, 3>& tilt = found.tilt;
@@ -448,7 +448,7 @@ void Holds::find_first(VoxelId cell, Found& found, Axes& all) const noexcept {
   for (std::size_t axis = 0; axis < 3; ++axis) all[axis] = held[axis] == count;
 }
 
-void Holds::find_above(int level, VoxelId cell, Found& found, Axes& all) const noexcept {
+void BoundarySprings::find_above(int level, VoxelId cell, Found& found, Axes& all) const noexcept {
   const Level& finer = at(level - 1);
   const std::array<int, 3> place = at(level).couplings->grid().coordinates(cell);
   const auto size = static_cast<float>(1 << level);
@@ -491,7 +491,7 @@ void Holds::find_above(int level, VoxelId cell, Found& found, Axes& all) const n
   for (std::size_t axis = 0; axis < 3; ++axis) all[axis] = held[axis] == count;
 }
 
-void Holds::set(int level, VoxelId cell, const Found& found) noexcept {
+void BoundarySprings::set(int level, VoxelId cell, const Found& found) noexcept {
   Level& l = at(level);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     for (std::size_t d = 0; d < 3; ++d) l.through[axis][d][cell] = found.through[axis][d];
@@ -507,7 +507,7 @@ void Holds::set(int level, VoxelId cell, const Found& found) noexcept {
   if ((l.row_held[cell / kRow] & kWaits) != 0) l.found[cell / kRow] |= 1U << cell % kRow;
 }
 
-void Holds::prepare_all() noexcept {
+void BoundarySprings::prepare_all() noexcept {
   held_mark_.populate();
   supported_.populate();
   for (Level& l : levels_) {
@@ -527,7 +527,7 @@ void Holds::prepare_all() noexcept {
   }
 }
 
-std::size_t Holds::memory_bytes() const {
+std::size_t BoundarySprings::memory_bytes() const {
   std::size_t bytes = sizeof(*this) + resident_bytes(held_) + held_mark_.resident_bytes() +
                       supported_.resident_bytes() + row_supported_.resident_bytes();
   for (const auto& cells : queue_) bytes += resident_bytes(cells);

@@ -21,13 +21,13 @@
 #include <span>
 #include <vector>
 
-#include "voxel/lattice/level_stiffness.h"
 #include "voxel/lattice/lattice.h"
 #include "voxel/lattice/lazy_array.h"
+#include "voxel/lattice/level_stiffness.h"
 
 namespace voxel {
 
-class Holds {
+class BoundarySprings {
  public:
   // How a voxel is held: not, altogether, or along a normal, while it slides across that, on the tool or on
   // an obstacle.
@@ -42,7 +42,7 @@ class Holds {
   static constexpr Support kAll{Support::By::all, {}};
 
   // `levels`: level 0 first; kept by the caller. Allocates.
-  Holds(const Lattice& lattice, const std::vector<Couplings*>& levels);
+  BoundarySprings(const Lattice& lattice, const std::vector<LevelStiffness*>& levels);
 
   // What the tool and other objects hold. Of more than there are surface voxels the first.
   void set_held(std::span<const VoxelId> held) noexcept;
@@ -63,8 +63,8 @@ class Holds {
     return at(level).hold[axis].data() + static_cast<std::size_t>(row) * kRow;
   }
   // [lane] Of what it is told a cell follows by the 1 / (1 + this)th part: it is nearer to what holds it than
-  // the middle of the cell that tells. (Told all of it, cells beside an anchor overshot by as much, on every
-  // level: 0.23 of the error left with three levels, and 1 with seven.)
+  // the middle of the cell that tells. (ProlongedBox all of it, cells beside an anchor overshot by as much,
+  // on every level: 0.23 of the error left with three levels, and 1 with seven.)
   [[nodiscard]] const float* nearer(int level, RowId row, std::size_t axis) const {
     return at(level).nearer[axis].data() + static_cast<std::size_t>(row) * kRow;
   }
@@ -93,7 +93,7 @@ class Holds {
     std::uint16_t which;  // bit 3·axis + d: through; bit 9 + axis: all of it is held
   };
   struct Level {
-    Couplings* couplings = nullptr;
+    LevelStiffness* couplings = nullptr;
     std::array<std::array<LazyArray<float>, 3>, 3> through;  // [axis][d][cell]
     std::array<LazyArray<float>, 3> hold, nearer;            // [axis][cell]
     LazyArray<std::uint8_t> row_held;                        // [row] how many of these are not 0, and kWaits
@@ -101,7 +101,7 @@ class Holds {
     LazyArray<std::uint8_t> row_tilted;                      // [row] cells with any
     LazyArray<std::uint8_t> queued;                          // [cell] 1: it is in its queue
     LazyArray<std::uint32_t> found;  // [row] lanes of a row that waits that do not any more
-    // From Couplings::kKept on, of the cells that wait or did, in their order.
+    // From LevelStiffness::kKept on, of the cells that wait or did, in their order.
     std::vector<Record> records;
     std::vector<float> values;
   };

@@ -43,10 +43,10 @@ void for_lanes(RowId row, std::uint32_t lanes, const Visit& visit) {
 
 // `visit(v, lane)` for the voxels of a row, in the octets of a span, that the tool presses.
 template <class Visit>
-void for_pressed(const Displacement& state, RowId row, OctetSpan span, const Visit& visit) {
+void for_pressed(const Displacement& state, RowId row, LaneSpan span, const Visit& visit) {
   if (state.row_standing[row] == 0) return;
-  const auto first = static_cast<std::size_t>(span.first) * kOctet,
-             last = static_cast<std::size_t>(span.last) * kOctet + kOctet;
+  const auto first = static_cast<std::size_t>(span.first) * kLanes,
+             last = static_cast<std::size_t>(span.last) * kLanes + kLanes;
   for (std::size_t lane = first; lane < last; ++lane) {
     const auto v = static_cast<VoxelId>(row * kRow + lane);
     if (state.role[v] == Displacement::pressed) visit(v, lane);
@@ -55,7 +55,7 @@ void for_pressed(const Displacement& state, RowId row, OctetSpan span, const Vis
 
 }  // namespace
 
-float Multigrid::slide_pressed(RowId row, Displacement& state, OctetSpan span) noexcept {
+float Multigrid::slide_pressed(RowId row, Displacement& state, LaneSpan span) noexcept {
   float most = 0.0F;
   for_pressed(state, row, span, [&](VoxelId v, std::size_t) {
     most = std::max(most, slide(couplings(), state, v, balance_of(v, state)));
@@ -64,7 +64,7 @@ float Multigrid::slide_pressed(RowId row, Displacement& state, OctetSpan span) n
 }
 
 float Multigrid::slide_pressed_by(RowId row, const RowVector& way, Displacement& state,
-                                  OctetSpan span) noexcept {
+                                  LaneSpan span) noexcept {
   float most = 0.0F;
   for_pressed(state, row, span, [&](VoxelId v, std::size_t i) {
     most = std::max(most, slide_by(couplings(), state, v, {way[0][i], way[1][i], way[2][i]}));
@@ -86,29 +86,29 @@ std::uint32_t Multigrid::move_outside(LevelRow r, RowId row, Displacement& state
   for (std::size_t axis = 0; axis < 3; ++axis) std::copy_n(r.u[axis], kRow, before[axis].begin());
   std::array<std::uint8_t, kRow> stays{};
   if (r.stopped != nullptr) std::copy_n(r.stopped, kRow, stays.begin());
-  std::uint32_t blocked_lanes = 0;
+  std::uint32_t jammed_lanes = 0;
   const std::uint32_t near = obstacle_lanes(state, row);
   for (int n = 0; n < kObstacleRounds; ++n) {
     move(r);
     std::uint32_t more = 0;
-    for_lanes(row, near & ~blocked_lanes, [&](VoxelId v, std::size_t lane) {
-      if (blocked(obstacles, state, v, 0.0)) more |= 1U << lane;
+    for_lanes(row, near & ~jammed_lanes, [&](VoxelId v, std::size_t lane) {
+      if (is_jammed(obstacles, state, v, 0.0)) more |= 1U << lane;
     });
     if (more == 0) break;
-    blocked_lanes |= more;
+    jammed_lanes |= more;
     if (n + 1 == kObstacleRounds) break;
     for (std::size_t axis = 0; axis < 3; ++axis) std::copy_n(before[axis].begin(), kRow, r.u[axis]);
-    for_lanes(row, blocked_lanes, [&](VoxelId, std::size_t lane) { stays[lane] = 7; });
+    for_lanes(row, jammed_lanes, [&](VoxelId, std::size_t lane) { stays[lane] = 7; });
     r.stopped = stays.data();
   }
-  for_lanes(row, blocked_lanes, [&](VoxelId v, std::size_t) {
+  for_lanes(row, jammed_lanes, [&](VoxelId v, std::size_t) {
     relax_obstacle(couplings(), state, obstacles, v, balance_of(v, state));
   });
-  return blocked_lanes;
+  return jammed_lanes;
 }
 
 float Multigrid::smooth_voxels(const LevelRow& r, RowId row, Displacement& state,
-                               const ObstacleView& obstacles, OctetSpan span) noexcept {
+                               const ObstacleView& obstacles, LaneSpan span) noexcept {
   const RowLimits limits = couplings().limits(row);
   float change = 0.0F;
   move_outside(r, row, state, obstacles,
@@ -120,7 +120,7 @@ float Multigrid::smooth_voxels(const LevelRow& r, RowId row, Displacement& state
 // refused: a voxel that slides along it goes on with its neighbours, and cells that took its part back in
 // every cycle swung between two states (a block pressed onto a plate: 0.26 to 0.68 N, where 0.40 is right).
 RowCorrection Multigrid::correct_voxels(const LevelRow& r, RowId row, const RowVector& correction,
-                                        Displacement& state, const ObstacleView& obstacles, OctetSpan span,
+                                        Displacement& state, const ObstacleView& obstacles, LaneSpan span,
                                         RowVector& refused) noexcept {
   const RowLimits limits = couplings().limits(row);
   RowCorrection done;
@@ -139,23 +139,24 @@ RowCorrection Multigrid::correct_voxels(const LevelRow& r, RowId row, const RowV
 
 // What presses a voxel against its obstacle, or the tool, is balanced by it, and the cells above are held by
 // it.
-void Multigrid::balance_contacts(RowId row, Displacement& state, const ObstacleView& obstacles,
-                                 OctetSpan span, RowResidual& found, RowVector& out) noexcept {
+void Multigrid::balance_contacts(RowId row, Displacement& state, const ObstacleView& obstacles, LaneSpan span,
+                                 RowResidual& found, RowVector& out) noexcept {
   const double touching = kTouching * lattice_.min_spacing_m();
-  const auto first = static_cast<std::size_t>(span.first) * kOctet,
-             last = static_cast<std::size_t>(span.last) * kOctet + kOctet;
+  const auto first = static_cast<std::size_t>(span.first) * kLanes,
+             last = static_cast<std::size_t>(span.last) * kLanes + kLanes;
   for (std::size_t i = first; i < last; ++i) {
     const auto v = static_cast<VoxelId>(row * kRow + i);
-    Holds::Support by{};
+    BoundarySprings::Support by{};
     if (state.role[v] == Displacement::pressed) {
       const auto force = sliding_force(couplings(), state, v, balance_of(v, state));
       for (int axis = 0; axis < 3 && force; ++axis)
         out[static_cast<std::size_t>(axis)][i] = static_cast<float>((*force)[axis]);
-      by = force ? Holds::along(state.tool_normal[lattice_.surface_number(v)], Holds::Support::By::tool)
-                 : Holds::kAll;
-    } else if (Displacement::in_part(state.role[v])) {
-      by = support_of_part(lattice_.part(v) - 1U);
-    } else if (state.role[v] == Displacement::obstacle && blocked(obstacles, state, v, touching)) {
+      by = force ? BoundarySprings::along(state.tool_normal[lattice_.surface_number(v)],
+                                          BoundarySprings::Support::By::tool)
+                 : BoundarySprings::kAll;
+    } else if (Displacement::in_block(state.role[v])) {
+      by = support_of_block(lattice_.part(v) - 1U);
+    } else if (state.role[v] == Displacement::obstacle && is_jammed(obstacles, state, v, touching)) {
       const glm::vec3 n = obstacles.of(v).normal;
       const float into = out[0][i] * n.x + out[1][i] * n.y + out[2][i] * n.z;
       for (int axis = 0; axis < 3; ++axis) {
@@ -163,9 +164,9 @@ void Multigrid::balance_contacts(RowId row, Displacement& state, const ObstacleV
         found.resisted[ua] &= ~(1U << i);
         if (into < 0.0F) out[ua][i] -= into * n[axis];
       }
-      if (into < 0.0F) by = Holds::along(n, Holds::Support::By::obstacle);
+      if (into < 0.0F) by = BoundarySprings::along(n, BoundarySprings::Support::By::obstacle);
     }
-    holds_->support(v, by);
+    boundary_springs_->support(v, by);
   }
 }
 
@@ -214,13 +215,13 @@ glm::vec3 across(const std::array<float, 3>& tilt, const glm::vec3& way) {
 }  // namespace
 
 template <class Visit>
-void Multigrid::for_tilted(int level, RowId row, const LevelRow& r, OctetSpan span,
+void Multigrid::for_tilted(int level, RowId row, const LevelRow& r, LaneSpan span,
                            const Visit& visit) noexcept {
-  const auto first = static_cast<std::size_t>(span.first) * kOctet,
-             last = static_cast<std::size_t>(span.last) * kOctet + kOctet;
+  const auto first = static_cast<std::size_t>(span.first) * kLanes,
+             last = static_cast<std::size_t>(span.last) * kLanes + kLanes;
   for (std::size_t i = first; i < last; ++i) {
     const auto cell = static_cast<VoxelId>(row * kRow + i);
-    const std::array<float, 3> tilt = holds_->tilt(level, cell);
+    const std::array<float, 3> tilt = boundary_springs_->tilt(level, cell);
     if (tilt[0] == 0.0F && tilt[1] == 0.0F && tilt[2] == 0.0F) continue;
     // A cell that a limit stops, or that does not move on an axis, is held by that.
     bool moves = r.stopped == nullptr || r.stopped[i] == 0;
@@ -236,7 +237,7 @@ void Multigrid::for_tilted(int level, RowId row, const LevelRow& r, OctetSpan sp
 }
 
 // Cells on inclined surfaces, whose axes are not by themselves: each where its energy is least.
-float Multigrid::smooth_tilted(int level, RowId row, const LevelRow& r, OctetSpan span) noexcept {
+float Multigrid::smooth_tilted(int level, RowId row, const LevelRow& r, LaneSpan span) noexcept {
   Level& l = at(level);
   const Grid& g = l.couplings->grid();
   float most = 0.0F;
@@ -275,7 +276,7 @@ float Multigrid::smooth_tilted(int level, RowId row, const LevelRow& r, OctetSpa
 }
 
 // Adds to the residual of a coarse row what inclined surfaces pull across.
-void Multigrid::add_tilt(int level, RowId row, const LevelRow& r, OctetSpan span, RowVector& out) noexcept {
+void Multigrid::add_tilt(int level, RowId row, const LevelRow& r, LaneSpan span, RowVector& out) noexcept {
   for_tilted(level, row, r, span,
              [&](VoxelId, std::size_t i, const std::array<float, 3>& tilt, const std::array<float, 3>&) {
                glm::vec3 back(0.0F);

@@ -6,8 +6,8 @@
 #include <array>
 #include <cstdint>
 
-#include "voxel/lattice/row_grid.h"
 #include "voxel/lattice/lazy_array.h"
+#include "voxel/lattice/row_grid.h"
 
 namespace voxel {
 
@@ -31,7 +31,7 @@ class TileQueue {
   [[nodiscard]] std::size_t waiting() const { return waiting_; }
   // Something moved in this row (Grid::row_coordinates): its tile waits, and the one beside it if the row is
   // at its edge.
-  void stir(const std::array<int, 3>& row) noexcept {
+  void mark_dirty(const std::array<int, 3>& row) noexcept {
     const int column = row[0] - 1, j = row[1], k = row[2];
     push(column, j, k);
     if (j % kSide == 0) push(column, j - 1, k);

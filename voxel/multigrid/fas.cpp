@@ -11,10 +11,10 @@ namespace voxel {
 namespace {
 
 constexpr int kMaxLevels = 10;
-constexpr int kSmallest = 3;                // cells across the coarsest level
-constexpr int kWrittenAtOnce = 5;           // from this level on springs are written out on construction
-constexpr std::size_t kMaxBalanced = 4096;  // rows; the contact of a tool has some hundred
-constexpr std::size_t kMostInTick = 1024;   // rows that a tick adds together
+constexpr int kSmallest = 3;               // cells across the coarsest level
+constexpr int kWrittenAtOnce = 5;          // from this level on springs are written out on construction
+constexpr std::size_t kMaxFrozen = 4096;   // rows; the contact of a tool has some hundred
+constexpr std::size_t kMostInTick = 1024;  // rows that a tick adds together
 constexpr std::uint8_t kAllAxes = 7;
 constexpr std::size_t kMaxStopped = 65536;  // cells of all levels stopped at a time; more move a little
 
@@ -30,8 +30,8 @@ Multigrid::Multigrid(const Lattice& lattice) : lattice_(lattice), tiles_(lattice
   levels_.reserve(kMaxLevels);
   while (levels() < kMaxLevels) {
     Level level;
-    const Couplings* finer = levels_.empty() ? nullptr : levels_.back().couplings.get();
-    level.couplings = std::make_unique<Couplings>(lattice, finer);
+    const LevelStiffness* finer = levels_.empty() ? nullptr : levels_.back().couplings.get();
+    level.couplings = std::make_unique<LevelStiffness>(lattice, finer);
     const Grid& g = level.couplings->grid();
     if (finer != nullptr) {
       for (auto* arrays : {&level.value, &level.told, &level.load, &level.loaded_at}) {
@@ -45,24 +45,24 @@ Multigrid::Multigrid(const Lattice& lattice) : lattice_(lattice), tiles_(lattice
     if (levels() > 1 && *std::max_element(g.dims.begin(), g.dims.end()) <= kSmallest) break;
   }
   for (int l = kWrittenAtOnce; l < levels(); ++l) prepare_level(l);
-  hats_ = Hats(lattice.grid());
-  for (auto& axis : tied_) axis = LazyArray<float>(lattice.size());
-  row_tied_ = LazyArray<std::uint16_t>(lattice.grid().rows());
+  prolongation_ = Prolongation(lattice.grid());
+  for (auto& axis : limit_load_) axis = LazyArray<float>(lattice.size());
+  row_has_limit_load_ = LazyArray<std::uint16_t>(lattice.grid().rows());
   stopped_.reserve(kMaxStopped);
   still_stopped_.reserve(kMaxStopped);
-  joint_ = JointMove(lattice.grid().rows());
-  std::vector<Couplings*> couplings;
+  limited_correction_ = LimitedCorrection(lattice.grid().rows());
+  std::vector<LevelStiffness*> couplings;
   for (const Level& level : levels_) couplings.push_back(level.couplings.get());
-  holds_ = std::make_unique<Holds>(lattice, couplings);
-  if (lattice.part_count() == 0) return;
-  parts_ = std::make_unique<WholeParts>(lattice, couplings);
-  part_state_.resize(parts_->count());
-  for (PartState& p : part_state_) p.on.resize(levels_.size());
-  part_bounds_.reserve(kMostPartBounds);
+  boundary_springs_ = std::make_unique<BoundarySprings>(lattice, couplings);
+  if (lattice.block_count() == 0) return;
+  parts_ = std::make_unique<RigidBlocks>(lattice, couplings);
+  block_state_.resize(parts_->count());
+  for (BlockState& p : block_state_) p.on.resize(levels_.size());
+  block_bounds_.reserve(kMaxBlockBounds);
   // Rows are relaxed beside them, and they by themselves.
   for (int l = 1; l < levels(); ++l) {
     for (std::size_t p = 0; p < parts_->count(); ++p) {
-      for (const WholeParts::Run& run : parts_->on(l, p).rows) {
+      for (const RigidBlocks::Run& run : parts_->on(l, p).rows) {
         for (std::uint32_t lanes = run.lanes; lanes != 0; lanes &= lanes - 1)
           at(l).stopped[run.row * kRow + static_cast<VoxelId>(std::countr_zero(lanes))] = kAllAxes;
         mark(l, run.row, limited);
@@ -90,13 +90,13 @@ void Multigrid::prepare_all() noexcept {
     level.stopped.populate(kRow, rows);
     level.flags.populate();
   }
-  holds_->prepare_all();
-  joint_.populate(grid(0).rows(), kMostInTick);
+  boundary_springs_->prepare_all();
+  limited_correction_.populate(grid(0).rows(), kMostInTick);
 }
 
-void Multigrid::prepare_tied() noexcept {
-  for (auto& axis : tied_) axis.populate();
-  row_tied_.populate();
+void Multigrid::prepare_limit_loads() noexcept {
+  for (auto& axis : limit_load_) axis.populate();
+  row_has_limit_load_.populate();
 }
 
 // Marks a row and the rows beside it.
@@ -106,15 +106,15 @@ void Multigrid::spread(int level, RowId row, std::uint8_t flags) noexcept {
   const Grid& g = l.couplings->grid();
   for (const RowId r : {row, row - 1, row + 1, row - g.row_z, row + g.row_z, row - g.row_x, row + g.row_x})
     l.flags[r] |= flags;
-  if (level == 0 && (flags & active) != 0) tiles_.stir(g.row_coordinates(row));
+  if (level == 0 && (flags & active) != 0) tiles_.mark_dirty(g.row_coordinates(row));
 }
 
 // A row was moved by as much. What is too little for a sweep is still passed on: a small force on each of
 // many voxels is a large one on the cell that holds them, four times as large on each level.
 void Multigrid::note_change(int level, RowId row, float change) noexcept {
-  if (change <= passed_on_m()) return;
+  if (change <= restricted_m()) return;
   if (level == 0) bricks_.look_at(row);
-  spread(level, row, change > quiet_m_ ? active | dirty : dirty);
+  spread(level, row, change > motion_tolerance_m_ ? active | dirty : dirty);
   if (level > 0) mark(level, row, changed);
 }
 
@@ -135,13 +135,15 @@ void Multigrid::stop_cells(VoxelId v, std::uint8_t bits) noexcept {
 }
 
 void Multigrid::tie(VoxelId v, const glm::vec3& force_N) noexcept {
-  const auto tied = [&] { return tied_[0][v] != 0.0F || tied_[1][v] != 0.0F || tied_[2][v] != 0.0F; };
+  const auto tied = [&] {
+    return limit_load_[0][v] != 0.0F || limit_load_[1][v] != 0.0F || limit_load_[2][v] != 0.0F;
+  };
   const bool was = tied();
   if (!was && force_N == glm::vec3(0.0F)) return;
-  for (int axis = 0; axis < 3; ++axis) tied_[static_cast<std::size_t>(axis)][v] = force_N[axis];
+  for (int axis = 0; axis < 3; ++axis) limit_load_[static_cast<std::size_t>(axis)][v] = force_N[axis];
   const bool is = tied();
   if (was == is) return;
-  std::uint16_t& count = row_tied_[v / kRow];
+  std::uint16_t& count = row_has_limit_load_[v / kRow];
   count = static_cast<std::uint16_t>(is ? count + 1 : count - 1);
 }
 
@@ -188,8 +190,8 @@ void Multigrid::copy_from(const Multigrid& other) noexcept {
     Level& to = at(l);
     const Level& from = other.at(l);
     to.flags.copy_from(from.flags);
-    for (std::size_t p = 0; p < part_state_.size(); ++p)
-      part_state_[p].on[static_cast<std::size_t>(l)] = other.part_state_[p].on[static_cast<std::size_t>(l)];
+    for (std::size_t p = 0; p < block_state_.size(); ++p)
+      block_state_[p].on[static_cast<std::size_t>(l)] = other.block_state_[p].on[static_cast<std::size_t>(l)];
     if (l == 0) continue;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       to.value[axis].copy_from(from.value[axis]);
@@ -240,9 +242,9 @@ void Multigrid::drop_coarse() noexcept {
 
 void Multigrid::begin_anew() noexcept {
   drop_coarse();
-  for (const RowId row : balanced_) balance_number_[row] = 0;
-  balanced_.clear();
-  begin_parts_anew();
+  for (const RowId row : frozen_residual_) balance_number_[row] = 0;
+  frozen_residual_.clear();
+  restart_blocks();
 }
 
 void Multigrid::keep_log() {
@@ -250,8 +252,8 @@ void Multigrid::keep_log() {
   rows.reserve(levels_.size());
   for (int l = 0; l < levels(); ++l) rows.push_back(grid(l).rows());
   log_.begin(rows);
-  const std::size_t most = std::min(kMaxBalanced, grid(0).rows());
-  balanced_.reserve(most);
+  const std::size_t most = std::min(kMaxFrozen, grid(0).rows());
+  frozen_residual_.reserve(most);
   balance_ = LazyArray<float>(most * 3 * kRow);
   balance_.populate();
   balance_number_ = LazyArray<std::uint16_t>(grid(0).rows());
@@ -259,11 +261,12 @@ void Multigrid::keep_log() {
 
 std::size_t Multigrid::memory_bytes() const {
   std::size_t bytes = tiles_.memory_bytes() + log_.memory_bytes() + bricks_.memory_bytes() +
-                      (parts_ == nullptr ? 0 : parts_->memory_bytes()) + holds_->memory_bytes() +
-                      hats_.memory_bytes() + resident_bytes(stopped_) + resident_bytes(still_stopped_) +
-                      row_tied_.resident_bytes() + balance_number_.resident_bytes() +
-                      balance_.resident_bytes() + resident_bytes(balanced_) + joint_.memory_bytes();
-  for (const auto& axis : tied_) bytes += axis.resident_bytes();
+                      (parts_ == nullptr ? 0 : parts_->memory_bytes()) + boundary_springs_->memory_bytes() +
+                      prolongation_.memory_bytes() + resident_bytes(stopped_) +
+                      resident_bytes(still_stopped_) + row_has_limit_load_.resident_bytes() +
+                      balance_number_.resident_bytes() + balance_.resident_bytes() +
+                      resident_bytes(frozen_residual_) + limited_correction_.memory_bytes();
+  for (const auto& axis : limit_load_) bytes += axis.resident_bytes();
   for (const Level& l : levels_) {
     bytes += l.couplings->memory_bytes() + l.flags.resident_bytes() + l.stopped.resident_bytes();
     for (const auto* arrays : {&l.value, &l.told, &l.load, &l.loaded_at}) {

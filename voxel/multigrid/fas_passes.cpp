@@ -35,8 +35,8 @@ LevelRow Multigrid::row_of(int level, RowId row, Displacement& state) noexcept {
     r.load[axis] = l.load[axis].data() + begin;
     r.held_at[axis] = l.loaded_at[axis].data() + begin;
   }
-  if (holds_->any(level, row)) {
-    for (std::size_t axis = 0; axis < 3; ++axis) r.hold[axis] = holds_->hold(level, row, axis);
+  if (boundary_springs_->any(level, row)) {
+    for (std::size_t axis = 0; axis < 3; ++axis) r.hold[axis] = boundary_springs_->hold(level, row, axis);
   }
   r.hold_times = hold_;
   if (has(level, row, limited)) r.stopped = l.stopped.data() + begin;
@@ -53,19 +53,19 @@ bool Multigrid::yield(RowId row, Displacement& state, bool keep) noexcept {
     }
     if (!beyond) return false;
   }
-  const RowYield found = yield_row(couplings(), state, row, keep);
+  const RowPlasticity found = plastic_row(couplings(), state, row, keep);
   note_change(0, row, found.moved_m);
   return found.unkept;
 }
 
 void Multigrid::smooth(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
-                       OctetSpan span) noexcept {
+                       LaneSpan span) noexcept {
   if (parts_ != nullptr && parts_->fill_row(level, row)) return;  // they go as one
   const LevelRow r = row_of(level, row, state);
   log_.note(level, row);
   if (level > 0) {
     float change = smooth_row(r, nullptr, span);
-    if (holds_->tilted(level, row)) change = std::max(change, smooth_tilted(level, row, r, span));
+    if (boundary_springs_->tilted(level, row)) change = std::max(change, smooth_tilted(level, row, r, span));
     note_change(level, row, change);
     return;
   }
@@ -85,15 +85,15 @@ std::array<RowId, 8> Multigrid::rows_below(int level, RowId row) const noexcept 
 namespace {
 
 // The octets of the half-th finer row that octets of a coarse row hold; none: first > last.
-OctetSpan octets_below(OctetSpan coarse, int half) {
-  const int from = half * kOctets / 2;
+LaneSpan octets_below(LaneSpan coarse, int half) {
+  const int from = half * kLaneGroups / 2;
   return {2 * (std::max(coarse.first, from) - from),
-          2 * (std::min(coarse.last, from + kOctets / 2 - 1) - from) + 1};
+          2 * (std::min(coarse.last, from + kLaneGroups / 2 - 1) - from) + 1};
 }
 
 }  // namespace
 
-void Multigrid::restrict_values(int level, RowId row, Displacement& state, OctetSpan span) noexcept {
+void Multigrid::restrict_values(int level, RowId row, Displacement& state, LaneSpan span) noexcept {
   Level& l = at(level);
   log_.note(level, row);
   const std::size_t begin = static_cast<std::size_t>(row) * kRow;
@@ -102,7 +102,7 @@ void Multigrid::restrict_values(int level, RowId row, Displacement& state, Octet
   const std::array<RowId, 8> rows = rows_below(level, row);
   for (std::size_t child = 0; child < 8; ++child) {
     const int half = static_cast<int>(child & 1U);
-    const OctetSpan below = octets_below(span, half);
+    const LaneSpan below = octets_below(span, half);
     if (below.first > below.last) continue;
     const std::size_t fine = static_cast<std::size_t>(rows[child]) * kRow;
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -118,52 +118,52 @@ void Multigrid::restrict_values(int level, RowId row, Displacement& state, Octet
 }
 
 void Multigrid::balance(RowId row, Displacement& state, const ObstacleView& obstacles,
-                        OctetSpan span) noexcept {
-  if (!prepare(0, row) || balanced_.size() == balanced_.capacity()) return;
+                        LaneSpan span) noexcept {
+  if (!prepare(0, row) || frozen_residual_.size() == frozen_residual_.capacity()) return;
   RowVector left;
   residual_of(0, row, state, obstacles, span, left);
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    float* to = balance_.data() + (balanced_.size() * 3 + axis) * kRow;
+    float* to = balance_.data() + (frozen_residual_.size() * 3 + axis) * kRow;
     const float* own = state.load_of(row, static_cast<int>(axis));
     for (std::size_t i = 0; i < kRow; ++i) to[i] = own == nullptr ? 0.0F : own[i];
-    for (std::size_t i = static_cast<std::size_t>(span.first) * kOctet;
-         i < static_cast<std::size_t>(span.last + 1) * kOctet; ++i)
+    for (std::size_t i = static_cast<std::size_t>(span.first) * kLanes;
+         i < static_cast<std::size_t>(span.last + 1) * kLanes; ++i)
       to[i] -= left[axis][i];
   }
-  balanced_.push_back(row);
-  balance_number_[row] = static_cast<std::uint16_t>(balanced_.size());
+  frozen_residual_.push_back(row);
+  balance_number_[row] = static_cast<std::uint16_t>(frozen_residual_.size());
 }
 
-void Multigrid::keep_balanced(float part, const Displacement& state) noexcept {
-  for (std::size_t n = 0; n < balanced_.size(); ++n) {
+void Multigrid::keep_frozen_residual(float part, const Displacement& state) noexcept {
+  for (std::size_t n = 0; n < frozen_residual_.size(); ++n) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       float* of_row = balance_.data() + (n * 3 + axis) * kRow;
-      const float* own = state.load_of(balanced_[n], static_cast<int>(axis));
+      const float* own = state.load_of(frozen_residual_[n], static_cast<int>(axis));
       for (std::size_t i = 0; i < kRow; ++i) {
         const float beside = own == nullptr ? 0.0F : own[i];
         of_row[i] = beside + part * (of_row[i] - beside);
       }
     }
   }
-  for (PartState& p : part_state_) p.balance *= static_cast<double>(part);
+  for (BlockState& p : block_state_) p.balance *= static_cast<double>(part);
 }
 
-void Multigrid::add_ties(RowId row, LevelRow& r, RowVector& loads) noexcept {
+void Multigrid::add_limit_loads(RowId row, LevelRow& r, RowVector& loads) noexcept {
   const std::size_t begin = static_cast<std::size_t>(row) * kRow;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     for (std::size_t i = 0; i < kRow; ++i)
-      loads[axis][i] = tied_[axis][begin + i] + (r.load[axis] == nullptr ? 0.0F : r.load[axis][i]);
+      loads[axis][i] = limit_load_[axis][begin + i] + (r.load[axis] == nullptr ? 0.0F : r.load[axis][i]);
     r.load[axis] = loads[axis].data();
   }
 }
 
 // What pulls the voxels, or cells, of a row that are free to follow.
 RowResidual Multigrid::residual_of(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
-                                   OctetSpan span, RowVector& out) noexcept {
+                                   LaneSpan span, RowVector& out) noexcept {
   LevelRow r = row_of(level, row, state);
   if (level > 0) {
     RowResidual found = residual_row(r, nullptr, 0.0F, span, out);
-    if (holds_->tilted(level, row)) {
+    if (boundary_springs_->tilted(level, row)) {
       add_tilt(level, row, r, span, out);
       measure_row(r.springs, out, span, found);
     }
@@ -172,17 +172,17 @@ RowResidual Multigrid::residual_of(int level, RowId row, Displacement& state, co
   const RowLimits limits = couplings().limits(row);
   const float tight = kTight * static_cast<float>(lattice_.min_spacing_m());
   RowVector loads;
-  const bool ties = row_tied_[row] != 0;
-  if (ties) add_ties(row, r, loads);
-  RowResidual found = residual_row(r, passes_on_all_ ? nullptr : &limits, tight, span, out);
-  if (state.row_obstacles[row] != 0 || state.row_standing[row] != 0 || holds_->supports(row)) {
+  const bool ties = row_has_limit_load_[row] != 0;
+  if (ties) add_limit_loads(row, r, loads);
+  RowResidual found = residual_row(r, restricts_all_ ? nullptr : &limits, tight, span, out);
+  if (state.row_obstacles[row] != 0 || state.row_standing[row] != 0 || boundary_springs_->supports(row)) {
     balance_contacts(row, state, obstacles, span, found, out);
     measure_row(r.springs, out, span, found);
   }
   for (std::size_t axis = 0; axis < 3 && ties; ++axis) {
-    const float* tied = tied_[axis].data() + static_cast<std::size_t>(row) * kRow;
-    for (std::size_t i = static_cast<std::size_t>(span.first) * kOctet;
-         i < static_cast<std::size_t>(span.last + 1) * kOctet; ++i) {
+    const float* tied = limit_load_[axis].data() + static_cast<std::size_t>(row) * kRow;
+    for (std::size_t i = static_cast<std::size_t>(span.first) * kLanes;
+         i < static_cast<std::size_t>(span.last + 1) * kLanes; ++i) {
       if (tied[i] != 0.0F)
         stop_cells(static_cast<VoxelId>(row * kRow + i), static_cast<std::uint8_t>(1U << axis));
     }
@@ -199,15 +199,15 @@ RowResidual Multigrid::residual_of(int level, RowId row, Displacement& state, co
 }
 
 float Multigrid::restrict_loads(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
-                                OctetSpan span) noexcept {
-  Couplings& finer = *at(level - 1).couplings;
+                                LaneSpan span) noexcept {
+  LevelStiffness& finer = *at(level - 1).couplings;
   float worst = 0.0F;
   RowVector sums{};
   const std::array<RowId, 8> rows = rows_below(level, row);
   for (std::size_t child = 0; child < 8; ++child) {
     const RowId fine = rows[child];
     const int half = static_cast<int>(child & 1U);
-    const OctetSpan below = octets_below(span, half);
+    const LaneSpan below = octets_below(span, half);
     if (below.first > below.last || !finer.prepare(fine)) continue;
     // Parts have theirs from their borders.
     if (parts_ != nullptr && parts_->fill_known_row(level - 1, fine)) {
@@ -223,29 +223,29 @@ float Multigrid::restrict_loads(int level, RowId row, Displacement& state, const
     }
     worst = std::max(worst, left.most_N);
     if (parts_ != nullptr && parts_->in_row(level - 1, fine))
-      set_part_lanes(level - 1, fine, below, residual);
+      set_block_lanes(level - 1, fine, below, residual);
     for (std::size_t axis = 0; axis < 3; ++axis)
       add_pairs(residual[axis].data(), below, sums[axis].data() + half * kRow / 2);
     if (!span.whole()) continue;
     // Of voxels as a force, of cells as a displacement, whose threshold is the same on all levels.
-    const bool at_rest = level == 1 ? left.most_N < tolerance_N_ : left.most_way_m < quiet_m_;
+    const bool at_rest = level == 1 ? left.most_N < tolerance_N_ : left.most_way_m < motion_tolerance_m_;
     unmark(level - 1, fine, at_rest ? active | dirty : dirty);
     if (!at_rest) mark(level - 1, fine, active);
   }
   log_.note(level, row);
-  if (parts_ != nullptr && parts_->in_row(level, row)) pass_part_lanes(level, row, span, sums);
-  take_loads(told_row(level, row), sums, loads(level, row), span);
+  if (parts_ != nullptr && parts_->in_row(level, row)) restrict_block_lanes(level, row, span, sums);
+  take_loads(prolonged_row(level, row), sums, loads(level, row), span);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::size_t begin =
-        static_cast<std::size_t>(row) * kRow + static_cast<std::size_t>(span.first) * kOctet;
-    std::copy_n(at(level).told[axis].data() + begin, (span.last - span.first + 1) * kOctet,
+        static_cast<std::size_t>(row) * kRow + static_cast<std::size_t>(span.first) * kLanes;
+    std::copy_n(at(level).told[axis].data() + begin, (span.last - span.first + 1) * kLanes,
                 at(level).loaded_at[axis].data() + begin);
   }
   spread(level, row, active | dirty);
   return worst;
 }
 
-LevelRow Multigrid::told_row(int level, RowId row) noexcept {
+LevelRow Multigrid::prolonged_row(int level, RowId row) noexcept {
   Level& l = at(level);
   const Grid& g = l.couplings->grid();
   LevelRow r;
@@ -263,7 +263,7 @@ std::array<float*, 3> Multigrid::loads(int level, RowId row) noexcept {
   return {l.load[0].data() + begin, l.load[1].data() + begin, l.load[2].data() + begin};
 }
 
-float Multigrid::untold(int level, RowId row, OctetSpan span, int first, int last) const noexcept {
+float Multigrid::pending_correction(int level, RowId row, LaneSpan span, int first, int last) const noexcept {
   const Level& l = at(level);
   const std::size_t begin = static_cast<std::size_t>(row) * kRow;
   float most = 0.0F;
@@ -274,44 +274,44 @@ float Multigrid::untold(int level, RowId row, OctetSpan span, int first, int las
   return most;
 }
 
-void Multigrid::forget_untold(int level, RowId row, Displacement& state,
-                              const ObstacleView& obstacles) noexcept {
+void Multigrid::forget_pending_correction(int level, RowId row, Displacement& state,
+                                          const ObstacleView& obstacles) noexcept {
   Level& l = at(level);
   const std::size_t begin = static_cast<std::size_t>(row) * kRow;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     std::fill_n(l.value[axis].data() + begin, kRow, 0.0F);
     std::fill_n(l.told[axis].data() + begin, kRow, 0.0F);
   }
-  if (parts_ != nullptr && parts_->in_row(level, row)) forget_untold_parts(level, row);
+  if (parts_ != nullptr && parts_->in_row(level, row)) forget_pending_of_blocks(level, row);
   restrict_values(level, row, state);
   restrict_loads(level, row, state, obstacles);
   unmark(level, row, changed);
 }
 
 // Reads what the cells of one row, all along x, have to tell, and with that they have told it.
-void Multigrid::spread_hats(int level, int j, int k, const Told& box) noexcept {
+void Multigrid::interpolate_row(int level, int j, int k, const ProlongedBox& box) noexcept {
   Level& l = at(level);
   const Grid& g = l.couplings->grid();
-  bool tells = false, whole = true;
-  const int before = hats_.first() - 1, after = hats_.first() + hats_.octets();
+  bool is_source = false, whole = true;
+  const int before = prolongation_.first() - 1, after = prolongation_.first() + prolongation_.octets();
   for (int q = before; q <= after; ++q) {
-    const int column = (q + kOctets) / kOctets;  // the empty one before the first included
+    const int column = (q + kLaneGroups) / kLaneGroups;  // the empty one before the first included
     const RowId row = g.row(column, j, k);
-    tells = tells || (q > before && q < after && has(level, row, telling));
+    is_source = is_source || (q > before && q < after && has(level, row, telling));
     whole = whole && l.couplings->prepare(row) && l.couplings->uniform(row);
   }
   const auto add = [this](std::size_t which, int q) {
-    return hats_.cells(which) + static_cast<std::ptrdiff_t>(q - hats_.first()) * kOctet;
+    return prolongation_.cells(which) + static_cast<std::ptrdiff_t>(q - prolongation_.first()) * kLanes;
   };
-  const Octet none{};
-  for (int q = before; q <= after && (tells || !whole); ++q) {
-    const int column = (q + kOctets) / kOctets;
+  const Float8 none{};
+  for (int q = before; q <= after && (is_source || !whole); ++q) {
+    const int column = (q + kLaneGroups) / kLaneGroups;
     const RowId row = g.row(column, j, k);
-    const int octet = (q + kOctets) % kOctets;
+    const int octet = (q + kLaneGroups) % kLaneGroups;
     const bool any = l.couplings->prepare(row);
     if (!whole) {
       if (any) {
-        std::copy_n(l.couplings->filled(row) + octet * kOctet, kOctet, add(3, q));
+        std::copy_n(l.couplings->filled(row) + octet * kLanes, kLanes, add(3, q));
       } else {
         store(add(3, q), none);
       }
@@ -319,72 +319,75 @@ void Multigrid::spread_hats(int level, int j, int k, const Told& box) noexcept {
     const bool here = any && q > before && q < after && has(level, row, telling);
     const int origin = (column - 1) * kRow;
     const std::size_t begin = static_cast<std::size_t>(row) * kRow;
-    for (std::size_t axis = 0; axis < 3 && tells; ++axis) {
+    for (std::size_t axis = 0; axis < 3 && is_source; ++axis) {
       if (here) {
-        take_untold(l.value[axis].data() + begin, l.told[axis].data() + begin, l.couplings->filled(row),
-                    {octet, octet}, box.first_teller - origin, box.last_teller - origin, add(axis, q));
+        take_pending_correction(l.value[axis].data() + begin, l.told[axis].data() + begin,
+                                l.couplings->filled(row), {octet, octet}, box.first_source - origin,
+                                box.last_source - origin, add(axis, q));
       } else {
         store(add(axis, q), none);
       }
     }
   }
-  if (tells) {
-    for (int c = hats_.first() / kOctets; c <= (after - 1) / kOctets; ++c) {
+  if (is_source) {
+    for (int c = prolongation_.first() / kLaneGroups; c <= (after - 1) / kLaneGroups; ++c) {
       const RowId row = g.row(c + 1, j, k);
       if (!has(level, row, telling)) continue;
       unmark(level, row, telling);
       log_.note(level, row);
-      if (untold(level, row) == 0.0F) unmark(level, row, changed);
+      if (pending_correction(level, row) == 0.0F) unmark(level, row, changed);
     }
   }
-  hats_.spread(j, k, tells, whole);
+  prolongation_.spread(j, k, is_source, whole);
 }
 
-void Multigrid::tell(int level, const Told& box, Displacement& state, const ObstacleView& obstacles,
-                     bool jointly) noexcept {
+void Multigrid::prolong(int level, const ProlongedBox& box, Displacement& state,
+                        const ObstacleView& obstacles, bool jointly) noexcept {
   const Grid& g = grid(level);
   // Of the two cells around a voxel the lower one.
   const auto below = [](int x) { return (x + 1) / 2 - 1; };
-  if (box.from_k == box.k0) hats_.begin(box.q0 / 2, box.q1 / 2, below(box.j0), below(box.j1) + 1);
+  if (box.from_k == box.k0) prolongation_.begin(box.q0 / 2, box.q1 / 2, below(box.j0), below(box.j1) + 1);
   // Beyond these octets no hat reaches.
-  const int q0 = std::max(box.q0, std::max(2 * box.first_teller - 1, 0) / kOctet);
-  const int q1 = std::min(box.q1, (2 * box.last_teller + 2) / kOctet);
+  const int q0 = std::max(box.q0, std::max(2 * box.first_source - 1, 0) / kLanes);
+  const int q1 = std::min(box.q1, (2 * box.last_source + 2) / kLanes);
   int spread =
       box.from_k == box.k0 ? below(box.k0) - 1 : below(box.from_k - 1) + 1;  // the last plane of cells
   for (int k = box.from_k; k <= box.to_k; ++k) {
     for (; spread <= below(k); ++spread) {
-      for (int j = below(box.j0); j <= below(box.j1) + 1; ++j) spread_hats(level + 1, j, spread + 1, box);
+      for (int j = below(box.j0); j <= below(box.j1) + 1; ++j) interpolate_row(level + 1, j, spread + 1, box);
     }
     const int own_k = k / 2, near_k = (k & 1) != 0 ? own_k + 1 : own_k - 1;
     for (int j = box.j0; j <= box.j1; ++j) {
       const int own_j = j / 2, near_j = (j & 1) != 0 ? own_j + 1 : own_j - 1;
-      const auto hats = [&](int octet) {
-        return std::array<HatRow, 4>{hats_.row(own_j, own_k, octet), hats_.row(near_j, own_k, octet),
-                                     hats_.row(own_j, near_k, octet), hats_.row(near_j, near_k, octet)};
+      const auto prolongation = [&](int octet) {
+        return std::array<ProlongedRow, 4>{
+            prolongation_.row(own_j, own_k, octet), prolongation_.row(near_j, own_k, octet),
+            prolongation_.row(own_j, near_k, octet), prolongation_.row(near_j, near_k, octet)};
       };
-      const auto here = hats(q0);
-      if (std::none_of(here.begin(), here.end(), [](const HatRow& r) { return r.tells; })) continue;
-      for (int c = q0 / kOctets; c <= q1 / kOctets; ++c) {
+      const auto here = prolongation(q0);
+      if (std::none_of(here.begin(), here.end(), [](const ProlongedRow& r) { return r.is_source; })) continue;
+      for (int c = q0 / kLaneGroups; c <= q1 / kLaneGroups; ++c) {
         const RowId row = g.row(c + 1, j, k);
         if (!prepare(level, row)) continue;
-        const int first = std::max(q0, c * kOctets), last = std::min(q1, c * kOctets + kOctets - 1);
+        const int first = std::max(q0, c * kLaneGroups),
+                  last = std::min(q1, c * kLaneGroups + kLaneGroups - 1);
         if (j + kAhead <= box.j1) fetch(level, row + kAhead, state);
-        tell_row(level, row, hats(first), state, obstacles, {first - c * kOctets, last - c * kOctets},
-                 jointly && level == 0);
+        prolong_row(level, row, prolongation(first), state, obstacles,
+                    {first - c * kLaneGroups, last - c * kLaneGroups}, jointly && level == 0);
       }
     }
   }
   if (jointly && level == 0) {
-    go_jointly(state);
-    for (const JointMove::Row& r : joint_.rows()) {
+    apply_limited_correction(state);
+    for (const LimitedCorrection::Row& r : limited_correction_.rows()) {
       if (!r.aims) continue;
       Refused refused{.row = r.row, .axes = 0, .span = r.span, .way = {}};
       refused.axes = left_of(r, state, refused.way);
       if (refused.axes != 0) take_back_refused(0, refused);
     }
-    joint_.clear();
+    limited_correction_.clear();
   }
-  if (parts_ != nullptr && box.to_k == box.k1) tell_parts(level, state, obstacles);
+  if (parts_ != nullptr && box.to_k == box.k1) prolong_to_blocks(level, state, obstacles);
 }
 
 // What rows are told is added to what stands in none of the nearer caches: to wait for that was half of it.
@@ -394,23 +397,26 @@ void Multigrid::fetch(int level, RowId row, const Displacement& state) const noe
     fetch_lines(axis.data() + static_cast<std::size_t>(row) * kRow, kRow * sizeof(float));
 }
 
-void Multigrid::tell_row(int level, RowId row, const std::array<HatRow, 4>& hats, Displacement& state,
-                         const ObstacleView& obstacles, OctetSpan span, bool jointly) noexcept {
+void Multigrid::prolong_row(int level, RowId row, const std::array<ProlongedRow, 4>& prolongation,
+                            Displacement& state, const ObstacleView& obstacles, LaneSpan span,
+                            bool jointly) noexcept {
   if (level == 0 && parts_ != nullptr && parts_->fill_known_row(level, row)) return;  // told as a whole
   // Near obstacles each goes for itself, before those that go together.
-  JointMove::Row* const together =
-      jointly && state.row_obstacles[row] == 0 && !joint_.full() ? &joint_.add(row, span) : nullptr;
+  LimitedCorrection::Row* const together =
+      jointly && state.row_obstacles[row] == 0 && !limited_correction_.full()
+          ? &limited_correction_.add(row, span)
+          : nullptr;
   RowVector alone;
   RowVector& correction = together != nullptr ? together->from : alone;
-  sum_hats(hats, span, correction);
-  for (std::size_t axis = 0; axis < 3 && level > 0 && holds_->any(level, row); ++axis) {
-    const float* nearer = holds_->nearer(level, row, axis);
-    for (std::size_t i = static_cast<std::size_t>(span.first) * kOctet;
-         i < static_cast<std::size_t>(span.last + 1) * kOctet; ++i)
+  sum_interpolated(prolongation, span, correction);
+  for (std::size_t axis = 0; axis < 3 && level > 0 && boundary_springs_->any(level, row); ++axis) {
+    const float* nearer = boundary_springs_->nearer(level, row, axis);
+    for (std::size_t i = static_cast<std::size_t>(span.first) * kLanes;
+         i < static_cast<std::size_t>(span.last + 1) * kLanes; ++i)
       correction[axis][i] /= 1.0F + nearer[i];
   }
   log_.note(level, row);
-  if (parts_ != nullptr && parts_->in_row(level, row)) note_told_parts(level, row, span, correction);
+  if (parts_ != nullptr && parts_->in_row(level, row)) note_prolonged_blocks(level, row, span, correction);
   if (together != nullptr) {
     // Where all are among them none can be in the way of one that goes alone.
     if (obstacles.obstacles.empty()) set_out(*together, state);
@@ -422,7 +428,7 @@ void Multigrid::tell_row(int level, RowId row, const std::array<HatRow, 4>& hats
 }
 
 void Multigrid::correct(int level, RowId row, const RowVector& correction, Displacement& state,
-                        const ObstacleView& obstacles, OctetSpan span, Refused& refused) noexcept {
+                        const ObstacleView& obstacles, LaneSpan span, Refused& refused) noexcept {
   LevelRow r = row_of(level, row, state);
   RowCorrection done;
   if (level > 0) {
@@ -439,25 +445,25 @@ void Multigrid::correct(int level, RowId row, const RowVector& correction, Displ
 }
 
 void Multigrid::take_back_refused(int level, const Refused& refused) noexcept {
-  const OctetSpan span = refused.span;
+  const LaneSpan span = refused.span;
   Level& coarse = at(level + 1);
   const auto c = grid(level).row_coordinates(refused.row);
   const RowId above = coarse.couplings->grid().row((c[0] - 1) / 2 + 1, c[1] / 2, c[2] / 2);
   log_.note(level + 1, above);
   const int half = (c[0] - 1) % 2;
-  const OctetSpan pairs{span.first & ~1, span.last | 1};
+  const LaneSpan pairs{span.first & ~1, span.last | 1};
   RowVector sums{}, lanes{};
   std::array<float*, 3> value{}, told{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     value[axis] = coarse.value[axis].data() + static_cast<std::size_t>(above) * kRow;
     told[axis] = coarse.told[axis].data() + static_cast<std::size_t>(above) * kRow;
     if ((refused.axes >> axis & 1U) == 0) continue;
-    std::copy_n(refused.way[axis].begin() + span.first * kOctet, (span.last - span.first + 1) * kOctet,
-                lanes[axis].begin() + span.first * kOctet);
+    std::copy_n(refused.way[axis].begin() + span.first * kLanes, (span.last - span.first + 1) * kLanes,
+                lanes[axis].begin() + span.first * kLanes);
     add_pairs(lanes[axis].data(), pairs, sums[axis].data() + half * kRow / 2);
   }
   take_back(sums, coarse.couplings->share(above), value, told,
-            {half * kOctets / 2 + pairs.first / 2, half * kOctets / 2 + pairs.last / 2});
+            {half * kLaneGroups / 2 + pairs.first / 2, half * kLaneGroups / 2 + pairs.last / 2});
   spread(level + 1, above, active | dirty);
 }
 

@@ -12,13 +12,13 @@ constexpr std::size_t kAhead = 3;  // rows
 
 }  // namespace
 
-JointMove::JointMove(std::size_t rows)
+LimitedCorrection::LimitedCorrection(std::size_t rows)
     : rows_(std::min(kMost, rows)),
       aims_(std::min(kMost, rows)),
       number_(rows),
       ring_(std::min(kMost, rows) + 1) {}
 
-JointMove::Row& JointMove::add(RowId row, OctetSpan span) noexcept {
+LimitedCorrection::Row& LimitedCorrection::add(RowId row, LaneSpan span) noexcept {
   // Of those that come next, what is to be written: to wait for that was half of what it takes to set out.
   fetch_lines(rows_.data() + std::min(count_ + kAhead, rows_.size() - 1), sizeof(Row));
   Row& r = rows_[count_++];
@@ -29,12 +29,12 @@ JointMove::Row& JointMove::add(RowId row, OctetSpan span) noexcept {
   return r;
 }
 
-void JointMove::clear() noexcept {
+void LimitedCorrection::clear() noexcept {
   for (const Row& r : rows()) number_[r.row] = 0;
   count_ = head_ = tail_ = 0;
 }
 
-void JointMove::ask(RowId row) noexcept {
+void LimitedCorrection::ask(RowId row) noexcept {
   if (number_[row] == 0) return;
   Row& r = rows_[number_[row] - std::size_t{1}];
   if (r.asked) return;
@@ -43,7 +43,7 @@ void JointMove::ask(RowId row) noexcept {
   tail_ = tail_ + 1 == ring_.size() ? 0 : tail_ + 1;
 }
 
-JointMove::Row* JointMove::next() noexcept {
+LimitedCorrection::Row* LimitedCorrection::next() noexcept {
   if (head_ == tail_) return nullptr;
   Row& r = rows_[ring_[head_]];
   head_ = head_ + 1 == ring_.size() ? 0 : head_ + 1;

@@ -6,8 +6,8 @@
 // its limits then comes back towards where it was, until nothing is: where all were, nothing was beyond, so
 // one of a link's two ends can always come nearer to it, and what comes back never turns round. What links
 // allow is closed under least and most, so that where all on an axis go the same way the least that must does
-// come back, whatever the order. (Told row by row, twice, a cone of tissue at its limits that was to open by
-// seven spacings opened by 0.6 in a cycle.)
+// come back, whatever the order. (ProlongedBox row by row, twice, a cone of tissue at its limits that was to
+// open by seven spacings opened by 0.6 in a cycle.)
 #pragma once
 
 #include <algorithm>
@@ -15,20 +15,20 @@
 #include <cstdint>
 #include <span>
 
-#include "voxel/lattice/row_grid.h"
 #include "voxel/lattice/lazy_array.h"
+#include "voxel/lattice/row_grid.h"
 #include "voxel/lattice/simd8.h"
 #include "voxel/multigrid/row_smoother.h"
 
 namespace voxel {
 
-class JointMove {
+class LimitedCorrection {
  public:
   static constexpr std::size_t kMost = 65536;  // rows at a time
 
   struct Row {
     RowId row = 0;
-    OctetSpan span;
+    LaneSpan span;
     float most_m = 0.0F;  // that any of it was asked to move
     bool asked = false;   // stands in the queue
     bool out = false;     // has set out
@@ -37,9 +37,9 @@ class JointMove {
     RowVector from;       // where it was; before it sets out, its way (m)
   };
 
-  JointMove() = default;
+  LimitedCorrection() = default;
   // Address space for `rows` of a grid, of which kMost at most are in it at a time.
-  explicit JointMove(std::size_t rows);
+  explicit LimitedCorrection(std::size_t rows);
 
   [[nodiscard]] bool full() const noexcept { return count_ == rows_.size(); }
   // Takes the memory now of so many rows, some of which do not get where they are to go.
@@ -51,7 +51,7 @@ class JointMove {
   }
   // Its way, of which the lanes in the span are gone, is to be written to `from`. Once a row, while it is not
   // full.
-  Row& add(RowId row, OctetSpan span) noexcept;
+  Row& add(RowId row, LaneSpan span) noexcept;
   void clear() noexcept;
   // Where a row is to go, which is kept only of those that did not get there (m).
   [[nodiscard]] RowVector& aim(const Row& row) noexcept { return aims_[index(row)]; }

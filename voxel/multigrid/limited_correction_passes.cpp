@@ -19,7 +19,7 @@ constexpr std::size_t kMostVisits = 64;
 // short on one axis leaves it, or enters it, by little, until the tool is next looked at. When it stayed
 // altogether, so did all that hangs on it by tight links: of what 320 rows round a contact were to go, a
 // thirtieth of a spacing each, nearly all was left.)
-void Multigrid::set_out(JointMove::Row& r, Displacement& state) noexcept {
+void Multigrid::set_out(LimitedCorrection::Row& r, Displacement& state) noexcept {
   LevelRow row = row_of(0, r.row, state);
   const std::size_t begin = static_cast<std::size_t>(r.row) * kRow;
   if (has(0, r.row, limited)) row.stopped = at(0).stopped.data() + begin;
@@ -42,7 +42,8 @@ void Multigrid::set_out(JointMove::Row& r, Displacement& state) noexcept {
   // Links to others are looked at when the second of the two sets out.
   unsigned sides = 0, side = 1;
   for (const RowId to : beside(r.row)) {
-    if (const JointMove::Row* other = joint_.find(to); other != nullptr && other->out) sides |= side;
+    if (const LimitedCorrection::Row* other = limited_correction_.find(to); other != nullptr && other->out)
+      sides |= side;
     side *= 2;
   }
   const SetOut out = set_out_row(row, couplings().limits(r.row), r.span, sides, r.from, refused);
@@ -51,27 +52,27 @@ void Multigrid::set_out(JointMove::Row& r, Displacement& state) noexcept {
   if (out.beyond) ask_round(r.row);
   if (out.stopped == 0) return;
   keep_aim(r, state);
-  RowVector& aim = joint_.aim(r);
+  RowVector& aim = limited_correction_.aim(r);
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    for (auto i = static_cast<std::size_t>(r.span.first) * kOctet;
-         i < static_cast<std::size_t>(r.span.last + 1) * kOctet; ++i)
+    for (auto i = static_cast<std::size_t>(r.span.first) * kLanes;
+         i < static_cast<std::size_t>(r.span.last + 1) * kLanes; ++i)
       aim[axis][i] += refused[axis][i];
   }
 }
 
 // Before anything keeps it from getting there.
-void Multigrid::keep_aim(JointMove::Row& r, const Displacement& state) noexcept {
+void Multigrid::keep_aim(LimitedCorrection::Row& r, const Displacement& state) noexcept {
   if (r.aims) return;
   r.aims = true;
-  RowVector& aim = joint_.aim(r);
+  RowVector& aim = limited_correction_.aim(r);
   for (std::size_t axis = 0; axis < 3; ++axis)
     std::copy_n(state.u[axis].data() + static_cast<std::size_t>(r.row) * kRow, kRow, aim[axis].begin());
 }
 
 void Multigrid::stay(Displacement& state) noexcept {
-  while (joint_.next() != nullptr) {
+  while (limited_correction_.next() != nullptr) {
   }
-  for (JointMove::Row& r : joint_.rows()) {
+  for (LimitedCorrection::Row& r : limited_correction_.rows()) {
     keep_aim(r, state);
     for (std::size_t axis = 0; axis < 3; ++axis)
       std::copy_n(r.from[axis].begin(), kRow, state.u[axis].data() + static_cast<std::size_t>(r.row) * kRow);
@@ -85,22 +86,22 @@ std::array<RowId, 6> Multigrid::beside(RowId row) const noexcept {
 }
 
 void Multigrid::ask_round(RowId row) noexcept {
-  joint_.ask(row);
-  for (const RowId to : beside(row)) joint_.ask(to);
+  limited_correction_.ask(row);
+  for (const RowId to : beside(row)) limited_correction_.ask(to);
 }
 
 // Those that do not go along may hold one back, too.
-void Multigrid::look_at_others(const JointMove::Row& r, Displacement& state) noexcept {
+void Multigrid::look_at_others(const LimitedCorrection::Row& r, Displacement& state) noexcept {
   unsigned sides = 0, side = 1;
   for (const RowId to : beside(r.row)) {
-    if (!joint_.has(to) && lattice_.filled_in(to) != 0) sides |= side;
+    if (!limited_correction_.has(to) && lattice_.filled_in(to) != 0) sides |= side;
     side *= 2;
   }
   if (sides != 0 && may_be_beyond(row_of(0, r.row, state), couplings().limits(r.row), sides))
-    joint_.ask(r.row);
+    limited_correction_.ask(r.row);
 }
 
-void Multigrid::draw_back(JointMove::Row& r, Displacement& state) noexcept {
+void Multigrid::draw_back(LimitedCorrection::Row& r, Displacement& state) noexcept {
   const LevelRow row = row_of(0, r.row, state);
   const RowLimits limits = couplings().limits(r.row);
   const unsigned axes = axes_beyond(row, limits);
@@ -109,29 +110,29 @@ void Multigrid::draw_back(JointMove::Row& r, Displacement& state) noexcept {
   if (draw_back_row(row, limits, axes, r.from)) ask_round(r.row);
 }
 
-void Multigrid::go_jointly(Displacement& state) noexcept {
-  for (JointMove::Row& r : joint_.rows()) {
+void Multigrid::apply_limited_correction(Displacement& state) noexcept {
+  for (LimitedCorrection::Row& r : limited_correction_.rows()) {
     if (!r.out) set_out(r, state);
   }
-  for (const JointMove::Row& r : joint_.rows()) look_at_others(r, state);
-  std::size_t visits = kMostVisits * joint_.rows().size();
-  for (JointMove::Row* r = joint_.next(); r != nullptr; r = joint_.next()) {
+  for (const LimitedCorrection::Row& r : limited_correction_.rows()) look_at_others(r, state);
+  std::size_t visits = kMostVisits * limited_correction_.rows().size();
+  for (LimitedCorrection::Row* r = limited_correction_.next(); r != nullptr; r = limited_correction_.next()) {
     if (visits-- == 0) {
       stay(state);
       break;
     }
     draw_back(*r, state);
   }
-  for (const JointMove::Row& r : joint_.rows()) note_change(0, r.row, r.most_m);
+  for (const LimitedCorrection::Row& r : limited_correction_.rows()) note_change(0, r.row, r.most_m);
 }
 
 // What of its way a row did not go, of those that may; bits of the axes on which there is any.
-unsigned Multigrid::left_of(const JointMove::Row& r, const Displacement& state,
+unsigned Multigrid::left_of(const LimitedCorrection::Row& r, const Displacement& state,
                             RowVector& left) const noexcept {
   left = {};
   if (!r.aims) return 0;
   unsigned axes = 0;
-  const RowVector& aim = joint_.aim(r);
+  const RowVector& aim = limited_correction_.aim(r);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const float* u = state.u[axis].data() + static_cast<std::size_t>(r.row) * kRow;
     for (std::size_t i = 0; i < kRow; ++i) {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // One row of a joint move (limited_correction.h): octet by octet, as row_smoother.cpp.
-#include "voxel/multigrid/row_stencil.h"
+#include "voxel/lattice/simd_dispatch.h"
 #include "voxel/multigrid/row_limits.h"
 #include "voxel/multigrid/row_smoother.h"
-#include "voxel/lattice/simd_dispatch.h"
+#include "voxel/multigrid/row_stencil.h"
 
 namespace voxel {
 namespace {
@@ -15,38 +15,38 @@ HYBRID_INLINE bool draw_back_axis(const LevelRow& row, const AxisBounds& bounds,
   const AxisSprings s(row.springs, axis);
   float* own = row.u[axis];
   Span u;
-  std::array<Interval, kOctets> allowed;
+  std::array<Interval, kLaneGroups> allowed;
   ends_of(u, own, row.x, {});
 #pragma GCC unroll 1
-  for (int octet = 0; octet < kOctets; ++octet) {
+  for (int octet = 0; octet < kLaneGroups; ++octet) {
     const auto n = static_cast<std::size_t>(octet);
     Around at;
-    look_around(at, own + octet * kOctet, row.z);
+    look_around(at, own + octet * kLanes, row.z);
     u.at[n + 1] = at.own;
     everywhere(allowed[n]);
     narrow_beside<kUniform, kLimits>(allowed[n], at, s, bounds, octet);
   }
-  OctetMask came{};
+  Mask8 came{};
 #pragma GCC unroll 1
   for (int colour = 0; colour < 2; ++colour) {
 #pragma GCC unroll 1
-    for (int octet = 0; octet < kOctets; ++octet) {
+    for (int octet = 0; octet < kLaneGroups; ++octet) {
       const auto n = static_cast<std::size_t>(octet);
-      const Octet now = u.at[n + 1];
-      Octet x_down, x_up, home, rounding = -now;
+      const Float8 now = u.at[n + 1];
+      Float8 x_down, x_up, home, rounding = -now;
       shift_down(x_down, u.at[n], now);
       shift_up(x_up, now, u.at[n + 2]);
-      load(home, from + octet * kOctet);
+      load(home, from + octet * kLanes);
       Interval in = allowed[n];
       narrow<kUniform, kLimits>(in, x_up, x_down, s, bounds, 0, octet);
       take_largest(rounding, now);
       rounding *= kRounding;
-      const OctetMask taken = colour == 0 ? kEven : ~kEven;
-      const OctetMask up = (now < in.low - rounding) & (home > now) & taken,
-                      down = (now > in.high + rounding) & (home < now) & taken;
+      const Mask8 taken = colour == 0 ? kEven : ~kEven;
+      const Mask8 up = (now < in.low - rounding) & (home > now) & taken,
+                  down = (now > in.high + rounding) & (home < now) & taken;
       take_least(in.low, home);
       take_largest(in.high, home);
-      Octet to = up ? in.low : now;
+      Float8 to = up ? in.low : now;
       to = down ? in.high : to;
       came |= to != now;
       u.at[n + 1] = to;
@@ -54,8 +54,8 @@ HYBRID_INLINE bool draw_back_axis(const LevelRow& row, const AxisBounds& bounds,
   }
   if (!any(came)) return false;
 #pragma GCC unroll 1
-  for (int octet = 0; octet < kOctets; ++octet)
-    store(own + octet * kOctet, u.at[static_cast<std::size_t>(octet) + 1]);
+  for (int octet = 0; octet < kLaneGroups; ++octet)
+    store(own + octet * kLanes, u.at[static_cast<std::size_t>(octet) + 1]);
   return true;
 }
 
@@ -71,12 +71,12 @@ HYBRID_INLINE bool draw_back_axes(const LevelRow& row, const RowLimits& limits, 
   return came;
 }
 
-HYBRID_INLINE void take_largest_step(Octet& most, const std::array<Octet, kOctets + 2>& own,
+HYBRID_INLINE void take_largest_step(Float8& most, const std::array<Float8, kLaneGroups + 2>& own,
                                      const float* beside) {
 #pragma GCC unroll 4
-  for (std::size_t n = 0; n < kOctets; ++n) {
-    Octet there;
-    load(there, beside + n * kOctet);
+  for (std::size_t n = 0; n < kLaneGroups; ++n) {
+    Float8 there;
+    load(there, beside + n * kLanes);
     take_largest_size(most, own[n + 1] - there);
   }
 }
@@ -84,19 +84,19 @@ HYBRID_INLINE void take_largest_step(Octet& most, const std::array<Octet, kOctet
 // By the tightest limits, and what is not there taken for what is at rest: no spring is read. `u` without
 // what lies beside it along x.
 HYBRID_INLINE bool steps_beyond(Axes& u, const LevelRow& row, const RowLimits& limits, unsigned sides) {
-  OctetMask beyond{};
+  Mask8 beyond{};
 #pragma GCC unroll 1
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const float* const own = row.u[axis];
     auto& at = u[axis];
-    at[0] = Octet{} + ((sides & kXDown) != 0 ? own[kRow - 1 - row.x] : own[0]);
-    at[kOctets + 1] = Octet{} + ((sides & kXUp) != 0 ? own[row.x] : own[kRow - 1]);
-    Octet along_x{}, along_y{}, along_z{}, up;
-    shift_up(up, at[kOctets], at[kOctets + 1]);
-    take_largest_size(along_x, up - at[kOctets]);
+    at[0] = Float8{} + ((sides & kXDown) != 0 ? own[kRow - 1 - row.x] : own[0]);
+    at[kLaneGroups + 1] = Float8{} + ((sides & kXUp) != 0 ? own[row.x] : own[kRow - 1]);
+    Float8 along_x{}, along_y{}, along_z{}, up;
+    shift_up(up, at[kLaneGroups], at[kLaneGroups + 1]);
+    take_largest_size(along_x, up - at[kLaneGroups]);
 #pragma GCC unroll 4
-    for (std::size_t n = 1; n <= kOctets; ++n) {
-      Octet down;
+    for (std::size_t n = 1; n <= kLaneGroups; ++n) {
+      Float8 down;
       shift_down(down, at[n - 1], at[n]);
       take_largest_size(along_x, at[n] - down);
     }
@@ -112,36 +112,36 @@ HYBRID_INLINE bool steps_beyond(Axes& u, const LevelRow& row, const RowLimits& l
 
 }  // namespace
 
-HYBRID_WIDE_AND_MANY SetOut set_out_row(const LevelRow& row, const RowLimits& limits, OctetSpan span,
-                                        unsigned sides, RowVector& way, RowVector& refused) noexcept {
+HYBRID_MULTIVERSIONED_512 SetOut set_out_row(const LevelRow& row, const RowLimits& limits, LaneSpan span,
+                                             unsigned sides, RowVector& way, RowVector& refused) noexcept {
   SetOut out;
-  Octet most{};
-  OctetMask cut{};
+  Float8 most{};
+  Mask8 cut{};
   Axes u;
 #pragma GCC unroll 1
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    OctetMask any_stopped{};
+    Mask8 any_stopped{};
 #pragma GCC unroll 1
-    for (int octet = 0; octet < kOctets; ++octet) {
-      float* const at = row.u[axis] + octet * kOctet;
-      float* const ways = way[axis].data() + octet * kOctet;
-      Octet now, go;
+    for (int octet = 0; octet < kLaneGroups; ++octet) {
+      float* const at = row.u[axis] + octet * kLanes;
+      float* const ways = way[axis].data() + octet * kLanes;
+      Float8 now, go;
       load(now, at);
       load(go, ways);
       store(ways, now);
       u[axis][static_cast<std::size_t>(octet) + 1] = now;
       if (octet < span.first || octet > span.last) continue;
-      OctetMask stands;
+      Mask8 stands;
       standing_by_bits(stands, row, axis, octet);
       cut |= stands & (go != 0.0F);
-      go = stands ? Octet{} : go;
+      go = stands ? Float8{} : go;
       take_largest_size(most, go);
       if (row.stopped != nullptr) {
-        OctetMask stopped;
-        bits_set(stopped, row.stopped + octet * kOctet, 1 << axis);
+        Mask8 stopped;
+        bits_set(stopped, row.stopped + octet * kLanes, 1 << axis);
         any_stopped |= stopped & (go != 0.0F);
-        store(refused[axis].data() + octet * kOctet, stopped ? go : Octet{});
-        go = stopped ? Octet{} : go;
+        store(refused[axis].data() + octet * kLanes, stopped ? go : Float8{});
+        go = stopped ? Float8{} : go;
       }
       now += go;
       store(at, now);
@@ -155,22 +155,22 @@ HYBRID_WIDE_AND_MANY SetOut set_out_row(const LevelRow& row, const RowLimits& li
   return out;
 }
 
-HYBRID_WIDE_AND_MANY bool may_be_beyond(const LevelRow& row, const RowLimits& limits,
-                                        unsigned sides) noexcept {
+HYBRID_MULTIVERSIONED_512 bool may_be_beyond(const LevelRow& row, const RowLimits& limits,
+                                             unsigned sides) noexcept {
   Axes u;
   load_axes(u, row, {});
   return steps_beyond(u, row, limits, sides);
 }
 
-HYBRID_WIDE_AND_MANY unsigned axes_beyond(const LevelRow& row, const RowLimits& limits) noexcept {
+HYBRID_MULTIVERSIONED_512 unsigned axes_beyond(const LevelRow& row, const RowLimits& limits) noexcept {
   Axes u;
   load_axes(u, row, {});
   return row.springs.uniform && limits.lanes == nullptr ? beyond_band<true>(u, row, limits, {}, 0.0F)
                                                         : beyond_band<false>(u, row, limits, {}, 0.0F);
 }
 
-HYBRID_WIDE_AND_MANY bool draw_back_row(const LevelRow& row, const RowLimits& limits, unsigned axes,
-                                        const RowVector& from) noexcept {
+HYBRID_MULTIVERSIONED_512 bool draw_back_row(const LevelRow& row, const RowLimits& limits, unsigned axes,
+                                             const RowVector& from) noexcept {
   if (limits.lanes != nullptr) return draw_back_axes<false, Limits::lanes>(row, limits, axes, from);
   return row.springs.uniform ? draw_back_axes<true, Limits::row>(row, limits, axes, from)
                              : draw_back_axes<false, Limits::row>(row, limits, axes, from);

@@ -3,7 +3,7 @@
 
 namespace voxel {
 
-Hats::Hats(const Grid& fine)
+Prolongation::Prolongation(const Grid& fine)
     : rows_(static_cast<std::size_t>(fine.dims[1]) / 2 + 4),
       lanes_(static_cast<std::size_t>(fine.columns + 2) * kRow),
       cell_lanes_(lanes_ / 2 + std::size_t{2} * kRow),
@@ -11,7 +11,7 @@ Hats::Hats(const Grid& fine)
       lanes_of_(2 * rows_ * 4 * lanes_),
       spread_(2 * rows_) {}
 
-void Hats::begin(int first, int last, int j0, int j1) noexcept {
+void Prolongation::begin(int first, int last, int j0, int j1) noexcept {
   first_ = first;
   octets_ = last - first + 1;
   j0_ = j0;
@@ -20,15 +20,15 @@ void Hats::begin(int first, int last, int j0, int j1) noexcept {
   }
 }
 
-void Hats::spread(int j, int k, bool tells, bool whole) noexcept {
+void Prolongation::spread(int j, int k, bool is_source, bool whole) noexcept {
   const std::size_t to = slot(j, k);
   float* lanes = lanes_of_.data() + to * 4 * lanes_;
   if (!whole) {
     spread_along(cells(3), octets_, lanes + 3 * lanes_);
     whole = all_ones(lanes + 3 * lanes_, 2 * octets_);
   }
-  spread_[to] = {tells, whole};
-  if (!tells) return;
+  spread_[to] = {is_source, whole};
+  if (!is_source) return;
   for (std::size_t axis = 0; axis < 3; ++axis) spread_along(cells(axis), octets_, lanes + axis * lanes_);
 }
 

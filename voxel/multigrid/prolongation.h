@@ -11,18 +11,18 @@
 #include <cstddef>
 #include <vector>
 
-#include "voxel/lattice/row_grid.h"
 #include "voxel/lattice/lazy_array.h"
+#include "voxel/lattice/row_grid.h"
 #include "voxel/lattice/simd8.h"
 #include "voxel/multigrid/row_smoother.h"
 
 namespace voxel {
 
-class Hats {
+class Prolongation {
  public:
-  Hats() = default;
+  Prolongation() = default;
   // For any box of this grid, the finer of two.
-  explicit Hats(const Grid& fine);
+  explicit Prolongation(const Grid& fine);
 
   [[nodiscard]] std::size_t memory_bytes() const {
     return cells_.resident_bytes() + lanes_of_.resident_bytes() + resident_bytes(spread_);
@@ -36,17 +36,17 @@ class Hats {
   // Room for the cells of a row before they are spread: of each axis, and (3) which of them there are, from
   // coarse octet first() on. Of the octets before and after, too.
   [[nodiscard]] float* cells(std::size_t which) noexcept {
-    return cells_.data() + which * cell_lanes_ + kOctet;
+    return cells_.data() + which * cell_lanes_ + kLanes;
   }
   // Spreads what is in cells(): `whole`, nothing is missing there.
-  void spread(int j, int k, bool tells, bool whole) noexcept;
+  void spread(int j, int k, bool is_source, bool whole) noexcept;
   // A row of the finer level's lanes from its octet `octet` on, of all octets along x.
-  [[nodiscard]] HatRow row(int j, int k, int octet) const noexcept {
+  [[nodiscard]] ProlongedRow row(int j, int k, int octet) const noexcept {
     const std::size_t at = slot(j, k);
     const float* lanes =
-        lanes_of_.data() + at * 4 * lanes_ + static_cast<std::size_t>(octet - 2 * first_) * kOctet;
-    HatRow out;
-    out.tells = spread_[at].tells;
+        lanes_of_.data() + at * 4 * lanes_ + static_cast<std::size_t>(octet - 2 * first_) * kLanes;
+    ProlongedRow out;
+    out.is_source = spread_[at].is_source;
     if (!spread_[at].whole) out.weight = lanes + 3 * lanes_;
     for (std::size_t axis = 0; axis < 3; ++axis) out.sum[axis] = lanes + axis * lanes_;
     return out;
@@ -54,7 +54,7 @@ class Hats {
 
  private:
   struct Spread {
-    bool tells = false, whole = true;
+    bool is_source = false, whole = true;
   };
   [[nodiscard]] std::size_t slot(int j, int k) const {
     return static_cast<std::size_t>(k & 1) * rows_ + static_cast<std::size_t>(j - j0_);

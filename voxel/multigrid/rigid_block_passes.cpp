@@ -19,7 +19,7 @@ constexpr std::uint32_t kAllLanes = ~std::uint32_t{0};
 
 // `visit(cell, lane)` for the cells of a part in a run.
 template <class Visit>
-void for_cells(const WholeParts::Run& run, const Visit& visit) {
+void for_cells(const RigidBlocks::Run& run, const Visit& visit) {
   for (std::uint32_t lanes = run.lanes; lanes != 0; lanes &= lanes - 1) {
     const auto lane = static_cast<std::uint32_t>(std::countr_zero(lanes));
     visit(run.row * kRow + lane, lane);
@@ -31,7 +31,7 @@ double along(const Spring& spring, int axis, int d) {
 }
 
 // How far the voxel of a part at a link's end may go on an axis before the link stops it: {down, up}.
-std::array<double, 2> room_at(const Lattice& lattice, const Displacement& state, const WholeParts::Link& l,
+std::array<double, 2> room_at(const Lattice& lattice, const Displacement& state, const RigidBlocks::Link& l,
                               int axis) {
   const auto& u = state.u[static_cast<std::size_t>(axis)];
   const auto bounds = lattice.bounds(l.up ? l.cell : l.beside, l.d, axis);
@@ -60,7 +60,7 @@ double room_beside(const Lattice& lattice, const Displacement& state, VoxelId v,
 }
 
 // Is this the first of the links that a voxel beside a part has to it?
-bool first_link(const Lattice& lattice, const WholeParts::Link& l, std::uint16_t part) {
+bool first_link(const Lattice& lattice, const RigidBlocks::Link& l, std::uint16_t part) {
   for (int d = 0; d < l.d; ++d) {
     if (lattice.part(lattice.up(l.beside, d)) == part || lattice.part(lattice.down(l.beside, d)) == part)
       return false;
@@ -71,28 +71,28 @@ bool first_link(const Lattice& lattice, const WholeParts::Link& l, std::uint16_t
 }  // namespace
 
 template <class Visit>
-void Multigrid::for_parts(int level, const WholeParts::Box& box, const Visit& visit) noexcept {
-  for (std::size_t p = 0; p < part_state_.size(); ++p) {
-    const WholeParts::OnLevel& on = parts_->on(level, p);
-    if (on.count > 0 && on.box.meets(box)) visit(p, on, part_state_[p].on[static_cast<std::size_t>(level)]);
+void Multigrid::for_blocks(int level, const RigidBlocks::Box& box, const Visit& visit) noexcept {
+  for (std::size_t p = 0; p < block_state_.size(); ++p) {
+    const RigidBlocks::OnLevel& on = parts_->on(level, p);
+    if (on.count > 0 && on.box.meets(box)) visit(p, on, block_state_[p].on[static_cast<std::size_t>(level)]);
   }
 }
 
-void Multigrid::set_part_contacts(const Displacement& state, std::span<const VoxelId> held) noexcept {
+void Multigrid::set_block_contacts(const Displacement& state, std::span<const VoxelId> held) noexcept {
   if (parts_ == nullptr) return;
-  for (PartState& p : part_state_) p.by_tool.count = 0;
+  for (BlockState& p : block_state_) p.by_tool.count = 0;
   for (const VoxelId v : held) {
-    if (!Displacement::in_part(state.role[v])) continue;
+    if (!Displacement::in_block(state.role[v])) continue;
     const std::uint32_t s = lattice_.surface_number(v);
     if (s != Lattice::kNoSurface)
-      part_state_[lattice_.part(v) - 1U].by_tool.add(glm::dvec3(state.tool_normal[s]));
+      block_state_[lattice_.part(v) - 1U].by_tool.add(glm::dvec3(state.tool_normal[s]));
   }
-  for (PartState& p : part_state_) p.held = p.by_tool;
+  for (BlockState& p : block_state_) p.held = p.by_tool;
 }
 
-glm::dvec3 Multigrid::part_force(std::size_t part, const Displacement& state) const noexcept {
+glm::dvec3 Multigrid::block_force(std::size_t part, const Displacement& state) const noexcept {
   glm::dvec3 force(0.0);
-  for (const WholeParts::Link& l : parts_->on(0, part).border) {
+  for (const RigidBlocks::Link& l : parts_->on(0, part).border) {
     for (int axis = 0; axis < 3; ++axis) {
       const auto& u = state.u[static_cast<std::size_t>(axis)];
       force[axis] += along(l.spring, axis, l.d) * static_cast<double>(u[l.beside] - u[l.cell]);
@@ -109,10 +109,10 @@ glm::dvec3 Multigrid::part_force(std::size_t part, const Displacement& state) co
 
 // The least that links of the border leave it, `room(link, axis)`: {down, up}.
 template <class Room>
-Multigrid::PartRoom Multigrid::room_on_border(std::size_t part, const Room& room) const noexcept {
+Multigrid::AdmissibleInterval Multigrid::room_on_border(std::size_t part, const Room& room) const noexcept {
   constexpr double kFar = 1e30;
-  PartRoom all{{{-kFar, kFar}, {-kFar, kFar}, {-kFar, kFar}}};
-  for (const WholeParts::Link& l : parts_->on(0, part).border) {
+  AdmissibleInterval all{{{-kFar, kFar}, {-kFar, kFar}, {-kFar, kFar}}};
+  for (const RigidBlocks::Link& l : parts_->on(0, part).border) {
     for (int axis = 0; axis < 3; ++axis) {
       const std::array<double, 2> at_link = room(l, axis);
       auto& of_axis = all[static_cast<std::size_t>(axis)];
@@ -123,12 +123,13 @@ Multigrid::PartRoom Multigrid::room_on_border(std::size_t part, const Room& room
   return all;
 }
 
-Multigrid::PartRoom Multigrid::room_of_part(std::size_t part, const Displacement& state) const noexcept {
+Multigrid::AdmissibleInterval Multigrid::interval_of_block(std::size_t part,
+                                                           const Displacement& state) const noexcept {
   return room_on_border(
-      part, [&](const WholeParts::Link& l, int axis) { return room_at(lattice_, state, l, axis); });
+      part, [&](const RigidBlocks::Link& l, int axis) { return room_at(lattice_, state, l, axis); });
 }
 
-void Multigrid::add_bounds(const PartRoom& room, std::vector<PartBound>& bounds) {
+void Multigrid::add_bounds(const AdmissibleInterval& room, std::vector<BlockBound>& bounds) {
   for (int axis = 0; axis < 3; ++axis) {
     glm::dvec3 up(0.0);
     up[axis] = 1.0;
@@ -138,14 +139,14 @@ void Multigrid::add_bounds(const PartRoom& room, std::vector<PartBound>& bounds)
   }
 }
 
-void Multigrid::shift_part(std::size_t part, const glm::dvec3& way, Displacement& state) noexcept {
+void Multigrid::shift_block(std::size_t part, const glm::dvec3& way, Displacement& state) noexcept {
   const VoxelId first = parts_->first(part);
   const auto most = static_cast<float>(std::max({std::fabs(way.x), std::fabs(way.y), std::fabs(way.z)}));
   for (std::size_t axis = 0; axis < 3; ++axis) {
     // All stand where the first does, to the last bit.
     const float to =
         static_cast<float>(static_cast<double>(state.u[axis][first]) + way[static_cast<int>(axis)]);
-    for (const WholeParts::Run& run : parts_->on(0, part).rows) {
+    for (const RigidBlocks::Run& run : parts_->on(0, part).rows) {
       if (run.lanes == kAllLanes) {
         std::fill_n(state.u[axis].data() + std::size_t{run.row} * kRow, kRow, to);
       } else {
@@ -153,34 +154,34 @@ void Multigrid::shift_part(std::size_t part, const glm::dvec3& way, Displacement
       }
     }
   }
-  for (const WholeParts::Run& run : parts_->on(0, part).rows) note_change(0, run.row, most);
+  for (const RigidBlocks::Run& run : parts_->on(0, part).rows) note_change(0, run.row, most);
 }
 
 // Those it touches, and what it may come to.
 void Multigrid::stop_at_obstacles(std::size_t part, const Displacement& state, const ObstacleView& obstacles,
                                   Tool tool) noexcept {
-  part_bounds_.clear();
-  const HeldDirections& held = part_state_[part].by_tool;
+  block_bounds_.clear();
+  const HeldDirections& held = block_state_[part].by_tool;
   for (std::size_t n = 0; n < held.count && tool == Tool::holds; ++n)
-    part_bounds_.push_back({held.of[n], 0.0, true, 0.0});
+    block_bounds_.push_back({held.of[n], 0.0, true, 0.0});
   if (obstacles.obstacles.empty()) return;
   for (const std::uint32_t s : parts_->surface(part)) {
     const Obstacle& o = obstacles.obstacles[s];
     if (o.normal == glm::vec3(0.0F)) continue;
     const double depth = depth_in_obstacle(o, state.at(lattice_.surface()[s]));
     if (depth < -kNearObstacle * lattice_.max_spacing_m()) continue;
-    if (part_bounds_.size() + 6 >= kMostPartBounds) return;
+    if (block_bounds_.size() + 6 >= kMaxBlockBounds) return;
     // What is in its obstacle is brought out by others.
-    part_bounds_.push_back({glm::dvec3(o.normal), std::max(0.0, -depth), false, 0.0});
+    block_bounds_.push_back({glm::dvec3(o.normal), std::max(0.0, -depth), false, 0.0});
   }
 }
 
-// As room_of_part(), where voxels beside it come along as far as their other links let them; looked at on
-// the way it is to go.
-Multigrid::PartRoom Multigrid::room_with_others(std::size_t part, const glm::dvec3& way,
-                                                const Displacement& state) const noexcept {
+// As interval_of_block(), where voxels beside it come along as far as their other links let them; looked at
+// on the way it is to go.
+Multigrid::AdmissibleInterval Multigrid::room_with_others(std::size_t part, const glm::dvec3& way,
+                                                          const Displacement& state) const noexcept {
   const auto number = static_cast<std::uint16_t>(part + 1);
-  return room_on_border(part, [&](const WholeParts::Link& l, int axis) {
+  return room_on_border(part, [&](const RigidBlocks::Link& l, int axis) {
     std::array<double, 2> room = room_at(lattice_, state, l, axis);
     if (room[0] < -way[axis]) room[0] += room_beside(lattice_, state, l.beside, number, axis, false);
     if (room[1] < way[axis]) room[1] += room_beside(lattice_, state, l.beside, number, axis, true);
@@ -190,7 +191,7 @@ Multigrid::PartRoom Multigrid::room_with_others(std::size_t part, const glm::dve
 
 // Brings what is beside a part within the limits of its links to it.
 void Multigrid::take_others_along(std::size_t part, Displacement& state) noexcept {
-  for (const WholeParts::Link& l : parts_->on(0, part).border) {
+  for (const RigidBlocks::Link& l : parts_->on(0, part).border) {
     if (state.role[l.beside] != Displacement::free || lattice_.anchored(l.beside)) continue;
     for (int axis = 0; axis < 3; ++axis) {
       auto& u = state.u[static_cast<std::size_t>(axis)];
@@ -215,7 +216,7 @@ std::uint8_t Multigrid::add_what_comes_along(std::size_t part, const Displacemen
   const auto number = static_cast<std::uint16_t>(part + 1);
   const glm::dvec3 own = pull;
   std::uint8_t stopped = 0;
-  for (const WholeParts::Link& l : parts_->on(0, part).border) {
+  for (const RigidBlocks::Link& l : parts_->on(0, part).border) {
     for (int axis = 0; axis < 3; ++axis) {
       if (own[axis] == 0.0 || (stopped >> axis & 1U) != 0) continue;
       const bool upwards = own[axis] > 0.0;
@@ -235,24 +236,24 @@ std::uint8_t Multigrid::add_what_comes_along(std::size_t part, const Displacemen
   return stopped;
 }
 
-glm::dvec3 Multigrid::move_part(std::size_t part, const glm::dvec3& way, Displacement& state,
-                                const ObstacleView& obstacles, Tool tool, Note note) noexcept {
+glm::dvec3 Multigrid::move_block(std::size_t part, const glm::dvec3& way, Displacement& state,
+                                 const ObstacleView& obstacles, Tool tool, Note note) noexcept {
   const glm::dvec3& stiffness = parts_->on(0, part).stiffness;
   stop_at_obstacles(part, state, obstacles, tool);
-  const PartRoom room = room_with_others(part, way, state);
-  add_bounds(room, part_bounds_);
-  glm::dvec3 to = move_within(stiffness * way, stiffness, part_bounds_);
+  const AdmissibleInterval room = room_with_others(part, way, state);
+  add_bounds(room, block_bounds_);
+  glm::dvec3 to = move_within(stiffness * way, stiffness, block_bounds_);
   for (int axis = 0; axis < 3; ++axis) {  // what rounding left
     const auto& of_axis = room[static_cast<std::size_t>(axis)];
     to[axis] = std::clamp(to[axis], of_axis[0], of_axis[1]);
   }
   const double most = std::max({std::fabs(to.x), std::fabs(to.y), std::fabs(to.z)});
-  if (!(most > static_cast<double>(passed_on_m()))) return glm::dvec3(0.0);
+  if (!(most > static_cast<double>(restricted_m()))) return glm::dvec3(0.0);
   const VoxelId first = parts_->first(part);
   const glm::dvec3 before = state.at(first);
-  shift_part(part, to, state);
+  shift_block(part, to, state);
   take_others_along(part, state);
-  for (const WholeParts::Run& run : parts_->on(0, part).rows) {
+  for (const RigidBlocks::Run& run : parts_->on(0, part).rows) {
     if (note == Note::in_log) log_.note(0, run.row);
   }
   return state.at(first) - before;
@@ -262,7 +263,7 @@ void Multigrid::shift_cells(int level, std::size_t part, const glm::dvec3& way) 
   Level& l = at(level);
   const auto most = static_cast<float>(std::max({std::fabs(way.x), std::fabs(way.y), std::fabs(way.z)}));
   if (most == 0.0F) return;
-  for (const WholeParts::Run& run : parts_->on(level, part).rows) {
+  for (const RigidBlocks::Run& run : parts_->on(level, part).rows) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto by = static_cast<float>(way[static_cast<int>(axis)]);
       for_cells(run, [&](VoxelId cell, std::uint32_t) { l.value[axis][cell] += by; });
@@ -273,13 +274,13 @@ void Multigrid::shift_cells(int level, std::size_t part, const glm::dvec3& way) 
 }
 
 // What pulls a part on a level, and on what stiffness: springs that leave it, what holds its cells, its load.
-glm::dvec3 Multigrid::part_pull(int level, std::size_t part, glm::dvec3& stiffness) noexcept {
-  const WholeParts::OnLevel& on = parts_->on(level, part);
+glm::dvec3 Multigrid::block_pull(int level, std::size_t part, glm::dvec3& stiffness) noexcept {
+  const RigidBlocks::OnLevel& on = parts_->on(level, part);
   stiffness = on.stiffness;
-  if (level == 0) return part_state_[part].balance;
+  if (level == 0) return block_state_[part].balance;
   Level& l = at(level);
-  glm::dvec3 pull = part_state_[part].on[static_cast<std::size_t>(level)].load;
-  for (const WholeParts::Link& link : on.border) {
+  glm::dvec3 pull = block_state_[part].on[static_cast<std::size_t>(level)].load;
+  for (const RigidBlocks::Link& link : on.border) {
     for (int axis = 0; axis < 3; ++axis) {
       const auto& value = l.value[static_cast<std::size_t>(axis)];
       pull[axis] +=
@@ -288,13 +289,13 @@ glm::dvec3 Multigrid::part_pull(int level, std::size_t part, glm::dvec3& stiffne
   }
   // Where the tool, or an obstacle, holds it, its own cells are held by that: along a surface that it slides
   // on they would be held, too.
-  if (part_state_[part].held.count > 0 || parts_->sprawls(part)) return pull;
-  for (const WholeParts::Run& run : on.rows) {
-    if (!holds_->any(level, run.row) || !prepare(level, run.row)) continue;
-    RowCouplings springs;
+  if (block_state_[part].held.count > 0 || parts_->sprawls(part)) return pull;
+  for (const RigidBlocks::Run& run : on.rows) {
+    if (!boundary_springs_->any(level, run.row) || !prepare(level, run.row)) continue;
+    RowStiffness springs;
     l.couplings->all(run.row, springs);
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const float* hold = holds_->hold(level, run.row, axis);
+      const float* hold = boundary_springs_->hold(level, run.row, axis);
       for_cells(run, [&](VoxelId cell, std::uint32_t lane) {
         const float inverse = springs.inverse[axis * kRow + lane];
         if (!(hold[lane] > 0.0F) || !(inverse > 0.0F)) return;
@@ -308,51 +309,51 @@ glm::dvec3 Multigrid::part_pull(int level, std::size_t part, glm::dvec3& stiffne
   return pull;
 }
 
-void Multigrid::smooth_parts(int level, const WholeParts::Box& box, Displacement& state,
-                             const ObstacleView& obstacles) noexcept {
+void Multigrid::smooth_blocks(int level, const RigidBlocks::Box& box, Displacement& state,
+                              const ObstacleView& obstacles) noexcept {
   if (parts_ == nullptr) return;
-  for_parts(level, box, [&](std::size_t p, const WholeParts::OnLevel&, PartOnLevel& on) {
+  for_blocks(level, box, [&](std::size_t p, const RigidBlocks::OnLevel&, BlockOnLevel& on) {
     glm::dvec3 stiffness;
-    glm::dvec3 pull = part_pull(level, p, stiffness);
+    glm::dvec3 pull = block_pull(level, p, stiffness);
     if (level == 0) {
-      pull += part_force(p, state);
+      pull += block_force(p, state);
       add_what_comes_along(p, state, pull);
     }
     glm::dvec3 way(0.0);
     for (int axis = 0; axis < 3; ++axis) {
-      if (stiffness[axis] > 0.0 && (level == 0 || (part_state_[p].stopped >> axis & 1U) == 0))
+      if (stiffness[axis] > 0.0 && (level == 0 || (block_state_[p].stopped >> axis & 1U) == 0))
         way[axis] = pull[axis] / stiffness[axis];
     }
     if (level == 0) {
-      move_part(p, way, state, obstacles);
+      move_block(p, way, state, obstacles);
       return;
     }
-    way = part_state_[p].held.free_part(way);
+    way = block_state_[p].held.free_block(way);
     shift_cells(level, p, way);
-    on.untold += way;
+    on.pending_correction += way;
   });
 }
 
-float Multigrid::measure_parts(int level, const WholeParts::Box& box, Displacement& state,
-                               const ObstacleView& obstacles) noexcept {
+float Multigrid::measure_blocks(int level, const RigidBlocks::Box& box, Displacement& state,
+                                const ObstacleView& obstacles) noexcept {
   if (parts_ == nullptr) return 0.0F;
-  for (PartState& p : part_state_) {
+  for (BlockState& p : block_state_) {
     p.on[static_cast<std::size_t>(level)].left = glm::dvec3(0.0);
     p.on[static_cast<std::size_t>(level)].active = false;
     p.on[static_cast<std::size_t>(level) + 1].passed = glm::dvec3(0.0);
   }
   float worst = 0.0F;
-  for_parts(level, box, [&](std::size_t p, const WholeParts::OnLevel& of, PartOnLevel& on) {
-    PartState& part = part_state_[p];
+  for_blocks(level, box, [&](std::size_t p, const RigidBlocks::OnLevel& of, BlockOnLevel& on) {
+    BlockState& part = block_state_[p];
     glm::dvec3 stiffness;
-    glm::dvec3 pull = part_pull(level, p, stiffness);
+    glm::dvec3 pull = block_pull(level, p, stiffness);
     if (level == 0) {
-      pull += part_force(p, state);
+      pull += block_force(p, state);
       // What presses it on an obstacle is balanced by that.
       part.held = part.by_tool;
       stop_at_obstacles(p, state, obstacles, Tool::holds);
-      move_within(pull, stiffness, part_bounds_);
-      for (const PartBound& b : part_bounds_) {
+      move_within(pull, stiffness, block_bounds_);
+      for (const BlockBound& b : block_bounds_) {
         if (b.force_N > 0.0 && !b.both && b.room_m < kTouching * lattice_.min_spacing_m())
           part.held.add(b.normal);
       }
@@ -362,7 +363,7 @@ float Multigrid::measure_parts(int level, const WholeParts::Box& box, Displaceme
     for (int axis = 0; axis < 3; ++axis) {
       if ((part.stopped >> axis & 1U) != 0) pull[axis] = 0.0;
     }
-    on.left = part.held.free_part(pull);
+    on.left = part.held.free_block(pull);
     on.active = true;
     part.on[static_cast<std::size_t>(level) + 1].passed = on.left;
     if (level > 0 || of.border.empty()) return;
@@ -377,11 +378,11 @@ float Multigrid::measure_parts(int level, const WholeParts::Box& box, Displaceme
 
 // What of a row is passed on: nothing of a part that the next level knows, which hears of it as a whole; of
 // another as much of each of its cells.
-void Multigrid::set_part_lanes(int level, RowId row, OctetSpan span, RowVector& out) const noexcept {
-  for (int i = span.first * kOctet; i < (span.last + 1) * kOctet; ++i) {
+void Multigrid::set_block_lanes(int level, RowId row, LaneSpan span, RowVector& out) const noexcept {
+  for (int i = span.first * kLanes; i < (span.last + 1) * kLanes; ++i) {
     const std::uint16_t number = parts_->of(level, row * kRow + static_cast<VoxelId>(i));
     if (number == 0) continue;
-    const PartOnLevel& on = part_state_[number - 1U].on[static_cast<std::size_t>(level)];
+    const BlockOnLevel& on = block_state_[number - 1U].on[static_cast<std::size_t>(level)];
     const bool known = parts_->on(level + 1, number - 1U).count > 0;
     const double share = known || parts_->sprawls(number - 1U)
                              ? 0.0
@@ -393,25 +394,25 @@ void Multigrid::set_part_lanes(int level, RowId row, OctetSpan span, RowVector& 
 }
 
 // What other tissue in its cells is pulled by pulls a part on a coarse level.
-void Multigrid::pass_part_lanes(int level, RowId row, OctetSpan span, const RowVector& sums) noexcept {
-  for (int i = span.first * kOctet; i < (span.last + 1) * kOctet; ++i) {
+void Multigrid::restrict_block_lanes(int level, RowId row, LaneSpan span, const RowVector& sums) noexcept {
+  for (int i = span.first * kLanes; i < (span.last + 1) * kLanes; ++i) {
     const std::uint16_t number = parts_->of(level, row * kRow + static_cast<VoxelId>(i));
     if (number == 0) continue;
-    PartOnLevel& on = part_state_[number - 1U].on[static_cast<std::size_t>(level)];
+    BlockOnLevel& on = block_state_[number - 1U].on[static_cast<std::size_t>(level)];
     for (int axis = 0; axis < 3; ++axis)
       on.passed[axis] +=
           static_cast<double>(sums[static_cast<std::size_t>(axis)][static_cast<std::size_t>(i)]);
   }
 }
 
-void Multigrid::load_parts(int level, const WholeParts::Box& box) noexcept {
+void Multigrid::load_blocks(int level, const RigidBlocks::Box& box) noexcept {
   if (parts_ == nullptr) return;
   const Level& l = at(level);
-  for_parts(level, box, [&](std::size_t p, const WholeParts::OnLevel& of, PartOnLevel& on) {
+  for_blocks(level, box, [&](std::size_t p, const RigidBlocks::OnLevel& of, BlockOnLevel& on) {
     const bool known = parts_->on(level - 1, p).count > 0;
-    if (known && !part_state_[p].on[static_cast<std::size_t>(level - 1)].active) return;
+    if (known && !block_state_[p].on[static_cast<std::size_t>(level - 1)].active) return;
     on.load = on.passed;
-    for (const WholeParts::Link& link : of.border) {
+    for (const RigidBlocks::Link& link : of.border) {
       for (int axis = 0; axis < 3; ++axis) {
         const auto& told = l.told[static_cast<std::size_t>(axis)];
         on.load[axis] -=
@@ -421,31 +422,31 @@ void Multigrid::load_parts(int level, const WholeParts::Box& box) noexcept {
   });
 }
 
-void Multigrid::note_told_parts(int level, RowId row, OctetSpan span, const RowVector& way) noexcept {
-  for (int i = span.first * kOctet; i < (span.last + 1) * kOctet; ++i) {
+void Multigrid::note_prolonged_blocks(int level, RowId row, LaneSpan span, const RowVector& way) noexcept {
+  for (int i = span.first * kLanes; i < (span.last + 1) * kLanes; ++i) {
     const std::uint16_t number = parts_->of(level, row * kRow + static_cast<VoxelId>(i));
     if (number == 0) continue;
-    PartOnLevel& on = part_state_[number - 1U].on[static_cast<std::size_t>(level)];
+    BlockOnLevel& on = block_state_[number - 1U].on[static_cast<std::size_t>(level)];
     for (int axis = 0; axis < 3; ++axis)
       on.sum[axis] += static_cast<double>(way[static_cast<std::size_t>(axis)][static_cast<std::size_t>(i)]);
   }
 }
 
-void Multigrid::tell_parts(int level, Displacement& state, const ObstacleView& obstacles) noexcept {
+void Multigrid::prolong_to_blocks(int level, Displacement& state, const ObstacleView& obstacles) noexcept {
   Level& coarse = at(level + 1);
-  for (std::size_t p = 0; p < part_state_.size(); ++p) {
-    const WholeParts::OnLevel &of = parts_->on(level, p), &above = parts_->on(level + 1, p);
-    PartState& part = part_state_[p];
-    PartOnLevel &on = part.on[static_cast<std::size_t>(level)],
-                &from = part.on[static_cast<std::size_t>(level) + 1];
-    glm::dvec3 way = above.count > 0                       ? from.untold
+  for (std::size_t p = 0; p < block_state_.size(); ++p) {
+    const RigidBlocks::OnLevel &of = parts_->on(level, p), &above = parts_->on(level + 1, p);
+    BlockState& part = block_state_[p];
+    BlockOnLevel &on = part.on[static_cast<std::size_t>(level)],
+                 &from = part.on[static_cast<std::size_t>(level) + 1];
+    glm::dvec3 way = above.count > 0                       ? from.pending_correction
                      : of.count > 0 && !parts_->sprawls(p) ? on.sum / static_cast<double>(of.count)
                                                            : glm::dvec3(0.0);
     on.sum = glm::dvec3(0.0);
     if (above.count > 0 && way != glm::dvec3(0.0)) {
-      from.untold = glm::dvec3(0.0);
+      from.pending_correction = glm::dvec3(0.0);
       // All its cells have told it now, in the box or not.
-      for (const WholeParts::Run& run : above.rows) {
+      for (const RigidBlocks::Run& run : above.rows) {
         for (std::size_t axis = 0; axis < 3; ++axis)
           for_cells(run,
                     [&](VoxelId cell, std::uint32_t) { coarse.told[axis][cell] = coarse.value[axis][cell]; });
@@ -453,16 +454,16 @@ void Multigrid::tell_parts(int level, Displacement& state, const ObstacleView& o
       }
     }
     if (of.count == 0 || way == glm::dvec3(0.0)) continue;
-    way = part.held.free_part(way);
+    way = part.held.free_block(way);
     if (level > 0) {
       shift_cells(level, p, way);
-      on.untold += way;
+      on.pending_correction += way;
       continue;
     }
-    const glm::dvec3 went = move_part(p, way, state, obstacles);
+    const glm::dvec3 went = move_block(p, way, state, obstacles);
     if (above.count == 0 || went == way) continue;
     // What it could not follow its cells take back.
-    for (const WholeParts::Run& run : above.rows) {
+    for (const RigidBlocks::Run& run : above.rows) {
       for (std::size_t axis = 0; axis < 3; ++axis) {
         const auto less = static_cast<float>(way[static_cast<int>(axis)] - went[static_cast<int>(axis)]);
         for_cells(run, [&](VoxelId cell, std::uint32_t) {
@@ -474,28 +475,31 @@ void Multigrid::tell_parts(int level, Displacement& state, const ObstacleView& o
   }
 }
 
-Holds::Support Multigrid::support_of_part(std::size_t part) const noexcept {
-  if (parts_->sprawls(part)) return Holds::kAll;
-  const HeldDirections& held = part_state_[part].held;
+BoundarySprings::Support Multigrid::support_of_block(std::size_t part) const noexcept {
+  if (parts_->sprawls(part)) return BoundarySprings::kAll;
+  const HeldDirections& held = block_state_[part].held;
   if (held.count == 0) return {};
-  return held.count == 1 ? Holds::along(glm::vec3(held.of[0]), Holds::Support::By::obstacle) : Holds::kAll;
+  return held.count == 1
+             ? BoundarySprings::along(glm::vec3(held.of[0]), BoundarySprings::Support::By::obstacle)
+             : BoundarySprings::kAll;
 }
 
-void Multigrid::balance_parts(const Displacement& state) noexcept {
-  for (std::size_t p = 0; p < part_state_.size(); ++p) part_state_[p].balance = -part_force(p, state);
+void Multigrid::balance_blocks(const Displacement& state) noexcept {
+  for (std::size_t p = 0; p < block_state_.size(); ++p) block_state_[p].balance = -block_force(p, state);
 }
 
-void Multigrid::forget_untold_parts(int level, RowId row) noexcept {
+void Multigrid::forget_pending_of_blocks(int level, RowId row) noexcept {
   for (VoxelId cell = row * kRow; cell < (row + 1) * kRow; ++cell) {
     const std::uint16_t number = parts_->of(level, cell);
-    if (number != 0) part_state_[number - 1U].on[static_cast<std::size_t>(level)].untold = glm::dvec3(0.0);
+    if (number != 0)
+      block_state_[number - 1U].on[static_cast<std::size_t>(level)].pending_correction = glm::dvec3(0.0);
   }
 }
 
-void Multigrid::begin_parts_anew() noexcept {
-  for (PartState& p : part_state_) {
+void Multigrid::restart_blocks() noexcept {
+  for (BlockState& p : block_state_) {
     p.balance = glm::dvec3(0.0);
-    for (PartOnLevel& on : p.on) on = {};
+    for (BlockOnLevel& on : p.on) on = {};
   }
 }
 

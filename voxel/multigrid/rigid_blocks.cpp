@@ -26,15 +26,15 @@ VoxelId above(const Grid& finer, const Grid& coarser, VoxelId cell) {
 }  // namespace
 
 glm::dvec3 move_within(const glm::dvec3& force_N, const glm::dvec3& stiffness_N_per_m,
-                       std::span<PartBound> bounds) noexcept {
+                       std::span<BlockBound> bounds) noexcept {
   glm::dvec3 compliance(0.0);
   for (int axis = 0; axis < 3; ++axis)
     compliance[axis] = stiffness_N_per_m[axis] > 0.0 ? 1.0 / stiffness_N_per_m[axis] : 0.0;
   glm::dvec3 sum = force_N;
-  for (const PartBound& b : bounds) sum += b.force_N * b.normal;
+  for (const BlockBound& b : bounds) sum += b.force_N * b.normal;
   for (int n = 0; n < kMostRounds; ++n) {
     double most = 0.0, change = 0.0;
-    for (PartBound& b : bounds) {
+    for (BlockBound& b : bounds) {
       const double along = glm::dot(b.normal, compliance * b.normal);
       if (!(along > 0.0)) continue;
       double to = b.force_N - (glm::dot(b.normal, compliance * sum) + b.room_m) / along;
@@ -51,20 +51,20 @@ glm::dvec3 move_within(const glm::dvec3& force_N, const glm::dvec3& stiffness_N_
 
 void HeldDirections::add(const glm::dvec3& normal) noexcept {
   if (count == of.size()) return;
-  const glm::dvec3 rest = free_part(normal);
+  const glm::dvec3 rest = free_block(normal);
   const double size2 = glm::dot(rest, rest);
   if (size2 < kParallel) return;
   of[count++] = rest / std::sqrt(size2);
 }
 
-glm::dvec3 HeldDirections::free_part(glm::dvec3 way) const noexcept {
+glm::dvec3 HeldDirections::free_block(glm::dvec3 way) const noexcept {
   if (count == of.size()) return glm::dvec3(0.0);
   for (std::size_t n = 0; n < count; ++n) way -= glm::dot(of[n], way) * of[n];
   return way;
 }
 
-WholeParts::WholeParts(const Lattice& lattice, const std::vector<Couplings*>& levels)
-    : lattice_(lattice), couplings_(levels), count_(lattice.part_count()), levels_(levels.size()) {
+RigidBlocks::RigidBlocks(const Lattice& lattice, const std::vector<LevelStiffness*>& levels)
+    : lattice_(lattice), couplings_(levels), count_(lattice.block_count()), levels_(levels.size()) {
   for (std::size_t l = 0; l < levels.size(); ++l) {
     levels_[l].parts.resize(count_);
     levels_[l].row.assign(levels[l]->grid().rows(), 0);
@@ -89,7 +89,7 @@ WholeParts::WholeParts(const Lattice& lattice, const std::vector<Couplings*>& le
   if (lattice.has_bricks() || lattice.yields()) find_loaded();
 }
 
-void WholeParts::find_voxels() {
+void RigidBlocks::find_voxels() {
   const Grid& g = lattice_.grid();
   for (RowId row = 0; row < g.rows(); ++row) {
     if (lattice_.filled_in(row) == 0) continue;
@@ -107,8 +107,8 @@ void WholeParts::find_voxels() {
 }
 
 // From what cells of the level below hold, which becomes what those of this one do.
-void WholeParts::find_cells(int level, std::vector<std::vector<Share>>& shares,
-                            std::vector<std::uint32_t>& filled) {
+void RigidBlocks::find_cells(int level, std::vector<std::vector<Share>>& shares,
+                             std::vector<std::uint32_t>& filled) {
   const Grid &finer = couplings_[static_cast<std::size_t>(level - 1)]->grid(),
              &grid = couplings_[static_cast<std::size_t>(level)]->grid();
   std::vector<std::uint32_t> sums(grid.size());
@@ -155,7 +155,7 @@ void WholeParts::find_cells(int level, std::vector<std::vector<Share>>& shares,
 }
 
 // Do so few cells hold it that all of them go nearly the same way?
-bool WholeParts::compact(const Grid& grid, const std::vector<Share>& shares) {
+bool RigidBlocks::compact(const Grid& grid, const std::vector<Share>& shares) {
   std::array<int, 3> low{}, high{};
   for (const Share& s : shares) {
     const std::array<int, 3> c = grid.coordinates(s.cell);
@@ -170,8 +170,8 @@ bool WholeParts::compact(const Grid& grid, const std::vector<Share>& shares) {
   return true;
 }
 
-void WholeParts::find_border(int level) {
-  Couplings& couplings = *couplings_[static_cast<std::size_t>(level)];
+void RigidBlocks::find_border(int level) {
+  LevelStiffness& couplings = *couplings_[static_cast<std::size_t>(level)];
   const Grid& g = couplings.grid();
   for (std::size_t p = 0; p < count_; ++p) {
     OnLevel& part = levels_[static_cast<std::size_t>(level)].parts[p];
@@ -206,8 +206,8 @@ void WholeParts::find_border(int level) {
   }
 }
 
-void WholeParts::find_filled_rows(int level) {
-  const Couplings& couplings = *couplings_[static_cast<std::size_t>(level)];
+void RigidBlocks::find_filled_rows(int level) {
+  const LevelStiffness& couplings = *couplings_[static_cast<std::size_t>(level)];
   const Grid& g = couplings.grid();
   for (RowId row = 0; row < g.rows(); ++row) {
     std::uint8_t& known = levels_[static_cast<std::size_t>(level)].row[row];
@@ -222,7 +222,7 @@ void WholeParts::find_filled_rows(int level) {
   }
 }
 
-void WholeParts::find_loaded() {
+void RigidBlocks::find_loaded() {
   for (std::size_t p = 0; p < count_; ++p) {
     for (const Run& run : on(0, p).rows) {
       for (std::uint32_t lanes = run.lanes; lanes != 0; lanes &= lanes - 1) {
@@ -239,7 +239,7 @@ void WholeParts::find_loaded() {
   }
 }
 
-std::size_t WholeParts::memory_bytes() const {
+std::size_t RigidBlocks::memory_bytes() const {
   std::size_t bytes = 0;
   for (const Level& l : levels_) {
     bytes += l.number.resident_bytes() + l.row.size();

@@ -9,8 +9,8 @@
 // less than half, that level, and all coarser ones, know of it as of tissue, and tell it the mean of what
 // they tell its voxels: right where it lies in three cells along an axis at most. One that sprawls further,
 // as a thin sheet does, or a scaffold, holds tissue together that such levels take for loose: they do not
-// move it, and it holds on to the cells around it as what stands does (boundary_springs.h). (Told means, it swung for
-// ever.)
+// move it, and it holds on to the cells around it as what stands does (boundary_springs.h). (ProlongedBox
+// means, it swung for ever.)
 //
 // (Rejected: its springs in place of its limits, so many times stiffer that nobody sees it. Round what is a
 // hundred times stiffer than the rest a cycle leaves 0.83 of the error, and what is left is a strain that
@@ -24,14 +24,14 @@
 #include <span>
 #include <vector>
 
-#include "voxel/lattice/level_stiffness.h"
 #include "voxel/lattice/lattice.h"
 #include "voxel/lattice/lazy_array.h"
+#include "voxel/lattice/level_stiffness.h"
 
 namespace voxel {
 
 // A part's motion δ must satisfy normal · δ >= -room, or, `both`, = -room.
-struct PartBound {
+struct BlockBound {
   glm::dvec3 normal{0.0};
   double room_m = 0.0;
   bool both = false;
@@ -41,7 +41,7 @@ struct PartBound {
 // too, from those that stand there on. Coordinate ascent of the dual (Hildreth's): with three unknowns a few
 // rounds.
 glm::dvec3 move_within(const glm::dvec3& force_N, const glm::dvec3& stiffness_N_per_m,
-                       std::span<PartBound> bounds) noexcept;
+                       std::span<BlockBound> bounds) noexcept;
 
 // Directions in which a part is held, at right angles to one another.
 struct HeldDirections {
@@ -49,10 +49,10 @@ struct HeldDirections {
   std::size_t count = 0;
 
   void add(const glm::dvec3& normal) noexcept;
-  [[nodiscard]] glm::dvec3 free_part(glm::dvec3 way) const noexcept;
+  [[nodiscard]] glm::dvec3 free_block(glm::dvec3 way) const noexcept;
 };
 
-class WholeParts {
+class RigidBlocks {
  public:
   // Cells first … last on each axis, all included.
   struct Box {
@@ -83,7 +83,7 @@ class WholeParts {
   };
 
   // `levels`: level 0 first. Allocates.
-  WholeParts(const Lattice& lattice, const std::vector<Couplings*>& levels);
+  RigidBlocks(const Lattice& lattice, const std::vector<LevelStiffness*>& levels);
 
   [[nodiscard]] std::size_t count() const { return count_; }
   [[nodiscard]] const OnLevel& on(int level, std::size_t part) const {
@@ -135,7 +135,7 @@ class WholeParts {
   void find_loaded();
 
   const Lattice& lattice_;
-  std::vector<Couplings*> couplings_;
+  std::vector<LevelStiffness*> couplings_;
   std::size_t count_;
   std::vector<Level> levels_;
   std::vector<std::uint8_t> sprawls_;  // [part]

@@ -8,8 +8,8 @@
 
 namespace voxel {
 
-HYBRID_WIDE bool row_near_limits(const RowSprings& s, const RowView& u, const AxisLimits& limits, float share,
-                                 const float* wanted) noexcept {
+HYBRID_MULTIVERSIONED bool row_near_limits(const RowSprings& s, const RowView& u, const AxisLimits& limits,
+                                           float share, const float* wanted) noexcept {
   std::array<float, kRow + 2> p;
   p[0] = u.left;
   std::copy_n(wanted, kRow, p.begin() + 1);

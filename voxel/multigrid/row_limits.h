@@ -15,11 +15,11 @@ constexpr float kFar = std::numeric_limits<float>::max();
 
 // What links allow a voxel.
 struct Interval {
-  Octet low, high;
+  Float8 low, high;
 };
 HYBRID_INLINE void everywhere(Interval& in) {
-  in.low = Octet{} - kFar;
-  in.high = Octet{} + kFar;
+  in.low = Float8{} - kFar;
+  in.high = Float8{} + kFar;
 }
 // … the link to the neighbour above, which stands at `to`, and the one to the neighbour below.
 // None; one set for the row; each lane its own.
@@ -50,29 +50,29 @@ struct AxisBounds {
 
 // … the link to the neighbour above, which stands at `to`, and the one to the neighbour below.
 template <bool kUniform, Limits kLimits>
-HYBRID_INLINE void narrow(Interval& in, const Octet& up, const Octet& down, const AxisSprings& s,
+HYBRID_INLINE void narrow(Interval& in, const Float8& up, const Float8& down, const AxisSprings& s,
                           const AxisBounds& b, std::size_t d, int octet) {
   if constexpr (kLimits == Limits::lanes) {
-    Octet low, high;
-    load(low, b.up_low[d] + octet * kOctet);
-    load(high, b.up_high[d] + octet * kOctet);
+    Float8 low, high;
+    load(low, b.up_low[d] + octet * kLanes);
+    load(high, b.up_high[d] + octet * kLanes);
     low *= b.sign[d];
     take_largest(in.low, up - high);
     take_least(in.high, up - low);
-    load(low, b.down_low[d] + octet * kOctet);
-    load(high, b.down_high[d] + octet * kOctet);
+    load(low, b.down_low[d] + octet * kLanes);
+    load(high, b.down_high[d] + octet * kLanes);
     low *= b.sign[d];
     take_largest(in.low, down + low);
     take_least(in.high, down + high);
   } else {
-    Octet above_low = up - b.row.high[d], above_high = up - b.row.low[d];
-    Octet below_low = down + b.row.low[d], below_high = down + b.row.high[d];
+    Float8 above_low = up - b.row.high[d], above_high = up - b.row.low[d];
+    Float8 below_low = down + b.row.low[d], below_high = down + b.row.high[d];
     if (!kUniform) {
-      Octet k;
-      load(k, s.up[d] + octet * kOctet);
+      Float8 k;
+      load(k, s.up[d] + octet * kLanes);
       above_low = k > 0.0F ? above_low : in.low;
       above_high = k > 0.0F ? above_high : in.high;
-      load(k, s.down[d] + octet * kOctet);
+      load(k, s.down[d] + octet * kLanes);
       below_low = k > 0.0F ? below_low : in.low;
       below_high = k > 0.0F ? below_high : in.high;
     }
@@ -89,7 +89,7 @@ HYBRID_INLINE void narrow_beside(Interval& in, const Around& at, const AxisSprin
   narrow<kUniform, kLimits>(in, at.z_up, at.z_down, s, b, 2, octet);
 }
 // An empty interval can only be a rounding wide: it stays where it is then.
-HYBRID_INLINE void bring_into(Octet& wanted, const Interval& in, const Octet& now) {
+HYBRID_INLINE void bring_into(Float8& wanted, const Interval& in, const Float8& now) {
   take_largest(wanted, in.low);
   take_least(wanted, in.high);
   wanted = in.low > in.high ? now : wanted;
@@ -109,24 +109,24 @@ struct Band {
 };
 // Is a link of the octet beyond the band, when its own values are `own`?
 template <bool kUniform>
-HYBRID_INLINE void note_beyond(OctetMask& beyond, const Octet& own, const Octet& x_down, const Octet& x_up,
+HYBRID_INLINE void note_beyond(Mask8& beyond, const Float8& own, const Float8& x_down, const Float8& x_up,
                                const Around& at, const AxisSprings& s, const Band& band, int octet) {
-  const std::array<Octet, 3> up{x_up - own, at.y_up - own, at.z_up - own},
+  const std::array<Float8, 3> up{x_up - own, at.y_up - own, at.z_up - own},
       down{own - x_down, own - at.y_down, own - at.z_down};
   for (std::size_t d = 0; d < 3; ++d) {
-    OctetMask out;
+    Mask8 out;
     if (kUniform) {
-      Octet most{};
+      Float8 most{};
       take_largest_size(most, up[d]);
       take_largest_size(most, down[d]);
       out = most >= band.most[d];
     } else {
-      Octet above{}, below{}, k;
+      Float8 above{}, below{}, k;
       take_largest_size(above, up[d]);
       take_largest_size(below, down[d]);
-      load(k, s.up[d] + octet * kOctet);
+      load(k, s.up[d] + octet * kLanes);
       out = (above >= band.most[d]) & (k > 0.0F);
-      load(k, s.down[d] + octet * kOctet);
+      load(k, s.down[d] + octet * kLanes);
       out |= (below >= band.most[d]) & (k > 0.0F);
     }
     beyond |= out;
@@ -139,23 +139,23 @@ HYBRID_INLINE AxisBounds bounds_of(const RowLimits* limits, std::size_t axis) {
 }
 
 template <bool kUniform>
-HYBRID_INLINE void look_beyond(OctetMask& beyond, const Octet& own, const Octet& x_down, const Octet& x_up,
+HYBRID_INLINE void look_beyond(Mask8& beyond, const Float8& own, const Float8& x_down, const Float8& x_up,
                                const LevelRow& row, const Band& band, std::size_t axis, int octet) {
-  const float* at = row.u[axis] + octet * kOctet;
+  const float* at = row.u[axis] + octet * kLanes;
   for (std::size_t d = 0; d < 3; ++d) {
-    Octet above = x_up, below = x_down;
+    Float8 above = x_up, below = x_down;
     if (d > 0) {
       load(above, at + (d == 1 ? kRow : row.z));
       load(below, at - (d == 1 ? kRow : row.z));
     }
-    Octet up{}, down{};
+    Float8 up{}, down{};
     take_largest_size(up, above - own);
     take_largest_size(down, own - below);
     if (kUniform) {
       take_largest(up, down);
       beyond |= up >= band.most[d];
     } else {
-      Octet k;
+      Float8 k;
       spring_up<false>(k, row.springs, axis, d, octet);
       beyond |= (up >= band.most[d]) & (k > 0.0F);
       spring_down<false>(k, row.springs, axis, d, octet);
@@ -165,14 +165,14 @@ HYBRID_INLINE void look_beyond(OctetMask& beyond, const Octet& own, const Octet&
 }
 
 // The same where each lane has limits of its own.
-HYBRID_INLINE void look_beyond_lanes(OctetMask& beyond, const Octet& own, const Octet& x_down,
-                                     const Octet& x_up, const LevelRow& row, const RowLimits::Written& w,
+HYBRID_INLINE void look_beyond_lanes(Mask8& beyond, const Float8& own, const Float8& x_down,
+                                     const Float8& x_up, const LevelRow& row, const RowLimits::Written& w,
                                      std::size_t axis, int octet) {
   constexpr float kNear = 0.999F;
-  const float* at = row.u[axis] + octet * kOctet;
-  const auto lanes = static_cast<std::size_t>(octet) * kOctet;
+  const float* at = row.u[axis] + octet * kLanes;
+  const auto lanes = static_cast<std::size_t>(octet) * kLanes;
   for (std::size_t d = 0; d < 3; ++d) {
-    Octet above = x_up, below = x_down, low, high;
+    Float8 above = x_up, below = x_down, low, high;
     if (d > 0) {
       load(above, at + (d == 1 ? kRow : row.z));
       load(below, at - (d == 1 ? kRow : row.z));
@@ -195,15 +195,15 @@ enum class Beyond : std::uint8_t { tightest, linked, lanes };
 
 // True when any octet has such a link.
 template <Beyond kBeyond>
-HYBRID_INLINE bool look_at_axes(std::array<OctetMask, 3>& beyond, const Axes& u, const LevelRow& row,
-                                const RowLimits& limits, const std::array<Band, 3>& band, OctetSpan span) {
+HYBRID_INLINE bool look_at_axes(std::array<Mask8, 3>& beyond, const Axes& u, const LevelRow& row,
+                                const RowLimits& limits, const std::array<Band, 3>& band, LaneSpan span) {
   beyond = {};
 #pragma GCC unroll 1
   for (int octet = span.first; octet <= span.last; ++octet) {
     const auto n = static_cast<std::size_t>(octet - span.first);
 #pragma GCC unroll 3
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      Octet x_down, x_up;
+      Float8 x_down, x_up;
       shift_down(x_down, u[axis][n], u[axis][n + 1]);
       shift_up(x_up, u[axis][n + 1], u[axis][n + 2]);
       if constexpr (kBeyond == Beyond::lanes) {
@@ -214,16 +214,16 @@ HYBRID_INLINE bool look_at_axes(std::array<OctetMask, 3>& beyond, const Axes& u,
       }
     }
   }
-  const OctetMask all = beyond[0] | beyond[1] | beyond[2];
+  const Mask8 all = beyond[0] | beyond[1] | beyond[2];
   return any(all);
 }
 
 // Which axes may have links beyond the band, bit by bit, if the row stood at `u`. Most rows have none, and
 // each look costs more than the one before it.
 template <bool kUniform>
-HYBRID_INLINE unsigned beyond_band(const Axes& u, const LevelRow& row, const RowLimits& limits,
-                                   OctetSpan span, float tight) {
-  std::array<OctetMask, 3> beyond{};
+HYBRID_INLINE unsigned beyond_band(const Axes& u, const LevelRow& row, const RowLimits& limits, LaneSpan span,
+                                   float tight) {
+  std::array<Mask8, 3> beyond{};
   const std::array<Band, 3> band{Band((*limits.of)[0], tight), Band((*limits.of)[1], tight),
                                  Band((*limits.of)[2], tight)};
   if (!look_at_axes<Beyond::tightest>(beyond, u, row, limits, band, span)) return 0;

@@ -4,32 +4,32 @@
 
 #include <cstring>
 
-#include "voxel/multigrid/row_stencil.h"
-#include "voxel/multigrid/row_limits.h"
 #include "voxel/lattice/simd_dispatch.h"
+#include "voxel/multigrid/row_limits.h"
+#include "voxel/multigrid/row_stencil.h"
 
 namespace voxel {
 namespace {
 
 // Bit i for lane i.
-HYBRID_INLINE std::uint32_t lanes_set(const OctetMask& mask) {
-  std::array<std::int32_t, kOctet> lanes;
+HYBRID_INLINE std::uint32_t lanes_set(const Mask8& mask) {
+  std::array<std::int32_t, kLanes> lanes;
   std::memcpy(lanes.data(), &mask, sizeof mask);
   std::uint32_t bits = 0;
-  for (std::uint32_t i = 0; i < kOctet; ++i) bits |= (lanes[i] != 0 ? 1U : 0U) << i;
+  for (std::uint32_t i = 0; i < kLanes; ++i) bits |= (lanes[i] != 0 ? 1U : 0U) << i;
   return bits;
 }
 
 // One axis of a row where limits matter; cells, which have none, never come here.
 template <bool kUniform, Limits kLimits>
-HYBRID_INLINE void smooth_axis(const LevelRow& row, const AxisBounds& bounds, std::size_t axis,
-                               OctetSpan span, Octet& most) {
+HYBRID_INLINE void smooth_axis(const LevelRow& row, const AxisBounds& bounds, std::size_t axis, LaneSpan span,
+                               Float8& most) {
   const AxisSprings s(row.springs, axis);
   float* own = row.u[axis];
   Span u;
-  std::array<Octet, kOctets> beside;
-  std::array<OctetMask, kOctets> stays;
-  std::array<Interval, kOctets> allowed;
+  std::array<Float8, kLaneGroups> beside;
+  std::array<Mask8, kLaneGroups> stays;
+  std::array<Interval, kLaneGroups> allowed;
   ends_of(u, own, row.x, span);
   const int count = span.last - span.first + 1;
 #pragma GCC unroll 1
@@ -37,18 +37,18 @@ HYBRID_INLINE void smooth_axis(const LevelRow& row, const AxisBounds& bounds, st
     const int octet = span.first + n;
     const auto un = static_cast<std::size_t>(n);
     Around at;
-    look_around(at, own + octet * kOctet, row.z);
+    look_around(at, own + octet * kLanes, row.z);
     u.at[un + 1] = at.own;
-    Octet kyd, kyu, kzd, kzu, inverse;
+    Float8 kyd, kyu, kzd, kzu, inverse;
     spring<kUniform>(kyd, s.down[1], octet);
     spring<kUniform>(kyu, s.up[1], octet);
     spring<kUniform>(kzd, s.down[2], octet);
     spring<kUniform>(kzu, s.up[2], octet);
     spring<kUniform>(inverse, s.inverse, octet);
-    Octet sum = kyd * at.y_down + kyu * at.y_up + kzd * at.z_down + kzu * at.z_up;
+    Float8 sum = kyd * at.y_down + kyu * at.y_up + kzd * at.z_down + kzu * at.z_up;
     if (row.load[axis] != nullptr) {
-      Octet force;
-      load(force, row.load[axis] + octet * kOctet);
+      Float8 force;
+      load(force, row.load[axis] + octet * kLanes);
       sum += force;
     }
     beside[un] = sum;
@@ -62,25 +62,25 @@ HYBRID_INLINE void smooth_axis(const LevelRow& row, const AxisBounds& bounds, st
     for (int n = 0; n < count; ++n) {
       const int octet = span.first + n;
       const auto un = static_cast<std::size_t>(n);
-      const Octet now = u.at[un + 1];
-      Octet x_down, x_up, kxd, kxu, inverse;
+      const Float8 now = u.at[un + 1];
+      Float8 x_down, x_up, kxd, kxu, inverse;
       shift_down(x_down, u.at[un], now);
       shift_up(x_up, now, u.at[un + 2]);
       spring<kUniform>(kxd, s.down[0], octet);
       spring<kUniform>(kxu, s.up[0], octet);
       spring<kUniform>(inverse, s.inverse, octet);
-      Octet wanted = (kxd * x_down + kxu * x_up + beside[un]) * inverse;
+      Float8 wanted = (kxd * x_down + kxu * x_up + beside[un]) * inverse;
       Interval in = allowed[un];
       narrow<kUniform, kLimits>(in, x_up, x_down, s, bounds, 0, octet);
       bring_into(wanted, in, now);
-      const OctetMask taken = (colour == 0 ? kEven : ~kEven) & ~stays[un];
+      const Mask8 taken = (colour == 0 ? kEven : ~kEven) & ~stays[un];
       select(u.at[un + 1], taken, wanted, now);
     }
   }
 #pragma GCC unroll 1
   for (int n = 0; n < count; ++n) {
-    float* to = own + (span.first + n) * kOctet;
-    Octet before;
+    float* to = own + (span.first + n) * kLanes;
+    Float8 before;
     load(before, to);
     take_largest_size(most, u.at[static_cast<std::size_t>(n) + 1] - before);
     store(to, u.at[static_cast<std::size_t>(n) + 1]);
@@ -89,19 +89,19 @@ HYBRID_INLINE void smooth_axis(const LevelRow& row, const AxisBounds& bounds, st
 
 // Smooths the axes on which no limit comes near; returns the others, bit by bit, left as they were.
 template <bool kUniform, bool kLook>
-HYBRID_INLINE unsigned smooth_freely(const LevelRow& row, const RowLimits* limits, OctetSpan span,
-                                     Octet& most) {
-  const RowCouplings& s = row.springs;
+HYBRID_INLINE unsigned smooth_freely(const LevelRow& row, const RowLimits* limits, LaneSpan span,
+                                     Float8& most) {
+  const RowStiffness& s = row.springs;
   Axes u, beside;
-  std::array<std::array<OctetMask, kOctets>, 3> stays;
+  std::array<std::array<Mask8, kLaneGroups>, 3> stays;
   load_axes(u, row, span);
 #pragma GCC unroll 1
   for (int octet = span.first; octet <= span.last; ++octet) {
     const auto n = static_cast<std::size_t>(octet - span.first);
 #pragma GCC unroll 3
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const float* own = row.u[axis] + octet * kOctet;
-      Octet k, value, sum;
+      const float* own = row.u[axis] + octet * kLanes;
+      Float8 k, value, sum;
       spring_down<kUniform>(k, s, axis, 1, octet);
       load(value, own - kRow);
       sum = k * value;
@@ -115,7 +115,7 @@ HYBRID_INLINE unsigned smooth_freely(const LevelRow& row, const RowLimits* limit
       load(value, own + row.z);
       sum += k * value;
       if (row.load[axis] != nullptr) {
-        load(value, row.load[axis] + octet * kOctet);
+        load(value, row.load[axis] + octet * kLanes);
         sum += value;
       }
       beside[axis][n] = sum;
@@ -125,24 +125,24 @@ HYBRID_INLINE unsigned smooth_freely(const LevelRow& row, const RowLimits* limit
   }
 #pragma GCC unroll 1
   for (int colour = 0; colour < 2; ++colour) {
-    const OctetMask own_colour = colour == 0 ? kEven : ~kEven;
+    const Mask8 own_colour = colour == 0 ? kEven : ~kEven;
 #pragma GCC unroll 1
     for (int octet = span.first; octet <= span.last; ++octet) {
       const auto n = static_cast<std::size_t>(octet - span.first);
 #pragma GCC unroll 3
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        const Octet now = u[axis][n + 1];
-        Octet x_down, x_up, kxd, kxu, inverse;
+        const Float8 now = u[axis][n + 1];
+        Float8 x_down, x_up, kxd, kxu, inverse;
         shift_down(x_down, u[axis][n], now);
         shift_up(x_up, now, u[axis][n + 2]);
         spring_down<kUniform>(kxd, s, axis, 0, octet);
         spring_up<kUniform>(kxu, s, axis, 0, octet);
         inverse_of<kUniform>(inverse, s, axis, octet);
-        Octet wanted = (kxd * x_down + kxu * x_up + beside[axis][n]) * inverse;
+        Float8 wanted = (kxd * x_down + kxu * x_up + beside[axis][n]) * inverse;
         if (row.hold[axis] != nullptr) {
-          Octet told, hold;
-          load(told, row.held_at[axis] + octet * kOctet);
-          load(hold, row.hold[axis] + octet * kOctet);
+          Float8 told, hold;
+          load(told, row.held_at[axis] + octet * kLanes);
+          load(hold, row.hold[axis] + octet * kLanes);
           hold *= row.hold_times;
           wanted += (told - wanted) * (hold / (1.0F + hold));
         }
@@ -158,8 +158,8 @@ HYBRID_INLINE unsigned smooth_freely(const LevelRow& row, const RowLimits* limit
 #pragma GCC unroll 3
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if (kLook && (beyond >> axis & 1U) != 0) continue;
-      float* to = row.u[axis] + octet * kOctet;
-      Octet before;
+      float* to = row.u[axis] + octet * kLanes;
+      Float8 before;
       load(before, to);
       take_largest_size(most, u[axis][n + 1] - before);
       store(to, u[axis][n + 1]);
@@ -170,8 +170,8 @@ HYBRID_INLINE unsigned smooth_freely(const LevelRow& row, const RowLimits* limit
 
 // First as if there were no limits, and again with them where they matter.
 template <bool kUniform, Limits kLimits>
-HYBRID_INLINE float smooth_axes(const LevelRow& row, const RowLimits* limits, OctetSpan span) {
-  Octet most{};
+HYBRID_INLINE float smooth_axes(const LevelRow& row, const RowLimits* limits, LaneSpan span) {
+  Float8 most{};
   const unsigned beyond = smooth_freely<kUniform, clamps(kLimits)>(row, limits, span, most);
   if constexpr (clamps(kLimits)) {
 #pragma GCC unroll 1
@@ -186,8 +186,8 @@ HYBRID_INLINE float smooth_axes(const LevelRow& row, const RowLimits* limits, Oc
 
 template <bool kUniform, Limits kLimits>
 HYBRID_INLINE void residual_axis(RowResidual& result, const LevelRow& row, const AxisBounds& bounds,
-                                 std::size_t axis, float tight, OctetSpan span, float* out, Octet& most_N,
-                                 Octet& most_m) {
+                                 std::size_t axis, float tight, LaneSpan span, float* out, Float8& most_N,
+                                 Float8& most_m) {
   const AxisSprings s(row.springs, axis);
   const float* own = row.u[axis];
   Span u;
@@ -196,14 +196,14 @@ HYBRID_INLINE void residual_axis(RowResidual& result, const LevelRow& row, const
   const int count = span.last - span.first + 1;
 #pragma GCC unroll 1
   for (int n = 0; n < count; ++n)
-    load(u.at[static_cast<std::size_t>(n) + 1], own + (span.first + n) * kOctet);
+    load(u.at[static_cast<std::size_t>(n) + 1], own + (span.first + n) * kLanes);
 #pragma GCC unroll 1
   for (int n = 0; n < count; ++n) {
     const int octet = span.first + n;
     const auto un = static_cast<std::size_t>(n);
     Around at;
-    look_around(at, own + octet * kOctet, row.z);
-    Octet x_down, x_up, kxd, kxu, kyd, kyu, kzd, kzu, inverse;
+    look_around(at, own + octet * kLanes, row.z);
+    Float8 x_down, x_up, kxd, kxu, kyd, kyu, kzd, kzu, inverse;
     shift_down(x_down, u.at[un], at.own);
     shift_up(x_up, at.own, u.at[un + 2]);
     spring<kUniform>(kxd, s.down[0], octet);
@@ -213,38 +213,38 @@ HYBRID_INLINE void residual_axis(RowResidual& result, const LevelRow& row, const
     spring<kUniform>(kzd, s.down[2], octet);
     spring<kUniform>(kzu, s.up[2], octet);
     spring<kUniform>(inverse, s.inverse, octet);
-    Octet r = kxd * (x_down - at.own) + kxu * (x_up - at.own) + kyd * (at.y_down - at.own) +
-              kyu * (at.y_up - at.own) + kzd * (at.z_down - at.own) + kzu * (at.z_up - at.own);
+    Float8 r = kxd * (x_down - at.own) + kxu * (x_up - at.own) + kyd * (at.y_down - at.own) +
+               kyu * (at.y_up - at.own) + kzd * (at.z_down - at.own) + kzu * (at.z_up - at.own);
     if (row.load[axis] != nullptr) {
-      Octet force;
-      load(force, row.load[axis] + octet * kOctet);
+      Float8 force;
+      load(force, row.load[axis] + octet * kLanes);
       r += force;
     }
     if (row.hold[axis] != nullptr) {
-      Octet hold, told;
-      load(hold, row.hold[axis] + octet * kOctet);
-      load(told, row.held_at[axis] + octet * kOctet);
-      const Octet safe = inverse == 0.0F ? Octet{} + 1.0F : inverse;
+      Float8 hold, told;
+      load(hold, row.hold[axis] + octet * kLanes);
+      load(told, row.held_at[axis] + octet * kLanes);
+      const Float8 safe = inverse == 0.0F ? Float8{} + 1.0F : inverse;
       r += row.hold_times * hold / safe * (told - at.own);
     }
-    OctetMask stays;
+    Mask8 stays;
     staying(stays, row, inverse, axis, octet);
-    r = stays ? Octet{} : r;
+    r = stays ? Float8{} : r;
     if constexpr (clamps(kLimits)) {
-      OctetMask beyond{};
+      Mask8 beyond{};
       note_beyond<kUniform>(beyond, at.own, x_down, x_up, at, s, band, octet);
       if (any(beyond)) {
         Interval in;
         everywhere(in);
         narrow_beside<kUniform, kLimits>(in, at, s, bounds, octet);
         narrow<kUniform, kLimits>(in, x_up, x_down, s, bounds, 0, octet);
-        const OctetMask resisted =
+        const Mask8 resisted =
             ((r > 0.0F) & (at.own >= in.high - tight)) | ((r < 0.0F) & (at.own <= in.low + tight));
-        r = resisted ? Octet{} : r;
-        result.resisted[axis] |= lanes_set(resisted) << (octet * kOctet);
+        r = resisted ? Float8{} : r;
+        result.resisted[axis] |= lanes_set(resisted) << (octet * kLanes);
       }
     }
-    store(out + octet * kOctet, r);
+    store(out + octet * kLanes, r);
     take_largest_size(most_N, r);
     take_largest_size(most_m, r * inverse);
   }
@@ -252,8 +252,8 @@ HYBRID_INLINE void residual_axis(RowResidual& result, const LevelRow& row, const
 
 template <bool kUniform, Limits kLimits>
 HYBRID_INLINE void residual_axes(RowResidual& result, const LevelRow& row, const RowLimits* limits,
-                                 float tight, OctetSpan span, RowVector& out) {
-  Octet most_N{}, most_m{};
+                                 float tight, LaneSpan span, RowVector& out) {
+  Float8 most_N{}, most_m{};
 #pragma GCC unroll 1
   for (std::size_t axis = 0; axis < 3; ++axis) {
     residual_axis<kUniform, kLimits>(result, row, bounds_of(limits, axis), axis, tight, span,
@@ -265,33 +265,33 @@ HYBRID_INLINE void residual_axes(RowResidual& result, const LevelRow& row, const
 
 template <bool kUniform, Limits kLimits>
 HYBRID_INLINE void correct_axis(const LevelRow& row, const AxisBounds& bounds, std::size_t axis,
-                                OctetSpan span, const float* correction, float* refused, Octet& most) {
+                                LaneSpan span, const float* correction, float* refused, Float8& most) {
   const AxisSprings s(row.springs, axis);
   float* own = row.u[axis];
   const int count = span.last - span.first + 1;
   Span u;
-  std::array<Octet, kOctets> target;
-  std::array<OctetMask, kOctets> stays;
+  std::array<Float8, kLaneGroups> target;
+  std::array<Mask8, kLaneGroups> stays;
   ends_of(u, own, row.x, span);
 #pragma GCC unroll 1
   for (int n = 0; n < count; ++n) {
     const int octet = span.first + n;
     const auto un = static_cast<std::size_t>(n);
-    Octet now, way, inverse;
-    load(now, own + octet * kOctet);
-    load(way, correction + octet * kOctet);
+    Float8 now, way, inverse;
+    load(now, own + octet * kLanes);
+    load(way, correction + octet * kLanes);
     spring<kUniform>(inverse, s.inverse, octet);
     staying(stays[un], row, inverse, axis, octet);
     take_largest_size(most, way);
     target[un] = stays[un] ? now : now + way;
     u.at[un + 1] = now;
   }
-  std::array<Interval, kOctets> allowed;
+  std::array<Interval, kLaneGroups> allowed;
 #pragma GCC unroll 1
   for (int n = 0; n < count; ++n) {
     const int octet = span.first + n;
     Around at;
-    look_around(at, own + octet * kOctet, row.z);
+    look_around(at, own + octet * kLanes, row.z);
     everywhere(allowed[static_cast<std::size_t>(n)]);
     narrow_beside<kUniform, kLimits>(allowed[static_cast<std::size_t>(n)], at, s, bounds, octet);
   }
@@ -302,14 +302,14 @@ HYBRID_INLINE void correct_axis(const LevelRow& row, const AxisBounds& bounds, s
     for (int n = 0; n < count; ++n) {
       const int octet = span.first + n;
       const auto un = static_cast<std::size_t>(n);
-      const Octet now = u.at[un + 1];
-      Octet x_down, x_up, wanted = target[un];
+      const Float8 now = u.at[un + 1];
+      Float8 x_down, x_up, wanted = target[un];
       shift_down(x_down, u.at[un], now);
       shift_up(x_up, now, u.at[un + 2]);
       Interval in = allowed[un];
       narrow<kUniform, kLimits>(in, x_up, x_down, s, bounds, 0, octet);
       bring_into(wanted, in, now);
-      const OctetMask taken = (colour == 0 ? kEven : ~kEven) & ~stays[un];
+      const Mask8 taken = (colour == 0 ? kEven : ~kEven) & ~stays[un];
       select(u.at[un + 1], taken, wanted, now);
     }
   }
@@ -317,37 +317,37 @@ HYBRID_INLINE void correct_axis(const LevelRow& row, const AxisBounds& bounds, s
   for (int n = 0; n < count; ++n) {
     const int octet = span.first + n;
     const auto un = static_cast<std::size_t>(n);
-    Octet now, way, inverse;
-    load(now, own + octet * kOctet);
-    load(way, correction + octet * kOctet);
+    Float8 now, way, inverse;
+    load(now, own + octet * kLanes);
+    load(way, correction + octet * kLanes);
     spring<kUniform>(inverse, s.inverse, octet);
-    OctetMask fixed;
+    Mask8 fixed;
     standing(fixed, row, inverse, octet);
-    const Octet left = now + way - u.at[un + 1];
-    store(refused + octet * kOctet, fixed ? Octet{} : left);
-    store(own + octet * kOctet, u.at[un + 1]);
+    const Float8 left = now + way - u.at[un + 1];
+    store(refused + octet * kLanes, fixed ? Float8{} : left);
+    store(own + octet * kLanes, u.at[un + 1]);
   }
 }
 
 // What stopped voxels do not take of a correction. Returns the axes on which there is any.
 template <bool kUniform>
-HYBRID_INLINE unsigned note_stopped(const LevelRow& row, OctetSpan span, const RowVector& correction,
+HYBRID_INLINE unsigned note_stopped(const LevelRow& row, LaneSpan span, const RowVector& correction,
                                     RowVector& refused) {
   unsigned refusing = 0;
 #pragma GCC unroll 1
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    OctetMask some{};
+    Mask8 some{};
 #pragma GCC unroll 1
     for (int octet = span.first; octet <= span.last; ++octet) {
-      Octet way, inverse;
-      OctetMask fixed, stopped;
-      load(way, correction[axis].data() + octet * kOctet);
+      Float8 way, inverse;
+      Mask8 fixed, stopped;
+      load(way, correction[axis].data() + octet * kLanes);
       inverse_of<kUniform>(inverse, row.springs, axis, octet);
       standing(fixed, row, inverse, octet);
-      bits_set(stopped, row.stopped + octet * kOctet, 1 << axis);
-      way = (stopped & ~fixed) ? way : Octet{};
+      bits_set(stopped, row.stopped + octet * kLanes, 1 << axis);
+      way = (stopped & ~fixed) ? way : Float8{};
       some |= way != 0.0F;
-      store(refused[axis].data() + octet * kOctet, way);
+      store(refused[axis].data() + octet * kLanes, way);
     }
     if (any(some)) refusing |= 1U << axis;
   }
@@ -357,9 +357,9 @@ HYBRID_INLINE unsigned note_stopped(const LevelRow& row, OctetSpan span, const R
 // Adds corrections on the axes on which no limit comes near; returns the others, bit by bit, left as they
 // were.
 template <bool kUniform, bool kLook>
-HYBRID_INLINE unsigned correct_freely(const LevelRow& row, const RowLimits* limits, OctetSpan span,
+HYBRID_INLINE unsigned correct_freely(const LevelRow& row, const RowLimits* limits, LaneSpan span,
                                       const RowVector& correction, RowVector& refused, unsigned& refusing,
-                                      Octet& most) {
+                                      Float8& most) {
   Axes u;
   if (row.stopped != nullptr) refusing = note_stopped<kUniform>(row, span, correction, refused);
   if (kLook) {
@@ -370,14 +370,14 @@ HYBRID_INLINE unsigned correct_freely(const LevelRow& row, const RowLimits* limi
     const auto n = static_cast<std::size_t>(octet - span.first);
 #pragma GCC unroll 3
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      Octet now, way;
-      OctetMask stays;
-      load(now, row.u[axis] + octet * kOctet);
-      load(way, correction[axis].data() + octet * kOctet);
+      Float8 now, way;
+      Mask8 stays;
+      load(now, row.u[axis] + octet * kLanes);
+      load(way, correction[axis].data() + octet * kLanes);
       standing_by_bits(stays, row, axis, octet);
       if (row.stopped != nullptr) {
-        OctetMask stopped;
-        bits_set(stopped, row.stopped + octet * kOctet, 1 << axis);
+        Mask8 stopped;
+        bits_set(stopped, row.stopped + octet * kLanes, 1 << axis);
         stays |= stopped;
       }
       take_largest_size(most, way);
@@ -391,16 +391,16 @@ HYBRID_INLINE unsigned correct_freely(const LevelRow& row, const RowLimits* limi
     const auto n = static_cast<std::size_t>(octet - span.first);
 #pragma GCC unroll 3
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (!kLook || (beyond >> axis & 1U) == 0) store(row.u[axis] + octet * kOctet, u[axis][n + 1]);
+      if (!kLook || (beyond >> axis & 1U) == 0) store(row.u[axis] + octet * kLanes, u[axis][n + 1]);
     }
   }
   return beyond;
 }
 
 template <bool kUniform, Limits kLimits>
-HYBRID_INLINE RowCorrection correct_axes(const LevelRow& row, const RowLimits* limits, OctetSpan span,
+HYBRID_INLINE RowCorrection correct_axes(const LevelRow& row, const RowLimits* limits, LaneSpan span,
                                          const RowVector& correction, RowVector& refused) {
-  Octet most{};
+  Float8 most{};
   unsigned refusing = 0;
   const unsigned beyond =
       correct_freely<kUniform, clamps(kLimits)>(row, limits, span, correction, refused, refusing, most);
@@ -416,9 +416,9 @@ HYBRID_INLINE RowCorrection correct_axes(const LevelRow& row, const RowLimits* l
 }
 
 // Bit i of any lane.
-HYBRID_INLINE std::uint32_t all_bits(const OctetMask& bits) {
-  const OctetMask half = bits | __builtin_shufflevector(bits, bits, 4, 5, 6, 7, 0, 1, 2, 3);
-  const OctetMask pair = half | __builtin_shufflevector(half, half, 2, 3, 0, 1, 2, 3, 0, 1);
+HYBRID_INLINE std::uint32_t all_bits(const Mask8& bits) {
+  const Mask8 half = bits | __builtin_shufflevector(bits, bits, 4, 5, 6, 7, 0, 1, 2, 3);
+  const Mask8 pair = half | __builtin_shufflevector(half, half, 2, 3, 0, 1, 2, 3, 0, 1);
   return static_cast<std::uint32_t>(pair[0] | pair[1]);
 }
 
@@ -430,27 +430,27 @@ HYBRID_INLINE void look_at_limits(const LevelRow& row, const AxisBounds& bounds,
   Span u;
   ends_of(u, own, row.x, {});
 #pragma GCC unroll 1
-  for (int octet = 0; octet < kOctets; ++octet)
-    load(u.at[static_cast<std::size_t>(octet) + 1], own + octet * kOctet);
+  for (int octet = 0; octet < kLaneGroups; ++octet)
+    load(u.at[static_cast<std::size_t>(octet) + 1], own + octet * kLanes);
   // Each lane sets its own bit: gathered lane by lane in every octet, they took longer than all else.
-  OctetMask bit{1, 2, 4, 8, 16, 32, 64, 128};
-  std::array<OctetMask, 3> at_low{}, at_high{}, down_at_low{}, down_at_high{};
-  OctetMask pulled_up{}, pulled_down{}, movable{};
+  Mask8 bit{1, 2, 4, 8, 16, 32, 64, 128};
+  std::array<Mask8, 3> at_low{}, at_high{}, down_at_low{}, down_at_high{};
+  Mask8 pulled_up{}, pulled_down{}, movable{};
 #pragma GCC unroll 1
-  for (int octet = 0; octet < kOctets; ++octet, bit <<= kOctet) {
+  for (int octet = 0; octet < kLaneGroups; ++octet, bit <<= kLanes) {
     const auto n = static_cast<std::size_t>(octet);
-    const int lane = octet * kOctet;
+    const int lane = octet * kLanes;
     Around at;
     look_around(at, own + lane, row.z);
-    Octet x_down, x_up, k, inverse;
+    Float8 x_down, x_up, k, inverse;
     shift_down(x_down, u.at[n], at.own);
     shift_up(x_up, at.own, u.at[n + 2]);
-    const std::array<Octet, 3> up{x_up - at.own, at.y_up - at.own, at.z_up - at.own},
+    const std::array<Float8, 3> up{x_up - at.own, at.y_up - at.own, at.z_up - at.own},
         down{at.own - x_down, at.own - at.y_down, at.own - at.z_down};
-    Octet pull{};
+    Float8 pull{};
 #pragma GCC unroll 3
     for (std::size_t d = 0; d < 3; ++d) {
-      Octet low = Octet{} + bounds.row.low[d], high = Octet{} + bounds.row.high[d];
+      Float8 low = Float8{} + bounds.row.low[d], high = Float8{} + bounds.row.high[d];
       if constexpr (kLimits == Limits::lanes) {
         load(low, bounds.down_low[d] + lane);
         low *= bounds.sign[d];
@@ -493,8 +493,9 @@ HYBRID_INLINE void look_at_limits(const LevelRow& row, const AxisBounds& bounds,
 
 }  // namespace
 
-HYBRID_WIDE_AND_MANY void links_at_limits(const LevelRow& row, const RowLimits& limits, std::size_t axis,
-                                          const std::array<float, 3>& tight_m, LinksAtLimits& out) noexcept {
+HYBRID_MULTIVERSIONED_512 void links_at_limits(const LevelRow& row, const RowLimits& limits, std::size_t axis,
+                                               const std::array<float, 3>& tight_m,
+                                               LinksAtLimits& out) noexcept {
   const AxisBounds bounds(limits, axis);
   if (limits.lanes != nullptr) {
     look_at_limits<false, Limits::lanes>(row, bounds, axis, tight_m, out);
@@ -504,7 +505,8 @@ HYBRID_WIDE_AND_MANY void links_at_limits(const LevelRow& row, const RowLimits& 
   }
 }
 
-HYBRID_WIDE_AND_MANY float smooth_row(const LevelRow& row, const RowLimits* limits, OctetSpan span) noexcept {
+HYBRID_MULTIVERSIONED_512 float smooth_row(const LevelRow& row, const RowLimits* limits,
+                                           LaneSpan span) noexcept {
   const bool uniform = row.springs.uniform;
   if (limits == nullptr)
     return uniform ? smooth_axes<true, Limits::none>(row, limits, span)
@@ -514,8 +516,8 @@ HYBRID_WIDE_AND_MANY float smooth_row(const LevelRow& row, const RowLimits* limi
                  : smooth_axes<false, Limits::row>(row, limits, span);
 }
 
-HYBRID_WIDE_AND_MANY RowResidual residual_row(const LevelRow& row, const RowLimits* limits, float tight_m,
-                                              OctetSpan span, RowVector& out) noexcept {
+HYBRID_MULTIVERSIONED_512 RowResidual residual_row(const LevelRow& row, const RowLimits* limits,
+                                                   float tight_m, LaneSpan span, RowVector& out) noexcept {
   RowResidual result;
   const bool uniform = row.springs.uniform;
   if (limits == nullptr) {
@@ -530,16 +532,16 @@ HYBRID_WIDE_AND_MANY RowResidual residual_row(const LevelRow& row, const RowLimi
   return result;
 }
 
-HYBRID_WIDE_AND_MANY void measure_row(const RowCouplings& springs, const RowVector& residual, OctetSpan span,
-                                      RowResidual& out) noexcept {
-  Octet most_N{}, most_m{};
+HYBRID_MULTIVERSIONED_512 void measure_row(const RowStiffness& springs, const RowVector& residual,
+                                           LaneSpan span, RowResidual& out) noexcept {
+  Float8 most_N{}, most_m{};
 #pragma GCC unroll 1
   for (std::size_t axis = 0; axis < 3; ++axis) {
 #pragma GCC unroll 1
     for (int octet = span.first; octet <= span.last; ++octet) {
-      Octet r, inverse;
-      load(r, residual[axis].data() + octet * kOctet);
-      load(inverse, springs.inverse + axis * kRow + octet * kOctet);
+      Float8 r, inverse;
+      load(r, residual[axis].data() + octet * kLanes);
+      load(inverse, springs.inverse + axis * kRow + octet * kLanes);
       take_largest_size(most_N, r);
       take_largest_size(most_m, r * inverse);
     }
@@ -548,8 +550,9 @@ HYBRID_WIDE_AND_MANY void measure_row(const RowCouplings& springs, const RowVect
   out.most_way_m = largest(most_m);
 }
 
-HYBRID_WIDE_AND_MANY RowCorrection correct_row(const LevelRow& row, const RowLimits* limits, OctetSpan span,
-                                               const RowVector& correction, RowVector& refused) noexcept {
+HYBRID_MULTIVERSIONED_512 RowCorrection correct_row(const LevelRow& row, const RowLimits* limits,
+                                                    LaneSpan span, const RowVector& correction,
+                                                    RowVector& refused) noexcept {
   if (limits == nullptr) return correct_axes<false, Limits::none>(row, limits, span, correction, refused);
   if (limits->lanes != nullptr)
     return correct_axes<false, Limits::lanes>(row, limits, span, correction, refused);

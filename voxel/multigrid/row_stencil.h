@@ -17,7 +17,7 @@ struct AxisSprings {
   std::array<const float*, 3> up, down;
   const float* inverse;
 
-  AxisSprings(const RowCouplings& s, std::size_t axis) : inverse(s.inverse + axis * kRow) {
+  AxisSprings(const RowStiffness& s, std::size_t axis) : inverse(s.inverse + axis * kRow) {
     for (std::size_t d = 0; d < 3; ++d) {
       up[d] = (d == axis ? s.up_along : s.up_across) + d * kRow;
       down[d] = (d == axis ? s.down_along : s.down_across)[d];
@@ -25,26 +25,26 @@ struct AxisSprings {
   }
 };
 template <bool kUniform>
-HYBRID_INLINE void spring(Octet& k, const float* lanes, int octet) {
-  load(k, kUniform ? lanes : lanes + octet * kOctet);
+HYBRID_INLINE void spring(Float8& k, const float* lanes, int octet) {
+  load(k, kUniform ? lanes : lanes + octet * kLanes);
 }
 
-inline constexpr OctetMask kEven{-1, 0, -1, 0, -1, 0, -1, 0};
+inline constexpr Mask8 kEven{-1, 0, -1, 0, -1, 0, -1, 0};
 
 // The octets of a span with one more at both ends; of those, only the lane that touches the span is true.
 struct Span {
-  std::array<Octet, kOctets + 2> at;
+  std::array<Float8, kLaneGroups + 2> at;
 };
-HYBRID_INLINE void ends_of(Span& s, const float* own, std::ptrdiff_t x, OctetSpan span) {
-  const float before = span.first > 0 ? own[span.first * kOctet - 1] : own[kRow - 1 - x];
-  const float after = span.last < kOctets - 1 ? own[(span.last + 1) * kOctet] : own[x];
-  s.at[0] = Octet{} + before;
-  s.at[static_cast<std::size_t>(span.last - span.first) + 2] = Octet{} + after;
+HYBRID_INLINE void ends_of(Span& s, const float* own, std::ptrdiff_t x, LaneSpan span) {
+  const float before = span.first > 0 ? own[span.first * kLanes - 1] : own[kRow - 1 - x];
+  const float after = span.last < kLaneGroups - 1 ? own[(span.last + 1) * kLanes] : own[x];
+  s.at[0] = Float8{} + before;
+  s.at[static_cast<std::size_t>(span.last - span.first) + 2] = Float8{} + after;
 }
 
 // An octet of a row, and what stands around it.
 struct Around {
-  Octet own, y_down, y_up, z_down, z_up;
+  Float8 own, y_down, y_up, z_down, z_up;
 };
 HYBRID_INLINE void look_around(Around& at, const float* own, std::ptrdiff_t z) {
   load(at.own, own);
@@ -53,72 +53,72 @@ HYBRID_INLINE void look_around(Around& at, const float* own, std::ptrdiff_t z) {
   load(at.z_down, own - z);
   load(at.z_up, own + z);
 }
-HYBRID_INLINE bool any(const OctetMask& mask) {
+HYBRID_INLINE bool any(const Mask8& mask) {
   std::array<std::uint64_t, 4> words;
   std::memcpy(words.data(), &mask, sizeof words);
   return (words[0] | words[1] | words[2] | words[3]) != 0;
 }
 
 // Lanes that are anchored, or held.
-HYBRID_INLINE void standing(OctetMask& stands, const LevelRow& row, const Octet& inverse, int octet) {
+HYBRID_INLINE void standing(Mask8& stands, const LevelRow& row, const Float8& inverse, int octet) {
   stands = inverse == 0.0F;
   if (row.held != nullptr) {
-    OctetMask bits;
-    bits_set(bits, row.held + octet * kOctet, 1);
+    Mask8 bits;
+    bits_set(bits, row.held + octet * kLanes, 1);
     stands |= bits;
   }
 }
 // The same of an axis, read from bits.
-HYBRID_INLINE void standing_by_bits(OctetMask& stands, const LevelRow& row, std::size_t axis, int octet) {
-  bits_set(stands, row.springs.stands + octet * kOctet, 1 << axis);
+HYBRID_INLINE void standing_by_bits(Mask8& stands, const LevelRow& row, std::size_t axis, int octet) {
+  bits_set(stands, row.springs.stands + octet * kLanes, 1 << axis);
   if (row.held != nullptr) {
-    OctetMask bits;
-    bits_set(bits, row.held + octet * kOctet, 1);
+    Mask8 bits;
+    bits_set(bits, row.held + octet * kLanes, 1);
     stands |= bits;
   }
 }
 // Lanes of an axis that do not move.
-HYBRID_INLINE void staying(OctetMask& stays, const LevelRow& row, const Octet& inverse, std::size_t axis,
+HYBRID_INLINE void staying(Mask8& stays, const LevelRow& row, const Float8& inverse, std::size_t axis,
                            int octet) {
   standing(stays, row, inverse, octet);
   if (row.stopped != nullptr) {
-    OctetMask bits;
-    bits_set(bits, row.stopped + octet * kOctet, 1 << axis);
+    Mask8 bits;
+    bits_set(bits, row.stopped + octet * kLanes, 1 << axis);
     stays |= bits;
   }
 }
 
 // One spring of an octet; `axis` and `d` are known when this is compiled.
 template <bool kUniform>
-HYBRID_INLINE void spring_up(Octet& k, const RowCouplings& s, std::size_t axis, std::size_t d, int octet) {
-  load(k, (d == axis ? s.up_along : s.up_across) + d * kRow + (kUniform ? 0 : octet * kOctet));
+HYBRID_INLINE void spring_up(Float8& k, const RowStiffness& s, std::size_t axis, std::size_t d, int octet) {
+  load(k, (d == axis ? s.up_along : s.up_across) + d * kRow + (kUniform ? 0 : octet * kLanes));
 }
 template <bool kUniform>
-HYBRID_INLINE void spring_down(Octet& k, const RowCouplings& s, std::size_t axis, std::size_t d, int octet) {
-  load(k, (d == axis ? s.down_along : s.down_across)[d] + (kUniform ? 0 : octet * kOctet));
+HYBRID_INLINE void spring_down(Float8& k, const RowStiffness& s, std::size_t axis, std::size_t d, int octet) {
+  load(k, (d == axis ? s.down_along : s.down_across)[d] + (kUniform ? 0 : octet * kLanes));
 }
 template <bool kUniform>
-HYBRID_INLINE void inverse_of(Octet& inverse, const RowCouplings& s, std::size_t axis, int octet) {
-  load(inverse, s.inverse + axis * kRow + (kUniform ? 0 : octet * kOctet));
+HYBRID_INLINE void inverse_of(Float8& inverse, const RowStiffness& s, std::size_t axis, int octet) {
+  load(inverse, s.inverse + axis * kRow + (kUniform ? 0 : octet * kLanes));
 }
 // The axes side by side: each alone is a chain of operations that wait for one another.
-using Axes = std::array<std::array<Octet, kOctets + 2>, 3>;
+using Axes = std::array<std::array<Float8, kLaneGroups + 2>, 3>;
 
-HYBRID_INLINE void load_axes(Axes& u, const LevelRow& row, OctetSpan span) {
+HYBRID_INLINE void load_axes(Axes& u, const LevelRow& row, LaneSpan span) {
   const int count = span.last - span.first + 1;
 #pragma GCC unroll 3
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const float* own = row.u[axis];
-    const float before = span.first > 0 ? own[span.first * kOctet - 1] : own[kRow - 1 - row.x];
-    const float after = span.last < kOctets - 1 ? own[(span.last + 1) * kOctet] : own[row.x];
-    u[axis][0] = Octet{} + before;
-    u[axis][static_cast<std::size_t>(count) + 1] = Octet{} + after;
+    const float before = span.first > 0 ? own[span.first * kLanes - 1] : own[kRow - 1 - row.x];
+    const float after = span.last < kLaneGroups - 1 ? own[(span.last + 1) * kLanes] : own[row.x];
+    u[axis][0] = Float8{} + before;
+    u[axis][static_cast<std::size_t>(count) + 1] = Float8{} + after;
   }
 #pragma GCC unroll 1
   for (int n = 0; n < count; ++n) {
 #pragma GCC unroll 3
     for (std::size_t axis = 0; axis < 3; ++axis)
-      load(u[axis][static_cast<std::size_t>(n) + 1], row.u[axis] + (span.first + n) * kOctet);
+      load(u[axis][static_cast<std::size_t>(n) + 1], row.u[axis] + (span.first + n) * kLanes);
   }
 }
 

@@ -12,7 +12,8 @@ namespace {
 
 // Where a voxel goes with `way`, which is along the tool. Cut short on one axis, it would leave the surface,
 // or enter it: it stays then.
-bool allowed(Couplings& couplings, const Displacement& state, VoxelId v, const glm::dvec3& way) noexcept {
+bool allowed(LevelStiffness& couplings, const Displacement& state, VoxelId v,
+             const glm::dvec3& way) noexcept {
   const glm::dvec3 wanted = state.at(v) + way;
   for (int axis = 0; axis < 3; ++axis) {
     const auto interval = link_interval(couplings.lattice(), state, v, axis);
@@ -35,7 +36,7 @@ float size_of(const glm::dvec3& way) {
 struct Slide {
   glm::dvec3 force_N, way_m;
 };
-Slide slide_of(Couplings& couplings, const Displacement& state, VoxelId v, const glm::dvec3& load_N) {
+Slide slide_of(LevelStiffness& couplings, const Displacement& state, VoxelId v, const glm::dvec3& load_N) {
   const glm::dvec3 n(state.tool_normal[couplings.lattice().surface_number(v)]);
   const glm::dvec3 w = link_compliance(couplings, v), force = link_force(couplings, state, v) + load_N;
   const glm::dvec3 wn = w * n;
@@ -45,21 +46,21 @@ Slide slide_of(Couplings& couplings, const Displacement& state, VoxelId v, const
 
 }  // namespace
 
-std::optional<glm::dvec3> sliding_force(Couplings& couplings, const Displacement& state, VoxelId v,
+std::optional<glm::dvec3> sliding_force(LevelStiffness& couplings, const Displacement& state, VoxelId v,
                                         const glm::dvec3& load_N) noexcept {
   const Slide to = slide_of(couplings, state, v, load_N);
   if (!allowed(couplings, state, v, to.way_m)) return std::nullopt;
   return along(state, couplings.lattice(), v, to.force_N);
 }
 
-float slide(Couplings& couplings, Displacement& state, VoxelId v, const glm::dvec3& load_N) noexcept {
+float slide(LevelStiffness& couplings, Displacement& state, VoxelId v, const glm::dvec3& load_N) noexcept {
   const glm::dvec3 way = slide_of(couplings, state, v, load_N).way_m;
   if (!allowed(couplings, state, v, way)) return 0.0F;
   state.set(v, state.at(v) + way);
   return size_of(way);
 }
 
-float slide_by(Couplings& couplings, Displacement& state, VoxelId v, const glm::dvec3& given) noexcept {
+float slide_by(LevelStiffness& couplings, Displacement& state, VoxelId v, const glm::dvec3& given) noexcept {
   const glm::dvec3 way = along(state, couplings.lattice(), v, given);
   if (!allowed(couplings, state, v, way)) return 0.0F;
   state.set(v, state.at(v) + way);

@@ -10,20 +10,20 @@
 #include <glm/vec3.hpp>
 #include <optional>
 
-#include "voxel/lattice/level_stiffness.h"
 #include "voxel/lattice/displacement.h"
+#include "voxel/lattice/level_stiffness.h"
 
 namespace voxel {
 
 // Of voxels whose role is pressed; `load_N`: what pulls them beside their links.
 
 // What pulls a voxel along the tool's surface (N); nothing where its links keep it from going there.
-[[nodiscard]] std::optional<glm::dvec3> sliding_force(Couplings& couplings, const Displacement& state,
+[[nodiscard]] std::optional<glm::dvec3> sliding_force(LevelStiffness& couplings, const Displacement& state,
                                                       VoxelId v, const glm::dvec3& load_N) noexcept;
 // Brings it to where its energy is least along the tool. Returns how far it went, on the axis on which it
 // went furthest (m).
-float slide(Couplings& couplings, Displacement& state, VoxelId v, const glm::dvec3& load_N) noexcept;
+float slide(LevelStiffness& couplings, Displacement& state, VoxelId v, const glm::dvec3& load_N) noexcept;
 // Takes it along by the part of `way` that is along the tool, or not at all where links do not allow it.
-float slide_by(Couplings& couplings, Displacement& state, VoxelId v, const glm::dvec3& way) noexcept;
+float slide_by(LevelStiffness& couplings, Displacement& state, VoxelId v, const glm::dvec3& way) noexcept;
 
 }  // namespace voxel

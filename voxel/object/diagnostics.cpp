@@ -5,9 +5,9 @@
 #include <glm/geometric.hpp>
 
 #include "voxel/composite/grid.h"
+#include "voxel/lattice/plasticity.h"
 #include "voxel/lattice/voxel_links.h"
 #include "voxel/object/soft_object.h"
-#include "voxel/lattice/plasticity.h"
 
 namespace voxel {
 
@@ -99,7 +99,7 @@ std::size_t SoftObject::memory_bytes() const {
       resident_bytes(touched_voxels_) + resident_bytes(touched_numbers_) + resident_bytes(held_voxels_) +
       resident_bytes(all_held_) + resident_bytes(sources_) + resident_bytes(moves_) + resident_bytes(roots_) +
       resident_bytes(carried_) + resident_bytes(hanging_) + carried_mark_.resident_bytes() +
-      carried_index_.resident_bytes() + tight_rows_.memory_bytes() + drawn_rows_.memory_bytes();
+      carried_index_.resident_bytes() + limit_reactions_.memory_bytes() + limit_followers_.memory_bytes();
   const std::size_t others = pair_held_.resident_bytes() + pair_load_.resident_bytes() +
                              resident_bytes(pair_roots_) + resident_bytes(hanging_on_pairs_) +
                              hanging_entry_.resident_bytes() + resident_bytes(obstacles_) +

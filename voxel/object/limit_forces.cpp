@@ -6,17 +6,17 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
-#include "voxel/relaxation/admm_region.h"
-#include "voxel/lattice/voxel_links.h"
 #include "voxel/lattice/near_limit.h"
+#include "voxel/lattice/voxel_links.h"
 #include "voxel/object/soft_object.h"
+#include "voxel/relaxation/admm_region.h"
 
 namespace voxel {
 namespace {
 
-constexpr std::size_t kMostTied = 500;      // voxels looked at for what holds one of them
-constexpr float kTight = 1e-4F;             // of the spacing: nearer to its limit than this a link is tight
-constexpr std::size_t kMostHanging = 3000;  // voxels that hang on those that something else presses
+constexpr std::size_t kMaxLimitLoads = 500;  // voxels looked at for what holds one of them
+constexpr float kTight = 1e-4F;              // of the spacing: nearer to its limit than this a link is tight
+constexpr std::size_t kMostHanging = 3000;   // voxels that hang on those that something else presses
 // As kTight, where a body or another soft object presses. At rest what does not hang on what they press is
 // balanced, and adds nothing; what does is left behind a little whenever these, or the tool, withdraw. (By
 // kTight a tool lost a tenth of what another object pressed it with through the chain, in one tick or the
@@ -91,12 +91,12 @@ void add_from_far_end(Hanging& hanging, std::size_t first, const Drops& drops, c
 // What hangs on pressed voxels by tight links comes along when they withdraw: it is felt only where it is
 // tight, and the background may need many ticks to get to it. (Left to that, the force lost a sixth of itself
 // whenever the proxy was pushed back by a tenth of a micron, and a held tool never came to rest.)
-void SoftObject::draw_along() noexcept {
+void SoftObject::move_followers() noexcept {
   roots_.clear();
   for (const Touch& t : touches_) {
     if (t.pressed && !lattice_->anchored(t.v) && t.part == 0) roots_.push_back(t.v);
   }
-  if (!roots_.empty()) drawn_rows_.draw(relaxation_, state_, roots_, static_cast<float>(kStir));
+  if (!roots_.empty()) limit_followers_.draw(relaxation_, state_, roots_, static_cast<float>(kDirtyMotion));
 }
 
 // Force of its links on a voxel, and of other soft objects (N).
@@ -130,19 +130,19 @@ glm::dvec3 SoftObject::gather_load(glm::dmat3& stiffness) noexcept {
     roots_.push_back(touches_[i].v);
   }
   for (int axis = 0; axis < 3; ++axis) {
-    tight_rows_.gather(relaxation_.couplings(), state_, roots_, axis);
+    limit_reactions_.gather(relaxation_.couplings(), state_, roots_, axis);
     // What hangs on them goes along with the mean of those that something may hang on.
     glm::dvec3 way(0.0);
     int tight = 0;
     for (const Carried& c : carried_) {
       Touch& t = touches_[c.touch];
-      if (!tight_rows_.tight(t.v)) continue;
+      if (!limit_reactions_.tight(t.v)) continue;
       t.tight = true;
       way += t.normal[axis] * t.normal;
       ++tight;
     }
     if (tight > 0) way /= tight;
-    const TightRows::Hanging hanging = tight_rows_.hanging(relaxation_.couplings());
+    const LimitReactions::Hanging hanging = limit_reactions_.hanging(relaxation_.couplings());
     force[axis] = hanging.force_N;
     stiffness += hanging.stiffness_N_per_m * glm::outerProduct(way, way);
     add_stiffness_of_touches(axis, way, stiffness);
@@ -167,7 +167,7 @@ void SoftObject::add_stiffness_of_touches(int axis, const glm::dvec3& way, glm::
           const Touch& beside = touches_[carried_index_[w]];
           const glm::dvec3 r = q - beside.normal[axis] * beside.normal;
           stiffness += 0.5 * stiff * glm::outerProduct(r, r);  // met from both its ends
-        } else if (tight_rows_.carried(w)) {
+        } else if (limit_reactions_.carried(w)) {
           stiffness += stiff * glm::outerProduct(q - way, q - way);
         } else {
           to_others += stiff;
@@ -407,13 +407,13 @@ Reaction SoftObject::reaction(const ToolInBody& tool) noexcept {
     t.load = load_on(t.v);
   }
   glm::dvec3 hanging_N(0.0);
-  const bool by_rows = held_voxels_.empty() && part_seen_.empty();
+  const bool by_rows = held_voxels_.empty() && block_seen_.empty();
   if (by_rows) hanging_N = gather_load(result.stiffness_N_per_m);
   for (int axis = 0; axis < 3 && !by_rows; ++axis) {
-    if (part_seen_.empty()) {
+    if (block_seen_.empty()) {
       gather_load_with_pairs(axis);
     } else {
-      gather_load_with_parts(axis);
+      gather_load_with_blocks(axis);
     }
     add_stiffness(axis, result.stiffness_N_per_m);
     let_go_of_carried();
@@ -434,12 +434,12 @@ Reaction SoftObject::reaction(const ToolInBody& tool) noexcept {
     }
     if (load < 0.0) ++result.pressed;
   }
-  if (!part_seen_.empty()) add_reaction_of_parts(tool, result);
+  if (!block_seen_.empty()) add_reaction_of_blocks(tool, result);
   if (result.pressed == 0) result.force_N = glm::dvec3(0.0);  // what only pulls is no contact
   return result;
 }
 
-bool SoftObject::held_fast(VoxelId v, const glm::dvec3& direction) noexcept {
+bool SoftObject::is_immovable(VoxelId v, const glm::dvec3& direction) noexcept {
   if (grid_) return at_anchors_end(v, direction);
   const glm::dvec3 size = glm::abs(direction);
   const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
@@ -457,7 +457,7 @@ bool SoftObject::held_fast(VoxelId v, const glm::dvec3& direction) noexcept {
   carried_mark_[v] = 1;
   carried_.push_back({v, 0});
   bool held = rests(v);
-  for (std::size_t head = 0; head < carried_.size() && carried_.size() < kMostTied && !held; ++head) {
+  for (std::size_t head = 0; head < carried_.size() && carried_.size() < kMaxLimitLoads && !held; ++head) {
     const VoxelId c = carried_[head].v;
     const auto known = [&](VoxelId w) { return held || carried_mark_[w] != 0; };
     for_tight_neighbours(*lattice_, u, c, axis, known, [&](VoxelId w, bool pushed_up, bool pushed_down) {

@@ -19,7 +19,7 @@ void SoftObject::set_obstacle(std::size_t surface_number, const Obstacle& obstac
     changed_obstacles_.push_back(static_cast<std::uint32_t>(surface_number));
   }
   const std::uint8_t role = state_.role[v];
-  if ((Displacement::stands(role) && !Displacement::in_part(role)) || lattice_->anchored(v)) return;
+  if ((Displacement::stands(role) && !Displacement::in_block(role)) || lattice_->anchored(v)) return;
   state_.set_role(v, resting_role(v));
 }
 
@@ -39,8 +39,8 @@ void SoftObject::leave_obstacles(std::span<const std::uint32_t> surface_numbers)
   if (!sources_.empty()) settle_chain();
 }
 
-void SoftObject::stir(std::size_t surface_number) noexcept {
-  relaxation_.stir(lattice_->surface()[surface_number] / kRow);
+void SoftObject::mark_dirty(std::size_t surface_number) noexcept {
+  relaxation_.mark_dirty(lattice_->surface()[surface_number] / kRow);
   relaxation_.wake();
 }
 
@@ -69,14 +69,14 @@ void SoftObject::release(VoxelId v) noexcept {
   const auto found = std::find(held_voxels_.begin(), held_voxels_.end(), v);
   *found = held_voxels_.back();
   held_voxels_.pop_back();
-  relaxation_.stir(v / kRow);
+  relaxation_.mark_dirty(v / kRow);
   relaxation_.wake();
   state_.set_role(v, resting_role(v));
   set_touch_roles();
 }
 
 glm::dvec3 SoftObject::free_displacement(VoxelId v) noexcept {
-  return link_minimum(relaxation_.couplings(), state_, v);
+  return unconstrained_minimum(relaxation_.couplings(), state_, v);
 }
 
 glm::dvec3 SoftObject::compliance(VoxelId v) noexcept {
@@ -89,9 +89,9 @@ void SoftObject::move(VoxelId v, const glm::dvec3& displacement) noexcept {
   const glm::dvec3 before = state_.at(v);
   state_.set(v, clamp_to_links(*lattice_, state_, v, displacement));
   relaxation_.multigrid().log().note(0, v / kRow);
-  if (glm::distance(before, state_.at(v)) <= kStir * lattice_->min_spacing_m()) return;
+  if (glm::distance(before, state_.at(v)) <= kDirtyMotion * lattice_->min_spacing_m()) return;
   relaxation_.wake();
-  relaxation_.stir(v / kRow);
+  relaxation_.mark_dirty(v / kRow);
 }
 
 void SoftObject::drag(VoxelId v, const glm::dvec3& by) noexcept {

@@ -49,8 +49,9 @@ double least_force_N(const VoxelLinks& links, const glm::dvec3& wished, const gl
 // Where the springs' energy is least on the tool's surface, so that sliding round the tool is free of
 // friction: in their own metric, the surface straightened at the last place (one step left 3e-4 of the force
 // scale of friction).
-glm::dvec3 SoftObject::onto_tool(const ToolInBody& tool, const glm::dvec3& rest, const glm::dvec3& wished,
-                                 const glm::dvec3& compliance, Gap& g) const noexcept {
+glm::dvec3 SoftObject::project_on_tool(const ToolInBody& tool, const glm::dvec3& rest,
+                                       const glm::dvec3& wished, const glm::dvec3& compliance,
+                                       Gap& g) const noexcept {
   glm::dvec3 place = wished;
   for (int n = 0; n < kProjections && g.distance < voxel_radius(); ++n) {
     const double denominator = glm::dot(g.normal, compliance * g.normal);
@@ -76,12 +77,12 @@ glm::dvec3 SoftObject::no_deeper_in(const ToolInBody& tool, const glm::dvec3& re
   return to;
 }
 
-// As onto_tool(), where its links do not let it go there: the least energy on the tool within their limits.
-// Given the tool's force, each axis is for itself. (Brought onto the tool and then within its limits, it
-// stood a tenth of a spacing off the tool, or went into it, was pushed out by the next tick, and what hangs
-// on it with it: at a ball ten spacings deep 1.3 % of the energy in every tick, for good.)
-glm::dvec3 SoftObject::onto_tool_within(const ToolInBody& tool, const VoxelLinks& links,
-                                        const glm::dvec3& wished, Touch& t) const noexcept {
+// As project_on_tool(), where its links do not let it go there: the least energy on the tool within their
+// limits. Given the tool's force, each axis is for itself. (Brought onto the tool and then within its limits,
+// it stood a tenth of a spacing off the tool, or went into it, was pushed out by the next tick, and what
+// hangs on it with it: at a ball ten spacings deep 1.3 % of the energy in every tick, for good.)
+glm::dvec3 SoftObject::project_on_tool_within_limits(const ToolInBody& tool, const VoxelLinks& links,
+                                                     const glm::dvec3& wished, Touch& t) const noexcept {
   const glm::dvec3 now = state_.at(t.v);
   glm::dvec3 place = clamp_to_links(links, wished, now);
   for (int n = 0; n < kProjections; ++n) {
@@ -109,7 +110,7 @@ glm::dvec3 SoftObject::place_of(const ToolInBody& tool, const VoxelLinks& links,
     t.pressed = g.distance < 0.0;
   }
   if (t.pressed) {
-    wanted = onto_tool(tool, rest, wanted, links.compliance, g);
+    wanted = project_on_tool(tool, rest, wanted, links.compliance, g);
     t.normal = g.normal;
   }
   if (obstacles_.empty()) {
@@ -118,7 +119,7 @@ glm::dvec3 SoftObject::place_of(const ToolInBody& tool, const VoxelLinks& links,
     // is to give way, not to part it as a wedge would.
     const bool let_out = t.pressed && place != wanted && held_voxels_.empty() &&
                          !(anchors_pull_ && gap(tool, rest + now).distance < -kGiveWay * voxel_radius());
-    return let_out ? onto_tool_within(tool, links, wished, t) : place;
+    return let_out ? project_on_tool_within_limits(tool, links, wished, t) : place;
   }
   const Obstacle& o = obstacles_[t.surface];
   const glm::dvec3 n(o.normal);
@@ -164,7 +165,7 @@ void SoftObject::relax_touch(const ToolInBody& tool, Touch& t) noexcept {
   if (t.pressed != was_pressed) unsettled_m_ += glm::distance(before, state_.at(t.v));
   // A tool that jumped away moves no pressed voxel by follow(): what it let go of wakes the rest.
   if (was_pressed && !t.pressed &&
-      glm::distance(before, state_.at(t.v)) > kStir * lattice_->min_spacing_m()) {
+      glm::distance(before, state_.at(t.v)) > kDirtyMotion * lattice_->min_spacing_m()) {
     relaxation_.wake();
   }
 }

@@ -10,55 +10,55 @@
 namespace voxel {
 namespace {
 
-constexpr double kTightPart = 1e-4;     // of the spacing: nearer to its limit than this a link is at it
+constexpr double kBlockAtLimit = 1e-4;  // of the spacing: nearer to its limit than this a link is at it
 constexpr double kTightHanging = 1e-3;  // the same for what may be left behind a little as the tool withdraws
 
 }  // namespace
 
 // `visit(part)`, numbers from 1 on, for those of which any voxel is touched, in the order of the touches.
 template <class Visit>
-void SoftObject::for_touched_parts(const Visit& visit) noexcept {
+void SoftObject::for_touched_blocks(const Visit& visit) noexcept {
   for (const Touch& t : touches_) {
-    if (t.part == 0 || part_seen_[t.part - 1U] != 0) continue;
-    part_seen_[t.part - 1U] = 1;
+    if (t.part == 0 || block_seen_[t.part - 1U] != 0) continue;
+    block_seen_[t.part - 1U] = 1;
     visit(t.part);
   }
   for (const Touch& t : touches_) {
-    if (t.part != 0) part_seen_[t.part - 1U] = 0;
+    if (t.part != 0) block_seen_[t.part - 1U] = 0;
   }
 }
 
 // Where the tool lets a part go, straightened where each of its touched voxels is; those that are further
 // away than `within_m` do not count.
-void SoftObject::bound_part(const ToolInBody& tool, std::uint16_t part, double within_m) noexcept {
-  part_bounds_.clear();
+void SoftObject::bound_block(const ToolInBody& tool, std::uint16_t part, double within_m) noexcept {
+  block_bounds_.clear();
   bound_touch_.clear();
   for (std::size_t i = 0; i < touches_.size(); ++i) {
     if (touches_[i].part != part) continue;
     const Gap g = gap(tool, position(touches_[i]));
     if (g.distance > within_m) continue;
-    part_bounds_.push_back({g.normal, g.distance, false, 0.0});
+    block_bounds_.push_back({g.normal, g.distance, false, 0.0});
     bound_touch_.push_back(static_cast<std::uint32_t>(i));
   }
 }
 
 // The shortest way out of the tool; one of its voxels says to the chain where all of it is to go.
-void SoftObject::push_parts_out(const ToolInBody& tool) noexcept {
-  for_touched_parts([&](std::uint16_t part) {
-    bound_part(tool, part, voxel_radius());
-    const auto in = std::find_if(part_bounds_.begin(), part_bounds_.end(),
-                                 [](const PartBound& b) { return b.room_m < 0.0; });
-    if (in == part_bounds_.end()) return;
-    const VoxelId v = touches_[bound_touch_[static_cast<std::size_t>(in - part_bounds_.begin())]].v;
+void SoftObject::push_blocks_out(const ToolInBody& tool) noexcept {
+  for_touched_blocks([&](std::uint16_t part) {
+    bound_block(tool, part, voxel_radius());
+    const auto in = std::find_if(block_bounds_.begin(), block_bounds_.end(),
+                                 [](const BlockBound& b) { return b.room_m < 0.0; });
+    if (in == block_bounds_.end()) return;
+    const VoxelId v = touches_[bound_touch_[static_cast<std::size_t>(in - block_bounds_.begin())]].v;
     const glm::dvec3 before = state_.at(v);
-    state_.set(v, before + move_within(glm::dvec3(0.0), glm::dvec3(1.0), part_bounds_));
+    state_.set(v, before + move_within(glm::dvec3(0.0), glm::dvec3(1.0), block_bounds_));
     sources_.push_back(v);
     moves_.emplace_back(state_.at(v) - before);
   });
 }
 
-void SoftObject::follow_parts(const glm::dvec3& delta) noexcept {
-  for_touched_parts([&](std::uint16_t part) {
+void SoftObject::follow_blocks(const glm::dvec3& delta) noexcept {
+  for_touched_blocks([&](std::uint16_t part) {
     HeldDirections pressed;
     const Touch* first = nullptr;
     for (const Touch& t : touches_) {
@@ -68,7 +68,7 @@ void SoftObject::follow_parts(const glm::dvec3& delta) noexcept {
     }
     if (first == nullptr) return;
     const glm::dvec3 before = state_.at(first->v);
-    state_.set(first->v, before + delta - pressed.free_part(delta));
+    state_.set(first->v, before + delta - pressed.free_block(delta));
     sources_.push_back(first->v);
     moves_.emplace_back(state_.at(first->v) - before);
   });
@@ -76,18 +76,18 @@ void SoftObject::follow_parts(const glm::dvec3& delta) noexcept {
 
 // A part goes to the least energy of the springs that leave it, outside of the tool and within its limits. It
 // is pressed where that takes a force of the tool's.
-void SoftObject::relax_parts(const ToolInBody& tool) noexcept {
+void SoftObject::relax_blocks(const ToolInBody& tool) noexcept {
   Multigrid& grid = relaxation_.multigrid();
-  for_touched_parts([&](std::uint16_t part) {
+  for_touched_blocks([&](std::uint16_t part) {
     const std::size_t p = part - 1U;
     // With what only hangs on it: where links are at their limits, that is what presses it on the tool.
-    const Multigrid::PartRoom room = grid.room_of_part(p, state_);
-    const glm::dvec3 force = grid.part_force(p, state_) + hanging_on_part(p, room),
+    const Multigrid::AdmissibleInterval room = grid.interval_of_block(p, state_);
+    const glm::dvec3 force = grid.block_force(p, state_) + dependents_of_block(p, room),
                      stiffness = grid.parts().on(0, p).stiffness;
-    bound_part(tool, part, lattice_->max_spacing_m());
-    Multigrid::add_bounds(room, part_bounds_);
+    bound_block(tool, part, lattice_->max_spacing_m());
+    Multigrid::add_bounds(room, block_bounds_);
     bool was = false, is = false;
-    glm::dvec3 way = move_within(force, stiffness, part_bounds_);
+    glm::dvec3 way = move_within(force, stiffness, block_bounds_);
     for (Touch& t : touches_) {
       if (t.part != part) continue;
       was = was || t.pressed;
@@ -95,17 +95,17 @@ void SoftObject::relax_parts(const ToolInBody& tool) noexcept {
     }
     for (std::size_t i = 0; i < bound_touch_.size(); ++i) {
       Touch& t = touches_[bound_touch_[i]];
-      t.pressed = part_bounds_[i].force_N > 0.0;
-      t.normal = part_bounds_[i].normal;
+      t.pressed = block_bounds_[i].force_N > 0.0;
+      t.normal = block_bounds_[i].normal;
       is = is || t.pressed;
     }
     // While another relaxes the object it is his, but for what was moved since.
-    if (relaxation_.away()) way = move_within(force + grid.balance_of_part(p), stiffness, part_bounds_);
-    const glm::dvec3 went = grid.move_part(p, way, state_, obstacle_view(), Multigrid::Tool::is_seen_to);
+    if (relaxation_.away()) way = move_within(force + grid.residual_of_block(p), stiffness, block_bounds_);
+    const glm::dvec3 went = grid.move_block(p, way, state_, obstacle_view(), Multigrid::Tool::is_seen_to);
     const double far = glm::length(went);
     if (was != is) unsettled_m_ += far;
     unrelaxed_m_ += far;
-    if (unrelaxed_m_ <= kStir * lattice_->min_spacing_m()) return;
+    if (unrelaxed_m_ <= kDirtyMotion * lattice_->min_spacing_m()) return;
     unrelaxed_m_ = 0.0;
     relaxation_.wake();
   });
@@ -117,15 +117,16 @@ bool SoftObject::any_pressed(std::uint16_t part) const noexcept {
 }
 
 // What pulls tissue that hangs on a part, which has so much room, by links at their limits (N).
-glm::dvec3 SoftObject::hanging_on_part(std::size_t part, const Multigrid::PartRoom& room) noexcept {
+glm::dvec3 SoftObject::dependents_of_block(std::size_t part,
+                                           const Multigrid::AdmissibleInterval& room) noexcept {
   const Multigrid& grid = relaxation_.multigrid();
-  const double tight = kTightPart * lattice_->min_spacing_m();
+  const double tight = kBlockAtLimit * lattice_->min_spacing_m();
   glm::dvec3 force(0.0);
   for (int axis = 0; axis < 3; ++axis) {
     const auto& of_axis = room[static_cast<std::size_t>(axis)];
     if (of_axis[0] < -tight && of_axis[1] > tight) continue;
-    tight_rows_.gather_on_part(relaxation_.couplings(), state_, grid, part, axis);
-    force[axis] = tight_rows_.hanging(relaxation_.couplings()).force_N;
+    limit_reactions_.gather_on_block(relaxation_.couplings(), state_, grid, part, axis);
+    force[axis] = limit_reactions_.hanging(relaxation_.couplings()).force_N;
   }
   return force;
 }
@@ -134,7 +135,7 @@ glm::dvec3 SoftObject::hanging_on_part(std::size_t part, const Multigrid::PartRo
 // pulls a single voxel says nothing of which way it passes a load on: between the tool and an inclusion,
 // tissue at its limits is pulled down, and carries what presses the inclusion up. (Found by rows, voxel by
 // voxel, half of the force was lost.)
-void SoftObject::gather_load_with_parts(int axis) noexcept {
+void SoftObject::gather_load_with_blocks(int axis) noexcept {
   const Multigrid& grid = relaxation_.multigrid();
   const auto& u = state_.u[static_cast<std::size_t>(axis)];
   const auto tight = static_cast<float>(kTightHanging * lattice_->min_spacing_m());
@@ -163,14 +164,14 @@ void SoftObject::gather_load_with_parts(int axis) noexcept {
     if (carried_mark_[v] != 0 || carried_.size() >= kMaxCarried) return;
     carry(v, touch);
     const std::uint16_t part = lattice_->part(v);
-    const double load = part != 0 ? grid.part_force(part - 1U, state_)[axis] : load_on(v, axis);
+    const double load = part != 0 ? grid.block_force(part - 1U, state_)[axis] : load_on(v, axis);
     hanging_.push_back({static_cast<std::uint32_t>(head), pushed_up, pushed_down, load});
   };
   for (std::size_t head = 0; head < carried_.size(); ++head) {
     const VoxelId v = carried_[head].v;
     const std::uint16_t part = lattice_->part(v);
     if (part != 0) {
-      for (const WholeParts::Link& l : grid.parts().on(0, part - 1U).border)
+      for (const RigidBlocks::Link& l : grid.parts().on(0, part - 1U).border)
         look_at(head, l.cell, l.beside, l.d, l.up);
       continue;
     }
@@ -205,20 +206,20 @@ void SoftObject::gather_load_with_parts(int axis) noexcept {
   }
 }
 
-void SoftObject::add_reaction_of_parts(const ToolInBody& tool, Reaction& reaction) noexcept {
+void SoftObject::add_reaction_of_blocks(const ToolInBody& tool, Reaction& reaction) noexcept {
   const Multigrid& grid = relaxation_.multigrid();
-  for_touched_parts([&](std::uint16_t part) {
+  for_touched_blocks([&](std::uint16_t part) {
     const std::size_t p = part - 1U;
     if (!any_pressed(part)) return;
-    bound_part(tool, part, lattice_->max_spacing_m());
+    bound_block(tool, part, lattice_->max_spacing_m());
     const glm::dvec3 stiffness = grid.parts().on(0, p).stiffness;
-    glm::dvec3 force = grid.part_force(p, state_);
+    glm::dvec3 force = grid.block_force(p, state_);
     for (const Touch& t : touches_) {
       if (t.part == part && t.pressed) force += t.load;
     }
-    move_within(force, stiffness, part_bounds_);
+    move_within(force, stiffness, block_bounds_);
     HeldDirections held;
-    for (const PartBound& b : part_bounds_) {
+    for (const BlockBound& b : block_bounds_) {
       if (!(b.force_N > 0.0)) continue;
       reaction.force_N -= b.force_N * b.normal;
       ++reaction.pressed;

@@ -24,7 +24,7 @@ constexpr std::size_t kMostAtOnce = 1000;  // rows that a tick adds at once; a w
 constexpr int kContactCycles = 4, kUnsettled = 4;
 // … and round a part without slack that is pressed. (A whole cycle leaves 0.43 of the force's error at such a
 // part.)
-constexpr int kPartCycles = 4;
+constexpr int kBlockCycles = 4;
 constexpr double kMoved = 0.1;
 // Far from the contact only what changed by so many times as much as rows are left alone with (1e-4 of the
 // spacing) is passed on, and the rest once all is at rest. Within so many rows of it everything is, and so is
@@ -45,7 +45,7 @@ constexpr int kTurns = 16, kTurnsAtOnce = 8;
 // little.
 constexpr float kJumped = 5.0F;
 constexpr int kQuickResults = 3;
-constexpr std::array<int, kQuickResults> kWideCycles{3, 4, 2};
+constexpr std::array<int, kQuickResults> kLargePatchCycles{3, 4, 2};
 constexpr std::size_t kAhead = 4;  // rows that are fetched before their turn
 constexpr std::size_t kRowBytes = kRow * sizeof(float);
 constexpr std::size_t kOctetsOfRow = 12;  // a whole cycle smooths and tells as many of a row
@@ -57,7 +57,7 @@ std::size_t arrays_of(const Lattice& lattice) {
 
 }  // namespace
 
-Replica::Replica(SoftObject& object)
+ShadowObject::ShadowObject(SoftObject& object)
     : lattice_(object.lattice()),
       state_(object.state_),
       relaxation_(lattice_),
@@ -68,15 +68,15 @@ Replica::Replica(SoftObject& object)
       distance_(lattice_.grid().rows()),
       by_distance_(lattice_.grid().rows()),
       given_(lattice_.grid().rows()),
-      found_{Parcel(lattice_.grid().rows(), arrays_of(lattice_)),
-             Parcel(lattice_.grid().rows(), arrays_of(lattice_))},
-      again_(lattice_.grid().rows()) {
-  for (PartWays& ways : found_parts_) ways.assign(lattice_.part_count(), glm::dvec3(0.0));
+      found_{RowDelta(lattice_.grid().rows(), arrays_of(lattice_)),
+             RowDelta(lattice_.grid().rows(), arrays_of(lattice_))},
+      retry_(lattice_.grid().rows()) {
+  for (BlockMoves& ways : found_blocks_) ways.assign(lattice_.block_count(), glm::dvec3(0.0));
   multigrid().keep_log();
   relaxation_.copy_from(object.relaxation_);
   object.relaxation_.leave_to_another();
   // A part without slack sums what all round it are off by.
-  least_m_ = multigrid().has_parts() ? multigrid().passed_on_m() : multigrid().quiet_m();
+  least_m_ = multigrid().has_blocks() ? multigrid().restricted_m() : multigrid().motion_tolerance_m();
   const std::size_t most_held = lattice_.surface().size() + SoftObject::kMaxTouched;
   held_.reserve(most_held);
   given_held_.reserve(most_held);
@@ -96,14 +96,14 @@ Replica::Replica(SoftObject& object)
   for (auto& axis : before_) axis.populate(kRow, rows);
   const auto most = static_cast<std::size_t>(std::count(rows.begin(), rows.end(), true));
   given_.populate(most);
-  for (Parcel& parcel : found_) parcel.populate(most);
-  again_.populate();
+  for (RowDelta& delta : found_) delta.populate(most);
+  retry_.populate();
 }
 
-void Replica::give(SoftObject& object) noexcept {
+void ShadowObject::give(SoftObject& object) noexcept {
   ChangeLog& log = object.relaxation_.multigrid().log();
   given_.clear();
-  const Parcel& found = found_[taking_];
+  const RowDelta& found = found_[taking_];
   for (const RowId row : log.rows(0)) {
     float* to = given_.add(row);
     for (std::size_t axis = 0; axis < 3; ++axis)
@@ -112,7 +112,7 @@ void Replica::give(SoftObject& object) noexcept {
     // known here with what they have yet to go; it would be mended, and so go that way twice. (The better a
     // cycle was, the longer that went to and fro: a brain that hung free swung by a millimeter for ever.)
     const std::size_t n = found.find(row);
-    if (n == found.count() || (n < drained_ && !again_.waits(n))) continue;
+    if (n == found.count() || (n < drained_ && !retry_.waits(n))) continue;
     for (std::size_t i = 0; i < std::size_t{3} * kRow; ++i) to[i] += found.values(n)[i];
   }
   given_roles_.clear();
@@ -131,15 +131,15 @@ void Replica::give(SoftObject& object) noexcept {
   given_contacts_.clear();
   for (const VoxelId v : object.all_held_) {
     given_held_.push_back(v);
-    if (object.state_.role[v] == Displacement::pressed || Displacement::in_part(object.state_.role[v]))
+    if (object.state_.role[v] == Displacement::pressed || Displacement::in_block(object.state_.role[v]))
       given_contacts_.push_back({v, object.state_.tool_normal[lattice_.surface_number(v)]});
   }
   near_ = given_held_.empty() ? Relaxation::NearRows{} : object.relaxation_.near_contact();
-  object.give_away();
+  object.assign_residual();
   log.clear();
 }
 
-void Replica::note_motion(const SoftObject& object) noexcept {
+void ShadowObject::note_motion(const SoftObject& object) noexcept {
   const double way = glm::distance(object.tool_.centre, given_tool_m_);
   given_tool_m_ = object.tool_.centre;
   if (way > kMoved * lattice_.min_spacing_m()) unsettled_ = kUnsettled;
@@ -147,7 +147,7 @@ void Replica::note_motion(const SoftObject& object) noexcept {
   if (unsettled_ > 0) --unsettled_;
 }
 
-void Replica::open_given() noexcept {
+void ShadowObject::open_given() noexcept {
   Multigrid& to = multigrid();
   float moved_m = 0.0F;
   for (std::size_t n = 0; n < given_.count(); ++n) {
@@ -159,13 +159,13 @@ void Replica::open_given() noexcept {
       std::copy_n(given_.values(n) + axis * kRow, kRow, state_.u[axis].data() + at(row));
       std::copy_n(given_.values(n) + axis * kRow, kRow, before_[axis].data() + at(row));
     }
-    to.stir(0, row);
+    to.mark_dirty(0, row);
   }
   for (const GivenObstacle& given : given_obstacles_) {
     Obstacle& o = obstacles_[given.surface_number];
     moving_obstacles_ = moving_obstacles_ + (given.obstacle.moving ? 1 : 0) - (o.moving ? 1 : 0);
     o = given.obstacle;
-    to.stir(0, lattice_.surface()[given.surface_number] / kRow);
+    to.mark_dirty(0, lattice_.surface()[given.surface_number] / kRow);
   }
   for (const GivenRole& given : given_roles_) state_.set_role(given.v, given.role);
   held_.clear();
@@ -180,55 +180,56 @@ void Replica::open_given() noexcept {
   if (given_.count() > 0 || !given_obstacles_.empty()) relaxation_.wake();
   to.log().clear();
   // One whole cycle at least between two jumps: all else has its turn, however long the tool goes on.
-  if (moved_m > kJumped * static_cast<float>(lattice_.min_spacing_m()) && quick_ == 0 && !was_quick_) {
-    quick_ = kQuickResults;
-    far_ = kQuickResults + kUnsettled;
+  if (moved_m > kJumped * static_cast<float>(lattice_.min_spacing_m()) && coarse_first_left_ == 0 &&
+      !was_coarse_first_) {
+    coarse_first_left_ = kQuickResults;
+    large_motion_left_ = kQuickResults + kUnsettled;
   }
   // What presses a part without slack moves tissue all round that, wherever the contact is.
-  part_pressed_ = std::any_of(held_.begin(), held_.begin() + static_cast<std::ptrdiff_t>(given_pressed_),
-                              [this](VoxelId v) { return lattice_.part(v) != 0; });
-  if (given_pressed_ == 0) quick_ = 0;
-  if (part_pressed_) quick_ = std::min(quick_, 1);
+  block_pressed_ = std::any_of(held_.begin(), held_.begin() + static_cast<std::ptrdiff_t>(given_pressed_),
+                               [this](VoxelId v) { return lattice_.part(v) != 0; });
+  if (given_pressed_ == 0) coarse_first_left_ = 0;
+  if (block_pressed_) coarse_first_left_ = std::min(coarse_first_left_, 1);
 }
 
-void Replica::relax_quickly(const ObstacleView& obstacles) noexcept {
+void ShadowObject::relax_quickly(const ObstacleView& obstacles) noexcept {
   std::size_t octets = 0;
-  const bool first = quick_ == kQuickResults;
-  --quick_;
-  if (part_pressed_) {
+  const bool first = coarse_first_left_ == kQuickResults;
+  --coarse_first_left_;
+  if (block_pressed_) {
     octets = relaxation_.run_thoroughly(state_, obstacles, held_);
-    relaxation_.relax_round_parts(state_, obstacles);
+    relaxation_.relax_around_blocks(state_, obstacles);
     work_ = octets / kOctetsOfRow;
     return;
   }
   const std::span<const VoxelId> pressed{held_.data(), given_pressed_};
   if (first) {
-    octets += relaxation_.relax_widely(state_, obstacles, held_, pressed, true);
-    octets += relaxation_.tell_widely(state_, obstacles, pressed);
+    octets += relaxation_.relax_large_patch(state_, obstacles, held_, pressed, true);
+    octets += relaxation_.prolong_large_patch(state_, obstacles, pressed);
   }
-  const int cycles = kWideCycles[static_cast<std::size_t>(kQuickResults - 1 - quick_)];
+  const int cycles = kLargePatchCycles[static_cast<std::size_t>(kQuickResults - 1 - coarse_first_left_)];
   for (int n = 0; n < cycles; ++n)
-    octets += relaxation_.relax_widely(state_, obstacles, held_, pressed, false);
+    octets += relaxation_.relax_large_patch(state_, obstacles, held_, pressed, false);
   // Not after the last: a whole round comes next, which ends with it; nor after the first, when the tool goes
   // on to press other voxels. (There, too, it was no nearer.)
-  if (!first && quick_ > 0) relaxation_.relax_limited(state_, obstacles);
+  if (!first && coarse_first_left_ > 0) relaxation_.relax_limited(state_, obstacles);
   work_ = octets / kOctetsOfRow;
 }
 
-void Replica::relax() noexcept {
+void ShadowObject::relax() noexcept {
   open_given();
   const ObstacleView obstacles{obstacles_, &lattice_, moving_obstacles_};
-  was_quick_ = quick_ > 0;
+  was_coarse_first_ = coarse_first_left_ > 0;
   found_limited_ = false;
-  found_far_ = far_ > 0;
-  if (found_far_) --far_;
-  if (was_quick_) {
+  found_far_ = large_motion_left_ > 0;
+  if (found_far_) --large_motion_left_;
+  if (was_coarse_first_) {
     relax_quickly(obstacles);
   } else {
     relaxation_.run_cycle(state_, obstacles, held_);
     found_limited_ = relaxation_.limits_hold();
-    for (int n = 0; n < kPartCycles && settle_contact_ && part_pressed_; ++n)
-      relaxation_.relax_round_parts(state_, obstacles);
+    for (int n = 0; n < kBlockCycles && settle_contact_ && block_pressed_; ++n)
+      relaxation_.relax_around_blocks(state_, obstacles);
     for (int n = 0; n < kContactCycles && settle_contact_; ++n)
       relaxation_.relax_contact(state_, obstacles, held_, {held_.data(), given_pressed_});
     work_ = multigrid().log().count();
@@ -237,25 +238,25 @@ void Replica::relax() noexcept {
   ++times_relaxed_;
 }
 
-Replica::Found Replica::found() const {
-  const Parcel& parcel = found_[1 - taking_];
+ShadowObject::Found ShadowObject::found() const {
+  const RowDelta& delta = found_[1 - taking_];
   const std::size_t floats = arrays_of(lattice_) * kRow;
   Found result{
-      {}, {}, near_count_, found_far_, found_limited_, at_rest_, residual_N_, found_parts_[1 - taking_]};
-  for (std::size_t n = 0; n < parcel.count(); ++n) {
-    result.rows.push_back(parcel.row(n));
-    result.values.insert(result.values.end(), parcel.values(n), parcel.values(n) + floats);
+      {}, {}, near_count_, found_far_, found_limited_, at_rest_, residual_N_, found_blocks_[1 - taking_]};
+  for (std::size_t n = 0; n < delta.count(); ++n) {
+    result.rows.push_back(delta.row(n));
+    result.values.insert(result.values.end(), delta.values(n), delta.values(n) + floats);
   }
   return result;
 }
 
-void Replica::find_again(const Found& found) noexcept {
-  Parcel& parcel = found_[1 - taking_];
+void ShadowObject::replay_result(const Found& found) noexcept {
+  RowDelta& delta = found_[1 - taking_];
   const std::size_t floats = arrays_of(lattice_) * kRow;
-  parcel.clear();
+  delta.clear();
   for (std::size_t n = 0; n < found.rows.size(); ++n)
-    std::copy_n(found.values.data() + n * floats, floats, parcel.add(found.rows[n]));
-  found_parts_[1 - taking_] = found.part_ways;
+    std::copy_n(found.values.data() + n * floats, floats, delta.add(found.rows[n]));
+  found_blocks_[1 - taking_] = found.block_moves;
   near_count_ = found.near_count;
   found_far_ = found.far;
   found_limited_ = found.limited;
@@ -264,7 +265,7 @@ void Replica::find_again(const Found& found) noexcept {
 }
 
 // Counted and laid out (there are few distances): the order within one distance is that of the log.
-void Replica::sort_by_distance() noexcept {
+void ShadowObject::sort_by_distance() noexcept {
   const auto rows = multigrid().log().rows(0);
   begin_.fill(0);
   for (std::size_t n = 0; n < rows.size(); ++n) {
@@ -276,9 +277,9 @@ void Replica::sort_by_distance() noexcept {
   for (std::size_t n = 0; n < rows.size(); ++n) by_distance_[begin_[distance_[n]]++] = rows[n];
 }
 
-void Replica::pack_changes() noexcept {
-  Parcel& parcel = found_[1 - taking_];
-  parcel.clear();
+void ShadowObject::pack_changes() noexcept {
+  RowDelta& delta = found_[1 - taking_];
+  delta.clear();
   at_rest_ = relaxation_.asleep();
   residual_N_ = relaxation_.residual_N();
   pack_parts();
@@ -292,19 +293,19 @@ void Replica::pack_changes() noexcept {
     const RowId row = by_distance_[n];
     const bool all = at_rest_ || n < begin_[kNearRows] || given_.find(row) != given_.count();
     if (!pack_row(row, all ? least_m_ : kFarther * least_m_)) {
-      parcel.drop_last();
+      delta.drop_last();
       if (!all) keep_back(row);
     }
-    if (n < near) near_count_ = parcel.count();
+    if (n < near) near_count_ = delta.count();
   }
   if (at_rest_) pack_kept_back();
 }
 
 // What of a row is of a part is then as it was, and so is no change of the row's.
-void Replica::pack_parts() noexcept {
-  PartWays& ways = found_parts_[1 - taking_];
+void ShadowObject::pack_parts() noexcept {
+  BlockMoves& ways = found_blocks_[1 - taking_];
   for (std::size_t p = 0; p < ways.size(); ++p) {
-    const WholeParts& parts = multigrid().parts();
+    const RigidBlocks& parts = multigrid().parts();
     const VoxelId first = parts.first(p);
     glm::vec3 way(0.0F);
     for (int axis = 0; axis < 3; ++axis) {
@@ -316,13 +317,13 @@ void Replica::pack_parts() noexcept {
       continue;
     }
     // Less than it takes to move it there it does not go here either.
-    if (std::max({std::fabs(way.x), std::fabs(way.y), std::fabs(way.z)}) <= multigrid().passed_on_m())
+    if (std::max({std::fabs(way.x), std::fabs(way.y), std::fabs(way.z)}) <= multigrid().restricted_m())
       way = glm::vec3(0.0F);
     ways[p] = glm::dvec3(way);
     for (int axis = 0; axis < 3; ++axis) {
       const auto ua = static_cast<std::size_t>(axis);
       const float to = before_[ua][first] + way[axis];
-      for (const WholeParts::Run& run : parts.on(0, p).rows) {
+      for (const RigidBlocks::Run& run : parts.on(0, p).rows) {
         for (VoxelId v = run.row * kRow; v < (run.row + 1) * kRow; ++v) {
           if ((run.lanes >> v % kRow & 1U) != 0) state_.u[ua][v] = before_[ua][v] = to;
         }
@@ -332,27 +333,27 @@ void Replica::pack_parts() noexcept {
 }
 
 // All of each at once, what else there is of the result near it or not: it has one place.
-void Replica::take_parts(SoftObject& object) noexcept {
-  const PartWays& ways = found_parts_[taking_];
+void ShadowObject::take_parts(SoftObject& object) noexcept {
+  const BlockMoves& ways = found_blocks_[taking_];
   Multigrid& to = object.relaxation_.multigrid();
   for (std::size_t p = 0; p < ways.size(); ++p) {
     if (ways[p] == glm::dvec3(0.0)) continue;
     const VoxelId first = to.parts().first(p);
     const glm::vec3 wanted(object.state_.at(first) + ways[p]);
-    to.move_part(p, ways[p], object.state_, object.obstacle_view(), Multigrid::Tool::is_seen_to,
-                 Multigrid::Note::nowhere);
+    to.move_block(p, ways[p], object.state_, object.obstacle_view(), Multigrid::Tool::is_seen_to,
+                  Multigrid::Note::nowhere);
     if (glm::vec3(object.state_.at(first)) == wanted) continue;
-    for (const WholeParts::Run& run : to.parts().on(0, p).rows) to.log().note(0, run.row);
+    for (const RigidBlocks::Run& run : to.parts().on(0, p).rows) to.log().note(0, run.row);
   }
 }
 
-void Replica::keep_back(RowId row) noexcept {
+void ShadowObject::keep_back(RowId row) noexcept {
   if (kept_back_[row] != 0) return;
   kept_back_[row] = 1;
   rows_kept_back_[kept_back_count_++] = row;
 }
 
-void Replica::pack_kept_back() noexcept {
+void ShadowObject::pack_kept_back() noexcept {
   for (std::size_t n = 0; n < kept_back_count_; ++n) {
     const RowId row = rows_kept_back_[n];
     kept_back_[row] = 0;
@@ -362,7 +363,7 @@ void Replica::pack_kept_back() noexcept {
 }
 
 // False where no voxel changed by more than `least_m`: it waits until it is more.
-bool Replica::pack_row(RowId row, float least_m) noexcept {
+bool ShadowObject::pack_row(RowId row, float least_m) noexcept {
   float* way = found_[1 - taking_].add(row);
   float most = 0.0F;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -383,7 +384,7 @@ bool Replica::pack_row(RowId row, float least_m) noexcept {
   return true;
 }
 
-void Replica::fetch_change_ahead(RowId row) const noexcept {
+void ShadowObject::fetch_change_ahead(RowId row) const noexcept {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     fetch_lines(state_.u[axis].data() + at(row), kRowBytes);
     fetch_lines(before_[axis].data() + at(row), kRowBytes);
@@ -394,7 +395,7 @@ void Replica::fetch_change_ahead(RowId row) const noexcept {
 // no cache has kept since the last result. With nothing else on the machine that is where they are, and it
 // gains nothing; in real time a row takes 0.33 us in place of 0.54. (Of rows that are added together most
 // neighbours just were: what stands around is not fetched for them.)
-void Replica::fetch_ahead(SoftObject& object, std::size_t n, bool together) const noexcept {
+void ShadowObject::fetch_ahead(SoftObject& object, std::size_t n, bool together) const noexcept {
   if (n >= found_[taking_].count()) return;
   const RowId row = found_[taking_].row(n);
   const Grid& g = lattice_.grid();
@@ -412,7 +413,7 @@ void Replica::fetch_ahead(SoftObject& object, std::size_t n, bool together) cons
 }
 
 // Where the nth row of the parcel is to go, or a part of it, which is then left less.
-void Replica::way_of(SoftObject& object, std::size_t n, float part, RowVector& ways) noexcept {
+void ShadowObject::way_of(SoftObject& object, std::size_t n, float part, RowVector& ways) noexcept {
   const RowId row = found_[taking_].row(n);
   float* way = found_[taking_].values(n);
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -429,7 +430,7 @@ void Replica::way_of(SoftObject& object, std::size_t n, float part, RowVector& w
 }
 
 // True where free voxels did not follow; then what is left stands in the parcel.
-bool Replica::take_row(SoftObject& object, std::size_t n, float part) noexcept {
+bool ShadowObject::take_row(SoftObject& object, std::size_t n, float part) noexcept {
   Multigrid& to = object.relaxation_.multigrid();
   const RowId row = found_[taking_].row(n);
   float* way = found_[taking_].values(n);
@@ -453,8 +454,8 @@ bool Replica::take_row(SoftObject& object, std::size_t n, float part) noexcept {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const float* there = object.state_.u[axis].data() + at(row);
     for (std::size_t i = 0; i < kRow; ++i) {
-      const bool blocked = object.state_.role[at(row) + i] == Displacement::obstacle;
-      const float left = blocked ? 0.0F : wanted[axis][i] - there[i];
+      const bool is_jammed = object.state_.role[at(row) + i] == Displacement::obstacle;
+      const float left = is_jammed ? 0.0F : wanted[axis][i] - there[i];
       way[axis * kRow + i] = left;
       most = std::max(most, std::fabs(left));
     }
@@ -465,7 +466,8 @@ bool Replica::take_row(SoftObject& object, std::size_t n, float part) noexcept {
 // The rows first … before last of the parcel, each as far as its links to the others let it where those go.
 // (One after the other, what limits tie together stayed where it was. Where no limit holds there is nothing
 // in the way, and each by itself takes half as long.)
-void Replica::take_jointly(SoftObject& object, std::size_t first, std::size_t last, float part) noexcept {
+void ShadowObject::take_limited_correction(SoftObject& object, std::size_t first, std::size_t last,
+                                           float part) noexcept {
   Multigrid& to = object.relaxation_.multigrid();
   const bool whole = part == 1.0F;
   RowVector left;
@@ -482,7 +484,7 @@ void Replica::take_jointly(SoftObject& object, std::size_t first, std::size_t la
     if (!whole) to.log().note(0, row);
     bool gone = false;
     if (!to.joined(row, object.state_, left, gone)) {
-      if (take_row(object, n, part) && whole) again_.put(n);
+      if (take_row(object, n, part) && whole) retry_.put(n);
       continue;
     }
     object.note_moved(row);
@@ -497,15 +499,15 @@ void Replica::take_jointly(SoftObject& object, std::size_t first, std::size_t la
         most = std::max(most, std::fabs(left[axis][i]));
       }
     }
-    if (most > kFollows * static_cast<float>(lattice_.min_spacing_m())) again_.put(n);
+    if (most > kFollows * static_cast<float>(lattice_.min_spacing_m())) retry_.put(n);
   }
   to.forget_joined();
 }
 
-void Replica::take(SoftObject& object, int parts) noexcept {
+void ShadowObject::take(SoftObject& object, int parts) noexcept {
   taking_ = 1 - taking_;
   take_parts(object);
-  again_.clear();
+  retry_.clear();
   in_turns_ = found_far_;
   together_ = found_far_ || found_limited_;
   drained_ = near_count_;
@@ -516,7 +518,7 @@ void Replica::take(SoftObject& object, int parts) noexcept {
 
 // While parts are left, as much of what was given counts as balanced as has not come yet: the two ends of a
 // way are both at rest, and where forces are linear so is what lies between.
-void Replica::take_part(SoftObject& object, bool last) noexcept {
+void ShadowObject::take_part(SoftObject& object, bool last) noexcept {
   const int left = std::max(parts_left_, 1);
   const bool whole = last || left == 1;
   parts_left_ = whole ? 0 : left - 1;
@@ -527,43 +529,43 @@ void Replica::take_part(SoftObject& object, bool last) noexcept {
     object.keep_away(static_cast<float>(left - 1) / static_cast<float>(left));
   }
   if (together_) {
-    take_jointly(object, 0, near_count_, part);
+    take_limited_correction(object, 0, near_count_, part);
   } else {
     for (std::size_t n = 0; n < near_count_; ++n) {
       fetch_ahead(object, n + kAhead, false);
       // By parts it is rounded otherwise than the other thread knows it.
       if (left > 1) object.relaxation_.multigrid().log().note(0, found_[taking_].row(n));
-      if (take_row(object, n, part) && whole) again_.put(n);
+      if (take_row(object, n, part) && whole) retry_.put(n);
     }
   }
   if (!whole) return;
-  while (again_.count() > 0 && again_.turn() < kTurnsAtOnce)
-    again_.take(kTurns, [&](std::size_t n) { return take_row(object, n); });
+  while (retry_.count() > 0 && retry_.turn() < kTurnsAtOnce)
+    retry_.take(kTurns, [&](std::size_t n) { return take_row(object, n); });
   if (!at_rest_ || !drained()) object.relaxation_.wake();
 }
 
-void Replica::drain(SoftObject& object, std::size_t rows) noexcept {
+void ShadowObject::drain(SoftObject& object, std::size_t rows) noexcept {
   if (in_turns_) {
     const std::size_t count = std::min(rows, found_[taking_].count() - drained_);
-    if (count > 0) take_jointly(object, drained_, drained_ + count, 1.0F);
+    if (count > 0) take_limited_correction(object, drained_, drained_ + count, 1.0F);
     drained_ += count;
     rows -= count;
   }
   for (; rows > 0 && drained_ < found_[taking_].count(); --rows, ++drained_) {
     fetch_ahead(object, drained_ + kAhead, false);
-    if (take_row(object, drained_)) again_.put(drained_);
+    if (take_row(object, drained_)) retry_.put(drained_);
   }
-  for (; rows > 0 && again_.count() > 0; --rows)
-    again_.take(kTurns, [&](std::size_t n) { return take_row(object, n); });
+  for (; rows > 0 && retry_.count() > 0; --rows)
+    retry_.take(kTurns, [&](std::size_t n) { return take_row(object, n); });
 }
 
-std::size_t Replica::memory_bytes() const {
+std::size_t ShadowObject::memory_bytes() const {
   std::size_t bytes = relaxation_.memory_bytes() + obstacles_.size() * sizeof(Obstacle) +
                       state_.role.resident_bytes() + state_.row_standing.resident_bytes() +
                       state_.row_obstacles.resident_bytes() + given_.memory_bytes() +
                       distance_.resident_bytes() + by_distance_.resident_bytes() +
-                      kept_back_.resident_bytes() + rows_kept_back_.resident_bytes() + again_.memory_bytes();
-  for (const Parcel& parcel : found_) bytes += parcel.memory_bytes();
+                      kept_back_.resident_bytes() + rows_kept_back_.resident_bytes() + retry_.memory_bytes();
+  for (const RowDelta& delta : found_) bytes += delta.memory_bytes();
   for (std::size_t axis = 0; axis < 3; ++axis)
     bytes += state_.u[axis].resident_bytes() + before_[axis].resident_bytes();
   return bytes;

@@ -11,12 +11,12 @@
 //            some rows at a time, while the next is relaxed.
 // Displacements are linear where no limit is active, so what is found is added to what the tick did
 // meanwhile. For that each error has to be the business of one of the two. What was given is the other
-// thread's: round the contact it counts as balanced from then on (Relaxation::give_away), and the tick brings
-// to rest only what it moves itself. With X of that left by the tick, and Y of the other by a cycle, what is
-// left is the sum of the two, and never more. (Rejected: both at work on all of it, which leaves X + Y - 1.
-// As long as a tool stood still that was never more energy than was given; but it is -1 for all that both do
-// well, and a tool held in a brain felt 0 to 0.9 N where 0.14 is right. The replica's rows in place of the
-// tick's: there is a step at the seam. Tiles of the object itself for the thread: coarse cells are
+// thread's: round the contact it counts as balanced from then on (Relaxation::assign_residual), and the tick
+// brings to rest only what it moves itself. With X of that left by the tick, and Y of the other by a cycle,
+// what is left is the sum of the two, and never more. (Rejected: both at work on all of it, which leaves X +
+// Y - 1. As long as a tool stood still that was never more energy than was given; but it is -1 for all that
+// both do well, and a tool held in a brain felt 0 to 0.9 N where 0.14 is right. The replica's rows in place
+// of the tick's: there is a step at the seam. Tiles of the object itself for the thread: coarse cells are
 // everybody's.)
 //
 // Coarse cells are not exchanged: each of the two has its own. Nor are changes too small to matter, until all
@@ -42,16 +42,16 @@
 
 #include "voxel/lattice/displacement.h"
 #include "voxel/lattice/lazy_array.h"
-#include "voxel/relaxation/relaxation.h"
 #include "voxel/object/soft_object.h"
+#include "voxel/relaxation/relaxation.h"
 
 namespace voxel {
 
-class Replica {
+class ShadowObject {
  public:
   // In the object's state. From now on the object notes what is written in it, and has to be relaxed here:
   // relax_background() is for objects without a replica. Allocates; throws std::bad_alloc.
-  explicit Replica(SoftObject& object);
+  explicit ShadowObject(SoftObject& object);
 
   // Has anything moved since it was given, or is not at rest yet? Not while something given is still out.
   [[nodiscard]] static bool wanted(const SoftObject& object) { return !object.relaxation_.idle(); }
@@ -67,7 +67,7 @@ class Replica {
   // Adds the next `rows` rows of the rest.
   void drain(SoftObject& object, std::size_t rows) noexcept;
   [[nodiscard]] bool drained() const {
-    return parts_left_ == 0 && drained_ == found_[taking_].count() && again_.count() == 0;
+    return parts_left_ == 0 && drained_ == found_[taking_].count() && retry_.count() == 0;
   }
 
   // ---- between the two, the other thread ----
@@ -80,10 +80,10 @@ class Replica {
     std::size_t near_count = 0;
     bool far = false, limited = false, at_rest = false;
     double residual_N = 0.0;
-    std::vector<glm::dvec3> part_ways;  // as PartWays
+    std::vector<glm::dvec3> block_moves;  // as BlockMoves
   };
   [[nodiscard]] Found found() const;
-  void find_again(const Found& found) noexcept;
+  void replay_result(const Found& found) noexcept;
   [[nodiscard]] std::uint64_t times_relaxed() const { return times_relaxed_; }
   // What the last relax() cost: as many rows, of all levels, as a whole cycle writes in that time.
   [[nodiscard]] std::size_t work() const { return work_; }
@@ -98,10 +98,10 @@ class Replica {
  private:
   // Rows of voxels on their way from one thread to the other, one after the other in memory: to fetch what
   // another core wrote costs more than all that is done with it, and least where it stands in a row.
-  class Parcel {
+  class RowDelta {
    public:
     // Of each row `arrays` of them, [array][lane].
-    explicit Parcel(std::size_t rows, std::size_t arrays = 3)
+    explicit RowDelta(std::size_t rows, std::size_t arrays = 3)
         : floats_(arrays * kRow), rows_(rows), values_(rows * floats_), after_(rows) {}
     void clear() noexcept {
       while (count_ > 0) drop_last();
@@ -137,9 +137,9 @@ class Replica {
   };
   // Entries of a parcel that were not added altogether. In turns: in each the last of those before is the
   // first, since what is in the way of one row is most often the one after it.
-  class Again {
+  class RetryQueue {
    public:
-    explicit Again(std::size_t rows)
+    explicit RetryQueue(std::size_t rows)
         : lists_{LazyArray<std::uint32_t>(rows), LazyArray<std::uint32_t>(rows)}, waits_(rows) {}
     [[nodiscard]] std::size_t count() const { return count_ + next_; }  // that still have a turn
     [[nodiscard]] bool waits(std::size_t n) const { return waits_[n] != 0; }
@@ -196,7 +196,7 @@ class Replica {
   };
 
   // [part without slack] how far it went (m): of these not row by row, in which they could not follow.
-  using PartWays = std::vector<glm::dvec3>;
+  using BlockMoves = std::vector<glm::dvec3>;
 
   [[nodiscard]] Multigrid& multigrid() { return relaxation_.multigrid(); }
   void note_motion(const SoftObject& object) noexcept;
@@ -211,7 +211,7 @@ class Replica {
   void pack_kept_back() noexcept;
   void way_of(SoftObject& object, std::size_t n, float part, RowVector& ways) noexcept;
   bool take_row(SoftObject& object, std::size_t n, float part = 1.0F) noexcept;
-  void take_jointly(SoftObject& object, std::size_t first, std::size_t last, float part) noexcept;
+  void take_limited_correction(SoftObject& object, std::size_t first, std::size_t last, float part) noexcept;
   void fetch_change_ahead(RowId row) const noexcept;
   void fetch_ahead(SoftObject& object, std::size_t n, bool together) const noexcept;
 
@@ -223,13 +223,13 @@ class Replica {
   std::vector<VoxelId> held_;
   std::array<LazyArray<float>, 3> before_;  // [axis][voxel] what is here as the other state knows it
   std::size_t work_ = 0;
-  int quick_ = 0;               // results to come of wide boxes round the contact
-  bool was_quick_ = false;      // the last one was
-  int far_ = 0;                 // results to come that move tissue far
-  bool found_far_ = false;      // the last one did
-  bool found_limited_ = false;  // in the last one limits held what the tool presses
-  bool part_pressed_ = false;   // the tool presses a part without slack
-  float least_m_ = 0.0F;        // smaller changes are not passed on
+  int coarse_first_left_ = 0;      // results to come of wide boxes round the contact
+  bool was_coarse_first_ = false;  // the last one was
+  int large_motion_left_ = 0;      // results to come that move tissue far
+  bool found_far_ = false;         // the last one did
+  bool found_limited_ = false;     // in the last one limits held what the tool presses
+  bool block_pressed_ = false;     // the tool presses a part without slack
+  float least_m_ = 0.0F;           // smaller changes are not passed on
   // Rows whose change waits until all is at rest; some that were passed on since are among them.
   LazyArray<RowId> rows_kept_back_;
   std::size_t kept_back_count_ = 0;
@@ -240,9 +240,9 @@ class Replica {
   LazyArray<RowId> by_distance_;                       // these, nearest to the contact first
 
   // ---- what goes over ----
-  Parcel given_;
-  std::array<Parcel, 2> found_;  // what is drained, and what is found meanwhile: ways, loads of bricks
-  std::array<PartWays, 2> found_parts_;  // as found_
+  RowDelta given_;
+  std::array<RowDelta, 2> found_;  // what is drained, and what is found meanwhile: ways, loads of bricks
+  std::array<BlockMoves, 2> found_blocks_;  // as found_
   std::vector<GivenRole> given_roles_;
   std::vector<GivenObstacle> given_obstacles_;
   std::vector<VoxelId> given_held_;
@@ -253,7 +253,7 @@ class Replica {
   bool settle_contact_ = false;           // in this one
   Relaxation::NearRows near_;             // the contact
   std::size_t taking_ = 0, drained_ = 0;  // which of found_, and how many of its rows
-  Again again_;                           // of these
+  RetryQueue retry_;                      // of these
   bool in_turns_ = false;                 // rows that do not follow have another turn
   bool together_ = false;                 // those near the contact are added together
   std::size_t near_count_ = 0;            // of the other one's: they are near the contact

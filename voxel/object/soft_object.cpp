@@ -52,8 +52,8 @@ SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice)
       pair_held_(lattice_->surface().size()),
       pair_load_(lattice_->surface().size()),
       hanging_entry_(lattice_->surface().size()),
-      tight_rows_(*lattice_),
-      drawn_rows_(*lattice_, kMaxTouched),
+      limit_reactions_(*lattice_),
+      limit_followers_(*lattice_, kMaxTouched),
       carried_mark_(lattice_->size()),
       carried_index_(lattice_->size()) {
   const auto surface = lattice_->surface();
@@ -71,10 +71,10 @@ SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice)
   roots_.reserve(kMaxTouched);
   carried_.reserve(kMaxCarried + kMaxTouched);
   hanging_.reserve(kMaxCarried + kMaxTouched);
-  if (lattice_->part_count() > 0) {
-    part_bounds_.reserve(2 * kMaxTouched);
+  if (lattice_->block_count() > 0) {
+    block_bounds_.reserve(2 * kMaxTouched);
     bound_touch_.reserve(kMaxTouched);
-    part_seen_.resize(lattice_->part_count());
+    block_seen_.resize(lattice_->block_count());
   }
   if (lattice_->voxel_count() < kPreparedWhole) {
     state_.populate(relaxation_.couplings().rows_in_use());
@@ -157,7 +157,7 @@ void SoftObject::touch(std::span<const VoxelId> near) noexcept {
   if (cold_ticks_ > 0) --cold_ticks_;
   rests_ = std::exchange(asked_to_rest_, false);
   contact_work_ = 0;
-  wide_cycle_ = false;
+  split_cycle_ = false;
   if (near.empty()) pressed_last_.clear();
   std::size_t pressed = 0;
   touched_before_.clear();
@@ -171,7 +171,7 @@ void SoftObject::touch(std::span<const VoxelId> near) noexcept {
   for (const Touch& t : touches_) state_.set_role(t.v, resting_role_at(t.surface));
   // What the tool leaves behind springs back, however long it was at rest.
   for (const Touch& t : touches_) {
-    if (t.pressed) relaxation_.stir(t.v / kRow);
+    if (t.pressed) relaxation_.mark_dirty(t.v / kRow);
   }
   touches_.clear();
   for (const VoxelId v : near) {
@@ -230,14 +230,14 @@ void SoftObject::settle_chain() noexcept {
   for (const glm::vec3& move : moves_) most = std::max(most, glm::dot(move, move));
   unrelaxed_m_ += std::sqrt(static_cast<double>(most));
   unsettled_m_ += std::sqrt(static_cast<double>(most));
-  if (unrelaxed_m_ > kStir * lattice_->min_spacing_m()) {
+  if (unrelaxed_m_ > kDirtyMotion * lattice_->min_spacing_m()) {
     unrelaxed_m_ = 0.0;
     relaxation_.wake();
   }
   chain_.settle(state_, sources_, moves_, obstacles_);
   anchors_pull_ = anchors_pull_ || chain_.pulled_anchors();
   contact_work_ += kWorkOfVisit * static_cast<std::size_t>(chain_.work());
-  for (const RowId row : chain_.moved_rows()) relaxation_.stir(row);
+  for (const RowId row : chain_.moved_rows()) relaxation_.mark_dirty(row);
   for (const RowId row : chain_.moved_rows()) note_moved(row);
 }
 
@@ -272,7 +272,7 @@ bool SoftObject::push_out(const ToolInBody& tool) noexcept {
     sources_.push_back(t.v);
     moves_.emplace_back(state_.at(t.v) - before);
   }
-  if (!part_seen_.empty()) push_parts_out(tool);
+  if (!block_seen_.empty()) push_blocks_out(tool);
   if (!sources_.empty()) settle_chain();
   return any;
 }
@@ -292,13 +292,13 @@ bool SoftObject::cycle_due() const noexcept {
   // A contact that stands still is the background's: it comes to rest with all the object, where a box comes
   // to rest with its surroundings held.
   if (to_go < kSettled || cycles_since_touch_ == kMostCycles) return false;
-  const bool apart = relaxation_.left_to_another(), in_parts = apart && wide_cycle_;
+  const bool apart = relaxation_.left_to_another(), in_parts = apart && split_cycle_;
   if (to_go >= kJump && !in_parts && !rests_) return true;
   // Where another brings the object to rest, one cycle a tick then, but for what a wide one leaves of its
   // work. (With two narrow ones forces were no nearer to rest, and ticks took up to half as long again. Never
   // two, with a jump still to go either: tissue beside bone was left 5.8 % of a cell deep in it at 1 m/s.)
   if (cycles_since_touch_ > 0)
-    return apart ? in_parts && left_of(kContactWork) >= shared(kLeastWork) : !wide_cycle_;
+    return apart ? in_parts && left_of(kContactWork) >= shared(kLeastWork) : !split_cycle_;
   // What was let go of has this tick only.
   return !rests_ || !any_pressed();
 }
@@ -311,7 +311,7 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
   tool_ = tool;
   for (int n = 0; n < cycles; ++n) {
     for (Touch& t : touches_) relax_touch(tool, t);
-    if (!part_seen_.empty()) relax_parts(tool);
+    if (!block_seen_.empty()) relax_blocks(tool);
     set_touch_roles();
     if (!cycle_due()) break;
     const bool again = ++cycles_since_touch_ > 1;
@@ -319,7 +319,7 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
     // They are in the order of their ids, so those of a row follow one another.
     for (std::size_t i = 0; i < touches_.size(); ++i) {
       const RowId row = touches_[i].v / kRow;
-      if (i == 0 || touches_[i - 1].v / kRow != row) relaxation_.stir(row);
+      if (i == 0 || touches_[i - 1].v / kRow != row) relaxation_.mark_dirty(row);
     }
     const std::size_t pressed = list_held();
     if (pressed > 0 && pressed_last_.empty()) cold_ticks_ = kColdTicks;
@@ -328,7 +328,7 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
     const std::size_t left = left_of(kContactWork);
     if (relaxation_.under_way()) {
       contact_work_ += relaxation_.continue_contact(state_, obstacle_view(), all_held_, left);
-      wide_cycle_ = true;
+      split_cycle_ = true;
       continue;
     }
     // What the tool just let go of follows it, this once. (Left to the other thread, tissue that a quick tool
@@ -338,7 +338,7 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
     const bool in_parts = relaxation_.left_to_another() && pressed > 0;
     contact_work_ += relaxation_.relax_contact(state_, obstacle_view(), all_held_, pressed_last_, again,
                                                in_parts ? left : Relaxation::kWhole);
-    wide_cycle_ = relaxation_.wide();
+    split_cycle_ = relaxation_.wide();
   }
   // Last, so that what the tool feels is measured with its voxels where they belong; what is pressed first,
   // because what hangs on it by a tight link counts where that is tight still. (In the order of the list half
@@ -348,10 +348,10 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
       if (t.pressed == pressed) relax_touch(tool, t);
     }
   }
-  if (!part_seen_.empty()) relax_parts(tool);
+  if (!block_seen_.empty()) relax_blocks(tool);
   set_touch_roles();
   if (!any_pressed()) pressed_last_.clear();
-  draw_along();
+  move_followers();
 }
 
 // Pairs go to their places while all else stands, and where chains are tight in both objects that lifts the
@@ -361,18 +361,18 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
 void SoftObject::relax_near_pairs() noexcept {
   if (touches_.empty()) {  // no touch() was before
     contact_work_ = 0;
-    wide_cycle_ = false;
+    split_cycle_ = false;
   }
   if (hanging_on_pairs_.empty() || any_pressed() || !relaxation_.left_to_another()) return;
   const bool goes_on = relaxation_.under_way();
   if (std::exchange(asked_to_rest_, false)) return;
   const std::size_t left = left_of(kContactWork);
-  for (const VoxelId v : pair_roots_) relaxation_.stir(v / kRow);
+  for (const VoxelId v : pair_roots_) relaxation_.mark_dirty(v / kRow);
   list_held();
   contact_work_ +=
       goes_on ? relaxation_.continue_contact(state_, obstacle_view(), all_held_, left)
               : relaxation_.relax_contact(state_, obstacle_view(), all_held_, pair_roots_, false, left);
-  wide_cycle_ = relaxation_.wide();
+  split_cycle_ = relaxation_.wide();
 }
 
 void SoftObject::follow(const glm::dvec3& delta) noexcept {
@@ -386,7 +386,7 @@ void SoftObject::follow(const glm::dvec3& delta) noexcept {
     sources_.push_back(t.v);
     moves_.emplace_back(state_.at(t.v) - before);
   }
-  if (!part_seen_.empty()) follow_parts(delta);
+  if (!block_seen_.empty()) follow_blocks(delta);
   if (!sources_.empty()) settle_chain();
 }
 
@@ -464,8 +464,8 @@ bool SoftObject::prepare_exchange() noexcept {
 // What pressed voxels would do now they do not: they follow the tool, and once between two results they look
 // for their places. (Sliding while their neighbours were on their way elsewhere, ever so little more each
 // time, they never came to rest.)
-void SoftObject::give_away() noexcept {
-  relaxation_.give_away(state_, obstacle_view());
+void SoftObject::assign_residual() noexcept {
+  relaxation_.assign_residual(state_, obstacle_view());
   cold_ticks_ = kColdTicks;
   for (Touch& t : touches_) {
     t.left = glm::dvec3(0.0);
@@ -477,7 +477,7 @@ void SoftObject::give_away() noexcept {
 }
 
 void SoftObject::keep_away(float part) noexcept {
-  relaxation_.multigrid().keep_balanced(part, state_);
+  relaxation_.multigrid().keep_frozen_residual(part, state_);
   for (Touch& t : touches_) t.left *= static_cast<double>(part);
 }
 

@@ -17,12 +17,12 @@
 #include <vector>
 
 #include "voxel/chain/chainmail.h"
-#include "voxel/object/contact_energy_observer.h"
 #include "voxel/lattice/displacement.h"
-#include "voxel/relaxation/limit_followers.h"
 #include "voxel/lattice/lattice.h"
-#include "voxel/relaxation/relaxation.h"
+#include "voxel/object/contact_energy_observer.h"
+#include "voxel/relaxation/limit_followers.h"
 #include "voxel/relaxation/limit_reactions.h"
+#include "voxel/relaxation/relaxation.h"
 
 namespace voxel {
 
@@ -96,16 +96,16 @@ class SoftObject {
   // the way of that, and it stays as it is; empty: nothing. Allocates.
   static constexpr std::size_t kLeastOnGrid = 10'000;  // voxels
   std::string use_composite_grid(const ToolInBody& tool);
-  [[nodiscard]] bool uses_grid() const { return grid_ != nullptr; }
+  [[nodiscard]] bool uses_patches() const { return grid_ != nullptr; }
   // While something is pressed.
-  [[nodiscard]] const CompositeGrid* grid_in_use() const { return on_grid_ ? grid_.get() : nullptr; }
+  [[nodiscard]] const CompositeGrid* patches_in_use() const { return on_grid_ ? grid_.get() : nullptr; }
   // Once a tick, while nothing is pressed: what a contact with this tool will need is made ready, a part at a
   // time.
   void come_near_on_grid(const ToolInBody& tool) noexcept;
   // Surface voxels where the contact is: while there is one, what may be touched is among them.
   [[nodiscard]] std::span<const VoxelId> near_on_grid() const { return near_on_grid_; }
   // Boxes many times as wide, for references. Allocates.
-  void widen_grid();
+  void widen_patches();
 
   // ---- the tick; none of these allocates, locks or throws ----
   // The surface voxels near the tool, each once; at most kMaxTouched are kept.
@@ -115,7 +115,7 @@ class SoftObject {
   void relax_near(const ToolInBody& tool, int sweeps) noexcept;
   // Was there, since touch(), a wide cycle round the contact, or a part of one? What it leaves of a tick, as
   // Relaxation counts work.
-  [[nodiscard]] bool wide_cycle() const { return wide_cycle_; }
+  [[nodiscard]] bool large_patch_cycle() const { return split_cycle_; }
   // Of the counted work that a tick has for its contact, where another relaxes the object: 1, all of it, or
   // less, for a machine on which that takes too long. What is not done in one tick is in the next ones.
   void set_work_share(double share) noexcept {
@@ -145,14 +145,14 @@ class SoftObject {
   // Whether a voxel cannot move along `direction` because tight links tie it to what stands still: anchors,
   // or voxels on rigid surfaces. Looks along the largest component of it, no further than some hundred
   // voxels.
-  [[nodiscard]] bool held_fast(VoxelId v, const glm::dvec3& direction) noexcept;
+  [[nodiscard]] bool is_immovable(VoxelId v, const glm::dvec3& direction) noexcept;
   std::uint64_t relax_background(std::uint64_t budget) noexcept;
   // One whole cycle of it, however long that takes; nothing when at rest.
   void relax_cycle() noexcept;
 
   // Before the first set_obstacle(); allocates.
   void reserve_obstacles();
-  // Some of them will move: all memory that this takes, now. Before a Replica is made; allocates.
+  // Some of them will move: all memory that this takes, now. Before a ShadowObject is made; allocates.
   void prepare_beside_bodies();
   // A rigid surface near surface voxel number s (index into lattice().surface()); a zero normal: none any
   // more.
@@ -169,7 +169,7 @@ class SoftObject {
   // none of them can go that way by itself.
   void relax_held(std::span<const VoxelId> pressed) noexcept;
   // An obstacle that surface voxel number s lay on went away: it looks for its place.
-  void stir(std::size_t surface_number) noexcept;
+  void mark_dirty(std::size_t surface_number) noexcept;
   // Where there may be obstacles: rows that the chain moved, or what was found apart, since these were
   // forgotten, each once, the first kMostMovedRows of them.
   static constexpr std::size_t kMostMovedRows = 1024;
@@ -244,7 +244,7 @@ class SoftObject {
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
-  friend class Replica;  // the same object, relaxed elsewhere
+  friend class ShadowObject;  // the same object, relaxed elsewhere
   // Voxels of an object that has all its memory from the start, 280 bytes a voxel: what a tick touches for
   // the first time takes it five times as long. A larger one gets it where it is touched.
   static constexpr std::size_t kPreparedWhole = 1U << 21U;
@@ -267,9 +267,9 @@ class SoftObject {
     glm::dvec3 normal{0.0};
   };
   static constexpr std::size_t kMaxCarried =
-      20'000;                               // voxels that may hang on the pressed ones by tight links
-  static constexpr double kStir = 1e-5;     // of the spacing: voxels that moved less wake nobody
-  static constexpr double kGiveWay = 0.01;  // of the voxel radius: less is left to the next push
+      20'000;                                   // voxels that may hang on the pressed ones by tight links
+  static constexpr double kDirtyMotion = 1e-5;  // of the spacing: voxels that moved less wake nobody
+  static constexpr double kGiveWay = 0.01;      // of the voxel radius: less is left to the next push
   struct Carried {
     VoxelId v;
     std::uint32_t touch;  // whose load it adds to
@@ -284,8 +284,9 @@ class SoftObject {
   [[nodiscard]] Gap gap(const ToolInBody& tool, const glm::dvec3& position) const noexcept;
   // Where a voxel that is in the tool goes, its links wishing it at `wished` (from its rest place); `g`: its
   // gap there, and in the end its last one.
-  [[nodiscard]] glm::dvec3 onto_tool(const ToolInBody& tool, const glm::dvec3& rest, const glm::dvec3& wished,
-                                     const glm::dvec3& compliance, Gap& g) const noexcept;
+  [[nodiscard]] glm::dvec3 project_on_tool(const ToolInBody& tool, const glm::dvec3& rest,
+                                           const glm::dvec3& wished, const glm::dvec3& compliance,
+                                           Gap& g) const noexcept;
   // Is the gap no overlap? Most that is near is far enough to be told so without a root: surely.
   [[nodiscard]] bool surely_clear_of(const ToolInBody& tool, const glm::dvec3& position) const noexcept;
   [[nodiscard]] bool clear_of(const ToolInBody& tool, const glm::dvec3& position) const noexcept;
@@ -298,7 +299,7 @@ class SoftObject {
     return !held_voxels_.empty() && pair_held_[t.surface] != 0;
   }
   void set_touch_roles() noexcept;
-  void give_away() noexcept;            // what pulls near the contact is somebody else's
+  void assign_residual() noexcept;      // what pulls near the contact is somebody else's
   void keep_away(float part) noexcept;  // … and this part of it still is
   std::size_t list_held() noexcept;
   [[nodiscard]] bool any_pressed() const noexcept;
@@ -309,25 +310,27 @@ class SoftObject {
   // its links' limits; where a touched voxel belongs.
   [[nodiscard]] glm::dvec3 no_deeper_in(const ToolInBody& tool, const glm::dvec3& rest, const glm::dvec3& now,
                                         const glm::dvec3& place) const noexcept;
-  [[nodiscard]] glm::dvec3 onto_tool_within(const ToolInBody& tool, const VoxelLinks& links,
-                                            const glm::dvec3& wished, Touch& touch) const noexcept;
+  [[nodiscard]] glm::dvec3 project_on_tool_within_limits(const ToolInBody& tool, const VoxelLinks& links,
+                                                         const glm::dvec3& wished,
+                                                         Touch& touch) const noexcept;
   [[nodiscard]] glm::dvec3 place_of(const ToolInBody& tool, const VoxelLinks& links, Touch& touch) noexcept;
   void relax_touch(const ToolInBody& tool, Touch& touch) noexcept;
   // ---- touched voxels of parts without slack, which move as one (rigid_block_contact.cpp) ----
   template <class Visit>
-  void for_touched_parts(const Visit& visit) noexcept;
-  void bound_part(const ToolInBody& tool, std::uint16_t part, double within_m) noexcept;
-  void push_parts_out(const ToolInBody& tool) noexcept;
-  void follow_parts(const glm::dvec3& delta) noexcept;
-  void relax_parts(const ToolInBody& tool) noexcept;
-  void add_reaction_of_parts(const ToolInBody& tool, Reaction& reaction) noexcept;
-  [[nodiscard]] glm::dvec3 hanging_on_part(std::size_t part, const Multigrid::PartRoom& room) noexcept;
-  void gather_load_with_parts(int axis) noexcept;
+  void for_touched_blocks(const Visit& visit) noexcept;
+  void bound_block(const ToolInBody& tool, std::uint16_t part, double within_m) noexcept;
+  void push_blocks_out(const ToolInBody& tool) noexcept;
+  void follow_blocks(const glm::dvec3& delta) noexcept;
+  void relax_blocks(const ToolInBody& tool) noexcept;
+  void add_reaction_of_blocks(const ToolInBody& tool, Reaction& reaction) noexcept;
+  [[nodiscard]] glm::dvec3 dependents_of_block(std::size_t part,
+                                               const Multigrid::AdmissibleInterval& room) noexcept;
+  void gather_load_with_blocks(int axis) noexcept;
   [[nodiscard]] bool any_pressed(std::uint16_t part) const noexcept;
   void add_stiffness(int axis, glm::dmat3& stiffness) noexcept;
   [[nodiscard]] glm::dvec3 load_on(VoxelId v) noexcept;
   [[nodiscard]] double load_on(VoxelId v, int axis) noexcept;
-  void draw_along() noexcept;
+  void move_followers() noexcept;
   void carry(VoxelId v, std::uint32_t touch) noexcept;
   [[nodiscard]] glm::dvec3 gather_load(glm::dmat3& stiffness) noexcept;
   void add_stiffness_of_touches(int axis, const glm::dvec3& way, glm::dmat3& stiffness) noexcept;
@@ -386,11 +389,11 @@ class SoftObject {
   LazyVector<VoxelId> all_held_;                // by the tool, too
   LazyVector<VoxelId> sources_;
   LazyVector<glm::vec3> moves_;
-  std::vector<PartBound> part_bounds_;      // of one part without slack: of touches, then others
-  std::vector<std::uint32_t> bound_touch_;  // [as part_bounds_] of the first, index into touches_
-  std::vector<std::uint8_t> part_seen_;     // [part] 1: for_touched_parts() was there
-  TightRows tight_rows_;
-  DrawnRows drawn_rows_;
+  std::vector<BlockBound> block_bounds_;    // of one part without slack: of touches, then others
+  std::vector<std::uint32_t> bound_touch_;  // [as block_bounds_] of the first, index into touches_
+  std::vector<std::uint8_t> block_seen_;    // [part] 1: for_touched_blocks() was there
+  LimitReactions limit_reactions_;
+  LimitFollowers limit_followers_;
   std::vector<VoxelId> roots_;              // of these: what is pressed and not anchored
   LazyVector<Carried> carried_;             // [pressed first, then what hangs on them by a tight link]
   LazyVector<Hanging> hanging_;             // [as carried_]
@@ -402,7 +405,7 @@ class SoftObject {
   int cycles_since_touch_ = 0;              // of which there were so many
   int cold_ticks_ = 0;                      // for which what is near the contact is in no cache
   double work_share_ = 1.0;
-  bool wide_cycle_ = false;  // one of those cycles was wide
+  bool split_cycle_ = false;  // one of those cycles was wide
   bool asked_to_rest_ = false;
   bool rests_ = false;     // none of them is begun now, if that can wait
   bool dragging_ = false;  // sources_ are what drag() moved, moves_ where they were

@@ -46,7 +46,8 @@ void go_along(CompositeGrid& grid, const std::array<int, 3>& centre, const glm::
   const double inwards = force_N[axis] > 0.0 ? -1.0 : 1.0, depth_m = inwards * grid.fine_at(centre)[axis];
   if (depth_m < kLeastToScale * spacing_m) return;
   const double part = std::clamp(inwards * way_m[axis] / depth_m, -kMostScaled, kMostScaled);
-  grid.extrapolate(static_cast<std::size_t>(axis), std::pow(1.0 + part, kWithDepth) - 1.0, std::abs(part) * depth_m);
+  grid.extrapolate(static_cast<std::size_t>(axis), std::pow(1.0 + part, kWithDepth) - 1.0,
+                   std::abs(part) * depth_m);
 }
 
 }  // namespace
@@ -72,7 +73,7 @@ std::string SoftObject::use_composite_grid(const ToolInBody& tool) {
   return {};
 }
 
-void SoftObject::widen_grid() {
+void SoftObject::widen_patches() {
   if (!grid_) return;
   auto wide = std::make_unique<CompositeGrid>(*lattice_, CompositeGrid::kReferenceHalfWidth,
                                               CompositeGrid::kReferenceHalfWidth);
@@ -145,7 +146,7 @@ void SoftObject::come_near_on_grid(const ToolInBody& tool) noexcept {
 
 void SoftObject::touch_on_grid(std::span<const VoxelId> near) noexcept {
   contact_work_ = 0;
-  wide_cycle_ = false;
+  split_cycle_ = false;
   if (near.empty()) on_grid_ = false;
   touches_.clear();
   touched_voxels_.clear();
@@ -214,7 +215,7 @@ void SoftObject::put_aside(const ToolInBody& tool) noexcept {
     const glm::dvec3 rest = touches_[near.touch].rest, wished = grid_->unconstrained_minimum(near.voxel);
     Gap g = gap(tool, rest + wished);
     if (g.distance >= 0.0) return;
-    const glm::dvec3 place = onto_tool(tool, rest, wished, grid_->compliance(near.voxel), g);
+    const glm::dvec3 place = project_on_tool(tool, rest, wished, grid_->compliance(near.voxel), g);
     grid_->set_fine(near.voxel, grid_->clamp_to_anchors(near.voxel, place));
   };
   std::for_each(touches_on_grid_.begin(), touches_on_grid_.end(), put);
@@ -246,7 +247,7 @@ void SoftObject::press_on_grid(const ToolInBody& tool) noexcept {
     const glm::dvec3 wished = grid_->unconstrained_minimum(near.voxel);
     Gap g = gap(tool, t.rest + wished);
     if (g.distance >= 0.0) continue;
-    const glm::dvec3 place = onto_tool(tool, t.rest, wished, grid_->compliance(near.voxel), g);
+    const glm::dvec3 place = project_on_tool(tool, t.rest, wished, grid_->compliance(near.voxel), g);
     normal = g.normal;
     normal[bound.axis] = 0.0;
     grid_->press(near.voxel, grid_->clamp_to_anchors(near.voxel, place), normal);

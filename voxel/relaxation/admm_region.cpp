@@ -37,7 +37,7 @@ constexpr double kRounding = 1e-9;  // of the spacing
 
 }  // namespace
 
-LimitedRegion::LimitedRegion(const Lattice& lattice)
+AdmmRegion::AdmmRegion(const Lattice& lattice)
     : lattice_(lattice),
       spacing_m_(lattice.min_spacing_m()),
       number_(lattice.size()),
@@ -51,7 +51,7 @@ LimitedRegion::LimitedRegion(const Lattice& lattice)
   for (auto& of_axis : pressed_) of_axis = LazyArray<float>(lattice.size());
 }
 
-void LimitedRegion::prepare_lists() {
+void AdmmRegion::prepare_lists() {
   const auto fill = [](auto& list) {
     list.resize(list.capacity());
     list.clear();
@@ -62,7 +62,7 @@ void LimitedRegion::prepare_lists() {
   fill(known_);
 }
 
-void LimitedRegion::prepare_all() {
+void AdmmRegion::prepare_all() {
   prepare_lists();
   number_.populate();
   asked_.populate();
@@ -70,14 +70,14 @@ void LimitedRegion::prepare_all() {
   for (auto& of_axis : pressed_) of_axis.populate();
 }
 
-std::uint32_t LimitedRegion::add(VoxelId v) noexcept {
+std::uint32_t AdmmRegion::add(VoxelId v) noexcept {
   if (number_[v] != 0) return number_[v] - 1;
   members_.emplace_back().v = v;
   number_[v] = static_cast<std::uint32_t>(members_.size());
   return number_[v] - 1;
 }
 
-bool LimitedRegion::at_limit(const Displacement& state, VoxelId v, VoxelId up, int d) const noexcept {
+bool AdmmRegion::at_limit(const Displacement& state, VoxelId v, VoxelId up, int d) const noexcept {
   const auto tight = static_cast<float>(kAtLimit * spacing_m_);
   for (int axis = 0; axis < 3; ++axis) {
     const auto b = lattice_.bounds(v, d, axis);
@@ -88,7 +88,7 @@ bool LimitedRegion::at_limit(const Displacement& state, VoxelId v, VoxelId up, i
   return false;
 }
 
-bool LimitedRegion::gather(const Multigrid& multigrid, const Displacement& state, bool with_tool) noexcept {
+bool AdmmRegion::gather(const Multigrid& multigrid, const Displacement& state, bool with_tool) noexcept {
   for (const Member& m : members_) number_[m.v] = 0;
   members_.clear();
   const auto moves = [&](VoxelId v) {
@@ -120,7 +120,7 @@ bool LimitedRegion::gather(const Multigrid& multigrid, const Displacement& state
 }
 
 // All have those beside them, which stand where these do not move.
-void LimitedRegion::add_neighbours() noexcept {
+void AdmmRegion::add_neighbours() noexcept {
   const std::size_t moving = members_.size();
   for (std::size_t i = 0; i < moving; ++i) {
     for (int d = 0; d < 3; ++d) {
@@ -136,11 +136,11 @@ void LimitedRegion::add_neighbours() noexcept {
   }
 }
 
-double LimitedRegion::tighter(const Link& link, std::size_t axis) const noexcept {
+double AdmmRegion::tighter(const Link& link, std::size_t axis) const noexcept {
   return std::min(tighter_m_, 0.25 * (link.high[axis] - link.low[axis]));
 }
 
-void LimitedRegion::prepare_links(Couplings& couplings) noexcept {
+void AdmmRegion::prepare_links(LevelStiffness& couplings) noexcept {
   links_.assign(3 * members_.size(), Link{});
   for (std::size_t i = 0; i < members_.size(); ++i) {
     const Member& m = members_[i];
@@ -169,7 +169,7 @@ void LimitedRegion::prepare_links(Couplings& couplings) noexcept {
 
 // `visit(link, other member, up, d)` for the links of a member.
 template <class Visit>
-void LimitedRegion::for_links(std::size_t i, const Visit& visit) const noexcept {
+void AdmmRegion::for_links(std::size_t i, const Visit& visit) const noexcept {
   const Member& m = members_[i];
   for (std::size_t d = 0; d < 3; ++d) {
     if (m.up[d] != kNone) visit(links_[3 * i + d], members_[m.up[d]], true);
@@ -178,8 +178,8 @@ void LimitedRegion::for_links(std::size_t i, const Visit& visit) const noexcept 
 }
 
 // False where there is nothing to be done, or to be found.
-bool LimitedRegion::prepare(Multigrid& multigrid, const Displacement& state,
-                            const ObstacleView& obstacles) noexcept {
+bool AdmmRegion::prepare(Multigrid& multigrid, const Displacement& state,
+                         const ObstacleView& obstacles) noexcept {
   for (Member& m : members_) {
     const glm::dvec3 at = state.at(m.v);
     m.from = m.found = {at.x, at.y, at.z};
@@ -217,7 +217,7 @@ bool LimitedRegion::prepare(Multigrid& multigrid, const Displacement& state,
 }
 
 // Each to the least of the energy of its links, limits and obstacle, the others where they are.
-void LimitedRegion::sweep(bool forwards) noexcept {
+void AdmmRegion::sweep(bool forwards) noexcept {
   const std::size_t count = members_.size();
   for (std::size_t n = 0; n < count; ++n) {
     const std::size_t i = forwards ? n : count - 1 - n;
@@ -239,7 +239,7 @@ void LimitedRegion::sweep(bool forwards) noexcept {
   }
 }
 
-void LimitedRegion::set_multipliers() noexcept {
+void AdmmRegion::set_multipliers() noexcept {
   for (std::size_t i = 0; i < members_.size(); ++i) {
     Member& m = members_[i];
     for (std::size_t d = 0; d < 3; ++d) {
@@ -269,7 +269,7 @@ void LimitedRegion::set_multipliers() noexcept {
 
 // Brings what was found on one axis within its limits: down as far as the shortest way from any other lets it
 // be, or up. What limits allow is closed under least and most, so that both, one after the other, do it.
-bool LimitedRegion::come_within(std::size_t axis, bool downwards) noexcept {
+bool AdmmRegion::come_within(std::size_t axis, bool downwards) noexcept {
   const std::size_t count = members_.size();
   for (int n = 0; n < kMostPasses; ++n) {
     bool changed = false;
@@ -295,7 +295,7 @@ bool LimitedRegion::come_within(std::size_t axis, bool downwards) noexcept {
 }
 
 // Brings what was found within limits, and outside of obstacles as far as these let it.
-bool LimitedRegion::allow() noexcept {
+bool AdmmRegion::allow() noexcept {
   for (int n = 0; n < kRounds; ++n) {
     bool deep = false;
     for (Member& m : members_) {
@@ -315,7 +315,7 @@ bool LimitedRegion::allow() noexcept {
 }
 
 // The part of the way to what was found, at the end of which the energy is least.
-double LimitedRegion::share() const noexcept {
+double AdmmRegion::share() const noexcept {
   double most = 1.0, slope = 0.0, curvature = 0.0;
   for (std::size_t i = 0; i < members_.size(); ++i) {
     const Member& m = members_[i];
@@ -340,7 +340,7 @@ double LimitedRegion::share() const noexcept {
   return slope < 0.0 && curvature > 0.0 ? std::min(most, -slope / curvature) : 0.0;
 }
 
-void LimitedRegion::forget(Multigrid& multigrid, VoxelId v) noexcept {
+void AdmmRegion::forget(Multigrid& multigrid, VoxelId v) noexcept {
   multigrid.tie(v, glm::vec3(0.0F));
   const auto forget_of = [v](LazyArray<float>& of_axis) {
     if (of_axis[v] != 0.0F) of_axis[v] = 0.0F;  // what was only read takes no memory
@@ -350,7 +350,7 @@ void LimitedRegion::forget(Multigrid& multigrid, VoxelId v) noexcept {
   asked_[v] = 0;
 }
 
-void LimitedRegion::forget(Multigrid& multigrid) noexcept {
+void AdmmRegion::forget(Multigrid& multigrid) noexcept {
   for (const Member& m : members_) number_[m.v] = 0;
   members_.clear();
   on_body_.clear();
@@ -359,7 +359,7 @@ void LimitedRegion::forget(Multigrid& multigrid) noexcept {
   found_ = false;
 }
 
-void LimitedRegion::pass(Multigrid& multigrid) noexcept {
+void AdmmRegion::pass(Multigrid& multigrid) noexcept {
   if (known_.empty()) return;
   ++calls_;
   std::size_t kept = 0;
@@ -373,7 +373,7 @@ void LimitedRegion::pass(Multigrid& multigrid) noexcept {
   known_.resize(kept);
 }
 
-void LimitedRegion::keep_multipliers(Multigrid& multigrid) noexcept {
+void AdmmRegion::keep_multipliers(Multigrid& multigrid) noexcept {
   for (std::size_t i = 0; i < members_.size(); ++i) {
     const Member& m = members_[i];
     if (asked_[m.v] == 0) {
@@ -404,8 +404,8 @@ void LimitedRegion::keep_multipliers(Multigrid& multigrid) noexcept {
   pass(multigrid);
 }
 
-double LimitedRegion::relax(Multigrid& multigrid, Displacement& state, const ObstacleView& obstacles,
-                            std::span<const VoxelId> on_body, bool briefly) noexcept {
+double AdmmRegion::relax(Multigrid& multigrid, Displacement& state, const ObstacleView& obstacles,
+                         std::span<const VoxelId> on_body, bool briefly) noexcept {
   looked_at_ = 0;
   found_ = false;
   tighter_m_ = (obstacles.moving > 0 ? kTighter : kTighterAtTool) * spacing_m_;
@@ -441,12 +441,12 @@ double LimitedRegion::relax(Multigrid& multigrid, Displacement& state, const Obs
       if (m.inverse[axis] > 0.0) most_N = std::max(most_N, std::fabs(way) / m.inverse[axis]);
     }
     state.set(m.v, to);
-    multigrid.stir(0, m.v / kRow);
+    multigrid.mark_dirty(0, m.v / kRow);
   }
   return most_N;
 }
 
-std::size_t LimitedRegion::memory_bytes() const {
+std::size_t AdmmRegion::memory_bytes() const {
   std::size_t bytes = resident_bytes(on_body_) + resident_bytes(members_) + resident_bytes(links_) +
                       resident_bytes(known_) + number_.resident_bytes() + asked_.resident_bytes();
   for (const auto& of_axis : beyond_) bytes += of_axis.resident_bytes();

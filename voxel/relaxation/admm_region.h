@@ -33,9 +33,9 @@
 
 namespace voxel {
 
-class LimitedRegion {
+class AdmmRegion {
  public:
-  explicit LimitedRegion(const Lattice& lattice);
+  explicit AdmmRegion(const Lattice& lattice);
   // All its memory now, which else comes where a body first goes.
   void prepare_all();
   // … but what is kept by voxel, a large part of which no tool comes to.
@@ -89,7 +89,7 @@ class LimitedRegion {
   bool gather(const Multigrid& multigrid, const Displacement& state, bool with_tool) noexcept;
   void add_neighbours() noexcept;
   bool prepare(Multigrid& multigrid, const Displacement& state, const ObstacleView& obstacles) noexcept;
-  void prepare_links(Couplings& couplings) noexcept;
+  void prepare_links(LevelStiffness& couplings) noexcept;
   [[nodiscard]] double tighter(const Link& link, std::size_t axis) const noexcept;
   template <class Visit>
   void for_links(std::size_t i, const Visit& visit) const noexcept;

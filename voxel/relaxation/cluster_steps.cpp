@@ -27,18 +27,18 @@ float room(const Lattice& lattice, const LazyArray<float>& u, VoxelId from, int 
 
 }  // namespace
 
-ClusterMoves::ClusterMoves(const Lattice& lattice) : lattice_(lattice), mark_(lattice.size()) {
+ClusterSteps::ClusterSteps(const Lattice& lattice) : lattice_(lattice), mark_(lattice.size()) {
   cluster_.reserve(kMostVoxels);
   seen_.reserve(kMostLookedAt);
 }
 
-void ClusterMoves::begin() noexcept {
+void ClusterSteps::begin() noexcept {
   for (const VoxelId v : seen_) mark_[v] = 0;
   seen_.clear();
   looked_at_ = 0;
 }
 
-void ClusterMoves::forget(int axis) noexcept {
+void ClusterSteps::forget(int axis) noexcept {
   for (const VoxelId v : cluster_) {
     const bool fresh = mark_[v] == kIn;
     mark_[v] = static_cast<std::uint8_t>((mark_[v] | (2U << axis)) & ~kIn);
@@ -50,7 +50,7 @@ void ClusterMoves::forget(int axis) noexcept {
   }
 }
 
-bool ClusterMoves::gather(const Multigrid& multigrid, const Displacement& state, VoxelId v, int axis,
+bool ClusterSteps::gather(const Multigrid& multigrid, const Displacement& state, VoxelId v, int axis,
                           bool upwards) noexcept {
   const LazyArray<float>& u = state.u[static_cast<std::size_t>(axis)];
   const float tight = kTight * static_cast<float>(lattice_.min_spacing_m());
@@ -60,8 +60,8 @@ bool ClusterMoves::gather(const Multigrid& multigrid, const Displacement& state,
   for (std::size_t head = 0; head < cluster_.size(); ++head) {
     const VoxelId w = cluster_[head];
     if (++looked_at_ > kMostLookedAt || lattice_.anchored(w)) return false;
-    const bool in_part = state.role[w] == Displacement::joined;
-    if (in_part ? multigrid.tool_holds_part(lattice_.part(w) - 1U) : state.role[w] != Displacement::free)
+    const bool in_block = state.role[w] == Displacement::joined;
+    if (in_block ? multigrid.tool_presses_block(lattice_.part(w) - 1U) : state.role[w] != Displacement::free)
       return false;
     for (int d = 0; d < 3; ++d) {
       for (const bool up : {false, true}) {
@@ -77,13 +77,13 @@ bool ClusterMoves::gather(const Multigrid& multigrid, const Displacement& state,
   return true;
 }
 
-double ClusterMoves::move(Multigrid& multigrid, Displacement& state, VoxelId v, int axis,
+double ClusterSteps::move(Multigrid& multigrid, Displacement& state, VoxelId v, int axis,
                           double least_N) noexcept {
   if ((mark_[v] & (2U << axis)) != 0 || looked_at_ > kMostLookedAt) return 0.0;
-  Couplings& couplings = multigrid.couplings();
+  LevelStiffness& couplings = multigrid.couplings();
   const std::uint16_t part = lattice_.part(v);
   const double own =
-      (part != 0 ? multigrid.part_force(part - 1U, state) : link_force(couplings, state, v))[axis];
+      (part != 0 ? multigrid.block_force(part - 1U, state) : link_force(couplings, state, v))[axis];
   if (std::fabs(own) <= least_N) return 0.0;
   const bool upwards = own > 0.0;
   const bool free = gather(multigrid, state, v, axis, upwards);
@@ -115,7 +115,7 @@ double ClusterMoves::move(Multigrid& multigrid, Displacement& state, VoxelId v, 
   return force;
 }
 
-std::size_t ClusterMoves::memory_bytes() const {
+std::size_t ClusterSteps::memory_bytes() const {
   return resident_bytes(cluster_) + resident_bytes(seen_) + mark_.resident_bytes();
 }
 

@@ -13,17 +13,17 @@
 #include <cstdint>
 #include <vector>
 
-#include "voxel/lattice/level_stiffness.h"
 #include "voxel/lattice/displacement.h"
 #include "voxel/lattice/lattice.h"
 #include "voxel/lattice/lazy_array.h"
+#include "voxel/lattice/level_stiffness.h"
 #include "voxel/multigrid/fas.h"
 
 namespace voxel {
 
-class ClusterMoves {
+class ClusterSteps {
  public:
-  explicit ClusterMoves(const Lattice& lattice);
+  explicit ClusterSteps(const Lattice& lattice);
 
   // The voxel, pulled on this axis against a limit, and all that has to come along: moves them. Does nothing
   // where one of them is held, anchored or at an obstacle, where what they are pulled by together points the

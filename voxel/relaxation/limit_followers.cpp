@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include "voxel/lattice/voxel_links.h"
 #include "voxel/lattice/plastic_offsets.h"
+#include "voxel/lattice/voxel_links.h"
 
 namespace voxel {
 namespace {
@@ -40,7 +40,7 @@ std::array<float, 2> bounds_of(const RowLimits& limits, std::size_t lane) {
 
 // The links of a voxel in kD: what they pull it with, and where they let it be.
 template <std::size_t kAxis, std::size_t kD>
-void add_links(const RowCouplings& springs, const RowLimits& limits, std::size_t lane, float up, float down,
+void add_links(const RowStiffness& springs, const RowLimits& limits, std::size_t lane, float up, float down,
                float& pull, std::array<float, 2>& interval) {
   const std::size_t at = kD * kRow + lane;
   const float k_up = (kAxis == kD ? springs.up_along : springs.up_across)[at],
@@ -61,7 +61,7 @@ void add_links(const RowCouplings& springs, const RowLimits& limits, std::size_t
 
 }  // namespace
 
-DrawnRows::DrawnRows(const Lattice& lattice, std::size_t most_roots)
+LimitFollowers::LimitFollowers(const Lattice& lattice, std::size_t most_roots)
     : lattice_(lattice), yields_(lattice.yields()), entry_(lattice.grid().rows()) {
   for (std::size_t d = 0; d < 3; ++d)
     spacing_m_[d] = static_cast<float>(lattice.spacing_m()[static_cast<int>(d)]);
@@ -70,9 +70,9 @@ DrawnRows::DrawnRows(const Lattice& lattice, std::size_t most_roots)
 }
 
 // Null: nothing is in it, or too many were looked at.
-DrawnRows::Row* DrawnRows::look_at(RowId row) noexcept {
+LimitFollowers::Row* LimitFollowers::look_at(RowId row) noexcept {
   if (entry_[row] != 0) return &rows_[entry_[row] - 1U];
-  Couplings& couplings = relaxation_->couplings();
+  LevelStiffness& couplings = relaxation_->couplings();
   if (rows_.size() == rows_.capacity() || !couplings.prepare(row)) return nullptr;
   Row& out = rows_.emplace_back();
   entry_[row] = static_cast<std::uint16_t>(rows_.size());
@@ -88,11 +88,11 @@ DrawnRows::Row* DrawnRows::look_at(RowId row) noexcept {
   return &out;
 }
 
-void DrawnRows::draw(Relaxation& relaxation, Displacement& state, std::span<const VoxelId> roots,
-                     float stir) noexcept {
+void LimitFollowers::draw(Relaxation& relaxation, Displacement& state, std::span<const VoxelId> roots,
+                          float mark_dirty) noexcept {
   relaxation_ = &relaxation;
   state_ = &state;
-  stir_ = stir;
+  mark_dirty_ = mark_dirty;
   for (const Row& r : rows_) entry_[r.row] = 0;
   rows_.clear();
   draw_on<0>(roots);
@@ -101,7 +101,7 @@ void DrawnRows::draw(Relaxation& relaxation, Displacement& state, std::span<cons
 }
 
 template <std::size_t kAxis>
-void DrawnRows::draw_on(std::span<const VoxelId> roots) noexcept {
+void LimitFollowers::draw_on(std::span<const VoxelId> roots) noexcept {
   for (Row& r : rows_) r.closed = r.stays;
   drawn_.clear();
   for (const VoxelId v : roots) {
@@ -121,7 +121,7 @@ void DrawnRows::draw_on(std::span<const VoxelId> roots) noexcept {
 
 // At a voxel from the one below it in kD (kUp), or from the one above.
 template <std::size_t kAxis, std::size_t kD, bool kUp>
-void DrawnRows::look_from(VoxelId from, VoxelId at) noexcept {
+void LimitFollowers::look_from(VoxelId from, VoxelId at) noexcept {
   Row* row = look_at(at / kRow);
   const std::size_t lane = at % kRow;
   if (row == nullptr || (row->closed >> lane & 1U) != 0) return;
@@ -132,9 +132,9 @@ void DrawnRows::look_from(VoxelId from, VoxelId at) noexcept {
   if (room(before) > kNearlyTight * spacing_m_[kD]) return;
   const float place = place_of<kAxis>(*row, at);
   u[at] = place;
-  if (!row->stirred && std::fabs(place - before) > stir_ * spacing_m_[kD]) {
-    row->stirred = true;
-    relaxation_->stir(row->row);
+  if (!row->dirty && std::fabs(place - before) > mark_dirty_ * spacing_m_[kD]) {
+    row->dirty = true;
+    relaxation_->mark_dirty(row->row);
   }
   if (!row->noted) {
     row->noted = true;
@@ -145,12 +145,12 @@ void DrawnRows::look_from(VoxelId from, VoxelId at) noexcept {
 
 // Where a voxel would be if all else stood still.
 template <std::size_t kAxis>
-float DrawnRows::place_of(const Row& row, VoxelId v) const noexcept {
+float LimitFollowers::place_of(const Row& row, VoxelId v) const noexcept {
   const std::size_t lane = v % kRow;
   const float* u = state_->u[kAxis].data();
   const auto at = [&](VoxelId w) { return u[w]; };
   float pull = row.bricks[kAxis] != nullptr ? row.bricks[kAxis][lane] : 0.0F;
-  if (yields_) pull = yielded_load(lattice_, *state_, relaxation_->couplings().springs_of(v), v)[kAxis];
+  if (yields_) pull = plastic_load(lattice_, *state_, relaxation_->couplings().springs_of(v), v)[kAxis];
   constexpr float kFar = std::numeric_limits<float>::max();
   std::array<float, 2> interval{-kFar, kFar};
   add_links<kAxis, 0>(row.springs, row.limits, lane, at(lattice_.up(v, 0)), at(lattice_.down(v, 0)), pull,

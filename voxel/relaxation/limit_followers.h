@@ -13,27 +13,28 @@
 #include <span>
 #include <vector>
 
-#include "voxel/lattice/level_stiffness.h"
 #include "voxel/lattice/displacement.h"
 #include "voxel/lattice/lattice.h"
 #include "voxel/lattice/lazy_array.h"
+#include "voxel/lattice/level_stiffness.h"
 #include "voxel/relaxation/relaxation.h"
 
 namespace voxel {
 
-class DrawnRows {
+class LimitFollowers {
  public:
   static constexpr std::size_t kMostDrawn = 2000;   // voxels that come along on an axis, and a few
   static constexpr std::size_t kMostRows = 16'384;  // that are looked at; what is further away stays
 
   // Allocates; throws std::bad_alloc.
-  DrawnRows(const Lattice& lattice, std::size_t most_roots);
+  LimitFollowers(const Lattice& lattice, std::size_t most_roots);
 
   // Each free voxel beside one of `roots` (at most most_roots, none anchored), or beside one that was brought
   // along, goes to where its links, and what else pulls it, would have it, as far as those let it, if the
   // link between the two is near a limit; if it is at one afterwards, the voxel was brought along. Voxels
   // that move by more than `stir` of the spacing stir their rows. Does not allocate or throw.
-  void draw(Relaxation& relaxation, Displacement& state, std::span<const VoxelId> roots, float stir) noexcept;
+  void draw(Relaxation& relaxation, Displacement& state, std::span<const VoxelId> roots,
+            float mark_dirty) noexcept;
 
   [[nodiscard]] std::size_t memory_bytes() const {
     return entry_.resident_bytes() + resident_bytes(rows_) + resident_bytes(drawn_);
@@ -45,8 +46,8 @@ class DrawnRows {
     RowId row = 0;
     std::uint32_t stays = 0;   // no voxel, anchored, or not free
     std::uint32_t closed = 0;  // these, and what is in drawn_
-    bool noted = false, stirred = false;
-    RowCouplings springs;
+    bool noted = false, dirty = false;
+    RowStiffness springs;
     RowLimits limits;
     std::array<const float*, 3> bricks{}, balance{};  // [axis] what pulls besides (N); null: nothing
   };
@@ -70,7 +71,7 @@ class DrawnRows {
   bool yields_;
   Relaxation* relaxation_ = nullptr;  // while it draws
   Displacement* state_ = nullptr;
-  float stir_ = 0.0F;
+  float mark_dirty_ = 0.0F;
   LazyArray<std::uint16_t> entry_;  // [row] 1 + index into rows_; 0: not looked at
   LazyVector<Row> rows_;
   std::vector<VoxelId> drawn_;  // the roots first

@@ -5,8 +5,8 @@
 #include <bit>
 #include <bitset>
 
-#include "voxel/multigrid/fas.h"
 #include "voxel/lattice/near_limit.h"
+#include "voxel/multigrid/fas.h"
 
 namespace voxel {
 namespace {
@@ -23,19 +23,19 @@ double sum_of(const float* lanes, std::uint32_t bits) {
 
 }  // namespace
 
-struct TightRows::Gathering {
-  Couplings& couplings;
+struct LimitReactions::Gathering {
+  LevelStiffness& couplings;
   std::span<const VoxelId> roots;  // sorted
   const Multigrid* multigrid;      // null: there are no parts without slack
-  std::uint16_t root_part;         // number of the one whose voxels are the roots; 0: of none
+  std::uint16_t source_block;      // number of the one whose voxels are the roots; 0: of none
   bool border_known = false;       // all of that one's border was looked at
-  std::bitset<Lattice::kMostParts> known;
-  std::array<double, Lattice::kMostParts> pull_N;  // of those known
+  std::bitset<Lattice::kMaxBlocks> known;
+  std::array<double, Lattice::kMaxBlocks> pull_N;  // of those known
 
   // (By their own links its voxels are pulled this way and that, and an inclusion between the tool and the
   // anchors, in tissue at its limits, ended what hangs on the tool: half of the force was lost.)
-  void pull_as_parts(const Displacement& state, int axis, Row& row) {
-    std::uint32_t of_parts = 0, up = 0, down = 0;
+  void pull_as_blocks(const Displacement& state, int axis, Row& row) {
+    std::uint32_t of_blocks = 0, up = 0, down = 0;
     std::uint16_t last = 0;  // most rows have one
     double pull = 0.0;
     for (VoxelId lane = 0; lane < kRow; ++lane) {
@@ -46,44 +46,44 @@ struct TightRows::Gathering {
         pull = pull_of(number - 1U, state, axis);
       }
       const std::uint32_t bit = 1U << lane;
-      of_parts |= bit;
+      of_blocks |= bit;
       up |= pull > 0.0 ? bit : 0U;
       down |= pull < 0.0 ? bit : 0U;
-      if (number == root_part) row.roots |= bit;
+      if (number == source_block) row.roots |= bit;
     }
-    row.links.pulled_up = (row.links.pulled_up & ~of_parts) | up;
-    row.links.pulled_down = (row.links.pulled_down & ~of_parts) | down;
+    row.links.pulled_up = (row.links.pulled_up & ~of_blocks) | up;
+    row.links.pulled_down = (row.links.pulled_down & ~of_blocks) | down;
   }
 
   double pull_of(std::size_t part, const Displacement& state, int axis) {
     if (!known[part]) {
       known.set(part);
-      pull_N[part] = multigrid->part_force(part, state)[axis];
+      pull_N[part] = multigrid->block_force(part, state)[axis];
     }
     return pull_N[part];
   }
 
   // Is all that there is in a row of the part whose voxels are the roots?
-  [[nodiscard]] bool within_root_part(const Lattice& lattice, RowId row) const {
-    if (root_part == 0 || !multigrid->parts().fill_row(0, row)) return false;
+  [[nodiscard]] bool within_source_block(const Lattice& lattice, RowId row) const {
+    if (source_block == 0 || !multigrid->parts().fill_row(0, row)) return false;
     for (VoxelId v = row * kRow; v < (row + 1) * kRow; ++v) {
-      if (lattice.filled(v) && multigrid->parts().of(0, v) != root_part) return false;
+      if (lattice.filled(v) && multigrid->parts().of(0, v) != source_block) return false;
     }
     return true;
   }
 };
 
-TightRows::TightRows(const Lattice& lattice) : lattice_(lattice), entry_(lattice.grid().rows()) {
+LimitReactions::LimitReactions(const Lattice& lattice) : lattice_(lattice), entry_(lattice.grid().rows()) {
   rows_.reserve(kMostRows);
   queue_.resize(kMostRows);
 }
 
 // Null: nothing is in it, or too many were looked at.
-TightRows::Row* TightRows::look_at(RowId row) noexcept {
+LimitReactions::Row* LimitReactions::look_at(RowId row) noexcept {
   if (entry_[row] != 0) return &rows_[entry_[row] - 1U];
   if (rows_.size() == kMostRows || !gathering_->couplings.prepare(row)) return nullptr;
   // The inside of a part whose border was looked at.
-  if (gathering_->border_known && gathering_->within_root_part(lattice_, row)) return nullptr;
+  if (gathering_->border_known && gathering_->within_source_block(lattice_, row)) return nullptr;
   const Grid& g = lattice_.grid();
   const auto ua = static_cast<std::size_t>(axis_);
   LevelRow at;
@@ -98,7 +98,7 @@ TightRows::Row* TightRows::look_at(RowId row) noexcept {
   out.row = row;
   links_at_limits(at, gathering_->couplings.limits(row), ua, tight, out.links);
   if (gathering_->multigrid != nullptr && gathering_->multigrid->parts().in_row(0, row))
-    gathering_->pull_as_parts(*state_, axis_, out);
+    gathering_->pull_as_blocks(*state_, axis_, out);
   entry_[row] = static_cast<std::uint16_t>(rows_.size());
   const auto& roots = gathering_->roots;
   for (auto v = std::lower_bound(roots.begin(), roots.end(), row * kRow);
@@ -110,14 +110,14 @@ TightRows::Row* TightRows::look_at(RowId row) noexcept {
 
 // Voxels of a row that links at their limits push against what pulls them; of the links whose upper, or
 // lower, ends they are.
-std::uint32_t TightRows::pushed(const Row& row, std::uint32_t at_low, std::uint32_t at_high,
-                                End end) noexcept {
+std::uint32_t LimitReactions::pushed(const Row& row, std::uint32_t at_low, std::uint32_t at_high,
+                                     End end) noexcept {
   const std::uint32_t up = end == End::upper ? at_low : at_high, down = end == End::upper ? at_high : at_low;
   return (up & row.links.pulled_down) | (down & row.links.pulled_up) | (up & down);
 }
 
 // And what hangs on these in the row itself.
-void TightRows::add(Row& row, std::uint32_t bits) noexcept {
+void LimitReactions::add(Row& row, std::uint32_t bits) noexcept {
   const std::uint32_t before = row.carried, low = row.links.at_low[0], high = row.links.at_high[0];
   row.carried |= bits;
   const std::uint32_t upwards = pushed(row, low << 1U, high << 1U, End::upper) & row.links.movable,
@@ -131,7 +131,7 @@ void TightRows::add(Row& row, std::uint32_t bits) noexcept {
 }
 
 // What of a row hangs on voxels beside it, by links at their limits whose `end` it is.
-void TightRows::ask(RowId row, std::uint32_t at_low, std::uint32_t at_high, End end) noexcept {
+void LimitReactions::ask(RowId row, std::uint32_t at_low, std::uint32_t at_high, End end) noexcept {
   if ((at_low | at_high) == 0) return;
   Row* to = look_at(row);
   if (to == nullptr) return;
@@ -139,7 +139,7 @@ void TightRows::ask(RowId row, std::uint32_t at_low, std::uint32_t at_high, End 
   if (more != 0) add(*to, more);
 }
 
-void TightRows::begin(Gathering& gathering, Displacement& state, int axis) noexcept {
+void LimitReactions::begin(Gathering& gathering, Displacement& state, int axis) noexcept {
   gathering_ = &gathering;
   state_ = &state;
   axis_ = axis;
@@ -148,8 +148,8 @@ void TightRows::begin(Gathering& gathering, Displacement& state, int axis) noexc
   head_ = waiting_ = 0;
 }
 
-void TightRows::gather(Couplings& couplings, Displacement& state, std::span<const VoxelId> roots,
-                       int axis) noexcept {
+void LimitReactions::gather(LevelStiffness& couplings, Displacement& state, std::span<const VoxelId> roots,
+                            int axis) noexcept {
   Gathering gathering{couplings, roots, nullptr, 0, false, {}, {}};
   begin(gathering, state, axis);
   for (const VoxelId v : roots) {
@@ -167,17 +167,17 @@ void TightRows::gather(Couplings& couplings, Displacement& state, std::span<cons
   gathering_ = nullptr;
 }
 
-void TightRows::gather_on_part(Couplings& couplings, Displacement& state, const Multigrid& multigrid,
-                               std::size_t part, int axis) noexcept {
+void LimitReactions::gather_on_block(LevelStiffness& couplings, Displacement& state,
+                                     const Multigrid& multigrid, std::size_t part, int axis) noexcept {
   Gathering gathering{couplings, {}, &multigrid, static_cast<std::uint16_t>(part + 1), false, {}, {}};
   begin(gathering, state, axis);
-  for (const WholeParts::Link& l : multigrid.parts().on(0, part).border) look_at(l.cell / kRow);
+  for (const RigidBlocks::Link& l : multigrid.parts().on(0, part).border) look_at(l.cell / kRow);
   gathering.border_known = true;
   find_all();
   gathering_ = nullptr;
 }
 
-void TightRows::find_all() noexcept {
+void LimitReactions::find_all() noexcept {
   const Grid& g = lattice_.grid();
   while (waiting_ > 0) {
     Row& row = rows_[queue_[head_]];  // rows_ never grows beyond what was reserved, so it stays where it is
@@ -199,7 +199,7 @@ void TightRows::find_all() noexcept {
   }
 }
 
-bool TightRows::tight(VoxelId root) const noexcept {
+bool LimitReactions::tight(VoxelId root) const noexcept {
   const Row* own = find(root / kRow);
   if (own == nullptr) return false;
   const VoxelId lane = root % kRow;
@@ -215,14 +215,14 @@ bool TightRows::tight(VoxelId root) const noexcept {
   return false;
 }
 
-TightRows::Hanging TightRows::hanging(const Couplings& couplings) const noexcept {
+LimitReactions::Hanging LimitReactions::hanging(const LevelStiffness& couplings) const noexcept {
   Hanging sum;
   const RowId row_z = lattice_.grid().row_z, row_x = lattice_.grid().row_x;
   for (const Row& r : rows_) {
     const std::uint32_t hangs = r.carried & ~r.roots;
     if (hangs == 0) continue;
     sum.force_N += sum_of(r.links.pull_N.data(), hangs);
-    RowCouplings s;
+    RowStiffness s;
     couplings.all(r.row, s);
     const std::array<std::uint32_t, 3> up{r.carried >> 1U | carried_in(r.row + row_x) << (kRow - 1),
                                           carried_in(r.row + 1), carried_in(r.row + row_z)};

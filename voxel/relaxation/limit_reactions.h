@@ -11,32 +11,33 @@
 #include <span>
 #include <vector>
 
-#include "voxel/lattice/level_stiffness.h"
 #include "voxel/lattice/displacement.h"
 #include "voxel/lattice/lattice.h"
 #include "voxel/lattice/lazy_array.h"
+#include "voxel/lattice/level_stiffness.h"
 #include "voxel/multigrid/row_smoother.h"
 
 namespace voxel {
 
 class Multigrid;
 
-class TightRows {
+class LimitReactions {
  public:
   static constexpr std::size_t kMostRows = 4096;  // that are looked at; what is further away hangs on nothing
 
   // Allocates; throws std::bad_alloc.
-  explicit TightRows(const Lattice& lattice);
+  explicit LimitReactions(const Lattice& lattice);
 
   // ---- none of these allocates or throws ----
   // On one axis, all that hangs on `roots` (in the order of their ids, none anchored), one by another: a
   // voxel does where a link to one of these is at a limit and pushes it the way its own links, and what else
   // pulls it, do not. One that its link lets go neither way hangs on it in any case. What was found before is
   // forgotten.
-  void gather(Couplings& couplings, Displacement& state, std::span<const VoxelId> roots, int axis) noexcept;
+  void gather(LevelStiffness& couplings, Displacement& state, std::span<const VoxelId> roots,
+              int axis) noexcept;
   // The same of what hangs on a part without slack. A voxel of another one is pulled as the whole of that is.
-  void gather_on_part(Couplings& couplings, Displacement& state, const Multigrid& multigrid, std::size_t part,
-                      int axis) noexcept;
+  void gather_on_block(LevelStiffness& couplings, Displacement& state, const Multigrid& multigrid,
+                       std::size_t part, int axis) noexcept;
   // Is it one of them, or a root that they hang on? Of other roots it may say either.
   [[nodiscard]] bool carried(VoxelId v) const noexcept {
     return (carried_in(v / kRow) >> v % kRow & 1U) != 0;
@@ -48,7 +49,7 @@ class TightRows {
   struct Hanging {
     double force_N = 0.0, stiffness_N_per_m = 0.0;
   };
-  [[nodiscard]] Hanging hanging(const Couplings& couplings) const noexcept;
+  [[nodiscard]] Hanging hanging(const LevelStiffness& couplings) const noexcept;
 
   [[nodiscard]] std::size_t memory_bytes() const {
     return entry_.resident_bytes() + resident_bytes(rows_) + resident_bytes(queue_);

@@ -30,10 +30,10 @@ constexpr float kFarthest = 2.0F;
 constexpr std::uint64_t kPatient = 200'000;  // voxel updates a call: more than a tick has
 constexpr std::uint64_t kNextFirst = 7919;   // of these voxels is looked at first in the next round
 // Cells round a contact that are smoothed, on each level.
-constexpr int kContactMargin = 3, kWideMargin = 14;
+constexpr int kContactMargin = 3, kLargePatchMargin = 14;
 // … and told after a jump. (All cells there are: no nearer, and of 10^6 voxels a third of the first result's
 // time, since each row has to go over to the tick, too. Within 16: what was told then disturbed later ones.)
-constexpr int kToldMargin = 24;
+constexpr int kProlongedMargin = 24;
 constexpr int kNear = 2;  // rows that a cycle round a contact reads beyond those it brings to rest
 constexpr std::uint64_t kBesideContact = 2;  // this part of the budget is left beside cycles round a contact
 // Loads of bricks: what a row of them takes, in voxel updates, and what part of a budget they may have.
@@ -45,8 +45,8 @@ constexpr int kLooksAtOnce = 256;  // tiles looked at for what coarse levels hav
 Relaxation::Relaxation(const Lattice& lattice)
     : lattice_(lattice),
       multigrid_(lattice),
-      clusters_(lattice),
-      limited_(std::make_unique<LimitedRegion>(lattice)) {
+      cluster_steps_(lattice),
+      limited_(std::make_unique<AdmmRegion>(lattice)) {
   set_tolerance(kMeasured * kRestingResidual * lattice.force_scale_N());
   farthest_m_ = kFarthest * static_cast<float>(lattice.max_spacing_m());
   boxes_.resize(static_cast<std::size_t>(multigrid_.levels()));
@@ -71,7 +71,7 @@ void Relaxation::prepare_under_tool() {
 }
 
 void Relaxation::prepare_beside_bodies() {
-  multigrid_.prepare_tied();
+  multigrid_.prepare_limit_loads();
   limited_->prepare_all();
 }
 
@@ -79,7 +79,7 @@ void Relaxation::set_tolerance(double tolerance_N) noexcept {
   tolerance_N_ = tolerance_N;
   // A motion below this changes no force by more than the tolerance.
   const double scale = lattice_.force_scale_N();
-  multigrid_.set_quiet(
+  multigrid_.set_motion_tolerance(
       static_cast<float>(tolerance_N),
       scale > 0.0 ? static_cast<float>(tolerance_N / scale * lattice_.min_spacing_m()) : 0.0F);
 }
@@ -98,7 +98,7 @@ void Relaxation::leave_to_another() {
   multigrid_.keep_log();
 }
 
-void Relaxation::give_away(Displacement& state, const ObstacleView& obstacles) noexcept {
+void Relaxation::assign_residual(Displacement& state, const ObstacleView& obstacles) noexcept {
   asleep_ = away_ = true;
   end_contact();
   multigrid_.begin_anew();
@@ -109,12 +109,12 @@ void Relaxation::give_away(Displacement& state, const ObstacleView& obstacles) n
         multigrid_.balance(g.row(c, j, k), state, obstacles);
     }
   }
-  multigrid_.balance_parts(state);
+  multigrid_.balance_blocks(state);
 }
 
-void Relaxation::stir_all() noexcept {
+void Relaxation::mark_all_dirty() noexcept {
   for (RowId row = 0; row < lattice_.grid().rows(); ++row) {
-    if (lattice_.filled_in(row) != 0) multigrid_.stir(0, row);
+    if (lattice_.filled_in(row) != 0) multigrid_.mark_dirty(0, row);
   }
 }
 
@@ -133,7 +133,7 @@ void Relaxation::hold_what_stands(const Displacement& state, std::span<const Vox
   // the springs know: there the region went to and fro.
   tool_presses_ = tool_presses_ && !others_hold && !lattice_.has_bricks();
   multigrid_.set_held(standing_);
-  multigrid_.set_part_contacts(state, held);
+  multigrid_.set_block_contacts(state, held);
 }
 
 std::uint64_t Relaxation::run(Displacement& state, const ObstacleView& obstacles,
@@ -152,7 +152,7 @@ std::uint64_t Relaxation::run(Displacement& state, const ObstacleView& obstacles
   spend(kBrickUpdates * multigrid_.renew_bricks(state, 1 + budget / (kBrickShare * kBrickUpdates)));
   while (!asleep_ && credit_ > 0) {
     if (keeping_) {
-      spend(keep_yielded(state, static_cast<std::uint64_t>(credit_)));
+      spend(commit_plastic_offsets(state, static_cast<std::uint64_t>(credit_)));
       continue;
     }
     if (round_left_ == 0) round_left_ = tiles.waiting();
@@ -184,7 +184,7 @@ void Relaxation::run_cycle(Displacement& state, const ObstacleView& obstacles,
                            std::span<const VoxelId> held) noexcept {
   if (asleep_) return;
   if (keeping_) {
-    while (keeping_) keep_yielded(state, ~std::uint64_t{0});
+    while (keeping_) commit_plastic_offsets(state, ~std::uint64_t{0});
     return;
   }
   hold_what_stands(state, held);
@@ -206,8 +206,8 @@ std::size_t Relaxation::relax_contact(Displacement& state, const ObstacleView& o
   lay_contact_boxes(pressed, kContactMargin, Visits::once);
   const RowBox& b = boxes(0).smoothed;
   const Grid& g = lattice_.grid();
-  near_.first = {b.q0 / kOctets + 1, std::max(b.j0 - kNear, 0), std::max(b.k0 - kNear, 0)};
-  near_.last = {b.q1 / kOctets + 1, std::min(b.j1 + kNear, g.dims[1] - 1),
+  near_.first = {b.q0 / kLaneGroups + 1, std::max(b.j0 - kNear, 0), std::max(b.k0 - kNear, 0)};
+  near_.last = {b.q1 / kLaneGroups + 1, std::min(b.j1 + kNear, g.dims[1] - 1),
                 std::min(b.k1 + kNear, g.dims[2] - 1)};
   end_contact();
   smoothed_ = apart_ && again;
@@ -248,33 +248,33 @@ std::size_t Relaxation::run_steps(Displacement& state, const ObstacleView& obsta
   return done;
 }
 
-std::size_t Relaxation::relax_widely(Displacement& state, const ObstacleView& obstacles,
-                                     std::span<const VoxelId> held, std::span<const VoxelId> pressed,
-                                     bool coarse_first) noexcept {
+std::size_t Relaxation::relax_large_patch(Displacement& state, const ObstacleView& obstacles,
+                                          std::span<const VoxelId> held, std::span<const VoxelId> pressed,
+                                          bool coarse_first) noexcept {
   hold_what_stands(state, held);
   multigrid_.release_limited();
-  lay_contact_boxes(pressed, kWideMargin, Visits::twice);
-  tells_jointly_ = true;
+  lay_contact_boxes(pressed, kLargePatchMargin, Visits::twice);
+  is_limited_correction_ = true;
   if (coarse_first) {
     run_coarse_first(state, obstacles);
     run_steps_over(steps() - 1, steps(), state, obstacles, Look::all);
   } else {
     cycle(state, obstacles, Look::all);
   }
-  tells_jointly_ = false;
+  is_limited_correction_ = false;
   return octets_of_cycle();
 }
 
-std::size_t Relaxation::tell_widely(Displacement& state, const ObstacleView& obstacles,
-                                    std::span<const VoxelId> pressed) noexcept {
-  lay_contact_boxes(pressed, kToldMargin, Visits::once);
-  tells_jointly_ = true;
+std::size_t Relaxation::prolong_large_patch(Displacement& state, const ObstacleView& obstacles,
+                                            std::span<const VoxelId> pressed) noexcept {
+  lay_contact_boxes(pressed, kProlongedMargin, Visits::once);
+  is_limited_correction_ = true;
   std::size_t told = 0;
   for (int l = last_level() - 1; l >= 0; --l) {
-    tell_box(l, state, obstacles, kAllPlanes);
+    prolong_box(l, state, obstacles, kAllPlanes);
     told += octets(boxes(l).told);
   }
-  tells_jointly_ = false;
+  is_limited_correction_ = false;
   return told;
 }
 
@@ -307,7 +307,7 @@ std::uint64_t Relaxation::relax_tile(Displacement& state, const ObstacleView& ob
   cycle(state, obstacles, Look::all);
   std::uint64_t updates = 0;
   for (const LevelBoxes& b : boxes_) {
-    updates += static_cast<std::uint64_t>(b.smoothed.q1 - b.smoothed.q0 + 1) * kOctet *
+    updates += static_cast<std::uint64_t>(b.smoothed.q1 - b.smoothed.q0 + 1) * kLanes *
                static_cast<std::uint64_t>(b.smoothed.j1 - b.smoothed.j0 + 1) *
                static_cast<std::uint64_t>(b.smoothed.k1 - b.smoothed.k0 + 1);
   }
@@ -327,14 +327,14 @@ bool Relaxation::relax_limited(Displacement& state, const ObstacleView& obstacle
 
 // What limits held in this round moves with what it pulls on; returns the largest force a voxel that did (N).
 // Which voxel is first goes round, so that all have their turn however few a round has time for.
-double Relaxation::move_clusters(Displacement& state, const ObstacleView& obstacles) noexcept {
-  clusters_.begin();
+double Relaxation::step_clusters(Displacement& state, const ObstacleView& obstacles) noexcept {
+  cluster_steps_.begin();
   double most_N = 0.0;
   std::array<double, 3> went{};
   int moves = 0;
   const auto move = [&](VoxelId v, int axis) {
     const float from = state.u[static_cast<std::size_t>(axis)][v];
-    const double force = clusters_.move(multigrid_, state, v, axis, 0.5 * tolerance_N_);
+    const double force = cluster_steps_.move(multigrid_, state, v, axis, 0.5 * tolerance_N_);
     if (force == 0.0) return;
     most_N = std::max(most_N, force);
     // Every such step lowers the energy, though it may be far from limit to limit to where the force falls.
@@ -343,10 +343,10 @@ double Relaxation::move_clusters(Displacement& state, const ObstacleView& obstac
     ++moves;
     if (std::fabs(way) > kProgress * lattice_.min_spacing_m())
       cycles_without_gain_ = std::min(cycles_without_gain_, kPatience / 2 + 1);
-    for (const VoxelId w : clusters_.moved()) multigrid_.stir(0, w / kRow);
+    for (const VoxelId w : cluster_steps_.moved()) multigrid_.mark_dirty(0, w / kRow);
   };
   // Parts without slack that limits hold, which are pulled otherwise than what holds them.
-  for (std::size_t p = 0; multigrid_.has_parts() && p < multigrid_.parts().count(); ++p) {
+  for (std::size_t p = 0; multigrid_.has_blocks() && p < multigrid_.parts().count(); ++p) {
     for (int axis = 0; axis < 3; ++axis) move(multigrid_.parts().first(p), axis);
   }
   std::uint64_t count = 0;
@@ -366,17 +366,18 @@ double Relaxation::move_clusters(Displacement& state, const ObstacleView& obstac
     if (further > kDrift * lattice_.min_spacing_m())
       cycles_without_gain_ = std::min(cycles_without_gain_, kPatience / 2 + 1);
   }
-  credit_ -= static_cast<std::int64_t>(clusters_.looked_at());
+  credit_ -= static_cast<std::int64_t>(cluster_steps_.looked_at());
   return most_N;
 }
 
 // A round has looked at all that moves: is it at rest?
 void Relaxation::end_round(Displacement& state, const ObstacleView& obstacles, double residual_N) noexcept {
-  residual_N = std::max(residual_N, static_cast<double>(multigrid_.bricks().left_N()));
+  residual_N = std::max(residual_N, static_cast<double>(multigrid_.bricks().unbalanced_N()));
   // Only when nothing else moves any more: between other corrections they would undo one another (energy grew
   // 1.9 times within a cycle).
-  if (residual_N < kNearRest * tolerance_N_ || cycles_without_gain_ > kPatience / 2 || multigrid_.has_parts())
-    residual_N = std::max(residual_N, move_clusters(state, obstacles));
+  if (residual_N < kNearRest * tolerance_N_ || cycles_without_gain_ > kPatience / 2 ||
+      multigrid_.has_blocks())
+    residual_N = std::max(residual_N, step_clusters(state, obstacles));
   // While rounds gain nothing, what limits hold stays held for a few of them: let go of in every round, two
   // sets of voxels can take turns for ever.
   // What the tool presses, and all that hangs on it by links at their limits, goes together, too: a few
@@ -424,7 +425,7 @@ void Relaxation::end_round(Displacement& state, const ObstacleView& obstacles, d
   asleep_ = true;
 }
 
-std::uint64_t Relaxation::keep_yielded(Displacement& state, std::uint64_t budget) noexcept {
+std::uint64_t Relaxation::commit_plastic_offsets(Displacement& state, std::uint64_t budget) noexcept {
   std::uint64_t spent = 0;
   const auto rows = static_cast<RowId>(lattice_.grid().rows());
   for (; keep_row_ < rows && spent < budget; ++keep_row_, ++spent) {
@@ -448,7 +449,7 @@ bool Relaxation::tile_waits_for_coarse(std::size_t number) const noexcept {
       for (int j = j0; j < std::min(j0 + rows, g.dims[1]); ++j) {
         const RowId row = g.row(column, j, k);
         if (multigrid_.has(level, row, Multigrid::changed) &&
-            multigrid_.untold(level, row) > multigrid_.quiet_m())
+            multigrid_.pending_correction(level, row) > multigrid_.motion_tolerance_m())
           return true;
       }
     }
@@ -457,7 +458,7 @@ bool Relaxation::tile_waits_for_coarse(std::size_t number) const noexcept {
 }
 
 std::size_t Relaxation::memory_bytes() const {
-  return multigrid_.memory_bytes() + clusters_.memory_bytes() + limited_->memory_bytes() +
+  return multigrid_.memory_bytes() + cluster_steps_.memory_bytes() + limited_->memory_bytes() +
          boxes_.capacity() * sizeof(LevelBoxes) + resident_bytes(standing_);
 }
 

@@ -20,18 +20,18 @@
 #include <span>
 #include <vector>
 
-#include "voxel/relaxation/cluster_steps.h"
 #include "voxel/lattice/displacement.h"
 #include "voxel/lattice/lattice.h"
 #include "voxel/lattice/voxel_links.h"
 #include "voxel/multigrid/fas.h"
+#include "voxel/relaxation/cluster_steps.h"
 
 namespace voxel {
 
 // An object counts as at rest when no free voxel is pulled by more than this share of the force scale.
 inline constexpr double kRestingResidual = 1e-5;
 
-class LimitedRegion;
+class AdmmRegion;
 
 class Relaxation {
  public:
@@ -76,33 +76,34 @@ class Relaxation {
   // too much after two times four such cycles, and 69 % after two times six in which it stayed held.)
   // After a jump `coarse_first`: the coarse levels come to rest among themselves, and then tell all voxels of
   // the boxes at once. One such cycle is worth four others there. Returns octets.
-  std::size_t relax_widely(Displacement& state, const ObstacleView& obstacles, std::span<const VoxelId> held,
-                           std::span<const VoxelId> pressed, bool coarse_first) noexcept;
+  std::size_t relax_large_patch(Displacement& state, const ObstacleView& obstacles,
+                                std::span<const VoxelId> held, std::span<const VoxelId> pressed,
+                                bool coarse_first) noexcept;
   // Coarse levels tell what is round such boxes what they know, and no more. Returns octets.
-  std::size_t tell_widely(Displacement& state, const ObstacleView& obstacles,
-                          std::span<const VoxelId> pressed) noexcept;
+  std::size_t prolong_large_patch(Displacement& state, const ObstacleView& obstacles,
+                                  std::span<const VoxelId> pressed) noexcept;
   // A cycle over all of the object, coarse levels first. Voxels are told last, and not smoothed:
-  // relax_round_parts() has to follow. (Smoothed everywhere before that, a force was 0.9 % off in place of
+  // relax_around_blocks() has to follow. (Smoothed everywhere before that, a force was 0.9 % off in place of
   // 0.2.) Returns octets, as a whole cycle's.
   std::size_t run_thoroughly(Displacement& state, const ObstacleView& obstacles,
                              std::span<const VoxelId> held) noexcept;
-  // What limits hold under the tool (see LimitedRegion), after cycles that are not of whole rounds.
+  // What limits hold under the tool (see AdmmRegion), after cycles that are not of whole rounds.
   void relax_limited(Displacement& state, const ObstacleView& obstacles) noexcept;
   // A cycle round each part without slack that the tool presses: springs all about it are what is felt.
-  void relax_round_parts(Displacement& state, const ObstacleView& obstacles) noexcept;
+  void relax_around_blocks(Displacement& state, const ObstacleView& obstacles) noexcept;
 
-  [[nodiscard]] Couplings& couplings() { return multigrid_.couplings(); }
+  [[nodiscard]] LevelStiffness& couplings() { return multigrid_.couplings(); }
   [[nodiscard]] Multigrid& multigrid() { return multigrid_; }
   [[nodiscard]] const Multigrid& multigrid() const { return multigrid_; }
 
   // Voxels of a row (v / kRow) were moved by somebody else: it and the rows beside it are to be looked at.
-  void stir(RowId row) noexcept { multigrid_.stir(0, row); }
-  void stir_all() noexcept;
+  void mark_dirty(RowId row) noexcept { multigrid_.mark_dirty(0, row); }
+  void mark_all_dirty() noexcept;
   // Where links round voxels that lie on a body are at their limits: these and all round them go on towards
   // their least energy. False: no link is.
   bool relax_limited(Displacement& state, const ObstacleView& obstacles,
                      std::span<const VoxelId> on_body) noexcept;
-  [[nodiscard]] const LimitedRegion& limited() const { return *limited_; }
+  [[nodiscard]] const AdmmRegion& limited() const { return *limited_; }
   // Did links at their limits hold what the tool, or a body, presses, when they were last asked?
   [[nodiscard]] bool limits_hold() const noexcept;
   // Something moved: relax until the residual is below the tolerance again.
@@ -112,15 +113,15 @@ class Relaxation {
     drift_m_ = furthest_m_ = {};
   }
   [[nodiscard]] bool asleep() const { return asleep_ && !away_; }
-  // From now on another relaxes it (shadow_object.h), and what is left to do here is to follow the tool with what
-  // is near the contact. Allocates.
+  // From now on another relaxes it (shadow_object.h), and what is left to do here is to follow the tool with
+  // what is near the contact. Allocates.
   void leave_to_another();
   [[nodiscard]] bool left_to_another() const { return apart_; }
   // … and is at it now.
   [[nodiscard]] bool away() const { return away_; }
   // It was given to that: nothing to do here until somebody moves something. What pulls near the contact is
   // the other's business now, and counts as balanced here.
-  void give_away(Displacement& state, const ObstacleView& obstacles) noexcept;
+  void assign_residual(Displacement& state, const ObstacleView& obstacles) noexcept;
   [[nodiscard]] bool idle() const { return asleep_; }
   // What comes with that, and with take_over(), done ahead of it: what coarse cells had still to tell is
   // lost.
@@ -176,17 +177,17 @@ class Relaxation {
   struct LevelBoxes {
     RowBox smoothed;                         // what is brought to rest
     RowBox parents;                          // cells that hold what is brought to rest on the level below
-    RowBox tellers;                          // these, and the cells beside them
-    int first_teller = 0, last_teller = -1;  // cells along x
+    RowBox source_cells;                     // these, and the cells beside them
+    int first_source = 0, last_source = -1;  // cells along x
     RowBox told;                             // what the next level's tellers have something to tell
   };
   enum class Look : std::uint8_t { all, active };  // rows at rest are left alone
 
   void end_round(Displacement& state, const ObstacleView& obstacles, double residual_N) noexcept;
   void hold_what_stands(const Displacement& state, std::span<const VoxelId> held) noexcept;
-  double move_clusters(Displacement& state, const ObstacleView& obstacles) noexcept;
+  double step_clusters(Displacement& state, const ObstacleView& obstacles) noexcept;
   std::uint64_t relax_tile(Displacement& state, const ObstacleView& obstacles, std::size_t number) noexcept;
-  std::uint64_t keep_yielded(Displacement& state, std::uint64_t budget) noexcept;
+  std::uint64_t commit_plastic_offsets(Displacement& state, std::uint64_t budget) noexcept;
   [[nodiscard]] bool tile_waits_for_coarse(std::size_t number) const noexcept;
 
   // ---- one cycle (v_cycle.cpp) ----
@@ -202,7 +203,7 @@ class Relaxation {
   // then smoothed. A level that is solved again was smoothed last.
   struct Step {
     int level;
-    enum What : std::uint8_t { smooths, passes_on, solves, tells, smooths_after } what;
+    enum What : std::uint8_t { smooths, restricts, solves, is_source, smooths_after } what;
   };
   void list_steps();  // of cycles of either kind; allocates
   void add_steps(std::vector<Step>& to, int level, Visits visits, bool again) const;
@@ -225,13 +226,13 @@ class Relaxation {
   std::size_t run_steps(Displacement& state, const ObstacleView& obstacles, std::size_t at_once) noexcept;
   [[nodiscard]] std::size_t work_of_step(int n) const noexcept;
   [[nodiscard]] std::size_t work_of_planes(int n, int first) const noexcept;  // of it, from that plane on
-  void pass_on(int level, Displacement& state, const ObstacleView& obstacles, Look look,
-               Planes planes) noexcept;
+  void restrict_residual(int level, Displacement& state, const ObstacleView& obstacles, Look look,
+                         Planes planes) noexcept;
   void fetch_ahead_below(int level, RowId row, const Displacement& state) const noexcept;
   void smooth_box(int level, int first_colour, Displacement& state, const ObstacleView& obstacles, Look look,
                   Planes planes) noexcept;
-  void tell_box(int level, Displacement& state, const ObstacleView& obstacles, Planes planes) noexcept;
-  bool mark_tellers(int level, Displacement& state, const ObstacleView& obstacles) noexcept;
+  void prolong_box(int level, Displacement& state, const ObstacleView& obstacles, Planes planes) noexcept;
+  bool mark_source_cells(int level, Displacement& state, const ObstacleView& obstacles) noexcept;
   // A cycle whose coarse levels come to rest among themselves; voxels are told last, and not smoothed.
   void run_coarse_first(Displacement& state, const ObstacleView& obstacles) noexcept;
   void run_steps_over(int first, int last, Displacement& state, const ObstacleView& obstacles,
@@ -244,16 +245,16 @@ class Relaxation {
   [[nodiscard]] RowBox clipped(int level, const RowBox& box) const noexcept;
   [[nodiscard]] int last_level() const noexcept;  // of a cycle
   [[nodiscard]] static std::size_t octets(const RowBox& box);
-  [[nodiscard]] static WholeParts::Box cells(const RowBox& b) {
-    return {{b.q0 * kOctet, b.j0, b.k0}, {b.q1 * kOctet + kOctet - 1, b.j1, b.k1}};
+  [[nodiscard]] static RigidBlocks::Box cells(const RowBox& b) {
+    return {{b.q0 * kLanes, b.j0, b.k0}, {b.q1 * kLanes + kLanes - 1, b.j1, b.k1}};
   }
   [[nodiscard]] std::size_t octets_of_cycle() const noexcept;
   [[nodiscard]] LevelBoxes& boxes(int level) { return boxes_[static_cast<std::size_t>(level)]; }
 
   const Lattice& lattice_;
   Multigrid multigrid_;
-  ClusterMoves clusters_;
-  std::unique_ptr<LimitedRegion> limited_;
+  ClusterSteps cluster_steps_;
+  std::unique_ptr<AdmmRegion> limited_;
   std::vector<LevelBoxes> boxes_;
   std::array<std::vector<Step>, 2> steps_;  // [Visits]
   Visits visits_ = Visits::once;            // of the cycle whose boxes these are
@@ -270,13 +271,13 @@ class Relaxation {
   bool contact_relaxed_ = false;  // since run() last was
   bool wide_ = false;
   double narrow_share_ = 1.0;
-  int step_ = 0;                // the next one of a cycle round the contact, with its boxes in boxes_
-  int plane_ = 0;               // … and the next plane of that
-  bool any_tell_ = false;       // has a level of it anything to tell?
-  bool smoothed_ = false;       // and on its way down nothing is smoothed
-  bool unkept_ = false;         // some link is beyond what it keeps
-  bool keeping_ = false;        // it is kept now
-  bool tells_jointly_ = false;  // voxels are told all at once
+  int step_ = 0;                        // the next one of a cycle round the contact, with its boxes in boxes_
+  int plane_ = 0;                       // … and the next plane of that
+  bool any_source_ = false;             // has a level of it anything to tell?
+  bool smoothed_ = false;               // and on its way down nothing is smoothed
+  bool unkept_ = false;                 // some link is beyond what it keeps
+  bool keeping_ = false;                // it is kept now
+  bool is_limited_correction_ = false;  // voxels are told all at once
   double residual_N_ = 0.0, running_residual_N_ = 0.0, tolerance_N_ = 0.0, least_residual_N_ = 0.0;
   float hold_ = 1.0F;
   std::array<double, 3> drift_m_{}, furthest_m_{};  // of clusters at limits, since it was woken

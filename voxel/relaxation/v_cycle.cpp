@@ -36,8 +36,9 @@ int Relaxation::last_level() const noexcept {
 template <class Visit>
 void Relaxation::for_rows(int level, const RowBox& box, const Visit& visit) noexcept {
   const Grid& g = multigrid_.grid(level);
-  for (int c = box.q0 / kOctets; c <= box.q1 / kOctets && box.q0 <= box.q1; ++c) {
-    const OctetSpan span{std::max(box.q0 - c * kOctets, 0), std::min(box.q1 - c * kOctets, kOctets - 1)};
+  for (int c = box.q0 / kLaneGroups; c <= box.q1 / kLaneGroups && box.q0 <= box.q1; ++c) {
+    const LaneSpan span{std::max(box.q0 - c * kLaneGroups, 0),
+                        std::min(box.q1 - c * kLaneGroups, kLaneGroups - 1)};
     for (int k = box.k0; k <= box.k1; ++k) {
       for (int j = box.j0; j <= box.j1; ++j) {
         const RowId row = g.row(c + 1, j, k);
@@ -49,7 +50,7 @@ void Relaxation::for_rows(int level, const RowBox& box, const Visit& visit) noex
 
 Relaxation::RowBox Relaxation::clipped(int level, const RowBox& b) const noexcept {
   const Grid& g = multigrid_.grid(level);
-  return {std::max(b.q0, 0), std::min(b.q1, (g.columns - 2) * kOctets - 1),
+  return {std::max(b.q0, 0), std::min(b.q1, (g.columns - 2) * kLaneGroups - 1),
           std::max(b.j0, 0), std::min(b.j1, g.dims[1] - 1),
           std::max(b.k0, 0), std::min(b.k1, g.dims[2] - 1)};
 }
@@ -74,27 +75,27 @@ void Relaxation::lay_boxes(const std::array<int, 3>& low, const std::array<int, 
     const bool narrow = wide != kNoContact && l == 0;
     const int pair = narrow ? 0 : 1;
     RowBox& s = boxes(l).smoothed;
-    s = clipped(l, {(from[0] / kOctet) & ~pair, (to[0] / kOctet) | pair, from[1] & ~1, to[1] | 1,
+    s = clipped(l, {(from[0] / kLanes) & ~pair, (to[0] / kLanes) | pair, from[1] & ~1, to[1] | 1,
                     from[2] & ~1, to[2] | 1});
     if (l == last) break;
     const RowBox p{s.q0 / 2, s.q1 / 2, s.j0 / 2, s.j1 / 2, s.k0 / 2, s.k1 / 2};
     boxes(l + 1).parents = p;
     // They and the cells beside them tell all they hold what they know, and the voxels beside those their
     // part of it.
-    boxes(l + 1).tellers = clipped(l + 1, {p.q0 - 1, p.q1 + 1, p.j0 - 1, p.j1 + 1, p.k0 - 1, p.k1 + 1});
-    const RowBox& t = boxes(l + 1).tellers;
+    boxes(l + 1).source_cells = clipped(l + 1, {p.q0 - 1, p.q1 + 1, p.j0 - 1, p.j1 + 1, p.k0 - 1, p.k1 + 1});
+    const RowBox& t = boxes(l + 1).source_cells;
     RowBox& told = boxes(l).told;
     told = clipped(l, {2 * p.q0 - 2, 2 * p.q1 + 3, 2 * t.j0 - 1, 2 * t.j1 + 2, 2 * t.k0 - 1, 2 * t.k1 + 2});
-    boxes(l + 1).first_teller = std::max(p.q0 * kOctet - 1, 0);
-    boxes(l + 1).last_teller = p.q1 * kOctet + kOctet;
+    boxes(l + 1).first_source = std::max(p.q0 * kLanes - 1, 0);
+    boxes(l + 1).last_source = p.q1 * kLanes + kLanes;
     if (!narrow) continue;
     // Of a contact along x those of what is smoothed, and one on either side. (Not fewer: where a vector was
     // smoothed and only half told, that mended what the other half was still to be told, and what a spleen
     // pressed with ran away to twice as much.)
     told.q0 = std::max(told.q0, s.q0 - 1);
     told.q1 = std::min(told.q1, s.q1 + 1);
-    boxes(l + 1).first_teller = std::max(s.q0 * kOctet / 2 - 1, 0);
-    boxes(l + 1).last_teller = (s.q1 + 1) * kOctet / 2;
+    boxes(l + 1).first_source = std::max(s.q0 * kLanes / 2 - 1, 0);
+    boxes(l + 1).last_source = (s.q1 + 1) * kLanes / 2;
   }
 }
 
@@ -109,7 +110,7 @@ std::size_t Relaxation::octets_of_cycle() const noexcept {
   for (const Step& step : steps_now()) {
     const LevelBoxes& b = boxes_[static_cast<std::size_t>(step.level)];
     switch (step.what) {
-      case Step::passes_on:
+      case Step::restricts:
         break;
       case Step::smooths:
       case Step::smooths_after:
@@ -118,7 +119,7 @@ std::size_t Relaxation::octets_of_cycle() const noexcept {
       case Step::solves:
         sum += 2 * octets(b.smoothed);
         break;
-      case Step::tells:
+      case Step::is_source:
         sum += octets(b.told);
     }
   }
@@ -140,11 +141,11 @@ void Relaxation::add_steps(std::vector<Step>& to, int level, Visits visits, bool
     return;
   }
   if (!again) to.push_back({level, Step::smooths});
-  to.push_back({level, Step::passes_on});
+  to.push_back({level, Step::restricts});
   const int next = level + 1;
   const bool twice = visits == Visits::twice && next >= kFirstTwice && next <= kLastTwice && next < last;
   for (int n = 0; n < (twice ? 2 : 1); ++n) add_steps(to, next, visits, n > 0);
-  to.push_back({level, Step::tells});
+  to.push_back({level, Step::is_source});
   to.push_back({level, Step::smooths_after});
 }
 
@@ -156,13 +157,13 @@ std::size_t Relaxation::work_of_step(int n) const noexcept {
   switch (step.what) {
     case Step::smooths:
       return smoothed_ ? 0 : smoothed;
-    case Step::passes_on:
+    case Step::restricts:
       return each * kPassedOn * octets(b.smoothed);
     case Step::solves:
       return kContactSweeps * smoothed;
     case Step::smooths_after:
       return smoothed;
-    case Step::tells:
+    case Step::is_source:
       break;
   }
   // Along x no hat reaches more than an octet further.
@@ -181,7 +182,7 @@ void Relaxation::smooth_box(int level, int first_colour, Displacement& state, co
   const int first = all.k0 + planes.first, last = std::min(all.k0 + planes.last, all.k1);
   const RowId next_plane = multigrid_.grid(level).row_z;  // the planes before it are in the cache
   const auto smooth = [&](const RowBox& plane, int colour) {
-    for_rows(level, plane, [&](RowId row, OctetSpan span, int j, int k) {
+    for_rows(level, plane, [&](RowId row, LaneSpan span, int j, int k) {
       if (((j + k + colour) & 1) != 0) return;
       if (look == Look::active && !multigrid_.has(level, row, Multigrid::active)) return;
       if (colour == first_colour && j + kAhead <= all.j1) {
@@ -191,10 +192,10 @@ void Relaxation::smooth_box(int level, int first_colour, Displacement& state, co
       multigrid_.smooth(level, row, state, obstacles, span);
     });
   };
-  for (int c = all.q0 / kOctets; c <= all.q1 / kOctets && all.q0 <= all.q1; ++c) {
+  for (int c = all.q0 / kLaneGroups; c <= all.q1 / kLaneGroups && all.q0 <= all.q1; ++c) {
     RowBox plane = all;
-    plane.q0 = std::max(all.q0, c * kOctets);
-    plane.q1 = std::min(all.q1, c * kOctets + kOctets - 1);
+    plane.q0 = std::max(all.q0, c * kLaneGroups);
+    plane.q1 = std::min(all.q1, c * kLaneGroups + kLaneGroups - 1);
     for (int k = first; k <= last; ++k) {
       plane.k0 = plane.k1 = k;
       smooth(plane, first_colour);
@@ -210,30 +211,30 @@ void Relaxation::smooth_box(int level, int first_colour, Displacement& state, co
 // it. Those beside it go along, however little they have to tell: nobody brings what they hold to rest, but
 // the box would feel it if they stayed behind, four times as much on each coarser level. (Letting those with
 // less than 2e-4 spacings to tell wait was rejected: energy grew without end where tissue hangs by little.)
-void Relaxation::tell_box(int level, Displacement& state, const ObstacleView& obstacles,
-                          Planes planes) noexcept {
-  if (planes.first == 0) any_tell_ = mark_tellers(level, state, obstacles);
-  if (!any_tell_) return;
+void Relaxation::prolong_box(int level, Displacement& state, const ObstacleView& obstacles,
+                             Planes planes) noexcept {
+  if (planes.first == 0) any_source_ = mark_source_cells(level, state, obstacles);
+  if (!any_source_) return;
   const LevelBoxes& b = boxes(level + 1);
   const RowBox& t = boxes(level).told;
-  multigrid_.tell(level,
-                  {t.q0, t.q1, t.j0, t.j1, t.k0, t.k1, b.first_teller, b.last_teller, t.k0 + planes.first,
-                   std::min(t.k0 + planes.last, t.k1)},
-                  state, obstacles, tells_jointly_);
+  multigrid_.prolong(level,
+                     {t.q0, t.q1, t.j0, t.j1, t.k0, t.k1, b.first_source, b.last_source, t.k0 + planes.first,
+                      std::min(t.k0 + planes.last, t.k1)},
+                     state, obstacles, is_limited_correction_);
 }
 
-bool Relaxation::mark_tellers(int level, Displacement& state, const ObstacleView& obstacles) noexcept {
+bool Relaxation::mark_source_cells(int level, Displacement& state, const ObstacleView& obstacles) noexcept {
   const LevelBoxes& b = boxes(level + 1);
   bool any = false;
-  for_rows(level + 1, b.tellers, [&](RowId row, OctetSpan span, int, int) {
+  for_rows(level + 1, b.source_cells, [&](RowId row, LaneSpan span, int, int) {
     if (!multigrid_.has(level + 1, row, Multigrid::changed)) return;
     const int origin = (multigrid_.grid(level + 1).row_coordinates(row)[0] - 1) * kRow;
     const float most =
-        multigrid_.untold(level + 1, row, span, b.first_teller - origin, b.last_teller - origin);
-    if (most <= multigrid_.passed_on_m()) return;
+        multigrid_.pending_correction(level + 1, row, span, b.first_source - origin, b.last_source - origin);
+    if (most <= multigrid_.restricted_m()) return;
     // Where links at their limits hold tissue between obstacles, coarse cells can run away.
-    if (!(most <= farthest_m_) && !tells_jointly_) {
-      multigrid_.forget_untold(level + 1, row, state, obstacles);
+    if (!(most <= farthest_m_) && !is_limited_correction_) {
+      multigrid_.forget_pending_correction(level + 1, row, state, obstacles);
       return;
     }
     multigrid_.mark(level + 1, row, Multigrid::telling);
@@ -261,11 +262,11 @@ int Relaxation::planes_of_step(int n) const noexcept {
     case Step::smooths:
     case Step::smooths_after:
       return std::max(1, b.smoothed.k1 - b.smoothed.k0 + 1);
-    case Step::passes_on: {
+    case Step::restricts: {
       const RowBox& parents = boxes_[static_cast<std::size_t>(step.level) + 1].parents;
       return std::max(1, parents.k1 - parents.k0 + 1);
     }
-    case Step::tells:
+    case Step::is_source:
       return std::max(1, b.told.k1 - b.told.k0 + 1);
     case Step::solves:
       break;
@@ -279,32 +280,32 @@ void Relaxation::step(int n, Planes planes, Displacement& state, const ObstacleV
   // What coarse levels know and finer ones do not is told first: a step between voxels that were told and
   // others that were not would look like a force to the cells above it.
   for (int l = last_level() - 1; n == 0 && planes.first == 0 && l >= 0; --l)
-    tell_box(l, state, obstacles, kAllPlanes);
-  const WholeParts::Box box = cells(boxes(step.level).smoothed);
+    prolong_box(l, state, obstacles, kAllPlanes);
+  const RigidBlocks::Box box = cells(boxes(step.level).smoothed);
   const bool ends = planes.last >= planes_of_step(n) - 1;
   switch (step.what) {
     case Step::smooths:
       if (smoothed) break;
       smooth_box(step.level, 0, state, obstacles, look, planes);
-      if (ends) multigrid_.smooth_parts(step.level, box, state, obstacles);
+      if (ends) multigrid_.smooth_blocks(step.level, box, state, obstacles);
       break;
-    case Step::passes_on:
-      pass_on(step.level, state, obstacles, look, planes);
+    case Step::restricts:
+      restrict_residual(step.level, state, obstacles, look, planes);
       break;
     case Step::solves: {
       const int sweeps = apart_ ? kContactSweeps : kCoarsestSweeps;
       for (int k = 0; k < sweeps; ++k) {
         smooth_box(step.level, 0, state, obstacles, look, kAllPlanes);
-        multigrid_.smooth_parts(step.level, box, state, obstacles);
+        multigrid_.smooth_blocks(step.level, box, state, obstacles);
       }
       break;
     }
-    case Step::tells:
-      tell_box(step.level, state, obstacles, planes);
+    case Step::is_source:
+      prolong_box(step.level, state, obstacles, planes);
       break;
     case Step::smooths_after:
       smooth_box(step.level, 1, state, obstacles, look, planes);
-      if (ends) multigrid_.smooth_parts(step.level, box, state, obstacles);
+      if (ends) multigrid_.smooth_blocks(step.level, box, state, obstacles);
   }
 }
 
@@ -319,12 +320,12 @@ void Relaxation::fetch_ahead_below(int level, RowId row, const Displacement& sta
   }
 }
 
-void Relaxation::pass_on(int l, Displacement& state, const ObstacleView& obstacles, Look look,
-                         Planes planes) noexcept {
+void Relaxation::restrict_residual(int l, Displacement& state, const ObstacleView& obstacles, Look look,
+                                   Planes planes) noexcept {
   const bool begins = planes.first == 0;
   // Before forces are summed, so that what is called the residual is that of links that yield.
   if (l == 0 && lattice_.yields() && begins) {
-    for_rows(0, boxes(0).smoothed, [&](RowId row, OctetSpan, int, int) {
+    for_rows(0, boxes(0).smoothed, [&](RowId row, LaneSpan, int, int) {
       if (look == Look::all || multigrid_.has(0, row, Multigrid::active | Multigrid::dirty))
         unkept_ = multigrid_.yield(row, state, false) || unkept_;
     });
@@ -335,7 +336,7 @@ void Relaxation::pass_on(int l, Displacement& state, const ObstacleView& obstacl
   parents.k1 = std::min(all.k0 + planes.last, all.k1);
   const Grid& g = multigrid_.grid(l + 1);
   // All of them before any load: a row's load is that of its neighbours where they are, too.
-  for_rows(l + 1, begins ? all : RowBox{}, [&](RowId row, OctetSpan span, int, int) {
+  for_rows(l + 1, begins ? all : RowBox{}, [&](RowId row, LaneSpan span, int, int) {
     if (look == Look::active) {
       if (!restrict_due(l + 1, row)) return;
       // The load holds a row where it is beside its neighbours where they are.
@@ -347,10 +348,10 @@ void Relaxation::pass_on(int l, Displacement& state, const ObstacleView& obstacl
     if (!apart_) multigrid_.restrict_values(l + 1, row, state, span);
   });
   if (begins) {
-    const float of_parts = multigrid_.measure_parts(l, cells(boxes(l).smoothed), state, obstacles);
-    if (l == 0) running_residual_N_ = std::max(running_residual_N_, static_cast<double>(of_parts));
+    const float of_blocks = multigrid_.measure_blocks(l, cells(boxes(l).smoothed), state, obstacles);
+    if (l == 0) running_residual_N_ = std::max(running_residual_N_, static_cast<double>(of_blocks));
   }
-  for_rows(l + 1, parents, [&](RowId row, OctetSpan span, int j, int) {
+  for_rows(l + 1, parents, [&](RowId row, LaneSpan span, int j, int) {
     if (look == Look::active) {
       if (!multigrid_.has(l + 1, row, Multigrid::renewed)) return;
       multigrid_.unmark(l + 1, row, Multigrid::renewed);
@@ -360,8 +361,8 @@ void Relaxation::pass_on(int l, Displacement& state, const ObstacleView& obstacl
     if (l == 0) running_residual_N_ = std::max(running_residual_N_, static_cast<double>(worst));
   });
   if (parents.k1 < all.k1) return;
-  multigrid_.load_parts(l + 1, cells(all));
-  if (l == 0) multigrid_.renew_holds();
+  multigrid_.load_blocks(l + 1, cells(all));
+  if (l == 0) multigrid_.renew_boundary_springs();
 }
 
 void Relaxation::lay_whole_boxes(Visits visits) noexcept {
@@ -374,28 +375,28 @@ std::size_t Relaxation::run_thoroughly(Displacement& state, const ObstacleView& 
   hold_what_stands(state, held);
   multigrid_.release_limited();
   lay_whole_boxes(Visits::twice);
-  tells_jointly_ = true;
+  is_limited_correction_ = true;
   run_coarse_first(state, obstacles);
-  tells_jointly_ = false;
+  is_limited_correction_ = false;
   return octets_of_cycle();
 }
 
 void Relaxation::run_coarse_first(Displacement& state, const ObstacleView& obstacles) noexcept {
-  multigrid_.pass_on_all(true);
+  multigrid_.restrict_all(true);
   const int first_coarse = 2;         // level 1 is smoothed
   const int of_voxels = steps() - 2;  // they are told
   run_steps_over(0, of_voxels, state, obstacles, Look::all);
   for (int n = 0; n < kCoarseCycles; ++n)
     run_steps_over(first_coarse, of_voxels, state, obstacles, Look::all);
   run_steps_over(of_voxels, of_voxels + 1, state, obstacles, Look::all);
-  multigrid_.pass_on_all(false);
+  multigrid_.restrict_all(false);
 }
 
-void Relaxation::relax_round_parts(Displacement& state, const ObstacleView& obstacles) noexcept {
-  if (!multigrid_.has_parts()) return;
+void Relaxation::relax_around_blocks(Displacement& state, const ObstacleView& obstacles) noexcept {
+  if (!multigrid_.has_blocks()) return;
   for (std::size_t p = 0; p < multigrid_.parts().count(); ++p) {
-    if (!multigrid_.tool_holds_part(p)) continue;
-    const WholeParts::Box& part = multigrid_.parts().on(0, p).box;
+    if (!multigrid_.tool_presses_block(p)) continue;
+    const RigidBlocks::Box& part = multigrid_.parts().on(0, p).box;
     std::array<int, 3> low{}, high{};
     for (std::size_t d = 0; d < 3; ++d) {
       low[d] = std::max(part.first[d] - kRoundParts, 0);
@@ -408,15 +409,15 @@ void Relaxation::relax_round_parts(Displacement& state, const ObstacleView& obst
 
 void Relaxation::renew_coarse(Displacement& state, const ObstacleView& obstacles) noexcept {
   lay_whole_boxes(Visits::once);
-  stir_all();
+  mark_all_dirty();
   for (int l = 1; l < multigrid_.levels(); ++l) {
     for_rows(l, boxes(l).parents,
-             [&](RowId row, OctetSpan span, int, int) { multigrid_.restrict_values(l, row, state, span); });
-    multigrid_.measure_parts(l - 1, cells(boxes(l - 1).smoothed), state, obstacles);
-    for_rows(l, boxes(l).parents, [&](RowId row, OctetSpan span, int, int) {
+             [&](RowId row, LaneSpan span, int, int) { multigrid_.restrict_values(l, row, state, span); });
+    multigrid_.measure_blocks(l - 1, cells(boxes(l - 1).smoothed), state, obstacles);
+    for_rows(l, boxes(l).parents, [&](RowId row, LaneSpan span, int, int) {
       multigrid_.restrict_loads(l, row, state, obstacles, span);
     });
-    multigrid_.load_parts(l, cells(boxes(l).parents));
+    multigrid_.load_blocks(l, cells(boxes(l).parents));
   }
 }
 

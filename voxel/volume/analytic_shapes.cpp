@@ -11,7 +11,7 @@ namespace {
 
 // Centres that lie on a boundary up to rounding are treated alike on every side of a shape. (unit: one
 // spacing)
-constexpr double kTie = 1e-9;
+constexpr double kLimitLoad = 1e-9;
 
 constexpr std::array<char, 3> kAxis{'x', 'y', 'z'};
 
@@ -94,7 +94,7 @@ std::vector<std::uint8_t> slice_labels(const Formula& formula, int slices) {
   int slice = 0;
   for (const Layer& layer : formula.layers) {
     top += layer.thickness_m;
-    for (; slice < slices && (slice + 0.5 + kTie) * spacing < top; ++slice) {
+    for (; slice < slices && (slice + 0.5 + kLimitLoad) * spacing < top; ++slice) {
       labels[static_cast<std::size_t>(slice)] = layer.label;
     }
   }
@@ -112,8 +112,8 @@ struct Range {
 // Lattice indices along one axis whose centres can lie within `half` of `centre`.
 Range indices_near(const LabelVolume& volume, int axis, double centre, double half) {
   const double spacing = volume.spacing_m[axis];
-  const double first = std::ceil((centre - half - volume.origin_m[axis]) / spacing - kTie);
-  const double last = std::floor((centre + half - volume.origin_m[axis]) / spacing + kTie);
+  const double first = std::ceil((centre - half - volume.origin_m[axis]) / spacing - kLimitLoad);
+  const double last = std::floor((centre + half - volume.origin_m[axis]) / spacing + kLimitLoad);
   const double end = volume.dims[axis] - 1.0;
   if (last < 0.0 || first > end) return {};
   return {static_cast<int>(std::max(first, 0.0)), static_cast<int>(std::min(last, end))};
@@ -126,7 +126,7 @@ void for_each_inside(LabelVolume& volume, bool round, const glm::dvec3& centre, 
   const glm::dvec3 half = 0.5 * (round ? glm::dvec3(size.x) : size);
   std::array<Range, 3> range;
   for (int axis = 0; axis < 3; ++axis) range[axis] = indices_near(volume, axis, centre[axis], half[axis]);
-  const double limit = half.x * half.x * (1.0 + kTie);
+  const double limit = half.x * half.x * (1.0 + kLimitLoad);
   const auto offset = [&](int axis, int index) {
     return volume.origin_m[axis] + index * volume.spacing_m[axis] - centre[axis];
   };

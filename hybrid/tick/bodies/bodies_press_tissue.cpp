@@ -12,38 +12,42 @@
 namespace hybrid {
 namespace {
 
-// Exact queries a tick, of each soft object: 50 to 100 ns each of a primitive, 1 to 2 us of a mesh.
-constexpr std::size_t kLooks = 3000, kMeshLooks = 750;
-constexpr double kWatched = 1.5;      // spacings from a body within which a voxel has its half-space
-constexpr double kLookFar = 8.0;      // spacings further that one query looks, so that the next is not soon
-constexpr double kMovedAgain = 0.02;  // of the spacing: a voxel at a body that stands is looked at again
-constexpr double kComesOut = 0.25;    // of the spacing, and as far as the body moved: in one tick
-constexpr double kRests = 1e-3;       // of the spacing: so near to its half-space a voxel lies on it
-constexpr double kAtBone = 0.3;  // spacings from what stands within which a voxel has the half-space of that
-constexpr double kWayAlong = 0.4;  // sine of the angle between body and bone: in a closer gap there is no way
-constexpr double kGivenUp = 0.5;   // of the spacing: deeper than this after the wave, there is no way out
+// Exact queries a tick and soft object: 50 to 100 ns each for a primitive, 1 to 2 µs for a mesh.
+constexpr std::size_t kMaxQueries = 3000, kMaxMeshQueries = 750;
+constexpr double kWatchedRange = 1.5;  // spacings from a body within which a voxel has its half-space
+constexpr double kQueryAhead = 8.0;    // spacings that one query looks further, so that the next is not soon
+// Of the spacing: a voxel near a body that stands is queried again after this motion.
+constexpr double kRequeryMotion = 0.02;
+// Of the spacing: a deep voxel comes out by this and by the body's motion in one tick.
+constexpr double kExitStep = 0.25;
+constexpr double kLiesOn = 1e-3;  // of the spacing: a voxel this near to its half-space lies on it
+// Spacings from a fixed surface within which that surface has the voxel's half-space.
+constexpr double kNearFixed = 0.3;
+constexpr double kLeastGapSine =
+    0.4;                             // sine of the angle between body and bone: a narrower gap has no way out
+constexpr double kNoWayOut = 0.5;    // of the spacing: a voxel that is deeper after the wave has no way out
 constexpr double kOnSurface = 1e-9;  // of the spacing
-constexpr double kStep = 0.5;        // of the spacing: bodies come in steps no larger than this …
-constexpr int kMostSteps = 8;        // … and no more of them in a tick
-constexpr double kSqueezed = 0.05;   // of the spacing: deeper in a body than this is a fault
-constexpr int kMostRounds = 4;       // in a step a free body goes back and tissue leaves its way, in turns
-constexpr double kNoFurther = 0.25;  // of the spacing: in tissue that is so deep in it a free body stops
+constexpr double kLongestStep = 0.5;  // of the spacing: longest step of a body …
+constexpr int kMaxSteps = 8;          // … and largest number of steps in a tick
+constexpr double kSqueezed = 0.05;    // of the spacing: a deeper overlap is a fault
+constexpr int kMaxRounds = 4;         // in a step, alternations of a free body going back and tissue leaving
+constexpr double kStopDepth = 0.25;   // of the spacing: a free body this deep in tissue stops
 
-bool exists(const voxel::Obstacle& o) {
+bool is_set(const voxel::Obstacle& o) {
   return o.normal != glm::vec3(0.0F);
 }
 
 // How far a voxel is from the plane it may not cross (m).
-double slack(const voxel::Obstacle& o, const glm::dvec3& u) {
+double slack_m(const voxel::Obstacle& o, const glm::dvec3& u) {
   return glm::dot(glm::dvec3(o.normal), u) - static_cast<double>(o.bound);
 }
 
-// A moment within the tick: simulated time, and the part of the tick that is still to come.
+// A moment within the tick: simulated time, and the fraction of the tick that is still to come.
 struct Moment {
   double t_s = 0.0, to_come = 0.0;
 };
 
-// Where a body is then: a free one on the straight way from where it was.
+// Pose of a body at that moment; a free body moves straight from its previous pose.
 Pose pose_at(const World& world, const WorldState& state, std::uint32_t b, const Moment& moment) noexcept {
   if (!is_free(world, b)) return world.rigid[b].motion.pose_at(moment.t_s);
   const Pose &before = state.rigid[b].before, &now = state.rigid[b].pose;
@@ -53,7 +57,7 @@ Pose pose_at(const World& world, const WorldState& state, std::uint32_t b, const
 
 class TissueAtBodies {
  public:
-  // Bodies are looked at where they are at that moment.
+  // Bodies are queried in their pose at `moment`.
   TissueAtBodies(const World& world, WorldState& state, std::size_t soft, const Moment& moment = {})
       : world_(world),
         state_(state),
@@ -61,18 +65,18 @@ class TissueAtBodies {
         object_(*state.soft[soft]),
         beside_(state.body_obstacles[soft]),
         spacing_m_(object_.lattice().min_spacing_m()),
-        watched_m_(kWatched * object_.lattice().max_spacing_m()),
+        watched_m_(kWatchedRange * object_.lattice().max_spacing_m()),
         moment_(moment) {}
 
-  // Which voxels may be near, and have to be looked at.
-  void list(std::uint32_t b) noexcept {
+  // Lists the voxels that may be near body b and are due for a query.
+  void list_due(std::uint32_t b) noexcept {
     const polygon::RigidSurface& surface = *world_.rigid[b].surface;
     meshes_ = meshes_ || surface.element_count() > 1;
     const double moved = state_.body_moved_m[b];
     for (const std::uint32_t s : beside_.near) {
       if (beside_.whose[s] != b) continue;
-      const double since = glm::distance(displacement(s), glm::dvec3(sight(b, s).u));
-      if (moved > 0.0 || since > kMovedAgain * spacing_m_) add(left(b, s), b, s);
+      const double since = glm::distance(displacement(s), glm::dvec3(query_of(b, s).u));
+      if (moved > 0.0 || since > kRequeryMotion * spacing_m_) add(remaining_travel_m(b, s), b, s);
     }
     if (moved == 0.0 && object_.asleep()) return;
     const BodyFrame& frame = frame_of(b);
@@ -87,19 +91,19 @@ class TissueAtBodies {
       const std::uint32_t s = state_.scratch.map_hits[i] - body_.first_number;
       if (state_.scratch.map_hits[i] < body_.first_number || s >= surface_count || beside_.whose[s] == b)
         continue;
-      const double left_m = left(b, s);
+      const double left_m = remaining_travel_m(b, s);
       if (left_m <= moved) add(left_m, b, s);
     }
   }
 
-  // Looks at what was listed, those nearest first as far as the budget goes.
-  void look() noexcept {
+  // Queries the listed voxels, the nearest first, within the budget.
+  void query() noexcept {
     auto& due = state_.scratch.due;
-    const std::size_t most = meshes_ ? kMeshLooks : kLooks;
+    const std::size_t most = meshes_ ? kMaxMeshQueries : kMaxQueries;
     if (due.size() > most) {
       const auto end = due.begin() + static_cast<std::ptrdiff_t>(most);
       std::nth_element(due.begin(), end, due.end());
-      // What was left out may be within what it should keep out of.
+      // A voxel that was left out may overlap a body.
       for (auto d = end; d != due.end(); ++d) {
         if (d->left_m < -watched_m_ - kSqueezed * spacing_m_) state_.faults |= fault_body_crowded;
       }
@@ -109,17 +113,17 @@ class TissueAtBodies {
     std::sort(due.begin(), due.end(), [](const DueQuery& a, const DueQuery& b) {
       return a.body != b.body ? a.body < b.body : a.surface_number < b.surface_number;
     });
-    for (const DueQuery& d : due) look(d.body, d.surface_number);
+    for (const DueQuery& d : due) query(d.body, d.surface_number);
   }
 
-  // Each voxel that a body is near to gets the half-space of that or of what stands, and leaves it.
+  // Gives each voxel near a body its half-space in force, and moves it out if it is inside.
   void press() noexcept {
     auto& in_the_way = state_.scratch.in_the_way;
     in_the_way.clear();
     std::size_t kept = 0;
     for (const std::uint32_t s : beside_.near) {
-      choose(s);
-      if (leads_out(s)) in_the_way.push_back(s);
+      choose_obstacle(s);
+      if (set_way_out(s)) in_the_way.push_back(s);
       if (beside_.whose[s] != BodyObstacles::kNobody) {
         beside_.near[kept++] = s;
       } else {
@@ -128,57 +132,58 @@ class TissueAtBodies {
     }
     const bool all_left = kept == 0 && !beside_.near.empty();
     beside_.near.resize(kept);
-    if (all_left) spring_back();
+    if (all_left) mark_all_dirty();
     if (in_the_way.empty()) return;
-    for (const std::uint32_t s : beside_.near) let_in(s);
+    for (const std::uint32_t s : beside_.near) tolerate_depth(s);
     object_.leave_obstacles(in_the_way);
-    // What the wave took into bone comes out of it, wherever that is in the body. What was let in looks for a
-    // way out again as it relaxes.
+    // Voxels that the wave took into bone come out of it, also if bone is within the body. Voxels that were
+    // let in leave as they relax.
     in_the_way.clear();
     for (const std::uint32_t s : beside_.near) {
-      choose(s);
+      choose_obstacle(s);
       const voxel::Obstacle& o = object_.obstacles()[s];
-      if (exists(o) && !o.moving && slack(o, displacement(s)) < -kRests * spacing_m_) in_the_way.push_back(s);
+      if (is_set(o) && !o.moving && slack_m(o, displacement(s)) < -kLiesOn * spacing_m_)
+        in_the_way.push_back(s);
     }
     if (!in_the_way.empty()) object_.leave_obstacles(in_the_way);
-    give_up();
+    let_deep_through();
   }
 
-  void look_again(std::uint32_t b) noexcept {
+  void query_again(std::uint32_t b) noexcept {
     for (const std::uint32_t s : beside_.near) {
-      if (beside_.whose[s] == b) look(b, s);
+      if (beside_.whose[s] == b) query(b, s);
     }
   }
 
-  void first_look(std::uint32_t b) noexcept {
+  void query_all(std::uint32_t b) noexcept {
     const auto count = static_cast<std::uint32_t>(object_.lattice().surface().size());
-    for (std::uint32_t s = 0; s < count; ++s) look(b, s);
-    for (const std::uint32_t s : beside_.near) choose(s);
+    for (std::uint32_t s = 0; s < count; ++s) query(b, s);
+    for (const std::uint32_t s : beside_.near) choose_obstacle(s);
   }
 
-  // The half-space in force is that which a voxel is nearer to; on what stands, that.
-  void choose(std::uint32_t s) noexcept {
+  // The half-space in force: that of the nearer surface; near a fixed surface always the fixed one's.
+  void choose_obstacle(std::uint32_t s) noexcept {
     const voxel::Obstacle &moving = beside_.moving[s], &standing = beside_.standing[s];
     const glm::dvec3 u = displacement(s);
     const voxel::Obstacle* in_force = &standing;
-    if (exists(moving)) {
-      const double of_standing = exists(standing) ? slack(standing, u) : std::numeric_limits<double>::max();
-      const double at_bone = kAtBone * spacing_m_ + state_.body_moved_m[beside_.whose[s]];
-      if (of_standing > at_bone && slack(moving, u) < of_standing) in_force = &moving;
+    if (is_set(moving)) {
+      const double of_standing = is_set(standing) ? slack_m(standing, u) : std::numeric_limits<double>::max();
+      const double at_bone = kNearFixed * spacing_m_ + state_.body_moved_m[beside_.whose[s]];
+      if (of_standing > at_bone && slack_m(moving, u) < of_standing) in_force = &moving;
     }
     const voxel::Obstacle old = object_.obstacles()[s];
     if (old.normal == in_force->normal && old.bound == in_force->bound && old.moving == in_force->moving)
       return;
     object_.set_obstacle(s, *in_force);
-    if (exists(old) && slack(old, u) < kRests * spacing_m_) object_.stir(s);
+    if (is_set(old) && slack_m(old, u) < kLiesOn * spacing_m_) object_.mark_dirty(s);
   }
 
-  // Is tissue deeper in a body than it should be? Anchors count: they do not leave its way.
+  // Is tissue deeper in a body than allowed? Anchors, which do not leave its way, count too.
   [[nodiscard]] bool squeezed() noexcept {
     double worst = -kSqueezed * spacing_m_;
     std::uint32_t where = BodyObstacles::kNobody;
     for (const std::uint32_t s : beside_.near) {
-      const double here = slack(beside_.moving[s], displacement(s));
+      const double here = slack_m(beside_.moving[s], displacement(s));
       if (here >= worst) continue;
       worst = here;
       where = s;
@@ -186,71 +191,71 @@ class TissueAtBodies {
     if (where == BodyObstacles::kNobody) return false;
     polygon::SignedDistance near;
     const double radius = object_.voxel_radius();
-    return distance(beside_.whose[where], where, radius, near) &&
+    return signed_distance_at(beside_.whose[where], where, radius, near) &&
            near.distance < radius - kSqueezed * spacing_m_;
   }
 
  private:
-  // What could not leave a body's way, by much, is let through it: pushed on, towards whichever side of the
-  // body is the next, it would come out behind it, and be caught there.
-  void give_up() noexcept {
+  // A voxel that is far inside and could not leave is let through the body. If pushed on, it would leave on
+  // whichever side is nearest, and be caught behind the body.
+  void let_deep_through() noexcept {
     for (const std::uint32_t s : beside_.near) {
       // A free body gives way itself.
       if (beside_.whose[s] == BodyObstacles::kNobody || is_free(world_, beside_.whose[s])) continue;
-      if (slack(beside_.moving[s], displacement(s)) >= -kGivenUp * spacing_m_) continue;
-      sight(beside_.whose[s], s).given_up = true;
+      if (slack_m(beside_.moving[s], displacement(s)) >= -kNoWayOut * spacing_m_) continue;
+      query_of(beside_.whose[s], s).given_up = true;
       forget(s);
-      choose(s);
+      choose_obstacle(s);
       state_.faults |= fault_body_squeezed;
     }
   }
-  // Where links at their limits held tissue, relaxation may have let it be, far from rest. Now that the last
-  // body left, nothing holds it.
-  void spring_back() noexcept {
+  // Links at their limits may have kept tissue in place far from rest, where relaxation left it alone. When
+  // the last body has left, all of it must relax.
+  void mark_all_dirty() noexcept {
     if ((state_.faults & fault_body_squeezed) == 0) return;
-    for (std::size_t s = 0; s < object_.lattice().surface().size(); ++s) object_.stir(s);
+    for (std::size_t s = 0; s < object_.lattice().surface().size(); ++s) object_.mark_dirty(s);
   }
-  // Is a voxel in a body, and is there a way out that does not lead into what stands? Where the shortest one
-  // does, its obstacle becomes one for the way along that surface, until it has gone it.
-  bool leads_out(std::uint32_t s) noexcept {
+  // Is a voxel in a body, and is there a way out that does not lead into a fixed surface? If the shortest way
+  // does, the voxel's obstacle becomes one for the way along that surface, until the voxel is out.
+  bool set_way_out(std::uint32_t s) noexcept {
     const voxel::Obstacle &moving = beside_.moving[s], &standing = beside_.standing[s];
-    if (!exists(moving)) return false;
+    if (!is_set(moving)) return false;
     const glm::dvec3 u = displacement(s), n(moving.normal);
-    const double depth = -slack(moving, u) - lets_in_m(s);
-    // At a body that stands it is relaxation that brings out what can come out: or nothing came to rest.
+    const double depth = -slack_m(moving, u) - tolerated_depth_m(s);
+    // At a body that stands, relaxation alone brings voxels out; a wave each tick would prevent rest.
     if (!(depth > 0.0) || state_.body_moved_m[beside_.whose[s]] == 0.0) return false;
-    if (!exists(standing) || slack(standing, u + depth * n) >= 0.0) {
+    if (!is_set(standing) || slack_m(standing, u + depth * n) >= 0.0) {
       object_.set_obstacle(s, moving);
       return true;
     }
     const glm::dvec3 wall(standing.normal), along = n - glm::dot(n, wall) * wall;
     const double part = glm::length(along);
-    if (part < kWayAlong) return false;  // between the two of them there is none
+    if (part < kLeastGapSine) return false;  // no way out between the two
     object_.set_obstacle(
         s, {glm::vec3(along / part), static_cast<float>(glm::dot(along / part, u) + depth / part), true});
     return true;
   }
-  // A blocked voxel cannot leave altogether what it may be in. The wave does not ask it to: it would draw
-  // those beside it, by links at their limits, into the body, they it, and of two that are drawn apart the
-  // wave favours one. Four voxels under a ball of 10 kg went aside before it so, for ever, at 4 mm/s.
-  [[nodiscard]] double lets_in_m(std::uint32_t s) const noexcept {
+  // A jammed voxel cannot leave the tolerated depth altogether, so the wave does not require it to. Otherwise
+  // the wave would draw its neighbours, by links at their limits, into the body, and they it; of two voxels
+  // that are drawn apart it favours one, so that bodies would creep without end.
+  [[nodiscard]] double tolerated_depth_m(std::uint32_t s) const noexcept {
     return beside_.jammed[s] != 0 ? kJammedProbe * spacing_m_ : 0.0;
   }
-  void let_in(std::uint32_t s) noexcept {
+  void tolerate_depth(std::uint32_t s) noexcept {
     voxel::Obstacle o = object_.obstacles()[s];
     if (beside_.jammed[s] == 0 || !o.moving) return;
-    o.bound -= static_cast<float>(lets_in_m(s));
+    o.bound -= static_cast<float>(tolerated_depth_m(s));
     object_.set_obstacle(s, o);
   }
   [[nodiscard]] glm::dvec3 displacement(std::uint32_t s) const noexcept {
     return object_.state().at(object_.lattice().surface()[s]);
   }
-  [[nodiscard]] BodyQuery& sight(std::uint32_t b, std::uint32_t s) const noexcept {
+  [[nodiscard]] BodyQuery& query_of(std::uint32_t b, std::uint32_t s) const noexcept {
     return beside_.queries[b][s];
   }
-  // How far body and voxel may still move, at least, before the voxel is within what is watched (m).
-  [[nodiscard]] double left(std::uint32_t b, std::uint32_t s) const noexcept {
-    const BodyQuery& seen = sight(b, s);
+  // How far body and voxel may still move together before the voxel may be within the watched range (m).
+  [[nodiscard]] double remaining_travel_m(std::uint32_t b, std::uint32_t s) const noexcept {
+    const BodyQuery& seen = query_of(b, s);
     return seen.until_m - state_.body_travel_m[b] - glm::distance(displacement(s), glm::dvec3(seen.u));
   }
   void add(double left_m, std::uint32_t b, std::uint32_t s) noexcept {
@@ -264,8 +269,8 @@ class TissueAtBodies {
     frame_of_ = b;
     return frame_;
   }
-  [[nodiscard]] bool distance(std::uint32_t b, std::uint32_t s, double range,
-                              polygon::SignedDistance& out) noexcept {
+  [[nodiscard]] bool signed_distance_at(std::uint32_t b, std::uint32_t s, double range,
+                                        polygon::SignedDistance& out) noexcept {
     const BodyFrame& frame = frame_of(b);
     const glm::dvec3 at = frame.to_body(body_.to_scene(object_.position(object_.lattice().surface()[s])));
     glm::dvec3 known(0.0);
@@ -274,7 +279,7 @@ class TissueAtBodies {
     const polygon::RigidSurface& surface = *world_.rigid[b].surface;
     const bool found = polygon::signed_distance(surface, at, range, known, out);
     if (found && std::abs(out.distance) > kOnSurface * spacing_m_) return found;
-    // On the surface itself there is no way out to be seen, and what was known may be another face's.
+    // On the surface itself the direction outward is undefined, and the last one may be another face's.
     const glm::dvec3 away = at - 0.5 * (surface.lower() + surface.upper());
     const double far = glm::length(away);
     if (!(far > 0.0) || (!found && far > range)) return found;
@@ -282,25 +287,25 @@ class TissueAtBodies {
                                     out);
   }
 
-  void look(std::uint32_t b, std::uint32_t s) noexcept {
+  void query(std::uint32_t b, std::uint32_t s) noexcept {
     const double moved = state_.body_moved_m[b], watched = watched_m_ + moved,
                  radius = object_.voxel_radius(),
-                 range = watched + radius + kLookFar * object_.lattice().max_spacing_m();
+                 range = watched + radius + kQueryAhead * object_.lattice().max_spacing_m();
     polygon::SignedDistance near;
-    const bool found = distance(b, s, range, near);
+    const bool found = signed_distance_at(b, s, range, near);
     const double gap = found ? near.distance - radius : range - radius;
     const glm::dvec3 u = displacement(s);
-    const bool given_up = sight(b, s).given_up && (!found || gap < 0.0);
-    sight(b, s) = {glm::vec3(u), given_up, state_.body_travel_m[b] + gap - watched_m_};
+    const bool given_up = query_of(b, s).given_up && (!found || gap < 0.0);
+    query_of(b, s) = {glm::vec3(u), given_up, state_.body_travel_m[b] + gap - watched_m_};
     std::uint32_t& whose = beside_.whose[s];
     if (!found || given_up || gap >= watched) {
       if (whose == b) forget(s);
       return;
     }
-    if (whose != BodyObstacles::kNobody && whose != b && slack(beside_.moving[s], u) <= gap) return;
+    if (whose != BodyObstacles::kNobody && whose != b && slack_m(beside_.moving[s], u) <= gap) return;
     const glm::dvec3 n = glm::inverse(body_.pose.rotation) * (frame_of(b).rotation * near.normal);
-    // What lies deep, because it was squeezed, comes out bit by bit.
-    const double depth = std::min(-gap, moved + kComesOut * spacing_m_);
+    // A voxel that is deep, because it was squeezed, comes out a little each tick.
+    const double depth = std::min(-gap, moved + kExitStep * spacing_m_);
     beside_.moving[s] = {glm::vec3(n), static_cast<float>(glm::dot(n, u) + depth), true};
     whose = b;
     if (beside_.listed[s] != 0) return;
@@ -320,43 +325,43 @@ class TissueAtBodies {
   BodyObstacles& beside_;
   double spacing_m_, watched_m_;
   Moment moment_;
-  BodyFrame frame_;  // of the body that was asked for last
+  BodyFrame frame_;  // of the body of the last frame_of()
   std::uint32_t frame_of_ = BodyObstacles::kNobody;
   bool meshes_ = false;  // among the bodies
 };
 
 }  // namespace
 
-void watch_bodies(const World& world, WorldState& state) {
+void query_bodies(const World& world, WorldState& state) {
   for (std::size_t o = 0; o < state.body_obstacles.size(); ++o) {
     TissueAtBodies tissue(world, state, o);
     for (std::uint32_t b = 0; b < world.rigid.size(); ++b) {
-      if (world.rigid[b].presses_tissue) tissue.first_look(b);
+      if (world.rigid[b].presses_tissue) tissue.query_all(b);
     }
   }
 }
 
 namespace {
 
-// Bodies are where they are at that moment, having moved by body_moved_m since the last step.
+// Bodies are where they are at `moment`, having moved by body_moved_m since the last step.
 void press_once(const World& world, WorldState& state, const Moment& moment) noexcept {
   for (std::size_t o = 0; o < state.body_obstacles.size(); ++o) {
     TissueAtBodies tissue(world, state, o, moment);
     state.scratch.due.clear();
     for (std::uint32_t b = 0; b < world.rigid.size(); ++b) {
-      if (world.rigid[b].presses_tissue) tissue.list(b);
+      if (world.rigid[b].presses_tissue) tissue.list_due(b);
     }
-    tissue.look();
+    tissue.query();
     tissue.press();
   }
 }
 
-// A free body that tissue could not leave the way of gives way itself; as it turns, other tissue has to.
+// If tissue could not leave a free body's way, the body gives way; as it turns, other tissue may have to.
 void stop_in_tissue(const World& world, WorldState& state, std::uint32_t b, const Moment& moment,
                     double dt_s) noexcept {
   Pose pose = pose_at(world, state, b, moment);
-  double limit = moment.to_come > 0.0 ? kNoFurther : kTooDeep;
-  for (int n = 0; n < kMostRounds && give_way_to_tissue(world, state, b, pose, limit, dt_s); ++n) {
+  double limit = moment.to_come > 0.0 ? kStopDepth : kTooDeep;
+  for (int n = 0; n < kMaxRounds && give_way_to_tissue(world, state, b, pose, limit, dt_s); ++n) {
     for (std::size_t o = 0; o < state.body_obstacles.size(); ++o) TissueAtBodies(world, state, o).press();
     pose = state.rigid[b].pose;
     limit = kTooDeep;
@@ -370,9 +375,10 @@ void press_bodies_into_tissue(const World& world, WorldState& state, double dt_s
   double steps = 1.0;
   for (const double moved : state.body_moved_m) {
     for (const auto& object : state.soft)
-      steps = std::max(steps, std::ceil(moved / (kStep * object->lattice().min_spacing_m()) - kOnSurface));
+      steps =
+          std::max(steps, std::ceil(moved / (kLongestStep * object->lattice().min_spacing_m()) - kOnSurface));
   }
-  const int count = static_cast<int>(std::min(steps, static_cast<double>(kMostSteps)));
+  const int count = static_cast<int>(std::min(steps, static_cast<double>(kMaxSteps)));
   const double now_s = state.clock.now_s(), step_s = dt_s / count;
   for (int n = 1; n <= count; ++n) {
     const double to_come = 1.0 - static_cast<double>(n) / count, back_s = n == count ? 0.0 : dt_s * to_come;
@@ -392,8 +398,9 @@ void press_bodies_into_tissue(const World& world, WorldState& state, double dt_s
   relax_under_paths(world, state);
 }
 
-void look_again(const World& world, WorldState& state, std::uint32_t b) noexcept {
-  for (std::size_t o = 0; o < state.body_obstacles.size(); ++o) TissueAtBodies(world, state, o).look_again(b);
+void query_again(const World& world, WorldState& state, std::uint32_t b) noexcept {
+  for (std::size_t o = 0; o < state.body_obstacles.size(); ++o)
+    TissueAtBodies(world, state, o).query_again(b);
 }
 
 void flag_squeezed_bodies(const World& world, WorldState& state) noexcept {
@@ -415,7 +422,7 @@ void set_standing_obstacle(WorldState& state, std::size_t soft, std::size_t s,
   }
   BodyObstacles& beside = state.body_obstacles[soft];
   beside.standing[s] = obstacle;
-  if (!exists(beside.moving[s])) state.soft[soft]->set_obstacle(s, obstacle);
+  if (!is_set(beside.moving[s])) state.soft[soft]->set_obstacle(s, obstacle);
 }
 
 }  // namespace hybrid

@@ -13,17 +13,18 @@
 namespace hybrid {
 namespace {
 
-constexpr int kWaysAside = 8;  // looked for when a body pushes the proxy into another
-// A body rests after so many ticks in which it goes no further than this (spacings), and no force changes or
-// is left over by more than this share of all that presses; it moves again when that is more than so many
-// times.
-constexpr std::uint32_t kCalmTicks = 100;
-constexpr double kCalmWay = 1e-5, kCalmForce = 1e-3, kRoused = 3.0;
-constexpr double kStayed = 1e-9;  // of the ball: a proxy that is so near where it was pushed is there
+constexpr int kMaxWaysAside = 8;  // searches for a way aside when a body pushes the proxy into another
+// A body rests after kRestTicks ticks in which it moves no further than kRestMotion (spacings) and the change
+// of force and the unbalanced force stay below kRestForce of the load. A resting body wakes when these bounds
+// are exceeded kWakeFactor times.
+constexpr std::uint32_t kRestTicks = 100;
+constexpr double kRestMotion = 1e-5, kRestForce = 1e-3, kWakeFactor = 3.0;
+// Of the ball: a proxy no further from where it was pushed counts as there.
+constexpr double kSamePlace = 1e-9;
 
-// What pressed on the body in the last tick: the proxy's coupling, shared as the contacts share it.
-std::size_t contacts_of(const World& world, const WorldState& state, std::uint32_t object,
-                        std::array<BodyContact, 4>& contacts) noexcept {
+// Loads on the body from the last tick: the proxy's coupling, divided as its contacts divide it.
+std::size_t proxy_contacts(const World& world, const WorldState& state, std::uint32_t object,
+                           std::array<BodyContact, 4>& contacts) noexcept {
   std::size_t count = 0;
   for (std::uint32_t n = 0; n < state.active_count; ++n) {
     const ActiveElement& active = state.active[n];
@@ -43,20 +44,20 @@ std::size_t contacts_of(const World& world, const WorldState& state, std::uint32
   return count;
 }
 
-double stayed_m(const World& world) noexcept {
-  return kStayed * world.contact_radius_m() + 4.0 * world.rounding_m;
+double same_place_m(const World& world) noexcept {
+  return kSamePlace * world.contact_radius_m() + 4.0 * world.rounding_m;
 }
 
-// The proxy, feasible against the body alone, is brought to where it is so against everything.
+// The proxy is feasible against the body alone: moves it to a place that is feasible against everything.
 void step_aside(const World& world, WorldState& state, std::uint32_t object, const glm::dvec3& before,
                 const glm::dvec3& pushed) noexcept {
-  const double near = stayed_m(world);
+  const double near = same_place_m(world);
   glm::dvec3 way = pushed, from = before;
-  for (int n = 0; n < kWaysAside; ++n) {
+  for (int n = 0; n < kMaxWaysAside; ++n) {
     const Sweep others = sweep_past(world, state, object, true, from, way);
     state.proxy_m = others.point;
     if (glm::length(others.point - way) <= near) return;
-    // The others hold it: where does the body let it be that is nearest to there?
+    // The others hold the proxy: the nearest place to it that the body allows.
     const Sweep body = sweep_past(world, state, object, false, way, others.point);
     if (glm::length(body.point - others.point) <= near) return;
     from = others.point;
@@ -65,13 +66,13 @@ void step_aside(const World& world, WorldState& state, std::uint32_t object, con
   state.faults |= fault_infeasible;
 }
 
-// Friction holds the proxy on this body, or lets it slide: it is drawn along either way.
-bool carries(const WorldState& state, std::uint32_t object) noexcept {
+// Friction holds the proxy on this body or lets it slide: it is carried along in either case.
+bool carries_proxy(const WorldState& state, std::uint32_t object) noexcept {
   return (state.stuck || state.sliding) && state.active_count > 0 && state.rubbed == object;
 }
 
-// What holds the proxy turns with the body.
-void turn_contacts(WorldState& state, std::uint32_t object, const glm::dmat3& turn) noexcept {
+// The contact forces on the proxy turn with the body.
+void rotate_contact_forces(WorldState& state, std::uint32_t object, const glm::dmat3& turn) noexcept {
   for (std::uint32_t n = 0; n < state.active_count; ++n) {
     if (state.active[n].object == object) state.active[n].force_N = turn * state.active[n].force_N;
   }
@@ -89,30 +90,30 @@ void set_rigid_pose(const World& world, WorldState& state, std::uint32_t object,
   glm::dvec3 expected = state.proxy_m, pushed = state.proxy_m;
   if (within) {
     const glm::dvec3 from = near.frame.to_body(state.proxy_m);
-    const glm::dvec3 target = carries(state, object) ? from : after.to_body(state.proxy_m);
+    const glm::dvec3 target = carries_proxy(state, object) ? from : after.to_body(state.proxy_m);
     expected = after.to_scene(target);
-    // In the body's own frame it is the proxy that moves.
+    // In the body's own frame the proxy moves instead.
     near.frame = BodyFrame();
     pushed = after.to_scene(sweep_past(world, state, object, false, from, target).point);
   }
-  turn_contacts(state, object, after.rotation * glm::transpose(before_move.rotation));
+  rotate_contact_forces(state, object, after.rotation * glm::transpose(before_move.rotation));
   near.frame = after;
   near.pose = pose;
   if (world.use_map) state.map.move_body(object, pose.position_m, pose.rotation);
   state.look_m = -1.0;
-  state.swept_to_m = glm::dvec3(std::numeric_limits<double>::quiet_NaN());  // all is seen afresh
+  state.swept_to_m = glm::dvec3(std::numeric_limits<double>::quiet_NaN());  // cached planes are void
   const glm::dvec3 before = state.proxy_m;
   state.proxy_m = pushed;
   if (pushed != before && world.rigid.size() > 1) step_aside(world, state, object, before, pushed);
-  state.pushed = state.pushed || glm::length(state.proxy_m - expected) > stayed_m(world);
+  state.pushed = state.pushed || glm::length(state.proxy_m - expected) > same_place_m(world);
 }
 
 namespace {
 
-// Is a body that went from `before` to `after` about to come to rest, or still there? `springs`: the tool and
-// what tissue's links press with.
-bool is_calm(const FreeBody& body, const FreeBodyState& before, const FreeBodyState& after,
-             std::span<const BodyContact> springs, double dt_s, double most) noexcept {
+// Did a body that went from `before` to `after` (nearly) not move? `springs`: contacts of the tool and of
+// tissue's links.
+bool is_at_rest(const FreeBody& body, const FreeBodyState& before, const FreeBodyState& after,
+                std::span<const BodyContact> springs, double dt_s, double most) noexcept {
   double pressed = 0.0, change = 0.0;
   for (const BodyContact& c : springs) {
     if (!(c.force_N > 0.0)) continue;
@@ -127,12 +128,11 @@ bool is_calm(const FreeBody& body, const FreeBodyState& before, const FreeBodySt
   return pressed > 0.0 && std::max(change, left) <= most * std::max(pressed, weight);
 }
 
-// What acts on a free body by itself: first the tool, then what tissue's links press with, then what is as
-// good as rigid.
-OwnContacts list_contacts(const World& world, WorldState& state, std::uint32_t o, std::uint32_t member,
-                          double dt_s) noexcept {
+// The loads on one free body: first the tool, then tissue's links, then contacts that are as good as rigid.
+OwnContacts list_loads(const World& world, WorldState& state, std::uint32_t o, std::uint32_t member,
+                       double dt_s) noexcept {
   std::array<BodyContact, 4> of_tool;
-  const std::size_t count = contacts_of(world, state, o, of_tool);
+  const std::size_t count = proxy_contacts(world, state, o, of_tool);
   OwnContacts own{.first = state.scratch.body_contacts.size()};
   for (std::size_t n = 0; n < count; ++n) own.springs += add_contact(state, of_tool[n]) ? 1 : 0;
   if (world.rigid[o].presses_tissue) own.springs += add_tissue_contacts(world, state, o, dt_s);
@@ -141,17 +141,17 @@ OwnContacts list_contacts(const World& world, WorldState& state, std::uint32_t o
   return own;
 }
 
-// Beside tissue: does the body rest, in place of what its step says?
+// On tissue: does the body stay at rest instead of taking its step?
 bool rests(const World& world, WorldState& state, std::uint32_t o, const FreeBodyState& next,
            const OwnContacts& own, double dt_s) noexcept {
   const RigidMotion& motion = world.rigid[o].motion;
   RigidState& near = state.rigid[o];
-  const double most = near.calm_ticks == kCalmTicks ? kRoused : 1.0;
+  const double most = near.rest_ticks == kRestTicks ? kWakeFactor : 1.0;
   const auto springs = std::span(state.scratch.body_contacts).subspan(own.first, own.springs);
-  const bool calm = state.body_moved_m[o] <= most * kCalmWay * least_spacing_m(state) &&
-                    is_calm(motion.free_body(), near.free, next, springs, dt_s, most * kCalmForce);
-  near.calm_ticks = calm ? std::min(near.calm_ticks + 1, kCalmTicks) : 0;
-  return near.calm_ticks == kCalmTicks;
+  const bool calm = state.body_moved_m[o] <= most * kRestMotion * smallest_spacing_m(state) &&
+                    is_at_rest(motion.free_body(), near.free, next, springs, dt_s, most * kRestForce);
+  near.rest_ticks = calm ? std::min(near.rest_ticks + 1, kRestTicks) : 0;
+  return near.rest_ticks == kRestTicks;
 }
 
 void move_free_bodies(const World& world, WorldState& state, double dt_s) noexcept {
@@ -162,12 +162,12 @@ void move_free_bodies(const World& world, WorldState& state, double dt_s) noexce
   state.scratch.body_contacts.clear();
   for (std::uint32_t o = 0; o < world.rigid.size(); ++o) {
     if (!is_free(world, o)) continue;
-    all.own.push_back(list_contacts(world, state, o, static_cast<std::uint32_t>(all.stepped.size()), dt_s));
+    all.own.push_back(list_loads(world, state, o, static_cast<std::uint32_t>(all.stepped.size()), dt_s));
     all.stepped.push_back({.body = &world.rigid[o].motion.free_body(), .state = state.rigid[o].free});
     all.object.push_back(o);
   }
   if (all.stepped.empty()) return;
-  step_past_rigid(world, state, dt_s);
+  step_with_collisions(world, state, dt_s);
   for (std::size_t n = 0; n < all.stepped.size(); ++n) {
     const std::uint32_t o = all.object[n];
     RigidState& near = state.rigid[o];

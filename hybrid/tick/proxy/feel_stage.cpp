@@ -14,8 +14,9 @@ namespace {
 
 constexpr int kShadingPasses = 8;
 constexpr int kSlidingPasses = 8;
-constexpr double kOnTheCone = 1e-4;     // of the friction: a pull that exceeds it by less is on the cone
-constexpr double kShadingStill = 1e-6;  // of the depth: a pass that moves the proxy less is the last
+// Of the friction: a tangential pull that exceeds it by less is on the cone.
+constexpr double kConeTolerance = 1e-4;
+constexpr double kShadingConverged = 1e-6;  // of the depth: a pass that moves the proxy less is the last
 
 struct Contact {
   const RigidObject* object = nullptr;
@@ -25,7 +26,7 @@ struct Contact {
   double force_N = 0.0;
 };
 
-// What holds the proxy, at most three elements.
+// The proxy's contacts, at most three elements.
 struct Contacts {
   std::array<Contact, 3> list;
   std::size_t count = 0;
@@ -52,8 +53,8 @@ glm::dvec3 shaded(const World& world, const WorldState& state, const Contact& co
       contact.normal);
 }
 
-// As the last sweep left them, of a proxy that now is at `proxy`.
-Contacts contacts_of(const World& world, const WorldState& state, const glm::dvec3& proxy) noexcept {
+// The contacts of the last sweep, for a proxy that now is at `proxy`.
+Contacts active_contacts(const World& world, const WorldState& state, const glm::dvec3& proxy) noexcept {
   Contacts contacts;
   for (std::uint32_t n = 0; n < state.active_count; ++n) {
     const ActiveElement& active = state.active[n];
@@ -66,15 +67,16 @@ Contacts contacts_of(const World& world, const WorldState& state, const glm::dve
   return contacts;
 }
 
-MixedFeel mixed(const Contacts& contacts) noexcept {
+MixedFeel mixed_feel(const Contacts& contacts) noexcept {
   std::array<FeltSurface, 3> surfaces;
   for (std::size_t n = 0; n < contacts.count; ++n)
     surfaces[n] = {&contacts.list[n].object->feel, contacts.list[n].force_N};
   return mix_feel({surfaces.data(), contacts.count});
 }
 
-// The object that friction and shading act from: of those that have any, the one that presses hardest.
-std::uint32_t rubbing(const Contacts& contacts) noexcept {
+// The object that friction and shading are accounted to: of those that have either, the one with the largest
+// force.
+std::uint32_t friction_object(const Contacts& contacts) noexcept {
   const Contact* hardest = nullptr;
   for (const Contact& c : contacts) {
     const bool rubs = c.object->feel.has_friction() || c.object->feel.shading;
@@ -83,15 +85,15 @@ std::uint32_t rubbing(const Contacts& contacts) noexcept {
   return hardest != nullptr ? hardest->number : contacts.list[0].number;
 }
 
-// Where the proxy wants to go, and how far it may.
+// Target of the proxy, and the longest way there.
 struct Goal {
   glm::dvec3 target{0.0};
   glm::dmat3 metric{1.0};
   double travel = 0.0;
 };
 
-// What presses on the contacts of a proxy that does not move: the target held by planes through the proxy.
-// Sets their forces; returns the whole, zero when the target pulls the proxy off them.
+// The contact forces on a proxy that does not move: of planes through the proxy, against the pull to the
+// target. Sets each force; returns their sum, zero if the target pulls the proxy off.
 glm::dvec3 press_in_place(Contacts& contacts, const glm::dvec3& proxy, const Goal& goal) noexcept {
   const glm::dvec3 way = goal.target - proxy;
   std::array<polygon::ContactPlane, 3> planes;
@@ -107,8 +109,8 @@ glm::dvec3 press_in_place(Contacts& contacts, const glm::dvec3& proxy, const Goa
   return goal.metric * (held.point - way);
 }
 
-// The proxy stays at `from`: its contacts are what they were, pressed as they are now.
-Sweep stay(WorldState& state, const Contacts& contacts, const glm::dvec3& from) noexcept {
+// The proxy stays at `from` with the same contacts, under their present forces.
+Sweep hold_in_place(WorldState& state, const Contacts& contacts, const glm::dvec3& from) noexcept {
   Sweep sweep;
   sweep.point = from;
   std::fill(state.rigid_force_N.begin(), state.rigid_force_N.end(), glm::dvec3(0.0));
@@ -121,11 +123,11 @@ Sweep stay(WorldState& state, const Contacts& contacts, const glm::dvec3& from) 
   return sweep;
 }
 
-// Until the proxy is where the target pulls along the felt normals.
+// Repeats until the proxy is where the target pulls along the shaded normals.
 Sweep shade(const World& world, WorldState& state, const Goal& goal, Sweep sweep) noexcept {
   bool any = false;
   for (int n = 0; n < kShadingPasses; ++n) {
-    const Contacts contacts = contacts_of(world, state, sweep.point);
+    const Contacts contacts = active_contacts(world, state, sweep.point);
     if (!contacts.any([](const SurfaceFeel& feel) { return feel.shading; })) break;
     any = true;
     const std::array<glm::dvec3, 3> normals = contacts.felt_normals();
@@ -134,18 +136,18 @@ Sweep shade(const World& world, WorldState& state, const Goal& goal, Sweep sweep
                     shading_metric(goal.metric, {normals.data(), contacts.count}), goal.travel);
     const double moved = glm::length(next.point - sweep.point);
     sweep = {next.point, next.arrived, next.force_N, sweep.steps + next.steps, sweep.surveys + next.surveys};
-    if (moved <= kShadingStill * glm::length(goal.target - sweep.point)) break;
+    if (moved <= kShadingConverged * glm::length(goal.target - sweep.point)) break;
   }
   if (!any) return sweep;
-  Contacts contacts = contacts_of(world, state, sweep.point);
+  Contacts contacts = active_contacts(world, state, sweep.point);
   if (press_in_place(contacts, sweep.point, goal) == glm::dvec3(0.0)) return sweep;
-  const Sweep pressed = stay(state, contacts, sweep.point);
+  const Sweep pressed = hold_in_place(state, contacts, sweep.point);
   sweep.force_N = pressed.force_N;
   return sweep;
 }
 
-// All that the surfaces do to the proxy, and the part of it that friction and shading make.
-Sweep whole(WorldState& state, const Goal& goal, std::uint32_t from_object, Sweep sweep) noexcept {
+// Splits the whole force of the surfaces into the sweep's part and that of friction and shading.
+Sweep split_force(WorldState& state, const Goal& goal, std::uint32_t from_object, Sweep sweep) noexcept {
   const glm::dvec3 force = goal.metric * (sweep.point - goal.target);
   state.friction_N = force - sweep.force_N;
   state.rubbed = from_object;
@@ -154,19 +156,19 @@ Sweep whole(WorldState& state, const Goal& goal, std::uint32_t from_object, Swee
   return sweep;
 }
 
-// The proxy, pressed on `contacts` where it is, stays or slides. False where nothing rubs or nothing presses.
+// Keeps or slides a proxy that is pressed on `contacts`. False if there is no friction or no pressure.
 //
-// Where the surface turns within the slide, the pull that is on the cone of the normal where it began is not
-// on that of the normal where it ends: from there it goes on, until it is.
-bool rub(const World& world, WorldState& state, Contacts contacts, const Goal& goal, bool first_pass,
-         Sweep& sweep) noexcept {
-  const MixedFeel feel = mixed(contacts);
+// If the surface turns within the slide, a pull on the cone of the first normal is not on that of the last
+// normal. The slide goes on from there until it is.
+bool apply_friction(const World& world, WorldState& state, Contacts contacts, const Goal& goal,
+                    bool first_pass, Sweep& sweep) noexcept {
+  const MixedFeel feel = mixed_feel(contacts);
   if (!(feel.static_friction > 0.0)) return false;
   const glm::dvec3 from = state.proxy_m;
   const glm::dvec3 pressed = press_in_place(contacts, from, goal);
   if (pressed == glm::dvec3(0.0)) return false;
   const std::array<ActiveElement, 3> active = state.active;
-  const std::uint32_t active_count = state.active_count, object = rubbing(contacts);
+  const std::uint32_t active_count = state.active_count, object = friction_object(contacts);
   const FrictionStep step = friction_target(from, goal.target, goal.metric, glm::normalize(pressed),
                                             feel.static_friction, feel.dynamic_friction, state.sliding);
   bool stays = step.target == from;
@@ -177,23 +179,23 @@ bool rub(const World& world, WorldState& state, Contacts contacts, const Goal& g
     sweep = shade(world, state, slide,
                   sweep_proxy(world, state, sweep.point, slide.target, goal.metric, goal.travel));
     if (!step.sliding) break;
-    Contacts now = contacts_of(world, state, sweep.point);
+    Contacts now = active_contacts(world, state, sweep.point);
     const glm::dvec3 pressed_now = press_in_place(now, sweep.point, goal);
-    const MixedFeel felt = mixed(now);
+    const MixedFeel felt = mixed_feel(now);
     if (pressed_now == glm::dvec3(0.0)) break;
     next = friction_target(sweep.point, goal.target, goal.metric, glm::normalize(pressed_now),
                            felt.static_friction, felt.dynamic_friction, true);
-    if (next.tangential_N <= felt.dynamic_friction * next.normal_N * (1.0 + kOnTheCone)) break;
+    if (next.tangential_N <= felt.dynamic_friction * next.normal_N * (1.0 + kConeTolerance)) break;
   }
-  if (step.sliding && !stays) stays = !friction_spends(from, sweep.point, goal.target, goal.metric);
+  if (step.sliding && !stays) stays = !friction_dissipates(from, sweep.point, goal.target, goal.metric);
   state.stuck = stays;
   state.sliding = (step.sliding && !stays) || (!first_pass && state.sliding);
   if (stays) {
     state.active = active;
     state.active_count = active_count;
-    sweep = stay(state, contacts, from);
+    sweep = hold_in_place(state, contacts, from);
   }
-  sweep = whole(state, goal, object, sweep);
+  sweep = split_force(state, goal, object, sweep);
   return true;
 }
 
@@ -209,29 +211,29 @@ Sweep sweep_with_feel(const World& world, WorldState& state, const glm::dvec3& t
   const bool held = state.active_count > 0, pushed = state.pushed;
   state.pushed = false;
   Sweep smooth;
-  const bool swept = !held || pushed;  // where a body has pushed the proxy, what holds it is not what held it
+  const bool swept = !held || pushed;  // a body pushed the proxy: its contacts may have changed
   if (swept) smooth = sweep_proxy(world, state, state.proxy_m, target, metric, travel);
   if (held) {
-    const Contacts contacts = contacts_of(world, state, swept ? smooth.point : state.proxy_m);
+    const Contacts contacts = active_contacts(world, state, swept ? smooth.point : state.proxy_m);
     Sweep sweep;
-    if (rub(world, state, contacts, {target, metric, travel}, first_pass, sweep)) return sweep;
+    if (apply_friction(world, state, contacts, {target, metric, travel}, first_pass, sweep)) return sweep;
   }
   end_friction(state);
   if (!swept) smooth = sweep_proxy(world, state, state.proxy_m, target, metric, travel);
-  const Contacts touched = contacts_of(world, state, smooth.point);
+  const Contacts touched = active_contacts(world, state, smooth.point);
   if (touched.count == 0) return smooth;
-  state.rubbed = rubbing(touched);
-  state.stuck = mixed(touched).static_friction > 0.0;  // from here a body carries it
+  state.rubbed = friction_object(touched);
+  state.stuck = mixed_feel(touched).static_friction > 0.0;  // from now on a body carries it
   if (!touched.any([](const SurfaceFeel& f) { return f.shading; })) return smooth;
   smooth = shade(world, state, {target, metric, travel}, smooth);
-  return whole(state, {target, metric, travel}, state.rubbed, smooth);
+  return split_force(state, {target, metric, travel}, state.rubbed, smooth);
 }
 
 glm::dvec3 added_force(const World& world, WorldState& state, const glm::dvec3& device_m,
                        double dt_s) noexcept {
-  const Contacts contacts = contacts_of(world, state, state.proxy_m);
+  const Contacts contacts = active_contacts(world, state, state.proxy_m);
   const double k = world.tool.stiffness_N_per_m;
-  const double damping = mixed(contacts).damping_N_s_per_m;
+  const double damping = mixed_feel(contacts).damping_N_s_per_m;
   glm::dvec3 added(0.0), normal(0.0);
   double shares = 0.0;
   for (const Contact& c : contacts) {
@@ -251,9 +253,8 @@ glm::dvec3 added_force(const World& world, WorldState& state, const glm::dvec3& 
   for (const Contact& c : contacts) {
     if (c.object->feel.texture == nullptr) continue;
     const BodyFrame& frame = state.rigid[c.number].frame;
-    // Felt where the device is over the surface. A proxy that friction holds, or another surface, stands
-    // elsewhere: a relief felt there would push the hand by what the hand does not move over, and so pay it
-    // for going to and fro.
+    // Evaluated at the point of the surface under the device. A proxy held by friction or by another surface
+    // is elsewhere: its relief would push the hand over a way that the hand does not move, and add energy.
     const double depth = glm::dot(state.proxy_m - device_m, c.normal);
     const glm::dvec3 over = device_m + (depth - world.contact_radius_m()) * c.normal;
     const TexturedContact contact{frame.to_body(over), c.normal * frame.rotation, c.force_N / k, k};

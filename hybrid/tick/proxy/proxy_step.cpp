@@ -11,7 +11,7 @@
 namespace hybrid {
 namespace {
 
-constexpr int kMaxFreePieces = 512;  // of the way through free space looked at in one tick
+constexpr int kMaxFreePieces = 512;  // pieces of the way through free space examined in one tick
 
 }  // namespace
 
@@ -36,7 +36,7 @@ double gather_planes(const World& world, WorldState& state, const glm::dvec3& po
       const glm::dvec3 away = point - on_surface;
       const double distance = glm::length(away);
       if (!(distance > 0.0))
-        continue;  // on the surface itself, where no side is right: its neighbours decide
+        continue;  // on the surface itself no side is right: the neighbouring elements decide
       const glm::dvec3 normal = away / distance;
       state.scratch.planes.push_back(
           {normal, glm::dot(normal, on_surface) + world.contact_radius_m(), o, near.element});
@@ -51,7 +51,7 @@ bool advance_through_free_space(const World& world, WorldState& state, const glm
   const double radius = world.contact_radius_m();
   if (world.soft.empty() && state.look_m > 0.0) {
     if (state.active_count > 0) return false;
-    // Both ends lie in what the last look saw: nothing, or something that the proxy must be asked about.
+    // Both ends lie within the last map query: it is empty, or the sweep must consider its objects.
     const glm::dvec3 a = glm::abs(state.proxy_m - state.look_at), b = glm::abs(goal - state.look_at);
     const double most = state.look_m - radius;
     if (a.x <= most && a.y <= most && a.z <= most && b.x <= most && b.y <= most && b.z <= most) {
@@ -61,7 +61,7 @@ bool advance_through_free_space(const World& world, WorldState& state, const glm
   }
   if (!world.use_map) return false;
   const double margin = std::max(radius, soft_reach_m) + state.map.cell_m();
-  const double piece = look_cells * state.map.cell_m();
+  const double piece = kQueryCells * state.map.cell_m();
   for (int n = 0; n < kMaxFreePieces; ++n) {
     const glm::dvec3 way = goal - state.proxy_m;
     const double length = glm::length(way);
@@ -73,7 +73,7 @@ bool advance_through_free_space(const World& world, WorldState& state, const glm
     if (last) {
       if (world.soft.empty()) {  // for the ticks to come
         state.look_at = goal;
-        state.look_m = radius + look_cells * state.map.cell_m();
+        state.look_m = radius + kQueryCells * state.map.cell_m();
         state.look_mask = state.map.rigid_in(goal - state.look_m, goal + state.look_m, state.map_trail);
       }
       return true;

@@ -9,16 +9,17 @@
 namespace hybrid {
 namespace {
 
-constexpr int kMaxShrinks = 60;             // of a survey that found too much
-constexpr int kCrowded = 5;                 // so many shrinks do not help where a fan has its pole
-constexpr std::uint32_t kManySurveys = 12;  // of one sweep: then larger ones
-constexpr double kAhead = 0.6;              // of its margin a survey is made ahead of the proxy
-// A survey is good that finds so many elements: fewer are soon left, more are long to read. A ball has more
-// under it than a point before it is free to move at all.
+constexpr int kMaxShrinks = 60;  // halvings of the margin of a crowded survey
+constexpr int kCrowded = 5;      // halvings after which the crowd must be the pole of a fan of triangles
+constexpr std::uint32_t kManySurveys = 12;  // of one sweep: then surveys take more elements
+constexpr double kCentreAhead = 0.6;        // of its margin: how far ahead of the proxy a survey is centred
+// Target number of elements in a survey. Fewer are soon left behind, more take long to read. A ball has more
+// elements in contact range than a point has.
 constexpr double kGoodCount = 16.0, kGoodUnderBall = 104.0;
-constexpr double kCrowdStays = 0.7;  // of the count, when about half of the margin still finds it: a pole
-constexpr double kHalfOrSo = 0.6;
-constexpr double kFurtherLook = 4.0;  // times as far, when the look ends a step
+// Of the last count: if about half of the margin still finds this many, the proxy is at a pole.
+constexpr double kPoleCount = 0.7;
+constexpr double kPoleMargin = 0.6;
+constexpr double kRangeGrowth = 4.0;  // growth of the range when it cut a step
 
 double max_component(const glm::dvec3& v) noexcept {
   return std::max({v.x, v.y, v.z});
@@ -26,9 +27,8 @@ double max_component(const glm::dvec3& v) noexcept {
 
 }  // namespace
 
-// The proxy came here by another way than the last sweep's: a plane between it and an element may have it
-// on the wrong side.
-void Surroundings::see_afresh(const glm::dvec3& from) noexcept {
+// The proxy came here other than by the last sweep: cached planes may have it on the wrong side.
+void ProxySurroundings::renew_planes(const glm::dvec3& from) noexcept {
   for (std::uint32_t o = 0; o < world_.rigid.size(); ++o) {
     if (scope_.kind != Scope::Kind::all && (scope_.kind == Scope::Kind::only) != (o == scope_.object))
       continue;
@@ -37,45 +37,45 @@ void Surroundings::see_afresh(const glm::dvec3& from) noexcept {
   }
 }
 
-// Which objects are near, and that what is known of them covers the proxy.
-bool Surroundings::look_from(const glm::dvec3& point) noexcept {
+// Lists the objects near `point`, and surveys those whose known range does not cover it.
+bool ProxySurroundings::survey_from(const glm::dvec3& point) noexcept {
   point_ = point;
   const double room = state_.look_m - radius_ - max_component(glm::abs(point_ - state_.look_at));
   if (scope_.kind == Scope::Kind::only) {
-    state_.look_m = -1.0;  // what the map said of the scene is not what is asked
-  } else if (state_.look_m < 0.0 || room < 0.0 || look_ended_) {
-    if (look_ended_) look_cells_ *= kFurtherLook;  // too short-sighted for this motion
+    state_.look_m = -1.0;  // the list would be that of the whole scene
+  } else if (state_.look_m < 0.0 || room < 0.0 || query_cut_way_) {
+    if (query_cut_way_) query_cells_ *= kRangeGrowth;  // too short a range for this motion
     state_.look_at = point_;
-    state_.look_m = radius_ + look_cells_ * state_.map.cell_m();
+    state_.look_m = radius_ + query_cells_ * state_.map.cell_m();
     state_.look_mask =
         world_.use_map ? state_.map.rigid_in(point_ - state_.look_m, point_ + state_.look_m, state_.map_trail)
                        : ~std::uint64_t{0};
-    look_ended_ = false;
-    // Unasked, a neighbourhood does not follow the proxy, which may come back on another side.
+    query_cut_way_ = false;
+    // A neighbourhood out of range does not follow the proxy, which may come back on another side.
     for (std::uint32_t o = 0; o < world_.rigid.size(); ++o) {
-      if (!asked(o) && !(scope_.kind == Scope::Kind::all_but && o == scope_.object))
+      if (!in_scope(o) && !(scope_.kind == Scope::Kind::all_but && o == scope_.object))
         state_.rigid[o].near.forget();
     }
   }
   for (std::uint32_t o = 0; o < world_.rigid.size(); ++o) {
-    if (!asked(o)) continue;
+    if (!in_scope(o)) continue;
     const glm::dvec3 view = state_.rigid[o].frame.to_body(point_);
-    const bool ended = ended_ == o + 1;
+    const bool ended = cutting_object_ == o + 1;
     if (!ended && state_.rigid[o].near.margin_left(view) > 0.0) continue;
     if (!survey(o, view, ended)) return false;
   }
-  ended_ = 0;
+  cutting_object_ = 0;
   return true;
 }
 
-bool Surroundings::survey(std::uint32_t o, const glm::dvec3& view, bool moving) noexcept {
+bool ProxySurroundings::survey(std::uint32_t o, const glm::dvec3& view, bool moving) noexcept {
   RigidState& near = state_.rigid[o];
   const polygon::RigidSurface& surface = *world_.rigid[o].surface;
   const double smallest = 1e-6 * radius_ + 1e2 * rounding_;
-  if (surveys_ > 1) near.margin_m *= 2.0;  // too short-sighted for this motion
+  if (surveys_ > 1) near.margin_m *= 2.0;  // too short a margin for this motion
   const double longest = glm::length(surface.upper() - surface.lower()) + radius_;
   near.margin_m = std::clamp(near.margin_m, std::min(4.0 * smallest, longest), longest);
-  // From afar as far as there is nothing.
+  // Far from the object, the whole empty distance is the margin.
   const glm::dvec3 outside =
       glm::max(glm::max(surface.lower() - view, view - surface.upper()), glm::dvec3(0.0));
   const double apart = (glm::length(outside) - radius_) * (1.0 - 1e-9) - 4.0 * rounding_;
@@ -87,7 +87,8 @@ bool Surroundings::survey(std::uint32_t o, const glm::dvec3& view, bool moving) 
   for (int n = 0; n < kMaxShrinks; ++n) {
     if (n == kCrowded) near.margin_m = margin;
     if (n >= kCrowded && near.margin_m < smallest) break;
-    const glm::dvec3 ahead = glm::transpose(near.frame.rotation) * direction_ * (kAhead * near.margin_m);
+    const glm::dvec3 ahead =
+        glm::transpose(near.frame.rotation) * direction_ * (kCentreAhead * near.margin_m);
     ++surveys_;
     if (near.near.survey(surface, moving ? view + ahead : view, near.margin_m, radius_, view,
                          n >= kCrowded || surveys_ > kManySurveys)) {
@@ -101,26 +102,26 @@ bool Surroundings::survey(std::uint32_t o, const glm::dvec3& view, bool moving) 
   return false;
 }
 
-// Of the next survey: so that it finds neither too few elements nor too many, if that is in its power.
-void Surroundings::adapt_margin(RigidState& near) const noexcept {
+// The margin of the next survey, so that it finds neither too few elements nor too many if it can.
+void ProxySurroundings::adapt_margin(RigidState& near) const noexcept {
   const double count = std::max(1.0, static_cast<double>(near.near.size()));
   const double good = kGoodCount + kGoodUnderBall * radius_ / (radius_ + near.margin_m);
-  const bool pole = count > good && count >= kCrowdStays * near.counted &&
-                    near.margin_m < kHalfOrSo * near.margin_counted_m;
+  const bool pole = count > good && count >= kPoleCount * near.counted &&
+                    near.margin_m < kPoleMargin * near.margin_counted_m;
   near.counted = count;
   near.margin_counted_m = near.margin_m;
   if (pole) {
     near.margin_m *= 2.0;
-  } else if (surveys_ < 3 || count < good) {  // else the way of this tick is what needs it
+  } else if (surveys_ < 3 || count < good) {  // else the way of this tick needs the margin
     near.margin_m *= std::clamp(std::sqrt(good / count), 0.5, 1.5);
   }
 }
 
-// Of the straight way to q, the part within everything that was looked at.
-double Surroundings::clear_part(const glm::dvec3& q) noexcept {
+// The fraction of the straight way to q within the range that is known.
+double ProxySurroundings::known_fraction(const glm::dvec3& q) noexcept {
   double fraction = 1.0;
-  ended_ = 0;
-  look_ended_ = false;
+  cutting_object_ = 0;
+  query_cut_way_ = false;
   direction_ = q - point_;
   const double length = glm::length(direction_);
   if (length > 0.0) direction_ /= length;
@@ -131,11 +132,11 @@ double Surroundings::clear_part(const glm::dvec3& q) noexcept {
         to > 0.0 ? state_.look_at[d] + most - point_[d] : point_[d] - state_.look_at[d] + most;
     if (std::abs(to) * fraction > ahead) {
       fraction = std::max(0.0, ahead / std::abs(to));
-      look_ended_ = true;
+      query_cut_way_ = true;
     }
   }
   for (std::uint32_t o = 0; o < world_.rigid.size(); ++o) {
-    if (!asked(o)) continue;
+    if (!in_scope(o)) continue;
     const RigidState& near = state_.rigid[o];
     const glm::dvec3 a = near.frame.to_body(point_) - near.near.centre();
     const glm::dvec3 way = near.frame.to_body(q) - near.near.centre() - a;
@@ -147,27 +148,28 @@ double Surroundings::clear_part(const glm::dvec3& q) noexcept {
     const double f = std::max(0.0, (root - ab) / aa) * (1.0 - 1e-9);
     if (f >= fraction) continue;
     fraction = f;
-    ended_ = o + 1;
-    look_ended_ = false;
+    cutting_object_ = o + 1;
+    query_cut_way_ = false;
   }
   return fraction;
 }
 
-// The element that the first `part` of the way to q meets first; kNobody when that is clear.
-ProxyPlane Surroundings::first_in_the_way(const glm::dvec3& q, double fraction,
-                                          std::span<const ProxyPlane> held) noexcept {
+// The element that the first `fraction` of the way to q meets first; kNobody if there is none.
+ProxyPlane ProxySurroundings::first_in_the_way(const glm::dvec3& q, double fraction,
+                                               std::span<const ProxyPlane> held) noexcept {
   ProxyPlane first{kNobody, 0, {}, true};
   double soonest = 2.0;
   for (std::uint32_t o = 0; o < world_.rigid.size(); ++o) {
-    if (asked(o)) first_of(o, q, fraction, held, first, soonest);
+    if (in_scope(o)) first_in_object(o, q, fraction, held, first, soonest);
   }
   return first;
 }
 
-// Planes seen from elsewhere say too soon rather than too late: so the soonest is seen from here instead,
-// until the soonest is one that was.
-void Surroundings::first_of(std::uint32_t o, const glm::dvec3& q, double fraction,
-                            std::span<const ProxyPlane> held, ProxyPlane& first, double& soonest) noexcept {
+// Planes seen from another viewpoint report an element too soon, never too late. The soonest of them is
+// therefore renewed from here, until the soonest one is up to date.
+void ProxySurroundings::first_in_object(std::uint32_t o, const glm::dvec3& q, double fraction,
+                                        std::span<const ProxyPlane> held, ProxyPlane& first,
+                                        double& soonest) noexcept {
   using Violation = polygon::Neighbourhood::Violation;
   RigidState& near = state_.rigid[o];
   const glm::dvec3 view = near.frame.to_body(point_), goal = near.frame.to_body(q);
@@ -190,11 +192,12 @@ void Surroundings::first_of(std::uint32_t o, const glm::dvec3& q, double fractio
       first.in_body = near.near.plane(violated[n].index);
       return;
     }
-    if (!covered(candidate, held))
-      candidate.in_body = polygon::separating_plane(*world_.rigid[o].surface, candidate.element, view, radius_);
+    if (!is_covered(candidate, held))
+      candidate.in_body =
+          polygon::separating_plane(*world_.rigid[o].surface, candidate.element, view, radius_);
     near.near.set_plane(violated[n].index, candidate.in_body);
-    // A plane that only the first part of the way breaks, by what rounding did to where the proxy stands,
-    // is being left.
+    // A plane that only the first part of the way violates, by the rounding of the proxy's place, is being
+    // left.
     const double depth = candidate.in_body.offset - glm::dot(candidate.in_body.normal, end);
     const double at_goal = candidate.in_body.offset - glm::dot(candidate.in_body.normal, goal);
     if (depth > tolerance && at_goal > tolerance) {
@@ -207,9 +210,10 @@ void Surroundings::first_of(std::uint32_t o, const glm::dvec3& q, double fractio
   }
 }
 
-// Does a plane that holds already keep the proxy from this element as well? On a convex surface one plane
-// covers everything, and the proxy need not stop at each edge.
-bool Surroundings::covered(ProxyPlane& candidate, std::span<const ProxyPlane> held_planes) const noexcept {
+// Does an active plane already separate the proxy from this element? On a convex surface one plane covers
+// everything, so the proxy need not stop at each edge.
+bool ProxySurroundings::is_covered(ProxyPlane& candidate,
+                                   std::span<const ProxyPlane> held_planes) const noexcept {
   const polygon::RigidSurface& surface = *world_.rigid[candidate.object].surface;
   for (const ProxyPlane& held : held_planes) {
     if (held.object != candidate.object) continue;

@@ -12,13 +12,13 @@ namespace hybrid {
 namespace {
 
 constexpr std::uint32_t kMaxSteps = 64;
-constexpr std::uint32_t kMaxExchanges = 64;  // planes that join or are made anew in one step
+constexpr std::uint32_t kMaxExchanges = 64;  // planes added or renewed in one step
 constexpr std::uint32_t kMaxCrossings = 16;  // of nearly flat edges, in one sweep
-// A step shorter than this, of the way to the target and of the ball, is the end.
+// A shorter step ends the sweep; relative to the way to the target, and to the ball's radius.
 constexpr double kConvergedWay = 1e-9, kConvergedBall = 1e-7;
-constexpr double kShortLook = 0.05, kLongerLook = 32.0, kLeastLook = 1e-9;
-// Round an edge or a corner, of the ball: how far beyond the minimum over its planes a step goes, and over
-// which way their turning is measured.
+constexpr double kShortPart = 0.05, kPartGrowth = 32.0, kLeastPart = 1e-9;
+// Steps round an edge or a corner (unit: the ball's radius): how far beyond the minimum over its planes a
+// step may go, and the length over which the turning of the planes is measured.
 constexpr double kRoundStep = 0.5, kTurnStep = 1e-4;
 
 class Sweeper {
@@ -37,17 +37,17 @@ class Sweeper {
         radius_(world.contact_radius_m()),
         rounding_(world.rounding_m) {}
 
-  Sweep go(const glm::dvec3& from, double travel) noexcept {
+  Sweep run(const glm::dvec3& from, double travel) noexcept {
     Sweep sweep;
     sweep.point = from;
     sweep.arrived = false;
     state_.trail_count = 0;
     const bool goes_on = from == state_.swept_to_m;
-    if (!goes_on) around_.see_afresh(from);
+    if (!goes_on) around_.renew_planes(from);
     for (std::uint32_t n = 0; n < state_.active_count && scope_.kind == Scope::Kind::all; ++n) {
       const ActiveElement& active = state_.active[n];
       const ProxyPlane& last = held_[n];
-      // Held as the last sweep left it, unless something else used the list since.
+      // The planes are as the last sweep left them, unless something else used the list since.
       if (!goes_on || last.object != active.object || last.element != active.element)
         held_[n] = {active.object, active.element, {}, true};
       ++held_count_;
@@ -55,9 +55,9 @@ class Sweeper {
     for (; sweep.steps < kMaxSteps; ++sweep.steps) {
       point_ = sweep.point;
       leave_trail(point_);
-      if (!around_.look_from(point_)) break;
+      if (!around_.survey_from(point_)) break;
       if (sweep.steps == 0 &&
-          goes_on) {  // on the triangle that held it last: to the next, without a look here
+          goes_on) {  // on the triangle that held it last: crosses to the next one without a search
         const Crossing crossing = cross_edges(sweep.point, travel);
         if (crossing == Crossing::moved) continue;
         sweep.arrived = crossing == Crossing::arrived;
@@ -69,7 +69,7 @@ class Sweeper {
       const double still =
           kConvergedWay * glm::length(target_ - point_) + kConvergedBall * radius_ + rounding_;
       if (round_.taken && !round_step_paid()) {
-        if (state_.trail_count > 0) --state_.trail_count;  // it never was there
+        if (state_.trail_count > 0) --state_.trail_count;  // the proxy never was there
         sweep.point = round_.instead;
         continue;
       }
@@ -94,7 +94,8 @@ class Sweeper {
       keep_active();
       if (fraction_ == 1.0 && part == 1.0) {
         const Crossing crossing = cross_edges(sweep.point, travel);
-        if (crossing == Crossing::arrived || (crossing == Crossing::none && held_flatly(sweep.point))) {
+        if (crossing == Crossing::arrived ||
+            (crossing == Crossing::none && held_by_own_planes(sweep.point))) {
           sweep.arrived = true;
           break;
         }
@@ -112,8 +113,8 @@ class Sweeper {
     return glm::dot(q - target_, metric_ * (q - target_));
   }
 
-  // Held by something round, the proxy goes on to where the minimum will be when the planes have turned. That
-  // is a way uphill, and must pay with the next step.
+  // At a round edge or corner the proxy goes on to where the minimum will be when the planes have turned.
+  // Such a step goes uphill, so that the next step must pay for it.
   bool take_round_step(double still, double travel) noexcept {
     if (round_.waits > 0) --round_.waits;
     if (round_.waits > 0 || round_.taken || fraction_ != 1.0 || minimum_.active_count == 0 ||
@@ -133,8 +134,8 @@ class Sweeper {
       const glm::dvec3 on_plane =
           view + (held.in_body.offset - glm::dot(held.in_body.normal, view)) * held.in_body.normal;
       planes[n].hessian = frame.rotation *
-                          polygon::distance_hessian(*world_.rigid[held.object].surface, held.element, on_plane,
-                                              kTurnStep * radius_) *
+                          polygon::distance_hessian(*world_.rigid[held.object].surface, held.element,
+                                                    on_plane, kTurnStep * radius_) *
                           glm::transpose(frame.rotation);
       turns = true;
     }
@@ -144,7 +145,7 @@ class Sweeper {
         point_, minimum_.point, metric_, {planes.data(), minimum_.active_count}, kRoundStep * radius_);
     const bool clear = glm::length(round_.to - round_.instead) > still &&
                        glm::length(round_.to - point_) < travel && around_.is_clear(round_.to, held_planes());
-    around_.forget_end();
+    around_.forget_cut();
     if (!clear) return false;
     stepped_ = glm::length(round_.to - point_);
     round_.taken = true;
@@ -152,8 +153,8 @@ class Sweeper {
     return true;
   }
 
-  // Is what was reached better than the minimum that was left for it? If not, back to that, and on without
-  // for a while.
+  // Is the point reached better than the minimum that was skipped for it? If not, returns to that minimum and
+  // takes no round step for a while.
   bool round_step_paid() noexcept {
     const glm::dvec3 reached = point_ + fraction_ * (minimum_.point - point_);
     constexpr double kSame = 1.0 + 1e-14;
@@ -161,12 +162,12 @@ class Sweeper {
     round_.taken = false;
     round_.waits = round_.patience *= 2;
     held_count_ = 0;
-    around_.see_afresh(round_.instead);
+    around_.renew_planes(round_.instead);
     return false;
   }
 
-  // The proxy is at the minimum on one triangle's plane. When the next one's is nearer to the target, and
-  // only a nearly flat edge lies between, there, over that edge; and so on.
+  // The proxy is at the minimum on one triangle's plane. If the plane of the next triangle is nearer to the
+  // target, and only a nearly flat edge lies between, it crosses that edge; and so on.
   enum class Crossing : std::uint8_t { none, moved, arrived };
   Crossing cross_edges(glm::dvec3& point, double& travel) noexcept {
     if (held_count_ != 1 || !held_[0].flat || scope_.kind != Scope::Kind::all || !isotropic_)
@@ -178,7 +179,8 @@ class Sweeper {
     bool moved = false;
     while (crossings_ < kMaxCrossings) {
       if (near.crossable_edges.element != held.element || near.crossable_edges.plane != held.in_body)
-        near.crossable_edges = polygon::crossable_edges_of(surface, held.element, held.in_body, radius_, rounding_);
+        near.crossable_edges =
+            polygon::crossable_edges_of(surface, held.element, held.in_body, radius_, rounding_);
       const polygon::CrossableEdges::Side* side = polygon::nearer_side(near.crossable_edges, target);
       if (side == nullptr) break;
       ++crossings_;
@@ -186,19 +188,19 @@ class Sweeper {
       const glm::dvec3 top = near.frame.to_scene(crossing.top), end = near.frame.to_scene(crossing.end);
       const double length = glm::length(top - point) + glm::length(end - top);
       const ProxyPlane from = held;
-      stand_at(point);
+      set_viewpoint(point);
       bool clear = length < travel && around_.is_clear(top, held_planes());
       if (clear) {
-        stand_at(top);
+        set_viewpoint(top);
         held = {from.object, side->element, side->plane, true, true, false};
         clear = around_.is_clear(end, held_planes());
       }
       if (!clear) {
         held = from;
-        stand_at(point);
-        around_.see_afresh(point);
-        // Not far enough looked ahead: that comes first.
-        if (around_.ended()) return Crossing::moved;
+        set_viewpoint(point);
+        around_.renew_planes(point);
+        // The known neighbourhood ends on this way: look there first.
+        if (around_.range_cut_way()) return Crossing::moved;
         break;
       }
       for (const glm::dvec3& corner : {point, top, end}) leave_trail(corner);
@@ -218,13 +220,13 @@ class Sweeper {
     return Crossing::arrived;
   }
 
-  // The minimum over the planes in the way, and how much of the way there is known to be clear.
+  // The minimum over the planes in the way, and the fraction of the way there that is known to be clear.
   bool solve() noexcept {
     state_.scratch.planes.clear();
-    // Of those that held the proxy before, the ones that it still touches, and those found not to.
+    // Keeps the held planes whose elements the proxy still touches, and planes that were loosened.
     std::uint32_t kept = 0;
     for (std::uint32_t i = 0; i < held_count_; ++i) {
-      if (!around_.asked(held_[i].object) ||
+      if (!around_.in_scope(held_[i].object) ||
           (held_[i].own_plane && !held_[i].touching && !touches(held_[i], point_)))
         continue;
       held_[kept] = held_[i];
@@ -237,24 +239,23 @@ class Sweeper {
       minimum_ = polygon::minimise_on_planes(target_, factored_, state_.scratch.planes, rounding_);
       if (!minimum_.feasible) {
         state_.faults |= fault_infeasible;
-        return false;  // stay: the place before was outside everything
+        return false;  // stay: the last point is outside everything
       }
-      fraction_ = around_.clear_part(minimum_.point);
-      // Nothing holds the proxy just after it slid off what did: what is next is near, and short looks see
-      // few elements.
-      ProxyPlane first{Surroundings::kNobody, 0, {}, true};
-      for (double part = held_count_ == 0 ? short_look(minimum_.point) : 1.0;; part *= kLongerLook) {
+      fraction_ = around_.known_fraction(minimum_.point);
+      // The proxy has just slid off its element: the next obstacle is near, and short looks see few elements.
+      ProxyPlane first{ProxySurroundings::kNobody, 0, {}, true};
+      for (double part = held_count_ == 0 ? short_part(minimum_.point) : 1.0;; part *= kPartGrowth) {
         const double share = std::min(part, 1.0) * fraction_;
         first = around_.first_in_the_way(minimum_.point, share, held_planes());
-        if (first.object != Surroundings::kNobody || part >= 1.0) break;
+        if (first.object != ProxySurroundings::kNobody || part >= 1.0) break;
       }
-      if (first.object == Surroundings::kNobody) return true;
+      if (first.object == ProxySurroundings::kNobody) return true;
       if (held_count_ == kMaxProxyPlanes || n + 1 == kMaxExchanges) {
-        stop_before(first);
+        end_way_before(first);
         return true;
       }
-      // Found by the plane across its closest point, which says soonest what is really met; held by its own,
-      // which lets the proxy come up to it at once, not by halves.
+      // Found by the plane across its closest point, which shows first where the way meets it. Held by
+      // the element's own plane, on which the proxy arrives in one step instead of by halving.
       make_plane(first);
       held_[held_count_++] = first;
       state_.scratch.planes.push_back(in_scene(first));
@@ -262,21 +263,22 @@ class Sweeper {
     return true;
   }
 
-  // Too many planes for one step: the way to the minimum over those known ends at the next, by the plane that
-  // found it. (Its own would be reached later, and others that nobody has looked at yet stand before that.)
-  void stop_before(const ProxyPlane& next) noexcept {
+  // Too many planes for one step: the way ends at the next plane, as it was found. The element's own plane
+  // would be reached later, and elements not examined yet may stand before it.
+  void end_way_before(const ProxyPlane& next) noexcept {
     const BodyFrame& frame = state_.rigid[next.object].frame;
     const glm::dvec3 end = point_ + fraction_ * (minimum_.point - point_);
-    fraction_ *= polygon::Neighbourhood::fraction_before(next.in_body, frame.to_body(point_), frame.to_body(end));
-    around_.forget_end();
+    fraction_ *=
+        polygon::Neighbourhood::fraction_before(next.in_body, frame.to_body(point_), frame.to_body(end));
+    around_.forget_cut();
   }
 
-  // Of the way to q, a part as long as a twentieth of the last step.
-  [[nodiscard]] double short_look(const glm::dvec3& q) const noexcept {
+  // The fraction of the way to q that is a twentieth of the last step long.
+  [[nodiscard]] double short_part(const glm::dvec3& q) const noexcept {
     const double way = glm::length(q - point_);
     if (!(stepped_ > 0.0 && way > 0.0)) return 1.0;
-    const double part = kShortLook * stepped_ / way;
-    return part > kLeastLook ? part : kLeastLook;  // nor nothing, however far q is
+    const double part = kShortPart * stepped_ / way;
+    return part > kLeastPart ? part : kLeastPart;  // never zero, however far q is
   }
 
   void make_plane(ProxyPlane& held) noexcept {
@@ -287,8 +289,8 @@ class Sweeper {
     if (!held.flat) held.in_body = polygon::separating_plane(surface, held.element, view, radius_);
   }
 
-  // An element's own plane reaches beyond the element: a proxy that rests where the element is not rests on
-  // nothing. True when there was one, and the step must be done again.
+  // An element's own plane reaches beyond the element, where nothing supports the proxy. True if there was
+  // such a contact, and the step must be repeated.
   bool loosen_false_contacts() noexcept {
     bool any = false;
     for (std::uint32_t n = 0; n < minimum_.active_count; ++n) {
@@ -301,9 +303,9 @@ class Sweeper {
     return any;
   }
 
-  // Held by nothing, or by elements' own planes alone where the elements are: no plane would change if it
-  // were seen from `point`, so the minimum is the minimum.
-  [[nodiscard]] bool held_flatly(const glm::dvec3& point) noexcept {
+  // True if no plane holds the proxy, or only elements' own planes at points of the elements. No plane would
+  // then change if seen from `point`, so this minimum is final.
+  [[nodiscard]] bool held_by_own_planes(const glm::dvec3& point) noexcept {
     for (std::uint32_t n = 0; n < held_count_; ++n) {
       held_[n].touching = held_[n].flat && touches(held_[n], point);
       if (!held_[n].touching) return false;
@@ -315,16 +317,16 @@ class Sweeper {
     const glm::dvec3 view = state_.rigid[held.object].frame.to_body(point);
     const polygon::NearPoint near = world_.rigid[held.object].surface->closest(held.element, view);
     if (!held.flat) return near.distance <= radius_ * (1.0 + kConvergedBall) + 4.0 * rounding_;
-    // The foot on the plane must be the closest point: by distance alone, a ball would lie on a triangle
-    // whose edge it had passed by a root of the tolerance.
+    // The closest point must be the foot on the plane. By distance alone, a ball would still lie on a
+    // triangle after it passed the edge by the square root of the tolerance.
     const glm::dvec3 away = view - near.point;
     const glm::dvec3 aside = away - glm::dot(away, held.in_body.normal) * held.in_body.normal;
     return glm::length(aside) <= 4.0 * rounding_;
   }
 
-  // Only what holds the proxy goes on to the next step.
+  // Only the active planes go on to the next step.
   void keep_active() noexcept {
-    // In place: an active one may stand before or after where it goes.
+    // Sorted in place: an active plane may stand before or after its new position.
     std::array<std::uint32_t, 3> from = minimum_.active;
     held_count_ = std::min<std::uint32_t>(minimum_.active_count, 3);
     for (std::uint32_t n = 0; n < held_count_; ++n) {
@@ -340,8 +342,8 @@ class Sweeper {
   void publish(Sweep& sweep) noexcept {
     std::fill(state_.rigid_force_N.begin(), state_.rigid_force_N.end(), glm::dvec3(0.0));
     for (std::uint32_t n = 0; n < minimum_.active_count && n < held_count_; ++n) {
-      // After a whole step the held ones are the active ones, in their order; before, they are named by
-      // index.
+      // After a whole step the held planes are the active ones, in order; otherwise active planes are known
+      // by index.
       const polygon::ContactPlane& plane = state_.scratch.planes[minimum_.active[n]];
       const glm::dvec3 force = minimum_.multiplier[n] * plane.normal;
       sweep.force_N += force;
@@ -357,9 +359,9 @@ class Sweeper {
   void leave_trail(const glm::dvec3& corner) noexcept {
     if (state_.trail_count < state_.trail.size()) state_.trail[state_.trail_count++] = corner;
   }
-  void stand_at(const glm::dvec3& point) noexcept {
+  void set_viewpoint(const glm::dvec3& point) noexcept {
     point_ = point;
-    around_.stand_at(point);
+    around_.set_viewpoint(point);
   }
   [[nodiscard]] polygon::ContactPlane in_scene(const ProxyPlane& held) const noexcept {
     const BodyFrame& frame = state_.rigid[held.object].frame;
@@ -374,33 +376,33 @@ class Sweeper {
   const polygon::Metric factored_;
   std::array<ProxyPlane, kMaxProxyPlanes>& held_;
   const Scope scope_;
-  Surroundings around_;
+  ProxySurroundings around_;
   const bool isotropic_;
   const double radius_, rounding_;
-  glm::dvec3 point_{0.0};  // feasible; where everything is seen from
+  glm::dvec3 point_{0.0};  // feasible; the viewpoint of all planes
   std::uint32_t held_count_ = 0;
   polygon::PlaneMinimum minimum_;
   struct RoundStep {
-    bool taken = false;                     // the last step was one
-    std::uint32_t waits = 0, patience = 1;  // steps until the next, since one did not pay
+    bool taken = false;                     // the last step was a round step
+    std::uint32_t waits = 0, patience = 1;  // steps until the next round step, since one did not pay
     glm::dvec3 instead{0.0}, to{0.0};
   } round_;
   std::uint32_t crossings_ = 0;
-  double stepped_ = 0.0;   // how long the last step was
-  double fraction_ = 1.0;  // of the way to the minimum that is known to be clear
+  double stepped_ = 0.0;   // length of the last step
+  double fraction_ = 1.0;  // fraction of the way to the minimum that is known to be clear
 };
 
 }  // namespace
 
 Sweep sweep_proxy(const World& world, WorldState& state, const glm::dvec3& from, const glm::dvec3& target,
                   const glm::dmat3& metric, double travel) noexcept {
-  return Sweeper(world, state, target, metric).go(from, travel);
+  return Sweeper(world, state, target, metric).run(from, travel);
 }
 
 Sweep sweep_past(const World& world, WorldState& state, std::uint32_t object, bool but,
                  const glm::dvec3& from, const glm::dvec3& target) noexcept {
   const Scope scope{but ? Scope::Kind::all_but : Scope::Kind::only, object};
-  return Sweeper(world, state, target, glm::dmat3(1.0), scope).go(from, std::numeric_limits<double>::max());
+  return Sweeper(world, state, target, glm::dmat3(1.0), scope).run(from, std::numeric_limits<double>::max());
 }
 
 }  // namespace hybrid

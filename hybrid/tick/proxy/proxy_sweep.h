@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The rigid stage of the tick: moves the proxy, never through anything, to its constrained minimum.
+// The rigid stage of the tick: moves the proxy to its constrained minimum, never through a surface.
 #pragma once
 
 #include "hybrid/world/world_state.h"
@@ -7,22 +7,22 @@
 namespace hybrid {
 
 struct Sweep {
-  glm::dvec3 point{0.0};                 // where the proxy ends, scene frame; outside everything rigid
+  glm::dvec3 point{0.0};                 // end of the sweep, scene frame; outside everything rigid
   bool arrived = true;                   // false: `travel` or the bound on steps ended it first
-  glm::dvec3 force_N{0.0};               // Σ multiplier · normal at the end: what the rigid surfaces press
-  std::uint32_t steps = 0, surveys = 0;  // what it took
+  glm::dvec3 force_N{0.0};               // Σ multiplier · normal at the end: force of the rigid surfaces
+  std::uint32_t steps = 0, surveys = 0;  // their number
 };
 
-// From `from`, which is feasible, at most `travel` far towards the minimum of (q − target)ᵀ A (q − target)
-// over what can be reached on a way that stays outside and climbs over nothing but nearly flat edges, until
-// first-order conditions hold or the bound on steps is met. Each step goes straight to the minimum over the
-// planes that separate the elements near from the proxy (polygon::Neighbourhood), made lazily: only those in
-// the way. Fills state.rigid_force_N.
+// Moves at most `travel` from the feasible point `from` towards the minimum of (q − target)ᵀ A (q − target).
+// The way stays outside everything rigid and climbs over nothing but nearly flat edges. It ends when
+// first-order conditions hold, or at the bound on steps. Each step goes straight to the minimum over the
+// planes that separate nearby elements from the proxy (polygon::Neighbourhood), made lazily for the elements
+// in the way. Fills state.rigid_force_N.
 Sweep sweep_proxy(const World& world, WorldState& state, const glm::dvec3& from, const glm::dvec3& target,
                   const glm::dmat3& metric, double travel) noexcept;
 
 // The same against one object alone (`but` = false), or against all but that one (`but` = true), to the point
-// nearest to `target`. Nothing is said of forces, nor of what holds the proxy.
+// nearest to `target`. Does not change forces or active elements.
 Sweep sweep_past(const World& world, WorldState& state, std::uint32_t object, bool but,
                  const glm::dvec3& from, const glm::dvec3& target) noexcept;
 

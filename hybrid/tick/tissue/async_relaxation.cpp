@@ -11,22 +11,21 @@ namespace hybrid {
 namespace {
 
 constexpr std::size_t kMaxAsync = 64;  // bits of AsyncRelaxation::arrived
-// A tick: what a result is added to, about 100 us of it; beside a wide cycle round the contact as many rows
-// as that leaves work for, so much each, what they have to look for included, and some always: a result that
-// waits keeps the next one waiting. (With none, a brain had one every 125 ms in place of 65.)
-constexpr std::size_t kRowsTaken = 250, kLeastRows = 100, kWorkOfRow = 16;
-// Parts of what is taken near a contact that is held still.
-constexpr int kParts = 8;
-// A give or a take, of some 100 us and up to 300, comes in a tick without one: the contact is asked to rest,
-// which it does while the tool presses. Otherwise so many ticks go by at most.
-constexpr int kMostWaits = 3;
-// Rows that another core relaxes in a tick's time, so that a fixed-step session takes results as late as one
-// in real time does.
+// Rows applied a tick. kMaxRowsApplied: of a result, about 100 µs. Beside a large patch at the contact: as
+// many rows as leave it enough work, kWorkOfRow each (their obstacle queries included), but at least
+// kLeastRows, because a result that waits delays the next one.
+constexpr std::size_t kMaxRowsApplied = 250, kLeastRows = 100, kWorkOfRow = 16;
+// Parts in which the rows near a contact at rest are applied.
+constexpr int kResultParts = 8;
+// A submission or an application takes some 100 µs and up to 300. It waits for a tick without a cycle of a
+// large patch: the contact is asked to rest, which it does while the tool presses. It waits for at most
+// kMaxWaits ticks.
+constexpr int kMaxWaits = 3;
+// Rows that another core relaxes in the time of a tick. A fixed-step session gets its results as late as one
+// in real time.
 constexpr std::uint64_t kRowsRelaxed = 400;
-// Ticks between a result and what is given next, in which the contact looks at all that pulls. (With one of
-// them a block that a ball was pushed into beside another was 1.8 just noticeable differences off at most,
-// with three 1.3, with eight 1.2.)
-constexpr std::uint64_t kOwnTicks = 3;
+// Ticks between a result and the next submission, in which the contact sees the full residual.
+constexpr std::uint64_t kTicksBetween = 3;
 
 bool has_arrived(const AsyncRelaxation& async, const AsyncObject& object, std::size_t o,
                  std::uint64_t tick) noexcept {
@@ -55,11 +54,12 @@ void submit(WorldState& state, AsyncObject& object, std::size_t o) noexcept {
   object.due = state.tick + 1 + object.replica.work() / kRowsRelaxed;
 }
 
-// One of these a tick: a part of what is taken, what comes before a give or a take, these, some rows.
+// One exchange a tick: a part of a result, the preparation of an exchange, a submission or a result, or some
+// far rows.
 void exchange(WorldState& state, std::size_t o, std::uint64_t& arrived) noexcept {
   AsyncObject& object = *state.async.objects[o];
   voxel::SoftObject& soft = *state.soft[o];
-  // Noted when it is seen, not when it is taken: what is done until then depends on it.
+  // Noted when it is seen, not when it is applied, because the exchanges until then depend on it.
   if (object.submitted && !object.arrived && has_arrived(state.async, object, o, state.tick)) {
     object.arrived = true;
     arrived |= std::uint64_t{1} << o;
@@ -68,16 +68,16 @@ void exchange(WorldState& state, std::size_t o, std::uint64_t& arrived) noexcept
     object.replica.take_part(soft, !soft.held_still());
     state.async.applied = true;
     if (!object.replica.in_parts()) {
-      object.next = state.tick + kOwnTicks;
+      object.next = state.tick + kTicksBetween;
     } else {
       soft.ask_to_rest();
     }
     return;
   }
   const bool drained = object.replica.drained();
-  const bool gives = !object.submitted && state.tick >= object.next && voxel::Replica::wanted(soft);
+  const bool gives = !object.submitted && state.tick >= object.next && voxel::ShadowObject::wanted(soft);
   const bool takes = object.arrived && drained && !gives;
-  const bool waits = (gives || takes) && soft.wide_cycle() && object.waited < kMostWaits;
+  const bool waits = (gives || takes) && soft.large_patch_cycle() && object.waited < kMaxWaits;
   if (waits) {
     ++object.waited;
     soft.ask_to_rest();
@@ -91,20 +91,21 @@ void exchange(WorldState& state, std::size_t o, std::uint64_t& arrived) noexcept
   if (gives && !waits) {
     submit(state, object, o);
   } else if (takes && !waits) {
-    // At once it would be felt as a step where the tool is held still: of 48 mN in 150 in a brain. (While it
-    // moves that is lost in its motion, and would come later.)
-    object.replica.take(soft, soft.held_still() ? kParts : 1);
+    // Applied in parts if the tool is at rest: the whole would be felt as a step. While the tool moves, the
+    // step is lost in its motion, and parts would only be later.
+    object.replica.take(soft, soft.held_still() ? kResultParts : 1);
     if (object.replica.in_parts()) soft.ask_to_rest();
     object.submitted = object.arrived = false;
     ++state.async.results;
     state.async.applied = true;
-    object.next = state.tick + kOwnTicks;
+    object.next = state.tick + kTicksBetween;
   } else if (!drained) {
     const auto shared = [&soft](std::size_t rows) {
       return static_cast<std::size_t>(soft.work_share() * static_cast<double>(rows));
     };
-    const std::size_t beside = soft.work_left() / kWorkOfRow, most = shared(kRowsTaken);
-    object.replica.drain(soft, soft.wide_cycle() ? std::clamp(beside, shared(kLeastRows), most) : most);
+    const std::size_t beside = soft.work_left() / kWorkOfRow, most = shared(kMaxRowsApplied);
+    object.replica.drain(soft,
+                         soft.large_patch_cycle() ? std::clamp(beside, shared(kLeastRows), most) : most);
   }
 }
 
@@ -115,7 +116,7 @@ void start_async_relaxation(WorldState& state, Arrival arrival) {
   state.async.objects.clear();
   for (std::size_t o = 0; o < state.soft.size(); ++o) {
     const voxel::SoftObject& object = *state.soft[o];
-    const bool is_async = o < kMaxAsync && !object.lattice().yields() && !object.uses_grid();
+    const bool is_async = o < kMaxAsync && !object.lattice().yields() && !object.uses_patches();
     state.async.objects.push_back(is_async ? std::make_unique<AsyncObject>(*state.soft[o]) : nullptr);
   }
 }

@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The background stage of the tick: tissue away from the contact goes on to its equilibrium, either in the
-// tick, by a budget of voxel updates, or asynchronously (hybrid/world/async_relaxation.h).
+// The background stage of the tick: tissue away from the contact relaxes towards its equilibrium, either in
+// the tick, by a budget of voxel updates, or asynchronously (hybrid/world/async_relaxation.h).
 #pragma once
 
 #include "hybrid/world/world_state.h"
 
 namespace hybrid {
 
-// From now on soft objects are relaxed asynchronously. Objects that yield, objects on nested patches and all
-// from the 65th on stay in the tick. Allocates. Arrival::thread: the caller also runs a RelaxationThread.
+// From now on soft objects are relaxed asynchronously. Objects with plasticity, objects on nested patches and
+// all from the 65th on stay in the tick. Allocates. With Arrival::thread the caller must also run a
+// RelaxationThread.
 void start_async_relaxation(WorldState& state, Arrival arrival);
 
-// The stage: at most one exchange (a submission, a result, or a part of one) an object and tick.
+// The stage: at most one exchange (a submission, a result, or a part of one) per object and tick.
 void relax_background(const World& world, WorldState& state) noexcept;
 
 }  // namespace hybrid

@@ -7,21 +7,19 @@
 
 namespace hybrid {
 
-// How near a rigid surface must be to a surface voxel, in spacings, to become its obstacle.
+// A rigid surface within this distance of a surface voxel becomes its obstacle (spacings).
 inline constexpr double kObstacleRange = 4.0;
 
-// On load: gives every surface voxel near a rigid surface the half-space it may not leave. At rest nothing
-// presses: a voxel that already overlaps keeps the depth it has. Returns how many voxels have one.
+// On load: gives every surface voxel near a rigid surface its obstacle. Nothing presses at rest: a voxel that
+// already overlaps keeps its depth. Returns how many voxels have an obstacle.
 std::size_t find_obstacles(const World& world, WorldState& state, std::size_t soft);
 
-// In the tick: voxels that moved look again for rigid surfaces, so many a tick, those first that are nearest
-// to meeting one they have not seen. Looked through are what the tool touches, the rows that waves moved, and
-// a slice of all. (By turns, and each whenever it had moved a quarter of its spacing, voxels far from
-// everything took the looks of those that arrived: tissue thrown at a plate at 1 m/s went in by its spacing.)
+// In the tick: voxels that moved query rigid surfaces again, a bounded number each tick, first those that may
+// soonest meet a surface that they do not know. Candidates are the voxels that the tool touches, the rows
+// that waves moved, and a slice of all.
 void refresh_obstacles(const World& world, WorldState& state) noexcept;
-// The same where what was relaxed apart arrived in this tick, which may be far from where it was. What is in
-// a surface that it did not know leaves it at once. (Left to the next result, a brain that came down on the
-// skull was in it by a tenth of a cell.)
+// The same for rows that an asynchronous result moved in this tick, possibly far. A voxel inside a surface
+// that it did not know leaves it at once.
 void refresh_obstacles_of_arrived_rows(const World& world, WorldState& state) noexcept;
 
 }  // namespace hybrid

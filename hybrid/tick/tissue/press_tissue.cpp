@@ -8,8 +8,8 @@
 namespace hybrid {
 namespace {
 
-constexpr int kMaxHalvings = 6;           // of how far a crowded tool looks ahead
-constexpr std::uint32_t kMapSlice = 512;  // surface voxels of each object whose cell is looked at a tick
+constexpr int kMaxHalvings = 6;           // of the range in which a crowded tool looks for voxels
+constexpr std::uint32_t kMapSlice = 512;  // surface voxels of each object that are updated a tick
 
 const glm::dvec3 kPunchAxis(0.0, 0.0, -1.0);  // a punch presses downwards in the scene
 
@@ -33,8 +33,8 @@ double soft_reach(const World& world, const WorldState& state) noexcept {
 
 namespace {
 
-// Of the first `count` voxels found, those within reach and `range` of the tool. False: an object has more
-// than fit.
+// Lists, of the first `count` entries found, the voxels within reach plus `range` of the tool. False: an
+// object has more than fit.
 bool list_touched(const World& world, WorldState& state, const glm::dvec3& point, double range,
                   std::size_t count) noexcept {
   for (auto& list : state.scratch.touched) list.clear();
@@ -53,12 +53,12 @@ bool list_touched(const World& world, WorldState& state, const glm::dvec3& point
     std::size_t o = world.soft.size() - 1;
     while (world.soft[o].first_number > number) --o;
     const voxel::SoftObject& object = *state.soft[o];
-    if (object.grid_in_use() != nullptr) continue;
+    if (object.patches_in_use() != nullptr) continue;
     fits = take(o, object.lattice().surface()[number - world.soft[o].first_number]);
     if (!fits) break;
   }
   for (std::size_t o = 0; o < state.soft.size() && fits; ++o) {
-    if (state.soft[o]->grid_in_use() == nullptr) continue;
+    if (state.soft[o]->patches_in_use() == nullptr) continue;
     for (const voxel::VoxelId v : state.soft[o]->near_on_grid()) fits = fits && take(o, v);
   }
   return fits;
@@ -69,12 +69,12 @@ bool list_touched(const World& world, WorldState& state, const glm::dvec3& point
 bool find_touched_voxels(const World& world, WorldState& state, const glm::dvec3& point,
                          double& range) noexcept {
   bool any = false;
-  // A voxel may have moved since the map last looked at it, by much less than a cell.
+  // A voxel may have moved since its last update in the map, by much less than a cell.
   const glm::dvec3 box(soft_reach(world, state) + range + 0.5 * state.map.cell_m());
   const std::size_t count =
       state.map.soft_in(point - box, point + box, state.scratch.map_hits, state.map_trail);
   bool fits = count < state.scratch.map_hits.size() && list_touched(world, state, point, range, count);
-  // A tool of many spacings: it looks less far ahead, and so goes less far in a tick.
+  // A tool of many spacings: a shorter range, which also bounds its motion in this tick.
   for (int n = 0; n < kMaxHalvings && !fits; ++n) {
     range *= 0.5;
     fits = list_touched(world, state, point, range, count);
@@ -99,9 +99,7 @@ void press_tissue(const World& world, WorldState& state, const glm::dvec3& point
     if (object.touched().empty()) continue;
     const SoftBody& body = world.soft[o];
     const voxel::ToolInBody tool = tool_in_body(world, body, point);
-    // Two waves of the chain: what comes along with the first need not be pushed out by the second. (In one,
-    // a vessel pressed at 60 mm/s felt 0.20 N rms off in place of 0.12, a spleen 0.06 in place of 0.02, and a
-    // tick was no faster.)
+    // Two waves of the chain: voxels that the first one moved along need not be pushed out by the second.
     if (delta != glm::dvec3(0.0)) object.follow(glm::inverse(body.pose.rotation) * delta);
     object.push_out(tool);
     object.relax_near(tool, sweeps);
@@ -113,7 +111,7 @@ void press_tissue(const World& world, WorldState& state, const glm::dvec3& point
   }
 }
 
-std::size_t tool_bounds(const World& world, WorldState& state, const glm::dvec3& point, bool fast,
+std::size_t tool_bounds(const World& world, WorldState& state, const glm::dvec3& point, bool immovable_only,
                         std::vector<polygon::ContactPlane>& out) noexcept {
   std::size_t added = 0;
   for (std::uint32_t o = 0; o < state.soft.size(); ++o) {
@@ -123,7 +121,7 @@ std::size_t tool_bounds(const World& world, WorldState& state, const glm::dvec3&
     const std::size_t count = object.give_way(tool_in_body(world, body, point), state.scratch.bounds);
     for (std::size_t i = 0; i < count && out.size() < out.capacity(); ++i) {
       const voxel::ToolBound& bound = state.scratch.bounds[i];
-      if (fast && !object.held_fast(bound.voxel, -bound.normal)) continue;
+      if (immovable_only && !object.is_immovable(bound.voxel, -bound.normal)) continue;
       const glm::dvec3 normal = body.pose.rotation * bound.normal;
       out.push_back({normal, bound.offset + glm::dot(normal, body.pose.origin),
                      static_cast<std::uint32_t>(world.rigid.size()) + o, 0});
@@ -135,12 +133,12 @@ std::size_t tool_bounds(const World& world, WorldState& state, const glm::dvec3&
 
 bool contact_on_patches(const WorldState& state) noexcept {
   return std::any_of(state.soft.begin(), state.soft.end(),
-                     [](const auto& object) { return object->grid_in_use() != nullptr; });
+                     [](const auto& object) { return object->patches_in_use() != nullptr; });
 }
 
 void prepare_patches(const World& world, WorldState& state, const glm::dvec3& point) noexcept {
   for (std::size_t o = 0; o < state.soft.size(); ++o) {
-    if (!state.soft[o]->uses_grid()) continue;
+    if (!state.soft[o]->uses_patches()) continue;
     state.soft[o]->come_near_on_grid(tool_in_body(world, world.soft[o], point));
   }
 }
@@ -149,7 +147,7 @@ void refresh_map(const World& world, WorldState& state) noexcept {
   const std::uint64_t before = state.map.overflows();
   for (std::size_t o = 0; o < state.soft.size(); ++o) {
     const voxel::SoftObject& object = *state.soft[o];
-    if (!object.moved_ever() || object.uses_grid()) continue;
+    if (!object.moved_ever() || object.uses_patches()) continue;
     const SoftBody& body = world.soft[o];
     const auto surface = object.lattice().surface();
     const auto look = [&](std::uint32_t number) {
@@ -159,10 +157,10 @@ void refresh_map(const World& world, WorldState& state) noexcept {
     if (!state.body_obstacles.empty()) {
       for (const std::uint32_t number : state.body_obstacles[o].near) look(number);
     }
-    if (object.asleep() && state.cursor[o] == 0) continue;  // a whole round since it came to rest
+    if (object.asleep() && state.cursor[o] == 0) continue;  // a whole round since it fell asleep
     const auto count = static_cast<std::uint32_t>(surface.size());
     for (std::uint32_t i = 0; i < std::min(kMapSlice, count); ++i) {
-      fetch_surface_ahead(object, state.cursor[o]);
+      prefetch_surface(object, state.cursor[o]);
       look(state.cursor[o]);
       if (++state.cursor[o] == count) {
         state.cursor[o] = 0;

@@ -14,37 +14,38 @@ namespace hybrid {
 namespace {
 
 constexpr std::uint32_t kPairSlice = 256;  // surface voxels looked up for a partner a tick
-// Touching distances: pairs are made before they touch, so that none is jumped over before its turn, and part
-// when further apart.
-constexpr double kLookForPairs = 1.5;
-constexpr double kPartAt = 1.75;
-// Of it, apart: the pair moves its voxels. (Let go of at 0.1, while the surfaces were still on their way
-// apart, they swung, and a loop at 0.25 m/s gave the hand 26 uJ.)
-constexpr double kHoldAt = 0.1, kLetGoAt = 0.3;
-constexpr std::size_t kFarTurns = 4;  // ticks in which each pair that is too far apart to press is looked at
+// Touching distances: contacts are made before the surfaces touch, so that none is jumped over before its
+// turn, and are dropped when further apart.
+constexpr double kFindRange = 1.5;
+constexpr double kDropRange = 1.75;
+// Gap at which a contact begins and ends to move its voxels (unit: touching distance). The hysteresis
+// prevents oscillation of surfaces that part.
+constexpr double kHoldGap = 0.1, kReleaseGap = 0.3;
+// Ticks in which every contact that is too far apart to press gets one query.
+constexpr std::size_t kFarContactTurns = 4;
 constexpr int kPairSweeps = 2;
-// Rounds in which an object that the tool does not press gives way alone, and to how much of an overlap, in
-// touching distances: at rest. (To any, a tool at 1 m/s drove one object half a spacing into the other.)
-constexpr int kFirstGive = 2;
-constexpr double kGivesAlone = 0.1;
+// kAloneRounds: rounds in which an object that the tool does not press gives way alone. kAloneDepth: the
+// deepest overlap for which it does (touching distances), which is that of slow motion.
+constexpr int kAloneRounds = 2;
+constexpr double kAloneDepth = 0.1;
 
-// Both objects of a meeting where they lie.
+// Calls visit(a, b) with both objects of a pair in their poses.
 template <class Visit>
-auto with_objects(const World& world, WorldState& state, std::uint32_t soft_pair,
-                  const Visit& visit) noexcept {
+auto visit_objects(const World& world, WorldState& state, std::uint32_t soft_pair,
+                   const Visit& visit) noexcept {
   const auto [ia, ib] = world.soft_pairs[soft_pair];
   return visit(voxel::PosedObject{*state.soft[ia], world.soft[ia].pose},
                voxel::PosedObject{*state.soft[ib], world.soft[ib].pose});
 }
 
-// Of the second object's surface the voxel nearest to a voxel of the first, and the facet there.
+// The surface voxel of the second object that is nearest to a voxel of the first, and the facet there.
 voxel::PressedPair partner_of(const World& world, WorldState& state, std::uint32_t soft_pair,
                               voxel::VoxelId v) noexcept {
   const std::uint32_t ib = world.soft_pairs[soft_pair][1];
-  return with_objects(world, state, soft_pair, [&](const auto& a, const auto& b) {
+  return visit_objects(world, state, soft_pair, [&](const auto& a, const auto& b) {
     const auto surface = b.object.lattice().surface();
     const glm::dvec3 at = a.pose.origin + a.pose.rotation * a.object.position(v);
-    const double look = kLookForPairs * (a.object.voxel_radius() + b.object.voxel_radius());
+    const double look = kFindRange * (a.object.voxel_radius() + b.object.voxel_radius());
     const std::size_t found = state.map.soft_in(at - look, at + look, state.scratch.map_hits);
     voxel::PressedPair best;
     double nearest = look;
@@ -55,8 +56,7 @@ voxel::PressedPair partner_of(const World& world, WorldState& state, std::uint32
       const double distance = glm::length(world.soft[ib].to_scene(b.object.position(surface[number])) - at);
       if (distance > nearest || (distance == nearest && number >= partner)) continue;
       const voxel::PressedPair pair = voxel::pair_of(a, v, b, surface[number]);
-      if (pair.side == glm::dvec3(0.0) ||
-          voxel::gap_of_pair(a, b, pair) >= (kLookForPairs - 1.0) * pair.reach_m)
+      if (pair.side == glm::dvec3(0.0) || voxel::gap_of_pair(a, b, pair) >= (kFindRange - 1.0) * pair.reach_m)
         continue;
       best = pair;
       nearest = distance;
@@ -88,50 +88,50 @@ void find_pairs(const World& world, WorldState& state, std::uint32_t soft_pair) 
   }
 }
 
-// That which it is over last, so that this holds, whatever the others asked for.
+// Visits the contact's main facet last, so that its constraint holds exactly.
 template <class Pair, class Visit>
 void for_facets(Pair& pair, const Visit& visit) noexcept {
-  for (std::size_t i = 0; i < pair.extra_facets; ++i) visit(pair.beside[i]);
+  for (std::size_t i = 0; i < pair.extra_count; ++i) visit(pair.extra_facets[i]);
   visit(pair.pressed);
 }
 
-// Facets that it pressed before, and lies on still, press as they did; what it left gives its force to the
-// one that it is over.
+// Facets that the voxel pressed before and still lies on keep their force. The force on facets that it left
+// passes to its main facet.
 void keep_facets(const voxel::PosedObject& a, const voxel::PosedObject& b, const FacetContact& before,
                  FacetContact& now) noexcept {
-  now.extra_facets = 0;
+  now.extra_count = 0;
   now.pressed.force_N = glm::dvec3(0.0);
   const auto keep = [&](const voxel::PressedPair& was) {
-    voxel::PressedPair beside = was;
-    if (was.force_N != glm::dvec3(0.0) && now.extra_facets < now.beside.size() &&
-        voxel::lies_beside(a, b, now.pressed, beside)) {
-      now.beside[now.extra_facets++] = beside;
+    voxel::PressedPair extra_facets = was;
+    if (was.force_N != glm::dvec3(0.0) && now.extra_count < now.extra_facets.size() &&
+        voxel::lies_beside(a, b, now.pressed, extra_facets)) {
+      now.extra_facets[now.extra_count++] = extra_facets;
     } else {
       now.pressed.force_N += was.force_N;
     }
   };
   keep(before.pressed);
-  for (std::size_t i = 0; i < before.extra_facets; ++i) keep(before.beside[i]);
+  for (std::size_t i = 0; i < before.extra_count; ++i) keep(before.extra_facets[i]);
 }
 
-// Voxels moved over one another: the pair looks for its facets again. Returns the gap, in touching distances.
-double renew_pair(const World& world, WorldState& state, FacetContact& pair) noexcept {
-  return with_objects(world, state, pair.soft_pair, [&](const auto& a, const auto& b) {
+// Finds the contact's facets again after its voxels moved. Returns the gap (touching distances).
+double update_contact(const World& world, WorldState& state, FacetContact& pair) noexcept {
+  return visit_objects(world, state, pair.soft_pair, [&](const auto& a, const auto& b) {
     const voxel::PressedPair pressed = pair.pressed;
     voxel::find_facet(a, b, pair.pressed);
     const double gap = voxel::gap_of_pair(a, b, pair.pressed) / pair.pressed.reach_m;
-    const bool held = gap < (pair.held ? kLetGoAt : kHoldAt);
-    if (held == pair.held && pair.extra_facets == 0 && (!held || pressed.facet == pair.pressed.facet))
+    const bool held = gap < (pair.held ? kReleaseGap : kHoldGap);
+    if (held == pair.held && pair.extra_count == 0 && (!held || pressed.facet == pair.pressed.facet))
       return gap;
     FacetContact before = pair;
     before.pressed = pressed;
     pair.held = held;
-    // Before the old ones are let go of: what is in both stays held.
+    // Holds the new facets before it releases the old ones, so that voxels of both stay held.
     if (pair.held) {
       keep_facets(a, b, before, pair);
       for_facets(pair, [&](const voxel::PressedPair& p) { voxel::hold_pair(a, b, p); });
     } else {
-      pair.extra_facets = 0;
+      pair.extra_count = 0;
       pair.pressed.force_N = glm::dvec3(0.0);
     }
     if (before.held) for_facets(before, [&](const voxel::PressedPair& p) { voxel::release_pair(a, b, p); });
@@ -139,22 +139,22 @@ double renew_pair(const World& world, WorldState& state, FacetContact& pair) noe
   });
 }
 
-// By the facet that it was over when last looked for.
+// Judged by the facet of the last query.
 bool may_press(const World& world, WorldState& state, const FacetContact& pair) noexcept {
-  return pair.held || with_objects(world, state, pair.soft_pair, [&](const auto& a, const auto& b) {
-           return voxel::gap_of_pair(a, b, pair.pressed) < kLetGoAt * pair.pressed.reach_m;
+  return pair.held || visit_objects(world, state, pair.soft_pair, [&](const auto& a, const auto& b) {
+           return voxel::gap_of_pair(a, b, pair.pressed) < kReleaseGap * pair.pressed.reach_m;
          });
 }
 
-void renew_pairs(const World& world, WorldState& state) noexcept {
+void update_contacts(const World& world, WorldState& state) noexcept {
   for (std::size_t i = 0; i < state.facet_contacts.size();) {
     FacetContact& pair = state.facet_contacts[i];
-    // Most are only near one another, and a look for a facet costs as much as all else.
-    if ((i + state.tick) % kFarTurns != 0 && !may_press(world, state, pair)) {
+    // Most contacts only are near, and their facet search costs as much as all else.
+    if ((i + state.tick) % kFarContactTurns != 0 && !may_press(world, state, pair)) {
       ++i;
       continue;
     }
-    if (renew_pair(world, state, pair) < kPartAt - 1.0) {
+    if (update_contact(world, state, pair) < kDropRange - 1.0) {
       ++i;
       continue;
     }
@@ -164,72 +164,73 @@ void renew_pairs(const World& world, WorldState& state) noexcept {
   }
 }
 
-// What a sweep took over the edge of its facet meets the next one in the next sweep. False: nothing was.
+// Voxels that a sweep took over the edge of their facet get their new facet before the next sweep. False:
+// there were none.
 bool follow_over_edges(const World& world, WorldState& state) noexcept {
   bool any = false;
   for (FacetContact& pair : state.facet_contacts) {
     const bool left =
-        pair.held && with_objects(world, state, pair.soft_pair, [&](const auto& a, const auto& b) {
+        pair.held && visit_objects(world, state, pair.soft_pair, [&](const auto& a, const auto& b) {
           return voxel::left_facet(a, b, pair.pressed);
         });
     if (!left) continue;
-    renew_pair(world, state, pair);
+    update_contact(world, state, pair);
     any = true;
   }
   return any;
 }
 
-// An object that the tool presses is held by it where its chain is tight, so the other one gives way.
-// (Shared, what was pushed back came to the tool, which gave way to it in every tick and came again in the
-// next: the hand felt up to two thirds more than tissue pressed the tool with, and nothing came to rest.)
+// Where the chain is tight, the tool holds an object that it presses, so the other object gives way. Sharing
+// the overlap would push tissue back into the tool in every tick.
 voxel::GiveWay first_to_give(const World& world, WorldState& state, const FacetContact& pair) noexcept {
   const auto [ia, ib] = world.soft_pairs[pair.soft_pair];
   const bool of_a = state.reactions[ia].pressed > 0, of_b = state.reactions[ib].pressed > 0;
   if (of_a == of_b) return voxel::GiveWay::both;
-  const double gap = with_objects(world, state, pair.soft_pair, [&](const auto& a, const auto& b) {
+  const double gap = visit_objects(world, state, pair.soft_pair, [&](const auto& a, const auto& b) {
     return voxel::gap_of_pair(a, b, pair.pressed);
   });
-  if (gap < -kGivesAlone * pair.pressed.reach_m) return voxel::GiveWay::both;
+  if (gap < -kAloneDepth * pair.pressed.reach_m) return voxel::GiveWay::both;
   return of_a ? voxel::GiveWay::second : voxel::GiveWay::first;
 }
 
-// What links alone could not part, the chains follow: of who gives way first, then of both, then, where
-// anchors held one, of the other.
-void part_pairs(const World& world, WorldState& state) noexcept {
+// Overlaps that links alone could not take back move the chains: first of the object that gives way first,
+// then of both, then, if anchors held one, of the other.
+void separate_pairs(const World& world, WorldState& state) noexcept {
   using voxel::GiveWay;
   for (FacetContact& pair : state.facet_contacts) {
-    if (may_press(world, state, pair)) renew_pair(world, state, pair);
+    if (may_press(world, state, pair)) update_contact(world, state, pair);
   }
-  const auto part = [&](const auto& who) {
+  const auto separate = [&](const auto& who) {
     bool any = false;
-    // Those too far apart to be held as well: the chain takes along more than was dragged.
+    // Contacts that are too far apart to be held count too: the chain may have moved further voxels into
+    // overlap.
     for (const FacetContact& pair : state.facet_contacts) {
-      any = with_objects(world, state, pair.soft_pair,
-                         [&](const auto& a, const auto& b) {
-                           return voxel::part_pair(a, b, pair.pressed, who(pair));
-                         }) ||
+      any = visit_objects(world, state, pair.soft_pair,
+                          [&](const auto& a, const auto& b) {
+                            return voxel::part_pair(a, b, pair.pressed, who(pair));
+                          }) ||
             any;
     }
     for (const auto& object : state.soft) object->settle_dragged();
     return any;
   };
-  for (int n = 0; n < kFirstGive; ++n) {
-    if (!part([&](const FacetContact& pair) { return first_to_give(world, state, pair); })) return;
+  for (int n = 0; n < kAloneRounds; ++n) {
+    if (!separate([&](const FacetContact& pair) { return first_to_give(world, state, pair); })) return;
   }
   for (const GiveWay who : {GiveWay::both, GiveWay::both, GiveWay::second, GiveWay::first}) {
-    if (!part([&](const FacetContact&) { return who; })) return;
+    if (!separate([&](const FacetContact&) { return who; })) return;
   }
 }
 
 }  // namespace
 
 void solve_soft_contacts(const World& world, WorldState& state) noexcept {
-  renew_pairs(world, state);
+  update_contacts(world, state);
   for (std::uint32_t m = 0; m < world.soft_pairs.size(); ++m) find_pairs(world, state, m);
   const auto for_pairs = [&](const auto& visit) {
     for (FacetContact& pair : state.facet_contacts) {
       if (!pair.held) continue;
-      with_objects(world, state, pair.soft_pair, [&](const auto& a, const auto& b) {
+      visit_objects(world, state, pair.soft_pair, [&](const auto& a, const auto& b) {
         for_facets(pair, [&](voxel::PressedPair& p) { visit(a, b, p); });
       });
     }
@@ -239,7 +240,7 @@ void solve_soft_contacts(const World& world, WorldState& state) noexcept {
     for_pairs(voxel::load_pair);
   };
   load();
-  // What hangs on voxels of an object that the tool presses may hang on the tool as well, which feels it.
+  // Dependents of voxels in a pressed object may also depend on the tool, which has their load already.
   for (std::size_t o = 0; o < state.soft.size(); ++o) {
     if (state.reactions[o].pressed == 0) {
       state.soft[o]->find_hanging_on_pairs();
@@ -251,8 +252,8 @@ void solve_soft_contacts(const World& world, WorldState& state) noexcept {
     if (sweep > 0 && follow_over_edges(world, state)) load();
     for_pairs(voxel::relax_pair);
   }
-  part_pairs(world, state);
-  load();  // by the facets as they now are
+  separate_pairs(world, state);
+  load();  // with the facets as they are now
 }
 
 }  // namespace hybrid

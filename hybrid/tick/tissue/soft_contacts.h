@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Two soft objects stop one another: surface voxels of the finer one stand on facets of the other one's
+// Contact between two soft objects: surface voxels of the finer one are stopped by facets of the other one's
 // surface.
 #pragma once
 
@@ -7,8 +7,8 @@
 
 namespace hybrid {
 
-// In the tick: finds pairs of voxels of different objects that meet (a slice of the surface a tick), relaxes
-// all pairs, and lets go of those that parted.
+// In the tick: finds voxels of different objects that meet (a slice of the surface each tick), solves all
+// contacts, and drops those that parted.
 void solve_soft_contacts(const World& world, WorldState& state) noexcept;
 
 }  // namespace hybrid

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How much of its counted work a tick in real time does at a contact, so that it is no later on a slow
-// machine than on a fast one.
+// The share of its counted work that a tick in real time does at a contact, so that ticks are not late on a
+// slow machine.
 //
-// Work is counted, never timed, so that the same inputs give the same bits; how long it takes is the
-// machine's doing. In real time the share of it that a tick has follows what ticks take. Less of it is a
-// contact that comes to rest some ticks later, as the hand moves; at rest nothing differs. The share is on
-// record, and what is played again has the same.
+// Work is counted, never timed, so that the same inputs give the same bits; only the time that it takes
+// depends on the machine. In real time the share follows the measured duration of ticks. With a smaller share
+// a moving contact comes to rest some ticks later; at rest nothing differs. The share is recorded, and a
+// replayed session uses the recorded one.
 #pragma once
 
 #include <algorithm>
@@ -20,40 +20,40 @@ class WorkShare {
  public:
   static constexpr std::uint8_t kMostSteps = 6;
 
-  explicit WorkShare(double period_s) : limit_us_(kOfPeriod * 1e6 * period_s) {}
+  explicit WorkShare(double period_s) : limit_us_(kShareOfPeriod * 1e6 * period_s) {}
 
-  // Steps of a quarter of an octave below all of it: what the next tick is to have.
+  // The share that the next tick is to have, in steps of a quarter of an octave below all of the work.
   [[nodiscard]] std::uint8_t steps() const { return steps_; }
-  // Of all the work; 1 to a third. (To a quarter, organs were 100 to 151 mN off in place of 91, and ticks no
-  // faster than noise.)
+  // Fraction of all the work: 1 down to a third.
   [[nodiscard]] static double share(std::uint8_t steps) noexcept {
     return std::exp2(-0.25 * std::min(steps, kMostSteps));
   }
-  // A tick took so long, its own processor time. What is nowhere near tissue says nothing about the work.
-  void felt(double tick_us, bool tissue_pressed) noexcept {
+  // Call with a tick's own CPU time. Ticks without pressed tissue say nothing about the work and never raise
+  // the share.
+  void observe(double tick_us, bool tissue_pressed) noexcept {
     if (tick_us > limit_us_) {
       steps_ = static_cast<std::uint8_t>(
           std::min<int>(kMostSteps, steps_ + (tick_us > kFarBeyond * limit_us_ ? 2 : 1)));
-      calm_ = 0;
-    } else if (tissue_pressed && tick_us < kCalm * limit_us_ && steps_ > 0 && ++calm_ == kCalmTicks) {
+      fast_ticks_ = 0;
+    } else if (tissue_pressed && tick_us < kFastTick * limit_us_ && steps_ > 0 &&
+               ++fast_ticks_ == kFastTicks) {
       --steps_;
-      calm_ = 0;
+      fast_ticks_ = 0;
     }
   }
 
  private:
-  static constexpr double kOfPeriod = 0.4;   // the rest is for the driver, and for ticks with more to do
-  static constexpr double kFarBeyond = 1.5;  // of the limit: then it falls twice as fast
-  static constexpr double kCalm = 0.8;       // of the limit: with another step of work it is not beyond it
-  static constexpr int kCalmTicks = 60;
+  static constexpr double kShareOfPeriod = 0.4;  // the rest is for the driver, and for ticks with more to do
+  static constexpr double kFarBeyond = 1.5;      // of the limit: the share then falls twice as fast
+  static constexpr double kFastTick = 0.8;  // of the limit: one more step of work still stays below the limit
+  static constexpr int kFastTicks = 60;
 
   double limit_us_;
   std::uint8_t steps_ = 0;
-  int calm_ = 0;
+  int fast_ticks_ = 0;
 };
 
-// From now on soft objects of `state` that are relaxed apart (async_relaxation.cpp, which knows them) have
-// this share of their work at a contact.
+// Sets the share of work at a contact for the soft objects of `state` under asynchronous relaxation.
 void give_work_share(WorldState& state, std::uint8_t steps) noexcept;
 
 }  // namespace hybrid

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The hand-over between threads: values arrive whole, in order, and the latest is never lost. Meant for the
-// thread sanitizer too.
+// The triple buffer between threads: values arrive whole and in order, and the latest is never lost. Also a
+// test for the thread sanitizer.
 #include "hybrid/base/triple_buffer.h"
 
 #include <gtest/gtest.h>
@@ -12,10 +12,10 @@
 
 namespace {
 
-using Value = std::array<std::uint64_t, 64>;  // large enough to be torn, were it handed over badly
+using Value = std::array<std::uint64_t, 64>;  // large enough that a faulty exchange would tear it
 
-TEST(HandOver, KeepsTheLatest) {
-  hybrid::HandOver<int> hand_over;
+TEST(TripleBuffer, KeepsTheLatest) {
+  hybrid::TripleBuffer<int> hand_over;
   EXPECT_EQ(hand_over.take(), 0);
   for (const int value : {1, 2, 3}) {
     hand_over.back() = value;
@@ -25,9 +25,9 @@ TEST(HandOver, KeepsTheLatest) {
   EXPECT_EQ(hand_over.take(), 3);
 }
 
-TEST(HandOver, ValuesArriveWholeAndInOrder) {
+TEST(TripleBuffer, ValuesArriveWholeAndInOrder) {
   constexpr std::uint64_t count = 200'000;
-  hybrid::HandOver<Value> hand_over;
+  hybrid::TripleBuffer<Value> hand_over;
   std::atomic<bool> done{false};
   std::jthread writer([&] {
     for (std::uint64_t n = 1; n <= count; ++n) {
@@ -43,7 +43,7 @@ TEST(HandOver, ValuesArriveWholeAndInOrder) {
     for (const std::uint64_t x : value) ASSERT_EQ(x, value[0]);
     ASSERT_GE(value[0], last);
     last = value[0];
-    // Once the writer has ended the very next look must find its last value.
+    // Once the writer has ended, the next read must find its last value.
     ASSERT_FALSE(finished && last < count);
     finished = done;
   }

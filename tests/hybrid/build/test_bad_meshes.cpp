@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Damaged meshes, as they came and as repaired: what is found, what repair did, what is left, and that a ball
-// which presses and slides on them feels a finite, bounded force.
+// Damaged meshes, as loaded and as repaired: the findings, the changes by repair, the remaining findings, and
+// a finite, bounded force on a ball that presses and slides on them.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -12,26 +12,26 @@
 #include <string>
 #include <vector>
 
-#include "polygon/repair/check.h"
 #include "polygon/files/mesh_file.h"
 #include "polygon/mesh/triangle.h"
+#include "polygon/repair/check.h"
+#include "tests/hybrid/fixtures/touch.h"
 #include "tests/polygon/fixtures/findings.h"
 #include "tests/shared_data.h"
-#include "tests/hybrid/fixtures/touch.h"
 
 namespace {
 
 using glm::dvec3;
 
 constexpr double kStiffness = 1000.0;  // N/m
-constexpr double kSize = 0.1;          // m: every mesh is made this large
+constexpr double kSize = 0.1;          // m; every mesh is scaled to this size
 
 struct Expected {
   const char* file;
-  const char* found;  // loading and checking, self-intersections too
-  const char* did;    // repair
-  const char* left;   // checking again
-  bool solid_after;   // closed, and outward
+  const char* found;  // by loading and checking, with self-intersections
+  const char* did;    // by repair
+  const char* left;   // by a second check
+  bool solid_after;   // closed, and oriented outward
 };
 
 const std::vector<Expected>& expected() {
@@ -86,7 +86,8 @@ Box box_of(const polygon::TriangleMesh& mesh) {
   return box;
 }
 
-// Presses the ball 2 mm into triangles all over the mesh, from both sides, slides 5 mm along each and leaves.
+// Presses the ball 2 mm into triangles all over the mesh, from both sides, slides 5 mm along each, and
+// leaves.
 void press_and_slide(const std::filesystem::path& file, double unit_m, bool repair) {
   hybrid::Scene scene;
   scene.file = "in the test";
@@ -112,7 +113,7 @@ void press_and_slide(const std::filesystem::path& file, double unit_m, bool repa
     ++ticks;
     ASSERT_TRUE(tests::finite(felt.force_N) && tests::finite(felt.proxy_m));
     const double force = glm::length(felt.force_N);
-    // What is felt is the coupling alone, and no more than the device gives.
+    // The felt force is the coupling's alone, within the device's limit.
     ASSERT_LE(force, 8.5 * (1.0 + 1e-9));
     ASSERT_LE(glm::length(tests::coupling(felt) - kStiffness * (felt.proxy_m - felt.device_m)),
               1e-6 * kStiffness * kSize);
@@ -128,7 +129,7 @@ void press_and_slide(const std::filesystem::path& file, double unit_m, bool repa
     const dvec3 at = (a + b + c) / 3.0;
     dvec3 normal = glm::normalize(glm::cross(b - a, c - a));
     if (glm::dot(normal, at - middle) < 0.0) normal = -normal;
-    if (i % 3 == 2) normal = -normal;  // from the side that a closed mesh keeps the tool out of, too
+    if (i % 3 == 2) normal = -normal;  // also from the side that a closed mesh keeps the tool out of
     const dvec3 along = glm::normalize(b - a);
     touch.go(at + 0.02 * normal, 5e-3, 0, look);
     touch.go(at - 2e-3 * normal, 1e-3, 5, look);

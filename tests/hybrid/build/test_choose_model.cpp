@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// model = "auto": voxels where a hand would miss them, a proxy where it would not.
+// model = "auto": voxels if a hand would notice the compliance, a proxy otherwise.
 #include "hybrid/build/choose_model.h"
 
 #include <gtest/gtest.h>
@@ -51,7 +51,7 @@ TEST_F(ModelChoice, TissueStaysVoxelsAndBoneBecomesAProxy) {
   EXPECT_TRUE(bone.soft.empty());
   ASSERT_EQ(bone.rigid.size(), 1U);
   EXPECT_NE(bone.model_notes.at(0).text.find("as rigid"), std::string::npos);
-  // And so the session has not a byte of voxels.
+  // The session then has no voxel data.
   Touch touch(bone, {0, 0, 0.03});
   EXPECT_TRUE(touch.state().soft.empty());
   EXPECT_TRUE(touch.state().found.empty());
@@ -66,8 +66,8 @@ TEST_F(ModelChoice, WhoAsksForAModelGetsIt) {
   EXPECT_NE(refusal(text(6e3, "model = \"rigid\"\n")).find("auto"), std::string::npos);
 }
 
-// Whether what is chosen is right: pressed with the force that the choice is made for, voxels and proxy
-// differ by less than a hand can tell where the proxy was chosen, and by more well below that.
+// Checks the choice: pressed with the force that the choice assumes, voxels and proxy differ by less than a
+// JND if the proxy was chosen, and by more for much softer tissue.
 TEST_F(ModelChoice, TheChoiceIsWhatAHandWouldTell) {
   for (const double young_Pa : {3e4, 3e5, 1e7}) {
     const bool proxy = load(text(young_Pa, "model = \"auto\"\n")).soft.empty();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Height maps as functions: wavelength, slope, energy, and every bad image refused in words.
+// Height maps as functions: wavelength, slope and energy; every bad image is refused with a clear text.
 #include "hybrid/feel/height_texture.h"
 
 #include <gtest/gtest.h>
@@ -91,7 +91,7 @@ TEST(HeightTexture, AnImageOfAWaveIsThatWave) {
   for (int i = 0; i < pixels; ++i)
     image.grey.push_back(static_cast<float>(0.5 + 0.5 * std::cos(2.0 * kPi * (i + 0.5) / pixels)));
   const HeightTexture texture(image, {.size_m = 1.0, .height_m = 1.0});
-  const double kept = (2.0 + std::cos(2.0 * kPi / pixels)) / 3.0;  // what the spline leaves of it: 0.994
+  const double kept = (2.0 + std::cos(2.0 * kPi / pixels)) / 3.0;  // share that the spline keeps: 0.994
   for (int n = 0; n < 100; ++n) {
     const double u = 0.01 * n;
     EXPECT_NEAR(texture.sample(u, 0.0).height, 0.5 + 0.5 * kept * std::cos(2.0 * kPi * u), 2e-5);
@@ -99,8 +99,8 @@ TEST(HeightTexture, AnImageOfAWaveIsThatWave) {
 }
 
 TEST(HeightTexture, LiesUprightAndMirroredNowhere) {
-  // Bright in the upper right quarter of one period. Seen from +z with x to the right, the image's corner
-  // lies at the origin, and its rows run towards −y.
+  // Bright in the upper right quarter of one period. Seen from +z with x to the right, the image's corner is
+  // at the origin, and its rows run towards −y.
   hybrid::GreyImage image{8, 8, std::vector<float>(64, 0.0F)};
   for (std::size_t row = 0; row < 4; ++row)
     for (std::size_t column = 4; column < 8; ++column) image.grey[row * 8 + column] = 1.0F;
@@ -131,7 +131,7 @@ TEST(HeightTexture, TheGradientInTheBodyIsTheReliefsDerivative) {
   }
 }
 
-// What the hand feels at x over the plane z = 0 of some orientation, contact and texture together.
+// Force on the hand at x over the plane z = 0 in some orientation, contact and texture together.
 glm::dvec3 felt(const HeightTexture& texture, const glm::dvec3& x, const glm::dvec3& normal) {
   const double depth = -glm::dot(x, normal);
   if (depth <= 0.0) return glm::dvec3(0.0);
@@ -162,7 +162,7 @@ TEST(HeightTexture, AFlatReliefIsConservative) {
           ASSERT_NEAR(f[axis], -(potential(x + e) - potential(x - e)) / 2e-8, 1e-5);
         }
       }
-      // Around a closed path, in and out of contact: Gauss-Legendre of three points on short pieces.
+      // Around a closed path, in and out of contact: three-point Gauss-Legendre on short pieces.
       const glm::dvec3 a = 3e-3 * glm::dvec3(unit(random), unit(random), unit(random)),
                        b = 3e-3 * glm::dvec3(unit(random), unit(random), unit(random));
       const auto at = [&](double s) {
@@ -210,7 +210,7 @@ TEST(HeightTexture, ShadingTurnsTheForceAndKeepsItsSize) {
   }
 }
 
-// The strongest line in the force's spectrum while the tool slides is the texture's wavelength.
+// The strongest line in the force's spectrum during a slide is the texture's wavelength.
 TEST(HeightTexture, TheForceHasTheTexturesWavelength) {
   for (const TextureKind kind : {TextureKind::height, TextureKind::shading}) {
     for (const double wavelength : {1e-3, 2.5e-3, 8e-3}) {
@@ -259,7 +259,6 @@ TEST(HeightTexture, NothingNotFiniteComesOut) {
 }
 
 // ---- images
-// -------------------------------------------------------------------------------------------------
 
 class TextureImage : public tests::SceneFile {
  protected:
@@ -340,7 +339,7 @@ TEST_F(TextureImage, AnyDamageIsRefusedAndNothingCrashes) {
 
 TEST_F(TextureImage, ASizeBeyondTheLimitIsRefusedBeforeItIsAllocated) {
   std::string png_text = contents(png<std::uint8_t>(1, 1, PNG_FORMAT_GRAY, {7}));
-  // Width and height in the header, with its checksum made right.
+  // Width and height in the header, with a valid checksum.
   const auto claim = [&](std::uint32_t width, std::uint32_t height) {
     std::string text = png_text;
     const auto put = [&text](std::size_t at, std::uint32_t value) {

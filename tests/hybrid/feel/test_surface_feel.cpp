@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Friction, damping and shading as functions, on surfaces whose proxy is exact in one line.
+// Friction, damping and shading as functions, on surfaces whose exact proxy is a single formula.
 #include "hybrid/feel/surface_feel.h"
 
 #include <gtest/gtest.h>
@@ -24,7 +24,7 @@ using hybrid::FrictionStep;
 constexpr double kStiffness = 800.0;
 const glm::dvec3 up(0.0, 0.0, 1.0);
 
-// What lies below z = 0.
+// The half-space below z = 0.
 struct Plane {
   glm::dmat3 metric{kStiffness};
   [[nodiscard]] static glm::dvec3 normal(const glm::dvec3&) { return up; }
@@ -122,7 +122,7 @@ TEST(Friction, ComesToRestOnlyInTheDynamicConeAndHoldsThereAgain) {
   EXPECT_FALSE(rub.sliding);
   rub.to({0.90 * depth, 0.0, -depth});  // 0.65
   EXPECT_TRUE(rub.sliding);
-  rub.to({0.89 * depth, 0.0, -depth});  // turned round: at rest
+  rub.to({0.89 * depth, 0.0, -depth});  // reversed: at rest
   EXPECT_FALSE(rub.sliding);
 }
 
@@ -137,7 +137,7 @@ TEST(Friction, WithAnyMetricTheSlideEndsOnTheCone) {
         t = p + 0.01 * glm::dvec3(unit(random), unit(random), unit(random));
     const FrictionStep step = friction_target(p, t, plane.metric, up, mu, mu, true);
     const glm::dvec3 q = plane.proxy(step.target);
-    ASSERT_TRUE(hybrid::friction_spends(p, q, t, plane.metric));
+    ASSERT_TRUE(hybrid::friction_dissipates(p, q, t, plane.metric));
     if (!step.sliding) continue;
     if (step.target == p) {
       ++jammed;
@@ -145,7 +145,7 @@ TEST(Friction, WithAnyMetricTheSlideEndsOnTheCone) {
     }
     const glm::dvec3 pull = plane.metric * (t - q);
     const double pressed = -pull.z, held = glm::length(glm::dvec3(pull.x, pull.y, 0.0));
-    if (step.target == t) {  // nothing holds: the proxy lifts off or just touches
+    if (step.target == t) {  // no contact: the proxy lifts off or just touches
       ++lifted;
       ASSERT_LE(pressed, 1e-9);
       continue;
@@ -171,7 +171,7 @@ TEST(Friction, IsContinuousAtTheDynamicCone) {
       return glm::length(polygon::minimise_on_planes(step.target, metric, std::span(&plane, 1), 1e-18).point);
     };
     const double a = glm::dot(up, compliance[0]) / glm::dot(up, compliance[2]);
-    if (1.0 - mu * a < 0.2) continue;  // near jamming each newton more is a long way
+    if (1.0 - mu * a < 0.2) continue;  // near jamming a small force change means a long travel
     EXPECT_EQ(slide(-1e-9), 0.0);
     EXPECT_LT(slide(1e-9), 1e-9);
     EXPECT_NEAR(slide(1e-4), 10.0 * slide(1e-5), 1e-3 * slide(1e-4));
@@ -202,8 +202,8 @@ TEST(Friction, NothingToPressOnOrNothingToHold) {
   EXPECT_EQ(friction_target(into, into, metric, up, 0.5, 0.4, true).target, into);
 }
 
-// A closed path of the hand: what it put in, with the proxy held between two ticks (then the coupling is a
-// spring, and its work exact), is what is stored at the end and what was rubbed away.
+// A closed path of the hand, with the proxy fixed between two ticks, so that the coupling is a spring and its
+// work exact. The hand's work must equal the stored energy at the end plus the friction loss.
 template <typename Surface>
 void expect_no_energy_from_closed_paths(const Surface& surface, const glm::dvec3& middle, double reach) {
   std::mt19937 random(11);
@@ -225,7 +225,7 @@ void expect_no_energy_from_closed_paths(const Surface& surface, const glm::dvec3
     Rubbed<Surface> rub{.surface = surface, .static_friction = mu, .dynamic_friction = mu * 0.7};
     rub.start(at(0.0));
     const int ticks = 400;
-    for (int n = 1; n <= ticks; ++n) rub.to(at(static_cast<double>(n) / ticks));  // into its own cycle
+    for (int n = 1; n <= ticks; ++n) rub.to(at(static_cast<double>(n) / ticks));  // into the limit cycle
     const double before = rub.energy(rub.t);
     double work = 0.0, moved = 0.0;
     for (int n = 1; n <= ticks; ++n) {
@@ -234,7 +234,7 @@ void expect_no_energy_from_closed_paths(const Surface& surface, const glm::dvec3
       moved += std::fabs(rub.energy(next) - rub.energy(rub.t));
       const glm::dvec3 p = rub.p;
       rub.to(next);
-      ASSERT_TRUE(hybrid::friction_spends(p, rub.p, next, surface.metric));
+      ASSERT_TRUE(hybrid::friction_dissipates(p, rub.p, next, surface.metric));
     }
     const double spent = work - (rub.energy(rub.t) - before);
     ASSERT_GE(spent, -1e-12 * moved);
@@ -286,7 +286,6 @@ TEST(Friction, SeveralSurfacesCountByTheirShare) {
 }
 
 // ---- damping
-// ------------------------------------------------------------------------------------------------
 
 TEST(Damping, ASteadyWayInIsTheRateTimesTheCoefficient) {
   for (const double noise : {0.0, 3e-5}) {
@@ -337,8 +336,7 @@ TEST(Damping, NeverPullsTheToolIn) {
   }
 }
 
-// Whatever the depth does: the toll doubles, so in 1000 ticks the hand is given at most ten times one tick's
-// work.
+// For any motion the toll doubles, so in 1000 ticks the hand receives at most ten times the work of one tick.
 TEST(Damping, FeedsNoOscillation) {
   const double dt = 1e-3, resolution = 3e-5;
   for (const double noise : {0.0, resolution}) {
@@ -372,10 +370,9 @@ TEST(Damping, WhatIsNotFiniteIsForgotten) {
 }
 
 // ---- shading
-// ------------------------------------------------------------------------------------------------
 
-// A flat face that is felt as the sphere of `radius` through its middle. Its exact answer: the proxy lies
-// where the sphere's normal points at the device, seen from the sphere's centre.
+// A flat face rendered as the sphere of `radius` through its middle. Exact result: the proxy is where the
+// sphere's normal points at the device, seen from the sphere's centre.
 TEST(Shading, AFlatFaceFeelsLikeTheSphereItStandsFor) {
   const double radius = 0.05;
   double worst_deg = 0.0;

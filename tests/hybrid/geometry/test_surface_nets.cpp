@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Surfaces from labels, largest pieces and grown labels, against brute force and exact volumes.
 #include "hybrid/geometry/surface_nets.h"
 
 #include <gtest/gtest.h>
@@ -6,7 +7,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <functional>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <iostream>
@@ -14,67 +14,25 @@
 #include <map>
 #include <numbers>
 #include <random>
-#include <stdexcept>
 #include <string>
+
+#include "tests/hybrid/fixtures/label_volumes.h"
 
 namespace {
 
 using polygon::TriangleMesh;
+using tests::ball;
+using tests::cell_volume;
+using tests::count;
+using tests::empty_volume;
+using tests::filled;
+using tests::noise;
+using tests::refusal;
+using tests::signed_volume;
 using voxel::LabelVolume;
 
-LabelVolume empty_volume(int nx, int ny, int nz, glm::dvec3 spacing = glm::dvec3(1.0)) {
-  LabelVolume volume;
-  volume.dims = {nx, ny, nz};
-  volume.spacing_m = spacing;
-  volume.labels.assign(
-      static_cast<std::size_t>(nx) * static_cast<std::size_t>(ny) * static_cast<std::size_t>(nz), 0);
-  return volume;
-}
-
-template <typename Inside>
-LabelVolume filled(LabelVolume volume, Inside inside) {
-  for (int k = 0; k < volume.dims[2]; ++k) {
-    for (int j = 0; j < volume.dims[1]; ++j) {
-      for (int i = 0; i < volume.dims[0]; ++i) {
-        if (inside(i, j, k)) volume.labels[volume.index(i, j, k)] = 1;
-      }
-    }
-  }
-  return volume;
-}
-
-LabelVolume ball(int n, double radius, glm::dvec3 spacing) {
-  const glm::dvec3 middle = 0.5 * (n - 1) * spacing;
-  return filled(empty_volume(n, n, n, spacing), [&](int i, int j, int k) {
-    return glm::length(glm::dvec3(i, j, k) * spacing - middle) <= radius;
-  });
-}
-
-LabelVolume noise(int nx, int ny, int nz, double share, unsigned seed) {
-  std::mt19937 random(seed);
-  std::uniform_real_distribution<double> unit(0.0, 1.0);
-  return filled(empty_volume(nx, ny, nz), [&](int, int, int) { return unit(random) < share; });
-}
-
-std::size_t count(const LabelVolume& volume) {
-  return volume.labels.size() -
-         static_cast<std::size_t>(std::count(volume.labels.begin(), volume.labels.end(), 0));
-}
-
-double cell_volume(const LabelVolume& v) {
-  return v.spacing_m.x * v.spacing_m.y * v.spacing_m.z;
-}
-
-double signed_volume(const TriangleMesh& mesh) {
-  double sum = 0.0;
-  for (const auto& t : mesh.triangles) {
-    sum += glm::dot(mesh.vertices[t[0]], glm::cross(mesh.vertices[t[1]], mesh.vertices[t[2]]));
-  }
-  return sum / 6.0;
-}
-
-// Each directed edge once, with its opposite once: closed, oriented, and without an edge of more than two
-// triangles. Each vertex one fan: its triangles, stepped through from edge to edge, are all met in one round.
+// Each directed edge occurs once, and its opposite once: the mesh is closed and oriented, with two triangles
+// per edge. The triangles of each vertex form one fan: a walk from edge to edge meets all of them.
 void expect_manifold(const TriangleMesh& mesh) {
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> next;  // directed edge to the third vertex
   std::vector<std::size_t> triangles_at(mesh.vertices.size());
@@ -98,15 +56,6 @@ void expect_manifold(const TriangleMesh& mesh) {
     } while (rim != edge.second && steps <= triangles_at[edge.first]);
     ASSERT_EQ(steps, triangles_at[edge.first]) << "a vertex with two fans";
   }
-}
-
-std::string refusal(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return {};
 }
 
 // ---- surface_from_labels
@@ -176,7 +125,8 @@ TEST(LabelSurface, IsManifoldForEveryNeighbourhoodOfEightAndForNoise) {
     });
     expect_manifold(hybrid::surface_from_labels(volume, 0));
   }
-  for (unsigned bits = 0; bits < 4096; ++bits) {  // two cells that share a face, solid and hollow around them
+  for (unsigned bits = 0; bits < 4096;
+       ++bits) {  // the 12 voxels of two cells that share a face; solid or empty around them
     for (const bool shell : {false, true}) {
       const LabelVolume volume = filled(empty_volume(4, 4, 5), [&](int i, int j, int k) {
         if (i < 1 || i > 2 || j < 1 || j > 2 || k < 1 || k > 3) return shell;
@@ -217,7 +167,7 @@ TEST(LabelSurface, EmptyVolumesGiveEmptyMeshes) {
 
 // ---- keep_largest_piece
 
-// Flood fill with an explicit stack, the slow and plain way.
+// Flood fill with an explicit stack: the slow, simple reference.
 std::vector<int> pieces_by_flood(const LabelVolume& volume, bool empty, std::vector<std::size_t>& sizes) {
   std::vector<int> piece(volume.labels.size(), -1);
   for (int k = 0; k < volume.dims[2]; ++k) {
@@ -334,7 +284,7 @@ TEST(GrowLabels, AgreesWithBruteForceOnAnyLattice) {
         }
       }
     }
-    // One more layer anywhere would add nothing.
+    // Another layer anywhere would add nothing.
     EXPECT_EQ(count(hybrid::grow_labels(grown, 0.0)), count(grown));
     for (int axis = 0; axis < 3; ++axis) {
       const int steps = static_cast<int>(std::floor(distance / volume.spacing_m[axis]));
@@ -347,7 +297,7 @@ TEST(GrowLabels, AgreesWithBruteForceOnAnyLattice) {
 TEST(GrowLabels, OneVoxelBecomesABall) {
   const LabelVolume one = filled(empty_volume(1, 1, 1, glm::dvec3(1e-3)), [](int, int, int) { return true; });
   const LabelVolume grown = hybrid::grow_labels(one, 20e-3);
-  EXPECT_EQ(grown.dims, (std::array{41, 41, 41}));  // centres exactly at the distance belong to it
+  EXPECT_EQ(grown.dims, (std::array{41, 41, 41}));  // centres exactly at the distance are included
   EXPECT_EQ(grown.labels[grown.index(0, 20, 20)], 1);
   const double exact = 4.0 / 3.0 * std::numbers::pi * 8000.0;
   EXPECT_NEAR(static_cast<double>(count(grown)), exact, 0.01 * exact);
@@ -361,134 +311,6 @@ TEST(GrowLabels, RefusesWhatCannotBe) {
   EXPECT_NE(refusal([&] { hybrid::grow_labels(one, 1e6); }).find("voxels"), std::string::npos);
   EXPECT_NE(refusal([&] { hybrid::grow_labels(one, 1e300); }), "");
   EXPECT_EQ(count(hybrid::grow_labels(empty_volume(3, 3, 3), 1e300)), 0U);
-}
-
-// ---- voxelise_mesh
-
-TriangleMesh box_mesh(glm::dvec3 low, glm::dvec3 high) {
-  TriangleMesh mesh;
-  for (int c = 0; c < 8; ++c) {
-    mesh.vertices.emplace_back((c & 1) != 0 ? high.x : low.x, (c & 2) != 0 ? high.y : low.y,
-                               (c & 4) != 0 ? high.z : low.z);
-  }
-  mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
-                    {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
-  return mesh;
-}
-
-TEST(VoxeliseMesh, AlignedBoxIsExact) {
-  const TriangleMesh mesh = box_mesh({0.1, -0.2, 0.3}, {0.1 + 0.012, -0.2 + 0.02, 0.3 + 0.007});
-  const LabelVolume volume = hybrid::voxelise_mesh(mesh, glm::dvec3(1e-3), 4, 1'000'000);
-  EXPECT_EQ(volume.dims, (std::array{12, 20, 7}));
-  EXPECT_EQ(count(volume), 12U * 20U * 7U);
-  EXPECT_NEAR(volume.origin_m.x, 0.1005, 1e-12);
-  EXPECT_EQ(volume.labels[0], 4);
-}
-
-TEST(VoxeliseMesh, RowsThroughEdgesAndVerticesCountRight) {
-  // An octahedron whose equator, edges and tips all lie on rows of centres.
-  TriangleMesh mesh;
-  mesh.vertices = {{4, 0, 0}, {-4, 0, 0}, {0, 4, 0},          {0, -4, 0},
-                   {0, 0, 4}, {0, 0, -4}, {-4.5, -4.5, -4.5}, {4.5, 4.5, 4.5}};
-  for (const std::uint32_t z : {4U, 5U}) {
-    mesh.triangles.push_back({0, 2, z});
-    mesh.triangles.push_back({2, 1, z});
-    mesh.triangles.push_back({1, 3, z});
-    mesh.triangles.push_back({3, 0, z});
-  }
-  mesh.triangles.push_back(
-      {6, 6, 7});  // of no area: only widens the lattice so that centres are whole numbers
-  mesh.triangles.push_back({6, 6, 7});
-  const LabelVolume volume = hybrid::voxelise_mesh(mesh, glm::dvec3(1.0), 1, 100'000);
-  ASSERT_EQ(volume.dims, (std::array{9, 9, 9}));
-  for (int k = 0; k < 9; ++k) {
-    for (int j = 0; j < 9; ++j) {
-      for (int i = 0; i < 9; ++i) {
-        const int distance = std::abs(i - 4) + std::abs(j - 4) + std::abs(k - 4);
-        if (distance == 4) continue;  // on the surface: either, as long as the parity of the row is right
-        ASSERT_EQ(volume.labels[volume.index(i, j, k)], distance < 4 ? 1 : 0) << i << j << k;
-      }
-    }
-  }
-}
-
-TEST(VoxeliseMesh, SurfaceOfLabelsGivesTheLabelsBack) {
-  for (unsigned seed = 0; seed < 30; ++seed) {
-    LabelVolume volume = noise(8, 7, 6, 0.3, seed);
-    volume.spacing_m = {1e-3, 2e-3, 0.5e-3};
-    const TriangleMesh mesh = hybrid::surface_from_labels(volume, 0);
-    // The lattice is centred on the mesh, whose box is a whole number of voxels, so centres meet centres...
-    // where no sheets share a cell, which moves a vertex; those stay well clear of the centres.
-    const LabelVolume back = hybrid::voxelise_mesh(mesh, volume.spacing_m, 1, 1'000'000);
-    EXPECT_EQ(count(back), count(volume)) << seed;
-  }
-}
-
-TEST(VoxeliseMesh, TurnedBallHasItsVolume) {
-  const TriangleMesh rough = hybrid::surface_from_labels(ball(40, 17.3, glm::dvec3(1.0)), 4);
-  for (unsigned seed = 0; seed < 5; ++seed) {
-    TriangleMesh mesh = rough;
-    const glm::dquat turn = glm::angleAxis(0.3 + seed, glm::normalize(glm::dvec3(1.0, seed, 2.0)));
-    for (glm::dvec3& p : mesh.vertices) p = turn * p;
-    const LabelVolume volume = hybrid::voxelise_mesh(mesh, {0.7, 0.9, 0.8}, 1, 10'000'000);
-    const double expected = signed_volume(mesh);
-    EXPECT_NEAR(static_cast<double>(count(volume)) * cell_volume(volume), expected, 0.005 * expected);
-    // Parity at fault shows as a row filled to its end: the border of the box must be nearly empty.
-    for (int k = 0; k < volume.dims[2]; ++k) {
-      EXPECT_EQ(volume.labels[volume.index(volume.dims[0] - 1, 0, k)], 0);
-    }
-  }
-}
-
-TEST(VoxeliseMesh, InsideOutAndSoupsAreClosedToo) {
-  TriangleMesh mesh = box_mesh(glm::dvec3(0.0), glm::dvec3(0.01));
-  for (auto& t : mesh.triangles) std::swap(t[0], t[1]);
-  EXPECT_EQ(count(hybrid::voxelise_mesh(mesh, glm::dvec3(1e-3), 1, 10'000)), 1000U);
-  TriangleMesh soup;
-  for (const auto& t : mesh.triangles) {
-    for (const auto v : t) soup.vertices.push_back(mesh.vertices[v]);
-    const auto n = static_cast<std::uint32_t>(soup.vertices.size());
-    soup.triangles.push_back({n - 3, n - 2, n - 1});
-  }
-  EXPECT_EQ(count(hybrid::voxelise_mesh(soup, glm::dvec3(1e-3), 1, 10'000)), 1000U);
-  for (int copies = 0; copies < 4; ++copies) {  // coincident triangles cancel in pairs
-    soup.triangles.push_back(soup.triangles[0]);
-    soup.triangles.push_back(soup.triangles[0]);
-  }
-  EXPECT_EQ(count(hybrid::voxelise_mesh(soup, glm::dvec3(1e-3), 1, 10'000)), 1000U);
-}
-
-TEST(VoxeliseMesh, FarAwayAndMixedSpacings) {
-  const double far = 1e6;  // 1,000 km: a double still resolves 0.1 nm there
-  const TriangleMesh mesh = box_mesh({far, -far, far}, {far + 0.01, -far + 0.02, far + 0.03});
-  EXPECT_EQ(count(hybrid::voxelise_mesh(mesh, {1e-3, 2e-3, 3e-3}, 1, 10'000)), 1000U);
-  const TriangleMesh sheet = box_mesh({0, 0, 0}, {0.1, 0.1, 1e-4});
-  EXPECT_EQ(count(hybrid::voxelise_mesh(sheet, glm::dvec3(1e-3), 1, 100'000)), 10'000U);
-}
-
-TEST(VoxeliseMesh, RefusesWithTheNumbers) {
-  TriangleMesh open = box_mesh(glm::dvec3(0.0), glm::dvec3(0.01));
-  open.triangles.pop_back();
-  const auto voxelise = [](const TriangleMesh& mesh, double spacing, std::size_t most,
-                           std::uint8_t label = 1) {
-    return refusal([&] { hybrid::voxelise_mesh(mesh, glm::dvec3(spacing), label, most); });
-  };
-  EXPECT_NE(voxelise(open, 1e-3, 10'000).find("not closed: 3 of its edges"), std::string::npos);
-  const TriangleMesh box = box_mesh(glm::dvec3(0.0), glm::dvec3(0.01));
-  EXPECT_NE(voxelise(box, 1e-3, 999).find("10 x 10 x 10"), std::string::npos);
-  EXPECT_NE(voxelise(box, 1e-300, 1'000'000), "");
-  EXPECT_NE(voxelise(box, 0.0, 1'000), "");
-  EXPECT_NE(voxelise(box, std::numeric_limits<double>::quiet_NaN(), 1'000), "");
-  EXPECT_NE(voxelise(box, 1e-3, 1'000, 0), "");
-  EXPECT_NE(voxelise({}, 1e-3, 1'000), "");
-  TriangleMesh flat = box_mesh(glm::dvec3(0.0), {0.01, 0.01, 0.0});
-  EXPECT_NE(voxelise(flat, 1e-3, 1'000).find("no voxel centre lies inside"), std::string::npos);
-  TriangleMesh broken = box;
-  broken.vertices[3].y = std::numeric_limits<double>::infinity();
-  EXPECT_NE(voxelise(broken, 1e-3, 1'000).find("vertex 3"), std::string::npos);
-  broken = box;
-  broken.triangles[5][1] = 77;
-  EXPECT_NE(voxelise(broken, 1e-3, 1'000).find("triangle 5"), std::string::npos);
 }
 
 // ---- time
@@ -509,7 +331,7 @@ TEST(LabelSurface, SevenMillionVoxelsTakeAboutASecond) {
   total += timed("pieces", [&] { hybrid::keep_largest_piece(kept, true); });
   total += timed("grow", [&] { hybrid::grow_labels(volume, 5.0); });
   total += timed("voxelise", [&] { hybrid::voxelise_mesh(mesh, glm::dvec3(1.0), 1, 10'000'000); });
-  EXPECT_LT(total, 60.0);  // generous: sanitizers and shared machines; the figures are printed
+  EXPECT_LT(total, 60.0);  // generous for sanitizers and shared machines; the figures are printed
 }
 
 }  // namespace

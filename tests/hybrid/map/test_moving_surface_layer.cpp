@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Moving bodies in the occupancy map, against brute force over their triangles, and against a map that is
-// built from scratch where they are.
+// Moving bodies in the occupancy map, against brute force over their triangles and against a map that is
+// built at their present poses.
 #include "hybrid/map/moving_surface_layer.h"
 
 #include <gtest/gtest.h>
@@ -34,7 +34,7 @@ dvec3 random_vector(std::mt19937_64& random, double half) {
   return {x, y, z};
 }
 
-// Points of the surface, dense: a box that holds one must be answered for.
+// Dense points of the surface: a box that holds one must be reported.
 std::vector<dvec3> points_on(const polygon::TriangleMesh& mesh, std::mt19937_64& random, int a_triangle) {
   std::uniform_real_distribution<double> u(0.0, 1.0);
   std::vector<dvec3> points;
@@ -60,7 +60,7 @@ struct Body {
   dvec3 velocity{0.0}, spin{0.0};
 
   [[nodiscard]] dvec3 to_scene(const dvec3& p) const { return position + rotation * p; }
-  // Exact for boxes and balls to the resolution of the points.
+  // Exact for boxes and balls, to the resolution of the points.
   [[nodiscard]] double distance_to_box(const dvec3& low, const dvec3& high) const {
     double least = 1e300;
     for (const dvec3& p : points) {
@@ -113,7 +113,7 @@ class MovingBodies : public ::testing::TestWithParam<std::tuple<double, std::siz
     for (std::uint32_t b = 0; b < bodies.size(); ++b) {
       Body& body = bodies[b];
       if (round % 50 == 0) {
-        // From standing still to 10 m/s and 3,000 rad/s, and now and then somewhere else at once.
+        // From rest to 10 m/s and 3,000 rad/s, with an occasional jump.
         const double speed = std::pow(10.0, -4.0 + 5.0 * static_cast<double>(random() % 100) / 99.0);
         body.velocity = speed * random_vector(random, 1.0);
         body.spin = 300.0 * speed * random_vector(random, 1.0);
@@ -146,7 +146,7 @@ TEST_P(MovingBodies, AreNeverMissedAndFoundOnlyWhereTheyAre) {
     const dvec3 low = centre - half, high = centre + half;
     const std::uint64_t mask = map.rigid_in(low, high);
     for (std::uint32_t b = 0; b < bodies.size(); ++b) {
-      // Most bodies are nowhere near: their bounds say so.
+      // Most bodies are far away by their bounds.
       if (glm::distance(bodies[b].position, centre) > 0.06 + glm::length(half)) {
         ASSERT_EQ(mask & OccupancyMap::rigid_bit(b), 0U) << "body " << b << " is far away";
         continue;
@@ -157,7 +157,7 @@ TEST_P(MovingBodies, AreNeverMissedAndFoundOnlyWhereTheyAre) {
         ASSERT_TRUE(said) << "body " << b << " was missed in round " << round;
         ++hits;
       }
-      // The box's corners turned into the body's frame reach √3 further at most, and a cell beyond that.
+      // The box's corners, rotated into the body's frame, reach √3 further at most, plus one cell.
       if (said) {
         ASSERT_LE(distance, 0.74 * glm::length(half) + 2.0 * kCell + 2e-3) << "body " << b << " is elsewhere";
       } else {
@@ -201,8 +201,8 @@ TEST_P(MovingBodies, TakeNoMoreMemoryForHavingMoved) {
 INSTANTIATE_TEST_SUITE_P(FewAndMany, MovingBodies,
                          ::testing::Combine(::testing::Values(0.0, 1e6), ::testing::Values(1U, 4U, 40U)));
 
-// Beside fixed surfaces and soft voxels: each question is answered by the layers that it is about.
-TEST(MovingCells, ShareTheMapWithWhatStays) {
+// Beside fixed surfaces and soft voxels: each query is answered by its own layers only.
+TEST(MovingSurfaceLayer, ShareTheMapWithWhatStays) {
   OccupancyMap map(kCell, dvec3(0.0));
   map.add_triangle(0, dvec3(0.0), dvec3(0.01, 0, 0), dvec3(0, 0.01, 0));
   map.add_soft(1);
@@ -224,7 +224,7 @@ TEST(MovingCells, ShareTheMapWithWhatStays) {
   EXPECT_TRUE(map.validate());
 }
 
-TEST(MovingCells, OnlyDistrictsThatABodyLeavesOrEntersChange) {
+TEST(MovingSurfaceLayer, OnlyDistrictsThatABodyLeavesOrEntersChange) {
   OccupancyMap map(kCell, dvec3(0.0));
   const double radius = 0.05;
   for (std::uint32_t b = 0; b < 20; ++b)
@@ -232,7 +232,7 @@ TEST(MovingCells, OnlyDistrictsThatABodyLeavesOrEntersChange) {
                    dquat(1, 0, 0, 0));
   map.reserve_bricks(0);
   ASSERT_EQ(map.district_changes(), 0U);
-  // Turning on the spot, and moving within the district, change nothing.
+  // Rotation in place and motion within the district change nothing.
   for (int n = 0; n < 1000; ++n) map.move_body(3, {0.9, 0.0, 0.0}, glm::angleAxis(0.01 * n, dvec3(0, 0, 1)));
   EXPECT_EQ(map.district_changes(), 0U);
   // A body's length in 10,000 steps crosses one border along x with its front and one with its back: at most
@@ -244,8 +244,7 @@ TEST(MovingCells, OnlyDistrictsThatABodyLeavesOrEntersChange) {
   EXPECT_TRUE(map.validate());
 }
 
-// The margin of a curved surface: points of the exact ball, outside of its inscribed triangles, are not
-// missed.
+// The margin of a curved surface: points of the exact ball, outside its inscribed triangles, must be found.
 TEST(SurfaceCells, AMarginCoversWhatTheTrianglesStandFor) {
   std::mt19937_64 random(3);
   const double radius = 0.05;
@@ -267,7 +266,7 @@ TEST(SurfaceCells, AMarginCoversWhatTheTrianglesStandFor) {
   }
 }
 
-// Sealed or not, and from whatever part of the bitmap: the same answers.
+// Sealing changes no answer, in any part of the bitmap.
 TEST(SurfaceCells, SealingChangesNoAnswer) {
   std::mt19937_64 random(5);
   for (const double extent : {0.02, 0.5, 30.0}) {

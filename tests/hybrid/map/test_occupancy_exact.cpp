@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// After any number of motions the map is the map that would be built where everything now is; and however far
-// and long voxels wander, it needs no more room for it.
+// After any number of motions the map equals the map that would be built from the present positions. Voxels
+// that wander far and long need no more memory.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -37,7 +37,7 @@ std::vector<std::uint32_t> soft_in(const OccupancyMap& map, const dvec3& low, co
   return out;
 }
 
-// Soft voxels that rest in sheets, fixed triangles, and bodies that move.
+// Soft voxels at rest in sheets, fixed triangles, and moving bodies.
 struct Scene {
   dvec3 origin;
   std::vector<dvec3> rest, voxels;
@@ -81,7 +81,7 @@ TEST_P(OccupancyExact, IsTheMapBuiltFromScratchAfterAHundredThousandMotions) {
   const std::size_t bytes = map.memory_bytes();
   std::size_t crowded = 0;
   for (int n = 1; n <= 100'000; ++n) {
-    if (n % 10 == 0) {  // a body: a step, or somewhere else at once
+    if (n % 10 == 0) {  // a body: a step or a jump
       const std::size_t b = random() % scene.bodies.size();
       scene.position[b] = n % 500 == 0 ? origin + random_vector(random, 0.2)
                                        : scene.position[b] + random_vector(random, 2e-3);
@@ -91,10 +91,10 @@ TEST_P(OccupancyExact, IsTheMapBuiltFromScratchAfterAHundredThousandMotions) {
       const std::size_t v = random() % scene.voxels.size();
       dvec3& at = scene.voxels[v];
       switch (random() % 8) {
-        case 0:  // back to where it rested
+        case 0:  // back to the rest position
           at = scene.rest[v];
           break;
-        case 1:  // into another's cell
+        case 1:  // into another voxel's cell
           at = scene.voxels[random() % scene.voxels.size()] + random_vector(random, 1e-4);
           break;
         case 2:  // far away
@@ -113,7 +113,7 @@ TEST_P(OccupancyExact, IsTheMapBuiltFromScratchAfterAHundredThousandMotions) {
     const OccupancyMap fresh = scene.built();
     ASSERT_EQ(map.soft_bricks(), fresh.soft_bricks());
     ASSERT_EQ(map.occupied_cells(), fresh.occupied_cells());
-    // Every occupied cell is that of some voxel.
+    // Every occupied cell belongs to some voxel.
     for (std::uint32_t v = 0; v < scene.voxels.size(); ++v) {
       const dvec3& at = scene.voxels[v];
       const auto here = soft_in(map, at, at, scene.voxels.size());
@@ -138,7 +138,7 @@ TEST_P(OccupancyExact, IsTheMapBuiltFromScratchAfterAHundredThousandMotions) {
 
 INSTANTIATE_TEST_SUITE_P(AtAndFarFromTheOrigin, OccupancyExact, ::testing::Values(0.0, 1e4));
 
-// A few voxels over a region of a million bricks, with room for twenty more than there are.
+// A few voxels in a region of a million bricks, with capacity for only twenty more bricks than are in use.
 TEST(OccupancyRoom, VoxelsThatWanderForEverGiveTheirBricksBack) {
   std::mt19937_64 random(8);
   OccupancyMap map(kCell, dvec3(0.0));
@@ -167,7 +167,7 @@ TEST(OccupancyRoom, VoxelsThatWanderForEverGiveTheirBricksBack) {
   }
 }
 
-// Without any room to spare a voxel that is alone in its brick takes it along.
+// Without spare capacity, a voxel that is alone in its brick takes the brick along.
 TEST(OccupancyRoom, AVoxelThatIsAloneNeedsNoRoomToSpare) {
   OccupancyMap map(kCell, dvec3(0.0));
   map.add_soft(1);
@@ -179,7 +179,7 @@ TEST(OccupancyRoom, AVoxelThatIsAloneNeedsNoRoomToSpare) {
   EXPECT_FALSE(map.any_near(dvec3(0.0), dvec3(0.0)));
 }
 
-// Of the bitmap's units, too, what was left says that nothing is there.
+// Bitmap units that voxels have left must be empty again, too.
 TEST(OccupancyRoom, NothingIsNearWhereAVoxelHasPassed) {
   for (const double extent : {0.4, 1.5, 3.0}) {  // units of one brick, of two and of four along an edge
     SCOPED_TRACE(extent);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The occupancy map against brute force over everything that was put into it. A cell is the map's resolution:
-// it may report what lies within one cell of a box, and must report what lies in it.
+// The occupancy map against brute force over its content. A cell is the map's resolution: a query must report
+// everything inside a box, and may report things within one cell of the box.
 #include "hybrid/map/occupancy_map.h"
 
 #include <gtest/gtest.h>
@@ -33,8 +33,7 @@ bool within(const dvec3& p, const dvec3& low, const dvec3& high) {
   return glm::all(glm::greaterThanEqual(p, low)) && glm::all(glm::lessThanEqual(p, high));
 }
 
-// Does the triangle meet the box? Clipped by its six planes (Sutherland & Hodgman 1974), and looked at what
-// is left.
+// Triangle-box intersection: the triangle is clipped by the box's six planes (Sutherland & Hodgman 1974).
 bool meets(const Triangle& t, const dvec3& low, const dvec3& high) {
   std::vector<dvec3> polygon(t.begin(), t.end());
   for (int d = 0; d < 3; ++d) {
@@ -54,16 +53,16 @@ bool meets(const Triangle& t, const dvec3& low, const dvec3& high) {
   return true;
 }
 
-// The same questions in every test, at the scene's origin and far from it.
+// The same queries in every test, at the scene's origin and far from it.
 class Occupancy : public ::testing::TestWithParam<double> {
  protected:
   static constexpr double kCell = 2e-3;
   const dvec3 origin{GetParam(), -GetParam(), 0.5 * GetParam()};
-  // Coordinates this far out are rounded by so much.
+  // Rounding of coordinates at this distance.
   const double rounding = 1e-15 + 4e-16 * GetParam();
   std::mt19937_64 random{99};
   OccupancyMap map{kCell, origin};
-  OccupancyMap::Trail trail;  // through everything that is asked
+  OccupancyMap::Trail trail;  // through all queries
 
   void expect_soft(const std::vector<dvec3>& points, const dvec3& low, const dvec3& high) {
     std::vector<std::uint32_t> out(points.size());
@@ -102,7 +101,7 @@ TEST_P(Occupancy, FindsSoftVoxelsAsBruteForceDoesAfterManyMoves) {
   for (int round = 0; round < 60; ++round) {
     for (int n = 0; n < 1000; ++n) {
       const std::size_t i = any(random);
-      // Small steps mostly, as tissue moves; sometimes across the scene.
+      // Mostly small steps, as tissue moves; sometimes across the scene.
       points[i] +=
           n % 10 == 0 ? 0.5 * (origin - points[i]) + random_point(random, 0.04) : random_point(random, 1e-3);
       map.move(static_cast<std::uint32_t>(i), points[i]);
@@ -117,7 +116,7 @@ TEST_P(Occupancy, FindsSoftVoxelsAsBruteForceDoesAfterManyMoves) {
   EXPECT_EQ(map.overflows(), 0U);
 }
 
-// More than a block has room for beside its cells: all 64 cells, two voxels in each, and empty again.
+// More than a block's inline capacity: all 64 cells with two voxels each, and empty again.
 TEST_P(Occupancy, ABlockMayBeFullAndEmptyAgain) {
   const dvec3 far = origin + 100.0 * kCell;
   std::vector<dvec3> cells, points;
@@ -150,7 +149,7 @@ TEST_P(Occupancy, FindsRigidSurfacesAsBruteForceDoes) {
   std::vector<Triangle> triangles;
   for (std::uint32_t n = 0; n < 40; ++n) {
     const dvec3 a = origin + random_point(random, 0.05);
-    // Fat ones, slivers, segments and points; some flat in the faces between cells.
+    // Fat triangles, slivers, segments and points; some flat in the faces between cells.
     Triangle t{a, a + random_point(random, 0.01), a + random_point(random, 0.01)};
     if (n % 5 == 1) t[2] = t[0] + 0.5 * (t[1] - t[0]) + 1e-9;
     if (n % 5 == 2) t[2] = t[1] = t[0];
@@ -185,12 +184,12 @@ TEST_P(Occupancy, NothingIsNearWhereNothingIs) {
   map.add_soft(1);
   map.place(0, origin);
   map.add_triangle(0, origin, origin + dvec3(1e-3, 0, 0), origin + dvec3(0, 1e-3, 0));
-  // A brick has eight cells.
+  // A brick is eight cells wide.
   const double brick = 8.0 * kCell + 4.0 * rounding;
   EXPECT_TRUE(map.any_near(origin - 1e-4, origin + 1e-4));
   EXPECT_FALSE(map.any_near(origin + 2.0 * brick, origin + 3.0 * brick));
   EXPECT_FALSE(map.any_near(origin - 3.0 * brick, origin - 2.0 * brick));
-  // What has left is not there any more.
+  // Voxels that left are no longer there.
   map.reserve_bricks(64);
   map.move(0, origin + dvec3(10.0 * brick));
   std::vector<std::uint32_t> out(4);
@@ -198,7 +197,8 @@ TEST_P(Occupancy, NothingIsNearWhereNothingIs) {
   EXPECT_EQ(map.soft_in(origin + 10.0 * brick - 1e-3, origin + 10.0 * brick + 1e-3, out), 1U);
 }
 
-// Seven voxels want seven bricks, and there are four: who finds none stays where it was last known.
+// Seven voxels need seven bricks, and there are four: a voxel without a brick keeps its last position in the
+// map.
 TEST_P(Occupancy, AFullMapKeepsAVoxelWhereItWasLastKnown) {
   map.add_soft(7);
   for (std::uint32_t n = 0; n < 7; ++n) map.place(n, origin);
@@ -208,7 +208,7 @@ TEST_P(Occupancy, AFullMapKeepsAVoxelWhereItWasLastKnown) {
   EXPECT_TRUE(map.validate());
   std::vector<std::uint32_t> out(8);
   EXPECT_EQ(map.soft_in(origin - 1e-3, origin + 1e-3, out), 4U);
-  // One comes back, and its brick is room for another.
+  // One voxel returns, and its brick becomes free for another.
   map.move(1, origin);
   map.move(6, origin + dvec3(0.6, 0, 0));
   EXPECT_EQ(map.overflows(), 3U);
@@ -247,7 +247,8 @@ TEST(OccupancyMap, ManyObjectsShareTheLastBit) {
   }
 }
 
-// Along each axis the same, on either side of a cell's face, of zero and of what has no cell of its own.
+// The rule is equal along each axis, on both sides of a cell's face, of zero, and of positions without a
+// cell.
 TEST(OccupancyMap, ACellBeginsAtItsLowerFace) {
   const hybrid::BrickGrid grid(0.5, dvec3(0.0));
   const double far = 1e300, none = std::numeric_limits<double>::quiet_NaN();
@@ -270,8 +271,8 @@ TEST(OccupancyMap, ACellBeginsAtItsLowerFace) {
   }
 }
 
-// Forward and back through blocks that are there, that are not, and that come and go meanwhile: with one
-// trail, and with one that has been through another map, the answers are those without any.
+// A path forward and back through blocks that exist, that do not exist, and that appear and vanish meanwhile.
+// With a trail, and with a trail that was used in another map, the answers must equal those without a trail.
 TEST(OccupancyMap, APathFindsWhatIsThereNow) {
   constexpr double kCell = 1e-3;
   constexpr std::uint32_t kCount = 20'000;
@@ -292,7 +293,7 @@ TEST(OccupancyMap, APathFindsWhatIsThereNow) {
     const dvec3 start = random_point(random, 0.05), way = random_point(random, 0.4 * kCell);
     for (int n = 0; n < 200; ++n) {
       const dvec3 p = start + static_cast<double>(n < 150 ? n : 300 - n) * way;
-      // Some voxel comes into the way, or leaves it.
+      // Some voxel enters or leaves the path.
       map.move(mover++ % kCount, n % 3 == 0 ? p + way : random_point(random, 0.04));
       if (n % 50 == 49) (void)other.soft_in(p, p, with, trail);
       const std::size_t count = map.soft_in(p, p, with, trail);

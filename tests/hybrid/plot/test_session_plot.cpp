@@ -20,7 +20,7 @@ using hybrid::PlotPoint;
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-class Folder {  // removed with what is in it
+class Folder {  // removed with its content
  public:
   Folder() {
     const auto* test = testing::UnitTest::GetInstance()->current_test_info();
@@ -56,8 +56,8 @@ std::size_t count(const std::string& text, const std::string& what) {
   return n;
 }
 
-// Tags open and close in order, attributes are quoted, entities are known: enough of XML to catch what a
-// writer by hand gets wrong.
+// Tags open and close in order, attributes are quoted, entities are known: enough XML to catch the errors of
+// a hand-written writer.
 void expect_well_formed(const std::string& xml) {
   std::vector<std::string> open;
   std::size_t i = 0;
@@ -141,7 +141,7 @@ TEST(Decimate, KeepsEveryColumnsExtremesAndEnds) {
     x.push_back(i * 1e-3);
     y.push_back(std::sin(i * 0.37) + (i == 54'321 ? 50.0 : 0.0) - (i == 77'777 ? 40.0 : 0.0));
   }
-  const auto kept = hybrid::decimate_columns(x, y, x.front(), x.back(), 500);
+  const auto kept = hybrid::downsample_columns(x, y, x.front(), x.back(), 500);
   EXPECT_LE(kept.size(), 4U * 500U);
   EXPECT_TRUE(std::ranges::is_sorted(kept, {}, &PlotPoint::x));
   EXPECT_EQ(kept.front().x, x.front());
@@ -176,7 +176,7 @@ TEST(Decimate, KeepsEveryColumnsExtremesAndEnds) {
 TEST(Decimate, LeavesAFewSamplesAsTheyAre) {
   const std::vector<double> x{0.0, 1.0, 2.0, 3.0};
   const std::vector<double> y{5.0, 1.0, 4.0, 2.0};
-  const auto kept = hybrid::decimate_columns(x, y, 0.0, 3.0, 100);
+  const auto kept = hybrid::downsample_columns(x, y, 0.0, 3.0, 100);
   ASSERT_EQ(kept.size(), 4U);
   for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(kept[i].y, y[i]);
 }
@@ -184,7 +184,7 @@ TEST(Decimate, LeavesAFewSamplesAsTheyAre) {
 TEST(Decimate, TurnsARunOfNonFiniteValuesIntoOneGap) {
   const std::vector<double> x{0.0, 1.0, 2.0, 3.0, 4.0, 5.0};
   const std::vector<double> y{nan, 1.0, nan, std::numeric_limits<double>::infinity(), 2.0, nan};
-  const auto kept = hybrid::decimate_columns(x, y, 0.0, 5.0, 100);
+  const auto kept = hybrid::downsample_columns(x, y, 0.0, 5.0, 100);
   ASSERT_EQ(kept.size(), 4U);  // 1, gap, 2, gap
   EXPECT_EQ(kept[0].y, 1.0);
   EXPECT_TRUE(std::isnan(kept[1].y));
@@ -197,7 +197,7 @@ TEST(Decimate, PathKeepsItsEndsAndItsBound) {
     const double a = i * 1e-3;
     path.push_back({400.0 + 300.0 * std::cos(a), 200.0 + 150.0 * std::sin(3.1 * a)});
   }
-  const auto kept = hybrid::decimate_path(path, 0.4, 3000);
+  const auto kept = hybrid::downsample_path(path, 0.4, 3000);
   EXPECT_LE(kept.size(), 3000U);
   EXPECT_GT(kept.size(), 300U);
   EXPECT_EQ(kept.front().x, path.front().x);
@@ -285,8 +285,8 @@ TEST(SessionPlot, SaysWhenItCannotWrite) {
   }
 }
 
-// The difference panel's own samples are not visible from outside but for the picture; a constant difference
-// must be a straight line at the right height: half of the largest force there.
+// The samples of the difference panel are visible only in the figure. A constant difference must be a
+// straight line at the right height: half of the largest force there.
 TEST(ComparePlot, NamesEveryModelAndStaysSmall) {
   const Folder folder;
   std::vector<hybrid::ComparedModel> models(8);

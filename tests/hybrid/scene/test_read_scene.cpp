@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a scene file says reaches the Scene in SI, and every way to say it wrongly is refused with its place
-// and a remedy. broken_scenes/ has one file for each of those ways.
+// A scene file's values reach the Scene in SI. The refusals are in test_scene_refusals.cpp.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -19,8 +18,8 @@
 #include "hybrid/build/load_scene.h"
 #include "hybrid/scene/scene.h"
 #include "hybrid/scene/toml_tree.h"
-#include "tests/shared_data.h"
 #include "tests/hybrid/fixtures/scene_file_fixture.h"
+#include "tests/shared_data.h"
 
 namespace {
 
@@ -70,7 +69,7 @@ TEST_F(SceneFile, EveryUnitBecomesMeters) {
     EXPECT_DOUBLE_EQ(scene.unit_m, meters);
     EXPECT_DOUBLE_EQ(scene.occupancy_cell_m.value_or(0.0), 3.0 * meters);
     EXPECT_DOUBLE_EQ(scene.tool.radius_m, 2.0 * meters);
-    EXPECT_EQ(scene.tool.stiffness_N_per_m, 700.0);  // N/m in every unit
+    EXPECT_EQ(scene.tool.stiffness_N_per_m, 700.0);  // N/m with any unit of length
     EXPECT_DOUBLE_EQ(std::get<hybrid::BallPrimitive>(scene.rigid.at(0).source).radius_m, 4.0 * meters);
     expect_near(scene.rigid.at(0).pose.position_m, glm::dvec3(1.0, 2.0, 3.0) * meters);
     const auto& formula = std::get<voxel::Formula>(scene.soft.at(0).source);
@@ -137,7 +136,7 @@ TEST_F(SceneFile, DelayWatchdogGripTremorAndSafetyAreRead) {
   EXPECT_FALSE(usual.watchdog_s.has_value());
 }
 
-// Extrinsic, x then y then z: the same as three rotation matrices applied one after the other.
+// Extrinsic, x then y then z: equal to three rotation matrices applied one after the other.
 TEST_F(SceneFile, RotationIsAboutTheFixedAxesXThenYThenZ) {
   const Scene scene = load("format = 1\n" + ball + "rotation = [30, -50, 110]\n" + path);
   const double x = 30.0 * M_PI / 180.0, y = -50.0 * M_PI / 180.0, z = 110.0 * M_PI / 180.0;
@@ -173,7 +172,7 @@ TEST_F(SceneFile, RigidSources) {
   const auto& volume = std::get<hybrid::VolumeSurfaceSource>(scene.rigid[4].source);
   ASSERT_EQ(volume.rules.size(), 2U);
   EXPECT_EQ(volume.rules[1].lower, 1001.0);
-  EXPECT_EQ(volume.rules[1].label, 1);  // a surface needs only inside and outside
+  EXPECT_EQ(volume.rules[1].label, 1);  // a surface only distinguishes inside and outside
   EXPECT_DOUBLE_EQ(volume.spacing_m.value_or(0.0), 2e-3);
   EXPECT_DOUBLE_EQ(volume.grow_m, 1.5e-3);
   EXPECT_EQ(volume.smooth, 0);
@@ -209,7 +208,7 @@ TEST_F(SceneFile, SoftSources) {
   expect_near(*volume.spacing_m, glm::dvec3(1e-3, 1e-3, 3e-3));
   EXPECT_EQ(scene.soft[0].materials.at(9), "b");
   EXPECT_EQ(scene.soft[0].materials.at(2), "a");
-  EXPECT_TRUE(scene.soft[0].anchors.faces.empty());  // who names anchors names all of them
+  EXPECT_TRUE(scene.soft[0].anchors.faces.empty());  // anchors in the file replace all default anchors
   EXPECT_EQ(scene.soft[0].anchors.labels, std::vector<std::uint8_t>{9});
   EXPECT_DOUBLE_EQ(scene.soft[0].anchors.rigid_within_m, 2e-3);
   EXPECT_EQ(scene.soft[0].budget, 5U);
@@ -301,7 +300,7 @@ TEST_F(SceneFile, ExtremesThatAreSaidClearlyAreTaken) {
   EXPECT_NO_THROW((void)load(windows));
 }
 
-// 512 cubed at 4 bytes a voxel: 0.54 GB, which any machine that builds this has.
+// 512 cubed at 4 bytes per voxel: 0.54 GB, which every build machine has.
 TEST_F(SceneFile, TheLimitOfALatticeIsThatOfTheMachine) {
   const std::size_t most = hybrid::max_lattice_voxels();
   EXPECT_GE(most, std::size_t{1} << 27);
@@ -316,7 +315,7 @@ TEST_F(SceneFile, TheLimitOfALatticeIsThatOfTheMachine) {
   EXPECT_NE(refusal(cube(1.01 * edge)).find("bytes"), std::string::npos);
 }
 
-// A plate without slack, on tissue or on its own: felt as it is, so that there is nothing to say of it.
+// A plate without slack, on tissue or by itself, is rendered correctly; so there is no warning.
 TEST_F(SceneFile, TissueWithoutSlackNeedsNoWarning) {
   const auto warnings = [&](const std::string& stretch, const std::string& shear, double below) {
     std::ostringstream out;

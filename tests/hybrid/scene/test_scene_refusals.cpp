@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Every way to write a scene wrongly is refused with its place and a remedy. broken_scenes/ has a file for
-// each.
+// Every error in a scene file is refused with its place and a remedy. broken_scenes/ has one file for each.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -26,17 +25,18 @@ using hybrid::SceneError;
 using tests::block;
 using tests::path;
 
-const std::filesystem::path broken_folder = tests::source_folder / "tests" / "hybrid" / "scene" / "broken_scenes";
+const std::filesystem::path broken_folder =
+    tests::source_folder / "tests" / "hybrid" / "scene" / "broken_scenes";
 
 class SceneRefusal : public tests::SceneFile {};
 
 struct Broken {
   const char* file;
   const char* place;   // line:column
-  const char* wrong;   // a word of what is wrong
-  const char* remedy;  // a word of what to do
+  const char* wrong;   // part of the error
+  const char* remedy;  // part of the remedy
 };
-// Else a case would be listed by the bytes of its pointers, another list each time.
+// Without this, a case would be listed by the bytes of its pointers, which differ between runs.
 void PrintTo(const Broken& scene, std::ostream* out) {
   *out << scene.file;
 }
@@ -260,7 +260,7 @@ TEST(SceneKeys, EditDistanceCountsEditsAndSwaps) {
   EXPECT_EQ(hybrid::edit_distance("", "abc"), 3U);
 }
 
-// A few thousand small damages to a scene that has every table: each is a scene or a refusal, nothing else.
+// A few thousand small damages to a scene with every table: each gives a scene or a refusal, nothing else.
 TEST_F(SceneRefusal, DamagedScenesAreScenesOrRefused) {
   const std::string whole =
       "format = 1\nunits = \"mm\"\ntitle = \"T\"\noverlap = \"carve\"\n[occupancy]\ncell = 2.5\n"
@@ -314,7 +314,7 @@ TEST_F(SceneRefusal, DamagedScenesAreScenesOrRefused) {
           if (digit != std::string::npos) text[digit] = static_cast<char>('0' + below(10));
           break;
         }
-        default: {  // a digit becomes something else that may be a number
+        default: {  // a digit is replaced by a character that may be part of a number
           const std::size_t digit = text.find_first_of("0123456789", at);
           if (digit != std::string::npos) text.replace(digit, 1, pieces[below(pieces.size())]);
         }

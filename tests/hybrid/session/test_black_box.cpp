@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The last two seconds are kept, to the tick, and are on file when something went wrong: also when the
-// program crashed.
+// The last two seconds are kept to the tick, and are written after a fault: also after a crash of the
+// program.
 #include "hybrid/session/black_box.h"
 
 #include <gtest/gtest.h>
@@ -18,8 +18,8 @@
 namespace {
 
 using device::DeviceFault;
+using hybrid::BlackBoxFile;
 using hybrid::BlackBoxRow;
-using hybrid::KeptBox;
 
 constexpr double kRate_hz = 1000.0;
 constexpr std::uint64_t kRoom = 2000;
@@ -27,7 +27,7 @@ constexpr std::uint64_t kRoom = 2000;
 class BlackBox : public tests::SceneFile {
  protected:
   [[nodiscard]] std::filesystem::path file() const { return folder_ / "fault.csv"; }
-  // The path that the file is; x is the number of the tick.
+  // The written file as a path; x is the tick number.
   [[nodiscard]] device::Trajectory kept() const { return device::read_trajectory({.file = file()}); }
 };
 
@@ -39,7 +39,7 @@ BlackBoxRow row(std::uint64_t tick) {
 }
 
 TEST_F(BlackBox, WithoutAFaultThereIsNoFile) {
-  KeptBox kept(kRate_hz, file());
+  BlackBoxFile kept(kRate_hz, file());
   for (std::uint64_t tick = 0; tick < 3 * kRoom; ++tick) kept.box().add(row(tick));
   EXPECT_EQ(kept.save_on_fault(), "");
   EXPECT_FALSE(std::filesystem::exists(file()));
@@ -47,10 +47,10 @@ TEST_F(BlackBox, WithoutAFaultThereIsNoFile) {
 
 TEST_F(BlackBox, KeepsWhatLedToAFaultAndWhatCameOfIt) {
   constexpr std::uint64_t at = 5432;
-  KeptBox kept_box(kRate_hz, file());
+  BlackBoxFile kept_box(kRate_hz, file());
   for (std::uint64_t tick = 0; tick < 10'000; ++tick) {
     BlackBoxRow next = row(tick);
-    if (tick >= at && tick % 7 == at % 7) next.said = DeviceFault::late;
+    if (tick >= at && tick % 7 == at % 7) next.reported = DeviceFault::late;
     kept_box.box().add(next);
   }
   EXPECT_NE(kept_box.save_on_fault().find("'late' at 5.432 s"), std::string::npos)
@@ -65,10 +65,10 @@ TEST_F(BlackBox, KeepsWhatLedToAFaultAndWhatCameOfIt) {
 }
 
 TEST_F(BlackBox, OfAShortSessionAllIsKept) {
-  KeptBox kept_box(kRate_hz, file());
+  BlackBoxFile kept_box(kRate_hz, file());
   for (std::uint64_t tick = 0; tick < 100; ++tick) {
     BlackBoxRow next = row(tick);
-    if (tick == 99) next.said = DeviceFault::lost;
+    if (tick == 99) next.reported = DeviceFault::lost;
     kept_box.box().add(next);
   }
   EXPECT_NE(kept_box.save_on_fault().find("'lost' at 0.099 s"), std::string::npos);
@@ -86,17 +86,17 @@ TEST_F(BlackBox, SaysEachKindOfFaultAndTheFirstOfThem) {
     return box.fault().value_or("");
   };
   EXPECT_NE(said([](BlackBoxRow& r) { r.nonfinite = 1; }).find("a number that is none"), std::string::npos);
-  EXPECT_NE(said([](BlackBoxRow& r) { r.said = DeviceFault::warm_motors; }).find("'warm_motors'"),
+  EXPECT_NE(said([](BlackBoxRow& r) { r.reported = DeviceFault::warm_motors; }).find("'warm_motors'"),
             std::string::npos);
   EXPECT_NE(said([](BlackBoxRow& r) { r.faults |= hybrid::fault_infeasible; }).find("no room"),
             std::string::npos);
 }
 
 TEST_F(BlackBox, APlaceThatIsNoneIsInTheFileAndTheFileIsStillAPath) {
-  KeptBox kept_box(kRate_hz, file());
+  BlackBoxFile kept_box(kRate_hz, file());
   for (std::uint64_t tick = 0; tick < 10; ++tick) {
     BlackBoxRow next = row(tick);
-    if (tick == 5) next.said_m = glm::dvec3(std::numeric_limits<double>::quiet_NaN(), 1e300, -1.0);
+    if (tick == 5) next.reported_m = glm::dvec3(std::numeric_limits<double>::quiet_NaN(), 1e300, -1.0);
     next.nonfinite = tick >= 5 ? 1 : 0;
     kept_box.box().add(next);
   }
@@ -108,14 +108,14 @@ TEST_F(BlackBox, APlaceThatIsNoneIsInTheFileAndTheFileIsStillAPath) {
 }
 
 TEST_F(BlackBox, TheLongestRowFits) {
-  KeptBox kept_box(kRate_hz, file());
+  BlackBoxFile kept_box(kRate_hz, file());
   BlackBoxRow next;
   constexpr double longest = -1.2345678901234567e-300;
   next.tick = std::numeric_limits<std::uint64_t>::max();
   next.nonfinite = next.tick;
   next.faults = next.felt.contacts = std::numeric_limits<std::uint32_t>::max();
-  next.said = DeviceFault::not_calibrated;
-  next.said_m = next.felt.device_m = next.felt.proxy_m = next.felt.force_N = glm::dvec3(longest);
+  next.reported = DeviceFault::not_calibrated;
+  next.reported_m = next.felt.device_m = next.felt.proxy_m = next.felt.force_N = glm::dvec3(longest);
   next.felt.rigid_N = next.felt.soft_N = glm::dvec3(1.2345678901234567e300);
   next.late_us = -1.2345678e-30F;
   next.felt.tick_us = longest;
@@ -130,24 +130,24 @@ TEST_F(BlackBox, TheLongestRowFits) {
 }
 
 TEST_F(BlackBox, WhatCannotBeWrittenIsSaid) {
-  KeptBox kept_box(kRate_hz, folder_ / "no such folder" / "fault.csv");
+  BlackBoxFile kept_box(kRate_hz, folder_ / "no such folder" / "fault.csv");
   BlackBoxRow next = row(0);
-  next.said = DeviceFault::lost;
+  next.reported = DeviceFault::lost;
   kept_box.box().add(next);
   EXPECT_THROW((void)kept_box.save_on_fault(), std::runtime_error);
 }
 
-// Before anything else handles it: a sanitizer's own handler would report the crash and end as it likes.
+// Removes other handlers: a sanitizer's own handler would report the crash and end the program.
 void die_of_it() {
   for (const int number : {SIGSEGV, SIGABRT}) signal(number, SIG_DFL);
 }
 
-// A child process, which dies of it.
+// A child process that crashes.
 TEST_F(BlackBox, ACrashWritesIt) {
   EXPECT_EXIT(
       {
         die_of_it();
-        KeptBox kept_box(kRate_hz, file());
+        BlackBoxFile kept_box(kRate_hz, file());
         for (std::uint64_t tick = 0; tick < kRoom + 50; ++tick) kept_box.box().add(row(tick));
         raise(SIGSEGV);
       },
@@ -156,12 +156,13 @@ TEST_F(BlackBox, ACrashWritesIt) {
   EXPECT_EQ(kept().position_m.front().x, 50.0);
 }
 
-// Motors first: what was made last acts first, and a crash of one act leaves the others.
+// Actions run in reverse order of creation (motors first), and a crash within one action does not stop the
+// others.
 TEST_F(BlackBox, ActsOnACrashGoBackwardsAndOneThatCrashesLeavesTheOthers) {
   EXPECT_EXIT(
       {
         die_of_it();
-        KeptBox kept_box(kRate_hz, file());
+        BlackBoxFile kept_box(kRate_hz, file());
         kept_box.box().add(row(7));
         const device::OnCrash second([](void* /*user*/) noexcept { raise(SIGSEGV); }, nullptr);
         raise(SIGABRT);
@@ -175,11 +176,11 @@ TEST_F(BlackBox, ASessionPutsEveryTickIntoIt) {
       "format = 1\n[[rigid]]\nname = \"plate\"\nprimitive = \"plane\"\nsize = 100\n"
       "[path]\nkind = \"press\"\nfrom = [0, 0, 20]\nto = [0, 0, -2]\n");
   hybrid::BuiltScene built = hybrid::build_scene(scene);
-  KeptBox kept_box(scene.rate_hz, file());
+  BlackBoxFile kept_box(scene.rate_hz, file());
   const hybrid::SessionResult result =
       hybrid::run_session(scene, built, {.seconds = 0.5, .progress = {}, .black_box = &kept_box.box()});
   BlackBoxRow end = row(result.ticks);
-  end.said = DeviceFault::lost;
+  end.reported = DeviceFault::lost;
   kept_box.box().add(end);
   EXPECT_NE(kept_box.save_on_fault(), "");
   const device::Trajectory path = kept();
@@ -188,12 +189,12 @@ TEST_F(BlackBox, ASessionPutsEveryTickIntoIt) {
 }
 
 TEST(KeepBox, OnlyWhatCannotBeRunAgainIsKeptUnasked) {
-  EXPECT_EQ(hybrid::keep_box({}, "folder/scene.toml", false, kRate_hz), nullptr);
-  EXPECT_NE(hybrid::keep_box("asked.csv", "scene.toml", false, kRate_hz), nullptr);
-  const auto live = hybrid::keep_box({}, "folder/scene.toml", true, kRate_hz);
+  EXPECT_EQ(hybrid::open_black_box_file({}, "folder/scene.toml", false, kRate_hz), nullptr);
+  EXPECT_NE(hybrid::open_black_box_file("asked.csv", "scene.toml", false, kRate_hz), nullptr);
+  const auto live = hybrid::open_black_box_file({}, "folder/scene.toml", true, kRate_hz);
   ASSERT_NE(live, nullptr);
   BlackBoxRow lost;
-  lost.said = DeviceFault::lost;
+  lost.reported = DeviceFault::lost;
   live->box().add(lost);
   EXPECT_NE(live->save_on_fault().find("scene-fault.csv"), std::string::npos);
   std::filesystem::remove("scene-fault.csv");

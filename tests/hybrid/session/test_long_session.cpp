@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A tool that is moved about as wildly as a hand can, for as long as one likes (HYBRID_LONG_TICKS), while
-// another thread relaxes what it pressed: all stays finite, the map stays exact, memory stays as it is, and
-// the same session on one thread is the same to the last bit.
+// A tool moves as wildly as a hand can, for HYBRID_LONG_TICKS ticks, while another thread relaxes the tissue.
+// Everything stays finite, the map stays exact, memory stays constant, and the same session on one thread is
+// equal bit by bit.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -25,15 +25,14 @@ namespace {
 using glm::dvec3;
 
 constexpr double kDt_s = 1e-3;
-constexpr std::size_t kStretches = 10;  // after each of them all is looked at
+constexpr std::size_t kStretches = 10;  // a full check follows each stretch
 
 std::size_t long_ticks() {
   const char* ticks = std::getenv("HYBRID_LONG_TICKS");
   return ticks != nullptr ? std::strtoull(ticks, nullptr, 10) : 20'000;
 }
 
-// From one random place to the next at 0.02 to 2 m/s, with a rest at every fourth and a jump at every
-// fiftieth.
+// Moves between random places at 0.02 to 2 m/s, with a rest at every fourth and a jump at every fiftieth.
 class WildHand {
  public:
   explicit WildHand(std::uint64_t seed) : random_(seed) {}
@@ -66,7 +65,7 @@ class WildHand {
   std::uint64_t left_ = 0, legs_ = 0;
 };
 
-// Of this process, without what is mapped from files (bytes).
+// Resident memory of this process without mapped files (bytes).
 std::size_t resident_bytes() {
   std::ifstream status("/proc/self/status");
   for (std::string word; status >> word;) {
@@ -78,7 +77,7 @@ std::size_t resident_bytes() {
   return 0;
 }
 
-// The map beside one that is built anew from where everything is.
+// Compares the map with one that is built from the present positions.
 void expect_exact(const hybrid::World& world, const hybrid::WorldState& state) {
   ASSERT_TRUE(state.map.validate());
   hybrid::OccupancyMap fresh(state.map.cell_m(), state.map.origin());
@@ -106,12 +105,12 @@ void expect_exact(const hybrid::World& world, const hybrid::WorldState& state) {
 }
 
 struct LongSession {
-  std::vector<std::uint64_t> hash;  // of each stretch
+  std::vector<std::uint64_t> hash;  // after each stretch
   std::size_t contact_ticks = 0, bytes = 0, bytes_after_first = 0;
   std::uint64_t results = 0;
 };
 
-// In which tick results arrived, from the session that is felt to the one that plays it again meanwhile.
+// The ticks in which results arrived, passed from the live session to the replay that runs beside it.
 struct Arrivals {
   explicit Arrivals(std::size_t ticks) : arrived(ticks, 1) {}
 
@@ -119,7 +118,7 @@ struct Arrivals {
     arrived[tick] = static_cast<std::uint8_t>(bits);
     said.store(tick + 1, std::memory_order_release);
   }
-  // False: there is no more.
+  // Returns false at the end.
   bool wait_for(std::size_t tick, std::uint64_t& bits) const {
     while (said.load(std::memory_order_acquire) <= tick) {
       if (ended.load(std::memory_order_acquire) && said.load(std::memory_order_acquire) <= tick) return false;
@@ -129,7 +128,7 @@ struct Arrivals {
     return true;
   }
 
-  std::vector<std::uint8_t> arrived;  // per tick; its memory is there from the start
+  std::vector<std::uint8_t> arrived;  // per tick; allocated at the start
   std::atomic<std::size_t> said{0};
   std::atomic<bool> ended{false};
 };
@@ -166,7 +165,7 @@ LongSession feel(std::size_t ticks, Relaxed relaxed, Arrivals& arrivals) {
   EXPECT_EQ(state.nonfinite, 0U);
   EXPECT_EQ(state.faults, 0U);
   result.results = state.async.results;
-  // Let go of, until the map's slices have been all round.
+  // Without contact, until the map's time slices have gone once round.
   for (int n = 0; n < 3000; ++n) {
     if (plays) state.async.arrived = 0;
     touch.at({0, 0, 0.2});
@@ -175,7 +174,7 @@ LongSession feel(std::size_t ticks, Relaxed relaxed, Arrivals& arrivals) {
   return result;
 }
 
-// Both at once: the one on a single thread is some ticks behind. Memory is that of both.
+// Both run at once; the single-thread session is some ticks behind. The memory is that of both.
 TEST(LongSession, IsFiniteExactFlatAndTheSameOnOneThread) {
   const std::size_t ticks = long_ticks();
   Arrivals arrivals(ticks);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Scenes whose soft object keeps its contact on a composite grid: which those are, and what graphics see.
+// Scenes whose soft object keeps its contact on nested patches: which scenes do so, and the surface that
+// graphics get.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -25,7 +26,7 @@ std::string block(const std::string& more) {
 
 class GridSession : public tests::SceneFile {
  protected:
-  // What the build says about where contacts are kept.
+  // The build's note on where contacts are kept.
   std::string note_of(const std::string& text) {
     const hybrid::BuiltScene built = hybrid::build_scene(load(text));
     for (const hybrid::BuildNote& note : built.notes) {
@@ -45,45 +46,46 @@ TEST_F(GridSession, SaysWhereContactsAreKeptAndWhy) {
   EXPECT_NE(note_of(block(wall)).find("other objects"), std::string::npos);
 }
 
-// A window is given nodes of boxes and finds the surface by them: where the object itself says that it is.
+// The window gets the nodes of the patches; the surface computed from them must be where the object itself
+// has it.
 TEST_F(GridSession, TheWindowShowsTheDent) {
   const hybrid::Scene scene = load(block("spacing = 1\nposition = [5, 3, -2]\nrotation = [0, 0, 30]\n"));
   const double top = 0.032 - 0.002 + 0.008;
   tests::Touch touch(scene, {0.005, 0.003, top + 0.005}, true);
-  ASSERT_TRUE(touch.state().soft[0]->uses_grid());
+  ASSERT_TRUE(touch.state().soft[0]->uses_patches());
   touch.go({0.005, 0.003, top - 0.003}, 2e-4, 20);
   const hybrid::DrawnScene drawn = hybrid::drawn_scene(scene, touch.built, "block");
   const auto shown = [&] {
     hybrid::Snapshot snapshot, live;
     hybrid::fill_moved_near(touch.world(), touch.state(), snapshot);
-    hybrid::show_live(drawn, snapshot, {}, live);
+    hybrid::merge_live_surface(drawn, snapshot, {}, live);
     return live.soft_moved_m[0];
   };
   const auto pressed = shown();
   hybrid::Snapshot right;
   hybrid::fill_moved(touch.world(), touch.state(), right);
   ASSERT_EQ(pressed.size(), right.soft_moved_m[0].size());
-  float deepest = 0.0F, apart = 0.0F;
+  float deepest = 0.0F, tolerance = 0.0F;
   for (std::size_t v = 0; v < pressed.size(); ++v) {
     deepest = std::max(deepest, -pressed[v].z);
-    apart = std::max(apart, glm::distance(pressed[v], right.soft_moved_m[0][v]));
+    tolerance = std::max(tolerance, glm::distance(pressed[v], right.soft_moved_m[0][v]));
   }
   EXPECT_GT(deepest, 2e-3F);
-  EXPECT_LT(apart, 1e-3F * deepest);
+  EXPECT_LT(tolerance, 1e-3F * deepest);
   touch.go({0.005, 0.003, top + 0.02}, 1e-3, 5);
   for (const glm::vec3& moved : shown()) ASSERT_EQ(moved, glm::vec3(0.0F));
 }
 
-// A chain that is tight nearly from side to side: felt as it will be at rest, in objects that one box holds
-// and in those that it does not. (Link by link such a chain stalls: a block of 58^3 was felt 20 JND too
-// hard.) A ball between voxels is held there by them, and not pushed about: nothing moves from tick to tick.
+// A chain that is tight nearly from side to side must feel as at rest, both in objects that fit into one box
+// and in larger ones; the local relaxation of single links stalls here. The links hold a ball between voxels
+// still: nothing moves from tick to tick.
 TEST_F(GridSession, ATightChainIsFeltAsAtRest) {
   for (const int edge : {24, 38, 58}) {
     std::string text = block("spacing = 1\n");
     text.replace(text.find("[64, 64, 64]"), 12, fmt::format("[{0}, {0}, {0}]", edge));
     const double top = 0.5e-3 * edge + 0.008, depth = 0.75 * 0.1e-3 * (edge - 1);
     tests::Touch touch(load(text), {0.0, 0.0, top + 0.003}, true);
-    ASSERT_TRUE(touch.state().soft[0]->uses_grid());
+    ASSERT_TRUE(touch.state().soft[0]->uses_patches());
     const double felt_N = touch.go({0.0, 0.0, top - depth}, 2e-5, 100).force_N.z;
     const auto equilibrium = hybrid::equilibrium_force(touch.world(), touch.state());
     ASSERT_TRUE(equilibrium) << edge;
@@ -99,7 +101,7 @@ TEST_F(GridSession, ATightChainIsFeltAsAtRest) {
   }
 }
 
-// Four millimetres of skin on fat on muscle, 64 mm an edge, of these stiffnesses (Pa).
+// Four millimetres of skin on fat on muscle, 64 mm an edge, with the given stiffnesses (Pa).
 std::string layers(const std::array<int, 3>& young, const char* play) {
   std::string text;
   for (const auto& [name, young_Pa] : {std::pair{"skin", young[0]}, {"fat", young[1]}, {"muscle", young[2]}})
@@ -113,9 +115,8 @@ std::string layers(const std::array<int, 3>& young, const char* play) {
   return text;
 }
 
-// Skin, fat and muscle with a tight chain, in which the fat is squeezed to its limits between the others:
-// felt as it will be at rest, while the tool moves too. (Link by link: 10 JND off at 20 mm/s, where skin is
-// 31 times as stiff as fat 22.)
+// Skin, fat and muscle with a tight chain. The fat is squeezed to its limits between the others. It must feel
+// as at rest, also while the tool moves.
 TEST_F(GridSession, LayersWithATightChainAreFeltAsAtRest) {
   constexpr std::array alike{20000, 5000, 10000}, real{100000, 3250, 11100};  // (Pa)
   for (const auto& [young, play] : {std::pair{alike, "[0.9, 1.1]\nshear = 0.1"},
@@ -125,7 +126,7 @@ TEST_F(GridSession, LayersWithATightChainAreFeltAsAtRest) {
     const std::string text = layers(young, play);
     const double top = 0.032 + 0.008;
     tests::Touch touch(load(text), {0.0, 0.0, top + 0.001}, true);
-    ASSERT_TRUE(touch.state().soft[0]->uses_grid());
+    ASSERT_TRUE(touch.state().soft[0]->uses_patches());
     for (const double depth : {2e-3, 4e-3, 1.5e-3}) {
       for (const double step : {1e-4, 2e-5}) {
         touch.go({0.0, 0.0, top - depth}, step, 0);
@@ -141,8 +142,8 @@ TEST_F(GridSession, LayersWithATightChainAreFeltAsAtRest) {
   }
 }
 
-// A ball of nine spacings, pressed five deep where no limit is in the way, at 0.1 m/s: what it feels is what
-// it will at rest. (Link by link: 8 JND off.)
+// A ball of nine spacings, pressed five spacings deep with no limit active, at 0.1 m/s: the force must be
+// that at rest.
 TEST_F(GridSession, AWideToolIsFeltAsAtRest) {
   std::string text = block("spacing = 1\n");
   const auto put = [&](const std::string& what, const std::string& with) {
@@ -152,26 +153,25 @@ TEST_F(GridSession, AWideToolIsFeltAsAtRest) {
   put("radius = 8", "radius = 9");
   const double top = 0.032 + 0.009;
   tests::Touch touch(load(text), {0.0, 0.0, top + 0.002}, true);
-  ASSERT_TRUE(touch.state().soft[0]->uses_grid());
+  ASSERT_TRUE(touch.state().soft[0]->uses_patches());
   const double felt_N = touch.go({0.0, 0.0, top - 5e-3}, 1e-4, 0).force_N.z;
   const auto at_rest = hybrid::equilibrium_force(touch.world(), touch.state());
   ASSERT_TRUE(at_rest);
-  EXPECT_NEAR(felt_N, at_rest->z, 0.35 * 0.04);  // of what is just noticeable
+  EXPECT_NEAR(felt_N, at_rest->z, 0.35 * 0.04);  // share of the just noticeable difference
 }
 
-// A ball of two and a half spacings, four of them deep: felt as the same links are where they are relaxed one
-// by one, within wide limits and at them, and it holds still. (What is pressed aside by little was not held
-// aside at first: the ball's voxels went along x and y in turns, by 5 % of a spacing and 1.5 % of the force.)
+// A ball of two and a half spacings, four spacings deep. With wide limits and at the limits it must feel like
+// the same links relaxed one by one, and it must not oscillate.
 TEST_F(GridSession, ASmallBallFeelsWhatLinksDoAndHoldsStill) {
   const std::string wall =
       "[[rigid]]\nname = \"wall\"\nprimitive = \"box\"\nsize = [10, 90, 90]\nposition = [45, 0, 0]\n";
   struct Row {
     const char* limits;
-    double apart, still;  // of the force
+    double tolerance, still;  // shares of the force
   };
-  // (At limits what these press a voxel with is not known, and it goes aside and back, a fiftieth of a
-  // spacing.)
-  for (const auto& [limits, apart, still] :
+  // At limits the force of the links on a voxel is not known, and the voxel swings sideways by a fiftieth of
+  // a spacing.
+  for (const auto& [limits, tolerance, still] :
        {Row{"[0.01, 2.5]\nshear = 2", 0.01, 1e-3}, Row{"[0.5, 1.5]\nshear = 0.5", 0.025, 0.01}}) {
     std::string text = block("spacing = 2\n");
     const auto put = [&](const std::string& what, const std::string& with) {
@@ -185,26 +185,26 @@ TEST_F(GridSession, ASmallBallFeelsWhatLinksDoAndHoldsStill) {
         std::array<glm::dvec3, 2> felt_N{};
         for (const bool by_links : {false, true}) {
           tests::Touch touch(load(by_links ? text + wall : text), {x_m, x_m, 0.021}, true);
-          ASSERT_EQ(touch.state().soft[0]->uses_grid(), !by_links);
+          ASSERT_EQ(touch.state().soft[0]->uses_patches(), !by_links);
           const glm::dvec3 end(x_m, x_m, 0.02 - depth_m);
           felt_N[by_links ? 1 : 0] = touch.go(end, 2e-5, 1000).force_N;
           if (by_links) continue;
-          double apart_N = 0.0;
+          double difference_N = 0.0;
           touch.go(end, 2e-5, 50, [&](const hybrid::TickResult& felt) {
-            apart_N = std::max(apart_N, glm::distance(felt.force_N, felt_N[0]));
+            difference_N = std::max(difference_N, glm::distance(felt.force_N, felt_N[0]));
           });
-          EXPECT_LE(apart_N, still * felt_N[0].z);
+          EXPECT_LE(difference_N, still * felt_N[0].z);
         }
         std::printf("x = y = %.1f mm, %.0f mm deep: %.5f N, link by link %.5f N\n", 1e3 * x_m, 1e3 * depth_m,
                     felt_N[0].z, felt_N[1].z);
-        EXPECT_NEAR(felt_N[0].z, felt_N[1].z, apart * felt_N[1].z);
+        EXPECT_NEAR(felt_N[0].z, felt_N[1].z, tolerance * felt_N[1].z);
       }
     }
   }
 }
 
-// What is far away comes along at once, inwards and outwards: a tick after a step of a tenth of a spacing, by
-// which the force changes by an eighth, it is where it will be at rest.
+// Distant tissue must follow at once, inwards and outwards. One tick after a step of a tenth of a spacing,
+// which changes the force by an eighth, the force must be that at rest.
 TEST_F(GridSession, ATickAfterAStepTheForceIsThatAtRest) {
   const hybrid::Scene scene = load(block("spacing = 1\n"));
   for (const double step_m : {-1e-4, 1e-4}) {
@@ -219,8 +219,8 @@ TEST_F(GridSession, ATickAfterAStepTheForceIsThatAtRest) {
   }
 }
 
-// Round a closed path, slowly or not, tissue without friction gives the hand nothing: down and up; down,
-// aside, up and back; and the other way round, from where tissue is 1 % softer to where it is stiffer.
+// Round a closed path, slow or fast, frictionless tissue gives the hand no energy: down and up; down, aside,
+// up and back; and in reverse, from tissue that is 1 % softer to stiffer tissue.
 TEST_F(GridSession, AClosedPathGivesTheHandNoEnergy) {
   const glm::dvec3 above(0.0, 0.0, 0.043), deep(0.0, 0.0, 0.037), aside(0.005, 0.0, 0.0);
   const std::vector<std::vector<glm::dvec3>> paths{
@@ -229,7 +229,7 @@ TEST_F(GridSession, AClosedPathGivesTheHandNoEnergy) {
   for (const auto& path : paths) {
     for (const double step_m : {2e-5, 1e-4, 5e-4}) {
       tests::Touch touch(scene, above, true);
-      ASSERT_TRUE(touch.state().soft[0]->uses_grid());
+      ASSERT_TRUE(touch.state().soft[0]->uses_patches());
       double gained_J = 0.0, given_J = 0.0;
       glm::dvec3 last_m = above, last_N(0.0);
       const auto account = [&](const hybrid::TickResult& felt) {
@@ -248,13 +248,13 @@ TEST_F(GridSession, AClosedPathGivesTheHandNoEnergy) {
   }
 }
 
-// Over fat that skin squeezes to its limits a tool slides without a step in its force: from tick to tick that
-// changes by no more than where it is pressed in as quickly.
+// Over fat that skin squeezes to its limits a tool slides without a step in its force. From tick to tick the
+// force changes by no more than during pressing at the same speed.
 TEST_F(GridSession, ATightChainOfLayersIsSmoothToSlideOn) {
   for (const auto& young : {std::array{20000, 5000, 10000}, {100000, 3250, 11100}}) {
     const glm::dvec3 above(0.0, 0.0, 0.041), deep(0.0, 0.0, 0.036), aside(0.005, 0.0, 0.0);
     tests::Touch touch(load(layers(young, "[0.9, 1.1]\nshear = 0.1")), above, true);
-    ASSERT_TRUE(touch.state().soft[0]->uses_grid());
+    ASSERT_TRUE(touch.state().soft[0]->uses_patches());
     glm::dvec3 last_N(0.0);
     const auto most_of = [&](const glm::dvec3& to) {
       double most_N = 0.0;

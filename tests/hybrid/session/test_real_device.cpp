@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Sessions on a real device, played by the double of its driver's library.
+// Sessions on a real device, simulated by the test double of its driver's library.
 #include "hybrid/session/real_device.h"
 
 #include <gmock/gmock.h>
@@ -21,8 +21,8 @@ using testing::HasSubstr;
 
 class RealDevice : public tests::SceneFile {
  protected:
-  // A ball of 20 mm under the hand, which goes 20 mm up and down about a place 38 mm above the scene's
-  // middle.
+  // A ball of 20 mm under the hand. The hand moves 20 mm up and down about a point 38 mm above the scene's
+  // centre.
   RealDevice() {
     rig_.hd->y_mm = 38;
     rig_.hd->swing_mm = 20;
@@ -73,8 +73,8 @@ TEST_F(RealDevice, ABallIsFeltThroughIt) {
   EXPECT_EQ(played.scene.opened_limits->max_force_N, 3.3);
   EXPECT_THAT(played.placed, HasSubstr("at scale 1"));
   EXPECT_EQ(rig_.hd->misuse, 0U);
-  // Once all ramps are over: K times the depth under the ball's top, along the device's y, no more than it
-  // bears.
+  // After all ramps: K times the depth under the ball's top, along the device's y, at most the device's force
+  // limit.
   double most = 0.0;
   for (std::size_t i = 1000; i + 1 < rig_.hd->forces.size(); ++i) {
     const double y_mm = 38.0 + 20.0 * std::sin(2.0 * M_PI * 1e-3 * static_cast<double>(i));
@@ -102,10 +102,10 @@ TEST_F(RealDevice, ASessionThatLosesItIsKeptAndPlaysAgain) {
   EXPECT_EQ(rig_.at_tick_N(1750), 0.0);
 
   const auto again = hybrid::replay(recording(played), {});
-  EXPECT_TRUE(again.equal) << "parts at tick " << again.parts_at;
+  EXPECT_TRUE(again.equal) << "parts at tick " << again.first_difference;
 }
 
-// Faults of the device are inputs as positions are.
+// Faults of the device are recorded inputs like positions.
 TEST_F(RealDevice, ASessionWithWarmMotorsPlaysAgain) {
   rig_.hd->error = 0x200;
   rig_.hd->error_at = 700;
@@ -117,7 +117,7 @@ TEST_F(RealDevice, ASessionWithWarmMotorsPlaysAgain) {
   EXPECT_EQ(played.result.recording[705].fault, device::DeviceFault::warm_motors);
   EXPECT_THAT(tests::all(played.result.device_messages), HasSubstr("HD_WARM_MOTORS"));
   const auto again = hybrid::replay(recording(played), {});
-  EXPECT_TRUE(again.equal) << "parts at tick " << again.parts_at;
+  EXPECT_TRUE(again.equal) << "parts at tick " << again.first_difference;
 }
 
 TEST_F(RealDevice, WithoutItTheSceneSaysWhatToDo) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A session on file replays bit for bit, and a file that is not what it was is refused or found out.
+// A recorded session replays bit for bit; a damaged file is refused or detected.
 #include "hybrid/session/recording.h"
 #include "hybrid/tick/tissue/async_relaxation.h"
 
@@ -30,35 +30,35 @@ std::string read(const std::filesystem::path& file) {
 }
 
 Recording recording_of(const std::filesystem::path& file, const hybrid::Scene& scene,
-                       const hybrid::SessionResult& result, bool apart) {
+                       const hybrid::SessionResult& result, bool asynchronous) {
   return {.scene_file = file,
           .scene_text = read(file),
           .dt_s = result.dt_s,
           .device = hybrid::scene_limits(scene),
-          .async_relaxation = apart,
+          .async_relaxation = asynchronous,
           .state_hash = result.state_hash,
           .start_m = result.start_m,
           .ticks = result.recording};
 }
 
-Recording record(const std::filesystem::path& file, std::optional<double> seconds, bool apart = false,
+Recording record(const std::filesystem::path& file, std::optional<double> seconds, bool asynchronous = false,
                  bool realtime = false) {
   const hybrid::Scene scene = hybrid::load_scene(file);
   hybrid::BuiltScene built = hybrid::build_scene(scene);
   hybrid::SessionOptions options;
   options.seconds = seconds;
   options.keep_rows = false;
-  options.async_relaxation = apart;
+  options.async_relaxation = asynchronous;
   options.realtime = realtime;
   const hybrid::SessionResult result = hybrid::run_session(scene, built, options);
   EXPECT_GT(result.contact_ticks, 50U);
-  EXPECT_GE(result.relaxed_apart, apart ? 10U : 0U);
-  return recording_of(file, scene, result, apart);
+  EXPECT_GE(result.async_results, asynchronous ? 10U : 0U);
+  return recording_of(file, scene, result, asynchronous);
 }
 
 class RecordingFile : public tests::SceneFile {
  protected:
-  // A small scene that is quick to run: tissue and something rigid on it.
+  // A small scene that runs quickly: tissue with a rigid object on it.
   std::filesystem::path small_scene() const {
     return write("small.toml",
                  "format = 1\n" + tests::block +
@@ -95,7 +95,7 @@ TEST_P(ShippedScene, RunSavedLoadedAndReplayedIsTheSameToTheBit) {
   ASSERT_EQ(loaded.ticks.size(), recorded.ticks.size());
   EXPECT_EQ(loaded.scene_file, file);
   const hybrid::ReplayResult result = hybrid::replay(loaded, {});
-  EXPECT_TRUE(result.equal) << "parts at tick " << result.parts_at;
+  EXPECT_TRUE(result.equal) << "parts at tick " << result.first_difference;
   EXPECT_EQ(result.ticks, recorded.ticks.size());
   EXPECT_EQ(result.state_hash, recorded.state_hash);
 }
@@ -109,7 +109,7 @@ INSTANTIATE_TEST_SUITE_P(Replays, ShippedScene,
                            return name;
                          });
 
-// Which results of the relaxation thread a tick found is the machine's doing, and on record.
+// The arrival of the relaxation thread's results depends on the machine, and is recorded.
 TEST_F(RecordingFile, WithTheRelaxationThreadItIsTheSameToTheBit) {
   for (const bool realtime : {true, false}) {
     const Recording recorded = record(small_scene(), std::nullopt, true, realtime);
@@ -117,13 +117,14 @@ TEST_F(RecordingFile, WithTheRelaxationThreadItIsTheSameToTheBit) {
     const Recording loaded = hybrid::load_recording(folder_ / "a.rec");
     EXPECT_TRUE(loaded.async_relaxation);
     const hybrid::ReplayResult result = hybrid::replay(loaded, {});
-    EXPECT_TRUE(result.equal) << "parts at tick " << result.parts_at << (realtime ? ", in real time" : "");
+    EXPECT_TRUE(result.equal) << "parts at tick " << result.first_difference
+                              << (realtime ? ", in real time" : "");
     EXPECT_EQ(result.state_hash, recorded.state_hash);
   }
 }
 
-// A device that moves on between the beginning of a session and its first tick, as one does whose first tick
-// comes late.
+// A device that moves between the start of a session and its first tick, as happens if the first tick is
+// late.
 class MovesOn final : public device::HapticDevice {
  public:
   explicit MovesOn(std::shared_ptr<const device::Path> path) : path_(std::move(path)) {}
@@ -154,10 +155,10 @@ TEST_F(RecordingFile, AFirstTickThatComesLateIsNoMatter) {
   EXPECT_NE(result.start_m, result.recording.front().device_m);
   hybrid::save_recording(folder_ / "a.rec", recording_of(file, scene, result, true));
   const hybrid::ReplayResult again = hybrid::replay(hybrid::load_recording(folder_ / "a.rec"), {});
-  EXPECT_TRUE(again.equal) << "parts at tick " << again.parts_at;
+  EXPECT_TRUE(again.equal) << "parts at tick " << again.first_difference;
 }
 
-// So is how much of its work a tick had, which in real time follows the machine.
+// The work share of each tick, which in real time depends on the machine, is recorded too.
 TEST_F(RecordingFile, TheShareOfWorkThatTicksHadIsOnRecord) {
   Recording recorded = record(tests::source_folder / "scenes" / "tissue.toml", std::nullopt, true);
   const hybrid::Scene scene = hybrid::load_scene(recorded.scene_file);
@@ -166,11 +167,11 @@ TEST_F(RecordingFile, TheShareOfWorkThatTicksHadIsOnRecord) {
   hybrid::start_async_relaxation(*built.state, hybrid::Arrival::recorded);
   std::uint64_t hash = hybrid::kHashBegin;
   {
-    const hybrid::FlushedDenormals flushed;
+    const hybrid::ScopedFlushToZero flushed;
     for (std::size_t n = 0; n < recorded.ticks.size(); ++n) {
       hybrid::RecordedTick& tick = recorded.ticks[n];
       tick.work_share = static_cast<std::uint8_t>(n / 40 % (hybrid::WorkShare::kMostSteps + 1));
-      hybrid::play_again(tick, *built.state);
+      hybrid::restore_tick_timing(tick, *built.state);
       hash = hybrid::hash_tick(hash, hybrid::haptic_tick(*built.world, *built.state,
                                                          {.position_m = tick.device_m}, recorded.dt_s));
       tick.hash = hash;
@@ -180,7 +181,7 @@ TEST_F(RecordingFile, TheShareOfWorkThatTicksHadIsOnRecord) {
   hybrid::save_recording(folder_ / "a.rec", recorded);
   const Recording loaded = hybrid::load_recording(folder_ / "a.rec");
   const hybrid::ReplayResult result = hybrid::replay(loaded, {});
-  EXPECT_TRUE(result.equal) << "parts at tick " << result.parts_at;
+  EXPECT_TRUE(result.equal) << "parts at tick " << result.first_difference;
   EXPECT_EQ(result.state_hash, recorded.state_hash);
   for (hybrid::RecordedTick& tick : recorded.ticks) tick.work_share = 0;
   EXPECT_FALSE(hybrid::replay(recorded, {}).equal);
@@ -189,16 +190,16 @@ TEST_F(RecordingFile, TheShareOfWorkThatTicksHadIsOnRecord) {
 TEST(WorkShare, FollowsWhatTicksTake) {
   hybrid::WorkShare share(1e-3);
   const auto felt = [&share](int ticks, double tick_us, bool pressed) {
-    for (int n = 0; n < ticks; ++n) share.felt(tick_us, pressed);
+    for (int n = 0; n < ticks; ++n) share.observe(tick_us, pressed);
     return static_cast<int>(share.steps());
   };
   EXPECT_EQ(felt(1000, 390.0, true), 0);
-  // Late: less at once, the sooner the later it was, and no less than a third.
+  // After a late tick the share falls at once, further the later the tick, but not below a third.
   EXPECT_EQ(felt(1, 450.0, true), 1);
   EXPECT_EQ(felt(1, 800.0, true), 3);
   EXPECT_EQ(felt(100, 5000.0, true), hybrid::WorkShare::kMostSteps);
   EXPECT_NEAR(hybrid::WorkShare::share(share.steps()), 0.354, 1e-3);
-  // More again slowly, only where tissue is pressed, and only where there is room for it.
+  // The share rises slowly, only while tissue is pressed and only if time allows.
   EXPECT_EQ(felt(10'000, 30.0, false), hybrid::WorkShare::kMostSteps);
   EXPECT_EQ(felt(10'000, 350.0, true), hybrid::WorkShare::kMostSteps);
   EXPECT_EQ(felt(59, 250.0, true), hybrid::WorkShare::kMostSteps);
@@ -206,7 +207,8 @@ TEST(WorkShare, FollowsWhatTicksTake) {
   EXPECT_EQ(felt(2000, 250.0, true), 0);
 }
 
-// A machine whose ticks take as long as their work does not go to and fro: what ticks take is in between.
+// On a machine whose ticks take as long as their work, the share does not oscillate: tick times stay in
+// between.
 TEST(WorkShare, ComesToRestOnAMachineOfAnySpeed) {
   for (const double slow : {0.5, 1.0, 2.0, 2.5}) {
     hybrid::WorkShare share(1e-3);
@@ -214,14 +216,14 @@ TEST(WorkShare, ComesToRestOnAMachineOfAnySpeed) {
     for (int n = 0; n < 20'000; ++n) {
       const double tick_us = slow * (100.0 + 250.0 * hybrid::WorkShare::share(share.steps()));
       if (tick_us > 500.0) ++late;
-      share.felt(tick_us, true);
+      share.observe(tick_us, true);
     }
     EXPECT_LE(late, 5) << slow;
   }
 }
 
-// All that goes from tick to tick besides tissue: a body on a path and one that is pushed, friction, shading,
-// damping and a relief, on meshes and primitives.
+// All state besides tissue: a body on a path and a free body, friction, shading, damping and a relief, on
+// meshes and primitives.
 TEST_F(RecordingFile, WithMotionAndSurfaceFeelItIsTheSameToTheBit) {
   polygon::save_ply(folder_ / "ball.ply", polygon::make_ball_mesh(0.02, 3));
   const std::string feel =
@@ -240,7 +242,7 @@ TEST_F(RecordingFile, WithMotionAndSurfaceFeelItIsTheSameToTheBit) {
                 "20], [45, 3, 20]]\n");
   const Recording a = record(file, std::nullopt);
   const hybrid::ReplayResult again = hybrid::replay(a, {});
-  EXPECT_TRUE(again.equal) << "parts at tick " << again.parts_at;
+  EXPECT_TRUE(again.equal) << "parts at tick " << again.first_difference;
   EXPECT_EQ(again.state_hash, a.state_hash);
   const hybrid::Scene scene = hybrid::load_scene(file);
   hybrid::BuiltScene built = hybrid::build_scene(scene);
@@ -250,7 +252,7 @@ TEST_F(RecordingFile, WithMotionAndSurfaceFeelItIsTheSameToTheBit) {
   EXPECT_GT(result.object_contact_ticks[1], 50U) << "the puck is pushed";
   EXPECT_GT(built.state->rigid[1].pose.position_m.x, 0.041);
   EXPECT_EQ(built.state->faults, 0U);
-  // Where the bodies are is part of the state.
+  // The bodies' state is part of the hash.
   built.state->rigid[1].free.velocity_m_per_s.x += 1e-15;
   EXPECT_NE(hybrid::hash_state(0, *built.state), hybrid::hash_state(0, *hybrid::build_scene(scene).state));
   const std::uint64_t before = hybrid::hash_state(0, *built.state);
@@ -258,7 +260,8 @@ TEST_F(RecordingFile, WithMotionAndSurfaceFeelItIsTheSameToTheBit) {
   EXPECT_NE(hybrid::hash_state(0, *built.state), before);
 }
 
-// A wall far beyond what the loop can hold, with everything that the limits and the controller remember.
+// A wall far stiffer than the loop can keep stable, with all memory of the limits and of the passivity
+// controller.
 TEST_F(RecordingFile, WithPassivityControlDelayAndLateTicksItIsTheSameToTheBit) {
   const auto file =
       write("wall.toml",
@@ -271,7 +274,7 @@ TEST_F(RecordingFile, WithPassivityControlDelayAndLateTicksItIsTheSameToTheBit) 
   hybrid::SessionOptions options;
   const hybrid::SessionResult result = hybrid::run_session(scene, built, options);
   EXPECT_GT(built.state->passive.acted, 10U);
-  // What went out, counted from the trace: no more than one tick's worst, and 0.1 µJ.
+  // Energy given out, computed from the trace: at most the largest work of one tick, plus 0.1 µJ.
   double given_J = 0.0, worst_J = 0.0;
   for (std::size_t n = 1; n < result.rows.size(); ++n) {
     const double work =
@@ -282,7 +285,7 @@ TEST_F(RecordingFile, WithPassivityControlDelayAndLateTicksItIsTheSameToTheBit) 
   }
   EXPECT_TRUE(hybrid::replay(record(file, std::nullopt), {}).equal);
 
-  // Ticks that came late, and a device that was gone for a while, are inputs.
+  // Late ticks and a lost device are recorded inputs.
   Recording faulty = record(file, std::nullopt);
   hybrid::BuiltScene again = hybrid::build_scene(scene);
   hybrid::begin_session(scene, *again.world, *again.state, faulty.start_m);
@@ -326,7 +329,7 @@ TEST_F(RecordingFile, AFlippedBitOfAnInputIsNoticedAtItsTick) {
         static_cast<char>(flipped[first + kTickBytes * tick + 16 + 5] ^ 0x10);  // z: a few micrometers
     const auto result = hybrid::replay(hybrid::load_recording(write("b.rec", flipped)), {});
     EXPECT_FALSE(result.equal);
-    EXPECT_EQ(result.parts_at, tick);
+    EXPECT_EQ(result.first_difference, tick);
   }
 }
 
@@ -335,7 +338,7 @@ TEST_F(RecordingFile, AStateThatEndsElsewhereIsNoticedAtTheEnd) {
   recorded.state_hash ^= 1;
   const auto result = hybrid::replay(recorded, {});
   EXPECT_FALSE(result.equal);
-  EXPECT_EQ(result.parts_at, recorded.ticks.size());
+  EXPECT_EQ(result.first_difference, recorded.ticks.size());
 }
 
 TEST_F(RecordingFile, ASceneThatHasChangedSinceIsRefused) {
@@ -361,7 +364,7 @@ TEST_F(RecordingFile, TruncatedAndGarbageFilesAreRefusedInWords) {
   EXPECT_NE(refusal_of(std::string(1000, '\0')), "");
   EXPECT_THROW((void)hybrid::load_recording(folder_ / "missing.rec"), std::runtime_error);
   EXPECT_THROW((void)hybrid::load_recording(folder_), std::runtime_error);
-  // Counts that no file could hold are no reason to ask for the memory.
+  // Impossible counts must not lead to an allocation.
   for (const std::size_t field : {std::size_t{8}, std::size_t{16}, std::size_t{24}}) {
     for (const std::uint64_t value :
          {std::uint64_t{1} << 63, ~std::uint64_t{0}, std::uint64_t{1} << 59, std::uint64_t{1'000'000'000}}) {
@@ -370,7 +373,7 @@ TEST_F(RecordingFile, TruncatedAndGarbageFilesAreRefusedInWords) {
       EXPECT_NE(refusal_of(wrong), "") << "field at " << field << " = " << value;
     }
   }
-  // A time step that is none.
+  // Invalid time steps.
   for (const double dt : {0.0, -1e-3, std::nan(""), HUGE_VAL}) {
     std::string wrong = bytes;
     std::memcpy(wrong.data() + 32, &dt, sizeof dt);

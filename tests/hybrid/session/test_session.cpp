@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Whole sessions: what a hand that presses tissue and lets go must feel, and what a broken input must not do.
+// Whole sessions: the force of pressing and releasing tissue, and safe handling of broken input.
 #include "hybrid/session/session.h"
 
 #include <gtest/gtest.h>
@@ -22,7 +22,7 @@ hybrid::Scene cube(device::DeviceModel model) {
   return scene;
 }
 
-constexpr double kTouched = 0.028;  // the ball of 8 mm on the top at 20 mm
+constexpr double kTouched = 0.028;  // the ball of 8 mm touches the top at 20 mm
 
 TEST(CubeSession, NothingIsFeltBeforeContact) {
   for (const auto model : {device::DeviceModel::ideal, device::DeviceModel::premium_1_5}) {
@@ -68,7 +68,7 @@ TEST(CubeSession, TwoSecondsAfterItsReleaseItIsAtRestAgain) {
     }
     return static_cast<double>(most);
   };
-  // The path lets go at 1.09 s and is out of contact by 1.15 s.
+  // The path releases at 1.09 s and is out of contact by 1.15 s.
   const SessionResult pressed = hybrid::run_session(scene, built, {.seconds = 1.0, .progress = {}});
   const double deepest = displacement();
   ASSERT_GT(deepest, 3e-3);
@@ -164,7 +164,7 @@ TEST_F(BadInput, ThatIsFarAwayOrComesAtOddTimesStaysFinite) {
       ++n;
     }
   }
-  // And it is still a scene that can be touched.
+  // The scene can still be touched.
   for (int back = 0; back < 5000; ++back) touch.at({0, 0, 0.05});
   EXPECT_LE(glm::length(touch.at({0, 0, 0.05}).force_N), 1e-9);
   touch.go({0, 0, 4e-3}, 1e-4, 300);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Scenes from real data: bones and organs of a CT, and meshes as people publish them, good and bad.
+// Scenes from real data: bones and organs of a CT, and published meshes, good and bad.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -22,7 +22,6 @@ using hybrid::TickResult;
 using tests::Touch;
 
 // ---- organs and bones
-// --------------------------------------------------------------------------------------
 
 class Abdomen : public tests::SceneFile {
  protected:
@@ -40,7 +39,7 @@ class Abdomen : public tests::SceneFile {
   }
 };
 
-// The vertex of a surface furthest along a direction: nothing of the object is in front of it.
+// The vertex of a surface furthest along a direction: no part of the object is in front of it.
 dvec3 outermost(const polygon::TriangleMesh& mesh, const auto& to_scene, const dvec3& direction) {
   dvec3 best = to_scene(mesh.vertices.front());
   for (const dvec3& v : mesh.vertices) {
@@ -74,7 +73,8 @@ TEST_F(Abdomen, BonesAndOrgansOfACtAreFeltBoth) {
         ASSERT_LE(glm::length(felt.proxy_m - felt.device_m), 1e-9);
       }
     };
-    // 150 ticks towards the outermost point of each, 4 mm deep and off again, from the left and the front.
+    // 150 ticks towards the outermost point of each object, 4 mm deep and out again, from the left and from
+    // the front.
     for (const dvec3& direction : {dvec3(1, 0, 0), dvec3(0, -1, 0)}) {
       for (const dvec3& at :
            {outermost(
@@ -83,7 +83,7 @@ TEST_F(Abdomen, BonesAndOrgansOfACtAreFeltBoth) {
                 organ.drawn, [&](const dvec3& v) { return organ.to_scene(v); }, direction)}) {
         touch.go({5, 5, 5}, 10.0);
         touch.go(at + 1.0 * direction, 10.0);
-        touch.go(at + 0.02 * direction, 0.05, 40);  // in free space, however far it came
+        touch.go(at + 0.02 * direction, 0.05, 40);  // in free space, wherever the proxy is
         touch.go(at + 0.002 * direction, 4e-4, 30, look);
         touch.go(at + 0.02 * direction, 4e-4, 20, look);
       }
@@ -98,7 +98,6 @@ TEST_F(Abdomen, BonesAndOrgansOfACtAreFeltBoth) {
 }
 
 // ---- meshes
-// ------------------------------------------------------------------------------------------------
 
 class Meshes : public tests::SceneFile {
  protected:
@@ -111,8 +110,8 @@ class Meshes : public tests::SceneFile {
     return all;
   }
 
-  // The mesh as a rigid object whose longest side is 0.2 m, and 200 ticks of a stroke to its middle, from
-  // above.
+  // The mesh as a rigid object with a longest side of 0.2 m, and a stroke of 200 ticks from above to its
+  // middle.
   static void stroke(const std::filesystem::path& file) {
     const auto mesh = polygon::load_mesh(file).mesh;
     dvec3 low(1e300), high(-1e300);
@@ -138,7 +137,7 @@ class Meshes : public tests::SceneFile {
     touch.go(middle, step, 50, [&](const TickResult& felt) {
       ASSERT_TRUE(tests::finite(felt.force_N) && tests::finite(felt.proxy_m));
       ASSERT_LE(glm::length(felt.force_N), touch.world().limits.max_force_N * (1.0 + 1e-12));
-      // The proxy is where it can be nearest to the device: never further than where it started.
+      // The proxy minimises the distance to the device: it is never further than at the start.
       ASSERT_LE(glm::length(felt.proxy_m - felt.device_m), glm::length(start - middle) + 1e-3);
       if (felt.contacts == 0 && felt.proxy_m != felt.device_m) {
         ASSERT_LE(glm::length(felt.proxy_m - felt.device_m), 1e-9);
@@ -173,7 +172,7 @@ TEST_F(Meshes, ThatAreBadAreTouchedOrRefusedInWords) {
     } catch (const polygon::MeshError& error) {
       EXPECT_GT(std::string(error.what()).size(), 20U);
     }
-    // What the loader refuses the scene refuses too, and says where.
+    // A mesh that the loader refuses is refused by the scene too, with its place.
     hybrid::Scene scene;
     scene.file = "scene.toml";
     scene.rigid.push_back({.name = "mesh",

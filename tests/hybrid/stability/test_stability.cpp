@@ -189,9 +189,9 @@ TEST(Vibration, OfTwoTonesTheOneThatIsFelt) {
 
 TEST(FirstNotSo, IsTheLeastBoundaryOrNone) {
   const auto below = [](double limit) { return [limit](double x) { return x < limit; }; };
-  EXPECT_NEAR(*hybrid::first_not_so(1.0, 1e6, 2.0, 1e-4, below(777.0)), 777.0, 0.1);
-  EXPECT_EQ(hybrid::first_not_so(1.0, 1e6, 2.0, 1e-4, below(0.5)), 0.0);
-  EXPECT_EQ(hybrid::first_not_so(1.0, 1e6, 2.0, 1e-4, below(1e9)), std::nullopt);
+  EXPECT_NEAR(*hybrid::find_threshold(1.0, 1e6, 2.0, 1e-4, below(777.0)), 777.0, 0.1);
+  EXPECT_EQ(hybrid::find_threshold(1.0, 1e6, 2.0, 1e-4, below(0.5)), 0.0);
+  EXPECT_EQ(hybrid::find_threshold(1.0, 1e6, 2.0, 1e-4, below(1e9)), std::nullopt);
 }
 
 class StabilityScene : public tests::SceneFile {};

@@ -141,8 +141,8 @@ TEST(Clock, IsTheTimeAfterSoManySteps) {
   EXPECT_GT(std::abs(sum - 10'000.0), 1e-7) << "a plain sum drifts";
 }
 
-TEST(TimeSpread, IsNearTheListOfAll) {
-  hybrid::TimeSpread spread;
+TEST(LatencyHistogram, IsNearTheListOfAll) {
+  hybrid::LatencyHistogram spread;
   std::vector<double> all;
   for (int n = 1; n <= 20'000; ++n) {
     const double time_us = 0.05 * std::exp(1e-3 * ((n * 7919) % 20'000));

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Who gives way to whom: one scene for each rule, and the same four bars for all of them. (a) No voxel's ball
-// is deeper than a twentieth of a spacing in anything rigid, after any tick. (b) At rest the force on the
-// hand is what anchors and rigid surfaces carry. (c) Nothing passes through anything at 1 m/s. (d) A closed
-// path gives the hand no energy.
+// Precedence of objects in contact: one scene for each rule, and the same four bounds for all scenes. (a)
+// After every tick no voxel's ball is deeper than a twentieth of a spacing in a rigid object. (b) At rest
+// anchors and rigid surfaces carry the force on the hand. (c) Nothing passes through anything at 1 m/s. (d) A
+// closed path gives the hand no energy.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,18 +21,18 @@ namespace {
 
 using glm::dvec3;
 using hybrid::TickResult;
-using tests::ArbitrationWatch;
 using tests::coupling;
 using tests::Face;
+using tests::OverlapChecker;
 using tests::Touch;
 
-// From its first point to its last, and what may not be passed on the way.
+// A path of the tool from its first point to its last, and the faces that it must not pass.
 struct Stroke {
   std::vector<dvec3> points_mm;
-  std::vector<Face> fronts{};  // by the tool's centre
-  // Where a bar does not hold yet, what does; why stands beside it.
+  std::vector<Face> fronts{};  // tested for the tool's centre
+  // Wider bounds for the cases that do not keep the common ones; the reason stands beside each.
   double deepest = 0.05;   // spacings
-  std::size_t passed = 0;  // voxels in a solid, added up over the ticks
+  std::size_t passed = 0;  // voxels in a solid, summed over the ticks
 };
 
 struct Scenario {
@@ -41,13 +41,13 @@ struct Scenario {
   std::vector<Stroke> strokes;
   std::vector<std::vector<dvec3>> loops_mm;     // each ends where it begins
   std::vector<std::pair<Face, Face>> facing{};  // faces of soft objects that may not overlap
-  std::vector<dvec3> holds_mm{};                // where it is held too, before the path's end
-  bool apart = false;                           // is its tissue relaxed apart from the tick?
-  bool bricks = false;                          // of the trilinear energy?
-  double balance = 0.01;                        // of the force
+  std::vector<dvec3> holds_mm{};                // rest points besides the path's end
+  bool asynchronous = false;                    // relaxes tissue asynchronously
+  bool bricks = false;                          // with the trilinear energy
+  double balance = 0.01;                        // share of the force
 };
 std::string full_name(const Scenario& scenario) {
-  return std::string(scenario.name) + (scenario.apart ? "RelaxedApart" : "") +
+  return std::string(scenario.name) + (scenario.asynchronous ? "RelaxedApart" : "") +
          (scenario.bricks ? "OfBricks" : "");
 }
 
@@ -67,22 +67,22 @@ class Arbitration : public ::testing::TestWithParam<Scenario> {
     }
     return scene;
   }
-  // The corners of the scene's own path, its speed, and where it holds.
+  // The corners of the scene's own path, its speed, and its rest times.
   static device::WaypointPath path(const hybrid::Scene& scene) {
     if (const auto* press = std::get_if<device::PressPath>(&scene.path))
       return {{{press->from_m}, {press->to_m, press->hold_s}, {press->from_m, 0.1}}, press->speed_m_per_s};
     return std::get<device::WaypointPath>(scene.path);
   }
-  // How deep the surface of one soft object is in the other's, wherever two faces that may not overlap do
-  // (spacings); negative: so far apart. A surface lies half a voxel out of its voxels' centres.
+  // Largest overlap of two faces of soft objects that must not overlap (spacings); negative: their distance.
+  // A surface is half a spacing outside its voxels' centres.
   static double overlap(Touch& touch) {
     double deepest = -std::numeric_limits<double>::infinity();
     for (const auto& [a, b] : GetParam().facing) {
       const auto& first = *touch.state().soft[a.soft];
       const auto& second = *touch.state().soft[b.soft];
       const double reach = first.voxel_radius() + second.voxel_radius();
-      const double apart = tests::in_front_of(touch.world(), touch.state(), a, b);
-      deepest = std::max(deepest, (reach - apart) / first.lattice().min_spacing_m());
+      const double gap_m = tests::in_front_of(touch.world(), touch.state(), a, b);
+      deepest = std::max(deepest, (reach - gap_m) / first.lattice().min_spacing_m());
     }
     return deepest;
   }
@@ -96,14 +96,14 @@ TEST_P(Arbitration, NothingOverlapsAndAtRestForcesBalance) {
   const hybrid::Scene scene = Arbitration::scene();
   device::WaypointPath way = path(scene);
   for (const dvec3& hold : GetParam().holds_mm) way.points.insert(way.points.end() - 1, {1e-3 * hold, 0.4});
-  Touch touch(scene, way.points.front().position_m, GetParam().apart);
-  ArbitrationWatch watch(touch.world(), touch.state());
+  Touch touch(scene, way.points.front().position_m, GetParam().asynchronous);
+  OverlapChecker watch(touch.world(), touch.state());
   double soft = -1.0;
   std::uint64_t seen = 0;
   dvec3 device_before(0.0);
   const auto see = [&](const TickResult& felt) {
-    watch.see(touch.state(), felt);
-    // After every tick of motion, and now and then while it holds.
+    watch.check(touch.state(), felt);
+    // After every tick with motion, and after every eighth tick at rest.
     if (felt.device_m != device_before || seen++ % 8 == 0) soft = std::max(soft, overlap(touch));
     device_before = felt.device_m;
   };
@@ -120,19 +120,19 @@ TEST_P(Arbitration, NothingOverlapsAndAtRestForcesBalance) {
     dvec3 carried(0.0), left(0.0), tool(0.0), anchors(0.0), rigid(0.0);
     std::size_t tight = 0;
     double worst = 0.0;
-    for (const tests::Bearing& b : tests::bearings(touch.world(), touch.state())) {
+    for (const tests::Supports& b : tests::supports_of(touch.world(), touch.state())) {
       carried += b.anchors_N + b.rigid_N;
       anchors += b.anchors_N;
       rigid += b.rigid_N;
-      left += b.left_N;
+      left += b.unbalanced_N;
       tool += b.tool_N;
-      tight += b.tight;
-      worst = std::max(worst, b.worst_left_N);
+      tight += b.at_limit;
+      worst = std::max(worst, b.worst_unbalanced_N);
     }
     const dvec3 force = coupling(felt);
     if (force == dvec3(0.0)) continue;
-    // What the tissue's supports do not carry, rigid surfaces that the tool touches do.
-    const dvec3 off = tests::beyond_rigid(touch.world(), touch.state(), force + carried);
+    // Rigid surfaces that the tool touches carry the part that the tissue's supports do not carry.
+    const dvec3 off = tests::rest_beyond_rigid(touch.world(), touch.state(), force + carried);
     std::printf(
         "%s at (%g, %g, %g): %d ticks, hand (%.4f, %.4f, %.4f) N, anchors (%.4f, %.4f, %.4f), bone (%.4f, "
         "%.4f, "
@@ -161,11 +161,11 @@ TEST_P(Arbitration, NothingOverlapsAndAtRestForcesBalance) {
 
 TEST_P(Arbitration, NothingPassesThroughAnythingAtAMeterASecond) {
   for (const Stroke& stroke : GetParam().strokes) {
-    Touch touch(scene(), 1e-3 * stroke.points_mm.front(), GetParam().apart);
-    ArbitrationWatch watch(touch.world(), touch.state());
+    Touch touch(scene(), 1e-3 * stroke.points_mm.front(), GetParam().asynchronous);
+    OverlapChecker watch(touch.world(), touch.state());
     double front = 1.0, soft = -1.0, most = 0.0;
     const auto see = [&](const TickResult& felt) {
-      watch.see(touch.state(), felt);
+      watch.check(touch.state(), felt);
       most = std::max(most, glm::length(coupling(felt)));
       for (const Face& face : stroke.fronts)
         front = std::min(front, tests::in_front_of(touch.world(), touch.state(), face, felt.proxy_m));
@@ -199,9 +199,9 @@ struct Work {
   double soft_J = 0.0, rigid_J = 0.0;
 };
 
-// What the hand gains by a tick's motion. The trapezoid between two ticks is exact where forces grow evenly.
-// Where a rigid surface is met or left in between, they do not, and it would be off by as much as K·h²/8 of a
-// way h: 8 uJ at 0.25 m/s. But what a rigid surface loads the coupling with is known.
+// Energy that the hand gains in one tick. The trapezoid between two ticks is exact for forces that vary
+// linearly. Where the tool meets or leaves a rigid surface between the ticks, the trapezoid's error is up to
+// K·h²/8 for a step h: 8 uJ at 0.25 m/s. There the energy in the coupling is known, and is used instead.
 Work work_of_tick(const TickResult& before, const TickResult& now, double stiffness_N_per_m) {
   const dvec3 way = now.device_m - before.device_m;
   const double soft = 0.5 * glm::dot(before.soft_N + now.soft_N, way);
@@ -217,19 +217,19 @@ TEST_P(Arbitration, AClosedPathGivesTheHandNoEnergy) {
       for (const double speed : {0.04, 0.125, 0.25}) {
         std::vector<dvec3> points = loop;
         if (back) std::reverse(points.begin(), points.end());
-        Touch touch(scene(), 1e-3 * points.front(), GetParam().apart);
-        ArbitrationWatch watch(touch.world(), touch.state());
+        Touch touch(scene(), 1e-3 * points.front(), GetParam().asynchronous);
+        OverlapChecker watch(touch.world(), touch.state());
         double most = 0.0, soft = -1.0;
         TickResult before = touch.at(1e-3 * points.front());
         Work work;
         int felt_ticks = 0;
-        for (int round = 0; round < 2; ++round) {  // the first settles
+        for (int round = 0; round < 2; ++round) {  // the first round settles the tissue
           work = {};
           for (const dvec3& point : points) {
             touch.go(1e-3 * point, 1e-3 * speed, 0, [&](const TickResult& felt) {
-              watch.see(touch.state(), felt);
+              watch.check(touch.state(), felt);
               if (felt_ticks++ % 4 == 0)
-                soft = std::max(soft, overlap(touch));  // it takes longer than a tick
+                soft = std::max(soft, overlap(touch));  // not each tick: the check takes longer than a tick
               const Work gain = work_of_tick(before, felt, touch.world().tool.stiffness_N_per_m);
               work.soft_J += gain.soft_J, work.rigid_J += gain.rigid_J;
               before = felt;
@@ -237,10 +237,11 @@ TEST_P(Arbitration, AClosedPathGivesTheHandNoEnergy) {
             });
           }
         }
-        // Where the tool rounds an edge of bone its force turns between two ticks, and the trapezoid is off
-        // by the square of the step: 2.49, 0.65 and 0.13 uJ at 0.25, 0.125 and 0.0625 m/s round the tissue's
-        // edge (forces have kinks there: Simpson's rule gives 2.87). So at the highest speed Richardson's
-        // rule takes it off. Tissue's work depends on the speed, and counts as it is.
+        // Where the tool rounds an edge of bone the force turns between two ticks. The trapezoid's error is
+        // then proportional to the square of the step: 2.49, 0.65 and 0.13 uJ at 0.25, 0.125 and 0.0625 m/s
+        // round the tissue's edge. (Forces have kinks there: Simpson's rule gives 2.87.) So Richardson
+        // extrapolation removes the error at the highest speed. Tissue's work depends on the speed, and
+        // counts without correction.
         const double rigid_J = speed == 0.25 ? (4.0 * slower.rigid_J - work.rigid_J) / 3.0 : work.rigid_J;
         std::printf(
             "%s, loop of %zu corners at %g m/s %s: tissue %.3f uJ, rigid %.3f (%.3f by ticks); at most %.2f "
@@ -299,7 +300,7 @@ std::vector<Scenario> scenarios() {
        {{{-8, 0, 20}, {-8, 0, 13}, {8, 0, 13}, {8, 6, 13}, {-8, 6, 13}, {-8, 0, 13}, {-8, 0, 20}},
         {{-4, 0, 20}, {-4, 0, 10}, {4, 0, 10}, {4, 4, 10}, {-4, 4, 10}, {-4, 0, 10}, {-4, 0, 20}}},
        {{{0, 2, true}, {1, 2, false}}},
-       // Where the chain is tight from the tool to the other object; from z = 6 on in both.
+       // The chain is tight from the tool to the other object from z = 6 on in both objects.
        {{0, 0, 8}, {0, 0, 7}, {0, 0, 6}, {0, 0, 5}}},
       {"BetweenBoneAndTissue",
        "scenes/cleft.toml",
@@ -317,12 +318,12 @@ std::vector<Scenario> scenarios() {
   };
 }
 
-// Of bricks, what does not hold yet stands here.
+// Scenarios on bricks, with the bounds that bricks do not keep.
 Scenario of_bricks(Scenario scenario) {
-  scenario.apart = scenario.bricks = true;
+  scenario.asynchronous = scenario.bricks = true;
   if (std::string_view(scenario.name) == "TissueOnTissue") {
-    // With both objects' links at their limits the force wavers from tick to tick: see below for z = 7. At z
-    // = 6 it is 2.5 % off on average and 4 % in single ticks, at z = 5 1.6 % and 29 %.
+    // With links of both objects at their limits the force varies from tick to tick; the test below covers z
+    // = 7. At z = 6 the error is 2.5 % on average and 4 % in single ticks, at z = 5 1.6 % and 29 %.
     scenario.holds_mm.resize(1);
   }
   return scenario;
@@ -331,7 +332,7 @@ Scenario of_bricks(Scenario scenario) {
 std::vector<Scenario> in_all_ways() {
   std::vector<Scenario> all = scenarios();
   for (Scenario scenario : scenarios()) {
-    scenario.apart = true;
+    scenario.asynchronous = true;
     all.push_back(std::move(scenario));
   }
   for (Scenario& scenario : scenarios()) all.push_back(of_bricks(std::move(scenario)));
@@ -341,7 +342,7 @@ std::vector<Scenario> in_all_ways() {
 INSTANTIATE_TEST_SUITE_P(Rules, Arbitration, ::testing::ValuesIn(in_all_ways()),
                          [](const auto& s) { return full_name(s.param); });
 
-// With both objects' links at their limits it wavers, by less than a hand tells, about what is carried.
+// With links of both objects at their limits the force varies around the carried force by less than a JND.
 TEST(Bricks, OnBricksWithBothChainsTightTheForceStaysWithinWhatAHandTells) {
   hybrid::Scene scene =
       hybrid::load_scene(tests::source_folder / "tests/hybrid/tick/arbitration/soft_on_soft.toml");
@@ -354,7 +355,7 @@ TEST(Bricks, OnBricksWithBothChainsTightTheForceStaysWithinWhatAHandTells) {
   for (int n = 0; n < kTicks; ++n) {
     const dvec3 force = coupling(touch.at(at));
     dvec3 lacking = force;
-    for (const tests::Bearing& b : tests::bearings(touch.world(), touch.state()))
+    for (const tests::Supports& b : tests::supports_of(touch.world(), touch.state()))
       lacking += b.anchors_N + b.rigid_N;
     EXPECT_LE(glm::length(lacking), 0.05 * glm::length(force)) << n;
     hand += force;
@@ -364,7 +365,7 @@ TEST(Bricks, OnBricksWithBothChainsTightTheForceStaysWithinWhatAHandTells) {
   EXPECT_GT(hand.z, 0.5 * kTicks);
 }
 
-// The loads of bricks go from thread to thread with the ways, and on record.
+// The bricks' loads travel between the threads with the displacements, and are recorded.
 TEST(Bricks, ARecordedSessionReplaysToTheBit) {
   tests::expect_replays(tests::source_folder / "scenes" / "layers.toml", 2.0);
 }

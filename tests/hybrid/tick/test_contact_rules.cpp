@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// When contact begins and when it ends: nothing is felt and nothing moves before the tool's ball meets
-// something, by the distances themselves; and contact made is kept until the tool leaves.
+// Begin and end of contact. Nothing is felt and nothing moves before the tool's ball meets an object, judged
+// by exact distances. Contact lasts until the tool leaves.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,8 +15,8 @@
 #include <utility>
 #include <vector>
 
-#include "tests/hybrid/fixtures/overlap_checker.h"
 #include "hybrid/build/build_objects.h"
+#include "tests/hybrid/fixtures/overlap_checker.h"
 #include "tests/hybrid/fixtures/touch.h"
 #include "voxel/baseline/thesis_chainmail.h"
 
@@ -32,8 +32,8 @@ dvec3 direction(std::mt19937& engine) {
   return {std::sqrt(1.0 - z * z) * std::cos(angle), std::sqrt(1.0 - z * z) * std::sin(angle), z};
 }
 
-// From the tool's ball to the nearest thing, every surface voxel and every rigid surface looked at (m);
-// inside: negative, for solids as for tissue.
+// Distance from the tool's ball to the nearest surface, from every surface voxel and every rigid surface (m);
+// negative inside, for solids as for tissue.
 double gap(Touch& touch, const dvec3& at) {
   double least = std::numeric_limits<double>::infinity();
   const double radius = touch.world().tool.radius_m;
@@ -61,7 +61,7 @@ bool moved(const voxel::SoftObject& object) {
                      [&](voxel::VoxelId v) { return object.state().at(v) != dvec3(0.0); });
 }
 
-// The middle of a soft object's surface voxels, and how far they are from it (m, scene frame).
+// Centre of a soft object's surface voxels, and their largest distance from it (m, scene frame).
 std::pair<dvec3, double> extent(Touch& touch, std::size_t o) {
   const voxel::SoftObject& object = *touch.state().soft[o];
   dvec3 low(std::numeric_limits<double>::infinity()), high = -low;
@@ -75,12 +75,12 @@ std::pair<dvec3, double> extent(Touch& touch, std::size_t o) {
 
 class Approach : public ::testing::TestWithParam<const char*> {};
 
-// What was put into one another at rest was carved, so that none of it presses on the other, and the tool
-// comes from anywhere.
+// The build removed all overlap, so that no object presses on another at rest. The tool approaches from any
+// direction.
 TEST_P(Approach, NothingIsFeltBeforeContact) {
   constexpr int kWays = 40;
-  constexpr double kStep = 2e-4, kFast = 1e-3;  // m a tick, near and far
-  constexpr double kRounding = 1e-9;            // m: places are floats
+  constexpr double kStep = 2e-4, kFast = 1e-3;  // m per tick, near and far
+  constexpr double kRounding = 1e-9;            // m: positions are floats
   const hybrid::Scene scene = hybrid::load_scene(tests::source_folder / GetParam());
   std::mt19937 engine(6);
   double latest = 0.0;
@@ -88,7 +88,7 @@ TEST_P(Approach, NothingIsFeltBeforeContact) {
   for (int n = 0; n < kWays; ++n) {
     const auto [middle, size] = extent(at_rest, static_cast<std::size_t>(n) % at_rest.state().soft.size());
     const dvec3 way = direction(engine);
-    // To some place in the middle half of the object.
+    // Towards a random place in the middle half of the object.
     const dvec3 to = middle + 0.25 * size * direction(engine), from = to - (1.5 * size + 0.02) * way;
     ASSERT_GT(gap(at_rest, from), 0.0) << "way " << n << " begins within an object";
     Touch touch(scene, from, n % 2 == 1);
@@ -130,18 +130,18 @@ INSTANTIATE_TEST_SUITE_P(Scenes, Approach,
 
 class Stroke : public ::testing::TestWithParam<std::tuple<const char*, bool>> {};
 
-// Pressed, drawn along, held and lifted, somewhere on the top of the tissue: one contact, from the first tick
-// that feels something to the last (the thesis's Fig 20: it bounced), and the tool stays on top (Fig 21: it
-// slipped between voxels). Half of the strokes are drawn up fast until they hardly touch, when tissue that
-// lags is left behind.
+// The tool presses, drags, holds and lifts somewhere on the top of the tissue. Contact must be continuous
+// from its first tick to its last (the thesis's Fig 20: it bounced), and the tool must stay on top (Fig 21:
+// it slipped between voxels). Half of the strokes lift quickly until the tool hardly touches, where tissue
+// that lags is left behind.
 TEST_P(Stroke, IsOneContact) {
   constexpr int kStrokes = 60;
-  const auto [file, apart] = GetParam();
+  const auto [file, asynchronous] = GetParam();
   const hybrid::Scene scene = hybrid::load_scene(tests::source_folder / file);
   std::mt19937 engine(20);
   double deepest = 0.0;
   for (int n = 0; n < kStrokes; ++n) {
-    // The block's top is at z = 6 mm, the ball's radius 4 mm: on top its middle is at 10.
+    // The block's top is at z = 6 mm and the ball's radius is 4 mm: on top, its centre is at 10 mm.
     const bool up_fast = n % 2 == 1;
     const double speed = std::exp(between(engine, std::log(up_fast ? 0.2 : 0.01), std::log(0.5)));
     const double depth = between(engine, up_fast ? 2.0 : 0.2, 4.5);
@@ -151,7 +151,7 @@ TEST_P(Stroke, IsOneContact) {
     };
     const dvec3 first = place(depth), second = place(last);
     const dvec3 up(0.0, 0.0, 4.0 + depth);
-    Touch touch(scene, 1e-3 * (first + up), apart);
+    Touch touch(scene, 1e-3 * (first + up), asynchronous);
     int contacts = 0, ticks = 0;
     bool before = false;
     double lowest = 1.0, front = 1.0;
@@ -171,7 +171,7 @@ TEST_P(Stroke, IsOneContact) {
     EXPECT_FALSE(before) << "still felt after it left, stroke " << n;
     EXPECT_GT(ticks, 100);
     EXPECT_GT(front, 0.0) << "between voxels, stroke " << n;
-    // Not deeper than the hand is.
+    // The tool is never deeper than the device.
     EXPECT_GE(lowest, 1e-3 * std::min(first.z, second.z) - 1e-9);
     deepest = std::max(deepest, depth);
   }
@@ -185,7 +185,7 @@ INSTANTIATE_TEST_SUITE_P(Blocks, Stroke,
                            return std::string(std::get<1>(s.param) ? "relaxedApart" : "relaxedInTheTick");
                          });
 
-// A device of a Premium's mass in a hand that is pulled along.
+// A device with the mass of a Premium, in a hand that is pulled along.
 struct Hand {
   static constexpr double kMass_kg = 0.075, kStiffness_N_per_m = 300.0, kDamping_Ns_per_m = 3.0, kDt_s = 1e-3;
   dvec3 at_m, velocity{0.0};
@@ -197,13 +197,13 @@ struct Hand {
   }
 };
 
-// How often contact is lost in strokes of such a hand, while it presses and while it draws along.
+// Lost contacts in strokes of such a hand, while pressing and while dragging.
 struct Lost {
   int pressing = 0, drawing = 0;
 };
 
-// Strokes over a block whose top a tool meets at z = `top_m`. `feel` says what is felt at a place: whether
-// there is contact, and the force.
+// Strokes over a block whose top the tool meets at z = `top_m`. `feel` returns contact and force at a
+// position.
 template <class Begin, class Feel>
 Lost strokes_of_a_hand(int count, double top_m, Begin&& begin, Feel&& feel) {
   Lost lost;
@@ -233,8 +233,8 @@ Lost strokes_of_a_hand(int count, double top_m, Begin&& begin, Feel&& feel) {
   return lost;
 }
 
-// The thesis's check by one point loses contact, as it found, and so does the one by six that it took
-// instead.
+// The thesis's one-point check loses contact, as the thesis reports, and so does the six-point check that
+// replaced it.
 TEST(Hands, LoseContactAsInTheThesisAndNotHere) {
   constexpr int kStrokes = 30;
   constexpr double kTop = 6e-3;
@@ -245,8 +245,8 @@ TEST(Hands, LoseContactAsInTheThesisAndNotHere) {
   std::vector<hybrid::BuildNote> notes;
   const voxel::LabelVolume volume = hybrid::build_volume(soft, notes);
   const auto classic = [&](bool six_points) {
-    voxel::ClassicObject object(volume, hybrid::lattice_options(scene, soft),
-                                {.damping = 0.5, .six_points = six_points});
+    voxel::ThesisChainMail object(volume, hybrid::lattice_options(scene, soft),
+                                  {.damping = 0.5, .six_points = six_points});
     const auto feel = [&](const dvec3& at) {
       const auto felt = object.touch(at - volume.origin_m, radius);
       object.relax_in_turn(soft.budget);

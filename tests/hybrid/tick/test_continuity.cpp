@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How smooth tissue feels, and that nobody is given energy by it.
+// Smoothness of the felt force on tissue, and passivity of closed paths.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -18,8 +18,8 @@ using tests::between;
 
 constexpr double kSpacing = 1e-3;
 
-// Down, round at random depths, and back up to where it began: frictionless tissue gives back what it got, or
-// less.
+// Down, round at random depths, and back up to the start: frictionless tissue returns at most the energy that
+// it received.
 TEST(ClosedPaths, GiveNoEnergy) {
   std::mt19937 engine(4);
   double most = -1.0, least = 0.0;
@@ -53,8 +53,8 @@ TEST(ClosedPaths, GiveNoEnergy) {
   std::printf("closed paths: %.3g to %.3g uJ given to the hand\n", 1e6 * least, 1e6 * most);
 }
 
-// Slow strokes stay within a tenth of a JND of the equilibrium's own steps. Faster ones do not yet where they
-// turn round, but no step is one that jumps.
+// In slow strokes the force stays within a tenth of a JND of the equilibrium's own steps. Faster strokes
+// exceed this at their turning points, but no step is a jump.
 TEST(Continuity, StepsAreThoseOfTheEquilibrium) {
   const StrokeCase slow{.radius_spacings = 2.0, .depth_spacings = 1.0, .speed_m_per_s = 0.01};
   const StrokeCase slide{

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Once a scene is built, its ticks allocate nothing, lock nothing, wait for nobody, throw nothing, and read
-// and write no file. This program counts the calls of all that which its thread makes while it is watched.
+// After the build, a tick allocates nothing, takes no lock, waits for no thread, throws nothing, and reads
+// and writes no file. This program counts all such calls of its thread while the thread is watched.
 #include <dlfcn.h>
 #include <gtest/gtest.h>
 #include <pthread.h>
@@ -49,7 +49,7 @@ void count() noexcept {
   count(&Calls::allocations);
 }
 
-// What the next library in line has under that name.
+// The next definition of that name in the library order.
 template <class Function>
 Function* next(const char* name) noexcept {
   const bool was = std::exchange(watched, false);
@@ -61,10 +61,10 @@ Function* next(const char* name) noexcept {
 }  // namespace
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define COUNTS_CALLS 0  // sanitizers bring their own
+#define COUNTS_CALLS 0  // sanitizers have their own
 #else
 #define COUNTS_CALLS 1
-// The GNU C library's own names for what it would have called.
+// The GNU C library's own names of the functions that these replace.
 // NOLINTBEGIN(bugprone-reserved-identifier,cert-dcl37-c,cert-dcl51-cpp,readability-inconsistent-declaration-parameter-name)
 extern "C" {
 void* __libc_malloc(std::size_t size);
@@ -84,7 +84,8 @@ void* realloc(void* memory, std::size_t size) noexcept {
   return __libc_realloc(memory, size);
 }
 
-// std::mutex and its kin, std::condition_variable, semaphores; std::atomic::wait() goes through syscall().
+// Covers std::mutex and its relatives, std::condition_variable and semaphores; std::atomic::wait() goes
+// through syscall().
 #define COUNTED(of, result, name, parameters, ...)            \
   result name parameters noexcept {                           \
     static auto* const real = next<result parameters>(#name); \
@@ -99,7 +100,7 @@ COUNTED(locks, int, pthread_spin_lock, (pthread_spinlock_t * lock), lock)
 COUNTED(waits, int, sem_wait, (sem_t * semaphore), semaphore)
 COUNTED(waits, int, sched_yield, (), )
 #undef COUNTED
-// Points where a thread may be cancelled: they may throw.
+// Cancellation points: they may throw.
 #define COUNTED(of, result, name, parameters, ...)            \
   result name parameters {                                    \
     static auto* const real = next<result parameters>(#name); \
@@ -131,7 +132,7 @@ long syscall(long number, ...) noexcept {
 // NOLINTEND(bugprone-reserved-identifier,cert-dcl37-c,cert-dcl51-cpp,readability-inconsistent-declaration-parameter-name)
 #endif
 
-// Not inlined: where the compiler sees free() meet new it takes them for a mismatch.
+// Not inlined: otherwise the compiler reports new and free() as a mismatch.
 [[gnu::noinline]] void* operator new(std::size_t size) {
   count();
   if (void* memory = std::malloc(size == 0 ? 1 : size)) return memory;
@@ -192,12 +193,12 @@ TEST(ServoPath, TheCountersCount) {
   EXPECT_EQ(calls.files, 1U);
 }
 
-void watch_ticks(const hybrid::Scene& scene, const hybrid::BuiltScene& built, bool apart) {
+void watch_ticks(const hybrid::Scene& scene, const hybrid::BuiltScene& built, bool asynchronous) {
   const auto device = hybrid::scene_device(scene, hybrid::scene_path(scene));
-  hybrid::flush_denormals();
+  hybrid::set_flush_to_zero();
   hybrid::begin_session(scene, *built.world, *built.state, device->read().position_m);
-  // What the other thread does is done in the tick here, so that it is watched too.
-  if (apart) hybrid::start_async_relaxation(*built.state, hybrid::Arrival::counted);
+  // Here the tick does the other thread's work, so that this work is watched too.
+  if (asynchronous) hybrid::start_async_relaxation(*built.state, hybrid::Arrival::counted);
   const double dt = 1.0 / scene.rate_hz;
   std::size_t felt_ticks = 0;
   calls = {};
@@ -216,7 +217,7 @@ void watch_ticks(const hybrid::Scene& scene, const hybrid::BuiltScene& built, bo
 
 class ServoPathOf : public ::testing::TestWithParam<const char*> {
  protected:
-  static void watch(bool apart);
+  static void watch(bool asynchronous);
 };
 
 TEST_P(ServoPathOf, AllItsTicks) {
@@ -227,22 +228,22 @@ TEST_P(ServoPathOf, AllItsTicksRelaxedApart) {
   watch(true);
 }
 
-void ServoPathOf::watch(bool apart) {
+void ServoPathOf::watch(bool asynchronous) {
   std::unique_ptr<hybrid::Scene> scene;
   try {
     scene = std::make_unique<hybrid::Scene>(
         hybrid::load_scene(std::filesystem::path(HYBRID_SOURCE_DIR) / "scenes" / GetParam()));
   } catch (const hybrid::SceneError& error) {
-    // The head is the only one that needs a file that is not in the repository.
+    // The head is the only scene that needs a file from outside the repository.
     NEED_DATA(std::string(GetParam()) != "head.toml", error.what());
     throw;
   }
   const hybrid::BuiltScene built = hybrid::build_scene(*scene);
-  if (apart && built.state->soft.empty()) GTEST_SKIP() << "skipped: nothing soft in it";
-  watch_ticks(*scene, built, apart);
+  if (asynchronous && built.state->soft.empty()) GTEST_SKIP() << "skipped: nothing soft in it";
+  watch_ticks(*scene, built, asynchronous);
 }
 
-// What no shipped scene has.
+// Features that no shipped scene has.
 class ServoPathIn : public tests::SceneFile {
  protected:
   static std::string scene(const std::string& soft) {
@@ -258,7 +259,7 @@ class ServoPathIn : public tests::SceneFile {
 TEST_F(ServoPathIn, AllTicksOfAContactOnACompositeGrid) {
   const hybrid::Scene grid = load(scene("size = [64, 64, 64]\nspacing = 1\n"));
   const hybrid::BuiltScene built = hybrid::build_scene(grid);
-  ASSERT_TRUE(built.state->soft[0]->uses_grid());
+  ASSERT_TRUE(built.state->soft[0]->uses_patches());
   watch_ticks(grid, built, true);
 }
 
@@ -266,10 +267,10 @@ TEST_F(ServoPathIn, AllTicksOfAPartWithoutSlack) {
   const hybrid::Scene layers =
       load(scene("size = [64, 64, 64]\nspacing = 4\nlabel = 1\nlayers = [{ thickness = 52, label = 1 }, { "
                  "thickness = 12, label = 2 }]\nmaterials = { \"2\" = \"plate\" }\n"));
-  for (const bool apart : {false, true}) {
+  for (const bool asynchronous : {false, true}) {
     const hybrid::BuiltScene built = hybrid::build_scene(layers);
-    ASSERT_EQ(built.state->soft[0]->lattice().part_count(), 1U);
-    watch_ticks(layers, built, apart);
+    ASSERT_EQ(built.state->soft[0]->lattice().block_count(), 1U);
+    watch_ticks(layers, built, asynchronous);
   }
 }
 
@@ -286,7 +287,7 @@ INSTANTIATE_TEST_SUITE_P(ShippedScenes, ServoPathOf,
                            return name;
                          });
 
-// A scene that is shipped later is watched too.
+// A scene that is shipped later must be watched too.
 TEST(ServoPath, KnowsEveryShippedScene) {
   std::size_t scenes = 0;
   for (const auto& entry :

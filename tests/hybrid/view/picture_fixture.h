@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A scene to draw, and its picture as pixels. Where there is no EGL the cases that draw say that they were
-// skipped.
+// A scene to draw, and its picture as pixels. Without EGL, the cases that draw are skipped.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -18,7 +17,7 @@
 
 namespace tests {
 
-// A ball of quads by latitude and longitude, with everything above `cut` (of its radius) left out.
+// A ball of quads by latitude and longitude, without the part above `cut` (in radii).
 inline polygon::TriangleMesh ball_mesh(const glm::dvec3& centre, double radius, double cut = 2.0,
                                        std::uint32_t rows = 48) {
   polygon::TriangleMesh mesh;
@@ -44,7 +43,7 @@ inline polygon::TriangleMesh ball_mesh(const glm::dvec3& centre, double radius, 
   return mesh;
 }
 
-// A hollow shell, open on top, a soft ball in it that a tool presses down at its top.
+// A hollow shell, open on top, with a soft ball inside that a tool presses at its top.
 struct Session {
   hybrid::DrawnScene scene;
   hybrid::Snapshot now;
@@ -105,7 +104,7 @@ class Picture : public testing::Test {
     std::error_code ignored;
     std::filesystem::remove(file_, ignored);
   }
-  // Draws, or skips the case where this machine cannot.
+  // Draws, or skips the case if this machine cannot draw.
   Image draw(const Session& s, const hybrid::PictureOptions& options) {
     try {
       hybrid::save_picture(file_, s.scene, s.now, options);

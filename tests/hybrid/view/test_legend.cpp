@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A soft object of several materials: what is beneath its surface, its colours in the pixels, and what the
-// legend says and hides.
+// A soft object of several materials: the materials under its surface, its colours in the pixels, and the
+// rows and the place of the legend.
 #include "hybrid/view/legend.h"
 
 #include <gtest/gtest.h>
@@ -12,8 +12,8 @@
 #include "hybrid/build/build_world.h"
 #include "hybrid/snapshot/make_drawn_scene.h"
 #include "hybrid/view/palette.h"
-#include "tests/hybrid/view/picture_fixture.h"
 #include "tests/hybrid/fixtures/scene_file_fixture.h"
+#include "tests/hybrid/view/picture_fixture.h"
 
 namespace {
 
@@ -26,7 +26,7 @@ using tests::Session;
 using DrawnSceneOf = tests::SceneFile;
 using MaterialPicture = tests::Picture;
 
-// The soft ball alone, its half at x > 0 of one material and the rest of another.
+// The soft ball alone; its half at x > 0 has one material, the rest another.
 Session two_halves() {
   Session s = tests::shell_and_ball();
   s.scene.objects.erase(s.scene.objects.begin());
@@ -45,7 +45,7 @@ Camera from_the_front(const Session& s) {
   return camera;
 }
 
-// Light scales a colour; what it leaves is the direction.
+// Light scales a colour; its direction stays.
 float hue_apart(const glm::vec3& a, const glm::vec3& b) {
   return glm::length(glm::normalize(a) - glm::normalize(b));
 }
@@ -61,7 +61,7 @@ bool has(const std::vector<LegendRow>& rows, const std::string& name) {
   return std::ranges::find(all, name) != all.end();
 }
 
-// As a composed body has them: 25 bones, and tissue of 14 materials.
+// Like a composed body: 25 bones, and tissue of 14 materials.
 Session body() {
   Session s = two_halves();
   DrawnObject tissue = s.scene.objects[0];
@@ -85,7 +85,7 @@ TEST(MaterialColours, AreUnlikeOneAnotherAndOnesOwnInAScene) {
       EXPECT_GT(glm::distance(colours[a], colours[b]), 0.15F) << a << " " << b;
   }
   for (std::size_t a = 10; a < 14; ++a) EXPECT_EQ(colours[a], hybrid::palette::other_material);
-  // The same material in a second object, and an object of one material beside both.
+  // The same material in a second object, and an object of a single material beside both.
   s.scene.objects.push_back(s.scene.objects[25]);
   s.scene.objects.back().materials = {"skin", "organ 0"};
   s.scene.objects.push_back({"gel", true, tests::ball_mesh({0.0, 0.0, 0.0}, 0.01)});
@@ -114,7 +114,7 @@ TEST_F(DrawnSceneOf, HasTheMaterialBeneathEachVertex) {
   for (std::size_t v = 0; v < block.surface.vertices.size(); ++v) {
     const std::string& name = block.materials[block.vertex_material[v]];
     seen.insert(name);
-    // The filled voxel nearest to the vertex says the same, away from where both meet.
+    // The nearest filled voxel must have the same material, away from the border between materials.
     const glm::dvec3 at = built.world->soft[0].to_body(block.surface.vertices[v]) / lattice.spacing_m();
     std::set<int> labels;
     for (int c = 0; c < 8; ++c) {
@@ -131,7 +131,7 @@ TEST_F(DrawnSceneOf, HasTheMaterialBeneathEachVertex) {
   EXPECT_EQ(seen.size(), 2U);
 }
 
-// Thinning gives what it leaves labels of its own; they are of the tissue that they stand for.
+// Thinning gives the remaining voxels new labels, which must map to the materials of the original tissue.
 TEST_F(DrawnSceneOf, ThinnedTissueHasTheMaterialsItHad) {
   const std::string text =
       "format = 1\nunits = \"mm\"\n[material.lean]\nyoung = 9000\n[material.fat]\nyoung = 3000\n" +
@@ -146,7 +146,7 @@ TEST_F(DrawnSceneOf, ThinnedTissueHasTheMaterialsItHad) {
   EXPECT_EQ(a.materials.size(), 2U);
   EXPECT_EQ(a.materials, b.materials);
   ASSERT_EQ(a.vertex_material.size(), b.vertex_material.size());
-  // Where both meet, what thinning left out has no say in what most of the voxels are of.
+  // At borders, voxels that thinning removed do not count for the majority.
   std::size_t same = 0;
   for (std::size_t v = 0; v < a.vertex_material.size(); ++v)
     same += a.vertex_material[v] == b.vertex_material[v] ? 1U : 0U;
@@ -162,7 +162,7 @@ TEST_F(DrawnSceneOf, OneMaterialCarriesNothing) {
     EXPECT_TRUE(drawn.objects[0].materials.empty());
     EXPECT_TRUE(drawn.objects[0].vertex_material.empty());
   }
-  // A core that is not seen is no colour of the surface.
+  // A hidden core contributes no colour to the surface.
   const hybrid::Scene cube = hybrid::load_scene(tests::source_folder / "scenes" / "cube.toml");
   const hybrid::BuiltScene built = hybrid::build_scene(cube);
   EXPECT_TRUE(hybrid::drawn_scene(cube, built, "cube").objects[0].materials.empty());
@@ -192,8 +192,7 @@ TEST_F(MaterialPicture, OfOneMaterialIsAsItWas) {
   }
 }
 
-// Where the scale ends there is one colour, whatever the tissue; half way to its first third both still
-// differ.
+// At the end of the scale all tissues have the same colour; at a share of 0.23 they still differ.
 TEST_F(MaterialPicture, RunsFromTheMaterialsOwnColourWithDisplacement) {
   Session s = two_halves();
   s.now.proxy_m = s.now.device_m = {0.0, 0.0, 0.12};
@@ -230,7 +229,7 @@ TEST(Legend, ListsMaterialsUnderTheirObject) {
     EXPECT_TRUE(rows[1 + m].within);
     EXPECT_EQ(rows[1 + m].swatch, std::vector<glm::vec3>{colours[m]});
   }
-  // Beneath a tool on the right lies liver.
+  // Liver lies under a tool on the right.
   s.now.proxy_m = {0.05, 0.0, 0.06};
   const auto touching = hybrid::legend_rows(s.scene, s.now, 20);
   EXPECT_FALSE(touching[1].touched);
@@ -242,7 +241,7 @@ TEST(Legend, CountsWhatDoesNotFit) {
   for (const std::size_t most : {1U, 5U, 6U, 8U, 12U, 17U, 60U}) {
     const auto rows = hybrid::legend_rows(s.scene, s.now, most);
     EXPECT_LE(rows.size(), std::max<std::size_t>(most, 5));
-    // Every material and every bone is in a row or in a number.
+    // Every material and every bone is in a row or in a count.
     std::size_t organs = 0, bones = 0, objects = 0;
     for (const LegendRow& row : rows) {
       const std::string& words = row.more.empty() ? row.name : row.more;
@@ -300,7 +299,7 @@ TEST(Legend, StaysWhereItIsUntilItCovers) {
   EXPECT_EQ(hybrid::choose_place(places, first, 9U), 1U) << "a place that is no more";
 }
 
-// The tool is dark, and under the legend's plate it would be nearly white.
+// The tool is dark; under the legend's plate it would be nearly white.
 TEST_F(MaterialPicture, TheLegendLeavesTheToolFree) {
   Session s = body();
   const Camera camera = from_the_front(s);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Pictures are tested by what must be true of their pixels: where the tool is, its colour is; what is hidden
-// by bone is seen through it. Where there is no EGL the cases that draw say that they were skipped.
+// Tests necessary properties of the pixels: the tool's colour at the tool, and tissue visible through bone.
+// Without EGL, the cases that draw are skipped.
 #include "hybrid/view/picture.h"
 
 #include <gtest/gtest.h>
@@ -13,9 +13,9 @@
 #include <vector>
 
 #include "hybrid/view/camera.h"
-#include "hybrid/view/unit_shapes.h"
 #include "hybrid/view/overlay.h"
 #include "hybrid/view/palette.h"
+#include "hybrid/view/unit_shapes.h"
 #include "polygon/surface/primitives.h"
 #include "tests/hybrid/view/picture_fixture.h"
 
@@ -51,7 +51,7 @@ TEST(CameraTest, ProjectsAndPicksBack) {
   ASSERT_TRUE(pixel.has_value());
   const glm::dvec3 back = camera.point_at(*pixel, 640, 480, point);
   EXPECT_NEAR(glm::length(back - point), 0.0, 1e-12);
-  // The same pixel as the matrix that the renderer uses.
+  // The same pixel by the matrix that the renderer uses.
   const glm::dvec4 clip = camera.clip_from_scene(640.0 / 480.0, {1.0, 2.0, 3.0}, camera.target_m, 0.3) *
                           glm::dvec4(point - glm::dvec3(1.0, 2.0, 3.0), 1.0);
   EXPECT_NEAR(320.0 * (1.0 + clip.x / clip.w), pixel->x, 1e-6);
@@ -71,7 +71,7 @@ TEST(CameraTest, FramesTheWholeSceneWhereverItLies) {
     }
     EXPECT_LE(widest, 0.5);
     EXPECT_GE(widest, 0.25) << "the scene fills its picture";
-    // Pressed from above: seen from above, where the tool is.
+    // The tool presses from above, so the camera looks from above.
     EXPECT_GT(camera.elevation_rad, 0.0);
   }
 }
@@ -94,7 +94,7 @@ TEST(DrawGeometry, NormalsOfABallPointOutward) {
     ASSERT_EQ(draw.indices.size(), 3 * mesh.triangles.size());
     std::size_t known = 0;
     for (const auto& vertex : draw.vertices) {
-      if (std::abs(vertex.position.z) > 0.0495F) continue;  // at the poles triangles have no area
+      if (std::abs(vertex.position.z) > 0.0495F) continue;  // triangles at the poles have no area
       ++known;
       EXPECT_GT(glm::dot(vertex.normal, glm::normalize(vertex.position)), 0.98F);
     }
@@ -150,31 +150,31 @@ TEST_F(Picture, ShowsToolTissueAndForceWhereTheyAre) {
   ASSERT_EQ(image.width, 960);
   ASSERT_EQ(image.height, 720);
   const auto pixel = [&](const glm::dvec3& at) { return *camera.pixel(at, 960, 720); };
-  // The tool is dark, beside the device's ghost; a point on its upper side toward the eye.
+  // The tool is dark, next to the device's ghost; the sampled point is on its upper side, toward the eye.
   const glm::vec3 tool = image.at(pixel(s.now.proxy_m + camera.right() * 5e-3 + glm::dvec3(0.0, 0.0, 3e-3)));
   EXPECT_LT(tool.r + tool.g + tool.b, 1.2F);
-  // The arrow, half way up, is blue.
+  // Half-way up, the arrow is blue.
   const glm::dvec3 tip =
       s.now.proxy_m + glm::dvec3(0.0, 0.0, 8e-3 + 0.3 * camera.view_height_m() * 3.0 / 8.5);
   const glm::vec3 arrow = image.at(pixel(0.5 * (tip + s.now.proxy_m + glm::dvec3(0.0, 0.0, 8e-3))));
   EXPECT_GT(arrow.b, arrow.r + 0.2F);
-  // A corner that nothing covers has the background's colour.
+  // An empty corner has the background's colour.
   EXPECT_LT(glm::length(image.at({959.0, 360.0}) - hybrid::palette::background), 0.02F);
 }
 
 TEST_F(Picture, SeesThroughBoneThatHidesTissueAndOnlyThere) {
-  // A closed shell about the soft ball.
+  // A closed shell around the soft ball.
   const Session closed = shell_and_ball({0.0, 0.0, 0.0}, 2.0);
   Camera camera = hybrid::frame_scene(closed.scene, closed.now);
   camera.elevation_rad = 0.0;
   DRAW_OR_SKIP(image, closed, small(camera));
   const glm::vec3 middle = image.at(*camera.pixel({0.0, 0.0, -0.01}, 960, 720));
-  // At the side of the ball, between tissue and shell, the shell's own colour is seen.
+  // At the side of the ball, between tissue and shell, the shell's own colour shows.
   const glm::vec3 side = image.at(*camera.pixel(camera.right() * 0.0755, 960, 720));
   EXPECT_GT(redness(middle), 0.10F) << "tissue is pink";
   EXPECT_LT(redness(side), 0.12F) << "bone is not";
   EXPECT_GT(redness(middle), redness(side) + 0.05F);
-  // Without the soft object the same shell is opaque: bone in the middle.
+  // Without the soft object the same shell is opaque.
   Session alone = closed;
   alone.scene.objects.resize(1);
   alone.now.soft_moved_m.resize(1);
@@ -189,7 +189,7 @@ TEST_F(Picture, ColoursDisplacement) {
   Camera camera = hybrid::frame_scene(s.scene, s.now);
   camera.elevation_rad = 0.9;
   DRAW_OR_SKIP(image, s, small(camera));
-  // 16 mm beside the tool's axis the tissue moved by 6 mm of a scale of 20: yellow, neither blue nor pink.
+  // 16 mm beside the tool's axis the tissue moved by 6 mm on a scale of 20: yellow, neither blue nor pink.
   const glm::dvec3 beside =
       camera.right() * 0.016 + glm::dvec3(0.0, 0.0, std::sqrt(0.0049 - 0.000256) - 0.0063);
   const glm::vec3 moved = image.at(*camera.pixel(beside, 960, 720));
@@ -213,7 +213,7 @@ TEST_F(Picture, IsTheSameTwiceAndFarFromTheOrigin) {
   EXPECT_LT(sum / static_cast<double>(here.rgb.size()), 1.0);
 }
 
-// A bar to the left, turned and carried to the right.
+// A bar on the left, turned and moved to the right.
 TEST_F(Picture, DrawsARigidObjectWhereItIsAtThatMoment) {
   for (const glm::dvec3& at : {glm::dvec3(0.0), glm::dvec3(1e6, -1e6, 1e6)}) {
     Session s;
@@ -233,10 +233,10 @@ TEST_F(Picture, DrawsARigidObjectWhereItIsAtThatMoment) {
       return glm::length(colour - hybrid::palette::background) > 0.1F;
     };
     DRAW_OR_SKIP(rest, s, small(above));
-    // By 90 degrees about its own middle, and 100 mm to the right: what lay along x lies along y.
+    // Turned by 90 degrees about its own centre and moved 100 mm to the right: its length is now along y.
     s.now.rigid_place = {{.moved = true,
                           .about_m = at + glm::dvec3(-0.05, 0.0, 0.0),
-                          .way_m = {0.1, 0.0, 0.0},
+                          .shift_m = {0.1, 0.0, 0.0},
                           .turn = glm::angleAxis(0.5 * std::numbers::pi, glm::dvec3(0.0, 0.0, 1.0))}};
     DRAW_OR_SKIP(moved, s, small(above));
     for (const double along : {-0.028, -0.01, 0.01, 0.028}) {
@@ -249,7 +249,7 @@ TEST_F(Picture, DrawsARigidObjectWhereItIsAtThatMoment) {
   }
 }
 
-// Far beyond everything that lay still, and still in the picture: neither cut off nor out of the view.
+// Far beyond everything at rest, it is still in the picture: not clipped and within the view.
 TEST_F(Picture, FollowsARigidObjectThatLeaves) {
   Session s;
   s.scene.tool_radius_m = 2e-3;
@@ -257,7 +257,7 @@ TEST_F(Picture, FollowsARigidObjectThatLeaves) {
   s.scene.objects.push_back({"other", false, ball_mesh({0.1, 0.0, 0.0}, 0.02)});
   s.now.proxy_m = s.now.device_m = {0.0, 0.0, 0.05};
   s.now.rigid_place.resize(2);
-  s.now.rigid_place[1] = {.moved = true, .about_m = {0.1, 0.0, 0.0}, .way_m = {0.9, 0.5, -0.3}};
+  s.now.rigid_place[1] = {.moved = true, .about_m = {0.1, 0.0, 0.0}, .shift_m = {0.9, 0.5, -0.3}};
   const Camera camera = hybrid::frame_scene(s.scene, s.now);
   const glm::dvec3 there(1.0, 0.5, -0.3);
   const auto pixel = camera.pixel(there, 960, 720);
@@ -275,9 +275,9 @@ TEST_F(Picture, DrawsNothingAndBrokenSnapshots) {
   Session broken = shell_and_ball();
   const double nan = std::numeric_limits<double>::quiet_NaN();
   broken.now.proxy_m = broken.now.device_m = broken.now.force_N = {nan, nan, nan};
-  broken.now.soft_moved_m[1].resize(3);  // not this mesh's
-  broken.now.rigid_place.resize(9);      // more than there are
-  broken.now.rigid_place[0] = {.moved = true, .way_m = {nan, nan, nan}};
+  broken.now.soft_moved_m[1].resize(3);  // a size that does not match the mesh
+  broken.now.rigid_place.resize(9);      // more poses than objects
+  broken.now.rigid_place[0] = {.moved = true, .shift_m = {nan, nan, nan}};
   broken.now.feel.clear();
   broken.scene.title = std::string(500, 'W');
   broken.scene.objects[0].name = "100 %s %n Gehörgang \xff\xfe";

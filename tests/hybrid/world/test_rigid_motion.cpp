@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Where a rigid object is at a time, how far it went, and from scene file to world.
+// Pose of a rigid object at a time, its travel, and its path from scene file to world.
 #include "hybrid/world/rigid_motion.h"
 
 #include <gtest/gtest.h>
@@ -93,7 +93,7 @@ TEST(RigidMotion, TurnsAboutItsAxis) {
     const Pose pose = motion.pose_at(t);
     const dquat turn = glm::angleAxis(std::fmod(rate * t, glm::two_pi<double>()), axis);
     expect_pose(pose, {about + turn * (kStart.position_m - about), turn * kStart.rotation}, 1e-9);
-    // The distance to every point of the axis stays.
+    // The distance to every point of the axis is constant.
     for (const double s : {-0.5, 0.0, 0.5}) {
       EXPECT_NEAR(glm::distance(pose.position_m, about + s * axis),
                   glm::distance(kStart.position_m, about + s * axis), 1e-12);
@@ -225,7 +225,7 @@ TEST_F(MotionScene, BuildsIntoTheWorldAndTheMap) {
   EXPECT_EQ(map.rigid_in(at_x - half, at_x + half), 1U);
 }
 
-// The exact surfaces of curved primitives lie a little outside of the triangles that stand for them.
+// The exact surfaces of curved primitives are slightly outside their triangles.
 TEST_F(MotionScene, TheMapCoversCurvedPrimitives) {
   const std::string shapes =
       "format = 1\n[path]\nkind = \"press\"\nfrom = [0, 0, 90]\nto = [0, 0, 80]\n[occupancy]\ncell = 0.2\n"

@@ -212,15 +212,15 @@ TEST(BrickLoads, AnotherThatRelaxesItComesToTheSameRest) {
     if (scene.held.empty()) continue;
     const tests::PlainProblem plain = scene.plain();
     voxel::SoftObject object = object_of(scene.volume, scene.options);
-    voxel::Replica replica(object);
+    voxel::ShadowObject replica(object);
     scene.hold(object);
-    for (int n = 0; n < 3000 && voxel::Replica::wanted(object); ++n) {
+    for (int n = 0; n < 3000 && voxel::ShadowObject::wanted(object); ++n) {
       replica.give(object);
       replica.relax();
       replica.take(object);
       replica.drain(object, 1'000'000);
     }
-    EXPECT_FALSE(voxel::Replica::wanted(object)) << seed;
+    EXPECT_FALSE(voxel::ShadowObject::wanted(object)) << seed;
     EXPECT_LT(difference(object, scene, plain), 0.02) << seed;
   }
 }

@@ -28,10 +28,10 @@ using tests::Random;
 using tests::random_scene;
 using tests::voxel_at;
 using tests::voxel_of;
-using voxel::Couplings;
 using voxel::LabelVolume;
 using voxel::Lattice;
 using voxel::LatticeOptions;
+using voxel::LevelStiffness;
 using voxel::LinkMaterial;
 using voxel::RowId;
 using voxel::VoxelId;
@@ -94,10 +94,11 @@ TEST(Lattice, CouplingsAreItsSpringsOnEveryLevel) {
   options.materials[4] = elastic(2e3, 0.2);
   const Lattice lattice(wide_volume(), options);
   // Every row asked for on the way up, or only those of the level looked at.
-  std::vector<std::unique_ptr<Couplings>> known, unknown;
+  std::vector<std::unique_ptr<LevelStiffness>> known, unknown;
   for (int level = 0; level < 4; ++level) {
     for (auto* levels : {&known, &unknown})
-      levels->push_back(std::make_unique<Couplings>(lattice, level == 0 ? nullptr : levels->back().get()));
+      levels->push_back(
+          std::make_unique<LevelStiffness>(lattice, level == 0 ? nullptr : levels->back().get()));
     for (RowId row = 0; row < known.back()->grid().rows(); ++row) known.back()->prepare(row);
   }
   std::size_t uniform = 0;
@@ -133,7 +134,7 @@ TEST(Lattice, CouplingsAreItsSpringsOnEveryLevel) {
     const voxel::Grid& g = known[ul]->grid();
     const int size = 1 << level;
     // All of them here; of the other, those of this level alone, once.
-    Couplings alone(lattice, unknown[ul - 1].get());
+    LevelStiffness alone(lattice, unknown[ul - 1].get());
     const auto sum_of = [&](const std::array<int, 3>& cell, std::size_t d) {
       double sum = 0.0;
       std::array<int, 3> at{};

@@ -12,24 +12,24 @@
 namespace {
 
 using voxel::link_energy_J;
-using voxel::yield_link;
+using voxel::plastic_link;
 
 TEST(Yield, IsElasticUpToItsStrainAndPerfectlyPlasticBeyond) {
   const double y = 2e-4;
   for (const double side : {-1.0, 1.0}) {
-    const auto held = yield_link(side * 1.9e-4, 0.0, y);
+    const auto held = plastic_link(side * 1.9e-4, 0.0, y);
     EXPECT_EQ(held.elastic, side * 1.9e-4);
     EXPECT_EQ(held.offset, 0.0);
-    const auto gone = yield_link(side * 5e-4, 0.0, y);
+    const auto gone = plastic_link(side * 5e-4, 0.0, y);
     EXPECT_DOUBLE_EQ(gone.elastic, side * y);
     EXPECT_DOUBLE_EQ(gone.offset, side * 3e-4);
     // Unloaded, it is at rest where its offset is; loaded again as far, nothing is new.
-    EXPECT_EQ(yield_link(gone.offset, gone.offset, y).elastic, 0.0);
-    EXPECT_NEAR(yield_link(side * 5e-4, gone.offset, y).offset, gone.offset, 1e-19);
+    EXPECT_EQ(plastic_link(gone.offset, gone.offset, y).elastic, 0.0);
+    EXPECT_NEAR(plastic_link(side * 5e-4, gone.offset, y).offset, gone.offset, 1e-19);
   }
   const double never = std::numeric_limits<double>::infinity();
-  EXPECT_EQ(yield_link(1e3, 0.0, never).elastic, 1e3);
-  EXPECT_EQ(yield_link(1e3, 0.0, never).offset, 0.0);
+  EXPECT_EQ(plastic_link(1e3, 0.0, never).elastic, 1e3);
+  EXPECT_EQ(plastic_link(1e3, 0.0, never).offset, 0.0);
 }
 
 TEST(Yield, LeavesNoLimitOfTheChain) {
@@ -39,12 +39,12 @@ TEST(Yield, LeavesNoLimitOfTheChain) {
     const float low = std::min(number(random), 0.0F), high = std::max(number(random), 0.0F);
     const auto inside = [&] { return std::clamp(number(random), low, high); };
     const float before = inside(), difference = inside(), yield = std::fabs(number(random)) * 0.3F;
-    const auto link = yield_link(difference, before, yield);
+    const auto link = plastic_link(difference, before, yield);
     EXPECT_GE(link.offset, std::min(before, difference) - 1e-7F);
     EXPECT_LE(link.offset, std::max(before, difference) + 1e-7F);
     EXPECT_LE(std::fabs(link.elastic), yield);
     // Twice the same is once, but for the last place of a strain of up to 2.
-    const auto again = yield_link(difference, link.offset, yield);
+    const auto again = plastic_link(difference, link.offset, yield);
     EXPECT_NEAR(again.offset, link.offset, 2.4e-7F);
   }
 }
@@ -56,7 +56,7 @@ TEST(Yield, ForceIsTheSlopeOfItsEnergy) {
     const double slope =
         (link_energy_J(k, difference + step, offset, y) - link_energy_J(k, difference - step, offset, y)) /
         (2 * step);
-    EXPECT_NEAR(slope, k * yield_link(difference, offset, y).elastic, 1e-6 * k * y);
+    EXPECT_NEAR(slope, k * plastic_link(difference, offset, y).elastic, 1e-6 * k * y);
   }
 }
 
@@ -67,7 +67,8 @@ TEST(Yield, IsTheSameForAnyNumberOfSteps) {
   for (const int steps : {1, 7, 1000}) {
     double offset = 0.0;
     const auto go = [&](double from, double to) {
-      for (int s = 1; s <= steps; ++s) offset = yield_link(from + (to - from) * s / steps, offset, y).offset;
+      for (int s = 1; s <= steps; ++s)
+        offset = plastic_link(from + (to - from) * s / steps, offset, y).offset;
     };
     go(0.0, 7e-4);
     EXPECT_NEAR(offset, 6e-4, 1e-15);
@@ -87,7 +88,7 @@ TEST(Yield, SpendsTheAreaOfItsLoop) {
     for (int s = 1; s <= kSteps; ++s) {
       const double phase = 4.0 * s / kSteps;  // 0 → 1 → 0 → −1 → 0
       const double difference = amplitude * (phase < 1 ? phase : phase < 3 ? 2 - phase : phase - 4);
-      const auto link = yield_link(difference, offset, y);
+      const auto link = plastic_link(difference, offset, y);
       work += 0.5 * (k * link.elastic + last_force) * (difference - last);
       offset = link.offset;
       last = difference;
@@ -105,7 +106,7 @@ struct Bar {
   Bar(std::vector<double> stiffness, std::vector<double> yield)
       : k(std::move(stiffness)), y(std::move(yield)), offset(k.size(), 0.0), u(k.size() + 1, 0.0) {}
   [[nodiscard]] double force(std::size_t link) const {
-    return k[link] * yield_link(u[link + 1] - u[link], offset[link], y[link]).elastic;
+    return k[link] * plastic_link(u[link + 1] - u[link], offset[link], y[link]).elastic;
   }
   void sweep() {
     for (std::size_t v = 1; v + 1 < u.size(); ++v) {
@@ -118,7 +119,7 @@ struct Bar {
   }
   void keep() {
     for (std::size_t l = 0; l < k.size(); ++l)
-      offset[l] = yield_link(u[l + 1] - u[l], offset[l], y[l]).offset;
+      offset[l] = plastic_link(u[l + 1] - u[l], offset[l], y[l]).offset;
   }
   // The hand goes there; the offsets move when the bar has settled, or with every sweep.
   void pull(double to, int sweeps, bool keep_on_the_way = false) {

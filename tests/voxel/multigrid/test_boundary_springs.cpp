@@ -21,12 +21,12 @@
 namespace {
 
 using tests::elastic;
-using voxel::Couplings;
+using voxel::BoundarySprings;
 using voxel::Displacement;
-using voxel::Holds;
 using voxel::LabelVolume;
 using voxel::Lattice;
 using voxel::LatticeOptions;
+using voxel::LevelStiffness;
 using voxel::Relaxation;
 using voxel::VoxelId;
 
@@ -39,31 +39,31 @@ LabelVolume block(const std::array<int, 3>& dims) {
 struct Levels {
   explicit Levels(const Lattice& lattice) {
     for (int n = 0; n < 4; ++n) {
-      levels.push_back(std::make_unique<Couplings>(lattice, n == 0 ? nullptr : levels.back().get()));
+      levels.push_back(std::make_unique<LevelStiffness>(lattice, n == 0 ? nullptr : levels.back().get()));
       pointers.push_back(levels.back().get());
     }
   }
   // Of a cell (N/m).
-  double hold(Holds& holds, int level, VoxelId cell, int axis) {
+  double hold(BoundarySprings& holds, int level, VoxelId cell, int axis) {
     const voxel::VoxelSprings springs = pointers[static_cast<std::size_t>(level)]->springs_of(cell);
     if (!holds.any(level, cell / voxel::kRow)) return 0.0;
     return static_cast<double>(
                holds.hold(level, cell / voxel::kRow, static_cast<std::size_t>(axis))[cell % voxel::kRow]) /
            static_cast<double>(springs.inverse[static_cast<std::size_t>(axis)]);
   }
-  std::vector<std::unique_ptr<Couplings>> levels;
-  std::vector<Couplings*> pointers;
+  std::vector<std::unique_ptr<LevelStiffness>> levels;
+  std::vector<LevelStiffness*> pointers;
 };
 
 // A plane that is held is as far from the middle of a cell on each level as it is: (2^l − 1) / 2 links of the
 // voxels, 4^l of them side by side. Seen from either side, along each axis.
-TEST(Holds, APlaneStaysWhereItIsOnEveryLevel) {
+TEST(BoundarySprings, APlaneStaysWhereItIsOnEveryLevel) {
   LatticeOptions options;
   options.materials[1] = elastic(1e4, 0.3);
   options.anchor_faces = {"-z"};
   const Lattice lattice(block({32, 32, 32}), options);
   Levels levels(lattice);
-  Holds holds(lattice, levels.pointers);
+  BoundarySprings holds(lattice, levels.pointers);
   const voxel::Spring link = lattice.spring_within(1, 2);
   for (int level = 1; level < 4; ++level) {
     const voxel::Grid& g = levels.pointers[static_cast<std::size_t>(level)]->grid();
@@ -79,13 +79,13 @@ TEST(Holds, APlaneStaysWhereItIsOnEveryLevel) {
 }
 
 // Whatever came and went before: what is held now is all that counts.
-TEST(Holds, DependOnWhatIsHeldAlone) {
+TEST(BoundarySprings, DependOnWhatIsHeldAlone) {
   LatticeOptions options;
   options.materials[1] = elastic(1e4, 0.3);
   options.anchor_faces = {"-z"};
   const Lattice lattice(block({24, 20, 18}), options);
   Levels levels(lattice);
-  Holds changed(lattice, levels.pointers);
+  BoundarySprings changed(lattice, levels.pointers);
   std::mt19937 random(5);
   const auto some = [&] {
     std::vector<VoxelId> held;
@@ -98,13 +98,13 @@ TEST(Holds, DependOnWhatIsHeldAlone) {
     const std::vector<VoxelId> held = some();
     changed.set_held(held);
     const VoxelId pressed = some().front();
-    changed.support(pressed,
-                    Holds::along(glm::normalize(glm::vec3(0.0F, 0.5F, 1.0F)), Holds::Support::By::obstacle));
+    changed.support(pressed, BoundarySprings::along(glm::normalize(glm::vec3(0.0F, 0.5F, 1.0F)),
+                                                    BoundarySprings::Support::By::obstacle));
     changed.renew();
-    Holds fresh(lattice, levels.pointers);
+    BoundarySprings fresh(lattice, levels.pointers);
     fresh.set_held(held);
-    fresh.support(pressed,
-                  Holds::along(glm::normalize(glm::vec3(0.0F, 0.5F, 1.0F)), Holds::Support::By::obstacle));
+    fresh.support(pressed, BoundarySprings::along(glm::normalize(glm::vec3(0.0F, 0.5F, 1.0F)),
+                                                  BoundarySprings::Support::By::obstacle));
     fresh.renew();
     for (int level = 1; level < 4; ++level) {
       const voxel::Grid& g = levels.pointers[static_cast<std::size_t>(level)]->grid();
@@ -127,7 +127,7 @@ TEST(Holds, DependOnWhatIsHeldAlone) {
 
 // When and in which order rows are asked for changes nothing, nor what is held in between: what anchors hold
 // is the same, to the last bit, as if all of it had been found at the start.
-TEST(Holds, OfAnchorsAreTheSameWheneverTheyAreAskedFor) {
+TEST(BoundarySprings, OfAnchorsAreTheSameWheneverTheyAreAskedFor) {
   std::mt19937 random(9);
   for (int n = 0; n < 6; ++n) {
     LabelVolume volume = block({80, 40, 36});
@@ -150,7 +150,7 @@ TEST(Holds, OfAnchorsAreTheSameWheneverTheyAreAskedFor) {
     }
     const Lattice lattice(volume, options);
     Levels at_once_levels(lattice), later_levels(lattice);
-    Holds at_once(lattice, at_once_levels.pointers), later(lattice, later_levels.pointers);
+    BoundarySprings at_once(lattice, at_once_levels.pointers), later(lattice, later_levels.pointers);
     at_once.prepare_all();
     const auto any_row = [&](int level) {
       return static_cast<voxel::RowId>(random() %
@@ -167,9 +167,9 @@ TEST(Holds, OfAnchorsAreTheSameWheneverTheyAreAskedFor) {
                                      static_cast<int>(random() % 36));
         if (lattice.filled(v)) held.push_back(v);
       }
-      const Holds::Support by =
-          Holds::along(glm::normalize(glm::vec3(0.3F, -0.5F, 0.8F)), Holds::Support::By::tool);
-      for (Holds* holds : {&at_once, &later}) {
+      const BoundarySprings::Support by = BoundarySprings::along(glm::normalize(glm::vec3(0.3F, -0.5F, 0.8F)),
+                                                                 BoundarySprings::Support::By::tool);
+      for (BoundarySprings* holds : {&at_once, &later}) {
         holds->set_held(std::span(held).first(3));
         holds->support(held.back(), by);
         holds->renew();
@@ -193,27 +193,28 @@ TEST(Holds, OfAnchorsAreTheSameWheneverTheyAreAskedFor) {
 }
 
 // Voxels that slide along an inclined surface hold the cells above them along its normal, and not across.
-TEST(Holds, WhatSlidesHoldsAlongItsNormalAlone) {
+TEST(BoundarySprings, WhatSlidesHoldsAlongItsNormalAlone) {
   LatticeOptions options;
   options.materials[1] = elastic(1e4, 0.3);
   options.anchor_faces = {"-z"};
   const Lattice lattice(block({24, 20, 18}), options);
   Levels levels(lattice);
-  Holds holds(lattice, levels.pointers);
+  BoundarySprings holds(lattice, levels.pointers);
   const glm::vec3 n = glm::normalize(glm::vec3(0.5F, -0.4F, 0.8F));
   const voxel::Spring link = lattice.spring_within(1, 2);
   const VoxelId cell = levels.pointers[1]->grid().at(6, 5, 8);
   const auto k = [&link](int axis) { return 8.0 * static_cast<double>(link.on(axis, 2)); };
   double compliance = 0.0;  // along the normal, of the springs of all axes in series
   for (int axis = 0; axis < 3; ++axis) compliance += static_cast<double>(n[axis] * n[axis]) / k(axis);
-  for (const Holds::Support::By by : {Holds::Support::By::obstacle, Holds::Support::By::tool}) {
+  for (const BoundarySprings::Support::By by :
+       {BoundarySprings::Support::By::obstacle, BoundarySprings::Support::By::tool}) {
     for (int j = 0; j < 20; ++j) {
-      for (int i = 0; i < 24; ++i) holds.support(lattice.grid().at(i, j, 17), Holds::along(n, by));
+      for (int i = 0; i < 24; ++i) holds.support(lattice.grid().at(i, j, 17), BoundarySprings::along(n, by));
     }
     holds.renew();
     const auto expected = [&](int row, int column) {
       const double of_springs =
-          by == Holds::Support::By::tool ? 1.0 / compliance : std::sqrt(k(row) * k(column));
+          by == BoundarySprings::Support::By::tool ? 1.0 / compliance : std::sqrt(k(row) * k(column));
       return of_springs * static_cast<double>(n[row] * n[column]);
     };
     for (int axis = 0; axis < 3; ++axis)
@@ -228,20 +229,21 @@ TEST(Holds, WhatSlidesHoldsAlongItsNormalAlone) {
 }
 
 // However surfaces are inclined, nothing that holds a cell pushes it on.
-TEST(Holds, NeverPush) {
+TEST(BoundarySprings, NeverPush) {
   LatticeOptions options;
   options.materials[1] = elastic(1e4, 0.3);
   options.anchor_faces = {"-x"};
   const Lattice lattice(block({24, 20, 18}), options);
   Levels levels(lattice);
-  Holds holds(lattice, levels.pointers);
+  BoundarySprings holds(lattice, levels.pointers);
   std::mt19937 random(7);
   std::normal_distribution<float> any;
   for (int j = 3; j < 17; ++j) {
     for (int i = 2; i < 22; ++i) {
       const glm::vec3 n = glm::normalize(glm::vec3(any(random), any(random), any(random)));
-      const auto by = random() % 2 == 0 ? Holds::Support::By::obstacle : Holds::Support::By::tool;
-      if (random() % 3 != 0) holds.support(lattice.grid().at(i, j, 17), Holds::along(n, by));
+      const auto by =
+          random() % 2 == 0 ? BoundarySprings::Support::By::obstacle : BoundarySprings::Support::By::tool;
+      if (random() % 3 != 0) holds.support(lattice.grid().at(i, j, 17), BoundarySprings::along(n, by));
     }
   }
   holds.renew();
@@ -319,7 +321,7 @@ double left_by_a_cycle(const std::array<int, 3>& dims, int patch, Patch by = Pat
   };
   Relaxation relaxation(lattice);
   relaxation.set_tolerance(1e-12 * lattice.force_scale_N());
-  relaxation.stir_all();
+  relaxation.mark_all_dirty();
   constexpr int kCycles = 6;
   const double before = energy();
   for (int n = 0; n < kCycles; ++n) {
@@ -329,7 +331,7 @@ double left_by_a_cycle(const std::array<int, 3>& dims, int patch, Patch by = Pat
   return std::pow(energy() / before, 0.5 / kCycles);
 }
 
-TEST(Holds, ACycleLeavesAsLittleOfTheErrorAtAnySize) {
+TEST(BoundarySprings, ACycleLeavesAsLittleOfTheErrorAtAnySize) {
   for (const int size : {8, 16, 32, 64}) {
     const double left = left_by_a_cycle({size, size, size}, 0);
     std::cout << size << " voxels an edge: " << left << '\n';
@@ -343,7 +345,7 @@ TEST(Holds, ACycleLeavesAsLittleOfTheErrorAtAnySize) {
   EXPECT_LT(left_by_a_cycle({1, 1, 64}, 0), 0.33);
 }
 
-TEST(Holds, ACycleRoundWhatTheToolHoldsLeavesNoMore) {
+TEST(BoundarySprings, ACycleRoundWhatTheToolHoldsLeavesNoMore) {
   for (const int patch : {1, 5, 9, 17}) {
     const double left = left_by_a_cycle({33, 31, 30}, patch);
     std::cout << patch << " voxels held: " << left << '\n';
@@ -352,7 +354,7 @@ TEST(Holds, ACycleRoundWhatTheToolHoldsLeavesNoMore) {
 }
 
 // Nor where a patch is small beside the block, of which coarse levels see little, or slides.
-TEST(Holds, ACycleRoundASmallOrSlidingPatchLeavesNoMore) {
+TEST(BoundarySprings, ACycleRoundASmallOrSlidingPatchLeavesNoMore) {
   for (const int size : {48, 96}) {
     for (const Patch by : {Patch::held, Patch::slides}) {
       const double left = left_by_a_cycle({size, size, size}, 17, by);

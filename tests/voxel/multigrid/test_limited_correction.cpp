@@ -78,7 +78,7 @@ double tolerance(const Pulled& p, const Displacement& before) {
   return 8.0 * std::max(tests::rounding(p.scene, p.state), tests::rounding(p.scene, before));
 }
 
-TEST(JointMove, LeavesNoLinkBeyondItsLimitsAndGoesNoFurtherThanAsked) {
+TEST(LimitedCorrection, LeavesNoLinkBeyondItsLimitsAndGoesNoFurtherThanAsked) {
   Random random(1);
   for (int n = 0; n < tests::scenes(200); ++n) {
     Pulled p(random);
@@ -97,7 +97,7 @@ TEST(JointMove, LeavesNoLinkBeyondItsLimitsAndGoesNoFurtherThanAsked) {
   }
 }
 
-TEST(JointMove, WhereAllGoTheSameWayTheLeastThatMustComesBack) {
+TEST(LimitedCorrection, WhereAllGoTheSameWayTheLeastThatMustComesBack) {
   Random random(2);
   double worst = 0.0;
   for (int n = 0; n < tests::scenes(200); ++n) {
@@ -136,7 +136,7 @@ TEST(JointMove, WhereAllGoTheSameWayTheLeastThatMustComesBack) {
   RecordProperty("worst", std::to_string(worst));
 }
 
-TEST(JointMove, ArrivesWhereItWasAskedToWhereLinksAllowThat) {
+TEST(LimitedCorrection, ArrivesWhereItWasAskedToWhereLinksAllowThat) {
   Random random(3);
   for (int n = 0; n < tests::scenes(200); ++n) {
     Pulled p(random);

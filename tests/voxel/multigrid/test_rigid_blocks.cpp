@@ -82,13 +82,13 @@ struct Scene {
   }
   // In turns, as a session has them: `ticks` of them with the tool there.
   enum class Relaxed { here, by_another_thread };
-  void hold(voxel::Replica& replica, const voxel::ToolInBody& tool, int ticks,
+  void hold(voxel::ShadowObject& replica, const voxel::ToolInBody& tool, int ticks,
             Relaxed relaxed = Relaxed::here) {
     for (int n = 0; n < ticks; ++n) {
       touch(tool);
       object->push_out(tool);
       object->relax_near(tool, 2);
-      if (!voxel::Replica::wanted(*object)) continue;
+      if (!voxel::ShadowObject::wanted(*object)) continue;
       replica.give(*object);
       if (relaxed == Relaxed::here) {
         replica.relax();
@@ -100,7 +100,7 @@ struct Scene {
     }
   }
   // The tool comes down to `depth` in steps, and stays.
-  void press(voxel::Replica& replica, double radius, double depth, double x, double y, int ticks = 120) {
+  void press(voxel::ShadowObject& replica, double radius, double depth, double x, double y, int ticks = 120) {
     constexpr int kSteps = 10;
     for (int n = 1; n <= kSteps; ++n) hold(replica, ball(radius, depth * n / kSteps, x, y), 1);
     hold(replica, ball(radius, depth, x, y), ticks);
@@ -216,7 +216,7 @@ void expect_at_equilibrium(Scene& scene, const voxel::ToolInBody& tool, Limits l
 }
 
 // Nothing moved any more when the tool has gone.
-void expect_restored(Scene& scene, voxel::Replica& replica, voxel::ToolInBody tool, int ticks = 150) {
+void expect_restored(Scene& scene, voxel::ShadowObject& replica, voxel::ToolInBody tool, int ticks = 150) {
   tool.centre.z += 1.0;
   scene.hold(replica, tool, ticks);
   EXPECT_LT(scene.furthest_m(), 1e-3 * kSpacing);
@@ -243,15 +243,15 @@ const std::array<Shape, 4>& shapes() {
   return kShapes;
 }
 
-TEST(WholeParts, AreWhatHangsTogetherAndAtAnchorsAreAnchored) {
+TEST(RigidBlocks, AreWhatHangsTogetherAndAtAnchorsAreAnchored) {
   // Two plates, one of them on the anchors.
   const Scene scene({8, 7, 9}, kLoose, [](int, int, int k) { return k < 2 || k >= 6; });
-  EXPECT_EQ(scene.lattice->part_count(), 1U);
+  EXPECT_EQ(scene.lattice->block_count(), 1U);
   EXPECT_EQ(scene.lattice->anchored_count(), 2U * 8 * 7);
   for (int k = 0; k < 9; ++k) EXPECT_EQ(scene.lattice->part(scene.lattice->at(3, 3, k)), k >= 6 ? 1 : 0) << k;
 }
 
-TEST(WholeParts, OnAnchorsAreAsRigid) {
+TEST(RigidBlocks, OnAnchorsAreAsRigid) {
   Scene scene({8, 7, 6}, kLoose, [](int, int, int) { return true; });
   EXPECT_EQ(scene.lattice->anchored_count(), scene.lattice->voxel_count());
   const auto tool = scene.ball(3.0, 0.5, 3.5, 3.0);
@@ -264,12 +264,12 @@ TEST(WholeParts, OnAnchorsAreAsRigid) {
 }
 
 // The same wherever the tool is: over the middle, beside it, and where it comes from one place to another.
-TEST(WholeParts, AreFeltAsTheyAreHeldByTissue) {
+TEST(RigidBlocks, AreFeltAsTheyAreHeldByTissue) {
   for (const Shape& shape : shapes()) {
     SCOPED_TRACE(shape.name);
     Scene scene(kDims, kLoose, shape.tight);
-    EXPECT_EQ(scene.lattice->part_count(), 1U);
-    voxel::Replica replica(*scene.object);
+    EXPECT_EQ(scene.lattice->block_count(), 1U);
+    voxel::ShadowObject replica(*scene.object);
     scene.press(replica, 4.0, shape.depth, 11.5, 9.5);
     expect_at_equilibrium(scene, scene.ball(4.0, shape.depth, 11.5, 9.5), Limits::none);
     for (int n = 1; n <= 20; ++n) {
@@ -283,11 +283,11 @@ TEST(WholeParts, AreFeltAsTheyAreHeldByTissue) {
   }
 }
 
-TEST(WholeParts, AreFeltThroughLinksAtTheirLimits) {
+TEST(RigidBlocks, AreFeltThroughLinksAtTheirLimits) {
   for (const Shape& shape : shapes()) {
     SCOPED_TRACE(shape.name);
     Scene scene(kDims, kLimited, shape.tight);
-    voxel::Replica replica(*scene.object);
+    voxel::ShadowObject replica(*scene.object);
     const double depth = 0.6 * shape.depth;
     scene.press(replica, 4.0, depth, 11.5, 9.5);
     expect_at_equilibrium(scene, scene.ball(4.0, depth, 11.5, 9.5), Limits::active);
@@ -296,13 +296,13 @@ TEST(WholeParts, AreFeltThroughLinksAtTheirLimits) {
 }
 
 // Small ones, and some that sprawl between them, with links at their limits beside the tool.
-TEST(WholeParts, ScatteredAreFeltToo) {
+TEST(RigidBlocks, ScatteredAreFeltToo) {
   for (const std::uint32_t seed : {1U, 2U, 3U}) {
     SCOPED_TRACE(seed);
     tests::Random random(seed);
     Scene scene({18, 16, 12}, kLoose, [&random](int, int, int k) { return random.unit() < 0.25 && k > 0; });
-    EXPECT_GT(scene.lattice->part_count(), 50U);
-    voxel::Replica replica(*scene.object);
+    EXPECT_GT(scene.lattice->block_count(), 50U);
+    voxel::ShadowObject replica(*scene.object);
     const auto tool = scene.ball(4.0, 1.0, 8.6, 7.3);
     scene.press(replica, 4.0, 1.0, 8.6, 7.3, 300);
     expect_at_equilibrium(scene, tool, Limits::active);
@@ -310,13 +310,13 @@ TEST(WholeParts, ScatteredAreFeltToo) {
   }
 }
 
-TEST(WholeParts, AreTheSameToTheLastBitWhicheverThreadRelaxes) {
+TEST(RigidBlocks, AreTheSameToTheLastBitWhicheverThreadRelaxes) {
   for (const Shape& shape : shapes()) {
     std::array<std::unique_ptr<Scene>, 2> scenes;
     for (const auto relaxed : {Scene::Relaxed::here, Scene::Relaxed::by_another_thread}) {
       auto& scene = scenes[relaxed == Scene::Relaxed::here ? 0 : 1];
       scene = std::make_unique<Scene>(kDims, kLimited, shape.tight);
-      voxel::Replica replica(*scene->object);
+      voxel::ShadowObject replica(*scene->object);
       for (int n = 0; n < 20; ++n) scene->hold(replica, scene->ball(4.0, 0.05 * n, 11.5, 9.5), 1, relaxed);
     }
     for (std::size_t axis = 0; axis < 3; ++axis)

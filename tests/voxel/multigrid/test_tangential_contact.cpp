@@ -18,9 +18,9 @@ namespace {
 
 using tests::elastic;
 using tests::SoftBlock;
-using voxel::Couplings;
 using voxel::Displacement;
 using voxel::Lattice;
+using voxel::LevelStiffness;
 using voxel::VoxelId;
 
 constexpr double kH = 2e-3;  // spacing (m)
@@ -29,7 +29,7 @@ constexpr double kH = 2e-3;  // spacing (m)
 // more, without leaving it, and its energy falls by what the way in between is worth.
 TEST(Sliding, GoesToTheLeastEnergyAlongTheTool) {
   const Lattice lattice(tests::block({6, 6, 6}, glm::dvec3(kH)), tests::made_of(elastic(1e4, 0.3)));
-  Couplings couplings(lattice, nullptr);
+  LevelStiffness couplings(lattice, nullptr);
   std::mt19937 random(3);
   std::uniform_real_distribution<float> some(-0.1F, 0.1F);
   std::normal_distribution<float> any;
@@ -59,7 +59,7 @@ TEST(Sliding, GoesToTheLeastEnergyAlongTheTool) {
 TEST(Sliding, StaysWhereLinksKeepIt) {
   const voxel::LinkMaterial tied{.young_Pa = 1e4, .stretch_min = 0.99, .stretch_max = 1.01, .shear = 0.01};
   const Lattice lattice(tests::block({6, 6, 6}, glm::dvec3(kH)), tests::made_of(tied));
-  Couplings couplings(lattice, nullptr);
+  LevelStiffness couplings(lattice, nullptr);
   Displacement state(lattice);
   const VoxelId v = lattice.grid().at(2, 3, 5);
   state.set_role(v, Displacement::pressed);

@@ -16,7 +16,7 @@ namespace {
 using tests::elastic;
 using tests::SoftBlock;
 using voxel::LinkMaterial;
-using voxel::Replica;
+using voxel::ShadowObject;
 using voxel::ToolInBody;
 
 constexpr double kH = 1e-3;  // spacing (m)
@@ -29,14 +29,14 @@ constexpr LinkMaterial kFirm{
 constexpr double kRoundings = 6.0;
 
 // One exchange as ticks make it; `rows` a tick.
-void exchange(Replica& replica, SoftBlock& soft, std::size_t rows) {
+void exchange(ShadowObject& replica, SoftBlock& soft, std::size_t rows) {
   replica.give(*soft.object);
   replica.relax();
   replica.take(*soft.object);
   while (!replica.drained()) replica.drain(*soft.object, rows);
 }
 
-void press_and_let_go(Replica& replica, SoftBlock& soft) {
+void press_and_let_go(ShadowObject& replica, SoftBlock& soft) {
   const ToolInBody tool = soft.ball(6 * kH, 3 * kH);
   soft.touch(tool, 9 * kH);
   for (int n = 0; n < 10; ++n) {
@@ -55,12 +55,12 @@ double largest_difference(const voxel::SoftObject& a, const voxel::SoftObject& b
   return most;
 }
 
-TEST(Replica, AHeldContactComesToTheSameRest) {
+TEST(ShadowObject, AHeldContactComesToTheSameRest) {
   for (const LinkMaterial& material : {elastic(1e4, 0.3), kFirm}) {
     SoftBlock apart({41, 37, 25}, kH, material), there({41, 37, 25}, kH, material);
     const ToolInBody tool = apart.ball(6 * kH, 1.5 * kH);
     const voxel::Reaction wanted = there.press(tool, 9 * kH, 1e-5, 2000);
-    Replica replica(*apart.object);
+    ShadowObject replica(*apart.object);
     apart.touch(tool, 9 * kH);
     voxel::Reaction felt;
     for (int n = 0; n < 60; ++n) {
@@ -77,9 +77,9 @@ TEST(Replica, AHeldContactComesToTheSameRest) {
 
 // For as long as one likes: what the one and the other find are parts of the same way, not the same way
 // twice. (When they were, the force wavered by its own size.)
-TEST(Replica, AHeldContactStaysAtRest) {
+TEST(ShadowObject, AHeldContactStaysAtRest) {
   SoftBlock soft({41, 37, 25}, kH, kFirm);
-  Replica replica(*soft.object);
+  ShadowObject replica(*soft.object);
   const ToolInBody tool = soft.ball(6 * kH, 2 * kH);
   std::vector<double> felt;
   for (int n = 0; n < 400; ++n) {
@@ -104,7 +104,7 @@ TEST(Replica, AHeldContactStaysAtRest) {
 // from what it was to what it is at once in even steps, and ends there.
 // (Pressed so little that no link is at its limits: what these do not let a row follow depends on how it
 // comes.)
-TEST(Replica, AResultInPartsIsFeltInEvenSteps) {
+TEST(ShadowObject, AResultInPartsIsFeltInEvenSteps) {
   constexpr int parts = 8;
   SoftBlock whole({41, 37, 25}, kH, elastic(1e4, 0.3)), some({41, 37, 25}, kH, elastic(1e4, 0.3));
   const ToolInBody tool = whole.ball(6 * kH, 0.3 * kH);
@@ -113,11 +113,11 @@ TEST(Replica, AResultInPartsIsFeltInEvenSteps) {
     soft.object->relax_near(tool, 1);
     return soft.object->reaction(tool).force_N.z;
   };
-  Replica of_whole(*whole.object), of_some(*some.object);
+  ShadowObject of_whole(*whole.object), of_some(*some.object);
   double before = 0.0, after = 0.0;
   std::vector<double> felt;
   for (SoftBlock* soft : {&whole, &some}) {
-    Replica& replica = soft == &whole ? of_whole : of_some;
+    ShadowObject& replica = soft == &whole ? of_whole : of_some;
     soft->touch(tool, 9 * kH);
     before = feel(*soft);
     replica.give(*soft->object);
@@ -145,11 +145,11 @@ TEST(Replica, AResultInPartsIsFeltInEvenSteps) {
 }
 
 // And one that is cut short, as when the tool moves, has come whole.
-TEST(Replica, AResultInPartsThatIsCutShortHasComeWhole) {
+TEST(ShadowObject, AResultInPartsThatIsCutShortHasComeWhole) {
   SoftBlock whole({41, 37, 25}, kH, elastic(1e4, 0.3)), some({41, 37, 25}, kH, elastic(1e4, 0.3));
   for (SoftBlock* soft : {&whole, &some}) {
     const ToolInBody tool = soft->ball(6 * kH, 0.3 * kH);
-    Replica replica(*soft->object);
+    ShadowObject replica(*soft->object);
     soft->touch(tool, 9 * kH);
     soft->object->push_out(tool);
     soft->object->relax_near(tool, 1);
@@ -166,12 +166,12 @@ TEST(Replica, AResultInPartsThatIsCutShortHasComeWhole) {
   EXPECT_LT(largest_difference(*whole.object, *some.object), 1e-5 * kH);
 }
 
-TEST(Replica, WhatTheToolLeftComesToRestAndIsLeftAlone) {
+TEST(ShadowObject, WhatTheToolLeftComesToRestAndIsLeftAlone) {
   SoftBlock soft({41, 37, 25}, kH, elastic(1e4, 0.3));
-  Replica replica(*soft.object);
+  ShadowObject replica(*soft.object);
   press_and_let_go(replica, soft);
   int exchanges = 0;
-  for (; exchanges < 200 && Replica::wanted(*soft.object); ++exchanges) exchange(replica, soft, 1000);
+  for (; exchanges < 200 && ShadowObject::wanted(*soft.object); ++exchanges) exchange(replica, soft, 1000);
   EXPECT_LT(exchanges, 60);
   double most = 0.0;
   for (voxel::VoxelId v = 0; v < soft.lattice->size(); ++v)
@@ -196,10 +196,10 @@ ToolInBody press_at_once(SoftBlock& soft) {
 constexpr std::array<int, 3> kWide{75, 73, 57};
 constexpr LinkMaterial kLoose{.stretch_min = 0.05, .stretch_max = 10.0, .shear = 10.0};
 
-TEST(Replica, AJumpIsFeltRightAfterThreeResults) {
+TEST(ShadowObject, AJumpIsFeltRightAfterThreeResults) {
   for (const LinkMaterial& material : {LinkMaterial{}, kLoose}) {
     SoftBlock soft(kWide, kH, material), there(kWide, kH, material);
-    Replica replica(*soft.object);
+    ShadowObject replica(*soft.object);
     const ToolInBody tool = press_at_once(soft);
     const double wanted = there.press(tool, 13 * kH, 1e-5, 200).force_N.z;
     for (int n = 0; n < 3; ++n) {
@@ -215,10 +215,10 @@ TEST(Replica, AJumpIsFeltRightAfterThreeResults) {
 }
 
 // A result moves rows by spacings, and none can go there before those beside it: all get there all the same.
-TEST(Replica, WhatMovesFarIsAddedWhole) {
+TEST(ShadowObject, WhatMovesFarIsAddedWhole) {
   for (const LinkMaterial& material : {LinkMaterial{}, kLoose}) {
     SoftBlock soft(kWide, kH, material);
-    Replica replica(*soft.object);
+    ShadowObject replica(*soft.object);
     const ToolInBody tool = press_at_once(soft);
     soft.object->relax_near(tool, 2);
     exchange(replica, soft, 250);
@@ -236,14 +236,14 @@ TEST(Replica, WhatMovesFarIsAddedWhole) {
 }
 
 // Far from the contact small changes wait, but not for ever: at rest both know the same.
-TEST(Replica, WhatWasKeptBackIsPassedOnAtRest) {
+TEST(ShadowObject, WhatWasKeptBackIsPassedOnAtRest) {
   SoftBlock soft({41, 65, 65}, kH, elastic(1e4, 0.3));
-  Replica replica(*soft.object);
+  ShadowObject replica(*soft.object);
   const ToolInBody tool = soft.ball(6 * kH, 2 * kH);
   soft.touch(tool, 9 * kH);
   soft.object->push_out(tool);
-  for (int n = 0; n < 300 && Replica::wanted(*soft.object); ++n) exchange(replica, soft, 1000);
-  ASSERT_FALSE(Replica::wanted(*soft.object));
+  for (int n = 0; n < 300 && ShadowObject::wanted(*soft.object); ++n) exchange(replica, soft, 1000);
+  ASSERT_FALSE(ShadowObject::wanted(*soft.object));
   double most = 0.0;
   for (voxel::VoxelId v = 0; v < soft.lattice->size(); ++v) {
     if (!soft.lattice->filled(v)) continue;
@@ -255,19 +255,19 @@ TEST(Replica, WhatWasKeptBackIsPassedOnAtRest) {
 
 // Draining what was found takes longer than the next is given: what a tick moves meanwhile is given without
 // what it has yet to go, and must not go that twice. The block comes loose and is to come to rest.
-TEST(Replica, WhatIsGivenWhileItIsDrainedGoesItsWayOnce) {
+TEST(ShadowObject, WhatIsGivenWhileItIsDrainedGoesItsWayOnce) {
   SoftBlock soft({41, 37, 25}, kH, elastic(1e4, 0.3));
-  Replica replica(*soft.object);
+  ShadowObject replica(*soft.object);
   press_and_let_go(replica, soft);
   const double first = soft.object->energy_J();
   // Voxels that somebody moves by nothing, so that their rows are given each time.
-  const voxel::VoxelId stirred = soft.lattice->grid().at(20, 18, 12);
+  const voxel::VoxelId dirty = soft.lattice->grid().at(20, 18, 12);
   for (int n = 0; n < 40; ++n) {
     replica.give(*soft.object);
     replica.relax();
     while (!replica.drained()) {
       replica.drain(*soft.object, 40);
-      soft.object->move(stirred, soft.object->state().at(stirred));
+      soft.object->move(dirty, soft.object->state().at(dirty));
     }
     replica.take(*soft.object);
     for (voxel::VoxelId v = 0; v < soft.lattice->size(); v += 7 * voxel::kRow) {
@@ -280,10 +280,10 @@ TEST(Replica, WhatIsGivenWhileItIsDrainedGoesItsWayOnce) {
 // The tool stands still, and in turns the tick has its cycles round the contact and the replica its own, of a
 // state that is so many ticks old. What voxels the tool presses changes, so energy is compared with the
 // tool's work left out: of the same pressed voxels in the same places.
-TEST(Replica, TheSumNeverHasMoreEnergyThanWhatWasGiven) {
+TEST(ShadowObject, TheSumNeverHasMoreEnergyThanWhatWasGiven) {
   for (const LinkMaterial& material : {elastic(1e4, 0.3), kFirm}) {
     SoftBlock soft({41, 37, 25}, kH, material);
-    Replica replica(*soft.object);
+    ShadowObject replica(*soft.object);
     const ToolInBody tool = soft.ball(6 * kH, 2 * kH);
     soft.touch(tool, 9 * kH);
     soft.object->push_out(tool);
@@ -310,9 +310,9 @@ TEST(Replica, TheSumNeverHasMoreEnergyThanWhatWasGiven) {
 }
 
 // A tool that moves on while results are old, deep where the chain is tight: limits hold after every slice.
-TEST(Replica, NoLinkLeavesItsLimitsInBetween) {
+TEST(ShadowObject, NoLinkLeavesItsLimitsInBetween) {
   SoftBlock soft({31, 29, 19}, kH, kFirm);
-  Replica replica(*soft.object);
+  ShadowObject replica(*soft.object);
   std::mt19937_64 random(7);
   const auto uniform = [&random](double low, double high) {
     return low + (high - low) * (static_cast<double>(random() >> 11) * 0x1.0p-53);
@@ -331,7 +331,7 @@ TEST(Replica, NoLinkLeavesItsLimitsInBetween) {
       replica.take(*soft.object);
       given = false;
     }
-    if (!given && Replica::wanted(*soft.object)) {
+    if (!given && ShadowObject::wanted(*soft.object)) {
       replica.give(*soft.object);
       replica.relax();
       given = true;

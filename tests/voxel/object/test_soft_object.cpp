@@ -186,13 +186,13 @@ TEST(SoftObject, WhatIsTiedToAnchorsIsHeldFast) {
   SoftBlock soft({9, 9, 6}, kH, kFirm);
   const VoxelId v = soft.lattice->at(4, 4, 5);
   const glm::dvec3 down(0.1, 0.0, -1.0), up(0.0, 0.1, 1.0);
-  EXPECT_FALSE(soft.object->held_fast(v, down));
+  EXPECT_FALSE(soft.object->is_immovable(v, down));
   ToolInBody tool = soft.ball(3 * kH, 2 * kH);  // four times as deep as five links of a tenth let it
   soft.touch(tool, 6 * kH);
   soft.object->push_out(tool);
-  EXPECT_TRUE(soft.object->held_fast(v, down));
-  EXPECT_FALSE(soft.object->held_fast(v, up));
-  EXPECT_TRUE(soft.object->held_fast(soft.lattice->at(0, 0, 0), up));  // an anchor
+  EXPECT_TRUE(soft.object->is_immovable(v, down));
+  EXPECT_FALSE(soft.object->is_immovable(v, up));
+  EXPECT_TRUE(soft.object->is_immovable(soft.lattice->at(0, 0, 0), up));  // an anchor
 }
 
 TEST(SoftObject, NoToolSlipsBetweenVoxels) {

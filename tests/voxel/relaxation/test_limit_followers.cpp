@@ -21,7 +21,7 @@ using voxel::Lattice;
 using voxel::VoxelId;
 
 constexpr float kNearlyTight = 0.1F, kTight = 1e-4F;  // of the spacing, as there
-constexpr float kStir = 1e-5F;
+constexpr float kDirtyMotion = 1e-5F;
 constexpr std::size_t kMostRoots = 64;
 
 // How far the link of two neighbours along d is from its limits.
@@ -34,7 +34,7 @@ float room(const Lattice& lattice, const Displacement& state, VoxelId v, VoxelId
 }
 
 float place_of(voxel::Relaxation& relaxation, const Displacement& state, VoxelId v, int axis) {
-  glm::dvec3 rest = link_minimum(relaxation.couplings(), state, v);
+  glm::dvec3 rest = unconstrained_minimum(relaxation.couplings(), state, v);
   if (relaxation.away())
     rest += link_compliance(relaxation.couplings(), v) * relaxation.multigrid().balance_of(v, state);
   return voxel::clamp_to(link_interval(relaxation.couplings().lattice(), state, v, axis),
@@ -46,9 +46,9 @@ std::set<VoxelId> draw(voxel::Relaxation& relaxation, Displacement& state, const
                        int axis, std::size_t& drawn) {
   const Lattice& lattice = relaxation.couplings().lattice();
   auto& u = state.u[static_cast<std::size_t>(axis)];
-  std::set<VoxelId> known(roots.begin(), roots.end()), stirred;
+  std::set<VoxelId> known(roots.begin(), roots.end()), dirty;
   std::vector<VoxelId> carried = roots;
-  const std::size_t most = roots.size() + voxel::DrawnRows::kMostDrawn;
+  const std::size_t most = roots.size() + voxel::LimitFollowers::kMostDrawn;
   for (std::size_t head = 0; head < carried.size() && carried.size() < most; ++head) {
     for (int n = 0; n < 6; ++n) {
       const int d = n / 2;
@@ -61,14 +61,14 @@ std::set<VoxelId> draw(voxel::Relaxation& relaxation, Displacement& state, const
       if (room(lattice, state, v, w, d, up, axis) > kNearlyTight * spacing) continue;
       const float before = u[w];
       u[w] = place_of(relaxation, state, w, axis);
-      if (std::abs(u[w] - before) > kStir * spacing) stirred.insert(w);
+      if (std::abs(u[w] - before) > kDirtyMotion * spacing) dirty.insert(w);
       if (room(lattice, state, v, w, d, up, axis) > kTight * spacing) continue;
       known.insert(w);
       carried.push_back(w);
     }
   }
   drawn += carried.size() - roots.size();
-  return stirred;
+  return dirty;
 }
 
 struct Counts {
@@ -100,7 +100,7 @@ void compare(const voxel::LabelVolume& volume, const voxel::LatticeOptions& opti
   }
   if (roots.empty()) return;
   chain.settle(state, roots, moves, {});
-  for (const voxel::RowId row : chain.moved_rows()) relaxation.stir(row);
+  for (const voxel::RowId row : chain.moved_rows()) relaxation.mark_dirty(row);
   if (lattice.has_bricks()) relaxation.multigrid().renew_bricks(state, lattice.grid().rows());
   // What lies on a tool is not moved by this, whether it is a root or not.
   for (const VoxelId v : roots) {
@@ -110,7 +110,7 @@ void compare(const voxel::LabelVolume& volume, const voxel::LatticeOptions& opti
     state.set_role(v, Displacement::held);
   if (apart) {
     relaxation.leave_to_another();
-    relaxation.give_away(state, {});
+    relaxation.assign_residual(state, {});
     for (const voxel::RowId row : chain.moved_rows()) relaxation.multigrid().balance(row, state, {});
   }
   const auto back = static_cast<float>(random.between(-0.05, 0.05));
@@ -120,11 +120,11 @@ void compare(const voxel::LabelVolume& volume, const voxel::LatticeOptions& opti
   relaxation.multigrid().log().clear();
 
   Displacement simple = state;
-  std::set<VoxelId> stirred;
+  std::set<VoxelId> dirty;
   std::size_t drawn = 0;
   for (int axis = 0; axis < 3; ++axis) {
     std::size_t on_axis = 0;
-    stirred.merge(draw(relaxation, simple, roots, axis, on_axis));
+    dirty.merge(draw(relaxation, simple, roots, axis, on_axis));
     drawn += on_axis;
     counts.most = std::max(counts.most, on_axis);
   }
@@ -133,14 +133,14 @@ void compare(const voxel::LabelVolume& volume, const voxel::LatticeOptions& opti
     const VoxelId v = tests::voxel_of(lattice, volume, index);
     if (simple.at(v) != state.at(v)) moved.push_back(v);
   }
-  voxel::DrawnRows rows(lattice, kMostRoots);
-  rows.draw(relaxation, state, roots, kStir);
+  voxel::LimitFollowers rows(lattice, kMostRoots);
+  rows.draw(relaxation, state, roots, kDirtyMotion);
   for (const std::size_t index : filled) {
     const VoxelId v = tests::voxel_of(lattice, volume, index);
     for (std::size_t axis = 0; axis < 3; ++axis)
       ASSERT_EQ(state.u[axis][v], simple.u[axis][v]) << "voxel " << v << ", axis " << axis;
   }
-  for (const VoxelId v : stirred)
+  for (const VoxelId v : dirty)
     EXPECT_TRUE(relaxation.multigrid().has(0, v / voxel::kRow, voxel::Multigrid::active));
   for (const VoxelId v : moved) EXPECT_TRUE(!apart || relaxation.multigrid().log().has(0, v / voxel::kRow));
   counts.drawn += drawn;
@@ -152,7 +152,7 @@ std::ostream& operator<<(std::ostream& out, const Counts& counts) {
              << counts.moved << " moved";
 }
 
-TEST(DrawnRows, GoWhereTheyGoVoxelByVoxelInRandomScenes) {
+TEST(LimitFollowers, GoWhereTheyGoVoxelByVoxelInRandomScenes) {
   Random random(21);
   Counts counts;
   for (int n = 0; n < 400; ++n) {
@@ -168,7 +168,7 @@ TEST(DrawnRows, GoWhereTheyGoVoxelByVoxelInRandomScenes) {
   EXPECT_GT(counts.moved, 1000U);
 }
 
-TEST(DrawnRows, GoOnFromRowToRow) {
+TEST(LimitFollowers, GoOnFromRowToRow) {
   // Wider than a row of 32, of one label, whose rows share their springs, and of three; as many as are drawn
   // at most in some.
   Random random(22);
@@ -197,7 +197,7 @@ TEST(DrawnRows, GoOnFromRowToRow) {
     compare(volume, options, filled, n % 4 < 2, random, counts);
   }
   std::cout << counts << '\n';
-  EXPECT_GE(counts.most, voxel::DrawnRows::kMostDrawn);
+  EXPECT_GE(counts.most, voxel::LimitFollowers::kMostDrawn);
 }
 
 }  // namespace

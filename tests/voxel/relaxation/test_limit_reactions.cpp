@@ -44,8 +44,9 @@ void for_tight(const Lattice& lattice, const Displacement& state, VoxelId v, int
 }
 
 // What is pulled by less than rounding may hang or not: that is as `rows` say.
-std::set<VoxelId> looked_for(const Lattice& lattice, voxel::Couplings& couplings, const Displacement& state,
-                             const std::vector<VoxelId>& roots, int axis, const voxel::TightRows& rows) {
+std::set<VoxelId> looked_for(const Lattice& lattice, voxel::LevelStiffness& couplings,
+                             const Displacement& state, const std::vector<VoxelId>& roots, int axis,
+                             const voxel::LimitReactions& rows) {
   std::set<VoxelId> found(roots.begin(), roots.end());
   std::vector<VoxelId> waiting = roots;
   while (!waiting.empty()) {
@@ -75,7 +76,7 @@ void compare(const voxel::LabelVolume& volume, const voxel::LatticeOptions& opti
              const std::vector<std::size_t>& filled, Random& random, Counts& counts) {
   const Lattice lattice(volume, options);
   Displacement state(lattice);
-  voxel::Couplings couplings(lattice, nullptr);
+  voxel::LevelStiffness couplings(lattice, nullptr);
   voxel::ChainMail chain(lattice);
   std::vector<VoxelId> roots;
   std::vector<glm::vec3> moves;
@@ -93,7 +94,7 @@ void compare(const voxel::LabelVolume& volume, const voxel::LatticeOptions& opti
   chain.settle(state, roots, moves, {});
   std::sort(roots.begin(), roots.end());
   const auto is_root = [&](VoxelId v) { return std::binary_search(roots.begin(), roots.end(), v); };
-  voxel::TightRows rows(lattice);
+  voxel::LimitReactions rows(lattice);
   for (int axis = 0; axis < 3; ++axis) {
     rows.gather(couplings, state, roots, axis);
     const std::set<VoxelId> wanted = looked_for(lattice, couplings, state, roots, axis, rows);
@@ -118,7 +119,7 @@ void compare(const voxel::LabelVolume& volume, const voxel::LatticeOptions& opti
       carried += rows.carried(v) && !is_root(v) ? 1 : 0;
     }
     EXPECT_EQ(carried, wanted.size() - roots.size());
-    const voxel::TightRows::Hanging hanging = rows.hanging(couplings);
+    const voxel::LimitReactions::Hanging hanging = rows.hanging(couplings);
     EXPECT_NEAR(hanging.force_N, force, 1e-5 * size + 1e-6 * lattice.force_scale_N());
     EXPECT_NEAR(hanging.stiffness_N_per_m, stiffness, 1e-5 * stiffness);
     for (const VoxelId root : roots) {
@@ -137,7 +138,7 @@ void compare(const voxel::LabelVolume& volume, const voxel::LatticeOptions& opti
   }
 }
 
-TEST(TightRows, AreThoseFoundVoxelByVoxelInRandomScenes) {
+TEST(LimitReactions, AreThoseFoundVoxelByVoxelInRandomScenes) {
   Random random(11);
   Counts counts;
   for (int n = 0; n < 300; ++n) {
@@ -148,7 +149,7 @@ TEST(TightRows, AreThoseFoundVoxelByVoxelInRandomScenes) {
   EXPECT_GT(counts.hung, 1000U);
 }
 
-TEST(TightRows, GoOnFromRowToRow) {
+TEST(LimitReactions, GoOnFromRowToRow) {
   // Wider than a row of 32, of one label (whose rows share their springs) and of three.
   Random random(12);
   Counts counts;
@@ -176,7 +177,7 @@ TEST(TightRows, GoOnFromRowToRow) {
   EXPECT_GT(counts.across, 5);
 }
 
-TEST(TightRows, WhatHasNoSlackHangsOnItAllWhateverPullsIt) {
+TEST(LimitReactions, WhatHasNoSlackHangsOnItAllWhateverPullsIt) {
   // A plate that can only move as a whole, on tissue: no link inside of it is stretched, so nothing pulls the
   // voxels that carry the load to those that rest on the tissue.
   voxel::LabelVolume volume = tests::block({40, 10, 8}, glm::dvec3(1e-3));
@@ -191,8 +192,8 @@ TEST(TightRows, WhatHasNoSlackHangsOnItAllWhateverPullsIt) {
   for (std::size_t i = 0; i < volume.labels.size(); ++i) {
     if (volume.labels[i] == 2) state.set(tests::voxel_of(lattice, volume, i), {0.0, 0.0, -5e-4});
   }
-  voxel::Couplings couplings(lattice, nullptr);
-  voxel::TightRows rows(lattice);
+  voxel::LevelStiffness couplings(lattice, nullptr);
+  voxel::LimitReactions rows(lattice);
   const std::vector<VoxelId> root{lattice.at(35, 5, 7)};
   rows.gather(couplings, state, root, 2);
   for (std::size_t i = 0; i < volume.labels.size(); ++i)

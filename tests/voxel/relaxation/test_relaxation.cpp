@@ -59,7 +59,7 @@ LabelVolume connected_to_origin(LabelVolume volume) {
   return volume;
 }
 
-// Holds `v` at `u`, and tells the relaxation.
+// BoundarySprings `v` at `u`, and tells the relaxation.
 void hold(Displacement& state, std::vector<VoxelId>& held, VoxelId v, const glm::dvec3& u) {
   state.set(v, u);
   state.set_role(v, Displacement::held);
@@ -68,7 +68,7 @@ void hold(Displacement& state, std::vector<VoxelId>& held, VoxelId v, const glm:
 
 // Cycles until it sleeps; counts them.
 int relax(Relaxation& relaxation, Displacement& state, const std::vector<VoxelId>& held, int most = 2000) {
-  relaxation.stir_all();
+  relaxation.mark_all_dirty();
   relaxation.wake();
   int cycles = 0;
   while (!relaxation.asleep() && cycles < most) {
@@ -236,7 +236,7 @@ double largest_growth(bool limits_act) {
       chain.settle(state, {&v, 1}, {&move, 1}, {});
     }
     Relaxation relaxation(lattice);
-    relaxation.stir_all();
+    relaxation.mark_all_dirty();
     relaxation.wake();
     const double start = energy_of(lattice, scene.options, state);
     double before = start;
@@ -274,7 +274,7 @@ TEST(Relaxation, ItsResidualIsTheLargestForceLeft) {
     Displacement state(lattice);
     const auto held = press_patch(lattice, state, {0.0, 0.0, -0.3 * lattice.min_spacing_m()});
     Relaxation relaxation(lattice);
-    relaxation.stir_all();
+    relaxation.mark_all_dirty();
     relaxation.wake();
     const auto largest_force = [&] {
       double most = 0.0;
@@ -339,7 +339,7 @@ TEST(Relaxation, CyclesRoundAContactBetweenTilesEndWhereWholeOnesDo) {
     std::vector<VoxelId> held;
     pressed(state, held);
     Relaxation relaxation(lattice);
-    relaxation.stir_all();
+    relaxation.mark_all_dirty();
     relaxation.wake();
     for (int n = 0; n < 100 && !tiles; ++n) relaxation.run_cycle(state, {}, held);
     for (int n = 0; n < 4000 && tiles; ++n) {
@@ -357,7 +357,7 @@ TEST(Relaxation, CyclesRoundAContactBetweenTilesEndWhereWholeOnesDo) {
 struct Print {
   Print(const Lattice& lattice, bool apart) : state(lattice), relaxation(lattice) {
     if (apart) relaxation.leave_to_another();
-    relaxation.stir_all();
+    relaxation.mark_all_dirty();
     relaxation.wake();
     const auto& dims = lattice.grid().dims;
     for (int j = -4; j <= 4; ++j) {
@@ -442,7 +442,7 @@ TEST(Relaxation, WhereLimitsHoldTheStateIsTheOptimumOfTheProgram) {
     }
     chain.settle(state, held, moves, {});
     Relaxation relaxation(lattice);
-    relaxation.stir_all();
+    relaxation.mark_all_dirty();
     relaxation.wake();
     int cycles = 0;
     for (; cycles < 3000 && !relaxation.asleep(); ++cycles) {
@@ -500,7 +500,7 @@ TEST(Relaxation, WorkIsBoundedAndCutsChangeNoBit) {
     Displacement state(lattice);
     const auto held = press_patch(lattice, state, {0.0, 0.0, -0.3 * lattice.min_spacing_m()});
     Relaxation relaxation(lattice);
-    relaxation.stir_all();
+    relaxation.mark_all_dirty();
     relaxation.wake();
     std::uint64_t granted = 0, all_spent = 0;
     for (int n = 0; n < 10'000'000 && !relaxation.asleep(); ++n) {
@@ -528,7 +528,7 @@ TEST(Relaxation, AFreshObjectSleeps) {
   Relaxation relaxation(lattice);
   EXPECT_TRUE(relaxation.asleep());
   EXPECT_EQ(relaxation.run(state, {}, {}, 1000), 0U);
-  relaxation.stir_all();
+  relaxation.mark_all_dirty();
   relaxation.wake();
   EXPECT_LE(relax(relaxation, state, {}), 2);
   EXPECT_TRUE(relaxation.asleep());

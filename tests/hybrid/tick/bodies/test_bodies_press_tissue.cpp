@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Bodies on a path beside tissue: it leaves their way and comes back, and nothing overlaps after any tick.
+// Bodies on a path beside tissue: the tissue gives way and comes back, and nothing overlaps after any tick.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -12,10 +12,10 @@
 #include <string>
 #include <vector>
 
-#include "tests/hybrid/fixtures/overlap_checker.h"
 #include "polygon/files/mesh_file.h"
 #include "polygon/surface/primitives.h"
 #include "polygon/surface/signed_distance.h"
+#include "tests/hybrid/fixtures/overlap_checker.h"
 #include "tests/hybrid/fixtures/touch.h"
 #include "voxel/chain/chainmail.h"
 
@@ -33,7 +33,7 @@ constexpr double kLinks_m = 1e-8;
 struct Shape {
   const char* name;
   std::string text;
-  double lowest_mm;  // below its place
+  double lowest_mm;  // below the initial position
 };
 
 class BodyTissue : public tests::SceneFile {
@@ -42,14 +42,14 @@ class BodyTissue : public tests::SceneFile {
     return "format = 1\n[tool]\nradius = 5\nstiffness = 1000\n" + tests::unlimited +
            "[material.gel]\nyoung = 5000\npoisson = 0.3\n";
   }
-  // Its upper face is at z = 0.
+  // The upper face is at z = 0.
   static std::string block() {
     return head() +
            "[[soft]]\nname = \"block\"\nformula = \"block\"\n"
            "size = [60, 60, 24]\nspacing = 2\nposition = [0, 0, -12]\nmaterial = \"gel\"\n" +
            tests::some_path;
   }
-  // Straight down to `deep_mm` below where it touches, along by `along_mm`, where it stays, and up.
+  // Straight down to `deep_mm` below first contact, along by `along_mm`, a stop there, and up.
   static std::string pusher(const Shape& shape, double deep_mm, double along_mm, double speed_mm_per_s,
                             double stay_s = 0.0) {
     const double above = shape.lowest_mm + 3.0, below = shape.lowest_mm - deep_mm, from = -0.5 * along_mm;
@@ -79,7 +79,7 @@ const voxel::SoftObject& tissue(Touch& touch) {
   return *touch.state().soft[0];
 }
 
-// How deep the ball of a surface voxel is in a rigid object, at most (spacings).
+// Largest depth of a surface voxel's ball in a rigid object (spacings).
 double deepest(Touch& touch, std::size_t rigid = 0) {
   const hybrid::BodyFrame& frame = touch.state().rigid[rigid].frame;
   const polygon::RigidSurface& surface = *touch.world().rigid[rigid].surface;
@@ -115,10 +115,10 @@ void come_to_rest(Touch& touch, const dvec3& device) {
 TEST_F(BodyTissue, LeavesTheWayOfABodyAtAnySpeedAndComesBack) {
   for (const Shape& shape : shapes()) {
     for (const double speed : {100.0, 1000.0}) {
-      for (const bool apart : {false, true}) {
+      for (const bool asynchronous : {false, true}) {
         SCOPED_TRACE(std::string(shape.name) + " at " + std::to_string(speed) + " mm/s" +
-                     (apart ? ", relaxed apart" : ""));
-        Touch touch(load(block() + pusher(shape, 6.0, 8.0, speed)), kFarAway, apart);
+                     (asynchronous ? ", relaxed apart" : ""));
+        Touch touch(load(block() + pusher(shape, 6.0, 8.0, speed)), kFarAway, asynchronous);
         double worst = 0.0, moved = 0.0;
         const int ticks = static_cast<int>((9.0 + 8.0 + 9.0) / speed * 1e3) + 20;
         for (int n = 0; n < ticks; ++n) {
@@ -137,15 +137,15 @@ TEST_F(BodyTissue, LeavesTheWayOfABodyAtAnySpeedAndComesBack) {
   }
 }
 
-// At 1 m/s a body goes two of these spacings in a tick.
+// At 1 m/s a body moves two of these spacings in a tick.
 TEST_F(BodyTissue, LeavesTheWayOfABodyThatGoesSpacingsInATick) {
   const std::string fine = head() +
                            "[[soft]]\nname = \"block\"\nformula = \"block\"\nsize = [22.5, 22.5, 7]\n"
                            "spacing = 0.5\nposition = [0, 0, -3.5]\nmaterial = \"gel\"\n" +
                            tests::some_path;
   for (const std::size_t number : {0U, 2U}) {
-    for (const bool apart : {false, true}) {
-      Touch touch(load(fine + pusher(shapes()[number], 1.5, 2.0, 1000.0)), kFarAway, apart);
+    for (const bool asynchronous : {false, true}) {
+      Touch touch(load(fine + pusher(shapes()[number], 1.5, 2.0, 1000.0)), kFarAway, asynchronous);
       double worst = 0.0;
       for (int n = 0; n < 60; ++n) {
         touch.at(kFarAway);
@@ -157,21 +157,21 @@ TEST_F(BodyTissue, LeavesTheWayOfABodyThatGoesSpacingsInATick) {
   }
 }
 
-// What the springs store grows with the way of the body by what presses on the anchors, and nothing pulls at
-// anything else.
+// When the body advances, the energy in the springs grows by the work of the force that the anchors carry,
+// and no other force acts.
 TEST_F(BodyTissue, StandingInTissueABodyIsCarriedByItsAnchors) {
-  for (const bool apart : {false, true}) {
+  for (const bool asynchronous : {false, true}) {
     std::array<double, 2> energy{}, force{};
     for (const std::size_t n : {0U, 1U}) {
       const double deep_mm = n == 0 ? 2.0 : 2.2;
-      Touch touch(load(block() + pusher(shapes()[0], deep_mm, 0.0, 50.0, 60.0)), kFarAway, apart);
+      Touch touch(load(block() + pusher(shapes()[0], deep_mm, 0.0, 50.0, 60.0)), kFarAway, asynchronous);
       for (int tick = 0; tick < 200; ++tick) touch.at(kFarAway);
       come_to_rest(touch, kFarAway);
-      const tests::Bearing bearing = tests::bearings(touch.world(), touch.state())[0];
+      const tests::Supports bearing = tests::supports_of(touch.world(), touch.state())[0];
       energy[n] = tissue(touch).energy_J();
       force[n] = glm::length(bearing.anchors_N);
       EXPECT_LE(glm::length(bearing.anchors_N + bearing.rigid_N), 0.01 * force[n]);
-      EXPECT_LE(bearing.worst_left_N, 0.01 * force[n]);
+      EXPECT_LE(bearing.worst_unbalanced_N, 0.01 * force[n]);
       EXPECT_LE(deepest(touch), kOverlap);
       for (int tick = 0; tick < 100; ++tick) touch.at(kFarAway);
       EXPECT_EQ(tissue(touch).energy_J(), energy[n]) << "at rest it stays as it is";
@@ -184,9 +184,9 @@ TEST_F(BodyTissue, StandingInTissueABodyIsCarriedByItsAnchors) {
 TEST_F(BodyTissue, ABarSlidesAcrossTheSurface) {
   const Shape bar{"bar", "primitive = \"capsule\"\nradius = 3\nlength = 40\nrotation = [90, 0, 0]\n", 3.0};
   for (const double speed : {50.0, 300.0, 1000.0}) {
-    for (const bool apart : {false, true}) {
-      SCOPED_TRACE(std::to_string(speed) + " mm/s" + (apart ? ", relaxed apart" : ""));
-      Touch touch(load(block() + pusher(bar, 3.0, 30.0, speed)), kFarAway, apart);
+    for (const bool asynchronous : {false, true}) {
+      SCOPED_TRACE(std::to_string(speed) + " mm/s" + (asynchronous ? ", relaxed apart" : ""));
+      Touch touch(load(block() + pusher(bar, 3.0, 30.0, speed)), kFarAway, asynchronous);
       double worst = 0.0;
       for (int n = 0; n < static_cast<int>(42.0 / speed * 1e3) + 20; ++n) {
         touch.at(kFarAway);
@@ -200,18 +200,18 @@ TEST_F(BodyTissue, ABarSlidesAcrossTheSurface) {
   }
 }
 
-// The tool rests on tissue that a ball pushes from the side. From tick to tick the proxy goes no further than
-// the tissue under it.
+// The tool rests on tissue that a ball pushes from the side. From tick to tick the proxy moves no further
+// than the tissue under it.
 TEST_F(BodyTissue, AToolThatRestsOnTheTissueFeelsABodyBesideIt) {
   const std::string ball =
       "[[rigid]]\nname = \"pusher\"\nprimitive = \"ball\"\nradius = 8\nposition = [45, 0, -4]\n"
       "motion = \"path\"\n[rigid.path]\nkind = \"waypoints\"\nspeed = 100\n"
       "points = [[45, 0, -4], [45, 0, -4, 0.4], [32, 0, -4, 0.2], [45, 0, -4]]\n";
   const dvec3 above(0.018, 0.0, 0.02), on(0.018, 0.0, 0.003);
-  for (const bool apart : {false, true}) {
-    SCOPED_TRACE(apart ? "relaxed apart" : "in the tick");
-    Touch touch(load(block() + ball), above, apart);
-    tests::ArbitrationWatch watch(touch.world(), touch.state());
+  for (const bool asynchronous : {false, true}) {
+    SCOPED_TRACE(asynchronous ? "relaxed apart" : "in the tick");
+    Touch touch(load(block() + ball), above, asynchronous);
+    tests::OverlapChecker watch(touch.world(), touch.state());
     touch.go(on, 1e-4, 0);
     while (touch.state().tick < 390) touch.at(on);
     const double alone = glm::length(tests::coupling(touch.at(on)));
@@ -223,7 +223,7 @@ TEST_F(BodyTissue, AToolThatRestsOnTheTissueFeelsABodyBesideIt) {
       for (const voxel::VoxelId v : tissue(touch).lattice().surface())
         places.push_back(tissue(touch).position(v));
       const hybrid::TickResult felt = touch.at(on);
-      watch.see(touch.state(), felt);
+      watch.check(touch.state(), felt);
       double way = 0.0;
       for (std::size_t s = 0; s < places.size(); ++s) {
         const dvec3 now = tissue(touch).position(tissue(touch).lattice().surface()[s]);
@@ -246,7 +246,7 @@ TEST_F(BodyTissue, AToolThatRestsOnTheTissueFeelsABodyBesideIt) {
   }
 }
 
-// Deeper than links let tissue be squeezed: bone holds, the body overlaps, and that is said.
+// Deeper than links let tissue be squeezed: bone wins, the body overlaps, and a fault reports the overlap.
 TEST_F(BodyTissue, SqueezedOntoBoneItStaysOutOfBoneAndComesBack) {
   const std::string slab = head() +
                            "[[soft]]\nname = \"slab\"\nformula = \"block\"\n"
@@ -258,11 +258,11 @@ TEST_F(BodyTissue, SqueezedOntoBoneItStaysOutOfBoneAndComesBack) {
   for (const Shape& shape : shapes()) {
     if (shape.name == std::string("small ball")) continue;  // as small as a voxel, it parts them
     for (const double along : {0.0, 10.0}) {
-      for (const bool apart : {false, true}) {
-        const double speed = apart ? 1000.0 : 200.0;
+      for (const bool asynchronous : {false, true}) {
+        const double speed = asynchronous ? 1000.0 : 200.0;
         SCOPED_TRACE(std::string(shape.name) + (along > 0.0 ? " drawn along" : "") +
-                     (apart ? ", relaxed apart" : ""));
-        Touch touch(load(slab + pusher(shape, 7.0, along, speed) + plate), kFarAway, apart);
+                     (asynchronous ? ", relaxed apart" : ""));
+        Touch touch(load(slab + pusher(shape, 7.0, along, speed) + plate), kFarAway, asynchronous);
         double bone = 0.0, moved = 0.0;
         for (int n = 0; n < static_cast<int>((20.0 + along) / speed * 1e3) + 300; ++n) {
           touch.at(kFarAway);
@@ -281,8 +281,8 @@ TEST_F(BodyTissue, SqueezedOntoBoneItStaysOutOfBoneAndComesBack) {
 }
 
 TEST_F(BodyTissue, SqueezedByABodyThatStandsItIsCalm) {
-  for (const bool apart : {false, true}) {
-    Touch touch(load(block() + pusher(shapes()[0], 20.0, 0.0, 200.0, 60.0)), kFarAway, apart);
+  for (const bool asynchronous : {false, true}) {
+    Touch touch(load(block() + pusher(shapes()[0], 20.0, 0.0, 200.0, 60.0)), kFarAway, asynchronous);
     for (int n = 0; n < 2500; ++n) touch.at(kFarAway);
     const auto surface = tissue(touch).lattice().surface();
     std::vector<dvec3> before;
@@ -293,14 +293,14 @@ TEST_F(BodyTissue, SqueezedByABodyThatStandsItIsCalm) {
       for (std::size_t s = 0; s < surface.size(); ++s)
         way = std::max(way, glm::distance(before[s], tissue(touch).state().at(surface[s])));
     }
-    EXPECT_LE(way, apart ? 0.0 : 0.25 * kSpacing);
-    EXPECT_TRUE(tissue(touch).asleep() || !apart);
+    EXPECT_LE(way, asynchronous ? 0.0 : 0.25 * kSpacing);
+    EXPECT_TRUE(tissue(touch).asleep() || !asynchronous);
   }
 }
 
 TEST_F(BodyTissue, SqueezedOntoAnchorsItComesBack) {
-  for (const bool apart : {false, true}) {
-    Touch touch(load(block() + pusher(shapes()[0], 20.0, 0.0, 200.0)), kFarAway, apart);
+  for (const bool asynchronous : {false, true}) {
+    Touch touch(load(block() + pusher(shapes()[0], 20.0, 0.0, 200.0)), kFarAway, asynchronous);
     for (int n = 0; n < 300; ++n) {
       touch.at(kFarAway);
       ASSERT_LT(largest_displacement(touch), 0.1);
@@ -312,7 +312,7 @@ TEST_F(BodyTissue, SqueezedOntoAnchorsItComesBack) {
   }
 }
 
-// More voxels than a tick looks at: that is said, and nothing else happens.
+// More voxels than a tick examines: a fault reports it, and nothing else happens.
 TEST_F(BodyTissue, ABodyThatComesToTooManyVoxelsSaysSo) {
   const std::string sheet =
       head() +
@@ -348,7 +348,7 @@ TEST_F(BodyTissue, RefusesWhatIsNotSupported) {
   EXPECT_NE(sheet.find("open sheet"), std::string::npos) << sheet;
 }
 
-// The way out of a primitive, from outside and from within.
+// The outward direction of a primitive, from outside and from inside.
 TEST(SignedDistance, SaysTheWayOutFromEitherSide) {
   const auto check = [](const polygon::RigidSurface& surface, const dvec3& from, const dvec3& way,
                         double distance) {
@@ -367,7 +367,7 @@ TEST(SignedDistance, SaysTheWayOutFromEitherSide) {
   const auto capsule = polygon::make_capsule_surface(0.005, 0.01);
   check(*capsule, {0.004, 0.0, 0.005}, x, -0.001);
   polygon::SignedDistance near;
-  // On the surface there is only what was known.
+  // On the surface the result is the previous one.
   EXPECT_FALSE(polygon::signed_distance(*ball, 0.01 * z, 1.0, dvec3(0.0), near));
   ASSERT_TRUE(polygon::signed_distance(*ball, 0.01 * z, 1.0, x, near));
   EXPECT_EQ(near.normal, x);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Free bodies and everything rigid: against closed forms, conservation laws, and overlap as seen from points
+// Free bodies and rigid objects: against closed forms and conservation laws, and overlap measured at points
 // that the tick does not use.
 #include <gtest/gtest.h>
 
@@ -49,11 +49,12 @@ std::string another(const std::string& name, const std::string& shape, const dve
 const std::string kBall = "primitive = \"ball\"\nradius = 8\n";
 const std::string kBox = "primitive = \"box\"\nsize = [24, 16, 10]\n";
 const std::string kCapsule = "primitive = \"capsule\"\nradius = 5\nlength = 20\n";
-const std::string kTable = "primitive = \"box\"\nsize = [300, 300, 20]\n";  // its top 10 mm above its place
+const std::string kTable =
+    "primitive = \"box\"\nsize = [300, 300, 20]\n";  // its top is 10 mm above its position
 const std::string kSheet = "primitive = \"plane\"\nsize = 300\n";
 const std::string kThin = "primitive = \"box\"\nsize = [300, 300, 1]\n";
 
-// Points of the surface, everywhere alike, and close together along edges.
+// Points of the surface: uniform, and denser along edges.
 std::vector<dvec3> seen_points(const hybrid::RigidObject& object, std::mt19937& engine) {
   std::vector<dvec3> points;
   const polygon::TriangleMesh& mesh = *object.drawn;
@@ -70,7 +71,7 @@ std::vector<dvec3> seen_points(const hybrid::RigidObject& object, std::mt19937& 
   return points;
 }
 
-// How deep objects a and b are in one another (m), sheets not asked.
+// Depth of objects a and b in each other (m), without sheets.
 class Overlap {
  public:
   Overlap(Touch& touch, std::size_t a, std::size_t b) : touch_(touch), pair_{a, b} {
@@ -164,7 +165,7 @@ TEST_F(BodyCollisions, WhatIsDroppedComesToRestOnWhatStands) {
   }
 }
 
-// At up to 20 m/s, a tick's way is longer than the body.
+// At up to 20 m/s, the travel in a tick is longer than the body.
 TEST_F(BodyCollisions, NothingPassesThroughAnythingAtAnySpeed) {
   polygon::save_ply(folder_ / "sphere.ply", polygon::make_ball_mesh(0.009, 3));
   const std::string mesh = "mesh = \"sphere.ply\"\nunit = \"m\"\n";
@@ -250,8 +251,8 @@ TEST_F(BodyCollisions, MomentumIsKeptAndNoEnergyGained) {
   EXPECT_LE(turned, 0.02) << "places are put right by microns";
 }
 
-// A ball that hits another, in the middle and without friction: they go on at the speed of their common
-// centre.
+// A ball hits another centrally and without friction: both continue at the speed of their common centre of
+// mass.
 TEST_F(BodyCollisions, WhatMeetsHeadOnGoesOnTogether) {
   Touch touch(load(kHead + free(kBall, {0, 0, 0}, "") + another("other", kBall, {30, 0, 0}, "")), kFarAway);
   touch.state().rigid[0].free.velocity_m_per_s = {0.5, 0, 0};
@@ -262,7 +263,8 @@ TEST_F(BodyCollisions, WhatMeetsHeadOnGoesOnTogether) {
   }
 }
 
-// On a slope a block stays where its tangent is below the friction's, and slides as Coulomb says where not.
+// On a slope a block stays if the slope's tangent is below the coefficient of friction, and otherwise slides
+// by Coulomb's law.
 TEST_F(BodyCollisions, OnASlopeFrictionHoldsUpToItsCone) {
   const double friction = 0.4, degrees = glm::pi<double>() / 180.0;
   for (const double angle : {10.0, 20.0, 21.0, 23.0, 30.0, 45.0}) {
@@ -303,7 +305,7 @@ TEST_F(BodyCollisions, ABeltTakesAlongWhatLiesOnIt) {
                          rough + "motion = \"path\"\n[rigid.path]\nkind = \"waypoints\"\nspeed = 100\n"
                                  "points = [[0, 0, -10], [100, 0, -10]]\n")),
               kFarAway);
-  // It slides until it is as fast: v / (mu g).
+  // The block slides until it reaches the speed of the belt: v / (mu g).
   const double slides_s = 0.1 / (0.5 * kGravity);
   for (int n = 0; n < 500; ++n) touch.at(kFarAway);
   EXPECT_NEAR(state_of(touch, 0).velocity_m_per_s.x, 0.1, 1e-4);
@@ -332,7 +334,7 @@ TEST_F(BodyCollisions, AStackStands) {
   EXPECT_EQ(touch.state().faults, 0U);
 }
 
-// What is on a path has its way, and a body that has none left is not thrown.
+// A body on a path keeps its motion, and a body without any space left is not thrown.
 TEST_F(BodyCollisions, SqueezedBetweenTwoItIsAFaultAndStaysFinite) {
   const std::string piston =
       "motion = \"path\"\n[rigid.path]\nkind = \"waypoints\"\nspeed = 20\npoints = [[0, 0, 40], [0, 0, "
@@ -365,7 +367,7 @@ TEST_F(BodyCollisions, TheToolFeelsTheWallThroughABody) {
   EXPECT_EQ(touch.state().faults, 0U);
 }
 
-// Two knobbly meshes, and edges across edges: as deep as what lies between points may be.
+// Two knobbly meshes, edge against edge: the overlap is at most the depth that can lie between sample points.
 TEST_F(BodyCollisions, OfMeshesAndEdgesOnlyWhatLiesBetweenPointsOverlaps) {
   polygon::TriangleMesh knobs = polygon::make_ball_mesh(0.02, 4);
   for (dvec3& v : knobs.vertices)
@@ -405,7 +407,7 @@ TEST_F(BodyCollisions, OfMeshesAndEdgesOnlyWhatLiesBetweenPointsOverlaps) {
   }
 }
 
-// Beside tissue: a ball falls past it onto bone, and what presses it into bone is felt as bone.
+// Beside tissue: a ball falls past the tissue onto bone, and presses against bone there.
 TEST_F(BodyCollisions, BesideTissueBoneStopsIt) {
   Touch touch(
       load(kHead + free(kBall, {0, 0, 30}) + rigid("bone", kTable, {0, 0, -10}) +
@@ -418,7 +420,7 @@ TEST_F(BodyCollisions, BesideTissueBoneStopsIt) {
     touch.at(kFarAway);
     worst = std::max(worst, overlap.deepest());
   }
-  // It was thrown aside by the tissue that it fell onto by a millimeter.
+  // The tissue that it fell onto threw it aside by a millimeter.
   EXPECT_NEAR(state_of(touch, 0).centre_m.z, 0.008, 2e-5);
   EXPECT_EQ(worst, 0.0);
   EXPECT_EQ(touch.state().faults, 0U);

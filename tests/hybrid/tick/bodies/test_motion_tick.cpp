@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Moving bodies in the whole tick: they push and carry the tool, and free ones take no more energy than they
-// are given.
+// Moving bodies in the whole tick: they push and carry the tool, and free bodies never gain more energy than
+// they are given.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -45,7 +45,7 @@ class Motion : public Feel {
   }
 };
 
-// The device stands, pressed 3 mm deep, and the belt runs under it.
+// The device stays still, pressed 3 mm deep, while the belt moves under it.
 TEST_F(Motion, ABeltCarriesTheToolToTheStaticConeAndThenSlidesAtTheDynamicOne) {
   for (const double speed : {0.005, 0.1, 1.0}) {
     for (const bool triangles : {false, true}) {
@@ -88,7 +88,7 @@ TEST_F(Motion, ATurntableCarriesTheToolRoundAndAWheelToo) {
   struct Case {
     const char* name;
     RigidDescription object;
-    dvec3 axis, from;  // the device's place, pressed
+    dvec3 axis, from;  // the pressed device's position
   };
   const std::vector<Case> cases{
       {"turntable",
@@ -102,7 +102,7 @@ TEST_F(Motion, ATurntableCarriesTheToolRoundAndAWheelToo) {
     double worst = 0.0, force = 0.0;
     dvec3 held(0.0);
     for (int n = 0; n < 4000; ++n) {
-      // The device goes round with it.
+      // The device turns with the body.
       const glm::dquat turn = glm::angleAxis(rate * 1e-3 * (n + 1), c.axis);
       const dvec3 above = c.from + dvec3(0, 0, n < 20 ? 5e-3 : 0.0);
       const TickResult felt = touch.at(turn * above);
@@ -159,7 +159,7 @@ TEST_F(Motion, ABodyThatStandsOnItsPathFeelsAsAFixedOne) {
   EXPECT_LE(worst, 1e-4);
 }
 
-// What the hand puts in is what the body has then, and what friction and drag took: never less.
+// The hand's work equals the body's energy plus the losses to friction and drag, or more.
 TEST_F(Motion, AFreeBodyHasNoMoreEnergyThanTheHandGave) {
   for (const double mass : {0.001, 0.05, 2.0}) {
     for (const bool friction : {false, true}) {
@@ -169,7 +169,7 @@ TEST_F(Motion, AFreeBodyHasNoMoreEnergyThanTheHandGave) {
         Touch touch(scene_of({free(puck, mass)}, kRadius), {-0.04, off_centre, 0});
         Work work;
         double most = 0.0, excess = -1e9;
-        // Pushed for 0.1 s, with a swing to the side; then the hand stops.
+        // Pushed for 0.1 s with a lateral oscillation; then the hand stops.
         for (int n = 0; n < 1000; ++n) {
           const double t = std::min(1e-3 * n, 0.1);
           const TickResult felt = touch.at({-0.025 + 0.25 * t, off_centre + 2e-3 * std::sin(40.0 * t), 0});
@@ -197,7 +197,7 @@ TEST_F(Motion, AFreeBodyHasNoMoreEnergyThanTheHandGave) {
   }
 }
 
-// A heavy one with drag, pushed steadily: the hand feels the drag.
+// A heavy body with drag, pushed steadily: the hand feels the drag.
 TEST_F(Motion, APuckPushedSteadilyFeelsItsDrag) {
   const double drag = 20.0, speed = 0.05;
   RigidDescription puck = free(rigid("puck", hybrid::BoxPrimitive{{0.03, 0.03, 0.01}}), 0.05, drag);
@@ -205,20 +205,19 @@ TEST_F(Motion, APuckPushedSteadilyFeelsItsDrag) {
   TickResult felt;
   for (int n = 0; n < 3000; ++n) felt = touch.at({-0.02 + speed * 1e-3 * n, 0, 0});
   std::printf("puck with drag: %.4f N of %.4f N\n", -felt.force_N.x, drag * speed);
-  // The body gives way within the tick, so it is pushed by what the coupling has when the tick ends: K v dt
-  // less than the hand feels.
+  // The body gives way within the tick, so the coupling's force at the end of the tick pushes it: K v dt less
+  // than the hand feels.
   EXPECT_NEAR(-felt.force_N.x, drag * speed, 1.01 * kToolStiffness * speed * 1e-3);
   EXPECT_GE(-felt.force_N.x, drag * speed - 1e-9);
 }
 
-// The reference that the tick's force is measured against: everything as it is now, and the bodies stand
-// still.
+// The reference for the tick's force: everything in its present state, with the bodies at rest.
 TEST_F(Motion, TheEquilibriumOfACopyIsWhatIsFeltNow) {
   RigidDescription wheel = turning(rough(ball()), {0, 1, 0}, 1.0);
   wheel.feel.shading = true;
   Touch touch(scene_of({wheel}, kRadius), {0, 0, 0.09});
   touch.go({0, 0, 0.06}, 1e-3);
-  for (const int ticks : {20, 500}) {  // stuck, and then sliding
+  for (const int ticks : {20, 500}) {  // static, and then sliding
     const TickResult felt = touch.go({0, 0, kBall - 1e-3}, 1e-3, ticks);
     const std::uint64_t before = hybrid::hash_state(0, touch.state());
     const double time_s = touch.state().clock.now_s();

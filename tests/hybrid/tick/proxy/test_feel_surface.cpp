@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Shading, texture and damping in the whole tick: the force turned to the surface that facets stand for, the
-// relief at its wavelength, and damping that only resists.
+// Shading, texture and damping in the whole tick: a force along the normal of the surface that the facets
+// approximate, a relief at its wavelength, and damping that only resists.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,15 +9,14 @@
 #include <random>
 #include <vector>
 
-#include "tests/hybrid/fixtures/feel_scene.h"
 #include "hybrid/view/png_file.h"
+#include "tests/hybrid/fixtures/feel_scene.h"
 
 namespace {
 
 using namespace tests;  // NOLINT(google-build-using-namespace): the vocabulary of these tests
 
 // ---- shading
-// ----------------------------------------------------------------------------------------------------
 
 struct Slide {
   std::vector<double> degrees, step_N;  // force to the sphere's normal; from tick to tick
@@ -57,9 +56,9 @@ double p99(const std::vector<double>& sorted) {
 
 class Shading : public Feel, public ::testing::WithParamInterface<double> {};
 
-// The normal is the sphere's at the proxy: the direction from the middle of the ball to the proxy. (From
-// there to the device it is the same within the angle that is measured, because the force goes from device to
-// proxy.)
+// The reference normal is the sphere's at the proxy: the direction from the ball's centre to the proxy. The
+// normal at the device is the same within the measured angle, because the force is directed from device to
+// proxy.
 TEST_P(Shading, TurnsTheForceToTheSphereThatTheFacetsStandFor) {
   RigidDescription flat = ball(), smooth = ball();
   smooth.feel.shading = true;
@@ -84,7 +83,7 @@ TEST_P(Shading, TurnsTheForceToTheSphereThatTheFacetsStandFor) {
 INSTANTIATE_TEST_SUITE_P(Tools, Shading, ::testing::Values(0.0, 2e-3),
                          [](const auto& tool) { return tool.param > 0.0 ? "ABallOf2mm" : "APoint"; });
 
-// Shaded or not, a force of shaded normals is not one of a potential, but what it can give is little.
+// A force along shaded normals has no potential, but the energy that it can give is small.
 TEST_F(Feel, ShadingOnARoughBallGivesTheHandNothing) {
   RigidDescription smooth = rough(ball());
   smooth.feel.shading = true;
@@ -111,11 +110,10 @@ TEST_F(Feel, ShadingOnARoughBallGivesTheHandNothing) {
 }
 
 // ---- texture
-// ----------------------------------------------------------------------------------------------------
 
-// Amplitude of the sideways force along x at a wavelength, over a slide of `length_m`.
+// Amplitude of the lateral force along x at a wavelength, over a slide of `length_m`.
 struct Spectrum {
-  double peak_m = 0.0, bin = 0.0;  // wavelength of the highest peak; how many bins it is off
+  double peak_m = 0.0, bin = 0.0;  // wavelength of the highest peak; its distance in bins
 };
 Spectrum strongest(const std::vector<double>& force, double length_m, double wavelength_m) {
   Spectrum out;
@@ -142,7 +140,7 @@ class Texture : public Feel {
     RigidDescription plate = rigid("plate", hybrid::BoxPrimitive{{0.2, 0.1, 0.02}}, {0, 0, -0.01});
     hybrid::TextureDescription texture;
     texture.mapping = {.kind = kind, .along = hybrid::TextureAlong::z, .size_m = 5e-3, .height_m = 4e-4};
-    if (image) {  // one period: bright to the left
+    if (image) {  // one period: bright on the left
       const int side = 64;
       std::vector<std::uint8_t> rgb;
       for (int y = 0; y < side; ++y) {
@@ -190,7 +188,8 @@ TEST_F(Texture, ClosedWaysOverAFlatReliefGiveTheHandNothing) {
   for (const bool image : {false, true}) {
     for (const bool friction : {false, true}) {
       RigidDescription plate = textured(image, hybrid::TextureKind::height);
-      plate.feel.texture->mapping.size_m = 2e-3;  // finer than it is deep: where a relief can pay
+      plate.feel.texture->mapping.size_m =
+          2e-3;  // finer than deep: the case in which a relief can create energy
       plate.feel.texture->mapping.height_m = 5e-4;
       if (friction) plate = rough(plate);
       for (const Way& way : ways_on_the_flat()) {
@@ -198,8 +197,8 @@ TEST_F(Texture, ClosedWaysOverAFlatReliefGiveTheHandNothing) {
         const Gain gain = closed_way(touch, {0, 0, 0.01}, way.at, 2, 2e-6);
         std::printf("energy, %s%s, %s: the hand gains %+.3g mJ\n", image ? "image" : "pattern",
                     friction ? ", rough" : "", way.name, 1e3 * gain.work_J);
-        // Between ticks the force is not linear in the way, and the trapezoidal rule makes something of that
-        // (of an image's spline; it vanishes with the step): a millionth of what goes in and out again.
+        // Between ticks the force is not linear along the path, which leaves an error of the trapezoidal rule
+        // (for an image's spline; it vanishes with the step): a millionth of the energy exchanged.
         EXPECT_LE(gain.work_J, friction ? 0.0 : 1e-8);
       }
     }
@@ -207,7 +206,6 @@ TEST_F(Texture, ClosedWaysOverAFlatReliefGiveTheHandNothing) {
 }
 
 // ---- damping
-// ----------------------------------------------------------------------------------------------------
 
 TEST_F(Feel, DampingResistsTheWayInNeverPullsAndEndsWithTheMotion) {
   const double damping = 2.0, depth = 3e-3, speed = 0.1;  // N s/m; m; m/s
@@ -236,7 +234,7 @@ TEST_F(Feel, DampingResistsTheWayInNeverPullsAndEndsWithTheMotion) {
     if (std::fabs(f.force_N.z - 1e3 * depth) > 1e-9) ++settled;
   });
   EXPECT_LE(settled, 16) << "K d when it stands";
-  touch.go({0, 0, 0.01}, 3e-4, 0, look);  // 0.3 m/s out: B v > K d at the end
+  touch.go({0, 0, 0.01}, 3e-4, 0, look);  // 0.3 m/s outward: B v > K d at the end
   EXPECT_GE(least, 0.0) << "never pulls in";
   std::printf(
       "damping: B v off by %.2g N on the way in, K d after %d ticks at rest, least force %.3g N, the hand "
@@ -245,8 +243,8 @@ TEST_F(Feel, DampingResistsTheWayInNeverPullsAndEndsWithTheMotion) {
   EXPECT_LE(work.gained_J(), 0.0);
 }
 
-// A sampled damper is late by half a tick, and shaken faster than a third of the rate it gives where it
-// should take. It is found out, and left out (surface_feel.h): what it has given by then stays all there is.
+// A sampled damper lags by half a tick; shaken faster than a third of the rate it gives energy instead of
+// taking it. The tick detects this and disables the damper (surface_feel.h), so that no more energy is given.
 TEST_F(Feel, DampingFeedsNoShaking) {
   RigidDescription plate = box();
   for (const double damping : {1.0, 10.0, 100.0}) {
@@ -271,7 +269,6 @@ TEST_F(Feel, DampingFeedsNoShaking) {
 }
 
 // ---- everything at once
-// -----------------------------------------------------------------------------------------
 
 TEST_F(Texture, AllOfItAtOnceIsFiniteAtAnyTickLength) {
   for (const double dt : {1e-4, 1e-3, 1e-2}) {

@@ -15,17 +15,16 @@ namespace {
 using namespace tests;  // NOLINT(google-build-using-namespace): the vocabulary of these tests
 
 // ---- friction: the cones
-// ----------------------------------------------------------------------------------------
 
 struct Ramp {
-  double breakaway = 0.0;              // tan of the angle at which it began to slide
-  std::vector<double> sliding;         // tan of the angle of the force, each tick of the slide
-  double crept_m = 0.0;                // how far the proxy went before
-  std::vector<double> normal_degrees;  // between the normal it is measured from and an ideal one
+  double breakaway = 0.0;              // tan of the angle at which sliding began
+  std::vector<double> sliding;         // tan of the force's angle, each tick of the slide
+  double crept_m = 0.0;                // travel of the proxy before sliding
+  std::vector<double> normal_degrees;  // between the reference normal and the ideal one
 };
 
-// Pressed at `from`, then dragged by `step` each tick until it has slid for `slide` ticks; the angle is that
-// of the force to the normal of what the proxy touches.
+// Presses at `from`, then drags by `step` per tick until the proxy has slid for `slide` ticks. Angles are
+// between the force and the normal of the touched surface.
 Ramp drag(Touch& touch, const dvec3& above, const std::function<dvec3(int)>& device, int ticks, int slide) {
   Ramp ramp;
   touch.go(above, 1e-3);
@@ -60,7 +59,7 @@ void expect_coulomb(const char* name, const Ramp& ramp, double step_share) {
   EXPECT_EQ(ramp.crept_m, 0.0) << "stuck is stuck";
 }
 
-constexpr double kFine = 5e-6;  // of the device, a tick: 0.3 % of what the cone lets it go
+constexpr double kFine = 5e-6;  // device step per tick: 0.3 % of the travel that the cone allows
 
 TEST_F(Feel, APlaneHoldsToTheStaticConeAndLetsSlideAtTheDynamicOne) {
   Touch touch(scene_of({rough(plane())}, kRadius), {0, 0, 0.02});
@@ -74,7 +73,7 @@ TEST_F(Feel, ABoxOfTrianglesDoesToo) {
   expect_coulomb("box mesh", drag(touch, {-0.01, 0.003, 0.01}, device, 5000, 3000), 0.01);
 }
 
-// Along a great circle, at a constant depth below the ball; over faces, edges and corners.
+// Along a great circle at a constant depth below the ball, over faces, edges and corners.
 TEST_F(Feel, AnIcosphereDoesToo) {
   Touch touch(scene_of({rough(ball())}, kRadius), {0, 0, 0.08});
   const dvec3 x = glm::normalize(dvec3(1, 0.3, 0.2)), z = glm::normalize(glm::cross(x, dvec3(0.1, 1, 0.4)));
@@ -85,7 +84,7 @@ TEST_F(Feel, AnIcosphereDoesToo) {
   expect_coulomb("icosphere of 1,280", drag(touch, 0.06 * x, device, 30000, 25000), 0.01);
 }
 
-// With the tool at a person's speed: over a tick the proxy turns around half an edge.
+// With the tool at a person's speed: in a tick the proxy turns around half an edge.
 TEST_F(Feel, AnIcosphereDoesTooAtTenCentimetersASecond) {
   Touch touch(scene_of({rough(ball())}, kRadius), {0, 0, 0.08});
   const dvec3 x = glm::normalize(dvec3(1, 0.3, 0.2)), z = glm::normalize(glm::cross(x, dvec3(0.1, 1, 0.4)));
@@ -107,7 +106,6 @@ TEST_F(Feel, AnIcosphereDoesTooAtTenCentimetersASecond) {
 }
 
 // ---- friction: energy
-// -----------------------------------------------------------------------------------------------------------
 
 TEST_F(Feel, StickAndSlipOnAPlaneGivesTheHandNothing) {
   for (const Way& way : ways_on_the_flat()) {
@@ -117,7 +115,7 @@ TEST_F(Feel, StickAndSlipOnAPlaneGivesTheHandNothing) {
 }
 
 TEST_F(Feel, StickAndSlipOverTheEdgesOfABoxGivesTheHandNothing) {
-  // The edge lies at x = 30 mm; the box is 40 mm thick.
+  // The edge is at x = 30 mm; the box is 40 mm thick.
   const std::vector<Way> ways{
       {"over the edge and back",
        [](double p) { return dvec3(0.03 + 5e-3 * wave(p), 2e-3 * cowave(p), kRadius - 3e-3); }},
@@ -151,14 +149,14 @@ TEST_F(Feel, StickAndSlipOnAnIcosphereGivesTheHandNothing) {
 }
 
 TEST_F(Feel, AWedgeHoldsByBothItsFaces) {
-  // Two planes at 90 degrees: pressed into the groove, dragged along it.
+  // Two planes at 90 degrees: the tool is pressed into the groove and dragged along it.
   RigidDescription left = rough(plane()), right = rough(plane());
   left.name = "left";
   right.name = "right";
   left.pose.rotation = glm::angleAxis(glm::pi<double>() / 4.0, dvec3(0, 1, 0));
   right.pose.rotation = glm::angleAxis(-glm::pi<double>() / 4.0, dvec3(0, 1, 0));
   Touch touch(scene_of({left, right}, kRadius), {0, 0, 0.03});
-  const auto device = [](int n) { return dvec3(0, kFine * n, 0); };  // the proxy lies at z = √2 r
+  const auto device = [](int n) { return dvec3(0, kFine * n, 0); };  // the proxy is at z = √2 r
   expect_coulomb("groove", drag(touch, {0, 0, 0.01}, device, 4000, 2000), 0.01);
   Touch again(scene_of({left, right}, kRadius), {0, 0, 0.03});
   expect_no_gain(

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The proxy on meshes that are hard for it, driven slowly, fast and by jumps, judged by exact kernels that
-// share nothing with it: never inside, never through, never nearer than its radius, and at an optimum.
+// The proxy on meshes that are hard for it, driven slowly, fast and by jumps. Exact kernels that share no
+// code with it check that it is never inside, never passes through, is never nearer than its radius, and is
+// at an optimum.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,19 +11,19 @@
 #include <random>
 #include <string>
 
-#include "tests/hybrid/fixtures/hostile_meshes.h"
 #include "tests/hybrid/fixtures/exact_proxy_world.h"
+#include "tests/hybrid/fixtures/hostile_meshes.h"
 
 namespace {
 
 using glm::dvec3;
+using tests::ExactProxyWorld;
 using tests::HostileMesh;
-using tests::TruthWorld;
 
 enum class Gait { stroke, dash, jump };
 
-// Where the hand goes: under the surface along its vertices at up to 0.2 mm a tick, criss-cross at a
-// millimeter a tick, or from anywhere to anywhere in one.
+// The device's path: under the surface along its vertices at up to 0.2 mm per tick, across it at 1 mm per
+// tick, or by jumps between random places.
 class Walk {
  public:
   Walk(const polygon::TriangleMesh& mesh, Gait gait, std::uint64_t seed)
@@ -87,15 +88,15 @@ class Hostile : public ::testing::TestWithParam<std::size_t> {};
 
 TEST_P(Hostile, NeverInsideNeverThroughAndAtAnOptimum) {
   const HostileMesh hard = tests::hostile_meshes(1)[GetParam()];
-  const char* longer = std::getenv("HYBRID_TRUTH_TICKS");  // a longer walk, by hand
+  const char* longer = std::getenv("HYBRID_TRUTH_TICKS");  // a longer walk, started by hand
   const int ticks = longer != nullptr ? std::stoi(longer) : 120;
   double worst = 0.0, clearance = 1.0, way_clearance = 1.0;
-  int bounded = 0;  // ticks that a bound on the steps ended
+  int bounded = 0;  // ticks in which the bound on the steps was reached
   for (const double radius : {0.0, 2e-3}) {
     for (const Gait gait : {Gait::stroke, Gait::dash, Gait::jump}) {
       SCOPED_TRACE(hard.name + ", radius " + std::to_string(radius) + ", gait " +
                    std::to_string(static_cast<int>(gait)));
-      TruthWorld world({{hard.mesh, hard.solid}}, {.tool_radius_m = radius});
+      ExactProxyWorld world({{hard.mesh, hard.solid}}, {.tool_radius_m = radius});
       Walk walk(hard.mesh, gait, 77);
       ASSERT_TRUE(world.start(walk.at()));
       for (int tick = 0; tick < ticks; ++tick) {

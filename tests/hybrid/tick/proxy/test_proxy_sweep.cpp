@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The proxy on rigid objects alone: depth and direction against closed forms, first-order conditions against
-// every triangle of a mesh, and that nothing is ever passed through.
+// every triangle of a mesh, and no penetration.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -13,8 +13,8 @@
 
 #include "hybrid/tick/proxy/proxy_sweep.h"
 #include "polygon/files/mesh_file.h"
-#include "polygon/surface/primitives.h"
 #include "polygon/mesh/triangle.h"
+#include "polygon/surface/primitives.h"
 #include "tests/hybrid/fixtures/touch.h"
 
 namespace {
@@ -56,7 +56,7 @@ dvec3 random_direction(std::mt19937_64& random) {
 
 class RigidSweep : public tests::SceneFile {
  protected:
-  // A mesh through a file, as a user's would come.
+  // Meshes go through a file, as in a user's scene.
   hybrid::RigidDescription mesh(const std::string& name, const polygon::TriangleMesh& m) const {
     polygon::save_ply(folder_ / (name + ".ply"), m);
     return object(name, hybrid::MeshSource{.file = folder_ / (name + ".ply")});
@@ -79,7 +79,7 @@ TEST_F(RigidSweep, ABallPressesBackWithTheCouplingTimesTheDepth) {
   EXPECT_EQ(touch.state().faults, 0U);
 }
 
-// Every vertex lies on the sphere; a facet's middle lies deeper by at most edge²/(6R), which is the facets'
+// Every vertex is on the sphere; a facet's centre is deeper by at most edge²/(6R), which is the facets'
 // allowance.
 TEST_F(RigidSweep, ABallOfFacetsDoesSoWithinOnePercent) {
   const double radius = 0.02;
@@ -94,7 +94,7 @@ TEST_F(RigidSweep, ABallOfFacetsDoesSoWithinOnePercent) {
     for (const double depth : {1e-3, 3e-3, 5e-3}) {
       const TickResult felt = touch.go((0.025 - depth) * out, 1e-3, 2);
       EXPECT_NEAR(glm::length(felt.force_N), kStiffness * depth, 0.01 * kStiffness * depth);
-      // A facet's slope, against the depth: 2.5 degrees are what a finger's joint can tell.
+      // The slope of a facet, besides the depth: a finger joint can tell 2.5 degrees.
       EXPECT_GT(glm::dot(glm::normalize(felt.force_N), out), std::cos(glm::radians(2.5)));
     }
     touch.go(0.1 * out, 2e-3);
@@ -110,7 +110,7 @@ TEST_P(BoxContact, FaceEdgeAndCorner) {
   const auto box = GetParam() ? mesh("box", polygon::make_box_mesh(half, 8))
                               : object("box", hybrid::BoxPrimitive{2.0 * half});
   struct Case {
-    dvec3 at, out;  // of the surface, and away from it
+    dvec3 at, out;  // on the surface, and outward
   };
   const std::array<Case, 6> cases{{{{0.0, 0.0, half.z}, {0, 0, 1}},
                                    {{half.x, 0.0011, 0.0023}, {1, 0, 0}},
@@ -124,7 +124,8 @@ TEST_P(BoxContact, FaceEdgeAndCorner) {
     touch.go(0.1 * glm::normalize(c.at + 0.05 * c.out), 2e-3);
     touch.go(c.at + 0.05 * c.out, 2e-3);
     for (const double depth :
-         {1e-3, 3e-3, 5e-3}) {  // less than r: the tool's centre stays outside, so the way out is c.out
+         {1e-3, 3e-3,
+          5e-3}) {  // less than r: the tool's centre stays outside, so the outward direction is c.out
       const TickResult felt = touch.go(c.at + (r - depth) * c.out, 1e-3, 2);
       EXPECT_LE(glm::length(felt.force_N - kStiffness * depth * c.out), 1e-5 * kStiffness * depth)
           << c.at.x << ' ' << c.at.y << ' ' << c.at.z;
@@ -155,7 +156,7 @@ TEST_P(Sheet, StrokesAtTwoMetersASecondNeverGetThrough) {
              [&](const TickResult& felt) { ASSERT_GE(side * felt.proxy_m.z, 2e-3 * (1.0 - 1e-9)) << n; });
     const TickResult pressed = touch.at(to);
     EXPECT_NEAR(pressed.force_N.z, side * kStiffness * 0.052, 1e-6);
-    // Back up on its own side, and round the edge to the other one for the next stroke.
+    // Back up on the same side, and round the edge to the other side for the next stroke.
     touch.go({place(random), place(random), 0.05 * side}, 2e-3, 1,
              [&](const TickResult& felt) { ASSERT_GT(side * felt.proxy_m.z, 0.0); });
     touch.go({0.6, 0.0, 0.05 * side}, 2e-3);
@@ -177,7 +178,7 @@ TEST_P(Sheet, AJumpOfAMeterInATickDoesNotEither) {
       const TickResult felt = touch.at(to);
       ASSERT_GE(side * felt.proxy_m.z, 2e-3 * (1.0 - 1e-9)) << n;
       for (int wait = 0; wait < 3; ++wait) touch.at(to);
-      // Under the sheet the proxy lies straight above the device, wherever that jumped to.
+      // Under the sheet the proxy is straight above the device, wherever the device jumped to.
       const dvec3 on_sheet(to.x, to.y, n % 2 == 0 ? 2e-3 * side : z);
       EXPECT_LE(glm::length(touch.state().proxy_m - on_sheet), 1e-6) << n;
     }
@@ -202,7 +203,7 @@ TEST_F(RigidSweep, AConcaveCornerHoldsTheToolOnAllThreeSides) {
   EXPECT_LE(glm::length(felt.proxy_m - dvec3(2e-3)), 1e-9);
   EXPECT_LE(glm::length(felt.force_N - dvec3(5.0, 3.0, 7.0)), 1e-6);
   EXPECT_EQ(felt.contacts, 7U);
-  // Along two of them into the third, at speed.
+  // Along two of the sheets into the third, at speed.
   touch.go({0.05, -4e-3, -4e-3}, 2e-3);
   const TickResult again = touch.go({-6e-3, -4e-3, -4e-3}, 2e-3, 2);
   EXPECT_LE(glm::length(again.proxy_m - dvec3(2e-3)), 1e-9);
@@ -217,18 +218,18 @@ TEST_F(RigidSweep, ManyWalksInTheCornerNeverLeaveIt) {
     touch.go(to, step, 2, [&](const TickResult& felt) {
       for (int d = 0; d < 3; ++d) ASSERT_GE(felt.proxy_m[d], 2e-3 * (1.0 - 1e-9)) << n;
     });
-    // The corner is convex from inside: the constrained minimum is the clamped device.
+    // The corner is convex from inside: the constrained minimum is the device clamped to the corner.
     ASSERT_LE(glm::length(touch.state().proxy_m - glm::max(to, dvec3(2e-3))), 1e-6) << n;
   }
   EXPECT_EQ(touch.state().faults, 0U);
 }
 
-// The same motion in scenes of another size and place: everything in proportion.
+// The same motion in scenes of another size and place must give proportional results.
 TEST_F(RigidSweep, SizeAndPlaceOfTheSceneDoNotMatter) {
   struct Where {
     double scale;
     dvec3 offset;
-    double rounding;  // of a coordinate there, as a part of the scale; a hundred of them may add up
+    double rounding;  // of a coordinate there, relative to the scale; a hundred of them may add up
   };
   const std::array<Where, 5> places{{{1e-3, dvec3(0.0), 1e-12},
                                      {1.0, dvec3(0.0), 1e-12},
@@ -253,7 +254,7 @@ TEST_F(RigidSweep, SizeAndPlaceOfTheSceneDoNotMatter) {
     }
     EXPECT_EQ(touch.state().faults, 0U) << "scale " << w.scale << ", offset " << w.offset.x;
   }
-  // And a curved mesh, which has planes in all directions at once.
+  // Also a curved mesh, which has planes in all directions.
   std::optional<std::vector<dvec3>> first;
   for (const Where& w : places) {
     auto ball = mesh("ball", polygon::make_ball_mesh(0.02 * w.scale, 4));
@@ -270,7 +271,7 @@ TEST_F(RigidSweep, SizeAndPlaceOfTheSceneDoNotMatter) {
     double worst = 0.0;
     for (std::size_t n = 0; n < proxies.size(); ++n)
       worst = std::max(worst, glm::length(proxies[n] - (*first)[n]));
-    // A minimum in a shallow valley of facets moves by the root of what its planes moved by.
+    // A minimum in a shallow valley of facets moves by the square root of the planes' motion.
     EXPECT_LE(worst, 1e-7 + std::sqrt(2.0 * 5e-3 * 100.0 * w.rounding))
         << "scale " << w.scale << ", offset " << w.offset.x;
   }
@@ -280,7 +281,7 @@ TEST_F(RigidSweep, SizeAndPlaceOfTheSceneDoNotMatter) {
 double unbalanced(const dvec3& pull, const std::vector<dvec3>& normals) {
   double best = glm::length(pull);
   const auto look = [&](const std::vector<std::size_t>& s) {
-    // Least squares by the normal equations; a dependent set is covered by a smaller one.
+    // Least squares by the normal equations; a smaller set covers a dependent one.
     glm::dmat3 gram(1.0);
     dvec3 right(0.0);
     for (std::size_t i = 0; i < s.size(); ++i) {
@@ -307,7 +308,8 @@ double unbalanced(const dvec3& pull, const std::vector<dvec3>& normals) {
   return best;
 }
 
-// At a minimum the pull of the device is what the triangles at distance r push, and none is nearer than r.
+// At a minimum the contact forces of triangles at distance r balance the device's pull, and no triangle is
+// nearer than r.
 TEST_F(RigidSweep, FirstOrderConditionsHoldAgainstEveryTriangleAllAlongASlide) {
   const double r = 5e-3;
   const auto icosphere = polygon::make_ball_mesh(0.02, 3);  // 1,280 triangles: edges of 3 mm
@@ -332,7 +334,7 @@ TEST_F(RigidSweep, FirstOrderConditionsHoldAgainstEveryTriangleAllAlongASlide) {
     }
     worst = std::max(worst, unbalanced(felt.proxy_m - felt.device_m, normals));
   }
-  EXPECT_LE(worst, 1e-6);         // the proxy stands within a micrometer of its minimum
+  EXPECT_LE(worst, 1e-6);         // the proxy is within a micrometer of its minimum
   EXPECT_GE(nearest, r - 1e-11);  // and never nearer to any triangle
   EXPECT_EQ(touch.state().truncated_ticks, 0U);
   RecordProperty("worst_m", std::to_string(worst));
@@ -341,8 +343,8 @@ TEST_F(RigidSweep, FirstOrderConditionsHoldAgainstEveryTriangleAllAlongASlide) {
       worst, r - nearest);
 }
 
-// The nearest place on a convex surface, whatever way the proxy came: what it would be if no way back and
-// forth over the edges between caught it.
+// On a convex surface the proxy must be at the nearest place, whichever path it took; motion back and forth
+// over the edges must not trap it.
 TEST_F(RigidSweep, OnAFinelyFacetedBallTheProxyIsAtTheNearestFace) {
   for (const double r : {0.0, 5e-3}) {
     const auto icosphere = polygon::make_ball_mesh(0.02, 3);
@@ -366,16 +368,16 @@ TEST_F(RigidSweep, OnAFinelyFacetedBallTheProxyIsAtTheNearestFace) {
       elsewhere += depth > least * (1.0 + 1e-9) ? 1 : 0;
       worst = std::max(worst, depth / least - 1.0);
     }
-    // Neighbours bend by up to 11 degrees, which is worth 1.8 % of the depth; a twentieth of that is
-    // hysteresis. The nearest face may be up to three edges away, round a corner, and the first of them is
-    // worth at least a quarter of the whole.
+    // Neighbouring facets differ by up to 11 degrees, or 1.8 % of the depth; a twentieth of that is
+    // hysteresis. The nearest face may be up to three edges away, round a corner. The first edge counts for
+    // at least a quarter of the whole.
     EXPECT_LE(worst, 4.0 * 0.05 * 0.018) << r;
     EXPECT_LE(elsewhere, ticks / 10) << r;
     EXPECT_EQ(touch.state().truncated_ticks, 0U);
   }
 }
 
-// A cube's edge is not crossed: pressed on the top, the tool stays there however near the side is.
+// The tool does not cross a cube's edge: pressed on the top, it stays on top however near the side is.
 TEST_F(RigidSweep, ASharpEdgeIsNotCrossed) {
   Touch touch(scene_of({mesh("cube", polygon::make_box_mesh(dvec3(0.02), 4))}, 2e-3), {0, 0, 0.05});
   touch.go({0.015, 0, 0.021}, 1e-3);
@@ -387,7 +389,7 @@ TEST_F(RigidSweep, ASharpEdgeIsNotCrossed) {
 }
 
 TEST_F(RigidSweep, AFlatMeshIsFlatWhereverTheToolCrossesItsEdges) {
-  // Coordinates as a file of floats would hold them: planes that differ by millionths of a radian.
+  // Coordinates rounded to floats, as a file may have them: planes that differ by millionths of a radian.
   auto sheet = polygon::make_plane_mesh(0.05, 25);
   for (dvec3& v : sheet.vertices) v = dvec3(glm::vec3(v + dvec3(0.3, -0.2, 0.1)));
   Touch touch(scene_of({mesh("sheet", sheet)}, 5e-3), {0.3, -0.2, 0.15});

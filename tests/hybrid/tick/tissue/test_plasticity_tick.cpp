@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A scene whose tissue yields: what is pressed too far keeps its dent, the same in each run, and feels it.
+// A scene with plastic tissue: a deep press leaves a dent, which is equal in each run and can be felt.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -55,11 +55,11 @@ TEST_F(YieldTick, ABlockKeepsItsDentAndTheToolFeelsIt) {
   EXPECT_GT(dent, 0.2 * depth);
   EXPECT_LT(dent, depth);
   EXPECT_LT(deepest_m(spring), 0.01 * depth) << "what does not yield has none";
-  // Where the surface was there is none any more.
+  // At the former surface there is no tissue any more.
   const dvec3 in_the_dent(0.0, 0.0, kTouchedAt - 0.5 * dent);
   EXPECT_EQ(coupling(dough.go(in_the_dent, 4e-5, 100)), dvec3(0.0));
   EXPECT_GT(coupling(spring.go(in_the_dent, 4e-5, 100)).z, 0.0);
-  // Deep in it there is, and less than the first load leaves it as it was.
+  // Deep in the dent there is tissue, and a load below the first one leaves the dent unchanged.
   EXPECT_GT(press_and_leave(dough, 0.5 * (dent + depth)), 0.0);
   EXPECT_NEAR(deepest_m(dough), dent, 0.02 * dent);
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tissue that rests on bone, through a whole session relaxed apart: a brain in its skull, pressed until its
-// chain is tight and left alone. What is at rest stays at rest, and what came down on bone stays outside it.
+// Tissue that rests on bone, in a whole session with asynchronous relaxation: a brain in its skull, pressed
+// until its chain is tight and then released. Resting tissue must stay at rest, and tissue that came down on
+// bone must stay outside it.
 #include <algorithm>
 #include <filesystem>
 #include <iostream>
@@ -44,8 +45,8 @@ TEST(RestingTissue, ABrainStaysOutsideItsSkullAndComesToRest) {
   std::cout << "overlap with the skull at most " << -100.0 * deepest / cell << " % of a cell\n";
   EXPECT_GT(deepest, -0.05 * cell);
 
-  // The tool is away from 3.4 s on: the brain rises off the skull, and does not come back. (It swung by half
-  // a cell once, for ever.)
+  // The tool is gone from 3.4 s on. The brain rises off the skull and must not come back, that is, not
+  // oscillate.
   double falls = 0.0, highest = *gap_from(3.6);
   for (auto gap = gap_from(3.6); gap != course.gap_m.end(); ++gap) {
     highest = std::max(highest, *gap);
@@ -54,12 +55,12 @@ TEST(RestingTissue, ABrainStaysOutsideItsSkullAndComesToRest) {
   EXPECT_LT(falls, 0.01 * cell);
   EXPECT_NEAR(course.gap_m.back(), course.gap_m.front(), 0.02 * cell);
 
-  // Held at depth by the end of the first press, steps of the force from tick to tick.
+  // At rest at the depth of the first press: steps of the force from tick to tick.
   double step = 0.0;
   for (std::size_t n = 900; n < 1040; ++n)
     step = std::max(step, std::fabs(course.force_N[n] - course.force_N[n - 1]));
-  // And from soon after it stopped: a result of the other thread is felt in parts, none of which is noticed
-  // by itself (7 % of the force). At once one was 48 mN.
+  // Soon after the tool stopped: each asynchronous result is applied in parts, none of which is noticeable by
+  // itself (7 % of the force).
   double result = 0.0;
   for (std::size_t n = 700; n < 1040; ++n)
     result = std::max(result, std::fabs(course.force_N[n] - course.force_N[n - 1]));

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/plot/svg_canvas.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+
+namespace hybrid {
+
+std::string escaped(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        out += "&amp;";
+        break;
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      case '\'':
+        out += "&apos;";
+        break;
+      default:
+        // XML has no way to write most control characters.
+        out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+    }
+  }
+  return out;
+}
+
+std::size_t letters(std::string_view text) {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
+}
+
+std::string shortened(const std::string& text, std::size_t most) {
+  if (letters(text) <= most || most < 4) return text;
+  std::string out;
+  std::size_t count = 0;
+  for (const char c : text) {
+    const bool starts = (static_cast<unsigned char>(c) & 0xC0U) != 0x80U;
+    if (starts && ++count > most - 1) break;
+    out += c;
+  }
+  return out + "…";
+}
+
+std::string fixed(double v) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.1f", std::clamp(v, -99999.0, 99999.0));
+  std::string out = text.data();
+  if (out.ends_with(".0")) out.resize(out.size() - 2);
+  return out == "-0" ? "0" : out;
+}
+
+void Svg::text(double x, double y, const std::string& words, const char* style) {
+  body += "<text x=\"" + fixed(x) + "\" y=\"" + fixed(y) + "\" " + style + ">" + escaped(words) + "</text>\n";
+}
+
+void Svg::line(double x1, double y1, double x2, double y2, const std::string& colour, const char* more) {
+  body += "<path d=\"M" + fixed(x1) + " " + fixed(y1) + "L" + fixed(x2) + " " + fixed(y2) + "\" stroke=\"" +
+          escaped(colour) + "\" " + more + "/>\n";
+}
+
+void Svg::rect(double x, double y, double w, double h, const std::string& fill, const char* more) {
+  body += "<rect x=\"" + fixed(x) + "\" y=\"" + fixed(y) + "\" width=\"" + fixed(std::max(w, 0.0)) +
+          "\" height=\"" + fixed(std::max(h, 0.0)) + "\" fill=\"" + escaped(fill) + "\" " + more + "/>\n";
+}
+
+}  // namespace hybrid

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Internal to body_collisions.cpp: poses, distance queries and contacts of pairs of rigid bodies.
+//
+// The bodies' poses before and after the tick are cached as frames. A query of a contact point stays valid
+// until its pair has moved: the distance is then a lower bound, less by the motion of both objects.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <vector>
+
+#include "hybrid/world/world_state.h"
+
+namespace hybrid {
+
+class CollisionQueries {
+ public:
+  using Side = std::size_t;  // 0: points of the free object at the other's surface; 1: the reverse
+
+  CollisionQueries(const World& world, WorldState& state, double dt_s)
+      : world_(world), state_(state), all_(state.collisions), dt_s_(dt_s) {}
+
+ protected:
+  static std::uint32_t owner(const BodyPair& pair, Side side) noexcept {
+    return side == 0 ? pair.free : pair.other;
+  }
+  static std::uint32_t opposite(const BodyPair& pair, Side side) noexcept {
+    return side == 0 ? pair.other : pair.free;
+  }
+  [[nodiscard]] const SurfacePoint& point(const BodyPair& pair, Side side, std::size_t i) const noexcept {
+    return world_.rigid[owner(pair, side)].points[i];
+  }
+  // Where the point is on its object's surface now, in the object's frame.
+  [[nodiscard]] static glm::dvec3 position(const SurfacePoint& p, const PointQuery& query) noexcept {
+    return p.at_m + query.slid_m * p.along;
+  }
+  [[nodiscard]] glm::dvec3 position(const BodyPair& pair, Side side, std::size_t i) const noexcept {
+    return position(point(pair, side, i), pair.queries[side][i]);
+  }
+  template <class Visit>
+  void for_points(BodyPair& pair, const Visit& visit) noexcept {
+    for (Side side = 0; side < 2; ++side) {
+      for (std::size_t i = 0; i < pair.queries[side].size(); ++i) visit(side, i, pair.queries[side][i]);
+    }
+  }
+
+  // Sum of both objects' motion since the session began, up to the end of the last tick (m).
+  [[nodiscard]] double travel(const BodyPair& pair) const noexcept {
+    return all_.travel_m[pair.free] + all_.travel_m[pair.other];
+  }
+  [[nodiscard]] double drift(const BodyPair& pair, const PointQuery& query) const noexcept {
+    return travel(pair) - query.queried_at_m;
+  }
+
+  // Both have hardly moved since the query, so that pairs at rest need no new one.
+  [[nodiscard]] bool is_current(const BodyPair& pair, const PointQuery& query) const noexcept;
+
+  // Poses before this tick. Objects on paths have moved already; moves of free bodies by tissue since the
+  // last tick are added to their travel.
+  void place_now() noexcept;
+  // Poses after this tick, with free bodies as their present solution has them.
+  void place_after() noexcept;
+  [[nodiscard]] bool in_motion(const BodyPair& pair) const noexcept {
+    return member_[pair.free] != BodyContact::kNone || member_[pair.other] != BodyContact::kNone;
+  }
+
+  // True: nothing of one object is nearer than `range` to the other. False: unknown, or nearer.
+  bool far_apart(BodyPair& pair, double range) noexcept;
+  [[nodiscard]] bool far_apart_now(const BodyPair& pair) const noexcept {
+    return pair.until_m - travel(pair) > 0.0;
+  }
+
+  // Queries the surface from place `x` in the other object's frame. A point that moved no further than
+  // `jump_m`, is nearer than that to the surface and now sees its other side went through it.
+  [[nodiscard]] NearestSurface nearest_surface(const BodyPair& pair, Side side, const glm::dvec3& x,
+                                               double radius_m, const glm::dvec3& known,
+                                               double jump_m) noexcept;
+  // The last ways of a point were all shorter than its distance, so the query needs no memory of its side.
+  void refresh_query(const BodyPair& pair, Side side, std::size_t i, PointQuery& query) noexcept;
+
+  // The contact of a point with the surface that its query returned, without force. `of` and `at`: frames of
+  // the point's object and of the other one.
+  [[nodiscard]] BodyContact contact_at(const BodyPair& pair, Side side, std::size_t i,
+                                       const NearestSurface& query, const std::vector<BodyFrame>& of,
+                                       const std::vector<BodyFrame>& at) const noexcept;
+
+  const World& world_;
+  WorldState& state_;
+  BodyCollisions& all_;
+  double dt_s_;
+  std::size_t queries_made_ = 0;
+  std::vector<BodyFrame>&now_ = state_.scratch.free_bodies.before, &after_ = state_.scratch.free_bodies.after;
+  std::vector<Pose>& next_ = state_.scratch.free_bodies.next;
+  std::vector<double>& moves_ = state_.scratch.free_bodies.moves_m;
+  std::vector<std::uint32_t>& member_ = state_.scratch.free_bodies.member;
+};
+
+}  // namespace hybrid

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/view/gl_objects.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+namespace hybrid {
+namespace {
+
+GLuint compile(GLenum kind, const char* source) {
+  const GLuint shader = glCreateShader(kind);
+  glShaderSource(shader, 1, &source, nullptr);
+  glCompileShader(shader);
+  GLint good = GL_FALSE;
+  glGetShaderiv(shader, GL_COMPILE_STATUS, &good);
+  if (good != GL_TRUE) {
+    std::string log(1024, '\0');
+    GLsizei length = 0;
+    glGetShaderInfoLog(shader, static_cast<GLsizei>(log.size()), &length, log.data());
+    log.resize(static_cast<std::size_t>(std::max(length, 0)));
+    throw std::runtime_error("the graphics driver refuses a shader: " + log +
+                             "; set LIBGL_ALWAYS_SOFTWARE=1 to draw without it");
+  }
+  return shader;
+}
+
+}  // namespace
+
+void check_gl(const char* doing) {
+  const GLenum error = glGetError();
+  if (error == GL_NO_ERROR) return;
+  for (int i = 0; i < 16 && glGetError() != GL_NO_ERROR; ++i) {
+  }
+  if (error == GL_OUT_OF_MEMORY) {
+    throw std::runtime_error(std::string("the graphics memory is full while ") + doing +
+                             "; use a smaller picture or a coarser mesh");
+  }
+  throw std::runtime_error("OpenGL error " + std::to_string(error) + " while " + doing +
+                           "; update the graphics driver, or set LIBGL_ALWAYS_SOFTWARE=1 to draw without it");
+}
+
+GLuint link_program(const char* vertex, const char* fragment) {
+  const GLuint program = glCreateProgram();
+  const GLuint parts[] = {compile(GL_VERTEX_SHADER, vertex), compile(GL_FRAGMENT_SHADER, fragment)};
+  for (const GLuint part : parts) {
+    glAttachShader(program, part);
+    glDeleteShader(part);
+  }
+  glLinkProgram(program);
+  GLint good = GL_FALSE;
+  glGetProgramiv(program, GL_LINK_STATUS, &good);
+  if (good != GL_TRUE) throw std::runtime_error("the graphics driver cannot link a shader; update it");
+  return program;
+}
+
+const void* buffer_offset(std::size_t bytes) {
+  return reinterpret_cast<const void*>(bytes);  // NOLINT(performance-no-int-to-ptr): how OpenGL wants it
+}
+
+void GlMesh::upload(const DrawMesh& mesh, GLenum usage) {
+  if (mesh.indices.size() > static_cast<std::size_t>(std::numeric_limits<GLsizei>::max())) {
+    throw std::runtime_error("a surface of " + std::to_string(mesh.indices.size() / 3) +
+                             " triangles is more than one draw call holds; simplify the mesh");
+  }
+  glGenVertexArrays(1, &array);
+  glGenBuffers(1, &vertices);
+  glGenBuffers(1, &indices);
+  glBindVertexArray(array);
+  glBindBuffer(GL_ARRAY_BUFFER, vertices);
+  glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(mesh.vertices.size() * sizeof(DrawVertex)),
+               mesh.vertices.data(), usage);
+  glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, indices);
+  glBufferData(GL_ELEMENT_ARRAY_BUFFER, static_cast<GLsizeiptr>(mesh.indices.size() * sizeof(std::uint32_t)),
+               mesh.indices.data(), GL_STATIC_DRAW);
+  constexpr auto stride = static_cast<GLsizei>(sizeof(DrawVertex));
+  glVertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, stride, buffer_offset(offsetof(DrawVertex, position)));
+  glVertexAttribPointer(1, 3, GL_FLOAT, GL_FALSE, stride, buffer_offset(offsetof(DrawVertex, normal)));
+  glVertexAttribPointer(2, 1, GL_FLOAT, GL_FALSE, stride,
+                        buffer_offset(offsetof(DrawVertex, displacement_m)));
+  for (GLuint i = 0; i < 3; ++i) glEnableVertexAttribArray(i);
+  count = static_cast<GLsizei>(mesh.indices.size());
+}
+
+void GlMesh::upload_colours(const std::vector<VertexColour>& of_vertex) {
+  glGenBuffers(1, &colours);
+  glBindVertexArray(array);
+  glBindBuffer(GL_ARRAY_BUFFER, colours);
+  glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(of_vertex.size() * sizeof(VertexColour)),
+               of_vertex.data(), GL_STATIC_DRAW);
+  glVertexAttribPointer(3, 4, GL_UNSIGNED_BYTE, GL_TRUE, 0, buffer_offset(0));
+  glEnableVertexAttribArray(3);
+}
+
+void GlMesh::stream(const DrawMesh& mesh) const {
+  const auto bytes = static_cast<GLsizeiptr>(mesh.vertices.size() * sizeof(DrawVertex));
+  glBindBuffer(GL_ARRAY_BUFFER, vertices);
+  glBufferData(GL_ARRAY_BUFFER, bytes, nullptr, GL_STREAM_DRAW);
+  glBufferSubData(GL_ARRAY_BUFFER, 0, bytes, mesh.vertices.data());
+}
+
+void GlMesh::draw() const {
+  glBindVertexArray(array);
+  glDrawElements(GL_TRIANGLES, count, GL_UNSIGNED_INT, nullptr);
+}
+
+GLuint make_texture_target(GLenum inner, GLenum outer, GLenum type, int width, int height) {
+  GLuint texture = 0;
+  glGenTextures(1, &texture);
+  glBindTexture(GL_TEXTURE_2D, texture);
+  glTexImage2D(GL_TEXTURE_2D, 0, static_cast<GLint>(inner), width, height, 0, outer, type, nullptr);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+  return texture;
+}
+
+void attach_targets(GLuint frame, GLuint colour, GLuint depth) {
+  glBindFramebuffer(GL_FRAMEBUFFER, frame);
+  glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, colour, 0);
+  glFramebufferTexture2D(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_TEXTURE_2D, depth, 0);
+  const GLenum buffer = colour != 0 ? GL_COLOR_ATTACHMENT0 : GL_NONE;
+  glDrawBuffers(1, &buffer);
+  glReadBuffer(buffer);
+  if (glCheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE) {
+    throw std::runtime_error(
+        "the graphics driver cannot draw into a picture of this size; ask for a smaller one");
+  }
+}
+
+}  // namespace hybrid
