@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "hybrid/view/gl_objects.h"
 
+#include <epoxy/gl.h>
+
 #include <algorithm>
 #include <cstddef>
 #include <limits>
