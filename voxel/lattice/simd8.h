@@ -7,6 +7,7 @@
 // are passed by reference, since how they are passed by value depends on the machine.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -70,6 +71,15 @@ HYBRID_INLINE void bits_set(Mask8& out, const std::uint8_t* bytes, int bits) {
   Bytes b;
   std::memcpy(&b, bytes, sizeof b);
   out = (__builtin_convertvector(b, Mask8) & bits) != 0;
+}
+
+// Bit i is set where lane i of the mask is.
+HYBRID_INLINE std::uint32_t lanes_set(const Mask8& mask) {
+  std::array<std::int32_t, kLanes> lanes;
+  std::memcpy(lanes.data(), &mask, sizeof mask);
+  std::uint32_t bits = 0;
+  for (std::uint32_t i = 0; i < kLanes; ++i) bits |= (lanes[i] != 0 ? 1U : 0U) << i;
+  return bits;
 }
 
 }  // namespace voxel

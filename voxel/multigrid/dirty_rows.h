@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "voxel/lattice/row_grid.h"
 #include "voxel/lattice/lazy_array.h"
+#include "voxel/lattice/row_grid.h"
 
 namespace voxel {
 

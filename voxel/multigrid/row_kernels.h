@@ -4,9 +4,9 @@
 
 #include <array>
 
+#include "voxel/lattice/lattice.h"
 #include "voxel/lattice/level_stiffness.h"
 #include "voxel/lattice/row_grid.h"
-#include "voxel/lattice/lattice.h"
 
 namespace voxel {
 

@@ -14,15 +14,16 @@
 namespace voxel {
 namespace {
 
-constexpr std::size_t kMaxLimitLoads = 500;  // voxels looked at for what holds one of them
-constexpr float kTight = 1e-4F;              // of the spacing: nearer to its limit than this a link is tight
-constexpr std::size_t kMostHanging = 3000;   // voxels that hang on those that something else presses
+constexpr std::size_t kMaxLimitLoads = 500;  // voxels that are searched for one that holds another
+
+// voxels looked at for what holds one of them
+constexpr float kTight = 1e-4F;             // of the spacing: nearer to its limit than this a link is tight
+constexpr std::size_t kMostHanging = 3000;  // voxels that hang on those that something else presses
 // As kTight, where a body or another soft object presses. At rest what does not hang on what they press is
 // balanced, and adds nothing; what does is left behind a little whenever these, or the tool, withdraw. (By
 // kTight a tool lost a tenth of what another object pressed it with through the chain, in one tick or the
 // other, and did not come to rest.)
 constexpr float kTightBesideOthers = 0.02F;
-
 // u(w) − u(v) of neighbours along d, and what their link lets it be, whichever way the link points.
 struct LinkState {
   float difference, low, high;
@@ -32,7 +33,6 @@ LinkState link_state(const Lattice& lattice, const LazyArray<float>& u, VoxelId 
   const auto b = lattice.bounds(up ? v : w, d, axis);
   return {u[w] - u[v], up ? b[0] : -b[1], up ? b[1] : -b[0]};
 }
-
 // `visit(w, d, up)` for the neighbours of v.
 template <class Visit>
 void for_neighbours(const Lattice& lattice, VoxelId v, const Visit& visit) {
@@ -43,7 +43,6 @@ void for_neighbours(const Lattice& lattice, VoxelId v, const Visit& visit) {
     }
   }
 }
-
 // `visit(w, pushed_up, pushed_down)` for those whose link to v is at a limit along `axis`: at that below
 // which w cannot go, which pushes it up, at the one above, or at both. Where known(w), nothing is looked at:
 // of tissue that is tight all through, that is five neighbours of six.
@@ -59,7 +58,6 @@ void for_tight_neighbours(const Lattice& lattice, const LazyArray<float>& u, Vox
     if (pushed_up || pushed_down) visit(w, pushed_up, pushed_down);
   });
 }
-
 bool any_may_be_tight(const Lattice& lattice, const Displacement& state, std::span<const VoxelId> voxels,
                       float share) {
   for (int axis = 0; axis < 3; ++axis) {
@@ -69,7 +67,6 @@ bool any_may_be_tight(const Lattice& lattice, const Displacement& state, std::sp
   }
   return false;
 }
-
 // Each of `hanging` from `first` on hands its load to what it hangs on, `carries(i, load)` where that is one
 // of those before; `drops(i)` where its link does not press that way.
 template <class Hanging, class Drops, class Carries>
@@ -394,49 +391,6 @@ void SoftObject::add_stiffness(int axis, glm::dmat3& stiffness) noexcept {
       }
     }
   }
-}
-
-Reaction SoftObject::reaction(const ToolInBody& tool) noexcept {
-  if (grid_) return reaction_on_grid(tool);
-  Reaction result;
-  for (Touch& t : touches_) {
-    t.tight = false;
-    t.load = glm::dvec3(0.0);
-    if (!t.pressed || t.part != 0) continue;
-    t.normal = gap(tool, position(t)).normal;
-    t.load = load_on(t.v);
-  }
-  glm::dvec3 hanging_N(0.0);
-  const bool by_rows = held_voxels_.empty() && block_seen_.empty();
-  if (by_rows) hanging_N = gather_load(result.stiffness_N_per_m);
-  for (int axis = 0; axis < 3 && !by_rows; ++axis) {
-    if (block_seen_.empty()) {
-      gather_load_with_pairs(axis);
-    } else {
-      gather_load_with_blocks(axis);
-    }
-    add_stiffness(axis, result.stiffness_N_per_m);
-    let_go_of_carried();
-  }
-  // Tight links pass load between voxels, along and across their normals, and the sum of all is what is left
-  // of it: within the sum the chain's own forces cancel, whichever voxel each is booked to.
-  for (const Touch& t : touches_) {
-    if (t.pressed && t.tight && t.part == 0) result.force_N += t.load;
-  }
-  result.force_N += hanging_N;
-  const glm::dvec3 through_links = result.force_N;
-  for (const Touch& t : touches_) {
-    if (!t.pressed || t.part != 0) continue;
-    const double load = glm::dot(t.tight ? through_links : t.load, t.normal);
-    if (!t.tight && load < 0.0) {
-      // Frictionless: the tool feels what the voxel presses along the normal; what pulls is no contact.
-      result.force_N += load * t.normal;
-    }
-    if (load < 0.0) ++result.pressed;
-  }
-  if (!block_seen_.empty()) add_reaction_of_blocks(tool, result);
-  if (result.pressed == 0) result.force_N = glm::dvec3(0.0);  // what only pulls is no contact
-  return result;
 }
 
 bool SoftObject::is_immovable(VoxelId v, const glm::dvec3& direction) noexcept {

@@ -96,6 +96,9 @@ class ShadowObject {
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
+  static constexpr std::size_t kAhead = 4;  // rows that are fetched before their turn
+  static std::size_t at(RowId row) { return static_cast<std::size_t>(row) * kRow; }
+
   // Rows of voxels on their way from one thread to the other, one after the other in memory: to fetch what
   // another core wrote costs more than all that is done with it, and least where it stands in a row.
   class RowDelta {

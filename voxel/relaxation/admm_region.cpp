@@ -14,11 +14,7 @@ constexpr int kDeep = 3;                      // links from where it begins …
 constexpr int kFar = 12;                      // … and so many of them where they are at their limits
 constexpr int kSweeps = 30, kTickSweeps = 6;  // in a round of relaxation beside bodies; in a tick
 constexpr int kToolSweeps = 100;              // … under the tool, where rounds are nobody's tick
-constexpr std::uint64_t kOtherWork = 5;       // beside sweeps, in these
-constexpr std::uint32_t kRemembered = 8;      // calls
-// Of a link's own spring: that by which its multiplier is found, and likewise of a voxel's springs at its
-// obstacle.
-constexpr double kOfLink = 1.0;
+constexpr std::uint64_t kOtherWork = 5;
 constexpr double kFurther = 1.6;   // over-relaxation (Boyd et al., 3.4.3)
 constexpr double kAtLimit = 1e-3;  // of the spacing: so near to its limit a link is at it
 constexpr double kNear = 0.4;      // of the spacing: and so near it may come to it
@@ -29,9 +25,7 @@ constexpr double kTighter = 2e-5;
 // as much what the one moved the others moved back, by 5e-4 of a small force.
 constexpr double kTighterAtTool = 2e-6;
 constexpr double kSqueezed = 5e-3;  // of the spacing: what is deeper in an obstacle cannot leave it
-constexpr double kDeeper =
-    1e-3;                   // of the spacing: no deeper than that it comes by going where it was found to
-constexpr int kRounds = 4;  // in which limits and obstacles are met in turns
+constexpr int kRounds = 4;          // in which limits and obstacles are met in turns
 constexpr int kMostPasses = 60;     // until limits are met on one axis
 constexpr double kRounding = 1e-9;  // of the spacing
 
@@ -164,16 +158,6 @@ void AdmmRegion::prepare_links(LevelStiffness& couplings) noexcept {
         l.within[axis] = std::clamp(is, l.low[axis] + tighter(l, axis), l.high[axis] - tighter(l, axis));
       }
     }
-  }
-}
-
-// `visit(link, other member, up, d)` for the links of a member.
-template <class Visit>
-void AdmmRegion::for_links(std::size_t i, const Visit& visit) const noexcept {
-  const Member& m = members_[i];
-  for (std::size_t d = 0; d < 3; ++d) {
-    if (m.up[d] != kNone) visit(links_[3 * i + d], members_[m.up[d]], true);
-    if (m.down[d] != kNone) visit(links_[3 * m.down[d] + d], members_[m.down[d]], false);
   }
 }
 
@@ -315,94 +299,6 @@ bool AdmmRegion::allow() noexcept {
 }
 
 // The part of the way to what was found, at the end of which the energy is least.
-double AdmmRegion::share() const noexcept {
-  double most = 1.0, slope = 0.0, curvature = 0.0;
-  for (std::size_t i = 0; i < members_.size(); ++i) {
-    const Member& m = members_[i];
-    for (std::size_t axis = 0; axis < 3 && m.moves; ++axis)
-      slope -= m.load_N[axis] * (m.found[axis] - m.from[axis]);
-    for (std::size_t d = 0; d < 3; ++d) {
-      if (m.up[d] == kNone) continue;
-      const Link& l = links_[3 * i + d];  // without stiffness where neither moves
-      const Member& n = members_[m.up[d]];
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const double is = n.from[axis] - m.from[axis], more = n.found[axis] - m.found[axis] - is;
-        slope += l.stiff_N_per_m[axis] * is * more;
-        curvature += l.stiff_N_per_m[axis] * more * more;
-      }
-    }
-    if (!m.outside || !m.moves) continue;
-    const double was = depth_in_obstacle(m.plane, {m.from[0], m.from[1], m.from[2]}),
-                 is = depth_in_obstacle(m.plane, {m.found[0], m.found[1], m.found[2]}),
-                 room = std::max(0.0, -was) + kDeeper * spacing_m_;
-    if (is > was && most * (is - was) > room) most = room / (is - was);
-  }
-  return slope < 0.0 && curvature > 0.0 ? std::min(most, -slope / curvature) : 0.0;
-}
-
-void AdmmRegion::forget(Multigrid& multigrid, VoxelId v) noexcept {
-  multigrid.tie(v, glm::vec3(0.0F));
-  const auto forget_of = [v](LazyArray<float>& of_axis) {
-    if (of_axis[v] != 0.0F) of_axis[v] = 0.0F;  // what was only read takes no memory
-  };
-  for (auto& of_axis : beyond_) forget_of(of_axis);
-  for (auto& of_axis : pressed_) forget_of(of_axis);
-  asked_[v] = 0;
-}
-
-void AdmmRegion::forget(Multigrid& multigrid) noexcept {
-  for (const Member& m : members_) number_[m.v] = 0;
-  members_.clear();
-  on_body_.clear();
-  for (const VoxelId v : known_) forget(multigrid, v);
-  known_.clear();
-  found_ = false;
-}
-
-void AdmmRegion::pass(Multigrid& multigrid) noexcept {
-  if (known_.empty()) return;
-  ++calls_;
-  std::size_t kept = 0;
-  for (const VoxelId v : known_) {
-    if (calls_ - asked_[v] > kRemembered) {
-      forget(multigrid, v);
-    } else {
-      known_[kept++] = v;
-    }
-  }
-  known_.resize(kept);
-}
-
-void AdmmRegion::keep_multipliers(Multigrid& multigrid) noexcept {
-  for (std::size_t i = 0; i < members_.size(); ++i) {
-    const Member& m = members_[i];
-    if (asked_[m.v] == 0) {
-      if (known_.size() == known_.capacity()) continue;
-      known_.push_back(m.v);
-    }
-    asked_[m.v] = calls_ + 1;  // in pass(), below
-    glm::vec3 pull(0.0F);
-    for_links(i, [&](const Link& l, const Member&, bool up) {
-      for (std::size_t axis = 0; axis < 3 && m.moves; ++axis) {
-        const auto force = static_cast<float>(kOfLink * l.stiff_N_per_m[axis] * l.beyond[axis]);
-        pull[static_cast<int>(axis)] += up ? force : -force;
-      }
-    });
-    multigrid.tie(m.v, pull);
-    const auto keep = [&](LazyArray<float>& of_axis, double value) {
-      const auto is = static_cast<float>(value);
-      if (of_axis[m.v] != is) of_axis[m.v] = is;
-    };
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      for (std::size_t d = 0; d < 3; ++d) {
-        if (m.moves || (m.up[d] != kNone && members_[m.up[d]].moves))
-          keep(beyond_[3 * axis + d], links_[3 * i + d].beyond[axis]);
-      }
-      if (m.moves) keep(pressed_[axis], m.outside ? m.pressed[axis] * m.hold_N_per_m : 0.0);
-    }
-  }
-  pass(multigrid);
-}
 
 double AdmmRegion::relax(Multigrid& multigrid, Displacement& state, const ObstacleView& obstacles,
                          std::span<const VoxelId> on_body, bool briefly) noexcept {

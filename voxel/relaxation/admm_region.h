@@ -64,6 +64,9 @@ class AdmmRegion {
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
+  // Penalty of the augmented Lagrangian (unit: the link's own spring, or the voxel's springs at its obstacle).
+  static constexpr double kOfLink = 1.0;
+
   static constexpr std::uint32_t kNone = ~std::uint32_t{0};
   using Axes = std::array<double, 3>;
   struct Member {
@@ -117,5 +120,15 @@ class AdmmRegion {
   std::uint64_t looked_at_ = 0;
   bool found_ = false;
 };
+
+// `visit(link, other member, up, d)` for the links of a member.
+template <class Visit>
+void AdmmRegion::for_links(std::size_t i, const Visit& visit) const noexcept {
+  const Member& m = members_[i];
+  for (std::size_t d = 0; d < 3; ++d) {
+    if (m.up[d] != kNone) visit(links_[3 * i + d], members_[m.up[d]], true);
+    if (m.down[d] != kNone) visit(links_[3 * m.down[d] + d], members_[m.down[d]], false);
+  }
+}
 
 }  // namespace voxel

@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Rounds over the whole object: tiles, clusters, active limits, and when an object is at rest.
+#include "voxel/relaxation/relaxation.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "voxel/relaxation/admm_region.h"
+
+namespace voxel {
+
+namespace {
+
+constexpr std::uint64_t kLetGoEvery = 8;  // rounds
+constexpr int kPatience = 40;             // cycles without gain before an object counts as resting
+constexpr double kWorse = 1.05;
+constexpr float kHarder = 8.0F, kSofter = 0.97F, kHardest = 1e4F;
+constexpr double kGain = 0.98;      // of the least residual so far: less is a gain
+constexpr double kNearRest = 10.0;  // times the tolerance: what limits hold moves together from here on
+constexpr double kProgress = 1e-3;  // of the spacing: clusters that move further are on their way
+// … and where links have next to no slack, those that all went this much further than ever in a round; not
+// between surfaces, where what is squeezed would be on its way for long. (Taken for what their steps free of
+// energy, it was for ever.)
+constexpr double kDrift = 2e-5;
+constexpr std::uint64_t kNextFirst = 7919;  // of these voxels is looked at first in the next round
+
+}  // namespace
+
+std::uint64_t Relaxation::relax_tile(Displacement& state, const ObstacleView& obstacles,
+                                     std::size_t number) noexcept {
+  const TileQueue::Tile t = multigrid_.tiles().tile(number);
+  constexpr int kSide = TileQueue::kSide;
+  lay_boxes({t.column * kRow, t.j * kSide, t.k * kSide},
+            {(t.column + 1) * kRow - 1, (t.j + 1) * kSide - 1, (t.k + 1) * kSide - 1}, kNoContact, 0,
+            Visits::once);
+  cycle(state, obstacles, Look::all);
+  std::uint64_t updates = 0;
+  for (const LevelBoxes& b : boxes_) {
+    updates += static_cast<std::uint64_t>(b.smoothed.q1 - b.smoothed.q0 + 1) * kLanes *
+               static_cast<std::uint64_t>(b.smoothed.j1 - b.smoothed.j0 + 1) *
+               static_cast<std::uint64_t>(b.smoothed.k1 - b.smoothed.k0 + 1);
+  }
+  return 2 * updates;
+}
+
+bool Relaxation::relax_limited(Displacement& state, const ObstacleView& obstacles,
+                               std::span<const VoxelId> on_body) noexcept {
+  if (on_body.empty()) {
+    limited_->pass(multigrid_);
+    return false;
+  }
+  const double most_N = limited_->relax(multigrid_, state, obstacles, on_body);
+  if (most_N > tolerance_N_) wake();
+  return limited_->found();
+}
+
+// What limits held in this round moves with what it pulls on; returns the largest force a voxel that did (N).
+// Which voxel is first goes round, so that all have their turn however few a round has time for.
+double Relaxation::step_clusters(Displacement& state, const ObstacleView& obstacles) noexcept {
+  cluster_steps_.begin();
+  double most_N = 0.0;
+  std::array<double, 3> went{};
+  int moves = 0;
+  const auto move = [&](VoxelId v, int axis) {
+    const float from = state.u[static_cast<std::size_t>(axis)][v];
+    const double force = cluster_steps_.move(multigrid_, state, v, axis, 0.5 * tolerance_N_);
+    if (force == 0.0) return;
+    most_N = std::max(most_N, force);
+    // Every such step lowers the energy, though it may be far from limit to limit to where the force falls.
+    const auto way = static_cast<double>(state.u[static_cast<std::size_t>(axis)][v] - from);
+    went[static_cast<std::size_t>(axis)] += way;
+    ++moves;
+    if (std::fabs(way) > kProgress * lattice_.min_spacing_m())
+      cycles_without_gain_ = std::min(cycles_without_gain_, kPatience / 2 + 1);
+    for (const VoxelId w : cluster_steps_.moved()) multigrid_.mark_dirty(0, w / kRow);
+  };
+  // Parts without slack that limits hold, which are pulled otherwise than what holds them.
+  for (std::size_t p = 0; multigrid_.has_blocks() && p < multigrid_.parts().count(); ++p) {
+    for (int axis = 0; axis < 3; ++axis) move(multigrid_.parts().first(p), axis);
+  }
+  std::uint64_t count = 0;
+  multigrid_.for_limited([&count](VoxelId, int) { ++count; });
+  const std::uint64_t first = count == 0 ? 0 : cycles_ * kNextFirst % count;
+  for (const bool before : {false, true}) {
+    std::uint64_t n = 0;
+    multigrid_.for_limited([&](VoxelId v, int axis) {
+      if ((n++ < first) == before) move(v, axis);
+    });
+  }
+  for (std::size_t axis = 0; axis < 3 && moves > 0 && obstacles.obstacles.empty(); ++axis) {
+    drift_m_[axis] += went[axis] / moves;
+    const double further = std::fabs(drift_m_[axis]) - furthest_m_[axis];
+    if (further <= 0.0) continue;
+    furthest_m_[axis] += further;
+    if (further > kDrift * lattice_.min_spacing_m())
+      cycles_without_gain_ = std::min(cycles_without_gain_, kPatience / 2 + 1);
+  }
+  credit_ -= static_cast<std::int64_t>(cluster_steps_.looked_at());
+  return most_N;
+}
+
+// A round has looked at all that moves: is it at rest?
+void Relaxation::end_round(Displacement& state, const ObstacleView& obstacles, double residual_N) noexcept {
+  residual_N = std::max(residual_N, static_cast<double>(multigrid_.bricks().unbalanced_N()));
+  // Only when nothing else moves any more: between other corrections they would undo one another (energy grew
+  // 1.9 times within a cycle).
+  if (residual_N < kNearRest * tolerance_N_ || cycles_without_gain_ > kPatience / 2 ||
+      multigrid_.has_blocks())
+    residual_N = std::max(residual_N, step_clusters(state, obstacles));
+  // While rounds gain nothing, what limits hold stays held for a few of them: let go of in every round, two
+  // sets of voxels can take turns for ever.
+  // What the tool presses, and all that hangs on it by links at their limits, goes together, too: a few
+  // hundred thousand voxel updates, which no tick has to spare. Beside a body something moves in every tick,
+  // so that each round is as the first, and there what is still pulled against its limit stays held. (Let go
+  // of, coarse levels took it off the limit and back: under a ball at rest by 0.03 spacings, for ever. Kept
+  // everywhere, tissue that jumped stayed far from rest. Beside what stands, the contact's own solver knows
+  // nothing of such places, and took a brain back from them in every tick.)
+  if (obstacles.moving > 0 || (tool_presses_ && patient_ && obstacles.obstacles.empty())) {
+    residual_N = std::max(residual_N, limited_->relax(multigrid_, state, obstacles, {}));
+    credit_ -= static_cast<std::int64_t>(limited_->looked_at());
+    multigrid_.release_unlimited(state);
+  } else {
+    limited_->forget(multigrid_);
+    if (cycles_without_gain_ <= 1 || cycles_ % kLetGoEvery == 0) multigrid_.release_limited();
+  }
+  // Scattered voxels hold a cell harder than a patch of them does. A cycle that ends worse than it began says
+  // so.
+  if (residual_N > kWorse * residual_N_ && cycles_without_gain_ > 0) {
+    hold_ = std::min(hold_ * kHarder, kHardest);
+  } else {
+    hold_ = std::max(1.0F, hold_ * kSofter);
+  }
+  multigrid_.set_hold(hold_);
+  residual_N_ = residual_N;
+  running_residual_N_ = 0.0;
+  ++cycles_;
+  if (cycles_without_gain_ == 0 || residual_N_ < kGain * least_residual_N_) {
+    least_residual_N_ = residual_N_;
+    cycles_without_gain_ = 0;
+  }
+  ++cycles_without_gain_;
+  const bool at_rest =
+      (residual_N_ < tolerance_N_ && multigrid_.bricks().round_ended()) || cycles_without_gain_ > kPatience;
+  if (!at_rest) return;
+  // What yielded is kept at rest, and then there is a new rest to be found.
+  if (unkept_) {
+    keeping_ = true;
+    unkept_ = false;
+    keep_row_ = 0;
+    return;
+  }
+  if (multigrid_.tiles().waiting() > 0 && cycles_without_gain_ <= kPatience) return;
+  multigrid_.tiles().clear();
+  asleep_ = true;
+}
+
+std::uint64_t Relaxation::commit_plastic_offsets(Displacement& state, std::uint64_t budget) noexcept {
+  std::uint64_t spent = 0;
+  const auto rows = static_cast<RowId>(lattice_.grid().rows());
+  for (; keep_row_ < rows && spent < budget; ++keep_row_, ++spent) {
+    if (state.rest.row[keep_row_] == 0 || !multigrid_.prepare(0, keep_row_)) continue;
+    multigrid_.yield(keep_row_, state, true);
+    spent += kRow;
+  }
+  keeping_ = keep_row_ < rows;
+  return spent;
+}
+
+// Have the cells above a tile anything to tell it?
+bool Relaxation::tile_waits_for_coarse(std::size_t number) const noexcept {
+  constexpr int kSide = TileQueue::kSide;
+  const TileQueue::Tile t = multigrid_.tiles().tile(number);
+  for (int level = 1; level < multigrid_.levels(); ++level) {
+    const Grid& g = multigrid_.grid(level);
+    const int column = (t.column >> level) + 1, rows = std::max(1, kSide >> level);
+    const int j0 = t.j * kSide >> level, k0 = t.k * kSide >> level;
+    for (int k = k0; k < std::min(k0 + rows, g.dims[2]); ++k) {
+      for (int j = j0; j < std::min(j0 + rows, g.dims[1]); ++j) {
+        const RowId row = g.row(column, j, k);
+        if (multigrid_.has(level, row, Multigrid::changed) &&
+            multigrid_.pending_correction(level, row) > multigrid_.motion_tolerance_m())
+          return true;
+      }
+    }
+  }
+  return false;
+}
+
+}  // namespace voxel
