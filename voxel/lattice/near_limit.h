@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Whether a link is at one of its limits.
 #pragma once
 
 #include "voxel/lattice/displacement.h"
 #include "voxel/lattice/lattice.h"
 
 namespace voxel {
+
+// Of the spacing: a link that is nearer to a limit than this is at it (an active limit). A float of a displacement
+// of ten spacings is rounded by a hundredth of that.
+inline constexpr float kAtLimit = 1e-4F;
 
 // May any link of a voxel on one axis be within `share` of the spacing of a limit? By the tightest limits of
 // all, which is a tenth of the cost of looking at each link's own: most often the answer is no.

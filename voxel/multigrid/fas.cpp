@@ -157,7 +157,7 @@ void Multigrid::release_limited() noexcept {
 }
 
 void Multigrid::release_unlimited(const Displacement& state) noexcept {
-  const float tight = kTight * static_cast<float>(lattice_.min_spacing_m());
+  const float tight = kAtLimit * static_cast<float>(lattice_.min_spacing_m());
   const auto pulled_against_limit = [&](VoxelId v, int axis) {
     const float at = state.u[static_cast<std::size_t>(axis)][v];
     const std::array<float, 2> interval = link_interval(lattice_, state, v, axis);

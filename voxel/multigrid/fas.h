@@ -25,6 +25,7 @@
 #include "voxel/multigrid/prolongation.h"
 #include "voxel/multigrid/rigid_blocks.h"
 #include "voxel/multigrid/row_kernels.h"
+#include "voxel/lattice/near_limit.h"
 #include "voxel/multigrid/row_smoother.h"
 
 namespace voxel {
@@ -272,7 +273,6 @@ class Multigrid {
     LaneSpan span;
     RowVector way;
   };
-  static constexpr float kTight = 1e-4F;      // of the spacing: nearer to its limit than this a link is at it
   static constexpr float kLeastLoad = 0.25F;  // of the tolerance: loads less wrong than this are right
 
   // Of a part. What is of one level stands by level.

@@ -165,7 +165,7 @@ RowResidual Multigrid::residual_of(int level, RowId row, Displacement& state, co
     return found;
   }
   const RowLimits limits = couplings().limits(row);
-  const float tight = kTight * static_cast<float>(lattice_.min_spacing_m());
+  const float tight = kAtLimit * static_cast<float>(lattice_.min_spacing_m());
   RowVector loads;
   const bool ties = row_has_limit_load_[row] != 0;
   if (ties) add_limit_loads(row, r, loads);

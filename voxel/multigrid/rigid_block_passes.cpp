@@ -189,7 +189,7 @@ void Multigrid::take_others_along(std::size_t part, Displacement& state) noexcep
 // Returns bits of the axes on which it is held nevertheless.
 std::uint8_t Multigrid::add_what_comes_along(std::size_t part, const Displacement& state,
                                              glm::dvec3& pull) noexcept {
-  const double tight = static_cast<double>(kTight) * lattice_.min_spacing_m();
+  const double tight = static_cast<double>(kAtLimit) * lattice_.min_spacing_m();
   const auto number = static_cast<std::uint16_t>(part + 1);
   const glm::dvec3 own = pull;
   std::uint8_t stopped = 0;

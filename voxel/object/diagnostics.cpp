@@ -7,6 +7,7 @@
 #include "voxel/composite/grid.h"
 #include "voxel/lattice/plasticity.h"
 #include "voxel/lattice/voxel_links.h"
+#include "voxel/lattice/near_limit.h"
 #include "voxel/object/soft_object.h"
 
 namespace voxel {
@@ -46,8 +47,7 @@ double SoftObject::energy_J() const noexcept {
 
 std::optional<glm::dvec3> SoftObject::carried_by_anchors_N() const noexcept {
   if (on_grid_) return -grid_force_N_;
-  constexpr float kTight = 1e-4F;  // of the spacing: nearer to its limit than this a link is at it
-  const float tight_m = kTight * static_cast<float>(lattice_->min_spacing_m());
+  const float tight_m = kAtLimit * static_cast<float>(lattice_->min_spacing_m());
   glm::dvec3 carried(0.0);
   for (RowId row = 0; row < lattice_->grid().rows(); ++row) {
     for (std::uint32_t lanes = lattice_->anchored_lanes(row); lanes != 0; lanes &= lanes - 1) {

@@ -17,13 +17,12 @@ namespace {
 constexpr std::size_t kMaxLimitLoads = 500;  // voxels that are searched for one that holds another
 
 // voxels looked at for what holds one of them
-constexpr float kTight = 1e-4F;             // of the spacing: nearer to its limit than this a link is tight
 constexpr std::size_t kMostHanging = 3000;  // voxels that hang on those that something else presses
-// As kTight, where a body or another soft object presses. At rest what does not hang on what they press is
+// As kAtLimit, where a body or another soft object presses. At rest what does not hang on what they press is
 // balanced, and adds nothing; what does is left behind a little whenever these, or the tool, withdraw. (By
-// kTight a tool lost a tenth of what another object pressed it with through the chain, in one tick or the
+// kAtLimit a tool lost a tenth of what another object pressed it with through the chain, in one tick or the
 // other, and did not come to rest.)
-constexpr float kTightBesideOthers = 0.02F;
+constexpr float kAtLimitBesideOthers = 0.02F;
 // u(w) − u(v) of neighbours along d, and what their link lets it be, whichever way the link points.
 struct LinkState {
   float difference, low, high;
@@ -48,7 +47,7 @@ void for_neighbours(const Lattice& lattice, VoxelId v, const Visit& visit) {
 // of tissue that is tight all through, that is five neighbours of six.
 template <class Known, class Visit>
 void for_tight_neighbours(const Lattice& lattice, const LazyArray<float>& u, VoxelId v, int axis,
-                          const Known& known, const Visit& visit, float share = kTight) {
+                          const Known& known, const Visit& visit, float share = kAtLimit) {
   for_neighbours(lattice, v, [&](VoxelId w, int d, bool up) {
     if (known(w)) return;
     const float tight = share * static_cast<float>(lattice.spacing_m()[d]);
@@ -200,7 +199,7 @@ void SoftObject::gather_load_with_pairs(int axis) noexcept {
           carry(w, c.touch);
           hanging_.push_back({static_cast<std::uint32_t>(head), pushed_up, pushed_down, load_on(w, axis)});
         },
-        kTightBesideOthers);
+        kAtLimitBesideOthers);
   }
   add_from_far_end(
       hanging_, pressed, [&](std::size_t i) { carried_mark_[carried_[i].v] = 0; },
@@ -228,7 +227,7 @@ void SoftObject::add_hanging(int axis, std::span<const VoxelId> pressed, std::sp
     const auto known = [&](VoxelId w) { return carried_mark_[w] != 0 && loads[touch].tight; };
     for_tight_neighbours(
         *lattice_, u, carried_[head].v, axis, known,
-        [&](VoxelId w, bool up, bool down) { walk(head, w, up, down); }, kTightBesideOthers);
+        [&](VoxelId w, bool up, bool down) { walk(head, w, up, down); }, kAtLimitBesideOthers);
   }
   add_from_far_end(
       hanging_, first, [&](std::size_t i) { carried_mark_[carried_[i].v] = 0; },
@@ -281,7 +280,7 @@ void SoftObject::load_held(std::span<const VoxelId> held, std::size_t pressed,
 
 void SoftObject::relax_held(std::span<const VoxelId> pressed) noexcept {
   if (asleep() || !relaxation_.left_to_another()) return;
-  const bool tight = any_may_be_tight(*lattice_, state_, pressed, kTightBesideOthers);
+  const bool tight = any_may_be_tight(*lattice_, state_, pressed, kAtLimitBesideOthers);
   relaxation_.relax_limited(state_, obstacle_view(), pressed.first(tight ? pressed.size() : 0));
 }
 
@@ -298,7 +297,7 @@ void SoftObject::find_hanging_on_pairs() noexcept {
     if (!lattice_->anchored(v) && pair_load(lattice_->surface_number(v)) != glm::dvec3(0.0))
       pair_roots_.push_back(v);
   }
-  if (!any_may_be_tight(*lattice_, state_, pair_roots_, kTightBesideOthers)) {
+  if (!any_may_be_tight(*lattice_, state_, pair_roots_, kAtLimitBesideOthers)) {
     pair_roots_.clear();
     return;
   }
@@ -344,7 +343,7 @@ void SoftObject::hand_on(int axis) noexcept {
           if (s == kNoSurface || hanging_entry_[s] == 0) return;
           to = std::min<std::size_t>(to, hanging_entry_[s] - 1U);
         },
-        kTightBesideOthers);
+        kAtLimitBesideOthers);
     if (to == i) continue;
     hanging_on_pairs_[to].force_N[axis] += load;
     hanging_on_pairs_[to].stiffness_N_per_m[axis] += hanging_on_pairs_[i].stiffness_N_per_m[axis];
@@ -404,7 +403,7 @@ bool SoftObject::is_immovable(VoxelId v, const glm::dvec3& direction) noexcept {
     if (!Displacement::at_obstacle(state_.role[w])) return false;
     const Obstacle& o = obstacles_[lattice_->surface_number(w)];
     const double room = glm::dot(glm::dvec3(o.normal), state_.at(w)) - static_cast<double>(o.bound);
-    return room <= static_cast<double>(kTight) * lattice_->min_spacing_m() &&
+    return room <= static_cast<double>(kAtLimit) * lattice_->min_spacing_m() &&
            (upwards ? o.normal[axis] < -0.5F : o.normal[axis] > 0.5F);
   };
   carried_.clear();

@@ -5,12 +5,12 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include "voxel/lattice/near_limit.h"
 #include "voxel/object/soft_object.h"
 
 namespace voxel {
 namespace {
 
-constexpr double kBlockAtLimit = 1e-4;  // of the spacing: nearer to its limit than this a link is at it
 constexpr double kTightHanging = 1e-3;  // the same for what may be left behind a little as the tool withdraws
 
 }  // namespace
@@ -120,7 +120,7 @@ bool SoftObject::any_pressed(std::uint16_t part) const noexcept {
 glm::dvec3 SoftObject::dependents_of_block(std::size_t part,
                                            const Multigrid::AdmissibleInterval& room) noexcept {
   const Multigrid& grid = relaxation_.multigrid();
-  const double tight = kBlockAtLimit * lattice_->min_spacing_m();
+  const double tight = static_cast<double>(kAtLimit) * lattice_->min_spacing_m();
   glm::dvec3 force(0.0);
   for (int axis = 0; axis < 3; ++axis) {
     const auto& of_axis = room[static_cast<std::size_t>(axis)];

@@ -16,7 +16,7 @@ constexpr int kSweeps = 30, kTickSweeps = 6;  // in a round of relaxation beside
 constexpr int kToolSweeps = 100;              // … under the tool, where rounds are nobody's tick
 constexpr std::uint64_t kOtherWork = 5;
 constexpr double kFurther = 1.6;   // over-relaxation (Boyd et al., 3.4.3)
-constexpr double kAtLimit = 1e-3;  // of the spacing: so near to its limit a link is at it
+constexpr double kActiveAtFirst = 1e-3;  // of the spacing: so near to its limit a link is at it
 constexpr double kNear = 0.4;      // of the spacing: and so near it may come to it
 // Of the spacing, by which limits are tighter while the least energy is looked for: what is found is then
 // within them but for little.
@@ -72,7 +72,7 @@ std::uint32_t AdmmRegion::add(VoxelId v) noexcept {
 }
 
 bool AdmmRegion::at_limit(const Displacement& state, VoxelId v, VoxelId up, int d) const noexcept {
-  const auto tight = static_cast<float>(kAtLimit * spacing_m_);
+  const auto tight = static_cast<float>(kActiveAtFirst * spacing_m_);
   for (int axis = 0; axis < 3; ++axis) {
     const auto b = lattice_.bounds(v, d, axis);
     const LazyArray<float>& u = state.u[static_cast<std::size_t>(axis)];
@@ -151,7 +151,7 @@ void AdmmRegion::prepare_links(LevelStiffness& couplings) noexcept {
         const double is = members_[m.up[d]].from[axis] - m.from[axis],
                      left = std::min(is - l.low[axis], l.high[axis] - is) / spacing_m_,
                      beyond = static_cast<double>(beyond_[3 * axis + d][m.v]);
-        found_ = found_ || left < kAtLimit;
+        found_ = found_ || left < kActiveAtFirst;
         if (beyond == 0.0 && left >= kNear) continue;
         l.near = static_cast<std::uint8_t>(l.near | 1U << axis);
         l.beyond[axis] = beyond;

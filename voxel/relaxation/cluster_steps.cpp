@@ -13,7 +13,7 @@ namespace {
 constexpr std::size_t kMostVoxels = 20'000;      // that move as one
 constexpr std::uint64_t kMostLookedAt = 40'000;  // from begin() on
 constexpr std::uint8_t kIn = 1;
-constexpr float kTight = 1e-6F;  // of the spacing: nearer to its limit than this a link is at it
+constexpr float kExactlyAtLimit = 1e-6F;  // of the spacing: nearer to its limit than this a link is at it
 
 // How far u(from) may go on this way before the link to its neighbour stops it.
 float room(const Lattice& lattice, const LazyArray<float>& u, VoxelId from, int d, bool up, int axis,
@@ -53,7 +53,7 @@ void ClusterSteps::forget(int axis) noexcept {
 bool ClusterSteps::gather(const Multigrid& multigrid, const Displacement& state, VoxelId v, int axis,
                           bool upwards) noexcept {
   const LazyArray<float>& u = state.u[static_cast<std::size_t>(axis)];
-  const float tight = kTight * static_cast<float>(lattice_.min_spacing_m());
+  const float tight = kExactlyAtLimit * static_cast<float>(lattice_.min_spacing_m());
   cluster_.clear();
   cluster_.push_back(v);
   mark_[v] |= kIn;

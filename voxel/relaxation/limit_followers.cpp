@@ -129,7 +129,7 @@ void LimitFollowers::look_from(VoxelId from, VoxelId at) noexcept {
   const std::array<float, 2> b = bounds_of<kAxis, kD, !kUp>(row->limits, lane);
   const float low = kUp ? b[0] : -b[1], high = kUp ? b[1] : -b[0], before = u[at];
   const auto room = [&](float now) { return std::min(now - u[from] - low, high - (now - u[from])); };
-  if (room(before) > kNearlyTight * spacing_m_[kD]) return;
+  if (room(before) > kSearched * spacing_m_[kD]) return;
   const float place = place_of<kAxis>(*row, at);
   u[at] = place;
   if (!row->dirty && std::fabs(place - before) > mark_dirty_ * spacing_m_[kD]) {
@@ -140,7 +140,7 @@ void LimitFollowers::look_from(VoxelId from, VoxelId at) noexcept {
     row->noted = true;
     relaxation_->multigrid().log().note(0, row->row);
   }
-  if (room(place) <= kTight * spacing_m_[kD]) add(*row, at);
+  if (room(place) <= kAtLimit * spacing_m_[kD]) add(*row, at);
 }
 
 // Where a voxel would be if all else stood still.

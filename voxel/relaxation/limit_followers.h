@@ -17,6 +17,7 @@
 #include "voxel/lattice/lattice.h"
 #include "voxel/lattice/lazy_array.h"
 #include "voxel/lattice/level_stiffness.h"
+#include "voxel/lattice/near_limit.h"
 #include "voxel/relaxation/relaxation.h"
 
 namespace voxel {
@@ -51,8 +52,7 @@ class LimitFollowers {
     RowLimits limits;
     std::array<const float*, 3> bricks{}, balance{};  // [axis] what pulls besides (N); null: nothing
   };
-  static constexpr float kNearlyTight = 0.1F;  // of the spacing: links that are looked at
-  static constexpr float kTight = 1e-4F;  // of the spacing: nearer to its limit than this a link is tight
+  static constexpr float kSearched = 0.1F;  // of the spacing: links that are looked at
 
   [[nodiscard]] Row* look_at(RowId row) noexcept;
   void add(Row& row, VoxelId v) noexcept {

@@ -11,8 +11,7 @@
 namespace voxel {
 namespace {
 
-constexpr float kTight = 1e-4F;        // of the spacing: nearer to its limit than this a link is tight
-constexpr float kNearlyTight = 2e-4F;  // further from it, a link surely is not
+constexpr float kSurelyFree = 2e-4F;  // further from it, a link surely is not
 
 // Sum over the lanes whose bits are set.
 double sum_of(const float* lanes, std::uint32_t bits) {
@@ -93,7 +92,7 @@ LimitReactions::Row* LimitReactions::look_at(RowId row) noexcept {
   at.x = static_cast<std::ptrdiff_t>(g.row_x) * kRow;
   gathering_->couplings.all(row, at.springs);
   std::array<float, 3> tight{};
-  for (std::size_t d = 0; d < 3; ++d) tight[d] = kTight * static_cast<float>(lattice_.spacing_m()[d]);
+  for (std::size_t d = 0; d < 3; ++d) tight[d] = kAtLimit * static_cast<float>(lattice_.spacing_m()[d]);
   Row& out = rows_.emplace_back();
   out.row = row;
   links_at_limits(at, gathering_->couplings.limits(row), ua, tight, out.links);
@@ -153,7 +152,7 @@ void LimitReactions::gather(LevelStiffness& couplings, Displacement& state, std:
   Gathering gathering{couplings, roots, nullptr, 0, false, {}, {}};
   begin(gathering, state, axis);
   for (const VoxelId v : roots) {
-    if (may_be_tight(lattice_, state, v, axis, kNearlyTight)) look_at(v / kRow);
+    if (may_be_tight(lattice_, state, v, axis, kSurelyFree)) look_at(v / kRow);
   }
   find_all();
   // Roots beside what hangs on others, so that links between these and those are known for such.

@@ -20,7 +20,7 @@ using voxel::Displacement;
 using voxel::Lattice;
 using voxel::VoxelId;
 
-constexpr float kNearlyTight = 0.1F, kTight = 1e-4F;  // of the spacing, as there
+constexpr float kSearched = 0.1F, kTight = 1e-4F;  // of the spacing, as there
 constexpr float kDirtyMotion = 1e-5F;
 constexpr std::size_t kMostRoots = 64;
 
@@ -58,7 +58,7 @@ std::set<VoxelId> draw(voxel::Relaxation& relaxation, Displacement& state, const
           state.role[w] != Displacement::free)
         continue;
       const auto spacing = static_cast<float>(lattice.spacing_m()[d]);
-      if (room(lattice, state, v, w, d, up, axis) > kNearlyTight * spacing) continue;
+      if (room(lattice, state, v, w, d, up, axis) > kSearched * spacing) continue;
       const float before = u[w];
       u[w] = place_of(relaxation, state, w, axis);
       if (std::abs(u[w] - before) > kDirtyMotion * spacing) dirty.insert(w);
