@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Which cells have boundary springs: of held and sliding voxels, whose cells are queued, and of anchors,
+// found when first asked for.
 #include "voxel/multigrid/boundary_springs.h"
 
 #include <algorithm>
@@ -9,8 +11,10 @@
 namespace voxel {
 namespace {
 
-constexpr std::size_t kQueued = 65536;    // cells looked at together
-constexpr std::size_t kMostOfAVoxel = 7;  // Lanes of a row of the next coarser level, of its first half.
+constexpr std::size_t kQueued = 65536;  // cells renewed together
+// Cells that change with a voxel: its own and those of its neighbours.
+constexpr std::size_t kMostOfAVoxel = 7;
+// Lanes of the coarser row above lanes of a row (of its first half).
 std::uint32_t lanes_above(std::uint32_t lanes) {
   std::uint32_t out = 0;
   for (std::uint32_t rest = lanes; rest != 0;) {
@@ -50,7 +54,7 @@ BoundarySprings::BoundarySprings(const Lattice& lattice, const std::vector<Level
   wait_for_anchors();
 }
 
-// Rows with a cell that anchors may hold, on each level.
+// Marks the rows on each level with a cell that anchors may fix.
 void BoundarySprings::wait_for_anchors() {
   const auto above = [this](int level, RowId row) {
     const std::array<int, 3> c = at(level - 1).couplings->grid().row_coordinates(row);
@@ -99,7 +103,7 @@ void BoundarySprings::keep_records(int level) {
   l.values.shrink_to_fit();
 }
 
-// Lanes of voxels that are anchored or linked to one that is.
+// Lanes of voxels that are anchored or linked to an anchor.
 std::uint32_t BoundarySprings::voxels_at_anchors(RowId row) const noexcept {
   const Grid& g = lattice_.grid();
   const std::uint32_t filled = lattice_.filled_lanes(row), own = lattice_.anchored_lanes(row);
@@ -112,7 +116,7 @@ std::uint32_t BoundarySprings::voxels_at_anchors(RowId row) const noexcept {
   return lanes & filled;
 }
 
-// Lanes of the cells of a row that hold such a voxel.
+// Lanes of the cells above such voxels.
 std::uint32_t BoundarySprings::cells_at_anchors(int level, RowId row) const noexcept {
   const Grid& finer = at(level - 1).couplings->grid();
   const std::array<int, 3> c = at(level).couplings->grid().row_coordinates(row);
@@ -156,7 +160,7 @@ BoundarySprings::Found BoundarySprings::recorded(int level, const Record& record
   return found;
 }
 
-// Of a cell that waits.
+// Springs of a cell whose row waits.
 BoundarySprings::Found BoundarySprings::waiting(int level, VoxelId cell) const noexcept {
   if (level < LevelStiffness::kKept) return find(level, cell);
   for (const Record& record : records_in(level, cell / kRow)) {
@@ -187,7 +191,7 @@ void BoundarySprings::queue(int level, VoxelId cell) noexcept {
   queue_[static_cast<std::size_t>(level & 1)].push_back(cell);
 }
 
-// What holds voxel v changed, and with that its cell and those of its neighbours.
+// The support of voxel v changed: queues its cell and its neighbours' cells.
 void BoundarySprings::look_at(VoxelId v) noexcept {
   if (queue_[1].size() + kMostOfAVoxel > queue_[1].capacity()) renew();
   const Grid &g = lattice_.grid(), &above = at(1).couplings->grid();

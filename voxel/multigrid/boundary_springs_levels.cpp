@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How the springs of a coarse cell follow from those of the level below.
+// Boundary springs of a coarse cell from those of the finer level.
 #include "voxel/multigrid/boundary_springs.h"
 
 #include <algorithm>
@@ -11,8 +11,7 @@ namespace voxel {
 
 namespace {
 
-// cells that change with a voxel: its own, its neighbours'
-// Those of a cell's eight children, or voxels, that lie in the grid.
+// Visits a cell's children (cells or voxels) that lie in the grid.
 template <class Visit>
 void for_children(const Grid& finer, const std::array<int, 3>& cell, const Visit& visit) {
   for (int corner = 0; corner < 8; ++corner) {
@@ -23,9 +22,10 @@ void for_children(const Grid& finer, const std::array<int, 3>& cell, const Visit
   }
 }
 
-constexpr float kImmovable = 1e4F;  // a hold: all of the cell is held
-constexpr float kAllSlide = 16.0F;  // … all of it slides; of the voxels' own springs
-// The link of a child to the other one of its cell on axis d.
+constexpr float kImmovable = 1e4F;  // ratio of a cell that is fixed altogether
+// The same, of a cell whose voxels all slide; in units of the voxels' own springs.
+constexpr float kAllSlide = 16.0F;
+// Link of a child to its sibling in the same cell along d.
 Spring to_sibling(const VoxelSprings& springs, const std::array<int, 3>& child, std::size_t d) {
   return (child[d] & 1) != 0 ? springs.down[d] : springs.up[d];
 }
@@ -37,7 +37,7 @@ bool stands(const VoxelSprings& springs) {
 
 namespace {
 
-// Pairs of axes, as tilt() has them.
+// Pairs of axes in the order of tilt().
 constexpr std::array<std::array<std::size_t, 2>, 3> kPairs{{{0, 1}, {0, 2}, {1, 2}}};
 
 glm::vec3 normal_of(const BoundarySprings::Support& by) {
@@ -45,11 +45,8 @@ glm::vec3 normal_of(const BoundarySprings::Support& by) {
   return glm::vec3(by.n[0], by.n[1], by.n[2]) * unit;
 }
 
-// What is left of springs k (N/m) whose other end goes freely across n: one along n, n nᵀ / (nᵀ k⁻¹ n), the
-// Schur complement of where that end goes. (With √k n nᵀ √k, as beside obstacles, other ways are free than
-// those along the tool where tissue is stiffer along links than across them, and a cycle left 0.74 of what a
-// pressed ball's voxels had still to slide, now 0.35 to 0.5. Beside obstacles this did no good: a body on
-// tight links, which came to rest to 0.1 mm/s, went on at 0.1 to 0.2.)
+// Stiffness along n of springs k (N/m) whose other end moves freely across n: 1 / (nᵀ k⁻¹ n), the Schur
+// complement of the free motion. For contacts with the tool only; beside obstacles √k n nᵀ √k is used.
 float spring_along(const glm::vec3& n, const std::array<float, 3>& k) {
   float compliance = 0.0F;
   for (int axis = 0; axis < 3; ++axis) {
@@ -61,15 +58,15 @@ float spring_along(const glm::vec3& n, const std::array<float, 3>& k) {
   return compliance > 0.0F ? 1.0F / compliance : 0.0F;
 }
 
-// Of a voxel that is held as `own` is, what a link to one held as `other` keeps from moving: of each axis,
-// and of pairs, in parts of the link's springs.
+// Parts of a link's springs, by axis and by pair of axes, that resist a voxel with support `own` if the other
+// end has support `other`.
 struct Kept {
   std::array<float, 3> axes, pairs;
 };
 Kept kept_by(const BoundarySprings::Support& own, const BoundarySprings::Support& other) {
   using By = BoundarySprings::Support::By;
   Kept kept{};
-  if (other.by == By::all) {  // all that the voxel can do
+  if (other.by == By::all) {  // it resists all motion that the voxel can make
     kept.axes = {1.0F, 1.0F, 1.0F};
     if (!own.slides()) return kept;
     const glm::vec3 n = normal_of(own);
@@ -79,7 +76,8 @@ Kept kept_by(const BoundarySprings::Support& own, const BoundarySprings::Support
       kept.pairs[p] = -n[static_cast<int>(kPairs[p][0])] * n[static_cast<int>(kPairs[p][1])];
     return kept;
   }
-  glm::vec3 n = normal_of(other);  // along which the other one stays, as far as this one can go that way
+  glm::vec3 n =
+      normal_of(other);  // direction in which the other end is fixed, as far as this voxel can move that way
   if (own.slides()) {
     const glm::vec3 stays = normal_of(own);
     n -= (n.x * stays.x + n.y * stays.y + n.z * stays.z) * stays;
@@ -93,7 +91,7 @@ Kept kept_by(const BoundarySprings::Support& own, const BoundarySprings::Support
 }  // namespace
 
 void BoundarySprings::renew(int level, VoxelId cell) noexcept {
-  // What is below it is kept from now on: a tool that moves asks for it again and again.
+  // Springs of the finer level are stored from now on: a moving tool asks for them repeatedly.
   if (level > 1) {
     const Level& finer = at(level - 1);
     for_children(finer.couplings->grid(), at(level).couplings->grid().coordinates(cell),
@@ -145,8 +143,8 @@ BoundarySprings::Found BoundarySprings::known(int level, VoxelId cell) const noe
   return out;
 }
 
-// Voxels of a cell that are free, by their links to others that are not: in the same cell, these are half a
-// link from its middle.
+// From the links between free voxels of the cell and fixed ones. If both are in the cell, the fixed one is
+// half a link from the cell's middle.
 void BoundarySprings::find_first(VoxelId cell, Found& found, Axes& all) const noexcept {
   const Grid& g = lattice_.grid();
   const LevelStiffness& couplings = *at(0).couplings;
@@ -200,7 +198,7 @@ void BoundarySprings::find_first(VoxelId cell, Found& found, Axes& all) const no
       }
     }
   });
-  // Of voxels that all slide, no link says that they do not go along their normals.
+  // If all voxels slide, no link resists motion along their normals.
   if (supported == count) {
     for (std::size_t axis = 0; axis < 3; ++axis) through[axis][axis] += kAllSlide * all_along[axis];
     for (std::size_t p = 0; p < 3; ++p) tilt[p] += kAllSlide * all_across[p];
@@ -220,11 +218,11 @@ void BoundarySprings::find_above(int level, VoxelId cell, Found& found, Axes& al
     if (!finer.couplings->holds_any(c)) return;
     ++count;
     const VoxelSprings springs = finer.couplings->find_springs(w);
-    // What stands does so whatever holds it.
+    // a fixed child needs no springs
     const Found child = stands(springs)       ? Found{}
                         : waits(level - 1, w) ? waiting(level - 1, w)
                                               : known(level - 1, w);
-    std::array<float, 3> passed{};  // of what holds the child, that part holds this one
+    std::array<float, 3> passed{};  // part of the child's springs that this cell gets
     for (std::size_t axis = 0; axis < 3; ++axis) {
       float before = 0.0F, after = 0.0F;
       const bool stays = springs.inverse[axis] == 0.0F || child.hold[axis] == kImmovable;
@@ -232,7 +230,7 @@ void BoundarySprings::find_above(int level, VoxelId cell, Found& found, Axes& al
       for (std::size_t d = 0; d < 3; ++d) {
         const float k = to_sibling(springs, c, d).on(static_cast<int>(axis), static_cast<int>(d));
         const float own = child.through[axis][d];
-        if (stays) {  // up to the middle of this one, but for half a voxel
+        if (stays) {  // from the middle of this cell, but for half a voxel
           through[axis][d] += size * k;
         } else if (own > 0.0F) {
           const float series = k > 0.0F ? 2.0F * k * own / (2.0F * k + own) : own;

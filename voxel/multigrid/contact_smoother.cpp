@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The passes of a cycle where something is touched: voxels that the tool presses slide, voxels beside rigid
-// surfaces stay out of them, and what either of them holds is held on the coarse levels too.
+// Passes of a cycle at contacts: pressed voxels slide on the tool, voxels at rigid surfaces stay outside of
+// them, and both are boundary springs for the coarse levels.
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -14,10 +14,10 @@
 namespace voxel {
 namespace {
 
-constexpr int kObstacleRounds = 3;  // of a row, in which more voxels each time stay out of their obstacles
+// Rounds of a row, in each of which more voxels stay out of their obstacles.
+constexpr int kObstacleRounds = 3;
 
-// Bit i: lane i of a row is near a rigid surface. Eight lanes at a time: asked one by one, few of them being
-// so, they took a third of what it takes to add a row of results.
+// Bit i: lane i of a row is near a rigid surface. Eight lanes at a time, because few of them are.
 std::uint32_t obstacle_lanes(const Displacement& state, RowId row) {
   constexpr std::uint64_t kOnes = 0x0101010101010101U, kLow = 0x7F * kOnes;
   static_assert(std::endian::native == std::endian::little);
@@ -32,7 +32,7 @@ std::uint32_t obstacle_lanes(const Displacement& state, RowId row) {
   return lanes;
 }
 
-// `visit(v, lane)` for those of the lanes whose bits are set, the first first.
+// `visit(v, lane)` for the lanes whose bits are set, in order.
 template <class Visit>
 void for_lanes(RowId row, std::uint32_t lanes, const Visit& visit) {
   for (; lanes != 0; lanes &= lanes - 1) {
@@ -41,7 +41,7 @@ void for_lanes(RowId row, std::uint32_t lanes, const Visit& visit) {
   }
 }
 
-// `visit(v, lane)` for the voxels of a row, in the octets of a span, that the tool presses.
+// `visit(v, lane)` for the pressed voxels of a row in the Float8 of a span.
 template <class Visit>
 void for_pressed(const Displacement& state, RowId row, LaneSpan span, const Visit& visit) {
   if (state.row_standing[row] == 0) return;
@@ -72,9 +72,9 @@ float Multigrid::slide_pressed_by(RowId row, const RowVector& way, Displacement&
   return most;
 }
 
-// A row is moved at once, and what that takes into its obstacle has to stay while the others are: put back
-// afterwards, it would find that the voxels beside it followed it in there as far as the links let them, and
-// hold it there.
+// Moves a row without voxels that this would take into their obstacles; these stay while the others move. If
+// such a voxel were put back afterwards, its neighbours would have followed it into the obstacle as far as
+// links allow, and would hold it there.
 template <class Move>
 std::uint32_t Multigrid::move_outside(LevelRow r, RowId row, Displacement& state,
                                       const ObstacleView& obstacles, const Move& move) noexcept {
@@ -116,9 +116,9 @@ float Multigrid::smooth_voxels(const LevelRow& r, RowId row, Displacement& state
   return std::max(change, slide_pressed(row, state, span));
 }
 
-// Corrects a row of voxels as far as links and obstacles allow. What an obstacle keeps from following is not
-// refused: a voxel that slides along it goes on with its neighbours, and cells that took its part back in
-// every cycle swung between two states (a block pressed onto a plate: 0.26 to 0.68 N, where 0.40 is right).
+// Corrects a row of voxels as far as links and obstacles allow. What an obstacle refuses is not subtracted
+// from the cells: such a voxel slides along the obstacle with its neighbours, and cells that took its part
+// back in every cycle would swing between two states.
 RowCorrection Multigrid::correct_voxels(const LevelRow& r, RowId row, const RowVector& correction,
                                         Displacement& state, const ObstacleView& obstacles, LaneSpan span,
                                         RowVector& refused) noexcept {
@@ -137,8 +137,8 @@ RowCorrection Multigrid::correct_voxels(const LevelRow& r, RowId row, const RowV
   return done;
 }
 
-// What presses a voxel against its obstacle, or the tool, is balanced by it, and the cells above are held by
-// it.
+// A contact balances the force that presses a voxel against its obstacle or the tool; the cells above get a
+// boundary spring.
 void Multigrid::balance_contacts(RowId row, Displacement& state, const ObstacleView& obstacles, LaneSpan span,
                                  RowResidual& found, RowVector& out) noexcept {
   const double touching = kTouching * lattice_.min_spacing_m();
@@ -170,10 +170,9 @@ void Multigrid::balance_contacts(RowId row, Displacement& state, const ObstacleV
   }
 }
 
-// What the other found is no deeper in its obstacles than it was, but for rounding. (Taken for a voxel that
-// was moved into its obstacle, one would look for its place again, beside others that have not come along
-// yet, and the other, told of that, would find it pulled: they disagreed about the underside of a brain by a
-// little more in each exchange.)
+// Motion from another solver takes no voxel deeper into its obstacle than it was, except by rounding. If
+// rounding counted as an overlap, the voxel would be projected again next to neighbours that have not moved
+// yet, and the two solvers would disagree more with each exchange.
 void Multigrid::add(RowId row, const RowVector& way, Displacement& state,
                     const ObstacleView& obstacles) noexcept {
   if (!prepare(0, row)) return;
@@ -206,7 +205,7 @@ void Multigrid::add(RowId row, const RowVector& way, Displacement& state,
 
 namespace {
 
-// What holds a cell, off the diagonal: for x, of y and z, and so on.
+// Product of the off-diagonal stiffness with a displacement.
 glm::vec3 across(const std::array<float, 3>& tilt, const glm::vec3& way) {
   return {tilt[0] * way.y + tilt[1] * way.z, tilt[0] * way.x + tilt[2] * way.z,
           tilt[1] * way.x + tilt[2] * way.y};
@@ -223,7 +222,7 @@ void Multigrid::for_tilted(int level, RowId row, const LevelRow& r, LaneSpan spa
     const auto cell = static_cast<VoxelId>(row * kRow + i);
     const std::array<float, 3> tilt = boundary_springs_->tilt(level, cell);
     if (tilt[0] == 0.0F && tilt[1] == 0.0F && tilt[2] == 0.0F) continue;
-    // A cell that a limit stops, or that does not move on an axis, is held by that.
+    // skip cells that an active limit holds, or that do not move on an axis
     bool moves = r.stopped == nullptr || r.stopped[i] == 0;
     std::array<float, 3> hold{};
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -236,7 +235,7 @@ void Multigrid::for_tilted(int level, RowId row, const LevelRow& r, LaneSpan spa
   }
 }
 
-// Cells on inclined surfaces, whose axes are not by themselves: each where its energy is least.
+// Smooths cells on inclined surfaces, whose axes are coupled: each moves to its least energy.
 float Multigrid::smooth_tilted(int level, RowId row, const LevelRow& r, LaneSpan span) noexcept {
   Level& l = at(level);
   const Grid& g = l.couplings->grid();
@@ -245,8 +244,8 @@ float Multigrid::smooth_tilted(int level, RowId row, const LevelRow& r, LaneSpan
       level, row, r, span,
       [&](VoxelId cell, std::size_t i, const std::array<float, 3>& tilt, const std::array<float, 3>& hold) {
         const VoxelSprings springs = l.couplings->springs_of(cell);
-        glm::dmat3 stiffness(0.0);  // whose determinant a float may not hold
-        glm::dvec3 pull(0.0);       // from where the cell is held
+        glm::dmat3 stiffness(0.0);  // double: a float may not hold the determinant
+        glm::dvec3 pull(0.0);       // from where the boundary spring is fixed
         for (int axis = 0; axis < 3; ++axis) {
           const auto ua = static_cast<std::size_t>(axis);
           const float told = r.held_at[ua][i];
@@ -275,7 +274,7 @@ float Multigrid::smooth_tilted(int level, RowId row, const LevelRow& r, LaneSpan
   return most;
 }
 
-// Adds to the residual of a coarse row what inclined surfaces pull across.
+// Adds the off-diagonal part of boundary springs to the residual of a coarse row.
 void Multigrid::add_tilt(int level, RowId row, const LevelRow& r, LaneSpan span, RowVector& out) noexcept {
   for_tilted(level, row, r, span,
              [&](VoxelId, std::size_t i, const std::array<float, 3>& tilt, const std::array<float, 3>&) {

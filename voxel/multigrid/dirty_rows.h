@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which rows of which level were written since somebody last asked, each once.
+// A log of rows written since clear(), each once, by level.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +14,7 @@ namespace voxel {
 
 class ChangeLog {
  public:
-  // For so many rows on each level; allocates. Nothing is noted before.
+  // Starts the log, for so many rows on each level; allocates. Before, nothing is noted.
   void begin(std::span<const std::size_t> rows) {
     levels_.clear();
     for (const std::size_t n : rows) levels_.push_back({LazyArray<std::uint8_t>(n), LazyArray<RowId>(n), 0});

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which parts of an object are to be relaxed next: tiles of voxels, first come, first served.
+// A queue of tiles of voxels that are to be relaxed: first in, first out, each once.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +13,7 @@ namespace voxel {
 
 class TileQueue {
  public:
-  // Rows of a tile in y and in z; along x it is one row long.
+  // Rows of a tile in y and in z; along x it is one row.
   static constexpr int kSide = 8;
   struct Tile {
     int column = 0, j = 0, k = 0;  // its first row is grid.row(column + 1, j · kSide, k · kSide)
@@ -29,8 +29,8 @@ class TileQueue {
 
   [[nodiscard]] std::size_t tiles() const { return waits_.size(); }
   [[nodiscard]] std::size_t waiting() const { return waiting_; }
-  // Something moved in this row (Grid::row_coordinates): its tile waits, and the one beside it if the row is
-  // at its edge.
+  // Something moved in this row (Grid::row_coordinates): queues its tile, and the tiles beside it if the row
+  // is at their border.
   void mark_dirty(const std::array<int, 3>& row) noexcept {
     const int column = row[0] - 1, j = row[1], k = row[2];
     push(column, j, k);
@@ -47,7 +47,7 @@ class TileQueue {
     order_[(first_ + waiting_) % order_.size()] = static_cast<std::uint32_t>(number);
     ++waiting_;
   }
-  // Before: waiting() > 0.
+  // Call only if waiting() > 0.
   std::size_t pop() noexcept {
     const std::size_t number = order_[first_];
     first_ = (first_ + 1) % order_.size();
@@ -75,7 +75,7 @@ class TileQueue {
 
   int columns_, js_, ks_;
   LazyArray<std::uint8_t> waits_;
-  LazyArray<std::uint32_t> order_;  // a ring, from first_ on
+  LazyArray<std::uint32_t> order_;  // ring buffer, from first_ on
   std::size_t first_ = 0, waiting_ = 0;
 };
 

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Levels of the multigrid, flags and logs of their rows, active limits, and the exchange with a shadow.
 #include "voxel/multigrid/fas.h"
 
 #include <algorithm>
@@ -11,12 +12,15 @@ namespace voxel {
 namespace {
 
 constexpr int kMaxLevels = 10;
-constexpr int kSmallest = 3;               // cells across the coarsest level
-constexpr int kWrittenAtOnce = 5;          // from this level on springs are written out on construction
-constexpr std::size_t kMaxFrozen = 4096;   // rows; the contact of a tool has some hundred
-constexpr std::size_t kMostInTick = 1024;  // rows that a tick adds together
+constexpr int kSmallest = 3;  // cells across the coarsest level
+// From this level on springs are written on construction.
+constexpr int kWrittenAtOnce = 5;
+constexpr std::size_t kMaxFrozen = 4096;  // rows; the contact of a tool has some hundred
+// Rows that a tick adds together.
+constexpr std::size_t kMostInTick = 1024;
 constexpr std::uint8_t kAllAxes = 7;
-constexpr std::size_t kMaxStopped = 65536;  // cells of all levels stopped at a time; more move a little
+// Active limits of all levels at a time; what exceeds them still moves.
+constexpr std::size_t kMaxStopped = 65536;
 
 }  // namespace
 
@@ -59,7 +63,7 @@ Multigrid::Multigrid(const Lattice& lattice) : lattice_(lattice), tiles_(lattice
   block_state_.resize(parts_->count());
   for (BlockState& p : block_state_) p.on.resize(levels_.size());
   block_bounds_.reserve(kMaxBlockBounds);
-  // Rows are relaxed beside them, and they by themselves.
+  // Cells of blocks are stopped for the row passes; blocks move by themselves.
   for (int l = 1; l < levels(); ++l) {
     for (std::size_t p = 0; p < parts_->count(); ++p) {
       for (const RigidBlocks::Run& run : parts_->on(l, p).rows) {
@@ -83,7 +87,7 @@ void Multigrid::prepare_level(int level) noexcept {
 void Multigrid::prepare_all() noexcept {
   for (int l = 0; l < levels(); ++l) {
     Level& level = at(l);
-    const std::vector<bool> rows = level.couplings->rows_in_use();  // which finds all springs
+    const std::vector<bool> rows = level.couplings->rows_in_use();  // finds all springs
     for (auto* arrays : {&level.value, &level.told, &level.load, &level.loaded_at}) {
       for (auto& array : *arrays) array.populate(kRow, rows);
     }
@@ -109,8 +113,8 @@ void Multigrid::spread(int level, RowId row, std::uint8_t flags) noexcept {
   if (level == 0 && (flags & active) != 0) tiles_.mark_dirty(g.row_coordinates(row));
 }
 
-// A row was moved by as much. What is too little for a sweep is still passed on: a small force on each of
-// many voxels is a large one on the cell that holds them, four times as large on each level.
+// A row moved by `change`. A change too small for a sweep is still restricted: small forces on many voxels
+// add up to a large one on the cell above, four times as large on each level.
 void Multigrid::note_change(int level, RowId row, float change) noexcept {
   if (change <= restricted_m()) return;
   if (level == 0) bricks_.look_at(row);
@@ -175,7 +179,7 @@ void Multigrid::release_unlimited(const Displacement& state) noexcept {
       if ((at(0).stopped[s.cell] & bit) != 0 && pulled_against_limit(s.cell, axis)) bits |= bit;
     }
     if (bits == 0) continue;
-    // Listed once for each time that axes were added: the first is enough.
+    // A voxel is listed once for each time that axes were added; the first entry has all.
     at(0).stopped[s.cell] = 0;
     still_stopped_.push_back({s.cell, bits});
   }

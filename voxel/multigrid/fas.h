@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The passes of which a multigrid cycle is made, row by row; which rows, and when, is Relaxation's business.
+// The passes of a multigrid cycle, row by row. Relaxation decides which rows, and when.
 //
-// Full approximation scheme (Brandt 1977; Briggs, Henson & McCormick, A Multigrid Tutorial, chapter 6): a
-// coarse cell holds the whole displacement, not a correction. So a neighbourhood of the contact can be
-// solved on all levels in a tick while fine voxels further away are still where they were: the coarse cells
-// there go on, and the voxels follow when their turn comes.
+// Full approximation scheme (FAS; Brandt 1977; Briggs, Henson & McCormick, A Multigrid Tutorial, chapter 6):
+// a coarse cell holds a displacement, not a correction. So a tick can solve the neighbourhood of the contact
+// on all levels while fine voxels further away are still where they were: the coarse cells there move on, and
+// their corrections are prolonged later. A correction that a cell has still to prolong is *pending*.
 #pragma once
 
 #include <array>
@@ -17,6 +17,7 @@
 #include "voxel/lattice/displacement.h"
 #include "voxel/lattice/lattice.h"
 #include "voxel/lattice/level_stiffness.h"
+#include "voxel/lattice/near_limit.h"
 #include "voxel/lattice/voxel_links.h"
 #include "voxel/multigrid/boundary_springs.h"
 #include "voxel/multigrid/dirty_rows.h"
@@ -25,7 +26,6 @@
 #include "voxel/multigrid/prolongation.h"
 #include "voxel/multigrid/rigid_blocks.h"
 #include "voxel/multigrid/row_kernels.h"
-#include "voxel/lattice/near_limit.h"
 #include "voxel/multigrid/row_smoother.h"
 
 namespace voxel {
@@ -36,17 +36,17 @@ class Multigrid {
 
   [[nodiscard]] int levels() const { return static_cast<int>(levels_.size()); }
   [[nodiscard]] const Grid& grid(int level) const { return at(level).couplings->grid(); }
-  // The springs of the voxels' links.
+  // Springs of the voxels' links (level 0).
   [[nodiscard]] LevelStiffness& couplings() { return *at(0).couplings; }
 
-  // What is known of a row.
+  // State of a row.
   enum Flag : std::uint8_t {
-    active = 1,    // its residual may be too large
-    dirty = 2,     // it, or a row beside it, changed since it was passed on to the next coarser level
-    changed = 4,   // (coarse) it changed since what it holds was told
-    renewed = 8,   // (coarse) its values were renewed, its load is to be
-    telling = 16,  // (coarse) it tells what it holds, in the cycle that goes on
-    limited = 32,  // something in it is held by a limit
+    active = 1,    // its residual may be above the tolerance
+    dirty = 2,     // it, or a row beside it, changed since it was last restricted
+    changed = 4,   // (coarse) it has a pending correction
+    renewed = 8,   // (coarse) its values were restricted, its load is still to be
+    telling = 16,  // (coarse) it prolongs its correction in the current cycle
+    limited = 32,  // an active limit holds something in it
   };
   [[nodiscard]] bool has(int level, RowId row, std::uint8_t flag) const {
     return (at(level).flags[row] & flag) != 0;
@@ -55,37 +55,40 @@ class Multigrid {
   void unmark(int level, RowId row, std::uint8_t flag) noexcept {
     at(level).flags[row] &= static_cast<std::uint8_t>(~flag);
   }
-  // Tiles of voxels near which somebody moved something; see Relaxation.
+  // Tiles near which something moved; see Relaxation.
   [[nodiscard]] TileQueue& tiles() { return tiles_; }
   [[nodiscard]] const TileQueue& tiles() const { return tiles_; }
-  // Somebody moved voxels of this row: it and the rows beside it are to be looked at.
+  // Call when voxels of this row were moved from outside: marks the row and the rows beside it.
   void mark_dirty(int level, RowId row) noexcept {
     log_.note(level, row);
     if (level == 0) bricks_.look_at(row);
     spread(level, row, active | dirty);
   }
-  // Finds the loads of bricks anew where voxels moved, in at most so many rows. Returns in how many it did.
+  // Renews the loads of bricks near moved voxels, in at most `most_rows` rows. Returns the number of rows
+  // renewed.
   std::size_t renew_bricks(Displacement& state, std::size_t most_rows) noexcept;
   [[nodiscard]] BrickLoads& bricks() { return bricks_; }
   [[nodiscard]] const BrickLoads& bricks() const { return bricks_; }
 
-  // What the tool and other objects hold does not move, and holds on to the cells around it.
+  // Voxels that the tool and other objects hold: they do not move, and are boundary springs of the cells
+  // above them.
   void set_held(std::span<const VoxelId> held) noexcept { boundary_springs_->set_held(held); }
-  // So do the tool and obstacles what lies pressed on them, along their normals, as residuals found it since.
+  // Renews the boundary springs of voxels that slide on the tool or on obstacles, as found by the last
+  // residuals.
   void renew_boundary_springs() noexcept { boundary_springs_->renew(); }
-  // Held voxels hold the cells above them as many times harder: what a cycle that overshot asks for.
+  // Factor for the boundary springs of held voxels; raised after a cycle that overshot.
   void set_hold(float times) noexcept { hold_ = times; }
-  // Cells held because a chain at its limit holds a voxel in them, until this is called.
+  // Releases all limits that are active, and the cells above them.
   void release_limited() noexcept;
-  // The same, but for those in which a voxel is still pulled against the limit that holds it.
+  // Releases active limits unless a voxel is still pulled against its limit.
   void release_unlimited(const Displacement& state) noexcept;
-  // What pulls a voxel against its limit is passed on as well, until this is said again: for what a wave has
-  // just laid at its limits, and is to open altogether.
+  // If set, residuals against active limits are restricted, too: for tissue that a wave has just laid at its
+  // limits and that is to open altogether.
   void restrict_all(bool all) noexcept { restricts_all_ = all; }
-  // What links at their limits were found to pull a voxel by (N), until another is: so it balances what its
-  // springs pull by, and the cells above it stand.
+  // Sets the force of active limits on a voxel (N), until it is set anew. It balances the springs' force, and
+  // the cells above the voxel do not move.
   void tie(VoxelId v, const glm::vec3& force_N) noexcept;
-  // The voxels among them: `visit(v, axis)` for each axis on which a limit holds one.
+  // Active limits of voxels: `visit(v, axis)` for each axis on which a limit holds v.
   template <class Visit>
   void for_limited(const Visit& visit) const {
     for (const StoppedCell& s : stopped_) {
@@ -96,56 +99,54 @@ class Multigrid {
     }
   }
 
-  // Is there anything in the row? Call it before any of what follows.
+  // Has the row any voxel or cell? Call it before the functions below.
   bool prepare(int level, RowId row) noexcept { return at(level).couplings->prepare(row); }
 
-  // Renews what yielded links add to the load of a row of voxels; `keep`: they keep it. True where a link is
-  // beyond what it keeps.
+  // Renews the plastic part of a row's load; `keep`: commits the plastic offsets. True if a link is beyond
+  // its committed offset.
   bool yield(RowId row, Displacement& state, bool keep) noexcept;
-  // The children (bit 0: in x, 1: in y, 2: in z) of a coarse row on the level below; where the lattice ends,
-  // rows of its empty border.
-  // Has a row's values fetched into the cache, to be read or written in a moment; any number.
+  // rows_below(): children of a coarse row (bit 0: in x, 1: in y, 2: in z) on the finer level; beyond the
+  // lattice, rows of its empty border. fetch() prefetches a row's values; any number is allowed.
   void fetch(int level, RowId row, const Displacement& state) const noexcept;
   [[nodiscard]] std::array<RowId, 8> rows_below(int level, RowId row) const noexcept;
 
-  // What follows works on the octets of `span` only; by default, on the whole row.
+  // The functions below work on the Float8 of `span`; by default on the whole row.
 
-  // Moves the voxels, or cells, of a row to the minimum of their energy given all other rows, every second
-  // one first, without leaving their limits.
+  // Smooths a row: moves its voxels or cells to the minimum of their energy within their limits, all other
+  // rows fixed, every second one first.
   void smooth(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
               LaneSpan span = {}) noexcept;
-  // The cells of a coarse row take the means of what they hold, and keep what they know beyond that …
+  // Restricts values: a coarse cell takes the mean of its children plus its pending correction …
   void restrict_values(int level, RowId row, Displacement& state, LaneSpan span = {}) noexcept;
-  // … and the load under which those would be at rest where they are. Returns the largest force left on any
-  // voxel below (N); only for level 1 is it one of voxels. Of whole rows it also finds which are at rest.
+  // … and the load under which the children would be at rest where they are. Returns the largest residual on
+  // the finer level (N); for level 1 it is one of voxels. For whole rows it also finds which are at rest.
   float restrict_loads(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
                        LaneSpan span = {}) noexcept;
-  // Tells the rows of a box on a level what cells above them have yet to tell (see prolongation.h): those of
-  // coarse rows marked `telling`, from first to last along x. What links at their limits keep from following,
-  // the cells take back: a cell whose voxels stayed behind would pull at the cells beside it, a little more
-  // every time, until it was kilometers away. `jointly`: voxels all at once (limited_correction.h), for
-  // tissue that has far to go: row by row it is in its own way.
+  // Prolongs pending corrections of coarse rows marked `telling` to the rows of a box (see prolongation.h),
+  // from plane to plane. The part of a correction that links at their limits refuse is subtracted from the
+  // cells again: otherwise cells would pull at their neighbours more and more. `jointly`: all voxels move
+  // together (limited_correction.h), for tissue that has far to go and is in its own way row by row.
   struct ProlongedBox {
-    int q0, q1, j0, j1, k0, k1;     // octets and rows of the level, all included
-    int first_source, last_source;  // cells of the next coarser level along x
-    int from_k, to_k;               // of these planes now, after those before; no other box comes in between
+    int q0, q1, j0, j1, k0, k1;     // Float8 and rows of the level, inclusive
+    int first_source, last_source;  // cells of the next coarser level along x that prolong
+    int from_k, to_k;  // planes of this call; the box's planes come in order, and no other box in between
   };
   void prolong(int level, const ProlongedBox& box, Displacement& state, const ObstacleView& obstacles,
                bool jointly = false) noexcept;
-  // The most that any cell of a coarse row has yet to tell, of those in the octets that are also from first
-  // to last in the row (m).
+  // Largest pending correction of a coarse row's cells, in the Float8 of `span` and between lanes `first` and
+  // `last` (m).
   [[nodiscard]] float pending_correction(int level, RowId row, LaneSpan span = {}, int first = 0,
                                          int last = kRow - 1) const noexcept;
 
-  // The cells of a coarse row know nothing any more that what they hold does not.
+  // Drops the pending corrections of a coarse row, and restricts it anew.
   void forget_pending_correction(int level, RowId row, Displacement& state,
                                  const ObstacleView& obstacles) noexcept;
 
-  // Rows whose voxels are pulled by less than `tolerance_N`, or whose cells would move less than
-  // `motion_tolerance_m`, are left alone.
+  // Rows are at rest if no voxel is pulled by more than `tolerance_N`, and no cell would move by more than
+  // `motion_tolerance_m`.
   [[nodiscard]] float motion_tolerance_m() const { return motion_tolerance_m_; }
   [[nodiscard]] float tolerance_N() const { return tolerance_N_; }
-  // Less than this is not passed on to other levels: a small share of what a row is left alone with.
+  // Smaller changes are not passed to other levels.
   [[nodiscard]] float restricted_m() const { return motion_tolerance_m_ / 32.0F; }
   void set_motion_tolerance(float tolerance_N, float motion_tolerance_m) noexcept {
     tolerance_N_ = tolerance_N;
@@ -157,54 +158,55 @@ class Multigrid {
   // ---- parts without slack (rigid_blocks.h, rigid_block_passes.cpp); part numbers begin with 0 ----
   [[nodiscard]] bool has_blocks() const { return parts_ != nullptr; }
   [[nodiscard]] const RigidBlocks& parts() const { return *parts_; }
-  // On which pressed voxels of theirs the tool holds them, along its normals, until this is called again.
+  // Sets which pressed voxels of blocks the tool holds along its normals, until the next call.
   void set_block_contacts(const Displacement& state, std::span<const VoxelId> held) noexcept;
   [[nodiscard]] bool tool_presses_block(std::size_t part) const {
     return block_state_[part].by_tool.count > 0;
   }
-  // What pulls a part (N): springs and loads, and what counts as balanced in it where that is asked for, too.
+  // Force of springs and loads on a block (N), and its frozen residual.
   [[nodiscard]] glm::dvec3 block_force(std::size_t part, const Displacement& state) const noexcept;
   [[nodiscard]] glm::dvec3 residual_of_block(std::size_t part) const noexcept {
     return block_state_[part].balance;
   }
-  // How far its links let it go, [axis][down, up] (m); no less than 0 up, no more down.
+  // How far its links let a block move, [axis][down, up] (m); down <= 0 <= up.
   using AdmissibleInterval = std::array<std::array<double, 2>, 3>;
   [[nodiscard]] AdmissibleInterval interval_of_block(std::size_t part,
                                                      const Displacement& state) const noexcept;
-  // Adds that to `bounds`, which has room for six more.
+  // Adds an interval to `bounds`, which has room for six more.
   static void add_bounds(const AdmissibleInterval& room, std::vector<BlockBound>& bounds);
-  // The same as far as its links and its obstacles let it, and along the tool where that holds it, or the
-  // tool is the caller's business; returns how far it went. What another found is not news to it.
+  // Moves a block by `way` as far as its links and obstacles allow; returns how far it moved. Where the tool
+  // presses it, it slides on the tool, unless the caller handles the tool. Results of another solver are not
+  // logged.
   enum class Tool : std::uint8_t { holds, is_seen_to };
   enum class Note : std::uint8_t { in_log, nowhere };
   glm::dvec3 move_block(std::size_t part, const glm::dvec3& way, Displacement& state,
                         const ObstacleView& obstacles, Tool tool = Tool::holds,
                         Note note = Note::in_log) noexcept;
-  // Those that meet a box of a level go to where the springs that leave them are in balance.
+  // Moves the blocks that meet a box of a level to the equilibrium of their border's springs.
   void smooth_blocks(int level, const RigidBlocks::Box& box, Displacement& state,
                      const ObstacleView& obstacles) noexcept;
-  // What pulls them is found, before the loads of the next coarser level are, and makes up the loads of what
-  // they are there afterwards. Returns the largest force a voxel (N); of level 0 only it is one of voxels.
+  // measure_blocks() finds the residuals of the blocks, before the coarser level's loads; load_blocks() finds
+  // their own loads there, afterwards. Returns the largest residual per voxel (N), for level 0 only.
   float measure_blocks(int level, const RigidBlocks::Box& box, Displacement& state,
                        const ObstacleView& obstacles) noexcept;
   void load_blocks(int level, const RigidBlocks::Box& box) noexcept;
-  // What pulls them counts as balanced from now on, as with balance().
+  // Freezes the residual of the blocks, as balance() does.
   void balance_blocks(const Displacement& state) noexcept;
 
-  // ---- two of the same lattice that work on one object, in turns (shadow_object.h) ----
-  // From now on every row that is written is noted. Allocates.
+  // ---- asynchronous relaxation: two Multigrid of one lattice work in turns (shadow_object.h) ----
+  // From now on written rows are logged. Allocates.
   void keep_log();
   [[nodiscard]] ChangeLog& log() { return log_; }
-  // Forgets what coarse cells hold, and leaves the loads of bricks to the other. Allocates.
+  // Drops all coarse cells, and leaves the loads of bricks to the shadow. Allocates.
   void forget_coarse();
-  // Coarse cells whose rows are in the log hold nothing any more: 0.25 us a row.
+  // Sets coarse cells of logged rows to 0.
   void drop_coarse() noexcept;
   [[nodiscard]] std::size_t rows_to_drop() const noexcept;
-  // … and nothing is balanced.
+  // The same, and no residual is frozen any more.
   void begin_anew() noexcept;
-  // What still pulls the voxels of a row counts as balanced from now on: they are at rest where they are.
+  // Freezes the residual of a row: its voxels count as at rest where they are.
   void balance(RowId row, Displacement& state, const ObstacleView& obstacles, LaneSpan span = {}) noexcept;
-  // The load that is for that, beside those that the voxel has of itself (N).
+  // The load that freezes a voxel's residual, without the voxel's own load (N).
   [[nodiscard]] glm::dvec3 balance_of(VoxelId v, const Displacement& state) const noexcept {
     const float* of_row = balance_of(static_cast<RowId>(v / kRow), 0);
     if (of_row == nullptr) return glm::dvec3(0.0);
@@ -212,21 +214,22 @@ class Multigrid {
     const float* at = of_row + v % kRow;
     return {at[0] - own[0], at[kRow] - own[1], at[2 * kRow] - own[2]};
   }
-  // Of what is balanced this part stays so.
+  // Keeps this part of the frozen residuals.
   void keep_frozen_residual(float part, const Displacement& state) noexcept;
-  // Of a row on one axis, what voxels have of themselves not taken off; null: nothing is balanced.
+  // Load of a row with a frozen residual on one axis, the voxels' own load included; null: its residual is
+  // not frozen.
   [[nodiscard]] const float* balance_of(RowId row, std::size_t axis) const noexcept {
     if (balance_number_.size() == 0 || balance_number_[row] == 0) return nullptr;
     return balance_.data() + ((balance_number_[row] - std::size_t{1}) * 3 + axis) * kRow;
   }
-  // Adds to a row of voxels what somebody else found, as far as its links allow.
+  // Adds motion that another solver found to a row, as far as its links allow.
   void add(RowId row, const RowVector& way, Displacement& state, const ObstacleView& obstacles) noexcept;
-  // The same to many rows at once, each given once before: as far as links to the others let it where those
-  // go. Where it may not be, it is added alone: it lies near obstacles, or there are too many.
+  // The same for many rows together: each goes as far as its links to the others' new places allow. A row is
+  // added once. If can_join() is false (obstacles nearby, or too many rows) use add().
   [[nodiscard]] bool can_join(RowId row, const Displacement& state) noexcept {
     return prepare(0, row) && state.row_obstacles[row] == 0 && !limited_correction_.full();
   }
-  // `fill(way)` says where to.
+  // `fill(way)` writes the row's motion.
   template <class Fill>
   void join(RowId row, Displacement& state, const Fill& fill) noexcept {
     LimitedCorrection::Row& r = limited_correction_.add(row, {});
@@ -234,7 +237,7 @@ class Multigrid {
     set_out(r, state);
   }
   void add_joined(Displacement& state) noexcept { apply_limited_correction(state); }
-  // Was it? Then what of its way is left (m), and whether all that it was to go is gone.
+  // Was the row added? Then `left` is what is left of its motion (m), and `gone` whether nothing is.
   [[nodiscard]] bool joined(RowId row, const Displacement& state, RowVector& left,
                             bool& gone) const noexcept {
     const LimitedCorrection::Row* r = limited_correction_.find(row);
@@ -244,18 +247,17 @@ class Multigrid {
   void forget_joined() noexcept { limited_correction_.clear(); }
   // Finds all springs and takes all memory now, not when a tick first needs them.
   void prepare_all() noexcept;
-  void prepare_limit_loads() noexcept;  // what tie() writes to
+  void prepare_limit_loads() noexcept;  // memory that tie() writes to
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
   struct Level {
     std::unique_ptr<LevelStiffness> couplings;
-    // [axis][cell]; those of level 0 are elsewhere. `told` is the value that what the cell holds knows of, so
-    // value − told is what it has yet to hear. `loaded_at` is what was told when the load was found: what
-    // holds the cell pulls from there on. (From what is told now on, cells beside a cycle's box went a little
-    // further in every cycle, as if nothing held them.)
+    // [axis][cell] of coarse levels. `told` is the part of the value that the finer level knows, so value −
+    // told is the pending correction. `loaded_at` is `told` when the load was found: boundary springs pull
+    // from there.
     std::array<LazyArray<float>, 3> value, told, load, loaded_at;
-    LazyArray<std::uint8_t> stopped;  // [cell or voxel] bits 0 to 2: held by a limit on that axis
+    LazyArray<std::uint8_t> stopped;  // [cell or voxel] bits 0 to 2: an active limit holds it on that axis
     LazyArray<std::uint8_t> flags;    // [row]
   };
   struct StoppedCell {
@@ -266,28 +268,28 @@ class Multigrid {
     VoxelId v;
     std::uint8_t axes;  // bits
   };
-  // What a row was told and did not follow.
+  // The part of a correction that a row refused.
   struct Refused {
     RowId row = 0;
     unsigned axes = 0;  // bits
     LaneSpan span;
     RowVector way;
   };
-  static constexpr float kLeastLoad = 0.25F;  // of the tolerance: loads less wrong than this are right
+  static constexpr float kLeastLoad = 0.25F;  // of the tolerance: smaller errors of a load are ignored
 
-  // Of a part. What is of one level stands by level.
+  // State of a block on one level.
   struct BlockOnLevel {
-    glm::dvec3 left{0.0};                // what pulls it, as measured (N)
-    glm::dvec3 passed{0.0};              // of the level below, what its cells are pulled by (N)
+    glm::dvec3 left{0.0};                // residual (N)
+    glm::dvec3 passed{0.0};              // residual restricted from the finer level (N)
     glm::dvec3 load{0.0};                // (N)
-    glm::dvec3 pending_correction{0.0};  // how far it went that the level below was not told (m)
-    glm::dvec3 sum{0.0};                 // of what its cells are told (m)
-    bool active = false;                 // in the cycle that goes on
+    glm::dvec3 pending_correction{0.0};  // pending correction (m)
+    glm::dvec3 sum{0.0};                 // sum of the corrections prolonged to its cells (m)
+    bool active = false;                 // in the current cycle
   };
   struct BlockState {
     std::vector<BlockOnLevel> on;  // [level]
-    HeldDirections by_tool, held;  // by it; and by obstacles
-    std::uint8_t stopped = 0;      // bits: of axes on which a limit holds it
+    HeldDirections by_tool, held;  // directions fixed by the tool; and by obstacles, too
+    std::uint8_t stopped = 0;      // bits: axes on which a limit holds it
     glm::dvec3 balance{0.0};       // (N)
   };
   static constexpr std::size_t kMaxBlockBounds = 1024;
@@ -326,7 +328,7 @@ class Multigrid {
                       LaneSpan span) noexcept;
   RowCorrection correct_voxels(const LevelRow& r, RowId row, const RowVector& correction, Displacement& state,
                                const ObstacleView& obstacles, LaneSpan span, RowVector& refused) noexcept;
-  // Lanes that obstacles kept from going along.
+  // Returns the lanes that obstacles hold back.
   template <class Move>
   std::uint32_t move_outside(LevelRow r, RowId row, Displacement& state, const ObstacleView& obstacles,
                              const Move& move) noexcept;
@@ -371,18 +373,17 @@ class Multigrid {
   LazyVector<StoppedCell> stopped_;
   LazyVector<StoppedVoxel> still_stopped_;
   std::array<LazyArray<float>, 3> limit_load_;   // [axis][v] (N)
-  LazyArray<std::uint16_t> row_has_limit_load_;  // [row] voxels that are
+  LazyArray<std::uint16_t> row_has_limit_load_;  // [row] number of voxels with a limit load
   LimitedCorrection limited_correction_;
-  // Rows in which something balances what pulls: that and their own load (N), one beside the other. (At their
-  // voxels' places, each in pages of its own, a first give took up to 1.2 ms, most of it to get these.)
+  // Rows with a frozen residual, and their loads (N) side by side, so that freezing touches few pages.
   LazyVector<RowId> frozen_residual_;
-  LazyArray<float> balance_;                 // [as frozen_residual_][axis][lane]
-  LazyArray<std::uint16_t> balance_number_;  // [row] 1 + where; 0: none
-  std::unique_ptr<RigidBlocks> parts_;       // null: there is none
+  LazyArray<float> balance_;                 // [as the list of rows][axis][lane]
+  LazyArray<std::uint16_t> balance_number_;  // [row] 1 + index; 0: not frozen
+  std::unique_ptr<RigidBlocks> parts_;       // null: there are no blocks
   std::vector<BlockState> block_state_;
   std::vector<BlockBound> block_bounds_;
   std::array<AxisLimits, 3> yield_limits_;
-  bool all_visited_ = false;  // cycles look at all in their boxes: which rows are active nobody asks
+  bool all_visited_ = false;  // cycles visit every row of their boxes, so active flags are not kept
   bool restricts_all_ = false;
   float tolerance_N_ = 0.0F, motion_tolerance_m_ = 0.0F, hold_ = 1.0F;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The passes of which a cycle is made.
+// Smoothing and restriction; the frozen residual of rows.
 #include <algorithm>
 
 #include "voxel/lattice/prefetch.h"
@@ -55,7 +55,7 @@ bool Multigrid::yield(RowId row, Displacement& state, bool keep) noexcept {
 
 void Multigrid::smooth(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
                        LaneSpan span) noexcept {
-  if (parts_ != nullptr && parts_->fill_row(level, row)) return;  // they go as one
+  if (parts_ != nullptr && parts_->fill_row(level, row)) return;  // blocks move as one
   const LevelRow r = row_of(level, row, state);
   log_.note(level, row);
   if (level > 0) {
@@ -79,7 +79,7 @@ std::array<RowId, 8> Multigrid::rows_below(int level, RowId row) const noexcept 
 
 namespace {
 
-// The octets of the half-th finer row that octets of a coarse row hold; none: first > last.
+// Float8 of the finer row `half` (0 or 1) below Float8 of a coarse row; none: first > last.
 LaneSpan octets_below(LaneSpan coarse, int half) {
   const int from = half * kLaneGroups / 2;
   return {2 * (std::max(coarse.first, from) - from),
@@ -152,7 +152,7 @@ void Multigrid::add_limit_loads(RowId row, LevelRow& r, RowVector& loads) noexce
   }
 }
 
-// What pulls the voxels, or cells, of a row that are free to follow.
+// Residual of the voxels or cells of a row that are free to move.
 RowResidual Multigrid::residual_of(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
                                    LaneSpan span, RowVector& out) noexcept {
   LevelRow r = row_of(level, row, state);
@@ -182,8 +182,8 @@ RowResidual Multigrid::residual_of(int level, RowId row, Displacement& state, co
         stop_cells(static_cast<VoxelId>(row * kRow + i), static_cast<std::uint8_t>(1U << axis));
     }
   }
-  // What the chain holds is balanced by it. Passed on, its residual would drive the coarse levels against
-  // links that do not give, and the sweeps after would undo it.
+  // Active limits balance their residual. If it were restricted, coarse levels would push against links that
+  // do not yield, and the sweeps after would undo it.
   for (std::size_t axis = 0; axis < 3; ++axis) {
     for (std::size_t i = 0; i < kRow && found.resisted[axis] >> i != 0; ++i) {
       if ((found.resisted[axis] >> i & 1U) != 0)
@@ -204,7 +204,7 @@ float Multigrid::restrict_loads(int level, RowId row, Displacement& state, const
     const int half = static_cast<int>(child & 1U);
     const LaneSpan below = octets_below(span, half);
     if (below.first > below.last || !finer.prepare(fine)) continue;
-    // Parts have theirs from their borders.
+    // blocks get theirs from their borders
     if (parts_ != nullptr && parts_->fill_known_row(level - 1, fine)) {
       if (span.whole()) unmark(level - 1, fine, active | dirty);
       continue;
@@ -222,7 +222,7 @@ float Multigrid::restrict_loads(int level, RowId row, Displacement& state, const
     for (std::size_t axis = 0; axis < 3; ++axis)
       add_pairs(residual[axis].data(), below, sums[axis].data() + half * kRow / 2);
     if (!span.whole()) continue;
-    // Of voxels as a force, of cells as a displacement, whose threshold is the same on all levels.
+    // For voxels the tolerance is a force, for cells a displacement, which is the same on all levels.
     const bool at_rest = level == 1 ? left.most_N < tolerance_N_ : left.most_way_m < motion_tolerance_m_;
     unmark(level - 1, fine, at_rest ? active | dirty : dirty);
     if (!at_rest) mark(level - 1, fine, active);

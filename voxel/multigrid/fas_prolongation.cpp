@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The way down of a cycle: coarse corrections are prolonged trilinearly and applied within the limits.
+// The way back to fine levels: coarse corrections are prolonged trilinearly and applied within the limits.
 #include <algorithm>
 
 #include "voxel/lattice/prefetch.h"
@@ -56,14 +56,14 @@ void Multigrid::forget_pending_correction(int level, RowId row, Displacement& st
   unmark(level, row, changed);
 }
 
-// Reads what the cells of one row, all along x, have to tell, and with that they have told it.
+// Reads the pending corrections of one row of cells, all along x; they count as prolonged then.
 void Multigrid::interpolate_row(int level, int j, int k, const ProlongedBox& box) noexcept {
   Level& l = at(level);
   const Grid& g = l.couplings->grid();
   bool is_source = false, whole = true;
   const int before = prolongation_.first() - 1, after = prolongation_.first() + prolongation_.octets();
   for (int q = before; q <= after; ++q) {
-    const int column = (q + kLaneGroups) / kLaneGroups;  // the empty one before the first included
+    const int column = (q + kLaneGroups) / kLaneGroups;  // including the empty one before the first
     const RowId row = g.row(column, j, k);
     is_source = is_source || (q > before && q < after && has(level, row, telling));
     whole = whole && l.couplings->prepare(row) && l.couplings->uniform(row);
@@ -112,14 +112,14 @@ void Multigrid::interpolate_row(int level, int j, int k, const ProlongedBox& box
 void Multigrid::prolong(int level, const ProlongedBox& box, Displacement& state,
                         const ObstacleView& obstacles, bool jointly) noexcept {
   const Grid& g = grid(level);
-  // Of the two cells around a voxel the lower one.
+  // the lower one of the two cells around a voxel
   const auto below = [](int x) { return (x + 1) / 2 - 1; };
   if (box.from_k == box.k0) prolongation_.begin(box.q0 / 2, box.q1 / 2, below(box.j0), below(box.j1) + 1);
-  // Beyond these octets no hat reaches.
+  // beyond these Float8 there is no correction
   const int q0 = std::max(box.q0, std::max(2 * box.first_source - 1, 0) / kLanes);
   const int q1 = std::min(box.q1, (2 * box.last_source + 2) / kLanes);
-  int spread =
-      box.from_k == box.k0 ? below(box.k0) - 1 : below(box.from_k - 1) + 1;  // the last plane of cells
+  int spread = box.from_k == box.k0 ? below(box.k0) - 1
+                                    : below(box.from_k - 1) + 1;  // last interpolated plane of cells
   for (int k = box.from_k; k <= box.to_k; ++k) {
     for (; spread <= below(k); ++spread) {
       for (int j = below(box.j0); j <= below(box.j1) + 1; ++j) interpolate_row(level + 1, j, spread + 1, box);
@@ -158,9 +158,9 @@ void Multigrid::prolong(int level, const ProlongedBox& box, Displacement& state,
   if (parts_ != nullptr && box.to_k == box.k1) prolong_to_blocks(level, state, obstacles);
 }
 
-// What rows are told is added to what stands in none of the nearer caches: to wait for that was half of it.
+// Prefetches the values that a correction is added to: no cache has them.
 void Multigrid::fetch(int level, RowId row, const Displacement& state) const noexcept {
-  if (parts_ != nullptr && parts_->fill_known_row(level, row)) return;  // not looked at row by row
+  if (parts_ != nullptr && parts_->fill_known_row(level, row)) return;  // not visited row by row
   for (const auto& axis : level == 0 ? state.u : at(level).value)
     fetch_lines(axis.data() + static_cast<std::size_t>(row) * kRow, kRow * sizeof(float));
 }
@@ -168,8 +168,8 @@ void Multigrid::fetch(int level, RowId row, const Displacement& state) const noe
 void Multigrid::prolong_row(int level, RowId row, const std::array<ProlongedRow, 4>& prolongation,
                             Displacement& state, const ObstacleView& obstacles, LaneSpan span,
                             bool jointly) noexcept {
-  if (level == 0 && parts_ != nullptr && parts_->fill_known_row(level, row)) return;  // told as a whole
-  // Near obstacles each goes for itself, before those that go together.
+  if (level == 0 && parts_ != nullptr && parts_->fill_known_row(level, row)) return;  // corrected as a whole
+  // Rows near obstacles are corrected alone, before those that move together.
   LimitedCorrection::Row* const together =
       jointly && state.row_obstacles[row] == 0 && !limited_correction_.full()
           ? &limited_correction_.add(row, span)
@@ -186,7 +186,7 @@ void Multigrid::prolong_row(int level, RowId row, const std::array<ProlongedRow,
   log_.note(level, row);
   if (parts_ != nullptr && parts_->in_row(level, row)) note_prolonged_blocks(level, row, span, correction);
   if (together != nullptr) {
-    // Where all are among them none can be in the way of one that goes alone.
+    // if all rows move together, none is in the way of a row that moves alone
     if (obstacles.obstacles.empty()) set_out(*together, state);
     return;
   }
@@ -202,7 +202,7 @@ void Multigrid::correct(int level, RowId row, const RowVector& correction, Displ
   if (level > 0) {
     done = correct_row(r, nullptr, span, correction, refused.way);
   } else {
-    // A voxel that pulls against a link at its limit stays, until the limit lets go of it.
+    // A voxel that pulls against an active limit stays until the limit is released.
     if (has(0, row, limited)) r.stopped = at(0).stopped.data() + static_cast<std::size_t>(row) * kRow;
     done = correct_voxels(r, row, correction, state, obstacles, span, refused.way);
   }

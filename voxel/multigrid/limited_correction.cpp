@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// The set of rows of one limited correction, and its queue.
 #include "voxel/multigrid/limited_correction.h"
 
 #include <algorithm>
@@ -19,7 +20,7 @@ LimitedCorrection::LimitedCorrection(std::size_t rows)
       ring_(std::min(kMost, rows) + 1) {}
 
 LimitedCorrection::Row& LimitedCorrection::add(RowId row, LaneSpan span) noexcept {
-  // Of those that come next, what is to be written: to wait for that was half of what it takes to set out.
+  // prefetch: waiting for this memory would be half of the cost
   fetch_lines(rows_.data() + std::min(count_ + kAhead, rows_.size() - 1), sizeof(Row));
   Row& r = rows_[count_++];
   r.row = row;

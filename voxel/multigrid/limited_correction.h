@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Rows of voxels that are to move together, each as far as links to the others let it where those go.
+// One correction for many rows of voxels under the limits of their links: rows move together, each as far as
+// the links to the others' new places allow.
 //
-// One after the other rows are in one another's way: each goes no further than its links to those that have
-// not gone yet let it, and what limits tie together does not go at all. So all go at once, and what is beyond
-// its limits then comes back towards where it was, until nothing is: where all were, nothing was beyond, so
-// one of a link's two ends can always come nearer to it, and what comes back never turns round. What links
-// allow is closed under least and most, so that where all on an axis go the same way the least that must does
-// come back, whatever the order. (ProlongedBox row by row, twice, a cone of tissue at its limits that was to
-// open by seven spacings opened by 0.6 in a cycle.)
+// Row by row, a row could go no further than its links to rows that have not moved yet allow, and voxels that
+// active limits tie together would not move. So all rows move first. Rows beyond a limit then come back
+// towards their start until no link is violated. At the start none was, so one end of a violated link can
+// always come nearer to its start, and none turns round. Difference constraints are closed under minimum and
+// maximum: if all on an axis move the same way, the least that must comes back, whatever the order.
 #pragma once
 
 #include <algorithm>
@@ -29,45 +28,45 @@ class LimitedCorrection {
   struct Row {
     RowId row = 0;
     LaneSpan span;
-    float most_m = 0.0F;  // that any of it was asked to move
-    bool asked = false;   // stands in the queue
-    bool out = false;     // has set out
-    bool cut = false;     // some that do not move were to
-    bool aims = false;    // its aim is not where it is
-    RowVector from;       // where it was; before it sets out, its way (m)
+    float most_m = 0.0F;  // largest motion asked of it
+    bool asked = false;   // it is queued
+    bool out = false;     // it has moved
+    bool cut = false;     // voxels that do not move were asked to
+    bool aims = false;    // its target differs from where it is
+    RowVector from;       // where it was; before it has moved, its motion (m)
   };
 
   LimitedCorrection() = default;
-  // Address space for `rows` of a grid, of which kMost at most are in it at a time.
+  // Reserves address space for `rows` rows of a grid; kMost at most are in use at a time.
   explicit LimitedCorrection(std::size_t rows);
 
   [[nodiscard]] bool full() const noexcept { return count_ == rows_.size(); }
-  // Takes the memory now of so many rows, some of which do not get where they are to go.
+  // Takes the memory now for so many rows, `some` of which do not reach their targets.
   void populate(std::size_t rows, std::size_t some) noexcept {
     rows_.populate(std::min(rows, rows_.size()), {true});
     aims_.populate(std::min(some, aims_.size()), {true});
     ring_.populate(std::min(some, ring_.size()), {true});
     number_.populate();
   }
-  // Its way, of which the lanes in the span are gone, is to be written to `from`. Once a row, while it is not
-  // full.
+  // Adds a row, once, unless full(). The caller writes its motion to `from`; lanes outside of the span do not
+  // move.
   Row& add(RowId row, LaneSpan span) noexcept;
   void clear() noexcept;
-  // Where a row is to go, which is kept only of those that did not get there (m).
+  // Target of a row (m); kept for rows that did not reach it.
   [[nodiscard]] RowVector& aim(const Row& row) noexcept { return aims_[index(row)]; }
   [[nodiscard]] const RowVector& aim(const Row& row) const noexcept { return aims_[index(row)]; }
   [[nodiscard]] std::span<Row> rows() noexcept { return {rows_.data(), count_}; }
-  // Null: it is not in there.
+  // Null: the row was not added.
   [[nodiscard]] const Row* find(RowId row) const noexcept {
     return number_[row] == 0 ? nullptr : &rows_[number_[row] - std::size_t{1}];
   }
 
   [[nodiscard]] bool has(RowId row) const noexcept { return number_[row] != 0; }
 
-  // ---- a queue of them ----
-  // A row that is not in it is not asked.
+  // ---- a queue of rows ----
+  // Queues a row that was added; ignores others.
   void ask(RowId row) noexcept;
-  // The next; null: none.
+  // The next row; null: none.
   [[nodiscard]] Row* next() noexcept;
 
   [[nodiscard]] std::size_t memory_bytes() const {
@@ -80,7 +79,7 @@ class LimitedCorrection {
 
   LazyArray<Row> rows_;
   LazyArray<RowVector> aims_;        // [as rows_]
-  LazyArray<std::uint32_t> number_;  // [row] 1 + index into rows_; 0: it is not in there
+  LazyArray<std::uint32_t> number_;  // [row] 1 + index into rows_; 0: not added
   LazyArray<std::uint32_t> ring_;
   std::size_t count_ = 0, head_ = 0, tail_ = 0;
 };

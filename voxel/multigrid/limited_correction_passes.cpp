@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Rows of voxels that are moved together (limited_correction.h).
+// Applies one correction to many rows of voxels together (limited_correction.h).
 #include <algorithm>
 #include <array>
 #include <glm/geometric.hpp>
@@ -9,16 +9,16 @@
 namespace voxel {
 namespace {
 
-// Of each row, on average: more come back only where it goes by roundings, and then all stay where they were.
+// Visits per row, on average. More happen only if rounding drives a row to and fro; then all rows return to
+// their start.
 constexpr std::size_t kMostVisits = 64;
 
 }  // namespace
 
-// What of its way each voxel may go, and there it goes: none where it stands; along the tool where that
-// presses it; none, and asked for all the same, where a limit stops it. (What slides on the tool and is cut
-// short on one axis leaves it, or enters it, by little, until the tool is next looked at. When it stayed
-// altogether, so did all that hangs on it by tight links: of what 320 rows round a contact were to go, a
-// thirtieth of a spacing each, nearly all was left.)
+// Moves a row by the motion in `from`: held and anchored voxels stay; pressed voxels move along the tool's
+// tangent plane; a voxel that an active limit stops stays, and its motion becomes a target. A limit that cuts
+// one axis of a sliding voxel's motion takes it off the tool, or into it, by little, until the next
+// projection.
 void Multigrid::set_out(LimitedCorrection::Row& r, Displacement& state) noexcept {
   LevelRow row = row_of(0, r.row, state);
   const std::size_t begin = static_cast<std::size_t>(r.row) * kRow;
@@ -39,7 +39,7 @@ void Multigrid::set_out(LimitedCorrection::Row& r, Displacement& state) noexcept
   }
   RowVector refused;
   r.out = true;
-  // Links to others are looked at when the second of the two sets out.
+  // links to other rows are checked when the second of both has moved
   unsigned sides = 0, side = 1;
   for (const RowId to : beside(r.row)) {
     if (const LimitedCorrection::Row* other = limited_correction_.find(to); other != nullptr && other->out)
@@ -60,7 +60,7 @@ void Multigrid::set_out(LimitedCorrection::Row& r, Displacement& state) noexcept
   }
 }
 
-// Before anything keeps it from getting there.
+// Call before anything keeps the row from its target.
 void Multigrid::keep_aim(LimitedCorrection::Row& r, const Displacement& state) noexcept {
   if (r.aims) return;
   r.aims = true;
@@ -79,7 +79,7 @@ void Multigrid::stay(Displacement& state) noexcept {
   }
 }
 
-// In the order of Side.
+// in the order of Side
 std::array<RowId, 6> Multigrid::beside(RowId row) const noexcept {
   const Grid& g = grid(0);
   return {row - 1, row + 1, row - g.row_z, row + g.row_z, row - g.row_x, row + g.row_x};
@@ -90,7 +90,7 @@ void Multigrid::ask_round(RowId row) noexcept {
   for (const RowId to : beside(row)) limited_correction_.ask(to);
 }
 
-// Those that do not go along may hold one back, too.
+// Rows that do not move may hold one back, too.
 void Multigrid::look_at_others(const LimitedCorrection::Row& r, Displacement& state) noexcept {
   unsigned sides = 0, side = 1;
   for (const RowId to : beside(r.row)) {
@@ -126,7 +126,8 @@ void Multigrid::apply_limited_correction(Displacement& state) noexcept {
   for (const LimitedCorrection::Row& r : limited_correction_.rows()) note_change(0, r.row, r.most_m);
 }
 
-// What of its way a row did not go, of those that may; bits of the axes on which there is any.
+// The part of a row's motion that it did not make, of voxels that may move; returns the bits of the axes that
+// have any.
 unsigned Multigrid::left_of(const LimitedCorrection::Row& r, const Displacement& state,
                             RowVector& left) const noexcept {
   left = {};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One row of a joint move (limited_correction.h): octet by octet, as row_smoother.cpp.
+// Inner loops of a limited correction on one row (limited_correction.h), by Float8, as row_smoother.cpp.
 #include "voxel/lattice/simd_dispatch.h"
 #include "voxel/multigrid/row_limits.h"
 #include "voxel/multigrid/row_smoother.h"
@@ -81,8 +81,8 @@ HYBRID_INLINE void take_largest_step(Float8& most, const std::array<Float8, kLan
   }
 }
 
-// By the tightest limits, and what is not there taken for what is at rest: no spring is read. `u` without
-// what lies beside it along x.
+// Compares with the tightest limits, and takes missing neighbours for neighbours at rest: no spring is read.
+// `u`: without the lanes beside it along x.
 HYBRID_INLINE bool steps_beyond(Axes& u, const LevelRow& row, const RowLimits& limits, unsigned sides) {
   Mask8 beyond{};
 #pragma GCC unroll 1

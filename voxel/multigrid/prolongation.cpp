@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Interpolation of coarse corrections along x.
 #include "voxel/multigrid/prolongation.h"
 
 namespace voxel {

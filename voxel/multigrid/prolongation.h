@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What coarse cells have to tell the voxels around them, on its way: two planes of cells at a time, spread
-// along x.
+// Prolongation buffer: two planes of coarse corrections, already interpolated along x.
 //
-// What a cell tells is told as a hat: all of it to the voxels nearest to its middle, less and less to those
-// up to the middles of the cells beside it. Sixteen rows of voxels want each row of cells; so it is read,
-// and spread along x, once.
+// Corrections are prolonged trilinearly. Sixteen rows of voxels need each row of cells; so it is read and
+// interpolated along x once.
 #pragma once
 
 #include <array>
@@ -21,26 +19,26 @@ namespace voxel {
 class Prolongation {
  public:
   Prolongation() = default;
-  // For any box of this grid, the finer of two.
+  // For any box of this grid, the finer of two levels.
   explicit Prolongation(const Grid& fine);
 
   [[nodiscard]] std::size_t memory_bytes() const {
     return cells_.resident_bytes() + lanes_of_.resident_bytes() + resident_bytes(spread_);
   }
 
-  // Coarse octets first … last along x, and coarse rows j0 … j1 of every plane.
+  // Starts a box: coarse Float8 first … last along x, coarse rows j0 … j1 of every plane.
   void begin(int first, int last, int j0, int j1) noexcept;
   [[nodiscard]] int first() const { return first_; }
   [[nodiscard]] int octets() const { return octets_; }
 
-  // Room for the cells of a row before they are spread: of each axis, and (3) which of them there are, from
-  // coarse octet first() on. Of the octets before and after, too.
+  // The cells of a row before interpolation, from coarse Float8 first() on: `which` 0 to 2 is the axis; 3 is
+  // 1 for each cell that exists, else 0. The Float8 before and after are writable, too.
   [[nodiscard]] float* cells(std::size_t which) noexcept {
     return cells_.data() + which * cell_lanes_ + kLanes;
   }
-  // Spreads what is in cells(): `whole`, nothing is missing there.
+  // Interpolates cells() along x. `whole`: every cell exists.
   void spread(int j, int k, bool is_source, bool whole) noexcept;
-  // A row of the finer level's lanes from its octet `octet` on, of all octets along x.
+  // A row of lanes of the finer level, from its Float8 number `octet` along x on.
   [[nodiscard]] ProlongedRow row(int j, int k, int octet) const noexcept {
     const std::size_t at = slot(j, k);
     const float* lanes =
@@ -60,7 +58,7 @@ class Prolongation {
     return static_cast<std::size_t>(k & 1) * rows_ + static_cast<std::size_t>(j - j0_);
   }
 
-  std::size_t rows_ = 0, lanes_ = 0, cell_lanes_ = 0;  // room for
+  std::size_t rows_ = 0, lanes_ = 0, cell_lanes_ = 0;  // capacities
   int first_ = 0, octets_ = 0, j0_ = 0;
   LazyArray<float> cells_, lanes_of_;  // [axis, or 3][lane]; [slot][axis, or 3][lane]
   std::vector<Spread> spread_;         // [slot]

@@ -13,6 +13,8 @@
 
 namespace voxel {
 
+// Residual of a row that is restricted for blocks: 0 for a block that the coarser level knows, which gets it
+// as a whole; for others an equal share for each of its cells.
 void Multigrid::set_block_lanes(int level, RowId row, LaneSpan span, RowVector& out) const noexcept {
   for (int i = span.first * kLanes; i < (span.last + 1) * kLanes; ++i) {
     const std::uint16_t number = parts_->of(level, row * kRow + static_cast<VoxelId>(i));
@@ -28,7 +30,7 @@ void Multigrid::set_block_lanes(int level, RowId row, LaneSpan span, RowVector& 
   }
 }
 
-// What other tissue in its cells is pulled by pulls a part on a coarse level.
+// Restricts the residual of other tissue in a block's cells to the block on the coarse level.
 void Multigrid::restrict_block_lanes(int level, RowId row, LaneSpan span, const RowVector& sums) noexcept {
   for (int i = span.first * kLanes; i < (span.last + 1) * kLanes; ++i) {
     const std::uint16_t number = parts_->of(level, row * kRow + static_cast<VoxelId>(i));
@@ -80,7 +82,7 @@ void Multigrid::prolong_to_blocks(int level, Displacement& state, const Obstacle
     on.sum = glm::dvec3(0.0);
     if (above.count > 0 && way != glm::dvec3(0.0)) {
       from.pending_correction = glm::dvec3(0.0);
-      // All its cells have told it now, in the box or not.
+      // now all its cells have prolonged, in the box or not
       for (const RigidBlocks::Run& run : above.rows) {
         for (std::size_t axis = 0; axis < 3; ++axis)
           for_cells(run,
@@ -97,7 +99,7 @@ void Multigrid::prolong_to_blocks(int level, Displacement& state, const Obstacle
     }
     const glm::dvec3 went = move_block(p, way, state, obstacles);
     if (above.count == 0 || went == way) continue;
-    // What it could not follow its cells take back.
+    // The part of the correction that the block refused is subtracted from its cells.
     for (const RigidBlocks::Run& run : above.rows) {
       for (std::size_t axis = 0; axis < 3; ++axis) {
         const auto less = static_cast<float>(way[static_cast<int>(axis)] - went[static_cast<int>(axis)]);

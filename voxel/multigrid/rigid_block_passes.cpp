@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The passes of a cycle in which parts without slack move as one.
+// Passes of a cycle that move rigid blocks.
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -14,10 +14,10 @@
 namespace voxel {
 namespace {
 
-constexpr double kRounding = 1.2e-7;   // the last bit of a float, of its value
-constexpr double kNearObstacle = 2.0;  // spacings: obstacles further away are not looked at
+constexpr double kRounding = 1.2e-7;   // last bit of a float, relative
+constexpr double kNearObstacle = 2.0;  // spacings: obstacles further away are skipped
 constexpr std::uint32_t kAllLanes = ~std::uint32_t{0};
-// How far the voxel of a part at a link's end may go on an axis before the link stops it: {down, up}.
+// How far the voxel of a block at a link's end may move on an axis before the link stops it: {down, up}.
 std::array<double, 2> room_at(const Lattice& lattice, const Displacement& state, const RigidBlocks::Link& l,
                               int axis) {
   const auto& u = state.u[static_cast<std::size_t>(axis)];
@@ -27,7 +27,7 @@ std::array<double, 2> room_at(const Lattice& lattice, const Displacement& state,
              apart = std::max(0.0, static_cast<double>(bounds[1] - difference));
   return l.up ? std::array<double, 2>{apart, closer} : std::array<double, 2>{closer, apart};
 }
-// And how much further by taking along the voxel at its other end, as far as all other links of that let it.
+// How much further, if the voxel at the link's other end comes along as far as its other links allow.
 double room_beside(const Lattice& lattice, const Displacement& state, VoxelId v, std::uint16_t part, int axis,
                    bool upwards) {
   if (state.role[v] != Displacement::free || lattice.anchored(v)) return 0.0;
@@ -44,7 +44,7 @@ double room_beside(const Lattice& lattice, const Displacement& state, VoxelId v,
   }
   return std::max(0.0, static_cast<double>(room));
 }
-// Is this the first of the links that a voxel beside a part has to it?
+// Is it the first of the links between a voxel and the block?
 bool first_link(const Lattice& lattice, const RigidBlocks::Link& l, std::uint16_t part) {
   for (int d = 0; d < l.d; ++d) {
     if (lattice.part(lattice.up(l.beside, d)) == part || lattice.part(lattice.down(l.beside, d)) == part)
@@ -84,7 +84,7 @@ glm::dvec3 Multigrid::block_force(std::size_t part, const Displacement& state) c
   return force;
 }
 
-// The least that links of the border leave it, `room(link, axis)`: {down, up}.
+// Interval that all links of the border leave the block; `room(link, axis)`: {down, up}.
 template <class Room>
 Multigrid::AdmissibleInterval Multigrid::room_on_border(std::size_t part, const Room& room) const noexcept {
   constexpr double kFar = 1e30;
@@ -120,7 +120,7 @@ void Multigrid::shift_block(std::size_t part, const glm::dvec3& way, Displacemen
   const VoxelId first = parts_->first(part);
   const auto most = static_cast<float>(std::max({std::fabs(way.x), std::fabs(way.y), std::fabs(way.z)}));
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    // All stand where the first does, to the last bit.
+    // All voxels get the place of the first, to the last bit.
     const float to =
         static_cast<float>(static_cast<double>(state.u[axis][first]) + way[static_cast<int>(axis)]);
     for (const RigidBlocks::Run& run : parts_->on(0, part).rows) {
@@ -134,7 +134,7 @@ void Multigrid::shift_block(std::size_t part, const glm::dvec3& way, Displacemen
   for (const RigidBlocks::Run& run : parts_->on(0, part).rows) note_change(0, run.row, most);
 }
 
-// Those it touches, and what it may come to.
+// Bounds by obstacles that the block touches or may reach.
 void Multigrid::stop_at_obstacles(std::size_t part, const Displacement& state, const ObstacleView& obstacles,
                                   Tool tool) noexcept {
   block_bounds_.clear();
@@ -148,13 +148,13 @@ void Multigrid::stop_at_obstacles(std::size_t part, const Displacement& state, c
     const double depth = depth_in_obstacle(o, state.at(lattice_.surface()[s]));
     if (depth < -kNearObstacle * lattice_.max_spacing_m()) continue;
     if (block_bounds_.size() + 6 >= kMaxBlockBounds) return;
-    // What is in its obstacle is brought out by others.
+    // Overlap is removed elsewhere.
     block_bounds_.push_back({glm::dvec3(o.normal), std::max(0.0, -depth), false, 0.0});
   }
 }
 
-// As interval_of_block(), where voxels beside it come along as far as their other links let them; looked at
-// on the way it is to go.
+// As interval_of_block(), if voxels beside the block come along as far as their other links allow; searched
+// in the direction of `way` only.
 Multigrid::AdmissibleInterval Multigrid::room_with_others(std::size_t part, const glm::dvec3& way,
                                                           const Displacement& state) const noexcept {
   const auto number = static_cast<std::uint16_t>(part + 1);
@@ -166,7 +166,7 @@ Multigrid::AdmissibleInterval Multigrid::room_with_others(std::size_t part, cons
   });
 }
 
-// Brings what is beside a part within the limits of its links to it.
+// Moves voxels beside a block within the limits of their links to it.
 void Multigrid::take_others_along(std::size_t part, Displacement& state) noexcept {
   for (const RigidBlocks::Link& l : parts_->on(0, part).border) {
     if (state.role[l.beside] != Displacement::free || lattice_.anchored(l.beside)) continue;
@@ -185,8 +185,8 @@ void Multigrid::take_others_along(std::size_t part, Displacement& state) noexcep
   }
 }
 
-// What links at their limits keep a part from following is pulled along with it: adds what pulls that.
-// Returns bits of the axes on which it is held nevertheless.
+// Voxels that links at their limits keep from moving away come along with the block: adds their forces.
+// Returns the bits of the axes on which the block is held nevertheless.
 std::uint8_t Multigrid::add_what_comes_along(std::size_t part, const Displacement& state,
                                              glm::dvec3& pull) noexcept {
   const double tight = static_cast<double>(kAtLimit) * lattice_.min_spacing_m();
@@ -220,7 +220,7 @@ glm::dvec3 Multigrid::move_block(std::size_t part, const glm::dvec3& way, Displa
   const AdmissibleInterval room = room_with_others(part, way, state);
   add_bounds(room, block_bounds_);
   glm::dvec3 to = move_within(stiffness * way, stiffness, block_bounds_);
-  for (int axis = 0; axis < 3; ++axis) {  // what rounding left
+  for (int axis = 0; axis < 3; ++axis) {  // rounding
     const auto& of_axis = room[static_cast<std::size_t>(axis)];
     to[axis] = std::clamp(to[axis], of_axis[0], of_axis[1]);
   }
@@ -250,7 +250,7 @@ void Multigrid::shift_cells(int level, std::size_t part, const glm::dvec3& way) 
   }
 }
 
-// What pulls a part on a level, and on what stiffness: springs that leave it, what holds its cells, its load.
+// Force and stiffness of a block on a level: springs of its border, boundary springs of its cells, its load.
 glm::dvec3 Multigrid::block_pull(int level, std::size_t part, glm::dvec3& stiffness) noexcept {
   const RigidBlocks::OnLevel& on = parts_->on(level, part);
   stiffness = on.stiffness;
@@ -264,8 +264,8 @@ glm::dvec3 Multigrid::block_pull(int level, std::size_t part, glm::dvec3& stiffn
           along(link.spring, axis, link.d) * static_cast<double>(value[link.beside] - value[link.cell]);
     }
   }
-  // Where the tool, or an obstacle, holds it, its own cells are held by that: along a surface that it slides
-  // on they would be held, too.
+  // If the tool or an obstacle holds the block, its cells have boundary springs because of that; they would
+  // hold it along the surface, too.
   if (block_state_[part].held.count > 0 || parts_->sprawls(part)) return pull;
   for (const RigidBlocks::Run& run : on.rows) {
     if (!boundary_springs_->any(level, run.row) || !prepare(level, run.row)) continue;
@@ -326,7 +326,7 @@ float Multigrid::measure_blocks(int level, const RigidBlocks::Box& box, Displace
     glm::dvec3 pull = block_pull(level, p, stiffness);
     if (level == 0) {
       pull += block_force(p, state);
-      // What presses it on an obstacle is balanced by that.
+      // An obstacle balances the force that presses the block on it.
       part.held = part.by_tool;
       stop_at_obstacles(p, state, obstacles, Tool::holds);
       move_within(pull, stiffness, block_bounds_);
@@ -334,7 +334,7 @@ float Multigrid::measure_blocks(int level, const RigidBlocks::Box& box, Displace
         if (b.force_N > 0.0 && !b.both && b.room_m < kTouching * lattice_.min_spacing_m())
           part.held.add(b.normal);
       }
-      // And so is what a limit holds, which coarse levels would pull at and be undone.
+      // An active limit balances its force, too; coarse levels would push against it in vain.
       part.stopped = add_what_comes_along(p, state, pull);
     }
     for (int axis = 0; axis < 3; ++axis) {
@@ -344,16 +344,12 @@ float Multigrid::measure_blocks(int level, const RigidBlocks::Box& box, Displace
     on.active = true;
     part.on[static_cast<std::size_t>(level) + 1].passed = on.left;
     if (level > 0 || of.border.empty()) return;
-    // The sum of as many forces, each of which may be wrong by as much; less what the last bit of its place
-    // is worth.
+    // Per border link, because each force may be off by the tolerance; less the rounding of its displacement.
     const glm::dvec3 bit = kRounding * glm::abs(state.at(of.border.front().cell)) * stiffness;
     const double left = std::max(0.0, glm::length(on.left) - glm::length(bit));
     worst = std::max(worst, static_cast<float>(left / std::sqrt(static_cast<double>(of.border.size()))));
   });
   return worst;
 }
-
-// What of a row is passed on: nothing of a part that the next level knows, which hears of it as a whole; of
-// another as much of each of its cells.
 
 }  // namespace voxel

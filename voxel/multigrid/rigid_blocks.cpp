@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Which voxels and cells form a rigid block on each level, and its border; motion of a block within bounds.
 #include "voxel/multigrid/rigid_blocks.h"
 
 #include <algorithm>
@@ -10,13 +11,13 @@ namespace voxel {
 namespace {
 
 constexpr int kMostRounds = 200;
-constexpr double kSettled = 1e-9;  // of the largest force of a bound: less changes nothing
-// Of a part's voxels so many are in cells of which it is half, or that level, and all coarser ones, do not
-// know of it: pulled by all that pulls it, and held by what is round a few cells, it would go much too far
-// there.
+constexpr double kSettled = 1e-9;  // of a bound's largest force: a smaller change ends the ascent
+// If less than this part of a block's voxels lies in cells of which it is at least half, that level and all
+// coarser ones do not know the block. With the force of the whole block on the springs of a few cells it
+// would move much too far there.
 constexpr double kMostOf = 0.7;
 constexpr int kCompact = 1;         // cells from the first to the last
-constexpr double kParallel = 1e-4;  // sin²: a direction within those already held
+constexpr double kParallel = 1e-4;  // sin² of the angle: a direction within those already fixed
 
 VoxelId above(const Grid& finer, const Grid& coarser, VoxelId cell) {
   const std::array<int, 3> c = finer.coordinates(cell);
@@ -106,7 +107,7 @@ void RigidBlocks::find_voxels() {
   }
 }
 
-// From what cells of the level below hold, which becomes what those of this one do.
+// From the shares of cells on the finer level to those on this one.
 void RigidBlocks::find_cells(int level, std::vector<std::vector<Share>>& shares,
                              std::vector<std::uint32_t>& filled) {
   const Grid &finer = couplings_[static_cast<std::size_t>(level - 1)]->grid(),
@@ -136,7 +137,7 @@ void RigidBlocks::find_cells(int level, std::vector<std::vector<Share>>& shares,
       all += s.voxels;
       if (2 * s.voxels >= filled[s.cell] && l.number[s.cell] == 0) known += s.voxels;
     }
-    if (of.empty()) continue;  // known to none any more
+    if (of.empty()) continue;  // unknown from a finer level on
     if (kMostOf * static_cast<double>(all) > static_cast<double>(known)) {
       sprawls_[p] = compact(grid, of) ? 0 : 1;
       of.clear();
@@ -154,7 +155,7 @@ void RigidBlocks::find_cells(int level, std::vector<std::vector<Share>>& shares,
   }
 }
 
-// Do so few cells hold it that all of them go nearly the same way?
+// Are its cells so few that all of them move nearly alike?
 bool RigidBlocks::compact(const Grid& grid, const std::vector<Share>& shares) {
   std::array<int, 3> low{}, high{};
   for (const Share& s : shares) {

@@ -1,20 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Parts of an object without slack (Lattice::part), on every level of the multigrid hierarchy.
+// Rigid blocks: components of an object whose links have no slack (Lattice::part), on every level of the
+// multigrid hierarchy.
 //
-// A region whose links are all of one length can only be displaced as a whole: it has three unknowns, however
-// many voxels it has. Voxel by voxel it would never move, since each is held by those beside it. So its
-// voxels stand while rows are relaxed, and the part goes, as one, to where the springs that leave it are in
-// balance. On a coarse level it is the cells of which it is half at least; these go as one, too, and soft
-// tissue around is told of it as of any other cells. Where most of it is in cells of which it is
-// less than half, that level, and all coarser ones, know of it as of tissue, and tell it the mean of what
-// they tell its voxels: right where it lies in three cells along an axis at most. One that sprawls further,
-// as a thin sheet does, or a scaffold, holds tissue together that such levels take for loose: they do not
-// move it, and it holds on to the cells around it as what stands does (boundary_springs.h). (ProlongedBox
-// means, it swung for ever.)
+// Such a component can only be displaced as a whole: it has three unknowns, however many voxels it has. Voxel
+// by voxel it would never move. So its voxels do not move when rows are relaxed, and the block moves, as one,
+// to the equilibrium of its border's springs. On a coarse level a block consists of the cells of which it is
+// at least half; these move as one, too, and their correction is prolonged as that of any other cells.
 //
-// (Rejected: its springs in place of its limits, so many times stiffer that nobody sees it. Round what is a
-// hundred times stiffer than the rest a cycle leaves 0.83 of the error, and what is left is a strain that
-// limits do not allow.)
+// A block that has too little in such cells is unknown to that level and to all coarser ones. It takes the
+// mean of the corrections prolonged to its voxels. That is right if it lies in three cells along an axis at
+// most. A block that sprawls further (a thin sheet, a scaffold) connects tissue that such levels take for
+// separate. They do not move it, and it is fixed for the cells around it (boundary_springs.h).
 #pragma once
 
 #include <array>
@@ -30,20 +26,20 @@
 
 namespace voxel {
 
-// A part's motion δ must satisfy normal · δ >= -room, or, `both`, = -room.
+// A block's motion δ must satisfy normal · δ >= -room, or = -room if `both`.
 struct BlockBound {
   glm::dvec3 normal{0.0};
   double room_m = 0.0;
   bool both = false;
-  double force_N = 0.0;  // along the normal, that keeps it so
+  double force_N = 0.0;  // multiplier, along the normal
 };
-// Where a body goes that `force_N` pulls on springs of this stiffness, within bounds: finds their forces,
-// too, from those that stand there on. Coordinate ascent of the dual (Hildreth's): with three unknowns a few
-// rounds.
+// Motion of a body under `force_N` on springs of this stiffness, within bounds. Sets the bounds' multipliers,
+// starting from those given. Coordinate ascent of the dual (Hildreth); a few rounds suffice for three
+// unknowns.
 glm::dvec3 move_within(const glm::dvec3& force_N, const glm::dvec3& stiffness_N_per_m,
                        std::span<BlockBound> bounds) noexcept;
 
-// Directions in which a part is held, at right angles to one another.
+// Orthonormal directions in which a block is fixed.
 struct HeldDirections {
   std::array<glm::dvec3, 3> of{};
   std::size_t count = 0;
@@ -54,7 +50,7 @@ struct HeldDirections {
 
 class RigidBlocks {
  public:
-  // Cells first … last on each axis, all included.
+  // Cells first … last on each axis, inclusive.
   struct Box {
     std::array<int, 3> first{0, 0, 0}, last{-1, -1, -1};
     [[nodiscard]] bool meets(const Box& other) const noexcept {
@@ -68,16 +64,16 @@ class RigidBlocks {
     RowId row;
     std::uint32_t lanes;
   };
-  struct Link {  // of a voxel or cell of the part to one that is not
+  struct Link {  // from a voxel or cell of the block to one outside
     VoxelId cell, beside;
     Spring spring;
     std::uint8_t d;
-    bool up;  // the one beside is the upper one
+    bool up;  // `beside` is the upper end
   };
   struct OnLevel {
     std::vector<Run> rows;
     std::vector<Link> border;
-    std::size_t count = 0;  // voxels, or cells
+    std::size_t count = 0;  // voxels or cells
     Box box;
     glm::dvec3 stiffness{0.0};  // of the border (N/m)
   };
@@ -89,26 +85,26 @@ class RigidBlocks {
   [[nodiscard]] const OnLevel& on(int level, std::size_t part) const {
     return levels_[static_cast<std::size_t>(level)].parts[part];
   }
-  // Number of the part that a cell belongs to, plus one; 0: to none.
+  // Number of the block that a cell belongs to, plus one; 0: none.
   [[nodiscard]] std::uint16_t of(int level, VoxelId cell) const {
     return level == 0 ? lattice_.part(cell) : levels_[static_cast<std::size_t>(level)].number[cell];
   }
   [[nodiscard]] bool in_row(int level, RowId row) const {
     return levels_[static_cast<std::size_t>(level)].row[row] != 0;
   }
-  // Is all that there is in it?
+  // Does the row hold nothing but blocks?
   [[nodiscard]] bool fill_row(int level, RowId row) const {
     return levels_[static_cast<std::size_t>(level)].row[row] >= kFilled;
   }
-  // … and is it known on the next level, which so hears of it, and tells it, as a whole?
+  // The same, and the next level knows all of these blocks, so that it restricts and prolongs them as wholes.
   [[nodiscard]] bool fill_known_row(int level, RowId row) const {
     return levels_[static_cast<std::size_t>(level)].row[row] == kFilledKnown;
   }
-  // Do coarse levels that do not know it hold it where it is?
+  // Is it fixed for coarse levels that do not know it?
   [[nodiscard]] bool sprawls(std::size_t part) const { return sprawls_[part] != 0; }
-  // Voxels of the part that have loads beside their springs: bricks, or links that yield, of what is beside.
+  // Voxels of the block with loads besides their springs: bricks, or plastic links, of tissue beside it.
   [[nodiscard]] const std::vector<VoxelId>& loaded(std::size_t part) const { return loaded_[part]; }
-  // Its surface voxels, by number.
+  // Surface numbers of its surface voxels.
   [[nodiscard]] const std::vector<std::uint32_t>& surface(std::size_t part) const { return surface_[part]; }
   [[nodiscard]] VoxelId first(std::size_t part) const {
     return on(0, part).border.empty() ? VoxelId{0} : on(0, part).border.front().cell;
@@ -119,10 +115,10 @@ class RigidBlocks {
   struct Level {
     std::vector<OnLevel> parts;
     LazyArray<std::uint16_t> number;  // [cell]; empty on level 0
-    std::vector<std::uint8_t> row;    // [row] 1: cells of parts are in it; kFilled: and no others
+    std::vector<std::uint8_t> row;    // [row] 1: has cells of blocks; kFilled: and no others
   };
   static constexpr std::uint8_t kFilled = 2, kFilledKnown = 3;
-  // How many voxels a cell has, and how many of them are of a part.
+  // A cell, and how many voxels of one block it holds.
   struct Share {
     VoxelId cell;
     std::uint32_t voxels;
@@ -138,7 +134,7 @@ class RigidBlocks {
   std::vector<LevelStiffness*> couplings_;
   std::size_t count_;
   std::vector<Level> levels_;
-  std::vector<std::uint8_t> sprawls_;  // [part]
+  std::vector<std::uint8_t> sprawls_;  // [block]
   std::vector<std::vector<VoxelId>> loaded_;
   std::vector<std::vector<std::uint32_t>> surface_;
 };

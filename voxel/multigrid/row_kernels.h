@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The innermost loops of relaxation: one axis of one row at a time, in vectors.
+// Inner loops of relaxation on one axis of one row, in vectors.
 #pragma once
 
 #include <array>
@@ -12,7 +12,7 @@ namespace voxel {
 
 using Row = std::array<float, kRow>;
 
-// A row of some field on a grid, and the rows around it.
+// A row of a field on a grid, and the rows around it.
 struct RowView {
   const float *own, *y_down, *y_up, *z_down, *z_up;
   float left, right;  // the values beyond both ends
@@ -27,7 +27,7 @@ struct RowView {
         right(*(own + static_cast<std::size_t>(grid.row_x) * kRow)) {}
 };
 
-// Would any link of the row reach `share` of the limits if all its voxels were where they want to be?
+// Would any link of the row reach `share` of its limits if the row's voxels stood at `wanted`?
 bool row_near_limits(const RowSprings& springs, const RowView& u, const AxisLimits& limits, float share,
                      const float* wanted) noexcept;
 

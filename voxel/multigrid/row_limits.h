@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Inside of the row passes: what links allow, and whether it has to be looked at.
+// Inside of the row passes: the interval that links allow, and whether limits have to be looked at.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +13,7 @@ namespace voxel {
 
 constexpr float kFar = std::numeric_limits<float>::max();
 
-// What links allow a voxel.
+// Interval that links allow a voxel.
 struct Interval {
   Float8 low, high;
 };
@@ -21,18 +21,17 @@ HYBRID_INLINE void everywhere(Interval& in) {
   in.low = Float8{} - kFar;
   in.high = Float8{} + kFar;
 }
-// … the link to the neighbour above, which stands at `to`, and the one to the neighbour below.
-// None; one set for the row; each lane its own.
+// Limits of a row: none, one set for the row, or one for each lane.
 enum class Limits : std::uint8_t { none, row, lanes };
 constexpr bool clamps(Limits l) {
   return l != Limits::none;
 }
 
-// Limits of one axis of a row: `low[d]` and `high[d]` of the links up and down, where each lane has its own.
+// Limits of one axis of a row. If lanes have their own: `low[d]` and `high[d]` of the links up and down.
 struct AxisBounds {
   AxisLimits row;
   std::array<const float*, 3> up_low{}, up_high{}, down_low{}, down_high{};
-  std::array<float, 3> sign{};  // of low: across, the limit below is the one above, negative
+  std::array<float, 3> sign{};  // of low: across, the lower limit is the upper one, negated
 
   AxisBounds(const RowLimits& limits, std::size_t axis) : row((*limits.of)[axis]) {
     if (limits.lanes == nullptr) return;
@@ -48,7 +47,7 @@ struct AxisBounds {
   }
 };
 
-// … the link to the neighbour above, which stands at `to`, and the one to the neighbour below.
+// Intersects an interval with the limits of the links in d to the neighbours at `up` and `down`.
 template <bool kUniform, Limits kLimits>
 HYBRID_INLINE void narrow(Interval& in, const Float8& up, const Float8& down, const AxisSprings& s,
                           const AxisBounds& b, std::size_t d, int octet) {
@@ -88,14 +87,14 @@ HYBRID_INLINE void narrow_beside(Interval& in, const Around& at, const AxisSprin
   narrow<kUniform, kLimits>(in, at.y_up, at.y_down, s, b, 1, octet);
   narrow<kUniform, kLimits>(in, at.z_up, at.z_down, s, b, 2, octet);
 }
-// An empty interval can only be a rounding wide: it stays where it is then.
+// An interval can only be empty by rounding: the voxel stays where it is then.
 HYBRID_INLINE void bring_into(Float8& wanted, const Interval& in, const Float8& now) {
   take_largest(wanted, in.low);
   take_least(wanted, in.high);
   wanted = in.low > in.high ? now : wanted;
 }
-// The most by which links may differ before they have to be looked at, [d] of an axis: a little less than
-// what the tightest of them allows.
+// [d] of an axis: difference across a link below which its limits need not be looked at; a little less than
+// the tightest of them allows.
 struct Band {
   std::array<float, 3> most;
 
@@ -107,7 +106,7 @@ struct Band {
     }
   }
 };
-// Is a link of the octet beyond the band, when its own values are `own`?
+// Marks lanes with a link beyond the band, if the Float8 stood at `own`.
 template <bool kUniform>
 HYBRID_INLINE void note_beyond(Mask8& beyond, const Float8& own, const Float8& x_down, const Float8& x_up,
                                const Around& at, const AxisSprings& s, const Band& band, int octet) {
@@ -132,7 +131,7 @@ HYBRID_INLINE void note_beyond(Mask8& beyond, const Float8& own, const Float8& x
     beyond |= out;
   }
 }
-// Where a row has no limits, what is said of them is not looked at.
+// A row without limits gets limits that are never read.
 HYBRID_INLINE AxisBounds bounds_of(const RowLimits* limits, std::size_t axis) {
   static constexpr std::array<AxisLimits, 3> kNone{};
   return limits != nullptr ? AxisBounds(*limits, axis) : AxisBounds(RowLimits{&kNone, nullptr}, axis);
@@ -164,7 +163,7 @@ HYBRID_INLINE void look_beyond(Mask8& beyond, const Float8& own, const Float8& x
   }
 }
 
-// The same where each lane has limits of its own.
+// The same, if each lane has its own limits.
 HYBRID_INLINE void look_beyond_lanes(Mask8& beyond, const Float8& own, const Float8& x_down,
                                      const Float8& x_up, const LevelRow& row, const RowLimits::Written& w,
                                      std::size_t axis, int octet) {
@@ -189,11 +188,11 @@ HYBRID_INLINE void look_beyond_lanes(Mask8& beyond, const Float8& own, const Flo
   }
 }
 
-// How a row's links are looked at: by the tightest limits, neighbours that are not there taken for neighbours
-// at rest, so that no spring is read; by the same, only where there is a link; each by its own.
+// How links are compared with limits: all with the tightest ones, missing neighbours taken for neighbours at
+// rest, so that no spring is read; the same only where there is a link; each link with its own.
 enum class Beyond : std::uint8_t { tightest, linked, lanes };
 
-// True when any octet has such a link.
+// True if any Float8 has such a link.
 template <Beyond kBeyond>
 HYBRID_INLINE bool look_at_axes(std::array<Mask8, 3>& beyond, const Axes& u, const LevelRow& row,
                                 const RowLimits& limits, const std::array<Band, 3>& band, LaneSpan span) {
@@ -218,8 +217,8 @@ HYBRID_INLINE bool look_at_axes(std::array<Mask8, 3>& beyond, const Axes& u, con
   return any(all);
 }
 
-// Which axes may have links beyond the band, bit by bit, if the row stood at `u`. Most rows have none, and
-// each look costs more than the one before it.
+// Bits of the axes that may have links beyond the band if the row stood at `u`. Cheap tests come first: most
+// rows have none.
 template <bool kUniform>
 HYBRID_INLINE unsigned beyond_band(const Axes& u, const LevelRow& row, const RowLimits& limits, LaneSpan span,
                                    float tight) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Residual of a row, and which of its links are at their limits, on one level.
+// Residual of a row, and its links at their limits.
 #include "voxel/lattice/simd_dispatch.h"
 #include "voxel/multigrid/row_limits.h"
 #include "voxel/multigrid/row_smoother.h"
@@ -87,7 +87,7 @@ HYBRID_INLINE void residual_axes(RowResidual& result, const LevelRow& row, const
   result.most_way_m = largest(most_m);
 }
 
-// Bit i of any lane.
+// bits of all lanes combined
 HYBRID_INLINE std::uint32_t all_bits(const Mask8& bits) {
   const Mask8 half = bits | __builtin_shufflevector(bits, bits, 4, 5, 6, 7, 0, 1, 2, 3);
   const Mask8 pair = half | __builtin_shufflevector(half, half, 2, 3, 0, 1, 2, 3, 0, 1);
@@ -104,7 +104,7 @@ HYBRID_INLINE void look_at_limits(const LevelRow& row, const AxisBounds& bounds,
 #pragma GCC unroll 1
   for (int octet = 0; octet < kLaneGroups; ++octet)
     load(u.at[static_cast<std::size_t>(octet) + 1], own + octet * kLanes);
-  // Each lane sets its own bit: gathered lane by lane in every octet, they took longer than all else.
+  // Each lane sets its own bit: cheaper than gathering lanes in each Float8.
   Mask8 bit{1, 2, 4, 8, 16, 32, 64, 128};
   std::array<Mask8, 3> at_low{}, at_high{}, down_at_low{}, down_at_high{};
   Mask8 pulled_up{}, pulled_down{}, movable{};

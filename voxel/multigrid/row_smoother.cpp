@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Smoothing and correction of a row, on one level.
+// Smoothing and correction of a row.
 #include "voxel/multigrid/row_smoother.h"
 
 #include <cstring>
@@ -11,7 +11,7 @@
 namespace voxel {
 namespace {
 
-// One axis of a row where limits matter; cells, which have none, never come here.
+// Smooths one axis of a row near its limits; cells have none.
 template <bool kUniform, Limits kLimits>
 HYBRID_INLINE void smooth_axis(const LevelRow& row, const AxisBounds& bounds, std::size_t axis, LaneSpan span,
                                Float8& most) {
@@ -78,7 +78,7 @@ HYBRID_INLINE void smooth_axis(const LevelRow& row, const AxisBounds& bounds, st
   }
 }
 
-// Smooths the axes on which no limit comes near; returns the others, bit by bit, left as they were.
+// Smooths the axes that stay clear of limits; returns the bits of the others, which are left as they were.
 template <bool kUniform, bool kLook>
 HYBRID_INLINE unsigned smooth_freely(const LevelRow& row, const RowLimits* limits, LaneSpan span,
                                      Float8& most) {
@@ -159,7 +159,7 @@ HYBRID_INLINE unsigned smooth_freely(const LevelRow& row, const RowLimits* limit
   return beyond;
 }
 
-// First as if there were no limits, and again with them where they matter.
+// First without limits, then again with them on axes that come near one.
 template <bool kUniform, Limits kLimits>
 HYBRID_INLINE float smooth_axes(const LevelRow& row, const RowLimits* limits, LaneSpan span) {
   Float8 most{};
@@ -207,7 +207,7 @@ HYBRID_INLINE void correct_axis(const LevelRow& row, const AxisBounds& bounds, s
     everywhere(allowed[static_cast<std::size_t>(n)]);
     narrow_beside<kUniform, kLimits>(allowed[static_cast<std::size_t>(n)], at, s, bounds, octet);
   }
-  // Every second voxel at a time: beside neighbours that stand still, a limit is a plain interval.
+  // Every second voxel at a time: next to fixed neighbours a limit is an interval.
 #pragma GCC unroll 1
   for (int colour = 0; colour < 2; ++colour) {
 #pragma GCC unroll 1
@@ -241,7 +241,7 @@ HYBRID_INLINE void correct_axis(const LevelRow& row, const AxisBounds& bounds, s
   }
 }
 
-// What stopped voxels do not take of a correction. Returns the axes on which there is any.
+// The part of a correction that stopped voxels refuse. Returns the bits of the axes that have any.
 template <bool kUniform>
 HYBRID_INLINE unsigned note_stopped(const LevelRow& row, LaneSpan span, const RowVector& correction,
                                     RowVector& refused) {
@@ -266,8 +266,7 @@ HYBRID_INLINE unsigned note_stopped(const LevelRow& row, LaneSpan span, const Ro
   return refusing;
 }
 
-// Adds corrections on the axes on which no limit comes near; returns the others, bit by bit, left as they
-// were.
+// Corrects the axes that stay clear of limits; returns the bits of the others, which are left as they were.
 template <bool kUniform, bool kLook>
 HYBRID_INLINE unsigned correct_freely(const LevelRow& row, const RowLimits* limits, LaneSpan span,
                                       const RowVector& correction, RowVector& refused, unsigned& refusing,

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The innermost loops of relaxation: all three axes of one row at once, in vectors. Pure functions of memory;
-// which rows, and what follows from it, is Multigrid's business.
+// Inner loops of relaxation on all three axes of one row, in vectors. Pure functions of memory; Multigrid
+// decides which rows, and what follows.
 //
-// They go by octets of lanes, so that a contact narrower than a row costs no more than it is wide.
+// They work on spans of Float8, so that a contact narrower than a row costs no more than its width.
 #pragma once
 
 #include <array>
@@ -19,115 +19,119 @@ namespace voxel {
 struct LevelRow {
   std::array<float*, 3> u{};           // [axis] its first value (unit: meter)
   std::array<const float*, 3> load{};  // (N); null: none
-  std::ptrdiff_t z = 0, x = 0;         // floats to the row beside it in z, and in x; kRow in y
+  std::ptrdiff_t z = 0, x = 0;         // floats to the next row in z, and in x; kRow in y
   RowStiffness springs;
-  const std::uint8_t* held = nullptr;     // [lane] bit 0: does not move; null: all may
-  const std::uint8_t* stopped = nullptr;  // [lane] bit `axis`: does not move on that axis; null: all may
-  // [axis] A spring to `held_at`, as many times as stiff as all links of the cell; all null: none has one.
+  const std::uint8_t* held = nullptr;  // [lane] bit 0: does not move; null: all may
+  const std::uint8_t* stopped =
+      nullptr;  // [lane] bit `axis`: an active limit holds it on that axis; null: none
+  // [axis] Boundary springs: stiffness over that of all links of the cell, times hold_times; and where they
+  // pull to. All null: there are none.
   std::array<const float*, 3> hold{};
   std::array<const float*, 3> held_at{};
   float hold_times = 1.0F;
 };
 
-// Moves the voxels, or cells (`limits` null), of a row to the minimum of their energy given the rows around,
-// every second one first. Returns the longest way of any (m).
+// Moves the voxels of a row, or its cells (`limits` null), to the minimum of their energy, the rows around
+// fixed, every second one first. Returns the largest motion (m).
 float smooth_row(const LevelRow& row, const RowLimits* limits, LaneSpan span) noexcept;
 
 using RowVector = std::array<Lanes, 3>;  // [axis][lane]
 
 struct RowResidual {
-  float most_N = 0.0F, most_way_m = 0.0F;   // the largest force left, and the furthest that any would move
-  std::array<std::uint32_t, 3> resisted{};  // [axis] lanes that pull against a limit: they count as at rest
+  float most_N = 0.0F, most_way_m = 0.0F;  // largest residual, and the largest motion that a lane would make
+  std::array<std::uint32_t, 3>
+      resisted{};  // [axis] lanes that pull against an active limit; their residual counts as 0
 };
 
-// What its links, and its load, pull each voxel of a row with that may move (N); 0 for others.
-// Nearer to its limit than `tight_m` a link is at it.
+// Residual of each lane that may move: force of links, load and boundary springs (N); 0 for others. A link
+// nearer to its limit than `tight_m` is at it.
 RowResidual residual_row(const LevelRow& row, const RowLimits* limits, float tight_m, LaneSpan span,
                          RowVector& out) noexcept;
-// The same for what somebody changed in `out` afterwards.
+// Renews the maxima after `out` was changed.
 void measure_row(const RowStiffness& springs, const RowVector& residual, LaneSpan span,
                  RowResidual& out) noexcept;
 
-// Adds neighbouring lanes of a finer row, of one axis, to half of a coarse row: its octets span.first/2 …
+// Adds pairs of lanes of a finer row, of one axis, to half of a coarse row, from its Float8 span.first/2 on.
 void add_pairs(const float* fine, LaneSpan span, float* half) noexcept;
 
-// From the sums of what the cells of a coarse row hold: their means, and what they know beyond those.
+// From the sums over children: told = their means; value keeps its pending correction.
 void take_means(const RowVector& sums, const float* share, const std::array<float*, 3>& value,
                 const std::array<float*, 3>& told, LaneSpan span) noexcept;
-// load = force − Σ k (told(neighbour) − told); `row.u` are the values told.
+// FAS load: load = force − Σ k (told(neighbour) − told); row.u is `told`.
 void take_loads(const LevelRow& row, const RowVector& force, const std::array<float*, 3>& load,
                 LaneSpan span) noexcept;
-// Of the lanes first … last of a coarse row, which may go beyond it: out = value − told, 0 in others of the
-// span; told = value.
+// Of lanes first … last of a coarse row (which may extend beyond it): out = value − told, then told = value.
+// out is 0 in the span's other lanes.
 void take_pending_correction(const float* value, float* told, const float* filled, LaneSpan span, int first,
                              int last, float* out) noexcept;
-// From cells to the lanes of the finer level, along x: 3/4 of the cell a lane is in, 1/4 of the nearer
-// neighbour. Of the octets before and after `cells` the nearest lane is read.
+// Interpolation along x from cells to lanes of the finer level: 3/4 of the own cell, 1/4 of the nearer
+// neighbour. Reads the nearest lane of the Float8 before and after `cells`.
 void spread_along(const float* cells, int octets, float* lanes) noexcept;
-// Is every one of these lanes 1?
+// Are all of these lanes 1?
 bool all_ones(const float* lanes, int octets) noexcept;
 
-// What the four coarse rows around a fine one tell it, own cell's first, then the nearer in y, in z, in both;
-// spread along x.
+// One of the four coarse rows around a fine one, interpolated along x. Their order: own, nearer in y, nearer
+// in z, nearer in both.
 struct ProlongedRow {
   std::array<const float*, 3> sum{};  // [axis][lane]
-  const float* weight = nullptr;      // [lane] of what there is of its cells; null: all of them
-  bool is_source = false;             // else it weighs, but adds nothing
+  const float* weight = nullptr;      // [lane] weight of the cells that exist; null: all exist
+  bool is_source = false;             // false: it has weight, but no correction
 };
-// Their sum, with cell-centred trilinear weights: 3/4 to the cell a voxel is in, 1/4 to the nearer neighbour,
-// on each axis; an empty neighbour's share goes to the others (a free surface). The rows' lanes begin with
-// the span's.
+// Cell-centred trilinear prolongation: 3/4 of the own cell, 1/4 of the nearer neighbour, on each axis. The
+// weight of a missing neighbour goes to the others (a free surface). The lanes of `rows` begin with those of
+// the span.
 void sum_interpolated(const std::array<ProlongedRow, 4>& rows, LaneSpan span, RowVector& out) noexcept;
-// From the sums over what cells hold: value and told less their means.
+// Subtracts the children's means from value and told.
 void take_back(const RowVector& sums, const float* share, const std::array<float*, 3>& value,
                const std::array<float*, 3>& told, LaneSpan span) noexcept;
-// The largest |a[i] − b[i]| of one axis, of the lanes of the span that lie in first … last.
+// Largest |a[i] − b[i]| of one axis, over the lanes of the span between `first` and `last`.
 float row_difference(const float* a, const float* b, LaneSpan span, int first, int last) noexcept;
 
-// way = now − was of one axis of a row; returns the longest.
+// way = now − was of one axis of a row; returns the largest |way|.
 float row_way(const float* now, const float* was, float* way) noexcept;
 
-// Links of a row of voxels on one axis, and what they pull at it; bits are lanes.
+// Links at their limits of a row of voxels on one axis, and their loads; bits are lanes.
 struct LinksAtLimits {
-  // [d] of the link up, and of the link down: the difference can be no less, no more.
+  // [d] links up and links down whose difference is at its lower, or upper, limit
   std::array<std::uint32_t, 3> at_low, at_high, down_at_low, down_at_high;
   std::uint32_t pulled_up, pulled_down;
   std::uint32_t movable;  // not anchored
-  Lanes pull_N;           // of links and loads
+  Lanes pull_N;           // force of links and loads
 };
-// Of `row` only that axis is read. Nearer to its limit than `tight_m` [d] a link is at it.
+// Only `axis` of `row` is read. A link nearer to its limit than tight_m[d] is at it.
 void links_at_limits(const LevelRow& row, const RowLimits& limits, std::size_t axis,
                      const std::array<float, 3>& tight_m, LinksAtLimits& out) noexcept;
 
 struct RowCorrection {
-  float most_m = 0.0F;   // the most that any voxel was asked to move
-  unsigned refused = 0;  // bit of each axis on which some did not follow all the way
+  float most_m = 0.0F;   // largest motion asked of a voxel
+  unsigned refused = 0;  // bits of the axes on which some voxel did not follow all the way
 };
-// Adds a correction to a row as far as its links allow. `refused`: where the bit is set, what was left of it
-// in the lanes of the span; of what is held or anchored nothing is expected.
+// Adds a correction to a row as far as its links allow. `refused`, for axes whose bit is set: the rest of the
+// correction in the lanes of the span; 0 for held and anchored voxels.
 RowCorrection correct_row(const LevelRow& row, const RowLimits* limits, LaneSpan span,
                           const RowVector& correction, RowVector& refused) noexcept;
 
-// ---- of a joint move (limited_correction_rows.cpp) ----
-// What lies beside a row, bit by bit.
+// ---- limited corrections (limited_correction_rows.cpp) ----
+// Sides of a row, as bits.
 enum Side : unsigned { kYDown = 1, kYUp = 2, kZDown = 4, kZUp = 8, kXDown = 16, kXUp = 32 };
 
 struct SetOut {
-  float most_m = 0.0F;   // the most that any voxel was asked to move
-  bool cut = false;      // something that stands was to go
-  bool beyond = false;   // links may be beyond their limits: within the row, or to one of its `sides`
-  unsigned stopped = 0;  // bit of each axis on which something that `row.stopped` stops was to
+  float most_m = 0.0F;  // largest motion asked of a voxel
+  bool cut = false;     // a voxel that does not move was asked to
+  bool beyond = false;  // links in the row, or to one of its `sides`, may be beyond their limits
+  unsigned stopped =
+      0;  // bits of the axes on which an active limit (row.stopped) holds a voxel that was asked to move
 };
-// Adds `way` to a row whatever its links allow, but to what stands and to what is stopped; in `way` stands
-// then where the row was. `refused`: where anything is stopped, the ways of that in the lanes of the span.
+// Adds `way` to a row regardless of its links; held, anchored and stopped voxels stay. `way` then holds where
+// the row was. `refused`, if anything is stopped: the motion of stopped voxels in the lanes of the span.
 SetOut set_out_row(const LevelRow& row, const RowLimits& limits, LaneSpan span, unsigned sides,
                    RowVector& way, RowVector& refused) noexcept;
-// May links within a row, or to one of its sides, be beyond their limits?
+// May links in a row, or to one of its sides, be beyond their limits?
 bool may_be_beyond(const LevelRow& row, const RowLimits& limits, unsigned sides) noexcept;
-// Bit of each axis on which links may be beyond their limits.
+// Bits of the axes on which links may be beyond their limits.
 unsigned axes_beyond(const LevelRow& row, const RowLimits& limits) noexcept;
-// On these axes voxels of a row that are beyond a limit of a link, by more than floats round, come back
-// towards `from`, as far as that asks and no further. True where any did.
+// On these axes, moves voxels with a link beyond its limit (by more than rounding) back towards `from`, as
+// far as needed. True if any moved.
 bool draw_back_row(const LevelRow& row, const RowLimits& limits, unsigned axes,
                    const RowVector& from) noexcept;
 

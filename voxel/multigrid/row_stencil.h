@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Inside of the row passes: an octet of a row, what stands around it and the springs between them.
+// Inside of the row passes: a Float8 of a row, its neighbours, and the springs between them.
 #pragma once
 
 #include <array>
@@ -12,7 +12,7 @@
 
 namespace voxel {
 
-// The springs of one axis of a row: lanes apart, or (kUniform) one for all.
+// The springs of one axis of a row, by lane or (kUniform) one for all lanes.
 struct AxisSprings {
   std::array<const float*, 3> up, down;
   const float* inverse;
@@ -31,7 +31,7 @@ HYBRID_INLINE void spring(Float8& k, const float* lanes, int octet) {
 
 inline constexpr Mask8 kEven{-1, 0, -1, 0, -1, 0, -1, 0};
 
-// The octets of a span with one more at both ends; of those, only the lane that touches the span is true.
+// The Float8 of a span, and one more at both ends, of which only the lane next to the span is valid.
 struct Span {
   std::array<Float8, kLaneGroups + 2> at;
 };
@@ -42,7 +42,7 @@ HYBRID_INLINE void ends_of(Span& s, const float* own, std::ptrdiff_t x, LaneSpan
   s.at[static_cast<std::size_t>(span.last - span.first) + 2] = Float8{} + after;
 }
 
-// An octet of a row, and what stands around it.
+// A Float8 of a row, and its neighbours in y and z.
 struct Around {
   Float8 own, y_down, y_up, z_down, z_up;
 };
@@ -59,7 +59,7 @@ HYBRID_INLINE bool any(const Mask8& mask) {
   return (words[0] | words[1] | words[2] | words[3]) != 0;
 }
 
-// Lanes that are anchored, or held.
+// Lanes that are anchored or held.
 HYBRID_INLINE void standing(Mask8& stands, const LevelRow& row, const Float8& inverse, int octet) {
   stands = inverse == 0.0F;
   if (row.held != nullptr) {
@@ -68,7 +68,7 @@ HYBRID_INLINE void standing(Mask8& stands, const LevelRow& row, const Float8& in
     stands |= bits;
   }
 }
-// The same of an axis, read from bits.
+// The same for one axis, read from bits.
 HYBRID_INLINE void standing_by_bits(Mask8& stands, const LevelRow& row, std::size_t axis, int octet) {
   bits_set(stands, row.springs.stands + octet * kLanes, 1 << axis);
   if (row.held != nullptr) {
@@ -77,7 +77,7 @@ HYBRID_INLINE void standing_by_bits(Mask8& stands, const LevelRow& row, std::siz
     stands |= bits;
   }
 }
-// Lanes of an axis that do not move.
+// Lanes that do not move on an axis.
 HYBRID_INLINE void staying(Mask8& stays, const LevelRow& row, const Float8& inverse, std::size_t axis,
                            int octet) {
   standing(stays, row, inverse, octet);
@@ -88,7 +88,7 @@ HYBRID_INLINE void staying(Mask8& stays, const LevelRow& row, const Float8& inve
   }
 }
 
-// One spring of an octet; `axis` and `d` are known when this is compiled.
+// One spring of a Float8; `axis` and `d` are known at compile time.
 template <bool kUniform>
 HYBRID_INLINE void spring_up(Float8& k, const RowStiffness& s, std::size_t axis, std::size_t d, int octet) {
   load(k, (d == axis ? s.up_along : s.up_across) + d * kRow + (kUniform ? 0 : octet * kLanes));
@@ -101,7 +101,7 @@ template <bool kUniform>
 HYBRID_INLINE void inverse_of(Float8& inverse, const RowStiffness& s, std::size_t axis, int octet) {
   load(inverse, s.inverse + axis * kRow + (kUniform ? 0 : octet * kLanes));
 }
-// The axes side by side: each alone is a chain of operations that wait for one another.
+// All axes side by side: one axis alone is a chain of dependent operations.
 using Axes = std::array<std::array<Float8, kLaneGroups + 2>, 3>;
 
 HYBRID_INLINE void load_axes(Axes& u, const LevelRow& row, LaneSpan span) {

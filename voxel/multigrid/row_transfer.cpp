@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Between levels.
+// Restriction and prolongation of a row.
 #include <array>
 
 #include "voxel/lattice/simd_dispatch.h"

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Steps of a pressed voxel in the tool's tangent plane.
 #include "voxel/multigrid/tangential_contact.h"
 
 #include <algorithm>
@@ -10,8 +11,8 @@
 namespace voxel {
 namespace {
 
-// Where a voxel goes with `way`, which is along the tool. Cut short on one axis, it would leave the surface,
-// or enter it: it stays then.
+// Do its links allow a voxel to move by `way`, which is tangential? Clamped on one axis, it would leave the
+// tool or enter it; so it stays then.
 bool allowed(LevelStiffness& couplings, const Displacement& state, VoxelId v,
              const glm::dvec3& way) noexcept {
   const glm::dvec3 wanted = state.at(v) + way;
@@ -32,7 +33,7 @@ float size_of(const glm::dvec3& way) {
   return static_cast<float>(std::max({std::fabs(way.x), std::fabs(way.y), std::fabs(way.z)}));
 }
 
-// What pulls a voxel, and the way to its least energy along the tool, in the metric of the springs.
+// Force on a voxel, and its motion to the least energy in the tangent plane, in the metric of the springs.
 struct Slide {
   glm::dvec3 force_N, way_m;
 };

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the tool presses slides along it, without friction, and relaxes as it does.
+// Frictionless sliding of pressed voxels on the tool, as a part of relaxation.
 //
-// Between two looks at its contact the tool is its tangent plane at each pressed voxel: there the voxel stays
-// along the normal, and moves along the plane with all that relaxes, on every level. (Held on all axes, and
-// brought to its place on the tool by itself between cycles, a contact of 32 voxels kept 0.6 of its error in
-// each, however well all else was at rest: that, and not the volume, was what a force took longest for.)
+// During a cycle the tool is its tangent plane at each pressed voxel. The voxel keeps its displacement along
+// the normal and relaxes in the plane, on every level. If it were fixed on all axes, cycles would not reduce
+// the error of the contact itself.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -15,15 +14,15 @@
 
 namespace voxel {
 
-// Of voxels whose role is pressed; `load_N`: what pulls them beside their links.
+// For voxels with the role `pressed`; `load_N` is added to the force of their links.
 
-// What pulls a voxel along the tool's surface (N); nothing where its links keep it from going there.
+// Tangential force on a voxel (N); nullopt if its links do not allow it to move that way.
 [[nodiscard]] std::optional<glm::dvec3> sliding_force(LevelStiffness& couplings, const Displacement& state,
                                                       VoxelId v, const glm::dvec3& load_N) noexcept;
-// Brings it to where its energy is least along the tool. Returns how far it went, on the axis on which it
-// went furthest (m).
+// Moves a voxel to its least energy in the tangent plane. Returns the largest component of the motion (m).
 float slide(LevelStiffness& couplings, Displacement& state, VoxelId v, const glm::dvec3& load_N) noexcept;
-// Takes it along by the part of `way` that is along the tool, or not at all where links do not allow it.
+// Moves a voxel by the tangential part of `way`, or not at all if its links do not allow that. Returns the
+// same.
 float slide_by(LevelStiffness& couplings, Displacement& state, VoxelId v, const glm::dvec3& way) noexcept;
 
 }  // namespace voxel

@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The contact of a soft object within a tick: pressed voxels leave the tool, and cycles round them relax.
+// The contact of a soft object within a tick: pressed voxels leave the tool, and contact cycles relax their
+// neighbourhood. A contact cycle is one multigrid cycle on boxes around the pressed voxels
+// (Relaxation::relax_contact). Its cost is counted work, never measured time. A cycle around a large patch
+// may be split over several ticks.
 #include "voxel/object/soft_object.h"
 
 #include <algorithm>
@@ -15,31 +18,29 @@ namespace voxel {
 
 namespace {
 
-constexpr double kSettled = 2e-3;     // of the spacing: a contact off by less is left to the background
-constexpr double kContraction = 0.5;  // of that, by a cycle round the contact
-// Cycles round the contact a tick: of a ball pressed at 0.2 m/s into 24,000 voxels one leaves 0.7, two 0.24
-// just noticeable differences of the force (60 samples), for 470 and 650 us.
+// Of the spacing: a contact nearer to equilibrium is left to the background.
+constexpr double kSettled = 2e-3;
+// Factor by which a contact cycle reduces that distance.
+constexpr double kContraction = 0.5;
+// Contact cycles a tick, at most.
 constexpr int kMostCycles = 2;
-// … where the first is not a wide one (Relaxation::wide): there the second brought little and took what the
-// tick did not have: a brain that is pressed feels the same within 2 %, and of 6,750 ticks in real time 91
-// missed their deadlines in place of 278. Unless the contact has as many spacings to go still.
+// With a large patch a tick has one cycle, unless the contact is still this many spacings from equilibrium: a
+// second cycle there gains little and costs what the tick does not have.
 constexpr double kJump = 0.1;
-// Where another thread relaxes the object, wide cycles have this much work of a tick (in octets of cells
-// told), some 150 us: what is left of one goes on in the next tick, and what one leaves of a tick begins the
-// next. (Whole, one took up to 450 us of a tick, and so had every other tick only. In parts of narrow ones a
-// cube of 24,000 voxels pressed at 200 mm/s was 2.2 just noticeable differences off in place of 0.6. Forces
-// on the way into organs of an abdomen are 67 mN off, root of the mean square, and 60 with an eighth more.)
+// Counted work (Float8 prolonged) that a tick may spend on split cycles under asynchronous relaxation. The
+// rest of a cycle continues in the next tick; what a cycle leaves of a tick begins the next cycle if it is at
+// least kLeastWork.
 constexpr std::size_t kContactWork = 4400, kLeastWork = 1000;
-// … and with what is added of results.
+// The same, with the rows of results that the tick applies.
 constexpr std::size_t kTickWork = 4900;
-// A whole cycle, in the same thread or beside it in the same cache, leaves nothing of the contact in there,
-// and until that is read again all takes up to twice as long: for so many ticks there is less work. The same
-// where the tool comes upon tissue that was not touched for long.
+// A whole cycle evicts the contact from the caches, and so does a long pause of the tool. Until its memory is
+// read again all takes up to twice as long: for this many ticks there is less work.
 constexpr int kColdTicks = 5;
 constexpr std::size_t kColdWork = 2500;
-constexpr std::size_t kDropsApart =
-    100;                        // rows of coarse cells: more of them are dropped in a tick of its own
-constexpr double kDeep = 0.05;  // of the voxel radius: less is an error of a tick, and is mended
+// Rows of coarse cells: if more are to be dropped, a tick of its own does so.
+constexpr std::size_t kDropsApart = 100;
+constexpr double kDeep = 0.05;  // of the voxel radius: a smaller depth at the start of a tick is the solver's
+                                // error, which is mended
 
 }  // namespace
 
@@ -76,21 +77,20 @@ bool SoftObject::held_still() const noexcept {
   return any_pressed() && relaxation_.wide() && unsettled_m_ < kJump * lattice_->min_spacing_m();
 }
 
-// Is a cycle round the contact due?
+// Should a contact cycle begin, or continue?
 bool SoftObject::cycle_due() const noexcept {
   if (relaxation_.under_way()) return cycles_since_touch_ == 0 && !(rests_ && any_pressed());
   const double to_go = unsettled_m_ / lattice_->min_spacing_m();
-  // A contact that stands still is the background's: it comes to rest with all the object, where a box comes
-  // to rest with its surroundings held.
+  // A contact that is nearly at rest is left to the background, which relaxes the whole object. A contact
+  // cycle holds the surroundings of its box fixed.
   if (to_go < kSettled || cycles_since_touch_ == kMostCycles) return false;
   const bool apart = relaxation_.left_to_another(), in_parts = apart && split_cycle_;
   if (to_go >= kJump && !in_parts && !rests_) return true;
-  // Where another brings the object to rest, one cycle a tick then, but for what a wide one leaves of its
-  // work. (With two narrow ones forces were no nearer to rest, and ticks took up to half as long again. Never
-  // two, with a jump still to go either: tissue beside bone was left 5.8 % of a cell deep in it at 1 m/s.)
+  // Under asynchronous relaxation a second cycle in a tick runs only after a jump, or if a split cycle left
+  // enough work.
   if (cycles_since_touch_ > 0)
     return apart ? in_parts && left_of(kContactWork) >= shared(kLeastWork) : !split_cycle_;
-  // What was let go of has this tick only.
+  // Tissue that was just released has this tick only.
   return !rests_ || !any_pressed();
 }
 
@@ -107,7 +107,7 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
     if (!cycle_due()) break;
     const bool again = ++cycles_since_touch_ > 1;
     if (!relaxation_.under_way()) unsettled_m_ *= kContraction;
-    // They are in the order of their ids, so those of a row follow one another.
+    // Touches are in the order of their ids, so those of one row are adjacent.
     for (std::size_t i = 0; i < touches_.size(); ++i) {
       const RowId row = touches_[i].v / kRow;
       if (i == 0 || touches_[i - 1].v / kRow != row) relaxation_.mark_dirty(row);
@@ -122,18 +122,16 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
       split_cycle_ = true;
       continue;
     }
-    // What the tool just let go of follows it, this once. (Left to the other thread, tissue that a quick tool
-    // was drawn along hung back by a twenty-fifth of a spacing for up to six ticks: of 5,000 strokes 12 lost
-    // contact by it.)
+    // Tissue that the tool just released follows it by one cycle here. The shadow alone would let tissue lag
+    // behind a quick stroke, and the contact would be lost.
     if (pressed_last_.empty()) continue;
     const bool in_parts = relaxation_.left_to_another() && pressed > 0;
     contact_work_ += relaxation_.relax_contact(state_, obstacle_view(), all_held_, pressed_last_, again,
                                                in_parts ? left : Relaxation::kWhole);
     split_cycle_ = relaxation_.wide();
   }
-  // Last, so that what the tool feels is measured with its voxels where they belong; what is pressed first,
-  // because what hangs on it by a tight link counts where that is tight still. (In the order of the list half
-  // of a ring of such voxels was left a micron behind, and the force lost them in one tick out of three.)
+  // Last, so that the reaction is measured with all voxels at their projections. Pressed voxels come first: a
+  // dependent counts only if its link to a pressed voxel is at its limit then.
   for (const bool pressed : {true, false}) {
     for (Touch& t : touches_) {
       if (t.pressed == pressed) relax_touch(tool, t);
@@ -145,12 +143,11 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
   move_followers();
 }
 
-// Pairs go to their places while all else stands, and where chains are tight in both objects that lifts the
-// tool, which comes back in the next tick. (With only results of every fourth tick to follow the pairs, that
-// went on for ever, with no result as well: the proxy went 0.5 mm in and 0.4 mm out in every tick, and the
-// hand felt 1.2 to 1.7 N where 0.92 is right.)
+// The pair solver projects its voxels with all others fixed. If chains are at their limits in both objects,
+// that lifts the tool, which comes back in the next tick. Contact cycles around these voxels end such limit
+// cycles; results of the shadow come too rarely.
 void SoftObject::relax_near_pairs() noexcept {
-  if (touches_.empty()) {  // no touch() was before
+  if (touches_.empty()) {  // touch() was not called
     contact_work_ = 0;
     split_cycle_ = false;
   }
@@ -167,7 +164,7 @@ void SoftObject::relax_near_pairs() noexcept {
 }
 
 void SoftObject::follow(const glm::dvec3& delta) noexcept {
-  if (grid_) return;  // it goes along in the next cycle
+  if (grid_) return;  // patches follow in the next cycle
   sources_.clear();
   moves_.clear();
   for (const Touch& t : touches_) {
@@ -186,7 +183,7 @@ std::size_t SoftObject::give_way(const ToolInBody& tool, std::span<ToolBound> ou
   std::size_t count = 0;
   for (const Touch& t : touches_) {
     if (count == out.size()) break;
-    if (on_grid_ && !t.pressed) continue;  // all that are in the tool are
+    if (on_grid_ && !t.pressed) continue;  // all voxels that remain in the tool are pressed
     const glm::dvec3 p = position(t);
     if (clear_of(tool, p)) continue;
     const Gap g = gap(tool, p);
@@ -207,7 +204,7 @@ std::size_t SoftObject::give_way(const ToolInBody& tool, std::span<ToolBound> ou
 
 void SoftObject::note_depths(const ToolInBody& tool) noexcept {
   const bool flat = tool.shape == ToolInBody::Shape::punch;
-  if (on_grid_ && !flat) return;  // as each cycle ends nothing is in it that could be elsewhere
+  if (on_grid_ && !flat) return;  // after each cycle no voxel is in the tool that could leave it
   for (Touch& t : touches_) {
     const glm::dvec3 from = position(t) - tool.centre;
     const double along = glm::dot(from, tool.axis), distance = glm::length(from);
@@ -252,9 +249,8 @@ bool SoftObject::prepare_exchange() noexcept {
   return true;
 }
 
-// What pressed voxels would do now they do not: they follow the tool, and once between two results they look
-// for their places. (Sliding while their neighbours were on their way elsewhere, ever so little more each
-// time, they never came to rest.)
+// The motion that pressed voxels would still make is frozen, too: until the next submission they only follow
+// the tool. If they slid while their neighbours move elsewhere, they would drift and never come to rest.
 void SoftObject::assign_residual() noexcept {
   relaxation_.assign_residual(state_, obstacle_view());
   cold_ticks_ = kColdTicks;

@@ -8,12 +8,12 @@
 namespace voxel {
 namespace {
 
-constexpr double kHeld = 1.0 / 3.0;  // of force times depth: what a contact holds at least
-constexpr double kLetGo = 0.97;      // of that: with less given, less is felt
-constexpr double kLeast = 0.8;       // share: what is counted wrongly is no worse than that
-constexpr double kStands = 1e-5;     // of what is held: with less work in a tick, the tool stands …
-constexpr double kComesBack = 0.02;  // … and so much of what is missing comes back
-constexpr double kRegained = 0.1;    // of that: so much work brings back a share that was taken away
+constexpr double kHeld = 1.0 / 3.0;  // of force times depth: least energy that a contact stores
+constexpr double kLetGo = 0.97;      // of that: with less energy given, the force is scaled down
+constexpr double kLeast = 0.8;       // lower bound of the share, because work may be counted wrongly
+constexpr double kStands = 1e-5;     // of the stored energy: with less work in a tick the tool rests …
+constexpr double kComesBack = 0.02;  // … and this part of the missing share returns
+constexpr double kRegained = 0.1;    // of the stored energy: work that restores half of the missing share
 
 }  // namespace
 

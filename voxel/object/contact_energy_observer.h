@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a contact has been given, and so may give back: the passivity observer of Hannaford & Ryu (IEEE Trans.
-// Robotics & Automation 18, 2002) for tissue whose force is not the slope of an energy to the last per cent.
+// How much energy a contact was given, and so may give back: the passivity observer of Hannaford & Ryu (IEEE
+// Trans. Robotics & Automation 18, 2002), for tissue whose force is only approximately the gradient of an
+// energy.
 //
-// Where forces are found level by level a path aside costs no force though the tissue is 1 % stiffer there,
-// and a tool that comes in at one place and leaves by another would be given that for nothing. What a contact
-// is known to hold is at least a third of its force times its depth (a cone within chain limits, E ~ depth³;
-// half of it where nothing is at its limit). When what it was given falls below that, its force on the way
-// out is a share of what it would be, four fifths at least, and that is not felt as a step: what is gained
-// over the last half of the way out is at most what a hundredth of the whole was. Where force is found late,
-// in tissue that is stiffer than the tool's coupling, work is counted wrongly; so the share is bounded below,
-// and comes back while the tool stands. (Bounded by nothing, such tissue was not felt at all.)
+// On nested patches a path sideways may cost no force although the tissue is 1 % stiffer there. A tool that
+// enters at one place and leaves at another would gain that energy.
+//
+// A contact stores at least a third of force times depth (a cone within chain limits, E ~ depth³; half of it
+// without active limits). If it was given less, the force on the way out is scaled by `share`, 0.8 at least.
+// The lower bound is needed because work is counted wrongly where tissue is stiffer than the tool's coupling.
+// The share changes gradually, and returns to 1 while the tool rests.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -18,12 +18,12 @@ namespace voxel {
 
 class ContactEnergy {
  public:
-  // A contact begins: what it holds then was given.
+  // A contact begins: the energy that it stores in the first account() counts as given.
   void begin() noexcept { *this = {}; }
-  // Once a tick: the tool went by `way_m` and the tissue's force on it, were nothing taken away, is now
-  // force_N, `depth_m` deep.
+  // Once a tick: the tool moved by `way_m`; force_N is the tissue's force on it before scaling, at depth
+  // `depth_m`.
   void account(const glm::dvec3& way_m, const glm::dvec3& force_N, double depth_m) noexcept;
-  // Of the force, 0.8 to 1.
+  // Factor for the force, 0.8 to 1.
   [[nodiscard]] double share() const { return share_; }
 
  private:

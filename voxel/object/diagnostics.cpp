@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What tests, references and reports ask of a soft object; nothing of it is for the tick.
+// Energy, anchor force, settling and memory of a soft object. For tests, references and reports, not for the
+// tick.
 #include <algorithm>
 #include <bit>
 #include <glm/geometric.hpp>
 
 #include "voxel/composite/grid.h"
+#include "voxel/lattice/near_limit.h"
 #include "voxel/lattice/plasticity.h"
 #include "voxel/lattice/voxel_links.h"
-#include "voxel/lattice/near_limit.h"
 #include "voxel/object/soft_object.h"
 
 namespace voxel {

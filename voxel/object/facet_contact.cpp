@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Search for facets, and the steps of the pair solver.
 #include "voxel/object/facet_contact.h"
 
 #include <algorithm>
@@ -10,24 +11,25 @@
 namespace voxel {
 namespace {
 
-constexpr double kLeastSide = 0.1;  // surfaces that look the same way say nothing of who is where
-constexpr double kLeastAlong =
-    0.3;  // of a facet's normal along the axis: a steeper one is pressed as a level one
-// Of the touching distance: a voxel further beside the last facet of a surface than this is past its edge.
+// Length of the difference of both outward normals: less means that the surfaces face the same way.
+constexpr double kLeastSide = 0.1;
+// Of a facet's normal along the axis: a steeper facet is pressed as a level one.
+constexpr double kLeastAlong = 0.3;
+// Of the touching distance: further beside the last facet a voxel is past the edge of the surface.
 constexpr double kBeside = 0.75;
-constexpr double kPushed = 1e-6;  // of it: roundings
-constexpr double kParted = 0.01;  // of it: less overlap is left to the next tick
-// Of it: where a surface rises less towards a voxel, on a facet's middle, it is no hollow. How far beside a
-// facet (barycentric) one may be that still lies on it.
+constexpr double kPushed = 1e-6;  // of the touching distance: rounding
+constexpr double kParted = 0.01;  // of the touching distance: less overlap is left to the next tick
+// kHollow, of the touching distance: a surface that rises less towards a voxel over the middle of a facet is
+// no hollow. kFarBeside, barycentric: how far beside a facet a voxel may still touch it.
 constexpr double kHollow = 0.005, kFarBeside = 0.5;
-constexpr double kTurns = 0.01;    // of what is left, whenever a pair is looked at: its way across a facet
-constexpr int kSteps = 4;          // over the surface, in search of the facet
-constexpr double kInside = -1e-9;  // barycentric
+constexpr double kTurns = 0.01;    // share by which the force direction turns to the facet's normal each time
+constexpr int kSteps = 4;          // steps over the surface in search of the facet
+constexpr double kInside = -1e-9;  // barycentric; less is outside
 constexpr VoxelId kNone = std::numeric_limits<VoxelId>::max();
 
 struct End {
-  glm::dvec3 u;           // displacement to where links, what hangs on it and the other pairs would have it
-  glm::dvec3 compliance;  // per body axis (m/N); 0 where it is anchored
+  glm::dvec3 u;           // displacement that links, dependents and the other pairs want
+  glm::dvec3 compliance;  // per body axis (m/N); 0 at an anchor
 };
 
 glm::dvec3 to_scene(const PosedObject& o, const glm::dvec3& in_body) noexcept {
@@ -40,7 +42,7 @@ glm::dvec3 place_of(const PosedObject& o, VoxelId v) noexcept {
   return to_scene(o, o.object.position(v));
 }
 
-// Per body axis (m/N), of a voxel and what hangs on it; 0 where it is anchored.
+// Compliance per body axis (m/N) of a voxel with its dependents; 0 at an anchor.
 glm::dvec3 with_hanging(const glm::dvec3& own, const HeldLoad& hanging) noexcept {
   glm::dvec3 w = own;
   for (int axis = 0; axis < 3; ++axis) {
@@ -66,12 +68,12 @@ End end_of(const PosedObject& o, VoxelId v, std::uint32_t number) noexcept {
   return {u + w * o.object.pair_load(number), w};
 }
 
-// How far a force of 1 N times a way (body frame) takes a voxel along that way (m/N).
+// Motion along `way` per unit of force along it (body frame, m/N).
 double yielding(const glm::dvec3& compliance, const glm::dvec3& way) noexcept {
   return glm::dot(way, compliance * way);
 }
 
-// A surface seen along one axis of its lattice: a height over the two others.
+// A surface as a height over two axes of its lattice, along the third.
 struct Surface {
   const SoftObject& object;
   int axis;
@@ -87,7 +89,7 @@ struct Surface {
   [[nodiscard]] bool is_top(VoxelId v) const {
     return object.lattice().filled(v) && !object.lattice().filled(outer(v));
   }
-  // The next one on the surface, a step of the lattice higher or lower at most.
+  // The neighbour on the surface, at most one step of the lattice higher or lower; kNone if there is none.
   [[nodiscard]] VoxelId beside(VoxelId v, int n, bool up) const {
     if (v == kNone) return kNone;
     const VoxelId level = up ? object.lattice().up(v, across(n)) : object.lattice().down(v, across(n));
@@ -103,7 +105,7 @@ double cross(const glm::dvec2& a, const glm::dvec2& b) noexcept {
   return a.x * b.y - a.y * b.x;
 }
 
-// Of a point in a flat triangle; false where it is outside, or the triangle is none.
+// Barycentric coordinates of p in a triangle; false if p is outside, or the triangle is degenerate.
 bool shares(const std::array<glm::dvec2, 3>& at, const glm::dvec2& p, std::array<double, 3>& out) noexcept {
   const double area = cross(at[1] - at[0], at[2] - at[0]);
   if (area == 0.0) return false;
@@ -119,12 +121,12 @@ void set_facet(const SoftObject& object, const std::array<VoxelId, 3>& facet, Pr
   for (std::size_t i = 0; i < 3; ++i) pair.number[i] = object.surface_number(facet[i]);
 }
 
-// Of the facets round a surface voxel, split along the diagonal from the lower to the upper corner, that
-// under p.
+// Finds the facet under p among those around a surface voxel. Squares are split along the diagonal from the
+// lower to the upper corner.
 bool facet_round(const Surface& surface, VoxelId v, const glm::dvec3& p, PressedPair& pair) noexcept {
   const glm::dvec2 flat = surface.flat(p), from = flat - surface.flat(surface.object.position(v));
   for (int n = 0; n < 4; ++n) {
-    // The most likely first.
+    // the most likely first
     const bool up0 = (from.x >= 0.0) != ((n & 1) != 0), up1 = (from.y >= 0.0) != ((n & 2) != 0);
     VoxelId corner = v;
     if (!up0) corner = surface.beside(corner, 0, false);
@@ -145,7 +147,7 @@ bool facet_round(const Surface& surface, VoxelId v, const glm::dvec3& p, Pressed
   return false;
 }
 
-// The component along the axis of a triangle's unit normal, and that normal over it.
+// Returns the component along the axis of a triangle's unit normal; `out` is the normal divided by it.
 double normal_of(const std::array<glm::dvec3, 3>& at, int axis, bool inwards_up, glm::dvec3& out) noexcept {
   const glm::dvec3 n = glm::cross(at[1] - at[0], at[2] - at[0]);
   const double length = glm::length(n), along = length > 0.0 ? std::fabs(n[axis]) / length : 0.0;
@@ -161,7 +163,7 @@ glm::dvec3 middle(const PosedObject& b, const PressedPair& pair) noexcept {
   return sum;
 }
 
-// What overlap_of() goes by.
+// Sets what overlap_of() reads.
 void set_across(const PosedObject& a, const PosedObject& b, PressedPair& pair,
                 const glm::dvec3& across) noexcept {
   pair.across = across;
@@ -216,8 +218,7 @@ void add_loads(const PosedObject& a, const PosedObject& b, const PressedPair& pa
   });
 }
 
-// What the chain of one object did not let it give way by, the other gives way by, and presses that much
-// harder.
+// If the chain of one object left overlap, the other object yields by it and presses that much harder.
 void push_the_rest(const PosedObject& a, const PosedObject& b, PressedPair& pair, const End& first,
                    const std::array<End, 3>& corners, double yielding_a, double yielding_b) noexcept {
   const double least = kPushed * pair.reach_m;
@@ -242,7 +243,7 @@ bool is_facet(const PressedPair& pair) noexcept {
   return pair.over && pair.facet[0] != pair.facet[1];
 }
 
-// Of its facet where the voxel is now; false where that is over none, or another.
+// Barycentric coordinates of the voxel in its facet; false if it is over no facet, or over another one.
 bool shares_of(const PosedObject& a, const PosedObject& b, const PressedPair& pair,
                std::array<double, 3>& out) noexcept {
   if (!is_facet(pair)) return false;
@@ -252,18 +253,17 @@ bool shares_of(const PosedObject& a, const PosedObject& b, const PressedPair& pa
   return shares(at, surface.flat(to_body(b, place_of(a, pair.a))), out);
 }
 
-// Bricks that a facet's slope presses sideways give way up and down as well, and so tilt it the other way:
-// where links are at their limits in both objects four voxels handed half of their force to and fro in turns,
-// and what presses followed from tick to tick. So there it turns with the facet slowly. At rest it is the
-// same, and how far the two are apart, along the axis, does not depend on it. (Links alone give way along
-// their axes only, and came to rest before.)
+// With bricks a facet that is pushed sideways also moves up and down, and tilts the other way. If links are
+// at their limits in both objects, the force would flip between voxels in each tick. So the force direction
+// follows the facet's normal slowly. At rest it is the same, and the gap along the axis does not depend on
+// it. Links alone couple no axes and need no such damping.
 glm::dvec3 turned(const PosedObject& a, const PosedObject& b, const PressedPair& pair,
                   const glm::dvec3& across) noexcept {
   if (!a.object.lattice().has_bricks() && !b.object.lattice().has_bricks()) return across;
   return glm::dot(pair.across, across) > 0.0 ? glm::mix(pair.across, across, kTurns) : across;
 }
 
-// What follows from its facet and its shares of it, as both objects are now.
+// Sets what follows from the facet and the shares, in the current state.
 void lie_on_facet(const PosedObject& a, const PosedObject& b, PressedPair& pair) noexcept {
   std::array<glm::dvec3, 3> at, rest;
   for (std::size_t i = 0; i < 3; ++i) {
@@ -271,7 +271,7 @@ void lie_on_facet(const PosedObject& a, const PosedObject& b, PressedPair& pair)
     rest[i] = b.object.lattice().rest(pair.facet[i]);
     pair.share[i] = std::clamp(pair.share[i], 0.0, 1.0);
   }
-  // Along the axis two oblique surfaces that touch are further apart than across themselves.
+  // Two oblique surfaces in contact are further apart along the axis than along their normal.
   const double apart = a.object.voxel_radius() + b.object.voxel_radius();
   glm::dvec3 at_rest, across(0.0);
   pair.reach_m = apart / std::max(normal_of(rest, pair.axis, !pair.upwards, at_rest), kLeastAlong);
@@ -410,7 +410,7 @@ double relax_pair(const PosedObject& a, const PosedObject& b, PressedPair& pair)
   }
   a.object.move(pair.a, first.u);
   for_corners(pair, [&](VoxelId v, double, std::size_t i) { b.object.move(v, corners[i].u); });
-  // Also where links at their limits keep them from getting where they would not overlap.
+  // also if links at their limits keep the voxels from separating
   if (pair.over) push_the_rest(a, b, pair, first, corners, of_first, of_facet);
   return gap_of_pair(a, b, pair);
 }
@@ -424,8 +424,8 @@ bool part_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pa
   const double first = who == GiveWay::second ? 0.0 : of_first;
   const double second = who == GiveWay::first ? 0.0 : of_facet;
   if (!(first + second > 0.0)) return true;
-  // Along the axis, so that the voxel stays over the facet. (Across the facet, as forces go, it had slid to
-  // the next one when all was done, and was half a spacing deep in that.)
+  // Along the axis, so that the voxel stays over the facet. Along the normal it would end up over the next
+  // facet, and inside of it.
   glm::dvec3 along(0.0);
   along[pair.axis] = pair.upwards ? -overlap : overlap;
   const glm::dvec3 in_scene = b.pose.rotation * along;

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Two soft objects that press on one another: surface voxels of the first, each on a facet of the second, a
-// triangle between three voxels of its surface.
+// Contact of two soft objects: surface voxels of the first, each on a facet of the second. A facet is a
+// triangle between three voxels of a surface.
 //
-// (Voxel against voxel, from centre to centre, was rejected: two surfaces of balls slide off one another into
-// the gaps between them, and through, however slowly they are pressed: 5.5 mm of 2 mm balls. Across the
-// surfaces, but still voxel on voxel, they met too late wherever the surface was not level: 0.4 of a
-// spacing.)
+// Contact between voxels of both surfaces fails: balls slide off one another into the gaps between them, and
+// surfaces that are not level meet too late.
 #pragma once
 
 #include <array>
@@ -16,7 +14,7 @@
 
 namespace voxel {
 
-// Where an object's volume frame lies: point_in_scene = origin + rotation · point_in_body.
+// Pose of an object's volume frame: point_in_scene = origin + rotation · point_in_body.
 struct BodyPose {
   glm::dvec3 origin{0.0};
   glm::dquat rotation{1.0, 0.0, 0.0, 0.0};
@@ -27,72 +25,70 @@ struct PosedObject {
   const BodyPose& pose;
 };
 
-// A voxel of the first object and the facet of the second that it is over. The voxel stays as far from the
-// facet, along an axis of the second's lattice, as two voxels that touch are apart.
+// A voxel of the first object and the facet of the second that it is over. In contact the voxel is as far
+// from the facet, along an axis of the second's lattice, as two touching voxels are apart.
 struct PressedPair {
-  VoxelId a = 0, b = 0;     // the voxel, and that of the other's surface which it is nearest to
-  glm::dvec3 force_N{0.0};  // on the facet, equal and opposite to that on the voxel (scene frame)
-  glm::dvec3 side{0.0};     // where the second belongs, seen from the first (scene frame, unit); 0: nowhere
-  int axis = 0;             // of the second's lattice, along which the two are apart
-  bool upwards = false;     // the surface of the second looks up that axis
-  bool over = false;        // there is a facet under the voxel, or an edge close by
-  std::array<VoxelId, 3> facet{};  // its corners, …
-  std::array<double, 3> share{};   // … and how much of the force each takes: barycentric
-  glm::dvec3 across{0.0};          // gradient of the distance when the facet moves (scene frame)
-  double reach_m = 0.0;            // that distance in contact
-  // Of these, until the facet is looked for again: the gradient in the bodies' frames, how deep the surfaces
-  // would overlap with both objects at rest, and surface numbers of the voxel and the corners.
+  VoxelId a = 0, b = 0;     // the voxel, and the voxel of the other surface that is nearest to it
+  glm::dvec3 force_N{0.0};  // on the facet; the voxel has the opposite (scene frame)
+  glm::dvec3 side{
+      0.0};      // direction from the first object to the second (scene frame, unit); 0: unknown, no contact
+  int axis = 0;  // of the second's lattice, along which distance is measured
+  bool upwards = false;            // the second's outside is up that axis
+  bool over = false;               // a facet, or an edge nearby, is under the voxel
+  std::array<VoxelId, 3> facet{};  // its corners …
+  std::array<double, 3> share{};   // … and their barycentric coordinates: their shares of the force
+  glm::dvec3 across{0.0};  // gradient of the overlap by the voxel's position, and of the distance by the
+                           // facet's (scene frame)
+  double reach_m = 0.0;    // distance of voxel and facet in contact
+  // Derived from these until the facet is found anew: the gradient in both body frames, the overlap of the
+  // surfaces at rest, and the surface numbers of voxel and corners.
   glm::dvec3 across_a{0.0}, across_b{0.0};
   double at_rest_m = 0.0;
   std::uint32_t number_a = 0;
   std::array<std::uint32_t, 3> number{};
 };
 
-// A voxel of the first and one of the second's surface that lies where it may press. `side` is 0 where the
-// two surfaces look the same way and say nothing of who is where.
+// A pair of a voxel of the first surface and one of the second that may touch. `side` is 0 if the two
+// surfaces face the same way, so that the order of the objects is unknown.
 [[nodiscard]] PressedPair pair_of(const PosedObject& a, VoxelId in_a, const PosedObject& b,
                                   VoxelId in_b) noexcept;
 
-// Finds the facet under the voxel as both are now, from `b` on. Before a round of relax_pair().
+// Finds the facet under the voxel in the current state, starting at `b`. Call before a round of relax_pair().
 void find_facet(const PosedObject& a, const PosedObject& b, PressedPair& pair) noexcept;
 
-// Has the voxel gone over the edge of the facet?
+// Is the voxel no longer over its facet?
 [[nodiscard]] bool left_facet(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept;
 
-// Where the surface is a hollow a voxel lies on several facets at a time, each of which it presses: a pair
-// for each, all of the same voxel. Does it lie on that one, which it was on before, beside the one that it is
-// over now? Finds its share of it, as both objects are now. (On the one that it was over alone, it was pushed
-// down the slope of that, over the edge, and deep into the next, which pushed it back in the next tick: with
-// it went the tool, up to 0.15 mm up and down a tick, and felt a third too much.)
+// In a hollow a voxel may touch several facets at a time; each has a pair, all with the same voxel. Does it
+// touch `beside`, a facet that it was over before, besides the one of `pair`? Sets the shares of `beside` in
+// the current state. With one facet only, voxel and tool would be pushed from facet to facet in turns.
 [[nodiscard]] bool lies_beside(const PosedObject& a, const PosedObject& b, const PressedPair& pair,
                                PressedPair& beside) noexcept;
 
-// The distance between the two surfaces (m; 0 in contact, negative where they overlap); infinite where the
-// voxel is over no facet.
+// Gap of the two surfaces (m; negative: overlap); infinite if the voxel is over no facet.
 [[nodiscard]] double gap_of_pair(const PosedObject& a, const PosedObject& b,
                                  const PressedPair& pair) noexcept;
 
-// Its voxels are the pair's from now on, and no longer.
+// Claims the pair's voxels for the pair solver, and releases them.
 void hold_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept;
 void release_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept;
 
-// What a pair presses its voxels with, added to what their objects know of. Before a round of relax_pair():
-// clear_pair_load() on all pairs, then this once a pair; so roundings of what is added and taken away do not
-// add up.
+// Load of a pair on its voxels, as their objects know it. Before a round of relax_pair(): clear_pair_load()
+// on all pairs, then load_pair() once a pair, so that rounding errors do not accumulate.
 void clear_pair_load(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept;
 void load_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept;
 
-// One step of block Gauss-Seidel on a pair: its voxels go to the joint minimum of their link energies, under
-// the loads of the other pairs they are in, subject to not overlapping. Overlap is shared in inverse
-// proportion to stiffness, and at rest the two press with equal and opposite force, also where several pairs
-// share a voxel. Voxels that passed one another press as if they had not. Returns gap_of_pair() afterwards:
-// the chains of both may leave them too little room.
+// One step of block Gauss-Seidel on a pair: its voxels move to the joint minimum of their link energies under
+// the loads of their other pairs, without overlap. Overlap is shared in proportion to compliance. At
+// equilibrium both objects press with equal and opposite force, also if several pairs share a voxel. Voxels
+// that have passed one another press as if they had not. Returns gap_of_pair() afterwards: chains may leave
+// too little room.
 double relax_pair(const PosedObject& a, const PosedObject& b, PressedPair& pair) noexcept;
 
-// Whose voxels give way to an overlap.
+// Which voxels move apart.
 enum class GiveWay : std::uint8_t { both, first, second };
-// What overlap is left the chains follow: SoftObject::drag(), and settle_dragged() once all pairs were looked
-// at. True when there was any.
+// Removes remaining overlap by drag(); call settle_dragged() after all pairs, so that the chains follow. True
+// if there was any.
 bool part_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pair, GiveWay who) noexcept;
 
 }  // namespace voxel

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What hangs on one another by links at their limits: what comes along with pressed voxels, what is felt
-// through them, and what holds them.
+// Loads that pass through links at their limits: dependents of pressed voxels follow them, are felt through
+// them, and hold them.
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -14,16 +14,16 @@
 namespace voxel {
 namespace {
 
-constexpr std::size_t kMaxLimitLoads = 500;  // voxels that are searched for one that holds another
+// Voxels that is_immovable() searches.
+constexpr std::size_t kMaxLimitLoads = 500;
 
-// voxels looked at for what holds one of them
-constexpr std::size_t kMostHanging = 3000;  // voxels that hang on those that something else presses
-// As kAtLimit, where a body or another soft object presses. At rest what does not hang on what they press is
-// balanced, and adds nothing; what does is left behind a little whenever these, or the tool, withdraw. (By
-// kAtLimit a tool lost a tenth of what another object pressed it with through the chain, in one tick or the
-// other, and did not come to rest.)
+// Dependents of voxels that obstacles or pairs press.
+constexpr std::size_t kMostHanging = 3000;
+// As kAtLimit, at voxels that a body or another soft object presses. Dependents lag a little whenever these
+// voxels or the tool withdraw, and would be lost for a tick. At rest a voxel that is no dependent is balanced
+// and adds nothing.
 constexpr float kAtLimitBesideOthers = 0.02F;
-// u(w) − u(v) of neighbours along d, and what their link lets it be, whichever way the link points.
+// u(w) − u(v) of neighbours along d, and its limits, whichever way the link points.
 struct LinkState {
   float difference, low, high;
 };
@@ -32,7 +32,7 @@ LinkState link_state(const Lattice& lattice, const LazyArray<float>& u, VoxelId 
   const auto b = lattice.bounds(up ? v : w, d, axis);
   return {u[w] - u[v], up ? b[0] : -b[1], up ? b[1] : -b[0]};
 }
-// `visit(w, d, up)` for the neighbours of v.
+// `visit(w, d, up)` for the neighbours w of v.
 template <class Visit>
 void for_neighbours(const Lattice& lattice, VoxelId v, const Visit& visit) {
   for (int d = 0; d < 3; ++d) {
@@ -42,9 +42,9 @@ void for_neighbours(const Lattice& lattice, VoxelId v, const Visit& visit) {
     }
   }
 }
-// `visit(w, pushed_up, pushed_down)` for those whose link to v is at a limit along `axis`: at that below
-// which w cannot go, which pushes it up, at the one above, or at both. Where known(w), nothing is looked at:
-// of tissue that is tight all through, that is five neighbours of six.
+// `visit(w, pushed_up, pushed_down)` for each neighbour w whose link to v is at a limit on `axis`: at the
+// lower limit, which pushes w up, at the upper one, which pushes w down, or at both. Neighbours with known(w)
+// are skipped; in tissue that is at its limits throughout these are five of six.
 template <class Known, class Visit>
 void for_tight_neighbours(const Lattice& lattice, const LazyArray<float>& u, VoxelId v, int axis,
                           const Known& known, const Visit& visit, float share = kAtLimit) {
@@ -66,8 +66,9 @@ bool any_may_be_tight(const Lattice& lattice, const Displacement& state, std::sp
   }
   return false;
 }
-// Each of `hanging` from `first` on hands its load to what it hangs on, `carries(i, load)` where that is one
-// of those before; `drops(i)` where its link does not press that way.
+// Adds up loads from the last of `hanging` to number `first`. Each adds its load to its source: carries(i,
+// load) if the source is among the first `first`. drops(i) if the link cannot carry the load in that
+// direction.
 template <class Hanging, class Drops, class Carries>
 void add_from_far_end(Hanging& hanging, std::size_t first, const Drops& drops, const Carries& carries) {
   for (std::size_t i = hanging.size(); i-- > first;) {
@@ -84,9 +85,8 @@ void add_from_far_end(Hanging& hanging, std::size_t first, const Drops& drops, c
 
 }  // namespace
 
-// What hangs on pressed voxels by tight links comes along when they withdraw: it is felt only where it is
-// tight, and the background may need many ticks to get to it. (Left to that, the force lost a sixth of itself
-// whenever the proxy was pushed back by a tenth of a micron, and a held tool never came to rest.)
+// Dependents follow pressed voxels that withdraw. They are felt only while their links are at a limit, and
+// the background may need many ticks to reach them.
 void SoftObject::move_followers() noexcept {
   roots_.clear();
   for (const Touch& t : touches_) {
@@ -95,7 +95,7 @@ void SoftObject::move_followers() noexcept {
   if (!roots_.empty()) limit_followers_.draw(relaxation_, state_, roots_, static_cast<float>(kDirtyMotion));
 }
 
-// Force of its links on a voxel, and of other soft objects (N).
+// Force of its links and of other soft objects on a voxel (N).
 glm::dvec3 SoftObject::load_on(VoxelId v) noexcept {
   const glm::dvec3 links = link_force(relaxation_.couplings(), state_, v);
   if (state_.role[v] != Displacement::held) return links;
@@ -114,8 +114,8 @@ void SoftObject::carry(VoxelId v, std::uint32_t touch) noexcept {
   carried_.push_back({v, touch});
 }
 
-// What hangs on a pressed voxel by a tight link and pulls it back is felt through it: the multiplier of the
-// chain's limit. Without it the force would saturate as soon as the chain is tight.
+// A dependent that pulls a pressed voxel back is felt through it: its load is the multiplier of the chain's
+// limit. Without it the force would saturate as soon as the chain is at its limits.
 glm::dvec3 SoftObject::gather_load(glm::dmat3& stiffness) noexcept {
   glm::dvec3 force(0.0);
   carried_.clear();
@@ -127,7 +127,7 @@ glm::dvec3 SoftObject::gather_load(glm::dmat3& stiffness) noexcept {
   }
   for (int axis = 0; axis < 3; ++axis) {
     limit_reactions_.gather(relaxation_.couplings(), state_, roots_, axis);
-    // What hangs on them goes along with the mean of those that something may hang on.
+    // Dependents move along with the mean motion of the pressed voxels that have any.
     glm::dvec3 way(0.0);
     int tight = 0;
     for (const Carried& c : carried_) {
@@ -147,12 +147,12 @@ glm::dvec3 SoftObject::gather_load(glm::dmat3& stiffness) noexcept {
   return force;
 }
 
-// Of the links of pressed voxels, what hangs on which goes along by `way` a unit of the tool's motion.
+// Stiffness of the links of pressed voxels; their dependents move by `way` per unit of the tool's motion.
 void SoftObject::add_stiffness_of_touches(int axis, const glm::dvec3& way, glm::dmat3& stiffness) noexcept {
   for (const Carried& c : carried_) {
     const glm::dvec3 q = touches_[c.touch].normal[axis] * touches_[c.touch].normal;
     const VoxelSprings springs = relaxation_.couplings().springs_of(c.v);
-    double to_others = 0.0;  // which do not come along
+    double to_others = 0.0;  // voxels that do not move along
     for (int d = 0; d < 3; ++d) {
       for (const bool up : {false, true}) {
         const Spring& spring = (up ? springs.up : springs.down)[static_cast<std::size_t>(d)];
@@ -162,7 +162,7 @@ void SoftObject::add_stiffness_of_touches(int axis, const glm::dvec3& way, glm::
         if (carried_mark_[w] != 0) {
           const Touch& beside = touches_[carried_index_[w]];
           const glm::dvec3 r = q - beside.normal[axis] * beside.normal;
-          stiffness += 0.5 * stiff * glm::outerProduct(r, r);  // met from both its ends
+          stiffness += 0.5 * stiff * glm::outerProduct(r, r);  // visited from both its ends
         } else if (limit_reactions_.carried(w)) {
           stiffness += stiff * glm::outerProduct(q - way, q - way);
         } else {
@@ -174,10 +174,9 @@ void SoftObject::add_stiffness_of_touches(int axis, const glm::dvec3& way, glm::
   }
 }
 
-// The same where other soft objects press on this one. What these press with comes in at the far end of the
-// chain and goes through voxels that by themselves pull the other way: so all that is tied together is
-// walked, and then added up from the far end. (Stopping at the first that pulls the other way lost 0.24 N
-// of 1.26.)
+// As gather_load(), for an object that other soft objects press. Their loads enter at the far end of the
+// chain and pass through voxels whose own links pull the other way. So all dependents are searched first, and
+// loads are added up from the far end.
 void SoftObject::gather_load_with_pairs(int axis) noexcept {
   carried_.clear();
   const auto& u = state_.u[static_cast<std::size_t>(axis)];
@@ -206,7 +205,7 @@ void SoftObject::gather_load_with_pairs(int axis) noexcept {
       [&](std::size_t i, double load) { touches_[carried_[i].touch].load[axis] += load; });
 }
 
-// As gather_load_with_pairs(), for voxels that a body presses.
+// As gather_load_with_pairs(), for voxels that a rigid surface or a pair presses.
 void SoftObject::add_hanging(int axis, std::span<const VoxelId> pressed, std::span<HeldLoad> loads) noexcept {
   const auto& u = state_.u[static_cast<std::size_t>(axis)];
   for (std::size_t i = 0; i < pressed.size(); ++i) {
@@ -234,7 +233,7 @@ void SoftObject::add_hanging(int axis, std::span<const VoxelId> pressed, std::sp
       [&](std::size_t i, double load) { loads[carried_[i].touch].force_N[axis] += load; });
 }
 
-// Of what moves along with each of the voxels that carry, while all else stands still.
+// Adds the stiffness of each source with its dependents, all other voxels fixed.
 void SoftObject::add_stiffness(int axis, std::span<HeldLoad> loads) noexcept {
   for (const Carried& c : carried_) {
     if (carried_mark_[c.v] == 0) continue;
@@ -267,7 +266,7 @@ void SoftObject::load_held(std::span<const VoxelId> held, std::size_t pressed,
   }
   const bool tight = std::any_of(loads.begin(), loads.begin() + static_cast<std::ptrdiff_t>(pressed),
                                  [](const HeldLoad& l) { return l.tight; });
-  // Asleep it presses as it did, or what rests on it would be roused.
+  // An object that sleeps keeps its multipliers: others would wake what rests on it.
   const bool balanced =
       asleep() ? tight && relaxation_.limited().found()
                : relaxation_.relax_limited(state_, obstacle_view(), held.first(tight ? pressed : 0));
@@ -325,9 +324,9 @@ void SoftObject::find_hanging_on_pairs() noexcept {
     forget_hanging_on_pairs();
 }
 
-// What pulls one of them against a link at its limit is carried by that at its other end, where pairs press
-// that one harder: beside where they press most they often press less than links pull. (Left to each by
-// itself, pairs pressed with 0.65 N what the anchors under them carried 0.82 N of.)
+// If a link at its limit carries a source's load, the multiplier is assigned to the voxel at its other end,
+// provided that pairs press that voxel harder. Beside the hardest contact pairs often press less than links
+// pull, and these loads would be lost.
 void SoftObject::hand_on(int axis) noexcept {
   const auto& u = state_.u[static_cast<std::size_t>(axis)];
   for (std::size_t i = pair_roots_.size(); i-- > 1;) {
@@ -350,17 +349,16 @@ void SoftObject::hand_on(int axis) noexcept {
   }
 }
 
-// A mark for each voxel, taken back, and not the number of the gathering that it was carried in: such a
-// number comes round (after four days of contact, in 32 bits), and then every voxel ever carried would count
-// as carried now.
+// Marks are reset, not numbered by gathering: a 32-bit number would wrap after four days of contact, and
+// every voxel ever gathered would count as gathered then.
 void SoftObject::let_go_of_carried() noexcept {
   for (const Carried& c : carried_) carried_mark_[c.v] = 0;
   carried_.clear();
 }
 
 void SoftObject::add_stiffness(int axis, glm::dmat3& stiffness) noexcept {
-  // A carried voxel moves by q = n_a·n per unit of tool motion, n its touch's normal; what a link stores then
-  // is ½ k (q_v·δ − q_w·δ)².
+  // A gathered voxel moves by q = n_a·n per unit of tool motion, n the normal of its touch. A link then
+  // stores ½ k (q_v·δ − q_w·δ)².
   const auto along = [&](VoxelId v) {
     if (carried_mark_[v] == 0) return glm::dvec3(0.0);
     const glm::dvec3& n = touches_[carried_index_[v]].normal;
@@ -369,7 +367,7 @@ void SoftObject::add_stiffness(int axis, glm::dmat3& stiffness) noexcept {
   for (const Carried& c : carried_) {
     if (carried_mark_[c.v] == 0) continue;
     const glm::dvec3 q = along(c.v);
-    // Most hang on the same as all beside them, and no link of theirs is stretched.
+    // Most voxels depend on the same touch as all their neighbours, and none of their links is stretched.
     unsigned stretched = 0;
     for (int n = 0; n < 6; ++n) {
       const VoxelId w = n % 2 != 0 ? lattice_->up(c.v, n / 2) : lattice_->down(c.v, n / 2);
@@ -385,7 +383,8 @@ void SoftObject::add_stiffness(int axis, glm::dmat3& stiffness) noexcept {
         const double stiff = static_cast<double>(spring.on(axis, d));
         if (stiff == 0.0) continue;
         const glm::dvec3 r = q - along(w);
-        const double share = carried_mark_[w] != 0 ? 0.5 : 1.0;  // an inner link is met from both its ends
+        const double share =
+            carried_mark_[w] != 0 ? 0.5 : 1.0;  // an inner link is visited from both its ends
         stiffness += share * stiff * glm::outerProduct(r, r);
       }
     }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What rigid surfaces and other soft objects ask of a soft object.
+// Rigid surfaces and other soft objects at a soft object: obstacles, claimed voxels, and moves of the pair
+// solver.
 #include <algorithm>
 #include <glm/geometric.hpp>
 #include <limits>

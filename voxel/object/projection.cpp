@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Where a touched voxel belongs while all else stands: at the least energy of its links, outside of the tool
-// and of its obstacle, within its limits.
+// Constrained projection of one touched voxel, all others fixed: the least energy of its links outside of the
+// tool and of its obstacle, within its limits.
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -12,16 +12,19 @@
 namespace voxel {
 namespace {
 
-constexpr int kProjections = 3;  // of a pressed voxel onto the tool, in search of its least energy
-constexpr double kSlides = 0.1;  // sin² between tool and obstacle; where they meet nearly flat it is squeezed
+// Projections onto the tool in search of the least energy.
+constexpr int kProjections = 3;
+constexpr double kSlides = 0.1;  // sin² of the angle between tool and obstacle; a voxel between nearly
+                                 // parallel surfaces is squeezed and does not slide
 
-// The least force along `way` (m, of 1 N; no component against the normal) that brings `wished`, each axis
-// within its links' interval, to normal · u >= bound; where none does, one at which no axis goes any further.
+// The least force along `way` (m per 1 N; no component against the normal) that brings `wished` to normal · u
+// >= bound, with each axis clamped to its links' interval. If no force does, the one at which no axis moves
+// any further.
 double least_force_N(const VoxelLinks& links, const glm::dvec3& wished, const glm::dvec3& way,
                      const glm::dvec3& normal, double bound) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
   double force_N = 0.0;
-  for (int n = 0; n < 7; ++n) {  // an axis begins to go once, and is stopped once
+  for (int n = 0; n < 7; ++n) {  // each axis starts to move once and stops once
     double reached = 0.0, rise = 0.0, next_N = kNone;
     for (int axis = 0; axis < 3; ++axis) {
       const auto& in = links.interval[static_cast<std::size_t>(axis)];
@@ -46,9 +49,8 @@ double least_force_N(const VoxelLinks& links, const glm::dvec3& wished, const gl
 
 }  // namespace
 
-// Where the springs' energy is least on the tool's surface, so that sliding round the tool is free of
-// friction: in their own metric, the surface straightened at the last place (one step left 3e-4 of the force
-// scale of friction).
+// The least energy of the springs on the tool's surface, so that sliding on the tool has no friction: a
+// projection in the metric of the springs, with the surface linearised at the last place.
 glm::dvec3 SoftObject::project_on_tool(const ToolInBody& tool, const glm::dvec3& rest,
                                        const glm::dvec3& wished, const glm::dvec3& compliance,
                                        Gap& g) const noexcept {
@@ -63,7 +65,7 @@ glm::dvec3 SoftObject::project_on_tool(const ToolInBody& tool, const glm::dvec3&
   return g.distance < 0.0 ? place - g.distance * g.normal : place;
 }
 
-// Where links do not let a voxel out of the tool altogether it goes no deeper than it was.
+// A voxel that its links keep in the tool gets no deeper than it was.
 glm::dvec3 SoftObject::no_deeper_in(const ToolInBody& tool, const glm::dvec3& rest, const glm::dvec3& now,
                                     const glm::dvec3& place) const noexcept {
   const double was = std::min(gap(tool, rest + now).distance, voxel_radius());
@@ -77,10 +79,10 @@ glm::dvec3 SoftObject::no_deeper_in(const ToolInBody& tool, const glm::dvec3& re
   return to;
 }
 
-// As project_on_tool(), where its links do not let it go there: the least energy on the tool within their
-// limits. Given the tool's force, each axis is for itself. (Brought onto the tool and then within its limits,
-// it stood a tenth of a spacing off the tool, or went into it, was pushed out by the next tick, and what
-// hangs on it with it: at a ball ten spacings deep 1.3 % of the energy in every tick, for good.)
+// As project_on_tool(), for links that do not allow that place: the least energy on the tool within their
+// limits. For a given force of the tool the axes are independent. Projecting first and clamping afterwards
+// would leave the voxel off the tool or inside of it, and the next tick would push it out with its
+// dependents.
 glm::dvec3 SoftObject::project_on_tool_within_limits(const ToolInBody& tool, const VoxelLinks& links,
                                                      const glm::dvec3& wished, Touch& t) const noexcept {
   const glm::dvec3 now = state_.at(t.v);
@@ -89,7 +91,7 @@ glm::dvec3 SoftObject::project_on_tool_within_limits(const ToolInBody& tool, con
     const Gap g = gap(tool, t.rest + place);
     t.normal = g.normal;
     if (n == 0 && g.distance >= 0.0) break;
-    const glm::dvec3 way = links.compliance * g.normal;  // of 1 N
+    const glm::dvec3 way = links.compliance * g.normal;  // for 1 N
     const double force_N =
         least_force_N(links, wished, way, g.normal, glm::dot(g.normal, place) - g.distance);
     place = clamp_to_links(links, wished + force_N * way, now);
@@ -115,8 +117,8 @@ glm::dvec3 SoftObject::place_of(const ToolInBody& tool, const VoxelLinks& links,
   }
   if (obstacles_.empty()) {
     const glm::dvec3 place = clamp_to_links(links, wanted, now);
-    // What other objects press, too, goes where its pairs have it; and of what anchors keep in the tool, that
-    // is to give way, not to part it as a wedge would.
+    // Other soft objects: the pair solver has the last word. Anchors that keep a voxel in the tool: the tool
+    // has to give way, and must not part tissue like a wedge.
     const bool let_out = t.pressed && place != wanted && held_voxels_.empty() &&
                          !(anchors_pull_ && gap(tool, rest + now).distance < -kGiveWay * voxel_radius());
     return let_out ? project_on_tool_within_limits(tool, links, wished, t) : place;
@@ -126,9 +128,8 @@ glm::dvec3 SoftObject::place_of(const ToolInBody& tool, const VoxelLinks& links,
   const double depth = static_cast<double>(o.bound) - glm::dot(n, wanted);
   if (depth > 0.0 && n != glm::dvec3(0.0)) {
     wanted += depth * n;
-    // Where that takes it into the tool it slides along the obstacle, out of its way. (Left there, the tool
-    // had to give way to tissue that bulged against the side of a bone: by 0.08 N of 1.1, in three ticks of
-    // four.)
+    // If the obstacle pushes the voxel into the tool, it slides along the obstacle until it is out. Otherwise
+    // the tool would have to give way to tissue that bulges beside bone.
     for (int k = 0; k < kProjections; ++k) {
       g = gap(tool, rest + wanted);
       const glm::dvec3 slide = g.normal - glm::dot(g.normal, n) * n;
@@ -146,11 +147,10 @@ void SoftObject::relax_touch(const ToolInBody& tool, Touch& t) noexcept {
   if (lattice_->anchored(t.v) || t.part != 0) return;
   const glm::dvec3 before = state_.at(t.v);
   const bool was_pressed = t.pressed;
-  // While another relaxes the object, a voxel that the tool does not press is his.
+  // While the shadow relaxes the object, voxels that the tool does not press are the shadow's.
   if (relaxation_.away() && !t.pressed && clear_of(tool, position(t))) return;
-  // One that another soft object presses is its pair's. (Brought to where its links alone would have it, it
-  // was a spacing deep in the other object whenever the force was measured, and the tool felt nothing of what
-  // that carries: 0.31 N of 0.61.)
+  // A voxel that another soft object presses belongs to its pair. At the equilibrium of its links alone it
+  // would lie inside of the other object when the force is measured.
   if (pair_held(t) && !t.pressed && clear_of(tool, position(t))) return;
   const VoxelLinks links = links_of(relaxation_.couplings(), state_, t.v);
   glm::dvec3 place = place_of(tool, links, t);
@@ -163,7 +163,7 @@ void SoftObject::relax_touch(const ToolInBody& tool, Touch& t) noexcept {
   state_.set(t.v, place);
   relaxation_.multigrid().log().note(0, t.v / kRow);
   if (t.pressed != was_pressed) unsettled_m_ += glm::distance(before, state_.at(t.v));
-  // A tool that jumped away moves no pressed voxel by follow(): what it let go of wakes the rest.
+  // A tool that jumped away moves no pressed voxel by follow(): released voxels wake the rest.
   if (was_pressed && !t.pressed &&
       glm::distance(before, state_.at(t.v)) > kDirtyMotion * lattice_->min_spacing_m()) {
     relaxation_.wake();

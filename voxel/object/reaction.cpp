@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The reaction to the tool: its force and its stiffness.
+// The reaction to the tool: its force and its stiffness. Without links at their limits each pressed voxel
+// contributes its load along its normal. The loads of all that such links tie together are summed first.
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -34,8 +35,8 @@ Reaction SoftObject::reaction(const ToolInBody& tool) noexcept {
     add_stiffness(axis, result.stiffness_N_per_m);
     let_go_of_carried();
   }
-  // Tight links pass load between voxels, along and across their normals, and the sum of all is what is left
-  // of it: within the sum the chain's own forces cancel, whichever voxel each is booked to.
+  // Links at their limits pass load between voxels, along and across their normals. Only the sum over all of
+  // these voxels is well defined: within it the chain's own forces cancel.
   for (const Touch& t : touches_) {
     if (t.pressed && t.tight && t.part == 0) result.force_N += t.load;
   }
@@ -45,13 +46,13 @@ Reaction SoftObject::reaction(const ToolInBody& tool) noexcept {
     if (!t.pressed || t.part != 0) continue;
     const double load = glm::dot(t.tight ? through_links : t.load, t.normal);
     if (!t.tight && load < 0.0) {
-      // Frictionless: the tool feels what the voxel presses along the normal; what pulls is no contact.
+      // Frictionless: the tool feels the load along the normal. A load that pulls is no contact.
       result.force_N += load * t.normal;
     }
     if (load < 0.0) ++result.pressed;
   }
   if (!block_seen_.empty()) add_reaction_of_blocks(tool, result);
-  if (result.pressed == 0) result.force_N = glm::dvec3(0.0);  // what only pulls is no contact
+  if (result.pressed == 0) result.force_N = glm::dvec3(0.0);  // a load that pulls is no contact
   return result;
 }
 

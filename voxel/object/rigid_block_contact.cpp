@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The tool on parts without slack: a part is one body of three unknowns, pressed where any of its voxels is,
-// and what it presses back with is all that pulls it.
+// The tool on rigid blocks (components without slack). A block is one body of three unknowns. It is pressed
+// if any of its voxels is, and presses back with all that pulls it. Block numbers in Lattice begin with 1,
+// those in RigidBlocks with 0.
 #include <algorithm>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
@@ -11,11 +12,12 @@
 namespace voxel {
 namespace {
 
-constexpr double kTightHanging = 1e-3;  // the same for what may be left behind a little as the tool withdraws
+// The same for links of dependents, which lag a little as the tool withdraws.
+constexpr double kTightHanging = 1e-3;
 
 }  // namespace
 
-// `visit(part)`, numbers from 1 on, for those of which any voxel is touched, in the order of the touches.
+// `visit(block)`, numbers from 1 on, for each block with a touched voxel, in the order of the touches.
 template <class Visit>
 void SoftObject::for_touched_blocks(const Visit& visit) noexcept {
   for (const Touch& t : touches_) {
@@ -28,8 +30,7 @@ void SoftObject::for_touched_blocks(const Visit& visit) noexcept {
   }
 }
 
-// Where the tool lets a part go, straightened where each of its touched voxels is; those that are further
-// away than `within_m` do not count.
+// Bounds of the tool on a block, linearised at each of its touched voxels that is nearer than `within_m`.
 void SoftObject::bound_block(const ToolInBody& tool, std::uint16_t part, double within_m) noexcept {
   block_bounds_.clear();
   bound_touch_.clear();
@@ -42,7 +43,7 @@ void SoftObject::bound_block(const ToolInBody& tool, std::uint16_t part, double 
   }
 }
 
-// The shortest way out of the tool; one of its voxels says to the chain where all of it is to go.
+// The shortest way out of the tool. One voxel of the block is the source of the chain's wave.
 void SoftObject::push_blocks_out(const ToolInBody& tool) noexcept {
   for_touched_blocks([&](std::uint16_t part) {
     bound_block(tool, part, voxel_radius());
@@ -74,13 +75,13 @@ void SoftObject::follow_blocks(const glm::dvec3& delta) noexcept {
   });
 }
 
-// A part goes to the least energy of the springs that leave it, outside of the tool and within its limits. It
-// is pressed where that takes a force of the tool's.
+// Moves each block to the least energy of its border's springs, outside of the tool and within its limits.
+// Bounds with a force are active contacts.
 void SoftObject::relax_blocks(const ToolInBody& tool) noexcept {
   Multigrid& grid = relaxation_.multigrid();
   for_touched_blocks([&](std::uint16_t part) {
     const std::size_t p = part - 1U;
-    // With what only hangs on it: where links are at their limits, that is what presses it on the tool.
+    // With its dependents: through links at their limits these press it on the tool, too.
     const Multigrid::AdmissibleInterval room = grid.interval_of_block(p, state_);
     const glm::dvec3 force = grid.block_force(p, state_) + dependents_of_block(p, room),
                      stiffness = grid.parts().on(0, p).stiffness;
@@ -99,7 +100,7 @@ void SoftObject::relax_blocks(const ToolInBody& tool) noexcept {
       t.normal = block_bounds_[i].normal;
       is = is || t.pressed;
     }
-    // While another relaxes the object it is his, but for what was moved since.
+    // While the shadow relaxes the object, only motion since the submission is relaxed here.
     if (relaxation_.away()) way = move_within(force + grid.residual_of_block(p), stiffness, block_bounds_);
     const glm::dvec3 went = grid.move_block(p, way, state_, obstacle_view(), Multigrid::Tool::is_seen_to);
     const double far = glm::length(went);
@@ -116,7 +117,7 @@ bool SoftObject::any_pressed(std::uint16_t part) const noexcept {
                      [part](const Touch& t) { return t.part == part && t.pressed; });
 }
 
-// What pulls tissue that hangs on a part, which has so much room, by links at their limits (N).
+// Load of a block's dependents (N); `room`: its admissible interval.
 glm::dvec3 SoftObject::dependents_of_block(std::size_t part,
                                            const Multigrid::AdmissibleInterval& room) noexcept {
   const Multigrid& grid = relaxation_.multigrid();
@@ -131,15 +132,14 @@ glm::dvec3 SoftObject::dependents_of_block(std::size_t part,
   return force;
 }
 
-// As gather_load_with_pairs(), where a part is one of what hangs on one another, pulled as a whole. What
-// pulls a single voxel says nothing of which way it passes a load on: between the tool and an inclusion,
-// tissue at its limits is pulled down, and carries what presses the inclusion up. (Found by rows, voxel by
-// voxel, half of the force was lost.)
+// As gather_load_with_pairs(), with each block as one voxel that is loaded as a whole. The load of a single
+// voxel of a block does not say which way the block passes it on: tissue at its limits between the tool and
+// an inclusion is pulled down and still carries the inclusion's load upwards.
 void SoftObject::gather_load_with_blocks(int axis) noexcept {
   const Multigrid& grid = relaxation_.multigrid();
   const auto& u = state_.u[static_cast<std::size_t>(axis)];
   const auto tight = static_cast<float>(kTightHanging * lattice_->min_spacing_m());
-  // A part is where its first voxel is.
+  // Its first voxel stands for the block.
   const auto whole = [&](VoxelId v) {
     const std::uint16_t part = lattice_->part(v);
     return part == 0 ? v : grid.parts().first(part - 1U);
@@ -180,8 +180,8 @@ void SoftObject::gather_load_with_blocks(int axis) noexcept {
       look_at(head, v, up ? lattice_->up(v, n / 2) : lattice_->down(v, n / 2), n / 2, up);
     }
   }
-  // Pulled away from what it was found by, it may rest on something else that is carried: then it counts all
-  // the same. Within the sum it does not matter through which of its links.
+  // A voxel that pulls away from its source may rest on another gathered one; it counts then, too. For the
+  // sum it does not matter through which link.
   const auto rests = [&](std::size_t i) {
     const VoxelId v = carried_[i].v, by = carried_[hanging_[i].from].v;
     for (int n = 0; n < 6 && lattice_->part(v) == 0; ++n) {
@@ -225,7 +225,7 @@ void SoftObject::add_reaction_of_blocks(const ToolInBody& tool, Reaction& reacti
       ++reaction.pressed;
       held.add(b.normal);
     }
-    // It goes along with the tool in the directions in which that holds it.
+    // The block follows the tool in the pressed directions.
     glm::dmat3 along(0.0), springs(0.0);
     for (std::size_t n = 0; n < held.count; ++n) along += glm::outerProduct(held.of[n], held.of[n]);
     for (int axis = 0; axis < 3; ++axis) springs[axis][axis] = stiffness[axis];

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Submission, relaxation and packing of a shadow object.
 #include "voxel/object/shadow_object.h"
 
 #include <algorithm>
@@ -10,34 +11,32 @@
 namespace voxel {
 namespace {
 
-constexpr std::size_t kMostAtOnce = 1000;  // rows that a tick adds at once; a wider contact sees steps go by
-// After a whole cycle, of which little reaches the contact (0.75 of its error is left in a brain), so many
-// round it, while the tool moves by so many spacings from one result to the next and some results longer: a
-// brain that felt 0.28 N on the way to 0.15 feels 0.22, and is within a twentieth of it after 0.2 s instead
-// of 0.6. At rest they are left out: beyond their boxes coarse cells know of the whole cycle's last sweeps
-// only in the next one, and a voxel that hardly touches the tool was let go and pressed in turns, with steps
-// of 30 mN.
+// Rows that a tick applies at once. In a wider contact steps are felt.
+constexpr std::size_t kMostAtOnce = 1000;
+// A whole cycle reduces the error at the contact only a little. While the tool moves by more than kMoved
+// spacings from one result to the next, and for kUnsettled results after, this many contact cycles follow it.
+// Not at rest: coarse cells outside of their boxes learn of the whole cycle's last sweeps only in the next
+// cycle, and a voxel that barely touches the tool would be released and pressed in turns.
 constexpr int kContactCycles = 4, kUnsettled = 4;
-// … and round a part without slack that is pressed. (A whole cycle leaves 0.43 of the force's error at such a
-// part.)
+// … and cycles around a pressed rigid block.
 constexpr int kBlockCycles = 4;
 constexpr double kMoved = 0.1;
-// Far from the contact only what changed by so many times as much as rows are left alone with (1e-4 of the
-// spacing) is passed on, and the rest once all is at rest. Within so many rows of it everything is, and so is
-// what the tick itself moved: given again, it would lose what was kept back.
+// Far from the contact a change is passed on only if it is kFarther times least_m_ (1e-4 of the spacing);
+// smaller ones are deferred until all is at rest. Rows within kNearRows of the contact are always passed on,
+// and so are submitted rows: a later submission would undo their deferred part.
 constexpr float kFarther = 20.0F;
 constexpr std::size_t kNearRows = 3;
-// Tissue that moved by as many spacings from one result to the next is far from all that is known of it. So
-// many results are then of so many cycles in wide boxes. In the first coarse levels come to rest before them,
-// and what is further away is told what they know: where it stayed behind it would hold back what is in the
-// boxes (by 17 % of the force, where links are at their limits). Where a part without slack is pressed, there
-// is one, which is thorough: no box is wide enough. No bricks meanwhile: of tissue on its way they know
-// little.
+// If tissue moved by more than kJumped spacings since the last submission, the next kQuickResults results are
+// of contact cycles on large boxes. In the first, coarse levels come to rest before the finer ones and are
+// prolonged beyond the boxes, too; tissue left behind there would hold back the contact. A pressed rigid
+// block has one such result over the whole object, because no box is large enough. Loads of bricks are not
+// renewed meanwhile: on tissue that moves far they mean little.
 constexpr float kJumped = 5.0F;
 constexpr int kQuickResults = 3;
 constexpr std::array<int, kQuickResults> kLargePatchCycles{3, 4, 2};
-constexpr std::size_t kOctetsOfRow = 12;  // a whole cycle smooths and tells as many of a row
-// Floats of a row that go over: ways, and where there are bricks their loads.
+// Float8 that a whole cycle smooths and prolongs per row.
+constexpr std::size_t kOctetsOfRow = 12;
+// Arrays of a row in a result: motion, and loads of bricks if there are any.
 std::size_t arrays_of(const Lattice& lattice) {
   return lattice.has_bricks() ? 6 : 3;
 }
@@ -62,7 +61,7 @@ ShadowObject::ShadowObject(SoftObject& object)
   multigrid().keep_log();
   relaxation_.copy_from(object.relaxation_);
   object.relaxation_.leave_to_another();
-  // A part without slack sums what all round it are off by.
+  // A rigid block sums the errors of all its border.
   least_m_ = multigrid().has_blocks() ? multigrid().restricted_m() : multigrid().motion_tolerance_m();
   const std::size_t most_held = lattice_.surface().size() + SoftObject::kMaxTouched;
   held_.reserve(most_held);
@@ -95,9 +94,8 @@ void ShadowObject::give(SoftObject& object) noexcept {
     float* to = given_.add(row);
     for (std::size_t axis = 0; axis < 3; ++axis)
       std::copy_n(object.state_.u[axis].data() + at(row), kRow, to + axis * kRow);
-    // As it will be once it is drained: without that, a row would be torn from those around it, which are
-    // known here with what they have yet to go; it would be mended, and so go that way twice. (The better a
-    // cycle was, the longer that went to and fro: a brain that hung free swung by a millimeter for ever.)
+    // As the row will be when the result is applied. Otherwise it would differ from its neighbours by motion
+    // that the shadow knows already, and would make that motion twice.
     const std::size_t n = found.find(row);
     if (n == found.count() || (n < drained_ && !retry_.waits(n))) continue;
     for (std::size_t i = 0; i < std::size_t{3} * kRow; ++i) to[i] += found.values(n)[i];
@@ -166,13 +164,13 @@ void ShadowObject::open_given() noexcept {
   }
   if (given_.count() > 0 || !given_obstacles_.empty()) relaxation_.wake();
   to.log().clear();
-  // One whole cycle at least between two jumps: all else has its turn, however long the tool goes on.
+  // At least one whole cycle between two jumps, so that the rest of the object has its turn.
   if (moved_m > kJumped * static_cast<float>(lattice_.min_spacing_m()) && coarse_first_left_ == 0 &&
       !was_coarse_first_) {
     coarse_first_left_ = kQuickResults;
     large_motion_left_ = kQuickResults + kUnsettled;
   }
-  // What presses a part without slack moves tissue all round that, wherever the contact is.
+  // A pressed rigid block moves tissue all around it, far from the contact.
   block_pressed_ = std::any_of(held_.begin(), held_.begin() + static_cast<std::ptrdiff_t>(given_pressed_),
                                [this](VoxelId v) { return lattice_.part(v) != 0; });
   if (given_pressed_ == 0) coarse_first_left_ = 0;
@@ -197,8 +195,8 @@ void ShadowObject::relax_quickly(const ObstacleView& obstacles) noexcept {
   const int cycles = kLargePatchCycles[static_cast<std::size_t>(kQuickResults - 1 - coarse_first_left_)];
   for (int n = 0; n < cycles; ++n)
     octets += relaxation_.relax_large_patch(state_, obstacles, held_, pressed, false);
-  // Not after the last: a whole round comes next, which ends with it; nor after the first, when the tool goes
-  // on to press other voxels. (There, too, it was no nearer.)
+  // Not after the last result, because a whole cycle follows that ends with it; nor after the first, when the
+  // tool goes on to press other voxels.
   if (!first && coarse_first_left_ > 0) relaxation_.relax_limited(state_, obstacles);
   work_ = octets / kOctetsOfRow;
 }
@@ -251,7 +249,7 @@ void ShadowObject::replay_result(const Found& found) noexcept {
   residual_N_ = found.residual_N;
 }
 
-// Counted and laid out (there are few distances): the order within one distance is that of the log.
+// A counting sort; within one distance rows stay in the order of the log.
 void ShadowObject::sort_by_distance() noexcept {
   const auto rows = multigrid().log().rows(0);
   begin_.fill(0);
@@ -273,7 +271,7 @@ void ShadowObject::pack_changes() noexcept {
   sort_by_distance();
   near_count_ = 0;
   const std::size_t count = multigrid().log().rows(0).size();
-  // What is near was laid out first, so it ends where the next distance began.
+  // After the sort begin_[d] is where distance d ends.
   const std::size_t near = near_.first[0] > near_.last[0] ? 0 : std::min<std::size_t>(begin_[0], kMostAtOnce);
   for (std::size_t n = 0; n < count; ++n) {
     if (n + kAhead < count) fetch_change_ahead(by_distance_[n + kAhead]);
@@ -288,7 +286,7 @@ void ShadowObject::pack_changes() noexcept {
   if (at_rest_) pack_kept_back();
 }
 
-// What of a row is of a part is then as it was, and so is no change of the row's.
+// Takes the motion of blocks out of the rows: it is no change of theirs.
 void ShadowObject::pack_parts() noexcept {
   BlockMoves& ways = found_blocks_[1 - taking_];
   for (std::size_t p = 0; p < ways.size(); ++p) {
@@ -303,7 +301,7 @@ void ShadowObject::pack_parts() noexcept {
       ways[p] = glm::dvec3(0.0);
       continue;
     }
-    // Less than it takes to move it there it does not go here either.
+    // Less than move_block() would move: nothing.
     if (std::max({std::fabs(way.x), std::fabs(way.y), std::fabs(way.z)}) <= multigrid().restricted_m())
       way = glm::vec3(0.0F);
     ways[p] = glm::dvec3(way);
@@ -319,7 +317,7 @@ void ShadowObject::pack_parts() noexcept {
   }
 }
 
-// All of each at once, what else there is of the result near it or not: it has one place.
+// A block moves at once, wherever the result's other rows are: it has one displacement.
 void ShadowObject::take_parts(SoftObject& object) noexcept {
   const BlockMoves& ways = found_blocks_[taking_];
   Multigrid& to = object.relaxation_.multigrid();
@@ -348,8 +346,6 @@ void ShadowObject::pack_kept_back() noexcept {
   }
   kept_back_count_ = 0;
 }
-
-// False where no voxel changed by more than `least_m`: it waits until it is more.
 
 std::size_t ShadowObject::memory_bytes() const {
   std::size_t bytes = relaxation_.memory_bytes() + obstacles_.size() * sizeof(Obstacle) +

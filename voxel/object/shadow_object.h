@@ -1,37 +1,31 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A soft object's tissue away from the contact, relaxed beside the tick: a second state of the same object,
-// which another thread brings nearer to rest while the first is being felt.
+// Asynchronous relaxation of a soft object: a second state of the same object (its shadow), which another
+// thread brings nearer to rest while the tick moves the first.
 //
-// They take turns with it, and neither waits for the other:
-//   give()   the tick says what changed in the object since the last time;
-//   relax()  the other thread goes one whole cycle nearer to equilibrium, the pressed voxels held where they
-//            were given, and says what that changed;
-//   take()   later, the tick adds that to the object: near the contact at once, or it would see a step go by,
-//            or in parts, of which each leaves balanced what is still to come; then, with drain(), the rest,
-//            some rows at a time, while the next is relaxed.
-// Displacements are linear where no limit is active, so what is found is added to what the tick did
-// meanwhile. For that each error has to be the business of one of the two. What was given is the other
-// thread's: round the contact it counts as balanced from then on (Relaxation::assign_residual), and the tick
-// brings to rest only what it moves itself. With X of that left by the tick, and Y of the other by a cycle,
-// what is left is the sum of the two, and never more. (Rejected: both at work on all of it, which leaves X +
-// Y - 1. As long as a tool stood still that was never more energy than was given; but it is -1 for all that
-// both do well, and a tool held in a brain felt 0 to 0.9 N where 0.14 is right. The replica's rows in place
-// of the tick's: there is a step at the seam. Tiles of the object itself for the thread: coarse cells are
-// everybody's.)
+// Tick and thread take turns with the shadow, and neither waits for the other:
 //
-// Coarse cells are not exchanged: each of the two has its own. Nor are changes too small to matter, until all
+// submit()      the tick hands over the rows that changed since the last submission;
+// relax()       the thread runs one whole cycle towards equilibrium, with the pressed voxels where they were
+//               submitted, and packs what changed (the result);
+// apply_near()  later the tick adds the result's rows near the contact: at once, so that no step is felt, or
+//               in parts, each of which leaves the residual of the rest frozen;
+// apply_far()   adds the other rows, some a tick, while the thread relaxes the next submission.
+//
+// Without active limits displacements are linear, so a result can be added to what the tick did meanwhile.
+// Each residual must then be owned by exactly one of the two solvers. What was submitted belongs to the
+// thread: around the contact it counts as frozen from then on (Relaxation::assign_residual), and the tick
+// relaxes only what it moves itself. If the tick leaves a fraction X of its residual and a cycle leaves Y of
+// the other, the total left is X + Y.
+//
+// Coarse cells are not exchanged: each side has its own. Changes too small to matter are deferred until all
 // is at rest.
 //
-// Limits hold throughout: what a row cannot follow, by the links to its neighbours as they now are, is left
-// out, and what became of it is given the next time.
+// Limits are never violated: the part of a row's motion that its links forbid is dropped, and the next
+// submission carries the actual state. After a jump of the tool the first results are of cycles on large
+// boxes around the contact (coarse levels first). These move tissue by spacings, so rows that could not
+// follow are queued and tried again (RetryQueue).
 //
-// After a jump of the tool the first results are of wide boxes round the contact, a third of a whole cycle
-// each at most: nothing else is nearly as far from rest. They move tissue by spacings, and there a row that
-// cannot follow waits until those beside it were added, and then has its turn again. (With one turn each,
-// they were lost for the most part. In all results, a brain came 4.8 % of a cell deep into its skull, and
-// not 4.5 %.)
-//
-// Not for tissue that yields, whose rest lengths change too.
+// Not for tissue with plasticity, whose rest lengths change too.
 #pragma once
 
 #include <array>
@@ -49,20 +43,21 @@ namespace voxel {
 
 class ShadowObject {
  public:
-  // In the object's state. From now on the object notes what is written in it, and has to be relaxed here:
-  // relax_background() is for objects without a replica. Allocates; throws std::bad_alloc.
+  // Starts in the object's state. From now on the object logs its changes, and only the shadow relaxes it:
+  // relax_background() is for objects without a shadow. Allocates; throws std::bad_alloc.
   explicit ShadowObject(SoftObject& object);
 
-  // Has anything moved since it was given, or is not at rest yet? Not while something given is still out.
+  // Has anything moved since the last submission, or is the object not at rest? Ask it only when no
+  // submission is out.
   [[nodiscard]] static bool wanted(const SoftObject& object) { return !object.relaxation_.idle(); }
 
   // ---- the tick; none of these allocates, locks or throws ----
   void give(SoftObject& object) noexcept;
-  // Once relax() is done and what it found before that is drained: adds what it found near the contact, at
-  // once, or the first of so many parts. What of it is still to come stays the other thread's business.
+  // Call when relax() is done and the result before is applied: adds the rows of its result near the contact,
+  // all at once or the first of `parts` equal parts. The residual of parts still to come stays frozen.
   void take(SoftObject& object, int parts = 1) noexcept;
   [[nodiscard]] bool in_parts() const { return parts_left_ > 0; }
-  // The next part; of those that are left, the last.
+  // Adds the next part, or all that are left (`last`).
   void take_part(SoftObject& object, bool last) noexcept;
   // Adds the next `rows` rows of the rest.
   void drain(SoftObject& object, std::size_t rows) noexcept;
@@ -72,11 +67,11 @@ class ShadowObject {
 
   // ---- between the two, the other thread ----
   void relax() noexcept;
-  // What relax() found, until it is taken; and, for a session that is played again, the same found at once in
-  // place of relax(), which then must not be called any more.
+  // The result of relax() until it is applied. When a session is replayed, replay_result() installs a
+  // recorded result; relax() must not be called any more then.
   struct Found {
     std::vector<RowId> rows;
-    std::vector<float> values;  // [row][array][lane], as in a parcel
+    std::vector<float> values;  // [row][array][lane], as in a RowDelta
     std::size_t near_count = 0;
     bool far = false, limited = false, at_rest = false;
     double residual_N = 0.0;
@@ -85,10 +80,10 @@ class ShadowObject {
   [[nodiscard]] Found found() const;
   void replay_result(const Found& found) noexcept;
   [[nodiscard]] std::uint64_t times_relaxed() const { return times_relaxed_; }
-  // What the last relax() cost: as many rows, of all levels, as a whole cycle writes in that time.
+  // Cost of the last relax(), in rows that a whole cycle writes in that time (all levels).
   [[nodiscard]] std::size_t work() const { return work_; }
 
-  // Displacement of a rest point as it is known here; 0 where none is near. By the thread that relaxes.
+  // Displacement of a rest point in the shadow's state; 0 if no voxel is near. For the thread that relaxes.
   [[nodiscard]] glm::dvec3 displacement_at(const glm::dvec3& rest_point) const noexcept {
     return voxel::displacement_at(lattice_, state_, rest_point);
   }
@@ -96,14 +91,14 @@ class ShadowObject {
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
-  static constexpr std::size_t kAhead = 4;  // rows that are fetched before their turn
+  static constexpr std::size_t kAhead = 4;  // rows prefetched
   static std::size_t at(RowId row) { return static_cast<std::size_t>(row) * kRow; }
 
-  // Rows of voxels on their way from one thread to the other, one after the other in memory: to fetch what
-  // another core wrote costs more than all that is done with it, and least where it stands in a row.
+  // Rows on their way from one thread to the other, contiguous in memory: fetching what another core wrote
+  // costs more than adding it.
   class RowDelta {
    public:
-    // Of each row `arrays` of them, [array][lane].
+    // `arrays` arrays of each row, [array][lane].
     explicit RowDelta(std::size_t rows, std::size_t arrays = 3)
         : floats_(arrays * kRow), rows_(rows), values_(rows * floats_), after_(rows) {}
     void clear() noexcept {
@@ -116,12 +111,12 @@ class ShadowObject {
     }
     void drop_last() noexcept { after_[rows_[--count_]] = 0; }
     [[nodiscard]] std::size_t count() const { return count_; }
-    // Where a row is in it; count() where it is not.
+    // Index of a row; count() if it is not in here.
     [[nodiscard]] std::size_t find(RowId row) const { return after_[row] == 0 ? count_ : after_[row] - 1; }
     [[nodiscard]] RowId row(std::size_t n) const { return rows_[n]; }
     [[nodiscard]] const float* values(std::size_t n) const { return values_.data() + floats_ * n; }
     [[nodiscard]] float* values(std::size_t n) { return values_.data() + floats_ * n; }
-    // What so many rows take.
+    // Takes the memory of so many rows now.
     void populate(std::size_t rows) noexcept {
       rows_.populate();
       values_.populate(rows * floats_, {true});
@@ -135,22 +130,23 @@ class ShadowObject {
     std::size_t floats_;
     LazyArray<RowId> rows_;
     LazyArray<float> values_;
-    LazyArray<std::uint32_t> after_;  // [row] the entries up to its own; 0: it is not in there
+    LazyArray<std::uint32_t> after_;  // [row] 1 + index; 0: it is not in here
     std::size_t count_ = 0;
   };
-  // Entries of a parcel that were not added altogether. In turns: in each the last of those before is the
-  // first, since what is in the way of one row is most often the one after it.
+  // Entries of a RowDelta that were only partly added. They are tried again in turns, each turn in reverse
+  // order: a row is most often blocked by the row after it.
   class RetryQueue {
    public:
     explicit RetryQueue(std::size_t rows)
         : lists_{LazyArray<std::uint32_t>(rows), LazyArray<std::uint32_t>(rows)}, waits_(rows) {}
-    [[nodiscard]] std::size_t count() const { return count_ + next_; }  // that still have a turn
+    [[nodiscard]] std::size_t count() const { return count_ + next_; }  // that have a turn left
     [[nodiscard]] bool waits(std::size_t n) const { return waits_[n] != 0; }
     void put(std::size_t n) noexcept {
       waits_[n] = 1;
       lists_[of_][count_++] = static_cast<std::uint32_t>(n);
     }
-    // One more has its turn; `add(n)` is true where something is left of it for the next, of so many.
+    // Tries one more entry. `add(n)` returns true if something is left for the next turn; there are
+    // `most_turns`.
     template <class Add>
     void take(int most_turns, const Add& add) noexcept {
       const std::uint32_t n = lists_[of_][--count_];
@@ -170,7 +166,7 @@ class ShadowObject {
       count_ = next_ = 0;
       turn_ = 0;
     }
-    [[nodiscard]] int turn() const { return turn_; }  // so many were; 0 where none has one
+    [[nodiscard]] int turn() const { return turn_; }  // turns begun; 0 if no entry is left
     void populate() noexcept {
       for (auto& list : lists_) list.populate();
       waits_.populate();
@@ -181,7 +177,7 @@ class ShadowObject {
 
    private:
     std::array<LazyArray<std::uint32_t>, 2> lists_;
-    LazyArray<std::uint8_t> waits_;  // [n]
+    LazyArray<std::uint8_t> waits_;  // [n] 1: entry n is queued
     std::size_t of_ = 0, count_ = 0, next_ = 0;
     int turn_ = 0;
   };
@@ -198,7 +194,7 @@ class ShadowObject {
     Obstacle obstacle;
   };
 
-  // [part without slack] how far it went (m): of these not row by row, in which they could not follow.
+  // [block] motion of a rigid block (m): its voxels could not follow row by row.
   using BlockMoves = std::vector<glm::dvec3>;
 
   [[nodiscard]] Multigrid& multigrid() { return relaxation_.multigrid(); }
@@ -224,43 +220,43 @@ class ShadowObject {
   std::vector<Obstacle> obstacles_;
   std::size_t moving_obstacles_ = 0;
   std::vector<VoxelId> held_;
-  std::array<LazyArray<float>, 3> before_;  // [axis][voxel] what is here as the other state knows it
+  std::array<LazyArray<float>, 3> before_;  // [axis][voxel] this state as the object knows it
   std::size_t work_ = 0;
-  int coarse_first_left_ = 0;      // results to come of wide boxes round the contact
-  bool was_coarse_first_ = false;  // the last one was
-  int large_motion_left_ = 0;      // results to come that move tissue far
-  bool found_far_ = false;         // the last one did
-  bool found_limited_ = false;     // in the last one limits held what the tool presses
-  bool block_pressed_ = false;     // the tool presses a part without slack
-  float least_m_ = 0.0F;           // smaller changes are not passed on
-  // Rows whose change waits until all is at rest; some that were passed on since are among them.
+  int coarse_first_left_ = 0;      // results still to come with coarse levels first
+  bool was_coarse_first_ = false;  // the last result was one
+  int large_motion_left_ = 0;      // results still to come that move tissue far
+  bool found_far_ = false;         // the last result does
+  bool found_limited_ = false;     // active limits held pressed voxels in the last cycle
+  bool block_pressed_ = false;     // the tool presses a rigid block
+  float least_m_ = 0.0F;           // smaller changes are deferred
+  // Rows whose change is deferred until all is at rest; some that were passed on since are among them.
   LazyArray<RowId> rows_kept_back_;
   std::size_t kept_back_count_ = 0;
-  LazyArray<std::uint8_t> kept_back_;  // [row] 1: it is one of them
+  LazyArray<std::uint8_t> kept_back_;  // [row] 1: in deferred_rows_
   static constexpr int kDistances = 64;
-  std::array<std::uint32_t, kDistances + 1> begin_{};  // [distance] of by_distance_
-  LazyArray<std::uint8_t> distance_;                   // [n] of the rows in the log
-  LazyArray<RowId> by_distance_;                       // these, nearest to the contact first
+  std::array<std::uint32_t, kDistances + 1> begin_{};  // [distance] first of by_distance_
+  LazyArray<std::uint8_t> distance_;                   // [n] distance of the nth row in the log
+  LazyArray<RowId> by_distance_;                       // rows of the log, nearest to the contact first
 
   // ---- what goes over ----
   RowDelta given_;
-  std::array<RowDelta, 2> found_;  // what is drained, and what is found meanwhile: ways, loads of bricks
-  std::array<BlockMoves, 2> found_blocks_;  // as found_
+  std::array<RowDelta, 2> found_;  // the one being applied, and the next: motion, and loads of bricks
+  std::array<BlockMoves, 2> found_blocks_;  // [as results_]
   std::vector<GivenRole> given_roles_;
   std::vector<GivenObstacle> given_obstacles_;
   std::vector<VoxelId> given_held_;
-  std::vector<GivenContact> given_contacts_;  // of those that slide along the tool
-  std::size_t given_pressed_ = 0;             // so many of them, the first, by the tool
-  glm::dvec3 given_tool_m_{0.0};              // where that was
-  int unsettled_ = 0;                     // results to come in which the contact is brought to rest once more
-  bool settle_contact_ = false;           // in this one
-  Relaxation::NearRows near_;             // the contact
-  std::size_t taking_ = 0, drained_ = 0;  // which of found_, and how many of its rows
-  RetryQueue retry_;                      // of these
-  bool in_turns_ = false;                 // rows that do not follow have another turn
-  bool together_ = false;                 // those near the contact are added together
-  std::size_t near_count_ = 0;            // of the other one's: they are near the contact
-  int parts_left_ = 0;                    // in which these are still to be added
+  std::vector<GivenContact> given_contacts_;  // contacts that slide on the tool
+  std::size_t given_pressed_ = 0;  // number of voxels, the first of submitted_held_, that the tool presses
+  glm::dvec3 given_tool_m_{0.0};   // centre of the tool at the submission
+  int unsettled_ = 0;              // results still to come that relax the contact once more
+  bool settle_contact_ = false;    // this one does
+  Relaxation::NearRows near_;      // rows of the contact
+  std::size_t taking_ = 0, drained_ = 0;  // index into results_, and rows applied of it
+  RetryQueue retry_;                      // entries of it to try again
+  bool in_turns_ = false;                 // rows that could not follow are tried again
+  bool together_ = false;                 // rows near the contact are applied together
+  std::size_t near_count_ = 0;            // rows near the contact in the other result
+  int parts_left_ = 0;                    // parts of these still to be applied
   bool at_rest_ = true;
   double residual_N_ = 0.0;
   std::uint64_t times_relaxed_ = 0;

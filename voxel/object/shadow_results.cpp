@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Applying the results of asynchronous relaxation to the object: row by row, within the limits of its links.
+// Applying a result of asynchronous relaxation to the object: row by row, or many rows together, within the
+// limits of their links.
 #include "voxel/object/shadow_object.h"
 
 #include <algorithm>
@@ -12,16 +13,17 @@ namespace voxel {
 
 namespace {
 
-// What a row cannot follow waits for its next turn where that is more than this of the spacing; less is what
-// any contact at its limits has in every result.
+// Of the spacing: if more than this is left of a row's motion, the row is tried again. Every contact at its
+// limits leaves less in each result.
 constexpr float kFollows = 0.01F;
-// Turns in all, and of what is near the contact at once: with 4 and 2 the force was 43 % off after four
-// results of a jump, with 8 and 4 by 2 %, with these after three.
+// Turns in all, and turns in the tick that applies the rows near the contact.
 constexpr int kTurns = 16, kTurnsAtOnce = 8;
 constexpr std::size_t kRowBytes = kRow * sizeof(float);
 
 }  // namespace
 
+// Packs the change of a row. False if no voxel moved by more than `least_m` and no load of bricks changed;
+// the caller drops the entry then.
 bool ShadowObject::pack_row(RowId row, float least_m) noexcept {
   float* way = found_[1 - taking_].add(row);
   float most = 0.0F;
@@ -50,10 +52,8 @@ void ShadowObject::fetch_change_ahead(RowId row) const noexcept {
   }
 }
 
-// Has what take_row() reads fetched while the rows before are added: what another core wrote, and rows that
-// no cache has kept since the last result. With nothing else on the machine that is where they are, and it
-// gains nothing; in real time a row takes 0.33 us in place of 0.54. (Of rows that are added together most
-// neighbours just were: what stands around is not fetched for them.)
+// Prefetches what apply_row() reads: lines that another core wrote, and rows that no cache kept since the
+// last result. Rows that are applied together have most of their neighbours in the cache.
 void ShadowObject::fetch_ahead(SoftObject& object, std::size_t n, bool together) const noexcept {
   if (n >= found_[taking_].count()) return;
   const RowId row = found_[taking_].row(n);
@@ -71,7 +71,8 @@ void ShadowObject::fetch_ahead(SoftObject& object, std::size_t n, bool together)
   object.relaxation_.couplings().fetch_ahead(row);
 }
 
-// Where the nth row of the parcel is to go, or a part of it, which is then left less.
+// Reads the motion of the nth row of the result, or a part of it; that part is subtracted from what is left.
+// Loads of bricks are copied.
 void ShadowObject::way_of(SoftObject& object, std::size_t n, float part, RowVector& ways) noexcept {
   const RowId row = found_[taking_].row(n);
   float* way = found_[taking_].values(n);
@@ -88,7 +89,7 @@ void ShadowObject::way_of(SoftObject& object, std::size_t n, float part, RowVect
   }
 }
 
-// True where free voxels did not follow; then what is left stands in the parcel.
+// True if free voxels did not follow; what is left of their motion is in the result then.
 bool ShadowObject::take_row(SoftObject& object, std::size_t n, float part) noexcept {
   Multigrid& to = object.relaxation_.multigrid();
   const RowId row = found_[taking_].row(n);
@@ -101,7 +102,7 @@ bool ShadowObject::take_row(SoftObject& object, std::size_t n, float part) noexc
   }
   to.add(row, ways, object.state_, object.obstacle_view());
   object.note_moved(row);
-  unsigned others = 0;  // all are counted: sought one by one, the first of them took longer than it spares
+  unsigned others = 0;  // all are counted: a search for the first took longer
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const float* there = object.state_.u[axis].data() + at(row);
     for (std::size_t i = 0; i < kRow; ++i) others += wanted[axis][i] != there[i] ? 1U : 0U;
@@ -122,9 +123,9 @@ bool ShadowObject::take_row(SoftObject& object, std::size_t n, float part) noexc
   return most > kFollows * static_cast<float>(lattice_.min_spacing_m());
 }
 
-// The rows first … before last of the parcel, each as far as its links to the others let it where those go.
-// (One after the other, what limits tie together stayed where it was. Where no limit holds there is nothing
-// in the way, and each by itself takes half as long.)
+// Applies rows first … last − 1 together: each goes as far as its links to the others' new places allow. Row
+// by row, voxels that active limits tie together would not move. Without active limits rows do not obstruct
+// one another, and one by one takes half the time.
 void ShadowObject::take_limited_correction(SoftObject& object, std::size_t first, std::size_t last,
                                            float part) noexcept {
   Multigrid& to = object.relaxation_.multigrid();
@@ -139,7 +140,7 @@ void ShadowObject::take_limited_correction(SoftObject& object, std::size_t first
   to.add_joined(object.state_);
   for (std::size_t n = first; n < last; ++n) {
     const RowId row = found_[taking_].row(n);
-    // By parts it is rounded otherwise than the other thread knows it.
+    // A part is rounded differently from what the shadow knows.
     if (!whole) to.log().note(0, row);
     bool gone = false;
     if (!to.joined(row, object.state_, left, gone)) {
@@ -171,12 +172,12 @@ void ShadowObject::take(SoftObject& object, int parts) noexcept {
   together_ = found_far_ || found_limited_;
   drained_ = near_count_;
   parts_left_ = parts;
-  // Loads of bricks come whole, so their ways do.
+  // Loads of bricks are not split, so their motion is not.
   take_part(object, parts <= 1 || in_turns_ || lattice_.has_bricks());
 }
 
-// While parts are left, as much of what was given counts as balanced as has not come yet: the two ends of a
-// way are both at rest, and where forces are linear so is what lies between.
+// While parts are left, the same fraction of the submitted residual stays frozen. Both ends of the motion are
+// at rest, and so is all between them as far as forces are linear.
 void ShadowObject::take_part(SoftObject& object, bool last) noexcept {
   const int left = std::max(parts_left_, 1);
   const bool whole = last || left == 1;
@@ -192,7 +193,7 @@ void ShadowObject::take_part(SoftObject& object, bool last) noexcept {
   } else {
     for (std::size_t n = 0; n < near_count_; ++n) {
       fetch_ahead(object, n + kAhead, false);
-      // By parts it is rounded otherwise than the other thread knows it.
+      // A part is rounded differently from what the shadow knows.
       if (left > 1) object.relaxation_.multigrid().log().note(0, found_[taking_].row(n));
       if (take_row(object, n, part) && whole) retry_.put(n);
     }

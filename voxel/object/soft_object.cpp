@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Construction and copy of a soft object, its touched voxels and their roles, and the chain that follows
+// them.
 #include "voxel/object/soft_object.h"
 
 #include <algorithm>
@@ -13,8 +15,8 @@
 namespace voxel {
 namespace {
 
-// Waves of the chain count as well, so much a row that they visit: eight of them a tick, which took 160 us of
-// an organ that is pressed deep. (Uncounted, the slowest ticks had all three.)
+// Counted work of one row that a wave of the chain visits. A tick has up to eight waves; they count as work
+// like its cycles.
 constexpr std::size_t kWorkOfVisit = 4;
 
 }  // namespace
@@ -94,8 +96,8 @@ std::unique_ptr<SoftObject> SoftObject::copy() const {
 }
 
 double SoftObject::reach(double tool_radius) const {
-  // Half a cell's diagonal would do for voxels at rest; pressed, they part. From a spacing and a half on none
-  // lets go (a test presses tools of a hundredth of a spacing three spacings deep).
+  // Half a cell's diagonal would do at rest, but pressed voxels part. From 1.5 spacings on no voxel loses the
+  // tool (tested with tools of a hundredth of a spacing, three spacings deep).
   return std::max(tool_radius + voxel_radius(), 1.5 * lattice_->max_spacing_m());
 }
 
@@ -104,12 +106,12 @@ SoftObject::Gap SoftObject::gap(const ToolInBody& tool, const glm::dvec3& positi
   if (tool.shape == ToolInBody::Shape::punch) {
     const double along = glm::dot(d, tool.axis);
     const double across2 = glm::dot(d, d) - along * along;
-    // Only what lies under the face, and not behind it, is pressed by it.
+    // The face presses what lies in front of it, not behind it.
     const bool under = across2 <= tool.radius * tool.radius && along > -4.0 * lattice_->max_spacing_m();
     return {under ? along - voxel_radius() : std::numeric_limits<double>::max(), tool.axis};
   }
   const double distance = glm::length(d);
-  // The tool's centre exactly on a voxel: any direction serves; back along the punch axis is one.
+  // The tool's centre is exactly on the voxel: any direction serves; the axis of the punch is one.
   const glm::dvec3 normal = distance > 0.0 ? d / distance : tool.axis;
   return {distance - reach(tool.radius), normal};
 }
@@ -144,7 +146,7 @@ void SoftObject::touch(std::span<const VoxelId> near) noexcept {
     ++pressed;
   }
   for (const Touch& t : touches_) state_.set_role(t.v, resting_role_at(t.surface));
-  // What the tool leaves behind springs back, however long it was at rest.
+  // Tissue that the tool leaves springs back, however long it was at rest.
   for (const Touch& t : touches_) {
     if (t.pressed) relaxation_.mark_dirty(t.v / kRow);
   }
@@ -183,9 +185,8 @@ Displacement::Role SoftObject::resting_role_at(std::uint32_t surface) const noex
                                                                              : Displacement::obstacle;
 }
 
-// Only what carries load is kept from the background. A voxel that is merely near the tool must move with its
-// neighbours, or a correction of the coarse levels tears at it (which grew from cycle to cycle when all were
-// held).
+// Only pressed voxels are kept from the background. A touched voxel without load has to move with its
+// neighbours: if it were held, coarse corrections would shear it, more in each cycle.
 void SoftObject::set_touch_roles() noexcept {
   for (const Touch& t : touches_) {
     const Displacement::Role resting = resting_role_at(t.surface);
@@ -193,7 +194,7 @@ void SoftObject::set_touch_roles() noexcept {
       state_.set_role(t.v, t.pressed ? Displacement::held : resting);
       continue;
     }
-    // What the tool and something else hold is the contact solver's alone.
+    // A voxel that the tool and something else press belongs to the contact solver alone.
     state_.set_role(t.v, resting == Displacement::free ? Displacement::pressed : Displacement::held);
     state_.tool_normal[t.surface] = glm::vec3(t.normal);
   }

@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A soft object that a tool can press: lattice, displacement, chain, relaxation and the contact between them.
-// Everything here is in the volume frame ("body") of the object: meters, newtons.
+// All points and vectors are in the volume frame ("body") of the object, in metres and newtons.
 //
-// One haptic tick uses it so (see hybrid/tick/tick.cpp):
-//   touch() names the surface voxels near the tool → push_out() moves what the tool overlaps, and the chain
-//   with it → relax_near() brings the neighbourhood of the contact near equilibrium → reaction() says what
-//   the tool feels and how stiff it is → the proxy moves by δ → follow() takes the pressed voxels along … a
-//   few times; relax_background() once.
+// Two words of the contact: a surface voxel near the tool is *touched* (a contact candidate, one Touch each);
+// a touched voxel that carries load towards the tool is *pressed* (an active contact). A *held* voxel does
+// not move while others relax. *Dependents* of a voxel are tied to it by links at active limits.
+//
+// One haptic tick calls (see hybrid/tick/tick.cpp): touch() takes the surface voxels near the tool →
+// push_out() moves voxels out of the tool, and the chain follows → relax_near() brings the neighbourhood of
+// the contact near equilibrium → reaction() returns force and stiffness → the proxy moves by δ → follow()
+// moves the pressed voxels along. The sequence from push_out() on repeats a few times; relax_background()
+// runs once.
 #pragma once
 
 #include <cstdint>
@@ -28,7 +32,7 @@ namespace voxel {
 
 class CompositeGrid;
 
-// The tool as one soft object sees it.
+// The tool in the frame of one soft object.
 struct ToolInBody {
   enum class Shape : std::uint8_t { ball, punch } shape = Shape::ball;
   glm::dvec3 centre{0.0};           // of the ball, or of the punch's flat face (unit: meter)
@@ -36,35 +40,34 @@ struct ToolInBody {
   double radius = 0.0;              // of ball or face (unit: meter)
 };
 
-// Force of the object on the tool, and how it grows when the tool moves: the quadratic model that the proxy
-// minimises.
+// Force of the object on the tool and its derivative: the quadratic model that the proxy minimises.
 struct Reaction {
   glm::dvec3 force_N{0.0};
-  glm::dmat3 stiffness_N_per_m{
-      0.0};  // symmetric, positive semi-definite; of the pressed voxels with all others still
+  // Symmetric, positive semi-definite; of the pressed voxels, with all other voxels fixed.
+  glm::dmat3 stiffness_N_per_m{0.0};
   std::uint32_t pressed = 0;  // voxels that carry load
 };
 
-// What one of several voxels that are held in place would pull at what holds it with.
+// Load of one voxel that something else than the tool presses: a rigid surface, or another soft object.
 struct HeldLoad {
-  glm::dvec3 force_N{0.0};            // of its links, and of what hangs on it by tight links
-  glm::dvec3 stiffness_N_per_m{0.0};  // per axis, of them all while the others stand still
-  bool tight = false;                 // some tight link hands part of its load to or from another voxel
-  bool balanced = false;              // limits and obstacles were found that hold it and all round it …
-  double pressed_N = 0.0;             // … it with so much along its normal
+  glm::dvec3 force_N{0.0};            // of its links and of its dependents
+  glm::dvec3 stiffness_N_per_m{0.0};  // per axis, of the voxel and its dependents, all others fixed
+  bool tight = false;                 // a link at its limit carries load between it and another voxel
+  bool balanced = false;   // the multipliers of limits and obstacles around it are known (AdmmRegion) …
+  double pressed_N = 0.0;  // … and its obstacle presses it with this force along the normal
 };
 
 // The tool's centre q must satisfy normal · q >= offset (body frame).
 struct ToolBound {
   glm::dvec3 normal{0.0};
   double offset = 0.0;
-  VoxelId voxel = 0;  // that is in the way
+  VoxelId voxel = 0;  // that bounds it
 };
 
 class SoftObject {
  public:
-  static constexpr std::size_t kMaxTouched =
-      4096;  // surface voxels near the tool; more are left to the next tick
+  // Surface voxels near the tool; further ones are left to the next tick.
+  static constexpr std::size_t kMaxTouched = 4096;
 
   explicit SoftObject(std::shared_ptr<const Lattice> lattice);
   ~SoftObject();
@@ -72,12 +75,14 @@ class SoftObject {
   SoftObject& operator=(const SoftObject&) = delete;
   SoftObject(SoftObject&&) = delete;
   SoftObject& operator=(SoftObject&&) = delete;
-  // The same object in the same state, sharing the lattice; for references found beside a running session.
+  // The same object in the same state; the lattice is shared. For references beside a running session.
+  // Allocates.
   [[nodiscard]] std::unique_ptr<SoftObject> copy() const;
 
   [[nodiscard]] const Lattice& lattice() const { return *lattice_; }
   [[nodiscard]] const Displacement& state() const { return state_; }
-  // How far a voxel has moved; in state() only where the object keeps its contact there (see below).
+  // Displacement of a voxel (unit: meter). state() has it only if the object does not use patches (see
+  // below).
   [[nodiscard]] glm::dvec3 displacement(VoxelId v) const noexcept {
     return on_grid_ ? displacement_on_grid(v) : state_.at(v);
   }
@@ -86,101 +91,100 @@ class SoftObject {
   }
   // A voxel is a ball of half its smallest spacing: the tool's surface stays this far from its centre.
   [[nodiscard]] double voxel_radius() const { return 0.5 * lattice_->min_spacing_m(); }
-  // Distance of a ball tool's centre to the centre of a voxel it touches. A tool smaller than the gaps
+  // Distance from a ball tool's centre to the centre of a voxel in contact. A tool smaller than the gaps
   // between voxels is felt as one that just cannot slip between them.
   [[nodiscard]] double reach(double tool_radius) const;
 
-  // A large object may keep what a tool does to it on a composite grid (grid.h): then
-  // a tick costs the same for any depth and size, and state() is the object as it was before, at rest, while
-  // displacement() is asked for what is felt. For objects that meet nothing but the tool. Returns what is in
-  // the way of that, and it stays as it is; empty: nothing. Allocates.
+  // A large object may keep its contact on nested patches (composite/grid.h). Then the cost of a tick does
+  // not depend on depth and size, state() stays at rest as it was before the contact, and displacement()
+  // returns what is felt. Only for objects that touch nothing but the tool. Returns the reason why the object
+  // is unsuitable, and changes nothing then; empty if patches are in use. Allocates.
   static constexpr std::size_t kLeastOnGrid = 10'000;  // voxels
   std::string use_composite_grid(const ToolInBody& tool);
   [[nodiscard]] bool uses_patches() const { return grid_ != nullptr; }
-  // While something is pressed.
+  // Null unless something is pressed.
   [[nodiscard]] const CompositeGrid* patches_in_use() const { return on_grid_ ? grid_.get() : nullptr; }
-  // Once a tick, while nothing is pressed: what a contact with this tool will need is made ready, a part at a
-  // time.
+  // Once a tick while nothing is pressed: prepares a part of the patches for a contact with this tool.
   void come_near_on_grid(const ToolInBody& tool) noexcept;
-  // Surface voxels where the contact is: while there is one, what may be touched is among them.
+  // Surface voxels in the finest patch. During a contact every touched voxel is among them.
   [[nodiscard]] std::span<const VoxelId> near_on_grid() const { return near_on_grid_; }
-  // Boxes many times as wide, for references. Allocates.
+  // Patches many times as wide, for references. Allocates.
   void widen_patches();
 
   // ---- the tick; none of these allocates, locks or throws ----
-  // The surface voxels near the tool, each once; at most kMaxTouched are kept.
+  // Sets the touched voxels: surface voxels near the tool, each once; at most kMaxTouched are kept.
   void touch(std::span<const VoxelId> near) noexcept;
-  // Moves every touched voxel that the tool overlaps out of it, and the chain after. True when any was.
+  // Moves every touched voxel out of the tool, and the chain follows. True if any voxel overlapped the tool.
   bool push_out(const ToolInBody& tool) noexcept;
   void relax_near(const ToolInBody& tool, int sweeps) noexcept;
-  // Was there, since touch(), a wide cycle round the contact, or a part of one? What it leaves of a tick, as
-  // Relaxation counts work.
+  // Since touch(): was there a cycle around a large contact patch, or a part of one? work_left() is the
+  // counted work (see Relaxation) that this tick has left.
   [[nodiscard]] bool large_patch_cycle() const { return split_cycle_; }
-  // Of the counted work that a tick has for its contact, where another relaxes the object: 1, all of it, or
-  // less, for a machine on which that takes too long. What is not done in one tick is in the next ones.
+  // Share (0 to 1) of the counted work that a tick may spend on its contact under asynchronous relaxation;
+  // less than 1 for a slow machine. Later ticks do what remains.
   void set_work_share(double share) noexcept {
     work_share_ = share;
     relaxation_.set_narrow_share(share);
   }
   [[nodiscard]] double work_share() const { return work_share_; }
   [[nodiscard]] std::size_t work_left() const noexcept;
-  // Is the tool pressed into it, wide enough for cycles in parts, and hardly moves? A voxel that slips, or a
-  // result on its way, is no motion.
+  // Does the tool press a large patch and hardly move? Slip of single voxels and results that are still to
+  // come do not count as motion.
   [[nodiscard]] bool held_still() const noexcept;
-  // While the tool presses it, no cycle round the contact is begun, or goes on, in the next tick.
+  // In the next tick no contact cycle begins or continues while the tool presses the object.
   void ask_to_rest() noexcept { asked_to_rest_ = true; }
-  // Part of what it takes to be given to a replica, or to take what that found, done in the tick before it;
-  // false where there is too little of it to be worth a tick.
+  // Does a part of the work of the next exchange with the ShadowObject one tick ahead. False if too little of
+  // that work is due to be worth a tick.
   bool prepare_exchange() noexcept;
   [[nodiscard]] Reaction reaction(const ToolInBody& tool) noexcept;
-  // The tool moves by `delta`: pressed voxels go along, each by the part of it along its own normal.
+  // The tool moves by `delta` (unit: meter): each pressed voxel moves by the component of it along its own
+  // normal.
   void follow(const glm::dvec3& delta) noexcept;
-  // The tool as a tick begins: where each touched voxel is in it.
+  // At the start of a tick: records how deep each touched voxel is in the tool.
   void note_depths(const ToolInBody& tool) noexcept;
-  // Where the chain did not let voxels out of the tool's way, the tool has to give way. But what did not move
-  // can stop a tool, and cannot push one: where it was as deep when the tick began, the tool may stay, and
-  // what was beside a punch then stops it by its side. (A punch that slid sideways under 8 mm of anchored
-  // tissue was lifted out by it, and gave the hand 35 mJ from nothing.) Returns how many bounds were written.
+  // Half-spaces that the tool may not enter, because the chain kept voxels from leaving it. A voxel that does
+  // not move may stop the tool but must not push it: the tool may stay as deep as it was when the tick began.
+  // A voxel that was beside a punch then bounds the punch sideways. Returns the number of bounds written.
   std::size_t give_way(const ToolInBody& tool, std::span<ToolBound> out) const noexcept;
-  // Whether a voxel cannot move along `direction` because tight links tie it to what stands still: anchors,
-  // or voxels on rigid surfaces. Looks along the largest component of it, no further than some hundred
-  // voxels.
+  // Whether links at their limits, in a row, tie a voxel to something that does not move along `direction`:
+  // an anchor, or a voxel on a rigid surface. Searches along the largest component of `direction`, through a
+  // few hundred voxels at most.
   [[nodiscard]] bool is_immovable(VoxelId v, const glm::dvec3& direction) noexcept;
   std::uint64_t relax_background(std::uint64_t budget) noexcept;
-  // One whole cycle of it, however long that takes; nothing when at rest.
+  // One cycle over the whole object, whatever it costs; nothing if the object is at rest.
   void relax_cycle() noexcept;
 
   // Before the first set_obstacle(); allocates.
   void reserve_obstacles();
-  // Some of them will move: all memory that this takes, now. Before a ShadowObject is made; allocates.
+  // Call if obstacles will move, before a ShadowObject is made: allocates all memory for that.
   void prepare_beside_bodies();
-  // A rigid surface near surface voxel number s (index into lattice().surface()); a zero normal: none any
-  // more.
+  // Sets the rigid surface near surface voxel number s (index into lattice().surface()). A zero normal
+  // removes it.
   void set_obstacle(std::size_t surface_number, const Obstacle& obstacle) noexcept;
   [[nodiscard]] std::span<const Obstacle> obstacles() const { return obstacles_; }
-  // Obstacles moved: brings these surface voxels out of theirs, as one wave, and the chain with them.
+  // After obstacles moved: brings these surface voxels out of theirs in one wave, and the chain follows.
   void leave_obstacles(std::span<const std::uint32_t> surface_numbers) noexcept;
-  // What voxels that obstacles hold press these with, each of `held` once, in their order. The first
-  // `pressed` of them, kMaxTouched at most, do; the others are near: what of them hangs on the first is not
-  // theirs.
+  // Loads of voxels that obstacles press; `held` lists each once, in the order of `loads`. The first
+  // `pressed` of them (kMaxTouched at most) are pressed; the others are near, and dependents of the first do
+  // not count as theirs.
   void load_held(std::span<const VoxelId> held, std::size_t pressed, std::span<HeldLoad> loads) noexcept;
-  // What obstacles that answer to nothing press, while another thread relaxes the object and links there are
-  // at their limits: goes on towards its least energy with all round it. A result is added row by row, and
-  // none of them can go that way by itself.
+  // Under asynchronous relaxation: if links at voxels pressed by fixed obstacles are at their limits, relaxes
+  // these voxels and their neighbourhood together (AdmmRegion). Results of the shadow are applied row by row
+  // and cannot move them.
   void relax_held(std::span<const VoxelId> pressed) noexcept;
-  // An obstacle that surface voxel number s lay on went away: it looks for its place.
+  // The obstacle of surface voxel number s is gone: the voxel is relaxed again.
   void mark_dirty(std::size_t surface_number) noexcept;
-  // Where there may be obstacles: rows that the chain moved, or what was found apart, since these were
-  // forgotten, each once, the first kMostMovedRows of them.
+  // Rows that the chain or a result of the shadow moved since forget_moved_rows(), each once, the first
+  // kMostMovedRows of them: obstacles may have to be looked up there.
   static constexpr std::size_t kMostMovedRows = 1024;
   [[nodiscard]] std::span<const RowId> moved_rows() const { return moved_rows_; }
   void forget_moved_rows() noexcept;
-  // A voxel pressed by another soft object: moved by the caller, held meanwhile, until it was released as
-  // often as it was held. See facet_contact.h.
+  // Claims a voxel that another soft object presses: its role is `held`, and only the caller moves it. Calls
+  // nest: it is free after as many release() calls. See facet_contact.h.
   void hold(VoxelId v) noexcept;
   void release(VoxelId v) noexcept;
-  // What other objects press it with (body frame, N): a tool under which the chain is tight down to it feels
-  // that.
+  // Force of other soft objects on a surface voxel (body frame, N). If the chain is tight down to that voxel,
+  // the tool feels this force.
   void clear_pair_load(std::uint32_t surface_number) noexcept {
     pair_load_[surface_number] = glm::vec3(0.0F);
   }
@@ -190,124 +194,127 @@ class SoftObject {
   [[nodiscard]] glm::dvec3 pair_load(std::uint32_t surface_number) const noexcept {
     return glm::dvec3(pair_load_[surface_number]);
   }
-  // What hangs by tight links on the voxels that pairs press, kMaxTouched of them at most: as it is now,
-  // until it is forgotten.
+  // Finds the dependents of the voxels that pairs press (kMaxTouched of them at most); they stay as found
+  // until they are forgotten.
   void find_hanging_on_pairs() noexcept;
   void forget_hanging_on_pairs() noexcept;
-  // While something does, in an object that the tool does not press and another thread relaxes: a cycle round
-  // these voxels, or a part of a wide one. Otherwise nothing.
+  // If there are dependents, the tool presses nothing, and relaxation is asynchronous: one cycle around these
+  // voxels, or a part of one for a large patch.
   void relax_near_pairs() noexcept;
-  // Of one of them, what that pulls it by, without its own links, and the springs of them all; 0: nothing
-  // hangs on it.
+  // Load and stiffness of one such voxel's dependents, without its own links; zero if it has none.
   [[nodiscard]] HeldLoad hanging_on_pair(std::uint32_t surface_number) const noexcept {
     if (hanging_on_pairs_.empty()) return {};
     const std::uint32_t entry = hanging_entry_[surface_number];
     return entry == 0 ? HeldLoad{} : hanging_on_pairs_[entry - 1U];
   }
-  // For the pair solver. Where its links alone would have a voxel, and how far a force of 1 N on it alone
-  // would move it (m/N): both 0 where it is anchored.
+  // For the pair solver: the displacement at which the links alone are in equilibrium, and the compliance per
+  // axis (m/N); both 0 at an anchor.
   [[nodiscard]] glm::dvec3 free_displacement(VoxelId v) noexcept;
   [[nodiscard]] glm::dvec3 compliance(VoxelId v) noexcept;
-  // Moves it, as far as its links allow.
+  // Moves a voxel as far as its links allow.
   void move(VoxelId v, const glm::dvec3& displacement) noexcept;
-  // Moves it however far, and, once all that is to be moved so was, the chain after: anchors and rigid
-  // surfaces may keep it from getting there.
+  // drag() moves a voxel regardless of its links. After all drags settle_dragged() lets the chain follow;
+  // anchors and rigid surfaces may keep a voxel from getting there.
   void drag(VoxelId v, const glm::dvec3& by) noexcept;
   void settle_dragged() noexcept;
 
   [[nodiscard]] bool moved_ever() const { return moved_ever_; }
   [[nodiscard]] bool asleep() const { return relaxation_.asleep() && !on_grid_; }
-  // Largest force left on any free voxel (N): what separates the state from equilibrium.
+  // Largest force left on any free voxel (N).
   [[nodiscard]] double residual_N() const { return relaxation_.residual_N(); }
   [[nodiscard]] const Relaxation& relaxation() const { return relaxation_; }
-  // Touched voxels of the last touch(), for the map to look at, and their surface numbers.
+  // Touched voxels of the last touch(), and their surface numbers.
   [[nodiscard]] std::span<const VoxelId> touched() const { return touched_voxels_; }
   [[nodiscard]] std::span<const std::uint32_t> touched_numbers() const { return touched_numbers_; }
-  // Number of a surface voxel; kNoSurface for one inside.
+  // Surface number of a voxel; kNoSurface for one inside.
   static constexpr std::uint32_t kNoSurface = Lattice::kNoSurface;
   [[nodiscard]] std::uint32_t surface_number(VoxelId v) const { return lattice_->surface_number(v); }
 
-  // Displacement at any rest point in the body, from the voxels around it (unit: meter); 0 where none is
+  // Displacement at any rest point in the body, interpolated between voxels (unit: meter); 0 if no voxel is
   // near.
   [[nodiscard]] glm::dvec3 displacement_at(const glm::dvec3& rest_point) const noexcept;
 
-  // What its springs pull the anchors with (N, body frame): at rest, what presses it, whether or not links
-  // are at their limits. Empty where a link to an anchor is, which carries what no spring says. For
+  // Force of the springs on the anchors (N, body frame); at rest it equals the force that presses the object.
+  // Empty if a link to an anchor is at its limit, because springs do not know what that link carries. For
   // references.
   [[nodiscard]] std::optional<glm::dvec3> carried_by_anchors_N() const noexcept;
-  // What the springs store, and what yielding spent since the last state of rest (J); for tests and reports.
+  // Energy of the springs plus plastic dissipation since the last state of rest (J). For tests and reports.
   [[nodiscard]] double energy_J() const noexcept;
-  // Relaxes with the tool still until the residual is below `tolerance_N` or `max_cycles` passed; true when
-  // it is. For references, not for the tick.
+  // Relaxes with the tool fixed until the residual is below `tolerance_N` or `max_cycles` passed; true in the
+  // first case. For references, not for the tick.
   bool settle(const ToolInBody& tool, double tolerance_N, int max_cycles) noexcept;
 
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
-  friend class ShadowObject;  // the same object, relaxed elsewhere
-  // Voxels of an object that has all its memory from the start, 280 bytes a voxel: what a tick touches for
-  // the first time takes it five times as long. A larger one gets it where it is touched.
+  friend class ShadowObject;  // relaxes the same object on another thread
+  // Objects with fewer voxels get all memory at construction (280 bytes a voxel), because the first access to
+  // a page in a tick is slow. Larger objects get memory on first access.
   static constexpr std::size_t kPreparedWhole = 1U << 21U;
 
   struct Touch {
     VoxelId v;
-    std::uint32_t surface;   // its surface number, which takes a search to find
+    std::uint32_t surface;   // surface number; finding it is a search
     bool pressed = false;    // carries load towards the tool
-    glm::dvec3 rest{0.0};    // asked for several times a tick, and to find it takes two divisions
+    glm::dvec3 rest{0.0};    // stored, because it is used several times a tick and costs two divisions
     glm::dvec3 normal{0.0};  // from tool to voxel, unit
-    glm::dvec3 load{0.0};    // of its links; beside other soft objects, of what hangs on it, too (N)
-    double noted = 0.0;      // how deep it was in the tool as the tick began (m)
-    bool beside = false;     // it was beside a punch then
-    bool tight = false;      // some tight link hands part of its load to or from another voxel
-    glm::dvec3 left{0.0};    // the way it had still to go when the object was given away (m)
-    std::uint16_t part = 0;  // without slack that it is in, plus one; 0: none
+    glm::dvec3 load{
+        0.0};  // of its links; with other soft objects, blocks or obstacles also of its dependents (N)
+    double noted = 0.0;      // depth in the tool at the start of the tick (m)
+    bool beside = false;     // it was beside a punch at the start of the tick
+    bool tight = false;      // a link at its limit carries load between it and another voxel
+    glm::dvec3 left{0.0};    // the motion that it still had to make when the residual was frozen (m)
+    std::uint16_t part = 0;  // number of its rigid block plus one; 0: none
   };
   struct Gap {
-    double distance = 0.0;  // of the voxel from the tool's surface along normal; negative: overlap
+    double distance = 0.0;  // from the voxel to the tool's surface along normal; negative: overlap
     glm::dvec3 normal{0.0};
   };
-  static constexpr std::size_t kMaxCarried =
-      20'000;                                   // voxels that may hang on the pressed ones by tight links
-  static constexpr double kDirtyMotion = 1e-5;  // of the spacing: voxels that moved less wake nobody
-  static constexpr double kGiveWay = 0.01;      // of the voxel radius: less is left to the next push
+  static constexpr std::size_t kMaxCarried = 20'000;  // pressed voxels and their dependents
+  static constexpr double kDirtyMotion = 1e-5;        // of the spacing: a smaller motion wakes nothing
+  // Of the voxel radius: less overlap is left to the next push_out().
+  static constexpr double kGiveWay = 0.01;
   struct Carried {
     VoxelId v;
-    std::uint32_t touch;  // whose load it adds to
+    std::uint32_t touch;  // touch (or index of a load) to which its load is added
   };
-  struct Hanging {       // as Carried, by the link through which it was first reached
+  struct Hanging {       // a dependent, by the link through which it was first reached
     std::uint32_t from;  // index into carried_
-    bool up, down;       // that link is at the limit that pulls it up, down
-    double load;         // of it, and of what hangs on it (N)
+    bool up, down;       // the limit that the link is at pushes it up, down
+    double load;         // of the voxel and of its own dependents (N)
   };
 
   [[nodiscard]] glm::dvec3 position(const Touch& t) const { return t.rest + displacement(t.v); }
   [[nodiscard]] Gap gap(const ToolInBody& tool, const glm::dvec3& position) const noexcept;
-  // Where a voxel that is in the tool goes, its links wishing it at `wished` (from its rest place); `g`: its
-  // gap there, and in the end its last one.
+  // Projects a voxel out of the tool, in the metric of its springs. `wished`: displacement that its links
+  // want. `g`: its gap there on entry, its last gap on return.
   [[nodiscard]] glm::dvec3 project_on_tool(const ToolInBody& tool, const glm::dvec3& rest,
                                            const glm::dvec3& wished, const glm::dvec3& compliance,
                                            Gap& g) const noexcept;
-  // Is the gap no overlap? Most that is near is far enough to be told so without a root: surely.
+  // surely_clear_of() is a test without a root that is true for most voxels outside of the tool; clear_of()
+  // is exact.
   [[nodiscard]] bool surely_clear_of(const ToolInBody& tool, const glm::dvec3& position) const noexcept;
   [[nodiscard]] bool clear_of(const ToolInBody& tool, const glm::dvec3& position) const noexcept;
   void settle_chain() noexcept;
   void note_moved(RowId row) noexcept;
-  // When no tool presses; of a voxel, and of a surface number.
+  // Role of a voxel that the tool does not press; by id, and by surface number.
   [[nodiscard]] Displacement::Role resting_role(VoxelId v) const noexcept;
   [[nodiscard]] Displacement::Role resting_role_at(std::uint32_t surface) const noexcept;
   [[nodiscard]] bool pair_held(const Touch& t) const {
     return !held_voxels_.empty() && pair_held_[t.surface] != 0;
   }
   void set_touch_roles() noexcept;
-  void assign_residual() noexcept;      // what pulls near the contact is somebody else's
-  void keep_away(float part) noexcept;  // … and this part of it still is
+  void assign_residual() noexcept;      // freezes the residual near the contact: the shadow owns it now …
+  void keep_away(float part) noexcept;  // … and this part of it still
   std::size_t list_held() noexcept;
   [[nodiscard]] bool any_pressed() const noexcept;
   [[nodiscard]] bool cycle_due() const noexcept;
   [[nodiscard]] std::size_t shared(std::size_t work) const noexcept;
-  [[nodiscard]] std::size_t left_of(std::size_t work) const noexcept;  // of a tick's; less while all is cold
-  // From rest, all three: on the way to `place` no deeper in the tool than it is now; on the tool and within
-  // its links' limits; where a touched voxel belongs.
+  [[nodiscard]] std::size_t left_of(
+      std::size_t work) const noexcept;  // of a tick's counted work; less while memory is cold
+  // Displacements from rest. clamp_depth_in_tool() shortens the way to `place` so that the voxel gets no
+  // deeper into the tool than it is now. project_on_tool_within_limits() finds the least energy on the tool
+  // within the links' limits. project_voxel() is the constrained projection of one touched voxel.
   [[nodiscard]] glm::dvec3 no_deeper_in(const ToolInBody& tool, const glm::dvec3& rest, const glm::dvec3& now,
                                         const glm::dvec3& place) const noexcept;
   [[nodiscard]] glm::dvec3 project_on_tool_within_limits(const ToolInBody& tool, const VoxelLinks& links,
@@ -355,7 +362,8 @@ class SoftObject {
   [[nodiscard]] double depth_on_grid() const noexcept;
   [[nodiscard]] Reaction reaction_on_grid(const ToolInBody& tool) const noexcept;
   [[nodiscard]] bool at_anchors_end(VoxelId v, const glm::dvec3& direction) const noexcept;
-  // The axis along which a voxel is pressed, the way out of the tool, and where on it the tool's surface is.
+  // Bound of a pressed voxel on one axis: the axis, the direction out of the tool, and the displacement at
+  // the tool's surface.
   struct Bound {
     int axis = 0;
     double way = 1.0, u = 0.0;
@@ -368,64 +376,65 @@ class SoftObject {
   Displacement state_;
   ChainMail chain_;
   Relaxation relaxation_;
-  LazyArray<std::uint16_t> pair_held_;      // [surface number] pairs with other soft objects it is in
-  LazyArray<glm::vec3> pair_load_;          // [surface number] and with what force (N)
-  std::vector<VoxelId> pair_roots_;         // what pairs press, hardest first
-  std::vector<HeldLoad> hanging_on_pairs_;  // [as pair_roots_]; empty: nothing hangs on any
-  LazyArray<std::uint32_t> hanging_entry_;  // [surface number] 1 + index into these; 0: none
-  std::vector<Obstacle> obstacles_;         // [surface number], empty when there is none
-  std::size_t moving_obstacles_ = 0;        // of them, those of bodies that move
+  LazyArray<std::uint16_t> pair_held_;      // [surface number] number of pairs that claim it
+  LazyArray<glm::vec3> pair_load_;          // [surface number] force of other soft objects (N)
+  std::vector<VoxelId> pair_roots_;         // voxels that pairs press, hardest first
+  std::vector<HeldLoad> hanging_on_pairs_;  // [as pair_sources_] their dependents; empty: none
+  LazyArray<std::uint32_t> hanging_entry_;  // [surface number] 1 + index into pair_sources_; 0: none
+  std::vector<Obstacle> obstacles_;         // [surface number]; empty: there are no obstacles
+  std::size_t moving_obstacles_ = 0;        // number of obstacles on moving bodies
   std::vector<RowId> moved_rows_;
-  LazyArray<std::uint8_t> row_moved_;             // 1: among them; empty: no obstacles
-  std::vector<std::uint32_t> changed_obstacles_;  // surface numbers, since a replica was last told
-  std::vector<std::uint8_t> obstacle_changed_;    // [surface number] 1: among them; empty: no replica
+  LazyArray<std::uint8_t> row_moved_;             // 1: in moved_rows_; empty: no obstacles
+  std::vector<std::uint32_t> changed_obstacles_;  // surface numbers, since the last submission to the shadow
+  std::vector<std::uint8_t> obstacle_changed_;  // [surface number] 1: in changed_obstacles_; empty: no shadow
   LazyVector<Touch> touches_;
-  LazyVector<Touch> touched_before_;   // those pressed then
-  std::vector<VoxelId> pressed_last_;  // while any is pressed, and in the call in which the last is let go
-  ToolInBody tool_;                    // as relax_near() last saw it
+  LazyVector<Touch> touched_before_;   // those that were pressed
+  std::vector<VoxelId> pressed_last_;  // pressed voxels, kept for the call in which the last one is released
+  ToolInBody tool_;                    // of the last relax_near()
   std::vector<VoxelId> touched_voxels_;
   std::vector<std::uint32_t> touched_numbers_;  // [as touched_voxels_] surface number
-  LazyVector<VoxelId> held_voxels_;             // by pairs
-  LazyVector<VoxelId> all_held_;                // by the tool, too
+  LazyVector<VoxelId> held_voxels_;             // claimed by pairs
+  LazyVector<VoxelId> all_held_;                // pressed by the tool, then claimed by pairs
   LazyVector<VoxelId> sources_;
   LazyVector<glm::vec3> moves_;
-  std::vector<BlockBound> block_bounds_;    // of one part without slack: of touches, then others
-  std::vector<std::uint32_t> bound_touch_;  // [as block_bounds_] of the first, index into touches_
-  std::vector<std::uint8_t> block_seen_;    // [part] 1: for_touched_blocks() was there
+  std::vector<BlockBound> block_bounds_;    // of one rigid block: first of its touches, then others
+  std::vector<std::uint32_t> bound_touch_;  // [as the first of block_bounds_] index into touches_
+  std::vector<std::uint8_t> block_seen_;    // [block] 1: for_touched_blocks() has visited it
   LimitReactions limit_reactions_;
   LimitFollowers limit_followers_;
-  std::vector<VoxelId> roots_;              // of these: what is pressed and not anchored
-  LazyVector<Carried> carried_;             // [pressed first, then what hangs on them by a tight link]
-  LazyVector<Hanging> hanging_;             // [as carried_]
-  LazyArray<std::uint8_t> carried_mark_;    // [v] 1: in carried_ (within touch(): was pressed)
-  LazyArray<std::uint32_t> carried_index_;  // [v]
-  double unrelaxed_m_ = 0.0;                // motion of pressed voxels since the background was last woken
-  double unsettled_m_ = 0.0;                // how far the contact may be from the rest of the object
-  std::size_t contact_work_ = 0;            // since touch(), of cycles round the contact …
-  int cycles_since_touch_ = 0;              // of which there were so many
-  int cold_ticks_ = 0;                      // for which what is near the contact is in no cache
+  std::vector<VoxelId> roots_;            // sources for these two: pressed voxels that are not anchored
+  LazyVector<Carried> carried_;           // pressed voxels first, then their dependents
+  LazyVector<Hanging> hanging_;           // [as carried_]
+  LazyArray<std::uint8_t> carried_mark_;  // [v] 1: in gathered_ (within touch(): was pressed; between drag()
+                                          // and settle_dragged(): was dragged)
+  LazyArray<std::uint32_t> carried_index_;  // [v] touch or load of that voxel; only if marked
+  double unrelaxed_m_ = 0.0;                // motion of pressed voxels since the last wake of the background
+  double unsettled_m_ = 0.0;                // estimated distance of the contact from equilibrium
+  std::size_t contact_work_ = 0;            // counted work of contact cycles since touch() …
+  int cycles_since_touch_ = 0;              // … and their number
+  int cold_ticks_ = 0;  // ticks for which the contact's neighbourhood is not in the caches yet
   double work_share_ = 1.0;
-  bool split_cycle_ = false;  // one of those cycles was wide
+  bool split_cycle_ = false;  // a cycle around a large patch ran, or a part of one
   bool asked_to_rest_ = false;
-  bool rests_ = false;     // none of them is begun now, if that can wait
-  bool dragging_ = false;  // sources_ are what drag() moved, moves_ where they were
+  bool rests_ = false;     // no contact cycle begins in this tick unless the tool jumps
+  bool dragging_ = false;  // sources_ lists dragged voxels, moves_ where they were
   bool moved_ever_ = false;
-  bool anchors_pull_ = false;            // since push_out(), a wave of the chain came to some, and they held
-  bool beside_bodies_ = false;           // that move
-  bool on_grid_ = false;                 // there is a contact, and it is on the composite grid
-  std::unique_ptr<CompositeGrid> grid_;  // none: contacts are in state_
+  bool anchors_pull_ = false;   // since push_out() a wave of the chain reached anchors that stopped it
+  bool beside_bodies_ = false;  // moving bodies
+  bool on_grid_ = false;        // there is a contact, and it is on nested patches
+  std::unique_ptr<CompositeGrid> grid_;  // null: contacts are in state_
   std::vector<VoxelId> near_on_grid_;
-  struct TouchOnGrid {  // of those in the box of level 0, near the tool as a cycle begins
+  struct TouchOnGrid {  // touched voxels in the finest patch, as a cycle begins
     std::uint32_t touch;
     std::array<int, 3> voxel;
     double gap_m;
   };
   std::vector<TouchOnGrid> touches_on_grid_;
-  std::array<int, 3> centre_{};                      // of the contact
-  std::uint32_t grid_cycles_ = 0;                    // since it began
-  glm::dvec3 grid_force_N_{0.0}, grid_tool_m_{0.0};  // and where the tool was
+  std::array<int, 3> centre_{};                      // of the contact (voxel)
+  std::uint32_t grid_cycles_ = 0;                    // since the contact began
+  glm::dvec3 grid_force_N_{0.0}, grid_tool_m_{0.0};  // force and tool position of the last cycle
   ContactEnergy contact_energy_;
-  double nearest_m_ = 0.0;  // of a voxel to the tool
+  double nearest_m_ = 0.0;  // smallest gap between a voxel and the tool
 };
 
 }  // namespace voxel

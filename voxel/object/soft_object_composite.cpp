@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A soft object whose contact is on a composite grid (grid.h): what the tick asks of it.
+// A soft object whose contact is on nested patches (composite/grid.h).
 //
-// The object's own state stays as it is, complete and at rest, and nothing is ever written there that would
-// have to be taken back: where the tissue is while it is pressed is asked of the grid, voxel by voxel, and
-// when the tool leaves, that is over.
+// The object's own state stays at rest and complete, and nothing is written to it. While tissue is pressed
+// its displacement is read from the patches; when the tool leaves, the patches are dropped.
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -15,29 +14,28 @@
 namespace voxel {
 namespace {
 
-// Of level 0, beyond the contact, and where the tool is so wide that this would be more than a tick has time
-// for (voxels).
+// Voxels of the finest patch beyond the contact, and the least number, for a tool so wide that more would
+// exceed the work of a tick.
 constexpr int kMargin = 6, kLeastMargin = 4;
 constexpr double kFelt = 0.3;          // of the force: an axis with less is relaxed in every second tick
-constexpr std::uint32_t kAllAxes = 4;  // cycles of a contact that has just begun
-// So near the tool a voxel is pressed, and so far from it tissue that is on its way is felt still (spacings).
+constexpr std::uint32_t kAllAxes = 4;  // first cycles of a contact that relax all axes
+// Spacings: a voxel this near to the tool is pressed; tissue this far from it on its way back is still felt.
 constexpr double kPressed = 0.02, kOnItsWay = 0.5;
-// How much stiffer than its secant the tissue is taken to be for the proxy's next step, along its force and
-// across it. Within limits force grows with the square of the depth (2), else by 1 to 1.5.
+// Tangent stiffness over secant stiffness for the proxy's next step, along the force and across it. Within
+// limits force grows with the square of the depth (2), else with a power of 1 to 1.5.
 constexpr double kTangent = 2.0, kAcross = 0.5;
-// Displacements far away go with this power of the depth. (The force goes with 1.9 of it. With 2 and more a
-// hand gains energy by pressing fast: up to 4 uJ of 464, where 1.7 loses some.)
+// Displacements far away scale with this power of the depth.
 constexpr double kWithDepth = 1.7;
 constexpr double kLeastToScale = 0.1, kMostScaled = 1.0;  // spacings deep; of the depth, in one cycle
 constexpr double kLeastDepth = 0.05;                      // of the spacing
-constexpr double kNear = 3.0;       // spacings: what is further from the tool is asked nothing
-constexpr double kAtRest_N = 1e-5;  // of anchors that carry no more, and nothing pressed, contact is over
-constexpr double kMoves = 0.03;     // spacings that a tool moves before there is another cycle in a tick
-constexpr double kFlat = 1.5;       // spacings differ by no more than this where a ball's contact is known
+constexpr double kNear = 3.0;       // spacings: surface voxels further from the tool are skipped
+constexpr double kAtRest_N = 1e-5;  // force on the anchors below which a contact with nothing pressed ends
+constexpr double kMoves = 0.03;     // spacings: a tool that moved further gets a second cycle in the tick
+constexpr double kFlat = 1.5;  // greatest ratio of spacings for which the width of a ball's contact is known
 
-// Before a cycle, of a contact that has gone on by `way_m`: what is far away goes along, and what is near as
-// far as the tool has gone. (With all of it multiplied, the tool found tissue further out than it had left
-// it, and pressed that and all behind it in again.)
+// Before a cycle: extrapolates the displacement of a contact that deepened by `way_m`. Far tissue is scaled,
+// near tissue moves with the tool. Scaling all of it would move tissue away from the tool and press it in
+// again.
 void go_along(CompositeGrid& grid, const std::array<int, 3>& centre, const glm::dvec3& force_N,
               const glm::dvec3& way_m, double spacing_m) noexcept {
   if (!grid.in_fine_patch(centre)) return;
@@ -56,7 +54,7 @@ std::string SoftObject::use_composite_grid(const ToolInBody& tool) {
   if (lattice_->voxel_count() < kLeastOnGrid) return "it is small enough to be known voxel by voxel";
   if (!obstacles_.empty() || moved_ever_) return "rigid surfaces are near it";
   if (lattice_->max_spacing_m() > kFlat * lattice_->min_spacing_m()) return "its voxels are not cubes";
-  // A ball meets tissue no further out than where it is steeper than links let a surface be.
+  // A ball touches tissue only where the ball is no steeper than links let a surface be.
   const double h = lattice_->min_spacing_m();
   double steepest = 0.0;
   for (int d = 0; d < 3; ++d)
@@ -96,13 +94,13 @@ glm::dvec3 SoftObject::position_on_grid(VoxelId v) const noexcept {
   return glm::dvec3(c[0] * h.x, c[1] * h.y, c[2] * h.z) + u;
 }
 
-// As much of the surface as the box of level 0 may have in it.
+// Greatest number of surface voxels in the finest patch.
 std::size_t SoftObject::most_in_box(int half_width) const {
   const std::size_t across = 2 * static_cast<std::size_t>(half_width) + 2;
   return std::min(lattice_->surface().size(), across * across * across);
 }
 
-// The surface in the box of level 0, by rows.
+// Lists the surface voxels of the finest patch, by rows.
 void SoftObject::list_near_on_grid() noexcept {
   near_on_grid_.clear();
   std::array<int, 3> low{}, high{};
@@ -123,8 +121,8 @@ void SoftObject::list_near_on_grid() noexcept {
   }
 }
 
-// By the voxel that the tool will meet, as far as that is known: of those near it the nearest, else that of
-// the object's box.
+// Places the patches at the voxel that the tool will probably touch: the nearest touched one, else the
+// nearest of the object's box.
 void SoftObject::come_near_on_grid(const ToolInBody& tool) noexcept {
   if (!grid_ || on_grid_) return;
   std::array<int, 3> nearest{};
@@ -160,7 +158,7 @@ void SoftObject::touch_on_grid(std::span<const VoxelId> near) noexcept {
 }
 
 bool SoftObject::push_out_on_grid(const ToolInBody& tool) noexcept {
-  if (on_grid_) return true;  // the next cycle sees to it
+  if (on_grid_) return true;  // the next cycle projects
   bool any = false;
   double nearest = 0.0;
   std::array<int, 3> centre{};
@@ -188,7 +186,7 @@ bool SoftObject::push_out_on_grid(const ToolInBody& tool) noexcept {
   return any;
 }
 
-// Along the largest part of the normal: there the tool's surface over the voxel is a height.
+// The tool's surface as a height along the largest component of its normal at the voxel.
 SoftObject::Bound SoftObject::bound_by(const ToolInBody& tool, const Touch& t,
                                        const glm::dvec3& u) const noexcept {
   const glm::dvec3 p = t.rest + u;
@@ -206,9 +204,8 @@ SoftObject::Bound SoftObject::bound_by(const ToolInBody& tool, const Touch& t,
   return {axis, way, tool.centre[axis] + way * std::sqrt(square) - t.rest[axis], true};
 }
 
-// What is pressed goes to where its links have it on the tool, from voxel to voxel and back: how far each is
-// pushed aside hangs on those beside it, and the cycle moves none of them along the tool. (With wide limits,
-// 140 voxels pressed: the force 2.7 JND off at 0.1 m/s without it, 1.2 with it; to and fro twice no better.)
+// Projects pressed voxels onto the tool, forwards and backwards: each one's place along the tool depends on
+// its neighbours, and the cycle does not move voxels along the tool.
 void SoftObject::put_aside(const ToolInBody& tool) noexcept {
   const auto put = [&](const TouchOnGrid& near) {
     if (near.gap_m > kPressed * lattice_->min_spacing_m()) return;
@@ -222,8 +219,8 @@ void SoftObject::put_aside(const ToolInBody& tool) noexcept {
   std::for_each(touches_on_grid_.rbegin(), touches_on_grid_.rend(), put);
 }
 
-// Says what may not be in the tool. Whether or not a voxel is pressed its bound stands: let go of because
-// coarse levels had gone too far, all of a contact was pressed and let go of in turns.
+// Sets the bounds of the patches' voxels. A bound stands whether or not its voxel is pressed: if it were
+// dropped when coarse levels overshoot, the whole contact would be pressed and released in turns.
 void SoftObject::press_on_grid(const ToolInBody& tool) noexcept {
   grid_->clear_pressed();
   touches_on_grid_.clear();
@@ -243,7 +240,7 @@ void SoftObject::press_on_grid(const ToolInBody& tool) noexcept {
     glm::dvec3 normal(0.0);
     normal[bound.axis] = bound.way;
     grid_->press(near.voxel, grid_->clamp_to_anchors(near.voxel, u), normal);
-    // What is pressed aside is held aside: on the tool's surface where its links have it.
+    // A voxel that is pressed aside is held there, on the tool's surface.
     const glm::dvec3 wished = grid_->unconstrained_minimum(near.voxel);
     Gap g = gap(tool, t.rest + wished);
     if (g.distance >= 0.0) continue;
@@ -254,7 +251,7 @@ void SoftObject::press_on_grid(const ToolInBody& tool) noexcept {
   }
 }
 
-// After a cycle: nothing that could be elsewhere is in the tool.
+// After a cycle: no voxel is left in the tool that anchors do not keep there.
 void SoftObject::settle_on_grid(const ToolInBody& tool) noexcept {
   glm::dvec3 sum(0.0);
   int pressed = 0;
@@ -286,7 +283,7 @@ void SoftObject::settle_on_grid(const ToolInBody& tool) noexcept {
     ++pressed;
   }
   if (pressed == 0) {
-    // Between two contacts the boxes go along with a tool that stays near, so that the next one is in them.
+    // Between two contacts the patches follow a tool that stays near, so that the next contact is in them.
     if (nearest != nullptr) centre_ = lattice_->coordinates(nearest->v);
     return;
   }
@@ -294,7 +291,7 @@ void SoftObject::settle_on_grid(const ToolInBody& tool) noexcept {
   for (int d = 0; d < 3; ++d) centre_[static_cast<std::size_t>(d)] = static_cast<int>(std::lround(sum[d]));
 }
 
-// An axis that hardly carries any force changes little: it has a turn in every second tick.
+// An axis that carries little force changes little: it is relaxed in every second tick.
 std::array<bool, 3> SoftObject::axes_due() noexcept {
   const std::uint32_t n = grid_cycles_++;
   if (n < kAllAxes) return {true, true, true};
@@ -332,7 +329,7 @@ void SoftObject::relax_on_grid(const ToolInBody& tool) noexcept {
   if (away && glm::length(grid_force_N_) < kAtRest_N) on_grid_ = false;
 }
 
-// Against the force.
+// Displacement of the contact against the force (unit: meter).
 double SoftObject::depth_on_grid() const noexcept {
   const double size = glm::length(grid_force_N_);
   if (size == 0.0 || !grid_->in_fine_patch(centre_)) return 0.0;
@@ -350,7 +347,7 @@ Reaction SoftObject::reaction_on_grid(const ToolInBody& tool) const noexcept {
     return result;
   result.pressed = std::max(result.pressed, 1U);
   if (size == 0.0) {
-    // Nothing has reached the anchors yet.
+    // no force has reached the anchors yet
     if (!grid_->in_fine_patch(centre_)) return result;
     const glm::dvec3 springs = static_cast<double>(result.pressed) / grid_->compliance(centre_);
     for (int d = 0; d < 3; ++d) result.stiffness_N_per_m[d][d] = springs[d];
@@ -359,7 +356,7 @@ Reaction SoftObject::reaction_on_grid(const ToolInBody& tool) const noexcept {
     result.stiffness_N_per_m =
         glm::dmat3(kAcross * secant) + (kTangent - kAcross) * secant * glm::outerProduct(n, n);
   }
-  // Until the next cycle it is what it was, and what the tool has moved since.
+  // Until the next cycle: the last force, less stiffness times the tool's motion since then.
   result.force_N = grid_force_N_ - result.stiffness_N_per_m * (tool.centre - grid_tool_m_);
   if (glm::dot(result.force_N, n) < 0.0) result.force_N = glm::dvec3(0.0);
   result.force_N *= contact_energy_.share();

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// The region around active limits, its sweeps and multiplier updates, and the clamped result.
 #include "voxel/relaxation/admm_region.h"
 
 #include <algorithm>
@@ -10,23 +11,22 @@ namespace {
 
 constexpr std::size_t kMost = 4096;  // voxels that move
 constexpr std::size_t kMostKnown = 8 * kMost;
-constexpr int kDeep = 3;                      // links from where it begins …
-constexpr int kFar = 12;                      // … and so many of them where they are at their limits
+constexpr int kDeep = 3;                      // links from the sources of the region …
+constexpr int kFar = 12;                      // … and through links at their limits
 constexpr int kSweeps = 30, kTickSweeps = 6;  // in a round of relaxation beside bodies; in a tick
-constexpr int kToolSweeps = 100;              // … under the tool, where rounds are nobody's tick
+constexpr int kToolSweeps = 100;              // in a round with the tool, which no tick waits for
 constexpr std::uint64_t kOtherWork = 5;
-constexpr double kFurther = 1.6;   // over-relaxation (Boyd et al., 3.4.3)
-constexpr double kActiveAtFirst = 1e-3;  // of the spacing: so near to its limit a link is at it
-constexpr double kNear = 0.4;      // of the spacing: and so near it may come to it
-// Of the spacing, by which limits are tighter while the least energy is looked for: what is found is then
-// within them but for little.
+constexpr double kFurther = 1.6;         // over-relaxation (Boyd et al., 3.4.3)
+constexpr double kActiveAtFirst = 1e-3;  // of the spacing: a link this near to its limit makes a region
+constexpr double kNear = 0.4;            // of the spacing: nearer to its limit than this a link may reach it
+// Of the spacing: limits are tightened by this while the least energy is searched, so that the result
+// violates them by little …
 constexpr double kTighter = 2e-5;
-// … under the tool, where whole cycles and the tick go on from there to the limits themselves: at ten times
-// as much what the one moved the others moved back, by 5e-4 of a small force.
+// … and by this under the tool, where cycles and the tick go on from the result up to the limits themselves.
 constexpr double kTighterAtTool = 2e-6;
-constexpr double kSqueezed = 5e-3;  // of the spacing: what is deeper in an obstacle cannot leave it
-constexpr int kRounds = 4;          // in which limits and obstacles are met in turns
-constexpr int kMostPasses = 60;     // until limits are met on one axis
+constexpr double kSqueezed = 5e-3;  // of the spacing: a voxel deeper in an obstacle cannot leave it
+constexpr int kRounds = 4;          // alternating between limits and obstacles
+constexpr int kMostPasses = 60;     // until one axis is within its limits
 constexpr double kRounding = 1e-9;  // of the spacing
 
 }  // namespace
@@ -113,7 +113,7 @@ bool AdmmRegion::gather(const Multigrid& multigrid, const Displacement& state, b
   return true;
 }
 
-// All have those beside them, which stand where these do not move.
+// Adds the neighbours of all moving members, as fixed members.
 void AdmmRegion::add_neighbours() noexcept {
   const std::size_t moving = members_.size();
   for (std::size_t i = 0; i < moving; ++i) {
@@ -161,7 +161,7 @@ void AdmmRegion::prepare_links(LevelStiffness& couplings) noexcept {
   }
 }
 
-// False where there is nothing to be done, or to be found.
+// False if no link is at its limit, or a voxel is squeezed.
 bool AdmmRegion::prepare(Multigrid& multigrid, const Displacement& state,
                          const ObstacleView& obstacles) noexcept {
   for (Member& m : members_) {
@@ -200,7 +200,7 @@ bool AdmmRegion::prepare(Multigrid& multigrid, const Displacement& state,
   return true;
 }
 
-// Each to the least of the energy of its links, limits and obstacle, the others where they are.
+// Gauss-Seidel on the augmented Lagrangian.
 void AdmmRegion::sweep(bool forwards) noexcept {
   const std::size_t count = members_.size();
   for (std::size_t n = 0; n < count; ++n) {
@@ -251,8 +251,8 @@ void AdmmRegion::set_multipliers() noexcept {
   }
 }
 
-// Brings what was found on one axis within its limits: down as far as the shortest way from any other lets it
-// be, or up. What limits allow is closed under least and most, so that both, one after the other, do it.
+// Brings one axis within its limits: downwards to the shortest path from any other member, or upwards.
+// Difference constraints are closed under minimum and maximum, so one after the other suffices.
 bool AdmmRegion::come_within(std::size_t axis, bool downwards) noexcept {
   const std::size_t count = members_.size();
   for (int n = 0; n < kMostPasses; ++n) {
@@ -278,7 +278,7 @@ bool AdmmRegion::come_within(std::size_t axis, bool downwards) noexcept {
   return false;
 }
 
-// Brings what was found within limits, and outside of obstacles as far as these let it.
+// Brings the result within limits, and out of obstacles as far as these allow.
 bool AdmmRegion::allow() noexcept {
   for (int n = 0; n < kRounds; ++n) {
     bool deep = false;
@@ -297,8 +297,6 @@ bool AdmmRegion::allow() noexcept {
   }
   return true;
 }
-
-// The part of the way to what was found, at the end of which the energy is least.
 
 double AdmmRegion::relax(Multigrid& multigrid, Displacement& state, const ObstacleView& obstacles,
                          std::span<const VoxelId> on_body, bool briefly) noexcept {

@@ -1,23 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tissue at its limits beside a body: brought to its least energy within limits and obstacles together.
+// Least energy of tissue at its limits, beside a body or under the tool: limits and obstacles are solved
+// together on a small region.
 //
-// There hardly a voxel can go by itself where its links pull it, nor can all that hang on one another in the
-// same direction: one that slides along the body takes what hangs on it up or down as it goes aside, each
-// another way. One by one they stay where they came to be, whatever is done on coarser levels: under a ball
-// with 2 % of their energy left to give, and the ball rested where it should have been carried by 0.94 of its
-// weight.
+// Voxel by voxel, hardly anything can move there: limits block each voxel alone, and a voxel that slides
+// along a body takes its dependents in other directions. Coarse levels do not help.
 //
-// So the least energy is looked for outside of the limits as well, by the alternating direction method of
-// multipliers (Boyd et al., Distributed Optimization and Statistical Learning via ADMM, 2011, chapter 3),
-// with a sweep of Gauss and Seidel's in place of the exact minimum. Multipliers are kept from call to call.
-// What was found is brought within the limits, and the tissue goes there as far as its energy falls.
+// The solver is the alternating direction method of multipliers (Boyd et al., Distributed Optimization and
+// Statistical Learning via ADMM, 2011, chapter 3), with a Gauss-Seidel sweep in place of the exact
+// minimisation. Multipliers are kept from call to call. The result is clamped to the limits, and the tissue
+// moves there as far as its energy falls.
 //
-// The same under the tool, in objects that lie beside nothing else: what it presses slides on its tangent
-// plane, and what hangs on that by tight links goes along. (Without, a ball ten spacings deep in 10^6 voxels
-// was felt by 2.3 % too much for good, and 1.4 % of the energy was left.)
+// Under the tool, for objects that touch nothing else, pressed voxels slide on their tangent planes and their
+// dependents belong to the region.
 //
-// The multipliers are the forces of links at their limits and of obstacles: coarse levels know of the first
-// (Multigrid::tie), or they would pull at what these hold, and a body that gives way feels the second.
+// Multipliers are the forces of links at their limits and of obstacles. The coarse levels get the first as
+// loads (Multigrid::tie), because otherwise they would pull at voxels that limits hold. A moving body feels
+// the second.
 #pragma once
 
 #include <array>
@@ -36,27 +34,27 @@ namespace voxel {
 class AdmmRegion {
  public:
   explicit AdmmRegion(const Lattice& lattice);
-  // All its memory now, which else comes where a body first goes.
+  // Takes all memory now, not when a body is first pressed …
   void prepare_all();
-  // … but what is kept by voxel, a large part of which no tool comes to.
+  // … and without the arrays by voxel, most of which a tool never touches.
   void prepare_lists();
 
-  // Voxels round those that limits hold, or that lie `on_body`, and on from there along links at their
-  // limits, go on towards their least energy. Empty: those that lay on a body the last time, and for longer.
-  // Where no link is at its limit, or something is squeezed into an obstacle, which no multiplier balances,
-  // all is forgotten. `briefly`: half as long, in tissue that is on its way. Returns the largest force that
-  // moved one of them (N).
+  // Relaxes a region: voxels that active limits hold or that lie `on_body`, and their neighbourhood, further
+  // along links at their limits. Empty `on_body`: those of the last call that had any, and with more sweeps.
+  // If no link is at its limit, or a voxel is squeezed into an obstacle (no multiplier balances that), all
+  // multipliers are dropped. `briefly`: half the sweeps, for tissue that is still moving. Returns the largest
+  // force that moved a voxel (N).
   double relax(Multigrid& multigrid, Displacement& state, const ObstacleView& obstacles,
                std::span<const VoxelId> on_body, bool briefly = false) noexcept;
-  // Was there any link at its limit?
+  // Was any link of the region at its limit in the last relax()?
   [[nodiscard]] bool found() const { return found_; }
-  // What presses a voxel on its obstacle, as the last relax() left it (N).
+  // Force between a voxel and its obstacle after the last relax() (N).
   [[nodiscard]] double pressed_N(VoxelId v) const noexcept {
     const double x = static_cast<double>(pressed_[0][v]), y = static_cast<double>(pressed_[1][v]),
                  z = static_cast<double>(pressed_[2][v]);
     return std::sqrt(x * x + y * y + z * z);
   }
-  // There was nothing to do: what nobody asked about for some calls is forgotten.
+  // Nothing to relax: drops multipliers that no call used for a while. forget() drops all of them.
   void pass(Multigrid& multigrid) noexcept;
   void forget(Multigrid& multigrid) noexcept;
   // Work of the last relax(), in voxel updates.
@@ -64,27 +62,29 @@ class AdmmRegion {
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
-  // Penalty of the augmented Lagrangian (unit: the link's own spring, or the voxel's springs at its obstacle).
+  // Penalty of the augmented Lagrangian (in units of the link's own spring, or of the voxel's springs at its
+  // obstacle).
   static constexpr double kOfLink = 1.0;
 
   static constexpr std::uint32_t kNone = ~std::uint32_t{0};
   using Axes = std::array<double, 3>;
   struct Member {
     VoxelId v = 0;
-    bool moves = false;    // false: it is beside the region
-    bool outside = false;  // of an obstacle, or of the tool
-    Obstacle plane;        // that, as the voxel meets it
-    std::array<std::uint32_t, 3> up{kNone, kNone, kNone}, down{kNone, kNone, kNone};  // members beside it
-    Axes from{}, found{};     // where it is, and is to go (m)
-    Axes load_N{};            // beside its springs
-    Axes inverse{};           // of all springs that hold it, per axis (m/N)
-    double hold_N_per_m = 0;  // of its obstacle
-    Axes out{}, pressed{};    // outside of that (m), and the multiplier, as a way of that spring (m)
+    bool moves = false;    // false: it borders the region and is fixed
+    bool outside = false;  // it has to stay outside of an obstacle, or of the tool
+    Obstacle plane;        // that half-space, for the displacement
+    std::array<std::uint32_t, 3> up{kNone, kNone, kNone},
+        down{kNone, kNone, kNone};  // neighbours, as indices into members_
+    Axes from{}, found{};           // displacement before, and of the current iterate (m)
+    Axes load_N{};                  // without its links
+    Axes inverse{};                 // 1 / (its springs with their penalties), per axis (m/N)
+    double hold_N_per_m = 0;        // penalty of its obstacle
+    Axes out{}, pressed{};  // copy of the displacement outside of the obstacle (m), and scaled multiplier (m)
   };
-  struct Link {  // of a member and the one above it, per axis
+  struct Link {  // from a member to the one above it, per axis
     Axes stiff_N_per_m{}, low{}, high{};
-    Axes within{}, beyond{};  // its limits (m), and the multiplier, as a way of that spring (m)
-    std::uint8_t near = 0;    // bits: it may come to a limit
+    Axes within{}, beyond{};  // copy of the difference within the limits (m), and scaled multiplier (m)
+    std::uint8_t near = 0;    // bits: axes on which it may reach a limit
   };
 
   std::uint32_t add(VoxelId v) noexcept;
@@ -107,21 +107,22 @@ class AdmmRegion {
   const Lattice& lattice_;
   double spacing_m_;
   double tighter_m_ = 0.0;
-  LazyVector<VoxelId> on_body_;  // as was said last
+  LazyVector<VoxelId> on_body_;  // of the last call that had any
   LazyVector<Member> members_;
   LazyVector<Link> links_;           // [3 member + d]
   LazyArray<std::uint32_t> number_;  // [v] 1 + index into members_; 0: none
-  // What is kept from call to call.
+  // Kept from call to call.
   LazyVector<VoxelId> known_;
-  LazyArray<std::uint32_t> asked_;           // [v] in which call, of those known; 0: none
-  std::array<LazyArray<float>, 9> beyond_;   // [3 axis + d][v] of the link to the voxel above (m)
-  std::array<LazyArray<float>, 3> pressed_;  // [axis][v] (N)
+  LazyArray<std::uint32_t> asked_;  // [v] number of the last call that used it; 0: not known
+  std::array<LazyArray<float>, 9>
+      beyond_;  // [3 axis + d][v] scaled multiplier of the link to the voxel above (m)
+  std::array<LazyArray<float>, 3> pressed_;  // [axis][v] force of the obstacle (N)
   std::uint32_t calls_ = 0;
   std::uint64_t looked_at_ = 0;
   bool found_ = false;
 };
 
-// `visit(link, other member, up, d)` for the links of a member.
+// `visit(link, neighbour, up)` for the links of a member; `up`: the neighbour is the upper end.
 template <class Visit>
 void AdmmRegion::for_links(std::size_t i, const Visit& visit) const noexcept {
   const Member& m = members_[i];

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Search and motion of one cluster.
 #include "voxel/relaxation/cluster_steps.h"
 
 #include <algorithm>
@@ -10,12 +11,13 @@
 namespace voxel {
 namespace {
 
-constexpr std::size_t kMostVoxels = 20'000;      // that move as one
-constexpr std::uint64_t kMostLookedAt = 40'000;  // from begin() on
+constexpr std::size_t kMostVoxels = 20'000;      // voxels of a cluster
+constexpr std::uint64_t kMostLookedAt = 40'000;  // voxels visited since begin()
 constexpr std::uint8_t kIn = 1;
-constexpr float kExactlyAtLimit = 1e-6F;  // of the spacing: nearer to its limit than this a link is at it
+// Of the spacing: a link nearer to its limit than this blocks motion.
+constexpr float kExactlyAtLimit = 1e-6F;
 
-// How far u(from) may go on this way before the link to its neighbour stops it.
+// How far u(from) may move before the link to its neighbour stops it.
 float room(const Lattice& lattice, const LazyArray<float>& u, VoxelId from, int d, bool up, int axis,
            bool upwards) noexcept {
   const VoxelId to = up ? lattice.up(from, d) : lattice.down(from, d);

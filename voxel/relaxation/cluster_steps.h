@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Voxels that can only move together.
+// Active-set step for voxels that can only move together.
 //
-// Where a link is at its limit, a voxel that its forces pull on against it stays: moved one by one, a row of
-// voxels without slack along itself never moves at all, whatever pulls it as a whole. Here the least set that
-// has to come along with such a voxel is found (breadth first over the links at their limits) and moved as
-// one body, to where the springs that leave it are in balance or the next limit stops it. It is the block
-// step of an active-set method for a quadratic function within difference constraints (Nocedal & Wright,
-// Numerical Optimization, chapter 16).
+// A voxel whose net force pushes against an active limit does not move alone. A row of voxels without slack
+// along itself would never move at all. A cluster is the least set that has to move with such a voxel
+// (breadth-first search over links at their limits). It moves as one body to the equilibrium of its border's
+// springs, or to the next limit. This is the block step of an active-set method for a quadratic function
+// under difference constraints (Nocedal & Wright, Numerical Optimization, chapter 16).
 #pragma once
 
 #include <array>
@@ -25,14 +24,13 @@ class ClusterSteps {
  public:
   explicit ClusterSteps(const Lattice& lattice);
 
-  // The voxel, pulled on this axis against a limit, and all that has to come along: moves them. Does nothing
-  // where one of them is held, anchored or at an obstacle, where what they are pulled by together points the
-  // other way or is less than `least_N` a voxel, where it was looked at in another's cluster already, or when
-  // the voxels looked at since begin() are too many.
-  // Returns the force a voxel that moved them (N); 0: they stay.
-  // Parts without slack come along as wholes, where the tool does not hold them.
+  // Moves the cluster of a voxel on one axis. Rigid blocks are parts of clusters as wholes. Nothing moves if
+  // a voxel of the cluster is held, anchored or at an obstacle, or in a block that the tool presses; if the
+  // cluster's net force points the other way or is at most `least_N` a voxel; if the voxel was in another
+  // cluster on this axis since begin(); or if too many voxels were visited since begin(). Returns the force
+  // per voxel that moved the cluster (N); 0: nothing moved.
   double move(Multigrid& multigrid, Displacement& state, VoxelId v, int axis, double least_N) noexcept;
-  // Voxels that the last move() moved.
+  // Voxels of the last cluster.
   [[nodiscard]] const std::vector<VoxelId>& moved() const { return cluster_; }
 
   void begin() noexcept;
@@ -46,7 +44,7 @@ class ClusterSteps {
 
   const Lattice& lattice_;
   std::vector<VoxelId> cluster_, seen_;
-  LazyArray<std::uint8_t> mark_;  // [v] 1: in the cluster; 2, 4, 8: was in one since begin(), on that axis
+  LazyArray<std::uint8_t> mark_;  // [v] 1: in the cluster; 2, 4, 8: was in one on that axis since begin()
   std::uint64_t looked_at_ = 0;
 };
 

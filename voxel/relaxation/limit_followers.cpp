@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Search for followers by rows, and their local equilibria.
 #include "voxel/relaxation/limit_followers.h"
 
 #include <algorithm>
@@ -11,7 +12,7 @@
 namespace voxel {
 namespace {
 
-// Lanes of a row whose voxels are not there, are anchored, or are moved by somebody else.
+// Lanes of a row that are empty, anchored, or moved by another solver.
 std::uint32_t staying(const Lattice& lattice, const Displacement& state, RowId row) {
   const std::size_t first = static_cast<std::size_t>(row) * kRow;
   const std::uint8_t* role = state.role.data() + first;
@@ -21,8 +22,8 @@ std::uint32_t staying(const Lattice& lattice, const Displacement& state, RowId r
   return bits;
 }
 
-// b0 <= u(up) − u(down) <= b1 of the link of a voxel on axis kAxis to its neighbour further up, or down, in
-// kD.
+// Limits b0 <= u(upper) − u(lower) <= b1 on axis kAxis of a voxel's link to its neighbour above (kUp) or
+// below in kD.
 template <std::size_t kAxis, std::size_t kD, bool kUp>
 std::array<float, 2> bounds_of(const RowLimits& limits, std::size_t lane) {
   if (limits.lanes == nullptr) {
@@ -38,7 +39,7 @@ std::array<float, 2> bounds_of(const RowLimits& limits, std::size_t lane) {
   }
 }
 
-// The links of a voxel in kD: what they pull it with, and where they let it be.
+// Adds the springs of a voxel's links in kD to its load, and their limits to its interval.
 template <std::size_t kAxis, std::size_t kD>
 void add_links(const RowStiffness& springs, const RowLimits& limits, std::size_t lane, float up, float down,
                float& pull, std::array<float, 2>& interval) {
@@ -48,7 +49,7 @@ void add_links(const RowStiffness& springs, const RowLimits& limits, std::size_t
   pull += k_up * up + k_down * down;
   const std::array<float, 2> above = bounds_of<kAxis, kD, true>(limits, lane),
                              below = bounds_of<kAxis, kD, false>(limits, lane);
-  // Where a row has one set of limits for all its links, those that are not there have it too.
+  // A row with one set of limits has them for missing links, too.
   if (k_up > 0.0F) {
     interval[0] = std::max(interval[0], up - above[1]);
     interval[1] = std::min(interval[1], up - above[0]);
@@ -69,7 +70,7 @@ LimitFollowers::LimitFollowers(const Lattice& lattice, std::size_t most_roots)
   drawn_.reserve(most_roots + kMostDrawn + 6);
 }
 
-// Null: nothing is in it, or too many were looked at.
+// Null: the row is empty, or too many were searched.
 LimitFollowers::Row* LimitFollowers::look_at(RowId row) noexcept {
   if (entry_[row] != 0) return &rows_[entry_[row] - 1U];
   LevelStiffness& couplings = relaxation_->couplings();
@@ -119,7 +120,7 @@ void LimitFollowers::draw_on(std::span<const VoxelId> roots) noexcept {
   }
 }
 
-// At a voxel from the one below it in kD (kUp), or from the one above.
+// Visits a voxel from its neighbour below in kD (kUp), or above.
 template <std::size_t kAxis, std::size_t kD, bool kUp>
 void LimitFollowers::look_from(VoxelId from, VoxelId at) noexcept {
   Row* row = look_at(at / kRow);
@@ -143,7 +144,7 @@ void LimitFollowers::look_from(VoxelId from, VoxelId at) noexcept {
   if (room(place) <= kAtLimit * spacing_m_[kD]) add(*row, at);
 }
 
-// Where a voxel would be if all else stood still.
+// Local equilibrium of a voxel, all others fixed.
 template <std::size_t kAxis>
 float LimitFollowers::place_of(const Row& row, VoxelId v) const noexcept {
   const std::size_t lane = v % kRow;

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What hangs on some voxels by links at their limits, brought along with them.
+// Moves the voxels that are tied to a given set through links at their limits (its dependents).
 //
-// Voxel by voxel, breadth first, each after the one it hangs on. What is asked of a voxel on the way (may it
-// move, was it brought along, what are its springs and limits, what else pulls it) is looked up once for its
-// row of 32 and all three axes: looked up for each voxel it took more than a third of a contact that a quick
-// hand pressed until the chain was tight, now a sixth.
+// Breadth first, one voxel at a time, each after its source. Roles, springs, limits and loads are looked up
+// once for each row of 32 voxels and all three axes, because a lookup per voxel would dominate the cost.
 #pragma once
 
 #include <array>
@@ -24,16 +22,18 @@ namespace voxel {
 
 class LimitFollowers {
  public:
-  static constexpr std::size_t kMostDrawn = 2000;   // voxels that come along on an axis, and a few
-  static constexpr std::size_t kMostRows = 16'384;  // that are looked at; what is further away stays
+  // Voxels that follow on an axis, and a few more.
+  static constexpr std::size_t kMostDrawn = 2000;
+  // Rows that are searched; voxels in further rows stay.
+  static constexpr std::size_t kMostRows = 16'384;
 
   // Allocates; throws std::bad_alloc.
   LimitFollowers(const Lattice& lattice, std::size_t most_roots);
 
-  // Each free voxel beside one of `roots` (at most most_roots, none anchored), or beside one that was brought
-  // along, goes to where its links, and what else pulls it, would have it, as far as those let it, if the
-  // link between the two is near a limit; if it is at one afterwards, the voxel was brought along. Voxels
-  // that move by more than `stir` of the spacing stir their rows. Does not allocate or throw.
+  // Moves each free voxel beside one of `roots` (at most most_roots, none anchored), or beside a follower, to
+  // its local equilibrium within its limits, if the link between the two is near a limit. If that link is at
+  // a limit afterwards, the voxel is a follower, too. Rows with a motion of more than `mark_dirty` of the
+  // spacing are marked dirty. Does not allocate or throw.
   void draw(Relaxation& relaxation, Displacement& state, std::span<const VoxelId> roots,
             float mark_dirty) noexcept;
 
@@ -45,14 +45,14 @@ class LimitFollowers {
   // Bits are lanes.
   struct Row {
     RowId row = 0;
-    std::uint32_t stays = 0;   // no voxel, anchored, or not free
-    std::uint32_t closed = 0;  // these, and what is in drawn_
+    std::uint32_t stays = 0;   // empty, anchored, or not free
+    std::uint32_t closed = 0;  // these, and the voxels in drawn_
     bool noted = false, dirty = false;
     RowStiffness springs;
     RowLimits limits;
-    std::array<const float*, 3> bricks{}, balance{};  // [axis] what pulls besides (N); null: nothing
+    std::array<const float*, 3> bricks{}, balance{};  // [axis] loads (N); null: none
   };
-  static constexpr float kSearched = 0.1F;  // of the spacing: links that are looked at
+  static constexpr float kSearched = 0.1F;  // of the spacing: links that are searched
 
   [[nodiscard]] Row* look_at(RowId row) noexcept;
   void add(Row& row, VoxelId v) noexcept {
@@ -69,12 +69,12 @@ class LimitFollowers {
   const Lattice& lattice_;
   std::array<float, 3> spacing_m_{};
   bool yields_;
-  Relaxation* relaxation_ = nullptr;  // while it draws
+  Relaxation* relaxation_ = nullptr;  // during draw()
   Displacement* state_ = nullptr;
   float mark_dirty_ = 0.0F;
   LazyArray<std::uint16_t> entry_;  // [row] 1 + index into rows_; 0: not looked at
   LazyVector<Row> rows_;
-  std::vector<VoxelId> drawn_;  // the roots first
+  std::vector<VoxelId> drawn_;  // sources first
 };
 
 }  // namespace voxel

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Search for dependents by rows, and the sums over them.
 #include "voxel/relaxation/limit_reactions.h"
 
 #include <algorithm>
@@ -11,7 +12,8 @@
 namespace voxel {
 namespace {
 
-constexpr float kSurelyFree = 2e-4F;  // further from it, a link surely is not
+// Of the spacing: a voxel whose links are all further from their limits has no dependents.
+constexpr float kSurelyFree = 2e-4F;
 
 // Sum over the lanes whose bits are set.
 double sum_of(const float* lanes, std::uint32_t bits) {
@@ -25,14 +27,14 @@ double sum_of(const float* lanes, std::uint32_t bits) {
 struct LimitReactions::Gathering {
   LevelStiffness& couplings;
   std::span<const VoxelId> roots;  // sorted
-  const Multigrid* multigrid;      // null: there are no parts without slack
-  std::uint16_t source_block;      // number of the one whose voxels are the roots; 0: of none
-  bool border_known = false;       // all of that one's border was looked at
+  const Multigrid* multigrid;      // null: there are no rigid blocks
+  std::uint16_t source_block;      // the block whose voxels are the sources, by number; 0: none
+  bool border_known = false;       // all of that block's border was visited
   std::bitset<Lattice::kMaxBlocks> known;
-  std::array<double, Lattice::kMaxBlocks> pull_N;  // of those known
+  std::array<double, Lattice::kMaxBlocks> pull_N;  // [block] if known
 
-  // (By their own links its voxels are pulled this way and that, and an inclusion between the tool and the
-  // anchors, in tissue at its limits, ended what hangs on the tool: half of the force was lost.)
+  // Voxels of a block have the block's load. Their own loads point either way, and would end the search at an
+  // inclusion.
   void pull_as_blocks(const Displacement& state, int axis, Row& row) {
     std::uint32_t of_blocks = 0, up = 0, down = 0;
     std::uint16_t last = 0;  // most rows have one
@@ -62,7 +64,7 @@ struct LimitReactions::Gathering {
     return pull_N[part];
   }
 
-  // Is all that there is in a row of the part whose voxels are the roots?
+  // Does the row hold nothing but the source block?
   [[nodiscard]] bool within_source_block(const Lattice& lattice, RowId row) const {
     if (source_block == 0 || !multigrid->parts().fill_row(0, row)) return false;
     for (VoxelId v = row * kRow; v < (row + 1) * kRow; ++v) {
@@ -77,11 +79,11 @@ LimitReactions::LimitReactions(const Lattice& lattice) : lattice_(lattice), entr
   queue_.resize(kMostRows);
 }
 
-// Null: nothing is in it, or too many were looked at.
+// Null: the row is empty, or too many were searched.
 LimitReactions::Row* LimitReactions::look_at(RowId row) noexcept {
   if (entry_[row] != 0) return &rows_[entry_[row] - 1U];
   if (rows_.size() == kMostRows || !gathering_->couplings.prepare(row)) return nullptr;
-  // The inside of a part whose border was looked at.
+  // the inside of a block whose border was visited
   if (gathering_->border_known && gathering_->within_source_block(lattice_, row)) return nullptr;
   const Grid& g = lattice_.grid();
   const auto ua = static_cast<std::size_t>(axis_);
@@ -107,15 +109,15 @@ LimitReactions::Row* LimitReactions::look_at(RowId row) noexcept {
   return &out;
 }
 
-// Voxels of a row that links at their limits push against what pulls them; of the links whose upper, or
-// lower, ends they are.
+// Voxels of a row that links at their limits push against their loads; they are the upper or lower ends of
+// these links.
 std::uint32_t LimitReactions::pushed(const Row& row, std::uint32_t at_low, std::uint32_t at_high,
                                      End end) noexcept {
   const std::uint32_t up = end == End::upper ? at_low : at_high, down = end == End::upper ? at_high : at_low;
   return (up & row.links.pulled_down) | (down & row.links.pulled_up) | (up & down);
 }
 
-// And what hangs on these in the row itself.
+// Adds voxels, and their dependents in the row itself.
 void LimitReactions::add(Row& row, std::uint32_t bits) noexcept {
   const std::uint32_t before = row.carried, low = row.links.at_low[0], high = row.links.at_high[0];
   row.carried |= bits;
@@ -129,7 +131,7 @@ void LimitReactions::add(Row& row, std::uint32_t bits) noexcept {
   queue_[(head_ + waiting_++) % kMostRows] = static_cast<std::uint32_t>(&row - rows_.data());
 }
 
-// What of a row hangs on voxels beside it, by links at their limits whose `end` it is.
+// Adds the dependents in a row of voxels beside it; `end`: the end of the links that the row has.
 void LimitReactions::ask(RowId row, std::uint32_t at_low, std::uint32_t at_high, End end) noexcept {
   if ((at_low | at_high) == 0) return;
   Row* to = look_at(row);
@@ -155,7 +157,7 @@ void LimitReactions::gather(LevelStiffness& couplings, Displacement& state, std:
     if (may_be_tight(lattice_, state, v, axis, kSurelyFree)) look_at(v / kRow);
   }
   find_all();
-  // Roots beside what hangs on others, so that links between these and those are known for such.
+  // Sources beside dependents of others, so that links between both are known as such.
   for (const VoxelId v : roots) {
     if (rows_.empty()) break;
     if (find(v / kRow) != nullptr) continue;
@@ -179,7 +181,7 @@ void LimitReactions::gather_on_block(LevelStiffness& couplings, Displacement& st
 void LimitReactions::find_all() noexcept {
   const Grid& g = lattice_.grid();
   while (waiting_ > 0) {
-    Row& row = rows_[queue_[head_]];  // rows_ never grows beyond what was reserved, so it stays where it is
+    Row& row = rows_[queue_[head_]];  // rows_ stays within its capacity, so the reference is stable
     head_ = (head_ + 1) % kMostRows;
     --waiting_;
     const std::uint32_t fresh = row.fresh;
@@ -190,7 +192,7 @@ void LimitReactions::find_all() noexcept {
       const std::uint32_t low = links.at_low[d] & fresh, high = links.at_high[d] & fresh,
                           down_low = links.down_at_low[d] & fresh, down_high = links.down_at_high[d] & fresh;
       const RowId away = d == 0 ? g.row_x : d == 1 ? 1U : g.row_z;
-      // Along x only the last voxel, and the first, have their neighbours in other rows.
+      // along x only the last and first voxel have neighbours in other rows
       const int up = d == 0 ? kRow - 1 : 0;
       ask(row.row + away, low >> up, high >> up, End::upper);
       ask(row.row - away, down_low << up, down_high << up, End::lower);

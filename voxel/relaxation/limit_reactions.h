@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What hangs on some voxels by links at their limits, found a row of 32 voxels at a time.
+// Dependents of given voxels through links at their limits, and the loads and springs of all of them
+// together.
 //
-// A tool that pushed a chain tight has some ten thousand voxels hanging on those it presses. Looked for voxel
-// by voxel, 30 ns each, they took more than all else in a tick; as bits of rows they take 0.4 of that.
+// Found a row of 32 voxels at a time, as bits: a tool that pushed a chain to its limits has some ten thousand
+// dependents.
 #pragma once
 
 #include <array>
@@ -23,29 +24,30 @@ class Multigrid;
 
 class LimitReactions {
  public:
-  static constexpr std::size_t kMostRows = 4096;  // that are looked at; what is further away hangs on nothing
+  // Rows that are searched; voxels in further rows count as independent.
+  static constexpr std::size_t kMostRows = 4096;
 
   // Allocates; throws std::bad_alloc.
   explicit LimitReactions(const Lattice& lattice);
 
   // ---- none of these allocates or throws ----
-  // On one axis, all that hangs on `roots` (in the order of their ids, none anchored), one by another: a
-  // voxel does where a link to one of these is at a limit and pushes it the way its own links, and what else
-  // pulls it, do not. One that its link lets go neither way hangs on it in any case. What was found before is
-  // forgotten.
+  // Finds, on one axis, all dependents of `roots` (sorted by id, none anchored), directly or through others.
+  // A voxel depends on a neighbour if their link is at a limit and pushes it against its own load, or if the
+  // link allows it to move neither way. Drops what was found before.
   void gather(LevelStiffness& couplings, Displacement& state, std::span<const VoxelId> roots,
               int axis) noexcept;
-  // The same of what hangs on a part without slack. A voxel of another one is pulled as the whole of that is.
+  // The same for the dependents of a rigid block. The load of a voxel in another block is the load of that
+  // block.
   void gather_on_block(LevelStiffness& couplings, Displacement& state, const Multigrid& multigrid,
                        std::size_t part, int axis) noexcept;
-  // Is it one of them, or a root that they hang on? Of other roots it may say either.
+  // Is the voxel a dependent, or a source that has any? For other sources the answer is undefined.
   [[nodiscard]] bool carried(VoxelId v) const noexcept {
     return (carried_in(v / kRow) >> v % kRow & 1U) != 0;
   }
-  // Of a root: is any link of it to what may move at a limit?
+  // Of a source: is any of its links to a voxel that may move at a limit?
   [[nodiscard]] bool tight(VoxelId root) const noexcept;
-  // What pulls all that hangs on the roots, without these (N), and the springs of their links to what does
-  // not hang on them (N/m).
+  // Sum of the dependents' loads, sources excluded (N), and of the springs between dependents and others
+  // (N/m).
   struct Hanging {
     double force_N = 0.0, stiffness_N_per_m = 0.0;
   };
@@ -62,7 +64,7 @@ class LimitReactions {
     RowId row;
     LinksAtLimits links;
     std::uint32_t roots = 0, carried = 0;
-    std::uint32_t fresh = 0;  // of these, whose neighbours were not looked at yet
+    std::uint32_t fresh = 0;  // of these: their neighbours are still to be visited
     bool queued = false;
   };
   enum class End : std::uint8_t { upper, lower };  // of a link
@@ -71,7 +73,7 @@ class LimitReactions {
     return entry_[row] == 0 ? nullptr : &rows_[entry_[row] - 1U];
   }
   void begin(Gathering& gathering, Displacement& state, int axis) noexcept;
-  void find_all() noexcept;  // from the roots on, by which rows were looked at
+  void find_all() noexcept;  // from the rows with sources on
   Row* look_at(RowId row) noexcept;
   [[nodiscard]] static std::uint32_t pushed(const Row& row, std::uint32_t at_low, std::uint32_t at_high,
                                             End end) noexcept;
@@ -83,12 +85,12 @@ class LimitReactions {
   }
 
   const Lattice& lattice_;
-  Gathering* gathering_ = nullptr;  // while it gathers
-  Displacement* state_ = nullptr;   // …, only read
+  Gathering* gathering_ = nullptr;  // during gather()
+  Displacement* state_ = nullptr;   // the same; only read
   int axis_ = 0;
   LazyArray<std::uint16_t> entry_;  // [row] 1 + index into rows_; 0: not looked at
   LazyVector<Row> rows_;
-  std::vector<std::uint32_t> queue_;  // into rows_, a ring
+  std::vector<std::uint32_t> queue_;  // ring of indices into rows_
   std::size_t head_ = 0, waiting_ = 0;
 };
 

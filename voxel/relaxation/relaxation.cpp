@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// The schedule of relaxation: budget, contact cycles and their parts, and the exchange with a shadow.
 #include "voxel/relaxation/relaxation.h"
 
 #include <algorithm>
@@ -9,24 +10,21 @@
 namespace voxel {
 namespace {
 
-// A residual is what a cycle finds before its coarse levels correct it: round what is a hundred times stiffer
-// more than that can be left afterwards. (Another sweep where links differ left less, but some tissue at its
-// limits, or hanging by little, did not come to rest with it.)
+// A residual is measured before coarse levels correct it. Around tissue a hundred times stiffer more than
+// that can be left afterwards.
 constexpr double kMeasured = 0.5;
-// Spacings that a coarse cell may have to tell. Between a body and a plate cells ran away to 1e30 m in ten
-// ticks; with ten spacings, or four, some went on running to and fro when the body had left.
+// Spacings: a larger pending correction is dropped. Cells between obstacles could run away otherwise.
 constexpr float kFarthest = 2.0F;
 constexpr std::uint64_t kPatient = 200'000;  // voxel updates a call: more than a tick has
-// Cells round a contact that are smoothed, on each level.
+// Cells around a contact that are smoothed on each level, for a contact cycle and for a large patch …
 constexpr int kContactMargin = 3, kLargePatchMargin = 14;
-// … and told after a jump. (All cells there are: no nearer, and of 10^6 voxels a third of the first result's
-// time, since each row has to go over to the tick, too. Within 16: what was told then disturbed later ones.)
+// … and that get corrections after a jump.
 constexpr int kProlongedMargin = 24;
-constexpr int kNear = 2;  // rows that a cycle round a contact reads beyond those it brings to rest
-constexpr std::uint64_t kBesideContact = 2;  // this part of the budget is left beside cycles round a contact
-// Loads of bricks: what a row of them takes, in voxel updates, and what part of a budget they may have.
+constexpr int kNear = 2;                     // rows that a contact cycle reads beyond those it relaxes
+constexpr std::uint64_t kBesideContact = 2;  // part of the budget that is left beside contact cycles
+// Cost of renewing bricks in a row (voxel updates), and the part of a budget for that.
 constexpr std::uint64_t kBrickUpdates = 4 * kRow, kBrickShare = 2;
-constexpr int kLooksAtOnce = 256;  // tiles looked at for what coarse levels have to tell them, a call
+constexpr int kLooksAtOnce = 256;  // tiles searched for pending corrections above them, per call
 
 }  // namespace
 
@@ -106,7 +104,7 @@ void Relaxation::mark_all_dirty() noexcept {
   }
 }
 
-// What the tool presses slides, and is held by where it does; see Multigrid.
+// Held voxels are fixed; pressed voxels slide and are fixed along the tool's normal.
 void Relaxation::hold_what_stands(const Displacement& state, std::span<const VoxelId> held) noexcept {
   standing_.clear();
   bool others_hold = false;
@@ -117,8 +115,8 @@ void Relaxation::hold_what_stands(const Displacement& state, std::span<const Vox
     if (state.role[v] == Displacement::held && standing_.size() < standing_.capacity())
       standing_.push_back(v);
   }
-  // Loads of bricks follow a cycle later, and with ν towards 0.5 what they are not yet told of is more than
-  // the springs know: there the region went to and fro.
+  // Loads of bricks lag by a cycle. With ν near 0.5 this error exceeds what the springs know, and the region
+  // would oscillate.
   tool_presses_ = tool_presses_ && !others_hold && !lattice_.has_bricks();
   multigrid_.set_held(standing_);
   multigrid_.set_block_contacts(state, held);
@@ -150,7 +148,7 @@ std::uint64_t Relaxation::run(Displacement& state, const ObstacleView& obstacles
       if (round_left_ > 0 && --round_left_ == 0) end_round(state, obstacles, running_residual_N_);
       continue;
     }
-    // Nothing was stirred: what coarse levels know may still have to be told somewhere.
+    // No tile is dirty: search for pending corrections above tiles.
     for (int n = 0; n < kLooksAtOnce && looked_at_ < tiles.tiles() && tiles.waiting() == 0;
          ++n, ++looked_at_) {
       if (tile_waits_for_coarse(cursor_)) tiles.push(cursor_);
@@ -163,7 +161,7 @@ std::uint64_t Relaxation::run(Displacement& state, const ObstacleView& obstacles
       end_round(state, obstacles, std::min(residual_N_, 0.99 * tolerance_N_));
     }
   }
-  // What was not needed is not saved up for a tick that has enough to do.
+  // unused budget is not saved for a tick that has enough to do
   credit_ = std::min<std::int64_t>(credit_, 0);
   return spent;
 }
@@ -209,7 +207,7 @@ std::size_t Relaxation::continue_contact(Displacement& state, const ObstacleView
   return run_steps(state, obstacles, at_once);
 }
 
-// Of what is left to do an equal part.
+// Does an equal part of the steps that are left.
 std::size_t Relaxation::run_steps(Displacement& state, const ObstacleView& obstacles,
                                   std::size_t at_once) noexcept {
   std::size_t left = work_of_planes(step_, plane_), done = 0;

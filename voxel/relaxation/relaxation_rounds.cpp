@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Rounds over the whole object: tiles, clusters, active limits, and when an object is at rest.
+// Rounds over the whole object: tiles, clusters, active limits, and whether the object is at rest.
 #include "voxel/relaxation/relaxation.h"
 
 #include <algorithm>
@@ -16,13 +16,13 @@ constexpr int kPatience = 40;             // cycles without gain before an objec
 constexpr double kWorse = 1.05;
 constexpr float kHarder = 8.0F, kSofter = 0.97F, kHardest = 1e4F;
 constexpr double kGain = 0.98;      // of the least residual so far: less is a gain
-constexpr double kNearRest = 10.0;  // times the tolerance: what limits hold moves together from here on
-constexpr double kProgress = 1e-3;  // of the spacing: clusters that move further are on their way
-// … and where links have next to no slack, those that all went this much further than ever in a round; not
-// between surfaces, where what is squeezed would be on its way for long. (Taken for what their steps free of
-// energy, it was for ever.)
+constexpr double kNearRest = 10.0;  // times the tolerance: below this clusters at limits move together
+constexpr double kProgress = 1e-3;  // of the spacing: a cluster that moves further is not at rest
+// The same for links with next to no slack: the mean motion of all clusters on an axis exceeds its previous
+// maximum by this in a round. Not between surfaces, where squeezed tissue would keep moving.
 constexpr double kDrift = 2e-5;
-constexpr std::uint64_t kNextFirst = 7919;  // of these voxels is looked at first in the next round
+// Step through the voxels at active limits: which one is first in the next round.
+constexpr std::uint64_t kNextFirst = 7919;
 
 }  // namespace
 
@@ -54,8 +54,8 @@ bool Relaxation::relax_limited(Displacement& state, const ObstacleView& obstacle
   return limited_->found();
 }
 
-// What limits held in this round moves with what it pulls on; returns the largest force a voxel that did (N).
-// Which voxel is first goes round, so that all have their turn however few a round has time for.
+// Moves the clusters at active limits of this round; returns the largest force per voxel that moved one (N).
+// The first voxel differs in each round, so that all have their turn in a limited budget.
 double Relaxation::step_clusters(Displacement& state, const ObstacleView& obstacles) noexcept {
   cluster_steps_.begin();
   double most_N = 0.0;
@@ -66,7 +66,7 @@ double Relaxation::step_clusters(Displacement& state, const ObstacleView& obstac
     const double force = cluster_steps_.move(multigrid_, state, v, axis, 0.5 * tolerance_N_);
     if (force == 0.0) return;
     most_N = std::max(most_N, force);
-    // Every such step lowers the energy, though it may be far from limit to limit to where the force falls.
+    // Each step lowers the energy, though force may fall only after many of them.
     const auto way = static_cast<double>(state.u[static_cast<std::size_t>(axis)][v] - from);
     went[static_cast<std::size_t>(axis)] += way;
     ++moves;
@@ -74,7 +74,7 @@ double Relaxation::step_clusters(Displacement& state, const ObstacleView& obstac
       cycles_without_gain_ = std::min(cycles_without_gain_, kPatience / 2 + 1);
     for (const VoxelId w : cluster_steps_.moved()) multigrid_.mark_dirty(0, w / kRow);
   };
-  // Parts without slack that limits hold, which are pulled otherwise than what holds them.
+  // blocks that limits hold
   for (std::size_t p = 0; multigrid_.has_blocks() && p < multigrid_.parts().count(); ++p) {
     for (int axis = 0; axis < 3; ++axis) move(multigrid_.parts().first(p), axis);
   }
@@ -99,22 +99,20 @@ double Relaxation::step_clusters(Displacement& state, const ObstacleView& obstac
   return most_N;
 }
 
-// A round has looked at all that moves: is it at rest?
+// The end of a round over all that moves: is the object at rest?
 void Relaxation::end_round(Displacement& state, const ObstacleView& obstacles, double residual_N) noexcept {
   residual_N = std::max(residual_N, static_cast<double>(multigrid_.bricks().unbalanced_N()));
-  // Only when nothing else moves any more: between other corrections they would undo one another (energy grew
-  // 1.9 times within a cycle).
+  // Only when little else moves: between other corrections they would undo one another and raise the energy.
   if (residual_N < kNearRest * tolerance_N_ || cycles_without_gain_ > kPatience / 2 ||
       multigrid_.has_blocks())
     residual_N = std::max(residual_N, step_clusters(state, obstacles));
-  // While rounds gain nothing, what limits hold stays held for a few of them: let go of in every round, two
-  // sets of voxels can take turns for ever.
-  // What the tool presses, and all that hangs on it by links at their limits, goes together, too: a few
-  // hundred thousand voxel updates, which no tick has to spare. Beside a body something moves in every tick,
-  // so that each round is as the first, and there what is still pulled against its limit stays held. (Let go
-  // of, coarse levels took it off the limit and back: under a ball at rest by 0.03 spacings, for ever. Kept
-  // everywhere, tissue that jumped stayed far from rest. Beside what stands, the contact's own solver knows
-  // nothing of such places, and took a brain back from them in every tick.)
+  // Active limits are released in every round only while rounds gain; else two sets of voxels could alternate
+  // without end.
+  //
+  // Pressed voxels and all their dependents move together (AdmmRegion): too much work for a tick. Beside a
+  // moving body each round is like the first. There only limits that no voxel pulls against are released:
+  // coarse levels would move such voxels off their limits and back. Beside fixed obstacles this is disabled:
+  // the per-voxel contact solver undoes the result in each tick.
   if (obstacles.moving > 0 || (tool_presses_ && patient_ && obstacles.obstacles.empty())) {
     residual_N = std::max(residual_N, limited_->relax(multigrid_, state, obstacles, {}));
     credit_ -= static_cast<std::int64_t>(limited_->looked_at());
@@ -123,8 +121,8 @@ void Relaxation::end_round(Displacement& state, const ObstacleView& obstacles, d
     limited_->forget(multigrid_);
     if (cycles_without_gain_ <= 1 || cycles_ % kLetGoEvery == 0) multigrid_.release_limited();
   }
-  // Scattered voxels hold a cell harder than a patch of them does. A cycle that ends worse than it began says
-  // so.
+  // Scattered held voxels fix a cell more firmly than a patch of them. A cycle that ends worse than it began
+  // raises the factor of boundary springs.
   if (residual_N > kWorse * residual_N_ && cycles_without_gain_ > 0) {
     hold_ = std::min(hold_ * kHarder, kHardest);
   } else {
@@ -142,7 +140,7 @@ void Relaxation::end_round(Displacement& state, const ObstacleView& obstacles, d
   const bool at_rest =
       (residual_N_ < tolerance_N_ && multigrid_.bricks().round_ended()) || cycles_without_gain_ > kPatience;
   if (!at_rest) return;
-  // What yielded is kept at rest, and then there is a new rest to be found.
+  // At rest plastic offsets are committed; then there is a new rest to be found.
   if (unkept_) {
     keeping_ = true;
     unkept_ = false;
@@ -166,7 +164,7 @@ std::uint64_t Relaxation::commit_plastic_offsets(Displacement& state, std::uint6
   return spent;
 }
 
-// Have the cells above a tile anything to tell it?
+// Has a cell above the tile a pending correction?
 bool Relaxation::tile_waits_for_coarse(std::size_t number) const noexcept {
   constexpr int kSide = TileQueue::kSide;
   const TileQueue::Tile t = multigrid_.tiles().tile(number);

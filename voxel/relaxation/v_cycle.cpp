@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One cycle: its boxes, and its passes in their order.
+// One cycle: its boxes, and its steps in order.
 #include <algorithm>
 
 #include "voxel/relaxation/relaxation.h"
@@ -8,24 +8,21 @@ namespace voxel {
 namespace {
 
 constexpr int kCoarsestSweeps = 8;
-constexpr int kContactSweeps = 4;  // of the coarsest level of a cycle round a contact, apart
-// Levels of a cycle round a contact where another relaxes the object: what is further away is his. (With all
-// of them both moved the coarsest cells, and a brain held for a minute wavered by a tenth of its force. With
-// four, or as many as reach three radii of the contact, the force on the way into organs was 4 to 25 %
-// higher.)
+constexpr int kContactSweeps = 4;  // of a contact cycle's coarsest level, under asynchronous relaxation
+// Levels of a contact cycle under asynchronous relaxation; the shadow relaxes what is further away. If both
+// moved the coarsest cells, they would disturb one another.
 constexpr int kContactLevels = 5;
-// What octets take, in those of cells that are told: smoothed; passed on. Voxels, which have limits, and
-// obstacles, take twice as much.
+// Cost of a Float8 of cells in Float8 prolonged: smoothed; restricted. Voxels, which have limits and
+// obstacles, cost twice as much.
 constexpr std::size_t kSmoothed = 2, kPassedOn = 3, kOfVoxels = 2;
-// Cycles of all levels but the first before a thorough cycle tells voxels: those are an eighth of it each.
+// Cycles of all levels but the first before voxels get the correction; each costs an eighth of a whole cycle.
 constexpr int kCoarseCycles = 2;
 constexpr int kRoundParts = 4;  // voxels
-// Solved once, coarse levels hand up what they still are off by, and a whole cycle leaves 0.65 of the error
-// round a held patch; with these twice 0.38, and deeper ones twice as well the same. (Level 1, too: 0.33, but
-// the cycle of a box takes twice as long.)
+// Levels that are visited twice in a cycle. Visited once, coarse levels leave an error of their own around a
+// held patch.
 constexpr int kFirstTwice = 2, kLastTwice = 3;
-constexpr int kAhead = 4;       // rows along y that are fetched before their turn
-constexpr int kTileMargin = 3;  // cells round a tile that are smoothed, from level 1 on
+constexpr int kAhead = 4;       // rows along y that are prefetched
+constexpr int kTileMargin = 3;  // cells around a tile that are smoothed, from level 1 on
 
 }  // namespace
 
@@ -55,9 +52,9 @@ Relaxation::RowBox Relaxation::clipped(int level, const RowBox& b) const noexcep
           std::max(b.k0, 0), std::min(b.k1, g.dims[2] - 1)};
 }
 
-// The boxes of a cycle that is to bring voxels low … high to rest: on each level so many cells more on every
-// side as the way that a force at the middle is felt: `contact_margin` and a quarter of how `wide` it is, in
-// cells, or where there is none the voxels themselves and a little more of their cells.
+// Lays the boxes of a cycle that relaxes voxels low … high. On each level they extend as far as a force in
+// the middle is felt: by `contact_margin` and a quarter of the width `wide`, in cells. A tile (no contact)
+// has its own voxels, and a few cells around it on coarse levels.
 void Relaxation::lay_boxes(const std::array<int, 3>& low, const std::array<int, 3>& high, int wide,
                            int contact_margin, Visits visits) noexcept {
   visits_ = visits;
@@ -69,9 +66,9 @@ void Relaxation::lay_boxes(const std::array<int, 3>& low, const std::array<int, 
       from[d] = std::max(0, (low[d] >> l) - margin);
       to[d] = std::min(multigrid_.grid(l).dims[d] - 1, (high[d] >> l) + margin);
     }
-    // Whole cells of the next level, so that each of them is passed on once all it holds is smooth. Along x,
-    // where voxels come by the vector, those of a contact hold some that are not, passed on as they are:
-    // twice as wide it took a twelfth longer and brought nothing. (On coarser levels that gains nothing.)
+    // Whole cells of the next level, so that a cell is restricted when all of its children are smoothed.
+    // Along x, a contact's cells on level 1 may have children that are not: making them whole would double
+    // the width there and gain nothing.
     const bool narrow = wide != kNoContact && l == 0;
     const int pair = narrow ? 0 : 1;
     RowBox& s = boxes(l).smoothed;
@@ -80,8 +77,8 @@ void Relaxation::lay_boxes(const std::array<int, 3>& low, const std::array<int, 
     if (l == last) break;
     const RowBox p{s.q0 / 2, s.q1 / 2, s.j0 / 2, s.j1 / 2, s.k0 / 2, s.k1 / 2};
     boxes(l + 1).parents = p;
-    // They and the cells beside them tell all they hold what they know, and the voxels beside those their
-    // part of it.
+    // These cells and the cells beside them prolong to all of their children, and to the children beside
+    // those.
     boxes(l + 1).source_cells = clipped(l + 1, {p.q0 - 1, p.q1 + 1, p.j0 - 1, p.j1 + 1, p.k0 - 1, p.k1 + 1});
     const RowBox& t = boxes(l + 1).source_cells;
     RowBox& told = boxes(l).told;
@@ -89,9 +86,8 @@ void Relaxation::lay_boxes(const std::array<int, 3>& low, const std::array<int, 
     boxes(l + 1).first_source = std::max(p.q0 * kLanes - 1, 0);
     boxes(l + 1).last_source = p.q1 * kLanes + kLanes;
     if (!narrow) continue;
-    // Of a contact along x those of what is smoothed, and one on either side. (Not fewer: where a vector was
-    // smoothed and only half told, that mended what the other half was still to be told, and what a spleen
-    // pressed with ran away to twice as much.)
+    // Around a contact along x only to the smoothed Float8 and one more on either side. If a smoothed Float8
+    // got half of a correction, smoothing would make up for the other half, which would then be added again.
     told.q0 = std::max(told.q0, s.q0 - 1);
     told.q1 = std::min(told.q1, s.q1 + 1);
     boxes(l + 1).first_source = std::max(s.q0 * kLanes / 2 - 1, 0);
@@ -104,7 +100,7 @@ std::size_t Relaxation::octets(const RowBox& b) {
          static_cast<std::size_t>(b.k1 - b.k0 + 1);
 }
 
-// Smoothed and told; what of the boxes is empty counts too.
+// Float8 smoothed and prolonged; empty ones count, too.
 std::size_t Relaxation::octets_of_cycle() const noexcept {
   std::size_t sum = 0;
   for (const Step& step : steps_now()) {
@@ -149,7 +145,7 @@ void Relaxation::add_steps(std::vector<Step>& to, int level, Visits visits, bool
   to.push_back({level, Step::smooths_after});
 }
 
-// In octets told.
+// In Float8 prolonged.
 std::size_t Relaxation::work_of_step(int n) const noexcept {
   const Step step = step_of(n);
   const LevelBoxes& b = boxes_[static_cast<std::size_t>(step.level)];
@@ -166,21 +162,21 @@ std::size_t Relaxation::work_of_step(int n) const noexcept {
     case Step::is_source:
       break;
   }
-  // Along x no hat reaches more than an octet further.
+  // along x corrections reach one Float8 further
   RowBox told = b.told;
   told.q0 = std::max(told.q0, b.smoothed.q0 - 1);
   told.q1 = std::min(told.q1, b.smoothed.q1 + 1);
   return each * octets(told);
 }
 
-// Rows of one colour, so that no two that are beside one another are of the same, then those of the other: by
-// planes, the other colour one behind, while what it reads is still in the cache. (The same bits as one
-// colour after the other: along x a row has neighbours of its own colour only, which come in the same order.)
+// Red-black by rows: first one colour, then the other, one plane behind while its memory is in the cache. The
+// result is the same to the last bit as one colour after the other: along x a row's neighbours have its own
+// colour, and come in the same order.
 void Relaxation::smooth_box(int level, int first_colour, Displacement& state, const ObstacleView& obstacles,
                             Look look, Planes planes) noexcept {
   const RowBox& all = boxes(level).smoothed;
   const int first = all.k0 + planes.first, last = std::min(all.k0 + planes.last, all.k1);
-  const RowId next_plane = multigrid_.grid(level).row_z;  // the planes before it are in the cache
+  const RowId next_plane = multigrid_.grid(level).row_z;  // the planes before are in the cache
   const auto smooth = [&](const RowBox& plane, int colour) {
     for_rows(level, plane, [&](RowId row, LaneSpan span, int j, int k) {
       if (((j + k + colour) & 1) != 0) return;
@@ -207,10 +203,9 @@ void Relaxation::smooth_box(int level, int first_colour, Displacement& state, co
   }
 }
 
-// Tells the rows of a level what the next coarser one knows, within the boxes: cells in the box and beside
-// it. Those beside it go along, however little they have to tell: nobody brings what they hold to rest, but
-// the box would feel it if they stayed behind, four times as much on each coarser level. (Letting those with
-// less than 2e-4 spacings to tell wait was rejected: energy grew without end where tissue hangs by little.)
+// Prolongs the pending corrections of the next coarser level within the boxes. Cells beside the box always
+// prolong, however small their correction: nothing relaxes their children here, and children left behind
+// would act on the box like a force, four times as much on each coarser level.
 void Relaxation::prolong_box(int level, Displacement& state, const ObstacleView& obstacles,
                              Planes planes) noexcept {
   if (planes.first == 0) any_source_ = mark_source_cells(level, state, obstacles);
@@ -232,7 +227,7 @@ bool Relaxation::mark_source_cells(int level, Displacement& state, const Obstacl
     const float most =
         multigrid_.pending_correction(level + 1, row, span, b.first_source - origin, b.last_source - origin);
     if (most <= multigrid_.restricted_m()) return;
-    // Where links at their limits hold tissue between obstacles, coarse cells can run away.
+    // Between obstacles coarse cells can run away under active limits.
     if (!(most <= farthest_m_) && !is_limited_correction_) {
       multigrid_.forget_pending_correction(level + 1, row, state, obstacles);
       return;
@@ -243,7 +238,7 @@ bool Relaxation::mark_source_cells(int level, Displacement& state, const Obstacl
   return any;
 }
 
-// Was anything that a coarse row holds moved since it was passed on?
+// Has a child of a coarse row changed since its last restriction?
 bool Relaxation::restrict_due(int level, RowId row) const noexcept {
   const std::array<RowId, 8> below = multigrid_.rows_below(level, row);
   return std::any_of(below.begin(), below.end(),
@@ -277,8 +272,8 @@ int Relaxation::planes_of_step(int n) const noexcept {
 void Relaxation::step(int n, Planes planes, Displacement& state, const ObstacleView& obstacles, Look look,
                       bool smoothed) noexcept {
   const Step step = step_of(n);
-  // What coarse levels know and finer ones do not is told first: a step between voxels that were told and
-  // others that were not would look like a force to the cells above it.
+  // Pending corrections come first: a step between corrected voxels and others would look like a force to the
+  // cells above.
   for (int l = last_level() - 1; n == 0 && planes.first == 0 && l >= 0; --l)
     prolong_box(l, state, obstacles, kAllPlanes);
   const RigidBlocks::Box box = cells(boxes(step.level).smoothed);
@@ -309,8 +304,8 @@ void Relaxation::step(int n, Planes planes, Displacement& state, const ObstacleV
   }
 }
 
-// What two rows further along y will be passed on of the finer level's last two planes: those before are in
-// the cache.
+// Prefetches the children of the row kAhead further, in the last two planes of the finer level; the planes
+// before are in the cache.
 void Relaxation::fetch_ahead_below(int level, RowId row, const Displacement& state) const noexcept {
   const Grid& finer = multigrid_.grid(level - 1);
   const RowId first = multigrid_.rows_below(level, row)[0] + finer.row_z + kAhead;
@@ -323,7 +318,7 @@ void Relaxation::fetch_ahead_below(int level, RowId row, const Displacement& sta
 void Relaxation::restrict_residual(int l, Displacement& state, const ObstacleView& obstacles, Look look,
                                    Planes planes) noexcept {
   const bool begins = planes.first == 0;
-  // Before forces are summed, so that what is called the residual is that of links that yield.
+  // Before forces are summed, so that the residual is that of plastic links.
   if (l == 0 && lattice_.yields() && begins) {
     for_rows(0, boxes(0).smoothed, [&](RowId row, LaneSpan, int, int) {
       if (look == Look::all || multigrid_.has(0, row, Multigrid::active | Multigrid::dirty))
@@ -335,16 +330,17 @@ void Relaxation::restrict_residual(int l, Displacement& state, const ObstacleVie
   parents.k0 = all.k0 + planes.first;
   parents.k1 = std::min(all.k0 + planes.last, all.k1);
   const Grid& g = multigrid_.grid(l + 1);
-  // All of them before any load: a row's load is that of its neighbours where they are, too.
+  // All values before any load: a row's load depends on its neighbours' values.
   for_rows(l + 1, begins ? all : RowBox{}, [&](RowId row, LaneSpan span, int, int) {
     if (look == Look::active) {
       if (!restrict_due(l + 1, row)) return;
-      // The load holds a row where it is beside its neighbours where they are.
+      // A load depends on the values of the neighbours, too.
       for (const RowId r :
            {row, row - 1, row + 1, row - g.row_z, row + g.row_z, row - g.row_x, row + g.row_x})
         multigrid_.mark(l + 1, r, Multigrid::renewed);
     }
-    // Apart, coarse cells hold only what was moved since all was balanced, and know that from themselves.
+    // Under asynchronous relaxation coarse cells hold only motion since the residual was frozen, which they
+    // know themselves.
     if (!apart_) multigrid_.restrict_values(l + 1, row, state, span);
   });
   if (begins) {
@@ -383,8 +379,8 @@ std::size_t Relaxation::run_thoroughly(Displacement& state, const ObstacleView& 
 
 void Relaxation::run_coarse_first(Displacement& state, const ObstacleView& obstacles) noexcept {
   multigrid_.restrict_all(true);
-  const int first_coarse = 2;         // level 1 is smoothed
-  const int of_voxels = steps() - 2;  // they are told
+  const int first_coarse = 2;         // level 1 is smoothed before
+  const int of_voxels = steps() - 2;  // voxels get the correction
   run_steps_over(0, of_voxels, state, obstacles, Look::all);
   for (int n = 0; n < kCoarseCycles; ++n)
     run_steps_over(first_coarse, of_voxels, state, obstacles, Look::all);

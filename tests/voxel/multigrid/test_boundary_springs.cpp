@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What holds coarse cells, and with it how much of its error a cycle leaves.
+// Boundary springs of coarse cells, and the error that a cycle leaves.
 #include "voxel/multigrid/boundary_springs.h"
 
 #include <gtest/gtest.h>
@@ -43,7 +43,7 @@ struct Levels {
       pointers.push_back(levels.back().get());
     }
   }
-  // Of a cell (N/m).
+  // Spring of a cell (N/m).
   double hold(BoundarySprings& holds, int level, VoxelId cell, int axis) {
     const voxel::VoxelSprings springs = pointers[static_cast<std::size_t>(level)]->springs_of(cell);
     if (!holds.any(level, cell / voxel::kRow)) return 0.0;
@@ -55,8 +55,8 @@ struct Levels {
   std::vector<LevelStiffness*> pointers;
 };
 
-// A plane that is held is as far from the middle of a cell on each level as it is: (2^l − 1) / 2 links of the
-// voxels, 4^l of them side by side. Seen from either side, along each axis.
+// On level l a fixed plane is (2^l − 1) / 2 voxel links from the middle of a cell, with 4^l links side by
+// side. From either side, along each axis.
 TEST(BoundarySprings, APlaneStaysWhereItIsOnEveryLevel) {
   LatticeOptions options;
   options.materials[1] = elastic(1e4, 0.3);
@@ -78,7 +78,7 @@ TEST(BoundarySprings, APlaneStaysWhereItIsOnEveryLevel) {
   }
 }
 
-// Whatever came and went before: what is held now is all that counts.
+// Only what is held now counts, whatever was held before.
 TEST(BoundarySprings, DependOnWhatIsHeldAlone) {
   LatticeOptions options;
   options.materials[1] = elastic(1e4, 0.3);
@@ -125,8 +125,8 @@ TEST(BoundarySprings, DependOnWhatIsHeldAlone) {
   }
 }
 
-// When and in which order rows are asked for changes nothing, nor what is held in between: what anchors hold
-// is the same, to the last bit, as if all of it had been found at the start.
+// The time and order of queries changes nothing, nor does what is held in between: springs of anchors are the
+// same, to the last bit, as if all were found at the start.
 TEST(BoundarySprings, OfAnchorsAreTheSameWheneverTheyAreAskedFor) {
   std::mt19937 random(9);
   for (int n = 0; n < 6; ++n) {
@@ -192,7 +192,7 @@ TEST(BoundarySprings, OfAnchorsAreTheSameWheneverTheyAreAskedFor) {
   }
 }
 
-// Voxels that slide along an inclined surface hold the cells above them along its normal, and not across.
+// Voxels that slide on an inclined surface fix the cells above them along its normal only.
 TEST(BoundarySprings, WhatSlidesHoldsAlongItsNormalAlone) {
   LatticeOptions options;
   options.materials[1] = elastic(1e4, 0.3);
@@ -228,7 +228,7 @@ TEST(BoundarySprings, WhatSlidesHoldsAlongItsNormalAlone) {
   }
 }
 
-// However surfaces are inclined, nothing that holds a cell pushes it on.
+// However surfaces are inclined, a boundary spring never pushes a cell on.
 TEST(BoundarySprings, NeverPush) {
   LatticeOptions options;
   options.materials[1] = elastic(1e4, 0.3);
@@ -272,8 +272,8 @@ TEST(BoundarySprings, NeverPush) {
   EXPECT_GT(tilted, 50);
 }
 
-// Six cycles over a block that was bent as a whole, and is to come back to 0: what each leaves of the error,
-// in energy, on the mean. A patch of its surface is held, or slides as on a ball.
+// Six cycles over a block that was bent as a whole and is to come back to 0: the mean fraction of the error's
+// energy that a cycle leaves. A patch of its surface is held, or slides as on a ball.
 enum class Patch : std::uint8_t { held, slides };
 double left_by_a_cycle(const std::array<int, 3>& dims, int patch, Patch by = Patch::held) {
   LatticeOptions options;
@@ -337,7 +337,7 @@ TEST(BoundarySprings, ACycleLeavesAsLittleOfTheErrorAtAnySize) {
     std::cout << size << " voxels an edge: " << left << '\n';
     EXPECT_LT(left, 0.3) << size;
   }
-  for (const int size : {9, 17, 33, 61}) {  // a cell of one layer on every level, or on some
+  for (const int size : {9, 17, 33, 61}) {  // some levels, or all, have a cell of one layer
     const double left = left_by_a_cycle({size, size, size}, 0);
     std::cout << size << " voxels an edge: " << left << '\n';
     EXPECT_LT(left, 0.45) << size;
@@ -353,7 +353,8 @@ TEST(BoundarySprings, ACycleRoundWhatTheToolHoldsLeavesNoMore) {
   }
 }
 
-// Nor where a patch is small beside the block, of which coarse levels see little, or slides.
+// The same for a patch that is small beside the block, of which coarse levels see little, and for one that
+// slides.
 TEST(BoundarySprings, ACycleRoundASmallOrSlidingPatchLeavesNoMore) {
   for (const int size : {48, 96}) {
     for (const Patch by : {Patch::held, Patch::slides}) {

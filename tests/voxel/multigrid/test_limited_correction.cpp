@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Rows that are moved together, against what that is defined by.
+// Limited corrections of many rows, against their definition.
 #include "voxel/multigrid/limited_correction.h"
 
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ using voxel::Lattice;
 using voxel::RowId;
 using voxel::VoxelId;
 
-// A lattice pulled somewhere, so that many of its links are at their limits and none is beyond.
+// A lattice that was pulled: many of its links are at their limits, and none is beyond.
 struct Pulled {
   tests::RandomScene scene;
   Lattice lattice;
@@ -39,7 +39,7 @@ struct Pulled {
   }
 };
 
-// Not anchored, and linked to something: what hangs on nothing is moved by nobody.
+// not anchored, and linked to something
 bool moves(const Lattice& lattice, VoxelId v) {
   if (!lattice.filled(v) || lattice.anchored(v)) return false;
   for (int d = 0; d < 3; ++d) {

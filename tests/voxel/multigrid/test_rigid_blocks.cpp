@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Parts without slack, in and on soft tissue: against the equilibrium found by a direct solver in which each
-// of them is one unknown an axis.
+// Rigid blocks in and on soft tissue, against a direct solution in which each block is one unknown an axis.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -48,7 +47,7 @@ struct Scene {
     object = std::make_unique<voxel::SoftObject>(lattice);
   }
 
-  // `depth` spacings below where it first touches the top, at x, y in spacings.
+  // A tool `depth` spacings below first contact with the top, at x, y in spacings.
   [[nodiscard]] voxel::ToolInBody ball(double radius, double depth, double x, double y) const {
     voxel::ToolInBody tool;
     tool.radius = radius * kSpacing;
@@ -80,7 +79,7 @@ struct Scene {
     }
     return worst / kSpacing;
   }
-  // In turns, as a session has them: `ticks` of them with the tool there.
+  // Relaxes in turns, as a session does: `ticks` ticks with the tool there.
   enum class Relaxed { here, by_another_thread };
   void hold(voxel::ShadowObject& replica, const voxel::ToolInBody& tool, int ticks,
             Relaxed relaxed = Relaxed::here) {
@@ -99,7 +98,7 @@ struct Scene {
       while (!replica.drained()) replica.drain(*object, lattice->grid().rows());
     }
   }
-  // The tool comes down to `depth` in steps, and stays.
+  // Moves the tool down to `depth` in steps, and keeps it there.
   void press(voxel::ShadowObject& replica, double radius, double depth, double x, double y, int ticks = 120) {
     constexpr int kSteps = 10;
     for (int n = 1; n <= kSteps; ++n) hold(replica, ball(radius, depth * n / kSteps, x, y), 1);
@@ -114,8 +113,7 @@ struct Scene {
   }
 };
 
-// The equilibrium on an axis, with what the tool presses held where it is and each part without slack one
-// unknown.
+// The equilibrium on an axis, with pressed voxels where they are and each rigid block as one unknown.
 tests::Problem condensed(const Scene& scene, int axis, const voxel::ToolInBody& tool) {
   const voxel::Lattice& lattice = *scene.lattice;
   const auto& u = scene.object->state().u[static_cast<std::size_t>(axis)];
@@ -148,7 +146,7 @@ tests::Problem condensed(const Scene& scene, int axis, const voxel::ToolInBody& 
   return p;
 }
 
-// What the anchors carry in such a solution (N), where no link of theirs is at its limit.
+// Force on the anchors in such a solution (N), if none of their links is at its limit.
 double carried(const Scene& scene, const tests::Problem& p) {
   double force = 0.0;
   for (const tests::Link& l : p.links) {
@@ -162,7 +160,7 @@ double carried(const Scene& scene, const tests::Problem& p) {
 
 enum class Limits { none, active };
 
-// Force and displacements are those of the direct solution, and nothing is pulled that may move.
+// Force and displacements are those of the direct solution, and the residual of all that may move is small.
 void expect_at_equilibrium(Scene& scene, const voxel::ToolInBody& tool, Limits limits) {
   scene.touch(tool);
   scene.object->push_out(tool);
@@ -178,8 +176,8 @@ void expect_at_equilibrium(Scene& scene, const voxel::ToolInBody& tool, Limits l
       tests::solve_with_limits(p, kSpacing);
     }
     EXPECT_NEAR(-force[axis], carried(scene, p), 0.01 * size) << "axis " << axis;
-    // Across the press, voxels that are pressed with their links at their limits do not slide as far as they
-    // could, parts or none (tangential_contact.h).
+    // Across the press, pressed voxels with links at their limits do not slide as far as they could, with
+    // blocks or without (tangential_contact.h).
     if (limits == Limits::active && axis != 2) continue;
     double off = 0.0;
     for (std::size_t v = 0; v < p.u.size(); ++v)
@@ -190,7 +188,7 @@ void expect_at_equilibrium(Scene& scene, const voxel::ToolInBody& tool, Limits l
   }
   EXPECT_EQ(voxel::validate(*scene.lattice, scene.object->state(), 8.0), "");
   if (limits == Limits::active) return;
-  // Of the first-order conditions what is left: on each voxel that may move, and on each part as a whole.
+  // what is left of the first-order conditions, on each voxel that may move and on each block
   std::map<int, glm::dvec3> of_part;
   double most = 0.0;
   for (std::size_t i = 0; i < scene.lattice->size(); ++i) {
@@ -215,7 +213,7 @@ void expect_at_equilibrium(Scene& scene, const voxel::ToolInBody& tool, Limits l
   EXPECT_LT(most, 1e-4 * size);
 }
 
-// Nothing moved any more when the tool has gone.
+// All is back at rest when the tool has gone.
 void expect_restored(Scene& scene, voxel::ShadowObject& replica, voxel::ToolInBody tool, int ticks = 150) {
   tool.centre.z += 1.0;
   scene.hold(replica, tool, ticks);
@@ -263,7 +261,7 @@ TEST(RigidBlocks, OnAnchorsAreAsRigid) {
   EXPECT_GT(scene.object->give_way(tool, bounds), 0U);
 }
 
-// The same wherever the tool is: over the middle, beside it, and where it comes from one place to another.
+// wherever the tool is: over the middle, beside it, and moving from one place to another
 TEST(RigidBlocks, AreFeltAsTheyAreHeldByTissue) {
   for (const Shape& shape : shapes()) {
     SCOPED_TRACE(shape.name);
@@ -295,7 +293,7 @@ TEST(RigidBlocks, AreFeltThroughLinksAtTheirLimits) {
   }
 }
 
-// Small ones, and some that sprawl between them, with links at their limits beside the tool.
+// small blocks, and some that sprawl between them, with links at their limits beside the tool
 TEST(RigidBlocks, ScatteredAreFeltToo) {
   for (const std::uint32_t seed : {1U, 2U, 3U}) {
     SCOPED_TRACE(seed);

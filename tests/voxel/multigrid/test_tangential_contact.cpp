@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the tool presses slides along it, with all that relaxes.
+// Pressed voxels slide on the tool as a part of relaxation.
 #include "voxel/multigrid/tangential_contact.h"
 
 #include <gtest/gtest.h>
@@ -25,8 +25,8 @@ using voxel::VoxelId;
 
 constexpr double kH = 2e-3;  // spacing (m)
 
-// One voxel on an inclined surface, its neighbours anywhere: it goes to where nothing pulls it along that any
-// more, without leaving it, and its energy falls by what the way in between is worth.
+// One voxel on an inclined surface, with random neighbours: it moves to the point without tangential force,
+// without leaving the surface, and its energy falls by the work on the way.
 TEST(Sliding, GoesToTheLeastEnergyAlongTheTool) {
   const Lattice lattice(tests::block({6, 6, 6}, glm::dvec3(kH)), tests::made_of(elastic(1e4, 0.3)));
   LevelStiffness couplings(lattice, nullptr);
@@ -55,7 +55,7 @@ TEST(Sliding, GoesToTheLeastEnergyAlongTheTool) {
   }
 }
 
-// What is at its limit on one axis does not leave the surface by going on along the others.
+// A voxel at its limit on one axis does not leave the surface by moving along the others.
 TEST(Sliding, StaysWhereLinksKeepIt) {
   const voxel::LinkMaterial tied{.young_Pa = 1e4, .stretch_min = 0.99, .stretch_max = 1.01, .shear = 0.01};
   const Lattice lattice(tests::block({6, 6, 6}, glm::dvec3(kH)), tests::made_of(tied));
@@ -71,8 +71,8 @@ TEST(Sliding, StaysWhereLinksKeepIt) {
   EXPECT_EQ(state.at(v), glm::dvec3(0.0));
 }
 
-// A ball at rest in a block goes on by a tenth of a spacing: what is left of the error of the force, in steps
-// of the force, after so many cycles over all of it.
+// A ball at rest in a block moves on by a tenth of a spacing: the error of the force after so many whole
+// cycles, over the step of the force.
 double left_after(int cycles, int edge, double radius, double depth, double step) {
   const auto force_at = [&](SoftBlock& soft, double deep) {
     return soft.press(soft.ball(radius * kH, deep * kH), (radius + 4.0) * kH, 1e-6, 400).force_N.z;
@@ -90,8 +90,7 @@ double left_after(int cycles, int edge, double radius, double depth, double step
   return std::fabs((soft.object->reaction(tool).force_N.z - to) / (to - from));
 }
 
-// Held on all axes between looks at the tool, the first of these was 0.011 off after six cycles, and the
-// last 0.13.
+// A contact that slides during cycles converges like the rest of the object.
 TEST(Sliding, AContactComesToRestWithAllElse) {
   const double steep = left_after(6, 24, 4.0, 3.0, -0.1), flat = left_after(6, 24, 10.0, 1.0, 0.1),
                deep = left_after(6, 32, 8.0, 6.0, 0.05);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Newtons from Young's modulus and Poisson's ratio: Hertz's ball, the flat punch, and a finite-element block.
-// What a block of soft tissue, its store and its relaxation make of them; the energies alone are looked at in
+// Newtons from Young's modulus and Poisson's ratio: Hertz's ball, the flat punch, and a finite-element block,
+// through a whole block of soft tissue with its store and relaxation. The energies alone are tested in
 // test_half_space.cpp and test_reference_block.cpp.
 #include <gtest/gtest.h>
 
@@ -29,7 +29,7 @@ double contact_modulus(double poisson) {
   return kYoung / (1 - poisson * poisson);
 }
 
-// Cycles until the force on the held voxels stands still; that force, upwards.
+// Runs cycles until the force on the held voxels is constant; returns that force, upwards.
 double relaxed_force(SoftBlock& soft, const std::vector<VoxelId>& held, double part = 1e-4) {
   double before = 0.0;
   for (int cycle = 0; cycle < 60; ++cycle) {
@@ -43,12 +43,12 @@ double relaxed_force(SoftBlock& soft, const std::vector<VoxelId>& held, double p
   return before;
 }
 
-// A quarter of a block 20 contact radii wide: pressed at the edge where its two inner faces meet. A face of
-// the lattice is a plane of symmetry, because the links in it weigh half.
+// A quarter of a block 20 contact radii wide, pressed at the edge of its two inner faces. A face of the
+// lattice is a plane of symmetry, because links in it count half.
 struct Corner {
   SoftBlock soft;
   std::vector<VoxelId> held;
-  std::vector<double> radius2;  // of each from the edge (spacings²)
+  std::vector<double> radius2;  // distance² of each voxel from the edge (spacings²)
 
   Corner(double a, double poisson)
       : soft({size(a), size(a), 2 * size(a) - 1}, kH, elastic(kYoung, poisson)) {}
@@ -64,7 +64,7 @@ struct Corner {
       }
     }
   }
-  // What a tool that is where the voxels already are feels, of the whole block.
+  // Reaction of the whole block on a tool at the voxels' present places.
   Reaction felt(const voxel::ToolInBody& tool) {
     for (const VoxelId v : held) soft.object->release(v);
     soft.object->touch(held);
@@ -79,11 +79,11 @@ struct Felt {
   double force_N, theory_N, radius;
 };
 
-// The radius is that of the ball that voxel centres meet; its depth is a tenth of a spacing.
+// A ball with contact radius a (in voxel centres); its depth is a tenth of a spacing.
 Felt ball(double a, double poisson) {
   const double depth = 0.1 * kH, radius = a * a * kH * kH / depth;
   Corner corner(a, poisson);
-  // The paraboloid that Hertz's ball is, and the ball itself, are the same here within 1e-6 of the depth.
+  // Hertz's paraboloid and the ball differ by less than 1e-6 of the depth here.
   const double nudge = 1e-6 * depth;
   voxel::ToolInBody tool;
   tool.radius = radius - corner.soft.object->voxel_radius();
@@ -95,7 +95,7 @@ Felt ball(double a, double poisson) {
   for (std::size_t n = 0; n < corner.held.size(); ++n)
     corner.soft.object->move(corner.held[n], {0.0, 0.0, bottom(corner.radius2[n]) + nudge});
   relaxed_force(corner.soft, corner.held);
-  // None of them is pulled, and none outside lies in the ball.
+  // pressed voxels only push, and no other voxel lies in the ball
   for (int round = 0; round < 6; ++round) {
     std::size_t changed = 0;
     for (std::size_t n = corner.held.size(); n-- > 0;) {
@@ -139,7 +139,7 @@ Felt punch(double a, double poisson) {
   tool.radius = (a + 1e-3) * kH;
   tool.centre = {0.0, 0.0, corner.soft.top() + corner.soft.object->voxel_radius() - depth};
   const double found = corner.felt(tool).force_N.z;
-  // Of the whole punch: those on a face are half as many as they look, the one on the edge a quarter.
+  // voxels of the whole punch: those on a face count half, the one on the edge a quarter
   double voxels = 0.0;
   for (const VoxelId v : corner.held) {
     const auto c = corner.soft.lattice->coordinates(v);
@@ -157,7 +157,7 @@ void compare(const char* what, double poisson, const Felt& felt) {
       << what << ' ' << felt.radius << ' ' << poisson;
 }
 
-// Under a sanitizer the small block alone: it looks for errors, not for percents.
+// under a sanitizer only the small block: it looks for errors, not accuracy
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 const std::vector<double> kRadii{4.0};
 #else
@@ -176,8 +176,8 @@ TEST(Calibration, AFlatPunchIsTheHalfSpaces) {
   }
 }
 
-// The block of the reference is 100 × 100 × 60 mm with its base held and a square punch on top
-// (reference/README.md), here with a voxel at each of its nodes.
+// The reference is a block of 100 × 100 × 60 mm with its base held and a square punch on top
+// (reference/README.md), with a voxel at each of its nodes.
 double pressed_square(const tests::ReferenceRow& row) {
   const double h = row.spacing_m, depth = 1e-3;
   const int n = static_cast<int>(std::lround(0.1 / h)) + 1, nz = static_cast<int>(std::lround(0.06 / h)) + 1;
@@ -212,7 +212,7 @@ TEST(Calibration, ABlockIsTheFiniteElements) {
       ++homogeneous;
       EXPECT_LT(std::fabs(error), 0.1);
     }
-    // The same energy solved plainly, to a tenth of a percent of it.
+    // the same energy by the plain solver, within a tenth of a percent
     if (row.spacing_m > 0.004) {
       EXPECT_NEAR(error, tests::pressed_block(row, tests::Energy::six_link) / row.force_N - 1.0, 0.001);
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a contact gives back, of springs whose force is not the slope of an energy.
+// Energy that a contact returns, for springs whose force is not the gradient of an energy.
 #include "voxel/object/contact_energy_observer.h"
 
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 
 namespace {
 
-// A tissue into which a tool goes by z, whose force is a power of the depth, and stiffer towards x = 0.
+// Tissue whose force along z is a power of the depth, and which is stiffer towards x = 0.
 struct Tissue {
   double power, stiffer_per_m;
   [[nodiscard]] glm::dvec3 force_N(const glm::dvec3& tool) const {
@@ -57,9 +57,9 @@ TEST(ContactEnergy, WhatGoesInComesOutWhole) {
   }
 }
 
-// In where it is soft, out where it is stiff, and again: nothing for nothing, and no step on the way.
+// In where it is soft, out where it is stiff, repeatedly: no energy is gained, and no step is felt.
 TEST(ContactEnergy, ATissueThatIsStifferWhereAToolLeavesGivesNothing) {
-  for (const double stiffer : {1.0, 2.0, 4.0}) {  // per meter: 0.5, 1 and 2 % over the way aside
+  for (const double stiffer : {1.0, 2.0, 4.0}) {  // per meter: 0.5, 1 and 2 % along the sideways path
     Hand hand{{2.0, stiffer}, {}};
     hand.energy.begin();
     for (int press = 0; press < 4; ++press) {
@@ -73,7 +73,7 @@ TEST(ContactEnergy, ATissueThatIsStifferWhereAToolLeavesGivesNothing) {
   }
 }
 
-// A share that was taken away comes back while the tool presses on.
+// A reduced share returns to 1 while the tool presses on.
 TEST(ContactEnergy, PressingOnRegainsTheForce) {
   Hand hand{{2.0, 60.0}, {}};
   hand.energy.begin();
@@ -85,7 +85,7 @@ TEST(ContactEnergy, PressingOnRegainsTheForce) {
   EXPECT_GT(hand.energy.share(), 0.99);
 }
 
-// A contact that is there when a session begins holds what it holds.
+// A contact that exists when a session begins has its stored energy.
 TEST(ContactEnergy, WhatIsThereAtTheBeginningMayBeGiven) {
   Hand hand{{2.0, 0.0}, {}, {0.0, 0.0, -3e-3}};
   hand.energy.begin();

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Is what a contact comes to rest at the least energy within limits? By its conditions of first order
-// (Karush, Kuhn and Tucker): what springs pull every voxel by is balanced by forces of links at their limits
-// and of the tool, each of which pushes its own way only. Those forces are looked for here, and nobody is
-// asked for them.
+// Does a contact come to rest at the least energy within limits? By the first-order conditions (Karush, Kuhn
+// and Tucker): forces of links at their limits and of the tool, each with the right sign, balance the
+// springs' force on every voxel. The test finds these forces itself.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -17,7 +16,7 @@ namespace {
 
 using voxel::VoxelId;
 
-// A force that may act: along `way` at one voxel, and against it at another where there is one.
+// An admissible force: along `way` at one voxel, and against it at another if it is a link's.
 struct Force {
   std::size_t a = 0, b = kNone;  // 3 v + axis for links; 3 v for the tool
   glm::dvec3 way{0.0};
@@ -42,8 +41,7 @@ class Conditions {
     }
   }
 
-  // The largest pull on any voxel that no such forces balance (N): the least sum of squares, one force at a
-  // time.
+  // Largest force on a voxel that admissible forces do not balance (N): least squares, one force at a time.
   double least_left_N() {
     for (int n = 0; n < kRounds; ++n) {
       for (Force& f : forces_) balance(f);

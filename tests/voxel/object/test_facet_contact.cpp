@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Two soft blocks, one on the other: they share the overlap, and press with equal and opposite force.
+// Two soft blocks in contact share the overlap, and press with equal and opposite force.
 #include "voxel/object/facet_contact.h"
 
 #include <gtest/gtest.h>
@@ -27,13 +27,14 @@ using voxel::VoxelId;
 
 constexpr double kH = 1e-3;
 
-// The lower block stands on its base, the upper one hangs from its top, over the other and `overlap` into it.
+// The lower block stands on its base; the upper one hangs from its top, over the lower one and `overlap` into
+// it.
 struct Stack {
   std::array<int, 3> dims;
   std::shared_ptr<const Lattice> lattice_below, lattice_above;
   SoftObject below, above;
   BodyPose pose_below, pose_above;
-  std::vector<PressedPair> pairs;  // of the voxels below, on the surface above
+  std::vector<PressedPair> pairs;  // voxels of the lower block on the surface of the upper one
 
   Stack(const std::array<int, 3>& size, double young_below, double young_above, double overlap,
         const BodyPose& frame = {}, double beside = 0.0)
@@ -54,12 +55,13 @@ struct Stack {
       }
     }
     for (const PressedPair& pair : pairs) {
-      // Single voxels look nowhere.
+      // surfaces of single voxels have no direction
       if (pair.side != glm::dvec3(0.0)) voxel::hold_pair({below, pose_below}, {above, pose_above}, pair);
     }
   }
 
-  // Sweeps over the pairs and a background cycle of each, as ticks do. Returns the deepest overlap left.
+  // Sweeps over the pairs, with a background cycle of each object, as ticks do. Returns the deepest overlap
+  // left.
   double relax(int rounds) {
     double deepest = 0.0;
     for (int n = 0; n < rounds; ++n) {
@@ -81,9 +83,9 @@ struct Stack {
   }
 };
 
-// Whole links that a bar of width × width voxels is worth: nine in 4 × 4 voxels, since a bar ends at the
-// centres of its outermost voxels, where links stand for a half and in its edges for a quarter of their area.
-// One in a row of single voxels, which has no inside.
+// Stiffness of a bar of width × width voxels in whole links: nine for 4 × 4 voxels, because a bar ends at the
+// centres of its outermost voxels, where links count half, and a quarter at its edges. One for a row of
+// single voxels, which has no inside.
 double links_side_by_side(int width) {
   double sum = 0.0;
   for (int j = 0; j < width; ++j) {
@@ -105,7 +107,8 @@ TEST(PairContact, ForcesAreEqualAndOpposite) {
   oblique.rotation = glm::normalize(glm::dquat(0.8, 0.3, -0.4, 0.2));
   for (const BodyPose& frame : {BodyPose{}, oblique}) {
     for (const auto& [young_below, young_above] : {std::pair{1e4, 1e4}, {1e4, 3e4}, {5e4, 5e3}}) {
-      // One ball on another slips off sideways unless the rounding is symmetric: columns only where it is.
+      // single columns only in the aligned frame: one ball on another slips sideways unless rounding is
+      // symmetric
       for (const int width : {frame.origin == glm::dvec3(0.0) ? 1 : 3, 5}) {
         Stack stack({width, width, 7}, young_below, young_above, 0.8 * kH, frame);
         const double deepest = stack.relax(400);
@@ -116,7 +119,7 @@ TEST(PairContact, ForcesAreEqualAndOpposite) {
           worst = std::max(worst, glm::length(fb + fa) / glm::length(fb));
           total += fb;
         }
-        // Two bars end to end, pressed together by the overlap: six links each, of E·h times their area.
+        // Two bars end to end, compressed by the overlap: six links each, of E·h times their area.
         const double k = 1.0 / (6 / (young_below * kH) + 6 / (young_above * kH));
         const double expected = k * 0.8 * kH * links_side_by_side(width);
         const double force = glm::dot(total, frame.rotation * glm::dvec3(0, 0, 1));
@@ -126,7 +129,7 @@ TEST(PairContact, ForcesAreEqualAndOpposite) {
         EXPECT_LE(worst, 0.01);
         EXPECT_LE(deepest, 0.05 * kH);
         EXPECT_NEAR(force, expected, 0.01 * expected);
-        // The softer one gives way by so much more as it is softer.
+        // overlap is shared in proportion to compliance
         const PressedPair& middle = stack.pairs[stack.pairs.size() / 2];
         const double down = -stack.below.state().at(middle.a).z, up = stack.above.state().at(middle.b).z;
         EXPECT_NEAR(down / up, young_above / young_below, 0.02 * young_above / young_below);
@@ -164,7 +167,7 @@ TEST(PairContact, AVoxelBetweenFourIsHeldByAllOfThem) {
 }
 
 TEST(PairContact, ChainsFollowWhatLinksCannot) {
-  // Each voxel may come 0.95 of a spacing nearer to the one behind it; the rest is for those behind.
+  // each voxel may come 0.95 of a spacing nearer to the one behind it; the rest is left to those behind
   Stack stack({3, 3, 4}, 1e4, 2e4, 2.4 * kH);
   const voxel::PosedObject below{stack.below, stack.pose_below}, above{stack.above, stack.pose_above};
   for (PressedPair& pair : stack.pairs) EXPECT_LT(stack.press(pair), -0.4 * kH);
@@ -179,7 +182,7 @@ TEST(PairContact, ChainsFollowWhatLinksCannot) {
 }
 
 TEST(PairContact, OverlapIsSharedInverselyToStiffnessAtOnce) {
-  // Already in the first step, before anything else moved.
+  // in the first step already, before anything else moved
   Stack stack({1, 1, 2}, 1e4, 4e4, 0.5 * kH);
   PressedPair& pair = stack.pairs[0];
   EXPECT_NEAR(stack.press(pair), 0.0, 1e-9);
@@ -201,7 +204,7 @@ TEST(PairContact, VoxelsThatPassedOneAnotherAreNotHeldThere) {
   Stack stack({3, 3, 5}, 1e4, 1e4, -0.5 * kH);
   PressedPair& pair = stack.pairs[4];
   EXPECT_NEAR(pair.side.z, 1.0, 1e-12);
-  stack.above.move(pair.b, {0.0, 0.0, -1.9 * kH});  // below the surface that it belongs above
+  stack.above.move(pair.b, {0.0, 0.0, -1.9 * kH});  // below the surface that it should be above
   ASSERT_LT(stack.above.state().at(pair.b).z, -1.6 * kH);
   EXPECT_NEAR(stack.press(pair), 0.5 * kH, 1e-9);
   EXPECT_EQ(pair.force_N, glm::dvec3(0.0));
@@ -209,7 +212,7 @@ TEST(PairContact, VoxelsThatPassedOneAnotherAreNotHeldThere) {
 }
 
 TEST(PairContact, AnAnchoredVoxelDoesNotGiveWay) {
-  // The lower block is one layer, all of it anchored: the upper one takes the whole overlap.
+  // The lower block is one layer, all anchored: the upper one takes the whole overlap.
   Stack stack({1, 1, 1}, 1e4, 1e4, 0.0);
   auto tall = std::make_shared<Lattice>(block({1, 1, 4}, glm::dvec3(kH)), made_of(elastic(1e4, 0.3), "+z"));
   SoftObject above(tall);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Relaxed apart: the same rest, never more energy, no limit broken, whatever the tick does meanwhile.
+// Asynchronous relaxation reaches the same rest, never raises the energy, and violates no limit, whatever the
+// tick does meanwhile.
 #include "voxel/object/shadow_object.h"
 
 #include <gtest/gtest.h>
@@ -23,12 +24,12 @@ constexpr double kH = 1e-3;  // spacing (m)
 constexpr LinkMaterial kFirm{
     .young_Pa = 1e4, .poisson = 0.3, .stretch_min = 0.9, .stretch_max = 1.1, .shear = 0.1};
 
-// How far beyond its limits a link may be left: the chain lets 3.5 roundings of the largest move be, so that
-// waves do not run for roundings, and a limit and the places of its ends are rounded once each. It does not
-// grow: 5 is the most that 25 sequences of 400 ticks leave, always from the chain.
+// Bound on the violation of limits, in roundings of the largest displacement. The chain tolerates 3.5, so
+// that waves do not run for roundings; a limit and both ends of its link are rounded once each. Five is the
+// most in 25 sequences of 400 ticks, always from the chain; it does not grow.
 constexpr double kRoundings = 6.0;
 
-// One exchange as ticks make it; `rows` a tick.
+// One exchange, with `rows` rows a tick.
 void exchange(ShadowObject& replica, SoftBlock& soft, std::size_t rows) {
   replica.give(*soft.object);
   replica.relax();
@@ -75,8 +76,7 @@ TEST(ShadowObject, AHeldContactComesToTheSameRest) {
   }
 }
 
-// For as long as one likes: what the one and the other find are parts of the same way, not the same way
-// twice. (When they were, the force wavered by its own size.)
+// Without end: the two solvers find parts of one motion, not the same motion twice.
 TEST(ShadowObject, AHeldContactStaysAtRest) {
   SoftBlock soft({41, 37, 25}, kH, kFirm);
   ShadowObject replica(*soft.object);
@@ -100,10 +100,9 @@ TEST(ShadowObject, AHeldContactStaysAtRest) {
   EXPECT_LT(*high - *low, 1e-3 * felt.back());
 }
 
-// A result that comes in parts while the tool is held: on the way nothing pulls by itself, so the force goes
-// from what it was to what it is at once in even steps, and ends there.
-// (Pressed so little that no link is at its limits: what these do not let a row follow depends on how it
-// comes.)
+// A result that is applied in parts while the tool is still: nothing has a residual in between, so the force
+// changes in even steps and ends where one step would take it. Pressed so little that no limit is active:
+// under active limits the outcome depends on the steps.
 TEST(ShadowObject, AResultInPartsIsFeltInEvenSteps) {
   constexpr int parts = 8;
   SoftBlock whole({41, 37, 25}, kH, elastic(1e4, 0.3)), some({41, 37, 25}, kH, elastic(1e4, 0.3));
@@ -135,7 +134,7 @@ TEST(ShadowObject, AResultInPartsIsFeltInEvenSteps) {
     if (soft == &whole) after = now;
     felt.push_back(now);
   }
-  felt.erase(felt.begin());  // of the one that came at once
+  felt.erase(felt.begin());  // of the result applied at once
   const double step = (after - before) / parts;
   ASSERT_EQ(felt.size(), static_cast<std::size_t>(parts));
   EXPECT_LT(after, 0.99 * before) << "a result that changes something";
@@ -144,7 +143,7 @@ TEST(ShadowObject, AResultInPartsIsFeltInEvenSteps) {
   EXPECT_LT(largest_difference(*whole.object, *some.object), 0.01 * kH);
 }
 
-// And one that is cut short, as when the tool moves, has come whole.
+// A result that is cut short, because the tool moves, is applied as a whole.
 TEST(ShadowObject, AResultInPartsThatIsCutShortHasComeWhole) {
   SoftBlock whole({41, 37, 25}, kH, elastic(1e4, 0.3)), some({41, 37, 25}, kH, elastic(1e4, 0.3));
   for (SoftBlock* soft : {&whole, &some}) {
@@ -179,8 +178,8 @@ TEST(ShadowObject, WhatTheToolLeftComesToRestAndIsLeftAlone) {
   EXPECT_LT(most, 1e-3 * kH);
 }
 
-// Ten spacings deep, in steps and without a cycle between them, as a tool that jumps finds it: everything
-// that moved is at its limits, and has spacings to go.
+// Ten spacings deep, in steps and without a cycle between them, as after a jump of the tool: everything that
+// moved is at its limits, and has spacings to go.
 ToolInBody press_at_once(SoftBlock& soft) {
   ToolInBody tool;
   constexpr int steps = 40;
@@ -214,7 +213,7 @@ TEST(ShadowObject, AJumpIsFeltRightAfterThreeResults) {
   }
 }
 
-// A result moves rows by spacings, and none can go there before those beside it: all get there all the same.
+// A result moves rows by spacings; none can go before its neighbours, and yet all arrive.
 TEST(ShadowObject, WhatMovesFarIsAddedWhole) {
   for (const LinkMaterial& material : {LinkMaterial{}, kLoose}) {
     SoftBlock soft(kWide, kH, material);
@@ -235,7 +234,7 @@ TEST(ShadowObject, WhatMovesFarIsAddedWhole) {
   }
 }
 
-// Far from the contact small changes wait, but not for ever: at rest both know the same.
+// Far from the contact small changes are deferred; at rest both states are the same.
 TEST(ShadowObject, WhatWasKeptBackIsPassedOnAtRest) {
   SoftBlock soft({41, 65, 65}, kH, elastic(1e4, 0.3));
   ShadowObject replica(*soft.object);
@@ -253,14 +252,14 @@ TEST(ShadowObject, WhatWasKeptBackIsPassedOnAtRest) {
   EXPECT_LT(most, voxel::kRestingResidual * kH);
 }
 
-// Draining what was found takes longer than the next is given: what a tick moves meanwhile is given without
-// what it has yet to go, and must not go that twice. The block comes loose and is to come to rest.
+// Applying a result takes longer than the time to the next submission. Rows that a tick moves meanwhile are
+// submitted with their motion to come, and must not make it twice. The block is released and comes to rest.
 TEST(ShadowObject, WhatIsGivenWhileItIsDrainedGoesItsWayOnce) {
   SoftBlock soft({41, 37, 25}, kH, elastic(1e4, 0.3));
   ShadowObject replica(*soft.object);
   press_and_let_go(replica, soft);
   const double first = soft.object->energy_J();
-  // Voxels that somebody moves by nothing, so that their rows are given each time.
+  // marks rows dirty by a motion of 0, so that they are submitted each time
   const voxel::VoxelId dirty = soft.lattice->grid().at(20, 18, 12);
   for (int n = 0; n < 40; ++n) {
     replica.give(*soft.object);
@@ -277,9 +276,9 @@ TEST(ShadowObject, WhatIsGivenWhileItIsDrainedGoesItsWayOnce) {
   EXPECT_LT(soft.object->energy_J(), 1e-6 * first);
 }
 
-// The tool stands still, and in turns the tick has its cycles round the contact and the replica its own, of a
-// state that is so many ticks old. What voxels the tool presses changes, so energy is compared with the
-// tool's work left out: of the same pressed voxels in the same places.
+// The tool is still; the tick runs contact cycles and the shadow its own, on a state that is some ticks old.
+// Which voxels are pressed changes, so energies are compared without the tool's work: with the same pressed
+// voxels at the same places.
 TEST(ShadowObject, TheSumNeverHasMoreEnergyThanWhatWasGiven) {
   for (const LinkMaterial& material : {elastic(1e4, 0.3), kFirm}) {
     SoftBlock soft({41, 37, 25}, kH, material);
@@ -309,7 +308,7 @@ TEST(ShadowObject, TheSumNeverHasMoreEnergyThanWhatWasGiven) {
   }
 }
 
-// A tool that moves on while results are old, deep where the chain is tight: limits hold after every slice.
+// A tool that moves on while results are old, deep in tissue at its limits: limits hold after every part.
 TEST(ShadowObject, NoLinkLeavesItsLimitsInBetween) {
   SoftBlock soft({31, 29, 19}, kH, kFirm);
   ShadowObject replica(*soft.object);

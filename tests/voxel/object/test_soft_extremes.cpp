@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One soft object with one setting taken to its end: pressed, slid over and left, every number is one, no
-// link is beyond its limit, and it comes to rest. The scenes of `hybrid stability --extremes` are the same as
-// a whole.
+// One soft object with one setting at its extreme: pressed, stroked and released. Every number is finite, no
+// link is beyond its limits, and the object comes to rest. `hybrid stability --extremes` runs the same scenes
+// as whole sessions.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -36,7 +36,7 @@ struct Outcome {
   bool finite = true;
   double violation_spacings = 0.0;  // worst link, of the largest displacement
   double most_force_N = 0.0;
-  double left_spacings = 0.0;  // moved from rest when all is over
+  double left_spacings = 0.0;  // displacement left at the end
   bool asleep = false;
 };
 
@@ -123,7 +123,7 @@ TEST(SoftExtremes, NoSlackAtAllMovesNothing) {
   EXPECT_EQ(o.left_spacings, 0.0);
 }
 
-// Voxels tied to one another along one way, free along the others, move as rows and layers.
+// Voxels without slack along one axis and with slack along the others move as rows and layers.
 TEST(SoftExtremes, SlackOneWayOnly) {
   expect_rest({.name = "none along", .material = of(1.0, 1.0, 0.6)});
   for (const double slack : {1e-4, 1e-2}) {
@@ -132,8 +132,8 @@ TEST(SoftExtremes, SlackOneWayOnly) {
   expect_rest({.name = "0.01 along", .material = of(0.99, 1.01, 0.6)});
 }
 
-// Nearer to nothing, and yet not nothing, such clusters take so many steps from limit to limit that they are
-// left where the tool left them: nothing is wrong with them but that.
+// With nearly no slack, clusters take so many steps from limit to limit that they are left where the tool
+// left them; nothing else is wrong.
 TEST(SoftExtremes, HardlyAnySlackOneWayOnlyIsKeptWithinItsLimits) {
   for (const LinkMaterial& material : {of(0.4, 1.6, 0.0), of(0.4, 1.6, 1e-6), of(1.0 - 1e-6, 1.0 + 1e-6, 0.6),
                                        of(1.0 - 1e-4, 1.0 + 1e-4, 0.6)}) {
@@ -162,7 +162,7 @@ TEST(SoftExtremes, Spacing) {
       {.name = "slices ten times as far apart", .material = of(0.4, 1.6, 0.6), .anisotropy = {1, 1, 10}});
 }
 
-// Twice as stiff, or of twice the spacing, everything is the same but the force.
+// With twice the stiffness or twice the spacing only the force differs.
 TEST(SoftExtremes, ForcesScale) {
   const double plain = press_and_leave({.name = "", .material = of(0.4, 1.6, 0.6, 1e4)}).most_force_N;
   for (const double young : {1.0, 1e12}) {
@@ -180,7 +180,7 @@ TEST(SoftExtremes, OneVoxelThick) {
   expect_rest({.name = "a sheet", .dims = {15, 15, 1}, .material = of(0.4, 1.6, 0.6), .held_at_sides = true});
   expect_rest({.name = "a sheet on edge", .dims = {15, 1, 9}, .material = of(0.4, 1.6, 0.6)});
   expect_rest({.name = "a row", .dims = {1, 1, 9}, .material = of(0.4, 1.6, 0.6)});
-  // All of it is its own bottom layer: it is held, and gives nothing.
+  // the whole object is its own bottom layer: it is held, and rigid
   const Outcome one =
       press_and_leave({.name = "one voxel", .dims = {1, 1, 1}, .material = of(0.4, 1.6, 0.6)});
   EXPECT_TRUE(one.finite && one.asleep);

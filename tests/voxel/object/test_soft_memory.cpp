@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a soft object takes of the machine's memory: until it is touched next to nothing beside its labels,
-// and at any time what it says that it takes.
+// Memory of a soft object: little more than its labels until it is touched, and at any time what
+// memory_bytes() says.
 #include <gtest/gtest.h>
 
 #include <cstdint>
@@ -31,7 +31,7 @@ constexpr double kH = 1e-3;  // spacing (m)
 struct Counted {
   std::unique_ptr<SoftObject> object;
   double voxels = 0.0;
-  std::size_t before = 0;  // what the process took before there was an object
+  std::size_t before = 0;  // of the process, before there is an object
 
   Counted(const LabelVolume& volume, const LatticeOptions& options) : before(own_bytes()) {
     object = std::make_unique<SoftObject>(std::make_shared<Lattice>(volume, options));
@@ -49,7 +49,7 @@ LatticeOptions four_tissues(const std::string& face) {
   return options;
 }
 
-// 134 million voxels: one byte each, and no more than another fifth for all else.
+// 134 million voxels: one byte each, and at most another fifth for everything else.
 TEST(SoftMemory, UntilItIsTouchedA512CubeTakes1Point2BytesAVoxel) {
   if (!kMemoryIsOurs) GTEST_SKIP() << "a sanitizer's own memory is counted";
   if (reading_takes_memory()) GTEST_SKIP() << kReadingTakes;
@@ -61,9 +61,9 @@ TEST(SoftMemory, UntilItIsTouchedA512CubeTakes1Point2BytesAVoxel) {
   EXPECT_NEAR(cube.said(), cube.counted(), 0.005 * cube.counted());
 }
 
-// A smaller one has more surface, of 4 bytes a voxel, which is 0.05, and pages and rows at its ends that are
-// not full, the rest of 0.12. Which face is anchored makes no difference beyond that, nor how tissues mix,
-// nor bone in the middle that is anchored.
+// A smaller object has more surface, at 4 bytes a voxel (0.05), and pages and rows that are not full, the
+// rest of 0.12. It makes no difference which face is anchored, how tissues mix, or whether bone inside is
+// anchored.
 TEST(SoftMemory, NoAnchorAndNoTissueTakesMuch) {
   if (!kMemoryIsOurs) GTEST_SKIP() << "a sanitizer's own memory is counted";
   if (reading_takes_memory()) GTEST_SKIP() << kReadingTakes;
@@ -88,7 +88,7 @@ TEST(SoftMemory, NoAnchorAndNoTissueTakesMuch) {
 
 TEST(SoftMemory, WhatItSaysIsWhatTheProcessTakesAlsoWhereItIsTouched) {
   if (!kMemoryIsOurs) GTEST_SKIP() << "a sanitizer's own memory is counted";
-  for (const int edge : {64, 160}) {  // all memory at the start, and as it is touched
+  for (const int edge : {64, 160}) {  // all memory at construction, and on first access
     const LabelVolume volume = block({edge, edge, edge}, glm::dvec3(kH));
     const Counted cube(volume, four_tissues("-z"));
     EXPECT_NEAR(cube.said(), cube.counted(), 0.03 * cube.counted()) << edge;
@@ -114,7 +114,7 @@ TEST(SoftMemory, WhatItSaysIsWhatTheProcessTakesAlsoWhereItIsTouched) {
   }
 }
 
-// A lattice that is given its volume is the same, and the volume's memory is gone when it is there.
+// A lattice that takes over its volume is the same, and frees the volume's memory.
 TEST(SoftMemory, AVolumeThatIsGivenAwayGivesItsMemoryBack) {
   LabelVolume volume = block({100, 90, 70}, glm::dvec3(kH));
   tests::Random random(12);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a tool feels, against what it must be: the derivative of the minimised energy.
+// The reaction against its definition: the derivative of the minimised energy.
 #include "voxel/object/soft_object.h"
 
 #include <gtest/gtest.h>
@@ -24,7 +24,7 @@ constexpr double kH = 1e-3;  // spacing of the blocks below (m)
 constexpr LinkMaterial kFirm{
     .young_Pa = 1e4, .poisson = 0.3, .stretch_min = 0.9, .stretch_max = 1.1, .shear = 0.1};
 
-// dE/d(depth) by central difference; the object is left pressed to `depth + step`.
+// dE/d(depth) by central difference; the object stays pressed to `depth + step`.
 double energy_slope(SoftBlock& soft, double radius, double depth, double step, double range) {
   soft.press(soft.ball(radius, depth - step), range);
   const double less = soft.object->energy_J();
@@ -49,8 +49,7 @@ TEST(SoftObject, ReactionIsTheDerivativeOfTheMinimisedEnergy) {
 }
 
 TEST(SoftObject, TheTightChainIsFelt) {
-  // Where the chain is at its limits the force goes on growing: the load of what hangs on the pressed voxels
-  // is felt too.
+  // With links at their limits the force goes on growing, because the loads of dependents are felt.
   SoftBlock soft({21, 21, 15}, kH, kFirm);
   double before = 0.0, worst = 0.0;
   for (const double depth : {0.2, 0.4, 0.6, 0.8, 1.0}) {
@@ -67,7 +66,7 @@ TEST(SoftObject, TheTightChainIsFelt) {
   std::cout << "largest difference " << 100 * worst << " %\n";
 }
 
-// At rest, and not before: an object that is calm in between is told apart by it.
+// At rest only: the difference tells an object that is not.
 TEST(SoftObject, AnchorsCarryWhatIsFelt) {
   for (const LinkMaterial& material : {elastic(1e4, 0.3), kFirm}) {
     SoftBlock soft({25, 25, 17}, kH, material);
@@ -86,7 +85,7 @@ TEST(SoftObject, AnchorsCarryWhatIsFelt) {
   }
 }
 
-// A link to an anchor at its limit carries what its spring does not say.
+// A link to an anchor at its limit carries a force that its spring does not know.
 TEST(SoftObject, WhatTightAnchorsCarryIsNotSaid) {
   SoftBlock soft({15, 15, 3}, kH, kFirm);
   soft.press(soft.ball(4 * kH, 0.6 * kH), 8 * kH);
@@ -97,7 +96,7 @@ TEST(SoftObject, NoWorkIsDoneAroundAClosedPath) {
   SoftBlock soft({27, 27, 17}, kH, elastic(1e4, 0.3));
   const double side = 1.0 * kH;
   const int steps = 16;
-  // Off the middle and off the lattice, so that nothing cancels by symmetry.
+  // off the middle and off the lattice, so that nothing cancels by symmetry
   const glm::dvec3 corner = soft.ball(5 * kH, 1.2 * kH).centre + glm::dvec3(1.3, 0.4, 0.0) * kH;
   ToolInBody tool = soft.ball(5 * kH, 0.0);
   const auto felt_at = [&](const glm::dvec3& place) {
@@ -137,7 +136,7 @@ TEST(SoftObject, ForgetsAToolThatLeft) {
   const double start = largest();
   EXPECT_NEAR(start, 3 * kH, 0.1 * kH);
   soft.object->touch({});
-  // A tick that presses nothing wakes the background by itself.
+  // a tick that presses nothing wakes the background itself
   int cycles = 0;
   const auto& relaxation = soft.object->relaxation();
   for (const auto first = relaxation.cycles(); largest() > 0.01 * start && cycles < 200;) {
@@ -151,7 +150,7 @@ TEST(SoftObject, ForgetsAToolThatLeft) {
 }
 
 TEST(SoftObject, WhatCannotGoFurtherPushesTheToolOut) {
-  // Five layers of links that give a tenth each: half a spacing in all.
+  // five layers of links that give a tenth each: half a spacing in all
   SoftBlock soft({9, 9, 6}, kH, kFirm);
   ToolInBody tool = soft.ball(3 * kH, 2 * kH);
   std::array<ToolBound, 256> bounds;
@@ -177,7 +176,7 @@ TEST(SoftObject, WhatCannotGoFurtherPushesTheToolOut) {
   const double depth = soft.ball(3 * kH, 0.0).centre.z - tool.centre.z;
   std::cout << "out by " << (tool.centre.z - deepest) / kH << " spacings in " << turns
             << " turns, to a depth of " << depth / kH << "\n";
-  EXPECT_LE(depth, 0.51 * kH);  // and give_way() leaves a hundredth of a voxel to the next push
+  EXPECT_LE(depth, 0.51 * kH);  // give_way() leaves a hundredth of a voxel to the next push_out()
   EXPECT_GE(depth, 0.1 * kH);
   EXPECT_LE(voxel::worst_violation(*soft.lattice, soft.object->state()), 1e-9);
 }
@@ -187,7 +186,7 @@ TEST(SoftObject, WhatIsTiedToAnchorsIsHeldFast) {
   const VoxelId v = soft.lattice->at(4, 4, 5);
   const glm::dvec3 down(0.1, 0.0, -1.0), up(0.0, 0.1, 1.0);
   EXPECT_FALSE(soft.object->is_immovable(v, down));
-  ToolInBody tool = soft.ball(3 * kH, 2 * kH);  // four times as deep as five links of a tenth let it
+  ToolInBody tool = soft.ball(3 * kH, 2 * kH);  // four times as deep as five links of a tenth allow
   soft.touch(tool, 6 * kH);
   soft.object->push_out(tool);
   EXPECT_TRUE(soft.object->is_immovable(v, down));
@@ -199,7 +198,7 @@ TEST(SoftObject, NoToolSlipsBetweenVoxels) {
   for (const double radius : {0.01, 0.2, 0.4, 0.6, 0.8, 1.0}) {
     SoftBlock soft({11, 11, 8}, kH, {.young_Pa = 1e4});
     ToolInBody tool = soft.ball(radius * kH, 0.0);
-    // Over the middle of four voxels, where the gap is widest.
+    // over the middle of four voxels, where the gap is widest
     tool.centre.x += 0.5 * kH;
     tool.centre.y += 0.5 * kH;
     const double start = soft.top() + soft.object->reach(radius * kH);
@@ -209,7 +208,7 @@ TEST(SoftObject, NoToolSlipsBetweenVoxels) {
       soft.touch(tool, 4 * kH);
       soft.object->settle(tool, 1e-4 * soft.lattice->force_scale_N(), 100);
       const double force = soft.object->reaction(tool).force_N.z;
-      // It never lets go again.
+      // it never loses contact again
       if (force < 0.8 * most) lost = depth;
       most = std::max(most, force);
     }

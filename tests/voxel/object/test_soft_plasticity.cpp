@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tissue that keeps its dent, through the whole soft object: closed forms in a row of links, and a dent.
+// Plasticity of a whole soft object: closed forms in a row of links, and a dent.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -26,7 +26,7 @@ LinkMaterial yielding(double yield) {
   return m;
 }
 
-// A row of ten voxels that stands on an anchor; the label of the one on top differs.
+// A row of ten voxels on an anchor; the label of the top voxel differs.
 struct Column {
   std::shared_ptr<const voxel::Lattice> lattice;
   SoftObject object;
@@ -46,7 +46,7 @@ struct Column {
     for (int n = 0; n < 3000 && !object.asleep(); ++n) object.relax_cycle();
     EXPECT_TRUE(object.asleep());
   }
-  // Force on the top voxel, upwards, when it is held at `u`.
+  // Upward force on the top voxel when it is held at `u`.
   double hold_at(double u) {
     object.hold(top);
     object.move(top, {0.0, 0.0, u});
@@ -67,10 +67,10 @@ TEST(SoftYield, ARowOfLinksYieldsAsOne) {
   Column column(yield, yield);
   EXPECT_NEAR(column.hold_at(-0.9 * most), kStiffness * 0.9 * yield * kH, 1e-3 * kStiffness * yield * kH);
   EXPECT_NEAR(column.let_go(), 0.0, 1e-3 * most);
-  // Twice the yield strain: half of it stays.
+  // twice the yield strain: half of it stays
   EXPECT_NEAR(column.hold_at(-2.0 * most), kStiffness * yield * kH, 1e-3 * kStiffness * yield * kH);
   EXPECT_NEAR(column.let_go(), -most, 1e-3 * most);
-  // From there it is elastic as far as it was pressed, and up to yield the other way.
+  // from there it is elastic as far as it was pressed, and up to yield the other way
   EXPECT_NEAR(column.hold_at(-1.5 * most), 0.5 * kStiffness * yield * kH, 1e-3 * kStiffness * yield * kH);
   EXPECT_NEAR(column.let_go(), -most, 1e-3 * most);
   EXPECT_NEAR(column.hold_at(1.0 * most), -kStiffness * yield * kH, 1e-3 * kStiffness * yield * kH);
@@ -80,12 +80,12 @@ TEST(SoftYield, ARowOfLinksYieldsAsOne) {
 TEST(SoftYield, TheWeakestLinkTakesWhatIsBeyond) {
   const double weak = 0.02, pressed = 0.5 * kH;
   Column column(0.2, weak);
-  // Eight links stretch by the force that the ninth yields at; that one takes the rest.
+  // eight links stretch by the force at which the ninth yields; that one takes the rest
   EXPECT_NEAR(column.hold_at(-pressed), kStiffness * weak * kH, 2e-3 * kStiffness * weak * kH);
   EXPECT_NEAR(column.let_go(), -(pressed - 9 * weak * kH), 2e-3 * pressed);
 }
 
-// Pressed by a ball, let go, and pressed half as deep again.
+// Pressed by a ball, released, and pressed half as deep again.
 struct Dented {
   static constexpr std::array<int, 3> kSize{25, 25, 17};
 
@@ -118,10 +118,10 @@ TEST(SoftYield, ABlockKeepsItsDent) {
   EXPECT_GT(dent, 0.2 * first.depth);
   EXPECT_LT(dent, first.depth);
   EXPECT_LE(voxel::worst_violation(*first.soft.lattice, first.soft.object->state()), 1e-8);
-  // The same each time, to the last bit.
+  // the same each time, to the last bit
   EXPECT_EQ(second.press(second.depth), force);
   EXPECT_EQ(second.leave(), dent);
-  // Less load than the last leaves it as it is.
+  // a smaller load than the last one changes nothing
   const double less = first.press(dent + 0.4 * (first.depth - dent));
   EXPECT_GT(less, 0.0);
   EXPECT_LT(less, 0.9 * force);
@@ -130,7 +130,7 @@ TEST(SoftYield, ABlockKeepsItsDent) {
   EXPECT_NEAR(again, dent, 0.01 * dent);
 }
 
-// A copy goes on as its original, dent and all.
+// A copy has the dent, and goes on like the original.
 TEST(SoftYield, ACopyHasTheDent) {
   Dented dented;
   dented.press(dented.depth);
@@ -143,7 +143,7 @@ TEST(SoftYield, ACopyHasTheDent) {
   EXPECT_NEAR(copy->energy_J(), dented.soft.object->energy_J(), 1e-3 * copy->energy_J());
 }
 
-// What cannot yield has no memory for it.
+// Tissue without plasticity has no memory for it.
 TEST(SoftYield, CostsNothingWhereNothingYields) {
   SoftBlock soft(Dented::kSize, kH, tests::elastic(kYoung, 0.3));
   EXPECT_EQ(soft.object->state().rest.row.size(), 0U);

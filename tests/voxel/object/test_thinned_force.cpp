@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What thinning does to the force, at equilibrium, against the same object in full.
+// Error of the force through thinning, at equilibrium, against the full object.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -23,9 +23,9 @@ constexpr double kTissuePa = 1e4;
 // A block of tissue with bone under `cover` voxels of it.
 struct Block {
   int cover;         // voxels of tissue above the bone
-  double ratio;      // of the bone's modulus to the tissue's
+  double ratio;      // modulus of bone over that of tissue
   bool embedded;     // a slab of bone with tissue around it; else all below the cover is bone
-  int every, shell;  // 0: in full
+  int every, shell;  // 0: not thinned
   int high;          // voxels
 };
 
@@ -105,8 +105,8 @@ double worst_error(const Case& c, int high, const std::vector<std::array<int, 2>
 
 constexpr double kJnd = 0.07;
 
-// A plane of struts right under the surface carries what presses on it, one further down does not: as far as
-// struts go, heights that differ are different objects.
+// A plane of struts right under the surface carries the load, one further down does not: for struts, objects
+// of different height are different objects.
 constexpr std::array<int, 3> kHeights{35, 36, 37};
 
 TEST(ThinnedForce, IsWithinAJustNoticeableDifferenceWithTheDefaultShell) {
@@ -119,8 +119,8 @@ TEST(ThinnedForce, IsWithinAJustNoticeableDifferenceWithAThinShell) {
   EXPECT_LT(worst_error(kShallow, 36, {{3, 1}, {4, 1}, {6, 1}}), kJnd);
 }
 
-// The modulus of the inside is the material's: what crosses a plane within the face of one cube of struts is
-// as stiff, n links in a row together, as what crossed it there before.
+// The modulus of the inside is the material's: through a plane within the face of one cube of struts, n links
+// in a row together are as stiff as what they replace.
 TEST(ThinnedForce, StrutsAreAsStiffAsWhatTheyStandFor) {
   for (const int n : {2, 3, 4, 6}) {
     LabelVolume v = tests::block({40, 40, 40}, {1e-3, 1.5e-3, 2e-3}, kBone);
@@ -132,7 +132,8 @@ TEST(ThinnedForce, StrutsAreAsStiffAsWhatTheyStandFor) {
     const voxel::Lattice thin(thinned.volume, options);
     const int first = 2 * n, last = first + n;  // a cube well inside
     for (int d = 0; d < 3; ++d) {
-      std::array<double, 2> along{}, across{};  // compliance of the n planes: in full, and of struts
+      std::array<double, 2> along{},
+          across{};  // compliance of the n planes: of the full object, and of struts
       for (int plane = first; plane < last; ++plane) {
         std::array<double, 2> sum_along{}, sum_across{};
         for (int b = first; b < last; ++b) {
@@ -160,7 +161,7 @@ TEST(ThinnedForce, StrutsAreAsStiffAsWhatTheyStandFor) {
   }
 }
 
-// Every row of the table in voxel/README.md, which has the worse of the three heights.
+// Every row of the table of thinning, which has the worst of the three heights.
 TEST(ThinnedForce, DISABLED_Table) {
   for (const Case& c : {kDeep, kShallow, kUnder, kBare}) {
     for (const int high : kHeights)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the tests of relaxation share: displacements that are prescribed, and the energy of a state.
+// Prescribed displacements, and the energy of a state, for the tests of relaxation.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@
 
 namespace tests {
 
-// BoundarySprings `v` at `u`, and tells the relaxation.
+// Sets voxel `v` to `u` and holds it there.
 inline void hold(voxel::Displacement& state, std::vector<voxel::VoxelId>& held, voxel::VoxelId v,
                  const glm::dvec3& u) {
   state.set(v, u);
@@ -22,7 +22,7 @@ inline void hold(voxel::Displacement& state, std::vector<voxel::VoxelId>& held, 
   held.push_back(v);
 }
 
-// Cycles until it sleeps; counts them.
+// Runs cycles until the object sleeps; returns their number.
 inline int relax(voxel::Relaxation& relaxation, voxel::Displacement& state,
                  const std::vector<voxel::VoxelId>& held, int most = 2000) {
   relaxation.mark_all_dirty();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What is brought along with voxels that it hangs on, against the same done voxel by voxel.
+// Followers of given voxels, against a search voxel by voxel.
 #include "voxel/relaxation/limit_followers.h"
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ using voxel::Displacement;
 using voxel::Lattice;
 using voxel::VoxelId;
 
-constexpr float kSearched = 0.1F, kTight = 1e-4F;  // of the spacing, as there
+constexpr float kSearched = 0.1F, kTight = 1e-4F;  // of the spacing, as in the code
 constexpr float kDirtyMotion = 1e-5F;
 constexpr std::size_t kMostRoots = 64;
 
@@ -41,7 +41,7 @@ float place_of(voxel::Relaxation& relaxation, const Displacement& state, VoxelId
                          static_cast<float>(rest[axis]), state.u[static_cast<std::size_t>(axis)][v]);
 }
 
-// Brings along what hangs on `roots`; which voxels moved far enough to stir their rows.
+// Moves the dependents of `roots`; returns voxels that moved far enough to mark their rows dirty.
 std::set<VoxelId> draw(voxel::Relaxation& relaxation, Displacement& state, const std::vector<VoxelId>& roots,
                        int axis, std::size_t& drawn) {
   const Lattice& lattice = relaxation.couplings().lattice();
@@ -75,8 +75,8 @@ struct Counts {
   std::size_t drawn = 0, moved = 0, most = 0;
 };
 
-// Some voxels of a lattice, pushed so far that others come along, and then taken back a little. `apart`:
-// while somebody else relaxes it.
+// Some voxels of a lattice are pushed so far that others follow, and then moved back a little. `apart`: while
+// a shadow relaxes the object.
 void compare(const voxel::LabelVolume& volume, const voxel::LatticeOptions& options,
              const std::vector<std::size_t>& filled, bool apart, Random& random, Counts& counts) {
   const Lattice lattice(volume, options);
@@ -102,7 +102,7 @@ void compare(const voxel::LabelVolume& volume, const voxel::LatticeOptions& opti
   chain.settle(state, roots, moves, {});
   for (const voxel::RowId row : chain.moved_rows()) relaxation.mark_dirty(row);
   if (lattice.has_bricks()) relaxation.multigrid().renew_bricks(state, lattice.grid().rows());
-  // What lies on a tool is not moved by this, whether it is a root or not.
+  // voxels on the tool do not follow, whether they are sources or not
   for (const VoxelId v : roots) {
     if (lattice.surface_number(v) != Lattice::kNoSurface) state.set_role(v, Displacement::held);
   }
@@ -169,8 +169,8 @@ TEST(LimitFollowers, GoWhereTheyGoVoxelByVoxelInRandomScenes) {
 }
 
 TEST(LimitFollowers, GoOnFromRowToRow) {
-  // Wider than a row of 32, of one label, whose rows share their springs, and of three; as many as are drawn
-  // at most in some.
+  // wider than a row of 32; of one label (rows share their springs), and of three; up to the greatest number
+  // of followers
   Random random(22);
   Counts counts;
   for (int n = 0; n < 100; ++n) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What hangs on some voxels by links at their limits, against the same looked for voxel by voxel.
+// Dependents through links at their limits, against a search voxel by voxel.
 #include "voxel/relaxation/limit_reactions.h"
 
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ using voxel::Displacement;
 using voxel::Lattice;
 using voxel::VoxelId;
 
-constexpr float kTight = 1e-4F;  // of the spacing, as there
+constexpr float kTight = 1e-4F;  // of the spacing, as in the code
 
 // `visit(w, pushed_up, pushed_down)` for the neighbours of v whose links to it are at a limit.
 template <class Visit>
@@ -43,7 +43,7 @@ void for_tight(const Lattice& lattice, const Displacement& state, VoxelId v, int
   }
 }
 
-// What is pulled by less than rounding may hang or not: that is as `rows` say.
+// Reference. A voxel with a load below rounding may be a dependent or not: there it follows `rows`.
 std::set<VoxelId> looked_for(const Lattice& lattice, voxel::LevelStiffness& couplings,
                              const Displacement& state, const std::vector<VoxelId>& roots, int axis,
                              const voxel::LimitReactions& rows) {
@@ -68,10 +68,10 @@ std::set<VoxelId> looked_for(const Lattice& lattice, voxel::LevelStiffness& coup
 
 struct Counts {
   std::size_t hung = 0, most = 0;
-  int across = 0;  // sets that reach into rows along x where no root is
+  int across = 0;  // sets that reach into rows along x without a source
 };
 
-// Some voxels of a lattice, pushed so far that others come along.
+// Some voxels of a lattice are pushed so far that others follow.
 void compare(const voxel::LabelVolume& volume, const voxel::LatticeOptions& options,
              const std::vector<std::size_t>& filled, Random& random, Counts& counts) {
   const Lattice lattice(volume, options);
@@ -150,7 +150,7 @@ TEST(LimitReactions, AreThoseFoundVoxelByVoxelInRandomScenes) {
 }
 
 TEST(LimitReactions, GoOnFromRowToRow) {
-  // Wider than a row of 32, of one label (whose rows share their springs) and of three.
+  // wider than a row of 32; of one label (rows share their springs), and of three
   Random random(12);
   Counts counts;
   for (int n = 0; n < 300; ++n) {
@@ -178,8 +178,8 @@ TEST(LimitReactions, GoOnFromRowToRow) {
 }
 
 TEST(LimitReactions, WhatHasNoSlackHangsOnItAllWhateverPullsIt) {
-  // A plate that can only move as a whole, on tissue: no link inside of it is stretched, so nothing pulls the
-  // voxels that carry the load to those that rest on the tissue.
+  // A plate that can only move as a whole, on tissue. No link in it is stretched, so the voxels between the
+  // sources and the tissue have no load of their own.
   voxel::LabelVolume volume = tests::block({40, 10, 8}, glm::dvec3(1e-3));
   for (std::size_t i = 0; i < volume.labels.size(); ++i) {
     if (i >= volume.index(0, 0, 4)) volume.labels[i] = 2;
@@ -198,7 +198,7 @@ TEST(LimitReactions, WhatHasNoSlackHangsOnItAllWhateverPullsIt) {
   rows.gather(couplings, state, root, 2);
   for (std::size_t i = 0; i < volume.labels.size(); ++i)
     EXPECT_EQ(rows.carried(tests::voxel_of(lattice, volume, i)), volume.labels[i] == 2);
-  // Each of the links to the tissue below is pressed by half a spacing.
+  // each of the links to the tissue below is compressed by half a spacing
   double below = 0.0;
   for (int i = 0; i < 40; ++i) {
     for (int j = 0; j < 10; ++j) below += static_cast<double>(lattice.spring(lattice.at(i, j, 3), 2).along);

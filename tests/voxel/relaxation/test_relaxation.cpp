@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Relaxation against direct solutions: of the linear problem where no limit is near, of the quadratic program
-// where limits hold.
+// Relaxation against direct solutions: of the linear problem without active limits, of the quadratic program
+// with them.
 #include "voxel/relaxation/relaxation.h"
 
 #include <gtest/gtest.h>
@@ -38,7 +38,7 @@ using voxel::VoxelId;
 
 // ---- scenes ----
 
-// What of a random volume hangs together with voxel (0,0,0), which is anchored.
+// The component of a random volume that contains voxel (0,0,0), which is anchored.
 LabelVolume connected_to_origin(LabelVolume volume) {
   std::vector<std::uint8_t> seen(volume.labels.size(), 0);
   std::vector<std::array<int, 3>> front{{0, 0, 0}};
@@ -64,7 +64,7 @@ LabelVolume connected_to_origin(LabelVolume volume) {
   return volume;
 }
 
-// Error of the state against the direct solution, of the largest displacement.
+// Error of the state against the direct solution, over the largest displacement.
 double error_without_limits(const Lattice& lattice, const LatticeOptions& options,
                             const Displacement& state) {
   double worst = 0.0;
@@ -112,11 +112,11 @@ TEST(Relaxation, ConvergesToTheDirectSolutionOnIrregularVolumes) {
             << " cycles\n";
 }
 
-// Displacements are floats: where some links are a hundred times stiffer, the rounding of their ends pulls a
-// hundred times harder, and neither residual nor error get as small.
+// Displacements are floats: if some links are a hundred times stiffer, rounding of their ends pulls a hundred
+// times harder, and neither residual nor error get as small.
 struct Pressed {
   const char* name;
-  double rounding;  // by how much it is worse than in a homogeneous block
+  double rounding;  // factor against a homogeneous block
   LabelVolume volume;
   LatticeOptions options;
 };
@@ -176,8 +176,8 @@ TEST(Relaxation, ConvergesToTheDirectSolutionUnderAPressedPatch) {
   }
 }
 
-// Relaxes 60 random scenes from torn starts. Links never leave their limits on the way. Returns the largest
-// ratio of the energies after and before a cycle, and expects each scene to end with less than it began with.
+// Relaxes 60 random scenes from random starts within limits. No link may leave its limits on the way. Returns
+// the largest growth of energy in a cycle, and expects each scene to end with less than it began with.
 double largest_growth(bool limits_act) {
   Random random(22);
   double worst = 0.0;
@@ -193,7 +193,7 @@ double largest_growth(bool limits_act) {
       }
     }
     const Lattice lattice(scene.volume, scene.options);
-    // Anywhere within the limits: where the chain ends up after being torn about.
+    // anywhere within the limits, as the chain leaves it
     Displacement state(lattice);
     voxel::ChainMail chain(lattice);
     for (int pull = 0; pull < 6; ++pull) {
@@ -218,7 +218,7 @@ double largest_growth(bool limits_act) {
       const auto number = relaxation.cycles();
       while (relaxation.cycles() == number) {
         relaxation.run(state, {}, {}, 20'000);
-        // Not only at its end: never.
+        // at every moment, not only at the end
         EXPECT_LE(voxel::worst_violation(lattice, state), rounding) << "scene " << n << ", cycle " << cycle;
       }
       const double energy = energy_of(lattice, scene.options, state);
@@ -235,8 +235,8 @@ TEST(Relaxation, EnergyNeverGrows) {
   EXPECT_LE(largest_growth(false), 1.0 + 1e-6);
 }
 
-// With links at their limits a correction is clipped, and a cycle is no descent step any more: some of the
-// energy may come back on the way. What is relied on is that it ends far below its start.
+// If links are at their limits a correction is clipped, and a cycle is no longer a descent step: energy may
+// rise for a moment. What holds is that it ends far below its start.
 TEST(Relaxation, WithLimitsInTheWayItEndsFarBelowItsStart) {
   EXPECT_LE(largest_growth(true), 1.25);
 }
@@ -259,13 +259,13 @@ TEST(Relaxation, ItsResidualIsTheLargestForceLeft) {
       }
       return most;
     };
-    // It is measured after the first smoothing of a cycle: about what there was before it.
+    // the residual is measured after the first smoothing of a cycle: about what it was before the cycle
     for (int cycle = 0; cycle < 8; ++cycle) {
       const double before = largest_force();
       relaxation.run_cycle(state, {}, held);
       EXPECT_LE(relaxation.residual_N(), 2.0 * before) << p.name;
     }
-    // At rest it is below the tolerance, and so is what is really left.
+    // At rest the reported residual is below the tolerance, and so is the true one.
     relax(relaxation, state, held);
     ASSERT_TRUE(relaxation.asleep());
     const double resting = voxel::kRestingResidual * lattice.force_scale_N() * p.rounding;
@@ -275,8 +275,8 @@ TEST(Relaxation, ItsResidualIsTheLargestForceLeft) {
   }
 }
 
-// A porous ball on a thin stem, pressed at its top: it hangs by little, so that coarse levels have much to
-// say, and cells beside a cycle's box that kept theirs to themselves fed energy to it, cycle by cycle.
+// A porous ball on a thin stem, pressed at its top: weakly attached, so coarse corrections are large. Cells
+// beside a cycle's box have to prolong theirs, too, or energy grows from cycle to cycle.
 TEST(Relaxation, CyclesRoundAContactBetweenTilesEndWhereWholeOnesDo) {
   constexpr int kSize = 48, kWide = 5;
   LabelVolume volume = block({kSize, kSize, kSize}, glm::dvec3(1e-3));
@@ -329,7 +329,7 @@ TEST(Relaxation, CyclesRoundAContactBetweenTilesEndWhereWholeOnesDo) {
 TEST(Relaxation, WorkIsBoundedAndCutsChangeNoBit) {
   const Pressed p = pressed_blocks()[1];
   const Lattice lattice(p.volume, p.options);
-  // What a call may spend beyond what was granted so far: a cycle round one tile, which is not cut.
+  // a call may exceed the budget so far by a cycle around one tile, which is not cut
   const std::uint64_t a_cycle = 4 * lattice.size();
   Random random(23);
   std::vector<Displacement> ends;

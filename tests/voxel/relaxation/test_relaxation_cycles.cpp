@@ -33,7 +33,7 @@ using voxel::LinkMaterial;
 using voxel::Relaxation;
 using voxel::VoxelId;
 
-// A ball's print on top of a block that something else relaxes, or nothing else.
+// The print of a ball on top of a block, under asynchronous relaxation (`apart`) or not.
 struct Print {
   Print(const Lattice& lattice, bool apart) : state(lattice), relaxation(lattice) {
     if (apart) relaxation.leave_to_another();
@@ -78,7 +78,7 @@ TEST(Relaxation, ACycleInPartsEndsWhereAWholeOneDoes) {
   }
 }
 
-// What one leaves undone, the next begins with.
+// A cycle that ends half way leaves the rest to the next one.
 TEST(Relaxation, CyclesThatEndHalfWayComeToTheSameRest) {
   const LatticeOptions options = tests::made_of(elastic(1e4, 0.3));
   const Lattice lattice(block({29, 27, 24}, glm::dvec3(1e-3)), options);
@@ -134,7 +134,7 @@ TEST(Relaxation, WhereLimitsHoldTheStateIsTheOptimumOfTheProgram) {
     }
     EXPECT_TRUE(relaxation.asleep()) << row.name;
 
-    // First order, voxel by voxel: a force is left only where a link at its limit stands against it.
+    // First-order conditions by voxel: a residual remains only against a link at its limit.
     double unopposed = 0.0;
     std::size_t at_limit = 0;
     for (std::size_t i = 0; i < lattice.size(); ++i) {
@@ -152,7 +152,7 @@ TEST(Relaxation, WhereLimitsHoldTheStateIsTheOptimumOfTheProgram) {
         }
       }
     }
-    // And as a whole: its energy beside the optimum's.
+    // The energy against that of the optimum.
     Problem p = problem_of(lattice, options, state, 2);
     const double found = tests::energy_of(p);
     tests::solve_with_limits(p, 1e-3);
