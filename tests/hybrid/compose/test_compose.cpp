@@ -19,6 +19,7 @@
 #include "hybrid/session/session.h"
 #include "polygon/files/mesh_file.h"
 #include "polygon/surface/primitives.h"
+#include "tests/hybrid/compose/label_boxes.h"
 #include "tests/hybrid/fixtures/scene_file_fixture.h"
 #include "tests/shared_data.h"
 #include "voxel/volume/read_volume.h"
@@ -32,40 +33,12 @@ using hybrid::ComposeError;
 using hybrid::ComposeOptions;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using tests::LabelBox;
+using tests::torso;
+using tests::volume_of;
 
 constexpr const char* kNames =
     "label,name\n1,liver\n2,rib_left_1\n3,vertebrae_L1\n4,spleen\n5,mystery\n6,rib_left_2\n7,skull\n";
-
-// Boxes of labels; later ones win.
-struct LabelBox {
-  std::array<int, 3> low, high;  // inclusive
-  std::uint8_t label;
-};
-
-voxel::LabelVolume volume_of(const std::vector<LabelBox>& boxes, double spacing_m = 2e-3) {
-  voxel::LabelVolume volume;
-  volume.dims = {44, 40, 32};
-  volume.spacing_m = glm::dvec3(spacing_m);
-  volume.origin_m = {-0.04, 0.01, 0.3};
-  volume.labels.assign(44U * 40U * 32U, 0);
-  for (const LabelBox& box : boxes) {
-    for (int k = box.low[2]; k <= box.high[2]; ++k) {
-      for (int j = box.low[1]; j <= box.high[1]; ++j) {
-        for (int i = box.low[0]; i <= box.high[0]; ++i) volume.labels[volume.index(i, j, k)] = box.label;
-      }
-    }
-  }
-  return volume;
-}
-
-// A liver with a rib before it and a vertebra behind it; a spleen that touches nothing; a speck of spleen.
-std::vector<LabelBox> torso() {
-  return {{{8, 12, 8}, {31, 27, 23}, 1},
-          {{8, 8, 8}, {13, 11, 23}, 2},
-          {{14, 28, 8}, {25, 33, 23}, 3},
-          {{35, 12, 8}, {42, 27, 23}, 4},
-          {{2, 2, 2}, {2, 3, 2}, 4}};
-}
 
 class Compose : public tests::SceneFile {
  protected:
@@ -136,7 +109,6 @@ std::string all(const std::vector<std::string>& lines) {
 }
 
 // ---- from a segmentation
-// --------------------------------------------------------------------------------------
 
 TEST_F(Compose, BonesBecomeSurfacesAndTheRestTissueAndEachIsFelt) {
   const Composed composed = hybrid::compose(of_torso());
@@ -264,7 +236,6 @@ TEST_F(Compose, TissueIsReadCoarserWhereAskedAndBoneIsNot) {
 }
 
 // ---- from meshes and volumes
-// ----------------------------------------------------------------------------------
 
 TEST_F(Compose, AMeshIsPlacedInAVolume) {
   auto part = polygon::make_box_mesh({10, 10, 10}, 4);  // half edges; in mm, as meshes are read
@@ -298,7 +269,6 @@ TEST_F(Compose, WhatLiesFarAwayIsSaid) {
 }
 
 // ---- from nothing
-// ---------------------------------------------------------------------------------------------
 
 TEST_F(Compose, TheStarterSceneRuns) {
   ComposeOptions options;
@@ -311,7 +281,6 @@ TEST_F(Compose, TheStarterSceneRuns) {
 }
 
 // ---- refusals
-// -------------------------------------------------------------------------------------------------
 
 TEST_F(Compose, NothingIsOverwrittenUnasked) {
   ComposeOptions options = of_torso();
@@ -422,68 +391,6 @@ TEST_F(Compose, NamesThatCannotBeReadSayTheirRow) {
   EXPECT_THAT(refused(options), HasSubstr("is no JSON"));
 }
 
-TEST(LabelNames, ComeFromTablesAndJson) {
-  const auto file = fs::temp_directory_path() / "hybrid-test-names.json";
-  std::ofstream(file) << R"({"R": [0, 1], "labels": ["Air", "liver", "", "rib_1"]})";
-  EXPECT_EQ(hybrid::read_label_names(file), (hybrid::LabelNames{{1, "liver"}, {3, "rib_1"}}));
-  std::ofstream(file) << R"({"1": "liver", "7": "rib_1"})";
-  EXPECT_EQ(hybrid::read_label_names(file), (hybrid::LabelNames{{1, "liver"}, {7, "rib_1"}}));
-  fs::remove(file);
-  const auto table = fs::temp_directory_path() / "hybrid-test-names.txt";
-  std::ofstream(table) << "# a comment\r\n1\tliver\r\n2 \"left rib\" 255 0 0\r\n";
-  EXPECT_EQ(hybrid::read_label_names(table).at(1), "liver");
-  fs::remove(table);
-}
-
-TEST(Tissues, AreKnownByTheirNames) {
-  const std::map<std::string, std::string> expected{{"rib_left_7", "rib"},
-                                                    {"vertebrae_L3", "vertebra"},
-                                                    {"hip_right", "hip"},
-                                                    {"skull", "skull"},
-                                                    {"costal_cartilages", "cartilage"},
-                                                    {"spinal_cord", "spinal cord"},
-                                                    {"liver", "liver"},
-                                                    {"kidney_left", "kidney"},
-                                                    {"small_bowel", "bowel"},
-                                                    {"inferior_vena_cava", "vessel"},
-                                                    {"portal_vein_and_splenic_vein", "vessel"},
-                                                    {"lung_upper_lobe_left", "lung"},
-                                                    {"gluteus_maximus_left", "muscle"},
-                                                    {"iliac_artery_left", "vessel"},
-                                                    {"iliopsoas_left", "muscle"},
-                                                    {"atrial_appendage_left", "heart"},
-                                                    {"urinary_bladder", "bladder"},
-                                                    {"gallbladder", "bladder"},
-                                                    {"Subcutaneous Fat", "fat"},
-                                                    {"brachiocephalic_trunk", "vessel"},
-                                                    {"trachea", "airway"},
-                                                    {"thyroid_gland", "thyroid"},
-                                                    {"adrenal_gland_left", "gland"}};
-  for (const auto& [label, tissue] : expected) {
-    const hybrid::Tissue* found = hybrid::find_tissue(label);
-    ASSERT_NE(found, nullptr) << label;
-    EXPECT_EQ(found->name, tissue) << label;
-  }
-  EXPECT_EQ(hybrid::find_tissue("mystery"), nullptr);
-  for (const hybrid::Tissue& t : hybrid::tissue_table()) {
-    EXPECT_FALSE(t.source.empty()) << t.name;
-    if (t.bone) continue;
-    EXPECT_GT(t.young_Pa, 0.0) << t.name;
-    EXPECT_GE(t.poisson, 0.0) << t.name;
-    EXPECT_LT(t.poisson, 0.5) << t.name;
-  }
-}
-
-TEST(Tissues, PatternsHaveStarsAndQuestionMarks) {
-  EXPECT_TRUE(hybrid::fits_pattern("rib_left_1", "rib_*"));
-  EXPECT_TRUE(hybrid::fits_pattern("Rib_Left_1", "rib_left_?"));
-  EXPECT_TRUE(hybrid::fits_pattern("", "*"));
-  EXPECT_TRUE(hybrid::fits_pattern("aXbXc", "*x*c"));
-  EXPECT_FALSE(hybrid::fits_pattern("rib_left_12", "rib_left_?"));
-  EXPECT_FALSE(hybrid::fits_pattern("rib", "rib_*"));
-  EXPECT_FALSE(hybrid::fits_pattern("aab", "a*a"));
-}
-
 // The same voxels, counted from the other end of an axis: a flip that formats make.
 TEST_F(Compose, AGridThatIsCountedFromAnotherEndIsTheSameGrid) {
   voxel::LabelVolume scan = volume_of(torso());
@@ -496,7 +403,6 @@ TEST_F(Compose, AGridThatIsCountedFromAnotherEndIsTheSameGrid) {
 }
 
 // ---- a real scan
-// ----------------------------------------------------------------------------------------------
 
 TEST_F(Compose, AnAbdomenOfSixtyLabelsBecomesASceneOnWhichBoneAndOrgansAreFelt) {
   const fs::path data = tests::shared_data("data/volumes");
