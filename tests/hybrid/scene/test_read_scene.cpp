@@ -348,7 +348,7 @@ TEST(Scenes, AllThatComeWithTheProgramLoad) {
     const std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
     const bool wants_templates = text.find(templates.string()) != std::string::npos;
     if (wants_templates && !std::filesystem::is_directory(templates)) {
-      EXPECT_FALSE(data_are_expected()) << entry.path() << " needs Debian's mricron-data";
+      EXPECT_FALSE(tests::data_are_expected()) << entry.path() << " needs Debian's mricron-data";
       std::cout << "skipped: " << entry.path() << " needs Debian's mricron-data\n";
       continue;
     }
