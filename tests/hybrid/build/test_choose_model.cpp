@@ -54,7 +54,7 @@ TEST_F(ModelChoice, TissueStaysVoxelsAndBoneBecomesAProxy) {
   // The session then has no voxel data.
   Touch touch(bone, {0, 0, 0.03});
   EXPECT_TRUE(touch.state().soft.empty());
-  EXPECT_TRUE(touch.state().found.empty());
+  EXPECT_TRUE(touch.state().scratch.map_hits.empty());
 }
 
 TEST_F(ModelChoice, WhoAsksForAModelGetsIt) {
