@@ -22,6 +22,8 @@ function(hybrid_target name)
   # there is none (GCC bug 105651). Precompiled headers make it report what it sees inside the standard library.
   target_compile_options(${name} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wno-restrict
                                          -Wno-array-bounds -Wno-stringop-overflow -Werror -ffp-contract=off)
+  # In a batch g++ takes a source for a header, whose types may not hold those of an anonymous namespace.
+  target_compile_options(${name} PRIVATE $<$<BOOL:${CMAKE_UNITY_BUILD}>:-Wno-subobject-linkage>)
   if(HYBRID_SANITIZE)
     target_compile_options(${name} PUBLIC -fsanitize=${HYBRID_SANITIZE} -fno-omit-frame-pointer
                                           -fno-sanitize-recover=all)
@@ -42,6 +44,9 @@ function(hybrid_headers name)
   target_precompile_headers(${name} PRIVATE ${arg_HEADERS})
 endfunction()
 
+# The release preset compiles the sources of a room in batches (CMAKE_UNITY_BUILD), which halves the time to build. So a name in
+# an anonymous namespace is unique within its room. The other presets compile each source by itself.
+#
 # hybrid_room(PART/ROOM SOURCES … LINKS … PRIVATE_LINKS … HEADERS NAME): the library of one folder, called hybrid::PART_ROOM, or
 # hybrid::ROOM where the part is hybrid itself. LINKS are rooms that its headers include; PRIVATE_LINKS are libraries of its
 # sources alone; HEADERS are precompiled ones. COLD: nothing in it runs in a tick or is timed, so it is compiled with -O1.

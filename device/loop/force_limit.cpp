@@ -5,12 +5,10 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "device/loop/is_finite.h"
+
 namespace device {
 namespace {
-
-bool finite(const glm::dvec3& v) noexcept {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
 
 // A limit that is NaN or negative lets nothing through.
 double usable_limit(double limit) noexcept {
@@ -34,7 +32,7 @@ glm::dvec3 no_longer_than(const glm::dvec3& v, double limit, bool& cut) noexcept
 // Adds the work of the last force on the tool since the last tick.
 void count_work(const ForceLimits& limits, ForceLimitState& state, const glm::dvec3& position_m,
                 double dt_s) noexcept {
-  if (!finite(position_m)) return;
+  if (!is_finite(position_m)) return;
   const double work = state.placed ? glm::dot(state.last_N, position_m - state.last_m) : 0.0;
   state.handed.add(std::max(0.0, work), dt_s, limits.energy_window_s);
   state.last_m = position_m;
@@ -78,7 +76,7 @@ glm::dvec3 limit_force(const ForceLimits& limits, ForceLimitState& state, const 
 
   // Checked first, because a value that is not finite must not reach the slew rate's memory. The force is
   // zero at once, and the slew rate starts from zero again.
-  if (!finite(command_N)) return cut_force(state, state.nonfinite);
+  if (!is_finite(command_N)) return cut_force(state, state.nonfinite);
   // Written so that a limit that is NaN lets nothing through.
   std::uint64_t* reason = nullptr;
   if (tool.fault == DeviceFault::late || !(dt <= limits.deadline_s)) {
@@ -104,7 +102,7 @@ glm::dvec3 limit_force(const ForceLimits& limits, ForceLimitState& state, const 
   force = no_longer_than(force, usable_limit(limits.max_force_N), cut);
   if (cut) ++state.clamped;
 
-  if (!finite(force)) force = glm::dvec3(0.0);  // the difference of two finite commands can overflow
+  if (!is_finite(force)) force = glm::dvec3(0.0);  // the difference of two finite commands can overflow
   state.last_N = force;
   return force;
 }

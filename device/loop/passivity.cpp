@@ -5,6 +5,8 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "device/loop/is_finite.h"
+
 namespace device {
 namespace {
 
@@ -15,10 +17,6 @@ constexpr double kSpare_J = 1e-9;
 // up to 2.5 kN/m at 1 kHz to start unreduced.
 constexpr double kSeed_J = 200e-6;
 constexpr double kStrideKept_s = 0.5;
-
-bool finite(const glm::dvec3& v) noexcept {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
 
 // Longest step of a tool at rest until the next tick. It is a divisor, so never 0.
 double sudden_m(const PassivityOptions& options, double dt_s) noexcept {
@@ -50,7 +48,7 @@ void observe(const PassivityOptions& options, PassivityState& state, const glm::
 glm::dvec3 keep_passive(const PassivityOptions& options, PassivityState& state, const glm::dvec3& force_N,
                         const glm::dvec3& position_m, double dt_s) noexcept {
   const double dt = std::isfinite(dt_s) && dt_s > 0.0 ? dt_s : 0.0;
-  if (!finite(force_N) || !finite(position_m)) {
+  if (!is_finite(force_N) || !is_finite(position_m)) {
     state.last_N = glm::dvec3(0.0);
     return state.last_N;
   }

@@ -19,11 +19,11 @@ constexpr std::array<Unit, 2> kForceUnits{{{"_mn", 1e-3}, {"_n", 1.0}}};
 
 enum Role : std::size_t { time, x, y, z, fx, fy, fz, strength, roles };
 
-struct Column {
+struct MeasuredColumn {
   std::size_t index = 0;
   double in_si = 1.0;
 };
-using Columns = std::array<std::optional<Column>, roles>;
+using MeasuredColumns = std::array<std::optional<MeasuredColumn>, roles>;
 
 std::string lower(std::string_view text) {
   std::string out(text);
@@ -70,14 +70,14 @@ class ColumnFinder {
   ColumnFinder(const MeasuredFile& measured, const LineReader& reader, std::vector<std::string>& notes)
       : measured_(measured), reader_(reader), notes_(notes) {}
 
-  Columns by_name(const std::vector<std::string_view>& names) {
+  MeasuredColumns by_name(const std::vector<std::string_view>& names) {
     for (std::size_t i = 0; i < names.size(); ++i) take(i, names[i]);
     choose_force();
     return columns_;
   }
 
-  // Columns of numbers without names.
-  Columns by_count(std::size_t count) {
+  // MeasuredColumns of numbers without names.
+  MeasuredColumns by_count(std::size_t count) {
     constexpr std::array<std::pair<std::size_t, std::string_view>, 4> kLayouts{
         {{5, "t_s,x_mm,y_mm,z_mm,fn_N"},
          {6, "x_mm,y_mm,z_mm,fx_N,fy_N,fz_N"},
@@ -97,7 +97,7 @@ class ColumnFinder {
   [[nodiscard]] std::string name() const { return measured_.file.filename().string(); }
 
   void set(Role role, std::size_t index, double in_si) {
-    if (!columns_[role]) columns_[role] = Column{index, in_si};
+    if (!columns_[role]) columns_[role] = MeasuredColumn{index, in_si};
   }
 
   void take(std::size_t index, std::string_view written) {
@@ -120,7 +120,7 @@ class ColumnFinder {
       auto group =
           std::find_if(forces_.begin(), forces_.end(), [&](const Force& f) { return f.of_what == of_what; });
       if (group == forces_.end()) group = forces_.insert(forces_.end(), {of_what, {}});
-      group->columns[*axis] = Column{index, newton.value_or(1.0)};
+      group->columns[*axis] = MeasuredColumn{index, newton.value_or(1.0)};
       return;
     }
 
@@ -155,18 +155,18 @@ class ColumnFinder {
 
   struct Force {
     std::string of_what;
-    std::array<std::optional<Column>, 3> columns;
+    std::array<std::optional<MeasuredColumn>, 3> columns;
   };
   const MeasuredFile& measured_;
   const LineReader& reader_;
   std::vector<std::string>& notes_;
-  Columns columns_;
+  MeasuredColumns columns_;
   std::vector<Force> forces_;
 };
 
 // The columns; `is_row` tells whether the first line is already a row of numbers.
-Columns find_columns(const MeasuredFile& measured, const LineReader& reader, std::string_view first,
-                     bool& is_row, std::vector<std::string>& notes) {
+MeasuredColumns find_measured_columns(const MeasuredFile& measured, const LineReader& reader,
+                                      std::string_view first, bool& is_row, std::vector<std::string>& notes) {
   ColumnFinder finder(measured, reader, notes);
   const std::vector<std::string_view> fields = fields_of(first);
   is_row = !fields.empty() && std::all_of(fields.begin(), fields.end(), is_number);
@@ -174,13 +174,13 @@ Columns find_columns(const MeasuredFile& measured, const LineReader& reader, std
   if (!is_row) return finder.by_name(fields);
   const std::vector<std::string_view> commented = fields_of(reader.comment());
   if (commented.size() == fields.size()) {
-    const Columns columns = ColumnFinder(measured, reader, notes).by_name(commented);
+    const MeasuredColumns columns = ColumnFinder(measured, reader, notes).by_name(commented);
     if (columns[x] && columns[y] && columns[z]) return columns;
   }
   return finder.by_count(fields.size());
 }
 
-void require(const MeasuredFile& measured, const LineReader& reader, const Columns& columns) {
+void require(const MeasuredFile& measured, const LineReader& reader, const MeasuredColumns& columns) {
   if (!columns[x] || !columns[y] || !columns[z]) {
     reader.refuse("no columns x, y and z; name them in a header, or with --columns, as in " +
                   std::string(kExample));
@@ -201,7 +201,7 @@ MeasuredTrajectory read_measured(const MeasuredFile& measured) {
   if (!reader.next(line))
     throw PathError(measured.file.string() + ": is empty; it must have rows of numbers");
   bool is_row = false;
-  const Columns columns = find_columns(measured, reader, line, is_row, result.notes);
+  const MeasuredColumns columns = find_measured_columns(measured, reader, line, is_row, result.notes);
   require(measured, reader, columns);
   std::size_t last = 0;
   for (const auto& column : columns) last = std::max(last, column ? column->index : 0);

@@ -11,6 +11,7 @@
 #include <ctime>
 #include <glm/geometric.hpp>
 
+#include "device/loop/is_finite.h"
 #include "device/phantom/hd_errors.h"
 
 namespace device {
@@ -18,10 +19,6 @@ namespace {
 
 constexpr std::uint64_t kTemperatureEvery = 64;  // ticks between readings
 constexpr double kWarm = 0.8;  // fraction of the permitted temperature that is worth a message
-
-bool finite(const glm::dvec3& v) noexcept {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
 
 long thread_number() noexcept {
   return syscall(SYS_gettid);
@@ -117,7 +114,7 @@ void PhantomServo::read() noexcept {
   call_.get_integers(hd::kButtons, buttons.data());
   const glm::dvec3 p(position[0], position[1], position[2]), v(velocity[0], velocity[1], velocity[2]);
   state_.buttons = static_cast<std::uint32_t>(buttons[0]);
-  if (finite(p) && finite(v)) {
+  if (is_finite(p) && is_finite(v)) {
     state_.position_m = options_.fit.position(hd::kMillimeter * p);
     state_.velocity_m_per_s = options_.fit.velocity(hd::kMillimeter * v);
   } else {  // keep the last valid position, with zero force

@@ -8,22 +8,23 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
-#include "hybrid/bench/soft.h"
-#include "hybrid/build/build_world.h"
 #include "hybrid/base/flush_to_zero.h"
+#include "hybrid/bench/soft.h"
+#include "hybrid/bench/soft_engines.h"
+#include "hybrid/build/build_world.h"
 #include "hybrid/session/session.h"
-#include "hybrid/tick/tissue/press_tissue.h"
 #include "hybrid/tick/tick.h"
+#include "hybrid/tick/tissue/press_tissue.h"
 
 namespace hybrid::bench {
 namespace {
 
-constexpr double kSpacing = 1e-3, kTick = 1e-3;
+constexpr double kTick = 1e-3;
 constexpr int kWide = 36, kHigh = 20;  // voxels of a block; a ball is as wide
 constexpr double kYoung = 1e5;         // Pa: forces of newtons, so that a JND is a share of them
 constexpr double kAway = 0.5;          // spacings above the surface, where strokes begin and end
 constexpr double kTolerance = 1e-4;    // of the lattice's force scale: a reference is at rest
-constexpr int kReferenceCycles = 60;
+constexpr int kMostSettleCycles = 60;
 
 // Device positions, a tick apart.
 template <class Visit>
@@ -45,13 +46,13 @@ class Equilibrium {
   glm::dvec3 at(const glm::dvec3& point) {
     const SoftBody& body = world_.soft[0];
     const voxel::ToolInBody tool = tool_in_body(world_, body, point);
-    const double reach = object_->reach(tool.radius) + 2.0 * kSpacing;
+    const double reach = object_->reach(tool.radius) + 2.0 * kSoftSpacing_m;
     near_.clear();
     for (const voxel::VoxelId v : object_->lattice().surface()) {
       if (glm::distance(object_->position(v), tool.centre) < reach) near_.push_back(v);
     }
     object_->touch(near_);
-    if (!object_->settle(tool, kTolerance * object_->lattice().force_scale_N(), kReferenceCycles))
+    if (!object_->settle(tool, kTolerance * object_->lattice().force_scale_N(), kMostSettleCycles))
       ++unsettled;
     return body.pose.rotation * object_->reaction(tool).force_N;
   }
@@ -85,27 +86,27 @@ const char* smooth_name(Smooth block) {
 Scene stroke_scene(const StrokeCase& stroke) {
   Scene scene;
   scene.file = fmt::format("stroke over a {} object", smooth_name(stroke.block));
-  scene.tool.radius_m = stroke.radius_spacings * kSpacing;
+  scene.tool.radius_m = stroke.radius_spacings * kSoftSpacing_m;
   scene.device_model = device::DeviceModel::ideal;
   scene.max_force_given = true;
   scene.safety = {.max_force_N = 1e6, .max_slew_N_per_s = 1e12, .soft_start_s = 0.0};
   scene.materials["tissue"] = {.young_Pa = kYoung, .place = {}};
   scene.materials["firm"] = {.young_Pa = 4.0 * kYoung, .place = {}};
-  voxel::Formula formula{.size_m = glm::dvec3(kWide, kWide, kHigh) * kSpacing,
-                         .spacing_m = glm::dvec3(kSpacing),
+  voxel::Formula formula{.size_m = glm::dvec3(kWide, kWide, kHigh) * kSoftSpacing_m,
+                         .spacing_m = glm::dvec3(kSoftSpacing_m),
                          .layers = {},
                          .inclusions = {}};
   Anchors anchors;
   std::map<std::uint8_t, std::string> materials;
   if (stroke.block == Smooth::layered) {
     // Skin, fat and muscle: soft between firm, the top layer three voxels thick.
-    formula.layers = {{0.5 * kHigh * kSpacing, 2}, {(0.5 * kHigh - 3.0) * kSpacing, 1}};
+    formula.layers = {{0.5 * kHigh * kSoftSpacing_m, 2}, {(0.5 * kHigh - 3.0) * kSoftSpacing_m, 1}};
     formula.label = 2;
     materials[2] = "firm";
   } else if (stroke.block == Smooth::oblique) {
     formula.shape = voxel::Formula::Shape::ball;
-    formula.size_m = glm::dvec3(kWide * kSpacing);
-    formula.inclusions = {{.size_m = glm::dvec3(0.4 * kWide * kSpacing), .label = 3}};
+    formula.size_m = glm::dvec3(kWide * kSoftSpacing_m);
+    formula.inclusions = {{.size_m = glm::dvec3(0.4 * kWide * kSoftSpacing_m), .label = 3}};
     materials[3] = "tissue";
     anchors.labels = {3};
   }
@@ -122,17 +123,18 @@ Scene stroke_scene(const StrokeCase& stroke) {
 
 std::vector<glm::dvec3> stroke_corners(const StrokeCase& stroke) {
   const glm::dvec3 n = outwards(stroke.block);
-  const double surface = 0.5 * (stroke.block == Smooth::oblique ? kWide : kHigh) * kSpacing;
-  const double touched = surface + stroke.radius_spacings * kSpacing;
+  const double surface = 0.5 * (stroke.block == Smooth::oblique ? kWide : kHigh) * kSoftSpacing_m;
+  const double touched = surface + stroke.radius_spacings * kSoftSpacing_m;
   // Off the lattice in every direction.
   const glm::dvec3 side = glm::normalize(glm::cross(n, glm::dvec3(0.3, 1.0, 0.2))),
                    other = glm::cross(n, side);
-  const glm::dvec3 start =
-      touched * n - 0.5 * stroke.slide_spacings * kSpacing * side + kSpacing * (0.31 * side + 0.17 * other);
-  const glm::dvec3 slide = stroke.slide_spacings * kSpacing * side;
-  std::vector<glm::dvec3> corners{start + kAway * kSpacing * n, start - stroke.depth_spacings * kSpacing * n};
+  const glm::dvec3 start = touched * n - 0.5 * stroke.slide_spacings * kSoftSpacing_m * side +
+                           kSoftSpacing_m * (0.31 * side + 0.17 * other);
+  const glm::dvec3 slide = stroke.slide_spacings * kSoftSpacing_m * side;
+  std::vector<glm::dvec3> corners{start + kAway * kSoftSpacing_m * n,
+                                  start - stroke.depth_spacings * kSoftSpacing_m * n};
   if (stroke.slide_spacings > 0.0) corners.push_back(corners[1] + slide);
-  corners.push_back(corners.back() + (kAway + stroke.depth_spacings) * kSpacing * n);
+  corners.push_back(corners.back() + (kAway + stroke.depth_spacings) * kSoftSpacing_m * n);
   return corners;
 }
 

@@ -29,7 +29,7 @@ constexpr std::array<OccupancyPattern, 3> kPatterns{OccupancyPattern::empty, Occ
                                                     OccupancyPattern::random};
 constexpr std::array<int, 2> kBoxes{1, 5};  // cells along an edge: one cell; a tool's
 
-struct Box {
+struct QueryBox {
   glm::dvec3 low, high;
   // What the map is asked: of one cell of voxels a point in it, which is the same question.
   glm::dvec3 map_low, map_high;
@@ -50,9 +50,9 @@ double share_of(std::vector<double>& values, double share) {
 }
 
 // One ball in all engines.
-class Bench {
+class OccupancyBench {
  public:
-  Bench(const OccupancyBenchOptions& options, OccupancyBall ball)
+  OccupancyBench(const OccupancyBenchOptions& options, OccupancyBall ball)
       : options_(options), ball_(std::move(ball)), index_(ball_.cell_m, glm::dvec3(0.0)) {}
 
   void run(const std::function<void(OccupancyRow)>& add);
@@ -76,14 +76,14 @@ class Bench {
   [[nodiscard]] std::unique_ptr<polygon::BoxSearch> built_tree() const;
   void build(const std::function<void(OccupancyRow)>& add);
   void look_up(OccupancyPattern pattern, int box_cells, const std::function<void(OccupancyRow)>& add);
-  void check(OccupancyRow& row, std::span<const Box> boxes) const;
+  void check(OccupancyRow& row, std::span<const QueryBox> boxes) const;
   void update_voxels(const std::function<void(OccupancyRow)>& add);
   void update_body(const std::function<void(OccupancyRow)>& add);
 
   // Whole cells about a place: the same points lie in these for every engine.
-  [[nodiscard]] Box box_about(const glm::dvec3& p, int box_cells) const;
-  [[nodiscard]] std::size_t ask(OccupancyEngine engine, const Box& box, Found& out) const;
-  [[nodiscard]] std::size_t ask_brute(const Box& box, Found& out) const;
+  [[nodiscard]] QueryBox box_about(const glm::dvec3& p, int box_cells) const;
+  [[nodiscard]] std::size_t ask(OccupancyEngine engine, const QueryBox& box, Found& out) const;
+  [[nodiscard]] std::size_t ask_brute(const QueryBox& box, Found& out) const;
 
   const OccupancyBenchOptions& options_;
   OccupancyBall ball_;
@@ -96,8 +96,8 @@ class Bench {
   Samples tree_build_;
 };
 
-OccupancyRow Bench::row(const char* op, OccupancyEngine engine, OccupancyPattern pattern,
-                        Samples samples) const {
+OccupancyRow OccupancyBench::row(const char* op, OccupancyEngine engine, OccupancyPattern pattern,
+                                 Samples samples) const {
   OccupancyRow r;
   r.op = op;
   r.engine = engine;
@@ -117,7 +117,7 @@ OccupancyRow Bench::row(const char* op, OccupancyEngine engine, OccupancyPattern
   return r;
 }
 
-std::unique_ptr<OccupancyMap> Bench::built_map() const {
+std::unique_ptr<OccupancyMap> OccupancyBench::built_map() const {
   auto map = std::make_unique<OccupancyMap>(ball_.cell_m, glm::dvec3(0.0));
   if (voxels()) {
     map->add_soft(static_cast<std::uint32_t>(ball_.points.size()));
@@ -130,11 +130,11 @@ std::unique_ptr<OccupancyMap> Bench::built_map() const {
   return map;
 }
 
-std::unique_ptr<polygon::BoxSearch> Bench::built_tree() const {
+std::unique_ptr<polygon::BoxSearch> OccupancyBench::built_tree() const {
   return voxels() ? polygon::make_cgal_search(ball_.points) : polygon::make_cgal_search(ball_.mesh);
 }
 
-void Bench::build(const std::function<void(OccupancyRow)>& add) {
+void OccupancyBench::build(const std::function<void(OccupancyRow)>& add) {
   const std::size_t repeats = options_.quick ? 2 : elements() > 2'000'000 ? 1 : elements() > 200'000 ? 3 : 9;
   Samples map_build{{}, 1};
   tree_build_ = {{}, 1};
@@ -158,17 +158,17 @@ void Bench::build(const std::function<void(OccupancyRow)>& add) {
   if (tree) add(row("rebuild", OccupancyEngine::cgal_aabb, OccupancyPattern::coherent, tree_build_));
 }
 
-Box Bench::box_about(const glm::dvec3& p, int box_cells) const {
+QueryBox OccupancyBench::box_about(const glm::dvec3& p, int box_cells) const {
   const CellCoordinates c = index_.cell_of(p);
   const double reach = 0.5 * (box_cells - 1);
   // A hair within the cells' faces, where no voxel is.
   const glm::dvec3 middle = ball_.cell_m * (glm::dvec3(c[0], c[1], c[2]) + 0.5),
                    half(ball_.cell_m * (reach + 0.5 - 1e-3));
-  const Box box{middle - half, middle + half, middle - half, middle + half};
-  return box_cells == 1 && voxels() ? Box{box.low, box.high, middle, middle} : box;
+  const QueryBox box{middle - half, middle + half, middle - half, middle + half};
+  return box_cells == 1 && voxels() ? QueryBox{box.low, box.high, middle, middle} : box;
 }
 
-std::size_t Bench::ask_brute(const Box& box, Found& out) const {
+std::size_t OccupancyBench::ask_brute(const QueryBox& box, Found& out) const {
   std::size_t count = 0;
   for (std::uint32_t n = 0; n < ball_.points.size(); ++n) {
     const glm::dvec3& p = ball_.points[n];
@@ -180,7 +180,7 @@ std::size_t Bench::ask_brute(const Box& box, Found& out) const {
   return count;
 }
 
-std::size_t Bench::ask(OccupancyEngine engine, const Box& box, Found& out) const {
+std::size_t OccupancyBench::ask(OccupancyEngine engine, const QueryBox& box, Found& out) const {
   if (engine == OccupancyEngine::brute) return ask_brute(box, out);
   // Of triangles the map says whether there are any, and the tree ends with the first.
   if (!voxels()) {
@@ -191,7 +191,7 @@ std::size_t Bench::ask(OccupancyEngine engine, const Box& box, Found& out) const
                                         : tree_->in(box.low, box.high, out);
 }
 
-void Bench::check(OccupancyRow& r, std::span<const Box> boxes) const {
+void OccupancyBench::check(OccupancyRow& r, std::span<const QueryBox> boxes) const {
   const bool by_tree = tree_ != nullptr && r.engine != OccupancyEngine::cgal_aabb;
   const bool by_map = !by_tree && r.engine != OccupancyEngine::map;
   const OccupancyEngine other = by_tree  ? OccupancyEngine::cgal_aabb
@@ -227,14 +227,15 @@ void Bench::check(OccupancyRow& r, std::span<const Box> boxes) const {
   r.found_mean = static_cast<double>(found) / static_cast<double>(std::max<std::size_t>(1, r.checked));
 }
 
-void Bench::look_up(OccupancyPattern pattern, int box_cells, const std::function<void(OccupancyRow)>& add) {
-  std::vector<Box> boxes;
+void OccupancyBench::look_up(OccupancyPattern pattern, int box_cells,
+                             const std::function<void(OccupancyRow)>& add) {
+  std::vector<QueryBox> boxes;
   for (const glm::dvec3& p : places(ball_, pattern, kBatch * (options_.quick ? 50 : 1500)))
     boxes.push_back(box_about(p, box_cells));
   std::array<Samples, kOccupancyEngines.size()> samples;
   std::array<std::size_t, kOccupancyEngines.size()> at{};
   static thread_local Found out;
-  std::array<Box, kBatch> asked{};
+  std::array<QueryBox, kBatch> asked{};
   volatile std::size_t keep = 0;
   // In turns, so that whatever else the machine does meets all alike.
   for (std::size_t round = 0; round < kRounds; ++round) {
@@ -257,13 +258,13 @@ void Bench::look_up(OccupancyPattern pattern, int box_cells, const std::function
         const std::uint64_t begin = TickTimer::begin();
         switch (engine) {  // a loop of its own for each: none pays for the choice
           case OccupancyEngine::map:
-            for (const Box& box : questions) found += ask(OccupancyEngine::map, box, out);
+            for (const QueryBox& box : questions) found += ask(OccupancyEngine::map, box, out);
             break;
           case OccupancyEngine::cgal_aabb:
-            for (const Box& box : questions) found += ask(OccupancyEngine::cgal_aabb, box, out);
+            for (const QueryBox& box : questions) found += ask(OccupancyEngine::cgal_aabb, box, out);
             break;
           case OccupancyEngine::brute:
-            for (const Box& box : questions) found += ask_brute(box, out);
+            for (const QueryBox& box : questions) found += ask_brute(box, out);
             break;
         }
         const double ns = 1e3 * timer_.us(TickTimer::end() - begin) / static_cast<double>(count);
@@ -285,7 +286,7 @@ void Bench::look_up(OccupancyPattern pattern, int box_cells, const std::function
 }
 
 // Voxels move to the next cell outwards and come back, one after another in the lattice's order or anywhere.
-void Bench::update_voxels(const std::function<void(OccupancyRow)>& add) {
+void OccupancyBench::update_voxels(const std::function<void(OccupancyRow)>& add) {
   std::vector<glm::dvec3> moved = ball_.points;  // of brute force: all there is to update
   SplitMix64 random(3);
   for (const OccupancyPattern pattern : {OccupancyPattern::coherent, OccupancyPattern::random}) {
@@ -332,7 +333,7 @@ void Bench::update_voxels(const std::function<void(OccupancyRow)>& add) {
 }
 
 // The whole ball moves: a fifth of a cell a time, or anywhere.
-void Bench::update_body(const std::function<void(OccupancyRow)>& add) {
+void OccupancyBench::update_body(const std::function<void(OccupancyRow)>& add) {
   auto cells = std::make_shared<SurfaceCells>(ball_.cell_m, glm::dvec3(0.0));
   for (const auto& t : ball_.mesh.triangles)
     cells->add_triangle(1, ball_.mesh.vertices[t[0]], ball_.mesh.vertices[t[1]], ball_.mesh.vertices[t[2]]);
@@ -362,7 +363,7 @@ void Bench::update_body(const std::function<void(OccupancyRow)>& add) {
       r.note = "a body moves";
       r.reference = "the fixed map of the ball";
       for (const glm::dvec3& p : places(ball_, OccupancyPattern::random, 200)) {
-        const Box box = box_about(p, 5);
+        const QueryBox box = box_about(p, 5);
         ++r.checked;
         const bool fixed = map_->rigid_in(box.low, box.high) != 0,
                    moving = map.rigid_in(at + box.low, at + box.high) != 0;
@@ -379,7 +380,7 @@ void Bench::update_body(const std::function<void(OccupancyRow)>& add) {
   }
 }
 
-void Bench::run(const std::function<void(OccupancyRow)>& add) {
+void OccupancyBench::run(const std::function<void(OccupancyRow)>& add) {
   build(add);
   if (wanted("lookup")) {
     for (const OccupancyPattern pattern : kPatterns) {
@@ -431,11 +432,11 @@ std::vector<OccupancyRow> bench_occupancy(const OccupancyBenchOptions& options) 
     for (const OccupancyWhat what :
          {OccupancyWhat::voxels_surface, OccupancyWhat::triangles, OccupancyWhat::voxels_all}) {
       say(what_name(what), count);
-      Bench(options, make_ball(what, count)).run(add);
+      OccupancyBench(options, make_ball(what, count)).run(add);
     }
     // Beside the ball of all voxels, the same ball as a session has it.
     say("voxels, of which the surface", count);
-    Bench(options, make_ball_surface_of(count)).run(add);
+    OccupancyBench(options, make_ball_surface_of(count)).run(add);
   }
   return rows;
 }

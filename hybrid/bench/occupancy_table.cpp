@@ -9,7 +9,7 @@
 namespace hybrid::bench {
 namespace {
 
-std::string time_text(double ns) {
+std::string ns_text(double ns) {
   return ns < 100.0 ? fmt::format("{:.1f}", ns)
          : ns < 1e5 ? fmt::format("{:.0f}", ns)
          : ns < 1e7 ? fmt::format("{:.0f}k", ns / 1e3)
@@ -17,8 +17,8 @@ std::string time_text(double ns) {
 }
 
 // The row of another engine to the same question; nullptr: there is none.
-const OccupancyRow* beside(const std::vector<OccupancyRow>& rows, const OccupancyRow& row,
-                           OccupancyEngine engine) {
+const OccupancyRow* same_query(const std::vector<OccupancyRow>& rows, const OccupancyRow& row,
+                               OccupancyEngine engine) {
   for (const OccupancyRow& other : rows) {
     if (other.op == row.op && other.engine == engine && other.pattern == row.pattern &&
         other.what == row.what && other.elements == row.elements && other.box_cells == row.box_cells)
@@ -103,8 +103,8 @@ std::string occupancy_table_line(const OccupancyRow& row) {
   return fmt::format(
       "{:<8}{:<10}{:<15}{:<9}{:>10}{:>10}{:>4}{:>10}{:>10}{:>8.1f}{:>8}{:>8}{:>7}{:>7}{}\n", row.op,
       engine_name(row.engine), what_name(row.what), pattern_name(row.pattern), row.elements, row.cells,
-      row.box_cells > 0 ? fmt::format("{}", row.box_cells) : std::string("-"), time_text(row.p50_ns),
-      time_text(row.p99_ns), row.bytes_per_cell,
+      row.box_cells > 0 ? fmt::format("{}", row.box_cells) : std::string("-"), ns_text(row.p50_ns),
+      ns_text(row.p99_ns), row.bytes_per_cell,
       row.op == "lookup" ? fmt::format("{:.1f}", row.found_mean) : std::string("-"), count(row.checked),
       count(row.missed), count(row.extra), row.note.empty() ? std::string() : "  " + row.note);
 }
@@ -117,7 +117,7 @@ std::string occupancy_summary(const std::vector<OccupancyRow>& rows) {
     missed += row.missed;
     if (row.engine != OccupancyEngine::map) continue;
     for (const OccupancyEngine engine : {OccupancyEngine::cgal_aabb, OccupancyEngine::brute}) {
-      const OccupancyRow* other = beside(rows, row, engine);
+      const OccupancyRow* other = same_query(rows, row, engine);
       if (other == nullptr) continue;
       ++compared;
       if (engine == OccupancyEngine::cgal_aabb && other->bytes_per_cell > 0.0 && row.op == "lookup") {
@@ -126,8 +126,8 @@ std::string occupancy_summary(const std::vector<OccupancyRow>& rows) {
         most_memory = std::max(most_memory, ratio);
       }
       if (row.p50_ns > other->p50_ns)
-        worse += fmt::format("  {}: {} ns, {} {} ns\n", name_of(row), time_text(row.p50_ns),
-                             engine_name(engine), time_text(other->p50_ns));
+        worse += fmt::format("  {}: {} ns, {} {} ns\n", name_of(row), ns_text(row.p50_ns),
+                             engine_name(engine), ns_text(other->p50_ns));
     }
   }
   if (compared > 0)

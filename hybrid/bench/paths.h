@@ -38,7 +38,7 @@ class SplitMix64 {
 };
 
 // The spiral over the unit sphere from near one pole to near the other in 20 s, such that a point at
-// kSphereRadius_m moves at exactly `speed_m_s` (above 6 mm/s, which the way between the poles takes alone).
+// kSphereRadius_m moves at exactly `speed_m_s`. The motion from pole to pole alone is 6.4 mm/s, the least.
 glm::dvec3 spiral_direction(double t_s, double speed_m_s);
 
 // Where the ideal proxy is for a goal near the sphere: on it when the goal is inside, at the goal otherwise.

@@ -11,8 +11,6 @@
 namespace hybrid::bench {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 // All of the paths' own scale (unit: meter, times the run's scale).
 constexpr double kDeep_m = 1e-5;    // below the inscribed sphere by this much is inside the ball
 constexpr double kLeak_m = 1e-6;    // past a cube's face or a corner's plane by this much is inside
@@ -20,8 +18,8 @@ constexpr double kSearch_m = 1e-3;  // around the proxy for its first-order opti
 constexpr std::size_t kProbe = 16;  // ticks that are always judged, and tell what one costs
 constexpr double kCornerSeen_m = 0.1;
 
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 struct MaxRms {
@@ -102,7 +100,7 @@ std::vector<std::size_t> Judge::ticks_to_judge(const TouchRun& run, double budge
   const std::vector<std::size_t>& candidates = held.empty() ? all : held;
   if (budget_s < 0.0) return candidates;
   const std::vector<std::size_t> probe = thinned(candidates, kProbe);
-  const auto start = Clock::now();
+  const auto start = std::chrono::steady_clock::now();
   for (const std::size_t k : probe)
     static_cast<void>(reference_->nearest_optimum(in_body(path_.goals[k], k), in_body(run.proxy_m[k], k),
                                                   radius_m_, kSearch_m * scale_));
@@ -141,7 +139,7 @@ void Judge::judge_optimum(const TouchRun& run, double budget_s, Judgement& out) 
       return glm::length(optimum - in_body(path_.reference[k], k));
     };
     const std::vector<std::size_t> probe = thinned(all, kProbe);
-    const auto start = Clock::now();
+    const auto start = std::chrono::steady_clock::now();
     for (const std::size_t k : probe) static_cast<void>(find(k));
     for (const std::size_t k :
          thinned(all, affordable(all.size(), probe.size(), seconds_since(start), budget_s)))

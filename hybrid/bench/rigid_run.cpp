@@ -9,8 +9,8 @@
 #include <glm/geometric.hpp>
 #include <stdexcept>
 
-#include "hybrid/tick/bodies/move_bodies.h"
 #include "hybrid/build/build_world.h"
+#include "hybrid/tick/bodies/move_bodies.h"
 #include "hybrid/tick/proxy/proxy_step.h"
 #include "hybrid/tick/tick.h"
 #include "polygon/reference/cgal_surface.h"
@@ -19,12 +19,10 @@
 namespace hybrid::bench {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 constexpr std::size_t kBlock = 2000;  // ticks an engine has the processor's caches for itself
 
-double ms_since(Clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+double ms_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
 
 struct Box {
@@ -106,7 +104,7 @@ const char* engine_name(Engine engine) {
 }
 
 TimedSurface make_surface(const BenchMesh& mesh, Engine engine) {
-  const auto start = Clock::now();
+  const auto start = std::chrono::steady_clock::now();
   TimedSurface made;
   if (engine == Engine::cgal_aabb) {
     made.surface = polygon::make_cgal_surface(mesh.mesh, mesh.solid);
@@ -121,7 +119,7 @@ TouchWorld::TouchWorld(const BenchMesh& mesh, const TimedSurface& surface, Engin
                        double tool_radius_m, const glm::dvec3& offset_m, bool moves)
     : moves_(moves), build_ms_(surface.build_ms) {
   const Box box{surface.surface->lower(), surface.surface->upper()};
-  const auto start = Clock::now();
+  const auto start = std::chrono::steady_clock::now();
   OccupancyMap map = engine == Engine::no_map ? OccupancyMap(1.0, offset_m)
                                               : fill_map(mesh.mesh, box, tool_radius_m, offset_m, moves);
   map_ms_ = engine == Engine::no_map ? 0.0 : ms_since(start);

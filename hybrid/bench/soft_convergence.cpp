@@ -5,13 +5,13 @@
 #include <glm/geometric.hpp>
 #include <memory>
 
+#include "hybrid/bench/soft_engines.h"
 #include "voxel/baseline/thesis_chainmail.h"
 #include "voxel/object/soft_object.h"
 
 namespace hybrid::bench {
 namespace {
 
-constexpr double kSpacing = 1e-3;
 constexpr float kPush = 0.5e-3F;  // m, within the slack: no chain, relaxation alone
 constexpr double kRemedy = 0.2;   // of the thesis's movement: "some small value"
 
@@ -27,7 +27,7 @@ Object object_of(const std::array<int, 3>& dims, const std::array<int, 3>& pushe
                  voxel::ThesisChainMailOptions::Movement movement) {
   Object object;
   object.volume.dims = dims;
-  object.volume.spacing_m = glm::dvec3(kSpacing);
+  object.volume.spacing_m = glm::dvec3(kSoftSpacing_m);
   object.volume.labels.assign(static_cast<std::size_t>(dims[0] * dims[1] * dims[2]), 1);
   object.pushed = pushed;
   object.movement = movement;

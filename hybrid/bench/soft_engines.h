@@ -16,6 +16,8 @@
 
 namespace hybrid::bench {
 
+inline constexpr double kSoftSpacing_m = 1e-3;  // of every benchmark's soft object
+
 // Voxels of a volume that are moved, and by how much from where they are (unit: meter).
 struct Push {
   std::vector<std::array<int, 3>> sources;
@@ -59,8 +61,8 @@ WaveState look_at(const WaveEngine& engine, const voxel::LabelVolume& volume,
 
 // Blocks to push into, spacing 1 mm, lower layer anchored. "homogeneous": one label; "layers": slabs of 8
 // voxels of three labels in turn; "labels": lumps of about 10 voxels of three labels; "random": each voxel
-// one of eight labels. Label n has `slack` times 1, 1.5, 2 (random: 1, 1 + 1/7 … 2) spacings of play along
-// each link and across it.
+// one of eight labels. Links of label n may stretch, shorten and shear by `slack` · f spacings: f is 1, 1.5,
+// 2, or 1, 1 + 1/7 … 2 for "random".
 const std::vector<std::string>& wave_materials();
 voxel::LabelVolume wave_volume(const std::string& material, const std::array<int, 3>& dims);
 voxel::LatticeOptions wave_options(const std::string& material, double slack);

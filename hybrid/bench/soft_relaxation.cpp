@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "hybrid/bench/soft.h"
+#include "hybrid/bench/soft_engines.h"
 #include "hybrid/bench/timer.h"
 #include "hybrid/session/session.h"
 #include "voxel/baseline/thesis_chainmail.h"
@@ -21,7 +22,6 @@
 namespace hybrid::bench {
 namespace {
 
-constexpr double kSpacing = 1e-3;
 constexpr double kDepth = 10.0, kRadius = 10.0;  // (unit: spacing)
 constexpr int kSweepsNear = 2;
 constexpr double kConverged = 0.01;
@@ -78,7 +78,7 @@ voxel::LabelVolume layered_cube(int edge) {
 
 void say_error_when_asked(SoftRow& row, double force_N, double reference_N) {
   row.force_error_N = std::fabs(force_N - reference_N);
-  row.force_error_jnd = *row.force_error_N / std::max(kJndShare * reference_N, kJndFloor_N);
+  row.force_error_jnd = jnd_of(glm::dvec3(force_N, 0.0, 0.0), glm::dvec3(reference_N, 0.0, 0.0), kJndFloor_N);
   row.note += "; error after 100 ms";
 }
 
@@ -94,14 +94,14 @@ class Pressed {
     options.anchor_faces = {"-z"};
     object_ = std::make_unique<voxel::SoftObject>(std::make_shared<voxel::Lattice>(volume, options));
     if (relaxed == Relaxed::apart) replica_ = std::make_unique<voxel::ShadowObject>(*object_);
-    const double middle = 0.5 * (edge - 1) * kSpacing, top = (edge - 1) * kSpacing;
-    tool_.radius = kRadius * kSpacing;
+    const double middle = 0.5 * (edge - 1) * kSoftSpacing_m, top = (edge - 1) * kSoftSpacing_m;
+    tool_.radius = kRadius * kSoftSpacing_m;
     const double from = top + object_->reach(tool_.radius);
     constexpr int steps = 40;
     for (int n = 1; n <= steps; ++n) {
-      tool_.centre = {middle, middle, from - kDepth * kSpacing * n / steps};
+      tool_.centre = {middle, middle, from - kDepth * kSoftSpacing_m * n / steps};
       touch();
-      if (n > 1) object_->follow({0.0, 0.0, -kDepth * kSpacing / steps});
+      if (n > 1) object_->follow({0.0, 0.0, -kDepth * kSoftSpacing_m / steps});
       object_->push_out(tool_);
     }
   }
@@ -110,14 +110,14 @@ class Pressed {
   void touch() {
     near_.clear();
     for (const voxel::VoxelId v : object_->lattice().surface()) {
-      if (glm::distance(object_->position(v), tool_.centre) < object_->reach(tool_.radius) + kSpacing)
+      if (glm::distance(object_->position(v), tool_.centre) < object_->reach(tool_.radius) + kSoftSpacing_m)
         near_.push_back(v);
     }
     object_->touch(near_);
   }
 
   [[nodiscard]] voxel::SoftObject& object() { return *object_; }
-  [[nodiscard]] voxel::ShadowObject& replica() { return *replica_; }
+  [[nodiscard]] voxel::ShadowObject& shadow() { return *replica_; }
   [[nodiscard]] const voxel::ToolInBody& tool() const { return tool_; }
   [[nodiscard]] double force_N() { return glm::length(object_->reaction(tool_).force_N); }
 
@@ -154,7 +154,7 @@ SoftRow relax_row(int edge, const Limits& limits, std::optional<double> at_rest_
   std::vector<Moment> moments;
   std::uint64_t updates = 0;
   double us = 0.0, background_us = 0.0;
-  voxel::ShadowObject& replica = pressed.replica();
+  voxel::ShadowObject& shadow = pressed.shadow();
   int calm = 0;
   for (int n = 0;
        n < kMostRounds && (n == 0 || voxel::ShadowObject::wanted(object)) && us < 60e6 && calm < kCalmRounds;
@@ -166,11 +166,11 @@ SoftRow relax_row(int edge, const Limits& limits, std::optional<double> at_rest_
     const double force = pressed.force_N();
     const std::uint64_t between = TickTimer::begin();
     if (voxel::ShadowObject::wanted(object)) {
-      replica.give(object);
-      replica.relax();
-      replica.take(object);
-      while (!replica.drained()) replica.drain(object, object.lattice().grid().rows());
-      updates += replica.work() * voxel::kRow;
+      shadow.submit(object);
+      shadow.relax();
+      shadow.apply_near(object);
+      while (!shadow.all_applied()) shadow.apply_far(object, object.lattice().grid().rows());
+      updates += shadow.work() * voxel::kRow;
     }
     const std::uint64_t after = TickTimer::end();
     calm = !moments.empty() && std::fabs(force - moments.back().force_N) <= kCalm * force ? calm + 1 : 0;
@@ -228,18 +228,18 @@ TightRow tight_row(int edge, bool layered) {
   options.materials[2] = kFirm;
   options.anchor_faces = {"-z"};
   const auto lattice = std::make_shared<const voxel::Lattice>(volume, options);
-  const double middle = 0.5 * (edge - 1) * kSpacing, top = (edge - 1) * kSpacing;
-  voxel::ToolInBody tool{.centre = {middle, middle, 0.0}, .radius = kRadius * kSpacing};
+  const double middle = 0.5 * (edge - 1) * kSoftSpacing_m, top = (edge - 1) * kSoftSpacing_m;
+  voxel::ToolInBody tool{.centre = {middle, middle, 0.0}, .radius = kRadius * kSoftSpacing_m};
   const auto pressed = [&](bool wide, const auto& look) {
     voxel::SoftObject object(lattice);
     std::string obstacle = object.use_composite_grid(tool);
     if (!obstacle.empty()) return obstacle;
     if (wide) object.widen_patches();
-    tool.centre.z = top + object.reach(tool.radius) - depth * kSpacing;
+    tool.centre.z = top + object.reach(tool.radius) - depth * kSoftSpacing_m;
     std::vector<voxel::VoxelId> near(lattice->surface().begin(), lattice->surface().end());
     for (int n = 0; n < kTicks; ++n) {
       // As a tick begins: what is near, or may be.
-      const double away = object.reach(tool.radius) + kSpacing;
+      const double away = object.reach(tool.radius) + kSoftSpacing_m;
       if (object.patches_in_use() != nullptr)
         near.assign(object.near_on_grid().begin(), object.near_on_grid().end());
       std::erase_if(near,
@@ -291,7 +291,7 @@ SoftRow classic_row(int edge) {
   options.anchor_faces = {"-z"};
   voxel::ThesisChainMail object(volume, options);
   const auto source = object.at(edge / 2, edge / 2, edge - 1);
-  const glm::vec3 move(0.0F, 0.0F, static_cast<float>(-kDepth * kSpacing));
+  const glm::vec3 move(0.0F, 0.0F, static_cast<float>(-kDepth * kSoftSpacing_m));
   object.move({&source, 1}, {&move, 1});
   std::vector<double> us;
   for (int n = 0; n < 5; ++n) {

@@ -6,12 +6,13 @@
 #include <array>
 
 #include "hybrid/bench/soft.h"
+#include "hybrid/bench/soft_engines.h"
 #include "hybrid/session/session.h"
 
 namespace hybrid::bench {
 namespace {
 
-constexpr double kSpacing = 1e-3, kSlack = 0.1, kSpeed = 0.5, kToolRadius = 8.0 * kSpacing;
+constexpr double kSlack = 0.1, kSpeed = 0.5, kToolRadius = 8.0 * kSoftSpacing_m;
 constexpr double kMostDepth = 20.0;  // (unit: spacing)
 constexpr int kSamples = 100;  // of the force's error, fewer where tissue is pressed for part of the time
 
@@ -33,8 +34,8 @@ Scene cube_scene(int edge, double seconds) {
   scene.safety = {.max_force_N = 1e6, .max_slew_N_per_s = 1e12, .soft_start_s = 0.0};
   scene.materials["tissue"] = {
       .stretch_min = 1.0 - kSlack, .stretch_max = 1.0 + kSlack, .shear = kSlack, .place = {}};
-  voxel::Formula cube{.size_m = glm::dvec3(edge * kSpacing),
-                      .spacing_m = glm::dvec3(kSpacing),
+  voxel::Formula cube{.size_m = glm::dvec3(edge * kSoftSpacing_m),
+                      .spacing_m = glm::dvec3(kSoftSpacing_m),
                       .layers = {},
                       .inclusions = {}};
   scene.soft.push_back({.name = "cube",
@@ -45,7 +46,7 @@ Scene cube_scene(int edge, double seconds) {
                         .anchors = {},
                         .place = {},
                         .source_place = {}});
-  const double top = 0.5 * edge * kSpacing + kToolRadius, depth = depth_for(edge) * kSpacing;
+  const double top = 0.5 * edge * kSoftSpacing_m + kToolRadius, depth = depth_for(edge) * kSoftSpacing_m;
   const double above = top + 0.25 * depth, low = top - depth, aside = 0.5 * depth;
   device::WaypointPath path{.points = {}, .speed_m_per_s = kSpeed};
   const std::array<glm::dvec2, 4> places{glm::dvec2(0.0), glm::dvec2(aside, 0.0), glm::dvec2(aside, aside),
@@ -62,7 +63,7 @@ Scene cube_scene(int edge, double seconds) {
   return scene;
 }
 
-SoftRow row_of(const char* name, int edge) {
+SoftRow empty_row(const char* name, int edge) {
   return {.test_case = name,
           .voxels = static_cast<std::size_t>(edge) * static_cast<std::size_t>(edge) *
                     static_cast<std::size_t>(edge),
@@ -77,7 +78,7 @@ std::size_t soft_bytes(const WorldState& state) {
 }
 
 SoftRow session_row(int edge, const Scene& scene, BuiltScene& built, const SoftBenchOptions& options) {
-  SoftRow row = row_of("session", edge);
+  SoftRow row = empty_row("session", edge);
   row.depth_spacings = depth_for(edge);
   const SessionResult result = run_session(scene, built,
                                            {.seconds = options.session_s,
@@ -109,7 +110,7 @@ void bench_sessions(const SoftBenchOptions& options, bool sessions, bool loads, 
   for (const int edge : sizes) {
     if (options.progress) options.progress(fmt::format("a session with {} voxels an edge", edge));
     const Scene scene = cube_scene(edge, options.session_s);
-    SoftRow load = row_of("load", edge);
+    SoftRow load = empty_row("load", edge);
     BuiltScene built;
     try {
       built = build_scene(scene);

@@ -24,7 +24,6 @@ struct Engine {
   std::vector<double> us;
 };
 
-constexpr double kSpacing = 1e-3;  // (unit: meter), LabelVolume's own
 constexpr std::size_t kLeastTurns = 1, kMostTurns = 20, kRunsInTurn = 5;
 
 std::vector<Engine> engines_of(const std::vector<SoftEngine>& names) {
@@ -41,7 +40,7 @@ std::array<int, 3> dims_for(const Wave& wave) {
 }
 
 Push push_of(const Wave& wave, const std::array<int, 3>& dims) {
-  const auto by = static_cast<float>(wave.depth * kSpacing);
+  const auto by = static_cast<float>(wave.depth * kSoftSpacing_m);
   return {.sources = {{dims[0] / 2, dims[1] / 2, dims[2] - 1}},
           .moves = {wave.axes == 3 ? glm::vec3(by, by, -by) : glm::vec3(0.0F, 0.0F, -by)}};
 }
@@ -58,7 +57,7 @@ SoftRow row_of(const Wave& wave, Engine& engine, const voxel::LabelVolume& volum
   const WaveState state =
       look_at(*engine.does, volume, options, push_of(wave, volume.dims), wave.depth / wave.slack);
   row.exact = state.exact();
-  row.source_off_spacings = state.source_off_m / kSpacing;
+  row.source_off_spacings = state.source_off_m / kSoftSpacing_m;
   row.moved = state.moved;
   row.violated = state.violated;
   row.repeats = engine.us.size();

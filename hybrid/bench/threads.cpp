@@ -38,9 +38,9 @@ void hog_memory(const std::atomic<bool>& stop, const Meanwhile& meanwhile) {
   }
 }
 
-// Runs `load` beside `work`, and stops it.
+// Runs `load` run_beside `work`, and stops it.
 template <class Load, class Work>
-void beside(const Load& load, const Work& work) {
+void run_beside(const Load& load, const Work& work) {
   std::atomic<bool> stop{false};
   std::thread thread([&] { load(stop); });
   try {
@@ -74,9 +74,9 @@ void relax_and_snap(const Scene& scene, BuiltScene& built, const std::atomic<boo
 }
 
 // Of one scene.
-class Bench {
+class ThreadBench {
  public:
-  Bench(const Scene& scene, const std::string& name) : scene_(scene) {
+  ThreadBench(const Scene& scene, const std::string& name) : scene_(scene) {
     const std::array loads{"relaxation", "memory", "nothing relaxed"};
     for (std::size_t n = 0; n < rows_.size(); ++n) {
       rows_[n].scene = name;
@@ -131,8 +131,8 @@ class Bench {
   SessionResult run_relaxing() {
     BuiltScene built = build_scene(scene_), other = build_scene(scene_);
     SessionResult result;
-    beside([&](const std::atomic<bool>& stop) { relax_and_snap(scene_, other, stop); },
-           [&] { result = run(built, true); });
+    run_beside([&](const std::atomic<bool>& stop) { relax_and_snap(scene_, other, stop); },
+               [&] { result = run(built, true); });
     add(0, result);
     relaxation_s_ += result.relaxation_s;
     return result;
@@ -140,8 +140,8 @@ class Bench {
 
   void run_without_relaxation() {
     BuiltScene built = build_scene(scene_);
-    beside([](const std::atomic<bool>& stop) { hog_memory(stop, [] {}); },
-           [&] { add(2, run(built, false)); });
+    run_beside([](const std::atomic<bool>& stop) { hog_memory(stop, [] {}); },
+               [&] { add(2, run(built, false)); });
   }
 
   // The session again, as fast as it goes, its results found in the tick and kept.
@@ -165,27 +165,27 @@ class Bench {
     begin_session(scene_, *built.world, *built.state, felt.start_m);
     start_async_relaxation(*built.state, Arrival::played);
     AsyncRelaxation& apart = built.state->async;
-    beside([&](const std::atomic<bool>& stop) { hog_memory(stop, [&] { tape.hand_out(apart); }); },
-           [&] {
-             SessionResult played;
-             played.dt_s = felt.dt_s;
-             device::ServoTimer timer(felt.dt_s);
-             timer.raise_priority();
-             std::uint64_t hash = kHashBegin;
-             for (const RecordedTick& tick : felt.recording) {
-               timer.wait();
-               restore_tick_timing(tick, *built.state);
-               while (!ResultTape::ready(apart)) std::this_thread::yield();
-               const TickResult again = tick_again(built, tick);
-               hash = hash_tick(hash, again);
-               played.tick_us.add(again.tick_us);
-               ++played.ticks;
-             }
-             played.deadline_misses = timer.missed();
-             played.async_results = apart.results;
-             rows_[1].same_ticks = rows_[1].same_ticks && hash == felt.recording.back().hash;
-             add(1, played);
-           });
+    run_beside([&](const std::atomic<bool>& stop) { hog_memory(stop, [&] { tape.hand_out(apart); }); },
+               [&] {
+                 SessionResult played;
+                 played.dt_s = felt.dt_s;
+                 device::ServoTimer timer(felt.dt_s);
+                 timer.raise_priority();
+                 std::uint64_t hash = kHashBegin;
+                 for (const RecordedTick& tick : felt.recording) {
+                   timer.wait();
+                   restore_tick_timing(tick, *built.state);
+                   while (!ResultTape::ready(apart)) std::this_thread::yield();
+                   const TickResult again = tick_again(built, tick);
+                   hash = hash_tick(hash, again);
+                   played.tick_us.add(again.tick_us);
+                   ++played.ticks;
+                 }
+                 played.deadline_misses = timer.missed();
+                 played.async_results = apart.results;
+                 rows_[1].same_ticks = rows_[1].same_ticks && hash == felt.recording.back().hash;
+                 add(1, played);
+               });
   }
 
   TickResult tick_again(BuiltScene& built, const RecordedTick& tick) const {
@@ -209,7 +209,7 @@ std::vector<ThreadsRow> bench_threads(const ThreadsBenchOptions& options) {
     const Scene scene = load_scene(file);
     const std::string name =
         file.filename() == "scene.toml" ? file.parent_path().filename().string() : file.stem().string();
-    Bench bench(scene, name);
+    ThreadBench bench(scene, name);
     while (bench.seconds() < options.seconds) {
       bench.turn([&](const std::string& load, double seconds) {
         if (options.progress)

@@ -204,9 +204,9 @@ std::uint64_t soft_touched_bytes(const voxel::Lattice& lattice) {
   double bytes = 0.0;
   for (voxel::RowId row = 0; row < lattice.grid().rows(); ++row) {
     if (lattice.filled_in(row) == 0) continue;
-    bytes +=
-        voxel::kRow * ((lattice.inside(row) != 0 ? kTouchedBytes : kTouchedMixedBytes) +
-                       (lattice.yields() ? kYieldBytes : 0.0) + (lattice.has_bricks() ? kBrickBytes : 0.0));
+    bytes += voxel::kRow *
+             ((lattice.inside(row) != 0 ? kTouchedBytes : kTouchedMixedBytes) +
+              (lattice.has_plasticity() ? kYieldBytes : 0.0) + (lattice.has_bricks() ? kBrickBytes : 0.0));
   }
   return static_cast<std::uint64_t>(bytes);
 }

@@ -161,10 +161,9 @@ class Builder {
       built_.notes.push_back(
           {world_->soft[o].name, polygon::Severity::info,
            obstacle.empty()
-               ? std::string(
-                     "contacts are kept on a composite grid: a tick takes the same time for any depth "
-                     "and size")
-               : fmt::format("contacts are kept voxel by voxel, not on a composite grid: {}", obstacle)});
+               ? std::string("contacts are kept on nested patches: a tick takes the same time for any depth "
+                             "and size")
+               : fmt::format("contacts are kept voxel by voxel, not on nested patches: {}", obstacle)});
     }
   }
 

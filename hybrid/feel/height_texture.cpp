@@ -9,15 +9,13 @@
 #include <stdexcept>
 #include <utility>
 
+#include "polygon/mesh/is_finite.h"
+
 namespace hybrid {
 namespace {
 
 constexpr double kTau = 2.0 * std::numbers::pi;
 constexpr int kLinePower = 8;  // of the grid's lines: about a sixth of the period wide
-
-bool finite(const glm::dvec3& v) noexcept {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
 
 void check(const TextureMapping& mapping) {
   if (!(mapping.size_m > 0.0) || !(mapping.height_m > 0.0) || !std::isfinite(mapping.size_m) ||
@@ -172,8 +170,8 @@ Relief relief_at(const HeightTexture& texture, const glm::dvec3& point, const gl
 glm::dvec3 texture_force(const HeightTexture& texture, const TexturedContact& contact) noexcept {
   const glm::dvec3 zero(0.0), &n = contact.normal;
   const double d = contact.depth_m, k = contact.stiffness_N_per_m;
-  if (!(d > 0.0) || !(k > 0.0) || !std::isfinite(d) || !std::isfinite(k) || !finite(contact.point) ||
-      !finite(n)) {
+  if (!(d > 0.0) || !(k > 0.0) || !std::isfinite(d) || !std::isfinite(k) ||
+      !polygon::is_finite(contact.point) || !polygon::is_finite(n)) {
     return zero;
   }
   const Relief relief = relief_at(texture, contact.point, n);
@@ -183,7 +181,7 @@ glm::dvec3 texture_force(const HeightTexture& texture, const TexturedContact& co
                               ? (k * std::max(0.0, d + relief.height_m)) * turned
                               : (k * d / glm::length(turned)) * turned;
   const glm::dvec3 extra = felt - (k * d) * n;
-  return finite(extra) ? extra : zero;
+  return polygon::is_finite(extra) ? extra : zero;
 }
 
 }  // namespace hybrid

@@ -8,14 +8,12 @@
 #include <glm/matrix.hpp>
 #include <utility>
 
+#include "polygon/mesh/is_finite.h"
+
 namespace hybrid {
 namespace {
 
 constexpr double kFarthestDistrict = 1e9;
-
-bool finite(const glm::dvec3& v) noexcept {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
 
 double largest(const glm::dvec3& v) noexcept {
   return std::max({std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)});
@@ -134,8 +132,8 @@ void MovingSurfaceLayer::relist(std::uint32_t body) noexcept {
 void MovingSurfaceLayer::move(std::uint32_t object, const glm::dvec3& position,
                               const glm::dquat& rotation) noexcept {
   if (object >= body_of_object_.size() || body_of_object_[object] == kNone) return;
-  const bool usable = finite(position) && std::isfinite(rotation.w) && std::isfinite(rotation.x) &&
-                      std::isfinite(rotation.y) && std::isfinite(rotation.z);
+  const bool usable = polygon::is_finite(position) && std::isfinite(rotation.w) &&
+                      std::isfinite(rotation.x) && std::isfinite(rotation.y) && std::isfinite(rotation.z);
   if (!usable) return;
   Body& body = bodies_[body_of_object_[object]];
   set_pose(body, position, rotation);

@@ -12,8 +12,8 @@ namespace {
 constexpr std::size_t kBatch = 16;                    // blocks of a box that are fetched together
 constexpr std::size_t kLarge = std::size_t{1} << 19;  // bytes: more than the cache of one core
 
-// Compared as integers, which takes one branch. A difference in the sign of zero alone gives the same result
-// through the box path.
+// Compares bits as integers, which takes one branch. If only the sign of a zero differs, in() calls in_box(),
+// which gives the same result.
 bool same_bits(const glm::dvec3& a, const glm::dvec3& b) noexcept {
   const auto differ = [](double x, double y) {
     return std::bit_cast<std::uint64_t>(x) ^ std::bit_cast<std::uint64_t>(y);

@@ -9,14 +9,14 @@
 namespace hybrid {
 namespace {
 
-constexpr double gap = std::numeric_limits<double>::quiet_NaN();
+constexpr double kGap = std::numeric_limits<double>::quiet_NaN();
 
 bool is_gap(const PlotPoint& p) {
   return !std::isfinite(p.x) || !std::isfinite(p.y);
 }
 
 void add_gap(std::vector<PlotPoint>& out, double x) {
-  if (!out.empty() && !is_gap(out.back())) out.push_back({x, gap});
+  if (!out.empty() && !is_gap(out.back())) out.push_back({x, kGap});
 }
 
 }  // namespace
@@ -67,11 +67,11 @@ std::vector<PlotPoint> downsample_path(std::span<const PlotPoint> path, double t
   // loop ends.
   for (int round = 0; round < 40; ++round, tolerance *= 2.0) {
     out.clear();
-    PlotPoint skipped{gap, gap};  // last point left out, so that the ends of lines keep their place
+    PlotPoint skipped{kGap, kGap};  // last point left out, so that the ends of lines keep their place
     for (const PlotPoint& point : path) {
       if (is_gap(point)) {
         if (!is_gap(skipped)) out.push_back(skipped);
-        skipped = {gap, gap};
+        skipped = {kGap, kGap};
         add_gap(out, 0.0);
         continue;
       }
@@ -81,7 +81,7 @@ std::vector<PlotPoint> downsample_path(std::span<const PlotPoint> path, double t
         continue;
       }
       out.push_back(point);
-      skipped = {gap, gap};
+      skipped = {kGap, kGap};
     }
     if (!is_gap(skipped)) out.push_back(skipped);
     if (out.size() <= most) return out;

@@ -12,7 +12,7 @@
 namespace hybrid {
 namespace {
 
-nlohmann::ordered_json report(const Scene& scene, const Comparison& comparison) {
+nlohmann::ordered_json comparison_report(const Scene& scene, const Comparison& comparison) {
   nlohmann::ordered_json j = report_head("compare");
   j["scene"] = scene.file.string();
   j["object"] = comparison.object;
@@ -52,8 +52,8 @@ void print_models(std::FILE* words, const Comparison& comparison) {
   }
 }
 
-void save_plot(const CompareCommand& command, const Scene& scene, const Comparison& comparison,
-               std::FILE* words) {
+void save_comparison_plot(const CompareCommand& command, const Scene& scene, const Comparison& comparison,
+                          std::FILE* words) {
   if (command.plot.empty()) return;
   std::vector<ComparedModel> models;
   for (const ModelResult& m : comparison.models) models.push_back({m.name, m.rows, m.depth_m});
@@ -80,9 +80,9 @@ int compare_with_measured(const CompareCommand& command, const Scene& scene) {
   fmt::print(words, "\nRMS force error over all ticks, in contact or not: {:.4f} N\n", result.rms_N);
   if (result.in_gaps > 0)
     fmt::print(words, "{} ticks lie in gaps of the measurement, and are left out\n", result.in_gaps);
-  save_plot(command, scene, result.comparison, words);
+  save_comparison_plot(command, scene, result.comparison, words);
   if (command.json.empty()) return 0;
-  nlohmann::ordered_json j = report(scene, result.comparison);
+  nlohmann::ordered_json j = comparison_report(scene, result.comparison);
   j["measured"] = {{"file", options.measured.file.string()},
                    {"along", options.along.empty() ? nlohmann::ordered_json(nullptr)
                                                    : nlohmann::ordered_json(options.along.string())},
@@ -104,8 +104,8 @@ int compare(const CompareCommand& command) {
   std::FILE* words = command.json == "-" ? stderr : stdout;
   fmt::print(words, "\"{}\" along the path of {}\n", comparison.object, scene.file.filename().string());
   print_models(words, comparison);
-  save_plot(command, scene, comparison, words);
-  if (!command.json.empty()) save_json(command.json, report(scene, comparison));
+  save_comparison_plot(command, scene, comparison, words);
+  if (!command.json.empty()) save_json(command.json, comparison_report(scene, comparison));
   return 0;
 }
 

@@ -43,7 +43,7 @@ void print_table(std::FILE* out, const std::vector<ComposedPart>& rows) {
   }
 }
 
-Json report(const Composed& composed) {
+Json composition_report(const Composed& composed) {
   Json json = report_head("compose");
   json["scene"] = composed.scene.string();
   json["objects"] = Json::array();
@@ -93,7 +93,7 @@ int compose(const ComposeCommand& command) {
   fmt::print(words, "\n{}: written; its path takes {:.0f} s\nnext: hybrid run {} --picture {}\n", scene,
              composed.path_s, in_shell(scene),
              in_shell((composed.scene.parent_path() / "scene.png").string()));
-  if (!command.json.empty()) save_json(command.json, report(composed));
+  if (!command.json.empty()) save_json(command.json, composition_report(composed));
   return 0;
 }
 

@@ -24,7 +24,7 @@ bool RelaxationThread::relax_submitted() noexcept {
   for (const auto& object : async_.objects) {
     if (object == nullptr || object->phase.load(std::memory_order_acquire) != AsyncObject::Phase::thread)
       continue;
-    object->replica.relax();
+    object->shadow.relax();
     object->phase.store(AsyncObject::Phase::tick, std::memory_order_release);
     any = true;
   }
@@ -42,7 +42,7 @@ void RelaxationThread::publish_surfaces() {
     of_object.resize(body.drawn.vertices.size());
     for (std::size_t v = 0; v < of_object.size(); ++v)
       of_object[v] =
-          glm::vec3(body.pose.rotation * async_.objects[o]->replica.displacement_at(body.drawn.vertices[v]));
+          glm::vec3(body.pose.rotation * async_.objects[o]->shadow.displacement_at(body.drawn.vertices[v]));
   }
   surfaces_.publish();
 }

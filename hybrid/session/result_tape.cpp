@@ -5,8 +5,8 @@ namespace hybrid {
 
 void ResultTape::keep(const AsyncRelaxation& async) {
   for (std::size_t o = 0; o < async.objects.size(); ++o) {
-    if (async.has(o) && async.objects[o]->replica.times_relaxed() > found_[o].size())
-      found_[o].push_back(async.objects[o]->replica.found());
+    if (async.has(o) && async.objects[o]->shadow.times_relaxed() > found_[o].size())
+      found_[o].push_back(async.objects[o]->shadow.result());
   }
 }
 
@@ -17,7 +17,7 @@ void ResultTape::hand_out(AsyncRelaxation& async) noexcept {
     if (object.phase.load(std::memory_order_acquire) != AsyncObject::Phase::thread ||
         next_[o] == found_[o].size())
       continue;
-    object.replica.replay_result(found_[o][next_[o]++]);
+    object.shadow.replay_result(found_[o][next_[o]++]);
     object.phase.store(AsyncObject::Phase::tick, std::memory_order_release);
   }
 }

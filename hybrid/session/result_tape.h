@@ -23,8 +23,8 @@ class ResultTape {
   [[nodiscard]] static bool ready(const AsyncRelaxation& async) noexcept;
 
  private:
-  std::vector<std::vector<voxel::ShadowObject::Found>> found_;  // [soft]
-  std::vector<std::size_t> next_;                               // [soft] to be handed out
+  std::vector<std::vector<voxel::ShadowObject::Result>> found_;  // [soft]
+  std::vector<std::size_t> next_;                                // [soft] to be handed out
 };
 
 }  // namespace hybrid

@@ -406,7 +406,7 @@ bool carried_by_anchors(const World& world, const WorldState& state) noexcept {
   if (!world.soft_pairs.empty()) return true;
   for (std::size_t o = 0; o < state.soft.size(); ++o) {
     const voxel::SoftObject& object = *state.soft[o];
-    if (state.reactions[o].pressed == 0 || !object.obstacles().empty() || object.lattice().yields() ||
+    if (state.reactions[o].pressed == 0 || !object.obstacles().empty() || object.lattice().has_plasticity() ||
         object.lattice().has_bricks())
       continue;
     const auto carried = object.carried_by_anchors_N();

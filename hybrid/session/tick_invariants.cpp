@@ -8,16 +8,13 @@
 #include <limits>
 
 #include "hybrid/session/session.h"
+#include "polygon/mesh/is_finite.h"
 
 namespace hybrid {
 namespace {
 
 constexpr std::uint64_t kStateCheckEvery = 64;  // ticks between two checks of every displacement
 constexpr double kRounding = 1e-12;             // share of the sum of absolute work
-
-bool finite(const glm::dvec3& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
 
 // Safe for vectors too long to be squared.
 double length(const glm::dvec3& v) {
@@ -40,9 +37,10 @@ Spring spring_of(const World& world, const glm::dvec3& proxy_m, const glm::dvec3
 bool finite(const WorldState& state) {
   for (const RigidState& body : state.rigid) {
     const glm::dquat& q = body.pose.rotation;
-    const bool good = finite(body.pose.position_m) && std::isfinite(q.w + q.x + q.y + q.z) &&
-                      finite(body.free.centre_m) && finite(body.free.velocity_m_per_s) &&
-                      finite(body.free.spin_rad_per_s);
+    const bool good = polygon::is_finite(body.pose.position_m) && std::isfinite(q.w + q.x + q.y + q.z) &&
+                      polygon::is_finite(body.free.centre_m) &&
+                      polygon::is_finite(body.free.velocity_m_per_s) &&
+                      polygon::is_finite(body.free.spin_rad_per_s);
     if (!good) return false;
   }
   for (const auto& object : state.soft) {
@@ -51,7 +49,7 @@ bool finite(const WorldState& state) {
     }
   }
   return std::isfinite(state.clock.now_s()) && std::isfinite(state.limit.elapsed_s) &&
-         finite(state.limit.last_N) && std::isfinite(state.learnt_stiffness_N_per_m) &&
+         polygon::is_finite(state.limit.last_N) && std::isfinite(state.learnt_stiffness_N_per_m) &&
          std::isfinite(state.damping.balance_J);
 }
 
@@ -110,8 +108,9 @@ void TickInvariants::check_outside(const WorldState& state, const glm::dvec3& pr
 }
 
 void TickInvariants::check_tick(const WorldState& state, const TickResult& felt, double dt_s) {
-  const bool good = finite(felt.device_m) && finite(felt.proxy_m) && finite(felt.force_N) &&
-                    finite(felt.rigid_N) && finite(felt.soft_N);
+  const bool good = polygon::is_finite(felt.device_m) && polygon::is_finite(felt.proxy_m) &&
+                    polygon::is_finite(felt.force_N) && polygon::is_finite(felt.rigid_N) &&
+                    polygon::is_finite(felt.soft_N);
   if (!good) {
     ++not_finite_;
     ++ticks_;

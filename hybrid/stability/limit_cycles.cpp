@@ -17,7 +17,7 @@
 namespace hybrid {
 namespace {
 
-constexpr double kSoftest_N_per_m = 20.0, kStiffest_N_per_m = 1e7;
+constexpr double kSoftestWall_N_per_m = 20.0, kStiffestWall_N_per_m = 1e7;
 constexpr double kSoftestBuzz_N_per_m = 100.0;
 constexpr double kDeepest_m = 2e-3;     // a soft wall is pressed less hard
 constexpr double kPressing_s = 0.3;     // that the hand takes to press
@@ -179,12 +179,12 @@ bool comes_to_rest(PressedScene& scene, const LoopSetting& setting, double stiff
 
 std::optional<double> measured_stable_stiffness(PressedScene& scene, const LoopSetting& setting) {
   if (setting.linear()) {
-    return find_threshold(kSoftest_N_per_m, kStiffest_N_per_m, 2.0, 1e-3,
+    return find_threshold(kSoftestWall_N_per_m, kStiffestWall_N_per_m, 2.0, 1e-3,
                           [&](double stiffness) { return envelope_growth(scene, setting, stiffness) < 0.0; });
   }
   // A press that is hardly more than friction does not say where the tool rests.
-  const double softest = std::max(kSoftest_N_per_m, 10.0 * setting.friction_N() / kDeepest_m);
-  return find_threshold(softest, kStiffest_N_per_m, 1.3, 5e-3,
+  const double softest = std::max(kSoftestWall_N_per_m, 10.0 * setting.friction_N() / kDeepest_m);
+  return find_threshold(softest, kStiffestWall_N_per_m, 1.3, 5e-3,
                         [&](double stiffness) { return comes_to_rest(scene, setting, stiffness); });
 }
 

@@ -54,9 +54,9 @@ namespace {
 
 // A grid of everything that could draw energy out.
 std::vector<DrivenMotion> motions(const PressedScene& scene, const LoopSetting& setting, double stiffness) {
-  constexpr double kDeepest_m = 1e-3;
+  constexpr double kDeepestPress_m = 1e-3;
   const double step = setting.encoder_m();
-  const double deep = std::min(kDeepest_m, scene.press_N() / stiffness);
+  const double deep = std::min(kDeepestPress_m, scene.press_N() / stiffness);
   std::vector<DrivenMotion> all;
   if (!(step > 0.0)) {
     // Small beside the depth, so that damping is not cut where it would pull. In a linear loop the phase

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The program's own haptic loop, pressed on one place of a scene: what the measurements of stability and
-// passivity drive. The place is where the scene's path is first felt, the direction that of the force there.
+// The program's own haptic loop, pressed on one place of a scene. The measurements of stability and passivity
+// drive it. The place is where the scene's path first feels a contact. The tool presses along the line of the
+// force there.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -10,8 +11,8 @@
 #include "device/loop/loop_theory.h"
 #include "device/simulated/simulated.h"
 #include "hybrid/build/build_world.h"
-#include "hybrid/tick/tick.h"
 #include "hybrid/stability/vibration_threshold.h"
+#include "hybrid/tick/tick.h"
 
 namespace hybrid {
 

@@ -25,10 +25,10 @@ namespace hybrid {
 namespace {
 
 constexpr std::uint64_t kEpisode = 1000;
-constexpr int kMostRest = 4000;
+constexpr int kMostTicksToRest = 4000;
 constexpr std::size_t kMostFailures = 20;
 constexpr double kUnit_m = 1e-3, kJump_m = 1.0;
-constexpr double kMostInside_m = 1e-9, kLongTick_us = 1e6;
+constexpr double kMostInside_m = 1e-9, kLongFuzzTick_us = 1e6;
 
 constexpr const char* kMoving =
     R"(# Rigid objects that move, turn, fall on one another, are pushed, rub and are textured.
@@ -187,7 +187,7 @@ class Input {
 
  private:
   double uniform(double low, double high) {
-    // Written out: what the library's distribution makes of the same bits is not the same everywhere.
+    // std::uniform_real_distribution may give other numbers for the same bits on other standard libraries.
     return low + (high - low) * (static_cast<double>(random_() >> 11) * 0x1.0p-53);
   }
   bool chance(double p) { return uniform(0.0, 1.0) < p; }
@@ -260,7 +260,7 @@ class Fuzz {
     if (watch_->not_finite() > 0) fail(fmt::format("{} ticks not finite", watch_->not_finite()));
     if (watch_->over_force_N() > 0.0) fail(fmt::format("{:.3g} N over the limit", watch_->over_force_N()));
     if (watch_->over_slew_N() > 0.0) fail(fmt::format("{:.3g} N over the slew", watch_->over_slew_N()));
-    if (watch_->slowest_us() > kLongTick_us)
+    if (watch_->slowest_us() > kLongFuzzTick_us)
       fail(fmt::format("a tick of {:.3g} ms", 1e-3 * watch_->slowest_us()));
     const bool infeasible = (state_.faults & fault_infeasible) != 0;  // between bodies that close on it
     if (watch_->inside_m() > kMostInside_m && !infeasible)
@@ -291,7 +291,7 @@ class Fuzz {
     const auto calm = [this](const glm::dvec3& device_m) { return tick({.position_m = device_m}, 1e-3); };
     const glm::dvec3 away = lead_out(world_, state_, glm::dvec3(0.0), 2.0 * kReach * kUnit_m, calm);
     TickResult felt = calm(away);
-    for (int n = 0; n < kMostRest && !all_asleep(state_); ++n) felt = calm(away);
+    for (int n = 0; n < kMostTicksToRest && !all_asleep(state_); ++n) felt = calm(away);
     felt = calm(away);
     judge();
     const double moved = largest_displacement_m(state_);

@@ -17,6 +17,7 @@
 #include "hybrid/tick/tissue/obstacles.h"
 #include "hybrid/tick/tissue/press_tissue.h"
 #include "hybrid/tick/tissue/soft_contacts.h"
+#include "polygon/mesh/is_finite.h"
 
 namespace hybrid {
 namespace {
@@ -51,13 +52,10 @@ class StageClock {
   Clock::time_point last_;
 };
 
-bool finite(const glm::dvec3& v) noexcept {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
-
 // A position that is further away than the bound is as invalid as NaN.
 bool is_place(const glm::dvec3& v) noexcept {
-  return finite(v) && std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}) <= kFarthestDevice_m;
+  return polygon::is_finite(v) &&
+         std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}) <= kFarthestDevice_m;
 }
 
 glm::dvec3 check_input(WorldState& state, const device::DeviceState& input) noexcept {

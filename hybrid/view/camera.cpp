@@ -9,15 +9,12 @@
 #include <limits>
 #include <numbers>
 
+#include "polygon/mesh/is_finite.h"
+
 namespace hybrid {
 namespace {
 
 constexpr double degree = std::numbers::pi / 180.0;
-
-template <class Vector>
-bool finite(const Vector& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
 
 // Visits every `stride`-th finite vertex of the scene in its present state. The stride bounds the cost: a
 // large mesh costs no more than a small one.
@@ -31,7 +28,7 @@ void for_some_vertices(const DrawnScene& scene, const Snapshot& snapshot, const 
     const std::size_t stride = rest.size() / at_most + 1;
     for (std::size_t v = 0; v < rest.size(); v += stride) {
       const glm::dvec3 at = moved ? rest[v] + glm::dvec3(snapshot.soft_moved_m[i][v]) : place(rest[v]);
-      if (finite(at)) visit(at);
+      if (polygon::is_finite(at)) visit(at);
     }
   }
 }
@@ -41,7 +38,7 @@ struct Bounds {
   glm::dvec3 lower{std::numeric_limits<double>::infinity()}, upper{-std::numeric_limits<double>::infinity()};
 
   void add(const glm::dvec3& at) {
-    if (!finite(at)) return;
+    if (!polygon::is_finite(at)) return;
     lower = glm::min(lower, at);
     upper = glm::max(upper, at);
   }
@@ -182,7 +179,7 @@ Camera frame_scene(const DrawnScene& scene, const Snapshot& snapshot, double asp
       candidates.push_back({at.azimuth_rad, at.elevation_rad, at.toward_eye()});
     }
   }
-  if (finite(snapshot.proxy_m)) add_hidden(scene, snapshot, candidates);
+  if (polygon::is_finite(snapshot.proxy_m)) add_hidden(scene, snapshot, candidates);
 
   // Preferred: the side that the force points to (the tool is there), but oblique, so that depth shows; a
   // little above the horizon; the front.
@@ -207,7 +204,7 @@ Camera frame_scene(const DrawnScene& scene, const Snapshot& snapshot, double asp
   };
   for_some_vertices(scene, snapshot, fit);
   for (const glm::dvec3& at : {snapshot.proxy_m, snapshot.device_m}) {
-    if (finite(at)) fit(at + camera.toward_eye() * scene.tool_radius_m);
+    if (polygon::is_finite(at)) fit(at + camera.toward_eye() * scene.tool_radius_m);
   }
   camera.distance_m = std::max(distance, 1.05 * bounds.radius_m);
   return camera;
@@ -215,7 +212,7 @@ Camera frame_scene(const DrawnScene& scene, const Snapshot& snapshot, double asp
 
 Camera frame_contact(const DrawnScene& scene, const Snapshot& snapshot, const Camera& overview) {
   Camera camera = overview;
-  if (!finite(snapshot.proxy_m)) return camera;
+  if (!polygon::is_finite(snapshot.proxy_m)) return camera;
   camera.target_m = snapshot.proxy_m;
   double offset_m = glm::length(snapshot.device_m - snapshot.proxy_m);
   if (!std::isfinite(offset_m)) offset_m = 0.0;

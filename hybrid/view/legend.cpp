@@ -11,6 +11,7 @@
 
 #include "hybrid/view/overlay.h"
 #include "hybrid/view/palette.h"
+#include "polygon/mesh/is_finite.h"
 
 namespace hybrid {
 namespace {
@@ -18,10 +19,6 @@ namespace {
 constexpr std::size_t kMostSingly = 6;  // untouched rigid objects that get a row each
 constexpr std::size_t kMostMaterials = palette::material.size() + 1;  // rows of one object's materials
 constexpr std::size_t kMostStripes = 4;                               // colours of one swatch
-
-bool finite(const glm::dvec3& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
 
 std::string and_more(std::size_t count) {
   return "and " + std::to_string(count) + " more";
@@ -122,7 +119,7 @@ void add_tool(std::vector<LegendRow>& rows, const DrawnScene& scene, const Snaps
                   .kind = scene.tool_is_punch ? "punch" : "ball"});
   rows.push_back({.swatch = {palette::device},
                   .name = "tool, where the device is",
-                  .force = finite(off) ? length_text(glm::length(off)) + " off" : "not finite",
+                  .force = polygon::is_finite(off) ? length_text(glm::length(off)) + " off" : "not finite",
                   .alpha = 0.45F});
   rows.push_back({.swatch = {palette::force},
                   .name = "force on the hand",

@@ -7,13 +7,10 @@
 
 #include "hybrid/view/palette.h"
 #include "hybrid/view/tool_and_arrow.h"
+#include "polygon/mesh/is_finite.h"
 
 namespace hybrid {
 namespace {
-
-bool finite(const glm::dvec3& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
 
 // Colours of the soft objects, at most six: the first of each object, then the materials with the most
 // surface.
@@ -113,7 +110,7 @@ std::optional<PixelBox> draw_scale_bar(const Pen& pen, const Camera& camera, con
 std::optional<ForceLabel> force_label(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
                                       const Camera& camera, const PixelRect& where) {
   const double force = glm::length(snapshot.force_N);
-  if (!(force > 1e-3) || !std::isfinite(force) || !finite(snapshot.proxy_m)) return {};
+  if (!(force > 1e-3) || !std::isfinite(force) || !polygon::is_finite(snapshot.proxy_m)) return {};
   const auto tip = camera.pixel(arrow_tip(scene, snapshot, camera), where.width, where.height);
   if (!tip) return {};
   const std::string words = force_text(force);

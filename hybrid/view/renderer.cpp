@@ -18,6 +18,7 @@
 #include "hybrid/view/renderer_shaders.h"
 #include "hybrid/view/tool_and_arrow.h"
 #include "hybrid/view/unit_shapes.h"
+#include "polygon/mesh/is_finite.h"
 
 namespace hybrid {
 namespace {
@@ -30,10 +31,6 @@ struct Object {
   SceneBounds bounds;      // at rest
   glm::mat4 placed{1.0F};  // from the uploaded pose to the present pose
 };
-
-bool finite(const glm::dvec3& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
 
 constexpr int most_pixels = 8192;
 
@@ -242,16 +239,16 @@ void Renderer::draw(const DrawnScene& scene, const Snapshot& snapshot, const Cam
                     const PixelRect& where) {
   State& s = *state_;
   if (where.width < 1 || where.height < 1) return;
-  const bool tool_known = finite(snapshot.proxy_m) && scene.tool_radius_m > 0.0;
+  const bool tool_known = polygon::is_finite(snapshot.proxy_m) && scene.tool_radius_m > 0.0;
   double radius = 1.1 * s.bounds.radius_m;
   for (const glm::dvec3& at : {snapshot.proxy_m, snapshot.device_m, arrow_tip(scene, snapshot, camera)}) {
-    if (finite(at))
+    if (polygon::is_finite(at))
       radius = std::max(radius, glm::length(at - s.bounds.centre_m) + 4.0 * scene.tool_radius_m);
   }
   for (std::size_t i = 0; i < s.objects.size(); ++i) {
     const RigidPlace place = snapshot.place_of(i);
     const glm::dvec3 at = place(s.objects[i].bounds.centre_m);
-    if (place.moved && finite(at))
+    if (place.moved && polygon::is_finite(at))
       radius = std::max(radius, glm::length(at - s.bounds.centre_m) + 1.1 * s.objects[i].bounds.radius_m);
   }
   const glm::mat4 clip(camera.clip_from_scene(static_cast<double>(where.width) / where.height, s.origin_m,
@@ -311,7 +308,7 @@ void Renderer::draw(const DrawnScene& scene, const Snapshot& snapshot, const Cam
     draw_felt(0.28F);
     glDepthFunc(GL_LEQUAL);
     const bool device_is_off = glm::length(snapshot.device_m - snapshot.proxy_m) > 0.03 * scene.tool_radius_m;
-    if (device_is_off && finite(snapshot.device_m)) {
+    if (device_is_off && polygon::is_finite(snapshot.device_m)) {
       glDepthFunc(GL_ALWAYS);  // the device point lies inside an object
       s.uniform("pass", 3);
       s.uniform("own_colour", palette::device);

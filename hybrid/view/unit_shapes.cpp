@@ -8,18 +8,16 @@
 #include <numbers>
 
 #include "hybrid/view/palette.h"
+#include "polygon/mesh/is_finite.h"
 #include "polygon/mesh/mesh.h"
 
 namespace hybrid {
 namespace {
 
-bool finite(const glm::dvec3& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
-
 bool usable(const polygon::TriangleMesh& mesh, const polygon::TriangleIndices& corner) {
-  return std::ranges::all_of(
-      corner, [&](std::uint32_t v) { return v < mesh.vertices.size() && finite(mesh.vertices[v]); });
+  return std::ranges::all_of(corner, [&](std::uint32_t v) {
+    return v < mesh.vertices.size() && polygon::is_finite(mesh.vertices[v]);
+  });
 }
 
 glm::vec3 unit_or_zero(const glm::vec3& v) {
@@ -52,7 +50,8 @@ DrawMesh shared_mesh(const polygon::TriangleMesh& mesh, const glm::dvec3& origin
   DrawMesh draw;
   draw.vertices.resize(mesh.vertices.size());
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
-    if (finite(mesh.vertices[v])) draw.vertices[v].position = glm::vec3(mesh.vertices[v] - origin_m);
+    if (polygon::is_finite(mesh.vertices[v]))
+      draw.vertices[v].position = glm::vec3(mesh.vertices[v] - origin_m);
   }
   draw.indices.reserve(3 * mesh.triangles.size());
   for (const polygon::TriangleIndices& corner : mesh.triangles) {
@@ -173,8 +172,8 @@ float move_vertices(DrawMesh& draw, std::span<const glm::dvec3> rest, std::span<
   for (std::size_t v = 0; v < draw.vertices.size(); ++v) {
     DrawVertex& vertex = draw.vertices[v];
     const glm::dvec3 moved(moved_m[v]);
-    if (!finite(rest[v])) continue;
-    const bool known = finite(moved);
+    if (!polygon::is_finite(rest[v])) continue;
+    const bool known = polygon::is_finite(moved);
     vertex.position = glm::vec3(rest[v] - origin_m + (known ? moved : glm::dvec3(0.0)));
     vertex.displacement_m = known ? static_cast<float>(glm::length(moved)) : 0.0F;
     most = std::max(most, vertex.displacement_m);

@@ -29,10 +29,10 @@ enum class Arrival : std::uint8_t {
 
 // One soft object's shadow copy, and which side has it now.
 struct AsyncObject {
-  explicit AsyncObject(voxel::SoftObject& object) : replica(object) {}
+  explicit AsyncObject(voxel::SoftObject& object) : shadow(object) {}
   enum class Phase : std::uint8_t { tick, thread };
 
-  voxel::ShadowObject replica;
+  voxel::ShadowObject shadow;
   std::atomic<Phase> phase{Phase::tick};
   // Fields below are the tick's.
   bool submitted = false;

@@ -34,7 +34,8 @@ inline constexpr std::size_t kMostSurfacePoints = 800;
 
 // Points of an object whose surface is `shape` (body frame): the centre of a ball, points on the axis of a
 // capsule, and otherwise the shape's vertices and points along its sharp edges. Beyond kMostSurfacePoints
-// they are thinned evenly, and the sharpest are kept. Deterministic.
+// only the sharpest point of each cell of a grid is kept; cells grow until few enough are left.
+// Deterministic.
 [[nodiscard]] std::vector<SurfacePoint> surface_points(const RigidSource& source,
                                                        const polygon::TriangleMesh& shape);
 

@@ -8,6 +8,7 @@
 #include <glm/matrix.hpp>
 
 #include "hybrid/world/rigid_contact_solver.h"
+#include "polygon/mesh/is_finite.h"
 
 namespace hybrid {
 namespace {
@@ -15,10 +16,6 @@ namespace {
 constexpr int kMaxNewton = 12;          // Newton steps of the midpoint rule
 constexpr double kLongestStep_s = 1.0;  // a longer pause is not made up for
 constexpr double kMostTurn = 1.0;       // rad a step: beyond it the midpoint rule has more than one solution
-
-bool finite(const glm::dvec3& v) noexcept {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
 
 glm::dmat3 cross_matrix(const glm::dvec3& v) noexcept {
   return {0.0, v.z, -v.y, -v.z, 0.0, v.x, v.y, -v.x, 0.0};  // columns
@@ -37,14 +34,14 @@ void turn(const FreeBody& body, glm::dquat& rotation, glm::dvec3& spin, double d
     const glm::dvec3 residual = now - momentum + 0.5 * dt * glm::cross(middle, now);
     const glm::dmat3 jacobian = inertia + 0.5 * dt * (cross_matrix(middle) * inertia - cross_matrix(now));
     const glm::dvec3 step = glm::inverse(jacobian) * residual;
-    if (!finite(step)) break;
+    if (!polygon::is_finite(step)) break;
     middle -= step;
     if (glm::length(step) <= 1e-15 * scale) break;
   }
   glm::dvec3 after = 2.0 * middle - before;
   // Energy and momentum are exact to rounding if Newton converged; otherwise energy must not grow.
   const double energy = glm::dot(before, momentum), gained = glm::dot(after, inertia * after);
-  if (!finite(after)) {
+  if (!polygon::is_finite(after)) {
     middle = after = before;
   } else if (gained > energy && gained > 0.0) {
     after *= std::sqrt(energy / gained);
@@ -68,14 +65,15 @@ bool advance(const FreeBody& body, FreeBodyState& state, const Twist& after, dou
   turn(body, next.rotation, next.spin_rad_per_s, dt);
   const glm::dquat& q = next.rotation;
   const double sum = q.w + q.x + q.y + q.z;
-  if (!finite(next.centre_m) || !finite(next.spin_rad_per_s) || !std::isfinite(sum)) return false;
+  if (!polygon::is_finite(next.centre_m) || !polygon::is_finite(next.spin_rad_per_s) || !std::isfinite(sum))
+    return false;
   state = next;
   return true;
 }
 
 bool is_finite(const BodyContact& c) noexcept {
-  return finite(c.point_m) && finite(c.normal) && finite(c.carried_m_per_s) &&
-         std::isfinite(c.force_N + c.stiffness_N_per_m + c.friction);
+  return polygon::is_finite(c.point_m) && polygon::is_finite(c.normal) &&
+         polygon::is_finite(c.carried_m_per_s) && std::isfinite(c.force_N + c.stiffness_N_per_m + c.friction);
 }
 
 void stop(SteppedBody& stepped) noexcept {

@@ -74,7 +74,7 @@ struct TickScratch {
   FreeBodyStep free_bodies;                         // the free bodies of these contacts
   std::vector<std::uint32_t> body_surface_numbers;  // surface voxels of one object that press on a free body
   std::vector<voxel::VoxelId> body_voxels;          // their voxels
-  std::vector<voxel::HeldLoad> body_loads;          // their loads
+  std::vector<voxel::ContactLoad> body_loads;       // their loads
 };
 
 }  // namespace hybrid

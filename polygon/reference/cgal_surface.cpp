@@ -239,7 +239,8 @@ GatherResult CgalSurface::gather(const glm::dvec3& point, double radius,
 bool CgalSurface::nearest(const glm::dvec3& point, double radius, NearPoint& out) const noexcept {
   if (!answerable(point, radius)) return false;
   const glm::dvec3 local = point - centre_;
-  // An element number above all others, so that an element at exactly `radius` counts.
+  // Of equal distances the lower element number wins. kNoElement is above every number, so an element at
+  // exactly `radius` counts.
   NearPoint best{{}, radius, kNoElement};
   auto leaf = [&](std::uint32_t element, double& squared_radius) {
     const NearPoint found = closest_local(element, local);

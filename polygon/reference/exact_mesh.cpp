@@ -23,13 +23,13 @@ namespace {
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Rational = CGAL::Exact_rational;
 using Exact = CGAL::Simple_cartesian<Rational>;
-using Triangles = std::vector<Kernel::Triangle_3>;
-using Primitive = CGAL::AABB_triangle_primitive<Kernel, Triangles::const_iterator>;
-using Traits = CGAL::AABB_traits<Kernel, Primitive>;
-using Tree = CGAL::AABB_tree<Traits>;
-using Node = CGAL::AABB_node<Traits>;
+using ExactTriangles = std::vector<Kernel::Triangle_3>;
+using Primitive = CGAL::AABB_triangle_primitive<Kernel, ExactTriangles::const_iterator>;
+using ExactTraits = CGAL::AABB_traits<Kernel, Primitive>;
+using ExactTree = CGAL::AABB_tree<ExactTraits>;
+using ExactNode = CGAL::AABB_node<ExactTraits>;
 
-constexpr double kRelativeSlack = 1e-12;  // for a few roundings in double
+constexpr double kRoundingSlack = 1e-12;  // for a few roundings in double
 constexpr std::size_t kMostEquallyNear = 64;
 constexpr int kMostRays = 32;
 
@@ -62,7 +62,7 @@ glm::dvec3 high_corner(const CGAL::Bbox_3& box) {
   return {box.xmax(), box.ymax(), box.zmax()};
 }
 
-double squared_distance(const glm::dvec3& p, const CGAL::Bbox_3& box) {
+double squared_box_distance(const glm::dvec3& p, const CGAL::Bbox_3& box) {
   const glm::dvec3 out = glm::max(glm::max(low_corner(box) - p, p - high_corner(box)), glm::dvec3(0.0));
   return glm::dot(out, out);
 }
@@ -80,21 +80,24 @@ bool enters(const glm::dvec3& from, const glm::dvec3& way, const CGAL::Bbox_3& b
     first = std::max(first, std::min(a, b));
     last = std::min(last, std::max(a, b));
   }
-  return first <= last + kRelativeSlack;
+  return first <= last + kRoundingSlack;
 }
 
 // Traversal traits for CGAL's tree: descends into a box if opens(box), and calls found(triangle) at each
 // leaf. The two may share state, so a bound that improves narrows the traversal.
 template <typename Opens, typename Found>
-class Visit {
+class ExactVisit {
  public:
   using Priority = double;
 
-  Visit(const Opens& opens, const Found& found) : opens_(opens), found_(found) {}
+  ExactVisit(const Opens& opens, const Found& found) : opens_(opens), found_(found) {}
   [[nodiscard]] bool go_further() const { return true; }
   void intersection(int /*query*/, const Primitive& primitive) const { found_(primitive.id()); }
-  [[nodiscard]] bool do_intersect(int /*query*/, const Node& node) const { return opens_(node.bbox()).first; }
-  [[nodiscard]] std::pair<bool, Priority> do_intersect_with_priority(int /*query*/, const Node& node) const {
+  [[nodiscard]] bool do_intersect(int /*query*/, const ExactNode& node) const {
+    return opens_(node.bbox()).first;
+  }
+  [[nodiscard]] std::pair<bool, Priority> do_intersect_with_priority(int /*query*/,
+                                                                     const ExactNode& node) const {
     return opens_(node.bbox());
   }
 
@@ -130,8 +133,8 @@ Crossing crossing(const Kernel::Point_3& start, const Kernel::Point_3& end, cons
 }  // namespace
 
 struct ExactMesh::Data {
-  Triangles triangles;
-  Tree tree;
+  ExactTriangles triangles;
+  ExactTree tree;
   CGAL::Bbox_3 box;
   double size = 0.0;
   double furthest = 0.0;
@@ -174,14 +177,14 @@ std::array<glm::dvec3, 3> ExactMesh::corners(std::uint32_t triangle) const {
 
 void ExactMesh::near_point(const glm::dvec3& point, double radius, std::vector<std::uint32_t>& out) const {
   out.clear();
-  const double reach = radius * radius * (1.0 + kRelativeSlack);
+  const double reach = radius * radius * (1.0 + kRoundingSlack);
   const auto opens = [&](const CGAL::Bbox_3& box) {
-    return std::pair(squared_distance(point, box) <= reach, 0.0);
+    return std::pair(squared_box_distance(point, box) <= reach, 0.0);
   };
   const auto found = [&](const Primitive::Id& id) {
     if (opens(id->bbox()).first) out.push_back(data_->index(id));
   };
-  Visit visit(opens, found);
+  ExactVisit visit(opens, found);
   data_->tree.traversal(0, visit);
 }
 
@@ -189,12 +192,12 @@ void ExactMesh::near_segment(const glm::dvec3& from, const glm::dvec3& to, doubl
                              std::vector<std::uint32_t>& out) const {
   out.clear();
   const glm::dvec3 way = to - from;
-  const double margin = radius + kRelativeSlack * (radius + glm::length(way) + data_->size);
+  const double margin = radius + kRoundingSlack * (radius + glm::length(way) + data_->size);
   const auto opens = [&](const CGAL::Bbox_3& box) { return std::pair(enters(from, way, box, margin), 0.0); };
   const auto found = [&](const Primitive::Id& id) {
     if (opens(id->bbox()).first) out.push_back(data_->index(id));
   };
-  Visit visit(opens, found);
+  ExactVisit visit(opens, found);
   data_->tree.traversal(0, visit);
 }
 
@@ -230,9 +233,9 @@ ExactMesh::Closest ExactMesh::closest(const glm::dvec3& point) const {
   double least = std::numeric_limits<double>::infinity();
   const double slack = 1e-15 * (data_->furthest + glm::length(point));
   std::vector<std::pair<double, std::uint32_t>> candidates;
-  const auto limit = [&] { return (least + slack) * (1.0 + kRelativeSlack) + slack; };
+  const auto limit = [&] { return (least + slack) * (1.0 + kRoundingSlack) + slack; };
   const auto opens = [&](const CGAL::Bbox_3& box) {
-    const double squared = squared_distance(point, box);
+    const double squared = squared_box_distance(point, box);
     return std::pair(std::sqrt(squared) <= limit(), -squared);  // the nearer box first
   };
   const auto found = [&](const Primitive::Id& id) {
@@ -245,7 +248,7 @@ ExactMesh::Closest ExactMesh::closest(const glm::dvec3& point) const {
     }
     candidates.emplace_back(distance, data_->index(id));
   };
-  Visit visit(opens, found);
+  ExactVisit visit(opens, found);
   data_->tree.traversal_with_priority(0, visit);
 
   std::sort(candidates.begin(), candidates.end());
@@ -259,7 +262,7 @@ ExactMesh::Closest ExactMesh::closest(const glm::dvec3& point) const {
 }
 
 bool ExactMesh::inside(const glm::dvec3& point) const {
-  if (squared_distance(point, data_->box) > 0.0) return false;
+  if (squared_box_distance(point, data_->box) > 0.0) return false;
   const Kernel::Point_3 start = to_cgal(point);
   // A segment that touches an edge or a corner decides nothing, so another direction is tried. The directions
   // form a spiral on the sphere, parallel to nothing that people model.
@@ -269,7 +272,7 @@ bool ExactMesh::inside(const glm::dvec3& point) const {
     const glm::dvec3 way =
         (2.0 * data_->size + 1e-300) * glm::dvec3(across * std::cos(turn), across * std::sin(turn), height);
     const Kernel::Point_3 end = to_cgal(point + way);
-    const double margin = kRelativeSlack * data_->size;
+    const double margin = kRoundingSlack * data_->size;
     int crossings = 0;
     bool on_surface = false, unclear = false;
     const auto opens = [&](const CGAL::Bbox_3& box) {
@@ -281,7 +284,7 @@ bool ExactMesh::inside(const glm::dvec3& point) const {
       unclear = unclear || how == Crossing::touches;
       on_surface = on_surface || how == Crossing::through_start;
     };
-    Visit visit(opens, found);
+    ExactVisit visit(opens, found);
     data_->tree.traversal(0, visit);
     if (on_surface) return false;
     if (!unclear) return crossings % 2 == 1;
@@ -291,7 +294,7 @@ bool ExactMesh::inside(const glm::dvec3& point) const {
 
 std::size_t ExactMesh::memory_bytes() const {
   return sizeof(*this) + sizeof(Data) + data_->triangles.capacity() * sizeof(Kernel::Triangle_3) +
-         data_->tree.size() * (sizeof(Primitive) + sizeof(Node));
+         data_->tree.size() * (sizeof(Primitive) + sizeof(ExactNode));
 }
 
 }  // namespace polygon

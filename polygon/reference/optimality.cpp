@@ -6,19 +6,14 @@
 #include <limits>
 #include <stdexcept>
 
+#include "polygon/mesh/is_finite.h"
 #include "polygon/reference/exact_mesh.h"
 #include "polygon/reference/near_triangle.h"
 #include "polygon/reference/optimality_search.h"
 #include "polygon/reference/stationary_point.h"
 
 namespace polygon {
-namespace {
-
-bool is_finite(const glm::dvec3& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
-
-}  // namespace
+namespace {}  // namespace
 
 struct OptimalityReference::Data {
   explicit Data(const TriangleMesh& soup) : mesh(soup) {}

@@ -46,7 +46,7 @@ Connected connect(const TriangleMesh& mesh) {
   return c;
 }
 
-glm::dvec3 middle(const Connected& c, std::uint32_t triangle) {
+glm::dvec3 centroid_of(const Connected& c, std::uint32_t triangle) {
   const TriangleIndices& t = c.triangles[triangle];
   return (c.points[t[0]] + c.points[t[1]] + c.points[t[2]]) / 3.0;
 }
@@ -56,14 +56,14 @@ void check_triangles(const Connected& c, MeshCheck& check) {
   for (std::uint32_t i = 0; i < c.triangles.size(); ++i) {
     const TriangleIndices& t = c.triangles[i];
     if (has_repeated_corner(t)) {
-      repeated.add(middle(c, i), i);
+      repeated.add(centroid_of(c, i), i);
     } else if (is_degenerate(c.points[t[0]], c.points[t[1]], c.points[t[2]])) {
-      flat.add(middle(c, i), i);
+      flat.add(centroid_of(c, i), i);
     }
   }
   const std::vector<std::uint32_t> first = first_duplicates(c.triangles, c.welded.points);
   for (std::uint32_t i = 0; i < first.size(); ++i) {
-    if (first[i] != i && !has_repeated_corner(c.triangles[i])) duplicates.add(middle(c, i), i);
+    if (first[i] != i && !has_repeated_corner(c.triangles[i])) duplicates.add(centroid_of(c, i), i);
   }
   add_finding(
       check.findings, "M01-repeated-corners", Severity::warning, repeated,
@@ -223,8 +223,8 @@ void check_pieces(const Connected& c, MeshCheck& check) {
     const std::uint32_t p = pieces.find(c.triangles[i][0]);
     if (!is_piece[p]) continue;
     is_piece[p] = false;  // counted
-    all.add(middle(c, i), i);
-    if (volume[p] < 0.0) negative.add(middle(c, i), i);
+    all.add(centroid_of(c, i), i);
+    if (volume[p] < 0.0) negative.add(centroid_of(c, i), i);
     check.volume_m3 += volume[p];
   }
   if (all.count > 1)
@@ -259,7 +259,7 @@ void check_intersections(const Connected& c, MeshCheck& check) {
   const SelfIntersections found = find_self_intersections(c.points, proper);
   if (found.pairs == 0) return;
   const std::uint32_t at = number[found.first];
-  const FindingTally pairs{found.pairs, {middle(c, at), found.lower, found.upper, at}};
+  const FindingTally pairs{found.pairs, {centroid_of(c, at), found.lower, found.upper, at}};
   add_finding(check.findings, "M12-self-intersections", Severity::warning, pairs,
               std::string("pairs of triangles cut one another") +
                   (found.complete ? "" : " at least (the search was ended there)") +

@@ -25,7 +25,7 @@ namespace {
 // Triangulating n edges takes n³ steps. This bounds the sum over all loops (about a minute).
 constexpr double kMostSteps = 3e8;
 
-struct Box {
+struct LoopBox {
   glm::dvec3 low{std::numeric_limits<double>::infinity()}, high{-std::numeric_limits<double>::infinity()};
   void add(const glm::dvec3& p) {
     low = glm::min(low, p);
@@ -40,7 +40,7 @@ struct Loop {
   std::vector<std::uint32_t> points;
   std::vector<std::uint32_t> triangles;  // [i] at the edge from points[i] to points[i + 1]
   bool branching = false;                // more than two border edges meet at one of its points
-  Box box;
+  LoopBox box;
 };
 
 std::uint64_t edge_key(std::uint32_t a, std::uint32_t b) {
@@ -145,7 +145,7 @@ class Pieces {
 
  private:
   DisjointSets sets_;
-  std::vector<Box> boxes_;
+  std::vector<LoopBox> boxes_;
 };
 
 // Three points on one line: a vertex on another triangle's edge, and a gap without width. A degenerate

@@ -75,7 +75,7 @@ TriangleMesh to_mesh(const Surface& surface) {
   return to_mesh(soup);
 }
 
-glm::dvec3 middle(const std::vector<glm::dvec3>& points, const TriangleIndices& t) {
+glm::dvec3 centroid(const std::vector<glm::dvec3>& points, const TriangleIndices& t) {
   return (points[t[0]] + points[t[1]] + points[t[2]]) / 3.0;
 }
 
@@ -109,7 +109,7 @@ RepairSoup merge_equal(const TriangleMesh& mesh, Changes& changes) {
   const std::vector<TriangleIndices> triangles = welded_triangles(mesh, welded);
   const std::vector<std::uint32_t> first = first_duplicates(triangles, welded.points);
   for (std::uint32_t i = 0; i < triangles.size(); ++i) {
-    const glm::dvec3 where = middle(soup.mesh.vertices, triangles[i]);
+    const glm::dvec3 where = centroid(soup.mesh.vertices, triangles[i]);
     if (has_repeated_corner(triangles[i])) {
       repeated.add(where, i);
     } else if (first[i] != i) {
@@ -178,7 +178,7 @@ void orient(CgalSoup& soup, const RepairSoup& origin, Changes& changes) {
   FindingTally turned, split;
   for (std::size_t i = 0; i < soup.polygons.size(); ++i) {
     if (origin.number[i] == RepairSoup::kFilled || same_sense(before, soup, i)) continue;
-    turned.add(middle(origin.mesh.vertices, origin.mesh.triangles[i]), origin.number[i]);
+    turned.add(centroid(origin.mesh.vertices, origin.mesh.triangles[i]), origin.number[i]);
   }
   for (std::size_t p = before.points.size(); p < soup.points.size(); ++p) split.add(to_glm(soup.points[p]));
   add_finding(changes, "R04-oriented-triangles", Severity::info, turned,

@@ -16,7 +16,7 @@ namespace {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Point = Kernel::Point_3;
-using Box = CGAL::Box_intersection_d::Box_with_info_d<double, 3, std::uint32_t>;
+using TriangleBox = CGAL::Box_intersection_d::Box_with_info_d<double, 3, std::uint32_t>;
 
 class PairTest {
  public:
@@ -60,9 +60,9 @@ class PairTest {
   std::span<const TriangleIndices> triangles_;
 };
 
-std::vector<Box> boxes_of(std::span<const glm::dvec3> points, std::span<const TriangleIndices> triangles,
-                          std::uint32_t first) {
-  std::vector<Box> boxes;
+std::vector<TriangleBox> boxes_of(std::span<const glm::dvec3> points,
+                                  std::span<const TriangleIndices> triangles, std::uint32_t first) {
+  std::vector<TriangleBox> boxes;
   boxes.reserve(triangles.size() - first);
   for (std::uint32_t i = first; i < triangles.size(); ++i) {
     CGAL::Bbox_3 bounds;
@@ -85,7 +85,7 @@ struct EnoughTests {};  // thrown through CGAL's search, which offers no other e
 
 SelfIntersections find_self_intersections(std::span<const glm::dvec3> points,
                                           std::span<const TriangleIndices> triangles) {
-  std::vector<Box> boxes = boxes_of(points, triangles, 0);
+  std::vector<TriangleBox> boxes = boxes_of(points, triangles, 0);
   const PairTest test(points, triangles);
   SelfIntersections result;
   std::size_t tests = 0;
@@ -94,19 +94,20 @@ SelfIntersections find_self_intersections(std::span<const glm::dvec3> points,
     return (points[t[0]] + points[t[1]] + points[t[2]]) / 3.0;
   };
   try {
-    CGAL::box_self_intersection_d(boxes.begin(), boxes.end(), [&](const Box& x, const Box& y) {
-      if (++tests > most_tests(triangles.size())) throw EnoughTests{};
-      const auto [first, second] = std::minmax({x.info(), y.info()});
-      if (!test.intersect(first, second)) return;
-      // Keeps the lowest pair, so that the result does not depend on the order of CGAL's search.
-      if (result.pairs == 0) result.lower = result.upper = middle(first);
-      if (result.pairs++ == 0 || std::pair(first, second) < std::pair(result.first, result.second)) {
-        result.first = first;
-        result.second = second;
-      }
-      result.lower = glm::min(result.lower, glm::min(middle(first), middle(second)));
-      result.upper = glm::max(result.upper, glm::max(middle(first), middle(second)));
-    });
+    CGAL::box_self_intersection_d(
+        boxes.begin(), boxes.end(), [&](const TriangleBox& x, const TriangleBox& y) {
+          if (++tests > most_tests(triangles.size())) throw EnoughTests{};
+          const auto [first, second] = std::minmax({x.info(), y.info()});
+          if (!test.intersect(first, second)) return;
+          // Keeps the lowest pair, so that the result does not depend on the order of CGAL's search.
+          if (result.pairs == 0) result.lower = result.upper = middle(first);
+          if (result.pairs++ == 0 || std::pair(first, second) < std::pair(result.first, result.second)) {
+            result.first = first;
+            result.second = second;
+          }
+          result.lower = glm::min(result.lower, glm::min(middle(first), middle(second)));
+          result.upper = glm::max(result.upper, glm::max(middle(first), middle(second)));
+        });
   } catch (const EnoughTests&) {
     result.complete = false;
   }
@@ -116,14 +117,14 @@ SelfIntersections find_self_intersections(std::span<const glm::dvec3> points,
 std::vector<std::uint32_t> new_triangles_that_cut(std::span<const glm::dvec3> points,
                                                   std::span<const TriangleIndices> triangles,
                                                   std::uint32_t first_new) {
-  std::vector<Box> added = boxes_of(points, triangles, first_new);
-  std::vector<Box> all = boxes_of(points, triangles, 0);
+  std::vector<TriangleBox> added = boxes_of(points, triangles, first_new);
+  std::vector<TriangleBox> all = boxes_of(points, triangles, 0);
   const PairTest test(points, triangles);
   std::vector<bool> cuts(triangles.size(), false);
   std::size_t tests = 0;
   try {
     CGAL::box_intersection_d(added.begin(), added.end(), all.begin(), all.end(),
-                             [&](const Box& x, const Box& y) {
+                             [&](const TriangleBox& x, const TriangleBox& y) {
                                if (++tests > most_tests(triangles.size())) throw EnoughTests{};
                                if (y.info() >= x.info() || cuts[x.info()]) return;
                                cuts[x.info()] = test.intersect(y.info(), x.info());

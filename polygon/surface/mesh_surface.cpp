@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "polygon/mesh/is_finite.h"
 #include "polygon/mesh/mesh_bounds.h"
 #include "polygon/mesh/topology.h"
 #include "polygon/mesh/triangle.h"
@@ -24,10 +25,6 @@ namespace {
 
 constexpr double kFarAway = 700.0;  // radii of the mesh: there the rounding of floats and the lens together
                                     // cost least
-
-bool is_finite(const glm::dvec3& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
 
 class MeshSurface final : public RigidSurface {
  public:

@@ -10,16 +10,10 @@
 
 #include "polygon/mesh/topology.h"
 #include "polygon/surface/primitives.h"
+#include "polygon/surface/require_size.h"
 
 namespace polygon {
 namespace {
-
-void require_size(const char* what, double value, bool zero_allowed = false) {
-  if (std::isfinite(value) && (value > 0.0 || (zero_allowed && value == 0.0))) return;
-  std::ostringstream text;
-  text << what << " is " << value << " m; it must be finite and " << (zero_allowed ? ">= 0" : "> 0");
-  throw std::invalid_argument(text.str());
-}
 
 void require_count(const char* what, int value, int lowest, int highest) {
   if (value >= lowest && value <= highest) return;

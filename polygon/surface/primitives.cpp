@@ -10,19 +10,11 @@
 #include <stdexcept>
 #include <type_traits>
 
+#include "polygon/mesh/is_finite.h"
+#include "polygon/surface/require_size.h"
+
 namespace polygon {
 namespace {
-
-bool is_finite(const glm::dvec3& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
-
-void require_size(const char* what, double value, bool zero_allowed = false) {
-  if (std::isfinite(value) && (value > 0.0 || (zero_allowed && value == 0.0))) return;
-  std::ostringstream text;
-  text << what << " is " << value << " m; it must be finite and " << (zero_allowed ? ">= 0" : "> 0");
-  throw std::invalid_argument(text.str());
-}
 
 // Nearest point of the shape's surface, and whether the query point is inside.
 struct SurfacePoint {

@@ -14,7 +14,8 @@ namespace voxel {
 
 inline constexpr std::uint32_t kFullRow = 0xFFFFFFFFU;  // RowInfo::free of a row of free voxels
 
-// All that decides how a row is relaxed, together, because a visit reads it of several rows.
+// All data that decides how a row is relaxed. They lie together because one visit reads those of several
+// rows.
 struct RowInfo {
   std::uint32_t free = 0;     // bit of each lane: a voxel that is not anchored
   std::uint8_t label = 0;     // of a row full of free voxels of one label; else 0

@@ -8,8 +8,8 @@
 namespace voxel::composite {
 namespace {
 
-// A correction is shortened if it overshoots the least energy by more than this share of itself. At half the
-// energy is what it was before the correction. At most kMaxShortening of the correction is taken back.
+// A correction that overshoots the least energy by half of itself leaves the energy as it was. A correction
+// that overshoots by more is shortened, by at most kMaxShortening of itself.
 constexpr double kMinOvershoot = 0.5, kMaxShortening = 0.9;
 
 }  // namespace

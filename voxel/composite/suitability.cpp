@@ -75,7 +75,7 @@ double thin_tissue_share(const Lattice& lattice) {
           ++to[d];
           links[index(n)] = softer(moduli_at(from), moduli_at(to));
         }
-        const LinkParts parts = link_blocks(links);
+        const LinkParts parts = link_parts(links);
         thin += parts.thin.along_Pa;
         all += parts.thin.along_Pa + parts.cells.along_Pa;
       }
@@ -94,7 +94,7 @@ bool alike_in_poisson(std::span<const LinkMaterial> materials) {
 std::string CompositeGrid::reason_unsuitable(const Lattice& lattice) {
   if (!lattice.uniform_limits()) return "its materials have limits of their own";
   if (!alike_in_poisson(lattice.materials().subspan(1))) return "its materials differ in Poisson's ratio";
-  if (lattice.yields()) return "it keeps dents";
+  if (lattice.has_plasticity()) return "it keeps dents";
   if (lattice.has_bricks()) return "it is of the accurate energy";
   for (int d = 0; d < 3; ++d) {
     const LinkLimit& l = lattice.tightest(d);

@@ -8,16 +8,17 @@
 namespace voxel {
 namespace {
 
-// Of the ratios of bricks to links in what an object does: the largest is its elements'; this is about the
-// least (shear along (110)), but for what bends.
+// Approximate least eigenvalue of K_links⁻¹·K_bricks (shear along (110)), bending excluded. The largest comes
+// from largest_ratio().
 constexpr double kLeastRatio = 0.5;
-// Shares of where steps would grow from one to the next. More carried on brings a held tool to rest sooner,
-// and takes a moving one further off; with all that is optimal, tissue of ν 0.49 swung.
+// Step as a fraction of the stability limit, and upper bound of the momentum. More momentum converges sooner
+// for a held tool, but increases the error for a moving tool. The optimal momentum made tissue of ν 0.49
+// oscillate.
 constexpr double kBelowLimit = 0.6, kMostCarriedOn = 0.3;
 constexpr float kGain = 0.98F, kElsewhere = 2.0F, kCalmer = 0.9F;
 constexpr int kPatience = 20;  // rounds
 
-// The rows around one, each with a voxel more at both ends, one after the other: [z][y].
+// A row and its eight neighbour rows, [z][y], each with one more voxel at both ends.
 constexpr std::size_t kStrideY = 40, kStrideZ = 3 * kStrideY, kOwn = kStrideZ + kStrideY + 1;
 using Around = std::array<float, 3 * kStrideZ>;
 
@@ -39,7 +40,7 @@ BrickLoads::BrickLoads(const Lattice& lattice) : lattice_(lattice) {
     kind_.back() = std::make_unique<Kind>(Kind{node_stencil(beyond), in_floats(beyond)});
     ratio = std::max(ratio, largest_ratio(brick, links));
   }
-  // Richardson's iteration with momentum (Polyak 1964): of the last step ((√κ−1)/(√κ+1))² is best.
+  // Richardson's iteration with momentum (Polyak 1964). The optimal momentum is ((√κ−1)/(√κ+1))².
   const double kappa = std::sqrt(std::max(ratio / kLeastRatio, 1.0)), best = (kappa - 1.0) / (kappa + 1.0);
   carry_on_ = static_cast<float>(std::min(best * best, kMostCarriedOn));
   share_ =
@@ -57,7 +58,7 @@ void BrickLoads::look_at_all_of(const BrickLoads& other) noexcept {
   }
 }
 
-// What is around rows that moved is due, and what was not right yet.
+// Rows that moved, their neighbour rows, and rows that the last round changed become due.
 bool BrickLoads::begin_round() noexcept {
   if (moved_.count + retry_.count == 0) return false;
   due_.count = next_ = 0;
@@ -82,9 +83,9 @@ bool BrickLoads::begin_round() noexcept {
   return due_.count > 0;
 }
 
-// Where many links are at their limits there is no end to it: voxels that limits hold change places, and the
-// loads with them (a held tool felt 0.1 of 3.1 N sideways, now here, now there). So loads that gain nothing
-// by being renewed come to rest, until they are off by more again.
+// Damps the iteration while it makes no progress. With many links at their limits it does not converge: the
+// active set keeps changing, and the loads change with it. So step and momentum shrink after kPatience rounds
+// without progress, until the error grows by the factor kElsewhere.
 void BrickLoads::end_round() noexcept {
   left_N_ = worst_N_;
   if (left_N_ < kGain * least_left_N_) {
@@ -110,7 +111,7 @@ bool BrickLoads::renew_row(RowId row, Displacement& state) noexcept {
   worst_N_ = std::max(worst_N_, worst);
   const bool on_its_way = (mark_[row] & kStepped) != 0;
   if (worst <= least_N_) {
-    // Nothing is carried on from here, when it moves again.
+    // Clears the momentum, so that the next renewal starts without it.
     for (std::size_t axis = 0; axis < 3 && on_its_way; ++axis)
       std::fill_n(step_[axis].data() + static_cast<std::size_t>(row) * kRow, kRow, 0.0F);
     mark_[row] &= static_cast<std::uint8_t>(~kStepped);
@@ -169,8 +170,8 @@ void BrickLoads::mixed_loads(RowId row, const NodeField& field, std::array<Lanes
     for (VoxelId i = 0; i < kRow; ++i) material[n][i + 1] = lattice_.material(first + i);
     material[n][kRow + 1] = lattice_.material(grid.up(first + kRow - 1, 0));
   }
-  // The softest voxel of the cells between slices x and x + 1, by whether they are above in y and in z; 0
-  // where a voxel is missing.
+  // Softest material of the four cells between slices x and x + 1, by cell = (above in y) + 2·(above in z); 0
+  // if a voxel of the cell is missing.
   const auto cells_at = [&](std::size_t x) {
     std::array<std::uint8_t, 4> softest{};
     for (std::size_t cell = 0; cell < 4; ++cell) {
@@ -184,12 +185,12 @@ void BrickLoads::mixed_loads(RowId row, const NodeField& field, std::array<Lanes
     }
     return softest;
   };
-  // Along a row little changes: mostly the cells are those before.
-  std::array<std::uint8_t, kRow + 1> changes{};  // [x] is slice x + 1 another than slice x?
+  // Cells are recomputed only where materials change along the row.
+  std::array<std::uint8_t, kRow + 1> changes{};  // [x]: does slice x + 1 differ from slice x?
   for (const Materials& m : material) {
     for (std::size_t x = 0; x < changes.size(); ++x) changes[x] |= static_cast<std::uint8_t>(m[x] ^ m[x + 1]);
   }
-  // Where all cells are of one material, by the octet: in rows that end on a face of a block nearly all are.
+  // Runs of nodes within one material use the vector kernel row_forces().
   const Kind* one = nullptr;
   std::size_t since = 0;
   const auto end_run = [&](std::size_t i) {

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The accurate energy in a lattice whose solver knows links: what its bricks (voxel/fem/hex_element.h) pull
-// at a voxel beyond what the links of their cells do, as a load on that voxel.
+// The accurate energy as a deferred correction of the links. The load on a voxel is the force of its bricks
+// (voxel/fem/hex_element.h) minus the force of the links of their cells.
 //
 // Deferred correction (Stetter 1978; Trottenberg, Oosterlee & Schüller, Multigrid, section 5.4): with the
-// load kept, links come to rest by everything that knows links - contact, limits, coarse levels -, then the
-// load is found anew where they are, u ← u − ω·K_links⁻¹·K_bricks·u. It ends where the bricks are at rest,
-// whatever the links are. A cell's bricks are at most `largest_ratio` times as stiff as its links, which says
-// how large ω may be; a part of each step is carried on to the next (without, a tool held in layers of ν 0.45
-// came to rest half as fast). (Rejected: a smoother and coarse levels of bricks: 27 blocks of 3×3 a voxel in
-// every pass of the tick, and limits per axis would no longer be limits of one unknown.)
+// loads fixed, the solver relaxes the links with contact, limits and coarse levels. Then the loads are
+// computed again at the new displacements: u ← u − ω·K_links⁻¹·K_bricks·u. The fixed point is the equilibrium
+// of the bricks and does not depend on the links. `largest_ratio` bounds the stiffness of a cell's bricks
+// relative to its links, and so bounds ω. A momentum term carries a part of each step on to the next (Polyak
+// 1964). A smoother and coarse levels of bricks would need 27 blocks of 3×3 per voxel in every pass, and a
+// limit per axis would no longer be a limit of one unknown.
 //
-// So a tick feels links at once, within some tenths right, and the rest of the way as results come.
+// A tick feels the links at once. The correction follows over the next ticks.
 #pragma once
 
 #include <array>
@@ -31,20 +31,20 @@ class BrickLoads {
  public:
   explicit BrickLoads(const Lattice& lattice);
 
-  // Is there anything to renew here? Not where another does it.
+  // Are there loads that this object renews? False without bricks and after leave_to_shadow().
   [[nodiscard]] bool any() const { return share_ > 0.0F; }
-  void leave_to_another() noexcept { share_ = 0.0F; }
-  // Loads that are less wrong than this are left alone.
+  void leave_to_shadow() noexcept { share_ = 0.0F; }
+  // Loads whose error is at most `least_N` are not renewed.
   void set_least(float least_N) noexcept { least_N_ = least_N; }
 
-  // Voxels of this row moved.
+  // Call when voxels of this row moved.
   void look_at(RowId row) noexcept {
     if (any() && (mark_[row] & kMoved) == 0) put(moved_, row, kMoved);
   }
-  // Every row that `other` ever looked at.
+  // Calls look_at() for every row that `other` ever listed.
   void look_at_all_of(const BrickLoads& other) noexcept;
-  // Renews the loads of at most so many rows, of each of which voxels moved once, `changed(row)` for each
-  // that changed. Returns how many it looked at.
+  // Renews the loads of at most `most_rows` rows that are due, and calls `changed(row)` for each row whose
+  // loads changed. Returns the number of rows examined.
   template <class Changed>
   std::size_t renew(Displacement& state, std::size_t most_rows, const Changed& changed) noexcept {
     if (!any() || (next_ == due_.count && !begin_round())) return 0;
@@ -57,25 +57,26 @@ class BrickLoads {
     if (next_ == due_.count) end_round();
     return count;
   }
-  // Whether its loads changed since this was last asked.
+  // Have the loads of the row changed since the last call? Clears the flag.
   bool take_changed(RowId row) noexcept {
     const bool changed = any() && (mark_[row] & kChanged) != 0;
     if (changed) mark_[row] &= static_cast<std::uint8_t>(~kChanged);
     return changed;
   }
-  // All that was due when the last round began was looked at.
+  // Every row that was due when the last round began has been examined.
   [[nodiscard]] bool round_ended() const { return next_ == due_.count; }
-  // How wrong the worst was when the last whole round looked at it (N).
+  // Largest error of a load in the last complete round (N).
   [[nodiscard]] float unbalanced_N() const { return left_N_; }
 
-  // What bricks pull the voxels of a row with beyond what the links of their cells do, where those are now
-  // (N). False: nothing.
+  // Loads on the voxels of a row at the present displacements (N): force of the bricks minus force of the
+  // links of their cells. Returns false, and leaves `out` unset, if the row lies inside a material without
+  // bricks.
   bool loads_of(RowId row, const Displacement& state, std::array<Lanes, 3>& out) const noexcept;
 
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
-  // Of a material: its bricks less the links of their cells.
+  // Per material: stiffness of its bricks minus that of the links of their cells.
   struct Kind {
     NodeStencil inside;
     BrickFloats brick;
@@ -85,7 +86,7 @@ class BrickLoads {
     std::size_t count = 0;
   };
   static constexpr std::uint8_t kMoved = 1, kDue = 2, kAgain = 4, kEver = 8, kChanged = 16, kStepped = 32;
-  using Materials = std::array<std::uint8_t, kRow + 2>;  // of a row, and the voxels beyond its ends
+  using Materials = std::array<std::uint8_t, kRow + 2>;  // of a row, with one voxel beyond each end
 
   void put(Rows& rows, RowId row, std::uint8_t mark) noexcept {
     mark_[row] |= mark | kEver;
@@ -100,17 +101,17 @@ class BrickLoads {
   void mixed_loads(RowId row, const NodeField& field, std::array<Lanes, 3>& out) const noexcept;
 
   const Lattice& lattice_;
-  std::vector<std::unique_ptr<Kind>> kind_;  // [material], null where that is of links
-  float share_ = 0.0F;                       // ω; 0: nothing to renew
-  float carry_on_ = 0.0F;                    // of the last step
-  std::array<LazyArray<float>, 3> step_;     // [axis][v] that (N)
+  std::vector<std::unique_ptr<Kind>> kind_;  // [material]; null for a material of links
+  float share_ = 0.0F;                       // ω; 0: no loads to renew
+  float carry_on_ = 0.0F;                    // momentum: fraction of the last step
+  std::array<LazyArray<float>, 3> step_;     // [axis][v]: the last step (N)
   float least_N_ = 0.0F, left_N_ = 0.0F, worst_N_ = 0.0F;
-  float calm_ = 1.0F;             // of the share: less where rounds do not gain
-  float least_left_N_ = 0.0F;     // since the contact was last somewhere else
+  float calm_ = 1.0F;             // factor of share_ and carry_on_; falls while rounds make no progress
+  float least_left_N_ = 0.0F;     // least left_N_ since the contact last changed
   int without_gain_ = 0;          // rounds
   LazyArray<std::uint8_t> mark_;  // [row]
-  Rows moved_, due_, retry_;      // retry_: still wrong when they were looked at in this round
-  std::size_t next_ = 0;          // of due_
+  Rows moved_, due_, retry_;      // retry_: rows that this round changed
+  std::size_t next_ = 0;          // index of the next row in due_
 };
 
 }  // namespace voxel

@@ -31,7 +31,8 @@ Elasticity elasticity(double young, double poisson) {
   return d;
 }
 
-// Strain of a displacement field whose three components all have this gradient, one column a component.
+// Strain-displacement columns of one shape function: column a is the strain for displacement component a,
+// given the gradient of the shape function.
 template <typename Columns>
 void put_gradient(Columns columns, const Eigen::Vector3d& gradient) {
   columns.setZero();
@@ -43,7 +44,7 @@ void put_gradient(Columns columns, const Eigen::Vector3d& gradient) {
   }
 }
 
-// At (ξ, η, ζ), each −1 to 1.
+// Strain-displacement matrix of the eight corners at (ξ, η, ζ), each −1 to 1.
 CornerStrain corner_strain(const Eigen::Vector3d& at, const Eigen::Vector3d& spacing) {
   CornerStrain out;
   for (int corner = 0; corner < 8; ++corner) {
@@ -58,8 +59,8 @@ CornerStrain corner_strain(const Eigen::Vector3d& at, const Eigen::Vector3d& spa
   return out;
 }
 
-// The incompatible modes 1 − ξ², 1 − η², 1 − ζ². Their strain has no mean over a brick, so that a constant
-// strain leaves them alone.
+// The incompatible modes 1 − ξ², 1 − η², 1 − ζ². Their mean strain over a brick is zero, so that a constant
+// strain does not excite them (patch test).
 ModeStrain mode_strain(const Eigen::Vector3d& at, const Eigen::Vector3d& spacing) {
   ModeStrain out;
   for (int mode = 0; mode < 3; ++mode) {
@@ -85,7 +86,7 @@ void check(double young_Pa, double poisson, const glm::dvec3& spacing_m) {
 
 BrickStiffness brick_stiffness(double young_Pa, double poisson, const glm::dvec3& spacing_m) {
   check(young_Pa, poisson, spacing_m);
-  // In units of the longest edge and of E, so that nothing under- or overflows at 1 µm or 1 TPa.
+  // Units are the longest edge and E, so that values neither under- nor overflow at 1 µm or 1 TPa.
   const Eigen::Vector3d metres(spacing_m.x, spacing_m.y, spacing_m.z);
   const double unit = metres.maxCoeff();
   const Eigen::Vector3d spacing = metres / unit;
@@ -108,7 +109,7 @@ BrickStiffness brick_stiffness(double young_Pa, double poisson, const glm::dvec3
   corners -= mixed * modes.ldlt().solve(mixed.transpose());
 
   BrickStiffness out;
-  // The mean of the two halves, which rounding left apart.
+  // Symmetrises: rounding leaves the two halves slightly different.
   const Eigen::Matrix<double, 24, 24> symmetric = 0.5 * young_Pa * unit * (corners + corners.transpose());
   std::copy_n(symmetric.data(), symmetric.size(), out.entry.begin());
   return out;
@@ -143,7 +144,7 @@ double largest_ratio(const BrickStiffness& brick, const BrickStiffness& links) {
   using Matrix = Eigen::Matrix<double, 24, 24>;
   const Matrix of = Eigen::Map<const Matrix>(brick.entry.data());
   Matrix to = Eigen::Map<const Matrix>(links.entry.data());
-  // Shifts cost neither of them anything, and would make the second singular.
+  // Rigid shifts are zero modes of both matrices. Stiffness added on them makes `to` non-singular.
   const double stiffness = to.trace() / 24.0;
   for (int axis = 0; axis < 3; ++axis) {
     Eigen::Matrix<double, 24, 1> shift = Eigen::Matrix<double, 24, 1>::Zero();
@@ -158,7 +159,7 @@ NodeStencil node_stencil(const BricksAround& bricks) {
   std::array<std::array<double, 12>, 27> sum{};
   for (std::size_t octant = 0; octant < 8; ++octant) {
     if (bricks[octant] == nullptr) continue;
-    const std::size_t self = 7 - octant;  // the brick's corner that is the node
+    const std::size_t self = 7 - octant;  // corner of the brick at the node
     for (std::size_t corner = 0; corner < 8; ++corner) {
       std::size_t o = 0;
       for (std::size_t a = 0, step = 1; a < 3; ++a, step *= 3) {

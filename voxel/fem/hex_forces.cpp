@@ -13,11 +13,10 @@ namespace {
 constexpr std::size_t kLanes = 8;
 constexpr std::size_t kSelf = 13;
 
-// Vectors of the compiler (GCC, Clang), element by element; left to loops over arrays it takes 15 times as
-// long.
-using Lanes [[gnu::vector_size(kLanes * sizeof(float))]] = float;
+// Vector extension of GCC and Clang; equivalent loops over arrays are much slower.
+using NodeLanes [[gnu::vector_size(kLanes * sizeof(float))]] = float;
 
-[[gnu::always_inline]] inline void load(Lanes& out, const float* from) {
+[[gnu::always_inline]] inline void load(NodeLanes& out, const float* from) {
   std::memcpy(&out, from, sizeof out);
 }
 
@@ -27,23 +26,23 @@ constexpr std::array<int, 3> offset_of(std::size_t o) {
   return {n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1};
 }
 
-// Whether entry (r, c) of block o is other than zero inside a material: mirroring the lattice in axis r turns
-// the sign of u_r, so what couples r and c is odd in both offsets.
+// Can entry (r, c) of block o be non-zero inside a material? Mirroring the lattice in axis r changes the sign
+// of u_r. So an entry with r ≠ c is odd in the offsets along r and c.
 constexpr bool couples(std::size_t o, std::size_t r, std::size_t c) {
   return r == c || (offset_of(o)[r] != 0 && offset_of(o)[c] != 0);
 }
 
-// kLanes nodes from `at`; the pair of neighbours o and 26 − o.
+// Adds the forces of the neighbours o and 26 − o to kLanes nodes from `at`.
 template <std::size_t o>
 [[gnu::always_inline]] inline void add_pair(const NodeStencil& stencil, const NodeField& field,
-                                            std::size_t at, const Lanes* self, Lanes* sum) {
+                                            std::size_t at, const NodeLanes* self, NodeLanes* sum) {
   constexpr std::array<int, 3> kOffset = offset_of(o);
   const std::ptrdiff_t away = kOffset[0] + kOffset[1] * field.stride_y + kOffset[2] * field.stride_z;
   for (std::size_t c = 0; c < 3; ++c) {
-    Lanes one, other;
+    NodeLanes one, other;
     load(one, field.u[c] + at + away);
     load(other, field.u[c] + at - away);
-    const Lanes both = (one - self[c]) + (other - self[c]);
+    const NodeLanes both = (one - self[c]) + (other - self[c]);
     for (std::size_t r = 0; r < 3; ++r) {
       if (couples(o, r, c)) sum[r] -= stencil.block[o][4 * c + r] * both;
     }
@@ -52,8 +51,8 @@ template <std::size_t o>
 
 template <std::size_t... o>
 [[gnu::always_inline]] inline void add_pairs(std::index_sequence<o...>, const NodeStencil& stencil,
-                                             const NodeField& field, std::size_t at, const Lanes* self,
-                                             Lanes* sum) {
+                                             const NodeField& field, std::size_t at, const NodeLanes* self,
+                                             NodeLanes* sum) {
   (add_pair<o>(stencil, field, at, self, sum), ...);
 }
 
@@ -61,10 +60,10 @@ template <std::size_t... o>
 
 HYBRID_MULTIVERSIONED void row_forces(const NodeStencil& inside, const NodeField& field, std::size_t first,
                                       std::size_t count, const std::array<float*, 3>& force) {
-  // The last ones with some before them once more: one by one they took a tenth of a block's whole cycle.
+  // The last vector overlaps the one before it, so that no node is left for a scalar loop.
   for (std::size_t done = 0; done < count && count >= kLanes; done += kLanes) {
     const std::size_t from = std::min(done, count - kLanes);
-    Lanes self[3], sum[3] = {};
+    NodeLanes self[3], sum[3] = {};
     for (std::size_t c = 0; c < 3; ++c) load(self[c], field.u[c] + first + from);
     add_pairs(std::make_index_sequence<kSelf>{}, inside, field, first + from, self, sum);
     for (std::size_t c = 0; c < 3; ++c) std::memcpy(force[c] + from, &sum[c], sizeof sum[c]);
@@ -77,7 +76,7 @@ HYBRID_MULTIVERSIONED void row_forces(const NodeStencil& inside, const NodeField
 
 namespace {
 
-// A node's force is summed in the three lanes of x, y and z; the fourth is whatever stands beside.
+// Sums a node's force in the lanes x, y and z. The fourth lane holds neighbouring data and is ignored.
 using Quad [[gnu::vector_size(4 * sizeof(float))]] = float;
 
 [[gnu::always_inline]] inline void add_column(Quad& sum, const float* column, float by) {
@@ -86,7 +85,7 @@ using Quad [[gnu::vector_size(4 * sizeof(float))]] = float;
   sum -= k * by;
 }
 
-// Differences of the 27 neighbours from the node; [3·o + axis].
+// Differences of the 27 neighbours to the node: out[3·o + axis].
 template <std::size_t... o>
 [[gnu::always_inline]] inline void differences(std::index_sequence<o...>, const NodeField& field,
                                                std::size_t node, float* out) {
@@ -104,7 +103,7 @@ template <std::size_t... o>
 std::array<float, 3> node_force(const NodeStencil& stencil, const NodeField& field, std::size_t node) {
   std::array<float, 81> d;
   differences(std::make_index_sequence<27>{}, field, node, d.data());
-  std::array<Quad, 3> sum{};  // three chains of additions instead of one
+  std::array<Quad, 3> sum{};  // three independent chains of additions
   for (std::size_t o = 0; o < 27; ++o) {
     for (std::size_t c = 0; c < 3; ++c) add_column(sum[c], &stencil.block[o][4 * c], d[3 * o + c]);
   }
@@ -127,7 +126,7 @@ std::array<float, 3> node_force(const std::array<const BrickFloats*, 8>& bricks,
   for (std::size_t octant = 0; octant < 8; ++octant) {
     if (bricks[octant] == nullptr) continue;
     const auto number = [](std::size_t bits) { return (bits & 1) + 3 * (bits >> 1 & 1) + 9 * (bits >> 2); };
-    // Symmetric: a column of the node's three rows is a piece of a row.
+    // The matrix is symmetric: a column of the node's three rows is contiguous in a row.
     const float* rows = bricks[octant]->data() + 3 * (7 - octant);
     for (std::size_t corner = 0; corner < 8; ++corner) {
       const float* from = d.data() + 3 * (number(octant) + number(corner));

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Trilinear interpolation of displacements at a rest point.
 #include "voxel/lattice/displacement.h"
 
 #include <algorithm>
@@ -26,7 +27,7 @@ glm::dvec3 displacement_at(const Lattice& lattice, const Displacement& state,
     if (!lattice.filled(v)) continue;
     const double w = (i != 0 ? part[0] : 1.0 - part[0]) * (j != 0 ? part[1] : 1.0 - part[1]) *
                          (k != 0 ? part[2] : 1.0 - part[2]) +
-                     1e-9;  // a corner that is just reached still counts when it is the only one
+                     1e-9;  // a corner of weight 0 counts if it is the only voxel
     sum += w * state.at(v);
     weight += w;
   }

@@ -1,5 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The moving half of a soft object: how far each voxel is from rest, and who is responsible for moving it.
+// The state of a soft object: displacement of each voxel from rest, and the role that says which solver moves
+// it.
+//
+// Arrays take memory page by page where they are written, so untouched tissue costs address space only.
+// Counts per row agree with the roles, because roles change through set_role() only.
 #pragma once
 
 #include <array>
@@ -13,10 +17,11 @@
 
 namespace voxel {
 
-// What bricks add to the forces of links, as it was when it was last found (voxel/fem/deferred_correction.h).
+// Loads of bricks: their forces beyond those of links, from the last renewal
+// (voxel/fem/deferred_correction.h).
 struct BrickLoad {
   BrickLoad() = default;
-  // Takes no address space where no tissue is of bricks.
+  // Takes no address space for a lattice without bricks.
   explicit BrickLoad(const Lattice& lattice) {
     if (!lattice.has_bricks()) return;
     for (auto& axis : load) axis = LazyArray<float>(lattice.size());
@@ -24,7 +29,7 @@ struct BrickLoad {
   }
 
   std::array<LazyArray<float>, 3> load;  // [axis][v] (N)
-  LazyArray<std::uint8_t> row;           // [row] 1 where it has any
+  LazyArray<std::uint8_t> row;           // [row] 1 if the row has a load
 
   [[nodiscard]] bool has(RowId r) const noexcept { return row.size() != 0 && row[r] != 0; }
   [[nodiscard]] std::array<float, 3> at(VoxelId v) const noexcept {
@@ -40,20 +45,20 @@ struct BrickLoad {
   }
 };
 
-// Displacement, not position: at coordinate 100 a float position has lost the slack of the chain to rounding,
-// a displacement near zero has not.
+// Displacements of all voxels. A float position far from the origin would lose the slack of the chain to
+// rounding. A displacement near zero does not.
 struct Displacement {
   enum Role : std::uint8_t {
     free = 0,
     held = 1,      // near the tool or another soft object: moved by the contact solver only
-    obstacle = 2,  // near a rigid surface: also subject to n·u >= c
-    pressed = 3,   // on the tool, and nothing else: slides along it (see tangential_contact.h)
-    // In a part without slack (rigid_blocks.h), and moved with that alone, whatever else it is; the second
-    // where it is also near a rigid surface. From construction on.
+    obstacle = 2,  // near a rigid surface: also subject to n·u >= bound
+    pressed = 3,   // on the tool only: slides along its surface (see tangential_contact.h)
+    // In a block without slack (rigid_blocks.h): moves with its block only, whatever else touches it. Voxels
+    // keep this role from construction on. The second value marks those near a rigid surface.
     joined = 5,
     joined_at_obstacle = 7,
   };
-  // Those that stand while their rows are relaxed.
+  // Roles that row relaxation does not move.
   [[nodiscard]] static bool stands(std::uint8_t role) noexcept { return (role & 1U) != 0; }
   [[nodiscard]] static bool in_block(std::uint8_t role) noexcept { return role >= joined; }
   [[nodiscard]] static bool at_obstacle(std::uint8_t role) noexcept {
@@ -65,11 +70,11 @@ struct Displacement {
         row_standing(lattice.grid().rows()),
         row_obstacles(lattice.grid().rows()),
         tool_normal(lattice.surface().size()),
-        rest(lattice),
+        plastic(lattice),
         bricks(lattice) {
     for (auto& axis : u) axis = LazyArray<float>(lattice.size());
     for (VoxelId v = 0; lattice.block_count() > 0 && v < lattice.size(); ++v) {
-      if (lattice.part(v) == 0) continue;
+      if (lattice.block(v) == 0) continue;
       role[v] = joined;
       ++row_standing[v / kRow];
     }
@@ -77,22 +82,22 @@ struct Displacement {
 
   std::array<LazyArray<float>, 3> u;                    // [axis][v] (unit: meter)
   LazyArray<std::uint8_t> role;                         // [v]
-  LazyArray<std::uint8_t> row_standing, row_obstacles;  // [row]: voxels of the row that stand; with obstacles
-  LazyArray<glm::vec3> tool_normal;  // [surface number] from the tool, unit; of those pressed
-  RestOffsets rest;
+  LazyArray<std::uint8_t> row_standing, row_obstacles;  // [row] voxels that stand; voxels at obstacles
+  LazyArray<glm::vec3> tool_normal;  // [surface number] unit, out of the tool; for pressed voxels
+  PlasticOffsets plastic;
   BrickLoad bricks;
 
-  // All memory that these rows will take, now.
+  // Touches all pages of these rows, so that a tick does not pay for the page faults.
   void populate(const std::vector<bool>& rows) noexcept {
     for (auto& axis : u) axis.populate(kRow, rows);
     role.populate(kRow, rows);
     bricks.populate(rows);
   }
-  // Loads of a row of voxels beside the pulls of their springs; null: none (N).
+  // Loads on a row of voxels beyond the forces of its springs (N); null: none.
   [[nodiscard]] const float* load_of(RowId r, int axis) const noexcept {
     if (bricks.has(r))
       return bricks.load[static_cast<std::size_t>(axis)].data() + static_cast<std::size_t>(r) * kRow;
-    return rest.load_of(r, axis);
+    return plastic.load_of(r, axis);
   }
   [[nodiscard]] glm::dvec3 at(VoxelId v) const { return {u[0][v], u[1][v], u[2][v]}; }
   void set(VoxelId v, const glm::dvec3& value) {
@@ -112,18 +117,20 @@ struct Displacement {
   }
 };
 
-// Displacement at any rest point of the body, from the voxels around it (unit: meter); 0 where none is near.
+// Displacement (m) at any rest point of the object, interpolated from the eight voxels around it; 0 if none
+// exists.
 [[nodiscard]] glm::dvec3 displacement_at(const Lattice& lattice, const Displacement& state,
                                          const glm::dvec3& rest_point) noexcept;
 
-// Of the smallest spacing: a voxel that is no deeper in its obstacle than this lies on it.
+// Share of the smallest spacing: a voxel no deeper in its obstacle than this touches it.
 inline constexpr double kTouching = 1e-6;
 
 // A half-space that one surface voxel may not leave: normal · u >= bound, u its displacement.
 struct Obstacle {
   glm::vec3 normal{0.0F};
-  float bound = 0.0F;  // (unit: meter), <= 0 where the voxel is clear of it at rest
-  // It is a body's that moves: where a voxel cannot be outside of all, it is in that, and not in what stands.
+  float bound = 0.0F;  // (m); <= 0 if the voxel at rest is outside the obstacle
+  // The obstacle is a moving body. If a voxel cannot be outside all obstacles, it enters the moving body, not
+  // a fixed surface.
   bool moving = false;
 };
 

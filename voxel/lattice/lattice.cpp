@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Construction of a lattice from labels, and its look-ups.
 #include "voxel/lattice/lattice.h"
 
 #include <algorithm>
@@ -11,10 +12,9 @@
 namespace voxel {
 namespace {
 
-// Ids between two entries of surface_before_: with 64 these took more memory than the surface itself, in a
-// full cube, for some nanoseconds a look-up.
+// Ids between two entries of surface_before_: a compromise between memory and look-up time.
 constexpr std::size_t kSurfaceBlock = 256;
-constexpr std::size_t kGivenBack = std::size_t{1} << 24U;  // bytes of a volume, at a time
+constexpr std::size_t kGivenBack = std::size_t{1} << 24U;  // bytes of a volume returned at a time
 constexpr std::size_t kMostCells = std::size_t{1} << 31;
 
 void check_material(std::size_t label, const LinkMaterial& m) {
@@ -86,7 +86,7 @@ void Lattice::fill_labels(const LabelVolume& volume, std::uint8_t* give_back) {
       for (int i = 0; i < volume.dims[0]; i += kRow) {
         const auto count = static_cast<std::size_t>(std::min(kRow, volume.dims[0] - i));
         const std::uint8_t* from = volume.labels.data() + volume.index(i, j, k);
-        // Rows of nothing are not written: empty space costs no memory.
+        // Empty rows are not written, so empty space costs no memory.
         if (std::memcmp(from, nothing.data(), count) == 0) continue;
         std::memcpy(label_.data() + grid_.at(i, j, k), from, count);
         const auto filled = count - static_cast<std::size_t>(std::count(from, from + count, std::uint8_t{0}));
@@ -149,14 +149,14 @@ void Lattice::fill_links(const LatticeOptions& options) {
       for (std::size_t ib = 1; ib < material_count_; ++ib) {
         const LinkMaterial &a = materials[ia], &b = materials[ib];
         LinkLimit& limit = limits_[ud][ia * material_count_ + ib];
-        // A link of two materials is half of each, so its limits are their means.
+        // A link between two materials is half of each, so its limits are the means.
         limit.along_low = static_cast<float>((0.5 * (a.stretch_min + b.stretch_min) - 1.0) * h[d]);
         limit.along_high = static_cast<float>((0.5 * (a.stretch_max + b.stretch_max) - 1.0) * h[d]);
         limit.across = static_cast<float>(0.5 * (a.shear + b.shear) * h[d]);
         float& yield = yield_m_[ud][ia * material_count_ + ib];
         yield = static_cast<float>(std::min(a.yield, b.yield) * h[d]);
         first_yield_m_[ud] = std::min(first_yield_m_[ud], yield);
-        yields_ = yields_ || yield < never;
+        has_plasticity_ = has_plasticity_ || yield < never;
         tightest.along_low = std::max(tightest.along_low, limit.along_low);
         tightest.along_high = std::min(tightest.along_high, limit.along_high);
         tightest.across = std::min(tightest.across, limit.across);
@@ -165,16 +165,16 @@ void Lattice::fill_links(const LatticeOptions& options) {
       }
     }
   }
-  if (yields_ && has_bricks_) {
+  if (has_plasticity_ && has_bricks_) {
     throw std::invalid_argument(
         "tissue that yields and tissue of the trilinear energy cannot be one object: give both the six-link "
         "energy, or take the yield away");
   }
 }
 
-// Which rows are inside a region of one label.
+// Marks the rows that are inside a region of one label.
 void Lattice::fill_inside() {
-  LazyArray<std::uint8_t> whole(grid_.rows());  // label of a row that is all of one
+  LazyArray<std::uint8_t> whole(grid_.rows());  // label of a full row of one label
   for (RowId row = 0; row < grid_.rows(); ++row) {
     if (filled_in(row) != kRow) continue;
     const std::uint8_t* at = labels(row);
@@ -269,7 +269,7 @@ VoxelSprings Lattice::springs_of(VoxelId v) const noexcept {
 }
 
 void Lattice::fill_anchors(const LabelVolume& volume, const LatticeOptions& options) {
-  LazyArray<std::uint32_t> lanes(grid_.rows());  // of each row, those that are anchored
+  LazyArray<std::uint32_t> lanes(grid_.rows());  // [row] anchored lanes
   // The outermost voxels on a side are those in the outermost occupied layer of the lattice.
   std::array<int, 3> low = grid_.dims, high{-1, -1, -1};
   std::array<bool, 256> by_label{};
@@ -363,7 +363,7 @@ void Lattice::find_surface() {
     if (first % kSurfaceBlock == 0)
       surface_before_[first / kSurfaceBlock] = static_cast<std::uint32_t>(surface_.size());
     if (filled_in(row) == 0) continue;
-    // Full rows among full rows have a surface at their ends at most.
+    // A full row among full rows has surface voxels only at its ends.
     const bool inside = filled_in(row) == kRow && filled_in(row - 1) == kRow && filled_in(row + 1) == kRow &&
                         filled_in(row - grid_.row_z) == kRow && filled_in(row + grid_.row_z) == kRow;
     for (int i = 0; i < kRow; i += inside ? kRow - 1 : 1) {
@@ -381,11 +381,10 @@ void Lattice::find_surface() {
     surface_before_[b] = static_cast<std::uint32_t>(surface_.size());
 }
 
-// Of the first surface voxel that is `v` or beyond it, within the block that `v` is in.
+// Surface number of the first surface voxel with an id of `v` or more; past the last one in the block of ids
+// that contains `v` if there is none.
 std::uint32_t Lattice::surface_from(VoxelId v) const noexcept {
   const auto block = v / kSurfaceBlock;
-  // (A search without branches was rejected: rows are mostly asked for one after the other, and then branches
-  // are foretold.)
   const auto first = surface_.begin() + static_cast<std::ptrdiff_t>(surface_before_[block]),
              last = surface_.begin() + static_cast<std::ptrdiff_t>(surface_before_[block + 1]);
   return static_cast<std::uint32_t>(std::lower_bound(first, last, v) - surface_.begin());
@@ -423,7 +422,7 @@ glm::dvec3 Lattice::outward(VoxelId v) const noexcept {
 std::size_t Lattice::memory_bytes() const {
   return sizeof(*this) + label_.resident_bytes() + rows_.resident_bytes() + resident_bytes(listed_before_) +
          resident_bytes(anchored_) + resident_bytes(surface_) + resident_bytes(surface_before_) +
-         part_.resident_bytes() + 3 * limits_[0].size() * (sizeof(LinkLimit) + sizeof(float));
+         block_.resident_bytes() + 3 * limits_[0].size() * (sizeof(LinkLimit) + sizeof(float));
 }
 
 }  // namespace voxel

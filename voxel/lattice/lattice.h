@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The constant half of a soft object: which voxels there are, how stiff each link is, how far each link
-// may stretch, what is anchored. Nothing here changes while a person touches it.
+// The object at rest: its voxels, the stiffness and limits of their links, and the anchors.
 //
-// A voxel costs its label: a link's stiffness follows from the labels around it
-// (voxel/lattice/link_stiffness.h), its limits from those at its two ends, and rest positions from the index
-// (see row_grid.h).
+// A lattice is constant after construction. A voxel stores its label only. The stiffness of a link follows
+// from the labels around it (voxel/lattice/link_stiffness.h), its limits from the labels at its two ends, and
+// rest positions from the index (see row_grid.h).
 #pragma once
 
 #include <algorithm>
@@ -24,20 +23,20 @@
 
 namespace voxel {
 
-// What a label is made of.
+// Material of a label.
 struct LinkMaterial {
   double young_Pa = 5e3;
   double poisson = 0.3;
   double stretch_min = 0.4;  // shortest, in rest lengths
   double stretch_max = 1.6;  // longest
-  double shear = 0.6;        // most slip across the link, in its rest length
-  // Strain beyond which a link keeps what is beyond (voxel/lattice/plasticity.h), of its rest length.
+  double shear = 0.6;        // largest slip across the link, in rest lengths
+  // Yield strain: a link keeps the strain beyond it (voxel/lattice/plasticity.h).
   double yield = std::numeric_limits<double>::infinity();
-  // Cells of which it is the softest are of the accurate energy (voxel/fem/deferred_correction.h), not of
-  // links.
+  // Cells whose softest voxel has this material use the accurate energy (voxel/fem/deferred_correction.h)
+  // instead of links.
   bool bricks = false;
 
-  // Voxels of such materials that are linked to one another only move as one.
+  // Linked voxels of such materials move as one block.
   [[nodiscard]] bool without_slack() const {
     return stretch_min >= 1.0 && stretch_max <= 1.0 && shear <= 0.0;
   }
@@ -51,8 +50,8 @@ struct LinkLimit {
   float across = 0.0F;                        // across it, both ways; >= 0
 };
 
-// Towards 0.5 bricks are ever so much stiffer in volume than links, and it takes as many times longer until
-// they are at rest.
+// Towards ν = 0.5 bricks become many times stiffer in volume than links, and convergence slows by the same
+// factor.
 inline constexpr double kMostPoissonOfBricks = 0.49;
 
 struct LatticeOptions {
@@ -71,12 +70,12 @@ struct Spring {
   friend bool operator==(const Spring&, const Spring&) = default;
 };
 
-// The six links of a voxel, by direction, and 1 / Σ of them on each axis, 0 where nothing may move.
+// Springs of the six links of a voxel, and per axis 1 / (sum of their stiffness); 0 if the voxel cannot move.
 struct VoxelSprings {
   std::array<Spring, 3> up, down;
   std::array<float, 3> inverse{};
 
-  // Of a voxel that may move.
+  // For movable voxels only.
   void set_inverse() noexcept {
     for (int axis = 0; axis < 3; ++axis) {
       float sum = 0.0F;
@@ -89,14 +88,14 @@ struct VoxelSprings {
 
 class Lattice {
  public:
-  // Throws std::invalid_argument in words: no voxel, no anchor (a free object has no equilibrium force), a
-  // material out of range, more than 2^31 cells.
+  // Throws std::invalid_argument with a message for the user: no voxel, no anchor (a free object has no
+  // equilibrium force), a material out of range, more than 2^31 cells.
   Lattice(const LabelVolume& volume, const LatticeOptions& options);
-  // The same; what was read of the volume gives its memory back meanwhile, and the volume holds nothing more.
+  // The same, but returns the volume's memory to the system while reading it and leaves the volume empty.
   Lattice(LabelVolume&& volume, const LatticeOptions& options);
 
   [[nodiscard]] const Grid& grid() const { return grid_; }
-  [[nodiscard]] std::size_t size() const { return label_.size(); }  // of the grid, the border included
+  [[nodiscard]] std::size_t size() const { return label_.size(); }  // cells of the grid, border included
   [[nodiscard]] std::size_t voxel_count() const { return voxel_count_; }
   [[nodiscard]] std::size_t anchored_count() const { return anchored_count_; }
   [[nodiscard]] bool filled(VoxelId v) const { return label_[v] != 0; }
@@ -109,7 +108,7 @@ class Lattice {
   [[nodiscard]] const std::uint8_t* labels(RowId row) const {
     return label_.data() + row * std::size_t{kRow};
   }
-  // Bits of a row's lanes: where there is a voxel, where an anchored one.
+  // Lane bits of a row: its voxels; its anchored voxels.
   [[nodiscard]] std::uint32_t filled_lanes(RowId row) const noexcept;
   [[nodiscard]] std::uint32_t anchored_lanes(RowId row) const noexcept {
     const Anchors which = anchors_of(row);
@@ -120,8 +119,7 @@ class Lattice {
   [[nodiscard]] const glm::dvec3& spacing_m() const { return spacing_m_; }
   [[nodiscard]] double min_spacing_m() const { return min_spacing_m_; }
   [[nodiscard]] double max_spacing_m() const { return max_spacing_m_; }
-  // Force that stretches an average link, were it a whole one, to twice its length (unit: newton): the scale
-  // by which residuals are small.
+  // Force (N) that stretches an average link of full area to twice its length: the scale for residuals.
   [[nodiscard]] double force_scale_N() const { return force_scale_N_; }
 
   [[nodiscard]] VoxelId at(int i, int j, int k) const { return grid_.at(i, j, k); }
@@ -134,53 +132,53 @@ class Lattice {
     return {c[0] * spacing_m_.x, c[1] * spacing_m_.y, c[2] * spacing_m_.z};
   }
 
-  // Voxels with a missing neighbour, in the order of their ids, and the number of one of them among these;
-  // kNoSurface for one inside.
+  // Surface voxels (at least one of six neighbours missing), by ascending id. surface_number() is the index
+  // of v among them, kNoSurface for other voxels.
   static constexpr std::uint32_t kNoSurface = 0xFFFFFFFFU;
   [[nodiscard]] std::span<const VoxelId> surface() const { return surface_; }
   [[nodiscard]] std::uint32_t surface_number(VoxelId v) const noexcept;
-  // The numbers of those in a row: from the first on, up to but without the second.
+  // Surface numbers of the voxels in a row: a half-open range [first, second).
   [[nodiscard]] std::array<std::uint32_t, 2> surface_in(RowId row) const noexcept;
-  // Away from the object at a surface voxel at rest, by its 26 neighbours: unit, volume frame; 0 where these
-  // do not say, in a sheet one voxel thick.
+  // Outward unit normal of a surface voxel at rest, from its 26 neighbours (volume frame). 0 if their
+  // directions cancel, as in a sheet one voxel thick.
   [[nodiscard]] glm::dvec3 outward(VoxelId v) const noexcept;
 
-  // Of the link v → up(v, d); nothing where an end is missing. It looks at up to eighteen labels: what a tick
-  // asks for, it asks of LevelStiffness.
+  // Spring of the link v → up(v, d); 0 if an end is missing. Reads up to eighteen labels, so a tick uses
+  // LevelStiffness instead.
   [[nodiscard]] Spring spring(VoxelId v, int d) const noexcept;
   [[nodiscard]] VoxelSprings springs_of(VoxelId v) const noexcept;
-  // The label that a row, the eight rows beside it and the voxels beyond all their ends are of, all of them;
-  // 0 where they are not of one. Every link of the row's voxels is then within that label.
+  // Common label of a row, of the eight rows beside it and of the voxels beyond the ends of all nine; 0 if
+  // they differ. With a common label, every link of the row's voxels lies within this label.
   [[nodiscard]] std::uint8_t inside(RowId row) const {
     return (rows_[row] & kCount) == kInside ? labels(row)[0] : std::uint8_t{0};
   }
   [[nodiscard]] const Spring& spring_within(std::uint8_t label, int d) const {
     return within_[static_cast<std::size_t>(d)][material_[label]];
   }
-  // Number of a voxel's material; equal ones share it. 0: no voxel.
+  // Number of a voxel's material; equal materials share a number. 0: no voxel.
   [[nodiscard]] std::uint8_t material(VoxelId v) const { return material_[label_[v]]; }
   [[nodiscard]] std::uint8_t material_of(std::uint8_t label) const { return material_[label]; }
-  // The materials by that number; of [0] nothing is true.
+  // Materials by number; [0] is a placeholder.
   [[nodiscard]] std::span<const LinkMaterial> materials() const { return materials_; }
   [[nodiscard]] bool has_bricks() const { return has_bricks_; }
 
-  // Parts without slack: voxels whose links to one another are of one length, two at least, and which so only
-  // move as one. Those that are anchored somewhere are anchored throughout. Of the others the kMaxBlocks with
-  // most voxels have numbers from 1 on; 0: in none of these.
+  // Blocks without slack: connected components of two or more voxels whose links have a fixed length, so that
+  // they move as one. A component with an anchor is anchored throughout. The kMaxBlocks largest of the others
+  // are numbered from 1 on; 0: in no block.
   static constexpr std::size_t kMaxBlocks = 1024;
   [[nodiscard]] std::size_t block_count() const { return block_count_; }
-  [[nodiscard]] std::uint16_t part(VoxelId v) const {
-    return block_count_ == 0 ? std::uint16_t{0} : part_[v];
+  [[nodiscard]] std::uint16_t block(VoxelId v) const {
+    return block_count_ == 0 ? std::uint16_t{0} : block_[v];
   }
-  // Of a link in +d whose parallels (link_stiffness.h) leave voxels of materials `from` and end in `to`.
+  // Spring of a link in +d whose parallels (link_stiffness.h) lead from materials `from` to materials `to`.
   [[nodiscard]] Spring spring_among(const std::array<std::uint8_t, 9>& from,
                                     const std::array<std::uint8_t, 9>& to, int d) const noexcept;
 
-  // Limit of the link v → up(v, d); only meaningful where both ends are filled.
+  // Limit of the link v → up(v, d); meaningful only if both ends are filled.
   [[nodiscard]] const LinkLimit& limit(VoxelId v, int d) const {
     return limits_[static_cast<std::size_t>(d)][pair_of(label_[v], label_[grid_.up(v, d)])];
   }
-  // Of a link in direction d between two labels.
+  // Limit of a link in direction d between two labels.
   [[nodiscard]] const LinkLimit& limit_between(std::uint8_t a, std::uint8_t b, int d) const {
     return limits_[static_cast<std::size_t>(d)][pair_of(a, b)];
   }
@@ -190,14 +188,15 @@ class Lattice {
     return axis == d ? std::array<float, 2>{l.along_low, l.along_high}
                      : std::array<float, 2>{-l.across, l.across};
   }
-  // No link in direction d is tighter than this: where it holds, no link needs to be looked at one by one.
+  // Tightest limits of all links in direction d. A difference within them satisfies any link's own limit.
   [[nodiscard]] const LinkLimit& tightest(int d) const { return tightest_[static_cast<std::size_t>(d)]; }
-  // Every link in a direction has the same limits: those of tightest().
+  // True if all links of a direction have the same limits, which are then those of tightest().
   [[nodiscard]] bool uniform_limits() const { return uniform_limits_; }
 
-  // Does any link yield; from which difference on, on any axis, the link v → up(v, d) does, that of its ends
-  // which yields first (m, infinite: never); and from which on some link in that direction does.
-  [[nodiscard]] bool yields() const { return yields_; }
+  // has_plasticity(): some link has a finite yield. yield_m(): difference (m, on any axis) beyond which the
+  // link v → up(v, d) yields, the smaller of its two ends'; infinite: never. first_yield_m(): the smallest
+  // yield_m() in direction d.
+  [[nodiscard]] bool has_plasticity() const { return has_plasticity_; }
   [[nodiscard]] float yield_m(VoxelId v, int d) const {
     return yield_m_[static_cast<std::size_t>(d)][pair_of(label_[v], label_[grid_.up(v, d)])];
   }
@@ -206,15 +205,14 @@ class Lattice {
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
-  // What is known of a row in one byte: how many voxels it has, and, beyond kRow, that it is full and inside
-  // a label (see inside()); above that which of its voxels are anchored. A byte for each voxel was rejected:
-  // anchors on a side of an object lie in all of its pages.
+  // One byte a row. Low bits: number of voxels, or kInside if the row is full and inside a label (see
+  // inside()). Top two bits: which of its voxels are anchored.
   enum class Anchors : std::uint8_t { none = 0, all = 1, some = 2 };
   static constexpr std::uint8_t kCount = 63, kInside = kRow + 1;
   static constexpr int kAnchorShift = 6;
   static constexpr std::size_t kListBlock = 64;  // rows
   [[nodiscard]] Anchors anchors_of(RowId row) const { return Anchors(rows_[row] >> kAnchorShift); }
-  // Of a row in which some voxels are anchored and others are not.
+  // Anchored lanes of a row with Anchors::some.
   [[nodiscard]] std::uint32_t listed_anchors(RowId row) const noexcept;
 
   [[nodiscard]] std::size_t pair_of(std::uint8_t a, std::uint8_t b) const {
@@ -228,7 +226,7 @@ class Lattice {
   void fill_links(const LatticeOptions& options);
   void fill_force_scale();
   void find_surface();
-  // ---- parts without slack (rigid_components.cpp) ----
+  // ---- blocks without slack (rigid_components.cpp) ----
   [[nodiscard]] bool without_slack(VoxelId v) const {
     return materials_[material_[label_[v]]].without_slack();
   }
@@ -243,11 +241,11 @@ class Lattice {
   glm::dvec3 spacing_m_{1e-3};
   double min_spacing_m_ = 1e-3, max_spacing_m_ = 1e-3;
   double force_scale_N_ = 0.0;
-  bool uniform_limits_ = true, yields_ = false, has_bricks_ = false;
+  bool uniform_limits_ = true, has_plasticity_ = false, has_bricks_ = false;
   std::size_t voxel_count_ = 0, anchored_count_ = 0, material_count_ = 1;
   LazyArray<std::uint8_t> label_, rows_;
   std::vector<std::uint32_t> listed_before_;  // [row / kListBlock] rows in anchored_ with smaller ids
-  std::vector<std::uint32_t> anchored_;       // lanes of rows of which some are
+  std::vector<std::uint32_t> anchored_;       // lanes of the rows with Anchors::some
   std::array<std::uint8_t, 256> material_{};  // label → number among equal materials; 0: empty
   std::vector<LinkMaterial> materials_;       // [material]
   std::vector<LinkModuli> moduli_;            // [material]; [0]: none
@@ -257,7 +255,7 @@ class Lattice {
   std::array<LinkLimit, 3> tightest_;
   std::array<std::vector<float>, 3> yield_m_;  // as limits_
   std::array<float, 3> first_yield_m_{};
-  LazyArray<std::uint16_t> part_;  // [v]; empty: there is none
+  LazyArray<std::uint16_t> block_;  // [v]; empty: no block
   std::size_t block_count_ = 0;
   std::vector<VoxelId> surface_;
   std::vector<std::uint32_t> surface_before_;  // [id / kSurfaceBlock] surface voxels with smaller ids

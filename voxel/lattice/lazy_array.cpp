@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Residency of pages: touching, returning, counting and copying them (Linux, /proc/self/pagemap).
 #include "voxel/lattice/lazy_array.h"
 
 #include <fcntl.h>
@@ -19,12 +20,12 @@ std::size_t page_bytes() {
   return bytes;
 }
 
-// What the system says of the pages of this process. Opened anew for each question: a child of fork() would
-// go on asking about its parent.
+// Page table entries of this process. Opened for each query, because a descriptor inherited through fork()
+// would still describe the parent.
 class PageMap {
  public:
-  // mincore() was rejected: it takes pages that were only read for memory, and those that are swapped out for
-  // none, and so copies would lose what these hold.
+  // mincore() is unsuitable: it counts pages that were only read and omits pages that are swapped out, so
+  // copies would lose the contents of these.
   using Entries = std::array<std::uint64_t, kPagesAtOnce>;
   static constexpr std::uint64_t kPresent = 1ULL << 63U, kSwapped = 1ULL << 62U, kMappedOnce = 1ULL << 56U;
 
@@ -35,7 +36,7 @@ class PageMap {
     if (file_ >= 0) ::close(file_);
   }
 
-  // False: the system does not tell.
+  // False: the system gives no information.
   [[nodiscard]] bool read(std::size_t first, std::size_t count, Entries& out) const noexcept {
     const auto bytes = static_cast<ssize_t>(count * sizeof(std::uint64_t));
     const auto from = static_cast<off_t>(first * sizeof(std::uint64_t));
@@ -50,12 +51,12 @@ bool all_zero(const char* at, std::size_t bytes) {
   return bytes == 0 || (at[0] == 0 && std::memcmp(at, at + 1, bytes - 1) == 0);
 }
 
-// Calls `visit(offset, bytes)` for what lies in pages that take memory of their own, a page or less at a
-// time. The page of zeros that reading maps is mapped many times, and nothing tells it from one that a child
-// of this process shares but what it holds. Where the system does not tell, that decides for all: pages of
-// zeros that were written are passed over then.
+// Calls `visit(offset, bytes)` for each page, or part of one, in the range that takes memory of its own.
+// Reading an untouched page maps the shared page of zeros. Page table entries do not distinguish it from a
+// page that is shared with a child process, so such a page is visited unless it contains only zeros. Without
+// information from the system the contents decide for all pages, and written pages of zeros are skipped.
 template <class Visit>
-void for_held(const void* at, std::size_t bytes, const Visit& visit) {
+void for_resident(const void* at, std::size_t bytes, const Visit& visit) {
   const PageMap map;
   PageMap::Entries entries{};
   const std::size_t page = page_bytes(), begin = reinterpret_cast<std::uintptr_t>(at), end = begin + bytes;
@@ -80,7 +81,7 @@ void populate(void* at, std::size_t bytes) noexcept {
   auto* bytes_at = static_cast<volatile std::uint8_t*>(at);
   if (bytes == 0) return;
   for (std::size_t n = 0; n < bytes; n += page) bytes_at[n] = bytes_at[n];
-  bytes_at[bytes - 1] = bytes_at[bytes - 1];  // what does not begin with a page may end in one more
+  bytes_at[bytes - 1] = bytes_at[bytes - 1];  // a range that starts within a page may end in one more page
 }
 
 void give_back(void* at, std::size_t bytes) noexcept {
@@ -92,13 +93,13 @@ void give_back(void* at, std::size_t bytes) noexcept {
 
 std::size_t resident_bytes(const void* at, std::size_t bytes) {
   std::size_t sum = 0;
-  if (bytes > 0) for_held(at, bytes, [&](std::size_t, std::size_t held) { sum += held; });
+  if (bytes > 0) for_resident(at, bytes, [&](std::size_t, std::size_t held) { sum += held; });
   return sum;
 }
 
 void copy_resident(void* to, const void* from, std::size_t bytes) noexcept {
   if (bytes == 0) return;
-  for_held(from, bytes, [&](std::size_t offset, std::size_t held) {
+  for_resident(from, bytes, [&](std::size_t offset, std::size_t held) {
     std::memcpy(static_cast<char*>(to) + offset, static_cast<const char*>(from) + offset, held);
   });
 }

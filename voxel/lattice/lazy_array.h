@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Arrays whose memory the operating system provides page by page, where they are written.
+//
+// Untouched elements are zero and cost address space only. Copies and memory counts skip untouched pages.
 #pragma once
 
 #include <sys/mman.h>
@@ -13,9 +16,8 @@
 
 namespace voxel {
 
-// A fixed number of zeros that take memory only where something was written (a page at a time, by the
-// operating system): untouched tissue costs address space and nothing else. A table of bricks in our own
-// hands was rejected: one more indirection in every inner loop, for what the memory unit does anyway.
+// A fixed number of elements, zero at first. Element access has no indirection: the memory management unit
+// does the page look-up.
 template <class T>
 class LazyArray {
   static_assert(std::is_trivially_copyable_v<T>);
@@ -28,7 +30,8 @@ class LazyArray {
     void* at = ::mmap(nullptr, count * sizeof(T), PROT_READ | PROT_WRITE,
                       MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
     if (at == MAP_FAILED) throw std::bad_alloc();
-    // Huge pages would take 2 MiB for one voxel. Not every kernel has them, so a refusal is no error.
+    // A huge page would take 2 MiB for one voxel. A kernel without huge pages refuses the call; this is no
+    // error.
     (void)::madvise(at, count * sizeof(T), MADV_NOHUGEPAGE);
     data_ = static_cast<T*>(at);
   }
@@ -62,15 +65,15 @@ class LazyArray {
     return std::equal(a.begin(), a.end(), b.begin(), b.end());
   }
 
-  // Gives every page its memory now: what a first touch of each takes (about a microsecond) is then not taken
-  // from a tick.
+  // Touches every page now, so that a tick does not pay for the page faults (about a microsecond each).
   void populate() noexcept;
-  // The same of those parts of `each` values, one after the other, that are `wanted`, and of what shares a
-  // page with them.
+  // The same for chunks: chunk n, values n·each to (n + 1)·each − 1, is touched if wanted[n]. Values on the
+  // same pages are touched too.
   void populate(std::size_t each, const std::vector<bool>& wanted) noexcept;
-  // Memory that what was written so far takes (unit: byte); what was only read takes none.
+  // Bytes of pages that were written so far; pages that were only read take no memory.
   [[nodiscard]] std::size_t resident_bytes() const;
-  // Copies what `other`, of the same size, holds; pages that hold nothing stay untouched.
+  // Copies `other`, which has the same size. Its untouched pages are skipped, so this array must be zero
+  // there.
   void copy_from(const LazyArray& other) noexcept;
 
  private:
@@ -79,24 +82,24 @@ class LazyArray {
 };
 
 void populate(void* at, std::size_t bytes) noexcept;
-// What is there is not needed any more, but for its destructor: whole pages go back to the system, and read
-// as zeros.
+// Returns the whole pages of a range to the system; they read as zeros afterwards. For memory that only its
+// destructor still needs.
 void give_back(void* at, std::size_t bytes) noexcept;
-// How many of `bytes` from `at` on take memory of their own. A page that was only read does not: all such
-// pages are the same one, of zeros.
+// Number of bytes in [at, at + bytes) whose pages take memory of their own. Pages that were only read do not:
+// they all map the one page of zeros.
 [[nodiscard]] std::size_t resident_bytes(const void* at, std::size_t bytes);
-// Copies only pages of `from` that hold anything. Both are mappings of `bytes`, `to` of zeros.
+// Copies the touched pages of `from`. Both are mappings of `bytes`; `to` contains zeros.
 void copy_resident(void* to, const void* from, std::size_t bytes) noexcept;
 
-// For vectors that have room for the most there can ever be, and mostly hold next to nothing: theirs is
-// address space of their own. From the C library they get, once larger ones were freed, what those had
-// written to.
+// Allocator for vectors with a large capacity that is mostly unused. Large blocks are mappings of their own:
+// malloc() may reuse freed blocks, whose pages already take memory.
 template <class T>
-struct LazyRoom {
+struct LazyAllocator {
   using value_type = T;
-  LazyRoom() = default;
+  LazyAllocator() = default;
   template <class Other>
-  LazyRoom(const LazyRoom<Other>&) noexcept {}  // NOLINT(google-explicit-constructor): an allocator's
+  LazyAllocator(const LazyAllocator<Other>&) noexcept {
+  }  // NOLINT(google-explicit-constructor): an allocator's
 
   [[nodiscard]] T* allocate(std::size_t count) {
     if (count * sizeof(T) < kLeast) return std::allocator<T>().allocate(count);
@@ -114,7 +117,7 @@ struct LazyRoom {
     }
   }
   template <class Other>
-  bool operator==(const LazyRoom<Other>&) const noexcept {
+  bool operator==(const LazyAllocator<Other>&) const noexcept {
     return true;
   }
 
@@ -122,9 +125,9 @@ struct LazyRoom {
   static constexpr std::size_t kLeast = std::size_t{1} << 16U;  // bytes
 };
 template <class T>
-using LazyVector = std::vector<T, LazyRoom<T>>;
+using LazyVector = std::vector<T, LazyAllocator<T>>;
 
-// Of what a vector has room for, what takes memory: room that is reserved and not used does not.
+// Bytes of a vector's capacity that take memory; untouched capacity takes none.
 template <class T, class Allocator>
 [[nodiscard]] std::size_t resident_bytes(const std::vector<T, Allocator>& v) {
   return resident_bytes(v.data(), v.capacity() * sizeof(T));

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Classification of rows, and links and contents of coarse cells.
 #include "voxel/lattice/level_stiffness.h"
 
 #include <algorithm>
@@ -86,8 +87,8 @@ void LevelStiffness::keep_cells() {
   }
 }
 
-// What a cell holds: it is held where all it holds is. Where only some is, that holds on to it (see
-// Multigrid::hold_cells).
+// A cell is `held` if all voxels in it are anchored. If only some are, boundary springs act on the cell
+// (voxel/multigrid/boundary_springs.h).
 LevelStiffness::Content LevelStiffness::content(const std::array<int, 3>& cell) const noexcept {
   const auto [i, j, k] = cell;
   if (level_ == 0) {
@@ -110,7 +111,8 @@ LevelStiffness::Content LevelStiffness::content_from_finer(const std::array<int,
   return all;
 }
 
-// The link of a cell to its upper neighbour in d: what was or will be written for it, to the last bit.
+// Link of a cell to its upper neighbour in d, equal to the last bit to the written one, whether written yet
+// or not.
 Spring LevelStiffness::link(const std::array<int, 3>& cell, int d) const noexcept {
   const auto ud = static_cast<std::size_t>(d);
   for (std::size_t a = 0; a < 3; ++a) {
@@ -134,7 +136,7 @@ Spring LevelStiffness::link_from_finer(const std::array<int, 3>& cell, int d) co
   std::array<Spring, 4> fine;
   for (std::size_t n = 0; n < 4; ++n) {
     std::array<int, 3> at{};
-    at[ud] = 2 * cell[ud] + 1;  // the last layer of this cell; the link crosses to the next one's first
+    at[ud] = 2 * cell[ud] + 1;  // last layer of this cell; the link leads to the first of the next
     at[p] = 2 * cell[p] + static_cast<int>(n & 1);
     at[q] = 2 * cell[q] + static_cast<int>(n >> 1);
     fine[n] = finer_->link(at, d);

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The springs of one level of the multigrid hierarchy, row by row, as inner loops want them.
+// Springs of one level of the multigrid hierarchy, row by row, in the layout of the inner loops.
 //
-// Level 0 is the lattice; a cell of level l stands for 2×2×2 cells of the level below it. A coarse link is as
-// many fine links side by side as cross the face between its two cells, each 2^l times as long: half the sum
-// of the four of the level below. Rows inside a region of one label share one set of constants; any other row
-// has its springs written out when it is first asked for. So untouched tissue costs nothing: what is kept of
-// it from the start is the links of coarse levels alone, a few hundredths of a byte a voxel.
+// Level 0 is the lattice. A cell of level l stands for 2×2×2 cells of the next finer level. A coarse link
+// combines the four finer links that cross the face between its two cells, side by side, each twice as long:
+// half of their sum. Rows inside a region of one label share one set of constants. Any other row is written
+// out when it is first prepared, so untouched tissue costs almost no memory: only the links of levels from
+// kKept on are stored from the start.
 #pragma once
 
 #include <array>
@@ -19,20 +19,20 @@
 
 namespace voxel {
 
-// Springs of one row on one axis: up[d][i] is the link of voxel i to its upper neighbour in d (N/m), 0 where
+// Springs of one row on one axis: up[d][i] is the link of voxel i to its upper neighbour in d (N/m), 0 if
 // there is none.
 struct RowSprings {
   std::array<const float*, 3> up{}, down{};
-  const float* inverse = nullptr;  // 1 / Σ; 0 where nothing may move
+  const float* inverse = nullptr;  // 1 / (sum over the six links); 0 for immovable voxels
 };
 
-// Those of all axes: [d][lane], what the link in d weighs on its own axis and on the two others. Links down
-// are those up of the row below, and read from there.
-struct RowStiffness {  // all is written by who finds them: with zeros before that, a row took a tenth longer
+// Springs of one row on all axes: [d][lane], along the link in d and across it. Down-links are the up-links
+// of the row below and are read from there.
+struct RowStiffness {  // uninitialised for speed: all() writes every member
   const float *up_along, *up_across;
   std::array<const float*, 3> down_along, down_across;  // [d], each of [lane]
   const float* inverse;                                 // [axis][lane]
-  // [lane] bit `axis`: inverse is 0. A twelfth of what there is to read of that.
+  // [lane] bit `axis`: inverse is 0. One byte to read instead of three floats.
   const std::uint8_t* stands;
   bool uniform;  // the same in every lane
 };
@@ -41,7 +41,7 @@ using LaneBits = std::array<std::uint8_t, kRow>;
 
 using Lanes = std::array<float, kRow>;
 
-// Limits of all links of a lattice, or of a label, on one axis: low[d] <= u(up) − u(v) <= high[d].
+// Limits on one axis for links with common limits: low[d] <= u(up) − u(v) <= high[d].
 struct AxisLimits {
   std::array<float, 3> low{}, high{};
 
@@ -55,42 +55,42 @@ struct AxisLimits {
   }
 };
 
-// Limits of the links of one row of voxels: the same for all, or lane by lane, [d], without end where there
-// is no link.
+// Limits of the links of one row: common to all lanes, or lane by lane, [d]. A missing link has limits of
+// ± the largest float.
 struct RowLimits {
   struct Written {
     std::array<Lanes, 3> up_low, up_high, up_across, down_low, down_high, down_across;
     std::array<AxisLimits, 3> tightest;  // [axis] no link is tighter
   };
   const std::array<AxisLimits, 3>* of = nullptr;  // [axis] no link is tighter
-  const Written* lanes = nullptr;                 // null: all are as tight as that
+  const Written* lanes = nullptr;                 // null: all links have exactly those limits
 };
 
 class LevelStiffness {
  public:
-  // The first level whose links and contents are kept for all cells. To find one of its rows from those below
-  // took a millisecond where tissues mix; written out as inner loops want them (1.5 kB a row), they took
-  // three times as much memory.
+  // First level whose links and contents are stored for all cells. On finer levels they are found from the
+  // next finer level on demand. Recursion over more levels would take too long in a tick where tissues mix.
   static constexpr int kKept = 3;
 
-  // `finer`: the level below, kept by the caller; none for level 0.
+  // `finer`: the next finer level, owned by the caller; null for level 0.
   LevelStiffness(const Lattice& lattice, const LevelStiffness* finer);
 
   [[nodiscard]] const Grid& grid() const { return grid_; }
   [[nodiscard]] int level() const { return level_; }
 
-  // Is there any cell in this row? Finds out, and writes out the springs where they are not uniform: call it
-  // before what follows. Allocates address space never, pages of memory the first time.
+  // Does the row contain a cell? The first call for a row classifies it and writes out springs that are not
+  // uniform. Call it before the functions below that read a row. It never allocates address space, but the
+  // first call may touch new pages.
   bool prepare(RowId row) noexcept {
     if ((kind_[row] & ready) == 0) make_ready(row);
     return kind(row) != empty;
   }
-  // Rows in which there is anything, and those beside them, whose values are read with theirs.
+  // Rows with any cell, and the six rows beside each, whose values are read together with it.
   [[nodiscard]] std::vector<bool> rows_in_use();
   [[nodiscard]] bool uniform(RowId row) const { return kind(row) == one_label; }
   [[nodiscard]] RowSprings springs(RowId row, int axis) const noexcept;
-  // By reference, and member by member: returned by value it was written and read back at once in pieces of
-  // different sizes, which took longer than to smooth an octet.
+  // Springs of a prepared row. By reference and member by member, for speed: a result by value is stored and
+  // reloaded at once in pieces of different sizes.
   void all(RowId row, RowStiffness& out) const noexcept {
     const Kind what = kind(row);
     if (what == one_label) {
@@ -123,7 +123,7 @@ class LevelStiffness {
     out.down_across.fill(zeros_[0].data());
     out.stands = immovable_.data();
   }
-  // Has what a correction reads of a row fetched into the cache meanwhile; of one that was found.
+  // Prefetches the data of a prepared row that a correction reads.
   void fetch_ahead(RowId row) const noexcept {
     if (kind(row) != mixed) return;
     const std::uint32_t at = written_at_[row];
@@ -133,24 +133,24 @@ class LevelStiffness {
     __builtin_prefetch(tightest);
     __builtin_prefetch(tightest + sizeof(RowLimits::Written::tightest) - 1);
   }
-  // [lane] 1 / number of cells of the level below; 0 where there is none. Not of level 0, of a prepared row.
+  // [lane] 1 / (number of finer cells in the cell); 0 if there is none. For prepared rows of coarse levels.
   [[nodiscard]] const float* share(RowId row) const noexcept {
     if (kind(row) == one_label) return eighths_.data();
     return kind(row) == mixed ? written_cells_[written_at_[row]].share.data() : zeros_[0].data();
   }
-  // [lane] 1 where there is a cell, 0 elsewhere; the same.
+  // [lane] 1 for a cell, 0 otherwise. For prepared rows of coarse levels.
   [[nodiscard]] const float* filled(RowId row) const noexcept {
     if (kind(row) == one_label) return ones_.data();
     return kind(row) == mixed ? written_cells_[written_at_[row]].filled.data() : zeros_[0].data();
   }
-  // Of level 0.
+  // Limits of a prepared row of level 0.
   [[nodiscard]] RowLimits limits(RowId row) const noexcept;
-  // Those of one voxel or cell, on all axes; a few loads once its row was prepared, which it sees to.
+  // Springs of one voxel or cell on all axes. Prepares its row; afterwards it takes a few loads.
   [[nodiscard]] VoxelSprings springs_of(VoxelId cell) noexcept;
-  // The same to the last bit, and nothing is written out for it: slower where nobody prepared its row.
+  // The same to the last bit, without preparing the row: slower if the row is not prepared.
   [[nodiscard]] VoxelSprings find_springs(VoxelId cell) const noexcept;
-  // Is there a voxel in this cell of the grid?
-  [[nodiscard]] bool holds_any(const std::array<int, 3>& cell) const noexcept {
+  // Does this cell of the grid contain a voxel?
+  [[nodiscard]] bool has_voxel(const std::array<int, 3>& cell) const noexcept {
     return content(cell) != nothing;
   }
   [[nodiscard]] const Lattice& lattice() const { return lattice_; }
@@ -158,13 +158,14 @@ class LevelStiffness {
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
-  // `ready`: so are the rows whose links up are those down of this one, unless they are the same anyway.
+  // `ready`: the row is classified. For a mixed row, so are the rows below it, whose up-links are its
+  // down-links.
   enum Kind : std::uint8_t { unknown = 0, empty, one_label, mixed, ready };
   enum Content : std::uint8_t { nothing = 0, some = 1, held = 2 };
   static Content together(Content a, Content b) { return a == nothing || (a == held && b == some) ? b : a; }
-  // Springs of a mixed row: of the links up, [d][lane]; before those in x, the link of the voxel before the
-  // first. (With those down, which are their neighbours', and what is now Cells, a cycle round a contact
-  // waited for 2.2 kB a row.)
+  // Springs of a mixed row: of its up-links, [d][lane]. The entry before lane 0 in x is the down-link of lane
+  // 0. The other down-links are stored with their own rows, and Cells apart, so that a cycle reads less
+  // memory.
   struct alignas(64) Written {
     static constexpr std::size_t kBefore = 8;
     std::array<float, kBefore + std::size_t{3} * kRow> along, across;
@@ -173,19 +174,19 @@ class LevelStiffness {
     [[nodiscard]] const float* up_along(std::size_t d) const { return along.data() + kBefore + d * kRow; }
     [[nodiscard]] const float* up_across(std::size_t d) const { return across.data() + kBefore + d * kRow; }
   };
-  struct Cells {  // of a mixed row of a coarse level
+  struct Cells {  // mixed row of a coarse level
     Lanes filled, share;
   };
-  struct Constant {  // springs of all rows of one label
+  struct Constant {  // common springs of the rows of one label
     std::array<Lanes, 3> along, across, inverse;
   };
 
   [[nodiscard]] Kind kind(RowId row) const noexcept { return static_cast<Kind>(kind_[row] & mixed); }
-  // The row whose links up in d, 1 or 2, lead to this one.
+  // The row whose up-links in d (1 or 2) lead to this row.
   [[nodiscard]] RowId below(RowId row, std::size_t d) const noexcept {
     return d == 1 ? row - 1 : row - grid_.row_z;
   }
-  // The links up in d of any row that was found.
+  // Up-links in d of any classified row.
   void find_up(RowId row, std::size_t d, const float*& along, const float*& across) const noexcept {
     along = across = zeros_[0].data();
     if (kind(row) == one_label) {
@@ -221,19 +222,18 @@ class LevelStiffness {
   int level_;
   Grid grid_;
   LazyArray<std::uint8_t> kind_, label_;   // [row]
-  LazyArray<std::uint8_t> content_;        // [cell], from kKept on; found on the fly below
-  std::array<LazyArray<Spring>, 3> link_;  // [d][cell], likewise: to its upper neighbour
+  LazyArray<std::uint8_t> content_;        // [cell], on levels from kKept on; empty on finer ones
+  std::array<LazyArray<Spring>, 3> link_;  // [d][cell], likewise: link to the upper neighbour
   LazyArray<std::uint32_t> written_at_;    // [row] into written_
   LazyArray<Written> written_;
-  LazyArray<Cells> written_cells_;  // as written_; none of level 0
-  // As written_, and apart from it: corrections read no more than this, and what they read stands together.
-  // (In there, to wait for it was a third of what it took to add a result.)
+  LazyArray<Cells> written_cells_;  // as written_; empty on level 0
+  // As written_, but a separate array: corrections read only this part, so their reads stay together.
   LazyArray<LaneBits> written_stands_;
-  LazyArray<RowLimits::Written> written_limits_;  // as written_; empty where all links have the same
+  LazyArray<RowLimits::Written> written_limits_;             // as written_; empty if all limits are alike
   std::array<std::array<AxisLimits, 3>, 256> label_limits_;  // [label][axis]
   std::uint32_t written_count_ = 0;
-  // Rows with the same springs share them: along a face or between layers there are thousands of each kind,
-  // and to wait for 2 kB of its own a row was a third of what a whole cycle of 10^6 voxels took.
+  // Rows with equal springs share one copy, found by a hash. Along a face or between layers thousands of rows
+  // are alike, and shared copies mean less memory to read.
   LazyArray<std::uint32_t> written_by_hash_;             // 1 + index into written_; 0: none
   std::array<std::unique_ptr<Constant>, 256> constant_;  // [label]
   Lanes ones_, eighths_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Rows of springs and limits that are written out because their voxels differ; equal rows share one copy.
+// Writes out the springs and limits of mixed rows. Equal rows share one copy.
 #include "voxel/lattice/level_stiffness.h"
 
 #include <algorithm>
@@ -13,7 +13,7 @@ namespace voxel {
 
 namespace {
 
-// FNV-1a, by words.
+// FNV-1a, on 64-bit words.
 template <class T>
 void add_to_hash(std::uint64_t& hash, const T& what) {
   static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % sizeof(std::uint64_t) == 0);
@@ -34,7 +34,7 @@ bool same_bits(const T& a, const T& b) {
 
 }  // namespace
 
-// Where what was just written after all others stands: there, or where the same was written before.
+// Index of the row written last, at written_count_: that of an equal earlier row if there is one.
 std::uint32_t LevelStiffness::find_written() noexcept {
   const std::uint32_t last = written_count_;
   std::uint64_t hash = 0xcbf29ce484222325;
@@ -43,7 +43,7 @@ std::uint32_t LevelStiffness::find_written() noexcept {
   if (written_cells_.size() > 0) add_to_hash(hash, written_cells_[last]);
   if (written_limits_.size() > 0) add_to_hash(hash, written_limits_[last]);
   const std::size_t mask = written_by_hash_.size() - 1;
-  // What is hashed last changes the high bits most.
+  // The words hashed last affect the high bits most, so the high half is folded in.
   for (std::size_t n = (hash ^ hash >> 32U) & mask;; n = (n + 1) & mask) {
     if (written_by_hash_[n] == 0) {
       written_by_hash_[n] = last + 1;
@@ -58,7 +58,7 @@ std::uint32_t LevelStiffness::find_written() noexcept {
   }
 }
 
-// After all that was written. False where there is nothing in the row.
+// Writes the springs of the row at index written_count_. False if the row is empty.
 bool LevelStiffness::write_out(RowId row) noexcept {
   Written& out = written_[written_count_];
   LaneBits& stands = written_stands_[written_count_];
@@ -83,7 +83,7 @@ void LevelStiffness::write_lane(std::size_t i, const VoxelSprings& springs, Writ
 }
 
 bool LevelStiffness::write_voxels(RowId row, Written& out, LaneBits& stands) const noexcept {
-  // Materials around the row, [lane + 1][z][y]: those at one place along the row stand together.
+  // Materials around the row, [lane + 1][z][y]: the nine of one place along x are adjacent.
   using Slice = std::array<std::uint8_t, 9>;
   std::array<Slice, kRow + 2> around{};
   for (std::size_t n = 0; n < 9; ++n) {
@@ -100,7 +100,7 @@ bool LevelStiffness::write_voxels(RowId row, Written& out, LaneBits& stands) con
     Slice a{}, b{};
     const std::size_t along = d == 1 ? 1 : 3, across = d == 1 ? 3 : 1;
     for (std::size_t n = 0; n < 9; ++n) {
-      // In the order of Lattice::spring(): sums round alike.
+      // In the order of Lattice::spring(), so that sums round alike.
       const std::size_t beside = d == 1 ? n / 3 : n % 3,
                         at = (d == 1 ? n % 3 : n / 3) * across + from * along;
       a[n] = around[x - 1 + beside][at];
@@ -114,7 +114,7 @@ bool LevelStiffness::write_voxels(RowId row, Written& out, LaneBits& stands) con
     const std::size_t x = i + 1;
     const auto v = static_cast<VoxelId>(row * kRow + i);
     any = any || around[x][4] != 0;
-    // Along a row little changes: mostly the links are those of the voxel before.
+    // Most voxels of a row have the links of the voxel before them.
     const bool as_before = i > 0 && around[x + 1] == around[x] && around[x] == around[x - 1] &&
                            around[x - 1] == around[x - 2] && anchored == lattice_.anchored(v);
     if (!as_before) {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The six-link energy: what a link's springs are worth.
+// The six-link energy: spring stiffness of a link.
 //
 // A link along d of length h_d has a spring of E·A/h_d along it and of G·A/h_d across it, A the product of
 // the two other spacings. A voxel is a node: an object, and a region of stiffer tissue within it, ends at the
 // centres of its outermost voxels. Around a link lie four cells of eight voxels, and the link stands for a
-// quarter of each: E and G are the mean of the four quarters, nothing where a voxel of the cell is missing.
+// quarter of each. E and G are the means of the four quarters; a quarter is 0 if its cell lacks a voxel.
 #pragma once
 
 #include <array>
@@ -14,26 +14,25 @@
 namespace voxel {
 
 // Springs E along and G across make pressing on a face of the lattice an anisotropic Laplace problem, whose
-// half-space feels the contact modulus 2·sqrt(E·G). This G makes it the elastic half-space's E/(1−ν²), the
-// only modulus that Hertz's ball and the flat punch ask for. Rejected: the shear modulus E/(2(1+ν)), up to 46
-// % off, and E/(4(1−ν²)), whose contact modulus is E/sqrt(1−ν²).
+// half-space has the contact modulus 2·sqrt(E·G). This G makes it E/(1−ν²), the contact modulus of an elastic
+// half-space and the only modulus in the solutions for Hertz's ball and the flat punch.
 [[nodiscard]] constexpr double across_modulus_Pa(double young_Pa, double poisson) {
   const double plane = 1.0 - poisson * poisson;
   return young_Pa / (4.0 * plane * plane);
 }
 
-// A link a→b, its parallels from a+s to b+s, s = (p, q) in the two directions across it, each −1, 0 or 1: the
-// one at (p, q) has number (p+1) + 3(q+1), and the link itself is number 4. p and q may be swapped.
+// A link a→b has nine parallels a+s → b+s. s = (p, q) is an offset in the two directions across the link,
+// each −1, 0 or 1. The parallel at (p, q) has number (p+1) + 3(q+1); the link itself is number 4. p and q may
+// be swapped.
 inline constexpr std::size_t kLinkItself = 4;
 
-// Share of its area that a link stands for, 0 < w <= 1. Bit n of `parallels` says whether link n exists, that
-// is, whether both of its ends are filled; bit 4 is taken as set.
+// Share of the area that a link stands for, 0 < w <= 1. Bit n of `parallels` is set if link n exists (both of
+// its ends are filled); bit 4 is taken as set.
 //
-// 1 within, 1/2 on a face, 1/4 on an edge, 3/4 along a notch. On a flat surface that makes the stiffness felt
-// by a wave right to second order in the spacing; whole links at the border are right only to first (Hertz's
-// ball: 8 % too much at a contact radius of 4 spacings, 5 % at 8).
-// A direction in which neither side exists has no inside: a sheet one voxel thick keeps the thickness of its
-// voxels, a row of voxels its whole area.
+// The share is 1 inside, 1/2 on a face, 1/4 on an edge, 3/4 along a notch. On a flat surface the stiffness
+// for a wave is then second-order accurate in the spacing. Whole links at the border would be first-order
+// accurate. A direction without a neighbour on either side does not reduce the share: a sheet one voxel thick
+// keeps the thickness of its voxels, a row of voxels its whole area.
 [[nodiscard]] constexpr double link_weight(std::uint32_t parallels) {
   const auto there = [parallels](int p, int q) { return (parallels >> (p + 1 + 3 * (q + 1)) & 1U) != 0; };
   int quarters = 0;
@@ -45,8 +44,8 @@ inline constexpr std::size_t kLinkItself = 4;
   return share(there(-1, 0), there(1, 0)) * share(there(0, -1), there(0, 1));
 }
 
-// The parallels of the link that leaves a voxel in direction +d, from what is filled around that voxel: bit
-// (x+1) + 3(y+1) + 9(z+1) for the voxel at offset (x, y, z), each −1, 0 or 1.
+// Parallels of the link of a voxel in direction +d. Bit (x+1) + 3(y+1) + 9(z+1) of `filled` is set if the
+// voxel at offset (x, y, z) exists; x, y and z are −1, 0 or 1.
 [[nodiscard]] constexpr std::uint32_t parallel_links(std::uint32_t filled, int d) {
   constexpr std::array<int, 3> kStep{1, 3, 9};
   const int along = kStep[static_cast<std::size_t>(d)];
@@ -63,27 +62,26 @@ inline constexpr std::size_t kLinkItself = 4;
 }
 
 struct LinkModuli {
-  double along_Pa = 0.0, across_Pa = 0.0;  // both 0 where there is no link
+  double along_Pa = 0.0, across_Pa = 0.0;  // both 0 if there is no link
 };
 
 [[nodiscard]] constexpr LinkModuli softer(const LinkModuli& a, const LinkModuli& b) {
   return b.along_Pa < a.along_Pa ? b : a;
 }
 
-// What a link is worth where materials meet, in two parts; `links[n]` is link n's material, the softer of its
-// two ends' (nothing where an end is missing). In one material the sum is that material's moduli times
+// Moduli of a link where materials meet, as a sum of two parts. `links[n]` has the moduli of parallel n: of
+// the softer of its two ends, 0 if an end is missing. In one material the sum is the material's moduli times
 // link_weight.
 struct LinkParts {
-  // The mean of the quarters, each of the softest voxel of its cell.
-  // Rejected: the two ends' moduli in series, as it ignores what lies beside the link (layers two spacings
-  // thick: +68 % where this is within 21 %).
+  // Mean of the four quarters; a quarter has the moduli of the softest voxel of its cell. The two ends in
+  // series would ignore the voxels beside the link.
   LinkModuli cells;
-  // What a sheet or row of voxels too thin to have a cell of its own stiffness has beyond that, as one in the
-  // air has; else skin in fat would not be there at all. Nothing where a quarter is as stiff as the link.
+  // Excess stiffness of a sheet or row of voxels too thin to fill a cell, as if it were in air. Without this
+  // part, thin skin in fat would have no stiffness of its own. 0 if a quarter is as stiff as the link.
   LinkModuli thin;
 };
 
-[[nodiscard]] constexpr LinkParts link_blocks(const std::array<LinkModuli, 9>& links) {
+[[nodiscard]] constexpr LinkParts link_parts(const std::array<LinkModuli, 9>& links) {
   const LinkModuli& own = links[kLinkItself];
   LinkParts out;
   bool thick = false;
@@ -103,16 +101,16 @@ struct LinkParts {
   return out;
 }
 
-// The springs of the six-link energy.
+// Moduli for the springs of the six-link energy.
 [[nodiscard]] constexpr LinkModuli link_moduli(const std::array<LinkModuli, 9>& links) {
-  const LinkParts parts = link_blocks(links);
+  const LinkParts parts = link_parts(links);
   return {parts.cells.along_Pa + parts.thin.along_Pa, parts.cells.across_Pa + parts.thin.across_Pa};
 }
 
-// The springs that stand beside the bricks of the accurate energy (voxel/fem/hex_element.h): the cells are
-// the bricks', what is too thin for a brick keeps its links, and both hold the same voxels.
+// Moduli for the springs beside the bricks of the accurate energy (voxel/fem/hex_element.h). Bricks replace
+// the cells; tissue too thin for a brick keeps its links. Both act on the same voxels.
 [[nodiscard]] constexpr LinkModuli link_moduli_beside_bricks(const std::array<LinkModuli, 9>& links) {
-  return link_blocks(links).thin;
+  return link_parts(links).thin;
 }
 
 }  // namespace voxel

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Whether a link is at one of its limits.
+// Tests whether a link is at one of its limits (an active limit).
 #pragma once
 
 #include "voxel/lattice/displacement.h"
@@ -7,14 +7,14 @@
 
 namespace voxel {
 
-// Of the spacing: a link that is nearer to a limit than this is at it (an active limit). A float of a displacement
-// of ten spacings is rounded by a hundredth of that.
+// Share of the spacing: a link nearer to a limit than this is at its limit. Rounding of a float displacement
+// of ten spacings is a hundredth of this.
 inline constexpr float kAtLimit = 1e-4F;
 
-// May any link of a voxel on one axis be within `share` of the spacing of a limit? By the tightest limits of
-// all, which is a tenth of the cost of looking at each link's own: most often the answer is no.
-inline bool may_be_tight(const Lattice& lattice, const Displacement& state, VoxelId v, int axis,
-                         float share) noexcept {
+// Quick test: false if no link of the voxel is within `share` of the spacing of a limit on this axis. Uses
+// the tightest limits of all links, which is much cheaper than each link's own, so true may be a false alarm.
+inline bool may_be_at_limit(const Lattice& lattice, const Displacement& state, VoxelId v, int axis,
+                            float share) noexcept {
   const auto& u = state.u[static_cast<std::size_t>(axis)];
   for (int d = 0; d < 3; ++d) {
     const LinkLimit& l = lattice.tightest(d);

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Loads and offsets of yielded links, voxel by voxel.
 #include "voxel/lattice/plastic_offsets.h"
 
 #include <algorithm>
@@ -11,8 +12,8 @@
 
 namespace voxel {
 
-RestOffsets::RestOffsets(const Lattice& lattice) {
-  if (!lattice.yields()) return;
+PlasticOffsets::PlasticOffsets(const Lattice& lattice) {
+  if (!lattice.has_plasticity()) return;
   for (auto& d : offset) {
     for (auto& axis : d) axis = LazyArray<float>(lattice.size());
   }
@@ -20,7 +21,7 @@ RestOffsets::RestOffsets(const Lattice& lattice) {
   row = LazyArray<std::uint8_t>(lattice.grid().rows());
 }
 
-std::size_t RestOffsets::memory_bytes() const {
+std::size_t PlasticOffsets::memory_bytes() const {
   std::size_t bytes = row.resident_bytes();
   for (const auto& d : offset) {
     for (const auto& axis : d) bytes += axis.resident_bytes();
@@ -45,7 +46,7 @@ void for_links(const Lattice& lattice, const Displacement& state, VoxelId v, con
       const Spring& spring = (up ? springs.up : springs.down)[d];
       for (std::size_t axis = 0; axis < 3; ++axis) {
         const LazyArray<float>& u = state.u[axis];
-        const float before = state.rest.offset_of(a, d, axis);
+        const float before = state.plastic.offset_of(a, d, axis);
         const float after = plastic_link(u[b] - u[a], before, yield).offset;
         visit(d, axis, up, before, after, spring.on(static_cast<int>(axis), id));
       }
@@ -58,7 +59,7 @@ void for_links(const Lattice& lattice, const Displacement& state, VoxelId v, con
 std::array<float, 3> plastic_load(const Lattice& lattice, const Displacement& state,
                                   const VoxelSprings& springs, VoxelId v) noexcept {
   std::array<float, 3> load{};
-  if (state.rest.row.size() == 0 || !lattice.filled(v)) return load;
+  if (state.plastic.row.size() == 0 || !lattice.filled(v)) return load;
   for_links(lattice, state, v, springs,
             [&](std::size_t, std::size_t axis, bool up, float, float after, float spring) {
               load[axis] += (up ? -after : after) * spring;
@@ -68,7 +69,7 @@ std::array<float, 3> plastic_load(const Lattice& lattice, const Displacement& st
 
 RowPlasticity plastic_row(LevelStiffness& couplings, Displacement& state, RowId row, bool keep) noexcept {
   const Lattice& lattice = couplings.lattice();
-  RestOffsets& rest = state.rest;
+  PlasticOffsets& rest = state.plastic;
   RowPlasticity out;
   for (VoxelId v = row * kRow; v < (row + 1) * kRow; ++v) {
     if (!lattice.filled(v)) continue;
@@ -79,7 +80,7 @@ RowPlasticity plastic_row(LevelStiffness& couplings, Displacement& state, RowId 
                 load[axis] += (up ? -after : after) * spring;
                 if (after == before) return;
                 if (!keep) {
-                  out.unkept = true;
+                  out.uncommitted = true;
                 } else if (up) {
                   rest.offset[d][axis][v] = after;
                 }

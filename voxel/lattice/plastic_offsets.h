@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What yielded links keep, and how they pull meanwhile.
+// Plastic offsets of yielded links, and their loads on voxels.
 //
-// A step goes from one state of rest to the next. Within it a link beyond its yield pulls no harder, which is
-// an extra load on its two ends; the state of rest is that of the convex energy of
-// voxel/lattice/plasticity.h, whatever the way there. When it is reached, the offsets are moved.
+// A step leads from one state of rest to the next. Within a step the force of a link stays constant beyond
+// its yield; the difference to its spring's force is a load on its two ends. The state of rest minimises the
+// convex energy of voxel/lattice/plasticity.h and does not depend on the path. The offsets move when it is
+// reached.
 #pragma once
 
 #include <array>
@@ -19,18 +20,18 @@ class Lattice;
 struct Displacement;
 struct VoxelSprings;
 
-struct RestOffsets {
-  RestOffsets() = default;
-  // Takes no memory where nothing has yielded, and no address space where nothing can.
-  explicit RestOffsets(const Lattice& lattice);
+struct PlasticOffsets {
+  PlasticOffsets() = default;
+  // Takes no memory for rows without a yielded link, and no address space if no link can yield.
+  explicit PlasticOffsets(const Lattice& lattice);
 
   // [d][axis][v]: rest difference of the link v → up(v, d) since the last state of rest (m).
   std::array<std::array<LazyArray<float>, 3>, 3> offset;
-  // [axis][v]: what offsets, and yielding since, add to the force of the springs (N).
+  // [axis][v]: load of the offsets, and of yielding since, beyond the force of the springs (N).
   std::array<LazyArray<float>, 3> load;
-  LazyArray<std::uint8_t> row;  // [row] 1 where any of its links has yielded
+  LazyArray<std::uint8_t> row;  // [row] 1 if any of its links has yielded
 
-  // Null where there is none.
+  // Null: no load.
   [[nodiscard]] const float* load_of(RowId r, int axis) const noexcept {
     if (row.size() == 0 || row[r] == 0) return nullptr;
     return load[static_cast<std::size_t>(axis)].data() + static_cast<std::size_t>(r) * kRow;
@@ -41,18 +42,18 @@ struct RestOffsets {
   [[nodiscard]] std::size_t memory_bytes() const;
 };
 
-// What offsets, and yielding, add to the force of its springs on a voxel where it and its neighbours are now
-// (N, per axis). Rows keep what they were told last; a contact wants to know it now, or a held tool and its
-// tissue answer one another's last round for ever.
+// Plastic load on a voxel at the present displacements (N, per axis). The loads of rows date from their last
+// renewal. A contact needs the present load: with the old one, a held tool and its tissue would keep reacting
+// to each other's last round and never come to rest.
 std::array<float, 3> plastic_load(const Lattice& lattice, const Displacement& state,
                                   const VoxelSprings& springs, VoxelId v) noexcept;
 
 struct RowPlasticity {
-  float moved_m = 0.0F;  // how far the change of its load would move a voxel of the row
-  bool unkept = false;   // some link is beyond what it keeps
+  float moved_m = 0.0F;      // largest motion of a voxel of the row by the change of its load
+  bool uncommitted = false;  // some link is beyond its yield, and its offset has not moved
 };
 
-// Renews the loads of a row; `keep`: its links also keep what is beyond their yield. `couplings`: of level 0.
+// Renews the loads of a row. `keep`: also moves the offsets of its yielded links. `couplings`: of level 0.
 RowPlasticity plastic_row(LevelStiffness& couplings, Displacement& state, RowId row, bool keep) noexcept;
 
 }  // namespace voxel

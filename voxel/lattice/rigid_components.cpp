@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Parts of an object whose links have no slack at all: found once, since labels do not change.
+// Finds blocks of an object whose links have no slack. Once, because labels do not change.
 #include <algorithm>
 #include <numeric>
 #include <vector>
@@ -13,7 +13,8 @@ bool Lattice::any_without_slack() const {
                      [](const LinkMaterial& m) { return m.without_slack(); });
 }
 
-// Adds to `voxels` what hangs together with them, as far as `enter` is true, once for each.
+// Flood fill: appends to `voxels` all voxels without slack that are connected to them, where `enter` returns
+// true. `enter` must return true at most once per voxel.
 template <class Enter>
 void Lattice::flood(std::vector<VoxelId>& voxels, const Enter& enter) const {
   for (std::size_t head = 0; head < voxels.size(); ++head) {
@@ -25,7 +26,7 @@ void Lattice::flood(std::vector<VoxelId>& voxels, const Enter& enter) const {
   }
 }
 
-// What hangs on an anchor without slack cannot move either.
+// Anchors all voxels that are connected without slack to an anchored voxel.
 void Lattice::anchor_blocks(LazyArray<std::uint32_t>& lanes) {
   if (!any_without_slack()) return;
   std::vector<VoxelId> voxels;
@@ -47,7 +48,7 @@ void Lattice::anchor_blocks(LazyArray<std::uint32_t>& lanes) {
 
 void Lattice::find_blocks() {
   if (!any_without_slack()) return;
-  LazyArray<std::uint32_t> found(grid_.size());  // 1 + number; 0: in none
+  LazyArray<std::uint32_t> found(grid_.size());  // component number, from 1 on; 0: none
   std::vector<std::size_t> sizes;
   std::vector<VoxelId> voxels;
   for (RowId row = 0; row < grid_.rows(); ++row) {
@@ -75,11 +76,11 @@ void Lattice::find_blocks() {
     number_of[n + 1] = static_cast<std::uint16_t>(++block_count_);
   }
   if (block_count_ == 0) return;
-  part_ = LazyArray<std::uint16_t>(grid_.size());
+  block_ = LazyArray<std::uint16_t>(grid_.size());
   for (RowId row = 0; row < grid_.rows(); ++row) {
     if (filled_in(row) == 0) continue;
     for (VoxelId v = row * kRow; v < (row + 1) * kRow; ++v) {
-      if (found[v] != 0 && number_of[found[v]] != 0) part_[v] = number_of[found[v]];
+      if (found[v] != 0 && number_of[found[v]] != 0) block_[v] = number_of[found[v]];
     }
   }
 }

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Where voxel (i, j, k) of a lattice stands in memory.
+// Memory layout of a lattice: the index of voxel (i, j, k).
 //
-// Voxels are stored in rows of kRow along x. A row's neighbours in y and z stand a constant number of rows
-// away, so inner loops are plain strides; only along x does the next row stand elsewhere. A page of memory
-// holds rows that are near one another in y, so a small contact touches little of it. There is an empty row
-// on every side: every voxel has six neighbours, and no bound is ever checked.
+// Voxels are stored in rows of kRow along x. A row's neighbours in y and z lie a constant number of rows
+// away, so inner loops are plain strides. The next row along x lies in another column. A page of memory
+// contains rows that are near one another in y, so a small contact touches few pages. An empty row borders
+// every side: every voxel has six neighbours, and no bound is checked.
 #pragma once
 
 #include <array>
@@ -27,19 +27,19 @@ struct Grid {
         row_x(row_z * (static_cast<RowId>(voxels[2]) + 2)) {}
 
   std::array<int, 3> dims{0, 0, 0};  // voxels, without the border
-  int columns = 0;                   // rows side by side along x, the empty ones at both ends included
-  RowId row_z = 1, row_x = 1;        // rows from one to its neighbour in z, in x; 1 in y
+  int columns = 0;                   // rows along x, including the empty ones at both ends
+  RowId row_z = 1, row_x = 1;        // rows between neighbours in z, in x; 1 in y
 
   [[nodiscard]] std::size_t rows() const {
     return static_cast<std::size_t>(columns) * static_cast<std::size_t>(row_x);
   }
   [[nodiscard]] std::size_t size() const { return rows() * kRow; }
 
-  // Voxel (i, j, k); each from -1 to dims, both included.
+  // Voxel (i, j, k); each from -1 to dims, inclusive.
   [[nodiscard]] VoxelId at(int i, int j, int k) const {
     return row(((i + kRow) / kRow), j, k) * kRow + static_cast<VoxelId>((i + kRow) % kRow);
   }
-  // Row of column c (1: the one with i = 0), of y = j and z = k.
+  // Row in column c (column 1 starts at i = 0), y = j, z = k.
   [[nodiscard]] RowId row(int c, int j, int k) const {
     return static_cast<RowId>(c) * row_x + static_cast<RowId>(k + 1) * row_z + static_cast<RowId>(j + 1);
   }
@@ -54,7 +54,7 @@ struct Grid {
             static_cast<int>(in_column / row_z) - 1};
   }
 
-  // The neighbour one further, or one back, on axis d.
+  // Next and previous neighbour on axis d.
   [[nodiscard]] VoxelId up(VoxelId v, int d) const {
     if (d == 0) return v % kRow == kRow - 1 ? v + (row_x - 1) * kRow + 1 : v + 1;
     return v + (d == 1 ? 1U : row_z) * kRow;

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Eight floats at a time: the width all of today's machines have, and a quarter of a row.
-// (Sixteen, where a machine has them, were rejected: with GCC 12 a row is smoothed in the same time, and
-// passes that combine comparisons take 1.5 times as long.)
+// Vectors of eight floats, a quarter of a row: the width of AVX2.
 //
-// Only for inside of functions marked HYBRID_MULTIVERSIONED: everything here is inlined into them. Vectors
-// are passed by reference, since how they are passed by value depends on the machine.
+// Use only inside functions marked HYBRID_MULTIVERSIONED: everything here is inlined into them. Vectors are
+// passed by reference, because the calling convention by value depends on the target machine.
 #pragma once
 
 #include <array>
@@ -22,7 +20,7 @@ inline constexpr int kLaneGroups = kRow / kLanes;  // in a row
 using Float8 = float __attribute__((vector_size(32)));
 using Mask8 = std::int32_t __attribute__((vector_size(32)));  // a lane is 0 or −1
 
-// Octets first … last of a row, both included.
+// Lane groups first … last of a row, inclusive.
 struct LaneSpan {
   int first = 0, last = kLaneGroups - 1;
 
@@ -37,14 +35,15 @@ HYBRID_INLINE void load(Float8& to, const float* from) {
 HYBRID_INLINE void store(float* to, const Float8& from) {
   std::memcpy(to, &from, sizeof from);
 }
-// Lane i of `down` is lane i − 1 of the values that go on from `before` into `own`; of `up`, lane i + 1.
+// Shifts by one lane. Lane i of `down` is lane i − 1 of `own`, lane 0 the last of `before`. Lane i of `up` is
+// lane i + 1 of `own`, the last lane the first of `after`.
 HYBRID_INLINE void shift_down(Float8& down, const Float8& before, const Float8& own) {
   down = __builtin_shufflevector(before, own, 7, 8, 9, 10, 11, 12, 13, 14);
 }
 HYBRID_INLINE void shift_up(Float8& up, const Float8& own, const Float8& after) {
   up = __builtin_shufflevector(own, after, 1, 2, 3, 4, 5, 6, 7, 8);
 }
-// Where the mask is set `a`, elsewhere `b`.
+// Per lane: `a` if the mask is set, else `b`.
 HYBRID_INLINE void select(Float8& out, const Mask8& mask, const Float8& a, const Float8& b) {
   out = mask ? a : b;
 }
@@ -65,7 +64,7 @@ HYBRID_INLINE float largest(const Float8& x) {
   take_largest(most, Float8(__builtin_shufflevector(most, most, 2, 3, 2, 3, 2, 3, 2, 3)));
   return most[1] > most[0] ? most[1] : most[0];
 }
-// Lanes whose byte has any of these bits.
+// Mask of the lanes whose byte has any of these bits.
 HYBRID_INLINE void bits_set(Mask8& out, const std::uint8_t* bytes, int bits) {
   using Bytes = std::uint8_t __attribute__((vector_size(8)));
   Bytes b;
@@ -73,7 +72,7 @@ HYBRID_INLINE void bits_set(Mask8& out, const std::uint8_t* bytes, int bits) {
   out = (__builtin_convertvector(b, Mask8) & bits) != 0;
 }
 
-// Bit i is set where lane i of the mask is.
+// Bit i is set if lane i of the mask is set.
 HYBRID_INLINE std::uint32_t lanes_set(const Mask8& mask) {
   std::array<std::int32_t, kLanes> lanes;
   std::memcpy(lanes.data(), &mask, sizeof mask);

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Compiles a function for several vector widths. The loader picks one when the program starts.
+//
+// All versions give the same bits: the operations are element-wise, and contraction is off. Sanitizers do not
+// support ifunc resolvers at start-up, so a sanitizer build names the one width of its machine
+// (cmake/HybridTarget.cmake).
 #pragma once
 
-// Compiles a function for several vector widths; the loader picks one when the program starts. All give the
-// same bits, because the operations are element-wise and contraction is off. The start-up of sanitizers does
-// not support ifunc resolvers, so there the build names the one width that its machine has
-// (cmake/HybridTarget.cmake).
 #if defined(__clang__) || !defined(__x86_64__)
 #define HYBRID_MULTIVERSIONED
 #define HYBRID_MULTIVERSIONED_512
@@ -19,6 +20,6 @@
 #define HYBRID_MULTIVERSIONED_512
 #else
 #define HYBRID_MULTIVERSIONED __attribute__((target_clones("default", "avx2")))
-// For functions that need many registers: AVX-512 has 32 and saves spills to the stack.
+// For functions that need many registers: the 32 of AVX-512 avoid spills to the stack.
 #define HYBRID_MULTIVERSIONED_512 __attribute__((target_clones("default", "avx2", "arch=x86-64-v4")))
 #endif

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Per-voxel link queries, and the minimum of energy outside an obstacle.
 #include "voxel/lattice/voxel_links.h"
 
 #include <algorithm>
@@ -10,7 +11,7 @@
 namespace voxel {
 namespace {
 
-// What pulls a voxel beside its springs: bricks, or links that yielded. No object has both.
+// Load on a voxel beyond its springs: of bricks or of plastic offsets. No object has both.
 std::array<float, 3> load_beside_springs(const Lattice& lattice, const Displacement& state,
                                          const VoxelSprings& springs, VoxelId v) noexcept {
   return lattice.has_bricks() ? state.bricks.at(v) : plastic_load(lattice, state, springs, v);
@@ -179,17 +180,17 @@ glm::dvec3 no_deeper(const Obstacle& o, const glm::dvec3& before, const glm::dve
 
 namespace {
 
-// From `wanted`, where its links alone would have a voxel, to the place of least energy that both these and
-// the obstacle allow: along the way that the obstacle presses, w · n of each axis, as far as it lies in the
-// interval of that axis. (Projected onto the obstacle first and clamped to the intervals then, what a link at
-// its limit kept from the one axis was missing on the others as well, and voxels rested off the obstacle:
-// below a ball 0.07 spacings from it, pulled towards it by half of what the ball presses such a voxel with.)
+// Place of least energy within the intervals low … high and outside the obstacle. `wanted` is the minimum
+// without either; w is the compliance. The obstacle's multiplier grows from 0 and moves each axis at the rate
+// w·n, while that axis lies in its interval, until the place is outside. A projection that is clamped
+// afterwards would be wrong: an axis at its limit would not be compensated by the other axes.
 glm::dvec3 least_outside(const Obstacle& o, const glm::dvec3& w, const glm::dvec3& wanted,
                          const glm::dvec3& low, const glm::dvec3& high) noexcept {
   const glm::dvec3 n(o.normal), rate = w * n;
   glm::dvec3 place = glm::clamp(wanted, low, high);
-  double depth = depth_in_obstacle(o, place), pressed = 0.0;  // by so much has the obstacle pressed so far
-  for (int part = 0; part < 6 && depth > 0.0; ++part) {       // of the way: an axis begins to move, or ends
+  double depth = depth_in_obstacle(o, place), pressed = 0.0;  // multiplier so far (N)
+  for (int part = 0; part < 6 && depth > 0.0;
+       ++part) {  // pieces of the path: each ends where an axis starts or stops moving
     double until = std::numeric_limits<double>::infinity(), out = 0.0;
     glm::dvec3 moves(0.0);
     for (int axis = 0; axis < 3; ++axis) {
@@ -224,16 +225,15 @@ void relax_obstacle(LevelStiffness& couplings, Displacement& state, const Obstac
   const glm::dvec3 n(o.normal), before = state.at(v), w = link_compliance(couplings, v);
   const glm::dvec3 wanted = unconstrained_minimum(couplings, state, v) + w * load_N;
   if (!o.moving) {
-    // What stands is not carried by the tissue, and a projection in the metric of the springs does, which
-    // lowers the energy along the surface. (With what follows a brain came back into its skull 43 um short of
-    // where it had been, in the time in which it is 40 um at most.)
+    // Fixed surface: project in the metric of the springs. This lowers the energy along the surface and
+    // suffices, because tissue does not carry a fixed surface.
     const double depth = depth_in_obstacle(o, wanted), denominator = glm::dot(n, w * n);
     const glm::dvec3 projected =
         depth > 0.0 && denominator > 0.0 ? wanted + (depth / denominator) * w * n : wanted;
     const glm::dvec3 within = clamp_to_links(couplings.lattice(), state, v, projected);
     const double now = depth_in_obstacle(o, before);
-    // A voxel in the obstacle that its limits keep from the projection takes the least energy of all places
-    // that limits and obstacle allow. Otherwise it would stay where it is for good.
+    // If limits keep a voxel inside the obstacle from its projection, the minimum within limits and obstacle
+    // is computed below. Otherwise the voxel would never move again.
     if (now <= kTouching * couplings.lattice().min_spacing_m() || depth_in_obstacle(o, within) <= now) {
       state.set(v, no_deeper(o, before, within));
       return;
@@ -242,7 +242,7 @@ void relax_obstacle(LevelStiffness& couplings, Displacement& state, const Obstac
   glm::dvec3 low, high;
   for (int axis = 0; axis < 3; ++axis) {
     const std::array<float, 2> interval = link_interval(couplings.lattice(), state, v, axis);
-    const bool empty = !(interval[0] <= interval[1]);  // by a rounding
+    const bool empty = !(interval[0] <= interval[1]);  // by rounding
     low[axis] = empty ? before[axis] : static_cast<double>(interval[0]);
     high[axis] = empty ? before[axis] : static_cast<double>(interval[1]);
   }

@@ -62,8 +62,8 @@ class BoundarySprings {
   [[nodiscard]] const float* nearer(int level, RowId row, std::size_t axis) const {
     return at(level).nearer[axis].data() + static_cast<std::size_t>(row) * kRow;
   }
-  // Has the row cells whose axes are coupled? A fixed voxel on an inclined surface couples the axes of its
-  // cell.
+  // Are the axes of any cell in the row coupled? A fixed voxel on an inclined surface couples the axes of
+  // its cell.
   [[nodiscard]] bool tilted(int level, RowId row) const { return at(level).row_tilted[row] != 0; }
   // Off-diagonal stiffness of xy, xz and yz (N/m); all 0: the axes are independent.
   [[nodiscard]] std::array<float, 3> tilt(int level, VoxelId cell) const {

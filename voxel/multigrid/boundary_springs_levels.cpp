@@ -215,7 +215,7 @@ void BoundarySprings::find_above(int level, VoxelId cell, Found& found, Axes& al
   std::array<int, 3> held{};
   int count = 0;
   for_children(finer.couplings->grid(), place, [&](VoxelId w, const std::array<int, 3>& c) {
-    if (!finer.couplings->holds_any(c)) return;
+    if (!finer.couplings->has_voxel(c)) return;
     ++count;
     const VoxelSprings springs = finer.couplings->find_springs(w);
     // a fixed child needs no springs

@@ -58,7 +58,7 @@ void for_pressed(const Displacement& state, RowId row, LaneSpan span, const Visi
 float Multigrid::slide_pressed(RowId row, Displacement& state, LaneSpan span) noexcept {
   float most = 0.0F;
   for_pressed(state, row, span, [&](VoxelId v, std::size_t) {
-    most = std::max(most, slide(couplings(), state, v, balance_of(v, state)));
+    most = std::max(most, slide(couplings(), state, v, frozen_load(v, state)));
   });
   return most;
 }
@@ -102,7 +102,7 @@ std::uint32_t Multigrid::move_outside(LevelRow r, RowId row, Displacement& state
     r.stopped = stays.data();
   }
   for_lanes(row, jammed_lanes, [&](VoxelId v, std::size_t) {
-    relax_obstacle(couplings(), state, obstacles, v, balance_of(v, state));
+    relax_obstacle(couplings(), state, obstacles, v, frozen_load(v, state));
   });
   return jammed_lanes;
 }
@@ -148,14 +148,14 @@ void Multigrid::balance_contacts(RowId row, Displacement& state, const ObstacleV
     const auto v = static_cast<VoxelId>(row * kRow + i);
     BoundarySprings::Support by{};
     if (state.role[v] == Displacement::pressed) {
-      const auto force = sliding_force(couplings(), state, v, balance_of(v, state));
+      const auto force = sliding_force(couplings(), state, v, frozen_load(v, state));
       for (int axis = 0; axis < 3 && force; ++axis)
         out[static_cast<std::size_t>(axis)][i] = static_cast<float>((*force)[axis]);
       by = force ? BoundarySprings::along(state.tool_normal[lattice_.surface_number(v)],
                                           BoundarySprings::Support::By::tool)
                  : BoundarySprings::kAll;
     } else if (Displacement::in_block(state.role[v])) {
-      by = support_of_block(lattice_.part(v) - 1U);
+      by = support_of_block(lattice_.block(v) - 1U);
     } else if (state.role[v] == Displacement::obstacle && is_jammed(obstacles, state, v, touching)) {
       const glm::vec3 n = obstacles.of(v).normal;
       const float into = out[0][i] * n.x + out[1][i] * n.y + out[2][i] * n.z;
@@ -173,8 +173,8 @@ void Multigrid::balance_contacts(RowId row, Displacement& state, const ObstacleV
 // Motion from another solver takes no voxel deeper into its obstacle than it was, except by rounding. If
 // rounding counted as an overlap, the voxel would be projected again next to neighbours that have not moved
 // yet, and the two solvers would disagree more with each exchange.
-void Multigrid::add(RowId row, const RowVector& way, Displacement& state,
-                    const ObstacleView& obstacles) noexcept {
+void Multigrid::add_motion(RowId row, const RowVector& way, Displacement& state,
+                           const ObstacleView& obstacles) noexcept {
   if (!prepare(0, row)) return;
   RowVector refused, before;
   const LevelRow r = row_of(0, row, state);
@@ -248,12 +248,13 @@ float Multigrid::smooth_tilted(int level, RowId row, const LevelRow& r, LaneSpan
         glm::dvec3 pull(0.0);       // from where the boundary spring is fixed
         for (int axis = 0; axis < 3; ++axis) {
           const auto ua = static_cast<std::size_t>(axis);
-          const float told = r.held_at[ua][i];
+          const float prolonged = r.held_at[ua][i];
           float sum = 0.0F, all = r.load[ua][i];
           for (int d = 0; d < 3; ++d) {
             const auto ud = static_cast<std::size_t>(d);
             const float up = springs.up[ud].on(axis, d), down = springs.down[ud].on(axis, d);
-            all += up * (l.value[ua][g.up(cell, d)] - told) + down * (l.value[ua][g.down(cell, d)] - told);
+            all += up * (l.value[ua][g.up(cell, d)] - prolonged) +
+                   down * (l.value[ua][g.down(cell, d)] - prolonged);
             sum += up + down;
           }
           stiffness[axis][axis] = static_cast<double>(sum + hold[ua]);

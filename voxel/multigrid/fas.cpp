@@ -38,7 +38,7 @@ Multigrid::Multigrid(const Lattice& lattice) : lattice_(lattice), tiles_(lattice
     level.couplings = std::make_unique<LevelStiffness>(lattice, finer);
     const Grid& g = level.couplings->grid();
     if (finer != nullptr) {
-      for (auto* arrays : {&level.value, &level.told, &level.load, &level.loaded_at}) {
+      for (auto* arrays : {&level.value, &level.prolonged, &level.load, &level.loaded_at}) {
         for (auto& array : *arrays) array = LazyArray<float>(g.size());
       }
     }
@@ -59,14 +59,14 @@ Multigrid::Multigrid(const Lattice& lattice) : lattice_(lattice), tiles_(lattice
   for (const Level& level : levels_) couplings.push_back(level.couplings.get());
   boundary_springs_ = std::make_unique<BoundarySprings>(lattice, couplings);
   if (lattice.block_count() == 0) return;
-  parts_ = std::make_unique<RigidBlocks>(lattice, couplings);
-  block_state_.resize(parts_->count());
+  blocks_ = std::make_unique<RigidBlocks>(lattice, couplings);
+  block_state_.resize(blocks_->count());
   for (BlockState& p : block_state_) p.on.resize(levels_.size());
   block_bounds_.reserve(kMaxBlockBounds);
   // Cells of blocks are stopped for the row passes; blocks move by themselves.
   for (int l = 1; l < levels(); ++l) {
-    for (std::size_t p = 0; p < parts_->count(); ++p) {
-      for (const RigidBlocks::Run& run : parts_->on(l, p).rows) {
+    for (std::size_t p = 0; p < blocks_->count(); ++p) {
+      for (const RigidBlocks::Run& run : blocks_->on(l, p).rows) {
         for (std::uint32_t lanes = run.lanes; lanes != 0; lanes &= lanes - 1)
           at(l).stopped[run.row * kRow + static_cast<VoxelId>(std::countr_zero(lanes))] = kAllAxes;
         mark(l, run.row, limited);
@@ -88,7 +88,7 @@ void Multigrid::prepare_all() noexcept {
   for (int l = 0; l < levels(); ++l) {
     Level& level = at(l);
     const std::vector<bool> rows = level.couplings->rows_in_use();  // finds all springs
-    for (auto* arrays : {&level.value, &level.told, &level.load, &level.loaded_at}) {
+    for (auto* arrays : {&level.value, &level.prolonged, &level.load, &level.loaded_at}) {
       for (auto& array : *arrays) array.populate(kRow, rows);
     }
     level.stopped.populate(kRow, rows);
@@ -130,7 +130,7 @@ void Multigrid::stop_cells(VoxelId v, std::uint8_t bits) noexcept {
     }
     Level& level = at(l);
     const VoxelId cell = level.couplings->grid().at(c[0], c[1], c[2]);
-    if (parts_ != nullptr && l > 0 && parts_->of(l, cell) != 0) continue;
+    if (blocks_ != nullptr && l > 0 && blocks_->of(l, cell) != 0) continue;
     if ((level.stopped[cell] & bits) == bits || stopped_.size() == stopped_.capacity()) return;
     level.stopped[cell] |= bits;
     mark(l, cell / kRow, limited);
@@ -138,7 +138,7 @@ void Multigrid::stop_cells(VoxelId v, std::uint8_t bits) noexcept {
   }
 }
 
-void Multigrid::tie(VoxelId v, const glm::vec3& force_N) noexcept {
+void Multigrid::set_limit_load(VoxelId v, const glm::vec3& force_N) noexcept {
   const auto tied = [&] {
     return limit_load_[0][v] != 0.0F || limit_load_[1][v] != 0.0F || limit_load_[2][v] != 0.0F;
   };
@@ -151,16 +151,16 @@ void Multigrid::tie(VoxelId v, const glm::vec3& force_N) noexcept {
   count = static_cast<std::uint16_t>(is ? count + 1 : count - 1);
 }
 
-void Multigrid::release_limited() noexcept {
+void Multigrid::release_active() noexcept {
   for (const StoppedCell& s : stopped_) {
     at(s.level).stopped[s.cell] = 0;
-    if (parts_ == nullptr || s.level == 0 || !parts_->in_row(s.level, s.cell / kRow))
+    if (blocks_ == nullptr || s.level == 0 || !blocks_->in_row(s.level, s.cell / kRow))
       unmark(s.level, s.cell / kRow, limited);
   }
   stopped_.clear();
 }
 
-void Multigrid::release_unlimited(const Displacement& state) noexcept {
+void Multigrid::release_inactive(const Displacement& state) noexcept {
   const float tight = kAtLimit * static_cast<float>(lattice_.min_spacing_m());
   const auto pulled_against_limit = [&](VoxelId v, int axis) {
     const float at = state.u[static_cast<std::size_t>(axis)][v];
@@ -183,7 +183,7 @@ void Multigrid::release_unlimited(const Displacement& state) noexcept {
     at(0).stopped[s.cell] = 0;
     still_stopped_.push_back({s.cell, bits});
   }
-  release_limited();
+  release_active();
   for (const StoppedVoxel& s : still_stopped_) stop_cells(s.v, s.axes);
 }
 
@@ -199,7 +199,7 @@ void Multigrid::copy_from(const Multigrid& other) noexcept {
     if (l == 0) continue;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       to.value[axis].copy_from(from.value[axis]);
-      to.told[axis].copy_from(from.told[axis]);
+      to.prolonged[axis].copy_from(from.prolonged[axis]);
       to.loaded_at[axis].copy_from(from.loaded_at[axis]);
       to.load[axis].copy_from(from.load[axis]);
     }
@@ -207,11 +207,11 @@ void Multigrid::copy_from(const Multigrid& other) noexcept {
 }
 
 void Multigrid::forget_coarse() {
-  bricks_.leave_to_another();
+  bricks_.leave_to_shadow();
   all_visited_ = true;
   for (int l = 1; l < levels(); ++l) {
     Level& level = at(l);
-    for (auto* arrays : {&level.value, &level.told, &level.load, &level.loaded_at}) {
+    for (auto* arrays : {&level.value, &level.prolonged, &level.load, &level.loaded_at}) {
       for (auto& array : *arrays) array = LazyArray<float>(level.couplings->grid().size());
     }
   }
@@ -234,7 +234,7 @@ void Multigrid::drop_coarse() noexcept {
   for (int l = 1; l < levels(); ++l) {
     Level& level = at(l);
     for (const RowId row : log_.rows(l)) {
-      for (auto* arrays : {&level.value, &level.told, &level.load, &level.loaded_at}) {
+      for (auto* arrays : {&level.value, &level.prolonged, &level.load, &level.loaded_at}) {
         for (auto& array : *arrays)
           std::fill_n(array.data() + static_cast<std::size_t>(row) * kRow, kRow, 0.0F);
       }
@@ -244,10 +244,10 @@ void Multigrid::drop_coarse() noexcept {
   }
 }
 
-void Multigrid::begin_anew() noexcept {
+void Multigrid::restart() noexcept {
   drop_coarse();
-  for (const RowId row : frozen_residual_) balance_number_[row] = 0;
-  frozen_residual_.clear();
+  for (const RowId row : frozen_rows_) frozen_number_[row] = 0;
+  frozen_rows_.clear();
   restart_blocks();
 }
 
@@ -257,23 +257,23 @@ void Multigrid::keep_log() {
   for (int l = 0; l < levels(); ++l) rows.push_back(grid(l).rows());
   log_.begin(rows);
   const std::size_t most = std::min(kMaxFrozen, grid(0).rows());
-  frozen_residual_.reserve(most);
-  balance_ = LazyArray<float>(most * 3 * kRow);
-  balance_.populate();
-  balance_number_ = LazyArray<std::uint16_t>(grid(0).rows());
+  frozen_rows_.reserve(most);
+  frozen_residual_ = LazyArray<float>(most * 3 * kRow);
+  frozen_residual_.populate();
+  frozen_number_ = LazyArray<std::uint16_t>(grid(0).rows());
 }
 
 std::size_t Multigrid::memory_bytes() const {
   std::size_t bytes = tiles_.memory_bytes() + log_.memory_bytes() + bricks_.memory_bytes() +
-                      (parts_ == nullptr ? 0 : parts_->memory_bytes()) + boundary_springs_->memory_bytes() +
+                      (blocks_ == nullptr ? 0 : blocks_->memory_bytes()) + boundary_springs_->memory_bytes() +
                       prolongation_.memory_bytes() + resident_bytes(stopped_) +
                       resident_bytes(still_stopped_) + row_has_limit_load_.resident_bytes() +
-                      balance_number_.resident_bytes() + balance_.resident_bytes() +
-                      resident_bytes(frozen_residual_) + limited_correction_.memory_bytes();
+                      frozen_number_.resident_bytes() + frozen_residual_.resident_bytes() +
+                      resident_bytes(frozen_rows_) + limited_correction_.memory_bytes();
   for (const auto& axis : limit_load_) bytes += axis.resident_bytes();
   for (const Level& l : levels_) {
     bytes += l.couplings->memory_bytes() + l.flags.resident_bytes() + l.stopped.resident_bytes();
-    for (const auto* arrays : {&l.value, &l.told, &l.load, &l.loaded_at}) {
+    for (const auto* arrays : {&l.value, &l.prolonged, &l.load, &l.loaded_at}) {
       for (const auto& array : *arrays) bytes += array.resident_bytes();
     }
   }

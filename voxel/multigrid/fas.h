@@ -45,7 +45,7 @@ class Multigrid {
     dirty = 2,     // it, or a row beside it, changed since it was last restricted
     changed = 4,   // (coarse) it has a pending correction
     renewed = 8,   // (coarse) its values were restricted, its load is still to be
-    telling = 16,  // (coarse) it prolongs its correction in the current cycle
+    source = 16,   // (coarse) it prolongs its correction in the current cycle
     limited = 32,  // an active limit holds something in it
   };
   [[nodiscard]] bool has(int level, RowId row, std::uint8_t flag) const {
@@ -77,20 +77,20 @@ class Multigrid {
   // residuals.
   void renew_boundary_springs() noexcept { boundary_springs_->renew(); }
   // Factor for the boundary springs of held voxels; raised after a cycle that overshot.
-  void set_hold(float times) noexcept { hold_ = times; }
+  void set_boundary_scale(float times) noexcept { boundary_scale_ = times; }
   // Releases all limits that are active, and the cells above them.
-  void release_limited() noexcept;
+  void release_active() noexcept;
   // Releases active limits unless a voxel is still pulled against its limit.
-  void release_unlimited(const Displacement& state) noexcept;
+  void release_inactive(const Displacement& state) noexcept;
   // If set, residuals against active limits are restricted, too: for tissue that a wave has just laid at its
   // limits and that is to open altogether.
   void restrict_all(bool all) noexcept { restricts_all_ = all; }
   // Sets the force of active limits on a voxel (N), until it is set anew. It balances the springs' force, and
   // the cells above the voxel do not move.
-  void tie(VoxelId v, const glm::vec3& force_N) noexcept;
+  void set_limit_load(VoxelId v, const glm::vec3& force_N) noexcept;
   // Active limits of voxels: `visit(v, axis)` for each axis on which a limit holds v.
   template <class Visit>
-  void for_limited(const Visit& visit) const {
+  void for_active(const Visit& visit) const {
     for (const StoppedCell& s : stopped_) {
       if (s.level != 0) continue;
       for (int axis = 0; axis < 3; ++axis) {
@@ -104,7 +104,7 @@ class Multigrid {
 
   // Renews the plastic part of a row's load; `keep`: commits the plastic offsets. True if a link is beyond
   // its committed offset.
-  bool yield(RowId row, Displacement& state, bool keep) noexcept;
+  bool update_plasticity(RowId row, Displacement& state, bool keep) noexcept;
   // rows_below(): children of a coarse row (bit 0: in x, 1: in y, 2: in z) on the finer level; beyond the
   // lattice, rows of its empty border. fetch() prefetches a row's values; any number is allowed.
   void fetch(int level, RowId row, const Displacement& state) const noexcept;
@@ -122,7 +122,7 @@ class Multigrid {
   // the finer level (N); for level 1 it is one of voxels. For whole rows it also finds which are at rest.
   float restrict_loads(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
                        LaneSpan span = {}) noexcept;
-  // Prolongs pending corrections of coarse rows marked `telling` to the rows of a box (see prolongation.h),
+  // Prolongs pending corrections of coarse rows marked `source` to the rows of a box (see prolongation.h),
   // from plane to plane. The part of a correction that links at their limits refuse is subtracted from the
   // cells again: otherwise cells would pull at their neighbours more and more. `jointly`: all voxels move
   // together (limited_correction.h), for tissue that has far to go and is in its own way row by row.
@@ -155,33 +155,33 @@ class Multigrid {
   }
   void copy_from(const Multigrid& other) noexcept;
 
-  // ---- parts without slack (rigid_blocks.h, rigid_block_passes.cpp); part numbers begin with 0 ----
-  [[nodiscard]] bool has_blocks() const { return parts_ != nullptr; }
-  [[nodiscard]] const RigidBlocks& parts() const { return *parts_; }
+  // ---- rigid blocks (rigid_blocks.h, rigid_block_passes.cpp); numbers begin with 0 ----
+  [[nodiscard]] bool has_blocks() const { return blocks_ != nullptr; }
+  [[nodiscard]] const RigidBlocks& blocks() const { return *blocks_; }
   // Sets which pressed voxels of blocks the tool holds along its normals, until the next call.
   void set_block_contacts(const Displacement& state, std::span<const VoxelId> held) noexcept;
-  [[nodiscard]] bool tool_presses_block(std::size_t part) const {
-    return block_state_[part].by_tool.count > 0;
+  [[nodiscard]] bool tool_presses_block(std::size_t block) const {
+    return block_state_[block].by_tool.count > 0;
   }
   // Force of springs and loads on a block (N), and its frozen residual.
-  [[nodiscard]] glm::dvec3 block_force(std::size_t part, const Displacement& state) const noexcept;
-  [[nodiscard]] glm::dvec3 residual_of_block(std::size_t part) const noexcept {
-    return block_state_[part].balance;
+  [[nodiscard]] glm::dvec3 block_force(std::size_t block, const Displacement& state) const noexcept;
+  [[nodiscard]] glm::dvec3 residual_of_block(std::size_t block) const noexcept {
+    return block_state_[block].frozen_N;
   }
   // How far its links let a block move, [axis][down, up] (m); down <= 0 <= up.
   using AdmissibleInterval = std::array<std::array<double, 2>, 3>;
-  [[nodiscard]] AdmissibleInterval interval_of_block(std::size_t part,
+  [[nodiscard]] AdmissibleInterval interval_of_block(std::size_t block,
                                                      const Displacement& state) const noexcept;
   // Adds an interval to `bounds`, which has room for six more.
   static void add_bounds(const AdmissibleInterval& room, std::vector<BlockBound>& bounds);
   // Moves a block by `way` as far as its links and obstacles allow; returns how far it moved. Where the tool
   // presses it, it slides on the tool, unless the caller handles the tool. Results of another solver are not
   // logged.
-  enum class Tool : std::uint8_t { holds, is_seen_to };
-  enum class Note : std::uint8_t { in_log, nowhere };
-  glm::dvec3 move_block(std::size_t part, const glm::dvec3& way, Displacement& state,
-                        const ObstacleView& obstacles, Tool tool = Tool::holds,
-                        Note note = Note::in_log) noexcept;
+  enum class Tool : std::uint8_t { constrains, caller_handles };
+  enum class Note : std::uint8_t { logged, unlogged };
+  glm::dvec3 move_block(std::size_t block, const glm::dvec3& way, Displacement& state,
+                        const ObstacleView& obstacles, Tool tool = Tool::constrains,
+                        Note note = Note::logged) noexcept;
   // Moves the blocks that meet a box of a level to the equilibrium of their border's springs.
   void smooth_blocks(int level, const RigidBlocks::Box& box, Displacement& state,
                      const ObstacleView& obstacles) noexcept;
@@ -190,25 +190,26 @@ class Multigrid {
   float measure_blocks(int level, const RigidBlocks::Box& box, Displacement& state,
                        const ObstacleView& obstacles) noexcept;
   void load_blocks(int level, const RigidBlocks::Box& box) noexcept;
-  // Freezes the residual of the blocks, as balance() does.
-  void balance_blocks(const Displacement& state) noexcept;
+  // Freezes the residual of the blocks, as freeze_residual() does.
+  void freeze_blocks(const Displacement& state) noexcept;
 
   // ---- asynchronous relaxation: two Multigrid of one lattice work in turns (shadow_object.h) ----
   // From now on written rows are logged. Allocates.
   void keep_log();
   [[nodiscard]] ChangeLog& log() { return log_; }
-  // Drops all coarse cells, and leaves the loads of bricks to the shadow. Allocates.
+  // Drops all coarse cells. From then on only the shadow renews the loads of bricks. Allocates.
   void forget_coarse();
   // Sets coarse cells of logged rows to 0.
   void drop_coarse() noexcept;
   [[nodiscard]] std::size_t rows_to_drop() const noexcept;
   // The same, and no residual is frozen any more.
-  void begin_anew() noexcept;
+  void restart() noexcept;
   // Freezes the residual of a row: its voxels count as at rest where they are.
-  void balance(RowId row, Displacement& state, const ObstacleView& obstacles, LaneSpan span = {}) noexcept;
+  void freeze_residual(RowId row, Displacement& state, const ObstacleView& obstacles,
+                       LaneSpan span = {}) noexcept;
   // The load that freezes a voxel's residual, without the voxel's own load (N).
-  [[nodiscard]] glm::dvec3 balance_of(VoxelId v, const Displacement& state) const noexcept {
-    const float* of_row = balance_of(static_cast<RowId>(v / kRow), 0);
+  [[nodiscard]] glm::dvec3 frozen_load(VoxelId v, const Displacement& state) const noexcept {
+    const float* of_row = frozen_load(static_cast<RowId>(v / kRow), 0);
     if (of_row == nullptr) return glm::dvec3(0.0);
     const std::array<float, 3> own = state.bricks.at(v);
     const float* at = of_row + v % kRow;
@@ -218,45 +219,46 @@ class Multigrid {
   void keep_frozen_residual(float part, const Displacement& state) noexcept;
   // Load of a row with a frozen residual on one axis, the voxels' own load included; null: its residual is
   // not frozen.
-  [[nodiscard]] const float* balance_of(RowId row, std::size_t axis) const noexcept {
-    if (balance_number_.size() == 0 || balance_number_[row] == 0) return nullptr;
-    return balance_.data() + ((balance_number_[row] - std::size_t{1}) * 3 + axis) * kRow;
+  [[nodiscard]] const float* frozen_load(RowId row, std::size_t axis) const noexcept {
+    if (frozen_number_.size() == 0 || frozen_number_[row] == 0) return nullptr;
+    return frozen_residual_.data() + ((frozen_number_[row] - std::size_t{1}) * 3 + axis) * kRow;
   }
   // Adds motion that another solver found to a row, as far as its links allow.
-  void add(RowId row, const RowVector& way, Displacement& state, const ObstacleView& obstacles) noexcept;
+  void add_motion(RowId row, const RowVector& way, Displacement& state,
+                  const ObstacleView& obstacles) noexcept;
   // The same for many rows together: each goes as far as its links to the others' new places allow. A row is
-  // added once. If can_join() is false (obstacles nearby, or too many rows) use add().
-  [[nodiscard]] bool can_join(RowId row, const Displacement& state) noexcept {
+  // added once. If can_batch() is false (obstacles nearby, or too many rows) use add_motion().
+  [[nodiscard]] bool can_batch(RowId row, const Displacement& state) noexcept {
     return prepare(0, row) && state.row_obstacles[row] == 0 && !limited_correction_.full();
   }
   // `fill(way)` writes the row's motion.
   template <class Fill>
-  void join(RowId row, Displacement& state, const Fill& fill) noexcept {
+  void batch(RowId row, Displacement& state, const Fill& fill) noexcept {
     LimitedCorrection::Row& r = limited_correction_.add(row, {});
     fill(r.from);
     set_out(r, state);
   }
-  void add_joined(Displacement& state) noexcept { apply_limited_correction(state); }
+  void move_batch(Displacement& state) noexcept { apply_limited_correction(state); }
   // Was the row added? Then `left` is what is left of its motion (m), and `gone` whether nothing is.
-  [[nodiscard]] bool joined(RowId row, const Displacement& state, RowVector& left,
-                            bool& gone) const noexcept {
+  [[nodiscard]] bool batched(RowId row, const Displacement& state, RowVector& left,
+                             bool& gone) const noexcept {
     const LimitedCorrection::Row* r = limited_correction_.find(row);
     if (r != nullptr) gone = left_of(*r, state, left) == 0 && !r->cut;
     return r != nullptr;
   }
-  void forget_joined() noexcept { limited_correction_.clear(); }
+  void clear_batch() noexcept { limited_correction_.clear(); }
   // Finds all springs and takes all memory now, not when a tick first needs them.
   void prepare_all() noexcept;
-  void prepare_limit_loads() noexcept;  // memory that tie() writes to
+  void prepare_limit_loads() noexcept;  // memory that set_limit_load() writes to
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
   struct Level {
     std::unique_ptr<LevelStiffness> couplings;
-    // [axis][cell] of coarse levels. `told` is the part of the value that the finer level knows, so value −
-    // told is the pending correction. `loaded_at` is `told` when the load was found: boundary springs pull
-    // from there.
-    std::array<LazyArray<float>, 3> value, told, load, loaded_at;
+    // [axis][cell] of coarse levels. `prolonged` is the part of the value that the finer level knows, so
+    // value − prolonged is the pending correction. `loaded_at` is `prolonged` when the load was found:
+    // boundary springs pull from there.
+    std::array<LazyArray<float>, 3> value, prolonged, load, loaded_at;
     LazyArray<std::uint8_t> stopped;  // [cell or voxel] bits 0 to 2: an active limit holds it on that axis
     LazyArray<std::uint8_t> flags;    // [row]
   };
@@ -290,7 +292,7 @@ class Multigrid {
     std::vector<BlockOnLevel> on;  // [level]
     HeldDirections by_tool, held;  // directions fixed by the tool; and by obstacles, too
     std::uint8_t stopped = 0;      // bits: axes on which a limit holds it
-    glm::dvec3 balance{0.0};       // (N)
+    glm::dvec3 frozen_N{0.0};      // (N)
   };
   static constexpr std::size_t kMaxBlockBounds = 1024;
 
@@ -341,25 +343,25 @@ class Multigrid {
   float smooth_tilted(int level, RowId row, const LevelRow& r, LaneSpan span) noexcept;
   void add_tilt(int level, RowId row, const LevelRow& r, LaneSpan span, RowVector& out) noexcept;
 
-  // ---- parts ----
+  // ---- rigid blocks ----
   template <class Visit>
   void for_blocks(int level, const RigidBlocks::Box& box, const Visit& visit) noexcept;
-  [[nodiscard]] glm::dvec3 block_pull(int level, std::size_t part, glm::dvec3& stiffness) noexcept;
+  [[nodiscard]] glm::dvec3 block_pull(int level, std::size_t block, glm::dvec3& stiffness) noexcept;
   template <class Room>
-  [[nodiscard]] AdmissibleInterval room_on_border(std::size_t part, const Room& room) const noexcept;
-  [[nodiscard]] AdmissibleInterval room_with_others(std::size_t part, const glm::dvec3& way,
+  [[nodiscard]] AdmissibleInterval room_on_border(std::size_t block, const Room& room) const noexcept;
+  [[nodiscard]] AdmissibleInterval room_with_others(std::size_t block, const glm::dvec3& way,
                                                     const Displacement& state) const noexcept;
-  void take_others_along(std::size_t part, Displacement& state) noexcept;
-  std::uint8_t add_what_comes_along(std::size_t part, const Displacement& state, glm::dvec3& pull) noexcept;
-  void shift_block(std::size_t part, const glm::dvec3& way, Displacement& state) noexcept;
-  void shift_cells(int level, std::size_t part, const glm::dvec3& way) noexcept;
+  void take_others_along(std::size_t block, Displacement& state) noexcept;
+  std::uint8_t add_what_comes_along(std::size_t block, const Displacement& state, glm::dvec3& pull) noexcept;
+  void shift_block(std::size_t block, const glm::dvec3& way, Displacement& state) noexcept;
+  void shift_cells(int level, std::size_t block, const glm::dvec3& way) noexcept;
   void set_block_lanes(int level, RowId row, LaneSpan span, RowVector& out) const noexcept;
   void restrict_block_lanes(int level, RowId row, LaneSpan span, const RowVector& sums) noexcept;
   void note_prolonged_blocks(int level, RowId row, LaneSpan span, const RowVector& way) noexcept;
   void prolong_to_blocks(int level, Displacement& state, const ObstacleView& obstacles) noexcept;
-  void stop_at_obstacles(std::size_t part, const Displacement& state, const ObstacleView& obstacles,
+  void stop_at_obstacles(std::size_t block, const Displacement& state, const ObstacleView& obstacles,
                          Tool tool) noexcept;
-  [[nodiscard]] BoundarySprings::Support support_of_block(std::size_t part) const noexcept;
+  [[nodiscard]] BoundarySprings::Support support_of_block(std::size_t block) const noexcept;
   void forget_pending_of_blocks(int level, RowId row) noexcept;
   void restart_blocks() noexcept;
 
@@ -376,16 +378,16 @@ class Multigrid {
   LazyArray<std::uint16_t> row_has_limit_load_;  // [row] number of voxels with a limit load
   LimitedCorrection limited_correction_;
   // Rows with a frozen residual, and their loads (N) side by side, so that freezing touches few pages.
-  LazyVector<RowId> frozen_residual_;
-  LazyArray<float> balance_;                 // [as the list of rows][axis][lane]
-  LazyArray<std::uint16_t> balance_number_;  // [row] 1 + index; 0: not frozen
-  std::unique_ptr<RigidBlocks> parts_;       // null: there are no blocks
+  LazyVector<RowId> frozen_rows_;
+  LazyArray<float> frozen_residual_;        // [as the list of rows][axis][lane]
+  LazyArray<std::uint16_t> frozen_number_;  // [row] 1 + index; 0: not frozen
+  std::unique_ptr<RigidBlocks> blocks_;     // null: there are no blocks
   std::vector<BlockState> block_state_;
   std::vector<BlockBound> block_bounds_;
   std::array<AxisLimits, 3> yield_limits_;
   bool all_visited_ = false;  // cycles visit every row of their boxes, so active flags are not kept
   bool restricts_all_ = false;
-  float tolerance_N_ = 0.0F, motion_tolerance_m_ = 0.0F, hold_ = 1.0F;
+  float tolerance_N_ = 0.0F, motion_tolerance_m_ = 0.0F, boundary_scale_ = 1.0F;
 };
 
 }  // namespace voxel

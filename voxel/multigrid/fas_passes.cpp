@@ -16,7 +16,7 @@ LevelRow Multigrid::row_of(int level, RowId row, Displacement& state) noexcept {
   r.z = static_cast<std::ptrdiff_t>(g.row_z) * kRow;
   r.x = static_cast<std::ptrdiff_t>(g.row_x) * kRow;
   if (level == 0) {
-    const float* const balanced = balance_of(row, 0);
+    const float* const balanced = frozen_load(row, 0);
     for (std::size_t axis = 0; axis < 3; ++axis) {
       r.u[axis] = state.u[axis].data() + begin;
       r.load[axis] =
@@ -33,13 +33,13 @@ LevelRow Multigrid::row_of(int level, RowId row, Displacement& state) noexcept {
   if (boundary_springs_->any(level, row)) {
     for (std::size_t axis = 0; axis < 3; ++axis) r.hold[axis] = boundary_springs_->hold(level, row, axis);
   }
-  r.hold_times = hold_;
+  r.hold_times = boundary_scale_;
   if (has(level, row, limited)) r.stopped = l.stopped.data() + begin;
   return r;
 }
 
-bool Multigrid::yield(RowId row, Displacement& state, bool keep) noexcept {
-  if (state.rest.row[row] == 0) {
+bool Multigrid::update_plasticity(RowId row, Displacement& state, bool keep) noexcept {
+  if (state.plastic.row[row] == 0) {
     bool beyond = false;
     for (int axis = 0; axis < 3 && !beyond; ++axis) {
       const auto ua = static_cast<std::size_t>(axis);
@@ -50,12 +50,12 @@ bool Multigrid::yield(RowId row, Displacement& state, bool keep) noexcept {
   }
   const RowPlasticity found = plastic_row(couplings(), state, row, keep);
   note_change(0, row, found.moved_m);
-  return found.unkept;
+  return found.uncommitted;
 }
 
 void Multigrid::smooth(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
                        LaneSpan span) noexcept {
-  if (parts_ != nullptr && parts_->fill_row(level, row)) return;  // blocks move as one
+  if (blocks_ != nullptr && blocks_->fill_row(level, row)) return;  // blocks move as one
   const LevelRow r = row_of(level, row, state);
   log_.note(level, row);
   if (level > 0) {
@@ -93,7 +93,7 @@ void Multigrid::restrict_values(int level, RowId row, Displacement& state, LaneS
   log_.note(level, row);
   const std::size_t begin = static_cast<std::size_t>(row) * kRow;
   RowVector sums{};
-  std::array<float*, 3> value{}, told{};
+  std::array<float*, 3> value{}, prolonged{};
   const std::array<RowId, 8> rows = rows_below(level, row);
   for (std::size_t child = 0; child < 8; ++child) {
     const int half = static_cast<int>(child & 1U);
@@ -107,40 +107,40 @@ void Multigrid::restrict_values(int level, RowId row, Displacement& state, LaneS
   }
   for (std::size_t axis = 0; axis < 3; ++axis) {
     value[axis] = l.value[axis].data() + begin;
-    told[axis] = l.told[axis].data() + begin;
+    prolonged[axis] = l.prolonged[axis].data() + begin;
   }
-  take_means(sums, l.couplings->share(row), value, told, span);
+  take_means(sums, l.couplings->share(row), value, prolonged, span);
 }
 
-void Multigrid::balance(RowId row, Displacement& state, const ObstacleView& obstacles,
-                        LaneSpan span) noexcept {
-  if (!prepare(0, row) || frozen_residual_.size() == frozen_residual_.capacity()) return;
+void Multigrid::freeze_residual(RowId row, Displacement& state, const ObstacleView& obstacles,
+                                LaneSpan span) noexcept {
+  if (!prepare(0, row) || frozen_rows_.size() == frozen_rows_.capacity()) return;
   RowVector left;
   residual_of(0, row, state, obstacles, span, left);
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    float* to = balance_.data() + (frozen_residual_.size() * 3 + axis) * kRow;
+    float* to = frozen_residual_.data() + (frozen_rows_.size() * 3 + axis) * kRow;
     const float* own = state.load_of(row, static_cast<int>(axis));
     for (std::size_t i = 0; i < kRow; ++i) to[i] = own == nullptr ? 0.0F : own[i];
     for (std::size_t i = static_cast<std::size_t>(span.first) * kLanes;
          i < static_cast<std::size_t>(span.last + 1) * kLanes; ++i)
       to[i] -= left[axis][i];
   }
-  frozen_residual_.push_back(row);
-  balance_number_[row] = static_cast<std::uint16_t>(frozen_residual_.size());
+  frozen_rows_.push_back(row);
+  frozen_number_[row] = static_cast<std::uint16_t>(frozen_rows_.size());
 }
 
 void Multigrid::keep_frozen_residual(float part, const Displacement& state) noexcept {
-  for (std::size_t n = 0; n < frozen_residual_.size(); ++n) {
+  for (std::size_t n = 0; n < frozen_rows_.size(); ++n) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      float* of_row = balance_.data() + (n * 3 + axis) * kRow;
-      const float* own = state.load_of(frozen_residual_[n], static_cast<int>(axis));
+      float* of_row = frozen_residual_.data() + (n * 3 + axis) * kRow;
+      const float* own = state.load_of(frozen_rows_[n], static_cast<int>(axis));
       for (std::size_t i = 0; i < kRow; ++i) {
         const float beside = own == nullptr ? 0.0F : own[i];
         of_row[i] = beside + part * (of_row[i] - beside);
       }
     }
   }
-  for (BlockState& p : block_state_) p.balance *= static_cast<double>(part);
+  for (BlockState& p : block_state_) p.frozen_N *= static_cast<double>(part);
 }
 
 void Multigrid::add_limit_loads(RowId row, LevelRow& r, RowVector& loads) noexcept {
@@ -205,19 +205,19 @@ float Multigrid::restrict_loads(int level, RowId row, Displacement& state, const
     const LaneSpan below = octets_below(span, half);
     if (below.first > below.last || !finer.prepare(fine)) continue;
     // blocks get theirs from their borders
-    if (parts_ != nullptr && parts_->fill_known_row(level - 1, fine)) {
+    if (blocks_ != nullptr && blocks_->fill_known_row(level - 1, fine)) {
       if (span.whole()) unmark(level - 1, fine, active | dirty);
       continue;
     }
     RowVector residual;
     RowResidual left;
-    if (parts_ == nullptr || !parts_->fill_row(level - 1, fine)) {
+    if (blocks_ == nullptr || !blocks_->fill_row(level - 1, fine)) {
       left = residual_of(level - 1, fine, state, obstacles, below, residual);
     } else {
       residual = {};
     }
     worst = std::max(worst, left.most_N);
-    if (parts_ != nullptr && parts_->in_row(level - 1, fine))
+    if (blocks_ != nullptr && blocks_->in_row(level - 1, fine))
       set_block_lanes(level - 1, fine, below, residual);
     for (std::size_t axis = 0; axis < 3; ++axis)
       add_pairs(residual[axis].data(), below, sums[axis].data() + half * kRow / 2);
@@ -228,12 +228,12 @@ float Multigrid::restrict_loads(int level, RowId row, Displacement& state, const
     if (!at_rest) mark(level - 1, fine, active);
   }
   log_.note(level, row);
-  if (parts_ != nullptr && parts_->in_row(level, row)) restrict_block_lanes(level, row, span, sums);
+  if (blocks_ != nullptr && blocks_->in_row(level, row)) restrict_block_lanes(level, row, span, sums);
   take_loads(prolonged_row(level, row), sums, loads(level, row), span);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::size_t begin =
         static_cast<std::size_t>(row) * kRow + static_cast<std::size_t>(span.first) * kLanes;
-    std::copy_n(at(level).told[axis].data() + begin, (span.last - span.first + 1) * kLanes,
+    std::copy_n(at(level).prolonged[axis].data() + begin, (span.last - span.first + 1) * kLanes,
                 at(level).loaded_at[axis].data() + begin);
   }
   spread(level, row, active | dirty);

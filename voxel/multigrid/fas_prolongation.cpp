@@ -9,7 +9,7 @@ namespace voxel {
 
 namespace {
 
-constexpr int kAhead = 4;  // rows
+constexpr int kRowsAhead = 4;  // rows
 
 }  // namespace
 
@@ -21,7 +21,7 @@ LevelRow Multigrid::prolonged_row(int level, RowId row) noexcept {
   r.z = static_cast<std::ptrdiff_t>(g.row_z) * kRow;
   r.x = static_cast<std::ptrdiff_t>(g.row_x) * kRow;
   for (std::size_t axis = 0; axis < 3; ++axis)
-    r.u[axis] = l.told[axis].data() + static_cast<std::size_t>(row) * kRow;
+    r.u[axis] = l.prolonged[axis].data() + static_cast<std::size_t>(row) * kRow;
   return r;
 }
 
@@ -36,8 +36,8 @@ float Multigrid::pending_correction(int level, RowId row, LaneSpan span, int fir
   const std::size_t begin = static_cast<std::size_t>(row) * kRow;
   float most = 0.0F;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    most = std::max(
-        most, row_difference(l.value[axis].data() + begin, l.told[axis].data() + begin, span, first, last));
+    most = std::max(most, row_difference(l.value[axis].data() + begin, l.prolonged[axis].data() + begin, span,
+                                         first, last));
   }
   return most;
 }
@@ -48,9 +48,9 @@ void Multigrid::forget_pending_correction(int level, RowId row, Displacement& st
   const std::size_t begin = static_cast<std::size_t>(row) * kRow;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     std::fill_n(l.value[axis].data() + begin, kRow, 0.0F);
-    std::fill_n(l.told[axis].data() + begin, kRow, 0.0F);
+    std::fill_n(l.prolonged[axis].data() + begin, kRow, 0.0F);
   }
-  if (parts_ != nullptr && parts_->in_row(level, row)) forget_pending_of_blocks(level, row);
+  if (blocks_ != nullptr && blocks_->in_row(level, row)) forget_pending_of_blocks(level, row);
   restrict_values(level, row, state);
   restrict_loads(level, row, state, obstacles);
   unmark(level, row, changed);
@@ -61,11 +61,11 @@ void Multigrid::interpolate_row(int level, int j, int k, const ProlongedBox& box
   Level& l = at(level);
   const Grid& g = l.couplings->grid();
   bool is_source = false, whole = true;
-  const int before = prolongation_.first() - 1, after = prolongation_.first() + prolongation_.octets();
+  const int before = prolongation_.first() - 1, after = prolongation_.first() + prolongation_.groups();
   for (int q = before; q <= after; ++q) {
     const int column = (q + kLaneGroups) / kLaneGroups;  // including the empty one before the first
     const RowId row = g.row(column, j, k);
-    is_source = is_source || (q > before && q < after && has(level, row, telling));
+    is_source = is_source || (q > before && q < after && has(level, row, source));
     whole = whole && l.couplings->prepare(row) && l.couplings->uniform(row);
   }
   const auto add = [this](std::size_t which, int q) {
@@ -75,22 +75,22 @@ void Multigrid::interpolate_row(int level, int j, int k, const ProlongedBox& box
   for (int q = before; q <= after && (is_source || !whole); ++q) {
     const int column = (q + kLaneGroups) / kLaneGroups;
     const RowId row = g.row(column, j, k);
-    const int octet = (q + kLaneGroups) % kLaneGroups;
+    const int group = (q + kLaneGroups) % kLaneGroups;
     const bool any = l.couplings->prepare(row);
     if (!whole) {
       if (any) {
-        std::copy_n(l.couplings->filled(row) + octet * kLanes, kLanes, add(3, q));
+        std::copy_n(l.couplings->filled(row) + group * kLanes, kLanes, add(3, q));
       } else {
         store(add(3, q), none);
       }
     }
-    const bool here = any && q > before && q < after && has(level, row, telling);
+    const bool here = any && q > before && q < after && has(level, row, source);
     const int origin = (column - 1) * kRow;
     const std::size_t begin = static_cast<std::size_t>(row) * kRow;
     for (std::size_t axis = 0; axis < 3 && is_source; ++axis) {
       if (here) {
-        take_pending_correction(l.value[axis].data() + begin, l.told[axis].data() + begin,
-                                l.couplings->filled(row), {octet, octet}, box.first_source - origin,
+        take_pending_correction(l.value[axis].data() + begin, l.prolonged[axis].data() + begin,
+                                l.couplings->filled(row), {group, group}, box.first_source - origin,
                                 box.last_source - origin, add(axis, q));
       } else {
         store(add(axis, q), none);
@@ -100,8 +100,8 @@ void Multigrid::interpolate_row(int level, int j, int k, const ProlongedBox& box
   if (is_source) {
     for (int c = prolongation_.first() / kLaneGroups; c <= (after - 1) / kLaneGroups; ++c) {
       const RowId row = g.row(c + 1, j, k);
-      if (!has(level, row, telling)) continue;
-      unmark(level, row, telling);
+      if (!has(level, row, source)) continue;
+      unmark(level, row, source);
       log_.note(level, row);
       if (pending_correction(level, row) == 0.0F) unmark(level, row, changed);
     }
@@ -127,10 +127,10 @@ void Multigrid::prolong(int level, const ProlongedBox& box, Displacement& state,
     const int own_k = k / 2, near_k = (k & 1) != 0 ? own_k + 1 : own_k - 1;
     for (int j = box.j0; j <= box.j1; ++j) {
       const int own_j = j / 2, near_j = (j & 1) != 0 ? own_j + 1 : own_j - 1;
-      const auto prolongation = [&](int octet) {
+      const auto prolongation = [&](int group) {
         return std::array<ProlongedRow, 4>{
-            prolongation_.row(own_j, own_k, octet), prolongation_.row(near_j, own_k, octet),
-            prolongation_.row(own_j, near_k, octet), prolongation_.row(near_j, near_k, octet)};
+            prolongation_.row(own_j, own_k, group), prolongation_.row(near_j, own_k, group),
+            prolongation_.row(own_j, near_k, group), prolongation_.row(near_j, near_k, group)};
       };
       const auto here = prolongation(q0);
       if (std::none_of(here.begin(), here.end(), [](const ProlongedRow& r) { return r.is_source; })) continue;
@@ -139,7 +139,7 @@ void Multigrid::prolong(int level, const ProlongedBox& box, Displacement& state,
         if (!prepare(level, row)) continue;
         const int first = std::max(q0, c * kLaneGroups),
                   last = std::min(q1, c * kLaneGroups + kLaneGroups - 1);
-        if (j + kAhead <= box.j1) fetch(level, row + kAhead, state);
+        if (j + kRowsAhead <= box.j1) fetch(level, row + kRowsAhead, state);
         prolong_row(level, row, prolongation(first), state, obstacles,
                     {first - c * kLaneGroups, last - c * kLaneGroups}, jointly && level == 0);
       }
@@ -155,20 +155,21 @@ void Multigrid::prolong(int level, const ProlongedBox& box, Displacement& state,
     }
     limited_correction_.clear();
   }
-  if (parts_ != nullptr && box.to_k == box.k1) prolong_to_blocks(level, state, obstacles);
+  if (blocks_ != nullptr && box.to_k == box.k1) prolong_to_blocks(level, state, obstacles);
 }
 
 // Prefetches the values that a correction is added to: no cache has them.
 void Multigrid::fetch(int level, RowId row, const Displacement& state) const noexcept {
-  if (parts_ != nullptr && parts_->fill_known_row(level, row)) return;  // not visited row by row
+  if (blocks_ != nullptr && blocks_->fill_known_row(level, row)) return;  // not visited row by row
   for (const auto& axis : level == 0 ? state.u : at(level).value)
-    fetch_lines(axis.data() + static_cast<std::size_t>(row) * kRow, kRow * sizeof(float));
+    prefetch_range(axis.data() + static_cast<std::size_t>(row) * kRow, kRow * sizeof(float));
 }
 
 void Multigrid::prolong_row(int level, RowId row, const std::array<ProlongedRow, 4>& prolongation,
                             Displacement& state, const ObstacleView& obstacles, LaneSpan span,
                             bool jointly) noexcept {
-  if (level == 0 && parts_ != nullptr && parts_->fill_known_row(level, row)) return;  // corrected as a whole
+  if (level == 0 && blocks_ != nullptr && blocks_->fill_known_row(level, row))
+    return;  // corrected as a whole
   // Rows near obstacles are corrected alone, before those that move together.
   LimitedCorrection::Row* const together =
       jointly && state.row_obstacles[row] == 0 && !limited_correction_.full()
@@ -184,7 +185,7 @@ void Multigrid::prolong_row(int level, RowId row, const std::array<ProlongedRow,
       correction[axis][i] /= 1.0F + nearer[i];
   }
   log_.note(level, row);
-  if (parts_ != nullptr && parts_->in_row(level, row)) note_prolonged_blocks(level, row, span, correction);
+  if (blocks_ != nullptr && blocks_->in_row(level, row)) note_prolonged_blocks(level, row, span, correction);
   if (together != nullptr) {
     // if all rows move together, none is in the way of a row that moves alone
     if (obstacles.obstacles.empty()) set_out(*together, state);
@@ -221,16 +222,16 @@ void Multigrid::take_back_refused(int level, const Refused& refused) noexcept {
   const int half = (c[0] - 1) % 2;
   const LaneSpan pairs{span.first & ~1, span.last | 1};
   RowVector sums{}, lanes{};
-  std::array<float*, 3> value{}, told{};
+  std::array<float*, 3> value{}, prolonged{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     value[axis] = coarse.value[axis].data() + static_cast<std::size_t>(above) * kRow;
-    told[axis] = coarse.told[axis].data() + static_cast<std::size_t>(above) * kRow;
+    prolonged[axis] = coarse.prolonged[axis].data() + static_cast<std::size_t>(above) * kRow;
     if ((refused.axes >> axis & 1U) == 0) continue;
     std::copy_n(refused.way[axis].begin() + span.first * kLanes, (span.last - span.first + 1) * kLanes,
                 lanes[axis].begin() + span.first * kLanes);
     add_pairs(lanes[axis].data(), pairs, sums[axis].data() + half * kRow / 2);
   }
-  take_back(sums, coarse.couplings->share(above), value, told,
+  take_back(sums, coarse.couplings->share(above), value, prolonged,
             {half * kLaneGroups / 2 + pairs.first / 2, half * kLaneGroups / 2 + pairs.last / 2});
   spread(level + 1, above, active | dirty);
 }

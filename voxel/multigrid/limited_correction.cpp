@@ -21,7 +21,7 @@ LimitedCorrection::LimitedCorrection(std::size_t rows)
 
 LimitedCorrection::Row& LimitedCorrection::add(RowId row, LaneSpan span) noexcept {
   // prefetch: waiting for this memory would be half of the cost
-  fetch_lines(rows_.data() + std::min(count_ + kAhead, rows_.size() - 1), sizeof(Row));
+  prefetch_range(rows_.data() + std::min(count_ + kAhead, rows_.size() - 1), sizeof(Row));
   Row& r = rows_[count_++];
   r.row = row;
   r.span = span;

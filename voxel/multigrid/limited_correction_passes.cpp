@@ -9,8 +9,8 @@
 namespace voxel {
 namespace {
 
-// Visits per row, on average. More happen only if rounding drives a row to and fro; then all rows return to
-// their start.
+// Visits per row, on average. More happen only if rounding drives a row back and forth; then all rows return
+// to their start.
 constexpr std::size_t kMostVisits = 64;
 
 }  // namespace

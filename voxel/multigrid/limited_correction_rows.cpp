@@ -18,27 +18,27 @@ HYBRID_INLINE bool draw_back_axis(const LevelRow& row, const AxisBounds& bounds,
   std::array<Interval, kLaneGroups> allowed;
   ends_of(u, own, row.x, {});
 #pragma GCC unroll 1
-  for (int octet = 0; octet < kLaneGroups; ++octet) {
-    const auto n = static_cast<std::size_t>(octet);
+  for (int group = 0; group < kLaneGroups; ++group) {
+    const auto n = static_cast<std::size_t>(group);
     Around at;
-    look_around(at, own + octet * kLanes, row.z);
+    look_around(at, own + group * kLanes, row.z);
     u.at[n + 1] = at.own;
     everywhere(allowed[n]);
-    narrow_beside<kUniform, kLimits>(allowed[n], at, s, bounds, octet);
+    narrow_beside<kUniform, kLimits>(allowed[n], at, s, bounds, group);
   }
   Mask8 came{};
 #pragma GCC unroll 1
   for (int colour = 0; colour < 2; ++colour) {
 #pragma GCC unroll 1
-    for (int octet = 0; octet < kLaneGroups; ++octet) {
-      const auto n = static_cast<std::size_t>(octet);
+    for (int group = 0; group < kLaneGroups; ++group) {
+      const auto n = static_cast<std::size_t>(group);
       const Float8 now = u.at[n + 1];
       Float8 x_down, x_up, home, rounding = -now;
       shift_down(x_down, u.at[n], now);
       shift_up(x_up, now, u.at[n + 2]);
-      load(home, from + octet * kLanes);
+      load(home, from + group * kLanes);
       Interval in = allowed[n];
-      narrow<kUniform, kLimits>(in, x_up, x_down, s, bounds, 0, octet);
+      narrow<kUniform, kLimits>(in, x_up, x_down, s, bounds, 0, group);
       take_largest(rounding, now);
       rounding *= kRounding;
       const Mask8 taken = colour == 0 ? kEven : ~kEven;
@@ -54,8 +54,8 @@ HYBRID_INLINE bool draw_back_axis(const LevelRow& row, const AxisBounds& bounds,
   }
   if (!any(came)) return false;
 #pragma GCC unroll 1
-  for (int octet = 0; octet < kLaneGroups; ++octet)
-    store(own + octet * kLanes, u.at[static_cast<std::size_t>(octet) + 1]);
+  for (int group = 0; group < kLaneGroups; ++group)
+    store(own + group * kLanes, u.at[static_cast<std::size_t>(group) + 1]);
   return true;
 }
 
@@ -122,30 +122,30 @@ HYBRID_MULTIVERSIONED_512 SetOut set_out_row(const LevelRow& row, const RowLimit
   for (std::size_t axis = 0; axis < 3; ++axis) {
     Mask8 any_stopped{};
 #pragma GCC unroll 1
-    for (int octet = 0; octet < kLaneGroups; ++octet) {
-      float* const at = row.u[axis] + octet * kLanes;
-      float* const ways = way[axis].data() + octet * kLanes;
+    for (int group = 0; group < kLaneGroups; ++group) {
+      float* const at = row.u[axis] + group * kLanes;
+      float* const ways = way[axis].data() + group * kLanes;
       Float8 now, go;
       load(now, at);
       load(go, ways);
       store(ways, now);
-      u[axis][static_cast<std::size_t>(octet) + 1] = now;
-      if (octet < span.first || octet > span.last) continue;
+      u[axis][static_cast<std::size_t>(group) + 1] = now;
+      if (group < span.first || group > span.last) continue;
       Mask8 stands;
-      standing_by_bits(stands, row, axis, octet);
+      standing_by_bits(stands, row, axis, group);
       cut |= stands & (go != 0.0F);
       go = stands ? Float8{} : go;
       take_largest_size(most, go);
       if (row.stopped != nullptr) {
         Mask8 stopped;
-        bits_set(stopped, row.stopped + octet * kLanes, 1 << axis);
+        bits_set(stopped, row.stopped + group * kLanes, 1 << axis);
         any_stopped |= stopped & (go != 0.0F);
-        store(refused[axis].data() + octet * kLanes, stopped ? go : Float8{});
+        store(refused[axis].data() + group * kLanes, stopped ? go : Float8{});
         go = stopped ? Float8{} : go;
       }
       now += go;
       store(at, now);
-      u[axis][static_cast<std::size_t>(octet) + 1] = now;
+      u[axis][static_cast<std::size_t>(group) + 1] = now;
     }
     if (any(any_stopped)) out.stopped |= 1U << axis;
   }

@@ -14,7 +14,7 @@ Prolongation::Prolongation(const Grid& fine)
 
 void Prolongation::begin(int first, int last, int j0, int j1) noexcept {
   first_ = first;
-  octets_ = last - first + 1;
+  groups_ = last - first + 1;
   j0_ = j0;
   for (int k = 0; k < 2; ++k) {
     for (int j = j0; j <= j1; ++j) spread_[slot(j, k)] = {};
@@ -25,12 +25,12 @@ void Prolongation::spread(int j, int k, bool is_source, bool whole) noexcept {
   const std::size_t to = slot(j, k);
   float* lanes = lanes_of_.data() + to * 4 * lanes_;
   if (!whole) {
-    spread_along(cells(3), octets_, lanes + 3 * lanes_);
-    whole = all_ones(lanes + 3 * lanes_, 2 * octets_);
+    spread_along(cells(3), groups_, lanes + 3 * lanes_);
+    whole = all_ones(lanes + 3 * lanes_, 2 * groups_);
   }
   spread_[to] = {is_source, whole};
   if (!is_source) return;
-  for (std::size_t axis = 0; axis < 3; ++axis) spread_along(cells(axis), octets_, lanes + axis * lanes_);
+  for (std::size_t axis = 0; axis < 3; ++axis) spread_along(cells(axis), groups_, lanes + axis * lanes_);
 }
 
 }  // namespace voxel

@@ -29,7 +29,7 @@ class Prolongation {
   // Starts a box: coarse Float8 first … last along x, coarse rows j0 … j1 of every plane.
   void begin(int first, int last, int j0, int j1) noexcept;
   [[nodiscard]] int first() const { return first_; }
-  [[nodiscard]] int octets() const { return octets_; }
+  [[nodiscard]] int groups() const { return groups_; }
 
   // The cells of a row before interpolation, from coarse Float8 first() on: `which` 0 to 2 is the axis; 3 is
   // 1 for each cell that exists, else 0. The Float8 before and after are writable, too.
@@ -39,10 +39,10 @@ class Prolongation {
   // Interpolates cells() along x. `whole`: every cell exists.
   void spread(int j, int k, bool is_source, bool whole) noexcept;
   // A row of lanes of the finer level, from its Float8 number `octet` along x on.
-  [[nodiscard]] ProlongedRow row(int j, int k, int octet) const noexcept {
+  [[nodiscard]] ProlongedRow row(int j, int k, int group) const noexcept {
     const std::size_t at = slot(j, k);
     const float* lanes =
-        lanes_of_.data() + at * 4 * lanes_ + static_cast<std::size_t>(octet - 2 * first_) * kLanes;
+        lanes_of_.data() + at * 4 * lanes_ + static_cast<std::size_t>(group - 2 * first_) * kLanes;
     ProlongedRow out;
     out.is_source = spread_[at].is_source;
     if (!spread_[at].whole) out.weight = lanes + 3 * lanes_;
@@ -59,7 +59,7 @@ class Prolongation {
   }
 
   std::size_t rows_ = 0, lanes_ = 0, cell_lanes_ = 0;  // capacities
-  int first_ = 0, octets_ = 0, j0_ = 0;
+  int first_ = 0, groups_ = 0, j0_ = 0;
   LazyArray<float> cells_, lanes_of_;  // [axis, or 3][lane]; [slot][axis, or 3][lane]
   std::vector<Spread> spread_;         // [slot]
 };

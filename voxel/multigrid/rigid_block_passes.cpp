@@ -28,15 +28,15 @@ std::array<double, 2> room_at(const Lattice& lattice, const Displacement& state,
   return l.up ? std::array<double, 2>{apart, closer} : std::array<double, 2>{closer, apart};
 }
 // How much further, if the voxel at the link's other end comes along as far as its other links allow.
-double room_beside(const Lattice& lattice, const Displacement& state, VoxelId v, std::uint16_t part, int axis,
-                   bool upwards) {
+double room_beside(const Lattice& lattice, const Displacement& state, VoxelId v, std::uint16_t block,
+                   int axis, bool upwards) {
   if (state.role[v] != Displacement::free || lattice.anchored(v)) return 0.0;
   const auto& u = state.u[static_cast<std::size_t>(axis)];
   float room = std::numeric_limits<float>::max();
   for (int d = 0; d < 3; ++d) {
     for (const bool up : {false, true}) {
       const VoxelId w = up ? lattice.up(v, d) : lattice.down(v, d);
-      if (!lattice.filled(w) || lattice.part(w) == part) continue;
+      if (!lattice.filled(w) || lattice.block(w) == block) continue;
       const auto bounds = lattice.bounds(up ? v : w, d, axis);
       const float difference = up ? u[w] - u[v] : u[v] - u[w];
       room = std::min(room, up == upwards ? difference - bounds[0] : bounds[1] - difference);
@@ -45,37 +45,37 @@ double room_beside(const Lattice& lattice, const Displacement& state, VoxelId v,
   return std::max(0.0, static_cast<double>(room));
 }
 // Is it the first of the links between a voxel and the block?
-bool first_link(const Lattice& lattice, const RigidBlocks::Link& l, std::uint16_t part) {
+bool first_link(const Lattice& lattice, const RigidBlocks::Link& l, std::uint16_t block) {
   for (int d = 0; d < l.d; ++d) {
-    if (lattice.part(lattice.up(l.beside, d)) == part || lattice.part(lattice.down(l.beside, d)) == part)
+    if (lattice.block(lattice.up(l.beside, d)) == block || lattice.block(lattice.down(l.beside, d)) == block)
       return false;
   }
-  return !l.up || lattice.part(lattice.up(l.beside, l.d)) != part;
+  return !l.up || lattice.block(lattice.up(l.beside, l.d)) != block;
 }
 
 }  // namespace
 
 void Multigrid::set_block_contacts(const Displacement& state, std::span<const VoxelId> held) noexcept {
-  if (parts_ == nullptr) return;
+  if (blocks_ == nullptr) return;
   for (BlockState& p : block_state_) p.by_tool.count = 0;
   for (const VoxelId v : held) {
     if (!Displacement::in_block(state.role[v])) continue;
     const std::uint32_t s = lattice_.surface_number(v);
     if (s != Lattice::kNoSurface)
-      block_state_[lattice_.part(v) - 1U].by_tool.add(glm::dvec3(state.tool_normal[s]));
+      block_state_[lattice_.block(v) - 1U].by_tool.add(glm::dvec3(state.tool_normal[s]));
   }
   for (BlockState& p : block_state_) p.held = p.by_tool;
 }
 
-glm::dvec3 Multigrid::block_force(std::size_t part, const Displacement& state) const noexcept {
+glm::dvec3 Multigrid::block_force(std::size_t block, const Displacement& state) const noexcept {
   glm::dvec3 force(0.0);
-  for (const RigidBlocks::Link& l : parts_->on(0, part).border) {
+  for (const RigidBlocks::Link& l : blocks_->on(0, block).border) {
     for (int axis = 0; axis < 3; ++axis) {
       const auto& u = state.u[static_cast<std::size_t>(axis)];
       force[axis] += along(l.spring, axis, l.d) * static_cast<double>(u[l.beside] - u[l.cell]);
     }
   }
-  for (const VoxelId v : parts_->loaded(part)) {
+  for (const VoxelId v : blocks_->loaded(block)) {
     for (int axis = 0; axis < 3; ++axis) {
       const float* of_row = state.load_of(v / kRow, axis);
       if (of_row != nullptr) force[axis] += static_cast<double>(of_row[v % kRow]);
@@ -86,10 +86,10 @@ glm::dvec3 Multigrid::block_force(std::size_t part, const Displacement& state) c
 
 // Interval that all links of the border leave the block; `room(link, axis)`: {down, up}.
 template <class Room>
-Multigrid::AdmissibleInterval Multigrid::room_on_border(std::size_t part, const Room& room) const noexcept {
-  constexpr double kFar = 1e30;
-  AdmissibleInterval all{{{-kFar, kFar}, {-kFar, kFar}, {-kFar, kFar}}};
-  for (const RigidBlocks::Link& l : parts_->on(0, part).border) {
+Multigrid::AdmissibleInterval Multigrid::room_on_border(std::size_t block, const Room& room) const noexcept {
+  constexpr double kUnlimited = 1e30;
+  AdmissibleInterval all{{{-kUnlimited, kUnlimited}, {-kUnlimited, kUnlimited}, {-kUnlimited, kUnlimited}}};
+  for (const RigidBlocks::Link& l : blocks_->on(0, block).border) {
     for (int axis = 0; axis < 3; ++axis) {
       const std::array<double, 2> at_link = room(l, axis);
       auto& of_axis = all[static_cast<std::size_t>(axis)];
@@ -100,10 +100,10 @@ Multigrid::AdmissibleInterval Multigrid::room_on_border(std::size_t part, const 
   return all;
 }
 
-Multigrid::AdmissibleInterval Multigrid::interval_of_block(std::size_t part,
+Multigrid::AdmissibleInterval Multigrid::interval_of_block(std::size_t block,
                                                            const Displacement& state) const noexcept {
   return room_on_border(
-      part, [&](const RigidBlocks::Link& l, int axis) { return room_at(lattice_, state, l, axis); });
+      block, [&](const RigidBlocks::Link& l, int axis) { return room_at(lattice_, state, l, axis); });
 }
 
 void Multigrid::add_bounds(const AdmissibleInterval& room, std::vector<BlockBound>& bounds) {
@@ -116,14 +116,14 @@ void Multigrid::add_bounds(const AdmissibleInterval& room, std::vector<BlockBoun
   }
 }
 
-void Multigrid::shift_block(std::size_t part, const glm::dvec3& way, Displacement& state) noexcept {
-  const VoxelId first = parts_->first(part);
+void Multigrid::shift_block(std::size_t block, const glm::dvec3& way, Displacement& state) noexcept {
+  const VoxelId first = blocks_->first(block);
   const auto most = static_cast<float>(std::max({std::fabs(way.x), std::fabs(way.y), std::fabs(way.z)}));
   for (std::size_t axis = 0; axis < 3; ++axis) {
     // All voxels get the place of the first, to the last bit.
     const float to =
         static_cast<float>(static_cast<double>(state.u[axis][first]) + way[static_cast<int>(axis)]);
-    for (const RigidBlocks::Run& run : parts_->on(0, part).rows) {
+    for (const RigidBlocks::Run& run : blocks_->on(0, block).rows) {
       if (run.lanes == kAllLanes) {
         std::fill_n(state.u[axis].data() + std::size_t{run.row} * kRow, kRow, to);
       } else {
@@ -131,18 +131,18 @@ void Multigrid::shift_block(std::size_t part, const glm::dvec3& way, Displacemen
       }
     }
   }
-  for (const RigidBlocks::Run& run : parts_->on(0, part).rows) note_change(0, run.row, most);
+  for (const RigidBlocks::Run& run : blocks_->on(0, block).rows) note_change(0, run.row, most);
 }
 
 // Bounds by obstacles that the block touches or may reach.
-void Multigrid::stop_at_obstacles(std::size_t part, const Displacement& state, const ObstacleView& obstacles,
+void Multigrid::stop_at_obstacles(std::size_t block, const Displacement& state, const ObstacleView& obstacles,
                                   Tool tool) noexcept {
   block_bounds_.clear();
-  const HeldDirections& held = block_state_[part].by_tool;
-  for (std::size_t n = 0; n < held.count && tool == Tool::holds; ++n)
+  const HeldDirections& held = block_state_[block].by_tool;
+  for (std::size_t n = 0; n < held.count && tool == Tool::constrains; ++n)
     block_bounds_.push_back({held.of[n], 0.0, true, 0.0});
   if (obstacles.obstacles.empty()) return;
-  for (const std::uint32_t s : parts_->surface(part)) {
+  for (const std::uint32_t s : blocks_->surface(block)) {
     const Obstacle& o = obstacles.obstacles[s];
     if (o.normal == glm::vec3(0.0F)) continue;
     const double depth = depth_in_obstacle(o, state.at(lattice_.surface()[s]));
@@ -155,10 +155,10 @@ void Multigrid::stop_at_obstacles(std::size_t part, const Displacement& state, c
 
 // As interval_of_block(), if voxels beside the block come along as far as their other links allow; searched
 // in the direction of `way` only.
-Multigrid::AdmissibleInterval Multigrid::room_with_others(std::size_t part, const glm::dvec3& way,
+Multigrid::AdmissibleInterval Multigrid::room_with_others(std::size_t block, const glm::dvec3& way,
                                                           const Displacement& state) const noexcept {
-  const auto number = static_cast<std::uint16_t>(part + 1);
-  return room_on_border(part, [&](const RigidBlocks::Link& l, int axis) {
+  const auto number = static_cast<std::uint16_t>(block + 1);
+  return room_on_border(block, [&](const RigidBlocks::Link& l, int axis) {
     std::array<double, 2> room = room_at(lattice_, state, l, axis);
     if (room[0] < -way[axis]) room[0] += room_beside(lattice_, state, l.beside, number, axis, false);
     if (room[1] < way[axis]) room[1] += room_beside(lattice_, state, l.beside, number, axis, true);
@@ -167,8 +167,8 @@ Multigrid::AdmissibleInterval Multigrid::room_with_others(std::size_t part, cons
 }
 
 // Moves voxels beside a block within the limits of their links to it.
-void Multigrid::take_others_along(std::size_t part, Displacement& state) noexcept {
-  for (const RigidBlocks::Link& l : parts_->on(0, part).border) {
+void Multigrid::take_others_along(std::size_t block, Displacement& state) noexcept {
+  for (const RigidBlocks::Link& l : blocks_->on(0, block).border) {
     if (state.role[l.beside] != Displacement::free || lattice_.anchored(l.beside)) continue;
     for (int axis = 0; axis < 3; ++axis) {
       auto& u = state.u[static_cast<std::size_t>(axis)];
@@ -187,13 +187,13 @@ void Multigrid::take_others_along(std::size_t part, Displacement& state) noexcep
 
 // Voxels that links at their limits keep from moving away come along with the block: adds their forces.
 // Returns the bits of the axes on which the block is held nevertheless.
-std::uint8_t Multigrid::add_what_comes_along(std::size_t part, const Displacement& state,
+std::uint8_t Multigrid::add_what_comes_along(std::size_t block, const Displacement& state,
                                              glm::dvec3& pull) noexcept {
   const double tight = static_cast<double>(kAtLimit) * lattice_.min_spacing_m();
-  const auto number = static_cast<std::uint16_t>(part + 1);
+  const auto number = static_cast<std::uint16_t>(block + 1);
   const glm::dvec3 own = pull;
   std::uint8_t stopped = 0;
-  for (const RigidBlocks::Link& l : parts_->on(0, part).border) {
+  for (const RigidBlocks::Link& l : blocks_->on(0, block).border) {
     for (int axis = 0; axis < 3; ++axis) {
       if (own[axis] == 0.0 || (stopped >> axis & 1U) != 0) continue;
       const bool upwards = own[axis] > 0.0;
@@ -213,11 +213,11 @@ std::uint8_t Multigrid::add_what_comes_along(std::size_t part, const Displacemen
   return stopped;
 }
 
-glm::dvec3 Multigrid::move_block(std::size_t part, const glm::dvec3& way, Displacement& state,
+glm::dvec3 Multigrid::move_block(std::size_t block, const glm::dvec3& way, Displacement& state,
                                  const ObstacleView& obstacles, Tool tool, Note note) noexcept {
-  const glm::dvec3& stiffness = parts_->on(0, part).stiffness;
-  stop_at_obstacles(part, state, obstacles, tool);
-  const AdmissibleInterval room = room_with_others(part, way, state);
+  const glm::dvec3& stiffness = blocks_->on(0, block).stiffness;
+  stop_at_obstacles(block, state, obstacles, tool);
+  const AdmissibleInterval room = room_with_others(block, way, state);
   add_bounds(room, block_bounds_);
   glm::dvec3 to = move_within(stiffness * way, stiffness, block_bounds_);
   for (int axis = 0; axis < 3; ++axis) {  // rounding
@@ -226,21 +226,21 @@ glm::dvec3 Multigrid::move_block(std::size_t part, const glm::dvec3& way, Displa
   }
   const double most = std::max({std::fabs(to.x), std::fabs(to.y), std::fabs(to.z)});
   if (!(most > static_cast<double>(restricted_m()))) return glm::dvec3(0.0);
-  const VoxelId first = parts_->first(part);
+  const VoxelId first = blocks_->first(block);
   const glm::dvec3 before = state.at(first);
-  shift_block(part, to, state);
-  take_others_along(part, state);
-  for (const RigidBlocks::Run& run : parts_->on(0, part).rows) {
-    if (note == Note::in_log) log_.note(0, run.row);
+  shift_block(block, to, state);
+  take_others_along(block, state);
+  for (const RigidBlocks::Run& run : blocks_->on(0, block).rows) {
+    if (note == Note::logged) log_.note(0, run.row);
   }
   return state.at(first) - before;
 }
 
-void Multigrid::shift_cells(int level, std::size_t part, const glm::dvec3& way) noexcept {
+void Multigrid::shift_cells(int level, std::size_t block, const glm::dvec3& way) noexcept {
   Level& l = at(level);
   const auto most = static_cast<float>(std::max({std::fabs(way.x), std::fabs(way.y), std::fabs(way.z)}));
   if (most == 0.0F) return;
-  for (const RigidBlocks::Run& run : parts_->on(level, part).rows) {
+  for (const RigidBlocks::Run& run : blocks_->on(level, block).rows) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto by = static_cast<float>(way[static_cast<int>(axis)]);
       for_cells(run, [&](VoxelId cell, std::uint32_t) { l.value[axis][cell] += by; });
@@ -251,12 +251,12 @@ void Multigrid::shift_cells(int level, std::size_t part, const glm::dvec3& way) 
 }
 
 // Force and stiffness of a block on a level: springs of its border, boundary springs of its cells, its load.
-glm::dvec3 Multigrid::block_pull(int level, std::size_t part, glm::dvec3& stiffness) noexcept {
-  const RigidBlocks::OnLevel& on = parts_->on(level, part);
+glm::dvec3 Multigrid::block_pull(int level, std::size_t block, glm::dvec3& stiffness) noexcept {
+  const RigidBlocks::OnLevel& on = blocks_->on(level, block);
   stiffness = on.stiffness;
-  if (level == 0) return block_state_[part].balance;
+  if (level == 0) return block_state_[block].frozen_N;
   Level& l = at(level);
-  glm::dvec3 pull = block_state_[part].on[static_cast<std::size_t>(level)].load;
+  glm::dvec3 pull = block_state_[block].on[static_cast<std::size_t>(level)].load;
   for (const RigidBlocks::Link& link : on.border) {
     for (int axis = 0; axis < 3; ++axis) {
       const auto& value = l.value[static_cast<std::size_t>(axis)];
@@ -266,7 +266,7 @@ glm::dvec3 Multigrid::block_pull(int level, std::size_t part, glm::dvec3& stiffn
   }
   // If the tool or an obstacle holds the block, its cells have boundary springs because of that; they would
   // hold it along the surface, too.
-  if (block_state_[part].held.count > 0 || parts_->sprawls(part)) return pull;
+  if (block_state_[block].held.count > 0 || blocks_->sprawls(block)) return pull;
   for (const RigidBlocks::Run& run : on.rows) {
     if (!boundary_springs_->any(level, run.row) || !prepare(level, run.row)) continue;
     RowStiffness springs;
@@ -276,7 +276,7 @@ glm::dvec3 Multigrid::block_pull(int level, std::size_t part, glm::dvec3& stiffn
       for_cells(run, [&](VoxelId cell, std::uint32_t lane) {
         const float inverse = springs.inverse[axis * kRow + lane];
         if (!(hold[lane] > 0.0F) || !(inverse > 0.0F)) return;
-        const double by = static_cast<double>(hold_ * hold[lane] / inverse);
+        const double by = static_cast<double>(boundary_scale_ * hold[lane] / inverse);
         stiffness[static_cast<int>(axis)] += by;
         pull[static_cast<int>(axis)] +=
             by * static_cast<double>(l.loaded_at[axis][cell] - l.value[axis][cell]);
@@ -288,7 +288,7 @@ glm::dvec3 Multigrid::block_pull(int level, std::size_t part, glm::dvec3& stiffn
 
 void Multigrid::smooth_blocks(int level, const RigidBlocks::Box& box, Displacement& state,
                               const ObstacleView& obstacles) noexcept {
-  if (parts_ == nullptr) return;
+  if (blocks_ == nullptr) return;
   for_blocks(level, box, [&](std::size_t p, const RigidBlocks::OnLevel&, BlockOnLevel& on) {
     glm::dvec3 stiffness;
     glm::dvec3 pull = block_pull(level, p, stiffness);
@@ -305,7 +305,7 @@ void Multigrid::smooth_blocks(int level, const RigidBlocks::Box& box, Displaceme
       move_block(p, way, state, obstacles);
       return;
     }
-    way = block_state_[p].held.free_block(way);
+    way = block_state_[p].held.free_component(way);
     shift_cells(level, p, way);
     on.pending_correction += way;
   });
@@ -313,7 +313,7 @@ void Multigrid::smooth_blocks(int level, const RigidBlocks::Box& box, Displaceme
 
 float Multigrid::measure_blocks(int level, const RigidBlocks::Box& box, Displacement& state,
                                 const ObstacleView& obstacles) noexcept {
-  if (parts_ == nullptr) return 0.0F;
+  if (blocks_ == nullptr) return 0.0F;
   for (BlockState& p : block_state_) {
     p.on[static_cast<std::size_t>(level)].left = glm::dvec3(0.0);
     p.on[static_cast<std::size_t>(level)].active = false;
@@ -321,28 +321,28 @@ float Multigrid::measure_blocks(int level, const RigidBlocks::Box& box, Displace
   }
   float worst = 0.0F;
   for_blocks(level, box, [&](std::size_t p, const RigidBlocks::OnLevel& of, BlockOnLevel& on) {
-    BlockState& part = block_state_[p];
+    BlockState& block = block_state_[p];
     glm::dvec3 stiffness;
     glm::dvec3 pull = block_pull(level, p, stiffness);
     if (level == 0) {
       pull += block_force(p, state);
       // An obstacle balances the force that presses the block on it.
-      part.held = part.by_tool;
-      stop_at_obstacles(p, state, obstacles, Tool::holds);
+      block.held = block.by_tool;
+      stop_at_obstacles(p, state, obstacles, Tool::constrains);
       move_within(pull, stiffness, block_bounds_);
       for (const BlockBound& b : block_bounds_) {
         if (b.force_N > 0.0 && !b.both && b.room_m < kTouching * lattice_.min_spacing_m())
-          part.held.add(b.normal);
+          block.held.add(b.normal);
       }
       // An active limit balances its force, too; coarse levels would push against it in vain.
-      part.stopped = add_what_comes_along(p, state, pull);
+      block.stopped = add_what_comes_along(p, state, pull);
     }
     for (int axis = 0; axis < 3; ++axis) {
-      if ((part.stopped >> axis & 1U) != 0) pull[axis] = 0.0;
+      if ((block.stopped >> axis & 1U) != 0) pull[axis] = 0.0;
     }
-    on.left = part.held.free_block(pull);
+    on.left = block.held.free_component(pull);
     on.active = true;
-    part.on[static_cast<std::size_t>(level) + 1].passed = on.left;
+    block.on[static_cast<std::size_t>(level) + 1].passed = on.left;
     if (level > 0 || of.border.empty()) return;
     // Per border link, because each force may be off by the tolerance; less the rounding of its displacement.
     const glm::dvec3 bit = kRounding * glm::abs(state.at(of.border.front().cell)) * stiffness;

@@ -22,7 +22,7 @@ inline double along(const Spring& spring, int axis, int d) {
 template <class Visit>
 void Multigrid::for_blocks(int level, const RigidBlocks::Box& box, const Visit& visit) noexcept {
   for (std::size_t p = 0; p < block_state_.size(); ++p) {
-    const RigidBlocks::OnLevel& on = parts_->on(level, p);
+    const RigidBlocks::OnLevel& on = blocks_->on(level, p);
     if (on.count > 0 && on.box.meets(box)) visit(p, on, block_state_[p].on[static_cast<std::size_t>(level)]);
   }
 }

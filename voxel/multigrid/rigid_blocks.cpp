@@ -52,13 +52,13 @@ glm::dvec3 move_within(const glm::dvec3& force_N, const glm::dvec3& stiffness_N_
 
 void HeldDirections::add(const glm::dvec3& normal) noexcept {
   if (count == of.size()) return;
-  const glm::dvec3 rest = free_block(normal);
+  const glm::dvec3 rest = free_component(normal);
   const double size2 = glm::dot(rest, rest);
   if (size2 < kParallel) return;
   of[count++] = rest / std::sqrt(size2);
 }
 
-glm::dvec3 HeldDirections::free_block(glm::dvec3 way) const noexcept {
+glm::dvec3 HeldDirections::free_component(glm::dvec3 way) const noexcept {
   if (count == of.size()) return glm::dvec3(0.0);
   for (std::size_t n = 0; n < count; ++n) way -= glm::dot(of[n], way) * of[n];
   return way;
@@ -67,7 +67,7 @@ glm::dvec3 HeldDirections::free_block(glm::dvec3 way) const noexcept {
 RigidBlocks::RigidBlocks(const Lattice& lattice, const std::vector<LevelStiffness*>& levels)
     : lattice_(lattice), couplings_(levels), count_(lattice.block_count()), levels_(levels.size()) {
   for (std::size_t l = 0; l < levels.size(); ++l) {
-    levels_[l].parts.resize(count_);
+    levels_[l].blocks.resize(count_);
     levels_[l].row.assign(levels[l]->grid().rows(), 0);
     if (l > 0) levels_[l].number = LazyArray<std::uint16_t>(levels[l]->grid().size());
   }
@@ -87,7 +87,7 @@ RigidBlocks::RigidBlocks(const Lattice& lattice, const std::vector<LevelStiffnes
   for (int l = 1; l < static_cast<int>(levels.size()); ++l) find_cells(l, shares, filled);
   for (int l = 0; l < static_cast<int>(levels.size()); ++l) find_border(l);
   for (int l = 0; l < static_cast<int>(levels.size()); ++l) find_filled_rows(l);
-  if (lattice.has_bricks() || lattice.yields()) find_loaded();
+  if (lattice.has_bricks() || lattice.has_plasticity()) find_loaded();
 }
 
 void RigidBlocks::find_voxels() {
@@ -95,14 +95,14 @@ void RigidBlocks::find_voxels() {
   for (RowId row = 0; row < g.rows(); ++row) {
     if (lattice_.filled_in(row) == 0) continue;
     for (VoxelId v = row * kRow; v < (row + 1) * kRow; ++v) {
-      if (lattice_.part(v) == 0) continue;
-      OnLevel& part = levels_[0].parts[lattice_.part(v) - 1U];
-      if (part.rows.empty() || part.rows.back().row != row) part.rows.push_back({row, 0});
-      part.rows.back().lanes |= 1U << v % kRow;
-      ++part.count;
+      if (lattice_.block(v) == 0) continue;
+      OnLevel& block = levels_[0].blocks[lattice_.block(v) - 1U];
+      if (block.rows.empty() || block.rows.back().row != row) block.rows.push_back({row, 0});
+      block.rows.back().lanes |= 1U << v % kRow;
+      ++block.count;
       levels_[0].row[row] = 1;
       const std::uint32_t s = lattice_.surface_number(v);
-      if (s != Lattice::kNoSurface) surface_[lattice_.part(v) - 1U].push_back(s);
+      if (s != Lattice::kNoSurface) surface_[lattice_.block(v) - 1U].push_back(s);
     }
   }
 }
@@ -131,7 +131,7 @@ void RigidBlocks::find_cells(int level, std::vector<std::vector<Share>>& shares,
       }
     }
     of.resize(kept);
-    OnLevel& part = l.parts[p];
+    OnLevel& block = l.blocks[p];
     std::size_t all = 0, known = 0;
     for (const Share& s : of) {
       all += s.voxels;
@@ -147,9 +147,9 @@ void RigidBlocks::find_cells(int level, std::vector<std::vector<Share>>& shares,
       if (2 * s.voxels < filled[s.cell] || l.number[s.cell] != 0) continue;
       l.number[s.cell] = static_cast<std::uint16_t>(p + 1);
       const RowId row = s.cell / kRow;
-      if (part.rows.empty() || part.rows.back().row != row) part.rows.push_back({row, 0});
-      part.rows.back().lanes |= 1U << s.cell % kRow;
-      ++part.count;
+      if (block.rows.empty() || block.rows.back().row != row) block.rows.push_back({row, 0});
+      block.rows.back().lanes |= 1U << s.cell % kRow;
+      ++block.count;
       l.row[row] = 1;
     }
   }
@@ -175,15 +175,15 @@ void RigidBlocks::find_border(int level) {
   LevelStiffness& couplings = *couplings_[static_cast<std::size_t>(level)];
   const Grid& g = couplings.grid();
   for (std::size_t p = 0; p < count_; ++p) {
-    OnLevel& part = levels_[static_cast<std::size_t>(level)].parts[p];
+    OnLevel& block = levels_[static_cast<std::size_t>(level)].blocks[p];
     bool any = false;
-    for (const Run& run : part.rows) {
+    for (const Run& run : block.rows) {
       for (std::uint32_t lanes = run.lanes; lanes != 0; lanes &= lanes - 1) {
         const VoxelId cell = run.row * kRow + static_cast<VoxelId>(std::countr_zero(lanes));
         const std::array<int, 3> c = g.coordinates(cell);
         for (std::size_t d = 0; d < 3; ++d) {
-          part.box.first[d] = any ? std::min(part.box.first[d], c[d]) : c[d];
-          part.box.last[d] = any ? std::max(part.box.last[d], c[d]) : c[d];
+          block.box.first[d] = any ? std::min(block.box.first[d], c[d]) : c[d];
+          block.box.last[d] = any ? std::max(block.box.last[d], c[d]) : c[d];
         }
         any = true;
         std::array<VoxelId, 6> beside;
@@ -198,9 +198,9 @@ void RigidBlocks::find_border(int level) {
           const bool up = n % 2 != 0;
           const Spring& spring = (up ? springs.up : springs.down)[n / 2];
           if (of(level, beside[n]) == p + 1 || !(spring.along > 0.0F || spring.across > 0.0F)) continue;
-          part.border.push_back({cell, beside[n], spring, static_cast<std::uint8_t>(n / 2), up});
+          block.border.push_back({cell, beside[n], spring, static_cast<std::uint8_t>(n / 2), up});
           for (int axis = 0; axis < 3; ++axis)
-            part.stiffness[axis] += static_cast<double>(spring.on(axis, static_cast<int>(n / 2)));
+            block.stiffness[axis] += static_cast<double>(spring.on(axis, static_cast<int>(n / 2)));
         }
       }
     }
@@ -216,7 +216,7 @@ void RigidBlocks::find_filled_rows(int level) {
     bool all = true, above = level + 1 < static_cast<int>(levels_.size());
     for (VoxelId v = row * kRow; v < (row + 1) * kRow && all; ++v) {
       const std::uint16_t number = of(level, v);
-      all = number != 0 || !couplings.holds_any(g.coordinates(v));
+      all = number != 0 || !couplings.has_voxel(g.coordinates(v));
       above = above && (number == 0 || on(level + 1, number - 1U).count > 0);
     }
     if (all) known = above ? kFilledKnown : kFilled;
@@ -232,7 +232,7 @@ void RigidBlocks::find_loaded() {
         bool inside = true;
         for (int n = 0; n < 27 && inside; ++n) {
           const VoxelId w = lattice_.at(c[0] + n % 3 - 1, c[1] + n / 3 % 3 - 1, c[2] + n / 9 - 1);
-          inside = !lattice_.filled(w) || lattice_.part(w) == p + 1;
+          inside = !lattice_.filled(w) || lattice_.block(w) == p + 1;
         }
         if (!inside) loaded_[p].push_back(v);
       }
@@ -244,8 +244,8 @@ std::size_t RigidBlocks::memory_bytes() const {
   std::size_t bytes = 0;
   for (const Level& l : levels_) {
     bytes += l.number.resident_bytes() + l.row.size();
-    for (const OnLevel& part : l.parts)
-      bytes += sizeof(part) + part.rows.capacity() * sizeof(Run) + part.border.capacity() * sizeof(Link);
+    for (const OnLevel& block : l.blocks)
+      bytes += sizeof(block) + block.rows.capacity() * sizeof(Run) + block.border.capacity() * sizeof(Link);
   }
   for (std::size_t p = 0; p < count_; ++p)
     bytes += loaded_[p].capacity() * sizeof(VoxelId) + surface_[p].capacity() * sizeof(std::uint32_t);

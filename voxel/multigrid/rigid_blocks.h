@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Rigid blocks: components of an object whose links have no slack (Lattice::part), on every level of the
+// Rigid blocks: components of an object whose links have no slack (Lattice::block), on every level of the
 // multigrid hierarchy.
 //
 // Such a component can only be displaced as a whole: it has three unknowns, however many voxels it has. Voxel
@@ -45,7 +45,7 @@ struct HeldDirections {
   std::size_t count = 0;
 
   void add(const glm::dvec3& normal) noexcept;
-  [[nodiscard]] glm::dvec3 free_block(glm::dvec3 way) const noexcept;
+  [[nodiscard]] glm::dvec3 free_component(glm::dvec3 way) const noexcept;
 };
 
 class RigidBlocks {
@@ -82,12 +82,12 @@ class RigidBlocks {
   RigidBlocks(const Lattice& lattice, const std::vector<LevelStiffness*>& levels);
 
   [[nodiscard]] std::size_t count() const { return count_; }
-  [[nodiscard]] const OnLevel& on(int level, std::size_t part) const {
-    return levels_[static_cast<std::size_t>(level)].parts[part];
+  [[nodiscard]] const OnLevel& on(int level, std::size_t block) const {
+    return levels_[static_cast<std::size_t>(level)].blocks[block];
   }
   // Number of the block that a cell belongs to, plus one; 0: none.
   [[nodiscard]] std::uint16_t of(int level, VoxelId cell) const {
-    return level == 0 ? lattice_.part(cell) : levels_[static_cast<std::size_t>(level)].number[cell];
+    return level == 0 ? lattice_.block(cell) : levels_[static_cast<std::size_t>(level)].number[cell];
   }
   [[nodiscard]] bool in_row(int level, RowId row) const {
     return levels_[static_cast<std::size_t>(level)].row[row] != 0;
@@ -101,19 +101,19 @@ class RigidBlocks {
     return levels_[static_cast<std::size_t>(level)].row[row] == kFilledKnown;
   }
   // Is it fixed for coarse levels that do not know it?
-  [[nodiscard]] bool sprawls(std::size_t part) const { return sprawls_[part] != 0; }
+  [[nodiscard]] bool sprawls(std::size_t block) const { return sprawls_[block] != 0; }
   // Voxels of the block with loads besides their springs: bricks, or plastic links, of tissue beside it.
-  [[nodiscard]] const std::vector<VoxelId>& loaded(std::size_t part) const { return loaded_[part]; }
+  [[nodiscard]] const std::vector<VoxelId>& loaded(std::size_t block) const { return loaded_[block]; }
   // Surface numbers of its surface voxels.
-  [[nodiscard]] const std::vector<std::uint32_t>& surface(std::size_t part) const { return surface_[part]; }
-  [[nodiscard]] VoxelId first(std::size_t part) const {
-    return on(0, part).border.empty() ? VoxelId{0} : on(0, part).border.front().cell;
+  [[nodiscard]] const std::vector<std::uint32_t>& surface(std::size_t block) const { return surface_[block]; }
+  [[nodiscard]] VoxelId first(std::size_t block) const {
+    return on(0, block).border.empty() ? VoxelId{0} : on(0, block).border.front().cell;
   }
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
   struct Level {
-    std::vector<OnLevel> parts;
+    std::vector<OnLevel> blocks;
     LazyArray<std::uint16_t> number;  // [cell]; empty on level 0
     std::vector<std::uint8_t> row;    // [row] 1: has cells of blocks; kFilled: and no others
   };

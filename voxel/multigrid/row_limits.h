@@ -50,16 +50,16 @@ struct AxisBounds {
 // Intersects an interval with the limits of the links in d to the neighbours at `up` and `down`.
 template <bool kUniform, Limits kLimits>
 HYBRID_INLINE void narrow(Interval& in, const Float8& up, const Float8& down, const AxisSprings& s,
-                          const AxisBounds& b, std::size_t d, int octet) {
+                          const AxisBounds& b, std::size_t d, int group) {
   if constexpr (kLimits == Limits::lanes) {
     Float8 low, high;
-    load(low, b.up_low[d] + octet * kLanes);
-    load(high, b.up_high[d] + octet * kLanes);
+    load(low, b.up_low[d] + group * kLanes);
+    load(high, b.up_high[d] + group * kLanes);
     low *= b.sign[d];
     take_largest(in.low, up - high);
     take_least(in.high, up - low);
-    load(low, b.down_low[d] + octet * kLanes);
-    load(high, b.down_high[d] + octet * kLanes);
+    load(low, b.down_low[d] + group * kLanes);
+    load(high, b.down_high[d] + group * kLanes);
     low *= b.sign[d];
     take_largest(in.low, down + low);
     take_least(in.high, down + high);
@@ -68,10 +68,10 @@ HYBRID_INLINE void narrow(Interval& in, const Float8& up, const Float8& down, co
     Float8 below_low = down + b.row.low[d], below_high = down + b.row.high[d];
     if (!kUniform) {
       Float8 k;
-      load(k, s.up[d] + octet * kLanes);
+      load(k, s.up[d] + group * kLanes);
       above_low = k > 0.0F ? above_low : in.low;
       above_high = k > 0.0F ? above_high : in.high;
-      load(k, s.down[d] + octet * kLanes);
+      load(k, s.down[d] + group * kLanes);
       below_low = k > 0.0F ? below_low : in.low;
       below_high = k > 0.0F ? below_high : in.high;
     }
@@ -83,9 +83,9 @@ HYBRID_INLINE void narrow(Interval& in, const Float8& up, const Float8& down, co
 }
 template <bool kUniform, Limits kLimits>
 HYBRID_INLINE void narrow_beside(Interval& in, const Around& at, const AxisSprings& s, const AxisBounds& b,
-                                 int octet) {
-  narrow<kUniform, kLimits>(in, at.y_up, at.y_down, s, b, 1, octet);
-  narrow<kUniform, kLimits>(in, at.z_up, at.z_down, s, b, 2, octet);
+                                 int group) {
+  narrow<kUniform, kLimits>(in, at.y_up, at.y_down, s, b, 1, group);
+  narrow<kUniform, kLimits>(in, at.z_up, at.z_down, s, b, 2, group);
 }
 // An interval can only be empty by rounding: the voxel stays where it is then.
 HYBRID_INLINE void bring_into(Float8& wanted, const Interval& in, const Float8& now) {
@@ -109,7 +109,7 @@ struct Band {
 // Marks lanes with a link beyond the band, if the Float8 stood at `own`.
 template <bool kUniform>
 HYBRID_INLINE void note_beyond(Mask8& beyond, const Float8& own, const Float8& x_down, const Float8& x_up,
-                               const Around& at, const AxisSprings& s, const Band& band, int octet) {
+                               const Around& at, const AxisSprings& s, const Band& band, int group) {
   const std::array<Float8, 3> up{x_up - own, at.y_up - own, at.z_up - own},
       down{own - x_down, own - at.y_down, own - at.z_down};
   for (std::size_t d = 0; d < 3; ++d) {
@@ -123,9 +123,9 @@ HYBRID_INLINE void note_beyond(Mask8& beyond, const Float8& own, const Float8& x
       Float8 above{}, below{}, k;
       take_largest_size(above, up[d]);
       take_largest_size(below, down[d]);
-      load(k, s.up[d] + octet * kLanes);
+      load(k, s.up[d] + group * kLanes);
       out = (above >= band.most[d]) & (k > 0.0F);
-      load(k, s.down[d] + octet * kLanes);
+      load(k, s.down[d] + group * kLanes);
       out |= (below >= band.most[d]) & (k > 0.0F);
     }
     beyond |= out;
@@ -139,8 +139,8 @@ HYBRID_INLINE AxisBounds bounds_of(const RowLimits* limits, std::size_t axis) {
 
 template <bool kUniform>
 HYBRID_INLINE void look_beyond(Mask8& beyond, const Float8& own, const Float8& x_down, const Float8& x_up,
-                               const LevelRow& row, const Band& band, std::size_t axis, int octet) {
-  const float* at = row.u[axis] + octet * kLanes;
+                               const LevelRow& row, const Band& band, std::size_t axis, int group) {
+  const float* at = row.u[axis] + group * kLanes;
   for (std::size_t d = 0; d < 3; ++d) {
     Float8 above = x_up, below = x_down;
     if (d > 0) {
@@ -155,9 +155,9 @@ HYBRID_INLINE void look_beyond(Mask8& beyond, const Float8& own, const Float8& x
       beyond |= up >= band.most[d];
     } else {
       Float8 k;
-      spring_up<false>(k, row.springs, axis, d, octet);
+      spring_up<false>(k, row.springs, axis, d, group);
       beyond |= (up >= band.most[d]) & (k > 0.0F);
-      spring_down<false>(k, row.springs, axis, d, octet);
+      spring_down<false>(k, row.springs, axis, d, group);
       beyond |= (down >= band.most[d]) & (k > 0.0F);
     }
   }
@@ -166,10 +166,10 @@ HYBRID_INLINE void look_beyond(Mask8& beyond, const Float8& own, const Float8& x
 // The same, if each lane has its own limits.
 HYBRID_INLINE void look_beyond_lanes(Mask8& beyond, const Float8& own, const Float8& x_down,
                                      const Float8& x_up, const LevelRow& row, const RowLimits::Written& w,
-                                     std::size_t axis, int octet) {
+                                     std::size_t axis, int group) {
   constexpr float kNear = 0.999F;
-  const float* at = row.u[axis] + octet * kLanes;
-  const auto lanes = static_cast<std::size_t>(octet) * kLanes;
+  const float* at = row.u[axis] + group * kLanes;
+  const auto lanes = static_cast<std::size_t>(group) * kLanes;
   for (std::size_t d = 0; d < 3; ++d) {
     Float8 above = x_up, below = x_down, low, high;
     if (d > 0) {
@@ -198,18 +198,18 @@ HYBRID_INLINE bool look_at_axes(std::array<Mask8, 3>& beyond, const Axes& u, con
                                 const RowLimits& limits, const std::array<Band, 3>& band, LaneSpan span) {
   beyond = {};
 #pragma GCC unroll 1
-  for (int octet = span.first; octet <= span.last; ++octet) {
-    const auto n = static_cast<std::size_t>(octet - span.first);
+  for (int group = span.first; group <= span.last; ++group) {
+    const auto n = static_cast<std::size_t>(group - span.first);
 #pragma GCC unroll 3
     for (std::size_t axis = 0; axis < 3; ++axis) {
       Float8 x_down, x_up;
       shift_down(x_down, u[axis][n], u[axis][n + 1]);
       shift_up(x_up, u[axis][n + 1], u[axis][n + 2]);
       if constexpr (kBeyond == Beyond::lanes) {
-        look_beyond_lanes(beyond[axis], u[axis][n + 1], x_down, x_up, row, *limits.lanes, axis, octet);
+        look_beyond_lanes(beyond[axis], u[axis][n + 1], x_down, x_up, row, *limits.lanes, axis, group);
       } else {
         look_beyond<kBeyond == Beyond::tightest>(beyond[axis], u[axis][n + 1], x_down, x_up, row, band[axis],
-                                                 axis, octet);
+                                                 axis, group);
       }
     }
   }

@@ -23,52 +23,52 @@ HYBRID_INLINE void residual_axis(RowResidual& result, const LevelRow& row, const
     load(u.at[static_cast<std::size_t>(n) + 1], own + (span.first + n) * kLanes);
 #pragma GCC unroll 1
   for (int n = 0; n < count; ++n) {
-    const int octet = span.first + n;
+    const int group = span.first + n;
     const auto un = static_cast<std::size_t>(n);
     Around at;
-    look_around(at, own + octet * kLanes, row.z);
+    look_around(at, own + group * kLanes, row.z);
     Float8 x_down, x_up, kxd, kxu, kyd, kyu, kzd, kzu, inverse;
     shift_down(x_down, u.at[un], at.own);
     shift_up(x_up, at.own, u.at[un + 2]);
-    spring<kUniform>(kxd, s.down[0], octet);
-    spring<kUniform>(kxu, s.up[0], octet);
-    spring<kUniform>(kyd, s.down[1], octet);
-    spring<kUniform>(kyu, s.up[1], octet);
-    spring<kUniform>(kzd, s.down[2], octet);
-    spring<kUniform>(kzu, s.up[2], octet);
-    spring<kUniform>(inverse, s.inverse, octet);
+    spring<kUniform>(kxd, s.down[0], group);
+    spring<kUniform>(kxu, s.up[0], group);
+    spring<kUniform>(kyd, s.down[1], group);
+    spring<kUniform>(kyu, s.up[1], group);
+    spring<kUniform>(kzd, s.down[2], group);
+    spring<kUniform>(kzu, s.up[2], group);
+    spring<kUniform>(inverse, s.inverse, group);
     Float8 r = kxd * (x_down - at.own) + kxu * (x_up - at.own) + kyd * (at.y_down - at.own) +
                kyu * (at.y_up - at.own) + kzd * (at.z_down - at.own) + kzu * (at.z_up - at.own);
     if (row.load[axis] != nullptr) {
       Float8 force;
-      load(force, row.load[axis] + octet * kLanes);
+      load(force, row.load[axis] + group * kLanes);
       r += force;
     }
     if (row.hold[axis] != nullptr) {
-      Float8 hold, told;
-      load(hold, row.hold[axis] + octet * kLanes);
-      load(told, row.held_at[axis] + octet * kLanes);
+      Float8 hold, prolonged;
+      load(hold, row.hold[axis] + group * kLanes);
+      load(prolonged, row.held_at[axis] + group * kLanes);
       const Float8 safe = inverse == 0.0F ? Float8{} + 1.0F : inverse;
-      r += row.hold_times * hold / safe * (told - at.own);
+      r += row.hold_times * hold / safe * (prolonged - at.own);
     }
     Mask8 stays;
-    staying(stays, row, inverse, axis, octet);
+    staying(stays, row, inverse, axis, group);
     r = stays ? Float8{} : r;
     if constexpr (clamps(kLimits)) {
       Mask8 beyond{};
-      note_beyond<kUniform>(beyond, at.own, x_down, x_up, at, s, band, octet);
+      note_beyond<kUniform>(beyond, at.own, x_down, x_up, at, s, band, group);
       if (any(beyond)) {
         Interval in;
         everywhere(in);
-        narrow_beside<kUniform, kLimits>(in, at, s, bounds, octet);
-        narrow<kUniform, kLimits>(in, x_up, x_down, s, bounds, 0, octet);
+        narrow_beside<kUniform, kLimits>(in, at, s, bounds, group);
+        narrow<kUniform, kLimits>(in, x_up, x_down, s, bounds, 0, group);
         const Mask8 resisted =
             ((r > 0.0F) & (at.own >= in.high - tight)) | ((r < 0.0F) & (at.own <= in.low + tight));
         r = resisted ? Float8{} : r;
-        result.resisted[axis] |= lanes_set(resisted) << (octet * kLanes);
+        result.resisted[axis] |= lanes_set(resisted) << (group * kLanes);
       }
     }
-    store(out + octet * kLanes, r);
+    store(out + group * kLanes, r);
     take_largest_size(most_N, r);
     take_largest_size(most_m, r * inverse);
   }
@@ -102,16 +102,16 @@ HYBRID_INLINE void look_at_limits(const LevelRow& row, const AxisBounds& bounds,
   Span u;
   ends_of(u, own, row.x, {});
 #pragma GCC unroll 1
-  for (int octet = 0; octet < kLaneGroups; ++octet)
-    load(u.at[static_cast<std::size_t>(octet) + 1], own + octet * kLanes);
+  for (int group = 0; group < kLaneGroups; ++group)
+    load(u.at[static_cast<std::size_t>(group) + 1], own + group * kLanes);
   // Each lane sets its own bit: cheaper than gathering lanes in each Float8.
   Mask8 bit{1, 2, 4, 8, 16, 32, 64, 128};
   std::array<Mask8, 3> at_low{}, at_high{}, down_at_low{}, down_at_high{};
   Mask8 pulled_up{}, pulled_down{}, movable{};
 #pragma GCC unroll 1
-  for (int octet = 0; octet < kLaneGroups; ++octet, bit <<= kLanes) {
-    const auto n = static_cast<std::size_t>(octet);
-    const int lane = octet * kLanes;
+  for (int group = 0; group < kLaneGroups; ++group, bit <<= kLanes) {
+    const auto n = static_cast<std::size_t>(group);
+    const int lane = group * kLanes;
     Around at;
     look_around(at, own + lane, row.z);
     Float8 x_down, x_up, k, inverse;
@@ -128,7 +128,7 @@ HYBRID_INLINE void look_at_limits(const LevelRow& row, const AxisBounds& bounds,
         low *= bounds.sign[d];
         load(high, bounds.down_high[d] + lane);
       }
-      spring<kUniform>(k, s.down[d], octet);
+      spring<kUniform>(k, s.down[d], group);
       pull -= k * down[d];
       down_at_low[d] |= (k > 0.0F) & (down[d] <= low + tight[d]) & bit;
       down_at_high[d] |= (k > 0.0F) & (down[d] >= high - tight[d]) & bit;
@@ -137,7 +137,7 @@ HYBRID_INLINE void look_at_limits(const LevelRow& row, const AxisBounds& bounds,
         low *= bounds.sign[d];
         load(high, bounds.up_high[d] + lane);
       }
-      spring<kUniform>(k, s.up[d], octet);
+      spring<kUniform>(k, s.up[d], group);
       pull += k * up[d];
       at_low[d] |= (k > 0.0F) & (up[d] <= low + tight[d]) & bit;
       at_high[d] |= (k > 0.0F) & (up[d] >= high - tight[d]) & bit;
@@ -146,7 +146,7 @@ HYBRID_INLINE void look_at_limits(const LevelRow& row, const AxisBounds& bounds,
       load(k, row.load[axis] + lane);
       pull += k;
     }
-    spring<kUniform>(inverse, s.inverse, octet);
+    spring<kUniform>(inverse, s.inverse, group);
     movable |= (inverse != 0.0F) & bit;
     pulled_up |= (pull > 0.0F) & bit;
     pulled_down |= (pull < 0.0F) & bit;
@@ -199,10 +199,10 @@ HYBRID_MULTIVERSIONED_512 void measure_row(const RowStiffness& springs, const Ro
 #pragma GCC unroll 1
   for (std::size_t axis = 0; axis < 3; ++axis) {
 #pragma GCC unroll 1
-    for (int octet = span.first; octet <= span.last; ++octet) {
+    for (int group = span.first; group <= span.last; ++group) {
       Float8 r, inverse;
-      load(r, residual[axis].data() + octet * kLanes);
-      load(inverse, springs.inverse + axis * kRow + octet * kLanes);
+      load(r, residual[axis].data() + group * kLanes);
+      load(inverse, springs.inverse + axis * kRow + group * kLanes);
       take_largest_size(most_N, r);
       take_largest_size(most_m, r * inverse);
     }

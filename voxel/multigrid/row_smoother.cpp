@@ -25,44 +25,44 @@ HYBRID_INLINE void smooth_axis(const LevelRow& row, const AxisBounds& bounds, st
   const int count = span.last - span.first + 1;
 #pragma GCC unroll 1
   for (int n = 0; n < count; ++n) {
-    const int octet = span.first + n;
+    const int group = span.first + n;
     const auto un = static_cast<std::size_t>(n);
     Around at;
-    look_around(at, own + octet * kLanes, row.z);
+    look_around(at, own + group * kLanes, row.z);
     u.at[un + 1] = at.own;
     Float8 kyd, kyu, kzd, kzu, inverse;
-    spring<kUniform>(kyd, s.down[1], octet);
-    spring<kUniform>(kyu, s.up[1], octet);
-    spring<kUniform>(kzd, s.down[2], octet);
-    spring<kUniform>(kzu, s.up[2], octet);
-    spring<kUniform>(inverse, s.inverse, octet);
+    spring<kUniform>(kyd, s.down[1], group);
+    spring<kUniform>(kyu, s.up[1], group);
+    spring<kUniform>(kzd, s.down[2], group);
+    spring<kUniform>(kzu, s.up[2], group);
+    spring<kUniform>(inverse, s.inverse, group);
     Float8 sum = kyd * at.y_down + kyu * at.y_up + kzd * at.z_down + kzu * at.z_up;
     if (row.load[axis] != nullptr) {
       Float8 force;
-      load(force, row.load[axis] + octet * kLanes);
+      load(force, row.load[axis] + group * kLanes);
       sum += force;
     }
     beside[un] = sum;
-    staying(stays[un], row, inverse, axis, octet);
+    staying(stays[un], row, inverse, axis, group);
     everywhere(allowed[un]);
-    narrow_beside<kUniform, kLimits>(allowed[un], at, s, bounds, octet);
+    narrow_beside<kUniform, kLimits>(allowed[un], at, s, bounds, group);
   }
 #pragma GCC unroll 1
   for (int colour = 0; colour < 2; ++colour) {
 #pragma GCC unroll 1
     for (int n = 0; n < count; ++n) {
-      const int octet = span.first + n;
+      const int group = span.first + n;
       const auto un = static_cast<std::size_t>(n);
       const Float8 now = u.at[un + 1];
       Float8 x_down, x_up, kxd, kxu, inverse;
       shift_down(x_down, u.at[un], now);
       shift_up(x_up, now, u.at[un + 2]);
-      spring<kUniform>(kxd, s.down[0], octet);
-      spring<kUniform>(kxu, s.up[0], octet);
-      spring<kUniform>(inverse, s.inverse, octet);
+      spring<kUniform>(kxd, s.down[0], group);
+      spring<kUniform>(kxu, s.up[0], group);
+      spring<kUniform>(inverse, s.inverse, group);
       Float8 wanted = (kxd * x_down + kxu * x_up + beside[un]) * inverse;
       Interval in = allowed[un];
-      narrow<kUniform, kLimits>(in, x_up, x_down, s, bounds, 0, octet);
+      narrow<kUniform, kLimits>(in, x_up, x_down, s, bounds, 0, group);
       bring_into(wanted, in, now);
       const Mask8 taken = (colour == 0 ? kEven : ~kEven) & ~stays[un];
       select(u.at[un + 1], taken, wanted, now);
@@ -87,55 +87,55 @@ HYBRID_INLINE unsigned smooth_freely(const LevelRow& row, const RowLimits* limit
   std::array<std::array<Mask8, kLaneGroups>, 3> stays;
   load_axes(u, row, span);
 #pragma GCC unroll 1
-  for (int octet = span.first; octet <= span.last; ++octet) {
-    const auto n = static_cast<std::size_t>(octet - span.first);
+  for (int group = span.first; group <= span.last; ++group) {
+    const auto n = static_cast<std::size_t>(group - span.first);
 #pragma GCC unroll 3
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const float* own = row.u[axis] + octet * kLanes;
+      const float* own = row.u[axis] + group * kLanes;
       Float8 k, value, sum;
-      spring_down<kUniform>(k, s, axis, 1, octet);
+      spring_down<kUniform>(k, s, axis, 1, group);
       load(value, own - kRow);
       sum = k * value;
-      spring_up<kUniform>(k, s, axis, 1, octet);
+      spring_up<kUniform>(k, s, axis, 1, group);
       load(value, own + kRow);
       sum += k * value;
-      spring_down<kUniform>(k, s, axis, 2, octet);
+      spring_down<kUniform>(k, s, axis, 2, group);
       load(value, own - row.z);
       sum += k * value;
-      spring_up<kUniform>(k, s, axis, 2, octet);
+      spring_up<kUniform>(k, s, axis, 2, group);
       load(value, own + row.z);
       sum += k * value;
       if (row.load[axis] != nullptr) {
-        load(value, row.load[axis] + octet * kLanes);
+        load(value, row.load[axis] + group * kLanes);
         sum += value;
       }
       beside[axis][n] = sum;
-      inverse_of<kUniform>(k, s, axis, octet);
-      staying(stays[axis][n], row, k, axis, octet);
+      inverse_of<kUniform>(k, s, axis, group);
+      staying(stays[axis][n], row, k, axis, group);
     }
   }
 #pragma GCC unroll 1
   for (int colour = 0; colour < 2; ++colour) {
     const Mask8 own_colour = colour == 0 ? kEven : ~kEven;
 #pragma GCC unroll 1
-    for (int octet = span.first; octet <= span.last; ++octet) {
-      const auto n = static_cast<std::size_t>(octet - span.first);
+    for (int group = span.first; group <= span.last; ++group) {
+      const auto n = static_cast<std::size_t>(group - span.first);
 #pragma GCC unroll 3
       for (std::size_t axis = 0; axis < 3; ++axis) {
         const Float8 now = u[axis][n + 1];
         Float8 x_down, x_up, kxd, kxu, inverse;
         shift_down(x_down, u[axis][n], now);
         shift_up(x_up, now, u[axis][n + 2]);
-        spring_down<kUniform>(kxd, s, axis, 0, octet);
-        spring_up<kUniform>(kxu, s, axis, 0, octet);
-        inverse_of<kUniform>(inverse, s, axis, octet);
+        spring_down<kUniform>(kxd, s, axis, 0, group);
+        spring_up<kUniform>(kxu, s, axis, 0, group);
+        inverse_of<kUniform>(inverse, s, axis, group);
         Float8 wanted = (kxd * x_down + kxu * x_up + beside[axis][n]) * inverse;
         if (row.hold[axis] != nullptr) {
-          Float8 told, hold;
-          load(told, row.held_at[axis] + octet * kLanes);
-          load(hold, row.hold[axis] + octet * kLanes);
+          Float8 prolonged, hold;
+          load(prolonged, row.held_at[axis] + group * kLanes);
+          load(hold, row.hold[axis] + group * kLanes);
           hold *= row.hold_times;
-          wanted += (told - wanted) * (hold / (1.0F + hold));
+          wanted += (prolonged - wanted) * (hold / (1.0F + hold));
         }
         select(u[axis][n + 1], own_colour & ~stays[axis][n], wanted, now);
       }
@@ -144,12 +144,12 @@ HYBRID_INLINE unsigned smooth_freely(const LevelRow& row, const RowLimits* limit
   unsigned beyond = 0;
   if constexpr (kLook) beyond = beyond_band<kUniform>(u, row, *limits, span, 0.0F);
 #pragma GCC unroll 1
-  for (int octet = span.first; octet <= span.last; ++octet) {
-    const auto n = static_cast<std::size_t>(octet - span.first);
+  for (int group = span.first; group <= span.last; ++group) {
+    const auto n = static_cast<std::size_t>(group - span.first);
 #pragma GCC unroll 3
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if (kLook && (beyond >> axis & 1U) != 0) continue;
-      float* to = row.u[axis] + octet * kLanes;
+      float* to = row.u[axis] + group * kLanes;
       Float8 before;
       load(before, to);
       take_largest_size(most, u[axis][n + 1] - before);
@@ -187,13 +187,13 @@ HYBRID_INLINE void correct_axis(const LevelRow& row, const AxisBounds& bounds, s
   ends_of(u, own, row.x, span);
 #pragma GCC unroll 1
   for (int n = 0; n < count; ++n) {
-    const int octet = span.first + n;
+    const int group = span.first + n;
     const auto un = static_cast<std::size_t>(n);
     Float8 now, way, inverse;
-    load(now, own + octet * kLanes);
-    load(way, correction + octet * kLanes);
-    spring<kUniform>(inverse, s.inverse, octet);
-    staying(stays[un], row, inverse, axis, octet);
+    load(now, own + group * kLanes);
+    load(way, correction + group * kLanes);
+    spring<kUniform>(inverse, s.inverse, group);
+    staying(stays[un], row, inverse, axis, group);
     take_largest_size(most, way);
     target[un] = stays[un] ? now : now + way;
     u.at[un + 1] = now;
@@ -201,25 +201,25 @@ HYBRID_INLINE void correct_axis(const LevelRow& row, const AxisBounds& bounds, s
   std::array<Interval, kLaneGroups> allowed;
 #pragma GCC unroll 1
   for (int n = 0; n < count; ++n) {
-    const int octet = span.first + n;
+    const int group = span.first + n;
     Around at;
-    look_around(at, own + octet * kLanes, row.z);
+    look_around(at, own + group * kLanes, row.z);
     everywhere(allowed[static_cast<std::size_t>(n)]);
-    narrow_beside<kUniform, kLimits>(allowed[static_cast<std::size_t>(n)], at, s, bounds, octet);
+    narrow_beside<kUniform, kLimits>(allowed[static_cast<std::size_t>(n)], at, s, bounds, group);
   }
   // Every second voxel at a time: next to fixed neighbours a limit is an interval.
 #pragma GCC unroll 1
   for (int colour = 0; colour < 2; ++colour) {
 #pragma GCC unroll 1
     for (int n = 0; n < count; ++n) {
-      const int octet = span.first + n;
+      const int group = span.first + n;
       const auto un = static_cast<std::size_t>(n);
       const Float8 now = u.at[un + 1];
       Float8 x_down, x_up, wanted = target[un];
       shift_down(x_down, u.at[un], now);
       shift_up(x_up, now, u.at[un + 2]);
       Interval in = allowed[un];
-      narrow<kUniform, kLimits>(in, x_up, x_down, s, bounds, 0, octet);
+      narrow<kUniform, kLimits>(in, x_up, x_down, s, bounds, 0, group);
       bring_into(wanted, in, now);
       const Mask8 taken = (colour == 0 ? kEven : ~kEven) & ~stays[un];
       select(u.at[un + 1], taken, wanted, now);
@@ -227,17 +227,17 @@ HYBRID_INLINE void correct_axis(const LevelRow& row, const AxisBounds& bounds, s
   }
 #pragma GCC unroll 1
   for (int n = 0; n < count; ++n) {
-    const int octet = span.first + n;
+    const int group = span.first + n;
     const auto un = static_cast<std::size_t>(n);
     Float8 now, way, inverse;
-    load(now, own + octet * kLanes);
-    load(way, correction + octet * kLanes);
-    spring<kUniform>(inverse, s.inverse, octet);
+    load(now, own + group * kLanes);
+    load(way, correction + group * kLanes);
+    spring<kUniform>(inverse, s.inverse, group);
     Mask8 fixed;
-    standing(fixed, row, inverse, octet);
+    standing(fixed, row, inverse, group);
     const Float8 left = now + way - u.at[un + 1];
-    store(refused + octet * kLanes, fixed ? Float8{} : left);
-    store(own + octet * kLanes, u.at[un + 1]);
+    store(refused + group * kLanes, fixed ? Float8{} : left);
+    store(own + group * kLanes, u.at[un + 1]);
   }
 }
 
@@ -250,16 +250,16 @@ HYBRID_INLINE unsigned note_stopped(const LevelRow& row, LaneSpan span, const Ro
   for (std::size_t axis = 0; axis < 3; ++axis) {
     Mask8 some{};
 #pragma GCC unroll 1
-    for (int octet = span.first; octet <= span.last; ++octet) {
+    for (int group = span.first; group <= span.last; ++group) {
       Float8 way, inverse;
       Mask8 fixed, stopped;
-      load(way, correction[axis].data() + octet * kLanes);
-      inverse_of<kUniform>(inverse, row.springs, axis, octet);
-      standing(fixed, row, inverse, octet);
-      bits_set(stopped, row.stopped + octet * kLanes, 1 << axis);
+      load(way, correction[axis].data() + group * kLanes);
+      inverse_of<kUniform>(inverse, row.springs, axis, group);
+      standing(fixed, row, inverse, group);
+      bits_set(stopped, row.stopped + group * kLanes, 1 << axis);
       way = (stopped & ~fixed) ? way : Float8{};
       some |= way != 0.0F;
-      store(refused[axis].data() + octet * kLanes, way);
+      store(refused[axis].data() + group * kLanes, way);
     }
     if (any(some)) refusing |= 1U << axis;
   }
@@ -277,18 +277,18 @@ HYBRID_INLINE unsigned correct_freely(const LevelRow& row, const RowLimits* limi
     load_axes(u, row, span);
   }
 #pragma GCC unroll 1
-  for (int octet = span.first; octet <= span.last; ++octet) {
-    const auto n = static_cast<std::size_t>(octet - span.first);
+  for (int group = span.first; group <= span.last; ++group) {
+    const auto n = static_cast<std::size_t>(group - span.first);
 #pragma GCC unroll 3
     for (std::size_t axis = 0; axis < 3; ++axis) {
       Float8 now, way;
       Mask8 stays;
-      load(now, row.u[axis] + octet * kLanes);
-      load(way, correction[axis].data() + octet * kLanes);
-      standing_by_bits(stays, row, axis, octet);
+      load(now, row.u[axis] + group * kLanes);
+      load(way, correction[axis].data() + group * kLanes);
+      standing_by_bits(stays, row, axis, group);
       if (row.stopped != nullptr) {
         Mask8 stopped;
-        bits_set(stopped, row.stopped + octet * kLanes, 1 << axis);
+        bits_set(stopped, row.stopped + group * kLanes, 1 << axis);
         stays |= stopped;
       }
       take_largest_size(most, way);
@@ -298,11 +298,11 @@ HYBRID_INLINE unsigned correct_freely(const LevelRow& row, const RowLimits* limi
   unsigned beyond = 0;
   if constexpr (kLook) beyond = beyond_band<kUniform>(u, row, *limits, span, 0.0F);
 #pragma GCC unroll 1
-  for (int octet = span.first; octet <= span.last; ++octet) {
-    const auto n = static_cast<std::size_t>(octet - span.first);
+  for (int group = span.first; group <= span.last; ++group) {
+    const auto n = static_cast<std::size_t>(group - span.first);
 #pragma GCC unroll 3
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (!kLook || (beyond >> axis & 1U) == 0) store(row.u[axis] + octet * kLanes, u[axis][n + 1]);
+      if (!kLook || (beyond >> axis & 1U) == 0) store(row.u[axis] + group * kLanes, u[axis][n + 1]);
     }
   }
   return beyond;

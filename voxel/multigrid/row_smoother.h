@@ -54,21 +54,21 @@ void measure_row(const RowStiffness& springs, const RowVector& residual, LaneSpa
 // Adds pairs of lanes of a finer row, of one axis, to half of a coarse row, from its Float8 span.first/2 on.
 void add_pairs(const float* fine, LaneSpan span, float* half) noexcept;
 
-// From the sums over children: told = their means; value keeps its pending correction.
+// From the sums over children: prolonged = their means; value keeps its pending correction.
 void take_means(const RowVector& sums, const float* share, const std::array<float*, 3>& value,
-                const std::array<float*, 3>& told, LaneSpan span) noexcept;
-// FAS load: load = force − Σ k (told(neighbour) − told); row.u is `told`.
+                const std::array<float*, 3>& prolonged, LaneSpan span) noexcept;
+// FAS load: load = force − Σ k (prolonged(neighbour) − prolonged); row.u is `prolonged`.
 void take_loads(const LevelRow& row, const RowVector& force, const std::array<float*, 3>& load,
                 LaneSpan span) noexcept;
-// Of lanes first … last of a coarse row (which may extend beyond it): out = value − told, then told = value.
-// out is 0 in the span's other lanes.
-void take_pending_correction(const float* value, float* told, const float* filled, LaneSpan span, int first,
-                             int last, float* out) noexcept;
+// Of lanes first … last of a coarse row (which may extend beyond it): out = value − prolonged, then prolonged
+// = value. out is 0 in the span's other lanes.
+void take_pending_correction(const float* value, float* prolonged, const float* filled, LaneSpan span,
+                             int first, int last, float* out) noexcept;
 // Interpolation along x from cells to lanes of the finer level: 3/4 of the own cell, 1/4 of the nearer
 // neighbour. Reads the nearest lane of the Float8 before and after `cells`.
-void spread_along(const float* cells, int octets, float* lanes) noexcept;
+void spread_along(const float* cells, int groups, float* lanes) noexcept;
 // Are all of these lanes 1?
-bool all_ones(const float* lanes, int octets) noexcept;
+bool all_ones(const float* lanes, int groups) noexcept;
 
 // One of the four coarse rows around a fine one, interpolated along x. Their order: own, nearer in y, nearer
 // in z, nearer in both.
@@ -81,9 +81,9 @@ struct ProlongedRow {
 // weight of a missing neighbour goes to the others (a free surface). The lanes of `rows` begin with those of
 // the span.
 void sum_interpolated(const std::array<ProlongedRow, 4>& rows, LaneSpan span, RowVector& out) noexcept;
-// Subtracts the children's means from value and told.
+// Subtracts the children's means from value and prolonged.
 void take_back(const RowVector& sums, const float* share, const std::array<float*, 3>& value,
-               const std::array<float*, 3>& told, LaneSpan span) noexcept;
+               const std::array<float*, 3>& prolonged, LaneSpan span) noexcept;
 // Largest |a[i] − b[i]| of one axis, over the lanes of the span between `first` and `last`.
 float row_difference(const float* a, const float* b, LaneSpan span, int first, int last) noexcept;
 

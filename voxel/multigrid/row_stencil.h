@@ -25,8 +25,8 @@ struct AxisSprings {
   }
 };
 template <bool kUniform>
-HYBRID_INLINE void spring(Float8& k, const float* lanes, int octet) {
-  load(k, kUniform ? lanes : lanes + octet * kLanes);
+HYBRID_INLINE void spring(Float8& k, const float* lanes, int group) {
+  load(k, kUniform ? lanes : lanes + group * kLanes);
 }
 
 inline constexpr Mask8 kEven{-1, 0, -1, 0, -1, 0, -1, 0};
@@ -60,46 +60,46 @@ HYBRID_INLINE bool any(const Mask8& mask) {
 }
 
 // Lanes that are anchored or held.
-HYBRID_INLINE void standing(Mask8& stands, const LevelRow& row, const Float8& inverse, int octet) {
+HYBRID_INLINE void standing(Mask8& stands, const LevelRow& row, const Float8& inverse, int group) {
   stands = inverse == 0.0F;
   if (row.held != nullptr) {
     Mask8 bits;
-    bits_set(bits, row.held + octet * kLanes, 1);
+    bits_set(bits, row.held + group * kLanes, 1);
     stands |= bits;
   }
 }
 // The same for one axis, read from bits.
-HYBRID_INLINE void standing_by_bits(Mask8& stands, const LevelRow& row, std::size_t axis, int octet) {
-  bits_set(stands, row.springs.stands + octet * kLanes, 1 << axis);
+HYBRID_INLINE void standing_by_bits(Mask8& stands, const LevelRow& row, std::size_t axis, int group) {
+  bits_set(stands, row.springs.stands + group * kLanes, 1 << axis);
   if (row.held != nullptr) {
     Mask8 bits;
-    bits_set(bits, row.held + octet * kLanes, 1);
+    bits_set(bits, row.held + group * kLanes, 1);
     stands |= bits;
   }
 }
 // Lanes that do not move on an axis.
 HYBRID_INLINE void staying(Mask8& stays, const LevelRow& row, const Float8& inverse, std::size_t axis,
-                           int octet) {
-  standing(stays, row, inverse, octet);
+                           int group) {
+  standing(stays, row, inverse, group);
   if (row.stopped != nullptr) {
     Mask8 bits;
-    bits_set(bits, row.stopped + octet * kLanes, 1 << axis);
+    bits_set(bits, row.stopped + group * kLanes, 1 << axis);
     stays |= bits;
   }
 }
 
 // One spring of a Float8; `axis` and `d` are known at compile time.
 template <bool kUniform>
-HYBRID_INLINE void spring_up(Float8& k, const RowStiffness& s, std::size_t axis, std::size_t d, int octet) {
-  load(k, (d == axis ? s.up_along : s.up_across) + d * kRow + (kUniform ? 0 : octet * kLanes));
+HYBRID_INLINE void spring_up(Float8& k, const RowStiffness& s, std::size_t axis, std::size_t d, int group) {
+  load(k, (d == axis ? s.up_along : s.up_across) + d * kRow + (kUniform ? 0 : group * kLanes));
 }
 template <bool kUniform>
-HYBRID_INLINE void spring_down(Float8& k, const RowStiffness& s, std::size_t axis, std::size_t d, int octet) {
-  load(k, (d == axis ? s.down_along : s.down_across)[d] + (kUniform ? 0 : octet * kLanes));
+HYBRID_INLINE void spring_down(Float8& k, const RowStiffness& s, std::size_t axis, std::size_t d, int group) {
+  load(k, (d == axis ? s.down_along : s.down_across)[d] + (kUniform ? 0 : group * kLanes));
 }
 template <bool kUniform>
-HYBRID_INLINE void inverse_of(Float8& inverse, const RowStiffness& s, std::size_t axis, int octet) {
-  load(inverse, s.inverse + axis * kRow + (kUniform ? 0 : octet * kLanes));
+HYBRID_INLINE void inverse_of(Float8& inverse, const RowStiffness& s, std::size_t axis, int group) {
+  load(inverse, s.inverse + axis * kRow + (kUniform ? 0 : group * kLanes));
 }
 // All axes side by side: one axis alone is a chain of dependent operations.
 using Axes = std::array<std::array<Float8, kLaneGroups + 2>, 3>;

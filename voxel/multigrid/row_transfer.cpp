@@ -10,33 +10,33 @@ namespace voxel {
 
 HYBRID_MULTIVERSIONED_512 void add_pairs(const float* fine, LaneSpan span, float* half) noexcept {
 #pragma GCC unroll 1
-  for (int octet = span.first; octet < span.last; octet += 2) {
+  for (int group = span.first; group < span.last; group += 2) {
     Float8 a, b, sum;
-    load(a, fine + octet * kLanes);
-    load(b, fine + (octet + 1) * kLanes);
-    load(sum, half + octet / 2 * kLanes);
+    load(a, fine + group * kLanes);
+    load(b, fine + (group + 1) * kLanes);
+    load(sum, half + group / 2 * kLanes);
     const Float8 even = __builtin_shufflevector(a, b, 0, 2, 4, 6, 8, 10, 12, 14),
                  odd = __builtin_shufflevector(a, b, 1, 3, 5, 7, 9, 11, 13, 15);
     sum += even + odd;
-    store(half + octet / 2 * kLanes, sum);
+    store(half + group / 2 * kLanes, sum);
   }
 }
 
 HYBRID_MULTIVERSIONED_512 void take_means(const RowVector& sums, const float* share,
                                           const std::array<float*, 3>& value,
-                                          const std::array<float*, 3>& told, LaneSpan span) noexcept {
+                                          const std::array<float*, 3>& prolonged, LaneSpan span) noexcept {
 #pragma GCC unroll 1
   for (std::size_t axis = 0; axis < 3; ++axis) {
 #pragma GCC unroll 1
-    for (int octet = span.first; octet <= span.last; ++octet) {
+    for (int group = span.first; group <= span.last; ++group) {
       Float8 mean, part, v, t;
-      load(mean, sums[axis].data() + octet * kLanes);
-      load(part, share + octet * kLanes);
-      load(v, value[axis] + octet * kLanes);
-      load(t, told[axis] + octet * kLanes);
+      load(mean, sums[axis].data() + group * kLanes);
+      load(part, share + group * kLanes);
+      load(v, value[axis] + group * kLanes);
+      load(t, prolonged[axis] + group * kLanes);
       mean *= part;
-      store(value[axis] + octet * kLanes, mean + (v - t));
-      store(told[axis] + octet * kLanes, mean);
+      store(value[axis] + group * kLanes, mean + (v - t));
+      store(prolonged[axis] + group * kLanes, mean);
     }
   }
 }
@@ -47,27 +47,27 @@ HYBRID_MULTIVERSIONED_512 void take_loads(const LevelRow& row, const RowVector& 
   Axes u;
   load_axes(u, row, span);
 #pragma GCC unroll 1
-  for (int octet = span.first; octet <= span.last; ++octet) {
-    const auto n = static_cast<std::size_t>(octet - span.first);
-    const int lane = octet * kLanes;
+  for (int group = span.first; group <= span.last; ++group) {
+    const auto n = static_cast<std::size_t>(group - span.first);
+    const int lane = group * kLanes;
 #pragma GCC unroll 3
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const float* at = row.u[axis] + lane;
       const Float8 own = u[axis][n + 1];
       Float8 k, value, sum;
       shift_down(value, u[axis][n], own);
-      spring_down<false>(k, s, axis, 0, octet);
+      spring_down<false>(k, s, axis, 0, group);
       sum = k * (value - own);
       shift_up(value, own, u[axis][n + 2]);
-      spring_up<false>(k, s, axis, 0, octet);
+      spring_up<false>(k, s, axis, 0, group);
       sum += k * (value - own);
       for (std::size_t d = 1; d < 3; ++d) {
         const std::ptrdiff_t stride = d == 1 ? kRow : row.z;
         load(value, at - stride);
-        spring_down<false>(k, s, axis, d, octet);
+        spring_down<false>(k, s, axis, d, group);
         sum += k * (value - own);
         load(value, at + stride);
-        spring_up<false>(k, s, axis, d, octet);
+        spring_up<false>(k, s, axis, d, group);
         sum += k * (value - own);
       }
       load(value, force[axis].data() + lane);
@@ -76,31 +76,31 @@ HYBRID_MULTIVERSIONED_512 void take_loads(const LevelRow& row, const RowVector& 
   }
 }
 
-HYBRID_MULTIVERSIONED_512 void take_pending_correction(const float* value, float* told, const float* filled,
-                                                       LaneSpan span, int first, int last,
-                                                       float* out) noexcept {
+HYBRID_MULTIVERSIONED_512 void take_pending_correction(const float* value, float* prolonged,
+                                                       const float* filled, LaneSpan span, int first,
+                                                       int last, float* out) noexcept {
   constexpr Mask8 kLane{0, 1, 2, 3, 4, 5, 6, 7};
 #pragma GCC unroll 1
-  for (int octet = span.first; octet <= span.last; ++octet) {
-    const int lane = octet * kLanes;
+  for (int group = span.first; group <= span.last; ++group) {
+    const int lane = group * kLanes;
     const Mask8 at = kLane + lane;
     const Mask8 is_source = (at >= first) & (at <= last);
     Float8 v, t, f;
     load(v, value + lane);
-    load(t, told + lane);
+    load(t, prolonged + lane);
     load(f, filled + lane);
     f *= v - t;
-    store(out + (octet - span.first) * kLanes, is_source ? f : Float8{});
-    store(told + lane, is_source ? v : t);
+    store(out + (group - span.first) * kLanes, is_source ? f : Float8{});
+    store(prolonged + lane, is_source ? v : t);
   }
 }
 
-HYBRID_MULTIVERSIONED_512 void spread_along(const float* cells, int octets, float* lanes) noexcept {
+HYBRID_MULTIVERSIONED_512 void spread_along(const float* cells, int groups, float* lanes) noexcept {
   Float8 before, own, after;
   load(before, cells - kLanes);
   load(own, cells);
 #pragma GCC unroll 1
-  for (int m = 0; m < octets; ++m) {
+  for (int m = 0; m < groups; ++m) {
     load(after, cells + (m + 1) * kLanes);
     const Float8 low = 0.75F * __builtin_shufflevector(own, own, 0, 0, 1, 1, 2, 2, 3, 3) +
                        0.25F * __builtin_shufflevector(own, before, 15, 1, 0, 2, 1, 3, 2, 4);
@@ -113,10 +113,10 @@ HYBRID_MULTIVERSIONED_512 void spread_along(const float* cells, int octets, floa
   }
 }
 
-HYBRID_MULTIVERSIONED_512 bool all_ones(const float* lanes, int octets) noexcept {
+HYBRID_MULTIVERSIONED_512 bool all_ones(const float* lanes, int groups) noexcept {
   Mask8 other{};
 #pragma GCC unroll 1
-  for (int m = 0; m < octets; ++m) {
+  for (int m = 0; m < groups; ++m) {
     Float8 x;
     load(x, lanes + m * kLanes);
     other |= x != 1.0F;
@@ -130,8 +130,8 @@ HYBRID_MULTIVERSIONED_512 void sum_interpolated(const std::array<ProlongedRow, 4
   bool whole = true;
   for (const ProlongedRow& r : rows) whole = whole && r.weight == nullptr;
 #pragma GCC unroll 1
-  for (int octet = span.first; octet <= span.last; ++octet) {
-    const int lane = (octet - span.first) * kLanes;
+  for (int group = span.first; group <= span.last; ++group) {
+    const int lane = (group - span.first) * kLanes;
     std::array<Float8, 3> sum{};
     Float8 weight{};
 #pragma GCC unroll 1
@@ -155,25 +155,25 @@ HYBRID_MULTIVERSIONED_512 void sum_interpolated(const std::array<ProlongedRow, 4
       for (std::size_t axis = 0; axis < 3; ++axis) sum[axis] *= inverse;
     }
 #pragma GCC unroll 3
-    for (std::size_t axis = 0; axis < 3; ++axis) store(out[axis].data() + octet * kLanes, sum[axis]);
+    for (std::size_t axis = 0; axis < 3; ++axis) store(out[axis].data() + group * kLanes, sum[axis]);
   }
 }
 
 HYBRID_MULTIVERSIONED_512 void take_back(const RowVector& sums, const float* share,
                                          const std::array<float*, 3>& value,
-                                         const std::array<float*, 3>& told, LaneSpan span) noexcept {
+                                         const std::array<float*, 3>& prolonged, LaneSpan span) noexcept {
 #pragma GCC unroll 1
   for (std::size_t axis = 0; axis < 3; ++axis) {
 #pragma GCC unroll 1
-    for (int octet = span.first; octet <= span.last; ++octet) {
+    for (int group = span.first; group <= span.last; ++group) {
       Float8 mean, part, x;
-      load(mean, sums[axis].data() + octet * kLanes);
-      load(part, share + octet * kLanes);
+      load(mean, sums[axis].data() + group * kLanes);
+      load(part, share + group * kLanes);
       mean *= part;
-      load(x, value[axis] + octet * kLanes);
-      store(value[axis] + octet * kLanes, x - mean);
-      load(x, told[axis] + octet * kLanes);
-      store(told[axis] + octet * kLanes, x - mean);
+      load(x, value[axis] + group * kLanes);
+      store(value[axis] + group * kLanes, x - mean);
+      load(x, prolonged[axis] + group * kLanes);
+      store(prolonged[axis] + group * kLanes, x - mean);
     }
   }
 }
@@ -183,10 +183,10 @@ HYBRID_MULTIVERSIONED_512 float row_difference(const float* a, const float* b, L
   constexpr Mask8 kLane{0, 1, 2, 3, 4, 5, 6, 7};
   Float8 most{}, x, y;
 #pragma GCC unroll 1
-  for (int octet = span.first; octet <= span.last; ++octet) {
-    load(x, a + octet * kLanes);
-    load(y, b + octet * kLanes);
-    const Mask8 at = kLane + octet * kLanes;
+  for (int group = span.first; group <= span.last; ++group) {
+    load(x, a + group * kLanes);
+    load(y, b + group * kLanes);
+    const Mask8 at = kLane + group * kLanes;
     x -= y;
     x = ((at >= first) & (at <= last)) ? x : Float8{};
     take_largest_size(most, x);
@@ -197,12 +197,12 @@ HYBRID_MULTIVERSIONED_512 float row_difference(const float* a, const float* b, L
 HYBRID_MULTIVERSIONED float row_way(const float* now, const float* was, float* way) noexcept {
   Float8 most{};
 #pragma GCC unroll 4
-  for (int octet = 0; octet < kLaneGroups; ++octet) {
+  for (int group = 0; group < kLaneGroups; ++group) {
     Float8 is, before;
-    load(is, now + octet * kLanes);
-    load(before, was + octet * kLanes);
+    load(is, now + group * kLanes);
+    load(before, was + group * kLanes);
     is -= before;
-    store(way + octet * kLanes, is);
+    store(way + group * kLanes, is);
     take_largest_size(most, is);
   }
   return largest(most);

@@ -58,7 +58,7 @@ bool SoftObject::push_out(const ToolInBody& tool) noexcept {
     if (g.distance >= 0.0) continue;
     any = true;
     t.pressed = true;
-    if (lattice_->anchored(t.v) || t.part != 0) continue;
+    if (lattice_->anchored(t.v) || t.block != 0) continue;
     const glm::dvec3 before = state_.at(t.v);
     state_.set(t.v, before - g.distance * g.normal);
     sources_.push_back(t.v);
@@ -73,25 +73,25 @@ bool SoftObject::any_pressed() const noexcept {
   return std::any_of(touches_.begin(), touches_.end(), [](const Touch& t) { return t.pressed; });
 }
 
-bool SoftObject::held_still() const noexcept {
-  return any_pressed() && relaxation_.wide() && unsettled_m_ < kJump * lattice_->min_spacing_m();
+bool SoftObject::contact_is_still() const noexcept {
+  return any_pressed() && relaxation_.has_large_patch() && unsettled_m_ < kJump * lattice_->min_spacing_m();
 }
 
 // Should a contact cycle begin, or continue?
 bool SoftObject::cycle_due() const noexcept {
-  if (relaxation_.under_way()) return cycles_since_touch_ == 0 && !(rests_ && any_pressed());
+  if (relaxation_.under_way()) return cycles_since_touch_ == 0 && !(skips_cycle_ && any_pressed());
   const double to_go = unsettled_m_ / lattice_->min_spacing_m();
   // A contact that is nearly at rest is left to the background, which relaxes the whole object. A contact
   // cycle holds the surroundings of its box fixed.
   if (to_go < kSettled || cycles_since_touch_ == kMostCycles) return false;
-  const bool apart = relaxation_.left_to_another(), in_parts = apart && split_cycle_;
-  if (to_go >= kJump && !in_parts && !rests_) return true;
+  const bool apart = relaxation_.left_to_shadow(), in_parts = apart && split_cycle_;
+  if (to_go >= kJump && !in_parts && !skips_cycle_) return true;
   // Under asynchronous relaxation a second cycle in a tick runs only after a jump, or if a split cycle left
   // enough work.
   if (cycles_since_touch_ > 0)
     return apart ? in_parts && left_of(kContactWork) >= shared(kLeastWork) : !split_cycle_;
   // Tissue that was just released has this tick only.
-  return !rests_ || !any_pressed();
+  return !skips_cycle_ || !any_pressed();
 }
 
 void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
@@ -115,20 +115,20 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
     const std::size_t pressed = list_held();
     if (pressed > 0 && pressed_last_.empty()) cold_ticks_ = kColdTicks;
     if (pressed > 0)
-      pressed_last_.assign(all_held_.begin(), all_held_.begin() + static_cast<std::ptrdiff_t>(pressed));
+      pressed_last_.assign(held_voxels_.begin(), held_voxels_.begin() + static_cast<std::ptrdiff_t>(pressed));
     const std::size_t left = left_of(kContactWork);
     if (relaxation_.under_way()) {
-      contact_work_ += relaxation_.continue_contact(state_, obstacle_view(), all_held_, left);
+      contact_work_ += relaxation_.continue_contact(state_, obstacle_view(), held_voxels_, left);
       split_cycle_ = true;
       continue;
     }
     // Tissue that the tool just released follows it by one cycle here. The shadow alone would let tissue lag
     // behind a quick stroke, and the contact would be lost.
     if (pressed_last_.empty()) continue;
-    const bool in_parts = relaxation_.left_to_another() && pressed > 0;
-    contact_work_ += relaxation_.relax_contact(state_, obstacle_view(), all_held_, pressed_last_, again,
-                                               in_parts ? left : Relaxation::kWhole);
-    split_cycle_ = relaxation_.wide();
+    const bool in_parts = relaxation_.left_to_shadow() && pressed > 0;
+    contact_work_ += relaxation_.relax_contact(state_, obstacle_view(), held_voxels_, pressed_last_, again,
+                                               in_parts ? left : Relaxation::kUnlimited);
+    split_cycle_ = relaxation_.has_large_patch();
   }
   // Last, so that the reaction is measured with all voxels at their projections. Pressed voxels come first: a
   // dependent counts only if its link to a pressed voxel is at its limit then.
@@ -151,16 +151,16 @@ void SoftObject::relax_near_pairs() noexcept {
     contact_work_ = 0;
     split_cycle_ = false;
   }
-  if (hanging_on_pairs_.empty() || any_pressed() || !relaxation_.left_to_another()) return;
+  if (pair_dependents_.empty() || any_pressed() || !relaxation_.left_to_shadow()) return;
   const bool goes_on = relaxation_.under_way();
-  if (std::exchange(asked_to_rest_, false)) return;
+  if (std::exchange(skip_requested_, false)) return;
   const std::size_t left = left_of(kContactWork);
-  for (const VoxelId v : pair_roots_) relaxation_.mark_dirty(v / kRow);
+  for (const VoxelId v : pair_sources_) relaxation_.mark_dirty(v / kRow);
   list_held();
   contact_work_ +=
-      goes_on ? relaxation_.continue_contact(state_, obstacle_view(), all_held_, left)
-              : relaxation_.relax_contact(state_, obstacle_view(), all_held_, pair_roots_, false, left);
-  split_cycle_ = relaxation_.wide();
+      goes_on ? relaxation_.continue_contact(state_, obstacle_view(), held_voxels_, left)
+              : relaxation_.relax_contact(state_, obstacle_view(), held_voxels_, pair_sources_, false, left);
+  split_cycle_ = relaxation_.has_large_patch();
 }
 
 void SoftObject::follow(const glm::dvec3& delta) noexcept {
@@ -168,7 +168,7 @@ void SoftObject::follow(const glm::dvec3& delta) noexcept {
   sources_.clear();
   moves_.clear();
   for (const Touch& t : touches_) {
-    if (!t.pressed || lattice_->anchored(t.v) || t.part != 0) continue;
+    if (!t.pressed || lattice_->anchored(t.v) || t.block != 0) continue;
     const glm::dvec3 before = state_.at(t.v);
     state_.set(t.v, before + glm::dot(delta, t.normal) * t.normal);
     sources_.push_back(t.v);
@@ -188,7 +188,7 @@ std::size_t SoftObject::give_way(const ToolInBody& tool, std::span<ToolBound> ou
     if (clear_of(tool, p)) continue;
     const Gap g = gap(tool, p);
     if (g.distance >= -kGiveWay * voxel_radius()) continue;
-    if (t.beside && -g.distance > kDeep * voxel_radius()) {
+    if (t.beside_punch && -g.distance > kDeep * voxel_radius()) {
       const glm::dvec3 from = p - tool.centre, across = from - glm::dot(from, tool.axis) * tool.axis;
       const double distance = glm::length(across);
       if (distance > 0.0) {
@@ -197,30 +197,30 @@ std::size_t SoftObject::give_way(const ToolInBody& tool, std::span<ToolBound> ou
       }
     }
     const double away = flat ? voxel_radius() : reach(tool.radius);
-    out[count++] = {-g.normal, glm::dot(-g.normal, p) + away - t.noted, t.v};
+    out[count++] = {-g.normal, glm::dot(-g.normal, p) + away - t.start_depth, t.v};
   }
   return count;
 }
 
-void SoftObject::note_depths(const ToolInBody& tool) noexcept {
+void SoftObject::record_depths(const ToolInBody& tool) noexcept {
   const bool flat = tool.shape == ToolInBody::Shape::punch;
   if (on_grid_ && !flat) return;  // after each cycle no voxel is in the tool that could leave it
   for (Touch& t : touches_) {
     const glm::dvec3 from = position(t) - tool.centre;
     const double along = glm::dot(from, tool.axis), distance = glm::length(from);
-    t.beside = flat && distance * distance - along * along > tool.radius * tool.radius;
+    t.beside_punch = flat && distance * distance - along * along > tool.radius * tool.radius;
     const double depth = flat ? voxel_radius() - along : reach(tool.radius) - distance;
-    t.noted = depth > kDeep * voxel_radius() ? depth : 0.0;
+    t.start_depth = depth > kDeep * voxel_radius() ? depth : 0.0;
   }
 }
 
 std::size_t SoftObject::list_held() noexcept {
-  all_held_.clear();
+  held_voxels_.clear();
   for (const Touch& t : touches_) {
-    if (t.pressed) all_held_.push_back(t.v);
+    if (t.pressed) held_voxels_.push_back(t.v);
   }
-  const std::size_t pressed = all_held_.size();
-  for (const VoxelId v : held_voxels_) all_held_.push_back(v);
+  const std::size_t pressed = held_voxels_.size();
+  for (const VoxelId v : claimed_voxels_) held_voxels_.push_back(v);
   return pressed;
 }
 
@@ -240,7 +240,7 @@ std::size_t SoftObject::work_left() const noexcept {
 std::uint64_t SoftObject::relax_background(std::uint64_t budget) noexcept {
   if (relaxation_.asleep()) return 0;
   list_held();
-  return relaxation_.run(state_, obstacle_view(), all_held_, budget);
+  return relaxation_.run(state_, obstacle_view(), held_voxels_, budget);
 }
 
 bool SoftObject::prepare_exchange() noexcept {
@@ -255,22 +255,22 @@ void SoftObject::assign_residual() noexcept {
   relaxation_.assign_residual(state_, obstacle_view());
   cold_ticks_ = kColdTicks;
   for (Touch& t : touches_) {
-    t.left = glm::dvec3(0.0);
-    if (!t.pressed || lattice_->anchored(t.v) || t.part != 0) continue;
+    t.frozen_motion = glm::dvec3(0.0);
+    if (!t.pressed || lattice_->anchored(t.v) || t.block != 0) continue;
     Touch here = t;
-    const glm::dvec3 place = place_of(tool_, links_of(relaxation_.couplings(), state_, t.v), here);
-    if (here.pressed) t.left = place - state_.at(t.v);
+    const glm::dvec3 place = project_voxel(tool_, links_of(relaxation_.couplings(), state_, t.v), here);
+    if (here.pressed) t.frozen_motion = place - state_.at(t.v);
   }
 }
 
-void SoftObject::keep_away(float part) noexcept {
+void SoftObject::keep_frozen_residual(float part) noexcept {
   relaxation_.multigrid().keep_frozen_residual(part, state_);
-  for (Touch& t : touches_) t.left *= static_cast<double>(part);
+  for (Touch& t : touches_) t.frozen_motion *= static_cast<double>(part);
 }
 
 void SoftObject::relax_cycle() noexcept {
   list_held();
-  relaxation_.run_cycle(state_, obstacle_view(), all_held_);
+  relaxation_.run_cycle(state_, obstacle_view(), held_voxels_);
 }
 
 }  // namespace voxel

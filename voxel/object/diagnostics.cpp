@@ -36,8 +36,8 @@ double SoftObject::energy_J() const noexcept {
           const auto& u = state_.u[static_cast<std::size_t>(axis)];
           const double stretch = static_cast<double>(u[w]) - static_cast<double>(u[v]);
           energy += link_energy_J(static_cast<double>(spring.on(axis, d)), stretch,
-                                  static_cast<double>(state_.rest.offset_of(v, static_cast<std::size_t>(d),
-                                                                            static_cast<std::size_t>(axis))),
+                                  static_cast<double>(state_.plastic.offset_of(
+                                      v, static_cast<std::size_t>(d), static_cast<std::size_t>(axis))),
                                   static_cast<double>(lattice_->yield_m(v, d)));
         }
       }
@@ -80,7 +80,7 @@ bool SoftObject::settle(const ToolInBody& tool, double tolerance_N, int max_cycl
     relax_cycle();
     double worst = relaxation_.residual_N();
     for (const Touch& t : touches_) {
-      if (lattice_->anchored(t.v) || t.part != 0) continue;
+      if (lattice_->anchored(t.v) || t.block != 0) continue;
       glm::dvec3 left = link_force(relaxation_.couplings(), state_, t.v);
       if (t.pressed) left -= std::min(0.0, glm::dot(left, t.normal)) * t.normal;
       worst = std::max(worst, glm::length(left));
@@ -93,17 +93,18 @@ bool SoftObject::settle(const ToolInBody& tool, double tolerance_N, int max_cycl
 std::size_t SoftObject::memory_bytes() const {
   std::size_t state = state_.bricks.memory_bytes() + state_.role.resident_bytes() +
                       state_.row_standing.resident_bytes() + state_.row_obstacles.resident_bytes() +
-                      state_.rest.memory_bytes() + state_.tool_normal.resident_bytes();
+                      state_.plastic.memory_bytes() + state_.tool_normal.resident_bytes();
   for (const auto& axis : state_.u) state += axis.resident_bytes();
   const std::size_t contact =
       resident_bytes(touches_) + resident_bytes(touched_before_) + resident_bytes(pressed_last_) +
-      resident_bytes(touched_voxels_) + resident_bytes(touched_numbers_) + resident_bytes(held_voxels_) +
-      resident_bytes(all_held_) + resident_bytes(sources_) + resident_bytes(moves_) + resident_bytes(roots_) +
-      resident_bytes(carried_) + resident_bytes(hanging_) + carried_mark_.resident_bytes() +
-      carried_index_.resident_bytes() + limit_reactions_.memory_bytes() + limit_followers_.memory_bytes();
-  const std::size_t others = pair_held_.resident_bytes() + pair_load_.resident_bytes() +
-                             resident_bytes(pair_roots_) + resident_bytes(hanging_on_pairs_) +
-                             hanging_entry_.resident_bytes() + resident_bytes(obstacles_) +
+      resident_bytes(touched_voxels_) + resident_bytes(touched_numbers_) + resident_bytes(claimed_voxels_) +
+      resident_bytes(held_voxels_) + resident_bytes(sources_) + resident_bytes(moves_) +
+      resident_bytes(limit_sources_) + resident_bytes(gathered_) + resident_bytes(dependents_) +
+      gathered_mark_.resident_bytes() + gathered_index_.resident_bytes() + limit_reactions_.memory_bytes() +
+      limit_followers_.memory_bytes();
+  const std::size_t others = pair_claims_.resident_bytes() + pair_load_.resident_bytes() +
+                             resident_bytes(pair_sources_) + resident_bytes(pair_dependents_) +
+                             pair_entry_.resident_bytes() + resident_bytes(obstacles_) +
                              resident_bytes(moved_rows_) + row_moved_.resident_bytes() +
                              resident_bytes(changed_obstacles_) + resident_bytes(obstacle_changed_);
   return sizeof(*this) + lattice_->memory_bytes() + state + contact + others + chain_.memory_bytes() +

@@ -22,7 +22,8 @@ constexpr double kParted = 0.01;  // of the touching distance: less overlap is l
 // kHollow, of the touching distance: a surface that rises less towards a voxel over the middle of a facet is
 // no hollow. kFarBeside, barycentric: how far beside a facet a voxel may still touch it.
 constexpr double kHollow = 0.005, kFarBeside = 0.5;
-constexpr double kTurns = 0.01;    // share by which the force direction turns to the facet's normal each time
+constexpr double kNormalTurn =
+    0.01;                          // share by which the force direction turns to the facet's normal each time
 constexpr int kSteps = 4;          // steps over the surface in search of the facet
 constexpr double kInside = -1e-9;  // barycentric; less is outside
 constexpr VoxelId kNone = std::numeric_limits<VoxelId>::max();
@@ -38,32 +39,32 @@ glm::dvec3 to_scene(const PosedObject& o, const glm::dvec3& in_body) noexcept {
 glm::dvec3 to_body(const PosedObject& o, const glm::dvec3& in_scene) noexcept {
   return glm::conjugate(o.pose.rotation) * (in_scene - o.pose.origin);
 }
-glm::dvec3 place_of(const PosedObject& o, VoxelId v) noexcept {
+glm::dvec3 scene_position(const PosedObject& o, VoxelId v) noexcept {
   return to_scene(o, o.object.position(v));
 }
 
 // Compliance per body axis (m/N) of a voxel with its dependents; 0 at an anchor.
-glm::dvec3 with_hanging(const glm::dvec3& own, const HeldLoad& hanging) noexcept {
+glm::dvec3 with_dependents(const glm::dvec3& own, const ContactLoad& dependents) noexcept {
   glm::dvec3 w = own;
   for (int axis = 0; axis < 3; ++axis) {
-    if (hanging.stiffness_N_per_m[axis] > 0.0) w[axis] = 1.0 / hanging.stiffness_N_per_m[axis];
+    if (dependents.stiffness_N_per_m[axis] > 0.0) w[axis] = 1.0 / dependents.stiffness_N_per_m[axis];
   }
   return w;
 }
 
 glm::dvec3 compliance_of(const PosedObject& o, VoxelId v, std::uint32_t number) noexcept {
-  return with_hanging(o.object.compliance(v), o.object.hanging_on_pair(number));
+  return with_dependents(o.object.compliance(v), o.object.dependents_of_pair(number));
 }
 
 End end_of(const PosedObject& o, VoxelId v, std::uint32_t number) noexcept {
   const glm::dvec3 own = o.object.compliance(v);
-  const HeldLoad hanging = o.object.hanging_on_pair(number);
-  const glm::dvec3 w = with_hanging(own, hanging);
-  glm::dvec3 u = o.object.free_displacement(v);
+  const ContactLoad dependents = o.object.dependents_of_pair(number);
+  const glm::dvec3 w = with_dependents(own, dependents);
+  glm::dvec3 u = o.object.unconstrained_minimum(v);
   for (int axis = 0; axis < 3; ++axis) {
-    if (!(hanging.stiffness_N_per_m[axis] > 0.0)) continue;
+    if (!(dependents.stiffness_N_per_m[axis] > 0.0)) continue;
     const double now = o.object.state().at(v)[axis];
-    u[axis] = now + w[axis] * ((u[axis] - now) / own[axis] + hanging.force_N[axis]);
+    u[axis] = now + w[axis] * ((u[axis] - now) / own[axis] + dependents.force_N[axis]);
   }
   return {u + w * o.object.pair_load(number), w};
 }
@@ -159,7 +160,7 @@ double normal_of(const std::array<glm::dvec3, 3>& at, int axis, bool inwards_up,
 
 glm::dvec3 middle(const PosedObject& b, const PressedPair& pair) noexcept {
   glm::dvec3 sum(0.0);
-  for (std::size_t i = 0; i < 3; ++i) sum += pair.share[i] * place_of(b, pair.facet[i]);
+  for (std::size_t i = 0; i < 3; ++i) sum += pair.share[i] * scene_position(b, pair.facet[i]);
   return sum;
 }
 
@@ -250,7 +251,7 @@ bool shares_of(const PosedObject& a, const PosedObject& b, const PressedPair& pa
   const Surface surface{b.object, pair.axis, pair.upwards};
   std::array<glm::dvec2, 3> at;
   for (std::size_t i = 0; i < 3; ++i) at[i] = surface.flat(b.object.position(pair.facet[i]));
-  return shares(at, surface.flat(to_body(b, place_of(a, pair.a))), out);
+  return shares(at, surface.flat(to_body(b, scene_position(a, pair.a))), out);
 }
 
 // With bricks a facet that is pushed sideways also moves up and down, and tilts the other way. If links are
@@ -260,7 +261,7 @@ bool shares_of(const PosedObject& a, const PosedObject& b, const PressedPair& pa
 glm::dvec3 turned(const PosedObject& a, const PosedObject& b, const PressedPair& pair,
                   const glm::dvec3& across) noexcept {
   if (!a.object.lattice().has_bricks() && !b.object.lattice().has_bricks()) return across;
-  return glm::dot(pair.across, across) > 0.0 ? glm::mix(pair.across, across, kTurns) : across;
+  return glm::dot(pair.across, across) > 0.0 ? glm::mix(pair.across, across, kNormalTurn) : across;
 }
 
 // Sets what follows from the facet and the shares, in the current state.
@@ -305,7 +306,7 @@ PressedPair pair_of(const PosedObject& a, VoxelId in_a, const PosedObject& b, Vo
 
 void find_facet(const PosedObject& a, const PosedObject& b, PressedPair& pair) noexcept {
   const Surface surface{b.object, pair.axis, pair.upwards};
-  const glm::dvec3 p = to_body(b, place_of(a, pair.a));
+  const glm::dvec3 p = to_body(b, scene_position(a, pair.a));
   const glm::dvec2 flat = surface.flat(p);
   const auto away = [&](VoxelId v) {
     const glm::dvec2 d = surface.flat(b.object.position(v)) - flat;
@@ -351,7 +352,7 @@ bool lies_beside(const PosedObject& a, const PosedObject& b, const PressedPair& 
                  PressedPair& beside) noexcept {
   if (!is_facet(pair) || !is_facet(beside) || beside.facet == pair.facet) return false;
   glm::dvec3 centre(0.0);
-  for (const VoxelId v : beside.facet) centre += place_of(b, v) / 3.0;
+  for (const VoxelId v : beside.facet) centre += scene_position(b, v) / 3.0;
   if (glm::dot(middle(b, pair) - centre, pair.across) < kHollow * pair.reach_m) return false;
   shares_of(a, b, beside, beside.share);
   double sum = 0.0;
@@ -369,9 +370,9 @@ double gap_of_pair(const PosedObject& a, const PosedObject& b, const PressedPair
   return pair.over ? -overlap_of(a, b, pair) : std::numeric_limits<double>::infinity();
 }
 
-void hold_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept {
-  a.object.hold(pair.a);
-  for (const VoxelId v : pair.facet) b.object.hold(v);
+void claim_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept {
+  a.object.claim(pair.a);
+  for (const VoxelId v : pair.facet) b.object.claim(v);
 }
 
 void release_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept {

@@ -70,7 +70,7 @@ void find_facet(const PosedObject& a, const PosedObject& b, PressedPair& pair) n
                                  const PressedPair& pair) noexcept;
 
 // Claims the pair's voxels for the pair solver, and releases them.
-void hold_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept;
+void claim_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept;
 void release_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept;
 
 // Load of a pair on its voxels, as their objects know it. Before a round of relax_pair(): clear_pair_load()

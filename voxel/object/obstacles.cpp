@@ -56,28 +56,28 @@ void SoftObject::prepare_beside_bodies() {
   if (lattice_->voxel_count() < kPreparedWhole) relaxation_.prepare_beside_bodies();
 }
 
-void SoftObject::hold(VoxelId v) noexcept {
+void SoftObject::claim(VoxelId v) noexcept {
   const std::uint32_t s = lattice_->surface_number(v);
-  if (pair_held_[s] == std::numeric_limits<std::uint16_t>::max() || pair_held_[s]++ != 0) return;
-  held_voxels_.push_back(v);
+  if (pair_claims_[s] == std::numeric_limits<std::uint16_t>::max() || pair_claims_[s]++ != 0) return;
+  claimed_voxels_.push_back(v);
   state_.set_role(v, Displacement::held);
 }
 
 void SoftObject::release(VoxelId v) noexcept {
   const std::uint32_t s = lattice_->surface_number(v);
-  if (pair_held_[s] == 0 || --pair_held_[s] != 0) return;
+  if (pair_claims_[s] == 0 || --pair_claims_[s] != 0) return;
   pair_load_[s] = glm::vec3(0.0F);
-  const auto found = std::find(held_voxels_.begin(), held_voxels_.end(), v);
-  *found = held_voxels_.back();
-  held_voxels_.pop_back();
+  const auto found = std::find(claimed_voxels_.begin(), claimed_voxels_.end(), v);
+  *found = claimed_voxels_.back();
+  claimed_voxels_.pop_back();
   relaxation_.mark_dirty(v / kRow);
   relaxation_.wake();
   state_.set_role(v, resting_role(v));
   set_touch_roles();
 }
 
-glm::dvec3 SoftObject::free_displacement(VoxelId v) noexcept {
-  return unconstrained_minimum(relaxation_.couplings(), state_, v);
+glm::dvec3 SoftObject::unconstrained_minimum(VoxelId v) noexcept {
+  return voxel::unconstrained_minimum(relaxation_.couplings(), state_, v);
 }
 
 glm::dvec3 SoftObject::compliance(VoxelId v) noexcept {
@@ -102,8 +102,8 @@ void SoftObject::drag(VoxelId v, const glm::dvec3& by) noexcept {
     moves_.clear();
     dragging_ = true;
   }
-  if (carried_mark_[v] == 0) {
-    carried_mark_[v] = 1;
+  if (gathered_mark_[v] == 0) {
+    gathered_mark_[v] = 1;
     sources_.push_back(v);
     moves_.emplace_back(state_.at(v));
   }
@@ -114,7 +114,7 @@ void SoftObject::settle_dragged() noexcept {
   if (!dragging_) return;
   dragging_ = false;
   for (std::size_t i = 0; i < sources_.size(); ++i) {
-    carried_mark_[sources_[i]] = 0;
+    gathered_mark_[sources_[i]] = 0;
     moves_[i] = glm::vec3(state_.at(sources_[i])) - moves_[i];
   }
   settle_chain();

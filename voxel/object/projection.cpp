@@ -22,10 +22,10 @@ constexpr double kSlides = 0.1;  // sin² of the angle between tool and obstacle
 // any further.
 double least_force_N(const VoxelLinks& links, const glm::dvec3& wished, const glm::dvec3& way,
                      const glm::dvec3& normal, double bound) {
-  constexpr double kNone = std::numeric_limits<double>::infinity();
+  constexpr double kNoBound = std::numeric_limits<double>::infinity();
   double force_N = 0.0;
   for (int n = 0; n < 7; ++n) {  // each axis starts to move once and stops once
-    double reached = 0.0, rise = 0.0, next_N = kNone;
+    double reached = 0.0, rise = 0.0, next_N = kNoBound;
     for (int axis = 0; axis < 3; ++axis) {
       const auto& in = links.interval[static_cast<std::size_t>(axis)];
       const double low = static_cast<double>(in[0]), high = std::max(low, static_cast<double>(in[1]));
@@ -39,9 +39,9 @@ double least_force_N(const VoxelLinks& links, const glm::dvec3& wished, const gl
       next_N = std::min(next_N, force_N >= begin_N ? end_N : begin_N);
     }
     if (reached >= bound) break;
-    const double to_N = rise > 0.0 ? force_N + (bound - reached) / rise : kNone;
-    if (to_N <= next_N && to_N < kNone) return to_N;
-    if (next_N == kNone) break;
+    const double to_N = rise > 0.0 ? force_N + (bound - reached) / rise : kNoBound;
+    if (to_N <= next_N && to_N < kNoBound) return to_N;
+    if (next_N == kNoBound) break;
     force_N = next_N;
   }
   return force_N;
@@ -66,8 +66,8 @@ glm::dvec3 SoftObject::project_on_tool(const ToolInBody& tool, const glm::dvec3&
 }
 
 // A voxel that its links keep in the tool gets no deeper than it was.
-glm::dvec3 SoftObject::no_deeper_in(const ToolInBody& tool, const glm::dvec3& rest, const glm::dvec3& now,
-                                    const glm::dvec3& place) const noexcept {
+glm::dvec3 SoftObject::clamp_depth_in_tool(const ToolInBody& tool, const glm::dvec3& rest,
+                                           const glm::dvec3& now, const glm::dvec3& place) const noexcept {
   const double was = std::min(gap(tool, rest + now).distance, voxel_radius());
   glm::dvec3 to = place;
   for (int n = 0; n < kProjections; ++n) {
@@ -96,14 +96,14 @@ glm::dvec3 SoftObject::project_on_tool_within_limits(const ToolInBody& tool, con
         least_force_N(links, wished, way, g.normal, glm::dot(g.normal, place) - g.distance);
     place = clamp_to_links(links, wished + force_N * way, now);
   }
-  return no_deeper_in(tool, t.rest, now, place);
+  return clamp_depth_in_tool(tool, t.rest, now, place);
 }
 
 // Where a touched voxel belongs, everything else where it is; `pressed`: by the tool.
-glm::dvec3 SoftObject::place_of(const ToolInBody& tool, const VoxelLinks& links, Touch& t) noexcept {
+glm::dvec3 SoftObject::project_voxel(const ToolInBody& tool, const VoxelLinks& links, Touch& t) noexcept {
   const glm::dvec3 rest = t.rest, now = state_.at(t.v);
   glm::dvec3 wanted = links.minimum;
-  if (pair_held(t)) wanted += links.compliance * glm::dvec3(pair_load_[t.surface]);
+  if (is_claimed(t)) wanted += links.compliance * glm::dvec3(pair_load_[t.surface]);
   const glm::dvec3 wished = wanted;
   t.pressed = !surely_clear_of(tool, rest + wanted);
   Gap g;
@@ -119,7 +119,7 @@ glm::dvec3 SoftObject::place_of(const ToolInBody& tool, const VoxelLinks& links,
     const glm::dvec3 place = clamp_to_links(links, wanted, now);
     // Other soft objects: the pair solver has the last word. Anchors that keep a voxel in the tool: the tool
     // has to give way, and must not part tissue like a wedge.
-    const bool let_out = t.pressed && place != wanted && held_voxels_.empty() &&
+    const bool let_out = t.pressed && place != wanted && claimed_voxels_.empty() &&
                          !(anchors_pull_ && gap(tool, rest + now).distance < -kGiveWay * voxel_radius());
     return let_out ? project_on_tool_within_limits(tool, links, wished, t) : place;
   }
@@ -144,18 +144,18 @@ glm::dvec3 SoftObject::place_of(const ToolInBody& tool, const VoxelLinks& links,
 }
 
 void SoftObject::relax_touch(const ToolInBody& tool, Touch& t) noexcept {
-  if (lattice_->anchored(t.v) || t.part != 0) return;
+  if (lattice_->anchored(t.v) || t.block != 0) return;
   const glm::dvec3 before = state_.at(t.v);
   const bool was_pressed = t.pressed;
   // While the shadow relaxes the object, voxels that the tool does not press are the shadow's.
-  if (relaxation_.away() && !t.pressed && clear_of(tool, position(t))) return;
+  if (relaxation_.shadow_busy() && !t.pressed && clear_of(tool, position(t))) return;
   // A voxel that another soft object presses belongs to its pair. At the equilibrium of its links alone it
   // would lie inside of the other object when the force is measured.
-  if (pair_held(t) && !t.pressed && clear_of(tool, position(t))) return;
+  if (is_claimed(t) && !t.pressed && clear_of(tool, position(t))) return;
   const VoxelLinks links = links_of(relaxation_.couplings(), state_, t.v);
-  glm::dvec3 place = place_of(tool, links, t);
-  if (relaxation_.away() && was_pressed && t.pressed) {
-    place -= t.left;
+  glm::dvec3 place = project_voxel(tool, links, t);
+  if (relaxation_.shadow_busy() && was_pressed && t.pressed) {
+    place -= t.frozen_motion;
     const Gap g = gap(tool, t.rest + place);
     if (g.distance < 0.0) place -= g.distance * g.normal;
     place = clamp_to_links(links, place, before);

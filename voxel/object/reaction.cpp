@@ -17,15 +17,15 @@ Reaction SoftObject::reaction(const ToolInBody& tool) noexcept {
   if (grid_) return reaction_on_grid(tool);
   Reaction result;
   for (Touch& t : touches_) {
-    t.tight = false;
+    t.at_limit = false;
     t.load = glm::dvec3(0.0);
-    if (!t.pressed || t.part != 0) continue;
+    if (!t.pressed || t.block != 0) continue;
     t.normal = gap(tool, position(t)).normal;
     t.load = load_on(t.v);
   }
-  glm::dvec3 hanging_N(0.0);
-  const bool by_rows = held_voxels_.empty() && block_seen_.empty();
-  if (by_rows) hanging_N = gather_load(result.stiffness_N_per_m);
+  glm::dvec3 dependents_N(0.0);
+  const bool by_rows = claimed_voxels_.empty() && block_seen_.empty();
+  if (by_rows) dependents_N = gather_load(result.stiffness_N_per_m);
   for (int axis = 0; axis < 3 && !by_rows; ++axis) {
     if (block_seen_.empty()) {
       gather_load_with_pairs(axis);
@@ -33,19 +33,19 @@ Reaction SoftObject::reaction(const ToolInBody& tool) noexcept {
       gather_load_with_blocks(axis);
     }
     add_stiffness(axis, result.stiffness_N_per_m);
-    let_go_of_carried();
+    clear_gathered();
   }
   // Links at their limits pass load between voxels, along and across their normals. Only the sum over all of
   // these voxels is well defined: within it the chain's own forces cancel.
   for (const Touch& t : touches_) {
-    if (t.pressed && t.tight && t.part == 0) result.force_N += t.load;
+    if (t.pressed && t.at_limit && t.block == 0) result.force_N += t.load;
   }
-  result.force_N += hanging_N;
+  result.force_N += dependents_N;
   const glm::dvec3 through_links = result.force_N;
   for (const Touch& t : touches_) {
-    if (!t.pressed || t.part != 0) continue;
-    const double load = glm::dot(t.tight ? through_links : t.load, t.normal);
-    if (!t.tight && load < 0.0) {
+    if (!t.pressed || t.block != 0) continue;
+    const double load = glm::dot(t.at_limit ? through_links : t.load, t.normal);
+    if (!t.at_limit && load < 0.0) {
       // Frictionless: the tool feels the load along the normal. A load that pulls is no contact.
       result.force_N += load * t.normal;
     }

@@ -13,7 +13,7 @@ namespace voxel {
 namespace {
 
 // The same for links of dependents, which lag a little as the tool withdraws.
-constexpr double kTightHanging = 1e-3;
+constexpr double kAtLimitLagging = 1e-3;
 
 }  // namespace
 
@@ -21,21 +21,21 @@ constexpr double kTightHanging = 1e-3;
 template <class Visit>
 void SoftObject::for_touched_blocks(const Visit& visit) noexcept {
   for (const Touch& t : touches_) {
-    if (t.part == 0 || block_seen_[t.part - 1U] != 0) continue;
-    block_seen_[t.part - 1U] = 1;
-    visit(t.part);
+    if (t.block == 0 || block_seen_[t.block - 1U] != 0) continue;
+    block_seen_[t.block - 1U] = 1;
+    visit(t.block);
   }
   for (const Touch& t : touches_) {
-    if (t.part != 0) block_seen_[t.part - 1U] = 0;
+    if (t.block != 0) block_seen_[t.block - 1U] = 0;
   }
 }
 
 // Bounds of the tool on a block, linearised at each of its touched voxels that is nearer than `within_m`.
-void SoftObject::bound_block(const ToolInBody& tool, std::uint16_t part, double within_m) noexcept {
+void SoftObject::bound_block(const ToolInBody& tool, std::uint16_t block, double within_m) noexcept {
   block_bounds_.clear();
   bound_touch_.clear();
   for (std::size_t i = 0; i < touches_.size(); ++i) {
-    if (touches_[i].part != part) continue;
+    if (touches_[i].block != block) continue;
     const Gap g = gap(tool, position(touches_[i]));
     if (g.distance > within_m) continue;
     block_bounds_.push_back({g.normal, g.distance, false, 0.0});
@@ -45,8 +45,8 @@ void SoftObject::bound_block(const ToolInBody& tool, std::uint16_t part, double 
 
 // The shortest way out of the tool. One voxel of the block is the source of the chain's wave.
 void SoftObject::push_blocks_out(const ToolInBody& tool) noexcept {
-  for_touched_blocks([&](std::uint16_t part) {
-    bound_block(tool, part, voxel_radius());
+  for_touched_blocks([&](std::uint16_t block) {
+    bound_block(tool, block, voxel_radius());
     const auto in = std::find_if(block_bounds_.begin(), block_bounds_.end(),
                                  [](const BlockBound& b) { return b.room_m < 0.0; });
     if (in == block_bounds_.end()) return;
@@ -59,17 +59,17 @@ void SoftObject::push_blocks_out(const ToolInBody& tool) noexcept {
 }
 
 void SoftObject::follow_blocks(const glm::dvec3& delta) noexcept {
-  for_touched_blocks([&](std::uint16_t part) {
+  for_touched_blocks([&](std::uint16_t block) {
     HeldDirections pressed;
     const Touch* first = nullptr;
     for (const Touch& t : touches_) {
-      if (t.part != part || !t.pressed) continue;
+      if (t.block != block || !t.pressed) continue;
       pressed.add(t.normal);
       if (first == nullptr) first = &t;
     }
     if (first == nullptr) return;
     const glm::dvec3 before = state_.at(first->v);
-    state_.set(first->v, before + delta - pressed.free_block(delta));
+    state_.set(first->v, before + delta - pressed.free_component(delta));
     sources_.push_back(first->v);
     moves_.emplace_back(state_.at(first->v) - before);
   });
@@ -79,18 +79,18 @@ void SoftObject::follow_blocks(const glm::dvec3& delta) noexcept {
 // Bounds with a force are active contacts.
 void SoftObject::relax_blocks(const ToolInBody& tool) noexcept {
   Multigrid& grid = relaxation_.multigrid();
-  for_touched_blocks([&](std::uint16_t part) {
-    const std::size_t p = part - 1U;
+  for_touched_blocks([&](std::uint16_t block) {
+    const std::size_t p = block - 1U;
     // With its dependents: through links at their limits these press it on the tool, too.
     const Multigrid::AdmissibleInterval room = grid.interval_of_block(p, state_);
     const glm::dvec3 force = grid.block_force(p, state_) + dependents_of_block(p, room),
-                     stiffness = grid.parts().on(0, p).stiffness;
-    bound_block(tool, part, lattice_->max_spacing_m());
+                     stiffness = grid.blocks().on(0, p).stiffness;
+    bound_block(tool, block, lattice_->max_spacing_m());
     Multigrid::add_bounds(room, block_bounds_);
     bool was = false, is = false;
     glm::dvec3 way = move_within(force, stiffness, block_bounds_);
     for (Touch& t : touches_) {
-      if (t.part != part) continue;
+      if (t.block != block) continue;
       was = was || t.pressed;
       t.pressed = false;
     }
@@ -101,8 +101,9 @@ void SoftObject::relax_blocks(const ToolInBody& tool) noexcept {
       is = is || t.pressed;
     }
     // While the shadow relaxes the object, only motion since the submission is relaxed here.
-    if (relaxation_.away()) way = move_within(force + grid.residual_of_block(p), stiffness, block_bounds_);
-    const glm::dvec3 went = grid.move_block(p, way, state_, obstacle_view(), Multigrid::Tool::is_seen_to);
+    if (relaxation_.shadow_busy())
+      way = move_within(force + grid.residual_of_block(p), stiffness, block_bounds_);
+    const glm::dvec3 went = grid.move_block(p, way, state_, obstacle_view(), Multigrid::Tool::caller_handles);
     const double far = glm::length(went);
     if (was != is) unsettled_m_ += far;
     unrelaxed_m_ += far;
@@ -112,13 +113,13 @@ void SoftObject::relax_blocks(const ToolInBody& tool) noexcept {
   });
 }
 
-bool SoftObject::any_pressed(std::uint16_t part) const noexcept {
+bool SoftObject::any_pressed(std::uint16_t block) const noexcept {
   return std::any_of(touches_.begin(), touches_.end(),
-                     [part](const Touch& t) { return t.part == part && t.pressed; });
+                     [block](const Touch& t) { return t.block == block && t.pressed; });
 }
 
 // Load of a block's dependents (N); `room`: its admissible interval.
-glm::dvec3 SoftObject::dependents_of_block(std::size_t part,
+glm::dvec3 SoftObject::dependents_of_block(std::size_t block,
                                            const Multigrid::AdmissibleInterval& room) noexcept {
   const Multigrid& grid = relaxation_.multigrid();
   const double tight = static_cast<double>(kAtLimit) * lattice_->min_spacing_m();
@@ -126,8 +127,8 @@ glm::dvec3 SoftObject::dependents_of_block(std::size_t part,
   for (int axis = 0; axis < 3; ++axis) {
     const auto& of_axis = room[static_cast<std::size_t>(axis)];
     if (of_axis[0] < -tight && of_axis[1] > tight) continue;
-    limit_reactions_.gather_on_block(relaxation_.couplings(), state_, grid, part, axis);
-    force[axis] = limit_reactions_.hanging(relaxation_.couplings()).force_N;
+    limit_reactions_.gather_on_block(relaxation_.couplings(), state_, grid, block, axis);
+    force[axis] = limit_reactions_.dependents(relaxation_.couplings()).force_N;
   }
   return force;
 }
@@ -138,40 +139,40 @@ glm::dvec3 SoftObject::dependents_of_block(std::size_t part,
 void SoftObject::gather_load_with_blocks(int axis) noexcept {
   const Multigrid& grid = relaxation_.multigrid();
   const auto& u = state_.u[static_cast<std::size_t>(axis)];
-  const auto tight = static_cast<float>(kTightHanging * lattice_->min_spacing_m());
+  const auto tight = static_cast<float>(kAtLimitLagging * lattice_->min_spacing_m());
   // Its first voxel stands for the block.
   const auto whole = [&](VoxelId v) {
-    const std::uint16_t part = lattice_->part(v);
-    return part == 0 ? v : grid.parts().first(part - 1U);
+    const std::uint16_t block = lattice_->block(v);
+    return block == 0 ? v : grid.blocks().first(block - 1U);
   };
-  carried_.clear();
+  gathered_.clear();
   for (std::size_t i = 0; i < touches_.size(); ++i) {
     if (!touches_[i].pressed || lattice_->anchored(touches_[i].v)) continue;
     const VoxelId v = whole(touches_[i].v);
-    if (carried_mark_[v] == 0) carry(v, static_cast<std::uint32_t>(i));
+    if (gathered_mark_[v] == 0) gather(v, static_cast<std::uint32_t>(i));
   }
-  const std::size_t pressed = carried_.size();
-  hanging_.assign(pressed, Hanging{});
+  const std::size_t pressed = gathered_.size();
+  dependents_.assign(pressed, Dependent{});
   const auto look_at = [&](std::size_t head, VoxelId from, VoxelId to, int d, bool up) {
     if (!lattice_->filled(to) || lattice_->anchored(to)) return;
     const auto b = lattice_->bounds(up ? from : to, d, axis);
     const float is = u[to] - u[from], low = up ? b[0] : -b[1], high = up ? b[1] : -b[0];
     const bool pushed_up = is <= low + tight, pushed_down = is >= high - tight;
     if (!pushed_up && !pushed_down) return;
-    const std::uint32_t touch = carried_[head].touch;
-    touches_[touch].tight = true;
+    const std::uint32_t touch = gathered_[head].touch;
+    touches_[touch].at_limit = true;
     const VoxelId v = whole(to);
-    if (carried_mark_[v] != 0 || carried_.size() >= kMaxCarried) return;
-    carry(v, touch);
-    const std::uint16_t part = lattice_->part(v);
-    const double load = part != 0 ? grid.block_force(part - 1U, state_)[axis] : load_on(v, axis);
-    hanging_.push_back({static_cast<std::uint32_t>(head), pushed_up, pushed_down, load});
+    if (gathered_mark_[v] != 0 || gathered_.size() >= kMaxGathered) return;
+    gather(v, touch);
+    const std::uint16_t block = lattice_->block(v);
+    const double load = block != 0 ? grid.block_force(block - 1U, state_)[axis] : load_on(v, axis);
+    dependents_.push_back({static_cast<std::uint32_t>(head), pushed_up, pushed_down, load});
   };
-  for (std::size_t head = 0; head < carried_.size(); ++head) {
-    const VoxelId v = carried_[head].v;
-    const std::uint16_t part = lattice_->part(v);
-    if (part != 0) {
-      for (const RigidBlocks::Link& l : grid.parts().on(0, part - 1U).border)
+  for (std::size_t head = 0; head < gathered_.size(); ++head) {
+    const VoxelId v = gathered_[head].v;
+    const std::uint16_t block = lattice_->block(v);
+    if (block != 0) {
+      for (const RigidBlocks::Link& l : grid.blocks().on(0, block - 1U).border)
         look_at(head, l.cell, l.beside, l.d, l.up);
       continue;
     }
@@ -183,39 +184,39 @@ void SoftObject::gather_load_with_blocks(int axis) noexcept {
   // A voxel that pulls away from its source may rest on another gathered one; it counts then, too. For the
   // sum it does not matter through which link.
   const auto rests = [&](std::size_t i) {
-    const VoxelId v = carried_[i].v, by = carried_[hanging_[i].from].v;
-    for (int n = 0; n < 6 && lattice_->part(v) == 0; ++n) {
+    const VoxelId v = gathered_[i].v, by = gathered_[dependents_[i].from].v;
+    for (int n = 0; n < 6 && lattice_->block(v) == 0; ++n) {
       const bool up = n % 2 != 0;
       const VoxelId w = up ? lattice_->up(v, n / 2) : lattice_->down(v, n / 2);
-      if (!lattice_->filled(w) || whole(w) == by || carried_mark_[whole(w)] == 0) continue;
+      if (!lattice_->filled(w) || whole(w) == by || gathered_mark_[whole(w)] == 0) continue;
       const auto b = lattice_->bounds(up ? v : w, n / 2, axis);
       const float is = u[v] - u[w], low = up ? -b[1] : b[0], high = up ? -b[0] : b[1];
-      if (hanging_[i].load < 0.0 ? is <= low + tight : is >= high - tight) return true;
+      if (dependents_[i].load < 0.0 ? is <= low + tight : is >= high - tight) return true;
     }
     return false;
   };
-  for (std::size_t i = hanging_.size(); i-- > pressed;) {
-    const Hanging& h = hanging_[i];
+  for (std::size_t i = dependents_.size(); i-- > pressed;) {
+    const Dependent& h = dependents_[i];
     if (!((h.up && h.load < 0.0) || (h.down && h.load > 0.0)) && !rests(i)) {
-      carried_mark_[carried_[i].v] = 0;
+      gathered_mark_[gathered_[i].v] = 0;
     } else if (h.from < pressed) {
-      touches_[carried_[h.from].touch].load[axis] += h.load;
+      touches_[gathered_[h.from].touch].load[axis] += h.load;
     } else {
-      hanging_[h.from].load += h.load;
+      dependents_[h.from].load += h.load;
     }
   }
 }
 
 void SoftObject::add_reaction_of_blocks(const ToolInBody& tool, Reaction& reaction) noexcept {
   const Multigrid& grid = relaxation_.multigrid();
-  for_touched_blocks([&](std::uint16_t part) {
-    const std::size_t p = part - 1U;
-    if (!any_pressed(part)) return;
-    bound_block(tool, part, lattice_->max_spacing_m());
-    const glm::dvec3 stiffness = grid.parts().on(0, p).stiffness;
+  for_touched_blocks([&](std::uint16_t block) {
+    const std::size_t p = block - 1U;
+    if (!any_pressed(block)) return;
+    bound_block(tool, block, lattice_->max_spacing_m());
+    const glm::dvec3 stiffness = grid.blocks().on(0, p).stiffness;
     glm::dvec3 force = grid.block_force(p, state_);
     for (const Touch& t : touches_) {
-      if (t.part == part && t.pressed) force += t.load;
+      if (t.block == block && t.pressed) force += t.load;
     }
     move_within(force, stiffness, block_bounds_);
     HeldDirections held;

@@ -12,7 +12,7 @@ namespace voxel {
 namespace {
 
 // Rows that a tick applies at once. In a wider contact steps are felt.
-constexpr std::size_t kMostAtOnce = 1000;
+constexpr std::size_t kMaxAtOnce = 1000;
 // A whole cycle reduces the error at the contact only a little. While the tool moves by more than kMoved
 // spacings from one result to the next, and for kUnsettled results after, this many contact cycles follow it.
 // Not at rest: coarse cells outside of their boxes learn of the whole cycle's last sweeps only in the next
@@ -26,16 +26,16 @@ constexpr double kMoved = 0.1;
 // and so are submitted rows: a later submission would undo their deferred part.
 constexpr float kFarther = 20.0F;
 constexpr std::size_t kNearRows = 3;
-// If tissue moved by more than kJumped spacings since the last submission, the next kQuickResults results are
-// of contact cycles on large boxes. In the first, coarse levels come to rest before the finer ones and are
-// prolonged beyond the boxes, too; tissue left behind there would hold back the contact. A pressed rigid
-// block has one such result over the whole object, because no box is large enough. Loads of bricks are not
-// renewed meanwhile: on tissue that moves far they mean little.
+// If tissue moved by more than kJumped spacings since the last submission, the next kCoarseFirstResults
+// results are of contact cycles on large boxes. In the first, coarse levels come to rest before the finer
+// ones and are prolonged beyond the boxes, too; tissue left behind there would hold back the contact. A
+// pressed rigid block has one such result over the whole object, because no box is large enough. Loads of
+// bricks are not renewed meanwhile: on tissue that moves far they mean little.
 constexpr float kJumped = 5.0F;
-constexpr int kQuickResults = 3;
-constexpr std::array<int, kQuickResults> kLargePatchCycles{3, 4, 2};
+constexpr int kCoarseFirstResults = 3;
+constexpr std::array<int, kCoarseFirstResults> kLargePatchCycles{3, 4, 2};
 // Float8 that a whole cycle smooths and prolongs per row.
-constexpr std::size_t kOctetsOfRow = 12;
+constexpr std::size_t kGroupsOfRow = 12;
 // Arrays of a row in a result: motion, and loads of bricks if there are any.
 std::size_t arrays_of(const Lattice& lattice) {
   return lattice.has_bricks() ? 6 : 3;
@@ -49,26 +49,26 @@ ShadowObject::ShadowObject(SoftObject& object)
       relaxation_(lattice_),
       obstacles_(object.obstacles_),
       moving_obstacles_(object.moving_obstacles_),
-      rows_kept_back_(lattice_.grid().rows()),
-      kept_back_(lattice_.grid().rows()),
+      deferred_rows_(lattice_.grid().rows()),
+      deferred_(lattice_.grid().rows()),
       distance_(lattice_.grid().rows()),
       by_distance_(lattice_.grid().rows()),
-      given_(lattice_.grid().rows()),
-      found_{RowDelta(lattice_.grid().rows(), arrays_of(lattice_)),
-             RowDelta(lattice_.grid().rows(), arrays_of(lattice_))},
+      submitted_(lattice_.grid().rows()),
+      results_{RowDelta(lattice_.grid().rows(), arrays_of(lattice_)),
+               RowDelta(lattice_.grid().rows(), arrays_of(lattice_))},
       retry_(lattice_.grid().rows()) {
-  for (BlockMoves& ways : found_blocks_) ways.assign(lattice_.block_count(), glm::dvec3(0.0));
+  for (BlockMoves& ways : block_moves_) ways.assign(lattice_.block_count(), glm::dvec3(0.0));
   multigrid().keep_log();
   relaxation_.copy_from(object.relaxation_);
-  object.relaxation_.leave_to_another();
+  object.relaxation_.leave_to_shadow();
   // A rigid block sums the errors of all its border.
   least_m_ = multigrid().has_blocks() ? multigrid().restricted_m() : multigrid().motion_tolerance_m();
   const std::size_t most_held = lattice_.surface().size() + SoftObject::kMaxTouched;
   held_.reserve(most_held);
-  given_held_.reserve(most_held);
-  given_contacts_.reserve(SoftObject::kMaxTouched);
-  given_roles_.reserve(2 * most_held);
-  given_obstacles_.reserve(lattice_.surface().size());
+  submitted_held_.reserve(most_held);
+  submitted_contacts_.reserve(SoftObject::kMaxTouched);
+  submitted_roles_.reserve(2 * most_held);
+  submitted_obstacles_.reserve(lattice_.surface().size());
   object.changed_obstacles_.reserve(lattice_.surface().size());
   object.obstacle_changed_.assign(object.obstacles_.size(), 0);
   for (std::size_t axis = 0; axis < 3; ++axis) before_[axis] = state_.u[axis];
@@ -81,172 +81,173 @@ ShadowObject::ShadowObject(SoftObject& object)
   state_.populate(rows);
   for (auto& axis : before_) axis.populate(kRow, rows);
   const auto most = static_cast<std::size_t>(std::count(rows.begin(), rows.end(), true));
-  given_.populate(most);
-  for (RowDelta& delta : found_) delta.populate(most);
+  submitted_.populate(most);
+  for (RowDelta& delta : results_) delta.populate(most);
   retry_.populate();
 }
 
-void ShadowObject::give(SoftObject& object) noexcept {
+void ShadowObject::submit(SoftObject& object) noexcept {
   ChangeLog& log = object.relaxation_.multigrid().log();
-  given_.clear();
-  const RowDelta& found = found_[taking_];
+  submitted_.clear();
+  const RowDelta& delta = results_[applying_];
   for (const RowId row : log.rows(0)) {
-    float* to = given_.add(row);
+    float* to = submitted_.add(row);
     for (std::size_t axis = 0; axis < 3; ++axis)
       std::copy_n(object.state_.u[axis].data() + at(row), kRow, to + axis * kRow);
     // As the row will be when the result is applied. Otherwise it would differ from its neighbours by motion
     // that the shadow knows already, and would make that motion twice.
-    const std::size_t n = found.find(row);
-    if (n == found.count() || (n < drained_ && !retry_.waits(n))) continue;
-    for (std::size_t i = 0; i < std::size_t{3} * kRow; ++i) to[i] += found.values(n)[i];
+    const std::size_t n = delta.find(row);
+    if (n == delta.count() || (n < rows_applied_ && !retry_.waits(n))) continue;
+    for (std::size_t i = 0; i < std::size_t{3} * kRow; ++i) to[i] += delta.values(n)[i];
   }
-  given_roles_.clear();
-  given_obstacles_.clear();
+  submitted_roles_.clear();
+  submitted_obstacles_.clear();
   for (const std::uint32_t s : object.changed_obstacles_) {
     object.obstacle_changed_[s] = 0;
-    given_obstacles_.push_back({s, object.obstacles_[s]});
+    submitted_obstacles_.push_back({s, object.obstacles_[s]});
     const VoxelId v = lattice_.surface()[s];
-    given_roles_.push_back({v, object.resting_role(v)});
+    submitted_roles_.push_back({v, object.resting_role(v)});
   }
   object.changed_obstacles_.clear();
-  for (const VoxelId v : given_held_) given_roles_.push_back({v, object.resting_role(v)});
-  given_pressed_ = object.list_held();
+  for (const VoxelId v : submitted_held_) submitted_roles_.push_back({v, object.resting_role(v)});
+  submitted_pressed_ = object.list_held();
   note_motion(object);
-  given_held_.clear();
-  given_contacts_.clear();
-  for (const VoxelId v : object.all_held_) {
-    given_held_.push_back(v);
+  submitted_held_.clear();
+  submitted_contacts_.clear();
+  for (const VoxelId v : object.held_voxels_) {
+    submitted_held_.push_back(v);
     if (object.state_.role[v] == Displacement::pressed || Displacement::in_block(object.state_.role[v]))
-      given_contacts_.push_back({v, object.state_.tool_normal[lattice_.surface_number(v)]});
+      submitted_contacts_.push_back({v, object.state_.tool_normal[lattice_.surface_number(v)]});
   }
-  near_ = given_held_.empty() ? Relaxation::NearRows{} : object.relaxation_.near_contact();
+  near_ = submitted_held_.empty() ? Relaxation::NearRows{} : object.relaxation_.near_contact();
   object.assign_residual();
   log.clear();
 }
 
 void ShadowObject::note_motion(const SoftObject& object) noexcept {
-  const double way = glm::distance(object.tool_.centre, given_tool_m_);
-  given_tool_m_ = object.tool_.centre;
+  const double way = glm::distance(object.tool_.centre, submitted_tool_m_);
+  submitted_tool_m_ = object.tool_.centre;
   if (way > kMoved * lattice_.min_spacing_m()) unsettled_ = kUnsettled;
-  settle_contact_ = unsettled_ > 0 && given_pressed_ > 0;
+  settle_contact_ = unsettled_ > 0 && submitted_pressed_ > 0;
   if (unsettled_ > 0) --unsettled_;
 }
 
-void ShadowObject::open_given() noexcept {
+void ShadowObject::read_submission() noexcept {
   Multigrid& to = multigrid();
   float moved_m = 0.0F;
-  for (std::size_t n = 0; n < given_.count(); ++n) {
-    const RowId row = given_.row(n);
+  for (std::size_t n = 0; n < submitted_.count(); ++n) {
+    const RowId row = submitted_.row(n);
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const float* now = given_.values(n) + axis * kRow;
+      const float* now = submitted_.values(n) + axis * kRow;
       const float* was = before_[axis].data() + at(row);
       for (std::size_t i = 0; i < kRow; ++i) moved_m = std::max(moved_m, std::fabs(now[i] - was[i]));
-      std::copy_n(given_.values(n) + axis * kRow, kRow, state_.u[axis].data() + at(row));
-      std::copy_n(given_.values(n) + axis * kRow, kRow, before_[axis].data() + at(row));
+      std::copy_n(submitted_.values(n) + axis * kRow, kRow, state_.u[axis].data() + at(row));
+      std::copy_n(submitted_.values(n) + axis * kRow, kRow, before_[axis].data() + at(row));
     }
     to.mark_dirty(0, row);
   }
-  for (const GivenObstacle& given : given_obstacles_) {
-    Obstacle& o = obstacles_[given.surface_number];
-    moving_obstacles_ = moving_obstacles_ + (given.obstacle.moving ? 1 : 0) - (o.moving ? 1 : 0);
-    o = given.obstacle;
-    to.mark_dirty(0, lattice_.surface()[given.surface_number] / kRow);
+  for (const SubmittedObstacle& submitted : submitted_obstacles_) {
+    Obstacle& o = obstacles_[submitted.surface_number];
+    moving_obstacles_ = moving_obstacles_ + (submitted.obstacle.moving ? 1 : 0) - (o.moving ? 1 : 0);
+    o = submitted.obstacle;
+    to.mark_dirty(0, lattice_.surface()[submitted.surface_number] / kRow);
   }
-  for (const GivenRole& given : given_roles_) state_.set_role(given.v, given.role);
+  for (const SubmittedRole& submitted : submitted_roles_) state_.set_role(submitted.v, submitted.role);
   held_.clear();
-  for (const VoxelId v : given_held_) {
+  for (const VoxelId v : submitted_held_) {
     held_.push_back(v);
     state_.set_role(v, Displacement::held);
   }
-  for (const GivenContact& given : given_contacts_) {
-    state_.set_role(given.v, Displacement::pressed);
-    state_.tool_normal[lattice_.surface_number(given.v)] = given.normal;
+  for (const SubmittedContact& submitted : submitted_contacts_) {
+    state_.set_role(submitted.v, Displacement::pressed);
+    state_.tool_normal[lattice_.surface_number(submitted.v)] = submitted.normal;
   }
-  if (given_.count() > 0 || !given_obstacles_.empty()) relaxation_.wake();
+  if (submitted_.count() > 0 || !submitted_obstacles_.empty()) relaxation_.wake();
   to.log().clear();
   // At least one whole cycle between two jumps, so that the rest of the object has its turn.
   if (moved_m > kJumped * static_cast<float>(lattice_.min_spacing_m()) && coarse_first_left_ == 0 &&
       !was_coarse_first_) {
-    coarse_first_left_ = kQuickResults;
-    large_motion_left_ = kQuickResults + kUnsettled;
+    coarse_first_left_ = kCoarseFirstResults;
+    large_motion_left_ = kCoarseFirstResults + kUnsettled;
   }
   // A pressed rigid block moves tissue all around it, far from the contact.
-  block_pressed_ = std::any_of(held_.begin(), held_.begin() + static_cast<std::ptrdiff_t>(given_pressed_),
-                               [this](VoxelId v) { return lattice_.part(v) != 0; });
-  if (given_pressed_ == 0) coarse_first_left_ = 0;
+  block_pressed_ = std::any_of(held_.begin(), held_.begin() + static_cast<std::ptrdiff_t>(submitted_pressed_),
+                               [this](VoxelId v) { return lattice_.block(v) != 0; });
+  if (submitted_pressed_ == 0) coarse_first_left_ = 0;
   if (block_pressed_) coarse_first_left_ = std::min(coarse_first_left_, 1);
 }
 
-void ShadowObject::relax_quickly(const ObstacleView& obstacles) noexcept {
-  std::size_t octets = 0;
-  const bool first = coarse_first_left_ == kQuickResults;
+void ShadowObject::relax_coarse_first(const ObstacleView& obstacles) noexcept {
+  std::size_t groups = 0;
+  const bool first = coarse_first_left_ == kCoarseFirstResults;
   --coarse_first_left_;
   if (block_pressed_) {
-    octets = relaxation_.run_thoroughly(state_, obstacles, held_);
+    groups = relaxation_.run_whole_coarse_first(state_, obstacles, held_);
     relaxation_.relax_around_blocks(state_, obstacles);
-    work_ = octets / kOctetsOfRow;
+    work_ = groups / kGroupsOfRow;
     return;
   }
-  const std::span<const VoxelId> pressed{held_.data(), given_pressed_};
+  const std::span<const VoxelId> pressed{held_.data(), submitted_pressed_};
   if (first) {
-    octets += relaxation_.relax_large_patch(state_, obstacles, held_, pressed, true);
-    octets += relaxation_.prolong_large_patch(state_, obstacles, pressed);
+    groups += relaxation_.relax_large_patch(state_, obstacles, held_, pressed, true);
+    groups += relaxation_.prolong_large_patch(state_, obstacles, pressed);
   }
-  const int cycles = kLargePatchCycles[static_cast<std::size_t>(kQuickResults - 1 - coarse_first_left_)];
+  const int cycles =
+      kLargePatchCycles[static_cast<std::size_t>(kCoarseFirstResults - 1 - coarse_first_left_)];
   for (int n = 0; n < cycles; ++n)
-    octets += relaxation_.relax_large_patch(state_, obstacles, held_, pressed, false);
+    groups += relaxation_.relax_large_patch(state_, obstacles, held_, pressed, false);
   // Not after the last result, because a whole cycle follows that ends with it; nor after the first, when the
   // tool goes on to press other voxels.
-  if (!first && coarse_first_left_ > 0) relaxation_.relax_limited(state_, obstacles);
-  work_ = octets / kOctetsOfRow;
+  if (!first && coarse_first_left_ > 0) relaxation_.relax_region(state_, obstacles);
+  work_ = groups / kGroupsOfRow;
 }
 
 void ShadowObject::relax() noexcept {
-  open_given();
+  read_submission();
   const ObstacleView obstacles{obstacles_, &lattice_, moving_obstacles_};
   was_coarse_first_ = coarse_first_left_ > 0;
-  found_limited_ = false;
-  found_far_ = large_motion_left_ > 0;
-  if (found_far_) --large_motion_left_;
+  at_limits_ = false;
+  large_motion_ = large_motion_left_ > 0;
+  if (large_motion_) --large_motion_left_;
   if (was_coarse_first_) {
-    relax_quickly(obstacles);
+    relax_coarse_first(obstacles);
   } else {
     relaxation_.run_cycle(state_, obstacles, held_);
-    found_limited_ = relaxation_.limits_hold();
+    at_limits_ = relaxation_.at_limits();
     for (int n = 0; n < kBlockCycles && settle_contact_ && block_pressed_; ++n)
       relaxation_.relax_around_blocks(state_, obstacles);
     for (int n = 0; n < kContactCycles && settle_contact_; ++n)
-      relaxation_.relax_contact(state_, obstacles, held_, {held_.data(), given_pressed_});
+      relaxation_.relax_contact(state_, obstacles, held_, {held_.data(), submitted_pressed_});
     work_ = multigrid().log().count();
   }
   pack_changes();
   ++times_relaxed_;
 }
 
-ShadowObject::Found ShadowObject::found() const {
-  const RowDelta& delta = found_[1 - taking_];
+ShadowObject::Result ShadowObject::result() const {
+  const RowDelta& delta = results_[1 - applying_];
   const std::size_t floats = arrays_of(lattice_) * kRow;
-  Found result{
-      {}, {}, near_count_, found_far_, found_limited_, at_rest_, residual_N_, found_blocks_[1 - taking_]};
+  Result out{{},         {},       near_count_, large_motion_,
+             at_limits_, at_rest_, residual_N_, block_moves_[1 - applying_]};
   for (std::size_t n = 0; n < delta.count(); ++n) {
-    result.rows.push_back(delta.row(n));
-    result.values.insert(result.values.end(), delta.values(n), delta.values(n) + floats);
+    out.rows.push_back(delta.row(n));
+    out.values.insert(out.values.end(), delta.values(n), delta.values(n) + floats);
   }
-  return result;
+  return out;
 }
 
-void ShadowObject::replay_result(const Found& found) noexcept {
-  RowDelta& delta = found_[1 - taking_];
+void ShadowObject::replay_result(const Result& result) noexcept {
+  RowDelta& delta = results_[1 - applying_];
   const std::size_t floats = arrays_of(lattice_) * kRow;
   delta.clear();
-  for (std::size_t n = 0; n < found.rows.size(); ++n)
-    std::copy_n(found.values.data() + n * floats, floats, delta.add(found.rows[n]));
-  found_blocks_[1 - taking_] = found.block_moves;
-  near_count_ = found.near_count;
-  found_far_ = found.far;
-  found_limited_ = found.limited;
-  at_rest_ = found.at_rest;
-  residual_N_ = found.residual_N;
+  for (std::size_t n = 0; n < result.rows.size(); ++n)
+    std::copy_n(result.values.data() + n * floats, floats, delta.add(result.rows[n]));
+  block_moves_[1 - applying_] = result.block_moves;
+  near_count_ = result.near_count;
+  large_motion_ = result.large_motion;
+  at_limits_ = result.at_limits;
+  at_rest_ = result.at_rest;
+  residual_N_ = result.residual_N;
 }
 
 // A counting sort; within one distance rows stay in the order of the log.
@@ -263,35 +264,35 @@ void ShadowObject::sort_by_distance() noexcept {
 }
 
 void ShadowObject::pack_changes() noexcept {
-  RowDelta& delta = found_[1 - taking_];
+  RowDelta& delta = results_[1 - applying_];
   delta.clear();
   at_rest_ = relaxation_.asleep();
   residual_N_ = relaxation_.residual_N();
-  pack_parts();
+  pack_block_moves();
   sort_by_distance();
   near_count_ = 0;
   const std::size_t count = multigrid().log().rows(0).size();
   // After the sort begin_[d] is where distance d ends.
-  const std::size_t near = near_.first[0] > near_.last[0] ? 0 : std::min<std::size_t>(begin_[0], kMostAtOnce);
+  const std::size_t near = near_.first[0] > near_.last[0] ? 0 : std::min<std::size_t>(begin_[0], kMaxAtOnce);
   for (std::size_t n = 0; n < count; ++n) {
     if (n + kAhead < count) fetch_change_ahead(by_distance_[n + kAhead]);
     const RowId row = by_distance_[n];
-    const bool all = at_rest_ || n < begin_[kNearRows] || given_.find(row) != given_.count();
+    const bool all = at_rest_ || n < begin_[kNearRows] || submitted_.find(row) != submitted_.count();
     if (!pack_row(row, all ? least_m_ : kFarther * least_m_)) {
       delta.drop_last();
-      if (!all) keep_back(row);
+      if (!all) defer_row(row);
     }
     if (n < near) near_count_ = delta.count();
   }
-  if (at_rest_) pack_kept_back();
+  if (at_rest_) pack_deferred();
 }
 
 // Takes the motion of blocks out of the rows: it is no change of theirs.
-void ShadowObject::pack_parts() noexcept {
-  BlockMoves& ways = found_blocks_[1 - taking_];
+void ShadowObject::pack_block_moves() noexcept {
+  BlockMoves& ways = block_moves_[1 - applying_];
   for (std::size_t p = 0; p < ways.size(); ++p) {
-    const RigidBlocks& parts = multigrid().parts();
-    const VoxelId first = parts.first(p);
+    const RigidBlocks& blocks = multigrid().blocks();
+    const VoxelId first = blocks.first(p);
     glm::vec3 way(0.0F);
     for (int axis = 0; axis < 3; ++axis) {
       const auto ua = static_cast<std::size_t>(axis);
@@ -308,7 +309,7 @@ void ShadowObject::pack_parts() noexcept {
     for (int axis = 0; axis < 3; ++axis) {
       const auto ua = static_cast<std::size_t>(axis);
       const float to = before_[ua][first] + way[axis];
-      for (const RigidBlocks::Run& run : parts.on(0, p).rows) {
+      for (const RigidBlocks::Run& run : blocks.on(0, p).rows) {
         for (VoxelId v = run.row * kRow; v < (run.row + 1) * kRow; ++v) {
           if ((run.lanes >> v % kRow & 1U) != 0) state_.u[ua][v] = before_[ua][v] = to;
         }
@@ -318,42 +319,42 @@ void ShadowObject::pack_parts() noexcept {
 }
 
 // A block moves at once, wherever the result's other rows are: it has one displacement.
-void ShadowObject::take_parts(SoftObject& object) noexcept {
-  const BlockMoves& ways = found_blocks_[taking_];
+void ShadowObject::apply_block_moves(SoftObject& object) noexcept {
+  const BlockMoves& ways = block_moves_[applying_];
   Multigrid& to = object.relaxation_.multigrid();
   for (std::size_t p = 0; p < ways.size(); ++p) {
     if (ways[p] == glm::dvec3(0.0)) continue;
-    const VoxelId first = to.parts().first(p);
+    const VoxelId first = to.blocks().first(p);
     const glm::vec3 wanted(object.state_.at(first) + ways[p]);
-    to.move_block(p, ways[p], object.state_, object.obstacle_view(), Multigrid::Tool::is_seen_to,
-                  Multigrid::Note::nowhere);
+    to.move_block(p, ways[p], object.state_, object.obstacle_view(), Multigrid::Tool::caller_handles,
+                  Multigrid::Note::unlogged);
     if (glm::vec3(object.state_.at(first)) == wanted) continue;
-    for (const RigidBlocks::Run& run : to.parts().on(0, p).rows) to.log().note(0, run.row);
+    for (const RigidBlocks::Run& run : to.blocks().on(0, p).rows) to.log().note(0, run.row);
   }
 }
 
-void ShadowObject::keep_back(RowId row) noexcept {
-  if (kept_back_[row] != 0) return;
-  kept_back_[row] = 1;
-  rows_kept_back_[kept_back_count_++] = row;
+void ShadowObject::defer_row(RowId row) noexcept {
+  if (deferred_[row] != 0) return;
+  deferred_[row] = 1;
+  deferred_rows_[deferred_count_++] = row;
 }
 
-void ShadowObject::pack_kept_back() noexcept {
-  for (std::size_t n = 0; n < kept_back_count_; ++n) {
-    const RowId row = rows_kept_back_[n];
-    kept_back_[row] = 0;
-    if (!multigrid().log().has(0, row) && !pack_row(row, least_m_)) found_[1 - taking_].drop_last();
+void ShadowObject::pack_deferred() noexcept {
+  for (std::size_t n = 0; n < deferred_count_; ++n) {
+    const RowId row = deferred_rows_[n];
+    deferred_[row] = 0;
+    if (!multigrid().log().has(0, row) && !pack_row(row, least_m_)) results_[1 - applying_].drop_last();
   }
-  kept_back_count_ = 0;
+  deferred_count_ = 0;
 }
 
 std::size_t ShadowObject::memory_bytes() const {
   std::size_t bytes = relaxation_.memory_bytes() + obstacles_.size() * sizeof(Obstacle) +
                       state_.role.resident_bytes() + state_.row_standing.resident_bytes() +
-                      state_.row_obstacles.resident_bytes() + given_.memory_bytes() +
+                      state_.row_obstacles.resident_bytes() + submitted_.memory_bytes() +
                       distance_.resident_bytes() + by_distance_.resident_bytes() +
-                      kept_back_.resident_bytes() + rows_kept_back_.resident_bytes() + retry_.memory_bytes();
-  for (const RowDelta& delta : found_) bytes += delta.memory_bytes();
+                      deferred_.resident_bytes() + deferred_rows_.resident_bytes() + retry_.memory_bytes();
+  for (const RowDelta& delta : results_) bytes += delta.memory_bytes();
   for (std::size_t axis = 0; axis < 3; ++axis)
     bytes += state_.u[axis].resident_bytes() + before_[axis].resident_bytes();
   return bytes;

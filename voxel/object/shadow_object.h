@@ -52,33 +52,33 @@ class ShadowObject {
   [[nodiscard]] static bool wanted(const SoftObject& object) { return !object.relaxation_.idle(); }
 
   // ---- the tick; none of these allocates, locks or throws ----
-  void give(SoftObject& object) noexcept;
-  // Call when relax() is done and the result before is applied: adds the rows of its result near the contact,
-  // all at once or the first of `parts` equal parts. The residual of parts still to come stays frozen.
-  void take(SoftObject& object, int parts = 1) noexcept;
+  void submit(SoftObject& object) noexcept;
+  // Call when relax() is done and the previous result is fully applied. Adds the change of the rows near the
+  // contact, whole or the first of `parts` equal parts. The residual of parts still to come stays frozen.
+  void apply_near(SoftObject& object, int parts = 1) noexcept;
   [[nodiscard]] bool in_parts() const { return parts_left_ > 0; }
   // Adds the next part, or all that are left (`last`).
-  void take_part(SoftObject& object, bool last) noexcept;
+  void apply_part(SoftObject& object, bool last) noexcept;
   // Adds the next `rows` rows of the rest.
-  void drain(SoftObject& object, std::size_t rows) noexcept;
-  [[nodiscard]] bool drained() const {
-    return parts_left_ == 0 && drained_ == found_[taking_].count() && retry_.count() == 0;
+  void apply_far(SoftObject& object, std::size_t rows) noexcept;
+  [[nodiscard]] bool all_applied() const {
+    return parts_left_ == 0 && rows_applied_ == results_[applying_].count() && retry_.count() == 0;
   }
 
   // ---- between the two, the other thread ----
   void relax() noexcept;
   // The result of relax() until it is applied. When a session is replayed, replay_result() installs a
   // recorded result; relax() must not be called any more then.
-  struct Found {
+  struct Result {
     std::vector<RowId> rows;
     std::vector<float> values;  // [row][array][lane], as in a RowDelta
     std::size_t near_count = 0;
-    bool far = false, limited = false, at_rest = false;
+    bool large_motion = false, at_limits = false, at_rest = false;
     double residual_N = 0.0;
     std::vector<glm::dvec3> block_moves;  // as BlockMoves
   };
-  [[nodiscard]] Found found() const;
-  void replay_result(const Found& found) noexcept;
+  [[nodiscard]] Result result() const;
+  void replay_result(const Result& result) noexcept;
   [[nodiscard]] std::uint64_t times_relaxed() const { return times_relaxed_; }
   // Cost of the last relax(), in rows that a whole cycle writes in that time (all levels).
   [[nodiscard]] std::size_t work() const { return work_; }
@@ -148,7 +148,7 @@ class ShadowObject {
     // Tries one more entry. `add(n)` returns true if something is left for the next turn; there are
     // `most_turns`.
     template <class Add>
-    void take(int most_turns, const Add& add) noexcept {
+    void retry(int most_turns, const Add& add) noexcept {
       const std::uint32_t n = lists_[of_][--count_];
       if (add(n)) {
         lists_[1 - of_][next_++] = n;
@@ -181,15 +181,15 @@ class ShadowObject {
     std::size_t of_ = 0, count_ = 0, next_ = 0;
     int turn_ = 0;
   };
-  struct GivenRole {
+  struct SubmittedRole {
     VoxelId v;
     Displacement::Role role;
   };
-  struct GivenContact {
+  struct SubmittedContact {
     VoxelId v;
     glm::vec3 normal;
   };
-  struct GivenObstacle {
+  struct SubmittedObstacle {
     std::uint32_t surface_number;
     Obstacle obstacle;
   };
@@ -199,18 +199,18 @@ class ShadowObject {
 
   [[nodiscard]] Multigrid& multigrid() { return relaxation_.multigrid(); }
   void note_motion(const SoftObject& object) noexcept;
-  void open_given() noexcept;
-  void relax_quickly(const ObstacleView& obstacles) noexcept;
+  void read_submission() noexcept;
+  void relax_coarse_first(const ObstacleView& obstacles) noexcept;
   void sort_by_distance() noexcept;
   void pack_changes() noexcept;
   bool pack_row(RowId row, float least_m) noexcept;
-  void pack_parts() noexcept;
-  void take_parts(SoftObject& object) noexcept;
-  void keep_back(RowId row) noexcept;
-  void pack_kept_back() noexcept;
-  void way_of(SoftObject& object, std::size_t n, float part, RowVector& ways) noexcept;
-  bool take_row(SoftObject& object, std::size_t n, float part = 1.0F) noexcept;
-  void take_limited_correction(SoftObject& object, std::size_t first, std::size_t last, float part) noexcept;
+  void pack_block_moves() noexcept;
+  void apply_block_moves(SoftObject& object) noexcept;
+  void defer_row(RowId row) noexcept;
+  void pack_deferred() noexcept;
+  void take_delta(SoftObject& object, std::size_t n, float part, RowVector& ways) noexcept;
+  bool apply_row(SoftObject& object, std::size_t n, float part = 1.0F) noexcept;
+  void apply_together(SoftObject& object, std::size_t first, std::size_t last, float part) noexcept;
   void fetch_change_ahead(RowId row) const noexcept;
   void fetch_ahead(SoftObject& object, std::size_t n, bool together) const noexcept;
 
@@ -225,38 +225,39 @@ class ShadowObject {
   int coarse_first_left_ = 0;      // results still to come with coarse levels first
   bool was_coarse_first_ = false;  // the last result was one
   int large_motion_left_ = 0;      // results still to come that move tissue far
-  bool found_far_ = false;         // the last result does
-  bool found_limited_ = false;     // active limits held pressed voxels in the last cycle
+  bool large_motion_ = false;      // the last result does
+  bool at_limits_ = false;         // active limits held pressed voxels in the last cycle
   bool block_pressed_ = false;     // the tool presses a rigid block
   float least_m_ = 0.0F;           // smaller changes are deferred
   // Rows whose change is deferred until all is at rest; some that were passed on since are among them.
-  LazyArray<RowId> rows_kept_back_;
-  std::size_t kept_back_count_ = 0;
-  LazyArray<std::uint8_t> kept_back_;  // [row] 1: in deferred_rows_
+  LazyArray<RowId> deferred_rows_;
+  std::size_t deferred_count_ = 0;
+  LazyArray<std::uint8_t> deferred_;  // [row] 1: in deferred_rows_
   static constexpr int kDistances = 64;
   std::array<std::uint32_t, kDistances + 1> begin_{};  // [distance] first of by_distance_
   LazyArray<std::uint8_t> distance_;                   // [n] distance of the nth row in the log
   LazyArray<RowId> by_distance_;                       // rows of the log, nearest to the contact first
 
   // ---- what goes over ----
-  RowDelta given_;
-  std::array<RowDelta, 2> found_;  // the one being applied, and the next: motion, and loads of bricks
-  std::array<BlockMoves, 2> found_blocks_;  // [as results_]
-  std::vector<GivenRole> given_roles_;
-  std::vector<GivenObstacle> given_obstacles_;
-  std::vector<VoxelId> given_held_;
-  std::vector<GivenContact> given_contacts_;  // contacts that slide on the tool
-  std::size_t given_pressed_ = 0;  // number of voxels, the first of submitted_held_, that the tool presses
-  glm::dvec3 given_tool_m_{0.0};   // centre of the tool at the submission
-  int unsettled_ = 0;              // results still to come that relax the contact once more
-  bool settle_contact_ = false;    // this one does
-  Relaxation::NearRows near_;      // rows of the contact
-  std::size_t taking_ = 0, drained_ = 0;  // index into results_, and rows applied of it
-  RetryQueue retry_;                      // entries of it to try again
-  bool in_turns_ = false;                 // rows that could not follow are tried again
-  bool together_ = false;                 // rows near the contact are applied together
-  std::size_t near_count_ = 0;            // rows near the contact in the other result
-  int parts_left_ = 0;                    // parts of these still to be applied
+  RowDelta submitted_;
+  std::array<RowDelta, 2> results_;        // the one being applied, and the next: motion, and loads of bricks
+  std::array<BlockMoves, 2> block_moves_;  // [as results_]
+  std::vector<SubmittedRole> submitted_roles_;
+  std::vector<SubmittedObstacle> submitted_obstacles_;
+  std::vector<VoxelId> submitted_held_;
+  std::vector<SubmittedContact> submitted_contacts_;  // contacts that slide on the tool
+  std::size_t submitted_pressed_ =
+      0;                              // number of voxels, the first of submitted_held_, that the tool presses
+  glm::dvec3 submitted_tool_m_{0.0};  // centre of the tool at the submission
+  int unsettled_ = 0;                 // results still to come that relax the contact once more
+  bool settle_contact_ = false;       // this one does
+  Relaxation::NearRows near_;         // rows of the contact
+  std::size_t applying_ = 0, rows_applied_ = 0;  // index into results_, and rows applied of it
+  RetryQueue retry_;                             // entries of it to try again
+  bool retries_rows_ = false;                    // rows that could not follow are tried again
+  bool together_ = false;                        // rows near the contact are applied together
+  std::size_t near_count_ = 0;                   // rows near the contact in the other result
+  int parts_left_ = 0;                           // parts of these still to be applied
   bool at_rest_ = true;
   double residual_N_ = 0.0;
   std::uint64_t times_relaxed_ = 0;

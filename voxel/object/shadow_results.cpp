@@ -25,7 +25,7 @@ constexpr std::size_t kRowBytes = kRow * sizeof(float);
 // Packs the change of a row. False if no voxel moved by more than `least_m` and no load of bricks changed;
 // the caller drops the entry then.
 bool ShadowObject::pack_row(RowId row, float least_m) noexcept {
-  float* way = found_[1 - taking_].add(row);
+  float* way = results_[1 - applying_].add(row);
   float most = 0.0F;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     most = std::max(
@@ -47,25 +47,26 @@ bool ShadowObject::pack_row(RowId row, float least_m) noexcept {
 
 void ShadowObject::fetch_change_ahead(RowId row) const noexcept {
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    fetch_lines(state_.u[axis].data() + at(row), kRowBytes);
-    fetch_lines(before_[axis].data() + at(row), kRowBytes);
+    prefetch_range(state_.u[axis].data() + at(row), kRowBytes);
+    prefetch_range(before_[axis].data() + at(row), kRowBytes);
   }
 }
 
 // Prefetches what apply_row() reads: lines that another core wrote, and rows that no cache kept since the
 // last result. Rows that are applied together have most of their neighbours in the cache.
 void ShadowObject::fetch_ahead(SoftObject& object, std::size_t n, bool together) const noexcept {
-  if (n >= found_[taking_].count()) return;
-  const RowId row = found_[taking_].row(n);
+  if (n >= results_[applying_].count()) return;
+  const RowId row = results_[applying_].row(n);
   const Grid& g = lattice_.grid();
-  fetch_lines(found_[taking_].values(n), 3 * kRowBytes);
+  prefetch_range(results_[applying_].values(n), 3 * kRowBytes);
   for (const auto& axis : object.state_.u) {
     const float* u = axis.data();
-    fetch_lines(u + at(row), kRowBytes);
+    prefetch_range(u + at(row), kRowBytes);
     if (together) continue;
-    for (const RowId r : {row - g.row_z, row - 1, row + 1, row + g.row_z}) fetch_lines(u + at(r), kRowBytes);
-    fetch_lines(u + at(row - g.row_x) + kRow - 1, sizeof(float));
-    fetch_lines(u + at(row + g.row_x), sizeof(float));
+    for (const RowId r : {row - g.row_z, row - 1, row + 1, row + g.row_z})
+      prefetch_range(u + at(r), kRowBytes);
+    prefetch_range(u + at(row - g.row_x) + kRow - 1, sizeof(float));
+    prefetch_range(u + at(row + g.row_x), sizeof(float));
   }
   __builtin_prefetch(object.state_.role.data() + at(row));
   object.relaxation_.couplings().fetch_ahead(row);
@@ -73,9 +74,9 @@ void ShadowObject::fetch_ahead(SoftObject& object, std::size_t n, bool together)
 
 // Reads the motion of the nth row of the result, or a part of it; that part is subtracted from what is left.
 // Loads of bricks are copied.
-void ShadowObject::way_of(SoftObject& object, std::size_t n, float part, RowVector& ways) noexcept {
-  const RowId row = found_[taking_].row(n);
-  float* way = found_[taking_].values(n);
+void ShadowObject::take_delta(SoftObject& object, std::size_t n, float part, RowVector& ways) noexcept {
+  const RowId row = results_[applying_].row(n);
+  float* way = results_[applying_].values(n);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     for (std::size_t i = 0; i < kRow; ++i) {
       ways[axis][i] = part * way[axis * kRow + i];
@@ -90,17 +91,17 @@ void ShadowObject::way_of(SoftObject& object, std::size_t n, float part, RowVect
 }
 
 // True if free voxels did not follow; what is left of their motion is in the result then.
-bool ShadowObject::take_row(SoftObject& object, std::size_t n, float part) noexcept {
+bool ShadowObject::apply_row(SoftObject& object, std::size_t n, float part) noexcept {
   Multigrid& to = object.relaxation_.multigrid();
-  const RowId row = found_[taking_].row(n);
-  float* way = found_[taking_].values(n);
+  const RowId row = results_[applying_].row(n);
+  float* way = results_[applying_].values(n);
   RowVector ways, wanted;
-  way_of(object, n, part, ways);
+  take_delta(object, n, part, ways);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const float* there = object.state_.u[axis].data() + at(row);
     for (std::size_t i = 0; i < kRow; ++i) wanted[axis][i] = there[i] + ways[axis][i];
   }
-  to.add(row, ways, object.state_, object.obstacle_view());
+  to.add_motion(row, ways, object.state_, object.obstacle_view());
   object.note_moved(row);
   unsigned others = 0;  // all are counted: a search for the first took longer
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -109,7 +110,7 @@ bool ShadowObject::take_row(SoftObject& object, std::size_t n, float part) noexc
   }
   if (others == 0) return false;
   to.log().note(0, row);
-  if (!in_turns_) return false;
+  if (!retries_rows_) return false;
   float most = 0.0F;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const float* there = object.state_.u[axis].data() + at(row);
@@ -126,32 +127,32 @@ bool ShadowObject::take_row(SoftObject& object, std::size_t n, float part) noexc
 // Applies rows first … last − 1 together: each goes as far as its links to the others' new places allow. Row
 // by row, voxels that active limits tie together would not move. Without active limits rows do not obstruct
 // one another, and one by one takes half the time.
-void ShadowObject::take_limited_correction(SoftObject& object, std::size_t first, std::size_t last,
-                                           float part) noexcept {
+void ShadowObject::apply_together(SoftObject& object, std::size_t first, std::size_t last,
+                                  float part) noexcept {
   Multigrid& to = object.relaxation_.multigrid();
   const bool whole = part == 1.0F;
   RowVector left;
   for (std::size_t n = first; n < last; ++n) {
     fetch_ahead(object, n + kAhead, true);
-    const RowId row = found_[taking_].row(n);
-    if (!to.can_join(row, object.state_)) continue;
-    to.join(row, object.state_, [&](RowVector& ways) { way_of(object, n, part, ways); });
+    const RowId row = results_[applying_].row(n);
+    if (!to.can_batch(row, object.state_)) continue;
+    to.batch(row, object.state_, [&](RowVector& ways) { take_delta(object, n, part, ways); });
   }
-  to.add_joined(object.state_);
+  to.move_batch(object.state_);
   for (std::size_t n = first; n < last; ++n) {
-    const RowId row = found_[taking_].row(n);
+    const RowId row = results_[applying_].row(n);
     // A part is rounded differently from what the shadow knows.
     if (!whole) to.log().note(0, row);
     bool gone = false;
-    if (!to.joined(row, object.state_, left, gone)) {
-      if (take_row(object, n, part) && whole) retry_.put(n);
+    if (!to.batched(row, object.state_, left, gone)) {
+      if (apply_row(object, n, part) && whole) retry_.put(n);
       continue;
     }
     object.note_moved(row);
     if (gone) continue;
     to.log().note(0, row);
-    if (!in_turns_ || !whole) continue;
-    float* way = found_[taking_].values(n);
+    if (!retries_rows_ || !whole) continue;
+    float* way = results_[applying_].values(n);
     float most = 0.0F;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       for (std::size_t i = 0; i < kRow; ++i) {
@@ -161,62 +162,62 @@ void ShadowObject::take_limited_correction(SoftObject& object, std::size_t first
     }
     if (most > kFollows * static_cast<float>(lattice_.min_spacing_m())) retry_.put(n);
   }
-  to.forget_joined();
+  to.clear_batch();
 }
 
-void ShadowObject::take(SoftObject& object, int parts) noexcept {
-  taking_ = 1 - taking_;
-  take_parts(object);
+void ShadowObject::apply_near(SoftObject& object, int parts) noexcept {
+  applying_ = 1 - applying_;
+  apply_block_moves(object);
   retry_.clear();
-  in_turns_ = found_far_;
-  together_ = found_far_ || found_limited_;
-  drained_ = near_count_;
+  retries_rows_ = large_motion_;
+  together_ = large_motion_ || at_limits_;
+  rows_applied_ = near_count_;
   parts_left_ = parts;
   // Loads of bricks are not split, so their motion is not.
-  take_part(object, parts <= 1 || in_turns_ || lattice_.has_bricks());
+  apply_part(object, parts <= 1 || retries_rows_ || lattice_.has_bricks());
 }
 
 // While parts are left, the same fraction of the submitted residual stays frozen. Both ends of the motion are
 // at rest, and so is all between them as far as forces are linear.
-void ShadowObject::take_part(SoftObject& object, bool last) noexcept {
+void ShadowObject::apply_part(SoftObject& object, bool last) noexcept {
   const int left = std::max(parts_left_, 1);
   const bool whole = last || left == 1;
   parts_left_ = whole ? 0 : left - 1;
   const float part = whole ? 1.0F : 1.0F / static_cast<float>(left);
   if (whole) {
-    object.relaxation_.take_over(residual_N_);
+    object.relaxation_.resume(residual_N_);
   } else {
-    object.keep_away(static_cast<float>(left - 1) / static_cast<float>(left));
+    object.keep_frozen_residual(static_cast<float>(left - 1) / static_cast<float>(left));
   }
   if (together_) {
-    take_limited_correction(object, 0, near_count_, part);
+    apply_together(object, 0, near_count_, part);
   } else {
     for (std::size_t n = 0; n < near_count_; ++n) {
       fetch_ahead(object, n + kAhead, false);
       // A part is rounded differently from what the shadow knows.
-      if (left > 1) object.relaxation_.multigrid().log().note(0, found_[taking_].row(n));
-      if (take_row(object, n, part) && whole) retry_.put(n);
+      if (left > 1) object.relaxation_.multigrid().log().note(0, results_[applying_].row(n));
+      if (apply_row(object, n, part) && whole) retry_.put(n);
     }
   }
   if (!whole) return;
   while (retry_.count() > 0 && retry_.turn() < kTurnsAtOnce)
-    retry_.take(kTurns, [&](std::size_t n) { return take_row(object, n); });
-  if (!at_rest_ || !drained()) object.relaxation_.wake();
+    retry_.retry(kTurns, [&](std::size_t n) { return apply_row(object, n); });
+  if (!at_rest_ || !all_applied()) object.relaxation_.wake();
 }
 
-void ShadowObject::drain(SoftObject& object, std::size_t rows) noexcept {
-  if (in_turns_) {
-    const std::size_t count = std::min(rows, found_[taking_].count() - drained_);
-    if (count > 0) take_limited_correction(object, drained_, drained_ + count, 1.0F);
-    drained_ += count;
+void ShadowObject::apply_far(SoftObject& object, std::size_t rows) noexcept {
+  if (retries_rows_) {
+    const std::size_t count = std::min(rows, results_[applying_].count() - rows_applied_);
+    if (count > 0) apply_together(object, rows_applied_, rows_applied_ + count, 1.0F);
+    rows_applied_ += count;
     rows -= count;
   }
-  for (; rows > 0 && drained_ < found_[taking_].count(); --rows, ++drained_) {
-    fetch_ahead(object, drained_ + kAhead, false);
-    if (take_row(object, drained_)) retry_.put(drained_);
+  for (; rows > 0 && rows_applied_ < results_[applying_].count(); --rows, ++rows_applied_) {
+    fetch_ahead(object, rows_applied_ + kAhead, false);
+    if (apply_row(object, rows_applied_)) retry_.put(rows_applied_);
   }
   for (; rows > 0 && retry_.count() > 0; --rows)
-    retry_.take(kTurns, [&](std::size_t n) { return take_row(object, n); });
+    retry_.retry(kTurns, [&](std::size_t n) { return apply_row(object, n); });
 }
 
 }  // namespace voxel

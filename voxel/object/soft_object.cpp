@@ -26,13 +26,13 @@ SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice)
       state_(*lattice_),
       chain_(*lattice_),
       relaxation_(*lattice_),
-      pair_held_(lattice_->surface().size()),
+      pair_claims_(lattice_->surface().size()),
       pair_load_(lattice_->surface().size()),
-      hanging_entry_(lattice_->surface().size()),
+      pair_entry_(lattice_->surface().size()),
       limit_reactions_(*lattice_),
       limit_followers_(*lattice_, kMaxTouched),
-      carried_mark_(lattice_->size()),
-      carried_index_(lattice_->size()) {
+      gathered_mark_(lattice_->size()),
+      gathered_index_(lattice_->size()) {
   const auto surface = lattice_->surface();
   touches_.reserve(kMaxTouched);
   pressed_last_.reserve(kMaxTouched);
@@ -41,13 +41,13 @@ SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice)
   touched_numbers_.reserve(kMaxTouched);
   sources_.reserve(surface.size());
   moves_.reserve(surface.size());
-  held_voxels_.reserve(surface.size());
-  all_held_.reserve(surface.size() + kMaxTouched);
-  pair_roots_.reserve(kMaxTouched);
-  hanging_on_pairs_.reserve(kMaxTouched);
-  roots_.reserve(kMaxTouched);
-  carried_.reserve(kMaxCarried + kMaxTouched);
-  hanging_.reserve(kMaxCarried + kMaxTouched);
+  claimed_voxels_.reserve(surface.size());
+  held_voxels_.reserve(surface.size() + kMaxTouched);
+  pair_sources_.reserve(kMaxTouched);
+  pair_dependents_.reserve(kMaxTouched);
+  limit_sources_.reserve(kMaxTouched);
+  gathered_.reserve(kMaxGathered + kMaxTouched);
+  dependents_.reserve(kMaxGathered + kMaxTouched);
   if (lattice_->block_count() > 0) {
     block_bounds_.reserve(2 * kMaxTouched);
     bound_touch_.reserve(kMaxTouched);
@@ -55,7 +55,7 @@ SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice)
   }
   if (lattice_->voxel_count() < kPreparedWhole) {
     state_.populate(relaxation_.couplings().rows_in_use());
-    pair_held_.populate();
+    pair_claims_.populate();
     chain_.prepare_all();
     relaxation_.prepare_all();
   }
@@ -69,9 +69,9 @@ std::unique_ptr<SoftObject> SoftObject::copy() const {
   if (!obstacles_.empty()) result->reserve_obstacles();
   result->obstacles_ = obstacles_;
   result->moving_obstacles_ = moving_obstacles_;
-  result->pair_held_ = pair_held_;
+  result->pair_claims_ = pair_claims_;
   result->pair_load_.copy_from(pair_load_);
-  for (const VoxelId v : held_voxels_) result->held_voxels_.push_back(v);
+  for (const VoxelId v : claimed_voxels_) result->claimed_voxels_.push_back(v);
   for (const Touch& t : touches_) result->touches_.push_back(t);
   result->touched_voxels_.assign(touched_voxels_.begin(), touched_voxels_.end());
   result->touched_numbers_.assign(touched_numbers_.begin(), touched_numbers_.end());
@@ -90,8 +90,7 @@ std::unique_ptr<SoftObject> SoftObject::copy() const {
     result->nearest_m_ = nearest_m_;
     result->grid_cycles_ = grid_cycles_;
   }
-  if (relaxation_.left_to_another())
-    result->relaxation_.renew_coarse(result->state_, result->obstacle_view());
+  if (relaxation_.left_to_shadow()) result->relaxation_.renew_coarse(result->state_, result->obstacle_view());
   return result;
 }
 
@@ -132,7 +131,7 @@ void SoftObject::touch(std::span<const VoxelId> near) noexcept {
   cycles_since_touch_ = 0;
   if (near.empty()) relaxation_.end_contact();
   if (cold_ticks_ > 0) --cold_ticks_;
-  rests_ = std::exchange(asked_to_rest_, false);
+  skips_cycle_ = std::exchange(skip_requested_, false);
   contact_work_ = 0;
   split_cycle_ = false;
   if (near.empty()) pressed_last_.clear();
@@ -140,8 +139,8 @@ void SoftObject::touch(std::span<const VoxelId> near) noexcept {
   touched_before_.clear();
   for (const Touch& t : touches_) {
     if (!t.pressed) continue;
-    carried_mark_[t.v] = 1;
-    carried_index_[t.v] = static_cast<std::uint32_t>(touched_before_.size());
+    gathered_mark_[t.v] = 1;
+    gathered_index_[t.v] = static_cast<std::uint32_t>(touched_before_.size());
     touched_before_.push_back(t);
     ++pressed;
   }
@@ -153,16 +152,16 @@ void SoftObject::touch(std::span<const VoxelId> near) noexcept {
   touches_.clear();
   for (const VoxelId v : near) {
     if (touches_.size() == kMaxTouched) break;
-    const bool kept = carried_mark_[v] != 0;
+    const bool kept = gathered_mark_[v] != 0;
     if (kept) --pressed;
     touches_.push_back({v, lattice_->surface_number(v), kept, lattice_->rest(v)});
-    touches_.back().part = lattice_->part(v);
+    touches_.back().block = lattice_->block(v);
     if (!kept) continue;
-    const Touch& before = touched_before_[carried_index_[v]];
+    const Touch& before = touched_before_[gathered_index_[v]];
     touches_.back().normal = before.normal;
-    touches_.back().left = before.left;
+    touches_.back().frozen_motion = before.frozen_motion;
   }
-  for (const VoxelId v : touched_voxels_) carried_mark_[v] = 0;
+  for (const VoxelId v : touched_voxels_) gathered_mark_[v] = 0;
   touched_voxels_.clear();
   touched_numbers_.clear();
   for (const Touch& t : touches_) {
@@ -174,13 +173,13 @@ void SoftObject::touch(std::span<const VoxelId> near) noexcept {
 }
 
 Displacement::Role SoftObject::resting_role(VoxelId v) const noexcept {
-  if (held_voxels_.empty() && obstacles_.empty()) return Displacement::free;
+  if (claimed_voxels_.empty() && obstacles_.empty()) return Displacement::free;
   return resting_role_at(lattice_->surface_number(v));
 }
 
 Displacement::Role SoftObject::resting_role_at(std::uint32_t surface) const noexcept {
-  if (held_voxels_.empty() && obstacles_.empty()) return Displacement::free;
-  if (pair_held_[surface] != 0) return Displacement::held;
+  if (claimed_voxels_.empty() && obstacles_.empty()) return Displacement::free;
+  if (pair_claims_[surface] != 0) return Displacement::held;
   return obstacles_.empty() || obstacles_[surface].normal == glm::vec3(0.0F) ? Displacement::free
                                                                              : Displacement::obstacle;
 }

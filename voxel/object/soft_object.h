@@ -49,12 +49,12 @@ struct Reaction {
 };
 
 // Load of one voxel that something else than the tool presses: a rigid surface, or another soft object.
-struct HeldLoad {
+struct ContactLoad {
   glm::dvec3 force_N{0.0};            // of its links and of its dependents
   glm::dvec3 stiffness_N_per_m{0.0};  // per axis, of the voxel and its dependents, all others fixed
-  bool tight = false;                 // a link at its limit carries load between it and another voxel
-  bool balanced = false;   // the multipliers of limits and obstacles around it are known (AdmmRegion) …
-  double pressed_N = 0.0;  // … and its obstacle presses it with this force along the normal
+  bool at_limit = false;              // a link at its limit carries load between it and another voxel
+  bool has_multipliers = false;  // the multipliers of limits and obstacles around it are known (AdmmRegion) …
+  double pressed_N = 0.0;        // … and its obstacle presses it with this force along the normal
 };
 
 // The tool's centre q must satisfy normal · q >= offset (body frame).
@@ -117,22 +117,22 @@ class SoftObject {
   // Moves every touched voxel out of the tool, and the chain follows. True if any voxel overlapped the tool.
   bool push_out(const ToolInBody& tool) noexcept;
   void relax_near(const ToolInBody& tool, int sweeps) noexcept;
-  // Since touch(): was there a cycle around a large contact patch, or a part of one? work_left() is the
-  // counted work (see Relaxation) that this tick has left.
+  // Has a cycle around a large contact patch, or part of such a cycle, run since touch()?
   [[nodiscard]] bool large_patch_cycle() const { return split_cycle_; }
   // Share (0 to 1) of the counted work that a tick may spend on its contact under asynchronous relaxation;
   // less than 1 for a slow machine. Later ticks do what remains.
   void set_work_share(double share) noexcept {
     work_share_ = share;
-    relaxation_.set_narrow_share(share);
+    relaxation_.set_small_patch_share(share);
   }
   [[nodiscard]] double work_share() const { return work_share_; }
+  // Counted work (see Relaxation) that remains for this tick.
   [[nodiscard]] std::size_t work_left() const noexcept;
   // Does the tool press a large patch and hardly move? Slip of single voxels and results that are still to
   // come do not count as motion.
-  [[nodiscard]] bool held_still() const noexcept;
+  [[nodiscard]] bool contact_is_still() const noexcept;
   // In the next tick no contact cycle begins or continues while the tool presses the object.
-  void ask_to_rest() noexcept { asked_to_rest_ = true; }
+  void skip_next_cycle() noexcept { skip_requested_ = true; }
   // Does a part of the work of the next exchange with the ShadowObject one tick ahead. False if too little of
   // that work is due to be worth a tick.
   bool prepare_exchange() noexcept;
@@ -141,7 +141,7 @@ class SoftObject {
   // normal.
   void follow(const glm::dvec3& delta) noexcept;
   // At the start of a tick: records how deep each touched voxel is in the tool.
-  void note_depths(const ToolInBody& tool) noexcept;
+  void record_depths(const ToolInBody& tool) noexcept;
   // Half-spaces that the tool may not enter, because the chain kept voxels from leaving it. A voxel that does
   // not move may stop the tool but must not push it: the tool may stay as deep as it was when the tick began.
   // A voxel that was beside a punch then bounds the punch sideways. Returns the number of bounds written.
@@ -167,11 +167,12 @@ class SoftObject {
   // Loads of voxels that obstacles press; `held` lists each once, in the order of `loads`. The first
   // `pressed` of them (kMaxTouched at most) are pressed; the others are near, and dependents of the first do
   // not count as theirs.
-  void load_held(std::span<const VoxelId> held, std::size_t pressed, std::span<HeldLoad> loads) noexcept;
+  void contact_loads(std::span<const VoxelId> held, std::size_t pressed,
+                     std::span<ContactLoad> loads) noexcept;
   // Under asynchronous relaxation: if links at voxels pressed by fixed obstacles are at their limits, relaxes
   // these voxels and their neighbourhood together (AdmmRegion). Results of the shadow are applied row by row
   // and cannot move them.
-  void relax_held(std::span<const VoxelId> pressed) noexcept;
+  void relax_at_obstacles(std::span<const VoxelId> pressed) noexcept;
   // The obstacle of surface voxel number s is gone: the voxel is relaxed again.
   void mark_dirty(std::size_t surface_number) noexcept;
   // Rows that the chain or a result of the shadow moved since forget_moved_rows(), each once, the first
@@ -181,7 +182,7 @@ class SoftObject {
   void forget_moved_rows() noexcept;
   // Claims a voxel that another soft object presses: its role is `held`, and only the caller moves it. Calls
   // nest: it is free after as many release() calls. See facet_contact.h.
-  void hold(VoxelId v) noexcept;
+  void claim(VoxelId v) noexcept;
   void release(VoxelId v) noexcept;
   // Force of other soft objects on a surface voxel (body frame, N). If the chain is tight down to that voxel,
   // the tool feels this force.
@@ -196,20 +197,20 @@ class SoftObject {
   }
   // Finds the dependents of the voxels that pairs press (kMaxTouched of them at most); they stay as found
   // until they are forgotten.
-  void find_hanging_on_pairs() noexcept;
-  void forget_hanging_on_pairs() noexcept;
+  void find_pair_dependents() noexcept;
+  void forget_pair_dependents() noexcept;
   // If there are dependents, the tool presses nothing, and relaxation is asynchronous: one cycle around these
   // voxels, or a part of one for a large patch.
   void relax_near_pairs() noexcept;
   // Load and stiffness of one such voxel's dependents, without its own links; zero if it has none.
-  [[nodiscard]] HeldLoad hanging_on_pair(std::uint32_t surface_number) const noexcept {
-    if (hanging_on_pairs_.empty()) return {};
-    const std::uint32_t entry = hanging_entry_[surface_number];
-    return entry == 0 ? HeldLoad{} : hanging_on_pairs_[entry - 1U];
+  [[nodiscard]] ContactLoad dependents_of_pair(std::uint32_t surface_number) const noexcept {
+    if (pair_dependents_.empty()) return {};
+    const std::uint32_t entry = pair_entry_[surface_number];
+    return entry == 0 ? ContactLoad{} : pair_dependents_[entry - 1U];
   }
   // For the pair solver: the displacement at which the links alone are in equilibrium, and the compliance per
   // axis (m/N); both 0 at an anchor.
-  [[nodiscard]] glm::dvec3 free_displacement(VoxelId v) noexcept;
+  [[nodiscard]] glm::dvec3 unconstrained_minimum(VoxelId v) noexcept;
   [[nodiscard]] glm::dvec3 compliance(VoxelId v) noexcept;
   // Moves a voxel as far as its links allow.
   void move(VoxelId v, const glm::dvec3& displacement) noexcept;
@@ -260,26 +261,26 @@ class SoftObject {
     glm::dvec3 normal{0.0};  // from tool to voxel, unit
     glm::dvec3 load{
         0.0};  // of its links; with other soft objects, blocks or obstacles also of its dependents (N)
-    double noted = 0.0;      // depth in the tool at the start of the tick (m)
-    bool beside = false;     // it was beside a punch at the start of the tick
-    bool tight = false;      // a link at its limit carries load between it and another voxel
-    glm::dvec3 left{0.0};    // the motion that it still had to make when the residual was frozen (m)
-    std::uint16_t part = 0;  // number of its rigid block plus one; 0: none
+    double start_depth = 0.0;       // depth in the tool at the start of the tick (m)
+    bool beside_punch = false;      // it was beside a punch at the start of the tick
+    bool at_limit = false;          // a link at its limit carries load between it and another voxel
+    glm::dvec3 frozen_motion{0.0};  // the motion that it still had to make when the residual was frozen (m)
+    std::uint16_t block = 0;        // number of its rigid block plus one; 0: none
   };
   struct Gap {
     double distance = 0.0;  // from the voxel to the tool's surface along normal; negative: overlap
     glm::dvec3 normal{0.0};
   };
-  static constexpr std::size_t kMaxCarried = 20'000;  // pressed voxels and their dependents
-  static constexpr double kDirtyMotion = 1e-5;        // of the spacing: a smaller motion wakes nothing
+  static constexpr std::size_t kMaxGathered = 20'000;  // pressed voxels and their dependents
+  static constexpr double kDirtyMotion = 1e-5;         // of the spacing: a smaller motion wakes nothing
   // Of the voxel radius: less overlap is left to the next push_out().
   static constexpr double kGiveWay = 0.01;
-  struct Carried {
+  struct Gathered {
     VoxelId v;
     std::uint32_t touch;  // touch (or index of a load) to which its load is added
   };
-  struct Hanging {       // a dependent, by the link through which it was first reached
-    std::uint32_t from;  // index into carried_
+  struct Dependent {     // a dependent, by the link through which it was first reached
+    std::uint32_t from;  // index into gathered_
     bool up, down;       // the limit that the link is at pushes it up, down
     double load;         // of the voxel and of its own dependents (N)
   };
@@ -300,12 +301,12 @@ class SoftObject {
   // Role of a voxel that the tool does not press; by id, and by surface number.
   [[nodiscard]] Displacement::Role resting_role(VoxelId v) const noexcept;
   [[nodiscard]] Displacement::Role resting_role_at(std::uint32_t surface) const noexcept;
-  [[nodiscard]] bool pair_held(const Touch& t) const {
-    return !held_voxels_.empty() && pair_held_[t.surface] != 0;
+  [[nodiscard]] bool is_claimed(const Touch& t) const {
+    return !claimed_voxels_.empty() && pair_claims_[t.surface] != 0;
   }
   void set_touch_roles() noexcept;
-  void assign_residual() noexcept;      // freezes the residual near the contact: the shadow owns it now …
-  void keep_away(float part) noexcept;  // … and this part of it still
+  void assign_residual() noexcept;  // freezes the residual near the contact: the shadow owns it now …
+  void keep_frozen_residual(float part) noexcept;  // … and this part of it still
   std::size_t list_held() noexcept;
   [[nodiscard]] bool any_pressed() const noexcept;
   [[nodiscard]] bool cycle_due() const noexcept;
@@ -315,37 +316,38 @@ class SoftObject {
   // Displacements from rest. clamp_depth_in_tool() shortens the way to `place` so that the voxel gets no
   // deeper into the tool than it is now. project_on_tool_within_limits() finds the least energy on the tool
   // within the links' limits. project_voxel() is the constrained projection of one touched voxel.
-  [[nodiscard]] glm::dvec3 no_deeper_in(const ToolInBody& tool, const glm::dvec3& rest, const glm::dvec3& now,
-                                        const glm::dvec3& place) const noexcept;
+  [[nodiscard]] glm::dvec3 clamp_depth_in_tool(const ToolInBody& tool, const glm::dvec3& rest,
+                                               const glm::dvec3& now, const glm::dvec3& place) const noexcept;
   [[nodiscard]] glm::dvec3 project_on_tool_within_limits(const ToolInBody& tool, const VoxelLinks& links,
                                                          const glm::dvec3& wished,
                                                          Touch& touch) const noexcept;
-  [[nodiscard]] glm::dvec3 place_of(const ToolInBody& tool, const VoxelLinks& links, Touch& touch) noexcept;
+  [[nodiscard]] glm::dvec3 project_voxel(const ToolInBody& tool, const VoxelLinks& links,
+                                         Touch& touch) noexcept;
   void relax_touch(const ToolInBody& tool, Touch& touch) noexcept;
-  // ---- touched voxels of parts without slack, which move as one (rigid_block_contact.cpp) ----
+  // ---- touched voxels of rigid blocks, which move as one (rigid_block_contact.cpp) ----
   template <class Visit>
   void for_touched_blocks(const Visit& visit) noexcept;
-  void bound_block(const ToolInBody& tool, std::uint16_t part, double within_m) noexcept;
+  void bound_block(const ToolInBody& tool, std::uint16_t block, double within_m) noexcept;
   void push_blocks_out(const ToolInBody& tool) noexcept;
   void follow_blocks(const glm::dvec3& delta) noexcept;
   void relax_blocks(const ToolInBody& tool) noexcept;
   void add_reaction_of_blocks(const ToolInBody& tool, Reaction& reaction) noexcept;
-  [[nodiscard]] glm::dvec3 dependents_of_block(std::size_t part,
+  [[nodiscard]] glm::dvec3 dependents_of_block(std::size_t block,
                                                const Multigrid::AdmissibleInterval& room) noexcept;
   void gather_load_with_blocks(int axis) noexcept;
-  [[nodiscard]] bool any_pressed(std::uint16_t part) const noexcept;
+  [[nodiscard]] bool any_pressed(std::uint16_t block) const noexcept;
   void add_stiffness(int axis, glm::dmat3& stiffness) noexcept;
   [[nodiscard]] glm::dvec3 load_on(VoxelId v) noexcept;
   [[nodiscard]] double load_on(VoxelId v, int axis) noexcept;
   void move_followers() noexcept;
-  void carry(VoxelId v, std::uint32_t touch) noexcept;
+  void gather(VoxelId v, std::uint32_t touch) noexcept;
   [[nodiscard]] glm::dvec3 gather_load(glm::dmat3& stiffness) noexcept;
   void add_stiffness_of_touches(int axis, const glm::dvec3& way, glm::dmat3& stiffness) noexcept;
   void gather_load_with_pairs(int axis) noexcept;
-  void add_hanging(int axis, std::span<const VoxelId> pressed, std::span<HeldLoad> loads) noexcept;
-  void add_stiffness(int axis, std::span<HeldLoad> loads) noexcept;
-  void hand_on(int axis) noexcept;
-  void let_go_of_carried() noexcept;
+  void add_dependents(int axis, std::span<const VoxelId> pressed, std::span<ContactLoad> loads) noexcept;
+  void add_stiffness(int axis, std::span<ContactLoad> loads) noexcept;
+  void reassign_multiplier(int axis) noexcept;
+  void clear_gathered() noexcept;
   [[nodiscard]] ObstacleView obstacle_view() const { return {obstacles_, lattice_.get(), moving_obstacles_}; }
   // ---- on the composite grid (soft_object_composite.cpp) ----
   [[nodiscard]] glm::dvec3 displacement_on_grid(VoxelId v) const noexcept;
@@ -376,13 +378,13 @@ class SoftObject {
   Displacement state_;
   ChainMail chain_;
   Relaxation relaxation_;
-  LazyArray<std::uint16_t> pair_held_;      // [surface number] number of pairs that claim it
-  LazyArray<glm::vec3> pair_load_;          // [surface number] force of other soft objects (N)
-  std::vector<VoxelId> pair_roots_;         // voxels that pairs press, hardest first
-  std::vector<HeldLoad> hanging_on_pairs_;  // [as pair_sources_] their dependents; empty: none
-  LazyArray<std::uint32_t> hanging_entry_;  // [surface number] 1 + index into pair_sources_; 0: none
-  std::vector<Obstacle> obstacles_;         // [surface number]; empty: there are no obstacles
-  std::size_t moving_obstacles_ = 0;        // number of obstacles on moving bodies
+  LazyArray<std::uint16_t> pair_claims_;      // [surface number] number of pairs that claim it
+  LazyArray<glm::vec3> pair_load_;            // [surface number] force of other soft objects (N)
+  std::vector<VoxelId> pair_sources_;         // voxels that pairs press, hardest first
+  std::vector<ContactLoad> pair_dependents_;  // [as pair_sources_] their dependents; empty: none
+  LazyArray<std::uint32_t> pair_entry_;       // [surface number] 1 + index into pair_sources_; 0: none
+  std::vector<Obstacle> obstacles_;           // [surface number]; empty: there are no obstacles
+  std::size_t moving_obstacles_ = 0;          // number of obstacles on moving bodies
   std::vector<RowId> moved_rows_;
   LazyArray<std::uint8_t> row_moved_;             // 1: in moved_rows_; empty: no obstacles
   std::vector<std::uint32_t> changed_obstacles_;  // surface numbers, since the last submission to the shadow
@@ -393,8 +395,8 @@ class SoftObject {
   ToolInBody tool_;                    // of the last relax_near()
   std::vector<VoxelId> touched_voxels_;
   std::vector<std::uint32_t> touched_numbers_;  // [as touched_voxels_] surface number
-  LazyVector<VoxelId> held_voxels_;             // claimed by pairs
-  LazyVector<VoxelId> all_held_;                // pressed by the tool, then claimed by pairs
+  LazyVector<VoxelId> claimed_voxels_;          // claimed by pairs
+  LazyVector<VoxelId> held_voxels_;             // pressed by the tool, then claimed by pairs
   LazyVector<VoxelId> sources_;
   LazyVector<glm::vec3> moves_;
   std::vector<BlockBound> block_bounds_;    // of one rigid block: first of its touches, then others
@@ -402,22 +404,22 @@ class SoftObject {
   std::vector<std::uint8_t> block_seen_;    // [block] 1: for_touched_blocks() has visited it
   LimitReactions limit_reactions_;
   LimitFollowers limit_followers_;
-  std::vector<VoxelId> roots_;            // sources for these two: pressed voxels that are not anchored
-  LazyVector<Carried> carried_;           // pressed voxels first, then their dependents
-  LazyVector<Hanging> hanging_;           // [as carried_]
-  LazyArray<std::uint8_t> carried_mark_;  // [v] 1: in gathered_ (within touch(): was pressed; between drag()
-                                          // and settle_dragged(): was dragged)
-  LazyArray<std::uint32_t> carried_index_;  // [v] touch or load of that voxel; only if marked
-  double unrelaxed_m_ = 0.0;                // motion of pressed voxels since the last wake of the background
-  double unsettled_m_ = 0.0;                // estimated distance of the contact from equilibrium
-  std::size_t contact_work_ = 0;            // counted work of contact cycles since touch() …
-  int cycles_since_touch_ = 0;              // … and their number
+  std::vector<VoxelId> limit_sources_;     // sources for these two: pressed voxels that are not anchored
+  LazyVector<Gathered> gathered_;          // pressed voxels first, then their dependents
+  LazyVector<Dependent> dependents_;       // [as gathered_]
+  LazyArray<std::uint8_t> gathered_mark_;  // [v] 1: in gathered_ (within touch(): was pressed; between drag()
+                                           // and settle_dragged(): was dragged)
+  LazyArray<std::uint32_t> gathered_index_;  // [v] touch or load of that voxel; only if marked
+  double unrelaxed_m_ = 0.0;                 // motion of pressed voxels since the last wake of the background
+  double unsettled_m_ = 0.0;                 // estimated distance of the contact from equilibrium
+  std::size_t contact_work_ = 0;             // counted work of contact cycles since touch() …
+  int cycles_since_touch_ = 0;               // … and their number
   int cold_ticks_ = 0;  // ticks for which the contact's neighbourhood is not in the caches yet
   double work_share_ = 1.0;
   bool split_cycle_ = false;  // a cycle around a large patch ran, or a part of one
-  bool asked_to_rest_ = false;
-  bool rests_ = false;     // no contact cycle begins in this tick unless the tool jumps
-  bool dragging_ = false;  // sources_ lists dragged voxels, moves_ where they were
+  bool skip_requested_ = false;
+  bool skips_cycle_ = false;  // no contact cycle begins in this tick unless the tool jumps
+  bool dragging_ = false;     // sources_ lists dragged voxels, moves_ where they were
   bool moved_ever_ = false;
   bool anchors_pull_ = false;   // since push_out() a wave of the chain reached anchors that stopped it
   bool beside_bodies_ = false;  // moving bodies

@@ -45,7 +45,7 @@ std::string validate_row(const Lattice& lattice, const Displacement& state, RowI
       return where(lattice, v) + " has a role that there is not";
     if (role != Displacement::free && !lattice.filled(v))
       return where(lattice, v) + " has a role and is empty";
-    if (Displacement::in_block(role) != (lattice.part(v) != 0))
+    if (Displacement::in_block(role) != (lattice.block(v) != 0))
       return where(lattice, v) + " moves as one with a part it is not in, or not with that it is in";
     if (role >= Displacement::obstacle && role != Displacement::joined &&
         lattice.surface_number(v) == Lattice::kNoSurface)

@@ -44,7 +44,7 @@ double AdmmRegion::share() const noexcept {
 }
 
 void AdmmRegion::forget(Multigrid& multigrid, VoxelId v) noexcept {
-  multigrid.tie(v, glm::vec3(0.0F));
+  multigrid.set_limit_load(v, glm::vec3(0.0F));
   const auto forget_of = [v](LazyArray<float>& of_axis) {
     if (of_axis[v] != 0.0F) of_axis[v] = 0.0F;  // memory that was only read is not written
   };
@@ -59,10 +59,10 @@ void AdmmRegion::forget(Multigrid& multigrid) noexcept {
   on_body_.clear();
   for (const VoxelId v : known_) forget(multigrid, v);
   known_.clear();
-  found_ = false;
+  at_limits_ = false;
 }
 
-void AdmmRegion::pass(Multigrid& multigrid) noexcept {
+void AdmmRegion::skip(Multigrid& multigrid) noexcept {
   if (known_.empty()) return;
   ++calls_;
   std::size_t kept = 0;
@@ -83,7 +83,7 @@ void AdmmRegion::keep_multipliers(Multigrid& multigrid) noexcept {
       if (known_.size() == known_.capacity()) continue;
       known_.push_back(m.v);
     }
-    asked_[m.v] = calls_ + 1;  // the number that pass() below will have
+    asked_[m.v] = calls_ + 1;  // the number that skip() below will have
     glm::vec3 pull(0.0F);
     for_links(i, [&](const Link& l, const Member&, bool up) {
       for (std::size_t axis = 0; axis < 3 && m.moves; ++axis) {
@@ -91,7 +91,7 @@ void AdmmRegion::keep_multipliers(Multigrid& multigrid) noexcept {
         pull[static_cast<int>(axis)] += up ? force : -force;
       }
     });
-    multigrid.tie(m.v, pull);
+    multigrid.set_limit_load(m.v, pull);
     const auto keep = [&](LazyArray<float>& of_axis, double value) {
       const auto is = static_cast<float>(value);
       if (of_axis[m.v] != is) of_axis[m.v] = is;
@@ -104,7 +104,7 @@ void AdmmRegion::keep_multipliers(Multigrid& multigrid) noexcept {
       if (m.moves) keep(pressed_[axis], m.outside ? m.pressed[axis] * m.hold_N_per_m : 0.0);
     }
   }
-  pass(multigrid);
+  skip(multigrid);
 }
 
 }  // namespace voxel

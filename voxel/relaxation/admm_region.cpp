@@ -18,7 +18,7 @@ constexpr int kToolSweeps = 100;              // in a round with the tool, which
 constexpr std::uint64_t kOtherWork = 5;
 constexpr double kFurther = 1.6;         // over-relaxation (Boyd et al., 3.4.3)
 constexpr double kActiveAtFirst = 1e-3;  // of the spacing: a link this near to its limit makes a region
-constexpr double kNear = 0.4;            // of the spacing: nearer to its limit than this a link may reach it
+constexpr double kNearLimit = 0.4;       // of the spacing: nearer to its limit than this a link may reach it
 // Of the spacing: limits are tightened by this while the least energy is searched, so that the result
 // violates them by little …
 constexpr double kTighter = 2e-5;
@@ -89,7 +89,7 @@ bool AdmmRegion::gather(const Multigrid& multigrid, const Displacement& state, b
     return members_.size() < kMost && lattice_.filled(v) && !lattice_.anchored(v) &&
            (!Displacement::stands(state.role[v]) || (with_tool && state.role[v] == Displacement::pressed));
   };
-  multigrid.for_limited([&](VoxelId v, int) {
+  multigrid.for_active([&](VoxelId v, int) {
     if (moves(v)) members_[add(v)].moves = true;
   });
   for (const VoxelId v : on_body_) {
@@ -151,8 +151,8 @@ void AdmmRegion::prepare_links(LevelStiffness& couplings) noexcept {
         const double is = members_[m.up[d]].from[axis] - m.from[axis],
                      left = std::min(is - l.low[axis], l.high[axis] - is) / spacing_m_,
                      beyond = static_cast<double>(beyond_[3 * axis + d][m.v]);
-        found_ = found_ || left < kActiveAtFirst;
-        if (beyond == 0.0 && left >= kNear) continue;
+        at_limits_ = at_limits_ || left < kActiveAtFirst;
+        if (beyond == 0.0 && left >= kNearLimit) continue;
         l.near = static_cast<std::uint8_t>(l.near | 1U << axis);
         l.beyond[axis] = beyond;
         l.within[axis] = std::clamp(is, l.low[axis] + tighter(l, axis), l.high[axis] - tighter(l, axis));
@@ -169,12 +169,12 @@ bool AdmmRegion::prepare(Multigrid& multigrid, const Displacement& state,
     m.from = m.found = {at.x, at.y, at.z};
   }
   prepare_links(multigrid.couplings());
-  if (!found_) return false;
+  if (!at_limits_) return false;
   for (std::size_t i = 0; i < members_.size(); ++i) {
     Member& m = members_[i];
     if (!m.moves) continue;
     const std::array<float, 3> own = lattice_.has_bricks() ? state.bricks.at(m.v) : std::array<float, 3>{};
-    const glm::dvec3 balance = multigrid.balance_of(m.v, state);
+    const glm::dvec3 balance = multigrid.frozen_load(m.v, state);
     Axes sum{};
     for_links(i, [&](const Link& l, const Member&, bool) {
       for (std::size_t axis = 0; axis < 3; ++axis)
@@ -301,14 +301,14 @@ bool AdmmRegion::allow() noexcept {
 double AdmmRegion::relax(Multigrid& multigrid, Displacement& state, const ObstacleView& obstacles,
                          std::span<const VoxelId> on_body, bool briefly) noexcept {
   looked_at_ = 0;
-  found_ = false;
+  at_limits_ = false;
   tighter_m_ = (obstacles.moving > 0 ? kTighter : kTighterAtTool) * spacing_m_;
   if (!on_body.empty()) {
     const std::span<const VoxelId> first = on_body.first(std::min(on_body.size(), kMost));
     on_body_.assign(first.begin(), first.end());
   }
   if (!gather(multigrid, state, obstacles.moving == 0)) {
-    pass(multigrid);
+    skip(multigrid);
     return 0.0;
   }
   if (!prepare(multigrid, state, obstacles)) {

@@ -6,7 +6,7 @@
 // along a body takes its dependents in other directions. Coarse levels do not help.
 //
 // The solver is the alternating direction method of multipliers (Boyd et al., Distributed Optimization and
-// Statistical Learning via ADMM, 2011, chapter 3), with a Gauss-Seidel sweep in place of the exact
+// Statistical Learning via ADMM, 2011, chapter 3), with a Gauss-Seidel sweep instead of the exact
 // minimisation. Multipliers are kept from call to call. The result is clamped to the limits, and the tissue
 // moves there as far as its energy falls.
 //
@@ -14,8 +14,8 @@
 // dependents belong to the region.
 //
 // Multipliers are the forces of links at their limits and of obstacles. The coarse levels get the first as
-// loads (Multigrid::tie), because otherwise they would pull at voxels that limits hold. A moving body feels
-// the second.
+// loads (Multigrid::set_limit_load), because otherwise they would pull at voxels that limits hold. A moving
+// body feels the second.
 #pragma once
 
 #include <array>
@@ -47,7 +47,7 @@ class AdmmRegion {
   double relax(Multigrid& multigrid, Displacement& state, const ObstacleView& obstacles,
                std::span<const VoxelId> on_body, bool briefly = false) noexcept;
   // Was any link of the region at its limit in the last relax()?
-  [[nodiscard]] bool found() const { return found_; }
+  [[nodiscard]] bool at_limits() const { return at_limits_; }
   // Force between a voxel and its obstacle after the last relax() (N).
   [[nodiscard]] double pressed_N(VoxelId v) const noexcept {
     const double x = static_cast<double>(pressed_[0][v]), y = static_cast<double>(pressed_[1][v]),
@@ -55,7 +55,7 @@ class AdmmRegion {
     return std::sqrt(x * x + y * y + z * z);
   }
   // Nothing to relax: drops multipliers that no call used for a while. forget() drops all of them.
-  void pass(Multigrid& multigrid) noexcept;
+  void skip(Multigrid& multigrid) noexcept;
   void forget(Multigrid& multigrid) noexcept;
   // Work of the last relax(), in voxel updates.
   [[nodiscard]] std::uint64_t looked_at() const { return looked_at_; }
@@ -119,7 +119,7 @@ class AdmmRegion {
   std::array<LazyArray<float>, 3> pressed_;  // [axis][v] force of the obstacle (N)
   std::uint32_t calls_ = 0;
   std::uint64_t looked_at_ = 0;
-  bool found_ = false;
+  bool at_limits_ = false;
 };
 
 // `visit(link, neighbour, up)` for the links of a member; `up`: the neighbour is the upper end.

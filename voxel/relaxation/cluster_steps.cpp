@@ -63,7 +63,7 @@ bool ClusterSteps::gather(const Multigrid& multigrid, const Displacement& state,
     const VoxelId w = cluster_[head];
     if (++looked_at_ > kMostLookedAt || lattice_.anchored(w)) return false;
     const bool in_block = state.role[w] == Displacement::joined;
-    if (in_block ? multigrid.tool_presses_block(lattice_.part(w) - 1U) : state.role[w] != Displacement::free)
+    if (in_block ? multigrid.tool_presses_block(lattice_.block(w) - 1U) : state.role[w] != Displacement::free)
       return false;
     for (int d = 0; d < 3; ++d) {
       for (const bool up : {false, true}) {
@@ -83,9 +83,9 @@ double ClusterSteps::move(Multigrid& multigrid, Displacement& state, VoxelId v, 
                           double least_N) noexcept {
   if ((mark_[v] & (2U << axis)) != 0 || looked_at_ > kMostLookedAt) return 0.0;
   LevelStiffness& couplings = multigrid.couplings();
-  const std::uint16_t part = lattice_.part(v);
+  const std::uint16_t block = lattice_.block(v);
   const double own =
-      (part != 0 ? multigrid.block_force(part - 1U, state) : link_force(couplings, state, v))[axis];
+      (block != 0 ? multigrid.block_force(block - 1U, state) : link_force(couplings, state, v))[axis];
   if (std::fabs(own) <= least_N) return 0.0;
   const bool upwards = own > 0.0;
   const bool free = gather(multigrid, state, v, axis, upwards);

@@ -62,12 +62,12 @@ void add_links(const RowStiffness& springs, const RowLimits& limits, std::size_t
 
 }  // namespace
 
-LimitFollowers::LimitFollowers(const Lattice& lattice, std::size_t most_roots)
-    : lattice_(lattice), yields_(lattice.yields()), entry_(lattice.grid().rows()) {
+LimitFollowers::LimitFollowers(const Lattice& lattice, std::size_t most_sources)
+    : lattice_(lattice), has_plasticity_(lattice.has_plasticity()), entry_(lattice.grid().rows()) {
   for (std::size_t d = 0; d < 3; ++d)
     spacing_m_[d] = static_cast<float>(lattice.spacing_m()[static_cast<int>(d)]);
   rows_.reserve(std::min(kMostRows, lattice.grid().rows()));
-  drawn_.reserve(most_roots + kMostDrawn + 6);
+  followers_.reserve(most_sources + kMaxFollowers + 6);
 }
 
 // Null: the row is empty, or too many were searched.
@@ -84,45 +84,45 @@ LimitFollowers::Row* LimitFollowers::look_at(RowId row) noexcept {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (state_->bricks.has(row))
       out.bricks[axis] = state_->bricks.load[axis].data() + static_cast<std::size_t>(row) * kRow;
-    if (relaxation_->away()) out.balance[axis] = relaxation_->multigrid().balance_of(row, axis);
+    if (relaxation_->shadow_busy()) out.frozen[axis] = relaxation_->multigrid().frozen_load(row, axis);
   }
   return &out;
 }
 
-void LimitFollowers::draw(Relaxation& relaxation, Displacement& state, std::span<const VoxelId> roots,
+void LimitFollowers::move(Relaxation& relaxation, Displacement& state, std::span<const VoxelId> sources,
                           float mark_dirty) noexcept {
   relaxation_ = &relaxation;
   state_ = &state;
   mark_dirty_ = mark_dirty;
   for (const Row& r : rows_) entry_[r.row] = 0;
   rows_.clear();
-  draw_on<0>(roots);
-  draw_on<1>(roots);
-  draw_on<2>(roots);
+  move_on<0>(sources);
+  move_on<1>(sources);
+  move_on<2>(sources);
 }
 
 template <std::size_t kAxis>
-void LimitFollowers::draw_on(std::span<const VoxelId> roots) noexcept {
+void LimitFollowers::move_on(std::span<const VoxelId> sources) noexcept {
   for (Row& r : rows_) r.closed = r.stays;
-  drawn_.clear();
-  for (const VoxelId v : roots) {
+  followers_.clear();
+  for (const VoxelId v : sources) {
     if (Row* row = look_at(v / kRow); row != nullptr) add(*row, v);
   }
-  const std::size_t most = drawn_.size() + kMostDrawn;
-  for (std::size_t head = 0; head < drawn_.size() && drawn_.size() < most; ++head) {
-    const VoxelId v = drawn_[head];
-    look_from<kAxis, 0, false>(v, lattice_.down(v, 0));
-    look_from<kAxis, 0, true>(v, lattice_.up(v, 0));
-    look_from<kAxis, 1, false>(v, lattice_.down(v, 1));
-    look_from<kAxis, 1, true>(v, lattice_.up(v, 1));
-    look_from<kAxis, 2, false>(v, lattice_.down(v, 2));
-    look_from<kAxis, 2, true>(v, lattice_.up(v, 2));
+  const std::size_t most = followers_.size() + kMaxFollowers;
+  for (std::size_t head = 0; head < followers_.size() && followers_.size() < most; ++head) {
+    const VoxelId v = followers_[head];
+    visit<kAxis, 0, false>(v, lattice_.down(v, 0));
+    visit<kAxis, 0, true>(v, lattice_.up(v, 0));
+    visit<kAxis, 1, false>(v, lattice_.down(v, 1));
+    visit<kAxis, 1, true>(v, lattice_.up(v, 1));
+    visit<kAxis, 2, false>(v, lattice_.down(v, 2));
+    visit<kAxis, 2, true>(v, lattice_.up(v, 2));
   }
 }
 
 // Visits a voxel from its neighbour below in kD (kUp), or above.
 template <std::size_t kAxis, std::size_t kD, bool kUp>
-void LimitFollowers::look_from(VoxelId from, VoxelId at) noexcept {
+void LimitFollowers::visit(VoxelId from, VoxelId at) noexcept {
   Row* row = look_at(at / kRow);
   const std::size_t lane = at % kRow;
   if (row == nullptr || (row->closed >> lane & 1U) != 0) return;
@@ -131,7 +131,7 @@ void LimitFollowers::look_from(VoxelId from, VoxelId at) noexcept {
   const float low = kUp ? b[0] : -b[1], high = kUp ? b[1] : -b[0], before = u[at];
   const auto room = [&](float now) { return std::min(now - u[from] - low, high - (now - u[from])); };
   if (room(before) > kSearched * spacing_m_[kD]) return;
-  const float place = place_of<kAxis>(*row, at);
+  const float place = local_equilibrium<kAxis>(*row, at);
   u[at] = place;
   if (!row->dirty && std::fabs(place - before) > mark_dirty_ * spacing_m_[kD]) {
     row->dirty = true;
@@ -146,12 +146,13 @@ void LimitFollowers::look_from(VoxelId from, VoxelId at) noexcept {
 
 // Local equilibrium of a voxel, all others fixed.
 template <std::size_t kAxis>
-float LimitFollowers::place_of(const Row& row, VoxelId v) const noexcept {
+float LimitFollowers::local_equilibrium(const Row& row, VoxelId v) const noexcept {
   const std::size_t lane = v % kRow;
   const float* u = state_->u[kAxis].data();
   const auto at = [&](VoxelId w) { return u[w]; };
   float pull = row.bricks[kAxis] != nullptr ? row.bricks[kAxis][lane] : 0.0F;
-  if (yields_) pull = plastic_load(lattice_, *state_, relaxation_->couplings().springs_of(v), v)[kAxis];
+  if (has_plasticity_)
+    pull = plastic_load(lattice_, *state_, relaxation_->couplings().springs_of(v), v)[kAxis];
   constexpr float kFar = std::numeric_limits<float>::max();
   std::array<float, 2> interval{-kFar, kFar};
   add_links<kAxis, 0>(row.springs, row.limits, lane, at(lattice_.up(v, 0)), at(lattice_.down(v, 0)), pull,
@@ -162,9 +163,9 @@ float LimitFollowers::place_of(const Row& row, VoxelId v) const noexcept {
                       interval);
   const float inverse = row.springs.inverse[kAxis * kRow + lane];
   auto wanted = static_cast<double>(pull * inverse);
-  if (row.balance[kAxis] != nullptr) {
+  if (row.frozen[kAxis] != nullptr) {
     const float own = row.bricks[kAxis] != nullptr ? row.bricks[kAxis][lane] : 0.0F;
-    wanted += static_cast<double>(inverse) * static_cast<double>(row.balance[kAxis][lane] - own);
+    wanted += static_cast<double>(inverse) * static_cast<double>(row.frozen[kAxis][lane] - own);
   }
   return clamp_to(interval, static_cast<float>(wanted), u[v]);
 }

@@ -23,22 +23,22 @@ namespace voxel {
 class LimitFollowers {
  public:
   // Voxels that follow on an axis, and a few more.
-  static constexpr std::size_t kMostDrawn = 2000;
+  static constexpr std::size_t kMaxFollowers = 2000;
   // Rows that are searched; voxels in further rows stay.
   static constexpr std::size_t kMostRows = 16'384;
 
   // Allocates; throws std::bad_alloc.
-  LimitFollowers(const Lattice& lattice, std::size_t most_roots);
+  LimitFollowers(const Lattice& lattice, std::size_t most_sources);
 
-  // Moves each free voxel beside one of `roots` (at most most_roots, none anchored), or beside a follower, to
-  // its local equilibrium within its limits, if the link between the two is near a limit. If that link is at
-  // a limit afterwards, the voxel is a follower, too. Rows with a motion of more than `mark_dirty` of the
-  // spacing are marked dirty. Does not allocate or throw.
-  void draw(Relaxation& relaxation, Displacement& state, std::span<const VoxelId> roots,
+  // Moves each free voxel beside one of `sources` (at most most_sources, none anchored), or beside a
+  // follower, to its local equilibrium within its limits, if the link between the two is near a limit. If
+  // that link is at a limit afterwards, the voxel is a follower, too. Rows with a motion of more than
+  // `mark_dirty` of the spacing are marked dirty. Does not allocate or throw.
+  void move(Relaxation& relaxation, Displacement& state, std::span<const VoxelId> sources,
             float mark_dirty) noexcept;
 
   [[nodiscard]] std::size_t memory_bytes() const {
-    return entry_.resident_bytes() + resident_bytes(rows_) + resident_bytes(drawn_);
+    return entry_.resident_bytes() + resident_bytes(rows_) + resident_bytes(followers_);
   }
 
  private:
@@ -46,35 +46,35 @@ class LimitFollowers {
   struct Row {
     RowId row = 0;
     std::uint32_t stays = 0;   // empty, anchored, or not free
-    std::uint32_t closed = 0;  // these, and the voxels in drawn_
+    std::uint32_t closed = 0;  // these, and the voxels in followers_
     bool noted = false, dirty = false;
     RowStiffness springs;
     RowLimits limits;
-    std::array<const float*, 3> bricks{}, balance{};  // [axis] loads (N); null: none
+    std::array<const float*, 3> bricks{}, frozen{};  // [axis] loads (N); null: none
   };
   static constexpr float kSearched = 0.1F;  // of the spacing: links that are searched
 
   [[nodiscard]] Row* look_at(RowId row) noexcept;
   void add(Row& row, VoxelId v) noexcept {
     row.closed |= 1U << v % kRow;
-    drawn_.push_back(v);
+    followers_.push_back(v);
   }
   template <std::size_t kAxis>
-  void draw_on(std::span<const VoxelId> roots) noexcept;
+  void move_on(std::span<const VoxelId> sources) noexcept;
   template <std::size_t kAxis, std::size_t kD, bool kUp>
-  void look_from(VoxelId from, VoxelId at) noexcept;
+  void visit(VoxelId from, VoxelId at) noexcept;
   template <std::size_t kAxis>
-  [[nodiscard]] float place_of(const Row& row, VoxelId v) const noexcept;
+  [[nodiscard]] float local_equilibrium(const Row& row, VoxelId v) const noexcept;
 
   const Lattice& lattice_;
   std::array<float, 3> spacing_m_{};
-  bool yields_;
-  Relaxation* relaxation_ = nullptr;  // during draw()
+  bool has_plasticity_;
+  Relaxation* relaxation_ = nullptr;  // during move()
   Displacement* state_ = nullptr;
   float mark_dirty_ = 0.0F;
   LazyArray<std::uint16_t> entry_;  // [row] 1 + index into rows_; 0: not looked at
   LazyVector<Row> rows_;
-  std::vector<VoxelId> drawn_;  // sources first
+  std::vector<VoxelId> followers_;  // sources first
 };
 
 }  // namespace voxel

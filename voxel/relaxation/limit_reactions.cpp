@@ -26,10 +26,10 @@ double sum_of(const float* lanes, std::uint32_t bits) {
 
 struct LimitReactions::Gathering {
   LevelStiffness& couplings;
-  std::span<const VoxelId> roots;  // sorted
-  const Multigrid* multigrid;      // null: there are no rigid blocks
-  std::uint16_t source_block;      // the block whose voxels are the sources, by number; 0: none
-  bool border_known = false;       // all of that block's border was visited
+  std::span<const VoxelId> sources;  // sorted
+  const Multigrid* multigrid;        // null: there are no rigid blocks
+  std::uint16_t source_block;        // the block whose voxels are the sources, by number; 0: none
+  bool border_known = false;         // all of that block's border was visited
   std::bitset<Lattice::kMaxBlocks> known;
   std::array<double, Lattice::kMaxBlocks> pull_N;  // [block] if known
 
@@ -40,7 +40,7 @@ struct LimitReactions::Gathering {
     std::uint16_t last = 0;  // most rows have one
     double pull = 0.0;
     for (VoxelId lane = 0; lane < kRow; ++lane) {
-      const std::uint16_t number = multigrid->parts().of(0, row.row * kRow + lane);
+      const std::uint16_t number = multigrid->blocks().of(0, row.row * kRow + lane);
       if (number == 0) continue;
       if (number != last) {
         last = number;
@@ -50,25 +50,25 @@ struct LimitReactions::Gathering {
       of_blocks |= bit;
       up |= pull > 0.0 ? bit : 0U;
       down |= pull < 0.0 ? bit : 0U;
-      if (number == source_block) row.roots |= bit;
+      if (number == source_block) row.sources |= bit;
     }
     row.links.pulled_up = (row.links.pulled_up & ~of_blocks) | up;
     row.links.pulled_down = (row.links.pulled_down & ~of_blocks) | down;
   }
 
-  double pull_of(std::size_t part, const Displacement& state, int axis) {
-    if (!known[part]) {
-      known.set(part);
-      pull_N[part] = multigrid->block_force(part, state)[axis];
+  double pull_of(std::size_t block, const Displacement& state, int axis) {
+    if (!known[block]) {
+      known.set(block);
+      pull_N[block] = multigrid->block_force(block, state)[axis];
     }
-    return pull_N[part];
+    return pull_N[block];
   }
 
   // Does the row hold nothing but the source block?
   [[nodiscard]] bool within_source_block(const Lattice& lattice, RowId row) const {
-    if (source_block == 0 || !multigrid->parts().fill_row(0, row)) return false;
+    if (source_block == 0 || !multigrid->blocks().fill_row(0, row)) return false;
     for (VoxelId v = row * kRow; v < (row + 1) * kRow; ++v) {
-      if (lattice.filled(v) && multigrid->parts().of(0, v) != source_block) return false;
+      if (lattice.filled(v) && multigrid->blocks().of(0, v) != source_block) return false;
     }
     return true;
   }
@@ -93,19 +93,19 @@ LimitReactions::Row* LimitReactions::look_at(RowId row) noexcept {
   at.z = static_cast<std::ptrdiff_t>(g.row_z) * kRow;
   at.x = static_cast<std::ptrdiff_t>(g.row_x) * kRow;
   gathering_->couplings.all(row, at.springs);
-  std::array<float, 3> tight{};
-  for (std::size_t d = 0; d < 3; ++d) tight[d] = kAtLimit * static_cast<float>(lattice_.spacing_m()[d]);
+  std::array<float, 3> at_limit{};
+  for (std::size_t d = 0; d < 3; ++d) at_limit[d] = kAtLimit * static_cast<float>(lattice_.spacing_m()[d]);
   Row& out = rows_.emplace_back();
   out.row = row;
-  links_at_limits(at, gathering_->couplings.limits(row), ua, tight, out.links);
-  if (gathering_->multigrid != nullptr && gathering_->multigrid->parts().in_row(0, row))
+  links_at_limits(at, gathering_->couplings.limits(row), ua, at_limit, out.links);
+  if (gathering_->multigrid != nullptr && gathering_->multigrid->blocks().in_row(0, row))
     gathering_->pull_as_blocks(*state_, axis_, out);
   entry_[row] = static_cast<std::uint16_t>(rows_.size());
-  const auto& roots = gathering_->roots;
-  for (auto v = std::lower_bound(roots.begin(), roots.end(), row * kRow);
-       v != roots.end() && *v / kRow == row; ++v)
-    out.roots |= 1U << *v % kRow;
-  if (out.roots != 0) add(out, out.roots);
+  const auto& sources = gathering_->sources;
+  for (auto v = std::lower_bound(sources.begin(), sources.end(), row * kRow);
+       v != sources.end() && *v / kRow == row; ++v)
+    out.sources |= 1U << *v % kRow;
+  if (out.sources != 0) add(out, out.sources);
   return &out;
 }
 
@@ -119,13 +119,13 @@ std::uint32_t LimitReactions::pushed(const Row& row, std::uint32_t at_low, std::
 
 // Adds voxels, and their dependents in the row itself.
 void LimitReactions::add(Row& row, std::uint32_t bits) noexcept {
-  const std::uint32_t before = row.carried, low = row.links.at_low[0], high = row.links.at_high[0];
-  row.carried |= bits;
+  const std::uint32_t before = row.gathered, low = row.links.at_low[0], high = row.links.at_high[0];
+  row.gathered |= bits;
   const std::uint32_t upwards = pushed(row, low << 1U, high << 1U, End::upper) & row.links.movable,
                       downwards = pushed(row, low, high, End::lower) & row.links.movable;
-  for (std::uint32_t more = ~0U; more != 0; row.carried |= more)
-    more = ((row.carried << 1U & upwards) | (row.carried >> 1U & downwards)) & ~row.carried;
-  row.fresh |= row.carried & ~before;
+  for (std::uint32_t more = ~0U; more != 0; row.gathered |= more)
+    more = ((row.gathered << 1U & upwards) | (row.gathered >> 1U & downwards)) & ~row.gathered;
+  row.fresh |= row.gathered & ~before;
   if (row.fresh == 0 || row.queued) return;
   row.queued = true;
   queue_[(head_ + waiting_++) % kMostRows] = static_cast<std::uint32_t>(&row - rows_.data());
@@ -136,7 +136,7 @@ void LimitReactions::ask(RowId row, std::uint32_t at_low, std::uint32_t at_high,
   if ((at_low | at_high) == 0) return;
   Row* to = look_at(row);
   if (to == nullptr) return;
-  const std::uint32_t more = pushed(*to, at_low, at_high, end) & to->links.movable & ~to->carried;
+  const std::uint32_t more = pushed(*to, at_low, at_high, end) & to->links.movable & ~to->gathered;
   if (more != 0) add(*to, more);
 }
 
@@ -149,30 +149,30 @@ void LimitReactions::begin(Gathering& gathering, Displacement& state, int axis) 
   head_ = waiting_ = 0;
 }
 
-void LimitReactions::gather(LevelStiffness& couplings, Displacement& state, std::span<const VoxelId> roots,
+void LimitReactions::gather(LevelStiffness& couplings, Displacement& state, std::span<const VoxelId> sources,
                             int axis) noexcept {
-  Gathering gathering{couplings, roots, nullptr, 0, false, {}, {}};
+  Gathering gathering{couplings, sources, nullptr, 0, false, {}, {}};
   begin(gathering, state, axis);
-  for (const VoxelId v : roots) {
-    if (may_be_tight(lattice_, state, v, axis, kSurelyFree)) look_at(v / kRow);
+  for (const VoxelId v : sources) {
+    if (may_be_at_limit(lattice_, state, v, axis, kSurelyFree)) look_at(v / kRow);
   }
   find_all();
   // Sources beside dependents of others, so that links between both are known as such.
-  for (const VoxelId v : roots) {
+  for (const VoxelId v : sources) {
     if (rows_.empty()) break;
     if (find(v / kRow) != nullptr) continue;
     for (int n = 0; n < 6; ++n) {
-      if (carried(n % 2 == 0 ? lattice_.up(v, n / 2) : lattice_.down(v, n / 2))) look_at(v / kRow);
+      if (gathered(n % 2 == 0 ? lattice_.up(v, n / 2) : lattice_.down(v, n / 2))) look_at(v / kRow);
     }
   }
   gathering_ = nullptr;
 }
 
 void LimitReactions::gather_on_block(LevelStiffness& couplings, Displacement& state,
-                                     const Multigrid& multigrid, std::size_t part, int axis) noexcept {
-  Gathering gathering{couplings, {}, &multigrid, static_cast<std::uint16_t>(part + 1), false, {}, {}};
+                                     const Multigrid& multigrid, std::size_t block, int axis) noexcept {
+  Gathering gathering{couplings, {}, &multigrid, static_cast<std::uint16_t>(block + 1), false, {}, {}};
   begin(gathering, state, axis);
-  for (const RigidBlocks::Link& l : multigrid.parts().on(0, part).border) look_at(l.cell / kRow);
+  for (const RigidBlocks::Link& l : multigrid.blocks().on(0, block).border) look_at(l.cell / kRow);
   gathering.border_known = true;
   find_all();
   gathering_ = nullptr;
@@ -200,35 +200,35 @@ void LimitReactions::find_all() noexcept {
   }
 }
 
-bool LimitReactions::tight(VoxelId root) const noexcept {
-  const Row* own = find(root / kRow);
+bool LimitReactions::at_limit(VoxelId source) const noexcept {
+  const Row* own = find(source / kRow);
   if (own == nullptr) return false;
-  const VoxelId lane = root % kRow;
+  const VoxelId lane = source % kRow;
   for (int d = 0; d < 3; ++d) {
     const auto ud = static_cast<std::size_t>(d);
     const LinksAtLimits& l = own->links;
-    if (((l.at_low[ud] | l.at_high[ud]) >> lane & 1U) != 0 && !lattice_.anchored(lattice_.up(root, d)))
+    if (((l.at_low[ud] | l.at_high[ud]) >> lane & 1U) != 0 && !lattice_.anchored(lattice_.up(source, d)))
       return true;
     if (((l.down_at_low[ud] | l.down_at_high[ud]) >> lane & 1U) != 0 &&
-        !lattice_.anchored(lattice_.down(root, d)))
+        !lattice_.anchored(lattice_.down(source, d)))
       return true;
   }
   return false;
 }
 
-LimitReactions::Hanging LimitReactions::hanging(const LevelStiffness& couplings) const noexcept {
-  Hanging sum;
+LimitReactions::Dependents LimitReactions::dependents(const LevelStiffness& couplings) const noexcept {
+  Dependents sum;
   const RowId row_z = lattice_.grid().row_z, row_x = lattice_.grid().row_x;
   for (const Row& r : rows_) {
-    const std::uint32_t hangs = r.carried & ~r.roots;
+    const std::uint32_t hangs = r.gathered & ~r.sources;
     if (hangs == 0) continue;
     sum.force_N += sum_of(r.links.pull_N.data(), hangs);
     RowStiffness s;
     couplings.all(r.row, s);
-    const std::array<std::uint32_t, 3> up{r.carried >> 1U | carried_in(r.row + row_x) << (kRow - 1),
-                                          carried_in(r.row + 1), carried_in(r.row + row_z)};
-    const std::array<std::uint32_t, 3> down{r.carried << 1U | carried_in(r.row - row_x) >> (kRow - 1),
-                                            carried_in(r.row - 1), carried_in(r.row - row_z)};
+    const std::array<std::uint32_t, 3> up{r.gathered >> 1U | gathered_in(r.row + row_x) << (kRow - 1),
+                                          gathered_in(r.row + 1), gathered_in(r.row + row_z)};
+    const std::array<std::uint32_t, 3> down{r.gathered << 1U | gathered_in(r.row - row_x) >> (kRow - 1),
+                                            gathered_in(r.row - 1), gathered_in(r.row - row_z)};
     for (std::size_t d = 0; d < 3; ++d) {
       const bool along = static_cast<int>(d) == axis_;
       sum.stiffness_N_per_m += sum_of((along ? s.up_along : s.up_across) + d * kRow, hangs & ~up[d]) +

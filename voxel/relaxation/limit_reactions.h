@@ -31,27 +31,27 @@ class LimitReactions {
   explicit LimitReactions(const Lattice& lattice);
 
   // ---- none of these allocates or throws ----
-  // Finds, on one axis, all dependents of `roots` (sorted by id, none anchored), directly or through others.
-  // A voxel depends on a neighbour if their link is at a limit and pushes it against its own load, or if the
-  // link allows it to move neither way. Drops what was found before.
-  void gather(LevelStiffness& couplings, Displacement& state, std::span<const VoxelId> roots,
+  // Finds, on one axis, all dependents of `sources` (sorted by id, none anchored), directly or through
+  // others. A voxel depends on a neighbour if their link is at a limit and pushes it against its own load, or
+  // if the link allows it to move neither way. Drops what was found before.
+  void gather(LevelStiffness& couplings, Displacement& state, std::span<const VoxelId> sources,
               int axis) noexcept;
   // The same for the dependents of a rigid block. The load of a voxel in another block is the load of that
   // block.
   void gather_on_block(LevelStiffness& couplings, Displacement& state, const Multigrid& multigrid,
-                       std::size_t part, int axis) noexcept;
+                       std::size_t block, int axis) noexcept;
   // Is the voxel a dependent, or a source that has any? For other sources the answer is undefined.
-  [[nodiscard]] bool carried(VoxelId v) const noexcept {
-    return (carried_in(v / kRow) >> v % kRow & 1U) != 0;
+  [[nodiscard]] bool gathered(VoxelId v) const noexcept {
+    return (gathered_in(v / kRow) >> v % kRow & 1U) != 0;
   }
   // Of a source: is any of its links to a voxel that may move at a limit?
-  [[nodiscard]] bool tight(VoxelId root) const noexcept;
+  [[nodiscard]] bool at_limit(VoxelId source) const noexcept;
   // Sum of the dependents' loads, sources excluded (N), and of the springs between dependents and others
   // (N/m).
-  struct Hanging {
+  struct Dependents {
     double force_N = 0.0, stiffness_N_per_m = 0.0;
   };
-  [[nodiscard]] Hanging hanging(const LevelStiffness& couplings) const noexcept;
+  [[nodiscard]] Dependents dependents(const LevelStiffness& couplings) const noexcept;
 
   [[nodiscard]] std::size_t memory_bytes() const {
     return entry_.resident_bytes() + resident_bytes(rows_) + resident_bytes(queue_);
@@ -63,7 +63,7 @@ class LimitReactions {
   struct Row {
     RowId row;
     LinksAtLimits links;
-    std::uint32_t roots = 0, carried = 0;
+    std::uint32_t sources = 0, gathered = 0;
     std::uint32_t fresh = 0;  // of these: their neighbours are still to be visited
     bool queued = false;
   };
@@ -79,9 +79,9 @@ class LimitReactions {
                                             End end) noexcept;
   void add(Row& row, std::uint32_t bits) noexcept;
   void ask(RowId row, std::uint32_t at_low, std::uint32_t at_high, End end) noexcept;
-  [[nodiscard]] std::uint32_t carried_in(RowId row) const noexcept {
+  [[nodiscard]] std::uint32_t gathered_in(RowId row) const noexcept {
     const Row* r = find(row);
-    return r == nullptr ? 0U : r->carried;
+    return r == nullptr ? 0U : r->gathered;
   }
 
   const Lattice& lattice_;

@@ -32,7 +32,7 @@ Relaxation::Relaxation(const Lattice& lattice)
     : lattice_(lattice),
       multigrid_(lattice),
       cluster_steps_(lattice),
-      limited_(std::make_unique<AdmmRegion>(lattice)) {
+      region_(std::make_unique<AdmmRegion>(lattice)) {
   set_tolerance(kMeasured * kRestingResidual * lattice.force_scale_N());
   farthest_m_ = kFarthest * static_cast<float>(lattice.max_spacing_m());
   boxes_.resize(static_cast<std::size_t>(multigrid_.levels()));
@@ -42,23 +42,23 @@ Relaxation::Relaxation(const Lattice& lattice)
 
 Relaxation::~Relaxation() = default;
 
-bool Relaxation::limits_hold() const noexcept {
-  return limited_->found();
+bool Relaxation::at_limits() const noexcept {
+  return region_->at_limits();
 }
 
-void Relaxation::relax_limited(Displacement& state, const ObstacleView& obstacles) noexcept {
+void Relaxation::relax_region(Displacement& state, const ObstacleView& obstacles) noexcept {
   if (!tool_presses_ || !obstacles.obstacles.empty()) return;
-  limited_->relax(multigrid_, state, obstacles, {}, true);
-  multigrid_.release_unlimited(state);
+  region_->relax(multigrid_, state, obstacles, {}, true);
+  multigrid_.release_inactive(state);
 }
 
 void Relaxation::prepare_under_tool() {
-  limited_->prepare_lists();
+  region_->prepare_lists();
 }
 
 void Relaxation::prepare_beside_bodies() {
   multigrid_.prepare_limit_loads();
-  limited_->prepare_all();
+  region_->prepare_all();
 }
 
 void Relaxation::set_tolerance(double tolerance_N) noexcept {
@@ -73,29 +73,29 @@ void Relaxation::set_tolerance(double tolerance_N) noexcept {
 void Relaxation::copy_from(const Relaxation& other) noexcept {
   multigrid_.copy_from(other.multigrid_);
   set_tolerance(other.tolerance_N_);
-  unkept_ = other.unkept_;
+  uncommitted_ = other.uncommitted_;
   wake();
 }
 
-void Relaxation::leave_to_another() {
-  apart_ = true;
+void Relaxation::leave_to_shadow() {
+  left_to_shadow_ = true;
   list_steps();
   multigrid_.forget_coarse();
   multigrid_.keep_log();
 }
 
 void Relaxation::assign_residual(Displacement& state, const ObstacleView& obstacles) noexcept {
-  asleep_ = away_ = true;
+  asleep_ = shadow_busy_ = true;
   end_contact();
-  multigrid_.begin_anew();
+  multigrid_.restart();
   const Grid& g = lattice_.grid();
   for (int c = near_.first[0]; c <= near_.last[0]; ++c) {
     for (int k = near_.first[2]; k <= near_.last[2]; ++k) {
       for (int j = near_.first[1]; j <= near_.last[1]; ++j)
-        multigrid_.balance(g.row(c, j, k), state, obstacles);
+        multigrid_.freeze_residual(g.row(c, j, k), state, obstacles);
     }
   }
-  multigrid_.balance_blocks(state);
+  multigrid_.freeze_blocks(state);
 }
 
 void Relaxation::mark_all_dirty() noexcept {
@@ -105,7 +105,7 @@ void Relaxation::mark_all_dirty() noexcept {
 }
 
 // Held voxels are fixed; pressed voxels slide and are fixed along the tool's normal.
-void Relaxation::hold_what_stands(const Displacement& state, std::span<const VoxelId> held) noexcept {
+void Relaxation::fix_held_voxels(const Displacement& state, std::span<const VoxelId> held) noexcept {
   standing_.clear();
   bool others_hold = false;
   tool_presses_ = false;
@@ -126,7 +126,7 @@ std::uint64_t Relaxation::run(Displacement& state, const ObstacleView& obstacles
                               std::span<const VoxelId> held, std::uint64_t budget) noexcept {
   if (asleep_) return 0;
   patient_ = budget >= kPatient;
-  hold_what_stands(state, held);
+  fix_held_voxels(state, held);
   TileQueue& tiles = multigrid_.tiles();
   std::uint64_t spent = 0;
   credit_ += static_cast<std::int64_t>(contact_relaxed_ ? budget / kBesideContact : budget);
@@ -137,7 +137,7 @@ std::uint64_t Relaxation::run(Displacement& state, const ObstacleView& obstacles
   };
   spend(kBrickUpdates * multigrid_.renew_bricks(state, 1 + budget / (kBrickShare * kBrickUpdates)));
   while (!asleep_ && credit_ > 0) {
-    if (keeping_) {
+    if (committing_) {
       spend(commit_plastic_offsets(state, static_cast<std::uint64_t>(credit_)));
       continue;
     }
@@ -169,17 +169,17 @@ std::uint64_t Relaxation::run(Displacement& state, const ObstacleView& obstacles
 void Relaxation::run_cycle(Displacement& state, const ObstacleView& obstacles,
                            std::span<const VoxelId> held) noexcept {
   if (asleep_) return;
-  if (keeping_) {
-    while (keeping_) commit_plastic_offsets(state, ~std::uint64_t{0});
+  if (committing_) {
+    while (committing_) commit_plastic_offsets(state, ~std::uint64_t{0});
     return;
   }
-  hold_what_stands(state, held);
+  fix_held_voxels(state, held);
   multigrid_.renew_bricks(state, multigrid_.grid(0).rows());
   multigrid_.tiles().clear();
   round_left_ = 0;
   running_residual_N_ = 0.0;
   lay_whole_boxes(Visits::once);
-  cycle(state, obstacles, Look::active);
+  cycle(state, obstacles, Look::active_rows);
   patient_ = true;
   end_round(state, obstacles, running_residual_N_);
 }
@@ -188,7 +188,7 @@ std::size_t Relaxation::relax_contact(Displacement& state, const ObstacleView& o
                                       std::span<const VoxelId> held, std::span<const VoxelId> pressed,
                                       bool again, std::size_t at_once) noexcept {
   contact_relaxed_ = true;
-  hold_what_stands(state, held);
+  fix_held_voxels(state, held);
   lay_contact_boxes(pressed, kContactMargin, Visits::once);
   const RowBox& b = boxes(0).smoothed;
   const Grid& g = lattice_.grid();
@@ -196,14 +196,15 @@ std::size_t Relaxation::relax_contact(Displacement& state, const ObstacleView& o
   near_.last = {b.q1 / kLaneGroups + 1, std::min(b.j1 + kNear, g.dims[1] - 1),
                 std::min(b.k1 + kNear, g.dims[2] - 1)};
   end_contact();
-  smoothed_ = apart_ && again;
-  wide_ = static_cast<double>(octets_of_cycle()) > narrow_share_ * static_cast<double>(kNarrow);
-  return run_steps(state, obstacles, wide_ ? at_once : kWhole);
+  smoothed_ = left_to_shadow_ && again;
+  large_patch_ =
+      static_cast<double>(octets_of_cycle()) > small_patch_share_ * static_cast<double>(kSmallPatch);
+  return run_steps(state, obstacles, large_patch_ ? at_once : kUnlimited);
 }
 
 std::size_t Relaxation::continue_contact(Displacement& state, const ObstacleView& obstacles,
                                          std::span<const VoxelId> held, std::size_t at_once) noexcept {
-  hold_what_stands(state, held);
+  fix_held_voxels(state, held);
   return run_steps(state, obstacles, at_once);
 }
 
@@ -226,7 +227,7 @@ std::size_t Relaxation::run_steps(Displacement& state, const ObstacleView& obsta
       last = std::min(last, plane_ + static_cast<int>(fit) - 1);
     }
     done += work_of_planes(step_, plane_) - work_of_planes(step_, last + 1);
-    step(step_, {plane_, last}, state, obstacles, Look::all, smoothed_);
+    step(step_, {plane_, last}, state, obstacles, Look::all_rows, smoothed_);
     plane_ = last + 1 < planes ? last + 1 : 0;
     if (plane_ == 0) ++step_;
   }
@@ -237,15 +238,15 @@ std::size_t Relaxation::run_steps(Displacement& state, const ObstacleView& obsta
 std::size_t Relaxation::relax_large_patch(Displacement& state, const ObstacleView& obstacles,
                                           std::span<const VoxelId> held, std::span<const VoxelId> pressed,
                                           bool coarse_first) noexcept {
-  hold_what_stands(state, held);
-  multigrid_.release_limited();
+  fix_held_voxels(state, held);
+  multigrid_.release_active();
   lay_contact_boxes(pressed, kLargePatchMargin, Visits::twice);
   is_limited_correction_ = true;
   if (coarse_first) {
     run_coarse_first(state, obstacles);
-    run_steps_over(steps() - 1, steps(), state, obstacles, Look::all);
+    run_steps_over(steps() - 1, steps(), state, obstacles, Look::all_rows);
   } else {
-    cycle(state, obstacles, Look::all);
+    cycle(state, obstacles, Look::all_rows);
   }
   is_limited_correction_ = false;
   return octets_of_cycle();
@@ -255,13 +256,13 @@ std::size_t Relaxation::prolong_large_patch(Displacement& state, const ObstacleV
                                             std::span<const VoxelId> pressed) noexcept {
   lay_contact_boxes(pressed, kProlongedMargin, Visits::once);
   is_limited_correction_ = true;
-  std::size_t told = 0;
+  std::size_t prolonged = 0;
   for (int l = last_level() - 1; l >= 0; --l) {
     prolong_box(l, state, obstacles, kAllPlanes);
-    told += octets(boxes(l).told);
+    prolonged += groups(boxes(l).prolonged);
   }
   is_limited_correction_ = false;
-  return told;
+  return prolonged;
 }
 
 void Relaxation::lay_contact_boxes(std::span<const VoxelId> pressed, int margin, Visits visits) noexcept {
@@ -284,7 +285,7 @@ void Relaxation::lay_contact_boxes(std::span<const VoxelId> pressed, int margin,
 }
 
 std::size_t Relaxation::memory_bytes() const {
-  return multigrid_.memory_bytes() + cluster_steps_.memory_bytes() + limited_->memory_bytes() +
+  return multigrid_.memory_bytes() + cluster_steps_.memory_bytes() + region_->memory_bytes() +
          boxes_.capacity() * sizeof(LevelBoxes) + resident_bytes(standing_);
 }
 

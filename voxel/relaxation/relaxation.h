@@ -49,20 +49,20 @@ class Relaxation {
   // prolonged that would cost as much (about 45 ns each). Of a cycle around a large patch that costs more
   // than `at_once` only a part is done; continue_contact() does the rest.
   static constexpr int kMaxNear = 64;
-  static constexpr std::size_t kWhole = ~std::size_t{0};
+  static constexpr std::size_t kUnlimited = ~std::size_t{0};
   std::size_t relax_contact(Displacement& state, const ObstacleView& obstacles, std::span<const VoxelId> held,
                             std::span<const VoxelId> pressed, bool again = false,
-                            std::size_t at_once = kWhole) noexcept;
+                            std::size_t at_once = kUnlimited) noexcept;
   // Continues that cycle in the same boxes by about `at_once` of counted work, one step at least. Parts are
   // as equal as steps allow. Between parts anything may be moved.
   std::size_t continue_contact(Displacement& state, const ObstacleView& obstacles,
                                std::span<const VoxelId> held, std::size_t at_once) noexcept;
   [[nodiscard]] bool under_way() const { return step_ > 0 || plane_ > 0; }
-  // Has the last or current contact cycle a large patch: more than kNarrow Float8 on all levels?
-  static constexpr std::size_t kNarrow = 2500;
-  // Scales kNarrow: if a tick has less work, more cycles are split.
-  void set_narrow_share(double share) noexcept { narrow_share_ = share; }
-  [[nodiscard]] bool wide() const { return wide_; }
+  // Has the last or current contact cycle a large patch: more than kSmallPatch Float8 on all levels?
+  static constexpr std::size_t kSmallPatch = 2500;
+  // Scales kSmallPatch: if a tick has less work, more cycles are split.
+  void set_small_patch_share(double share) noexcept { small_patch_share_ = share; }
+  [[nodiscard]] bool has_large_patch() const { return large_patch_; }
   // Ends a cycle that is under way; pending corrections wait for the next one.
   void end_contact() noexcept { step_ = plane_ = 0; }
 
@@ -78,10 +78,10 @@ class Relaxation {
                                   std::span<const VoxelId> pressed) noexcept;
   // A cycle over the whole object, coarse levels first. Voxels get the correction last and are not smoothed:
   // call relax_around_blocks() after it. Returns Float8 visited.
-  std::size_t run_thoroughly(Displacement& state, const ObstacleView& obstacles,
-                             std::span<const VoxelId> held) noexcept;
+  std::size_t run_whole_coarse_first(Displacement& state, const ObstacleView& obstacles,
+                                     std::span<const VoxelId> held) noexcept;
   // Relaxes what limits hold under the tool (AdmmRegion), after cycles that do not end a round.
-  void relax_limited(Displacement& state, const ObstacleView& obstacles) noexcept;
+  void relax_region(Displacement& state, const ObstacleView& obstacles) noexcept;
   // A cycle around each rigid block that the tool presses: the force depends on the springs all around it.
   void relax_around_blocks(Displacement& state, const ObstacleView& obstacles) noexcept;
 
@@ -95,41 +95,41 @@ class Relaxation {
   void mark_all_dirty() noexcept;
   // If links around voxels on a body are at their limits, relaxes these voxels and their neighbourhood
   // together (AdmmRegion). False: no link is.
-  bool relax_limited(Displacement& state, const ObstacleView& obstacles,
-                     std::span<const VoxelId> on_body) noexcept;
-  [[nodiscard]] const AdmmRegion& limited() const { return *limited_; }
+  bool relax_region(Displacement& state, const ObstacleView& obstacles,
+                    std::span<const VoxelId> on_body) noexcept;
+  [[nodiscard]] const AdmmRegion& region() const { return *region_; }
   // Did active limits hold what the tool or a body presses, in the last such call?
-  [[nodiscard]] bool limits_hold() const noexcept;
+  [[nodiscard]] bool at_limits() const noexcept;
   // Something moved: relaxes until the residual is below the tolerance again.
   void wake() noexcept {
     asleep_ = false;
     cycles_without_gain_ = 0;
     drift_m_ = furthest_m_ = {};
   }
-  [[nodiscard]] bool asleep() const { return asleep_ && !away_; }
+  [[nodiscard]] bool asleep() const { return asleep_ && !shadow_busy_; }
   // From now on a shadow relaxes the object (shadow_object.h); here only the neighbourhood of the contact
   // follows the tool. Allocates.
-  void leave_to_another();
-  [[nodiscard]] bool left_to_another() const { return apart_; }
+  void leave_to_shadow();
+  [[nodiscard]] bool left_to_shadow() const { return left_to_shadow_; }
   // Is a submission with the shadow now?
-  [[nodiscard]] bool away() const { return away_; }
+  [[nodiscard]] bool shadow_busy() const { return shadow_busy_; }
   // The state was submitted: nothing to do here until something moves. The residual near the contact is
   // frozen, because the shadow owns it.
   void assign_residual(Displacement& state, const ObstacleView& obstacles) noexcept;
   [[nodiscard]] bool idle() const { return asleep_; }
-  // Work of assign_residual() and take_over() that can be done ahead. Pending corrections are lost.
+  // Work of assign_residual() and resume() that can be done ahead. Pending corrections are lost.
   [[nodiscard]] std::size_t rows_to_drop() const noexcept { return multigrid_.rows_to_drop(); }
   void drop_coarse() noexcept {
     end_contact();
     multigrid_.drop_coarse();
   }
   // The shadow's result is applied from here on; `residual_N` is its residual.
-  void take_over(double residual_N) noexcept {
-    away_ = false;
+  void resume(double residual_N) noexcept {
+    shadow_busy_ = false;
     end_contact();
     residual_N_ = residual_N;
-    multigrid_.begin_anew();
-    multigrid_.release_limited();
+    multigrid_.restart();
+    multigrid_.release_active();
   }
   // Rows of voxels that the last contact cycle read: [first, last] of columns, j and k.
   struct NearRows {
@@ -171,12 +171,12 @@ class Relaxation {
     RowBox parents;                          // cells above the relaxed box of the finer level
     RowBox source_cells;                     // these and the cells beside them, which prolong
     int first_source = 0, last_source = -1;  // the same as cells along x
-    RowBox told;                             // receives the corrections of the coarser level's source cells
+    RowBox prolonged;                        // receives the corrections of the coarser level's source cells
   };
-  enum class Look : std::uint8_t { all, active };  // active: rows at rest are skipped
+  enum class Look : std::uint8_t { all_rows, active_rows };  // active: rows at rest are skipped
 
   void end_round(Displacement& state, const ObstacleView& obstacles, double residual_N) noexcept;
-  void hold_what_stands(const Displacement& state, std::span<const VoxelId> held) noexcept;
+  void fix_held_voxels(const Displacement& state, std::span<const VoxelId> held) noexcept;
   double step_clusters(Displacement& state, const ObstacleView& obstacles) noexcept;
   std::uint64_t relax_tile(Displacement& state, const ObstacleView& obstacles, std::size_t number) noexcept;
   std::uint64_t commit_plastic_offsets(Displacement& state, std::uint64_t budget) noexcept;
@@ -192,11 +192,11 @@ class Relaxation {
   void lay_contact_boxes(std::span<const VoxelId> pressed, int margin, Visits visits) noexcept;
   void lay_whole_boxes(Visits visits) noexcept;
   // A cycle is a list of steps: on the way to coarse levels each level is smoothed and restricted; the
-  // coarsest is solved; on the way back each level gets the correction (is_source) and is smoothed. A level
+  // coarsest is solved; on the way back each level gets the correction (prolongs) and is smoothed. A level
   // that is visited again skips the first smoothing.
   struct Step {
     int level;
-    enum What : std::uint8_t { smooths, restricts, solves, is_source, smooths_after } what;
+    enum What : std::uint8_t { smooths, restricts, solves, prolongs, smooths_after } what;
   };
   void list_steps();  // for both kinds of cycle; allocates
   void add_steps(std::vector<Step>& to, int level, Visits visits, bool again) const;
@@ -238,7 +238,7 @@ class Relaxation {
   void for_rows(int level, const RowBox& box, const Visit& visit) noexcept;
   [[nodiscard]] RowBox clipped(int level, const RowBox& box) const noexcept;
   [[nodiscard]] int last_level() const noexcept;  // of a cycle
-  [[nodiscard]] static std::size_t octets(const RowBox& box);
+  [[nodiscard]] static std::size_t groups(const RowBox& box);
   [[nodiscard]] static RigidBlocks::Box cells(const RowBox& b) {
     return {{b.q0 * kLanes, b.j0, b.k0}, {b.q1 * kLanes + kLanes - 1, b.j1, b.k1}};
   }
@@ -248,7 +248,7 @@ class Relaxation {
   const Lattice& lattice_;
   Multigrid multigrid_;
   ClusterSteps cluster_steps_;
-  std::unique_ptr<AdmmRegion> limited_;
+  std::unique_ptr<AdmmRegion> region_;
   std::vector<LevelBoxes> boxes_;
   std::array<std::vector<Step>, 2> steps_;  // [Visits]
   Visits visits_ = Visits::once;            // of the cycle whose boxes are laid
@@ -258,22 +258,22 @@ class Relaxation {
   std::int64_t credit_ = 0;                 // voxel updates left; negative: overspent
   std::size_t round_left_ = 0;              // tiles left in this round
   std::size_t cursor_ = 0, looked_at_ = 0;  // tiles searched for pending corrections of the cells above them
-  RowId keep_row_ = 0;                      // next row whose plastic offsets are to be committed
-  bool asleep_ = true, away_ = false;
-  bool apart_ = false;  // a shadow relaxes the object
+  RowId commit_row_ = 0;                    // next row whose plastic offsets are to be committed
+  bool asleep_ = true, shadow_busy_ = false;
+  bool left_to_shadow_ = false;  // a shadow relaxes the object
   NearRows near_;
   bool contact_relaxed_ = false;  // a contact cycle ran since the last run()
-  bool wide_ = false;
-  double narrow_share_ = 1.0;
+  bool large_patch_ = false;
+  double small_patch_share_ = 1.0;
   int step_ = 0;                        // next step of a contact cycle, whose boxes are laid
   int plane_ = 0;                       // next plane of that step
   bool any_source_ = false;             // the level has a pending correction
   bool smoothed_ = false;               // the cycle skips smoothing on the way to coarse levels
-  bool unkept_ = false;                 // some plastic offset is not committed
-  bool keeping_ = false;                // offsets are being committed
+  bool uncommitted_ = false;            // some plastic offset is not committed
+  bool committing_ = false;             // offsets are being committed
   bool is_limited_correction_ = false;  // corrections move all voxels together (limited_correction.h)
   double residual_N_ = 0.0, running_residual_N_ = 0.0, tolerance_N_ = 0.0, least_residual_N_ = 0.0;
-  float hold_ = 1.0F;
+  float boundary_scale_ = 1.0F;
   std::array<double, 3> drift_m_{}, furthest_m_{};  // of clusters, since wake()
   float farthest_m_ = 0.0F;                         // a cell with a larger pending correction drops it
   int cycles_without_gain_ = 0;

@@ -33,7 +33,7 @@ std::uint64_t Relaxation::relax_tile(Displacement& state, const ObstacleView& ob
   lay_boxes({t.column * kRow, t.j * kSide, t.k * kSide},
             {(t.column + 1) * kRow - 1, (t.j + 1) * kSide - 1, (t.k + 1) * kSide - 1}, kNoContact, 0,
             Visits::once);
-  cycle(state, obstacles, Look::all);
+  cycle(state, obstacles, Look::all_rows);
   std::uint64_t updates = 0;
   for (const LevelBoxes& b : boxes_) {
     updates += static_cast<std::uint64_t>(b.smoothed.q1 - b.smoothed.q0 + 1) * kLanes *
@@ -43,15 +43,15 @@ std::uint64_t Relaxation::relax_tile(Displacement& state, const ObstacleView& ob
   return 2 * updates;
 }
 
-bool Relaxation::relax_limited(Displacement& state, const ObstacleView& obstacles,
-                               std::span<const VoxelId> on_body) noexcept {
+bool Relaxation::relax_region(Displacement& state, const ObstacleView& obstacles,
+                              std::span<const VoxelId> on_body) noexcept {
   if (on_body.empty()) {
-    limited_->pass(multigrid_);
+    region_->skip(multigrid_);
     return false;
   }
-  const double most_N = limited_->relax(multigrid_, state, obstacles, on_body);
+  const double most_N = region_->relax(multigrid_, state, obstacles, on_body);
   if (most_N > tolerance_N_) wake();
-  return limited_->found();
+  return region_->at_limits();
 }
 
 // Moves the clusters at active limits of this round; returns the largest force per voxel that moved one (N).
@@ -75,15 +75,15 @@ double Relaxation::step_clusters(Displacement& state, const ObstacleView& obstac
     for (const VoxelId w : cluster_steps_.moved()) multigrid_.mark_dirty(0, w / kRow);
   };
   // blocks that limits hold
-  for (std::size_t p = 0; multigrid_.has_blocks() && p < multigrid_.parts().count(); ++p) {
-    for (int axis = 0; axis < 3; ++axis) move(multigrid_.parts().first(p), axis);
+  for (std::size_t p = 0; multigrid_.has_blocks() && p < multigrid_.blocks().count(); ++p) {
+    for (int axis = 0; axis < 3; ++axis) move(multigrid_.blocks().first(p), axis);
   }
   std::uint64_t count = 0;
-  multigrid_.for_limited([&count](VoxelId, int) { ++count; });
+  multigrid_.for_active([&count](VoxelId, int) { ++count; });
   const std::uint64_t first = count == 0 ? 0 : cycles_ * kNextFirst % count;
   for (const bool before : {false, true}) {
     std::uint64_t n = 0;
-    multigrid_.for_limited([&](VoxelId v, int axis) {
+    multigrid_.for_active([&](VoxelId v, int axis) {
       if ((n++ < first) == before) move(v, axis);
     });
   }
@@ -114,21 +114,21 @@ void Relaxation::end_round(Displacement& state, const ObstacleView& obstacles, d
   // coarse levels would move such voxels off their limits and back. Beside fixed obstacles this is disabled:
   // the per-voxel contact solver undoes the result in each tick.
   if (obstacles.moving > 0 || (tool_presses_ && patient_ && obstacles.obstacles.empty())) {
-    residual_N = std::max(residual_N, limited_->relax(multigrid_, state, obstacles, {}));
-    credit_ -= static_cast<std::int64_t>(limited_->looked_at());
-    multigrid_.release_unlimited(state);
+    residual_N = std::max(residual_N, region_->relax(multigrid_, state, obstacles, {}));
+    credit_ -= static_cast<std::int64_t>(region_->looked_at());
+    multigrid_.release_inactive(state);
   } else {
-    limited_->forget(multigrid_);
-    if (cycles_without_gain_ <= 1 || cycles_ % kLetGoEvery == 0) multigrid_.release_limited();
+    region_->forget(multigrid_);
+    if (cycles_without_gain_ <= 1 || cycles_ % kLetGoEvery == 0) multigrid_.release_active();
   }
   // Scattered held voxels fix a cell more firmly than a patch of them. A cycle that ends worse than it began
   // raises the factor of boundary springs.
   if (residual_N > kWorse * residual_N_ && cycles_without_gain_ > 0) {
-    hold_ = std::min(hold_ * kHarder, kHardest);
+    boundary_scale_ = std::min(boundary_scale_ * kHarder, kHardest);
   } else {
-    hold_ = std::max(1.0F, hold_ * kSofter);
+    boundary_scale_ = std::max(1.0F, boundary_scale_ * kSofter);
   }
-  multigrid_.set_hold(hold_);
+  multigrid_.set_boundary_scale(boundary_scale_);
   residual_N_ = residual_N;
   running_residual_N_ = 0.0;
   ++cycles_;
@@ -141,10 +141,10 @@ void Relaxation::end_round(Displacement& state, const ObstacleView& obstacles, d
       (residual_N_ < tolerance_N_ && multigrid_.bricks().round_ended()) || cycles_without_gain_ > kPatience;
   if (!at_rest) return;
   // At rest plastic offsets are committed; then there is a new rest to be found.
-  if (unkept_) {
-    keeping_ = true;
-    unkept_ = false;
-    keep_row_ = 0;
+  if (uncommitted_) {
+    committing_ = true;
+    uncommitted_ = false;
+    commit_row_ = 0;
     return;
   }
   if (multigrid_.tiles().waiting() > 0 && cycles_without_gain_ <= kPatience) return;
@@ -155,12 +155,12 @@ void Relaxation::end_round(Displacement& state, const ObstacleView& obstacles, d
 std::uint64_t Relaxation::commit_plastic_offsets(Displacement& state, std::uint64_t budget) noexcept {
   std::uint64_t spent = 0;
   const auto rows = static_cast<RowId>(lattice_.grid().rows());
-  for (; keep_row_ < rows && spent < budget; ++keep_row_, ++spent) {
-    if (state.rest.row[keep_row_] == 0 || !multigrid_.prepare(0, keep_row_)) continue;
-    multigrid_.yield(keep_row_, state, true);
+  for (; commit_row_ < rows && spent < budget; ++commit_row_, ++spent) {
+    if (state.plastic.row[commit_row_] == 0 || !multigrid_.prepare(0, commit_row_)) continue;
+    multigrid_.update_plasticity(commit_row_, state, true);
     spent += kRow;
   }
-  keeping_ = keep_row_ < rows;
+  committing_ = commit_row_ < rows;
   return spent;
 }
 

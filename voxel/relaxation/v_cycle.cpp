@@ -27,7 +27,7 @@ constexpr int kTileMargin = 3;  // cells around a tile that are smoothed, from l
 }  // namespace
 
 int Relaxation::last_level() const noexcept {
-  return std::min(multigrid_.levels(), apart_ ? kContactLevels : multigrid_.levels()) - 1;
+  return std::min(multigrid_.levels(), left_to_shadow_ ? kContactLevels : multigrid_.levels()) - 1;
 }
 
 template <class Visit>
@@ -81,21 +81,22 @@ void Relaxation::lay_boxes(const std::array<int, 3>& low, const std::array<int, 
     // those.
     boxes(l + 1).source_cells = clipped(l + 1, {p.q0 - 1, p.q1 + 1, p.j0 - 1, p.j1 + 1, p.k0 - 1, p.k1 + 1});
     const RowBox& t = boxes(l + 1).source_cells;
-    RowBox& told = boxes(l).told;
-    told = clipped(l, {2 * p.q0 - 2, 2 * p.q1 + 3, 2 * t.j0 - 1, 2 * t.j1 + 2, 2 * t.k0 - 1, 2 * t.k1 + 2});
+    RowBox& prolonged = boxes(l).prolonged;
+    prolonged =
+        clipped(l, {2 * p.q0 - 2, 2 * p.q1 + 3, 2 * t.j0 - 1, 2 * t.j1 + 2, 2 * t.k0 - 1, 2 * t.k1 + 2});
     boxes(l + 1).first_source = std::max(p.q0 * kLanes - 1, 0);
     boxes(l + 1).last_source = p.q1 * kLanes + kLanes;
     if (!narrow) continue;
     // Around a contact along x only to the smoothed Float8 and one more on either side. If a smoothed Float8
     // got half of a correction, smoothing would make up for the other half, which would then be added again.
-    told.q0 = std::max(told.q0, s.q0 - 1);
-    told.q1 = std::min(told.q1, s.q1 + 1);
+    prolonged.q0 = std::max(prolonged.q0, s.q0 - 1);
+    prolonged.q1 = std::min(prolonged.q1, s.q1 + 1);
     boxes(l + 1).first_source = std::max(s.q0 * kLanes / 2 - 1, 0);
     boxes(l + 1).last_source = (s.q1 + 1) * kLanes / 2;
   }
 }
 
-std::size_t Relaxation::octets(const RowBox& b) {
+std::size_t Relaxation::groups(const RowBox& b) {
   return static_cast<std::size_t>(b.q1 - b.q0 + 1) * static_cast<std::size_t>(b.j1 - b.j0 + 1) *
          static_cast<std::size_t>(b.k1 - b.k0 + 1);
 }
@@ -110,13 +111,13 @@ std::size_t Relaxation::octets_of_cycle() const noexcept {
         break;
       case Step::smooths:
       case Step::smooths_after:
-        sum += octets(b.smoothed);
+        sum += groups(b.smoothed);
         break;
       case Step::solves:
-        sum += 2 * octets(b.smoothed);
+        sum += 2 * groups(b.smoothed);
         break;
-      case Step::is_source:
-        sum += octets(b.told);
+      case Step::prolongs:
+        sum += groups(b.prolonged);
     }
   }
   return sum;
@@ -141,7 +142,7 @@ void Relaxation::add_steps(std::vector<Step>& to, int level, Visits visits, bool
   const int next = level + 1;
   const bool twice = visits == Visits::twice && next >= kFirstTwice && next <= kLastTwice && next < last;
   for (int n = 0; n < (twice ? 2 : 1); ++n) add_steps(to, next, visits, n > 0);
-  to.push_back({level, Step::is_source});
+  to.push_back({level, Step::prolongs});
   to.push_back({level, Step::smooths_after});
 }
 
@@ -149,24 +150,24 @@ void Relaxation::add_steps(std::vector<Step>& to, int level, Visits visits, bool
 std::size_t Relaxation::work_of_step(int n) const noexcept {
   const Step step = step_of(n);
   const LevelBoxes& b = boxes_[static_cast<std::size_t>(step.level)];
-  const std::size_t each = step.level == 0 ? kOfVoxels : 1, smoothed = each * kSmoothed * octets(b.smoothed);
+  const std::size_t each = step.level == 0 ? kOfVoxels : 1, smoothed = each * kSmoothed * groups(b.smoothed);
   switch (step.what) {
     case Step::smooths:
       return smoothed_ ? 0 : smoothed;
     case Step::restricts:
-      return each * kPassedOn * octets(b.smoothed);
+      return each * kPassedOn * groups(b.smoothed);
     case Step::solves:
       return kContactSweeps * smoothed;
     case Step::smooths_after:
       return smoothed;
-    case Step::is_source:
+    case Step::prolongs:
       break;
   }
   // along x corrections reach one Float8 further
-  RowBox told = b.told;
-  told.q0 = std::max(told.q0, b.smoothed.q0 - 1);
-  told.q1 = std::min(told.q1, b.smoothed.q1 + 1);
-  return each * octets(told);
+  RowBox prolonged = b.prolonged;
+  prolonged.q0 = std::max(prolonged.q0, b.smoothed.q0 - 1);
+  prolonged.q1 = std::min(prolonged.q1, b.smoothed.q1 + 1);
+  return each * groups(prolonged);
 }
 
 // Red-black by rows: first one colour, then the other, one plane behind while its memory is in the cache. The
@@ -180,7 +181,7 @@ void Relaxation::smooth_box(int level, int first_colour, Displacement& state, co
   const auto smooth = [&](const RowBox& plane, int colour) {
     for_rows(level, plane, [&](RowId row, LaneSpan span, int j, int k) {
       if (((j + k + colour) & 1) != 0) return;
-      if (look == Look::active && !multigrid_.has(level, row, Multigrid::active)) return;
+      if (look == Look::active_rows && !multigrid_.has(level, row, Multigrid::active)) return;
       if (colour == first_colour && j + kAhead <= all.j1) {
         multigrid_.fetch(level, row + next_plane + kAhead, state);
         multigrid_.fetch(level, row + next_plane + kAhead + 1, state);
@@ -211,7 +212,7 @@ void Relaxation::prolong_box(int level, Displacement& state, const ObstacleView&
   if (planes.first == 0) any_source_ = mark_source_cells(level, state, obstacles);
   if (!any_source_) return;
   const LevelBoxes& b = boxes(level + 1);
-  const RowBox& t = boxes(level).told;
+  const RowBox& t = boxes(level).prolonged;
   multigrid_.prolong(level,
                      {t.q0, t.q1, t.j0, t.j1, t.k0, t.k1, b.first_source, b.last_source, t.k0 + planes.first,
                       std::min(t.k0 + planes.last, t.k1)},
@@ -232,7 +233,7 @@ bool Relaxation::mark_source_cells(int level, Displacement& state, const Obstacl
       multigrid_.forget_pending_correction(level + 1, row, state, obstacles);
       return;
     }
-    multigrid_.mark(level + 1, row, Multigrid::telling);
+    multigrid_.mark(level + 1, row, Multigrid::source);
     any = true;
   });
   return any;
@@ -261,8 +262,8 @@ int Relaxation::planes_of_step(int n) const noexcept {
       const RowBox& parents = boxes_[static_cast<std::size_t>(step.level) + 1].parents;
       return std::max(1, parents.k1 - parents.k0 + 1);
     }
-    case Step::is_source:
-      return std::max(1, b.told.k1 - b.told.k0 + 1);
+    case Step::prolongs:
+      return std::max(1, b.prolonged.k1 - b.prolonged.k0 + 1);
     case Step::solves:
       break;
   }
@@ -288,14 +289,14 @@ void Relaxation::step(int n, Planes planes, Displacement& state, const ObstacleV
       restrict_residual(step.level, state, obstacles, look, planes);
       break;
     case Step::solves: {
-      const int sweeps = apart_ ? kContactSweeps : kCoarsestSweeps;
+      const int sweeps = left_to_shadow_ ? kContactSweeps : kCoarsestSweeps;
       for (int k = 0; k < sweeps; ++k) {
         smooth_box(step.level, 0, state, obstacles, look, kAllPlanes);
         multigrid_.smooth_blocks(step.level, box, state, obstacles);
       }
       break;
     }
-    case Step::is_source:
+    case Step::prolongs:
       prolong_box(step.level, state, obstacles, planes);
       break;
     case Step::smooths_after:
@@ -319,10 +320,10 @@ void Relaxation::restrict_residual(int l, Displacement& state, const ObstacleVie
                                    Planes planes) noexcept {
   const bool begins = planes.first == 0;
   // Before forces are summed, so that the residual is that of plastic links.
-  if (l == 0 && lattice_.yields() && begins) {
+  if (l == 0 && lattice_.has_plasticity() && begins) {
     for_rows(0, boxes(0).smoothed, [&](RowId row, LaneSpan, int, int) {
-      if (look == Look::all || multigrid_.has(0, row, Multigrid::active | Multigrid::dirty))
-        unkept_ = multigrid_.yield(row, state, false) || unkept_;
+      if (look == Look::all_rows || multigrid_.has(0, row, Multigrid::active | Multigrid::dirty))
+        uncommitted_ = multigrid_.update_plasticity(row, state, false) || uncommitted_;
     });
   }
   const RowBox& all = boxes(l + 1).parents;
@@ -332,7 +333,7 @@ void Relaxation::restrict_residual(int l, Displacement& state, const ObstacleVie
   const Grid& g = multigrid_.grid(l + 1);
   // All values before any load: a row's load depends on its neighbours' values.
   for_rows(l + 1, begins ? all : RowBox{}, [&](RowId row, LaneSpan span, int, int) {
-    if (look == Look::active) {
+    if (look == Look::active_rows) {
       if (!restrict_due(l + 1, row)) return;
       // A load depends on the values of the neighbours, too.
       for (const RowId r :
@@ -341,14 +342,14 @@ void Relaxation::restrict_residual(int l, Displacement& state, const ObstacleVie
     }
     // Under asynchronous relaxation coarse cells hold only motion since the residual was frozen, which they
     // know themselves.
-    if (!apart_) multigrid_.restrict_values(l + 1, row, state, span);
+    if (!left_to_shadow_) multigrid_.restrict_values(l + 1, row, state, span);
   });
   if (begins) {
     const float of_blocks = multigrid_.measure_blocks(l, cells(boxes(l).smoothed), state, obstacles);
     if (l == 0) running_residual_N_ = std::max(running_residual_N_, static_cast<double>(of_blocks));
   }
   for_rows(l + 1, parents, [&](RowId row, LaneSpan span, int j, int) {
-    if (look == Look::active) {
+    if (look == Look::active_rows) {
       if (!multigrid_.has(l + 1, row, Multigrid::renewed)) return;
       multigrid_.unmark(l + 1, row, Multigrid::renewed);
     }
@@ -366,10 +367,10 @@ void Relaxation::lay_whole_boxes(Visits visits) noexcept {
   lay_boxes({0, 0, 0}, {dims[0] - 1, dims[1] - 1, dims[2] - 1}, kNoContact, 0, visits);
 }
 
-std::size_t Relaxation::run_thoroughly(Displacement& state, const ObstacleView& obstacles,
-                                       std::span<const VoxelId> held) noexcept {
-  hold_what_stands(state, held);
-  multigrid_.release_limited();
+std::size_t Relaxation::run_whole_coarse_first(Displacement& state, const ObstacleView& obstacles,
+                                               std::span<const VoxelId> held) noexcept {
+  fix_held_voxels(state, held);
+  multigrid_.release_active();
   lay_whole_boxes(Visits::twice);
   is_limited_correction_ = true;
   run_coarse_first(state, obstacles);
@@ -381,25 +382,25 @@ void Relaxation::run_coarse_first(Displacement& state, const ObstacleView& obsta
   multigrid_.restrict_all(true);
   const int first_coarse = 2;         // level 1 is smoothed before
   const int of_voxels = steps() - 2;  // voxels get the correction
-  run_steps_over(0, of_voxels, state, obstacles, Look::all);
+  run_steps_over(0, of_voxels, state, obstacles, Look::all_rows);
   for (int n = 0; n < kCoarseCycles; ++n)
-    run_steps_over(first_coarse, of_voxels, state, obstacles, Look::all);
-  run_steps_over(of_voxels, of_voxels + 1, state, obstacles, Look::all);
+    run_steps_over(first_coarse, of_voxels, state, obstacles, Look::all_rows);
+  run_steps_over(of_voxels, of_voxels + 1, state, obstacles, Look::all_rows);
   multigrid_.restrict_all(false);
 }
 
 void Relaxation::relax_around_blocks(Displacement& state, const ObstacleView& obstacles) noexcept {
   if (!multigrid_.has_blocks()) return;
-  for (std::size_t p = 0; p < multigrid_.parts().count(); ++p) {
+  for (std::size_t p = 0; p < multigrid_.blocks().count(); ++p) {
     if (!multigrid_.tool_presses_block(p)) continue;
-    const RigidBlocks::Box& part = multigrid_.parts().on(0, p).box;
+    const RigidBlocks::Box& block = multigrid_.blocks().on(0, p).box;
     std::array<int, 3> low{}, high{};
     for (std::size_t d = 0; d < 3; ++d) {
-      low[d] = std::max(part.first[d] - kRoundParts, 0);
-      high[d] = std::min(part.last[d] + kRoundParts, lattice_.grid().dims[d] - 1);
+      low[d] = std::max(block.first[d] - kRoundParts, 0);
+      high[d] = std::min(block.last[d] + kRoundParts, lattice_.grid().dims[d] - 1);
     }
     lay_boxes(low, high, kNoContact, 0, Visits::twice);
-    cycle(state, obstacles, Look::all);
+    cycle(state, obstacles, Look::all_rows);
   }
 }
 

@@ -9,9 +9,8 @@
 namespace voxel {
 namespace {
 
-// Centres that lie on a boundary up to rounding are treated alike on every side of a shape. (unit: one
-// spacing)
-constexpr double kLimitLoad = 1e-9;
+// Tolerance that treats centres on a boundary alike on every side of a shape. (unit: spacing)
+constexpr double kRounding = 1e-9;
 
 constexpr std::array<char, 3> kAxis{'x', 'y', 'z'};
 
@@ -19,7 +18,7 @@ bool positive(double value) {
   return std::isfinite(value) && value > 0.0;
 }
 
-void check(const Formula& formula) {
+void check_formula(const Formula& formula) {
   const bool ball = formula.shape == Formula::Shape::ball;
   for (int axis = 0; axis < 3; ++axis) {
     if (!positive(formula.spacing_m[axis])) {
@@ -69,7 +68,7 @@ LabelVolume empty_lattice(const Formula& formula, std::size_t max_voxels) {
              " m, so it has no voxel; make the spacing smaller");
     }
   }
-  // In doubles, because the product may be beyond any integer.
+  // In double, because the product may exceed any integer type.
   const double total = counts[0] * counts[1] * counts[2];
   constexpr double kLongest = 1e9;  // an axis must fit in an int
   if (!(total <= static_cast<double>(max_voxels)) || std::max({counts[0], counts[1], counts[2]}) > kLongest) {
@@ -84,8 +83,8 @@ LabelVolume empty_lattice(const Formula& formula, std::size_t max_voxels) {
   return volume;
 }
 
-// The label of each slice of the block. A layer boundary at a slice of centres gives that slice to the upper
-// layer.
+// The label of each slice of the block. A slice whose voxel centres lie exactly on a layer boundary belongs
+// to the upper layer.
 std::vector<std::uint8_t> slice_labels(const Formula& formula, int slices) {
   const double spacing = formula.spacing_m.z;
   const double height = slices * spacing;
@@ -94,7 +93,7 @@ std::vector<std::uint8_t> slice_labels(const Formula& formula, int slices) {
   int slice = 0;
   for (const Layer& layer : formula.layers) {
     top += layer.thickness_m;
-    for (; slice < slices && (slice + 0.5 + kLimitLoad) * spacing < top; ++slice) {
+    for (; slice < slices && (slice + 0.5 + kRounding) * spacing < top; ++slice) {
       labels[static_cast<std::size_t>(slice)] = layer.label;
     }
   }
@@ -105,15 +104,15 @@ std::vector<std::uint8_t> slice_labels(const Formula& formula, int slices) {
   return labels;
 }
 
-struct Range {
+struct IndexRange {
   int first = 0, last = -1;  // inclusive
 };
 
 // Lattice indices along one axis whose centres can lie within `half` of `centre`.
-Range indices_near(const LabelVolume& volume, int axis, double centre, double half) {
+IndexRange indices_near(const LabelVolume& volume, int axis, double centre, double half) {
   const double spacing = volume.spacing_m[axis];
-  const double first = std::ceil((centre - half - volume.origin_m[axis]) / spacing - kLimitLoad);
-  const double last = std::floor((centre + half - volume.origin_m[axis]) / spacing + kLimitLoad);
+  const double first = std::ceil((centre - half - volume.origin_m[axis]) / spacing - kRounding);
+  const double last = std::floor((centre + half - volume.origin_m[axis]) / spacing + kRounding);
   const double end = volume.dims[axis] - 1.0;
   if (last < 0.0 || first > end) return {};
   return {static_cast<int>(std::max(first, 0.0)), static_cast<int>(std::min(last, end))};
@@ -124,9 +123,9 @@ template <typename Visit>
 void for_each_inside(LabelVolume& volume, bool round, const glm::dvec3& centre, const glm::dvec3& size,
                      Visit visit) {
   const glm::dvec3 half = 0.5 * (round ? glm::dvec3(size.x) : size);
-  std::array<Range, 3> range;
+  std::array<IndexRange, 3> range;
   for (int axis = 0; axis < 3; ++axis) range[axis] = indices_near(volume, axis, centre[axis], half[axis]);
-  const double limit = half.x * half.x * (1.0 + kLimitLoad);
+  const double limit = half.x * half.x * (1.0 + kRounding);
   const auto offset = [&](int axis, int index) {
     return volume.origin_m[axis] + index * volume.spacing_m[axis] - centre[axis];
   };
@@ -143,7 +142,7 @@ void for_each_inside(LabelVolume& volume, bool round, const glm::dvec3& centre, 
 }  // namespace
 
 LabelVolume make_volume(const Formula& formula, std::size_t max_voxels) {
-  check(formula);
+  check_formula(formula);
   LabelVolume volume = empty_lattice(formula, max_voxels);
   if (formula.shape == Formula::Shape::ball) {
     for_each_inside(volume, true, glm::dvec3(0.0), formula.size_m,
@@ -156,9 +155,8 @@ LabelVolume make_volume(const Formula& formula, std::size_t max_voxels) {
                 labels[static_cast<std::size_t>(k)]);
     }
   }
-  // An inclusion replaces material. What sticks out of the shape stays empty, and a cavity (label 0) made by
-  // an earlier inclusion can be filled by a later one, so 'material' is asked of the shape, not of the
-  // labels.
+  // An inclusion replaces material inside the shape; outside, voxels stay empty. The test uses the shape, not
+  // the labels: a later inclusion may fill a cavity (label 0) of an earlier one.
   std::vector<std::uint8_t> shape;
   if (!formula.inclusions.empty() && formula.shape == Formula::Shape::ball) shape = volume.labels;
   for (const Inclusion& inclusion : formula.inclusions) {

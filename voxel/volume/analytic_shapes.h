@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Volumes from a formula: block, ball, layers, inclusions.
+// Label volumes from analytic shapes: a block or a ball, with layers and inclusions.
+// A voxel is filled when its centre lies in the shape. Shapes are centred on the middle of the volume, which
+// is the origin of the scene.
 #pragma once
 
 #include <variant>
@@ -9,7 +11,7 @@
 
 namespace voxel {
 
-// All shapes are centred on the volume's own middle; sizes in meters.
+// Sizes and positions in meters, from the middle of the volume.
 struct Inclusion {
   enum class Shape : std::uint8_t { box, ball } shape = Shape::ball;
   glm::dvec3 centre_m{0.0};  // from the middle of the volume
@@ -32,8 +34,8 @@ struct Formula {
 };
 
 // A voxel is filled when its centre lies in the shape; a block of size s at spacing h has round(s/h) voxels
-// an axis. The middle of the volume lies at the origin of the scene. Throws std::invalid_argument with the
-// numbers when a size or a spacing is not finite and positive, or the lattice would have more than
+// along an axis. The middle of the volume lies at the origin of the scene. Throws std::invalid_argument, with
+// the numbers, if a size or a spacing is not finite and positive, or if the lattice would have more than
 // `max_voxels`.
 LabelVolume make_volume(const Formula& formula, std::size_t max_voxels);
 

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "voxel/volume/raw_volume.h"
 #include "voxel/volume/check_header.h"
+#include "voxel/volume/raw_volume.h"
 
 namespace voxel {
 namespace {
@@ -29,7 +29,7 @@ struct Element {
   std::uint32_t length = 0;
 };
 
-// Sequences and items are walked flat: their headers are passed, and what is in them comes next.
+// Walks sequences and items flat: after the header of a sequence or an item, its content follows as elements.
 class Walker {
  public:
   explicit Walker(const std::filesystem::path& path) : path_(path), file_(path, std::ios::binary) {
@@ -106,7 +106,7 @@ class Walker {
     file_.seekg(static_cast<std::streamoff>(at_));
   }
 
-  // The file's own elements, group 0002, always explicit and little-endian.
+  // The file meta elements (group 0002), always explicit and little-endian.
   void walk_meta() {
     while (left() >= 8) {
       const std::uint64_t start = at_;
@@ -128,7 +128,7 @@ class Walker {
     }
   }
 
-  // One element; false where the rest is padding.
+  // Walks one element. Returns false if the rest of the file is padding.
   bool step() {
     const Element element = header();
     const bool pixels = element.tag == kPixels && open_.empty();
@@ -144,7 +144,7 @@ class Walker {
       refuse_volume(path_, "there is no DICOM element at byte ", at_, "; ", kDamaged);
     }
     if (element.length == kUndefined) {
-      // What is inside an 'unknown' of undefined length is implicit (PS3.5, 6.2.2).
+      // The content of an element of type UN and undefined length is implicit (PS3.5, 6.2.2).
       open_.push_back({implicit_, pixels});
       if (element.type == "UN") implicit_ = true;
       return true;
@@ -155,7 +155,7 @@ class Walker {
     return true;
   }
 
-  // An implicit element does not say that it is a sequence; GDCM looks at its first bytes, and so does this.
+  // An implicit element has no type. As GDCM does, a sequence is recognised by its first bytes.
   bool begins_with_item(const Element& element) {
     if (element.length < 8) return false;
     const std::uint64_t start = at_;
@@ -178,13 +178,13 @@ class Walker {
     if (element.length == kUndefined && !fragment) {
       open_.push_back({implicit_, false});
     } else if (fragment) {
-      pass(element);  // of packed pixels, not elements
+      pass(element);  // a fragment of packed pixels holds no elements
     } else if (element.length > left()) {
       refuse(element);
     }
   }
 
-  // What was opened without a length and ends at a delimiter.
+  // A sequence or item of undefined length; a delimiter ends it.
   struct Open {
     bool implicit_outside = false;
     bool pixels = false;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Whether a DICOM file's lengths fit into it. Internal to volume_file: GDCM allocates whatever an element
-// says it is long, up to 4 GB each, before it notices that the file ends.
+// Checks that every element of a DICOM file fits into the file, before GDCM opens it. Internal to the readers
+// (read_volume.h). GDCM allocates the length that an element states, up to 4 GB each, before it notices the
+// end of the file. Source: DICOM PS3.5, chapter 7.
 #pragma once
 
 #include <filesystem>
@@ -13,8 +14,8 @@ enum class DicomKind {
   image
 };  // no DICOM; DICOM of another kind (a directory, a report)
 
-// Walks the elements of a file without keeping them. Throws VolumeError where one is longer than what is
-// left.
+// Walks the elements of a file without keeping them. Throws VolumeError if an element is longer than the rest
+// of the file.
 DicomKind check_dicom(const std::filesystem::path& path);
 
 }  // namespace voxel

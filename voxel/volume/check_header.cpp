@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Deflate packs at most 1,032 bytes into one.
+// Deflate packs at most 1,032 bytes into one byte; with some margin.
 constexpr double kMostPacked = 1100.0;
 constexpr const char* kNoSpacing = "the header gives no voxel spacing; one unit was put in its place";
 constexpr bool kLittle = std::endian::native == std::endian::little;
@@ -42,17 +42,17 @@ std::string trimmed(const std::string& text) {
   return first == std::string::npos ? "" : text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
 }
 
-// The "key = value" or "key: value" lines, keys in lower case without blanks.
+// The "key = value" or "key: value" lines; keys are in lower case without blanks.
 struct TextHeader {
   std::map<std::string, std::string> fields;
-  std::uint64_t bytes = 0;  // up to what follows it in the same file
+  std::uint64_t bytes = 0;  // length of the header in its file
 
   [[nodiscard]] bool has(const std::string& key) const { return fields.count(key) != 0; }
   [[nodiscard]] std::string text(const std::string& key) const {
     const auto field = fields.find(key);
     return field == fields.end() ? "" : field->second;
   }
-  // NaN where the field is no number.
+  // `otherwise` if the field is absent; NaN if it is not a number.
   [[nodiscard]] double number(const std::string& key, double otherwise) const {
     const auto field = fields.find(key);
     if (field == fields.end()) return otherwise;
@@ -62,10 +62,9 @@ struct TextHeader {
   }
 };
 
-// Reads up to an empty line, which ends a NRRD header, or the line of `last_key`, which ends a MetaImage
-// header.
+// Reads to the end of the header: an empty line (NRRD) or the line of `last_key` (MetaImage).
 TextHeader read_text_header(const fs::path& path, char separator, const std::string& last_key) {
-  constexpr std::size_t kLongestLine = 1000;  // MetaIO has room for 1,024 and does not look
+  constexpr std::size_t kLongestLine = 1000;  // MetaIO has a buffer of 1,024 and does not check
   constexpr std::size_t kMostLines = 1000;
   std::ifstream file(path, std::ios::binary);
   TextHeader header;
@@ -102,11 +101,11 @@ std::uint64_t size_of_file(const fs::path& path) {
   return error ? 0 : bytes;
 }
 
-// The voxels' file as the header names it.
+// Finds the file of the voxels that the header names.
 void find_data_file(const fs::path& header, const std::string& name, VoxelPlace& place) {
   const std::string word = lower_case(name);
   if (name.empty() || word == "local") return;
-  // LIST and printf patterns name several files, and the libraries hand patterns to printf as they are.
+  // LIST and printf patterns name several files. The libraries pass patterns to printf unchecked.
   if (starts_with(word, "list") || name.find('%') != std::string::npos) {
     refuse_volume(header, "the voxels are spread over several files ('", name,
                   "'); save the volume as one file");
@@ -123,12 +122,12 @@ void find_data_file(const fs::path& header, const std::string& name, VoxelPlace&
 
 void check_axes(const fs::path& path, double axes) {
   if (axes >= 1.0 && axes <= 7.0 && axes == std::floor(axes))
-    return;  // whether it is one volume is seen later
+    return;  // the reader checks later that it is one volume
   refuse_volume(path, "the header says ", axes, " axes; a volume has three. ", kDamaged);
 }
 
-// A count of bytes in a header: absent, or a number that can be one. -1 means 'the voxels are at the file's
-// end'.
+// A byte count in a header; 0 if absent. -1 means that the voxels are at the end of the file and gives 0,
+// too.
 std::uint64_t bytes_to_skip(const fs::path& path, const TextHeader& header, const std::string& key) {
   const double bytes = header.number(key, 0.0);
   if (!(bytes >= -1.0 && bytes <= 1e15)) {
@@ -149,7 +148,8 @@ void inspect_meta(const fs::path& path, VoxelPlace& place) {
   const std::string binary = lower_case(header.text("binarydata"));
   if (starts_with(binary, "f") || starts_with(binary, "0")) place.packing = VoxelPlace::Packing::text;
   place.offset += bytes_to_skip(path, header, "headersize");
-  if (header.number("headersize", 0.0) < 0.0) place.as_they_are = false;  // at the file's end
+  if (header.number("headersize", 0.0) < 0.0)
+    place.as_they_are = false;  // the voxels are at the end of the file
   if (!header.has("elementspacing")) place.notes.emplace_back(kNoSpacing);
   for (const char* key : {"binarydatabyteordermsb", "elementbyteordermsb"}) {
     const std::string order = lower_case(header.text(key));
@@ -182,7 +182,7 @@ void inspect_nrrd(const fs::path& path, VoxelPlace& place) {
   if (directions.find("nan") != std::string::npos || spacings.find("nan") != std::string::npos)
     refuse_volume(path, "the header gives no voxel spacing along an axis (nan); correct it");
   if (directions.empty() && spacings.empty()) place.notes.emplace_back(kNoSpacing);
-  // Of the axes, those without a direction are no space; three must be.
+  // An axis without a direction is not a space axis. Three space axes are needed.
   std::size_t none = 0;
   for (auto at = directions.find("none"); at != std::string::npos; at = directions.find("none", at + 4))
     ++none;
@@ -195,7 +195,7 @@ void inspect_nrrd(const fs::path& path, VoxelPlace& place) {
 
 // ---- NIfTI
 
-// The number at `at` of a header, in the file's byte order.
+// The number at byte `at` of a header; its bytes are reversed if `swapped`.
 template <typename T, std::size_t Bytes>
 T field_at(const std::array<unsigned char, Bytes>& header, std::size_t at, bool swapped) {
   std::array<unsigned char, sizeof(T)> bytes{};
@@ -206,7 +206,7 @@ T field_at(const std::array<unsigned char, Bytes>& header, std::size_t at, bool 
   return value;
 }
 
-// ITK ends the whole program over a frame that is not finite, or overflows while it is decomposed.
+// Refuses a frame that is not finite or overflows in its decomposition: ITK would end the program.
 template <std::size_t Bytes>
 void check_nifti_frame(const fs::path& path, const std::array<unsigned char, Bytes>& header, bool swapped) {
   const auto check = [&](const char* what, std::size_t at, std::size_t count) {
@@ -221,7 +221,7 @@ void check_nifti_frame(const fs::path& path, const std::array<unsigned char, Byt
   if (field_at<std::int16_t>(header, 254, swapped) > 0) check("sform", 280, 12);
 }
 
-// Files that are good, but not what their name says, or of a kind that is not read.
+// Refuses valid files whose name is wrong, or whose kind is not supported.
 template <std::size_t Bytes>
 void check_nifti_kind(const fs::path& path, const std::array<unsigned char, Bytes>& header) {
   const bool named_packed = ends_with(lower_case(path.string()), ".gz");
@@ -238,7 +238,7 @@ void check_nifti_kind(const fs::path& path, const std::array<unsigned char, Byte
     refuse_volume(path, "the voxels are in a file of their own (.img); save it as one .nii file");
 }
 
-// Where the two frames of a header put a voxel in different places, it is luck which one a program takes.
+// Do qform and sform put a voxel in different places? Programs differ in which of the two they use.
 template <std::size_t Bytes>
 bool frames_differ(const std::array<unsigned char, Bytes>& header, bool swapped) {
   const auto at = [&](std::size_t byte, std::size_t n) {
@@ -268,7 +268,7 @@ bool frames_differ(const std::array<unsigned char, Bytes>& header, bool swapped)
 void inspect_nifti(const fs::path& path, VoxelPlace& place) {
   constexpr std::int32_t kHeaderBytes = 348;
   std::array<unsigned char, kHeaderBytes> header{};
-  const gzFile file = gzopen(path.c_str(), "rb");  // reads what is not packed as it is
+  const gzFile file = gzopen(path.c_str(), "rb");  // also reads unpacked files
   const int got = file == nullptr ? 0 : gzread(file, header.data(), header.size());
   if (file != nullptr) gzclose(file);
   check_nifti_kind(path, header);
@@ -303,7 +303,7 @@ void inspect_nifti(const fs::path& path, VoxelPlace& place) {
   if (ends_with(lower_case(path.string()), ".gz")) place.packing = VoxelPlace::Packing::deflate;
   const float offset = field_at<float>(header, 108, swapped);
   const double most = place.packing == VoxelPlace::Packing::raw ? 1.0 : kMostPacked;
-  // 0 is common and means right after the header and its four bytes of extension flags.
+  // 0 is common: the voxels follow the header and its four bytes of extension flags.
   if (!(offset >= 0.0F && offset <= most * static_cast<double>(place.file_bytes))) {
     refuse_volume(path, "the header says the voxels begin at byte ", offset, "; ", kDamaged);
   }
@@ -311,8 +311,8 @@ void inspect_nifti(const fs::path& path, VoxelPlace& place) {
                                                 {256, 1}, {512, 2}, {768, 4}, {1024, 8}, {1280, 8}};
   const auto type = type_bytes.find(field_at<std::int16_t>(header, 70, swapped));
   if (type != type_bytes.end())
-    place.voxel_bytes = type->second;  // other types are refused once ITK names them
-  // With a slope, ITK makes floats of them.
+    place.voxel_bytes = type->second;  // other types are refused after ITK has named them
+  // With a slope, ITK converts the voxels to floats.
   const float slope = field_at<float>(header, 112, swapped),
               intercept = field_at<float>(header, 116, swapped);
   place.as_they_are = slope == 0.0F || (slope == 1.0F && intercept == 0.0F);
@@ -368,7 +368,7 @@ VoxelPlace inspect_volume(const fs::path& path, VolumeFormat format) {
 
 void check_file_size(const fs::path& path, const VoxelPlace& place, VolumeHeader& header) {
   const std::uint64_t left = place.file_bytes > place.offset ? place.file_bytes - place.offset : 0;
-  // As text a voxel of up to eight bytes takes one digit and a blank at least.
+  // As text, a voxel of up to eight bytes takes at least one digit and a blank.
   const bool raw = place.packing == VoxelPlace::Packing::raw;
   const double most = raw ? 1.0 : place.packing == VoxelPlace::Packing::text ? 8.0 : kMostPacked;
   const std::uint64_t needed = bytes_in_file(place, header);

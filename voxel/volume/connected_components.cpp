@@ -10,7 +10,7 @@ ConnectedRuns::ConnectedRuns(const LabelVolume& volume, const std::vector<bool>&
   const auto rows = static_cast<std::size_t>(ny) * static_cast<std::size_t>(nz);
   row_begin_.assign(rows + 1, 0);
   DisjointSets sets;
-  // Two rows with a face between them: runs that overlap are one piece.
+  // Joins the overlapping runs of two rows that share a face.
   const auto join_rows = [&](std::size_t row, std::size_t other) {
     std::size_t a = row_begin_[row], b = row_begin_[other];
     const std::size_t end_a = runs_.size(), end_b = row_begin_[other + 1];
@@ -36,7 +36,7 @@ ConnectedRuns::ConnectedRuns(const LabelVolume& volume, const std::vector<bool>&
       if (k > 0) join_rows(row, row - static_cast<std::size_t>(ny));
     }
   }
-  // Numbers without gaps, in the order of each piece's first run.
+  // Numbers the components without gaps, in the order of their first run.
   std::vector<std::uint32_t> number(runs_.size(), kNone);
   for (Run& run : runs_) {
     std::uint32_t& n = number[sets.find(run.piece)];

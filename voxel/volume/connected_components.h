@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which voxels of a volume hang together, by runs along its rows: memory grows with the runs, not the voxels.
+// Connected components of a label volume, by runs along its rows.
+// Voxels are connected by faces. Memory grows with the number of runs, not of voxels. Components ("pieces")
+// are numbered without gaps, in the order of their first run.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +11,7 @@
 
 namespace voxel {
 
-// The pieces, connected by faces, of the voxels whose label is in `chosen`.
+// Face-connected components of the voxels whose label is in `chosen` (indexed by label).
 class ConnectedRuns {
  public:
   struct Run {
@@ -20,11 +22,11 @@ class ConnectedRuns {
 
   [[nodiscard]] std::uint32_t pieces() const { return pieces_; }
   [[nodiscard]] const std::vector<Run>& runs() const { return runs_; }
-  // Row of a run: j + k·dims[1].
+  // Index of the first run of a row; row = j + k·dims[1].
   [[nodiscard]] std::size_t row_begin(std::size_t row) const { return row_begin_[row]; }
   [[nodiscard]] std::size_t rows() const { return row_begin_.size() - 1; }
   static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
-  // The piece that a voxel belongs to; kNone where it was not chosen.
+  // The component of a voxel; kNone if the voxel's label is not chosen.
   [[nodiscard]] std::uint32_t piece_of(int i, std::size_t row) const;
 
  private:
@@ -33,7 +35,7 @@ class ConnectedRuns {
   std::uint32_t pieces_ = 0;
 };
 
-// Sets with a member each at first, joined one by one; the smallest member stands for all.
+// Union-find with path halving. Each set is represented by its smallest member.
 class DisjointSets {
  public:
   std::uint32_t add() {

@@ -20,7 +20,7 @@ template <typename... Parts>
   throw std::invalid_argument(text.str());
 }
 
-void check(const LabelVolume& volume, const ThinningOptions& options) {
+void check_options(const LabelVolume& volume, const ThinningOptions& options) {
   if (options.every < 2 || options.every > 64)
     refuse("thinning keeps every ", options.every, "th row of voxels; use every = 2 to 64");
   if (options.shell < 1 || options.shell > 63)
@@ -28,8 +28,8 @@ void check(const LabelVolume& volume, const ThinningOptions& options) {
   const glm::dvec3& h = volume.spacing_m;
   const double smallest = std::min({h.x, h.y, h.z}), largest = std::max({h.x, h.y, h.z});
   const double middle = h.x + h.y + h.z - smallest - largest;
-  // The middle of four voxels of the shell is half a diagonal from each, and a voxel is a ball of half the
-  // smallest spacing.
+  // The middle of four voxels of the shell is half a diagonal from each of them. A voxel counts as a ball
+  // with half the smallest spacing as radius.
   const double gap = 0.5 * options.stretch_max * std::hypot(largest, middle) - 0.5 * smallest;
   if (options.tool_radius_m >= gap) return;
   refuse(
@@ -38,7 +38,7 @@ void check(const LabelVolume& volume, const ThinningOptions& options) {
       gap * 1e3, " mm or more, a smaller spacing, or no thinning");
 }
 
-// Labels that no voxel has, largest first.
+// Unused labels, largest first.
 std::vector<std::uint8_t> free_labels(const LabelVolume& volume) {
   std::array<bool, 256> used{};
   for (const std::uint8_t label : volume.labels) used[label] = true;
@@ -70,8 +70,8 @@ class Thinner {
  private:
   LabelVolume& volume() { return result_.volume; }
 
-  // Each stiff label gets one for its struts and one for what is removed; the second is in use on the way
-  // only, where what was removed must still count as stiff, and may be kept after all.
+  // Each stiff label gets one label for its struts and one for its removed voxels. The second label is
+  // temporary: removed voxels still count as stiff, and join_pieces() may restore them.
   void choose_labels() {
     std::array<std::size_t, 256> count{};
     for (const std::uint8_t label : volume().labels) ++count[label];
@@ -94,7 +94,7 @@ class Thinner {
       refuse("no voxel has a label that thinning names; name the labels of what is stiff");
   }
 
-  // Struts along the edges of cubes, and a frame of them under the surface layer (see the header).
+  // Marks struts along the edges of cubes, and the frame in or under the shell (see the header).
   void mark() {
     const LabelVolume& v = volume();
     std::vector<bool> inside(v.labels.size());
@@ -108,7 +108,7 @@ class Thinner {
     for_each_stiff([&](const std::array<int, 3>& at, std::size_t index) {
       std::array<bool, 3> on{};
       for (std::size_t d = 0; d < 3; ++d) on[d] = at[d] % options_.every == 0;
-      // A shell of one layer has the frame beneath it, any other in its innermost layer.
+      // A shell of one layer has the frame beneath it. A thicker shell has the frame in its innermost layer.
       const bool may_carry = inside[index] == (options_.shell == 1);
       bool strut = inside[index] && on[0] + on[1] + on[2] >= 2;
       for (std::size_t d = 0; d < 3 && may_carry && !strut; ++d) {
@@ -124,7 +124,7 @@ class Thinner {
     });
   }
 
-  // visit(place, index) for the voxels of the labels to be thinned.
+  // Calls visit(place, index) for the voxels of the labels to be thinned.
   template <typename Visit>
   void for_each_stiff(const Visit& visit) {
     const std::array<int, 3>& n = volume().dims;
@@ -138,7 +138,7 @@ class Thinner {
     }
   }
 
-  // Whether everything within the shell's thickness, corners included, is stiff.
+  // Are all voxels within the shell's thickness, corners included, stiff?
   [[nodiscard]] bool is_inside(int i, int j, int k) {
     const int s = options_.shell;
     const std::array<int, 3>& n = volume().dims;
@@ -165,8 +165,8 @@ class Thinner {
     before[0] = after[0] = false;
     for (std::size_t label = 0; label < 256; ++label) after[label] = after[label] && !is_removed_[label];
     const ConnectedRuns whole(volume(), before), kept(volume(), after);
-    if (kept.pieces() == whole.pieces()) return;  // thinning makes pieces, and never joins any
-    // Of each whole piece, the first kept one is what the others are joined to.
+    if (kept.pieces() == whole.pieces()) return;  // thinning can only split components
+    // In each component of the whole object, the first kept component is the one that the others join.
     std::vector<std::uint32_t> first(whole.pieces(), ConnectedRuns::kNone);
     DisjointSets joined;
     for (std::uint32_t p = 0; p < kept.pieces(); ++p) joined.add();
@@ -187,14 +187,15 @@ class Thinner {
     }
   }
 
-  // Keeps the shortest way from a piece, through what is removed, to any that it does not hang on yet. Struts
-  // lie `every` apart, so that it is short; where it leads to another loose piece, that one goes on.
+  // Restores the shortest path, through removed voxels, from a component to any component that is not joined
+  // to it yet. The path is short, because struts lie `every` apart. If the path leads to another loose
+  // component, that component is joined in its own turn.
   void join_piece(std::uint32_t piece, const std::vector<glm::ivec3>& voxels, const ConnectedRuns& kept,
                   DisjointSets& joined) {
     static constexpr std::array<std::array<int, 3>, 6> kFaces{
         {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}};
     constexpr std::size_t kStart = std::numeric_limits<std::size_t>::max();
-    std::map<std::size_t, std::size_t> from;  // voxel reached → the one before it
+    std::map<std::size_t, std::size_t> from;  // voxel reached → the voxel before it
     std::vector<glm::ivec3> front = voxels, next;
     for (; !front.empty(); front.swap(next), next.clear()) {
       for (const glm::ivec3& at : front) {
@@ -230,7 +231,7 @@ class Thinner {
 
   ThinningOptions options_;
   Thinned result_;
-  std::map<std::size_t, std::uint32_t> restored_;  // voxel kept after all → the piece it joined
+  std::map<std::size_t, std::uint32_t> restored_;  // restored voxel → the component that it joins
   std::array<std::uint8_t, 256> removed_label_{}, original_{};  // [stiff label], [removed label]
   std::array<bool, 256> is_stiff_{}, is_removed_{};
 };
@@ -238,7 +239,7 @@ class Thinner {
 }  // namespace
 
 Thinned thin_labels(LabelVolume volume, const ThinningOptions& options) {
-  check(volume, options);
+  check_options(volume, options);
   return Thinner(std::move(volume), options).thin();
 }
 

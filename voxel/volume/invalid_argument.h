@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How what is asked for wrongly is refused.
+// Throws std::invalid_argument with a text put together from parts. Numbers have nine digits.
 #pragma once
 
 #include <sstream>
@@ -7,7 +7,7 @@
 
 namespace voxel {
 
-// Throws std::invalid_argument with the parts, one after another, as its text.
+// Throws std::invalid_argument; its text is the parts, concatenated.
 template <typename... Parts>
 [[noreturn]] void refuse(const Parts&... parts) {
   std::ostringstream text;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What read_volume.cpp and read_dicom.cpp share of ITK. No other file includes this one.
+// Functions on ITK's readers that read_volume.cpp and read_dicom.cpp share. No other file includes this
+// header. Every exception of ITK and GDCM leaves as a VolumeError with file, action, cause and remedy.
 #pragma once
 
 #include <exception>
@@ -10,27 +11,28 @@
 #include <string>
 #include <vector>
 
-#include "voxel/volume/subprocess.h"
-#include "voxel/volume/raw_volume.h"
 #include "voxel/volume/check_header.h"
+#include "voxel/volume/raw_volume.h"
+#include "voxel/volume/subprocess.h"
 
 namespace itk {
-class ImageIOBase;  // NOLINT(cppcoreguidelines-virtual-class-destructor): ITK's own, reported where it is
-                    // first named
+class ImageIOBase;  // NOLINT(cppcoreguidelines-virtual-class-destructor): ITK's class, reported at its
+                    // first declaration
 }
 
 namespace voxel {
 
-// The component of what ITK is about to read, if it is one number a voxel of a type that we know.
+// The component type that ITK will read; none if a voxel holds several numbers or its type is unknown.
 std::optional<Component> component_of(const itk::ImageIOBase& io);
 
-// ITK's and GDCM's words for what went wrong, without their source file, class and address.
+// The error text of ITK or GDCM, without source file, class and address.
 std::string words_of(const std::exception& error);
 
-// Reads the voxels that ReadImageInformation announced, and no more.
+// Reads the voxels that ReadImageInformation announced. Throws std::runtime_error if their size is not that
+// of `bytes`.
 void read_voxels(itk::ImageIOBase& io, std::vector<std::byte>& bytes);
 
-// Calls `call` and turns whatever the libraries throw into a VolumeError: "file: doing: what; remedy".
+// Calls `call` and turns any exception of the libraries into a VolumeError: "file: doing: what; remedy".
 template <typename Call>
 auto in_words(const std::filesystem::path& path, const char* doing, const char* remedy, Call call) {
   try {
@@ -45,13 +47,13 @@ auto in_words(const std::filesystem::path& path, const char* doing, const char* 
   }
 }
 
-// One DICOM series in a folder (read_dicom.cpp), its files in order along the slice normal.
+// One DICOM series in a folder (read_dicom.cpp). Its files are ordered along the slice normal.
 struct DicomSeries {
   std::vector<std::string> files;
   VolumeData data;  // without voxels
 };
 DicomSeries read_dicom_header(const std::filesystem::path& folder, double unit_m);
-// All voxels, slice after slice.
+// All voxels of the series, slice after slice.
 std::unique_ptr<SharedMemory> read_dicom_voxels(const std::filesystem::path& folder,
                                                 const DicomSeries& series);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A label volume: what a soft object is made of, on a regular lattice.
+// A label volume: the material label of each voxel of a soft object, on a regular lattice.
 #pragma once
 
 #include <array>
@@ -13,8 +13,8 @@
 namespace voxel {
 
 // Labels on a lattice of dims[0] × dims[1] × dims[2] voxels, x fastest. 0 is empty.
-// The centre of voxel (i, j, k) in the volume frame is (i, j, k)·spacing_m; the volume frame lies in the
-// scene by rotation and origin: point_in_scene = origin_m + rotation · point_in_volume.
+// The centre of voxel (i, j, k) in the volume frame is (i, j, k)·spacing_m. Rotation and origin place the
+// volume frame in the scene: point_in_scene = origin_m + rotation · point_in_volume.
 struct LabelVolume {
   std::array<int, 3> dims{0, 0, 0};
   glm::dvec3 spacing_m{1e-3};               // each > 0, may differ per axis (CT slices)

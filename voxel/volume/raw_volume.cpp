@@ -12,10 +12,10 @@
 namespace voxel {
 namespace {
 
-constexpr double kShortest = 1e-9, kLongest = 1e6;  // (unit: meter) of a voxel
-constexpr double kLongestAxis = 1e6;                // (unit: voxel) more is not a volume but a broken header
+constexpr double kShortest = 1e-9, kLongest = 1e6;  // (unit: meter) edge of a voxel
+constexpr double kLongestAxis = 1e6;                // (unit: voxel) a longer axis means a broken header
 
-// Calls visit with a value of the component's type.
+// Calls visit with a zero of the component's type.
 template <typename Visit>
 auto visit_component(Component component, Visit visit) {
   switch (component) {
@@ -57,8 +57,8 @@ std::string megabytes(double bytes) {
   return text.str();
 }
 
-// Rotation matrices that only exchange and turn axes are made exact, whatever the file's float rounding did
-// to them, and others orthonormal to double precision.
+// Removes the file's float rounding: signed permutations of the axes become exact, other matrices orthonormal
+// to double precision.
 glm::dmat3 exact_axes(const glm::dmat3& direction) {
   glm::dmat3 snapped(0.0);
   bool permutation = true;
@@ -75,7 +75,8 @@ glm::dmat3 exact_axes(const glm::dmat3& direction) {
   return {x, y, handed * glm::cross(x, y)};
 }
 
-// The quaternions of the 24 turns that exchange axes have components 0, 1/2, sqrt(1/2) and 1 only.
+// Quaternion of a rotation. The 24 rotations that permute axes have only components 0, 1/2, sqrt(1/2) and 1,
+// which are set exactly.
 glm::dquat quaternion_of(const glm::dmat3& rotation) {
   glm::dquat q = glm::normalize(glm::quat_cast(rotation));
   for (int n = 0; n < 4; ++n) {
@@ -118,7 +119,7 @@ void check_frame(const std::filesystem::path& path, const FileFrame& frame) {
   }
 }
 
-// Which source voxel the centre of each voxel of the result is nearest to, along one axis.
+// Nearest source voxel of the centre of each result voxel, along one axis.
 struct Axis {
   std::vector<std::size_t> source;
   double first_centre = 0.0;  // (unit: source spacing) from source voxel 0
@@ -135,7 +136,7 @@ Axis resample_axis(int voxels, double spacing, double wanted, bool reversed) {
   axis.first_centre = 0.5 * (voxels - 1) - 0.5 * (static_cast<double>(count) - 1.0) * ratio;
   axis.source.resize(count);
   for (std::size_t n = 0; n < count; ++n) {
-    // A centre halfway between two goes to the lower one, whatever rounding says.
+    // A centre halfway between two voxels goes to the lower voxel, independent of rounding.
     const double at = std::ceil(axis.first_centre + static_cast<double>(n) * ratio - 0.5 - 1e-9);
     const double clamped = std::clamp(at, 0.0, voxels - 1.0);
     axis.source[n] = static_cast<std::size_t>(reversed ? voxels - 1.0 - clamped : clamped);
@@ -299,7 +300,7 @@ LabelVolume label_voxels(const std::filesystem::path& path, const VolumeData& da
       return;
     }
     const auto label_of = [&](T value, std::size_t index, std::size_t slice) {
-      // In doubles, where the comparison with 255 means the same for every type; NaN fails it.
+      // In double, the comparison with 255 means the same for every type. NaN fails it.
       const auto number = static_cast<double>(value);
       if (number >= 0.0 && number <= 255.0 && number == std::floor(number))
         return static_cast<std::uint8_t>(number);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A volume as its file holds it, between reading and labelling. Internal to volume_file: knows neither ITK
-// nor a format.
+// A volume in its file's component type, between reading and labelling. Internal to the readers
+// (read_volume.h); independent of ITK and of file formats. Checks frames, memory and options; labels and
+// resamples the voxels.
 #pragma once
 
 #include <cstddef>
@@ -42,11 +43,12 @@ struct VolumeData {
   }
 };
 
-// Gives the next slice of voxels: components in the file's order, x fastest, valid until the next call. So
-// that a volume never lies in memory in its file's type, which may be eight times that of its labels.
+// Returns the next slice of voxels: components in the file's order, x fastest, valid until the next call.
+// Reading by slices keeps the whole volume out of memory in its file's type, which may be eight times the
+// size of its labels.
 using NextSlice = std::function<std::span<const std::byte>()>;
 
-// Throws VolumeError: the file, what is wrong with it, and the parts' text put together.
+// Throws VolumeError; its text is the file, then the parts, concatenated.
 template <typename... Parts>
 [[noreturn]] void refuse_volume(const std::filesystem::path& path, const Parts&... parts) {
   std::ostringstream text;
@@ -56,32 +58,33 @@ template <typename... Parts>
   throw VolumeError(text.str());
 }
 
-// What a file says about its lattice, in the file's length unit.
+// Frame of the lattice as the file states it, in the file's length unit.
 struct FileFrame {
   std::array<double, 3> dims{0.0, 0.0, 0.0};
   glm::dvec3 spacing{1.0}, origin{0.0};
   glm::dmat3 direction{1.0};  // columns are the axes of the lattice
 };
 
-// Checks the frame and fills the header's dims, spacing, origin, rotation, component and bytes.
+// Checks the frame and fills the header's dims, spacing, origin, rotation, component and bytes. Throws
+// VolumeError. A left-handed frame gets its first axis reversed, with a note.
 void set_frame(const std::filesystem::path& path, const FileFrame& frame, Component component, double unit_m,
                VolumeData& data);
 
-// Refuses, with the numbers, what would need more than max_bytes. `copies` of the voxels are in memory at a
-// time, and a slice.
+// Throws VolumeError, with the numbers, if reading would need more than max_bytes: `copies` of the voxels,
+// one slice and the labels.
 void check_memory(const std::filesystem::path& path, const VolumeData& data, double copies,
                   const std::optional<glm::dvec3>& spacing_m, std::uint64_t max_bytes);
 
-// Labels of the voxels, resampled where asked. Asks for every slice.
+// Labels of the voxels, resampled if options.spacing_m is set. Calls `next` once for every slice.
 LabelVolume label_voxels(const std::filesystem::path& path, const VolumeData& data, const NextSlice& next,
                          const VolumeFileOptions& options);
 
 VolumeStatistics statistics_of(const VolumeData& data, const NextSlice& next);
 
-// The voxels, each as a double.
+// The voxels, each converted to a double.
 std::vector<std::byte> as_doubles(Component component, std::span<const std::byte> voxels);
 
-// Refuses rules, spacing, unit or limit that no file could meet.
+// Throws VolumeError for a rule or a spacing that is invalid for every file.
 void check_options(const std::filesystem::path& path, const VolumeFileOptions& options);
 
 }  // namespace voxel

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A folder with one DICOM series: its slices put in order by their own positions, one slice in memory at a
-// time.
+// Reads a folder with one DICOM series. Slices are ordered by their positions along the slice normal. GDCM
+// runs only in child processes, so that a damaged file cannot end the caller.
 #include <itkGDCMImageIO.h>
 
 #include <algorithm>
@@ -14,8 +14,8 @@
 #include <type_traits>
 
 #include "voxel/volume/check_dicom.h"
-#include "voxel/volume/subprocess.h"
 #include "voxel/volume/itk_adapter.h"
+#include "voxel/volume/subprocess.h"
 
 namespace voxel {
 namespace {
@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 
 struct Slice {
   std::string file;
-  std::string series;  // its identifier
+  std::string series;  // series instance UID
   FileFrame frame;
   Component component = Component::int16;
   double height = 0.0;  // (unit: the file's) along the slice normal
@@ -34,13 +34,13 @@ std::string name_of(const Slice& slice) {
   return fs::path(slice.file).filename().string();
 }
 
-// What a process apart hands back of one slice: plain, because it lies in shared memory.
+// Header of one slice as a child process returns it. Trivially copyable, because it lies in shared memory.
 struct SharedSlice {
   bool done = false;
   std::array<char, 1000> refusal{};
   std::array<char, 100> series{};
   Component component = Component::int16;
-  bool no_spacing = false;  // in its header, as far as that can be seen
+  bool no_spacing = false;  // the header seems to have no pixel spacing
   FileFrame frame;
 };
 static_assert(std::is_trivially_copyable_v<SharedSlice>);
@@ -64,7 +64,7 @@ void read_slice_header(const std::string& file, SharedSlice& slice) {
   std::string series;
   io->GetValueFromTag("0020|000e", series);
   copy_text(series, slice.series);
-  // GDCM puts 1 mm in the place of a spacing that is 0 or missing.
+  // GDCM replaces a spacing that is 0 or missing by 1 mm.
   std::string spacing;
   io->GetValueFromTag("0028|0030", spacing);
   std::istringstream in(spacing);
@@ -91,14 +91,14 @@ void read_slice_header(const std::string& file, SharedSlice& slice) {
   }
 }
 
-// Calls `call(n)` for each file in a process apart, and refuses the first file that it refuses or does not
-// survive.
+// Calls `call(n)` for every file, all in one child process. Throws VolumeError for the first file that `call`
+// refuses or that ends the child.
 template <typename Call>
 void for_each_apart(const fs::path& folder, const std::vector<std::string>& files, SharedSlice* slices,
                     Call call) {
   for (std::size_t n = 0; n < files.size(); ++n) slices[n].done = false;
   const auto seconds = static_cast<unsigned>(60 + 10 * files.size());
-  const int ended = run_apart(
+  const int ended = run_in_subprocess(
       [&] {
         for (std::size_t n = 0; n < files.size(); ++n) {
           try {
@@ -122,8 +122,8 @@ void for_each_apart(const fs::path& folder, const std::vector<std::string>& file
   }
 }
 
-// The slices of the only series in the folder, in no order. Not by GDCMSeriesFileNames, which reads every
-// file of the folder as it is.
+// The slices of the only series in the folder, unordered. GDCMSeriesFileNames is not used: it would read
+// every file of the folder unchecked.
 std::vector<Slice> read_slices(const fs::path& folder, std::vector<std::string>& notes) {
   std::vector<fs::path> files;
   std::error_code error;
@@ -185,7 +185,8 @@ void check_alike(const fs::path& folder, const Slice& first, const Slice& slice)
                 "); put the slices of one volume into a folder of their own");
 }
 
-// The step between slices along their normal, the same for all. (unit: the file's)
+// The uniform step between slices along their normal (unit: the file's). Throws VolumeError for uneven
+// slices.
 double slice_step(const fs::path& folder, const std::vector<Slice>& slices) {
   std::vector<double> steps;
   for (std::size_t n = 1; n < slices.size(); ++n) steps.push_back(slices[n].height - slices[n - 1].height);
@@ -224,7 +225,7 @@ double slice_step(const fs::path& folder, const std::vector<Slice>& slices) {
 }  // namespace
 
 DicomSeries read_dicom_header(const fs::path& folder, double unit_m) {
-  itk::Object::SetGlobalWarningDisplay(false);  // the findings that matter are said in our own words
+  itk::Object::SetGlobalWarningDisplay(false);  // relevant findings go to notes and errors
   DicomSeries series;
   std::vector<Slice> slices = read_slices(folder, series.data.header.notes);
   series.data.header.format = "DICOM series";
@@ -232,7 +233,7 @@ DicomSeries read_dicom_header(const fs::path& folder, double unit_m) {
   for (Slice& slice : slices) {
     slice.height = glm::dot(slice.frame.origin, slices.front().frame.direction[2]);
     if (slices.size() > 1) check_alike(folder, slices.front(), slice);
-    // Each slice may carry a rescale of its own (PET), which decides its type.
+    // Each slice may have its own rescale (PET), which decides its type.
     if (slice.component != component) component = Component::float64;
   }
   std::stable_sort(slices.begin(), slices.end(),

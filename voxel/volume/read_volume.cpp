@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Volumes in single files. Every component type goes through one buffer of bytes (ImageIOBase), not through
-// ITK's image templates, which would compile for minutes; and each reader is named here, so that no factory
-// is registered.
+// Reads volumes from single files, and dispatches folders to read_dicom.cpp. Every component type goes
+// through one buffer of bytes (ImageIOBase), because ITK's image templates compile for minutes. Each ITK
+// reader is named here, so that no factory is registered.
 #include "voxel/volume/read_volume.h"
 
 #include <itkMetaImageIO.h>
@@ -47,7 +47,7 @@ FileFrame frame_of(const fs::path& path, const itk::ImageIOBase& io) {
   for (unsigned axis = 0; axis < 3; ++axis) {
     const auto a = static_cast<int>(axis);
     frame.dims[axis] = axis < axes ? static_cast<double>(io.GetDimensions(axis)) : 1.0;
-    if (axis >= axes) continue;  // a single slice or row: spacing 1 in the file's unit, along its own axis
+    if (axis >= axes) continue;  // a single slice or row gets spacing 1 (unit: the file's)
     frame.spacing[a] = io.GetSpacing(axis);
     frame.origin[a] = io.GetOrigin(axis);
     const std::vector<double> direction = io.GetDirection(axis);
@@ -58,8 +58,8 @@ FileFrame frame_of(const fs::path& path, const itk::ImageIOBase& io) {
   return frame;
 }
 
-// The NIfTI library reads the voxels of v.nii.gz from a v.nii that lies beside it, whatever is in that. So
-// where there is one, the file is read through a link in a folder where it is alone.
+// Isolates a packed NIfTI file. The NIfTI library reads the voxels of v.nii.gz from a file v.nii beside it,
+// if there is one. In that case v.nii.gz is read through a symbolic link in a temporary folder.
 class AloneFile {
  public:
   AloneFile(const fs::path& path, VolumeFormat format) : path_(path) {
@@ -96,7 +96,7 @@ struct OpenVolume {
   itk::ImageIOBase::Pointer io;
   VolumeData data;
   VoxelPlace place;
-  double copies = 1.0;  // of the voxels in memory while they are read
+  double copies = 1.0;  // copies of the voxels in memory during reading
 };
 
 OpenVolume open_volume(const fs::path& path, double unit_m) {
@@ -132,7 +132,7 @@ OpenVolume open_volume(const fs::path& path, double unit_m) {
         "the file has fewer than three axes; the missing ones have one voxel, one unit long");
   }
   check_file_size(path, open.place, open.data.header);
-  // NIfTI and NRRD are read into a buffer of their library's own first, and scaled NIfTI into a third.
+  // The NIfTI and NRRD libraries read into their own buffer first. Scaled NIfTI needs a third copy.
   if (format != VolumeFormat::meta) open.copies = 2.0;
   if (format == VolumeFormat::nifti && (*component == Component::float32 || *component == Component::float64))
     open.copies = 3.0;
@@ -144,8 +144,8 @@ bool is_folder(const fs::path& path) {
   return fs::is_directory(path, error);
 }
 
-// The voxels of a single file, slice by slice: as they are where nothing has to be done to them, and as the
-// library reads them otherwise (text, bzip2, scaled NIfTI), in memory then.
+// Calls use(data, next slice) for a single file. Voxels that need no conversion but byte order are streamed.
+// Others (text, bzip2, scaled NIfTI) are read whole into memory by the library.
 template <typename Use>
 auto with_file_slices(const fs::path& path, double unit_m, const std::optional<glm::dvec3>& spacing_m,
                       std::uint64_t max_bytes, Use use) {
@@ -162,7 +162,7 @@ auto with_file_slices(const fs::path& path, double unit_m, const std::optional<g
     return result;
   }
   check_memory(path, data, open.copies, spacing_m, max_bytes);
-  if (packed) {  // the libraries fill up with zeros what is not there
+  if (packed) {  // check completeness: the libraries replace missing voxels by zeros
     VoxelStream whole(path, open.place, data.header);
     const std::uint64_t slice =
         bytes_in_file(open.place, data.header) / static_cast<std::uint64_t>(data.header.dims[2]);
@@ -188,7 +188,7 @@ auto with_slices(const fs::path& path, double unit_m, const std::optional<glm::d
                  std::uint64_t max_bytes, Use use) {
   if (!is_folder(path)) return with_file_slices(path, unit_m, spacing_m, max_bytes, use);
   const DicomSeries series = read_dicom_header(path, unit_m);
-  check_memory(path, series.data, 1.0, spacing_m, max_bytes);  // what the process apart hands over
+  check_memory(path, series.data, 1.0, spacing_m, max_bytes);  // 1 copy: shared with the child process
   const auto voxels =
       in_words(path, "the voxels cannot be read", kDamaged, [&] { return read_dicom_voxels(path, series); });
   std::size_t at = 0;
@@ -243,7 +243,7 @@ std::string words_of(const std::exception& any) {
   if (text.rfind(prefix, 0) == 0) text.erase(0, prefix.size());
   const auto address = text.find("): ");  // NiftiImageIO(0x55…): words
   if (address != std::string::npos && text.find("(0x") < address) text.erase(0, address + 3);
-  const auto last_word = text.rfind("[nrrd] ");  // one of the stack of its functions
+  const auto last_word = text.rfind("[nrrd] ");  // keep the last entry of NRRD's error stack
   if (last_word != std::string::npos) text.erase(0, last_word + 7);
   for (char& c : text) c = c == '\n' || c == '\r' ? ' ' : c;
   const auto last = text.find_last_not_of(" .");

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Volumes out of files. The only part of the project that knows ITK. (Into files: write_volume.h.)
-// Frame: whatever the format, positions come out in ITK's (and DICOM's) world frame, in which x points to the
-// patient's left, y to the back and z to the head (LPS). That frame is the scene's. NIfTI files state theirs
-// as RAS (x right, y front), so their x and y change sign here and again on saving: viewers see the same
+// Reads label volumes from files: NIfTI, NRRD, MetaImage, or a folder with one DICOM series. (write_volume.h
+// writes them.) Only these readers use ITK.
+// Frame: positions of every format are returned in the world frame of ITK and DICOM, in which x points to the
+// patient's left, y to the back and z to the head (LPS). That frame is the scene's. NIfTI states positions in
+// RAS (x right, y front). So x and y change sign on reading and again on saving, and viewers show the same
 // place.
 #pragma once
 
@@ -18,13 +19,13 @@
 
 namespace voxel {
 
-// A file that cannot be used: what() says what is wrong, where, and what to do next.
+// A file that cannot be used. what() names the file, the error and the remedy.
 class VolumeError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-// What a volume's header says, read without reading the voxels.
+// Header of a volume, read without the voxels.
 struct VolumeHeader {
   std::string format;     // "NIfTI", "NRRD", "MetaImage", "DICOM series"
   std::string component;  // "uint8", "int16", "float32", ...
@@ -32,7 +33,7 @@ struct VolumeHeader {
   glm::dvec3 spacing_m{0.0};
   glm::dvec3 origin_m{0.0};
   glm::dquat rotation{1.0, 0.0, 0.0, 0.0};
-  std::uint64_t bytes = 0;         // of the voxels once read, in memory
+  std::uint64_t bytes = 0;         // size of the voxels in memory, in the file's component type
   std::vector<std::string> notes;  // e.g. slices missing, axes flipped to make the frame right-handed
 };
 
@@ -45,27 +46,27 @@ struct LabelRule {
 struct VolumeFileOptions {
   double unit_m = 1e-3;          // length unit of the file (medical formats: mm)
   std::vector<LabelRule> rules;  // empty: the file holds labels 0..255, kept as they are
-  // Resample to this spacing (nearest neighbour); as in the file otherwise.
+  // Resample to this spacing (nearest neighbour). Without a value, the file's spacing is kept.
   std::optional<glm::dvec3> spacing_m;
-  // Most memory that loading may take: the voxels (with the copies that the libraries make) and
-  // the labels. Refused above, with the numbers, before allocation.
+  // Limit of the memory that loading takes: the voxels (with the copies that the libraries make) and the
+  // labels. Above the limit VolumeError is thrown, with the numbers, before allocation.
   std::uint64_t max_bytes = 8ULL * 1024 * 1024 * 1024;
 };
 
 // `path` is a file, or a folder holding one DICOM series. Throws VolumeError.
 VolumeHeader read_volume_header(const std::filesystem::path& path, double unit_m = 1e-3);
 
-// The axes are permuted and flipped nowhere except where the file's frame is left-handed: then the first axis
-// is reversed, so that `rotation` is a proper rotation. What was found and put right is said in `notes`, as
-// in the header's. Throws VolumeError.
+// Axes are never permuted. Only a left-handed frame is changed: its first axis is reversed, so that
+// `rotation` is a proper rotation. `notes` receives the notes of the header (findings and corrections).
+// Throws VolumeError.
 LabelVolume load_volume(const std::filesystem::path& path, const VolumeFileOptions& options,
                         std::vector<std::string>* notes = nullptr);
 
-// The labels found and how many voxels each has, and the range of intensities, for `check`. Throws
+// Labels with their voxel counts, and the range of intensities, for the command `check`. The reader throws
 // VolumeError.
 struct VolumeStatistics {
   double minimum = 0.0, maximum = 0.0;
-  // Only when every value is a whole number in 0..255; in rising order, with 0 (empty) where it occurs.
+  // Empty unless every value is a whole number in 0..255. In rising order; 0 (empty) is listed if present.
   std::vector<std::pair<int, std::size_t>> label_counts;
 };
 VolumeStatistics read_volume_statistics(const std::filesystem::path& path,

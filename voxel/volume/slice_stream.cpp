@@ -8,7 +8,7 @@
 
 namespace voxel {
 
-// zlib or gzip, told apart by their headers; several streams in a row are one, as gzip has it.
+// Inflates zlib or gzip, recognised by the header. Concatenated streams count as one, as in gzip.
 class VoxelStream::Inflater {
  public:
   Inflater() { ready_ = inflateInit2(&stream_, 15 + 32) == Z_OK; }
@@ -18,7 +18,8 @@ class VoxelStream::Inflater {
   Inflater(const Inflater&) = delete;
   Inflater& operator=(const Inflater&) = delete;
 
-  // Fills some of `out` from `file`; 0 at the end of the file, or where it is damaged.
+  // Fills the front of `out` from `file`. Returns the byte count; 0 at the end of the file or if it is
+  // damaged.
   std::size_t read(std::ifstream& file, std::span<std::byte> out) {
     stream_.next_out = reinterpret_cast<unsigned char*>(out.data());
     stream_.avail_out = static_cast<uInt>(std::min(out.size(), std::size_t{1} << 30U));
@@ -109,7 +110,7 @@ std::span<const std::byte> VoxelStream::next(std::size_t count, std::size_t comp
 void VoxelStream::finish() {
   if (!inflater_) return;
   std::array<std::byte, 4096> more{};
-  // A file may go on behind the voxels; only to the end of the stream that they end in.
+  // A file may continue behind the voxels. Read only to the end of the stream that holds the last voxel.
   while (!inflater_->ended() && !inflater_->failed() && inflater_->read(file_, more) > 0) continue;
   if (inflater_->failed()) refuse("are damaged after");
   if (!inflater_->ended()) refuse("end after");

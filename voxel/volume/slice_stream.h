@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The voxels of a file in the order that they are there, slice by slice. Internal to volume_file: the
-// libraries behind ITK read a volume whole, two or three times over, and fill up with zeros what a damaged
-// file lacks.
+// Streams the voxels of a raw or deflated file, slice by slice, in file order. Internal to the readers
+// (read_volume.h). A file that ends early or is damaged is always reported. The libraries behind ITK hold a
+// whole volume two or three times, and fill missing voxels of a damaged file with zeros.
 #pragma once
 
 #include <cstddef>
@@ -17,16 +17,16 @@ namespace voxel {
 
 class VoxelStream {
  public:
-  // For raw and deflate. Nothing is read yet.
+  // `place.packing` is raw or deflate. Reads no voxel yet.
   VoxelStream(std::filesystem::path path, const VoxelPlace& place, const VolumeHeader& header);
   ~VoxelStream();
   VoxelStream(const VoxelStream&) = delete;
   VoxelStream& operator=(const VoxelStream&) = delete;
 
   // The next `count` bytes, in this machine's byte order for components of `component_bytes`. Throws
-  // VolumeError where the file ends before, or is damaged.
+  // VolumeError if the file ends early or is damaged.
   std::span<const std::byte> next(std::size_t count, std::size_t component_bytes);
-  // After the last voxel: reads on to the end of the packed stream, where its checksum is. Throws
+  // Call after the last voxel: reads to the end of the packed stream and so verifies its checksum. Throws
   // VolumeError.
   void finish();
 
@@ -40,7 +40,7 @@ class VoxelStream {
   VoxelPlace place_;
   std::uint64_t needed_ = 0, read_ = 0;  // (unit: byte) of the voxels
   std::ifstream file_;
-  std::unique_ptr<Inflater> inflater_;  // where the voxels are packed
+  std::unique_ptr<Inflater> inflater_;  // null if the voxels are raw
   std::vector<std::byte> slice_;
 };
 

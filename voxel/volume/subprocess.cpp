@@ -25,7 +25,7 @@ SharedMemory::~SharedMemory() {
   munmap(data_, bytes_);
 }
 
-int run_apart(const std::function<void()>& call, unsigned cpu_seconds) {
+int run_in_subprocess(const std::function<void()>& call, unsigned cpu_seconds) {
   const pid_t child = fork();
   if (child < 0) return -1;
   if (child == 0) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Work that may end its process, done in a process of its own. Internal to volume_file: GDCM, as Debian
-// builds it, asserts where a DICOM file is damaged, and a loader must not take the session with it.
+// Runs a call in a child process, so that a crash of the call does not end the caller. Internal to the
+// readers (read_volume.h). GDCM as Debian builds it aborts on an assertion when a DICOM file is damaged.
+// Results return through shared memory.
 #pragma once
 
 #include <cstddef>
@@ -8,7 +9,8 @@
 
 namespace voxel {
 
-// Zeroed memory that a process started by run_apart writes to and the caller reads. Pages cost when touched.
+// Zeroed memory that a child of run_in_subprocess writes and the caller reads. A page takes memory once it is
+// touched.
 class SharedMemory {
  public:
   explicit SharedMemory(std::size_t bytes);  // throws std::bad_alloc
@@ -22,9 +24,9 @@ class SharedMemory {
   std::size_t bytes_ = 0;
 };
 
-// Calls `call` in a copy of this process, silent and with at most `cpu_seconds` of processor time, and waits.
-// Returns 0 when it came back, the signal that ended it, or -1 when no process could be started. `call` must
-// not throw.
-int run_apart(const std::function<void()>& call, unsigned cpu_seconds);
+// Calls `call` in a child process (fork) and waits. The child's output is discarded, and its CPU time is
+// limited to `cpu_seconds`. Returns 0 if `call` returned, the signal that ended the child, or -1 if no child
+// could be started. `call` must not throw.
+int run_in_subprocess(const std::function<void()>& call, unsigned cpu_seconds);
 
 }  // namespace voxel

@@ -14,16 +14,16 @@
 namespace voxel {
 namespace {
 
-// How far outside of a tetrahedron a centre still belongs to it, in its heights: rounding must not open a gap
-// between two of them.
+// Tolerance of the point-in-tetrahedron test (unit: height of the tetrahedron), so that rounding opens no gap
+// between neighbours.
 constexpr double kSeam = 1e-6;
 
-struct Slice {
+struct SliceData {
   std::vector<std::uint8_t> labels;
   std::vector<glm::vec3> moved;  // (unit: meter)
-  bool still = true;             // nothing in it has moved
+  bool still = true;             // no filled voxel has moved
 
-  explicit Slice(std::size_t size) : labels(size, 0), moved(size, glm::vec3(0.0F)) {}
+  explicit SliceData(std::size_t size) : labels(size, 0), moved(size, glm::vec3(0.0F)) {}
   void clear() {
     std::fill(labels.begin(), labels.end(), std::uint8_t{0});
     std::fill(moved.begin(), moved.end(), glm::vec3(0.0F));
@@ -43,11 +43,12 @@ class Boxes {
   Boxes(const VolumeFrame& frame, const LabelSlice& labels, const VectorSlice& displacement)
       : frame_(frame), labels_(labels), displacement_(displacement) {}
 
-  // visit(i, j, k, label, corners, still): corners[c] is the place of corner c (bits: x, y, z) in indices.
+  // Calls visit(i, j, k, label, corners, still). corners[c] is the place of corner c (bits: x, y, z; unit:
+  // index); valid only if not `still`.
   template <typename Visit>
   void for_each(Visit visit) const {
     const auto nx = static_cast<std::size_t>(frame_.dims[0]), ny = static_cast<std::size_t>(frame_.dims[1]);
-    Slice below(nx * ny), here(nx * ny);
+    SliceData below(nx * ny), here(nx * ny);
     std::array<Corners, 2> level;
     for (Corners& c : level) c.moved.assign((nx + 1) * (ny + 1), glm::dvec3(0.0));
     for (int k = 0; k <= frame_.dims[2]; ++k) {
@@ -64,7 +65,7 @@ class Boxes {
   }
 
  private:
-  void read(int k, Slice& slice) const {
+  void read(int k, SliceData& slice) const {
     labels_(k, slice.labels);
     displacement_(k, slice.moved);
     slice.still = true;
@@ -78,7 +79,7 @@ class Boxes {
     }
   }
 
-  void find_corners(const Slice& below, const Slice& above, Corners& corners) const {
+  void find_corners(const SliceData& below, const SliceData& above, Corners& corners) const {
     const bool still = below.still && above.still;
     if (still && corners.still) return;
     corners.still = still;
@@ -90,7 +91,7 @@ class Boxes {
       for (int i = 0; i <= nx; ++i) {
         glm::dvec3 sum(0.0);
         int count = 0;
-        for (const Slice* slice : {&below, &above}) {
+        for (const SliceData* slice : {&below, &above}) {
           for (int b = std::max(j - 1, 0); b <= std::min(j, ny - 1); ++b) {
             for (int a = std::max(i - 1, 0); a <= std::min(i, nx - 1); ++a) {
               const auto n =
@@ -112,7 +113,7 @@ class Boxes {
   }
 
   template <typename Visit>
-  void visit_slice(int k, const Slice& slice, const std::array<Corners, 2>& level, Visit visit) const {
+  void visit_slice(int k, const SliceData& slice, const std::array<Corners, 2>& level, Visit visit) const {
     const bool all_still = level[0].still && level[1].still;
     std::array<glm::dvec3, 8> place;
     std::size_t n = 0;
@@ -124,8 +125,8 @@ class Boxes {
           const int x = static_cast<int>(c & 1U), y = static_cast<int>((c >> 1U) & 1U);
           const glm::dvec3& u = level[c >> 2U].moved[corner(i + x, j + y)];
           still = still && u == glm::dvec3(0.0);
-          place[c] =
-              glm::dvec3(i + x, j + y, k + static_cast<int>(c >> 2U)) - 0.5 + u;  // corners lie between
+          place[c] = glm::dvec3(i + x, j + y, k + static_cast<int>(c >> 2U)) - 0.5 +
+                     u;  // corners lie between voxel centres
         }
         visit(i, j, k, slice.labels[n], place, still);
       }
@@ -137,12 +138,12 @@ class Boxes {
   const VectorSlice& displacement_;
 };
 
-struct Range {
+struct IndexBox {
   glm::dvec3 low{std::numeric_limits<double>::infinity()}, high{-std::numeric_limits<double>::infinity()};
 };
 
-// The lattice that holds what was there and what is there now.
-LabelVolume enlarged(const VolumeFrame& frame, const Range& range, glm::ivec3& shift,
+// The empty lattice that covers the volume before and after. `shift` is the index of the old voxel (0,0,0).
+LabelVolume enlarged(const VolumeFrame& frame, const IndexBox& range, glm::ivec3& shift,
                      std::size_t max_voxels) {
   LabelVolume volume;
   volume.spacing_m = frame.spacing_m;
@@ -152,7 +153,7 @@ LabelVolume enlarged(const VolumeFrame& frame, const Range& range, glm::ivec3& s
   glm::dvec3 below(0.0);
   for (int a = 0; a < 3; ++a) {
     const auto axis = static_cast<std::size_t>(a);
-    // A centre that the outermost corner just reaches is in; half a voxel of rounding beside it is not.
+    // Includes a voxel whose centre the outermost corner just reaches, up to rounding.
     below[a] = std::max(0.0, -std::ceil(range.low[a] - kSeam));
     const double above =
         std::max(0.0, std::floor(range.high[a] + kSeam) - (static_cast<double>(frame.dims[axis]) - 1.0));
@@ -173,18 +174,18 @@ LabelVolume enlarged(const VolumeFrame& frame, const Range& range, glm::ivec3& s
   return volume;
 }
 
-// The label of a box for every centre in it that has none yet.
+// Gives the label of a box to every voxel whose centre is in the box and that has no label yet.
 void fill_box(const std::array<glm::dvec3, 8>& corner, std::uint8_t label, const glm::ivec3& shift,
               LabelVolume& volume) {
-  // Kuhn's six tetrahedra about the diagonal 0-7: the same in every box, so that neighbours share the
-  // diagonals of the faces between them.
+  // Kuhn's six tetrahedra about the diagonal 0-7. They are the same in every box, so that neighbours share
+  // the diagonals of their common faces.
   static constexpr std::array<std::array<std::size_t, 2>, 6> kMiddle{
       {{1, 3}, {1, 5}, {2, 3}, {2, 6}, {4, 5}, {4, 6}}};
   for (const auto& [b, c] : kMiddle) {
     const glm::dvec3& o = corner[0];
     const glm::dmat3 edges(corner[b] - o, corner[c] - o, corner[7] - o);
     const double determinant = glm::determinant(edges);
-    if (!(std::abs(determinant) > 1e-12)) continue;  // pressed flat: holds no centre
+    if (!(std::abs(determinant) > 1e-12)) continue;  // flat: contains no centre
     const glm::dmat3 inverse = glm::inverse(edges);
     const glm::dvec3 low = glm::min(glm::min(o, corner[b]), glm::min(corner[c], corner[7]));
     const glm::dvec3 high = glm::max(glm::max(o, corner[b]), glm::max(corner[c], corner[7]));
@@ -208,7 +209,7 @@ void fill_box(const std::array<glm::dvec3, 8>& corner, std::uint8_t label, const
 LabelVolume warp_labels(const VolumeFrame& frame, const LabelSlice& labels, const VectorSlice& displacement,
                         std::size_t max_voxels) {
   const Boxes boxes(frame, labels, displacement);
-  Range range;
+  IndexBox range;
   boxes.for_each([&](int, int, int, std::uint8_t, const std::array<glm::dvec3, 8>& corners, bool still) {
     if (still) return;
     for (const glm::dvec3& c : corners) {

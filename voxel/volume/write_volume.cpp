@@ -14,8 +14,8 @@
 #include <memory>
 #include <sstream>
 
-#include "voxel/volume/raw_volume.h"
 #include "voxel/volume/check_header.h"
+#include "voxel/volume/raw_volume.h"
 
 namespace voxel {
 namespace {
@@ -26,12 +26,12 @@ constexpr const char* kRemedy = "check the folder's permissions and free space";
 
 enum class Packing { raw, gzip, zlib };
 
-// A file that is there in whole or not at all.
+// Writes a file completely or not at all: keep() renames the temporary file to the path.
 class TemporaryFile {
  public:
   explicit TemporaryFile(fs::path path)
       : path_(std::move(path)), part_(path_.string() + ".part" + std::to_string(getpid())) {
-    // A rename would put a file in the place of an empty folder.
+    // A rename would replace an empty folder by the file.
     std::error_code error;
     if (!fs::is_directory(path_, error)) out_.open(part_, std::ios::binary | std::ios::trunc);
     if (!out_.is_open()) refuse_volume(path_, "the file cannot be written; ", kRemedy);
@@ -77,7 +77,7 @@ class Packer {
  public:
   Packer(TemporaryFile& file, Packing packing) : file_(file), packing_(packing) {
     if (packing == Packing::raw) return;
-    // Level 1: labels and fields that are mostly zero pack a hundredfold anyway, and ten times as fast.
+    // Level 1 is fast, and enough for labels and fields that are mostly zero.
     if (deflateInit2(&stream_, 1, Z_DEFLATED, packing == Packing::gzip ? 15 + 16 : 15, 9,
                      Z_DEFAULT_STRATEGY) != Z_OK)
       throw std::bad_alloc();
@@ -124,7 +124,7 @@ class Packer {
   std::vector<unsigned char> out_ = std::vector<unsigned char>(std::size_t{1} << 16U);
 };
 
-// What all three formats say of a volume, in the file's unit.
+// Frame and kind of a volume to be saved, common to the three formats. Lengths are in the file's unit.
 struct Saved {
   fs::path path;
   VolumeFrame frame;
@@ -139,7 +139,7 @@ struct Saved {
   }
 };
 
-Saved check(const fs::path& path, const VolumeFrame& frame, bool vectors, double unit_m) {
+Saved check_path(const fs::path& path, const VolumeFrame& frame, bool vectors, double unit_m) {
   const VolumeFormat format = format_of(path);
   if (!(std::isfinite(unit_m) && unit_m > 0.0)) {
     refuse_volume(path, "the file's length unit is given as ", unit_m,
@@ -168,7 +168,7 @@ Saved check(const fs::path& path, const VolumeFrame& frame, bool vectors, double
 
 // ---- headers
 
-// NIfTI-1 (nifti1.h of the NIfTI working group), in its own RAS frame: x and y of LPS turned round.
+// NIfTI-1 (nifti1.h of the NIfTI working group), in its RAS frame: x and y of LPS change sign.
 std::string nifti_header(const Saved& s) {
   std::string header(352, '\0');
   const auto put = [&header](std::size_t at, auto value) { std::memcpy(&header[at], &value, sizeof(value)); };
@@ -190,7 +190,7 @@ std::string nifti_header(const Saved& s) {
                                static_cast<float>(s.spacing.z), 1.0F, 1.0F, 1.0F, 1.0F});
   put(108, 352.0F);
   put(112, 1.0F);
-  put(123, static_cast<char>(2));  // mm; other units are the caller's, and have no code below a micrometer
+  put(123, static_cast<char>(2));  // always the code for mm: NIfTI has no code for arbitrary units
   put(252, std::int16_t{1});       // qform and sform: scanner coordinates
   put(254, std::int16_t{1});
   glm::dquat q = glm::dquat(0.0, 0.0, 0.0, 1.0) * glm::normalize(s.frame.rotation);  // half a turn about z
@@ -265,7 +265,7 @@ void write_nifti(const Saved& s, const Voxels& voxels) {
   file.keep();
 }
 
-// A header with the voxels behind it, or beside it where the name's ending says so.
+// Writes NRRD or MetaImage: the voxels follow the header, or lie in a file beside it (.nhdr, .mhd).
 void write_with_text_header(const Saved& s, const Voxels& voxels) {
   const bool meta = format_of(s.path) == VolumeFormat::meta;
   const bool detached = s.ends_with("hdr") || s.ends_with("mhd");
@@ -311,7 +311,7 @@ VolumeFrame frame_of(const LabelVolume& volume) {
 }
 
 void write_labels(const fs::path& path, const VolumeFrame& frame, const LabelSlice& slice, double unit_m) {
-  const Saved saved = check(path, frame, false, unit_m);
+  const Saved saved = check_path(path, frame, false, unit_m);
   write_volume(saved, [&](Packer& packer) {
     std::vector<std::uint8_t> labels(frame.slice_size());
     for (int k = 0; k < frame.dims[2]; ++k) {
@@ -337,7 +337,7 @@ void save_volume(const fs::path& path, const LabelVolume& volume, double unit_m)
 }
 
 void write_vectors(const fs::path& path, const VolumeFrame& frame, const VectorSlice& slice, double unit_m) {
-  const Saved saved = check(path, frame, true, unit_m);
+  const Saved saved = check_path(path, frame, true, unit_m);
   const bool apart = format_of(path) == VolumeFormat::nifti;
   write_volume(saved, [&](Packer& packer) {
     std::vector<glm::vec3> vectors(frame.slice_size());

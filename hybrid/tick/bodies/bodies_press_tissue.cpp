@@ -13,7 +13,7 @@ namespace hybrid {
 namespace {
 
 // Exact queries a tick and soft object: 50 to 100 ns each for a primitive, 1 to 2 µs for a mesh.
-constexpr std::size_t kMaxQueries = 3000, kMaxMeshQueries = 750;
+constexpr std::size_t kMaxSurfaceQueries = 3000, kMaxMeshQueries = 750;
 constexpr double kWatchedRange = 1.5;  // spacings from a body within which a voxel has its half-space
 constexpr double kQueryAhead = 8.0;    // spacings that one query looks further, so that the next is not soon
 // Of the spacing: a voxel near a body that stands is queried again after this motion.
@@ -99,7 +99,7 @@ class TissueAtBodies {
   // Queries the listed voxels, the nearest first, within the budget.
   void query() noexcept {
     auto& due = state_.scratch.due;
-    const std::size_t most = meshes_ ? kMaxMeshQueries : kMaxQueries;
+    const std::size_t most = meshes_ ? kMaxMeshQueries : kMaxSurfaceQueries;
     if (due.size() > most) {
       const auto end = due.begin() + static_cast<std::ptrdiff_t>(most);
       std::nth_element(due.begin(), end, due.end());

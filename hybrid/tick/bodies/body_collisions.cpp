@@ -25,8 +25,8 @@ constexpr double kSlideRange = 0.05;  // of the smaller object: nearer points sl
 constexpr double kLeastSlide = 0.01;  // of their reach: shorter slides are skipped
 constexpr double kStride = 0.02;      // of the smaller object: step along a way
 constexpr int kMostStrides = 32;
-constexpr int kRounds = 6;                  // of solving and following ways
-constexpr std::size_t kMaxQueries = 20000;  // exact queries a tick
+constexpr int kRounds = 6;                           // of solving and following ways
+constexpr std::size_t kMaxCollisionQueries = 20000;  // exact queries a tick
 // Of the smaller object: range within which a body that gives way is stopped.
 constexpr double kStopRange = 0.05;
 
@@ -111,7 +111,7 @@ class Collisions : private CollisionQueries {
       if (far_apart(pair, slides_m)) continue;
       for_points(pair, [&](Side side, std::size_t i, PointQuery& query) {
         const double watched_m = point(pair, side, i).has_ends() ? slides_m : near_m;
-        if (query.gap_m - drift(pair, query) > watched_m || queries_made_ > kMaxQueries) return;
+        if (query.gap_m - drift(pair, query) > watched_m || queries_made_ > kMaxCollisionQueries) return;
         refresh_query(pair, side, i, query);
         slide(pair, side, i, query);
         if (query.gap_m > near_m || is_implied(pair, side, i)) return;
@@ -169,7 +169,7 @@ class Collisions : private CollisionQueries {
       if (moved == 0.0 || far_apart(pair, moved + pair.skin_m)) continue;
       for_points(pair, [&](Side side, std::size_t i, PointQuery& query) {
         if (query.gap_m - drift(pair, query) > moved + pair.skin_m) return;
-        if (queries_made_ > kMaxQueries) {
+        if (queries_made_ > kMaxCollisionQueries) {
           state_.faults |= fault_body_crowded;
           return;
         }

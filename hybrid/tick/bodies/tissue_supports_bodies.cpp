@@ -100,7 +100,7 @@ bool presses(voxel::SoftObject& object, std::uint32_t s, const NearVoxel& voxel_
   const voxel::VoxelId v = object.lattice().surface()[s];
   const glm::dvec3 stiffness = 1.0 / object.compliance(v);
   const glm::dvec3 place =
-      voxel::clamp_to_links(object.lattice(), object.state(), v, object.free_displacement(v));
+      voxel::clamp_to_links(object.lattice(), object.state(), v, object.unconstrained_minimum(v));
   const glm::dvec3 left = place - object.state().at(v) + voxel_at.gap_m * voxel_at.normal;
   return glm::dot(voxel_at.normal, stiffness * left) < 0.0;
 }
@@ -159,7 +159,7 @@ void add_pressing(const World& world, WorldState& state, std::uint32_t b, std::s
   glm::dvec3 lacking_N(0.0);
   glm::dmat3 normals(0.0);
   for (std::size_t n = 0; n < state.scratch.body_surface_numbers.size(); ++n) {
-    if (!state.scratch.body_loads[n].tight) continue;
+    if (!state.scratch.body_loads[n].at_limit) continue;
     const glm::dvec3 normal(beside.moving[state.scratch.body_surface_numbers[n]].normal);
     lacking_N += -state.scratch.body_loads[n].force_N - pressed(n, normal) * normal;
     normals += glm::outerProduct(normal, normal);
@@ -169,23 +169,23 @@ void add_pressing(const World& world, WorldState& state, std::uint32_t b, std::s
       most > 0.0 ? glm::inverse(normals + glm::dmat3(kRegularisation * most)) * lacking_N : glm::dvec3(0.0);
   for (std::size_t n = 0; n < state.scratch.body_surface_numbers.size(); ++n) {
     const std::uint32_t s = state.scratch.body_surface_numbers[n];
-    const voxel::HeldLoad& load = state.scratch.body_loads[n];
+    const voxel::ContactLoad& load = state.scratch.body_loads[n];
     const NearVoxel voxel_at = near_voxel(object, beside, s);
     BodyContact contact = contact_at(world.soft[o], object, beside.queries[b][s], s, voxel_at);
     const double springs = glm::dot(voxel_at.normal, load.stiffness_N_per_m * voxel_at.normal);
     contact.stiffness_N_per_m = kLinkDamping * springs;
     contact.force_N = -glm::dot(voxel_at.normal, load.force_N) -
-                      springs * distance_to_body_m(object, s, voxel_at, load.tight);
-    if (load.balanced) {
+                      springs * distance_to_body_m(object, s, voxel_at, load.at_limit);
+    if (load.has_multipliers) {
       const bool presses = load.pressed_N > 0.0;
       contact.force_N = presses ? load.pressed_N : -kLinkDamping * springs * std::max(voxel_at.gap_m, 0.0);
-      contact.stiffness_N_per_m = (presses && load.tight ? kLimitDamping : kLinkDamping) * springs;
+      contact.stiffness_N_per_m = (presses && load.at_limit ? kLimitDamping : kLinkDamping) * springs;
       add_contact(state, contact);
       continue;
     }
     // A voxel that would not reach the body by itself presses only from where they meet.
     if (contact.force_N < 0.0) contact.force_N *= kLinkDamping;
-    if (load.tight && pressed(n, voxel_at.normal) > 0.0) {
+    if (load.at_limit && pressed(n, voxel_at.normal) > 0.0) {
       contact.force_N += glm::dot(share, voxel_at.normal);
       contact.stiffness_N_per_m = kLimitDamping * springs;
     }
@@ -200,7 +200,7 @@ std::size_t add_tissue_contacts(const World& world, WorldState& state, std::uint
   const std::size_t before = state.scratch.body_contacts.size();
   for (std::size_t o = 0; o < state.body_obstacles.size(); ++o) {
     const std::size_t pressed = list_pressing(state, b, o);
-    state.soft[o]->load_held(state.scratch.body_voxels, pressed, state.scratch.body_loads);
+    state.soft[o]->contact_loads(state.scratch.body_voxels, pressed, state.scratch.body_loads);
     add_pressing(world, state, b, o);
   }
   const std::size_t links = state.scratch.body_contacts.size();
@@ -312,7 +312,7 @@ void relax_under_paths(const World& world, WorldState& state) noexcept {
       if (state.scratch.body_voxels.size() == state.scratch.body_voxels.capacity()) break;
       state.scratch.body_voxels.push_back(object.lattice().surface()[s]);
     }
-    if (!state.scratch.body_voxels.empty()) object.relax_held(state.scratch.body_voxels);
+    if (!state.scratch.body_voxels.empty()) object.relax_at_obstacles(state.scratch.body_voxels);
   }
 }
 

@@ -17,9 +17,9 @@ constexpr std::size_t kMaxAsync = 64;  // bits of AsyncRelaxation::arrived
 constexpr std::size_t kMaxRowsApplied = 250, kLeastRows = 100, kWorkOfRow = 16;
 // Parts in which the rows near a contact at rest are applied.
 constexpr int kResultParts = 8;
-// A submission or an application takes some 100 µs and up to 300. It waits for a tick without a cycle of a
-// large patch: the contact is asked to rest, which it does while the tool presses. It waits for at most
-// kMaxWaits ticks.
+// A submission or an application takes some 100 µs and up to 300. It waits up to kMaxWaits ticks for a tick
+// without a cycle of a large patch. Meanwhile the contact is asked to skip its cycles, and skips them as long
+// as the tool presses.
 constexpr int kMaxWaits = 3;
 // Rows that another core relaxes in the time of a tick. A fixed-step session gets its results as late as one
 // in real time.
@@ -42,16 +42,16 @@ bool has_arrived(const AsyncRelaxation& async, const AsyncObject& object, std::s
 }
 
 void submit(WorldState& state, AsyncObject& object, std::size_t o) noexcept {
-  object.replica.give(*state.soft[o]);
+  object.shadow.submit(*state.soft[o]);
   object.submitted = true;
   if (state.async.arrival == Arrival::thread || state.async.arrival == Arrival::played) {
     object.phase.store(AsyncObject::Phase::thread, std::memory_order_release);
     return;
   }
   const double before_s = thread_time_s();
-  object.replica.relax();
+  object.shadow.relax();
   state.async.other_thread_us += 1e6 * (thread_time_s() - before_s);
-  object.due = state.tick + 1 + object.replica.work() / kRowsRelaxed;
+  object.due = state.tick + 1 + object.shadow.work() / kRowsRelaxed;
 }
 
 // One exchange a tick: a part of a result, the preparation of an exchange, a submission or a result, or some
@@ -64,28 +64,28 @@ void exchange(WorldState& state, std::size_t o, std::uint64_t& arrived) noexcept
     object.arrived = true;
     arrived |= std::uint64_t{1} << o;
   }
-  if (object.replica.in_parts()) {
-    object.replica.take_part(soft, !soft.held_still());
+  if (object.shadow.in_parts()) {
+    object.shadow.apply_part(soft, !soft.contact_is_still());
     state.async.applied = true;
-    if (!object.replica.in_parts()) {
+    if (!object.shadow.in_parts()) {
       object.next = state.tick + kTicksBetween;
     } else {
-      soft.ask_to_rest();
+      soft.skip_next_cycle();
     }
     return;
   }
-  const bool drained = object.replica.drained();
+  const bool drained = object.shadow.all_applied();
   const bool gives = !object.submitted && state.tick >= object.next && voxel::ShadowObject::wanted(soft);
   const bool takes = object.arrived && drained && !gives;
   const bool waits = (gives || takes) && soft.large_patch_cycle() && object.waited < kMaxWaits;
   if (waits) {
     ++object.waited;
-    soft.ask_to_rest();
+    soft.skip_next_cycle();
   } else if (gives || takes) {
     object.waited = 0;
   }
   if ((gives || takes) && !waits && soft.prepare_exchange()) {
-    soft.ask_to_rest();
+    soft.skip_next_cycle();
     return;
   }
   if (gives && !waits) {
@@ -93,8 +93,8 @@ void exchange(WorldState& state, std::size_t o, std::uint64_t& arrived) noexcept
   } else if (takes && !waits) {
     // Applied in parts if the tool is at rest: the whole would be felt as a step. While the tool moves, the
     // step is lost in its motion, and parts would only be later.
-    object.replica.take(soft, soft.held_still() ? kResultParts : 1);
-    if (object.replica.in_parts()) soft.ask_to_rest();
+    object.shadow.apply_near(soft, soft.contact_is_still() ? kResultParts : 1);
+    if (object.shadow.in_parts()) soft.skip_next_cycle();
     object.submitted = object.arrived = false;
     ++state.async.results;
     state.async.applied = true;
@@ -104,8 +104,8 @@ void exchange(WorldState& state, std::size_t o, std::uint64_t& arrived) noexcept
       return static_cast<std::size_t>(soft.work_share() * static_cast<double>(rows));
     };
     const std::size_t beside = soft.work_left() / kWorkOfRow, most = shared(kMaxRowsApplied);
-    object.replica.drain(soft,
-                         soft.large_patch_cycle() ? std::clamp(beside, shared(kLeastRows), most) : most);
+    object.shadow.apply_far(soft,
+                            soft.large_patch_cycle() ? std::clamp(beside, shared(kLeastRows), most) : most);
   }
 }
 
@@ -116,7 +116,7 @@ void start_async_relaxation(WorldState& state, Arrival arrival) {
   state.async.objects.clear();
   for (std::size_t o = 0; o < state.soft.size(); ++o) {
     const voxel::SoftObject& object = *state.soft[o];
-    const bool is_async = o < kMaxAsync && !object.lattice().yields() && !object.uses_patches();
+    const bool is_async = o < kMaxAsync && !object.lattice().has_plasticity() && !object.uses_patches();
     state.async.objects.push_back(is_async ? std::make_unique<AsyncObject>(*state.soft[o]) : nullptr);
   }
 }

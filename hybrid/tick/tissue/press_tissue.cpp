@@ -85,7 +85,7 @@ bool find_touched_voxels(const World& world, WorldState& state, const glm::dvec3
     std::sort(state.scratch.touched[o].begin(), state.scratch.touched[o].end());
     if (state.scratch.touched[o].empty() && state.soft[o]->touched().empty()) continue;
     state.soft[o]->touch(state.scratch.touched[o]);
-    state.soft[o]->note_depths(tool_in_body(world, world.soft[o], point));
+    state.soft[o]->record_depths(tool_in_body(world, world.soft[o], point));
     any = any || !state.scratch.touched[o].empty();
   }
   return any;

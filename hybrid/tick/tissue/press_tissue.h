@@ -18,7 +18,8 @@ void press_tissue(const World& world, WorldState& state, const glm::dvec3& point
                   int sweeps) noexcept;
 
 // Appends to `out`, up to its capacity, half-spaces of voxels that could not leave the way of a tool at
-// `point`. `fast`: only of voxels that are immovable until their surroundings move. Returns how many.
+// `point`. `immovable_only`: only of voxels that are immovable until their surroundings move. Returns how
+// many.
 std::size_t tool_bounds(const World& world, WorldState& state, const glm::dvec3& point, bool immovable_only,
                         std::vector<polygon::ContactPlane>& out) noexcept;
 

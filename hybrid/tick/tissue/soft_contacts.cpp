@@ -129,7 +129,7 @@ double update_contact(const World& world, WorldState& state, FacetContact& pair)
     // Holds the new facets before it releases the old ones, so that voxels of both stay held.
     if (pair.held) {
       keep_facets(a, b, before, pair);
-      for_facets(pair, [&](const voxel::PressedPair& p) { voxel::hold_pair(a, b, p); });
+      for_facets(pair, [&](const voxel::PressedPair& p) { voxel::claim_pair(a, b, p); });
     } else {
       pair.extra_count = 0;
       pair.pressed.force_N = glm::dvec3(0.0);
@@ -243,9 +243,9 @@ void solve_soft_contacts(const World& world, WorldState& state) noexcept {
   // Dependents of voxels in a pressed object may also depend on the tool, which has their load already.
   for (std::size_t o = 0; o < state.soft.size(); ++o) {
     if (state.reactions[o].pressed == 0) {
-      state.soft[o]->find_hanging_on_pairs();
+      state.soft[o]->find_pair_dependents();
     } else {
-      state.soft[o]->forget_hanging_on_pairs();
+      state.soft[o]->forget_pair_dependents();
     }
   }
   for (int sweep = 0; sweep < kPairSweeps; ++sweep) {

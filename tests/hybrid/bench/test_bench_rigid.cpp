@@ -314,7 +314,7 @@ TEST(BenchRigid, AQuickRunSaysWhatItMustAndNothingPopsThrough) {
     EXPECT_LE(row.tick_us.p50, row.tick_us.p99);
     EXPECT_GT(row.bytes, 0U) << name;
     EXPECT_GT(row.ticks, 0U) << name;
-    // The figures that have a meaning here are there, and finite.
+    // Each figure is present exactly if it is defined for this mesh and path, and it is finite.
     EXPECT_EQ(row.judged.error_sphere_max.has_value(), row.mesh == "ico3" && row.path != "moving") << name;
     EXPECT_EQ(row.judged.optimum_sphere_max.has_value(), row.path == "slide") << name;
     ASSERT_TRUE(row.judged.error_mesh_max.has_value()) << name;

@@ -30,15 +30,15 @@ class GridSession : public tests::SceneFile {
   std::string note_of(const std::string& text) {
     const hybrid::BuiltScene built = hybrid::build_scene(load(text));
     for (const hybrid::BuildNote& note : built.notes) {
-      if (note.text.find("composite grid") != std::string::npos) return note.text;
+      if (note.text.find("nested patches") != std::string::npos) return note.text;
     }
     return {};
   }
 };
 
 TEST_F(GridSession, SaysWhereContactsAreKeptAndWhy) {
-  EXPECT_NE(note_of(block("spacing = 1\n")).find("kept on a composite grid"), std::string::npos);
-  EXPECT_NE(note_of(block("spacing = 2\n")).find("kept on a composite grid"), std::string::npos);
+  EXPECT_NE(note_of(block("spacing = 1\n")).find("kept on nested patches"), std::string::npos);
+  EXPECT_NE(note_of(block("spacing = 2\n")).find("kept on nested patches"), std::string::npos);
   EXPECT_EQ(note_of(block("spacing = 4\n")), "");
   const std::string wall =
       "spacing = 1\n[[rigid]]\nname = \"wall\"\nprimitive = \"box\"\nsize = [10, 90, 90]\nposition = [45, 0, "

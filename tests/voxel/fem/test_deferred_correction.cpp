@@ -157,7 +157,7 @@ struct Pulled {
     const voxel::Lattice& lattice = object.lattice();
     for (std::size_t n = 0; n < held.size(); ++n) {
       const voxel::VoxelId v = lattice.at(held[n][0], held[n][1], held[n][2]);
-      object.hold(v);
+      object.claim(v);
       object.drag(v, at_m[n] - object.state().at(v));
     }
     object.settle_dragged();
@@ -212,13 +212,13 @@ TEST(BrickLoads, AnotherThatRelaxesItComesToTheSameRest) {
     if (scene.held.empty()) continue;
     const tests::PlainProblem plain = scene.plain();
     voxel::SoftObject object = object_of(scene.volume, scene.options);
-    voxel::ShadowObject replica(object);
+    voxel::ShadowObject shadow(object);
     scene.hold(object);
     for (int n = 0; n < 3000 && voxel::ShadowObject::wanted(object); ++n) {
-      replica.give(object);
-      replica.relax();
-      replica.take(object);
-      replica.drain(object, 1'000'000);
+      shadow.submit(object);
+      shadow.relax();
+      shadow.apply_near(object);
+      shadow.apply_far(object, 1'000'000);
     }
     EXPECT_FALSE(voxel::ShadowObject::wanted(object)) << seed;
     EXPECT_LT(difference(object, scene, plain), 0.02) << seed;
@@ -244,7 +244,7 @@ double pressed_by_punch(const tests::ReferenceRow& row) {
     if (at.z < top - 0.5 * h) continue;
     if (std::max(std::fabs(at.x - 0.05), std::fabs(at.y - 0.05)) > 0.5 * row.width_m + 1e-9) continue;
     punched.push_back(v);
-    object.hold(v);
+    object.claim(v);
     object.drag(v, {0.0, 0.0, -depth});
   }
   object.settle_dragged();
@@ -252,7 +252,7 @@ double pressed_by_punch(const tests::ReferenceRow& row) {
   for (int cycle = 1; cycle <= 400; ++cycle) {
     // The punch is smooth: what it presses slides along its face.
     for (const voxel::VoxelId v : punched) {
-      const glm::dvec3 wanted = object.free_displacement(v);
+      const glm::dvec3 wanted = object.unconstrained_minimum(v);
       object.move(v, {wanted.x, wanted.y, -depth});
     }
     object.relax_cycle();
@@ -311,7 +311,7 @@ TEST(BrickLoads, MaterialsChooseEachForItself) {
   options.anchor_faces = {"-z"};
   voxel::SoftObject object = object_of(volume, options);
   const voxel::VoxelId v = object.lattice().at(20, 4, 7);
-  object.hold(v);
+  object.claim(v);
   object.drag(v, {0.0, 0.0, -0.3e-3});
   object.settle_dragged();
   for (int n = 0; n < 500 && !object.asleep(); ++n) object.relax_cycle();

@@ -88,7 +88,7 @@ double across(double poisson) {
   return voxel::across_modulus_Pa(1.0, poisson);
 }
 
-// What the modes say is what the springs say, by another route.
+// The force from the cosine modes (Face) equals the force from solving the springs directly.
 TEST(HalfSpace, ModesAreTheSprings) {
   constexpr int n = 9, nz = 6;
   for (const double poisson : {0.0, 0.45}) {

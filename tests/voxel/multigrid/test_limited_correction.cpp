@@ -53,15 +53,15 @@ using Ways = std::vector<std::array<float, 3>>;  // [v][axis]
 void move(const Lattice& lattice, Displacement& state, const Ways& ways) {
   voxel::Multigrid multigrid(lattice);
   for (RowId row = 0; row < lattice.grid().rows(); ++row) {
-    if (!multigrid.can_join(row, state)) continue;
-    multigrid.join(row, state, [&](voxel::RowVector& way) {
+    if (!multigrid.can_batch(row, state)) continue;
+    multigrid.batch(row, state, [&](voxel::RowVector& way) {
       for (std::size_t axis = 0; axis < 3; ++axis) {
         for (std::size_t i = 0; i < kRow; ++i) way[axis][i] = ways[row * kRow + i][axis];
       }
     });
   }
-  multigrid.add_joined(state);
-  multigrid.forget_joined();
+  multigrid.move_batch(state);
+  multigrid.clear_batch();
 }
 
 Ways random_ways(const Lattice& lattice, Random& random, double sign) {

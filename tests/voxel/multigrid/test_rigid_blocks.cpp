@@ -81,28 +81,28 @@ struct Scene {
   }
   // Relaxes in turns, as a session does: `ticks` ticks with the tool there.
   enum class Relaxed { here, by_another_thread };
-  void hold(voxel::ShadowObject& replica, const voxel::ToolInBody& tool, int ticks,
+  void hold(voxel::ShadowObject& shadow, const voxel::ToolInBody& tool, int ticks,
             Relaxed relaxed = Relaxed::here) {
     for (int n = 0; n < ticks; ++n) {
       touch(tool);
       object->push_out(tool);
       object->relax_near(tool, 2);
       if (!voxel::ShadowObject::wanted(*object)) continue;
-      replica.give(*object);
+      shadow.submit(*object);
       if (relaxed == Relaxed::here) {
-        replica.relax();
+        shadow.relax();
       } else {
-        std::jthread([&replica] { replica.relax(); }).join();
+        std::jthread([&shadow] { shadow.relax(); }).join();
       }
-      replica.take(*object);
-      while (!replica.drained()) replica.drain(*object, lattice->grid().rows());
+      shadow.apply_near(*object);
+      while (!shadow.all_applied()) shadow.apply_far(*object, lattice->grid().rows());
     }
   }
   // Moves the tool down to `depth` in steps, and keeps it there.
-  void press(voxel::ShadowObject& replica, double radius, double depth, double x, double y, int ticks = 120) {
+  void press(voxel::ShadowObject& shadow, double radius, double depth, double x, double y, int ticks = 120) {
     constexpr int kSteps = 10;
-    for (int n = 1; n <= kSteps; ++n) hold(replica, ball(radius, depth * n / kSteps, x, y), 1);
-    hold(replica, ball(radius, depth, x, y), ticks);
+    for (int n = 1; n <= kSteps; ++n) hold(shadow, ball(radius, depth * n / kSteps, x, y), 1);
+    hold(shadow, ball(radius, depth, x, y), ticks);
   }
   [[nodiscard]] double furthest_m() const {
     double most = 0.0;
@@ -128,12 +128,12 @@ tests::Problem condensed(const Scene& scene, int axis, const voxel::ToolInBody& 
   std::map<int, bool> held;
   for (std::size_t i = 0; i < lattice.size(); ++i) {
     const auto v = static_cast<VoxelId>(i);
-    if (lattice.filled(v) && lattice.part(v) != 0 && touches(v)) held[lattice.part(v)] = true;
+    if (lattice.filled(v) && lattice.block(v) != 0 && touches(v)) held[lattice.block(v)] = true;
   }
   std::map<int, int> of_part;
   for (std::size_t i = 0; i < lattice.size(); ++i) {
     const auto v = static_cast<VoxelId>(i);
-    const int part = lattice.part(v);
+    const int part = lattice.block(v);
     if (!lattice.filled(v) || lattice.anchored(v) || (part != 0 ? held[part] : touches(v))) continue;
     if (part == 0) {
       p.unknown[i] = p.unknowns++;
@@ -195,8 +195,8 @@ void expect_at_equilibrium(Scene& scene, const voxel::ToolInBody& tool, Limits l
     const auto v = static_cast<VoxelId>(i);
     if (!scene.lattice->filled(v) || scene.lattice->anchored(v)) continue;
     const glm::dvec3 pull = voxel::link_force(*scene.lattice, scene.object->state(), v);
-    if (scene.lattice->part(v) != 0) {
-      of_part.emplace(scene.lattice->part(v), glm::dvec3(0.0)).first->second += pull;
+    if (scene.lattice->block(v) != 0) {
+      of_part.emplace(scene.lattice->block(v), glm::dvec3(0.0)).first->second += pull;
     } else if (glm::distance(scene.object->position(v), tool.centre) >
                scene.object->reach(tool.radius) + 0.01 * kSpacing) {
       most = std::max(most, glm::length(pull));
@@ -206,17 +206,17 @@ void expect_at_equilibrium(Scene& scene, const voxel::ToolInBody& tool, Limits l
     bool pressed = false;
     for (const VoxelId v : scene.object->touched())
       pressed = pressed ||
-                (scene.lattice->part(v) == part && glm::distance(scene.object->position(v), tool.centre) <
-                                                       scene.object->reach(tool.radius) + 1e-4 * kSpacing);
+                (scene.lattice->block(v) == part && glm::distance(scene.object->position(v), tool.centre) <
+                                                        scene.object->reach(tool.radius) + 1e-4 * kSpacing);
     if (!pressed) most = std::max(most, glm::length(pull));
   }
   EXPECT_LT(most, 1e-4 * size);
 }
 
 // All is back at rest when the tool has gone.
-void expect_restored(Scene& scene, voxel::ShadowObject& replica, voxel::ToolInBody tool, int ticks = 150) {
+void expect_restored(Scene& scene, voxel::ShadowObject& shadow, voxel::ToolInBody tool, int ticks = 150) {
   tool.centre.z += 1.0;
-  scene.hold(replica, tool, ticks);
+  scene.hold(shadow, tool, ticks);
   EXPECT_LT(scene.furthest_m(), 1e-3 * kSpacing);
   EXPECT_TRUE(scene.object->asleep());
 }
@@ -246,7 +246,8 @@ TEST(RigidBlocks, AreWhatHangsTogetherAndAtAnchorsAreAnchored) {
   const Scene scene({8, 7, 9}, kLoose, [](int, int, int k) { return k < 2 || k >= 6; });
   EXPECT_EQ(scene.lattice->block_count(), 1U);
   EXPECT_EQ(scene.lattice->anchored_count(), 2U * 8 * 7);
-  for (int k = 0; k < 9; ++k) EXPECT_EQ(scene.lattice->part(scene.lattice->at(3, 3, k)), k >= 6 ? 1 : 0) << k;
+  for (int k = 0; k < 9; ++k)
+    EXPECT_EQ(scene.lattice->block(scene.lattice->at(3, 3, k)), k >= 6 ? 1 : 0) << k;
 }
 
 TEST(RigidBlocks, OnAnchorsAreAsRigid) {
@@ -267,17 +268,17 @@ TEST(RigidBlocks, AreFeltAsTheyAreHeldByTissue) {
     SCOPED_TRACE(shape.name);
     Scene scene(kDims, kLoose, shape.tight);
     EXPECT_EQ(scene.lattice->block_count(), 1U);
-    voxel::ShadowObject replica(*scene.object);
-    scene.press(replica, 4.0, shape.depth, 11.5, 9.5);
+    voxel::ShadowObject shadow(*scene.object);
+    scene.press(shadow, 4.0, shape.depth, 11.5, 9.5);
     expect_at_equilibrium(scene, scene.ball(4.0, shape.depth, 11.5, 9.5), Limits::none);
     for (int n = 1; n <= 20; ++n) {
-      scene.hold(replica, scene.ball(4.0, shape.depth, 11.5 + 0.2 * n, 9.5 - 0.1 * n), 1);
+      scene.hold(shadow, scene.ball(4.0, shape.depth, 11.5 + 0.2 * n, 9.5 - 0.1 * n), 1);
       EXPECT_EQ(voxel::validate(*scene.lattice, scene.object->state(), 8.0), "") << n;
     }
     const auto beside = scene.ball(4.0, shape.depth, 15.5, 7.5);
-    scene.hold(replica, beside, 120);
+    scene.hold(shadow, beside, 120);
     expect_at_equilibrium(scene, beside, Limits::none);
-    expect_restored(scene, replica, beside);
+    expect_restored(scene, shadow, beside);
   }
 }
 
@@ -285,11 +286,11 @@ TEST(RigidBlocks, AreFeltThroughLinksAtTheirLimits) {
   for (const Shape& shape : shapes()) {
     SCOPED_TRACE(shape.name);
     Scene scene(kDims, kLimited, shape.tight);
-    voxel::ShadowObject replica(*scene.object);
+    voxel::ShadowObject shadow(*scene.object);
     const double depth = 0.6 * shape.depth;
-    scene.press(replica, 4.0, depth, 11.5, 9.5);
+    scene.press(shadow, 4.0, depth, 11.5, 9.5);
     expect_at_equilibrium(scene, scene.ball(4.0, depth, 11.5, 9.5), Limits::active);
-    expect_restored(scene, replica, scene.ball(4.0, depth, 11.5, 9.5));
+    expect_restored(scene, shadow, scene.ball(4.0, depth, 11.5, 9.5));
   }
 }
 
@@ -300,11 +301,11 @@ TEST(RigidBlocks, ScatteredAreFeltToo) {
     tests::Random random(seed);
     Scene scene({18, 16, 12}, kLoose, [&random](int, int, int k) { return random.unit() < 0.25 && k > 0; });
     EXPECT_GT(scene.lattice->block_count(), 50U);
-    voxel::ShadowObject replica(*scene.object);
+    voxel::ShadowObject shadow(*scene.object);
     const auto tool = scene.ball(4.0, 1.0, 8.6, 7.3);
-    scene.press(replica, 4.0, 1.0, 8.6, 7.3, 300);
+    scene.press(shadow, 4.0, 1.0, 8.6, 7.3, 300);
     expect_at_equilibrium(scene, tool, Limits::active);
-    expect_restored(scene, replica, tool, 400);
+    expect_restored(scene, shadow, tool, 400);
   }
 }
 
@@ -314,8 +315,8 @@ TEST(RigidBlocks, AreTheSameToTheLastBitWhicheverThreadRelaxes) {
     for (const auto relaxed : {Scene::Relaxed::here, Scene::Relaxed::by_another_thread}) {
       auto& scene = scenes[relaxed == Scene::Relaxed::here ? 0 : 1];
       scene = std::make_unique<Scene>(kDims, kLimited, shape.tight);
-      voxel::ShadowObject replica(*scene->object);
-      for (int n = 0; n < 20; ++n) scene->hold(replica, scene->ball(4.0, 0.05 * n, 11.5, 9.5), 1, relaxed);
+      voxel::ShadowObject shadow(*scene->object);
+      for (int n = 0; n < 20; ++n) scene->hold(shadow, scene->ball(4.0, 0.05 * n, 11.5, 9.5), 1, relaxed);
     }
     for (std::size_t axis = 0; axis < 3; ++axis)
       EXPECT_TRUE(scenes[0]->object->state().u[axis] == scenes[1]->object->state().u[axis]) << shape.name;

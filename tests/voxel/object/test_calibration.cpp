@@ -60,7 +60,7 @@ struct Corner {
         if (i * i + j * j > radius * radius) continue;
         held.push_back(voxel_at(*soft.lattice, i, j, soft.dims[2] - 1));
         radius2.push_back(i * i + j * j);
-        soft.object->hold(held.back());
+        soft.object->claim(held.back());
       }
     }
   }
@@ -115,7 +115,7 @@ Felt ball(double a, double poisson) {
         if (std::find(corner.held.begin(), corner.held.end(), v) != corner.held.end()) continue;
         corner.held.push_back(v);
         corner.radius2.push_back(r2);
-        corner.soft.object->hold(v);
+        corner.soft.object->claim(v);
         corner.soft.object->move(v, {0.0, 0.0, z});
         ++changed;
       }
@@ -194,7 +194,7 @@ double pressed_square(const tests::ReferenceRow& row) {
   for (int j = first; j < first + wide; ++j) {
     for (int i = first; i < first + wide; ++i) held.push_back(voxel_at(*soft.lattice, i, j, nz - 1));
   }
-  for (const VoxelId v : held) soft.object->hold(v);
+  for (const VoxelId v : held) soft.object->claim(v);
   for (const VoxelId v : held) soft.object->move(v, {0.0, 0.0, -depth});
   return relaxed_force(soft, held, 1e-5);
 }

@@ -56,7 +56,7 @@ struct Stack {
     }
     for (const PressedPair& pair : pairs) {
       // surfaces of single voxels have no direction
-      if (pair.side != glm::dvec3(0.0)) voxel::hold_pair({below, pose_below}, {above, pose_above}, pair);
+      if (pair.side != glm::dvec3(0.0)) voxel::claim_pair({below, pose_below}, {above, pose_above}, pair);
     }
   }
 
@@ -219,7 +219,7 @@ TEST(PairContact, AnAnchoredVoxelDoesNotGiveWay) {
   BodyPose pose{{0.0, 0.0, 0.7 * kH}, {1.0, 0.0, 0.0, 0.0}};
   const VoxelId b = voxel_at(*stack.lattice_below, 0, 0, 0), a = voxel_at(*tall, 0, 0, 0);
   PressedPair pair = voxel::pair_of({stack.below, stack.pose_below}, b, {above, pose}, a);
-  voxel::hold_pair({stack.below, stack.pose_below}, {above, pose}, pair);
+  voxel::claim_pair({stack.below, stack.pose_below}, {above, pose}, pair);
   const double gap = voxel::relax_pair({stack.below, stack.pose_below}, {above, pose}, pair);
   EXPECT_NEAR(gap, 0.0, 1e-9);
   EXPECT_EQ(stack.below.state().at(b), glm::dvec3(0.0));

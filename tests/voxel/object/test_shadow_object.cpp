@@ -30,20 +30,20 @@ constexpr LinkMaterial kFirm{
 constexpr double kRoundings = 6.0;
 
 // One exchange, with `rows` rows a tick.
-void exchange(ShadowObject& replica, SoftBlock& soft, std::size_t rows) {
-  replica.give(*soft.object);
-  replica.relax();
-  replica.take(*soft.object);
-  while (!replica.drained()) replica.drain(*soft.object, rows);
+void exchange(ShadowObject& shadow, SoftBlock& soft, std::size_t rows) {
+  shadow.submit(*soft.object);
+  shadow.relax();
+  shadow.apply_near(*soft.object);
+  while (!shadow.all_applied()) shadow.apply_far(*soft.object, rows);
 }
 
-void press_and_let_go(ShadowObject& replica, SoftBlock& soft) {
+void press_and_let_go(ShadowObject& shadow, SoftBlock& soft) {
   const ToolInBody tool = soft.ball(6 * kH, 3 * kH);
   soft.touch(tool, 9 * kH);
   for (int n = 0; n < 10; ++n) {
     soft.object->push_out(tool);
     soft.object->relax_near(tool, 1);
-    exchange(replica, soft, 1000);
+    exchange(shadow, soft, 1000);
   }
   soft.object->touch({});
 }
@@ -61,14 +61,14 @@ TEST(ShadowObject, AHeldContactComesToTheSameRest) {
     SoftBlock apart({41, 37, 25}, kH, material), there({41, 37, 25}, kH, material);
     const ToolInBody tool = apart.ball(6 * kH, 1.5 * kH);
     const voxel::Reaction wanted = there.press(tool, 9 * kH, 1e-5, 2000);
-    ShadowObject replica(*apart.object);
+    ShadowObject shadow(*apart.object);
     apart.touch(tool, 9 * kH);
     voxel::Reaction felt;
     for (int n = 0; n < 60; ++n) {
       apart.object->push_out(tool);
       apart.object->relax_near(tool, 1);
       felt = apart.object->reaction(tool);
-      exchange(replica, apart, 333);
+      exchange(shadow, apart, 333);
     }
     EXPECT_NEAR(felt.force_N.z, wanted.force_N.z, 2e-3 * wanted.force_N.z);
     EXPECT_LT(largest_difference(*apart.object, *there.object), 0.02 * kH);
@@ -79,7 +79,7 @@ TEST(ShadowObject, AHeldContactComesToTheSameRest) {
 // Without end: the two solvers find parts of one motion, not the same motion twice.
 TEST(ShadowObject, AHeldContactStaysAtRest) {
   SoftBlock soft({41, 37, 25}, kH, kFirm);
-  ShadowObject replica(*soft.object);
+  ShadowObject shadow(*soft.object);
   const ToolInBody tool = soft.ball(6 * kH, 2 * kH);
   std::vector<double> felt;
   for (int n = 0; n < 400; ++n) {
@@ -89,12 +89,12 @@ TEST(ShadowObject, AHeldContactStaysAtRest) {
       soft.object->relax_near(tool, 1);
       felt.push_back(soft.object->reaction(tool).force_N.z);
       if (tick == 0) {
-        replica.give(*soft.object);
-        replica.relax();
+        shadow.submit(*soft.object);
+        shadow.relax();
       }
     }
-    replica.take(*soft.object);
-    while (!replica.drained()) replica.drain(*soft.object, 250);
+    shadow.apply_near(*soft.object);
+    while (!shadow.all_applied()) shadow.apply_far(*soft.object, 250);
   }
   const auto [low, high] = std::minmax_element(felt.begin() + 200, felt.end());
   EXPECT_LT(*high - *low, 1e-3 * felt.back());
@@ -116,20 +116,20 @@ TEST(ShadowObject, AResultInPartsIsFeltInEvenSteps) {
   double before = 0.0, after = 0.0;
   std::vector<double> felt;
   for (SoftBlock* soft : {&whole, &some}) {
-    ShadowObject& replica = soft == &whole ? of_whole : of_some;
+    ShadowObject& shadow = soft == &whole ? of_whole : of_some;
     soft->touch(tool, 9 * kH);
     before = feel(*soft);
-    replica.give(*soft->object);
-    replica.relax();
-    replica.take(*soft->object, soft == &whole ? 1 : parts);
-    EXPECT_EQ(replica.in_parts(), soft == &some);
+    shadow.submit(*soft->object);
+    shadow.relax();
+    shadow.apply_near(*soft->object, soft == &whole ? 1 : parts);
+    EXPECT_EQ(shadow.in_parts(), soft == &some);
     for (int n = 1; n < parts && soft == &some; ++n) {
-      EXPECT_FALSE(replica.drained());
+      EXPECT_FALSE(shadow.all_applied());
       felt.push_back(feel(*soft));
-      replica.take_part(*soft->object, false);
+      shadow.apply_part(*soft->object, false);
     }
-    EXPECT_FALSE(replica.in_parts());
-    while (!replica.drained()) replica.drain(*soft->object, 1000);
+    EXPECT_FALSE(shadow.in_parts());
+    while (!shadow.all_applied()) shadow.apply_far(*soft->object, 1000);
     const double now = feel(*soft);
     if (soft == &whole) after = now;
     felt.push_back(now);
@@ -148,29 +148,29 @@ TEST(ShadowObject, AResultInPartsThatIsCutShortHasComeWhole) {
   SoftBlock whole({41, 37, 25}, kH, elastic(1e4, 0.3)), some({41, 37, 25}, kH, elastic(1e4, 0.3));
   for (SoftBlock* soft : {&whole, &some}) {
     const ToolInBody tool = soft->ball(6 * kH, 0.3 * kH);
-    ShadowObject replica(*soft->object);
+    ShadowObject shadow(*soft->object);
     soft->touch(tool, 9 * kH);
     soft->object->push_out(tool);
     soft->object->relax_near(tool, 1);
-    replica.give(*soft->object);
-    replica.relax();
-    replica.take(*soft->object, soft == &whole ? 1 : 8);
+    shadow.submit(*soft->object);
+    shadow.relax();
+    shadow.apply_near(*soft->object, soft == &whole ? 1 : 8);
     if (soft == &some) {
-      replica.take_part(*soft->object, false);
-      replica.take_part(*soft->object, true);
+      shadow.apply_part(*soft->object, false);
+      shadow.apply_part(*soft->object, true);
     }
-    EXPECT_FALSE(replica.in_parts());
-    while (!replica.drained()) replica.drain(*soft->object, 1000);
+    EXPECT_FALSE(shadow.in_parts());
+    while (!shadow.all_applied()) shadow.apply_far(*soft->object, 1000);
   }
   EXPECT_LT(largest_difference(*whole.object, *some.object), 1e-5 * kH);
 }
 
 TEST(ShadowObject, WhatTheToolLeftComesToRestAndIsLeftAlone) {
   SoftBlock soft({41, 37, 25}, kH, elastic(1e4, 0.3));
-  ShadowObject replica(*soft.object);
-  press_and_let_go(replica, soft);
+  ShadowObject shadow(*soft.object);
+  press_and_let_go(shadow, soft);
   int exchanges = 0;
-  for (; exchanges < 200 && ShadowObject::wanted(*soft.object); ++exchanges) exchange(replica, soft, 1000);
+  for (; exchanges < 200 && ShadowObject::wanted(*soft.object); ++exchanges) exchange(shadow, soft, 1000);
   EXPECT_LT(exchanges, 60);
   double most = 0.0;
   for (voxel::VoxelId v = 0; v < soft.lattice->size(); ++v)
@@ -198,12 +198,12 @@ constexpr LinkMaterial kLoose{.stretch_min = 0.05, .stretch_max = 10.0, .shear =
 TEST(ShadowObject, AJumpIsFeltRightAfterThreeResults) {
   for (const LinkMaterial& material : {LinkMaterial{}, kLoose}) {
     SoftBlock soft(kWide, kH, material), there(kWide, kH, material);
-    ShadowObject replica(*soft.object);
+    ShadowObject shadow(*soft.object);
     const ToolInBody tool = press_at_once(soft);
     const double wanted = there.press(tool, 13 * kH, 1e-5, 200).force_N.z;
     for (int n = 0; n < 3; ++n) {
       soft.object->relax_near(tool, 2);
-      exchange(replica, soft, 250);
+      exchange(shadow, soft, 250);
       soft.touch(tool, 13 * kH);
       soft.object->push_out(tool);
     }
@@ -217,15 +217,15 @@ TEST(ShadowObject, AJumpIsFeltRightAfterThreeResults) {
 TEST(ShadowObject, WhatMovesFarIsAddedWhole) {
   for (const LinkMaterial& material : {LinkMaterial{}, kLoose}) {
     SoftBlock soft(kWide, kH, material);
-    ShadowObject replica(*soft.object);
+    ShadowObject shadow(*soft.object);
     const ToolInBody tool = press_at_once(soft);
     soft.object->relax_near(tool, 2);
-    exchange(replica, soft, 250);
+    exchange(shadow, soft, 250);
     std::size_t moved = 0, behind = 0;
     for (voxel::VoxelId v = 0; v < soft.lattice->size(); ++v) {
       if (!soft.lattice->filled(v)) continue;
       const glm::dvec3 here = soft.object->state().at(v),
-                       there = replica.displacement_at(soft.lattice->rest(v));
+                       there = shadow.displacement_at(soft.lattice->rest(v));
       moved += glm::length(there) > 0.1 * kH ? 1 : 0;
       behind += glm::distance(here, there) > 0.1 * kH ? 1 : 0;
     }
@@ -235,18 +235,18 @@ TEST(ShadowObject, WhatMovesFarIsAddedWhole) {
 }
 
 // Far from the contact small changes are deferred; at rest both states are the same.
-TEST(ShadowObject, WhatWasKeptBackIsPassedOnAtRest) {
+TEST(ShadowObject, DeferredChangesArePassedOnAtRest) {
   SoftBlock soft({41, 65, 65}, kH, elastic(1e4, 0.3));
-  ShadowObject replica(*soft.object);
+  ShadowObject shadow(*soft.object);
   const ToolInBody tool = soft.ball(6 * kH, 2 * kH);
   soft.touch(tool, 9 * kH);
   soft.object->push_out(tool);
-  for (int n = 0; n < 300 && ShadowObject::wanted(*soft.object); ++n) exchange(replica, soft, 1000);
+  for (int n = 0; n < 300 && ShadowObject::wanted(*soft.object); ++n) exchange(shadow, soft, 1000);
   ASSERT_FALSE(ShadowObject::wanted(*soft.object));
   double most = 0.0;
   for (voxel::VoxelId v = 0; v < soft.lattice->size(); ++v) {
     if (!soft.lattice->filled(v)) continue;
-    const glm::dvec3 known = replica.displacement_at(soft.lattice->rest(v));
+    const glm::dvec3 known = shadow.displacement_at(soft.lattice->rest(v));
     most = std::max(most, glm::distance(soft.object->state().at(v), known));
   }
   EXPECT_LT(most, voxel::kRestingResidual * kH);
@@ -254,21 +254,21 @@ TEST(ShadowObject, WhatWasKeptBackIsPassedOnAtRest) {
 
 // Applying a result takes longer than the time to the next submission. Rows that a tick moves meanwhile are
 // submitted with their motion to come, and must not make it twice. The block is released and comes to rest.
-TEST(ShadowObject, WhatIsGivenWhileItIsDrainedGoesItsWayOnce) {
+TEST(ShadowObject, RowsSubmittedWhileAResultIsAppliedMoveOnce) {
   SoftBlock soft({41, 37, 25}, kH, elastic(1e4, 0.3));
-  ShadowObject replica(*soft.object);
-  press_and_let_go(replica, soft);
+  ShadowObject shadow(*soft.object);
+  press_and_let_go(shadow, soft);
   const double first = soft.object->energy_J();
   // marks rows dirty by a motion of 0, so that they are submitted each time
   const voxel::VoxelId dirty = soft.lattice->grid().at(20, 18, 12);
   for (int n = 0; n < 40; ++n) {
-    replica.give(*soft.object);
-    replica.relax();
-    while (!replica.drained()) {
-      replica.drain(*soft.object, 40);
+    shadow.submit(*soft.object);
+    shadow.relax();
+    while (!shadow.all_applied()) {
+      shadow.apply_far(*soft.object, 40);
       soft.object->move(dirty, soft.object->state().at(dirty));
     }
-    replica.take(*soft.object);
+    shadow.apply_near(*soft.object);
     for (voxel::VoxelId v = 0; v < soft.lattice->size(); v += 7 * voxel::kRow) {
       if (soft.lattice->filled(v)) soft.object->move(v, soft.object->state().at(v));
     }
@@ -279,10 +279,10 @@ TEST(ShadowObject, WhatIsGivenWhileItIsDrainedGoesItsWayOnce) {
 // The tool is still; the tick runs contact cycles and the shadow its own, on a state that is some ticks old.
 // Which voxels are pressed changes, so energies are compared without the tool's work: with the same pressed
 // voxels at the same places.
-TEST(ShadowObject, TheSumNeverHasMoreEnergyThanWhatWasGiven) {
+TEST(ShadowObject, TheSumNeverHasMoreEnergyThanTheSubmission) {
   for (const LinkMaterial& material : {elastic(1e4, 0.3), kFirm}) {
     SoftBlock soft({41, 37, 25}, kH, material);
-    ShadowObject replica(*soft.object);
+    ShadowObject shadow(*soft.object);
     const ToolInBody tool = soft.ball(6 * kH, 2 * kH);
     soft.touch(tool, 9 * kH);
     soft.object->push_out(tool);
@@ -290,12 +290,12 @@ TEST(ShadowObject, TheSumNeverHasMoreEnergyThanWhatWasGiven) {
     const double first = before;
     double worst = 0.0;
     for (int n = 0; n < 40; ++n) {
-      replica.give(*soft.object);
-      replica.relax();
+      shadow.submit(*soft.object);
+      shadow.relax();
       for (int tick = 0; tick < n % 4; ++tick) soft.object->relax_near(tool, 1);
-      replica.take(*soft.object);
-      while (!replica.drained()) {
-        replica.drain(*soft.object, 100);
+      shadow.apply_near(*soft.object);
+      while (!shadow.all_applied()) {
+        shadow.apply_far(*soft.object, 100);
         if (n % 2 == 1) soft.object->relax_near(tool, 1);
       }
       const double now = soft.object->energy_J();
@@ -311,7 +311,7 @@ TEST(ShadowObject, TheSumNeverHasMoreEnergyThanWhatWasGiven) {
 // A tool that moves on while results are old, deep in tissue at its limits: limits hold after every part.
 TEST(ShadowObject, NoLinkLeavesItsLimitsInBetween) {
   SoftBlock soft({31, 29, 19}, kH, kFirm);
-  ShadowObject replica(*soft.object);
+  ShadowObject shadow(*soft.object);
   std::mt19937_64 random(7);
   const auto uniform = [&random](double low, double high) {
     return low + (high - low) * (static_cast<double>(random() >> 11) * 0x1.0p-53);
@@ -324,15 +324,15 @@ TEST(ShadowObject, NoLinkLeavesItsLimitsInBetween) {
     soft.touch(tool, 9 * kH);
     soft.object->push_out(tool);
     soft.object->relax_near(tool, 1);
-    if (!replica.drained()) {
-      replica.drain(*soft.object, 50);
+    if (!shadow.all_applied()) {
+      shadow.apply_far(*soft.object, 50);
     } else if (given && uniform(0.0, 1.0) < 0.2) {
-      replica.take(*soft.object);
+      shadow.apply_near(*soft.object);
       given = false;
     }
     if (!given && ShadowObject::wanted(*soft.object)) {
-      replica.give(*soft.object);
-      replica.relax();
+      shadow.submit(*soft.object);
+      shadow.relax();
       given = true;
     }
     if (tick % 7 == 0) {

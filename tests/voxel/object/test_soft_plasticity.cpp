@@ -48,7 +48,7 @@ struct Column {
   }
   // Upward force on the top voxel when it is held at `u`.
   double hold_at(double u) {
-    object.hold(top);
+    object.claim(top);
     object.move(top, {0.0, 0.0, u});
     rest();
     return voxel::link_force(*lattice, object.state(), top).z;
@@ -146,11 +146,11 @@ TEST(SoftYield, ACopyHasTheDent) {
 // Tissue without plasticity has no memory for it.
 TEST(SoftYield, CostsNothingWhereNothingYields) {
   SoftBlock soft(Dented::kSize, kH, tests::elastic(kYoung, 0.3));
-  EXPECT_EQ(soft.object->state().rest.row.size(), 0U);
+  EXPECT_EQ(soft.object->state().plastic.row.size(), 0U);
   Dented dented;
   dented.press(0.05 * kH);
   dented.leave();
-  const voxel::RestOffsets& rest = dented.soft.object->state().rest;
+  const voxel::PlasticOffsets& rest = dented.soft.object->state().plastic;
   EXPECT_LE(rest.memory_bytes(), rest.row.size());
 }
 

@@ -35,20 +35,20 @@ float room(const Lattice& lattice, const Displacement& state, VoxelId v, VoxelId
 
 float place_of(voxel::Relaxation& relaxation, const Displacement& state, VoxelId v, int axis) {
   glm::dvec3 rest = unconstrained_minimum(relaxation.couplings(), state, v);
-  if (relaxation.away())
-    rest += link_compliance(relaxation.couplings(), v) * relaxation.multigrid().balance_of(v, state);
+  if (relaxation.shadow_busy())
+    rest += link_compliance(relaxation.couplings(), v) * relaxation.multigrid().frozen_load(v, state);
   return voxel::clamp_to(link_interval(relaxation.couplings().lattice(), state, v, axis),
                          static_cast<float>(rest[axis]), state.u[static_cast<std::size_t>(axis)][v]);
 }
 
-// Moves the dependents of `roots`; returns voxels that moved far enough to mark their rows dirty.
-std::set<VoxelId> draw(voxel::Relaxation& relaxation, Displacement& state, const std::vector<VoxelId>& roots,
-                       int axis, std::size_t& drawn) {
+// Moves the dependents of `sources`; returns voxels that moved far enough to mark their rows dirty.
+std::set<VoxelId> draw(voxel::Relaxation& relaxation, Displacement& state,
+                       const std::vector<VoxelId>& sources, int axis, std::size_t& drawn) {
   const Lattice& lattice = relaxation.couplings().lattice();
   auto& u = state.u[static_cast<std::size_t>(axis)];
-  std::set<VoxelId> known(roots.begin(), roots.end()), dirty;
-  std::vector<VoxelId> carried = roots;
-  const std::size_t most = roots.size() + voxel::LimitFollowers::kMostDrawn;
+  std::set<VoxelId> known(sources.begin(), sources.end()), dirty;
+  std::vector<VoxelId> carried = sources;
+  const std::size_t most = sources.size() + voxel::LimitFollowers::kMaxFollowers;
   for (std::size_t head = 0; head < carried.size() && carried.size() < most; ++head) {
     for (int n = 0; n < 6; ++n) {
       const int d = n / 2;
@@ -67,7 +67,7 @@ std::set<VoxelId> draw(voxel::Relaxation& relaxation, Displacement& state, const
       carried.push_back(w);
     }
   }
-  drawn += carried.size() - roots.size();
+  drawn += carried.size() - sources.size();
   return dirty;
 }
 
@@ -87,34 +87,34 @@ void compare(const voxel::LabelVolume& volume, const voxel::LatticeOptions& opti
     return tests::voxel_of(lattice, volume,
                            filled[static_cast<std::size_t>(random.below(static_cast<int>(filled.size())))]);
   };
-  std::vector<VoxelId> roots;
+  std::vector<VoxelId> sources;
   std::vector<glm::vec3> moves;
   for (int n = 1 + random.below(4); n > 0; --n) {
     const VoxelId v = any();
-    if (lattice.anchored(v) || std::find(roots.begin(), roots.end(), v) != roots.end()) continue;
+    if (lattice.anchored(v) || std::find(sources.begin(), sources.end(), v) != sources.end()) continue;
     glm::dvec3 move(0.0);
     for (int axis = 0; axis < 3; ++axis) move[axis] = random.between(-3.0, 3.0) * lattice.min_spacing_m();
     state.set(v, move);
-    roots.push_back(v);
+    sources.push_back(v);
     moves.emplace_back(move);
   }
-  if (roots.empty()) return;
-  chain.settle(state, roots, moves, {});
+  if (sources.empty()) return;
+  chain.settle(state, sources, moves, {});
   for (const voxel::RowId row : chain.moved_rows()) relaxation.mark_dirty(row);
   if (lattice.has_bricks()) relaxation.multigrid().renew_bricks(state, lattice.grid().rows());
   // voxels on the tool do not follow, whether they are sources or not
-  for (const VoxelId v : roots) {
+  for (const VoxelId v : sources) {
     if (lattice.surface_number(v) != Lattice::kNoSurface) state.set_role(v, Displacement::held);
   }
   if (const VoxelId v = any(); lattice.surface_number(v) != Lattice::kNoSurface)
     state.set_role(v, Displacement::held);
   if (apart) {
-    relaxation.leave_to_another();
+    relaxation.leave_to_shadow();
     relaxation.assign_residual(state, {});
-    for (const voxel::RowId row : chain.moved_rows()) relaxation.multigrid().balance(row, state, {});
+    for (const voxel::RowId row : chain.moved_rows()) relaxation.multigrid().freeze_residual(row, state, {});
   }
   const auto back = static_cast<float>(random.between(-0.05, 0.05));
-  for (const VoxelId v : roots) {
+  for (const VoxelId v : sources) {
     for (auto& axis : state.u) axis[v] += back * axis[v];
   }
   relaxation.multigrid().log().clear();
@@ -124,7 +124,7 @@ void compare(const voxel::LabelVolume& volume, const voxel::LatticeOptions& opti
   std::size_t drawn = 0;
   for (int axis = 0; axis < 3; ++axis) {
     std::size_t on_axis = 0;
-    dirty.merge(draw(relaxation, simple, roots, axis, on_axis));
+    dirty.merge(draw(relaxation, simple, sources, axis, on_axis));
     drawn += on_axis;
     counts.most = std::max(counts.most, on_axis);
   }
@@ -134,7 +134,7 @@ void compare(const voxel::LabelVolume& volume, const voxel::LatticeOptions& opti
     if (simple.at(v) != state.at(v)) moved.push_back(v);
   }
   voxel::LimitFollowers rows(lattice, kMostRoots);
-  rows.draw(relaxation, state, roots, kDirtyMotion);
+  rows.move(relaxation, state, sources, kDirtyMotion);
   for (const std::size_t index : filled) {
     const VoxelId v = tests::voxel_of(lattice, volume, index);
     for (std::size_t axis = 0; axis < 3; ++axis)
@@ -197,7 +197,7 @@ TEST(LimitFollowers, GoOnFromRowToRow) {
     compare(volume, options, filled, n % 4 < 2, random, counts);
   }
   std::cout << counts << '\n';
-  EXPECT_GE(counts.most, voxel::LimitFollowers::kMostDrawn);
+  EXPECT_GE(counts.most, voxel::LimitFollowers::kMaxFollowers);
 }
 
 }  // namespace

@@ -45,10 +45,10 @@ void for_tight(const Lattice& lattice, const Displacement& state, VoxelId v, int
 
 // Reference. A voxel with a load below rounding may be a dependent or not: there it follows `rows`.
 std::set<VoxelId> looked_for(const Lattice& lattice, voxel::LevelStiffness& couplings,
-                             const Displacement& state, const std::vector<VoxelId>& roots, int axis,
+                             const Displacement& state, const std::vector<VoxelId>& sources, int axis,
                              const voxel::LimitReactions& rows) {
-  std::set<VoxelId> found(roots.begin(), roots.end());
-  std::vector<VoxelId> waiting = roots;
+  std::set<VoxelId> found(sources.begin(), sources.end());
+  std::vector<VoxelId> waiting = sources;
   while (!waiting.empty()) {
     const VoxelId v = waiting.back();
     waiting.pop_back();
@@ -58,7 +58,7 @@ std::set<VoxelId> looked_for(const Lattice& lattice, voxel::LevelStiffness& coup
       const bool unsure = std::abs(pull) < 1e-6 * lattice.force_scale_N();
       const bool hangs =
           (pushed_up && pull < 0.0) || (pushed_down && pull > 0.0) || (pushed_up && pushed_down);
-      if (unsure ? !rows.carried(w) : !hangs) return;
+      if (unsure ? !rows.gathered(w) : !hangs) return;
       found.insert(w);
       waiting.push_back(w);
     });
@@ -78,30 +78,30 @@ void compare(const voxel::LabelVolume& volume, const voxel::LatticeOptions& opti
   Displacement state(lattice);
   voxel::LevelStiffness couplings(lattice, nullptr);
   voxel::ChainMail chain(lattice);
-  std::vector<VoxelId> roots;
+  std::vector<VoxelId> sources;
   std::vector<glm::vec3> moves;
   for (int n = 1 + random.below(4); n > 0; --n) {
     const VoxelId v = tests::voxel_of(
         lattice, volume, filled[static_cast<std::size_t>(random.below(static_cast<int>(filled.size())))]);
-    if (lattice.anchored(v) || std::find(roots.begin(), roots.end(), v) != roots.end()) continue;
+    if (lattice.anchored(v) || std::find(sources.begin(), sources.end(), v) != sources.end()) continue;
     glm::dvec3 move(0.0);
     for (int axis = 0; axis < 3; ++axis) move[axis] = random.between(-3.0, 3.0) * lattice.min_spacing_m();
     state.set(v, move);
-    roots.push_back(v);
+    sources.push_back(v);
     moves.emplace_back(move);
   }
-  if (roots.empty()) return;
-  chain.settle(state, roots, moves, {});
-  std::sort(roots.begin(), roots.end());
-  const auto is_root = [&](VoxelId v) { return std::binary_search(roots.begin(), roots.end(), v); };
+  if (sources.empty()) return;
+  chain.settle(state, sources, moves, {});
+  std::sort(sources.begin(), sources.end());
+  const auto is_root = [&](VoxelId v) { return std::binary_search(sources.begin(), sources.end(), v); };
   voxel::LimitReactions rows(lattice);
   for (int axis = 0; axis < 3; ++axis) {
-    rows.gather(couplings, state, roots, axis);
-    const std::set<VoxelId> wanted = looked_for(lattice, couplings, state, roots, axis, rows);
+    rows.gather(couplings, state, sources, axis);
+    const std::set<VoxelId> wanted = looked_for(lattice, couplings, state, sources, axis, rows);
     double force = 0.0, stiffness = 0.0, size = 0.0;
     for (const VoxelId v : wanted) {
       if (is_root(v)) continue;
-      EXPECT_TRUE(rows.carried(v)) << "voxel " << v << ", axis " << axis;
+      EXPECT_TRUE(rows.gathered(v)) << "voxel " << v << ", axis " << axis;
       const double own = link_force(couplings, state, v, axis);
       force += own;
       size += std::abs(own);
@@ -116,22 +116,22 @@ void compare(const voxel::LabelVolume& volume, const voxel::LatticeOptions& opti
     std::size_t carried = 0;
     for (const std::size_t index : filled) {
       const VoxelId v = tests::voxel_of(lattice, volume, index);
-      carried += rows.carried(v) && !is_root(v) ? 1 : 0;
+      carried += rows.gathered(v) && !is_root(v) ? 1 : 0;
     }
-    EXPECT_EQ(carried, wanted.size() - roots.size());
-    const voxel::LimitReactions::Hanging hanging = rows.hanging(couplings);
+    EXPECT_EQ(carried, wanted.size() - sources.size());
+    const voxel::LimitReactions::Dependents hanging = rows.dependents(couplings);
     EXPECT_NEAR(hanging.force_N, force, 1e-5 * size + 1e-6 * lattice.force_scale_N());
     EXPECT_NEAR(hanging.stiffness_N_per_m, stiffness, 1e-5 * stiffness);
-    for (const VoxelId root : roots) {
+    for (const VoxelId root : sources) {
       bool tight = false;
       for_tight(lattice, state, root, axis,
                 [&](VoxelId w, bool, bool) { tight = tight || !lattice.anchored(w); });
-      EXPECT_EQ(rows.tight(root), tight);
+      EXPECT_EQ(rows.at_limit(root), tight);
     }
-    counts.hung += wanted.size() - roots.size();
+    counts.hung += wanted.size() - sources.size();
     counts.most = std::max(counts.most, wanted.size());
     std::set<int> columns;
-    for (const VoxelId v : roots) columns.insert(lattice.coordinates(v)[0] / voxel::kRow);
+    for (const VoxelId v : sources) columns.insert(lattice.coordinates(v)[0] / voxel::kRow);
     counts.across += std::any_of(wanted.begin(), wanted.end(), [&](VoxelId v) {
       return !columns.contains(lattice.coordinates(v)[0] / voxel::kRow);
     });
@@ -197,13 +197,13 @@ TEST(LimitReactions, WhatHasNoSlackHangsOnItAllWhateverPullsIt) {
   const std::vector<VoxelId> root{lattice.at(35, 5, 7)};
   rows.gather(couplings, state, root, 2);
   for (std::size_t i = 0; i < volume.labels.size(); ++i)
-    EXPECT_EQ(rows.carried(tests::voxel_of(lattice, volume, i)), volume.labels[i] == 2);
+    EXPECT_EQ(rows.gathered(tests::voxel_of(lattice, volume, i)), volume.labels[i] == 2);
   // each of the links to the tissue below is compressed by half a spacing
   double below = 0.0;
   for (int i = 0; i < 40; ++i) {
     for (int j = 0; j < 10; ++j) below += static_cast<double>(lattice.spring(lattice.at(i, j, 3), 2).along);
   }
-  EXPECT_NEAR(rows.hanging(couplings).force_N, below * 5e-4, 1e-4 * below * 5e-4);
+  EXPECT_NEAR(rows.dependents(couplings).force_N, below * 5e-4, 1e-4 * below * 5e-4);
 }
 
 }  // namespace

@@ -36,7 +36,7 @@ using voxel::VoxelId;
 // The print of a ball on top of a block, under asynchronous relaxation (`apart`) or not.
 struct Print {
   Print(const Lattice& lattice, bool apart) : state(lattice), relaxation(lattice) {
-    if (apart) relaxation.leave_to_another();
+    if (apart) relaxation.leave_to_shadow();
     relaxation.mark_all_dirty();
     relaxation.wake();
     const auto& dims = lattice.grid().dims;
