@@ -91,14 +91,14 @@ SoftRow session_row(int edge, const Scene& scene, BuiltScene& built, const SoftB
   row.time_us = result.tick_us.percentiles();
   row.truncated_share = static_cast<double>(built.state->truncated_ticks) /
                         static_cast<double>(std::max<std::uint64_t>(1, result.ticks));
-  if (result.error.samples > 0) {
+  if (result.error.all.samples > 0) {
     row.force_error_N = result.error.p99_N;
     row.force_error_jnd = result.error.p99_jnd;
     row.reference = "the equilibrium lattice with its limits";
   }
   row.bytes_per_voxel = static_cast<double>(soft_bytes(*built.state)) / static_cast<double>(row.voxels);
   row.note =
-      fmt::format("ticks; error's p99 of {}, at most {:.2f} JND", result.error.samples, result.error.max_jnd);
+      fmt::format("ticks; error's p99 of {}, at most {:.2f} JND", result.error.all.samples, result.error.all.max_jnd);
   return row;
 }
 

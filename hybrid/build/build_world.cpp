@@ -94,14 +94,15 @@ class Builder {
     make_lattices();
     fill_map();
     finish_world();
+    use_patches();
     for (std::size_t o = 0; o < built_.state->soft.size() && !world_->rigid.empty(); ++o) {
+      if (built_.state->soft[o]->uses_patches()) continue;  // nothing rigid is in its reach
       const std::size_t near = find_obstacles(*world_, *built_.state, o);
       if (near == 0) continue;
       built_.notes.push_back(
           {world_->soft[o].name, polygon::Severity::info,
            fmt::format("{} surface voxels lie near rigid objects, which will stop them", near)});
     }
-    use_patches();
     query_bodies(*world_, *built_.state);
     built_.world = std::move(world_);
     return_freed_memory();
@@ -125,18 +126,13 @@ class Builder {
                        d.name));
   }
 
-  // Gives contacts on nested patches to objects that can meet nothing but the tool: nothing in the scene
-  // moves, and no other object is nearer than a fraction of the object's size.
-  void use_patches() {
-    constexpr double kClearance = 0.25;
-    const bool moves = std::any_of(world_->rigid.begin(), world_->rigid.end(),
-                                   [](const RigidObject& object) { return object.motion.moves(); });
+  // Boxes of all objects at rest, rigid ones first.
+  std::vector<Box> boxes_at_rest() const {
     std::vector<Box> boxes;
     for (const RigidObject& object : world_->rigid) {
       boxes.emplace_back();
       for (const glm::dvec3& v : object.drawn->vertices) boxes.back().add(object.to_scene(v));
     }
-    const std::size_t rigid = boxes.size();
     for (std::size_t o = 0; o < world_->soft.size(); ++o) {
       boxes.emplace_back();
       const voxel::Lattice& lattice = built_.state->soft[o]->lattice();
@@ -146,18 +142,38 @@ class Builder {
         boxes.back().add(world_->soft[o].to_scene(at * lattice.spacing_m()));
       }
     }
+    return boxes;
+  }
+
+  // Why object `own` of `boxes` may meet something else than the tool, in words; empty if it cannot: nothing
+  // in the scene moves, and no other object is nearer than a share of its size.
+  std::string may_meet(const std::vector<Box>& boxes, std::size_t own) const {
+    constexpr double kClearance = 0.25;
+    const auto moves = std::find_if(world_->rigid.begin(), world_->rigid.end(),
+                                    [](const RigidObject& object) { return object.motion.moves(); });
+    if (moves != world_->rigid.end()) return fmt::format("\"{}\" moves and may meet it", moves->name);
+    const glm::dvec3 size = boxes[own].high - boxes[own].low;
+    const double apart = kClearance * std::max({size.x, size.y, size.z});
+    for (std::size_t o = 0; o < boxes.size(); ++o) {
+      if (o == own || !glm::all(glm::lessThan(boxes[o].low, boxes[own].high + apart)) ||
+          !glm::all(glm::lessThan(boxes[own].low - apart, boxes[o].high)))
+        continue;
+      const std::size_t rigid = world_->rigid.size();
+      return fmt::format("\"{}\" is nearer than {:.3g} mm, a quarter of its size, and may meet it",
+                         o < rigid ? world_->rigid[o].name : world_->soft[o - rigid].name, 1e3 * apart);
+    }
+    return {};
+  }
+
+  // Gives contacts on nested patches to objects that can meet nothing but the tool.
+  void use_patches() {
+    const std::vector<Box> boxes = boxes_at_rest();
     for (std::size_t o = 0; o < world_->soft.size(); ++o) {
-      const Box& own = boxes[rigid + o];
-      const glm::dvec3 size = own.high - own.low;
-      const double apart = kClearance * std::max({size.x, size.y, size.z});
-      const bool alone = !moves && std::none_of(boxes.begin(), boxes.end(), [&](const Box& other) {
-        return &other != &own && glm::all(glm::lessThan(other.low, own.high + apart)) &&
-               glm::all(glm::lessThan(own.low - apart, other.high));
-      });
       voxel::SoftObject& object = *built_.state->soft[o];
       if (object.lattice().voxel_count() < voxel::SoftObject::kLeastOnGrid) continue;
       const voxel::ToolInBody tool = tool_in_body(*world_, world_->soft[o], glm::dvec3(0.0));
-      const std::string obstacle = alone ? object.use_composite_grid(tool) : "other objects may meet it";
+      std::string obstacle = may_meet(boxes, world_->rigid.size() + o);
+      if (obstacle.empty()) obstacle = object.use_composite_grid(tool);
       built_.notes.push_back(
           {world_->soft[o].name, polygon::Severity::info,
            obstacle.empty()

@@ -85,6 +85,55 @@ nlohmann::ordered_json safety_json(const Scene& scene, const BuiltScene& built) 
   return j;
 }
 
+nlohmann::ordered_json to_json(const ErrorRange& range) {
+  nlohmann::ordered_json j{{"samples", range.samples}};
+  if (range.samples == 0) return j;
+  j["max_N"] = range.max_N;
+  j["rms_N"] = range.rms_N;
+  j["max_jnd"] = range.max_jnd;
+  j["worst_t_s"] = range.worst_t_s;
+  return j;
+}
+
+nlohmann::ordered_json budget_json(const BuiltScene& built, const ForceError& error) {
+  const auto measured = [&error](double value) {
+    return error.all.samples > 0 ? nlohmann::ordered_json(value) : nlohmann::ordered_json(nullptr);
+  };
+  nlohmann::ordered_json j{{"truncated_ticks", built.state->truncated_ticks},
+                           {"force_error_N", measured(error.all.max_N)},
+                           {"force_error_rms_N", measured(error.all.rms_N)},
+                           {"force_error_jnd", measured(error.all.max_jnd)},
+                           {"worst_t_s", measured(error.all.worst_t_s)},
+                           {"samples", error.all.samples},
+                           {"unsettled", error.unsettled},
+                           {"moving", to_json(error.moving)},
+                           {"still", to_json(error.still)},
+                           {"within_1_jnd_after_s", nullptr},
+                           {"verdict", in_words(error)}};
+  if (error.within_after_s) j["within_1_jnd_after_s"] = *error.within_after_s;
+  j["reference"] = error.all.samples > 0 ? "equilibrium lattice with its limits, at the sampled ticks"
+                                         : "not measured: " + error.not_measured;
+  return j;
+}
+
+std::string range_words(const char* name, const ErrorRange& range) {
+  if (range.samples == 0) return {};
+  return fmt::format("  {:<6} {:>3} ticks: at most {:.4f} N, {:.2f} JND at {:.3f} s; rms {:.4f} N\n", name,
+                     range.samples, range.max_N, range.max_jnd, range.worst_t_s, range.rms_N);
+}
+
+std::string error_words(const ForceError& error) {
+  if (error.all.samples == 0 && error.unsettled == 0)
+    return fmt::format("force error of tissue: not measured ({})\n", error.not_measured);
+  std::string text = fmt::format("force error of tissue, against the lattice at rest: {}\n", in_words(error));
+  text += range_words("moving", error.moving) + range_words("still", error.still);
+  if (error.unsettled > 0) {
+    text += fmt::format("  {} of {} sampled states did not come to rest, and have no reference\n",
+                        error.unsettled, error.wanted);
+  }
+  return text;
+}
+
 std::string safety_words(const BuiltScene& built) {
   const device::ForceLimitState& limit = built.state->limit;
   std::string text;
@@ -156,16 +205,7 @@ nlohmann::ordered_json run_report(const Scene& scene, const BuiltScene& built, S
   j["occupancy"] = {{"cells", built.state->map.occupied_cells()},
                     {"bytes", built.state->map.memory_bytes()},
                     {"cell_m", built.state->map.cell_m()}};
-  const bool measured = result.error.samples > 0;
-  const nlohmann::ordered_json none = nullptr;
-  j["budget"] = {{"truncated_ticks", built.state->truncated_ticks},
-                 {"force_error_N", measured ? nlohmann::ordered_json(result.error.max_N) : none},
-                 {"force_error_rms_N", measured ? nlohmann::ordered_json(result.error.rms_N) : none},
-                 {"force_error_jnd", measured ? nlohmann::ordered_json(result.error.max_jnd) : none},
-                 {"samples", result.error.samples},
-                 {"reference",
-                  measured ? "equilibrium lattice with its limits, at the sampled ticks"
-                           : "not measured (no soft contact at a sampled tick, real time, or --samples 0)"}};
+  j["budget"] = budget_json(built, result.error);
   j["safety"] = safety_json(scene, built);
   const double seconds = static_cast<double>(result.ticks) * result.dt_s;
   const auto thread = [&](const char* name, double cpu_s) {
@@ -217,12 +257,7 @@ std::string run_summary(const BuiltScene& built, SessionResult& result) {
                           in_words(object_box(*built.world, o)));
     }
   }
-  if (result.error.samples > 0) {
-    text += fmt::format(
-        "force error against the equilibrium lattice at {} sampled ticks: at most {:.4f} N ({:.2f} JND), rms "
-        "{:.4f} N\n",
-        result.error.samples, result.error.max_N, result.error.max_jnd, result.error.rms_N);
-  }
+  if (!built.state->soft.empty()) text += error_words(result.error);
   if (result.async_results > 0) {
     const double seconds = static_cast<double>(result.ticks) * result.dt_s;
     text += fmt::format(

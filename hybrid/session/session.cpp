@@ -12,11 +12,12 @@
 
 #include "device/simulated/simulated.h"
 #include "hybrid/base/flush_to_zero.h"
+#include "hybrid/session/equilibrium.h"
 #include "hybrid/session/relaxation_thread.h"
 #include "hybrid/snapshot/fill_snapshot.h"
-#include "hybrid/tick/bodies/body_collisions.h"
 #include "hybrid/tick/proxy/proxy_step.h"
 #include "hybrid/tick/tissue/async_relaxation.h"
+#include "hybrid/tick/tissue/leave_tissue.h"
 #include "hybrid/tick/tissue/work_budget.h"
 #include "voxel/composite/grid.h"
 
@@ -27,9 +28,6 @@ constexpr double kAfterPath_s = 0.5;
 constexpr double kWithHand_s = 60.0;         // a real device has no path that ends
 constexpr std::uint64_t kMomentEvery = 20;   // ticks between two candidates for the kept snapshot
 constexpr std::uint64_t kClearances = 1000;  // samples of the clearance in a session
-constexpr int kSettleTicks = 1200;           // most ticks of equilibrium_force()
-constexpr int kStillTicks = 40;              // ticks over which its force must stay within the tolerance
-constexpr std::uint32_t kSettleBudget = 400'000;
 
 std::uint64_t hash_in(std::uint64_t hash, std::uint64_t bits) noexcept {  // FNV-1a, eight bytes at a time
   return (hash ^ bits) * 0x100000001B3ULL;
@@ -79,17 +77,21 @@ std::shared_ptr<const device::Path> later(std::shared_ptr<const device::Path> pa
 
 class Run {
  public:
-  Run(const Scene& scene, BuiltScene& built, const SessionOptions& options)
+  // `course`: filled tick by tick, or null. `sampler`: takes its samples, or null.
+  Run(const Scene& scene, const World& world, WorldState& state, const SessionOptions& options,
+      ForceCourse* course, ForceErrorSampler* sampler)
       : scene_(scene),
-        world_(*built.world),
-        state_(*built.state),
+        world_(world),
+        state_(state),
         options_(options),
+        course_(course),
+        sampler_(sampler),
         path_(later(options.path ? options.path : scene_path(scene),
                     static_cast<double>(options.start_ticks) / scene.rate_hz)),
         simulated_(options.real_device == nullptr ? scene_device(scene, path_) : nullptr),
         device_(options.real_device == nullptr ? *simulated_ : *options.real_device),
         realtime_(options.realtime || options.real_device != nullptr),
-        follows_machine_(realtime_ && options.async_relaxation && !built.state->soft.empty()),
+        follows_machine_(realtime_ && options.async_relaxation && !state.soft.empty()),
         dt_(1.0 / scene.rate_hz),
         work_share_(dt_) {
     const double usual = options.real_device == nullptr ? path_->duration_s() + kAfterPath_s : kWithHand_s;
@@ -118,10 +120,6 @@ class Run {
     std::optional<RelaxationThread> relaxation;
     if (options_.async_relaxation && options_.relaxation_thread && realtime_ && !state_.soft.empty())
       relaxation.emplace(world_, state_.async, options_.surfaces_hz);
-    if (options_.reference_samples > 0 && !realtime_) {
-      sample_every_ =
-          std::max<std::uint64_t>(1, ticks_ / static_cast<std::uint64_t>(2 * options_.reference_samples));
-    }
     auto tick = [this](const device::ServoInput& input) { return answer(input); };
     device::ServoReport served;
     if (ticks_ > 0) {
@@ -148,11 +146,6 @@ class Run {
     result_.ticks = ticks_done_;
     result_.state_hash = hash_state(hash_, state_);
     if (ticks_done_ > 0) result_.rms_force_N = std::sqrt(sum_force2_ / static_cast<double>(ticks_done_));
-    if (result_.error.samples > 0) {
-      result_.error.rms_N = std::sqrt(result_.error.rms_N / result_.error.samples);
-      result_.error.p99_N = percentiles(errors_N_).p99;
-      result_.error.p99_jnd = percentiles(errors_jnd_).p99;
-    }
     return std::move(result_);
   }
 
@@ -180,8 +173,7 @@ class Run {
       late_us_.add(input.late_s * 1e6);
       if (follows_machine_) follow_machine(felt.tick_us);
     } else {
-      if (sample_every_ != 0 && result_.error.samples < options_.reference_samples)
-        sample(felt, sample_every_);
+      compare_force(felt, tick);
       if (options_.keep_picture && tick % kMomentEvery == 0) maybe_keep_snapshot(felt, tick);
       if (options_.keep_clearance && tick % clearance_every_ == 0) measure_clearance(tick);
       if (options_.progress && tick % 64 == 0) report_progress(tick);
@@ -228,24 +220,19 @@ class Run {
                             felt.tick_us});
   }
 
-  // Compares the force with its equilibrium at moments spread evenly over the time of soft contact.
-  void sample(const TickResult& felt, std::uint64_t every) {
-    bool soft = false;
-    for (const voxel::Reaction& r : state_.reactions) soft = soft || r.pressed > 0;
-    if (!soft || ++soft_ticks_ % every != every / 2) return;
-    if (options_.progress)
-      options_.progress(fmt::format("comparing the force at tick {} with its equilibrium", state_.tick));
-    const auto reference = equilibrium_force(world_, state_);
-    if (!reference) return;
-    const glm::dvec3 raw = world_.tool.stiffness_N_per_m * (felt.proxy_m - felt.device_m);
-    const double error = glm::length(raw - *reference);
-    ++result_.error.samples;
-    result_.error.max_N = std::max(result_.error.max_N, error);
-    result_.error.rms_N += error * error;
-    const double jnd = jnd_of(raw, *reference, jnd_floor_N(scene_));
-    result_.error.max_jnd = std::max(result_.error.max_jnd, jnd);
-    errors_N_.push_back(error);
-    errors_jnd_.push_back(jnd);
+  // Keeps the tick in the course, and compares its force with the equilibrium if it was chosen.
+  void compare_force(const TickResult& felt, std::uint64_t tick) {
+    const glm::dvec3 coupling = world_.tool.stiffness_N_per_m * (felt.proxy_m - felt.device_m);
+    if (course_ != nullptr) {
+      const bool soft = std::any_of(state_.reactions.begin(), state_.reactions.end(),
+                                    [](const voxel::Reaction& r) { return r.pressed > 0; });
+      const double speed = tick > 0 ? glm::length(felt.device_m - device_before_m_) / dt_ : 0.0;
+      course_->push_back({coupling, speed, soft});
+      device_before_m_ = felt.device_m;
+    }
+    if (sampler_ == nullptr || !sampler_->wants(tick)) return;
+    if (options_.progress) options_.progress(sampler_->progress());
+    sampler_->take(world_, state_, coupling, static_cast<double>(tick) * dt_);
   }
 
   void measure_clearance(std::uint64_t tick) {
@@ -271,6 +258,9 @@ class Run {
   const World& world_;
   WorldState& state_;
   const SessionOptions& options_;
+  ForceCourse* course_;
+  ForceErrorSampler* sampler_;
+  glm::dvec3 device_before_m_{0.0};
   std::shared_ptr<const device::Path> path_;
   std::unique_ptr<device::HapticDevice> simulated_;
   device::HapticDevice& device_;
@@ -278,10 +268,9 @@ class Run {
   double dt_;
   WorkShare work_share_;
   LatencyHistogram late_us_;
-  std::vector<double> errors_N_, errors_jnd_;  // of the sampled ticks
   std::chrono::steady_clock::time_point last_report_ = std::chrono::steady_clock::now();
   std::uint64_t clearance_every_ = 1;
-  std::uint64_t ticks_ = 0, ticks_done_ = 0, sample_every_ = 0, soft_ticks_ = 0, hash_ = kHashBegin;
+  std::uint64_t ticks_ = 0, ticks_done_ = 0, hash_ = kHashBegin;
   double sum_force2_ = 0.0, best_score_ = 0.0;
   SessionResult result_;
 };
@@ -330,12 +319,14 @@ std::unique_ptr<device::HapticDevice> scene_device(const Scene& scene,
 }
 
 void begin_session(const Scene& scene, const World& world, WorldState& state, const glm::dvec3& device_m) {
-  if (start_proxy(world, state, device_m)) return;
-  throw SceneError(
-      scene.file, scene.path_place,
-      fmt::format(
-          "the path starts at ({:.4g}, {:.4g}, {:.4g}) m, inside something rigid; start it in free space",
-          device_m.x, device_m.y, device_m.z));
+  const auto refuse = [&](const char* inside) {
+    throw SceneError(
+        scene.file, scene.path_place,
+        fmt::format("the path starts at ({:.4g}, {:.4g}, {:.4g}) m, inside {}; start it in free space",
+                    device_m.x, device_m.y, device_m.z, inside));
+  };
+  if (!start_proxy(world, state, device_m)) refuse("something rigid");
+  if (!leave_tissue(world, state)) refuse("tissue, with no way out for the tool");
 }
 
 void restore_tick_timing(const RecordedTick& tick, WorldState& state) noexcept {
@@ -344,7 +335,30 @@ void restore_tick_timing(const RecordedTick& tick, WorldState& state) noexcept {
 }
 
 SessionResult run_session(const Scene& scene, BuiltScene& built, const SessionOptions& options) {
-  return Run(scene, built, options).run();
+  const char* not_measured = built.state->soft.empty()                            ? "nothing is soft"
+                             : options.realtime || options.real_device != nullptr ? "real time"
+                             : options.reference_samples <= 0 ? "no samples were asked for"
+                                                              : nullptr;
+  if (not_measured != nullptr) {
+    SessionResult result = Run(scene, *built.world, *built.state, options, nullptr, nullptr).run();
+    result.error.not_measured = not_measured;
+    return result;
+  }
+  const std::unique_ptr<WorldState> begin = copy_state(*built.world, *built.state);
+  ForceCourse course;
+  SessionResult result = Run(scene, *built.world, *built.state, options, &course, nullptr).run();
+  ForceErrorSampler sampler(
+      choose_error_samples(course, static_cast<std::size_t>(options.reference_samples), result.dt_s),
+      jnd_floor_N(scene));
+  if (sampler.ticks() > 0) {
+    SessionOptions again = options;
+    again.seconds = static_cast<double>(sampler.ticks()) * result.dt_s;
+    again.keep_rows = again.keep_recording = again.keep_clearance = again.keep_picture = false;
+    again.black_box = nullptr;
+    Run(scene, *built.world, *begin, again, nullptr, &sampler).run();
+  }
+  result.error = sampler.result();
+  return result;
 }
 
 std::uint64_t hash_tick(std::uint64_t before, const TickResult& tick) noexcept {
@@ -384,59 +398,6 @@ Snapshot take_snapshot(const World& world, const WorldState& state, const TickRe
                     .tick_us = tick.tick_us};
   fill_moved(world, state, snapshot);
   return snapshot;
-}
-
-std::unique_ptr<WorldState> copy_state(const World& world, const WorldState& state) {
-  auto copy = std::make_unique<WorldState>(world, OccupancyMap(state.map));
-  for (const auto& object : state.soft) copy->soft.push_back(object->copy());
-  copy->prepare(world);
-  prepare_collisions(world, *copy);
-  copy->map.reserve_bricks(1024);
-  static_cast<CarriedState&>(*copy) = static_cast<const CarriedState&>(state);
-  return copy;
-}
-
-namespace {
-
-// True if the anchors carry the felt force of each object that nothing but the tool presses. Far from rest an
-// object can stand still: with active limits all around a deep push, nothing moves from one cycle to the
-// next, although half of the load has not reached the anchors, or is not felt.
-bool carried_by_anchors(const World& world, const WorldState& state) noexcept {
-  constexpr double kShare = 0.01, kLeast_N = 1e-3;
-  if (!world.soft_pairs.empty()) return true;
-  for (std::size_t o = 0; o < state.soft.size(); ++o) {
-    const voxel::SoftObject& object = *state.soft[o];
-    if (state.reactions[o].pressed == 0 || !object.obstacles().empty() || object.lattice().has_plasticity() ||
-        object.lattice().has_bricks())
-      continue;
-    const auto carried = object.carried_by_anchors_N();
-    if (!carried) continue;
-    const glm::dvec3 felt = glm::inverse(world.soft[o].pose.rotation) * state.reactions[o].force_N;
-    if (glm::length(felt + *carried) > std::max(kLeast_N, kShare * glm::length(felt))) return false;
-  }
-  return true;
-}
-
-}  // namespace
-
-std::optional<glm::dvec3> equilibrium_force(const World& world, const WorldState& state, double tolerance_N) {
-  const std::unique_ptr<WorldState> copy = copy_state(world, state);
-  // The same physics with a large budget: the budget changes only the time to settle, not the rest state.
-  World settling = world;
-  for (SoftBody& body : settling.soft) body.budget = kSettleBudget;
-  for (RigidObject& object : settling.rigid) object.motion = {};  // moving bodies stand still meanwhile
-  std::fill(copy->body_moved_m.begin(), copy->body_moved_m.end(), 0.0);
-  for (const auto& object : copy->soft) object->widen_patches();
-  const device::DeviceState still{.position_m = state.device_m};
-  glm::dvec3 before(0.0);
-  for (int n = 1; n <= kSettleTicks; ++n) {
-    const TickResult felt = haptic_tick(settling, *copy, still, 1e-3);
-    if (n % kStillTicks != 0) continue;
-    const glm::dvec3 force = world.tool.stiffness_N_per_m * (felt.proxy_m - felt.device_m);
-    if (glm::length(force - before) < tolerance_N && carried_by_anchors(settling, *copy)) return force;
-    before = force;
-  }
-  return std::nullopt;
 }
 
 }  // namespace hybrid

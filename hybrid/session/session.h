@@ -17,6 +17,7 @@
 #include "hybrid/build/load_scene.h"
 #include "hybrid/session/black_box.h"
 #include "hybrid/session/clearance.h"
+#include "hybrid/session/force_error.h"
 #include "hybrid/snapshot/snapshot.h"
 #include "hybrid/tick/tick.h"
 
@@ -47,7 +48,9 @@ struct SessionOptions {
   bool keep_recording = true;   // every input, 48 bytes a tick: without it and the rows memory stays flat
   bool keep_clearance = false;  // distances between objects, at a thousand moments
   bool keep_picture = false;    // keep the snapshot with the most contact
-  int reference_samples = 0;    // comparisons of the force with its equilibrium; 0 in real time
+  // Comparisons of the force with its equilibrium (force_error.h). They take a second run, and seconds each.
+  // None in real time.
+  int reference_samples = 0;
   // Clocks, counters and path begin as after this many ticks, when a soft start is over. The forces do not
   // depend on it.
   std::uint64_t start_ticks = 0;
@@ -58,12 +61,6 @@ struct SessionOptions {
   double surfaces_hz = 0.0;                    // how often that thread publishes surfaces for drawing
   BlackBox* black_box = nullptr;               // every tick is added to it
   std::shared_ptr<const device::Path> path{};  // of the hand; null: the scene's path
-};
-
-struct ForceError {  // of the tick's force at the sampled ticks; reference: the equilibrium lattice with its
-                     // limits
-  int samples = 0;
-  double max_N = 0.0, rms_N = 0.0, max_jnd = 0.0, p99_N = 0.0, p99_jnd = 0.0;
 };
 
 struct SessionResult {
@@ -121,14 +118,5 @@ std::uint64_t hash_state(std::uint64_t before, const WorldState& state) noexcept
 
 // A snapshot of now.
 Snapshot take_snapshot(const World& world, const WorldState& state, const TickResult& tick, double t_s);
-
-// A deep copy of the state; the constant lattices are shared.
-std::unique_ptr<WorldState> copy_state(const World& world, const WorldState& state);
-
-// The force at the present device position once all tissue is at rest (N). A copy of the state is relaxed
-// until the force changes by less than `tolerance_N` over dozens of whole relaxation cycles and the anchors
-// carry it; moving bodies stand still meanwhile. Empty when the force does not settle.
-std::optional<glm::dvec3> equilibrium_force(const World& world, const WorldState& state,
-                                            double tolerance_N = 1e-4);
 
 }  // namespace hybrid

@@ -7,8 +7,9 @@
 #include <limits>
 
 #include "hybrid/base/flush_to_zero.h"
-#include "hybrid/tick/proxy/proxy_sweep.h"
+#include "hybrid/session/equilibrium.h"
 #include "hybrid/session/session.h"
+#include "hybrid/tick/proxy/proxy_sweep.h"
 
 namespace hybrid {
 namespace {

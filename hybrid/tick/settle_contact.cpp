@@ -84,6 +84,11 @@ OutsideRigid minimise_outside_rigid(const World& world, WorldState& state, const
   return least;
 }
 
+// Remembers a soft object's plane that stops the tool in this tick.
+void add_stop(WorldState& state, const polygon::ContactPlane& plane) noexcept {
+  if (state.scratch.stops.size() < state.scratch.stops.capacity()) state.scratch.stops.push_back(plane);
+}
+
 // Tissue that cannot leave the tool's way is as good as rigid, and the proxy stops there. A tool that is
 // pressed further in every pass and taken back at the end of the tick would act as a wedge: it would drive
 // voxels aside and gain energy. Once a tick the planes recede by `probe`, to find out whether the voxels
@@ -106,8 +111,10 @@ glm::dvec3 stop_at_jammed(const World& world, WorldState& state, const glm::dvec
   // The sweep meets the rigid planes itself, so only the multipliers of jammed tissue are added here.
   glm::dvec3 jammed_N(0.0);
   for (std::uint32_t i = 0; i < stop.active_count; ++i) {
-    if (stop.active[i] >= least.rigid)
-      jammed_N += stop.multiplier[i] * state.scratch.planes[stop.active[i]].normal;
+    if (stop.active[i] < least.rigid) continue;
+    const polygon::ContactPlane& plane = state.scratch.planes[stop.active[i]];
+    jammed_N += stop.multiplier[i] * plane.normal;
+    add_stop(state, plane);
   }
   return target + glm::inverse(metric) * jammed_N;
 }
@@ -117,6 +124,7 @@ glm::dvec3 stop_at_jammed(const World& world, WorldState& state, const glm::dvec
 double move_proxy(const World& world, WorldState& state, const glm::dvec3& device, bool near_soft,
                   double travel, bool first_pass, Sweep& sweep) noexcept {
   const double k = world.tool.stiffness_N_per_m;
+  state.scratch.stops.clear();
   glm::dmat3 model(k);
   for (const voxel::Reaction& reaction : state.reactions) model += reaction.stiffness_N_per_m;
   // The learnt stiffness applies only in contact; free, the proxy goes to the device at once.
@@ -172,6 +180,7 @@ double contact_range_m(const World& world, const WorldState& state) noexcept {
 Sweep settle_contact(const World& world, WorldState& state, const glm::dvec3& device,
                      const Neighbourhood& around) noexcept {
   Sweep sweep;
+  state.scratch.stops.clear();
   std::fill(state.rigid_force_N.begin(), state.rigid_force_N.end(), glm::dvec3(0.0));
   if (!around.near_soft) {
     std::fill(state.reactions.begin(), state.reactions.end(), voxel::Reaction{});
@@ -197,6 +206,10 @@ void give_way(const World& world, WorldState& state, const glm::dvec3& before, S
       world, state, state.proxy_m, polygon::Metric(glm::dmat3(1.0)),
       [&] { bounds = tool_bounds(world, state, state.proxy_m, false, state.scratch.planes); });
   // If no exit is found, return to the start of the tick, unless the tool was deeper there.
+  for (std::size_t i = least.rigid; i < state.scratch.planes.size(); ++i) {
+    if (state.scratch.planes[i].offset > glm::dot(state.scratch.planes[i].normal, state.proxy_m))
+      add_stop(state, state.scratch.planes[i]);
+  }
   if (least.sure) {
     state.proxy_m = least.minimum.point;
   } else if (deepest(state, bounds, before) <= deepest(state, bounds, state.proxy_m)) {

@@ -10,6 +10,7 @@
 #include "hybrid/tick/bodies/bodies_press_tissue.h"
 #include "hybrid/tick/bodies/move_bodies.h"
 #include "hybrid/tick/bodies/tissue_supports_bodies.h"
+#include "hybrid/tick/forces_by_object.h"
 #include "hybrid/tick/proxy/feel_stage.h"
 #include "hybrid/tick/proxy/proxy_step.h"
 #include "hybrid/tick/settle_contact.h"
@@ -121,11 +122,8 @@ void publish_force(const World& world, WorldState& state, const Sweep& sweep,
   result.rigid_N = sweep.force_N + added;
   result.soft_N = coupling - sweep.force_N;
   result.force_N = make_safe(world, state, coupling + added, input, dt_s);
-  for (std::size_t o = 0; o < world.object_count(); ++o) {
-    const std::size_t rigid = world.rigid.size();
-    const glm::dvec3 force = o < rigid ? state.rigid_force_N[o] : state.reactions[o - rigid].force_N;
-    state.feel[o].force_N = glm::length(force);
-    state.feel[o].contact = state.feel[o].force_N > 0.0;
+  split_by_object(world, state, result.soft_N);
+  for (std::size_t o = 0; o < state.feel.size(); ++o) {
     if (state.feel[o].contact) result.contacts |= 1U << std::min<std::size_t>(o, 31);
   }
 }

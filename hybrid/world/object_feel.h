@@ -2,11 +2,14 @@
 // One object's part of the force on the hand.
 #pragma once
 
+#include <glm/vec3.hpp>
+
 namespace hybrid {
 
 struct ObjectFeel {
   bool contact = false;
-  double force_N = 0.0;
+  double force_N = 0.0;       // length of on_hand_N
+  glm::dvec3 on_hand_N{0.0};  // scene frame; those of all objects sum up to the felt force before its limits
 };
 
 }  // namespace hybrid

@@ -66,6 +66,8 @@ struct TickScratch {
   std::vector<voxel::ToolBound> bounds;
   std::vector<std::uint32_t> map_hits;               // entries that the last look-up in the map returned
   std::vector<std::vector<voxel::VoxelId>> touched;  // [soft] surface voxels near the tool
+  std::vector<polygon::ContactPlane> stops;  // planes of soft objects that stopped the tool in this tick
+  std::vector<glm::dmat3> soft_stiffness;    // [soft] on the tool (N/m), of split_by_object()
 
   // ---- bodies that move ----
   std::vector<DueQuery> due;

@@ -40,6 +40,8 @@ void WorldState::prepare(const World& world) {
   if (!soft.empty()) {
     scratch.bounds.resize(kMaxPlanes / 2);
     jammed.reserve(kMaxPlanes);
+    scratch.stops.reserve(kMaxPlanes);
+    scratch.soft_stiffness.resize(soft.size());
     scratch.map_hits.resize(kMaxMapHits);
   }
   prepare_body_obstacles(world);

@@ -4,6 +4,7 @@
 // The object's own state stays at rest and complete, and nothing is written to it. While tissue is pressed
 // its displacement is read from the patches; when the tool leaves, the patches are dropped.
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
@@ -52,7 +53,7 @@ void go_along(CompositeGrid& grid, const std::array<int, 3>& centre, const glm::
 
 std::string SoftObject::use_composite_grid(const ToolInBody& tool) {
   if (lattice_->voxel_count() < kLeastOnGrid) return "it is small enough to be known voxel by voxel";
-  if (!obstacles_.empty() || moved_ever_) return "rigid surfaces are near it";
+  assert(obstacles_.empty() && !moved_ever_);
   if (lattice_->max_spacing_m() > kFlat * lattice_->min_spacing_m()) return "its voxels are not cubes";
   // A ball touches tissue only where the ball is no steeper than links let a surface be.
   const double h = lattice_->min_spacing_m();

@@ -9,6 +9,8 @@
 #include <glm/geometric.hpp>
 #include <iostream>
 
+#include "hybrid/feel/just_noticeable.h"
+#include "hybrid/session/equilibrium.h"
 #include "hybrid/snapshot/fill_snapshot.h"
 #include "hybrid/snapshot/make_drawn_scene.h"
 #include "hybrid/snapshot/merge_live_surface.h"
@@ -43,7 +45,27 @@ TEST_F(GridSession, SaysWhereContactsAreKeptAndWhy) {
   const std::string wall =
       "spacing = 1\n[[rigid]]\nname = \"wall\"\nprimitive = \"box\"\nsize = [10, 90, 90]\nposition = [45, 0, "
       "0]\n";
-  EXPECT_NE(note_of(block(wall)).find("other objects"), std::string::npos);
+  EXPECT_NE(note_of(block(wall)).find("\"wall\" is nearer than 16.2 mm"), std::string::npos);
+}
+
+// Rigid surfaces out of reach do not change what is felt, while the tool moves and after. The proxy may go
+// its way in other steps.
+TEST_F(GridSession, ABallFarAwayChangesNothing) {
+  const std::string ball =
+      "[[rigid]]\nname = \"ball\"\nprimitive = \"ball\"\nradius = 20\nposition = [150, 0, 20]\n";
+  const double top = 0.032 - 0.002 + 0.008;
+  const auto play = [&](const std::string& more) {
+    std::vector<glm::dvec3> forces;
+    tests::Touch touch(load(block("spacing = 1\n" + more)), {0.0, 0.0, top + 0.005}, true);
+    const auto keep = [&](const hybrid::TickResult& tick) { forces.push_back(tick.force_N); };
+    touch.go({0.0, 0.0, top - 0.004}, 2e-4, 30, keep);
+    touch.go({0.008, 0.002, top - 0.002}, 2e-4, 30, keep);
+    return forces;
+  };
+  const auto beside = play(ball), alone = play("");
+  ASSERT_EQ(beside.size(), alone.size());
+  for (std::size_t n = 0; n < alone.size(); ++n)
+    ASSERT_LT(hybrid::jnd_of(beside[n], alone[n], hybrid::kJndFloor_N), 0.1) << "tick " << n;
 }
 
 // The window gets the nodes of the patches; the surface computed from them must be where the object itself

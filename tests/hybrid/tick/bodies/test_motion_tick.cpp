@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <vector>
 
+#include "hybrid/session/equilibrium.h"
 #include "tests/hybrid/fixtures/feel_scene.h"
 
 namespace {

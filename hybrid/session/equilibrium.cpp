@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/session/equilibrium.h"
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+
+#include "hybrid/tick/bodies/body_collisions.h"
+#include "hybrid/tick/tick.h"
+
+namespace hybrid {
+namespace {
+
+constexpr int kSettleTicks = 1200;  // most ticks of equilibrium_force()
+constexpr int kStillTicks = 40;     // ticks over which its force must stay within the tolerance
+constexpr std::uint32_t kSettleBudget = 400'000;
+
+}  // namespace
+
+std::unique_ptr<WorldState> copy_state(const World& world, const WorldState& state) {
+  auto copy = std::make_unique<WorldState>(world, OccupancyMap(state.map));
+  for (const auto& object : state.soft) copy->soft.push_back(object->copy());
+  copy->prepare(world);
+  prepare_collisions(world, *copy);
+  copy->map.reserve_bricks(1024);
+  static_cast<CarriedState&>(*copy) = static_cast<const CarriedState&>(state);
+  return copy;
+}
+
+namespace {
+
+// True if the anchors carry the felt force of each object that nothing but the tool presses. Far from rest an
+// object can stand still: with active limits all around a deep push, nothing moves from one cycle to the
+// next, although half of the load has not reached the anchors, or is not felt.
+bool carried_by_anchors(const World& world, const WorldState& state) noexcept {
+  constexpr double kShare = 0.01, kLeast_N = 1e-3;
+  if (!world.soft_pairs.empty()) return true;
+  for (std::size_t o = 0; o < state.soft.size(); ++o) {
+    const voxel::SoftObject& object = *state.soft[o];
+    if (state.reactions[o].pressed == 0 || !object.obstacles().empty() || object.lattice().has_plasticity() ||
+        object.lattice().has_bricks())
+      continue;
+    const auto carried = object.carried_by_anchors_N();
+    if (!carried) continue;
+    const glm::dvec3 felt = glm::inverse(world.soft[o].pose.rotation) * state.reactions[o].force_N;
+    if (glm::length(felt + *carried) > std::max(kLeast_N, kShare * glm::length(felt))) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+std::optional<glm::dvec3> equilibrium_force(const World& world, const WorldState& state, double tolerance_N) {
+  const std::unique_ptr<WorldState> copy = copy_state(world, state);
+  // The same physics with a large budget: the budget changes only the time to settle, not the rest state.
+  World settling = world;
+  for (SoftBody& body : settling.soft) body.budget = kSettleBudget;
+  for (RigidObject& object : settling.rigid) object.motion = {};  // moving bodies stand still meanwhile
+  std::fill(copy->body_moved_m.begin(), copy->body_moved_m.end(), 0.0);
+  for (const auto& object : copy->soft) object->widen_patches();
+  const device::DeviceState still{.position_m = state.device_m};
+  glm::dvec3 before(0.0);
+  for (int n = 1; n <= kSettleTicks; ++n) {
+    const TickResult felt = haptic_tick(settling, *copy, still, 1e-3);
+    if (n % kStillTicks != 0) continue;
+    const glm::dvec3 force = world.tool.stiffness_N_per_m * (felt.proxy_m - felt.device_m);
+    if (glm::length(force - before) < tolerance_N && carried_by_anchors(settling, *copy)) return force;
+    before = force;
+  }
+  return std::nullopt;
+}
+
+}  // namespace hybrid

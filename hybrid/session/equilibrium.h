@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The equilibrium of a state: the force once all tissue is at rest.
+#pragma once
+
+#include <glm/vec3.hpp>
+#include <memory>
+#include <optional>
+
+#include "hybrid/world/world_state.h"
+
+namespace hybrid {
+
+// A deep copy of the state; the constant lattices are shared.
+std::unique_ptr<WorldState> copy_state(const World& world, const WorldState& state);
+
+// The force at the present device position once all tissue is at rest (N). A copy of the state is relaxed
+// until the force changes by less than `tolerance_N` over dozens of whole relaxation cycles and the anchors
+// carry it; moving bodies stand still meanwhile. Empty when the force does not settle.
+std::optional<glm::dvec3> equilibrium_force(const World& world, const WorldState& state,
+                                            double tolerance_N = 1e-4);
+
+}  // namespace hybrid

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The start of a session whose tool begins inside tissue.
+#pragma once
+
+#include "hybrid/world/world_state.h"
+
+namespace hybrid {
+
+// Moves the proxy out of all tissue at rest, along the lattice axis or diagonal of an object on which that is
+// shortest. The first ticks then press the tool in from there, as from any start outside. Call it before the
+// first tick, with the proxy outside everything rigid. False: the tool finds no free place; a session must
+// not start there.
+bool leave_tissue(const World& world, WorldState& state) noexcept;
+
+}  // namespace hybrid
