@@ -102,7 +102,11 @@ int compare(const CompareCommand& command) {
   const Comparison comparison = compare_models(scene, command.object, progress_on_terminal());
   end_progress();
   std::FILE* words = command.json == "-" ? stderr : stdout;
-  fmt::print(words, "\"{}\" along the path of {}\n", comparison.object, scene.file.filename().string());
+  fmt::print(
+      words,
+      "\"{}\" alone along the path of {}: no other objects, an ideal device, tissue relaxed in the tick "
+      "(the force of the whole scene: hybrid run)\n",
+      comparison.object, scene.file.filename().string());
   print_models(words, comparison);
   save_comparison_plot(command, scene, comparison, words);
   if (!command.json.empty()) save_json(command.json, comparison_report(scene, comparison));
