@@ -12,7 +12,6 @@ namespace {
 
 constexpr int kSettleTicks = 1200;  // most ticks of equilibrium_force()
 constexpr int kStillTicks = 40;     // ticks over which its force must stay within the tolerance
-constexpr std::uint32_t kSettleBudget = 400'000;
 
 }  // namespace
 
@@ -51,9 +50,7 @@ bool carried_by_anchors(const World& world, const WorldState& state) noexcept {
 
 std::optional<glm::dvec3> equilibrium_force(const World& world, const WorldState& state, double tolerance_N) {
   const std::unique_ptr<WorldState> copy = copy_state(world, state);
-  // The same physics with a large budget: the budget changes only the time to settle, not the rest state.
   World settling = world;
-  for (SoftBody& body : settling.soft) body.budget = kSettleBudget;
   for (RigidObject& object : settling.rigid) object.motion = {};  // moving bodies stand still meanwhile
   std::fill(copy->body_moved_m.begin(), copy->body_moved_m.end(), 0.0);
   for (const auto& object : copy->soft) object->widen_patches();

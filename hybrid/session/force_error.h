@@ -17,7 +17,7 @@ namespace hybrid {
 
 // One tick of the first run.
 struct CourseTick {
-  glm::dvec3 force_N{0.0};   // of the coupling
+  glm::dvec3 force_N{0.0};   // of the soft objects
   double speed_m_per_s = 0;  // of the device
   bool soft = false;         // something soft is in contact
 };
@@ -34,7 +34,7 @@ inline constexpr double kStill_m_per_s = 1e-3;
 
 // At most `count` ticks of `course`, in rising order, each with something soft in contact. Half of them while
 // the device moves, if it does: the fastest changes of the force, and evenly spread ones. The others at
-// delays of 10 ms, 30 ms, 0.1 s … after the device stopped, the longest forces first. The largest force and
+// delays of 10 ms, 30 ms, 0.1 s … after the device stopped, the largest forces first. The largest force and
 // the fastest change are always among them.
 std::vector<ErrorSample> choose_error_samples(const ForceCourse& course, std::size_t count, double dt_s);
 

@@ -227,7 +227,7 @@ class Run {
       const bool soft = std::any_of(state_.reactions.begin(), state_.reactions.end(),
                                     [](const voxel::Reaction& r) { return r.pressed > 0; });
       const double speed = tick > 0 ? glm::length(felt.device_m - device_before_m_) / dt_ : 0.0;
-      course_->push_back({coupling, speed, soft});
+      course_->push_back({felt.soft_N, speed, soft});
       device_before_m_ = felt.device_m;
     }
     if (sampler_ == nullptr || !sampler_->wants(tick)) return;
