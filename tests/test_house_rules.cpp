@@ -286,7 +286,7 @@ TEST(HouseRules, HeavyLibrariesStayInFewFilesAndOutOfHeaders) {
     std::string list;
     for (const std::string& file : files) list += "\n  " + file;
     // CGAL also is what others are measured against: the exact reference, and the tree that people use.
-    const std::size_t most = library == "CGAL/" ? 4 : 2;
+    const std::size_t most = library == "CGAL/" ? 5 : 2;
     EXPECT_LE(files.size(), most) << library << " is included in more than " << most << " files:" << list;
   }
 }

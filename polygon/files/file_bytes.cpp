@@ -4,6 +4,7 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <array>
 #include <fstream>
 #include <memory>
 #include <new>
@@ -11,6 +12,7 @@
 #include <vector>
 
 #include "polygon/files/mesh_file.h"
+#include "polygon/files/prescan.h"
 
 namespace polygon {
 namespace {
@@ -63,6 +65,23 @@ std::string unpack(const std::filesystem::path& file, std::uint64_t max_bytes) {
 
 }  // namespace
 
+std::string_view other_kind(std::string_view first_bytes) {
+  struct Kind {
+    std::string_view begins, is;
+  };
+  constexpr std::array<Kind, 4> kKinds{{{"version https://git-lfs.github.com/",
+                                         "is a Git LFS pointer, which stands for a file that was not "
+                                         "fetched; run 'git lfs pull' in its repository"},
+                                        {"<!DOCTYPE html", "is a web page; download the file itself"},
+                                        {"<!doctype html", "is a web page; download the file itself"},
+                                        {"<html", "is a web page; download the file itself"}}};
+  first_bytes = without_byte_order_mark(first_bytes);
+  for (const Kind& kind : kKinds) {
+    if (first_bytes.starts_with(kind.begins)) return kind.is;
+  }
+  return {};
+}
+
 std::string read_file_bytes(const std::filesystem::path& file, bool packed, std::uint64_t max_bytes) {
   std::error_code error;
   const std::filesystem::file_status status = std::filesystem::status(file, error);
@@ -73,9 +92,15 @@ std::string read_file_bytes(const std::filesystem::path& file, bool packed, std:
   if (size > max_bytes) refuse(file, "has " + std::to_string(size) + " bytes, " + too_large(max_bytes));
   if (size == 0) refuse(file, "is empty (0 bytes); export the mesh again, or copy it again");
   try {
-    if (packed) return unpack(file, max_bytes);
     std::ifstream in(file, std::ios::binary);
     if (!in) refuse(file, "cannot be opened; check that you may read it");
+    std::array<char, 64> first{};
+    in.read(first.data(), first.size());
+    const std::string_view other = other_kind({first.data(), static_cast<std::size_t>(in.gcount())});
+    if (!other.empty()) refuse(file, std::string(other));
+    if (packed) return unpack(file, max_bytes);
+    in.clear();
+    in.seekg(0);
     std::string bytes(size, '\0');
     in.read(bytes.data(), static_cast<std::streamsize>(size));
     if (static_cast<std::uintmax_t>(in.gcount()) != size) {

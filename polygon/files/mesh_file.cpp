@@ -17,6 +17,7 @@
 #include "polygon/files/file_bytes.h"
 #include "polygon/files/prescan.h"
 #include "polygon/mesh/mesh_bounds.h"
+#include "polygon/repair/cut_polygon.h"
 
 namespace polygon {
 namespace {
@@ -101,8 +102,7 @@ class SoupImporter final : public io::BaseImporter {
   std::size_t vertices_ = 0;
 };
 
-// A stream over bytes in memory that does not copy them. It can seek, because OpenMesh's OBJ reader rewinds
-// once.
+// A stream over bytes in memory that does not copy them. It can seek, as OpenMesh's readers may.
 class MemoryBuffer final : public std::streambuf {
  public:
   explicit MemoryBuffer(std::string& bytes) { setg(bytes.data(), bytes.data(), bytes.data() + bytes.size()); }
@@ -153,7 +153,7 @@ void report(std::vector<Finding>& findings, const char* id, Severity severity, s
   if (count > 0) findings.push_back({id, severity, count, text});
 }
 
-// Cuts polygons into fans of triangles. Leaves out unusable elements and reports them.
+// Cuts polygons into triangles. Leaves out unusable elements and reports them.
 MeshFile assemble(PrescannedFile& prescanned, SoupImporter& soup, double scale) {
   MeshFile result;
   std::vector<glm::dvec3>& vertices = result.mesh.vertices;
@@ -170,7 +170,7 @@ MeshFile assemble(PrescannedFile& prescanned, SoupImporter& soup, double scale) 
 
   std::size_t out_of_range = 0, first_out_of_range = 0, nonfinite = prescanned.nonfinite_facets;
   std::size_t repeated = prescanned.faces - soup.n_faces();
-  std::size_t polygons = 0;
+  std::size_t polygons = 0, crossing = 0, first_crossing = 0;
   const std::size_t fewer = 2 * soup.n_faces();
   result.mesh.triangles.reserve(soup.corners.size() > fewer ? soup.corners.size() - fewer : 0);
   for (std::size_t f = 0; f + 1 < soup.face_begin.size(); ++f) {
@@ -182,11 +182,13 @@ MeshFile assemble(PrescannedFile& prescanned, SoupImporter& soup, double scale) 
       ++nonfinite;
     } else if (face.size() < 3) {
       ++repeated;
+    } else if (face.size() == 3) {
+      result.mesh.triangles.push_back({face[0], face[1], face[2]});
     } else {
-      if (face.size() > 3) ++polygons;
-      for (std::size_t c = 1; c + 1 < face.size(); ++c) {
-        result.mesh.triangles.push_back({face[0], face[c], face[c + 1]});
-      }
+      const PolygonCut cut = cut_polygon(vertices, face, result.mesh.triangles);
+      if (cut == PolygonCut::nothing) ++repeated;
+      if (cut != PolygonCut::nothing) ++polygons;
+      if (cut == PolygonCut::crossing && crossing++ == 0) first_crossing = f;
     }
   }
 
@@ -220,13 +222,17 @@ MeshFile assemble(PrescannedFile& prescanned, SoupImporter& soup, double scale) 
          "faces have fewer than three corners (first: " + prescanned.first_short_face +
              ") and are left out: points and lines cannot be touched");
   report(findings, "F05-repeated-corners", Severity::warning, repeated,
-         "faces use a corner twice, have no area and are left out: nothing is lost to touch");
+         "faces have fewer than three different corners and no area, and are left out: nothing is lost to "
+         "touch");
   report(findings, "F06-polygons", Severity::info, polygons,
-         "faces have more than three corners and are cut into triangles from their first: where one is not "
-         "convex, "
-         "triangulate it before");
+         "faces have more than three corners and are cut into triangles inside them");
   report(findings, "F07-trailing-bytes", Severity::warning, prescanned.trailing_bytes,
          "bytes follow the end of the mesh and are ignored: the file may be damaged");
+  report(
+      findings, "F08-crossing-polygons", Severity::warning, crossing,
+      "faces cross themselves, seen along their normal (first: face " + std::to_string(first_crossing) +
+          ", counted from 0 without shorter ones), so no triangles cover just them: look at them there, or "
+          "cut them into triangles before export");
   return result;
 }
 
@@ -247,7 +253,7 @@ MeshFile load_mesh(const std::filesystem::path& file, const MeshFileOptions& opt
   std::string extension = lower_case(file.extension().string());
   const bool packed = extension == ".gz";
   if (packed) extension = lower_case(file.stem().extension().string());
-  using Prescan = PrescannedFile (*)(const std::filesystem::path&, std::string_view);
+  using Prescan = PrescannedFile (*)(const std::filesystem::path&, std::span<char>);
   struct Kind {
     std::string_view extension;
     Prescan prescan;
@@ -262,7 +268,7 @@ MeshFile load_mesh(const std::filesystem::path& file, const MeshFileOptions& opt
   }
   try {
     PrescannedFile prescanned = [&] {
-      const std::string bytes = read_file_bytes(file, packed, options.max_bytes);
+      std::string bytes = read_file_bytes(file, packed, options.max_bytes);
       return kind->prescan(file, bytes);
     }();
     SoupImporter soup = read_by_openmesh(file, prescanned);

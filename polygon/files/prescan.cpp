@@ -4,12 +4,10 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <glm/common.hpp>
 #include <limits>
-#include <system_error>
 
 #include "polygon/files/mesh_file.h"
 #include "polygon/mesh/mesh_bounds.h"
@@ -22,10 +20,6 @@ static_assert(std::endian::native == std::endian::little,
 
 constexpr std::int64_t kMostElements =
     std::numeric_limits<std::int32_t>::max();  // OpenMesh's handles are ints
-
-bool is_space(char c) {
-  return c == ' ' || c == '\t' || c == '\r' || c == '\n' || c == '\v' || c == '\f';
-}
 
 std::string at_line(std::size_t line) {
   return "line " + std::to_string(line);
@@ -71,34 +65,33 @@ std::string_view logical_line(TextCursor& text, std::string& joined) {
 
 }  // namespace
 
-PrescannedFile prescan_obj(const std::filesystem::path& file, std::string_view bytes) {
+PrescannedFile prescan_obj(const std::filesystem::path& file, std::span<char> raw) {
+  const std::string_view bytes = plain_text(file, raw);
   PrescannedFile prescanned;
-  prescanned.openmesh_extension = "obj";
-  prescanned.may_drop = true;
-  prescanned.dialect = "v 0 0 0\n";  // the additional vertex, see below
   std::string joined;
-  // First pass: vertices, because a face may use vertices that come later in the file. OpenMesh gets dummies
-  // to count ("v 0 0 0"). The true coordinates are kept here, because OpenMesh would round them to floats.
+  // First pass: vertices, because a face may use vertices that come later in the file.
   for (TextCursor text(bytes); !text.at_end();) {
     const std::size_t number = text.line();
     std::string_view line = logical_line(text, joined);
     if (take_word(line) != "v") continue;
     prescanned.coordinates.push_back(take_coordinates(file, line, number));
-    prescanned.dialect += "v 0 0 0\n";
   }
   const auto vertices = static_cast<std::int64_t>(prescanned.coordinates.size());
   if (vertices >= kMostElements) refuse_mesh(file, "has more than 2^31 - 1 vertices; split it");
 
   std::int64_t so_far = 0;  // vertices so far; negative indices count back from here
-  std::string face;
+  // OpenMesh's OBJ reader drops faces with repeated corners, also those that a cut to a hole runs along
+  // twice. So the faces are passed on as PLY.
+  std::string faces;
   for (TextCursor text(bytes); !text.at_end();) {
     const std::size_t number = text.line();
     std::string_view line = logical_line(text, joined);
     const std::string_view keyword = take_word(line);
     if (keyword == "v") ++so_far;
     if (keyword != "f" && keyword != "fo") continue;  // fo: the same, in files of the nineties
-    face.assign(1, 'f');
-    std::size_t corners = 0;
+    const std::size_t face_at = faces.size();
+    append_raw(faces, std::int32_t{0});
+    std::int32_t corners = 0;
     for (std::string_view word = take_word(line); !word.empty(); word = take_word(line), ++corners) {
       std::int64_t index = 0;
       if (word.front() == '#') break;
@@ -108,25 +101,25 @@ PrescannedFile prescan_obj(const std::filesystem::path& file, std::string_view b
                         " is no corner of a face (vertex, vertex/texture/normal); export the mesh again");
       }
       if (index < 0) index += so_far + 1;
-      // OpenMesh does not check indices, and drops repeated corners. So an index out of range is mapped to
-      // one additional vertex, which the importer recognises and reports.
       const bool exists = index >= 1 && index <= vertices;
-      face.push_back(' ');
-      append_integer(face, exists ? index : vertices + 1);
+      append_raw(faces, static_cast<std::int32_t>(exists ? index - 1 : -1));
     }
     if (corners < 3) {
       if (prescanned.short_faces++ == 0) prescanned.first_short_face = at_line(number);
+      faces.resize(face_at);
       continue;
     }
-    prescanned.dialect.append(face).push_back('\n');
+    std::memcpy(faces.data() + face_at, &corners, sizeof(corners));
     ++prescanned.faces;
   }
+  write_ply_dialect(prescanned, faces);
   return prescanned;
 }
 
 // ---- OFF
 
-PrescannedFile prescan_off(const std::filesystem::path& file, std::string_view bytes) {
+PrescannedFile prescan_off(const std::filesystem::path& file, std::span<char> raw) {
+  const std::string_view bytes = plain_text(file, raw);
   PrescannedFile prescanned;
   prescanned.openmesh_extension = "off";
   TextCursor text(bytes);
@@ -312,20 +305,22 @@ void prescan_stl_binary(std::string_view bytes, std::uint64_t count, PrescannedF
 
 }  // namespace
 
-PrescannedFile prescan_stl(const std::filesystem::path& file, std::string_view bytes) {
+PrescannedFile prescan_stl(const std::filesystem::path& file, std::span<char> raw) {
+  const std::string_view bytes(raw.data(), raw.size());
   PrescannedFile prescanned;
   begin_stl(prescanned);
   std::uint32_t count = 0;
   if (bytes.size() >= kStlHeader)
     std::memcpy(&count, bytes.data() + kStlHeader - sizeof(count), sizeof(count));
   const std::uint64_t expected = kStlHeader + static_cast<std::uint64_t>(count) * kStlFacet;
-  std::string_view first_line = bytes.substr(0, 256);
+  std::string_view first_line = without_byte_order_mark(bytes.substr(0, 256));
   const std::string_view first_word = take_word(first_line);
   const bool says_solid = first_word == "solid" || first_word == "SOLID";
   // Many binary files begin with 'solid' too, so the size decides first.
   if (says_solid && expected != bytes.size()) {
-    prescan_stl_text(file, bytes, prescanned);
+    prescan_stl_text(file, plain_text(file, raw), prescanned);
   } else if (bytes.size() < kStlHeader) {
+    (void)plain_text(file, raw);  // refuses UTF-16
     refuse_mesh(file,
                 "has " + std::to_string(bytes.size()) +
                     " bytes, fewer than the header of a binary STL (84), and does not begin with 'solid'; "
@@ -339,67 +334,6 @@ PrescannedFile prescan_stl(const std::filesystem::path& file, std::string_view b
   }
   end_stl(prescanned);
   return prescanned;
-}
-
-// ---- shared
-
-void refuse_mesh(const std::filesystem::path& file, const std::string& what_and_remedy) {
-  throw MeshError(file.string() + ": " + what_and_remedy);
-}
-
-std::string_view TextCursor::next_line() {
-  const std::size_t end = rest_.find('\n');
-  std::string_view line = rest_.substr(0, end);
-  rest_.remove_prefix(end == std::string_view::npos ? rest_.size() : end + 1);
-  ++line_;
-  if (line.ends_with('\r')) line.remove_suffix(1);
-  return line;
-}
-
-std::string_view TextCursor::next_word() {
-  std::size_t begin = 0;
-  for (; begin < rest_.size() && is_space(rest_[begin]); ++begin) line_ += rest_[begin] == '\n' ? 1 : 0;
-  std::size_t end = begin;
-  while (end < rest_.size() && !is_space(rest_[end])) ++end;
-  const std::string_view word = rest_.substr(begin, end - begin);
-  rest_.remove_prefix(end);
-  return word;
-}
-
-std::string_view take_word(std::string_view& line) {
-  std::size_t begin = 0;
-  while (begin < line.size() && is_space(line[begin])) ++begin;
-  std::size_t end = begin;
-  while (end < line.size() && !is_space(line[end])) ++end;
-  const std::string_view word = line.substr(begin, end - begin);
-  line.remove_prefix(end);
-  return word;
-}
-
-bool parse_number(std::string_view word, double& value) {
-  if (word.starts_with('+')) word.remove_prefix(1);
-  const char* end = word.data() + word.size();
-  const auto [stop, error] = std::from_chars(word.data(), end, value);
-  if (stop != end || error == std::errc::invalid_argument) return false;
-  if (error == std::errc::result_out_of_range) {
-    const bool tiny = word.find("e-") != std::string_view::npos || word.find("E-") != std::string_view::npos;
-    value = tiny ? 0.0 : std::numeric_limits<double>::infinity();
-  }
-  return true;
-}
-
-bool parse_integer(std::string_view word, std::int64_t& value) {
-  if (word.starts_with('+')) word.remove_prefix(1);
-  const char* end = word.data() + word.size();
-  const auto [stop, error] = std::from_chars(word.data(), end, value);
-  return error == std::errc() && stop == end;
-}
-
-void append_integer(std::string& text, std::int64_t value) {
-  std::array<char, 24> digits{};
-  const auto [end, error] = std::to_chars(digits.data(), digits.data() + digits.size(), value);
-  (void)error;  // 24 digits are always enough
-  text.append(digits.data(), end);
 }
 
 }  // namespace polygon

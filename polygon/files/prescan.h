@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <glm/vec3.hpp>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -25,7 +26,7 @@ struct PrescannedFile {
   // (file units) one per vertex; empty for STL, which holds floats.
   std::vector<glm::dvec3> coordinates;
   std::size_t faces = 0;  // number that OpenMesh must find
-  // OpenMesh's OBJ and STL readers drop faces with repeated corners.
+  // OpenMesh's STL reader drops facets with repeated corners.
   bool may_drop = false;
   std::size_t short_faces = 0;        // faces left out: fewer than three corners
   std::string first_short_face;       // place of the first one
@@ -34,15 +35,28 @@ struct PrescannedFile {
   std::size_t trailing_bytes = 0;     // bytes after the end of a binary file
 };
 
-// Throw MeshError for a malformed or truncated file, with the line or byte.
-PrescannedFile prescan_obj(const std::filesystem::path& file, std::string_view bytes);
-PrescannedFile prescan_ply(const std::filesystem::path& file, std::string_view bytes);
-PrescannedFile prescan_stl(const std::filesystem::path& file, std::string_view bytes);
-PrescannedFile prescan_off(const std::filesystem::path& file, std::string_view bytes);
+// Throw MeshError for a malformed or truncated file, with the line or byte. `bytes` of a text are brought to
+// one form of line ends in place.
+PrescannedFile prescan_obj(const std::filesystem::path& file, std::span<char> bytes);
+PrescannedFile prescan_ply(const std::filesystem::path& file, std::span<char> bytes);
+PrescannedFile prescan_stl(const std::filesystem::path& file, std::span<char> bytes);
+PrescannedFile prescan_off(const std::filesystem::path& file, std::span<char> bytes);
 
 // ---- shared by the formats
 
 [[noreturn]] void refuse_mesh(const std::filesystem::path& file, const std::string& what_and_remedy);
+
+// Without the mark of UTF-8 at the start.
+[[nodiscard]] std::string_view without_byte_order_mark(std::string_view text);
+// A text without the byte-order mark at its start, and with "\n" where a line ends with "\r" alone. Lines
+// keep their numbers. Refuses UTF-16.
+[[nodiscard]] std::string_view plain_text(const std::filesystem::path& file, std::span<char> bytes);
+// Does the same with the line ends alone.
+void mend_line_ends(std::span<char> text);
+
+// Begins a binary PLY, the dialect in which OpenMesh reads the faces and counts the vertices; one byte stands
+// for each. `faces`: of each face the number of corners, then their indices, as 32-bit integers.
+void write_ply_dialect(PrescannedFile& prescanned, const std::string& faces);
 
 // The words of a text, separated by white space, and the line on which they stand.
 class TextCursor {

@@ -71,6 +71,20 @@ bool is_integer(Scalar type) {
   return type != Scalar::float32 && type != Scalar::float64;
 }
 
+// Where the body begins; the end of the file if there is no 'end_header'. Where the lines of the header end
+// with
+// '\r' alone, a '\n' after its last one belongs to the body.
+std::size_t header_end(std::string_view bytes) {
+  constexpr std::string_view kLast = "end_header";
+  const std::size_t last = bytes.find(kLast);
+  if (last == std::string_view::npos) return bytes.size();
+  const std::size_t end = bytes.find_first_of("\r\n", last);
+  if (end == std::string_view::npos) return bytes.size();
+  if (bytes[end] == '\n') return end + 1;
+  const bool returns = !bytes.substr(bytes.find('\r')).starts_with("\r\n");
+  return end + (!returns && bytes.substr(end).starts_with("\r\n") ? 2 : 1);
+}
+
 // Reads the header and moves `text` past it.
 Header read_header(const std::filesystem::path& file, TextCursor& text) {
   Header header;
@@ -327,10 +341,15 @@ void check_element(const std::filesystem::path& file, const Element& element, co
 
 }  // namespace
 
-PrescannedFile prescan_ply(const std::filesystem::path& file, std::string_view bytes) {
-  TextCursor text(bytes);
+PrescannedFile prescan_ply(const std::filesystem::path& file, std::span<char> bytes) {
+  const std::size_t header_bytes = header_end(std::string_view(bytes.data(), bytes.size()));
+  const std::string_view head = plain_text(file, bytes.first(header_bytes));
+  const std::size_t mark = header_bytes - head.size();
+  TextCursor text(std::string_view(bytes.data(), bytes.size()).substr(mark));
   const Header header = read_header(file, text);
-  Body body(file, header.encoding, bytes.substr(bytes.size() - text.remaining()), text.line());
+  const std::span<char> rest = bytes.last(text.remaining());
+  if (header.encoding == Encoding::text) mend_line_ends(rest);
+  Body body(file, header.encoding, std::string_view(rest.data(), rest.size()), text.line());
   for (const std::string_view once : {"vertex", "face"}) {
     const auto n = std::count_if(header.elements.begin(), header.elements.end(),
                                  [&](const Element& e) { return e.name == once; });
@@ -341,7 +360,6 @@ PrescannedFile prescan_ply(const std::filesystem::path& file, std::string_view b
   }
 
   PrescannedFile prescanned;
-  prescanned.openmesh_extension = "ply";
   std::string faces;
   for (const Element& element : header.elements) {
     check_element(file, element, body);
@@ -357,17 +375,7 @@ PrescannedFile prescan_ply(const std::filesystem::path& file, std::string_view b
   }
   if (header.encoding != Encoding::text) prescanned.trailing_bytes = body.remaining();
 
-  // OpenMesh counts the vertices and reads the faces. The coordinates, which it would round to floats, are
-  // kept here. One byte stands for each vertex.
-  constexpr std::size_t kHeader = 256;
-  prescanned.dialect.reserve(kHeader + prescanned.coordinates.size() + faces.size());
-  prescanned.dialect += "ply\nformat binary_little_endian 1.0\nelement vertex ";
-  append_integer(prescanned.dialect, static_cast<std::int64_t>(prescanned.coordinates.size()));
-  prescanned.dialect += "\nproperty uchar nothing\nelement face ";
-  append_integer(prescanned.dialect, static_cast<std::int64_t>(prescanned.faces));
-  prescanned.dialect += "\nproperty list int int vertex_indices\nend_header\n";
-  prescanned.dialect.append(prescanned.coordinates.size(), '\0');
-  prescanned.dialect += faces;
+  write_ply_dialect(prescanned, faces);
   return prescanned;
 }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Fills small holes: loops of border edges are triangulated by dynamic programming (Barequet & Sharir,
-// Filling gaps in the boundary of a polyhedron, 1995). Fills that would intersect the mesh or one another are
-// dropped.
+// Fills small holes: loops of border edges get the triangles of least area. Fills that would intersect the mesh
+// or one another are dropped.
 #include <algorithm>
 #include <array>
 #include <cstddef>
@@ -16,6 +15,7 @@
 #include "polygon/mesh/disjoint_sets.h"
 #include "polygon/mesh/topology.h"
 #include "polygon/mesh/triangle.h"
+#include "polygon/repair/least_area.h"
 #include "polygon/repair/repair_soup.h"
 #include "polygon/repair/self_intersections.h"
 
@@ -155,75 +155,15 @@ bool is_split_edge(const Loop& loop, const std::vector<glm::dvec3>& points) {
          is_degenerate(points[loop.points[0]], points[loop.points[1]], points[loop.points[2]]);
 }
 
-// The triangulation of least cost, by dynamic programming over the loop's chords (Barequet & Sharir 1995).
-// The cost is the total area, so that nothing folds over, plus a small term for long edges. That term decides
-// in a flat loop, where every triangulation has the same area. Degenerate triangles are excluded, and so are
-// inner edges that the mesh already has, because they would get a third triangle. Empty if no triangulation
-// is left.
-class Triangulation {
- public:
-  Triangulation(const Loop& loop, const std::vector<glm::dvec3>& points,
-                const std::unordered_set<std::uint64_t>& old_edges)
-      : loop_(loop), points_(points), n_(loop.points.size()), cost_(n_ * n_, 0.0), apex_(n_ * n_, 0) {
-    for (std::size_t span = 2; span < n_; ++span) {
-      for (std::size_t i = 0; i + span < n_; ++i) {
-        const std::size_t k = i + span;
-        const bool inner = span + 1 < n_;
-        double& best = cost_[i * n_ + k];
-        best = kNever;
-        if (inner && old_edges.contains(edge_key(loop_.points[i], loop_.points[k]))) continue;
-        for (std::size_t j = i + 1; j < k; ++j) {
-          const double cost = cost_[i * n_ + j] + cost_[j * n_ + k] + area(i, j, k);
-          if (cost < best) {
-            best = cost;
-            apex_[i * n_ + k] = j;
-          }
-        }
-        if (inner) best += kLengthCost * glm::dot(at(k) - at(i), at(k) - at(i));
-      }
-    }
-  }
-
-  [[nodiscard]] std::vector<TriangleIndices> triangles() const {
-    std::vector<TriangleIndices> result;
-    if (!(cost_[n_ - 1] < kNever)) return result;
-    std::vector<std::pair<std::size_t, std::size_t>> open{{0, n_ - 1}};
-    while (!open.empty()) {
-      const auto [i, k] = open.back();
-      open.pop_back();
-      if (k - i < 2) continue;
-      const std::size_t j = apex_[i * n_ + k];
-      result.push_back({loop_.points[i], loop_.points[j], loop_.points[k]});
-      open.emplace_back(i, j);
-      open.emplace_back(j, k);
-    }
-    return result;
-  }
-
- private:
-  static constexpr double kNever = std::numeric_limits<double>::infinity();
-  static constexpr double kLengthCost = 0.01;
-
-  [[nodiscard]] const glm::dvec3& at(std::size_t i) const { return points_[loop_.points[i]]; }
-  [[nodiscard]] double area(std::size_t i, std::size_t j, std::size_t k) const {
-    if (is_degenerate(at(i), at(j), at(k))) return kNever;
-    return 0.5 * glm::length(glm::cross(at(j) - at(i), at(k) - at(i)));
-  }
-
-  const Loop& loop_;
-  const std::vector<glm::dvec3>& points_;
-  std::size_t n_;
-  std::vector<double> cost_;       // [first][last] cost of the part of the loop between a chord's ends
-  std::vector<std::size_t> apex_;  // [first][last]
-};
-
 std::vector<TriangleIndices> triangulated(const Loop& loop, const std::vector<glm::dvec3>& points,
                                           const std::unordered_set<std::uint64_t>& old_edges) {
   const bool lone = std::all_of(loop.triangles.begin(), loop.triangles.end(),
                                 [&](std::uint32_t t) { return t == loop.triangles[0]; });
   if (lone) return {};  // the rim of a single triangle would be covered by a copy of it
   if (is_split_edge(loop, points)) return {{loop.points[0], loop.points[1], loop.points[2]}};
-  return Triangulation(loop, points, old_edges).triangles();
+  return least_area_triangles(loop.points, points, [&](std::uint32_t a, std::uint32_t b) {
+    return old_edges.contains(edge_key(a, b));
+  });
 }
 
 struct Fill {

@@ -159,7 +159,7 @@ TEST_F(MeshFiles, NonManifoldFacesAreKept) {
   EXPECT_TRUE(fins.findings.empty());
 }
 
-TEST_F(MeshFiles, PolygonsBecomeFans) {
+TEST_F(MeshFiles, PolygonsThatAllCanBeSeenFromTheirFirstCornerBecomeFans) {
   const MeshFile file =
       load_mesh(write("a.obj", "v 0 0 0\nv 1 0 0\nv 2 1 0\nv 1 2 0\nv 0 1 0\nf 1 2 3 \\\n 4 5\n"));
   const std::vector<TriangleIndices> expected{{0, 1, 2}, {0, 2, 3}, {0, 3, 4}};
@@ -171,7 +171,7 @@ TEST_F(MeshFiles, WhatCannotBeKeptIsLeftOutAndReported) {
   const MeshFile file =
       load_mesh(write("a.obj",
                       "v 0 0 0\nv nan 0 0\nv 1 0 0\nv 0 1 0\nv 0 inf 0\nv 1e999 0 0\nv 1e13 0 0\n"
-                      "f 1 3 4\nf 1 2 3\nf 1 3 99\nf 1 3 -99\nf 0 1 3\nf 1 3\nf 1 1 3\nf 7 1 3\n"));
+                      "f 1 3 4\nf 1 2 3\nf 1 3 99\nf 1 3 -99\nf 0 1 3\nf 1 3\nf 1 1 3 1\nf 7 1 3\n"));
   EXPECT_EQ(file.mesh.triangles.size(), 1U);
   EXPECT_EQ(file.mesh.vertices.size(), 3U);
   EXPECT_EQ(count_of(file, "F01"), 4U);
