@@ -19,8 +19,9 @@ class ComposeError : public std::runtime_error {
 
 using LabelNames = std::map<int, std::string>;  // 1..255
 
-// From a table (CSV, TSV or text: number and name in a row, a heading first or not) or from JSON: a list of
-// names under "labels", or an object of numbers and names. Throws ComposeError.
+// From a table (label_rows.h) or JSON, by its extension: under "labels" or at its top, names by number or
+// numbers by name (dataset.json of nnU-Net), or a list of names. UTF-8. Labels above 255, which no volume can
+// have, are passed over. Throws ComposeError: what cannot be read, with its line, and a table without a name.
 LabelNames read_label_names(const std::filesystem::path& file);
 
 // The labels that the words name: by number, by name, or by a pattern with '*' and '?'. `names` has a name
