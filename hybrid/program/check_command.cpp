@@ -72,7 +72,7 @@ Json would_repair(const polygon::TriangleMesh& mesh, bool deep) {
   for (const polygon::Finding& f : checked.findings) json["after"].push_back(counted(f));
   json["summary"] =
       fmt::format("{} vertices, {} triangles, {}", repaired.mesh.vertices.size(),
-                  repaired.mesh.triangles.size(), checked.oriented ? "a closed solid" : "a two-sided sheet");
+                  repaired.mesh.triangles.size(), polygon::touched_as(checked));
   return json;
 }
 
@@ -105,7 +105,7 @@ void check_mesh_file(const std::filesystem::path& path, const CheckCommand& comm
   file["summary"] =
       fmt::format("{} vertices, {} triangles, {:.4g} x {:.4g} x {:.4g} m, {}; {:.1f} MB to touch",
                   mesh->vertices.size(), mesh->triangles.size(), high.x - low.x, high.y - low.y,
-                  high.z - low.z, checked.oriented ? "a closed solid" : "a two-sided sheet",
+                  high.z - low.z, polygon::touched_as(checked),
                   static_cast<double>(surface->memory_bytes()) / 1e6);
 }
 

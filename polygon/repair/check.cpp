@@ -13,6 +13,7 @@
 #include "polygon/mesh/findings.h"
 #include "polygon/mesh/topology.h"
 #include "polygon/mesh/triangle.h"
+#include "polygon/repair/border_loops.h"
 #include "polygon/repair/self_intersections.h"
 
 namespace polygon {
@@ -94,12 +95,8 @@ void check_vertices(const Connected& c, MeshCheck& check) {
               "vertices belong to no triangle and are ignored");
 }
 
-struct EdgeCounts {
-  FindingTally boundary, nonmanifold, against;
-};
-
-EdgeCounts check_edges(const Connected& c, const EdgeTable& edges, MeshCheck& check) {
-  EdgeCounts counts;
+void check_edges(const Connected& c, const EdgeTable& edges, MeshCheck& check) {
+  FindingTally nonmanifold, against;
   edges.for_each([&](const EdgeTable::Edge& edge) {
     const std::size_t uses = edge.uses.size();
     const auto forward = static_cast<std::size_t>(std::count_if(
@@ -107,19 +104,20 @@ EdgeCounts check_edges(const Connected& c, const EdgeTable& edges, MeshCheck& ch
     if (uses == 2 && forward == 1) return;
     const glm::dvec3 where = 0.5 * (c.points[edge.low] + c.points[edge.high]);
     const std::uint32_t triangle = edge.uses[0].triangle();
-    if (uses == 1) counts.boundary.add(where, triangle);
-    if (uses > 2) counts.nonmanifold.add(where, triangle);
-    if (forward > 1) counts.against.add(where, triangle);
-    if (uses - forward > 1) counts.against.add(where, triangle);
+    if (uses == 1) ++check.border_edges;
+    if (uses > 2) nonmanifold.add(where, triangle);
+    if (forward > 1) against.add(where, triangle);
+    if (uses - forward > 1) against.add(where, triangle);
   });
-  add_finding(check.findings, "M06-nonmanifold-edges", Severity::warning, counts.nonmanifold,
+  add_finding(check.findings, "M06-nonmanifold-edges", Severity::warning, nonmanifold,
               "edges have more than two triangles; the mesh has no inside there. Repair parts the sheets "
               "that meet, and moves none");
   add_finding(
-      check.findings, "M07-inconsistent-orientation", Severity::warning, counts.against,
+      check.findings, "M07-inconsistent-orientation", Severity::warning, against,
       "edges are run through in the same direction by two triangles, one of which is turned over. Repair "
       "orients them");
-  return counts;
+  check.nonmanifold_edges = nonmanifold.count;
+  check.turned_edges = against.count;
 }
 
 // Triangles around a point that are connected through shared edges form one fan. A manifold point has one
@@ -154,45 +152,19 @@ void check_points(const Connected& c, const EdgeTable& edges, MeshCheck& check) 
               "vertices join parts that share no edge there. Repair gives each part its own");
 }
 
-// Connected boundary edges form one loop. Loops that touch in a point count as one.
-void check_boundary(const Connected& c, const EdgeTable& edges, const EdgeCounts& counts, MeshCheck& check) {
-  if (counts.boundary.count == 0) return;
-  struct Loop {
-    std::size_t edges = 0;
-    std::uint32_t triangle = 0;  // one triangle at the loop
-    glm::dvec3 low{std::numeric_limits<double>::infinity()}, high{-std::numeric_limits<double>::infinity()};
-    [[nodiscard]] glm::dvec3 middle() const { return 0.5 * (low + high); }
-  };
-  DisjointSets ends(c.points.size());
-  const auto for_each_boundary_edge = [&](auto&& visit) {
-    edges.for_each([&](const EdgeTable::Edge& edge) {
-      if (edge.uses.size() == 1) visit(edge);
-    });
-  };
-  for_each_boundary_edge([&](const EdgeTable::Edge& e) { ends.unite(e.low, e.high); });
-  // [point that names the set] index + 1 of its loop.
-  std::vector<std::uint32_t> loop_at(c.points.size(), 0);
-  std::vector<Loop> loops;
-  for_each_boundary_edge([&](const EdgeTable::Edge& e) {
-    std::uint32_t& number = loop_at[ends.find(e.low)];
-    if (number == 0) {
-      loops.push_back({.triangle = e.uses[0].triangle()});
-      number = static_cast<std::uint32_t>(loops.size());
-    }
-    Loop& loop = loops[number - 1];
-    ++loop.edges;
-    loop.low = glm::min(loop.low, glm::min(c.points[e.low], c.points[e.high]));
-    loop.high = glm::max(loop.high, glm::max(c.points[e.low], c.points[e.high]));
+// The finding's place is that of the longest loop.
+void check_boundary(const Connected& c, const EdgeTable& edges, MeshCheck& check) {
+  if (check.border_edges == 0) return;
+  std::vector<BorderLoop> loops = border_loops(c.points, c.triangles, edges);
+  std::stable_sort(loops.begin(), loops.end(), [](const BorderLoop& a, const BorderLoop& b) {
+    return a.triangles.size() > b.triangles.size();
   });
-  const auto longest = std::max_element(loops.begin(), loops.end(),
-                                        [](const Loop& a, const Loop& b) { return a.edges < b.edges; });
-  std::iter_swap(loops.begin(), longest);  // the finding's place is that of the first loop
   FindingTally found;
-  for (const Loop& loop : loops) found.add(loop.middle(), loop.triangle);
+  for (const BorderLoop& loop : loops) found.add(0.5 * (loop.lower + loop.upper), loop.triangles[0]);
   add_finding(check.findings, "M09-boundary-loops", Severity::info, found,
-              "holes or rims, of " + std::to_string(counts.boundary.count) +
-                  " edges in all, the longest of " + std::to_string(loops.front().edges) + ", " +
-                  point_in_words(loops.front().high - loops.front().low) +
+              "holes or rims, of " + std::to_string(check.border_edges) + " edges in all, the longest of " +
+                  std::to_string(loops.front().triangles.size()) + ", " +
+                  point_in_words(loops.front().upper - loops.front().lower) +
                   " large: the mesh is open, is touched as a two-sided sheet, and has no inside");
 }
 
@@ -268,6 +240,18 @@ void check_intersections(const Connected& c, MeshCheck& check) {
 
 }  // namespace
 
+std::string touched_as(const MeshCheck& check) {
+  if (check.oriented) return "a closed solid";
+  const std::string sheet = "a two-sided sheet, because ";
+  if (check.border_edges > 0) return sheet + std::to_string(check.border_edges) + " edges are open";
+  if (check.nonmanifold_edges > 0)
+    return sheet + std::to_string(check.nonmanifold_edges) + " edges have more than two triangles";
+  if (check.turned_edges > 0)
+    return sheet + std::to_string(check.turned_edges) +
+           " edges have triangles that are turned against each other";
+  return sheet + (check.volume_m3 < 0.0 ? "it is inside out" : "it encloses no volume");
+}
+
 MeshCheck check_mesh(const TriangleMesh& mesh, bool deep) {
   MeshCheck check;
   if (mesh.empty()) {
@@ -280,12 +264,12 @@ MeshCheck check_mesh(const TriangleMesh& mesh, bool deep) {
   check_vertices(c, check);
   {
     const EdgeTable edges(c.triangles, c.welded.points);
-    const EdgeCounts counts = check_edges(c, edges, check);
+    check_edges(c, edges, check);
     check_points(c, edges, check);
-    check_boundary(c, edges, counts, check);
-    check.closed = !edges.empty() && counts.boundary.count == 0 && counts.nonmanifold.count == 0;
+    check_boundary(c, edges, check);
+    check.closed = !edges.empty() && check.border_edges == 0 && check.nonmanifold_edges == 0;
     // Check_pieces decides whether it is outward.
-    check.oriented = check.closed && counts.against.count == 0;
+    check.oriented = check.closed && check.turned_edges == 0;
   }
   check_pieces(c, check);
   if (deep) check_intersections(c, check);

@@ -4,6 +4,10 @@
 // processing (repair.cpp).
 #pragma once
 
+#include <cstddef>
+#include <string>
+#include <vector>
+
 #include "polygon/mesh/mesh.h"
 
 namespace polygon {
@@ -13,7 +17,12 @@ struct MeshCheck {
   bool closed = false;            // every edge has exactly two triangles, after welding
   bool oriented = false;          // closed, consistently oriented and outward (positive volume)
   double volume_m3 = 0.0;         // signed; 0 unless closed and consistently oriented
+  // Edges of one triangle, of more than two, and run through in one direction by two.
+  std::size_t border_edges = 0, nonmanifold_edges = 0, turned_edges = 0;
 };
+
+// "a closed solid", or "a two-sided sheet" and why: how the mesh is touched.
+[[nodiscard]] std::string touched_as(const MeshCheck& check);
 
 // `deep` also searches for self-intersections (seconds for a million triangles).
 MeshCheck check_mesh(const TriangleMesh& mesh, bool deep = false);

@@ -19,8 +19,10 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <optional>
 #include <sstream>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "polygon/mesh/topology.h"
@@ -129,7 +131,8 @@ RepairSoup merge_equal(const TriangleMesh& mesh, Changes& changes) {
   return soup;
 }
 
-void mend_borders(RepairSoup& soup, const RepairOptions& options, Changes& changes) {
+// Returns how many holes were not tried.
+std::size_t mend_borders(RepairSoup& soup, const RepairOptions& options, Changes& changes) {
   glm::dvec3 low(std::numeric_limits<double>::infinity()), high(-std::numeric_limits<double>::infinity());
   for (const TriangleIndices& t : soup.mesh.triangles) {
     for (const std::uint32_t corner : t) {
@@ -137,26 +140,17 @@ void mend_borders(RepairSoup& soup, const RepairOptions& options, Changes& chang
       high = glm::max(high, soup.mesh.vertices[corner]);
     }
   }
-  if (soup.mesh.empty()) return;
+  if (soup.mesh.empty()) return 0;
   const double tolerance_m = options.crack_share * glm::length(high - low);
   const ClosedCracks cracks = close_cracks(soup, tolerance_m);
   add_finding(changes, "R12-closed-cracks", Severity::info, cracks.edges,
               "pairs of border edges joined by moving " + std::to_string(cracks.vertices) +
                   " vertices, none by more than " + in_words(cracks.furthest_m) +
                   " m (cracks are closed up to " + in_words(tolerance_m) + " m)");
-  const FilledHoles holes = fill_holes(soup, options.hole_edges, options.hole_share);
+  const FilledHoles holes = fill_holes(soup, options);
   add_finding(changes, "R13-filled-holes", Severity::info, holes.filled,
               "holes filled with " + std::to_string(holes.triangles) + " triangles");
-  std::string why;
-  const auto because = [&](std::size_t count, const std::string& reason) {
-    if (count > 0) why += (why.empty() ? "" : ", ") + std::to_string(count) + " " + reason;
-  };
-  because(holes.too_long, "of more than " + std::to_string(options.hole_edges) + " edges");
-  because(holes.too_large, "larger than " + in_words(options.hole_share) + " of their piece");
-  because(holes.branching, "whose rims branch");
-  because(holes.unfillable, "that no fill fits without cutting the mesh");
-  add_finding(changes, "R14-holes-left", Severity::warning, holes.left,
-              "holes or rims were not filled: " + why);
+  return holes.untried;
 }
 
 // Compares corners and their cyclic order by coordinates, because orienting may give a triangle copies of its
@@ -291,16 +285,52 @@ void turn_outward(Surface& surface, bool cuts_itself, Changes& changes) {
               "pieces turned over, so that their outside is out (an inner one: towards the hollow)");
 }
 
-void say_how_it_ended(const Surface& surface, Changes& changes) {
-  FindingTally border;
-  for (const auto h : surface.halfedges()) {
-    if (surface.is_border(h)) border.add(middle(surface, h));
-  }
-  if (border.count == 0) {
+void say_what_is_left(const TriangleMesh& mesh, const RepairOptions& options, std::size_t untried,
+                      Changes& changes) {
+  const HolesLeft holes = holes_left(mesh, options);
+  std::string why;
+  const auto because = [&](std::size_t count, const std::string& reason) {
+    if (count > 0) why += (why.empty() ? "" : ", ") + std::to_string(count) + " " + reason;
+  };
+  because(holes.too_long, "of more than " + std::to_string(options.hole_edges) + " edges");
+  because(holes.too_large, "larger than " + in_words(options.hole_share) + " of their piece");
+  because(holes.branching, "whose rims end at edges of more than two triangles");
+  because(holes.unfillable, "that no fill fits without cutting the mesh");
+  because(untried, "of these not tried, because filling them takes too long");
+  add_finding(changes, "R14-holes-left", Severity::warning, holes.left,
+              "holes or rims were not filled: " + why);
+}
+
+// The outcome, as a check of the mesh finds it.
+void say_how_it_ended(const TriangleMesh& mesh, Changes& changes) {
+  const MeshCheck check = check_mesh(mesh);
+  if (check.oriented) {
     changes.push_back({"R09-closed", Severity::info, 1, "the repaired mesh is closed"});
+    return;
+  }
+  // Triangles are numbered as in the mesh as given, and a repaired one has others.
+  const auto place_of = [&](std::string_view id) {
+    std::optional<FindingPlace> place;
+    for (const Finding& f : check.findings) {
+      if (f.id.starts_with(id)) place = f.place;
+    }
+    if (place) place->triangle.reset();
+    return place;
+  };
+  const std::string sheet = ": the mesh is touched as a two-sided sheet";
+  if (check.border_edges > 0) {
+    changes.push_back({"R10-open", Severity::warning, check.border_edges, "border edges are left" + sheet,
+                       place_of("M09")});
+  } else if (check.nonmanifold_edges > 0) {
+    changes.push_back({"R17-no-inside", Severity::warning, check.nonmanifold_edges,
+                       "edges have more than two triangles, and no edge is open" + sheet, place_of("M06")});
+  } else if (check.turned_edges > 0) {
+    changes.push_back({"R17-no-inside", Severity::warning, check.turned_edges,
+                       "edges have triangles that cannot be turned alike, and no edge is open" + sheet,
+                       place_of("M07")});
   } else {
-    add_finding(changes, "R10-open", Severity::warning, border,
-                "border edges are left: the mesh stays open, and is touched as a two-sided sheet");
+    changes.push_back(
+        {"R17-no-inside", Severity::warning, 1, "mesh encloses no volume" + sheet, place_of("M11")});
   }
 }
 
@@ -310,9 +340,10 @@ RepairedMesh repair_mesh(const TriangleMesh& mesh, const RepairOptions& options)
   RepairedMesh repaired;
   RepairSoup merged = merge_equal(mesh, repaired.changes);
   // If CGAL refuses a step, the result of the steps before is kept, and the report says so.
+  std::size_t untried = 0;
   const char* done = "merged, but not oriented, stitched nor turned outward";
   try {
-    mend_borders(merged, options, repaired.changes);
+    untried = mend_borders(merged, options, repaired.changes);
     CgalSoup soup = to_cgal(merged.mesh);
     pmp::remove_isolated_points_in_polygon_soup(soup.points, soup.polygons);
     orient(soup, merged, repaired.changes);
@@ -339,7 +370,8 @@ RepairedMesh repair_mesh(const TriangleMesh& mesh, const RepairOptions& options)
                   std::string("pairs of triangles cut one another") + (cuts.complete ? "" : " at least") +
                       " and are left so: no way to part them keeps every surface where it is");
     }
-    say_how_it_ended(surface, repaired.changes);
+    say_what_is_left(repaired.mesh, options, untried, repaired.changes);
+    say_how_it_ended(repaired.mesh, repaired.changes);
   } catch (const std::exception& error) {
     if (repaired.mesh.empty()) repaired.mesh = std::move(merged.mesh);
     repaired.changes.push_back(

@@ -8,6 +8,7 @@
 
 #include "polygon/mesh/findings.h"
 #include "polygon/mesh/mesh.h"
+#include "polygon/repair/check.h"
 
 namespace polygon {
 
@@ -28,14 +29,20 @@ struct ClosedCracks {
 };
 ClosedCracks close_cracks(RepairSoup& soup, double tolerance_m);
 
-// Fills small holes (RepairOptions) with triangles between existing vertices.
+// Fills small holes (RepairOptions) with triangles between existing vertices. No triangle and no inner edge
+// of a fill is one that is there already.
 struct FilledHoles {
   FindingTally filled;
   std::size_t triangles = 0;  // added
-  // Not filled; its place is that of the longest loop. Counts by reason:
-  FindingTally left;
+  std::size_t untried = 0;    // holes that were left because the bound on the work was reached
+};
+FilledHoles fill_holes(RepairSoup& soup, const RepairOptions& options);
+
+// The rims of a repaired mesh, as a check counts them, by the reason why they are left.
+struct HolesLeft {
+  FindingTally left;  // its place is that of the longest
   std::size_t too_long = 0, too_large = 0, branching = 0, unfillable = 0;
 };
-FilledHoles fill_holes(RepairSoup& soup, std::size_t most_edges, double most_share);
+HolesLeft holes_left(const TriangleMesh& mesh, const RepairOptions& options);
 
 }  // namespace polygon
