@@ -7,7 +7,6 @@
 #include <array>
 #include <cstddef>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <set>
 #include <string>
@@ -15,67 +14,15 @@
 #include <utility>
 #include <vector>
 
+#include "tests/source_tree.h"
+
 namespace {
 
 namespace fs = std::filesystem;
+using namespace tests;
 
 constexpr std::array kParts{"polygon", "voxel", "device", "hybrid"};
 constexpr std::array kFolders{"polygon", "voxel", "device", "hybrid", "scenes", "tests"};
-
-struct SourceFile {
-  std::string path;  // from the root, with '/'
-  std::vector<std::string> lines;
-};
-
-std::vector<std::string> lines_of(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::vector<std::string> lines;
-  for (std::string line; std::getline(stream, line);) lines.push_back(line);
-  return lines;
-}
-
-bool is_header(const SourceFile& file) {
-  return file.path.ends_with(".h") || file.path.ends_with(".hpp");
-}
-bool is_cpp(const SourceFile& file) {
-  return is_header(file) || file.path.ends_with(".cpp");
-}
-bool is_in(const SourceFile& file, std::string_view folder) {
-  return file.path.starts_with(std::string(folder).append("/"));
-}
-
-// Everything a person wrote: sources, build files, scripts, scenes and documents. Data are left out.
-bool is_text(const fs::path& file) {
-  static const std::set<std::string> kEndings{".cpp",  ".h",   ".hpp",  ".cmake", ".sh",  ".md",
-                                              ".toml", ".txt", ".json", ".yml",   ".yaml"};
-  const fs::path folder = file.parent_path().filename();
-  return kEndings.contains(file.extension().string()) || folder == ".ci" || file.filename() == ".clang-tidy";
-}
-
-std::vector<SourceFile> read_tree() {
-  const fs::path root = HYBRID_SOURCE_DIR;
-  std::vector<SourceFile> files;
-  const auto add = [&](const fs::directory_entry& entry) {
-    if (!entry.is_regular_file() || !is_text(entry.path())) return;
-    files.push_back({entry.path().lexically_relative(root).generic_string(), lines_of(entry.path())});
-  };
-  for (const fs::directory_entry& entry : fs::directory_iterator(root)) add(entry);
-  for (const char* folder : {"polygon", "voxel", "device", "hybrid", "scenes", "tests", "cmake", ".ci"}) {
-    if (!fs::is_directory(root / folder)) continue;
-    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(root / folder)) add(entry);
-  }
-  std::sort(files.begin(), files.end(), [](const auto& a, const auto& b) { return a.path < b.path; });
-  return files;
-}
-
-const std::vector<SourceFile>& tree() {
-  static const std::vector<SourceFile> files = read_tree();
-  return files;
-}
-
-std::string place(const SourceFile& file, std::size_t line) {
-  return file.path + ":" + std::to_string(line + 1) + ": ";
-}
 
 // What a line includes; empty when it is no #include.
 std::string included_by(std::string_view line) {

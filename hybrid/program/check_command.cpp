@@ -144,7 +144,8 @@ void check_scene_file(const std::filesystem::path& path, Json& file) {
     add_finding(file, {"S01", note.severity, 1,
                        fmt::format("{}{}{}", note.object, note.object.empty() ? "" : ": ", note.text)});
   }
-  for (const std::string& note : scene_path(scene)->notes()) {
+  const std::shared_ptr<const device::Path> hand_path = scene_path(scene);
+  for (const std::string& note : hand_path->notes()) {
     add_finding(file, {"S03", polygon::Severity::info, 1, "path: " + note});
   }
   file["objects"] = Json::array();

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Reads the source tree and finds loops over a part of a temporary: `for (x : f()->list())`, where f()
+// returns a pointer that owns. g++ 12 and clang 14 do not warn of it.
+#include <gtest/gtest.h>
+
+#include <cctype>
+#include <cstddef>
+#include <set>
+#include <string>
+#include <string_view>
+
+#include "tests/source_tree.h"
+
+namespace {
+
+using namespace tests;
+
+bool is_word(char c) {
+  return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_';
+}
+
+// The name of the call that ends before `end` ("at" of "rooms().at(part)"), and where it begins; npos: no
+// call does.
+std::size_t call_before(std::string_view text, std::size_t end, std::string& name) {
+  if (end == 0 || text[end - 1] != ')') return std::string_view::npos;
+  std::size_t open = end - 1;
+  for (std::size_t depth = 1; depth > 0 && open > 0;) {
+    --open;
+    if (text[open] == ')') ++depth;
+    if (text[open] == '(') --depth;
+  }
+  if (open > 0 && text[open - 1] == '>') open = text.rfind('<', open);  // std::make_unique<int>(3)
+  if (open == std::string_view::npos) return open;
+  std::size_t begin = open;
+  while (begin > 0 && is_word(text[begin - 1])) --begin;
+  name = text.substr(begin, open - begin);
+  return begin;
+}
+
+// The names of functions that some source declares as returning a reference, a pointer or a span.
+const std::set<std::string>& names_of_what_stays() {
+  static const std::set<std::string> names = [] {
+    std::set<std::string> found{"span"};
+    for (const SourceFile& file : tree()) {
+      if (!is_cpp(file)) continue;
+      for (const std::string_view line : file.lines) {
+        for (std::size_t open = line.find('('); open != std::string_view::npos;
+             open = line.find('(', open + 1)) {
+          std::size_t begin = open;
+          while (begin > 0 && is_word(line[begin - 1])) --begin;
+          if (begin < 2 || line[begin - 1] != ' ') continue;
+          const char before = line[begin - 2];
+          const bool span = before == '>' && line.substr(0, begin).find("span<") != std::string_view::npos;
+          if (before == '&' || before == '*' || span) found.emplace(line.substr(begin, open - begin));
+        }
+      }
+    }
+    return found;
+  }();
+  return names;
+}
+
+// The call in the range of a range-for whose result is gone before the loop begins; empty: there is none.
+// C++20 keeps the range alive, but not a temporary that the range is a part of, as in f()->notes().
+std::string lost_call(std::string_view range) {
+  std::size_t end = range.size();
+  bool reached_through = range.starts_with("*");  // by an arrow, a star, or a call on it
+  std::string name;
+  while (end > 0) {
+    const std::size_t begin = call_before(range, end, name);
+    if (begin != std::string_view::npos) {
+      if (reached_through && !names_of_what_stays().contains(name)) return name;
+      reached_through = true;
+      end = begin;
+    } else {
+      while (end > 0 && is_word(range[end - 1])) --end;
+    }
+    if (range.substr(0, end).ends_with("->")) {
+      reached_through = true;
+      end -= 2;
+    } else if (range.substr(0, end).ends_with('.')) {
+      --end;
+    } else {
+      break;
+    }
+  }
+  return "";
+}
+
+// The range of a range-for that begins at `at`; empty where it is another loop.
+std::string range_at(const SourceFile& file, std::size_t line, std::size_t at) {
+  std::string text = file.lines[line].substr(at);
+  for (std::size_t more = 1; more < 4 && line + more < file.lines.size(); ++more)
+    text += file.lines[line + more];
+  std::size_t depth = 0, colon = 0;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] == '(' || text[i] == '[' || text[i] == '{') ++depth;
+    if ((text[i] == ')' || text[i] == ']' || text[i] == '}') && --depth == 0) {
+      if (colon == 0) return "";
+      const std::size_t first = text.find_first_not_of(' ', colon + 1);
+      return text.substr(first, i - first);
+    }
+    if (depth == 1 && text[i] == ':' && text[i - 1] == ' ' && text[i + 1] == ' ') colon = i;
+  }
+  return "";
+}
+
+TEST(LoopRanges, RangesOfLoopsThatAreGoneAreRecognised) {
+  EXPECT_EQ(lost_call("scene_path(scene)->notes()"), "scene_path");
+  EXPECT_EQ(lost_call("load_scene(file(1)).notes().items"), "load_scene");
+  EXPECT_EQ(lost_call("*std::make_unique<int>(3)"), "make_unique");
+  EXPECT_EQ(lost_call("*scene_path(scene)"), "scene_path");
+  EXPECT_EQ(lost_call("scene_path(scene)->list"), "scene_path");
+  for (const char* sound : {"scene_path(scene)", "load_scene(file).items", "object.lattice().surface()",
+                            "object.list", "std::span(list).first(3)", "object->list", "list.of[3].items()"})
+    EXPECT_EQ(lost_call(sound), "") << sound;
+}
+
+TEST(LoopRanges, NoLoopRunsOverAPartOfATemporary) {
+  for (const SourceFile& file : tree()) {
+    if (!is_cpp(file) || file.path == "tests/test_loop_ranges.cpp") continue;
+    for (std::size_t i = 0; i < file.lines.size(); ++i) {
+      const std::size_t at = file.lines[i].find("for (");
+      if (at == std::string::npos) continue;
+      const std::string lost = lost_call(range_at(file, i, at + 4));
+      EXPECT_EQ(lost, "") << place(file, i) << "the result of " << lost
+                          << "() is gone before the loop begins: give it a name before the loop";
+    }
+  }
+}
+
+}  // namespace
