@@ -4,15 +4,35 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
-#include <cmath>
-#include <cstdio>
+#include <system_error>
+#include <utility>
 
 namespace device {
 namespace {
 
+using namespace std::string_view_literals;
+
 constexpr std::size_t kMaxLines = 10'000'000;  // 2.8 hours at 1 kHz; 320 MB in memory
-constexpr double kGapFactor = 10.0;            // a step longer than this many median steps is a gap
+constexpr std::size_t kMaxLineLength = 16'384;
+constexpr std::size_t kChunk = 65'536;  // bytes read at once
+
+constexpr std::string_view kUtf8Mark = "\xEF\xBB\xBF"sv;
+constexpr std::string_view kUtf16Remedy = "save it as UTF-8 (iconv -f UTF-16 -t UTF-8)"sv;
+
+// Files that are no plain text, by their first bytes.
+struct OtherFormat {
+  std::string_view begins, is;
+};
+constexpr std::array<OtherFormat, 7> kOtherFormats{
+    {{"\xFF\xFE\0\0"sv, "is UTF-32 text; save it as UTF-8 (iconv -f UTF-32 -t UTF-8)"sv},
+     {"\0\0\xFE\xFF"sv, "is UTF-32 text; save it as UTF-8 (iconv -f UTF-32 -t UTF-8)"sv},
+     {"\xFF\xFE"sv, "is UTF-16 text; save it as UTF-8 (iconv -f UTF-16 -t UTF-8)"sv},
+     {"\xFE\xFF"sv, "is UTF-16 text; save it as UTF-8 (iconv -f UTF-16 -t UTF-8)"sv},
+     {"PK\x03\x04"sv, "is a ZIP file or a workbook (.xlsx, .ods); export its table as CSV"sv},
+     {"\xD0\xCF\x11\xE0"sv, "is a workbook (.xls); export its table as CSV"sv},
+     {"version https://git-lfs"sv, "is a Git LFS pointer; fetch the file itself (git lfs pull)"sv}}};
 
 gzFile zlib(void* stream) {
   return static_cast<gzFile>(stream);
@@ -20,7 +40,7 @@ gzFile zlib(void* stream) {
 
 }  // namespace
 
-LineReader::LineReader(const std::filesystem::path& file) : file_(file) {
+LineReader::LineReader(const std::filesystem::path& file) : file_(file), buffer_(kChunk) {
   std::error_code ignored;
   if (!std::filesystem::exists(file, ignored)) {
     throw PathError(file.string() + ": no such file; check the path's file name");
@@ -39,111 +59,112 @@ LineReader::~LineReader() {
 }
 
 bool LineReader::next(std::string_view& line) {
-  while (next_raw(line)) {
-    if (line_ == 1 && line.substr(0, 3) == "\xEF\xBB\xBF") line.remove_prefix(3);  // byte order mark
-    line = trimmed(line);
-    if (line.empty()) continue;
-    if (line.front() != '#') return true;
-    comment_ = trimmed(line.substr(1));
+  while (next_raw()) {
+    const std::string_view content = without_blanks(text_);
+    if (content.empty()) continue;
+    if (content.front() != '#' && content.front() != '%') {
+      line = text_;
+      return true;
+    }
+    comment_ = without_blanks(content.substr(1));
   }
   return false;
 }
 
-void LineReader::refuse(const std::string& what) const {
-  throw PathError(file_.string() + ":" + std::to_string(line_) + ": " + what);
+void LineReader::refuse(const std::string& what, std::size_t line) const {
+  throw PathError(file_.string() + ":" + std::to_string(line == 0 ? line_ : line) + ": " + what);
 }
 
-bool LineReader::next_raw(std::string_view& line) {
-  const bool got = gzgets(zlib(stream_), buffer_.data(), static_cast<int>(buffer_.size())) != nullptr;
-  // Checked also if a line was read, because a truncated file ends with a partial line.
+bool LineReader::next_raw() {
+  text_.clear();
+  for (bool ended = false; !ended;) {
+    if (at_ == filled_ && !fill()) {
+      if (text_.empty()) return false;
+      break;  // the last line has no end
+    }
+    const char* const begin = buffer_.data() + at_;
+    const char* const end = buffer_.data() + filled_;
+    if (std::exchange(after_cr_, false) && *begin == '\n') {
+      ++at_;
+      continue;
+    }
+    const char* const stop = std::find_if(begin, end, [](char c) { return c == '\n' || c == '\r'; });
+    text_.append(begin, stop);
+    at_ += static_cast<std::size_t>(stop - begin);
+    if (stop != end) {
+      ended = true;
+      after_cr_ = *stop == '\r';
+      ++at_;
+    }
+    if (text_.size() > kMaxLineLength) {
+      ++line_;
+      refuse("a line longer than " + std::to_string(kMaxLineLength) + " characters; is this a CSV file?");
+    }
+  }
+  ++line_;
+  if (line_ > kMaxLines) {
+    refuse("more than " + std::to_string(kMaxLines) + " lines; leave samples out, or cut the file in parts");
+  }
+  if (text_.find('\0') != std::string::npos) {
+    refuse("a byte of value 0, so this is no plain text; if it is UTF-16, " + std::string(kUtf16Remedy));
+  }
+  return true;
+}
+
+// More bytes into the buffer; false at the end of the file.
+bool LineReader::fill() {
+  at_ = 0;
+  const int got = gzread(zlib(stream_), buffer_.data(), static_cast<unsigned>(buffer_.size()));
+  filled_ = got > 0 ? static_cast<std::size_t>(got) : 0;
+  // Checked also if bytes were read, because a truncated file ends with a part of them.
   int error = Z_OK;
   gzerror(zlib(stream_), &error);
   if (error != Z_OK) {
     ++line_;
     refuse("the file cannot be read further; it is cut short or damaged: fetch or write it again");
   }
-  if (!got) return false;
-  ++line_;
-  line = buffer_.data();
-  if (line_ > kMaxLines) {
-    refuse("more than " + std::to_string(kMaxLines) + " lines; leave samples out, or cut the file in parts");
+  if (!std::exchange(began_, true)) {
+    refuse_other_formats();
+    if (std::string_view(buffer_.data(), filled_).starts_with(kUtf8Mark)) at_ = kUtf8Mark.size();
   }
-  if (line.size() + 1 == buffer_.size() && line.back() != '\n') {
-    refuse("a line longer than " + std::to_string(kMaxLineLength) + " characters; is this a CSV file?");
-  }
-  return true;
+  return at_ < filled_;
 }
 
-double LineReader::number(std::string_view field) const {
-  std::string_view digits = field;
-  if (digits.size() > 1 && digits[0] == '+' && digits[1] != '-')
-    digits.remove_prefix(1);  // from_chars accepts no '+'
-  double value = 0.0;
-  const char* const end = digits.data() + digits.size();
-  const auto [stopped, error] = std::from_chars(digits.data(), end, value);
-  if (error != std::errc() || stopped != end || digits.empty() || !std::isfinite(value)) {
-    refuse(std::string(1, '\'').append(field.substr(0, 40)) +
-           "' is not a finite number; correct or leave out the line");
+void LineReader::refuse_other_formats() const {
+  for (const OtherFormat& format : kOtherFormats) {
+    if (!std::string_view(buffer_.data(), filled_).starts_with(format.begins)) continue;
+    throw PathError(file_.string() + ": " + std::string(format.is));
   }
-  return value;
 }
 
-std::string_view trimmed(std::string_view text) {
-  constexpr std::string_view kBlank = " \t\r\n\"";
+std::string_view without_blanks(std::string_view text) {
+  constexpr std::string_view kBlank = " \t\r\n";
   const std::size_t first = text.find_first_not_of(kBlank);
   if (first == std::string_view::npos) return {};
   return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
 }
 
-std::vector<std::string_view> comma_fields(std::string_view line) {
-  std::vector<std::string_view> result;
-  while (true) {
-    const std::size_t comma = line.find(',');
-    result.push_back(trimmed(line.substr(0, comma)));
-    if (comma == std::string_view::npos) return result;
-    line.remove_prefix(comma + 1);
+std::string lower_ascii(std::string_view text) {
+  std::string out(text);
+  for (char& c : out) {
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
   }
+  return out;
+}
+
+std::string shown(std::string_view text) {
+  std::string out(text.substr(0, 40));
+  for (char& c : out) {
+    if (c < ' ' || c > '~') c = '?';
+  }
+  return "'" + out + "'";
 }
 
 std::string short_number(double value) {
   std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.4g", value);
-  return text.data();
-}
-
-std::optional<double> unit_of(std::string_view name, std::span<const Unit> units) {
-  for (const Unit& unit : units) {
-    if (name.ends_with(unit.suffix)) return unit.in_si;
-  }
-  return std::nullopt;
-}
-
-Gaps find_gaps(const std::vector<double>& t_s) {
-  Gaps gaps;
-  if (t_s.size() < 3) return gaps;
-  std::vector<double> steps(t_s.size() - 1);
-  for (std::size_t i = 0; i < steps.size(); ++i) steps[i] = t_s[i + 1] - t_s[i];
-  std::vector<double> sorted = steps;
-  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-  std::nth_element(sorted.begin(), middle, sorted.end());
-  gaps.limit_s = kGapFactor * *middle;
-  for (std::size_t i = 0; i < steps.size(); ++i) {
-    if (steps[i] <= gaps.limit_s) continue;
-    gaps.before.push_back(i);
-    if (steps[i] > gaps.longest_s) {
-      gaps.longest_s = steps[i];
-      gaps.longest_before = i;
-    }
-  }
-  return gaps;
-}
-
-std::string gaps_in_words(const std::string& file, const std::vector<double>& t_s, const Gaps& gaps) {
-  if (gaps.before.empty()) return "";
-  return file + ": " + std::to_string(gaps.before.size()) + (gaps.before.size() == 1 ? " gap" : " gaps") +
-         " of more than " + short_number(gaps.limit_s) + " s (10 usual steps), the longest " +
-         short_number(gaps.longest_s) + " s at t = " + short_number(t_s[gaps.longest_before]) +
-         " s; the hand moves straight across";
+  const auto end =
+      std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, 4).ptr;
+  return {text.data(), end};
 }
 
 }  // namespace device

@@ -1,13 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reads columns of numbers from a text file, plain or gzip. Every error names file and line.
+// Reads a text file line by line, plain or gzip. Every error names file and line.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <filesystem>
-#include <memory>
-#include <optional>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -16,7 +12,8 @@
 
 namespace device {
 
-// The lines of a text file. Throws PathError: no such file, unreadable, truncated, not text.
+// The lines of a text file that end with LF, CR LF or CR alone. Throws PathError: no such file, unreadable,
+// truncated, not text, not UTF-8 by its byte-order mark.
 class LineReader {
  public:
   explicit LineReader(const std::filesystem::path& file);
@@ -26,52 +23,37 @@ class LineReader {
   LineReader& operator=(LineReader&&) = delete;
   ~LineReader();
 
-  // The next line that is not empty, trimmed; false at the end of the file. A line that begins with '#' is a
-  // comment; the last one is kept.
+  // The next line that is not blank, without its end; false at the end of the file. `line` holds until the
+  // next call. A line that begins with '#' or '%' is a comment; the last one is kept.
   bool next(std::string_view& line);
-  // Throws PathError "file:line: what".
-  [[noreturn]] void refuse(const std::string& what) const;
+  // Throws PathError "file:line: what"; by default at the current line.
+  [[noreturn]] void refuse(const std::string& what, std::size_t line = 0) const;
   [[nodiscard]] std::size_t line() const { return line_; }
-  // The last comment before the current line, without its '#'; empty if there was none.
+  // The last comment before the current line, without its mark; empty if there was none.
   [[nodiscard]] const std::string& comment() const { return comment_; }
-  // A finite number; otherwise refuse().
-  [[nodiscard]] double number(std::string_view field) const;
 
  private:
-  bool next_raw(std::string_view& line);
+  bool next_raw();
+  bool fill();
+  void refuse_other_formats() const;
 
-  static constexpr std::size_t kMaxLineLength = 16'384;
   std::filesystem::path file_;
   void* stream_ = nullptr;  // gzFile
   std::size_t line_ = 0;
-  std::string comment_;
-  std::array<char, kMaxLineLength + 2> buffer_{};
+  std::string text_, comment_;
+  std::vector<char> buffer_;
+  std::size_t at_ = 0, filled_ = 0;  // in buffer_
+  bool after_cr_ = false;            // a line feed that comes next belongs to the last line
+  bool began_ = false;
 };
 
-// Without blanks and quotation marks at both ends.
-std::string_view trimmed(std::string_view text);
-// The fields between commas.
-std::vector<std::string_view> comma_fields(std::string_view line);
-// Four digits, for messages.
+// Without blanks and tabs at both ends.
+std::string_view without_blanks(std::string_view text);
+// Lower case, of ASCII letters alone: the same in every locale.
+std::string lower_ascii(std::string_view text);
+// At most 40 characters in quotation marks, for a message. A byte outside ASCII is shown as '?'.
+std::string shown(std::string_view text);
+// Four digits, for messages. The decimal mark is a point in every locale.
 std::string short_number(double value);
-
-struct Unit {
-  std::string_view suffix;
-  double in_si;
-};
-inline constexpr std::array<Unit, 4> kTimeUnits{{{"_s", 1.0}, {"_ms", 1e-3}, {"_us", 1e-6}, {"_ns", 1e-9}}};
-inline constexpr std::array<Unit, 4> kLengthUnits{{{"_m", 1.0}, {"_cm", 1e-2}, {"_mm", 1e-3}, {"_um", 1e-6}}};
-// The unit given by the suffix of a column's name; empty if it has no known suffix.
-std::optional<double> unit_of(std::string_view name, std::span<const Unit> units);
-
-// Time steps longer than ten median steps, each by the index of the sample before it.
-struct Gaps {
-  std::vector<std::size_t> before;
-  double limit_s = 0.0, longest_s = 0.0;
-  std::size_t longest_before = 0;
-};
-Gaps find_gaps(const std::vector<double>& t_s);
-// For a note; empty if there are no gaps.
-std::string gaps_in_words(const std::string& file, const std::vector<double>& t_s, const Gaps& gaps);
 
 }  // namespace device

@@ -9,6 +9,7 @@
 #include <glm/trigonometric.hpp>
 #include <utility>
 
+#include "device/paths/line_reader.h"
 #include "device/paths/path_file.h"
 
 namespace device {
@@ -21,13 +22,13 @@ void require_finite(const glm::dvec3& v, const char* what) {
 
 void require_speed(double speed_m_per_s) {
   if (speed_m_per_s > 0.0 && std::isfinite(speed_m_per_s)) return;
-  throw PathError("path: its speed is " + std::to_string(speed_m_per_s) +
+  throw PathError("path: its speed is " + short_number(speed_m_per_s) +
                   " m/s; a speed must be a number above 0");
 }
 
 void require_duration(double hold_s) {
   if (hold_s >= 0.0 && std::isfinite(hold_s)) return;
-  throw PathError("path: a hold of " + std::to_string(hold_s) + " s; it must be a number not below 0");
+  throw PathError("path: a hold of " + short_number(hold_s) + " s; it must be a number not below 0");
 }
 
 // Positions at ascending times, linear in between, `repeat` times over. Repeated polylines end where they

@@ -48,9 +48,9 @@ struct LissajousPath {
   double duration_s = 10.0;
 };
 
-// Columns t, x, y, z of a CSV file (also .gz) at any rate, linear between samples. Each is the first column
-// whose name begins with that letter (e.g. t_s, x_mm). The unit comes from the name's suffix (_m, _cm, _mm,
-// _um; time _s, _ms, _us, _ns), otherwise from `unit_m` (time: seconds). Time starts at the first sample.
+// Columns of a CSV file (also .gz) at any rate, linear between samples. Their names are matched whole, and
+// their units are those of the names (column_names.h); a length without one is in `unit_m`, a time in
+// seconds. Time starts at the first sample.
 struct CsvPath {
   std::filesystem::path file;
   double unit_m = 1.0;

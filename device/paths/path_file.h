@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reads a recorded trajectory from a CSV file, plain or gzip.
+// Reads a recorded trajectory from columns of text (CSV), plain or gzip.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -16,9 +16,8 @@ struct Trajectory {
   std::vector<std::string> notes;      // repeated times, gaps, assumed units
 };
 
-// Throws PathError, with file and line if there is one: file missing or unreadable, no columns t, x, y, z, no
-// rows or too many, not a number, time running backwards. A sample that repeats the time of the one before
-// replaces it. Empty lines and lines that begin with '#' are ignored.
+// As read_measured() of a path (trajectory_file.h). Throws PathError with file and line; also for a unit or
+// an offset out of range.
 Trajectory read_trajectory(const CsvPath& csv);
 
 // A path along the trajectory. Throws PathError if it has no samples.

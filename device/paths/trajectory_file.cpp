@@ -3,259 +3,212 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
-#include <charconv>
 #include <cmath>
-#include <optional>
 #include <string_view>
+#include <utility>
+
+#include "device/paths/file_columns.h"
+#include "device/paths/line_reader.h"
+#include "device/paths/row_fields.h"
 
 namespace device {
 namespace {
 
-using namespace std::string_view_literals;
+constexpr double kGapFactor = 10.0;  // a step longer than this many median steps is a gap
+constexpr double kDay_s = 86'400.0;
+// Seconds since 1970 from September 2001 to the end of 2099. A first time in this range, but for a power of
+// 1000, is a clock of milliseconds, microseconds or nanoseconds since 1970.
+constexpr double kEpochFrom_s = 1e9, kEpochTo_s = 4.1e9;
+constexpr double kLatest_s = 1e11;      // seconds since the year 0 stay below it
+constexpr double kSlowestStep_s = 1.0;  // a usual step from this on makes a unit of seconds doubtful
 
-constexpr std::string_view kExample = "t_s,x_mm,y_mm,z_mm,fx_N,fy_N,fz_N";
-constexpr std::array<Unit, 2> kForceUnits{{{"_mn", 1e-3}, {"_n", 1.0}}};
-
-enum Role : std::size_t { time, x, y, z, fx, fy, fz, strength, roles };
-
-struct MeasuredColumn {
-  std::size_t index = 0;
-  double in_si = 1.0;
+struct ClockUnit {
+  double in_s;
+  std::string_view name, ending;
 };
-using MeasuredColumns = std::array<std::optional<MeasuredColumn>, roles>;
+constexpr std::array<ClockUnit, 3> kClockUnits{
+    {{1e-3, "milliseconds", "_ms"}, {1e-6, "microseconds", "_us"}, {1e-9, "nanoseconds", "_ns"}}};
 
-std::string lower(std::string_view text) {
-  std::string out(text);
-  std::transform(out.begin(), out.end(), out.begin(), [](unsigned char c) { return std::tolower(c); });
-  return out;
+double median_step_s(const std::vector<double>& t_s) {
+  std::vector<double> steps(t_s.size() - 1);
+  for (std::size_t i = 0; i < steps.size(); ++i) steps[i] = t_s[i + 1] - t_s[i];
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return *middle;
 }
 
-// Fields between commas if there is one, otherwise between blanks or semicolons.
-std::vector<std::string_view> fields_of(std::string_view line) {
-  if (line.find(',') != std::string_view::npos) return comma_fields(line);
-  std::vector<std::string_view> fields;
-  constexpr std::string_view kBlank = " \t;";
-  for (std::size_t at = line.find_first_not_of(kBlank); at != std::string_view::npos;) {
-    const std::size_t end = std::min(line.find_first_of(kBlank, at), line.size());
-    fields.push_back(line.substr(at, end - at));
-    at = line.find_first_not_of(kBlank, end);
-  }
-  return fields;
-}
-
-bool is_number(std::string_view text) {
-  double value = 0.0;
-  const auto [stopped, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc() && stopped == text.data() + text.size();
-}
-
-// The axis (0 to 2) of a name such as fx, force_x, giver_fx or f_x, and the prefix before it.
-std::optional<std::size_t> force_axis(std::string_view stem, std::string& of_what) {
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    for (const std::string_view kind : {"force_"sv, "f_"sv, "f"sv}) {
-      const std::string ending = std::string(kind) + "xyz"[axis];
-      if (!stem.ends_with(ending)) continue;
-      const std::string_view before = stem.substr(0, stem.size() - ending.size());
-      if (!before.empty() && before.back() != '_') continue;
-      of_what = before.empty() ? "" : std::string(before.substr(0, before.size() - 1));
-      return axis;
+Gaps find_gaps(const std::vector<double>& t_s) {
+  Gaps gaps;
+  if (t_s.size() < 3) return gaps;
+  gaps.limit_s = kGapFactor * median_step_s(t_s);
+  for (std::size_t i = 0; i + 1 < t_s.size(); ++i) {
+    const double step_s = t_s[i + 1] - t_s[i];
+    if (step_s <= gaps.limit_s) continue;
+    gaps.before.push_back(i);
+    if (step_s > gaps.longest_s) {
+      gaps.longest_s = step_s;
+      gaps.longest_before = i;
     }
   }
-  return std::nullopt;
+  return gaps;
 }
 
-class ColumnFinder {
+std::string gaps_in_words(const std::vector<double>& t_s, const Gaps& gaps) {
+  return std::to_string(gaps.before.size()) + (gaps.before.size() == 1 ? " gap" : " gaps") +
+         " of more than " + short_number(gaps.limit_s) + " s (10 usual steps), the longest " +
+         short_number(gaps.longest_s) + " s at t = " + short_number(t_s[gaps.longest_before]) +
+         " s; the hand moves straight across";
+}
+
+// Reads the rows below the heading.
+class RowReader {
  public:
-  ColumnFinder(const MeasuredFile& measured, const LineReader& reader, std::vector<std::string>& notes)
-      : measured_(measured), reader_(reader), notes_(notes) {}
-
-  MeasuredColumns by_name(const std::vector<std::string_view>& names) {
-    for (std::size_t i = 0; i < names.size(); ++i) take(i, names[i]);
-    choose_force();
-    return columns_;
+  RowReader(const MeasuredFile& measured, LineReader& reader, FileColumns columns)
+      : measured_(measured), reader_(reader), columns_(std::move(columns)) {
+    for (std::string& note : columns_.notes) out_.notes.push_back(std::move(note));
+    if (!columns_.role[role_time]) {
+      note("without times; taken as " + short_number(measured_.rate_hz) +
+           " samples a second (--rate states another)");
+    }
+    if (!measured_.as_path && !columns_.role[role_x]->unit_is_stated) {
+      note("its lengths state no unit; taken as mm (x_mm in the heading states it)");
+    }
   }
 
-  // MeasuredColumns of numbers without names.
-  MeasuredColumns by_count(std::size_t count) {
-    constexpr std::array<std::pair<std::size_t, std::string_view>, 4> kLayouts{
-        {{5, "t_s,x_mm,y_mm,z_mm,fn_N"},
-         {6, "x_mm,y_mm,z_mm,fx_N,fy_N,fz_N"},
-         {7, "t_s,x_mm,y_mm,z_mm,fx_N,fy_N,fz_N"},
-         {8, "t_s,x_mm,y_mm,z_mm,fx_N,fy_N,fz_N,fn_N"}}};
-    for (const auto& [columns, layout] : kLayouts) {
-      if (columns != count) continue;
-      notes_.push_back(name() + ": its " + std::to_string(count) + " columns are not named, and taken as " +
-                       std::string(layout) + "; state others with --columns");
-      return by_name(comma_fields(layout));
+  MeasuredTrajectory read(std::string_view line) {
+    for (bool more = columns_.has_row; more; more = reader_.next(line)) {
+      split_row(reader_, columns_, line, fields_);
+      if (!fields_.empty()) add_row();
     }
-    reader_.refuse(std::to_string(count) + " columns without a name; state them with --columns, as in " +
-                   std::string(kExample) + " ('-' for a column to leave out)");
+    if (out_.t_s.empty()) throw PathError(measured_.file.string() + ": has a header but no rows");
+    finish();
+    return std::move(out_);
   }
 
  private:
-  [[nodiscard]] std::string name() const { return measured_.file.filename().string(); }
-
-  void set(Role role, std::size_t index, double in_si) {
-    if (!columns_[role]) columns_[role] = MeasuredColumn{index, in_si};
+  void note(const std::string& text) {
+    out_.notes.push_back(measured_.file.filename().string() + ": " + text);
   }
 
-  void take(std::size_t index, std::string_view written) {
-    const std::string full = lower(written);
-    if (unit_of(full, kTimeUnits) && full.starts_with("t")) {
-      const std::string_view stem = std::string_view(full).substr(0, full.rfind('_'));
-      if (stem == "t" || stem == "time" || stem == "timestamp") {
-        return set(time, index, *unit_of(full, kTimeUnits));
-      }
-    }
-    if (full == "t" || full == "time" || full == "timestamp") return set(time, index, 1.0);
-
-    const std::optional<double> newton = unit_of(full, kForceUnits);
-    const std::string_view force_stem = newton ? std::string_view(full).substr(0, full.rfind('_')) : full;
-    if (force_stem == "fn" || force_stem == "f_normal" || force_stem == "normal_force") {
-      return set(strength, index, newton.value_or(1.0));
-    }
-    std::string of_what;
-    if (const auto axis = force_axis(force_stem, of_what)) {
-      auto group =
-          std::find_if(forces_.begin(), forces_.end(), [&](const Force& f) { return f.of_what == of_what; });
-      if (group == forces_.end()) group = forces_.insert(forces_.end(), {of_what, {}});
-      group->columns[*axis] = MeasuredColumn{index, newton.value_or(1.0)};
-      return;
-    }
-
-    const std::optional<double> length = unit_of(full, kLengthUnits);
-    const std::string_view stem = length ? std::string_view(full).substr(0, full.rfind('_')) : full;
-    for (const Role role : {x, y, z}) {
-      const char axis = "xyz"[role - x];
-      for (const std::string_view before : {""sv, "p"sv, "pos_"sv, "position_"sv, "device_"sv, "tool_"sv}) {
-        if (stem == std::string(before) + axis) set(role, index, length.value_or(measured_.unit_m));
-      }
-    }
+  template <typename Real = double>
+  [[nodiscard]] Real number(std::size_t role) const {
+    const std::string_view field = fields_[columns_.role[role]->index];
+    if (const auto value = number_in<Real>(field, columns_.mark)) return *value;
+    std::string what = shown(field) + " is not a finite number";
+    if (columns_.mark == DecimalMark::comma) what += " with a decimal comma, as others of this file";
+    what += role == role_time && field.find(':') != std::string_view::npos
+                ? "; write times as numbers, in seconds or in the unit of the heading"
+                : "; correct or leave out the line";
+    reader_.refuse(what);
+  }
+  [[nodiscard]] double in_si(std::size_t role) const {
+    const double value = number(role) * columns_.role[role]->in_si;
+    if (!std::isfinite(value)) reader_.refuse("a value too large to be used; correct or leave out the line");
+    return value;
+  }
+  [[nodiscard]] glm::dvec3 vector_in_si(std::size_t first) const {
+    return {in_si(first), in_si(first + 1), in_si(first + 2)};
   }
 
-  // The requested force, the one without a prefix, or the only one.
-  void choose_force() {
-    const auto whole = [](const Force& f) { return f.columns[0] && f.columns[1] && f.columns[2]; };
-    std::erase_if(forces_, [&](const Force& f) { return !whole(f); });
-    auto chosen = std::find_if(forces_.begin(), forces_.end(),
-                               [&](const Force& f) { return f.of_what == lower(measured_.force); });
-    if (chosen == forces_.end() && measured_.force.empty() && forces_.size() == 1) chosen = forces_.begin();
-    if (chosen == forces_.end()) {
-      if ((forces_.empty() && measured_.force.empty()) || !measured_.needs_force) return;
-      std::string known;
-      for (const Force& f : forces_)
-        known += (known.empty() ? "" : ", ") + (f.of_what.empty() ? "''" : f.of_what);
-      reader_.refuse(
-          (measured_.force.empty() ? std::string("several forces") : "no force '" + measured_.force + "'") +
-          " in the columns; choose one with --force: " + (known.empty() ? "there is none" : known));
+  void add_row() {
+    const double t_s = time_s();
+    const glm::dvec3 position_m = vector_in_si(role_x);
+    glm::dvec3 force_N(0.0);
+    if (columns_.role[role_fx]) force_N = (measured_.on_object ? -1.0 : 1.0) * vector_in_si(role_fx);
+    if (columns_.role[role_strength]) force_N.x = std::abs(in_si(role_strength));
+    if (!out_.t_s.empty() && t_s < out_.t_s.back()) {
+      reader_.refuse("time runs backwards, by " + short_number(out_.t_s.back() - t_s) +
+                     " s; sort the rows by time, or cut the file where a new recording begins");
     }
-    for (std::size_t axis = 0; axis < 3; ++axis) columns_[fx + axis] = chosen->columns[axis];
+    if (t_s > kDay_s) {
+      reader_.refuse("the recording lasts longer than a day, " + short_number(t_s) +
+                     " s so far; state the unit of its times in the heading, as in t_ms or t_ns, or cut it");
+    }
+    if (!out_.t_s.empty() && t_s == out_.t_s.back()) {  // the later sample replaces the earlier
+      if (repeated_++ == 0) first_repeated_line_ = reader_.line();
+    } else {
+      out_.t_s.push_back(t_s);
+    }
+    out_.position_m.resize(out_.t_s.size());
+    out_.position_m.back() = position_m;
+    if (columns_.role[role_fx]) {
+      out_.force_N.resize(out_.t_s.size());
+      out_.force_N.back() = force_N;
+    } else if (columns_.role[role_strength]) {
+      out_.strength_N.resize(out_.t_s.size());
+      out_.strength_N.back() = force_N.x;
+    }
+    ++rows_;
   }
 
-  struct Force {
-    std::string of_what;
-    std::array<std::optional<MeasuredColumn>, 3> columns;
-  };
+  // Since the first sample. Of a clock the difference is taken before rounding: nanoseconds since 1970 have
+  // 19 digits.
+  double time_s() {
+    if (!columns_.role[role_time]) return static_cast<double>(rows_) / measured_.rate_hz;
+    FileColumn& column = *columns_.role[role_time];
+    if (rows_ == 0) {
+      first_ = number<long double>(role_time);
+      recognise_clock(column);
+    }
+    if (first_ == 0.0L) return in_si(role_time);
+    return static_cast<double>(number<long double>(role_time) - first_) * column.in_si;
+  }
+
+  void recognise_clock(FileColumn& column) {
+    const double first = static_cast<double>(first_);
+    for (const ClockUnit& unit : kClockUnits) {
+      if (column.unit_is_stated || first * unit.in_s < kEpochFrom_s || first * unit.in_s > kEpochTo_s)
+        continue;
+      column.in_si = unit.in_s;
+      column.unit_is_stated = true;
+      note("its times name no unit, and by their size are " + std::string(unit.name) +
+           " since 1970; taken as such (t" + std::string(unit.ending) + " in the heading states it)");
+    }
+    if (std::abs(first * column.in_si) <= kLatest_s) return;
+    reader_.refuse("its first time is " + short_number(first * column.in_si) +
+                   " s, beyond any calendar; state the unit of its times in the heading, as in t_ms or t_ns");
+  }
+
+  void finish() {
+    if (first_ != 0.0L) {
+      note("its first time, " + short_number(static_cast<double>(first_) * columns_.role[role_time]->in_si) +
+           " s, is taken as 0");
+    }
+    if (repeated_ > 0) {
+      note(std::to_string(repeated_) + (repeated_ == 1 ? " sample repeats" : " samples repeat") +
+           " the time of the one before and stand in its place (the first in line " +
+           std::to_string(first_repeated_line_) + ")");
+    }
+    const auto& time = columns_.role[role_time];
+    if (time && !time->unit_is_stated && out_.t_s.size() > 1 && median_step_s(out_.t_s) >= kSlowestStep_s) {
+      note("its times name no unit and are taken as seconds, so a usual step is " +
+           short_number(median_step_s(out_.t_s)) + " s; if they are others, state it, as in t_ms");
+    }
+    out_.gaps = find_gaps(out_.t_s);
+    if (!out_.gaps.before.empty()) note(gaps_in_words(out_.t_s, out_.gaps));
+  }
+
   const MeasuredFile& measured_;
-  const LineReader& reader_;
-  std::vector<std::string>& notes_;
-  MeasuredColumns columns_;
-  std::vector<Force> forces_;
+  LineReader& reader_;
+  FileColumns columns_;
+  MeasuredTrajectory out_;
+  std::vector<std::string_view> fields_;
+  long double first_ = 0.0L;  // in the unit of its column
+  std::size_t rows_ = 0, repeated_ = 0, first_repeated_line_ = 0;
 };
-
-// The columns; `is_row` tells whether the first line is already a row of numbers.
-MeasuredColumns find_measured_columns(const MeasuredFile& measured, const LineReader& reader,
-                                      std::string_view first, bool& is_row, std::vector<std::string>& notes) {
-  ColumnFinder finder(measured, reader, notes);
-  const std::vector<std::string_view> fields = fields_of(first);
-  is_row = !fields.empty() && std::all_of(fields.begin(), fields.end(), is_number);
-  if (!measured.columns.empty()) return finder.by_name(comma_fields(measured.columns));
-  if (!is_row) return finder.by_name(fields);
-  const std::vector<std::string_view> commented = fields_of(reader.comment());
-  if (commented.size() == fields.size()) {
-    const MeasuredColumns columns = ColumnFinder(measured, reader, notes).by_name(commented);
-    if (columns[x] && columns[y] && columns[z]) return columns;
-  }
-  return finder.by_count(fields.size());
-}
-
-void require(const MeasuredFile& measured, const LineReader& reader, const MeasuredColumns& columns) {
-  if (!columns[x] || !columns[y] || !columns[z]) {
-    reader.refuse("no columns x, y and z; name them in a header, or with --columns, as in " +
-                  std::string(kExample));
-  }
-  if (measured.needs_force && !columns[fx] && !columns[strength]) {
-    reader.refuse(
-        "no columns of a force (fx, fy, fz, or fn for its strength alone); a comparison needs what was "
-        "measured");
-  }
-}
 
 }  // namespace
 
 MeasuredTrajectory read_measured(const MeasuredFile& measured) {
   LineReader reader(measured.file);
-  MeasuredTrajectory result;
   std::string_view line;
-  if (!reader.next(line))
-    throw PathError(measured.file.string() + ": is empty; it must have rows of numbers");
-  bool is_row = false;
-  const MeasuredColumns columns = find_measured_columns(measured, reader, line, is_row, result.notes);
-  require(measured, reader, columns);
-  std::size_t last = 0;
-  for (const auto& column : columns) last = std::max(last, column ? column->index : 0);
-  const std::string name = measured.file.filename().string();
-  if (!columns[time]) {
-    result.notes.push_back(name + ": without times; taken as " + short_number(measured.rate_hz) +
-                           " samples a second (--rate states another)");
+  if (!reader.next(line)) {
+    throw PathError(measured.file.string() +
+                    (measured.as_path ? ": is empty; it must have a header (t_s,x_m,y_m,z_m) and rows"
+                                      : ": is empty; it must have rows of numbers"));
   }
-
-  const double sign = measured.on_object ? -1.0 : 1.0;
-  double first_t_s = 0.0;
-  std::size_t rows = 0, repeated = 0;
-  for (bool more = is_row || reader.next(line); more; more = reader.next(line), ++rows) {
-    const std::vector<std::string_view> fields = fields_of(line);
-    if (fields.size() <= last) {
-      reader.refuse("only " + std::to_string(fields.size()) + " columns where " + std::to_string(last + 1) +
-                    " are needed; complete or leave out the line");
-    }
-    const auto value = [&](std::size_t role) {
-      return columns[role] ? reader.number(fields[columns[role]->index]) * columns[role]->in_si : 0.0;
-    };
-    const double file_time_s = columns[time] ? value(time) : static_cast<double>(rows) / measured.rate_hz;
-    if (rows == 0) first_t_s = file_time_s;
-    const double t_s = file_time_s - first_t_s;
-    if (!result.t_s.empty() && t_s < result.t_s.back()) {
-      reader.refuse("time runs backwards, by " + short_number(result.t_s.back() - t_s) +
-                    " s; sort the rows by time, or cut the file where a new recording begins");
-    }
-    if (!result.t_s.empty() && t_s == result.t_s.back()) {  // the later sample replaces the earlier
-      ++repeated;
-      result.t_s.pop_back();
-      result.position_m.pop_back();
-      if (!result.force_N.empty()) result.force_N.pop_back();
-      if (!result.strength_N.empty()) result.strength_N.pop_back();
-    }
-    result.t_s.push_back(t_s);
-    result.position_m.emplace_back(value(x), value(y), value(z));
-    if (columns[fx]) {
-      result.force_N.push_back(sign * glm::dvec3(value(fx), value(fy), value(fz)));
-    } else if (columns[strength]) {
-      result.strength_N.push_back(std::abs(value(strength)));
-    }
-  }
-  if (result.t_s.empty()) throw PathError(measured.file.string() + ": has a header but no rows");
-  if (repeated > 0) {
-    result.notes.push_back(name + ": " + std::to_string(repeated) +
-                           (repeated == 1 ? " sample repeats" : " samples repeat") +
-                           " the time of the one before and stand in its place");
-  }
-  result.gaps = find_gaps(result.t_s);
-  if (std::string words = gaps_in_words(name, result.t_s, result.gaps); !words.empty()) {
-    result.notes.push_back(std::move(words));
-  }
-  return result;
+  FileColumns columns = find_file_columns(measured, reader, line);
+  return RowReader(measured, reader, std::move(columns)).read(line);
 }
 
 bool measured_at(const MeasuredTrajectory& trajectory, double t_s, std::size_t& before,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Measured trajectories: the position of a probe and the force on it. Reads CSV with force columns, and the
+// Measured trajectories: the position of a probe and the force on it. Reads columns of text (CSV), and the
 // .traj files of E. Ruffaldi, D. Morris, T. Edmunds, F. Barbagli, D. K. Pai, "Standardized Evaluation of
 // Haptic Rendering Systems", Haptics Symposium 2006.
 //
@@ -8,15 +8,22 @@
 // comment that names the columns, or `columns` overrides that.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <glm/vec3.hpp>
 #include <string>
 #include <vector>
 
-#include "device/paths/line_reader.h"
 #include "device/paths/path.h"
 
 namespace device {
+
+// Time steps longer than ten median steps, each by the index of the sample before it.
+struct Gaps {
+  std::vector<std::size_t> before;
+  double limit_s = 0.0, longest_s = 0.0;
+  std::size_t longest_before = 0;
+};
 
 struct MeasuredFile {
   std::filesystem::path file{};
@@ -25,7 +32,8 @@ struct MeasuredFile {
   double unit_m = 1e-3;     // of lengths whose column states none
   double rate_hz = 1000.0;  // of samples without a time
   bool on_object = false;   // the forces are those on the object; their sign is changed
-  bool needs_force = true;  // false: positions suffice, and force_N may stay empty
+  bool needs_force = true;  // false: positions suffice, and force_N stays empty
+  bool as_path = false;     // times and names are needed; they have no default
 };
 
 struct MeasuredTrajectory {
@@ -37,7 +45,9 @@ struct MeasuredTrajectory {
   std::vector<std::string> notes;  // assumptions, gaps, repeated times
 };
 
-// Throws PathError with file and line, and names what to state if the columns are not clear.
+// Throws PathError with file and line, and names what to state if the columns are not clear: no file, no
+// columns of what is needed, unknown units, no rows or too many, no number, time running backwards, more than
+// a day. A sample that repeats the time of the one before replaces it.
 MeasuredTrajectory read_measured(const MeasuredFile& measured);
 
 // Sets the sample before t_s and the share of the way to the next one; the end points apply outside. False

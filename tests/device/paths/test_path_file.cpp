@@ -69,11 +69,12 @@ TEST_F(PathFile, WithoutAUnitTheCallersHolds) {
   const Trajectory read = read_trajectory(path);
   EXPECT_LE(glm::length(read.position_m[0] - glm::dvec3(1.001, 0.002, 0.003)), 1e-15);
   EXPECT_THAT(read.notes, IsEmpty());
-  // An unknown unit is reported, not ignored.
-  EXPECT_THAT(read_trajectory(csv("t,x_inch,y_m,z_m\n0,1,2,3\n")).notes, ElementsAre(HasSubstr("x_inch")));
+  // A time without a unit is in seconds; a usual step of seconds is doubtful, and said.
+  EXPECT_THAT(read_trajectory(csv("t,x_m,y_m,z_m\n0,0,0,0\n10,0,0,0\n20,0,0,0\n")).notes,
+              ElementsAre(testing::AllOf(HasSubstr("taken as seconds"), HasSubstr("10 s"))));
 }
 
-TEST_F(PathFile, TheFirstColumnOfEachNameIsTakenAndOthersAreIgnored) {
+TEST_F(PathFile, OtherColumnsAreIgnoredWhateverTheyHold) {
   const Trajectory read = read_trajectory(
       csv("quality,z_m,t_s,taker_fx,y_m,x_m,x_raw,note\n9,3,0,nan,2,1,77,hello\n9,6,1,,5,4,77,\n"));
   EXPECT_THAT(read.t_s, ElementsAre(0.0, 1.0));
@@ -91,6 +92,45 @@ TEST_F(PathFile, TimesBeginAtZero) {
   const Trajectory read = read_trajectory(csv("t_s,x_m,y_m,z_m\n100,0,0,0\n101,1,0,0\n"));
   EXPECT_THAT(read.t_s, ElementsAre(0.0, 1.0));
   EXPECT_THAT(read.notes, ElementsAre(HasSubstr("100 s")));
+}
+
+TEST_F(PathFile, ClocksThatCountFrom1970AreRecognisedByTheirSize) {
+  struct Clock {
+    const char *heading, *first, *last, *said;  // 2 s apart
+  };
+  for (const Clock& clock : {Clock{"time", "1617187200000000000", "1617187202000000000", "nanoseconds"},
+                             Clock{"timestamp", "1617187200000000", "1617187202000000", "microseconds"},
+                             Clock{"t", "1617187200000", "1617187202000", "milliseconds"}}) {
+    const Trajectory read = read_trajectory(csv(clock.heading + std::string(",x_m,y_m,z_m\n") + clock.first +
+                                                ",0,0,0\n" + clock.last + ",1,0,0\n"));
+    EXPECT_DOUBLE_EQ(read.t_s.back(), 2.0);
+    EXPECT_THAT(read.notes, ElementsAre(HasSubstr(clock.said), HasSubstr("1.617e+09 s, is taken as 0")));
+  }
+  const Trajectory seconds =
+      read_trajectory(csv("t,x_m,y_m,z_m\n1617187200.25,0,0,0\n1617187200.75,0,0,0\n"));
+  EXPECT_DOUBLE_EQ(seconds.t_s.back(), 0.5);
+  EXPECT_THAT(seconds.notes, testing::SizeIs(1));
+}
+
+TEST_F(PathFile, NanosecondsSince1970KeepEveryDigit) {
+  const Trajectory read =
+      read_trajectory(csv("timestamp_ns,x_m,y_m,z_m\n1617187200000000001,0,0,0\n1617187200000000002,0,0,0\n"
+                          "1617187202000000001,0,0,0\n"));
+  EXPECT_THAT(read.t_s, ElementsAre(0.0, testing::DoubleEq(1e-9), testing::DoubleEq(2.0)));
+}
+
+TEST_F(PathFile, TimesThatCannotBeInTheirUnitAreRefused) {
+  const auto from_to = [&](const char* heading, const char* first, const char* last) {
+    return refusal(csv(heading + std::string(",x_m,y_m,z_m\n") + first + ",0,0,0\n" + last + ",0,0,0\n"));
+  };
+  EXPECT_THAT(from_to("t", "0", "86401"), testing::AllOf(HasSubstr("longer than a day"), HasSubstr("t_ms")));
+  EXPECT_EQ(from_to("t", "0", "86400"), "");
+  EXPECT_THAT(from_to("t_s", "0", "2000000000"), HasSubstr("longer than a day")) << "stated, and wrong";
+  EXPECT_THAT(from_to("t_s", "1617187200000000000", "1617187200000000001"), HasSubstr("beyond any calendar"));
+  EXPECT_THAT(from_to("t", "86400000000000", "86400010000000"), HasSubstr("beyond any calendar"))
+      << "nanoseconds since the machine started";
+  EXPECT_THAT(from_to("time", "12:30:15.5", "12:30:16.5"), HasSubstr("write times as numbers"));
+  EXPECT_EQ(from_to("t_min", "0", "1440"), "");
 }
 
 TEST_F(PathFile, RepeatedTimesAndGapsAreReported) {
@@ -118,8 +158,9 @@ TEST_F(PathFile, FilesThatAreNoTrajectoryAreRefused) {
   EXPECT_THAT(refusal(csv("")), HasSubstr("empty"));
   EXPECT_THAT(refusal(csv("\n\n# nothing\n")), HasSubstr("empty"));
   EXPECT_THAT(refusal(csv("t_s,x_m,y_m,z_m\n")), HasSubstr("no rows"));
-  EXPECT_THAT(refusal(csv("0,1,2,3\n")), HasSubstr("begins with 't'"));
-  EXPECT_THAT(refusal(csv("t_s,x_m,y_m\n0,1,2\n")), HasSubstr("begins with 'z'"));
+  EXPECT_THAT(refusal(csv("0,1,2,3\n")), HasSubstr("without a heading"));
+  EXPECT_THAT(refusal(csv("t_s,x_m,y_m\n0,1,2\n")), HasSubstr("nothing is named z"));
+  EXPECT_THAT(refusal(csv("x_m,y_m,z_m\n0,1,2\n")), HasSubstr("no column of times"));
   EXPECT_THAT(refusal(csv(std::string(100'000, 'x'))), HasSubstr("longer than"));
   EXPECT_THAT(refusal({.file = folder_ / "missing.csv"}), HasSubstr("no such file"));
   EXPECT_THAT(refusal({.file = folder_}), HasSubstr("not a file"));
@@ -129,6 +170,7 @@ TEST_F(PathFile, FilesThatAreNoTrajectoryAreRefused) {
   CsvPath far = csv("t_s,x_m,y_m,z_m\n0,1e308,0,0\n");
   far.offset_m = {1e308, 0, 0};
   EXPECT_THAT(refusal(far), HasSubstr("too large"));
+  EXPECT_THAT(refusal(csv("t_s,x_m,y_m,z_m\n0,1e308,0,0\n")), "") << "large, and a number";
 }
 
 TEST_F(PathFile, CompressedFilesReadTheSameAndDamagedOnesAreRefused) {

@@ -8,6 +8,8 @@
 #include <fstream>
 #include <string>
 
+#include "device/paths/path_file.h"
+
 namespace {
 
 using device::MeasuredFile;
@@ -73,12 +75,20 @@ TEST(TrajectoryFile, AHeaderACommentOrTheUserNamesTheColumns) {
       read("g.traj", "9 1 2 3 4 5 6\n", {.columns = "-,fx_N,fy_N,fz_N,x_m,y_m,z_m", .on_object = true});
   EXPECT_EQ(user.position_m[0], glm::dvec3(4, 5, 6));
   EXPECT_EQ(user.force_N[0], glm::dvec3(-1, -2, -3));
-  // A trace of this program can be read as a measurement.
-  const auto trace = read("h.csv",
-                          "t_s,device_x_m,device_y_m,device_z_m,proxy_x_m,force_x_N,force_y_N,force_z_N\n"
-                          "0,1,2,3,9,4,5,6\n");
+  EXPECT_THAT(refusal("g.traj", "9 1 2 3 4 5 6\n", {.columns = "-,fx_N,fy_N,fz_N,x_furlong,y_m,z_m"}),
+              HasSubstr("nothing is named x"));
+}
+
+TEST(TrajectoryFile, ATraceOfThisProgramIsAMeasurementAndAPath) {
+  const std::string text =
+      "t_s,device_x_m,device_y_m,device_z_m,proxy_x_m,proxy_y_m,proxy_z_m,force_x_N,force_y_N,force_z_N,"
+      "rigid_N,"
+      "soft_N,contacts,tick_us\n0,1,2,3,9,9,9,4,5,6,7,8,1,12.5\n";
+  const auto trace = read("h.csv", text);
   EXPECT_EQ(trace.position_m[0], glm::dvec3(1, 2, 3));
   EXPECT_EQ(trace.force_N[0], glm::dvec3(4, 5, 6));
+  EXPECT_TRUE(trace.notes.empty());
+  EXPECT_EQ(device::read_trajectory({.file = write("h.csv", text)}).position_m[0], glm::dvec3(1, 2, 3));
 }
 
 TEST(TrajectoryFile, OfSeveralForcesOneIsChosen) {
@@ -101,6 +111,17 @@ TEST(TrajectoryFile, WhatDoesNotFitIsRefusedWithItsPlace) {
   EXPECT_THAT(refusal("o.csv", "t_s,a,b,c,fx,fy,fz\n0,1,2,3,4,5,6\n"), HasSubstr("no columns x, y and z"));
   EXPECT_THAT(refusal("p.csv", ""), HasSubstr("is empty"));
   EXPECT_THAT(refusal("q.csv", "t_s,x_m,y_m,z_m,fx,fy,fz\n"), HasSubstr("no rows"));
+}
+
+TEST(TrajectoryFile, UnitsThatAreNotStatedAreSaid) {
+  EXPECT_THAT(read("s.csv", "t,x,y,z,fx,fy,fz\n0,1,2,3,4,5,6\n").notes,
+              testing::ElementsAre(HasSubstr("taken as mm")));
+  const auto clock =
+      read("t.csv", "time,x_mm,y_mm,z_mm,fn_N\n1617187200000,1,2,3,4\n1617187202000,1,2,3,4\n");
+  EXPECT_DOUBLE_EQ(clock.t_s.back(), 2.0);
+  EXPECT_THAT(clock.notes, testing::ElementsAre(HasSubstr("milliseconds"), HasSubstr("is taken as 0")));
+  EXPECT_THAT(refusal("u.csv", "t,x_mm,y_mm,z_mm,fn_N\n0,1,2,3,4\n100000,1,2,3,4\n"),
+              HasSubstr("longer than a day"));
 }
 
 TEST(TrajectoryFile, GapsAndRepeatedTimesAreToldAndGapsAreNoMeasurement) {
