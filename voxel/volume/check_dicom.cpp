@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "voxel/volume/check_dicom.h"
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <iomanip>
@@ -20,7 +22,12 @@ constexpr std::uint32_t kItem = 0xfffee000U;
 constexpr std::uint32_t kItemEnd = 0xfffee00dU;
 constexpr std::uint32_t kSequenceEnd = 0xfffee0ddU;
 constexpr std::uint32_t kPixels = 0x7fe00010U;
+constexpr std::uint32_t kFloats = 0x7fe00008U;
+constexpr std::uint32_t kDoubles = 0x7fe00009U;
 constexpr std::uint32_t kTransferSyntax = 0x00020010U;
+constexpr std::uint32_t kFrames = 0x00280008U;
+constexpr std::uint32_t kBits = 0x00280100U;
+constexpr std::size_t kMostFrames = 1'000'000;  // a header that says more is broken
 
 // One element's header. DICOM PS3.5, chapter 7.
 struct Element {
@@ -29,7 +36,21 @@ struct Element {
   std::uint32_t length = 0;
 };
 
+// Value representations whose length takes four bytes, and those where it takes two (PS3.5, 7.1.2). GDCM
+// guesses the length of an element of any other.
+constexpr std::array<const char*, 13> kLongTypes{"OB", "OD", "OF", "OL", "OV", "OW", "SQ",
+                                                 "SV", "UC", "UN", "UR", "UT", "UV"};
+constexpr std::array<const char*, 21> kShortTypes{"AE", "AS", "AT", "CS", "DA", "DS", "DT",
+                                                  "FD", "FL", "IS", "LO", "LT", "PN", "SH",
+                                                  "SL", "SS", "ST", "TM", "UI", "UL", "US"};
+
+template <std::size_t Count>
+bool is_one_of(const std::array<const char*, Count>& types, const std::string& type) {
+  return std::any_of(types.begin(), types.end(), [&](const char* other) { return type == other; });
+}
+
 // Walks sequences and items flat: after the header of a sequence or an item, its content follows as elements.
+// A stack holds the sequences and items that are open, whether a length or a delimiter ends them.
 class Walker {
  public:
   explicit Walker(const std::filesystem::path& path) : path_(path), file_(path, std::ios::binary) {
@@ -38,26 +59,47 @@ class Walker {
     bytes_ = error ? 0 : bytes;
   }
 
-  DicomKind walk() {
+  DicomFile walk() {
     std::array<char, 132> preamble{};
-    if (!file_.read(preamble.data(), preamble.size()) || std::memcmp(&preamble[128], "DICM", 4) != 0) {
-      return DicomKind::none;
+    if (file_.read(preamble.data(), preamble.size()) && std::memcmp(&preamble[128], "DICM", 4) == 0) {
+      at_ = preamble.size();
+    } else if (!begins_with_element()) {
+      return found_;
     }
-    at_ = preamble.size();
+    found_.kind = DicomKind::without_image;
     walk_meta();
-    implicit_ = syntax_ == "1.2.840.10008.1.2";
-    big_endian_ = syntax_ == "1.2.840.10008.1.2.2";
+    if (!syntax_.empty()) implicit_ = syntax_ == "1.2.840.10008.1.2";
+    found_.big_endian = big_endian_ = syntax_ == "1.2.840.10008.1.2.2";
     if (syntax_ == "1.2.840.10008.1.2.1.99") {
       refuse_volume(path_, "the DICOM file is deflated as a whole, which is not read; save it uncompressed");
     }
     while (left() >= 8) {
       if (!step()) break;
     }
-    return image_ ? DicomKind::image : DicomKind::without_image;
+    return found_;
   }
 
  private:
   [[nodiscard]] std::uint64_t left() const { return bytes_ > at_ ? bytes_ - at_ : 0; }
+
+  // Does the file begin with an element of group 2 or 8, as a file does that lacks its preamble? Then without
+  // a group 2 the elements are implicit if the first one names no type.
+  bool begins_with_element() {
+    file_.clear();
+    file_.seekg(0);
+    at_ = 0;
+    std::array<unsigned char, 8> start{};
+    if (!file_.read(reinterpret_cast<char*>(start.data()), start.size())) return false;
+    file_.seekg(0);
+    const unsigned group = start[0] | static_cast<unsigned>(start[1]) << 8U;
+    const unsigned element = start[2] | static_cast<unsigned>(start[3]) << 8U;
+    const std::string type{static_cast<char>(start[4]), static_cast<char>(start[5])};
+    const bool typed = is_one_of(kLongTypes, type) || is_one_of(kShortTypes, type);
+    implicit_ = !typed;
+    // An implicit first element is short: a length of group, a character set, a kind of image.
+    const bool is_short = start[5] == 0 && start[6] == 0 && start[7] == 0 && start[4] <= 64;
+    return (group == 2 || group == 8) && element <= 0x0100 && (typed || is_short);
+  }
 
   std::uint32_t number(std::size_t bytes) {
     std::array<unsigned char, 4> raw{};
@@ -83,10 +125,7 @@ class Walker {
     file_.read(letters.data(), 2);
     at_ += 2;
     element.type.assign(letters.data(), 2);
-    constexpr std::array<const char*, 13> kLong{"OB", "OD", "OF", "OL", "OV", "OW", "SQ",
-                                                "SV", "UC", "UN", "UR", "UT", "UV"};
-    bool is_long = false;
-    for (const char* type : kLong) is_long = is_long || element.type == type;
+    const bool is_long = is_one_of(kLongTypes, element.type);
     if (is_long) number(2);
     element.length = number(is_long ? 4 : 2);
     return element;
@@ -130,29 +169,66 @@ class Walker {
 
   // Walks one element. Returns false if the rest of the file is padding.
   bool step() {
+    while (!open_.empty() && at_ >= open_.back().end) close();
     const Element element = header();
-    const bool pixels = element.tag == kPixels && open_.empty();
-    image_ = image_ || pixels;
     if (element.tag == kItem || element.tag == kItemEnd || element.tag == kSequenceEnd) {
       delimiter(element);
       return true;
     }
-    const bool known = implicit_ || (element.type[0] >= 'A' && element.type[0] <= 'Z' &&
-                                     element.type[1] >= 'A' && element.type[1] <= 'Z');
+    const bool outermost = open_.empty();
+    if (element.tag == kPixels && outermost) {
+      found_.kind = DicomKind::image;
+      found_.pixels_as_bytes = element.type == "OB";
+    }
+    if (outermost && (element.tag == kFloats || element.tag == kDoubles)) {
+      refuse_volume(
+          path_,
+          "the pixels are real numbers (Float Pixel Data), which are not read from DICOM; export the "
+          "series as NIfTI, NRRD or MetaImage");
+    }
+    const bool known =
+        implicit_ || is_one_of(kLongTypes, element.type) || is_one_of(kShortTypes, element.type);
     if (!known) {
-      if (image_ && open_.empty()) return false;
+      if (found_.kind == DicomKind::image && outermost) return false;
       refuse_volume(path_, "there is no DICOM element at byte ", at_, "; ", kDamaged);
     }
     if (element.length == kUndefined) {
+      // Pixels of undefined length are packed into fragments, those of an icon in a sequence, too.
+      open_.push_back({kNoEnd, implicit_, element.tag == kPixels});
       // The content of an element of type UN and undefined length is implicit (PS3.5, 6.2.2).
-      open_.push_back({implicit_, pixels});
       if (element.type == "UN") implicit_ = true;
       return true;
     }
     if (element.length > left()) refuse(element);
-    if (element.type == "SQ" || (implicit_ && begins_with_item(element))) return true;
-    pass(element);
+    if (element.type == "SQ" || (implicit_ && element.tag != kPixels && begins_with_item(element))) {
+      open_.push_back({at_ + element.length, implicit_, false});
+      return true;
+    }
+    if (element.tag == kFrames && outermost && element.length <= 16) {
+      read_frames(element);
+    } else if (element.tag == kBits && outermost && element.length == 2) {
+      check_bits(number(2));
+    } else {
+      pass(element);
+    }
     return true;
+  }
+
+  void check_bits(std::uint32_t bits) const {
+    if (bits != 1) return;
+    refuse_volume(path_,
+                  "each voxel is one bit, as in a DICOM segmentation (SEG), which is not read; export the "
+                  "segmentation as NIfTI or NRRD");
+  }
+
+  void read_frames(const Element& element) {
+    std::string text(element.length, '\0');
+    file_.read(text.data(), element.length);
+    at_ += element.length;
+    const long frames = std::strtol(text.c_str(), nullptr, 10);
+    if (frames > static_cast<long>(kMostFrames))
+      refuse_volume(path_, "the DICOM file says it has ", frames, " frames; ", kDamaged);
+    found_.frames = frames < 1 ? 1 : static_cast<std::size_t>(frames);
   }
 
   // An implicit element has no type. As GDCM does, a sequence is recognised by its first bytes.
@@ -166,41 +242,47 @@ class Walker {
     return item;
   }
 
+  void close() {
+    implicit_ = open_.back().implicit_outside;
+    open_.pop_back();
+  }
+
   void delimiter(const Element& element) {
     if (element.tag != kItem) {
-      if (!open_.empty()) {
-        implicit_ = open_.back().implicit_outside;
-        open_.pop_back();
-      }
+      if (!open_.empty()) close();
       return;
     }
-    const bool fragment = !open_.empty() && open_.back().pixels;
-    if (element.length == kUndefined && !fragment) {
-      open_.push_back({implicit_, false});
-    } else if (fragment) {
+    const bool fragment = !open_.empty() && open_.back().fragments;
+    if (fragment && element.length != kUndefined) {
       pass(element);  // a fragment of packed pixels holds no elements
+    } else if (element.length == kUndefined) {
+      if (!fragment) open_.push_back({kNoEnd, implicit_, false});
     } else if (element.length > left()) {
       refuse(element);
     }
   }
 
-  // A sequence or item of undefined length; a delimiter ends it.
+  static constexpr std::uint64_t kNoEnd = ~std::uint64_t{0};
+
+  // A sequence or item. An item of known length needs no entry: its sequence has one.
   struct Open {
+    std::uint64_t end = kNoEnd;  // (unit: byte) in the file; kNoEnd if a delimiter ends it
     bool implicit_outside = false;
-    bool pixels = false;
+    bool fragments = false;  // holds packed pixels
   };
 
   std::filesystem::path path_;
   std::ifstream file_;
   std::uint64_t bytes_ = 0, at_ = 0;
   std::string syntax_;
-  bool implicit_ = false, big_endian_ = false, image_ = false;
+  bool implicit_ = false, big_endian_ = false;
+  DicomFile found_;
   std::vector<Open> open_;
 };
 
 }  // namespace
 
-DicomKind check_dicom(const std::filesystem::path& path) {
+DicomFile check_dicom(const std::filesystem::path& path) {
   return Walker(path).walk();
 }
 

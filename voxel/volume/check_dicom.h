@@ -4,18 +4,27 @@
 // end of the file. Source: DICOM PS3.5, chapter 7.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 
 namespace voxel {
 
 enum class DicomKind {
   none,
-  without_image,
+  without_image,  // a directory, a report
   image
-};  // no DICOM; DICOM of another kind (a directory, a report)
+};
+
+// What the elements of a file say about its pixels.
+struct DicomFile {
+  DicomKind kind = DicomKind::none;
+  std::size_t frames = 1;        // as the header says
+  bool big_endian = false;       // numbers of the file begin with their high byte
+  bool pixels_as_bytes = false;  // the pixels are stated as bytes (OB), not as 16-bit words (OW)
+};
 
 // Walks the elements of a file without keeping them. Throws VolumeError if an element is longer than the rest
-// of the file.
-DicomKind check_dicom(const std::filesystem::path& path);
+// of the file. A file without the preamble that marks DICOM is known by its first element.
+DicomFile check_dicom(const std::filesystem::path& path);
 
 }  // namespace voxel

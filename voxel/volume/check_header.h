@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Checks the header of a single volume file before ITK opens it. Internal to the readers (read_volume.h).
-// The libraries behind ITK trust a header: they fill arrays of fixed size, expand printf patterns, open other
-// files, allocate the stated sizes, and read missing voxels as zeros. Every entry that they trust is checked
-// here first.
+// Checks the header of a single volume file, and reads the frame of NIfTI and NRRD. Internal to the readers
+// (read_volume.h). The libraries behind ITK trust a header: they fill arrays of fixed size, expand printf
+// patterns, open other files, allocate the stated sizes, and read missing voxels as zeros. Every entry that
+// they trust is checked here first.
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,10 +24,13 @@ inline constexpr const char* kVolumeFormats =
 inline constexpr const char* kDamaged =
     "the file is damaged, incomplete or not what its name says: copy or export it again";
 
+// Deflate packs at most 1,032 bytes into one byte; with some margin.
+inline constexpr double kMostPacked = 1100.0;
+
 // The format by the ending of the name. Throws VolumeError.
 VolumeFormat format_of(const std::filesystem::path& path);
 
-// Location and encoding of the voxels of a file.
+// Location and encoding of the voxels of a file, and their frame.
 struct VoxelPlace {
   enum class Packing { raw, text, deflate, other };
   std::filesystem::path file;    // the header's own file, or a file beside it
@@ -34,9 +38,17 @@ struct VoxelPlace {
   std::uint64_t offset = 0;   // (unit: byte) in `file` before the voxels (raw), or before the packed stream
   std::uint64_t skipped = 0;  // (unit: byte) before the voxels inside the packed stream
   Packing packing = Packing::raw;
-  std::uint64_t voxel_bytes = 0;  // (unit: byte) of a voxel in the file, before scaling; 0 if not known
-  bool swapped = false;           // byte order differs from this machine's
-  bool as_they_are = true;        // raw or deflate: the voxels need no conversion but byte order
+  bool swapped = false;                 // byte order differs from this machine's
+  bool as_they_are = true;              // raw or deflate: the voxels can be streamed
+  double slope = 1.0, intercept = 0.0;  // intensity = slope · stored number + intercept
+  // Type and frame of the voxels, as NIfTI and NRRD headers state them; absent for MetaImage, whose library
+  // reads them right.
+  std::optional<Component> stored;
+  FileFrame frame;               // in the header's length unit
+  std::optional<double> unit_m;  // length unit that the header states
+  std::string stated_unit;       // as the header spells it; empty if it states none
+  bool directions_known = true;  // the header says how the axes lie in the patient
+  std::size_t axes = 3;          // axes of the lattice that the header gives
   std::vector<std::string> notes;
 };
 
@@ -49,5 +61,8 @@ void check_file_size(const std::filesystem::path& path, const VoxelPlace& place,
 
 // Size of all voxels as encoded in the file, unpacked. (unit: byte)
 std::uint64_t bytes_in_file(const VoxelPlace& place, const VolumeHeader& header);
+
+// Size of a file (unit: byte); 0 if it cannot be read.
+std::uint64_t size_of_file(const std::filesystem::path& path);
 
 }  // namespace voxel

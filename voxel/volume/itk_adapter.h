@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Functions on ITK's readers that read_volume.cpp and read_dicom.cpp share. No other file includes this
-// header. Every exception of ITK and GDCM leaves as a VolumeError with file, action, cause and remedy.
+// Functions on ITK's readers, and on exceptions of ITK and GDCM, which leave as a VolumeError with file,
+// action, cause and remedy. Only read_volume.cpp and read_dicom.cpp include this header.
 #pragma once
 
 #include <exception>
 #include <filesystem>
-#include <memory>
 #include <new>
 #include <optional>
 #include <string>
@@ -13,7 +12,6 @@
 
 #include "voxel/volume/check_header.h"
 #include "voxel/volume/raw_volume.h"
-#include "voxel/volume/subprocess.h"
 
 namespace itk {
 class ImageIOBase;  // NOLINT(cppcoreguidelines-virtual-class-destructor): ITK's class, reported at its
@@ -46,15 +44,5 @@ auto in_words(const std::filesystem::path& path, const char* doing, const char* 
     refuse_volume(path, doing, ": ", words_of(error), "; ", remedy);
   }
 }
-
-// One DICOM series in a folder (read_dicom.cpp). Its files are ordered along the slice normal.
-struct DicomSeries {
-  std::vector<std::string> files;
-  VolumeData data;  // without voxels
-};
-DicomSeries read_dicom_header(const std::filesystem::path& folder, double unit_m);
-// All voxels of the series, slice after slice.
-std::unique_ptr<SharedMemory> read_dicom_voxels(const std::filesystem::path& folder,
-                                                const DicomSeries& series);
 
 }  // namespace voxel

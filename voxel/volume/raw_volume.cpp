@@ -8,6 +8,7 @@
 #include <glm/matrix.hpp>
 #include <limits>
 #include <numbers>
+#include <type_traits>
 
 namespace voxel {
 namespace {
@@ -183,6 +184,16 @@ std::size_t size_of(Component component) {
   return visit_component(component, [](auto value) { return sizeof(value); });
 }
 
+void complete_axes(FileFrame& frame, std::size_t given) {
+  glm::dmat3& d = frame.direction;
+  if (given == 0) d = glm::dmat3(1.0);
+  if (given == 1) {
+    const glm::dvec3 aside = std::abs(d[0].y) < 0.9 ? glm::dvec3(0.0, 1.0, 0.0) : glm::dvec3(1.0, 0.0, 0.0);
+    d[1] = glm::normalize(aside - glm::dot(aside, d[0]) * d[0]);
+  }
+  if (given < 3) d[2] = glm::cross(d[0], d[1]);
+}
+
 void set_frame(const std::filesystem::path& path, const FileFrame& frame, Component component, double unit_m,
                VolumeData& data) {
   if (!(std::isfinite(unit_m) && unit_m > 0.0)) {
@@ -347,18 +358,23 @@ VolumeStatistics statistics_of(const VolumeData& data, const NextSlice& next) {
   return statistics;
 }
 
-std::vector<std::byte> as_doubles(Component component, std::span<const std::byte> voxels) {
-  std::vector<std::byte> out;
-  visit_component(component, [&](auto zero) {
-    using T = decltype(zero);
-    const std::size_t count = voxels.size() / sizeof(T);
-    out.resize(count * sizeof(double));
-    for (std::size_t n = 0; n < count; ++n) {
-      const auto value = static_cast<double>(value_at<T>(voxels, n));
-      std::memcpy(&out[n * sizeof(double)], &value, sizeof(double));
-    }
+void rescale_voxels(Component from, std::span<const std::byte> voxels, double slope, double intercept,
+                    Component to, std::span<std::byte> out) {
+  visit_component(from, [&](auto zero) {
+    using From = decltype(zero);
+    visit_component(to, [&](auto zero_out) {
+      using To = decltype(zero_out);
+      for (std::size_t n = 0; n < voxels.size() / sizeof(From); ++n) {
+        double scaled = slope * static_cast<double>(value_at<From>(voxels, n)) + intercept;
+        if constexpr (std::is_integral_v<To>) {
+          scaled = std::clamp(scaled, static_cast<double>(std::numeric_limits<To>::lowest()),
+                              static_cast<double>(std::numeric_limits<To>::max()));
+        }
+        const auto value = static_cast<To>(scaled);
+        std::memcpy(&out[n * sizeof(To)], &value, sizeof(To));
+      }
+    });
   });
-  return out;
 }
 
 }  // namespace voxel

@@ -65,6 +65,9 @@ struct FileFrame {
   glm::dmat3 direction{1.0};  // columns are the axes of the lattice
 };
 
+// Gives the axes from `given` (0 to 3) on, which have one voxel, directions at right angles to the others.
+void complete_axes(FileFrame& frame, std::size_t given);
+
 // Checks the frame and fills the header's dims, spacing, origin, rotation, component and bytes. Throws
 // VolumeError. A left-handed frame gets its first axis reversed, with a note.
 void set_frame(const std::filesystem::path& path, const FileFrame& frame, Component component, double unit_m,
@@ -81,8 +84,10 @@ LabelVolume label_voxels(const std::filesystem::path& path, const VolumeData& da
 
 VolumeStatistics statistics_of(const VolumeData& data, const NextSlice& next);
 
-// The voxels, each converted to a double.
-std::vector<std::byte> as_doubles(Component component, std::span<const std::byte> voxels);
+// slope · voxel + intercept of each voxel, computed in double, as numbers of type `to`; those beyond its
+// range become its ends. `out` has as many voxels as `voxels`.
+void rescale_voxels(Component from, std::span<const std::byte> voxels, double slope, double intercept,
+                    Component to, std::span<std::byte> out);
 
 // Throws VolumeError for a rule or a spacing that is invalid for every file.
 void check_options(const std::filesystem::path& path, const VolumeFileOptions& options);

@@ -1,19 +1,22 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reads a folder with one DICOM series. Slices are ordered by their positions along the slice normal. GDCM
-// runs only in child processes, so that a damaged file cannot end the caller.
-#include <itkGDCMImageIO.h>
+// Reads a folder with one DICOM series. Slices, whether files or frames of files, are ordered by their
+// positions along the slice normal. GDCM runs only in child processes, so that a damaged file cannot end the
+// caller.
+#include "voxel/volume/read_dicom.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
+#include <limits>
 #include <map>
 #include <new>
 #include <sstream>
 #include <type_traits>
 
-#include "voxel/volume/check_dicom.h"
+#include "voxel/volume/dicom_frames.h"
+#include "voxel/volume/foreign_file.h"
 #include "voxel/volume/itk_adapter.h"
 #include "voxel/volume/subprocess.h"
 
@@ -22,92 +25,40 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Slice {
-  std::string file;
-  std::string series;  // series instance UID
-  FileFrame frame;
-  Component component = Component::int16;
-  double height = 0.0;  // (unit: the file's) along the slice normal
-};
-
-std::string name_of(const Slice& slice) {
-  return fs::path(slice.file).filename().string();
+std::string name_of(const DicomSlice& slice) {
+  const std::string name = slice.path.filename().string();
+  return slice.file.frames == 1 ? name : name + ", frame " + std::to_string(slice.index + 1);
 }
 
-// Header of one slice as a child process returns it. Trivially copyable, because it lies in shared memory.
-struct SharedSlice {
+// The state of one file as a child process returns it. Trivially copyable, because it lies in shared memory.
+struct SharedFile {
   bool done = false;
   std::array<char, 1000> refusal{};
   std::array<char, 100> series{};
-  Component component = Component::int16;
-  bool no_spacing = false;  // the header seems to have no pixel spacing
-  FileFrame frame;
 };
-static_assert(std::is_trivially_copyable_v<SharedSlice>);
+static_assert(std::is_trivially_copyable_v<SharedFile> && std::is_trivially_copyable_v<DicomFrame>);
 
 template <std::size_t Size>
 void copy_text(const std::string& text, std::array<char, Size>& to) {
   text.copy(to.data(), Size - 1);
 }
 
-void read_slice_header(const std::string& file, SharedSlice& slice) {
-  const fs::path path = file;
-  const auto io = itk::GDCMImageIO::New();
-  io->SetFileName(file);
-  in_words(path, "the slice cannot be read", kDamaged, [&] { io->ReadImageInformation(); });
-  const std::optional<Component> component = component_of(*io);
-  if (!component) {
-    refuse_volume(path, "each voxel holds ", io->GetNumberOfComponents(),
-                  " numbers; only slices of single intensities make a volume");
-  }
-  slice.component = *component;
-  std::string series;
-  io->GetValueFromTag("0020|000e", series);
-  copy_text(series, slice.series);
-  // GDCM replaces a spacing that is 0 or missing by 1 mm.
-  std::string spacing;
-  io->GetValueFromTag("0028|0030", spacing);
-  std::istringstream in(spacing);
-  for (double value = 0.0; in >> value; in.ignore(1, '\\')) {
-    if (value > 0.0) continue;
-    refuse_volume(path, "the header says a pixel spacing of ", value,
-                  "; it must be above 0. Correct the header or export the series again");
-  }
-  std::string of_detector;
-  io->GetValueFromTag("0018|1164", of_detector);
-  slice.no_spacing =
-      spacing.empty() && of_detector.empty() && io->GetSpacing(0) == 1.0 && io->GetSpacing(1) == 1.0;
-  const unsigned axes = std::min(io->GetNumberOfDimensions(), 3U);
-  slice.frame.dims = {1.0, 1.0, 1.0};
-  for (unsigned axis = 0; axis < axes; ++axis) {
-    const auto a = static_cast<int>(axis);
-    slice.frame.dims[axis] = static_cast<double>(io->GetDimensions(axis));
-    slice.frame.spacing[a] = io->GetSpacing(axis);
-    slice.frame.origin[a] = io->GetOrigin(axis);
-    const std::vector<double> direction = io->GetDirection(axis);
-    for (unsigned row = 0; row < std::min<std::size_t>(direction.size(), 3); ++row) {
-      slice.frame.direction[a][static_cast<int>(row)] = direction[row];
-    }
-  }
-}
-
 // Calls `call(n)` for every file, all in one child process. Throws VolumeError for the first file that `call`
 // refuses or that ends the child.
 template <typename Call>
-void for_each_apart(const fs::path& folder, const std::vector<std::string>& files, SharedSlice* slices,
+void for_each_apart(const fs::path& folder, const std::vector<fs::path>& files, SharedFile* shared,
                     Call call) {
-  for (std::size_t n = 0; n < files.size(); ++n) slices[n].done = false;
   const auto seconds = static_cast<unsigned>(60 + 10 * files.size());
   const int ended = run_in_subprocess(
       [&] {
         for (std::size_t n = 0; n < files.size(); ++n) {
           try {
-            call(n);
+            in_words(files[n], "the slice cannot be read", kDamaged, [&] { call(n); });
           } catch (const std::exception& error) {
-            copy_text(error.what(), slices[n].refusal);
+            copy_text(error.what(), shared[n].refusal);
             return;
           }
-          slices[n].done = true;
+          shared[n].done = true;
         }
       },
       seconds);
@@ -116,15 +67,14 @@ void for_each_apart(const fs::path& folder, const std::vector<std::string>& file
                   "no process could be started to read the DICOM series; close other programs and try again");
   }
   for (std::size_t n = 0; n < files.size(); ++n) {
-    if (slices[n].done) continue;
-    if (slices[n].refusal[0] != '\0') throw VolumeError(slices[n].refusal.data());
+    if (shared[n].done) continue;
+    if (shared[n].refusal[0] != '\0') throw VolumeError(shared[n].refusal.data());
     refuse_volume(files[n], "the DICOM library gave up on this slice (signal ", ended, "); ", kDamaged);
   }
 }
 
-// The slices of the only series in the folder, unordered. GDCMSeriesFileNames is not used: it would read
-// every file of the folder unchecked.
-std::vector<Slice> read_slices(const fs::path& folder, std::vector<std::string>& notes) {
+// The regular files of a folder, by name.
+std::vector<fs::path> files_of(const fs::path& folder) {
   std::vector<fs::path> files;
   std::error_code error;
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
@@ -133,22 +83,52 @@ std::vector<Slice> read_slices(const fs::path& folder, std::vector<std::string>&
   if (error)
     refuse_volume(folder, "the folder cannot be read (", error.message(), "); check its permissions");
   std::sort(files.begin(), files.end());
-  std::vector<std::string> images;
-  for (const fs::path& file : files) {
-    if (check_dicom(file) == DicomKind::image) images.push_back(file.string());
+  return files;
+}
+
+// A file that is no DICOM image is left out, unless it stands in the place of a slice.
+void check_left_out(const std::vector<fs::path>& others, const std::vector<fs::path>& images) {
+  for (const fs::path& file : others) {
+    if (images.empty() || file.extension() == images[0].extension()) refuse_foreign_file(file, false);
   }
-  const std::size_t others = files.size() - images.size();
-  const SharedMemory memory(images.size() * sizeof(SharedSlice));
-  auto* shared = new (memory.data()) SharedSlice[images.size()];
-  for_each_apart(folder, images, shared, [&](std::size_t n) { read_slice_header(images[n], shared[n]); });
-  std::vector<Slice> slices;
+}
+
+// The slices of the only series in the folder, unordered. GDCMSeriesFileNames is not used: it would read
+// every file of the folder unchecked.
+std::vector<DicomSlice> read_slices(const fs::path& folder, VolumeHeader& header) {
+  std::vector<fs::path> images, others;
+  std::vector<DicomFile> kinds;
+  std::vector<std::size_t> first;  // frame of each file, in the list of all frames
+  std::size_t frames = 0;
+  for (const fs::path& file : files_of(folder)) {
+    const DicomFile kind = check_dicom(file);
+    if (kind.kind != DicomKind::image) {
+      others.push_back(file);
+      continue;
+    }
+    images.push_back(file);
+    kinds.push_back(kind);
+    first.push_back(frames);
+    frames += kind.frames;
+  }
+  check_left_out(others, images);
+  if (images.empty()) {
+    refuse_volume(folder, "the folder holds no DICOM series; give the folder that directly holds the slices");
+  }
+  const SharedMemory memory(images.size() * sizeof(SharedFile)), planes(frames * sizeof(DicomFrame));
+  auto* shared = new (memory.data()) SharedFile[images.size()];
+  auto* shared_frames = reinterpret_cast<DicomFrame*>(planes.data());
+  for_each_apart(folder, images, shared, [&](std::size_t n) {
+    const DicomHeader read = read_dicom_frames(images[n], kinds[n]);
+    copy_text(read.series, shared[n].series);
+    std::copy(read.frames.begin(), read.frames.end(), shared_frames + first[n]);
+  });
+  std::vector<DicomSlice> slices;
   std::map<std::string, std::size_t> series;
   for (std::size_t n = 0; n < images.size(); ++n) {
-    slices.push_back({images[n], shared[n].series.data(), shared[n].frame, shared[n].component, 0.0});
-    ++series[slices.back().series];
-  }
-  if (slices.empty()) {
-    refuse_volume(folder, "the folder holds no DICOM series; give the folder that directly holds the slices");
+    for (std::size_t index = 0; index < kinds[n].frames; ++index)
+      slices.push_back({images[n], kinds[n], index, shared_frames[first[n] + index], 0.0});
+    ++series[shared[n].series.data()];
   }
   if (series.size() > 1) {
     std::ostringstream text;
@@ -161,23 +141,44 @@ std::vector<Slice> read_slices(const fs::path& folder, std::vector<std::string>&
     refuse_volume(folder, "the folder holds ", series.size(), " DICOM series: ", text.str(),
                   named > 8 ? ", ..." : "", "; put the files of one of them into a folder of their own");
   }
-  if (shared[0].no_spacing)
-    notes.emplace_back("the slices do not say how large their pixels are; 1 mm was put in its place");
-  if (others > 0)
-    notes.push_back(std::to_string(others) + " files of the folder are not DICOM images and were left out");
+  if (!others.empty())
+    header.notes.push_back(std::to_string(others.size()) +
+                           " files of the folder are not DICOM images and were left out");
   return slices;
 }
 
-void check_alike(const fs::path& folder, const Slice& first, const Slice& slice) {
+// What a single slice may leave out, several may not: their order and distance follow from their places.
+void check_places(const fs::path& folder, const std::vector<DicomSlice>& slices, VolumeHeader& header) {
+  bool spacing = true, orientation = true;
+  for (const DicomSlice& slice : slices) {
+    spacing = spacing && slice.frame.has_spacing;
+    orientation = orientation && slice.frame.has_orientation;
+    header.directions_known = header.directions_known && slice.frame.has_orientation;
+    if (slice.frame.has_position || slices.size() == 1) continue;
+    refuse_volume(
+        folder, "slice ", name_of(slice),
+        " does not say where it lies (it has no Image Position (Patient)), so the order and the distance "
+        "of the slices are unknown; export the series again with the positions of its slices");
+  }
+  if (!spacing)
+    header.notes.emplace_back("the slices do not say how large their pixels are; 1 mm was put in its place");
+  if (!orientation)
+    header.notes.emplace_back(
+        "the slices have no Image Orientation (Patient): anatomical directions are unknown, and their rows "
+        "and "
+        "columns are taken to run to the left and to the back");
+}
+
+void check_alike(const fs::path& folder, const DicomSlice& first, const DicomSlice& slice) {
   const auto same = [](double a, double b) { return std::abs(a - b) <= 1e-4 * std::max(std::abs(a), 1e-3); };
-  bool alike = first.frame.dims == slice.frame.dims && slice.frame.dims[2] == 1.0;
+  bool alike = first.frame.plane.dims == slice.frame.plane.dims;
   for (int axis = 0; axis < 2; ++axis) {
-    alike = alike && same(first.frame.spacing[axis], slice.frame.spacing[axis]) &&
-            glm::distance(first.frame.direction[axis], slice.frame.direction[axis]) < 1e-3;
+    alike = alike && same(first.frame.plane.spacing[axis], slice.frame.plane.spacing[axis]) &&
+            glm::distance(first.frame.plane.direction[axis], slice.frame.plane.direction[axis]) < 1e-3;
   }
   if (alike) return;
-  const auto& a = first.frame;
-  const auto& b = slice.frame;
+  const auto& a = first.frame.plane;
+  const auto& b = slice.frame.plane;
   refuse_volume(folder, "slice ", name_of(slice), " (", b.dims[0], " x ", b.dims[1], " x ", b.dims[2],
                 " voxels of ", b.spacing.x, " x ", b.spacing.y,
                 ") differs in size, spacing or orientation from slice ", name_of(first), " (", a.dims[0],
@@ -187,7 +188,7 @@ void check_alike(const fs::path& folder, const Slice& first, const Slice& slice)
 
 // The uniform step between slices along their normal (unit: the file's). Throws VolumeError for uneven
 // slices.
-double slice_step(const fs::path& folder, const std::vector<Slice>& slices) {
+double slice_step(const fs::path& folder, const std::vector<DicomSlice>& slices) {
   std::vector<double> steps;
   for (std::size_t n = 1; n < slices.size(); ++n) steps.push_back(slices[n].height - slices[n - 1].height);
   std::vector<double> sorted = steps;
@@ -195,8 +196,8 @@ double slice_step(const fs::path& folder, const std::vector<Slice>& slices) {
                    sorted.end());
   const double usual = sorted[sorted.size() / 2];
   for (std::size_t n = 0; n < steps.size(); ++n) {
-    const Slice& below = slices[n];
-    const Slice& above = slices[n + 1];
+    const DicomSlice& below = slices[n];
+    const DicomSlice& above = slices[n + 1];
     const double step = steps[n];
     if (step <= 1e-3 * std::max(usual, 1e-3)) {
       refuse_volume(folder, "slices ", name_of(below), " and ", name_of(above), " lie in the same place (at ",
@@ -212,7 +213,8 @@ double slice_step(const fs::path& folder, const std::vector<Slice>& slices) {
                          : std::string(": slices are uneven"),
           "; add the missing files, or resample the series onto an even lattice");
     }
-    const glm::dvec3 aside = above.frame.origin - below.frame.origin - below.frame.direction[2] * step;
+    const glm::dvec3 aside =
+        above.frame.plane.origin - below.frame.plane.origin - below.frame.plane.direction[2] * step;
     if (glm::length(aside) > 0.01 * usual + 1e-3) {
       refuse_volume(folder, "slice ", name_of(above), " is shifted sideways by ", glm::length(aside),
                     " against the one before it, as with a tilted gantry; resample the series onto a "
@@ -222,57 +224,97 @@ double slice_step(const fs::path& folder, const std::vector<Slice>& slices) {
   return (slices.back().height - slices.front().height) / (static_cast<double>(slices.size()) - 1.0);
 }
 
+// The smallest type that holds the rescaled numbers of all slices: that of the stored ones where no slice is
+// rescaled, else whole numbers where slope and intercept are whole, else double.
+Component common_component(const std::vector<DicomSlice>& slices) {
+  const Component stored = slices.front().frame.stored;
+  bool as_stored = true, whole = true;
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const DicomSlice& slice : slices) {
+    const DicomFrame& f = slice.frame;
+    as_stored = as_stored && f.stored == stored && f.slope == 1.0 && f.intercept == 0.0;
+    whole = whole && f.slope == std::floor(f.slope) && f.intercept == std::floor(f.intercept);
+    for (const double end : {f.lowest, f.highest}) {
+      low = std::min(low, f.slope * end + f.intercept);
+      high = std::max(high, f.slope * end + f.intercept);
+    }
+  }
+  if (as_stored) return stored;
+  const auto holds = [&](auto zero) {
+    using Limits = std::numeric_limits<decltype(zero)>;
+    return whole && low >= static_cast<double>(Limits::min()) && high <= static_cast<double>(Limits::max());
+  };
+  if (holds(std::uint8_t{})) return Component::uint8;
+  if (holds(std::int8_t{})) return Component::int8;
+  if (holds(std::uint16_t{})) return Component::uint16;
+  if (holds(std::int16_t{})) return Component::int16;
+  if (holds(std::uint32_t{})) return Component::uint32;
+  if (holds(std::int32_t{})) return Component::int32;
+  return Component::float64;
+}
+
+// The thickness of a single slice, which is the size of its voxels (unit: the file's).
+double single_thickness(const DicomSlice& slice, std::vector<std::string>& notes) {
+  const double thickness = slice.frame.plane.spacing.z;
+  std::ostringstream note;
+  note << "the series has a single slice; ";
+  if (thickness > 0.0) {
+    note << "its thickness, " << thickness << " mm, is taken from its header";
+  } else {
+    note << "it does not say how thick it is, and 1 mm was put in its place";
+  }
+  notes.push_back(note.str());
+  return thickness > 0.0 ? thickness : 1.0;
+}
+
 }  // namespace
 
-DicomSeries read_dicom_header(const fs::path& folder, double unit_m) {
-  itk::Object::SetGlobalWarningDisplay(false);  // relevant findings go to notes and errors
+DicomSeries read_dicom_header(const fs::path& folder, const std::optional<double>& unit_m) {
   DicomSeries series;
-  std::vector<Slice> slices = read_slices(folder, series.data.header.notes);
-  series.data.header.format = "DICOM series";
-  Component component = slices.front().component;
-  for (Slice& slice : slices) {
-    slice.height = glm::dot(slice.frame.origin, slices.front().frame.direction[2]);
+  VolumeHeader& header = series.data.header;
+  std::vector<DicomSlice> slices = read_slices(folder, header);
+  header.format = "DICOM series";
+  check_places(folder, slices, header);
+  for (DicomSlice& slice : slices) {
+    slice.height = glm::dot(slice.frame.plane.origin, slices.front().frame.plane.direction[2]);
     if (slices.size() > 1) check_alike(folder, slices.front(), slice);
-    // Each slice may have its own rescale (PET), which decides its type.
-    if (slice.component != component) component = Component::float64;
   }
   std::stable_sort(slices.begin(), slices.end(),
-                   [](const Slice& a, const Slice& b) { return a.height < b.height; });
-  FileFrame frame = slices.front().frame;
-  if (slices.size() > 1) {
-    frame.spacing.z = slice_step(folder, slices);
-    frame.dims[2] = static_cast<double>(slices.size());
-  } else if (frame.dims[2] == 1.0) {
-    series.data.header.notes.emplace_back(
-        "the series has a single slice; its thickness is taken from its header");
-  }
-  set_frame(folder, frame, component, unit_m, series.data);
-  for (const Slice& slice : slices) series.files.push_back(slice.file);
+                   [](const DicomSlice& a, const DicomSlice& b) { return a.height < b.height; });
+  FileFrame frame = slices.front().frame.plane;
+  frame.dims[2] = static_cast<double>(slices.size());
+  frame.spacing.z =
+      slices.size() > 1 ? slice_step(folder, slices) : single_thickness(slices.front(), header.notes);
+  constexpr double kMillimeter = 1e-3;
+  set_frame(folder, frame, common_component(slices), unit_m.value_or(kMillimeter), series.data);
+  series.slices = std::move(slices);
   return series;
 }
 
 std::unique_ptr<SharedMemory> read_dicom_voxels(const fs::path& folder, const DicomSeries& series) {
   const VolumeData& data = series.data;
-  const std::vector<std::string>& files = series.files;
-  const std::size_t voxels = data.header.bytes / size_of(data.component) / files.size();
-  const std::size_t slice_bytes = voxels * size_of(data.component);
-  const SharedMemory states(files.size() * sizeof(SharedSlice));
+  const std::size_t slice_bytes = data.slice_bytes();
+  const std::size_t voxels = slice_bytes / size_of(data.component);
+  std::map<fs::path, std::vector<std::size_t>> slices_of;  // a file is read once, whatever it holds
+  for (std::size_t k = 0; k < series.slices.size(); ++k) slices_of[series.slices[k].path].push_back(k);
+  std::vector<fs::path> files;
+  for (const auto& [file, slices] : slices_of) files.push_back(file);
+  const SharedMemory states(files.size() * sizeof(SharedFile));
   auto memory = std::make_unique<SharedMemory>(data.header.bytes);
-  auto* shared = new (states.data()) SharedSlice[files.size()];
+  auto* shared = new (states.data()) SharedFile[files.size()];
   for_each_apart(folder, files, shared, [&](std::size_t n) {
-    Component component{};
-    std::vector<std::byte> bytes;
-    in_words(files[n], "the slice cannot be read", kDamaged, [&] {
-      const auto io = itk::GDCMImageIO::New();
-      io->SetFileName(files[n]);
-      io->ReadImageInformation();
-      component = component_of(*io).value();
-      bytes.resize(voxels * size_of(component));
-      read_voxels(*io, bytes);
-    });
-    if (component != data.component) bytes = as_doubles(component, bytes);
-    std::copy_n(bytes.begin(), std::min(bytes.size(), slice_bytes),
-                memory->data() + static_cast<std::ptrdiff_t>(n * slice_bytes));
+    const std::vector<std::size_t>& here = slices_of.at(files[n]);
+    const DicomSlice& any = series.slices[here.front()];
+    const std::size_t frame_bytes = voxels * size_of(any.frame.stored);
+    const std::vector<std::byte> numbers =
+        read_dicom_numbers(files[n], any.file, any.frame.stored, frame_bytes * any.file.frames);
+    for (const std::size_t k : here) {
+      const DicomSlice& slice = series.slices[k];
+      rescale_voxels(slice.frame.stored,
+                     std::span<const std::byte>(numbers).subspan(slice.index * frame_bytes, frame_bytes),
+                     slice.frame.slope, slice.frame.intercept, data.component,
+                     std::span<std::byte>(memory->data() + k * slice_bytes, slice_bytes));
+    }
   });
   return memory;
 }

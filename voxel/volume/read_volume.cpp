@@ -5,18 +5,17 @@
 #include "voxel/volume/read_volume.h"
 
 #include <itkMetaImageIO.h>
-#include <itkNiftiImageIO.h>
 #include <itkNrrdImageIO.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdlib>
-#include <fstream>
-#include <glm/gtc/quaternion.hpp>
 #include <memory>
 
 #include "voxel/volume/check_header.h"
 #include "voxel/volume/itk_adapter.h"
+#include "voxel/volume/length_unit.h"
+#include "voxel/volume/read_dicom.h"
 #include "voxel/volume/slice_stream.h"
 
 namespace voxel {
@@ -24,15 +23,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-itk::ImageIOBase::Pointer reader_for(VolumeFormat format) {
-  switch (format) {
-    case VolumeFormat::nifti:
-      return itk::NiftiImageIO::New().GetPointer();
-    case VolumeFormat::nrrd:
-      return itk::NrrdImageIO::New().GetPointer();
-    case VolumeFormat::meta:
-      break;
-  }
+// The library of a format. NIfTI needs none: its header is read by inspect_nifti.cpp, its voxels are
+// streamed.
+itk::ImageIOBase::Pointer library_of(VolumeFormat format) {
+  if (format == VolumeFormat::nrrd) return itk::NrrdImageIO::New().GetPointer();
   return itk::MetaImageIO::New().GetPointer();
 }
 
@@ -58,84 +52,64 @@ FileFrame frame_of(const fs::path& path, const itk::ImageIOBase& io) {
   return frame;
 }
 
-// Isolates a packed NIfTI file. The NIfTI library reads the voxels of v.nii.gz from a file v.nii beside it,
-// if there is one. In that case v.nii.gz is read through a symbolic link in a temporary folder.
-class AloneFile {
- public:
-  AloneFile(const fs::path& path, VolumeFormat format) : path_(path) {
-    std::error_code error;
-    const std::string name = path.string();
-    const bool packed = format == VolumeFormat::nifti && path.extension() != ".nii" && name.size() > 3;
-    if (!packed || !fs::exists(name.substr(0, name.size() - 3), error)) return;
-    std::string pattern = (fs::temp_directory_path() / "hybrid_XXXXXX").string();
-    if (mkdtemp(pattern.data()) != nullptr) {
-      folder_ = pattern;
-      path_ = folder_ / path.filename();
-      fs::create_symlink(fs::absolute(path), path_, error);
-      if (!error) return;
-      remove();
-    }
-    refuse_volume(path, "'", name.substr(0, name.size() - 3),
-                  "' beside it would be read in its place; move one of the two");
-  }
-  ~AloneFile() { remove(); }
-  AloneFile(const AloneFile&) = delete;
-  AloneFile& operator=(const AloneFile&) = delete;
-  [[nodiscard]] std::string name() const { return path_.string(); }
-
- private:
-  void remove() const {
-    std::error_code ignored;
-    if (!folder_.empty()) fs::remove_all(folder_, ignored);
-  }
-  fs::path path_, folder_;
-};
-
 struct OpenVolume {
-  std::unique_ptr<AloneFile> alone;
-  itk::ImageIOBase::Pointer io;
+  VolumeFormat format = VolumeFormat::nifti;
+  itk::ImageIOBase::Pointer io;  // MetaImage: reads the header
   VolumeData data;
   VoxelPlace place;
-  double copies = 1.0;  // copies of the voxels in memory during reading
 };
 
-OpenVolume open_volume(const fs::path& path, double unit_m) {
-  const VolumeFormat format = format_of(path);
-  OpenVolume open;
-  open.place = inspect_volume(path, format);
-  open.io = reader_for(format);
-  open.alone = std::make_unique<AloneFile>(path, format);
-  open.io->SetFileName(open.alone->name());
-  in_words(path, "the header cannot be read", kDamaged, [&] {
-    try {
-      open.io->ReadImageInformation();
-    } catch (const itk::ExceptionObject& error) {
-      if (words_of(error).find("orthonormal") == std::string::npos) throw;
-      refuse_volume(path,
-                    "the axes that the header's sform gives are not at right angles, or not as long as "
-                    "its voxel sizes; correct the header, or resample the volume onto a rectangular "
-                    "lattice first");
-    }
-  });
-  const std::optional<Component> component = component_of(*open.io);
-  if (!component) {
+// Reads the header of a MetaImage by its library.
+void open_meta(const fs::path& path, OpenVolume& open) {
+  open.io = library_of(open.format);
+  open.io->SetFileName(path.string());
+  in_words(path, "the header cannot be read", kDamaged, [&] { open.io->ReadImageInformation(); });
+  open.place.stored = component_of(*open.io);
+  if (!open.place.stored) {
     refuse_volume(path, "each voxel holds ", open.io->GetNumberOfComponents(), " numbers of type ",
                   itk::ImageIOBase::GetComponentTypeAsString(open.io->GetComponentType()),
                   ", where one whole or real number is needed; save one channel of it");
   }
+  open.place.frame = frame_of(path, *open.io);
+  open.place.axes = std::min<std::size_t>(open.io->GetNumberOfDimensions(), 3);
+}
+
+// Type of the voxels once they are scaled. Whole numbers of up to 16 bits become floats, which hold them.
+Component scaled_component(const VoxelPlace& place) {
+  if (place.slope == 1.0 && place.intercept == 0.0) return *place.stored;
+  return *place.stored == Component::float32 || size_of(*place.stored) <= 2 ? Component::float32
+                                                                            : Component::float64;
+}
+
+// The length unit of the header's numbers (unit: meter).
+double unit_of(const VoxelPlace& place, const std::optional<double>& asked_m,
+               std::vector<std::string>& notes) {
+  constexpr double kMillimeter = 1e-3;
+  if (!asked_m) return place.unit_m.value_or(kMillimeter);
+  if (place.unit_m && std::abs(*place.unit_m - *asked_m) > 1e-9 * *asked_m) {
+    notes.push_back("the header gives its lengths in " + unit_in_words(*place.unit_m) +
+                    "; they are taken in " + unit_in_words(*asked_m) + ", as asked");
+  }
+  return *asked_m;
+}
+
+OpenVolume open_volume(const fs::path& path, const std::optional<double>& unit_m) {
   constexpr std::array<const char*, 3> kNames{"NIfTI", "NRRD", "MetaImage"};
-  open.data.header.notes = open.place.notes;
-  open.data.header.format = kNames[static_cast<std::size_t>(format)];
-  set_frame(path, frame_of(path, *open.io), *component, unit_m, open.data);
-  if (open.io->GetNumberOfDimensions() < 3) {
-    open.data.header.notes.emplace_back(
+  OpenVolume open;
+  open.format = format_of(path);
+  open.place = inspect_volume(path, open.format);
+  if (open.format == VolumeFormat::meta) open_meta(path, open);
+  VolumeHeader& header = open.data.header;
+  header.notes = open.place.notes;
+  header.format = kNames[static_cast<std::size_t>(open.format)];
+  header.directions_known = open.place.directions_known;
+  set_frame(path, open.place.frame, scaled_component(open.place), unit_of(open.place, unit_m, header.notes),
+            open.data);
+  if (open.place.axes < 3) {
+    header.notes.emplace_back(
         "the file has fewer than three axes; the missing ones have one voxel, one unit long");
   }
-  check_file_size(path, open.place, open.data.header);
-  // The NIfTI and NRRD libraries read into their own buffer first. Scaled NIfTI needs a third copy.
-  if (format != VolumeFormat::meta) open.copies = 2.0;
-  if (format == VolumeFormat::nifti && (*component == Component::float32 || *component == Component::float64))
-    open.copies = 3.0;
+  check_file_size(path, open.place, header);
   return open;
 }
 
@@ -144,33 +118,46 @@ bool is_folder(const fs::path& path) {
   return fs::is_directory(path, error);
 }
 
-// Calls use(data, next slice) for a single file. Voxels that need no conversion but byte order are streamed.
-// Others (text, bzip2, scaled NIfTI) are read whole into memory by the library.
+// Calls use(data, next slice) for a single file. Raw and deflated voxels are streamed. Others (text, and
+// those whose place a library must find) are read whole into memory by the library.
 template <typename Use>
-auto with_file_slices(const fs::path& path, double unit_m, const std::optional<glm::dvec3>& spacing_m,
-                      std::uint64_t max_bytes, Use use) {
+auto with_file_slices(const fs::path& path, const std::optional<double>& unit_m,
+                      const std::optional<glm::dvec3>& spacing_m, std::uint64_t max_bytes, Use use) {
   OpenVolume open = open_volume(path, unit_m);
   const VolumeData& data = open.data;
-  const std::size_t component = size_of(data.component);
+  const Component stored = *open.place.stored;
   const bool packed = open.place.packing == VoxelPlace::Packing::deflate;
-  if (open.place.as_they_are && (packed || open.place.packing == VoxelPlace::Packing::raw) &&
-      (open.place.voxel_bytes == 0 || open.place.voxel_bytes == component)) {
+  if (open.place.as_they_are && (packed || open.place.packing == VoxelPlace::Packing::raw)) {
     check_memory(path, data, 0.0, spacing_m, max_bytes);
     VoxelStream stream(path, open.place, data.header);
-    auto result = use(data, [&] { return stream.next(data.slice_bytes(), component); });
+    const std::size_t slice_bytes = data.slice_bytes() / size_of(data.component) * size_of(stored);
+    const bool scaled = open.place.slope != 1.0 || open.place.intercept != 0.0;
+    std::vector<std::byte> slice(scaled ? data.slice_bytes() : 0);
+    auto result = use(data, [&]() -> std::span<const std::byte> {
+      const std::span<const std::byte> numbers = stream.next(slice_bytes, size_of(stored));
+      if (!scaled) return numbers;
+      rescale_voxels(stored, numbers, open.place.slope, open.place.intercept, data.component, slice);
+      return slice;
+    });
     stream.finish();
     return result;
   }
-  check_memory(path, data, open.copies, spacing_m, max_bytes);
+  // NRRD's library reads into its own buffer first.
+  check_memory(path, data, open.format == VolumeFormat::nrrd ? 2.0 : 1.0, spacing_m, max_bytes);
   if (packed) {  // check completeness: the libraries replace missing voxels by zeros
     VoxelStream whole(path, open.place, data.header);
-    const std::uint64_t slice =
-        bytes_in_file(open.place, data.header) / static_cast<std::uint64_t>(data.header.dims[2]);
-    for (int k = 0; k < data.header.dims[2]; ++k) whole.next(slice, 1);
+    for (int k = 0; k < data.header.dims[2]; ++k) whole.next(data.slice_bytes(), 1);
     whole.finish();
   }
   std::vector<std::byte> bytes;
   in_words(path, "the voxels cannot be read", kDamaged, [&] {
+    if (!open.io) {
+      open.io = library_of(open.format);
+      open.io->SetFileName(path.string());
+      open.io->ReadImageInformation();
+      if (component_of(*open.io) != data.component)
+        throw std::runtime_error("the library of the format reads the header otherwise");
+    }
     bytes.resize(data.header.bytes);
     read_voxels(*open.io, bytes);
   });
@@ -184,8 +171,8 @@ auto with_file_slices(const fs::path& path, double unit_m, const std::optional<g
 
 // Calls use(data, next slice) for a file or a folder, within the limit.
 template <typename Use>
-auto with_slices(const fs::path& path, double unit_m, const std::optional<glm::dvec3>& spacing_m,
-                 std::uint64_t max_bytes, Use use) {
+auto with_slices(const fs::path& path, const std::optional<double>& unit_m,
+                 const std::optional<glm::dvec3>& spacing_m, std::uint64_t max_bytes, Use use) {
   if (!is_folder(path)) return with_file_slices(path, unit_m, spacing_m, max_bytes, use);
   const DicomSeries series = read_dicom_header(path, unit_m);
   check_memory(path, series.data, 1.0, spacing_m, max_bytes);  // 1 copy: shared with the child process
@@ -264,7 +251,7 @@ void read_voxels(itk::ImageIOBase& io, std::vector<std::byte>& bytes) {
   io.Read(bytes.data());
 }
 
-VolumeHeader read_volume_header(const fs::path& path, double unit_m) {
+VolumeHeader read_volume_header(const fs::path& path, const std::optional<double>& unit_m) {
   return is_folder(path) ? read_dicom_header(path, unit_m).data.header
                          : open_volume(path, unit_m).data.header;
 }
@@ -281,7 +268,7 @@ LabelVolume load_volume(const fs::path& path, const VolumeFileOptions& options,
 }
 
 VolumeStatistics read_volume_statistics(const fs::path& path, std::uint64_t max_bytes) {
-  return with_slices(path, 1e-3, std::nullopt, max_bytes, statistics_of);
+  return with_slices(path, std::nullopt, std::nullopt, max_bytes, statistics_of);
 }
 
 }  // namespace voxel

@@ -33,8 +33,11 @@ struct VolumeHeader {
   glm::dvec3 spacing_m{0.0};
   glm::dvec3 origin_m{0.0};
   glm::dquat rotation{1.0, 0.0, 0.0, 0.0};
-  std::uint64_t bytes = 0;         // size of the voxels in memory, in the file's component type
-  std::vector<std::string> notes;  // e.g. slices missing, axes flipped to make the frame right-handed
+  std::uint64_t bytes = 0;  // size of the voxels in memory, in the file's component type
+  // False if nothing in the file says how its axes lie in the patient (the notes say so, too). Then x, y and
+  // z are the file's own, and no side of the volume can be called left, front or head.
+  bool directions_known = true;
+  std::vector<std::string> notes;  // e.g. axes flipped to make the frame right-handed
 };
 
 // A range of intensities (or one label) that becomes one label. First match wins; no match is empty (0).
@@ -44,7 +47,9 @@ struct LabelRule {
 };
 
 struct VolumeFileOptions {
-  double unit_m = 1e-3;          // length unit of the file (medical formats: mm)
+  // Length unit of the file's numbers, which counts even if the header states another. Without a value, it is
+  // the unit that the header states, or the millimeter if it states none.
+  std::optional<double> unit_m;
   std::vector<LabelRule> rules;  // empty: the file holds labels 0..255, kept as they are
   // Resample to this spacing (nearest neighbour). Without a value, the file's spacing is kept.
   std::optional<glm::dvec3> spacing_m;
@@ -54,7 +59,8 @@ struct VolumeFileOptions {
 };
 
 // `path` is a file, or a folder holding one DICOM series. Throws VolumeError.
-VolumeHeader read_volume_header(const std::filesystem::path& path, double unit_m = 1e-3);
+VolumeHeader read_volume_header(const std::filesystem::path& path,
+                                const std::optional<double>& unit_m = std::nullopt);
 
 // Axes are never permuted. Only a left-handed frame is changed: its first axis is reversed, so that
 // `rotation` is a proper rotation. `notes` receives the notes of the header (findings and corrections).

@@ -15,6 +15,7 @@
 #include <sstream>
 
 #include "voxel/volume/check_header.h"
+#include "voxel/volume/length_unit.h"
 #include "voxel/volume/raw_volume.h"
 
 namespace voxel {
@@ -168,6 +169,12 @@ Saved check_path(const fs::path& path, const VolumeFrame& frame, bool vectors, d
 
 // ---- headers
 
+// NIfTI's number of a length unit; 0 if it has none.
+char nifti_unit(double unit_m) {
+  const std::string unit = unit_in_words(unit_m);
+  return static_cast<char>(unit == "m" ? 1 : unit == "mm" ? 2 : unit == "um" ? 3 : 0);
+}
+
 // NIfTI-1 (nifti1.h of the NIfTI working group), in its RAS frame: x and y of LPS change sign.
 std::string nifti_header(const Saved& s) {
   std::string header(352, '\0');
@@ -190,8 +197,8 @@ std::string nifti_header(const Saved& s) {
                                static_cast<float>(s.spacing.z), 1.0F, 1.0F, 1.0F, 1.0F});
   put(108, 352.0F);
   put(112, 1.0F);
-  put(123, static_cast<char>(2));  // always the code for mm: NIfTI has no code for arbitrary units
-  put(252, std::int16_t{1});       // qform and sform: scanner coordinates
+  put(123, nifti_unit(s.unit_m));
+  put(252, std::int16_t{1});  // qform and sform: scanner coordinates
   put(254, std::int16_t{1});
   glm::dquat q = glm::dquat(0.0, 0.0, 0.0, 1.0) * glm::normalize(s.frame.rotation);  // half a turn about z
   if (q.w < 0.0) q = -q;
@@ -225,6 +232,10 @@ std::string nrrd_header(const Saved& s, const std::string& data_file) {
   }
   out << "\nkinds:" << (s.vectors ? " vector" : "") << " domain domain domain\n";
   if (s.vectors) out << "endian: little\n";
+  // Readers take the millimeter where no unit is stated.
+  const std::string unit = unit_in_words(s.unit_m);
+  if (unit != "mm" && length_unit_m(unit))
+    out << "space units: \"" << unit << "\" \"" << unit << "\" \"" << unit << "\"\n";
   out << "encoding: gzip\nspace origin: (" << s.origin.x << ',' << s.origin.y << ',' << s.origin.z << ")\n";
   if (!data_file.empty()) out << "data file: " << data_file << '\n';
   if (data_file.empty()) out << '\n';
@@ -245,6 +256,8 @@ std::string meta_header(const Saved& s, const std::string& data_file) {
   out << "\nOffset = " << s.origin.x << ' ' << s.origin.y << ' ' << s.origin.z
       << "\nCenterOfRotation = 0 0 0\nElementSpacing = " << s.spacing.x << ' ' << s.spacing.y << ' '
       << s.spacing.z << "\nDimSize = " << s.frame.dims[0] << ' ' << s.frame.dims[1] << ' ' << s.frame.dims[2];
+  const std::string unit = unit_in_words(s.unit_m);
+  if (unit == "um" || unit == "cm") out << "\nDistanceUnits = " << unit;
   if (s.vectors) out << "\nElementNumberOfChannels = 3";
   out << "\nElementType = " << (s.vectors ? "MET_FLOAT" : "MET_UCHAR")
       << "\nElementDataFile = " << (data_file.empty() ? "LOCAL" : data_file) << '\n';

@@ -85,6 +85,7 @@ TEST_F(VolumeFile, RoundTripOfThinVolumesAndOtherUnits) {
       EXPECT_EQ(back.labels, volume.labels) << name;
       EXPECT_LT(glm::distance(back.spacing_m, volume.spacing_m), 1e-9) << name;
       EXPECT_LT(glm::distance(back.origin_m, volume.origin_m), 1e-7) << name;
+      EXPECT_LT(glm::distance(voxel::load_volume(path, {}).spacing_m, volume.spacing_m), 1e-9) << name;
     }
   }
 }

@@ -18,6 +18,7 @@
 #include <random>
 #include <vector>
 
+#include "tests/voxel/volume/dicom_files.h"
 #include "tests/voxel/volume/dicom_slices.h"
 #include "tests/voxel/volume/volume_folder.h"
 
@@ -317,9 +318,26 @@ TEST_F(VolumeCorpus, EachIsReadRightOrRefusedInWords) {
   EXPECT_GT(number, 60U);
 }
 
-// ---- DICOM
-
 // ---- random damage
+
+// DICOM files of other kinds: frames, the other byte order, no preamble, an icon.
+std::vector<std::string> other_dicom() {
+  const tests::DicomText text, big{.big_endian = true, .implicit = false},
+      untyped{.big_endian = false, .implicit = true};
+  const std::string icon = text.sequence(
+      0x88, 0x200, {text.us(0x28, 0x10, 4) + text.element(0x7fe0, 0x10, "OB", std::string(16, '\7'))}, true);
+  return {tests::with_preamble(tests::dicom_enhanced({{0, 30.0, 0.5, {}}, {1, 32.0, {}, {}}}, 2.0)),
+          tests::with_preamble(tests::dicom_slice(big, 0, {32, "OB"}), big), tests::dicom_slice(untyped, 0),
+          tests::with_preamble(tests::dicom_slice(text, 0, {}, icon))};
+}
+
+std::vector<std::string> other_nrrd_headers() {
+  return {
+      "space: LAST\nspace directions: (2,0,0,0) (0,2,0,0) (0,0,2,0)\nspace units: \"um\" \"mm\" \"in\" "
+      "\"s\"\n"
+      "space origin: (1,2,3,0)\n",
+      "spacings: 2 2 2\naxis mins: -1 -2 -3\ncenters: cell node ???\nunits: \"cm\" \"cm\" \"\"\n"};
+}
 
 // A second and a half, or HYBRID_FUZZ_SECONDS of it, from HYBRID_FUZZ_SEED.
 TEST_F(VolumeCorpus, DamagedFilesEndInAVolumeOrARefusal) {
@@ -333,6 +351,9 @@ TEST_F(VolumeCorpus, DamagedFilesEndInAVolumeOrARefusal) {
   for (int n = 0; n < 4; ++n) {
     originals.push_back({"slices/0", tests::dicom(DicomSlice{}), ""});
     originals.push_back({"slices/0", tests::dicom(packed), ""});
+    for (const std::string& dicom : other_dicom()) originals.push_back({"slices/0", dicom, ""});
+    for (const std::string& header : other_nrrd_headers())
+      originals.push_back({"v.nrrd", tests::nrrd_file(header), ""});
   }
   fs::create_directories(in_folder("slices"));
   voxel::VolumeFileOptions options;
