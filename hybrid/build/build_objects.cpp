@@ -71,7 +71,8 @@ RigidObject mesh_object(const RigidDescription& d, const Pose& pose, polygon::Tr
   return surface_object(d, pose, std::move(mesh), check.oriented);
 }
 
-voxel::VolumeFileOptions volume_options(const std::vector<voxel::LabelRule>& rules, double unit_m,
+voxel::VolumeFileOptions volume_options(const std::vector<voxel::LabelRule>& rules,
+                                        const std::optional<double>& unit_m,
                                         const std::optional<glm::dvec3>& spacing) {
   return {.unit_m = unit_m, .rules = rules, .spacing_m = spacing, .max_bytes = usable_memory_bytes() / 4};
 }

@@ -90,11 +90,13 @@ RigidDescription as_rigid(const SoftDescription& soft) {
     rigid.source = mesh->mesh;
   } else {
     const auto& volume = std::get<VolumeSource>(soft.source);
-    VolumeSurfaceSource surface{
-        .file = volume.file, .rules = volume.rules, .spacing_m = std::nullopt, .cuts = {}};
+    VolumeSurfaceSource surface{.file = volume.file,
+                                .rules = volume.rules,
+                                .spacing_m = std::nullopt,
+                                .cuts = {},
+                                .unit_m = volume.unit_m};
     if (volume.spacing_m) surface.spacing_m = volume.spacing_m->x;
     surface.largest = volume.largest;
-    surface.unit_m = volume.unit_m;
     rigid.source = surface;
   }
   return rigid;

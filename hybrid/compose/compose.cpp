@@ -178,6 +178,7 @@ void compose_segmentation(const ComposeOptions& options, ComposeFolder& folder, 
                                         filled, *spacing * 1e3));
     }
   }
+  parts.of_a_body = voxel::read_volume_header(options.labels).directions_known;
   if (spacing && !split.soft.empty()) {
     const voxel::LabelVolume tissue = read_labels(options.labels, spacing, parts.notes);
     add_segmentation(fine, tissue, names, split, folder, parts, progress);

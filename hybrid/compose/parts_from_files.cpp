@@ -6,12 +6,12 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "hybrid/base/process_memory.h"
 #include "hybrid/compose/parts_from_labels.h"
 #include "hybrid/geometry/surface_nets.h"
-#include "hybrid/base/process_memory.h"
+#include "polygon/files/mesh_file.h"
 #include "polygon/mesh/mesh_bounds.h"
 #include "polygon/repair/check.h"
-#include "polygon/files/mesh_file.h"
 #include "voxel/volume/read_volume.h"
 #include "voxel/volume/write_volume.h"
 
@@ -77,7 +77,7 @@ std::optional<double> ready_spacing_m(const voxel::LabelVolume& volume, std::siz
 void add_intensities(const std::filesystem::path& file, const std::string& name, const Placement& placement,
                      std::optional<std::array<double, 2>> range, std::optional<double> spacing_m,
                      ComposeFolder& folder, SceneParts& parts, const Progress& progress) {
-  parts.of_a_body = true;
+  parts.of_a_body = voxel::read_volume_header(file).directions_known;
   if (progress) progress(fmt::format("reading {}", file.string()));
   const voxel::VolumeStatistics statistics = voxel::read_volume_statistics(file, usable_memory_bytes() / 4);
   if (!(statistics.maximum > statistics.minimum)) {
@@ -96,7 +96,9 @@ void add_intensities(const std::filesystem::path& file, const std::string& name,
   options.rules = {{(*range)[0], (*range)[1], 1}};
   options.max_bytes = usable_memory_bytes() / 4;
   if (spacing_m) options.spacing_m = glm::dvec3(*spacing_m);
-  voxel::LabelVolume volume = voxel::load_volume(file, options);
+  std::vector<std::string> of_file;
+  voxel::LabelVolume volume = voxel::load_volume(file, options, &of_file);
+  for (const std::string& note : of_file) parts.notes.push_back(fmt::format("{}: {}", file.string(), note));
   const auto filled = [&volume] {
     return static_cast<std::size_t>(
         std::count_if(volume.labels.begin(), volume.labels.end(), [](auto l) { return l != 0; }));

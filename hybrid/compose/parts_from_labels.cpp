@@ -328,7 +328,6 @@ Split split_labels(const LabelNames& names, const std::set<int>& present,
 void add_segmentation(const LabelVolume& fine, const LabelVolume& tissue, const LabelNames& names,
                       const Split& split, ComposeFolder& folder, SceneParts& parts,
                       const Progress& progress) {
-  parts.of_a_body = true;
   const std::array<Box, 256> boxes = label_boxes(fine);
   for (const int label : split.rigid) {
     if (progress) progress(fmt::format("surface of {}", names.at(label)));

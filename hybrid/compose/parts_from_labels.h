@@ -59,7 +59,7 @@ struct SceneParts {
   std::vector<SoftPart> soft{};
   std::vector<ComposedPart> rows{};
   std::vector<std::string> notes{};
-  bool of_a_body = false;  // a volume gives the frame: x to the left, y to the back, z to the head
+  bool of_a_body = false;  // a volume says where x (left), y (back) and z (head) are
 };
 
 // Labels out of a file, resampled to `spacing_m` where that is given. Throws voxel::VolumeError.

@@ -89,7 +89,7 @@ VolumeSurfaceSource read_volume_surface(const TableReader& table) {
   out.grow_m = table.number("grow", table.source().distance(), out.grow_m);
   out.smooth = static_cast<int>(table.integer("smooth", 0, 1000, out.smooth));
   out.largest = table.boolean("largest", out.largest);
-  out.unit_m = table.unit("unit", out.unit_m);
+  if (table.has("unit")) out.unit_m = table.unit("unit", 1e-3);
   out.cuts = read_cuts(table);
   return out;
 }

@@ -123,7 +123,7 @@ VolumeSource read_volume(const TableReader& table) {
   out.rules = read_label_rules(table, true);
   if (table.has("spacing")) out.spacing_m = table.number_or_vector("spacing", table.source().size());
   out.largest = table.boolean("largest", out.largest);
-  out.unit_m = table.unit("unit", out.unit_m);
+  if (table.has("unit")) out.unit_m = table.unit("unit", 1e-3);
   return out;
 }
 

@@ -86,7 +86,8 @@ struct VolumeSurfaceSource {
   int smooth = 10;      // smoothing passes
   bool largest = true;  // keep only the largest connected piece, and fill its cavities
   std::vector<CutPlane> cuts;
-  double unit_m = 1e-3;  // length unit of the file (medical formats: mm)
+  // Length unit of the file's numbers. Without a value, the file's own: what its header states, else mm.
+  std::optional<double> unit_m;
 };
 using RigidSource = std::variant<MeshSource, BallPrimitive, BoxPrimitive, PlanePrimitive, CapsulePrimitive,
                                  VolumeSurfaceSource>;
@@ -151,8 +152,9 @@ struct VolumeSource {
   std::filesystem::path file;
   std::vector<voxel::LabelRule> rules;
   std::optional<glm::dvec3> spacing_m;
-  bool largest = true;   // keep only the largest connected piece
-  double unit_m = 1e-3;  // length unit of the file (medical formats: mm)
+  bool largest = true;  // keep only the largest connected piece
+  // Length unit of the file's numbers. Without a value, the file's own: what its header states, else mm.
+  std::optional<double> unit_m;
 };
 struct ClosedMeshSource {
   MeshSource mesh;

@@ -426,4 +426,22 @@ TEST_F(Compose, AnAbdomenOfSixtyLabelsBecomesASceneOnWhichBoneAndOrgansAreFelt) 
   EXPECT_GT(tissue, 200U);
 }
 
+TEST_F(Compose, AVolumeWithoutAnatomyIsTouchedFromNoSideOfABody) {
+  ComposeOptions options = of_torso();
+  const auto sides = [](const Composed& composed) {
+    return std::count_if(composed.path.presses.begin(), composed.path.presses.end(), [](const auto& press) {
+      return press.where.find("from the ") == 0 || press.where.find("from its ") == 0;
+    });
+  };
+  EXPECT_GT(sides(hybrid::compose(options)), 0);
+  std::string bytes = text_of(save("labels.nrrd", volume_of(torso())));
+  const std::string space = "left-posterior-superior";
+  options.labels = write("scanner.nrrd", bytes.replace(bytes.find(space), space.size(), "scanner-xyz"));
+  options.out = folder_ / "scanner";
+  const Composed composed = hybrid::compose(options);
+  EXPECT_EQ(sides(composed), 0);
+  EXPECT_THAT(composed.notes, ::testing::Contains(HasSubstr("anatomical directions are unknown")));
+  EXPECT_EQ(text_of(composed.scene).find("patient's left"), std::string::npos);
+}
+
 }  // namespace
