@@ -45,11 +45,11 @@ ServoReport run_servo(HapticDevice& device, const ServoOptions& options, ServoFu
       const std::uint64_t missed = timer->missed();
       input.late_s = timer->wait();
       device.delay(static_cast<double>(timer->missed() - missed) * dt_s);
-      if (stop_signal() != 0) {
-        report.end = ServoEnd::stopped;
-        report.messages.emplace_back("stopped by a signal; what was felt until then is kept");
-        break;
-      }
+    }
+    if (stop_signal() != 0) {
+      report.end = ServoEnd::stopped;
+      report.messages.emplace_back("stopped by a signal; what was felt until then is kept");
+      break;
     }
     input.device = device.read();
     if (dt_s + input.late_s > options.deadline_s && input.device.fault == DeviceFault::none) {

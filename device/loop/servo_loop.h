@@ -59,7 +59,7 @@ struct ServoReport {
 
 struct ServoOptions {
   double rate_hz = 1000.0;
-  bool realtime = false;  // paces a simulated device with a timer, and stops on a signal
+  bool realtime = false;  // paces a simulated device with a timer, and takes signals (StopOnSignal)
   // Longest time between ticks. A later tick is reported as DeviceFault::late, which is recorded and felt.
   double deadline_s = 10e-3;
 };

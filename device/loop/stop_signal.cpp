@@ -2,11 +2,14 @@
 #include "device/loop/stop_signal.h"
 
 #include <signal.h>  // NOLINT(modernize-deprecated-headers): sigaction is POSIX
+#include <unistd.h>
 
 #include <array>
 #include <atomic>
 #include <cstddef>
+#include <mutex>
 #include <stdexcept>
+#include <string_view>
 
 namespace device {
 namespace {
@@ -15,6 +18,8 @@ constexpr std::array kStops{SIGINT, SIGTERM, SIGHUP};
 constexpr std::array kCrashes{SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
 
 std::atomic<int> stop_requested{0};
+std::mutex stops_guard;   // of the two below
+int stops_installed = 0;  // objects of StopOnSignal
 struct CrashAct {
   std::atomic<OnCrash::Act> act{nullptr};
   std::atomic<void*> user{nullptr};
@@ -27,8 +32,27 @@ static_assert(std::atomic<int>::is_always_lock_free && std::atomic<void*>::is_al
 std::array<struct sigaction, kStops.size()> stops_before{};
 std::array<struct sigaction, kCrashes.size()> crashes_before{};
 
+// Whoever starts a program may choose that a closed terminal does not end it (nohup).
+bool stays_ignored(std::size_t i) {
+  return kStops[i] == SIGHUP && stops_before[i].sa_handler == SIG_IGN;
+}
+
+void restore_stops() noexcept {
+  for (std::size_t i = 0; i < kStops.size(); ++i) {
+    struct sigaction action = stops_before[i];
+    if (action.sa_handler == SIG_IGN && !stays_ignored(i)) action.sa_handler = SIG_DFL;
+    sigaction(kStops[i], &action, nullptr);
+  }
+}
+
+// From the first signal on each of them ends the program at once.
 extern "C" void hybrid_on_stop(int signal) {
   stop_requested.store(signal);
+  restore_stops();
+  if (isatty(STDERR_FILENO) != 0) {
+    constexpr std::string_view kWords = "\nstopping; once more ends at once\n";
+    [[maybe_unused]] const ssize_t told = write(STDERR_FILENO, kWords.data(), kWords.size());
+  }
 }
 
 extern "C" void hybrid_on_crash(int signal) {
@@ -45,20 +69,32 @@ extern "C" void hybrid_on_crash(int signal) {
 }  // namespace
 
 StopOnSignal::StopOnSignal() {
+  const std::lock_guard lock(stops_guard);
+  if (stops_installed++ > 0) return;
   stop_requested.store(0);
+  for (std::size_t i = 0; i < kStops.size(); ++i) sigaction(kStops[i], nullptr, &stops_before[i]);
   struct sigaction action {};
   action.sa_handler = hybrid_on_stop;
-  action.sa_flags = static_cast<int>(SA_RESETHAND);
   sigemptyset(&action.sa_mask);
-  for (std::size_t i = 0; i < kStops.size(); ++i) sigaction(kStops[i], &action, &stops_before[i]);
+  for (const int signal : kStops) sigaddset(&action.sa_mask, signal);
+  for (std::size_t i = 0; i < kStops.size(); ++i) {
+    if (!stays_ignored(i)) sigaction(kStops[i], &action, nullptr);
+  }
 }
 
 StopOnSignal::~StopOnSignal() {
+  const std::lock_guard lock(stops_guard);
+  if (--stops_installed > 0) return;
   for (std::size_t i = 0; i < kStops.size(); ++i) sigaction(kStops[i], &stops_before[i], nullptr);
+  stop_requested.store(0);
 }
 
 int stop_signal() noexcept {
   return stop_requested.load(std::memory_order_relaxed);
+}
+
+void stop_if_asked() {
+  if (const int signal = stop_signal(); signal != 0) throw StopAsked{signal};
 }
 
 OnCrash::OnCrash(Act act, void* user) {

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Signals: a session that is told to stop, or that crashes, turns the motors off first.
+// Signals: what runs ends early and in order when it is told to stop. A session that crashes turns the motors
+// off first.
 #pragma once
 
 #include <cstddef>
 
 namespace device {
 
-// While an object exists, SIGINT, SIGTERM and SIGHUP ask the servo loop to end. A second signal of the same
-// kind kills as usual. At most one object at a time.
+// While an object exists, the first SIGINT, SIGTERM or SIGHUP asks for an end in order: servo loops end, and
+// stop_if_asked() throws. Any further one kills as usual. A SIGHUP that was ignored stays so (nohup). Objects
+// may overlap, on any thread; the first one installs the handlers, the last one restores what was there.
 class StopOnSignal {
  public:
   StopOnSignal();
@@ -18,8 +20,15 @@ class StopOnSignal {
   StopOnSignal& operator=(StopOnSignal&&) = delete;
 };
 
-// The signal that was received, or 0. Lock-free.
+// The signal that was received while an object of StopOnSignal exists, or 0. Lock-free.
 int stop_signal() noexcept;
+
+// Thrown through long work that is told to stop. No std::exception, so that nobody takes it for an error.
+struct StopAsked {
+  int signal = 0;
+};
+// Throws StopAsked once a signal was received.
+void stop_if_asked();
 
 // While an object exists, SIGSEGV, SIGBUS, SIGFPE, SIGILL and SIGABRT call `act(user)` on the thread that
 // crashed, and then take their previous effect. `act` must be safe in a signal handler. Not covered: a stack

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "device/loop/force_gate.h"
+#include "device/loop/stop_signal.h"
 #include "device/paths/path.h"
 #include "device/simulated/simulated.h"
 
@@ -61,6 +62,41 @@ TEST(ServoLoop, ASignalEndsAPacedOne) {
   EXPECT_EQ(report.end, device::ServoEnd::stopped);
   EXPECT_EQ(report.ticks, 3U);
   EXPECT_EQ(device.given.back(), 0.0);
+}
+
+TEST(ServoLoop, ASignalEndsOneThatIsNotPacedWhereItIsTaken) {
+  Recorder device;
+  int n = 0;
+  auto tick = [&n](const ServoInput& /*input*/) {
+    if (++n == 3) raise(SIGTERM);
+    return ServoAnswer{.force_N = {0, 0, 1}, .go_on = n < 1000};
+  };
+  const device::StopOnSignal stop;
+  const device::ServoReport report = device::run_servo(device, {}, tick);
+  EXPECT_EQ(report.end, device::ServoEnd::stopped);
+  EXPECT_EQ(report.ticks, 3U);
+  EXPECT_EQ(device::stop_signal(), SIGTERM);
+}
+
+TEST(StopOnSignal, ObjectsOverlapAndTheLastOneRestoresWhatWasThere) {
+  static int taken = 0;
+  taken = 0;
+  const auto before = std::signal(SIGTERM, [](int) { ++taken; });
+  {
+    const device::StopOnSignal outer;
+    { const device::StopOnSignal inner; }
+    EXPECT_NO_THROW(device::stop_if_asked());
+    raise(SIGTERM);
+    EXPECT_EQ(taken, 0);
+    EXPECT_EQ(device::stop_signal(), SIGTERM);
+    EXPECT_THROW(device::stop_if_asked(), device::StopAsked);
+    raise(SIGTERM);  // the second one goes to whoever was there
+    EXPECT_EQ(taken, 1);
+  }
+  EXPECT_EQ(device::stop_signal(), 0);
+  raise(SIGTERM);
+  EXPECT_EQ(taken, 2);
+  std::signal(SIGTERM, before);
 }
 
 TEST(ForceGate, ClosesAtOnceRestsAndRamps) {
