@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
 #include <istream>
 #include <mutex>
 #include <new>
@@ -282,33 +281,6 @@ MeshFile load_mesh(const std::filesystem::path& file, const MeshFileOptions& opt
   } catch (const std::bad_alloc&) {
     refuse_mesh(file, "does not fit into memory; simplify the mesh");
   }
-}
-
-void save_ply(const std::filesystem::path& file, const TriangleMesh& mesh) {
-  std::ofstream out(file, std::ios::binary);
-  if (!out) refuse_mesh(file, "cannot be written; check that the folder exists and that you may write there");
-  // Written here as doubles; OpenMesh would write floats.
-  out << "ply\nformat binary_little_endian 1.0\ncomment coordinates in meters\nelement vertex "
-      << mesh.vertices.size() << "\nproperty double x\nproperty double y\nproperty double z\nelement face "
-      << mesh.triangles.size() << "\nproperty list uchar int vertex_indices\nend_header\n";
-  std::string bytes;
-  const auto flush_above = [&](std::size_t limit) {
-    if (bytes.size() < limit) return;
-    out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    bytes.clear();
-  };
-  for (const glm::dvec3& v : mesh.vertices) {
-    for (int i = 0; i < 3; ++i) append_raw(bytes, v[i]);
-    flush_above(1U << 16U);
-  }
-  for (const TriangleIndices& t : mesh.triangles) {
-    append_raw(bytes, std::uint8_t{3});
-    for (const std::uint32_t corner : t) append_raw(bytes, corner);
-    flush_above(1U << 16U);
-  }
-  flush_above(0);
-  out.close();
-  if (!out) refuse_mesh(file, "could not be written to the end; check the space on the disk");
 }
 
 }  // namespace polygon

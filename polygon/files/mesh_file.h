@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reads and writes mesh files. This is the only part of the project that knows OpenMesh. Every file is
-// prescanned first (prescan.h), and nothing that is left out goes unreported.
+// Reads mesh files, and writes PLY (write_mesh.h writes other formats, and to streams). This is the only part
+// of the project that knows OpenMesh. Every file is prescanned first (prescan.h), and nothing that is left
+// out goes unreported.
 #pragma once
 
 #include <cstdint>
@@ -35,7 +36,7 @@ struct MeshFile {
 // max_bytes.
 MeshFile load_mesh(const std::filesystem::path& file, const MeshFileOptions& options = {});
 
-// Writes PLY, binary, coordinates in meters. Throws MeshError.
+// Writes PLY, binary, coordinates in meters, whole or not at all: beside its name first. Throws MeshError.
 void save_ply(const std::filesystem::path& file, const TriangleMesh& mesh);
 
 }  // namespace polygon

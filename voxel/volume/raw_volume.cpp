@@ -316,10 +316,10 @@ LabelVolume label_voxels(const std::filesystem::path& path, const VolumeData& da
       if (number >= 0.0 && number <= 255.0 && number == std::floor(number))
         return static_cast<std::uint8_t>(number);
       const auto nx = static_cast<std::size_t>(header.dims[0]);
-      refuse_volume(
-          path, "the file was read as labels, but voxel (", index % nx, ", ", index / nx, ", ", slice,
-          ") holds ", number,
-          ", which is not a label from 0 to 255; give rules that map ranges of intensity to labels");
+      refuse_volume(path, "the file was read as labels, but voxel (", index % nx, ", ", index / nx, ", ",
+                    slice, ") holds ", number,
+                    ", which is not a label from 0 to 255; say which range of intensities is meant, and of "
+                    "which label");
     };
     fill_labels<T>(data, next, axes, label_of, volume);
   });

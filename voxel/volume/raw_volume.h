@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <functional>
 #include <glm/mat3x3.hpp>
+#include <locale>
 #include <span>
 #include <sstream>
 #include <string>
@@ -52,6 +53,7 @@ using NextSlice = std::function<std::span<const std::byte>()>;
 template <typename... Parts>
 [[noreturn]] void refuse_volume(const std::filesystem::path& path, const Parts&... parts) {
   std::ostringstream text;
+  text.imbue(std::locale::classic());
   text.precision(9);
   text << path.string() << ": ";
   (text << ... << parts);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "voxel/volume/write_volume.h"
 
+#include <fcntl.h>
 #include <unistd.h>
 #include <zlib.h>
 
@@ -11,6 +12,7 @@
 #include <fstream>
 #include <glm/gtc/quaternion.hpp>
 #include <iomanip>
+#include <locale>
 #include <memory>
 #include <sstream>
 
@@ -27,19 +29,25 @@ constexpr const char* kRemedy = "check the folder's permissions and free space";
 
 enum class Packing { raw, gzip, zlib };
 
-// Writes a file completely or not at all: keep() renames the temporary file to the path.
+// Writes a file completely or not at all: keep() puts it in the place of the path, or of what a link there
+// names. Until then it has no name, and is gone with the process, where the file system can do that.
 class TemporaryFile {
  public:
   explicit TemporaryFile(fs::path path)
-      : path_(std::move(path)), part_(path_.string() + ".part" + std::to_string(getpid())) {
-    // A rename would replace an empty folder by the file.
+      : path_(std::move(path)),
+        target_(behind_links(path_)),
+        part_(target_.string() + ".part" + std::to_string(getpid())) {
     std::error_code error;
-    if (!fs::is_directory(path_, error)) out_.open(part_, std::ios::binary | std::ios::trunc);
+    const fs::file_status status = fs::status(target_, error);
+    beside_ = !fs::exists(status) || fs::is_regular_file(status);  // a device has no other name
+    // A rename would replace an empty folder by the file.
+    if (!fs::is_directory(status)) open();
     if (!out_.is_open()) refuse_volume(path_, "the file cannot be written; ", kRemedy);
   }
   ~TemporaryFile() {
+    if (descriptor_ >= 0) ::close(descriptor_);
     std::error_code ignored;
-    if (!kept_) fs::remove(part_, ignored);
+    if (beside_ && !kept_) fs::remove(part_, ignored);
   }
   TemporaryFile(const TemporaryFile&) = delete;
   TemporaryFile& operator=(const TemporaryFile&) = delete;
@@ -57,21 +65,56 @@ class TemporaryFile {
 
   void keep() {
     out_.close();
-    std::error_code error;
-    if (out_) fs::rename(part_, path_, error);
-    if (!out_ || error) refuse();
+    if (!out_) refuse();
+    if (beside_ && !put_in_place()) refuse();
     kept_ = true;
   }
 
  private:
+  static fs::path behind_links(fs::path path) {
+    constexpr int kMostLinks = 40;  // as for the system itself
+    std::error_code error;
+    for (int n = 0; n < kMostLinks && fs::is_symlink(fs::symlink_status(path, error)); ++n) {
+      const fs::path to = fs::read_symlink(path, error);
+      path = to.is_absolute() ? to : path.parent_path() / to;
+    }
+    return path;
+  }
+
+  [[nodiscard]] std::string open_file() const { return "/proc/self/fd/" + std::to_string(descriptor_); }
+
+  void open() {
+    constexpr mode_t kMode = 0666;  // less the umask
+    const fs::path folder = target_.has_parent_path() ? target_.parent_path() : fs::path(".");
+    if (beside_ && ::access("/proc/self/fd", X_OK) == 0)
+      descriptor_ = ::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, kMode);
+    unnamed_ = descriptor_ >= 0;
+    if (beside_ && !unnamed_)
+      descriptor_ = ::open(part_.c_str(), O_CREAT | O_RDWR | O_TRUNC | O_CLOEXEC, kMode);
+    if (beside_ && descriptor_ < 0) return;
+    out_.open(beside_ ? open_file() : target_.string(), std::ios::binary);
+  }
+
+  bool put_in_place() {
+    if (::fsync(descriptor_) != 0) return false;
+    std::error_code error;
+    if (unnamed_) {
+      fs::remove(part_, error);  // of a process that had this number and was killed
+      if (::linkat(AT_FDCWD, open_file().c_str(), AT_FDCWD, part_.c_str(), AT_SYMLINK_FOLLOW) != 0)
+        return false;
+    }
+    return ::rename(part_.c_str(), target_.c_str()) == 0;
+  }
+
   [[noreturn]] void refuse() const {
     refuse_volume(path_, "the volume was not written (", std::strerror(errno), "); ", kRemedy);
   }
 
-  fs::path path_, part_;
+  fs::path path_, target_, part_;
   std::ofstream out_;
+  int descriptor_ = -1;
   std::uint64_t written_ = 0;
-  bool kept_ = false;
+  bool beside_ = true, unnamed_ = false, kept_ = false;
 };
 
 class Packer {
@@ -222,6 +265,7 @@ std::string nifti_header(const Saved& s) {
 
 std::string nrrd_header(const Saved& s, const std::string& data_file) {
   std::ostringstream out;
+  out.imbue(std::locale::classic());
   out << std::setprecision(17) << "NRRD0005\n"
       << "type: " << (s.vectors ? "float" : "uint8") << "\ndimension: " << (s.vectors ? 4 : 3)
       << "\nspace: left-posterior-superior\nsizes: " << (s.vectors ? "3 " : "") << s.frame.dims[0] << ' '
@@ -246,6 +290,7 @@ constexpr int kSizeDigits = 20;
 
 std::string meta_header(const Saved& s, const std::string& data_file) {
   std::ostringstream out;
+  out.imbue(std::locale::classic());
   out << std::setprecision(17)
       << "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nCompressedData = "
          "True\nCompressedDataSize = "
@@ -295,6 +340,7 @@ void write_with_text_header(const Saved& s, const Voxels& voxels) {
   packer.finish();
   if (meta) {
     std::ostringstream size;
+    size.imbue(std::locale::classic());
     size << std::setw(kSizeDigits) << std::setfill('0') << to.written() - begin;
     file.rewrite(header.find(std::string(kSizeDigits, '0')), size.str());
   }

@@ -11,6 +11,7 @@
 #include <fstream>
 #include <limits>
 
+#include "polygon/files/write_mesh.h"
 #include "polygon/surface/primitives.h"
 #include "tests/shared_data.h"
 
@@ -309,6 +310,42 @@ TEST_F(MeshFiles, SavingSaysWhyItCannot) {
   if (std::filesystem::exists("/dev/full")) {
     EXPECT_THROW(save_ply("/dev/full", make_ball_mesh(1.0, 5)), MeshError);
   }
+}
+
+TEST_F(MeshFiles, WrittenFormatsAreReadAgainInTheirUnit) {
+  const TriangleMesh ball = make_ball_mesh(0.0123456789, 2);
+  struct Written {
+    const char* name;
+    void (*write)(const TriangleMesh&, const ByteSink&);
+    double unit_m, error_m;
+  };
+  // STL has floats, of which OpenMesh welds equal ones.
+  for (const Written& w :
+       {Written{"a.ply", write_ply, 1.0, 0.0}, Written{"a.stl", write_stl_in_mm, 1e-3, 1e-9},
+        Written{"a.obj", write_obj_in_mm, 1e-3, 1e-17}}) {
+    std::string bytes;
+    w.write(ball, [&bytes](std::string_view more) { bytes += more; });
+    const MeshFile back = load_mesh(write(w.name, bytes), {.scale = w.unit_m});
+    EXPECT_TRUE(back.findings.empty()) << w.name;
+    ASSERT_EQ(back.mesh.vertices.size(), ball.vertices.size()) << w.name;
+    ASSERT_EQ(back.mesh.triangles.size(), ball.triangles.size()) << w.name;
+    for (std::size_t t = 0; t < ball.triangles.size(); ++t) {
+      for (std::size_t corner = 0; corner < 3; ++corner) {
+        const glm::dvec3 away =
+            back.mesh.vertices[back.mesh.triangles[t][corner]] - ball.vertices[ball.triangles[t][corner]];
+        EXPECT_LE(glm::length(away), w.error_m) << w.name;
+      }
+    }
+  }
+}
+
+TEST_F(MeshFiles, AMeshThatIsNotFinishedLeavesWhatWasThere) {
+  save_ply(path("a.ply"), make_ball_mesh(1.0, 0));
+  EXPECT_EQ(load_mesh(path("a.ply")).mesh.triangles.size(), 20U);
+  save_ply(path("a.ply"), make_ball_mesh(1.0, 1));
+  EXPECT_EQ(load_mesh(path("a.ply")).mesh.triangles.size(), 80U);
+  EXPECT_EQ(
+      std::distance(std::filesystem::directory_iterator(folder_), std::filesystem::directory_iterator()), 1);
 }
 
 // The expected counts are those of the data sets' own list, made by another program.

@@ -209,7 +209,7 @@ TEST_F(VolumeFile, NotANumberIsEmptyAndIntensitiesAreNotLabels) {
   VolumeFileOptions options;
   options.rules = {{-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity(), 7}};
   EXPECT_EQ(voxel::load_volume(path, options).labels, (std::vector<std::uint8_t>{0, 7, 7}));
-  EXPECT_SAYS(refusal_of(path), "give rules");
+  EXPECT_SAYS(refusal_of(path), "say which range");
   const voxel::VolumeStatistics statistics = voxel::read_volume_statistics(path);
   EXPECT_EQ(statistics.minimum, -1024.0);
   EXPECT_EQ(statistics.maximum, 300.5);
