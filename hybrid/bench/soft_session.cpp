@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 
+#include "device/loop/stop_signal.h"
 #include "hybrid/bench/soft.h"
 #include "hybrid/bench/soft_engines.h"
 #include "hybrid/session/session.h"
@@ -87,6 +88,7 @@ SoftRow session_row(int edge, const Scene& scene, BuiltScene& built, const SoftB
                                             .reference_samples = options.quick ? 6 : kSamples,
                                             .progress = {},
                                             .async_relaxation = true});
+  device::stop_if_asked();
   row.repeats = result.ticks;
   row.time_us = result.tick_us.percentiles();
   row.truncated_share = static_cast<double>(built.state->truncated_ticks) /

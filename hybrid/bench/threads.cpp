@@ -14,6 +14,7 @@
 #include <thread>
 
 #include "device/loop/servo_timer.h"
+#include "device/loop/stop_signal.h"
 #include "hybrid/base/flush_to_zero.h"
 #include "hybrid/session/session.h"
 #include "hybrid/snapshot/fill_snapshot.h"
@@ -118,7 +119,9 @@ class ThreadBench {
     options.keep_rows = false;
     options.keep_recording = options.relaxation_thread = relaxes;
     options.surfaces_hz = kAsOftenAsItCan_hz;
-    return run_session(scene_, built, options);
+    SessionResult result = run_session(scene_, built, options);
+    device::stop_if_asked();
+    return result;
   }
   void add(std::size_t n, const SessionResult& result) {
     rows_[n].ticks += result.ticks;
@@ -173,6 +176,7 @@ class ThreadBench {
                  timer.raise_priority();
                  std::uint64_t hash = kHashBegin;
                  for (const RecordedTick& tick : felt.recording) {
+                   device::stop_if_asked();
                    timer.wait();
                    restore_tick_timing(tick, *built.state);
                    while (!ResultTape::ready(apart)) std::this_thread::yield();

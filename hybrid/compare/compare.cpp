@@ -8,11 +8,12 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "device/loop/stop_signal.h"
 #include "hybrid/build/build_objects.h"
+#include "hybrid/build/choose_model.h"
+#include "hybrid/compare/closed_form.h"
 #include "hybrid/compare/nearest_surface_rendering.h"
 #include "hybrid/compare/thesis_rendering.h"
-#include "hybrid/compare/closed_form.h"
-#include "hybrid/build/choose_model.h"
 
 namespace hybrid {
 namespace {
@@ -62,6 +63,7 @@ ModelResult run_model(const std::string& name, const Scene& scene, const Progres
   if (progress) progress(fmt::format("feeling it as {}", name));
   BuiltScene built = build_scene(scene, {});
   SessionResult session = run_session(scene, built, {.seconds = std::nullopt, .progress = {}});
+  device::stop_if_asked();
   ModelResult model{
       .name = name, .rows = std::move(session.rows), .depth_m = {}, .tick_us = session.tick_us.percentiles()};
   return model;

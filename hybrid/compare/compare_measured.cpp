@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
+#include "device/loop/stop_signal.h"
 #include "device/paths/path_file.h"
 
 namespace hybrid {
@@ -83,6 +84,7 @@ MeasuredComparison compare_measured(const Scene& scene, const MeasuredOptions& o
   BuiltScene built = build_scene(ideal, progress);
   SessionResult session = run_session(
       ideal, built, {.seconds = seconds, .progress = progress, .path = device::make_path(std::move(motion))});
+  device::stop_if_asked();
   ModelResult felt{.name = "scene",
                    .rows = std::move(session.rows),
                    .depth_m = {},

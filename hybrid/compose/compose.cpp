@@ -4,12 +4,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "hybrid/base/file_ending.h"
 #include "hybrid/compose/write_scene.h"
 #include "hybrid/scene/table_reader.h"
 #include "hybrid/session/session.h"
@@ -20,19 +20,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kDraft = ".compose-draft.toml";
+constexpr const char* kScene = "scene.toml";
+constexpr const char* kDraft = "draft.toml";
 constexpr std::size_t kMostPlaces = 12;  // objects of a segmentation that are said one by one
-
-bool is_mesh(const fs::path& file) {
-  fs::path name = file;
-  const auto lower = [](std::string s) {
-    std::transform(s.begin(), s.end(), s.begin(), [](unsigned char c) { return std::tolower(c); });
-    return s;
-  };
-  if (lower(name.extension().string()) == ".gz") name = name.stem();
-  const std::string ending = lower(name.extension().string());
-  return ending == ".obj" || ending == ".ply" || ending == ".stl" || ending == ".off";
-}
 
 // "head" of "head.nii.gz" and of "head/".
 std::string stem_of(const fs::path& file) {
@@ -233,8 +223,8 @@ Composed compose_starter(const ComposeOptions& options) {
         "FILE");
   }
   ComposeFolder folder(options.out, options.force);
-  folder.write_text("scene.toml", starter_scene());
-  const Scene scene = load_scene(folder.scene());
+  folder.write_text(kScene, starter_scene());
+  const Scene scene = load_scene(folder.staging() / kScene);
   Composed composed{.scene = folder.scene(), .path_s = scene_path(scene)->duration_s()};
   composed.tool_radius_m = scene.tool.radius_m;
   folder.keep();
@@ -252,10 +242,10 @@ Composed compose(const ComposeOptions& options, const Progress& progress) {
   std::vector<Input> inputs;
   std::vector<fs::path> scans;
   for (const fs::path& file : options.inputs) {
-    if (!options.labels.empty() && !is_mesh(file)) {
+    if (!options.labels.empty() && !is_mesh_name(file)) {
       scans.push_back(file);
     } else {
-      inputs.push_back({file, {}, is_mesh(file), {}});
+      inputs.push_back({file, {}, is_mesh_name(file), {}});
     }
   }
   if (scans.size() > 1) {
@@ -295,7 +285,7 @@ Composed compose(const ComposeOptions& options, const Progress& progress) {
   folder.write_text(kDraft, scene_text(parts, settings, no_path()));
   Composed composed{.scene = folder.scene(), .tool_radius_m = settings.tool_radius_m};
   {
-    const BuiltScene built = build_scene(load_scene(folder.path() / kDraft), progress);
+    const BuiltScene built = build_scene(load_scene(folder.staging() / kDraft), progress);
     if (progress) progress("planning a path");
     composed.path = plan_presses(built, parts, settings.tool_radius_m);
     composed.places = places(*built.world, !options.labels.empty());
@@ -305,8 +295,8 @@ Composed compose(const ComposeOptions& options, const Progress& progress) {
         "nothing of this scene can be reached from outside along an axis; `hybrid check` the inputs");
   }
   folder.drop(kDraft);
-  folder.write_text("scene.toml", scene_text(parts, settings, composed.path));
-  composed.path_s = scene_path(load_scene(folder.scene()))->duration_s();
+  folder.write_text(kScene, scene_text(parts, settings, composed.path));
+  composed.path_s = scene_path(load_scene(folder.staging() / kScene))->duration_s();
   composed.rows = std::move(parts.rows);
   composed.notes = std::move(parts.notes);
   folder.keep();

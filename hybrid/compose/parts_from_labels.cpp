@@ -8,12 +8,13 @@
 #include <cmath>
 #include <glm/common.hpp>
 
-#include "hybrid/geometry/surface_nets.h"
 #include "hybrid/base/process_memory.h"
+#include "hybrid/base/whole_file.h"
+#include "hybrid/geometry/surface_nets.h"
 #include "hybrid/scene/table_reader.h"
+#include "polygon/files/write_mesh.h"
 #include "polygon/mesh/mesh_bounds.h"
 #include "polygon/repair/check.h"
-#include "polygon/files/mesh_file.h"
 #include "voxel/volume/connected_components.h"
 #include "voxel/volume/read_volume.h"
 #include "voxel/volume/write_volume.h"
@@ -94,7 +95,11 @@ void add_bone(const LabelVolume& fine, int label, const std::string& label_name,
       parts.notes.push_back(fmt::format("{}: {}: {} {}", label_name, f.id, f.count, f.text));
   }
   const std::string name = folder.unused_name(label_name);
-  polygon::save_ply(folder.claim(name + ".ply"), mesh);
+  {
+    WholeFile out(folder.claim(name + ".ply"));
+    polygon::write_ply(mesh, [&out](std::string_view bytes) { out.write(bytes); });
+    out.keep();
+  }
   const Tissue* tissue = find_tissue(label_name);
   const polygon::MeshBounds bounds = polygon::checked_bounds(mesh);
   parts.rigid.push_back(
@@ -291,13 +296,34 @@ std::map<int, std::size_t> label_counts(const LabelVolume& volume) {
   return counts;
 }
 
+namespace {
+
+// Throws if the file can be read, but what it holds are no labels.
+void refuse_intensities(const std::filesystem::path& file) {
+  const voxel::VolumeStatistics held = voxel::read_volume_statistics(file, usable_memory_bytes() / 4);
+  if (!held.label_counts.empty()) return;
+  throw ComposeError(
+      fmt::format("--labels {}: holds intensities from {:.6g} to {:.6g}, not labels from 0 to 255; give the "
+                  "file without --labels, and say with --range LO,HI which intensities are tissue",
+                  file.string(), held.minimum, held.maximum));
+}
+
+}  // namespace
+
 LabelVolume read_labels(const std::filesystem::path& file, std::optional<double> spacing_m,
                         std::vector<std::string>& notes) {
   voxel::VolumeFileOptions options;
   options.max_bytes = usable_memory_bytes() / 4;
   if (spacing_m) options.spacing_m = glm::dvec3(*spacing_m);
   std::vector<std::string> of_file;
-  LabelVolume volume = voxel::load_volume(file, options, &of_file);
+  LabelVolume volume = [&] {
+    try {
+      return voxel::load_volume(file, options, &of_file);
+    } catch (const voxel::VolumeError&) {
+      refuse_intensities(file);
+      throw;
+    }
+  }();
   for (const std::string& note : of_file) notes.push_back(fmt::format("{}: {}", file.string(), note));
   return volume;
 }

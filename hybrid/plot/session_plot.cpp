@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <numbers>
 #include <stdexcept>
 
+#include "hybrid/base/number_text.h"
 #include "hybrid/plot/svg_figure.h"
 
 namespace hybrid {
@@ -19,12 +19,6 @@ using Intervals = std::vector<std::pair<double, double>>;
 
 constexpr double gap = std::numeric_limits<double>::quiet_NaN();
 constexpr const char* touched_colour = "#eaf2e3";
-
-std::string text_of(double value, const char* format) {
-  std::array<char, 64> text{};
-  std::snprintf(text.data(), text.size(), format, value);  // NOLINT(clang-diagnostic-format-nonliteral)
-  return text.data();
-}
 
 // A contact lasts from its tick to the next tick.
 Intervals contact_intervals(std::span<const TraceRow> rows, std::uint32_t mask) {
@@ -76,9 +70,9 @@ std::string largest(std::span<const TraceRow> rows) {
       when = row.t_s;
     }
   }
-  std::string words = most < 0.0
-                          ? "no finite force"
-                          : "largest force " + text_of(most, "%.3g N") + " at " + text_of(when, "%.3f s");
+  std::string words =
+      most < 0.0 ? "no finite force"
+                 : "largest force " + with_digits(most, 3) + " N" + " at " + with_decimals(when, 3) + " s";
   if (not_finite > 0) words += "; " + std::to_string(not_finite) + " ticks without a finite force (gaps)";
   return words;
 }
@@ -199,7 +193,7 @@ Panel clearance_panel(const ClearanceCourse& near) {
     }
     if (std::ranges::none_of(gap_mm, [](double g) { return std::isfinite(g); })) return;
     panel.series.push_back({std::string(name) + ", at most " +
-                                text_of(100.0 * std::fabs(deepest) / near.cell_m, "%.2f %%") +
+                                with_decimals(100.0 * std::fabs(deepest) / near.cell_m, 2) + " %" +
                                 " of a cell deep",
                             near.t_s, std::move(gap_mm), series_colour(colour)});
   };
@@ -225,8 +219,8 @@ void save_session_plot(const std::filesystem::path& svg, std::span<const TraceRo
     last = std::max(last, at);
   }
   figure.notes.push_back(std::to_string(rows.size()) + " ticks" +
-                         (first <= last ? ", " + text_of(last - first, "%.3f s") : "") + "; in contact " +
-                         text_of(duration(any), "%.3f s") + "; " + largest(rows));
+                         (first <= last ? ", " + with_decimals(last - first, 3) + " s" : "") +
+                         "; in contact " + with_decimals(duration(any), 3) + " s" + "; " + largest(rows));
 
   Panel force;
   force.title = "What the hand feels";
@@ -265,7 +259,7 @@ void save_session_plot(const std::filesystem::path& svg, std::span<const TraceRo
     Lane lane;
     lane.name = objects[i].name;
     lane.intervals = contact_intervals(rows, bit_of(i));
-    lane.note = (objects[i].soft ? "soft, " : "rigid, ") + text_of(duration(lane.intervals), "%.3f s");
+    lane.note = (objects[i].soft ? "soft, " : "rigid, ") + with_decimals(duration(lane.intervals), 3) + " s";
     lane.colour = series_colour(objects[i].soft ? 1 : 0);
     contact.lanes.push_back(std::move(lane));
   }
@@ -313,8 +307,8 @@ void save_compare_plot(const std::filesystem::path& svg, std::span<const Compare
   Figure figure;
   figure.title = title;
   figure.notes.push_back("reference: " + reference.name +
-                         "; one JND: " + text_of(100.0 * options.jnd_share, "%.3g %%") +
-                         " of its force, at least " + text_of(options.jnd_floor_N, "%.3g N"));
+                         "; one JND: " + with_digits(100.0 * options.jnd_share, 3) + " %" +
+                         " of its force, at least " + with_digits(options.jnd_floor_N, 3) + " N");
   if (with_sign) {
     figure.notes.emplace_back(
         "some force turns round: drawn is the part along the largest force of the reference; below 0 it "

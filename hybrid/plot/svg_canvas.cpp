@@ -3,7 +3,8 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdio>
+
+#include "hybrid/base/number_text.h"
 
 namespace hybrid {
 
@@ -52,9 +53,7 @@ std::string shortened(const std::string& text, std::size_t most) {
 }
 
 std::string fixed(double v) {
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.1f", std::clamp(v, -99999.0, 99999.0));
-  std::string out = text.data();
+  std::string out = with_decimals(std::clamp(v, -99999.0, 99999.0), 1);
   if (out.ends_with(".0")) out.resize(out.size() - 2);
   return out == "-0" ? "0" : out;
 }

@@ -3,16 +3,12 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cmath>
-#include <cstdio>
-#include <cstring>
-#include <fstream>
 #include <limits>
 #include <optional>
-#include <stdexcept>
-#include <system_error>
 
+#include "hybrid/base/number_text.h"
+#include "hybrid/base/whole_file.h"
 #include "hybrid/plot/downsample.h"
 #include "hybrid/plot/svg_canvas.h"
 
@@ -359,19 +355,7 @@ std::string to_svg(const Figure& figure) {
 }
 
 void save_svg(const std::filesystem::path& file, const Figure& figure) {
-  const std::string text = to_svg(figure);
-  errno = 0;
-  std::ofstream out(file, std::ios::binary);
-  if (!out) {
-    throw std::runtime_error(file.string() + ": cannot write the plot (" + std::strerror(errno) +
-                             "); name a file in a folder that exists and that you may write to");
-  }
-  out << text << std::flush;
-  if (out) return;
-  out.close();
-  std::error_code ignored;
-  if (std::filesystem::is_regular_file(file, ignored)) std::filesystem::remove(file, ignored);
-  throw std::runtime_error(file.string() + ": the plot could not be finished; see that the disk has room");
+  save_text(file, to_svg(figure));
 }
 
 std::string series_colour(std::size_t index) {
@@ -399,11 +383,11 @@ std::vector<double> nice_ticks(double from, double to, int wanted) {
 }
 
 std::string tick_text(double value, double step) {
-  std::array<char, 64> text{};
+  std::string text;
   const double size = std::max(std::abs(value), std::abs(step));
   if (std::abs(value) < 1e-9 * std::abs(step)) return "0";
   if (size >= 1e6 || (step != 0.0 && std::abs(step) < 1e-5)) {
-    std::snprintf(text.data(), text.size(), "%.4g", value);
+    text = with_digits(value, 4);
   } else {
     int decimals = step != 0.0 ? 0 : 3;
     for (double scaled = std::abs(step);
@@ -411,11 +395,9 @@ std::string tick_text(double value, double step) {
       scaled *= 10.0;
       ++decimals;
     }
-    std::snprintf(text.data(), text.size(), "%.*f", decimals, value);
+    text = with_decimals(value, decimals);
   }
-  std::string out = text[0] == '-' ? "−" : "";
-  out += text.data() + (text[0] == '-' ? 1 : 0);
-  return out;
+  return text.starts_with("-") ? "−" + text.substr(1) : text;
 }
 
 }  // namespace hybrid

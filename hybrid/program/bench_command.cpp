@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "device/loop/stop_signal.h"
 #include "hybrid/bench/convergence_plot.h"
 #include "hybrid/bench/occupancy.h"
 #include "hybrid/bench/occupancy_plot.h"
@@ -13,6 +14,7 @@
 #include "hybrid/bench/soft.h"
 #include "hybrid/bench/threads.h"
 #include "hybrid/program/commands.h"
+#include "hybrid/program/outputs.h"
 #include "hybrid/session/report.h"
 
 namespace hybrid {
@@ -58,7 +60,7 @@ std::vector<std::string> chosen_in_suite(const std::vector<std::string>& chosen,
   return result;
 }
 
-nlohmann::ordered_json rigid_suite(const BenchCommand& command, std::FILE* words) {
+void rigid_suite(const BenchCommand& command, std::FILE* words, nlohmann::ordered_json& json) {
   bench::RigidBenchOptions options{.quick = command.quick,
                                    .every_tick = command.every_tick,
                                    .paths = chosen_in_suite(command.only, bench::rigid_paths()),
@@ -67,10 +69,12 @@ nlohmann::ordered_json rigid_suite(const BenchCommand& command, std::FILE* words
                                    .trace = command.trace,
                                    .progress = progress_on_terminal(),
                                    .on_row = {}};
-  options.on_row = [words](const bench::RigidRow& row) {
+  options.on_row = [words, &json](const bench::RigidRow& row) {
     end_progress();
+    json.push_back(bench::to_json(row));
     fmt::print(words, "{}", bench::table_line(row));
     std::fflush(words);
+    device::stop_if_asked();
   };
   fmt::print(words,
              "times in us, lengths in um (u) or mm (m), build in ms; 'mesh err' is the distance to the exact "
@@ -84,14 +88,11 @@ nlohmann::ordered_json rigid_suite(const BenchCommand& command, std::FILE* words
                rows.front().timer_overhead_us);
   if (const std::string ratios = bench::ratio_table(rows); !ratios.empty())
     fmt::print(words, "\nhybrid's own times, and how many times as long the baselines took:\n{}", ratios);
-  nlohmann::ordered_json json = nlohmann::ordered_json::array();
-  for (const bench::RigidRow& row : rows) json.push_back(bench::to_json(row));
-  return json;
 }
 
-// Returns the rows; `growth` receives the growth of work with size.
-nlohmann::ordered_json soft_suite(const BenchCommand& command, std::FILE* words,
-                                  nlohmann::ordered_json& growth) {
+// `growth` receives the growth of work with size.
+void soft_suite(const BenchCommand& command, std::FILE* words, Outputs& outputs, nlohmann::ordered_json& json,
+                nlohmann::ordered_json& growth) {
   bench::SoftBenchOptions options{.quick = command.quick,
                                   .cases = chosen_in_suite(command.only, bench::soft_cases()),
                                   .engines = {},
@@ -104,10 +105,12 @@ nlohmann::ordered_json soft_suite(const BenchCommand& command, std::FILE* words,
     if (!chosen_in_suite(command.engines, {bench::engine_name(engine)}).empty())
       options.engines.push_back(engine);
   }
-  options.on_row = [words](const bench::SoftRow& row) {
+  options.on_row = [words, &json](const bench::SoftRow& row) {
     end_progress();
+    json.push_back(bench::to_json(row));
     fmt::print(words, "{}", bench::soft_table_line(row));
     std::fflush(words);
+    device::stop_if_asked();
   };
   fmt::print(words, "times in us, depth and slack in spacings; 'viol' are links beyond their limits\n{}",
              bench::soft_table_head());
@@ -117,13 +120,9 @@ nlohmann::ordered_json soft_suite(const BenchCommand& command, std::FILE* words,
     fmt::print(words, "\n{}", bench::in_words(*found));
     growth = bench::to_json(*found);
   }
-  if (!command.plot.empty()) {
-    save_settling_plot(command.plot, bench::measure_settling(kSettlingRounds));
-    fmt::print(words, "plot: {}\n", command.plot.string());
-  }
-  nlohmann::ordered_json json = nlohmann::ordered_json::array();
-  for (const bench::SoftRow& row : rows) json.push_back(bench::to_json(row));
-  return json;
+  outputs.write("plot", command.plot, [](const std::filesystem::path& file) {
+    save_settling_plot(file, bench::measure_settling(kSettlingRounds));
+  });
 }
 
 // With all suites, each plot gets its suite's name, because several suites write one.
@@ -133,7 +132,8 @@ std::filesystem::path occupancy_plot(const BenchCommand& command) {
   return plot.replace_filename(plot.stem().string() + "-occupancy" + plot.extension().string());
 }
 
-nlohmann::ordered_json occupancy_suite(const BenchCommand& command, std::FILE* words) {
+void occupancy_suite(const BenchCommand& command, std::FILE* words, Outputs& outputs,
+                     nlohmann::ordered_json& json) {
   bench::OccupancyBenchOptions options{.quick = command.quick,
                                        .cases = chosen_in_suite(command.only, bench::occupancy_cases()),
                                        .engines = {},
@@ -144,10 +144,12 @@ nlohmann::ordered_json occupancy_suite(const BenchCommand& command, std::FILE* w
     if (!chosen_in_suite(command.engines, {bench::engine_name(engine)}).empty())
       options.engines.push_back(engine);
   }
-  options.on_row = [words](const bench::OccupancyRow& row) {
+  options.on_row = [words, &json](const bench::OccupancyRow& row) {
     end_progress();
+    json.push_back(bench::to_json(row));
     fmt::print(words, "{}", bench::occupancy_table_line(row));
     std::fflush(words);
+    device::stop_if_asked();
   };
   fmt::print(
       words,
@@ -158,16 +160,11 @@ nlohmann::ordered_json occupancy_suite(const BenchCommand& command, std::FILE* w
   const std::vector<bench::OccupancyRow> rows = bench::bench_occupancy(options);
   end_progress();
   fmt::print(words, "\n{}", bench::occupancy_summary(rows));
-  if (const std::filesystem::path plot = occupancy_plot(command); !plot.empty()) {
-    save_occupancy_plot(plot, rows);
-    fmt::print(words, "plot: {}\n", plot.string());
-  }
-  nlohmann::ordered_json json = nlohmann::ordered_json::array();
-  for (const bench::OccupancyRow& row : rows) json.push_back(bench::to_json(row));
-  return json;
+  outputs.write("plot", occupancy_plot(command),
+                [&rows](const std::filesystem::path& file) { save_occupancy_plot(file, rows); });
 }
 
-nlohmann::ordered_json threads_suite(const BenchCommand& command, std::FILE* words) {
+void threads_suite(const BenchCommand& command, std::FILE* words, nlohmann::ordered_json& json) {
   bench::ThreadsBenchOptions options{.scenes = command.scenes, .progress = progress_on_terminal()};
   if (command.session_s) options.seconds = *command.session_s;
   const std::vector<bench::ThreadsRow> rows = bench::bench_threads(options);
@@ -176,9 +173,7 @@ nlohmann::ordered_json threads_suite(const BenchCommand& command, std::FILE* wor
              "the servo thread's own processor time, in us, while the other cores relax and snap, and while "
              "they copy memory\n{}",
              bench::threads_table(rows));
-  nlohmann::ordered_json json = nlohmann::ordered_json::array();
   for (const bench::ThreadsRow& row : rows) json.push_back(bench::to_json(row));
-  return json;
 }
 
 // Whether a suite has anything to do: in "all" it is left out if every chosen name belongs to other suites.
@@ -232,45 +227,62 @@ std::string bench_mesh_error(const std::string& name) {
   }
 }
 
-int run_bench(const BenchCommand& command) {
-  std::FILE* words = command.json == "-" ? stderr : stdout;
-  nlohmann::ordered_json report = report_head("bench");
-  report["quick"] = command.quick;
-  report["suites"] = nlohmann::ordered_json::object();
+namespace {
+
+// Runs what was asked for into `report`, row by row. Throws std::invalid_argument: there is nothing to run.
+void run_suites(const BenchCommand& command, Outputs& outputs, nlohmann::ordered_json& report) {
+  std::FILE* words = outputs.words();
+  nlohmann::ordered_json& suites = report["suites"] = nlohmann::ordered_json::object();
   const auto runs = [&command](const char* suite) {
     return command.suite == "all" || command.suite == suite;
   };
-  bool any = false;
-  if (runs("rigid") && has_work(command, bench::rigid_paths(), names_of(bench::kEngines))) {
-    report["suites"]["rigid"] = rigid_suite(command, words);
-    any = true;
-  }
+  const auto rows_of = [&suites](const char* suite) -> nlohmann::ordered_json& {
+    return suites[suite] = nlohmann::ordered_json::array();
+  };
+  if (runs("rigid") && has_work(command, bench::rigid_paths(), names_of(bench::kEngines)))
+    rigid_suite(command, words, rows_of("rigid"));
   if (runs("soft") && has_work(command, bench::soft_cases(), names_of(bench::kSoftEngines))) {
     nlohmann::ordered_json growth;
-    report["suites"]["soft"] = soft_suite(command, words, growth);
+    soft_suite(command, words, outputs, rows_of("soft"), growth);
     report["growth"] = growth;
-    any = true;
   }
-  if (runs("occupancy") && has_work(command, bench::occupancy_cases(), names_of(bench::kOccupancyEngines))) {
-    report["suites"]["occupancy"] = occupancy_suite(command, words);
-    any = true;
-  }
+  if (runs("occupancy") && has_work(command, bench::occupancy_cases(), names_of(bench::kOccupancyEngines)))
+    occupancy_suite(command, words, outputs, rows_of("occupancy"));
   if (command.suite == "threads" && command.scenes.empty())
     throw std::invalid_argument("bench threads: no scene; say which, as in --scenes scenes/cube.toml");
-  if (!command.scenes.empty() && runs("threads")) {
-    report["suites"]["threads"] = threads_suite(command, words);
-    any = true;
+  if (!command.scenes.empty() && runs("threads")) threads_suite(command, words, rows_of("threads"));
+  if (!suites.empty()) return;
+  throw std::invalid_argument(fmt::format(
+      "bench {}: nothing of --only or --engines belongs to it; paths and engines of rigid are {} and {}, "
+      "cases and engines of soft {} and {}, of occupancy {} and {}",
+      command.suite, listed(bench::rigid_paths()), listed(names_of(bench::kEngines)),
+      listed(bench::soft_cases()), listed(names_of(bench::kSoftEngines)), listed(bench::occupancy_cases()),
+      listed(names_of(bench::kOccupancyEngines))));
+}
+
+}  // namespace
+
+int run_bench(const BenchCommand& command) {
+  Outputs outputs;
+  outputs.ask_plot(command.plot);
+  outputs.ask_json(command.json);
+  nlohmann::ordered_json report = report_head("bench");
+  report["quick"] = command.quick;
+  const device::StopOnSignal stop;  // rows that are done are kept
+  int signal = 0;
+  try {
+    run_suites(command, outputs, report);
+  } catch (const device::StopAsked& asked) {
+    signal = asked.signal;
+    report["stopped"] = true;
   }
-  if (!any) {
-    throw std::invalid_argument(fmt::format(
-        "bench {}: nothing of --only or --engines belongs to it; paths and engines of rigid are {} and {}, "
-        "cases and engines of soft {} and {}, of occupancy {} and {}",
-        command.suite, listed(bench::rigid_paths()), listed(names_of(bench::kEngines)),
-        listed(bench::soft_cases()), listed(names_of(bench::kSoftEngines)), listed(bench::occupancy_cases()),
-        listed(names_of(bench::kOccupancyEngines))));
-  }
-  if (!command.json.empty()) save_json(command.json, report);
-  return 0;
+  end_progress();
+  outputs.write_json(command.json, report);
+  outputs.say_files();
+  if (signal == 0) return outputs.failed() ? 1 : 0;
+  std::size_t rows = 0;
+  for (const auto& suite : report["suites"]) rows += suite.size();
+  return outputs.say_stopped(signal, fmt::format("{} rows", rows));
 }
 
 }  // namespace hybrid

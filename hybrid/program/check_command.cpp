@@ -7,8 +7,11 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "hybrid/base/file_ending.h"
 #include "hybrid/base/process_memory.h"
 #include "hybrid/program/commands.h"
+#include "hybrid/program/outputs.h"
+#include "hybrid/scene/table_reader.h"
 #include "hybrid/session/report.h"
 #include "polygon/files/mesh_file.h"
 #include "polygon/repair/check.h"
@@ -83,6 +86,13 @@ void print_findings(std::FILE* out, const Json& findings, const char* indent) {
   }
 }
 
+std::string unit_in_words(double unit_m) {
+  for (const auto& [name, value_m] : length_units()) {
+    if (value_m == unit_m) return name;
+  }
+  return fmt::format("{:g} m", unit_m);
+}
+
 void check_mesh_file(const std::filesystem::path& path, const CheckCommand& command, Json& file) {
   file["kind"] = "mesh";
   polygon::MeshFile loaded =
@@ -102,11 +112,13 @@ void check_mesh_file(const std::filesystem::path& path, const CheckCommand& comm
   file["upper_m"] = to_json(high);
   file["volume_m3"] = checked.volume_m3;
   file["touch_bytes"] = surface->memory_bytes();
-  file["summary"] =
-      fmt::format("{} vertices, {} triangles, {:.4g} x {:.4g} x {:.4g} m, {}; {:.1f} MB to touch",
-                  mesh->vertices.size(), mesh->triangles.size(), high.x - low.x, high.y - low.y,
-                  high.z - low.z, polygon::touched_as(checked),
-                  static_cast<double>(surface->memory_bytes()) / 1e6);
+  file["summary"] = fmt::format(
+      "{} vertices, {} triangles, {:.4g} x {:.4g} x {:.4g} mm where the file's unit is {}, {}; "
+      "{:.1f} MB to touch",
+      mesh->vertices.size(), mesh->triangles.size(), 1e3 * (high.x - low.x), 1e3 * (high.y - low.y),
+      1e3 * (high.z - low.z), unit_in_words(command.unit_m),
+      polygon::touched_as(checked),
+      static_cast<double>(surface->memory_bytes()) / 1e6);
 }
 
 void check_volume_file(const std::filesystem::path& path, Json& file) {
@@ -179,29 +191,21 @@ void check_scene_file(const std::filesystem::path& path, Json& file) {
       built.state->map.cell_m() * 1e3, static_cast<double>(bytes) / 1e6, built.seconds);
 }
 
-bool is_mesh(std::string extension, std::string stem_extension) {
-  const auto lower = [](std::string& s) {
-    std::transform(s.begin(), s.end(), s.begin(), [](unsigned char c) { return std::tolower(c); });
-  };
-  lower(extension);
-  lower(stem_extension);
-  const std::string& e = extension == ".gz" ? stem_extension : extension;
-  return e == ".obj" || e == ".ply" || e == ".stl" || e == ".off";
-}
-
 }  // namespace
 
 int check(const CheckCommand& command) {
+  Outputs outputs;
+  outputs.ask_json(command.json);
   Json report = report_head("check");
   report["files"] = Json::array();
-  std::FILE* words = command.json == "-" ? stderr : stdout;
+  std::FILE* words = outputs.words();
   int status = 0;
   for (const std::filesystem::path& path : command.files) {
     Json file{{"file", path.string()}, {"kind", "unknown"}, {"findings", Json::array()}};
     try {
-      if (path.extension() == ".toml") {
+      if (lower_ending(path) == ".toml") {
         check_scene_file(path, file);
-      } else if (is_mesh(path.extension().string(), path.stem().extension().string())) {
+      } else if (is_mesh_name(path)) {
         check_mesh_file(path, command, file);
       } else {
         check_volume_file(path, file);
@@ -222,8 +226,8 @@ int check(const CheckCommand& command) {
     }
     report["files"].push_back(file);
   }
-  if (!command.json.empty()) save_json(command.json, report);
-  return status;
+  outputs.write_json(command.json, report);
+  return outputs.failed() ? 1 : status;
 }
 
 }  // namespace hybrid

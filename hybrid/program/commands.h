@@ -38,8 +38,8 @@ int replay(const ReplayCommand& command);
 struct CheckCommand {
   std::vector<std::filesystem::path> files;
   bool deep = false;
-  bool repair = false;  // also report the changes that `repair = true` would make
-  double unit_m = 1.0;  // of mesh files
+  bool repair = false;   // also report the changes that `repair = true` would make
+  double unit_m = 1e-3;  // of mesh files, as scenes and `compose` have it
   std::string json;
 };
 int check(const CheckCommand& command);
@@ -86,6 +86,7 @@ std::string bench_mesh_error(const std::string& name);  // empty: the mesh exist
 
 struct StabilityCommand {
   std::filesystem::path scene, plot;
+  bool quick = false;
   std::string json;
 };
 int stability(const StabilityCommand& command);
@@ -112,7 +113,7 @@ struct ViewCommand {
 int view(const ViewCommand& command);
 
 // Progress on standard error. A terminal shows one line that is overwritten. Otherwise, after the first
-// second, a line is written at most every two seconds.
+// second, a line is written at most every two seconds. Throws device::StopAsked once a signal came.
 Progress progress_on_terminal();
 void end_progress();
 // Both write to standard error: the notes of the build, and the file with the seconds around a fault.

@@ -4,9 +4,11 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "hybrid/base/file_ending.h"
 #include "hybrid/compare/compare.h"
 #include "hybrid/plot/session_plot.h"
 #include "hybrid/program/commands.h"
+#include "hybrid/program/outputs.h"
 #include "hybrid/session/report.h"
 
 namespace hybrid {
@@ -52,36 +54,32 @@ void print_models(std::FILE* words, const Comparison& comparison) {
   }
 }
 
-void save_comparison_plot(const CompareCommand& command, const Scene& scene, const Comparison& comparison,
-                          std::FILE* words) {
-  if (command.plot.empty()) return;
+void save_comparison_plot(const std::filesystem::path& file, const Scene& scene,
+                          const Comparison& comparison) {
   std::vector<ComparedModel> models;
   for (const ModelResult& m : comparison.models) models.push_back({m.name, m.rows, m.depth_m});
   save_compare_plot(
-      command.plot, models, {},
+      file, models, {},
       fmt::format("{}: {}", scene.title.empty() ? scene.file.stem().string() : scene.title,
                   comparison.object),
       {.reference = comparison.reference, .jnd_share = kJndShare, .jnd_floor_N = comparison.jnd_floor_N});
-  fmt::print(words, "\nplot: {}\n", command.plot.string());
 }
 
-int compare_with_measured(const CompareCommand& command, const Scene& scene) {
+// All files come before the words, which a reader may cut short.
+void write_files(const CompareCommand& command, const Scene& scene, const Comparison& comparison,
+                 const nlohmann::ordered_json& report, Outputs& outputs) {
+  outputs.write_json(command.json, report);
+  outputs.write("plot", command.plot,
+                [&](const std::filesystem::path& file) { save_comparison_plot(file, scene, comparison); });
+}
+
+int compare_with_measured(const CompareCommand& command, const Scene& scene, Outputs& outputs) {
   MeasuredOptions options = command.measured;
   // .traj files of the evaluation are in millimeters; a CSV without units follows the scene.
-  if (options.measured.file.extension() != ".traj") options.measured.unit_m = scene.unit_m;
+  if (lower_ending(options.measured.file) != ".traj") options.measured.unit_m = scene.unit_m;
   const MeasuredComparison result = compare_measured(scene, options, progress_on_terminal());
   end_progress();
   for (const std::string& note : result.notes) std::fprintf(stderr, "note: %s\n", note.c_str());
-  std::FILE* words = command.json == "-" ? stderr : stdout;
-  const std::string file = options.measured.file.filename().string();
-  fmt::print(words, "{} along {}, {} ticks\n", scene.file.filename().string(),
-             options.along.empty() ? file : options.along.filename().string(), result.samples);
-  print_models(words, result.comparison);
-  fmt::print(words, "\nRMS force error over all ticks, in contact or not: {:.4f} N\n", result.rms_N);
-  if (result.in_gaps > 0)
-    fmt::print(words, "{} ticks lie in gaps of the measurement, and are left out\n", result.in_gaps);
-  save_comparison_plot(command, scene, result.comparison, words);
-  if (command.json.empty()) return 0;
   nlohmann::ordered_json j = comparison_report(scene, result.comparison);
   j["measured"] = {{"file", options.measured.file.string()},
                    {"along", options.along.empty() ? nlohmann::ordered_json(nullptr)
@@ -90,27 +88,39 @@ int compare_with_measured(const CompareCommand& command, const Scene& scene) {
                    {"ticks", result.samples},
                    {"ticks_in_gaps", result.in_gaps},
                    {"notes", result.notes}};
-  save_json(command.json, j);
-  return 0;
+  write_files(command, scene, result.comparison, j, outputs);
+  std::FILE* words = outputs.words();
+  const std::string file = options.measured.file.filename().string();
+  fmt::print(words, "{} along {}, {} ticks\n", scene.file.filename().string(),
+             options.along.empty() ? file : options.along.filename().string(), result.samples);
+  print_models(words, result.comparison);
+  fmt::print(words, "\nRMS force error over all ticks, in contact or not: {:.4f} N\n", result.rms_N);
+  if (result.in_gaps > 0)
+    fmt::print(words, "{} ticks lie in gaps of the measurement, and are left out\n", result.in_gaps);
+  outputs.say_files();
+  return outputs.failed() ? 1 : 0;
 }
 
 }  // namespace
 
 int compare(const CompareCommand& command) {
   const Scene scene = load_scene(command.scene);
-  if (!command.measured.measured.file.empty()) return compare_with_measured(command, scene);
+  Outputs outputs;
+  outputs.ask_plot(command.plot);
+  outputs.ask_json(command.json);
+  if (!command.measured.measured.file.empty()) return compare_with_measured(command, scene, outputs);
   const Comparison comparison = compare_models(scene, command.object, progress_on_terminal());
   end_progress();
-  std::FILE* words = command.json == "-" ? stderr : stdout;
+  write_files(command, scene, comparison, comparison_report(scene, comparison), outputs);
+  std::FILE* words = outputs.words();
   fmt::print(
       words,
       "\"{}\" alone along the path of {}: no other objects, an ideal device, tissue relaxed in the tick "
       "(the force of the whole scene: hybrid run)\n",
       comparison.object, scene.file.filename().string());
   print_models(words, comparison);
-  save_comparison_plot(command, scene, comparison, words);
-  if (!command.json.empty()) save_json(command.json, comparison_report(scene, comparison));
-  return 0;
+  outputs.say_files();
+  return outputs.failed() ? 1 : 0;
 }
 
 }  // namespace hybrid

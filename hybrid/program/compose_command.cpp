@@ -5,7 +5,9 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "device/loop/stop_signal.h"
 #include "hybrid/program/commands.h"
+#include "hybrid/program/outputs.h"
 #include "hybrid/scene/table_reader.h"
 #include "hybrid/session/report.h"
 
@@ -70,9 +72,13 @@ Json composition_report(const Composed& composed) {
 }  // namespace
 
 int compose(const ComposeCommand& command) {
+  Outputs outputs;
+  outputs.ask_json(command.json);
+  const device::StopOnSignal stop;  // what was written until then goes again
   const Composed composed = compose(command.options, progress_on_terminal());
   end_progress();
-  std::FILE* words = command.json == "-" ? stderr : stdout;
+  outputs.write_json(command.json, composition_report(composed));
+  std::FILE* words = outputs.words();
   for (const std::string& note : composed.notes) fmt::print(stderr, "note: {}\n", note);
   if (!composed.rows.empty()) print_table(words, composed.rows);
   if (!composed.places.empty()) fmt::print(words, "\n");
@@ -93,8 +99,7 @@ int compose(const ComposeCommand& command) {
   fmt::print(words, "\n{}: written; its path takes {:.0f} s\nnext: hybrid run {} --picture {}\n", scene,
              composed.path_s, in_shell(scene),
              in_shell((composed.scene.parent_path() / "scene.png").string()));
-  if (!command.json.empty()) save_json(command.json, composition_report(composed));
-  return 0;
+  return outputs.failed() ? 1 : 0;
 }
 
 }  // namespace hybrid

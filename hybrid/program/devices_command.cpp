@@ -10,6 +10,7 @@
 #include "device/phantom/phantom.h"
 #include "device/simulated/simulated.h"
 #include "hybrid/program/commands.h"
+#include "hybrid/program/outputs.h"
 #include "hybrid/session/report.h"
 
 namespace hybrid {
@@ -112,6 +113,8 @@ Json simulated_row(const char* model, device::DeviceModel which, std::string& te
 }  // namespace
 
 int devices(const DevicesCommand& command) {
+  Outputs outputs;
+  outputs.ask_json(command.json);
   Json report = report_head("devices");
   std::string real, simulated;
   report["devices"] = Json::array();
@@ -119,9 +122,9 @@ int devices(const DevicesCommand& command) {
   report["devices"].push_back(simulated_row("premium-1.5", device::DeviceModel::premium_1_5, simulated));
   report["devices"].push_back(simulated_row("touch", device::DeviceModel::touch, simulated));
   report["devices"].push_back(simulated_row("ideal", device::DeviceModel::ideal, simulated));
-  fmt::print(command.json == "-" ? stderr : stdout, "{}{}", real, simulated);
-  if (!command.json.empty()) save_json(command.json, report);
-  return 0;
+  outputs.write_json(command.json, report);
+  fmt::print(outputs.words(), "{}{}", real, simulated);
+  return outputs.failed() ? 1 : 0;
 }
 
 }  // namespace hybrid

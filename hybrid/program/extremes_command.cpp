@@ -5,7 +5,9 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "device/loop/stop_signal.h"
 #include "hybrid/program/commands.h"
+#include "hybrid/program/outputs.h"
 #include "hybrid/session/report.h"
 #include "hybrid/stress/extremes.h"
 #include "hybrid/stress/fuzz_ticks.h"
@@ -48,7 +50,10 @@ nlohmann::ordered_json fuzz(const ExtremesCommand& command, std::FILE* words, bo
 }  // namespace
 
 int extremes(const ExtremesCommand& command) {
-  std::FILE* words = command.json == "-" ? stderr : stdout;
+  Outputs outputs;
+  outputs.ask_json(command.json);
+  std::FILE* words = outputs.words();
+  const device::StopOnSignal stop;  // scratch files go
   nlohmann::ordered_json report = report_head("stability");
   report["scene"] = command.scene.string();
   bool ok = true;
@@ -63,8 +68,8 @@ int extremes(const ExtremesCommand& command) {
   }
   if (command.fuzz_ticks > 0) report["fuzz"] = fuzz(command, words, ok);
   report["ok"] = ok;
-  if (!command.json.empty()) save_json(command.json, report);
-  return ok ? 0 : 1;
+  outputs.write_json(command.json, report);
+  return ok && !outputs.failed() ? 0 : 1;
 }
 
 }  // namespace hybrid

@@ -1,12 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The `hybrid` program: the spelling of its commands and options. Exit status: 0 done, 1 refused input, an
-// unequal replay or a violated invariant, 2 usage.
+// unequal replay or a violated invariant, 2 usage, 128 and the number of a signal that ended it.
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
 #include <cstdio>
+#include <cstring>
 #include <exception>
 #include <nlohmann/json.hpp>
 
+#include "device/loop/stop_signal.h"
+#include "hybrid/base/file_ending.h"
 #include "hybrid/program/commands.h"
+#include "hybrid/program/outputs.h"
+#include "hybrid/scene/table_reader.h"
 
 namespace {
 
@@ -21,7 +29,7 @@ constexpr const char* kAbout =
     "  hybrid compose --labels labels.nii.gz --names labels.csv --out body   a scene from a segmented "
     "scan\n\n"
     "A scene is one small text file; scenes/README.md describes its keys.\n"
-    "Exit status: 0 done, 1 input refused (with the place and the remedy), 2 wrong usage.";
+    "Exit status: 0 done, 1 input refused (with the place and the remedy), 2 wrong usage, 130 Ctrl-C.";
 
 void add_device(CLI::App& sub, std::string& device) {
   sub.add_option("--device", device, "use this one in place of the scene's")
@@ -57,7 +65,7 @@ void add_run(CLI::App& app, int& status) {
   sub->add_option("--black-box", c->black_box,
                   "where the 2 s around the first fault go; default in real time: SCENE-fault.csv here");
   sub->add_option("--save-surface", c->save_surface,
-                  "write all surfaces as they are at the end as one PLY (m, scene frame)");
+                  "write all surfaces as they are at the end, scene frame, as STL or OBJ (mm) or PLY (m)");
   sub->add_option("--save-volume", c->save_volume,
                   "write each soft object's displacement and moved labels (.nii.gz, .nrrd, .mha)");
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
@@ -82,9 +90,10 @@ void add_check(CLI::App& app, int& status) {
   sub->add_flag(
       "--repair", c->repair,
       "also say what `repair = true` would do to a mesh, and what is left; the file stays as it is");
-  sub->add_option("--unit", c->unit_m, "length unit of mesh files in meters")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
+  sub->add_option("--unit", c->unit_m,
+                  "length unit of mesh files: mm, cm, m, um or a number of meters; default: mm")
+      ->transform(CLI::Transformer(hybrid::length_units()))
+      ->check(CLI::PositiveNumber);
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
   sub->callback([c, &status] { status = hybrid::check(*c); });
 }
@@ -215,9 +224,9 @@ void add_stability(CLI::App& app, int& status) {
   sub->add_option("SCENE", c->scene, "scene file (.toml), such as scenes/wall.toml")->required();
   sub->add_option("--plot", c->plot, "write stiffness over damping and rate as SVG (rigid scenes)");
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
-  auto* table = sub->add_flag("--extremes", e->table,
-                              "instead: rigid, soft and mixed scenes with every setting taken to its end");
-  sub->add_flag("--quick", e->quick, "of --extremes: a share of the table; a few seconds")->needs(table);
+  sub->add_flag("--extremes", e->table,
+                "instead: rigid, soft and mixed scenes with every setting taken to its end");
+  sub->add_flag("--quick", c->quick, "a row of each kind, or a share of --extremes; some seconds");
   auto* ticks =
       sub->add_option("--fuzz-ticks", e->fuzz_ticks, "instead: so many ticks of random device input");
   sub->add_option("--seed", e->seed, "of --fuzz-ticks")->needs(ticks)->capture_default_str();
@@ -226,6 +235,7 @@ void add_stability(CLI::App& app, int& status) {
   sub->callback([c, e, &status] {
     e->scene = c->scene;
     e->json = c->json;
+    e->quick = c->quick;
     status = e->table || e->fuzz_ticks > 0 ? hybrid::extremes(*e) : hybrid::stability(*c);
   });
 }
@@ -242,9 +252,54 @@ void add_view(CLI::App& app, int& status) {
   sub->callback([c, &status] { status = hybrid::view(*c); });
 }
 
+// What a wrong command or option was probably meant to be, as a line of its own; empty where nothing is near.
+std::string did_you_mean(const CLI::App& app, const std::vector<std::string>& arguments) {
+  const auto nearest = [](const std::string& word, const std::vector<std::string>& names) -> std::string {
+    const std::vector<std::string_view> views(names.begin(), names.end());
+    const std::string_view found = hybrid::nearest_name(word, views);
+    const bool alike = 3 * hybrid::edit_distance(word, found) <= std::max(word.size(), found.size()) + 1;
+    return alike ? std::string(found) : std::string();
+  };
+  if (arguments.empty()) return {};
+  const CLI::App* chosen = nullptr;
+  std::vector<std::string> commands;
+  for (const CLI::App* sub : app.get_subcommands([](const CLI::App*) { return true; })) {
+    commands.push_back(sub->get_name());
+    if (sub->get_name() == arguments.front()) chosen = sub;
+  }
+  if (chosen == nullptr) {
+    const std::string& word = arguments.front();
+    if (hybrid::lower_ending(word) == ".toml") return "did you mean `hybrid run " + word + "`?\n";
+    const std::string command = word.starts_with("-") ? std::string() : nearest(word, commands);
+    return command.empty() ? std::string() : "did you mean `" + command + "`?\n";
+  }
+  std::vector<std::string> options;
+  for (const CLI::Option* option : chosen->get_options([](const CLI::Option*) { return true; })) {
+    for (const std::string& name : option->get_lnames()) options.push_back("--" + name);
+  }
+  for (auto word = arguments.begin() + 1; word != arguments.end(); ++word) {
+    const std::string name = word->substr(0, word->find('='));
+    if (!name.starts_with("--") || std::find(options.begin(), options.end(), name) != options.end()) continue;
+    const std::string option = nearest(name, options);
+    if (!option.empty()) return "did you mean `" + option + "`?\n";
+  }
+  return {};
+}
+
+// Words that did not reach their reader are an error like any other, but for a reader that had enough.
+int flushed(int status) {
+  errno = 0;
+  if (std::fflush(stdout) == 0 || errno == EPIPE) return status;
+  std::fprintf(stderr, "standard output cannot be written (%s); see that the disk has room\n",
+               std::strerror(errno));
+  return status == 0 ? 1 : status;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that grows too large is an error of its writing
+  hybrid::end_at_once_on_signals();
   CLI::App app(kAbout, "hybrid");
   app.require_subcommand(1);
   app.set_version_flag("--version", HYBRID_VERSION);
@@ -261,7 +316,13 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : 2;
+    const bool wanted = app.exit(e) == 0;  // --help
+    if (wanted) return flushed(0);
+    std::fputs(did_you_mean(app, {argv + 1, argv + argc}).c_str(), stderr);
+    return 2;
+  } catch (const device::StopAsked& asked) {
+    hybrid::end_progress();
+    return hybrid::Outputs().say_stopped(asked.signal, "");
   } catch (const std::bad_alloc&) {
     hybrid::end_progress();
     std::fputs("hybrid: out of memory; use a coarser spacing or a smaller part of the data\n", stderr);
@@ -271,5 +332,5 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "%s\n", e.what());
     return 1;
   }
-  return status;
+  return flushed(status);
 }

@@ -8,8 +8,11 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "device/loop/stop_signal.h"
+#include "hybrid/base/file_ending.h"
 #include "hybrid/plot/session_plot.h"
 #include "hybrid/program/commands.h"
+#include "hybrid/program/outputs.h"
 #include "hybrid/session/export_shapes.h"
 #include "hybrid/session/real_device.h"
 #include "hybrid/session/recording.h"
@@ -27,11 +30,6 @@ bool& progress_shown() {
   return shown;
 }
 
-// Text goes to standard output, unless the report goes there.
-std::FILE* words_for(const std::string& json) {
-  return json == "-" ? stderr : stdout;
-}
-
 std::string read_text(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   std::ostringstream text;
@@ -39,18 +37,30 @@ std::string read_text(const std::filesystem::path& file) {
   return text.str();
 }
 
-// Finds an output that cannot be written before a long run, not after it.
-void check_writable(const std::filesystem::path& file) {
-  if (file.empty()) return;
-  if (file.has_parent_path()) {
-    std::error_code error;
-    std::filesystem::create_directories(file.parent_path(), error);
+void ask_outputs(const RunCommand& command, const Scene& scene, Outputs& outputs) {
+  outputs.ask("--trace", command.trace, {".csv", ".txt"});
+  outputs.ask_plot(command.plot);
+  outputs.ask("--picture", command.picture, {".png"});
+  require_ending_of_none("--record", command.record);
+  outputs.ask("--record", command.record, {});
+  outputs.ask("--save-surface", command.save_surface, {".ply", ".stl", ".obj"});
+  outputs.ask("--black-box", command.black_box, {".csv", ".txt"});
+  if (!command.save_volume.empty()) {
+    for (const auto& file : saved_volume_names(command.save_volume, scene))
+      outputs.ask("--save-volume", file, {});
   }
-  const bool existed = std::filesystem::exists(file);
-  const bool writable = static_cast<bool>(std::ofstream(file, std::ios::app));
-  if (!writable)
-    throw std::runtime_error(fmt::format("{}: cannot be written; check the folder", file.string()));
-  if (!existed) std::filesystem::remove(file);
+  outputs.ask_json(command.json);
+}
+
+void save_plot_of(const std::filesystem::path& file, const BuiltScene& built, const SessionResult& result,
+                  const std::string& title) {
+  std::vector<PlottedObject> objects;
+  for (std::size_t o = 0; o < built.world->object_count(); ++o) {
+    const std::size_t rigid = built.world->rigid.size();
+    objects.push_back({o < rigid ? built.world->rigid[o].name : built.world->soft[o - rigid].name, o >= rigid,
+                       result.object_force_N[o]});
+  }
+  save_session_plot(file, result.rows, objects, title, result.clearance);
 }
 
 }  // namespace
@@ -59,6 +69,7 @@ Progress progress_on_terminal() {
   const auto start = std::chrono::steady_clock::now();
   const bool terminal = isatty(STDERR_FILENO) != 0;
   return [start, terminal, last = start](const std::string& text) mutable {
+    device::stop_if_asked();
     const auto now = std::chrono::steady_clock::now();
     if (terminal) {
       std::fprintf(stderr, "\r\033[K%s", text.c_str());
@@ -93,19 +104,14 @@ void print_fault(const BlackBoxFile& kept) {
 int run(const RunCommand& command) {
   Scene scene = load_scene(command.scene);
   if (!command.device.empty()) use_device(scene, command.device);
-  for (const auto* file : {&command.trace, &command.plot, &command.picture, &command.record,
-                           &command.save_surface, &command.black_box}) {
-    check_writable(*file);
-  }
-  if (!command.save_volume.empty()) {
-    for (const auto& file : saved_volume_names(command.save_volume, scene)) check_writable(file);
-  }
-  if (command.json != "-") check_writable(command.json);
+  Outputs outputs;
+  ask_outputs(command, scene, outputs);
   const Progress progress = progress_on_terminal();
   const auto real = open_real_device(scene);  // before the build, which may take long
   BuiltScene built = build_scene(scene, progress);
   end_progress();
   print_notes(built);
+  const device::StopOnSignal stop;  // until here a signal ends at once, as there is nothing to keep
   if (real) {
     std::fprintf(stderr, "note: %s\n", place_real_device(scene, *built.world, *real).c_str());
     await_free_tool(scene, *built.world, *built.state, *real, progress);
@@ -128,60 +134,71 @@ int run(const RunCommand& command) {
                          .black_box = kept ? &kept->box() : nullptr};
   SessionResult result = run_session(scene, built, options);
   end_progress();
-  if (kept) print_fault(*kept);
+  const int signal = result.end == device::ServoEnd::stopped ? device::stop_signal() : 0;
+  outputs.attempt([&kept] {
+    if (kept) print_fault(*kept);
+  });
 
-  std::FILE* words = words_for(command.json);
-  if (!command.trace.empty()) save_trace(command.trace, result.rows);
+  using Path = std::filesystem::path;
   const std::string title = scene.title.empty() ? command.scene.stem().string() : scene.title;
-  if (!command.plot.empty()) {
-    std::vector<PlottedObject> objects;
-    for (std::size_t o = 0; o < built.world->object_count(); ++o) {
-      const std::size_t rigid = built.world->rigid.size();
-      objects.push_back({o < rigid ? built.world->rigid[o].name : built.world->soft[o - rigid].name,
-                         o >= rigid, result.object_force_N[o]});
-    }
-    save_session_plot(command.plot, result.rows, objects, title, result.clearance);
+  outputs.write("trace", command.trace, [&](const Path& file) { save_trace(file, result.rows); });
+  outputs.write("recording", command.record, [&](const Path& file) {
+    save_recording(file, {std::filesystem::absolute(command.scene), read_text(command.scene), result.dt_s,
+                          scene_limits(scene), options.async_relaxation, result.state_hash, result.start_m,
+                          result.recording});
+  });
+  outputs.write_json(command.json, command.json.empty() ? nullptr : run_report(scene, built, result));
+  outputs.write("plot", command.plot, [&](const Path& file) { save_plot_of(file, built, result, title); });
+  outputs.write("surface", command.save_surface, [&](const Path& file) { save_surfaces(file, built); });
+  outputs.attempt([&] {
+    if (command.save_volume.empty()) return;
+    for (const Path& file : save_volumes(command.save_volume, scene, built)) outputs.wrote("volume", file);
+  });
+  outputs.write("picture", command.picture, [&](const Path& file) {
+    save_picture(file, drawn_scene(scene, built, title), *result.moment);
+  });
+  fmt::print(outputs.words(), "{}", run_summary(built, result));
+  outputs.say_files();
+  if (signal != 0) {
+    return outputs.say_stopped(
+        signal, fmt::format("{:.2f} s of {:.2f} s", static_cast<double>(result.ticks) * result.dt_s,
+                            static_cast<double>(result.planned_ticks) * result.dt_s));
   }
-  if (!command.picture.empty())
-    save_picture(command.picture, drawn_scene(scene, built, title), *result.moment);
-  if (!command.record.empty()) {
-    save_recording(command.record, {std::filesystem::absolute(command.scene), read_text(command.scene),
-                                    result.dt_s, scene_limits(scene), options.async_relaxation,
-                                    result.state_hash, result.start_m, result.recording});
-  }
-  if (!command.save_surface.empty()) save_surfaces(command.save_surface, built);
-  std::vector<std::filesystem::path> volumes;
-  if (!command.save_volume.empty()) volumes = save_volumes(command.save_volume, scene, built);
-  if (!command.json.empty()) save_json(command.json, run_report(scene, built, result));
-  fmt::print(words, "{}", run_summary(built, result));
-  for (const auto& [what, file] :
-       {std::pair{"trace", command.trace}, std::pair{"plot", command.plot},
-        std::pair{"picture", command.picture}, std::pair{"recording", command.record},
-        std::pair{"surface", command.save_surface}}) {
-    if (!file.empty()) fmt::print(words, "{}: {}\n", what, file.string());
-  }
-  for (const auto& file : volumes) fmt::print(words, "volume: {}\n", file.string());
-  return result.end == device::ServoEnd::lost ? 1 : 0;
+  return result.end == device::ServoEnd::lost || outputs.failed() ? 1 : 0;
 }
 
 int replay(const ReplayCommand& command) {
+  Outputs outputs;
+  outputs.ask_json(command.json);
   const Recording recording = load_recording(command.recording);
+  const device::StopOnSignal stop;
   const ReplayResult result = replay(recording, progress_on_terminal());
   end_progress();
-  if (!command.json.empty()) {
-    nlohmann::ordered_json j = report_head("replay");
-    j["ticks"] = result.ticks;
-    j["state_hash"] = fmt::format("{:016x}", result.state_hash);
-    j["equal"] = result.equal;
-    if (!result.equal) j["parts_at_tick"] = result.first_difference;
-    save_json(command.json, j);
+  const int signal = device::stop_signal();
+  const bool whole = result.replayed_ticks == result.ticks;
+  nlohmann::ordered_json j = report_head("replay");
+  j["ticks"] = result.ticks;
+  j["replayed_ticks"] = result.replayed_ticks;
+  j["state_hash"] = fmt::format("{:016x}", result.state_hash);
+  j["equal"] =
+      whole || !result.equal ? nlohmann::ordered_json(result.equal) : nlohmann::ordered_json(nullptr);
+  if (!result.equal) j["parts_at_tick"] = result.first_difference;
+  outputs.write_json(command.json, j);
+  if (!result.equal) {
+    fmt::print(outputs.words(), "parts at tick {} of {}: this build does not feel what was recorded\n",
+               result.first_difference, result.ticks);
+  } else if (whole) {
+    fmt::print(outputs.words(), "equal: {} ticks, state hash {:016x}\n", result.ticks, result.state_hash);
+  } else {
+    fmt::print(outputs.words(), "equal so far: {} of {} ticks\n", result.replayed_ticks, result.ticks);
   }
-  fmt::print(words_for(command.json), "{}\n",
-             result.equal
-                 ? fmt::format("equal: {} ticks, state hash {:016x}", result.ticks, result.state_hash)
-                 : fmt::format("parts at tick {} of {}: this build does not feel what was recorded",
-                               result.first_difference, result.ticks));
-  return result.equal ? 0 : 1;
+  if (!whole) {
+    return outputs.say_stopped(
+        signal,
+        fmt::format("{:.2f} s of {:.2f} s", static_cast<double>(result.replayed_ticks) * recording.dt_s,
+                    static_cast<double>(result.ticks) * recording.dt_s));
+  }
+  return result.equal && !outputs.failed() ? 0 : 1;
 }
 
 }  // namespace hybrid

@@ -5,7 +5,9 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "device/loop/stop_signal.h"
 #include "hybrid/program/commands.h"
+#include "hybrid/program/outputs.h"
 #include "hybrid/session/report.h"
 #include "hybrid/stability/plot.h"
 #include "hybrid/stability/stability.h"
@@ -93,19 +95,25 @@ int stability(const StabilityCommand& command) {
                     "scenes/wall.toml",
                     scene.file.string()));
   }
-  const StabilityReport report = measure_stability(scene, progress_on_terminal());
+  Outputs outputs;
+  outputs.ask_plot(command.plot);
+  outputs.ask_json(command.json);
+  const device::StopOnSignal stop;  // rows that are done are kept
+  const StabilityReport report =
+      measure_stability(scene, {.quick = command.quick, .progress = progress_on_terminal()});
   end_progress();
-  std::FILE* words = command.json == "-" ? stderr : stdout;
-  fmt::print(words, "{}", stability_tables(report));
-  if (!command.plot.empty()) {
-    save_plot(command.plot, scene, report);
-    fmt::print(words, "plot: {}\n", command.plot.string());
-  }
-  if (command.json.empty()) return 0;
   nlohmann::ordered_json json = report_head("stability");
   add_to_json(report, json);
-  save_json(command.json, json);
-  return 0;
+  if (command.quick) json["quick"] = true;
+  if (report.stopped_by != 0) json["stopped"] = true;
+  outputs.write_json(command.json, json);
+  outputs.write("plot", command.plot,
+                [&](const std::filesystem::path& file) { save_plot(file, scene, report); });
+  fmt::print(outputs.words(), "{}", stability_tables(report));
+  outputs.say_files();
+  if (report.stopped_by != 0)
+    return outputs.say_stopped(report.stopped_by, fmt::format("{} rows", report.rows.size()));
+  return outputs.failed() ? 1 : 0;
 }
 
 }  // namespace hybrid

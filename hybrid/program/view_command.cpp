@@ -10,10 +10,12 @@
 #include <thread>
 
 #include "device/loop/servo_loop.h"
+#include "device/loop/stop_signal.h"
 #include "device/simulated/simulated.h"
 #include "hybrid/base/flush_to_zero.h"
 #include "hybrid/base/triple_buffer.h"
 #include "hybrid/program/commands.h"
+#include "hybrid/program/outputs.h"
 #include "hybrid/session/real_device.h"
 #include "hybrid/session/relaxation_thread.h"
 #include "hybrid/session/session.h"
@@ -147,8 +149,8 @@ std::filesystem::path frame_file(const std::filesystem::path& folder, std::uint6
 }
 
 // Plays frames that each stand for a fixed stretch of session time, so that the pictures are reproducible on
-// any machine.
-void play_frames(const ViewCommand& command, Player& player, Window& window) {
+// any machine. Returns the exit status.
+int play_frames(const ViewCommand& command, Player& player, Window& window) {
   std::shared_ptr<const device::Path> drag;
   if (!command.drag.empty()) drag = device::make_path(device::CsvPath{.file = command.drag});
   Snapshot snapshot;
@@ -163,10 +165,16 @@ void play_frames(const ViewCommand& command, Player& player, Window& window) {
       felt = player.step(request);
     }
     player.snapshot(felt, snapshot);
-    if (!window.frame(snapshot)) return;
+    if (!window.frame(snapshot)) return 0;
     if (!command.out.empty()) window.save_frame(frame_file(command.out, n));
+    if (const int signal = device::stop_signal(); signal != 0) {
+      fmt::print(stderr, "stopped by {} after {} of {} frames{}{}\n", signal_in_words(signal), n + 1,
+                 *command.frames, command.out.empty() ? "" : ", which are in ", command.out.string());
+      return exit_status_of_signal(signal);
+    }
   }
   if (!command.out.empty()) fmt::print("{} frames in {}\n", *command.frames, command.out.string());
+  return 0;
 }
 
 // Runs the window on this thread and the session on another. Returns the device's events.
@@ -237,6 +245,7 @@ int view(const ViewCommand& command) {
   const DrawnScene drawn =
       drawn_scene(scene, built, scene.title.empty() ? command.scene.stem().string() : scene.title);
   Window window(drawn);
+  const device::StopOnSignal stop;
   if (real) {
     std::fprintf(stderr, "note: %s\n", place_real_device(scene, *built.world, *real).c_str());
     await_free_tool(scene, *built.world, *built.state, *real, progress_on_terminal());
@@ -245,13 +254,13 @@ int view(const ViewCommand& command) {
   Player player(scene, built, real.get());
   if (command.frames) {
     start_async_relaxation(*built.state, Arrival::counted);
-    play_frames(command, player, window);
-    return 0;
+    return play_frames(command, player, window);
   }
   const auto kept = open_black_box_file({}, command.scene, true, scene.rate_hz);
   const device::ServoReport report = play_live(drawn, player, window, kept->box());
   print_fault(*kept);
   for (const std::string& message : report.messages) std::fprintf(stderr, "device: %s\n", message.c_str());
+  if (report.end == device::ServoEnd::stopped) return exit_status_of_signal(device::stop_signal());
   return report.end == device::ServoEnd::lost ? 1 : 0;
 }
 

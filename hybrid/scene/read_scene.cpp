@@ -8,7 +8,9 @@
 #include <limits>
 #include <new>
 #include <set>
+#include <utility>
 
+#include "hybrid/scene/read_material.h"
 #include "hybrid/scene/read_path.h"
 #include "hybrid/scene/read_rigid.h"
 #include "hybrid/scene/scene.h"
@@ -18,12 +20,6 @@
 namespace hybrid {
 namespace {
 
-constexpr UnsupportedKey material_later[] = {
-    {"elastic", "remove it: every material is elastic up to its yield"},
-    {"plastic", "say from which strain on: yield = 0.2"},
-    {"damping", "remove it: tissue is quasi-static for now"},
-    {"density", "remove it: tissue has no mass here"},
-};
 constexpr UnsupportedKey device_later[] = {
     {"delay", "say it in ticks: delay_ticks = 1"},
     {"watchdog", "say it in ms: watchdog_ms = 20"},
@@ -81,10 +77,13 @@ void read_once(const TableReader& root, std::string_view key, const Read& read) 
   if (entry == nullptr) return;
   const std::string name = words("[", key, "]");
   if (entry->value.kind == TreeNode::Kind::array) {
-    root.refuse(key, words(name, " stands in double brackets or is a list"),
-                words("write ", name, " once, as there is only one"));
+    root.source().gather([&] {
+      root.refuse(key, words(name, " stands in double brackets or is a list"),
+                  words("write ", name, " once, as there is only one"));
+    });
+    return;
   }
-  read(TableReader(root.source(), entry->value, entry->place, name));
+  root.source().gather([&] { read(TableReader(root.source(), entry->value, entry->place, name)); });
 }
 
 Tool read_tool(const TableReader& table) {
@@ -195,93 +194,6 @@ void read_safety(const TableReader& table, Scene& scene) {
   }
 }
 
-void read_stretch(const TableReader& table, Material& out) {
-  const TreeNode& stretch = table.list("stretch", "[0.4, 1.6]");
-  if (stretch.items.size() != 2) {
-    table.refuse("stretch", words("'stretch' in ", table.what(), " has ", stretch.items.size(), " numbers"),
-                 "give two, the shortest and the longest of a link by its rest length: stretch = [0.4, 1.6]");
-  }
-  const Quantity any{"a finite number", "1", 1.0, -1e300, 1e300};
-  out.stretch_min = table.number_at(stretch.items[0], stretch.items[0].place, "'stretch' (min)", any);
-  out.stretch_max = table.number_at(stretch.items[1], stretch.items[1].place, "'stretch' (max)", any);
-  if (out.stretch_min > out.stretch_max) {
-    table.refuse("stretch",
-                 words("'stretch' in ", table.what(), " has its min ", in_words(out.stretch_min),
-                       " above its max ", in_words(out.stretch_max)),
-                 "put the smaller number first: stretch = [min, max]");
-  }
-  const bool usable =
-      out.stretch_min > 0.0 && out.stretch_min <= 1.0 && out.stretch_max >= 1.0 && out.stretch_max <= 1e6;
-  if (!usable) {
-    table.refuse("stretch",
-                 words("'stretch' in ", table.what(), " is [", in_words(out.stretch_min), ", ",
-                       in_words(out.stretch_max), "], which leaves out a link at rest, or a positive length"),
-                 "keep 0 < min <= 1 <= max <= 1e6, e.g. stretch = [0.4, 1.6]");
-  }
-}
-
-Material read_material(const TableReader& table) {
-  static constexpr std::string_view keys[] = {"young", "poisson", "stretch", "shear", "yield", "energy"};
-  table.allow(keys, material_later);
-  Material out;
-  out.place = table.place();
-  out.young_Pa =
-      table.number("young", {"Young's modulus above 0, in Pa", "3000", 1.0, 1e-3, 1e13}, out.young_Pa);
-  out.poisson = table.number(
-      "poisson", {"Poisson's ratio, below 0.5", "0.3", 1.0, 0.0, std::nextafter(0.5, 0.0)}, out.poisson);
-  if (table.has("stretch")) read_stretch(table, out);
-  out.shear =
-      table.number("shear", {"a share of the rest length, 0 or more", "0.6", 1.0, 0.0, 1e6}, out.shear);
-  out.yield = table.number(
-      "yield", {"a strain, above 0, beyond which it stays deformed", "0.2", 1.0, 1e-6, 1e6}, out.yield);
-  out.energy = read_energy(table);
-  if (out.energy == Energy::trilinear && std::isfinite(out.yield)) {
-    table.refuse("energy", words(table.what(), " has both a yield and the trilinear energy"),
-                 "take one of them away: what yields is of links");
-  }
-  // Rows of voxels that are rigid along one axis and free along another are refused. Relaxation moves voxels
-  // and blocks of them, and neither can move without breaking such a row, so the tissue would stay as it was
-  // pressed.
-  const bool stretches = out.stretch_max > out.stretch_min, slips = out.shear > 0.0;
-  if (stretches != slips) {
-    table.refuse(
-        table.has("shear") ? "shear" : "stretch",
-        words("the links of ", table.what(),
-              slips ? " may slip but not stretch" : " may stretch but not slip",
-              ", and nothing would bring back what is pressed"),
-        "give both some slack, e.g. stretch = [0.99, 1.01] and shear = 0.01, or neither: stretch = [1, "
-        "1] and shear = 0");
-  }
-  return out;
-}
-
-void read_materials(const TableReader& table, Scene& scene) {
-  for (const TreeEntry& entry : table.entries()) {
-    const std::string& name = entry.key;
-    if (entry.value.kind != TreeNode::Kind::table) {
-      table.source().refuse(entry.place,
-                            words(in_quotes(name), " in [material] is ", kind_in_words(entry.value.kind)),
-                            "give every material a name and a table: [material.tissue]");
-    }
-    scene.materials.emplace(name, read_material(TableReader(table.source(), entry.value, entry.place,
-                                                            words("[material.", printable(name, 60), "]"))));
-  }
-}
-
-void check_material(const SceneSource& source, const Scene& scene, const SoftDescription& soft,
-                    const std::string& name, SourcePlace place) {
-  if (name.empty() || scene.materials.contains(name)) return;
-  const std::string what =
-      words("[[soft]] '", soft.name, "' is of material ", in_quotes(name), ", which is not defined");
-  if (scene.materials.empty())
-    source.refuse(place, what, words("add a table [material.", printable(name, 60), "]"));
-  std::vector<std::string_view> names;
-  for (const auto& [known, material] : scene.materials) names.push_back(known);
-  source.refuse(place, what,
-                words("did you mean '", nearest_name(name, names), "'? Else add a table [material.",
-                      printable(name, 60), "]"));
-}
-
 void check_names(const SceneSource& source, const Scene& scene) {
   std::map<std::string, SourcePlace> taken;
   const auto take = [&](const std::string& name, SourcePlace place) {
@@ -291,9 +203,11 @@ void check_names(const SceneSource& source, const Scene& scene) {
         std::max(place, first->second, [](SourcePlace a, SourcePlace b) { return a.line < b.line; });
     const SourcePlace earlier =
         std::min(place, first->second, [](SourcePlace a, SourcePlace b) { return a.line < b.line; });
-    source.refuse(later,
-                  words("two objects are called ", in_quotes(name), ", the other one at line ", earlier.line),
-                  "give each object a name of its own");
+    source.gather([&] {
+      source.refuse(
+          later, words("two objects are called ", in_quotes(name), ", the other one at line ", earlier.line),
+          "give each object a name of its own");
+    });
   };
   for (const RigidDescription& rigid : scene.rigid) take(rigid.name, rigid.place);
   for (const SoftDescription& soft : scene.soft) take(soft.name, soft.place);
@@ -317,27 +231,48 @@ void check_point_tool(const SceneSource& source, const Scene& scene, SourcePlace
                 words("give it a radius of about two spacings of \"", scene.soft.front().name, "\""));
 }
 
-void read_objects(const SceneSource& source, const TableReader& root, Scene& scene) {
-  for (const TreeNode& table : object_tables(root, "rigid")) {
-    scene.rigid.push_back(read_rigid(source, table, scene.rigid.size() + 1));
-  }
-  for (const TreeNode& table : object_tables(root, "soft")) {
-    scene.soft.push_back(read_soft(source, table, scene.soft.size() + 1));
-    const SoftDescription& soft = scene.soft.back();
-    const TableReader reader = object_table(source, table, "[[soft]]", scene.soft.size());
+// `materials`: whether all of them could be read, so that one that is missing is an error of its own.
+void read_soft_object(const SceneSource& source, const TreeNode& table, bool materials, Scene& scene) {
+  scene.soft.push_back(read_soft(source, table, scene.soft.size() + 1));
+  const SoftDescription& soft = scene.soft.back();
+  const TableReader reader = object_table(source, table, "[[soft]]", scene.soft.size());
+  if (materials) {
     check_material(source, scene, soft, soft.material, reader.place_of("material"));
     if (reader.has("materials")) {
       for (const TreeEntry& entry : reader.find("materials")->value.entries) {
-        check_material(source, scene, soft, entry.value.text, entry.place);
+        source.gather([&] { check_material(source, scene, soft, entry.value.text, entry.place); });
       }
     }
-    check_anchors(reader, scene, soft);
   }
+  check_anchors(reader, scene, soft);
+}
+
+void read_objects(const SceneSource& source, const TableReader& root, bool materials, Scene& scene) {
+  const std::size_t before = source.found();
+  source.gather([&] {
+    for (const TreeNode& table : object_tables(root, "rigid"))
+      source.gather([&] { scene.rigid.push_back(read_rigid(source, table, scene.rigid.size() + 1)); });
+  });
+  source.gather([&] {
+    for (const TreeNode& table : object_tables(root, "soft"))
+      source.gather([&] { read_soft_object(source, table, materials, scene); });
+  });
+  if (source.found() != before) return;  // what follows is about all objects
   if (scene.rigid.empty() && scene.soft.empty()) {
     source.refuse({1, 1}, "the scene has no objects",
                   "add a [[rigid]] or a [[soft]] table (see scenes/README.md)");
   }
   check_names(source, scene);
+}
+
+// All of them in one, a line each, in the order of the file.
+[[noreturn]] void throw_all(const std::filesystem::path& file, std::vector<ReaderError>& errors) {
+  std::stable_sort(errors.begin(), errors.end(), [](const ReaderError& a, const ReaderError& b) {
+    return std::pair(a.place.line, a.place.column) < std::pair(b.place.line, b.place.column);
+  });
+  std::string text = errors.front().text;
+  for (std::size_t n = 1; n < errors.size(); ++n) text += words("\n", errors[n].what());
+  throw SceneError(file, errors.front().place, text);
 }
 
 Scene read_whole(const std::filesystem::path& file) {
@@ -346,17 +281,20 @@ Scene read_whole(const std::filesystem::path& file) {
                                               "material", "rigid",  "soft"};
   static constexpr std::string_view overlaps[] = {"carve", "refuse"};
   const TreeNode tree = read_tree(file);
+  std::vector<ReaderError> errors;
   SceneSource source{file};
   check_format(source, tree);
+  source.errors = &errors;
   const TableReader root(source, tree, {1, 1}, "the scene");
   root.allow(keys);
-  read_units(source, root);
+  source.gather([&] { read_units(source, root); });
 
   Scene scene;
   scene.file = file;
   scene.unit_m = source.unit_m;
   scene.title = root.has("title") ? root.text("title", "A soft block") : file.stem().string();
-  scene.overlap = root.choice("overlap", overlaps, 0) == 0 ? Overlap::carve : Overlap::refuse;
+  source.gather(
+      [&] { scene.overlap = root.choice("overlap", overlaps, 0) == 0 ? Overlap::carve : Overlap::refuse; });
   read_once(root, "occupancy", [&](const TableReader& table) {
     static constexpr std::string_view occupancy_keys[] = {"cell"};
     table.allow(occupancy_keys);
@@ -371,17 +309,21 @@ Scene read_whole(const std::filesystem::path& file) {
   read_once(root, "device", [&](const TableReader& table) { read_device(table, scene); });
   read_once(root, "hand", [&](const TableReader& table) { scene.hand = read_hand(table, scene); });
   read_once(root, "safety", [&](const TableReader& table) { read_safety(table, scene); });
+  const std::size_t before = source.found();
   read_once(root, "material", [&](const TableReader& table) { read_materials(table, scene); });
-  read_objects(source, root, scene);
-  check_point_tool(source, scene, tool_radius);
-  if (!root.has("path")) {
+  const bool materials = source.found() == before;
+  source.gather([&] { read_objects(source, root, materials, scene); });
+  if (source.found() == 0) source.gather([&] { check_point_tool(source, scene, tool_radius); });
+  source.gather([&] {
+    if (root.has("path")) return;
     source.refuse({1, 1}, "the scene has no [path], so the hand would not move",
                   "add [path] with kind = \"press\", from and to (see scenes/README.md)");
-  }
+  });
   read_once(root, "path", [&](const TableReader& table) {
     scene.path = read_path(table);
     scene.path_place = table.place();
   });
+  if (!errors.empty()) throw_all(file, errors);
   return scene;
 }
 

@@ -25,10 +25,23 @@ bool contains(std::span<const std::string_view> names, std::string_view name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
+bool found_at(const SceneSource& source, SourcePlace place) {
+  return source.errors != nullptr &&
+         std::any_of(source.errors->begin(), source.errors->end(), [place](const ReaderError& error) {
+           return error.place.line == place.line && error.place.column == place.column;
+         });
+}
+
 }  // namespace
 
 void SceneSource::refuse(SourcePlace place, const std::string& what, const std::string& remedy) const {
-  throw SceneError(file, place, words(what, "; ", remedy));
+  throw ReaderError(file, place, words(what, "; ", remedy));
+}
+
+void SceneSource::keep(const ReaderError& error) const {
+  constexpr std::size_t kMost = 100;  // of a file that is no scene at all
+  if (errors == nullptr || errors->size() >= kMost) throw error;
+  errors->push_back(error);
 }
 
 Quantity SceneSource::length() const {
@@ -43,6 +56,15 @@ Quantity SceneSource::distance() const {
 Quantity SceneSource::speed() const {
   return {words("a speed above 0 in ", unit_name, "/s"), in_words(0.05 / unit_m), unit_m, 1e-9,
           largest_length_m};
+}
+
+const std::map<std::string, double>& length_units() {
+  static const std::map<std::string, double> units = [] {
+    std::map<std::string, double> all;
+    for (std::size_t n = 0; n < std::size(unit_names); ++n) all.emplace(unit_names[n], unit_values_m[n]);
+    return all;
+  }();
+  return units;
 }
 
 std::size_t edit_distance(std::string_view a, std::string_view b) {
@@ -101,21 +123,32 @@ void TableReader::allow(std::span<const std::string_view> keys, std::span<const 
                         std::span<const std::string_view> elsewhere, std::string_view condition) const {
   for (const TreeEntry& entry : table_.entries) {
     if (contains(keys, entry.key)) continue;
-    const auto is_later = [&entry](const UnsupportedKey& key) { return key.name == entry.key; };
-    if (const auto found = std::find_if(later.begin(), later.end(), is_later); found != later.end()) {
-      source_.refuse(entry.place, words(in_quotes(entry.key), " in ", what_, " is not supported yet"),
-                     std::string(found->meanwhile));
+    try {
+      refuse_key(entry, keys, later, elsewhere, condition);
+    } catch (const ReaderError& error) {
+      has_unknown_ = true;
+      if (!found_at(source_, error.place)) source_.keep(error);  // a table may be looked at twice
     }
-    if (contains(elsewhere, entry.key)) {
-      source_.refuse(entry.place,
-                     words(in_quotes(entry.key), " in ", what_, " has no meaning with ", condition),
-                     words("remove it, or correct ", condition, " (keys here: ", joined(keys), ")"));
-    }
-    if (keys.empty())
-      source_.refuse(entry.place, words("unknown key ", in_quotes(entry.key), " in ", what_), "remove it");
-    source_.refuse(entry.place, words("unknown key ", in_quotes(entry.key), " in ", what_),
-                   words("did you mean '", nearest_name(entry.key, keys), "'? Known here: ", joined(keys)));
   }
+}
+
+void TableReader::refuse_key(const TreeEntry& entry, std::span<const std::string_view> keys,
+                             std::span<const UnsupportedKey> later,
+                             std::span<const std::string_view> elsewhere, std::string_view condition) const {
+  const auto is_later = [&entry](const UnsupportedKey& key) { return key.name == entry.key; };
+  if (const auto found = std::find_if(later.begin(), later.end(), is_later); found != later.end()) {
+    source_.refuse(entry.place, words(in_quotes(entry.key), " in ", what_, " is not supported yet"),
+                   std::string(found->meanwhile));
+  }
+  if (contains(elsewhere, entry.key)) {
+    source_.refuse(entry.place,
+                   words(in_quotes(entry.key), " in ", what_, " has no meaning with ", condition),
+                   words("remove it, or correct ", condition, " (keys here: ", joined(keys), ")"));
+  }
+  if (keys.empty())
+    source_.refuse(entry.place, words("unknown key ", in_quotes(entry.key), " in ", what_), "remove it");
+  source_.refuse(entry.place, words("unknown key ", in_quotes(entry.key), " in ", what_),
+                 words("did you mean '", nearest_name(entry.key, keys), "'? Known here: ", joined(keys)));
 }
 
 const TreeEntry* TableReader::find(std::string_view key) const {
@@ -165,8 +198,10 @@ double TableReader::number_at(const TreeNode& node, SourcePlace place, const std
 double TableReader::number(std::string_view key, const Quantity& quantity,
                            std::optional<double> fallback) const {
   if (fallback && !has(key)) return *fallback;
-  const TreeEntry& entry = require(key, quantity.example);
-  return number_at(entry.value, entry.place, in_quotes(key), quantity);
+  return value_or(key, fallback.value_or(quantity.lower), [&] {
+    const TreeEntry& entry = require(key, quantity.example);
+    return number_at(entry.value, entry.place, in_quotes(key), quantity);
+  });
 }
 
 glm::dvec3 TableReader::vector_at(const TreeEntry& entry, const Quantity& quantity) const {
@@ -193,42 +228,53 @@ glm::dvec3 TableReader::vector(std::string_view key, const Quantity& quantity,
                                std::optional<glm::dvec3> fallback) const {
   if (fallback && !has(key)) return *fallback;
   const std::string& e = quantity.example;
-  return vector_at(require(key, words("[", e, ", ", e, ", ", e, "]")), quantity);
+  return value_or(key, fallback.value_or(glm::dvec3(quantity.lower)),
+                  [&] { return vector_at(require(key, words("[", e, ", ", e, ", ", e, "]")), quantity); });
 }
 
 glm::dvec3 TableReader::number_or_vector(std::string_view key, const Quantity& quantity,
                                          std::optional<glm::dvec3> fallback) const {
   if (fallback && !has(key)) return *fallback;
-  const TreeEntry& entry = require(key, quantity.example);
-  if (entry.value.kind == TreeNode::Kind::array) return vector_at(entry, quantity);
-  return glm::dvec3(number_at(entry.value, entry.place, in_quotes(key), quantity));
+  return value_or(key, fallback.value_or(glm::dvec3(quantity.lower)), [&] {
+    const TreeEntry& entry = require(key, quantity.example);
+    if (entry.value.kind == TreeNode::Kind::array) return vector_at(entry, quantity);
+    return glm::dvec3(number_at(entry.value, entry.place, in_quotes(key), quantity));
+  });
 }
 
 std::int64_t TableReader::integer(std::string_view key, std::int64_t lower, std::int64_t upper,
                                   std::optional<std::int64_t> fallback) const {
   if (fallback && !has(key)) return *fallback;
   const std::string example = std::to_string(fallback.value_or(std::max<std::int64_t>(lower, 1)));
-  const TreeEntry& entry = require(key, example);
-  if (entry.value.kind != TreeNode::Kind::integer) {
-    wrong_type(entry.place, in_quotes(key), entry.value.kind, "a whole number", words(key, " = ", example));
-  }
-  if (entry.value.integer < lower || entry.value.integer > upper) {
-    source_.refuse(entry.place, words(in_quotes(key), " in ", what_, " is ", entry.value.integer),
-                   words("it must be a whole number from ", lower, " to ", upper));
-  }
-  return entry.value.integer;
+  return value_or(key, fallback.value_or(lower), [&] {
+    const TreeEntry& entry = require(key, example);
+    if (entry.value.kind != TreeNode::Kind::integer) {
+      wrong_type(entry.place, in_quotes(key), entry.value.kind, "a whole number", words(key, " = ", example));
+    }
+    if (entry.value.integer < lower || entry.value.integer > upper) {
+      source_.refuse(entry.place, words(in_quotes(key), " in ", what_, " is ", entry.value.integer),
+                     words("it must be a whole number from ", lower, " to ", upper));
+    }
+    return entry.value.integer;
+  });
 }
 
 bool TableReader::boolean(std::string_view key, bool fallback) const {
   const TreeEntry* entry = find(key);
   if (entry == nullptr) return fallback;
-  if (entry->value.kind != TreeNode::Kind::boolean) {
-    wrong_type(entry->place, in_quotes(key), entry->value.kind, "true or false", words(key, " = true"));
-  }
-  return entry->value.boolean;
+  return value_or(key, fallback, [&] {
+    if (entry->value.kind != TreeNode::Kind::boolean) {
+      wrong_type(entry->place, in_quotes(key), entry->value.kind, "true or false", words(key, " = true"));
+    }
+    return entry->value.boolean;
+  });
 }
 
 std::string TableReader::text(std::string_view key, std::string_view example) const {
+  return value_or(key, std::string(example), [&] { return text_or_refuse(key, example); });
+}
+
+std::string TableReader::text_or_refuse(std::string_view key, std::string_view example) const {
   std::string shown = "\"";
   shown.append(example).append("\"");
   const TreeEntry& entry = require(key, shown);
@@ -245,7 +291,7 @@ std::size_t TableReader::choice(std::string_view key, std::span<const std::strin
                                 std::optional<std::size_t> fallback,
                                 std::span<const UnsupportedKey> later) const {
   if (fallback && !has(key)) return *fallback;
-  const std::string value = text(key, options.front());
+  const std::string value = text_or_refuse(key, options.front());
   const auto found = std::find(options.begin(), options.end(), value);
   if (found != options.end()) return static_cast<std::size_t>(found - options.begin());
   const std::string said = words(key, " = \"", printable(value, 60), "\" in ", what_);
@@ -262,11 +308,15 @@ std::size_t TableReader::choice(std::string_view key, std::span<const std::strin
 
 double TableReader::unit(std::string_view key, double fallback_m) const {
   if (!has(key)) return fallback_m;
-  return unit_values_m[choice(key, unit_names)];
+  return value_or(key, fallback_m, [&] { return unit_values_m[choice(key, unit_names)]; });
 }
 
 std::filesystem::path TableReader::file(std::string_view key, bool may_be_folder) const {
-  const std::string value = text(key, may_be_folder ? "head.nii.gz" : "bone.ply");
+  return value_or(key, std::filesystem::path(), [&] { return file_or_refuse(key, may_be_folder); });
+}
+
+std::filesystem::path TableReader::file_or_refuse(std::string_view key, bool may_be_folder) const {
+  const std::string value = text_or_refuse(key, may_be_folder ? "head.nii.gz" : "bone.ply");
   if (value.empty()) refuse(key, words(in_quotes(key), " in ", what_, " is empty"), "name a file there");
   std::filesystem::path path = value;
   if (path.is_relative()) path = source_.file.parent_path() / path;

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Reads the keys of one table of a scene file: types, units, bounds and unknown keys. Every refusal names its
-// place.
+// place. Where errors are gathered, a number, text or file that is wrong is kept as an error and read as some
+// value that is right, so that all keys of a table are looked at; a rule among several keys is only an error
+// where nothing else is wrong in the table.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <glm/vec3.hpp>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -25,13 +28,37 @@ struct Quantity {
   double lower = 0.0, upper = 0.0;
 };
 
+// An error that others can be found beside.
+struct ReaderError : SceneError {
+  ReaderError(const std::filesystem::path& file, SourcePlace where, const std::string& what_and_remedy)
+      : SceneError(file, where, what_and_remedy), place(where), text(what_and_remedy) {}
+  SourcePlace place;
+  std::string text;
+};
+
 // Properties of the whole file during reading.
 struct SceneSource {
   std::filesystem::path file;
   double unit_m = 1e-3;
   std::string unit_name = "mm";
 
+  // Where errors go that do not keep others from being found; null: each one is thrown.
+  std::vector<ReaderError>* errors = nullptr;
+
   [[noreturn]] void refuse(SourcePlace place, const std::string& what, const std::string& remedy) const;
+  // Keeps the error for the end of the reading, or throws it where nothing is kept, or too many are.
+  void keep(const ReaderError& error) const;
+  [[nodiscard]] std::size_t found() const { return errors == nullptr ? 0 : errors->size(); }
+  // Calls read(), and keeps an error that it throws, unless others were found in it: it may follow from them.
+  template <typename Read>
+  void gather(const Read& read) const {
+    const std::size_t before = found();
+    try {
+      read();
+    } catch (const ReaderError& error) {
+      if (found() == before) keep(error);
+    }
+  }
   [[nodiscard]] Quantity length() const;    // any sign
   [[nodiscard]] Quantity size() const;      // above 0
   [[nodiscard]] Quantity distance() const;  // 0 or more
@@ -43,6 +70,9 @@ struct UnsupportedKey {
   std::string_view name;
   std::string_view meanwhile;  // what to do until then
 };
+
+// The length units that a person may name, in meters.
+const std::map<std::string, double>& length_units();
 
 // Optimal string alignment distance (a swap of neighbours is one edit), ignoring case.
 std::size_t edit_distance(std::string_view a, std::string_view b);
@@ -106,6 +136,22 @@ class TableReader {
                                  const Quantity& quantity) const;
 
  private:
+  // What read() returns, or `otherwise` after an error.
+  template <typename Value, typename Read>
+  [[nodiscard]] Value value_or(std::string_view key, Value otherwise, const Read& read) const {
+    try {
+      return read();
+    } catch (const ReaderError& error) {
+      // A key that is missing beside an unknown one is probably that one.
+      if (!has_unknown_ || has(key)) source_.keep(error);
+      return otherwise;
+    }
+  }
+  [[nodiscard]] std::string text_or_refuse(std::string_view key, std::string_view example) const;
+  [[nodiscard]] std::filesystem::path file_or_refuse(std::string_view key, bool may_be_folder) const;
+  [[noreturn]] void refuse_key(const TreeEntry& entry, std::span<const std::string_view> keys,
+                               std::span<const UnsupportedKey> later,
+                               std::span<const std::string_view> elsewhere, std::string_view condition) const;
   [[nodiscard]] glm::dvec3 vector_at(const TreeEntry& entry, const Quantity& quantity) const;
   [[noreturn]] void wrong_type(SourcePlace place, const std::string& name, TreeNode::Kind found,
                                std::string_view wanted, const std::string& example) const;
@@ -114,6 +160,7 @@ class TableReader {
   const TreeNode& table_;
   SourcePlace place_;
   std::string what_;
+  mutable bool has_unknown_ = false;  // found by allow()
 };
 
 }  // namespace hybrid

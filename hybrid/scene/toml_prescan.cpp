@@ -105,6 +105,52 @@ class Screen {
   std::size_t at_ = 0, values_ = 0, parts_ = 0;
 };
 
+// Bytes of the UTF-8 character at `at`, 0 where there is none (RFC 3629).
+std::size_t utf8_length(std::string_view text, std::size_t at) {
+  const auto byte = [&](std::size_t n) {
+    return at + n < text.size() ? static_cast<unsigned char>(text[at + n]) : 0U;
+  };
+  const unsigned first = byte(0);
+  if (first < 0x80) return 1;
+  const std::size_t length = first >= 0xF0 ? 4 : first >= 0xE0 ? 3 : 2;
+  if (first < 0xC2 || first > 0xF4) return 0;
+  for (std::size_t n = 1; n < length; ++n) {
+    if ((byte(n) & 0xC0U) != 0x80U) return 0;
+  }
+  const unsigned second = byte(1);
+  const bool overlong = (first == 0xE0 && second < 0xA0) || (first == 0xF0 && second < 0x90);
+  const bool no_character = (first == 0xED && second >= 0xA0) || (first == 0xF4 && second >= 0x90);
+  return overlong || no_character ? 0 : length;
+}
+
+std::size_t first_not_utf8(std::string_view text) {
+  std::size_t at = 0;
+  while (at < text.size()) {
+    const std::size_t length = utf8_length(text, at);
+    if (length == 0) return at;
+    at += length;
+  }
+  return text.size();
+}
+
+// Latin-1 has a letter or sign for every byte from 0xA0 on, and no other use for those below.
+[[noreturn]] void refuse_encoding(std::string_view text, std::size_t at, const std::filesystem::path& file) {
+  const bool latin = std::all_of(text.begin(), text.end(), [](char c) {
+    const auto byte = static_cast<unsigned char>(c);
+    return byte < 0x80 || byte >= 0xA0;
+  });
+  if (!latin) {
+    throw SceneError(file, place_in_text(text, at),
+                     "the text is not utf-8 here; save the file as UTF-8 text");
+  }
+  const auto byte = static_cast<unsigned char>(text[at]);
+  const std::string letter{static_cast<char>(0xC0U | (byte >> 6U)),
+                           static_cast<char>(0x80U | (byte & 0x3FU))};
+  throw SceneError(file, place_in_text(text, at),
+                   words("the file seems to be Latin-1 (ISO 8859-1), not UTF-8: the byte here is ",
+                         in_quotes(letter), " there; save the file as UTF-8 text"));
+}
+
 }  // namespace
 
 SourcePlace place_in_text(std::string_view text, std::size_t at) {
@@ -135,6 +181,7 @@ void prescan_scene_text(std::string_view text, const std::filesystem::path& file
     throw SceneError(file, place_in_text(text, nul),
                      "the file is not text (it has a zero byte here); give the .toml file of a scene");
   }
+  if (const std::size_t bad = first_not_utf8(text); bad < text.size()) refuse_encoding(text, bad, file);
   Screen(text, file).run();
 }
 

@@ -17,9 +17,10 @@ inline constexpr std::size_t most_key_parts = 64;            // of a.b.c; bounds
 // Place of the byte at offset `at`; columns count characters.
 SourcePlace place_in_text(std::string_view text, std::size_t at);
 
-// Throws SceneError if the text is empty, too large, UTF-16, contains a zero byte, too many values or a key
-// of too many parts, or has characters outside ASCII outside strings and comments. No key of a scene has such
-// characters, and on them toml++ 3.3 has undefined behaviour (its test for Unicode white space ends in
+// Throws SceneError if the text is empty, too large, UTF-16, Latin-1 or else not UTF-8, contains a zero byte,
+// too many values or a key of too many parts, or has characters outside ASCII outside strings and comments.
+// No key of a scene has such characters, and on them toml++ 3.3 has undefined behaviour (its test for Unicode
+// white space ends in
 // __builtin_unreachable()).
 void prescan_scene_text(std::string_view text, const std::filesystem::path& file);
 

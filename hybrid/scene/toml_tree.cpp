@@ -3,12 +3,11 @@
 
 #include <algorithm>
 #include <fstream>
-#include <iomanip>
-#include <sstream>
 #include <system_error>
 #include <tuple>
 #include <utility>
 
+#include "hybrid/base/number_text.h"
 #include "hybrid/scene/toml_prescan.h"
 
 // On some malformed files (a header "[=" for one) toml++ 3.3 asserts instead of reporting, and has undefined
@@ -161,9 +160,7 @@ std::string printable(std::string_view text, std::size_t longest) {
 }
 
 std::string in_words(double number) {
-  std::ostringstream out;
-  out << std::setprecision(6) << number;
-  return out.str();
+  return with_digits(number, 6);
 }
 
 std::string in_quotes(std::string_view name) {

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "hybrid/session/black_box.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <charconv>
 #include <cmath>
+#include <cstring>
 #include <glm/geometric.hpp>
 #include <stdexcept>
 #include <string_view>
@@ -62,11 +63,9 @@ class Row {
   char* end_ = text_.data();
 };
 
-bool write_file(const BlackBox& box, const char* file) noexcept {
-  const int descriptor = ::open(file, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  if (descriptor < 0) return false;
-  const bool written = box.write_to(descriptor);
-  return ::close(descriptor) == 0 && written;
+bool write_file(const BlackBox& box, const FilePlace& place) noexcept {
+  FileOnItsWay file(place);
+  return file.open() && box.write_to(file.descriptor()) && file.keep();
 }
 
 }  // namespace
@@ -145,21 +144,21 @@ bool BlackBox::write_to(int descriptor) const noexcept {
   return written;
 }
 
-BlackBoxFile::BlackBoxFile(double rate_hz, std::filesystem::path file)
-    : box_(rate_hz), file_(std::move(file)), on_crash_(save_now, this) {}
+BlackBoxFile::BlackBoxFile(double rate_hz, const std::filesystem::path& file)
+    : box_(rate_hz), place_(file), on_crash_(save_now, this) {}
 
 void BlackBoxFile::save_now(void* self) noexcept {
   const auto* const me = static_cast<const BlackBoxFile*>(self);
-  write_file(me->box_, me->file_.c_str());
+  write_file(me->box_, me->place_);
 }
 
 std::string BlackBoxFile::save_on_fault() const {
   const std::optional<std::string> fault = box_.fault();
   if (!fault) return {};
-  if (!write_file(box_, file_.c_str()))
-    throw std::runtime_error(
-        fmt::format("{}: cannot be written; check the folder and the space left", file_.string()));
-  return fmt::format("{}; the {:g} s around it are in {}", *fault, BlackBox::kSeconds, file_.string());
+  if (!write_file(box_, place_))
+    throw std::runtime_error(fmt::format("{}: cannot be written ({}); check the folder and the space left",
+                                         place_.asked.string(), std::strerror(errno)));
+  return fmt::format("{}; the {:g} s around it are in {}", *fault, BlackBox::kSeconds, place_.asked.string());
 }
 
 std::unique_ptr<BlackBoxFile> open_black_box_file(const std::filesystem::path& asked,

@@ -11,6 +11,7 @@
 
 #include "device/loop/servo_loop.h"
 #include "device/loop/stop_signal.h"
+#include "hybrid/base/whole_file.h"
 #include "hybrid/tick/tick.h"
 
 namespace hybrid {
@@ -61,7 +62,8 @@ class BlackBox {
 // A black box and its file. A crash writes it from the signal handler, a fault at the end of the session.
 class BlackBoxFile {
  public:
-  BlackBoxFile(double rate_hz, std::filesystem::path file);
+  // Throws std::runtime_error: no file can be written there.
+  BlackBoxFile(double rate_hz, const std::filesystem::path& file);
 
   [[nodiscard]] BlackBox& box() { return box_; }
   // After a fault writes the file and returns its name; empty without a fault.
@@ -71,7 +73,7 @@ class BlackBoxFile {
   static void save_now(void* self) noexcept;
 
   BlackBox box_;
-  std::filesystem::path file_;
+  FilePlace place_;
   device::OnCrash on_crash_;
 };
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <glm/geometric.hpp>
 
+#include "device/loop/stop_signal.h"
 #include "hybrid/tick/bodies/body_collisions.h"
 #include "hybrid/tick/tick.h"
 
@@ -56,7 +57,7 @@ std::optional<glm::dvec3> equilibrium_force(const World& world, const WorldState
   for (const auto& object : copy->soft) object->widen_patches();
   const device::DeviceState still{.position_m = state.device_m};
   glm::dvec3 before(0.0);
-  for (int n = 1; n <= kSettleTicks; ++n) {
+  for (int n = 1; n <= kSettleTicks && device::stop_signal() == 0; ++n) {
     const TickResult felt = haptic_tick(settling, *copy, still, 1e-3);
     if (n % kStillTicks != 0) continue;
     const glm::dvec3 force = world.tool.stiffness_N_per_m * (felt.proxy_m - felt.device_m);

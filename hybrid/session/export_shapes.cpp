@@ -2,15 +2,18 @@
 #include "hybrid/session/export_shapes.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <array>
 #include <cctype>
+#include <cstdint>
 #include <set>
 #include <stdexcept>
+#include <string_view>
 
+#include "hybrid/base/file_ending.h"
+#include "hybrid/base/whole_file.h"
 #include "hybrid/snapshot/fill_snapshot.h"
-#include "polygon/files/mesh_file.h"
+#include "polygon/files/write_mesh.h"
 #include "voxel/volume/warp_labels.h"
 
 namespace hybrid {
@@ -68,6 +71,14 @@ std::string as_file_name(std::string name) {
   return name;
 }
 
+enum class SurfaceFormat : std::uint8_t { ply, stl, obj };
+
+SurfaceFormat surface_format(const fs::path& file) {
+  const std::string ending = lower_ending(file);
+  if (ending == ".stl") return SurfaceFormat::stl;
+  return ending == ".obj" ? SurfaceFormat::obj : SurfaceFormat::ply;
+}
+
 fs::path before_ending(const fs::path& file, const std::string& more) {
   const std::string name = file.string(), ending = voxel::volume_ending(file);
   return name.substr(0, name.size() - ending.size()) + more + ending;
@@ -97,15 +108,20 @@ void save_surfaces(const fs::path& file, const BuiltScene& built) {
     add(body.drawn,
         [&](std::size_t v) { return body.to_scene(body.drawn.vertices[v]) + glm::dvec3(moved[v]); });
   }
-  const fs::path part = file.string() + ".part" + std::to_string(getpid()) + ".ply";
-  std::error_code error;
-  try {
-    polygon::save_ply(part, all);
-    fs::rename(part, file);
-  } catch (...) {
-    fs::remove(part, error);
-    throw;
+  WholeFile out(file);
+  const polygon::ByteSink sink = [&out](std::string_view bytes) { out.write(bytes); };
+  switch (surface_format(file)) {
+    case SurfaceFormat::ply:
+      polygon::write_ply(all, sink);
+      break;
+    case SurfaceFormat::stl:
+      polygon::write_stl_in_mm(all, sink);
+      break;
+    case SurfaceFormat::obj:
+      polygon::write_obj_in_mm(all, sink);
+      break;
   }
+  out.keep();
 }
 
 std::vector<fs::path> saved_volume_names(const fs::path& file, const Scene& scene) {

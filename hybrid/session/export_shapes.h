@@ -9,8 +9,9 @@
 
 namespace hybrid {
 
-// Writes the present surfaces of all objects as one PLY (scene frame, meters). An existing file is replaced
-// whole or not at all. Throws std::runtime_error in words.
+// Writes the present surfaces of all objects as one mesh in the scene's frame. The ending selects the format:
+// .stl and .obj in millimeters, as scenes read them; any other is PLY in meters, with that unit in its
+// header. Throws std::runtime_error in words.
 void save_surfaces(const std::filesystem::path& file, const BuiltScene& built);
 
 // Writes a displacement field and the moved labels of each soft object (millimeters). Their frame is that of

@@ -10,7 +10,9 @@
 #include <fstream>
 #include <sstream>
 
+#include "device/loop/stop_signal.h"
 #include "hybrid/base/flush_to_zero.h"
+#include "hybrid/base/whole_file.h"
 #include "hybrid/tick/tissue/async_relaxation.h"
 
 namespace hybrid {
@@ -45,7 +47,7 @@ std::string read_text(const std::filesystem::path& file) {
 }  // namespace
 
 void save_recording(const std::filesystem::path& file, const Recording& recording) {
-  std::ofstream out(file, std::ios::binary);
+  WholeFile out(file);
   const std::string path = recording.scene_file.string();
   const Header header{kMagic,
                       path.size(),
@@ -58,21 +60,18 @@ void save_recording(const std::filesystem::path& file, const Recording& recordin
                       recording.async_relaxation ? 1U : 0U,
                       recording.state_hash,
                       {recording.start_m.x, recording.start_m.y, recording.start_m.z}};
-  out.write(reinterpret_cast<const char*>(&header), sizeof header);
-  out.write(path.data(), static_cast<std::streamsize>(path.size()));
-  out.write(recording.scene_text.data(), static_cast<std::streamsize>(recording.scene_text.size()));
+  out.write(&header, sizeof header);
+  out.write(path);
+  out.write(recording.scene_text);
   for (const RecordedTick& t : recording.ticks) {
     const Tick tick{{t.device_m.x, t.device_m.y, t.device_m.z},
                     t.hash,
                     static_cast<std::uint32_t>(t.fault),
                     t.work_share,
                     t.arrived};
-    out.write(reinterpret_cast<const char*>(&tick), sizeof tick);
+    out.write(&tick, sizeof tick);
   }
-  out.flush();
-  if (!out)
-    throw std::runtime_error(
-        fmt::format("{}: cannot be written; check the folder and the space left", file.string()));
+  out.keep();
 }
 
 Recording load_recording(const std::filesystem::path& file) {
@@ -147,17 +146,19 @@ ReplayResult replay(const Recording& recording, const Progress& progress) {
   begin_session(scene, *built.world, *built.state, recording.start_m);
   if (recording.async_relaxation) start_async_relaxation(*built.state, Arrival::recorded);
   std::uint64_t hash = kHashBegin;
-  for (std::size_t n = 0; n < recording.ticks.size(); ++n) {
+  for (std::size_t n = 0; n < recording.ticks.size() && device::stop_signal() == 0; ++n) {
     const device::DeviceState input{.position_m = recording.ticks[n].device_m,
                                     .fault = recording.ticks[n].fault};
     restore_tick_timing(recording.ticks[n], *built.state);
     hash = hash_tick(hash, haptic_tick(*built.world, *built.state, input, recording.dt_s));
+    ++result.replayed_ticks;
     if (hash == recording.ticks[n].hash || !result.equal) continue;
     result.equal = false;
     result.first_difference = n;
   }
   result.state_hash = hash_state(hash, *built.state);
-  result.equal = result.equal && result.state_hash == recording.state_hash;
+  if (result.replayed_ticks == result.ticks)
+    result.equal = result.equal && result.state_hash == recording.state_hash;
   return result;
 }
 

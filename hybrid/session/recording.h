@@ -28,8 +28,9 @@ void save_recording(const std::filesystem::path& file, const Recording& recordin
 Recording load_recording(const std::filesystem::path& file);
 
 struct ReplayResult {
-  std::uint64_t ticks = 0, state_hash = 0;
-  bool equal = false;
+  std::uint64_t ticks = 0, state_hash = 0;  // of the recording; of the replay
+  std::uint64_t replayed_ticks = 0;  // fewer than `ticks` where a signal ended the replay (StopOnSignal)
+  bool equal = false;                // of the ticks that were replayed
   std::uint64_t first_difference =
       0;  // first tick whose hash differs; the number of ticks when only the final hash differs
 };

@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "hybrid/base/process_memory.h"
+#include "hybrid/base/whole_file.h"
 
 namespace hybrid {
 namespace {
@@ -319,17 +320,7 @@ std::vector<std::string> fault_texts(std::uint32_t faults) {
 }
 
 void save_json(const std::string& file, const nlohmann::ordered_json& report) {
-  const std::string text = report.dump(2);
-  if (file == "-") {
-    fmt::print("{}\n", text);
-    std::fflush(stdout);
-    return;
-  }
-  std::ofstream out(file);
-  out << text << '\n';
-  out.flush();
-  if (!out)
-    throw std::runtime_error(fmt::format("{}: cannot be written; check the folder and the space left", file));
+  save_text(file, report.dump(2) + '\n');
 }
 
 }  // namespace hybrid

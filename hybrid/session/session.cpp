@@ -10,6 +10,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "device/loop/stop_signal.h"
 #include "device/simulated/simulated.h"
 #include "hybrid/base/flush_to_zero.h"
 #include "hybrid/session/equilibrium.h"
@@ -99,6 +100,7 @@ class Run {
     result_.device_name = device_.name();
     result_.path_notes = path_->notes();
     ticks_ = static_cast<std::uint64_t>(std::llround(seconds * scene.rate_hz));
+    result_.planned_ticks = ticks_;
     result_.dt_s = dt_;
     clearance_every_ = std::max<std::uint64_t>(1, ticks_ / kClearances);
     if (options.keep_recording) result_.recording.reserve(ticks_);
@@ -193,8 +195,12 @@ class Run {
     const auto now = std::chrono::steady_clock::now();
     if (now - last_report_ <= std::chrono::milliseconds(500)) return;
     last_report_ = now;
-    options_.progress(fmt::format("tick {} of {} ({:.0f} %)", tick, ticks_,
-                                  100.0 * static_cast<double>(tick) / static_cast<double>(ticks_)));
+    say(fmt::format("tick {} of {} ({:.0f} %)", tick, ticks_,
+                    100.0 * static_cast<double>(tick) / static_cast<double>(ticks_)));
+  }
+
+  // A signal ends the servo loop, which keeps what was felt; no exception may go through it.
+  void say(const std::string& text) try { options_.progress(text); } catch (const device::StopAsked&) {
   }
 
   void record_tick(const TickResult& felt, std::uint64_t tick, device::DeviceFault fault) {
@@ -231,7 +237,7 @@ class Run {
       device_before_m_ = felt.device_m;
     }
     if (sampler_ == nullptr || !sampler_->wants(tick)) return;
-    if (options_.progress) options_.progress(sampler_->progress());
+    if (options_.progress) say(sampler_->progress());
     sampler_->take(world_, state_, coupling, static_cast<double>(tick) * dt_);
   }
 

@@ -65,6 +65,7 @@ struct SessionOptions {
 
 struct SessionResult {
   std::uint64_t ticks = 0, contact_ticks = 0, deadline_misses = 0;
+  std::uint64_t planned_ticks = 0;  // more than `ticks` where a signal or the device ended the session
   double dt_s = 0.0;
   std::uint64_t state_hash = 0;
   std::vector<TraceRow> rows;
@@ -96,7 +97,8 @@ struct SessionResult {
   std::uint64_t ticks_with_less_work = 0;
 };
 
-// Runs the scene's path to its end on its device. Throws SceneError: the tool starts inside something rigid.
+// Runs the scene's path to its end on its device, or until a signal (StopOnSignal): then the result is of the
+// ticks so far, and `end` says so. Throws SceneError: the tool starts inside something rigid.
 SessionResult run_session(const Scene& scene, BuiltScene& built, const SessionOptions& options);
 
 // The pieces, for callers that drive the loop themselves.

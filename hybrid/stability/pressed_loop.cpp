@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "device/loop/stop_signal.h"
 #include "hybrid/base/flush_to_zero.h"
 #include "hybrid/session/equilibrium.h"
 #include "hybrid/session/session.h"
@@ -96,6 +97,7 @@ double PressedScene::depth_of(const glm::dvec3& point_m) const {
 }
 
 void PressedScene::restart(const LoopSetting& setting, double stiffness_N_per_m) {
+  device::stop_if_asked();
   world_.tool.stiffness_N_per_m = stiffness_N_per_m;
   world_.encoder_m = setting.encoder_m();
   world_.damping_account = setting.damping_account;

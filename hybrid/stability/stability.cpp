@@ -8,8 +8,11 @@
 #include <chrono>
 #include <cmath>
 #include <ctime>
+#include <set>
+#include <tuple>
 #include <utility>
 
+#include "device/loop/stop_signal.h"
 #include "hybrid/base/find_threshold.h"
 
 namespace hybrid {
@@ -249,6 +252,14 @@ void measure(PressedScene& scene, StabilityRow& row) {
   }
 }
 
+// A fixed and a varied coupling are two kinds.
+void keep_first_of_each(std::vector<StabilityRow>& rows) {
+  std::set<std::tuple<StabilitySweep, Boundary, bool>> seen;
+  std::erase_if(rows, [&seen](const StabilityRow& row) {
+    return !seen.emplace(row.sweep, row.kind, row.coupling_N_per_m.has_value()).second;
+  });
+}
+
 }  // namespace
 
 std::string_view name_of(Boundary kind) noexcept {
@@ -278,8 +289,11 @@ std::optional<double> StabilityRow::error() const {
   return *measured / *theory - 1.0;
 }
 
-StabilityReport measure_stability(const Scene& scene, const Progress& progress) {
+StabilityReport measure_stability(const Scene& scene, const StabilityOptions& options) {
   const auto start = std::chrono::steady_clock::now();
+  const auto seconds = [start] {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  };
   const std::clock_t processor = std::clock();
   Plan plan(scene);
   if (scene.soft.empty()) {
@@ -289,25 +303,37 @@ StabilityReport measure_stability(const Scene& scene, const Progress& progress) 
   }
   StabilityReport report = std::move(plan.report);
   report.scene = scene.file.string();
+  if (options.quick) keep_first_of_each(report.rows);
   std::unique_ptr<PressedScene> pressed;
   std::optional<double> built_with;
-  for (std::size_t n = 0; n < report.rows.size(); ++n) {
-    StabilityRow& row = report.rows[n];
-    if (progress)
-      progress(
-          fmt::format("{} of {}: {}, {}", n + 1, report.rows.size(), name_of(row.kind), title_of(row.sweep)));
-    if (row.coupling_N_per_m) {
-      measure_modulus(scene, row);
-      continue;
+  std::size_t done = 0;
+  try {
+    for (; done < report.rows.size(); ++done) {
+      StabilityRow& row = report.rows[done];
+      if (options.progress) {
+        const double left_s = done == 0 ? 0.0
+                                        : seconds() * static_cast<double>(report.rows.size() - done) /
+                                              static_cast<double>(done);
+        options.progress(fmt::format("{} of {}: {}, {}{}", done + 1, report.rows.size(), name_of(row.kind),
+                                     title_of(row.sweep),
+                                     done == 0 ? "" : fmt::format("; about {:.0f} s left", left_s)));
+      }
+      if (row.coupling_N_per_m) {
+        measure_modulus(scene, row);
+        continue;
+      }
+      if (pressed == nullptr || row.young_Pa != built_with) {
+        pressed = std::make_unique<PressedScene>(row.young_Pa ? with_young(scene, *row.young_Pa) : scene,
+                                                 options.progress);
+        built_with = row.young_Pa;
+      }
+      measure(*pressed, row);
     }
-    if (pressed == nullptr || row.young_Pa != built_with) {
-      pressed =
-          std::make_unique<PressedScene>(row.young_Pa ? with_young(scene, *row.young_Pa) : scene, progress);
-      built_with = row.young_Pa;
-    }
-    measure(*pressed, row);
+  } catch (const device::StopAsked& asked) {
+    report.stopped_by = asked.signal;
+    report.rows.resize(done);
   }
-  report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  report.seconds = seconds();
   report.processor_seconds = static_cast<double>(std::clock() - processor) / CLOCKS_PER_SEC;
   return report;
 }

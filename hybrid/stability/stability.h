@@ -61,12 +61,18 @@ struct StabilityReport {
   std::vector<StabilityRow> rows;
   std::vector<TheoryCurve> curves;
   double seconds = 0.0, processor_seconds = 0.0;
+  int stopped_by = 0;  // the signal that ended the measurement; the rows are then those that were done
 };
 
-// Measures them all: over rigid scenes the whole plan (about two minutes), over scenes with something soft
-// where they begin to buzz: with Young's modulus at 1, 10 and 100 kPa, and with a stiff coupling by Young's
-// modulus. Throws SceneError (see PressedScene).
-StabilityReport measure_stability(const Scene& scene, const Progress& progress = {});
+struct StabilityOptions {
+  bool quick = false;  // of each sweep and kind the first row alone
+  Progress progress{};
+};
+
+// Measures them all: over rigid scenes the whole plan (two to five minutes; quick: some seconds), over scenes
+// with something soft where they begin to buzz: with Young's modulus at 1, 10 and 100 kPa, and with a stiff
+// coupling by Young's modulus. A signal (StopOnSignal) ends it early. Throws SceneError (see PressedScene).
+StabilityReport measure_stability(const Scene& scene, const StabilityOptions& options = {});
 
 // What theory and measurement are compared over: rows that have a theory, and how far the worst is off.
 struct Agreement {

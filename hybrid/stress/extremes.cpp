@@ -2,7 +2,6 @@
 #include "hybrid/stress/extremes.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -19,6 +18,7 @@
 
 #include "hybrid/base/process_memory.h"
 #include "hybrid/stress/cases.h"
+#include "hybrid/stress/scratch_folder.h"
 #include "polygon/files/mesh_file.h"
 #include "polygon/surface/primitives.h"
 
@@ -31,26 +31,6 @@ constexpr double kPassiveRounding_J = 1e-7;  // that the controller lets pass be
 constexpr double kLongTick_us = 250e3;       // processor time: a hang, on any machine
 constexpr double kBack = 0.01;               // of the spacing: tissue that is nearer to rest has come back
 constexpr std::size_t kQuickEvery = 7;       // cases of the table, of which the quick share takes one
-
-// A folder that goes when this does.
-class Folder {
- public:
-  Folder() : path_(fs::temp_directory_path() / fmt::format("hybrid-extremes-{}", ::getpid())) {
-    fs::create_directories(path_);
-  }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-  Folder(Folder&&) = delete;
-  Folder& operator=(Folder&&) = delete;
-  ~Folder() {
-    std::error_code none;
-    fs::remove_all(path_, none);
-  }
-  [[nodiscard]] const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
 
 // "…scene.toml:12:8: what; what to do"
 bool says_where_what_and_remedy(const std::string& text) {
@@ -284,7 +264,7 @@ class Suite {
   }
 
   const ExtremesOptions& options_;
-  Folder folder_;
+  ScratchFolder folder_{"extremes"};
   std::vector<ExtremeRow> rows_;
   std::string test_case_, setting_;
   std::string like_;  // of the scene that these were felt in

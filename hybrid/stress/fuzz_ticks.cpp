@@ -2,7 +2,6 @@
 #include "hybrid/stress/fuzz_ticks.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -14,11 +13,13 @@
 #include <optional>
 #include <random>
 
+#include "device/loop/stop_signal.h"
 #include "hybrid/base/flush_to_zero.h"
 #include "hybrid/session/session.h"
 #include "hybrid/session/tick_invariants.h"
 #include "hybrid/stress/drive.h"
 #include "hybrid/stress/scenes.h"
+#include "hybrid/stress/scratch_folder.h"
 #include "hybrid/tick/tissue/async_relaxation.h"
 
 namespace hybrid {
@@ -222,6 +223,7 @@ class Fuzz {
     set_flush_to_zero();
     begin_session(scene_, world_, state_, glm::dvec3(0.0, 0.0, 60.0 * kUnit_m));
     while (result_.ticks < ticks) {
+      device::stop_if_asked();
       episode();
       recover();
     }
@@ -321,18 +323,14 @@ class Fuzz {
 }  // namespace
 
 std::vector<FuzzResult> fuzz_ticks(const FuzzOptions& options) {
-  const std::filesystem::path folder =
-      std::filesystem::temp_directory_path() / fmt::format("hybrid-fuzz-{}", ::getpid());
-  std::filesystem::create_directories(folder);
+  const ScratchFolder folder("fuzz");
   std::vector<FuzzResult> results;
   for (const FuzzScene& which : scenes()) {
     if (!options.only.empty() && which.name != options.only) continue;
     if (options.progress) options.progress(fmt::format("fuzzing ticks: {}", which.name));
-    results.push_back(Fuzz(which, folder, options.seed, options.async_relaxation)
+    results.push_back(Fuzz(which, folder.path(), options.seed, options.async_relaxation)
                           .run(std::max<std::uint64_t>(1, options.ticks / scenes().size())));
   }
-  std::error_code none;
-  std::filesystem::remove_all(folder, none);
   return results;
 }
 

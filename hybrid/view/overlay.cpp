@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <system_error>
 
+#include "hybrid/base/number_text.h"
 #include "hybrid/view/overlay_parts.h"
 
 namespace hybrid {
@@ -124,23 +124,17 @@ OverlayMesh Overlay::build(const DrawnScene& scene, const Snapshot& snapshot, co
   return mesh;
 }
 
-std::string number_text(double value, const char* format) {
-  std::array<char, 64> text{};
-  std::snprintf(text.data(), text.size(), format, value);  // NOLINT(clang-diagnostic-format-nonliteral)
-  return text.data();
-}
-
 std::string force_text(double force_N) {
   if (!std::isfinite(force_N)) return "not finite";
   const double size = std::abs(force_N);
-  return number_text(force_N, size < 0.9995 ? "%.3f N" : (size < 99.95 ? "%.2f N" : "%.0f N"));
+  return with_decimals(force_N, size < 0.9995 ? 3 : (size < 99.95 ? 2 : 0)) + " N";
 }
 
 std::string length_text(double length_m) {
   if (!std::isfinite(length_m)) return "not finite";
   const double size = std::abs(length_m);
   const auto say = [&](double unit, const char* name) {
-    return number_text(length_m / unit, "%.3g ") + name;
+    return with_digits(length_m / unit, 3) + " " + name;
   };
   if (size >= 0.9995e3) return say(1e3, "km");
   if (size >= 0.9995) return say(1.0, "m");

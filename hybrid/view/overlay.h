@@ -63,9 +63,6 @@ std::string length_text(double length_m);
 // "1.20 N": three significant digits, at most three decimals.
 std::string force_text(double force_N);
 
-// Formats a number; `format` is a printf format with one %g or %f.
-std::string number_text(double value, const char* format);
-
 // Largest of 1, 2, 5 · 10^n that is at most `value`; 0 when the value is not positive or not finite.
 double round_down(double value);
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "hybrid/base/number_text.h"
 #include "hybrid/view/palette.h"
 #include "hybrid/view/tool_and_arrow.h"
 #include "polygon/mesh/is_finite.h"
@@ -46,7 +47,7 @@ float draw_heading(const Pen& pen, const DrawnScene& scene, const Snapshot& snap
   pen.text(x, y, kInk, title, true);
   y += 2.2F * em;
   pen.text(x, y, kInk,
-           "time " + number_text(snapshot.t_s, "%.3f s") + "    force on the hand " +
+           "time " + with_decimals(snapshot.t_s, 3) + " s    force on the hand " +
                force_text(glm::length(snapshot.force_N)) + (content.paused ? "    PAUSED" : ""));
   return y + 2.0F * em;
 }
@@ -176,7 +177,7 @@ std::optional<PixelBox> draw_history(const Pen& pen, const OverlayContent& conte
   while (top < most) top += round_down(most);
   pen.plate(x0, y0, w, h);
   pen.text(x0 + 0.6F * em, y0 + 0.4F * em, kInk,
-           "force, last " + number_text(span, "%.1f s") + "  (top " + force_text(top) + ")");
+           "force, last " + with_decimals(span, 1) + " s  (top " + force_text(top) + ")");
   const float low = y0 + h - 0.5F * em;
   const float high = y0 + 1.9F * em;
   pen.line({x0 + 2.0F, high}, {x0 + w - 2.0F, high}, kEdge);

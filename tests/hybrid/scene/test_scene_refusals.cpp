@@ -47,7 +47,7 @@ const Broken broken[] = {
     {"format-not-first", "2:1", "must be the first", "move format = 1"},
     {"format-two", "1:1", "format 1", "format = 1"},
     {"binary", "3:1", "not text", ".toml"},
-    {"binary-later", "2:9", "utf-8", "UTF-8"},
+    {"binary-later", "2:10", "UTF-8", "save the file as UTF-8"},
     {"utf16", "1:1", "UTF-16", "save it as UTF-8"},
     {"syntax", "2:9", "value", "quotes"},
     {"syntax-header", "2:2", "no key", "correct the TOML"},
@@ -334,6 +334,79 @@ TEST_F(SceneRefusal, DamagedScenesAreScenesOrRefused) {
   EXPECT_EQ(scenes + refused, rounds);
   EXPECT_GT(scenes, rounds / 50);
   EXPECT_GT(refused, rounds / 2);
+}
+
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> lines;
+  std::size_t at = 0;
+  while (at < text.size()) {
+    const std::size_t end = std::min(text.find('\n', at), text.size());
+    lines.push_back(text.substr(at, end - at));
+    at = end + 1;
+  }
+  return lines;
+}
+
+// Lines as ":2:1: unknown key …", in the order of the file.
+TEST_F(SceneRefusal, AllErrorsAreSaidInTheOrderOfTheFile) {
+  const std::string said = refusal(
+      "format = 1\ntitel = \"a\"\n"                                                  // 2
+      "[tool]\nradius = -1\nstiffness = \"hard\"\n"                                  // 4, 5
+      "[material.fat]\nyoung = 0\n"                                                  // 7
+      "[[rigid]]\nname = \"a\"\nprimitive = \"sphere\"\nradius = 4\n"                // 10
+      "[[soft]]\nname = \"b\"\nformula = \"block\"\nsize = [20, 20]\nspacing = 0\n"  // 15, 16
+      "[path]\nkind = \"press\"\nfrom = 3\nto = [0, 0, 3]\n");                       // 19
+  const std::vector<std::string> lines = lines_of(said);
+  const std::vector<int> expected{2, 4, 5, 7, 10, 15, 16, 19};
+  ASSERT_EQ(lines.size(), expected.size()) << said;
+  for (std::size_t n = 0; n < lines.size(); ++n) {
+    EXPECT_NE(lines[n].find(":" + std::to_string(expected[n]) + ":"), std::string::npos) << lines[n];
+    EXPECT_NE(lines[n].find("; "), std::string::npos) << lines[n];
+  }
+}
+
+TEST_F(SceneRefusal, WhatFollowsFromAnErrorIsNoErrorOfItsOwn) {
+  struct Case {
+    const char* what;
+    std::string text;
+    std::size_t errors;
+  };
+  const std::string head = "format = 1\n";
+  for (const Case& c :
+       {Case{"a misspelt key is not also missing",
+             head + "[[rigid]]\nname = \"a\"\nprimitive = \"ball\"\nradus = 4\n" + path, 1},
+        Case{"a material that is wrong is not also undefined",
+             head + "[material.fat]\nyoung = 0\n" + block + "material = \"fat\"\n" + path, 1},
+        Case{
+            "names that are missing are not the same one",
+            head +
+                "[[rigid]]\nprimitive = \"ball\"\nradius = 4\n[[rigid]]\nprimitive = \"ball\"\nradius = 4\n" +
+                path,
+            2},
+        Case{"two misspelt materials",
+             head + "[material.fat]\nyoung = 1e4\n" + block + "material = \"fta\"\n" +
+                 "[[soft]]\nname = \"c\"\nformula = \"block\"\nsize = 20\nspacing = 2\nmaterial = \"aft\"\n" +
+                 path,
+             2},
+        Case{"no path and no objects", head, 2}}) {
+    const std::string said = refusal(c.text);
+    EXPECT_EQ(lines_of(said).size(), c.errors) << c.what << ": " << said;
+  }
+}
+
+TEST_F(SceneRefusal, Latin1IsNamedWithItsLine) {
+  const std::string said = refusal(
+      "format = 1\n# fine\ntitle = \"Sch\xE4"
+      "del\"\n" +
+      block + path);
+  EXPECT_NE(said.find(":3:13: "), std::string::npos) << said;
+  EXPECT_NE(said.find("Latin-1"), std::string::npos) << said;
+  EXPECT_NE(said.find("'\u00E4'"), std::string::npos) << said;
+  EXPECT_NE(said.find("save the file as UTF-8"), std::string::npos) << said;
+  // In a comment too; and what is cut within a character is not Latin-1, but no UTF-8 either.
+  EXPECT_NE(refusal("format = 1 # f\xFCr\n").find(":1:15: "), std::string::npos);
+  EXPECT_NE(refusal("format = 1 # \xE2\x82\n").find("not utf-8"), std::string::npos);
+  EXPECT_EQ(refusal("format = 1\ntitle = \"Sch\u00E4del\"\n" + block + path), "");
 }
 
 }  // namespace

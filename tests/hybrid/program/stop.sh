@@ -1,0 +1,74 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
+# stop.sh PROGRAM SCENES FOLDER: signals end a session in order. What was asked for is written for what was played.
+set -u
+program=$1 scenes=$2 folder=$3
+failures=0
+rm -rf "$folder"
+mkdir -p "$folder"
+cd "$folder" || exit 1
+
+fail() {
+  echo "FAILED: $*"
+  failures=$((failures + 1))
+}
+
+# Far longer than it takes until the signal comes.
+session=("$program" run "$scenes/cube.toml" --seconds 2000 --samples 0 --trace t.csv --record r.rec --json j.json)
+
+# stopped SIGNAL STATUS WORDS WHEN COMMAND…: the signal comes once WHEN was said, or after five seconds where that is
+# empty.
+stopped() {
+  local signal=$1 wanted=$2 words=$3 when=$4 process status n
+  shift 4
+  rm -f t.csv r.rec j.json
+  "$@" > run.log 2>&1 &
+  process=$!
+  if [ -z "$when" ]; then
+    sleep 5
+  else
+    for ((n = 0; n < 600; ++n)); do
+      grep -q "$when" run.log && break
+      sleep 0.1
+    done
+  fi
+  kill "-$signal" "$process"
+  wait "$process"
+  status=$?
+  [ "$status" = "$wanted" ] || fail "$signal: status $status, not $wanted"
+  grep -q "$words" run.log || fail "$signal: '$words' was not said, but: $(tail -n 3 run.log)"
+}
+
+for mode in "" --realtime; do
+  when="tick [0-9]"
+  [ -z "$mode" ] || when="" # says nothing while it runs
+  for signal in INT TERM; do
+    status=130 name=Ctrl-C
+    [ $signal = TERM ] && status=143 name=SIGTERM
+    # shellcheck disable=SC2086
+    stopped $signal $status "stopped by $name after .* s of 2000.00 s; trace, recording, report were written" "$when" \
+      "${session[@]}" $mode
+    grep -q '"end": "stopped"' j.json || fail "the report does not say that it was stopped"
+    ticks=$(sed -n 's/^  "ticks": \([0-9]*\),/\1/p' j.json)
+    rows=$(($(wc -l < t.csv) - 1))
+    if [ "$ticks" != "$rows" ] || [ "$rows" = 0 ]; then
+      fail "$ticks ticks in the report, $rows rows in the trace"
+    fi
+    "$program" replay r.rec > replay.log 2>&1 || fail "the recording does not replay: $(cat replay.log)"
+    grep -q "equal: $ticks ticks" replay.log || fail "the replay is not of $ticks ticks: $(cat replay.log)"
+  done
+done
+
+# A study keeps the rows that are done.
+stopped INT 130 "stopped by Ctrl-C after .* rows; report was written" "of [0-9]*: slide" \
+  "$program" bench rigid --only slide --meshes ico2,ico3 --json j.json
+grep -q '"stopped": true' j.json || fail "the report of bench does not say that it was stopped"
+stopped INT 130 "stopped by Ctrl-C after .* rows; report was written" "of [0-9]*: stable" \
+  "$program" stability "$scenes/wall.toml" --json j.json
+grep -q '"stopped": true' j.json || fail "the report of stability does not say that it was stopped"
+
+# Where there is nothing to keep, the end comes at once and leaves nothing.
+stopped INT 130 "by Ctrl-C" "" "$program" compare "$scenes/head.toml" --json j.json
+[ ! -e j.json ] || fail "compare left a report"
+if ((failures > 0)); then exit 1; fi
+echo "all was kept"
