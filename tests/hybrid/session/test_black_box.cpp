@@ -129,8 +129,11 @@ TEST_F(BlackBox, TheLongestRowFits) {
   EXPECT_EQ(std::count(line.begin(), line.end(), ','), std::count(header.begin(), header.end(), ','));
 }
 
-TEST_F(BlackBox, WhatCannotBeWrittenIsSaid) {
-  BlackBoxFile kept_box(kRate_hz, folder_ / "no such folder" / "fault.csv");
+TEST_F(BlackBox, WhatCannotBeWrittenIsSaidBeforeTheSessionOrAfterTheFault) {
+  EXPECT_THROW(BlackBoxFile(kRate_hz, folder_ / "no such folder" / "fault.csv"), std::runtime_error);
+  std::filesystem::create_directory(folder_ / "goes");
+  BlackBoxFile kept_box(kRate_hz, folder_ / "goes" / "fault.csv");
+  std::filesystem::remove(folder_ / "goes");
   BlackBoxRow next = row(0);
   next.reported = DeviceFault::lost;
   kept_box.box().add(next);
