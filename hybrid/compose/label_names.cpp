@@ -7,7 +7,7 @@
 #include <optional>
 #include <string_view>
 
-#include "hybrid/compose/tissue_table.h"
+#include "hybrid/scene/tissue_table.h"
 #include "hybrid/scene/table_reader.h"
 
 namespace hybrid {

@@ -13,7 +13,7 @@
 #include "hybrid/build/build_world.h"
 #include "hybrid/compose/write_folder.h"
 #include "hybrid/compose/label_names.h"
-#include "hybrid/compose/tissue_table.h"
+#include "hybrid/scene/tissue_table.h"
 #include "voxel/volume/label_volume.h"
 
 namespace hybrid {

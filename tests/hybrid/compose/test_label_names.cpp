@@ -14,7 +14,7 @@
 
 #include "hybrid/compose/compose.h"
 #include "hybrid/compose/parts_from_labels.h"
-#include "hybrid/compose/tissue_table.h"
+#include "hybrid/scene/tissue_table.h"
 
 namespace {
 

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What is known of tissues by their names: bone or not, and how stiff, with where the figure is from.
+// Tissues by their names: bone or not, how stiff, with the source of the figure, and the customary colour in
+// anatomical drawings.
 #pragma once
 
+#include <glm/vec3.hpp>
 #include <span>
 #include <string>
 #include <string_view>
@@ -16,6 +18,7 @@ struct Tissue {
   double poisson = 0.0;
   bool measured = false;    // published for this tissue; else a stand-in, and `source` says which
   std::string_view source;  // where the figure is from
+  glm::vec3 colour{0.0F};   // sRGB, 0 to 1: of the tissue in pictures
 };
 
 // The first row wins. Young's moduli are of small, slow deformation in living tissue where there is such a
