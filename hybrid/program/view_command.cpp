@@ -144,6 +144,14 @@ class Player {
   glm::dvec3 goal_m_{0.0};
 };
 
+// Places of the hand from the path's beginning to its end.
+std::vector<glm::dvec3> places_along(const device::Path& path) {
+  constexpr int steps = 500;
+  std::vector<glm::dvec3> places;
+  for (int n = 0; n <= steps; ++n) places.push_back(path.position(path.duration_s() * n / steps));
+  return places;
+}
+
 std::filesystem::path frame_file(const std::filesystem::path& folder, std::uint64_t n) {
   return folder / fmt::format("frame-{:05}.png", n);
 }
@@ -242,8 +250,9 @@ int view(const ViewCommand& command) {
   BuiltScene built = build_scene(scene, progress_on_terminal());
   end_progress();
   print_notes(built);
-  const DrawnScene drawn =
+  DrawnScene drawn =
       drawn_scene(scene, built, scene.title.empty() ? command.scene.stem().string() : scene.title);
+  if (!real) drawn.path_m = places_along(*scene_path(scene));
   Window window(drawn);
   const device::StopOnSignal stop;
   if (real) {

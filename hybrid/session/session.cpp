@@ -403,6 +403,7 @@ Snapshot take_snapshot(const World& world, const WorldState& state, const TickRe
                     .rigid_place = {},
                     .tick_us = tick.tick_us};
   fill_moved(world, state, snapshot);
+  fill_inside(world, state, snapshot);
   return snapshot;
 }
 

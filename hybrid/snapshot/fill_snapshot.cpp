@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "hybrid/snapshot/fill_snapshot.h"
 
+#include <algorithm>
 #include <glm/gtc/quaternion.hpp>
 
 #include "voxel/composite/grid.h"
 
 namespace hybrid {
 namespace {
+
+constexpr int kNodesInside = 24;  // along the longest edge of an object: displacements for a cut
 
 void fill_places(const World& world, const WorldState& state, Snapshot& snapshot) {
   snapshot.rigid_place.resize(world.rigid.size());
@@ -60,6 +63,40 @@ void fill_moved(const World& world, const WorldState& state, Snapshot& snapshot)
   snapshot.soft_moved_m.resize(world.object_count());
   for (std::size_t o = 0; o < world.soft.size(); ++o)
     fill_surface(world.soft[o], *state.soft[o], snapshot.soft_moved_m[world.rigid.size() + o]);
+}
+
+void fill_inside(const World& world, const WorldState& state, Snapshot& snapshot) {
+  snapshot.inside.resize(world.object_count());
+  for (std::size_t o = 0; o < world.soft.size(); ++o) {
+    const std::size_t number = world.rigid.size() + o;
+    if (number >= state.feel.size() || !state.feel[number].contact) continue;
+    const SoftBody& body = world.soft[o];
+    const voxel::SoftObject& object = *state.soft[o];
+    const std::array<int, 3>& dims = object.lattice().grid().dims;
+    SoftDent& dent = snapshot.inside[number];
+    dent.used = true;
+    dent.to_scene = glm::mat3_cast(body.pose.rotation);
+    dent.origin_m = body.pose.origin;
+    dent.spacing_m = object.lattice().spacing_m();
+    dent.count = 1;
+    SoftDent::Box& box = dent.boxes.emplace_back();
+    box.step = std::max(1, (std::max({dims[0], dims[1], dims[2]}) + kNodesInside - 1) / kNodesInside);
+    for (std::size_t d = 0; d < 3; ++d) box.count[d] = (dims[d] - 1) / box.step + 2;
+    box.stride = static_cast<std::size_t>(box.count[0]);
+    box.plane = box.stride * static_cast<std::size_t>(box.count[1]);
+    for (int k = 0; k < box.count[2]; ++k) {
+      for (int j = 0; j < box.count[1]; ++j) {
+        for (int i = 0; i < box.count[0]; ++i) {
+          // Nodes beyond the last voxels have the displacement of the last ones.
+          const glm::dvec3 node(std::min(i * box.step, dims[0] - 1), std::min(j * box.step, dims[1] - 1),
+                                std::min(k * box.step, dims[2] - 1));
+          const glm::dvec3 moved = object.displacement_at(node * dent.spacing_m);
+          for (std::size_t a = 0; a < 3; ++a)
+            box.moved_m[a].push_back(static_cast<float>(moved[static_cast<glm::length_t>(a)]));
+        }
+      }
+    }
+  }
 }
 
 void fill_moved_near(const World& world, const WorldState& state, Snapshot& snapshot) {

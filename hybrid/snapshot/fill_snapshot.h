@@ -12,5 +12,7 @@ void fill_moved(const World& world, const WorldState& state, Snapshot& snapshot)
 // The same from within a tick that must not wait: for a soft object under asynchronous relaxation only the
 // neighbourhood of the tool.
 void fill_moved_near(const World& world, const WorldState& state, Snapshot& snapshot);
+// Adds the displacements within each touched soft object, on a coarse grid: for the cut of a picture.
+void fill_inside(const World& world, const WorldState& state, Snapshot& snapshot);
 
 }  // namespace hybrid

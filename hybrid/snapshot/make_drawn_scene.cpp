@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
 #include <map>
 #include <span>
 
@@ -13,6 +15,7 @@ namespace {
 
 constexpr double kDrawnPoint = 0.004;  // of the scene: smallest drawn radius of a tool
 constexpr const char* kUnnamed = "default material";
+constexpr std::size_t kMostInside = 1U << 24U;  // cells of an object whose inside is kept for a cut
 
 // The material of each label, as a number and by name.
 struct MaterialsOfLabels {
@@ -79,10 +82,47 @@ std::vector<double> area_of_materials(const polygon::TriangleMesh& mesh,
   return area;
 }
 
+// The materials voxel by voxel, if the surface hides one of them. `shown`: numbers of the visible ones.
+void add_inside(DrawnObject& drawn, const SoftBody& body, const voxel::Lattice& lattice,
+                const MaterialsOfLabels& materials, const std::vector<std::uint8_t>& shown) {
+  const std::array<int, 3> dims = lattice.grid().dims;
+  const std::size_t cells = static_cast<std::size_t>(dims[0]) * static_cast<std::size_t>(dims[1]) *
+                            static_cast<std::size_t>(dims[2]);
+  if (shown.empty() || cells > kMostInside) return;
+  DrawnInside inside{.dims = dims,
+                     .to_scene = glm::mat3_cast(body.pose.rotation),
+                     .origin_m = body.pose.origin,
+                     .spacing_m = lattice.spacing_m()};
+  std::array<std::uint8_t, 256> rank{};  // 0: none yet, else 1 + index into inside.materials
+  const auto rank_of = [&](std::uint8_t material) {
+    if (rank[material] == 0) {
+      inside.materials.push_back(materials.names[material]);
+      rank[material] = static_cast<std::uint8_t>(inside.materials.size());
+    }
+    return rank[material];
+  };
+  for (const std::uint8_t material : shown) rank_of(material);
+  inside.of_voxel.reserve(cells);
+  for (int k = 0; k < dims[2]; ++k) {
+    for (int j = 0; j < dims[1]; ++j) {
+      for (int i = 0; i < dims[0]; ++i) {
+        const voxel::VoxelId v = lattice.at(i, j, k);
+        inside.of_voxel.push_back(lattice.filled(v) ? rank_of(materials.of_label[lattice.label(v)])
+                                                    : std::uint8_t{0});
+      }
+    }
+  }
+  if (inside.materials.size() > shown.size()) drawn.inside = std::move(inside);
+}
+
 void add_materials(DrawnObject& drawn, const SoftDescription& description, const SoftBody& body,
                    const voxel::Lattice& lattice) {
   const MaterialsOfLabels materials = materials_of_labels(description, body);
-  if (materials.names.size() < 2) return;
+  const auto only = [&](const std::string& name) { drawn.material = name == kUnnamed ? "" : name; };
+  if (materials.names.size() < 2) {
+    if (!materials.names.empty()) only(materials.names.front());
+    return;
+  }
   std::vector<std::uint8_t> of_vertex;
   of_vertex.reserve(body.drawn.vertices.size());
   for (const glm::dvec3& v : body.drawn.vertices)
@@ -92,8 +132,12 @@ void add_materials(DrawnObject& drawn, const SoftDescription& description, const
   for (std::size_t m = 0; m < area.size(); ++m) {
     if (area[m] > 0.0) order.push_back(static_cast<std::uint8_t>(m));
   }
-  if (order.size() < 2) return;  // a single visible material has the object's own colour
   std::stable_sort(order.begin(), order.end(), [&](auto a, auto b) { return area[a] > area[b]; });
+  add_inside(drawn, body, lattice, materials, order);
+  if (order.size() < 2) {
+    if (!order.empty()) only(materials.names[order.front()]);
+    return;
+  }
   std::array<std::uint8_t, 256> rank{};
   for (std::size_t r = 0; r < order.size(); ++r) {
     rank[order[r]] = static_cast<std::uint8_t>(r);
@@ -104,6 +148,18 @@ void add_materials(DrawnObject& drawn, const SoftDescription& description, const
 }
 
 }  // namespace
+
+std::optional<std::size_t> DrawnInside::material_at(const glm::dvec3& at_rest_m) const noexcept {
+  const glm::dvec3 point = glm::round(((at_rest_m - origin_m) * to_scene) / spacing_m);  // v · R is Rᵀ v
+  std::size_t cell = 0;
+  for (std::size_t d = 3; d-- > 0;) {
+    const double at = point[static_cast<glm::length_t>(d)];
+    if (!(at >= 0.0) || !(at < dims[d])) return {};
+    cell = cell * static_cast<std::size_t>(dims[d]) + static_cast<std::size_t>(at);
+  }
+  if (cell >= of_voxel.size() || of_voxel[cell] == 0) return {};
+  return of_voxel[cell] - std::size_t{1};
+}
 
 DrawnScene drawn_scene(const Scene& scene, const BuiltScene& built, const std::string& title) {
   const World& world = *built.world;

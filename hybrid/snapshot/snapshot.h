@@ -9,6 +9,7 @@
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,14 +18,30 @@
 
 namespace hybrid {
 
+// The materials within a soft object, voxel by voxel.
+struct DrawnInside {
+  std::array<int, 3> dims{};                 // voxels; all 0: not known
+  glm::dmat3 to_scene{1};                    // of the object's axes
+  glm::dvec3 origin_m{0.0}, spacing_m{1.0};  // the middle of voxel (0, 0, 0), in the scene frame
+  std::vector<std::string> materials{};      // those that the surface shows come first
+  std::vector<std::uint8_t> of_voxel{};      // x fastest: 0: empty, else 1 + index into `materials`
+
+  // Index of the material at a point at rest (scene frame); empty: outside.
+  [[nodiscard]] std::optional<std::size_t> material_at(const glm::dvec3& at_rest_m) const noexcept;
+};
+
 struct DrawnObject {
   std::string name;
   bool soft = false;
   polygon::TriangleMesh surface;  // scene frame, meters, at rest
+  // Name of the one material that the surface of a soft object shows; empty: none has a name, or it shows
+  // several.
+  std::string material{};
   // For a soft object with several visible materials, else both empty: their names, the largest area first,
   // and for each vertex the index of the material beneath it.
   std::vector<std::string> materials{};
   std::vector<std::uint8_t> vertex_material{};
+  DrawnInside inside{};  // only of a soft object with a material that its surface hides
 };
 
 struct DrawnScene {
@@ -32,7 +49,8 @@ struct DrawnScene {
   std::vector<DrawnObject> objects;
   bool tool_is_punch = false;
   double tool_radius_m = 0.0;
-  double max_force_N = 0.0;  // scale of the force arrow
+  double max_force_N = 0.0;          // scale of the force arrow
+  std::vector<glm::dvec3> path_m{};  // places of the hand on its path, for the first view; may be empty
 };
 
 // Present place of a rigid object relative to its place at rest: a rotation about a point that moves along.
@@ -89,6 +107,8 @@ struct Snapshot {
   std::vector<SoftPatch> patches{};
   // [object], or empty: for objects with contact on nested patches, instead of soft_moved_m.
   std::vector<SoftDent> dents{};
+  // [object], or empty: displacements within the touched soft objects, for a cut.
+  std::vector<SoftDent> inside{};
   std::vector<RigidPlace> rigid_place;  // [object]; if shorter: further objects have not moved
   double tick_us = 0.0;
 

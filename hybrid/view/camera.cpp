@@ -15,6 +15,8 @@ namespace hybrid {
 namespace {
 
 constexpr double degree = std::numbers::pi / 180.0;
+constexpr double kNearTools = 3.5;  // half the height of the nearer view, in radii of the tool
+constexpr double kFilled = 0.9;     // share of the view that the whole scene takes
 
 // Visits every `stride`-th finite vertex of the scene in its present state. The stride bounds the cost: a
 // large mesh costs no more than a small one.
@@ -52,6 +54,25 @@ struct Bounds {
     return bounds;
   }
 };
+
+// Every vertex and, of a snapshot, the tool; and the tool along a path.
+Bounds box_of(const DrawnScene& scene, const Snapshot* snapshot, std::span<const glm::dvec3> path_m) {
+  Bounds box;
+  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+    const RigidPlace place = snapshot != nullptr ? snapshot->place_of(i) : RigidPlace{};
+    for (const glm::dvec3& at : scene.objects[i].surface.vertices) box.add(place(at));
+  }
+  const auto add_tool = [&](const glm::dvec3& at) {
+    box.add(at - scene.tool_radius_m);
+    box.add(at + scene.tool_radius_m);
+  };
+  if (snapshot != nullptr) {
+    add_tool(snapshot->proxy_m);
+    add_tool(snapshot->device_m);
+  }
+  std::ranges::for_each(path_m, add_tool);
+  return box;
+}
 
 struct Candidate {
   double azimuth, elevation;
@@ -148,23 +169,13 @@ SceneBounds bounds_of(const polygon::TriangleMesh& surface) {
 }
 
 SceneBounds bounds_of(const DrawnScene& scene, const Snapshot* snapshot) {
-  Bounds box;
-  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
-    const RigidPlace place = snapshot != nullptr ? snapshot->place_of(i) : RigidPlace{};
-    for (const glm::dvec3& at : scene.objects[i].surface.vertices) box.add(place(at));
-  }
-  if (snapshot != nullptr) {
-    for (const glm::dvec3& at : {snapshot->proxy_m, snapshot->device_m}) {
-      box.add(at - scene.tool_radius_m);
-      box.add(at + scene.tool_radius_m);
-    }
-  }
-  return box.ball();
+  return box_of(scene, snapshot, {}).ball();
 }
 
-Camera frame_scene(const DrawnScene& scene, const Snapshot& snapshot, double aspect) {
+Camera frame_scene(const DrawnScene& scene, const Snapshot& snapshot, double aspect,
+                   std::span<const glm::dvec3> path_m) {
   Camera camera;
-  const SceneBounds bounds = bounds_of(scene, &snapshot);
+  const SceneBounds bounds = box_of(scene, &snapshot, path_m).ball();
   camera.target_m = bounds.centre_m;
 
   const double force = glm::length(snapshot.force_N);
@@ -192,9 +203,9 @@ Camera frame_scene(const DrawnScene& scene, const Snapshot& snapshot, double asp
   camera.azimuth_rad = best->azimuth;
   camera.elevation_rad = best->elevation;
 
-  // The shortest distance at which everything still fits, with room for the legend.
-  const double tan_y = 0.86 * std::tan(0.5 * camera.fov_y_rad);
-  const double tan_x = 0.86 * std::tan(0.5 * camera.fov_y_rad) * std::max(aspect, 0.1);
+  // The shortest distance at which everything still fits, with room for the scale bar.
+  const double tan_y = kFilled * std::tan(0.5 * camera.fov_y_rad);
+  const double tan_x = tan_y * std::max(aspect, 0.1);
   double distance = 0.0;
   const auto fit = [&](const glm::dvec3& at) {
     const glm::dvec3 offset = at - camera.target_m;
@@ -203,9 +214,15 @@ Camera frame_scene(const DrawnScene& scene, const Snapshot& snapshot, double asp
                          toward + std::abs(glm::dot(offset, camera.right())) / tan_x});
   };
   for_some_vertices(scene, snapshot, fit);
-  for (const glm::dvec3& at : {snapshot.proxy_m, snapshot.device_m}) {
-    if (polygon::is_finite(at)) fit(at + camera.toward_eye() * scene.tool_radius_m);
-  }
+  const auto fit_tool = [&](const glm::dvec3& at) {
+    if (!polygon::is_finite(at)) return;
+    for (const glm::dvec3& side :
+         {camera.toward_eye(), camera.up(), -camera.up(), camera.right(), -camera.right()})
+      fit(at + side * scene.tool_radius_m);
+  };
+  fit_tool(snapshot.proxy_m);
+  fit_tool(snapshot.device_m);
+  std::ranges::for_each(path_m, fit_tool);
   camera.distance_m = std::max(distance, 1.05 * bounds.radius_m);
   return camera;
 }
@@ -217,7 +234,7 @@ Camera frame_contact(const DrawnScene& scene, const Snapshot& snapshot, const Ca
   double offset_m = glm::length(snapshot.device_m - snapshot.proxy_m);
   if (!std::isfinite(offset_m)) offset_m = 0.0;
   const double half_height =
-      std::max({5.0 * scene.tool_radius_m, 1.6 * offset_m, 1e-6 * overview.distance_m});
+      std::max({kNearTools * scene.tool_radius_m, 1.6 * offset_m, 1e-6 * overview.distance_m});
   camera.distance_m = half_height / std::tan(0.5 * camera.fov_y_rad);
   return camera;
 }

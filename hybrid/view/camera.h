@@ -6,6 +6,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <optional>
+#include <span>
 
 #include "hybrid/snapshot/snapshot.h"
 
@@ -50,9 +51,11 @@ struct SceneBounds {
 SceneBounds bounds_of(const polygon::TriangleMesh& surface);
 SceneBounds bounds_of(const DrawnScene& scene, const Snapshot* snapshot = nullptr);
 
-// View of the whole scene. The direction minimises the cover between eye and tool and stands at an angle to
-// the force, so that the tool's depth shows. `aspect` is width / height.
-Camera frame_scene(const DrawnScene& scene, const Snapshot& snapshot, double aspect = 4.0 / 3.0);
+// View of the whole scene, and of the tool anywhere on `path_m`. The direction minimises the cover between
+// eye and tool and stands at an angle to the force, so that the tool's depth shows. `aspect` is width /
+// height.
+Camera frame_scene(const DrawnScene& scene, const Snapshot& snapshot, double aspect = 4.0 / 3.0,
+                   std::span<const glm::dvec3> path_m = {});
 
 // The same direction of view, close to the tool: some tool radii around the tool.
 Camera frame_contact(const DrawnScene& scene, const Snapshot& snapshot, const Camera& overview);

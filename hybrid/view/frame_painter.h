@@ -15,7 +15,7 @@ namespace hybrid {
 
 struct FrameOptions {
   int width = 0, height = 0;  // (pixels)
-  bool inset = true;          // draw a nearer view of the contact when the tool is small in the whole view
+  bool inset = true;          // draw a nearer view of the contact if it is kLeastNearer times nearer
   std::vector<ForceSample> history;
   std::string help;
   bool paused = false;

@@ -108,6 +108,14 @@ void GlMesh::draw() const {
   glDrawElements(GL_TRIANGLES, count, GL_UNSIGNED_INT, nullptr);
 }
 
+void GlMesh::release() {
+  glDeleteVertexArrays(1, &array);
+  for (const GLuint* buffer : {&vertices, &indices, &colours}) {
+    if (*buffer != 0) glDeleteBuffers(1, buffer);
+  }
+  *this = {};
+}
+
 GLuint make_texture_target(GLenum inner, GLenum outer, GLenum type, int width, int height) {
   GLuint texture = 0;
   glGenTextures(1, &texture);

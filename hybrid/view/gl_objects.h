@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The OpenGL objects that the renderer makes: programs, meshes in buffers, and textures to draw into. Every
-// call needs the renderer's context to be current. Nothing here deletes its objects: they end with the
-// context.
+// call needs the renderer's context to be current. Objects end with the context, unless they are released.
 #pragma once
 
 #include <cstddef>
@@ -36,6 +35,8 @@ struct GlMesh {
   // Replaces the vertices. Orphans the old storage, so that the driver need not wait for the previous frame.
   void stream(const DrawMesh& mesh) const;
   void draw() const;
+  // Deletes the buffers; the mesh is empty then.
+  void release();
 };
 
 // A texture to draw into, sampled without filtering (unit of width and height: pixel).

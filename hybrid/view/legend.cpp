@@ -3,10 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <numeric>
+#include <optional>
+#include <span>
 #include <utility>
 
 #include "hybrid/view/overlay.h"
@@ -92,6 +93,16 @@ void add_object(std::vector<LegendRow>& rows, const DrawnScene& scene, const Sna
                   .kind = drawn.soft ? "soft" : "rigid",
                   .force = feel.contact ? force_text(feel.force_N) : "-",
                   .touched = feel.contact});
+  // What a cut shows and the surface hides.
+  if (object < snapshot.inside.size() && snapshot.inside[object].used && material_rows > 0) {
+    const std::vector<glm::vec3> within = palette::of_inside(scene, object);
+    for (std::size_t m = std::max<std::size_t>(drawn.materials.size(), 1); m < within.size(); ++m) {
+      if (material_rows == 0) break;
+      --material_rows;
+      rows.push_back(
+          {.swatch = {within[m]}, .name = drawn.inside.materials[m] + " (inside)", .within = true});
+    }
+  }
   const std::size_t count = drawn.materials.size();
   const std::size_t listed =
       count <= material_rows ? count : material_rows - std::min<std::size_t>(material_rows, 1);
@@ -115,10 +126,9 @@ void add_object(std::vector<LegendRow>& rows, const DrawnScene& scene, const Sna
 void add_tool(std::vector<LegendRow>& rows, const DrawnScene& scene, const Snapshot& snapshot) {
   const glm::dvec3 off = snapshot.device_m - snapshot.proxy_m;
   rows.push_back({.swatch = {palette::tool},
-                  .name = "tool, as felt (proxy)",
-                  .kind = scene.tool_is_punch ? "punch" : "ball"});
+                  .name = scene.tool_is_punch ? "punch, as felt (proxy)" : "tool, as felt (proxy)"});
   rows.push_back({.swatch = {palette::device},
-                  .name = "tool, where the device is",
+                  .name = "tool, at the device",
                   .force = polygon::is_finite(off) ? length_text(glm::length(off)) + " off" : "not finite",
                   .alpha = 0.45F});
   rows.push_back({.swatch = {palette::force},
@@ -136,11 +146,6 @@ LegendRow grouped_row(const DrawnScene& scene, std::span<const std::size_t> obje
           .more = objects.size() > 1 ? " " + and_more(objects.size() - 1) : "",
           .kind = "rigid",
           .force = "-"};
-}
-
-float covered(const PixelBox& a, const PixelBox& b) {
-  const glm::vec2 both = glm::min(a.high, b.high) - glm::max(a.low, b.low);
-  return std::max(both.x, 0.0F) * std::max(both.y, 0.0F);
 }
 
 }  // namespace
@@ -164,21 +169,6 @@ std::vector<LegendRow> legend_rows(const DrawnScene& scene, const Snapshot& snap
   if (cut) rows.push_back({.name = and_more(shown.singly.size() - objects)});
   rows.insert(rows.end(), tool.begin(), tool.end());
   return rows;
-}
-
-std::size_t choose_place(std::span<const PixelBox> places, std::span<const PixelBox> clear,
-                         std::optional<std::size_t> last) {
-  const auto cover = [&](std::size_t place) {
-    float sum = 0.0F;
-    for (const PixelBox& box : clear) sum += covered(places[place], box);
-    return sum;
-  };
-  if (last && *last < places.size() && !(cover(*last) > 0.0F)) return *last;
-  std::size_t best = 0;
-  for (std::size_t place = 1; place < places.size(); ++place) {
-    if (cover(place) < cover(best)) best = place;
-  }
-  return best;
 }
 
 }  // namespace hybrid

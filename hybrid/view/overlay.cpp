@@ -18,7 +18,6 @@ struct Overlay::State {
   ImGuiContext* context = nullptr;
   Pen pen;
   FontAtlas atlas;
-  std::optional<std::size_t> legend_place;
 
   // Takes a system font that is known to be legible at any size and to have more than Latin letters. Without
   // one, takes the embedded font, which is drawn for 13 pixels and sharp only at multiples of 13.
@@ -32,7 +31,7 @@ struct Overlay::State {
       if (!std::filesystem::is_regular_file(file, ignored)) continue;
       static constexpr std::array<ImWchar, 9> ranges{0x0020, 0x024F, 0x0370, 0x03FF, 0x0400,
                                                      0x04FF, 0x2010, 0x2264, 0};
-      pen.em = std::round(std::clamp(static_cast<float>(height) / 58.0F, 13.0F, 64.0F));
+      pen.em = text_height(height);
       pen.body = fonts.AddFontFromFileTTF(file, pen.em, &config, ranges.data());
       pen.head = fonts.AddFontFromFileTTF(file, std::round(1.6F * pen.em), &config, ranges.data());
       if (pen.body != nullptr && pen.head != nullptr) return;
@@ -82,24 +81,16 @@ OverlayMesh Overlay::build(const DrawnScene& scene, const Snapshot& snapshot, co
   Pen& pen = state_->pen;
   pen.list = ImGui::GetForegroundDrawList();
 
-  const PixelRect whole{0, 0, content.width, content.height};
+  const PixelRect& view = content.layout.scene;
   if (content.inset) draw_inset_frame(pen, snapshot, content);
-  draw_force_label(pen, scene, snapshot, content.camera, whole);
+  draw_force_label(pen, scene, snapshot, content.camera, view);
   if (content.inset) {
-    draw_force_label(pen, scene, snapshot, content.inset->camera, content.inset->where);
-    draw_scale_bar(pen, content.inset->camera, content.inset->where);
+    draw_force_label(pen, scene, snapshot, content.inset->camera, content.layout.inset);
+    draw_scale_bar(pen, content.inset->camera, content.layout.inset);
   }
-  Furniture furniture;
-  furniture.below = draw_heading(pen, scene, snapshot, content);
-  furniture.colour_scale = draw_colour_scale(pen, scene, content);
-  PixelRect bar = whole;
-  if (!content.help.empty()) bar.height -= static_cast<int>(1.8F * pen.em);
-  const auto scale_bar = draw_scale_bar(pen, content.camera, bar);
-  const auto history = draw_history(pen, content);
-  furniture.above = static_cast<float>(bar.height);
-  for (const auto& box : {scale_bar, history})
-    if (box) furniture.above = std::min(furniture.above, box->low.y);
-  draw_legend(pen, furniture, scene, snapshot, content, state_->legend_place);
+  draw_heading(pen, scene, snapshot, content);
+  draw_scale_bar(pen, content.camera, view);
+  draw_column(pen, scene, snapshot, content);
   if (!content.help.empty()) {
     pen.label(pen.em, static_cast<float>(content.height) - 1.7F * pen.em, kPaleInk,
               pen.fit(content.help, static_cast<float>(content.width) - 2.0F * pen.em));

@@ -14,6 +14,7 @@
 
 #include "hybrid/snapshot/snapshot.h"
 #include "hybrid/view/camera.h"
+#include "hybrid/view/layout.h"
 #include "hybrid/view/renderer.h"
 
 namespace hybrid {
@@ -25,10 +26,11 @@ struct ForceSample {
 
 struct OverlayContent {
   int width = 0, height = 0;  // of the picture (pixels)
+  FrameLayout layout;
   Camera camera;
-  struct Inset {  // second, nearer view of the contact
+  struct Inset {  // second, nearer view of the contact, in the layout's place for it
     Camera camera;
-    PixelRect where;
+    double nearer = 1.0;  // times_nearer()
   };
   std::optional<Inset> inset;
   double displacement_scale_m = 0.0;  // 0: nothing soft has moved, no colour scale

@@ -13,31 +13,12 @@
 namespace hybrid {
 namespace {
 
-// Colours of the soft objects, at most six: the first of each object, then the materials with the most
-// surface.
-std::vector<glm::vec3> colours_at_rest(const DrawnScene& scene) {
-  constexpr std::size_t most = 6;
-  std::vector<std::vector<glm::vec3>> of_object;
-  std::size_t longest = 0;
-  for (std::size_t i = 0; i < scene.objects.size() && of_object.size() < most; ++i) {
-    if (!scene.objects[i].soft) continue;
-    of_object.push_back(palette::of_materials(scene, i));
-    longest = std::max(longest, of_object.back().size());
-  }
-  std::vector<glm::vec3> colours;
-  for (std::size_t rank = 0; rank < longest; ++rank) {
-    for (const auto& own : of_object) {
-      if (rank >= own.size() || colours.size() == most) continue;
-      if (std::ranges::find(colours, own[rank]) == colours.end()) colours.push_back(own[rank]);
-    }
-  }
-  return colours;
-}
+constexpr float kHairline = 1.0F;  // pixels: what points at the scene without covering it
 
 }  // namespace
 
-float draw_heading(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
-                   const OverlayContent& content) {
+void draw_heading(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
+                  const OverlayContent& content) {
   const float em = pen.em;
   const float x = em;
   float y = 0.8F * em;
@@ -49,71 +30,57 @@ float draw_heading(const Pen& pen, const DrawnScene& scene, const Snapshot& snap
   pen.text(x, y, kInk,
            "time " + with_decimals(snapshot.t_s, 3) + " s    force on the hand " +
                force_text(glm::length(snapshot.force_N)) + (content.paused ? "    PAUSED" : ""));
-  return y + 2.0F * em;
 }
 
-std::optional<PixelBox> draw_colour_scale(const Pen& pen, const DrawnScene& scene,
-                                          const OverlayContent& content) {
-  if (!(content.displacement_scale_m > 0.0)) return {};
+void draw_colour_scale(const Pen& pen, const PixelRect& where, double scale_m) {
+  constexpr int steps = 160;
   const float em = pen.em;
-  const std::vector<glm::vec3> soft = colours_at_rest(scene);
-  if (soft.empty()) return {};
-  const float bar_width = 1.1F * em;
-  const float bar_height = 12.0F * em;
-  const std::string title = "tissue moved by";
-  const float bars =
-      bar_width * static_cast<float>(soft.size()) + 0.25F * em * static_cast<float>(soft.size() - 1);
-  const float w = std::max(pen.width(title), bars + 0.6F * em + pen.width("0.00 mm")) + 1.6F * em;
-  const float x0 = static_cast<float>(content.width) - w - em;
-  const float y0 = 4.2F * em;
-  pen.plate(x0, y0, w, bar_height + 4.0F * em);
-  pen.text(x0 + 0.8F * em, y0 + 0.7F * em, kInk, title);
-  const float top = y0 + 2.8F * em;
-  float x = x0 + 0.8F * em;
-  for (const glm::vec3& own : soft) {
-    constexpr int steps = 40;
-    for (int s = 0; s < steps; ++s) {
-      const float a = top + bar_height * static_cast<float>(s) / static_cast<float>(steps);
-      const float b = top + bar_height * static_cast<float>(s + 1) / static_cast<float>(steps);
-      const float share = 1.0F - (static_cast<float>(s) + 0.5F) / static_cast<float>(steps);
-      pen.fill({x, a}, {x + bar_width, b}, ink_of(palette::of_displacement(own, share)));
-    }
-    pen.frame({x, top}, {x + bar_width, top + bar_height}, kEdge);
-    x += bar_width + 0.25F * em;
+  const auto x0 = static_cast<float>(where.x), y0 = static_cast<float>(where.y);
+  const auto w = static_cast<float>(where.width);
+  pen.plate(x0, y0, w, static_cast<float>(where.height));
+  pen.text(x0 + 0.8F * em, y0 + 0.5F * em, kInk, "tissue moved by");
+  const float left = x0 + 0.8F * em, right = x0 + w - 0.8F * em;
+  const float top = y0 + 2.0F * em, bottom = top + 0.9F * em;
+  // What hardly moved has its own colour: paper stands for it.
+  const glm::vec3 paper(1.0F);
+  for (int s = 0; s < steps; ++s) {
+    const float a = static_cast<float>(s) / steps, b = static_cast<float>(s + 1) / steps;
+    pen.fill({left + a * (right - left), top}, {left + b * (right - left), bottom},
+             ink_of(palette::of_displacement(paper, 0.5F * (a + b))));
   }
+  pen.frame({left, top}, {right, bottom}, kEdge);
   for (int tick = 0; tick <= 4; ++tick) {
-    const float y = top + bar_height * (1.0F - static_cast<float>(tick) / 4.0F);
-    pen.line({x - 0.25F * em, y}, {x + 0.1F * em, y}, kInk);
-    pen.text(x + 0.35F * em, y - 0.5F * em, kInk,
-             tick == 0 ? "0" : length_text(content.displacement_scale_m * tick / 4.0));
+    const float x = left + (right - left) * static_cast<float>(tick) / 4.0F;
+    pen.line({x, bottom}, {x, bottom + 0.25F * em}, kInk);
+    if (tick % 2 != 0) continue;
+    const std::string words = tick == 0 ? "0" : length_text(scale_m * tick / 4.0);
+    const float wide = pen.width(words);
+    pen.text(std::clamp(x - 0.5F * wide, left, right - wide), bottom + 0.4F * em, kInk, words);
   }
-  return PixelBox{{x0, y0}, {x0 + w, y0 + bar_height + 4.0F * em}};
 }
 
-std::optional<PixelBox> draw_scale_bar(const Pen& pen, const Camera& camera, const PixelRect& where) {
+void draw_scale_bar(const Pen& pen, const Camera& camera, const PixelRect& where) {
   const double per_pixel = camera.view_height_m() / where.height;
   const double length = round_down(per_pixel * 0.24 * where.width);
-  if (!(length > 0.0)) return {};
+  if (!(length > 0.0)) return;
   const float em = pen.em;
   const auto w = static_cast<float>(length / per_pixel);
   const float x = static_cast<float>(where.x) + 1.2F * em;
   const float y = static_cast<float>(where.y + where.height) - 1.4F * em;
   const std::string words = length_text(length);
-  const PixelBox box{{x - 0.5F * em, y - 1.9F * em},
-                     {x + std::max(w, pen.width(words)) + 0.5F * em, y + 0.7F * em}};
-  pen.fill(box.low, box.high, kPaper, 3.0F);
-  pen.fill({x, y - 2.0F}, {x + w, y + 2.0F}, kInk);
+  pen.fill({x - 0.5F * em, y - 1.9F * em}, {x + std::max(w, pen.width(words)) + 0.5F * em, y + 0.7F * em},
+           kPaper, 3.0F);
+  pen.fill({x, y - 1.0F}, {x + w, y + 1.0F}, kInk);
   for (const float end : {x, x + w}) pen.line({end, y - 5.0F}, {end, y + 5.0F}, kInk, 2.0F);
   pen.text(x, y - 1.6F * em, kInk, words);
-  return box;
 }
 
-std::optional<ForceLabel> force_label(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
-                                      const Camera& camera, const PixelRect& where) {
+void draw_force_label(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera,
+                      const PixelRect& where) {
   const double force = glm::length(snapshot.force_N);
-  if (!(force > 1e-3) || !std::isfinite(force) || !polygon::is_finite(snapshot.proxy_m)) return {};
+  if (!(force > 1e-3) || !std::isfinite(force) || !polygon::is_finite(snapshot.proxy_m)) return;
   const auto tip = camera.pixel(arrow_tip(scene, snapshot, camera), where.width, where.height);
-  if (!tip) return {};
+  if (!tip) return;
   const std::string words = force_text(force);
   const float most_x = static_cast<float>(where.width) - pen.width(words) - 0.6F * pen.em;
   const float most_y = static_cast<float>(where.height) - 2.0F * pen.em;
@@ -126,49 +93,38 @@ std::optional<ForceLabel> force_label(const Pen& pen, const DrawnScene& scene, c
       std::clamp(static_cast<float>(tip->x) + aside, 0.5F * pen.em, std::max(most_x, 0.5F * pen.em));
   const float y =
       std::clamp(static_cast<float>(tip->y) - 0.6F * pen.em, 0.5F * pen.em, std::max(most_y, 0.5F * pen.em));
-  return ForceLabel{static_cast<float>(where.x) + x, static_cast<float>(where.y) + y, words};
-}
-
-void draw_force_label(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera,
-                      const PixelRect& where) {
-  const auto label = force_label(pen, scene, snapshot, camera, where);
-  if (label) pen.label(label->x, label->y, ink_of(palette::force), label->words);
+  pen.label(static_cast<float>(where.x) + x, static_cast<float>(where.y) + y, ink_of(palette::force), words);
 }
 
 void draw_inset_frame(const Pen& pen, const Snapshot& snapshot, const OverlayContent& content) {
-  const PixelRect& r = content.inset->where;
+  const PixelRect& r = content.layout.inset;
   const glm::vec2 a(static_cast<float>(r.x), static_cast<float>(r.y));
   const glm::vec2 b(a.x + static_cast<float>(r.width), a.y + static_cast<float>(r.height));
-  // A ring in the large view marks the region that the inset shows; a line connects the two.
-  if (const auto at = content.camera.pixel(snapshot.proxy_m, content.width, content.height)) {
-    const double per_pixel = content.camera.view_height_m() / content.height;
+  if (const auto at = content.layout.pixel(content.camera, snapshot.proxy_m)) {
+    const double per_pixel = content.camera.view_height_m() / content.layout.scene.height;
     const auto radius =
         std::max(static_cast<float>(0.5 * content.inset->camera.view_height_m() / per_pixel), 0.6F * pen.em);
     const glm::vec2 centre(static_cast<float>(at->x), static_cast<float>(at->y));
     const glm::vec2 corner(std::clamp(centre.x, a.x, b.x), std::clamp(centre.y, a.y, b.y));
-    const float dx = corner.x - centre.x;
-    const float dy = corner.y - centre.y;
-    const float distance = std::sqrt(dx * dx + dy * dy);
-    pen.circle(centre, radius, kInk, 1.5F);
-    if (distance > radius) {
-      pen.line({centre.x + dx / distance * radius, centre.y + dy / distance * radius}, corner, kInk, 1.5F);
-    }
+    const glm::vec2 way = corner - centre;
+    const float distance = glm::length(way);
+    pen.circle(centre, radius, kPaleInk, kHairline);
+    if (distance > radius) pen.line(centre + way / distance * radius, corner, kPaleInk, kHairline);
   }
-  pen.frame(a, b, kInk, 0.0F, 2.0F);
-  pen.label(a.x + 0.7F * pen.em, a.y + 0.6F * pen.em, kInk, "the contact, nearer");
+  pen.frame(a, b, kPaleInk, 0.0F, kHairline);
+  pen.label(a.x + 0.7F * pen.em, a.y + 0.6F * pen.em, kInk,
+            "the contact, " + number_text(content.inset->nearer, "%.1f") + " times nearer");
 }
 
-std::optional<PixelBox> draw_history(const Pen& pen, const OverlayContent& content) {
-  if (content.history.size() < 2) return {};
+void draw_history(const Pen& pen, const PixelRect& where, std::span<const ForceSample> history) {
+  if (history.size() < 2 || where.width < 8) return;
   const float em = pen.em;
-  const float w = std::min(30.0F * em, 0.4F * static_cast<float>(content.width));
-  const float h = 7.0F * em;
-  const float x0 = em;
-  const float y0 = static_cast<float>(content.height) - h - 6.2F * em;
-  const double end = content.history.back().t_s;
-  const double span = std::max(end - content.history.front().t_s, 1e-3);
+  const auto w = static_cast<float>(where.width), h = static_cast<float>(where.height);
+  const auto x0 = static_cast<float>(where.x), y0 = static_cast<float>(where.y);
+  const double end = history.back().t_s;
+  const double span = std::max(end - history.front().t_s, 1e-3);
   double most = 0.0;
-  for (const ForceSample& sample : content.history) {
+  for (const ForceSample& sample : history) {
     if (std::isfinite(sample.force_N)) most = std::max(most, sample.force_N);
   }
   // End of the axis: the largest round number not above the maximum, or twice that number if the maximum
@@ -185,7 +141,7 @@ std::optional<PixelBox> draw_history(const Pen& pen, const OverlayContent& conte
   // Largest force in each pixel column; a gap where it is not finite.
   const auto columns = static_cast<std::size_t>(w) - 4;
   std::vector<double> column(columns, -1.0);
-  for (const ForceSample& sample : content.history) {
+  for (const ForceSample& sample : history) {
     if (!std::isfinite(sample.force_N)) continue;
     const double share = std::clamp((sample.t_s - (end - span)) / span, 0.0, 1.0);
     double& at = column[static_cast<std::size_t>(share * static_cast<double>(columns - 1))];
@@ -199,7 +155,6 @@ std::optional<PixelBox> draw_history(const Pen& pen, const OverlayContent& conte
     if (last) pen.line(*last, at, ink_of(palette::force), 1.5F);
     last = at;
   }
-  return PixelBox{{x0, y0}, {x0 + w, y0 + h}};
 }
 
 }  // namespace hybrid

@@ -3,13 +3,9 @@
 // in hue and in lightness, so that colour-blind readers can tell them apart (after Okabe & Ito 2008).
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
-#include <glm/common.hpp>
-#include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
-#include <string>
 #include <vector>
 
 #include "hybrid/snapshot/snapshot.h"
@@ -21,9 +17,20 @@ inline constexpr glm::vec3 background{0.945F, 0.953F, 0.962F};
 inline constexpr glm::vec3 tool{0.13F, 0.17F, 0.24F};
 inline constexpr glm::vec3 device{0.10F, 0.45F, 0.85F};
 inline constexpr glm::vec3 force{0.03F, 0.38F, 0.93F};
-// The displacement scale runs from the object's own colour over these two.
-inline constexpr glm::vec3 moved_half{1.00F, 0.84F, 0.25F};
-inline constexpr glm::vec3 moved_most{0.78F, 0.08F, 0.16F};
+
+// The scale of displacement, from 0 to its end: viridis (Smith & van der Walt 2015), in which equal steps
+// look equal, to colour-blind readers too, and which gets lighter from end to end. What hardly moved keeps
+// its own colour: the share of the scale up to which it is the only one, and the share from which it is gone.
+inline constexpr std::array<glm::vec3, 9> moved{{{0.267F, 0.005F, 0.329F},
+                                                 {0.283F, 0.141F, 0.458F},
+                                                 {0.229F, 0.322F, 0.546F},
+                                                 {0.173F, 0.449F, 0.558F},
+                                                 {0.128F, 0.567F, 0.551F},
+                                                 {0.158F, 0.684F, 0.502F},
+                                                 {0.369F, 0.789F, 0.383F},
+                                                 {0.678F, 0.864F, 0.190F},
+                                                 {0.993F, 0.906F, 0.144F}}};
+inline constexpr float kOwnUntil = 0.02F, kRampFrom = 0.15F;
 
 inline constexpr std::array<glm::vec3, 4> rigid{
     {{0.89F, 0.84F, 0.72F}, {0.78F, 0.77F, 0.74F}, {0.80F, 0.71F, 0.55F}, {0.66F, 0.68F, 0.72F}}};
@@ -51,51 +58,23 @@ inline constexpr std::array<glm::vec3, 10> material{{{0.86F, 0.57F, 0.57F},
 // All materials beyond these share one neutral colour, so that no colour stands for two materials.
 inline constexpr glm::vec3 other_material{0.50F, 0.50F, 0.50F};
 
-// Colour of object `index`: the n-th rigid (or soft) object has the n-th colour of its kind.
-inline glm::vec3 of_object(const DrawnScene& scene, std::size_t index) {
-  std::size_t rank = 0;
-  const bool is_soft = scene.objects[index].soft;
-  for (std::size_t i = 0; i < index; ++i) rank += scene.objects[i].soft == is_soft ? 1U : 0U;
-  return is_soft ? soft[rank % soft.size()] : rigid[rank % rigid.size()];
-}
+// However many colours the scene has already, so many stay for materials.
+inline constexpr std::size_t kLeastFree = 5;
 
-// Colours that are available to materials: those unlike the colours of soft objects with a single material.
-inline std::vector<glm::vec3> free_for_materials(const DrawnScene& scene) {
-  constexpr float alike = 0.25F;
-  std::vector<glm::vec3> free(material.begin(), material.end());
-  std::size_t rank = 0;
-  for (const DrawnObject& object : scene.objects) {
-    if (!object.soft) continue;
-    const glm::vec3 own = soft[rank++ % soft.size()];
-    if (!object.materials.empty()) continue;
-    std::erase_if(free, [&](const glm::vec3& c) { return glm::distance(c, own) < alike; });
-    if (rank >= soft.size()) break;  // later ones repeat the same colours
-  }
-  return free;
-}
+// Colour of object `index`: the customary one if its name, or that of its material, is in the table of
+// tissues (hybrid/scene/tissue_table.h); else the n-th such rigid (or soft) object has the n-th colour of its
+// kind.
+glm::vec3 of_object(const DrawnScene& scene, std::size_t index);
 
 // Colours of an object's materials, in their order; the object's own colour if it has none. A material has
-// one colour in the whole scene: colours are assigned by name, object after object.
-inline std::vector<glm::vec3> of_materials(const DrawnScene& scene, std::size_t index) {
-  if (scene.objects[index].materials.empty()) return {of_object(scene, index)};
-  const std::vector<glm::vec3> free = free_for_materials(scene);
-  std::vector<std::string> dealt;
-  std::vector<glm::vec3> colours;
-  for (std::size_t i = 0; i <= index; ++i) {
-    for (const std::string& name : scene.objects[i].materials) {
-      const auto rank = static_cast<std::size_t>(std::ranges::find(dealt, name) - dealt.begin());
-      if (rank == dealt.size()) dealt.push_back(name);
-      if (i == index) colours.push_back(rank < free.size() ? free[rank] : other_material);
-    }
-  }
-  return colours;
-}
+// one colour in the whole scene: the customary one, or one that is assigned by name, object after object.
+std::vector<glm::vec3> of_materials(const DrawnScene& scene, std::size_t index);
+
+// Colours of the materials within an object (DrawnInside::materials), also of those that its surface hides.
+std::vector<glm::vec3> of_inside(const DrawnScene& scene, std::size_t index);
 
 // Colour of a point that moved by `share` (0 to 1) of the scale's end, on an object of colour `own`. The
 // renderer's shader computes the same formula.
-inline glm::vec3 of_displacement(const glm::vec3& own, float share) {
-  const float t = share < 0.0F ? 0.0F : (share > 1.0F ? 1.0F : share);
-  return t < 0.5F ? glm::mix(own, moved_half, t * 2.0F) : glm::mix(moved_half, moved_most, t * 2.0F - 1.0F);
-}
+glm::vec3 of_displacement(const glm::vec3& own, float share);
 
 }  // namespace hybrid::palette

@@ -128,7 +128,7 @@ PictureMaker::~PictureMaker() = default;
 
 void PictureMaker::save(const std::filesystem::path& png, const Snapshot& snapshot,
                         const PictureOptions& options) {
-  const double aspect = static_cast<double>(options.width) / std::max(options.height, 1);
+  const double aspect = frame_layout(options.width, options.height, false).aspect();
   FrameOptions frame;
   frame.width = options.width;
   frame.height = options.height;

@@ -15,7 +15,7 @@ namespace hybrid {
 struct PictureOptions {
   int width = 1280, height = 960;  // (pixels), 1 to 8192 each
   std::optional<Camera> camera;    // default: frame_scene()
-  bool inset = true;  // draw a nearer view of the contact when the tool is small in the whole view
+  bool inset = true;               // draw a nearer view of the contact if it is kLeastNearer times nearer
 };
 
 // Throws std::runtime_error that names the remedy: no EGL or OpenGL on this machine, size out of range, file

@@ -9,6 +9,7 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/type_ptr.hpp>
 #include <limits>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -16,6 +17,7 @@
 #include "hybrid/view/gl_objects.h"
 #include "hybrid/view/palette.h"
 #include "hybrid/view/renderer_shaders.h"
+#include "hybrid/view/section.h"
 #include "hybrid/view/tool_and_arrow.h"
 #include "hybrid/view/unit_shapes.h"
 #include "polygon/mesh/is_finite.h"
@@ -28,11 +30,14 @@ struct Object {
   DrawMesh moving;  // kept for a soft object only
   bool soft = false;
   glm::vec3 colour{1.0F};
-  SceneBounds bounds;      // at rest
-  glm::mat4 placed{1.0F};  // from the uploaded pose to the present pose
+  SceneBounds bounds;                      // at rest
+  glm::mat4 placed{1.0F};                  // from the uploaded pose to the present pose
+  GlMesh face;                             // of a cut, in the present view; empty: whole
+  glm::vec4 kept{0.0F, 0.0F, 0.0F, 1.0F};  // plane of the cut: what is drawn lies on its positive side
 };
 
 constexpr int most_pixels = 8192;
+constexpr double kDepthApart = 5e-4;  // of the view's height: about half a pixel
 
 }  // namespace
 
@@ -63,6 +68,13 @@ struct Renderer::State {
   void uniform(const char* name, const glm::vec3& value) const {
     glUniform3fv(glGetUniformLocation(program, name), 1, glm::value_ptr(value));
   }
+  void uniform(const char* name, const glm::vec4& value) const {
+    glUniform4fv(glGetUniformLocation(program, name), 1, glm::value_ptr(value));
+  }
+  void uniform(const char* name, std::span<const glm::vec3> values) const {
+    glUniform3fv(glGetUniformLocation(program, name), static_cast<GLsizei>(values.size()),
+                 glm::value_ptr(values.front()));
+  }
   void place(const glm::mat4& scene_from_mesh) const {
     // The inverse transpose keeps normals perpendicular under non-uniform scale.
     const glm::mat3 normal = glm::transpose(glm::inverse(glm::mat3(scene_from_mesh)));
@@ -72,6 +84,7 @@ struct Renderer::State {
                        glm::value_ptr(normal));
   }
   void build_targets();
+  void cut_objects(const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera);
   void draw_objects(bool soft, int pass) const;
   void draw_tool(const DrawnScene& scene, const glm::dvec3& at) const;
   void draw_arrow(const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera) const;
@@ -104,11 +117,35 @@ void Renderer::State::draw_objects(bool soft, int pass) const {
     uniform("own_colour", object.colour);
     uniform("coloured_vertices", object.mesh.colours != 0 ? 1 : 0);
     uniform("moved_scale", soft ? static_cast<float>(most_moved_m) : 0.0F);
+    uniform("kept", object.kept);
+    if (object.face.count > 0) glEnable(GL_CLIP_DISTANCE0);
     object.mesh.draw();
+    glDisable(GL_CLIP_DISTANCE0);
+    if (object.face.count == 0) continue;
+    // The face lies in the plane: rounding must not clip it.
+    uniform("kept", glm::vec4(0.0F, 0.0F, 0.0F, 1.0F));
+    uniform("coloured_vertices", 1);
+    uniform("moved_scale", 0.0F);
+    object.face.draw();
   }
   uniform("moved_scale", 0.0F);
   uniform("coloured_vertices", 0);
   uniform("pass", 0);
+}
+
+void Renderer::State::cut_objects(const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera) {
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    Object& object = objects[i];
+    if (object.face.count > 0) object.face.release();
+    const auto cut = object.soft ? choose_cut(scene, snapshot, camera, i) : std::nullopt;
+    if (!cut) continue;
+    const SectionMesh section = make_section(scene, snapshot, i, *cut, origin_m);
+    if (section.mesh.indices.empty()) continue;
+    object.face.upload(section.mesh, GL_STATIC_DRAW);
+    object.face.upload_colours(section.colours);
+    const glm::dvec3 away = -cut->toward_eye;
+    object.kept = glm::vec4(glm::dvec4(away, -glm::dot(away, cut->point_m - origin_m)));
+  }
 }
 
 void Renderer::State::draw_tool(const DrawnScene& scene, const glm::dvec3& at) const {
@@ -253,12 +290,18 @@ void Renderer::draw(const DrawnScene& scene, const Snapshot& snapshot, const Cam
   }
   const glm::mat4 clip(camera.clip_from_scene(static_cast<double>(where.width) / where.height, s.origin_m,
                                               s.bounds.centre_m, radius));
+  s.cut_objects(scene, snapshot, camera);
+  const glm::vec3 eye(camera.eye_m() - s.origin_m);
+  // Surfaces that lie on one another have one depth, and rounding would choose pixel by pixel: a rigid one
+  // is drawn nearer than tissue by this length, and hides tissue only if it is nearer still.
+  const auto apart = static_cast<float>(kDepthApart * camera.view_height_m());
   s.use(s.mesh_program, clip);
-  s.uniform("eye", glm::vec3(camera.eye_m() - s.origin_m));
+  s.uniform("eye", eye);
   s.uniform("light_right", glm::vec3(camera.right()));
   s.uniform("light_up", glm::vec3(camera.up()));
-  s.uniform("moved_half", palette::moved_half);
-  s.uniform("moved_most", palette::moved_most);
+  s.uniform("moved_ramp", palette::moved);
+  s.uniform("own_until", palette::kOwnUntil);
+  s.uniform("ramp_from", palette::kRampFrom);
   glActiveTexture(GL_TEXTURE0);
   glBindTexture(GL_TEXTURE_2D, 0);
   const int bottom = s.height - where.y - where.height;
@@ -274,9 +317,12 @@ void Renderer::draw(const DrawnScene& scene, const Snapshot& snapshot, const Cam
   // Depth of the things that must not be hidden: soft objects, the arrow, and a disc a little larger than the
   // tool.
   s.use(s.depth_program, clip);
+  s.uniform("eye", eye);
   glBindFramebuffer(GL_FRAMEBUFFER, s.shown_frame);
   glClear(GL_DEPTH_BUFFER_BIT);
+  s.uniform("nearer", 2.0F * apart);
   s.draw_objects(true, 0);
+  s.uniform("nearer", 0.0F);
   if (tool_known) {
     s.place(place_tool_disc(scene, snapshot.proxy_m, camera, s.origin_m));
     s.disc.draw();
@@ -298,7 +344,9 @@ void Renderer::draw(const DrawnScene& scene, const Snapshot& snapshot, const Cam
   };
   if (tool_known) draw_felt(1.0F);
   glBindTexture(GL_TEXTURE_2D, s.shown_depth);
+  s.uniform("nearer", apart);
   s.draw_objects(false, 1);
+  s.uniform("nearer", 0.0F);
 
   glEnable(GL_BLEND);
   glEnable(GL_CULL_FACE);  // closed transparent shapes would otherwise be blended twice
@@ -322,10 +370,13 @@ void Renderer::draw(const DrawnScene& scene, const Snapshot& snapshot, const Cam
   glDepthMask(GL_TRUE);
   glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
   s.use(s.depth_program, clip);
+  s.uniform("nearer", apart);
   s.draw_objects(false, 2);
   s.use(s.mesh_program, clip);
+  s.uniform("nearer", apart);
   glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
   s.draw_objects(false, 2);
+  s.uniform("nearer", 0.0F);
   glDisable(GL_BLEND);
   glDisable(GL_SCISSOR_TEST);
 }

@@ -13,13 +13,9 @@
 
 #include "hybrid/snapshot/snapshot.h"
 #include "hybrid/view/camera.h"
+#include "hybrid/view/layout.h"
 
 namespace hybrid {
-
-// Rectangle of the picture (pixels, y down from the top).
-struct PixelRect {
-  int x = 0, y = 0, width = 0, height = 0;
-};
 
 // The overlay's triangles: pixels (y down), texture coordinates in the font atlas, colour 0xAABBGGRR.
 struct OverlayVertex {

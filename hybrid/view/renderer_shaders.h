@@ -12,6 +12,9 @@ layout(location = 3) in vec3 vertex_colour;
 uniform mat4 scene_from_mesh;   // scene: relative to the renderer's origin
 uniform mat3 normal_from_mesh;
 uniform mat4 clip_from_scene;
+uniform vec3 eye;
+uniform vec4 kept;              // plane of a cut (scene): the positive side is drawn
+uniform float nearer;           // length by which the surface is drawn towards the eye (scene)
 out vec3 scene_position;
 out vec3 scene_normal;
 out float moved;
@@ -23,7 +26,8 @@ void main() {
   scene_normal = normal_from_mesh * normal;
   moved = displacement;
   material_colour = vertex_colour;
-  gl_Position = clip_from_scene * at;
+  gl_ClipDistance[0] = dot(kept, at);
+  gl_Position = clip_from_scene * vec4(at.xyz + nearer * normalize(eye - at.xyz), 1.0);
 }
 )";
 
@@ -40,8 +44,9 @@ uniform vec3 light_right;   // camera axes: the light moves with the eye
 uniform vec3 light_up;
 uniform vec3 own_colour;
 uniform bool coloured_vertices;  // material_colour in place of own_colour
-uniform vec3 moved_half;
-uniform vec3 moved_most;
+uniform vec3 moved_ramp[9];      // colours of the scale, from 0 to its end
+uniform float own_until;         // shares of the scale over which the own colour gives way to the ramp
+uniform float ramp_from;
 uniform float moved_scale;  // 0: the object does not move
 uniform float alpha;
 uniform float shine;
@@ -73,7 +78,9 @@ void main() {
   vec3 base = own;
   if (moved_scale > 0.0) {
     float t = clamp(moved / moved_scale, 0.0, 1.0);
-    base = t < 0.5 ? mix(own, moved_half, t * 2.0) : mix(moved_half, moved_most, t * 2.0 - 1.0);
+    float at = t * 8.0;
+    int low = min(int(at), 7);
+    base = mix(own, mix(moved_ramp[low], moved_ramp[low + 1], at - float(low)), smoothstep(own_until, ramp_from, t));
     // A thin darker line every tenth of the scale: contours show shape where colour alone does not.
     float line = t * 10.0;
     float width = max(fwidth(line), 1e-4);

@@ -72,6 +72,7 @@ struct Window::State {
   WindowInput input;
   std::deque<ForceSample> history;
   int width = 0, height = 0;
+  FrameLayout layout;  // of the last frame
 
   State(const DrawnScene& drawn, const WindowOptions& options) : scene(drawn), history_s(options.history_s) {}
 
@@ -97,16 +98,22 @@ struct Window::State {
             std::clamp(camera.elevation_rad + std::numbers::pi * dy / height, -steepest, steepest);
         break;
       case Drag::pan: {
-        const double per_pixel = camera.view_height_m() / height;
+        const double per_pixel = camera.view_height_m() / std::max(layout.scene.height, 1);
         camera.target_m += (camera.up() * dy - camera.right() * dx) * per_pixel;
         break;
       }
       case Drag::tool:
-        input.dragged_goal_m = camera.point_at({x, y}, width, height, drag_plane_m) + grip_m;
+        input.dragged_goal_m = under_pointer() + grip_m;
         break;
       case Drag::none:
         break;
     }
+  }
+
+  // Point of the drag's plane that the scene shows under the pointer.
+  [[nodiscard]] glm::dvec3 under_pointer() const {
+    const PixelRect& view = layout.scene;
+    return camera.point_at({x - view.x, y - view.y}, view.width, view.height, drag_plane_m);
   }
 
   void button(int which, int action, int mods) {
@@ -122,7 +129,7 @@ struct Window::State {
       drag = Drag::tool;
       // The drag starts from the tool's position: the tool does not jump to the pointer.
       drag_plane_m = device_m;
-      grip_m = drag_plane_m - camera.point_at({x, y}, width, height, drag_plane_m);
+      grip_m = drag_plane_m - under_pointer();
       input.dragged_goal_m = drag_plane_m;
     } else if (which == GLFW_MOUSE_BUTTON_LEFT) {
       drag = Drag::orbit;
@@ -192,8 +199,9 @@ bool Window::frame(const Snapshot& snapshot) {
   s.remember(snapshot);
   glfwGetFramebufferSize(handle, &s.width, &s.height);
   if (s.width < 1 || s.height < 1) return true;  // minimised: nothing to draw
+  s.layout = frame_layout(s.width, s.height, true);
   if (!s.framed || s.wants_frame) {
-    s.camera = frame_scene(s.scene, snapshot, static_cast<double>(s.width) / s.height);
+    s.camera = frame_scene(s.scene, snapshot, s.layout.aspect(), s.scene.path_m);
     s.framed = true;
     s.wants_frame = false;
   }

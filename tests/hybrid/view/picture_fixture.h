@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "hybrid/view/camera.h"
+#include "hybrid/view/layout.h"
 #include "hybrid/view/picture.h"
 
 namespace tests {
@@ -122,6 +123,15 @@ class Picture : public testing::Test {
 #define DRAW_OR_SKIP(image, session, options) \
   const Image image = draw(session, options); \
   if (!why_not_.empty()) GTEST_SKIP() << why_not_
+
+// The small picture's layout, the pixel at which it shows a point, and its view of the whole scene.
+inline const hybrid::FrameLayout small_layout = hybrid::frame_layout(960, 720, false);
+inline glm::dvec2 seen_at(const hybrid::Camera& camera, const glm::dvec3& point_m) {
+  return small_layout.pixel(camera, point_m).value_or(glm::dvec2(0.0));
+}
+inline hybrid::Camera framed(const Session& s) {
+  return hybrid::frame_scene(s.scene, s.now, small_layout.aspect());
+}
 
 inline hybrid::PictureOptions small(const hybrid::Camera& camera) {
   hybrid::PictureOptions options;

@@ -145,11 +145,11 @@ TEST(LengthText, SaysWhatAPersonWould) {
 
 TEST_F(Picture, ShowsToolTissueAndForceWhereTheyAre) {
   const Session s = shell_and_ball();
-  const Camera camera = hybrid::frame_scene(s.scene, s.now);
+  const Camera camera = tests::framed(s);
   DRAW_OR_SKIP(image, s, small(camera));
   ASSERT_EQ(image.width, 960);
   ASSERT_EQ(image.height, 720);
-  const auto pixel = [&](const glm::dvec3& at) { return *camera.pixel(at, 960, 720); };
+  const auto pixel = [&](const glm::dvec3& at) { return tests::seen_at(camera, at); };
   // The tool is dark, next to the device's ghost; the sampled point is on its upper side, toward the eye.
   const glm::vec3 tool = image.at(pixel(s.now.proxy_m + camera.right() * 5e-3 + glm::dvec3(0.0, 0.0, 3e-3)));
   EXPECT_LT(tool.r + tool.g + tool.b, 1.2F);
@@ -165,12 +165,12 @@ TEST_F(Picture, ShowsToolTissueAndForceWhereTheyAre) {
 TEST_F(Picture, SeesThroughBoneThatHidesTissueAndOnlyThere) {
   // A closed shell around the soft ball.
   const Session closed = shell_and_ball({0.0, 0.0, 0.0}, 2.0);
-  Camera camera = hybrid::frame_scene(closed.scene, closed.now);
+  Camera camera = tests::framed(closed);
   camera.elevation_rad = 0.0;
   DRAW_OR_SKIP(image, closed, small(camera));
-  const glm::vec3 middle = image.at(*camera.pixel({0.0, 0.0, -0.01}, 960, 720));
+  const glm::vec3 middle = image.at(tests::seen_at(camera, {0.0, 0.0, -0.01}));
   // At the side of the ball, between tissue and shell, the shell's own colour shows.
-  const glm::vec3 side = image.at(*camera.pixel(camera.right() * 0.0755, 960, 720));
+  const glm::vec3 side = image.at(tests::seen_at(camera, camera.right() * 0.0755));
   EXPECT_GT(redness(middle), 0.10F) << "tissue is pink";
   EXPECT_LT(redness(side), 0.12F) << "bone is not";
   EXPECT_GT(redness(middle), redness(side) + 0.05F);
@@ -179,35 +179,62 @@ TEST_F(Picture, SeesThroughBoneThatHidesTissueAndOnlyThere) {
   alone.scene.objects.resize(1);
   alone.now.soft_moved_m.resize(1);
   alone.now.proxy_m = alone.now.device_m = {0.0, 0.0, 0.2};
-  camera = hybrid::frame_scene(alone.scene, alone.now);
+  camera = tests::framed(alone);
   DRAW_OR_SKIP(bone, alone, small(camera));
-  EXPECT_LT(redness(bone.at(*camera.pixel({0.0, 0.0, -0.01}, 960, 720))), 0.12F);
+  EXPECT_LT(redness(bone.at(tests::seen_at(camera, {0.0, 0.0, -0.01}))), 0.12F);
 }
 
 TEST_F(Picture, ColoursDisplacement) {
   const Session s = shell_and_ball();
-  Camera camera = hybrid::frame_scene(s.scene, s.now);
+  Camera camera = tests::framed(s);
   camera.elevation_rad = 0.9;
   DRAW_OR_SKIP(image, s, small(camera));
-  // 16 mm beside the tool's axis the tissue moved by 6 mm on a scale of 20: yellow, neither blue nor pink.
+  // 16 mm beside the tool's axis the tissue moved by 6 mm on a scale of 20; 45 mm beside it, hardly.
   const glm::dvec3 beside =
       camera.right() * 0.016 + glm::dvec3(0.0, 0.0, std::sqrt(0.0049 - 0.000256) - 0.0063);
-  const glm::vec3 moved = image.at(*camera.pixel(beside, 960, 720));
-  const glm::vec3 rest =
-      image.at(*camera.pixel(camera.right() * 0.045 + glm::dvec3(0.0, 0.0, 0.0536), 960, 720));
-  EXPECT_GT(moved.g - moved.b, 0.08F);
-  EXPECT_LT(rest.g - rest.b, 0.04F);
+  const glm::vec3 own = hybrid::palette::of_object(s.scene, 1);
+  const auto like = [&](const glm::dvec3& at, const glm::vec3& colour) {
+    return glm::dot(glm::normalize(image.at(tests::seen_at(camera, at))), glm::normalize(colour));
+  };
+  EXPECT_GT(like(beside, hybrid::palette::of_displacement(own, 0.3F)), 0.98F);
+  EXPECT_GT(like(camera.right() * 0.045 + glm::dvec3(0.0, 0.0, 0.0536), own), 0.99F);
+  EXPECT_LT(like(beside, own), 0.95F);
+}
+
+// A bar that lies on a block, seen along their common faces: the bar is whole, whatever rounding says.
+TEST_F(Picture, DrawsABodyWholeOnTheTissueThatItLiesOn) {
+  Session s;
+  s.scene.tool_radius_m = 2e-3;
+  s.scene.objects.push_back({"bar", false, polygon::make_box_mesh({0.01, 0.01, 0.005}, 8)});
+  s.scene.objects.push_back({"block", true, polygon::make_box_mesh({0.03, 0.03, 0.015}, 16)});
+  // Its front face lies in that of the block, at y = −0.03.
+  for (glm::dvec3& v : s.scene.objects[0].surface.vertices) v += glm::dvec3(0.0, -0.02, 0.0);
+  s.now.proxy_m = s.now.device_m = {0.0, 0.0, 0.1};
+  s.now.feel.resize(2);
+  Camera camera = tests::framed(s);
+  camera.azimuth_rad = -0.4 * std::numbers::pi;
+  camera.elevation_rad = 0.2;
+  DRAW_OR_SKIP(image, s, small(camera));
+  const glm::vec3 bone = hybrid::palette::of_object(s.scene, 0);
+  int whole = 0, all = 0;
+  for (double x = -0.008; x <= 0.008; x += 5e-4) {
+    for (double z = -0.003; z <= 0.003; z += 5e-4, ++all) {
+      const glm::vec3 seen = image.at(tests::seen_at(camera, {x, -0.03, z}));
+      whole += glm::dot(glm::normalize(seen), glm::normalize(bone)) > 0.99F ? 1 : 0;
+    }
+  }
+  EXPECT_EQ(whole, all);
 }
 
 TEST_F(Picture, IsTheSameTwiceAndFarFromTheOrigin) {
   const Session s = shell_and_ball();
-  const Camera camera = hybrid::frame_scene(s.scene, s.now);
+  const Camera camera = tests::framed(s);
   DRAW_OR_SKIP(once, s, small(camera));
   DRAW_OR_SKIP(twice, s, small(camera));
   EXPECT_EQ(once.rgb, twice.rgb);
   const Session far = shell_and_ball({1e6, 1e6, -1e6});
-  DRAW_OR_SKIP(here, s, small(hybrid::frame_scene(s.scene, s.now)));
-  DRAW_OR_SKIP(there, far, small(hybrid::frame_scene(far.scene, far.now)));
+  DRAW_OR_SKIP(here, s, small(tests::framed(s)));
+  DRAW_OR_SKIP(there, far, small(tests::framed(far)));
   double sum = 0.0;
   for (std::size_t i = 0; i < here.rgb.size(); ++i) sum += std::abs(int{here.rgb[i]} - int{there.rgb[i]});
   EXPECT_LT(sum / static_cast<double>(here.rgb.size()), 1.0);
@@ -229,7 +256,7 @@ TEST_F(Picture, DrawsARigidObjectWhereItIsAtThatMoment) {
     above.elevation_rad = 1.4;
     above.azimuth_rad = -0.5 * std::numbers::pi;
     const auto shown = [&](const Image& image, const glm::dvec3& p) {
-      const glm::vec3 colour = image.at(*above.pixel(at + p, 960, 720));
+      const glm::vec3 colour = image.at(tests::seen_at(above, at + p));
       return glm::length(colour - hybrid::palette::background) > 0.1F;
     };
     DRAW_OR_SKIP(rest, s, small(above));
@@ -258,9 +285,9 @@ TEST_F(Picture, FollowsARigidObjectThatLeaves) {
   s.now.proxy_m = s.now.device_m = {0.0, 0.0, 0.05};
   s.now.rigid_place.resize(2);
   s.now.rigid_place[1] = {.moved = true, .about_m = {0.1, 0.0, 0.0}, .shift_m = {0.9, 0.5, -0.3}};
-  const Camera camera = hybrid::frame_scene(s.scene, s.now);
+  const Camera camera = tests::framed(s);
   const glm::dvec3 there(1.0, 0.5, -0.3);
-  const auto pixel = camera.pixel(there, 960, 720);
+  const auto pixel = tests::small_layout.pixel(camera, there);
   ASSERT_TRUE(pixel.has_value());
   EXPECT_GT(std::min(pixel->x, pixel->y), 0.0);
   EXPECT_LT(std::max(pixel->x / 960, pixel->y / 720), 1.0);

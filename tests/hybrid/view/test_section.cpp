@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The cut through an object that hides a material: the inside of a built scene, when it is cut, and where.
+#include "hybrid/view/section.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+#include <numbers>
+#include <string>
+
+#include "hybrid/build/build_world.h"
+#include "hybrid/snapshot/make_drawn_scene.h"
+#include "hybrid/view/legend.h"
+#include "hybrid/view/palette.h"
+#include "tests/hybrid/fixtures/scene_file_fixture.h"
+#include "tests/hybrid/view/picture_fixture.h"
+
+namespace {
+
+using hybrid::Camera;
+using tests::Image;
+using tests::Session;
+using InsideOf = tests::SceneFile;
+using CutPicture = tests::Picture;
+
+// A block of 20 mm of gel; its inner 10 mm are a core. The tool presses it from above.
+Session cored() {
+  Session s;
+  s.scene.tool_radius_m = 3e-3;
+  s.scene.objects.push_back({"block", true, tests::ball_mesh({0.0, 0.0, 0.0}, 0.017)});
+  hybrid::DrawnInside& inside = s.scene.objects[0].inside;
+  inside.dims = {20, 20, 20};
+  inside.origin_m = glm::dvec3(-9.5e-3);
+  inside.spacing_m = glm::dvec3(1e-3);
+  inside.materials = {"gel", "core"};
+  for (int k = 0; k < 20; ++k) {
+    for (int j = 0; j < 20; ++j) {
+      for (int i = 0; i < 20; ++i) {
+        const bool core = std::min({i, j, k}) >= 5 && std::max({i, j, k}) < 15;
+        inside.of_voxel.push_back(core ? 2 : 1);
+      }
+    }
+  }
+  s.now.proxy_m = s.now.device_m = {0.0, 0.0, 0.015};
+  s.now.force_N = {0.0, 0.0, 1.0};
+  s.now.feel = {{true, 1.0}};
+  s.now.inside.resize(1);
+  s.now.inside[0].used = true;  // without boxes: at rest
+  return s;
+}
+
+Camera from_the_front() {
+  Camera camera;
+  camera.distance_m = 0.1;
+  camera.azimuth_rad = -0.5 * std::numbers::pi;
+  camera.elevation_rad = 0.4;
+  return camera;
+}
+
+TEST(DrawnInside, FindsTheMaterialOfAPoint) {
+  const hybrid::DrawnInside inside = cored().scene.objects[0].inside;
+  EXPECT_EQ(inside.material_at({0.0, 0.0, 0.0}), 1U);
+  EXPECT_EQ(inside.material_at({4.9e-3, 0.0, 0.0}), 1U);
+  EXPECT_EQ(inside.material_at({5.1e-3, 0.0, 0.0}), 0U);
+  EXPECT_EQ(inside.material_at({9.9e-3, 0.0, 0.0}), 0U);
+  EXPECT_FALSE(inside.material_at({10.1e-3, 0.0, 0.0}).has_value());
+  EXPECT_FALSE(hybrid::DrawnInside{}.material_at({0.0, 0.0, 0.0}).has_value());
+}
+
+TEST(CutOf, LiesAlongTheForceAndFacesTheEye) {
+  const Session s = cored();
+  const auto cut = hybrid::choose_cut(s.scene, s.now, from_the_front(), 0);
+  ASSERT_TRUE(cut.has_value());
+  EXPECT_NEAR(glm::length(cut->toward_eye - glm::dvec3(0.0, -1.0, 0.0)), 0.0, 1e-12);
+  EXPECT_EQ(cut->point_m, s.now.proxy_m);
+}
+
+TEST(CutOf, IsOnlyThroughWhatIsPressedAndHidesSomething) {
+  const Camera camera = from_the_front();
+  Session s = cored();
+  s.now.feel[0].contact = false;
+  EXPECT_FALSE(hybrid::choose_cut(s.scene, s.now, camera, 0).has_value());
+  s = cored();
+  s.scene.objects[0].inside = {};
+  EXPECT_FALSE(hybrid::choose_cut(s.scene, s.now, camera, 0).has_value());
+  s = cored();
+  s.now.inside.clear();
+  EXPECT_FALSE(hybrid::choose_cut(s.scene, s.now, camera, 0).has_value());
+  s = cored();
+  s.now.force_N = camera.toward_eye();
+  EXPECT_FALSE(hybrid::choose_cut(s.scene, s.now, camera, 0).has_value()) << "seen from its edge";
+}
+
+TEST(CutOf, ShowsAsMuchOfEachMaterialAsThereIs) {
+  const Session s = cored();
+  const auto cut = hybrid::choose_cut(s.scene, s.now, from_the_front(), 0);
+  ASSERT_TRUE(cut.has_value());
+  const auto section = hybrid::make_section(s.scene, s.now, 0, *cut, {0.0, 0.0, 0.0});
+  ASSERT_EQ(section.colours.size(), section.mesh.vertices.size());
+  const auto colours = hybrid::palette::of_inside(s.scene, 0);
+  double core = 0.0, all = 0.0;
+  for (std::size_t n = 0; n < section.mesh.indices.size(); n += 3) {
+    const auto at = [&](std::size_t c) {
+      return section.mesh.vertices[section.mesh.indices[n + c]].position;
+    };
+    const double area = 0.5 * glm::length(glm::cross(at(1) - at(0), at(2) - at(0)));
+    const auto& colour = section.colours[section.mesh.indices[n]];
+    all += area;
+    if (std::abs(static_cast<float>(colour[0]) / 255.0F - colours[1].r) < 0.01F) core += area;
+    EXPECT_NEAR(at(0).y, 0.0F, 1e-6F);
+  }
+  EXPECT_NEAR(all, 20e-3 * 20e-3, 0.03 * 4e-4);
+  EXPECT_NEAR(core, 10e-3 * 10e-3, 0.06 * 1e-4);
+}
+
+TEST_F(CutPicture, ShowsTheCoreInItsColour) {
+  Session s = cored();
+  Camera camera = from_the_front();
+  const glm::vec3 core = hybrid::palette::of_inside(s.scene, 0)[1];
+  const auto like_core = [&](const tests::Image& image) {
+    const glm::vec3 seen = image.at(tests::seen_at(camera, {2e-3, 0.0, -2e-3}));
+    return glm::dot(glm::normalize(seen), glm::normalize(core)) > 0.99F;
+  };
+  DRAW_OR_SKIP(cut, s, tests::small(camera));
+  EXPECT_TRUE(like_core(cut));
+  s.now.inside.clear();
+  DRAW_OR_SKIP(whole, s, tests::small(camera));
+  EXPECT_FALSE(like_core(whole));
+  bool named = false;
+  for (const auto& row : hybrid::legend_rows(cored().scene, cored().now, 20))
+    named = named || row.name == "core (inside)";
+  EXPECT_TRUE(named);
+}
+
+TEST_F(InsideOf, IsKeptOnlyIfTheSurfaceHidesAMaterial) {
+  const std::string materials =
+      "format = 1\nunits = \"mm\"\n[material.gel]\nyoung = 9000\n[material.hard]\nyoung = 90000\n" +
+      tests::block + "material = \"gel\"\nmaterials = { \"2\" = \"hard\" }\n";
+  const auto drawn = [&](const std::string& text) {
+    const hybrid::Scene scene = load(materials + text + tests::path);
+    const hybrid::BuiltScene built = hybrid::build_scene(scene);
+    return hybrid::drawn_scene(scene, built, "a").objects[0];
+  };
+  const auto hidden =
+      drawn("inclusions = [{ shape = \"box\", centre = [0, 0, 0], size = [10, 10, 4], label = 2 }]\n");
+  ASSERT_EQ(hidden.inside.materials, (std::vector<std::string>{"gel", "hard"}));
+  EXPECT_EQ(hidden.inside.material_at({0.0, 0.0, 0.0}), 1U);
+  EXPECT_EQ(hidden.inside.material_at({9e-3, 0.0, 0.0}), 0U);
+  EXPECT_TRUE(drawn("").inside.of_voxel.empty());
+  EXPECT_TRUE(drawn("inclusions = [{ shape = \"box\", centre = [0, 0, 5], size = [10, 10, 6], label = 2 }]\n")
+                  .inside.of_voxel.empty());
+}
+
+}  // namespace
