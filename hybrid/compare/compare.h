@@ -12,6 +12,8 @@
 
 namespace hybrid {
 
+inline constexpr const char* kThesisModel = "classic";  // the name of the thesis's algorithm
+
 struct ModelResult {
   std::string name;  // "mesh and proxy", "nearest-surface", "voxels", "classic", "hertz", "flat punch",
                      // "rigid closed form"

@@ -21,7 +21,7 @@ ModelResult classic_voxels(const Scene& scene, const SoftDescription& soft,
   const voxel::LabelVolume volume = build_volume(soft, notes);
   voxel::ThesisChainMail object(volume, lattice_options(scene, soft), {.damping = kDamping});
   const glm::dquat to_body = glm::conjugate(volume.rotation);
-  ModelResult model{.name = "classic", .rows = {}, .depth_m = {}, .tick_us = {}};
+  ModelResult model{.name = kThesisModel, .rows = {}, .depth_m = {}, .tick_us = {}};
   const ScopedFlushToZero flushed;  // as a session has it
   LatencyHistogram times;
   object.touch(glm::dvec3(1e9), 0.0);  // touches nothing, and builds the map outside of the first tick

@@ -2,61 +2,32 @@
 #include "hybrid/plot/session_plot.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
-#include <numbers>
-#include <stdexcept>
+#include <optional>
 
 #include "hybrid/base/number_text.h"
+#include "hybrid/plot/contacts.h"
 #include "hybrid/plot/svg_figure.h"
 
 namespace hybrid {
 namespace {
 
-using Intervals = std::vector<std::pair<double, double>>;
+constexpr const char* kTouchedColour = "#eaf2e3";
+constexpr std::size_t kMostColours = 7;   // of series_colour(), before it repeats
+constexpr std::size_t kMostContacts = 6;  // lines of force over depth
+constexpr std::size_t kLookUpEvery = 10;  // ticks between two look-ups of the material beneath the tool
+constexpr std::uint8_t kNoPart = 255;
 
-constexpr double gap = std::numeric_limits<double>::quiet_NaN();
-constexpr const char* touched_colour = "#eaf2e3";
-
-// A contact lasts from its tick to the next tick.
-Intervals contact_intervals(std::span<const TraceRow> rows, std::uint32_t mask) {
-  Intervals intervals;
-  bool on = false;
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    const bool touches = (rows[i].contacts & mask) != 0;
-    if (touches && !on) intervals.emplace_back(rows[i].t_s, rows[i].t_s);
-    if (!touches && on) intervals.back().second = rows[i].t_s;
-    if (touches) intervals.back().second = rows[i].t_s;
-    on = touches;
-  }
-  return intervals;
-}
-
-double duration(const Intervals& intervals) {
-  double sum = 0.0;
-  for (const auto& [from, to] : intervals) {
-    if (std::isfinite(to - from)) sum += to - from;
-  }
-  return sum;
-}
-
-std::vector<double> times(std::span<const TraceRow> rows) {
+std::vector<double> times_of(std::span<const TraceRow> rows) {
   std::vector<double> t;
   t.reserve(rows.size());
   for (const TraceRow& row : rows) t.push_back(row.t_s);
   return t;
 }
 
-std::vector<double> forces(std::span<const TraceRow> rows) {
-  std::vector<double> force;
-  force.reserve(rows.size());
-  for (const TraceRow& row : rows) force.push_back(glm::length(row.force_N));
-  return force;
-}
-
-// "largest 2.31 N at 0.412 s", or a text for no force.
+// "largest force 2.31 N at 0.412 s", or a text for no force.
 std::string largest(std::span<const TraceRow> rows) {
   double most = -1.0;
   double when = 0.0;
@@ -77,104 +48,107 @@ std::string largest(std::span<const TraceRow> rows) {
   return words;
 }
 
-std::uint32_t bit_of(std::size_t object) {
-  return 1U << std::min<std::size_t>(object, 31);
+// All objects from the 32nd on share the last bit: those touch while they have a force.
+bool touches(std::span<const TraceRow> rows, const PlottedObject& object, std::size_t number,
+             std::size_t row) {
+  constexpr std::size_t shared = 31;
+  if (number < shared || object.force_N.size() != rows.size())
+    return (rows[row].contacts & (1U << std::min(number, shared))) != 0;
+  return object.force_N[row] > 0.0;
 }
 
-// y at each of `at`, linear between samples; a gap outside the range of x and beside samples that are not
-// finite.
-std::vector<double> sampled(std::span<const double> x, std::span<const double> y,
-                            std::span<const double> at) {
-  std::vector<double> out;
-  out.reserve(at.size());
-  std::size_t i = 0;
-  for (const double t : at) {
-    while (i + 1 < x.size() && x[i + 1] < t) ++i;
-    if (x.empty() || !(t >= x.front()) || !(t <= x.back())) {
-      out.push_back(gap);
-    } else if (i + 1 >= x.size() || !(x[i + 1] > x[i])) {
-      out.push_back(y[i]);
-    } else {
-      const double share = std::clamp((t - x[i]) / (x[i + 1] - x[i]), 0.0, 1.0);
-      out.push_back(share == 0.0 ? y[i] : (share == 1.0 ? y[i + 1] : y[i] + share * (y[i + 1] - y[i])));
-    }
-  }
-  return out;
-}
-
-// The origin of depth (the first contact in any model) and its direction.
-struct DepthFrame {
-  glm::dvec3 start_m{0.0};
-  glm::dvec3 into{0.0, 0.0, -1.0};
+// What the figure names: an object, or a part of one, that the tool touched.
+struct Touched {
+  std::string name;
+  bool soft = false;
+  Intervals intervals{};
+  std::vector<double> force_N{};  // [row]; empty: not recorded
+  double felt_Ns = 0.0;           // force over time; without forces: the time of contact
 };
 
-DepthFrame depth_frame(std::span<const ComparedModel> models, const ComparedModel& reference) {
-  DepthFrame frame;
-  double first = std::numeric_limits<double>::infinity();
-  for (const ComparedModel& model : models) {
-    const auto touch =
-        std::ranges::find_if(model.rows, [](const TraceRow& row) { return row.contacts != 0; });
-    if (touch != model.rows.end() && touch->t_s < first) {
-      first = touch->t_s;
-      frame.start_m = touch->device_m;
-    }
+Touched touched_thing(std::span<const TraceRow> rows, const PlottedObject& object, std::size_t number,
+                      std::optional<std::size_t> part) {
+  Touched thing{.name = part ? object.parts[*part] : object.name, .soft = object.soft};
+  const bool has_force = object.force_N.size() == rows.size();
+  if (has_force) thing.force_N.assign(rows.size(), 0.0);
+  bool on = false;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const bool now = touches(rows, object, number, i) &&
+                     (!part || (i < object.touched_part.size() && object.touched_part[i] == *part));
+    if (now && !on) thing.intervals.emplace_back(rows[i].t_s, rows[i].t_s);
+    if (now || on) thing.intervals.back().second = rows[i].t_s;
+    on = now;
+    if (!now || !has_force) continue;
+    thing.force_N[i] = object.force_N[i];
+    const double dt = i + 1 < rows.size() ? rows[i + 1].t_s - rows[i].t_s : 0.0;
+    if (std::isfinite(object.force_N[i] * dt)) thing.felt_Ns += object.force_N[i] * dt;
   }
-  double most = 1e-9;
-  for (const TraceRow& row : reference.rows) {
-    const double force = glm::length(row.force_N);
-    if (std::isfinite(force) && force > most) {
-      most = force;
-      frame.into = -row.force_N / force;
-    }
-  }
-  return frame;
+  if (!has_force) thing.felt_Ns = duration(thing.intervals);
+  return thing;
 }
 
-constexpr double kTurned_deg =
-    15.0;  // a model's angle is shown if its force turns further than this from the reference
-
-// Angle between two forces (degrees); a gap if either force is too small to have a direction.
-double angle_between(const glm::dvec3& a, const glm::dvec3& b, double floor_N) {
-  const double size = glm::length(a) * glm::length(b);
-  if (!(glm::length(a) > floor_N) || !(glm::length(b) > floor_N) || !std::isfinite(size)) return gap;
-  return std::acos(std::clamp(glm::dot(a, b) / size, -1.0, 1.0)) * 180.0 / std::numbers::pi;
+// The most felt one first; empty where nothing was touched.
+std::vector<Touched> touched_things(std::span<const TraceRow> rows, std::span<const PlottedObject> objects,
+                                    std::size_t& untouched) {
+  std::vector<Touched> things;
+  untouched = 0;
+  for (std::size_t o = 0; o < objects.size(); ++o) {
+    const std::size_t before = things.size();
+    const PlottedObject& object = objects[o];
+    const auto add = [&](std::optional<std::size_t> part) {
+      Touched thing = touched_thing(rows, object, o, part);
+      if (!thing.intervals.empty()) things.push_back(std::move(thing));
+    };
+    for (std::size_t part = 0; part < object.parts.size(); ++part) add(part);
+    if (object.parts.empty()) add({});
+    if (things.size() == before) ++untouched;
+  }
+  std::ranges::stable_sort(things, std::ranges::greater{}, &Touched::felt_Ns);
+  return things;
 }
 
-// Angle of each model's force to the reference's force, at the reference's ticks. A model with its own times
-// contributes its last tick before. No series if no model turns far enough.
-Panel direction_panel(std::span<const ComparedModel> models, const ComparedModel& reference, double floor_N) {
+Panel force_panel(std::span<const TraceRow> rows, const std::vector<double>& t,
+                  std::span<const Touched> things, const Intervals& any) {
   Panel panel;
-  panel.title = "Direction: angle to the force of " + reference.name;
-  panel.y_label = "angle (degrees)";
-  panel.height = 150.0;
+  panel.title = "Force on the hand";
+  panel.y_label = "force (N)";
+  panel.height = 230.0;
   panel.from_zero = true;
-  double most = 0.0;
-  for (std::size_t m = 0; m < models.size(); ++m) {
-    const std::span<const TraceRow> rows = models[m].rows;
-    if (&models[m] == &reference || rows.empty()) continue;
-    std::vector<double> angle;
-    std::size_t i = 0;
-    for (const TraceRow& row : reference.rows) {
-      while (i + 1 < rows.size() && rows[i + 1].t_s <= row.t_s) ++i;
-      angle.push_back(angle_between(rows[i].force_N, row.force_N, floor_N));
-      if (angle.back() > most) most = angle.back();
-    }
-    panel.series.push_back({models[m].name, times(reference.rows), angle, series_colour(m), 1.6, m >= 7});
+  panel.bands.push_back({"in contact", any, kTouchedColour});
+  std::vector<double> total, rigid, soft;
+  for (const TraceRow& row : rows) {
+    total.push_back(glm::length(row.force_N));
+    rigid.push_back(row.rigid_N);
+    soft.push_back(row.soft_N);
   }
-  if (most < kTurned_deg) panel.series.clear();
+  panel.series.push_back({"total", t, std::move(total), "#000000", 2.2});
+  const auto count = [&](bool is_soft) {
+    return std::ranges::count_if(things, [&](const Touched& thing) { return thing.soft == is_soft; });
+  };
+  if (count(false) > 0) panel.series.push_back({"rigid objects", t, std::move(rigid), series_colour(0)});
+  if (count(true) > 0) panel.series.push_back({"soft objects", t, std::move(soft), series_colour(1)});
+  // Dashed lines of their own, if a kind has more than one: they are parts of the sums above.
+  std::size_t colour = 2;
+  for (const Touched& thing : things) {
+    if (thing.force_N.empty() || count(thing.soft) < 2 || colour >= kMostColours) continue;
+    panel.series.push_back({thing.name, t, thing.force_N, series_colour(colour++), 1.4, true});
+  }
   return panel;
 }
 
-// True if some model pushes against the direction of the reference's largest force by more than a tenth of
-// that force.
-bool any_model_reverses(std::span<const ComparedModel> models, const ComparedModel& reference,
-                        const glm::dvec3& into) {
-  double floor_N = 0.0;
-  for (const TraceRow& row : reference.rows) floor_N = std::max(floor_N, -0.1 * glm::dot(row.force_N, into));
-  return std::ranges::any_of(models, [&](const ComparedModel& model) {
-    return std::ranges::any_of(model.rows,
-                               [&](const TraceRow& row) { return glm::dot(row.force_N, into) > floor_N; });
-  });
+Panel contact_panel(std::span<const Touched> things, std::size_t untouched) {
+  Panel panel;
+  panel.title = "Touched, the most felt first";
+  for (const Touched& thing : things) {
+    panel.lanes.push_back(
+        {thing.name, (thing.soft ? "soft, " : "rigid, ") + with_decimals(duration(thing.intervals), 3) + " s",
+         thing.intervals, series_colour(thing.soft ? 1 : 0)});
+  }
+  if (untouched > 0) {
+    panel.note =
+        untouched == 1 ? "1 object was not touched" : std::to_string(untouched) + " objects were not touched";
+  }
+  return panel;
 }
 
 // Clearance of tissue to rigid objects and to other tissue. No series if nothing comes near.
@@ -182,7 +156,7 @@ Panel clearance_panel(const ClearanceCourse& near) {
   Panel panel;
   panel.title = "Between objects (0: they touch; below: they overlap)";
   panel.y_label = "gap (mm)";
-  panel.height = 150.0;
+  panel.height = 130.0;
   panel.from_zero = true;
   const auto add = [&](const char* name, const std::vector<double>& gap_m, std::size_t colour) {
     std::vector<double> gap_mm;
@@ -202,183 +176,166 @@ Panel clearance_panel(const ClearanceCourse& near) {
   return panel;
 }
 
+// No series if no tick was timed.
+Panel tick_time_panel(std::span<const TraceRow> rows, const std::vector<double>& t, double period_s) {
+  Panel panel;
+  panel.title = "Time that each tick takes";
+  panel.y_label = "time";
+  panel.y_unit = "s";
+  panel.y_scale = Scale::logarithmic;
+  panel.height = 130.0;
+  panel.lines.push_back({period_s, quantity_text(period_s, "s") + ": the next tick begins", "#a02020"});
+  std::vector<double> taken_s;
+  for (const TraceRow& row : rows) taken_s.push_back(row.tick_us * 1e-6);
+  if (std::ranges::any_of(taken_s, [](double s) { return s > 0.0 && plottable(s); }))
+    panel.series.push_back({"", t, std::move(taken_s), series_colour(5), 1.0});
+  return panel;
+}
+
+// What a contact is called: the thing that was felt most in it.
+std::string name_in(const Contact& contact, std::span<const Touched> things, std::span<const TraceRow> rows) {
+  std::string name;
+  double most = -1.0;
+  for (const Touched& thing : things) {
+    double felt = 0.0;  // force, or without forces time: sums that only things of one trace are compared by
+    for (std::size_t i = 0; i < thing.force_N.size(); ++i) {
+      if (rows[i].t_s >= contact.from_s && rows[i].t_s <= contact.to_s) felt += thing.force_N[i];
+    }
+    if (thing.force_N.empty()) {
+      for (const auto& [from, to] : thing.intervals)
+        felt += std::max(std::min(to, contact.to_s) - std::max(from, contact.from_s), 0.0);
+    }
+    if (!(felt > most)) continue;
+    most = felt;
+    name = thing.name;
+  }
+  return name;
+}
+
+// Force over depth. No series without contacts.
+Panel depth_panel(std::span<const TraceRow> rows, std::span<const Touched> things, const Intervals& any) {
+  Panel panel;
+  panel.title = "Force over depth, one line for each contact";
+  panel.y_label = "force (N)";
+  panel.from_zero = true;
+  const std::vector<Contact> all = contacts_of(rows, any);
+  const std::vector<Contact> contacts = most_felt(all, kMostContacts);
+  for (std::size_t c = 0; c < contacts.size(); ++c) {
+    const Contact& contact = contacts[c];
+    Series line{.name = with_decimals(contact.from_s, 2) + " s: " + name_in(contact, things, rows),
+                .x = {},
+                .y = {},
+                .colour = series_colour(c),
+                .width = 1.6};
+    for (const TraceRow& row : rows) {
+      if (!(row.t_s >= contact.from_s && row.t_s <= contact.to_s)) continue;
+      line.x.push_back(contact.depth_m(row.device_m) * 1e3);
+      line.y.push_back(glm::length(row.force_N));
+    }
+    panel.series.push_back(std::move(line));
+  }
+  if (all.size() > contacts.size())
+    panel.note = std::to_string(all.size() - contacts.size()) + " contacts that were felt less are not drawn";
+  return panel;
+}
+
+// Index of the material of the surface vertex nearest to a point.
+std::uint8_t nearest_material(const DrawnObject& object, const glm::dvec3& at_m) {
+  double least = std::numeric_limits<double>::infinity();
+  std::uint8_t material = kNoPart;
+  for (std::size_t v = 0; v < object.surface.vertices.size(); ++v) {
+    const glm::dvec3 way = object.surface.vertices[v] - at_m;
+    const double squared = glm::dot(way, way);
+    if (!(squared < least)) continue;
+    least = squared;
+    material = object.vertex_material[v];
+  }
+  return material;
+}
+
 }  // namespace
+
+std::vector<PlottedObject> plotted_objects(const DrawnScene& scene, std::span<const TraceRow> rows,
+                                           const std::vector<std::vector<double>>& force_N) {
+  std::vector<PlottedObject> objects;
+  for (std::size_t o = 0; o < scene.objects.size(); ++o) {
+    const DrawnObject& drawn = scene.objects[o];
+    PlottedObject object{.name = drawn.name, .soft = drawn.soft, .force_N = force_N[o]};
+    if (!drawn.materials.empty() && drawn.vertex_material.size() == drawn.surface.vertices.size()) {
+      object.parts = drawn.materials;
+      object.touched_part.assign(rows.size(), kNoPart);
+      std::size_t known_until = 0;
+      std::uint8_t part = kNoPart;
+      for (std::size_t i = 0; i < rows.size(); ++i) {
+        if (!touches(rows, object, o, i)) {
+          known_until = 0;
+          continue;
+        }
+        if (i >= known_until) {
+          part = nearest_material(drawn, rows[i].proxy_m);
+          known_until = i + kLookUpEvery;
+        }
+        object.touched_part[i] = part;
+      }
+    } else if (!drawn.material.empty() && drawn.material != drawn.name) {
+      object.name += " (" + drawn.material + ")";
+    }
+    objects.push_back(std::move(object));
+  }
+  return objects;
+}
 
 void save_session_plot(const std::filesystem::path& svg, std::span<const TraceRow> rows,
                        std::span<const PlottedObject> objects, const std::string& title,
-                       const ClearanceCourse& near) {
-  const std::vector<double> t = times(rows);
+                       const SessionPlotOptions& options) {
+  const std::vector<double> t = times_of(rows);
   const Intervals any = contact_intervals(rows, ~0U);
+  std::size_t untouched = 0;
+  const std::vector<Touched> things = touched_things(rows, objects, untouched);
+  ValueRange time;
+  for (const double at : t) time.add(at);
+
   Figure figure;
   figure.title = title;
-  double first = std::numeric_limits<double>::infinity();
-  double last = -first;
-  for (const double at : t) {
-    if (!std::isfinite(at)) continue;
-    first = std::min(first, at);
-    last = std::max(last, at);
-  }
   figure.notes.push_back(std::to_string(rows.size()) + " ticks" +
-                         (first <= last ? ", " + with_decimals(last - first, 3) + " s" : "") +
+                         (time.empty() ? "" : ", " + with_decimals(time.to - time.from, 3) + " s") +
                          "; in contact " + with_decimals(duration(any), 3) + " s" + "; " + largest(rows));
-
-  Panel force;
-  force.title = "What the hand feels";
-  force.y_label = "force (N)";
-  force.height = 230.0;
-  force.from_zero = true;
-  force.bands.push_back({"in contact", any, touched_colour});
-  std::vector<double> rigid;
-  std::vector<double> soft;
-  std::vector<double> distance_mm;
-  for (const TraceRow& row : rows) {
-    rigid.push_back(row.rigid_N);
-    soft.push_back(row.soft_N);
-    distance_mm.push_back(glm::length(row.device_m - row.proxy_m) * 1e3);
-  }
-  force.series.push_back({"total", t, forces(rows), "#000000", 2.2});
-  const auto has = [&](bool is_soft) {
-    return objects.empty() ||
-           std::ranges::any_of(objects, [&](const PlottedObject& o) { return o.soft == is_soft; });
-  };
-  if (has(false)) force.series.push_back({"rigid objects", t, rigid, series_colour(0)});
-  if (has(true)) force.series.push_back({"soft objects", t, soft, series_colour(1)});
-  // Objects get lines of their own if a kind has more than one; dashed, because they are parts of the sums
-  // above.
-  std::size_t colour = 2;
-  for (const PlottedObject& object : objects) {
-    const auto same =
-        std::ranges::count_if(objects, [&](const PlottedObject& o) { return o.soft == object.soft; });
-    if (object.force_N.empty() || same < 2 || colour >= 7) continue;
-    force.series.push_back({object.name, t, object.force_N, series_colour(colour++), 1.4, true});
-  }
-
-  Panel contact;
-  contact.title = "What the tool touches";
-  for (std::size_t i = 0; i < objects.size(); ++i) {
-    Lane lane;
-    lane.name = objects[i].name;
-    lane.intervals = contact_intervals(rows, bit_of(i));
-    lane.note = (objects[i].soft ? "soft, " : "rigid, ") + with_decimals(duration(lane.intervals), 3) + " s";
-    lane.colour = series_colour(objects[i].soft ? 1 : 0);
-    contact.lanes.push_back(std::move(lane));
-  }
-
-  Panel depth;
-  depth.title = "How far the device is from where the tool may be (proxy)";
-  depth.y_label = "|device − proxy| (mm)";
-  depth.height = 150.0;
-  depth.from_zero = true;
-  depth.bands.push_back({"", any, touched_colour});
-  depth.series.push_back({"", t, distance_mm, series_colour(2)});
-
   PanelGroup group;
   group.x_label = "time (s)";
-  group.panels.push_back(std::move(force));
-  if (!contact.lanes.empty()) group.panels.push_back(std::move(contact));
+  if (!time.empty()) group.squeezed = long_in_the_air(any, time.from, time.to);
+  if (!group.squeezed.empty())
+    figure.notes.emplace_back("Grey: long times in the air, drawn short; below them their length (s).");
+
+  group.panels.push_back(force_panel(rows, t, things, any));
+  Panel contact = contact_panel(things, untouched);
+  if (!contact.lanes.empty()) {
+    group.panels.push_back(std::move(contact));
+  } else if (!contact.note.empty()) {
+    group.panels.back().note = contact.note;
+  }
+  Panel depth;
+  depth.title = "Distance from the device to the tool as felt (proxy)";
+  depth.y_label = "distance (mm)";
+  depth.height = 130.0;
+  depth.from_zero = true;
+  depth.bands.push_back({"", any, kTouchedColour});
+  std::vector<double> distance_mm;
+  for (const TraceRow& row : rows) distance_mm.push_back(glm::length(row.device_m - row.proxy_m) * 1e3);
+  depth.series.push_back({"", t, std::move(distance_mm), series_colour(2)});
   group.panels.push_back(std::move(depth));
-  Panel gaps = clearance_panel(near);
-  if (!gaps.series.empty()) {
-    gaps.bands.push_back({"", any, touched_colour});
-    group.panels.push_back(std::move(gaps));
+  for (Panel panel : {clearance_panel(options.near), tick_time_panel(rows, t, options.period_s)}) {
+    if (panel.series.empty()) continue;
+    panel.bands.push_back({"", any, kTouchedColour});
+    group.panels.push_back(std::move(panel));
   }
   figure.groups.push_back(std::move(group));
-  save_svg(svg, figure);
-}
 
-void save_compare_plot(const std::filesystem::path& svg, std::span<const ComparedModel> models,
-                       std::span<const ReferenceCurve> curves, const std::string& title,
-                       const ComparePlotOptions& options) {
-  if (options.reference >= models.size())
-    throw std::invalid_argument("save_compare_plot: the reference is no model");
-  const ComparedModel& reference = models[options.reference];
-  const std::vector<double> t = times(reference.rows);
-  const DepthFrame frame = depth_frame(models, reference);
-  // A force that reverses shows only with its sign: then the component along the reference's largest force is
-  // drawn.
-  const bool with_sign = any_model_reverses(models, reference, frame.into);
-  const auto drawn = [&](std::span<const TraceRow> rows) {
-    std::vector<double> out = forces(rows);
-    for (std::size_t i = 0; with_sign && i < out.size(); ++i) out[i] = -glm::dot(rows[i].force_N, frame.into);
-    return out;
-  };
-  const std::vector<double> felt = drawn(reference.rows);
-
-  Figure figure;
-  figure.title = title;
-  figure.notes.push_back("reference: " + reference.name +
-                         "; one JND: " + with_digits(100.0 * options.jnd_share, 3) + " %" +
-                         " of its force, at least " + with_digits(options.jnd_floor_N, 3) + " N");
-  if (with_sign) {
-    figure.notes.emplace_back(
-        "some force turns round: drawn is the part along the largest force of the reference; below 0 it "
-        "pulls the "
-        "tool on");
+  Panel over_depth = depth_panel(rows, things, any);
+  if (!over_depth.series.empty()) {
+    PanelGroup& by_depth = figure.groups.emplace_back();
+    by_depth.x_label = "depth of the device since the first touch, against the largest force (mm)";
+    by_depth.panels.push_back(std::move(over_depth));
   }
-
-  Panel over_time;
-  over_time.title = "Force on the hand";
-  over_time.y_label = "force (N)";
-  over_time.height = 230.0;
-  over_time.from_zero = true;
-  Panel difference;
-  difference.title = "Difference from " + reference.name;
-  difference.y_label = "difference (N)";
-  difference.height = 170.0;
-  difference.from_zero = true;
-  Area band{"not felt: within ±1 JND", t, {}, {}, "#dfe8f2"};
-  for (const double force : felt) {
-    const double jnd =
-        std::isfinite(force) ? std::max(options.jnd_share * std::fabs(force), options.jnd_floor_N) : gap;
-    band.low.push_back(-jnd);
-    band.high.push_back(jnd);
-  }
-  difference.areas.push_back(std::move(band));
-  Panel over_depth;
-  over_depth.title = "Force over depth";
-  over_depth.y_label = "force (N)";
-  over_depth.height = 260.0;
-  over_depth.from_zero = true;
-
-  for (std::size_t m = 0; m < models.size(); ++m) {
-    const ComparedModel& model = models[m];
-    const bool is_reference = m == options.reference;
-    const std::string colour = series_colour(m);
-    const bool dashed = m >= 7;
-    const std::vector<double> own_t = times(model.rows);
-    std::vector<double> own = drawn(model.rows);
-    std::vector<double> depth_mm;
-    for (std::size_t i = 0; i < model.rows.size(); ++i) {
-      const double depth_m = i < model.depth_m.size()
-                                 ? model.depth_m[i]
-                                 : glm::dot(model.rows[i].device_m - frame.start_m, frame.into);
-      // Far from the object there is nothing to compare, and the approach would fill the axis.
-      depth_mm.push_back(depth_m >= -1e-3 ? depth_m * 1e3 : gap);
-    }
-    if (!is_reference) {
-      std::vector<double> gaps = sampled(own_t, own, t);
-      for (std::size_t i = 0; i < gaps.size(); ++i) gaps[i] -= felt[i];
-      difference.series.push_back({model.name, t, std::move(gaps), colour, 1.6, dashed});
-    }
-    const double width = is_reference ? 2.4 : 1.6;
-    over_depth.series.push_back({model.name, std::move(depth_mm), own, colour, width, dashed});
-    over_time.series.push_back(
-        {model.name + (is_reference ? " (reference)" : ""), own_t, std::move(own), colour, width, dashed});
-  }
-  for (const ReferenceCurve& curve : curves) {
-    std::vector<double> depth_mm = curve.depth_m;
-    for (double& depth : depth_mm) depth *= 1e3;
-    over_depth.series.push_back({curve.name, std::move(depth_mm), curve.force_N, "#333333", 1.8, true});
-  }
-  PanelGroup time_group{"time (s)", {}};
-  time_group.panels.push_back(std::move(over_time));
-  time_group.panels.push_back(std::move(difference));
-  Panel direction = direction_panel(models, reference, options.jnd_floor_N);
-  if (!direction.series.empty()) time_group.panels.push_back(std::move(direction));
-  PanelGroup depth_group{"depth of the device (mm)", {}};
-  depth_group.panels.push_back(std::move(over_depth));
-  figure.groups.push_back(std::move(time_group));
-  figure.groups.push_back(std::move(depth_group));
   save_svg(svg, figure);
 }
 

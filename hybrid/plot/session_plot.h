@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The two figures of a session: the forces of one run, and the comparison of models.
+// The figure of a session: forces, contacts, depth and times of the ticks of one run.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <span>
 #include <string>
@@ -17,39 +18,27 @@ struct PlottedObject {
   bool soft = false;
   // Force of this object in each tick (N), one entry per row of the trace; empty: not recorded.
   std::vector<double> force_N;
+  // The names of its organs or materials, and for each row the index of the one that the tool touches; empty:
+  // it is one thing.
+  std::vector<std::string> parts{};
+  std::vector<std::uint8_t> touched_part{};
 };
 
-// Plots force over time, a lane of contact for each object, the distance between device and proxy, and the
-// clearance between objects if `near` is not empty. Throws std::runtime_error: file not writable.
+// The objects of a trace, with the material beneath the tool wherever it touches a soft object of several.
+// The material is that of the surface at rest nearest to the proxy, looked up every few ticks.
+std::vector<PlottedObject> plotted_objects(const DrawnScene& scene, std::span<const TraceRow> rows,
+                                           const std::vector<std::vector<double>>& force_N);
+
+struct SessionPlotOptions {
+  ClearanceCourse near{};  // distances between objects; empty: not drawn
+  double period_s = 1e-3;  // of a tick: the time that it may take
+};
+
+// Plots force over time, a lane of contact for each object that was touched, the distance between device and
+// proxy, the clearance between objects, the times of the ticks, and force over depth, one line for each
+// contact. Time in the air is squeezed. Throws std::runtime_error: file not writable.
 void save_session_plot(const std::filesystem::path& svg, std::span<const TraceRow> rows,
                        std::span<const PlottedObject> objects, const std::string& title,
-                       const ClearanceCourse& near = {});
-
-struct ComparedModel {
-  std::string name;
-  std::vector<TraceRow> rows;
-  // Depth of the device in the object in each tick (m), if known. Empty: the device's travel since first
-  // contact, against the direction of the reference's largest force.
-  std::vector<double> depth_m;
-};
-
-// A curve that a model should follow (Hertz, flat punch, a measurement).
-struct ReferenceCurve {
-  std::string name;
-  std::vector<double> depth_m, force_N;
-};
-
-struct ComparePlotOptions {
-  std::size_t reference = 0;  // index of the model that the others are compared with
-  double jnd_share = 0.07;    // a hand distinguishes forces that differ by this share
-  double jnd_floor_N = 0.04;  // and by at least this amount
-};
-
-// Plots force over time, the difference from the reference model with the band of one JND, and force over
-// depth. Models may have their own times: they are compared at the reference's times, linearly between
-// samples. Throws std::runtime_error: file not writable; std::invalid_argument: the reference is no model.
-void save_compare_plot(const std::filesystem::path& svg, std::span<const ComparedModel> models,
-                       std::span<const ReferenceCurve> curves, const std::string& title,
-                       const ComparePlotOptions& options = {});
+                       const SessionPlotOptions& options = {});
 
 }  // namespace hybrid

@@ -19,40 +19,28 @@ constexpr double letter = 6.4;          // mean width of a letter at 12 pixels, 
 constexpr double most_points = 18'000;  // of all lines together; about 12 bytes each
 constexpr double lane_height = 22.0;
 constexpr std::size_t most_lanes = 24;
-
-// Larger values would overflow in differences; no measurement is that large.
-bool plottable(double v) {
-  return std::isfinite(v) && std::abs(v) < 1e150;
-}
-
-struct Range {
-  double from = std::numeric_limits<double>::infinity();
-  double to = -std::numeric_limits<double>::infinity();
-  void add(double v) {
-    if (!plottable(v)) return;
-    from = std::min(from, v);
-    to = std::max(to, v);
-  }
-  [[nodiscard]] bool empty() const { return !(from <= to); }
-};
+constexpr double kTitleLetter = 7.9;  // mean width of a bold letter at 13 pixels, on the wide side
+constexpr double kEntryGap = 6.0;     // between entries of a legend (pixels)
+constexpr double kRounding = 1e-6;    // pixels: an end of a line is not beyond the end of its axis
+constexpr int kTicks = 10;            // of an x axis, about
+constexpr double kTickGap = 8.0;      // between the axis and the text of a tick (pixels)
+constexpr const char* kSqueezedColour = "#ececec";
 
 // Maps a panel's data to the page.
 struct Axes {
   double left, top, width, height;
-  Range x, y;
-  [[nodiscard]] double px(double v) const { return left + (v - x.from) / (x.to - x.from) * width; }
-  [[nodiscard]] double py(double v) const { return top + height - (v - y.from) / (y.to - y.from) * height; }
+  Axis x, y;
 };
 
 // Intervals on the page (pixels): neighbours nearer than half a pixel are merged, and intervals are cut to
 // the axes.
-std::vector<std::pair<double, double>> page_intervals(const std::vector<std::pair<double, double>>& intervals,
-                                                      const Axes& axes) {
-  std::vector<std::pair<double, double>> out;
+Intervals page_intervals(const Intervals& intervals, const Axes& axes) {
+  Intervals out;
   for (const auto& [from, to] : intervals) {
-    if (!plottable(from) || !plottable(to) || to < axes.x.from || from > axes.x.to) continue;
-    const double a = std::max(axes.px(from), axes.left);
-    const double b = std::min(axes.px(to), axes.left + axes.width);
+    if (!plottable(from) || !plottable(to) || to < axes.x.values().from || from > axes.x.values().to)
+      continue;
+    const double a = std::max(axes.x.page(from), axes.left);
+    const double b = std::min(axes.x.page(to), axes.left + axes.width);
     if (!out.empty() && a - out.back().second < 0.5) {
       out.back().second = std::max(out.back().second, b);
     } else {
@@ -85,26 +73,26 @@ std::string path_of(const std::vector<PlotPoint>& page) {
   return d;
 }
 
+// Places of values on the page; not finite where there is none.
+std::vector<double> on_page(const std::vector<double>& values, std::size_t count, const Axis& axis) {
+  std::vector<double> page(count);
+  for (std::size_t i = 0; i < count; ++i) page[i] = axis.page(values[i]);
+  return page;
+}
+
 void draw_series(Svg& svg, const Series& series, const Axes& axes, std::size_t points) {
   const std::size_t n = std::min(series.x.size(), series.y.size());
-  std::vector<double> y(series.y.begin(), series.y.begin() + static_cast<std::ptrdiff_t>(n));
-  for (double& v : y) {
-    if (!plottable(v)) v = std::numeric_limits<double>::quiet_NaN();
-  }
+  const std::vector<double> x = on_page(series.x, n, axes.x), y = on_page(series.y, n, axes.y);
   bool forward = true;
-  for (std::size_t i = 1; i < n && forward; ++i) forward = !(series.x[i] < series.x[i - 1]);
+  for (std::size_t i = 1; i < n && forward; ++i) forward = !(x[i] < x[i - 1]);
   std::vector<PlotPoint> page;
   if (forward) {
-    page = downsample_columns(series.x, y, axes.x.from, axes.x.to,
+    page = downsample_columns(x, y, axes.left - kRounding, axes.left + axes.width + kRounding,
                               std::clamp<std::size_t>(points / 4, 40, static_cast<std::size_t>(axes.width)));
-    for (PlotPoint& p : page) p = {axes.px(p.x), std::isfinite(p.y) ? axes.py(p.y) : p.y};
   } else {
     std::vector<PlotPoint> all;
     all.reserve(n);
-    for (std::size_t i = 0; i < n; ++i) {
-      all.push_back({plottable(series.x[i]) ? axes.px(series.x[i]) : std::numeric_limits<double>::quiet_NaN(),
-                     std::isfinite(y[i]) ? axes.py(y[i]) : y[i]});
-    }
+    for (std::size_t i = 0; i < n; ++i) all.push_back({x[i], y[i]});
     page = downsample_path(all, 0.4, std::max<std::size_t>(points, 40));
   }
   svg.body += "<path d=\"" + path_of(page) + "\" stroke=\"" + escaped(series.colour) + "\" stroke-width=\"" +
@@ -115,18 +103,24 @@ void draw_series(Svg& svg, const Series& series, const Axes& axes, std::size_t p
 void draw_area(Svg& svg, const Area& area, const Axes& axes, std::size_t points) {
   const std::size_t columns =
       std::clamp<std::size_t>(points / 8, 20, static_cast<std::size_t>(axes.width) / 2);
-  const auto low = downsample_columns(area.x, area.low, axes.x.from, axes.x.to, columns);
-  const auto high = downsample_columns(area.x, area.high, axes.x.from, axes.x.to, columns);
+  const std::size_t n = std::min({area.x.size(), area.low.size(), area.high.size()});
+  const std::vector<double> x = on_page(area.x, n, axes.x);
+  const double left = axes.left - kRounding, right = axes.left + axes.width + kRounding;
+  const auto low = downsample_columns(x, on_page(area.low, n, axes.y), left, right, columns);
+  const auto high = downsample_columns(x, on_page(area.high, n, axes.y), left, right, columns);
   std::string d;
   const auto add = [&](const PlotPoint& p) {
-    if (!plottable(p.y)) return;
-    const double y = std::clamp(axes.py(p.y), axes.top - 9.0, axes.top + axes.height + 9.0);
-    add_point(d, d.empty() ? 'M' : 'L', axes.px(p.x), y);
+    if (!std::isfinite(p.y)) return;
+    add_point(d, d.empty() ? 'M' : 'L', p.x, std::clamp(p.y, axes.top - 9.0, axes.top + axes.height + 9.0));
   };
   for (const PlotPoint& p : low) add(p);
   std::for_each(high.rbegin(), high.rend(), add);
   if (!d.empty())
     svg.body += "<path d=\"" + d + "Z\" fill=\"" + escaped(area.colour) + "\" stroke=\"none\"/>\n";
+}
+
+double unscaled_symmetric(double at) {
+  return std::abs(at) <= 1.0 ? at : std::copysign(std::pow(10.0, std::abs(at) - 1.0), at);
 }
 
 struct LegendEntry {
@@ -148,8 +142,8 @@ double entry_width(const LegendEntry& e) {
   return 40.0 + letter * static_cast<double>(letters(e.name));
 }
 
-// Draws the legend's rows (or only measures them, if `svg` is null); returns their height.
-double draw_legend(Svg* svg, const std::vector<LegendEntry>& entries, double left, double top, double width) {
+// Draws the legend's rows; returns their height.
+double draw_legend(Svg& svg, const std::vector<LegendEntry>& entries, double left, double top, double width) {
   double x = left;
   double y = top;
   for (const LegendEntry& e : entries) {
@@ -157,38 +151,54 @@ double draw_legend(Svg* svg, const std::vector<LegendEntry>& entries, double lef
       x = left;
       y += 17.0;
     }
-    if (svg != nullptr) {
-      if (e.filled) {
-        svg->rect(x, y + 3.0, 22.0, 10.0, e.colour, "stroke=\"#bbbbbb\" stroke-width=\"0.5\"");
-      } else {
-        svg->line(x, y + 8.0, x + 22.0, y + 8.0, e.colour,
-                  e.dashed ? "stroke-width=\"2.4\" stroke-dasharray=\"6 4\"" : "stroke-width=\"2.4\"");
-      }
-      svg->text(x + 27.0, y + 12.0, e.name, "class=\"t\"");
+    if (e.filled) {
+      svg.rect(x, y + 3.0, 22.0, 10.0, e.colour, "stroke=\"#bbbbbb\" stroke-width=\"0.5\"");
+    } else {
+      svg.line(x, y + 8.0, x + 22.0, y + 8.0, e.colour,
+               e.dashed ? "stroke-width=\"2.4\" stroke-dasharray=\"6 4\"" : "stroke-width=\"2.4\"");
     }
-    x += entry_width(e) + 6.0;
+    svg.text(x + 27.0, y + 12.0, e.name, "class=\"t\"");
+    x += entry_width(e) + kEntryGap;
   }
-  return entries.empty() ? 0.0 : y - top + 21.0;
+  return entries.empty() ? 0.0 : y - top + 20.0;
 }
 
-void choose_y(const Panel& panel, Axes& axes) {
-  for (const Series& s : panel.series) {
-    for (const double v : s.y) axes.y.add(v);
+// A tick alone has no pitch: its own size is taken for it.
+std::vector<std::string> tick_texts(const std::vector<double>& ticks, Scale scale, const std::string& unit) {
+  const double step = ticks.size() > 1 ? ticks[1] - ticks[0] : 0.0;
+  std::vector<std::string> texts;
+  for (const double tick : ticks) {
+    if (!unit.empty()) {
+      texts.push_back(quantity_text(tick, unit));
+    } else {
+      texts.push_back(tick_text(tick, scale == Scale::linear || tick == 0.0 ? step : tick));
+    }
   }
-  for (const ReferenceLine& line : panel.lines) axes.y.add(line.y);
+  return texts;
+}
+
+// The y axis that shows all of a panel, with a margin.
+Axis choose_y(const Panel& panel, double top, double height) {
+  ValueRange y;  // in the coordinate in which the axis is linear
+  const auto add = [&](double v) { y.add(scaled(panel.y_scale, v)); };
+  for (const Series& s : panel.series) std::ranges::for_each(s.y, add);
+  for (const ReferenceLine& line : panel.lines) add(line.y);
   for (const Area& a : panel.areas) {
-    for (const double v : a.low) axes.y.add(v);
-    for (const double v : a.high) axes.y.add(v);
+    std::ranges::for_each(a.low, add);
+    std::ranges::for_each(a.high, add);
   }
-  if (panel.from_zero || axes.y.empty()) axes.y.add(0.0);
-  double span = axes.y.to - axes.y.from;
-  if (!(span > 1e-12 * std::max(std::abs(axes.y.to), std::abs(axes.y.from)))) {
-    span = axes.y.to != 0.0 ? std::abs(axes.y.to) : 1.0;
-    axes.y.to += 0.5 * span;
-    if (!panel.from_zero) axes.y.from -= 0.5 * span;
+  if ((panel.from_zero && panel.y_scale == Scale::linear) || y.empty()) y.add(0.0);
+  double span = y.to - y.from;
+  if (!(span > 1e-12 * std::max(std::abs(y.to), std::abs(y.from)))) {
+    span = y.to != 0.0 ? std::abs(y.to) : 1.0;
+    y.to += 0.5 * span;
+    if (!panel.from_zero) y.from -= 0.5 * span;
   }
-  axes.y.to += 0.06 * span;
-  if (!(panel.from_zero && axes.y.from == 0.0)) axes.y.from -= 0.06 * span;
+  y.to += 0.06 * span;
+  if (!(panel.from_zero && y.from == 0.0)) y.from -= 0.06 * span;
+  if (panel.y_scale == Scale::logarithmic) y = {std::pow(10.0, y.from), std::pow(10.0, y.to)};
+  if (panel.y_scale == Scale::symmetric) y = {unscaled_symmetric(y.from), unscaled_symmetric(y.to)};
+  return {panel.y_scale, y, top + height, top};
 }
 
 void draw_lanes(Svg& svg, const Panel& panel, const Axes& axes, std::size_t shown) {
@@ -204,45 +214,55 @@ void draw_lanes(Svg& svg, const Panel& panel, const Axes& axes, std::size_t show
   }
 }
 
+// Above the line; below it where the top of the panel is too near.
+double label_y(const Axes& axes, double value) {
+  const double y = axes.y.page(value);
+  return y - axes.top < 16.0 ? y + 13.0 : y - 4.0;
+}
+
 void draw_panel(Svg& svg, const Panel& panel, Axes axes, std::size_t points, std::size_t lanes) {
   const bool has_lanes = !panel.lanes.empty();
+  double y_label_x = 14.0;
   for (const Bands& bands : panel.bands) {
     for (const auto& [a, b] : page_intervals(bands.intervals, axes)) {
       svg.rect(a, axes.top, std::max(b - a, 0.6), axes.height, bands.colour);
     }
   }
-  for (const double tick : nice_ticks(axes.x.from, axes.x.to, 10)) {
-    svg.line(axes.px(tick), axes.top, axes.px(tick), axes.top + axes.height, "#dddddd",
+  for (const auto& [a, b] : page_intervals(axes.x.squeezed(), axes))
+    svg.rect(a, axes.top, b - a, axes.height, kSqueezedColour);
+  for (const double tick : axes.x.ticks(kTicks)) {
+    svg.line(axes.x.page(tick), axes.top, axes.x.page(tick), axes.top + axes.height, "#dddddd",
              "stroke-width=\"0.6\"");
   }
   if (has_lanes) {
     draw_lanes(svg, panel, axes, lanes);
   } else {
-    choose_y(panel, axes);
-    const std::vector<double> ticks =
-        nice_ticks(axes.y.from, axes.y.to, std::clamp(static_cast<int>(axes.height / 36.0), 3, 10));
-    const double step = ticks.size() > 1 ? ticks[1] - ticks[0] : 0.0;
-    for (const double tick : ticks) {
-      svg.line(axes.left, axes.py(tick), axes.left + axes.width, axes.py(tick), "#dddddd",
-               "stroke-width=\"0.6\"");
-      svg.text(axes.left - 8.0, axes.py(tick) + 4.0, tick_text(tick, step),
-               "class=\"t\" text-anchor=\"end\"");
+    axes.y = choose_y(panel, axes.top, axes.height);
+    const std::vector<double> ticks = axes.y.ticks(std::clamp(static_cast<int>(axes.height / 32.0), 3, 10));
+    const std::vector<std::string> texts = tick_texts(ticks, panel.y_scale, panel.y_unit);
+    std::size_t longest = 1;
+    for (std::size_t n = 0; n < ticks.size(); ++n) {
+      const double y = axes.y.page(ticks[n]);
+      svg.line(axes.left, y, axes.left + axes.width, y, "#dddddd", "stroke-width=\"0.6\"");
+      svg.text(axes.left - kTickGap, y + 4.0, texts[n], "class=\"t\" text-anchor=\"end\"");
+      longest = std::max(longest, letters(texts[n]));
     }
+    y_label_x = std::max(axes.left - kTickGap - letter * static_cast<double>(longest) - 10.0, 14.0);
     svg.body += "<g clip-path=\"url(#" + std::string("c") + fixed(axes.top) + ")\">\n";
     for (const Area& area : panel.areas) draw_area(svg, area, axes, points);
-    if (axes.y.from < 0.0 && axes.y.to > 0.0) {
-      svg.line(axes.left, axes.py(0.0), axes.left + axes.width, axes.py(0.0), "#888888");
+    if (axes.y.values().from < 0.0 && axes.y.values().to > 0.0) {
+      svg.line(axes.left, axes.y.page(0.0), axes.left + axes.width, axes.y.page(0.0), "#888888");
     }
     for (const ReferenceLine& line : panel.lines) {
       if (!plottable(line.y)) continue;
-      svg.line(axes.left, axes.py(line.y), axes.left + axes.width, axes.py(line.y), line.colour,
+      svg.line(axes.left, axes.y.page(line.y), axes.left + axes.width, axes.y.page(line.y), line.colour,
                "stroke-dasharray=\"3 3\"");
     }
     for (const Series& series : panel.series) draw_series(svg, series, axes, points);
     svg.body += "</g>\n";
     for (const ReferenceLine& line : panel.lines) {
       if (!plottable(line.y)) continue;
-      svg.text(axes.left + axes.width - 6.0, axes.py(line.y) - 4.0, line.label,
+      svg.text(axes.left + axes.width - 6.0, label_y(axes, line.y), line.label,
                "class=\"t p h\" text-anchor=\"end\"");
     }
     const bool nothing = std::ranges::none_of(
@@ -251,19 +271,22 @@ void draw_panel(Svg& svg, const Panel& panel, Axes axes, std::size_t points, std
       svg.text(axes.left + 0.5 * axes.width, axes.top + 0.5 * axes.height, "no finite values",
                "class=\"t p\" text-anchor=\"middle\"");
     }
-    svg.body += "<text transform=\"translate(18 " + fixed(axes.top + 0.5 * axes.height) +
-                ") rotate(-90)\" text-anchor=\"middle\" class=\"t\">" + escaped(panel.y_label) + "</text>\n";
+    svg.body += "<text transform=\"translate(" + fixed(y_label_x) + " " +
+                fixed(axes.top + 0.5 * axes.height) + ") rotate(-90)\" text-anchor=\"middle\" class=\"t\">" +
+                escaped(panel.y_label) + "</text>\n";
   }
   svg.body += "<rect x=\"" + fixed(axes.left) + "\" y=\"" + fixed(axes.top) + "\" width=\"" +
               fixed(axes.width) + "\" height=\"" + fixed(axes.height) +
               "\" fill=\"none\" stroke=\"#555555\"/>\n";
 }
 
-Range x_range(const PanelGroup& group) {
-  Range range;
+ValueRange x_range(const PanelGroup& group) {
+  ValueRange range;
   for (const Panel& panel : group.panels) {
     for (const Series& s : panel.series) {
-      for (const double v : s.x) range.add(v);
+      for (const double v : s.x) {
+        if (group.x_scale != Scale::logarithmic || v > 0.0) range.add(v);
+      }
     }
     for (const Area& a : panel.areas) {
       for (const double v : a.x) range.add(v);
@@ -275,13 +298,35 @@ Range x_range(const PanelGroup& group) {
       }
     }
   }
-  if (range.empty()) range = {0.0, 1.0};
+  if (range.empty()) range = {1.0, 2.0};
   if (!(range.to - range.from > 1e-12 * std::max(std::abs(range.to), std::abs(range.from)))) {
     const double half = range.to != 0.0 ? 0.5 * std::abs(range.to) : 0.5;
     range.from -= half;
     range.to += half;
   }
   return range;
+}
+
+// The texts below a group: numbers, and the length of each squeezed interval.
+void draw_x_ticks(Svg& svg, const PanelGroup& group, const Axis& x, double y) {
+  const std::vector<double> ticks = x.ticks(kTicks);
+  const std::vector<std::string> texts = tick_texts(ticks, group.x_scale, "");
+  Intervals taken;  // on the page
+  for (const auto& [from, to] : x.squeezed()) {
+    const double middle = 0.5 * (x.page(from) + x.page(to));
+    const std::string words = "+" + tick_text(to - from, 0.1);
+    const double half = 0.5 * letter * static_cast<double>(letters(words)) + 6.0;
+    svg.text(middle, y, words, "class=\"t p\" text-anchor=\"middle\"");
+    taken.emplace_back(middle - half, middle + half);
+  }
+  for (std::size_t n = 0; n < ticks.size(); ++n) {
+    const double at = x.page(ticks[n]);
+    const double half = 0.5 * letter * static_cast<double>(letters(texts[n]));
+    const bool free = std::ranges::none_of(
+        taken, [&](const auto& t) { return at + half > t.first && at - half < t.second; });
+    if (free) svg.text(at, y, texts[n], "class=\"t\" text-anchor=\"middle\"");
+    if (free) taken.emplace_back(at - half, at + half + 4.0);
+  }
 }
 
 }  // namespace
@@ -313,13 +358,23 @@ std::string to_svg(const Figure& figure) {
   }
   y += 18.0;
   for (const PanelGroup& group : figure.groups) {
-    const Range x = x_range(group);
+    const Axis x(group.x_scale, x_range(group), left, left + plot_width, group.squeezed);
     for (const Panel& panel : group.panels) {
+      const std::vector<LegendEntry> legend = legend_of(panel);
+      double legend_left = left;
       if (!panel.title.empty()) {
         svg.text(left, y + 12.0, panel.title, "class=\"h2\"");
-        y += 20.0;
+        // The legend stands beside the title if there is room, and the title directly above its axes.
+        const double beside = left + kTitleLetter * static_cast<double>(letters(panel.title)) + 24.0;
+        double needed = 0.0;
+        for (const LegendEntry& e : legend) needed += entry_width(e) + kEntryGap;
+        if (!legend.empty() && beside + needed <= left + plot_width) {
+          legend_left = beside;
+        } else {
+          y += legend.empty() ? 19.0 : 18.0;
+        }
       }
-      y += draw_legend(&svg, legend_of(panel), left, y, plot_width);
+      y += draw_legend(svg, legend, legend_left, y, left + plot_width - legend_left);
       const std::size_t lanes = std::min(panel.lanes.size(), most_lanes);
       const double height =
           panel.lanes.empty() ? std::max(panel.height, 40.0) : lane_height * static_cast<double>(lanes);
@@ -327,19 +382,18 @@ std::string to_svg(const Figure& figure) {
                "\" width=\"" + fixed(plot_width) + "\" height=\"" + fixed(height) + "\"/></clipPath>\n";
       draw_panel(svg, panel, {left, y, plot_width, height, x, {}}, points, lanes);
       y += height + 14.0;
+      std::string note = panel.note;
       if (panel.lanes.size() > lanes) {
-        svg.text(left, y + 2.0, "and " + std::to_string(panel.lanes.size() - lanes) + " more, not shown",
-                 "class=\"t p\"");
-        y += 14.0;
+        const std::string more = "and " + std::to_string(panel.lanes.size() - lanes) + " more, not shown";
+        note = note.empty() ? more : more + "; " + note;
+      }
+      if (!note.empty()) {
+        svg.text(left, y + 2.0, note, "class=\"t p\"");
+        y += 18.0;
       }
     }
-    const std::vector<double> ticks = nice_ticks(x.from, x.to, 10);
-    const double step = ticks.size() > 1 ? ticks[1] - ticks[0] : 0.0;
-    for (const double tick : ticks) {
-      svg.text(left + (tick - x.from) / (x.to - x.from) * plot_width, y + 2.0, tick_text(tick, step),
-               "class=\"t\" text-anchor=\"middle\"");
-    }
-    y += 20.0;
+    draw_x_ticks(svg, group, x, y + 2.0);
+    y += 18.0;
     svg.text(left + 0.5 * plot_width, y, group.x_label, "class=\"t\" text-anchor=\"middle\"");
     y += 26.0;
   }
@@ -362,42 +416,6 @@ std::string series_colour(std::size_t index) {
   static constexpr std::array<const char*, 7> colours{"#0072B2", "#D55E00", "#009E73", "#CC79A7",
                                                       "#E69F00", "#56B4E9", "#000000"};
   return colours[index % colours.size()];
-}
-
-std::vector<double> nice_ticks(double from, double to, int wanted) {
-  std::vector<double> ticks;
-  if (!plottable(from) || !plottable(to) || !(to > from) || wanted < 1) return ticks;
-  const double rough = (to - from) / wanted;
-  const double power = std::pow(10.0, std::floor(std::log10(rough)));
-  double step = 10.0 * power;
-  for (const double nice : {5.0, 2.0, 1.0}) {
-    if (nice * power >= rough * (1.0 - 1e-9)) step = nice * power;
-  }
-  const double first = std::ceil(from / step - 1e-9);
-  for (int i = 0; i < 64; ++i) {
-    const double tick = (first + i) * step;
-    if (tick > to + 1e-9 * step) break;
-    ticks.push_back(tick);
-  }
-  return ticks;
-}
-
-std::string tick_text(double value, double step) {
-  std::string text;
-  const double size = std::max(std::abs(value), std::abs(step));
-  if (std::abs(value) < 1e-9 * std::abs(step)) return "0";
-  if (size >= 1e6 || (step != 0.0 && std::abs(step) < 1e-5)) {
-    text = with_digits(value, 4);
-  } else {
-    int decimals = step != 0.0 ? 0 : 3;
-    for (double scaled = std::abs(step);
-         decimals < 6 && std::abs(scaled - std::round(scaled)) > 1e-6 * scaled;) {
-      scaled *= 10.0;
-      ++decimals;
-    }
-    text = with_decimals(value, decimals);
-  }
-  return text.starts_with("-") ? "−" + text.substr(1) : text;
 }
 
 }  // namespace hybrid

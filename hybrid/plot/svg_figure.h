@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "hybrid/plot/axis.h"
+
 namespace hybrid {
 
 struct Series {
@@ -29,7 +31,7 @@ struct Area {
 // Shaded stretches of the x axis.
 struct Bands {
   std::string name;
-  std::vector<std::pair<double, double>> intervals;  // from, to; in order
+  Intervals intervals;
   std::string colour = "#eeeeee";
 };
 
@@ -42,25 +44,30 @@ struct ReferenceLine {
 // A row of bars, with its name on the left and a note on the right.
 struct Lane {
   std::string name, note;
-  std::vector<std::pair<double, double>> intervals;  // from, to; in order
+  Intervals intervals;
   std::string colour = "#000000";
 };
 
 struct Panel {
   std::string title;
-  std::string y_label;     // with its unit
+  std::string y_label;     // with its unit, if `y_unit` is empty
   double height = 200.0;   // (pixels); ignored with lanes
-  bool from_zero = false;  // the y axis contains 0
+  bool from_zero = false;  // the y axis contains 0; of a linear scale
+  Scale y_scale = Scale::linear;
+  std::string y_unit;  // not empty: each tick has its unit, with a prefix ("10 µs")
   std::vector<Bands> bands;
   std::vector<Area> areas;
   std::vector<Series> series;
   std::vector<ReferenceLine> lines;
   std::vector<Lane> lanes;  // if not empty, only bands are drawn besides
+  std::string note;         // a line below the panel
 };
 
 struct PanelGroup {
   std::string x_label;  // with its unit
   std::vector<Panel> panels;
+  Scale x_scale = Scale::linear;
+  Intervals squeezed;  // of a linear x axis: drawn short, on grey, with their length below
 };
 
 struct Figure {
@@ -77,11 +84,5 @@ std::string to_svg(const Figure& figure);
 
 // Throws std::runtime_error: file not writable, disk full.
 void save_svg(const std::filesystem::path& file, const Figure& figure);
-
-// Round numbers at a pitch of 1, 2 or 5 · 10^n within [from, to], about `wanted` of them and at most 64.
-std::vector<double> nice_ticks(double from, double to, int wanted);
-
-// Text of a tick, with as many decimals as the pitch needs.
-std::string tick_text(double value, double step);
 
 }  // namespace hybrid

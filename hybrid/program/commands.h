@@ -61,6 +61,7 @@ struct CompareCommand {
   std::string object;        // empty: the first suitable object
   MeasuredOptions measured;  // empty file: no measurement
   std::filesystem::path plot;
+  bool classic = false;  // the plot also has the thesis's algorithm
   std::string json;
 };
 int compare(const CompareCommand& command);

@@ -6,7 +6,7 @@
 
 #include "hybrid/base/file_ending.h"
 #include "hybrid/compare/compare.h"
-#include "hybrid/plot/session_plot.h"
+#include "hybrid/plot/compare_plot.h"
 #include "hybrid/program/commands.h"
 #include "hybrid/program/outputs.h"
 #include "hybrid/session/report.h"
@@ -54,23 +54,30 @@ void print_models(std::FILE* words, const Comparison& comparison) {
   }
 }
 
-void save_comparison_plot(const std::filesystem::path& file, const Scene& scene,
-                          const Comparison& comparison) {
+void save_comparison_plot(const std::filesystem::path& file, const CompareCommand& command,
+                          const Scene& scene, const Comparison& comparison) {
   std::vector<ComparedModel> models;
-  for (const ModelResult& m : comparison.models) models.push_back({m.name, m.rows, m.depth_m});
-  save_compare_plot(
-      file, models, {},
-      fmt::format("{}: {}", scene.title.empty() ? scene.file.stem().string() : scene.title,
-                  comparison.object),
-      {.reference = comparison.reference, .jnd_share = kJndShare, .jnd_floor_N = comparison.jnd_floor_N});
+  std::size_t reference = 0;
+  for (std::size_t m = 0; m < comparison.models.size(); ++m) {
+    const ModelResult& model = comparison.models[m];
+    const bool classic = model.name == kThesisModel;
+    if (classic && !command.classic) continue;
+    if (m == comparison.reference) reference = models.size();
+    models.push_back({model.name, model.rows, model.depth_m, classic});
+  }
+  save_compare_plot(file, models, {},
+                    fmt::format("{}: {}", scene.title.empty() ? scene.file.stem().string() : scene.title,
+                                comparison.object),
+                    {.reference = reference, .jnd_share = kJndShare, .jnd_floor_N = comparison.jnd_floor_N});
 }
 
 // All files come before the words, which a reader may cut short.
 void write_files(const CompareCommand& command, const Scene& scene, const Comparison& comparison,
                  const nlohmann::ordered_json& report, Outputs& outputs) {
   outputs.write_json(command.json, report);
-  outputs.write("plot", command.plot,
-                [&](const std::filesystem::path& file) { save_comparison_plot(file, scene, comparison); });
+  outputs.write("plot", command.plot, [&](const std::filesystem::path& file) {
+    save_comparison_plot(file, command, scene, comparison);
+  });
 }
 
 int compare_with_measured(const CompareCommand& command, const Scene& scene, Outputs& outputs) {

@@ -171,7 +171,9 @@ void add_compare(CLI::App& app, int& status) {
       ->needs(measured);
   sub->add_flag("--on-object", file.on_object, "of --measured: its forces are those on the object")
       ->needs(measured);
-  sub->add_option("--plot", c->plot, "write force over time and depth as SVG");
+  auto* plot = sub->add_option("--plot", c->plot, "write force over time and depth as SVG");
+  sub->add_flag("--classic", c->classic, "of --plot: draw the thesis's algorithm too, below the others")
+      ->needs(plot);
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
   sub->callback([c, &status] { status = hybrid::compare(*c); });
 }

@@ -52,17 +52,6 @@ void ask_outputs(const RunCommand& command, const Scene& scene, Outputs& outputs
   outputs.ask_json(command.json);
 }
 
-void save_plot_of(const std::filesystem::path& file, const BuiltScene& built, const SessionResult& result,
-                  const std::string& title) {
-  std::vector<PlottedObject> objects;
-  for (std::size_t o = 0; o < built.world->object_count(); ++o) {
-    const std::size_t rigid = built.world->rigid.size();
-    objects.push_back({o < rigid ? built.world->rigid[o].name : built.world->soft[o - rigid].name, o >= rigid,
-                       result.object_force_N[o]});
-  }
-  save_session_plot(file, result.rows, objects, title, result.clearance);
-}
-
 }  // namespace
 
 Progress progress_on_terminal() {
@@ -148,7 +137,11 @@ int run(const RunCommand& command) {
                           result.recording});
   });
   outputs.write_json(command.json, command.json.empty() ? nullptr : run_report(scene, built, result));
-  outputs.write("plot", command.plot, [&](const Path& file) { save_plot_of(file, built, result, title); });
+  outputs.write("plot", command.plot, [&](const Path& file) {
+    const auto objects =
+        plotted_objects(drawn_scene(scene, built, title), result.rows, result.object_force_N);
+    save_session_plot(file, result.rows, objects, title, {.near = result.clearance, .period_s = result.dt_s});
+  });
   outputs.write("surface", command.save_surface, [&](const Path& file) { save_surfaces(file, built); });
   outputs.attempt([&] {
     if (command.save_volume.empty()) return;

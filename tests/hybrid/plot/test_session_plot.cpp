@@ -6,133 +6,24 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <limits>
-#include <sstream>
 #include <string>
+#include <vector>
 
+#include "hybrid/plot/contacts.h"
 #include "hybrid/plot/downsample.h"
-#include "hybrid/plot/svg_figure.h"
+#include "tests/hybrid/plot/svg_fixture.h"
 
 namespace {
 
 using hybrid::PlotPoint;
+using tests::contents;
+using tests::count;
+using tests::expect_well_formed;
+using tests::Folder;
+using tests::row;
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-
-class Folder {  // removed with its content
- public:
-  Folder() {
-    const auto* test = testing::UnitTest::GetInstance()->current_test_info();
-    path_ = std::filesystem::temp_directory_path() /
-            ("hybrid-" + std::string(test->test_suite_name()) + "-" + test->name() + "-" +
-             std::to_string(std::hash<const void*>{}(this)));
-    std::filesystem::create_directories(path_);
-  }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-  Folder(Folder&&) = delete;
-  Folder& operator=(Folder&&) = delete;
-  ~Folder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  [[nodiscard]] std::filesystem::path file(const char* name) const { return path_ / name; }
-
- private:
-  std::filesystem::path path_;
-};
-
-std::string contents(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  std::ostringstream text;
-  text << in.rdbuf();
-  return text.str();
-}
-
-std::size_t count(const std::string& text, const std::string& what) {
-  std::size_t n = 0;
-  for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + what.size())) ++n;
-  return n;
-}
-
-// Tags open and close in order, attributes are quoted, entities are known: enough XML to catch the errors of
-// a hand-written writer.
-void expect_well_formed(const std::string& xml) {
-  std::vector<std::string> open;
-  std::size_t i = 0;
-  while (i < xml.size()) {
-    if (xml[i] == '&') {
-      const std::size_t end = xml.find(';', i);
-      ASSERT_NE(end, std::string::npos);
-      const std::string entity = xml.substr(i + 1, end - i - 1);
-      EXPECT_TRUE(entity == "amp" || entity == "lt" || entity == "gt" || entity == "quot" || entity == "apos")
-          << entity;
-      i = end + 1;
-    } else if (xml[i] == '<') {
-      std::size_t end = i + 1;
-      bool quoted = false;
-      while (end < xml.size() && (quoted || xml[end] != '>')) {
-        if (xml[end] == '"') quoted = !quoted;
-        EXPECT_FALSE(xml[end] == '<') << "at " << end;
-        ++end;
-      }
-      ASSERT_LT(end, xml.size());
-      const std::string tag = xml.substr(i + 1, end - i - 1);
-      const std::string name = tag.substr(0, tag.find_first_of(" /", 1));
-      if (tag[0] == '/') {
-        ASSERT_FALSE(open.empty());
-        EXPECT_EQ("/" + open.back(), tag);
-        open.pop_back();
-      } else if (tag[0] != '?' && tag.back() != '/') {
-        open.push_back(name);
-      }
-      i = end + 1;
-    } else {
-      EXPECT_GE(static_cast<unsigned char>(xml[i]), xml[i] == '\n' ? 0x0A : 0x20);
-      ++i;
-    }
-  }
-  EXPECT_TRUE(open.empty());
-}
-
-hybrid::TraceRow row(double t, double force, std::uint32_t contacts = 0) {
-  hybrid::TraceRow made;
-  made.t_s = t;
-  made.force_N = {0.0, 0.0, force};
-  made.contacts = contacts;
-  return made;
-}
-
-TEST(NiceTicks, AreRoundEvenlySpacedAndInside) {
-  for (const double size : {1e-9, 3.7e-4, 1.0, 42.0, 9.99e8}) {
-    for (const double from : {-0.3 * size, 0.0, 17.0 * size}) {
-      const auto ticks = hybrid::nice_ticks(from, from + size, 8);
-      ASSERT_GE(ticks.size(), 3U) << size;
-      ASSERT_LE(ticks.size(), 12U);
-      const double step = ticks[1] - ticks[0];
-      const double mantissa = step / std::pow(10.0, std::floor(std::log10(step * (1.0 + 1e-9))));
-      EXPECT_TRUE(std::abs(mantissa - 1.0) < 1e-6 || std::abs(mantissa - 2.0) < 1e-6 ||
-                  std::abs(mantissa - 5.0) < 1e-6)
-          << mantissa;
-      for (std::size_t i = 0; i < ticks.size(); ++i) {
-        EXPECT_GE(ticks[i], from - 1e-6 * step);
-        EXPECT_LE(ticks[i], from + size + 1e-6 * step);
-        EXPECT_NEAR(ticks[i] / step, std::round(ticks[i] / step), 1e-6);
-      }
-    }
-  }
-  EXPECT_TRUE(hybrid::nice_ticks(1.0, 1.0, 5).empty());
-  EXPECT_TRUE(hybrid::nice_ticks(nan, 1.0, 5).empty());
-}
-
-TEST(TickText, HasTheDecimalsItsStepNeeds) {
-  EXPECT_EQ(hybrid::tick_text(0.5, 0.5), "0.5");
-  EXPECT_EQ(hybrid::tick_text(2.0, 0.25), "2.00");
-  EXPECT_EQ(hybrid::tick_text(40.0, 20.0), "40");
-  EXPECT_EQ(hybrid::tick_text(0.1 * 3 - 0.3, 0.1), "0");
-  EXPECT_EQ(hybrid::tick_text(-2.0, 1.0), "−2");
-}
 
 TEST(Decimate, KeepsEveryColumnsExtremesAndEnds) {
   std::vector<double> x;
@@ -261,18 +152,144 @@ TEST(SessionPlot, DrawsEmptyAndNonFiniteTraces) {
   EXPECT_NE(svg.find("without a finite force"), std::string::npos);
 }
 
-TEST(SessionPlot, ContactLanesLastAsLongAsContact) {
-  const Folder folder;
+// Three contacts: with bone and tissue at 1 s, with tissue at 5 s, with the 40th object at 9 s; 10 s in all.
+struct ThreeContacts {
   std::vector<hybrid::TraceRow> rows;
-  // Object 1 touches from 0.25 to 0.5 s and from 0.75 to the end at 1 s.
-  for (int i = 0; i <= 1000; ++i) {
-    rows.push_back(row(i * 1e-3, 1.0, (i >= 250 && i < 500) || i >= 750 ? 2U : 0U));
+  std::vector<hybrid::PlottedObject> objects{{"bone", false, {}}, {"rib", false, {}}, {"tissue", true, {}}};
+
+  ThreeContacts() {
+    for (int n = 3; n < 39; ++n) objects.push_back({"far " + std::to_string(n), false, {}});
+    objects.push_back({"fortieth", false, {}});
+    for (auto& object : objects) object.force_N.assign(10'001, 0.0);
+    for (int i = 0; i <= 10'000; ++i) {
+      const bool first = i >= 1000 && i < 1500, second = i >= 5000 && i < 5500, third = i >= 9000 && i < 9500;
+      const double into = (i % 4000 - 1000) * 1e-3;
+      rows.push_back(row(i * 1e-3, first || second || third ? 1.0 : 0.0,
+                         (first ? 1U : 0U) | (first || second ? 4U : 0U) | (third ? 1U << 31U : 0U)));
+      if (first || second || third) rows.back().device_m.z = -0.01 * into;
+      rows.back().tick_us = 20.0;
+      const auto at = static_cast<std::size_t>(i);
+      objects[0].force_N[at] = first ? 0.1 : 0.0;
+      objects[2].force_N[at] = first || second ? 0.9 : 0.0;
+      objects[39].force_N[at] = third ? 1.0 : 0.0;
+    }
   }
-  const std::vector<hybrid::PlottedObject> objects{{"a", false, {}}, {"b", true, {}}};
-  hybrid::save_session_plot(folder.file("a.svg"), rows, objects, "lanes");
-  const std::string svg = contents(folder.file("a.svg"));
-  EXPECT_NE(svg.find("rigid, 0.000 s"), std::string::npos);
-  EXPECT_NE(svg.find("soft, 0.500 s"), std::string::npos);
+  [[nodiscard]] std::string svg() const {
+    const Folder folder;
+    hybrid::save_session_plot(folder.file("a.svg"), rows, objects, "three");
+    return contents(folder.file("a.svg"));
+  }
+};
+
+TEST(SessionPlot, NamesWhatWasTouchedTheMostFeltFirstAndCountsTheOthers) {
+  const std::string svg = ThreeContacts().svg();
+  expect_well_formed(svg);
+  const std::size_t lanes = svg.find("Touched, the most felt first");
+  ASSERT_NE(lanes, std::string::npos);
+  const std::size_t tissue = svg.find(">tissue<", lanes), fortieth = svg.find(">fortieth<", lanes),
+                    bone = svg.find(">bone<", lanes);
+  ASSERT_NE(bone, std::string::npos);
+  EXPECT_LT(tissue, fortieth);
+  EXPECT_LT(fortieth, bone);
+  EXPECT_EQ(count(svg, "rib"), 0U);
+  EXPECT_EQ(count(svg, "far "), 0U);
+  EXPECT_EQ(count(svg, "37 objects were not touched"), 1U);
+  EXPECT_NE(svg.find("soft, 1.000 s"), std::string::npos);
+  EXPECT_NE(svg.find("rigid, 0.500 s"), std::string::npos);
+}
+
+TEST(SessionPlot, CountsASingleUntouchedObjectAndNone) {
+  ThreeContacts session;
+  session.objects.resize(3);
+  session.rows.resize(6000);
+  for (auto& object : session.objects) object.force_N.resize(6000);
+  EXPECT_EQ(count(session.svg(), "1 object was not touched"), 1U);
+  session.objects.erase(session.objects.begin() + 1);
+  session.objects.insert(session.objects.begin() + 1, {"rib", false, session.objects[1].force_N});
+  for (auto& r : session.rows) r.contacts |= r.contacts != 0 ? 2U : 0U;
+  EXPECT_EQ(count(session.svg(), "not touched"), 0U);
+}
+
+TEST(SessionPlot, NamesTheOrganThatIsTouched) {
+  ThreeContacts session;
+  session.objects[2].parts = {"spleen", "liver", "fat"};
+  session.objects[2].touched_part.assign(session.rows.size(), 1);
+  const std::string svg = session.svg();
+  EXPECT_GE(count(svg, "liver"), 1U);
+  EXPECT_EQ(count(svg, "spleen"), 0U);
+  EXPECT_EQ(count(svg, ">tissue<"), 0U);
+}
+
+TEST(SessionPlot, DrawsOneLineOverDepthForEachContact) {
+  const std::string svg = ThreeContacts().svg();
+  EXPECT_EQ(count(svg, ">1.00 s: tissue<"), 1U);
+  EXPECT_EQ(count(svg, ">5.00 s: tissue<"), 1U);
+  EXPECT_EQ(count(svg, ">9.00 s: fortieth<"), 1U);
+}
+
+TEST(SessionPlot, SqueezesTheAirAndSaysSo) {
+  ThreeContacts session;
+  const std::string svg = session.svg();
+  // From 1.5 to 5 s and from 5.5 to 9 s, less 0.3 s on each side.
+  EXPECT_EQ(count(svg, ">+2.9<"), 2U);
+  EXPECT_EQ(count(svg, "long times in the air"), 1U);
+  for (auto& r : session.rows) r.contacts = 4U;
+  EXPECT_EQ(count(session.svg(), "long times in the air"), 0U);
+}
+
+TEST(SessionPlot, ShowsTickTimesBesideTheNextTick) {
+  ThreeContacts session;
+  const std::string svg = session.svg();
+  EXPECT_EQ(count(svg, ">1 ms: the next tick begins<"), 1U);
+  EXPECT_EQ(count(svg, ">100 µs<"), 1U);
+  for (auto& r : session.rows) r.tick_us = 0.0;
+  EXPECT_EQ(count(session.svg(), "the next tick begins"), 0U) << "nothing was timed";
+}
+
+TEST(Contacts, AMomentInTheAirDoesNotEndOne) {
+  std::vector<hybrid::TraceRow> rows;
+  for (int i = 0; i < 1000; ++i) {
+    rows.push_back(row(i * 1e-3, i == 300 ? 3.0 : 1.0, i >= 200 && i < 700 && i % 100 >= 20 ? 1U : 0U));
+    rows.back().device_m.z = -i * 1e-5;
+  }
+  const auto contacts = hybrid::contacts_of(rows, hybrid::contact_intervals(rows, ~0U));
+  ASSERT_EQ(contacts.size(), 1U);
+  EXPECT_NEAR(contacts[0].from_s, 0.22, 1e-12);
+  EXPECT_NEAR(contacts[0].to_s, 0.7, 1e-12);
+  EXPECT_EQ(contacts[0].most_N, 1.0) << "the tick of 3 N is not in contact";
+  EXPECT_NEAR(contacts[0].depth_m(rows[420].device_m), 2e-3, 1e-9);
+}
+
+TEST(Contacts, TheMostFeltStayInOrderOfTime) {
+  std::vector<hybrid::Contact> contacts;
+  for (const double force : {1.0, 5.0, 2.0, 4.0})
+    contacts.push_back({.from_s = static_cast<double>(contacts.size()), .most_N = force});
+  const auto kept = hybrid::most_felt(contacts, 2);
+  ASSERT_EQ(kept.size(), 2U);
+  EXPECT_EQ(kept[0].most_N, 5.0);
+  EXPECT_EQ(kept[1].most_N, 4.0);
+}
+
+TEST(PlottedObjects, HaveTheMaterialBeneathTheTool) {
+  hybrid::DrawnScene scene;
+  scene.objects.push_back({"table", false, {}});
+  scene.objects.push_back({"body", true, {.vertices = {{-1, 0, 0}, {1, 0, 0}}, .triangles = {}}});
+  scene.objects.back().materials = {"fat", "liver"};
+  scene.objects.back().vertex_material = {0, 1};
+  scene.objects.push_back({"block", true, {}});
+  scene.objects.back().material = "gel";
+  std::vector<hybrid::TraceRow> rows(100);
+  for (std::size_t i = 40; i < 80; ++i) {
+    rows[i].contacts = 2U;
+    rows[i].proxy_m.x = i < 60 ? 0.4 : -0.4;
+  }
+  const auto objects = hybrid::plotted_objects(scene, rows, std::vector<std::vector<double>>(3));
+  ASSERT_EQ(objects.size(), 3U);
+  EXPECT_EQ(objects[2].name, "block (gel)");
+  ASSERT_EQ(objects[1].parts.size(), 2U);
+  EXPECT_EQ(objects[1].touched_part[45], 1);
+  EXPECT_EQ(objects[1].touched_part[75], 0);
+  EXPECT_GT(objects[1].touched_part[90], 1) << "nothing is touched";
 }
 
 TEST(SessionPlot, SaysWhenItCannotWrite) {
@@ -283,36 +300,6 @@ TEST(SessionPlot, SaysWhenItCannotWrite) {
     EXPECT_NE(std::string(error.what()).find("/nonexistent-folder/a.svg"), std::string::npos);
     EXPECT_NE(std::string(error.what()).find("folder that exists"), std::string::npos);
   }
-}
-
-// The samples of the difference panel are visible only in the figure. A constant difference must be a
-// straight line at the right height: half of the largest force there.
-TEST(ComparePlot, NamesEveryModelAndStaysSmall) {
-  const Folder folder;
-  std::vector<hybrid::ComparedModel> models(8);
-  for (std::size_t m = 0; m < models.size(); ++m) {
-    models[m].name = "model " + std::to_string(m);
-    for (int i = 0; i < 50'000; ++i) {
-      // Each model has its own rate.
-      hybrid::TraceRow r = row(i * 1e-3 * (1.0 + 0.1 * static_cast<double>(m)),
-                               1.0 + std::sin(i * 0.7 + static_cast<double>(m)), 1);
-      r.device_m.z = -5e-3 * std::sin(i * 1e-2);
-      models[m].rows.push_back(r);
-    }
-  }
-  const std::vector<hybrid::ReferenceCurve> curves{{"Hertz & co", {0.0, 1e-3, 2e-3}, {0.0, 1.0, 2.8}}};
-  hybrid::save_compare_plot(folder.file("a.svg"), models, curves, "many");
-  const std::string svg = contents(folder.file("a.svg"));
-  expect_well_formed(svg);
-  EXPECT_LT(svg.size(), 300'000U);
-  for (const auto& model : models) EXPECT_GE(count(svg, model.name), 2U) << model.name;
-  EXPECT_NE(svg.find("Hertz &amp; co"), std::string::npos);
-  EXPECT_NE(svg.find("±1 JND"), std::string::npos);
-  EXPECT_NE(svg.find("depth of the device (mm)"), std::string::npos);
-}
-
-TEST(ComparePlot, RefusesAReferenceThatIsNoModel) {
-  EXPECT_THROW(hybrid::save_compare_plot("/tmp/none.svg", {}, {}, "none"), std::invalid_argument);
 }
 
 }  // namespace

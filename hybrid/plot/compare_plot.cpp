@@ -1,0 +1,286 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/plot/compare_plot.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <numbers>
+#include <stdexcept>
+
+#include "hybrid/base/number_text.h"
+#include "hybrid/plot/contacts.h"
+#include "hybrid/plot/svg_figure.h"
+
+namespace hybrid {
+namespace {
+
+constexpr double kGapInLine = std::numeric_limits<double>::quiet_NaN();
+constexpr std::size_t kMostDepthPanels = 3;
+constexpr std::size_t kSolidColours = 7;  // of series_colour(); later lines are dashed
+constexpr double kTurned_deg = 15.0;      // angles are drawn if some force turns further than this
+constexpr double kReversedShare = 0.1;    // of a contact's largest force: a pull that is drawn with its sign
+constexpr double kShownOutside_m = 1e-3;  // how far outside the object force over depth begins
+constexpr const char* kReferenceColour = "#8a8a8a";
+constexpr const char* kNotFeltColour = "#dfe8f2";
+
+// y at each of `at`, linear between samples; a gap outside the range of x and beside samples that are not
+// finite.
+std::vector<double> sampled(std::span<const double> x, std::span<const double> y,
+                            std::span<const double> at) {
+  std::vector<double> out;
+  out.reserve(at.size());
+  std::size_t i = 0;
+  for (const double t : at) {
+    while (i + 1 < x.size() && x[i + 1] < t) ++i;
+    if (x.empty() || !(t >= x.front()) || !(t <= x.back())) {
+      out.push_back(kGapInLine);
+    } else if (i + 1 >= x.size() || !(x[i + 1] > x[i])) {
+      out.push_back(y[i]);
+    } else {
+      const double share = std::clamp((t - x[i]) / (x[i + 1] - x[i]), 0.0, 1.0);
+      out.push_back(share == 0.0 ? y[i] : (share == 1.0 ? y[i + 1] : y[i] + share * (y[i + 1] - y[i])));
+    }
+  }
+  return out;
+}
+
+struct Course {
+  std::vector<double> t_s;
+  std::vector<glm::dvec3> force_N;
+};
+
+Course course_of(const ComparedModel& model) {
+  Course course;
+  for (const TraceRow& row : model.rows) {
+    course.t_s.push_back(row.t_s);
+    course.force_N.push_back(row.force_N);
+  }
+  return course;
+}
+
+// The model's force at the reference's times.
+std::vector<glm::dvec3> at_times(const Course& model, const std::vector<double>& t_s) {
+  std::vector<glm::dvec3> out(t_s.size());
+  std::vector<double> own(model.force_N.size());
+  for (glm::length_t axis = 0; axis < 3; ++axis) {
+    for (std::size_t i = 0; i < own.size(); ++i) own[i] = model.force_N[i][axis];
+    const std::vector<double> there = sampled(model.t_s, own, t_s);
+    for (std::size_t i = 0; i < out.size(); ++i) out[i][axis] = there[i];
+  }
+  return out;
+}
+
+// Difference of the vectors in JND; negative where the model's force is the smaller one.
+double signed_jnd(const glm::dvec3& force, const glm::dvec3& reference, const ComparePlotOptions& options) {
+  const double size = glm::length(reference);
+  const double jnd = glm::length(force - reference) / std::max(options.jnd_share * size, options.jnd_floor_N);
+  return glm::length(force) < size ? -jnd : jnd;
+}
+
+// Angle between two forces (degrees); a gap if either force is too small to have a direction.
+double angle_between(const glm::dvec3& a, const glm::dvec3& b, double floor_N) {
+  const double size = glm::length(a) * glm::length(b);
+  if (!(glm::length(a) > floor_N) || !(glm::length(b) > floor_N) || !std::isfinite(size)) return kGapInLine;
+  return std::acos(std::clamp(glm::dot(a, b) / size, -1.0, 1.0)) * 180.0 / std::numbers::pi;
+}
+
+class ComparePlot {
+ public:
+  ComparePlot(std::span<const ComparedModel> models, std::span<const ReferenceCurve> curves,
+              const ComparePlotOptions& options)
+      : models_(models), curves_(curves), options_(options), reference_(models[options.reference]) {
+    for (const ComparedModel& model : models) {
+      courses_.push_back(course_of(model));
+      if (model.apart) continue;
+      touched_ = merged(std::move(touched_), contact_intervals(model.rows, ~0U));
+      for (const double t : courses_.back().t_s) time_.add(t);
+    }
+    contacts_ = contacts_of(reference_.rows, touched_);
+    for (const ComparedModel& model : models) with_sign_ = with_sign_ || (!model.apart && reverses(model));
+  }
+
+  Figure draw(const std::string& title) const {
+    Figure figure;
+    figure.title = title;
+    figure.notes.push_back("Reference: " + reference_.name +
+                           ". One JND: " + with_digits(100.0 * options_.jnd_share, 3) + " %" +
+                           " of its force, at least " + with_digits(options_.jnd_floor_N, 3) + " N" + ".");
+    if (with_sign_) {
+      figure.notes.emplace_back(
+          "Some force turns round: drawn is the part along the reference's largest force of each contact; "
+          "below 0 it pulls the tool on.");
+    }
+    PanelGroup group;
+    group.x_label = "time (s)";
+    if (!time_.empty()) group.squeezed = long_in_the_air(touched_, time_.from, time_.to);
+    if (!group.squeezed.empty())
+      figure.notes.emplace_back("Grey: long times in the air, drawn short; below them their length (s).");
+    add_model(group, options_.reference);
+    for (std::size_t m = 0; m < models_.size(); ++m) {
+      if (m != options_.reference && !models_[m].apart) add_model(group, m);
+    }
+    Panel direction = direction_panel();
+    if (!direction.series.empty()) group.panels.push_back(std::move(direction));
+    figure.groups.push_back(std::move(group));
+    const std::vector<Contact> drawn = most_felt(contacts_, kMostDepthPanels);
+    for (const Contact& contact : drawn) figure.groups.push_back(depth_group(contact));
+    if (contacts_.size() > drawn.size()) {
+      figure.groups.back().panels.back().note =
+          std::to_string(contacts_.size() - drawn.size()) + " contacts that were felt less are not drawn";
+    }
+    for (std::size_t m = 0; m < models_.size(); ++m) {
+      if (!models_[m].apart || m == options_.reference) continue;
+      PanelGroup& apart = figure.groups.emplace_back();
+      apart.x_label = "time (s)";
+      add_model(apart, m);
+    }
+    return figure;
+  }
+
+ private:
+  const Contact* contact_at(double t_s) const {
+    const auto next = std::ranges::find_if(contacts_, [&](const Contact& c) { return t_s <= c.to_s; });
+    return next != contacts_.end() && t_s >= next->from_s ? &*next : nullptr;
+  }
+
+  // True if the model pushes against the direction of the reference's largest force in a contact.
+  bool reverses(const ComparedModel& model) const {
+    return std::ranges::any_of(model.rows, [&](const TraceRow& row) {
+      const Contact* const contact = contact_at(row.t_s);
+      return contact != nullptr && glm::dot(row.force_N, contact->into) > kReversedShare * contact->most_N;
+    });
+  }
+
+  double shown(double t_s, const glm::dvec3& force_N) const {
+    const Contact* const contact = with_sign_ ? contact_at(t_s) : nullptr;
+    return contact != nullptr ? -glm::dot(force_N, contact->into) : glm::length(force_N);
+  }
+
+  std::vector<double> shown(const Course& course) const {
+    std::vector<double> out;
+    for (std::size_t i = 0; i < course.t_s.size(); ++i)
+      out.push_back(shown(course.t_s[i], course.force_N[i]));
+    return out;
+  }
+
+  // Force over time; for all but the reference also its difference.
+  void add_model(PanelGroup& group, std::size_t m) const {
+    const ComparedModel& model = models_[m];
+    const Course& reference = courses_[options_.reference];
+    const bool is_reference = m == options_.reference;
+    Panel force;
+    force.title = model.name + (is_reference ? " (reference)" : "");
+    force.y_label = "force (N)";
+    force.height = 120.0;
+    force.from_zero = true;
+    if (!is_reference)
+      force.series.push_back({reference_.name, reference.t_s, shown(reference), kReferenceColour, 1.2});
+    force.series.push_back({is_reference ? "" : model.name, courses_[m].t_s, shown(courses_[m]),
+                            series_colour(m), 1.8, m >= kSolidColours});
+    group.panels.push_back(std::move(force));
+    if (is_reference) return;
+    Panel difference;
+    difference.title = model.name + ": difference from " + reference_.name;
+    difference.y_label = "difference (JND)";
+    difference.height = 130.0;
+    difference.y_scale = Scale::symmetric;
+    std::vector<double> jnd;
+    const std::vector<glm::dvec3> there = at_times(courses_[m], reference.t_s);
+    for (std::size_t i = 0; i < there.size(); ++i)
+      jnd.push_back(signed_jnd(there[i], reference.force_N[i], options_));
+    if (!reference.t_s.empty()) {
+      const std::vector<double> ends{reference.t_s.front(), reference.t_s.back()};
+      difference.areas.push_back({"not felt: within ±1 JND", ends, {-1.0, -1.0}, {1.0, 1.0}, kNotFeltColour});
+    }
+    difference.series.push_back(
+        {"", reference.t_s, std::move(jnd), series_colour(m), 1.6, m >= kSolidColours});
+    group.panels.push_back(std::move(difference));
+  }
+
+  // Angle of each model's force to the reference's force, at the reference's ticks. A model with its own
+  // times contributes its last tick before. No series if no model turns far enough.
+  Panel direction_panel() const {
+    Panel panel;
+    panel.title = "Direction: angle to the force of " + reference_.name;
+    panel.y_label = "angle (degrees)";
+    panel.height = 150.0;
+    panel.from_zero = true;
+    double most = 0.0;
+    const Course& reference = courses_[options_.reference];
+    for (std::size_t m = 0; m < models_.size(); ++m) {
+      const Course& course = courses_[m];
+      if (m == options_.reference || models_[m].apart || course.t_s.empty()) continue;
+      std::vector<double> angle;
+      std::size_t i = 0;
+      for (std::size_t n = 0; n < reference.t_s.size(); ++n) {
+        while (i + 1 < course.t_s.size() && course.t_s[i + 1] <= reference.t_s[n]) ++i;
+        angle.push_back(angle_between(course.force_N[i], reference.force_N[n], options_.jnd_floor_N));
+        if (angle.back() > most) most = angle.back();
+      }
+      panel.series.push_back(
+          {models_[m].name, reference.t_s, std::move(angle), series_colour(m), 1.6, m >= kSolidColours});
+    }
+    if (most < kTurned_deg) panel.series.clear();
+    return panel;
+  }
+
+  PanelGroup depth_group(const Contact& contact) const {
+    Panel panel;
+    panel.title = "Force over depth, contact from " + with_decimals(contact.from_s, 2) + " to " +
+                  with_decimals(contact.to_s, 2) + " s";
+    panel.y_label = "force (N)";
+    panel.from_zero = true;
+    bool known = false;
+    for (std::size_t m = 0; m < models_.size(); ++m) {
+      const ComparedModel& model = models_[m];
+      if (model.apart) continue;
+      Series line{.name = model.name,
+                  .x = {},
+                  .y = {},
+                  .colour = series_colour(m),
+                  .width = m == options_.reference ? 2.4 : 1.6,
+                  .dashed = m >= kSolidColours};
+      for (std::size_t i = 0; i < model.rows.size(); ++i) {
+        const TraceRow& row = model.rows[i];
+        if (!(row.t_s >= contact.from_s && row.t_s <= contact.to_s)) continue;
+        known = known || i < model.depth_m.size();
+        const double depth_m = i < model.depth_m.size() ? model.depth_m[i] : contact.depth_m(row.device_m);
+        line.x.push_back(depth_m >= -kShownOutside_m ? depth_m * 1e3 : kGapInLine);
+        line.y.push_back(shown(row.t_s, row.force_N));
+      }
+      panel.series.push_back(std::move(line));
+    }
+    for (const ReferenceCurve& curve : curves_) {
+      std::vector<double> depth_mm = curve.depth_m;
+      for (double& depth : depth_mm) depth *= 1e3;
+      panel.series.push_back({curve.name, std::move(depth_mm), curve.force_N, "#333333", 1.8, true});
+    }
+    PanelGroup group;
+    group.x_label = known ? "depth of the device (mm)" : "depth of the device since the first touch (mm)";
+    group.panels.push_back(std::move(panel));
+    return group;
+  }
+
+  std::span<const ComparedModel> models_;
+  std::span<const ReferenceCurve> curves_;
+  const ComparePlotOptions& options_;
+  const ComparedModel& reference_;
+  std::vector<Course> courses_;
+  Intervals touched_;
+  ValueRange time_;
+  std::vector<Contact> contacts_;
+  bool with_sign_ = false;
+};
+
+}  // namespace
+
+void save_compare_plot(const std::filesystem::path& svg, std::span<const ComparedModel> models,
+                       std::span<const ReferenceCurve> curves, const std::string& title,
+                       const ComparePlotOptions& options) {
+  if (options.reference >= models.size())
+    throw std::invalid_argument("save_compare_plot: the reference is no model");
+  save_svg(svg, ComparePlot(models, curves, options).draw(title));
+}
+
+}  // namespace hybrid

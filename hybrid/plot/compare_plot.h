@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The figure of a comparison: each model's force, and how far it is from the reference.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "hybrid/snapshot/snapshot.h"
+
+namespace hybrid {
+
+struct ComparedModel {
+  std::string name;
+  std::vector<TraceRow> rows;
+  // Depth of the device in the object in each tick (m), if known. Empty: the device's travel since the first
+  // touch of a contact, against the reference's largest force in it.
+  std::vector<double> depth_m{};
+  // Drawn below the others, over its own time: for a model that still pulls when the others have let go.
+  bool apart = false;
+};
+
+// A curve that a model should follow (Hertz, flat punch, a measurement).
+struct ReferenceCurve {
+  std::string name;
+  std::vector<double> depth_m, force_N;
+};
+
+struct ComparePlotOptions {
+  std::size_t reference = 0;  // index of the model that the others are compared with
+  double jnd_share = 0.07;    // a hand distinguishes forces that differ by this share
+  double jnd_floor_N = 0.04;  // and by at least this amount
+};
+
+// Plots, for each model in panels of its own, force over time and the difference from the reference in JND,
+// and for each contact force over depth. The difference is that of the force vectors, negative where the
+// model's force is the smaller one. Models may have their own times: they are compared at the reference's
+// times, linearly between samples. Throws std::runtime_error: file not writable; std::invalid_argument: the
+// reference is no model.
+void save_compare_plot(const std::filesystem::path& svg, std::span<const ComparedModel> models,
+                       std::span<const ReferenceCurve> curves, const std::string& title,
+                       const ComparePlotOptions& options = {});
+
+}  // namespace hybrid

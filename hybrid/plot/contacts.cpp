@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/plot/contacts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+namespace hybrid {
+namespace {
+
+constexpr double kLiftOff_s = 0.05;     // a contact goes on if the tool was in the air no longer
+constexpr double kKeptShare = 0.03;     // of the whole time: kept before and after each contact
+constexpr double kLongShare = 0.08;     // of the whole time: a squeezed stretch is at least this long
+constexpr double kLeastForce_N = 1e-9;  // a smaller force has no direction
+
+}  // namespace
+
+Intervals contact_intervals(std::span<const TraceRow> rows, std::uint32_t mask) {
+  Intervals intervals;
+  bool on = false;
+  for (const TraceRow& row : rows) {
+    const bool touches = (row.contacts & mask) != 0;
+    if (touches && !on) intervals.emplace_back(row.t_s, row.t_s);
+    if (touches || on) intervals.back().second = row.t_s;
+    on = touches;
+  }
+  return intervals;
+}
+
+double duration(const Intervals& intervals) {
+  double sum = 0.0;
+  for (const auto& [from, to] : intervals) {
+    if (std::isfinite(to - from)) sum += to - from;
+  }
+  return sum;
+}
+
+double Contact::depth_m(const glm::dvec3& device_m) const {
+  return glm::dot(device_m - start_m, into);
+}
+
+std::vector<Contact> contacts_of(std::span<const TraceRow> rows, const Intervals& touched) {
+  std::vector<Contact> contacts;
+  for (const auto& [from, to] : touched) {
+    if (!contacts.empty() && from - contacts.back().to_s <= kLiftOff_s) {
+      contacts.back().to_s = std::max(contacts.back().to_s, to);
+    } else if (std::isfinite(from) && std::isfinite(to)) {
+      contacts.push_back({.from_s = from, .to_s = to});
+    }
+  }
+  std::size_t n = 0;
+  bool started = false;
+  for (const TraceRow& row : rows) {
+    while (n < contacts.size() && row.t_s > contacts[n].to_s) {
+      ++n;
+      started = false;
+    }
+    if (n == contacts.size()) break;
+    if (!(row.t_s >= contacts[n].from_s)) continue;
+    if (!started) contacts[n].start_m = row.device_m;
+    started = true;
+    const double force = glm::length(row.force_N);
+    if (!std::isfinite(force) || !(force > std::max(contacts[n].most_N, kLeastForce_N))) continue;
+    contacts[n].most_N = force;
+    contacts[n].into = -row.force_N / force;
+  }
+  return contacts;
+}
+
+std::vector<Contact> most_felt(std::vector<Contact> contacts, std::size_t most) {
+  std::ranges::stable_sort(contacts, std::ranges::greater{}, &Contact::most_N);
+  if (contacts.size() > most) contacts.resize(most);
+  std::ranges::stable_sort(contacts, {}, &Contact::from_s);
+  return contacts;
+}
+
+Intervals merged(Intervals a, const Intervals& b) {
+  a.insert(a.end(), b.begin(), b.end());
+  std::erase_if(a, [](const auto& i) { return !std::isfinite(i.first) || !std::isfinite(i.second); });
+  std::ranges::sort(a);
+  Intervals out;
+  for (const auto& interval : a) {
+    if (!out.empty() && interval.first <= out.back().second) {
+      out.back().second = std::max(out.back().second, interval.second);
+    } else {
+      out.push_back(interval);
+    }
+  }
+  return out;
+}
+
+Intervals long_in_the_air(const Intervals& touched, double from_s, double to_s) {
+  Intervals air;
+  if (touched.empty() || !(to_s > from_s)) return air;
+  const double whole = to_s - from_s, kept = kKeptShare * whole;
+  double begin = from_s;
+  const auto add = [&](double a, double b) {
+    if (b - a >= kLongShare * whole) air.emplace_back(a, b);
+  };
+  for (const auto& [from, to] : touched) {
+    add(begin, from - kept);
+    begin = to + kept;
+  }
+  add(begin, to_s);
+  return air;
+}
+
+}  // namespace hybrid
