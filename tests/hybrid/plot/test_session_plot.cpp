@@ -256,7 +256,7 @@ TEST(Contacts, AMomentInTheAirDoesNotEndOne) {
   ASSERT_EQ(contacts.size(), 1U);
   EXPECT_NEAR(contacts[0].from_s, 0.22, 1e-12);
   EXPECT_NEAR(contacts[0].to_s, 0.7, 1e-12);
-  EXPECT_EQ(contacts[0].most_N, 1.0) << "the tick of 3 N is not in contact";
+  EXPECT_EQ(contacts[0].most_N, 3.0) << "from the first touch to the last, a moment in the air included";
   EXPECT_NEAR(contacts[0].depth_m(rows[420].device_m), 2e-3, 1e-9);
 }
 

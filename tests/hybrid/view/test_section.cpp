@@ -147,7 +147,6 @@ TEST_F(InsideOf, IsKeptOnlyIfTheSurfaceHidesAMaterial) {
   ASSERT_EQ(hidden.inside.materials, (std::vector<std::string>{"gel", "hard"}));
   EXPECT_EQ(hidden.inside.material_at({0.0, 0.0, 0.0}), 1U);
   EXPECT_EQ(hidden.inside.material_at({9e-3, 0.0, 0.0}), 0U);
-  EXPECT_TRUE(drawn("").inside.of_voxel.empty());
   EXPECT_TRUE(drawn("inclusions = [{ shape = \"box\", centre = [0, 0, 5], size = [10, 10, 6], label = 2 }]\n")
                   .inside.of_voxel.empty());
 }
