@@ -13,7 +13,11 @@
 #include <utility>
 #include <vector>
 
+#include "hybrid/base/process_memory.h"
 #include "hybrid/bench/paths.h"
+#include "polygon/files/mesh_file.h"
+#include "polygon/mesh/mesh_bounds.h"
+#include "polygon/repair/check.h"
 #include "polygon/surface/primitives.h"
 
 namespace hybrid::bench {
@@ -47,7 +51,9 @@ Name parse(const std::string& name) {
   }
   throw std::invalid_argument(
       fmt::format("there is no mesh \"{}\"; there are ico0 to ico9 (balls of 20·4^n triangles), geo1 to "
-                  "geo1024 (balls of 20·n²), cube1 to cube1024 and corner1 to corner1024 (n quads an edge)",
+                  "geo1024 (balls of 20·n²), cube1 to cube1024 and corner1 to corner1024 (n quads an edge), "
+                  "and files: OBJ, "
+                  "PLY, STL, OFF",
                   name));
 }
 
@@ -207,6 +213,35 @@ std::size_t bench_mesh_triangles(const std::string& name) {
       break;
   }
   return 6 * n * n;
+}
+
+bool is_bench_mesh_file(std::string_view name) {
+  return name.find_first_of("./") != std::string_view::npos;
+}
+
+BenchMesh load_bench_mesh(const std::string& file, double unit_m, std::vector<std::string>& notes) {
+  polygon::MeshFile loaded =
+      polygon::load_mesh(file, {.scale = unit_m, .max_bytes = usable_memory_bytes() / 4});
+  const polygon::MeshCheck check = polygon::check_mesh(loaded.mesh);
+  const auto note = [&](const std::vector<polygon::Finding>& findings) {
+    for (const polygon::Finding& f : findings) {
+      if (f.severity != polygon::Severity::info)
+        notes.push_back(fmt::format("{}: {}: {} {}", file, f.id, f.count, f.text));
+    }
+  };
+  note(loaded.findings);
+  note(check.findings);
+  BenchMesh made{
+      .name = file, .shape = BenchShape::from_file, .solid = check.oriented, .mesh = std::move(loaded.mesh)};
+  const polygon::MeshBounds bounds = polygon::checked_bounds(made.mesh);
+  for (glm::dvec3& v : made.mesh.vertices) v -= 0.5 * (bounds.low + bounds.high);
+  for (const polygon::TriangleIndices& t : made.mesh.triangles) {
+    for (const std::uint32_t v : t) made.reach_m = std::max(made.reach_m, glm::length(made.mesh.vertices[v]));
+  }
+  if (!(made.reach_m > 0.0))
+    throw polygon::MeshError(
+        fmt::format("{}: all of its vertices are one point; give a mesh with a size", file));
+  return made;
 }
 
 BenchMesh make_bench_mesh(const std::string& name, double scale) {

@@ -1,21 +1,25 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The meshes that `hybrid bench rigid` touches, by name, from a thousand triangles to ten million and more.
+// The meshes that `hybrid bench rigid` touches: by name, from a thousand triangles to ten million and more,
+// or from a file.
 #pragma once
 
 #include <cstdint>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "polygon/mesh/mesh.h"
 
 namespace hybrid::bench {
 
-enum class BenchShape : std::uint8_t { sphere, cube, corner };
+enum class BenchShape : std::uint8_t { sphere, cube, corner, from_file };
 
 struct BenchMesh {
   std::string name;
   BenchShape shape = BenchShape::sphere;
   bool solid = true;                // closed: it has an inside
   double inscribed_radius_m = 0.0;  // sphere and cube: least distance of a triangle's plane to the middle
+  double reach_m = 0.0;             // from_file: greatest distance of a vertex to the middle of the box
   polygon::TriangleMesh mesh;       // counter-clockwise seen from outside, each vertex once
 };
 
@@ -29,6 +33,12 @@ BenchMesh make_bench_mesh(const std::string& name, double scale = 1.0);
 // What a name stands for, without making it; the same exception.
 BenchShape bench_mesh_shape(const std::string& name);
 std::size_t bench_mesh_triangles(const std::string& name);
+
+// Is this the path of a file, and no name of the list above? (It has a dot or a slash.)
+bool is_bench_mesh_file(std::string_view name);
+// The mesh of a file with the middle of its box at the origin. `notes`: its defects in words. Throws
+// polygon::MeshError.
+BenchMesh load_bench_mesh(const std::string& file, double unit_m, std::vector<std::string>& notes);
 
 // The ball of geo<frequency>.
 polygon::TriangleMesh make_geodesic_mesh(double radius_m, int frequency);

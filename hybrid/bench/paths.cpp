@@ -69,9 +69,13 @@ glm::dvec3 SplitMix64::direction() noexcept {
   return {s * std::cos(f), s * std::sin(f), c};
 }
 
+double least_spiral_speed_m_s() {
+  return kSphereRadius_m * (kLastPolar - kFirstPolar) / kSpiral_s;
+}
+
 glm::dvec3 spiral_direction(double t_s, double speed_m_s) {
   const double polar_rate = (kLastPolar - kFirstPolar) / kSpiral_s;
-  const double down = kSphereRadius_m * polar_rate;
+  const double down = least_spiral_speed_m_s();
   const double around = std::sqrt(std::max(0.0, speed_m_s * speed_m_s - down * down));
   const double th = kFirstPolar + polar_rate * t_s;
   // ∫ dθ / sin θ = ln tan(θ/2): the azimuth's rate grows near the poles as its circles shrink.
@@ -135,6 +139,27 @@ GoalPath tap_path(double tool_radius_m, int taps) {
       path.goals.push_back(b + (static_cast<double>(j) / kTapTicks) * (a2 - b));
   }
   add_sphere_reference(path, tool_radius_m);
+  return path;
+}
+
+GoalPath drape_path(double tool_radius_m, double speed_m_s, int ticks,
+                    const std::function<std::optional<double>(const glm::dvec3&)>& surface_m) {
+  GoalPath path;
+  path.starts = {0};
+  path.counted_from = kPressTicks;
+  double surface = kSphereRadius_m;
+  const auto below = [&](const glm::dvec3& direction) {
+    surface = surface_m(direction).value_or(surface);
+    return surface - kSlideDepth_m;
+  };
+  const glm::dvec3 down = spiral_direction(0.0, speed_m_s);
+  const double from = kSphereRadius_m + tool_radius_m + kPressFrom_m, to = below(down);
+  for (int k = 0; k < kPressTicks; ++k)
+    path.goals.push_back((from + (static_cast<double>(k) / (kPressTicks - 1)) * (to - from)) * down);
+  for (int k = 0; k < ticks; ++k) {
+    const glm::dvec3 direction = spiral_direction((k + 1) * kTick_s, speed_m_s);
+    path.goals.push_back(below(direction) * direction);
+  }
   return path;
 }
 

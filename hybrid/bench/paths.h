@@ -4,7 +4,9 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <glm/vec3.hpp>
+#include <optional>
 #include <vector>
 
 namespace hybrid::bench {
@@ -40,6 +42,7 @@ class SplitMix64 {
 // The spiral over the unit sphere from near one pole to near the other in 20 s, such that a point at
 // kSphereRadius_m moves at exactly `speed_m_s`. The motion from pole to pole alone is 6.4 mm/s, the least.
 glm::dvec3 spiral_direction(double t_s, double speed_m_s);
+double least_spiral_speed_m_s();
 
 // Where the ideal proxy is for a goal near the sphere: on it when the goal is inside, at the goal otherwise.
 glm::dvec3 sphere_reference(const glm::dvec3& goal, double tool_radius_m);
@@ -50,6 +53,13 @@ GoalPath far_path(int ticks = 5000);
 GoalPath hover_path(double tool_radius_m, double speed_m_s, int ticks = 20000);
 GoalPath slide_path(double tool_radius_m, double speed_m_s, int ticks = 20000);
 GoalPath tap_path(double tool_radius_m, int taps = 5000);
+
+// Mesh of a file whose vertices lie within kSphereRadius_m of the origin: as the slide, but kSlideDepth_m
+// below the surface that is met first along the way to the origin. `surface_m` gives its distance from the
+// origin by direction; where it is empty, the last distance holds. A point at kSphereRadius_m moves at
+// `speed_m_s`. No closed form.
+GoalPath drape_path(double tool_radius_m, double speed_m_s, int ticks,
+                    const std::function<std::optional<double>(const glm::dvec3&)>& surface_m);
 
 // Cube: over a face, off its edge, along the next face and round again, in steps of 0.1 mm.
 GoalPath edge_path(double tool_radius_m, int laps = 10);

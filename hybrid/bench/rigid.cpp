@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <map>
+#include <memory>
+#include <optional>
 #include <stdexcept>
 #include <tuple>
 
@@ -20,6 +22,7 @@ constexpr double kPoint_m = 0.0;
 constexpr std::size_t kMostReferenceTriangles =
     3'000'000;                             // of the exact reference, which takes 1 kB a triangle
 constexpr std::size_t kLarge = 3'000'000;  // triangles: a shorter table
+constexpr double kSlowest_m_s = 0.02;      // of a scene of size 1: a lap of `moving` takes 19 s then
 
 // Seconds a baseline may spend in steps of one run, and what judging one run may take.
 struct Budget {
@@ -28,9 +31,18 @@ struct Budget {
 constexpr Budget kFull{1.5, 2.0, 1.0, 0.2};
 constexpr Budget kQuick{0.1, 0.2, 0.05, 0.02};
 
+// Paths are made in a scene of size 1, and scaled. A mesh of a file keeps its size: the scale fits the paths
+// to it, and tool and speed are what they are in the scene.
 struct Case {
   std::string path, mesh;
-  double radius_m = 0.0, speed_m_s = 0.0, scale = 1.0, offset_m = 0.0;
+  double radius_m = 0.0, speed_m_s = 0.0;  // in a scene of size 1
+  double scale = 1.0, offset_m = 0.0;
+  std::shared_ptr<const BenchMesh> file;  // null: a mesh by name
+  std::size_t triangles = 0;
+
+  [[nodiscard]] double tool_m() const { return radius_m * scale; }
+  [[nodiscard]] double speed() const { return speed_m_s * scale; }
+  [[nodiscard]] double scene_scale() const { return file ? 1.0 : scale; }
 };
 
 // ---- which runs ----
@@ -49,6 +61,10 @@ class Plan {
   explicit Plan(const RigidBenchOptions& options) : options_(options) {
     const bool chosen = !options.meshes.empty();
     for (const std::string& mesh : chosen ? options.meshes : default_meshes(options.quick)) {
+      if (is_bench_mesh_file(mesh)) {
+        add_file(mesh);
+        continue;
+      }
       switch (bench_mesh_shape(mesh)) {
         case BenchShape::sphere:
           add_sphere(mesh);
@@ -60,6 +76,8 @@ class Plan {
           add("corner", mesh, {0.1});
           add("corner_sym", mesh, {0.1});
           add("cornerfast", mesh, {1.0});
+          break;
+        case BenchShape::from_file:
           break;
       }
       if (bench_mesh_shape(mesh) != BenchShape::corner && (chosen || mesh == "ico5" || mesh == "cube1")) {
@@ -79,8 +97,33 @@ class Plan {
            double scale = 1.0, double offset_m = 0.0) {
     if (!wanted(options_.paths, path)) return;
     for (const double radius : {kPoint_m, kBall_m}) {
-      for (const double speed : speeds) cases_.push_back({path, mesh, radius, speed, scale, offset_m});
+      for (const double speed : speeds)
+        cases_.push_back({path, mesh, radius, speed, scale, offset_m, nullptr, bench_mesh_triangles(mesh)});
     }
+  }
+
+  void add_file(const std::string& name) {
+    std::vector<std::string> notes;
+    const auto mesh = std::make_shared<const BenchMesh>(load_bench_mesh(name, options_.mesh_unit_m, notes));
+    for (const std::string& note : notes) {
+      if (options_.on_note) options_.on_note(note);
+    }
+    const double scale = mesh->reach_m / kSphereRadius_m;
+    // The same ball as elsewhere, unless the mesh is too small for it.
+    const double ball = kBall_m / std::max(1.0, scale);
+    const auto add_path = [&](const char* path, const std::vector<double>& speeds) {
+      if (!wanted(options_.paths, path)) return;
+      for (const double radius : {kPoint_m, ball}) {
+        for (const double speed : speeds)
+          cases_.push_back({path, name, radius, std::max(kSlowest_m_s, speed / scale), scale, 0.0, mesh,
+                            mesh->mesh.triangles.size()});
+      }
+    };
+    using Speeds = std::vector<double>;
+    add_path("far", {0.1});
+    add_path("slide", options_.quick ? Speeds{0.1} : Speeds{0.1, 1.0});
+    add_path("tap", {2.0 * scale});  // a path of 41 ticks, whatever the size
+    add_path("moving", options_.quick ? Speeds{0.1} : Speeds{0.02, 0.1, 1.0});
   }
 
   void add_sphere(const std::string& mesh) {
@@ -110,10 +153,31 @@ class Plan {
   std::vector<Case> cases_;
 };
 
-GoalPath make_path(const Case& c, bool quick, bool large) {
+// Where the surface of a mesh of a file lies first on the way from outside to the origin, in a scene of size
+// 1: the way goes on by the distance to the surface, until that is a billionth.
+std::optional<double> first_surface(const polygon::RigidSurface& surface, const glm::dvec3& direction,
+                                    double scale) {
+  constexpr double kMet = 1e-9;
+  constexpr int kMostSteps = 500;  // along a grazed surface the steps are short
+  double at = 1.1 * kSphereRadius_m * scale;
+  for (int n = 0; n < kMostSteps && at > 0.0; ++n) {
+    polygon::NearPoint near;
+    if (!surface.nearest(at * direction, 4.0 * kSphereRadius_m * scale, near)) return std::nullopt;
+    if (near.distance <= kMet * scale) return at / scale;
+    at -= near.distance;
+  }
+  return std::nullopt;
+}
+
+GoalPath make_path(const Case& c, bool quick, bool large, const polygon::RigidSurface* surface) {
   const int ticks = quick ? 1000 : 20000;
   if (c.path == "far") return far_path(quick ? 1000 : 5000);
   if (c.path == "hover") return hover_path(c.radius_m, c.speed_m_s, ticks);
+  if (c.path == "slide" && c.file != nullptr) {
+    return drape_path(c.radius_m, c.speed_m_s, ticks, [&](const glm::dvec3& direction) {
+      return first_surface(*surface, direction, c.scale);
+    });
+  }
   if (c.path == "slide") return slide_path(c.radius_m, c.speed_m_s, ticks);
   if (c.path == "tap") return tap_path(c.radius_m, quick ? 50 : (large ? 500 : 5000));
   if (c.path == "edge") return edge_path(c.radius_m, quick ? 1 : 10);
@@ -132,7 +196,11 @@ std::string tool_text(double radius_m) {
 class Workshop {
  public:
   Workshop(const RigidBenchOptions& options, const Case& first)
-      : options_(options), scale_(first.scale), mesh_(make_bench_mesh(first.mesh, first.scale)) {
+      : options_(options),
+        scale_(first.scale),
+        kept_(first.file ? first.file
+                         : std::make_shared<const BenchMesh>(make_bench_mesh(first.mesh, first.scale))),
+        mesh_(*kept_) {
     if (mesh_.mesh.triangles.size() <= kMostReferenceTriangles) {
       say("building the exact reference");
       reference_ = std::make_unique<polygon::OptimalityReference>(mesh_.mesh);
@@ -152,7 +220,8 @@ class Workshop {
   std::vector<RigidRow> run(const Case& c, const TickTimer& timer) {
     const glm::dvec3 offset(c.offset_m);
     const bool large = mesh_.mesh.triangles.size() > kLarge;
-    const GoalPath path = placed(make_path(c, options_.quick, large), c.scale, offset);
+    const polygon::RigidSurface* surface = c.file ? surface_of(Engine::hybrid).surface.get() : nullptr;
+    const GoalPath path = placed(make_path(c, options_.quick, large, surface), c.scale, offset);
     const double radius = c.radius_m * c.scale;
     const Budget& budget = options_.quick ? kQuick : kFull;
     std::vector<TouchWorld*> worlds;
@@ -160,7 +229,6 @@ class Workshop {
     for (const Engine engine : engines_) {
       TouchWorld& world = world_of(engine, radius, offset, !path.body_m.empty());
       world.state().faults = 0;
-      world.state().truncated_ticks = 0;
       worlds.push_back(&world);
       limits.push_back(engine == Engine::hybrid      ? 0.0
                        : engine == Engine::cgal_aabb ? budget.cgal_s
@@ -212,7 +280,7 @@ class Workshop {
                  .triangles = mesh_.mesh.triangles.size(),
                  .radius_m = c.radius_m * c.scale,
                  .speed_m_s = c.speed_m_s * c.scale,
-                 .scale = c.scale,
+                 .scale = c.scene_scale(),
                  .offset_m = glm::dvec3(c.offset_m),
                  .engine = run.engine,
                  .tick_us = {},
@@ -233,7 +301,7 @@ class Workshop {
     row.steps_mean = static_cast<double>(run.steps) / all;
     row.steps_max = run.most_steps;
     row.surveys_per_tick = static_cast<double>(run.surveys) / all;
-    row.truncated_ticks = world.state().truncated_ticks;
+    row.truncated_ticks = run.truncated_ticks;
     row.surface_build_ms = world.build_ms() - world.map_ms();
     row.map_build_ms = world.map_ms();
     row.build_ms = world.build_ms();
@@ -242,10 +310,13 @@ class Workshop {
   }
 
   void save(const Case& c, const GoalPath& path, const TouchRun& run) const {
-    std::string name = fmt::format("{}-{}-{}-{:g}mps-{}", c.path, c.mesh,
-                                   c.radius_m > 0.0 ? fmt::format("{:g}mm", 1e3 * c.radius_m) : "point",
-                                   c.speed_m_s, engine_name(run.engine));
-    if (c.scale != 1.0) name += fmt::format("-x{:g}", c.scale);
+    const double own =
+        c.scale / c.scene_scale();  // the name's figures are of a scene of size 1, or of the file
+    std::string name =
+        fmt::format("{}-{}-{}-{:g}mps-{}", c.path, std::filesystem::path(c.mesh).filename().string(),
+                    c.radius_m > 0.0 ? fmt::format("{:g}mm", 1e3 * own * c.radius_m) : "point",
+                    own * c.speed_m_s, engine_name(run.engine));
+    if (c.scene_scale() != 1.0) name += fmt::format("-x{:g}", c.scale);
     if (c.offset_m != 0.0) name += fmt::format("-at{:g}m", c.offset_m);
     std::vector<TraceRow> rows(run.ticks);
     for (std::size_t k = 0; k < run.ticks; ++k) {
@@ -263,7 +334,8 @@ class Workshop {
 
   const RigidBenchOptions& options_;
   double scale_;
-  BenchMesh mesh_;
+  std::shared_ptr<const BenchMesh> kept_;
+  const BenchMesh& mesh_;
   std::vector<Engine> engines_;
   std::unique_ptr<polygon::OptimalityReference> reference_;
   TimedSurface own_, cgal_;
@@ -284,12 +356,14 @@ std::vector<RigidRow> bench_rigid(const RigidBenchOptions& options) {
   if (cases.empty()) {
     throw std::invalid_argument(
         "none of the chosen meshes has one of the chosen paths: far, hover, slide, tap are for ico and geo, "
-        "edge for cube, corner, corner_sym, cornerfast for corner, moving for all but corner");
+        "edge for cube, corner, corner_sym, cornerfast for corner, moving for all but corner; far, slide, "
+        "tap "
+        "and moving for files");
   }
   // What shares a mesh comes together; else in the order of the plan.
   std::stable_sort(cases.begin(), cases.end(), [](const Case& a, const Case& b) {
     const auto key = [](const Case& c) {
-      return std::tuple(c.scale != 1.0, bench_mesh_triangles(c.mesh), c.mesh, c.scale);
+      return std::tuple(c.scene_scale() != 1.0, c.triangles, c.mesh, c.scale);
     };
     return key(a) < key(b);
   });
@@ -301,7 +375,7 @@ std::vector<RigidRow> bench_rigid(const RigidBenchOptions& options) {
     const Case& c = cases[i];
     if (options.progress) {
       options.progress(fmt::format("{} of {}: {} on {}, {}, {:g} m/s", i + 1, cases.size(), c.path, c.mesh,
-                                   tool_text(c.radius_m), c.speed_m_s));
+                                   tool_text(c.tool_m() / c.scene_scale()), c.speed() / c.scene_scale()));
     }
     if (!workshop || !workshop->serves(c)) {
       workshop.reset();  // before the next is built: both need not fit

@@ -20,17 +20,20 @@ struct RigidBenchOptions {
   bool quick = false;              // a short piece of each path, small meshes, one speed
   bool every_tick = false;         // the exact reference at every tick, however long that takes
   std::vector<std::string> paths;  // empty: all
-  std::vector<std::string>
-      meshes;                   // empty: those of the default table; else exactly these, see meshes.h
+  // Empty: those of the default table; else exactly these, by name or by file, see meshes.h.
+  std::vector<std::string> meshes;
+  double mesh_unit_m = 1e-3;    // of files
   std::vector<Engine> engines;  // empty: all, but CGAL's tree only up to kMostBaselineTriangles
   std::filesystem::path trace;  // folder for one CSV a run; empty: none
   Progress progress;
-  std::function<void(const RigidRow&)> on_row;  // as soon as there is one
+  std::function<void(const std::string&)> on_note;  // defects of a file's mesh
+  std::function<void(const RigidRow&)> on_row;      // as soon as there is one
 };
 
 inline constexpr std::size_t kMostBaselineTriangles = 2'000'000;
 
-// Throws std::invalid_argument (no such mesh, or nothing to do) and std::runtime_error (trace not writable).
+// Throws std::invalid_argument (no such mesh, or nothing to do), polygon::MeshError (a file) and
+// std::runtime_error (trace not writable).
 std::vector<RigidRow> bench_rigid(const RigidBenchOptions& options);
 
 }  // namespace hybrid::bench

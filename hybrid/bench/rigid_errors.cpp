@@ -12,7 +12,7 @@ namespace hybrid::bench {
 namespace {
 
 // All of the paths' own scale (unit: meter, times the run's scale).
-constexpr double kDeep_m = 1e-5;    // below the inscribed sphere by this much is inside the ball
+constexpr double kDeep_m = 1e-5;    // below the inscribed sphere, or a file's mesh, by this much is inside
 constexpr double kLeak_m = 1e-6;    // past a cube's face or a corner's plane by this much is inside
 constexpr double kSearch_m = 1e-3;  // around the proxy for its first-order optimum
 constexpr std::size_t kProbe = 16;  // ticks that are always judged, and tell what one costs
@@ -84,6 +84,8 @@ bool Judge::inside(const glm::dvec3& p) const {
       const glm::dvec3 a = glm::abs(p);
       return std::max({a.x, a.y, a.z}) < mesh_.inscribed_radius_m - kLeak_m * scale_;
     }
+    case BenchShape::from_file:
+      return reference_->inside(p) && reference_->distance(p) > kDeep_m * scale_;
     case BenchShape::corner:
       break;
   }
@@ -182,6 +184,8 @@ void Judge::judge_forces(const TouchRun& run, Judgement& out) const {
 }
 
 void Judge::judge_places(const TouchRun& run, Judgement& out) const {
+  if (mesh_.shape == BenchShape::from_file && (!mesh_.solid || reference_ == nullptr)) return;
+  out.inside_ticks = out.pop_throughs = 0;
   bool was_inside = false;
   auto start = path_.starts.begin();
   for (std::size_t k = 0; k < run.ticks; ++k) {
@@ -190,8 +194,8 @@ void Judge::judge_places(const TouchRun& run, Judgement& out) const {
       ++start;
     }
     const bool now = !std::isfinite(glm::length(run.proxy_m[k])) || inside(in_body(run.proxy_m[k], k));
-    if (now) ++out.inside_ticks;
-    if (now && !was_inside) ++out.pop_throughs;
+    if (now) ++*out.inside_ticks;
+    if (now && !was_inside) ++*out.pop_throughs;
     was_inside = now;
   }
 }

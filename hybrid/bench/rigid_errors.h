@@ -25,7 +25,8 @@ struct Judgement {  // lengths in meters; empty: the figure has no meaning here
   // The mesh's own exact optimum against the ideal sphere, and the proxy's error at the same ticks.
   std::optional<double> optimum_sphere_max, optimum_sphere_rms, error_sphere_there_max;
   std::optional<double> force_step_p99_N;  // from tick to tick while in contact
-  std::size_t contact_ticks = 0, inside_ticks = 0, pop_throughs = 0;
+  std::size_t contact_ticks = 0;
+  std::optional<std::size_t> inside_ticks, pop_throughs;  // empty: a mesh of a file without an inside
 };
 
 // One path on one mesh, in a scene of one size and place: what all its runs are judged by.

@@ -84,6 +84,7 @@ void run_block(const GoalPath& path, std::size_t first, std::size_t last, TouchW
     run.steps += step.steps;
     run.surveys += step.surveys;
     run.most_steps = std::max(run.most_steps, step.steps);
+    if (!step.arrived && k >= path.counted_from) ++run.truncated_ticks;
     run.spent_s += 1e-6 * us;
     run.ticks = k + 1;
   }

@@ -66,6 +66,7 @@ struct TouchRun {
   std::size_t ticks = 0;                 // done: fewer than the path's when the time was up
   std::uint64_t steps = 0, surveys = 0;  // of all ticks
   std::uint32_t most_steps = 0;
+  std::uint64_t truncated_ticks = 0;  // counted ticks that a bound on the steps ended before the minimum
   double spent_s = 0.0;
 };
 

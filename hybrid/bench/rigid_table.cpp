@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "hybrid/session/report.h"
@@ -19,6 +20,18 @@ Json number(double value) {
 }
 Json number(const std::optional<double>& value) {
   return value ? number(*value) : Json(nullptr);
+}
+
+Json count(const std::optional<std::size_t>& value) {
+  return value ? Json(*value) : Json(nullptr);
+}
+std::string count_text(const std::optional<std::size_t>& value) {
+  return value ? std::to_string(*value) : std::string("-");
+}
+
+// The file alone of a path.
+std::string mesh_text(const RigidRow& row) {
+  return std::filesystem::path(row.mesh).filename().string();
 }
 
 // A length as a person reads it: in micrometers up to a millimeter.
@@ -64,8 +77,8 @@ Json to_json(const RigidRow& row) {
             {"error_sphere_rms_m", number(j.error_sphere_rms)},
             {"optimum_sphere_max_m", number(j.optimum_sphere_max)},
             {"force_step_p99_N", number(j.force_step_p99_N)},
-            {"inside_ticks", j.inside_ticks},
-            {"pop_throughs", j.pop_throughs},
+            {"inside_ticks", count(j.inside_ticks)},
+            {"pop_throughs", count(j.pop_throughs)},
             {"build_ms", row.build_ms},
             {"bytes", row.bytes}};
   json["mesh"] = row.mesh;
@@ -110,17 +123,18 @@ std::string table_line(const RigidRow& row) {
       "{:<10} {:<9} {:>9} {:>5} {:>6g} {:<9} {:>7} {:>7} {:>7} {:>7} {:>8} {:>6} {:>8} {:>8} {:>8} {:>7} "
       "{:>6} "
       "{:>5} {:>7.4g} {:>7.4g}",
-      row.path, row.mesh, row.triangles,
+      row.path, mesh_text(row), row.triangles,
       row.radius_m > 0.0 ? fmt::format("{:g}", 1e3 * row.radius_m) : "point", row.speed_m_s,
       engine_name(row.engine), microseconds(row.tick_us.p50), microseconds(row.tick_us.p99),
       microseconds(row.tick_us.p999), microseconds(row.tick_us.max), length_text(j.error_mesh_max),
       j.error_ticks, length_text(j.error_sphere_max), length_text(j.error_sphere_rms),
       length_text(j.optimum_sphere_max),
-      j.force_step_p99_N ? fmt::format("{:.4f}", *j.force_step_p99_N) : "-", j.inside_ticks, j.pop_throughs,
-      row.build_ms, 1e-6 * static_cast<double>(row.bytes));
+      j.force_step_p99_N ? fmt::format("{:.4f}", *j.force_step_p99_N) : "-", count_text(j.inside_ticks),
+      count_text(j.pop_throughs), row.build_ms, 1e-6 * static_cast<double>(row.bytes));
   line += place_text(row);
   if (row.ticks < row.path_ticks) line += fmt::format(" (first {} ticks)", row.ticks);
   if (j.lost_ticks > 0) line += fmt::format(" {} lost", j.lost_ticks);
+  if (row.truncated_ticks > 0) line += fmt::format(" {} truncated", row.truncated_ticks);
   if (!row.faults.empty()) line += fmt::format(" {} faults", row.faults.size());
   return line + "\n";
 }
@@ -141,7 +155,7 @@ std::string ratio_table(const std::vector<RigidRow>& rows) {
       }
       return fmt::format("{:>22}", "-");
     };
-    text += fmt::format("{:<10} {:<9} {:>5} {:>6g} {:>9} {:>9} | {} | {}{}\n", row.path, row.mesh,
+    text += fmt::format("{:<10} {:<9} {:>5} {:>6g} {:>9} {:>9} | {} | {}{}\n", row.path, mesh_text(row),
                         row.radius_m > 0.0 ? fmt::format("{:g}", 1e3 * row.radius_m) : "point", row.speed_m_s,
                         microseconds(row.tick_us.p50), microseconds(row.tick_us.p99),
                         beside(Engine::cgal_aabb), beside(Engine::no_map), place_text(row));

@@ -86,16 +86,18 @@ class ThreadBench {
     }
   }
 
-  // A path's length under each load, so that what else the machine does comes to all.
+  // A path's length under each load, so that what else the machine does comes to all. Progress counts whole
+  // turns: a turn that has begun is counted when it ends.
   template <class Say>
   void turn(const Say& say) {
-    say(rows_[0].load, seconds_[0]);
+    const double done_s = seconds_[0];
+    say(rows_[0].load, done_s);
     const SessionResult felt = run_relaxing();
-    say("finding what is handed out", seconds_[0]);
+    say("finding what is handed out", done_s);
     ResultTape tape = taped(felt);
-    say(rows_[1].load, seconds_[1]);
+    say(rows_[1].load, done_s);
     play(felt, tape);
-    say(rows_[2].load, seconds_[2]);
+    say(rows_[2].load, done_s);
     run_without_relaxation();
   }
   [[nodiscard]] double seconds() const { return seconds_[0]; }
@@ -217,7 +219,7 @@ std::vector<ThreadsRow> bench_threads(const ThreadsBenchOptions& options) {
     while (bench.seconds() < options.seconds) {
       bench.turn([&](const std::string& load, double seconds) {
         if (options.progress)
-          options.progress(fmt::format("{}, {}: {:.0f} of {:.0f} s", name, load, seconds, options.seconds));
+          options.progress(fmt::format("{}, {}: {:.3g} of {:.3g} s", name, load, seconds, options.seconds));
       });
     }
     for (ThreadsRow& row : bench.rows()) rows.push_back(std::move(row));

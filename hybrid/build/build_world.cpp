@@ -12,6 +12,7 @@
 #include "hybrid/base/process_memory.h"
 #include "hybrid/build/build_objects.h"
 #include "hybrid/build/remove_overlap.h"
+#include "hybrid/build/soft_notes.h"
 #include "hybrid/build/thin_object.h"
 #include "hybrid/geometry/surface_nets.h"
 #include "hybrid/scene/read_feel.h"
@@ -86,6 +87,8 @@ class Builder {
       refuse(scene_, scene_.rigid.front().place,
              "a punch against rigid objects is not supported yet; use [tool] shape = \"ball\"");
     }
+    for (const UnusedKey& key : scene_.unused_keys)
+      built_.notes.push_back({key.object, polygon::Severity::warning, key.text});
     for (const ModelNote& note : scene_.model_notes)
       built_.notes.push_back({note.object, polygon::Severity::info, note.text});
     for (const RigidDescription& d : scene_.rigid) add_rigid(d);
@@ -198,6 +201,7 @@ class Builder {
     report_progress(fmt::format("reading soft \"{}\"", d.name));
     at_place(scene_, d.source_place, d.name, [&] {
       volumes_.push_back(build_volume(d, built_.notes));
+      note_missing_labels(d, volumes_.back(), built_.notes);
       const std::uint64_t bytes = soft_load_bytes(volumes_.back().dims);
       if (bytes > usable_memory_bytes()) {
         throw std::runtime_error(
@@ -218,6 +222,7 @@ class Builder {
         report_progress(fmt::format("looking where \"{}\" meets rigid objects", d.name));
         removed = remove_rigid_overlap(world_->rigid, volumes_[o], d.anchors.rigid_within_m, anchored_[o]);
         note_carved(d, removed, "rigid objects");
+        note_missing_anchors(d, anchored_[o], built_.notes);
       }
       for (std::size_t later = o + 1; later < volumes_.size(); ++later) {
         const std::size_t by_soft = remove_soft_overlap(volumes_[o], volumes_[later]);
@@ -265,6 +270,7 @@ class Builder {
             std::make_unique<voxel::Lattice>(std::move(volumes_[o]), options)));
         volumes_[o] = {};
         note_memory(d, soft_.back()->lattice());
+        note_felt_surface(scene_.tool, d.name, *soft_.back(), built_.notes);
         for (const glm::dvec3& v : body.drawn.vertices) box_.add(body.to_scene(v));
         world_->soft.push_back(std::move(body));
       });

@@ -161,14 +161,18 @@ void compose_segmentation(const ComposeOptions& options, ComposeFolder& folder, 
   std::size_t filled = 0;
   for (const int label : split.soft) filled += counts.at(label);
   std::optional<double> spacing = options.spacing_m;
-  if (!spacing) {
-    spacing = ready_spacing_m(fine, filled);
+  if (!spacing && filled > 0) {
+    std::string why;
+    spacing = ready_spacing_m(fine, filled, why);
     if (spacing) {
-      parts.notes.push_back(fmt::format("{} voxels of tissue, read at {:.3g} mm; --spacing says otherwise",
-                                        filled, *spacing * 1e3));
+      parts.notes.push_back(
+          fmt::format("{}, read at {:.3g} mm along all axes; --spacing says otherwise", why, *spacing * 1e3));
     }
   }
   parts.of_a_body = voxel::read_volume_header(options.labels).directions_known;
+  if (options.spacing_m && split.soft.empty())
+    throw ComposeError(
+        "--spacing has no effect: no label becomes tissue; remove it, or choose some with --soft");
   if (spacing && !split.soft.empty()) {
     const voxel::LabelVolume tissue = read_labels(options.labels, spacing, parts.notes);
     add_segmentation(fine, tissue, names, split, folder, parts, progress);
@@ -217,10 +221,11 @@ PressPath no_path() {
 }
 
 Composed compose_starter(const ComposeOptions& options) {
-  if (!options.place.empty() || !options.rigid.empty() || !options.soft.empty() || !options.names.empty()) {
+  if (!options.place.empty() || !options.rigid.empty() || !options.soft.empty() || !options.names.empty() ||
+      options.range || options.spacing_m) {
     throw ComposeError(
-        "--place, --rigid, --soft and --names need something to work on; give a mesh, a volume or --labels "
-        "FILE");
+        "--place, --rigid, --soft, --names, --range and --spacing need something to work on; give a mesh, a "
+        "volume or --labels FILE");
   }
   ComposeFolder folder(options.out, options.force);
   folder.write_text(kScene, starter_scene());
@@ -260,6 +265,14 @@ Composed compose(const ComposeOptions& options, const Progress& progress) {
     throw ComposeError(fmt::format("--range {:.6g},{:.6g}: must be LO,HI with LO at most HI, as in 300,3000",
                                    (*options.range)[0], (*options.range)[1]));
   }
+  const bool intensities = std::any_of(inputs.begin(), inputs.end(), [](const Input& i) { return !i.mesh; });
+  if (options.range && !intensities) {
+    throw ComposeError(
+        "--range has no effect: it chooses intensities of a volume without labels, and there is none; remove "
+        "it");
+  }
+  if (options.spacing_m && !intensities && options.labels.empty())
+    throw ComposeError("--spacing has no effect: only meshes are given, and no tissue; remove it");
   for (const fs::path& scan : scans) check_grid(scan, options.labels);
 
   ComposeFolder folder(options.out, options.force);

@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 
 #include "hybrid/base/process_memory.h"
+#include "hybrid/build/soft_notes.h"
 #include "hybrid/compose/parts_from_labels.h"
 #include "hybrid/geometry/surface_nets.h"
 #include "polygon/files/mesh_file.h"
@@ -21,6 +22,7 @@ namespace {
 constexpr double kReadyVoxels = 1.5e6;  // more tissue is read coarser, unless --spacing says otherwise
 constexpr std::size_t kBins = 64;       // of the histogram; a reader's rules are tried one by one
 constexpr double kSmall_m = 5e-3;       // a mesh below this in mm was likely made in meters
+constexpr double kBone_HU = 300.0;      // a CT's value from which on a voxel is bone
 
 // The bin above which tissue begins: the split of the histogram into two classes with the greatest variance
 // between them (Otsu 1979).
@@ -62,13 +64,40 @@ double tissue_from(const std::filesystem::path& file, const voxel::VolumeStatist
   return statistics.minimum + width * (static_cast<double>(otsu(count)) + 1.0);
 }
 
+// Nothing tells bone from tissue in a volume without labels. In a CT bone is what is bright.
+void note_bone(const std::filesystem::path& file, const std::string& name, const voxel::LabelVolume& tissue,
+               const voxel::VolumeStatistics& statistics, SceneParts& parts) {
+  if (statistics.maximum < kBone_HU) return;
+  voxel::VolumeFileOptions options;
+  options.rules = {{kBone_HU, statistics.maximum, 1}};
+  options.spacing_m = tissue.spacing_m;
+  options.max_bytes = usable_memory_bytes() / 4;
+  const auto count = [](const voxel::LabelVolume& volume) {
+    return static_cast<double>(
+        std::count_if(volume.labels.begin(), volume.labels.end(), [](auto l) { return l != 0; }));
+  };
+  const double share = count(voxel::load_volume(file, options)) / std::max(1.0, count(tissue));
+  parts.notes.push_back(
+      fmt::format("{}: without labels all of it becomes one tissue, bone too: {:.2g} % of it lies above "
+                  "{:.0f}, which is bone "
+                  "in a CT. For rigid bone give --labels, or write a [[rigid]] object into the scene with "
+                  "volume = \"{}\" "
+                  "and range = [{:.0f}, {:.6g}]",
+                  name, 100.0 * share, kBone_HU, file.string(), kBone_HU, statistics.maximum));
+}
+
 }  // namespace
 
-std::optional<double> ready_spacing_m(const voxel::LabelVolume& volume, std::size_t filled) {
-  if (static_cast<double>(filled) <= kReadyVoxels) return std::nullopt;
+std::optional<double> ready_spacing_m(const voxel::LabelVolume& volume, std::size_t filled,
+                                      std::string& why) {
   const glm::dvec3& h = volume.spacing_m;
-  const double now = std::cbrt(h.x * h.y * h.z);
-  const double wanted = now * std::cbrt(static_cast<double>(filled) / kReadyVoxels);
+  const double thick = std::max({h.x, h.y, h.z}), fine = std::min({h.x, h.y, h.z});
+  const bool many = static_cast<double>(filled) > kReadyVoxels, uneven = thick > kThickSlices * fine;
+  if (!many && !uneven) return std::nullopt;
+  why = fmt::format("{} voxels of tissue", filled);
+  if (uneven) why += fmt::format(" in slices of {:.3g} mm and pixels of {:.3g} mm", 1e3 * thick, 1e3 * fine);
+  const double now = std::cbrt(h.x * h.y * h.z);  // the same number of voxels
+  const double wanted = now * std::cbrt(std::max(1.0, static_cast<double>(filled) / kReadyVoxels));
   // Rounded up to two digits, which is what a person reads.
   const double digit = std::pow(10.0, std::floor(std::log10(wanted)) - 1.0);
   return std::ceil(wanted / digit) * digit;
@@ -84,6 +113,7 @@ void add_intensities(const std::filesystem::path& file, const std::string& name,
     throw ComposeError(fmt::format("{}: every voxel is {:.6g}; give a volume with something in it",
                                    file.string(), statistics.minimum));
   }
+  const bool told = range.has_value();
   if (!range) {
     range = {tissue_from(file, statistics), statistics.maximum};
     parts.notes.push_back(
@@ -103,11 +133,12 @@ void add_intensities(const std::filesystem::path& file, const std::string& name,
     return static_cast<std::size_t>(
         std::count_if(volume.labels.begin(), volume.labels.end(), [](auto l) { return l != 0; }));
   };
-  const auto coarser = spacing_m ? std::nullopt : ready_spacing_m(volume, filled());
-  if (coarser) {
-    parts.notes.push_back(fmt::format("{}: {} voxels of tissue, read at {:.3g} mm; --spacing says otherwise",
-                                      name, filled(), *coarser * 1e3));
-    options.spacing_m = glm::dvec3(*coarser);
+  std::string why;
+  const auto ready = spacing_m ? std::nullopt : ready_spacing_m(volume, filled(), why);
+  if (ready) {
+    parts.notes.push_back(fmt::format("{}: {}, read at {:.3g} mm along all axes; --spacing says otherwise",
+                                      name, why, *ready * 1e3));
+    options.spacing_m = glm::dvec3(*ready);
     volume = voxel::load_volume(file, options);
   }
   if (filled() == 0) {
@@ -117,6 +148,7 @@ void add_intensities(const std::filesystem::path& file, const std::string& name,
                     "or a smaller --spacing",
                     file.string(), (*range)[0], (*range)[1], statistics.minimum, statistics.maximum));
   }
+  if (!told) note_bone(file, name, volume, statistics, parts);
   keep_largest_piece(volume, false);
   const Tissue* found = find_tissue(name);
   const Tissue& tissue = found == nullptr || found->bone ? unknown_tissue() : *found;

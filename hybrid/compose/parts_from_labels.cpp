@@ -226,6 +226,22 @@ std::vector<bool> as_flags(const std::set<int>& labels) {
   return flags;
 }
 
+// The object is called what its labels are called: all of a few, else the largest two.
+std::string name_of_tissue(const LabelVolume& tissue, const LabelNames& names, const std::set<int>& soft) {
+  std::vector<std::pair<std::size_t, std::string>> largest;
+  for (const auto& [label, count] : label_counts(tissue)) {
+    if (soft.contains(label)) largest.emplace_back(count, names.at(label));
+  }
+  std::stable_sort(largest.begin(), largest.end(),
+                   [](const auto& a, const auto& b) { return a.first > b.first; });
+  constexpr std::size_t kNamed = 2;
+  std::string name;
+  for (std::size_t n = 0; n < largest.size() && n < kNamed; ++n)
+    name += (name.empty() ? "" : "_and_") + largest[n].second.substr(0, 20);
+  if (largest.size() > kNamed) name += fmt::format("_and_{}", largest.size() - kNamed);
+  return name;
+}
+
 void add_tissue(const LabelVolume& tissue, const LabelNames& names, const Split& split, ComposeFolder& folder,
                 SceneParts& parts) {
   const std::array<Box, 256> boxes = label_boxes(tissue);
@@ -233,8 +249,11 @@ void add_tissue(const LabelVolume& tissue, const LabelNames& names, const Split&
   const auto missing = [&](int label) { return boxes[static_cast<std::size_t>(label)].high[0] < 0; };
   if (std::all_of(split.soft.begin(), split.soft.end(), missing))
     throw ComposeError("no soft label has a voxel at this spacing; give --spacing a smaller one");
-  SoftPart part{
-      .name = folder.unused_name("tissue"), .file = {}, .comment = {}, .placement = {}, .volume = {}};
+  SoftPart part{.name = folder.unused_name(name_of_tissue(tissue, names, split.soft)),
+                .file = {},
+                .comment = {},
+                .placement = {},
+                .volume = {}};
   part.file = part.name + ".nii.gz";
   std::vector<std::string_view> unknown;
   for (const int label : split.soft) {
@@ -250,9 +269,9 @@ void add_tissue(const LabelVolume& tissue, const LabelNames& names, const Split&
   }
   if (!unknown.empty()) {
     parts.notes.push_back(fmt::format(
-        "{}: no stiffness of such a tissue is known here; {} kPa is assumed. Correct [material.{}] "
-        "in the scene",
-        joined(unknown), unknown_tissue().young_Pa / 1e3, unknown_tissue().name));
+        "{}: no stiffness of such a tissue is known here; {} kPa is assumed. Correct `young` of the material "
+        "with this name in the scene",
+        joined(unknown), unknown_tissue().young_Pa / 1e3));
   }
   LabelVolume work = tissue;
   const voxel::ConnectedRuns runs(work, soft);
@@ -267,6 +286,9 @@ void add_tissue(const LabelVolume& tissue, const LabelNames& names, const Split&
         "the soft labels are loose specks of a few voxels each; choose others with --soft, or a smaller "
         "--spacing");
   part.volume = cropped(work, box, is_tissue);
+  const std::map<int, std::size_t> kept = label_counts(part.volume);
+  std::erase_if(part.materials, [&](const auto& label) { return !kept.contains(label.first); });
+  std::erase_if(part.label_names, [&](const auto& label) { return !kept.contains(label.first); });
   const double h = std::max({tissue.spacing_m.x, tissue.spacing_m.y, tissue.spacing_m.z});
   if (!split.rigid.empty()) part.rigid_within_mm = kHeldWithin * h * 1e3;
   voxel::save_volume(folder.claim(part.file), part.volume);

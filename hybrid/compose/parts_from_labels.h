@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "hybrid/build/build_world.h"
-#include "hybrid/compose/write_folder.h"
 #include "hybrid/compose/label_names.h"
+#include "hybrid/compose/write_folder.h"
 #include "hybrid/scene/tissue_table.h"
 #include "voxel/volume/label_volume.h"
 
@@ -90,8 +90,9 @@ void add_intensities(const std::filesystem::path& file, const std::string& name,
 void add_mesh(const std::filesystem::path& file, const std::string& name, const Placement& placement,
               ComposeFolder& folder, SceneParts& parts, const Progress& progress);
 
-// The spacing at which so many voxels of tissue answer readily; empty: the one they have.
-std::optional<double> ready_spacing_m(const voxel::LabelVolume& volume, std::size_t filled);
+// The spacing along all axes at which so many voxels of tissue answer readily and are felt where they are
+// drawn; empty: the one they have. `why` says the reason.
+std::optional<double> ready_spacing_m(const voxel::LabelVolume& volume, std::size_t filled, std::string& why);
 
 // Labels that have voxels.
 std::map<int, std::size_t> label_counts(const voxel::LabelVolume& volume);

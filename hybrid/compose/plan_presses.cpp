@@ -19,7 +19,10 @@ constexpr double kPixels = 400.0;      // along the scene's longest side, at mos
 constexpr double kSoftDepth = 0.8;     // of the tool's radius, that the hand goes beyond first contact
 constexpr double kBoneDepth = 0.25;    // the same, where nothing gives way
 constexpr double kClearance_m = 0.01;  // between presses, above what lies between; at least a diameter
-constexpr double kHold_s = 0.3;
+constexpr double kHold_s = 1.0;
+// From one press to the next the tool strokes over the surface: so deep, with a point of the path so often
+// (both of the tool's radius), except where the surface falls or rises by more than kSteep for a step aside.
+constexpr double kStrokeDepth = 0.25, kStrokeStep = 1.5, kSteep = 1.5;
 constexpr double kFastest_m_per_s = 0.06;             // a hand that explores
 constexpr std::size_t kMostRigid = 8, kMostSoft = 8;  // presses of each kind
 constexpr double kNothing = -std::numeric_limits<double>::infinity();
@@ -197,6 +200,16 @@ class HeightMap {
     }
     return most;
   }
+  // The height of the tool's centre that just touches at this place; kNothing where there is nothing.
+  [[nodiscard]] double touching(const glm::dvec3& p) const {
+    const int u = static_cast<int>(std::round((p[u_] - low_[u_]) / cell_));
+    const int v = static_cast<int>(std::round((p[v_] - low_[v_]) / cell_));
+    return u < 0 || v < 0 || u >= nu_ || v >= nv_ ? kNothing : centre_[index(u, v)];
+  }
+  // How far apart two places are across the view.
+  [[nodiscard]] double across(const glm::dvec3& a, const glm::dvec3& b) const {
+    return std::hypot(b[u_] - a[u_], b[v_] - a[v_]);
+  }
   [[nodiscard]] double height_of(const glm::dvec3& p) const { return view_.sign * p[view_.axis]; }
   [[nodiscard]] glm::dvec3 at_height(glm::dvec3 p, double height) const {
     p[view_.axis] = view_.sign * height;
@@ -282,6 +295,27 @@ struct Chosen {
   HeightMap::Spot spot;
 };
 
+// The way from one place of contact to another over the surface, without its ends. Where the surface is steep
+// or missing the tool is lifted over it by `lift_m`.
+std::vector<glm::dvec3> stroke(const HeightMap& map, const glm::dvec3& from, const glm::dvec3& to,
+                               double radius_m, double lift_m) {
+  const double way = map.across(from, to);
+  const int steps = static_cast<int>(std::ceil(way / (kStrokeStep * radius_m)));
+  std::vector<glm::dvec3> points;
+  double before = map.touching(from);
+  for (int n = 1; n < steps; ++n) {
+    const auto at = [&](int step) { return from + (to - from) * (static_cast<double>(step) / steps); };
+    const double height = map.touching(at(n)), after = map.touching(at(n + 1));
+    const double most = kSteep * way / steps;
+    const bool gentle = height != kNothing && std::abs(height - before) <= most &&
+                        (after == kNothing || std::abs(after - height) <= most);
+    const double over = std::max({map.clear_height(at(n - 1), at(n + 1)), map.height_of(from)}) + lift_m;
+    points.push_back(map.at_height(at(n), gentle ? height - kStrokeDepth * radius_m : over));
+    before = height;
+  }
+  return points;
+}
+
 // The best places, a few of each kind, in the order in which they are visited: view after view, and within
 // one the nearest next.
 std::vector<Chosen> choose(const Surfaces& all, const std::vector<HeightMap>& maps) {
@@ -344,7 +378,7 @@ PressPath plan_presses(const BuiltScene& built, const SceneParts& parts, double 
       // Round the box: out of the old side, along it until beyond the new one, and in.
       const View& old = views[*last];
       glm::dvec3 p = maps[*last].at_height(path.points.back().at_m, outside(old));
-      go(p, 0.0, "round the outside");
+      go(p, 0.0, "off, and round the outside");
       if (old.axis == view.axis) {
         const int side = (view.axis + 1) % 3;
         p[side] = all.high[side] + tool_radius_m + clearance;
@@ -357,10 +391,9 @@ PressPath plan_presses(const BuiltScene& built, const SceneParts& parts, double 
       }
       go(above);
     } else {
-      const glm::dvec3 from = path.points.back().at_m;
-      const double height = std::max(map.clear_height(from, contact), map.height_of(from)) + 0.25 * clearance;
-      go(map.at_height(from, height));
-      go(map.at_height(contact, height));
+      for (const glm::dvec3& p :
+           stroke(map, path.points.back().at_m, contact, tool_radius_m, 0.25 * clearance))
+        go(p);
     }
     last = press.view;
     const double depth = (target.rigid ? kBoneDepth : kSoftDepth) * tool_radius_m;
@@ -368,9 +401,9 @@ PressPath plan_presses(const BuiltScene& built, const SceneParts& parts, double 
     const std::string what = detail == target.name ? detail : fmt::format("{} ({})", target.name, detail);
     go(map.at_height(contact, map.height_of(contact) - depth), kHold_s,
        fmt::format("{}, {}", what, view.words));
-    go(map.at_height(contact, map.height_of(contact) + clearance));
     path.presses.push_back({what, view.words});
   }
+  if (last) go(maps[*last].at_height(path.points.back().at_m, outside(views[*last])), 0.0, "off");
   for (std::size_t t = 0; t < all.targets.size(); ++t) {
     const bool pressed =
         std::any_of(presses.begin(), presses.end(), [&](const Chosen& c) { return c.target == t; });

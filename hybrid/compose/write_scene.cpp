@@ -11,9 +11,6 @@
 namespace hybrid {
 namespace {
 
-// A quarter of the schema's default: in an abdomen of 290,000 voxels the tick's p99 fell by a third, and the
-// force was as near to equilibrium as with the default.
-constexpr int kBudget = 3000;
 constexpr double kToolShare = 0.02;  // radius of the tool, of the longest object
 constexpr double kCoupling = 800.0;  // N/m: calm in every grip; see `hybrid stability`
 
@@ -35,11 +32,41 @@ std::string plain(std::string text) {
   return text;
 }
 
-std::string key_of(const Tissue& tissue) {
-  std::string key(tissue.name);
-  std::replace(key.begin(), key.end(), ' ', '_');
-  return key;
-}
+// The name of each label's material: that of the label, as a bare key of TOML. So reports, plots and pictures
+// name organs.
+class MaterialNames {
+ public:
+  explicit MaterialNames(const SceneParts& parts) {
+    for (const SoftPart& part : parts.soft) {
+      auto& of_part = of_part_.emplace_back();
+      for (const auto& [label, tissue] : part.materials)
+        of_part[label] = unused(key_of(part.label_names.at(label)), tissue);
+    }
+  }
+  [[nodiscard]] const std::string& of(std::size_t part, int label) const { return of_part_[part].at(label); }
+  // All, in the order of their names.
+  [[nodiscard]] const std::map<std::string, const Tissue*>& all() const { return all_; }
+
+ private:
+  static std::string key_of(const std::string& label_name) {
+    std::string key = label_name;
+    for (char& c : key) {
+      const bool bare = std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' || c == '_';
+      if (!bare || static_cast<unsigned char>(c) >= 0x80) c = '_';
+    }
+    return key.empty() ? "tissue" : key;
+  }
+  // Labels of the same name and tissue share a material.
+  std::string unused(const std::string& key, const Tissue* tissue) {
+    std::string name = key;
+    for (int n = 2; all_.contains(name) && all_.at(name) != tissue; ++n) name = fmt::format("{}-{}", key, n);
+    all_[name] = tissue;
+    return name;
+  }
+
+  std::vector<std::map<int, std::string>> of_part_;
+  std::map<std::string, const Tissue*> all_;
+};
 
 std::string vector_mm(const glm::dvec3& v) {
   return fmt::format("[{:.7g}, {:.7g}, {:.7g}]", v.x, v.y, v.z);
@@ -52,22 +79,24 @@ void add_placement(std::string& text, const Placement& p) {
                         vector_mm(p.rotation_deg));
 }
 
-void add_materials(std::string& text, const SceneParts& parts) {
-  std::vector<const Tissue*> used;
-  for (const SoftPart& part : parts.soft) {
-    for (const auto& [label, tissue] : part.materials) {
-      if (std::find(used.begin(), used.end(), tissue) == used.end()) used.push_back(tissue);
-    }
-  }
-  if (used.empty()) return;
+void add_materials(std::string& text, const MaterialNames& names) {
+  if (names.all().empty()) return;
   text +=
-      "\n# Stiffness of tissue: Young's modulus and Poisson's ratio, with where they are from. `stretch` and "
-      "`shear`\n"
-      "# bound how far a link may give way; see scenes/README.md.\n";
-  for (const Tissue* t : used) {
+      "\n# Stiffness of tissue: Young's modulus and Poisson's ratio, with where they are from. Links between "
+      "voxels\n"
+      "# are right for ratios up to 0.3. A tissue above that has 0.3, and the Young's modulus that keeps its "
+      "contact\n"
+      "# modulus E/(1 - nu^2). `stretch` and `shear` bound how far a link may give way; see "
+      "scenes/README.md.\n";
+  for (const auto& [name, t] : names.all()) {
+    const LatticeStiffness links = as_six_links(*t);
+    const std::string published = links.poisson == t->poisson
+                                      ? std::string()
+                                      : fmt::format("{:.6g} at nu {:.3g}; ", t->young_Pa, t->poisson);
     text += fmt::format(
-        "[material.{}]\nyoung = {:.6g} # Pa; {}{}\npoisson = {:.3g}\nstretch = [0.5, 1.5]\nshear = 0.5\n\n",
-        key_of(*t), t->young_Pa, t->measured ? "" : "no measurement: ", t->source, t->poisson);
+        "[material.{}]\nyoung = {:.4g} # Pa; {}{}{}\npoisson = {:.3g}\nstretch = [0.5, 1.5]\nshear = "
+        "0.5\n\n",
+        name, links.young_Pa, published, t->measured ? "" : "no measurement: ", t->source, links.poisson);
   }
 }
 
@@ -97,8 +126,9 @@ std::string anchors(const SoftPart& part) {
   return "{ " + items + " }";
 }
 
-void add_soft(std::string& text, const SceneParts& parts) {
-  for (const SoftPart& part : parts.soft) {
+void add_soft(std::string& text, const SceneParts& parts, const MaterialNames& names) {
+  for (std::size_t o = 0; o < parts.soft.size(); ++o) {
+    const SoftPart& part = parts.soft[o];
     text +=
         "# Tissue: one volume, so that what touches in the body hangs together. Its labels have the "
         "stiffness that\n"
@@ -110,12 +140,12 @@ void add_soft(std::string& text, const SceneParts& parts) {
                         quoted(part.file));
     const bool alone = part.materials.size() == 1;
     if (alone) {
-      text += fmt::format("material = {}\n", quoted(key_of(*part.materials.begin()->second)));
+      text += fmt::format("material = {}\n", quoted(names.of(o, part.materials.begin()->first)));
     } else {
       text += "materials = { ";
       bool first = true;
       for (const auto& [label, tissue] : part.materials) {
-        text += fmt::format("{}\"{}\" = {}", first ? "" : ", ", label, quoted(key_of(*tissue)));
+        text += fmt::format("{}\"{}\" = {}", first ? "" : ", ", label, quoted(names.of(o, label)));
         first = false;
       }
       text += " }\n# labels:";
@@ -133,9 +163,6 @@ void add_soft(std::string& text, const SceneParts& parts) {
       text += line + "\n";
     }
     text += fmt::format("anchors = {}\n", anchors(part));
-    text += fmt::format(
-        "budget = {} # voxel updates of the background a tick; more settles sooner and costs time\n",
-        kBudget);
     add_placement(text, part.placement);
     text += "\n";
   }
@@ -143,9 +170,10 @@ void add_soft(std::string& text, const SceneParts& parts) {
 
 void add_path(std::string& text, const PressPath& path) {
   text +=
-      "# Where the simulated hand goes: [x, y, z] or [x, y, z, seconds to hold]. The points after a comment "
-      "are the\n"
-      "# press that it names and the way off again. kind = \"lissajous\", \"slide\" or a recorded \"csv\" "
+      "# Where the simulated hand goes: [x, y, z] or [x, y, z, seconds to hold]. A comment names the press "
+      "of its\n"
+      "# point; the points after it are the way over the surface to the next one. kind = \"lissajous\", "
+      "\"slide\" or a recorded \"csv\" "
       "are other paths.\n"
       "[path]\nkind = \"waypoints\"\n";
   text += fmt::format("speed = {:.3g} # mm/s\npoints = [\n", path.speed_m_per_s * 1e3);
@@ -199,10 +227,11 @@ std::string scene_text(const SceneParts& parts, const SceneSettings& settings, c
   text +=
       "# A simulated device; model = \"phantom\" is a real one.\n[device]\nmodel = \"premium-1.5\"\nrate = "
       "1000 # Hz\n";
-  add_materials(text, parts);
+  const MaterialNames names(parts);
+  add_materials(text, names);
   if (text.back() == '\n' && !text.ends_with("\n\n")) text += "\n";
   add_rigid(text, parts);
-  add_soft(text, parts);
+  add_soft(text, parts, names);
   add_path(text, path);
   return text;
 }

@@ -38,15 +38,15 @@ std::string summary(const std::vector<bench::RigidRow>& rows) {
   for (const bench::RigidRow& row : rows) {
     if (row.engine != bench::Engine::hybrid) continue;
     ++runs;
-    inside += row.judged.inside_ticks;
-    pops += row.judged.pop_throughs;
+    inside += row.judged.inside_ticks.value_or(0);
+    pops += row.judged.pop_throughs.value_or(0);
     lost += row.judged.lost_ticks;
     if (row.judged.error_mesh_max) worst = std::max(worst, *row.judged.error_mesh_max / row.scale);
   }
   if (runs == 0) return {};
   return fmt::format(
       "hybrid, {} runs: {} ticks inside, {} times popped through; error against the mesh at most {:.3g} um "
-      "(of a scene of size 1), {} ticks without an optimum nearby\n",
+      "(in a scene of size 1; of a file at its own size), {} ticks without an optimum nearby\n",
       runs, inside, pops, 1e6 * worst, lost);
 }
 
@@ -65,10 +65,16 @@ void rigid_suite(const BenchCommand& command, std::FILE* words, nlohmann::ordere
                                    .every_tick = command.every_tick,
                                    .paths = chosen_in_suite(command.only, bench::rigid_paths()),
                                    .meshes = command.meshes,
+                                   .mesh_unit_m = command.mesh_unit_m,
                                    .engines = engines_of(command.engines),
                                    .trace = command.trace,
                                    .progress = progress_on_terminal(),
+                                   .on_note = {},
                                    .on_row = {}};
+  options.on_note = [](const std::string& note) {
+    end_progress();
+    fmt::print(stderr, "note: {}\n", note);
+  };
   options.on_row = [words, &json](const bench::RigidRow& row) {
     end_progress();
     json.push_back(bench::to_json(row));
@@ -220,7 +226,7 @@ std::vector<std::string> bench_engines() {
 }
 std::string bench_mesh_error(const std::string& name) {
   try {
-    bench::bench_mesh_shape(name);
+    if (!bench::is_bench_mesh_file(name)) (void)bench::bench_mesh_shape(name);
     return {};
   } catch (const std::invalid_argument& e) {
     return e.what();

@@ -13,6 +13,7 @@
 #include "hybrid/program/outputs.h"
 #include "hybrid/scene/table_reader.h"
 #include "hybrid/session/report.h"
+#include "hybrid/session/scene_cost.h"
 #include "polygon/files/mesh_file.h"
 #include "polygon/repair/check.h"
 #include "polygon/surface/mesh_surface.h"
@@ -146,10 +147,24 @@ void check_volume_file(const std::filesystem::path& path, Json& file) {
       static_cast<double>(bytes) / 1e6, static_cast<double>(soft_touched_bytes(h.dims)) / 1e6);
 }
 
+Json to_json(const SceneCost& cost) {
+  return {{"load_s", cost.load_s},
+          {"held_memory_bytes", cost.held_bytes},
+          {"touched_memory_bytes", cost.touched_bytes},
+          {"tick_us", cost.tick_us ? hybrid::to_json(*cost.tick_us) : Json(nullptr)},
+          {"ticks", cost.ticks},
+          {"places", cost.places},
+          {"period_us", cost.period_us}};
+}
+
 void check_scene_file(const std::filesystem::path& path, Json& file) {
   file["kind"] = "scene";
   const Scene scene = load_scene(path);
-  const BuiltScene built = build_scene(scene, progress_on_terminal());
+  const Progress progress = progress_on_terminal();
+  BuiltScene built = build_scene(scene, progress);
+  note_relaxation(scene, built, true);
+  progress("measuring ticks at places of contact");
+  const SceneCost cost = measure_cost(scene, built);
   end_progress();
   std::uint64_t bytes = built.state->map.memory_bytes();
   for (const BuildNote& note : built.notes) {
@@ -185,6 +200,10 @@ void check_scene_file(const std::filesystem::path& path, Json& file) {
   }
   file["touch_bytes"] = bytes;
   file["build_s"] = built.seconds;
+  file["cost"] = to_json(cost);
+  const bool slow = cost.tick_us && cost.tick_us->p99 > cost.period_us;
+  add_finding(file, {"S04", slow ? polygon::Severity::warning : polygon::Severity::info, 1,
+                     "cost: " + in_words(cost) + (slow ? "; use a coarser spacing or a smaller tool" : "")});
   file["summary"] = fmt::format(
       "{} rigid and {} soft objects, {} occupied cells of {:.3g} mm; {:.1f} MB to touch, built in {:.2f} s",
       built.world->rigid.size(), built.world->soft.size(), built.state->map.occupied_cells(),

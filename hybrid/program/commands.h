@@ -70,6 +70,7 @@ struct BenchCommand {
   std::string suite;  // of bench_suites(), or "all"
   bool quick = false, every_tick = false;
   std::vector<std::string> only, meshes, engines;  // empty: the suite's own choice
+  double mesh_unit_m = 1e-3;                       // of rigid: of mesh files
   std::vector<int> sizes;                          // of soft: voxels an edge; empty: its own choice
   std::vector<std::size_t> cells;                  // of occupancy: occupied cells; empty: its own choice
   std::vector<std::filesystem::path> scenes;       // of threads
@@ -83,7 +84,7 @@ int run_bench(const BenchCommand& command);
 const std::vector<std::string>& bench_suites();
 std::vector<std::string> bench_parts();  // paths of rigid, cases of soft and occupancy
 std::vector<std::string> bench_engines();
-std::string bench_mesh_error(const std::string& name);  // empty: the mesh exists
+std::string bench_mesh_error(const std::string& name);  // empty: a mesh's name, or a path
 
 struct StabilityCommand {
   std::filesystem::path scene, plot;

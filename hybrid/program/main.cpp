@@ -189,11 +189,15 @@ void add_bench(CLI::App& app, int& status) {
   sub->add_option("--only", c->only, "paths of rigid, cases of soft and occupancy, with commas between")
       ->delimiter(',')
       ->check(CLI::IsMember(hybrid::bench_parts()));
-  sub->add_option("--meshes", c->meshes,
-                  "of rigid: meshes, with commas between: ico0 to ico9 (20 x 4^n triangles), geo1 to geo1024 "
-                  "(20 x n^2), cube1 to cube1024, corner1 to corner1024")
+  sub->add_option(
+         "--meshes", c->meshes,
+         "of rigid: meshes, with commas between: files (my.obj), and ico0 to ico9 (20 x 4^n triangles), "
+         "geo1 to geo1024 (20 x n^2), cube1 to cube1024, corner1 to corner1024")
       ->delimiter(',')
       ->check(CLI::Validator(hybrid::bench_mesh_error, "MESH"));
+  sub->add_option("--unit", c->mesh_unit_m, "of rigid: length unit of mesh files in meters")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   sub->add_option("--sizes", c->sizes, "of soft: voxels an edge of sessions and loads, with commas between")
       ->delimiter(',')
       ->check(CLI::Range(16, 1024));

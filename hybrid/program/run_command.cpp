@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <fstream>
@@ -99,6 +100,7 @@ int run(const RunCommand& command) {
   const auto real = open_real_device(scene);  // before the build, which may take long
   BuiltScene built = build_scene(scene, progress);
   end_progress();
+  note_relaxation(scene, built, command.relaxation == "apart");
   print_notes(built);
   const device::StopOnSignal stop;  // until here a signal ends at once, as there is nothing to keep
   if (real) {

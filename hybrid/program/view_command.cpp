@@ -249,6 +249,7 @@ int view(const ViewCommand& command) {
   const auto real = open_real_device(scene);
   BuiltScene built = build_scene(scene, progress_on_terminal());
   end_progress();
+  note_relaxation(scene, built, true);
   print_notes(built);
   DrawnScene drawn =
       drawn_scene(scene, built, scene.title.empty() ? command.scene.stem().string() : scene.title);

@@ -16,6 +16,7 @@
 #include "hybrid/scene/scene.h"
 #include "hybrid/scene/table_reader.h"
 #include "hybrid/scene/toml_tree.h"
+#include "hybrid/scene/unused_keys.h"
 
 namespace hybrid {
 namespace {
@@ -324,6 +325,7 @@ Scene read_whole(const std::filesystem::path& file) {
     scene.path_place = table.place();
   });
   if (!errors.empty()) throw_all(file, errors);
+  note_unused_keys(root, scene);
   return scene;
 }
 

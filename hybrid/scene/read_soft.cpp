@@ -299,6 +299,7 @@ SoftDescription read_soft(const SceneSource& source, const TreeNode& table, std:
   }
   out.anchors = read_anchors(reader, known);
   out.budget = static_cast<std::uint32_t>(reader.integer("budget", 1, 1'000'000'000, out.budget));
+  if (reader.has("budget")) out.budget_place = reader.place_of("budget");
   if (reader.has("thinning")) out.thinning = read_thinning(reader, known);
   if (const auto energy = read_energy(reader)) out.energy = *energy;
   static constexpr SoftModel kinds[] = {SoftModel::voxels, SoftModel::proxy, SoftModel::automatic};

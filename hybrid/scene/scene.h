@@ -188,6 +188,7 @@ struct SoftDescription {
   std::string material;                           // name; empty: the default Material
   Anchors anchors;
   std::uint32_t budget = 12'000;  // voxel updates of background relaxation a tick
+  SourcePlace budget_place{};     // of the key; line 0: the default
   std::optional<Thinning> thinning{};
   Energy energy = Energy::six_link;  // for materials without their own
   // Always `voxels` in Scene::soft of a loaded scene: the model of others has been decided.
@@ -211,6 +212,10 @@ enum class Overlap : std::uint8_t { carve, refuse };
 struct ModelNote {
   std::string object, text;
 };
+// A key without effect, its line, and the reason.
+struct UnusedKey {
+  std::string object, text;  // object: empty for a key of the scene
+};
 
 struct Scene {
   std::filesystem::path file;
@@ -223,6 +228,7 @@ struct Scene {
   std::vector<RigidDescription> rigid;
   std::vector<SoftDescription> soft;
   std::vector<ModelNote> model_notes;
+  std::vector<UnusedKey> unused_keys;
   std::map<std::string, Material> materials;
   Tool tool;
   // Simulated, unless real_device is set.

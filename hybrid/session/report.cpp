@@ -32,6 +32,7 @@ struct ObjectRow {
   std::size_t triangles = 0, voxels = 0, surface_voxels = 0, memory_bytes = 0;
   std::uint64_t contact_ticks = 0;
   double max_force_N = 0.0;
+  std::vector<FeltMaterial> materials{};  // those that were felt
 };
 
 std::vector<ObjectRow> object_rows(const BuiltScene& built, const SessionResult& result) {
@@ -53,6 +54,9 @@ std::vector<ObjectRow> object_rows(const BuiltScene& built, const SessionResult&
                     .voxels = object.lattice().voxel_count(),
                     .surface_voxels = object.lattice().surface().size(),
                     .memory_bytes = object.memory_bytes()});
+    for (const FeltMaterial& material : result.felt_materials[o]) {
+      if (material.contact_ticks > 0) rows.back().materials.push_back(material);
+    }
   }
   for (std::size_t o = 0; o < rows.size(); ++o) {
     rows[o].contact_ticks = result.object_contact_ticks[o];
@@ -197,6 +201,13 @@ nlohmann::ordered_json run_report(const Scene& scene, const BuiltScene& built, S
     o["memory_bytes"] = row.memory_bytes;
     o["contact_ticks"] = row.contact_ticks;
     o["max_force_N"] = row.max_force_N;
+    if (row.kind == "soft") {
+      o["materials"] = nlohmann::ordered_json::array();
+      for (const FeltMaterial& m : row.materials) {
+        o["materials"].push_back(
+            {{"name", m.name}, {"contact_ticks", m.contact_ticks}, {"max_force_N", m.max_force_N}});
+      }
+    }
     if (!row.motion.empty()) {
       o["motion"] = row.motion;
       o["position_m"] = {row.position_m.x, row.position_m.y, row.position_m.z};
@@ -227,6 +238,14 @@ nlohmann::ordered_json run_report(const Scene& scene, const BuiltScene& built, S
                  {"end", kEnds[static_cast<std::size_t>(result.end)]},
                  {"messages", result.device_messages}};
   j["path_notes"] = result.path_notes;
+  j["notes"] = nlohmann::ordered_json::array();
+  for (const BuildNote& note : built.notes) {
+    j["notes"].push_back({{"object", note.object},
+                          {"severity", note.severity == polygon::Severity::info      ? "info"
+                                       : note.severity == polygon::Severity::warning ? "warning"
+                                                                                     : "error"},
+                          {"text", note.text}});
+  }
   j["faults"] = fault_texts(built.state->faults);
   j["build_s"] = built.seconds;
   j["load"] = {{"seconds", built.seconds},
@@ -248,6 +267,11 @@ std::string run_summary(const BuiltScene& built, SessionResult& result) {
     text += fmt::format("  {:<16} {:<5} {:>9} {:<9} felt in {} ticks, at most {:.3f} N\n", row.name, row.kind,
                         row.kind == "rigid" ? row.triangles : row.voxels,
                         row.kind == "rigid" ? "triangles" : "voxels", row.contact_ticks, row.max_force_N);
+    for (const FeltMaterial& m : row.materials) {
+      if (row.materials.size() == 1 && m.name == row.name) continue;
+      text += fmt::format("    {:<30} felt in {} ticks, at most {:.3f} N\n", m.name, m.contact_ticks,
+                          m.max_force_N);
+    }
   }
   if (result.contact_ticks == 0) {
     text += "nothing was touched: does the [path] lead to an object? They lie in\n";

@@ -94,7 +94,8 @@ class Run {
         realtime_(options.realtime || options.real_device != nullptr),
         follows_machine_(realtime_ && options.async_relaxation && !state.soft.empty()),
         dt_(1.0 / scene.rate_hz),
-        work_share_(dt_) {
+        work_share_(dt_),
+        felt_(scene, world) {
     const double usual = options.real_device == nullptr ? path_->duration_s() + kAfterPath_s : kWithHand_s;
     const double seconds = options.seconds.value_or(usual);
     result_.device_name = device_.name();
@@ -147,6 +148,7 @@ class Run {
     result_.device_messages = std::move(served.messages);
     result_.ticks = ticks_done_;
     result_.state_hash = hash_state(hash_, state_);
+    for (std::size_t o = 0; o < world_.soft.size(); ++o) result_.felt_materials.push_back(felt_.of(o));
     if (ticks_done_ > 0) result_.rms_force_N = std::sqrt(sum_force2_ / static_cast<double>(ticks_done_));
     return std::move(result_);
   }
@@ -220,6 +222,8 @@ class Run {
       result_.object_max_force_N[o] = std::max(result_.object_max_force_N[o], state_.feel[o].force_N);
       if (options_.keep_rows) result_.object_force_N[o].push_back(state_.feel[o].force_N);
     }
+    for (std::size_t o = 0; o < world_.soft.size(); ++o)
+      felt_.add(world_, state_, o, state_.feel[world_.rigid.size() + o].force_N);
     if (!options_.keep_rows) return;
     result_.rows.push_back({static_cast<double>(tick) * dt_, felt.device_m, felt.proxy_m, felt.force_N,
                             glm::length(felt.rigid_N), glm::length(felt.soft_N), felt.contacts,
@@ -273,6 +277,7 @@ class Run {
   bool realtime_, follows_machine_;
   double dt_;
   WorkShare work_share_;
+  FeltMaterials felt_;
   LatencyHistogram late_us_;
   std::chrono::steady_clock::time_point last_report_ = std::chrono::steady_clock::now();
   std::uint64_t clearance_every_ = 1;

@@ -17,6 +17,7 @@
 #include "hybrid/build/load_scene.h"
 #include "hybrid/session/black_box.h"
 #include "hybrid/session/clearance.h"
+#include "hybrid/session/felt_materials.h"
 #include "hybrid/session/force_error.h"
 #include "hybrid/snapshot/snapshot.h"
 #include "hybrid/tick/tick.h"
@@ -69,10 +70,11 @@ struct SessionResult {
   double dt_s = 0.0;
   std::uint64_t state_hash = 0;
   std::vector<TraceRow> rows;
-  std::vector<std::vector<double>> object_force_N;  // [object][row]
-  ClearanceCourse clearance;                        // of keep_clearance, where anything is soft
-  std::vector<std::uint64_t> object_contact_ticks;  // [object]
-  std::vector<double> object_max_force_N;           // [object]
+  std::vector<std::vector<double>> object_force_N;        // [object][row]
+  ClearanceCourse clearance;                              // of keep_clearance, where anything is soft
+  std::vector<std::uint64_t> object_contact_ticks;        // [object]
+  std::vector<double> object_max_force_N;                 // [object]
+  std::vector<std::vector<FeltMaterial>> felt_materials;  // [soft object][material]
   LatencyHistogram tick_us;
   std::array<LatencyHistogram, kStages> stage_us;
   double max_force_N = 0.0, rms_force_N = 0.0;
@@ -96,6 +98,9 @@ struct SessionResult {
   double least_work_share = 1.0;
   std::uint64_t ticks_with_less_work = 0;
 };
+
+// Adds notes on keys of the scene that have no effect with this kind of relaxation.
+void note_relaxation(const Scene& scene, BuiltScene& built, bool async_relaxation);
 
 // Runs the scene's path to its end on its device, or until a signal (StopOnSignal): then the result is of the
 // ticks so far, and `end` says so. Throws SceneError: the tool starts inside something rigid.

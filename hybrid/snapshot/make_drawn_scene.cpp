@@ -2,7 +2,6 @@
 #include "hybrid/snapshot/make_drawn_scene.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -10,36 +9,13 @@
 #include <map>
 #include <span>
 
+#include "hybrid/snapshot/materials_of_labels.h"
+
 namespace hybrid {
 namespace {
 
 constexpr double kDrawnPoint = 0.004;  // of the scene: smallest drawn radius of a tool
-constexpr const char* kUnnamed = "default material";
 constexpr std::size_t kMostInside = 1U << 24U;  // cells of an object whose inside is kept for a cut
-
-// The material of each label, as a number and by name.
-struct MaterialsOfLabels {
-  std::array<std::uint8_t, 256> of_label{};
-  std::vector<std::string> names;
-};
-
-MaterialsOfLabels materials_of_labels(const SoftDescription& description, const SoftBody& body) {
-  MaterialsOfLabels result;
-  std::map<std::string, std::uint8_t> number;
-  const auto number_of = [&](const std::string& name) {
-    const auto [at, fresh] = number.try_emplace(name, static_cast<std::uint8_t>(number.size()));
-    if (fresh) result.names.push_back(name);
-    return at->second;
-  };
-  for (std::size_t label = 1; label < 256; ++label) {
-    const auto own = description.materials.find(static_cast<std::uint8_t>(label));
-    const std::string& name = own != description.materials.end() ? own->second : description.material;
-    result.of_label[label] = number_of(name.empty() ? kUnnamed : name);
-  }
-  // A strut has the tissue that it replaces.
-  for (const auto& [strut, label] : body.struts) result.of_label[strut] = result.of_label[label];
-  return result;
-}
 
 // The material of most voxels around a vertex. A vertex lies within one cube between eight voxel centres, of
 // which at least one is filled. Ties go to the material that was named first.

@@ -32,8 +32,8 @@ struct TickResult {
   glm::dvec3 rigid_N{0.0}, soft_N{0.0};
   // A bit per object, rigid ones first; all objects from the 32nd on share the last bit.
   std::uint32_t contacts = 0;
-  std::array<float, kStages> stage_us{};
-  double tick_us = 0.0;  // CPU time of this thread; the stages are wall time
+  std::array<float, kStages> stage_us{};  // CPU time of this thread
+  double tick_us = 0.0;                   // the sum of the stages
 };
 
 // One tick of dt_s. A pure function of (world, state, input, dt_s), measured times excepted: the same inputs

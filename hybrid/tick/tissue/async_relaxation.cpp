@@ -111,13 +111,17 @@ void exchange(WorldState& state, std::size_t o, std::uint64_t& arrived) noexcept
 
 }  // namespace
 
+bool relaxes_asynchronously(const WorldState& state, std::size_t o) {
+  const voxel::SoftObject& object = *state.soft[o];
+  return o < kMaxAsync && !object.lattice().has_plasticity() && !object.uses_patches();
+}
+
 void start_async_relaxation(WorldState& state, Arrival arrival) {
   state.async.arrival = arrival;
   state.async.objects.clear();
   for (std::size_t o = 0; o < state.soft.size(); ++o) {
-    const voxel::SoftObject& object = *state.soft[o];
-    const bool is_async = o < kMaxAsync && !object.lattice().has_plasticity() && !object.uses_patches();
-    state.async.objects.push_back(is_async ? std::make_unique<AsyncObject>(*state.soft[o]) : nullptr);
+    state.async.objects.push_back(
+        relaxes_asynchronously(state, o) ? std::make_unique<AsyncObject>(*state.soft[o]) : nullptr);
   }
 }
 

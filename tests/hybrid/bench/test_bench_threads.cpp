@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <string>
 
 #include "tests/hybrid/fixtures/touch.h"
 
@@ -17,8 +18,16 @@ TEST(BenchThreads, WhatIsHandedOutIsFeltAsWhatWasRelaxed) {
   options.scenes = {tests::source_folder / "tests/hybrid/tick/arbitration/kept.toml",
                     tests::source_folder / "tests/hybrid/tick/arbitration/soft_on_soft.toml"};
   options.seconds = 0.1;  // a path's length is longer
+  std::size_t said = 0;
+  options.progress = [&said](const std::string& text) {  // "kept, memory: 0 of 0.1 s"
+    const std::size_t of = text.rfind(" of "), from = text.rfind(": ");
+    ASSERT_TRUE(of != std::string::npos && from < of) << text;
+    EXPECT_LE(std::stod(text.substr(from + 2)), std::stod(text.substr(of + 4))) << text;
+    ++said;
+  };
   const std::vector<ThreadsRow> rows = hybrid::bench::bench_threads(options);
   ASSERT_EQ(rows.size(), 6U);
+  EXPECT_EQ(said, 8U);
   for (std::size_t scene = 0; scene < rows.size(); scene += 3) {
     const ThreadsRow &relaxed = rows[scene], &handed = rows[scene + 1], &without = rows[scene + 2];
     SCOPED_TRACE(hybrid::bench::threads_table({relaxed, handed, without}));
