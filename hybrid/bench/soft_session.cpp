@@ -99,8 +99,8 @@ SoftRow session_row(int edge, const Scene& scene, BuiltScene& built, const SoftB
     row.reference = "the equilibrium lattice with its limits";
   }
   row.bytes_per_voxel = static_cast<double>(soft_bytes(*built.state)) / static_cast<double>(row.voxels);
-  row.note =
-      fmt::format("ticks; error's p99 of {}, at most {:.2f} JND", result.error.all.samples, result.error.all.max_jnd);
+  row.note = fmt::format("ticks; error's p99 of {}, at most {:.2f} JND", result.error.all.samples,
+                         result.error.all.max_jnd);
   return row;
 }
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // One object of a scene felt in several ways along the same motion: as mesh and proxy, as voxels where it has
 // any, a rigid one by the surface nearest to the device (no proxy: thesis, Fig 18), a soft one also by the
-// thesis's own algorithm (voxel/baseline/thesis_chainmail.h), and in closed form where one applies (ball, box or block under a
-// ball; flat punch on a block).
+// thesis's own algorithm (voxel/baseline/thesis_chainmail.h), and in closed form where one applies (ball, box
+// or block under a ball; flat punch on a block).
 #pragma once
 
 #include <string>

@@ -7,8 +7,8 @@
 #include <optional>
 #include <string_view>
 
-#include "hybrid/scene/tissue_table.h"
 #include "hybrid/scene/table_reader.h"
+#include "hybrid/scene/tissue_table.h"
 
 namespace hybrid {
 namespace {

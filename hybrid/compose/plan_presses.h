@@ -29,9 +29,8 @@ struct PressPath {
 
 // Looks at the scene along each axis, both ways, as heights over a grid, each dilated by the tool: what a
 // ball meets first that comes along the axis, and where. Each kind of bone, mesh and tissue is pressed once,
-// from where most of it faces the tool. From press to press the tool strokes over what lies between, and it goes
-// round the outside from view to view. `built` has the objects of `parts`,
-// in order.
+// from where most of it faces the tool. From press to press the tool strokes over what lies between, and it
+// goes round the outside from view to view. `built` has the objects of `parts`, in order.
 PressPath plan_presses(const BuiltScene& built, const SceneParts& parts, double tool_radius_m);
 
 }  // namespace hybrid

@@ -4,7 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
+
+#include "hybrid/base/number_text.h"
 
 namespace hybrid {
 namespace {
@@ -149,13 +150,11 @@ std::vector<double> nice_ticks(double from, double to, int wanted) {
 
 std::string tick_text(double value, double step) {
   constexpr int kMostDecimals = 12;
-  std::array<char, 64> text{};
   const double size = std::max(std::abs(value), std::abs(step));
   if (std::abs(value) < 1e-9 * std::abs(step)) return "0";
   std::string digits;
   if (size >= 1e15 || (step != 0.0 && std::abs(step) < 1e-12)) {
-    std::snprintf(text.data(), text.size(), "%.4g", value);
-    digits = text.data();
+    digits = with_digits(value, 4);
   } else {
     int decimals = step != 0.0 ? 0 : 3;
     for (double rest = std::abs(step);
@@ -163,8 +162,7 @@ std::string tick_text(double value, double step) {
       rest *= 10.0;
       ++decimals;
     }
-    std::snprintf(text.data(), text.size(), "%.*f", decimals, value);
-    digits = with_commas(text.data());
+    digits = with_commas(with_decimals(value, decimals));
   }
   return digits[0] == '-' ? "−" + digits.substr(1) : digits;
 }
@@ -183,11 +181,9 @@ std::string quantity_text(double value, std::string_view unit) {
     if (size >= prefix.size * (1.0 - 1e-9)) break;
   }
   if (size == 0.0) chosen = prefixes[2];
-  std::array<char, 64> text{};
-  std::snprintf(text.data(), text.size(), "%.6g ", value / chosen.size);
-  std::string out = text[0] == '-' ? "−" : "";
-  out += text.data() + (text[0] == '-' ? 1 : 0);
-  return out + chosen.name + std::string(unit);
+  const std::string digits = with_digits(value / chosen.size, 6);
+  const std::string sign = digits[0] == '-' ? "−" : "";
+  return sign + digits.substr(sign.empty() ? 0 : 1) + " " + chosen.name + std::string(unit);
 }
 
 }  // namespace hybrid

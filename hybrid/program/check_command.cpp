@@ -74,9 +74,8 @@ Json would_repair(const polygon::TriangleMesh& mesh, bool deep) {
             {"volume_m3", checked.volume_m3}};
   for (const polygon::Finding& f : repaired.changes) json["changes"].push_back(counted(f));
   for (const polygon::Finding& f : checked.findings) json["after"].push_back(counted(f));
-  json["summary"] =
-      fmt::format("{} vertices, {} triangles, {}", repaired.mesh.vertices.size(),
-                  repaired.mesh.triangles.size(), polygon::touched_as(checked));
+  json["summary"] = fmt::format("{} vertices, {} triangles, {}", repaired.mesh.vertices.size(),
+                                repaired.mesh.triangles.size(), polygon::touched_as(checked));
   return json;
 }
 
@@ -117,8 +116,7 @@ void check_mesh_file(const std::filesystem::path& path, const CheckCommand& comm
       "{} vertices, {} triangles, {:.4g} x {:.4g} x {:.4g} mm where the file's unit is {}, {}; "
       "{:.1f} MB to touch",
       mesh->vertices.size(), mesh->triangles.size(), 1e3 * (high.x - low.x), 1e3 * (high.y - low.y),
-      1e3 * (high.z - low.z), unit_in_words(command.unit_m),
-      polygon::touched_as(checked),
+      1e3 * (high.z - low.z), unit_in_words(command.unit_m), polygon::touched_as(checked),
       static_cast<double>(surface->memory_bytes()) / 1e6);
 }
 

@@ -6,7 +6,6 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
-#include <map>
 #include <span>
 
 #include "hybrid/snapshot/materials_of_labels.h"
@@ -14,7 +13,7 @@
 namespace hybrid {
 namespace {
 
-constexpr double kDrawnPoint = 0.004;  // of the scene: smallest drawn radius of a tool
+constexpr double kDrawnPoint = 0.004;           // of the scene: smallest drawn radius of a tool
 constexpr std::size_t kMostInside = 1U << 24U;  // cells of an object whose inside is kept for a cut
 
 // The material of most voxels around a vertex. A vertex lies within one cube between eight voxel centres, of

@@ -4,10 +4,7 @@
 #include <map>
 
 namespace hybrid {
-namespace {
-
-
-}  // namespace
+namespace {}  // namespace
 
 MaterialsOfLabels materials_of_labels(const SoftDescription& description, const SoftBody& body) {
   MaterialsOfLabels result;

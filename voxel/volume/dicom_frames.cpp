@@ -12,6 +12,7 @@
 #include <glm/geometric.hpp>
 
 #include "voxel/volume/check_header.h"
+#include "voxel/volume/number_at.h"
 
 namespace voxel {
 namespace {
@@ -38,8 +39,8 @@ std::vector<double> numbers_of(const gdcm::DataSet& set, const Tag& tag) {
   std::vector<double> values;
   const char* at = text.c_str();
   while (*at != '\0') {
-    char* end = nullptr;
-    values.push_back(std::strtod(at, &end));
+    const char* end = nullptr;
+    values.push_back(number_at(at, &end));
     while (*end == ' ') ++end;
     if (end == at || !std::isfinite(values.back()) || (*end != '\0' && *end != '\\')) return {};
     at = *end == '\0' ? end : end + 1;

@@ -10,6 +10,7 @@
 
 #include "voxel/volume/inspect_formats.h"
 #include "voxel/volume/length_unit.h"
+#include "voxel/volume/number_at.h"
 #include "voxel/volume/text_header.h"
 
 namespace voxel {
@@ -56,8 +57,8 @@ std::vector<double> vector_of(const fs::path& path, const std::string& key, cons
   std::vector<double> values;
   const char* at = word.c_str() + 1;
   while (word.size() > 2 && word.front() == '(') {
-    char* end = nullptr;
-    const double value = std::strtod(at, &end);
+    const char* end = nullptr;
+    const double value = number_at(at, &end);
     if (end == at) break;
     values.push_back(value);
     while (std::isspace(static_cast<unsigned char>(*end)) != 0) ++end;
@@ -69,8 +70,8 @@ std::vector<double> vector_of(const fs::path& path, const std::string& key, cons
 }
 
 double number_of(const fs::path& path, const std::string& key, const std::string& word) {
-  char* end = nullptr;
-  const double value = std::strtod(word.c_str(), &end);
+  const char* end = nullptr;
+  const double value = number_at(word.c_str(), &end);
   if (end == word.c_str() || *end != '\0') refuse_header(path, "'", word, "' of '", key, "' is no number");
   return value;
 }

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <fstream>
 
+#include "voxel/volume/number_at.h"
 #include "voxel/volume/raw_volume.h"
 
 namespace voxel {
@@ -42,8 +43,8 @@ std::string TextHeader::text(const std::string& key) const {
 double TextHeader::number(const std::string& key, double otherwise) const {
   const auto field = fields.find(key);
   if (field == fields.end()) return otherwise;
-  char* end = nullptr;
-  const double value = std::strtod(field->second.c_str(), &end);
+  const char* end = nullptr;
+  const double value = number_at(field->second.c_str(), &end);
   return end == field->second.c_str() ? std::nan("") : value;
 }
 
