@@ -20,7 +20,7 @@ struct RunCommand {
   std::optional<double> seconds;
   bool realtime = false;
   std::string device;  // replaces the scene's device; empty: the scene's
-  int samples = 24;
+  int samples = 1'000'000;  // more than a session has
   std::uint64_t start_ticks = 0;
   std::string relaxation = "apart";  // or "tick": where tissue away from the contact is relaxed
   std::filesystem::path trace, plot, picture, record, save_surface, save_volume;  // empty: not written

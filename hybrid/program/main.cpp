@@ -47,9 +47,9 @@ void add_run(CLI::App& app, int& status) {
   add_device(*sub, c->device);
   sub->add_option(
          "--samples", c->samples,
-         "how often the soft force is compared with its equilibrium (slow on large volumes); 0: never")
-      ->check(CLI::Range(0, 1000))
-      ->capture_default_str();
+         "most ticks in which the force of tissue is compared with the same path played slowly, which takes "
+         "several times as long as the session; 0: none; default: all")
+      ->check(CLI::Range(0, 1'000'000));
   sub->add_option("--start-ticks", c->start_ticks,
                   "begin with all clocks and counters as after so many ticks; nothing felt should differ");
   sub->add_option(

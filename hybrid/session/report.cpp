@@ -110,13 +110,12 @@ nlohmann::ordered_json budget_json(const BuiltScene& built, const ForceError& er
                            {"force_error_jnd", measured(error.all.max_jnd)},
                            {"worst_t_s", measured(error.all.worst_t_s)},
                            {"samples", error.all.samples},
-                           {"unsettled", error.unsettled},
                            {"moving", to_json(error.moving)},
                            {"still", to_json(error.still)},
                            {"within_1_jnd_after_s", nullptr},
                            {"verdict", in_words(error)}};
   if (error.within_after_s) j["within_1_jnd_after_s"] = *error.within_after_s;
-  j["reference"] = error.all.samples > 0 ? "equilibrium lattice with its limits, at the sampled ticks"
+  j["reference"] = error.all.samples > 0 ? fmt::format("the same path, {} times slower", kSlower)
                                          : "not measured: " + error.not_measured;
   return j;
 }
@@ -128,15 +127,10 @@ std::string range_words(const char* name, const ErrorRange& range) {
 }
 
 std::string error_words(const ForceError& error) {
-  if (error.all.samples == 0 && error.unsettled == 0)
-    return fmt::format("force error of tissue: not measured ({})\n", error.not_measured);
-  std::string text = fmt::format("force error of tissue, against the lattice at rest: {}\n", in_words(error));
-  text += range_words("moving", error.moving) + range_words("still", error.still);
-  if (error.unsettled > 0) {
-    text += fmt::format("  {} of {} sampled states did not come to rest, and have no reference\n",
-                        error.unsettled, error.wanted);
-  }
-  return text;
+  if (error.all.samples == 0) return fmt::format("force error of tissue: {}\n", in_words(error));
+  return fmt::format("force error of tissue, against the same path {} times slower: {}\n", kSlower,
+                     in_words(error)) +
+         range_words("moving", error.moving) + range_words("still", error.still);
 }
 
 std::string safety_words(const BuiltScene& built) {

@@ -78,15 +78,14 @@ std::shared_ptr<const device::Path> later(std::shared_ptr<const device::Path> pa
 
 class Run {
  public:
-  // `course`: filled tick by tick, or null. `sampler`: takes its samples, or null.
+  // `course`: filled tick by tick, or null.
   Run(const Scene& scene, const World& world, WorldState& state, const SessionOptions& options,
-      ForceCourse* course, ForceErrorSampler* sampler)
+      ForceCourse* course)
       : scene_(scene),
         world_(world),
         state_(state),
         options_(options),
         course_(course),
-        sampler_(sampler),
         path_(later(options.path ? options.path : scene_path(scene),
                     static_cast<double>(options.start_ticks) / scene.rate_hz)),
         simulated_(options.real_device == nullptr ? scene_device(scene, path_) : nullptr),
@@ -177,7 +176,7 @@ class Run {
       late_us_.add(input.late_s * 1e6);
       if (follows_machine_) follow_machine(felt.tick_us);
     } else {
-      compare_force(felt, tick);
+      if (course_ != nullptr) keep_in_course(felt);
       if (options_.keep_picture && tick % kMomentEvery == 0) maybe_keep_snapshot(felt, tick);
       if (options_.keep_clearance && tick % clearance_every_ == 0) measure_clearance(tick);
       if (options_.progress && tick % 64 == 0) report_progress(tick);
@@ -230,19 +229,10 @@ class Run {
                             felt.tick_us});
   }
 
-  // Keeps the tick in the course, and compares its force with the equilibrium if it was chosen.
-  void compare_force(const TickResult& felt, std::uint64_t tick) {
-    const glm::dvec3 coupling = world_.tool.stiffness_N_per_m * (felt.proxy_m - felt.device_m);
-    if (course_ != nullptr) {
-      const bool soft = std::any_of(state_.reactions.begin(), state_.reactions.end(),
-                                    [](const voxel::Reaction& r) { return r.pressed > 0; });
-      const double speed = tick > 0 ? glm::length(felt.device_m - device_before_m_) / dt_ : 0.0;
-      course_->push_back({felt.soft_N, speed, soft});
-      device_before_m_ = felt.device_m;
-    }
-    if (sampler_ == nullptr || !sampler_->wants(tick)) return;
-    if (options_.progress) say(sampler_->progress());
-    sampler_->take(world_, state_, coupling, static_cast<double>(tick) * dt_);
+  void keep_in_course(const TickResult& felt) {
+    const bool soft = std::any_of(state_.reactions.begin(), state_.reactions.end(),
+                                  [](const voxel::Reaction& r) { return r.pressed > 0; });
+    course_->push_back({felt.device_m, world_.tool.stiffness_N_per_m * (felt.proxy_m - felt.device_m), soft});
   }
 
   void measure_clearance(std::uint64_t tick) {
@@ -269,8 +259,6 @@ class Run {
   WorldState& state_;
   const SessionOptions& options_;
   ForceCourse* course_;
-  ForceErrorSampler* sampler_;
-  glm::dvec3 device_before_m_{0.0};
   std::shared_ptr<const device::Path> path_;
   std::unique_ptr<device::HapticDevice> simulated_;
   device::HapticDevice& device_;
@@ -345,30 +333,41 @@ void restore_tick_timing(const RecordedTick& tick, WorldState& state) noexcept {
   give_work_share(state, tick.work_share);
 }
 
+namespace {
+
+// A signal ends the comparison by itself; the session before it is kept.
+Progress keep_going(const Progress& progress) {
+  if (!progress) return {};
+  return [&progress](const std::string& text) {
+    try {
+      progress(text);
+    } catch (const device::StopAsked&) {
+    }
+  };
+}
+
+}  // namespace
+
 SessionResult run_session(const Scene& scene, BuiltScene& built, const SessionOptions& options) {
   const char* not_measured = built.state->soft.empty()                            ? "nothing is soft"
                              : options.realtime || options.real_device != nullptr ? "real time"
                              : options.reference_samples <= 0 ? "no samples were asked for"
                                                               : nullptr;
   if (not_measured != nullptr) {
-    SessionResult result = Run(scene, *built.world, *built.state, options, nullptr, nullptr).run();
+    SessionResult result = Run(scene, *built.world, *built.state, options, nullptr).run();
     result.error.not_measured = not_measured;
     return result;
   }
   const std::unique_ptr<WorldState> begin = copy_state(*built.world, *built.state);
   ForceCourse course;
-  SessionResult result = Run(scene, *built.world, *built.state, options, &course, nullptr).run();
-  ForceErrorSampler sampler(
-      choose_error_samples(course, static_cast<std::size_t>(options.reference_samples), result.dt_s),
-      jnd_floor_N(scene));
-  if (sampler.ticks() > 0) {
-    SessionOptions again = options;
-    again.seconds = static_cast<double>(sampler.ticks()) * result.dt_s;
-    again.keep_rows = again.keep_recording = again.keep_clearance = again.keep_picture = false;
-    again.black_box = nullptr;
-    Run(scene, *built.world, *begin, again, nullptr, &sampler).run();
-  }
-  result.error = sampler.result();
+  SessionResult result = Run(scene, *built.world, *built.state, options, &course).run();
+  begin_session(scene, *built.world, *begin, result.start_m);
+  result.error = compare_with_slow_run(*built.world, *begin, course,
+                                       {.dt_s = result.dt_s,
+                                        .floor_N = jnd_floor_N(scene),
+                                        .most = options.reference_samples,
+                                        .async_relaxation = options.async_relaxation,
+                                        .progress = keep_going(options.progress)});
   return result;
 }
 

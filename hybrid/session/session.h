@@ -49,8 +49,8 @@ struct SessionOptions {
   bool keep_recording = true;   // every input, 48 bytes a tick: without it and the rows memory stays flat
   bool keep_clearance = false;  // distances between objects, at a thousand moments
   bool keep_picture = false;    // keep the snapshot with the most contact
-  // Comparisons of the force with its equilibrium (force_error.h). They take a second run, and seconds each.
-  // None in real time.
+  // Most ticks whose force is compared with that of a slow run (force_error.h), evenly spread. The slow run
+  // takes up to kSlower times as long as the session. None in real time.
   int reference_samples = 0;
   // Clocks, counters and path begin as after this many ticks, when a soft start is over. The forces do not
   // depend on it.
