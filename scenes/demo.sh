@@ -12,7 +12,7 @@ stage 'touch scenes/head.toml'
 cd -- "$hybrid_root"
 mkdir -p out
 build/release/hybrid run scenes/head.toml --plot out/head.svg --picture out/head.png --trace out/head.csv \
-  --json out/head.json --samples 2
+  --json out/head.json
 stage
 say ''
 say "what the hand felt: $hybrid_root/out/head.svg"

@@ -113,7 +113,7 @@ void draw_inset_frame(const Pen& pen, const Snapshot& snapshot, const OverlayCon
   }
   pen.frame(a, b, kPaleInk, 0.0F, kHairline);
   pen.label(a.x + 0.7F * pen.em, a.y + 0.6F * pen.em, kInk,
-            "the contact, " + number_text(content.inset->nearer, "%.1f") + " times nearer");
+            "the contact, " + with_decimals(content.inset->nearer, 1) + " times nearer");
 }
 
 void draw_history(const Pen& pen, const PixelRect& where, std::span<const ForceSample> history) {
