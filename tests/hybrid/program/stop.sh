@@ -60,7 +60,7 @@ for mode in "" --realtime; do
 done
 
 # A study keeps the rows that are done. It must take far longer than until its first words.
-stopped INT 130 "stopped by Ctrl-C after .* rows; report was written" "of [0-9]*: slide" \
+stopped INT 130 "stopped by Ctrl-C after .* rows; report was written" "^slide" \
   "$program" bench rigid --only slide --meshes ico2,ico3,ico5,ico6,ico7 --json j.json
 grep -q '"stopped": true' j.json || fail "the report of bench does not say that it was stopped"
 stopped INT 130 "stopped by Ctrl-C after .* rows; report was written" "of [0-9]*: stable" \
