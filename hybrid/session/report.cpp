@@ -319,6 +319,9 @@ std::vector<std::string> fault_texts(std::uint32_t faults) {
   say(fault_map_overflow,
       "the occupancy map had no room for a voxel that moved; use a larger [occupancy] cell");
   say(fault_pair_overflow, "more soft voxels press on one another than fit; use a coarser spacing");
+  say(fault_tool_in_tissue,
+      "the tool got between the voxels of tissue and was in it without being felt; press less deep, use a "
+      "larger tool or a finer spacing, or give the tissue narrower limits (stretch, shear)");
   say(fault_nonfinite_body,
       "a free body was pushed by a force that is not finite, and stood still for that tick");
   say(fault_body_squeezed,

@@ -145,7 +145,7 @@ double move_proxy(const World& world, WorldState& state, const glm::dvec3& devic
     if (!contact_on_patches(state))
       learn_stiffness(world, state, delta, pull, pull_on_proxy(world, state, device), model, metric);
     if (first_pass) state.jammed.clear();
-    tool_bounds(world, state, state.proxy_m, true, state.jammed);
+    tool_bounds(world, state, state.proxy_m, true, kSettings.soft_step, state.jammed);
   }
   return glm::length(delta);
 }
@@ -200,11 +200,13 @@ Sweep settle_contact(const World& world, WorldState& state, const glm::dvec3& de
 
 void give_way(const World& world, WorldState& state, const glm::dvec3& before, Sweep& sweep) noexcept {
   state.scratch.planes.clear();
-  std::size_t bounds = tool_bounds(world, state, state.proxy_m, false, state.scratch.planes);
+  std::size_t bounds =
+      tool_bounds(world, state, state.proxy_m, false, kSettings.soft_step, state.scratch.planes);
   if (bounds == 0) return;
-  const auto least = minimise_outside_rigid(
-      world, state, state.proxy_m, polygon::Metric(glm::dmat3(1.0)),
-      [&] { bounds = tool_bounds(world, state, state.proxy_m, false, state.scratch.planes); });
+  const auto least =
+      minimise_outside_rigid(world, state, state.proxy_m, polygon::Metric(glm::dmat3(1.0)), [&] {
+        bounds = tool_bounds(world, state, state.proxy_m, false, kSettings.soft_step, state.scratch.planes);
+      });
   // If no exit is found, return to the start of the tick, unless the tool was deeper there.
   for (std::size_t i = least.rigid; i < state.scratch.planes.size(); ++i) {
     if (state.scratch.planes[i].offset > glm::dot(state.scratch.planes[i].normal, state.proxy_m))

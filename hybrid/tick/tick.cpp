@@ -18,6 +18,7 @@
 #include "hybrid/tick/tissue/obstacles.h"
 #include "hybrid/tick/tissue/press_tissue.h"
 #include "hybrid/tick/tissue/soft_contacts.h"
+#include "hybrid/tick/tissue/tissue_facets.h"
 #include "polygon/mesh/is_finite.h"
 
 namespace hybrid {
@@ -171,6 +172,7 @@ TickResult haptic_tick(const World& world, WorldState& state, const device::Devi
     solve_soft_contacts(world, state);
   }
   if (around.near_soft) give_way(world, state, before, sweep);
+  flag_lost_tool(world, state);
   clock.done(Stage::arbitration);
   if (!may_meet) relax_tissue(world, state, clock);
 

@@ -50,6 +50,7 @@ enum FaultBit : std::uint32_t {
   fault_body_squeezed = 128,    // tissue could not leave the way of a moving body: they overlapped
   fault_body_crowded = 256,     // a moving body came to more soft voxels than a tick can query
   fault_bodies_overlap = 512,   // a free body had no way out between rigid objects
+  fault_tool_in_tissue = 1024,  // the tool's centre was in tissue that it did not press
 };
 
 inline constexpr std::size_t kMaxNear = 256;     // triangles considered at once

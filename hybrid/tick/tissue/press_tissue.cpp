@@ -5,6 +5,8 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include "hybrid/tick/tissue/tissue_facets.h"
+
 namespace hybrid {
 namespace {
 
@@ -112,23 +114,28 @@ void press_tissue(const World& world, WorldState& state, const glm::dvec3& point
 }
 
 std::size_t tool_bounds(const World& world, WorldState& state, const glm::dvec3& point, bool immovable_only,
-                        std::vector<polygon::ContactPlane>& out) noexcept {
-  std::size_t added = 0;
+                        double facets_within, std::vector<polygon::ContactPlane>& out) noexcept {
+  const std::size_t before = out.size();
   for (std::uint32_t o = 0; o < state.soft.size(); ++o) {
     voxel::SoftObject& object = *state.soft[o];
     if (object.touched().empty()) continue;
     const SoftBody& body = world.soft[o];
-    const std::size_t count = object.give_way(tool_in_body(world, body, point), state.scratch.bounds);
-    for (std::size_t i = 0; i < count && out.size() < out.capacity(); ++i) {
-      const voxel::ToolBound& bound = state.scratch.bounds[i];
-      if (immovable_only && !object.is_immovable(bound.voxel, -bound.normal)) continue;
+    const voxel::ToolInBody tool = tool_in_body(world, body, point);
+    const auto add = [&](const voxel::ToolBound& bound) {
+      if (out.size() == out.capacity()) return;
       const glm::dvec3 normal = body.pose.rotation * bound.normal;
       out.push_back({normal, bound.offset + glm::dot(normal, body.pose.origin),
                      static_cast<std::uint32_t>(world.rigid.size()) + o, 0});
-      ++added;
+    };
+    auto& bounds = state.scratch.bounds;
+    std::size_t count = object.give_way(tool, bounds);
+    for (std::size_t i = 0; i < count; ++i) {
+      if (!immovable_only || object.is_immovable(bounds[i].voxel, -bounds[i].normal)) add(bounds[i]);
     }
+    count = facet_bounds(object, tool, facets_within * object.reach(world.tool.radius_m), bounds);
+    for (std::size_t i = 0; i < count; ++i) add(bounds[i]);
   }
-  return added;
+  return out.size() - before;
 }
 
 bool contact_on_patches(const WorldState& state) noexcept {

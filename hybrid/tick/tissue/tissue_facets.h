@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The tool's centre never passes through the surface of tissue.
+//
+// Tissue is pressed as balls at its voxels. A tool of about a spacing may part four voxels of the surface,
+// within the limits of their links, so far that it fits between the balls. The facets between the voxels
+// close these gaps.
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+#include "hybrid/world/world_state.h"
+
+namespace hybrid {
+
+// Writes half-spaces of facets (triangles of surface voxels) that face the tool's centre: the centre must
+// stay outside the tissue's surface, half a spacing outside each facet. `within`: distance from that surface
+// (m). Only facets that bound a full cell of eight voxels count: others have no inner side. Returns how many;
+// stops when `out` is full.
+std::size_t facet_bounds(const voxel::SoftObject& object, const voxel::ToolInBody& tool, double within,
+                         std::span<voxel::ToolBound> out) noexcept;
+
+// Is the point (body frame) in a full cell of the tissue as it is now? Valid where tissue is nearly at rest:
+// the displacement is taken from the voxel nearest to the point at rest.
+[[nodiscard]] bool in_resting_tissue(const voxel::SoftObject& object, const glm::dvec3& point) noexcept;
+
+// Sets a fault if the tool's centre is in an object that the tool does not press.
+void flag_lost_tool(const World& world, WorldState& state) noexcept;
+
+}  // namespace hybrid
