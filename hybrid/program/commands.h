@@ -19,7 +19,7 @@ struct RunCommand {
   std::filesystem::path scene;
   std::optional<double> seconds;
   bool realtime = false;
-  std::string device;  // replaces the scene's device; empty: the scene's
+  std::string device;       // replaces the scene's device; empty: the scene's
   int samples = 1'000'000;  // more than a session has
   std::uint64_t start_ticks = 0;
   std::string relaxation = "apart";  // or "tick": where tissue away from the contact is relaxed
@@ -57,14 +57,16 @@ struct DevicesCommand {
 int devices(const DevicesCommand& command);
 
 struct CompareCommand {
-  std::filesystem::path scene;
-  std::string object;        // empty: the first suitable object
-  MeasuredOptions measured;  // empty file: no measurement
+  std::vector<std::filesystem::path> scenes;  // one: an object of it in several ways; more: whole scenes
+  int samples = 1'000'000;                    // of whole scenes, as of `run`
+  std::string object;                         // empty: the first suitable object
+  MeasuredOptions measured;                   // empty file: no measurement
   std::filesystem::path plot;
   bool classic = false;  // the plot also has the thesis's algorithm
   std::string json;
 };
 int compare(const CompareCommand& command);
+int compare_whole_scenes(const CompareCommand& command);  // two or more
 
 struct BenchCommand {
   std::string suite;  // of bench_suites(), or "all"

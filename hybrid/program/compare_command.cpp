@@ -111,7 +111,8 @@ int compare_with_measured(const CompareCommand& command, const Scene& scene, Out
 }  // namespace
 
 int compare(const CompareCommand& command) {
-  const Scene scene = load_scene(command.scene);
+  if (command.scenes.size() > 1) return compare_whole_scenes(command);
+  const Scene scene = load_scene(command.scenes.front());
   Outputs outputs;
   outputs.ask_plot(command.plot);
   outputs.ask_json(command.json);

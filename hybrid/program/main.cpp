@@ -149,11 +149,20 @@ void add_devices(CLI::App& app, int& status) {
 }
 
 void add_compare(CLI::App& app, int& status) {
-  auto* sub = app.add_subcommand(
-      "compare", "One object as mesh and proxy, as voxels, and in closed form, along the same path");
+  auto* sub = app.add_subcommand("compare",
+                                 "One object as mesh and proxy, as voxels, and in closed form, along the "
+                                 "same path; or two or more whole "
+                                 "scenes along the path of the first");
   auto c = std::make_shared<hybrid::CompareCommand>();
-  sub->add_option("SCENE", c->scene, "scene file (.toml)")->required();
-  sub->add_option("--object", c->object, "name of the object; default: the first");
+  sub->add_option("SCENE", c->scenes, "scene files (.toml)")->required();
+  auto* object =
+      sub->add_option("--object", c->object, "of one scene: name of the object; default: the first");
+  auto* samples =
+      sub->add_option(
+             "--samples", c->samples,
+             "of two or more scenes: most ticks in which each is compared with itself played slowly, "
+             "which takes several times as long as the session; 0: none; default: all")
+          ->check(CLI::Range(0, 1'000'000));
   device::MeasuredFile& file = c->measured.measured;
   auto* measured = sub->add_option(
       "--measured", file.file, "compare the whole scene with forces measured along a motion (.traj, .csv)");
@@ -172,10 +181,19 @@ void add_compare(CLI::App& app, int& status) {
   sub->add_flag("--on-object", file.on_object, "of --measured: its forces are those on the object")
       ->needs(measured);
   auto* plot = sub->add_option("--plot", c->plot, "write force over time and depth as SVG");
-  sub->add_flag("--classic", c->classic, "of --plot: draw the thesis's algorithm too, below the others")
-      ->needs(plot);
+  auto* classic = sub->add_flag("--classic", c->classic,
+                                "of --plot, one scene: draw the thesis's algorithm too, below the others")
+                      ->needs(plot);
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
-  sub->callback([c, &status] { status = hybrid::compare(*c); });
+  sub->callback([=, &status] {
+    const bool whole = c->scenes.size() > 1;
+    for (const CLI::Option* option : {object, measured, classic}) {
+      if (whole && option->count() > 0)
+        throw CLI::ValidationError(option->get_name(), "takes one scene only");
+    }
+    if (!whole && samples->count() > 0) throw CLI::ValidationError("--samples", "takes two or more scenes");
+    status = hybrid::compare(*c);
+  });
 }
 
 void add_bench(CLI::App& app, int& status) {

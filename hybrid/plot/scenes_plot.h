@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The figure of whole scenes along one motion: all forces over time, and below them the difference of each
+// from the reference.
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+
+#include "hybrid/plot/compare_plot.h"
+
+namespace hybrid {
+
+// The scenes have ticks at the same times. The difference is that of the force vectors in JND, negative where
+// the scene's force is the smaller one. Throws std::runtime_error: file not writable; std::invalid_argument:
+// the reference is no scene.
+void save_scenes_plot(const std::filesystem::path& svg, std::span<const ComparedModel> scenes,
+                      const std::string& title, const ComparePlotOptions& options = {});
+
+}  // namespace hybrid

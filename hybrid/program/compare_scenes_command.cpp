@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// `hybrid compare` with two or more scenes.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "hybrid/compare/compare_scenes.h"
+#include "hybrid/feel/just_noticeable.h"
+#include "hybrid/plot/scenes_plot.h"
+#include "hybrid/program/commands.h"
+#include "hybrid/program/outputs.h"
+#include "hybrid/session/report.h"
+
+namespace hybrid {
+namespace {
+
+nlohmann::ordered_json number_or_null(const std::optional<double>& value, double factor = 1.0) {
+  return value ? nlohmann::ordered_json(factor * *value) : nlohmann::ordered_json(nullptr);
+}
+
+nlohmann::ordered_json difference_json(const ScenesDifference& d) {
+  return {{"ticks", d.ticks},
+          {"jnd_p50", d.p50_jnd},
+          {"jnd_p99", d.p99_jnd},
+          {"jnd_max", d.max_jnd},
+          {"max_t_s", d.ticks > 0 ? nlohmann::ordered_json(d.max_t_s) : nlohmann::ordered_json(nullptr)}};
+}
+
+nlohmann::ordered_json own_error_json(const ForceError& error) {
+  if (error.all.samples == 0) return {{"samples", 0}, {"not_measured", error.not_measured}};
+  return {{"samples", error.all.samples},
+          {"jnd_p99", error.p99_jnd},
+          {"moving_jnd_max", error.moving.max_jnd},
+          {"still_jnd_max", error.still.max_jnd}};
+}
+
+nlohmann::ordered_json scenes_report(const CompareCommand& command, const ScenesComparison& comparison) {
+  nlohmann::ordered_json j = report_head("compare");
+  j["reference"] = comparison.scenes.front().name;
+  j["jnd"] = {{"share", kJndShare}, {"floor_N", comparison.jnd_floor_N}};
+  j["notes"] = comparison.notes;
+  j["scenes"] = nlohmann::ordered_json::array();
+  for (std::size_t s = 0; s < comparison.scenes.size(); ++s) {
+    const ComparedScene& scene = comparison.scenes[s];
+    nlohmann::ordered_json row{{"name", scene.name}, {"file", command.scenes[s].string()}};
+    row["peak_force_N"] = scene.peak_N;
+    row["difference"] = difference_json(scene.all);
+    row["difference_moving"] = difference_json(scene.moving);
+    row["difference_still"] = difference_json(scene.still);
+    row["direction_p99_deg"] = number_or_null(scene.direction_p99_deg);
+    row["onset_s"] = number_or_null(scene.onset_s);
+    row["onset_later_ms"] = number_or_null(scene.onset_later_s, 1e3);
+    row["own_error"] = own_error_json(scene.own_error);
+    row["tick_us"] = to_json(scene.tick_us);
+    row["load_s"] = scene.load_s;
+    row["memory_bytes"] = scene.memory_bytes;
+    row["soft_voxels"] = scene.soft_voxels;
+    if (s > 0) row["verdict"] = verdict(comparison, s);
+    j["scenes"].push_back(std::move(row));
+  }
+  return j;
+}
+
+std::string cell(const std::optional<double>& value, double factor, int decimals) {
+  return value ? fmt::format("{:.{}f}", factor * *value, decimals) : "-";
+}
+
+std::string cells(const ScenesDifference& d) {
+  return d.ticks > 0 ? fmt::format("{:.2f}/{:.2f}/{:.2f}", d.p50_jnd, d.p99_jnd, d.max_jnd) : "-";
+}
+
+std::string own_error_cells(const ForceError& error) {
+  if (error.all.samples == 0) return "-";
+  return fmt::format("{:.2f}/{:.2f}", error.moving.max_jnd, error.still.max_jnd);
+}
+
+void print_scenes(std::FILE* words, const ScenesComparison& comparison, bool own_error) {
+  std::size_t width = 5;
+  for (const ComparedScene& scene : comparison.scenes) width = std::max(width, scene.name.size());
+  fmt::print(words, "{:<{}} {:>7} {:>17} {:>17} {:>7} {:>7} {:>8} {:>12} {:>27} {:>7} {:>7} {:>9}\n", "scene",
+             width, "peak N", "moving JND", "still JND", "max at", "dir p99", "onset ms", "own error",
+             "tick us", "MB", "load s", "voxels");
+  fmt::print(words, "{:<{}} {:>7} {:>17} {:>17} {:>7} {:>7} {:>8} {:>12} {:>27}\n", "", width, "",
+             "p50/p99/max", "p50/p99/max", "s", "deg", "later", "moving/still", "p50/p99/p99.9/max");
+  for (std::size_t s = 0; s < comparison.scenes.size(); ++s) {
+    const ComparedScene& scene = comparison.scenes[s];
+    const Percentiles& t = scene.tick_us;
+    fmt::print(words,
+               "{:<{}} {:>7.3f} {:>17} {:>17} {:>7} {:>7} {:>8} {:>12} {:>27} {:>7.1f} {:>7.2f} {:>9}\n",
+               scene.name, width, scene.peak_N, s == 0 ? "reference" : cells(scene.moving),
+               s == 0 ? "reference" : cells(scene.still),
+               s == 0 || scene.all.max_jnd == 0.0 ? "-" : fmt::format("{:.3f}", scene.all.max_t_s),
+               s == 0 ? "-" : cell(scene.direction_p99_deg, 1.0, 2),
+               s == 0 ? "-" : cell(scene.onset_later_s, 1e3, 0), own_error_cells(scene.own_error),
+               fmt::format("{:.0f}/{:.0f}/{:.0f}/{:.0f}", t.p50, t.p99, t.p999, t.max),
+               1e-6 * static_cast<double>(scene.memory_bytes), scene.load_s, scene.soft_voxels);
+  }
+  const std::string own = own_error ? fmt::format(
+                                          "greatest JND against the same scene along the same path, {} "
+                                          "times slower; -: nothing soft was felt",
+                                          kSlower)
+                                    : "not measured, as --samples is 0: the times stand without it";
+  fmt::print(words,
+             "\ndifferences are from {}; 1 JND = max({:.0f} % of its force, {:.2f} N)\nown error: {}\n"
+             "ticks: timed on this machine, not pinned to a core, in alternating order; compare ratios\n",
+             comparison.scenes.front().name, 100.0 * kJndShare, comparison.jnd_floor_N, own);
+  for (std::size_t s = 1; s < comparison.scenes.size(); ++s)
+    fmt::print(words, "{}\n", verdict(comparison, s));
+}
+
+}  // namespace
+
+int compare_whole_scenes(const CompareCommand& command) {
+  Outputs outputs;
+  outputs.ask_plot(command.plot);
+  outputs.ask_json(command.json);
+  std::vector<Scene> scenes;
+  for (const std::filesystem::path& file : command.scenes) scenes.push_back(load_scene(file));
+  const ScenesComparison comparison = compare_scenes(scenes, command.samples, progress_on_terminal());
+  end_progress();
+  outputs.write_json(command.json, scenes_report(command, comparison));
+  outputs.write("plot", command.plot, [&](const std::filesystem::path& file) {
+    std::vector<ComparedModel> drawn;
+    std::string title;
+    for (const ComparedScene& scene : comparison.scenes) {
+      drawn.push_back({scene.name, scene.rows, {}, false});
+      title += (title.empty() ? "" : ", ") + scene.name;
+    }
+    title += " along the path of " + comparison.scenes.front().name;
+    save_scenes_plot(file, drawn, title,
+                     {.reference = 0, .jnd_share = kJndShare, .jnd_floor_N = comparison.jnd_floor_N});
+  });
+  std::FILE* words = outputs.words();
+  fmt::print(
+      words,
+      "{} whole scenes along the path of {}, each on an ideal device: the tool is at the same places in "
+      "all, and no force is limited\n\n",
+      scenes.size(), comparison.scenes.front().name);
+  for (const std::string& note : comparison.notes) fmt::print(words, "note: {}\n", note);
+  print_scenes(words, comparison, command.samples > 0);
+  outputs.say_files();
+  return outputs.failed() ? 1 : 0;
+}
+
+}  // namespace hybrid
