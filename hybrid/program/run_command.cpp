@@ -26,6 +26,9 @@
 namespace hybrid {
 namespace {
 
+// Moments of a session at which the forces between objects are computed.
+constexpr int kBetweenSamples = 200;
+
 bool& progress_shown() {
   static bool shown = false;
   return shown;
@@ -117,6 +120,7 @@ int run(const RunCommand& command) {
                          .keep_rows = !command.trace.empty() || !command.plot.empty(),
                          .keep_recording = !command.record.empty(),
                          .keep_clearance = !command.plot.empty(),
+                         .between_samples = kBetweenSamples,
                          .keep_picture = !command.picture.empty(),
                          .reference_samples = command.samples,
                          .start_ticks = command.start_ticks,

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 #include <thread>
 
@@ -155,6 +156,68 @@ std::string safety_words(const BuiltScene& built) {
   return text;
 }
 
+constexpr std::array kPairKinds{"rigid", "soft", "anchors"};  // ObjectPair::Kind
+
+std::string other_name(const World& world, const ObjectPair& pair) {
+  if (pair.kind == ObjectPair::Kind::anchors) return "its anchors";
+  return pair.kind == ObjectPair::Kind::rigid ? world.rigid[pair.other].name : world.soft[pair.other].name;
+}
+
+nlohmann::ordered_json between_json(const World& world, const ForcesCourse& between) {
+  nlohmann::ordered_json j{{"samples", between.samples}, {"end_t_s", between.end_t_s}};
+  j["pairs"] = nlohmann::ordered_json::array();
+  for (const PairCourse& course : between.pairs) {
+    nlohmann::ordered_json pair{{"soft", world.soft[course.pair.soft].name},
+                                {"kind", kPairKinds[static_cast<std::size_t>(course.pair.kind)]},
+                                {"other", nullptr},
+                                {"samples", course.samples},
+                                {"known_samples", course.known_samples},
+                                {"max_N", nullptr},
+                                {"max_t_s", nullptr},
+                                {"end_N", nullptr},
+                                {"end_on_soft_N", nullptr}};
+    if (course.pair.kind != ObjectPair::Kind::anchors) pair["other"] = other_name(world, course.pair);
+    if (course.known_samples > 0) {
+      pair["max_N"] = course.max_N;
+      pair["max_t_s"] = course.max_t_s;
+    }
+    if (const auto& end = course.end_on_soft_N) {
+      pair["end_N"] = glm::length(*end);
+      pair["end_on_soft_N"] = {end->x, end->y, end->z};
+    }
+    j["pairs"].push_back(pair);
+  }
+  j["balance"] = nlohmann::ordered_json::array();
+  for (std::size_t o = 0; o < between.end_balance.size(); ++o) {
+    const ForceBalance& balance = between.end_balance[o];
+    nlohmann::ordered_json of_object{
+        {"soft", world.soft[o].name}, {"largest_N", balance.largest_N}, {"sum_N", nullptr}};
+    if (balance.sum_N) of_object["sum_N"] = *balance.sum_N;
+    j["balance"].push_back(of_object);
+  }
+  return j;
+}
+
+std::string between_words(const World& world, const ForcesCourse& between) {
+  if (between.pairs.empty()) return {};
+  std::string text = fmt::format("forces between objects, at {} moments:\n", between.samples);
+  for (const PairCourse& course : between.pairs) {
+    const std::string most = course.known_samples > 0
+                                 ? fmt::format("at most {:.3f} N at {:.3f} s", course.max_N, course.max_t_s)
+                                 : "force not known";
+    const std::string end =
+        course.end_on_soft_N ? fmt::format("{:.3f} N", glm::length(*course.end_on_soft_N)) : "not known";
+    text += fmt::format("  {:<16} {:<16} {}; at the end {}", world.soft[course.pair.soft].name,
+                        other_name(world, course.pair), most, end);
+    const std::uint64_t unknown = course.samples - course.known_samples;
+    text += unknown > 0
+                ? fmt::format(" (unknown at {} of {} moments: links at their limits share the load)\n",
+                              unknown, course.samples)
+                : "\n";
+  }
+  return text;
+}
+
 }  // namespace
 
 nlohmann::ordered_json report_head(const std::string& command) {
@@ -208,6 +271,7 @@ nlohmann::ordered_json run_report(const Scene& scene, const BuiltScene& built, S
     }
     j["objects"].push_back(o);
   }
+  if (result.between.samples > 0) j["between_objects"] = between_json(*built.world, result.between);
   j["occupancy"] = {{"cells", built.state->map.occupied_cells()},
                     {"bytes", built.state->map.memory_bytes()},
                     {"cell_m", built.state->map.cell_m()}};
@@ -267,6 +331,7 @@ std::string run_summary(const BuiltScene& built, SessionResult& result) {
                           m.max_force_N);
     }
   }
+  text += between_words(*built.world, result.between);
   if (result.contact_ticks == 0) {
     text += "nothing was touched: does the [path] lead to an object? They lie in\n";
     for (std::size_t o = 0; o < built.world->object_count(); ++o) {

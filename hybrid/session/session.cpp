@@ -102,6 +102,9 @@ class Run {
     ticks_ = static_cast<std::uint64_t>(std::llround(seconds * scene.rate_hz));
     result_.planned_ticks = ticks_;
     result_.dt_s = dt_;
+    if (options.between_samples > 0)
+      between_every_ =
+          std::max<std::uint64_t>(1, ticks_ / static_cast<std::uint64_t>(options.between_samples));
     clearance_every_ = std::max<std::uint64_t>(1, ticks_ / kClearances);
     if (options.keep_recording) result_.recording.reserve(ticks_);
     result_.object_contact_ticks.assign(world_.object_count(), 0);
@@ -143,6 +146,7 @@ class Run {
     if (relaxation) result_.relaxation_s = relaxation->busy_s();
     relaxation.reset();
     result_.async_results = state_.async.results;
+    if (options_.between_samples > 0 && ticks_done_ > 0) measure_between(ticks_done_ - 1);
     result_.end = served.end;
     result_.device_messages = std::move(served.messages);
     result_.ticks = ticks_done_;
@@ -179,6 +183,7 @@ class Run {
       if (course_ != nullptr) keep_in_course(felt);
       if (options_.keep_picture && tick % kMomentEvery == 0) maybe_keep_snapshot(felt, tick);
       if (options_.keep_clearance && tick % clearance_every_ == 0) measure_clearance(tick);
+      if (options_.between_samples > 0 && tick % between_every_ == 0) measure_between(tick);
       if (options_.progress && tick % 64 == 0) report_progress(tick);
     }
     return {.force_N = felt.force_N, .go_on = ticks_done_ < ticks_};
@@ -247,6 +252,13 @@ class Run {
       course.cell_m = std::min(course.cell_m, object->lattice().min_spacing_m());
   }
 
+  void measure_between(std::uint64_t tick) {
+    if (state_.soft.empty()) return;
+    const double t_s = static_cast<double>(tick) * dt_;
+    if (result_.between.samples > 0 && result_.between.end_t_s == t_s) return;
+    result_.between.add(forces_between(world_, state_), t_s);
+  }
+
   void maybe_keep_snapshot(const TickResult& felt, std::uint64_t tick) {
     const double score = moment_score(world_, state_);
     if (score <= best_score_ * 1.02) return;
@@ -268,7 +280,7 @@ class Run {
   FeltMaterials felt_;
   LatencyHistogram late_us_;
   std::chrono::steady_clock::time_point last_report_ = std::chrono::steady_clock::now();
-  std::uint64_t clearance_every_ = 1;
+  std::uint64_t clearance_every_ = 1, between_every_ = 1;
   std::uint64_t ticks_ = 0, ticks_done_ = 0, hash_ = kHashBegin;
   double sum_force2_ = 0.0, best_score_ = 0.0;
   SessionResult result_;

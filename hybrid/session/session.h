@@ -19,6 +19,7 @@
 #include "hybrid/session/clearance.h"
 #include "hybrid/session/felt_materials.h"
 #include "hybrid/session/force_error.h"
+#include "hybrid/session/forces_between.h"
 #include "hybrid/snapshot/snapshot.h"
 #include "hybrid/tick/tick.h"
 
@@ -48,7 +49,10 @@ struct SessionOptions {
   bool keep_rows = true;        // trace rows and per-object forces
   bool keep_recording = true;   // every input, 48 bytes a tick: without it and the rows memory stays flat
   bool keep_clearance = false;  // distances between objects, at a thousand moments
-  bool keep_picture = false;    // keep the snapshot with the most contact
+  // Most moments, evenly spread, at which the forces between objects are computed; in real time only the end
+  // is one.
+  int between_samples = 0;
+  bool keep_picture = false;  // keep the snapshot with the most contact
   // Most ticks whose force is compared with that of a slow run (force_error.h), evenly spread. The slow run
   // takes up to kSlower times as long as the session. None in real time.
   int reference_samples = 0;
@@ -72,6 +76,7 @@ struct SessionResult {
   std::vector<TraceRow> rows;
   std::vector<std::vector<double>> object_force_N;        // [object][row]
   ClearanceCourse clearance;                              // of keep_clearance, where anything is soft
+  ForcesCourse between;                                   // of between_samples
   std::vector<std::uint64_t> object_contact_ticks;        // [object]
   std::vector<double> object_max_force_N;                 // [object]
   std::vector<std::vector<FeltMaterial>> felt_materials;  // [soft object][material]

@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/session/forces_between.h"
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+#include <tuple>
+
+#include "voxel/object/loads_by_partner.h"
+
+namespace hybrid {
+namespace {
+
+using Kind = ObjectPair::Kind;
+
+// Of the spacing: a voxel nearer than this to its half-space lies on it.
+constexpr double kLiesOnHalfSpace = 1e-3;
+// Of the spacing, beyond a voxel's ball: the surface of its half-space is looked for so far.
+constexpr double kLookBeyond = 0.5;
+
+// The fixed rigid object whose surface is nearest to a point (scene frame).
+std::optional<std::uint32_t> nearest_fixed(const World& world, const glm::dvec3& at, double range_m) {
+  std::optional<std::uint32_t> best;
+  for (std::uint32_t o = 0; o < world.rigid.size(); ++o) {
+    const RigidObject& object = world.rigid[o];
+    polygon::NearPoint near;
+    if (object.presses_tissue || !object.surface->nearest(object.to_body(at), range_m, near)) continue;
+    range_m = near.distance;
+    best = o;
+  }
+  return best;
+}
+
+// The rigid object that surface voxel s lies on, if any.
+std::optional<std::uint32_t> rigid_under(const World& world, const WorldState& state, std::size_t soft,
+                                         std::uint32_t s) {
+  const voxel::SoftObject& object = *state.soft[soft];
+  const voxel::Obstacle& obstacle = object.obstacles()[s];
+  const voxel::VoxelId v = object.lattice().surface()[s];
+  if (obstacle.normal == glm::vec3(0.0F) || object.lattice().anchored(v)) return {};
+  const double spacing_m = object.lattice().min_spacing_m();
+  const double gap_m =
+      glm::dot(glm::dvec3(obstacle.normal), object.state().at(v)) - static_cast<double>(obstacle.bound);
+  if (gap_m > kLiesOnHalfSpace * spacing_m) return {};
+  if (obstacle.moving) {
+    const std::uint32_t body = state.body_obstacles[soft].whose[s];
+    return body == BodyObstacles::kNobody ? std::nullopt : std::optional(body);
+  }
+  return nearest_fixed(world, world.soft[soft].to_scene(object.position(v)),
+                       object.voxel_radius() + kLookBeyond * spacing_m);
+}
+
+// The voxels of one soft object that hand, anchors and rigid objects hold.
+std::vector<voxel::HeldVoxel> held_voxels(const World& world, const WorldState& state, std::size_t soft) {
+  const voxel::SoftObject& object = *state.soft[soft];
+  std::vector<voxel::HeldVoxel> held;
+  if (!object.moved_ever()) return held;
+  voxel::list_anchors(object, held);
+  for (const voxel::VoxelId v : object.touched()) {
+    const std::uint8_t role = object.state().role[v];
+    if ((role == voxel::Displacement::pressed || role == voxel::Displacement::held) &&
+        !object.lattice().anchored(v))
+      held.push_back({v, voxel::kHandPartner});
+  }
+  for (std::uint32_t s = 0; s < object.obstacles().size(); ++s) {
+    if (const auto rigid = rigid_under(world, state, soft, s))
+      held.push_back({object.lattice().surface()[s], voxel::kFirstRigidPartner + *rigid});
+  }
+  return held;
+}
+
+bool has_partner(const std::vector<voxel::HeldVoxel>& held, std::uint32_t partner) {
+  return std::any_of(held.begin(), held.end(),
+                     [partner](const voxel::HeldVoxel& h) { return h.partner == partner; });
+}
+
+// Adds the forces of anchors and rigid objects on one soft object.
+void add_supports(const World& world, const WorldState& state, std::uint32_t soft, const glm::dvec3& hand_N,
+                  std::vector<PairForce>& out) {
+  const voxel::SoftObject& object = *state.soft[soft];
+  const glm::dquat& rotation = world.soft[soft].pose.rotation;
+  if (object.uses_patches()) {
+    if (object.patches_in_use() == nullptr) return;
+    const auto carried_N = object.carried_by_anchors_N();
+    PairForce anchors{{Kind::anchors, soft, 0}, {}};
+    if (carried_N) anchors.on_soft_N = rotation * -*carried_N;
+    out.push_back(anchors);
+    return;
+  }
+  const auto held = held_voxels(world, state, soft);
+  if (held.empty()) return;
+  const std::size_t partners = voxel::kFirstRigidPartner + world.rigid.size();
+  const bool blocks = object.lattice().block_count() > 0;
+  const auto loads = blocks
+                         ? std::vector<voxel::PartnerLoad>(partners, {.known = false})
+                         : voxel::loads_by_partner(object, held, partners, glm::inverse(rotation) * hand_N);
+  for (std::uint32_t p = voxel::kAnchorPartner; p < partners; ++p) {
+    if (!has_partner(held, p) && loads[p].known && loads[p].force_N == glm::dvec3(0.0)) continue;
+    if (blocks && !has_partner(held, p)) continue;
+    PairForce force{p == voxel::kAnchorPartner ? ObjectPair{Kind::anchors, soft, 0}
+                                               : ObjectPair{Kind::rigid, soft, p - voxel::kFirstRigidPartner},
+                    {}};
+    if (loads[p].known) force.on_soft_N = rotation * loads[p].force_N;
+    out.push_back(force);
+  }
+}
+
+// Adds the forces of other soft objects; each pair once, by its first object.
+void add_soft_pairs(const World& world, const WorldState& state, std::vector<PairForce>& out) {
+  for (std::uint32_t m = 0; m < world.soft_pairs.size(); ++m) {
+    const auto [a, b] = world.soft_pairs[m];
+    bool touch = false;
+    glm::dvec3 on_second_N(0.0);
+    for (const FacetContact& contact : state.facet_contacts) {
+      if (contact.soft_pair != m || !contact.held) continue;
+      touch = true;
+      on_second_N += contact.pressed.force_N;
+      for (std::size_t i = 0; i < contact.extra_count; ++i) on_second_N += contact.extra_facets[i].force_N;
+    }
+    if (!touch) continue;
+    PairForce force{{Kind::soft, a, b}, {}};
+    if (state.soft[a]->lattice().block_count() == 0 && state.soft[b]->lattice().block_count() == 0)
+      force.on_soft_N = -on_second_N;
+    out.push_back(force);
+  }
+}
+
+ForceBalance balance_of(std::uint32_t soft, const glm::dvec3& hand_N, const std::vector<PairForce>& pairs) {
+  ForceBalance balance{.hand_N = hand_N, .largest_N = glm::length(hand_N), .sum_N = {}};
+  glm::dvec3 sum_N = hand_N;
+  bool known = true;
+  for (const PairForce& force : pairs) {
+    const bool second = force.pair.kind == Kind::soft && force.pair.other == soft;
+    if (force.pair.soft != soft && !second) continue;
+    known = known && force.on_soft_N.has_value();
+    const glm::dvec3 on_it_N = (second ? -1.0 : 1.0) * force.on_soft_N.value_or(glm::dvec3(0.0));
+    sum_N += on_it_N;
+    balance.largest_N = std::max(balance.largest_N, glm::length(on_it_N));
+  }
+  if (known) balance.sum_N = glm::length(sum_N);
+  return balance;
+}
+
+}  // namespace
+
+ForcesBetween forces_between(const World& world, const WorldState& state) {
+  ForcesBetween forces;
+  const auto hand_N = [&](std::size_t soft) { return -state.feel[world.rigid.size() + soft].on_hand_N; };
+  for (std::uint32_t o = 0; o < state.soft.size(); ++o)
+    add_supports(world, state, o, hand_N(o), forces.pairs);
+  add_soft_pairs(world, state, forces.pairs);
+  for (std::uint32_t o = 0; o < state.soft.size(); ++o)
+    forces.balance.push_back(balance_of(o, hand_N(o), forces.pairs));
+  return forces;
+}
+
+void ForcesCourse::add(const ForcesBetween& now, double t_s) {
+  ++samples;
+  end_t_s = t_s;
+  end_balance = now.balance;
+  for (PairCourse& course : pairs) course.end_on_soft_N = glm::dvec3(0.0);
+  for (const PairForce& force : now.pairs) {
+    auto found = std::find_if(pairs.begin(), pairs.end(),
+                              [&](const PairCourse& course) { return course.pair == force.pair; });
+    if (found == pairs.end()) {
+      const auto order = [](const ObjectPair& p) { return std::tuple(p.soft, p.kind, p.other); };
+      found = std::find_if(pairs.begin(), pairs.end(),
+                           [&](const PairCourse& course) { return order(force.pair) < order(course.pair); });
+      found = pairs.insert(found, PairCourse{.pair = force.pair});
+    }
+    ++found->samples;
+    found->end_on_soft_N = force.on_soft_N;
+    if (!force.on_soft_N) continue;
+    ++found->known_samples;
+    const double size_N = glm::length(*force.on_soft_N);
+    if (size_N <= found->max_N) continue;
+    found->max_N = size_N;
+    found->max_t_s = t_s;
+  }
+}
+
+}  // namespace hybrid

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Forces between the objects of a scene: how hard each pair presses on one another, and what anchors carry.
+// They are computed between ticks, from the present state alone, never within a tick.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <optional>
+#include <vector>
+
+#include "hybrid/world/world_state.h"
+
+namespace hybrid {
+
+// A soft object, and the other object of the pair.
+struct ObjectPair {
+  enum class Kind : std::uint8_t { rigid, soft, anchors } kind = Kind::anchors;
+  std::uint32_t soft = 0;   // index into World::soft
+  std::uint32_t other = 0;  // index into World::rigid or World::soft; 0 for anchors
+  friend bool operator==(const ObjectPair&, const ObjectPair&) = default;
+};
+
+struct PairForce {
+  ObjectPair pair;
+  // Of the other object on the soft one (scene frame). Empty where the state does not tell it: links at their
+  // limits tie both the other object and a third one to the same voxels, or the object has rigid blocks.
+  std::optional<glm::dvec3> on_soft_N;
+};
+
+// All forces on a soft object from outside.
+struct ForceBalance {
+  glm::dvec3 hand_N{0.0};  // of the hand on the object (scene frame)
+  double largest_N = 0.0;  // of these forces
+  // Length of their sum: 0 for tissue at rest. Tissue that still moves has no balance, because it has no
+  // inertia. Empty where a force is unknown.
+  std::optional<double> sum_N;
+};
+
+struct ForcesBetween {
+  std::vector<PairForce> pairs;       // those that touch
+  std::vector<ForceBalance> balance;  // [soft]
+};
+// Allocates.
+[[nodiscard]] ForcesBetween forces_between(const World& world, const WorldState& state);
+
+// Over the sampled moments of a session.
+struct PairCourse {
+  ObjectPair pair;
+  double max_N = 0.0, max_t_s = 0.0;
+  std::optional<glm::dvec3> end_on_soft_N{};     // at the last sample; 0 if they do not touch then
+  std::uint64_t samples = 0, known_samples = 0;  // in which they touch; of these, with a known force
+};
+
+struct ForcesCourse {
+  std::uint64_t samples = 0;
+  double end_t_s = 0.0;
+  std::vector<PairCourse> pairs;          // that touched at any sample, in the order of objects
+  std::vector<ForceBalance> end_balance;  // [soft]
+  void add(const ForcesBetween& now, double t_s);
+};
+
+}  // namespace hybrid

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Splits the load on the held voxels of a soft object by partner: by who holds them. For reports, between
+// ticks.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <span>
+#include <vector>
+
+#include "voxel/object/soft_object.h"
+
+namespace voxel {
+
+// A partner is the hand, the anchors, or one rigid object (from number 2 on).
+inline constexpr std::uint32_t kHandPartner = 0, kAnchorPartner = 1, kFirstRigidPartner = 2;
+inline constexpr std::size_t kMostPartners = 64;
+
+// A voxel that a partner keeps from moving as its links pull.
+struct HeldVoxel {
+  VoxelId v = 0;
+  std::uint32_t partner = kHandPartner;
+};
+
+struct PartnerLoad {
+  glm::dvec3 force_N{0.0};  // of the partner on the object (body frame)
+  // False: links at their limits tie the partner to another one, or to more voxels than are searched.
+  // Displacements do not tell then how the load is divided.
+  bool known = true;
+};
+
+// Appends the anchored voxels that something else of the object may pull.
+void list_anchors(const SoftObject& object, std::vector<HeldVoxel>& held);
+
+// The force of each of `partners` partners on the object, in its present state. It counts springs, bricks and
+// the loads of other soft objects (SoftObject::pair_load), and the loads that links at their limits pass on
+// to `held`. `hand_N` is the force of the hand on the object: it divides the load of voxels that links at
+// their limits tie both to the hand and to one other partner. A voxel may be in `held` once for each of its
+// partners. Allocates; reads the state only. Not for an object on nested patches or with rigid blocks.
+[[nodiscard]] std::vector<PartnerLoad> loads_by_partner(const SoftObject& object,
+                                                        std::span<const HeldVoxel> held, std::size_t partners,
+                                                        const glm::dvec3& hand_N);
+
+}  // namespace voxel
