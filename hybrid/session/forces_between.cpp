@@ -12,6 +12,9 @@ namespace {
 
 using Kind = ObjectPair::Kind;
 
+// Links at their limits carry a load that only the balance can confirm: it has to close to this share of the
+// largest force, or to this force.
+constexpr double kBalanced = 0.01, kBalanced_N = 1e-4;
 // Of the spacing: a voxel nearer than this to its half-space lies on it.
 constexpr double kLiesOnHalfSpace = 1e-3;
 // Of the spacing, beyond a voxel's ball: the surface of its half-space is looked for so far.
@@ -81,7 +84,7 @@ void add_supports(const World& world, const WorldState& state, std::uint32_t sof
   if (object.uses_patches()) {
     if (object.patches_in_use() == nullptr) return;
     const auto carried_N = object.carried_by_anchors_N();
-    PairForce anchors{{Kind::anchors, soft, 0}, {}};
+    PairForce anchors{{Kind::anchors, soft, 0}, {}, false};
     if (carried_N) anchors.on_soft_N = rotation * -*carried_N;
     out.push_back(anchors);
     return;
@@ -98,8 +101,10 @@ void add_supports(const World& world, const WorldState& state, std::uint32_t sof
     if (blocks && !has_partner(held, p)) continue;
     PairForce force{p == voxel::kAnchorPartner ? ObjectPair{Kind::anchors, soft, 0}
                                                : ObjectPair{Kind::rigid, soft, p - voxel::kFirstRigidPartner},
-                    {}};
+                    {},
+                    false};
     if (loads[p].known) force.on_soft_N = rotation * loads[p].force_N;
+    force.through_limits = loads[p].through_limits;
     out.push_back(force);
   }
 }
@@ -117,7 +122,7 @@ void add_soft_pairs(const World& world, const WorldState& state, std::vector<Pai
       for (std::size_t i = 0; i < contact.extra_count; ++i) on_second_N += contact.extra_facets[i].force_N;
     }
     if (!touch) continue;
-    PairForce force{{Kind::soft, a, b}, {}};
+    PairForce force{{Kind::soft, a, b}, {}, false};
     if (state.soft[a]->lattice().block_count() == 0 && state.soft[b]->lattice().block_count() == 0)
       force.on_soft_N = -on_second_N;
     out.push_back(force);
@@ -140,6 +145,14 @@ ForceBalance balance_of(std::uint32_t soft, const glm::dvec3& hand_N, const std:
   return balance;
 }
 
+// Forces through limits of an object that has no balance are taken back.
+void take_back_unbalanced(std::uint32_t soft, const ForceBalance& balance, std::vector<PairForce>& pairs) {
+  if (balance.sum_N && *balance.sum_N <= std::max(kBalanced * balance.largest_N, kBalanced_N)) return;
+  for (PairForce& force : pairs) {
+    if (force.pair.soft == soft && force.through_limits) force.on_soft_N.reset();
+  }
+}
+
 }  // namespace
 
 ForcesBetween forces_between(const World& world, const WorldState& state) {
@@ -148,6 +161,8 @@ ForcesBetween forces_between(const World& world, const WorldState& state) {
   for (std::uint32_t o = 0; o < state.soft.size(); ++o)
     add_supports(world, state, o, hand_N(o), forces.pairs);
   add_soft_pairs(world, state, forces.pairs);
+  for (std::uint32_t o = 0; o < state.soft.size(); ++o)
+    take_back_unbalanced(o, balance_of(o, hand_N(o), forces.pairs), forces.pairs);
   for (std::uint32_t o = 0; o < state.soft.size(); ++o)
     forces.balance.push_back(balance_of(o, hand_N(o), forces.pairs));
   return forces;

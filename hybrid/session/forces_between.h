@@ -23,8 +23,10 @@ struct ObjectPair {
 struct PairForce {
   ObjectPair pair;
   // Of the other object on the soft one (scene frame). Empty where the state does not tell it: links at their
-  // limits tie both the other object and a third one to the same voxels, or the object has rigid blocks.
+  // limits tie both the other object and a third one to the same voxels, or carry loads in tissue whose
+  // forces do not balance; or the object has rigid blocks.
   std::optional<glm::dvec3> on_soft_N;
+  bool through_limits = false;  // links at their limits may carry a part of it
 };
 
 // All forces on a soft object from outside.

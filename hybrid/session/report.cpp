@@ -210,10 +210,9 @@ std::string between_words(const World& world, const ForcesCourse& between) {
     text += fmt::format("  {:<16} {:<16} {}; at the end {}", world.soft[course.pair.soft].name,
                         other_name(world, course.pair), most, end);
     const std::uint64_t unknown = course.samples - course.known_samples;
-    text += unknown > 0
-                ? fmt::format(" (unknown at {} of {} moments: links at their limits share the load)\n",
-                              unknown, course.samples)
-                : "\n";
+    text += unknown > 0 ? fmt::format(" (unknown at {} of {} moments: links at their limits carry load)\n",
+                                      unknown, course.samples)
+                        : "\n";
   }
   return text;
 }

@@ -102,9 +102,8 @@ class Run {
     ticks_ = static_cast<std::uint64_t>(std::llround(seconds * scene.rate_hz));
     result_.planned_ticks = ticks_;
     result_.dt_s = dt_;
-    if (options.between_samples > 0)
-      between_every_ =
-          std::max<std::uint64_t>(1, ticks_ / static_cast<std::uint64_t>(options.between_samples));
+    if (const auto most = static_cast<std::uint64_t>(std::max(options.between_samples, 0)); most > 0)
+      between_every_ = std::max<std::uint64_t>(1, (ticks_ + most - 1) / most);
     clearance_every_ = std::max<std::uint64_t>(1, ticks_ / kClearances);
     if (options.keep_recording) result_.recording.reserve(ticks_);
     result_.object_contact_ticks.assign(world_.object_count(), 0);

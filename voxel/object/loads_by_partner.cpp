@@ -16,6 +16,10 @@
 namespace voxel {
 namespace {
 
+// Of the spacing: a link nearer to a limit is taken to be at it. Voxels that are tied without need add loads
+// that balance at rest; a tie that is missed loses a load.
+constexpr float kTied = 0.02F;
+
 using PartnerSet = std::uint64_t;  // bit n: partner n
 
 constexpr PartnerSet set_of(std::uint32_t partner) {
@@ -32,6 +36,7 @@ class Clusters {
     for (const HeldVoxel& h : held) node(h.v, set_of(h.partner));
     for (std::uint32_t i = 0; i < voxels_.size() && voxels_.size() < kMost; ++i) tie(i);
   }
+  [[nodiscard]] bool any_ties() const { return ties_; }
   [[nodiscard]] bool complete() const { return voxels_.size() < kMost; }
 
   // visit(set of partners, load of the cluster (N))
@@ -68,16 +73,17 @@ class Clusters {
   // Ties voxel number i to its neighbours across links at their limits. Anchors are tied to no anchor.
   void tie(std::uint32_t i) {
     const VoxelId v = voxels_[i];
-    if (!may_be_at_limit(lattice_, object_.state(), v, axis_, kAtLimit)) return;
+    if (!may_be_at_limit(lattice_, object_.state(), v, axis_, kTied)) return;
     const auto& u = object_.state().u[static_cast<std::size_t>(axis_)];
     for (int d = 0; d < 3; ++d) {
-      const float tight_m = kAtLimit * static_cast<float>(lattice_.spacing_m()[d]);
+      const float tight_m = kTied * static_cast<float>(lattice_.spacing_m()[d]);
       for (const bool up : {false, true}) {
         const VoxelId w = up ? lattice_.up(v, d) : lattice_.down(v, d);
         if (!lattice_.filled(w) || (lattice_.anchored(v) && lattice_.anchored(w))) continue;
         const float longer = up ? u[w] - u[v] : u[v] - u[w];
         const auto bounds = lattice_.bounds(up ? v : w, d, axis_);
         if (longer > bounds[0] + tight_m && longer < bounds[1] - tight_m) continue;
+        ties_ = true;
         parent_[root_of(node(w, lattice_.anchored(w) ? set_of(kAnchorPartner) : 0))] = root_of(i);
       }
     }
@@ -93,6 +99,7 @@ class Clusters {
   const SoftObject& object_;
   const Lattice& lattice_;
   int axis_;
+  bool ties_ = false;
   std::unordered_map<VoxelId, std::uint32_t> index_;
   std::vector<VoxelId> voxels_;
   std::vector<PartnerSet> partners_;
@@ -167,6 +174,9 @@ std::vector<PartnerLoad> loads_by_partner(const SoftObject& object, std::span<co
     std::vector<Group> groups;
     Clusters clusters(object, held, axis);
     if (!clusters.complete()) all_unknown();
+    if (clusters.any_ties()) {
+      for (PartnerLoad& load : out) load.through_limits = true;
+    }
     clusters.for_each([&](PartnerSet set, double load_N) {
       const auto found =
           std::find_if(groups.begin(), groups.end(), [set](const Group& g) { return g.partners == set; });

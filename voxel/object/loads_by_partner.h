@@ -28,6 +28,7 @@ struct PartnerLoad {
   // False: links at their limits tie the partner to another one, or to more voxels than are searched.
   // Displacements do not tell then how the load is divided.
   bool known = true;
+  bool through_limits = false;  // links at their limits may carry a part of it
 };
 
 // Appends the anchored voxels that something else of the object may pull.
