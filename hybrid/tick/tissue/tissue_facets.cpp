@@ -66,6 +66,8 @@ bool bound_of(const std::array<glm::dvec3, 3>& at, const glm::dvec3& normal, con
 
 std::size_t facet_bounds(const voxel::SoftObject& object, const voxel::ToolInBody& tool, double within,
                          std::span<voxel::ToolBound> out) noexcept {
+  // The face of a punch touches tissue at just this distance, and is pressed by the voxels under it.
+  if (tool.shape == voxel::ToolInBody::Shape::punch) return 0;
   const voxel::Lattice& lattice = object.lattice();
   // The surface of tissue is half a spacing outside its outermost voxels.
   const double surface = object.voxel_radius(), reach = within + surface;

@@ -13,10 +13,10 @@
 
 namespace hybrid {
 
-// Writes half-spaces of facets (triangles of surface voxels) that face the tool's centre: the centre must
-// stay outside the tissue's surface, half a spacing outside each facet. `within`: distance from that surface
-// (m). Only facets that bound a full cell of eight voxels count: others have no inner side. Returns how many;
-// stops when `out` is full.
+// For a ball: writes half-spaces of facets (triangles of surface voxels) that face the tool's centre: the
+// centre must stay outside the tissue's surface, half a spacing outside each facet. `within`: distance from
+// that surface (m). Only facets that bound a full cell of eight voxels count: others have no inner side.
+// Returns how many; stops when `out` is full.
 std::size_t facet_bounds(const voxel::SoftObject& object, const voxel::ToolInBody& tool, double within,
                          std::span<voxel::ToolBound> out) noexcept;
 
