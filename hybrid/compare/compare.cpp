@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <numbers>
 
 #include "device/loop/stop_signal.h"
 #include "hybrid/build/build_objects.h"
@@ -175,8 +174,7 @@ void measure(ModelResult& model, const ModelResult& reference, double floor_N) {
     model.max_N = std::max(model.max_N, error);
     jnd.push_back(jnd_of(f, r, floor_N));
     if (glm::length(f) <= floor_N || glm::length(r) <= floor_N) continue;
-    const double c = glm::dot(f, r) / (glm::length(f) * glm::length(r));
-    angle.push_back(std::acos(std::clamp(c, -1.0, 1.0)) * 180.0 / std::numbers::pi);
+    angle.push_back(angle_between_deg(f, r));
   }
   if (jnd.empty()) return;
   model.rms_N = std::sqrt(sum2 / static_cast<double>(jnd.size()));

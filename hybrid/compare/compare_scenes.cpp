@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <numbers>
 #include <stdexcept>
 
 #include "hybrid/compare/compare.h"
@@ -115,10 +114,7 @@ void measure_scene(ComparedScene& scene, const ComparedScene& reference, double 
     const double jnd = jnd_of(f, r, floor_N);
     all.add(jnd, t_s);
     (holds ? still : moving).add(jnd, t_s);
-    if (size_N > kDirection_N && reference_N > kDirection_N) {
-      const double cosine = std::clamp(glm::dot(f / size_N, r / reference_N), -1.0, 1.0);
-      angle_deg.push_back(f == r ? 0.0 : std::acos(cosine) * 180.0 / std::numbers::pi);
-    }
+    if (size_N > kDirection_N && reference_N > kDirection_N) angle_deg.push_back(angle_between_deg(f, r));
   }
   scene.all = difference_of(all.jnd, all.max_t_s);
   scene.moving = difference_of(moving.jnd, moving.max_t_s);

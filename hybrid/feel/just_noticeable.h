@@ -5,8 +5,10 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
+#include <numbers>
 
 namespace hybrid {
 
@@ -17,6 +19,11 @@ inline constexpr double kJndFloor_N = 0.04;  // floor for a device without frict
 [[nodiscard]] inline double jnd_of(const glm::dvec3& force, const glm::dvec3& reference,
                                    double floor_N) noexcept {
   return glm::length(force - reference) / std::max(kJndShare * glm::length(reference), floor_N);
+}
+
+// Angle between two forces (degrees). Exactly 0 for equal ones; neither may be 0.
+[[nodiscard]] inline double angle_between_deg(const glm::dvec3& a, const glm::dvec3& b) noexcept {
+  return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b)) * 180.0 / std::numbers::pi;
 }
 
 }  // namespace hybrid

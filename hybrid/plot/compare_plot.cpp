@@ -5,10 +5,10 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
-#include <numbers>
 #include <stdexcept>
 
 #include "hybrid/base/number_text.h"
+#include "hybrid/feel/just_noticeable.h"
 #include "hybrid/plot/contacts.h"
 #include "hybrid/plot/svg_figure.h"
 
@@ -17,12 +17,10 @@ namespace {
 
 constexpr double kGapInLine = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t kMostDepthPanels = 3;
-constexpr std::size_t kSolidColours = 7;  // of series_colour(); later lines are dashed
 constexpr double kTurned_deg = 15.0;      // angles are drawn if some force turns further than this
 constexpr double kReversedShare = 0.1;    // of a contact's largest force: a pull that is drawn with its sign
 constexpr double kShownOutside_m = 1e-3;  // how far outside the object force over depth begins
 constexpr const char* kReferenceColour = "#8a8a8a";
-constexpr const char* kNotFeltColour = "#dfe8f2";
 
 // y at each of `at`, linear between samples; a gap outside the range of x and beside samples that are not
 // finite.
@@ -71,18 +69,11 @@ std::vector<glm::dvec3> at_times(const Course& model, const std::vector<double>&
   return out;
 }
 
-// Difference of the vectors in JND; negative where the model's force is the smaller one.
-double signed_jnd(const glm::dvec3& force, const glm::dvec3& reference, const ComparePlotOptions& options) {
-  const double size = glm::length(reference);
-  const double jnd = glm::length(force - reference) / std::max(options.jnd_share * size, options.jnd_floor_N);
-  return glm::length(force) < size ? -jnd : jnd;
-}
-
 // Angle between two forces (degrees); a gap if either force is too small to have a direction.
 double angle_between(const glm::dvec3& a, const glm::dvec3& b, double floor_N) {
   const double size = glm::length(a) * glm::length(b);
   if (!(glm::length(a) > floor_N) || !(glm::length(b) > floor_N) || !std::isfinite(size)) return kGapInLine;
-  return std::acos(std::clamp(glm::dot(a, b) / size, -1.0, 1.0)) * 180.0 / std::numbers::pi;
+  return angle_between_deg(a, b);
 }
 
 class ComparePlot {
@@ -103,9 +94,7 @@ class ComparePlot {
   Figure draw(const std::string& title) const {
     Figure figure;
     figure.title = title;
-    figure.notes.push_back("Reference: " + reference_.name +
-                           ". One JND: " + with_digits(100.0 * options_.jnd_share, 3) + " %" +
-                           " of its force, at least " + with_digits(options_.jnd_floor_N, 3) + " N" + ".");
+    figure.notes.push_back(reference_note(reference_.name, options_));
     if (with_sign_) {
       figure.notes.emplace_back(
           "Some force turns round: drawn is the part along the reference's largest force of each contact; "
@@ -177,7 +166,7 @@ class ComparePlot {
     if (!is_reference)
       force.series.push_back({reference_.name, reference.t_s, shown(reference), kReferenceColour, 1.2});
     force.series.push_back({is_reference ? "" : model.name, courses_[m].t_s, shown(courses_[m]),
-                            series_colour(m), 1.8, m >= kSolidColours});
+                            series_colour(m), 1.8, m >= kSeriesColours});
     group.panels.push_back(std::move(force));
     if (is_reference) return;
     Panel difference;
@@ -191,10 +180,10 @@ class ComparePlot {
       jnd.push_back(signed_jnd(there[i], reference.force_N[i], options_));
     if (!reference.t_s.empty()) {
       const std::vector<double> ends{reference.t_s.front(), reference.t_s.back()};
-      difference.areas.push_back({"not felt: within ±1 JND", ends, {-1.0, -1.0}, {1.0, 1.0}, kNotFeltColour});
+      difference.areas.push_back(not_felt_area(ends));
     }
     difference.series.push_back(
-        {"", reference.t_s, std::move(jnd), series_colour(m), 1.6, m >= kSolidColours});
+        {"", reference.t_s, std::move(jnd), series_colour(m), 1.6, m >= kSeriesColours});
     group.panels.push_back(std::move(difference));
   }
 
@@ -219,7 +208,7 @@ class ComparePlot {
         if (angle.back() > most) most = angle.back();
       }
       panel.series.push_back(
-          {models_[m].name, reference.t_s, std::move(angle), series_colour(m), 1.6, m >= kSolidColours});
+          {models_[m].name, reference.t_s, std::move(angle), series_colour(m), 1.6, m >= kSeriesColours});
     }
     if (most < kTurned_deg) panel.series.clear();
     return panel;
@@ -240,7 +229,7 @@ class ComparePlot {
                   .y = {},
                   .colour = series_colour(m),
                   .width = m == options_.reference ? 2.4 : 1.6,
-                  .dashed = m >= kSolidColours};
+                  .dashed = m >= kSeriesColours};
       for (std::size_t i = 0; i < model.rows.size(); ++i) {
         const TraceRow& row = model.rows[i];
         if (!(row.t_s >= contact.from_s && row.t_s <= contact.to_s)) continue;
@@ -274,6 +263,21 @@ class ComparePlot {
 };
 
 }  // namespace
+
+double signed_jnd(const glm::dvec3& force, const glm::dvec3& reference, const ComparePlotOptions& options) {
+  const double size = glm::length(reference);
+  const double jnd = glm::length(force - reference) / std::max(options.jnd_share * size, options.jnd_floor_N);
+  return glm::length(force) < size ? -jnd : jnd;
+}
+
+std::string reference_note(const std::string& name, const ComparePlotOptions& options) {
+  return "Reference: " + name + ". One JND: " + with_digits(100.0 * options.jnd_share, 3) +
+         " % of its force, at least " + with_digits(options.jnd_floor_N, 3) + " N.";
+}
+
+Area not_felt_area(const std::vector<double>& ends) {
+  return {"not felt: within ±1 JND", ends, {-1.0, -1.0}, {1.0, 1.0}, "#dfe8f2"};
+}
 
 void save_compare_plot(const std::filesystem::path& svg, std::span<const ComparedModel> models,
                        std::span<const ReferenceCurve> curves, const std::string& title,

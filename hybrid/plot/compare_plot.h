@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "hybrid/plot/svg_figure.h"
 #include "hybrid/snapshot/snapshot.h"
 
 namespace hybrid {
@@ -33,6 +34,12 @@ struct ComparePlotOptions {
   double jnd_share = 0.07;    // a hand distinguishes forces that differ by this share
   double jnd_floor_N = 0.04;  // and by at least this amount
 };
+
+// Shared by the figures of comparisons: the difference of the vectors in JND, negative where `force` is the
+// smaller one; the line that names reference and JND; the area of what is not felt between two times (s).
+double signed_jnd(const glm::dvec3& force, const glm::dvec3& reference, const ComparePlotOptions& options);
+std::string reference_note(const std::string& name, const ComparePlotOptions& options);
+Area not_felt_area(const std::vector<double>& ends);
 
 // Plots, for each model in panels of its own, force over time and the difference from the reference in JND,
 // and for each contact force over depth. The difference is that of the force vectors, negative where the

@@ -2,19 +2,14 @@
 #include "hybrid/plot/scenes_plot.h"
 
 #include <algorithm>
-#include <cmath>
 #include <glm/geometric.hpp>
 #include <stdexcept>
 
-#include "hybrid/base/number_text.h"
 #include "hybrid/plot/contacts.h"
 #include "hybrid/plot/svg_figure.h"
 
 namespace hybrid {
 namespace {
-
-constexpr std::size_t kUnlikeColours = 7;  // of series_colour(); later lines are dashed
-constexpr const char* kWithinJndColour = "#dfe8f2";
 
 Series difference_series(const ComparedModel& scene, const ComparedModel& reference,
                          const ComparePlotOptions& options) {
@@ -22,11 +17,8 @@ Series difference_series(const ComparedModel& scene, const ComparedModel& refere
   line.name = scene.name;
   const std::size_t count = std::min(scene.rows.size(), reference.rows.size());
   for (std::size_t i = 0; i < count; ++i) {
-    const glm::dvec3 &f = scene.rows[i].force_N, &r = reference.rows[i].force_N;
-    const double size = glm::length(r);
-    const double jnd = glm::length(f - r) / std::max(options.jnd_share * size, options.jnd_floor_N);
     line.x.push_back(reference.rows[i].t_s);
-    line.y.push_back(glm::length(f) < size ? -jnd : jnd);
+    line.y.push_back(signed_jnd(scene.rows[i].force_N, reference.rows[i].force_N, options));
   }
   return line;
 }
@@ -40,9 +32,7 @@ void save_scenes_plot(const std::filesystem::path& svg, std::span<const Compared
   const ComparedModel& reference = scenes[options.reference];
   Figure figure;
   figure.title = title;
-  figure.notes.push_back("Reference: " + reference.name +
-                         ". One JND: " + with_digits(100.0 * options.jnd_share, 3) +
-                         " % of its force, at least " + with_digits(options.jnd_floor_N, 3) + " N.");
+  figure.notes.push_back(reference_note(reference.name, options));
   PanelGroup group;
   group.x_label = "time (s)";
   Panel force;
@@ -63,7 +53,7 @@ void save_scenes_plot(const std::filesystem::path& svg, std::span<const Compared
     line.colour = series_colour(s);
     // The reference is drawn first and wide, so that a curve on it leaves both visible.
     line.width = is_reference ? 3.0 : 1.5;
-    line.dashed = s >= kUnlikeColours;
+    line.dashed = s >= kSeriesColours;
     for (const TraceRow& row : scenes[s].rows) {
       line.x.push_back(row.t_s);
       line.y.push_back(glm::length(row.force_N));
@@ -73,13 +63,12 @@ void save_scenes_plot(const std::filesystem::path& svg, std::span<const Compared
     if (is_reference) continue;
     Series apart = difference_series(scenes[s], reference, options);
     apart.colour = series_colour(s);
-    apart.dashed = s >= kUnlikeColours;
+    apart.dashed = s >= kSeriesColours;
     difference.series.push_back(std::move(apart));
   }
   if (!reference.rows.empty()) {
     const double from = reference.rows.front().t_s, to = reference.rows.back().t_s;
-    difference.areas.push_back(
-        {"not felt: within ±1 JND", {from, to}, {-1.0, -1.0}, {1.0, 1.0}, kWithinJndColour});
+    difference.areas.push_back(not_felt_area({from, to}));
     group.squeezed = long_in_the_air(touched, from, to);
     if (!group.squeezed.empty())
       figure.notes.emplace_back("Grey: long times in the air, drawn short; below them their length (s).");

@@ -15,7 +15,6 @@ namespace hybrid {
 namespace {
 
 constexpr const char* kTouchedColour = "#eaf2e3";
-constexpr std::size_t kMostColours = 7;   // of series_colour(), before it repeats
 constexpr std::size_t kMostContacts = 6;  // lines of force over depth
 constexpr std::size_t kLookUpEvery = 10;  // ticks between two look-ups of the material beneath the tool
 constexpr std::uint8_t kNoPart = 255;
@@ -130,7 +129,7 @@ Panel force_panel(std::span<const TraceRow> rows, const std::vector<double>& t,
   // Dashed lines of their own, if a kind has more than one: they are parts of the sums above.
   std::size_t colour = 2;
   for (const Touched& thing : things) {
-    if (thing.force_N.empty() || count(thing.soft) < 2 || colour >= kMostColours) continue;
+    if (thing.force_N.empty() || count(thing.soft) < 2 || colour >= kSeriesColours) continue;
     panel.series.push_back({thing.name, t, thing.force_N, series_colour(colour++), 1.4, true});
   }
   return panel;

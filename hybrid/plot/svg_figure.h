@@ -77,7 +77,9 @@ struct Figure {
   double width = 960.0;  // (pixels)
 };
 
-// Colours that colour-blind readers can distinguish (Okabe & Ito 2008), on white; repeats after seven.
+// Colours that colour-blind readers can distinguish (Okabe & Ito 2008), on white; repeats after
+// kSeriesColours.
+inline constexpr std::size_t kSeriesColours = 7;
 std::string series_colour(std::size_t index);
 
 std::string to_svg(const Figure& figure);

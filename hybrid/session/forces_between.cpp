@@ -5,6 +5,8 @@
 #include <glm/geometric.hpp>
 #include <tuple>
 
+#include "hybrid/tick/tissue/obstacles.h"
+#include "voxel/lattice/voxel_links.h"
 #include "voxel/object/loads_by_partner.h"
 
 namespace hybrid {
@@ -15,23 +17,8 @@ using Kind = ObjectPair::Kind;
 // Links at their limits carry a load that only the balance can confirm: it has to close to this share of the
 // largest force, or to this force.
 constexpr double kBalanced = 0.01, kBalanced_N = 1e-4;
-// Of the spacing: a voxel nearer than this to its half-space lies on it.
-constexpr double kLiesOnHalfSpace = 1e-3;
 // Of the spacing, beyond a voxel's ball: the surface of its half-space is looked for so far.
 constexpr double kLookBeyond = 0.5;
-
-// The fixed rigid object whose surface is nearest to a point (scene frame).
-std::optional<std::uint32_t> nearest_fixed(const World& world, const glm::dvec3& at, double range_m) {
-  std::optional<std::uint32_t> best;
-  for (std::uint32_t o = 0; o < world.rigid.size(); ++o) {
-    const RigidObject& object = world.rigid[o];
-    polygon::NearPoint near;
-    if (object.presses_tissue || !object.surface->nearest(object.to_body(at), range_m, near)) continue;
-    range_m = near.distance;
-    best = o;
-  }
-  return best;
-}
 
 // The rigid object that surface voxel s lies on, if any.
 std::optional<std::uint32_t> rigid_under(const World& world, const WorldState& state, std::size_t soft,
@@ -41,15 +28,15 @@ std::optional<std::uint32_t> rigid_under(const World& world, const WorldState& s
   const voxel::VoxelId v = object.lattice().surface()[s];
   if (obstacle.normal == glm::vec3(0.0F) || object.lattice().anchored(v)) return {};
   const double spacing_m = object.lattice().min_spacing_m();
-  const double gap_m =
-      glm::dot(glm::dvec3(obstacle.normal), object.state().at(v)) - static_cast<double>(obstacle.bound);
-  if (gap_m > kLiesOnHalfSpace * spacing_m) return {};
+  if (-voxel::depth_in_obstacle(obstacle, object.state().at(v)) > static_cast<double>(kLiesOn) * spacing_m)
+    return {};
   if (obstacle.moving) {
     const std::uint32_t body = state.body_obstacles[soft].whose[s];
     return body == BodyObstacles::kNobody ? std::nullopt : std::optional(body);
   }
-  return nearest_fixed(world, world.soft[soft].to_scene(object.position(v)),
-                       object.voxel_radius() + kLookBeyond * spacing_m);
+  const NearestRigid near = nearest_rigid(world, state, world.soft[soft].to_scene(object.position(v)),
+                                          object.voxel_radius() + kLookBeyond * spacing_m);
+  return near.found ? std::optional(near.object) : std::nullopt;
 }
 
 // The voxels of one soft object that hand, anchors and rigid objects hold.
@@ -97,8 +84,7 @@ void add_supports(const World& world, const WorldState& state, std::uint32_t sof
                          ? std::vector<voxel::PartnerLoad>(partners, {.known = false})
                          : voxel::loads_by_partner(object, held, partners, glm::inverse(rotation) * hand_N);
   for (std::uint32_t p = voxel::kAnchorPartner; p < partners; ++p) {
-    if (!has_partner(held, p) && loads[p].known && loads[p].force_N == glm::dvec3(0.0)) continue;
-    if (blocks && !has_partner(held, p)) continue;
+    if (!has_partner(held, p)) continue;
     PairForce force{p == voxel::kAnchorPartner ? ObjectPair{Kind::anchors, soft, 0}
                                                : ObjectPair{Kind::rigid, soft, p - voxel::kFirstRigidPartner},
                     {},

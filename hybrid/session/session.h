@@ -49,8 +49,8 @@ struct SessionOptions {
   bool keep_rows = true;        // trace rows and per-object forces
   bool keep_recording = true;   // every input, 48 bytes a tick: without it and the rows memory stays flat
   bool keep_clearance = false;  // distances between objects, at a thousand moments
-  // Most moments, evenly spread, at which the forces between objects are computed; in real time only the end
-  // is one.
+  // Most moments, evenly spread, at which the forces between objects are computed, beside the end. In real
+  // time the end alone.
   int between_samples = 0;
   bool keep_picture = false;  // keep the snapshot with the most contact
   // Most ticks whose force is compared with that of a slow run (force_error.h), evenly spread. The slow run

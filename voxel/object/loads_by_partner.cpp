@@ -133,7 +133,6 @@ void divide(std::span<const Group> groups, int axis, double hand_N, std::span<Pa
     const auto p = static_cast<std::size_t>(std::countr_zero(others));
     out[p].force_N[axis] -= group.load_N + (beside_hand ? hand_N - hand_alone_N : 0.0);
   }
-  out[kHandPartner].force_N[axis] = with_hand > 0 ? hand_N : hand_alone_N;
 }
 
 // Links reach the six neighbours, bricks also those across edges and corners.

@@ -34,11 +34,12 @@ struct PartnerLoad {
 // Appends the anchored voxels that something else of the object may pull.
 void list_anchors(const SoftObject& object, std::vector<HeldVoxel>& held);
 
-// The force of each of `partners` partners on the object, in its present state. It counts springs, bricks and
-// the loads of other soft objects (SoftObject::pair_load), and the loads that links at their limits pass on
-// to `held`. `hand_N` is the force of the hand on the object: it divides the load of voxels that links at
-// their limits tie both to the hand and to one other partner. A voxel may be in `held` once for each of its
-// partners. Allocates; reads the state only. Not for an object on nested patches or with rigid blocks.
+// The force of each of `partners` partners but the hand on the object, in its present state. It counts
+// springs, bricks and the loads of other soft objects (SoftObject::pair_load), and the loads that links at
+// their limits pass on to `held`. `hand_N` is the force of the hand on the object: it divides the load of
+// voxels that links at their limits tie both to the hand and to one other partner. The entry of the hand
+// stays 0. A voxel may be in `held` once for each of its partners. Allocates; reads the state only. Not for
+// an object on nested patches or with rigid blocks.
 [[nodiscard]] std::vector<PartnerLoad> loads_by_partner(const SoftObject& object,
                                                         std::span<const HeldVoxel> held, std::size_t partners,
                                                         const glm::dvec3& hand_N);

@@ -24,14 +24,9 @@ constexpr double kInside = 0.01;  // of the spacing: a voxel that is deeper in a
 constexpr float kMovedEnough = 0.25F, kUnknownAhead = 2.0F, kKnownAhead = 0.6F;
 // In objects with bricks, a voxel on its obstacle queries again when it slid by kSlideOnObstacle, so that it
 // follows a surface that turns. Links give way along their axes alone, and hardly need this.
-constexpr float kSlideOnObstacle = 0.02F, kLiesOn = 1e-3F;
+constexpr float kSlideOnObstacle = 0.02F;
 
-struct NearestRigid {
-  glm::dvec3 normal{0.0};  // away from the surface, scene frame, unit
-  double distance = 0.0;   // negative: within the solid
-  std::uint32_t object = 0;
-  bool found = false;
-};
+}  // namespace
 
 NearestRigid nearest_rigid(const World& world, const WorldState& state, const glm::dvec3& point,
                            double range) noexcept {
@@ -49,6 +44,8 @@ NearestRigid nearest_rigid(const World& world, const WorldState& state, const gl
   }
   return best;
 }
+
+namespace {
 
 // From within a solid the nearest surface shows its wrong side, which would keep the voxel inside.
 NearestRigid flip_if_inside(const World& world, const glm::dvec3& point, NearestRigid near) noexcept {

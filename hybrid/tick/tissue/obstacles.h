@@ -10,6 +10,19 @@ namespace hybrid {
 // A rigid surface within this distance of a surface voxel becomes its obstacle (spacings).
 inline constexpr double kObstacleRange = 4.0;
 
+// A voxel nearer to its half-space than this lies on it (spacings).
+inline constexpr float kLiesOn = 1e-3F;
+
+// The point of standing rigid surfaces that is nearest to `point` (scene frame), within `range` (m).
+struct NearestRigid {
+  glm::dvec3 normal{0.0};  // away from the surface, scene frame, unit
+  double distance = 0.0;   // negative: within the solid
+  std::uint32_t object = 0;
+  bool found = false;
+};
+NearestRigid nearest_rigid(const World& world, const WorldState& state, const glm::dvec3& point,
+                           double range) noexcept;
+
 // On load: gives every surface voxel near a rigid surface its obstacle. Nothing presses at rest: a voxel that
 // already overlaps keeps its depth. Returns how many voxels have an obstacle.
 std::size_t find_obstacles(const World& world, WorldState& state, std::size_t soft);

@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/vec3.hpp>
+#include <numbers>
 
 #include "polygon/mesh/triangle.h"
 
@@ -17,6 +18,7 @@ namespace {
 // A facet faces the centre if the direction to its nearest point is within 45 degrees of its normal. At a
 // convex edge this leaves the centre free beside the edge.
 constexpr double kFaces = 0.70710678118654752;
+
 // A square between four neighbouring voxels: `corner`, and one step along each of two axes.
 struct Square {
   std::array<voxel::VoxelId, 4> voxels{};  // in a ring
@@ -62,6 +64,32 @@ bool bound_of(const std::array<glm::dvec3, 3>& at, const glm::dvec3& normal, con
   return true;
 }
 
+// Is the point (body frame) in a full cell of the tissue as it is now? Valid where tissue is nearly at rest:
+// the displacement is taken from the voxel nearest to the point at rest.
+bool in_resting_tissue(const voxel::SoftObject& object, const glm::dvec3& point) noexcept {
+  const voxel::Lattice& lattice = object.lattice();
+  const glm::dvec3 at = point / lattice.spacing_m();
+  const auto inside = [&](const glm::dvec3& p) {
+    for (int d = 0; d < 3; ++d) {
+      if (!(p[d] >= 0.0 && p[d] < lattice.grid().dims[static_cast<std::size_t>(d)] - 1)) return false;
+    }
+    return true;
+  };
+  if (!inside(at)) return false;
+  const glm::ivec3 nearest(glm::round(at));
+  const voxel::VoxelId v = lattice.at(nearest.x, nearest.y, nearest.z);
+  if (!lattice.filled(v)) return false;
+  const glm::dvec3 rest = at - object.displacement(v) / lattice.spacing_m();
+  if (!inside(rest)) return false;
+  const glm::ivec3 cell(glm::floor(rest));
+  for (int corner = 0; corner < 8; ++corner) {
+    if (!lattice.filled(
+            lattice.at(cell.x + (corner & 1), cell.y + ((corner >> 1) & 1), cell.z + (corner >> 2))))
+      return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 std::size_t facet_bounds(const voxel::SoftObject& object, const voxel::ToolInBody& tool, double within,
@@ -71,7 +99,10 @@ std::size_t facet_bounds(const voxel::SoftObject& object, const voxel::ToolInBod
   const voxel::Lattice& lattice = object.lattice();
   // The surface of tissue is half a spacing outside its outermost voxels.
   const double surface = object.voxel_radius(), reach = within + surface;
-  const double near = reach + 2.0 * longest_link_m(lattice);  // of a facet's corner
+  // The nearest point of a triangle lies at right angles to its plane or to a side, and no further from the
+  // nearest corner than the longest side over the root of 3. That side is the diagonal of a square, two links
+  // at most.
+  const double near = std::hypot(reach, 2.0 / std::numbers::sqrt3 * longest_link_m(lattice));
   std::size_t count = 0;
   const auto add = [&](const voxel::ToolBound& bound) {
     const auto known = [&](const voxel::ToolBound& b) {
@@ -101,36 +132,11 @@ std::size_t facet_bounds(const voxel::SoftObject& object, const voxel::ToolInBod
         // The ring turns about +d.
         const glm::dvec3 up = glm::cross(at[1] - at[0], at[2] - at[0]);
         voxel::ToolBound bound;
-        bound.voxel = v;
         if (bound_of(at, below ? up : -up, tool.centre, reach, surface, bound)) add(bound);
       }
     }
   }
   return count;
-}
-
-bool in_resting_tissue(const voxel::SoftObject& object, const glm::dvec3& point) noexcept {
-  const voxel::Lattice& lattice = object.lattice();
-  const glm::dvec3 at = point / lattice.spacing_m();
-  const auto inside = [&](const glm::dvec3& p) {
-    for (int d = 0; d < 3; ++d) {
-      if (!(p[d] >= 0.0 && p[d] < lattice.grid().dims[static_cast<std::size_t>(d)] - 1)) return false;
-    }
-    return true;
-  };
-  if (!inside(at)) return false;
-  const glm::ivec3 nearest(glm::round(at));
-  const voxel::VoxelId v = lattice.at(nearest.x, nearest.y, nearest.z);
-  if (!lattice.filled(v)) return false;
-  const glm::dvec3 rest = at - object.displacement(v) / lattice.spacing_m();
-  if (!inside(rest)) return false;
-  const glm::ivec3 cell(glm::floor(rest));
-  for (int corner = 0; corner < 8; ++corner) {
-    if (!lattice.filled(
-            lattice.at(cell.x + (corner & 1), cell.y + ((corner >> 1) & 1), cell.z + (corner >> 2))))
-      return false;
-  }
-  return true;
 }
 
 void flag_lost_tool(const World& world, WorldState& state) noexcept {

@@ -20,10 +20,6 @@ namespace hybrid {
 std::size_t facet_bounds(const voxel::SoftObject& object, const voxel::ToolInBody& tool, double within,
                          std::span<voxel::ToolBound> out) noexcept;
 
-// Is the point (body frame) in a full cell of the tissue as it is now? Valid where tissue is nearly at rest:
-// the displacement is taken from the voxel nearest to the point at rest.
-[[nodiscard]] bool in_resting_tissue(const voxel::SoftObject& object, const glm::dvec3& point) noexcept;
-
 // Sets a fault if the tool's centre is in an object that the tool does not press.
 void flag_lost_tool(const World& world, WorldState& state) noexcept;
 
