@@ -97,15 +97,7 @@ class Builder {
     make_lattices();
     fill_map();
     finish_world();
-    use_patches();
-    for (std::size_t o = 0; o < built_.state->soft.size() && !world_->rigid.empty(); ++o) {
-      if (built_.state->soft[o]->uses_patches()) continue;  // nothing rigid is in its reach
-      const std::size_t near = find_obstacles(*world_, *built_.state, o);
-      if (near == 0) continue;
-      built_.notes.push_back(
-          {world_->soft[o].name, polygon::Severity::info,
-           fmt::format("{} surface voxels lie near rigid objects, which will stop them", near)});
-    }
+    use_patches_and_obstacles();
     query_bodies(*world_, *built_.state);
     built_.world = std::move(world_);
     return_freed_memory();
@@ -148,42 +140,63 @@ class Builder {
     return boxes;
   }
 
-  // Why object `own` of `boxes` may meet something else than the tool, in words; empty if it cannot: nothing
-  // in the scene moves, and no other object is nearer than a share of its size.
-  std::string may_meet(const std::vector<Box>& boxes, std::size_t own) const {
+  // The objects of `boxes` that are nearer to object `own` than a share of its size, in turn.
+  template <class Visit>
+  void for_near(const std::vector<Box>& boxes, std::size_t own, const Visit& visit) const {
     constexpr double kClearance = 0.25;
-    const auto moves = std::find_if(world_->rigid.begin(), world_->rigid.end(),
-                                    [](const RigidObject& object) { return object.motion.moves(); });
-    if (moves != world_->rigid.end()) return fmt::format("\"{}\" moves and may meet it", moves->name);
     const glm::dvec3 size = boxes[own].high - boxes[own].low;
     const double apart = kClearance * std::max({size.x, size.y, size.z});
     for (std::size_t o = 0; o < boxes.size(); ++o) {
-      if (o == own || !glm::all(glm::lessThan(boxes[o].low, boxes[own].high + apart)) ||
-          !glm::all(glm::lessThan(boxes[own].low - apart, boxes[o].high)))
-        continue;
-      const std::size_t rigid = world_->rigid.size();
-      return fmt::format("\"{}\" is nearer than {:.3g} mm, a quarter of its size, and may meet it",
-                         o < rigid ? world_->rigid[o].name : world_->soft[o - rigid].name, 1e3 * apart);
+      if (o != own && glm::all(glm::lessThan(boxes[o].low, boxes[own].high + apart)) &&
+          glm::all(glm::lessThan(boxes[own].low - apart, boxes[o].high)))
+        visit(o, apart);
     }
-    return {};
   }
 
-  // Gives contacts on nested patches to objects that can meet nothing but the tool.
-  void use_patches() {
+  // Why soft object `o` may meet something that moves or gives way, in words; empty if it cannot: no rigid
+  // object moves, and no other soft one is near.
+  std::string may_meet(const std::vector<Box>& boxes, std::size_t o) const {
+    const auto moves = std::find_if(world_->rigid.begin(), world_->rigid.end(),
+                                    [](const RigidObject& object) { return object.motion.moves(); });
+    if (moves != world_->rigid.end()) return fmt::format("\"{}\" moves and may meet it", moves->name);
+    std::string why;
+    for_near(boxes, world_->rigid.size() + o, [&](std::size_t other, double apart) {
+      if (other < world_->rigid.size() || !why.empty()) return;
+      why = fmt::format("\"{}\" is nearer than {:.3g} mm, a quarter of its size, and may meet it",
+                        world_->soft[other - world_->rigid.size()].name, 1e3 * apart);
+    });
+    return why;
+  }
+
+  // Gives contacts on nested patches to objects that can meet nothing but the tool and rigid objects that
+  // stand still. Obstacles for these, and for all objects that are kept voxel by voxel.
+  void use_patches_and_obstacles() {
     const std::vector<Box> boxes = boxes_at_rest();
     for (std::size_t o = 0; o < world_->soft.size(); ++o) {
-      voxel::SoftObject& object = *built_.state->soft[o];
-      if (object.lattice().voxel_count() < voxel::SoftObject::kLeastOnGrid) continue;
-      const voxel::ToolInBody tool = tool_in_body(*world_, world_->soft[o], glm::dvec3(0.0));
-      std::string obstacle = may_meet(boxes, world_->rigid.size() + o);
-      if (obstacle.empty()) obstacle = object.use_composite_grid(tool);
+      use_patches(boxes, o);
+      bool near = !built_.state->soft[o]->uses_patches() && !world_->rigid.empty();
+      for_near(boxes, world_->rigid.size() + o,
+               [&](std::size_t other, double) { near = near || other < world_->rigid.size(); });
+      const std::size_t voxels = near ? find_obstacles(*world_, *built_.state, o) : 0;
+      if (voxels == 0) continue;
       built_.notes.push_back(
           {world_->soft[o].name, polygon::Severity::info,
-           obstacle.empty()
-               ? std::string("contacts are kept on nested patches: a tick takes the same time for any depth "
-                             "and size")
-               : fmt::format("contacts are kept voxel by voxel, not on nested patches: {}", obstacle)});
+           fmt::format("{} surface voxels lie near rigid objects, which will stop them", voxels)});
     }
+  }
+
+  void use_patches(const std::vector<Box>& boxes, std::size_t o) {
+    voxel::SoftObject& object = *built_.state->soft[o];
+    if (object.lattice().voxel_count() < voxel::SoftObject::kLeastOnGrid) return;
+    const voxel::ToolInBody tool = tool_in_body(*world_, world_->soft[o], glm::dvec3(0.0));
+    std::string obstacle = may_meet(boxes, o);
+    if (obstacle.empty()) obstacle = object.use_composite_grid(tool);
+    built_.notes.push_back(
+        {world_->soft[o].name, polygon::Severity::info,
+         obstacle.empty()
+             ? std::string("contacts are kept on nested patches: a tick takes the same time for any depth "
+                           "and size")
+             : fmt::format("contacts are kept voxel by voxel, not on nested patches: {}", obstacle)});
   }
 
   void add_rigid(const RigidDescription& d) {

@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "hybrid/tick/tissue/obstacles.h"
+#include "voxel/composite/grid.h"
 #include "voxel/lattice/voxel_links.h"
 #include "voxel/object/loads_by_partner.h"
 
@@ -63,17 +64,35 @@ bool has_partner(const std::vector<voxel::HeldVoxel>& held, std::uint32_t partne
                      [partner](const voxel::HeldVoxel& h) { return h.partner == partner; });
 }
 
+// The same of an object whose contact is on nested patches.
+void add_supports_of_patches(const World& world, const WorldState& state, std::uint32_t soft,
+                             std::vector<PairForce>& out) {
+  const voxel::SoftObject& object = *state.soft[soft];
+  const voxel::CompositeGrid& patches = *object.patches_in_use();
+  const glm::dquat& rotation = world.soft[soft].pose.rotation;
+  out.push_back({{Kind::anchors, soft, 0}, rotation * -patches.force_on_anchors_N(), false});
+  std::vector<std::optional<glm::dvec3>> by_rigid(world.rigid.size());
+  const double look_m = kObstacleRange * object.lattice().max_spacing_m();
+  for (const voxel::CompositeGrid::ObstacleForce& force : patches.obstacle_forces()) {
+    const voxel::VoxelId v = object.lattice().surface()[force.surface_number];
+    const NearestRigid near =
+        nearest_rigid(world, state, world.soft[soft].to_scene(object.position(v)), look_m);
+    if (!near.found) continue;
+    auto& sum_N = by_rigid[near.object];
+    sum_N = sum_N.value_or(glm::dvec3(0.0)) + rotation * force.on_object_N;
+  }
+  for (std::uint32_t r = 0; r < by_rigid.size(); ++r) {
+    if (by_rigid[r]) out.push_back({{Kind::rigid, soft, r}, by_rigid[r], false});
+  }
+}
+
 // Adds the forces of anchors and rigid objects on one soft object.
 void add_supports(const World& world, const WorldState& state, std::uint32_t soft, const glm::dvec3& hand_N,
                   std::vector<PairForce>& out) {
   const voxel::SoftObject& object = *state.soft[soft];
   const glm::dquat& rotation = world.soft[soft].pose.rotation;
   if (object.uses_patches()) {
-    if (object.patches_in_use() == nullptr) return;
-    const auto carried_N = object.carried_by_anchors_N();
-    PairForce anchors{{Kind::anchors, soft, 0}, {}, false};
-    if (carried_N) anchors.on_soft_N = rotation * -*carried_N;
-    out.push_back(anchors);
+    if (object.patches_in_use() != nullptr) add_supports_of_patches(world, state, soft, out);
     return;
   }
   const auto held = held_voxels(world, state, soft);

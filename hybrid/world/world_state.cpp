@@ -33,6 +33,7 @@ WorldState::WorldState(const World& world, OccupancyMap occupancy) : map(std::mo
 void WorldState::prepare(const World& world) {
   reactions.resize(soft.size());
   obstacle_queries.resize(soft.size());
+  obstacles_at_rest.resize(soft.size());
   cursor.assign(soft.size(), 0);
   obstacle_cursor.assign(soft.size(), 0);
   scratch.touched.resize(soft.size());

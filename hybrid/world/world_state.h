@@ -79,8 +79,17 @@ struct ActiveElement {
 
 // Result of a surface voxel's last rigid-distance query.
 struct ObstacleQuery {
-  glm::vec3 from{0.0F};  // displacement of the voxel at the query (m)
-  float clear_m = 0.0F;  // distance from its centre to the nearest surface, or the search range
+  glm::vec3 from{0.0F};   // displacement of the voxel at the query (m)
+  bool replaced = false;  // the obstacle at rest is in obstacles_at_rest
+  float clear_m = 0.0F;   // distance from its centre to the nearest surface, or the search range
+};
+
+// On nested patches tissue is at rest as soon as its contact ends, and so are its obstacles: these are the
+// obstacle and the query of a surface voxel that the contact moved.
+struct ObstacleAtRest {
+  std::uint32_t surface_number = 0;
+  voxel::Obstacle obstacle;
+  ObstacleQuery query;
 };
 
 // State that goes from tick to tick as plain values: assignment copies the state.
@@ -118,11 +127,12 @@ struct CarriedState {
   // ---- of arbitration ----
   std::vector<voxel::Reaction> reactions;  // [soft] on the tool when it last pressed, scene frame
   std::vector<FacetContact> facet_contacts;
-  std::vector<std::vector<std::uint8_t>> paired;             // [soft pair][surface voxel of the first]
-  std::vector<std::vector<ObstacleQuery>> obstacle_queries;  // [soft][surface voxel]
-  std::vector<std::uint32_t> cursor, obstacle_cursor;        // [soft] next surface voxel, in turns
-  std::vector<std::uint32_t> pair_cursor;                    // [soft pair]
-  std::vector<BodyObstacles> body_obstacles;                 // [soft]; empty where no body presses tissue
+  std::vector<std::vector<std::uint8_t>> paired;               // [soft pair][surface voxel of the first]
+  std::vector<std::vector<ObstacleQuery>> obstacle_queries;    // [soft][surface voxel]
+  std::vector<std::vector<ObstacleAtRest>> obstacles_at_rest;  // [soft] replaced since its contact began
+  std::vector<std::uint32_t> cursor, obstacle_cursor;          // [soft] next surface voxel, in turns
+  std::vector<std::uint32_t> pair_cursor;                      // [soft pair]
+  std::vector<BodyObstacles> body_obstacles;                   // [soft]; empty where no body presses tissue
   // For bodies that press tissue: bound on the motion of any point since the session began, and in this tick.
   std::vector<double> body_travel_m, body_moved_m;  // [rigid]
   BodyCollisions collisions;

@@ -26,7 +26,7 @@ composite::LevelView CompositeGrid::view(std::size_t l, std::size_t axis) noexce
   const std::size_t from = level.first_row();
   composite::LevelView v{};
   v.u = level.u[axis].data() + from;
-  v.f = l == 0 ? nullptr : level.f.data() + from;
+  v.f = l == 0 && obstacle_bounds_.empty() ? nullptr : level.f.data() + from;
   v.lower = level.bounded[0] ? level.bound[0].data() + from : nullptr;
   v.negated_upper = level.bounded[1] ? level.bound[1].data() + from : nullptr;
   v.residual = level.residual.data() + from;
@@ -99,6 +99,7 @@ void CompositeGrid::restrict_residual(std::size_t l, std::size_t a) noexcept {
       for (int i = first[0]; i <= last[0]; ++i) f[i] -= forces[i];
     }
   }
+  add_obstacle_loads(l + 1, a);
   coarse.has_active_stiffness = any_active;
   if (any_active) {
     std::fill_n(coarse.active_stiffness.begin() + static_cast<std::ptrdiff_t>(begin), floats, 0.0F);
@@ -230,6 +231,7 @@ void CompositeGrid::cycle(const std::array<bool, 3>& axes) noexcept {
   for (std::size_t a = 0; a < 3; ++a) {
     if (!axes[a]) continue;
     find_bounds(a);
+    add_obstacle_bounds(a);
     const auto bound = [](Level& level, std::size_t kind) {
       return level.bounded[kind] ? level.bound[kind].data() + level.first_row() : nullptr;
     };
@@ -246,6 +248,10 @@ void CompositeGrid::cycle(const std::array<bool, 3>& axes) noexcept {
     // No smoothing on the way down: after a jump of the tool, a fine level that follows its bounds before the
     // coarse levels do pulls these too far.
     levels_[0].has_active_stiffness = false;
+    if (!obstacle_bounds_.empty()) {
+      std::fill(levels_[0].f.begin(), levels_[0].f.end(), 0.0F);
+      add_obstacle_loads(0, a);
+    }
     for (std::size_t l = 0; l < last; ++l) restrict_residual(l, a);
     add_active_stiffness(last, a);
     for (int n = 0; n < kCoarsestSweeps; ++n) smooth(last);
@@ -270,6 +276,7 @@ void CompositeGrid::cycle(const std::array<bool, 3>& axes) noexcept {
     }
     fill_ghosts(levels_[0], levels_[0].u[a].data());
     fit_far_field(a);
+    measure_obstacle_forces(a);
     update_multipliers(a);
   }
   patch_moved_ = false;

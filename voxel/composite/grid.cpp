@@ -89,9 +89,7 @@ void CompositeGrid::set_fine(const Index3& voxel, const glm::dvec3& u) noexcept 
   for (std::size_t a = 0; a < 3; ++a) levels_[0].u[a][n] = static_cast<float>(u[static_cast<int>(a)]);
 }
 
-glm::dvec3 CompositeGrid::unconstrained_minimum(const Index3& voxel) const noexcept {
-  const Level& level = levels_[0];
-  const std::size_t n = fine_node(voxel);
+glm::dvec3 CompositeGrid::minimum_at(const Level& level, std::size_t n) const noexcept {
   glm::dvec3 place(0.0);
   for (std::size_t a = 0; a < 3; ++a) {
     const auto& weight = weights_on(level, a);
@@ -104,6 +102,10 @@ glm::dvec3 CompositeGrid::unconstrained_minimum(const Index3& voxel) const noexc
     place[static_cast<int>(a)] = sum * static_cast<double>(level.inverse_diagonal[a][n]);
   }
   return place;
+}
+
+glm::dvec3 CompositeGrid::unconstrained_minimum(const Index3& voxel) const noexcept {
+  return minimum_at(levels_[0], fine_node(voxel));
 }
 
 glm::dvec3 CompositeGrid::compliance(const Index3& voxel) const noexcept {

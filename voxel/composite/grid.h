@@ -34,6 +34,7 @@
 #include <vector>
 
 #include "voxel/composite/coarse_material.h"
+#include "voxel/lattice/displacement.h"
 #include "voxel/lattice/lattice.h"
 
 namespace voxel {
@@ -75,8 +76,28 @@ class CompositeGrid {
   [[nodiscard]] glm::dvec3 unconstrained_minimum(const Index3& voxel) const noexcept;
   [[nodiscard]] glm::dvec3 compliance(const Index3& voxel) const noexcept;
   void set_fine(const Index3& voxel, const glm::dvec3& u) noexcept;
-  // `u` clamped to the displacements that the chain from fully anchored sides allows the voxel (m).
-  [[nodiscard]] glm::dvec3 clamp_to_anchors(const Index3& voxel, const glm::dvec3& u) const noexcept;
+  // `u` clamped to the displacements that the chains from fully anchored sides, and from nodes held by rigid
+  // surfaces, allow the voxel (m).
+  [[nodiscard]] glm::dvec3 clamp_to_supports(const Index3& voxel, const glm::dvec3& u) const noexcept {
+    return clamp_to_obstacles(voxel, clamp_to_anchors(voxel, u));
+  }
+
+  // ---- rigid surfaces that stand still (rigid_contacts.cpp) ----
+  // Obstacles by surface number, which outlive the grid. Call it again when they have another address.
+  // Allocates.
+  void watch_obstacles(std::span<const Obstacle> obstacles);
+  // A surface voxel got an obstacle.
+  void add_obstacle(std::uint32_t surface_number) noexcept;
+  // Before a cycle, and before press(): sets the bounds of all nodes beside rigid surfaces.
+  void press_on_obstacles() noexcept;
+  // After a cycle and set_fine(): moves nodes out of their obstacles.
+  void settle_on_obstacles() noexcept;
+  // Forces of rigid surfaces in the last cycle, by surface number.
+  struct ObstacleForce {
+    std::uint32_t surface_number;
+    glm::dvec3 on_object_N;
+  };
+  [[nodiscard]] std::vector<ObstacleForce> obstacle_forces() const;
 
   // Before a cycle, if the contact has moved: displacements along `axis` grow by the ratio `share`, each by
   // `most_m` at most (m).
@@ -87,7 +108,9 @@ class CompositeGrid {
   void press(const Index3& voxel, const glm::dvec3& u, const glm::dvec3& normal) noexcept;
   // One FAC cycle over all levels, on these axes.
   void cycle(const std::array<bool, 3>& axes = {true, true, true}) noexcept;
-  // Force of the object on the tool: minus the sum of the anchors' reactions (N).
+  // Forces on the anchors, and on the tool: minus the sum of the forces that anchors and rigid surfaces carry
+  // (N).
+  [[nodiscard]] glm::dvec3 force_on_anchors_N() const noexcept;
   [[nodiscard]] glm::dvec3 force_on_tool_N() const noexcept;
   // The most by which a link of level 0 exceeds its limits (m).
   [[nodiscard]] double worst_violation() const noexcept;
@@ -151,6 +174,24 @@ class CompositeGrid {
   struct Ghost {
     std::uint32_t at, first, count;
   };
+  // A surface voxel beside a rigid surface, and the node of a level that it stands for.
+  struct BesideRigid {
+    Index3 voxel;
+    std::uint32_t surface;
+  };
+  struct ObstacleNode {
+    Index3 node;
+    std::size_t number;
+    Index3 voxel;
+    std::uint32_t surface;
+  };
+  // sign · u(node) >= sign · `u` on one axis, and its force on the object in the last cycle (N).
+  struct ObstacleBound {
+    std::uint32_t level;
+    ObstacleNode node;
+    std::size_t axis;
+    float sign, u, force_N = 0.0F;
+  };
   struct Level {
     int step = 1;           // voxels between two nodes
     bool is_built = false;  // with the present offset of coordinates
@@ -175,6 +216,8 @@ class CompositeGrid {
     bool has_gaps = false;              // some link within the patch is missing
     std::vector<Ghost> ghosts;
     std::vector<std::uint32_t> ghost_neighbours;
+    std::vector<ObstacleNode> obstacle_nodes;
+    std::vector<std::uint32_t> obstacle_of;  // [node] 1 + index into obstacle_nodes; 0: none
     [[nodiscard]] std::size_t row(int j, int k) const {
       return plane + stride + kPad + static_cast<std::size_t>(k) * plane +
              static_cast<std::size_t>(j) * stride;
@@ -199,6 +242,10 @@ class CompositeGrid {
     Index3 node;
     glm::vec3 u, normal;
   };
+
+  // A contact bounds its node on the axes on which its normal has more than this. A larger value would let
+  // voxels that a ball presses aside slightly move back, and the contact would oscillate.
+  static constexpr float kAlong = 0.02F;
 
   // ---- suitability.cpp ----
   [[nodiscard]] std::string trial_failure();
@@ -249,6 +296,19 @@ class CompositeGrid {
   void propagate_bounds(Level& level, std::size_t axis, std::size_t kind, const Index3& low,
                         const Index3& high) const noexcept;
   void propagate_bounds_round_gaps(Level& level, std::size_t axis, std::size_t kind) const noexcept;
+  // ---- rigid_contacts.cpp ----
+  [[nodiscard]] bool nearest_unknown(const Level& level, const Index3& at, Index3& node) const noexcept;
+  [[nodiscard]] float obstacle_gap(const Level& level, const ObstacleNode& node) const noexcept;
+  void offer_obstacle(std::size_t l, const BesideRigid& beside) noexcept;
+  void list_obstacle_nodes(std::size_t l) noexcept;
+  [[nodiscard]] bool is_covered(std::size_t l, const Index3& node) const noexcept;
+  void bound_by_obstacle(std::size_t l, const ObstacleNode& node, float gap) noexcept;
+  void add_obstacle_bounds(std::size_t axis) noexcept;
+  void add_obstacle_loads(std::size_t l, std::size_t axis) noexcept;
+  void measure_obstacle_forces(std::size_t axis) noexcept;
+  [[nodiscard]] glm::vec3 load_of(const ObstacleBound& b) const noexcept;
+  [[nodiscard]] glm::dvec3 force_of(const ObstacleBound& b) const noexcept;
+  [[nodiscard]] glm::dvec3 clamp_to_obstacles(const Index3& voxel, const glm::dvec3& u) const noexcept;
   // ---- fac_cycle.cpp ----
   [[nodiscard]] composite::LevelView view(std::size_t l, std::size_t axis) noexcept;
   void inject_from_finer(std::size_t l, std::size_t axis) noexcept;
@@ -292,6 +352,9 @@ class CompositeGrid {
             voxel[2] + material_.offset()[2]};
   }
   [[nodiscard]] std::size_t fine_node(const Index3& voxel) const;  // grid.cpp
+  // Of a node, its neighbours fixed: its displacement of least energy without bounds (m).
+  [[nodiscard]] glm::dvec3 minimum_at(const Level& level, std::size_t node) const noexcept;  // grid.cpp
+  [[nodiscard]] glm::dvec3 clamp_to_anchors(const Index3& voxel, const glm::dvec3& u) const noexcept;
   [[nodiscard]] static double inside_share(const Level& level, std::size_t d, int i) noexcept;
   [[nodiscard]] double covered_share(std::size_t l, std::size_t d, int i) const noexcept;
   [[nodiscard]] double anchor_share(std::size_t l, std::size_t number, std::size_t d) const noexcept;
@@ -307,6 +370,12 @@ class CompositeGrid {
   Level before_move_;               // the level whose patch moves, as it was
   std::size_t covering_level_ = 0;  // the first level that covers the whole object
   std::vector<Pressed> pressed_;
+  std::span<const Obstacle> obstacles_;        // [surface number]; empty: no rigid surface is near
+  std::vector<BesideRigid> beside_rigid_;      // surface voxels that have, or had, an obstacle
+  std::vector<std::uint8_t> is_beside_rigid_;  // [surface number] 1: in beside_rigid_
+  std::vector<float> obstacle_load_N_;         // [surface number] force along the normal
+  std::vector<ObstacleBound> obstacle_bounds_;
+  std::size_t obstacle_cursor_ = 0;           // of beside_rigid_: last one that was offered to its nodes
   bool patch_moved_ = false;                  // since the last cycle
   std::array<bool, 3> multipliers_active_{};  // [axis] some link has a multiplier
   std::size_t work_ = 0;

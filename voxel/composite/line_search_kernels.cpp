@@ -20,17 +20,23 @@ HYBRID_MULTIVERSIONED void beyond_bounds(const float* u, const float* lower, con
   for (std::size_t n = 0; n < count; n += kLanes) {
     Float8 x, low = zero, high = zero, bound;
     load(x, u + n);
+    // Room to the bound that a larger displacement would meet.
+    Float8 above = zero - composite::kNoBound, below = above;
     if (lower != nullptr) {
       load(bound, lower + n);
       low = bound > zero ? bound : zero;
+      below = x - bound;
     }
     if (negated_upper != nullptr) {
       load(bound, negated_upper + n);
       high = bound > zero ? -bound : zero;
+      above = -bound - x;
     }
     // A displacement above 0 is measured from the lower bound, one below 0 from the upper bound.
-    const Float8 up = x - low, down = x - high;
-    store(beyond + n, x > zero ? (up > zero ? up : zero) : (down < zero ? down : zero));
+    Float8 up = x - low, down = high - x;
+    up = up < above ? up : above;
+    down = down < below ? down : below;
+    store(beyond + n, x > zero ? (up > zero ? up : zero) : (down > zero ? -down : zero));
   }
 }
 
@@ -62,6 +68,10 @@ HYBRID_MULTIVERSIONED ModeResponse mode_response(const LevelView& v, const float
         load(inverse, v.inverse_diagonal + at);
         load(counts, own + o * kLanes);
         Float8 force = -all * here, stiffness = all * m;
+        if (v.f != nullptr) {
+          load(x, v.f + at);
+          force += x;
+        }
         const std::array<std::size_t, 3> by{1, v.stride, v.plane};
         for (std::size_t d = 0; d < 3; ++d) {
           const Float8 spring = Float8{} + v.spring[d];
@@ -103,23 +113,8 @@ HYBRID_MULTIVERSIONED void shorten_correction(const LevelView& v, float* before)
   }
   // Along the correction the energy is a parabola: slope and curvature at its end give the minimum.
   const ModeResponse sum = mode_response(v, before, {0, 0, 0}, {-1, -1, -1});
-  double loads = 0.0;
-  if (v.f != nullptr) {
-    for (int k = v.first[2]; k <= v.last[2]; ++k) {
-      for (int j = v.first[1]; j <= v.last[1]; ++j) {
-        const std::size_t row =
-            static_cast<std::size_t>(k) * v.plane + static_cast<std::size_t>(j) * v.stride;
-        float of_row = 0.0F;
-        for (std::size_t i = 0; i < v.stride; ++i) {
-          const std::size_t n = row + i;
-          of_row += v.inverse_diagonal[n] > 0.0F ? v.f[n] * before[n] : 0.0F;
-        }
-        loads += static_cast<double>(of_row);
-      }
-    }
-  }
   if (!(sum.stiffness > 0.0)) return;
-  const double overshoot = -(sum.force + loads) / sum.stiffness;
+  const double overshoot = -sum.force / sum.stiffness;
   if (overshoot <= kMinOvershoot) return;
   const auto back = static_cast<float>(std::min(overshoot, kMaxShortening));
   for (std::size_t n = 0; n < count; n += kLanes) {

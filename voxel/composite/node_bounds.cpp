@@ -13,9 +13,6 @@ using composite::index;
 
 using composite::kNoBound;
 
-// A pressed voxel gets bounds on the axes on which its normal has more than this. A larger value would let
-// voxels that a ball presses aside slightly move back, and the contact would oscillate.
-constexpr float kAlong = 0.02F;
 constexpr int kSweepRounds = 2;
 
 }  // namespace

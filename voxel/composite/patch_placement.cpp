@@ -54,6 +54,7 @@ void CompositeGrid::rebuild(std::size_t l) noexcept {
   place_nodes(level, l, shifted(centre_));
   assemble(level);
   level.is_built = true;
+  list_obstacle_nodes(l);
   if (l + 1 < levels_.size()) set_up_transfer(level, levels_[l + 1]);
   if (l > 0) set_up_transfer(levels_[l - 1], level);
 }
@@ -105,6 +106,8 @@ void CompositeGrid::begin(const Index3& centre) noexcept {
     level.moved = true;
   }
   pressed_.clear();
+  obstacle_bounds_.clear();
+  std::fill(obstacle_load_N_.begin(), obstacle_load_N_.end(), 0.0F);
 }
 
 bool CompositeGrid::centre_on(const Index3& centre) noexcept {
@@ -170,6 +173,7 @@ void CompositeGrid::move_patch(std::size_t l) noexcept {
   }
   assemble(level);
   restore_multipliers(level, by);
+  list_obstacle_nodes(l);
 }
 
 }  // namespace voxel

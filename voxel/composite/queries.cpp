@@ -51,6 +51,12 @@ double CompositeGrid::link_share(std::size_t l, std::size_t number, std::size_t 
 }
 
 glm::dvec3 CompositeGrid::force_on_tool_N() const noexcept {
+  glm::dvec3 on_object_N = -force_on_anchors_N();
+  for (const ObstacleBound& b : obstacle_bounds_) on_object_N += force_of(b);
+  return on_object_N;
+}
+
+glm::dvec3 CompositeGrid::force_on_anchors_N() const noexcept {
   glm::dvec3 reaction(0.0);
   for (std::size_t l = 0; l <= covering_level_; ++l) {
     const Level& level = levels_[l];
@@ -71,7 +77,7 @@ glm::dvec3 CompositeGrid::force_on_tool_N() const noexcept {
       }
     }
   }
-  return -reaction;
+  return reaction;
 }
 
 double CompositeGrid::anchor_area_ratio() const noexcept {
@@ -200,8 +206,10 @@ CompositeGrid::Nodes CompositeGrid::nodes_of(std::size_t box) const noexcept {
 }
 
 std::size_t CompositeGrid::memory_bytes() const {
-  std::size_t bytes =
-      levels_.capacity() * sizeof(Level) + pressed_.capacity() * sizeof(Pressed) + material_.memory_bytes();
+  std::size_t bytes = levels_.capacity() * sizeof(Level) + pressed_.capacity() * sizeof(Pressed) +
+                      material_.memory_bytes() + beside_rigid_.capacity() * sizeof(BesideRigid) +
+                      is_beside_rigid_.capacity() + obstacle_load_N_.capacity() * sizeof(float) +
+                      obstacle_bounds_.capacity() * sizeof(ObstacleBound);
   const auto add = [&bytes](const Level& level) {
     for (const auto* arrays : {&level.u, &level.at_bound, &level.weight, &level.anchor_weight,
                                &level.shape_weight, &level.inverse_diagonal, &level.diagonal}) {
@@ -211,8 +219,10 @@ std::size_t CompositeGrid::memory_bytes() const {
          {&level.f, &level.restricted_u, &level.residual, &level.is_free, &level.is_active,
           &level.active_stiffness, &level.inverse_with_active, &level.bound[0], &level.bound[1]})
       bytes += array->capacity() * sizeof(float);
-    bytes +=
-        level.ghosts.capacity() * sizeof(Ghost) + level.ghost_neighbours.capacity() * sizeof(std::uint32_t);
+    bytes += level.ghosts.capacity() * sizeof(Ghost) +
+             level.ghost_neighbours.capacity() * sizeof(std::uint32_t) +
+             level.obstacle_nodes.capacity() * sizeof(ObstacleNode) +
+             level.obstacle_of.capacity() * sizeof(std::uint32_t);
   };
   const auto add_limits = [&bytes](const Level& level) {
     for (const auto* arrays : {&level.anchor_distance, &level.limited_weight[0], &level.limited_weight[1],

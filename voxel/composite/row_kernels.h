@@ -80,11 +80,12 @@ void note_at_bound(float* at_bound, const float* u, const float* lower, const fl
 
 // ---- line_search_kernels.cpp ----
 
-// The part of u that its bounds do not prescribe: u minus the bound (or 0) between u and 0, and 0 at a bound.
+// The part of u that its bounds do not prescribe: u minus the bound (or 0) between u and 0, at most the room
+// to the bound beyond u, and 0 at either.
 void beyond_bounds(const float* u, const float* lower, const float* negated_upper, float* beyond,
                    std::size_t count) noexcept;
-// Force of the links along `mode` (J per unit of the mode) and stiffness along it, summed over the unknowns
-// that are not strictly within the finer patch finer_first … finer_last (none: last < first).
+// Force of links and loads along `mode` (J per unit of the mode) and stiffness along it, summed over the
+// unknowns that are not strictly within the finer patch finer_first … finer_last (none: last < first).
 struct ModeResponse {
   double force = 0.0, stiffness = 0.0;
 };

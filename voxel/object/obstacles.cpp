@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "voxel/composite/grid.h"
 #include "voxel/lattice/voxel_links.h"
 #include "voxel/object/soft_object.h"
 
@@ -15,6 +16,8 @@ void SoftObject::set_obstacle(std::size_t surface_number, const Obstacle& obstac
   Obstacle& o = obstacles_[surface_number];
   moving_obstacles_ = moving_obstacles_ + (obstacle.moving ? 1 : 0) - (o.moving ? 1 : 0);
   o = obstacle;
+  if (grid_ && obstacle.normal != glm::vec3(0.0F))
+    grid_->add_obstacle(static_cast<std::uint32_t>(surface_number));
   if (!obstacle_changed_.empty() && obstacle_changed_[surface_number] == 0) {
     obstacle_changed_[surface_number] = 1;
     changed_obstacles_.push_back(static_cast<std::uint32_t>(surface_number));
@@ -49,6 +52,7 @@ void SoftObject::reserve_obstacles() {
   obstacles_.resize(lattice_->surface().size());
   moved_rows_.reserve(kMostMovedRows);
   row_moved_ = LazyArray<std::uint8_t>(lattice_->grid().rows());
+  if (grid_) grid_->watch_obstacles(obstacles_);
 }
 
 void SoftObject::prepare_beside_bodies() {

@@ -53,7 +53,7 @@ void go_along(CompositeGrid& grid, const std::array<int, 3>& centre, const glm::
 
 std::string SoftObject::use_composite_grid(const ToolInBody& tool) {
   if (lattice_->voxel_count() < kLeastOnGrid) return "it is small enough to be known voxel by voxel";
-  assert(obstacles_.empty() && !moved_ever_);
+  assert(obstacles_.empty() && !moved_ever_);  // obstacles are found afterwards
   if (lattice_->max_spacing_m() > kFlat * lattice_->min_spacing_m()) return "its voxels are not cubes";
   // A ball touches tissue only where the ball is no steeper than links let a surface be.
   const double h = lattice_->min_spacing_m();
@@ -77,6 +77,7 @@ void SoftObject::widen_patches() {
   auto wide = std::make_unique<CompositeGrid>(*lattice_, CompositeGrid::kReferenceHalfWidth,
                                               CompositeGrid::kReferenceHalfWidth);
   wide->begin(centre_);
+  if (!obstacles_.empty()) wide->watch_obstacles(obstacles_);
   wide->interpolate_from(*grid_);
   grid_ = std::move(wide);
   near_on_grid_.reserve(most_in_box(CompositeGrid::kReferenceHalfWidth));
@@ -214,7 +215,7 @@ void SoftObject::put_aside(const ToolInBody& tool) noexcept {
     Gap g = gap(tool, rest + wished);
     if (g.distance >= 0.0) return;
     const glm::dvec3 place = project_on_tool(tool, rest, wished, grid_->compliance(near.voxel), g);
-    grid_->set_fine(near.voxel, grid_->clamp_to_anchors(near.voxel, place));
+    grid_->set_fine(near.voxel, grid_->clamp_to_supports(near.voxel, place));
   };
   std::for_each(touches_on_grid_.begin(), touches_on_grid_.end(), put);
   std::for_each(touches_on_grid_.rbegin(), touches_on_grid_.rend(), put);
@@ -224,6 +225,7 @@ void SoftObject::put_aside(const ToolInBody& tool) noexcept {
 // dropped when coarse levels overshoot, the whole contact would be pressed and released in turns.
 void SoftObject::press_on_grid(const ToolInBody& tool) noexcept {
   grid_->clear_pressed();
+  grid_->press_on_obstacles();
   touches_on_grid_.clear();
   for (std::uint32_t n = 0; n < touches_.size(); ++n) {
     const std::array<int, 3> c = lattice_->coordinates(touches_[n].v);
@@ -240,7 +242,7 @@ void SoftObject::press_on_grid(const ToolInBody& tool) noexcept {
     u[bound.axis] = bound.u;
     glm::dvec3 normal(0.0);
     normal[bound.axis] = bound.way;
-    grid_->press(near.voxel, grid_->clamp_to_anchors(near.voxel, u), normal);
+    grid_->press(near.voxel, grid_->clamp_to_supports(near.voxel, u), normal);
     // A voxel that is pressed aside is held there, on the tool's surface.
     const glm::dvec3 wished = grid_->unconstrained_minimum(near.voxel);
     Gap g = gap(tool, t.rest + wished);
@@ -248,7 +250,7 @@ void SoftObject::press_on_grid(const ToolInBody& tool) noexcept {
     const glm::dvec3 place = project_on_tool(tool, t.rest, wished, grid_->compliance(near.voxel), g);
     normal = g.normal;
     normal[bound.axis] = 0.0;
-    grid_->press(near.voxel, grid_->clamp_to_anchors(near.voxel, place), normal);
+    grid_->press(near.voxel, grid_->clamp_to_supports(near.voxel, place), normal);
   }
 }
 
@@ -275,7 +277,7 @@ void SoftObject::settle_on_grid(const ToolInBody& tool) noexcept {
     if (g.distance < 0.0) {
       const Bound bound = bound_by(tool, t, u);
       if (bound.any) u[bound.axis] = bound.u;
-      u = grid_->clamp_to_anchors(c, u);
+      u = grid_->clamp_to_supports(c, u);
       grid_->set_fine(c, u);
     }
     t.pressed = true;
@@ -283,6 +285,7 @@ void SoftObject::settle_on_grid(const ToolInBody& tool) noexcept {
     sum += glm::dvec3(c[0], c[1], c[2]);
     ++pressed;
   }
+  grid_->settle_on_obstacles();
   if (pressed == 0) {
     // Between two contacts the patches follow a tool that stays near, so that the next contact is in them.
     if (nearest != nullptr) centre_ = lattice_->coordinates(nearest->v);
@@ -373,7 +376,7 @@ bool SoftObject::at_anchors_end(VoxelId v, const glm::dvec3& direction) const no
   glm::dvec3 further = displacement(v);
   const double step = (direction[axis] > 0.0 ? 1e-3 : -1e-3) * lattice_->min_spacing_m();
   further[axis] += step;
-  return grid_->clamp_to_anchors(c, further)[axis] != further[axis];
+  return grid_->clamp_to_supports(c, further)[axis] != further[axis];
 }
 
 }  // namespace voxel

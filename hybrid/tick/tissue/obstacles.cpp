@@ -60,7 +60,7 @@ voxel::Obstacle obstacle_of(const SoftBody& body, const voxel::SoftObject& objec
                             const NearestRigid& near) noexcept {
   // n·(y + Δu − c) >= radius, with n·(y − c) = distance now.
   const glm::dvec3 n = glm::inverse(body.pose.rotation) * near.normal;
-  const double bound = glm::dot(n, object.state().at(v)) + object.voxel_radius() - near.distance;
+  const double bound = glm::dot(n, object.displacement(v)) + object.voxel_radius() - near.distance;
   return {glm::vec3(n), static_cast<float>(bound)};
 }
 
@@ -75,6 +75,7 @@ std::size_t find_obstacles(const World& world, WorldState& state, std::size_t so
   // Also if nothing is near: the object may be pressed beyond the search range.
   object.reserve_obstacles();
   state.obstacle_queries[soft].assign(surface.size(), {});
+  if (object.uses_patches()) state.obstacles_at_rest[soft].reserve(surface.size());
   for (std::size_t s = 0; s < surface.size(); ++s) {
     const NearestRigid near = nearest_rigid(world, state, body.to_scene(object.position(surface[s])), range);
     state.obstacle_queries[soft][s].clear_m = static_cast<float>(near.distance);
@@ -103,7 +104,7 @@ class ObstacleQueue {
   // Lists surface voxel s if it has moved enough.
   void consider(std::uint32_t s) noexcept {
     const ObstacleQuery& seen = queries_[s];
-    const glm::vec3 way = glm::vec3(object_.state().at(object_.lattice().surface()[s])) - seen.from;
+    const glm::vec3 way = glm::vec3(object_.displacement(object_.lattice().surface()[s])) - seen.from;
     const float square = glm::dot(way, way);
     // The surface that the voxel knows holds it; others are further away.
     const bool held = standing_obstacle(state_, soft_, s).normal != glm::vec3(0.0F);
@@ -160,11 +161,17 @@ void query_obstacle(const World& world, WorldState& state, std::size_t o, std::u
   const voxel::SoftObject& object = *state.soft[o];
   const SoftBody& body = world.soft[o];
   const voxel::VoxelId v = object.lattice().surface()[s];
-  const glm::vec3 u(object.state().at(v));
+  const glm::vec3 u(object.displacement(v));
   const double range = kObstacleRange * object.lattice().max_spacing_m();
   const glm::dvec3 at = body.to_scene(object.position(v));
   const NearestRigid near = flip_if_inside(world, at, nearest_rigid(world, state, at, range));
-  state.obstacle_queries[o][s] = {u, static_cast<float>(std::max(near.distance, 0.0))};
+  ObstacleQuery& query = state.obstacle_queries[o][s];
+  if (object.patches_in_use() != nullptr && !query.replaced) {
+    state.obstacles_at_rest[o].push_back({s, object.obstacles()[s], query});
+    query.replaced = true;
+  }
+  query.from = u;
+  query.clear_m = static_cast<float>(std::max(near.distance, 0.0));
   if (!near.found) {
     set_standing_obstacle(state, o, s, {});
     return;
@@ -180,6 +187,15 @@ void query_obstacle(const World& world, WorldState& state, std::size_t o, std::u
   set_standing_obstacle(state, o, s, fresh);
 }
 
+// After a contact on nested patches.
+void put_obstacles_to_rest(WorldState& state, std::size_t o) noexcept {
+  for (const ObstacleAtRest& at_rest : state.obstacles_at_rest[o]) {
+    set_standing_obstacle(state, o, at_rest.surface_number, at_rest.obstacle);
+    state.obstacle_queries[o][at_rest.surface_number] = at_rest.query;
+  }
+  state.obstacles_at_rest[o].clear();
+}
+
 }  // namespace
 
 void refresh_obstacles(const World& world, WorldState& state) noexcept {
@@ -187,11 +203,15 @@ void refresh_obstacles(const World& world, WorldState& state) noexcept {
   for (std::size_t o = 0; o < state.soft.size(); ++o) {
     voxel::SoftObject& object = *state.soft[o];
     if (object.obstacles().empty()) continue;
+    if (object.patches_in_use() == nullptr) put_obstacles_to_rest(state, o);
     if (!object.asleep()) {
       const voxel::Lattice& lattice = object.lattice();
       ObstacleQueue due(state, o);
       for (const std::uint32_t number : object.touched_numbers()) due.consider(number);
       due.consider_moved();
+      if (object.patches_in_use() != nullptr) {
+        for (const voxel::VoxelId v : object.near_on_grid()) due.consider(object.surface_number(v));
+      }
       // Slow motion without waves is found by going through the surface in turns.
       const auto count = static_cast<std::uint32_t>(lattice.surface().size());
       for (std::uint32_t i = 0; i < std::min(kObstacleSlice, count); ++i) {

@@ -11,9 +11,11 @@
 
 #include "hybrid/feel/just_noticeable.h"
 #include "hybrid/session/equilibrium.h"
+#include "hybrid/session/forces_between.h"
 #include "hybrid/snapshot/fill_snapshot.h"
 #include "hybrid/snapshot/make_drawn_scene.h"
 #include "hybrid/snapshot/merge_live_surface.h"
+#include "hybrid/tick/tissue/obstacles.h"
 #include "tests/hybrid/fixtures/touch.h"
 
 namespace {
@@ -45,7 +47,13 @@ TEST_F(GridSession, SaysWhereContactsAreKeptAndWhy) {
   const std::string wall =
       "spacing = 1\n[[rigid]]\nname = \"wall\"\nprimitive = \"box\"\nsize = [10, 90, 90]\nposition = [45, 0, "
       "0]\n";
-  EXPECT_NE(note_of(block(wall)).find("\"wall\" is nearer than 16.2 mm"), std::string::npos);
+  EXPECT_NE(note_of(block(wall)).find("kept on nested patches"), std::string::npos);
+  EXPECT_NE(note_of(block(wall + "motion = \"free\"\nmass = 1\n")).find("\"wall\" moves and may meet it"),
+            std::string::npos);
+  const std::string other =
+      "spacing = 1\n[[soft]]\nname = \"other\"\nformula = \"block\"\nsize = [20, 20, 20]\nspacing = 2\n"
+      "material = \"gel\"\nposition = [45, 0, 0]\n";
+  EXPECT_NE(note_of(block(other)).find("\"other\" is nearer than 16.2 mm"), std::string::npos);
 }
 
 // Rigid surfaces out of reach do not change what is felt, while the tool moves and after. The proxy may go
@@ -185,8 +193,11 @@ TEST_F(GridSession, AWideToolIsFeltAsAtRest) {
 // A ball of two and a half spacings, four spacings deep. With wide limits and at the limits it must feel like
 // the same links relaxed one by one, and it must not oscillate.
 TEST_F(GridSession, ASmallBallFeelsWhatLinksDoAndHoldsStill) {
-  const std::string wall =
-      "[[rigid]]\nname = \"wall\"\nprimitive = \"box\"\nsize = [10, 90, 90]\nposition = [45, 0, 0]\n";
+  // Beside a body that may move an object is kept link by link.
+  const std::string body =
+      "[[rigid]]\nname = \"body\"\nprimitive = \"box\"\nsize = [10, 10, 10]\nposition = [500, 0, 0]\nmotion "
+      "= "
+      "\"path\"\n[rigid.path]\nkind = \"press\"\nfrom = [0, 0, 0]\nto = [0, 0, 0.001]\n";
   struct Row {
     const char* limits;
     double tolerance, still;  // shares of the force
@@ -206,7 +217,7 @@ TEST_F(GridSession, ASmallBallFeelsWhatLinksDoAndHoldsStill) {
       for (const double depth_m : {3e-3, 5e-3, 8e-3}) {
         std::array<glm::dvec3, 2> felt_N{};
         for (const bool by_links : {false, true}) {
-          tests::Touch touch(load(by_links ? text + wall : text), {x_m, x_m, 0.021}, true);
+          tests::Touch touch(load(by_links ? text + body : text), {x_m, x_m, 0.021}, true);
           ASSERT_EQ(touch.state().soft[0]->uses_patches(), !by_links);
           const glm::dvec3 end(x_m, x_m, 0.02 - depth_m);
           felt_N[by_links ? 1 : 0] = touch.go(end, 2e-5, 1000).force_N;
@@ -290,6 +301,103 @@ TEST_F(GridSession, ATightChainOfLayersIsSmoothToSlideOn) {
     std::cout << "[ measured ] steps of the force: pressed in " << 1e3 * in_N << " mN, along "
               << 1e3 * along_N << " mN\n";
     EXPECT_LT(along_N, 1.2 * in_N);
+  }
+}
+
+// A slab of 15,360 voxels that two sides hold, 1 mm over a round bone, and beside it a wall.
+std::string slab_on_bone(double turned_deg) {
+  return fmt::format(
+             "format = 1\n[tool]\nradius = 6\nstiffness = 1000\n[material.tissue]\nyoung = 5000\npoisson = "
+             "0.3\n"
+             "[[rigid]]\nname = \"bone\"\nprimitive = \"ball\"\nradius = 12\nposition = [0, 0, -13]\n"
+             "[[rigid]]\nname = \"wall\"\nprimitive = \"box\"\nsize = [60, 10, 40]\nposition = [0, 22, 6]\n"
+             "[[soft]]\nname = \"tissue\"\nformula = \"block\"\nsize = [40, 32, 12]\nspacing = 1\n"
+             "position = [0, 0, 6]\nrotation = [0, 0, {}]\nmaterial = \"tissue\"\nanchors = {{ faces = "
+             "[\"-x\", \"+x\"] }}\n",
+             turned_deg) +
+         tests::unlimited + tests::some_path;
+}
+
+// Deepest overlap of tissue and rigid objects (spacings).
+double overlap(tests::Touch& touch) {
+  const voxel::SoftObject& object = *touch.state().soft[0];
+  double most = 0.0;
+  for (const voxel::VoxelId v : object.lattice().surface()) {
+    const glm::dvec3 at = touch.world().soft[0].to_scene(object.position(v));
+    const hybrid::NearestRigid near = hybrid::nearest_rigid(touch.world(), touch.state(), at, 2e-3);
+    if (near.found) most = std::max(most, (object.voxel_radius() - near.distance) / 1e-3);
+  }
+  return most;
+}
+
+// Pressed onto a bone, tissue feels as at rest while the tool moves. Hand, bone and anchors balance. The bone
+// is beyond the finest patch: voxels between coarse nodes may overlap it by a fiftieth of a spacing.
+TEST_F(GridSession, TissueOnABoneIsFeltAsAtRest) {
+  for (const double turned_deg : {0.0, 180.0}) {
+    const hybrid::Scene scene = load(slab_on_bone(turned_deg));
+    const glm::dvec3 above(0.0, 0.0, 0.019), deep(0.0, 0.0, 0.0135), aside(0.002, 0.001, 0.0);
+    tests::Touch fast(scene, above, true), slow(scene, above, true);
+    ASSERT_TRUE(fast.state().soft[0]->uses_patches());
+    double most_jnd = 0.0, most_overlap = 0.0;
+    for (const auto& [to, steps] : {std::pair{deep, 100}, {deep + aside, 40}, {deep, 40}, {above, 100}}) {
+      const glm::dvec3 from = fast.state().device_m;
+      for (int n = 1; n <= steps; ++n) {
+        const glm::dvec3 at = from + (to - from) * (static_cast<double>(n) / steps);
+        const glm::dvec3 moving_N = fast.at(at).force_N;
+        const glm::dvec3 at_rest_N = slow.go(at, 5e-6).force_N;
+        most_jnd = std::max(most_jnd, hybrid::jnd_of(moving_N, at_rest_N, hybrid::kJndFloor_N));
+        most_overlap = std::max(most_overlap, overlap(fast));
+      }
+      if (to != deep) continue;
+      slow.go(deep, 1e-4, 50);
+      const hybrid::ForcesBetween forces = hybrid::forces_between(slow.world(), slow.state());
+      ASSERT_EQ(forces.pairs.size(), 2U);  // anchors and bone
+      ASSERT_TRUE(forces.balance[0].sum_N);
+      EXPECT_LT(*forces.balance[0].sum_N, 0.01 * forces.balance[0].largest_N);
+      EXPECT_GT(forces.pairs[1].on_soft_N->z, 0.01);
+    }
+    std::cout << "[ measured ] at most " << most_jnd << " JND off, " << most_overlap
+              << " spacings in the bone\n";
+    EXPECT_LT(most_jnd, 0.5);
+    EXPECT_LT(most_overlap, 0.03);
+  }
+}
+
+// After a contact tissue is at rest at once, and its obstacles are those of rest.
+TEST_F(GridSession, ObstaclesAreThoseOfRestAfterAContact) {
+  tests::Touch touch(load(slab_on_bone(0.0)), {0.0, 0.0, 0.019}, true);
+  const auto obstacles = touch.state().soft[0]->obstacles();
+  const std::vector<voxel::Obstacle> before(obstacles.begin(), obstacles.end());
+  touch.go({0.004, 0.0, 0.012}, 1e-4, 100);
+  touch.go({0.0, 0.0, 0.03}, 1e-4, 5);
+  for (std::size_t s = 0; s < before.size(); ++s) {
+    ASSERT_EQ(obstacles[s].normal, before[s].normal) << s;
+    ASSERT_EQ(obstacles[s].bound, before[s].bound) << s;
+  }
+}
+
+// Round a closed path beside a bone frictionless tissue gives the hand no energy.
+TEST_F(GridSession, AClosedPathBesideABoneGivesTheHandNoEnergy) {
+  const glm::dvec3 above(0.0, 0.0, 0.019), deep(0.0, 0.0, 0.0135), aside(0.003, 0.0, 0.0);
+  const hybrid::Scene scene = load(slab_on_bone(0.0));
+  for (const auto& path : std::vector<std::vector<glm::dvec3>>{{deep, above},
+                                                               {deep, deep + aside, above + aside, above},
+                                                               {above + aside, deep + aside, deep, above}}) {
+    for (const double step_m : {2e-5, 1e-4}) {
+      tests::Touch touch(scene, above, true);
+      double gained_J = 0.0;
+      glm::dvec3 last_m = above, last_N(0.0);
+      for (const glm::dvec3& corner : path) {
+        touch.go(corner, step_m, 0, [&](const hybrid::TickResult& felt) {
+          gained_J += 0.5 * glm::dot(last_N + felt.force_N, felt.device_m - last_m);
+          last_m = felt.device_m;
+          last_N = felt.force_N;
+        });
+      }
+      std::cout << "[ measured ] " << path.size() << " corners, " << 1e3 * step_m << " mm a tick: gained "
+                << 1e6 * gained_J << " uJ\n";
+      EXPECT_LT(gained_J, 1e-6);
+    }
   }
 }
 

@@ -1,0 +1,293 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Contacts of a CompositeGrid with rigid surfaces that stand still.
+//
+// Each surface voxel beside such a surface has an obstacle: a half-space for its displacement. On level 0 the
+// voxel is a node and has this bound itself. On coarser levels, outside of the finer patch, the node nearest
+// to the voxel has it. If several voxels have the same nearest node, the one with the least gap counts.
+//
+// Axes are relaxed one after the other, so a contact is split: along the largest component of its normal it
+// is a bound, the plane's height at the node's place. Along the others it is a load, the force of that bound
+// times the slope of the plane. At the fixed point of cycles the force is along the normal, as without
+// friction. Loads follow the bound's force by a half in each cycle: a plane that rises steeply along a soft
+// axis would make the two swing otherwise.
+//
+// A bound stands whether or not its node is pressed (SoftObject::press_on_grid has the reason).
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "voxel/composite/grid.h"
+#include "voxel/composite/row_kernels.h"
+
+namespace voxel {
+namespace {
+
+using composite::index;
+
+constexpr float kNearby = 3.0F;        // steps of the level: nodes further from their plane get no bound
+constexpr float kFollows = 0.5F;       // of the difference, in a cycle: a load follows its bound
+constexpr float kHolds = 1e-3F;        // spacings: a node nearer to its bound is held by it
+constexpr std::size_t kOffered = 512;  // surface voxels that are offered to their nodes a tick
+
+int largest_axis(const glm::vec3& normal) {
+  const glm::vec3 size = glm::abs(normal);
+  return size.z >= size.x && size.z >= size.y ? 2 : size.y >= size.x ? 1 : 0;
+}
+
+}  // namespace
+
+void CompositeGrid::watch_obstacles(std::span<const Obstacle> obstacles) {
+  obstacles_ = obstacles;
+  if (is_beside_rigid_.size() == obstacles.size()) return;
+  is_beside_rigid_.assign(obstacles.size(), 0);
+  obstacle_load_N_.assign(obstacles.size(), 0.0F);
+  beside_rigid_.reserve(obstacles.size());
+  std::size_t most = 0;
+  for (std::size_t l = 0; l <= covering_level_; ++l) {
+    Level& level = levels_[l];
+    level.obstacle_of.assign(level.u[0].size(), 0);
+    level.obstacle_nodes.reserve(std::min(obstacles.size(), level.u[0].size()));
+    most += level.obstacle_nodes.capacity();
+  }
+  obstacle_bounds_.reserve(most);
+  for (std::uint32_t s = 0; s < obstacles.size(); ++s) {
+    if (obstacles[s].normal != glm::vec3(0.0F)) add_obstacle(s);
+  }
+}
+
+void CompositeGrid::add_obstacle(std::uint32_t surface_number) noexcept {
+  if (is_beside_rigid_[surface_number] != 0) return;
+  is_beside_rigid_[surface_number] = 1;
+  beside_rigid_.push_back({lattice_.coordinates(lattice_.surface()[surface_number]), surface_number});
+  for (std::size_t l = 0; l <= covering_level_; ++l) offer_obstacle(l, beside_rigid_.back());
+}
+
+// The unknown of a level that is nearest to a place, if the level has the place within its patch.
+bool CompositeGrid::nearest_unknown(const Level& level, const Index3& at, Index3& node) const noexcept {
+  Index3 other{};
+  for (std::size_t d = 0; d < 3; ++d) {
+    const AxisNodes& nodes = level.nodes[d];
+    const int way = at[d] - nodes.begin, half = level.step / 2;
+    node[d] = std::clamp((way + half) / level.step, 0, nodes.count - 1);
+    if (way < -half || node[d] < nodes.first || node[d] > nodes.last ||
+        way > (nodes.count - 1) * level.step + half)
+      return false;
+    other[d] = std::clamp(node[d] + (way > node[d] * level.step ? 1 : -1), nodes.first, nodes.last);
+  }
+  const auto is_unknown = [&](const Index3& n) {
+    return level.inverse_diagonal[0][level.node(n[0], n[1], n[2])] != 0.0F;
+  };
+  if (is_unknown(node)) return true;
+  if (level.step == 1) return false;
+  const Index3 nearest = node;
+  int least = 4 * 3 * level.step * level.step;
+  bool any = false;
+  for (int corner = 1; corner < 8; ++corner) {
+    Index3 n = nearest;
+    int square = 0;
+    for (std::size_t d = 0; d < 3; ++d) {
+      if ((corner >> d & 1) != 0) n[d] = other[d];
+      const int away = level.at(d, n[d]) - at[d];
+      square += away * away;
+    }
+    if (square >= least || !is_unknown(n)) continue;
+    least = square;
+    node = n;
+    any = true;
+  }
+  return any;
+}
+
+// Gap of a surface voxel to its plane, at its displacement on this level (m).
+float CompositeGrid::obstacle_gap(const Level& level, const ObstacleNode& node) const noexcept {
+  const Obstacle& o = obstacles_[node.surface];
+  const Index3 at = shifted(node.voxel);
+  const glm::vec3 u =
+      level.step == 1 ? glm::vec3(level.u[0][node.number], level.u[1][node.number], level.u[2][node.number])
+                      : glm::vec3(interpolate(level, {static_cast<double>(at[0]), static_cast<double>(at[1]),
+                                                      static_cast<double>(at[2])}));
+  return glm::dot(o.normal, u) - o.bound;
+}
+
+// A surface voxel stands for its node on level l if no other one has a smaller gap there.
+void CompositeGrid::offer_obstacle(std::size_t l, const BesideRigid& beside) noexcept {
+  Level& level = levels_[l];
+  Index3 at{};
+  if (!level.is_built || !nearest_unknown(level, shifted(beside.voxel), at)) return;
+  const ObstacleNode fresh{at, level.node(at[0], at[1], at[2]), beside.voxel, beside.surface};
+  std::uint32_t& entry = level.obstacle_of[fresh.number];
+  if (entry == 0) {
+    if (level.obstacle_nodes.size() == level.obstacle_nodes.capacity()) return;
+    level.obstacle_nodes.push_back(fresh);
+    entry = static_cast<std::uint32_t>(level.obstacle_nodes.size());
+    return;
+  }
+  ObstacleNode& now = level.obstacle_nodes[entry - 1U];
+  const bool gone = obstacles_[now.surface].normal == glm::vec3(0.0F);
+  if (gone || obstacle_gap(level, fresh) < obstacle_gap(level, now)) now = fresh;
+}
+
+// After a level was placed anew.
+void CompositeGrid::list_obstacle_nodes(std::size_t l) noexcept {
+  if (obstacles_.empty() || l > covering_level_) return;
+  Level& level = levels_[l];
+  for (const ObstacleNode& node : level.obstacle_nodes) level.obstacle_of[node.number] = 0;
+  level.obstacle_nodes.clear();
+  for (const BesideRigid& beside : beside_rigid_) {
+    if (obstacles_[beside.surface].normal != glm::vec3(0.0F)) offer_obstacle(l, beside);
+  }
+}
+
+// Does the finer patch have this node among its unknowns?
+bool CompositeGrid::is_covered(std::size_t l, const Index3& node) const noexcept {
+  if (l == 0) return false;
+  const auto& nodes = levels_[l - 1].nodes;
+  for (std::size_t d = 0; d < 3; ++d) {
+    if (node[d] < nodes[d].coarse_first || node[d] > nodes[d].coarse_last) return false;
+  }
+  return true;
+}
+
+void CompositeGrid::press_on_obstacles() noexcept {
+  obstacle_bounds_.clear();
+  if (beside_rigid_.empty()) return;
+  for (std::size_t n = 0; n < std::min(kOffered, beside_rigid_.size()); ++n) {
+    if (++obstacle_cursor_ >= beside_rigid_.size()) obstacle_cursor_ = 0;
+    const BesideRigid& beside = beside_rigid_[obstacle_cursor_];
+    if (obstacles_[beside.surface].normal == glm::vec3(0.0F)) continue;
+    for (std::size_t l = 1; l <= covering_level_; ++l) offer_obstacle(l, beside);
+  }
+  const auto spacing_m = static_cast<float>(lattice_.min_spacing_m());
+  for (std::size_t l = 0; l <= covering_level_; ++l) {
+    const float near_m = kNearby * spacing_m * static_cast<float>(levels_[l].step);
+    for (const ObstacleNode& node : levels_[l].obstacle_nodes) {
+      if (is_covered(l, node.node)) continue;
+      const float gap = obstacle_gap(levels_[l], node);
+      if (gap <= near_m) bound_by_obstacle(l, node, gap);
+    }
+  }
+}
+
+// Bounds a node such that its voxel, which moves with it, comes to the plane.
+void CompositeGrid::bound_by_obstacle(std::size_t l, const ObstacleNode& node, float gap) noexcept {
+  const Obstacle& o = obstacles_[node.surface];
+  if (o.normal == glm::vec3(0.0F) || obstacle_bounds_.size() == obstacle_bounds_.capacity()) return;
+  const int along = largest_axis(o.normal);
+  const float normal = o.normal[along];
+  obstacle_bounds_.push_back({static_cast<std::uint32_t>(l), node, index(along), normal > 0.0F ? 1.0F : -1.0F,
+                              levels_[l].u[index(along)][node.number] - gap / normal});
+}
+
+// Adds the obstacles' bounds of one axis to those that the tool's contact has set: on their nodes, and on the
+// nodes of coarser levels at the same places. They are not propagated: limits near a rigid surface are those
+// of clamp_to_supports() and of multipliers.
+void CompositeGrid::add_obstacle_bounds(std::size_t axis) noexcept {
+  for (const ObstacleBound& b : obstacle_bounds_) {
+    if (b.axis != axis) continue;
+    const std::size_t kind = b.sign > 0.0F ? 0 : 1;
+    if (!levels_[0].bounded[kind]) {
+      for (Level& level : levels_) {
+        std::fill_n(level.bound[kind].begin(), level.first_row() + level.floats() + kPad,
+                    composite::kNoBound);
+        level.bounded[kind] = true;
+      }
+    }
+    float& own = levels_[b.level].bound[kind][b.node.number];
+    own = std::max(own, b.sign * b.u);
+    Index3 node = b.node.node;
+    for (std::size_t l = b.level + 1; l < levels_.size(); ++l) {
+      const Level &fine = levels_[l - 1], &coarse = levels_[l];
+      bool coincides = true;
+      for (std::size_t d = 0; d < 3 && coincides; ++d) {
+        const int way = fine.at(d, node[d]) - coarse.nodes[d].begin;
+        node[d] = way / coarse.step;
+        coincides = way >= 0 && way % coarse.step == 0 && node[d] < coarse.nodes[d].count;
+      }
+      if (!coincides) break;
+      float& at = levels_[l].bound[kind][coarse.node(node[0], node[1], node[2])];
+      at = std::max(at, b.sign * b.u);
+    }
+  }
+}
+
+// Adds to f of a level what its obstacles carry on axes other than their own.
+void CompositeGrid::add_obstacle_loads(std::size_t l, std::size_t axis) noexcept {
+  Level& level = levels_[l];
+  for (const ObstacleBound& b : obstacle_bounds_) {
+    if (b.level == l && b.axis != axis) level.f[b.node.number] += load_of(b)[static_cast<int>(axis)];
+  }
+}
+
+glm::vec3 CompositeGrid::load_of(const ObstacleBound& b) const noexcept {
+  glm::vec3 load = obstacle_load_N_[b.node.surface] * obstacles_[b.node.surface].normal;
+  load[static_cast<int>(b.axis)] = 0.0F;
+  return load;
+}
+
+// After a cycle on one axis: the forces of the bounds that hold their nodes.
+void CompositeGrid::measure_obstacle_forces(std::size_t axis) noexcept {
+  const float holds_m = kHolds * static_cast<float>(lattice_.min_spacing_m());
+  for (ObstacleBound& b : obstacle_bounds_) {
+    if (b.axis != axis) continue;
+    const Level& level = levels_[b.level];
+    const float u = level.u[axis][b.node.number];
+    float pulled = 0.0F;
+    if (b.sign * (u - b.u) <= holds_m) {
+      pulled = level.diagonal[axis][b.node.number] *
+               static_cast<float>(static_cast<double>(u) -
+                                  minimum_at(level, b.node.number)[static_cast<int>(axis)]);
+    }
+    b.force_N = b.sign * pulled > 0.0F ? pulled : 0.0F;
+    float& load_N = obstacle_load_N_[b.node.surface];
+    load_N += kFollows * (b.force_N / obstacles_[b.node.surface].normal[static_cast<int>(axis)] - load_N);
+  }
+}
+
+glm::dvec3 CompositeGrid::force_of(const ObstacleBound& b) const noexcept {
+  glm::dvec3 force_N(load_of(b));
+  force_N[static_cast<int>(b.axis)] = static_cast<double>(b.force_N);
+  return force_N;
+}
+
+std::vector<CompositeGrid::ObstacleForce> CompositeGrid::obstacle_forces() const {
+  std::vector<ObstacleForce> forces;
+  for (const ObstacleBound& b : obstacle_bounds_) {
+    const glm::dvec3 force_N = force_of(b);
+    if (force_N != glm::dvec3(0.0)) forces.push_back({b.node.surface, force_N});
+  }
+  return forces;
+}
+
+// Nothing is left in an obstacle that was moved there after the cycle.
+void CompositeGrid::settle_on_obstacles() noexcept {
+  for (const ObstacleBound& b : obstacle_bounds_) {
+    Level& level = levels_[b.level];
+    const Obstacle& o = obstacles_[b.node.surface];
+    const float gap = obstacle_gap(level, b.node);
+    if (gap < 0.0F) level.u[b.axis][b.node.number] -= gap / o.normal[static_cast<int>(b.axis)];
+  }
+}
+
+glm::dvec3 CompositeGrid::clamp_to_obstacles(const Index3& voxel, const glm::dvec3& u) const noexcept {
+  glm::dvec3 result = u;
+  const Index3 at = shifted(voxel);
+  const float holds_m = kHolds * static_cast<float>(lattice_.min_spacing_m());
+  for (const ObstacleBound& b : obstacle_bounds_) {
+    const Level& level = levels_[b.level];
+    if (b.sign * (level.u[b.axis][b.node.number] - b.u) > holds_m) continue;
+    // For a link from a up to b: u(b) >= u(a) − limit[0] and u(a) >= u(b) − limit[1]; for −u the reverse.
+    const std::size_t kind = b.sign > 0.0F ? 0 : 1;
+    double least = static_cast<double>(b.sign * b.u);
+    for (std::size_t d = 0; d < 3; ++d) {
+      const int links = at[d] - level.at(d, b.node.node[d]);
+      least -= std::abs(links) * static_cast<double>(limit_m_[d][b.axis][(links > 0 ? 0U : 1U) ^ kind]);
+    }
+    double& to = result[static_cast<int>(b.axis)];
+    to = b.sign > 0.0F ? std::max(to, least) : std::min(to, -least);
+  }
+  return result;
+}
+
+}  // namespace voxel
