@@ -28,6 +28,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <glm/common.hpp>
 #include <glm/vec3.hpp>
 #include <span>
 #include <string>
@@ -76,11 +77,15 @@ class CompositeGrid {
   [[nodiscard]] glm::dvec3 unconstrained_minimum(const Index3& voxel) const noexcept;
   [[nodiscard]] glm::dvec3 compliance(const Index3& voxel) const noexcept;
   void set_fine(const Index3& voxel, const glm::dvec3& u) noexcept;
-  // `u` clamped to the displacements that the chains from fully anchored sides, and from nodes held by rigid
-  // surfaces, allow the voxel (m).
-  [[nodiscard]] glm::dvec3 clamp_to_supports(const Index3& voxel, const glm::dvec3& u) const noexcept {
-    return clamp_to_obstacles(voxel, clamp_to_anchors(voxel, u));
-  }
+  // The displacements that the chains from fully anchored sides, and from nodes held by rigid surfaces, allow
+  // a voxel (m).
+  struct Interval {
+    glm::dvec3 least, most;
+    [[nodiscard]] glm::dvec3 clamp(const glm::dvec3& u) const noexcept {
+      return glm::max(glm::min(u, most), least);
+    }
+  };
+  [[nodiscard]] Interval supported_interval(const Index3& voxel) const noexcept;
 
   // ---- rigid surfaces that stand still (rigid_contacts.cpp) ----
   // Obstacles by surface number, which outlive the grid. Call it again when they have another address.
@@ -306,9 +311,11 @@ class CompositeGrid {
   void add_obstacle_bounds(std::size_t axis) noexcept;
   void add_obstacle_loads(std::size_t l, std::size_t axis) noexcept;
   void measure_obstacle_forces(std::size_t axis) noexcept;
+  [[nodiscard]] float step_m(const Level& level) const noexcept;
+  [[nodiscard]] bool holds(const ObstacleBound& b) const noexcept;
   [[nodiscard]] glm::vec3 load_of(const ObstacleBound& b) const noexcept;
   [[nodiscard]] glm::dvec3 force_of(const ObstacleBound& b) const noexcept;
-  [[nodiscard]] glm::dvec3 clamp_to_obstacles(const Index3& voxel, const glm::dvec3& u) const noexcept;
+  void narrow_by_obstacles(const Index3& voxel, Interval& interval) const noexcept;
   // ---- fac_cycle.cpp ----
   [[nodiscard]] composite::LevelView view(std::size_t l, std::size_t axis) noexcept;
   void inject_from_finer(std::size_t l, std::size_t axis) noexcept;
@@ -354,7 +361,6 @@ class CompositeGrid {
   [[nodiscard]] std::size_t fine_node(const Index3& voxel) const;  // grid.cpp
   // Of a node, its neighbours fixed: its displacement of least energy without bounds (m).
   [[nodiscard]] glm::dvec3 minimum_at(const Level& level, std::size_t node) const noexcept;  // grid.cpp
-  [[nodiscard]] glm::dvec3 clamp_to_anchors(const Index3& voxel, const glm::dvec3& u) const noexcept;
   [[nodiscard]] static double inside_share(const Level& level, std::size_t d, int i) noexcept;
   [[nodiscard]] double covered_share(std::size_t l, std::size_t d, int i) const noexcept;
   [[nodiscard]] double anchor_share(std::size_t l, std::size_t number, std::size_t d) const noexcept;
@@ -375,9 +381,10 @@ class CompositeGrid {
   std::vector<std::uint8_t> is_beside_rigid_;  // [surface number] 1: in beside_rigid_
   std::vector<float> obstacle_load_N_;         // [surface number] force along the normal
   std::vector<ObstacleBound> obstacle_bounds_;
-  std::size_t obstacle_cursor_ = 0;           // of beside_rigid_: last one that was offered to its nodes
-  bool patch_moved_ = false;                  // since the last cycle
-  std::array<bool, 3> multipliers_active_{};  // [axis] some link has a multiplier
+  std::vector<std::uint32_t> supporting_bounds_;  // of obstacle_bounds_, near their planes
+  std::size_t obstacle_cursor_ = 0;               // of beside_rigid_: last one that was offered to its nodes
+  bool patch_moved_ = false;                      // since the last cycle
+  std::array<bool, 3> multipliers_active_{};      // [axis] some link has a multiplier
   std::size_t work_ = 0;
   // One plane of half cells: the cells that are in each, and these times their stiffness, by axis.
   struct HalfCells {

@@ -107,6 +107,7 @@ void CompositeGrid::begin(const Index3& centre) noexcept {
   }
   pressed_.clear();
   obstacle_bounds_.clear();
+  supporting_bounds_.clear();
   std::fill(obstacle_load_N_.begin(), obstacle_load_N_.end(), 0.0F);
 }
 

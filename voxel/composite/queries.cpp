@@ -209,7 +209,8 @@ std::size_t CompositeGrid::memory_bytes() const {
   std::size_t bytes = levels_.capacity() * sizeof(Level) + pressed_.capacity() * sizeof(Pressed) +
                       material_.memory_bytes() + beside_rigid_.capacity() * sizeof(BesideRigid) +
                       is_beside_rigid_.capacity() + obstacle_load_N_.capacity() * sizeof(float) +
-                      obstacle_bounds_.capacity() * sizeof(ObstacleBound);
+                      obstacle_bounds_.capacity() * sizeof(ObstacleBound) +
+                      supporting_bounds_.capacity() * sizeof(std::uint32_t);
   const auto add = [&bytes](const Level& level) {
     for (const auto* arrays : {&level.u, &level.at_bound, &level.weight, &level.anchor_weight,
                                &level.shape_weight, &level.inverse_diagonal, &level.diagonal}) {

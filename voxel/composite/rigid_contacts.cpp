@@ -27,6 +27,7 @@ namespace {
 using composite::index;
 
 constexpr float kNearby = 3.0F;        // steps of the level: nodes further from their plane get no bound
+constexpr float kSupports = 0.5F;      // steps: nodes nearer to their plane count in supported_interval()
 constexpr float kFollows = 0.5F;       // of the difference, in a cycle: a load follows its bound
 constexpr float kHolds = 1e-3F;        // spacings: a node nearer to its bound is held by it
 constexpr std::size_t kOffered = 512;  // surface voxels that are offered to their nodes a tick
@@ -52,6 +53,7 @@ void CompositeGrid::watch_obstacles(std::span<const Obstacle> obstacles) {
     most += level.obstacle_nodes.capacity();
   }
   obstacle_bounds_.reserve(most);
+  supporting_bounds_.reserve(most);
   for (std::uint32_t s = 0; s < obstacles.size(); ++s) {
     if (obstacles[s].normal != glm::vec3(0.0F)) add_obstacle(s);
   }
@@ -111,7 +113,8 @@ float CompositeGrid::obstacle_gap(const Level& level, const ObstacleNode& node) 
   return glm::dot(o.normal, u) - o.bound;
 }
 
-// A surface voxel stands for its node on level l if no other one has a smaller gap there.
+// A surface voxel stands for its node on level l if no other one has a smaller gap there. A node is in the
+// list once, and so are all lists within the room that watch_obstacles() has made.
 void CompositeGrid::offer_obstacle(std::size_t l, const BesideRigid& beside) noexcept {
   Level& level = levels_[l];
   Index3 at{};
@@ -119,7 +122,6 @@ void CompositeGrid::offer_obstacle(std::size_t l, const BesideRigid& beside) noe
   const ObstacleNode fresh{at, level.node(at[0], at[1], at[2]), beside.voxel, beside.surface};
   std::uint32_t& entry = level.obstacle_of[fresh.number];
   if (entry == 0) {
-    if (level.obstacle_nodes.size() == level.obstacle_nodes.capacity()) return;
     level.obstacle_nodes.push_back(fresh);
     entry = static_cast<std::uint32_t>(level.obstacle_nodes.size());
     return;
@@ -152,6 +154,7 @@ bool CompositeGrid::is_covered(std::size_t l, const Index3& node) const noexcept
 
 void CompositeGrid::press_on_obstacles() noexcept {
   obstacle_bounds_.clear();
+  supporting_bounds_.clear();
   if (beside_rigid_.empty()) return;
   for (std::size_t n = 0; n < std::min(kOffered, beside_rigid_.size()); ++n) {
     if (++obstacle_cursor_ >= beside_rigid_.size()) obstacle_cursor_ = 0;
@@ -159,9 +162,8 @@ void CompositeGrid::press_on_obstacles() noexcept {
     if (obstacles_[beside.surface].normal == glm::vec3(0.0F)) continue;
     for (std::size_t l = 1; l <= covering_level_; ++l) offer_obstacle(l, beside);
   }
-  const auto spacing_m = static_cast<float>(lattice_.min_spacing_m());
   for (std::size_t l = 0; l <= covering_level_; ++l) {
-    const float near_m = kNearby * spacing_m * static_cast<float>(levels_[l].step);
+    const float near_m = kNearby * step_m(levels_[l]);
     for (const ObstacleNode& node : levels_[l].obstacle_nodes) {
       if (is_covered(l, node.node)) continue;
       const float gap = obstacle_gap(levels_[l], node);
@@ -173,16 +175,18 @@ void CompositeGrid::press_on_obstacles() noexcept {
 // Bounds a node such that its voxel, which moves with it, comes to the plane.
 void CompositeGrid::bound_by_obstacle(std::size_t l, const ObstacleNode& node, float gap) noexcept {
   const Obstacle& o = obstacles_[node.surface];
-  if (o.normal == glm::vec3(0.0F) || obstacle_bounds_.size() == obstacle_bounds_.capacity()) return;
+  if (o.normal == glm::vec3(0.0F)) return;
   const int along = largest_axis(o.normal);
   const float normal = o.normal[along];
   obstacle_bounds_.push_back({static_cast<std::uint32_t>(l), node, index(along), normal > 0.0F ? 1.0F : -1.0F,
                               levels_[l].u[index(along)][node.number] - gap / normal});
+  if (gap <= kSupports * step_m(levels_[l]))
+    supporting_bounds_.push_back(static_cast<std::uint32_t>(obstacle_bounds_.size() - 1));
 }
 
 // Adds the obstacles' bounds of one axis to those that the tool's contact has set: on their nodes, and on the
 // nodes of coarser levels at the same places. They are not propagated: limits near a rigid surface are those
-// of clamp_to_supports() and of multipliers.
+// of supported_interval() and of multipliers.
 void CompositeGrid::add_obstacle_bounds(std::size_t axis) noexcept {
   for (const ObstacleBound& b : obstacle_bounds_) {
     if (b.axis != axis) continue;
@@ -228,13 +232,12 @@ glm::vec3 CompositeGrid::load_of(const ObstacleBound& b) const noexcept {
 
 // After a cycle on one axis: the forces of the bounds that hold their nodes.
 void CompositeGrid::measure_obstacle_forces(std::size_t axis) noexcept {
-  const float holds_m = kHolds * static_cast<float>(lattice_.min_spacing_m());
   for (ObstacleBound& b : obstacle_bounds_) {
     if (b.axis != axis) continue;
     const Level& level = levels_[b.level];
     const float u = level.u[axis][b.node.number];
     float pulled = 0.0F;
-    if (b.sign * (u - b.u) <= holds_m) {
+    if (holds(b)) {
       pulled = level.diagonal[axis][b.node.number] *
                static_cast<float>(static_cast<double>(u) -
                                   minimum_at(level, b.node.number)[static_cast<int>(axis)]);
@@ -264,30 +267,42 @@ std::vector<CompositeGrid::ObstacleForce> CompositeGrid::obstacle_forces() const
 void CompositeGrid::settle_on_obstacles() noexcept {
   for (const ObstacleBound& b : obstacle_bounds_) {
     Level& level = levels_[b.level];
-    const Obstacle& o = obstacles_[b.node.surface];
     const float gap = obstacle_gap(level, b.node);
-    if (gap < 0.0F) level.u[b.axis][b.node.number] -= gap / o.normal[static_cast<int>(b.axis)];
+    if (gap < 0.0F)
+      level.u[b.axis][b.node.number] -= gap / obstacles_[b.node.surface].normal[static_cast<int>(b.axis)];
   }
 }
 
-glm::dvec3 CompositeGrid::clamp_to_obstacles(const Index3& voxel, const glm::dvec3& u) const noexcept {
-  glm::dvec3 result = u;
+float CompositeGrid::step_m(const Level& level) const noexcept {
+  return static_cast<float>(lattice_.min_spacing_m()) * static_cast<float>(level.step);
+}
+
+bool CompositeGrid::holds(const ObstacleBound& b) const noexcept {
+  const float beyond_m = b.sign * (levels_[b.level].u[b.axis][b.node.number] - b.u);
+  return beyond_m <= kHolds * static_cast<float>(lattice_.min_spacing_m());
+}
+
+void CompositeGrid::narrow_by_obstacles(const Index3& voxel, Interval& interval) const noexcept {
   const Index3 at = shifted(voxel);
-  const float holds_m = kHolds * static_cast<float>(lattice_.min_spacing_m());
-  for (const ObstacleBound& b : obstacle_bounds_) {
-    const Level& level = levels_[b.level];
-    if (b.sign * (level.u[b.axis][b.node.number] - b.u) > holds_m) continue;
+  for (const std::uint32_t n : supporting_bounds_) {
+    const ObstacleBound& b = obstacle_bounds_[n];
     // For a link from a up to b: u(b) >= u(a) − limit[0] and u(a) >= u(b) − limit[1]; for −u the reverse.
     const std::size_t kind = b.sign > 0.0F ? 0 : 1;
     double least = static_cast<double>(b.sign * b.u);
+    // A coarse node stands for all voxels within half a step across the bound.
+    const Index3 from = shifted(b.node.voxel);
     for (std::size_t d = 0; d < 3; ++d) {
-      const int links = at[d] - level.at(d, b.node.node[d]);
-      least -= std::abs(links) * static_cast<double>(limit_m_[d][b.axis][(links > 0 ? 0U : 1U) ^ kind]);
+      const int links = at[d] - from[d], beyond = d == b.axis ? 0 : levels_[b.level].step / 2;
+      least -= std::max(std::abs(links) - beyond, 0) *
+               static_cast<double>(limit_m_[d][b.axis][(links > 0 ? 0U : 1U) ^ kind]);
     }
-    double& to = result[static_cast<int>(b.axis)];
-    to = b.sign > 0.0F ? std::max(to, least) : std::min(to, -least);
+    const auto axis = static_cast<int>(b.axis);
+    if (b.sign > 0.0F) {
+      interval.least[axis] = std::max(interval.least[axis], least);
+    } else {
+      interval.most[axis] = std::min(interval.most[axis], -least);
+    }
   }
-  return result;
 }
 
 }  // namespace voxel
