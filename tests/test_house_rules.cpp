@@ -127,9 +127,10 @@ const std::map<std::string, std::vector<Room>>& rooms() {
         {"compare", {"session", "view"}},
         {"compose", {"session", "view"}},
         {"stress", {"session", "view"}},
+        {"bench/reports", {}},
         {"bench", {"plot", "compare", "compose", "stress"}},
         {"stability", {"plot", "compare", "compose", "stress"}},
-        {"program", {"bench", "stability"}}}},
+        {"program", {"bench", "bench/reports", "stability"}}}},
   };
   return kRooms;
 }

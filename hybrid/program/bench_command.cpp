@@ -209,6 +209,23 @@ const std::vector<std::string>& bench_suites() {
   static const std::vector<std::string> kSuites{"rigid", "soft", "occupancy", "threads"};
   return kSuites;
 }
+const std::vector<BenchOption>& bench_options() {
+  static const std::vector<BenchOption> kOptions{
+      {"--quick", {"rigid", "soft", "occupancy"}},
+      {"--every-tick", {"rigid"}},
+      {"--only", {"rigid", "soft", "occupancy"}},
+      {"--meshes", {"rigid"}},
+      {"--unit", {"rigid"}},
+      {"--sizes", {"soft"}},
+      {"--cells", {"occupancy"}},
+      {"--scenes", {"threads"}},
+      {"--seconds", {"soft", "threads"}},
+      {"--engines", {"rigid", "soft", "occupancy"}},
+      {"--trace", {"rigid"}},
+      {"--plot", {"soft", "occupancy"}},
+  };
+  return kOptions;
+}
 std::vector<std::string> bench_parts() {
   std::vector<std::string> parts = bench::rigid_paths();
   parts.insert(parts.end(), bench::soft_cases().begin(), bench::soft_cases().end());

@@ -87,6 +87,20 @@ const std::vector<std::string>& bench_suites();
 std::vector<std::string> bench_parts();  // paths of rigid, cases of soft and occupancy
 std::vector<std::string> bench_engines();
 std::string bench_mesh_error(const std::string& name);  // empty: a mesh's name, or a path
+// The suites in which each option has an effect. In "all" each has one; options of all suites are left out.
+struct BenchOption {
+  const char* name;
+  std::vector<std::string> suites;
+};
+const std::vector<BenchOption>& bench_options();
+
+// `hybrid bench compare`: what changed between reports of `hybrid bench`. Neither side may be empty.
+struct BenchCompareCommand {
+  std::vector<std::filesystem::path> olds, news;
+  bool all = false;  // list every figure
+  std::string json;
+};
+int bench_compare(const BenchCompareCommand& command);
 
 struct StabilityCommand {
   std::filesystem::path scene, plot;

@@ -196,25 +196,64 @@ void add_compare(CLI::App& app, int& status) {
   });
 }
 
+// Refuses options that have no effect in the suite, and names the suites in which they have.
+void refuse_unused(const CLI::App& bench, const std::string& suite) {
+  for (const hybrid::BenchOption& option : hybrid::bench_options()) {
+    const auto& suites = option.suites;
+    if (suite == "all" || bench.count(option.name) == 0 ||
+        std::find(suites.begin(), suites.end(), suite) != suites.end())
+      continue;
+    std::string takers;
+    for (const std::string& taker : suites) takers += "bench " + taker + ", ";
+    throw CLI::ValidationError(std::string(option.name) + " has no effect in bench " + suite +
+                               "; leave it out, or use it with " + takers + "or bench all");
+  }
+}
+
+CLI::App* add_bench_compare(CLI::App& bench, int& status) {
+  auto* sub =
+      bench.add_subcommand("compare",
+                           "What changed between reports of this command, and whether that is noise:\n"
+                           "  hybrid bench compare old1.json old2.json ... --to new1.json new2.json ...");
+  auto c = std::make_shared<hybrid::BenchCompareCommand>();
+  sub->add_option("OLD", c->olds, "reports of the old build; OLD and NEW if there is no --to")->required();
+  sub->add_option("--to", c->news, "reports of the new build, measured in turns with the old ones");
+  sub->add_flag("--all", c->all, "list every figure, not only the first");
+  sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
+  sub->callback([c, &status] {
+    if (c->news.empty()) {
+      if (c->olds.size() != 2)
+        throw CLI::ValidationError(
+            "bench compare takes OLD.json NEW.json, or OLD.json ... --to NEW.json ... for repeats");
+      c->news = {c->olds.back()};
+      c->olds.pop_back();
+    }
+    status = hybrid::bench_compare(*c);
+  });
+  return sub;
+}
+
 void add_bench(CLI::App& app, int& status) {
   auto* sub = app.add_subcommand("bench", "Times and errors beside baselines, over meshes of all sizes");
   auto c = std::make_shared<hybrid::BenchCommand>();
   std::vector<std::string> suites = hybrid::bench_suites();
   suites.emplace_back("all");
-  sub->add_option("SUITE", c->suite, "what to time")->required()->check(CLI::IsMember(suites));
+  sub->add_option("SUITE", c->suite, "what to time")->check(CLI::IsMember(suites));
   sub->add_flag("--quick", c->quick, "a short piece of each path on small meshes; a few seconds");
   sub->add_flag("--every-tick", c->every_tick, "ask the exact reference at every tick; slow");
   sub->add_option("--only", c->only, "paths of rigid, cases of soft and occupancy, with commas between")
       ->delimiter(',')
       ->check(CLI::IsMember(hybrid::bench_parts()));
-  sub->add_option(
-         "--meshes", c->meshes,
-         "of rigid: meshes, with commas between: files (my.obj), and ico0 to ico9 (20 x 4^n triangles), "
-         "geo1 to geo1024 (20 x n^2), cube1 to cube1024, corner1 to corner1024")
-      ->delimiter(',')
-      ->check(CLI::Validator(hybrid::bench_mesh_error, "MESH"));
+  auto* meshes =
+      sub->add_option(
+             "--meshes", c->meshes,
+             "of rigid: meshes, with commas between: files (my.obj), and ico0 to ico9 (20 x 4^n triangles), "
+             "geo1 to geo1024 (20 x n^2), cube1 to cube1024, corner1 to corner1024")
+          ->delimiter(',')
+          ->check(CLI::Validator(hybrid::bench_mesh_error, "MESH"));
   sub->add_option("--unit", c->mesh_unit_m, "of rigid: length unit of mesh files in meters")
       ->check(CLI::PositiveNumber)
+      ->needs(meshes)
       ->capture_default_str();
   sub->add_option("--sizes", c->sizes, "of soft: voxels an edge of sessions and loads, with commas between")
       ->delimiter(',')
@@ -231,12 +270,18 @@ void add_bench(CLI::App& app, int& status) {
   sub->add_option("--engines", c->engines, "engines, with commas between")
       ->delimiter(',')
       ->check(CLI::IsMember(hybrid::bench_engines()));
-  sub->add_option("--trace", c->trace, "write every run as CSV into this folder");
+  sub->add_option("--trace", c->trace, "of rigid: write every run as CSV into this folder");
   sub->add_option("--plot", c->plot,
                   "as SVG: of soft relaxation round by round, classic's and ours; of occupancy look-ups over "
                   "cells (with all: beside it, NAME-occupancy.svg)");
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
-  sub->callback([c, &status] { status = hybrid::run_bench(*c); });
+  const CLI::App* compare = add_bench_compare(*sub, status);
+  sub->callback([c, sub, compare, &status] {
+    if (compare->parsed()) return;
+    if (c->suite.empty()) throw CLI::RequiredError("SUITE");
+    refuse_unused(*sub, c->suite);
+    status = hybrid::run_bench(*c);
+  });
 }
 
 void add_stability(CLI::App& app, int& status) {
@@ -290,6 +335,11 @@ std::string did_you_mean(const CLI::App& app, const std::vector<std::string>& ar
   for (const CLI::App* sub : app.get_subcommands([](const CLI::App*) { return true; })) {
     commands.push_back(sub->get_name());
     if (sub->get_name() == arguments.front()) chosen = sub;
+  }
+  if (chosen != nullptr && arguments.size() > 1) {
+    for (const CLI::App* sub : chosen->get_subcommands([](const CLI::App*) { return true; })) {
+      if (sub->get_name() == arguments[1]) chosen = sub;
+    }
   }
   if (chosen == nullptr) {
     const std::string& word = arguments.front();

@@ -27,6 +27,26 @@ std::string processor() {
   return "unknown processor";
 }
 
+// The compiler, and what slows a program down that was not built to be fast.
+std::string build_text() {
+#ifdef __OPTIMIZE__
+  constexpr const char* kOptimised = "optimised";
+#else
+  constexpr const char* kOptimised = "not optimised";
+#endif
+#ifdef NDEBUG
+  constexpr const char* kChecks = "without assertions";
+#else
+  constexpr const char* kChecks = "with assertions";
+#endif
+#ifdef __clang__
+  constexpr const char* kCompiler = "Clang";
+#else
+  constexpr const char* kCompiler = "GCC";
+#endif
+  return fmt::format("{} {}, {}, {}", kCompiler, __VERSION__, kOptimised, kChecks);
+}
+
 struct ObjectRow {
   std::string name, kind, motion{};  // motion: empty if the object stays
   glm::dvec3 position_m{0.0};        // of a moving object, at the end
@@ -224,6 +244,7 @@ nlohmann::ordered_json report_head(const std::string& command) {
   j["command"] = command;
   j["version"] = HYBRID_VERSION;
   j["machine"] = fmt::format("{}, {} threads", processor(), std::thread::hardware_concurrency());
+  j["build"] = build_text();
   return j;
 }
 

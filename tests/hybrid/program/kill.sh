@@ -61,7 +61,7 @@ mode() {
 mode run 2 "$program" run "$scenes/cube.toml" --samples 0 --trace out/t.csv --plot out/p.svg --record out/r.rec \
   --save-surface out/s.stl --json out/j.json
 mode compare 2 "$program" compare "$scenes/cube.toml" --plot out/c.svg --json out/c.json
-mode bench 2 "$program" bench rigid --quick --only far --meshes ico2 --plot out/b.svg --json out/b.json
+mode bench 2 "$program" bench occupancy --quick --only lookup --cells 1000 --plot out/b.svg --json out/b.json
 mode compose 1 "$program" compose --out out/starter --force
 if ((failures > 0)); then exit 1; fi
 echo "every file was whole or not there"

@@ -1,0 +1,341 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/bench/reports/compare_reports.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <set>
+#include <tuple>
+
+#include "hybrid/bench/reports/report_keys.h"
+
+namespace hybrid::bench {
+namespace {
+
+using Row = nlohmann::ordered_json;
+
+// What a user would just notice: a tick that takes a period of 1 kHz longer; a second of waiting.
+constexpr double kTickPeriod_us = 1e3, kWait_us = 1e6;
+
+struct MatchedRows {
+  std::vector<const Row*> olds, news;
+};
+// By the identity, in the order of the reports. Pointers go into the reports.
+struct MatchedSuite {
+  std::vector<Row> order;
+  std::map<std::string, MatchedRows> rows;  // by the identity as text
+  std::set<std::string> old_keys, new_keys;
+};
+
+bool identifies(const ReportKey& key) {
+  return key.kind == KeyKind::identity || key.kind == KeyKind::detail;
+}
+
+Row identity_of(const std::string& suite, const Row& row) {
+  Row identity = Row::object();
+  for (const ReportKey& key : keys_of(suite)) {
+    if (identifies(key) && row.contains(key.name)) identity[std::string(key.name)] = row[key.name];
+  }
+  return identity;
+}
+
+void match_side(std::span<const BenchReport> reports, bool old, std::map<std::string, MatchedSuite>& suites) {
+  for (const BenchReport& report : reports) {
+    for (const auto& [name, rows] : report.suites.items()) {
+      MatchedSuite& suite = suites[name];
+      for (const Row& row : rows) {
+        const Row identity = identity_of(name, row);
+        const auto [found, first] = suite.rows.try_emplace(identity.dump());
+        if (first) suite.order.push_back(identity);
+        (old ? found->second.olds : found->second.news).push_back(&row);
+        for (const auto& [key, value] : row.items()) (old ? suite.old_keys : suite.new_keys).insert(key);
+      }
+    }
+  }
+}
+
+// The names of the keys that differ between the rows of a suite.
+std::vector<std::string_view> telling_keys(const std::string& suite, const std::vector<Row>& identities) {
+  std::vector<std::string_view> telling;
+  for (const bool details : {false, true}) {
+    std::set<std::string> labels;
+    telling.clear();
+    for (const ReportKey& key : keys_of(suite)) {
+      if (!identifies(key) || (key.kind == KeyKind::detail && !details)) continue;
+      std::set<std::string> values;
+      for (const Row& identity : identities) values.insert(value_at(identity, key.name).dump());
+      if (values.size() > 1) telling.push_back(key.name);
+    }
+    for (const Row& identity : identities) {
+      std::string label;
+      for (const std::string_view key : telling) label += value_at(identity, key).dump() + ' ';
+      labels.insert(label);
+    }
+    if (labels.size() == identities.size()) break;
+  }
+  return telling;
+}
+
+std::string label_of(const std::string& suite, const Row& identity,
+                     const std::vector<std::string_view>& telling) {
+  std::string label = suite;
+  for (const std::string_view key : telling) {
+    const Row value = value_at(identity, key);
+    if (value.is_null()) continue;
+    if (value.is_string()) {
+      label += ' ' + value.get<std::string>();
+    } else {
+      label += fmt::format(" {}={}", key, value.dump());
+    }
+  }
+  return label;
+}
+
+// The figures of a time are for a tick, or for a wait.
+double noticed_us(const ComparedFigure& figure) {
+  const auto is = [&figure](const char* key, const char* value) {
+    return value_at(figure.identity, key) == value;
+  };
+  const bool wait = is("case", "load") || is("case", "relax") || is("op", "rebuild");
+  return wait || figure.key.ends_with("_ms") ? kWait_us : kTickPeriod_us;
+}
+double in_us(const std::string& key) {
+  if (key.ends_with("_ms")) return 1e3;
+  if (key.ends_with("_ns")) return 1e-3;
+  const bool us = key.ends_with("_us") || key.starts_with("tick_us.") || key.starts_with("pose_us.");
+  return us ? 1.0 : 0.0;  // 0: no time
+}
+
+double number_of(const Row& value) {
+  return value.is_null() ? std::numeric_limits<double>::infinity() : value.get<double>();
+}
+std::vector<double> numbers_of(const std::vector<Row>& values) {
+  std::vector<double> numbers;
+  numbers.reserve(values.size());
+  for (const Row& value : values) numbers.push_back(number_of(value));
+  return numbers;
+}
+
+bool all_equal(const std::vector<Row>& values) {
+  return std::all_of(values.begin(), values.end(), [&](const Row& value) { return value == values.front(); });
+}
+bool all_null(const std::vector<Row>& values) {
+  return values.front().is_null() && all_equal(values);
+}
+bool all_numbers(const std::vector<Row>& values) {
+  return std::all_of(values.begin(), values.end(),
+                     [](const Row& value) { return value.is_number() || value.is_null(); });
+}
+
+std::vector<Row> values_of(const std::vector<const Row*>& rows, std::string_view key) {
+  std::vector<Row> values;
+  values.reserve(rows.size());
+  for (const Row* row : rows) values.push_back(value_at(*row, key));
+  return values;
+}
+
+bool same_basis(const MatchedRows& rows, std::string_view basis) {
+  if (basis.empty()) return true;
+  std::vector<Row> values = values_of(rows.olds, basis);
+  const std::vector<Row> news = values_of(rows.news, basis);
+  values.insert(values.end(), news.begin(), news.end());
+  return all_equal(values);
+}
+
+// Exact figures are ranked where they are no such: they differ between the old runs, or a single old run does
+// not show that they would not.
+bool is_ranked(const ReportKey& key, const MatchedRows& rows, const ComparedFigure& figure) {
+  if (key.kind == KeyKind::measured) return true;
+  if (!all_numbers(figure.old_values) || !all_numbers(figure.new_values)) return false;
+  if (!key.measured_case.empty() && value_at(figure.identity, "case") == key.measured_case) return true;
+  if (!same_basis(rows, key.basis)) return true;
+  const bool olds_equal = all_equal(figure.old_values), news_equal = all_equal(figure.new_values);
+  return !olds_equal || (!news_equal && figure.old_values.size() < 2);
+}
+
+void judge_exact(ComparedFigure& figure) {
+  std::vector<std::string> olds, news;
+  for (const Row& value : figure.old_values) olds.push_back(value.dump());
+  for (const Row& value : figure.new_values) news.push_back(value.dump());
+  const bool equal = all_equal(figure.old_values) && all_equal(figure.new_values) &&
+                     figure.old_values.front() == figure.new_values.front();
+  const auto met = [&olds](const std::string& value) {
+    return std::find(olds.begin(), olds.end(), value) != olds.end();
+  };
+  const bool was_met = std::all_of(news.begin(), news.end(), met);
+  figure.verdict = equal || was_met ? Verdict::same : Verdict::changed;
+  const Row &before = figure.old_values.front(), &after = figure.new_values.front();
+  if (before.is_number() && after.is_number() && before.get<double>() != 0.0)
+    figure.ratio = after.get<double>() / before.get<double>();
+}
+
+void judge_ranked(ComparedFigure& figure) {
+  const std::vector<double> olds = numbers_of(figure.old_values), news = numbers_of(figure.new_values);
+  figure.old_spread = quartiles_of(olds);
+  figure.new_spread = quartiles_of(news);
+  const double before = figure.old_spread->median, after = figure.new_spread->median;
+  if (before != 0.0 && std::isfinite(before) && std::isfinite(after)) figure.ratio = after / before;
+  if (const double us = in_us(figure.key); us > 0.0)
+    figure.noticed = before == after ? 0.0 : std::fabs(after - before) * us / noticed_us(figure);
+  std::vector<double> all = olds;
+  all.insert(all.end(), news.begin(), news.end());
+  if (std::all_of(all.begin(), all.end(), [&all](double value) { return value == all.front(); })) return;
+  figure.test = rank_test(olds, news);
+  figure.verdict = least_p(olds.size(), news.size()) > kFalseChanges ? Verdict::unknown : Verdict::noise;
+}
+
+// Figures that are all equal say nothing, whichever runs are old, so they are no part of the family.
+void judge_family(ReportComparison& comparison) {
+  std::vector<double> p;
+  double least = 1.0;
+  for (const ComparedFigure& figure : comparison.figures) {
+    if (!figure.ranked || figure.verdict == Verdict::same) continue;
+    p.push_back(figure.test.p);
+    const std::size_t runs = std::min(figure.old_values.size(), figure.new_values.size());
+    comparison.least_runs = comparison.least_runs == 0 ? runs : std::min(comparison.least_runs, runs);
+    least = std::min(least, least_p(figure.old_values.size(), figure.new_values.size()));
+  }
+  comparison.ranked = p.size();
+  if (p.empty()) return;
+  const double family = static_cast<double>(p.size());
+  if (least <= kFalseChanges)
+    comparison.at_once = static_cast<std::size_t>(std::ceil(least * family / kFalseChanges));
+  comparison.runs_for_one = size_for(kFalseChanges / family);
+  const std::vector<double> rates = benjamini_hochberg(p);
+  std::size_t next = 0;
+  for (ComparedFigure& figure : comparison.figures) {
+    if (!figure.ranked || figure.verdict == Verdict::same) continue;
+    figure.false_discovery_rate = rates[next++];
+    if (figure.verdict == Verdict::noise && figure.false_discovery_rate <= kFalseChanges)
+      figure.verdict = Verdict::changed;
+  }
+}
+
+// Changed ones first: exact ones before times, the product before baselines, then by what is noticed.
+void sort_figures(std::vector<ComparedFigure>& figures) {
+  const auto place = [](const ComparedFigure& figure) {
+    const double change = figure.ratio > 0.0 ? std::fabs(std::log(figure.ratio)) : 0.0;
+    return std::tuple(figure.verdict != Verdict::changed, figure.verdict == Verdict::same, figure.ranked,
+                      !figure.product, figure.ranked ? 0 : figure.rank, -figure.noticed, -change);
+  };
+  std::stable_sort(
+      figures.begin(), figures.end(),
+      [&place](const ComparedFigure& a, const ComparedFigure& b) { return place(a) < place(b); });
+}
+
+std::string quoted_list(const std::set<std::string>& texts) {
+  std::string list;
+  for (const std::string& text : texts)
+    list += (list.empty() ? "" : "; ") + (text.empty() ? "unknown" : text);
+  return list;
+}
+
+void say_differences(std::span<const BenchReport> olds, std::span<const BenchReport> news,
+                     std::vector<std::string>& caveats) {
+  const auto say = [&](std::string BenchReport::*field, const char* what, const char* so) {
+    std::set<std::string> before, after;
+    for (const BenchReport& report : olds) before.insert(report.*field);
+    for (const BenchReport& report : news) after.insert(report.*field);
+    if (before.size() > 1)
+      caveats.push_back(fmt::format("old reports of several {}: {}", what, quoted_list(before)));
+    if (after.size() > 1)
+      caveats.push_back(fmt::format("new reports of several {}: {}", what, quoted_list(after)));
+    if (before != after)
+      caveats.push_back(
+          fmt::format("different {}{}: old {}; new {}", what, so, quoted_list(before), quoted_list(after)));
+  };
+  say(&BenchReport::machine, "machines", ", so times say nothing of the program");
+  say(&BenchReport::build, "builds", "");
+  say(&BenchReport::version, "versions", "");
+  std::set<bool> quick;
+  for (const auto& side : {olds, news}) {
+    for (const BenchReport& report : side) {
+      quick.insert(report.quick);
+      if (report.stopped) caveats.push_back(report.file + " was stopped early: rows are missing");
+    }
+  }
+  if (quick.size() > 1)
+    caveats.emplace_back("some reports are of --quick, which measures other rows, and less");
+}
+
+void say_keys(const std::string& name, const MatchedSuite& suite, std::vector<std::string>& caveats) {
+  const auto known = [&name](const std::string& key) {
+    const auto keys = keys_of(name);
+    return std::any_of(keys.begin(), keys.end(),
+                       [&key](const ReportKey& k) { return k.name.substr(0, k.name.find('.')) == key; });
+  };
+  std::set<std::string> unknown;
+  for (const auto* keys : {&suite.old_keys, &suite.new_keys}) {
+    for (const std::string& key : *keys) {
+      if (!known(key)) unknown.insert(key);
+    }
+  }
+  if (!unknown.empty())
+    caveats.push_back(
+        fmt::format("keys of {} that are unknown here, and not compared: {}", name, quoted_list(unknown)));
+}
+
+void compare_suite(const std::string& name, const MatchedSuite& suite, ReportComparison& comparison) {
+  const std::vector<std::string_view> telling = telling_keys(name, suite.order);
+  bool sampled = false;
+  for (const Row& identity : suite.order) {
+    const MatchedRows& rows = suite.rows.at(identity.dump());
+    const std::string label = label_of(name, identity, telling);
+    if (rows.news.empty()) comparison.only_old.push_back(label);
+    if (rows.olds.empty()) comparison.only_new.push_back(label);
+    if (rows.news.empty() || rows.olds.empty()) continue;
+    sampled = sampled || !same_basis(rows, "error_ticks");
+    const Row engine = value_at(identity, "engine");
+    std::size_t rank = 0;
+    for (const ReportKey& key : keys_of(name)) {
+      ++rank;
+      const std::string whole(key.name.substr(0, key.name.find('.')));
+      const bool figure_key = key.kind == KeyKind::exact || key.kind == KeyKind::measured;
+      if (!figure_key || !suite.old_keys.contains(whole) || !suite.new_keys.contains(whole)) continue;
+      ComparedFigure figure;
+      figure.suite = name;
+      figure.row = label;
+      figure.identity = identity;
+      figure.key = std::string(key.name);
+      figure.product = engine.is_null() || engine == "hybrid" || engine == "map";
+      figure.rank = rank;
+      figure.old_values = values_of(rows.olds, key.name);
+      figure.new_values = values_of(rows.news, key.name);
+      if (all_null(figure.old_values) && all_null(figure.new_values)) continue;
+      figure.ranked = is_ranked(key, rows, figure);
+      if (figure.ranked) {
+        judge_ranked(figure);
+      } else {
+        judge_exact(figure);
+      }
+      comparison.figures.push_back(std::move(figure));
+    }
+  }
+  if (sampled)
+    comparison.caveats.emplace_back(
+        "errors against the mesh are of other ticks in each run, as many as time allowed, and are compared "
+        "as "
+        "times are; with `bench rigid --every-tick` they are exact");
+}
+
+}  // namespace
+
+ReportComparison compare_reports(std::span<const BenchReport> olds, std::span<const BenchReport> news) {
+  std::map<std::string, MatchedSuite> suites;
+  match_side(olds, true, suites);
+  match_side(news, false, suites);
+  ReportComparison comparison;
+  say_differences(olds, news, comparison.caveats);
+  for (const auto& [name, suite] : suites) {
+    say_keys(name, suite, comparison.caveats);
+    compare_suite(name, suite, comparison);
+  }
+  judge_family(comparison);
+  sort_figures(comparison.figures);
+  return comparison;
+}
+
+}  // namespace hybrid::bench

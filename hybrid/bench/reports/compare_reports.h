@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What changed between two sets of reports of `hybrid bench`, and whether that is more than noise. Rows are
+// matched by the keys that identify them (report_keys.h); several with the same ones are repeats.
+#pragma once
+
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "hybrid/bench/reports/rank_test.h"
+#include "hybrid/bench/reports/read_reports.h"
+
+namespace hybrid::bench {
+
+// The share of comparisons of a build with itself in which any figure may be called changed.
+inline constexpr double kFalseChanges = 0.05;
+
+enum class Verdict : std::uint8_t {
+  same,     // every run has the same value
+  changed,  //
+  noise,    // the test does not tell the two apart
+  unknown,  // too few repeats for the test to tell anything apart
+};
+
+struct ComparedFigure {
+  std::string suite, row;           // `row`: the keys that tell it from the others of its suite, in words
+  nlohmann::ordered_json identity;  // all keys that identify the row
+  std::string key;
+  bool product = true;   // not of a baseline
+  bool ranked = false;   // by the rank test; else by equality
+  std::size_t rank = 0;  // of its key among those of the suite
+  double noticed = 0.0;  // change over what a user would notice: a tick's period, or a second of waiting
+  // The values of all runs. For a ranked figure null is infinity: what was never reached.
+  std::vector<nlohmann::ordered_json> old_values, new_values;
+  std::optional<Quartiles> old_spread, new_spread;  // of ranked ones
+  double ratio = 0.0;                               // new median over old; 0: there is none
+  RankTest test;
+  double false_discovery_rate = 1.0;  // the least at which it counts as changed
+  Verdict verdict = Verdict::same;
+};
+
+struct ReportComparison {
+  std::vector<std::string> caveats;
+  std::vector<ComparedFigure> figures;          // by what a user would notice, changed ones first
+  std::vector<std::string> only_old, only_new;  // rows
+  std::size_t ranked = 0;                       // figures that were tested
+  std::size_t least_runs = 0;    // of a tested figure, on the side with fewer; 0: none is tested
+  std::size_t at_once = 0;       // so many tested figures have to change for the test to name them; 0: never
+  std::size_t runs_for_one = 0;  // on each side, to name a single one
+};
+
+// Neither side may be empty.
+ReportComparison compare_reports(std::span<const BenchReport> olds, std::span<const BenchReport> news);
+
+// ---- compare_reports_table.cpp ----
+nlohmann::ordered_json to_json(const ReportComparison& comparison);
+// "3 of 120 figures changed: …; the rest cannot be told from noise."
+std::string comparison_summary(const ReportComparison& comparison);
+// Caveats, summary and table. Unless `all`, only the first of many rows are listed.
+std::string in_words(const ReportComparison& comparison, bool all);
+
+}  // namespace hybrid::bench
