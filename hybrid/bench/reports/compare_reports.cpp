@@ -184,34 +184,82 @@ void judge_ranked(ComparedFigure& figure) {
   all.insert(all.end(), news.begin(), news.end());
   if (std::all_of(all.begin(), all.end(), [&all](double value) { return value == all.front(); })) return;
   figure.test = rank_test(olds, news);
-  figure.verdict = least_p(olds.size(), news.size()) > kFalseChanges ? Verdict::unknown : Verdict::noise;
+  const bool enough = least_p(olds.size(), news.size()) <= rate_of(figure.family);
+  figure.verdict = enough ? Verdict::noise : Verdict::unknown;
 }
 
 // Figures that are all equal say nothing, whichever runs are old, so they are no part of the family.
-void judge_family(ReportComparison& comparison) {
+void judge_family(Family family, ReportComparison& comparison) {
+  std::vector<ComparedFigure*> members;
   std::vector<double> p;
   double least = 1.0;
-  for (const ComparedFigure& figure : comparison.figures) {
-    if (!figure.ranked || figure.verdict == Verdict::same) continue;
+  for (ComparedFigure& figure : comparison.figures) {
+    if (!figure.ranked || figure.family != family || figure.verdict == Verdict::same) continue;
+    members.push_back(&figure);
     p.push_back(figure.test.p);
-    const std::size_t runs = std::min(figure.old_values.size(), figure.new_values.size());
-    comparison.least_runs = comparison.least_runs == 0 ? runs : std::min(comparison.least_runs, runs);
     least = std::min(least, least_p(figure.old_values.size(), figure.new_values.size()));
   }
-  comparison.ranked = p.size();
   if (p.empty()) return;
-  const double family = static_cast<double>(p.size());
-  if (least <= kFalseChanges)
-    comparison.at_once = static_cast<std::size_t>(std::ceil(least * family / kFalseChanges));
-  comparison.runs_for_one = size_for(kFalseChanges / family);
+  const double rate = rate_of(family), count = static_cast<double>(p.size());
+  ReportComparison::Tested& tested = comparison.tested[static_cast<std::size_t>(family)];
+  tested.figures = p.size();
+  tested.at_once = least <= rate ? static_cast<std::size_t>(std::ceil(least * count / rate)) : 0;
+  tested.runs_for_one = size_for(rate / count);
   const std::vector<double> rates = benjamini_hochberg(p);
-  std::size_t next = 0;
-  for (ComparedFigure& figure : comparison.figures) {
-    if (!figure.ranked || figure.verdict == Verdict::same) continue;
-    figure.false_discovery_rate = rates[next++];
-    if (figure.verdict == Verdict::noise && figure.false_discovery_rate <= kFalseChanges)
-      figure.verdict = Verdict::changed;
+  for (std::size_t i = 0; i < p.size(); ++i) {
+    members[i]->false_discovery_rate = rates[i];
+    if (members[i]->verdict == Verdict::noise && rates[i] <= rate) members[i]->verdict = Verdict::changed;
   }
+}
+
+bool is_felt(const ComparedFigure& figure) {
+  const std::string& key = figure.key;
+  const bool tick = key == "tick_us.p50" || key == "tick_us.p99";
+  const bool row = (key.starts_with("p50_") || key.starts_with("p99_")) && !key.ends_with("_ratio");
+  return figure.product && (tick || row);
+}
+
+bool all_positive(const std::vector<Row>& values) {
+  return std::all_of(values.begin(), values.end(),
+                     [](const Row& value) { return value.is_number() && value.get<double>() > 0.0; });
+}
+
+// Run by run the geometric mean of a felt figure over the rows that have it in every run.
+void add_overall(const std::string& suite, std::string_view key, ReportComparison& comparison) {
+  std::vector<const ComparedFigure*> rows;
+  std::size_t olds = 0, news = 0;
+  for (const ComparedFigure& figure : comparison.figures) {
+    if (figure.suite != suite || figure.key != key || figure.family != Family::felt ||
+        !all_positive(figure.old_values) || !all_positive(figure.new_values))
+      continue;
+    olds = std::max(olds, figure.old_values.size());
+    news = std::max(news, figure.new_values.size());
+    rows.push_back(&figure);
+  }
+  std::erase_if(rows, [olds, news](const ComparedFigure* figure) {
+    return figure->old_values.size() != olds || figure->new_values.size() != news;
+  });
+  if (rows.size() < 2) return;
+  const auto means = [&rows](std::vector<Row> ComparedFigure::*side, std::size_t runs) {
+    std::vector<Row> values;
+    for (std::size_t run = 0; run < runs; ++run) {
+      double sum = 0.0;
+      for (const ComparedFigure* figure : rows) sum += std::log((figure->*side)[run].get<double>());
+      values.emplace_back(std::exp(sum / static_cast<double>(rows.size())));
+    }
+    return values;
+  };
+  ComparedFigure overall;
+  overall.suite = suite;
+  overall.row = fmt::format("{}: mean of {} rows", suite, rows.size());
+  overall.identity = Row::object();
+  overall.key = std::string(key);
+  overall.ranked = true;
+  overall.family = Family::overall;
+  overall.old_values = means(&ComparedFigure::old_values, olds);
+  overall.new_values = means(&ComparedFigure::new_values, news);
+  judge_ranked(overall);
+  comparison.figures.push_back(std::move(overall));
 }
 
 // Changed ones first: exact ones before times, the product before baselines, then by what is noticed.
@@ -219,7 +267,8 @@ void sort_figures(std::vector<ComparedFigure>& figures) {
   const auto place = [](const ComparedFigure& figure) {
     const double change = figure.ratio > 0.0 ? std::fabs(std::log(figure.ratio)) : 0.0;
     return std::tuple(figure.verdict != Verdict::changed, figure.verdict == Verdict::same, figure.ranked,
-                      !figure.product, figure.ranked ? 0 : figure.rank, -figure.noticed, -change);
+                      figure.family != Family::overall, !figure.product, figure.ranked ? 0 : figure.rank,
+                      -figure.noticed, -change);
   };
   std::stable_sort(
       figures.begin(), figures.end(),
@@ -307,12 +356,16 @@ void compare_suite(const std::string& name, const MatchedSuite& suite, ReportCom
       if (all_null(figure.old_values) && all_null(figure.new_values)) continue;
       figure.ranked = is_ranked(key, rows, figure);
       if (figure.ranked) {
+        figure.family = is_felt(figure) ? Family::felt : Family::other;
         judge_ranked(figure);
       } else {
         judge_exact(figure);
       }
       comparison.figures.push_back(std::move(figure));
     }
+  }
+  for (const ReportKey& key : keys_of(name)) {
+    if (key.kind == KeyKind::measured) add_overall(name, key.name, comparison);
   }
   if (sampled)
     comparison.caveats.emplace_back(
@@ -333,7 +386,7 @@ ReportComparison compare_reports(std::span<const BenchReport> olds, std::span<co
     say_keys(name, suite, comparison.caveats);
     compare_suite(name, suite, comparison);
   }
-  judge_family(comparison);
+  for (const Family family : kFamilies) judge_family(family, comparison);
   sort_figures(comparison.figures);
   return comparison;
 }

@@ -3,6 +3,7 @@
 // matched by the keys that identify them (report_keys.h); several with the same ones are repeats.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -16,8 +17,18 @@
 
 namespace hybrid::bench {
 
-// The share of comparisons of a build with itself in which any figure may be called changed.
-inline constexpr double kFalseChanges = 0.05;
+// Measured figures are tested in three families, so that the few that users feel do not need as many runs as
+// all of them. `rate` is the share of comparisons of a build with itself in which a figure of the family may
+// be called changed; together they are 5 of 100.
+enum class Family : std::uint8_t {
+  overall,  // of a suite: the geometric mean of a figure over the rows of the product
+  felt,     // of a row of the product: median and p99
+  other,
+};
+inline constexpr std::array kFamilies{Family::overall, Family::felt, Family::other};
+constexpr double rate_of(Family family) {
+  return family == Family::other ? 0.01 : 0.02;
+}
 
 enum class Verdict : std::uint8_t {
   same,     // every run has the same value
@@ -30,9 +41,10 @@ struct ComparedFigure {
   std::string suite, row;           // `row`: the keys that tell it from the others of its suite, in words
   nlohmann::ordered_json identity;  // all keys that identify the row
   std::string key;
-  bool product = true;   // not of a baseline
-  bool ranked = false;   // by the rank test; else by equality
-  std::size_t rank = 0;  // of its key among those of the suite
+  bool product = true;            // not of a baseline
+  Family family = Family::other;  // of a ranked one
+  bool ranked = false;            // by the rank test; else by equality
+  std::size_t rank = 0;           // of its key among those of the suite
   double noticed = 0.0;  // change over what a user would notice: a tick's period, or a second of waiting
   // The values of all runs. For a ranked figure null is infinity: what was never reached.
   std::vector<nlohmann::ordered_json> old_values, new_values;
@@ -47,10 +59,12 @@ struct ReportComparison {
   std::vector<std::string> caveats;
   std::vector<ComparedFigure> figures;          // by what a user would notice, changed ones first
   std::vector<std::string> only_old, only_new;  // rows
-  std::size_t ranked = 0;                       // figures that were tested
-  std::size_t least_runs = 0;    // of a tested figure, on the side with fewer; 0: none is tested
-  std::size_t at_once = 0;       // so many tested figures have to change for the test to name them; 0: never
-  std::size_t runs_for_one = 0;  // on each side, to name a single one
+  struct Tested {
+    std::size_t figures = 0;
+    std::size_t at_once = 0;       // so many have to change for the test to name them; 0: never
+    std::size_t runs_for_one = 0;  // on each side, to name a single one
+  };
+  std::array<Tested, kFamilies.size()> tested;  // by family
 };
 
 // Neither side may be empty.

@@ -117,22 +117,39 @@ Tally tally_of(const ReportComparison& comparison) {
   return tally;
 }
 
+std::size_t tested_in(const ReportComparison& comparison) {
+  std::size_t tested = 0;
+  for (const auto& family : comparison.tested) tested += family.figures;
+  return tested;
+}
+
+const char* family_name(Family family) {
+  switch (family) {
+    case Family::overall:
+      return "overall";
+    case Family::felt:
+      return "felt";
+    case Family::other:
+      return "other";
+  }
+  return "";
+}
+
 // How many runs would say more.
 std::string runs_text(const ReportComparison& comparison) {
-  if (comparison.ranked == 0) return {};
-  const std::size_t fewest = size_for(kFalseChanges);
-  const std::string one = fmt::format("{} on each side name a single one of {} figures",
-                                      comparison.runs_for_one, comparison.ranked);
-  if (comparison.at_once == 0)
-    return fmt::format(
-        "~: too few runs to tell a change from noise; {} on each side name a change of all at once, {}; run "
-        "the two builds in turns\n",
-        fewest, one);
-  if (comparison.at_once > 1)
-    return fmt::format(
-        "with so few runs a measured figure is called changed only if {} or more change at once; {}\n",
-        comparison.at_once, one);
-  return {};
+  static constexpr std::array kNames{"mean over rows", "median or p99 of a row", "other measured figure"};
+  std::string text;
+  for (const Family family : kFamilies) {
+    const auto place = static_cast<std::size_t>(family);
+    const auto& tested = comparison.tested[place];
+    if (tested.figures == 0 || tested.at_once == 1) continue;
+    const std::string now = tested.at_once == 0 || tested.at_once > tested.figures
+                                ? std::string("these name none")
+                                : fmt::format("these name {} or more that change at once", tested.at_once);
+    text += fmt::format("to name one changed {} of {} takes {} runs on each side, in turns; {}\n",
+                        kNames[place], tested.figures, tested.runs_for_one, now);
+  }
+  return text;
 }
 
 }  // namespace
@@ -144,11 +161,11 @@ std::string comparison_summary(const ReportComparison& comparison) {
   if (tally.changed() > 0)
     text += fmt::format(": {} of {} errors and counts, and of {} measured ones {} went up, {} down",
                         tally.changed_exact, tally.exact, tally.ranked, tally.longer, tally.shorter);
-  if (comparison.ranked == 0)
+  if (tested_in(comparison) == 0)
     return text + (tally.changed() > 0 ? "; the rest is exactly the same" : ": all are exactly the same");
-  if (tally.unknown == comparison.ranked)
+  if (tally.unknown == tested_in(comparison))
     return text + fmt::format("; {} measured ones differ, but so few runs say nothing of them (~)",
-                              comparison.ranked);
+                              tested_in(comparison));
   return text + "; the rest cannot be told from noise" +
          (tally.exact > tally.changed_exact ? ", or is exactly the same" : "");
 }
@@ -178,13 +195,17 @@ nlohmann::ordered_json to_json(const ReportComparison& comparison) {
   nlohmann::ordered_json json;
   json["caveats"] = comparison.caveats;
   json["summary"] = comparison_summary(comparison);
-  json["alpha"] = kFalseChanges;
   json["compared"] = comparison.figures.size();
   json["changed"] = tally.changed();
-  json["tested"] = comparison.ranked;
-  json["changes_at_once"] =
-      comparison.at_once > 0 ? nlohmann::ordered_json(comparison.at_once) : nlohmann::ordered_json(nullptr);
-  json["runs_for_one"] = comparison.runs_for_one;
+  for (const Family family : kFamilies) {
+    const auto& tested = comparison.tested[static_cast<std::size_t>(family)];
+    json["tested"][family_name(family)] = {
+        {"rate", rate_of(family)},
+        {"figures", tested.figures},
+        {"changes_at_once",
+         tested.at_once > 0 ? nlohmann::ordered_json(tested.at_once) : nlohmann::ordered_json(nullptr)},
+        {"runs_for_one", tested.runs_for_one}};
+  }
   nlohmann::ordered_json& figures = json["figures"] = nlohmann::ordered_json::array();
   for (const ComparedFigure& f : comparison.figures) {
     nlohmann::ordered_json row{
@@ -193,6 +214,7 @@ nlohmann::ordered_json to_json(const ReportComparison& comparison) {
     row["new_values"] = f.new_values;
     row["ratio"] = f.ratio > 0.0 ? nlohmann::ordered_json(f.ratio) : nlohmann::ordered_json(nullptr);
     if (f.ranked) {
+      row["family"] = family_name(f.family);
       row["old"] = spread_json(f.old_spread);
       row["new"] = spread_json(f.new_spread);
       const bool tested = f.verdict == Verdict::noise || f.verdict == Verdict::changed;
