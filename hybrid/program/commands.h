@@ -94,7 +94,7 @@ struct BenchOption {
 };
 const std::vector<BenchOption>& bench_options();
 
-// `hybrid bench compare`: what changed between reports of `hybrid bench`. Neither side may be empty.
+// `hybrid bench compare`: changes between reports of `hybrid bench`. Neither side may be empty.
 struct BenchCompareCommand {
   std::vector<std::filesystem::path> olds, news;
   bool all = false;  // list every figure

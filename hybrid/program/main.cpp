@@ -213,18 +213,26 @@ void refuse_unused(const CLI::App& bench, const std::string& suite) {
 CLI::App* add_bench_compare(CLI::App& bench, int& status) {
   auto* sub =
       bench.add_subcommand("compare",
-                           "What changed between reports of this command, and whether that is noise:\n"
+                           "Changes between reports of this command, told from noise:\n"
                            "  hybrid bench compare old1.json old2.json ... --to new1.json new2.json ...");
   auto c = std::make_shared<hybrid::BenchCompareCommand>();
   sub->add_option("OLD", c->olds, "reports of the old build; OLD and NEW if there is no --to")->required();
   sub->add_option("--to", c->news, "reports of the new build, measured in turns with the old ones");
   sub->add_flag("--all", c->all, "list every figure, not only the first");
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
-  sub->callback([c, &status] {
+  sub->callback([c, &bench, &status] {
+    for (const CLI::Option* option : bench.get_options()) {
+      if (option->count() > 0)
+        throw CLI::ValidationError(
+            option->get_name() +
+            " before compare has no effect; leave it out (options of compare follow it)");
+    }
     if (c->news.empty()) {
       if (c->olds.size() != 2)
         throw CLI::ValidationError(
-            "bench compare takes OLD.json NEW.json, or OLD.json ... --to NEW.json ... for repeats");
+            "bench compare: " + std::to_string(c->olds.size()) +
+            (c->olds.size() == 1 ? " report" : " reports") +
+            " and no --to; give OLD.json NEW.json, or repeats of both as OLD.json ... --to NEW.json ...");
       c->news = {c->olds.back()};
       c->olds.pop_back();
     }
@@ -337,9 +345,14 @@ std::string did_you_mean(const CLI::App& app, const std::vector<std::string>& ar
     if (sub->get_name() == arguments.front()) chosen = sub;
   }
   if (chosen != nullptr && arguments.size() > 1) {
+    std::vector<std::string> parts;
     for (const CLI::App* sub : chosen->get_subcommands([](const CLI::App*) { return true; })) {
+      parts.push_back(sub->get_name());
       if (sub->get_name() == arguments[1]) chosen = sub;
     }
+    const std::string part = parts.empty() ? std::string() : nearest(arguments[1], parts);
+    if (!part.empty() && part != arguments[1])
+      return "did you mean `" + arguments.front() + " " + part + "`?\n";
   }
   if (chosen == nullptr) {
     const std::string& word = arguments.front();

@@ -27,7 +27,7 @@ std::string processor() {
   return "unknown processor";
 }
 
-// The compiler, and what slows a program down that was not built to be fast.
+// The compiler, and the settings of a build that can slow it down.
 std::string build_text() {
 #ifdef __OPTIMIZE__
   constexpr const char* kOptimised = "optimised";

@@ -17,7 +17,7 @@ namespace {
 
 using Row = nlohmann::ordered_json;
 
-// What a user would just notice: a tick that takes a period of 1 kHz longer; a second of waiting.
+// A user just notices a tick that takes a period of 1 kHz longer, or a second of waiting.
 constexpr double kTickPeriod_us = 1e3, kWait_us = 1e6;
 
 struct MatchedRows {
@@ -145,8 +145,8 @@ bool same_basis(const MatchedRows& rows, std::string_view basis) {
   return all_equal(values);
 }
 
-// Exact figures are ranked where they are no such: they differ between the old runs, or a single old run does
-// not show that they would not.
+// Exact figures are ranked if the reports do not show that they are exact: they differ between the old runs,
+// or between the new runs when there is a single old one.
 bool is_ranked(const ReportKey& key, const MatchedRows& rows, const ComparedFigure& figure) {
   if (key.kind == KeyKind::measured) return true;
   if (!all_numbers(figure.old_values) || !all_numbers(figure.new_values)) return false;
@@ -157,17 +157,12 @@ bool is_ranked(const ReportKey& key, const MatchedRows& rows, const ComparedFigu
 }
 
 void judge_exact(ComparedFigure& figure) {
-  std::vector<std::string> olds, news;
-  for (const Row& value : figure.old_values) olds.push_back(value.dump());
-  for (const Row& value : figure.new_values) news.push_back(value.dump());
-  const bool equal = all_equal(figure.old_values) && all_equal(figure.new_values) &&
-                     figure.old_values.front() == figure.new_values.front();
-  const auto met = [&olds](const std::string& value) {
+  const std::vector<Row>&olds = figure.old_values, &news = figure.new_values;
+  const bool known = std::all_of(news.begin(), news.end(), [&olds](const Row& value) {
     return std::find(olds.begin(), olds.end(), value) != olds.end();
-  };
-  const bool was_met = std::all_of(news.begin(), news.end(), met);
-  figure.verdict = equal || was_met ? Verdict::same : Verdict::changed;
-  const Row &before = figure.old_values.front(), &after = figure.new_values.front();
+  });
+  figure.verdict = known ? Verdict::same : Verdict::changed;
+  const Row &before = olds.front(), &after = news.front();
   if (before.is_number() && after.is_number() && before.get<double>() != 0.0)
     figure.ratio = after.get<double>() / before.get<double>();
 }
@@ -262,7 +257,7 @@ void add_overall(const std::string& suite, std::string_view key, ReportCompariso
   comparison.figures.push_back(std::move(overall));
 }
 
-// Changed ones first: exact ones before times, the product before baselines, then by what is noticed.
+// Changed ones first: exact ones before times, the product before baselines, then the most noticed.
 void sort_figures(std::vector<ComparedFigure>& figures) {
   const auto place = [](const ComparedFigure& figure) {
     const double change = figure.ratio > 0.0 ? std::fabs(std::log(figure.ratio)) : 0.0;
@@ -275,7 +270,7 @@ void sort_figures(std::vector<ComparedFigure>& figures) {
       [&place](const ComparedFigure& a, const ComparedFigure& b) { return place(a) < place(b); });
 }
 
-std::string quoted_list(const std::set<std::string>& texts) {
+std::string joined(const std::set<std::string>& texts) {
   std::string list;
   for (const std::string& text : texts)
     list += (list.empty() ? "" : "; ") + (text.empty() ? "unknown" : text);
@@ -289,14 +284,14 @@ void say_differences(std::span<const BenchReport> olds, std::span<const BenchRep
     for (const BenchReport& report : olds) before.insert(report.*field);
     for (const BenchReport& report : news) after.insert(report.*field);
     if (before.size() > 1)
-      caveats.push_back(fmt::format("old reports of several {}: {}", what, quoted_list(before)));
+      caveats.push_back(fmt::format("old reports of several {}: {}", what, joined(before)));
     if (after.size() > 1)
-      caveats.push_back(fmt::format("new reports of several {}: {}", what, quoted_list(after)));
+      caveats.push_back(fmt::format("new reports of several {}: {}", what, joined(after)));
     if (before != after)
       caveats.push_back(
-          fmt::format("different {}{}: old {}; new {}", what, so, quoted_list(before), quoted_list(after)));
+          fmt::format("different {}{}: old {}; new {}", what, so, joined(before), joined(after)));
   };
-  say(&BenchReport::machine, "machines", ", so times say nothing of the program");
+  say(&BenchReport::machine, "machines", ", so their times cannot be compared");
   say(&BenchReport::build, "builds", "");
   say(&BenchReport::version, "versions", "");
   std::set<bool> quick;
@@ -306,8 +301,16 @@ void say_differences(std::span<const BenchReport> olds, std::span<const BenchRep
       if (report.stopped) caveats.push_back(report.file + " was stopped early: rows are missing");
     }
   }
+  for (const BenchReport& before : olds) {
+    for (const BenchReport& after : news) {
+      if (before.suites == after.suites)
+        caveats.push_back(fmt::format(
+            "{} of the new side is the same report as {} of the old one; measure one of them anew",
+            after.file, before.file));
+    }
+  }
   if (quick.size() > 1)
-    caveats.emplace_back("some reports are of --quick, which measures other rows, and less");
+    caveats.emplace_back("some reports are of --quick, which measures fewer and other rows");
 }
 
 void say_keys(const std::string& name, const MatchedSuite& suite, std::vector<std::string>& caveats) {
@@ -324,7 +327,7 @@ void say_keys(const std::string& name, const MatchedSuite& suite, std::vector<st
   }
   if (!unknown.empty())
     caveats.push_back(
-        fmt::format("keys of {} that are unknown here, and not compared: {}", name, quoted_list(unknown)));
+        fmt::format("keys of {} that are unknown here, and not compared: {}", name, joined(unknown)));
 }
 
 void compare_suite(const std::string& name, const MatchedSuite& suite, ReportComparison& comparison) {
@@ -369,9 +372,8 @@ void compare_suite(const std::string& name, const MatchedSuite& suite, ReportCom
   }
   if (sampled)
     comparison.caveats.emplace_back(
-        "errors against the mesh are of other ticks in each run, as many as time allowed, and are compared "
-        "as "
-        "times are; with `bench rigid --every-tick` they are exact");
+        "errors against the mesh are of other ticks in each run, as many as time allowed, so they are "
+        "compared like times; with `bench rigid --every-tick` they are exact");
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What changed between two sets of reports of `hybrid bench`, and whether that is more than noise. Rows are
+// Changes between two sets of reports of `hybrid bench`, told from noise as far as runs allow. Rows are
 // matched by the keys that identify them (report_keys.h); several with the same ones are repeats.
 #pragma once
 
@@ -31,8 +31,8 @@ constexpr double rate_of(Family family) {
 }
 
 enum class Verdict : std::uint8_t {
-  same,     // every run has the same value
-  changed,  //
+  same,     // every new value is also an old one
+  changed,  // an exact figure is another; or the test tells the two apart
   noise,    // the test does not tell the two apart
   unknown,  // too few repeats for the test to tell anything apart
 };
@@ -45,8 +45,8 @@ struct ComparedFigure {
   Family family = Family::other;  // of a ranked one
   bool ranked = false;            // by the rank test; else by equality
   std::size_t rank = 0;           // of its key among those of the suite
-  double noticed = 0.0;  // change over what a user would notice: a tick's period, or a second of waiting
-  // The values of all runs. For a ranked figure null is infinity: what was never reached.
+  double noticed = 0.0;  // change over the least that a user notices: a tick's period, a second of waiting
+  // The values of all runs. For a ranked figure null is infinity: it was never reached.
   std::vector<nlohmann::ordered_json> old_values, new_values;
   std::optional<Quartiles> old_spread, new_spread;  // of ranked ones
   double ratio = 0.0;                               // new median over old; 0: there is none
@@ -57,11 +57,11 @@ struct ComparedFigure {
 
 struct ReportComparison {
   std::vector<std::string> caveats;
-  std::vector<ComparedFigure> figures;          // by what a user would notice, changed ones first
+  std::vector<ComparedFigure> figures;          // changed ones first, then the most noticed
   std::vector<std::string> only_old, only_new;  // rows
   struct Tested {
     std::size_t figures = 0;
-    std::size_t at_once = 0;       // so many have to change for the test to name them; 0: never
+    std::size_t at_once = 0;       // so many have to change for the test to name any; 0: never
     std::size_t runs_for_one = 0;  // on each side, to name a single one
   };
   std::array<Tested, kFamilies.size()> tested;  // by family
@@ -74,7 +74,7 @@ ReportComparison compare_reports(std::span<const BenchReport> olds, std::span<co
 nlohmann::ordered_json to_json(const ReportComparison& comparison);
 // "3 of 120 figures changed: …; the rest cannot be told from noise."
 std::string comparison_summary(const ReportComparison& comparison);
-// Caveats, summary and table. Unless `all`, only the first of many rows are listed.
+// Caveats, summary and table. Without `all`, only the first of many rows are listed.
 std::string in_words(const ReportComparison& comparison, bool all);
 
 }  // namespace hybrid::bench

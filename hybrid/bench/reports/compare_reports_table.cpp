@@ -59,12 +59,12 @@ std::string compared_line(const ComparedFigure& f, std::size_t width) {
   if (!f.ranked)
     return fmt::format("{:<{}}  {:<18} {} -> {}, exactly\n", f.row, width, f.key, exact_text(f.old_values),
                        exact_text(f.new_values));
-  const auto spread = [](const std::optional<Quartiles>& s) {
-    return s ? fmt::format("[{}, {}]", figure_text(s->q1), figure_text(s->q3)) : std::string();
+  const auto spread = [](const std::optional<Quartiles>& s, std::size_t runs) {
+    return s && runs > 1 ? fmt::format("[{}, {}]", figure_text(s->q1), figure_text(s->q3)) : std::string();
   };
   return fmt::format("{:<{}}  {:<18} {:>9} {:<18} {:>9} {:<18} {:>7} {:>8}\n", f.row, width, f.key,
-                     figure_text(f.old_spread->median), spread(f.old_spread),
-                     figure_text(f.new_spread->median), spread(f.new_spread), ratio,
+                     figure_text(f.old_spread->median), spread(f.old_spread, f.old_values.size()),
+                     figure_text(f.new_spread->median), spread(f.new_spread, f.new_values.size()), ratio,
                      f.verdict == Verdict::unknown ? "~" : fmt::format("{:.2g}", f.test.p));
 }
 
@@ -135,19 +135,20 @@ const char* family_name(Family family) {
   return "";
 }
 
-// How many runs would say more.
+// The number of runs that a change of a single figure takes.
 std::string runs_text(const ReportComparison& comparison) {
-  static constexpr std::array kNames{"mean over rows", "median or p99 of a row", "other measured figure"};
+  static constexpr std::array kNames{"means over rows", "medians and p99 of rows", "other measured figures"};
   std::string text;
   for (const Family family : kFamilies) {
     const auto place = static_cast<std::size_t>(family);
     const auto& tested = comparison.tested[place];
     if (tested.figures == 0 || tested.at_once == 1) continue;
-    const std::string now = tested.at_once == 0 || tested.at_once > tested.figures
-                                ? std::string("these name none")
-                                : fmt::format("these name {} or more that change at once", tested.at_once);
-    text += fmt::format("to name one changed {} of {} takes {} runs on each side, in turns; {}\n",
-                        kNames[place], tested.figures, tested.runs_for_one, now);
+    const std::string now =
+        tested.at_once == 0 || tested.at_once > tested.figures
+            ? std::string("these runs can name none")
+            : fmt::format("these runs can name {} or more that change at once", tested.at_once);
+    text += fmt::format("to name a single change among {} {} takes {} runs on each side, in turns; {}\n",
+                        tested.figures, kNames[place], tested.runs_for_one, now);
   }
   return text;
 }
@@ -183,7 +184,7 @@ std::string in_words(const ReportComparison& comparison, bool all) {
   const std::size_t any = figures.size();
   if (open > 0) text += "\nchanged:\n" + section_text(figures, 0, open, all ? any : kMostChanged);
   if (same > open)
-    text += "\nnot told from noise, what would be noticed most first:\n" +
+    text += "\nnot told from noise, the most noticeable first:\n" +
             section_text(figures, open, same, all ? any : kMostUnchanged);
   text += only_text("old", comparison.only_old, all ? comparison.only_old.size() : kMostRowsOfOne);
   text += only_text("new", comparison.only_new, all ? comparison.only_new.size() : kMostRowsOfOne);

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reads reports of `hybrid bench`, and refuses what is none.
+// Reads reports of `hybrid bench`, and refuses other files.
 #pragma once
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace hybrid::bench {
@@ -17,7 +18,7 @@ struct BenchReport {
 };
 
 // Throws std::invalid_argument, with the file, the place in it and a remedy: not readable, not JSON, not a
-// report of `hybrid bench`, or rows that are not as REPORTS.md says.
+// report of `hybrid bench`, or rows that are not those of REPORTS.md.
 BenchReport read_bench_report(const std::filesystem::path& file);
 
 // The same of a side of a comparison. A file that is given twice, or a copy of one, is refused: it is not a

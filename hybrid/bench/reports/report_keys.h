@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The keys of the rows of `hybrid bench`: which of them identify a row, and which are figures of what kind.
+// The keys of the rows of `hybrid bench`: those that identify a row, and figures by their kind.
 #pragma once
 
 #include <cstdint>
@@ -9,10 +9,10 @@
 namespace hybrid::bench {
 
 enum class KeyKind : std::uint8_t {
-  identity,  // what was measured; rows are matched by it
+  identity,  // of the measurement: rows are matched by it
   detail,    // identity as well, but a reader knows the row without it; may be absent
   exact,     // the same in every run of a build: a count, an error, bytes
-  measured,  // differs from run to run: a time, or what follows from one
+  measured,  // differs from run to run: a time, or a figure that depends on one
   context,   // of the run, such as how often something was repeated; not compared
 };
 
@@ -25,7 +25,7 @@ struct ReportKey {
   std::string_view measured_case{};  // of an exact figure of `soft`: the case in which it depends on time
 };
 
-// Exact figures stand in the order of what matters most to a user: wrong answers, errors, work, memory.
+// Exact figures stand in the order in which they matter to a user: wrong answers, errors, work, memory.
 // Empty: no such suite.
 std::span<const ReportKey> keys_of(std::string_view suite);
 

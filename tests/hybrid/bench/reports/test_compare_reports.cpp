@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What `hybrid bench compare` says of reports whose differences are known, and what it refuses.
+// `hybrid bench compare` on reports whose differences are known, and on files that it refuses.
 #include "hybrid/bench/reports/compare_reports.h"
 
 #include <gtest/gtest.h>
@@ -90,7 +90,7 @@ TEST(CompareReports, WhatTakesHalfAsLongAgainIsFoundAndNothingElse) {
   }
   EXPECT_EQ(overall, 2U);  // median and p99
   EXPECT_GE(times, 4U * kMeshes);
-  // Of the rows, what takes longest grew most.
+  // Of the rows, the longest time grew most.
   EXPECT_EQ(comparison.figures[overall].key, "max_us");
   for (std::size_t i = overall + 1; i < times; ++i)
     EXPECT_GE(comparison.figures[i - 1].noticed, comparison.figures[i].noticed);
