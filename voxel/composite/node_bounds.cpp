@@ -14,6 +14,7 @@ using composite::index;
 using composite::kNoBound;
 
 constexpr int kSweepRounds = 2;
+constexpr int kRowsAtOnce = 8;  // rows that are swept together: along x each node waits for the one before
 
 }  // namespace
 
@@ -69,20 +70,23 @@ void CompositeGrid::propagate_bounds_round_gaps(Level& level, std::size_t a,
     }
   };
   const int nx = nodes[0].count, ny = nodes[1].count, nz = nodes[2].count;
+  const float *const link_x = level.weight[0].data(), *const link_y = level.weight[1].data(),
+                     *const link_z = level.weight[2].data();
   for (int round = 0; round < kSweepRounds; ++round) {
     for (int k = 0; k < nz; ++k) {
-      for (int j = 0; j < ny; ++j) {
-        float* row = bound + level.row(j, k);
-        const float* link = level.weight[0].data() + level.row(j, k);
-        for (int i = 1; i < nx; ++i) {
-          if (link[i - 1] > 0.0F) row[i] = std::max(row[i], row[i - 1] - fall(0, true));
-        }
-        for (int i = nx - 2; i >= 0; --i) {
-          if (link[i] > 0.0F) row[i] = std::max(row[i], row[i + 1] - fall(0, false));
-        }
+      for (int j = 0; j < ny; j += kRowsAtOnce) {
+        const int rows = std::min(kRowsAtOnce, ny - j);
+        const auto sweep = [&](int i, int from, int link, float by) {
+          for (int r = 0; r < rows; ++r) {
+            float* const row = bound + level.row(j + r, k);
+            const float asked = link_x[level.row(j + r, k) + index(link)] > 0.0F ? row[from] - by : kNoBound;
+            row[i] = std::max(row[i], asked);
+          }
+        };
+        for (int i = 1; i < nx; ++i) sweep(i, i - 1, i - 1, fall(0, true));
+        for (int i = nx - 2; i >= 0; --i) sweep(i, i + 1, i, fall(0, false));
       }
     }
-    const float *link_y = level.weight[1].data(), *link_z = level.weight[2].data();
     for (int k = 0; k < nz; ++k) {
       for (int j = 1; j < ny; ++j) {
         const std::size_t from = level.row(j - 1, k);
