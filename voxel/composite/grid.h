@@ -190,7 +190,12 @@ class CompositeGrid {
     Index3 voxel;
     std::uint32_t surface;
   };
-  // sign · u(node) >= sign · `u` on one axis, and its force on the object in the last cycle (N).
+  // Force of an obstacle in the last cycles, as its loads follow it (N), and the level of its node.
+  struct ObstacleLoad {
+    float along_normal_N = 0.0F;
+    std::uint32_t level = 0;
+  };
+  // sign · u(node) >= sign · `u` on one axis, and its force on the object there in the last cycle (N).
   struct ObstacleBound {
     std::uint32_t level;
     ObstacleNode node;
@@ -379,7 +384,7 @@ class CompositeGrid {
   std::span<const Obstacle> obstacles_;        // [surface number]; empty: no rigid surface is near
   std::vector<BesideRigid> beside_rigid_;      // surface voxels that have, or had, an obstacle
   std::vector<std::uint8_t> is_beside_rigid_;  // [surface number] 1: in beside_rigid_
-  std::vector<float> obstacle_load_N_;         // [surface number] force along the normal
+  std::vector<ObstacleLoad> obstacle_loads_;   // [surface number]
   std::vector<ObstacleBound> obstacle_bounds_;
   std::vector<std::uint32_t> supporting_bounds_;  // of obstacle_bounds_, near their planes
   std::size_t obstacle_cursor_ = 0;               // of beside_rigid_: last one that was offered to its nodes

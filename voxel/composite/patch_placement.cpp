@@ -108,7 +108,7 @@ void CompositeGrid::begin(const Index3& centre) noexcept {
   pressed_.clear();
   obstacle_bounds_.clear();
   supporting_bounds_.clear();
-  std::fill(obstacle_load_N_.begin(), obstacle_load_N_.end(), 0.0F);
+  std::fill(obstacle_loads_.begin(), obstacle_loads_.end(), ObstacleLoad{});
 }
 
 bool CompositeGrid::centre_on(const Index3& centre) noexcept {

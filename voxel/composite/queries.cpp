@@ -208,7 +208,7 @@ CompositeGrid::Nodes CompositeGrid::nodes_of(std::size_t box) const noexcept {
 std::size_t CompositeGrid::memory_bytes() const {
   std::size_t bytes = levels_.capacity() * sizeof(Level) + pressed_.capacity() * sizeof(Pressed) +
                       material_.memory_bytes() + beside_rigid_.capacity() * sizeof(BesideRigid) +
-                      is_beside_rigid_.capacity() + obstacle_load_N_.capacity() * sizeof(float) +
+                      is_beside_rigid_.capacity() + obstacle_loads_.capacity() * sizeof(ObstacleLoad) +
                       obstacle_bounds_.capacity() * sizeof(ObstacleBound) +
                       supporting_bounds_.capacity() * sizeof(std::uint32_t);
   const auto add = [&bytes](const Level& level) {

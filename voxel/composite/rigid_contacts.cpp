@@ -43,7 +43,7 @@ void CompositeGrid::watch_obstacles(std::span<const Obstacle> obstacles) {
   obstacles_ = obstacles;
   if (is_beside_rigid_.size() == obstacles.size()) return;
   is_beside_rigid_.assign(obstacles.size(), 0);
-  obstacle_load_N_.assign(obstacles.size(), 0.0F);
+  obstacle_loads_.assign(obstacles.size(), {});
   beside_rigid_.reserve(obstacles.size());
   std::size_t most = 0;
   for (std::size_t l = 0; l <= covering_level_; ++l) {
@@ -60,9 +60,10 @@ void CompositeGrid::watch_obstacles(std::span<const Obstacle> obstacles) {
 }
 
 void CompositeGrid::add_obstacle(std::uint32_t surface_number) noexcept {
-  if (is_beside_rigid_[surface_number] != 0) return;
+  const VoxelId voxel = lattice_.surface()[surface_number];
+  if (is_beside_rigid_[surface_number] != 0 || lattice_.anchored(voxel)) return;
   is_beside_rigid_[surface_number] = 1;
-  beside_rigid_.push_back({lattice_.coordinates(lattice_.surface()[surface_number]), surface_number});
+  beside_rigid_.push_back({lattice_.coordinates(voxel), surface_number});
   for (std::size_t l = 0; l <= covering_level_; ++l) offer_obstacle(l, beside_rigid_.back());
 }
 
@@ -176,10 +177,15 @@ void CompositeGrid::press_on_obstacles() noexcept {
 void CompositeGrid::bound_by_obstacle(std::size_t l, const ObstacleNode& node, float gap) noexcept {
   const Obstacle& o = obstacles_[node.surface];
   if (o.normal == glm::vec3(0.0F)) return;
+  const auto level = static_cast<std::uint32_t>(l);
   const int along = largest_axis(o.normal);
   const float normal = o.normal[along];
-  obstacle_bounds_.push_back({static_cast<std::uint32_t>(l), node, index(along), normal > 0.0F ? 1.0F : -1.0F,
-                              levels_[l].u[index(along)][node.number] - gap / normal});
+  // A node of another level stands for another number of voxels.
+  ObstacleLoad& load = obstacle_loads_[node.surface];
+  if (load.level != level) load = {0.0F, level};
+  obstacle_bounds_.push_back({level, node, index(along), normal > 0.0F ? 1.0F : -1.0F,
+                              levels_[l].u[index(along)][node.number] - gap / normal,
+                              load.along_normal_N * normal});
   if (gap <= kSupports * step_m(levels_[l]))
     supporting_bounds_.push_back(static_cast<std::uint32_t>(obstacle_bounds_.size() - 1));
 }
@@ -225,7 +231,7 @@ void CompositeGrid::add_obstacle_loads(std::size_t l, std::size_t axis) noexcept
 }
 
 glm::vec3 CompositeGrid::load_of(const ObstacleBound& b) const noexcept {
-  glm::vec3 load = obstacle_load_N_[b.node.surface] * obstacles_[b.node.surface].normal;
+  glm::vec3 load = obstacle_loads_[b.node.surface].along_normal_N * obstacles_[b.node.surface].normal;
   load[static_cast<int>(b.axis)] = 0.0F;
   return load;
 }
@@ -243,7 +249,7 @@ void CompositeGrid::measure_obstacle_forces(std::size_t axis) noexcept {
                                   minimum_at(level, b.node.number)[static_cast<int>(axis)]);
     }
     b.force_N = b.sign * pulled > 0.0F ? pulled : 0.0F;
-    float& load_N = obstacle_load_N_[b.node.surface];
+    float& load_N = obstacle_loads_[b.node.surface].along_normal_N;
     load_N += kFollows * (b.force_N / obstacles_[b.node.surface].normal[static_cast<int>(axis)] - load_N);
   }
 }
