@@ -64,13 +64,14 @@ bool has_partner(const std::vector<voxel::HeldVoxel>& held, std::uint32_t partne
                      [partner](const voxel::HeldVoxel& h) { return h.partner == partner; });
 }
 
-// The same of an object whose contact is on nested patches.
+// The same of an object whose contact is on nested patches. Patches know forces of springs alone, so at
+// limits the balance has to confirm them.
 void add_supports_of_patches(const World& world, const WorldState& state, std::uint32_t soft,
                              std::vector<PairForce>& out) {
   const voxel::SoftObject& object = *state.soft[soft];
   const voxel::CompositeGrid& patches = *object.patches_in_use();
   const glm::dquat& rotation = world.soft[soft].pose.rotation;
-  out.push_back({{Kind::anchors, soft, 0}, rotation * -patches.force_on_anchors_N(), false});
+  out.push_back({{Kind::anchors, soft, 0}, rotation * -patches.force_on_anchors_N(), true});
   std::vector<std::optional<glm::dvec3>> by_rigid(world.rigid.size());
   const double look_m = kObstacleRange * object.lattice().max_spacing_m();
   for (const voxel::CompositeGrid::ObstacleForce& force : patches.obstacle_forces()) {
@@ -82,7 +83,7 @@ void add_supports_of_patches(const World& world, const WorldState& state, std::u
     sum_N = sum_N.value_or(glm::dvec3(0.0)) + rotation * force.on_object_N;
   }
   for (std::uint32_t r = 0; r < by_rigid.size(); ++r) {
-    if (by_rigid[r]) out.push_back({{Kind::rigid, soft, r}, by_rigid[r], false});
+    if (by_rigid[r]) out.push_back({{Kind::rigid, soft, r}, by_rigid[r], true});
   }
 }
 
