@@ -41,7 +41,7 @@ Clearance clearance(const World& world, const WorldState& state) noexcept {
     for (std::size_t s = 0; s < surface.size() && s < obstacles.size(); ++s) {
       const voxel::Obstacle& obstacle = obstacles[s];
       if (obstacle.normal == glm::vec3(0.0F) || object.lattice().anchored(surface[s])) continue;
-      const double bound_gap = glm::dot(glm::dvec3(obstacle.normal), object.state().at(surface[s])) -
+      const double bound_gap = glm::dot(glm::dvec3(obstacle.normal), object.displacement(surface[s])) -
                                static_cast<double>(obstacle.bound);
       if (bound_gap > exact_m) {
         rigid = std::min(rigid, bound_gap);

@@ -9,6 +9,7 @@
 
 #include "hybrid/session/session.h"
 #include "polygon/mesh/is_finite.h"
+#include "voxel/composite/grid.h"
 
 namespace hybrid {
 namespace {
@@ -47,6 +48,10 @@ bool finite(const WorldState& state) {
     for (const auto& axis : object->state().u) {
       if (!std::all_of(axis.begin(), axis.end(), [](float u) { return std::isfinite(u); })) return false;
     }
+    bool good = true;
+    if (object->patches_in_use() != nullptr)
+      object->patches_in_use()->for_values([&good](float u) { good = good && std::isfinite(u); });
+    if (!good) return false;
   }
   return std::isfinite(state.clock.now_s()) && std::isfinite(state.limit.elapsed_s) &&
          polygon::is_finite(state.limit.last_N) && std::isfinite(state.learnt_stiffness_N_per_m) &&

@@ -204,8 +204,14 @@ void CompositeGrid::add_obstacle_bounds(std::size_t axis) noexcept {
         level.bounded[kind] = true;
       }
     }
-    float& own = levels_[b.level].bound[kind][b.node.number];
-    own = std::max(own, b.sign * b.u);
+    const auto set = [&](Level& level, std::size_t number) {
+      float& own = level.bound[kind][number];
+      own = std::max(own, b.sign * b.u);
+      // Tissue squeezed to its limits: the links give way, not the rigid surface.
+      float& opposite = level.bound[1 - kind][number];
+      opposite = std::min(opposite, -own);
+    };
+    set(levels_[b.level], b.node.number);
     Index3 node = b.node.node;
     for (std::size_t l = b.level + 1; l < levels_.size(); ++l) {
       const Level &fine = levels_[l - 1], &coarse = levels_[l];
@@ -216,8 +222,7 @@ void CompositeGrid::add_obstacle_bounds(std::size_t axis) noexcept {
         coincides = way >= 0 && way % coarse.step == 0 && node[d] < coarse.nodes[d].count;
       }
       if (!coincides) break;
-      float& at = levels_[l].bound[kind][coarse.node(node[0], node[1], node[2])];
-      at = std::max(at, b.sign * b.u);
+      set(levels_[l], coarse.node(node[0], node[1], node[2]));
     }
   }
 }
