@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace voxel {
 namespace {
@@ -115,9 +114,8 @@ glm::dvec3 CompositeGrid::compliance(const Index3& voxel) const noexcept {
           levels_[0].inverse_diagonal[2][n]};
 }
 
-CompositeGrid::Interval CompositeGrid::supported_interval(const Index3& voxel) const noexcept {
-  constexpr double kAnywhere = std::numeric_limits<double>::max();
-  Interval result{glm::dvec3(-kAnywhere), glm::dvec3(kAnywhere)};
+glm::dvec3 CompositeGrid::clamp_to_anchors(const Index3& voxel, const glm::dvec3& u) const noexcept {
+  glm::dvec3 result = u;
   const auto& dims = lattice_.grid().dims;
   for (std::size_t d = 0; d < 3; ++d) {
     for (const std::size_t end : {std::size_t{0}, std::size_t{1}}) {
@@ -127,13 +125,11 @@ CompositeGrid::Interval CompositeGrid::supported_interval(const Index3& voxel) c
         // Above the low face u is the extension of the chain of links; below the high face −u is.
         const double shorter = links * static_cast<double>(limit_m_[d][a][0]),
                      longer = links * static_cast<double>(limit_m_[d][a][1]);
-        const auto axis = static_cast<int>(a);
-        result.least[axis] = std::max(result.least[axis], end == 1 ? -longer : -shorter);
-        result.most[axis] = std::min(result.most[axis], end == 1 ? shorter : longer);
+        double& at = result[static_cast<int>(a)];
+        at = std::clamp(at, end == 1 ? -longer : -shorter, end == 1 ? shorter : longer);
       }
     }
   }
-  narrow_by_obstacles(voxel, result);
   return result;
 }
 

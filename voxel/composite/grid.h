@@ -28,7 +28,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <glm/common.hpp>
 #include <glm/vec3.hpp>
 #include <span>
 #include <string>
@@ -77,15 +76,11 @@ class CompositeGrid {
   [[nodiscard]] glm::dvec3 unconstrained_minimum(const Index3& voxel) const noexcept;
   [[nodiscard]] glm::dvec3 compliance(const Index3& voxel) const noexcept;
   void set_fine(const Index3& voxel, const glm::dvec3& u) noexcept;
-  // The displacements that the chains from fully anchored sides, and from nodes held by rigid surfaces, allow
-  // a voxel (m).
-  struct Interval {
-    glm::dvec3 least, most;
-    [[nodiscard]] glm::dvec3 clamp(const glm::dvec3& u) const noexcept {
-      return glm::max(glm::min(u, most), least);
-    }
-  };
-  [[nodiscard]] Interval supported_interval(const Index3& voxel) const noexcept;
+  // `u` clamped to the displacements that the chains from fully anchored sides, and from nodes near rigid
+  // surfaces, allow the voxel (m).
+  [[nodiscard]] glm::dvec3 clamp_to_supports(const Index3& voxel, const glm::dvec3& u) const noexcept {
+    return clamp_to_obstacles(voxel, clamp_to_anchors(voxel, u));
+  }
 
   // ---- rigid surfaces that stand still (rigid_contacts.cpp) ----
   // Obstacles by surface number, which outlive the grid. Call it again when they have another address.
@@ -320,7 +315,9 @@ class CompositeGrid {
   [[nodiscard]] bool holds(const ObstacleBound& b) const noexcept;
   [[nodiscard]] glm::vec3 load_of(const ObstacleBound& b) const noexcept;
   [[nodiscard]] glm::dvec3 force_of(const ObstacleBound& b) const noexcept;
-  void narrow_by_obstacles(const Index3& voxel, Interval& interval) const noexcept;
+  [[nodiscard]] double support_at(const Index3& at, std::size_t axis, std::size_t kind, const Index3& low,
+                                  const Index3& high, int beyond) const noexcept;
+  [[nodiscard]] glm::dvec3 clamp_to_obstacles(const Index3& voxel, const glm::dvec3& u) const noexcept;
   // ---- fac_cycle.cpp ----
   [[nodiscard]] composite::LevelView view(std::size_t l, std::size_t axis) noexcept;
   void inject_from_finer(std::size_t l, std::size_t axis) noexcept;
@@ -364,6 +361,7 @@ class CompositeGrid {
             voxel[2] + material_.offset()[2]};
   }
   [[nodiscard]] std::size_t fine_node(const Index3& voxel) const;  // grid.cpp
+  [[nodiscard]] glm::dvec3 clamp_to_anchors(const Index3& voxel, const glm::dvec3& u) const noexcept;
   // Of a node, its neighbours fixed: its displacement of least energy without bounds (m).
   [[nodiscard]] glm::dvec3 minimum_at(const Level& level, std::size_t node) const noexcept;  // grid.cpp
   [[nodiscard]] static double inside_share(const Level& level, std::size_t d, int i) noexcept;
@@ -386,6 +384,15 @@ class CompositeGrid {
   std::vector<std::uint8_t> is_beside_rigid_;  // [surface number] 1: in beside_rigid_
   std::vector<ObstacleLoad> obstacle_loads_;   // [surface number]
   std::vector<ObstacleBound> obstacle_bounds_;
+  // [axis][kind] coordinates of the voxels of supporting_bounds_, their greatest bound, and half of the
+  // widest step.
+  struct SupportBox {
+    Index3 low{}, high{};
+    float most = 0.0F;
+    int beyond = 0;
+    bool any = false;
+  };
+  std::array<std::array<SupportBox, 2>, 3> supports_{};
   std::vector<std::uint32_t> supporting_bounds_;  // of obstacle_bounds_, near their planes
   std::size_t obstacle_cursor_ = 0;               // of beside_rigid_: last one that was offered to its nodes
   bool patch_moved_ = false;                      // since the last cycle

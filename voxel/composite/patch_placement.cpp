@@ -108,6 +108,7 @@ void CompositeGrid::begin(const Index3& centre) noexcept {
   pressed_.clear();
   obstacle_bounds_.clear();
   supporting_bounds_.clear();
+  supports_ = {};
   std::fill(obstacle_loads_.begin(), obstacle_loads_.end(), ObstacleLoad{});
 }
 

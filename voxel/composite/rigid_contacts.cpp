@@ -27,7 +27,7 @@ namespace {
 using composite::index;
 
 constexpr float kNearby = 3.0F;        // steps of the level: nodes further from their plane get no bound
-constexpr float kSupports = 0.5F;      // steps: nodes nearer to their plane count in supported_interval()
+constexpr float kSupports = 0.5F;      // steps: nodes nearer to their plane count in clamp_to_supports()
 constexpr float kFollows = 0.5F;       // of the difference, in a cycle: a load follows its bound
 constexpr float kHolds = 1e-3F;        // spacings: a node nearer to its bound is held by it
 constexpr std::size_t kOffered = 512;  // surface voxels that are offered to their nodes a tick
@@ -156,6 +156,7 @@ bool CompositeGrid::is_covered(std::size_t l, const Index3& node) const noexcept
 void CompositeGrid::press_on_obstacles() noexcept {
   obstacle_bounds_.clear();
   supporting_bounds_.clear();
+  supports_ = {};
   if (beside_rigid_.empty()) return;
   for (std::size_t n = 0; n < std::min(kOffered, beside_rigid_.size()); ++n) {
     if (++obstacle_cursor_ >= beside_rigid_.size()) obstacle_cursor_ = 0;
@@ -186,13 +187,23 @@ void CompositeGrid::bound_by_obstacle(std::size_t l, const ObstacleNode& node, f
   obstacle_bounds_.push_back({level, node, index(along), normal > 0.0F ? 1.0F : -1.0F,
                               levels_[l].u[index(along)][node.number] - gap / normal,
                               load.along_normal_N * normal});
-  if (gap <= kSupports * step_m(levels_[l]))
-    supporting_bounds_.push_back(static_cast<std::uint32_t>(obstacle_bounds_.size() - 1));
+  if (gap > kSupports * step_m(levels_[l])) return;
+  supporting_bounds_.push_back(static_cast<std::uint32_t>(obstacle_bounds_.size() - 1));
+  const ObstacleBound& b = obstacle_bounds_.back();
+  SupportBox& box = supports_[b.axis][b.sign > 0.0F ? 0 : 1];
+  const Index3 at = shifted(node.voxel);
+  if (!box.any) box = {at, at, b.sign * b.u, 0, true};
+  for (std::size_t d = 0; d < 3; ++d) {
+    box.low[d] = std::min(box.low[d], at[d]);
+    box.high[d] = std::max(box.high[d], at[d]);
+  }
+  box.most = std::max(box.most, b.sign * b.u);
+  box.beyond = std::max(box.beyond, levels_[l].step / 2);
 }
 
 // Adds the obstacles' bounds of one axis to those that the tool's contact has set: on their nodes, and on the
 // nodes of coarser levels at the same places. They are not propagated: limits near a rigid surface are those
-// of supported_interval() and of multipliers.
+// of clamp_to_supports() and of multipliers.
 void CompositeGrid::add_obstacle_bounds(std::size_t axis) noexcept {
   for (const ObstacleBound& b : obstacle_bounds_) {
     if (b.axis != axis) continue;
@@ -293,27 +304,43 @@ bool CompositeGrid::holds(const ObstacleBound& b) const noexcept {
   return beyond_m <= kHolds * static_cast<float>(lattice_.min_spacing_m());
 }
 
-void CompositeGrid::narrow_by_obstacles(const Index3& voxel, Interval& interval) const noexcept {
-  const Index3 at = shifted(voxel);
-  for (const std::uint32_t n : supporting_bounds_) {
-    const ObstacleBound& b = obstacle_bounds_[n];
+// What the chains from the box low … high (coordinates) take from a bound on the way to the place `at` (m). A
+// coarse node stands for all voxels within half a step, `beyond`, across the bound.
+double CompositeGrid::support_at(const Index3& at, std::size_t axis, std::size_t kind, const Index3& low,
+                                 const Index3& high, int beyond) const noexcept {
+  double fall = 0.0;
+  for (std::size_t d = 0; d < 3; ++d) {
+    const int above = at[d] - high[d], below = low[d] - at[d];
+    const int links = std::max({above, below, 0}) - (d == axis ? 0 : beyond);
     // For a link from a up to b: u(b) >= u(a) − limit[0] and u(a) >= u(b) − limit[1]; for −u the reverse.
-    const std::size_t kind = b.sign > 0.0F ? 0 : 1;
-    double least = static_cast<double>(b.sign * b.u);
-    // A coarse node stands for all voxels within half a step across the bound.
-    const Index3 from = shifted(b.node.voxel);
-    for (std::size_t d = 0; d < 3; ++d) {
-      const int links = at[d] - from[d], beyond = d == b.axis ? 0 : levels_[b.level].step / 2;
-      least -= std::max(std::abs(links) - beyond, 0) *
-               static_cast<double>(limit_m_[d][b.axis][(links > 0 ? 0U : 1U) ^ kind]);
-    }
-    const auto axis = static_cast<int>(b.axis);
-    if (b.sign > 0.0F) {
-      interval.least[axis] = std::max(interval.least[axis], least);
-    } else {
-      interval.most[axis] = std::min(interval.most[axis], -least);
+    if (links > 0) fall += links * static_cast<double>(limit_m_[d][axis][(above > 0 ? 0U : 1U) ^ kind]);
+  }
+  return fall;
+}
+
+glm::dvec3 CompositeGrid::clamp_to_obstacles(const Index3& voxel, const glm::dvec3& u) const noexcept {
+  glm::dvec3 result = u;
+  const Index3 at = shifted(voxel);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    double& to = result[static_cast<int>(axis)];
+    for (const std::size_t kind : {std::size_t{0}, std::size_t{1}}) {
+      const double sign = kind == 0 ? 1.0 : -1.0;
+      const SupportBox& box = supports_[axis][kind];
+      // No single bound is nearer or greater than all of them together.
+      if (!box.any || sign * to >= static_cast<double>(box.most) -
+                                       support_at(at, axis, kind, box.low, box.high, box.beyond))
+        continue;
+      for (const std::uint32_t n : supporting_bounds_) {
+        const ObstacleBound& b = obstacle_bounds_[n];
+        if (b.axis != axis || (b.sign > 0.0F) != (kind == 0)) continue;
+        const Index3 from = shifted(b.node.voxel);
+        const double least = static_cast<double>(b.sign * b.u) -
+                             support_at(at, axis, kind, from, from, levels_[b.level].step / 2);
+        if (sign * to < least) to = sign * least;
+      }
     }
   }
+  return result;
 }
 
 }  // namespace voxel

@@ -14,7 +14,6 @@
 #pragma once
 
 #include <cstdint>
-#include <glm/common.hpp>
 #include <glm/mat3x3.hpp>
 #include <memory>
 #include <optional>
@@ -431,10 +430,6 @@ class SoftObject {
     std::uint32_t touch;
     std::array<int, 3> voxel;
     double gap_m;
-    glm::dvec3 least, most;  // displacement that anchors and rigid surfaces allow it (m)
-    [[nodiscard]] glm::dvec3 clamp(const glm::dvec3& u) const noexcept {
-      return glm::max(glm::min(u, most), least);
-    }
   };
   std::vector<TouchOnGrid> touches_on_grid_;
   std::array<int, 3> centre_{};                      // of the contact (voxel)

@@ -215,7 +215,7 @@ void SoftObject::put_aside(const ToolInBody& tool) noexcept {
     Gap g = gap(tool, rest + wished);
     if (g.distance >= 0.0) return;
     const glm::dvec3 place = project_on_tool(tool, rest, wished, grid_->compliance(near.voxel), g);
-    grid_->set_fine(near.voxel, near.clamp(place));
+    grid_->set_fine(near.voxel, grid_->clamp_to_supports(near.voxel, place));
   };
   std::for_each(touches_on_grid_.begin(), touches_on_grid_.end(), put);
   std::for_each(touches_on_grid_.rbegin(), touches_on_grid_.rend(), put);
@@ -231,9 +231,7 @@ void SoftObject::press_on_grid(const ToolInBody& tool) noexcept {
     const std::array<int, 3> c = lattice_->coordinates(touches_[n].v);
     if (!grid_->in_fine_patch(c)) continue;
     const double away = gap(tool, touches_[n].rest + grid_->fine_at(c)).distance;
-    if (away > kNear * lattice_->min_spacing_m()) continue;
-    const CompositeGrid::Interval room = grid_->supported_interval(c);
-    touches_on_grid_.push_back({n, c, away, room.least, room.most});
+    if (away <= kNear * lattice_->min_spacing_m()) touches_on_grid_.push_back({n, c, away});
   }
   put_aside(tool);
   for (const TouchOnGrid& near : touches_on_grid_) {
@@ -244,7 +242,7 @@ void SoftObject::press_on_grid(const ToolInBody& tool) noexcept {
     u[bound.axis] = bound.u;
     glm::dvec3 normal(0.0);
     normal[bound.axis] = bound.way;
-    grid_->press(near.voxel, near.clamp(u), normal);
+    grid_->press(near.voxel, grid_->clamp_to_supports(near.voxel, u), normal);
     // A voxel that is pressed aside is held there, on the tool's surface.
     const glm::dvec3 wished = grid_->unconstrained_minimum(near.voxel);
     Gap g = gap(tool, t.rest + wished);
@@ -252,7 +250,7 @@ void SoftObject::press_on_grid(const ToolInBody& tool) noexcept {
     const glm::dvec3 place = project_on_tool(tool, t.rest, wished, grid_->compliance(near.voxel), g);
     normal = g.normal;
     normal[bound.axis] = 0.0;
-    grid_->press(near.voxel, near.clamp(place), normal);
+    grid_->press(near.voxel, grid_->clamp_to_supports(near.voxel, place), normal);
   }
 }
 
@@ -279,7 +277,7 @@ void SoftObject::settle_on_grid(const ToolInBody& tool) noexcept {
     if (g.distance < 0.0) {
       const Bound bound = bound_by(tool, t, u);
       if (bound.any) u[bound.axis] = bound.u;
-      u = grid_->supported_interval(c).clamp(u);
+      u = grid_->clamp_to_supports(c, u);
       grid_->set_fine(c, u);
     }
     t.pressed = true;
@@ -378,7 +376,7 @@ bool SoftObject::at_anchors_end(VoxelId v, const glm::dvec3& direction) const no
   glm::dvec3 further = displacement(v);
   const double step = (direction[axis] > 0.0 ? 1e-3 : -1e-3) * lattice_->min_spacing_m();
   further[axis] += step;
-  return grid_->supported_interval(c).clamp(further)[axis] != further[axis];
+  return grid_->clamp_to_supports(c, further)[axis] != further[axis];
 }
 
 }  // namespace voxel
