@@ -22,6 +22,8 @@
 // limits from link to link. Near a notch or the edge of an anchored region the bounds are still necessary but
 // not sufficient: links may exceed their limits there (worst_violation()). Where tissues differ, links also
 // have multipliers of their own (link_limits.cpp).
+//
+// Rigid surfaces that stand still bound the nodes beside them (rigid_contacts.cpp).
 #pragma once
 
 #include <algorithm>

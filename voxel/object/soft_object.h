@@ -97,8 +97,9 @@ class SoftObject {
 
   // A large object may keep its contact on nested patches (composite/grid.h). Then the cost of a tick does
   // not depend on depth and size, state() stays at rest as it was before the contact, and displacement()
-  // returns what is felt. Only for objects that touch nothing but the tool. Returns the reason why the object
-  // is unsuitable, and changes nothing then; empty if patches are in use. Allocates.
+  // returns what is felt. Only for objects that touch nothing but the tool and rigid surfaces that stand
+  // still (their obstacles come later). Returns the reason why the object is unsuitable, and changes nothing
+  // then; empty if patches are in use. Allocates.
   static constexpr std::size_t kLeastOnGrid = 10'000;  // voxels
   std::string use_composite_grid(const ToolInBody& tool);
   [[nodiscard]] bool uses_patches() const { return grid_ != nullptr; }
