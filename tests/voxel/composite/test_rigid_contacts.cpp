@@ -37,7 +37,8 @@ struct Slab {
   int half = 2;
   double depth_m = 0.0;
 
-  Slab(const Index3& dims, std::mt19937& random) {
+  // `layers`: three voxels of skin on fat on muscle, in place of one tissue.
+  Slab(const Index3& dims, std::mt19937& random, bool layers = false) {
     const auto between = [&](double low, double high) {
       return std::uniform_real_distribution(low, high)(random);
     };
@@ -50,7 +51,17 @@ struct Slab {
         }
       }
     }
-    lattice = std::make_shared<Lattice>(block(dims, glm::dvec3(kSpacing)), options);
+    voxel::LabelVolume volume = block(dims, glm::dvec3(kSpacing));
+    if (layers) {
+      const std::size_t plane = static_cast<std::size_t>(dims[0]) * static_cast<std::size_t>(dims[1]);
+      const auto height = static_cast<std::size_t>(dims[2]);
+      for (n = 0; n < volume.labels.size(); ++n)
+        volume.labels[n] = n / plane + 3 >= height ? 1 : n / plane >= height / 2 - 1 ? 2 : 3;
+      options.materials[1].young_Pa = 1e5;
+      options.materials[2].young_Pa = 3e3;
+      options.materials[3].young_Pa = 1e4;
+    }
+    lattice = std::make_shared<Lattice>(std::move(volume), options);
     middle = {dims[0] / 2 + static_cast<int>(between(-3.0, 3.0)),
               dims[1] / 2 + static_cast<int>(between(-3.0, 3.0)), dims[2] - 1};
     depth_m = between(1.5, 2.5) * kSpacing;
@@ -217,6 +228,22 @@ TEST(RigidContacts, PatchesComeNearTheLattice) {
     std::cout << "[ measured ] tool " << felt.tool_N << " of " << right.tool_N << " N, rigid ball "
               << felt.rigid_N << " of " << right.rigid_N << " N on " << right.on_rigid << " voxels\n";
     EXPECT_NEAR(felt.tool_N, right.tool_N, 0.03 * std::fabs(right.tool_N));
+  }
+}
+
+// The same where tissues differ in stiffness.
+TEST(RigidContacts, LayersAreTheLatticeAtEquilibrium) {
+  std::mt19937 random(3);
+  for (int scene = 0; scene < 10; ++scene) {
+    const Slab slab({26, 20, 10}, random, true);
+    const Solution right = brute_force(slab);
+    const Felt felt = on_patches(slab, CompositeGrid::kRefineAll);
+    const Felt patches = on_patches(slab, 8);
+    std::cout << "[ measured ] tool " << felt.tool_N << " (patches " << patches.tool_N << ") of "
+              << right.tool_N << " N, rigid ball " << felt.rigid_N << " (patches " << patches.rigid_N
+              << ") of " << right.rigid_N << " N on " << right.on_rigid << " voxels\n";
+    EXPECT_NEAR(felt.tool_N, right.tool_N, 1e-3 * std::fabs(right.tool_N));
+    EXPECT_NEAR(felt.rigid_N, right.rigid_N, 1e-3 * std::fabs(right.tool_N));
   }
 }
 
