@@ -30,6 +30,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <glm/common.hpp>
 #include <glm/vec3.hpp>
 #include <span>
 #include <string>
@@ -82,6 +83,12 @@ class CompositeGrid {
   // surfaces, allow the voxel (m).
   [[nodiscard]] glm::dvec3 clamp_to_supports(const Index3& voxel, const glm::dvec3& u) const noexcept {
     return clamp_to_obstacles(voxel, clamp_to_anchors(voxel, u));
+  }
+
+  // The axis of the largest component: of two alike the later one.
+  [[nodiscard]] static int largest_axis(const glm::dvec3& v) noexcept {
+    const glm::dvec3 size = glm::abs(v);
+    return size.z >= size.x && size.z >= size.y ? 2 : size.y >= size.x ? 1 : 0;
   }
 
   // ---- rigid surfaces that stand still (rigid_contacts.cpp) ----
@@ -250,8 +257,8 @@ class CompositeGrid {
     glm::vec3 u, normal;
   };
 
-  // A contact bounds its node on the axes on which its normal has more than this. A larger value would let
-  // voxels that a ball presses aside slightly move back, and the contact would oscillate.
+  // A contact of the tool bounds its node on the axes on which its normal has more than this. A larger value
+  // would let voxels that a ball presses aside slightly move back, and the contact would oscillate.
   static constexpr float kAlong = 0.02F;
 
   // ---- suitability.cpp ----
@@ -317,8 +324,8 @@ class CompositeGrid {
   [[nodiscard]] bool holds(const ObstacleBound& b) const noexcept;
   [[nodiscard]] glm::vec3 load_of(const ObstacleBound& b) const noexcept;
   [[nodiscard]] glm::dvec3 force_of(const ObstacleBound& b) const noexcept;
-  [[nodiscard]] double support_at(const Index3& at, std::size_t axis, std::size_t kind, const Index3& low,
-                                  const Index3& high, int beyond) const noexcept;
+  [[nodiscard]] double fall_from(const Index3& at, std::size_t axis, std::size_t kind, const Index3& low,
+                                 const Index3& high, int beyond) const noexcept;
   [[nodiscard]] glm::dvec3 clamp_to_obstacles(const Index3& voxel, const glm::dvec3& u) const noexcept;
   // ---- fac_cycle.cpp ----
   [[nodiscard]] composite::LevelView view(std::size_t l, std::size_t axis) noexcept;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Bounds of the nodes of a CompositeGrid: cones from the pressed voxels, along existing links (grid.h).
 #include <algorithm>
-#include <cmath>
 
 #include "voxel/composite/grid.h"
 #include "voxel/composite/row_kernels.h"
@@ -114,8 +113,6 @@ void CompositeGrid::propagate_bounds_round_gaps(Level& level, std::size_t a,
 
 void CompositeGrid::find_bounds(std::size_t a) noexcept {
   const int axis = static_cast<int>(a);
-  float furthest = 0.0F;
-  for (const Pressed& p : pressed_) furthest = std::max(furthest, std::fabs(p.u[axis]));
   for (std::size_t kind = 0; kind < 2; ++kind) {
     const float sign = kind == 0 ? 1.0F : -1.0F;
     for (Level& level : levels_) level.bounded[kind] = false;

@@ -14,8 +14,6 @@
 // A bound stands whether or not its node is pressed (SoftObject::press_on_grid has the reason).
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
-#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include "voxel/composite/grid.h"
@@ -30,12 +28,7 @@ constexpr float kNearby = 3.0F;        // steps of the level: nodes further from
 constexpr float kSupports = 0.5F;      // steps: nodes nearer to their plane count in clamp_to_supports()
 constexpr float kFollows = 0.5F;       // of the difference, in a cycle: a load follows its bound
 constexpr float kHolds = 1e-3F;        // spacings: a node nearer to its bound is held by it
-constexpr std::size_t kOffered = 512;  // surface voxels that are offered to their nodes a tick
-
-int largest_axis(const glm::vec3& normal) {
-  const glm::vec3 size = glm::abs(normal);
-  return size.z >= size.x && size.z >= size.y ? 2 : size.y >= size.x ? 1 : 0;
-}
+constexpr std::size_t kOffered = 512;  // surface voxels that are offered to their nodes in a cycle
 
 }  // namespace
 
@@ -179,7 +172,7 @@ void CompositeGrid::bound_by_obstacle(std::size_t l, const ObstacleNode& node, f
   const Obstacle& o = obstacles_[node.surface];
   if (o.normal == glm::vec3(0.0F)) return;
   const auto level = static_cast<std::uint32_t>(l);
-  const int along = largest_axis(o.normal);
+  const int along = largest_axis(glm::dvec3(o.normal));
   const float normal = o.normal[along];
   // A node of another level stands for another number of voxels.
   ObstacleLoad& load = obstacle_loads_[node.surface];
@@ -304,10 +297,10 @@ bool CompositeGrid::holds(const ObstacleBound& b) const noexcept {
   return beyond_m <= kHolds * static_cast<float>(lattice_.min_spacing_m());
 }
 
-// What the chains from the box low … high (coordinates) take from a bound on the way to the place `at` (m). A
-// coarse node stands for all voxels within half a step, `beyond`, across the bound.
-double CompositeGrid::support_at(const Index3& at, std::size_t axis, std::size_t kind, const Index3& low,
-                                 const Index3& high, int beyond) const noexcept {
+// By how much a bound in the box low … high (coordinates) falls along chains to the place `at` (m). A coarse
+// node stands for all voxels within half a step, `beyond`, across the bound.
+double CompositeGrid::fall_from(const Index3& at, std::size_t axis, std::size_t kind, const Index3& low,
+                                const Index3& high, int beyond) const noexcept {
   double fall = 0.0;
   for (std::size_t d = 0; d < 3; ++d) {
     const int above = at[d] - high[d], below = low[d] - at[d];
@@ -328,14 +321,14 @@ glm::dvec3 CompositeGrid::clamp_to_obstacles(const Index3& voxel, const glm::dve
       const SupportBox& box = supports_[axis][kind];
       // No single bound is nearer or greater than all of them together.
       if (!box.any || sign * to >= static_cast<double>(box.most) -
-                                       support_at(at, axis, kind, box.low, box.high, box.beyond))
+                                       fall_from(at, axis, kind, box.low, box.high, box.beyond))
         continue;
       for (const std::uint32_t n : supporting_bounds_) {
         const ObstacleBound& b = obstacle_bounds_[n];
         if (b.axis != axis || (b.sign > 0.0F) != (kind == 0)) continue;
         const Index3 from = shifted(b.node.voxel);
         const double least = static_cast<double>(b.sign * b.u) -
-                             support_at(at, axis, kind, from, from, levels_[b.level].step / 2);
+                             fall_from(at, axis, kind, from, from, levels_[b.level].step / 2);
         if (sign * to < least) to = sign * least;
       }
     }

@@ -40,8 +40,7 @@ constexpr double kFlat = 1.5;  // greatest ratio of spacings for which the width
 void go_along(CompositeGrid& grid, const std::array<int, 3>& centre, const glm::dvec3& force_N,
               const glm::dvec3& way_m, double spacing_m) noexcept {
   if (!grid.in_fine_patch(centre)) return;
-  const glm::dvec3 size = glm::abs(force_N);
-  const int axis = size.z >= size.x && size.z >= size.y ? 2 : size.y >= size.x ? 1 : 0;
+  const int axis = CompositeGrid::largest_axis(force_N);
   const double inwards = force_N[axis] > 0.0 ? -1.0 : 1.0, depth_m = inwards * grid.fine_at(centre)[axis];
   if (depth_m < kLeastToScale * spacing_m) return;
   const double part = std::clamp(inwards * way_m[axis] / depth_m, -kMostScaled, kMostScaled);
@@ -194,8 +193,7 @@ SoftObject::Bound SoftObject::bound_by(const ToolInBody& tool, const Touch& t,
   const glm::dvec3 p = t.rest + u;
   const Gap g = gap(tool, p);
   if (g.distance == std::numeric_limits<double>::max()) return {};
-  const glm::dvec3 size = glm::abs(g.normal);
-  const int axis = size.z >= size.x && size.z >= size.y ? 2 : size.y >= size.x ? 1 : 0;
+  const int axis = CompositeGrid::largest_axis(g.normal);
   const double way = g.normal[axis] < 0.0 ? -1.0 : 1.0;
   if (tool.shape == ToolInBody::Shape::punch) return {axis, way, u[axis] - g.distance / g.normal[axis], true};
   const double away = reach(tool.radius);
