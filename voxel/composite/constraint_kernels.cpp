@@ -10,7 +10,116 @@ namespace {
 // Range of the factor by which one cycle may change the weight of a link at its limit.
 constexpr float kMaxCycleFactor = 2.0F, kMinCycleFactor = 0.25F;
 
+// The fall over each link; without a link, more than any bound.
+HYBRID_INLINE void fall_over(Float8& fall, const float* weight, float by) {
+  Float8 w;
+  load(w, weight);
+  const Float8 none = Float8{} - kNoBound;
+  fall = w > Float8{} ? Float8{} + by : none;
+}
+
+// Bounds of a row from its low end to its high end: y(i) = max(bound(i), y(i − 1) − fall(i)), as a scan with
+// three shifts within each vector (Hillis & Steele 1986).
+HYBRID_INLINE void sweep_row_up(float* bound, const float* weight, float by, int first, int last) {
+  const Float8 no_bound = Float8{} + kNoBound, zero{};
+  Float8 carried = no_bound;
+  for (int o = first; o <= last; ++o) {
+    Float8 y, fall, from;
+    load(y, bound + o * kLanes);
+    fall_over(fall, weight + o * kLanes - 1, by);
+    from = __builtin_shufflevector(no_bound, y, 0, 8, 9, 10, 11, 12, 13, 14);
+    take_largest(y, from - fall);
+    Float8 before = __builtin_shufflevector(zero, fall, 0, 8, 9, 10, 11, 12, 13, 14);
+    fall += before;
+    from = __builtin_shufflevector(no_bound, y, 0, 1, 8, 9, 10, 11, 12, 13);
+    take_largest(y, from - fall);
+    before = __builtin_shufflevector(zero, fall, 0, 1, 8, 9, 10, 11, 12, 13);
+    fall += before;
+    from = __builtin_shufflevector(no_bound, y, 0, 1, 2, 3, 8, 9, 10, 11);
+    take_largest(y, from - fall);
+    before = __builtin_shufflevector(zero, fall, 0, 1, 2, 3, 8, 9, 10, 11);
+    fall += before;
+    take_largest(y, carried - fall);
+    carried = __builtin_shufflevector(y, y, 7, 7, 7, 7, 7, 7, 7, 7);
+    store(bound + o * kLanes, y);
+  }
+}
+
+HYBRID_INLINE void sweep_row_down(float* bound, const float* weight, float by, int first, int last) {
+  const Float8 no_bound = Float8{} + kNoBound, zero{};
+  Float8 carried = no_bound;
+  for (int o = last; o >= first; --o) {
+    Float8 y, fall, from;
+    load(y, bound + o * kLanes);
+    fall_over(fall, weight + o * kLanes, by);
+    from = __builtin_shufflevector(y, no_bound, 1, 2, 3, 4, 5, 6, 7, 8);
+    take_largest(y, from - fall);
+    Float8 after = __builtin_shufflevector(fall, zero, 1, 2, 3, 4, 5, 6, 7, 8);
+    fall += after;
+    from = __builtin_shufflevector(y, no_bound, 2, 3, 4, 5, 6, 7, 8, 9);
+    take_largest(y, from - fall);
+    after = __builtin_shufflevector(fall, zero, 2, 3, 4, 5, 6, 7, 8, 9);
+    fall += after;
+    from = __builtin_shufflevector(y, no_bound, 4, 5, 6, 7, 8, 9, 10, 11);
+    take_largest(y, from - fall);
+    after = __builtin_shufflevector(fall, zero, 4, 5, 6, 7, 8, 9, 10, 11);
+    fall += after;
+    take_largest(y, carried - fall);
+    carried = __builtin_shufflevector(y, y, 0, 0, 0, 0, 0, 0, 0, 0);
+    store(bound + o * kLanes, y);
+  }
+}
+
+// Bounds of a row from those of a row beside it.
+HYBRID_INLINE void take_from_row(float* bound, const float* beside, const float* weight, float by, int first,
+                                 int last) {
+  for (int o = first; o <= last; ++o) {
+    Float8 y, from, fall;
+    load(y, bound + o * kLanes);
+    load(from, beside + o * kLanes);
+    fall_over(fall, weight + o * kLanes, by);
+    take_largest(y, from - fall);
+    store(bound + o * kLanes, y);
+  }
+}
+
 }  // namespace
+
+HYBRID_MULTIVERSIONED void sweep_bounds(const BoundSweep& s) noexcept {
+  const int first = s.low[0] / kLanes, last = s.high[0] / kLanes;
+  const auto row = [&s](int j, int k) {
+    return static_cast<std::size_t>(k) * s.plane + static_cast<std::size_t>(j) * s.stride;
+  };
+  for (int k = s.low[2]; k <= s.high[2]; ++k) {
+    for (int j = s.low[1]; j <= s.high[1]; ++j) {
+      const std::size_t n = row(j, k);
+      sweep_row_up(s.bound + n, s.weight[0] + n, s.fall_up[0], first, last);
+      sweep_row_down(s.bound + n, s.weight[0] + n, s.fall_down[0], first, last);
+    }
+  }
+  for (int k = s.low[2]; k <= s.high[2]; ++k) {
+    for (int j = s.low[1] + 1; j <= s.high[1]; ++j) {
+      const std::size_t from = row(j - 1, k), to = row(j, k);
+      take_from_row(s.bound + to, s.bound + from, s.weight[1] + from, s.fall_up[1], first, last);
+    }
+    for (int j = s.high[1] - 1; j >= s.low[1]; --j) {
+      const std::size_t from = row(j + 1, k), to = row(j, k);
+      take_from_row(s.bound + to, s.bound + from, s.weight[1] + to, s.fall_down[1], first, last);
+    }
+  }
+  for (int k = s.low[2] + 1; k <= s.high[2]; ++k) {
+    for (int j = s.low[1]; j <= s.high[1]; ++j) {
+      const std::size_t from = row(j, k - 1), to = row(j, k);
+      take_from_row(s.bound + to, s.bound + from, s.weight[2] + from, s.fall_up[2], first, last);
+    }
+  }
+  for (int k = s.high[2] - 1; k >= s.low[2]; --k) {
+    for (int j = s.low[1]; j <= s.high[1]; ++j) {
+      const std::size_t from = row(j, k + 1), to = row(j, k);
+      take_from_row(s.bound + to, s.bound + from, s.weight[2] + to, s.fall_down[2], first, last);
+    }
+  }
+}
 
 // Nodes at a bound must move with it before the cycle. In a tight cone nodes are pulled only where its planes
 // meet, so smoothing alone would move the cone by one node a sweep. A node that its bound has passed is moved
@@ -54,6 +163,16 @@ HYBRID_MULTIVERSIONED void note_at_bound(float* at_bound, const float* u, const 
     }
     store(at_bound + n, h);
   }
+}
+
+HYBRID_MULTIVERSIONED float largest_size(const float* u, std::size_t count) noexcept {
+  Float8 most{};
+  for (std::size_t n = 0; n < count; n += kLanes) {
+    Float8 x;
+    load(x, u + n);
+    take_largest_size(most, x);
+  }
+  return largest(most);
 }
 
 HYBRID_MULTIVERSIONED float largest_limit_ratio(const float* u, const float* weight, std::size_t by,

@@ -12,7 +12,21 @@ using composite::index;
 constexpr int kCoarsest = 5;  // nodes along the longest edge of the coarsest level
 constexpr std::size_t kMaxPressed = 2048;
 
+// Nodes of a level along an edge of so many voxels; one more where an end is anchored.
+int nodes_across(int voxels, std::size_t level) {
+  const int step = 1 << level;
+  return (voxels - 1 + step / 2) / step + 1;
+}
+
 }  // namespace
+
+// Has the whole object no more nodes on this level than a patch of it?
+bool CompositeGrid::can_cover(std::size_t l) const {
+  const auto across = index(2 * half_width_of(l) + 1);
+  std::size_t nodes = 1;
+  for (const int voxels : lattice_.grid().dims) nodes *= index(nodes_across(voxels, l));
+  return nodes <= across * across * across;
+}
 
 CompositeGrid::CompositeGrid(const Lattice& lattice, int half_width, int coarse_half_width)
     : lattice_(lattice),
@@ -32,19 +46,20 @@ CompositeGrid::CompositeGrid(const Lattice& lattice, int half_width, int coarse_
     }
   }
   pressed_.reserve(kMaxPressed);
+  while (half_width_ != kRefineAll && !can_cover(covering_level_)) ++covering_level_;
   const int largest = *std::max_element(dims.begin(), dims.end());
-  const auto nodes_across = [largest](std::size_t l) { return (largest - 1 + (1 << l) - 1) / (1 << l) + 1; };
-  while (half_width_ != kRefineAll && nodes_across(covering_level_) > 2 * half_width_of(covering_level_) + 1)
-    ++covering_level_;
   std::size_t count = covering_level_ + 1;
-  while (nodes_across(count - 1) > kCoarsest) ++count;
+  while (nodes_across(largest, count - 1) > kCoarsest) ++count;
   levels_.resize(count);
   for (std::size_t l = 0; l < count; ++l) allocate(levels_[l], l);
   if (covering_level_ > 0) allocate_for_moves();
   // Scratch of weigh(): one plane of half cells, two a node and axis and one on either side.
-  std::size_t most = 0;
+  std::size_t most = 0, most_nodes = 0;
   for (const Level& level : levels_) {
     for (const AxisNodes& axis : level.nodes) most = std::max(most, axis.coarse.size());
+    most_nodes =
+        std::max(most_nodes, (level.nodes[0].coarse.size() + 2) * (level.nodes[1].coarse.size() + 2) *
+                                 (level.nodes[2].coarse.size() + 2));
   }
   for (HalfCells& plane : half_cells_) {
     plane.cells.reserve((2 * most + 2) * (2 * most + 2));
@@ -52,6 +67,7 @@ CompositeGrid::CompositeGrid(const Lattice& lattice, int half_width, int coarse_
       axis.reserve(material_.is_heterogeneous() ? plane.cells.capacity() : 0);
   }
   material_.reserve_planes(2 * most + 2);
+  is_tissue_node_.resize(most_nodes);
   begin({dims[0] / 2, dims[1] / 2, dims[2] / 2});
 }
 

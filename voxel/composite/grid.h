@@ -207,7 +207,8 @@ class CompositeGrid {
     float sign, u, force_N = 0.0F;
   };
   struct Level {
-    int step = 1;           // voxels between two nodes
+    int step = 1;  // voxels between two nodes
+    int log2_step = 0;
     bool is_built = false;  // with the present offset of coordinates
     bool moved = false;     // since put_to_rest()
     std::array<AxisNodes, 3> nodes;
@@ -269,6 +270,7 @@ class CompositeGrid {
     for (std::size_t l = 0; l < level; ++l) half = std::max(coarse_half_width_, (half + 7) / 4 * 2);
     return half;
   }
+  [[nodiscard]] bool can_cover(std::size_t level) const;  // grid.cpp
   // ---- patch_placement.cpp ----
   [[nodiscard]] bool in_place(std::size_t l) const noexcept;
   [[nodiscard]] bool nested(std::size_t l) const noexcept;
@@ -293,7 +295,8 @@ class CompositeGrid {
   void find_anchor_weights(Level& level, bool near) noexcept;
   void find_diagonal(Level& level, bool near) noexcept;
   [[nodiscard]] bool row_near_anchors(const Level& level, int j, int k) const noexcept;
-  void find_ghosts(Level& level) noexcept;
+  void mark_tissue_nodes(const Level& level, bool near) noexcept;
+  void find_ghosts(Level& level, bool near) noexcept;
   void set_up_transfer(Level& fine, const Level& coarse) const noexcept;
   void fill_ghosts(const Level& level, float* values) const noexcept;
   void distribute_ghost_loads(const Level& level, float* loads) const noexcept;
@@ -307,9 +310,15 @@ class CompositeGrid {
   [[nodiscard]] static int half_cube(const Level& level) noexcept;
   // ---- node_bounds.cpp ----
   void find_bounds(std::size_t axis) noexcept;
-  void propagate_bounds(Level& level, std::size_t axis, std::size_t kind, const Index3& low,
-                        const Index3& high) const noexcept;
-  void propagate_bounds_round_gaps(Level& level, std::size_t axis, std::size_t kind) const noexcept;
+  struct NodeBox {
+    Index3 low{}, high{};  // both included
+    [[nodiscard]] bool is_empty() const { return low[0] > high[0] || low[1] > high[1] || low[2] > high[2]; }
+  };
+  [[nodiscard]] float largest_displacement(std::size_t axis) const noexcept;
+  [[nodiscard]] NodeBox reach_of_bounds(const Level& level, std::size_t axis, std::size_t kind,
+                                        const NodeBox& pressed, float fall_m) const noexcept;
+  void hand_on_bounds(std::size_t l, std::size_t kind, const NodeBox& reach) noexcept;
+  void propagate_bounds(Level& level, std::size_t axis, std::size_t kind, const NodeBox& box) const noexcept;
   // ---- rigid_contacts.cpp ----
   [[nodiscard]] bool nearest_unknown(const Level& level, const Index3& at, Index3& node) const noexcept;
   [[nodiscard]] float obstacle_gap(const Level& level, const ObstacleNode& node) const noexcept;
@@ -365,6 +374,7 @@ class CompositeGrid {
   }
   // ---- queries.cpp ----
   [[nodiscard]] glm::dvec3 interpolate(const Level& level, const std::array<double, 3>& place) const noexcept;
+  [[nodiscard]] static glm::vec3 interpolate_at(const Level& level, const Index3& at) noexcept;
   [[nodiscard]] Index3 shifted(const Index3& voxel) const {
     return {voxel[0] + material_.offset()[0], voxel[1] + material_.offset()[1],
             voxel[2] + material_.offset()[2]};
@@ -412,7 +422,8 @@ class CompositeGrid {
     Floats cells;
     std::array<Floats, 3> stiffness;
   };
-  std::array<HalfCells, 2> half_cells_;  // scratch of weigh()
+  std::array<HalfCells, 2> half_cells_;       // scratch of weigh()
+  std::vector<std::uint8_t> is_tissue_node_;  // of find_ghosts(), with a border of one node
 };
 
 }  // namespace voxel

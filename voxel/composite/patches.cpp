@@ -38,9 +38,10 @@ int floor_to_multiple(int at, int step) {
 
 void CompositeGrid::allocate(Level& level, std::size_t l) const {
   level.step = 1 << l;
+  level.log2_step = static_cast<int>(l);
   std::array<std::size_t, 3> most{};
   for (std::size_t d = 0; d < 3; ++d) {
-    const int all = (material_.high(d) - material_.low(d)) / level.step + 3;
+    const int size = material_.high(d) - material_.low(d), all = size / level.step + 3;
     const int half = half_width_of(l);
     most[d] = index(half == kRefineAll || l >= covering_level_ ? all : std::min(all, 2 * half + 2));
     level.nodes[d].coarse.resize(most[d]);
@@ -48,7 +49,7 @@ void CompositeGrid::allocate(Level& level, std::size_t l) const {
     level.nodes[d].weight_after.resize(most[d] + 16);
     level.nodes[d].lane_weight.resize(most[d] + 16);
     // Indexed by nodes of the next level, which may span the whole object.
-    const std::size_t next = most[d] + 4 * index(half_width_of(l + 1));
+    const auto next = std::max(most[d], index(size / (2 * level.step) + 3));
     for (auto* by_node :
          {&level.nodes[d].restrict_low, &level.nodes[d].restrict_own, &level.nodes[d].restrict_high})
       by_node->resize(next);
@@ -199,7 +200,7 @@ void CompositeGrid::assemble(Level& level) noexcept {
   const bool near = material_.anchor_near(low, high, 2 * level.step);
   find_anchor_weights(level, near);
   find_diagonal(level, near);
-  find_ghosts(level);
+  find_ghosts(level, near);
 }
 
 // Removes links that a gap or an anchor interrupts, and finds the weights of the links to anchors.
@@ -314,33 +315,48 @@ void CompositeGrid::find_diagonal(Level& level, bool near) noexcept {
   }
 }
 
+// Marks the nodes of the tissue: unknowns, and nodes that are anchored or linked to something.
+void CompositeGrid::mark_tissue_nodes(const Level& level, bool near) noexcept {
+  const auto& nodes = level.nodes;
+  const std::size_t wide = index(nodes[0].count + 2), plane = wide * index(nodes[1].count + 2);
+  std::fill_n(is_tissue_node_.begin(), plane * index(nodes[2].count + 2), std::uint8_t{0});
+  for (int k = 0; k < nodes[2].count; ++k) {
+    for (int j = 0; j < nodes[1].count; ++j) {
+      std::uint8_t* const mark = is_tissue_node_.data() + index(k + 1) * plane + index(j + 1) * wide + 1;
+      const std::size_t row = level.row(j, k);
+      for (int i = 0; i < nodes[0].count; ++i) {
+        const std::size_t n = row + index(i);
+        bool any = level.inverse_diagonal[0][n] != 0.0F;
+        for (std::size_t d = 0; d < 3 && !any; ++d) {
+          any = level.weight[d][n] != 0.0F || level.weight[d][n - level.stride_along(d)] != 0.0F ||
+                level.anchor_weight[d][n] != 0.0F;
+        }
+        any = any || (near && material_.is_anchored({level.at(0, i), level.at(1, j), level.at(2, k)}));
+        mark[i] = any ? 1 : 0;
+      }
+    }
+  }
+}
+
 // Nodes outside the tissue that have nodes of the tissue beside them. Finer levels interpolate between both,
 // so ghosts take the mean of these neighbours.
-void CompositeGrid::find_ghosts(Level& level) noexcept {
+void CompositeGrid::find_ghosts(Level& level, bool near) noexcept {
   const auto& nodes = level.nodes;
   level.ghosts.clear();
   level.ghost_neighbours.clear();
-  const auto is_node = [&](int i, int j, int k) {
-    const std::size_t n = level.node(i, j, k);
-    if (level.inverse_diagonal[0][n] != 0.0F) return true;
-    for (std::size_t d = 0; d < 3; ++d) {
-      const std::size_t by = d == 0 ? 1 : d == 1 ? level.stride : level.plane;
-      if (level.weight[d][n] != 0.0F || level.weight[d][n - by] != 0.0F || level.anchor_weight[d][n] != 0.0F)
-        return true;
-    }
-    return material_.is_anchored({level.at(0, i), level.at(1, j), level.at(2, k)});
-  };
+  mark_tissue_nodes(level, near);
+  const auto wide = static_cast<std::ptrdiff_t>(nodes[0].count + 2), plane = wide * (nodes[1].count + 2);
   for (int k = 0; k < nodes[2].count; ++k) {
     for (int j = 0; j < nodes[1].count; ++j) {
+      const std::uint8_t* const mark = is_tissue_node_.data() + (k + 1) * plane + (j + 1) * wide + 1;
       for (int i = 0; i < nodes[0].count; ++i) {
-        if (is_node(i, j, k)) continue;
+        if (mark[i] != 0) continue;
         const auto first = static_cast<std::uint32_t>(level.ghost_neighbours.size());
         for (const auto& way : kAround) {
-          const int x = i + way[0], y = j + way[1], z = k + way[2];
-          if (x < 0 || y < 0 || z < 0 || x >= nodes[0].count || y >= nodes[1].count || z >= nodes[2].count)
-            continue;
-          if (is_node(x, y, z) && level.ghost_neighbours.size() < level.ghost_neighbours.capacity())
-            level.ghost_neighbours.push_back(static_cast<std::uint32_t>(level.node(x, y, z)));
+          if (mark[i + way[0] + way[1] * wide + way[2] * plane] != 0 &&
+              level.ghost_neighbours.size() < level.ghost_neighbours.capacity())
+            level.ghost_neighbours.push_back(
+                static_cast<std::uint32_t>(level.node(i + way[0], j + way[1], k + way[2])));
         }
         const auto count = static_cast<std::uint32_t>(level.ghost_neighbours.size()) - first;
         if (count > 0 && level.ghosts.size() < level.ghosts.capacity())

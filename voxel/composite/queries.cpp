@@ -168,6 +168,33 @@ glm::dvec3 CompositeGrid::interpolate(const Level& level, const std::array<doubl
   return {sum[0], sum[1], sum[2]};
 }
 
+// The same at a voxel (coordinates).
+glm::vec3 CompositeGrid::interpolate_at(const Level& level, const Index3& at) noexcept {
+  std::array<std::size_t, 3> by{};
+  std::array<float, 3> part{};
+  Index3 node{};
+  for (std::size_t d = 0; d < 3; ++d) {
+    const AxisNodes& nodes = level.nodes[d];
+    const int way = std::clamp(at[d] - nodes.begin, 0, level.step * (nodes.count - 1));
+    node[d] = way >> level.log2_step;
+    part[d] = static_cast<float>(way & (level.step - 1)) / static_cast<float>(level.step);
+    by[d] = part[d] > 0.0F ? level.stride_along(d) : 0;
+  }
+  const std::size_t n = level.node(node[0], node[1], node[2]);
+  glm::vec3 result;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const float* const u = level.u[a].data() + n;
+    const auto along_x = [&](std::size_t from) { return u[from] + part[0] * (u[from + by[0]] - u[from]); };
+    const auto along_y = [&](std::size_t from) {
+      const float low = along_x(from);
+      return low + part[1] * (along_x(from + by[1]) - low);
+    };
+    const float low = along_y(0);
+    result[static_cast<int>(a)] = low + part[2] * (along_y(by[2]) - low);
+  }
+  return result;
+}
+
 glm::dvec3 CompositeGrid::at_point(const std::array<double, 3>& point) const noexcept {
   const std::array<double, 3> place{point[0] + material_.offset()[0], point[1] + material_.offset()[1],
                                     point[2] + material_.offset()[2]};

@@ -63,13 +63,16 @@ void CompositeGrid::add_obstacle(std::uint32_t surface_number) noexcept {
 // The unknown of a level that is nearest to a place, if the level has the place within its patch.
 bool CompositeGrid::nearest_unknown(const Level& level, const Index3& at, Index3& node) const noexcept {
   Index3 other{};
+  const int half = level.step / 2;
+  for (std::size_t d = 0; d < 3; ++d) {
+    const int way = at[d] - level.nodes[d].begin;
+    if (way < -half || way > (level.nodes[d].count - 1) * level.step + half) return false;
+  }
   for (std::size_t d = 0; d < 3; ++d) {
     const AxisNodes& nodes = level.nodes[d];
-    const int way = at[d] - nodes.begin, half = level.step / 2;
-    node[d] = std::clamp((way + half) / level.step, 0, nodes.count - 1);
-    if (way < -half || node[d] < nodes.first || node[d] > nodes.last ||
-        way > (nodes.count - 1) * level.step + half)
-      return false;
+    const int way = at[d] - nodes.begin;
+    node[d] = std::clamp((way + half) >> level.log2_step, 0, nodes.count - 1);
+    if (node[d] < nodes.first || node[d] > nodes.last) return false;
     other[d] = std::clamp(node[d] + (way > node[d] * level.step ? 1 : -1), nodes.first, nodes.last);
   }
   const auto is_unknown = [&](const Index3& n) {
@@ -99,11 +102,9 @@ bool CompositeGrid::nearest_unknown(const Level& level, const Index3& at, Index3
 // Gap of a surface voxel to its plane, at its displacement on this level (m).
 float CompositeGrid::obstacle_gap(const Level& level, const ObstacleNode& node) const noexcept {
   const Obstacle& o = obstacles_[node.surface];
-  const Index3 at = shifted(node.voxel);
   const glm::vec3 u =
       level.step == 1 ? glm::vec3(level.u[0][node.number], level.u[1][node.number], level.u[2][node.number])
-                      : glm::vec3(interpolate(level, {static_cast<double>(at[0]), static_cast<double>(at[1]),
-                                                      static_cast<double>(at[2])}));
+                      : interpolate_at(level, shifted(node.voxel));
   return glm::dot(o.normal, u) - o.bound;
 }
 

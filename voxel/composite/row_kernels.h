@@ -71,6 +71,19 @@ float update_row_weights(const float* u, const float* weight, std::size_t by, co
 [[nodiscard]] float updated_weight(float limited, float weight, float limit_ratio,
                                    const LinkMultiplier& limit) noexcept;
 
+// Lower bounds of one axis of one level, from its first row on, and a box of its nodes. For a link from a
+// node up to the next one along d: bound(next) >= bound − fall_up[d] and bound >= bound(next) − fall_down[d].
+struct BoundSweep {
+  float* bound;
+  std::array<const float*, 3> weight;  // [d] as in LevelView; 0: no link
+  std::array<float, 3> fall_up, fall_down;
+  std::array<int, 3> low, high;  // nodes of the box, both included
+  std::size_t stride, plane;
+};
+// Raises each bound of the box to those that its links ask for: along x in both directions, then y, then z.
+void sweep_bounds(const BoundSweep& sweep) noexcept;
+// The largest |u|.
+[[nodiscard]] float largest_size(const float* u, std::size_t count) noexcept;
 // Moves nodes onto their bound that are at it by `at_bound`, and nodes that are beyond it.
 void follow_bounds(float* u, const float* at_bound, const float* lower, const float* negated_upper,
                    std::size_t count) noexcept;
