@@ -194,8 +194,10 @@ class Builder {
     built_.notes.push_back(
         {world_->soft[o].name, polygon::Severity::info,
          obstacle.empty()
-             ? std::string("contacts are kept on nested patches: a tick takes the same time for any depth "
-                           "and size")
+             ? fmt::format(
+                   "contacts are kept on nested patches: a tick takes the same time for any depth and "
+                   "size (in trials, forces within {:.0f} % of those on wider patches)",
+                   std::max(1.0, std::ceil(100.0 * object.patch_error())))
              : fmt::format("contacts are kept voxel by voxel, not on nested patches: {}", obstacle)});
   }
 

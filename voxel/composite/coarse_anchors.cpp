@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Where the anchors of an object are, as the coarse levels of a CompositeGrid need them (coarse_material.h).
 #include <algorithm>
+#include <bit>
+#include <limits>
+#include <numeric>
 
 #include "voxel/composite/coarse_material.h"
 
@@ -30,6 +33,94 @@ void CoarseMaterial::mark_anchors() {
       }
     }
   }
+}
+
+void CoarseMaterial::list_anchor_faces() {
+  const auto in_whole_side = [this](const Index3& p) {
+    for (std::size_t d = 0; d < 3; ++d) {
+      if ((p[d] == 0 && anchored_share_[d][0] == 1.0) ||
+          (p[d] == dims_[d] - 1 && anchored_share_[d][1] == 1.0))
+        return true;
+    }
+    return false;
+  };
+  bool scattered = false;
+  const Grid& g = lattice_.grid();
+  for (RowId row = 0; row < g.rows(); ++row) {
+    for (std::uint32_t lanes = lattice_.anchored_lanes(row); lanes != 0; lanes &= lanes - 1) {
+      const Index3 p = lattice_.coordinates(row * kRow + static_cast<VoxelId>(std::countr_zero(lanes)));
+      scattered = scattered || !in_whole_side(p);
+      for (std::uint8_t d = 0; d < 3; ++d) {
+        for (std::uint8_t signs = 0; signs < 8; ++signs) add_anchor_face(p, d, signs);
+      }
+    }
+  }
+  if (!scattered) {
+    anchor_faces_ = {};
+    return;
+  }
+  const CubeLevel& cubes = levels_[kFirstAnchorLevel];
+  const auto cube_of = [&cubes](const PackedFace& face) {
+    return cubes.at({face.voxel[0] >> kFirstAnchorLevel, face.voxel[1] >> kFirstAnchorLevel,
+                     face.voxel[2] >> kFirstAnchorLevel});
+  };
+  std::stable_sort(anchor_faces_.begin(), anchor_faces_.end(),
+                   [&](const PackedFace& a, const PackedFace& b) { return cube_of(a) < cube_of(b); });
+  faces_until_.assign(cubes.anchored.size(), 0);
+  for (const PackedFace& face : anchor_faces_) ++faces_until_[cube_of(face)];
+  std::partial_sum(faces_until_.begin(), faces_until_.end(), faces_until_.begin());
+}
+
+// Adds a quarter of a face if there is one: the neighbour is tissue that may move, and the cell has all its
+// voxels.
+void CoarseMaterial::add_anchor_face(const Index3& voxel, std::uint8_t d, std::uint8_t signs) {
+  const auto sign = [signs](int bit) { return (signs >> bit & 1) != 0 ? 1 : -1; };
+  const auto at = [&](int along, int p, int q) {
+    Index3 v = voxel;
+    v[d] += along * sign(0);
+    v[(d + 1U) % 3] += p * sign(1);
+    v[(d + 2U) % 3] += q * sign(2);
+    return lattice_.at(v[0], v[1], v[2]);
+  };
+  if (!lattice_.filled(at(1, 0, 0)) || lattice_.anchored(at(1, 0, 0))) return;
+  for (const int along : {0, 1}) {
+    if (!lattice_.filled(at(along, 1, 0)) || !lattice_.filled(at(along, 0, 1)) ||
+        !lattice_.filled(at(along, 1, 1)))
+      return;
+  }
+  PackedFace face{{}, d, signs};
+  for (std::size_t e = 0; e < 3; ++e) face.voxel[e] = static_cast<std::uint16_t>(voxel[e]);
+  anchor_faces_.push_back(face);
+}
+
+// Breadth-first search from all anchors.
+std::vector<std::uint32_t> CoarseMaterial::links_to_anchors() const {
+  std::vector<std::uint32_t> links(lattice_.surface().size(), std::numeric_limits<std::uint32_t>::max());
+  std::vector<bool> known(lattice_.size());
+  std::vector<VoxelId> front, next;
+  const Grid& g = lattice_.grid();
+  const auto visit = [&](VoxelId v, std::uint32_t away) {
+    known[v] = true;
+    next.push_back(v);
+    const std::uint32_t s = lattice_.surface_number(v);
+    if (s < links.size()) links[s] = away;
+  };
+  for (RowId row = 0; row < g.rows(); ++row) {
+    for (std::uint32_t lanes = lattice_.anchored_lanes(row); lanes != 0; lanes &= lanes - 1)
+      visit(row * kRow + static_cast<VoxelId>(std::countr_zero(lanes)), 0);
+  }
+  for (std::uint32_t away = 1; !next.empty(); ++away) {
+    front.swap(next);
+    next.clear();
+    for (const VoxelId v : front) {
+      for (int d = 0; d < 3; ++d) {
+        for (const VoxelId w : {lattice_.up(v, d), lattice_.down(v, d)}) {
+          if (lattice_.filled(w) && !known[w]) visit(w, away);
+        }
+      }
+    }
+  }
+  return links;
 }
 
 bool CoarseMaterial::anchor_near(const Index3& p, const Index3& q, int span) const noexcept {
@@ -91,11 +182,7 @@ CoarseMaterial::AnchorSearch CoarseMaterial::anchors_along(const Index3& p, std:
     if (here && before) ++found.links;
     before = here;
     if (!here) continue;
-    if (!is_anchored(q)) {
-      found.low_free = found.low_free || t == 0;
-      found.high_free = t == links;
-      continue;
-    }
+    if (!is_anchored(q)) continue;
     // An anchor at an end of the line belongs to the node there, not to the link.
     if (t > 0 && found.ahead == 0) found.ahead = t;
     if (t < links) found.back = links - t;
@@ -139,8 +226,6 @@ CoarseMaterial::AnchorSearch CoarseMaterial::anchors_in_box(const Index3& p, std
   const int ahead = scan(std::max(first, 1), last, 1), back = scan(std::min(last, links - 1), first, -1);
   if (ahead <= links) found.ahead = ahead;
   if (back <= links) found.back = links - back;
-  found.low_free = first == 0 && !anchor_at(0);
-  found.high_free = last == links && !anchor_at(links);
   return found;
 }
 

@@ -16,6 +16,7 @@
 // every level.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -50,6 +51,11 @@ class CoarseMaterial {
     return anchored_share_[d][end];
   }
   [[nodiscard]] bool fills_box() const { return fills_box_; }
+  // Weight of the link from p to the next voxel along d if no cell is round it, else 0: of a sheet or row of
+  // single voxels (link_stiffness.h). `all_alike`: as if all tissue had the reference stiffness.
+  [[nodiscard]] float thin_link(const Index3& p, std::size_t d, bool all_alike) const noexcept;
+  // Has the object such links?
+  [[nodiscard]] bool has_thin_links() const { return has_thin_links_; }
   // Are there tissues of different stiffness?
   [[nodiscard]] bool is_heterogeneous() const { return stiffness_.size() > 2; }
   [[nodiscard]] bool is_filled(const Index3& p) const noexcept;
@@ -72,15 +78,30 @@ class CoarseMaterial {
 
   // Voxels from either end of a line to its first anchored voxel other than the end itself; 0: there is none.
   struct AnchorSearch {
-    int ahead = 0, back = 0;                   // from the low end upwards, from the high end downwards
-    int links = 0;                             // links of the line that are in tissue
-    bool low_free = false, high_free = false;  // the voxel at that end is tissue and not anchored
+    int ahead = 0, back = 0;  // from the low end upwards, from the high end downwards
+    int links = 0;            // links of the line that are in tissue
   };
   // Of the line of `links` links from p in direction d, or of the nearest line with tissue in it.
   [[nodiscard]] AnchorSearch anchors_along(const Index3& p, std::size_t d, int links) const noexcept;
   // May there be an anchor in the box between p and q, widened by half of `span`? p and q lie at most `span`
   // apart.
   [[nodiscard]] bool anchor_near(const Index3& p, const Index3& q, int span) const noexcept;
+  // Is there an anchor that does not lie in a side of the object that is anchored as a whole?
+  [[nodiscard]] bool has_scattered_anchors() const { return !anchor_faces_.empty(); }
+  // Of scattered anchors: calls visit(face) for the anchored voxels of the box, cube by cube.
+  // A quarter of the face between an anchored voxel and its neighbour along d, which may move: the quarter
+  // that the cell beside both stands for.
+  struct AnchorFace {
+    Index3 voxel{};
+    std::size_t d = 0;
+    int side = 0;               // −1 or 1: of the neighbour
+    std::array<int, 2> cell{};  // −1 or 1: of the cell along d + 1 and d + 2
+  };
+  template <class Visit>
+  void for_anchor_faces(const Index3& low, const Index3& high, const Visit& visit) const;
+  // [surface number] links from a surface voxel to the nearest anchor; without a chain to one, the largest
+  // number. Allocates.
+  [[nodiscard]] std::vector<std::uint32_t> links_to_anchors() const;
   // Are the `count` voxels from p on in direction d all filled?
   [[nodiscard]] bool is_unbroken(Index3 p, std::size_t d, int count) const noexcept;
 
@@ -115,6 +136,10 @@ class CoarseMaterial {
   void find_stiffness();
   void coarsen_stiffness(const CubeLevel& below, CubeLevel& coarse) const;
   void mark_anchors();
+  [[nodiscard]] float relative_stiffness(const Index3& p) const noexcept;
+  [[nodiscard]] bool find_thin_link() const noexcept;
+  void list_anchor_faces();
+  void add_anchor_face(const Index3& voxel, std::uint8_t d, std::uint8_t signs);
   [[nodiscard]] float cell_count(const CubeLevel& level, int m, const Index3& cube) const noexcept;
   void cell_ranks(int k, int x0, int nx, int y0, int ny, std::uint8_t* out) noexcept;
   void voxel_ranks(int x0, int nx, int j, int k, std::uint8_t* out) const noexcept;
@@ -124,12 +149,48 @@ class CoarseMaterial {
   const Lattice& lattice_;
   Index3 dims_, offset_{};
   std::array<std::array<double, 2>, 3> anchored_share_{};
-  bool fills_box_ = false;
+  bool fills_box_ = false, has_thin_links_ = false;
   std::array<std::uint8_t, 256> rank_{};  // [label] rank of its stiffness, the softest 1; 0: no voxel
   std::vector<float> stiffness_;          // [rank] relative to the reference's
   std::vector<float> series_pair_;        // [rank · ranks + rank] two cells in series, times their number
   std::vector<CubeLevel> levels_;         // [m]
   std::vector<std::uint8_t> voxel_scratch_, cell_scratch_;
+  struct PackedFace {
+    std::array<std::uint16_t, 3> voxel{};  // without the offset
+    std::uint8_t d = 0;
+    std::uint8_t signs = 0;  // bit 0: side, bits 1 and 2: cell; set: 1
+  };
+  std::vector<PackedFace> anchor_faces_;    // by cubes of kFirstAnchorLevel
+  std::vector<std::uint32_t> faces_until_;  // [cube] end of its faces
 };
+
+template <class Visit>
+void CoarseMaterial::for_anchor_faces(const Index3& low, const Index3& high, const Visit& visit) const {
+  if (anchor_faces_.empty()) return;
+  const CubeLevel& cubes = levels_[kFirstAnchorLevel];
+  Index3 first{}, last{}, cube{};
+  for (std::size_t d = 0; d < 3; ++d) {
+    first[d] = std::max((low[d] - offset_[d]) >> kFirstAnchorLevel, 0);
+    last[d] = std::min((high[d] - offset_[d]) >> kFirstAnchorLevel, cubes.dims[d] - 1);
+  }
+  for (cube[2] = first[2]; cube[2] <= last[2]; ++cube[2]) {
+    for (cube[1] = first[1]; cube[1] <= last[1]; ++cube[1]) {
+      for (cube[0] = first[0]; cube[0] <= last[0]; ++cube[0]) {
+        const std::size_t at = cubes.at(cube);
+        for (std::uint32_t n = at > 0 ? faces_until_[at - 1] : 0; n < faces_until_[at]; ++n) {
+          const PackedFace& packed = anchor_faces_[n];
+          const auto sign = [&packed](int bit) { return (packed.signs >> bit & 1) != 0 ? 1 : -1; };
+          AnchorFace face{{}, packed.d, sign(0), {sign(1), sign(2)}};
+          bool inside = true;
+          for (std::size_t d = 0; d < 3; ++d) {
+            face.voxel[d] = packed.voxel[d] + offset_[d];
+            inside = inside && face.voxel[d] >= low[d] && face.voxel[d] <= high[d];
+          }
+          if (inside) visit(face);
+        }
+      }
+    }
+  }
+}
 
 }  // namespace voxel

@@ -80,7 +80,8 @@ void CompositeGrid::restrict_residual(std::size_t l, std::size_t a) noexcept {
   const composite::LevelView here = view(l, a);
   composite::residual_of_level(here);
   // Coarser levels do not know which nodes are active, so they get the stiffness of the links to them.
-  const bool any_active = fine.bounded[0] || fine.bounded[1] || fine.has_active_stiffness;
+  const bool any_active =
+      fine.bounded[0] || fine.bounded[1] || fine.has_active_stiffness || !coarse.correction_springs.empty();
   if (any_active) {
     if (!fine.has_active_stiffness)
       std::fill(fine.active_stiffness.begin(), fine.active_stiffness.end(), 0.0F);
@@ -104,6 +105,11 @@ void CompositeGrid::restrict_residual(std::size_t l, std::size_t a) noexcept {
   if (any_active) {
     std::fill_n(coarse.active_stiffness.begin() + static_cast<std::ptrdiff_t>(begin), floats, 0.0F);
     restrict_values(coarse, fine, a, fine.active_stiffness.data(), coarse.active_stiffness.data());
+    for (const CorrectionSpring& s : coarse.correction_springs) {
+      coarse.active_stiffness[s.node] += s.weight[0] * spring_N_per_m_[0][a] +
+                                         s.weight[1] * spring_N_per_m_[1][a] +
+                                         s.weight[2] * spring_N_per_m_[2][a];
+    }
   }
   std::copy_n(coarse.u[a].begin() + static_cast<std::ptrdiff_t>(begin), floats,
               coarse.restricted_u.begin() + static_cast<std::ptrdiff_t>(begin));

@@ -3,20 +3,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 
 namespace voxel {
 namespace {
 
 using composite::index;
 
-constexpr int kCoarsest = 5;  // nodes along the longest edge of the coarsest level
+constexpr int kCoarsest = 5;  // nodes along the longest edge of the coarsest level, at most
 constexpr std::size_t kMaxPressed = 2048;
-
-// Nodes of a level along an edge of so many voxels; one more where an end is anchored.
-int nodes_across(int voxels, std::size_t level) {
-  const int step = 1 << level;
-  return (voxels - 1 + step / 2) / step + 1;
-}
 
 }  // namespace
 
@@ -24,7 +20,7 @@ int nodes_across(int voxels, std::size_t level) {
 bool CompositeGrid::can_cover(std::size_t l) const {
   const auto across = index(2 * half_width_of(l) + 1);
   std::size_t nodes = 1;
-  for (const int voxels : lattice_.grid().dims) nodes *= index(nodes_across(voxels, l));
+  for (std::size_t d = 0; d < 3; ++d) nodes *= index(whole_range(1 << l, d).count(1 << l));
   return nodes <= across * across * across;
 }
 
@@ -49,14 +45,15 @@ CompositeGrid::CompositeGrid(const Lattice& lattice, int half_width, int coarse_
   while (half_width_ != kRefineAll && !can_cover(covering_level_)) ++covering_level_;
   const int largest = *std::max_element(dims.begin(), dims.end());
   std::size_t count = covering_level_ + 1;
-  while (nodes_across(largest, count - 1) > kCoarsest) ++count;
+  while (((largest - 2) >> (count - 1)) + 2 > kCoarsest) ++count;
   levels_.resize(count);
   for (std::size_t l = 0; l < count; ++l) allocate(levels_[l], l);
   if (covering_level_ > 0) allocate_for_moves();
   // Scratch of weigh(): one plane of half cells, two a node and axis and one on either side.
-  std::size_t most = 0, most_nodes = 0;
+  std::size_t most = 0, most_nodes = 0, most_floats = 0;
   for (const Level& level : levels_) {
     for (const AxisNodes& axis : level.nodes) most = std::max(most, axis.coarse.size());
+    most_floats = std::max(most_floats, level.u[0].size());
     most_nodes =
         std::max(most_nodes, (level.nodes[0].coarse.size() + 2) * (level.nodes[1].coarse.size() + 2) *
                                  (level.nodes[2].coarse.size() + 2));
@@ -68,6 +65,13 @@ CompositeGrid::CompositeGrid(const Lattice& lattice, int half_width, int coarse_
   }
   material_.reserve_planes(2 * most + 2);
   is_tissue_node_.resize(most_nodes);
+  faces_of_cell_.resize(material_.has_scattered_anchors() ? most_floats : 0);
+  for (auto& sides : anchor_faces_) {
+    for (AnchorFaces& faces : sides) {
+      for (Floats* const array : {&faces.count, &faces.in_link, &faces.distance, &faces.constriction})
+        array->resize(material_.has_scattered_anchors() ? most_floats : 0);
+    }
+  }
   begin({dims[0] / 2, dims[1] / 2, dims[2] / 2});
 }
 
@@ -131,6 +135,7 @@ glm::dvec3 CompositeGrid::compliance(const Index3& voxel) const noexcept {
 }
 
 glm::dvec3 CompositeGrid::clamp_to_anchors(const Index3& voxel, const glm::dvec3& u) const noexcept {
+  if (material_.has_scattered_anchors()) return clamp_to_nearest_anchor(voxel, u);
   glm::dvec3 result = u;
   const auto& dims = lattice_.grid().dims;
   for (std::size_t d = 0; d < 3; ++d) {
@@ -145,6 +150,25 @@ glm::dvec3 CompositeGrid::clamp_to_anchors(const Index3& voxel, const glm::dvec3
         at = std::clamp(at, end == 1 ? -longer : -shorter, end == 1 ? shorter : longer);
       }
     }
+  }
+  return result;
+}
+
+void CompositeGrid::find_chains_to_anchors() {
+  if (material_.has_scattered_anchors()) links_to_anchor_ = material_.links_to_anchors();
+}
+
+// A chain to the nearest anchor is as long as its links allow along their widest limit.
+glm::dvec3 CompositeGrid::clamp_to_nearest_anchor(const Index3& voxel, const glm::dvec3& u) const noexcept {
+  const std::uint32_t s = lattice_.surface_number(lattice_.at(voxel[0], voxel[1], voxel[2]));
+  if (s >= links_to_anchor_.size()) return u;
+  glm::dvec3 result = u;
+  for (std::size_t a = 0; a < 3; ++a) {
+    float widest = 0.0F;
+    for (const auto& d : limit_m_) widest = std::max({widest, d[a][0], d[a][1]});
+    const double most = links_to_anchor_[s] * static_cast<double>(widest);
+    double& at = result[static_cast<int>(a)];
+    at = std::clamp(at, -most, most);
   }
   return result;
 }

@@ -12,7 +12,10 @@
 //
 // Shape. The stiffness of a link between two nodes follows from the tissue round it (coarse_material.h): on
 // level 0 it is that of the lattice, on coarser levels a mean. No link crosses a gap. Anchors are springs to
-// a node, at their distance. Tissues may differ in stiffness, but not in limits or Poisson's ratio.
+// a node: at their distance where whole sides are anchored, else with the constriction of the load that
+// spreads from them (scattered_anchors.cpp). Where a coarse level is weaker than the finer level is against
+// its corrections, springs shorten these (correction_springs.cpp). Tissues may differ in stiffness, but not
+// in limits or Poisson's ratio.
 //
 // Limits. In a convex body of one tissue the equilibrium within the chain limits solves an obstacle problem:
 // each node lies between L = max(u(s) − dist(v→s)) and U = min(u(s) + dist(s→v)) over the pressed voxels s,
@@ -37,6 +40,7 @@
 #include <vector>
 
 #include "voxel/composite/coarse_material.h"
+#include "voxel/composite/level.h"
 #include "voxel/lattice/displacement.h"
 #include "voxel/lattice/lattice.h"
 
@@ -49,18 +53,25 @@ struct LevelView;
 
 class CompositeGrid {
  public:
-  // Why contacts of this object cannot be solved on a CompositeGrid; empty: they can. Allocates.
-  static std::string reason_unsuitable(const Lattice& lattice);
+  struct Suitability {
+    std::string reason;  // why contacts of an object cannot be solved on a CompositeGrid; empty: they can
+    double force_error = 0.0;  // greatest relative difference from patches twice as wide in trials
+  };
+  // Allocates.
+  static Suitability suitability(const Lattice& lattice);
   static constexpr int kRefineAll = -1, kHalfWidth = 6, kMaxHalfWidth = 14, kReferenceHalfWidth = 24;
   // `half_width`: of the patch of level 0 (voxels); `coarse_half_width`: of the other patches (nodes). Both
   // are rounded up to even numbers >= kHalfWidth. kRefineAll: level 0 covers the whole object, for
   // references. Allocates.
   CompositeGrid(const Lattice& lattice, int half_width, int coarse_half_width = kHalfWidth);
+  // Before contacts: how many links each surface voxel is away from the nearest anchor, for
+  // clamp_to_supports(), where anchors are scattered. Allocates.
+  void find_chains_to_anchors();
   // Takes the displacements of another grid of the same object, interpolated.
   void interpolate_from(const CompositeGrid& other) noexcept;
 
   // ---- none of these allocates, locks or throws ----
-  using Index3 = std::array<int, 3>;  // voxel (i, j, k), node or cube
+  using Index3 = composite::Index3;  // voxel (i, j, k), node or cube
   // Before a contact, once a tick: does one level's share of begin() at this voxel.
   void prepare(const Index3& centre) noexcept;
   // Begins a contact at voxel `centre`, everything at rest. Patches that have the voxel well inside stay.
@@ -79,8 +90,8 @@ class CompositeGrid {
   [[nodiscard]] glm::dvec3 unconstrained_minimum(const Index3& voxel) const noexcept;
   [[nodiscard]] glm::dvec3 compliance(const Index3& voxel) const noexcept;
   void set_fine(const Index3& voxel, const glm::dvec3& u) noexcept;
-  // `u` clamped to the displacements that the chains from fully anchored sides, and from nodes near rigid
-  // surfaces, allow the voxel (m).
+  // `u` clamped to the displacements that the chains from anchors, and from nodes near rigid surfaces, allow
+  // the surface voxel (m).
   [[nodiscard]] glm::dvec3 clamp_to_supports(const Index3& voxel, const glm::dvec3& u) const noexcept {
     return clamp_to_obstacles(voxel, clamp_to_anchors(voxel, u));
   }
@@ -150,47 +161,21 @@ class CompositeGrid {
       }
     }
   }
-  // Does every anchor belong to a side of the object that is anchored as a whole?
-  [[nodiscard]] bool anchored_by_sides() const noexcept;
   // Is there no anchor within the distance that a contact should keep from them?
   [[nodiscard]] bool far_from_anchors(const Index3& voxel) const noexcept;
-  // Anchored area that the covering level sees, by that of the lattice's links; 1: all of it.
-  [[nodiscard]] double anchor_area_ratio() const noexcept;
 
  private:
-  static constexpr int kOutside = -2;
-  // Nodes of a level along one axis, and the one-dimensional transfer to the next coarser level.
-  struct AxisNodes {
-    int count = 0, begin = 0;                  // nodes; coordinate of the first
-    int first = 0, last = -1;                  // unknowns, both included
-    bool open_low = false, open_high = false;  // the patch ends within the object
-    // By node: the coarse node at or before it, and the weight of the coarse node after that (0 or 0.5).
-    std::vector<int> coarse;
-    std::vector<float> weight_after;
-    // The same along x for whole rows: lane i lies at or after the coarse lane base + (i + odd) / 2.
-    int base = 0;
-    bool odd = false;
-    std::vector<float> lane_weight;
-    // By coarse node: the node at its place, which may be one beyond either end; kOutside: further out.
-    std::vector<int> fine;
-    int coarse_first = 0, coarse_last = -1;  // coarse nodes strictly within this patch
-    // By coarse node: restriction weights of the nodes before, at and after it.
-    std::vector<float> restrict_low, restrict_own, restrict_high;
-  };
-  using Floats = std::vector<float>;
-  // A node outside the tissue, with nodes of the tissue beside it: ghost_neighbours[first … first + count −
-  // 1].
-  struct Ghost {
-    std::uint32_t at, first, count;
-  };
+  static constexpr std::size_t kPad = composite::kPad;
+  static constexpr int kOutside = composite::kOutside;
+  using Floats = composite::Floats;
+  using AxisNodes = composite::AxisNodes;
+  using AnchorFaces = composite::AnchorFaces;
+  using CorrectionSpring = composite::CorrectionSpring;
+  using Ghost = composite::Ghost;
+  using ObstacleNode = composite::ObstacleNode;
+  using Level = composite::GridLevel;
   // A surface voxel beside a rigid surface, and the node of a level that it stands for.
   struct BesideRigid {
-    Index3 voxel;
-    std::uint32_t surface;
-  };
-  struct ObstacleNode {
-    Index3 node;
-    std::size_t number;
     Index3 voxel;
     std::uint32_t surface;
   };
@@ -206,53 +191,6 @@ class CompositeGrid {
     std::size_t axis;
     float sign, u, force_N = 0.0F;
   };
-  struct Level {
-    int step = 1;  // voxels between two nodes
-    int log2_step = 0;
-    bool is_built = false;  // with the present offset of coordinates
-    bool moved = false;     // since put_to_rest()
-    std::array<AxisNodes, 3> nodes;
-    std::size_t stride = 8, plane = 0;
-    std::array<Floats, 3> u, at_bound;  // [axis] (m); 1 at the lower bound, −1 at the upper bound
-    // [d] of the link to the next node, and of links to anchors, relative to a link between two voxels.
-    std::array<Floats, 3> weight, anchor_weight;
-    // Where tissues differ: [d] the weight if all tissue had the reference stiffness; [d] voxels to the
-    // anchor, negative behind the node; [axis][d] the weights with multipliers.
-    std::array<Floats, 3> shape_weight, anchor_distance;
-    std::array<std::array<Floats, 3>, 3> limited_weight, limited_anchor_weight;
-    std::array<Floats, 3> inverse_diagonal, diagonal;  // [axis] of the stiffness matrix; inverse 0: fixed
-    // Of the axis that the cycle is on (LevelView). restricted_u: u before the level was smoothed.
-    Floats f, restricted_u, residual, is_free, is_active, active_stiffness, inverse_with_active;
-    std::array<Floats, 2> bound;  // of the same axis; 0: least u, 1: least −u
-    std::array<bool, 2> bounded{};
-    bool has_active_stiffness = false;  // from active nodes of finer levels; of the same axis
-    double anchored_area = 0.0;         // (unit: face of a voxel)
-    bool has_anchors = false;           // some node has an anchor weight
-    bool has_gaps = false;              // some link within the patch is missing
-    std::vector<Ghost> ghosts;
-    std::vector<std::uint32_t> ghost_neighbours;
-    std::vector<ObstacleNode> obstacle_nodes;
-    std::vector<std::uint32_t> obstacle_of;  // [node] 1 + index into obstacle_nodes; 0: none
-    [[nodiscard]] std::size_t row(int j, int k) const {
-      return plane + stride + kPad + static_cast<std::size_t>(k) * plane +
-             static_cast<std::size_t>(j) * stride;
-    }
-    [[nodiscard]] std::size_t first_row() const { return row(0, 0); }
-    [[nodiscard]] std::size_t floats() const { return static_cast<std::size_t>(nodes[2].count) * plane; }
-    [[nodiscard]] std::size_t node(int i, int j, int k) const {
-      return row(j, k) + static_cast<std::size_t>(i);
-    }
-    [[nodiscard]] std::array<int, 3> node_of(std::size_t number) const {  // number: from first_row() on
-      return {static_cast<int>(number % stride), static_cast<int>(number % plane / stride),
-              static_cast<int>(number / plane)};
-    }
-    // From a node to the next one along d.
-    [[nodiscard]] std::size_t stride_along(std::size_t d) const {
-      return d == 0 ? 1 : d == 1 ? stride : plane;
-    }
-    [[nodiscard]] int at(std::size_t d, int i) const { return nodes[d].begin + step * i; }
-  };
-  static constexpr std::size_t kPad = 8;
   struct Pressed {
     Index3 node;
     glm::vec3 u, normal;
@@ -263,7 +201,9 @@ class CompositeGrid {
   static constexpr float kAlong = 0.02F;
 
   // ---- suitability.cpp ----
-  [[nodiscard]] std::string trial_failure();
+  [[nodiscard]] Suitability try_contacts();
+  [[nodiscard]] bool converges_at(const Index3& place, float most_m) noexcept;
+  [[nodiscard]] double settled_press(const Index3& place, const glm::dvec3& push_m) noexcept;
   // So wide that a level's patch contains the finer one, wherever the contact lies between its nodes.
   [[nodiscard]] int half_width_of(std::size_t level) const {
     int half = half_width_;
@@ -288,16 +228,35 @@ class CompositeGrid {
     bool open_low, open_high;
     [[nodiscard]] int count(int step) const { return (high - low) / step + 1; }
   };
+  [[nodiscard]] NodeRange whole_range(int step, std::size_t d) const noexcept;
   [[nodiscard]] NodeRange node_range(std::size_t l, std::size_t d, int centre) const noexcept;
   void place_nodes(Level& level, std::size_t l, const Index3& centre) const noexcept;
   void assemble(Level& level) noexcept;
   // `near`: there may be anchors in or beside the patch.
   void find_anchor_weights(Level& level, bool near) noexcept;
   void find_diagonal(Level& level, bool near) noexcept;
+  [[nodiscard]] bool gathers_anchors(const Level& level) const {
+    return level.step > 1 && material_.has_scattered_anchors();
+  }
+  void gather_anchors(Level& level) noexcept;
+  [[nodiscard]] static bool nodes_of_face(const Level& level, const CoarseMaterial::AnchorFace& face,
+                                          std::size_t& held, std::size_t& nearest, int& distance) noexcept;
+  [[nodiscard]] float constriction_of_face(const Level& level, std::size_t cell) const noexcept;
+  [[nodiscard]] const std::array<Floats, 3>& shape_weights(const Level& level) const {
+    return material_.is_heterogeneous() ? level.shape_weight : level.weight;
+  }
+  [[nodiscard]] static float weight_of_faces(const AnchorFaces& faces, std::size_t node,
+                                             float square) noexcept;
+  [[nodiscard]] float stiffness_at(const Level& level, std::size_t node) const noexcept;
+  [[nodiscard]] static bool is_linked(const Level& level, const Index3& node) noexcept;
+  [[nodiscard]] static bool nearest_node(const Level& level, const Index3& at, bool unknown,
+                                         Index3& node) noexcept;
   [[nodiscard]] bool row_near_anchors(const Level& level, int j, int k) const noexcept;
   void mark_tissue_nodes(const Level& level, bool near) noexcept;
   void find_ghosts(Level& level, bool near) noexcept;
-  void set_up_transfer(Level& fine, const Level& coarse) const noexcept;
+  void set_up_transfer(Level& fine, Level& coarse) const noexcept;
+  void find_correction_springs(const Level& fine, Level& coarse) const noexcept;
+  [[nodiscard]] float prolonged_weight(const Level& fine, const Index3& node, std::size_t d) const noexcept;
   void fill_ghosts(const Level& level, float* values) const noexcept;
   void distribute_ghost_loads(const Level& level, float* loads) const noexcept;
   // ---- patch_stiffness.cpp ----
@@ -305,6 +264,7 @@ class CompositeGrid {
   void weigh_shape(const Level& level, std::array<Floats, 3>& weight) noexcept;
   void weigh_box(const Level& level, std::array<Floats, 3>& weight) noexcept;
   void weigh_cells(const Level& level, std::array<Floats, 3>& weight, bool all_alike) noexcept;
+  void weigh_thin_links(const Level& level, std::array<Floats, 3>& weight, bool all_alike) const noexcept;
   void weigh_halves(const Level& level, std::array<Floats, 3>& weight) noexcept;
   void weigh_tissues(Level& level) noexcept;
   [[nodiscard]] static int half_cube(const Level& level) noexcept;
@@ -320,7 +280,6 @@ class CompositeGrid {
   void hand_on_bounds(std::size_t l, std::size_t kind, const NodeBox& reach) noexcept;
   void propagate_bounds(Level& level, std::size_t axis, std::size_t kind, const NodeBox& box) const noexcept;
   // ---- rigid_contacts.cpp ----
-  [[nodiscard]] bool nearest_unknown(const Level& level, const Index3& at, Index3& node) const noexcept;
   [[nodiscard]] float obstacle_gap(const Level& level, const ObstacleNode& node) const noexcept;
   void offer_obstacle(std::size_t l, const BesideRigid& beside) noexcept;
   void list_obstacle_nodes(std::size_t l) noexcept;
@@ -380,18 +339,20 @@ class CompositeGrid {
             voxel[2] + material_.offset()[2]};
   }
   [[nodiscard]] std::size_t fine_node(const Index3& voxel) const;  // grid.cpp
+  [[nodiscard]] glm::dvec3 clamp_to_nearest_anchor(const Index3& voxel, const glm::dvec3& u) const noexcept;
   [[nodiscard]] glm::dvec3 clamp_to_anchors(const Index3& voxel, const glm::dvec3& u) const noexcept;
   // Of a node, its neighbours fixed: its displacement of least energy without bounds (m).
   [[nodiscard]] glm::dvec3 minimum_at(const Level& level, std::size_t node) const noexcept;  // grid.cpp
   [[nodiscard]] static double inside_share(const Level& level, std::size_t d, int i) noexcept;
   [[nodiscard]] double covered_share(std::size_t l, std::size_t d, int i) const noexcept;
-  [[nodiscard]] double anchor_share(std::size_t l, std::size_t number, std::size_t d) const noexcept;
+  [[nodiscard]] bool counts_anchors(std::size_t l, std::size_t number) const noexcept;
   [[nodiscard]] double link_share(std::size_t l, std::size_t number, std::size_t d) const noexcept;
 
   const Lattice& lattice_;
   CoarseMaterial material_;
   std::array<std::array<float, 3>, 3> spring_N_per_m_{};          // [d][axis] of a link between two voxels
   std::array<std::array<std::array<float, 2>, 3>, 3> limit_m_{};  // [d][axis][0: shorter, 1: longer], >= 0
+  std::vector<std::uint32_t> links_to_anchor_;  // [surface number] where anchors are scattered
   int half_width_, coarse_half_width_;
   Index3 centre_{};
   std::vector<Level> levels_;
@@ -422,8 +383,10 @@ class CompositeGrid {
     Floats cells;
     std::array<Floats, 3> stiffness;
   };
-  std::array<HalfCells, 2> half_cells_;       // scratch of weigh()
-  std::vector<std::uint8_t> is_tissue_node_;  // of find_ghosts(), with a border of one node
+  std::array<HalfCells, 2> half_cells_;                     // scratch of weigh()
+  Floats faces_of_cell_;                                    // by nearest node, scratch of gather_anchors()
+  std::array<std::array<AnchorFaces, 2>, 3> anchor_faces_;  // [d][0: of anchors above, 1: below], scratch
+  std::vector<std::uint8_t> is_tissue_node_;                // of find_ghosts(), with a border of one node
 };
 
 }  // namespace voxel

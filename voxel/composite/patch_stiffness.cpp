@@ -33,6 +33,7 @@ void CompositeGrid::weigh_shape(const Level& level, std::array<Floats, 3>& weigh
     weigh_box(level, weight);
   } else if (level.step == 1) {
     weigh_cells(level, weight, true);
+    weigh_thin_links(level, weight, true);
   } else {
     weigh_halves(level, weight);
   }
@@ -72,6 +73,26 @@ void CompositeGrid::weigh_cells(const Level& level, std::array<Floats, 3>& weigh
       }
     }
     std::swap(below, above);
+  }
+}
+
+// Coarse levels have no links through sheets and rows of single voxels: these move with the tissue beside
+// them.
+void CompositeGrid::weigh_thin_links(const Level& level, std::array<Floats, 3>& weight,
+                                     bool all_alike) const noexcept {
+  if (!material_.has_thin_links()) return;
+  const auto& nodes = level.nodes;
+  for (int k = 0; k < nodes[2].count; ++k) {
+    for (int j = 0; j < nodes[1].count; ++j) {
+      for (int i = 0; i < nodes[0].count; ++i) {
+        const Index3 node{i, j, k}, p{level.at(0, i), level.at(1, j), level.at(2, k)};
+        const std::size_t n = level.node(i, j, k);
+        for (std::size_t d = 0; d < 3; ++d) {
+          if (weight[d][n] == 0.0F && node[d] + 1 < nodes[d].count)
+            weight[d][n] = material_.thin_link(p, d, all_alike);
+        }
+      }
+    }
   }
 }
 
@@ -119,7 +140,10 @@ void CompositeGrid::weigh_halves(const Level& level, std::array<Floats, 3>& weig
 
 // Where tissues differ: half cells side by side in parallel, the two halves of the link in series.
 void CompositeGrid::weigh_tissues(Level& level) noexcept {
-  if (level.step == 1) return weigh_cells(level, level.weight, false);
+  if (level.step == 1) {
+    weigh_cells(level, level.weight, false);
+    return weigh_thin_links(level, level.weight, false);
+  }
   const auto& nodes = level.nodes;
   const int nx = nodes[0].count, ny = nodes[1].count, nz = nodes[2].count;
   const int hx = 2 * nx, hy = 2 * ny, m = half_cube(level), edge = 1 << m;

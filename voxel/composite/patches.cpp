@@ -74,6 +74,8 @@ void CompositeGrid::allocate(Level& level, std::size_t l) const {
   }
   // There are about as many ghosts as surface nodes.
   const std::size_t share = material_.fills_box() ? kFewerGhosts : 1;
+  if (!material_.fills_box() || material_.has_scattered_anchors())
+    level.correction_springs.reserve(floats / 8);
   level.ghosts.reserve(floats / (8 * share));
   level.ghost_neighbours.reserve(floats / share);
 }
@@ -107,16 +109,20 @@ void CompositeGrid::allocate_for_moves() {
   }
 }
 
-// A node exists if its cell overlaps the bounding box of the voxels.
+// All nodes of the object. A node exists if its cell overlaps the bounding box of the voxels.
+CompositeGrid::NodeRange CompositeGrid::whole_range(int step, std::size_t d) const noexcept {
+  const int start = material_.low(d), end = material_.high(d);
+  // At an anchored side the nodes include the side: anchors are searched on the links between nodes.
+  return {floor_to_multiple(material_.anchored_share(d, 0) > kAnchoredSide ? start : start + step / 2, step),
+          floor_to_multiple(
+              end + (material_.anchored_share(d, 1) > kAnchoredSide ? step - 1 : (step - 1) / 2), step),
+          false, false};
+}
+
 CompositeGrid::NodeRange CompositeGrid::node_range(std::size_t l, std::size_t d, int centre) const noexcept {
   const int step = levels_[l].step, half = half_width_of(l) * step;
   const int start = material_.low(d), end = material_.high(d);
-  // At an anchored side the nodes include the side: anchors are searched on the links between nodes.
-  NodeRange span{
-      floor_to_multiple(material_.anchored_share(d, 0) > kAnchoredSide ? start : start + step / 2, step),
-      floor_to_multiple(end + (material_.anchored_share(d, 1) > kAnchoredSide ? step - 1 : (step - 1) / 2),
-                        step),
-      false, false};
+  NodeRange span = whole_range(step, d);
   if (l >= covering_level_ || half < 0) return span;
   // The sides of the patch coincide with nodes of the next level.
   const int middle = floor_to_multiple(centre + step, 2 * step);
@@ -142,7 +148,7 @@ void CompositeGrid::place_nodes(Level& level, std::size_t l, const Index3& centr
   level.plane = level.stride * index(level.nodes[1].count);
 }
 
-void CompositeGrid::set_up_transfer(Level& fine, const Level& coarse) const noexcept {
+void CompositeGrid::set_up_transfer(Level& fine, Level& coarse) const noexcept {
   for (std::size_t d = 0; d < 3; ++d) {
     AxisNodes& nodes = fine.nodes[d];
     const AxisNodes& to = coarse.nodes[d];
@@ -188,6 +194,7 @@ void CompositeGrid::set_up_transfer(Level& fine, const Level& coarse) const noex
       nodes.restrict_high[n] = share(here + 1);
     }
   }
+  find_correction_springs(fine, coarse);
 }
 
 void CompositeGrid::assemble(Level& level) noexcept {
@@ -199,6 +206,7 @@ void CompositeGrid::assemble(Level& level) noexcept {
   }
   const bool near = material_.anchor_near(low, high, 2 * level.step);
   find_anchor_weights(level, near);
+  if (near && gathers_anchors(level)) gather_anchors(level);
   find_diagonal(level, near);
   find_ghosts(level, near);
 }
@@ -209,8 +217,8 @@ void CompositeGrid::find_anchor_weights(Level& level, bool near) noexcept {
   const int step = level.step;
   const auto whole = static_cast<float>(step);
   const bool is_heterogeneous = material_.is_heterogeneous();
+  const bool along_links = !gathers_anchors(level);
   level.has_gaps = false;
-  level.anchored_area = 0.0;
   level.has_anchors = false;
   for (Floats& weight : level.anchor_weight) std::fill(weight.begin(), weight.end(), 0.0F);
   for (int k = 0; k < nodes[2].count; ++k) {
@@ -234,8 +242,9 @@ void CompositeGrid::find_anchor_weights(Level& level, bool near) noexcept {
           after[d] += step;
           // The first anchor from either end on holds the node at that end, through the tissue of the link.
           const float stiff = is_heterogeneous ? weight / there : 1.0F;
-          const CoarseMaterial::AnchorSearch anchors =
-              anchors_near ? material_.anchors_along(at, d, step) : CoarseMaterial::AnchorSearch{};
+          const CoarseMaterial::AnchorSearch anchors = anchors_near && along_links
+                                                           ? material_.anchors_along(at, d, step)
+                                                           : CoarseMaterial::AnchorSearch{};
           const float part =
               anchors.links > 0 ? std::min(1.0F, there / static_cast<float>(anchors.links)) : 0.0F;
           const auto weight_at = [&](int links) {
@@ -248,9 +257,6 @@ void CompositeGrid::find_anchor_weights(Level& level, bool near) noexcept {
             level.anchor_distance[d][here] = static_cast<float>(anchors.ahead);
           if (is_heterogeneous && anchors.back > 0)
             level.anchor_distance[d][here + by] = static_cast<float>(-anchors.back);
-          const int ends = (anchors.low_free && anchors.ahead > 0 ? 1 : 0) +
-                           (anchors.high_free && anchors.back > 0 ? 1 : 0);
-          level.anchored_area += ends * static_cast<double>(part * whole * whole);
           const bool gap = step > 1 && there < kAlmostAll * whole && material_.is_filled(at) &&
                            material_.is_filled(after) && !material_.is_unbroken(at, d, step);
           if (anchors.ahead == 0 && anchors.back == 0 && !gap) continue;
@@ -261,6 +267,46 @@ void CompositeGrid::find_anchor_weights(Level& level, bool near) noexcept {
       }
     }
   }
+}
+
+// The node of a level that is nearest to a place, if the level has the place within its patch: an unknown, or
+// any node with links.
+bool CompositeGrid::nearest_node(const Level& level, const Index3& at, bool unknown, Index3& node) noexcept {
+  Index3 other{};
+  const int half = level.step / 2;
+  for (std::size_t d = 0; d < 3; ++d) {
+    const int way = at[d] - level.nodes[d].begin;
+    if (way < -half || way > (level.nodes[d].count - 1) * level.step + half) return false;
+  }
+  for (std::size_t d = 0; d < 3; ++d) {
+    const AxisNodes& nodes = level.nodes[d];
+    const int way = at[d] - nodes.begin;
+    node[d] = std::clamp((way + half) >> level.log2_step, 0, nodes.count - 1);
+    if (node[d] < nodes.first || node[d] > nodes.last) return false;
+    other[d] = std::clamp(node[d] + (way > node[d] * level.step ? 1 : -1), nodes.first, nodes.last);
+  }
+  const auto accepts = [&](const Index3& n) {
+    return unknown ? level.inverse_diagonal[0][level.node(n[0], n[1], n[2])] != 0.0F : is_linked(level, n);
+  };
+  if (accepts(node)) return true;
+  if (level.step == 1) return false;
+  const Index3 nearest = node;
+  int least = 4 * 3 * level.step * level.step;
+  bool any = false;
+  for (int corner = 1; corner < 8; ++corner) {
+    Index3 n = nearest;
+    int square = 0;
+    for (std::size_t d = 0; d < 3; ++d) {
+      if ((corner >> d & 1) != 0) n[d] = other[d];
+      const int away = level.at(d, n[d]) - at[d];
+      square += away * away;
+    }
+    if (square >= least || !accepts(n)) continue;
+    least = square;
+    node = n;
+    any = true;
+  }
+  return any;
 }
 
 bool CompositeGrid::row_near_anchors(const Level& level, int j, int k) const noexcept {
@@ -303,7 +349,11 @@ void CompositeGrid::find_diagonal(Level& level, bool near) noexcept {
             level.weight[1][n] + level.weight[1][n - by_y] + level.anchor_weight[1][n],
             level.weight[2][n] + level.weight[2][n - by_z] + level.anchor_weight[2][n]};
         if (links[0] + links[1] + links[2] == 0.0F) continue;
-        if (anchors_near && material_.is_anchored({level.at(0, i), level.at(1, j), level.at(2, k)})) continue;
+        const bool gathers =
+            level.anchor_weight[0][n] + level.anchor_weight[1][n] + level.anchor_weight[2][n] > 0.0F;
+        if (anchors_near && !(gathers_anchors(level) && gathers) &&
+            material_.is_anchored({level.at(0, i), level.at(1, j), level.at(2, k)}))
+          continue;
         for (std::size_t a = 0; a < 3; ++a) {
           const float sum = links[0] * spring_N_per_m_[0][a] + links[1] * spring_N_per_m_[1][a] +
                             links[2] * spring_N_per_m_[2][a];

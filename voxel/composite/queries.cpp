@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Queries to a CompositeGrid between cycles: displacements, force, energy, memory.
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 #include "voxel/composite/grid.h"
@@ -28,16 +27,17 @@ double CompositeGrid::covered_share(std::size_t l, std::size_t d, int i) const n
   return (here < fine.first && fine.open_low) || (here > fine.last && fine.open_high) ? 0.5 : 1.0;
 }
 
-// Share of a node's anchor weight along d that counts on this level and not on a finer one. `number`: of the
-// node, from first_row() on.
-double CompositeGrid::anchor_share(std::size_t l, std::size_t number, std::size_t d) const noexcept {
+// Do a node's anchors count on this level? Not on a finer one: at its sides, nodes take what this level has.
+// `number`: of the node, from first_row() on.
+bool CompositeGrid::counts_anchors(std::size_t l, std::size_t number) const noexcept {
   const Level& level = levels_[l];
   const Index3 node = level.node_of(number);
-  const std::size_t e = (d + 1) % 3, f = (d + 2) % 3;
-  if (inside_share(level, d, node[d]) < 1.0) return 0.0;
-  const double under =
-      covered_share(l, d, node[d]) == 1.0 ? covered_share(l, e, node[e]) * covered_share(l, f, node[f]) : 0.0;
-  return inside_share(level, e, node[e]) * inside_share(level, f, node[f]) * (1.0 - under);
+  bool inside = true, covered = true;
+  for (std::size_t d = 0; d < 3; ++d) {
+    inside = inside && inside_share(level, d, node[d]) == 1.0;
+    covered = covered && covered_share(l, d, node[d]) == 1.0;
+  }
+  return inside && !covered;
 }
 
 // The same share of the link from the node to the next one along d.
@@ -69,30 +69,15 @@ glm::dvec3 CompositeGrid::force_on_anchors_N() const noexcept {
                                                 anchor_weights_on(level, 2)[d].data()};
       for (std::size_t n = first; n < end; ++n) {
         if (weight[n] == 0.0F) continue;
-        const double share = anchor_share(l, n - first, d);
+        if (!counts_anchors(l, n - first)) continue;
         for (std::size_t a = 0; a < 3; ++a) {
           reaction[static_cast<int>(a)] +=
-              share * static_cast<double>(limited[a][n] * spring_N_per_m_[d][a] * level.u[a][n]);
+              static_cast<double>(limited[a][n] * spring_N_per_m_[d][a] * level.u[a][n]);
         }
       }
     }
   }
   return reaction;
-}
-
-double CompositeGrid::anchor_area_ratio() const noexcept {
-  double all = 0.0;
-  for (RowId row = 0; row < lattice_.grid().rows(); ++row) {
-    std::uint32_t lanes = lattice_.anchored_lanes(row);
-    for (; lanes != 0; lanes &= lanes - 1) {
-      const VoxelId v = row * kRow + static_cast<VoxelId>(std::countr_zero(lanes));
-      for (int d = 0; d < 3; ++d) {
-        for (const VoxelId w : {lattice_.up(v, d), lattice_.down(v, d)})
-          all += lattice_.filled(w) && !lattice_.anchored(w) ? 1.0 : 0.0;
-      }
-    }
-  }
-  return all > 0.0 ? levels_[covering_level_].anchored_area / all : 0.0;
 }
 
 double CompositeGrid::worst_violation() const noexcept {
@@ -138,7 +123,7 @@ double CompositeGrid::energy_J() const noexcept {
           of_anchor += k * static_cast<double>(anchor_weight[n] * *u * *u);
         }
         if (of_link != 0.0) energy += of_link * link_share(l, n - first, d);
-        if (of_anchor != 0.0) energy += of_anchor * anchor_share(l, n - first, d);
+        if (of_anchor != 0.0 && counts_anchors(l, n - first)) energy += of_anchor;
       }
     }
   }
@@ -237,7 +222,12 @@ std::size_t CompositeGrid::memory_bytes() const {
                       material_.memory_bytes() + beside_rigid_.capacity() * sizeof(BesideRigid) +
                       is_beside_rigid_.capacity() + obstacle_loads_.capacity() * sizeof(ObstacleLoad) +
                       obstacle_bounds_.capacity() * sizeof(ObstacleBound) +
-                      supporting_bounds_.capacity() * sizeof(std::uint32_t);
+                      supporting_bounds_.capacity() * sizeof(std::uint32_t) +
+                      links_to_anchor_.capacity() * sizeof(std::uint32_t) + is_tissue_node_.capacity() +
+                      faces_of_cell_.capacity() * sizeof(float);
+  for (const auto& sides : anchor_faces_) {
+    for (const AnchorFaces& faces : sides) bytes += 4 * faces.count.capacity() * sizeof(float);
+  }
   const auto add = [&bytes](const Level& level) {
     for (const auto* arrays : {&level.u, &level.at_bound, &level.weight, &level.anchor_weight,
                                &level.shape_weight, &level.inverse_diagonal, &level.diagonal}) {
@@ -249,6 +239,7 @@ std::size_t CompositeGrid::memory_bytes() const {
       bytes += array->capacity() * sizeof(float);
     bytes += level.ghosts.capacity() * sizeof(Ghost) +
              level.ghost_neighbours.capacity() * sizeof(std::uint32_t) +
+             level.correction_springs.capacity() * sizeof(CorrectionSpring) +
              level.obstacle_nodes.capacity() * sizeof(ObstacleNode) +
              level.obstacle_of.capacity() * sizeof(std::uint32_t);
   };

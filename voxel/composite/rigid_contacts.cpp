@@ -60,45 +60,6 @@ void CompositeGrid::add_obstacle(std::uint32_t surface_number) noexcept {
   for (std::size_t l = 0; l <= covering_level_; ++l) offer_obstacle(l, beside_rigid_.back());
 }
 
-// The unknown of a level that is nearest to a place, if the level has the place within its patch.
-bool CompositeGrid::nearest_unknown(const Level& level, const Index3& at, Index3& node) const noexcept {
-  Index3 other{};
-  const int half = level.step / 2;
-  for (std::size_t d = 0; d < 3; ++d) {
-    const int way = at[d] - level.nodes[d].begin;
-    if (way < -half || way > (level.nodes[d].count - 1) * level.step + half) return false;
-  }
-  for (std::size_t d = 0; d < 3; ++d) {
-    const AxisNodes& nodes = level.nodes[d];
-    const int way = at[d] - nodes.begin;
-    node[d] = std::clamp((way + half) >> level.log2_step, 0, nodes.count - 1);
-    if (node[d] < nodes.first || node[d] > nodes.last) return false;
-    other[d] = std::clamp(node[d] + (way > node[d] * level.step ? 1 : -1), nodes.first, nodes.last);
-  }
-  const auto is_unknown = [&](const Index3& n) {
-    return level.inverse_diagonal[0][level.node(n[0], n[1], n[2])] != 0.0F;
-  };
-  if (is_unknown(node)) return true;
-  if (level.step == 1) return false;
-  const Index3 nearest = node;
-  int least = 4 * 3 * level.step * level.step;
-  bool any = false;
-  for (int corner = 1; corner < 8; ++corner) {
-    Index3 n = nearest;
-    int square = 0;
-    for (std::size_t d = 0; d < 3; ++d) {
-      if ((corner >> d & 1) != 0) n[d] = other[d];
-      const int away = level.at(d, n[d]) - at[d];
-      square += away * away;
-    }
-    if (square >= least || !is_unknown(n)) continue;
-    least = square;
-    node = n;
-    any = true;
-  }
-  return any;
-}
-
 // Gap of a surface voxel to its plane, at its displacement on this level (m).
 float CompositeGrid::obstacle_gap(const Level& level, const ObstacleNode& node) const noexcept {
   const Obstacle& o = obstacles_[node.surface];
@@ -113,7 +74,7 @@ float CompositeGrid::obstacle_gap(const Level& level, const ObstacleNode& node) 
 void CompositeGrid::offer_obstacle(std::size_t l, const BesideRigid& beside) noexcept {
   Level& level = levels_[l];
   Index3 at{};
-  if (!level.is_built || !nearest_unknown(level, shifted(beside.voxel), at)) return;
+  if (!level.is_built || !nearest_node(level, shifted(beside.voxel), true, at)) return;
   const ObstacleNode fresh{at, level.node(at[0], at[1], at[2]), beside.voxel, beside.surface};
   std::uint32_t& entry = level.obstacle_of[fresh.number];
   if (entry == 0) {

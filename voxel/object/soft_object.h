@@ -103,6 +103,8 @@ class SoftObject {
   static constexpr std::size_t kLeastOnGrid = 10'000;  // voxels
   std::string use_composite_grid(const ToolInBody& tool);
   [[nodiscard]] bool uses_patches() const { return grid_ != nullptr; }
+  // Of use_composite_grid(): greatest relative difference from patches twice as wide, in trial contacts.
+  [[nodiscard]] double patch_error() const { return patch_error_; }
   // Null unless something is pressed.
   [[nodiscard]] const CompositeGrid* patches_in_use() const { return on_grid_ ? grid_.get() : nullptr; }
   // Once a tick while nothing is pressed: prepares a part of the patches for a contact with this tool.
@@ -426,6 +428,7 @@ class SoftObject {
   bool beside_bodies_ = false;  // moving bodies
   bool on_grid_ = false;        // there is a contact, and it is on nested patches
   std::unique_ptr<CompositeGrid> grid_;  // null: contacts are in state_
+  double patch_error_ = 0.0;
   std::vector<VoxelId> near_on_grid_;
   struct TouchOnGrid {  // touched voxels in the finest patch, as a cycle begins
     std::uint32_t touch;

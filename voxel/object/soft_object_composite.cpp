@@ -63,9 +63,11 @@ std::string SoftObject::use_composite_grid(const ToolInBody& tool) {
   const int contact = static_cast<int>(std::ceil(share * reach(tool.radius) / h));
   if (contact + kLeastMargin > CompositeGrid::kMaxHalfWidth) return "the tool is many voxels wide";
   const int half = std::min(contact + kMargin, CompositeGrid::kMaxHalfWidth);
-  std::string obstacle = CompositeGrid::reason_unsuitable(*lattice_);
-  if (!obstacle.empty()) return obstacle;
+  CompositeGrid::Suitability suitability = CompositeGrid::suitability(*lattice_);
+  if (!suitability.reason.empty()) return suitability.reason;
+  patch_error_ = suitability.force_error;
   grid_ = std::make_unique<CompositeGrid>(*lattice_, half);
+  grid_->find_chains_to_anchors();
   near_on_grid_.reserve(most_in_box(half));
   touches_on_grid_.reserve(kMaxTouched);
   return {};
@@ -75,6 +77,7 @@ void SoftObject::widen_patches() {
   if (!grid_) return;
   auto wide = std::make_unique<CompositeGrid>(*lattice_, CompositeGrid::kReferenceHalfWidth,
                                               CompositeGrid::kReferenceHalfWidth);
+  wide->find_chains_to_anchors();
   wide->begin(centre_);
   if (!obstacles_.empty()) wide->watch_obstacles(obstacles_);
   wide->interpolate_from(*grid_);

@@ -179,6 +179,15 @@ TEST(CompositeGrid, HolesAndNotchesAreInTheLinks) {
   EXPECT_LT(d.force, 0.02);
 }
 
+// A plate of single voxels joins two blocks.
+TEST(CompositeGrid, SheetsOfSingleVoxelsAreInTheLinks) {
+  const auto joined = [](const Index3& p) { return p[2] < 4 || p[2] > 8 || p[0] == 7; };
+  const Body body({15, 14, 13}, 0.2, joined, below);
+  const Difference d = compare(body, {{7, 7, 12}, 2, 0.8 * kSpacing}, CompositeGrid::kRefineAll);
+  EXPECT_LT(d.displacement, 0.02);
+  EXPECT_LT(d.force, 0.02);
+}
+
 // Layers and lumps of tissues of different stiffness. Soft layers between stiff ones are compressed to their
 // limits (contrast 4 to 200; depth as a share of the depth at which the chain ends).
 int stiff_soft_stiff(const Index3& p) {
@@ -215,12 +224,12 @@ TEST(CompositeGrid, SeveralTissuesAreTheLatticeAtEquilibrium) {
 }
 
 // Nested patches against all voxels, with a pressed square as large as a tool's contact.
-double patches_against_all(const Body& body, const PressedSquare& patch) {
+double patches_against_all(const Body& body, const PressedSquare& patch, int cycles = 25) {
   CompositeGrid all(*body.lattice, CompositeGrid::kRefineAll), patches(*body.lattice, 10);
   all.begin(patch.middle);
   patches.begin(patch.middle);
-  press(all, patch, 25);
-  press(patches, patch, 25);
+  press(all, patch, cycles);
+  press(patches, patch, cycles);
   const double share = patches.force_on_tool_N().z / all.force_on_tool_N().z - 1.0;
   std::cout << "[ measured ] " << all.force_on_tool_N().z << " N of all voxels, boxes " << 100.0 * share
             << " %\n";
@@ -367,21 +376,53 @@ TEST(CompositeGrid, TheFinestPatchHasTheContactAtEachTick) {
   EXPECT_TRUE(has_all_round({30, 70, n - 1}));
 }
 
+// Anchored regions smaller than the cells of coarse levels, and larger ones that follow no line of nodes.
+TEST(CompositeGrid, PatchesWithAnchorsAnywhere) {
+  using At = const Index3&;
+  const auto cube = [](int x, int y, int z, int half) {
+    return [=](At p) {
+      return std::abs(p[0] - x) <= half && std::abs(p[1] - y) <= half && std::abs(p[2] - z) <= half;
+    };
+  };
+  const auto from_bone = [](At p) { return std::hypot(p[0] - 30.0, p[1] - 30.0, p[2] - 20.0); };
+  const auto outside_bone = [&](At p) { return from_bone(p) > 12.0; };
+  const auto anchored_by = [](const std::function<bool(At)>& filled,
+                              const std::function<bool(At)>& anchored) {
+    const int n = 61;
+    return patches_against_all(Body({n, n, n}, 0.9, filled, anchored), {{30, 30, n - 1}, 4, kSpacing}, 60);
+  };
+  EXPECT_LT(anchored_by(everywhere, [](At p) { return p[2] == 21; }), 0.03);
+  EXPECT_LT(anchored_by(everywhere, [](At p) { return p[2] == 21 || p[0] == 3; }), 0.03);
+  EXPECT_LT(anchored_by(everywhere, [](At p) { return p[2] < 10 + p[0] / 4; }), 0.05);
+  EXPECT_LT(anchored_by(everywhere, [](At p) { return p[0] % 8 == 3 && p[1] % 8 == 3 && p[2] == 20; }), 0.05);
+  EXPECT_LT(anchored_by(everywhere, [](At p) { return p[0] % 8 == 0 && p[1] % 8 == 0 && p[2] == 16; }), 0.05);
+  EXPECT_LT(anchored_by(everywhere, [](At p) { return p[0] % 4 == 1 && p[1] % 4 == 1 && p[2] == 21; }), 0.05);
+  EXPECT_LT(anchored_by(outside_bone, [&](At p) { return from_bone(p) < 13.5; }), 0.03);
+  EXPECT_LT(anchored_by(outside_bone, [&](At p) { return p[0] < 30 && from_bone(p) < 13.5; }), 0.05);
+  // A small region alone: most of the resistance is the constriction round it.
+  for (const int half : {0, 1, 4, 8})
+    EXPECT_LT(anchored_by(everywhere, cube(27, 34, 25, half)), 0.08) << half;
+  EXPECT_LT(anchored_by(everywhere, cube(30, 30, 0, 1)), 0.08);
+  EXPECT_LT(anchored_by(everywhere, cube(22, 37, 0, 2)), 0.12);
+  EXPECT_LT(anchored_by(everywhere, cube(22, 37, 0, 4)), 0.08);
+}
+
 TEST(CompositeGrid, SaysWhyAnObjectIsUnsuitable) {
   const Index3 dims{40, 40, 40};
-  EXPECT_EQ(CompositeGrid::reason_unsuitable(*Body(dims, 0.1, everywhere, below).lattice), "");
-  const auto sheet = [](const Index3& p) { return p[2] < 20 || p[0] == 20; };
-  EXPECT_NE(CompositeGrid::reason_unsuitable(*Body(dims, 0.1, sheet, below).lattice), "");
+  const auto reason = [](const Body& body) { return CompositeGrid::suitability(*body.lattice).reason; };
+  EXPECT_EQ(reason(Body(dims, 0.1, everywhere, below)), "");
+  const auto fins = [](const Index3& p) { return p[2] < 20 || p[0] % 4 == 0; };
+  EXPECT_EQ(reason(Body(dims, 0.1, fins, below)), "much of it is one voxel thick");
   const auto specks = [](const Index3& p) { return p[0] % 8 == 4 && p[1] % 8 == 4 && p[2] == 20; };
-  EXPECT_NE(CompositeGrid::reason_unsuitable(*Body(dims, 0.1, everywhere, specks).lattice), "");
+  EXPECT_EQ(reason(Body(dims, 0.1, everywhere, specks)), "");
   const auto lump = [](const Index3& p) { return p[0] > 10 && p[0] < 30 && p[1] > 10 && p[2] < 10; };
-  EXPECT_NE(CompositeGrid::reason_unsuitable(*Body(dims, 0.1, everywhere, lump).lattice), "");
+  EXPECT_EQ(reason(Body(dims, 0.1, everywhere, lump)), "");
   voxel::LatticeOptions two = made_of(slack(0.1));
   voxel::LabelVolume volume = block(dims, glm::dvec3(kSpacing));
   std::fill_n(volume.labels.begin(), 40 * 40 * 20, std::uint8_t{2});
   const auto reason_with = [&](const LinkMaterial& other) {
     two.materials[2] = other;
-    return CompositeGrid::reason_unsuitable(Lattice(volume, two));
+    return CompositeGrid::suitability(Lattice(volume, two)).reason;
   };
   LinkMaterial stiff = slack(0.1);
   stiff.young_Pa *= 5.0;
@@ -390,7 +431,7 @@ TEST(CompositeGrid, SaysWhyAnObjectIsUnsuitable) {
   stiff.poisson = 0.4;
   EXPECT_NE(reason_with(stiff), "");
   const auto skin = [](const Index3& p) { return p[2] == 39 ? 20 : 1; };
-  EXPECT_NE(CompositeGrid::reason_unsuitable(*Body(dims, 0.1, everywhere, below, skin).lattice), "");
+  EXPECT_NE(reason(Body(dims, 0.1, everywhere, below, skin)), "");
 }
 
 }  // namespace

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// One level of a CompositeGrid (grid.h): its nodes, their links and displacements.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace voxel::composite {
+
+using Index3 = std::array<int, 3>;  // voxel (i, j, k), node or cube
+using Floats = std::vector<float>;
+inline constexpr std::size_t kPad = 8;  // floats before the first row
+
+inline constexpr int kOutside = -2;  // of AxisNodes::fine
+// Nodes of a level along one axis, and the one-dimensional transfer to the next coarser level.
+struct AxisNodes {
+  int count = 0, begin = 0;                  // nodes; coordinate of the first
+  int first = 0, last = -1;                  // unknowns, both included
+  bool open_low = false, open_high = false;  // the patch ends within the object
+  // By node: the coarse node at or before it, and the weight of the coarse node after that (0 or 0.5).
+  std::vector<int> coarse;
+  std::vector<float> weight_after;
+  // The same along x for whole rows: lane i lies at or after the coarse lane base + (i + odd) / 2.
+  int base = 0;
+  bool odd = false;
+  std::vector<float> lane_weight;
+  // By coarse node: the node at its place, which may be one beyond either end; kOutside: further out.
+  std::vector<int> fine;
+  int coarse_first = 0, coarse_last = -1;  // coarse nodes strictly within this patch
+  // By coarse node: restriction weights of the nodes before, at and after it.
+  std::vector<float> restrict_low, restrict_own, restrict_high;
+};
+// By node: faces of anchors that hold the node from one side, those of them that lie in a link, the sums of
+// their distances (voxels) and of constriction_of_face().
+struct AnchorFaces {
+  Floats count, in_link, distance, constriction;
+};
+// A node that corrections would move too far: springs to where it is, beside those of its links. [d] as
+// weights.
+struct CorrectionSpring {
+  std::uint32_t node;
+  std::array<float, 3> weight;
+};
+// A node outside the tissue, with nodes of the tissue beside it: ghost_neighbours[first … first + count −
+// 1].
+struct Ghost {
+  std::uint32_t at, first, count;
+};
+// The node that a surface voxel beside a rigid surface stands for.
+struct ObstacleNode {
+  Index3 node;
+  std::size_t number;
+  Index3 voxel;
+  std::uint32_t surface;
+};
+// A level of nodes. Arrays have one float a node, rows along x padded to a multiple of 8; row() says where.
+struct GridLevel {
+  int step = 1;  // voxels between two nodes
+  int log2_step = 0;
+  bool is_built = false;  // with the present offset of coordinates
+  bool moved = false;     // since put_to_rest()
+  std::array<AxisNodes, 3> nodes;
+  std::size_t stride = 8, plane = 0;
+  std::array<Floats, 3> u, at_bound;  // [axis] (m); 1 at the lower bound, −1 at the upper bound
+  // [d] of the link to the next node, and of links to anchors, relative to a link between two voxels.
+  std::array<Floats, 3> weight, anchor_weight;
+  // Where tissues differ: [d] the weight if all tissue had the reference stiffness; [d] voxels to the
+  // anchor, negative behind the node; [axis][d] the weights with multipliers.
+  std::array<Floats, 3> shape_weight, anchor_distance;
+  std::array<std::array<Floats, 3>, 3> limited_weight, limited_anchor_weight;
+  std::array<Floats, 3> inverse_diagonal, diagonal;  // [axis] of the stiffness matrix; inverse 0: fixed
+  // Of the axis that the cycle is on (LevelView). restricted_u: u before the level was smoothed.
+  Floats f, restricted_u, residual, is_free, is_active, active_stiffness, inverse_with_active;
+  std::array<Floats, 2> bound;  // of the same axis; 0: least u, 1: least −u
+  std::array<bool, 2> bounded{};
+  bool has_active_stiffness = false;  // from active nodes of finer levels; of the same axis
+  bool has_anchors = false;           // some node has an anchor weight
+  bool has_gaps = false;              // some link within the patch is missing
+  std::vector<Ghost> ghosts;
+  std::vector<std::uint32_t> ghost_neighbours;
+  std::vector<CorrectionSpring> correction_springs;
+  std::vector<ObstacleNode> obstacle_nodes;
+  std::vector<std::uint32_t> obstacle_of;  // [node] 1 + index into obstacle_nodes; 0: none
+  [[nodiscard]] std::size_t row(int j, int k) const {
+    return plane + stride + kPad + static_cast<std::size_t>(k) * plane + static_cast<std::size_t>(j) * stride;
+  }
+  [[nodiscard]] std::size_t first_row() const { return row(0, 0); }
+  [[nodiscard]] std::size_t floats() const { return static_cast<std::size_t>(nodes[2].count) * plane; }
+  [[nodiscard]] std::size_t node(int i, int j, int k) const {
+    return row(j, k) + static_cast<std::size_t>(i);
+  }
+  [[nodiscard]] std::array<int, 3> node_of(std::size_t number) const {  // number: from first_row() on
+    return {static_cast<int>(number % stride), static_cast<int>(number % plane / stride),
+            static_cast<int>(number / plane)};
+  }
+  // From a node to the next one along d.
+  [[nodiscard]] std::size_t stride_along(std::size_t d) const { return d == 0 ? 1 : d == 1 ? stride : plane; }
+  [[nodiscard]] int at(std::size_t d, int i) const { return nodes[d].begin + step * i; }
+};
+
+}  // namespace voxel::composite
