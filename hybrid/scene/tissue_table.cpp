@@ -81,9 +81,8 @@ char lower(char c) {
 }  // namespace
 
 LatticeStiffness as_six_links(const Tissue& tissue) {
-  constexpr double kMostPoisson = 0.3;
-  const double nu = std::min(tissue.poisson, kMostPoisson);
-  return {tissue.young_Pa * (1.0 - nu * nu) / (1.0 - tissue.poisson * tissue.poisson), nu};
+  constexpr double kPoisson = 0.3;
+  return {tissue.young_Pa * (1.0 - kPoisson * kPoisson) / (1.0 - tissue.poisson * tissue.poisson), kPoisson};
 }
 
 std::span<const Tissue> tissue_table() {

@@ -27,8 +27,8 @@ struct Tissue {
 std::span<const Tissue> tissue_table();
 
 // A tissue as a scene of six-link voxels has it. They are right for Poisson's ratios up to 0.3 in layers,
-// too, and a fifth too soft at 0.45 (voxel/README.md). So the ratio is 0.3 at most, and Young's modulus keeps
-// the contact modulus E/(1 − ν²), which is what a tool feels.
+// too, and a fifth too soft at 0.45 (voxel/README.md). Objects on nested patches have one ratio. So the ratio
+// is 0.3, and Young's modulus keeps the contact modulus E/(1 − ν²), which a tool feels.
 struct LatticeStiffness {
   double young_Pa = 0.0, poisson = 0.0;
 };
