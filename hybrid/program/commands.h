@@ -15,6 +15,12 @@
 
 namespace hybrid {
 
+// A report page: the folder that it is written into, and the command line that makes it again.
+struct ReportRequest {
+  std::filesystem::path folder;  // empty: no page
+  std::string command;
+};
+
 struct RunCommand {
   std::filesystem::path scene;
   std::optional<double> seconds;
@@ -25,7 +31,8 @@ struct RunCommand {
   std::string relaxation = "apart";  // or "tick": where tissue away from the contact is relaxed
   std::filesystem::path trace, plot, picture, record, save_surface, save_volume;  // empty: not written
   std::filesystem::path black_box;  // empty: see open_black_box_file()
-  std::string json;                 // "-": standard output
+  ReportRequest report;
+  std::string json;  // "-": standard output
 };
 int run(const RunCommand& command);
 

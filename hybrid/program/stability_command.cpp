@@ -70,11 +70,11 @@ std::vector<BoundaryGroup> figure_of(const StabilityReport& report) {
   return groups;
 }
 
-void save_plot(const std::filesystem::path& file, const Scene& scene, const StabilityReport& report) {
+Figure drawn(const Scene& scene, const StabilityReport& report) {
   const Agreement stable = agreement(report, Boundary::stable),
                   passive = agreement(report, Boundary::passive);
-  save_stability_plot(
-      file, figure_of(report),
+  return stability_figure(
+      figure_of(report),
       fmt::format("{}: how stiff before it is unstable, or active",
                   scene.title.empty() ? scene.file.stem().string() : scene.title),
       {"Lines: theory (discrete eigenvalues; passivity after Colgate & Schenkel, with the delay). Dots: "
@@ -108,7 +108,7 @@ int stability(const StabilityCommand& command) {
   if (report.stopped_by != 0) json["stopped"] = true;
   outputs.write_json(command.json, json);
   outputs.write("plot", command.plot,
-                [&](const std::filesystem::path& file) { save_plot(file, scene, report); });
+                [&](const std::filesystem::path& file) { save_svg(file, drawn(scene, report)); });
   fmt::print(outputs.words(), "{}", stability_tables(report));
   outputs.say_files();
   if (report.stopped_by != 0)
