@@ -131,7 +131,8 @@ const std::map<std::string, std::vector<Room>>& rooms() {
         {"bench/reports", {}},
         {"bench", {"plot", "compare", "compose", "stress"}},
         {"stability", {"plot", "compare", "compose", "stress"}},
-        {"program", {"bench", "bench/reports", "stability", "page"}}}},
+        {"validate", {"page", "compare"}},
+        {"program", {"bench", "bench/reports", "stability", "validate"}}}},
   };
   return kRooms;
 }

@@ -15,7 +15,7 @@ std::string_view page_style() {
 * { box-sizing: border-box; }
 body { margin: 0; background: var(--ground); color: var(--text);
   font: 1rem/1.5 system-ui, "Segoe UI", Helvetica, Arial, "DejaVu Sans", sans-serif; }
-main, footer { max-width: 74rem; margin: 0 auto; padding: 0 1rem; }
+main, footer { max-width: 94rem; margin: 0 auto; padding: 0 1rem; }
 h1 { font-size: 1.5rem; line-height: 1.3; margin: 1.5rem 0 0.3rem; max-width: 54rem; }
 h1.good { border-left: 0.3rem solid var(--good); padding-left: 0.8rem; }
 h1.bad { border-left: 0.3rem solid var(--bad); padding-left: 0.8rem; }
@@ -33,19 +33,21 @@ caption { padding-bottom: 0.4rem; max-width: min(54rem, calc(100vw - 2.5rem)); }
 .card img { display: block; width: 100%; height: auto; border-radius: 6px; }
 table { border-collapse: collapse; font-size: 0.92rem; font-variant-numeric: tabular-nums; }
 th, td { padding: 0.3rem 0.7rem; text-align: left; vertical-align: top; border-bottom: 1px solid var(--line); }
-td { min-width: 4rem; }
 thead th { background: var(--band); vertical-align: bottom; }
-tbody th { font-weight: 600; min-width: 8rem; }
+tbody th { font-weight: 600; }
 td.n, th.n { text-align: right; white-space: nowrap; }
 th.n { white-space: normal; }
-td.long { min-width: 16rem; }
+td { white-space: nowrap; }
+td.medium, td.long { white-space: normal; }
+.medium { min-width: 11rem; }
+.long { min-width: 17rem; }
 td.good { color: var(--good); font-weight: 600; }
 td.bad { color: var(--bad); font-weight: 600; }
 button { font: inherit; color: inherit; background: none; border: 0; padding: 0; cursor: pointer; }
 th button { font-weight: 600; text-align: inherit; }
-th button::after { content: " \2195"; color: var(--quiet); }
-th[aria-sort="ascending"] button::after { content: " \2191"; }
-th[aria-sort="descending"] button::after { content: " \2193"; }
+th button::after { content: "\a0\2195"; color: var(--quiet); }
+th[aria-sort="ascending"] button::after { content: "\a0\2191"; }
+th[aria-sort="descending"] button::after { content: "\a0\2193"; }
 button.copy { color: var(--link); font-size: 0.85rem; text-decoration: underline; margin-bottom: 0.4rem; }
 footer { border-top: 1px solid var(--line); margin-top: 2.5rem; padding-bottom: 2rem; font-size: 0.92rem; }
 dl { display: grid; grid-template-columns: max-content 1fr; gap: 0.2rem 1rem; }
@@ -59,7 +61,7 @@ code { font: 0.9em/1.5 ui-monospace, "DejaVu Sans Mono", Consolas, monospace; }
   body { font-size: 9.5pt; } main, footer { max-width: none; padding: 0; }
   h2 { break-after: avoid; } figure, tr { break-inside: avoid; } thead { display: table-header-group; }
   .wide { overflow: visible; } .card svg { min-width: 0; } .card img { max-width: 11cm; }
-  table { font-size: 8pt; } th, td { padding: 0.15rem 0.35rem; } td, td.long, tbody th { min-width: 0; }
+  table { font-size: 8pt; } th, td { padding: 0.15rem 0.35rem; } .medium, .long { min-width: 0; }
   .copy { display: none; } th button::after { content: none !important; } }
 )css";
 }

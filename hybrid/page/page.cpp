@@ -12,7 +12,13 @@
 namespace hybrid {
 namespace {
 
-constexpr std::size_t kLongText = 48;  // letters of a cell from which on it gets a wider column
+// Letters of a text from which on its column is wider, so that it does not become a tall stack of words.
+constexpr std::size_t kMediumText = 18, kLongText = 48;
+
+std::string width_class(const std::string& text) {
+  const std::size_t count = letters(text);
+  return count > kLongText ? "long" : count > kMediumText ? "medium" : "";
+}
 
 nlohmann::ordered_json cell_json(const PageCell& cell) {
   return cell.value ? nlohmann::ordered_json(*cell.value) : nlohmann::ordered_json(cell.text);
@@ -33,7 +39,7 @@ bool is_number_column(const PageTable& table, std::size_t column) {
 }
 
 std::string cell_html(const PageCell& cell, bool is_number) {
-  std::string names = is_number ? "n" : letters(cell.text) > kLongText ? "long" : "";
+  std::string names = is_number ? "n" : width_class(cell.text);
   const std::string mark = class_of(cell.mark);
   if (!mark.empty()) names += (names.empty() ? "" : " ") + mark;
   const std::string value = cell.value ? " data-value=\"" + nlohmann::json(*cell.value).dump() + "\"" : "";
@@ -54,7 +60,8 @@ std::string table_html(const PageTable& table) {
   for (const auto& row : table.rows) {
     html += "<tr>";
     for (std::size_t c = 0; c < row.size(); ++c) {
-      html += c == 0 ? "<th scope=\"row\">" + escaped(row[c].text) + "</th>"
+      html += c == 0 ? "<th scope=\"row\"" + class_attribute(width_class(row[c].text)) + ">" +
+                           escaped(row[c].text) + "</th>"
                      : cell_html(row[c], c < is_number.size() && is_number[c]);
     }
     html += "</tr>\n";
@@ -111,7 +118,8 @@ void for_each_table(const Page& page, const Visit& visit) {
 PageCell number_cell(std::optional<double> value, int decimals) {
   if (!value || !std::isfinite(*value)) return {.text = "–"};
   std::string text = with_decimals(*value, decimals);
-  if (text.starts_with('-')) text.replace(0, 1, "−");
+  const bool is_zero = text.find_first_not_of("-0.") == std::string::npos;
+  if (text.starts_with('-')) text.replace(0, 1, is_zero ? "" : "−");
   return {.text = std::move(text), .value = value};
 }
 

@@ -127,6 +127,14 @@ struct ExtremesCommand {
 };
 int extremes(const ExtremesCommand& command);
 
+struct ValidateCommand {
+  bool quick = false;
+  ReportRequest report;
+  std::string json;
+};
+int validate(
+    const ValidateCommand& command);  // the exit status is 1 if a case that is stated to hold does not
+
 struct ViewCommand {
   std::filesystem::path scene;
   std::optional<std::uint64_t>

@@ -332,6 +332,16 @@ void add_stability(CLI::App& app, int& status) {
   });
 }
 
+void add_validate(CLI::App& app, int& status) {
+  auto* sub = app.add_subcommand(
+      "validate", "The program's forces against closed forms, finite elements and measured tissue");
+  auto c = std::make_shared<hybrid::ValidateCommand>();
+  sub->add_flag("--quick", c->quick, "coarser grids, without the cases that take minutes");
+  add_report(*sub, c->report);
+  sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
+  sub->callback([c, &status] { status = hybrid::validate(*c); });
+}
+
 void add_view(CLI::App& app, int& status) {
   auto* sub = app.add_subcommand(
       "view", "A window: the simulated hand plays, or the mouse drags the tool (right button)");
@@ -371,6 +381,7 @@ int main(int argc, char** argv) {
   add_compare(app, status);
   add_bench(app, status);
   add_stability(app, status);
+  add_validate(app, status);
   add_view(app, status);
   try {
     app.parse(argc, argv);

@@ -159,6 +159,7 @@ TEST(Page, NumbersThatAreNotThereAreADash) {
   EXPECT_EQ(hybrid::number_cell(std::numeric_limits<double>::quiet_NaN(), 2).text, "–");
   EXPECT_FALSE(hybrid::number_cell(std::numeric_limits<double>::infinity(), 2).value.has_value());
   EXPECT_EQ(hybrid::number_cell(-0.5, 1).text, "−0.5");
+  EXPECT_EQ(hybrid::number_cell(-0.01, 1).text, "0.0");
 }
 
 TEST(Page, Base64IsThatOfRfc4648) {
