@@ -70,6 +70,7 @@ struct CompareCommand {
   MeasuredOptions measured;                   // empty file: no measurement
   std::filesystem::path plot;
   bool classic = false;  // the plot also has the thesis's algorithm
+  ReportRequest report;
   std::string json;
 };
 int compare(const CompareCommand& command);
@@ -112,6 +113,7 @@ int bench_compare(const BenchCompareCommand& command);
 struct StabilityCommand {
   std::filesystem::path scene, plot;
   bool quick = false;
+  ReportRequest report;
   std::string json;
 };
 int stability(const StabilityCommand& command);

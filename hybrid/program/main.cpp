@@ -199,6 +199,7 @@ void add_compare(CLI::App& app, int& status) {
   auto* classic = sub->add_flag("--classic", c->classic,
                                 "of --plot, one scene: draw the thesis's algorithm too, below the others")
                       ->needs(plot);
+  add_report(*sub, c->report);
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
   sub->callback([=, &status] {
     const bool whole = c->scenes.size() > 1;
@@ -315,6 +316,7 @@ void add_stability(CLI::App& app, int& status) {
   e->table = false;
   sub->add_option("SCENE", c->scene, "scene file (.toml), such as scenes/wall.toml")->required();
   sub->add_option("--plot", c->plot, "write stiffness over damping and rate as SVG (rigid scenes)");
+  add_report(*sub, c->report);
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
   sub->add_flag("--extremes", e->table,
                 "instead: rigid, soft and mixed scenes with every setting taken to its end");
@@ -328,7 +330,10 @@ void add_stability(CLI::App& app, int& status) {
     e->scene = c->scene;
     e->json = c->json;
     e->quick = c->quick;
-    status = e->table || e->fuzz_ticks > 0 ? hybrid::extremes(*e) : hybrid::stability(*c);
+    const bool other = e->table || e->fuzz_ticks > 0;
+    if (other && !c->report.folder.empty())
+      throw CLI::ValidationError("--report", "has no page for --extremes and --fuzz-ticks; use --json");
+    status = other ? hybrid::extremes(*e) : hybrid::stability(*c);
   });
 }
 
