@@ -50,7 +50,7 @@ th[aria-sort="ascending"] button::after { content: "\a0\2191"; }
 th[aria-sort="descending"] button::after { content: "\a0\2193"; }
 button.copy { color: var(--link); font-size: 0.85rem; text-decoration: underline; margin-bottom: 0.4rem; }
 footer { padding-bottom: 2rem; font-size: 0.92rem; }
-dl { display: grid; grid-template-columns: max-content 1fr; gap: 0.2rem 1rem; }
+dl { display: grid; grid-template-columns: max-content minmax(0, 1fr); gap: 0.2rem 1rem; }
 dt { color: var(--quiet); } dd { margin: 0; overflow-wrap: anywhere; }
 code { font: 0.9em/1.5 ui-monospace, "DejaVu Sans Mono", Consolas, monospace; }
 @media (max-width: 40rem) { h1 { font-size: 1.25rem; } dl { grid-template-columns: 1fr; }

@@ -112,12 +112,12 @@ Page models_page(const Comparison& comparison, const Figure& figure, const std::
   page.sections.push_back({.heading = "Errors and times", .parts = {models_table(comparison)}});
   page.sections.push_back(
       {.heading = "Force of each model",
-       .parts = {PageFigure{
-           .name = "models",
-           .caption = "Force over time and difference from the reference, for each model; force over "
-                      "depth, for each contact.",
-           .alternative = "Forces of the models along the motion; the table has the differences",
-           .svg = to_svg(figure)}}});
+       .parts = {
+           PageFigure{.name = "models",
+                      .caption = "Force over time and difference from the reference, for each model; force "
+                                 "over depth, for each contact.",
+                      .alternative = "Forces of the models along the motion; the table has the differences",
+                      .svg = to_svg(figure)}}});
   return page;
 }
 
@@ -131,20 +131,18 @@ Page scenes_page(const ScenesComparison& comparison, const Figure& figure, const
   page.summary.push_back(jnd_words(comparison.jnd_floor_N));
   page.sections.push_back(
       {.heading = "Differences and costs",
-       .parts = {
-           scenes_table(comparison),
-           fmt::format(
-               "Own error: against the same scene along the same path, {} times slower. Ticks are timed "
-               "in alternating order, not pinned to a core.",
-               kSlower)}});
+       .parts = {scenes_table(comparison),
+                 fmt::format("Own error: against the same scene along the same path, {} times slower. Ticks "
+                             "are timed in alternating order, not pinned to a core.",
+                             kSlower)}});
   page.sections.push_back(
       {.heading = "Force of each scene",
-       .parts = {PageFigure{
-           .name = "scenes",
-           .caption = "Force over time, and difference of each scene from the reference. Within the "
-                      "band a hand does not feel it.",
-           .alternative = "Forces of the scenes along the motion; the table has the differences",
-           .svg = to_svg(figure)}}});
+       .parts = {
+           PageFigure{.name = "scenes",
+                      .caption = "Force over time, and difference of each scene from the reference. Within "
+                                 "the band a hand does not feel it.",
+                      .alternative = "Forces of the scenes along the motion; the table has the differences",
+                      .svg = to_svg(figure)}}});
   PageSection notes{.heading = "Notes", .parts = {}};
   for (const std::string& note : comparison.notes) notes.parts.emplace_back(note);
   if (!notes.parts.empty()) page.sections.push_back(std::move(notes));

@@ -53,12 +53,12 @@ std::string tick_in_short(double p999_us, double period_us) {
 std::vector<std::string> summary_of(const Scene& scene, const SessionResult& result, const Json& report,
                                     double p999_us) {
   std::vector<std::string> summary;
-  summary.push_back(fmt::format(
-      "{} ticks of {:.3g} ms, {:.2f} s in all. The tool is a {} of radius {:.4g} mm on a coupling of {:.4g} "
-      "N/m. The device is {}.",
-      result.ticks, 1e3 * result.dt_s, seconds_of(result),
-      scene.tool.shape == Tool::Shape::ball ? "ball" : "flat punch", 1e3 * scene.tool.radius_m,
-      scene.tool.stiffness_N_per_m, result.device_name));
+  summary.push_back(
+      fmt::format("{} ticks of {:.3g} ms, {:.2f} s in all. The tool is a {} of radius {:.4g} mm on a "
+                  "coupling of {:.4g} N/m. The device is {}.",
+                  result.ticks, 1e3 * result.dt_s, seconds_of(result),
+                  scene.tool.shape == Tool::Shape::ball ? "ball" : "flat punch", 1e3 * scene.tool.radius_m,
+                  scene.tool.stiffness_N_per_m, result.device_name));
   summary.push_back(tick_in_short(p999_us, 1e6 * result.dt_s));
   if (result.end == device::ServoEnd::stopped) summary.emplace_back("A signal ended the session early.");
   if (result.end == device::ServoEnd::lost) summary.emplace_back("The device was lost during the session.");
@@ -83,10 +83,9 @@ PagePart picture_of(const DrawnScene& drawn, const SessionResult& result) {
     save_picture(png, drawn, *result.moment);
     return PageFigure{
         .name = "picture",
-        .caption =
-            fmt::format("The scene after {:.3f} s, when most was in contact. The arrow is the force on "
-                        "the hand.",
-                        result.moment->t_s),
+        .caption = fmt::format(
+            "The scene after {:.3f} s, when most was in contact. The arrow is the force on the hand.",
+            result.moment->t_s),
         .alternative = "Drawing of the objects, the tool and the force at the moment of most contact",
         .png = file_bytes(png)};
   } catch (const std::exception& why) {
@@ -98,15 +97,13 @@ PageSection force_section(const DrawnScene& drawn, const SessionResult& result, 
   const auto objects = plotted_objects(drawn, result.rows, result.object_force_N);
   const Figure figure =
       session_figure(result.rows, objects, title, {.near = result.clearance, .period_s = result.dt_s});
-  return {
-      .heading = "Force on the hand",
-      .parts = {PageFigure{
-          .name = "force",
-          .caption = "Force over time, contacts, depth and the time of each tick. Last, force over depth, "
-                     "one line for each contact.",
-          .alternative =
-              fmt::format("Force over {:.2f} s, at most {:.2f} N", seconds_of(result), result.max_force_N),
-          .svg = to_svg(figure)}}};
+  return {.heading = "Force on the hand",
+          .parts = {PageFigure{.name = "force",
+                               .caption = "Force over time, contacts, depth and the time of each tick. Last, "
+                                          "force over depth, one line for each contact.",
+                               .alternative = fmt::format("Force over {:.2f} s, at most {:.2f} N",
+                                                          seconds_of(result), result.max_force_N),
+                               .svg = to_svg(figure)}}};
 }
 
 PageTable objects_table(const Json& report, double dt_s) {

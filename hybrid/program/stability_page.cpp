@@ -72,9 +72,8 @@ Page stability_page(const Scene& scene, const StabilityReport& report, const std
       .title = (scene.title.empty() ? scene.file.stem().string() : scene.title) + ": stability of the loop",
       .verdict = stability_verdict(report),
       .mark = below > 0 ? PageMark::bad : PageMark::none,
-      .summary = {
-          "Measured is the stiffness of the virtual coupling up to which the loop is stable or passive, "
-          "or at which a steady press begins to buzz."}};
+      .summary = {"Measured is the stiffness of the virtual coupling up to which the loop is stable or "
+                  "passive, or at which a steady press begins to buzz."}};
   if (below > 0) page.summary.push_back(fmt::format("{} rows lie below their lower bound.", below));
   if (report.stopped_by != 0)
     page.summary.emplace_back("A signal ended the measurement; the rows are those done.");

@@ -13,6 +13,7 @@ void add_silicones(const ValidationOptions& options, ValidationReport& report);
 void add_probed_tissues(const ValidationOptions& options, ValidationReport& report);
 void add_cartilage(const ValidationOptions& options, ValidationReport& report);
 
+std::string silicone_quantity(std::size_t strain);  // of a row, by index into kSiliconeStrains
 void say(const ValidationOptions& options, const std::string& text);
 const char* words_of(Energy energy);  // "bricks", "links"
 

@@ -69,8 +69,7 @@ void add_worst(const Group& group, Energy energy, double spacing_m, ValidationRe
   if (energy == Energy::six_link) {
     worst.why =
         "springs to six neighbours part from elasticity under a punch of few spacings, in layers, and for ν "
-        "far from "
-        "0.3; energy = \"trilinear\" does not";
+        "far from 0.3; energy = \"trilinear\" does not";
   }
   report.rows.push_back(std::move(worst));
 }

@@ -94,8 +94,7 @@ std::string reason(const ProbedTissue& tissue, double depth_m) {
     return "depth 0 is light contact: the probe already pressed there, and no contact point is published";
   if (!tissue.pork)
     return "this liver stiffens faster than a linear half-space: strain, or a thin slice on a board; "
-           "thickness is not "
-           "published";
+           "thickness is not published";
   return "tissue stiffens with strain, and a linear lattice does not; contact deeper than half the radius";
 }
 

@@ -53,7 +53,7 @@ void add_rows(const Silicone& silicone, const Forces& per_Pa, ValidationReport& 
         {.group = "silicone",
          .name = silicone.name,
          .source = kSiliconeSource,
-         .quantity = fmt::format("force at {:.0f} % strain, from that at 5 %", 100.0 * kSiliconeStrains[s]),
+         .quantity = silicone_quantity(s),
          .unit = "N",
          .reference = measured.mean_N,
          .ours = young_Pa * per_Pa[s],
@@ -96,6 +96,10 @@ ValidationPanel family_panel(std::string_view family, const Forces& per_Pa) {
 }
 
 }  // namespace
+
+std::string silicone_quantity(std::size_t strain) {
+  return fmt::format("force at {:.0f} % strain, from that at 5 %", 100.0 * kSiliconeStrains.at(strain));
+}
 
 void add_silicones(const ValidationOptions& options, ValidationReport& report) {
   // Between slipping plates the strain is the same everywhere, and the spacing does not matter.

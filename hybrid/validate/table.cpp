@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "hybrid/plot/svg_canvas.h"
@@ -22,6 +23,11 @@ std::string padded(const std::string& text, std::size_t width) {
 
 std::string spread_words(const ValidationRow& row) {
   return row.low && row.high ? fmt::format("{:.4g} to {:.4g}", *row.low, *row.high) : "";
+}
+
+// In percent to one decimal; no "-0.0".
+double percent(double share) {
+  return std::round(1000.0 * share) / 10.0 + 0.0;
 }
 
 std::string verdict_words(const ValidationRow& row) {
@@ -80,7 +86,7 @@ std::string validation_table(const ValidationReport& report) {
     text +=
         fmt::format("  {} {} {:>10.4g} {} {:>10.4g} {:>+8.1f} %  {:>8}  {}\n",
                     padded(shortened(row.name, 62), 62), padded(shortened(row.quantity, 52), 52),
-                    row.reference, padded(spread_words(row), 16), row.ours, 100.0 * row.difference(),
+                    row.reference, padded(spread_words(row), 16), row.ours, percent(row.difference()),
                     row.bound ? fmt::format("{:.1f} %", 100.0 * *row.bound) : "spread", verdict_words(row));
     if (!row.inside() && !row.why.empty()) text += fmt::format("      {}\n", row.why);
   }
