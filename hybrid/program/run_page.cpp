@@ -33,7 +33,16 @@ double seconds_of(const SessionResult& result) {
 
 std::string error_in_short(const ForceError& error) {
   if (error.all.samples == 0) return {};
-  return fmt::format("; the tissue's force is within {:.2f} JND of equilibrium", error.all.max_jnd);
+  return fmt::format("; the tissue's force is {} {:.2f} JND {} equilibrium",
+                     error.all.max_jnd <= 1.0 ? "within" : "up to", error.all.max_jnd,
+                     error.all.max_jnd <= 1.0 ? "of" : "from");
+}
+
+// Good: something was felt, nothing failed, and a hand would not feel the errors.
+PageMark mark_of(const SessionResult& result, std::size_t faults, double p999_us) {
+  if (faults > 0 || result.contact_ticks == 0) return PageMark::bad;
+  const bool accurate = result.error.all.max_jnd <= 1.0, in_time = p999_us <= 1e6 * result.dt_s;
+  return accurate && in_time ? PageMark::good : PageMark::none;
 }
 
 std::string verdict_of(const SessionResult& result, std::size_t faults) {
@@ -242,7 +251,7 @@ Page run_page(const Scene& scene, const BuiltScene& built, const SessionResult& 
   const double p999_us = number_at(report["tick_us"], "p999").value_or(0.0);
   Page page{.title = title + ": a haptic session",
             .verdict = verdict_of(result, faults),
-            .mark = faults > 0 || result.contact_ticks == 0 ? PageMark::bad : PageMark::good,
+            .mark = mark_of(result, faults, p999_us),
             .summary = summary_of(scene, result, report, p999_us),
             .sections = {}};
   page.sections.push_back({.heading = "The scene", .parts = {picture_of(drawn, result)}});
