@@ -124,13 +124,15 @@ const std::map<std::string, std::vector<Room>>& rooms() {
         {"session", {"snapshot"}},
         {"view", {"snapshot"}},
         {"plot", {"session", "view"}},
+        {"page", {"plot"}},
         {"compare", {"session", "view"}},
         {"compose", {"session", "view"}},
         {"stress", {"session", "view"}},
         {"bench/reports", {}},
         {"bench", {"plot", "compare", "compose", "stress"}},
         {"stability", {"plot", "compare", "compose", "stress"}},
-        {"program", {"bench", "bench/reports", "stability"}}}},
+        {"validate", {"page", "compare"}},
+        {"program", {"bench", "bench/reports", "stability", "validate"}}}},
   };
   return kRooms;
 }

@@ -279,12 +279,17 @@ Area not_felt_area(const std::vector<double>& ends) {
   return {"not felt: within ±1 JND", ends, {-1.0, -1.0}, {1.0, 1.0}, "#dfe8f2"};
 }
 
+Figure compare_figure(std::span<const ComparedModel> models, std::span<const ReferenceCurve> curves,
+                      const std::string& title, const ComparePlotOptions& options) {
+  if (options.reference >= models.size())
+    throw std::invalid_argument("compare_figure: the reference is no model");
+  return ComparePlot(models, curves, options).draw(title);
+}
+
 void save_compare_plot(const std::filesystem::path& svg, std::span<const ComparedModel> models,
                        std::span<const ReferenceCurve> curves, const std::string& title,
                        const ComparePlotOptions& options) {
-  if (options.reference >= models.size())
-    throw std::invalid_argument("save_compare_plot: the reference is no model");
-  save_svg(svg, ComparePlot(models, curves, options).draw(title));
+  save_svg(svg, compare_figure(models, curves, title, options));
 }
 
 }  // namespace hybrid

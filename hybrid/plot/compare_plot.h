@@ -44,8 +44,10 @@ Area not_felt_area(const std::vector<double>& ends);
 // Plots, for each model in panels of its own, force over time and the difference from the reference in JND,
 // and for each contact force over depth. The difference is that of the force vectors, negative where the
 // model's force is the smaller one. Models may have their own times: they are compared at the reference's
-// times, linearly between samples. Throws std::runtime_error: file not writable; std::invalid_argument: the
-// reference is no model.
+// times, linearly between samples. Throws std::invalid_argument: the reference is no model.
+Figure compare_figure(std::span<const ComparedModel> models, std::span<const ReferenceCurve> curves,
+                      const std::string& title, const ComparePlotOptions& options = {});
+// The same as a file. Throws also std::runtime_error: file not writable.
 void save_compare_plot(const std::filesystem::path& svg, std::span<const ComparedModel> models,
                        std::span<const ReferenceCurve> curves, const std::string& title,
                        const ComparePlotOptions& options = {});

@@ -25,10 +25,10 @@ Series difference_series(const ComparedModel& scene, const ComparedModel& refere
 
 }  // namespace
 
-void save_scenes_plot(const std::filesystem::path& svg, std::span<const ComparedModel> scenes,
-                      const std::string& title, const ComparePlotOptions& options) {
+Figure scenes_figure(std::span<const ComparedModel> scenes, const std::string& title,
+                     const ComparePlotOptions& options) {
   if (options.reference >= scenes.size())
-    throw std::invalid_argument("save_scenes_plot: the reference is no scene");
+    throw std::invalid_argument("scenes_figure: the reference is no scene");
   const ComparedModel& reference = scenes[options.reference];
   Figure figure;
   figure.title = title;
@@ -76,7 +76,12 @@ void save_scenes_plot(const std::filesystem::path& svg, std::span<const Compared
   group.panels.push_back(std::move(force));
   group.panels.push_back(std::move(difference));
   figure.groups.push_back(std::move(group));
-  save_svg(svg, figure);
+  return figure;
+}
+
+void save_scenes_plot(const std::filesystem::path& svg, std::span<const ComparedModel> scenes,
+                      const std::string& title, const ComparePlotOptions& options) {
+  save_svg(svg, scenes_figure(scenes, title, options));
 }
 
 }  // namespace hybrid

@@ -12,8 +12,10 @@
 namespace hybrid {
 
 // The scenes have ticks at the same times. The difference is that of the force vectors in JND, negative where
-// the scene's force is the smaller one. Throws std::runtime_error: file not writable; std::invalid_argument:
-// the reference is no scene.
+// the scene's force is the smaller one. Throws std::invalid_argument: the reference is no scene.
+Figure scenes_figure(std::span<const ComparedModel> scenes, const std::string& title,
+                     const ComparePlotOptions& options = {});
+// The same as a file. Throws also std::runtime_error: file not writable.
 void save_scenes_plot(const std::filesystem::path& svg, std::span<const ComparedModel> scenes,
                       const std::string& title, const ComparePlotOptions& options = {});
 

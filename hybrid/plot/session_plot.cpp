@@ -284,9 +284,8 @@ std::vector<PlottedObject> plotted_objects(const DrawnScene& scene, std::span<co
   return objects;
 }
 
-void save_session_plot(const std::filesystem::path& svg, std::span<const TraceRow> rows,
-                       std::span<const PlottedObject> objects, const std::string& title,
-                       const SessionPlotOptions& options) {
+Figure session_figure(std::span<const TraceRow> rows, std::span<const PlottedObject> objects,
+                      const std::string& title, const SessionPlotOptions& options) {
   const std::vector<double> t = times_of(rows);
   const Intervals any = contact_intervals(rows, ~0U);
   std::size_t untouched = 0;
@@ -335,7 +334,13 @@ void save_session_plot(const std::filesystem::path& svg, std::span<const TraceRo
     by_depth.x_label = "depth of the device since the first touch, against the largest force (mm)";
     by_depth.panels.push_back(std::move(over_depth));
   }
-  save_svg(svg, figure);
+  return figure;
+}
+
+void save_session_plot(const std::filesystem::path& svg, std::span<const TraceRow> rows,
+                       std::span<const PlottedObject> objects, const std::string& title,
+                       const SessionPlotOptions& options) {
+  save_svg(svg, session_figure(rows, objects, title, options));
 }
 
 }  // namespace hybrid

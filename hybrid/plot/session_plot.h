@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "hybrid/plot/svg_figure.h"
 #include "hybrid/session/clearance.h"
 #include "hybrid/snapshot/snapshot.h"
 
@@ -36,7 +37,10 @@ struct SessionPlotOptions {
 
 // Plots force over time, a lane of contact for each object that was touched, the distance between device and
 // proxy, the clearance between objects, the times of the ticks, and force over depth, one line for each
-// contact. Time in the air is squeezed. Throws std::runtime_error: file not writable.
+// contact. Time in the air is squeezed.
+Figure session_figure(std::span<const TraceRow> rows, std::span<const PlottedObject> objects,
+                      const std::string& title, const SessionPlotOptions& options = {});
+// The same as a file. Throws std::runtime_error: file not writable.
 void save_session_plot(const std::filesystem::path& svg, std::span<const TraceRow> rows,
                        std::span<const PlottedObject> objects, const std::string& title,
                        const SessionPlotOptions& options = {});

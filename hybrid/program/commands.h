@@ -15,6 +15,12 @@
 
 namespace hybrid {
 
+// A report page: the folder that it is written into, and the command line that makes it again.
+struct ReportRequest {
+  std::filesystem::path folder;  // empty: no page
+  std::string command;
+};
+
 struct RunCommand {
   std::filesystem::path scene;
   std::optional<double> seconds;
@@ -25,7 +31,8 @@ struct RunCommand {
   std::string relaxation = "apart";  // or "tick": where tissue away from the contact is relaxed
   std::filesystem::path trace, plot, picture, record, save_surface, save_volume;  // empty: not written
   std::filesystem::path black_box;  // empty: see open_black_box_file()
-  std::string json;                 // "-": standard output
+  ReportRequest report;
+  std::string json;  // "-": standard output
 };
 int run(const RunCommand& command);
 
@@ -63,6 +70,7 @@ struct CompareCommand {
   MeasuredOptions measured;                   // empty file: no measurement
   std::filesystem::path plot;
   bool classic = false;  // the plot also has the thesis's algorithm
+  ReportRequest report;
   std::string json;
 };
 int compare(const CompareCommand& command);
@@ -105,6 +113,7 @@ int bench_compare(const BenchCompareCommand& command);
 struct StabilityCommand {
   std::filesystem::path scene, plot;
   bool quick = false;
+  ReportRequest report;
   std::string json;
 };
 int stability(const StabilityCommand& command);
@@ -119,6 +128,14 @@ struct ExtremesCommand {
   std::string json;
 };
 int extremes(const ExtremesCommand& command);
+
+struct ValidateCommand {
+  bool quick = false;
+  ReportRequest report;
+  std::string json;
+};
+int validate(
+    const ValidateCommand& command);  // the exit status is 1 if a case that is stated to hold does not
 
 struct ViewCommand {
   std::filesystem::path scene;

@@ -8,7 +8,9 @@
 #include "hybrid/compare/compare.h"
 #include "hybrid/plot/compare_plot.h"
 #include "hybrid/program/commands.h"
+#include "hybrid/program/compare_page.h"
 #include "hybrid/program/outputs.h"
+#include "hybrid/program/report_page.h"
 #include "hybrid/session/report.h"
 
 namespace hybrid {
@@ -54,8 +56,12 @@ void print_models(std::FILE* words, const Comparison& comparison) {
   }
 }
 
-void save_comparison_plot(const std::filesystem::path& file, const CompareCommand& command,
-                          const Scene& scene, const Comparison& comparison) {
+std::string title_of_comparison(const Scene& scene, const Comparison& comparison) {
+  return fmt::format("{}: {}", scene.title.empty() ? scene.file.stem().string() : scene.title,
+                     comparison.object);
+}
+
+Figure comparison_figure(const CompareCommand& command, const Scene& scene, const Comparison& comparison) {
   std::vector<ComparedModel> models;
   std::size_t reference = 0;
   for (std::size_t m = 0; m < comparison.models.size(); ++m) {
@@ -65,18 +71,23 @@ void save_comparison_plot(const std::filesystem::path& file, const CompareComman
     if (m == comparison.reference) reference = models.size();
     models.push_back({model.name, model.rows, model.depth_m, classic});
   }
-  save_compare_plot(file, models, {},
-                    fmt::format("{}: {}", scene.title.empty() ? scene.file.stem().string() : scene.title,
-                                comparison.object),
-                    {.reference = reference, .jnd_share = kJndShare, .jnd_floor_N = comparison.jnd_floor_N});
+  return compare_figure(
+      models, {}, title_of_comparison(scene, comparison),
+      {.reference = reference, .jnd_share = kJndShare, .jnd_floor_N = comparison.jnd_floor_N});
 }
 
 // All files come before the words, which a reader may cut short.
 void write_files(const CompareCommand& command, const Scene& scene, const Comparison& comparison,
-                 const nlohmann::ordered_json& report, Outputs& outputs) {
+                 const nlohmann::ordered_json& report, const std::string& about, Outputs& outputs) {
   outputs.write_json(command.json, report);
   outputs.write("plot", command.plot, [&](const std::filesystem::path& file) {
-    save_comparison_plot(file, command, scene, comparison);
+    save_svg(file, comparison_figure(command, scene, comparison));
+  });
+  if (command.report.folder.empty()) return;
+  outputs.attempt([&] {
+    const Page page = models_page(comparison, comparison_figure(command, scene, comparison),
+                                  title_of_comparison(scene, comparison), about);
+    write_report(outputs, command.report, page, report);
   });
 }
 
@@ -95,7 +106,12 @@ int compare_with_measured(const CompareCommand& command, const Scene& scene, Out
                    {"ticks", result.samples},
                    {"ticks_in_gaps", result.in_gaps},
                    {"notes", result.notes}};
-  write_files(command, scene, result.comparison, j, outputs);
+  write_files(
+      command, scene, result.comparison, j,
+      fmt::format("The whole scene {} along a measured motion, {} ticks. RMS force error over all of them: "
+                  "{:.4f} N.",
+                  scene.file.filename().string(), result.samples, result.rms_N),
+      outputs);
   std::FILE* words = outputs.words();
   const std::string file = options.measured.file.filename().string();
   fmt::print(words, "{} along {}, {} ticks\n", scene.file.filename().string(),
@@ -115,17 +131,18 @@ int compare(const CompareCommand& command) {
   const Scene scene = load_scene(command.scenes.front());
   Outputs outputs;
   outputs.ask_plot(command.plot);
+  ask_report(outputs, command.report);
   outputs.ask_json(command.json);
   if (!command.measured.measured.file.empty()) return compare_with_measured(command, scene, outputs);
   const Comparison comparison = compare_models(scene, command.object, progress_on_terminal());
   end_progress();
-  write_files(command, scene, comparison, comparison_report(scene, comparison), outputs);
-  std::FILE* words = outputs.words();
-  fmt::print(
-      words,
-      "\"{}\" alone along the path of {}: no other objects, an ideal device, tissue relaxed in the tick "
-      "(the force of the whole scene: hybrid run)\n",
+  const std::string about = fmt::format(
+      "\"{}\" alone along the path of {}: no other objects, an ideal device, tissue relaxed in the tick (the "
+      "force of the whole scene: hybrid run)",
       comparison.object, scene.file.filename().string());
+  write_files(command, scene, comparison, comparison_report(scene, comparison), about + ".", outputs);
+  std::FILE* words = outputs.words();
+  fmt::print(words, "{}\n", about);
   print_models(words, comparison);
   outputs.say_files();
   return outputs.failed() ? 1 : 0;

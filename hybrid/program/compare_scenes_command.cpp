@@ -9,7 +9,9 @@
 #include "hybrid/feel/just_noticeable.h"
 #include "hybrid/plot/scenes_plot.h"
 #include "hybrid/program/commands.h"
+#include "hybrid/program/compare_page.h"
 #include "hybrid/program/outputs.h"
+#include "hybrid/program/report_page.h"
 #include "hybrid/session/report.h"
 
 namespace hybrid {
@@ -60,6 +62,18 @@ nlohmann::ordered_json scenes_report(const CompareCommand& command, const Scenes
     j["scenes"].push_back(std::move(row));
   }
   return j;
+}
+
+Figure drawn_scenes(const ScenesComparison& comparison) {
+  std::vector<ComparedModel> drawn;
+  std::string title;
+  for (const ComparedScene& scene : comparison.scenes) {
+    drawn.push_back({scene.name, scene.rows, {}, false});
+    title += (title.empty() ? "" : ", ") + scene.name;
+  }
+  title += " along the path of " + comparison.scenes.front().name;
+  return scenes_figure(drawn, title,
+                       {.reference = 0, .jnd_share = kJndShare, .jnd_floor_N = comparison.jnd_floor_N});
 }
 
 std::string cell(const std::optional<double>& value, double factor, int decimals) {
@@ -114,22 +128,20 @@ void print_scenes(std::FILE* words, const ScenesComparison& comparison, bool own
 int compare_whole_scenes(const CompareCommand& command) {
   Outputs outputs;
   outputs.ask_plot(command.plot);
+  ask_report(outputs, command.report);
   outputs.ask_json(command.json);
   std::vector<Scene> scenes;
   for (const std::filesystem::path& file : command.scenes) scenes.push_back(load_scene(file));
   const ScenesComparison comparison = compare_scenes(scenes, command.samples, progress_on_terminal());
   end_progress();
-  outputs.write_json(command.json, scenes_report(command, comparison));
-  outputs.write("plot", command.plot, [&](const std::filesystem::path& file) {
-    std::vector<ComparedModel> drawn;
-    std::string title;
-    for (const ComparedScene& scene : comparison.scenes) {
-      drawn.push_back({scene.name, scene.rows, {}, false});
-      title += (title.empty() ? "" : ", ") + scene.name;
-    }
-    title += " along the path of " + comparison.scenes.front().name;
-    save_scenes_plot(file, drawn, title,
-                     {.reference = 0, .jnd_share = kJndShare, .jnd_floor_N = comparison.jnd_floor_N});
+  const nlohmann::ordered_json report = scenes_report(command, comparison);
+  outputs.write_json(command.json, report);
+  outputs.write("plot", command.plot,
+                [&](const std::filesystem::path& file) { save_svg(file, drawn_scenes(comparison)); });
+  outputs.attempt([&] {
+    if (command.report.folder.empty()) return;
+    const Figure figure = drawn_scenes(comparison);
+    write_report(outputs, command.report, scenes_page(comparison, figure, figure.title), report);
   });
   std::FILE* words = outputs.words();
   fmt::print(

@@ -13,7 +13,9 @@
 #include "device/loop/stop_signal.h"
 #include "hybrid/base/file_ending.h"
 #include "hybrid/program/commands.h"
+#include "hybrid/program/did_you_mean.h"
 #include "hybrid/program/outputs.h"
+#include "hybrid/program/report_page.h"
 #include "hybrid/scene/table_reader.h"
 
 namespace {
@@ -31,9 +33,21 @@ constexpr const char* kAbout =
     "A scene is one small text file; scenes/README.md describes its keys.\n"
     "Exit status: 0 done, 1 input refused (with the place and the remedy), 2 wrong usage, 130 Ctrl-C.";
 
+// The command line, set once by main().
+std::string& typed_command() {
+  static std::string line;
+  return line;
+}
+
 void add_device(CLI::App& sub, std::string& device) {
   sub.add_option("--device", device, "use this one in place of the scene's")
       ->check(CLI::IsMember({"phantom", "premium-1.5", "touch", "ideal"}));
+}
+
+void add_report(CLI::App& sub, hybrid::ReportRequest& report) {
+  sub.add_option("--report", report.folder,
+                 "write report.html, a page that explains itself, and its data into this folder");
+  report.command = typed_command();
 }
 
 void add_run(CLI::App& app, int& status) {
@@ -68,6 +82,7 @@ void add_run(CLI::App& app, int& status) {
                   "write all surfaces as they are at the end, scene frame, as STL or OBJ (mm) or PLY (m)");
   sub->add_option("--save-volume", c->save_volume,
                   "write each soft object's displacement and moved labels (.nii.gz, .nrrd, .mha)");
+  add_report(*sub, c->report);
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
   sub->callback([c, &status] { status = hybrid::run(*c); });
 }
@@ -184,6 +199,7 @@ void add_compare(CLI::App& app, int& status) {
   auto* classic = sub->add_flag("--classic", c->classic,
                                 "of --plot, one scene: draw the thesis's algorithm too, below the others")
                       ->needs(plot);
+  add_report(*sub, c->report);
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
   sub->callback([=, &status] {
     const bool whole = c->scenes.size() > 1;
@@ -300,6 +316,7 @@ void add_stability(CLI::App& app, int& status) {
   e->table = false;
   sub->add_option("SCENE", c->scene, "scene file (.toml), such as scenes/wall.toml")->required();
   sub->add_option("--plot", c->plot, "write stiffness over damping and rate as SVG (rigid scenes)");
+  add_report(*sub, c->report);
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
   sub->add_flag("--extremes", e->table,
                 "instead: rigid, soft and mixed scenes with every setting taken to its end");
@@ -313,8 +330,21 @@ void add_stability(CLI::App& app, int& status) {
     e->scene = c->scene;
     e->json = c->json;
     e->quick = c->quick;
-    status = e->table || e->fuzz_ticks > 0 ? hybrid::extremes(*e) : hybrid::stability(*c);
+    const bool other = e->table || e->fuzz_ticks > 0;
+    if (other && !c->report.folder.empty())
+      throw CLI::ValidationError("--report", "has no page for --extremes and --fuzz-ticks; use --json");
+    status = other ? hybrid::extremes(*e) : hybrid::stability(*c);
   });
+}
+
+void add_validate(CLI::App& app, int& status) {
+  auto* sub = app.add_subcommand(
+      "validate", "The program's forces against closed forms, finite elements and measured tissue");
+  auto c = std::make_shared<hybrid::ValidateCommand>();
+  sub->add_flag("--quick", c->quick, "coarser grids, without the cases that take minutes");
+  add_report(*sub, c->report);
+  sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
+  sub->callback([c, &status] { status = hybrid::validate(*c); });
 }
 
 void add_view(CLI::App& app, int& status) {
@@ -327,50 +357,6 @@ void add_view(CLI::App& app, int& status) {
   add_device(*sub, c->device);
   sub->add_option("--drag", c->drag, "drag the tool along a CSV (t_s, x_m, y_m, z_m) instead of the mouse");
   sub->callback([c, &status] { status = hybrid::view(*c); });
-}
-
-// What a wrong command or option was probably meant to be, as a line of its own; empty where nothing is near.
-std::string did_you_mean(const CLI::App& app, const std::vector<std::string>& arguments) {
-  const auto nearest = [](const std::string& word, const std::vector<std::string>& names) -> std::string {
-    const std::vector<std::string_view> views(names.begin(), names.end());
-    const std::string_view found = hybrid::nearest_name(word, views);
-    const bool alike = 3 * hybrid::edit_distance(word, found) <= std::max(word.size(), found.size()) + 1;
-    return alike ? std::string(found) : std::string();
-  };
-  if (arguments.empty()) return {};
-  const CLI::App* chosen = nullptr;
-  std::vector<std::string> commands;
-  for (const CLI::App* sub : app.get_subcommands([](const CLI::App*) { return true; })) {
-    commands.push_back(sub->get_name());
-    if (sub->get_name() == arguments.front()) chosen = sub;
-  }
-  if (chosen != nullptr && arguments.size() > 1) {
-    std::vector<std::string> parts;
-    for (const CLI::App* sub : chosen->get_subcommands([](const CLI::App*) { return true; })) {
-      parts.push_back(sub->get_name());
-      if (sub->get_name() == arguments[1]) chosen = sub;
-    }
-    const std::string part = parts.empty() ? std::string() : nearest(arguments[1], parts);
-    if (!part.empty() && part != arguments[1])
-      return "did you mean `" + arguments.front() + " " + part + "`?\n";
-  }
-  if (chosen == nullptr) {
-    const std::string& word = arguments.front();
-    if (hybrid::lower_ending(word) == ".toml") return "did you mean `hybrid run " + word + "`?\n";
-    const std::string command = word.starts_with("-") ? std::string() : nearest(word, commands);
-    return command.empty() ? std::string() : "did you mean `" + command + "`?\n";
-  }
-  std::vector<std::string> options;
-  for (const CLI::Option* option : chosen->get_options([](const CLI::Option*) { return true; })) {
-    for (const std::string& name : option->get_lnames()) options.push_back("--" + name);
-  }
-  for (auto word = arguments.begin() + 1; word != arguments.end(); ++word) {
-    const std::string name = word->substr(0, word->find('='));
-    if (!name.starts_with("--") || std::find(options.begin(), options.end(), name) != options.end()) continue;
-    const std::string option = nearest(name, options);
-    if (!option.empty()) return "did you mean `" + option + "`?\n";
-  }
-  return {};
 }
 
 // Words that did not reach their reader are an error like any other, but for a reader that had enough.
@@ -391,6 +377,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   app.set_version_flag("--version", HYBRID_VERSION);
   int status = 0;
+  typed_command() = hybrid::command_line(argc, argv);
   add_run(app, status);
   add_replay(app, status);
   add_check(app, status);
@@ -399,13 +386,14 @@ int main(int argc, char** argv) {
   add_compare(app, status);
   add_bench(app, status);
   add_stability(app, status);
+  add_validate(app, status);
   add_view(app, status);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     const bool wanted = app.exit(e) == 0;  // --help
     if (wanted) return flushed(0);
-    std::fputs(did_you_mean(app, {argv + 1, argv + argc}).c_str(), stderr);
+    std::fputs(hybrid::did_you_mean(app, {argv + 1, argv + argc}).c_str(), stderr);
     return 2;
   } catch (const device::StopAsked& asked) {
     hybrid::end_progress();

@@ -14,6 +14,8 @@
 #include "hybrid/plot/session_plot.h"
 #include "hybrid/program/commands.h"
 #include "hybrid/program/outputs.h"
+#include "hybrid/program/report_page.h"
+#include "hybrid/program/run_page.h"
 #include "hybrid/session/export_shapes.h"
 #include "hybrid/session/real_device.h"
 #include "hybrid/session/recording.h"
@@ -53,6 +55,7 @@ void ask_outputs(const RunCommand& command, const Scene& scene, Outputs& outputs
     for (const auto& file : saved_volume_names(command.save_volume, scene))
       outputs.ask("--save-volume", file, {});
   }
+  ask_report(outputs, command.report);
   outputs.ask_json(command.json);
 }
 
@@ -114,14 +117,15 @@ int run(const RunCommand& command) {
   }
   const bool realtime = command.realtime || real;
   const auto kept = open_black_box_file(command.black_box, command.scene, realtime, scene.rate_hz);
+  const bool paged = !command.report.folder.empty();
   SessionOptions options{.seconds = command.seconds,
                          .realtime = command.realtime,
                          .real_device = real.get(),
-                         .keep_rows = !command.trace.empty() || !command.plot.empty(),
+                         .keep_rows = !command.trace.empty() || !command.plot.empty() || paged,
                          .keep_recording = !command.record.empty(),
-                         .keep_clearance = !command.plot.empty(),
+                         .keep_clearance = !command.plot.empty() || paged,
                          .between_samples = kBetweenSamples,
-                         .keep_picture = !command.picture.empty(),
+                         .keep_picture = !command.picture.empty() || paged,
                          .reference_samples = command.samples,
                          .start_ticks = command.start_ticks,
                          .progress = progress,
@@ -142,7 +146,9 @@ int run(const RunCommand& command) {
                           scene_limits(scene), options.async_relaxation, result.state_hash, result.start_m,
                           result.recording});
   });
-  outputs.write_json(command.json, command.json.empty() ? nullptr : run_report(scene, built, result));
+  const nlohmann::ordered_json report =
+      command.json.empty() && !paged ? nullptr : run_report(scene, built, result);
+  outputs.write_json(command.json, report);
   outputs.write("plot", command.plot, [&](const Path& file) {
     const auto objects =
         plotted_objects(drawn_scene(scene, built, title), result.rows, result.object_force_N);
@@ -155,6 +161,9 @@ int run(const RunCommand& command) {
   });
   outputs.write("picture", command.picture, [&](const Path& file) {
     save_picture(file, drawn_scene(scene, built, title), *result.moment);
+  });
+  outputs.attempt([&] {
+    if (paged) write_report(outputs, command.report, run_page(scene, built, result, report, title), report);
   });
   fmt::print(outputs.words(), "{}", run_summary(built, result));
   outputs.say_files();

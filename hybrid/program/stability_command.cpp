@@ -8,6 +8,8 @@
 #include "device/loop/stop_signal.h"
 #include "hybrid/program/commands.h"
 #include "hybrid/program/outputs.h"
+#include "hybrid/program/report_page.h"
+#include "hybrid/program/stability_page.h"
 #include "hybrid/session/report.h"
 #include "hybrid/stability/plot.h"
 #include "hybrid/stability/stability.h"
@@ -70,11 +72,11 @@ std::vector<BoundaryGroup> figure_of(const StabilityReport& report) {
   return groups;
 }
 
-void save_plot(const std::filesystem::path& file, const Scene& scene, const StabilityReport& report) {
+Figure drawn(const Scene& scene, const StabilityReport& report) {
   const Agreement stable = agreement(report, Boundary::stable),
                   passive = agreement(report, Boundary::passive);
-  save_stability_plot(
-      file, figure_of(report),
+  return stability_figure(
+      figure_of(report),
       fmt::format("{}: how stiff before it is unstable, or active",
                   scene.title.empty() ? scene.file.stem().string() : scene.title),
       {"Lines: theory (discrete eigenvalues; passivity after Colgate & Schenkel, with the delay). Dots: "
@@ -97,6 +99,7 @@ int stability(const StabilityCommand& command) {
   }
   Outputs outputs;
   outputs.ask_plot(command.plot);
+  ask_report(outputs, command.report);
   outputs.ask_json(command.json);
   const device::StopOnSignal stop;  // rows that are done are kept
   const StabilityReport report =
@@ -108,7 +111,12 @@ int stability(const StabilityCommand& command) {
   if (report.stopped_by != 0) json["stopped"] = true;
   outputs.write_json(command.json, json);
   outputs.write("plot", command.plot,
-                [&](const std::filesystem::path& file) { save_plot(file, scene, report); });
+                [&](const std::filesystem::path& file) { save_svg(file, drawn(scene, report)); });
+  outputs.attempt([&] {
+    if (command.report.folder.empty()) return;
+    const auto figure = scene.soft.empty() ? std::optional(drawn(scene, report)) : std::nullopt;
+    write_report(outputs, command.report, stability_page(scene, report, figure), json);
+  });
   fmt::print(outputs.words(), "{}", stability_tables(report));
   outputs.say_files();
   if (report.stopped_by != 0)

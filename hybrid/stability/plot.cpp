@@ -4,8 +4,6 @@
 #include <limits>
 #include <utility>
 
-#include "hybrid/plot/svg_figure.h"
-
 namespace hybrid {
 namespace {
 
@@ -31,8 +29,8 @@ Series dots(const BoundaryCurve& curve, const std::string& colour, double width)
 
 }  // namespace
 
-void save_stability_plot(const std::filesystem::path& svg, const std::vector<BoundaryGroup>& groups,
-                         const std::string& title, const std::vector<std::string>& notes) {
+Figure stability_figure(const std::vector<BoundaryGroup>& groups, const std::string& title,
+                        const std::vector<std::string>& notes) {
   Figure figure;
   figure.title = title;
   figure.notes = notes;
@@ -56,7 +54,7 @@ void save_stability_plot(const std::filesystem::path& svg, const std::vector<Bou
       }
     }
   }
-  save_svg(svg, figure);
+  return figure;
 }
 
 }  // namespace hybrid

@@ -3,9 +3,10 @@
 // as dots.
 #pragma once
 
-#include <filesystem>
 #include <string>
 #include <vector>
+
+#include "hybrid/plot/svg_figure.h"
 
 namespace hybrid {
 
@@ -23,8 +24,7 @@ struct BoundaryGroup {
   std::vector<BoundaryPanel> panels;
 };
 
-// Throws std::runtime_error: file not writable.
-void save_stability_plot(const std::filesystem::path& svg, const std::vector<BoundaryGroup>& groups,
-                         const std::string& title, const std::vector<std::string>& notes);
+Figure stability_figure(const std::vector<BoundaryGroup>& groups, const std::string& title,
+                        const std::vector<std::string>& notes);
 
 }  // namespace hybrid

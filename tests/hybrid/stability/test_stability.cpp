@@ -236,19 +236,15 @@ TEST(StabilityReport, SaysHowFarOffAndHowManyBelow) {
 }
 
 TEST_F(StabilityScene, ThePlotHasALineAndADotForEachMeasurement) {
-  const std::filesystem::path file = folder_ / "plot.svg";
-  hybrid::save_stability_plot(file,
-                              {{.x_label = "b",
-                                .panels = {{.title = "Stable",
-                                            .curves = {{.name = "no delay",
-                                                        .x = {0.0, 1.0, 2.0},
-                                                        .theory_N_per_m = {0.0, 1000.0, 2000.0},
-                                                        .measured_x = {0.5, 1.0, 1.5},
-                                                        .measured_N_per_m = {500.0, 1001.0, 1500.0}}}}}}},
-                              "Wall", {});
-  std::ostringstream text;
-  text << std::ifstream(file).rdbuf();
-  const std::string svg = text.str();
+  const std::string svg = hybrid::to_svg(
+      hybrid::stability_figure({{.x_label = "b",
+                                 .panels = {{.title = "Stable",
+                                             .curves = {{.name = "no delay",
+                                                         .x = {0.0, 1.0, 2.0},
+                                                         .theory_N_per_m = {0.0, 1000.0, 2000.0},
+                                                         .measured_x = {0.5, 1.0, 1.5},
+                                                         .measured_N_per_m = {500.0, 1001.0, 1500.0}}}}}}},
+                               "Wall", {}));
   EXPECT_NE(svg.find("no delay"), std::string::npos);
   int dots = 0;
   for (std::size_t at = svg.find("h0"); at != std::string::npos; at = svg.find("h0", at + 1)) ++dots;

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace CLI {
+class App;
+}
+
+namespace hybrid {
+
+// What a wrong command or option was probably meant to be, as a line of its own; empty where nothing is near.
+std::string did_you_mean(const CLI::App& app, const std::vector<std::string>& arguments);
+
+}  // namespace hybrid

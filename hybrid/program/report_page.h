@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// `--report DIR`: what the pages of all commands share.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "hybrid/page/page.h"
+#include "hybrid/program/commands.h"
+#include "hybrid/program/outputs.h"
+
+namespace hybrid {
+
+// The words as they are typed into a shell again: those that a shell would read otherwise are quoted.
+std::string command_line(int count, const char* const* words);
+
+// Refuses before the work a folder that cannot be written.
+void ask_report(Outputs& outputs, const ReportRequest& request);
+
+// Fills in what stands at the end of a page, and writes it. `report` begins with report_head().
+void write_report(Outputs& outputs, const ReportRequest& request, Page page,
+                  const nlohmann::ordered_json& report);
+
+}  // namespace hybrid

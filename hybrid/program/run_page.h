@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The page of `hybrid run --report`.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "hybrid/page/page.h"
+#include "hybrid/session/session.h"
+
+namespace hybrid {
+
+// The session for a person who was not there. `report` is that of run_report(). The result has its rows and
+// the picture's moment. Without OpenGL the page says why it has no picture.
+Page run_page(const Scene& scene, const BuiltScene& built, const SessionResult& result,
+              const nlohmann::ordered_json& report, const std::string& title);
+
+}  // namespace hybrid
