@@ -140,7 +140,7 @@ int run(const RunCommand& command) {
   outputs.write("recording", command.record, [&](const Path& file) {
     save_recording(file, {std::filesystem::absolute(command.scene), read_text(command.scene), result.dt_s,
                           scene_limits(scene), options.async_relaxation, result.state_hash, result.start_m,
-                          result.recording});
+                          result.recording, result.edits});
   });
   outputs.write_json(command.json, command.json.empty() ? nullptr : run_report(scene, built, result));
   outputs.write("plot", command.plot, [&](const Path& file) {

@@ -16,9 +16,10 @@ namespace hybrid {
 struct FrameOptions {
   int width = 0, height = 0;  // (pixels)
   bool inset = true;          // draw a nearer view of the contact if it is kLeastNearer times nearer
-  std::vector<ForceSample> history;
-  std::string help;
+  std::string help, notice;   // one line below the scene; a message above it. Empty: none
   bool paused = false;
+  ViewSettings view;
+  OverlayPanel* panel = nullptr;  // null: none
 };
 
 // Needs a current OpenGL context for its whole life. Keeps a reference to the scene.

@@ -22,10 +22,12 @@
 #include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "hybrid/base/flush_to_zero.h"
 #include "hybrid/session/session.h"
 #include "hybrid/tick/tissue/async_relaxation.h"
+#include "hybrid/world/edits.h"
 #include "tests/hybrid/fixtures/scene_file_fixture.h"
 #include "tests/shared_data.h"
 
@@ -165,6 +167,7 @@ long syscall(long number, ...) noexcept {
 namespace {
 
 constexpr int kTicks = 10'000;
+std::vector<hybrid::EditableValue> values;
 
 TEST(ServoPath, TheCountersCount) {
   std::mutex mutex;
@@ -193,7 +196,17 @@ TEST(ServoPath, TheCountersCount) {
   EXPECT_EQ(calls.files, 1U);
 }
 
-void watch_ticks(const hybrid::Scene& scene, const hybrid::BuiltScene& built, bool asynchronous) {
+// Every value of the scene in turns, between its own value and a little more or less.
+void edit_in_turns(const hybrid::BuiltScene& built, std::uint64_t tick) {
+  if (tick % 10 != 0 || values.empty()) return;
+  const hybrid::EditableValue& value = values[tick / 10 % values.size()];
+  const double changed = std::min(value.in_scene * (tick % 20 == 0 ? 0.9 : 1.1), value.range.high);
+  hybrid::apply_edit(*built.world, *built.state, {tick, value.object, value.quantity, changed});
+}
+
+void watch_ticks(const hybrid::Scene& scene, const hybrid::BuiltScene& built, bool asynchronous,
+                 bool edited = false) {
+  values = hybrid::editable_values(*built.world, *built.state);
   const auto device = hybrid::scene_device(scene, hybrid::scene_path(scene));
   hybrid::set_flush_to_zero();
   hybrid::begin_session(scene, *built.world, *built.state, device->read().position_m);
@@ -204,6 +217,7 @@ void watch_ticks(const hybrid::Scene& scene, const hybrid::BuiltScene& built, bo
   calls = {};
   watched = true;
   for (int tick = 0; tick < kTicks; ++tick) {
+    if (edited) edit_in_turns(built, static_cast<std::uint64_t>(tick));
     const hybrid::TickResult felt = hybrid::haptic_tick(*built.world, *built.state, device->read(), dt);
     device->write(felt.force_N, dt);
     felt_ticks += felt.contacts != 0 ? 1 : 0;
@@ -261,6 +275,18 @@ TEST_F(ServoPathIn, AllTicksOfAContactOnACompositeGrid) {
   const hybrid::BuiltScene built = hybrid::build_scene(grid);
   ASSERT_TRUE(built.state->soft[0]->uses_patches());
   watch_ticks(grid, built, true);
+}
+
+TEST_F(ServoPathIn, AllTicksBetweenEdits) {
+  const hybrid::Scene felt =
+      load("format = 1\n" + tests::block +
+           "[[rigid]]\nname = \"plate\"\nprimitive = \"box\"\nsize = [20, 20, 10]\nposition = [30, 0, 0]\n"
+           "friction = 0.4\ndamping = 1\ntexture = { pattern = \"bumps\", size = 3, height = 0.3 }\n"
+           "[path]\nkind = \"waypoints\"\nspeed = 60\npoints = [[0, 0, 20], [0, 0, 5, 1], [30, 0, 20], [28, "
+           "0, 4], "
+           "[34, 2, 4, 2]]\n");
+  for (const bool asynchronous : {false, true})
+    watch_ticks(felt, hybrid::build_scene(felt), asynchronous, true);
 }
 
 TEST_F(ServoPathIn, AllTicksOfAPartWithoutSlack) {
