@@ -15,9 +15,8 @@
 #include "hybrid/program/commands.h"
 #include "hybrid/program/outputs.h"
 #include "hybrid/program/view_files.h"
-#include "hybrid/session/player.h"
+#include "hybrid/program/viewed_scene.h"
 #include "hybrid/session/real_device.h"
-#include "hybrid/snapshot/make_drawn_scene.h"
 #include "hybrid/snapshot/merge_live_surface.h"
 #include "hybrid/window/view_script.h"
 #include "hybrid/window/window.h"
@@ -28,26 +27,9 @@ namespace {
 constexpr double kSnapshotEvery_s = 1.0 / 60.0;
 constexpr double kScriptFrame_s = 1.0 / 30.0;  // session time of one frame of a scripted view
 
-// Places of the hand from the path's beginning to its end.
-std::vector<glm::dvec3> places_along(const device::Path& path) {
-  constexpr int steps = 500;
-  std::vector<glm::dvec3> places;
-  for (int n = 0; n <= steps; ++n) places.push_back(path.position(path.duration_s() * n / steps));
-  return places;
-}
-
 std::filesystem::path frame_file(const std::filesystem::path& folder, std::uint64_t n) {
   return folder / fmt::format("frame-{:05}.png", n);
 }
-
-// A scene with all that shows it and plays it.
-struct ViewedScene {
-  Scene scene;
-  std::string text;  // of the file, as it was loaded
-  BuiltScene built;
-  DrawnScene drawn;
-  std::unique_ptr<Player> player;
-};
 
 // What the window asked for since the last frame, as the session takes it.
 PlayRequest request_of(const WindowInput& input) {
@@ -73,13 +55,12 @@ ViewScript read_script(const std::filesystem::path& file, const DrawnScene& draw
 
 // Plays frames that each stand for a fixed stretch of time, so that the pictures are reproducible on any
 // machine. Returns the exit status.
-int play_frames(const ViewCommand& command, ViewedScene& viewed, Window& window) {
+int play_frames(const ViewCommand& command, ViewedScene& viewed, Window& window, ViewScript& script) {
   std::shared_ptr<const device::Path> drag;
   if (!command.drag.empty()) drag = device::make_path(device::CsvPath{.file = command.drag});
   Player& player = *viewed.player;
   Snapshot snapshot;
-  ViewFiles files(command, viewed.text);
-  ViewScript script = read_script(command.script, viewed.drawn);
+  ViewFiles files(command);
   double ahead_s = 0.0;  // of the ticks so far
   for (std::uint64_t n = 0; n < *command.frames; ++n) {
     script.play(static_cast<double>(n) * kScriptFrame_s, window);
@@ -97,7 +78,7 @@ int play_frames(const ViewCommand& command, ViewedScene& viewed, Window& window)
     window.add_ticks(player.samples());
     if (!window.frame(snapshot, notes_of(player, snapshot.t_s, files.message()))) break;
     if (!command.out.empty()) window.save_frame(frame_file(command.out, n));
-    files.save_what_was_asked(window, input, player, [] { return true; });
+    files.save_what_was_asked(window, input, viewed, snapshot, [] { return true; });
     if (const int signal = device::stop_signal(); signal != 0) {
       fmt::print(stderr, "stopped by {} after {} of {} frames{}{}\n", signal_in_words(signal), n + 1,
                  *command.frames, command.out.empty() ? "" : ", which are in ", command.out.string());
@@ -105,7 +86,7 @@ int play_frames(const ViewCommand& command, ViewedScene& viewed, Window& window)
     }
   }
   if (!command.out.empty()) fmt::print("{} frames in {}\n", *command.frames, command.out.string());
-  return files.save_at_end(player) ? 0 : 1;
+  return files.save_at_end(viewed) ? 0 : 1;
 }
 
 // The session on a thread of its own, while a window shows it.
@@ -192,39 +173,70 @@ class LiveSession {
   std::jthread thread_;
 };
 
-// Runs the window on this thread and the session on another. Returns the device's events.
-device::ServoReport play_live(const ViewCommand& command, ViewedScene& viewed, Window& window,
-                              BlackBox& box) {
+// What a user does to the scene that is played, and what may follow it.
+struct LiveWindow {
+  const ViewCommand& command;
+  Window& window;
+  ViewFiles files;
+  ViewScript script;
+  SceneReload reload;
+  std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
+};
+
+SessionNotes notes_of(const LiveWindow& live, const Player& player, double t_s) {
+  SessionNotes notes = notes_of(player, t_s, live.files.message());
+  if (live.reload.loading()) notes.message = "loading the scene again; the session goes on meanwhile";
+  if (!live.reload.error().empty())
+    notes.error = live.reload.error() + "\nThe session goes on with the scene as it was.";
+  return notes;
+}
+
+// Runs the window on this thread and the session on another, until the window closes or `next` is the scene
+// to go on with. Returns the device's events.
+device::ServoReport play_live(LiveWindow& live, ViewedScene& viewed, BlackBox& box,
+                              std::unique_ptr<ViewedScene>& next) {
   LiveSession session(viewed, box);
   Player& player = *viewed.player;
-  ViewFiles files(command, viewed.text);
-  ViewScript script = read_script(command.script, viewed.drawn);
-  const auto start = std::chrono::steady_clock::now();
   Snapshot shown;
   bool open = true;
-  while (open && !session.ended()) {
-    script.play(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(), window);
-    const WindowInput input = window.take_input();
+  while (open && !session.ended() && next == nullptr) {
+    live.script.play(std::chrono::duration<double>(std::chrono::steady_clock::now() - live.start).count(),
+                     live.window);
+    const WindowInput input = live.window.take_input();
     const PlayRequest request = request_of(input);
     for (const Edit& edit : input.edits) player.edit(edit);
     session.ask(request);
     session.shown(viewed.drawn, shown);
-    window.add_ticks(player.samples());
-    open = window.frame(shown, notes_of(player, shown.t_s, files.message()));
-    files.save_what_was_asked(window, input, player, [&] { return session.hold(request); });
+    live.window.add_ticks(player.samples());
+    open = live.window.frame(shown, notes_of(live, player, shown.t_s));
+    live.files.save_what_was_asked(live.window, input, viewed, shown, [&] { return session.hold(request); });
+    if (input.reload) live.reload.ask();
+    if (!player.is_real()) next = live.reload.poll();
   }
-  device::ServoReport report = session.stop();
-  if (!files.save_at_end(player)) report.messages.emplace_back("the session was not recorded");
-  return report;
+  return session.stop();
+}
+
+// Plays scene after scene: each time that its file has changed, the new one.
+device::ServoReport play_scenes(LiveWindow& live, std::unique_ptr<ViewedScene> viewed, BlackBox& box) {
+  for (;;) {
+    std::unique_ptr<ViewedScene> next;
+    device::ServoReport report = play_live(live, *viewed, box, next);
+    if (next == nullptr) {
+      if (!live.files.save_at_end(*viewed)) report.messages.emplace_back("the session was not recorded");
+      return report;
+    }
+    live.window.show_scene(next->drawn);
+    viewed = std::move(next);
+    print_notes(viewed->built);
+    live.files.say("The scene was loaded again.");
+  }
 }
 
 }  // namespace
 
 int view(const ViewCommand& command) {
-  ViewedScene viewed;
-  viewed.text = text_of(command.scene);
-  Scene& scene = viewed.scene = load_scene(command.scene);
-  if (!command.device.empty()) use_device(scene, command.device);
+  std::unique_ptr<ViewedScene> viewed = read_viewed_scene(command);
+  Scene& scene = viewed->scene;
   // Frames are reproducible pictures, which a real device cannot give.
   if (command.frames && scene.real_device) {
     throw SceneError(scene.file, scene.real_device->place,
@@ -232,29 +244,28 @@ int view(const ViewCommand& command) {
   }
   if (!command.out.empty()) std::filesystem::create_directories(command.out);
   const auto real = open_real_device(scene);
-  viewed.built = build_scene(scene, progress_on_terminal());
+  build_viewed_scene(command, *viewed, progress_on_terminal());
   end_progress();
-  note_relaxation(scene, viewed.built, true);
-  print_notes(viewed.built);
-  viewed.drawn =
-      drawn_scene(scene, viewed.built, scene.title.empty() ? command.scene.stem().string() : scene.title);
-  if (!real) viewed.drawn.path_m = places_along(*scene_path(scene));
+  print_notes(viewed->built);
+  ViewScript script = read_script(command.script, viewed->drawn);
   // Pictures of frames show the scene alone, unless a script plays the window's user.
-  Window window(viewed.drawn, {.visible = !command.frames || command.out.empty(),
-                               .panels = !command.frames || !command.script.empty()});
+  Window window(viewed->drawn, {.visible = !command.frames || command.out.empty(),
+                                .panels = !command.frames || !command.script.empty()});
   const device::StopOnSignal stop;
   if (real) {
-    std::fprintf(stderr, "note: %s\n", place_real_device(scene, *viewed.built.world, *real).c_str());
-    await_free_tool(scene, *viewed.built.world, *viewed.built.state, *real, progress_on_terminal());
+    const BuiltScene& built = viewed->built;
+    std::fprintf(stderr, "note: %s\n", place_real_device(scene, *built.world, *real).c_str());
+    await_free_tool(scene, *built.world, *built.state, *real, progress_on_terminal());
     end_progress();
   }
-  viewed.player = std::make_unique<Player>(scene, viewed.built, viewed.drawn, real.get());
+  viewed->player = std::make_unique<Player>(scene, viewed->built, viewed->drawn, real.get());
   if (command.frames) {
-    viewed.player->relax_at_once();
-    return play_frames(command, viewed, window);
+    viewed->player->relax_at_once();
+    return play_frames(command, *viewed, window, script);
   }
   const auto kept = open_black_box_file({}, command.scene, true, scene.rate_hz);
-  const device::ServoReport report = play_live(command, viewed, window, kept->box());
+  LiveWindow live{command, window, ViewFiles(command), std::move(script), SceneReload(command, viewed->text)};
+  const device::ServoReport report = play_scenes(live, std::move(viewed), kept->box());
   print_fault(*kept);
   for (const std::string& message : report.messages) std::fprintf(stderr, "device: %s\n", message.c_str());
   if (report.end == device::ServoEnd::stopped) return exit_status_of_signal(device::stop_signal());

@@ -4,11 +4,11 @@
 #include <fmt/format.h>
 
 #include <cstdio>
-#include <fstream>
-#include <sstream>
 #include <stdexcept>
 
+#include "hybrid/base/whole_file.h"
 #include "hybrid/program/outputs.h"
+#include "hybrid/session/scene_text.h"
 
 namespace hybrid {
 namespace {
@@ -18,16 +18,7 @@ constexpr int kMostNames = 10'000;
 
 }  // namespace
 
-std::string text_of(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  text << in.rdbuf();
-  if (!in || !text) throw std::runtime_error(file.string() + ": cannot be read; check its name and rights");
-  return text.str();
-}
-
-ViewFiles::ViewFiles(const ViewCommand& command, const std::string& scene_text)
-    : command_(command), scene_text_(scene_text) {
+ViewFiles::ViewFiles(const ViewCommand& command) : command_(command) {
   Outputs().ask("--record", command.record, {".rec"});
 }
 
@@ -63,23 +54,49 @@ void ViewFiles::attempt(const std::string& what, std::filesystem::path file, con
   }
 }
 
-void ViewFiles::save_what_was_asked(Window& window, const WindowInput& input, const Player& player,
-                                    const std::function<bool()>& hold) {
+void ViewFiles::save_what_was_asked(Window& window, const WindowInput& input, const ViewedScene& viewed,
+                                    const Snapshot& snapshot, const std::function<bool()>& hold) {
   if (const auto picture = window.take_screenshot())
     attempt("Picture", *picture, ".png", [&](const auto& file) { window.save_frame(file); });
   if (input.recording) {
     attempt("Recording", *input.recording, ".rec", [&](const auto& file) {
       if (!hold()) throw std::runtime_error("the session does not answer; try again");
-      save_recording(file, player.recording(scene_text_));
+      save_recording(file, viewed.player->recording(viewed.text));
     });
   }
+  if (input.save_scene) save_scene(viewed, snapshot);
 }
 
-bool ViewFiles::save_at_end(const Player& player) const {
+// The window loads the scene again when its file has changed, so that recordings begin with the new text.
+void ViewFiles::save_scene(const ViewedScene& viewed, const Snapshot& snapshot) try {
+  std::vector<ValueInScene> values;
+  for (std::size_t n = 0; n < viewed.drawn.editable.size() && n < snapshot.values.size(); ++n) {
+    const EditableValue& value = viewed.drawn.editable[n];
+    const std::string object =
+        value.object == Edit::kTool ? std::string() : viewed.drawn.objects[value.object].name;
+    values.push_back({object, value.quantity, snapshot.values[n], value.in_scene});
+  }
+  const EditedText edited = write_values(viewed.text, command_.scene, viewed.scene.unit_m, values);
+  std::string words = edited.changed.empty()
+                          ? "Nothing of the scene's file has been edited."
+                          : fmt::format("{} written; the session begins anew. Changed: {}.",
+                                        command_.scene.string(), fmt::join(edited.changed, ", "));
+  if (!edited.left.empty()) words += fmt::format(" Not in the file: {}.", fmt::join(edited.left, ", "));
+  if (!edited.changed.empty()) {
+    if (text_of(command_.scene) != viewed.text)
+      throw std::runtime_error("its file has changed since it was loaded; wait until it is loaded again");
+    save_text(command_.scene, edited.text);
+  }
+  say(words);
+} catch (const std::exception& e) {
+  say(std::string("Scene not written: ") + e.what());
+}
+
+bool ViewFiles::save_at_end(const ViewedScene& viewed) const {
   if (command_.record.empty()) return true;
   Outputs outputs;
   outputs.write("recording", command_.record,
-                [&](const auto& file) { save_recording(file, player.recording(scene_text_)); });
+                [&](const auto& file) { save_recording(file, viewed.player->recording(viewed.text)); });
   outputs.say_files();
   return !outputs.failed();
 }

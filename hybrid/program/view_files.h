@@ -1,33 +1,31 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The files that the user of a window asks for: pictures and recordings. What cannot be written is said in
-// the window, and the session goes on.
+// The files that the user of a window asks for: pictures, recordings, and edited values in the scene's file.
+// What cannot be written is said in the window, and the session goes on.
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <functional>
 #include <string>
 
 #include "hybrid/program/commands.h"
-#include "hybrid/session/player.h"
+#include "hybrid/program/viewed_scene.h"
 #include "hybrid/window/window.h"
 
 namespace hybrid {
 
-// Content of a text file. Throws std::runtime_error: not readable.
-[[nodiscard]] std::string text_of(const std::filesystem::path& file);
-
 class ViewFiles {
  public:
-  // `scene_text`: of the scene's file, as it was loaded. Throws std::runtime_error if --record cannot be
-  // written.
-  ViewFiles(const ViewCommand& command, const std::string& scene_text);
+  // Throws std::runtime_error if --record cannot be written.
+  explicit ViewFiles(const ViewCommand& command);
 
   // `hold`: stops the session, so that its state can be read; false if it does not answer.
-  void save_what_was_asked(Window& window, const WindowInput& input, const Player& player,
-                           const std::function<bool()>& hold);
+  void save_what_was_asked(Window& window, const WindowInput& input, const ViewedScene& viewed,
+                           const Snapshot& snapshot, const std::function<bool()>& hold);
   // The recording of --record. False if it was asked for and not written; the reason is on standard error.
-  [[nodiscard]] bool save_at_end(const Player& player) const;
+  [[nodiscard]] bool save_at_end(const ViewedScene& viewed) const;
 
+  void say(std::string words);
   // The last thing that was done, for a few seconds; empty: nothing.
   [[nodiscard]] std::string message() const;
 
@@ -35,10 +33,9 @@ class ViewFiles {
   template <class Save>
   void attempt(const std::string& what, std::filesystem::path file, const char* ending, const Save& save);
   [[nodiscard]] std::filesystem::path free_name(const char* ending) const;
-  void say(std::string words);
+  void save_scene(const ViewedScene& viewed, const Snapshot& snapshot);
 
   const ViewCommand& command_;
-  const std::string& scene_text_;
   std::string message_;
   std::chrono::steady_clock::time_point said_{};
 };

@@ -117,16 +117,18 @@ void draw_inset_frame(const Pen& pen, const Snapshot& snapshot, const OverlayCon
 }
 
 void draw_notice(const Pen& pen, const std::string& words, const PixelRect& where) {
-  const float em = pen.em, most = static_cast<float>(where.width) - 4.0F * em;
-  const std::vector<std::string> lines = pen.wrap(words, most);
-  const float line = 1.35F * em, height = line * static_cast<float>(lines.size()) + 0.9F * em;
+  constexpr float line = 1.35F, margin = 0.8F, share = 0.62F;  // (em); of the scene's width, at most
+  const float em = pen.em;
+  const std::vector<std::string> lines = pen.wrap(words, share * static_cast<float>(where.width));
+  float widest = 0.0F;
+  for (const std::string& text : lines) widest = std::max(widest, pen.width(text));
   const float x = static_cast<float>(where.x) + em;
-  float y = static_cast<float>(where.y + where.height) - height - 3.6F * em;  // above the scale bar
-  pen.plate(x, y, static_cast<float>(where.width) - 2.0F * em, height);
-  y += 0.4F * em;
+  float y = static_cast<float>(where.y);
+  pen.plate(x, y, widest + 2.0F * margin * em, (line * static_cast<float>(lines.size()) + margin) * em);
+  y += 0.5F * margin * em;
   for (const std::string& text : lines) {
-    pen.text(x + 0.8F * em, y, pen.inks.text, text);
-    y += line;
+    pen.text(x + margin * em, y, pen.inks.text, text);
+    y += line * em;
   }
 }
 

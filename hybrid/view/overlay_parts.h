@@ -18,7 +18,7 @@ void draw_inset_frame(const Pen& pen, const Snapshot& snapshot, const OverlayCon
 void draw_force_label(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera,
                       const PixelRect& where);
 
-// A message at the foot of the scene, in as many lines as it needs.
+// A message at the head of the scene, in as many lines as it needs.
 void draw_notice(const Pen& pen, const std::string& words, const PixelRect& where);
 
 // The column beside the scene: the legend, below it the colours of displacement, above the inset. What has no

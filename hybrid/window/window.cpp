@@ -180,8 +180,8 @@ struct Window::State {
   }
 
   void button(int which, bool pressed, bool shift) {
-    if (which <= GLFW_MOUSE_BUTTON_MIDDLE)
-      input.buttons[static_cast<std::size_t>(which)] = pressed && over_panel();
+    if (which > GLFW_MOUSE_BUTTON_MIDDLE) return;
+    input.press_button(static_cast<std::size_t>(which), pressed && over_panel());
     if (!pressed) {
       drag = Drag::none;
       goal_m.reset();
@@ -217,11 +217,10 @@ struct Window::State {
     for (const NamedKey& k : kNamedKeys) {
       if (k.name != name || k.ui < 0) continue;
       for_panel = input.by_keyboard || wants_text;
-      input.keys[static_cast<std::size_t>(k.ui)] = pressed && for_panel;
+      input.press_key(static_cast<UiKey>(k.ui), pressed && for_panel);
     }
     for (const auto& [letter, k] : kLetters) {
-      if (name.size() == 1 && name[0] == letter)
-        input.keys[static_cast<std::size_t>(k)] = pressed && wants_text;
+      if (name.size() == 1 && name[0] == letter) input.press_key(k, pressed && wants_text);
     }
     if (!pressed || wants_text) return;
     if (name == "tab" && user.panels && !input.by_keyboard) {
@@ -319,8 +318,7 @@ struct Window::State {
     const PanelResult asked = panels.take_result();
     for (const ViewAction& action : asked.actions) hybrid::act(user, action);
     wants_text = asked.wants_text;
-    input.typed.clear();
-    input.wheel = 0.0F;
+    input.end_frame();
   }
 
   // Hidden frames all last equally long, so that they are reproducible.

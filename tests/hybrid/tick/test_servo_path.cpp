@@ -25,7 +25,9 @@
 #include <vector>
 
 #include "hybrid/base/flush_to_zero.h"
+#include "hybrid/session/player.h"
 #include "hybrid/session/session.h"
+#include "hybrid/snapshot/make_drawn_scene.h"
 #include "hybrid/tick/tissue/async_relaxation.h"
 #include "hybrid/world/edits.h"
 #include "tests/hybrid/fixtures/scene_file_fixture.h"
@@ -287,6 +289,30 @@ TEST_F(ServoPathIn, AllTicksBetweenEdits) {
            "[34, 2, 4, 2]]\n");
   for (const bool asynchronous : {false, true})
     watch_ticks(felt, hybrid::build_scene(felt), asynchronous, true);
+}
+
+// The session of a window takes edits and requests, records, and hands every tick over.
+TEST_F(ServoPathIn, AllTicksOfAPlayer) {
+  const hybrid::Scene pressed =
+      load("format = 1\n" + tests::block + tests::ball + "position = [12, 0, 8]\n" + tests::path);
+  hybrid::BuiltScene built = hybrid::build_scene(pressed);
+  const hybrid::DrawnScene drawn = hybrid::drawn_scene(pressed, built, "");
+  hybrid::Player player(pressed, built, drawn, nullptr);
+  player.relax_at_once();
+  calls = {};
+  watched = true;
+  for (std::uint32_t n = 0; n < 3000; ++n) {
+    if (n % 7 == 0)
+      player.edit({0, hybrid::Edit::kTool, hybrid::EditedQuantity::coupling_stiffness, 500.0 + 0.1 * n});
+    player.step({.dragging = n > 1500,
+                 .paused = n % 50 == 49,
+                 .speed = n < 1000 ? 0.5 : 1.0,
+                 .restarts = n / 1000,
+                 .goal_m = {2e-3, 0.0, 4e-3}});
+  }
+  watched = false;
+  EXPECT_EQ(calls, Calls{});
+  EXPECT_GT(player.samples().refused() + player.ticks(), 2000U);
 }
 
 TEST_F(ServoPathIn, AllTicksOfAPartWithoutSlack) {
