@@ -228,7 +228,7 @@ device::ServoReport play_scenes(LiveWindow& live, std::unique_ptr<ViewedScene> v
     live.window.show_scene(next->drawn);
     viewed = std::move(next);
     print_notes(viewed->built);
-    live.files.say("The scene was loaded again.");
+    if (live.files.message().empty()) live.files.say("The scene was loaded again.");
   }
 }
 

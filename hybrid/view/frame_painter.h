@@ -29,6 +29,8 @@ class FramePainter {
 
   // Draws the frame off screen; then present() or read_rgb().
   void paint(const Snapshot& snapshot, const Camera& camera, const FrameOptions& options);
+  // Frees what was made in the context; this one paints no more.
+  void release() { renderer_.release(); }
   void present(int width, int height) { renderer_.present(width, height); }
   [[nodiscard]] std::vector<std::uint8_t> read_rgb() { return renderer_.read_rgb(); }
 

@@ -8,6 +8,7 @@
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
 #include "hybrid/view/renderer_shaders.h"
 
@@ -32,6 +33,20 @@ GLuint compile(GLenum kind, const char* source) {
 }
 
 }  // namespace
+
+void require_gl() {
+  if (epoxy_gl_version() < 33) {
+    throw std::runtime_error("drawing needs OpenGL 3.3, and this one is " +
+                             std::to_string(epoxy_gl_version() / 10) + "." +
+                             std::to_string(epoxy_gl_version() % 10) +
+                             "; set LIBGL_ALWAYS_SOFTWARE=1 to draw without the graphics card");
+  }
+}
+
+bool draws_in_software() {
+  const auto* name = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
+  return name != nullptr && std::string_view(name).find("llvmpipe") != std::string_view::npos;
+}
 
 void check_gl(const char* doing) {
   const GLenum error = glGetError();
@@ -166,6 +181,13 @@ void GlOverlay::set_font(const FontAtlas& atlas) {
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
   check_gl("uploading the font");
+}
+
+void GlOverlay::release() {
+  glDeleteProgram(program_);
+  glDeleteVertexArrays(1, &array_);
+  for (const GLuint buffer : {vertices_, indices_}) glDeleteBuffers(1, &buffer);
+  glDeleteTextures(1, &font_);
 }
 
 void GlOverlay::draw(const OverlayMesh& overlay, int width, int height) const {

@@ -17,6 +17,11 @@ namespace hybrid {
 using GlName = unsigned int;  // GLuint: an object or program
 using GlEnum = unsigned int;  // GLenum
 
+// Throws std::runtime_error with the remedy: the context is older than OpenGL 3.3.
+void require_gl();
+// Does the context draw without a graphics card?
+[[nodiscard]] bool draws_in_software();
+
 // Throws std::runtime_error if OpenGL has reported an error; `doing` completes "error while …".
 void check_gl(const char* doing);
 
@@ -72,6 +77,7 @@ class GlOverlay {
  public:
   void create();
   void set_font(const FontAtlas& atlas);
+  void release();
   // Into the bound framebuffer of this many pixels.
   void draw(const OverlayMesh& overlay, int width, int height) const;
 

@@ -75,6 +75,9 @@ std::vector<glm::vec3> of_materials(const DrawnScene& scene, std::size_t index);
 // Colours of the materials within an object (DrawnInside::materials), also of those that its surface hides.
 std::vector<glm::vec3> of_inside(const DrawnScene& scene, std::size_t index);
 
+// End of the scale for a largest motion: 1, 2 or 5 · 10^n, at or above it.
+double scale_end(double moved_m);
+
 // Colour of a point that moved by `share` (0 to 1) of the scale's end, on an object of colour `own`. The
 // renderer's shader computes the same formula.
 glm::vec3 of_displacement(const glm::vec3& own, float share);

@@ -4,6 +4,7 @@
 #include <epoxy/gl.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <glm/geometric.hpp>
@@ -11,8 +12,6 @@
 #include <limits>
 #include <span>
 #include <stdexcept>
-#include <string>
-#include <string_view>
 
 #include "hybrid/view/gl_objects.h"
 #include "hybrid/view/palette.h"
@@ -203,15 +202,8 @@ void Renderer::State::draw_arrow(const DrawnScene& scene, const Snapshot& snapsh
 
 Renderer::Renderer(const DrawnScene& scene, Samples samples) : state_(std::make_unique<State>()) {
   State& s = *state_;
-  if (epoxy_gl_version() < 33) {
-    throw std::runtime_error("drawing needs OpenGL 3.3, and this one is " +
-                             std::to_string(epoxy_gl_version() / 10) + "." +
-                             std::to_string(epoxy_gl_version() % 10) +
-                             "; set LIBGL_ALWAYS_SOFTWARE=1 to draw without the graphics card");
-  }
-  const auto* name = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
-  const bool software = name != nullptr && std::string_view(name).find("llvmpipe") != std::string_view::npos;
-  s.wanted_factor = software && samples == Samples::fast ? 1 : 2;
+  require_gl();
+  s.wanted_factor = draws_in_software() && samples == Samples::fast ? 1 : 2;
   s.mesh_program = link_program(shaders::mesh_vertex, shaders::mesh_fragment);
   s.depth_program = link_program(shaders::mesh_vertex, shaders::depth_fragment);
   s.bounds = bounds_of(scene);
@@ -242,8 +234,23 @@ Renderer::Renderer(const DrawnScene& scene, Samples samples) : state_(std::make_
   check_gl("uploading the scene");
 }
 
-// Destroying the context (owned by picture or window) frees every OpenGL object.
+// Destroying the context (owned by picture or window) frees every OpenGL object that is left.
 Renderer::~Renderer() = default;
+
+void Renderer::release() {
+  State& s = *state_;
+  for (Object& object : s.objects) {
+    object.mesh.release();
+    object.face.release();
+  }
+  for (GlMesh* mesh : {&s.ball, &s.cylinder, &s.cone, &s.disc}) mesh->release();
+  s.overlay.release();
+  const std::array textures{s.scene_colour, s.scene_depth, s.shown_depth, s.final_colour};
+  glDeleteTextures(textures.size(), textures.data());
+  const std::array frames{s.scene_frame, s.shown_frame, s.final_frame};
+  glDeleteFramebuffers(frames.size(), frames.data());
+  for (const GLuint used : {s.mesh_program, s.depth_program}) glDeleteProgram(used);
+}
 
 void Renderer::set_font(const FontAtlas& atlas) {
   state_->overlay.set_font(atlas);
@@ -274,19 +281,12 @@ void Renderer::begin(const DrawnScene& scene, const Snapshot& snapshot, int widt
     const auto& rest = scene.objects[i].surface.vertices;
     if (snapshot.soft_moved_m[i].size() != rest.size() || rest.size() != object.moving.vertices.size())
       continue;
-    const float moved = move_vertices(object.moving, rest, snapshot.soft_moved_m[i], s.origin_m);
+    const double moved = move_vertices(object.moving, rest, snapshot.soft_moved_m[i], s.origin_m);
     object.mesh.stream(object.moving);
     // Motion below a thousandth of the tool's radius does not start a scale: rounding must not show as a
     // pattern.
     const double least = 1e-3 * scene.tool_radius_m;
-    if (static_cast<double>(moved) > std::max(s.most_moved_m, least)) {
-      // A round number at or above the motion; it never falls.
-      const double power = std::pow(10.0, std::floor(std::log10(static_cast<double>(moved))));
-      for (const double step : {1.0, 2.0, 5.0, 10.0}) {
-        s.most_moved_m = step * power;
-        if (s.most_moved_m >= static_cast<double>(moved) * (1.0 - 1e-6)) break;
-      }
-    }
+    if (moved > std::max(s.most_moved_m, least)) s.most_moved_m = palette::scale_end(moved);
   }
   glBindFramebuffer(GL_FRAMEBUFFER, s.scene_frame);
   glDisable(GL_SCISSOR_TEST);

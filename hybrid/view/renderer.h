@@ -34,6 +34,8 @@ class Renderer {
   ~Renderer();
 
   void set_font(const FontAtlas& atlas);
+  // Frees what was made in the context, which goes on with another renderer. This one draws no more.
+  void release();
 
   // How the following frames show the scene.
   void set_view(const ViewSettings& view);

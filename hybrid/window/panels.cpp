@@ -283,7 +283,7 @@ void Panels::draw_values(const Pen& pen, const DrawnScene& scene, const Snapshot
 }
 
 void Panels::draw_view(const Pen& pen, const DrawnScene& scene, const PanelFrame& frame,
-                       PanelResult& result) const {
+                       PanelResult& result) {
   const ViewSettings& view = frame.state.view;
   const auto ask = [&](ViewVerb verb, std::vector<double> numbers = {}, std::string text = {}) {
     result.actions.push_back({.verb = verb, .numbers = std::move(numbers), .text = std::move(text)});
@@ -309,8 +309,8 @@ void Panels::draw_view(const Pen& pen, const DrawnScene& scene, const PanelFrame
   if (ImGui::Checkbox("other side", &other)) ask(ViewVerb::clip_side);
   if (clip) {
     auto share = static_cast<float>(view.clip.share);
-    // A '%' of the text would be read as a format.
-    const std::string place = length_text(clip_place_m(view.clip, bounds_of(scene)));
+    if (std::exchange(bounds_of_, &scene) != &scene) bounds_ = bounds_of(scene);
+    const std::string place = length_text(clip_place_m(view.clip, bounds_));
     label_beside(pen, "at");
     if (ImGui::SliderFloat("##clip", &share, 0.0F, 1.0F, place.c_str(), ImGuiSliderFlags_AlwaysClamp))
       ask(ViewVerb::clip_place, {static_cast<double>(share)});

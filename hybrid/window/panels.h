@@ -58,9 +58,11 @@ class Panels final : public OverlayPanel {
                    PanelResult& result);
   void draw_slider(const Pen& pen, std::size_t index, const EditableValue& value, double now,
                    PanelResult& result);
-  void draw_view(const Pen& pen, const DrawnScene& scene, const PanelFrame& frame, PanelResult& result) const;
+  void draw_view(const Pen& pen, const DrawnScene& scene, const PanelFrame& frame, PanelResult& result);
 
   const PanelFrame* frame_ = nullptr;
+  const DrawnScene* bounds_of_ = nullptr;  // the scene of bounds_, which takes a look at every vertex
+  SceneBounds bounds_;
   PanelResult result_;
   // The slider that is being moved, and its value as last asked for: the session answers a frame later.
   std::size_t moved_ = static_cast<std::size_t>(-1);

@@ -371,7 +371,7 @@ Window::~Window() = default;
 void Window::show_scene(const DrawnScene& scene) {
   State& s = *state_;
   glfwMakeContextCurrent(s.window.get());
-  s.painter.reset();
+  s.painter->release();
   s.scene = &scene;
   s.painter.emplace(scene, Samples::fast, s.height);
   s.history.clear();
