@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <stdexcept>
 
+#include "hybrid/base/file_ending.h"
 #include "hybrid/base/whole_file.h"
 #include "hybrid/program/outputs.h"
 #include "hybrid/session/scene_text.h"
@@ -19,7 +20,8 @@ constexpr int kMostNames = 10'000;
 }  // namespace
 
 ViewFiles::ViewFiles(const ViewCommand& command) : command_(command) {
-  Outputs().ask("--record", command.record, {".rec"});
+  require_ending_of_none("--record", command.record);
+  Outputs().ask("--record", command.record, {});
 }
 
 void ViewFiles::say(std::string words) {
