@@ -167,14 +167,17 @@ Relief relief_at(const HeightTexture& texture, const glm::dvec3& point, const gl
   return out;
 }
 
-glm::dvec3 texture_force(const HeightTexture& texture, const TexturedContact& contact) noexcept {
+glm::dvec3 texture_force(const HeightTexture& texture, const TexturedContact& contact,
+                         double share) noexcept {
   const glm::dvec3 zero(0.0), &n = contact.normal;
   const double d = contact.depth_m, k = contact.stiffness_N_per_m;
   if (!(d > 0.0) || !(k > 0.0) || !std::isfinite(d) || !std::isfinite(k) ||
       !polygon::is_finite(contact.point) || !polygon::is_finite(n)) {
     return zero;
   }
-  const Relief relief = relief_at(texture, contact.point, n);
+  Relief relief = relief_at(texture, contact.point, n);
+  relief.height_m *= share;
+  relief.gradient *= share;
   const glm::dvec3 slope = relief.gradient - glm::dot(relief.gradient, n) * n;
   const glm::dvec3 turned = n - slope;
   const glm::dvec3 felt = texture.mapping().kind == TextureKind::height

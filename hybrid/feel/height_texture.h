@@ -84,7 +84,8 @@ struct TexturedContact {
 //            a flat surface no closed path gains or loses anything. Sideways it is as stiff as
 //            K·(∇h² + (d + h)·h''): finer or steeper texture needs a softer coupling.
 //   shading: F = K·d·(n − ∇h)/|n − ∇h|: the direction turns, the size stays (thesis, Fig 4).
-// Zero without contact or if any input is not finite.
-glm::dvec3 texture_force(const HeightTexture& texture, const TexturedContact& contact) noexcept;
+// h is the relief times `share`. Zero without contact or if any input is not finite.
+glm::dvec3 texture_force(const HeightTexture& texture, const TexturedContact& contact,
+                         double share = 1.0) noexcept;
 
 }  // namespace hybrid

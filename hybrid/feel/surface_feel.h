@@ -20,6 +20,7 @@ struct SurfaceFeel {  // of one rigid object
   double static_friction = 0.0, dynamic_friction = 0.0;  // 0 <= dynamic <= static
   bool shading = false;
   std::shared_ptr<const HeightTexture> texture{};
+  double texture_share = 1.0;  // of the texture's own height
 
   [[nodiscard]] bool has_friction() const noexcept { return static_friction > 0.0; }
   [[nodiscard]] bool any() const noexcept {

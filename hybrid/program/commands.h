@@ -142,8 +142,10 @@ struct ViewCommand {
   std::optional<std::uint64_t>
       frames;  // the window closes after this many; each is written to `out` if that is given
   std::filesystem::path out;
-  std::filesystem::path drag;  // CSV of goals that replace the mouse: t, x, y, z
-  std::string device;          // replaces the scene's device; empty: the scene's
+  std::filesystem::path drag;    // CSV of goals that replace the mouse: t, x, y, z
+  std::filesystem::path script;  // what a user would do, and when; empty: none
+  std::filesystem::path record;  // the session, when the window closes; empty: not written
+  std::string device;            // replaces the scene's device; empty: the scene's
 };
 int view(const ViewCommand& command);
 

@@ -356,6 +356,8 @@ void add_view(CLI::App& app, int& status) {
   sub->add_option("--out", c->out, "write each frame as PNG into this folder");
   add_device(*sub, c->device);
   sub->add_option("--drag", c->drag, "drag the tool along a CSV (t_s, x_m, y_m, z_m) instead of the mouse");
+  sub->add_option("--script", c->script, "play keys, clicks and edits from this text file");
+  sub->add_option("--record", c->record, "write the session for `hybrid replay` when the window closes");
   sub->callback([c, &status] { status = hybrid::view(*c); });
 }
 

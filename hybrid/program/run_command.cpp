@@ -144,7 +144,7 @@ int run(const RunCommand& command) {
   outputs.write("recording", command.record, [&](const Path& file) {
     save_recording(file, {std::filesystem::absolute(command.scene), read_text(command.scene), result.dt_s,
                           scene_limits(scene), options.async_relaxation, result.state_hash, result.start_m,
-                          result.recording});
+                          result.recording, result.edits});
   });
   const nlohmann::ordered_json report =
       command.json.empty() && !paged ? nullptr : run_report(scene, built, result);

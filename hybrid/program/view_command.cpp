@@ -1,29 +1,25 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The viewer: a window and a session, each on its own thread. The session publishes snapshots and takes
-// goals; neither waits for the other.
+// The viewer: a window and a session, each on its own thread. The session publishes snapshots and the figures
+// of every tick, and takes goals and edits; neither waits for the other.
 #include <fmt/format.h>
 
 #include <atomic>
-#include <cmath>
+#include <chrono>
 #include <cstdio>
-#include <glm/geometric.hpp>
 #include <thread>
 
 #include "device/loop/servo_loop.h"
 #include "device/loop/stop_signal.h"
-#include "device/simulated/simulated.h"
 #include "hybrid/base/flush_to_zero.h"
 #include "hybrid/base/triple_buffer.h"
 #include "hybrid/program/commands.h"
 #include "hybrid/program/outputs.h"
+#include "hybrid/program/view_files.h"
+#include "hybrid/program/viewed_scene.h"
 #include "hybrid/session/real_device.h"
-#include "hybrid/session/relaxation_thread.h"
-#include "hybrid/session/session.h"
-#include "hybrid/snapshot/fill_snapshot.h"
-#include "hybrid/snapshot/make_drawn_scene.h"
 #include "hybrid/snapshot/merge_live_surface.h"
-#include "hybrid/tick/tissue/async_relaxation.h"
-#include "hybrid/view/window.h"
+#include "hybrid/window/view_script.h"
+#include "hybrid/window/window.h"
 
 namespace hybrid {
 namespace {
@@ -31,150 +27,58 @@ namespace {
 constexpr double kSnapshotEvery_s = 1.0 / 60.0;
 constexpr double kScriptFrame_s = 1.0 / 30.0;  // session time of one frame of a scripted view
 
-// Requests of the window to the session.
-struct WindowRequest {
-  bool dragging = false, paused = false;
-  std::uint32_t restarts = 0;
-  glm::dvec3 goal_m{0.0};
-};
-
-// Target of the simulated hand: the scene's path, or the goal of the mouse. The device reads it within a
-// tick.
-class SteeredPath final : public device::Path {
- public:
-  explicit SteeredPath(std::shared_ptr<const device::Path> path) : path_(std::move(path)) {}
-  [[nodiscard]] glm::dvec3 position(double t_s) const noexcept override {
-    return dragged_ ? goal_m_ : path_->position(std::fmod(t_s - start_s_, path_->duration_s() + 1.0));
-  }
-  [[nodiscard]] double duration_s() const noexcept override { return path_->duration_s(); }
-  [[nodiscard]] const std::vector<std::string>& notes() const noexcept override { return path_->notes(); }
-
-  void drag_to(const glm::dvec3& goal_m) {
-    dragged_ = true;
-    goal_m_ = goal_m;
-  }
-  void restart(double now_s) {
-    dragged_ = false;
-    start_s_ = now_s;
-  }
-
- private:
-  std::shared_ptr<const device::Path> path_;
-  bool dragged_ = false;
-  glm::dvec3 goal_m_{0.0};
-  double start_s_ = 0.0;
-};
-
-// The session's side. After a drag the tool stays at its last goal until a restart.
-class Player {
- public:
-  Player(const Scene& scene, BuiltScene& built, device::HapticDevice* real_device)
-      : built_(built),
-        path_(std::make_shared<SteeredPath>(scene_path(scene))),
-        simulated_(real_device == nullptr ? scene_device(scene, path_) : nullptr),
-        device_(real_device == nullptr ? *simulated_ : *real_device),
-        rate_hz_(scene.rate_hz),
-        dt_(1.0 / scene.rate_hz) {
-    set_flush_to_zero();
-    goal_m_ = device_.read().position_m;
-    begin_session(scene, *built.world, *built.state, goal_m_);
-  }
-
-  TickResult tick(const WindowRequest& request, const device::DeviceState& input) {
-    if (request.restarts != restarts_) {
-      restarts_ = request.restarts;
-      path_->restart(t_s());
-    }
-    // The mouse is faster than a hand: the goal follows it at most at the speed of a brisk hand.
-    if (request.dragging) {
-      const glm::dvec3 delta = request.goal_m - goal_m_;
-      const double length = glm::length(delta), most = kHandSpeed_m_per_s * dt_;
-      goal_m_ = length > most ? goal_m_ + delta * (most / length) : request.goal_m;
-      path_->drag_to(goal_m_);
-    }
-    const TickResult felt = haptic_tick(*built_.world, *built_.state, input, dt_);
-    if (!request.dragging) goal_m_ = felt.device_m;
-    ++ticks_;
-    return felt;
-  }
-  [[nodiscard]] BlackBoxRow row(const device::ServoInput& input, const TickResult& felt) const {
-    return black_box_row(input, felt, ticks_ - 1, *built_.state);
-  }
-  [[nodiscard]] double t_s() const { return static_cast<double>(ticks_) * dt_; }
-  [[nodiscard]] double rate_hz() const { return rate_hz_; }
-  [[nodiscard]] double deadline_s() const { return built_.world->limits.deadline_s; }
-  [[nodiscard]] device::HapticDevice& device() { return device_; }
-  // One tick on this thread, without real time.
-  TickResult step(const WindowRequest& request) {
-    const TickResult felt = tick(request, device_.read());
-    device_.write(felt.force_N, dt_);
-    return felt;
-  }
-  void snapshot(const TickResult& felt, Snapshot& out) const {
-    out.tick = built_.state->tick;
-    out.t_s = t_s();
-    out.device_m = felt.device_m;
-    out.proxy_m = felt.proxy_m;
-    out.force_N = felt.force_N;
-    out.feel = built_.state->feel;
-    out.tick_us = felt.tick_us;
-    if (live_) {
-      fill_moved_near(*built_.world, *built_.state, out);
-    } else {
-      fill_moved(*built_.world, *built_.state, out);
-    }
-  }
-  // From now on a thread relaxes the tissue; the caller runs that thread.
-  [[nodiscard]] std::unique_ptr<RelaxationThread> go_live() {
-    live_ = true;
-    start_async_relaxation(*built_.state, Arrival::thread);
-    return std::make_unique<RelaxationThread>(*built_.world, built_.state->async, 1.0 / kSnapshotEvery_s);
-  }
-
- private:
-  static constexpr double kHandSpeed_m_per_s = 0.5;
-  BuiltScene& built_;
-  std::shared_ptr<SteeredPath> path_;
-  std::unique_ptr<device::HapticDevice> simulated_;
-  device::HapticDevice& device_;
-  double rate_hz_, dt_;
-  bool live_ = false;
-  std::uint64_t ticks_ = 0;
-  std::uint32_t restarts_ = 0;
-  glm::dvec3 goal_m_{0.0};
-};
-
-// Places of the hand from the path's beginning to its end.
-std::vector<glm::dvec3> places_along(const device::Path& path) {
-  constexpr int steps = 500;
-  std::vector<glm::dvec3> places;
-  for (int n = 0; n <= steps; ++n) places.push_back(path.position(path.duration_s() * n / steps));
-  return places;
-}
-
 std::filesystem::path frame_file(const std::filesystem::path& folder, std::uint64_t n) {
   return folder / fmt::format("frame-{:05}.png", n);
 }
 
-// Plays frames that each stand for a fixed stretch of session time, so that the pictures are reproducible on
-// any machine. Returns the exit status.
-int play_frames(const ViewCommand& command, Player& player, Window& window) {
+// What the window asked for since the last frame, as the session takes it.
+PlayRequest request_of(const WindowInput& input) {
+  return {.dragging = input.dragged_goal_m.has_value(),
+          .paused = input.paused,
+          .speed = input.speed,
+          .restarts = input.restarts,
+          .single_ticks = input.single_ticks,
+          .goal_m = input.dragged_goal_m.value_or(glm::dvec3(0.0))};
+}
+
+SessionNotes notes_of(const Player& player, double t_s, const std::string& message) {
+  return {.real_device = player.is_real(),
+          .recorded_s = t_s,
+          .refused_edits = player.refused_edits(),
+          .unseen_ticks = player.unseen_ticks(),
+          .message = message};
+}
+
+ViewScript read_script(const std::filesystem::path& file, const DrawnScene& drawn) {
+  return file.empty() ? ViewScript() : ViewScript(text_of(file), file.string(), drawn);
+}
+
+// Plays frames that each stand for a fixed stretch of time, so that the pictures are reproducible on any
+// machine. Returns the exit status.
+int play_frames(const ViewCommand& command, ViewedScene& viewed, Window& window, ViewScript& script) {
   std::shared_ptr<const device::Path> drag;
   if (!command.drag.empty()) drag = device::make_path(device::CsvPath{.file = command.drag});
+  Player& player = *viewed.player;
   Snapshot snapshot;
+  ViewFiles files(command);
+  double ahead_s = 0.0;  // of the ticks so far
   for (std::uint64_t n = 0; n < *command.frames; ++n) {
-    WindowRequest request;
-    TickResult felt;
-    for (double end = player.t_s() + kScriptFrame_s; player.t_s() < end;) {
+    script.play(static_cast<double>(n) * kScriptFrame_s, window);
+    const WindowInput input = window.take_input();
+    PlayRequest request = request_of(input);
+    for (const Edit& edit : input.edits) player.edit(edit);
+    for (ahead_s += kScriptFrame_s; ahead_s > 0.5 / player.rate_hz(); ahead_s -= 1.0 / player.rate_hz()) {
       if (drag) {
         request.dragging = true;
         request.goal_m = drag->position(player.t_s());
       }
-      felt = player.step(request);
+      player.step(request);
     }
-    player.snapshot(felt, snapshot);
-    if (!window.frame(snapshot)) return 0;
+    player.snapshot(snapshot);
+    window.add_ticks(player.samples());
+    if (!window.frame(snapshot, notes_of(player, snapshot.t_s, files.message()))) break;
     if (!command.out.empty()) window.save_frame(frame_file(command.out, n));
+    files.save_what_was_asked(window, input, viewed, snapshot, [] { return true; });
     if (const int signal = device::stop_signal(); signal != 0) {
       fmt::print(stderr, "stopped by {} after {} of {} frames{}{}\n", signal_in_words(signal), n + 1,
                  *command.frames, command.out.empty() ? "" : ", which are in ", command.out.string());
@@ -182,64 +86,157 @@ int play_frames(const ViewCommand& command, Player& player, Window& window) {
     }
   }
   if (!command.out.empty()) fmt::print("{} frames in {}\n", *command.frames, command.out.string());
-  return 0;
+  return files.save_at_end(viewed) ? 0 : 1;
 }
 
-// Runs the window on this thread and the session on another. Returns the device's events.
-device::ServoReport play_live(const DrawnScene& drawn, Player& player, Window& window, BlackBox& box) {
-  TripleBuffer<Snapshot> snapshots;
-  TripleBuffer<WindowRequest> requests;
-  std::atomic<bool> stop{false}, ended{false};
-  device::ServoReport report;
-  const std::unique_ptr<RelaxationThread> relaxation = player.go_live();
-  std::jthread session([&] {
-    double next = 0.0;
-    auto tick = [&](const device::ServoInput& input) -> device::ServoAnswer {
-      const ScopedFlushToZero flushed;
-      const bool go_on = !stop.load(std::memory_order_relaxed);
-      const WindowRequest& request = requests.take();
-      if (request.paused || !go_on) return {.go_on = go_on, .skip = true};
-      const TickResult felt = player.tick(request, input.device);
-      box.add(player.row(input, felt));
-      if (player.t_s() >= next) {
-        next = player.t_s() + kSnapshotEvery_s;
-        player.snapshot(felt, snapshots.back());
-        snapshots.publish();
-      }
-      return {.force_N = felt.force_N};
-    };
-    try {
-      report = device::run_servo(
-          player.device(), {.rate_hz = player.rate_hz(), .realtime = true, .deadline_s = player.deadline_s()},
-          tick);
-    } catch (const std::exception& e) {
-      report.end = device::ServoEnd::lost;
-      report.messages.emplace_back(e.what());
+// The session on a thread of its own, while a window shows it.
+class LiveSession {
+ public:
+  LiveSession(ViewedScene& viewed, BlackBox& box)
+      : player_(*viewed.player), relaxation_(player_.go_live(1.0 / kSnapshotEvery_s)), box_(box) {
+    player_.snapshot(snapshots_.back());
+    snapshots_.publish();
+    thread_ = std::jthread([this] { serve(); });
+  }
+  LiveSession(const LiveSession&) = delete;
+  LiveSession& operator=(const LiveSession&) = delete;
+  LiveSession(LiveSession&&) = delete;
+  LiveSession& operator=(LiveSession&&) = delete;
+  ~LiveSession() { stop(); }
+
+  void ask(const PlayRequest& request) {
+    requests_.back() = request;
+    requests_.publish();
+  }
+  void shown(const DrawnScene& drawn, Snapshot& snapshot) {
+    merge_live_surface(drawn, snapshots_.take(), relaxation_->surfaces(), snapshot);
+  }
+  // Waits until the servo thread leaves the state alone; false if it does not answer.
+  bool hold(PlayRequest request) {
+    request.hold = true;
+    ask(request);
+    for (int n = 0; n < kMostWaits && !ended_; ++n) {
+      if (player_.held()) return true;
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
-    ended = true;
-  });
-  WindowRequest request;
+    return ended_;
+  }
+  [[nodiscard]] bool ended() const { return ended_; }
+  device::ServoReport stop() {
+    stop_ = true;
+    if (thread_.joinable()) thread_.join();
+    return report_;
+  }
+
+ private:
+  static constexpr int kMostWaits = 500;  // (ms)
+
+  device::ServoAnswer answer(const device::ServoInput& input) {
+    const ScopedFlushToZero flushed;
+    const bool go_on = !stop_.load(std::memory_order_relaxed);
+    if (!go_on) return {.go_on = false, .skip = true};
+    const bool ticked = player_.advance(requests_.take(), input);
+    if (ticked) box_.add(black_box_row(input, player_.felt(), player_.ticks() - 1, player_.state()));
+    if (ticked || player_.edited()) publish(ticked);
+    return {.force_N = player_.felt().force_N, .skip = !ticked};
+  }
+  // At most 60 times a second of servo periods, however slow the session.
+  void publish(bool ticked) {
+    const auto now = std::chrono::steady_clock::now();
+    if (ticked && now < next_) return;
+    next_ = now + std::chrono::microseconds(static_cast<int>(1e6 * kSnapshotEvery_s));
+    player_.shown();
+    player_.snapshot(snapshots_.back());
+    snapshots_.publish();
+  }
+  void serve() {
+    auto tick = [this](const device::ServoInput& input) { return answer(input); };
+    try {
+      report_ = device::run_servo(
+          player_.device(),
+          {.rate_hz = player_.rate_hz(), .realtime = true, .deadline_s = player_.deadline_s()}, tick);
+    } catch (const std::exception& e) {
+      report_.end = device::ServoEnd::lost;
+      report_.messages.emplace_back(e.what());
+    }
+    ended_ = true;
+  }
+
+  Player& player_;
+  std::unique_ptr<RelaxationThread> relaxation_;
+  BlackBox& box_;
+  TripleBuffer<Snapshot> snapshots_;
+  TripleBuffer<PlayRequest> requests_;
+  std::atomic<bool> stop_{false}, ended_{false};
+  std::chrono::steady_clock::time_point next_{};
+  device::ServoReport report_;
+  std::jthread thread_;
+};
+
+// What a user does to the scene that is played, and what may follow it.
+struct LiveWindow {
+  const ViewCommand& command;
+  Window& window;
+  ViewFiles files;
+  ViewScript script;
+  SceneReload reload;
+  std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
+};
+
+SessionNotes notes_of(const LiveWindow& live, const Player& player, double t_s) {
+  SessionNotes notes = notes_of(player, t_s, live.files.message());
+  if (live.reload.loading()) notes.message = "loading the scene again; the session goes on meanwhile";
+  if (!live.reload.error().empty())
+    notes.error = live.reload.error() + "\nThe session goes on with the scene as it was.";
+  return notes;
+}
+
+// Runs the window on this thread and the session on another, until the window closes or `next` is the scene
+// to go on with. Returns the device's events.
+device::ServoReport play_live(LiveWindow& live, ViewedScene& viewed, BlackBox& box,
+                              std::unique_ptr<ViewedScene>& next) {
+  LiveSession session(viewed, box);
+  Player& player = *viewed.player;
   Snapshot shown;
-  do {
-    const WindowInput input = window.take_input();
-    request.dragging = input.dragged_goal_m.has_value();
-    if (input.dragged_goal_m) request.goal_m = *input.dragged_goal_m;
-    request.paused = input.paused;
-    if (input.restart) ++request.restarts;
-    requests.back() = request;
-    requests.publish();
-    merge_live_surface(drawn, snapshots.take(), relaxation->surfaces(), shown);
-  } while (window.frame(shown) && !ended);
-  stop = true;
-  session.join();
-  return report;
+  bool open = true;
+  while (open && !session.ended() && next == nullptr) {
+    live.script.play(std::chrono::duration<double>(std::chrono::steady_clock::now() - live.start).count(),
+                     live.window);
+    const WindowInput input = live.window.take_input();
+    const PlayRequest request = request_of(input);
+    for (const Edit& edit : input.edits) player.edit(edit);
+    session.ask(request);
+    session.shown(viewed.drawn, shown);
+    live.window.add_ticks(player.samples());
+    open = live.window.frame(shown, notes_of(live, player, shown.t_s));
+    live.files.save_what_was_asked(live.window, input, viewed, shown, [&] { return session.hold(request); });
+    if (input.reload) live.reload.ask();
+    if (!player.is_real()) next = live.reload.poll();
+  }
+  return session.stop();
+}
+
+// Plays scene after scene: each time that its file has changed, the new one.
+device::ServoReport play_scenes(LiveWindow& live, std::unique_ptr<ViewedScene> viewed, BlackBox& box) {
+  for (;;) {
+    std::unique_ptr<ViewedScene> next;
+    device::ServoReport report = play_live(live, *viewed, box, next);
+    if (next == nullptr) {
+      if (!live.files.save_at_end(*viewed)) report.messages.emplace_back("the session was not recorded");
+      return report;
+    }
+    live.window.show_scene(next->drawn);
+    viewed = std::move(next);
+    print_notes(viewed->built);
+    if (live.files.message().empty()) live.files.say("The scene was loaded again.");
+  }
 }
 
 }  // namespace
 
 int view(const ViewCommand& command) {
-  Scene scene = load_scene(command.scene);
-  if (!command.device.empty()) use_device(scene, command.device);
+  std::unique_ptr<ViewedScene> viewed = read_viewed_scene(command);
+  Scene& scene = viewed->scene;
   // Frames are reproducible pictures, which a real device cannot give.
   if (command.frames && scene.real_device) {
     throw SceneError(scene.file, scene.real_device->place,
@@ -247,27 +244,28 @@ int view(const ViewCommand& command) {
   }
   if (!command.out.empty()) std::filesystem::create_directories(command.out);
   const auto real = open_real_device(scene);
-  BuiltScene built = build_scene(scene, progress_on_terminal());
+  build_viewed_scene(command, *viewed, progress_on_terminal());
   end_progress();
-  note_relaxation(scene, built, true);
-  print_notes(built);
-  DrawnScene drawn =
-      drawn_scene(scene, built, scene.title.empty() ? command.scene.stem().string() : scene.title);
-  if (!real) drawn.path_m = places_along(*scene_path(scene));
-  Window window(drawn);
+  print_notes(viewed->built);
+  ViewScript script = read_script(command.script, viewed->drawn);
+  // Pictures of frames show the scene alone, unless a script plays the window's user.
+  Window window(viewed->drawn, {.visible = !command.frames || command.out.empty(),
+                                .panels = !command.frames || !command.script.empty()});
   const device::StopOnSignal stop;
   if (real) {
+    const BuiltScene& built = viewed->built;
     std::fprintf(stderr, "note: %s\n", place_real_device(scene, *built.world, *real).c_str());
     await_free_tool(scene, *built.world, *built.state, *real, progress_on_terminal());
     end_progress();
   }
-  Player player(scene, built, real.get());
+  viewed->player = std::make_unique<Player>(scene, viewed->built, viewed->drawn, real.get());
   if (command.frames) {
-    start_async_relaxation(*built.state, Arrival::counted);
-    return play_frames(command, player, window);
+    viewed->player->relax_at_once();
+    return play_frames(command, *viewed, window, script);
   }
   const auto kept = open_black_box_file({}, command.scene, true, scene.rate_hz);
-  const device::ServoReport report = play_live(drawn, player, window, kept->box());
+  LiveWindow live{command, window, ViewFiles(command), std::move(script), SceneReload(command, viewed->text)};
+  const device::ServoReport report = play_scenes(live, std::move(viewed), kept->box());
   print_fault(*kept);
   for (const std::string& message : report.messages) std::fprintf(stderr, "device: %s\n", message.c_str());
   if (report.end == device::ServoEnd::stopped) return exit_status_of_signal(device::stop_signal());

@@ -3,18 +3,17 @@
 
 #include <string>
 
+#include "hybrid/scene/ranges.h"
+
 namespace hybrid {
 namespace {
-
-// Steeper flanks of a texture (height per period) would be walls that a tool cannot slide over.
-constexpr double kMostHeight = 0.5;
 
 constexpr std::string_view keys_of_feel[] = {"damping", "friction", "shading", "texture"};
 
 // One number for both, [static, dynamic], or { static = , dynamic = }.
 void read_friction(const TableReader& table, FeelDescription& out) {
   static constexpr std::string_view keys[] = {"static", "dynamic"};
-  const Quantity coefficient{"a friction coefficient", "0.4", 1.0, 0.0, 10.0};
+  const Quantity coefficient{"a friction coefficient", "0.4", 1.0, kFrictionRange.low, kFrictionRange.high};
   const TreeEntry* entry = table.find("friction");
   if (entry == nullptr) return;
   const TreeNode& value = entry->value;
@@ -69,7 +68,7 @@ TextureDescription read_texture(const TableReader& table) {
   out.mapping.along = static_cast<TextureAlong>(table.choice("along", axes, 3));
   out.mapping.size_m = table.number("size", table.source().size());
   out.mapping.height_m = table.number("height", table.source().size());
-  if (out.mapping.height_m > kMostHeight * out.mapping.size_m) {
+  if (out.mapping.height_m > kMostTextureHeight * out.mapping.size_m) {
     table.refuse("height", words("'height' in ", table.what(), " is more than half of 'size'"),
                  "make it flatter or its period longer: a steeper texture is a wall");
   }
@@ -84,7 +83,8 @@ std::span<const std::string_view> feel_keys() {
 
 FeelDescription read_feel(const TableReader& table) {
   FeelDescription out;
-  const Quantity damping{"a damping of 0 or more in N s/m", "2", 1.0, 0.0, 1e4};
+  const Quantity damping{"a damping of 0 or more in N s/m", "2", 1.0, kDampingRange_N_s_per_m.low,
+                         kDampingRange_N_s_per_m.high};
   out.damping_N_s_per_m = table.number("damping", damping, out.damping_N_s_per_m);
   read_friction(table, out);
   out.shading = table.boolean("shading", out.shading);

@@ -10,6 +10,7 @@
 #include <set>
 #include <utility>
 
+#include "hybrid/scene/ranges.h"
 #include "hybrid/scene/read_material.h"
 #include "hybrid/scene/read_path.h"
 #include "hybrid/scene/read_rigid.h"
@@ -96,7 +97,8 @@ Tool read_tool(const TableReader& table) {
   const bool ball = out.shape == Tool::Shape::ball;
   out.radius_m =
       table.number("radius", ball ? table.source().distance() : table.source().size(), out.radius_m);
-  const Quantity stiffness{"a stiffness above 0 in N/m", "1000", 1.0, 1e-6, 1e9};
+  const Quantity stiffness{"a stiffness above 0 in N/m", "1000", 1.0, kCouplingRange_N_per_m.low,
+                           kCouplingRange_N_per_m.high};
   out.stiffness_N_per_m = table.number("stiffness", stiffness, out.stiffness_N_per_m);
   return out;
 }
@@ -173,8 +175,9 @@ void read_safety(const TableReader& table, Scene& scene) {
                                               "max_energy", "energy_window", "passivity"};
   table.allow(keys);
   device::ForceLimits& out = scene.safety;
-  out.max_force_N =
-      table.number("max_force", {"a force above 0 in N", "8.5", 1.0, 1e-6, 1e4}, out.max_force_N);
+  out.max_force_N = table.number(
+      "max_force", {"a force above 0 in N", "8.5", 1.0, kMaxForceRange_N.low, kMaxForceRange_N.high},
+      out.max_force_N);
   out.max_slew_N_per_s =
       table.number("max_slew", {"a rate above 0 in N/s", "50000", 1.0, 1e-3, 1e9}, out.max_slew_N_per_s);
   out.soft_start_s =

@@ -7,11 +7,12 @@
 #include <system_error>
 #include <utility>
 
+#include "hybrid/scene/ranges.h"
+
 namespace hybrid {
 namespace {
 
 // Sizes between an atom and a planet, so that a product of three stays within the range of a double.
-constexpr double smallest_size_m = 1e-9;
 constexpr double largest_length_m = 1e9;
 
 constexpr std::string_view unit_names[] = {"m", "cm", "mm", "um"};
@@ -48,7 +49,7 @@ Quantity SceneSource::length() const {
   return {words("a length in ", unit_name), "10", unit_m, -largest_length_m, largest_length_m};
 }
 Quantity SceneSource::size() const {
-  return {words("a length above 0 in ", unit_name), "5", unit_m, smallest_size_m, largest_length_m};
+  return {words("a length above 0 in ", unit_name), "5", unit_m, kSmallestSize_m, largest_length_m};
 }
 Quantity SceneSource::distance() const {
   return {words("a length of 0 or more in ", unit_name), "2", unit_m, 0.0, largest_length_m};

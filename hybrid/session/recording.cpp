@@ -20,8 +20,11 @@ namespace {
 
 // Layout, little-endian: magic, sizes of path and text, number of ticks, dt, the device's force limit,
 // resolution and friction, flag for asynchronous relaxation, state hash, device position before the first
-// tick, path, text, ticks. A tick: x, y, z, hash, device fault, work share, arrived asynchronous results.
-constexpr std::array<char, 8> kMagic{'h', 'y', 'b', 'r', 'i', 'd', 'R', '4'};
+// tick, path, text, ticks, edits. A tick: x, y, z, hash, device fault, work share, arrived asynchronous
+// results. An edit: tick, object, quantity, value. Version 4 has no edits and is still read; a recording
+// without edits is written as version 4.
+constexpr std::array<char, 8> kMagic{'h', 'y', 'b', 'r', 'i', 'd', 'R', '5'};
+constexpr std::array<char, 8> kMagicWithoutEdits{'h', 'y', 'b', 'r', 'i', 'd', 'R', '4'};
 struct Header {
   std::array<char, 8> magic;
   std::uint64_t path_bytes, text_bytes, ticks;
@@ -37,6 +40,19 @@ struct Tick {
 };
 static_assert(sizeof(Header) == 104 && sizeof(Tick) == 48, "the file's layout has no padding");
 
+// Edits fill the rest of the file.
+bool are_edits(std::uint64_t bytes, bool with_edits) {
+  return with_edits ? bytes % sizeof(Edit) == 0 : bytes == 0;
+}
+
+bool is_edit(const Edit& edit) {
+  return static_cast<std::uint32_t>(edit.quantity) < kEditedQuantities && std::isfinite(edit.value);
+}
+
+std::uint64_t before_edits(const Header& header) {
+  return sizeof header + header.path_bytes + header.text_bytes + header.ticks * sizeof(Tick);
+}
+
 std::string read_text(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   std::ostringstream text;
@@ -49,7 +65,7 @@ std::string read_text(const std::filesystem::path& file) {
 void save_recording(const std::filesystem::path& file, const Recording& recording) {
   WholeFile out(file);
   const std::string path = recording.scene_file.string();
-  const Header header{kMagic,
+  const Header header{recording.edits.empty() ? kMagicWithoutEdits : kMagic,
                       path.size(),
                       recording.scene_text.size(),
                       recording.ticks.size(),
@@ -71,6 +87,7 @@ void save_recording(const std::filesystem::path& file, const Recording& recordin
                     t.arrived};
     out.write(&tick, sizeof tick);
   }
+  for (const Edit& edit : recording.edits) out.write(&edit, sizeof edit);
   out.keep();
 }
 
@@ -83,7 +100,8 @@ Recording load_recording(const std::filesystem::path& file) {
         fmt::format("{}: cannot be read; give a file written by `hybrid run --record`", file.string()));
   Header header{};
   in.read(reinterpret_cast<char*>(&header), sizeof header);
-  if (!in || header.magic != kMagic) {
+  const bool with_edits = header.magic == kMagic;
+  if (!in || (!with_edits && header.magic != kMagicWithoutEdits)) {
     throw std::runtime_error(fmt::format(
         "{}: not a recording of this version; record the session again with `hybrid run --record`",
         file.string()));
@@ -91,7 +109,7 @@ Recording load_recording(const std::filesystem::path& file) {
   // Each size is checked by itself first, so that the sum cannot wrap.
   const bool sane =
       header.path_bytes <= size && header.text_bytes <= size && header.ticks <= size / sizeof(Tick) &&
-      sizeof header + header.path_bytes + header.text_bytes + header.ticks * sizeof(Tick) == size &&
+      before_edits(header) <= size && are_edits(size - before_edits(header), with_edits) &&
       header.dt_s > 0.0 && std::isfinite(header.dt_s) && header.max_force_N >= 0.0 &&
       header.resolution_m >= 0.0 && std::isfinite(header.resolution_m) && header.friction_N >= 0.0 &&
       std::isfinite(header.friction_N) && header.async_relaxation <= 1 &&
@@ -122,7 +140,11 @@ Recording load_recording(const std::filesystem::path& file) {
          tick.arrived,
          static_cast<std::uint8_t>(tick.work_share)};
   }
+  recording.edits.resize((size - before_edits(header)) / sizeof(Edit));
+  for (Edit& edit : recording.edits) in.read(reinterpret_cast<char*>(&edit), sizeof edit);
   if (!in) throw std::runtime_error(fmt::format("{}: could not be read to its end", file.string()));
+  if (!std::all_of(recording.edits.begin(), recording.edits.end(), is_edit))
+    throw std::runtime_error(fmt::format("{}: damaged edits; copy it again", file.string()));
   return recording;
 }
 
@@ -146,9 +168,11 @@ ReplayResult replay(const Recording& recording, const Progress& progress) {
   begin_session(scene, *built.world, *built.state, recording.start_m);
   if (recording.async_relaxation) start_async_relaxation(*built.state, Arrival::recorded);
   std::uint64_t hash = kHashBegin;
+  std::size_t next_edit = 0;
   for (std::size_t n = 0; n < recording.ticks.size() && device::stop_signal() == 0; ++n) {
     const device::DeviceState input{.position_m = recording.ticks[n].device_m,
                                     .fault = recording.ticks[n].fault};
+    apply_edits_of_tick(*built.world, *built.state, recording.edits, n, next_edit);
     restore_tick_timing(recording.ticks[n], *built.state);
     hash = hash_tick(hash, haptic_tick(*built.world, *built.state, input, recording.dt_s));
     ++result.replayed_ticks;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A session as a file: the scene's text, every input, and a running hash for each tick. A bug report is such
-// a file.
+// A session as a file: the scene's text, every input and edit, and a running hash for each tick. A bug report
+// is such a file.
 #pragma once
 
 #include <cstdint>
@@ -21,6 +21,7 @@ struct Recording {
   std::uint64_t state_hash = 0;   // after the last tick
   glm::dvec3 start_m{0.0};        // SessionResult::start_m
   std::vector<RecordedTick> ticks;
+  std::vector<Edit> edits{};  // in order of their ticks
 };
 
 // Both throw std::runtime_error in words: not writable; not a recording, truncated, of another version.

@@ -106,6 +106,7 @@ class Run {
       between_every_ = std::max<std::uint64_t>(1, (ticks_ + most - 1) / most);
     clearance_every_ = std::max<std::uint64_t>(1, ticks_ / kClearances);
     if (options.keep_recording) result_.recording.reserve(ticks_);
+    result_.edits.reserve(options.edits.size());
     result_.object_contact_ticks.assign(world_.object_count(), 0);
     result_.object_max_force_N.assign(world_.object_count(), 0.0);
     if (!options.keep_rows) return;
@@ -171,6 +172,7 @@ class Run {
   device::ServoAnswer answer(const device::ServoInput& input) {
     const ScopedFlushToZero flushed;
     const std::uint64_t tick = ticks_done_++;
+    apply_edits(tick);
     if (follows_machine_) give_work_share(state_, work_share_.steps());
     const TickResult felt = haptic_tick(world_, state_, input.device, dt_);
     record_tick(felt, tick, input.device.fault);
@@ -186,6 +188,14 @@ class Run {
       if (options_.progress && tick % 64 == 0) report_progress(tick);
     }
     return {.force_N = felt.force_N, .go_on = ticks_done_ < ticks_};
+  }
+
+  void apply_edits(std::uint64_t tick) {
+    for (; next_edit_ < options_.edits.size() && options_.edits[next_edit_].tick <= tick; ++next_edit_) {
+      Edit edit = options_.edits[next_edit_];
+      edit.tick = tick;
+      if (apply_edit(world_, state_, edit)) result_.edits.push_back(edit);
+    }
   }
 
   void follow_machine(double tick_us) {
@@ -236,7 +246,8 @@ class Run {
   void keep_in_course(const TickResult& felt) {
     const bool soft = std::any_of(state_.reactions.begin(), state_.reactions.end(),
                                   [](const voxel::Reaction& r) { return r.pressed > 0; });
-    course_->push_back({felt.device_m, world_.tool.stiffness_N_per_m * (felt.proxy_m - felt.device_m), soft});
+    course_->push_back(
+        {felt.device_m, coupling_N_per_m(world_, state_) * (felt.proxy_m - felt.device_m), soft});
   }
 
   void measure_clearance(std::uint64_t tick) {
@@ -281,6 +292,7 @@ class Run {
   std::chrono::steady_clock::time_point last_report_ = std::chrono::steady_clock::now();
   std::uint64_t clearance_every_ = 1, between_every_ = 1;
   std::uint64_t ticks_ = 0, ticks_done_ = 0, hash_ = kHashBegin;
+  std::size_t next_edit_ = 0;
   double sum_force2_ = 0.0, best_score_ = 0.0;
   SessionResult result_;
 };
@@ -363,6 +375,7 @@ SessionResult run_session(const Scene& scene, BuiltScene& built, const SessionOp
   const char* not_measured = built.state->soft.empty()                            ? "nothing is soft"
                              : options.realtime || options.real_device != nullptr ? "real time"
                              : options.reference_samples <= 0 ? "no samples were asked for"
+                             : !options.edits.empty()         ? "values were edited"
                                                               : nullptr;
   if (not_measured != nullptr) {
     SessionResult result = Run(scene, *built.world, *built.state, options, nullptr).run();

@@ -22,6 +22,7 @@
 #include "hybrid/session/forces_between.h"
 #include "hybrid/snapshot/snapshot.h"
 #include "hybrid/tick/tick.h"
+#include "hybrid/world/edits.h"
 
 namespace hybrid {
 
@@ -66,6 +67,7 @@ struct SessionOptions {
   double surfaces_hz = 0.0;                    // how often that thread publishes surfaces for drawing
   BlackBox* black_box = nullptr;               // every tick is added to it
   std::shared_ptr<const device::Path> path{};  // of the hand; null: the scene's path
+  std::vector<Edit> edits{};  // in order of their ticks; those without effect are not kept in the result
 };
 
 struct SessionResult {
@@ -86,6 +88,7 @@ struct SessionResult {
   ForceError error;
   std::optional<Snapshot> moment;       // of keep_picture
   std::vector<RecordedTick> recording;  // of keep_recording
+  std::vector<Edit> edits{};            // that were applied
   // Position of device and proxy as the session began. A late first tick may find the device elsewhere.
   glm::dvec3 start_m{0.0};
   std::string device_name;

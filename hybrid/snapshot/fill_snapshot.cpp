@@ -65,6 +65,14 @@ void fill_moved(const World& world, const WorldState& state, Snapshot& snapshot)
     fill_surface(world.soft[o], *state.soft[o], snapshot.soft_moved_m[world.rigid.size() + o]);
 }
 
+void fill_values(const World& world, const WorldState& state, const DrawnScene& drawn, Snapshot& snapshot) {
+  snapshot.values.resize(drawn.editable.size());
+  for (std::size_t n = 0; n < drawn.editable.size(); ++n) {
+    const EditableValue& value = drawn.editable[n];
+    snapshot.values[n] = edited_value(world, state, value.object, value.quantity);
+  }
+}
+
 void fill_inside(const World& world, const WorldState& state, Snapshot& snapshot) {
   snapshot.inside.resize(world.object_count());
   for (std::size_t o = 0; o < world.soft.size(); ++o) {

@@ -142,7 +142,8 @@ DrawnScene drawn_scene(const Scene& scene, const BuiltScene& built, const std::s
                    .objects = {},
                    .tool_is_punch = world.tool.shape == Tool::Shape::punch,
                    .tool_radius_m = std::max(world.tool.radius_m, kDrawnPoint * world.extent_m),
-                   .max_force_N = world.limits.max_force_N};
+                   .max_force_N = world.limits.max_force_N,
+                   .editable = editable_values(world, *built.state)};
   for (const RigidObject& object : world.rigid) {
     drawn.objects.push_back({object.name, false, *object.drawn});
     for (glm::dvec3& v : drawn.objects.back().surface.vertices) v = object.to_scene(v);

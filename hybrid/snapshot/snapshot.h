@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "hybrid/world/edits.h"
 #include "hybrid/world/object_feel.h"
 #include "polygon/mesh/mesh.h"
 
@@ -49,7 +50,8 @@ struct DrawnScene {
   std::vector<DrawnObject> objects;
   bool tool_is_punch = false;
   double tool_radius_m = 0.0;
-  double max_force_N = 0.0;          // scale of the force arrow
+  double max_force_N = 0.0;  // scale of the force arrow
+  std::vector<EditableValue> editable{};
   std::vector<glm::dvec3> path_m{};  // places of the hand on its path, for the first view; may be empty
 };
 
@@ -111,6 +113,7 @@ struct Snapshot {
   std::vector<SoftDent> inside{};
   std::vector<RigidPlace> rigid_place;  // [object]; if shorter: further objects have not moved
   double tick_us = 0.0;
+  std::vector<double> values{};  // present values of DrawnScene::editable, SI
 
   [[nodiscard]] RigidPlace place_of(std::size_t object) const {
     return object < rigid_place.size() ? rigid_place[object] : RigidPlace{};

@@ -31,11 +31,11 @@ void split_by_object(const World& world, WorldState& state, const glm::dvec3& so
   }
   for (const polygon::ContactPlane& plane : state.scratch.stops) {
     stiffness[plane.object - rigid] +=
-        kJammedStiffness * world.tool.stiffness_N_per_m * glm::outerProduct(plane.normal, plane.normal);
+        kJammedStiffness * coupling_N_per_m(world, state) * glm::outerProduct(plane.normal, plane.normal);
   }
   for (std::size_t o = 0; o < state.soft.size(); ++o) {
     if (!state.soft[o]->touched().empty())
-      stiffness[o] += glm::dmat3(kLeastStiffness * world.tool.stiffness_N_per_m);
+      stiffness[o] += glm::dmat3(kLeastStiffness * coupling_N_per_m(world, state));
     all += stiffness[o];
   }
   if (all != glm::dmat3(0.0)) {

@@ -34,7 +34,7 @@ constexpr ContactSettings kSettings;
 
 // Force on the proxy apart from rigid surfaces: coupling and tissue (N).
 glm::dvec3 pull_on_proxy(const World& world, const WorldState& state, const glm::dvec3& device) noexcept {
-  glm::dvec3 pull = world.tool.stiffness_N_per_m * (device - state.proxy_m);
+  glm::dvec3 pull = coupling_N_per_m(world, state) * (device - state.proxy_m);
   for (const voxel::Reaction& reaction : state.reactions) pull += reaction.force_N;
   return pull;
 }
@@ -123,7 +123,7 @@ glm::dvec3 stop_at_jammed(const World& world, WorldState& state, const glm::dvec
 // rigid; then the tissue responds. Returns how far the proxy went (m).
 double move_proxy(const World& world, WorldState& state, const glm::dvec3& device, bool near_soft,
                   double travel, bool first_pass, Sweep& sweep) noexcept {
-  const double k = world.tool.stiffness_N_per_m;
+  const double k = coupling_N_per_m(world, state);
   state.scratch.stops.clear();
   glm::dmat3 model(k);
   for (const voxel::Reaction& reaction : state.reactions) model += reaction.stiffness_N_per_m;

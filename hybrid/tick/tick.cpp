@@ -122,7 +122,9 @@ glm::dvec3 make_safe(const World& world, WorldState& state, const glm::dvec3& fo
   // The gate gets the position in use: an invalid input was replaced by the last valid one.
   const device::DeviceState tool{.position_m = state.device_m, .fault = input.fault};
   const std::uint64_t bad = state.limit.nonfinite;
-  const glm::dvec3 limited = device::limit_force(world.limits, state.limit, force_N, tool, dt_s);
+  device::ForceLimits limits = world.limits;
+  limits.max_force_N = max_force_N(world, state);
+  const glm::dvec3 limited = device::limit_force(limits, state.limit, force_N, tool, dt_s);
   state.nonfinite += state.limit.nonfinite - bad;
   if (!world.passivity) return limited;
   return device::keep_passive(*world.passivity, state.passive, limited, state.device_m, dt_s);
@@ -131,7 +133,7 @@ glm::dvec3 make_safe(const World& world, WorldState& state, const glm::dvec3& fo
 // The hand feels the coupling, damping and texture alone; the parts and contacts are for the record.
 void publish_force(const World& world, WorldState& state, const Sweep& sweep,
                    const device::DeviceState& input, double dt_s, TickResult& result) noexcept {
-  const glm::dvec3 coupling = world.tool.stiffness_N_per_m * (state.proxy_m - result.device_m);
+  const glm::dvec3 coupling = coupling_N_per_m(world, state) * (state.proxy_m - result.device_m);
   const glm::dvec3 added = added_force(world, state, result.device_m, dt_s);
   result.proxy_m = state.proxy_m;
   result.rigid_N = sweep.force_N + added;

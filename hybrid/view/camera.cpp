@@ -239,4 +239,10 @@ Camera frame_contact(const DrawnScene& scene, const Snapshot& snapshot, const Ca
   return camera;
 }
 
+void look_along(Camera& camera, int axis) {
+  constexpr double quarter = 0.5 * std::numbers::pi, steepest = 89.0 * std::numbers::pi / 180.0;
+  camera.elevation_rad = axis == 2 ? steepest : 0.0;
+  camera.azimuth_rad = axis == 0 ? 0.0 : axis == 1 ? quarter : -quarter;
+}
+
 }  // namespace hybrid

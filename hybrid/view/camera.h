@@ -57,6 +57,10 @@ SceneBounds bounds_of(const DrawnScene& scene, const Snapshot* snapshot = nullpt
 Camera frame_scene(const DrawnScene& scene, const Snapshot& snapshot, double aspect = 4.0 / 3.0,
                    std::span<const glm::dvec3> path_m = {});
 
+// Turns the camera to look along an axis (0: x, 1: y, 2: z) from its positive side; along z with x to the
+// right.
+void look_along(Camera& camera, int axis);
+
 // The same direction of view, close to the tool: some tool radii around the tool.
 Camera frame_contact(const DrawnScene& scene, const Snapshot& snapshot, const Camera& overview);
 

@@ -11,15 +11,19 @@ FramePainter::FramePainter(const DrawnScene& scene, Samples samples, int height)
 }
 
 void FramePainter::paint(const Snapshot& snapshot, const Camera& camera, const FrameOptions& options) {
+  renderer_.set_view(options.view);
   renderer_.begin(scene_, snapshot, options.width, options.height);
   OverlayContent content;
-  content.layout = frame_layout(options.width, options.height, !options.help.empty());
+  content.layout =
+      frame_layout(options.width, options.height, !options.help.empty(), options.panel != nullptr);
   content.width = options.width;
   content.height = options.height;
   content.camera = camera;
   content.displacement_scale_m = renderer_.displacement_scale_m();
-  content.history = options.history;
+  content.panel = options.panel;
+  content.dark = options.view.dark;
   content.help = options.help;
+  content.notice = options.notice;
   content.paused = options.paused;
 
   const FrameLayout& layout = content.layout;

@@ -16,9 +16,10 @@ namespace hybrid {
 struct FrameOptions {
   int width = 0, height = 0;  // (pixels)
   bool inset = true;          // draw a nearer view of the contact if it is kLeastNearer times nearer
-  std::vector<ForceSample> history;
-  std::string help;
+  std::string help, notice;   // one line below the scene; a message above it. Empty: none
   bool paused = false;
+  ViewSettings view;
+  OverlayPanel* panel = nullptr;  // null: none
 };
 
 // Needs a current OpenGL context for its whole life. Keeps a reference to the scene.
@@ -28,6 +29,8 @@ class FramePainter {
 
   // Draws the frame off screen; then present() or read_rgb().
   void paint(const Snapshot& snapshot, const Camera& camera, const FrameOptions& options);
+  // Frees what was made in the context; this one paints no more.
+  void release() { renderer_.release(); }
   void present(int width, int height) { renderer_.present(width, height); }
   [[nodiscard]] std::vector<std::uint8_t> read_rgb() { return renderer_.read_rgb(); }
 

@@ -8,6 +8,9 @@
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <string_view>
+
+#include "hybrid/view/renderer_shaders.h"
 
 namespace hybrid {
 namespace {
@@ -30,6 +33,20 @@ GLuint compile(GLenum kind, const char* source) {
 }
 
 }  // namespace
+
+void require_gl() {
+  if (epoxy_gl_version() < 33) {
+    throw std::runtime_error("drawing needs OpenGL 3.3, and this one is " +
+                             std::to_string(epoxy_gl_version() / 10) + "." +
+                             std::to_string(epoxy_gl_version() % 10) +
+                             "; set LIBGL_ALWAYS_SOFTWARE=1 to draw without the graphics card");
+  }
+}
+
+bool draws_in_software() {
+  const auto* name = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
+  return name != nullptr && std::string_view(name).find("llvmpipe") != std::string_view::npos;
+}
 
 void check_gl(const char* doing) {
   const GLenum error = glGetError();
@@ -137,6 +154,67 @@ void attach_targets(GLuint frame, GLuint colour, GLuint depth) {
     throw std::runtime_error(
         "the graphics driver cannot draw into a picture of this size; ask for a smaller one");
   }
+}
+
+void GlOverlay::create() {
+  program_ = link_program(shaders::overlay_vertex, shaders::overlay_fragment);
+  glGenVertexArrays(1, &array_);
+  glGenBuffers(1, &vertices_);
+  glGenBuffers(1, &indices_);
+  glBindVertexArray(array_);
+  glBindBuffer(GL_ARRAY_BUFFER, vertices_);
+  glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, indices_);
+  constexpr auto stride = static_cast<GLsizei>(sizeof(OverlayVertex));
+  glVertexAttribPointer(0, 2, GL_FLOAT, GL_FALSE, stride, buffer_offset(offsetof(OverlayVertex, x)));
+  glVertexAttribPointer(1, 2, GL_FLOAT, GL_FALSE, stride, buffer_offset(offsetof(OverlayVertex, u)));
+  glVertexAttribPointer(2, 4, GL_UNSIGNED_BYTE, GL_TRUE, stride,
+                        buffer_offset(offsetof(OverlayVertex, colour)));
+  for (GLuint i = 0; i < 3; ++i) glEnableVertexAttribArray(i);
+}
+
+void GlOverlay::set_font(const FontAtlas& atlas) {
+  glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+  glGenTextures(1, &font_);
+  glBindTexture(GL_TEXTURE_2D, font_);
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_R8, atlas.width, atlas.height, 0, GL_RED, GL_UNSIGNED_BYTE,
+               atlas.alpha.data());
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  check_gl("uploading the font");
+}
+
+void GlOverlay::release() {
+  glDeleteProgram(program_);
+  glDeleteVertexArrays(1, &array_);
+  for (const GLuint buffer : {vertices_, indices_}) glDeleteBuffers(1, &buffer);
+  glDeleteTextures(1, &font_);
+}
+
+void GlOverlay::draw(const OverlayMesh& overlay, int width, int height) const {
+  glViewport(0, 0, width, height);
+  glDisable(GL_DEPTH_TEST);
+  glEnable(GL_BLEND);
+  glEnable(GL_SCISSOR_TEST);
+  glUseProgram(program_);
+  glUniform2f(glGetUniformLocation(program_, "size"), static_cast<float>(width), static_cast<float>(height));
+  glUniform1i(glGetUniformLocation(program_, "font"), 0);
+  glBindTexture(GL_TEXTURE_2D, font_);
+  glBindVertexArray(array_);
+  glBindBuffer(GL_ARRAY_BUFFER, vertices_);
+  glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(overlay.vertices.size() * sizeof(OverlayVertex)),
+               overlay.vertices.data(), GL_STREAM_DRAW);
+  glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, indices_);
+  glBufferData(GL_ELEMENT_ARRAY_BUFFER,
+               static_cast<GLsizeiptr>(overlay.indices.size() * sizeof(std::uint32_t)),
+               overlay.indices.data(), GL_STREAM_DRAW);
+  for (const OverlayMesh::Batch& batch : overlay.batches) {
+    const PixelRect& r = batch.inside;
+    glScissor(r.x, height - r.y - r.height, std::max(r.width, 0), std::max(r.height, 0));
+    glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(batch.count), GL_UNSIGNED_INT,
+                   buffer_offset(batch.first * sizeof(std::uint32_t)));
+  }
+  glDisable(GL_SCISSOR_TEST);
+  glDisable(GL_BLEND);
 }
 
 }  // namespace hybrid

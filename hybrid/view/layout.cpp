@@ -14,6 +14,7 @@ constexpr float kColumn = 25.0F;
 constexpr float kLeastScene = 16.0F;         // a narrower scene gets the column's place as well
 constexpr float kColumnShare = 1.0F / 3.0F;  // of the frame's width, at most
 constexpr float kInsetShare = 0.46F;         // of the column's height, at most
+constexpr float kInsetOfScene = 0.34F;       // of the scene's shorter side, beside a panel
 
 }  // namespace
 
@@ -31,7 +32,7 @@ double FrameLayout::aspect() const {
   return static_cast<double>(std::max(scene.width, 1)) / std::max(scene.height, 1);
 }
 
-FrameLayout frame_layout(int width, int height, bool help) {
+FrameLayout frame_layout(int width, int height, bool help, bool panel) {
   const float em = text_height(height);
   const int top = std::min(static_cast<int>(kHeading * em), height / 4);
   const int bottom = help ? std::min(static_cast<int>(kHelp * em), height / 8) : 0;
@@ -44,8 +45,14 @@ FrameLayout frame_layout(int width, int height, bool help) {
   const int margin = static_cast<int>(0.6F * em);
   const int side =
       std::min(column - margin, static_cast<int>(kInsetShare * static_cast<float>(layout.column.height)));
-  if (column > 0 && side > 0)
+  if (column > 0 && panel) {
+    const int corner = static_cast<int>(
+        kInsetOfScene * static_cast<float>(std::min(layout.scene.width, layout.scene.height)));
+    layout.inset = {layout.scene.width - corner - margin, top + layout.scene.height - corner - margin, corner,
+                    corner};
+  } else if (column > 0 && side > 0) {
     layout.inset = {width - margin - side, top + layout.column.height - margin - side, side, side};
+  }
   return layout;
 }
 

@@ -20,15 +20,16 @@ float text_height(int frame_height);
 struct FrameLayout {
   PixelRect scene;
   PixelRect column;  // on the right; width 0 where the frame is too narrow for one
-  PixelRect inset;   // square, at the lower end of the column; width 0 without a column
+  PixelRect inset;   // square, at the lower end of the column or of the scene; width 0 without a column
 
   // Pixel of the frame at which a camera shows a point in the scene's rectangle; empty: behind the eye.
   [[nodiscard]] std::optional<glm::dvec2> pixel(const Camera& camera, const glm::dvec3& point_m) const;
   [[nodiscard]] double aspect() const;  // of the scene: width / height
 };
 
-// `help`: a line of help stands below the scene.
-FrameLayout frame_layout(int width, int height, bool help);
+// `help`: a line of help stands below the scene. `panel`: a window's panel fills the column, and the nearer
+// view is a corner of the scene.
+FrameLayout frame_layout(int width, int height, bool help, bool panel = false);
 
 // A nearer view of the contact is worth its place from here on.
 inline constexpr double kLeastNearer = 1.5;

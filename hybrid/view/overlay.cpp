@@ -14,6 +14,19 @@
 
 namespace hybrid {
 
+namespace {
+
+constexpr float kScaleWidth = 12.0F;  // of the colour scale in a corner of the scene (em)
+
+// The panel fills the column: the scale is in the scene's upper corner beside it.
+PixelRect colour_scale_beside_panel(const Pen& pen, const PixelRect& scene) {
+  const int margin = static_cast<int>(0.6F * pen.em), width = static_cast<int>(kScaleWidth * pen.em);
+  return {scene.x + scene.width - width - margin, scene.y, width,
+          static_cast<int>(kColourScaleHeight * pen.em)};
+}
+
+}  // namespace
+
 struct Overlay::State {
   ImGuiContext* context = nullptr;
   Pen pen;
@@ -77,9 +90,11 @@ OverlayMesh Overlay::build(const DrawnScene& scene, const Snapshot& snapshot, co
   ImGuiIO& io = ImGui::GetIO();
   io.DisplaySize = {static_cast<float>(content.width), static_cast<float>(content.height)};
   io.DeltaTime = 1.0F / 60.0F;
+  if (content.panel != nullptr) content.panel->take_input();
   ImGui::NewFrame();
   Pen& pen = state_->pen;
-  pen.list = ImGui::GetForegroundDrawList();
+  pen.inks = content.dark ? kDarkInks : kLightInks;
+  pen.list = ImGui::GetBackgroundDrawList();
 
   const PixelRect& view = content.layout.scene;
   if (content.inset) draw_inset_frame(pen, snapshot, content);
@@ -90,9 +105,16 @@ OverlayMesh Overlay::build(const DrawnScene& scene, const Snapshot& snapshot, co
   }
   draw_heading(pen, scene, snapshot, content);
   draw_scale_bar(pen, content.camera, view);
-  draw_column(pen, scene, snapshot, content);
+  if (content.panel != nullptr) {
+    content.panel->draw(pen, scene, snapshot, content.layout.column);
+    if (content.displacement_scale_m > 0.0)
+      draw_colour_scale(pen, colour_scale_beside_panel(pen, view), content.displacement_scale_m);
+  } else {
+    draw_column(pen, scene, snapshot, content);
+  }
+  if (!content.notice.empty()) draw_notice(pen, content.notice, view);
   if (!content.help.empty()) {
-    pen.label(pen.em, static_cast<float>(content.height) - 1.7F * pen.em, kPaleInk,
+    pen.label(pen.em, static_cast<float>(content.height) - 1.7F * pen.em, pen.inks.pale,
               pen.fit(content.help, static_cast<float>(content.width) - 2.0F * pen.em));
   }
 
@@ -105,6 +127,10 @@ OverlayMesh Overlay::build(const DrawnScene& scene, const Snapshot& snapshot, co
     for (const ImDrawVert& v : list.VtxBuffer)
       mesh.vertices.push_back({v.pos.x, v.pos.y, v.uv.x, v.uv.y, v.col});
     for (const ImDrawCmd& command : list.CmdBuffer) {
+      const PixelRect inside{static_cast<int>(command.ClipRect.x), static_cast<int>(command.ClipRect.y),
+                             static_cast<int>(std::ceil(command.ClipRect.z - command.ClipRect.x)),
+                             static_cast<int>(std::ceil(command.ClipRect.w - command.ClipRect.y))};
+      mesh.batches.push_back({mesh.indices.size(), command.ElemCount, inside});
       for (unsigned i = 0; i < command.ElemCount; ++i) {
         const auto index = list.IdxBuffer[static_cast<int>(command.IdxOffset + i)];
         mesh.indices.push_back(base + command.VtxOffset + index);

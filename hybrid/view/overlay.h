@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The text and charts on a picture: title, time, legend, colour scale, scale bar and labels; in the window
-// also a strip chart of the force and a help line. The only part of the project that knows Dear ImGui. It
-// uses ImGui's draw lists and font (text_painter.cpp) without a backend: the output is triangles in pixels.
-// Its parts are in overlay_parts.h.
+// also a panel and a help line. It uses Dear ImGui without a backend: the output is triangles in pixels. Its
+// parts are in overlay_parts.h. Only it, text_painter.cpp and the window's panel know ImGui.
 #pragma once
 
 #include <functional>
@@ -14,15 +13,11 @@
 
 #include "hybrid/snapshot/snapshot.h"
 #include "hybrid/view/camera.h"
+#include "hybrid/view/gl_objects.h"
 #include "hybrid/view/layout.h"
-#include "hybrid/view/renderer.h"
+#include "hybrid/view/overlay_panel.h"
 
 namespace hybrid {
-
-struct ForceSample {
-  double t_s = 0.0;
-  double force_N = 0.0;
-};
 
 struct OverlayContent {
   int width = 0, height = 0;  // of the picture (pixels)
@@ -35,9 +30,10 @@ struct OverlayContent {
   std::optional<Inset> inset;
   double displacement_scale_m = 0.0;  // 0: nothing soft has moved, no colour scale
   // Window only:
-  std::vector<ForceSample> history;  // in order of time
-  std::string help;                  // one line; empty: none
-  bool paused = false;
+  OverlayPanel* panel = nullptr;  // null: the legend instead
+  std::string help;               // one line; empty: none
+  std::string notice;             // a message of a few lines; empty: none
+  bool paused = false, dark = false;
 };
 
 class Overlay {

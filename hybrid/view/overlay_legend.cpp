@@ -40,7 +40,8 @@ void draw_swatch(const Pen& pen, float x, float y, const LegendRow& row) {
     const float left = x + stripe * static_cast<float>(s);
     pen.fill({left, y}, {left + stripe, y + em}, ink_of(row.swatch[s], row.alpha), one ? 2.0F : 0.0F);
   }
-  pen.frame({x, y}, {x + em, y + em}, row.touched ? kInk : kEdge, 2.0F, row.touched ? 2.0F : 1.0F);
+  pen.frame({x, y}, {x + em, y + em}, row.touched ? pen.inks.text : pen.inks.edge, 2.0F,
+            row.touched ? 2.0F : 1.0F);
 }
 
 void draw_rows(const Pen& pen, const glm::vec2& low, std::span<const LegendRow> rows, const Columns& c) {
@@ -51,9 +52,10 @@ void draw_rows(const Pen& pen, const glm::vec2& low, std::span<const LegendRow> 
   for (const LegendRow& row : rows) {
     const float in = indent(pen, row);
     draw_swatch(pen, x + in, y, row);
-    pen.text(x + in + 1.6F * em, y, kInk, row.name + row.more);
-    pen.text(x + 2.2F * em + c.name, y, kPaleInk, row.kind);
-    pen.text(low.x + c.width - 0.8F * em - pen.width(row.force), y, row.touched ? kInk : kPaleInk, row.force);
+    pen.text(x + in + 1.6F * em, y, pen.inks.text, row.name + row.more);
+    pen.text(x + 2.2F * em + c.name, y, pen.inks.pale, row.kind);
+    pen.text(low.x + c.width - 0.8F * em - pen.width(row.force), y,
+             row.touched ? pen.inks.text : pen.inks.pale, row.force);
     y += kLine * em;
   }
 }
@@ -73,9 +75,7 @@ void draw_column(const Pen& pen, const DrawnScene& scene, const Snapshot& snapsh
   };
   const float end = static_cast<float>(content.inset ? content.layout.inset.y : column.y + column.height);
   const bool scale = content.displacement_scale_m > 0.0;
-  const bool history = content.history.size() >= 2;
-  const float charts =
-      (scale ? kColourScaleHeight + kMargin : 0.0F) + (history ? kHistoryHeight + kMargin : 0.0F);
+  const float charts = scale ? kColourScaleHeight + kMargin : 0.0F;
   const float room = (end - static_cast<float>(column.y)) / em - charts - kMargin;
   const float rows_fit = (room - 1.0F) / kLine;
   std::vector<LegendRow> rows =
@@ -84,14 +84,12 @@ void draw_column(const Pen& pen, const DrawnScene& scene, const Snapshot& snapsh
   for (LegendRow& row : rows)
     row.name = pen.fit(row.name, columns.name - indent(pen, row) - pen.width(row.more));
   draw_rows(pen, {left, static_cast<float>(column.y)}, rows, columns);
-  float y = static_cast<float>(column.y) + em * (kLine * static_cast<float>(rows.size()) + 1.0F + kMargin);
+  const float y =
+      static_cast<float>(column.y) + em * (kLine * static_cast<float>(rows.size()) + 1.0F + kMargin);
   if (scale) {
     if (y + kColourScaleHeight * em < end)
       draw_colour_scale(pen, part(y, kColourScaleHeight), content.displacement_scale_m);
-    y += (kColourScaleHeight + kMargin) * em;
   }
-  if (history && y + kHistoryHeight * em < end)
-    draw_history(pen, part(end - (kHistoryHeight + kMargin) * em, kHistoryHeight), content.history);
 }
 
 }  // namespace hybrid

@@ -25,9 +25,9 @@ void draw_heading(const Pen& pen, const DrawnScene& scene, const Snapshot& snaps
   std::string title = scene.title.empty() ? "untitled scene" : scene.title;
   // The head font is twice the body's, and fit() measures with the body's.
   title = pen.fit(title, (static_cast<float>(content.width) - 2.0F * em) / 2.0F);
-  pen.text(x, y, kInk, title, true);
+  pen.text(x, y, pen.inks.text, title, true);
   y += 2.2F * em;
-  pen.text(x, y, kInk,
+  pen.text(x, y, pen.inks.text,
            "time " + with_decimals(snapshot.t_s, 3) + " s    force on the hand " +
                force_text(glm::length(snapshot.force_N)) + (content.paused ? "    PAUSED" : ""));
 }
@@ -38,7 +38,7 @@ void draw_colour_scale(const Pen& pen, const PixelRect& where, double scale_m) {
   const auto x0 = static_cast<float>(where.x), y0 = static_cast<float>(where.y);
   const auto w = static_cast<float>(where.width);
   pen.plate(x0, y0, w, static_cast<float>(where.height));
-  pen.text(x0 + 0.8F * em, y0 + 0.5F * em, kInk, "tissue moved by");
+  pen.text(x0 + 0.8F * em, y0 + 0.5F * em, pen.inks.text, "tissue moved by");
   const float left = x0 + 0.8F * em, right = x0 + w - 0.8F * em;
   const float top = y0 + 2.0F * em, bottom = top + 0.9F * em;
   // What hardly moved has its own colour: paper stands for it.
@@ -48,14 +48,14 @@ void draw_colour_scale(const Pen& pen, const PixelRect& where, double scale_m) {
     pen.fill({left + a * (right - left), top}, {left + b * (right - left), bottom},
              ink_of(palette::of_displacement(paper, 0.5F * (a + b))));
   }
-  pen.frame({left, top}, {right, bottom}, kEdge);
+  pen.frame({left, top}, {right, bottom}, pen.inks.edge);
   for (int tick = 0; tick <= 4; ++tick) {
     const float x = left + (right - left) * static_cast<float>(tick) / 4.0F;
-    pen.line({x, bottom}, {x, bottom + 0.25F * em}, kInk);
+    pen.line({x, bottom}, {x, bottom + 0.25F * em}, pen.inks.text);
     if (tick % 2 != 0) continue;
     const std::string words = tick == 0 ? "0" : length_text(scale_m * tick / 4.0);
     const float wide = pen.width(words);
-    pen.text(std::clamp(x - 0.5F * wide, left, right - wide), bottom + 0.4F * em, kInk, words);
+    pen.text(std::clamp(x - 0.5F * wide, left, right - wide), bottom + 0.4F * em, pen.inks.text, words);
   }
 }
 
@@ -69,10 +69,10 @@ void draw_scale_bar(const Pen& pen, const Camera& camera, const PixelRect& where
   const float y = static_cast<float>(where.y + where.height) - 1.4F * em;
   const std::string words = length_text(length);
   pen.fill({x - 0.5F * em, y - 1.9F * em}, {x + std::max(w, pen.width(words)) + 0.5F * em, y + 0.7F * em},
-           kPaper, 3.0F);
-  pen.fill({x, y - 1.0F}, {x + w, y + 1.0F}, kInk);
-  for (const float end : {x, x + w}) pen.line({end, y - 5.0F}, {end, y + 5.0F}, kInk, 2.0F);
-  pen.text(x, y - 1.6F * em, kInk, words);
+           pen.inks.paper, 3.0F);
+  pen.fill({x, y - 1.0F}, {x + w, y + 1.0F}, pen.inks.text);
+  for (const float end : {x, x + w}) pen.line({end, y - 5.0F}, {end, y + 5.0F}, pen.inks.text, 2.0F);
+  pen.text(x, y - 1.6F * em, pen.inks.text, words);
 }
 
 void draw_force_label(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera,
@@ -93,7 +93,7 @@ void draw_force_label(const Pen& pen, const DrawnScene& scene, const Snapshot& s
       std::clamp(static_cast<float>(tip->x) + aside, 0.5F * pen.em, std::max(most_x, 0.5F * pen.em));
   const float y =
       std::clamp(static_cast<float>(tip->y) - 0.6F * pen.em, 0.5F * pen.em, std::max(most_y, 0.5F * pen.em));
-  pen.label(static_cast<float>(where.x) + x, static_cast<float>(where.y) + y, ink_of(palette::force), words);
+  pen.label(static_cast<float>(where.x) + x, static_cast<float>(where.y) + y, pen.inks.force, words);
 }
 
 void draw_inset_frame(const Pen& pen, const Snapshot& snapshot, const OverlayContent& content) {
@@ -108,52 +108,27 @@ void draw_inset_frame(const Pen& pen, const Snapshot& snapshot, const OverlayCon
     const glm::vec2 corner(std::clamp(centre.x, a.x, b.x), std::clamp(centre.y, a.y, b.y));
     const glm::vec2 way = corner - centre;
     const float distance = glm::length(way);
-    pen.circle(centre, radius, kPaleInk, kHairline);
-    if (distance > radius) pen.line(centre + way / distance * radius, corner, kPaleInk, kHairline);
+    pen.circle(centre, radius, pen.inks.pale, kHairline);
+    if (distance > radius) pen.line(centre + way / distance * radius, corner, pen.inks.pale, kHairline);
   }
-  pen.frame(a, b, kPaleInk, 0.0F, kHairline);
-  pen.label(a.x + 0.7F * pen.em, a.y + 0.6F * pen.em, kInk,
+  pen.frame(a, b, pen.inks.pale, 0.0F, kHairline);
+  pen.label(a.x + 0.7F * pen.em, a.y + 0.6F * pen.em, pen.inks.text,
             "the contact, " + with_decimals(content.inset->nearer, 1) + " times nearer");
 }
 
-void draw_history(const Pen& pen, const PixelRect& where, std::span<const ForceSample> history) {
-  if (history.size() < 2 || where.width < 8) return;
+void draw_notice(const Pen& pen, const std::string& words, const PixelRect& where) {
+  constexpr float line = 1.35F, margin = 0.8F, share = 0.62F;  // (em); of the scene's width, at most
   const float em = pen.em;
-  const auto w = static_cast<float>(where.width), h = static_cast<float>(where.height);
-  const auto x0 = static_cast<float>(where.x), y0 = static_cast<float>(where.y);
-  const double end = history.back().t_s;
-  const double span = std::max(end - history.front().t_s, 1e-3);
-  double most = 0.0;
-  for (const ForceSample& sample : history) {
-    if (std::isfinite(sample.force_N)) most = std::max(most, sample.force_N);
-  }
-  // End of the axis: the largest round number not above the maximum, or twice that number if the maximum
-  // exceeds it.
-  double top = most > 0.0 ? round_down(most) : 1.0;
-  while (top < most) top += round_down(most);
-  pen.plate(x0, y0, w, h);
-  pen.text(x0 + 0.6F * em, y0 + 0.4F * em, kInk,
-           "force, last " + with_decimals(span, 1) + " s  (top " + force_text(top) + ")");
-  const float low = y0 + h - 0.5F * em;
-  const float high = y0 + 1.9F * em;
-  pen.line({x0 + 2.0F, high}, {x0 + w - 2.0F, high}, kEdge);
-  pen.line({x0 + 2.0F, low}, {x0 + w - 2.0F, low}, kEdge);
-  // Largest force in each pixel column; a gap where it is not finite.
-  const auto columns = static_cast<std::size_t>(w) - 4;
-  std::vector<double> column(columns, -1.0);
-  for (const ForceSample& sample : history) {
-    if (!std::isfinite(sample.force_N)) continue;
-    const double share = std::clamp((sample.t_s - (end - span)) / span, 0.0, 1.0);
-    double& at = column[static_cast<std::size_t>(share * static_cast<double>(columns - 1))];
-    at = std::max(at, sample.force_N);
-  }
-  std::optional<glm::vec2> last;
-  for (std::size_t c = 0; c < columns; ++c) {
-    if (column[c] < 0.0) continue;
-    const glm::vec2 at(x0 + 2.0F + static_cast<float>(c),
-                       low - static_cast<float>(column[c] / top) * (low - high));
-    if (last) pen.line(*last, at, ink_of(palette::force), 1.5F);
-    last = at;
+  const std::vector<std::string> lines = pen.wrap(words, share * static_cast<float>(where.width));
+  float widest = 0.0F;
+  for (const std::string& text : lines) widest = std::max(widest, pen.width(text));
+  const float x = static_cast<float>(where.x) + em;
+  float y = static_cast<float>(where.y);
+  pen.plate(x, y, widest + 2.0F * margin * em, (line * static_cast<float>(lines.size()) + margin) * em);
+  y += 0.5F * margin * em;
+  for (const std::string& text : lines) {
+    pen.text(x + margin * em, y, pen.inks.text, text);
+    y += line * em;
   }
 }
 

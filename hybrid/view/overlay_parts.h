@@ -18,13 +18,14 @@ void draw_inset_frame(const Pen& pen, const Snapshot& snapshot, const OverlayCon
 void draw_force_label(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera,
                       const PixelRect& where);
 
-// The column beside the scene: the legend, below it the colours of displacement, and in a window the force of
-// the last seconds, above the inset. What has no room is left out, and rows of the legend are counted.
+// A message at the head of the scene, in as many lines as it needs.
+void draw_notice(const Pen& pen, const std::string& words, const PixelRect& where);
+
+// The column beside the scene: the legend, below it the colours of displacement, above the inset. What has no
+// room is left out, and rows of the legend are counted.
 void draw_column(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
                  const OverlayContent& content);
-// The two charts of the column.
 void draw_colour_scale(const Pen& pen, const PixelRect& where, double scale_m);
-void draw_history(const Pen& pen, const PixelRect& where, std::span<const ForceSample> history);
-inline constexpr float kColourScaleHeight = 5.0F, kHistoryHeight = 7.0F;  // (em)
+inline constexpr float kColourScaleHeight = 5.0F;  // (em)
 
 }  // namespace hybrid

@@ -2,6 +2,7 @@
 #include "hybrid/view/palette.h"
 
 #include <algorithm>
+#include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <map>
@@ -93,6 +94,14 @@ std::vector<glm::vec3> of_inside(const DrawnScene& scene, std::size_t index) {
     }
   }
   return colours;
+}
+
+double scale_end(double moved_m) {
+  const double power = std::pow(10.0, std::floor(std::log10(moved_m)));
+  for (const double step : {1.0, 2.0, 5.0}) {
+    if (step * power >= moved_m * (1.0 - 1e-6)) return step * power;
+  }
+  return 10.0 * power;
 }
 
 glm::vec3 of_displacement(const glm::vec3& own, float share) {

@@ -14,7 +14,9 @@ namespace hybrid::palette {
 
 // sRGB, 0 to 1.
 inline constexpr glm::vec3 background{0.945F, 0.953F, 0.962F};
+inline constexpr glm::vec3 dark_background{0.118F, 0.129F, 0.149F};
 inline constexpr glm::vec3 tool{0.13F, 0.17F, 0.24F};
+inline constexpr glm::vec3 dark_tool{0.66F, 0.71F, 0.79F};  // on the dark background
 inline constexpr glm::vec3 device{0.10F, 0.45F, 0.85F};
 inline constexpr glm::vec3 force{0.03F, 0.38F, 0.93F};
 
@@ -72,6 +74,9 @@ std::vector<glm::vec3> of_materials(const DrawnScene& scene, std::size_t index);
 
 // Colours of the materials within an object (DrawnInside::materials), also of those that its surface hides.
 std::vector<glm::vec3> of_inside(const DrawnScene& scene, std::size_t index);
+
+// End of the scale for a largest motion: 1, 2 or 5 · 10^n, at or above it.
+double scale_end(double moved_m);
 
 // Colour of a point that moved by `share` (0 to 1) of the scale's end, on an object of colour `own`. The
 // renderer's shader computes the same formula.

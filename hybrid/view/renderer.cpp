@@ -4,6 +4,7 @@
 #include <epoxy/gl.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <glm/geometric.hpp>
@@ -11,8 +12,6 @@
 #include <limits>
 #include <span>
 #include <stdexcept>
-#include <string>
-#include <string_view>
 
 #include "hybrid/view/gl_objects.h"
 #include "hybrid/view/palette.h"
@@ -42,11 +41,12 @@ constexpr double kDepthApart = 5e-4;  // of the view's height: about half a pixe
 }  // namespace
 
 struct Renderer::State {
-  GLuint mesh_program = 0, depth_program = 0, overlay_program = 0;
+  GLuint mesh_program = 0, depth_program = 0;
   GLuint program = 0;  // in use: the mesh's or the depth's
   std::vector<Object> objects;
   GlMesh ball, cylinder, cone, disc;
-  GLuint overlay_array = 0, overlay_vertices = 0, overlay_indices = 0, font = 0;
+  GlOverlay overlay;
+  ViewSettings view;
   GLuint scene_frame = 0, scene_colour = 0, scene_depth = 0;
   GLuint shown_frame = 0, shown_depth = 0;
   GLuint final_frame = 0, final_colour = 0;
@@ -86,6 +86,8 @@ struct Renderer::State {
   void build_targets();
   void cut_objects(const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera);
   void draw_objects(bool soft, int pass) const;
+  void draw_object(const Object& object, float alpha) const;
+  void draw_translucent(const glm::mat4& clip);
   void draw_tool(const DrawnScene& scene, const glm::dvec3& at) const;
   void draw_arrow(const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera) const;
 };
@@ -107,37 +109,72 @@ void Renderer::State::build_targets() {
   built_height = h;
 }
 
+// Opaque objects of one kind.
 void Renderer::State::draw_objects(bool soft, int pass) const {
   uniform("pass", pass);
-  uniform("alpha", 1.0F);
-  uniform("shine", soft ? 0.10F : 0.05F);
-  for (const Object& object : objects) {
-    if (object.soft != soft || object.mesh.count == 0) continue;
-    place(object.placed);
-    uniform("own_colour", object.colour);
-    uniform("coloured_vertices", object.mesh.colours != 0 ? 1 : 0);
-    uniform("moved_scale", soft ? static_cast<float>(most_moved_m) : 0.0F);
-    uniform("kept", object.kept);
-    if (object.face.count > 0) glEnable(GL_CLIP_DISTANCE0);
-    object.mesh.draw();
-    glDisable(GL_CLIP_DISTANCE0);
-    if (object.face.count == 0) continue;
-    // The face lies in the plane: rounding must not clip it.
-    uniform("kept", glm::vec4(0.0F, 0.0F, 0.0F, 1.0F));
-    uniform("coloured_vertices", 1);
-    uniform("moved_scale", 0.0F);
-    object.face.draw();
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    const ObjectLook look = view.look_of(i);
+    if (objects[i].soft == soft && look.visible && look.opacity >= 1.0F) draw_object(objects[i], 1.0F);
   }
   uniform("moved_scale", 0.0F);
   uniform("coloured_vertices", 0);
   uniform("pass", 0);
 }
 
+void Renderer::State::draw_object(const Object& object, float alpha) const {
+  if (object.mesh.count == 0) return;
+  uniform("alpha", alpha);
+  uniform("shine", object.soft ? 0.10F : 0.05F);
+  place(object.placed);
+  uniform("own_colour", object.colour);
+  uniform("coloured_vertices", object.mesh.colours != 0 ? 1 : 0);
+  uniform("moved_scale", object.soft ? static_cast<float>(most_moved_m) : 0.0F);
+  uniform("kept", object.kept);
+  const auto clip = clip_equation(view.clip, bounds, origin_m);
+  uniform("clip_plane", clip.value_or(glm::vec4(0.0F, 0.0F, 0.0F, 1.0F)));
+  if (clip) glEnable(GL_CLIP_DISTANCE1);
+  if (object.face.count > 0) glEnable(GL_CLIP_DISTANCE0);
+  object.mesh.draw();
+  glDisable(GL_CLIP_DISTANCE0);
+  if (object.face.count > 0) {
+    // The face lies in the plane: rounding must not clip it.
+    uniform("kept", glm::vec4(0.0F, 0.0F, 0.0F, 1.0F));
+    uniform("coloured_vertices", 1);
+    uniform("moved_scale", 0.0F);
+    object.face.draw();
+  }
+  glDisable(GL_CLIP_DISTANCE1);
+  // Some drivers clip by a plane that is switched off: tool and arrow are always whole.
+  uniform("clip_plane", glm::vec4(0.0F, 0.0F, 0.0F, 1.0F));
+}
+
+// Of translucent objects only the nearest surface is blended: a depth-only pass finds it first, so that no
+// order of triangles matters.
+void Renderer::State::draw_translucent(const glm::mat4& clip) {
+  const auto draw_all = [this] {
+    uniform("nearer", 0.0F);
+    for (std::size_t i = 0; i < objects.size(); ++i) {
+      const ObjectLook look = view.look_of(i);
+      if (look.visible && look.opacity < 1.0F && look.opacity > 0.0F) draw_object(objects[i], look.opacity);
+    }
+    uniform("moved_scale", 0.0F);
+    uniform("coloured_vertices", 0);
+  };
+  glDepthMask(GL_TRUE);
+  glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
+  use(depth_program, clip);
+  draw_all();
+  use(mesh_program, clip);
+  glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+  draw_all();
+}
+
 void Renderer::State::cut_objects(const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera) {
   for (std::size_t i = 0; i < objects.size(); ++i) {
     Object& object = objects[i];
     if (object.face.count > 0) object.face.release();
-    const auto cut = object.soft ? choose_cut(scene, snapshot, camera, i) : std::nullopt;
+    const auto cut =
+        object.soft && view.look_of(i).visible ? choose_cut(scene, snapshot, camera, i) : std::nullopt;
     if (!cut) continue;
     const SectionMesh section = make_section(scene, snapshot, i, *cut, origin_m);
     if (section.mesh.indices.empty()) continue;
@@ -165,18 +202,10 @@ void Renderer::State::draw_arrow(const DrawnScene& scene, const Snapshot& snapsh
 
 Renderer::Renderer(const DrawnScene& scene, Samples samples) : state_(std::make_unique<State>()) {
   State& s = *state_;
-  if (epoxy_gl_version() < 33) {
-    throw std::runtime_error("drawing needs OpenGL 3.3, and this one is " +
-                             std::to_string(epoxy_gl_version() / 10) + "." +
-                             std::to_string(epoxy_gl_version() % 10) +
-                             "; set LIBGL_ALWAYS_SOFTWARE=1 to draw without the graphics card");
-  }
-  const auto* name = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
-  const bool software = name != nullptr && std::string_view(name).find("llvmpipe") != std::string_view::npos;
-  s.wanted_factor = software && samples == Samples::fast ? 1 : 2;
+  require_gl();
+  s.wanted_factor = draws_in_software() && samples == Samples::fast ? 1 : 2;
   s.mesh_program = link_program(shaders::mesh_vertex, shaders::mesh_fragment);
   s.depth_program = link_program(shaders::mesh_vertex, shaders::depth_fragment);
-  s.overlay_program = link_program(shaders::overlay_vertex, shaders::overlay_fragment);
   s.bounds = bounds_of(scene);
   s.origin_m = s.bounds.centre_m;
   s.objects.resize(scene.objects.size());
@@ -198,36 +227,37 @@ Renderer::Renderer(const DrawnScene& scene, Samples samples) : state_(std::make_
   s.cone.upload(make_unit_cone(), GL_STATIC_DRAW);
   s.disc.upload(make_unit_disc(), GL_STATIC_DRAW);
 
-  glGenVertexArrays(1, &s.overlay_array);
-  glGenBuffers(1, &s.overlay_vertices);
-  glGenBuffers(1, &s.overlay_indices);
-  glBindVertexArray(s.overlay_array);
-  glBindBuffer(GL_ARRAY_BUFFER, s.overlay_vertices);
-  glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, s.overlay_indices);
-  constexpr auto stride = static_cast<GLsizei>(sizeof(OverlayVertex));
-  glVertexAttribPointer(0, 2, GL_FLOAT, GL_FALSE, stride, buffer_offset(offsetof(OverlayVertex, x)));
-  glVertexAttribPointer(1, 2, GL_FLOAT, GL_FALSE, stride, buffer_offset(offsetof(OverlayVertex, u)));
-  glVertexAttribPointer(2, 4, GL_UNSIGNED_BYTE, GL_TRUE, stride,
-                        buffer_offset(offsetof(OverlayVertex, colour)));
-  for (GLuint i = 0; i < 3; ++i) glEnableVertexAttribArray(i);
+  s.overlay.create();
   glGenFramebuffers(1, &s.scene_frame);
   glGenFramebuffers(1, &s.shown_frame);
   glGenFramebuffers(1, &s.final_frame);
   check_gl("uploading the scene");
 }
 
-// Destroying the context (owned by picture or window) frees every OpenGL object.
+// Destroying the context (owned by picture or window) frees every OpenGL object that is left.
 Renderer::~Renderer() = default;
 
+void Renderer::release() {
+  State& s = *state_;
+  for (Object& object : s.objects) {
+    object.mesh.release();
+    object.face.release();
+  }
+  for (GlMesh* mesh : {&s.ball, &s.cylinder, &s.cone, &s.disc}) mesh->release();
+  s.overlay.release();
+  const std::array textures{s.scene_colour, s.scene_depth, s.shown_depth, s.final_colour};
+  glDeleteTextures(textures.size(), textures.data());
+  const std::array frames{s.scene_frame, s.shown_frame, s.final_frame};
+  glDeleteFramebuffers(frames.size(), frames.data());
+  for (const GLuint used : {s.mesh_program, s.depth_program}) glDeleteProgram(used);
+}
+
 void Renderer::set_font(const FontAtlas& atlas) {
-  glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
-  glGenTextures(1, &state_->font);
-  glBindTexture(GL_TEXTURE_2D, state_->font);
-  glTexImage2D(GL_TEXTURE_2D, 0, GL_R8, atlas.width, atlas.height, 0, GL_RED, GL_UNSIGNED_BYTE,
-               atlas.alpha.data());
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
-  check_gl("uploading the font");
+  state_->overlay.set_font(atlas);
+}
+
+void Renderer::set_view(const ViewSettings& view) {
+  state_->view = view;
 }
 
 void Renderer::begin(const DrawnScene& scene, const Snapshot& snapshot, int width, int height) {
@@ -251,24 +281,18 @@ void Renderer::begin(const DrawnScene& scene, const Snapshot& snapshot, int widt
     const auto& rest = scene.objects[i].surface.vertices;
     if (snapshot.soft_moved_m[i].size() != rest.size() || rest.size() != object.moving.vertices.size())
       continue;
-    const float moved = move_vertices(object.moving, rest, snapshot.soft_moved_m[i], s.origin_m);
+    const double moved = move_vertices(object.moving, rest, snapshot.soft_moved_m[i], s.origin_m);
     object.mesh.stream(object.moving);
     // Motion below a thousandth of the tool's radius does not start a scale: rounding must not show as a
     // pattern.
     const double least = 1e-3 * scene.tool_radius_m;
-    if (static_cast<double>(moved) > std::max(s.most_moved_m, least)) {
-      // A round number at or above the motion; it never falls.
-      const double power = std::pow(10.0, std::floor(std::log10(static_cast<double>(moved))));
-      for (const double step : {1.0, 2.0, 5.0, 10.0}) {
-        s.most_moved_m = step * power;
-        if (s.most_moved_m >= static_cast<double>(moved) * (1.0 - 1e-6)) break;
-      }
-    }
+    if (moved > std::max(s.most_moved_m, least)) s.most_moved_m = palette::scale_end(moved);
   }
   glBindFramebuffer(GL_FRAMEBUFFER, s.scene_frame);
   glDisable(GL_SCISSOR_TEST);
   glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
-  glClearColor(palette::background.r, palette::background.g, palette::background.b, 1.0F);
+  const glm::vec3& background = s.view.dark ? palette::dark_background : palette::background;
+  glClearColor(background.r, background.g, background.b, 1.0F);
   glClear(GL_COLOR_BUFFER_BIT);
 }
 
@@ -336,7 +360,7 @@ void Renderer::draw(const DrawnScene& scene, const Snapshot& snapshot, const Cam
   const auto draw_felt = [&](float alpha) {
     s.uniform("alpha", alpha);
     s.uniform("shine", 0.45F);
-    s.uniform("own_colour", palette::tool);
+    s.uniform("own_colour", s.view.dark ? palette::dark_tool : palette::tool);
     s.draw_tool(scene, snapshot.proxy_m);
     s.uniform("shine", 0.1F);
     s.uniform("own_colour", palette::force);
@@ -377,6 +401,7 @@ void Renderer::draw(const DrawnScene& scene, const Snapshot& snapshot, const Cam
   glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
   s.draw_objects(false, 2);
   s.uniform("nearer", 0.0F);
+  s.draw_translucent(clip);
   glDisable(GL_BLEND);
   glDisable(GL_SCISSOR_TEST);
 }
@@ -388,24 +413,7 @@ void Renderer::finish(const OverlayMesh& overlay) {
   glBlitFramebuffer(0, 0, s.width * s.factor, s.height * s.factor, 0, 0, s.width, s.height,
                     GL_COLOR_BUFFER_BIT, s.factor == 1 ? GL_NEAREST : GL_LINEAR);
   glBindFramebuffer(GL_FRAMEBUFFER, s.final_frame);
-  glViewport(0, 0, s.width, s.height);
-  glDisable(GL_DEPTH_TEST);
-  glEnable(GL_BLEND);
-  glUseProgram(s.overlay_program);
-  glUniform2f(glGetUniformLocation(s.overlay_program, "size"), static_cast<float>(s.width),
-              static_cast<float>(s.height));
-  glUniform1i(glGetUniformLocation(s.overlay_program, "font"), 0);
-  glBindTexture(GL_TEXTURE_2D, s.font);
-  glBindVertexArray(s.overlay_array);
-  glBindBuffer(GL_ARRAY_BUFFER, s.overlay_vertices);
-  glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(overlay.vertices.size() * sizeof(OverlayVertex)),
-               overlay.vertices.data(), GL_STREAM_DRAW);
-  glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, s.overlay_indices);
-  glBufferData(GL_ELEMENT_ARRAY_BUFFER,
-               static_cast<GLsizeiptr>(overlay.indices.size() * sizeof(std::uint32_t)),
-               overlay.indices.data(), GL_STREAM_DRAW);
-  glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(overlay.indices.size()), GL_UNSIGNED_INT, nullptr);
-  glDisable(GL_BLEND);
+  s.overlay.draw(overlay, s.width, s.height);
   check_gl("drawing the scene");
 }
 

@@ -13,23 +13,11 @@
 
 #include "hybrid/snapshot/snapshot.h"
 #include "hybrid/view/camera.h"
+#include "hybrid/view/gl_objects.h"
 #include "hybrid/view/layout.h"
+#include "hybrid/view/view_settings.h"
 
 namespace hybrid {
-
-// The overlay's triangles: pixels (y down), texture coordinates in the font atlas, colour 0xAABBGGRR.
-struct OverlayVertex {
-  float x = 0.0F, y = 0.0F, u = 0.0F, v = 0.0F;
-  std::uint32_t colour = 0;
-};
-struct OverlayMesh {
-  std::vector<OverlayVertex> vertices;
-  std::vector<std::uint32_t> indices;
-};
-struct FontAtlas {
-  int width = 0, height = 0;
-  std::span<const std::uint8_t> alpha;  // width × height
-};
 
 // Samples per pixel: always four (fine), or one if the context draws without a graphics card (fast).
 enum class Samples : std::uint8_t { fine, fast };
@@ -46,7 +34,11 @@ class Renderer {
   ~Renderer();
 
   void set_font(const FontAtlas& atlas);
+  // Frees what was made in the context, which goes on with another renderer. This one draws no more.
+  void release();
 
+  // How the following frames show the scene.
+  void set_view(const ViewSettings& view);
   // Starts a frame of this many pixels (1 to 8192 each; throws std::runtime_error otherwise) and uploads the
   // snapshot's moving vertices. `scene` must be the scene that the renderer was made from.
   void begin(const DrawnScene& scene, const Snapshot& snapshot, int width, int height);

@@ -14,6 +14,7 @@ uniform mat3 normal_from_mesh;
 uniform mat4 clip_from_scene;
 uniform vec3 eye;
 uniform vec4 kept;              // plane of a cut (scene): the positive side is drawn
+uniform vec4 clip_plane;        // the same of the view's clip plane
 uniform float nearer;           // length by which the surface is drawn towards the eye (scene)
 out vec3 scene_position;
 out vec3 scene_normal;
@@ -27,6 +28,7 @@ void main() {
   moved = displacement;
   material_colour = vertex_colour;
   gl_ClipDistance[0] = dot(kept, at);
+  gl_ClipDistance[1] = dot(clip_plane, at);
   gl_Position = clip_from_scene * vec4(at.xyz + nearer * normalize(eye - at.xyz), 1.0);
 }
 )";

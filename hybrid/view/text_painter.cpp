@@ -3,6 +3,7 @@
 
 #include <imgui.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace hybrid {
@@ -30,13 +31,13 @@ void Pen::text(float x, float y, Ink ink, const std::string& words, bool large) 
 }
 
 void Pen::label(float x, float y, Ink ink, const std::string& words) const {
-  fill({x - 0.35F * em, y - 0.2F * em}, {x + width(words) + 0.35F * em, y + 1.2F * em}, kPaper, 3.0F);
+  fill({x - 0.35F * em, y - 0.2F * em}, {x + width(words) + 0.35F * em, y + 1.2F * em}, inks.paper, 3.0F);
   text(x, y, ink, words);
 }
 
 void Pen::plate(float x, float y, float w, float h) const {
-  fill({x, y}, {x + w, y + h}, kPaper, 5.0F);
-  frame({x, y}, {x + w, y + h}, kEdge, 5.0F);
+  fill({x, y}, {x + w, y + h}, inks.paper, 5.0F);
+  frame({x, y}, {x + w, y + h}, inks.edge, 5.0F);
 }
 
 void Pen::fill(const glm::vec2& low, const glm::vec2& high, Ink ink, float round) const {
@@ -65,6 +66,26 @@ std::string Pen::fit(std::string words, float most) const {
     } while (!words.empty());
   }
   return words + "...";
+}
+
+std::vector<std::string> Pen::wrap(const std::string& words, float most) const {
+  std::vector<std::string> lines(1);
+  std::size_t at = 0;
+  while (at < words.size()) {
+    const std::size_t end = std::min(words.find_first_of(" \n", at), words.size());
+    const std::string word = words.substr(at, end - at);
+    std::string& line = lines.back();
+    if (line.empty()) {
+      line = fit(word, most);
+    } else if (width(line + " " + word) <= most) {
+      line += " " + word;
+    } else {
+      lines.push_back(fit(word, most));
+    }
+    if (end < words.size() && words[end] == '\n') lines.emplace_back();
+    at = end + 1;
+  }
+  return lines;
 }
 
 }  // namespace hybrid

@@ -7,6 +7,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <string>
+#include <vector>
 
 struct ImDrawList;
 struct ImFont;
@@ -20,16 +21,21 @@ constexpr Ink ink_of(std::uint32_t r, std::uint32_t g, std::uint32_t b, std::uin
 }
 Ink ink_of(const glm::vec3& colour, float alpha = 1.0F);  // sRGB, 0 to 1
 
-inline constexpr Ink kInk = ink_of(28, 33, 41);
-inline constexpr Ink kPaleInk = ink_of(92, 101, 114);
-inline constexpr Ink kPaper = ink_of(255, 255, 255, 222);
-inline constexpr Ink kEdge = ink_of(160, 168, 178);
+// Colours of text and plates, on a light and on a dark background.
+struct Inks {
+  Ink text, pale, paper, edge, force;
+};
+inline constexpr Inks kLightInks{ink_of(28, 33, 41), ink_of(92, 101, 114), ink_of(255, 255, 255, 222),
+                                 ink_of(160, 168, 178), ink_of(8, 97, 237)};
+inline constexpr Inks kDarkInks{ink_of(232, 236, 241), ink_of(164, 173, 186), ink_of(38, 42, 50, 228),
+                                ink_of(92, 100, 112), ink_of(110, 178, 255)};
 
 struct Pen {
   ImDrawList* list = nullptr;
   ImFont* body = nullptr;
   ImFont* head = nullptr;
   float em = 13.0F;  // height of body text (pixels)
+  Inks inks = kLightInks;
 
   [[nodiscard]] float width(const std::string& text, bool large = false) const;
   void text(float x, float y, Ink ink, const std::string& words, bool large = false) const;
@@ -43,6 +49,8 @@ struct Pen {
   void circle(const glm::vec2& centre, float radius, Ink ink, float thick) const;
   // Shortens text at the end to at most `most` pixels; cuts between UTF-8 characters.
   [[nodiscard]] std::string fit(std::string words, float most) const;
+  // Lines of at most `most` pixels, broken at spaces and at line ends; a longer word is shortened.
+  [[nodiscard]] std::vector<std::string> wrap(const std::string& words, float most) const;
 };
 
 }  // namespace hybrid

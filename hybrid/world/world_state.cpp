@@ -13,6 +13,7 @@ constexpr double kFirstMargin = 1.0 / 64.0;  // margin of the proxy's first surv
 WorldState::WorldState(const World& world, OccupancyMap occupancy) : map(std::move(occupancy)) {
   feel.resize(world.object_count());
   rigid_force_N.resize(world.rigid.size());
+  edited.feel.resize(world.rigid.size());
   scratch.near.resize(world.rigid.empty() ? 0 : kMaxNear);
   rigid.reserve(world.rigid.size());
   for (const RigidObject& object : world.rigid) {
@@ -32,6 +33,7 @@ WorldState::WorldState(const World& world, OccupancyMap occupancy) : map(std::mo
 
 void WorldState::prepare(const World& world) {
   reactions.resize(soft.size());
+  edited.tissue_factor.assign(soft.size(), 1.0);
   obstacle_queries.resize(soft.size());
   obstacles_at_rest.resize(soft.size());
   cursor.assign(soft.size(), 0);

@@ -17,6 +17,7 @@
 #include "hybrid/map/occupancy_map.h"
 #include "hybrid/world/async_relaxation.h"
 #include "hybrid/world/body_state.h"
+#include "hybrid/world/edited_values.h"
 #include "hybrid/world/object_feel.h"
 #include "hybrid/world/tick_scratch.h"
 #include "hybrid/world/world.h"
@@ -95,6 +96,7 @@ struct ObstacleAtRest {
 // State that goes from tick to tick as plain values: assignment copies the state.
 struct CarriedState {
   // ---- of the session ----
+  EditedValues edited;
   glm::dvec3 proxy_m{0.0};   // scene frame
   glm::dvec3 device_m{0.0};  // last good input
   device::ForceLimitState limit;
@@ -159,6 +161,19 @@ struct WorldState : CarriedState {
  private:
   void prepare_body_obstacles(const World& world);
 };
+
+// ---- values that may have been edited (edits.h) ----
+inline double coupling_N_per_m(const World& world, const CarriedState& state) noexcept {
+  return state.edited.coupling_N_per_m.value_or(world.tool.stiffness_N_per_m);
+}
+inline double max_force_N(const World& world, const CarriedState& state) noexcept {
+  return state.edited.max_force_N.value_or(world.limits.max_force_N);
+}
+inline const SurfaceFeel& feel_of(const World& world, const CarriedState& state,
+                                  std::uint32_t rigid) noexcept {
+  const std::optional<SurfaceFeel>& edited = state.edited.feel[rigid];
+  return edited ? *edited : world.rigid[rigid].feel;
+}
 
 // Appends to the body contacts of this tick; without room, sets a fault and returns false.
 inline bool add_contact(WorldState& state, const BodyContact& contact) noexcept {

@@ -33,12 +33,12 @@ std::size_t proxy_contacts(const World& world, const WorldState& state, std::uin
     if (!(pressed > 0.0)) continue;
     const glm::dvec3 normal = active.force_N / pressed;  // away from the body
     contacts[count++] = {state.proxy_m - world.contact_radius_m() * normal, -normal, pressed,
-                         world.tool.stiffness_N_per_m};
+                         coupling_N_per_m(world, state)};
   }
   const double rubbed = glm::length(state.friction_N);
   if (count > 0 && rubbed > 0.0 && state.rubbed == object) {
     const glm::dvec3 along = state.friction_N / rubbed;
-    contacts[count] = {contacts[0].point_m, -along, rubbed, world.tool.stiffness_N_per_m};
+    contacts[count] = {contacts[0].point_m, -along, rubbed, coupling_N_per_m(world, state)};
     ++count;
   }
   return count;

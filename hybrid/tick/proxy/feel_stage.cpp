@@ -20,6 +20,7 @@ constexpr double kShadingConverged = 1e-6;  // of the depth: a pass that moves t
 
 struct Contact {
   const RigidObject* object = nullptr;
+  const SurfaceFeel* feel = nullptr;
   std::uint32_t element = 0, number = 0, slot = 0;  // slot: of WorldState::active
   glm::dvec3 normal{0.0};                           // unit, scene frame, away from the surface
   glm::dvec3 felt{0.0};                             // the same, shaded
@@ -38,13 +39,13 @@ struct Contacts {
   }
   template <class Is>
   [[nodiscard]] bool any(Is&& is) const noexcept {
-    return std::any_of(begin(), end(), [&is](const Contact& c) { return is(c.object->feel); });
+    return std::any_of(begin(), end(), [&is](const Contact& c) { return is(*c.feel); });
   }
 };
 
 glm::dvec3 shaded(const World& world, const WorldState& state, const Contact& contact,
                   const glm::dvec3& proxy) noexcept {
-  if (!contact.object->feel.shading) return contact.normal;
+  if (!contact.feel->shading) return contact.normal;
   const BodyFrame& frame = state.rigid[contact.number].frame;
   const glm::dvec3 on_surface = frame.to_body(proxy - world.contact_radius_m() * contact.normal);
   const glm::dvec3 away = contact.normal * frame.rotation;
@@ -61,7 +62,13 @@ Contacts active_contacts(const World& world, const WorldState& state, const glm:
     const double force = glm::length(active.force_N);
     if (!(force > 0.0)) continue;
     Contact& c = contacts.list[contacts.count++];
-    c = {&world.rigid[active.object], active.element, active.object, n, active.force_N / force, {}, force};
+    c = {.object = &world.rigid[active.object],
+         .feel = &feel_of(world, state, active.object),
+         .element = active.element,
+         .number = active.object,
+         .slot = n,
+         .normal = active.force_N / force,
+         .force_N = force};
     c.felt = shaded(world, state, c, proxy);
   }
   return contacts;
@@ -70,7 +77,7 @@ Contacts active_contacts(const World& world, const WorldState& state, const glm:
 MixedFeel mixed_feel(const Contacts& contacts) noexcept {
   std::array<FeltSurface, 3> surfaces;
   for (std::size_t n = 0; n < contacts.count; ++n)
-    surfaces[n] = {&contacts.list[n].object->feel, contacts.list[n].force_N};
+    surfaces[n] = {contacts.list[n].feel, contacts.list[n].force_N};
   return mix_feel({surfaces.data(), contacts.count});
 }
 
@@ -79,7 +86,7 @@ MixedFeel mixed_feel(const Contacts& contacts) noexcept {
 std::uint32_t friction_object(const Contacts& contacts) noexcept {
   const Contact* hardest = nullptr;
   for (const Contact& c : contacts) {
-    const bool rubs = c.object->feel.has_friction() || c.object->feel.shading;
+    const bool rubs = c.feel->has_friction() || c.feel->shading;
     if (rubs && (hardest == nullptr || c.force_N > hardest->force_N)) hardest = &c;
   }
   return hardest != nullptr ? hardest->number : contacts.list[0].number;
@@ -232,7 +239,7 @@ Sweep sweep_with_feel(const World& world, WorldState& state, const glm::dvec3& t
 glm::dvec3 added_force(const World& world, WorldState& state, const glm::dvec3& device_m,
                        double dt_s) noexcept {
   const Contacts contacts = active_contacts(world, state, state.proxy_m);
-  const double k = world.tool.stiffness_N_per_m;
+  const double k = coupling_N_per_m(world, state);
   const double damping = mixed_feel(contacts).damping_N_s_per_m;
   glm::dvec3 added(0.0), normal(0.0);
   double shares = 0.0;
@@ -251,14 +258,15 @@ glm::dvec3 added_force(const World& world, WorldState& state, const glm::dvec3& 
     end_damping(state.damping);
   }
   for (const Contact& c : contacts) {
-    if (c.object->feel.texture == nullptr) continue;
+    if (c.feel->texture == nullptr) continue;
     const BodyFrame& frame = state.rigid[c.number].frame;
     // Evaluated at the point of the surface under the device. A proxy held by friction or by another surface
     // is elsewhere: its relief would push the hand over a way that the hand does not move, and add energy.
     const double depth = glm::dot(state.proxy_m - device_m, c.normal);
     const glm::dvec3 over = device_m + (depth - world.contact_radius_m()) * c.normal;
     const TexturedContact contact{frame.to_body(over), c.normal * frame.rotation, c.force_N / k, k};
-    const glm::dvec3 relief = frame.rotation * texture_force(*c.object->feel.texture, contact);
+    const glm::dvec3 relief =
+        frame.rotation * texture_force(*c.feel->texture, contact, c.feel->texture_share);
     state.rigid_force_N[c.number] += relief;
     added += relief;
   }

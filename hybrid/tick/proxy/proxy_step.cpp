@@ -120,7 +120,7 @@ RigidStep step_rigid(const World& world, WorldState& state, const glm::dvec3& de
     state.active_count = 0;
   } else {
     const Sweep sweep =
-        sweep_proxy(world, state, state.proxy_m, device_m, glm::dmat3(world.tool.stiffness_N_per_m),
+        sweep_proxy(world, state, state.proxy_m, device_m, glm::dmat3(coupling_N_per_m(world, state)),
                     std::numeric_limits<double>::max());
     state.proxy_m = sweep.point;
     step.arrived = sweep.arrived;
@@ -128,7 +128,7 @@ RigidStep step_rigid(const World& world, WorldState& state, const glm::dvec3& de
     step.surveys = sweep.surveys;
   }
   step.proxy_m = state.proxy_m;
-  step.force_N = world.tool.stiffness_N_per_m * (state.proxy_m - device_m);
+  step.force_N = coupling_N_per_m(world, state) * (state.proxy_m - device_m);
   return step;
 }
 

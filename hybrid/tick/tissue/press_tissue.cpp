@@ -107,8 +107,10 @@ void press_tissue(const World& world, WorldState& state, const glm::dvec3& point
     object.relax_near(tool, sweeps);
     const voxel::Reaction in_body = object.reaction(tool);
     const glm::dmat3 to_scene = glm::mat3_cast(body.pose.rotation);
-    state.reactions[o].force_N = to_scene * in_body.force_N;
-    state.reactions[o].stiffness_N_per_m = to_scene * in_body.stiffness_N_per_m * glm::transpose(to_scene);
+    const double factor = state.edited.tissue_factor[o];
+    state.reactions[o].force_N = factor * (to_scene * in_body.force_N);
+    state.reactions[o].stiffness_N_per_m =
+        factor * (to_scene * in_body.stiffness_N_per_m * glm::transpose(to_scene));
     state.reactions[o].pressed = in_body.pressed;
   }
 }

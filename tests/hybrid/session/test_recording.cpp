@@ -123,6 +123,71 @@ TEST_F(RecordingFile, WithTheRelaxationThreadItIsTheSameToTheBit) {
   }
 }
 
+// ---- edits ----
+
+std::vector<hybrid::Edit> some_edits(const hybrid::World& world) {
+  using enum hybrid::EditedQuantity;
+  std::vector<hybrid::Edit> edits;
+  const auto at = [&](std::uint64_t tick, std::uint32_t object, hybrid::EditedQuantity quantity,
+                      double value) {
+    edits.push_back({tick, object, quantity, value});
+  };
+  at(0, hybrid::Edit::kTool, coupling_stiffness, 700.0);
+  at(150, 0, static_friction, 0.6);
+  at(150, 0, damping, 1.5);
+  at(200, hybrid::Edit::kTool, max_force, 0.5 * world.limits.max_force_N);
+  if (!world.soft.empty()) at(260, static_cast<std::uint32_t>(world.rigid.size()), tissue_factor, 2.5);
+  at(300, hybrid::Edit::kTool, coupling_stiffness, 450.0);
+  at(420, 0, dynamic_friction, 0.1);
+  at(500, hybrid::Edit::kTool, coupling_stiffness, -1.0);  // refused
+  return edits;
+}
+
+Recording record_edited(const std::filesystem::path& file, bool asynchronous) {
+  const hybrid::Scene scene = hybrid::load_scene(file);
+  hybrid::BuiltScene built = hybrid::build_scene(scene);
+  hybrid::SessionOptions options;
+  options.seconds = 0.8;
+  options.keep_rows = false;
+  options.async_relaxation = asynchronous;
+  options.edits = some_edits(*built.world);
+  const hybrid::SessionResult result = hybrid::run_session(scene, built, options);
+  EXPECT_EQ(result.edits.size(), options.edits.size() - 1) << "one is refused";
+  Recording recording = recording_of(file, scene, result, asynchronous);
+  recording.edits = result.edits;
+  return recording;
+}
+
+TEST_F(RecordingFile, AnEditedSessionReplaysToTheBitWithBothKindsOfRelaxation) {
+  for (const bool asynchronous : {false, true}) {
+    const Recording recorded = record_edited(small_scene(), asynchronous);
+    hybrid::save_recording(folder_ / "a.rec", recorded);
+    Recording loaded = hybrid::load_recording(folder_ / "a.rec");
+    EXPECT_EQ(loaded.edits, recorded.edits);
+    const hybrid::ReplayResult result = hybrid::replay(loaded, {});
+    EXPECT_TRUE(result.equal) << "parts at tick " << result.first_difference;
+    EXPECT_EQ(result.state_hash, recorded.state_hash);
+    loaded.edits[1].value += 0.1;
+    loaded.edits.pop_back();
+    EXPECT_FALSE(hybrid::replay(loaded, {}).equal) << "edits are inputs";
+  }
+}
+
+TEST_F(RecordingFile, WithoutEditsItIsAFileOfTheVersionBefore) {
+  Recording recorded = record(small_scene(), 0.3);
+  hybrid::save_recording(folder_ / "a.rec", recorded);
+  EXPECT_EQ(read(folder_ / "a.rec").substr(0, 8), "hybridR4");
+  recorded.edits.push_back({});
+  hybrid::save_recording(folder_ / "b.rec", recorded);
+  const std::string bytes = read(folder_ / "b.rec");
+  EXPECT_EQ(bytes.substr(0, 8), "hybridR5");
+  EXPECT_EQ(refusal_of(bytes), "");
+  EXPECT_NE(refusal_of(bytes.substr(0, bytes.size() - 1)), "") << "a part of an edit";
+  std::string wrong = bytes;
+  wrong[wrong.size() - 12] = 99;  // the quantity
+  EXPECT_NE(refusal_of(wrong).find("damaged edits"), std::string::npos);
+}
+
 // A device that moves between the start of a session and its first tick, as happens if the first tick is
 // late.
 class MovesOn final : public device::HapticDevice {

@@ -22,10 +22,14 @@
 #include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "hybrid/base/flush_to_zero.h"
+#include "hybrid/session/player.h"
 #include "hybrid/session/session.h"
+#include "hybrid/snapshot/make_drawn_scene.h"
 #include "hybrid/tick/tissue/async_relaxation.h"
+#include "hybrid/world/edits.h"
 #include "tests/hybrid/fixtures/scene_file_fixture.h"
 #include "tests/shared_data.h"
 
@@ -165,6 +169,7 @@ long syscall(long number, ...) noexcept {
 namespace {
 
 constexpr int kTicks = 10'000;
+std::vector<hybrid::EditableValue> values;
 
 TEST(ServoPath, TheCountersCount) {
   std::mutex mutex;
@@ -193,7 +198,17 @@ TEST(ServoPath, TheCountersCount) {
   EXPECT_EQ(calls.files, 1U);
 }
 
-void watch_ticks(const hybrid::Scene& scene, const hybrid::BuiltScene& built, bool asynchronous) {
+// Every value of the scene in turns, between its own value and a little more or less.
+void edit_in_turns(const hybrid::BuiltScene& built, std::uint64_t tick) {
+  if (tick % 10 != 0 || values.empty()) return;
+  const hybrid::EditableValue& value = values[tick / 10 % values.size()];
+  const double changed = std::min(value.in_scene * (tick % 20 == 0 ? 0.9 : 1.1), value.range.high);
+  hybrid::apply_edit(*built.world, *built.state, {tick, value.object, value.quantity, changed});
+}
+
+void watch_ticks(const hybrid::Scene& scene, const hybrid::BuiltScene& built, bool asynchronous,
+                 bool edited = false) {
+  values = hybrid::editable_values(*built.world, *built.state);
   const auto device = hybrid::scene_device(scene, hybrid::scene_path(scene));
   hybrid::set_flush_to_zero();
   hybrid::begin_session(scene, *built.world, *built.state, device->read().position_m);
@@ -204,6 +219,7 @@ void watch_ticks(const hybrid::Scene& scene, const hybrid::BuiltScene& built, bo
   calls = {};
   watched = true;
   for (int tick = 0; tick < kTicks; ++tick) {
+    if (edited) edit_in_turns(built, static_cast<std::uint64_t>(tick));
     const hybrid::TickResult felt = hybrid::haptic_tick(*built.world, *built.state, device->read(), dt);
     device->write(felt.force_N, dt);
     felt_ticks += felt.contacts != 0 ? 1 : 0;
@@ -261,6 +277,42 @@ TEST_F(ServoPathIn, AllTicksOfAContactOnACompositeGrid) {
   const hybrid::BuiltScene built = hybrid::build_scene(grid);
   ASSERT_TRUE(built.state->soft[0]->uses_patches());
   watch_ticks(grid, built, true);
+}
+
+TEST_F(ServoPathIn, AllTicksBetweenEdits) {
+  const hybrid::Scene felt =
+      load("format = 1\n" + tests::block +
+           "[[rigid]]\nname = \"plate\"\nprimitive = \"box\"\nsize = [20, 20, 10]\nposition = [30, 0, 0]\n"
+           "friction = 0.4\ndamping = 1\ntexture = { pattern = \"bumps\", size = 3, height = 0.3 }\n"
+           "[path]\nkind = \"waypoints\"\nspeed = 60\npoints = [[0, 0, 20], [0, 0, 5, 1], [30, 0, 20], [28, "
+           "0, 4], "
+           "[34, 2, 4, 2]]\n");
+  for (const bool asynchronous : {false, true})
+    watch_ticks(felt, hybrid::build_scene(felt), asynchronous, true);
+}
+
+// The session of a window takes edits and requests, records, and hands every tick over.
+TEST_F(ServoPathIn, AllTicksOfAPlayer) {
+  const hybrid::Scene pressed =
+      load("format = 1\n" + tests::block + tests::ball + "position = [12, 0, 8]\n" + tests::path);
+  hybrid::BuiltScene built = hybrid::build_scene(pressed);
+  const hybrid::DrawnScene drawn = hybrid::drawn_scene(pressed, built, "");
+  hybrid::Player player(pressed, built, drawn, nullptr);
+  player.relax_at_once();
+  calls = {};
+  watched = true;
+  for (std::uint32_t n = 0; n < 3000; ++n) {
+    if (n % 7 == 0)
+      player.edit({0, hybrid::Edit::kTool, hybrid::EditedQuantity::coupling_stiffness, 500.0 + 0.1 * n});
+    player.step({.dragging = n > 1500,
+                 .paused = n % 50 == 49,
+                 .speed = n < 1000 ? 0.5 : 1.0,
+                 .restarts = n / 1000,
+                 .goal_m = {2e-3, 0.0, 4e-3}});
+  }
+  watched = false;
+  EXPECT_EQ(calls, Calls{});
+  EXPECT_GT(player.samples().refused() + player.ticks(), 2000U);
 }
 
 TEST_F(ServoPathIn, AllTicksOfAPartWithoutSlack) {

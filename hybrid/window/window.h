@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The viewer's window. It reads snapshots only. It reports what the mouse asks of the tool, and does not act
-// on it. The only part of the project that knows GLFW. All calls must come from one thread, the program's
-// first.
-//   left drag: orbit    middle drag: pan    wheel: zoom    right drag, or shift + left: the tool
-//   space: pause        R: restart          F: frame       Esc: quit
+// The viewer's window. It reads snapshots only. It reports what mouse, keyboard, panel and scripts ask of the
+// session, and does not act on it. The only part of the project that knows GLFW. All calls must come from one
+// thread, the program's first. The keys are in README.md and in window_keys.h.
 #pragma once
 
 #include <filesystem>
@@ -13,20 +11,28 @@
 
 #include "hybrid/snapshot/snapshot.h"
 #include "hybrid/view/camera.h"
+#include "hybrid/window/panels.h"
+#include "hybrid/window/view_state.h"
 
 namespace hybrid {
 
 struct WindowOptions {
   int width = 1280, height = 960;  // (screen units; pixels on most displays)
   bool visible = true;             // false: a hidden window whose frames can be saved
-  double history_s = 5.0;          // length of the force chart
+  bool panels = true;
+  double history_s = 5.0;  // length of the charts
 };
 
 // User input that concerns the session rather than the view.
 struct WindowInput {
   std::optional<glm::dvec3> dragged_goal_m;  // goal of the tool's drag (scene frame); empty: no drag
   bool paused = false;
-  bool restart = false;  // once per press of R
+  double speed = 1.0;
+  std::uint32_t restarts = 0, single_ticks = 0;  // since the window opened
+  // ---- since the last call ----
+  std::vector<Edit> edits;
+  std::optional<std::filesystem::path> recording;  // to be saved; empty path: a name that is free
+  bool save_scene = false, reload = false;
 };
 
 class Window {
@@ -40,11 +46,18 @@ class Window {
   Window& operator=(Window&&) = delete;
   ~Window();
 
+  // Shows another scene from now on; view and selection stay. Keeps a reference to it.
+  void show_scene(const DrawnScene& scene);
+
   // Shows a snapshot and handles the input since the last call. Waits for the display's refresh. Returns
   // false when the user closed the window. Throws std::runtime_error when the driver fails.
-  bool frame(const Snapshot& snapshot);
+  bool frame(const Snapshot& snapshot, const SessionNotes& notes = {});
 
-  // Returns the input since the last call; a restart is returned once.
+  // Every tick since the last frame, for the charts.
+  void add_ticks(TickSamples& samples);
+  // Does what a script asks for, in the next frame.
+  void act(const ViewAction& action);
+  // Returns the input since the last call.
   [[nodiscard]] WindowInput take_input();
 
   // The view; may be changed between frames.
@@ -52,6 +65,8 @@ class Window {
 
   // Writes the last frame as PNG. Throws std::runtime_error: no frame yet, file not writable.
   void save_frame(const std::filesystem::path& png);
+  // The picture that the user asked for since the last call; empty path: a name that is free.
+  [[nodiscard]] std::optional<std::filesystem::path> take_screenshot();
 
  private:
   struct State;

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/program/view_files.h"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <stdexcept>
+
+#include "hybrid/base/file_ending.h"
+#include "hybrid/base/whole_file.h"
+#include "hybrid/program/outputs.h"
+#include "hybrid/session/scene_text.h"
+
+namespace hybrid {
+namespace {
+
+constexpr std::chrono::seconds kShown{6};  // how long a message stays
+constexpr int kMostNames = 10'000;
+
+}  // namespace
+
+ViewFiles::ViewFiles(const ViewCommand& command) : command_(command) {
+  require_ending_of_none("--record", command.record);
+  Outputs().ask("--record", command.record, {});
+}
+
+void ViewFiles::say(std::string words) {
+  message_ = std::move(words);
+  said_ = std::chrono::steady_clock::now();
+}
+
+std::string ViewFiles::message() const {
+  return std::chrono::steady_clock::now() - said_ < kShown ? message_ : std::string();
+}
+
+// Beside the frames, else in the current folder.
+std::filesystem::path ViewFiles::free_name(const char* ending) const {
+  for (int n = 1; n < kMostNames; ++n) {
+    std::filesystem::path file =
+        command_.out / fmt::format("{}-{}{}", command_.scene.stem().string(), n, ending);
+    if (!std::filesystem::exists(file)) return file;
+  }
+  throw std::runtime_error(fmt::format("there are {} files like {}; move some away", kMostNames,
+                                       command_.scene.stem().string() + "-1" + ending));
+}
+
+template <class Save>
+void ViewFiles::attempt(const std::string& what, std::filesystem::path file, const char* ending,
+                        const Save& save) {
+  try {
+    if (file.empty()) file = free_name(ending);
+    save(file);
+    say(what + " written: " + file.string());
+  } catch (const std::exception& e) {
+    say(what + " not written: " + e.what());
+  }
+}
+
+void ViewFiles::save_what_was_asked(Window& window, const WindowInput& input, const ViewedScene& viewed,
+                                    const Snapshot& snapshot, const std::function<bool()>& hold) {
+  if (const auto picture = window.take_screenshot())
+    attempt("Picture", *picture, ".png", [&](const auto& file) { window.save_frame(file); });
+  if (input.recording) {
+    attempt("Recording", *input.recording, ".rec", [&](const auto& file) {
+      if (!hold()) throw std::runtime_error("the session does not answer; try again");
+      save_recording(file, viewed.player->recording(viewed.text));
+    });
+  }
+  if (input.save_scene) save_scene(viewed, snapshot);
+}
+
+// The window loads the scene again when its file has changed, so that recordings begin with the new text.
+void ViewFiles::save_scene(const ViewedScene& viewed, const Snapshot& snapshot) try {
+  std::vector<ValueInScene> values;
+  for (std::size_t n = 0; n < viewed.drawn.editable.size() && n < snapshot.values.size(); ++n) {
+    const EditableValue& value = viewed.drawn.editable[n];
+    const std::string object =
+        value.object == Edit::kTool ? std::string() : viewed.drawn.objects[value.object].name;
+    values.push_back({object, value.quantity, snapshot.values[n], value.in_scene});
+  }
+  const EditedText edited = write_values(viewed.text, command_.scene, viewed.scene.unit_m, values);
+  std::string words = edited.changed.empty()
+                          ? "Nothing of the scene's file has been edited."
+                          : fmt::format("{} written; the session begins anew. Changed: {}.",
+                                        command_.scene.string(), fmt::join(edited.changed, ", "));
+  if (!edited.left.empty()) words += fmt::format(" Not in the file: {}.", fmt::join(edited.left, ", "));
+  if (!edited.changed.empty()) {
+    if (text_of(command_.scene) != viewed.text)
+      throw std::runtime_error("its file has changed since it was loaded; wait until it is loaded again");
+    save_text(command_.scene, edited.text);
+  }
+  say(words);
+} catch (const std::exception& e) {
+  say(std::string("Scene not written: ") + e.what());
+}
+
+bool ViewFiles::save_at_end(const ViewedScene& viewed) const {
+  if (command_.record.empty()) return true;
+  Outputs outputs;
+  outputs.write("recording", command_.record,
+                [&](const auto& file) { save_recording(file, viewed.player->recording(viewed.text)); });
+  outputs.say_files();
+  return !outputs.failed();
+}
+
+}  // namespace hybrid

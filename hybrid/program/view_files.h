@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The files that the user of a window asks for: pictures, recordings, and edited values in the scene's file.
+// What cannot be written is said in the window, and the session goes on.
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <string>
+
+#include "hybrid/program/commands.h"
+#include "hybrid/program/viewed_scene.h"
+#include "hybrid/window/window.h"
+
+namespace hybrid {
+
+class ViewFiles {
+ public:
+  // Throws std::runtime_error if --record cannot be written.
+  explicit ViewFiles(const ViewCommand& command);
+
+  // `hold`: stops the session, so that its state can be read; false if it does not answer.
+  void save_what_was_asked(Window& window, const WindowInput& input, const ViewedScene& viewed,
+                           const Snapshot& snapshot, const std::function<bool()>& hold);
+  // The recording of --record. False if it was asked for and not written; the reason is on standard error.
+  [[nodiscard]] bool save_at_end(const ViewedScene& viewed) const;
+
+  void say(std::string words);
+  // The last thing that was done, for a few seconds; empty: nothing.
+  [[nodiscard]] std::string message() const;
+
+ private:
+  template <class Save>
+  void attempt(const std::string& what, std::filesystem::path file, const char* ending, const Save& save);
+  [[nodiscard]] std::filesystem::path free_name(const char* ending) const;
+  void save_scene(const ViewedScene& viewed, const Snapshot& snapshot);
+
+  const ViewCommand& command_;
+  std::string message_;
+  std::chrono::steady_clock::time_point said_{};
+};
+
+}  // namespace hybrid

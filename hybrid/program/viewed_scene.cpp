@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/program/viewed_scene.h"
+
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+#include <system_error>
+
+#include "hybrid/session/real_device.h"
+#include "hybrid/snapshot/make_drawn_scene.h"
+
+namespace hybrid {
+namespace {
+
+constexpr std::chrono::milliseconds kLookEvery{300};  // at the scene's file
+
+// Places of the hand from the path's beginning to its end.
+std::vector<glm::dvec3> places_along(const device::Path& path) {
+  constexpr int steps = 500;
+  std::vector<glm::dvec3> places;
+  for (int n = 0; n <= steps; ++n) places.push_back(path.position(path.duration_s() * n / steps));
+  return places;
+}
+
+std::unique_ptr<ViewedScene> load_anew(const ViewCommand& command) {
+  auto viewed = read_viewed_scene(command);
+  if (viewed->scene.real_device)
+    throw std::runtime_error("a scene of a real device is loaded by closing and opening the window");
+  build_viewed_scene(command, *viewed, {});
+  viewed->player = std::make_unique<Player>(viewed->scene, viewed->built, viewed->drawn, nullptr);
+  return viewed;
+}
+
+}  // namespace
+
+std::string text_of(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  if (!in || !text) throw std::runtime_error(file.string() + ": cannot be read; check its name and rights");
+  return text.str();
+}
+
+std::unique_ptr<ViewedScene> read_viewed_scene(const ViewCommand& command) {
+  auto viewed = std::make_unique<ViewedScene>();
+  viewed->scene = load_scene(command.scene);  // first: its refusals say more
+  viewed->text = text_of(command.scene);
+  if (!command.device.empty()) use_device(viewed->scene, command.device);
+  return viewed;
+}
+
+void build_viewed_scene(const ViewCommand& command, ViewedScene& viewed, const Progress& progress) {
+  const Scene& scene = viewed.scene;
+  viewed.built = build_scene(scene, progress);
+  note_relaxation(scene, viewed.built, true);
+  viewed.drawn =
+      drawn_scene(scene, viewed.built, scene.title.empty() ? command.scene.stem().string() : scene.title);
+  if (!scene.real_device) viewed.drawn.path_m = places_along(*scene_path(scene));
+}
+
+// The time of the last change is looked at first, because it costs least. An editor that is still writing
+// changes it again.
+bool SceneReload::file_changed() {
+  const auto now = std::chrono::steady_clock::now();
+  if (now - looked_ < kLookEvery) return false;
+  looked_ = now;
+  std::error_code missing;
+  const auto written = std::filesystem::last_write_time(command_.scene, missing);
+  if (missing || written == written_) return false;
+  written_ = written;
+  try {
+    if (text_of(command_.scene) != tried_text_) return true;
+    error_.clear();  // the refused change was taken back
+  } catch (const std::runtime_error&) {
+    // The file is away for a moment while an editor replaces it.
+  }
+  return false;
+}
+
+void SceneReload::start() {
+  asked_ = false;
+  next_ = std::async(std::launch::async, [this] { return load_anew(command_); });
+}
+
+std::unique_ptr<ViewedScene> SceneReload::poll() {
+  if (!next_.valid()) {
+    if (file_changed() || asked_) start();
+    return nullptr;
+  }
+  if (next_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return nullptr;
+  try {
+    auto viewed = next_.get();
+    error_.clear();
+    tried_text_ = viewed->text;
+    return viewed;
+  } catch (const std::exception& e) {
+    error_ = e.what();
+    return nullptr;
+  }
+}
+
+}  // namespace hybrid

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A scene with all that shows and plays it in a window, and its loading anew while another one is played.
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <future>
+#include <memory>
+#include <string>
+
+#include "hybrid/program/commands.h"
+#include "hybrid/session/player.h"
+
+namespace hybrid {
+
+struct ViewedScene {
+  std::string text;  // of the file, as it was loaded
+  Scene scene;
+  BuiltScene built;
+  DrawnScene drawn;
+  std::unique_ptr<Player> player;  // null until the session begins
+};
+
+// Content of a text file. Throws std::runtime_error: not readable.
+[[nodiscard]] std::string text_of(const std::filesystem::path& file);
+
+// Reads the file. Throws SceneError, std::runtime_error.
+[[nodiscard]] std::unique_ptr<ViewedScene> read_viewed_scene(const ViewCommand& command);
+// Builds what was read. Throws SceneError.
+void build_viewed_scene(const ViewCommand& command, ViewedScene& viewed, const Progress& progress);
+
+// Loads the scene again when its file has changed, on a thread of its own: the old session goes on meanwhile,
+// and after an error.
+class SceneReload {
+ public:
+  SceneReload(const ViewCommand& command, std::string loaded_text)
+      : command_(command), tried_text_(std::move(loaded_text)) {}
+
+  // Loads even if the file is the same.
+  void ask() { asked_ = true; }
+  // To be called once a frame. Non-null once a scene is ready to be played, on a simulated device.
+  [[nodiscard]] std::unique_ptr<ViewedScene> poll();
+  [[nodiscard]] bool loading() const { return next_.valid(); }
+  // Why the file as it is now is refused, with its line; empty: it is not.
+  [[nodiscard]] const std::string& error() const { return error_; }
+
+ private:
+  [[nodiscard]] bool file_changed();
+  void start();
+
+  const ViewCommand& command_;
+  std::string tried_text_, error_;  // the text that was loaded last, and why a later one is refused
+  bool asked_ = false;
+  std::chrono::steady_clock::time_point looked_{};
+  std::filesystem::file_time_type written_{};
+  std::future<std::unique_ptr<ViewedScene>> next_;
+};
+
+}  // namespace hybrid

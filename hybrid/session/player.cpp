@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/session/player.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <stdexcept>
+
+#include "hybrid/base/flush_to_zero.h"
+#include "hybrid/snapshot/fill_snapshot.h"
+#include "hybrid/tick/tissue/async_relaxation.h"
+
+namespace hybrid {
+namespace {
+
+constexpr double kHandSpeed_m_per_s = 0.5;  // a brisk hand; the mouse is faster
+
+TickSample sample_of(const TickResult& felt, double t_s, double late_s, double dt_s) noexcept {
+  return {.t_s = t_s,
+          .total_N = static_cast<float>(glm::length(felt.force_N)),
+          .rigid_N = static_cast<float>(glm::length(felt.rigid_N)),
+          .soft_N = static_cast<float>(glm::length(felt.soft_N)),
+          .tick_us = static_cast<float>(felt.tick_us),
+          .stage_us = felt.stage_us,
+          .late = late_s >= dt_s};
+}
+
+}  // namespace
+
+glm::dvec3 SteeredPath::position(double t_s) const noexcept {
+  return dragged_ ? goal_m_ : path_->position(std::fmod(t_s - start_s_, path_->duration_s() + 1.0));
+}
+
+void SteeredPath::drag_to(const glm::dvec3& goal_m) noexcept {
+  dragged_ = true;
+  goal_m_ = goal_m;
+}
+
+void SteeredPath::restart(double now_s) noexcept {
+  dragged_ = false;
+  start_s_ = now_s;
+}
+
+Player::Player(const Scene& scene, BuiltScene& built, const DrawnScene& drawn,
+               device::HapticDevice* real_device)
+    : scene_(scene),
+      built_(built),
+      drawn_(drawn),
+      path_(std::make_shared<SteeredPath>(scene_path(scene))),
+      simulated_(real_device == nullptr ? scene_device(scene, path_) : nullptr),
+      device_(real_device == nullptr ? *simulated_ : *real_device),
+      rate_hz_(scene.rate_hz),
+      dt_s_(1.0 / scene.rate_hz) {
+  set_flush_to_zero();
+  recorded_.reserve(static_cast<std::size_t>(kMostRecorded_s * rate_hz_));
+  applied_.reserve(kMostEdits);
+  start_m_ = goal_m_ = device_.read().position_m;
+  felt_.device_m = felt_.proxy_m = start_m_;
+  begin_session(scene, *built.world, *built.state, start_m_);
+}
+
+std::unique_ptr<RelaxationThread> Player::go_live(double surfaces_hz) {
+  live_ = async_ = true;
+  start_async_relaxation(*built_.state, Arrival::thread);
+  return std::make_unique<RelaxationThread>(*built_.world, built_.state->async, surfaces_hz);
+}
+
+void Player::relax_at_once() {
+  async_ = true;
+  start_async_relaxation(*built_.state, Arrival::counted);
+}
+
+void Player::take_edits() noexcept {
+  Edit edit;
+  while (applied_.size() < kMostEdits && edits_.pop(edit)) {
+    edit.tick = ticks_;
+    if (apply_edit(*built_.world, *built_.state, edit)) applied_.push_back(edit);
+    edited_ = true;
+  }
+}
+
+bool Player::tick_is_due(const PlayRequest& request) noexcept {
+  if (request.paused) {
+    if (request.single_ticks == single_ticks_) return false;
+    ++single_ticks_;
+    return true;
+  }
+  single_ticks_ = request.single_ticks;
+  if (simulated_ == nullptr || !(request.speed < 1.0)) return true;
+  due_ += std::max(request.speed, 0.0);
+  if (due_ < 1.0) return false;
+  due_ -= 1.0;
+  return true;
+}
+
+// After a drag the tool stays at its last goal until a restart.
+void Player::steer(const PlayRequest& request) noexcept {
+  if (request.restarts != restarts_) {
+    restarts_ = request.restarts;
+    path_->restart(t_s());
+  }
+  if (!request.dragging) return;
+  const glm::dvec3 delta = request.goal_m - goal_m_;
+  const double length = glm::length(delta), most = kHandSpeed_m_per_s * dt_s_;
+  goal_m_ = length > most ? goal_m_ + delta * (most / length) : request.goal_m;
+  path_->drag_to(goal_m_);
+}
+
+void Player::keep(device::DeviceFault fault) noexcept {
+  hash_ = hash_tick(hash_, felt_);
+  if (recorded_.size() == recorded_.capacity()) {
+    whole_ = false;
+    return;
+  }
+  recorded_.push_back({felt_.device_m, hash_, fault, built_.state->async.arrived, 0});
+}
+
+bool Player::advance(const PlayRequest& request, const device::ServoInput& input) noexcept {
+  held_.store(request.hold, std::memory_order_release);
+  if (request.hold) return false;
+  take_edits();
+  if (!tick_is_due(request)) return false;
+  steer(request);
+  felt_ = haptic_tick(*built_.world, *built_.state, input.device, dt_s_);
+  if (!request.dragging) goal_m_ = felt_.device_m;
+  keep(input.device.fault);
+  samples_.push(sample_of(felt_, t_s(), input.late_s, dt_s_));
+  ++ticks_;
+  return true;
+}
+
+void Player::step(const PlayRequest& request) {
+  if (advance(request, {.device = device_.read(), .dt_s = dt_s_})) device_.write(felt_.force_N, dt_s_);
+}
+
+void Player::snapshot(Snapshot& out) const {
+  out.tick = built_.state->tick;
+  out.t_s = t_s();
+  out.device_m = felt_.device_m;
+  out.proxy_m = felt_.proxy_m;
+  out.force_N = felt_.force_N;
+  out.feel = built_.state->feel;
+  out.tick_us = felt_.tick_us;
+  fill_values(*built_.world, *built_.state, drawn_, out);
+  if (live_) {
+    fill_moved_near(*built_.world, *built_.state, out);
+  } else {
+    fill_moved(*built_.world, *built_.state, out);
+  }
+}
+
+Recording Player::recording(const std::string& scene_text) const {
+  if (!whole_) {
+    throw std::runtime_error(
+        fmt::format("the session is longer than the {:.0f} min that a window records; "
+                    "restart the window and record a shorter one",
+                    kMostRecorded_s / 60.0));
+  }
+  return {.scene_file = std::filesystem::absolute(scene_.file),
+          .scene_text = scene_text,
+          .dt_s = dt_s_,
+          .device = scene_limits(scene_),
+          .async_relaxation = async_,
+          .state_hash = hash_state(hash_, *built_.state),
+          .start_m = start_m_,
+          .ticks = recorded_,
+          .edits = applied_};
+}
+
+}  // namespace hybrid

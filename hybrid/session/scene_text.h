@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Edited values written into the text of a scene: only the values change, and comments and layout stay.
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "hybrid/world/edits.h"
+
+namespace hybrid {
+
+struct ValueInScene {
+  std::string object;  // name of a rigid object; empty: of the tool
+  EditedQuantity quantity = EditedQuantity::coupling_stiffness;
+  double value = 0.0, in_scene = 0.0;  // SI: now, and as the scene has it
+};
+
+struct EditedText {
+  std::string text;
+  std::vector<std::string> changed;  // "tool: stiffness", …
+  std::vector<std::string> left;     // the same, with the reason why they are not in the text
+};
+
+// The text with every value that differs from the scene's. A key that the scene lacks is added below the
+// header of its table. Left as they are: values of objects that are not [[rigid]] tables with a name, and
+// stiffness factors of tissue, because objects may share a material. `unit_m`: length unit of the scene's
+// numbers. `file` is for messages. Throws SceneError if `text` is no TOML.
+[[nodiscard]] EditedText write_values(const std::string& text, const std::filesystem::path& file,
+                                      double unit_m, std::span<const ValueInScene> values);
+
+}  // namespace hybrid

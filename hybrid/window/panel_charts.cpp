@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cmath>
+
+#include "hybrid/base/number_text.h"
+#include "hybrid/view/overlay.h"
+#include "hybrid/view/palette.h"
+#include "hybrid/window/panels.h"
+
+namespace hybrid {
+namespace {
+
+constexpr double kPeriod_us = 1000.0;  // of a servo loop at 1 kHz: the line in the chart of tick times
+
+// Colours of the series, apart in hue and in lightness (after Okabe & Ito 2008), on light and dark paper.
+constexpr std::array<glm::vec3, kForceSeries> kSeries{
+    {{0.03F, 0.38F, 0.93F}, {0.84F, 0.37F, 0.00F}, {0.00F, 0.62F, 0.45F}}};
+constexpr std::array<const char*, kForceSeries> kSeriesNames{"total", "rigid", "soft"};
+
+// "85.2 µs", "1.23 ms"
+std::string tick_time_text(double us) {
+  return us < kPeriod_us ? with_digits(us, 3) + " µs" : with_digits(1e-3 * us, 3) + " ms";
+}
+
+struct ChartBox {
+  float left, right, top, bottom;  // of the plot (pixels)
+};
+
+// The end of the axis: a round number at or above the maximum.
+double axis_end(double most) {
+  if (!(most > 0.0)) return 1.0;
+  double end = round_down(most);
+  while (end < most) end += round_down(most);
+  return end;
+}
+
+void draw_keys(const Pen& pen, float right, float y) {
+  float x = right;
+  for (std::size_t s = kForceSeries; s-- > 0;) {
+    x -= pen.width(kSeriesNames[s]);
+    pen.text(x, y, pen.inks.text, kSeriesNames[s]);
+    x -= 0.9F * pen.em;
+    pen.fill({x, y + 0.3F * pen.em}, {x + 0.6F * pen.em, y + 0.9F * pen.em}, ink_of(kSeries[s]), 1.0F);
+    x -= 0.7F * pen.em;
+  }
+}
+
+// One vertical line for each column, from its least to its largest force, joined to the column before.
+void draw_series(const Pen& pen, const ChartBox& box, const TickHistory& history, ForceSeries series,
+                 double top_N) {
+  const auto count = static_cast<std::size_t>(std::max(box.right - box.left, 1.0F));
+  const auto columns = history.columns(series, count);
+  const Ink ink = ink_of(kSeries[static_cast<std::size_t>(series)]);
+  // Where a part is the whole force, its thin line lies within the thick one of the whole.
+  const float half = series == ForceSeries::total ? 1.75F : 0.6F;
+  const auto y_of = [&](float force_N) {
+    const float share = std::clamp(force_N / static_cast<float>(top_N), 0.0F, 1.0F);
+    return box.bottom - share * (box.bottom - box.top);
+  };
+  std::optional<ColumnRange> before;
+  for (std::size_t c = 0; c < count; ++c) {
+    if (!columns[c]) {
+      before.reset();
+      continue;
+    }
+    ColumnRange range = *columns[c];
+    if (before) {
+      range.least_N = std::min(range.least_N, before->most_N);
+      range.most_N = std::max(range.most_N, before->least_N);
+    }
+    const float x = box.left + static_cast<float>(c);
+    pen.fill({x, y_of(range.most_N) - half}, {x + 1.0F, y_of(range.least_N) + half}, ink);
+    before = columns[c];
+  }
+}
+
+}  // namespace
+
+void draw_force_chart(const Pen& pen, const PixelRect& where, const TickHistory& history) {
+  const float em = pen.em;
+  const auto x0 = static_cast<float>(where.x), y0 = static_cast<float>(where.y);
+  const auto x1 = x0 + static_cast<float>(where.width), y1 = y0 + static_cast<float>(where.height);
+  const double top_N = axis_end(history.most_N());
+  const std::string top = force_text(top_N);
+  const ChartBox box{x0 + pen.width(top) + 0.5F * em, x1, y0 + 1.7F * em, y1 - 1.5F * em};
+  for (int line = 0; line <= 2; ++line) {
+    const float y = box.bottom - 0.5F * static_cast<float>(line) * (box.bottom - box.top);
+    pen.line({box.left, y}, {box.right, y}, pen.inks.edge);
+    const std::string words = line == 0 ? "0" : line == 2 ? top : std::string();
+    pen.text(box.left - 0.5F * em - pen.width(words), y - 0.6F * em, pen.inks.pale, words);
+  }
+  draw_keys(pen, box.right, y0);
+  for (const ForceSeries series : {ForceSeries::total, ForceSeries::soft, ForceSeries::rigid})
+    draw_series(pen, box, history, series, top_N);
+  const std::string from = "-" + with_decimals(history.seconds(), 0) + " s", to = "now";
+  pen.text(box.left, box.bottom + 0.3F * em, pen.inks.pale, from);
+  pen.text(box.right - pen.width(to), box.bottom + 0.3F * em, pen.inks.pale, to);
+}
+
+void draw_tick_times(const Pen& pen, const PixelRect& where, const TickTimes& times) {
+  const float em = pen.em;
+  const auto x0 = static_cast<float>(where.x), y0 = static_cast<float>(where.y);
+  const auto w = static_cast<float>(where.width);
+  const float bottom = y0 + static_cast<float>(where.height) - 1.5F * em, top = y0 + 1.7F * em;
+  pen.text(x0, y0, pen.inks.text,
+           "median " + tick_time_text(times.p50_us) + ", 99 % " + tick_time_text(times.p99_us) + ", most " +
+               tick_time_text(times.most_us));
+  std::uint64_t most = 1;
+  for (const std::uint64_t count : times.bins) most = std::max(most, count);
+  const auto x_of = [&](double us) {
+    return x0 + w * static_cast<float>(std::log(us / TickTimes::kFirst_us) /
+                                       std::log(TickTimes::kLast_us / TickTimes::kFirst_us));
+  };
+  pen.line({x0, bottom}, {x0 + w, bottom}, pen.inks.edge);
+  const float bar = w / static_cast<float>(TickTimes::kBins);
+  for (std::size_t b = 0; b < TickTimes::kBins; ++b) {
+    if (times.bins[b] == 0) continue;
+    // The height is logarithmic, so that a single late tick among thousands is seen.
+    const double share =
+        std::log1p(static_cast<double>(times.bins[b])) / std::log1p(static_cast<double>(most));
+    const float x = x0 + static_cast<float>(b) * bar;
+    pen.fill({x, bottom - std::max(2.0F, static_cast<float>(share) * (bottom - top))},
+             {x + bar - 1.0F, bottom}, pen.inks.force);
+  }
+  const float late = x_of(kPeriod_us);
+  pen.line({late, top - 0.3F * em}, {late, bottom}, ink_of(kSeries[1]), 2.0F);
+  for (const double us : {1.0, 10.0, 100.0, 1000.0}) {
+    const std::string words = us < kPeriod_us ? with_decimals(us, 0) + " µs" : "1 ms";
+    pen.text(std::min(x_of(us) + (us > 1.0 ? -0.5F * pen.width(words) : 0.0F), x0 + w - pen.width(words)),
+             bottom + 0.3F * em, pen.inks.pale, words);
+  }
+  const std::string missed = std::to_string(times.late) + " missed";
+  pen.text(x0 + w - pen.width(missed), bottom + 0.3F * em, times.late > 0 ? pen.inks.text : pen.inks.pale,
+           missed);
+}
+
+void draw_stage_times(const Pen& pen, const PixelRect& where, const TickTimes& times) {
+  const float em = pen.em, row = static_cast<float>(where.height) / static_cast<float>(kStages);
+  const float left = static_cast<float>(where.x) + 7.0F * em;
+  const float right = static_cast<float>(where.x + where.width) - pen.width("888.8 µs") - 0.5F * em;
+  const double most = std::max(1e-9, *std::max_element(times.stage_us.begin(), times.stage_us.end()));
+  for (std::size_t s = 0; s < kStages; ++s) {
+    const float y = static_cast<float>(where.y) + static_cast<float>(s) * row;
+    std::string name = kStageNames[s];
+    std::replace(name.begin(), name.end(), '_', ' ');
+    pen.text(static_cast<float>(where.x), y, pen.inks.text, name);
+    const auto share = static_cast<float>(times.stage_us[s] / most);
+    pen.fill({left, y + 0.25F * em}, {left + std::max(share * (right - left), 1.0F), y + 0.95F * em},
+             pen.inks.force, 1.0F);
+    const std::string us = with_decimals(times.stage_us[s], 1) + " µs";
+    pen.text(static_cast<float>(where.x + where.width) - pen.width(us), y, pen.inks.pale, us);
+  }
+}
+
+}  // namespace hybrid

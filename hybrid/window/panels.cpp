@@ -1,0 +1,365 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/window/panels.h"
+
+#include <imgui.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "hybrid/base/number_text.h"
+#include "hybrid/view/legend.h"
+#include "hybrid/view/overlay.h"
+#include "hybrid/view/palette.h"
+
+namespace hybrid {
+namespace {
+
+// ImGui asks for the keys that it knows by the numbers that the window uses: those of UiKey.
+void map_keys(ImGuiIO& io) {
+  constexpr std::array<ImGuiKey, kUiKeys> keys{
+      ImGuiKey_Tab,    ImGuiKey_LeftArrow, ImGuiKey_RightArrow, ImGuiKey_UpArrow, ImGuiKey_DownArrow,
+      ImGuiKey_PageUp, ImGuiKey_PageDown,  ImGuiKey_Home,       ImGuiKey_End,     ImGuiKey_Insert,
+      ImGuiKey_Delete, ImGuiKey_Backspace, ImGuiKey_Space,      ImGuiKey_Enter,   ImGuiKey_Escape,
+      ImGuiKey_A,      ImGuiKey_C,         ImGuiKey_V,          ImGuiKey_X,       ImGuiKey_Y,
+      ImGuiKey_Z};
+  for (std::size_t k = 0; k < kUiKeys; ++k) io.KeyMap[keys[k]] = static_cast<int>(k);
+}
+
+void hand_over(ImGuiIO& io, const UiInput& input) {
+  io.DeltaTime = std::max(input.dt_s, 1e-4F);
+  io.MousePos = {input.x, input.y};
+  for (std::size_t b = 0; b < input.buttons.size(); ++b) io.MouseDown[b] = input.buttons[b];
+  io.MouseWheel = input.wheel;
+  for (std::size_t k = 0; k < kUiKeys; ++k) io.KeysDown[k] = input.keys[k];
+  io.KeyCtrl = input.control;
+  io.KeyShift = input.shift;
+  io.KeyAlt = input.alt;
+  for (const char32_t c : input.typed) io.AddInputCharacter(static_cast<unsigned int>(c));
+}
+
+constexpr const char* kPanelName = "panel";
+constexpr float kForceChart_em = 7.0F, kTickChart_em = 6.0F, kStageRow_em = 1.25F;
+constexpr std::array<double, 3> kSpeeds{1.0, 0.1, 0.01};
+
+ImVec4 colour_of(Ink ink, float alpha = 1.0F) {
+  ImVec4 colour = ImGui::ColorConvertU32ToFloat4(ink);
+  colour.w = alpha;
+  return colour;
+}
+
+void set_style(const Pen& pen, bool dark) {
+  ImGuiStyle& style = ImGui::GetStyle();
+  if (dark) {
+    ImGui::StyleColorsDark(&style);
+  } else {
+    ImGui::StyleColorsLight(&style);
+  }
+  const float em = pen.em;
+  style.WindowPadding = {0.6F * em, 0.5F * em};
+  style.FramePadding = {0.45F * em, 0.22F * em};
+  style.ItemSpacing = {0.5F * em, 0.35F * em};
+  style.ItemInnerSpacing = {0.4F * em, 0.3F * em};
+  style.CellPadding = {0.3F * em, 0.1F * em};
+  style.ScrollbarSize = 0.8F * em;
+  style.GrabMinSize = 0.7F * em;
+  style.WindowRounding = style.FrameRounding = style.GrabRounding = 0.25F * em;
+  style.WindowBorderSize = 1.0F;
+  style.Colors[ImGuiCol_WindowBg] = colour_of(pen.inks.paper);
+  style.Colors[ImGuiCol_Text] = colour_of(pen.inks.text);
+  style.Colors[ImGuiCol_TextDisabled] = colour_of(pen.inks.pale);
+  style.Colors[ImGuiCol_Border] = colour_of(pen.inks.edge, 0.7F);
+  style.Colors[ImGuiCol_CheckMark] = colour_of(pen.inks.force);
+  // The value stands in the middle of a slider: it is read through the grab.
+  style.Colors[ImGuiCol_SliderGrab] = colour_of(pen.inks.force, 0.45F);
+  style.Colors[ImGuiCol_SliderGrabActive] = colour_of(pen.inks.force, 0.7F);
+  style.Colors[ImGuiCol_FrameBg] = colour_of(pen.inks.edge, 0.28F);
+  style.Colors[ImGuiCol_FrameBgHovered] = colour_of(pen.inks.edge, 0.45F);
+  style.Colors[ImGuiCol_FrameBgActive] = colour_of(pen.inks.edge, 0.6F);
+  style.Colors[ImGuiCol_Button] = colour_of(pen.inks.edge, 0.35F);
+  style.Colors[ImGuiCol_ButtonHovered] = colour_of(pen.inks.force, 0.35F);
+  style.Colors[ImGuiCol_ButtonActive] = colour_of(pen.inks.force, 0.55F);
+  style.Colors[ImGuiCol_Header] = colour_of(pen.inks.force, 0.16F);
+  style.Colors[ImGuiCol_HeaderHovered] = colour_of(pen.inks.force, 0.26F);
+  style.Colors[ImGuiCol_HeaderActive] = colour_of(pen.inks.force, 0.36F);
+  style.Colors[ImGuiCol_PopupBg] = colour_of(pen.inks.paper);
+  style.Colors[ImGuiCol_NavHighlight] = colour_of(pen.inks.force);
+}
+
+// A row of buttons of equal width.
+bool wide_button(const char* words, int of, bool lit = false) {
+  const float gap = ImGui::GetStyle().ItemSpacing.x;
+  const float width =
+      (ImGui::GetContentRegionAvail().x - static_cast<float>(of - 1) * gap) / static_cast<float>(of);
+  if (lit) ImGui::PushStyleColor(ImGuiCol_Button, ImGui::GetStyleColorVec4(ImGuiCol_ButtonActive));
+  const bool pressed = ImGui::Button(words, {std::max(width, 1.0F), 0.0F});
+  if (lit) ImGui::PopStyleColor();
+  return pressed;
+}
+
+bool open_section(const char* name, bool open = true) {
+  return ImGui::CollapsingHeader(name, open ? ImGuiTreeNodeFlags_DefaultOpen : 0);
+}
+
+std::string object_name(const DrawnScene& scene, std::uint32_t object) {
+  if (object == Edit::kTool) return "tool";
+  return object < scene.objects.size() ? scene.objects[object].name : std::string();
+}
+
+std::string words_of_value(EditedQuantity quantity) {
+  switch (quantity) {
+    case EditedQuantity::coupling_stiffness:
+      return "coupling";
+    case EditedQuantity::max_force:
+      return "force limit";
+    case EditedQuantity::static_friction:
+      return "friction at rest";
+    case EditedQuantity::dynamic_friction:
+      return "friction sliding";
+    case EditedQuantity::damping:
+      return "damping";
+    case EditedQuantity::texture_height:
+      return "texture height";
+    case EditedQuantity::tissue_factor:
+      return "stiffness, times";
+  }
+  return {};
+}
+
+// The chart's place in the panel; the cursor moves below it.
+PixelRect take_place(float height) {
+  const ImVec2 at = ImGui::GetCursorScreenPos();
+  const float width = ImGui::GetContentRegionAvail().x;
+  ImGui::Dummy({width, height});
+  return {static_cast<int>(at.x), static_cast<int>(at.y), static_cast<int>(width), static_cast<int>(height)};
+}
+
+void label_beside(const Pen& pen, const std::string& words) {
+  ImGui::AlignTextToFramePadding();
+  ImGui::TextUnformatted(words.c_str());
+  ImGui::SameLine(9.2F * pen.em);
+  ImGui::SetNextItemWidth(-0.1F * pen.em);
+}
+
+}  // namespace
+
+void Panels::draw_session(const PanelFrame& frame, const Snapshot& snapshot, PanelResult& result) const {
+  const ViewState& state = frame.state;
+  const auto ask = [&](ViewVerb verb, std::vector<double> numbers = {}) {
+    result.actions.push_back({.verb = verb, .numbers = std::move(numbers)});
+  };
+  if (wide_button(state.paused ? "Play" : "Pause", 3, state.paused)) ask(ViewVerb::pause);
+  ImGui::SameLine();
+  if (wide_button("One tick", 2)) ask(ViewVerb::step);
+  ImGui::SameLine();
+  if (wide_button("Restart", 1)) ask(ViewVerb::restart);
+  ImGui::BeginDisabled(frame.notes.real_device);
+  for (std::size_t n = 0; n < kSpeeds.size(); ++n) {
+    static constexpr std::array<const char*, kSpeeds.size()> words{"real time", "1/10", "1/100"};
+    if (n > 0) ImGui::SameLine();
+    if (wide_button(words[n], static_cast<int>(kSpeeds.size() - n), state.speed == kSpeeds[n]))
+      ask(ViewVerb::speed, {kSpeeds[n]});
+  }
+  ImGui::EndDisabled();
+  if (wide_button("Recording", 3)) ask(ViewVerb::save_recording);
+  if (ImGui::IsItemHovered())
+    ImGui::SetTooltip("Saves the session from its beginning; hybrid replay plays it");
+  ImGui::SameLine();
+  if (wide_button("Picture", 2)) ask(ViewVerb::screenshot);
+  if (ImGui::IsItemHovered()) ImGui::SetTooltip("Saves this frame as a PNG file");
+  ImGui::SameLine();
+  if (wide_button("Save scene", 1)) ask(ViewVerb::save_scene);
+  if (ImGui::IsItemHovered()) ImGui::SetTooltip("Writes the edited values into the scene's file");
+  ImGui::TextDisabled("tick %llu, %s s recorded", static_cast<unsigned long long>(snapshot.tick),
+                      with_decimals(frame.notes.recorded_s, 1).c_str());
+  if (frame.notes.refused_edits > 0)
+    ImGui::TextDisabled("%llu edits came too fast and were left out",
+                        static_cast<unsigned long long>(frame.notes.refused_edits));
+}
+
+void Panels::draw_objects(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
+                          const PanelFrame& frame, PanelResult& result) const {
+  constexpr int most_rows = 8;
+  const int rows = std::min(static_cast<int>(scene.objects.size()) + 1, most_rows);
+  const float height = static_cast<float>(rows) * (ImGui::GetFrameHeight() + 0.2F * pen.em);
+  if (!ImGui::BeginTable("objects", 4, ImGuiTableFlags_ScrollY, {0.0F, height + 0.2F * pen.em})) return;
+  ImGui::TableSetupColumn("shown", ImGuiTableColumnFlags_WidthFixed, ImGui::GetFrameHeight());
+  ImGui::TableSetupColumn("colour", ImGuiTableColumnFlags_WidthFixed, pen.em);
+  ImGui::TableSetupColumn("name", ImGuiTableColumnFlags_WidthStretch);
+  ImGui::TableSetupColumn("force", ImGuiTableColumnFlags_WidthFixed, pen.width("88.88 N"));
+  const auto row = [&](std::uint32_t object, const glm::vec3& colour, const std::string& force) {
+    ImGui::PushID(static_cast<int>(object));
+    ImGui::TableNextRow();
+    ImGui::TableNextColumn();
+    if (object != Edit::kTool) {
+      bool visible = frame.state.view.look_of(object).visible;
+      if (ImGui::Checkbox("##shown", &visible))
+        result.actions.push_back(
+            {.verb = ViewVerb::show, .numbers = {visible ? 1.0 : 0.0}, .object = object});
+    }
+    ImGui::TableNextColumn();
+    const ImVec2 at = ImGui::GetCursorScreenPos();
+    const float top = at.y + 0.5F * (ImGui::GetFrameHeight() - pen.em);
+    const ImVec2 end{at.x + pen.em, top + pen.em};
+    ImGui::GetWindowDrawList()->AddRectFilled({at.x, top}, end, ink_of(colour), 2.0F);
+    ImGui::GetWindowDrawList()->AddRect({at.x, top}, end, pen.inks.edge, 2.0F);
+    ImGui::TableNextColumn();
+    ImGui::AlignTextToFramePadding();
+    const std::string name = pen.fit(object_name(scene, object), ImGui::GetContentRegionAvail().x);
+    if (ImGui::Selectable((name + "##name").c_str(), frame.state.selected == object))
+      result.actions.push_back({.verb = ViewVerb::select, .object = object});
+    ImGui::TableNextColumn();
+    ImGui::AlignTextToFramePadding();
+    ImGui::SetCursorPosX(ImGui::GetCursorPosX() + ImGui::GetContentRegionAvail().x - pen.width(force));
+    ImGui::TextUnformatted(force.c_str());
+    ImGui::PopID();
+  };
+  row(Edit::kTool, frame.state.view.dark ? palette::dark_tool : palette::tool,
+      force_text(glm::length(snapshot.force_N)));
+  for (std::uint32_t o = 0; o < scene.objects.size(); ++o) {
+    const bool felt = o < snapshot.feel.size() && snapshot.feel[o].contact;
+    row(o, palette::of_object(scene, o), felt ? force_text(snapshot.feel[o].force_N) : std::string());
+  }
+  ImGui::EndTable();
+}
+
+void Panels::draw_slider(const Pen& pen, std::size_t index, const EditableValue& value, double now,
+                         PanelResult& result) {
+  const double unit = si_of_unit(value.quantity);
+  const std::string unit_words(unit_of(value.quantity));
+  const std::string format = "%.3g" + (unit_words.empty() ? "" : " " + unit_words);
+  label_beside(pen, words_of_value(value.quantity));
+  float shown = moved_ == index ? moved_to_ : static_cast<float>(now / unit);
+  const int flags = ImGuiSliderFlags_AlwaysClamp | (value.logarithmic ? ImGuiSliderFlags_Logarithmic : 0);
+  ImGui::PushID(static_cast<int>(index));
+  const bool changed = ImGui::SliderFloat("##value", &shown, static_cast<float>(value.usual.low / unit),
+                                          static_cast<float>(value.usual.high / unit), format.c_str(), flags);
+  if (ImGui::IsItemHovered() && now != value.in_scene)
+    ImGui::SetTooltip("in the scene: %s %s", with_digits(value.in_scene / unit, 3).c_str(),
+                      unit_words.c_str());
+  if (changed) {
+    moved_to_ = shown;
+    const double si = std::clamp(static_cast<double>(shown) * unit, value.range.low, value.range.high);
+    result.actions.push_back(
+        {.verb = ViewVerb::edit, .numbers = {si}, .object = value.object, .quantity = value.quantity});
+  }
+  if (ImGui::IsItemActive()) {
+    moved_ = index;
+    moved_to_ = shown;
+  } else if (moved_ == index) {
+    moved_ = static_cast<std::size_t>(-1);
+  }
+  ImGui::PopID();
+}
+
+void Panels::draw_values(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
+                         const PanelFrame& frame, PanelResult& result) {
+  const std::uint32_t selected = frame.state.selected;
+  bool any = false, edited = false;
+  for (std::size_t n = 0; n < scene.editable.size() && n < snapshot.values.size(); ++n) {
+    const EditableValue& value = scene.editable[n];
+    if (value.object != selected) continue;
+    draw_slider(pen, n, value, snapshot.values[n], result);
+    any = true;
+    edited = edited || snapshot.values[n] != value.in_scene;
+  }
+  if (!any) ImGui::TextDisabled("Its values are fixed while it is felt.");
+  if (selected < scene.objects.size()) {
+    label_beside(pen, "opacity");
+    float opacity = 100.0F * frame.state.view.look_of(selected).opacity;
+    if (ImGui::SliderFloat("##opacity", &opacity, 0.0F, 100.0F, "%.0f %%", ImGuiSliderFlags_AlwaysClamp))
+      result.actions.push_back({.verb = ViewVerb::opacity, .numbers = {0.01 * opacity}, .object = selected});
+  }
+  ImGui::BeginDisabled(!edited);
+  if (any && ImGui::Button("Values of the scene")) {
+    for (const EditableValue& value : scene.editable) {
+      if (value.object == selected)
+        result.actions.push_back({.verb = ViewVerb::edit,
+                                  .numbers = {value.in_scene},
+                                  .object = value.object,
+                                  .quantity = value.quantity});
+    }
+  }
+  ImGui::EndDisabled();
+}
+
+void Panels::draw_view(const Pen& pen, const DrawnScene& scene, const PanelFrame& frame,
+                       PanelResult& result) {
+  const ViewSettings& view = frame.state.view;
+  const auto ask = [&](ViewVerb verb, std::vector<double> numbers = {}, std::string text = {}) {
+    result.actions.push_back({.verb = verb, .numbers = std::move(numbers), .text = std::move(text)});
+  };
+  static constexpr std::array<const char*, 5> looks{"all", "contact", "x", "y", "z"};
+  static constexpr std::array<const char*, 5> look_words{"all (F)", "contact (C)", "X", "Y", "Z"};
+  const float narrow = 2.2F * pen.em, gap = ImGui::GetStyle().ItemSpacing.x;
+  const float wide = 0.5F * (ImGui::GetContentRegionAvail().x - 3.0F * narrow - 4.0F * gap);
+  for (std::size_t n = 0; n < looks.size(); ++n) {
+    if (n > 0) ImGui::SameLine();
+    if (ImGui::Button(look_words[n], {n < 2 ? wide : narrow, 0.0F})) ask(ViewVerb::look, {}, looks[n]);
+  }
+  bool clip = view.clip.on;
+  if (ImGui::Checkbox("clip", &clip)) ask(ViewVerb::clip, {clip ? 1.0 : 0.0});
+  for (int axis = 0; axis < 3; ++axis) {
+    static constexpr std::array<const char*, 3> names{"x", "y", "z"};
+    ImGui::SameLine();
+    if (ImGui::RadioButton(names[static_cast<std::size_t>(axis)], view.clip.axis == axis))
+      ask(ViewVerb::clip_axis, {static_cast<double>(axis)});
+  }
+  ImGui::SameLine();
+  bool other = view.clip.other_side;
+  if (ImGui::Checkbox("other side", &other)) ask(ViewVerb::clip_side);
+  if (clip) {
+    auto share = static_cast<float>(view.clip.share);
+    if (std::exchange(bounds_of_, &scene) != &scene) bounds_ = bounds_of(scene);
+    const std::string place = length_text(clip_place_m(view.clip, bounds_));
+    label_beside(pen, "at");
+    if (ImGui::SliderFloat("##clip", &share, 0.0F, 1.0F, place.c_str(), ImGuiSliderFlags_AlwaysClamp))
+      ask(ViewVerb::clip_place, {static_cast<double>(share)});
+  }
+  bool inset = view.inset, dark = view.dark;
+  if (ImGui::Checkbox("near view", &inset)) ask(ViewVerb::inset, {inset ? 1.0 : 0.0});
+  ImGui::SameLine();
+  if (ImGui::Checkbox("dark", &dark)) ask(ViewVerb::dark, {dark ? 1.0 : 0.0});
+}
+
+void Panels::take_input() {
+  ImGuiIO& io = ImGui::GetIO();
+  io.ConfigFlags |= ImGuiConfigFlags_NavEnableKeyboard;
+  map_keys(io);
+  hand_over(io, frame_->input);
+}
+
+void Panels::draw(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot, const PixelRect& where) {
+  const PanelFrame& frame = *frame_;
+  PanelResult& result = result_;
+  set_style(pen, frame.state.view.dark);
+  ImGui::PushFont(pen.body);
+  ImGui::SetNextWindowPos({static_cast<float>(where.x), static_cast<float>(where.y)});
+  ImGui::SetNextWindowSize({static_cast<float>(where.width), static_cast<float>(where.height)});
+  constexpr ImGuiWindowFlags flags = ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize |
+                                     ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings;
+  if (ImGui::Begin(kPanelName, nullptr, flags)) {
+    if (frame.input.by_keyboard && !ImGui::IsWindowFocused(ImGuiFocusedFlags_ChildWindows))
+      ImGui::SetWindowFocus();
+    if (open_section("Session")) draw_session(frame, snapshot, result);
+    if (open_section("Objects")) draw_objects(pen, scene, snapshot, frame, result);
+    const std::string values = "Values: " + object_name(scene, frame.state.selected) + "###values";
+    if (open_section(values.c_str())) draw_values(pen, scene, snapshot, frame, result);
+    if (open_section("View")) draw_view(pen, scene, frame, result);
+    Pen chart = pen;
+    chart.list = ImGui::GetWindowDrawList();
+    if (open_section("Force")) draw_force_chart(chart, take_place(kForceChart_em * pen.em), frame.history);
+    if (open_section("Ticks")) {
+      const TickTimes times = frame.history.times();
+      draw_tick_times(chart, take_place(kTickChart_em * pen.em), times);
+      draw_stage_times(chart, take_place(kStageRow_em * pen.em * static_cast<float>(kStages)), times);
+      if (frame.notes.unseen_ticks > 0)
+        ImGui::TextDisabled("%llu ticks are not in the charts",
+                            static_cast<unsigned long long>(frame.notes.unseen_ticks));
+    }
+  }
+  ImGui::End();
+  result.wants_text = ImGui::GetIO().WantTextInput;
+  ImGui::PopFont();
+}
+
+}  // namespace hybrid

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The panel beside the scene in a window: session, objects and their values, view, and charts of force and
+// tick times. It draws with Dear ImGui and returns actions; it changes nothing itself.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "hybrid/view/layout.h"
+#include "hybrid/view/overlay_panel.h"
+#include "hybrid/view/text_painter.h"
+#include "hybrid/window/tick_history.h"
+#include "hybrid/window/ui_input.h"
+#include "hybrid/window/view_state.h"
+
+namespace hybrid {
+
+// What the session tells its window beside snapshots.
+struct SessionNotes {
+  bool real_device = false;         // slow motion is not possible
+  double recorded_s = 0.0;          // length of the recording so far
+  std::uint64_t refused_edits = 0;  // too many waited
+  std::uint64_t unseen_ticks = 0;   // ticks that the charts missed, because a frame took too long
+  std::string message{};            // the last thing that was done; empty: nothing
+  std::string error{};              // of the scene's file; empty: none
+};
+
+// What the panel shows in one frame.
+struct PanelFrame {
+  const ViewState& state;
+  const TickHistory& history;
+  const SessionNotes& notes;
+  const UiInput& input;
+};
+
+struct PanelResult {
+  std::vector<ViewAction> actions;
+  bool wants_text = false;  // a control takes typed text: keys are not shortcuts
+};
+
+class Panels final : public OverlayPanel {
+ public:
+  // `frame` has to live until the frame is drawn; its input is taken once.
+  void show(const PanelFrame& frame) { frame_ = &frame; }
+  // What was asked for since the last call.
+  [[nodiscard]] PanelResult take_result() { return std::exchange(result_, {}); }
+
+  void take_input() override;
+  void draw(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
+            const PixelRect& where) override;
+
+ private:
+  void draw_session(const PanelFrame& frame, const Snapshot& snapshot, PanelResult& result) const;
+  void draw_objects(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
+                    const PanelFrame& frame, PanelResult& result) const;
+  void draw_values(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot, const PanelFrame& frame,
+                   PanelResult& result);
+  void draw_slider(const Pen& pen, std::size_t index, const EditableValue& value, double now,
+                   PanelResult& result);
+  void draw_view(const Pen& pen, const DrawnScene& scene, const PanelFrame& frame, PanelResult& result);
+
+  const PanelFrame* frame_ = nullptr;
+  const DrawnScene* bounds_of_ = nullptr;  // the scene of bounds_, which takes a look at every vertex
+  SceneBounds bounds_;
+  PanelResult result_;
+  // The slider that is being moved, and its value as last asked for: the session answers a frame later.
+  std::size_t moved_ = static_cast<std::size_t>(-1);
+  float moved_to_ = 0.0F;
+};
+
+// ---- charts (panel_charts.cpp) ----
+// Force of the last seconds: for each pixel column a line from the least to the largest force in it.
+void draw_force_chart(const Pen& pen, const PixelRect& where, const TickHistory& history);
+// Tick times on a logarithmic axis, with the servo period as a line.
+void draw_tick_times(const Pen& pen, const PixelRect& where, const TickTimes& times);
+// The mean time of each stage as a bar.
+void draw_stage_times(const Pen& pen, const PixelRect& where, const TickTimes& times);
+
+}  // namespace hybrid

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/window/tick_history.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace hybrid {
+namespace {
+
+constexpr std::size_t kMostSamples = 200'000;  // ten seconds at the highest servo rate
+
+float force_of(const TickSample& sample, ForceSeries series) noexcept {
+  switch (series) {
+    case ForceSeries::rigid:
+      return sample.rigid_N;
+    case ForceSeries::soft:
+      return sample.soft_N;
+    default:
+      return sample.total_N;
+  }
+}
+
+double percentile_of(std::vector<float>& sorted, double share) {
+  if (sorted.empty()) return 0.0;
+  const auto rank = static_cast<std::size_t>(share * static_cast<double>(sorted.size()));
+  return static_cast<double>(sorted[std::min(rank, sorted.size() - 1)]);
+}
+
+}  // namespace
+
+std::size_t TickTimes::bin_of(double us) noexcept {
+  if (!(us > kFirst_us)) return 0;
+  const double share = std::log(us / kFirst_us) / std::log(kLast_us / kFirst_us);
+  return std::min(static_cast<std::size_t>(share * kBins), kBins - 1);
+}
+
+void TickHistory::add(const TickSample& sample) {
+  if (!std::isfinite(sample.t_s)) return;
+  if (!samples_.empty() && sample.t_s <= samples_.back().t_s) samples_.clear();
+  samples_.push_back(sample);
+  while (samples_.front().t_s <= sample.t_s - seconds_ || samples_.size() > kMostSamples)
+    samples_.pop_front();
+}
+
+std::vector<std::optional<ColumnRange>> TickHistory::columns(ForceSeries series, std::size_t count) const {
+  std::vector<std::optional<ColumnRange>> columns(count);
+  if (count == 0) return columns;
+  // Columns are anchored in time, not at the newest tick, so that a spike keeps its column as it moves.
+  const double step_s = seconds_ / static_cast<double>(count);
+  const auto last = static_cast<std::int64_t>(std::floor(end_s() / step_s));
+  for (const TickSample& sample : samples_) {
+    const auto column = static_cast<std::int64_t>(std::floor(sample.t_s / step_s)) - last +
+                        static_cast<std::int64_t>(count) - 1;
+    const float force = force_of(sample, series);
+    if (!std::isfinite(force)) continue;
+    std::optional<ColumnRange>& at = columns[static_cast<std::size_t>(
+        std::clamp<std::int64_t>(column, 0, static_cast<std::int64_t>(count) - 1))];
+    if (!at) at = ColumnRange{force, force};
+    at->least_N = std::min(at->least_N, force);
+    at->most_N = std::max(at->most_N, force);
+  }
+  return columns;
+}
+
+double TickHistory::most_N() const {
+  float most = 0.0F;
+  for (const TickSample& sample : samples_) {
+    for (const float force : {sample.total_N, sample.rigid_N, sample.soft_N})
+      if (std::isfinite(force)) most = std::max(most, force);
+  }
+  return static_cast<double>(most);
+}
+
+TickTimes TickHistory::times() const {
+  TickTimes times;
+  std::vector<float> sorted;
+  sorted.reserve(samples_.size());
+  for (const TickSample& sample : samples_) {
+    ++times.bins[TickTimes::bin_of(static_cast<double>(sample.tick_us))];
+    times.late += sample.late ? 1 : 0;
+    sorted.push_back(sample.tick_us);
+    for (std::size_t s = 0; s < kStages; ++s) times.stage_us[s] += static_cast<double>(sample.stage_us[s]);
+  }
+  times.ticks = samples_.size();
+  for (double& mean : times.stage_us) mean /= std::max(1.0, static_cast<double>(times.ticks));
+  std::sort(sorted.begin(), sorted.end());
+  times.p50_us = percentile_of(sorted, 0.5);
+  times.p99_us = percentile_of(sorted, 0.99);
+  times.most_us = percentile_of(sorted, 1.0);
+  return times;
+}
+
+}  // namespace hybrid

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/window/view_state.h"
+
+#include <algorithm>
+
+namespace hybrid {
+namespace {
+
+double number_of(const ViewAction& action, double otherwise = 0.0) {
+  return action.numbers.empty() ? otherwise : action.numbers.front();
+}
+
+void set_or_flip(bool& value, const ViewAction& action) {
+  value = action.numbers.empty() ? !value : action.numbers.front() != 0.0;
+}
+
+ObjectLook& look_in(ViewSettings& view, std::uint32_t object) {
+  if (view.looks.size() <= object) view.looks.resize(std::size_t{object} + 1);
+  return view.looks[object];
+}
+
+void act_on_view(ViewState& state, const ViewAction& action) {
+  ViewSettings& view = state.view;
+  switch (action.verb) {
+    case ViewVerb::show:
+      if (action.object != Edit::kTool) look_in(view, action.object).visible = number_of(action, 1.0) != 0.0;
+      break;
+    case ViewVerb::opacity:
+      if (action.object != Edit::kTool)
+        look_in(view, action.object).opacity = static_cast<float>(std::clamp(number_of(action), 0.0, 1.0));
+      break;
+    case ViewVerb::clip:
+      set_or_flip(view.clip.on, action);
+      break;
+    case ViewVerb::clip_axis:
+      view.clip.axis = std::clamp(static_cast<int>(number_of(action)), 0, 2);
+      break;
+    case ViewVerb::clip_place:
+      view.clip.share = std::clamp(number_of(action), 0.0, 1.0);
+      break;
+    case ViewVerb::clip_side:
+      view.clip.other_side = !view.clip.other_side;
+      break;
+    case ViewVerb::dark:
+      set_or_flip(view.dark, action);
+      break;
+    case ViewVerb::inset:
+      set_or_flip(view.inset, action);
+      break;
+    default:
+      break;
+  }
+}
+
+void act_on_session(ViewState& state, const ViewAction& action) {
+  switch (action.verb) {
+    case ViewVerb::pause:
+      set_or_flip(state.paused, action);
+      break;
+    case ViewVerb::step:
+      state.paused = true;
+      ++state.single_ticks;
+      break;
+    case ViewVerb::speed:
+      state.speed = std::clamp(number_of(action, 1.0), kLeastSpeed, 1.0);
+      break;
+    case ViewVerb::restart:
+      ++state.restarts;
+      break;
+    case ViewVerb::edit:
+      state.edits.push_back({0, action.object, action.quantity, number_of(action)});
+      break;
+    case ViewVerb::screenshot:
+      state.screenshot = action.text;
+      break;
+    case ViewVerb::save_recording:
+      state.recording = action.text;
+      break;
+    case ViewVerb::save_scene:
+      state.save_scene = true;
+      break;
+    case ViewVerb::reload:
+      state.reload = true;
+      break;
+    default:
+      break;
+  }
+}
+
+}  // namespace
+
+void act(ViewState& state, const ViewAction& action) {
+  switch (action.verb) {
+    case ViewVerb::select:
+      state.selected = action.object;
+      return;
+    case ViewVerb::look:
+      state.look = action.text;
+      return;
+    case ViewVerb::panels:
+      set_or_flip(state.panels, action);
+      return;
+    case ViewVerb::quit:
+      state.quit = true;
+      return;
+    default:
+      act_on_view(state, action);
+      act_on_session(state, action);
+  }
+}
+
+}  // namespace hybrid

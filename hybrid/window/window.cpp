@@ -1,0 +1,447 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/window/window.h"
+
+#define GLFW_INCLUDE_NONE
+#include <GLFW/glfw3.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <deque>
+#include <glm/geometric.hpp>
+#include <numbers>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "hybrid/view/frame_painter.h"
+#include "hybrid/view/png_file.h"
+#include "hybrid/window/window_keys.h"
+
+namespace hybrid {
+namespace {
+
+std::string glfw_reason() {
+  const char* text = nullptr;
+  return glfwGetError(&text) != GLFW_NO_ERROR && text != nullptr ? text : "no reason given";
+}
+
+// GLFW is started with the first window and ended with the last.
+struct Library {
+  Library() {
+    if (glfwInit() == GLFW_TRUE) return;
+    const char* const display = std::getenv("DISPLAY");
+    throw std::runtime_error("no window can be opened: " + glfw_reason() + " (DISPLAY is " +
+                             (display != nullptr && *display != '\0' ? display : "not set") +
+                             "); start it from a desktop session or with ssh -X, or let `hybrid run SCENE "
+                             "--picture FILE.png` draw without a display");
+  }
+  Library(const Library&) = delete;
+  Library& operator=(const Library&) = delete;
+  Library(Library&&) = delete;
+  Library& operator=(Library&&) = delete;
+  ~Library() { glfwTerminate(); }
+};
+
+struct CloseWindow {
+  void operator()(GLFWwindow* window) const { glfwDestroyWindow(window); }
+};
+
+enum class Drag { none, orbit, pan, tool };
+
+constexpr int kMostPixels = 8192;    // along a side of a frame
+constexpr int kDragFrames = 12;      // of a script's drag
+constexpr float kSlowest_s = 0.25F;  // longest time between frames that the panel is told
+
+struct NamedKey {
+  std::string_view name;
+  int glfw;
+  int ui;  // UiKey, or -1
+};
+constexpr auto ui = [](UiKey key) { return static_cast<int>(key); };
+constexpr std::array<NamedKey, 17> kNamedKeys{{{"tab", GLFW_KEY_TAB, ui(UiKey::tab)},
+                                               {"left", GLFW_KEY_LEFT, ui(UiKey::left)},
+                                               {"right", GLFW_KEY_RIGHT, ui(UiKey::right)},
+                                               {"up", GLFW_KEY_UP, ui(UiKey::up)},
+                                               {"down", GLFW_KEY_DOWN, ui(UiKey::down)},
+                                               {"pageup", GLFW_KEY_PAGE_UP, ui(UiKey::page_up)},
+                                               {"pagedown", GLFW_KEY_PAGE_DOWN, ui(UiKey::page_down)},
+                                               {"home", GLFW_KEY_HOME, ui(UiKey::home)},
+                                               {"end", GLFW_KEY_END, ui(UiKey::end)},
+                                               {"insert", GLFW_KEY_INSERT, ui(UiKey::insert)},
+                                               {"delete", GLFW_KEY_DELETE, ui(UiKey::erase)},
+                                               {"backspace", GLFW_KEY_BACKSPACE, ui(UiKey::backspace)},
+                                               {"space", GLFW_KEY_SPACE, ui(UiKey::space)},
+                                               {"enter", GLFW_KEY_ENTER, ui(UiKey::enter)},
+                                               {"escape", GLFW_KEY_ESCAPE, ui(UiKey::escape)},
+                                               {"[", GLFW_KEY_LEFT_BRACKET, -1},
+                                               {"]", GLFW_KEY_RIGHT_BRACKET, -1}}};
+constexpr std::array<std::pair<char, UiKey>, 6> kLetters{
+    {{'a', UiKey::a}, {'c', UiKey::c}, {'v', UiKey::v}, {'x', UiKey::x}, {'y', UiKey::y}, {'z', UiKey::z}}};
+
+// One step of what a script does with mouse and keyboard.
+struct ScriptEvent {
+  enum class Kind : std::uint8_t { move, press, release, key_down, key_up, wheel, next_frame } kind;
+  double x = 0.0, y = 0.0;
+  int button = GLFW_MOUSE_BUTTON_LEFT;
+  std::string key{};
+};
+
+int button_named(std::string_view name) {
+  if (name == "right") return GLFW_MOUSE_BUTTON_RIGHT;
+  return name == "middle" ? GLFW_MOUSE_BUTTON_MIDDLE : GLFW_MOUSE_BUTTON_LEFT;
+}
+
+}  // namespace
+
+struct Window::State {
+  Library library;
+  std::unique_ptr<GLFWwindow, CloseWindow> window;
+  const DrawnScene* scene;
+  std::optional<FramePainter> painter;
+  Camera camera;
+  bool framed = false;  // the view has been chosen (needs the first snapshot: it has the tool's position)
+  bool painted = false;
+  Drag drag = Drag::none;
+  double x = 0.0, y = 0.0;  // of the pointer (pixels of the framebuffer)
+  glm::dvec3 grip_m{0.0};   // from the point under the pointer to the tool, at the start of the drag
+  // Tool's position at the start of the drag; the plane of the drag stays there. If the plane followed the
+  // device, contact could push the goal away.
+  glm::dvec3 drag_plane_m{0.0};
+  glm::dvec3 device_m{0.0};  // device position in the last frame
+  std::optional<glm::dvec3> goal_m;
+  ViewState user;
+  UiInput input;
+  bool wants_text = false;  // of the panel
+  TickHistory history;
+  Panels panels;
+  std::deque<ScriptEvent> events;
+  std::chrono::steady_clock::time_point last_frame = std::chrono::steady_clock::now();
+  bool visible = true;
+  int width = 0, height = 0;
+  FrameLayout layout;  // of the last frame
+
+  State(const DrawnScene& drawn, const WindowOptions& options)
+      : scene(&drawn), history(options.history_s), visible(options.visible) {
+    user.panels = options.panels;
+  }
+
+  static State& of(GLFWwindow* handle) { return *static_cast<State*>(glfwGetWindowUserPointer(handle)); }
+
+  // Pointer positions are in screen units, drawing is in pixels; on some displays they differ.
+  void pointer(double screen_x, double screen_y) {
+    int screen_width = 0;
+    int screen_height = 0;
+    glfwGetWindowSize(window.get(), &screen_width, &screen_height);
+    const double scale_x = screen_width > 0 ? static_cast<double>(width) / screen_width : 1.0;
+    const double scale_y = screen_height > 0 ? static_cast<double>(height) / screen_height : 1.0;
+    move_to(screen_x * scale_x, screen_y * scale_y);
+  }
+
+  void move_to(double to_x, double to_y) {
+    const double dx = to_x - x;
+    const double dy = to_y - y;
+    x = to_x;
+    y = to_y;
+    input.x = static_cast<float>(x);
+    input.y = static_cast<float>(y);
+    if (height <= 0) return;
+    constexpr double steepest = 89.0 * std::numbers::pi / 180.0;
+    switch (drag) {
+      case Drag::orbit:
+        camera.azimuth_rad -= 2.0 * std::numbers::pi * dx / std::max(width, 1);
+        camera.elevation_rad =
+            std::clamp(camera.elevation_rad + std::numbers::pi * dy / height, -steepest, steepest);
+        break;
+      case Drag::pan: {
+        const double per_pixel = camera.view_height_m() / std::max(layout.scene.height, 1);
+        camera.target_m += (camera.up() * dy - camera.right() * dx) * per_pixel;
+        break;
+      }
+      case Drag::tool:
+        goal_m = under_pointer() + grip_m;
+        break;
+      case Drag::none:
+        break;
+    }
+  }
+
+  // Point of the drag's plane that the scene shows under the pointer.
+  [[nodiscard]] glm::dvec3 under_pointer() const {
+    const PixelRect& view = layout.scene;
+    return camera.point_at({x - view.x, y - view.y}, view.width, view.height, drag_plane_m);
+  }
+
+  [[nodiscard]] bool over_panel() const {
+    return user.panels && layout.column.width > 0 && x >= layout.column.x && y >= layout.column.y;
+  }
+
+  void button(int which, bool pressed, bool shift) {
+    if (which > GLFW_MOUSE_BUTTON_MIDDLE) return;
+    input.press_button(static_cast<std::size_t>(which), pressed && over_panel());
+    if (!pressed) {
+      drag = Drag::none;
+      goal_m.reset();
+      return;
+    }
+    if (over_panel()) return;
+    input.by_keyboard = false;
+    if (which == GLFW_MOUSE_BUTTON_MIDDLE) {
+      drag = Drag::pan;
+    } else if (which == GLFW_MOUSE_BUTTON_RIGHT || (which == GLFW_MOUSE_BUTTON_LEFT && shift)) {
+      drag = Drag::tool;
+      // The drag starts from the tool's position: the tool does not jump to the pointer.
+      drag_plane_m = device_m;
+      grip_m = drag_plane_m - under_pointer();
+      goal_m = drag_plane_m;
+    } else if (which == GLFW_MOUSE_BUTTON_LEFT) {
+      drag = Drag::orbit;
+    }
+  }
+
+  void wheel(double turns) {
+    if (over_panel()) {
+      input.wheel += static_cast<float>(turns);
+      return;
+    }
+    camera.distance_m *= std::exp(-0.12 * std::clamp(turns, -10.0, 10.0));
+    camera.distance_m = std::clamp(camera.distance_m, 1e-9, 1e9);
+  }
+
+  // A key by its name. Keys that move among controls reach the panel only while it has the keyboard.
+  void key(std::string_view name, bool pressed) {
+    bool for_panel = false;
+    for (const NamedKey& k : kNamedKeys) {
+      if (k.name != name || k.ui < 0) continue;
+      for_panel = input.by_keyboard || wants_text;
+      input.press_key(static_cast<UiKey>(k.ui), pressed && for_panel);
+    }
+    for (const auto& [letter, k] : kLetters) {
+      if (name.size() == 1 && name[0] == letter) input.press_key(k, pressed && wants_text);
+    }
+    if (!pressed || wants_text) return;
+    if (name == "tab" && user.panels && !input.by_keyboard) {
+      input.by_keyboard = true;
+    } else if (name == "escape" && input.by_keyboard) {
+      input.by_keyboard = false;
+    } else if (!for_panel) {
+      if (const auto action = action_of_key(name, input.control, user)) hybrid::act(user, *action);
+    }
+  }
+
+  void glfw_key(int which, int action, int mods) {
+    input.control = (mods & GLFW_MOD_CONTROL) != 0;
+    input.shift = (mods & GLFW_MOD_SHIFT) != 0;
+    input.alt = (mods & GLFW_MOD_ALT) != 0;
+    if (action == GLFW_REPEAT) return;
+    for (const NamedKey& k : kNamedKeys) {
+      if (k.glfw == which) key(k.name, action == GLFW_PRESS);
+    }
+    const bool letter = which >= GLFW_KEY_A && which <= GLFW_KEY_Z;
+    if (!letter && (which < GLFW_KEY_0 || which > GLFW_KEY_9)) return;
+    const char name = static_cast<char>(letter ? 'a' + which - GLFW_KEY_A : '0' + which - GLFW_KEY_0);
+    key({&name, 1}, action == GLFW_PRESS);
+  }
+
+  // Turns an action of mouse or keyboard into events.
+  void enact(const ViewAction& action) {
+    using Kind = ScriptEvent::Kind;
+    const auto number = [&](std::size_t n) { return n < action.numbers.size() ? action.numbers[n] : 0.0; };
+    const auto add = [&](Kind kind, double at_x = 0.0, double at_y = 0.0) {
+      events.push_back({kind, at_x, at_y, button_named(action.text), action.text});
+    };
+    if (action.verb == ViewVerb::key) {
+      add(Kind::key_down);
+      add(Kind::next_frame);
+      add(Kind::key_up);
+    } else if (action.verb == ViewVerb::wheel) {
+      add(Kind::wheel, number(0));
+    } else {
+      const bool drags = action.verb == ViewVerb::drag;
+      add(Kind::move, number(0), number(1));
+      add(Kind::next_frame);
+      add(Kind::press);
+      add(Kind::next_frame);
+      for (int n = 1; drags && n <= kDragFrames; ++n) {
+        const double share = static_cast<double>(n) / kDragFrames;
+        add(Kind::move, number(0) + share * (number(2) - number(0)),
+            number(1) + share * (number(3) - number(1)));
+        add(Kind::next_frame);
+      }
+      add(Kind::release);
+    }
+    add(Kind::next_frame);
+  }
+
+  // The script's events of this frame.
+  void play_events() {
+    using Kind = ScriptEvent::Kind;
+    while (!events.empty()) {
+      const ScriptEvent event = events.front();
+      events.pop_front();
+      if (event.kind == Kind::next_frame) return;
+      if (event.kind == Kind::move) move_to(event.x, event.y);
+      if (event.kind == Kind::press || event.kind == Kind::release)
+        button(event.button, event.kind == Kind::press, false);
+      if (event.kind == Kind::key_down || event.kind == Kind::key_up)
+        key(event.key, event.kind == Kind::key_down);
+      if (event.kind == Kind::wheel) wheel(event.x);
+    }
+  }
+
+  void choose_view(const Snapshot& snapshot) {
+    if (!framed) user.look = "all";
+    if (user.look == "all") camera = frame_scene(*scene, snapshot, layout.aspect(), scene->path_m);
+    if (user.look == "contact") camera = frame_contact(*scene, snapshot, camera);
+    if (user.look.size() == 1) look_along(camera, user.look[0] - 'x');
+    user.look.clear();
+    framed = true;
+  }
+
+  void paint(const Snapshot& snapshot, const SessionNotes& notes) {
+    const PanelFrame panel{user, history, notes, input};
+    FrameOptions options;
+    options.width = std::min(width, kMostPixels);
+    options.height = std::min(height, kMostPixels);
+    options.inset = user.view.inset;
+    options.help = kWindowHelp;
+    options.paused = user.paused;
+    options.notice = notes.error.empty() ? notes.message : notes.error;
+    options.view = user.view;
+    panels.show(panel);
+    options.panel = user.panels && layout.column.width > 0 ? &panels : nullptr;
+    painter->paint(snapshot, camera, options);
+    painter->present(options.width, options.height);
+    const PanelResult asked = panels.take_result();
+    for (const ViewAction& action : asked.actions) hybrid::act(user, action);
+    wants_text = asked.wants_text;
+    input.end_frame();
+  }
+
+  // Hidden frames all last equally long, so that they are reproducible.
+  void measure_frame() {
+    const auto now = std::chrono::steady_clock::now();
+    const float real_s = std::chrono::duration<float>(now - std::exchange(last_frame, now)).count();
+    input.dt_s = visible ? std::min(real_s, kSlowest_s) : 1.0F / 60.0F;
+  }
+};
+
+Window::Window(const DrawnScene& scene, const WindowOptions& options) {
+  glfwSetErrorCallback(nullptr);  // errors are polled (glfw_reason), not printed
+  state_ = std::make_unique<State>(scene, options);
+  State& s = *state_;
+  glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
+  glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
+  glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
+  glfwWindowHint(GLFW_VISIBLE, options.visible ? GLFW_TRUE : GLFW_FALSE);
+  const std::string title = scene.title.empty() ? "hybrid" : scene.title + " - hybrid";
+  s.window.reset(glfwCreateWindow(std::clamp(options.width, 64, kMostPixels),
+                                  std::clamp(options.height, 64, kMostPixels), title.c_str(), nullptr,
+                                  nullptr));
+  if (!s.window) {
+    throw std::runtime_error(
+        "the display opens no OpenGL 3.3 window: " + glfw_reason() +
+        "; update the graphics driver, or set LIBGL_ALWAYS_SOFTWARE=1 to draw without it");
+  }
+  GLFWwindow* const handle = s.window.get();
+  glfwSetWindowUserPointer(handle, &s);
+  glfwSetCursorPosCallback(handle, [](GLFWwindow* w, double x, double y) { State::of(w).pointer(x, y); });
+  glfwSetMouseButtonCallback(handle, [](GLFWwindow* w, int b, int action, int mods) {
+    State::of(w).button(b, action == GLFW_PRESS, (mods & GLFW_MOD_SHIFT) != 0);
+  });
+  glfwSetKeyCallback(handle, [](GLFWwindow* w, int key, int, int action, int mods) {
+    State::of(w).glfw_key(key, action, mods);
+  });
+  glfwSetCharCallback(handle, [](GLFWwindow* w, unsigned int c) {
+    State& state = State::of(w);
+    if (state.wants_text) state.input.typed.push_back(static_cast<char32_t>(c));
+  });
+  glfwSetScrollCallback(handle, [](GLFWwindow* w, double, double y) { State::of(w).wheel(y); });
+  glfwMakeContextCurrent(handle);
+  glfwSwapInterval(options.visible ? 1 : 0);
+  glfwGetFramebufferSize(handle, &s.width, &s.height);
+  s.painter.emplace(scene, Samples::fast, s.height);
+}
+
+Window::~Window() = default;
+
+void Window::show_scene(const DrawnScene& scene) {
+  State& s = *state_;
+  glfwMakeContextCurrent(s.window.get());
+  s.painter->release();
+  s.scene = &scene;
+  s.painter.emplace(scene, Samples::fast, s.height);
+  s.history.clear();
+  if (s.user.selected != Edit::kTool && s.user.selected >= scene.objects.size())
+    s.user.selected = Edit::kTool;
+}
+
+bool Window::frame(const Snapshot& snapshot, const SessionNotes& notes) {
+  State& s = *state_;
+  GLFWwindow* const handle = s.window.get();
+  glfwPollEvents();
+  s.play_events();
+  if (s.user.quit || glfwWindowShouldClose(handle) == GLFW_TRUE) return false;
+  s.device_m = snapshot.device_m;
+  s.measure_frame();
+  glfwGetFramebufferSize(handle, &s.width, &s.height);
+  if (s.width < 1 || s.height < 1) return true;  // minimised: nothing to draw
+  s.layout = frame_layout(s.width, s.height, true, s.user.panels);
+  s.choose_view(snapshot);
+  glfwMakeContextCurrent(handle);
+  s.paint(snapshot, notes);
+  glfwSwapBuffers(handle);
+  s.painted = true;
+  return true;
+}
+
+void Window::add_ticks(TickSamples& samples) {
+  TickSample sample;
+  while (samples.pop(sample)) state_->history.add(sample);
+}
+
+void Window::act(const ViewAction& action) {
+  switch (action.verb) {
+    case ViewVerb::key:
+    case ViewVerb::click:
+    case ViewVerb::drag:
+    case ViewVerb::wheel:
+      state_->enact(action);
+      break;
+    default:
+      hybrid::act(state_->user, action);
+  }
+}
+
+WindowInput Window::take_input() {
+  State& s = *state_;
+  return {.dragged_goal_m = s.goal_m,
+          .paused = s.user.paused,
+          .speed = s.user.speed,
+          .restarts = s.user.restarts,
+          .single_ticks = s.user.single_ticks,
+          .edits = std::exchange(s.user.edits, {}),
+          .recording = std::exchange(s.user.recording, {}),
+          .save_scene = std::exchange(s.user.save_scene, false),
+          .reload = std::exchange(s.user.reload, false)};
+}
+
+std::optional<std::filesystem::path> Window::take_screenshot() {
+  return std::exchange(state_->user.screenshot, {});
+}
+
+Camera& Window::camera() {
+  return state_->camera;
+}
+
+void Window::save_frame(const std::filesystem::path& png) {
+  State& s = *state_;
+  if (!s.painted) throw std::runtime_error(png.string() + ": there is no frame to save yet; show one first");
+  glfwMakeContextCurrent(s.window.get());
+  save_png(png, std::min(s.width, kMostPixels), std::min(s.height, kMostPixels), s.painter->read_rgb());
+}
+
+}  // namespace hybrid

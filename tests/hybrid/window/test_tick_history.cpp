@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The charts' history: a short spike is in the columns at any frame rate and any width.
+#include "hybrid/window/tick_history.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace {
+
+using hybrid::ForceSeries;
+
+constexpr double kTick_s = 1e-3;
+
+hybrid::TickSample sample(int tick, float total_N) {
+  return {
+      .t_s = tick * kTick_s, .total_N = total_N, .rigid_N = 0.5F * total_N, .soft_N = 0.0F, .tick_us = 50.0F};
+}
+
+float most_in(const hybrid::TickHistory& history, ForceSeries series, std::size_t count) {
+  float most = 0.0F;
+  for (const auto& column : history.columns(series, count))
+    most = std::max(most, column ? column->most_N : 0.0F);
+  return most;
+}
+
+// The servo side fills the ring; the window empties it once a frame.
+TEST(TickHistory, ASpikeOfTwoTicksIsInTheColumnsAtAnyFrameRate) {
+  for (const int ticks_a_frame : {1, 7, 16, 17, 100, 900}) {
+    for (const std::size_t width : {std::size_t{1}, std::size_t{40}, std::size_t{333}, std::size_t{5000}}) {
+      hybrid::TickSamples ring(1000);
+      hybrid::TickHistory history(5.0);
+      for (int tick = 0; tick < 4000; ++tick) {
+        const bool spike = tick == 2500 || tick == 2501;
+        ASSERT_TRUE(ring.push(sample(tick, spike ? 6.0F : 1.0F)));
+        hybrid::TickSample taken;
+        if (tick % ticks_a_frame == ticks_a_frame - 1)
+          while (ring.pop(taken)) history.add(taken);
+      }
+      hybrid::TickSample taken;
+      while (ring.pop(taken)) history.add(taken);
+      EXPECT_EQ(most_in(history, ForceSeries::total, width), 6.0F) << ticks_a_frame << ", " << width;
+      EXPECT_EQ(most_in(history, ForceSeries::rigid, width), 3.0F);
+      // Elsewhere the columns are those without the spike.
+      const auto columns = history.columns(ForceSeries::total, width);
+      const auto high =
+          std::count_if(columns.begin(), columns.end(), [](const auto& c) { return c && c->most_N > 1.0F; });
+      EXPECT_LE(high, 2);
+      if (width > 2) {
+        EXPECT_EQ(columns.back()->least_N, 1.0F);
+      }
+    }
+  }
+}
+
+TEST(TickHistory, AFullRingRefusesAndCountsAndDoesNotWait) {
+  hybrid::TickSamples ring(100);
+  for (int tick = 0; tick < 250; ++tick) ring.push(sample(tick, 1.0F));
+  EXPECT_EQ(ring.refused(), 150U);
+}
+
+TEST(TickHistory, KeepsItsSecondsAndBeginsAnew) {
+  hybrid::TickHistory history(0.9995);
+  for (int tick = 0; tick < 5000; ++tick) history.add(sample(tick, 1.0F));
+  EXPECT_EQ(history.times().ticks, 1000U);
+  EXPECT_DOUBLE_EQ(history.end_s(), 4.999);
+  history.add(sample(10, 2.0F));
+  EXPECT_EQ(history.times().ticks, 1U);
+  history.add(sample(11, NAN));
+  EXPECT_EQ(most_in(history, ForceSeries::total, 10), 2.0F);
+}
+
+TEST(TickHistory, TimesAreThoseOfASortedList) {
+  hybrid::TickHistory history(10.0);
+  for (int tick = 0; tick < 1000; ++tick) {
+    hybrid::TickSample one = sample(tick, 1.0F);
+    one.tick_us = static_cast<float>(1 + tick);
+    one.stage_us[2] = 30.0F;
+    one.late = tick % 100 == 0;
+    history.add(one);
+  }
+  const hybrid::TickTimes times = history.times();
+  EXPECT_NEAR(times.p50_us, 501.0, 1.0);
+  EXPECT_NEAR(times.p99_us, 991.0, 1.0);
+  EXPECT_EQ(times.most_us, 1000.0);
+  EXPECT_EQ(times.late, 10U);
+  EXPECT_DOUBLE_EQ(times.stage_us[2], 30.0);
+  std::uint64_t in_bins = 0;
+  for (const std::uint64_t bin : times.bins) in_bins += bin;
+  EXPECT_EQ(in_bins, 1000U);
+  EXPECT_EQ(hybrid::TickTimes::bin_of(0.0), 0U);
+  EXPECT_EQ(hybrid::TickTimes::bin_of(1e9), hybrid::TickTimes::kBins - 1);
+}
+
+}  // namespace

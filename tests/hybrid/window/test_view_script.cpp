@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Scripts of a window: what each command does, and what is refused, with its line.
+#include "hybrid/window/view_script.h"
+
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+
+#include "hybrid/window/window_keys.h"
+
+namespace {
+
+using hybrid::Edit;
+using hybrid::EditedQuantity;
+using hybrid::ViewScript;
+using hybrid::ViewVerb;
+
+hybrid::DrawnScene drawn() {
+  hybrid::DrawnScene scene;
+  scene.objects.resize(2);
+  scene.objects[0].name = "bone";
+  scene.objects[1].name = "left lung";
+  scene.editable = {
+      {.object = Edit::kTool,
+       .quantity = EditedQuantity::coupling_stiffness,
+       .range = {1.0, 2000.0},
+       .in_scene = 800.0},
+      {.object = 0, .quantity = EditedQuantity::texture_height, .range = {0.0, 1e-3}, .in_scene = 1e-4}};
+  return scene;
+}
+
+std::string refusal_of_script(const std::string& text) {
+  try {
+    const ViewScript script(text, "tour.txt", drawn());
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return {};
+}
+
+TEST(ViewScript, PlaysEachActionOnceInItsTime) {
+  ViewScript script(
+      "# a tour\n0 select \"left lung\"\n\n0.5 edit bone texture-height 0.25  # mm\n0.5 hide bone\n1 clip y "
+      "0.25\n"
+      "2 drag 10 20 30 40 right\n2 quit",
+      "tour.txt", drawn());
+  ASSERT_EQ(script.size(), 8U) << "a clip is three actions";
+  EXPECT_EQ(script.due(0.4).size(), 1U);
+  EXPECT_EQ(script.due(0.4).size(), 0U);
+  const auto at_half = script.due(0.5);
+  ASSERT_EQ(at_half.size(), 2U);
+  EXPECT_DOUBLE_EQ(at_half[0].numbers[0], 0.25e-3);
+  EXPECT_EQ(at_half[0].object, 0U);
+  hybrid::ViewState state;
+  for (const auto& action : at_half) hybrid::act(state, action);
+  ASSERT_EQ(state.edits.size(), 1U);
+  EXPECT_EQ(state.edits[0].quantity, EditedQuantity::texture_height);
+  EXPECT_FALSE(state.view.look_of(0).visible);
+  EXPECT_TRUE(state.view.look_of(1).visible);
+  for (const auto& action : script.due(5.0)) hybrid::act(state, action);
+  EXPECT_TRUE(state.view.clip.on);
+  EXPECT_EQ(state.view.clip.axis, 1);
+  EXPECT_EQ(state.view.clip.share, 0.25);
+  EXPECT_TRUE(state.quit);
+}
+
+TEST(ViewScript, RefusesWithTheLineAndWhatWouldDo) {
+  const std::vector<std::pair<std::string, std::string>> wrong{
+      {"0 pause on\n0.1 jump",
+       "tour.txt:2: there is no command 'jump'; write a time and one of these: pause"},
+      {"x pause", "tour.txt:1: 'x' is no number"},
+      {"\n-1 pause", "tour.txt:2: '-1' is no number"},
+      {"1 pause\n0.5 step", "tour.txt:2: the time is before"},
+      {"0 hide skull", "tour.txt:1: there is no object 'skull'; the scene has bone, left lung"},
+      {"0 edit tool stiffness 1e9",
+       "tour.txt:1: '1e9' is no number that is allowed there; for example: edit"},
+      {"0 edit tool damping 1",
+       "tour.txt:1: 'tool' has no value 'damping' that can be edited; it has stiffness"},
+      {"0 edit tool stiffness", "tour.txt:1: 'edit' has 2 arguments"},
+      {"0 edit bone texture-height nan", "tour.txt:1: 'nan' is no number"},
+      {"0 look up", "tour.txt:1: 'up' is not known there; for example: look contact"},
+      {"0 clip w 0.5", "tour.txt:1: 'w' is no axis"},
+      {"0 key f13", "tour.txt:1: there is no key 'f13'"},
+      {"0 step 3", "tour.txt:1: 'step' has 1 arguments"},
+      {"0", "tour.txt:1: there is no command;"}};
+  for (const auto& [text, words] : wrong) {
+    EXPECT_EQ(refusal_of_script(text).substr(0, words.size()), words);
+  }
+  EXPECT_EQ(refusal_of_script(""), "");
+}
+
+TEST(WindowKeys, DoWhatTheButtonsDo) {
+  hybrid::ViewState state;
+  const auto press = [&state](std::string_view key, bool control = false) {
+    const auto action = hybrid::action_of_key(key, control, state);
+    if (action) hybrid::act(state, *action);
+    return action.has_value();
+  };
+  EXPECT_TRUE(press("space"));
+  EXPECT_TRUE(state.paused);
+  EXPECT_TRUE(press("space"));
+  EXPECT_FALSE(state.paused);
+  EXPECT_TRUE(press("n"));
+  EXPECT_TRUE(state.paused) << "one tick, then it waits";
+  EXPECT_EQ(state.single_ticks, 1U);
+  EXPECT_TRUE(press("3"));
+  EXPECT_EQ(state.speed, 0.01);
+  EXPECT_TRUE(press("]"));
+  EXPECT_NEAR(state.view.clip.share, 0.52, 1e-12);
+  EXPECT_FALSE(press("s")) << "saving over the scene's file needs control";
+  EXPECT_FALSE(state.save_scene);
+  EXPECT_TRUE(press("s", true));
+  EXPECT_TRUE(state.save_scene);
+  EXPECT_FALSE(press("tab"));
+  EXPECT_TRUE(hybrid::is_key("tab"));
+  EXPECT_FALSE(hybrid::is_key("q"));
+}
+
+TEST(ClipPlane, KeepsTheSideBeforeIt) {
+  const hybrid::SceneBounds bounds{{0.1, 0.0, 0.0}, 0.05};
+  hybrid::ClipPlane clip{.on = true, .axis = 0, .share = 0.75};
+  EXPECT_NEAR(hybrid::clip_place_m(clip, bounds), 0.125, 1e-12);
+  const auto side = [&](double x, const glm::dvec3& origin) {
+    const auto plane = hybrid::clip_equation(clip, bounds, origin);
+    return plane->x * static_cast<float>(x - origin.x) + plane->w;
+  };
+  for (const double origin : {0.0, 0.1}) {
+    EXPECT_GT(side(0.12, {origin, 0, 0}), 0.0F);
+    EXPECT_LT(side(0.13, {origin, 0, 0}), 0.0F);
+  }
+  clip.other_side = true;
+  EXPECT_GT(side(0.13, {0, 0, 0}), 0.0F);
+  clip.on = false;
+  EXPECT_FALSE(hybrid::clip_equation(clip, bounds, {}).has_value());
+}
+
+}  // namespace
