@@ -125,12 +125,13 @@ const std::map<std::string, std::vector<Room>>& rooms() {
         {"view", {"snapshot"}},
         {"plot", {"session", "view"}},
         {"compare", {"session", "view"}},
+        {"tune", {"compare", "plot"}},
         {"compose", {"session", "view"}},
         {"stress", {"session", "view"}},
         {"bench/reports", {}},
         {"bench", {"plot", "compare", "compose", "stress"}},
         {"stability", {"plot", "compare", "compose", "stress"}},
-        {"program", {"bench", "bench/reports", "stability"}}}},
+        {"program", {"bench", "bench/reports", "stability", "tune"}}}},
   };
   return kRooms;
 }

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/tune/truth.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace hybrid {
+namespace {
+
+// Of the error, in the spacing and in the speed. A voxel surface lies within half a spacing of the true one,
+// and the edge of a contact is known to a spacing: both are of first order, whatever the energy. Tissue that
+// relaxes for n times as long lags by 1/n.
+constexpr double kOrder = 1.0;
+constexpr double kCoarser = 2.0;    // a smaller ratio of spacings would amplify the noise of the grid's place
+constexpr double kSlowPlays = 0.4;  // share of a path with contact, for the weight of a slow run
+constexpr double kWeightPower = 1.5;  // of 1/scale: voxels near the contact cost, not all of them
+
+nlohmann::json course_json(const ForceCourse& course) {
+  nlohmann::json j = nlohmann::json::array();
+  for (const CourseTick& t : course) {
+    j.push_back({t.device_m.x, t.device_m.y, t.device_m.z, t.force_N.x, t.force_N.y, t.force_N.z,
+                 t.soft ? 1.0 : 0.0});
+  }
+  return j;
+}
+
+ForceCourse course_from(const nlohmann::json& j) {
+  ForceCourse course;
+  for (const auto& row : j) {
+    const auto t = row.get<std::array<double, 7>>();
+    course.push_back({{t[0], t[1], t[2]}, {t[3], t[4], t[5]}, t[6] != 0.0});
+  }
+  return course;
+}
+
+FeltError times(FeltError error, double factor) {
+  error.p50_jnd *= factor;
+  error.p99_jnd *= factor;
+  error.max_jnd *= factor;
+  return error;
+}
+
+// The error of the better of two runs, from their difference: their errors are as 1 to ratio^order.
+SettingError richardson(const SettingError& difference, double ratio) {
+  const double factor = 1.0 / (std::pow(ratio, kOrder) - 1.0);
+  return {times(difference.moving, factor), times(difference.still, factor)};
+}
+
+Setting at_scale(const std::vector<TunableObject>& objects, double scale) {
+  Setting setting;
+  for (const TunableObject& object : objects) setting.objects.push_back(scaled(object, scale));
+  return setting;
+}
+
+Setting coarser(const std::vector<TunableObject>& objects, const Setting& setting) {
+  Setting coarse;
+  for (std::size_t n = 0; n < objects.size(); ++n)
+    coarse.objects.push_back(scaled(objects[n], kCoarser * scale_of(objects[n], setting.objects[n])));
+  return coarse;
+}
+
+// Geometric mean over the objects of how much coarser one setting is than the other.
+double ratio_of(const std::vector<TunableObject>& objects, const Setting& coarse, const Setting& fine) {
+  double sum = 0.0;
+  for (std::size_t n = 0; n < objects.size(); ++n) {
+    sum += std::log(scale_of(objects[n], coarse.objects[n]) / scale_of(objects[n], fine.objects[n]));
+  }
+  return std::exp(sum / static_cast<double>(objects.size()));
+}
+
+}  // namespace
+
+double play_weight(double scale) {
+  return std::pow(scale, -kWeightPower);
+}
+
+double Truth::error_jnd() const {
+  return std::max(spacing.moving.p99_jnd + rest.moving.p99_jnd, spacing.still.p99_jnd + rest.still.p99_jnd);
+}
+
+ForceCourse slow_course(const TruthPlan& plan, const Setting& setting, const Motion& motion,
+                        const std::string& motion_words, int slower, const EvaluationCache& cache,
+                        const Step& step) {
+  const std::string key =
+      fmt::format("slow {} {} {}\n{}", slower, motion.ticks, motion_words, as_toml(setting));
+  ForceCourse course;
+  const double scale = scale_of(plan.objects.front(), setting.objects.front());
+  const std::string words = fmt::format("the truth at {:.2g} of the own spacing, {} times slower{}", scale,
+                                        slower, motion_words.empty() ? "" : ", " + motion_words);
+  step(words, play_weight(scale) * (1.0 + kSlowPlays * slower), [&](const Progress& progress) {
+    if (const auto kept = cache.find(key)) {
+      course = course_from(*kept);
+      return;
+    }
+    course = play_slowly(as_reference(plan.as_read, setting), plan.names, motion, slower, progress);
+    cache.keep(key, course_json(course));
+  });
+  return course;
+}
+
+Truth measure_truth(const TruthPlan& plan, const Motion& motion, const EvaluationCache& cache,
+                    const Step& step) {
+  Truth truth;
+  truth.setting = at_scale(plan.objects, plan.scale);
+  const Setting coarse = coarser(plan.objects, truth.setting);
+  truth.ratio = ratio_of(plan.objects, coarse, truth.setting);
+  Setting shown = truth.setting;
+  const Scene exact = as_reference(plan.as_read, truth.setting);
+  for (ObjectSetting& object : shown.objects) {
+    const auto soft = std::ranges::find(exact.soft, object.object, &SoftDescription::name);
+    object = {object.object, false, object.spacing, soft->energy};
+  }
+  truth.words = in_words(shown, plan.as_read.unit_m);
+  truth.key = fmt::format("{}{}", as_toml(truth.setting), motion.ticks);
+  const auto course = [&](const Setting& setting, int slower) {
+    return slow_course(plan, setting, motion, "", slower, cache, step);
+  };
+  const ForceCourse coarse_course = course(coarse, kSlower);
+  const ForceCourse coarse_slower = course(coarse, 2 * kSlower);
+  truth.course = course(truth.setting, kSlower);
+  truth.spacing = richardson(felt_error(coarse_course, truth.course, plan.floor_N, plan.dt_s), truth.ratio);
+  // The difference of the two speeds is half of the faster one's error, to which the ratio 2 belongs.
+  const SettingError half = felt_error(coarse_course, coarse_slower, plan.floor_N, plan.dt_s);
+  truth.rest = {times(half.moving, 2.0), times(half.still, 2.0)};
+  return truth;
+}
+
+}  // namespace hybrid
