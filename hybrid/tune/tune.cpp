@@ -5,7 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <glm/geometric.hpp>
+#include <glm/common.hpp>
 #include <stdexcept>
 
 #include "device/loop/stop_signal.h"
@@ -84,8 +84,9 @@ class Search {
 
   void plan(const std::vector<Setting>& settings) {
     const double scale = truth_scale();
-    // Two runs at twice the scale and two, with the confirming one, at the scale; all of them slow.
-    progress_.plan(2.0 * 5.0 * play_weight(scale) + (5.0 + 9.0) * play_weight(2.0 * scale));
+    // The truth, that of the confirming motion, and the two runs for its error.
+    progress_.plan((1.0 + 1.0 / kOtherSpeed) * slow_weight(scale, kTruthSlower) +
+                   slow_weight(scale, kTruthSlower / 2) + slow_weight(2.0 * scale, kTruthSlower));
     for (const Setting& setting : settings)
       progress_.plan(weight(setting) * (kFirstShare + static_cast<double>(passes())));
   }
@@ -97,13 +98,12 @@ class Search {
     double voxels = 0.0;
     for (const auto& object : built.state->soft)
       voxels += static_cast<double>(object->lattice().voxel_count());
-    const double wanted = options_.quick ? kQuickTruthScale : kTruthScale;
-    truth_scale_ = std::max(wanted, std::cbrt(voxels / kMostTruthVoxels));
-    if (truth_scale_ > wanted) {
+    truth_scale_ = std::max(kTruthScale, std::cbrt(voxels / kMostTruthVoxels));
+    if (truth_scale_ > kTruthScale) {
       result_.notes.push_back(
           fmt::format("the truth has {:.2f} of the own spacing, not {:.2f}: it would have more than {:.0f} "
                       "million voxels",
-                      truth_scale_, wanted, 1e-6 * kMostTruthVoxels));
+                      truth_scale_, kTruthScale, 1e-6 * kMostTruthVoxels));
     }
     return truth_scale_;
   }
@@ -282,16 +282,15 @@ class Search {
     for (Trial& trial : trials_) result_.settings.push_back(std::move(trial.tuned));
   }
 
-  // Sideways: across the mean force of the truth.
+  // Sideways: along the axis of the scene in which the truth's mean force is least.
   [[nodiscard]] glm::dvec3 sideways_m() const {
     glm::dvec3 force(0.0);
     for (const CourseTick& tick : result_.truth.course) {
       if (tick.soft) force += tick.force_N;
     }
-    const glm::dvec3 axis =
-        std::fabs(force.x) < 0.5 * glm::length(force) ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
-    const glm::dvec3 across = glm::cross(force, axis);
-    const glm::dvec3 unit = glm::length(across) > 0.0 ? glm::normalize(across) : axis;
+    force = glm::abs(force);
+    glm::dvec3 unit(0.0);
+    unit[force.x <= std::min(force.y, force.z) ? 0 : force.y <= force.z ? 1 : 2] = 1.0;
     const TunableObject& object = result_.objects.front();
     const glm::dvec3& spacing = object.own.spacing == glm::dvec3(0.0) ? object.finest : object.own.spacing;
     return kOtherWay * std::cbrt(spacing.x * spacing.y * spacing.z) * as_read_.unit_m * unit;
@@ -302,7 +301,7 @@ class Search {
       try {
         const glm::dvec3 offset_m = side * sideways_m();
         const std::string words =
-            fmt::format("the path {} times faster, moved by ({:.2g}, {:.2g}, {:.2g}) mm", kOtherSpeed,
+            fmt::format("the path {} times faster, moved by ({:.3g}, {:.3g}, {:.3g}) mm", kOtherSpeed,
                         1e3 * offset_m.x, 1e3 * offset_m.y, 1e3 * offset_m.z);
         confirm_on(other_motion(motion_, as_read_.rate_hz, offset_m), words);
         return;
@@ -317,7 +316,7 @@ class Search {
     Confirmation& confirmation = result_.confirmation;
     confirmation.motion = words;
     const ForceCourse truth =
-        slow_course(truth_plan(), result_.truth.setting, motion, words, kSlower, cache_, step_);
+        slow_course(truth_plan(), result_.truth.setting, motion, words, kTruthSlower, cache_, step_);
     const auto felt = [](const ForceCourse& course) {
       return static_cast<double>(std::ranges::count_if(course, &CourseTick::soft));
     };

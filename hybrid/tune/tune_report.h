@@ -18,7 +18,8 @@ std::string tune_words(const TuneResult& result);
 // Keys of `hybrid tune --json`, to be added to report_head().
 nlohmann::ordered_json tune_json(const TuneResult& result);
 
-// Whether the passes of two settings overlap, so that the machine's noise hides which one is cheaper.
-bool cost_overlaps(const TunedSetting& a, const TunedSetting& b);
+// Whether the machine's noise hides which of two settings is cheaper: in more than a quarter of the passes,
+// which are played in turns, the order of their p99.9 is another one.
+bool cost_hidden(const TunedSetting& a, const TunedSetting& b);
 
 }  // namespace hybrid
