@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 
 namespace hybrid {
 namespace {
@@ -109,51 +110,53 @@ ForceCourse slow_course(const TruthPlan& plan, const Setting& setting, const Mot
 
 namespace {
 
-double rest_jnd(const Truth& truth) {
-  return truth.rest.worst_jnd();
+using Course = std::function<ForceCourse(const Setting& setting, int slower)>;
+
+SettingError differs(const ForceCourse& other, const Truth& truth, const TruthPlan& plan) {
+  return felt_error(other, truth.course, plan.floor_N, plan.dt_s);
 }
 
-Truth truth_at(const TruthPlan& plan, double scale, const Motion& motion, const EvaluationCache& cache,
-               const Step& step) {
+Truth truth_at(const TruthPlan& plan, const Setting& setting, const Course& course) {
   Truth truth;
-  truth.setting = at_scale(plan.objects, scale);
-  const Setting coarse = coarser(plan.objects, truth.setting);
-  truth.ratio = ratio_of(plan.objects, coarse, truth.setting);
-  Setting shown = truth.setting;
-  const Scene exact = as_reference(plan.as_read, truth.setting);
+  truth.setting = setting;
+  truth.course = course(setting, kTruthSlower);
+  truth.rest = richardson(differs(course(setting, kTruthSlower / 2), truth, plan), 2.0, kRestOrder);
+  return truth;
+}
+
+std::string words_of(const TruthPlan& plan, const Setting& setting) {
+  const Scene exact = as_reference(plan.as_read, setting);
+  Setting shown = setting;
   for (ObjectSetting& object : shown.objects) {
     const auto soft = std::ranges::find(exact.soft, object.object, &SoftDescription::name);
     object = {object.object, false, object.spacing, soft->energy};
   }
-  truth.words = in_words(shown, plan.as_read.unit_m);
-  truth.key = fmt::format("{}{}", as_toml(truth.setting), motion.ticks);
-  const auto course = [&](const Setting& setting, int slower) {
-    return slow_course(plan, setting, motion, "", slower, cache, step);
-  };
-  const auto differs = [&](const ForceCourse& other) {
-    return felt_error(other, truth.course, plan.floor_N, plan.dt_s);
-  };
-  truth.course = course(truth.setting, kTruthSlower);
-  truth.spacing = richardson(differs(course(coarse, kTruthSlower)), truth.ratio, kSpacingOrder);
-  truth.rest = richardson(differs(course(truth.setting, kTruthSlower / 2)), 2.0, kRestOrder);
-  return truth;
+  return in_words(shown, plan.as_read.unit_m);
 }
 
 }  // namespace
 
 Truth measure_truth(const TruthPlan& plan, const Motion& motion, const EvaluationCache& cache,
                     const Step& step) {
-  Truth best = truth_at(plan, plan.scale, motion, cache, step);
-  std::vector<Setting> tried{best.setting};
+  const Course course = [&](const Setting& setting, int slower) {
+    return slow_course(plan, setting, motion, "", slower, cache, step);
+  };
+  Truth truth = truth_at(plan, at_scale(plan.objects, plan.scale), course);
+  std::vector<Setting> tried{truth.setting};
   for (const double other : kOtherTruthScales) {
-    if (rest_jnd(best) <= kAtRest_jnd) break;
+    if (truth.rest.worst_jnd() <= kAtRest_jnd) break;
     const Setting setting = at_scale(plan.objects, other * plan.scale);
     if (std::ranges::find(tried, setting) != tried.end()) continue;
     tried.push_back(setting);
-    Truth truth = truth_at(plan, other * plan.scale, motion, cache, step);
-    if (rest_jnd(truth) <= kAtRest_jnd || truth.error_jnd() < best.error_jnd()) best = std::move(truth);
+    Truth next = truth_at(plan, setting, course);
+    if (next.rest.worst_jnd() < truth.rest.worst_jnd()) truth = std::move(next);
   }
-  return best;
+  const Setting coarse = coarser(plan.objects, truth.setting);
+  truth.ratio = ratio_of(plan.objects, coarse, truth.setting);
+  truth.spacing = richardson(differs(course(coarse, kTruthSlower), truth, plan), truth.ratio, kSpacingOrder);
+  truth.words = words_of(plan, truth.setting);
+  truth.key = fmt::format("{}{}", as_toml(truth.setting), motion.ticks);
+  return truth;
 }
 
 }  // namespace hybrid

@@ -18,7 +18,7 @@ namespace hybrid {
 inline constexpr double kTruthScale = 0.75;
 // At some spacings accurate energy never rests under the tool: its force keeps jumping from voxel to voxel.
 // Then these are tried, in this order, times the first one.
-inline constexpr double kOtherTruthScales[] = {7.0 / 6.0, 5.0 / 6.0, 4.0 / 3.0};
+inline constexpr double kOtherTruthScales[] = {7.0 / 6.0, 4.0 / 3.0};
 inline constexpr double kAtRest_jnd = 0.5;        // error of its rest that a truth may have
 inline constexpr int kTruthSlower = 2 * kSlower;  // times
 
@@ -51,8 +51,8 @@ ForceCourse slow_course(const TruthPlan& plan, const Setting& setting, const Mot
                         const std::string& motion_words, int slower, const EvaluationCache& cache,
                         const Step& step);
 
-// The truth at the first of its spacings that comes to rest; if none does, at the one with the least error.
-// Its own error is extrapolated (Richardson) from two more runs: one with voxels twice as wide, and one
+// The truth at the first of its spacings that comes to rest; if none does, at the one that is nearest to
+// rest. Its own error is extrapolated (Richardson) from two more runs: one with voxels twice as wide, and one
 // played twice as fast.
 Truth measure_truth(const TruthPlan& plan, const Motion& motion, const EvaluationCache& cache,
                     const Step& step);

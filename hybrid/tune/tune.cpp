@@ -176,6 +176,7 @@ class Search {
       if (!trial.tuned.whole()) continue;
       Evaluation whole = evaluate(trial.tuned.setting, motion_, "", result_.truth.course, 0);
       trial.passes = {whole.tick_us};
+      trial.tuned.whole_session = whole.refused.empty();
       take(trial, whole);
     }
     leave_out(0, kMarginOfWhole, "after one session");

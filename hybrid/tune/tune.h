@@ -14,18 +14,19 @@ namespace hybrid {
 
 struct TuneOptions {
   double error_jnd = 1.0;
-  std::optional<double> budget_us;  // of a tick's p99.9; default: half of the device's period
-  bool quick = false;               // fewer settings, a coarser truth
-  std::filesystem::path cache;      // empty: nothing is kept
-  Progress progress;
+  std::optional<double> budget_us{};  // of a tick's p99.9; default: half of the device's period
+  bool quick = false;                 // fewer settings, a coarser truth
+  std::filesystem::path cache{};      // empty: nothing is kept
+  Progress progress{};
 };
 
 struct TunedSetting {
   Setting setting;
   std::string words;
-  bool own = false;      // as the scene has it
-  std::string left_out;  // why it was not played to the end; empty: it was
-  SettingError error;    // against the truth; of a part of the motion where it was left out
+  bool own = false;            // as the scene has it
+  std::string left_out;        // why it was not played to the end; empty: it was
+  bool whole_session = false;  // it was played over the whole motion at least once
+  SettingError error;          // against the truth; of a part of the motion where it was left out
   // Each tick does the same work in every pass: percentiles of the ticks' medians over the passes.
   Percentiles tick_us;
   std::vector<double> pass_p999_us;  // p99.9 of each pass by itself: the noise of the machine

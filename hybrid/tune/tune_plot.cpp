@@ -18,7 +18,8 @@ constexpr double kWidth = 960.0, kHeight = 620.0;
 constexpr double kLeft = 76.0, kRight = 930.0, kTop = 70.0, kBottom = 560.0;
 constexpr double kSmallestMark = 4.0, kLargestMark = 14.0;  // radius
 constexpr double kLetterWidth = 6.0;
-constexpr double kMargin = 1.3;       // of the axes, beyond the outermost values
+constexpr int kTicks = 16;
+constexpr double kMargin = 1.5;       // of the axes, beyond the outermost values
 constexpr double kLeastShown = 0.01;  // JND: a smaller error is drawn here
 constexpr const char* kGrey = "#b5bac1";
 
@@ -54,7 +55,8 @@ class TunePlot {
   }
 
  private:
-  static bool drawn(const TunedSetting& s) { return s.whole() && s.tick_us.p999 > 0.0; }
+  static bool drawn(const TunedSetting& s) { return s.whole_session && s.tick_us.p999 > 0.0; }
+  static bool beaten(const TunedSetting& s) { return !s.whole() || s.dominated_by.has_value(); }
   static double error_of(const TunedSetting& s) { return std::max(s.error.worst_jnd(), kLeastShown); }
   [[nodiscard]] double x_of(const TunedSetting& s) const { return x_.page(s.tick_us.p999); }
   [[nodiscard]] double y_of(const TunedSetting& s) const { return y_.page(error_of(s)); }
@@ -64,12 +66,12 @@ class TunePlot {
   }
 
   void draw_axes() {
-    for (const double tick : x_.ticks(8)) {
+    for (const double tick : x_.ticks(kTicks)) {
       const double x = x_.page(tick);
       svg_.line(x, kTop, x, kBottom, "#dddddd", "stroke-width=\"0.6\"");
       svg_.text(x, kBottom + 18.0, tick_text(tick, tick), "class=\"t\" text-anchor=\"middle\"");
     }
-    for (const double tick : y_.ticks(8)) {
+    for (const double tick : y_.ticks(kTicks)) {
       const double y = y_.page(tick);
       svg_.line(kLeft, y, kRight, y, "#dddddd", "stroke-width=\"0.6\"");
       svg_.text(kLeft - 8.0, y + 4.0, tick_text(tick, tick), "class=\"t\" text-anchor=\"end\"");
@@ -88,7 +90,7 @@ class TunePlot {
     const double x = x_.page(result_.bounds.budget_us), y = y_.page(result_.bounds.error_jnd);
     svg_.line(x, kTop, x, kBottom, "#D55E00", "stroke-dasharray=\"5 4\"");
     svg_.line(kLeft, y, kRight, y, "#009E73", "stroke-dasharray=\"5 4\"");
-    svg_.text(x - 5.0, kBottom - 8.0, fmt::format("budget {:.0f} µs", result_.bounds.budget_us),
+    svg_.text(x - 5.0, kTop + 16.0, fmt::format("budget {:.0f} µs", result_.bounds.budget_us),
               "class=\"t h\" text-anchor=\"end\"");
     svg_.text(kLeft + 6.0, y - 5.0, fmt::format("{:.2g} JND", result_.bounds.error_jnd), "class=\"t h\"");
   }
@@ -110,7 +112,7 @@ class TunePlot {
 
   void draw_marks() {
     for (const TunedSetting& s : result_.settings) {
-      if (drawn(s) && s.dominated_by) mark(s, fmt::format("fill=\"{}\"", kGrey));
+      if (drawn(s) && beaten(s)) mark(s, fmt::format("fill=\"{}\"", kGrey));
     }
     for (const std::size_t n : result_.front) {
       if (drawn(result_.settings[n]))
@@ -145,10 +147,9 @@ class TunePlot {
       if (from < b && from + width > a && std::fabs(y - at) < 13.0) return;
     }
     names_.push_back({from, from + width, y});
-    svg_.text(
-        x, y, words,
-        fmt::format("class=\"t h{}\" text-anchor=\"{}\"", s.dominated_by ? " p" : "", left ? "end" : "start")
-            .c_str());
+    svg_.text(x, y, words,
+              fmt::format("class=\"t h{}\" text-anchor=\"{}\"", beaten(s) ? " p" : "", left ? "end" : "start")
+                  .c_str());
   }
 
   [[nodiscard]] std::string whole(const std::string& title) const {

@@ -97,21 +97,21 @@ std::string cells(const TunedSetting& s, const char* mark, const std::string& wo
                      1e-6 * static_cast<double>(s.memory_bytes), s.soft_voxels);
 }
 
-std::string words_of(const TunedSetting& s) {
+std::string marked_words(const TunedSetting& s) {
   return s.words + (s.own ? " (as it is)" : "");
 }
 
 std::string table_of_front(const TuneResult& result) {
   std::size_t width = 7;
   for (const TunedSetting& s : result.settings)
-    width = std::max(width, std::min(words_of(s).size(), kMostWidth));
+    width = std::max(width, std::min(marked_words(s).size(), kMostWidth));
   std::string text = fmt::format("  {:<{}} {:>7} {:>7} {:>24} {:>13} {:>8} {:>9}\n", "setting", width,
                                  "moving", "still", "tick us", "p99.9 of", "MB", "voxels");
   text += fmt::format("  {:<{}} {:>7} {:>7} {:>24} {:>13}\n", "", width, "JND p99", "JND p99",
                       "p50/p99/p99.9/max", "single passes");
   for (const std::size_t n : result.front) {
     const TunedSetting& s = result.settings[n];
-    text += cells(s, n == result.chosen ? "*" : " ", words_of(s), width);
+    text += cells(s, n == result.chosen ? "*" : " ", marked_words(s), width);
   }
   bool any = false;
   for (std::size_t n = 0; n < result.settings.size(); ++n) {
@@ -119,7 +119,7 @@ std::string table_of_front(const TuneResult& result) {
     if (!s.whole() || !s.dominated_by) continue;
     if (!any) text += "dominated: another one is as cheap and as accurate\n";
     any = true;
-    text += cells(s, n == result.chosen ? "*" : "-", words_of(s), width);
+    text += cells(s, n == result.chosen ? "*" : "-", marked_words(s), width);
   }
   return text;
 }
