@@ -126,6 +126,7 @@ const std::map<std::string, std::vector<Room>>& rooms() {
         {"plot", {"session", "view"}},
         {"page", {"plot"}},
         {"compare", {"session", "view"}},
+        {"tune", {"compare", "plot"}},
         {"compose", {"session", "view"}},
         {"window", {"view"}},
         {"stress", {"session", "view"}},
@@ -133,7 +134,7 @@ const std::map<std::string, std::vector<Room>>& rooms() {
         {"bench", {"plot", "compare", "compose", "stress"}},
         {"stability", {"plot", "compare", "compose", "stress"}},
         {"validate", {"page", "compare"}},
-        {"program", {"bench", "bench/reports", "stability", "validate", "window"}}}},
+        {"program", {"bench", "bench/reports", "stability", "tune", "validate", "window"}}}},
   };
   return kRooms;
 }

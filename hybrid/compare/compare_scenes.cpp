@@ -123,16 +123,6 @@ void measure_scene(ComparedScene& scene, const ComparedScene& reference, double 
   if (scene.onset_s && reference.onset_s) scene.onset_later_s = *scene.onset_s - *reference.onset_s;
 }
 
-void add_costs(const BuiltScene& built, ComparedScene& scene) {
-  scene.load_s = built.seconds;
-  scene.memory_bytes = built.state->map.memory_bytes();
-  for (const RigidObject& object : built.world->rigid) scene.memory_bytes += object.memory_bytes();
-  for (const auto& object : built.state->soft) {
-    scene.memory_bytes += object->memory_bytes();
-    scene.soft_voxels += object->lattice().voxel_count();
-  }
-}
-
 // A refusal names the scene's own path, which is not the one that is played.
 SessionResult play(const Scene& scene, BuiltScene& built, const SessionOptions& options,
                    const std::string& first_name) {
@@ -160,7 +150,10 @@ ScenesComparison compare_scenes(std::span<const Scene> scenes, int samples, cons
     built.push_back(build_scene(ideal.back(), progress));
     comparison.scenes.emplace_back();
     comparison.scenes.back().name = names[s];
-    add_costs(built.back(), comparison.scenes.back());
+    const SceneSize size = size_of(built.back());
+    comparison.scenes.back().load_s = built.back().seconds;
+    comparison.scenes.back().memory_bytes = size.memory_bytes;
+    comparison.scenes.back().soft_voxels = size.soft_voxels;
   }
   comparison.jnd_floor_N = jnd_floor_N(ideal.front());
 
@@ -198,6 +191,16 @@ ScenesComparison compare_scenes(std::span<const Scene> scenes, int samples, cons
     measure_scene(scene, comparison.scenes.front(), comparison.jnd_floor_N, dt_s);
   }
   return comparison;
+}
+
+SceneSize size_of(const BuiltScene& built) {
+  SceneSize size{.memory_bytes = built.state->map.memory_bytes()};
+  for (const RigidObject& object : built.world->rigid) size.memory_bytes += object.memory_bytes();
+  for (const auto& object : built.state->soft) {
+    size.memory_bytes += object->memory_bytes();
+    size.soft_voxels += object->lattice().voxel_count();
+  }
+  return size;
 }
 
 std::string verdict(const ScenesComparison& comparison, std::size_t index) {

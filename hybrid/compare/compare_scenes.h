@@ -46,6 +46,13 @@ struct ScenesComparison {
 // Throws SceneError; std::runtime_error: tools of another shape or size, or devices at another rate.
 ScenesComparison compare_scenes(std::span<const Scene> scenes, int samples, const Progress& progress);
 
+// What a built scene takes before a session.
+struct SceneSize {
+  std::uint64_t memory_bytes = 0;  // of objects and occupancy map
+  std::uint64_t soft_voxels = 0;   // of all soft objects
+};
+SceneSize size_of(const BuiltScene& built);
+
 // The result for the scene with this index, not 0, in one sentence.
 std::string verdict(const ScenesComparison& comparison, std::size_t scene);
 

@@ -76,6 +76,19 @@ struct CompareCommand {
 int compare(const CompareCommand& command);
 int compare_whole_scenes(const CompareCommand& command);  // two or more
 
+struct TuneCommand {
+  std::filesystem::path scene;
+  std::optional<double> budget_us;  // of a tick's p99.9; default: half of the device's period
+  double error_jnd = 1.0;
+  bool quick = false;
+  bool apply = false;                 // write the choice into the scene's file
+  std::filesystem::path out;          // or into this one, in the same folder; empty: neither
+  std::filesystem::path plot, cache;  // empty: not written
+  std::string json;
+  std::string command_line;  // as it was typed, for the report
+};
+int tune_scene(const TuneCommand& command);
+
 struct BenchCommand {
   std::string suite;  // of bench_suites(), or "all"
   bool quick = false, every_tick = false;

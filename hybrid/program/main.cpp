@@ -212,6 +212,30 @@ void add_compare(CLI::App& app, int& status) {
   });
 }
 
+void add_tune(CLI::App& app, int& status) {
+  auto* sub = app.add_subcommand(
+      "tune", "Chooses spacing, energy and model: the cheapest whose force no hand can tell from the truth");
+  auto c = std::make_shared<hybrid::TuneCommand>();
+  c->command_line = typed_command();
+  sub->add_option("SCENE", c->scene, "scene file (.toml)")->required();
+  sub->add_option("--budget-us", c->budget_us,
+                  "most microseconds of a tick's p99.9; default: half of the device's period")
+      ->check(CLI::PositiveNumber);
+  sub->add_option("--error-jnd", c->error_jnd, "error that may be felt: p99, in JND")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  sub->add_flag("--quick", c->quick, "fewer settings and a coarser truth; a few minutes");
+  auto* apply =
+      sub->add_flag("--apply", c->apply, "write the choice into the scene's file; the rest of it stays");
+  sub->add_option("--out", c->out, "write the choice into a new scene file, in the folder of the scene")
+      ->excludes(apply);
+  sub->add_option("--cache", c->cache,
+                  "folder that keeps finished parts; the same command then goes on there");
+  sub->add_option("--plot", c->plot, "write error over cost of all settings as SVG");
+  sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
+  sub->callback([c, &status] { status = hybrid::tune_scene(*c); });
+}
+
 // Refuses options that have no effect in the suite, and names the suites in which they have.
 void refuse_unused(const CLI::App& bench, const std::string& suite) {
   for (const hybrid::BenchOption& option : hybrid::bench_options()) {
@@ -386,6 +410,7 @@ int main(int argc, char** argv) {
   add_compose(app, status);
   add_devices(app, status);
   add_compare(app, status);
+  add_tune(app, status);
   add_bench(app, status);
   add_stability(app, status);
   add_validate(app, status);

@@ -112,14 +112,16 @@ ForceError compare_with_slow_run(const World& world, WorldState& state, const Fo
       return none;
     }
     if (options.progress && t % kReportEvery == 0)
-      options.progress(fmt::format("the same path {} times slower, as the reference: {:.0f} %", kSlower,
+      options.progress(fmt::format("the same path {} times slower, as the reference: {:.0f} %",
+                                   options.slower,
                                    100.0 * static_cast<double>(t) / static_cast<double>(course.size())));
     const CourseTick& tick = course[t];
-    const int parts = slow[t] ? kSlower : 1;
+    const int parts = slow[t] ? options.slower : 1;
     TickResult felt;
     for (int n = 1; n <= parts; ++n) {
       const device::DeviceState at{
-          .position_m = n < parts ? glm::mix(from, tick.device_m, n / double{kSlower}) : tick.device_m};
+          .position_m = n < parts ? glm::mix(from, tick.device_m, n / static_cast<double>(options.slower))
+                                  : tick.device_m};
       felt = haptic_tick(world, state, at, options.dt_s / parts);
     }
     // Nested patches end within the object, and the reference must not share the error of that.
@@ -129,8 +131,9 @@ ForceError compare_with_slow_run(const World& world, WorldState& state, const Fo
       wide[o] = true;
     }
     from = tick.device_m;
-    if (!tick.soft || seen++ % stride != 0) continue;
     const glm::dvec3 reference = world.tool.stiffness_N_per_m * (felt.proxy_m - felt.device_m);
+    if (options.felt) options.felt(t, reference);
+    if (!tick.soft || seen++ % stride != 0) continue;
     errors.add(glm::distance(tick.force_N, reference), jnd_of(tick.force_N, reference, options.floor_N),
                static_cast<double>(t) * options.dt_s, static_cast<double>(still[t]) * options.dt_s);
   }

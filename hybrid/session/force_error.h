@@ -4,6 +4,7 @@
 // forces are compared in every tick in which something soft is in contact.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <glm/vec3.hpp>
@@ -48,6 +49,10 @@ struct SlowRunOptions {
   int most = 0;           // ticks that are compared, evenly spread; at least 1
   bool async_relaxation = false;
   std::function<void(const std::string&)> progress;  // may be empty
+  int slower = kSlower;                              // times; at least 1
+  // Gets the number of each tick that is played, compared or not, and the slow run's force (N). The run ends
+  // with the last tick in which something soft is in contact. May be empty.
+  std::function<void(std::size_t, const glm::dvec3&)> felt{};
 };
 
 // Plays `course` slowly from `state`, a session that has begun at the first position of the device.

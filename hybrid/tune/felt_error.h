@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The difference between two sessions along one motion, in JND, over the ticks in which something soft is
+// felt in either.
+#pragma once
+
+#include <cstdint>
+
+#include "hybrid/session/force_error.h"
+
+namespace hybrid {
+
+// Over the ticks of one kind.
+struct FeltError {
+  std::uint64_t ticks = 0;
+  double p50_jnd = 0.0, p99_jnd = 0.0, max_jnd = 0.0;
+  double max_t_s = 0.0;  // of the greatest difference
+};
+
+struct SettingError {
+  FeltError moving, still;  // moving: the device is faster than kStill_m_per_s
+  [[nodiscard]] double worst_jnd() const {
+    return moving.p99_jnd > still.p99_jnd ? moving.p99_jnd : still.p99_jnd;
+  }
+};
+
+// `ticks`: only the first so many count. 1 JND is of the reference's force.
+SettingError felt_error(const ForceCourse& course, const ForceCourse& reference, double floor_N, double dt_s,
+                        std::size_t ticks = static_cast<std::size_t>(-1));
+
+}  // namespace hybrid

@@ -1,0 +1,359 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/tune/tune.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <stdexcept>
+
+#include "device/loop/stop_signal.h"
+#include "hybrid/compare/compare.h"
+#include "hybrid/tune/evaluation.h"
+#include "hybrid/tune/progress.h"
+
+namespace hybrid {
+namespace {
+
+constexpr double kBudgetShare = 0.5;       // of the device's period
+constexpr double kFirstShare = 1.0 / 3.0;  // of the contact, in the first round
+// A setting is left out if another is this much better in both: after a part of the motion, and after all.
+constexpr double kMarginOfPart = 0.3, kMarginOfWhole = 0.1;
+constexpr std::size_t kPasses = 5, kQuickPasses = 3;  // timed sessions of each setting; odd, for the median
+constexpr double kMostTruthVoxels = 4e6;
+constexpr double kOtherWay = 0.5;        // spacings, by which the confirming motion lies beside
+constexpr double kStaysInContact = 0.5;  // least share of the contact that the confirming motion keeps
+
+// A setting while it is tried: the ticks of its passes.
+struct Trial {
+  TunedSetting tuned;
+  std::vector<std::vector<double>> passes;
+};
+
+class Search {
+ public:
+  Search(const Scene& as_read, const TuneOptions& options)
+      : as_read_(as_read),
+        options_(options),
+        cache_(options.cache, as_read),
+        progress_(options.progress),
+        step_(progress_.as_step()) {
+    result_.objects = tunable_objects(as_read);
+    if (result_.objects.empty()) {
+      throw std::runtime_error(fmt::format("{}: no [[soft]] object with voxels, so there is nothing to tune",
+                                           as_read.file.string()));
+    }
+    for (const TunableObject& object : result_.objects) {
+      names_.push_back(object.own.object);
+      if (!object.note.empty()) result_.notes.push_back(object.own.object + ": " + object.note);
+    }
+    own_ = with_setting(as_read, own_setting(result_.objects));
+    motion_ = scene_motion(own_);
+    result_.floor_N = jnd_floor_N(as_read);
+    result_.period_us = 1e6 / as_read.rate_hz;
+    result_.unit_m = as_read.unit_m;
+    result_.bounds = {options.error_jnd, options.budget_us.value_or(kBudgetShare * result_.period_us)};
+  }
+
+  TuneResult run() {
+    const std::vector<Setting> settings = common_settings(result_.objects, options_.quick);
+    plan(settings);
+    find_truth();
+    try_settings(settings);
+    if (result_.objects.size() > 1) refine();
+    time_survivors();
+    choose();
+    confirm();
+    result_.seconds = progress_.seconds();
+    return std::move(result_);
+  }
+
+ private:
+  [[nodiscard]] std::size_t passes() const { return options_.quick ? kQuickPasses : kPasses; }
+  [[nodiscard]] double dt_s() const { return 1.0 / as_read_.rate_hz; }
+
+  [[nodiscard]] double weight(const Setting& setting) const {
+    double heaviest = 0.0;
+    for (std::size_t n = 0; n < setting.objects.size(); ++n) {
+      if (!setting.objects[n].proxy)
+        heaviest = std::max(heaviest, play_weight(scale_of(result_.objects[n], setting.objects[n])));
+    }
+    return std::max(heaviest, 0.05);
+  }
+
+  void plan(const std::vector<Setting>& settings) {
+    const double scale = truth_scale();
+    // The truth, that of the confirming motion, and the two runs for its error.
+    progress_.plan((1.0 + 1.0 / kOtherSpeed) * slow_weight(scale, kTruthSlower) +
+                   slow_weight(scale, kTruthSlower / 2) + slow_weight(2.0 * scale, kTruthSlower));
+    for (const Setting& setting : settings)
+      progress_.plan(weight(setting) * (kFirstShare + static_cast<double>(passes())));
+  }
+
+  // Wider voxels where the truth would have too many of them.
+  double truth_scale() {
+    if (truth_scale_ > 0.0) return truth_scale_;
+    const BuiltScene built = build_scene(as_reference(as_read_, own_setting(result_.objects)));
+    double voxels = 0.0;
+    for (const auto& object : built.state->soft)
+      voxels += static_cast<double>(object->lattice().voxel_count());
+    truth_scale_ = std::max(kTruthScale, std::cbrt(voxels / kMostTruthVoxels));
+    if (truth_scale_ > kTruthScale) {
+      result_.notes.push_back(
+          fmt::format("the truth has {:.2f} of the own spacing, not {:.2f}: it would have more than {:.0f} "
+                      "million voxels",
+                      truth_scale_, kTruthScale, 1e-6 * kMostTruthVoxels));
+    }
+    return truth_scale_;
+  }
+
+  void find_truth() {
+    const TruthPlan plan = truth_plan();
+    result_.truth = measure_truth(plan, motion_, cache_, step_);
+    std::size_t felt = 0;
+    for (const CourseTick& tick : result_.truth.course) felt += tick.soft ? 1 : 0;
+    if (felt == 0) {
+      throw std::runtime_error(fmt::format(
+          "{}: its path touches nothing soft; give [path] points within an object (`hybrid check` says where "
+          "they lie)",
+          as_read_.file.string()));
+    }
+    std::size_t seen = 0;
+    for (std::size_t t = 0; t < result_.truth.course.size(); ++t) {
+      seen += result_.truth.course[t].soft ? 1 : 0;
+      if (static_cast<double>(seen) <= kFirstShare * static_cast<double>(felt)) part_ticks_ = t + 1;
+    }
+  }
+
+  [[nodiscard]] TruthPlan truth_plan() {
+    return {.as_read = as_read_,
+            .objects = result_.objects,
+            .names = names_,
+            .scale = truth_scale(),
+            .floor_N = result_.floor_N,
+            .dt_s = dt_s()};
+  }
+
+  // One session, from the cache or played.
+  Evaluation evaluate(const Setting& setting, const Motion& motion, const std::string& motion_words,
+                      const ForceCourse& truth, std::size_t pass) {
+    const std::string key = fmt::format("play pass {} {} {}\ntruth {}\n{}", pass, motion.ticks, motion_words,
+                                        result_.truth.key, as_toml(setting));
+    const std::string words = in_words(setting, result_.unit_m);
+    const double share = static_cast<double>(motion.ticks) / static_cast<double>(motion_.ticks);
+    Evaluation evaluation;
+    step_(words, weight(setting) * share, [&](const Progress& progress) {
+      if (const auto kept = cache_.find(key)) {
+        evaluation = evaluation_from(*kept);
+        return;
+      }
+      try {
+        evaluation = evaluation_of(play_setting(with_setting(as_read_, setting), names_, motion, progress),
+                                   truth, result_.floor_N, dt_s());
+      } catch (const SceneError& error) {
+        evaluation.refused = error.what();
+      }
+      cache_.keep(key, to_json(evaluation));
+    });
+    return evaluation;
+  }
+
+  // Two rounds: a part of the motion for all, the whole one for those that nothing clearly dominates.
+  void try_settings(const std::vector<Setting>& settings) {
+    const std::size_t first = trials_.size();
+    for (const Setting& setting : settings) {
+      Trial trial;
+      trial.tuned.setting = setting;
+      trial.tuned.words = in_words(setting, result_.unit_m);
+      trial.tuned.own = setting == own_setting(result_.objects);
+      take(trial, evaluate(setting, {motion_.path, part_ticks_}, "", result_.truth.course, 0));
+      trials_.push_back(std::move(trial));
+    }
+    leave_out(first, kMarginOfPart, fmt::format("after {:.0f} % of the contact", 100.0 * kFirstShare));
+    for (std::size_t n = first; n < trials_.size(); ++n) {
+      Trial& trial = trials_[n];
+      if (!trial.tuned.whole()) continue;
+      Evaluation whole = evaluate(trial.tuned.setting, motion_, "", result_.truth.course, 0);
+      trial.passes = {whole.tick_us};
+      trial.tuned.whole_session = whole.refused.empty();
+      take(trial, whole);
+    }
+    leave_out(0, kMarginOfWhole, "after one session");
+  }
+
+  static void take(Trial& trial, const Evaluation& evaluation) {
+    TunedSetting& tuned = trial.tuned;
+    tuned.error = evaluation.error;
+    tuned.felt_p99_us = evaluation.felt_p99_us;
+    tuned.memory_bytes = evaluation.memory_bytes;
+    tuned.soft_voxels = evaluation.soft_voxels;
+    tuned.load_s = evaluation.load_s;
+    tuned.faults = evaluation.faults;
+    if (!evaluation.refused.empty()) tuned.left_out = "refused: " + evaluation.refused;
+    std::vector<double> ticks = evaluation.tick_us;
+    tuned.tick_us = percentiles(ticks);
+  }
+
+  // Leaves out what is clearly dominated, of those from `first` on; the scene's own setting never is.
+  void leave_out(std::size_t first, double margin, const std::string& when) {
+    std::vector<std::size_t> whole;
+    std::vector<CostAndError> points;
+    for (std::size_t n = first; n < trials_.size(); ++n) {
+      if (!trials_[n].tuned.whole()) continue;
+      whole.push_back(n);
+      points.push_back({trials_[n].tuned.felt_p99_us, trials_[n].tuned.error.worst_jnd(),
+                        trials_[n].tuned.faults.empty()});
+    }
+    for (std::size_t p = 0; p < whole.size(); ++p) {
+      TunedSetting& tuned = trials_[whole[p]].tuned;
+      const auto better = dominated_by(points, p, margin);
+      if (!better || tuned.own) continue;
+      tuned.left_out = fmt::format("{}: {} has {:.2g} of its error at {:.2g} of its tick", when,
+                                   trials_[whole[*better]].tuned.words,
+                                   points[*better].error_jnd / std::max(points[p].error_jnd, 1e-9),
+                                   points[*better].cost_us / std::max(points[p].cost_us, 1e-9));
+    }
+  }
+
+  // Of several objects each by itself, from the common setting that the rules would choose now.
+  void refine() {
+    const std::vector<std::size_t> whole = whole_trials();
+    const Choice choice = choose_setting(points_of(whole, false), result_.bounds);
+    const Setting from = trials_[whole[choice.chosen]].tuned.setting;
+    std::vector<Setting> settings;
+    for (const Setting& setting : settings_beside(result_.objects, from)) {
+      const bool known =
+          std::ranges::any_of(trials_, [&](const Trial& trial) { return trial.tuned.setting == setting; });
+      if (known) continue;
+      settings.push_back(setting);
+      progress_.plan(weight(setting) * (kFirstShare + static_cast<double>(passes())));
+    }
+    try_settings(settings);
+  }
+
+  [[nodiscard]] std::vector<std::size_t> whole_trials() const {
+    std::vector<std::size_t> whole;
+    for (std::size_t n = 0; n < trials_.size(); ++n) {
+      if (trials_[n].tuned.whole()) whole.push_back(n);
+    }
+    return whole;
+  }
+
+  [[nodiscard]] std::vector<CostAndError> points_of(const std::vector<std::size_t>& which, bool p999) const {
+    std::vector<CostAndError> points;
+    for (const std::size_t n : which) {
+      const TunedSetting& tuned = trials_[n].tuned;
+      points.push_back(
+          {p999 ? tuned.tick_us.p999 : tuned.felt_p99_us, tuned.error.worst_jnd(), tuned.faults.empty()});
+    }
+    return points;
+  }
+
+  // Further passes, each in the reverse order of the one before, so that a machine that gets slower or faster
+  // does not favour any setting.
+  void time_survivors() {
+    std::vector<std::size_t> order = whole_trials();
+    for (std::size_t pass = 1; pass < passes(); ++pass) {
+      std::ranges::reverse(order);
+      for (const std::size_t n : order) {
+        Trial& trial = trials_[n];
+        trial.passes.push_back(
+            evaluate(trial.tuned.setting, motion_, "", result_.truth.course, pass).tick_us);
+      }
+    }
+    for (const std::size_t n : order) {
+      Trial& trial = trials_[n];
+      trial.tuned.tick_us = median_ticks(trial.passes);
+      for (std::vector<double> ticks : trial.passes)
+        trial.tuned.pass_p999_us.push_back(percentiles(ticks).p999);
+    }
+  }
+
+  void choose() {
+    const std::vector<std::size_t> whole = whole_trials();
+    const std::vector<CostAndError> points = points_of(whole, true);
+    result_.choice = choose_setting(points, result_.bounds);
+    result_.chosen = result_.choice.chosen = whole[result_.choice.chosen];
+    if (result_.choice.next_accurate) result_.choice.next_accurate = whole[*result_.choice.next_accurate];
+    for (const std::size_t p : pareto_front(points)) result_.front.push_back(whole[p]);
+    for (std::size_t p = 0; p < whole.size(); ++p) {
+      if (const auto better = dominated_by(points, p)) trials_[whole[p]].tuned.dominated_by = whole[*better];
+    }
+    for (Trial& trial : trials_) result_.settings.push_back(std::move(trial.tuned));
+  }
+
+  // Sideways: along the axis of the scene in which the truth's mean force is least.
+  [[nodiscard]] glm::dvec3 sideways_m() const {
+    glm::dvec3 force(0.0);
+    for (const CourseTick& tick : result_.truth.course) {
+      if (tick.soft) force += tick.force_N;
+    }
+    force = glm::abs(force);
+    glm::dvec3 unit(0.0);
+    unit[force.x <= std::min(force.y, force.z) ? 0 : force.y <= force.z ? 1 : 2] = 1.0;
+    const TunableObject& object = result_.objects.front();
+    const glm::dvec3& spacing = object.own.spacing == glm::dvec3(0.0) ? object.finest : object.own.spacing;
+    return kOtherWay * std::cbrt(spacing.x * spacing.y * spacing.z) * as_read_.unit_m * unit;
+  }
+
+  void confirm() {
+    for (const double side : {1.0, -1.0}) {
+      try {
+        const glm::dvec3 offset_m = side * sideways_m();
+        const std::string words =
+            fmt::format("the path {} times faster, moved by ({:.3g}, {:.3g}, {:.3g}) mm", kOtherSpeed,
+                        1e3 * offset_m.x, 1e3 * offset_m.y, 1e3 * offset_m.z);
+        confirm_on(other_motion(motion_, as_read_.rate_hz, offset_m), words);
+        return;
+      } catch (const SceneError& error) {  // there the tool begins in something
+        result_.confirmation = {};
+        result_.confirmation.not_done = error.what();
+      }
+    }
+  }
+
+  void confirm_on(const Motion& motion, const std::string& words) {
+    Confirmation& confirmation = result_.confirmation;
+    confirmation.motion = words;
+    const ForceCourse truth =
+        slow_course(truth_plan(), result_.truth.setting, motion, words, kTruthSlower, cache_, step_);
+    const auto felt = [](const ForceCourse& course) {
+      return static_cast<double>(std::ranges::count_if(course, &CourseTick::soft));
+    };
+    if (felt(truth) * kOtherSpeed < kStaysInContact * felt(result_.truth.course)) {
+      confirmation.not_done = "moved sideways the path loses its contact";
+      return;
+    }
+    std::vector<std::vector<double>> passes;
+    for (std::size_t pass = 0; pass < kQuickPasses; ++pass) {
+      const Evaluation played =
+          evaluate(result_.settings[result_.chosen].setting, motion, words, truth, pass);
+      if (!played.refused.empty()) throw SceneError(as_read_.file, {}, played.refused);
+      confirmation.error = played.error;
+      passes.push_back(played.tick_us);
+    }
+    confirmation.tick_us = median_ticks(passes);
+  }
+
+  const Scene& as_read_;
+  const TuneOptions& options_;
+  EvaluationCache cache_;
+  SearchProgress progress_;
+  Step step_;
+  TuneResult result_;
+  Scene own_;
+  Motion motion_;
+  std::vector<std::string> names_;
+  double truth_scale_ = 0.0;
+  std::uint64_t part_ticks_ = 1;
+  std::vector<Trial> trials_;
+};
+
+}  // namespace
+
+TuneResult tune(const Scene& as_read, const TuneOptions& options) {
+  return Search(as_read, options).run();
+}
+
+}  // namespace hybrid

@@ -1,0 +1,282 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/tune/tune_report.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "hybrid/feel/just_noticeable.h"
+#include "hybrid/session/report.h"
+
+namespace hybrid {
+namespace {
+
+// Longest shown words of a setting, in a table.
+constexpr std::size_t kMostWidth = 48;
+
+// Share of the passes that has to agree.
+constexpr double kTold = 0.75;
+
+struct PassRange {
+  double low = 0.0, high = 0.0;
+};
+
+PassRange range_of(const TunedSetting& setting) {
+  if (setting.pass_p999_us.empty()) return {setting.tick_us.p999, setting.tick_us.p999};
+  const auto [low, high] = std::ranges::minmax(setting.pass_p999_us);
+  return {low, high};
+}
+
+std::string error_text(const SettingError& error) {
+  const auto one = [](const FeltError& e) { return e.ticks > 0 ? fmt::format("{:.2f}", e.p99_jnd) : "-"; };
+  return fmt::format("{} JND moving, {} still", one(error.moving), one(error.still));
+}
+
+const char* rule_name(ChoiceRule rule) {
+  switch (rule) {
+    case ChoiceRule::cheapest_accurate:
+      return "cheapest under the error's bound, within the budget";
+    case ChoiceRule::most_accurate_in_time:
+      return "most accurate within the budget";
+    case ChoiceRule::cheapest:
+      return "cheapest";
+  }
+  return "";
+}
+
+// What else would make the tick fit.
+std::string remedy_in_time(const TuneResult& result) {
+  const TunedSetting& chosen = result.settings[result.chosen];
+  return fmt::format(
+      "{} is {:.2g} times the budget; a smaller tool, a shallower path, or a scene with fewer soft voxels "
+      "(here "
+      "{}) would make it fit, and --budget-us says what your machine can spare",
+      "its tick", chosen.tick_us.p999 / result.bounds.budget_us, chosen.soft_voxels);
+}
+
+std::string doubt_about_error(const TuneResult& result) {
+  const TunedSetting& chosen = result.settings[result.chosen];
+  const double own = result.truth.error_jnd(), bound = result.bounds.error_jnd;
+  if (std::fabs(chosen.error.worst_jnd() - bound) >= own) return {};
+  return fmt::format(
+      " The truth is itself uncertain by {:.2f} JND, so its error may lie on the other side of "
+      "{:.2g} JND.",
+      own, bound);
+}
+
+std::string doubt_about_cost(const TuneResult& result) {
+  const TunedSetting& chosen = result.settings[result.chosen];
+  const PassRange passes = range_of(chosen);
+  std::string text;
+  const auto over = static_cast<double>(std::ranges::count_if(
+      chosen.pass_p999_us, [&](double p999) { return p999 > result.bounds.budget_us; }));
+  const double share = over / std::max<double>(1.0, static_cast<double>(chosen.pass_p999_us.size()));
+  if (std::max(share, 1.0 - share) < kTold)
+    text += fmt::format(
+        " Single sessions took {:.0f} to {:.0f} us: the machine is too noisy to tell whether it keeps the "
+        "budget.",
+        passes.low, passes.high);
+  if (const auto next = result.choice.next_accurate; next &&
+                                                     result.choice.rule == ChoiceRule::cheapest_accurate &&
+                                                     cost_hidden(chosen, result.settings[*next])) {
+    text += fmt::format(" Noise hides whether {} is cheaper.", result.settings[*next].words);
+  }
+  return text;
+}
+
+std::string cells(const TunedSetting& s, const char* mark, const std::string& words, std::size_t width) {
+  const Percentiles& t = s.tick_us;
+  const PassRange passes = range_of(s);
+  const auto p99 = [](const FeltError& e) { return e.ticks > 0 ? fmt::format("{:.2f}", e.p99_jnd) : "-"; };
+  return fmt::format("{} {:<{}} {:>7} {:>7} {:>24} {:>13} {:>8.1f} {:>9}\n", mark, words, width,
+                     p99(s.error.moving), p99(s.error.still),
+                     fmt::format("{:.0f}/{:.0f}/{:.0f}/{:.0f}", t.p50, t.p99, t.p999, t.max),
+                     fmt::format("{:.0f} to {:.0f}", passes.low, passes.high),
+                     1e-6 * static_cast<double>(s.memory_bytes), s.soft_voxels);
+}
+
+std::string marked_words(const TunedSetting& s) {
+  return s.words + (s.own ? " (as it is)" : "");
+}
+
+std::string table_of_front(const TuneResult& result) {
+  std::size_t width = 7;
+  for (const TunedSetting& s : result.settings)
+    width = std::max(width, std::min(marked_words(s).size(), kMostWidth));
+  std::string text = fmt::format("  {:<{}} {:>7} {:>7} {:>24} {:>13} {:>8} {:>9}\n", "setting", width,
+                                 "moving", "still", "tick us", "p99.9 of", "MB", "voxels");
+  text += fmt::format("  {:<{}} {:>7} {:>7} {:>24} {:>13}\n", "", width, "JND p99", "JND p99",
+                      "p50/p99/p99.9/max", "single passes");
+  for (const std::size_t n : result.front) {
+    const TunedSetting& s = result.settings[n];
+    text += cells(s, n == result.chosen ? "*" : " ", marked_words(s), width);
+  }
+  bool any = false;
+  for (std::size_t n = 0; n < result.settings.size(); ++n) {
+    const TunedSetting& s = result.settings[n];
+    if (!s.whole() || !s.dominated_by) continue;
+    if (!any) text += "dominated: another one is as cheap and as accurate\n";
+    any = true;
+    text += cells(s, n == result.chosen ? "*" : "-", marked_words(s), width);
+  }
+  return text;
+}
+
+std::string left_out_words(const TuneResult& result) {
+  std::string text;
+  for (const TunedSetting& s : result.settings) {
+    if (!s.whole()) text += fmt::format("left out {}, {}\n", s.words, s.left_out);
+  }
+  for (const std::size_t n : result.front) {
+    for (const std::string& fault : result.settings[n].faults)
+      text += fmt::format("fault of {}, which so is not chosen: {}\n", result.settings[n].words, fault);
+  }
+  return text;
+}
+
+std::string truth_in_words(const TuneResult& result) {
+  const Truth& truth = result.truth;
+  std::string text = fmt::format(
+      "errors: p99 of the difference from the truth in each tick in which something soft is felt, on an "
+      "ideal "
+      "device;\n  1 JND = max({:.0f} % of the truth's force, {:.2f} N)\n"
+      "truth: {}, played {} times slower; its own error, from voxels twice as wide: {}; from "
+      "twice the speed: {}\n",
+      100.0 * kJndShare, result.floor_N, truth.words, kTruthSlower, error_text(truth.spacing),
+      error_text(truth.rest));
+  if (std::max(truth.rest.moving.p99_jnd, truth.rest.still.p99_jnd) > 1.0)
+    text += "  the truth does not come to rest within 1 JND: played slower still, its force differs\n";
+  return text;
+}
+
+std::string confirmation_words(const TuneResult& result) {
+  const Confirmation& c = result.confirmation;
+  if (!c.not_done.empty()) return "not confirmed on another motion: " + c.not_done + "\n";
+  const double before = result.settings[result.chosen].error.worst_jnd(), now = c.error.worst_jnd();
+  return fmt::format(
+      "confirmed on a motion that was not used, {}: {} ({:.2g} times the error), tick p99.9 {:.0f} "
+      "us ({:.2g} times)\n",
+      c.motion, error_text(c.error), now / std::max(before, 1e-9), c.tick_us.p999,
+      c.tick_us.p999 / std::max(result.settings[result.chosen].tick_us.p999, 1e-9));
+}
+
+nlohmann::ordered_json felt_report(const FeltError& e) {
+  return {{"ticks", e.ticks},
+          {"jnd_p50", e.p50_jnd},
+          {"jnd_p99", e.p99_jnd},
+          {"jnd_max", e.max_jnd},
+          {"max_t_s", e.ticks > 0 ? nlohmann::ordered_json(e.max_t_s) : nlohmann::ordered_json(nullptr)}};
+}
+
+nlohmann::ordered_json error_report(const SettingError& error) {
+  return {{"moving", felt_report(error.moving)}, {"still", felt_report(error.still)}};
+}
+
+nlohmann::ordered_json setting_report(const TuneResult& result, std::size_t n) {
+  const TunedSetting& s = result.settings[n];
+  nlohmann::ordered_json row{{"name", s.words}, {"toml", as_toml(s.setting)}, {"as_it_is", s.own}};
+  row["on_front"] = std::ranges::find(result.front, n) != result.front.end();
+  row["dominated_by"] = s.dominated_by ? nlohmann::ordered_json(result.settings[*s.dominated_by].words)
+                                       : nlohmann::ordered_json(nullptr);
+  row["left_out"] = s.whole() ? nlohmann::ordered_json(nullptr) : nlohmann::ordered_json(s.left_out);
+  row["error"] = error_report(s.error);
+  row["tick_us"] = to_json(s.tick_us);
+  row["pass_p999_us"] = s.pass_p999_us;
+  row["memory_bytes"] = s.memory_bytes;
+  row["soft_voxels"] = s.soft_voxels;
+  row["load_s"] = s.load_s;
+  row["faults"] = s.faults;
+  return row;
+}
+
+}  // namespace
+
+bool cost_hidden(const TunedSetting& a, const TunedSetting& b) {
+  const std::size_t passes = std::min(a.pass_p999_us.size(), b.pass_p999_us.size());
+  std::size_t cheaper = 0;
+  for (std::size_t p = 0; p < passes; ++p) cheaper += a.pass_p999_us[p] < b.pass_p999_us[p] ? 1 : 0;
+  return kTold * static_cast<double>(passes) > static_cast<double>(std::max(cheaper, passes - cheaper));
+}
+
+std::string tune_verdict(const TuneResult& result) {
+  const TunedSetting& s = result.settings[result.chosen];
+  const Bounds& b = result.bounds;
+  const std::string what = fmt::format("{}{}: {} (p99), tick p99.9 {:.0f} us", s.words,
+                                       s.own ? " (as it is)" : "", error_text(s.error), s.tick_us.p999);
+  std::string text;
+  switch (result.choice.rule) {
+    case ChoiceRule::cheapest_accurate:
+      text = fmt::format("{} is the cheapest setting under {:.2g} JND, within the budget of {:.0f} us.", what,
+                         b.error_jnd, b.budget_us);
+      break;
+    case ChoiceRule::most_accurate_in_time:
+      text = fmt::format(
+          "{} is the most accurate setting within the budget of {:.0f} us; none is under {:.2g} "
+          "JND there.",
+          what, b.budget_us, b.error_jnd);
+      if (const auto next = result.choice.next_accurate) {
+        text += fmt::format(" {} would be, at {:.0f} us.", result.settings[*next].words,
+                            result.settings[*next].tick_us.p999);
+      } else {
+        text += " Slower motion or a wider tool lowers the error.";
+      }
+      break;
+    case ChoiceRule::cheapest:
+      text = fmt::format("{} is the cheapest setting, and none keeps the budget of {:.0f} us: {}.", what,
+                         b.budget_us, remedy_in_time(result));
+      break;
+  }
+  if (!result.choice.any_sound) text += " Every setting had a fault.";
+  return text + doubt_about_error(result) + doubt_about_cost(result);
+}
+
+std::string tune_reason(const TuneResult& result) {
+  const TunedSetting& s = result.settings[result.chosen];
+  return fmt::format("{}: {} (p99), tick p99.9 {:.0f} us; {} (under {:.2g} JND, {:.0f} us).", s.words,
+                     error_text(s.error), s.tick_us.p999, rule_name(result.choice.rule),
+                     result.bounds.error_jnd, result.bounds.budget_us);
+}
+
+std::string tune_words(const TuneResult& result) {
+  std::string text = tune_verdict(result) + "\n\n" + table_of_front(result) + "\n";
+  text += truth_in_words(result) + confirmation_words(result) + left_out_words(result);
+  for (const std::string& note : result.notes) text += "note: " + note + "\n";
+  return text + fmt::format(
+                    "ticks: each one's median over the passes, whose order alternates; *: chosen. The search "
+                    "took {:.0f} s\n",
+                    result.seconds);
+}
+
+nlohmann::ordered_json tune_json(const TuneResult& result) {
+  nlohmann::ordered_json j;
+  j["verdict"] = tune_verdict(result);
+  j["bounds"] = {{"error_jnd", result.bounds.error_jnd},
+                 {"budget_us", result.bounds.budget_us},
+                 {"period_us", result.period_us}};
+  j["jnd"] = {{"share", kJndShare}, {"floor_N", result.floor_N}};
+  j["truth"] = {{"setting", result.truth.words},
+                {"slower", kTruthSlower},
+                {"spacing_error", error_report(result.truth.spacing)},
+                {"rest_error", error_report(result.truth.rest)},
+                {"error_jnd", result.truth.error_jnd()}};
+  j["chosen"] = result.settings[result.chosen].words;
+  j["rule"] = rule_name(result.choice.rule);
+  j["front"] = nlohmann::ordered_json::array();
+  for (const std::size_t n : result.front) j["front"].push_back(result.settings[n].words);
+  j["settings"] = nlohmann::ordered_json::array();
+  for (std::size_t n = 0; n < result.settings.size(); ++n) j["settings"].push_back(setting_report(result, n));
+  const Confirmation& c = result.confirmation;
+  if (c.not_done.empty()) {
+    j["confirmation"] = {
+        {"motion", c.motion}, {"error", error_report(c.error)}, {"tick_us", to_json(c.tick_us)}};
+  } else {
+    j["confirmation"] = {{"not_done", c.not_done}};
+  }
+  j["notes"] = result.notes;
+  j["seconds"] = result.seconds;
+  return j;
+}
+
+}  // namespace hybrid

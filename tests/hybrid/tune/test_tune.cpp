@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The search on a small scene: its errors against `compare`, and that a search that was ended goes on.
+#include "hybrid/tune/tune.h"
+
+#include <gmock/gmock.h>
+
+#include <nlohmann/json.hpp>
+
+#include "device/loop/stop_signal.h"
+#include "hybrid/compare/compare.h"
+#include "hybrid/compare/compare_scenes.h"
+#include "hybrid/tune/edit_scene.h"
+#include "hybrid/tune/tune_plot.h"
+#include "hybrid/tune/tune_report.h"
+#include "tests/hybrid/fixtures/scene_file_fixture.h"
+
+namespace {
+
+using hybrid::Motion;
+using hybrid::Scene;
+using hybrid::TuneResult;
+using testing::HasSubstr;
+
+class Tune : public tests::SceneFile {
+ protected:
+  std::filesystem::path gel(const std::string& name, const std::string& spacing,
+                            const std::string& to = "[0, 0, 6.5]") const {
+    return write(name,
+                 "format = 1\n[tool]\nradius = 4\nstiffness = 1500\n[material.gel]\nyoung = 8000\n[[soft]]\n"
+                 "name = \"block\"\nformula = \"block\"\nsize = [24, 24, 10]\nspacing = " +
+                     spacing + "\nmaterial = \"gel\"\n[path]\nkind = \"press\"\nfrom = [0, 0, 10]\nto = " +
+                     to + "\nhold = 0.1\nspeed = 40\n");
+  }
+};
+
+const std::vector<std::string> kBlock{"block"};
+
+TEST_F(Tune, AnErrorIsWhatCompareSaysOfTheTwoFiles) {
+  const std::vector scenes{hybrid::load_scene(gel("a.toml", "2")), hybrid::load_scene(gel("b.toml", "3"))};
+  const auto compared = hybrid::compare_scenes(scenes, 0, {}).scenes[1];
+  const Scene a = hybrid::on_ideal_device(scenes[0]), b = hybrid::on_ideal_device(scenes[1]);
+  const Motion motion = hybrid::scene_motion(a);
+  const auto reference = hybrid::play_setting(a, kBlock, motion, {}).course;
+  const auto other = hybrid::play_setting(b, kBlock, motion, {});
+  const auto error = hybrid::felt_error(other.course, reference, hybrid::jnd_floor_N(a), 1.0 / a.rate_hz);
+  EXPECT_GT(error.worst_jnd(), 0.0);
+  EXPECT_NEAR(error.moving.p99_jnd, compared.moving.p99_jnd, 1e-9);
+  EXPECT_NEAR(error.still.p99_jnd, compared.still.p99_jnd, 1e-9);
+  EXPECT_NEAR(error.still.max_jnd, compared.still.max_jnd, 1e-9);
+  EXPECT_EQ(error.moving.ticks, compared.moving.ticks);
+  EXPECT_EQ(other.soft_voxels, compared.soft_voxels);
+  EXPECT_GT(other.memory_bytes, 0U);
+}
+
+TEST_F(Tune, TheTruthAgainstItselfHasNoError) {
+  const Scene scene = hybrid::on_ideal_device(hybrid::load_scene(gel("a.toml", "2")));
+  const Motion motion = hybrid::scene_motion(scene);
+  const auto slow = [&](int slower) { return hybrid::play_slowly(scene, kBlock, motion, slower, {}); };
+  const auto error = [&](const auto& x, const auto& y) { return hybrid::felt_error(x, y, 0.04, 1e-3); };
+  const auto truth = slow(10);
+  const auto itself = error(truth, slow(10));
+  EXPECT_GT(itself.moving.ticks, 50U);
+  EXPECT_GT(itself.still.ticks, 50U);
+  EXPECT_EQ(itself.moving.max_jnd, 0.0);
+  EXPECT_EQ(itself.still.max_jnd, 0.0);
+  // Once slower is the session itself: so small a block has no patches that would be widened.
+  EXPECT_EQ(error(slow(1), hybrid::play_setting(scene, kBlock, motion, {}).course).worst_jnd(), 0.0);
+}
+
+void expect_equal(const TuneResult& a, const TuneResult& b, bool times) {
+  ASSERT_EQ(a.settings.size(), b.settings.size());
+  for (std::size_t n = 0; n < a.settings.size(); ++n) {
+    EXPECT_TRUE(a.settings[n].setting == b.settings[n].setting);
+    if (!times && !(a.settings[n].whole() && b.settings[n].whole())) continue;
+    EXPECT_EQ(a.settings[n].error.moving.p99_jnd, b.settings[n].error.moving.p99_jnd);
+    EXPECT_EQ(a.settings[n].error.still.p99_jnd, b.settings[n].error.still.p99_jnd);
+    if (!times) continue;
+    EXPECT_EQ(a.settings[n].left_out, b.settings[n].left_out);
+    EXPECT_EQ(a.settings[n].tick_us.p999, b.settings[n].tick_us.p999);
+    EXPECT_EQ(a.settings[n].pass_p999_us, b.settings[n].pass_p999_us);
+  }
+  if (!times) return;
+  EXPECT_EQ(a.front, b.front);
+  EXPECT_EQ(a.chosen, b.chosen);
+  EXPECT_EQ(a.confirmation.error.still.p99_jnd, b.confirmation.error.still.p99_jnd);
+}
+
+TEST_F(Tune, ASearchThatWasEndedGoesOnAndGivesTheSame) {
+  const Scene scene = hybrid::read_scene(gel("a.toml", "2"));
+  hybrid::TuneOptions options{.quick = true, .cache = folder_ / "cache", .progress = {}};
+  const auto kept = [&] {
+    const auto files = std::filesystem::directory_iterator(options.cache);
+    return std::distance(begin(files), end(files));
+  };
+  int messages = 0;
+  options.progress = [&messages](const std::string&) {
+    if (++messages > 60) throw device::StopAsked{15};
+  };
+  EXPECT_THROW((void)hybrid::tune(scene, options), device::StopAsked);
+  const auto at_stop = kept();
+  EXPECT_GT(at_stop, 3);
+  options.progress = {};
+  const TuneResult resumed = hybrid::tune(scene, options);
+  const auto at_end = kept();
+  EXPECT_GT(at_end, at_stop);
+  expect_equal(resumed, hybrid::tune(scene, options), true);
+  EXPECT_EQ(kept(), at_end);
+  options.cache.clear();
+  expect_equal(resumed, hybrid::tune(scene, options), false);
+
+  // The rest of what a user sees is of this result.
+  EXPECT_GE(resumed.front.size(), 3U);
+  EXPECT_LT(resumed.truth.error_jnd(), 2.0);
+  EXPECT_TRUE(resumed.confirmation.not_done.empty()) << resumed.confirmation.not_done;
+  EXPECT_GT(resumed.confirmation.error.still.ticks, 50U);
+  EXPECT_THAT(hybrid::tune_words(resumed), HasSubstr("(as it is)"));
+  const auto json = hybrid::tune_json(resumed);
+  EXPECT_EQ(json.at("settings").size(), resumed.settings.size());
+  EXPECT_EQ(json.at("front").size(), resumed.front.size());
+  hybrid::save_tune_plot(folder_ / "plot.svg", resumed, "a < b");
+  EXPECT_GT(std::filesystem::file_size(folder_ / "plot.svg"), 2000U);
+}
+
+TEST_F(Tune, AnotherSceneAnotherFileAndADamagedRecordAreNotFound) {
+  const auto file = gel("a.toml", "2");
+  const std::filesystem::path cache = folder_ / "cache";
+  hybrid::EvaluationCache(cache, hybrid::read_scene(file)).keep("text", {{"value", 0.1}});
+  const auto found = [&] { return hybrid::EvaluationCache(cache, hybrid::read_scene(file)).find("text"); };
+  ASSERT_TRUE(found());
+  EXPECT_EQ(found()->at("value"), 0.1);
+  (void)gel("a.toml", "3");
+  EXPECT_FALSE(found());
+  (void)gel("a.toml", "2");
+  EXPECT_TRUE(found());
+  const auto record = std::filesystem::directory_iterator(cache)->path();
+  std::filesystem::resize_file(record, std::filesystem::file_size(record) / 2);
+  EXPECT_FALSE(found());
+}
+
+TEST_F(Tune, APathThatTouchesNothingSoftIsRefused) {
+  const Scene scene = hybrid::read_scene(gel("a.toml", "2", "[0, 0, 9.8]"));
+  try {
+    (void)hybrid::tune(scene, {.quick = true, .cache = {}, .progress = {}});
+    ADD_FAILURE() << "accepted";
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("touches nothing soft"));
+  }
+}
+
+TEST_F(Tune, SettingsBesideOneChangeOneObject) {
+  const std::string two = tests::block +
+                          "position = [0, 0, 0]\n[[soft]]\nname = \"other\"\nformula = \"ball\"\n" +
+                          "size = 20\nspacing = 2\nposition = [60, 0, 0]\n";
+  const auto objects =
+      hybrid::tunable_objects(hybrid::read_scene(write("s.toml", "format = 1\n" + two + tests::path)));
+  ASSERT_EQ(objects.size(), 2U);
+  const auto own = hybrid::own_setting(objects);
+  const auto beside = hybrid::settings_beside(objects, own);
+  EXPECT_EQ(beside.size(), 8U);  // coarser, finer, the other energy, as rigid: of each
+  for (const auto& setting : beside)
+    EXPECT_EQ((setting.objects[0] == own.objects[0]) + (setting.objects[1] == own.objects[1]), 1);
+  for (const auto& setting : hybrid::common_settings(objects, false))
+    EXPECT_EQ(setting.objects[0].energy, setting.objects[1].energy);
+}
+
+}  // namespace
