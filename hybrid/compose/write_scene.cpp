@@ -84,9 +84,11 @@ void add_materials(std::string& text, const MaterialNames& names) {
   text +=
       "\n# Stiffness of tissue: Young's modulus and Poisson's ratio, with where they are from. Links between "
       "voxels\n"
-      "# are right for ratios up to 0.3, and nested patches need one ratio in a volume. So all tissue has 0.3, "
+      "# are right for ratios up to 0.3, and nested patches need one ratio in a volume. So all tissue has "
+      "0.3, "
       "and the\n"
-      "# Young's modulus that keeps its contact modulus E/(1 - nu^2). `stretch` and `shear` bound how far a link may give way; see "
+      "# Young's modulus that keeps its contact modulus E/(1 - nu^2). `stretch` and `shear` bound how far a "
+      "link may give way; see "
       "scenes/README.md.\n";
   for (const auto& [name, t] : names.all()) {
     const LatticeStiffness links = as_six_links(*t);

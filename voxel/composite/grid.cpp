@@ -16,12 +16,17 @@ constexpr std::size_t kMaxPressed = 2048;
 
 }  // namespace
 
-// Has the whole object no more nodes on this level than a patch of it?
+// Does the whole object fit in a patch of this level, or has it no more nodes than one of the usual width?
 bool CompositeGrid::can_cover(std::size_t l) const {
-  const auto across = index(2 * half_width_of(l) + 1);
+  const auto patch = index(2 * half_width_of(l) + 1), usual = index(2 * coarse_half_width_ + 1);
+  bool fits = true;
   std::size_t nodes = 1;
-  for (std::size_t d = 0; d < 3; ++d) nodes *= index(whole_range(1 << l, d).count(1 << l));
-  return nodes <= across * across * across;
+  for (std::size_t d = 0; d < 3; ++d) {
+    const auto across = index(whole_range(1 << l, d).count(1 << l));
+    fits = fits && across <= patch;
+    nodes *= across;
+  }
+  return fits || nodes <= usual * usual * usual;
 }
 
 CompositeGrid::CompositeGrid(const Lattice& lattice, int half_width, int coarse_half_width)

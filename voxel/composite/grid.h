@@ -161,8 +161,6 @@ class CompositeGrid {
       }
     }
   }
-  // Is there no anchor within the distance that a contact should keep from them?
-  [[nodiscard]] bool far_from_anchors(const Index3& voxel) const noexcept;
 
  private:
   static constexpr std::size_t kPad = composite::kPad;

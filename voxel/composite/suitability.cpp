@@ -16,12 +16,11 @@ using composite::index;
 
 constexpr int kTrialHalfWidth = 10;  // of level 0 in trials
 constexpr double kConverges = 0.85;  // largest mean convergence factor of the displacement per cycle
-constexpr double kMaxForceError =
-    0.14;  // of the force on patches twice as wide: two just noticeable differences
+// Of the force on patches twice as wide: two just noticeable differences.
+constexpr double kMaxForceError = 0.14;
 // Forces are compared as in a press of this share of the object's smallest side. Smaller ones count as 0.57
 // N: 0.04 N, which a hand does not feel, is 7 % of that.
 constexpr double kPressedShare = 0.1, kLeastForce_N = 0.57;
-constexpr int kFromAnchors = 16;        // voxels that a contact keeps from anchors
 constexpr double kMaxThinShare = 0.02;  // of the stiffness of links at surfaces and where tissues meet
 
 // At surfaces and where tissues meet: share of the links' stiffness that belongs to tissue too thin to have a
@@ -109,10 +108,7 @@ CompositeGrid::Suitability CompositeGrid::try_contacts() {
     for (const auto& axis : d) least = std::min({least, axis[0], axis[1]});
   }
   const float most_m = 0.5F * least;
-  // In heterogeneous objects multipliers may take a hundred cycles to converge, and say nothing about the
-  // shape: so the press stays within limits.
-  const double depth_m =
-      material_.is_heterogeneous() ? static_cast<double>(most_m) : lattice_.min_spacing_m();
+  const auto depth_m = static_cast<double>(most_m);
   double side_m = std::numeric_limits<double>::max();
   for (int d = 0; d < 3; ++d)
     side_m = std::min(side_m, lattice_.grid().dims[index(d)] * lattice_.spacing_m()[d]);
@@ -123,7 +119,6 @@ CompositeGrid::Suitability CompositeGrid::try_contacts() {
     const Index3 place = lattice_.coordinates(v);
     if (lattice_.anchored(v)) continue;
     if (!converges_at(place, most_m)) return {"coarse levels do not come to rest"};
-    if (!far_from_anchors(place)) continue;
     const glm::dvec3 push_m = depth_m * direction_into(lattice_, v);
     const double felt_N = scale * settled_press(place, push_m),
                  wide_N = scale * wide.settled_press(place, push_m);
@@ -177,10 +172,6 @@ double CompositeGrid::settled_press(const Index3& place, const glm::dvec3& push_
     if (std::fabs(felt_N - before_N) <= kSettled * felt_N) break;
   }
   return felt_N;
-}
-
-bool CompositeGrid::far_from_anchors(const Index3& voxel) const noexcept {
-  return !material_.anchor_near(shifted(voxel), shifted(voxel), 2 * kFromAnchors);
 }
 
 }  // namespace voxel
