@@ -45,11 +45,11 @@ nlohmann::ordered_json tune_report_of(const TuneCommand& command, const TuneResu
 int tune_scene(const TuneCommand& command) {
   const Scene scene = read_scene(command.scene);
   const std::string text = scene_text(command.scene);
+  refuse_other_folder(command);  // before --out makes a folder
   Outputs outputs;
   outputs.ask_plot(command.plot);
   outputs.ask_json(command.json);
   outputs.ask("--out", command.out, {".toml"});
-  refuse_other_folder(command);
   const TuneResult result = tune(scene, {.error_jnd = command.error_jnd,
                                          .budget_us = command.budget_us,
                                          .quick = command.quick,

@@ -56,14 +56,33 @@ std::string remedy_in_time(const TuneResult& result) {
       "its tick", chosen.tick_us.p999 / result.bounds.budget_us, chosen.soft_voxels);
 }
 
+// Whether the truth's own error is too large to tell what lies under the error's bound.
+bool truth_hides_bound(const TuneResult& result) {
+  return result.truth.error_jnd() >= result.bounds.error_jnd;
+}
+
 std::string doubt_about_error(const TuneResult& result) {
   const TunedSetting& chosen = result.settings[result.chosen];
   const double own = result.truth.error_jnd(), bound = result.bounds.error_jnd;
-  if (std::fabs(chosen.error.worst_jnd() - bound) >= own) return {};
+  std::string text;
+  if (!truth_hides_bound(result) && std::fabs(chosen.error.worst_jnd() - bound) < own) {
+    text = fmt::format(
+        " The truth is itself uncertain by {:.2f} JND, so its error may lie on the other side of {:.2g} JND.",
+        own, bound);
+  }
+  const double confirmed = result.confirmation.error.worst_jnd();
+  if (chosen.error.worst_jnd() < bound && confirmed >= bound)
+    text += fmt::format(" On another motion it is off by {:.2f} JND, more than the bound.", confirmed);
+  return text;
+}
+
+// Ahead of a verdict that cannot be trusted.
+std::string truth_warning(const TuneResult& result) {
+  if (!truth_hides_bound(result)) return {};
   return fmt::format(
-      " The truth is itself uncertain by {:.2f} JND, so its error may lie on the other side of "
-      "{:.2g} JND.",
-      own, bound);
+      "The truth is itself uncertain by {:.2f} JND, so no setting is shown to be under {:.2g} JND; measured "
+      "against it, ",
+      result.truth.error_jnd(), result.bounds.error_jnd);
 }
 
 std::string doubt_about_cost(const TuneResult& result) {
@@ -229,14 +248,15 @@ std::string tune_verdict(const TuneResult& result) {
       break;
   }
   if (!result.choice.any_sound) text += " Every setting had a fault.";
-  return text + doubt_about_error(result) + doubt_about_cost(result);
+  return truth_warning(result) + text + doubt_about_error(result) + doubt_about_cost(result);
 }
 
 std::string tune_reason(const TuneResult& result) {
   const TunedSetting& s = result.settings[result.chosen];
-  return fmt::format("{}: {} (p99), tick p99.9 {:.0f} us; {} (under {:.2g} JND, {:.0f} us).", s.words,
-                     error_text(s.error), s.tick_us.p999, rule_name(result.choice.rule),
-                     result.bounds.error_jnd, result.bounds.budget_us);
+  return fmt::format(
+      "{}: {} (p99, the truth uncertain by {:.2f}), tick p99.9 {:.0f} us; {} ({:.2g} JND, {:.0f} us).",
+      s.words, error_text(s.error), result.truth.error_jnd(), s.tick_us.p999, rule_name(result.choice.rule),
+      result.bounds.error_jnd, result.bounds.budget_us);
 }
 
 std::string tune_words(const TuneResult& result) {

@@ -137,6 +137,29 @@ TEST_F(Tune, AnotherSceneAnotherFileAndADamagedRecordAreNotFound) {
   EXPECT_FALSE(found());
 }
 
+// A result of one setting, under the bound.
+TuneResult one_setting(double truth_error_jnd, double confirmed_jnd) {
+  TuneResult result;
+  result.settings.resize(1);
+  result.settings[0].words = "2 mm six-link";
+  result.settings[0].error.still = {.ticks = 10, .p99_jnd = 0.4};
+  result.settings[0].tick_us.p999 = 100.0;
+  result.front = {0};
+  result.truth.spacing.still = {.ticks = 10, .p99_jnd = truth_error_jnd};
+  result.confirmation.error.still = {.ticks = 10, .p99_jnd = confirmed_jnd};
+  return result;
+}
+
+TEST_F(Tune, AVerdictSaysFirstThatTheTruthIsTooUncertainForIt) {
+  const std::string sure = hybrid::tune_verdict(one_setting(0.2, 0.5));
+  EXPECT_THAT(sure, testing::StartsWith("2 mm six-link"));
+  EXPECT_THAT(sure, testing::Not(HasSubstr("uncertain")));
+  EXPECT_THAT(hybrid::tune_verdict(one_setting(0.8, 0.5)), HasSubstr("may lie on the other side of 1 JND"));
+  EXPECT_THAT(hybrid::tune_verdict(one_setting(4.8, 0.5)),
+              testing::StartsWith("The truth is itself uncertain by 4.80 JND, so no setting is shown"));
+  EXPECT_THAT(hybrid::tune_verdict(one_setting(0.2, 1.9)), HasSubstr("off by 1.90 JND, more than the bound"));
+}
+
 TEST_F(Tune, APathThatTouchesNothingSoftIsRefused) {
   const Scene scene = hybrid::read_scene(gel("a.toml", "2", "[0, 0, 9.8]"));
   try {
