@@ -82,25 +82,8 @@ void note_differences(const Scene& first, const Scene& other, const std::string&
   }
 }
 
-ScenesDifference difference_of(std::vector<double>& jnd, double max_t_s) {
-  const std::uint64_t ticks = jnd.size();
-  const Percentiles p = percentiles(jnd);
-  return {.ticks = ticks, .p50_jnd = p.p50, .p99_jnd = p.p99, .max_jnd = p.max, .max_t_s = max_t_s};
-}
-
-struct KindOfTicks {
-  std::vector<double> jnd;
-  double max_jnd = -1.0, max_t_s = 0.0;
-  void add(double value, double t_s) {
-    jnd.push_back(value);
-    if (value <= max_jnd) return;
-    max_jnd = value;
-    max_t_s = t_s;
-  }
-};
-
 void measure_scene(ComparedScene& scene, const ComparedScene& reference, double floor_N, double dt_s) {
-  KindOfTicks all, moving, still;
+  TickDifferences all, moving, still;
   std::vector<double> angle_deg;
   const std::size_t count = std::min(scene.rows.size(), reference.rows.size());
   for (std::size_t i = 0; i < count; ++i) {
@@ -116,9 +99,9 @@ void measure_scene(ComparedScene& scene, const ComparedScene& reference, double 
     (holds ? still : moving).add(jnd, t_s);
     if (size_N > kDirection_N && reference_N > kDirection_N) angle_deg.push_back(angle_between_deg(f, r));
   }
-  scene.all = difference_of(all.jnd, all.max_t_s);
-  scene.moving = difference_of(moving.jnd, moving.max_t_s);
-  scene.still = difference_of(still.jnd, still.max_t_s);
+  scene.all = all.result();
+  scene.moving = moving.result();
+  scene.still = still.result();
   if (!angle_deg.empty()) scene.direction_p99_deg = percentiles(angle_deg).p99;
   if (scene.onset_s && reference.onset_s) scene.onset_later_s = *scene.onset_s - *reference.onset_s;
 }
@@ -191,6 +174,19 @@ ScenesComparison compare_scenes(std::span<const Scene> scenes, int samples, cons
     measure_scene(scene, comparison.scenes.front(), comparison.jnd_floor_N, dt_s);
   }
   return comparison;
+}
+
+void TickDifferences::add(double jnd, double t_s) {
+  jnd_.push_back(jnd);
+  if (jnd <= max_jnd_) return;
+  max_jnd_ = jnd;
+  max_t_s_ = t_s;
+}
+
+ScenesDifference TickDifferences::result() const {
+  std::vector<double> sorted = jnd_;
+  const Percentiles p = percentiles(sorted);
+  return {.ticks = jnd_.size(), .p50_jnd = p.p50, .p99_jnd = p.p99, .max_jnd = p.max, .max_t_s = max_t_s_};
 }
 
 SceneSize size_of(const BuiltScene& built) {

@@ -21,6 +21,17 @@ struct ScenesDifference {
   double max_t_s = 0.0;  // of the greatest difference
 };
 
+// Collects the differences of one kind of ticks.
+class TickDifferences {
+ public:
+  void add(double jnd, double t_s);
+  [[nodiscard]] ScenesDifference result() const;
+
+ private:
+  std::vector<double> jnd_;
+  double max_jnd_ = -1.0, max_t_s_ = 0.0;
+};
+
 struct ComparedScene {
   std::string name;  // of its file; made unlike the others'
   std::vector<TraceRow> rows;

@@ -3,18 +3,14 @@
 // felt in either.
 #pragma once
 
-#include <cstdint>
+#include <cstddef>
 
+#include "hybrid/compare/compare_scenes.h"
 #include "hybrid/session/force_error.h"
 
 namespace hybrid {
 
-// Over the ticks of one kind.
-struct FeltError {
-  std::uint64_t ticks = 0;
-  double p50_jnd = 0.0, p99_jnd = 0.0, max_jnd = 0.0;
-  double max_t_s = 0.0;  // of the greatest difference
-};
+using FeltError = ScenesDifference;
 
 struct SettingError {
   FeltError moving, still;  // moving: the device is faster than kStill_m_per_s

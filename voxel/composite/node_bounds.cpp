@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Bounds of the nodes of a CompositeGrid: cones from the pressed voxels, along existing links (grid.h).
 #include <algorithm>
+#include <cmath>
 
 #include "voxel/composite/grid.h"
 #include "voxel/composite/row_kernels.h"
