@@ -113,6 +113,22 @@ SourcePlace where_parser_gives_up(std::string_view text) {
 
 }  // namespace
 
+const TreeEntry* entry_of(const TreeNode& table, std::string_view key) {
+  const auto found = std::ranges::find(table.entries, key, &TreeEntry::key);
+  return found == table.entries.end() ? nullptr : &*found;
+}
+
+std::size_t byte_at(std::string_view text, SourcePlace place) {
+  std::size_t at = 0;
+  for (std::uint32_t line = 1; line < place.line && at < text.size(); ++line)
+    at = std::min(text.find('\n', at), text.size() - 1) + 1;
+  for (std::uint32_t column = 1; column < place.column && at < text.size(); ++column) {
+    ++at;
+    while (at < text.size() && (static_cast<unsigned char>(text[at]) & 0xC0U) == 0x80U) ++at;
+  }
+  return at;
+}
+
 std::string_view kind_in_words(TreeNode::Kind kind) {
   switch (kind) {
     case TreeNode::Kind::table:

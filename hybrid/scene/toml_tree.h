@@ -3,6 +3,7 @@
 // other code reads this tree, in the order of the file.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -32,6 +33,12 @@ struct TreeEntry {
   SourcePlace place;  // of the key
   TreeNode value;
 };
+
+// The entry of a table with this key; null: there is none.
+const TreeEntry* entry_of(const TreeNode& table, std::string_view key);
+
+// Byte of a file's text at a place, at most its size. Columns count code points.
+std::size_t byte_at(std::string_view text, SourcePlace place);
 
 // The kind of a value for a message: "a string", "a table", ...
 std::string_view kind_in_words(TreeNode::Kind kind);

@@ -14,25 +14,6 @@ namespace {
 constexpr int kSavedDigits = 6;       // of a number: far finer than a hand can tell
 constexpr double kSameNumber = 1e-5;  // relative: the text says what was meant
 
-const TreeEntry* entry_of(const TreeNode& table, std::string_view key) {
-  for (const TreeEntry& entry : table.entries) {
-    if (entry.key == key) return &entry;
-  }
-  return nullptr;
-}
-
-// Byte of the text at a place. The parser counts code points in a line.
-std::size_t byte_at(const std::string& text, SourcePlace place) {
-  std::size_t at = 0;
-  for (std::uint32_t line = 1; line < place.line && at < text.size(); ++line)
-    at = std::min(text.find('\n', at), text.size() - 1) + 1;
-  for (std::uint32_t column = 1; column < place.column && at < text.size(); ++column) {
-    ++at;
-    while (at < text.size() && (static_cast<unsigned char>(text[at]) & 0xC0U) == 0x80U) ++at;
-  }
-  return at;
-}
-
 // The end of the value that begins at `at`: of a number, or of a list on one line.
 std::size_t end_of_value(const std::string& text, std::size_t at) {
   if (at < text.size() && text[at] == '[') return std::min(text.find(']', at), text.size() - 1) + 1;

@@ -21,24 +21,6 @@ struct TextEdit {
   std::string add;
 };
 
-// Byte of a place. Columns count characters, and bytes of one character after its first do not count.
-std::size_t offset_of(std::string_view text, SourcePlace place) {
-  std::size_t at = 0;
-  for (std::uint32_t line = 1; line < place.line; ++line) {
-    const std::size_t end = text.find('\n', at);
-    if (end == std::string_view::npos) throw std::runtime_error("a value's line is not in the text");
-    at = end + 1;
-  }
-  const auto continues = [&](std::size_t n) {
-    return n < text.size() && (static_cast<unsigned char>(text[n]) & 0xC0U) == 0x80U;
-  };
-  for (std::uint32_t column = 1; column < place.column; ++column) {
-    ++at;
-    while (continues(at)) ++at;
-  }
-  return at;
-}
-
 std::size_t line_begin(std::string_view text, std::size_t at) {
   const std::size_t before = at == 0 ? std::string_view::npos : text.rfind('\n', at - 1);
   return before == std::string_view::npos ? 0 : before + 1;
@@ -80,11 +62,6 @@ std::size_t value_end(std::string_view text, std::size_t at) {
     }
   }
   return text.size();
-}
-
-const TreeEntry* entry_of(const TreeNode& table, std::string_view key) {
-  const auto found = std::ranges::find(table.entries, key, &TreeEntry::key);
-  return found == table.entries.end() ? nullptr : &*found;
 }
 
 const TreeNode& table_of(const TreeNode& root, const std::string& object) {
@@ -148,7 +125,7 @@ class Editor {
 
  private:
   std::size_t replace(const TreeEntry& entry, const Wanted& wanted) {
-    const std::size_t at = offset_of(text_, entry.value.place);
+    const std::size_t at = byte_at(text_, entry.value.place);
     edits_.push_back({at, value_end(text_, at) - at, wanted.value});
     return at;
   }
@@ -156,8 +133,8 @@ class Editor {
   // Below the line of the object's name; in an inline table behind the name.
   std::size_t add(const TreeNode& table, const Wanted& wanted) {
     const TreeEntry& name = *entry_of(table, "name");
-    const std::size_t at = offset_of(text_, name.value.place), end = value_end(text_, at);
-    const std::size_t key = offset_of(text_, name.place), begin = line_begin(text_, key);
+    const std::size_t at = byte_at(text_, name.value.place), end = value_end(text_, at);
+    const std::size_t key = byte_at(text_, name.place), begin = line_begin(text_, key);
     const std::string_view indent = text_.substr(begin, key - begin);
     if (indent.find_first_not_of(" \t") != std::string_view::npos) {
       edits_.push_back({end, 0, fmt::format(", {} = {}", wanted.key, wanted.value)});
