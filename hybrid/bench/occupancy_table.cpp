@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "hybrid/base/table.h"
 #include "hybrid/bench/occupancy.h"
 
 namespace hybrid::bench {
@@ -60,6 +61,48 @@ std::string all_against_surface(const std::vector<OccupancyRow>& rows) {
   return text;
 }
 
+const Table<OccupancyRow>& occupancy_table() {
+  const auto judged = [](std::size_t OccupancyRow::*value) {
+    return [value](const OccupancyRow& row) {
+      return row.reference.empty() ? std::string("-") : std::to_string(row.*value);
+    };
+  };
+  static const Table<OccupancyRow> table({
+      {{"op"}, 7, Side::left, [](const OccupancyRow& row) { return row.op; }},
+      {{"engine"},
+       9,
+       Side::left,
+       [](const OccupancyRow& row) { return std::string(engine_name(row.engine)); }},
+      {{"what"}, 14, Side::left, [](const OccupancyRow& row) { return std::string(what_name(row.what)); }},
+      {{"pattern"},
+       8,
+       Side::left,
+       [](const OccupancyRow& row) { return std::string(pattern_name(row.pattern)); }},
+      {{"elements"}, 10, Side::right, [](const OccupancyRow& row) { return std::to_string(row.elements); }},
+      {{"cells"}, 9, Side::right, [](const OccupancyRow& row) { return std::to_string(row.cells); }},
+      {{"box"},
+       3,
+       Side::right,
+       [](const OccupancyRow& row) { return row.box_cells > 0 ? std::to_string(row.box_cells) : "-"; }},
+      {{"p50"}, 9, Side::right, [](const OccupancyRow& row) { return ns_text(row.p50_ns); }},
+      {{"p99"}, 9, Side::right, [](const OccupancyRow& row) { return ns_text(row.p99_ns); }},
+      {{"B/cell"},
+       7,
+       Side::right,
+       [](const OccupancyRow& row) { return fmt::format("{:.1f}", row.bytes_per_cell); }},
+      {{"found"},
+       7,
+       Side::right,
+       [](const OccupancyRow& row) {
+         return row.op == "lookup" ? fmt::format("{:.1f}", row.found_mean) : std::string("-");
+       }},
+      {{"checked"}, 7, Side::right, judged(&OccupancyRow::checked)},
+      {{"missed"}, 6, Side::right, judged(&OccupancyRow::missed)},
+      {{"extra"}, 6, Side::right, judged(&OccupancyRow::extra)},
+  });
+  return table;
+}
+
 }  // namespace
 
 nlohmann::ordered_json to_json(const OccupancyRow& row) {
@@ -92,21 +135,11 @@ nlohmann::ordered_json to_json(const OccupancyRow& row) {
 }
 
 std::string occupancy_table_head() {
-  return fmt::format("{:<8}{:<10}{:<15}{:<9}{:>10}{:>10}{:>4}{:>10}{:>10}{:>8}{:>8}{:>8}{:>7}{:>7}\n", "op",
-                     "engine", "what", "pattern", "elements", "cells", "box", "p50", "p99", "B/cell", "found",
-                     "checked", "missed", "extra");
+  return occupancy_table().head();
 }
 
 std::string occupancy_table_line(const OccupancyRow& row) {
-  const bool judged = !row.reference.empty();
-  const auto count = [judged](std::size_t n) { return judged ? fmt::format("{}", n) : std::string("-"); };
-  return fmt::format(
-      "{:<8}{:<10}{:<15}{:<9}{:>10}{:>10}{:>4}{:>10}{:>10}{:>8.1f}{:>8}{:>8}{:>7}{:>7}{}\n", row.op,
-      engine_name(row.engine), what_name(row.what), pattern_name(row.pattern), row.elements, row.cells,
-      row.box_cells > 0 ? fmt::format("{}", row.box_cells) : std::string("-"), ns_text(row.p50_ns),
-      ns_text(row.p99_ns), row.bytes_per_cell,
-      row.op == "lookup" ? fmt::format("{:.1f}", row.found_mean) : std::string("-"), count(row.checked),
-      count(row.missed), count(row.extra), row.note.empty() ? std::string() : "  " + row.note);
+  return occupancy_table().line(row, row.note.empty() ? std::string() : "  " + row.note);
 }
 
 std::string occupancy_summary(const std::vector<OccupancyRow>& rows) {

@@ -3,10 +3,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "hybrid/base/table.h"
 #include "hybrid/session/report.h"
 
 namespace hybrid::bench {
@@ -59,6 +61,58 @@ bool same_work(const RigidRow& a, const RigidRow& b) {
          a.scale == b.scale && a.offset_m == b.offset_m;
 }
 
+// Cells that both tables have.
+std::string ball_text(const RigidRow& row) {
+  return row.radius_m > 0.0 ? fmt::format("{:g}", 1e3 * row.radius_m) : "point";
+}
+std::string speed_text(const RigidRow& row) {
+  return fmt::format("{:g}", row.speed_m_s);
+}
+auto time(double Percentiles::*which) {
+  return [which](const RigidRow& row) { return microseconds(row.tick_us.*which); };
+}
+
+const Table<RigidRow>& rigid_table() {
+  const auto length = [](std::optional<double> Judgement::*value) {
+    return [value](const RigidRow& row) { return length_text(row.judged.*value); };
+  };
+  const auto count = [](std::optional<std::size_t> Judgement::*value) {
+    return [value](const RigidRow& row) { return count_text(row.judged.*value); };
+  };
+  static const Table<RigidRow> table({
+      {{"path"}, 10, Side::left, [](const RigidRow& row) { return row.path; }},
+      {{"mesh"}, 9, Side::left, mesh_text},
+      {{"triangles"}, 9, Side::right, [](const RigidRow& row) { return std::to_string(row.triangles); }},
+      {{"ball"}, 5, Side::right, ball_text},
+      {{"m/s"}, 6, Side::right, speed_text},
+      {{"engine"}, 9, Side::left, [](const RigidRow& row) { return std::string(engine_name(row.engine)); }},
+      {{"p50"}, 7, Side::right, time(&Percentiles::p50)},
+      {{"p99"}, 7, Side::right, time(&Percentiles::p99)},
+      {{"p99.9"}, 7, Side::right, time(&Percentiles::p999)},
+      {{"max"}, 7, Side::right, time(&Percentiles::max)},
+      {{"mesh err"}, 8, Side::right, length(&Judgement::error_mesh_max)},
+      {{"at"}, 6, Side::right, [](const RigidRow& row) { return std::to_string(row.judged.error_ticks); }},
+      {{"sph max"}, 8, Side::right, length(&Judgement::error_sphere_max)},
+      {{"sph rms"}, 8, Side::right, length(&Judgement::error_sphere_rms)},
+      {{"optimum"}, 8, Side::right, length(&Judgement::optimum_sphere_max)},
+      {{"dF p99"},
+       7,
+       Side::right,
+       [](const RigidRow& row) {
+         const auto& step = row.judged.force_step_p99_N;
+         return step ? fmt::format("{:.4f}", *step) : "-";
+       }},
+      {{"inside"}, 6, Side::right, count(&Judgement::inside_ticks)},
+      {{"pops"}, 5, Side::right, count(&Judgement::pop_throughs)},
+      {{"build"}, 7, Side::right, [](const RigidRow& row) { return fmt::format("{:.4g}", row.build_ms); }},
+      {{"MB"},
+       7,
+       Side::right,
+       [](const RigidRow& row) { return fmt::format("{:.4g}", 1e-6 * static_cast<double>(row.bytes)); }},
+  });
+  return table;
+}
+
 }  // namespace
 
 Json to_json(const RigidRow& row) {
@@ -109,58 +163,51 @@ Json to_json(const RigidRow& row) {
 }
 
 std::string table_head() {
-  return fmt::format(
-      "{:<10} {:<9} {:>9} {:>5} {:>6} {:<9} {:>7} {:>7} {:>7} {:>7} {:>8} {:>6} {:>8} {:>8} {:>8} {:>7} "
-      "{:>6} "
-      "{:>5} {:>7} {:>7}\n",
-      "path", "mesh", "triangles", "ball", "m/s", "engine", "p50", "p99", "p99.9", "max", "mesh err", "at",
-      "sph max", "sph rms", "optimum", "dF p99", "inside", "pops", "build", "MB");
+  return rigid_table().head();
 }
 
 std::string table_line(const RigidRow& row) {
   const Judgement& j = row.judged;
-  std::string line = fmt::format(
-      "{:<10} {:<9} {:>9} {:>5} {:>6g} {:<9} {:>7} {:>7} {:>7} {:>7} {:>8} {:>6} {:>8} {:>8} {:>8} {:>7} "
-      "{:>6} "
-      "{:>5} {:>7.4g} {:>7.4g}",
-      row.path, mesh_text(row), row.triangles,
-      row.radius_m > 0.0 ? fmt::format("{:g}", 1e3 * row.radius_m) : "point", row.speed_m_s,
-      engine_name(row.engine), microseconds(row.tick_us.p50), microseconds(row.tick_us.p99),
-      microseconds(row.tick_us.p999), microseconds(row.tick_us.max), length_text(j.error_mesh_max),
-      j.error_ticks, length_text(j.error_sphere_max), length_text(j.error_sphere_rms),
-      length_text(j.optimum_sphere_max),
-      j.force_step_p99_N ? fmt::format("{:.4f}", *j.force_step_p99_N) : "-", count_text(j.inside_ticks),
-      count_text(j.pop_throughs), row.build_ms, 1e-6 * static_cast<double>(row.bytes));
-  line += place_text(row);
-  if (row.ticks < row.path_ticks) line += fmt::format(" (first {} ticks)", row.ticks);
-  if (j.lost_ticks > 0) line += fmt::format(" {} lost", j.lost_ticks);
-  if (row.truncated_ticks > 0) line += fmt::format(" {} truncated", row.truncated_ticks);
-  if (!row.faults.empty()) line += fmt::format(" {} faults", row.faults.size());
-  return line + "\n";
+  std::string note = place_text(row);
+  if (row.ticks < row.path_ticks) note += fmt::format(" (first {} ticks)", row.ticks);
+  if (j.lost_ticks > 0) note += fmt::format(" {} lost", j.lost_ticks);
+  if (row.truncated_ticks > 0) note += fmt::format(" {} truncated", row.truncated_ticks);
+  if (!row.faults.empty()) note += fmt::format(" {} faults", row.faults.size());
+  return rigid_table().line(row, note);
 }
 
 std::string ratio_table(const std::vector<RigidRow>& rows) {
-  std::string text =
-      fmt::format("{:<10} {:<9} {:>5} {:>6} {:>9} {:>9} | {:>22} | {:>22}\n", "path", "mesh", "ball", "m/s",
-                  "p50 us", "p99 us", "cgal-aabb x p50, p99", "no-map x p50, p99");
-  bool any = false;
+  const auto beside = [&](Engine engine, double Percentiles::*which, const RigidRow& row) {
+    const auto other = std::ranges::find_if(
+        rows, [&](const RigidRow& r) { return r.engine == engine && same_work(row, r); });
+    return other == rows.end() ? std::string("-")
+                               : fmt::format("{:.2f}", other->tick_us.*which / row.tick_us.*which);
+  };
+  const auto ratio = [&beside](Engine engine, double Percentiles::*which) {
+    return [&beside, engine, which](const RigidRow& row) { return beside(engine, which, row); };
+  };
+  const bool any = std::ranges::any_of(rows, [&](const RigidRow& row) {
+    return row.engine == Engine::hybrid && (beside(Engine::cgal_aabb, &Percentiles::p50, row) != "-" ||
+                                            beside(Engine::no_map, &Percentiles::p50, row) != "-");
+  });
+  if (!any) return {};
+  const Table<RigidRow> table({
+      {{"path"}, 10, Side::left, [](const RigidRow& row) { return row.path; }},
+      {{"mesh"}, 9, Side::left, mesh_text},
+      {{"ball"}, 5, Side::right, ball_text},
+      {{"m/s"}, 6, Side::right, speed_text},
+      {{"p50 us"}, 9, Side::right, time(&Percentiles::p50)},
+      {{"p99 us"}, 9, Side::right, time(&Percentiles::p99)},
+      {{"cgal-aabb", "p50 x"}, 9, Side::right, ratio(Engine::cgal_aabb, &Percentiles::p50)},
+      {{"", "p99 x"}, 9, Side::right, ratio(Engine::cgal_aabb, &Percentiles::p99)},
+      {{"no-map", "p50 x"}, 9, Side::right, ratio(Engine::no_map, &Percentiles::p50)},
+      {{"", "p99 x"}, 9, Side::right, ratio(Engine::no_map, &Percentiles::p99)},
+  });
+  std::string text = table.head();
   for (const RigidRow& row : rows) {
-    if (row.engine != Engine::hybrid) continue;
-    const auto beside = [&](Engine engine) -> std::string {
-      for (const RigidRow& other : rows) {
-        if (other.engine != engine || !same_work(row, other)) continue;
-        any = true;
-        return fmt::format("{:>11.2f} {:>10.2f}", other.tick_us.p50 / row.tick_us.p50,
-                           other.tick_us.p99 / row.tick_us.p99);
-      }
-      return fmt::format("{:>22}", "-");
-    };
-    text += fmt::format("{:<10} {:<9} {:>5} {:>6g} {:>9} {:>9} | {} | {}{}\n", row.path, mesh_text(row),
-                        row.radius_m > 0.0 ? fmt::format("{:g}", 1e3 * row.radius_m) : "point", row.speed_m_s,
-                        microseconds(row.tick_us.p50), microseconds(row.tick_us.p99),
-                        beside(Engine::cgal_aabb), beside(Engine::no_map), place_text(row));
+    if (row.engine == Engine::hybrid) text += table.line(row, place_text(row));
   }
-  return any ? text : std::string();
+  return text;
 }
 
 }  // namespace hybrid::bench

@@ -7,6 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "hybrid/base/table.h"
+
 namespace hybrid::bench {
 namespace {
 
@@ -69,6 +71,43 @@ std::optional<double> time_exponent(const std::vector<SoftRow>& rows, SoftEngine
   return least_squares(x, y).slope;
 }
 
+const Table<SoftRow>& soft_table() {
+  const auto time = [](double Percentiles::*which) {
+    return [which](const SoftRow& row) { return time_text(row.time_us, which); };
+  };
+  const auto optional = [](auto SoftRow::*value, const char* format) {
+    return [value, format](const SoftRow& row) { return or_dash(row.*value, format); };
+  };
+  static const Table<SoftRow> table({
+      {{"case"}, 8, Side::left, [](const SoftRow& row) { return row.test_case; }},
+      {{"engine"}, 8, Side::left, [](const SoftRow& row) { return engine_name(row.engine); }},
+      {{"voxels"}, 10, Side::right, [](const SoftRow& row) { return std::to_string(row.voxels); }},
+      {{"material"}, 12, Side::left, [](const SoftRow& row) { return row.material; }},
+      {{"depth"}, 5, Side::right, optional(&SoftRow::depth_spacings, "{:.4g}")},
+      {{"slack"}, 5, Side::right, optional(&SoftRow::slack, "{:.3g}")},
+      {{"axes"}, 4, Side::right, optional(&SoftRow::axes, "{}")},
+      {{"moved"}, 8, Side::right, optional(&SoftRow::moved, "{}")},
+      {{"viol"}, 5, Side::right, optional(&SoftRow::violated, "{}")},
+      {{"exact"},
+       5,
+       Side::right,
+       [](const SoftRow& row) { return !row.exact   ? "-"
+                                       : *row.exact ? "yes"
+                                                    : "no"; }},
+      {{"p50"}, 9, Side::right, time(&Percentiles::p50)},
+      {{"p99"}, 9, Side::right, time(&Percentiles::p99)},
+      {{"p99.9"}, 9, Side::right, time(&Percentiles::p999)},
+      {{"max"}, 9, Side::right, time(&Percentiles::max)},
+      {{"speedup"}, 8, Side::right, optional(&SoftRow::speedup, "{:.2f}")},
+      {{"ns/vox"}, 6, Side::right, optional(&SoftRow::ns_per_voxel_update, "{:.1f}")},
+      {{"trunc"}, 6, Side::right, optional(&SoftRow::truncated_share, "{:.3f}")},
+      {{"err N"}, 8, Side::right, optional(&SoftRow::force_error_N, "{:.4f}")},
+      {{"JND"}, 6, Side::right, optional(&SoftRow::force_error_jnd, "{:.2f}")},
+      {{"B/vox"}, 6, Side::right, optional(&SoftRow::bytes_per_voxel, "{:.2f}")},
+  });
+  return table;
+}
+
 }  // namespace
 
 const char* engine_name(SoftEngine engine) {
@@ -109,34 +148,11 @@ Json to_json(const SoftRow& row) {
 }
 
 std::string soft_table_head() {
-  return fmt::format(
-      "{:<8} {:<8} {:>10} {:<12} {:>5} {:>5} {:>4} {:>8} {:>5} {:>5} {:>9} {:>9} {:>9} {:>9} {:>8} {:>6} "
-      "{:>6} "
-      "{:>8} "
-      "{:>6} {:>6}\n",
-      "case", "engine", "voxels", "material", "depth", "slack", "axes", "moved", "viol", "exact", "p50",
-      "p99", "p99.9", "max", "speedup", "ns/vox", "trunc", "err N", "JND", "B/vox");
+  return soft_table().head();
 }
 
 std::string soft_table_line(const SoftRow& row) {
-  std::string line = fmt::format(
-      "{:<8} {:<8} {:>10} {:<12} {:>5} {:>5} {:>4} {:>8} {:>5} {:>5} {:>9} {:>9} {:>9} {:>9} {:>8} {:>6} "
-      "{:>6} "
-      "{:>8} "
-      "{:>6} {:>6}",
-      row.test_case, engine_name(row.engine), row.voxels, row.material, or_dash(row.depth_spacings, "{:.4g}"),
-      or_dash(row.slack, "{:.3g}"), or_dash(row.axes, "{}"), or_dash(row.moved, "{}"),
-      or_dash(row.violated, "{}"),
-      !row.exact   ? "-"
-      : *row.exact ? "yes"
-                   : "no",
-      time_text(row.time_us, &Percentiles::p50), time_text(row.time_us, &Percentiles::p99),
-      time_text(row.time_us, &Percentiles::p999), time_text(row.time_us, &Percentiles::max),
-      or_dash(row.speedup, "{:.2f}"), or_dash(row.ns_per_voxel_update, "{:.1f}"),
-      or_dash(row.truncated_share, "{:.3f}"), or_dash(row.force_error_N, "{:.4f}"),
-      or_dash(row.force_error_jnd, "{:.2f}"), or_dash(row.bytes_per_voxel, "{:.2f}"));
-  if (!row.note.empty()) line += " " + row.note;
-  return line + "\n";
+  return soft_table().line(row, row.note.empty() ? "" : " " + row.note);
 }
 
 std::optional<Growth> growth_of(const std::vector<SoftRow>& rows) {

@@ -16,6 +16,7 @@
 #include "device/loop/servo_timer.h"
 #include "device/loop/stop_signal.h"
 #include "hybrid/base/flush_to_zero.h"
+#include "hybrid/base/table.h"
 #include "hybrid/session/session.h"
 #include "hybrid/snapshot/fill_snapshot.h"
 
@@ -228,16 +229,27 @@ std::vector<ThreadsRow> bench_threads(const ThreadsBenchOptions& options) {
 }
 
 std::string threads_table(const std::vector<ThreadsRow>& rows) {
-  std::string text = fmt::format(
-      "{:<16} {:<15} {:>8} {:>7} {:>7} {:>7} {:>8} {:>10} {:>11} {:>6} {:>8} {:>5}\n", "scene", "load",
-      "ticks", "p50", "p99", "p99.9", "max", "p99 ratio", "p99.9 ratio", "late", "results", "same");
-  for (const ThreadsRow& r : rows) {
-    text += fmt::format(
-        "{:<16} {:<15} {:>8} {:>7.0f} {:>7.0f} {:>7.0f} {:>8.0f} {:>10.2f} {:>11.2f} {:>6} {:>8} {:>5}\n",
-        r.scene, r.load, r.ticks, r.tick_us.p50, r.tick_us.p99, r.tick_us.p999, r.tick_us.max, r.p99_ratio,
-        r.p999_ratio, r.late_ticks, r.results, r.same_ticks ? "yes" : "no");
-  }
-  return text;
+  const auto time = [](double Percentiles::*which) {
+    return [which](const ThreadsRow& r) { return fmt::format("{:.0f}", r.tick_us.*which); };
+  };
+  const auto ratio = [](double ThreadsRow::*which) {
+    return [which](const ThreadsRow& r) { return fmt::format("{:.2f}", r.*which); };
+  };
+  const Table<ThreadsRow> table({
+      {{"scene"}, 16, Side::left, [](const ThreadsRow& r) { return r.scene; }},
+      {{"load"}, 15, Side::left, [](const ThreadsRow& r) { return r.load; }},
+      {{"ticks"}, 8, Side::right, [](const ThreadsRow& r) { return std::to_string(r.ticks); }},
+      {{"p50"}, 7, Side::right, time(&Percentiles::p50)},
+      {{"p99"}, 7, Side::right, time(&Percentiles::p99)},
+      {{"p99.9"}, 7, Side::right, time(&Percentiles::p999)},
+      {{"max"}, 8, Side::right, time(&Percentiles::max)},
+      {{"p99 ratio"}, 10, Side::right, ratio(&ThreadsRow::p99_ratio)},
+      {{"p99.9 ratio"}, 11, Side::right, ratio(&ThreadsRow::p999_ratio)},
+      {{"late"}, 6, Side::right, [](const ThreadsRow& r) { return std::to_string(r.late_ticks); }},
+      {{"results"}, 8, Side::right, [](const ThreadsRow& r) { return std::to_string(r.results); }},
+      {{"same"}, 5, Side::right, [](const ThreadsRow& r) { return r.same_ticks ? "yes" : "no"; }},
+  });
+  return table.text(rows);
 }
 
 nlohmann::ordered_json to_json(const ThreadsRow& row) {

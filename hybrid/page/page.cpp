@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "hybrid/base/letters.h"
 #include "hybrid/base/number_text.h"
 #include "hybrid/page/assets.h"
 #include "hybrid/page/embed.h"

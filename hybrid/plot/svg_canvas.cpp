@@ -35,23 +35,6 @@ std::string escaped(std::string_view text) {
   return out;
 }
 
-std::size_t letters(std::string_view text) {
-  return static_cast<std::size_t>(
-      std::ranges::count_if(text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
-}
-
-std::string shortened(const std::string& text, std::size_t most) {
-  if (letters(text) <= most || most < 4) return text;
-  std::string out;
-  std::size_t count = 0;
-  for (const char c : text) {
-    const bool starts = (static_cast<unsigned char>(c) & 0xC0U) != 0x80U;
-    if (starts && ++count > most - 1) break;
-    out += c;
-  }
-  return out + "…";
-}
-
 std::string fixed(double v) {
   std::string out = with_decimals(std::clamp(v, -99999.0, 99999.0), 1);
   if (out.ends_with(".0")) out.resize(out.size() - 2);

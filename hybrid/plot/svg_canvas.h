@@ -12,12 +12,6 @@ namespace hybrid {
 // The text with XML's special characters escaped and control characters replaced by spaces.
 std::string escaped(std::string_view text);
 
-// Number of characters of a UTF-8 text.
-std::size_t letters(std::string_view text);
-
-// The text cut to at most `most` characters, with an ellipsis; unchanged if `most` is below 4.
-std::string shortened(const std::string& text, std::size_t most);
-
 // A coordinate with at most one decimal, clamped to five digits.
 std::string fixed(double v);
 

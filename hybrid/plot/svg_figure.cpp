@@ -7,6 +7,7 @@
 #include <limits>
 #include <optional>
 
+#include "hybrid/base/letters.h"
 #include "hybrid/base/number_text.h"
 #include "hybrid/base/whole_file.h"
 #include "hybrid/plot/downsample.h"

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "hybrid/base/file_ending.h"
+#include "hybrid/base/table.h"
 #include "hybrid/compare/compare.h"
 #include "hybrid/plot/compare_plot.h"
 #include "hybrid/program/commands.h"
@@ -42,18 +43,28 @@ void print_models(std::FILE* words, const Comparison& comparison) {
   fmt::print(words, "errors against: {}; 1 JND = max(7 %, {:.2f} N)\n\n", comparison.reference_text,
              comparison.jnd_floor_N);
   if (!comparison.note.empty()) fmt::print(words, "{}\n\n", comparison.note);
-  fmt::print(words, "{:<18} {:>8} {:>8} {:>8} {:>8} {:>7} {:>9} {:>9} {:>9} {:>9} {:>9}\n", "model", "rms N",
-             "max N", "JND p50", "JND p99", ">1 JND", "dir p99", "work J", "p50 us", "p99 us", "max us");
-  for (const ModelResult& m : comparison.models) {
-    fmt::print(words, "{:<18} {:>8.4f} {:>8.4f} {:>8.2f} {:>8.2f} {:>6.1f}% {:>8.2f}° {:>9.2g} ", m.name,
-               m.rms_N, m.max_N, m.jnd_p50, m.jnd_p99, 100.0 * m.share_above_1_jnd, m.direction_p99_deg,
-               m.work_J);
-    if (m.tick_us.max > 0.0) {
-      fmt::print(words, "{:>9.1f} {:>9.1f} {:>9.1f}\n", m.tick_us.p50, m.tick_us.p99, m.tick_us.max);
-    } else {
-      fmt::print(words, "{:>9} {:>9} {:>9}\n", "-", "-", "-");
-    }
-  }
+  const auto figure = [](const char* form, double ModelResult::*value, double factor = 1.0) {
+    return [=](const ModelResult& m) { return fmt::format(fmt::runtime(form), factor * m.*value); };
+  };
+  const auto time = [](double Percentiles::*which) {
+    return [which](const ModelResult& m) {
+      return m.tick_us.max > 0.0 ? fmt::format("{:.1f}", m.tick_us.*which) : "-";
+    };
+  };
+  const Table<ModelResult> table({
+      {{"model"}, 0, Side::left, [](const ModelResult& m) { return m.name; }},
+      {{"rms N"}, 8, Side::right, figure("{:.4f}", &ModelResult::rms_N)},
+      {{"max N"}, 8, Side::right, figure("{:.4f}", &ModelResult::max_N)},
+      {{"JND p50"}, 8, Side::right, figure("{:.2f}", &ModelResult::jnd_p50)},
+      {{"JND p99"}, 8, Side::right, figure("{:.2f}", &ModelResult::jnd_p99)},
+      {{">1 JND"}, 8, Side::right, figure("{:.1f} %", &ModelResult::share_above_1_jnd, 100.0)},
+      {{"dir p99"}, 9, Side::right, figure("{:.2f}°", &ModelResult::direction_p99_deg)},
+      {{"work J"}, 9, Side::right, figure("{:.2g}", &ModelResult::work_J)},
+      {{"p50 us"}, 9, Side::right, time(&Percentiles::p50)},
+      {{"p99 us"}, 9, Side::right, time(&Percentiles::p99)},
+      {{"max us"}, 9, Side::right, time(&Percentiles::max)},
+  });
+  fmt::print(words, "{}", table.text(comparison.models));
 }
 
 std::string title_of_comparison(const Scene& scene, const Comparison& comparison) {

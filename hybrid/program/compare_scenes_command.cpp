@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "hybrid/base/table.h"
 #include "hybrid/compare/compare_scenes.h"
 #include "hybrid/feel/just_noticeable.h"
 #include "hybrid/plot/scenes_plot.h"
@@ -90,26 +91,52 @@ std::string own_error_cells(const ForceError& error) {
 }
 
 void print_scenes(std::FILE* words, const ScenesComparison& comparison, bool own_error) {
-  std::size_t width = 5;
-  for (const ComparedScene& scene : comparison.scenes) width = std::max(width, scene.name.size());
-  fmt::print(words, "{:<{}} {:>7} {:>17} {:>17} {:>7} {:>7} {:>8} {:>12} {:>27} {:>7} {:>7} {:>9}\n", "scene",
-             width, "peak N", "moving JND", "still JND", "max at", "dir p99", "onset ms", "own error",
-             "tick us", "MB", "load s", "voxels");
-  fmt::print(words, "{:<{}} {:>7} {:>17} {:>17} {:>7} {:>7} {:>8} {:>12} {:>27}\n", "", width, "",
-             "p50/p99/max", "p50/p99/max", "s", "deg", "later", "moving/still", "p50/p99/p99.9/max");
-  for (std::size_t s = 0; s < comparison.scenes.size(); ++s) {
-    const ComparedScene& scene = comparison.scenes[s];
-    const Percentiles& t = scene.tick_us;
-    fmt::print(words,
-               "{:<{}} {:>7.3f} {:>17} {:>17} {:>7} {:>7} {:>8} {:>12} {:>27} {:>7.1f} {:>7.2f} {:>9}\n",
-               scene.name, width, scene.peak_N, s == 0 ? "reference" : cells(scene.moving),
-               s == 0 ? "reference" : cells(scene.still),
-               s == 0 || scene.all.max_jnd == 0.0 ? "-" : fmt::format("{:.3f}", scene.all.max_t_s),
-               s == 0 ? "-" : cell(scene.direction_p99_deg, 1.0, 2),
-               s == 0 ? "-" : cell(scene.onset_later_s, 1e3, 0), own_error_cells(scene.own_error),
-               fmt::format("{:.0f}/{:.0f}/{:.0f}/{:.0f}", t.p50, t.p99, t.p999, t.max),
-               1e-6 * static_cast<double>(scene.memory_bytes), scene.load_s, scene.soft_voxels);
-  }
+  const ComparedScene* const first = comparison.scenes.data();
+  const auto difference = [first](auto cell) {
+    return [first, cell](const ComparedScene& s) { return &s == first ? std::string("reference") : cell(s); };
+  };
+  const auto beside = [first](auto cell) {
+    return [first, cell](const ComparedScene& s) { return &s == first ? std::string("-") : cell(s); };
+  };
+  const Table<ComparedScene> table({
+      {{"scene"}, 0, Side::left, [](const ComparedScene& s) { return s.name; }},
+      {{"peak N"}, 7, Side::right, [](const ComparedScene& s) { return fmt::format("{:.3f}", s.peak_N); }},
+      {{"moving JND", "p50/p99/max"}, 15, Side::right, difference([](const ComparedScene& s) {
+         return cells(s.moving);
+       })},
+      {{"still JND", "p50/p99/max"}, 15, Side::right, difference([](const ComparedScene& s) {
+         return cells(s.still);
+       })},
+      {{"max at", "s"}, 7, Side::right, beside([](const ComparedScene& s) {
+         return s.all.max_jnd == 0.0 ? "-" : fmt::format("{:.3f}", s.all.max_t_s);
+       })},
+      {{"dir p99", "deg"}, 7, Side::right, beside([](const ComparedScene& s) {
+         return cell(s.direction_p99_deg, 1.0, 2);
+       })},
+      {{"onset ms", "later"}, 8, Side::right, beside([](const ComparedScene& s) {
+         return cell(s.onset_later_s, 1e3, 0);
+       })},
+      {{"own error", "moving/still"},
+       12,
+       Side::right,
+       [](const ComparedScene& s) { return own_error_cells(s.own_error); }},
+      {{"tick us", "p50/p99/p99.9/max"},
+       20,
+       Side::right,
+       [](const ComparedScene& s) {
+         const Percentiles& t = s.tick_us;
+         return fmt::format("{:.0f}/{:.0f}/{:.0f}/{:.0f}", t.p50, t.p99, t.p999, t.max);
+       }},
+      {{"MB"},
+       7,
+       Side::right,
+       [](const ComparedScene& s) {
+         return fmt::format("{:.1f}", 1e-6 * static_cast<double>(s.memory_bytes));
+       }},
+      {{"load s"}, 7, Side::right, [](const ComparedScene& s) { return fmt::format("{:.2f}", s.load_s); }},
+      {{"voxels"}, 9, Side::right, [](const ComparedScene& s) { return std::to_string(s.soft_voxels); }},
+  });
+  fmt::print(words, "{}", table.text(comparison.scenes));
   const std::string own = own_error ? fmt::format(
                                           "greatest JND against the same scene along the same path, {} "
                                           "times slower; -: nothing soft was felt",

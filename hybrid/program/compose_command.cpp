@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "device/loop/stop_signal.h"
+#include "hybrid/base/table.h"
 #include "hybrid/program/commands.h"
 #include "hybrid/program/outputs.h"
 #include "hybrid/scene/table_reader.h"
@@ -30,19 +31,30 @@ std::string in_shell(const std::string& text) {
 }
 
 void print_table(std::FILE* out, const std::vector<ComposedPart>& rows) {
-  std::size_t width = 4;
-  for (const ComposedPart& row : rows) width = std::max(width, row.name.size());
-  fmt::print(out, "{:<{}}  {:<5} {:>8} {:>9}  {:<21} {:>8} {:>5}  {}\n", "name", width, "as", "voxels",
-             "triangles", "size (mm)", "E (kPa)", "nu", "source");
-  for (const ComposedPart& row : rows) {
-    const glm::dvec3 mm = row.size_m * 1e3;
-    const auto number = [](std::size_t n) { return n == 0 ? std::string("-") : std::to_string(n); };
-    fmt::print(out, "{:<{}}  {:<5} {:>8} {:>9}  {:<21} {:>8} {:>5}  {}\n", row.name, width,
-               row.rigid ? "rigid" : "soft", number(row.voxels), number(row.triangles),
-               fmt::format("{:.4g} x {:.4g} x {:.4g}", mm.x, mm.y, mm.z),
-               row.rigid ? "-" : fmt::format("{:.4g}", row.young_Pa / 1e3),
-               row.rigid ? "-" : fmt::format("{:.2f}", row.poisson), row.source);
-  }
+  const auto number = [](std::size_t n) { return n == 0 ? std::string("-") : std::to_string(n); };
+  const Table<ComposedPart> table({
+      {{"name"}, 0, Side::left, [](const ComposedPart& row) { return row.name; }},
+      {{"as"}, 0, Side::left, [](const ComposedPart& row) { return row.rigid ? "rigid" : "soft"; }},
+      {{"voxels"}, 0, Side::right, [&](const ComposedPart& row) { return number(row.voxels); }},
+      {{"triangles"}, 0, Side::right, [&](const ComposedPart& row) { return number(row.triangles); }},
+      {{"size (mm)"},
+       0,
+       Side::left,
+       [](const ComposedPart& row) {
+         const glm::dvec3 mm = row.size_m * 1e3;
+         return fmt::format("{:.4g} x {:.4g} x {:.4g}", mm.x, mm.y, mm.z);
+       }},
+      {{"E (kPa)"},
+       0,
+       Side::right,
+       [](const ComposedPart& row) { return row.rigid ? "-" : fmt::format("{:.4g}", row.young_Pa / 1e3); }},
+      {{"nu"},
+       0,
+       Side::right,
+       [](const ComposedPart& row) { return row.rigid ? "-" : fmt::format("{:.2f}", row.poisson); }},
+      {{"source"}, 0, Side::left, [](const ComposedPart& row) { return row.source; }},
+  });
+  fmt::print(out, "{}", table.text(rows));
 }
 
 Json composition_report(const Composed& composed) {

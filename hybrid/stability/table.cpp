@@ -8,6 +8,8 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
+#include "hybrid/base/table.h"
+
 namespace hybrid {
 namespace {
 
@@ -76,24 +78,56 @@ std::string note_of(const StabilityRow& row) {
   return note;
 }
 
+const Table<StabilityRow>& sweep_table() {
+  const auto format = [](const char* form, auto value) {
+    return [form, value](const StabilityRow& row) { return fmt::format(fmt::runtime(form), value(row)); };
+  };
+  static const Table<StabilityRow> table({
+      {{"kind"}, 8, Side::left, [](const StabilityRow& row) { return std::string(name_of(row.kind)); }},
+      {{"b"},
+       6,
+       Side::right,
+       format("{:.3g}", [](const StabilityRow& row) { return row.damping_N_s_per_m(); })},
+      {{"wall B"},
+       6,
+       Side::right,
+       format("{:.3g}", [](const StabilityRow& row) { return row.setting.wall_damping_N_s_per_m; })},
+      {{"rate Hz"},
+       7,
+       Side::right,
+       format("{:.0f}", [](const StabilityRow& row) { return row.setting.rate_hz; })},
+      {{"delay"},
+       6,
+       Side::right,
+       format("{}", [](const StabilityRow& row) { return row.setting.delay_ticks; })},
+      {{"mm"},
+       6,
+       Side::right,
+       format("{:.3g}", [](const StabilityRow& row) { return row.setting.encoder_m() * 1e3; })},
+      {{"N"},
+       6,
+       Side::right,
+       format("{:.3g}", [](const StabilityRow& row) { return row.setting.friction_N(); })},
+      {{"grip"}, 7, Side::left, [](const StabilityRow& row) { return row.grip; }},
+      {{"K N/m"}, 9, Side::right, measured_text},
+      {{"theory"}, 9, Side::right, [](const StabilityRow& row) { return number(row.theory); }},
+      {{"off by"},
+       7,
+       Side::right,
+       [](const StabilityRow& row) {
+         return row.error() ? fmt::format("{:+.2f} %", 100.0 * *row.error()) : std::string();
+       }},
+  });
+  return table;
+}
+
 void add_sweep(std::string& text, const StabilityReport& report, StabilitySweep sweep) {
   bool first = true;
   for (const StabilityRow& row : report.rows) {
     if (row.sweep != sweep) continue;
-    if (first) {
-      fmt::format_to(std::back_inserter(text),
-                     "\n{}\n{:<8} {:>6} {:>6} {:>7} {:>6} {:>6} {:>6} {:<7} {:>9} {:>9} {:>7}\n",
-                     title_of(sweep), "kind", "b", "wall B", "rate Hz", "delay", "mm", "N", "grip", "K N/m",
-                     "theory", "off by");
-    }
+    if (first) text += fmt::format("\n{}\n{}", title_of(sweep), sweep_table().head());
     first = false;
-    const LoopSetting& s = row.setting;
-    fmt::format_to(std::back_inserter(text),
-                   "{:<8} {:>6.3g} {:>6.3g} {:>7.0f} {:>6} {:>6.3g} {:>6.3g} {:<7} {:>9} {:>9} {:>7} {}\n",
-                   name_of(row.kind), row.damping_N_s_per_m(), s.wall_damping_N_s_per_m, s.rate_hz,
-                   s.delay_ticks, s.encoder_m() * 1e3, s.friction_N(), row.grip, measured_text(row),
-                   number(row.theory), row.error() ? fmt::format("{:+.2f} %", 100.0 * *row.error()) : "",
-                   note_of(row));
+    text += sweep_table().line(row, " " + note_of(row));
   }
 }
 

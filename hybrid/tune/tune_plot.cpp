@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "hybrid/base/whole_file.h"
+#include "hybrid/base/letters.h"
 #include "hybrid/plot/svg_canvas.h"
 #include "hybrid/plot/svg_figure.h"
 

@@ -7,14 +7,12 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "hybrid/base/table.h"
 #include "hybrid/feel/just_noticeable.h"
 #include "hybrid/session/report.h"
 
 namespace hybrid {
 namespace {
-
-// Longest shown words of a setting, in a table.
-constexpr std::size_t kMostWidth = 48;
 
 // Share of the passes that has to agree.
 constexpr double kTold = 0.75;
@@ -105,40 +103,59 @@ std::string doubt_about_cost(const TuneResult& result) {
   return text;
 }
 
-std::string cells(const TunedSetting& s, const char* mark, const std::string& words, std::size_t width) {
-  const Percentiles& t = s.tick_us;
-  const PassRange passes = range_of(s);
-  const auto p99 = [](const FeltError& e) { return e.ticks > 0 ? fmt::format("{:.2f}", e.p99_jnd) : "-"; };
-  return fmt::format("{} {:<{}} {:>7} {:>7} {:>24} {:>13} {:>8.1f} {:>9}\n", mark, words, width,
-                     p99(s.error.moving), p99(s.error.still),
-                     fmt::format("{:.0f}/{:.0f}/{:.0f}/{:.0f}", t.p50, t.p99, t.p999, t.max),
-                     fmt::format("{:.0f} to {:.0f}", passes.low, passes.high),
-                     1e-6 * static_cast<double>(s.memory_bytes), s.soft_voxels);
-}
-
 std::string marked_words(const TunedSetting& s) {
   return s.words + (s.own ? " (as it is)" : "");
 }
 
+// `mark`: one letter before a setting.
+Table<TunedSetting> setting_table(const std::function<char(const TunedSetting&)>& mark) {
+  const auto p99 = [](const FeltError& e) { return e.ticks > 0 ? fmt::format("{:.2f}", e.p99_jnd) : "-"; };
+  return Table<TunedSetting>({
+      {{""}, 1, Side::left, [mark](const TunedSetting& s) { return std::string(1, mark(s)); }},
+      {{"setting"}, 0, Side::left, marked_words},
+      {{"moving", "JND p99"}, 7, Side::right, [p99](const TunedSetting& s) { return p99(s.error.moving); }},
+      {{"still", "JND p99"}, 7, Side::right, [p99](const TunedSetting& s) { return p99(s.error.still); }},
+      {{"tick us", "p50/p99/p99.9/max"},
+       17,
+       Side::right,
+       [](const TunedSetting& s) {
+         const Percentiles& t = s.tick_us;
+         return fmt::format("{:.0f}/{:.0f}/{:.0f}/{:.0f}", t.p50, t.p99, t.p999, t.max);
+       }},
+      {{"p99.9 of", "single passes"},
+       13,
+       Side::right,
+       [](const TunedSetting& s) {
+         const PassRange passes = range_of(s);
+         return fmt::format("{:.0f} to {:.0f}", passes.low, passes.high);
+       }},
+      {{"MB"},
+       8,
+       Side::right,
+       [](const TunedSetting& s) {
+         return fmt::format("{:.1f}", 1e-6 * static_cast<double>(s.memory_bytes));
+       }},
+      {{"voxels"}, 9, Side::right, [](const TunedSetting& s) { return std::to_string(s.soft_voxels); }},
+  });
+}
+
 std::string table_of_front(const TuneResult& result) {
-  std::size_t width = 7;
-  for (const TunedSetting& s : result.settings)
-    width = std::max(width, std::min(marked_words(s).size(), kMostWidth));
-  std::string text = fmt::format("  {:<{}} {:>7} {:>7} {:>24} {:>13} {:>8} {:>9}\n", "setting", width,
-                                 "moving", "still", "tick us", "p99.9 of", "MB", "voxels");
-  text += fmt::format("  {:<{}} {:>7} {:>7} {:>24} {:>13}\n", "", width, "JND p99", "JND p99",
-                      "p50/p99/p99.9/max", "single passes");
-  for (const std::size_t n : result.front) {
-    const TunedSetting& s = result.settings[n];
-    text += cells(s, n == result.chosen ? "*" : " ", marked_words(s), width);
-  }
+  const TunedSetting* const all = result.settings.data();
+  const auto is_on_front = [&](const TunedSetting& s) {
+    return std::ranges::find(result.front, static_cast<std::size_t>(&s - all)) != result.front.end();
+  };
+  Table<TunedSetting> table = setting_table([&](const TunedSetting& s) {
+    return &s == all + result.chosen ? '*' : is_on_front(s) ? ' ' : '-';
+  });
+  table.fit(result.settings);
+  std::string text = table.head();
+  for (const std::size_t n : result.front) text += table.line(result.settings[n]);
   bool any = false;
-  for (std::size_t n = 0; n < result.settings.size(); ++n) {
-    const TunedSetting& s = result.settings[n];
+  for (const TunedSetting& s : result.settings) {
     if (!s.whole() || !s.dominated_by) continue;
     if (!any) text += "dominated: another one is as cheap and as accurate\n";
     any = true;
-    text += cells(s, n == result.chosen ? "*" : "-", marked_words(s), width);
+    text += table.line(s);
   }
   return text;
 }

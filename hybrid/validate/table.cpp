@@ -3,22 +3,16 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "hybrid/plot/svg_canvas.h"
+#include "hybrid/base/table.h"
 
 namespace hybrid {
 namespace {
 
 nlohmann::ordered_json or_null(const std::optional<double>& value) {
   return value ? nlohmann::ordered_json(*value) : nlohmann::ordered_json(nullptr);
-}
-
-// Padded by letters, not bytes.
-std::string padded(const std::string& text, std::size_t width) {
-  return text + std::string(width - std::min(width, letters(text)), ' ');
 }
 
 std::string spread_words(const ValidationRow& row) {
@@ -34,6 +28,38 @@ std::string verdict_words(const ValidationRow& row) {
   if (row.fails()) return "FAILS";
   if (row.inside()) return row.stated ? "holds" : "inside";
   return "outside";
+}
+
+const Table<ValidationRow>& validation_columns() {
+  constexpr std::size_t kCaseLetters = 62, kQuantityLetters = 52;
+  static const Table<ValidationRow> table({
+      {{" case"},
+       kCaseLetters + 1,
+       Side::left,
+       [](const ValidationRow& row) { return " " + shortened(row.name, kCaseLetters); }},
+      {{"quantity"},
+       kQuantityLetters,
+       Side::left,
+       [](const ValidationRow& row) { return shortened(row.quantity, kQuantityLetters); }},
+      {{"reference"},
+       10,
+       Side::right,
+       [](const ValidationRow& row) { return fmt::format("{:.4g}", row.reference); }},
+      {{"spread"}, 16, Side::left, spread_words},
+      {{"ours"}, 10, Side::right, [](const ValidationRow& row) { return fmt::format("{:.4g}", row.ours); }},
+      {{"difference"},
+       10,
+       Side::right,
+       [](const ValidationRow& row) { return fmt::format("{:+.1f} %", percent(row.difference())); }},
+      {{"bound"},
+       9,
+       Side::right,
+       [](const ValidationRow& row) {
+         return row.bound ? fmt::format("{:.1f} %", 100.0 * *row.bound) : "spread";
+       }},
+      {{" verdict"}, 0, Side::left, [](const ValidationRow& row) { return " " + verdict_words(row); }},
+  });
+  return table;
 }
 
 }  // namespace
@@ -83,17 +109,10 @@ std::string validation_table(const ValidationReport& report) {
       group = row.group;
       text += fmt::format("\n{}\n", group);
     }
-    text +=
-        fmt::format("  {} {} {:>10.4g} {} {:>10.4g} {:>+8.1f} %  {:>8}  {}\n",
-                    padded(shortened(row.name, 62), 62), padded(shortened(row.quantity, 52), 52),
-                    row.reference, padded(spread_words(row), 16), row.ours, percent(row.difference()),
-                    row.bound ? fmt::format("{:.1f} %", 100.0 * *row.bound) : "spread", verdict_words(row));
+    text += validation_columns().line(row);
     if (!row.inside() && !row.why.empty()) text += fmt::format("      {}\n", row.why);
   }
-  const std::string head =
-      fmt::format("  {} {} {:>10} {} {:>10} {:>10}  {:>8}  {}\n", padded("case", 62), padded("quantity", 52),
-                  "reference", padded("spread", 16), "ours", "difference", "bound", "verdict");
-  return head + text +
+  return validation_columns().head() + text +
          fmt::format("\n{} more rows are in the report (--json, --report), with the sources of all.\n{}\n",
                      left_out, verdict(report));
 }
