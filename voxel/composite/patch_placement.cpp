@@ -117,7 +117,7 @@ bool CompositeGrid::centre_on(const Index3& centre) noexcept {
   bool moves = false;
   for (std::size_t d = 0; d < 3; ++d) moves = moves || std::abs(centre[d] - centre_[d]) >= kFollowDistance;
   if (moves) centre_ = centre;
-  // The coarsest level that is due, and the finer levels that would no longer be nested in it.
+  // Moves the coarsest level that is not in place, and the finer levels that would no longer be nested.
   const bool all = off_centre(centre);
   bool any = false, joins = false;
   for (std::size_t l = covering_level_; l-- > 0;) {
