@@ -8,9 +8,9 @@
 // counts.
 //
 // Where tissues differ in stiffness, the stiffness of a cube along an axis is that of its columns in
-// parallel, each column in series: the lower of the bounds of Cardwell & Parsons (Trans. AIME 160, 1945). A
-// mean over all cells would make a stack of layers along a link about as stiff as its stiffest layer. The
-// stored stiffness takes a fifth of a byte per voxel.
+// parallel, with the cells of each column in series: the lower of the bounds of Cardwell & Parsons (Trans.
+// AIME 160, 1945). A mean over all cells would make a stack of layers along a link about as stiff as its
+// stiffest layer. The stored stiffness takes a fifth of a byte per voxel.
 //
 // Coordinates are voxel indices plus an offset, chosen such that an unanchored end of the object is a node of
 // every level.

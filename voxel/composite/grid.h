@@ -122,8 +122,8 @@ class CompositeGrid {
   };
   [[nodiscard]] std::vector<ObstacleForce> obstacle_forces() const;
 
-  // Call it before a cycle if the contact has moved. It adds `share` of each displacement along `axis` to
-  // that displacement, at most `most_m` (m).
+  // Call it before a cycle if the contact has moved. Each displacement along `axis` grows by `share` times
+  // itself, but by at most `most_m` (m).
   void extrapolate(std::size_t axis, double share, double most_m) noexcept;
   // Call both before a cycle. clear_pressed() removes all constraints of the tool's contact; press() adds
   // one. A pressed voxel of level 0 may not move back against `normal` (unit vector, into the tissue) beyond

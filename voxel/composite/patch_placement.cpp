@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Where the patches of a CompositeGrid are. Building a level costs a tenth of a tick's work or more. So
+// Placement of the patches of a CompositeGrid. Building a level costs a tenth of a tick's work or more. So
 // levels are built one a tick: before a contact, while the tool approaches, and one after another while a
 // contact moves.
 #include <algorithm>
@@ -11,7 +11,7 @@ namespace voxel {
 namespace {
 
 constexpr int kFollowDistance = 2;  // voxels that a contact moves before patches follow it
-constexpr int kMaxOffCentre = 4;  // voxels from the contact to the middle of level 0; beyond, all levels move
+constexpr int kMaxOffCentre = 4;    // voxels from contact to middle of level 0; with more, all levels move
 
 }  // namespace
 

@@ -2,7 +2,7 @@
 // Innermost loops over one axis of one level of a CompositeGrid, in vectors of 8 nodes along x.
 //
 // Arrays are those of a level: one float a node, rows along x padded to a multiple of 8. Rows beside a
-// level's rows, and nodes beside a row's nodes, may be read: links there have weight 0. Smoothing and
+// level's rows, and nodes beside a row's nodes, may be read: their links have weight 0. Smoothing and
 // residual are in row_kernels.cpp, bounds and multipliers in constraint_kernels.cpp, line searches in
 // line_search_kernels.cpp.
 #pragma once
@@ -17,7 +17,7 @@
 namespace voxel::composite {
 
 inline constexpr float kNoBound = -1e30F;  // value of a bound array where there is no bound
-inline constexpr int kMaxVectors = 80;     // vectors of a row
+inline constexpr int kMaxVectors = 80;     // vectors of a row, at most
 
 // One axis of one level, from its first row on.
 struct LevelView {
@@ -45,7 +45,8 @@ void smooth_level(const LevelView& view) noexcept;
 // residual = f − K u, with is_free and is_active. The residual is 0 for fixed and for active nodes. Active
 // nodes take no correction from coarser levels either.
 void residual_of_level(const LevelView& view) noexcept;
-// active_stiffness of a free node: its own plus a share of its links to active nodes. Of other nodes: 0.
+// Sets active_stiffness. To a free node's value it adds a share of the stiffness of the node's links to
+// active nodes. Other nodes get 0.
 void find_active_stiffness(const LevelView& view) noexcept;
 // Adds a spring of active_stiffness that holds each node at its present u. Updates f and sets
 // inverse_with_active.
@@ -82,7 +83,7 @@ struct BoundSweep {
   std::array<int, 3> low, high;  // nodes of the box, both included
   std::size_t stride, plane;
 };
-// Raises each bound of the box to those that its links ask for: along x in both directions, then y, then z.
+// Raises each bound in the box as far as its links require: along x in both directions, then y, then z.
 void sweep_bounds(const BoundSweep& sweep) noexcept;
 // The largest |u|.
 [[nodiscard]] float largest_size(const float* u, std::size_t count) noexcept;

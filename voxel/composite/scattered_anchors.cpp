@@ -13,8 +13,8 @@ namespace {
 
 using composite::index;
 
-constexpr float kLeastResistance =
-    0.01F;  // relative to a link between voxels; for faces in their node's plane
+// Least resistance of a face, relative to a link between voxels. Faces in their node's plane have it.
+constexpr float kLeastResistance = 0.01F;
 
 }  // namespace
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which objects can be solved on a CompositeGrid: by their materials and anchors, and by trial contacts.
+// Decides which objects can be solved on a CompositeGrid: by their materials and anchors, and by trial
+// contacts.
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>

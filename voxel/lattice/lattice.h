@@ -210,7 +210,7 @@ class Lattice {
   enum class Anchors : std::uint8_t { none = 0, all = 1, some = 2 };
   static constexpr std::uint8_t kCount = 63, kInside = kRow + 1;
   static constexpr int kAnchorShift = 6;
-  static constexpr std::size_t kListBlock = 64;  // rows
+  static constexpr std::size_t kListBlock = 64;  // rows to an entry of listed_before_
   [[nodiscard]] Anchors anchors_of(RowId row) const { return Anchors(rows_[row] >> kAnchorShift); }
   // Anchored lanes of a row with Anchors::some.
   [[nodiscard]] std::uint32_t listed_anchors(RowId row) const noexcept;

@@ -101,7 +101,7 @@ bool LevelStiffness::write_voxels(RowId row, Written& out, LaneBits& stands) con
     Slice a{}, b{};
     const std::size_t along = d == 1 ? 1 : 3, across = d == 1 ? 3 : 1;
     for (std::size_t n = 0; n < 9; ++n) {
-      // In the order of Lattice::spring(), so that sums round alike.
+      // The order is that of Lattice::spring(), so that sums round alike.
       const std::size_t beside = d == 1 ? n / 3 : n % 3,
                         at = (d == 1 ? n % 3 : n / 3) * across + from * along;
       a[n] = around[x - 1 + beside][at];

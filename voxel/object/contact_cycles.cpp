@@ -145,8 +145,8 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
 }
 
 // The pair solver projects its voxels with all others fixed. If chains are at their limits in both objects,
-// that lifts the tool, which comes back in the next tick. Contact cycles around these voxels end such limit
-// cycles; results of the shadow come too rarely.
+// this lifts the tool, and the tool comes back in the next tick. Contact cycles around these voxels end such
+// limit cycles; results of the shadow come too rarely.
 void SoftObject::relax_near_pairs() noexcept {
   if (touches_.empty()) {  // touch() was not called
     contact_work_ = 0;

@@ -259,8 +259,8 @@ bool shares_of(const PosedObject& a, const PosedObject& b, const PressedPair& pa
 
 // With bricks a facet that is pushed sideways also moves up and down, and tilts the other way. If links are
 // at their limits in both objects, the force would flip between voxels in each tick. So the force direction
-// follows the facet's normal slowly. At rest it is the normal, and the gap along the axis does not depend on
-// it. Links alone couple no axes and need no such damping.
+// follows the facet's normal slowly. At rest the direction is the normal, and the gap along the axis does not
+// depend on the direction. Links alone couple no axes and need no such damping.
 glm::dvec3 turned(const PosedObject& a, const PosedObject& b, const PressedPair& pair,
                   const glm::dvec3& across) noexcept {
   if (!a.object.lattice().has_bricks() && !b.object.lattice().has_bricks()) return across;

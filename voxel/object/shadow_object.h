@@ -11,11 +11,11 @@
 //               in parts, each of which leaves the residual of the rest frozen;
 // apply_far()   adds the other rows, some a tick, while the thread relaxes the next submission.
 //
-// Without active limits displacements are linear, so a result can be added to what the tick did meanwhile.
-// Each residual must then be owned by exactly one of the two solvers. What was submitted belongs to the
-// thread: around the contact it counts as frozen from then on (Relaxation::assign_residual), and the tick
-// relaxes only what it moves itself. If the tick leaves a fraction X of its residual and a cycle leaves Y of
-// the other, the total left is X + Y.
+// Without active limits displacements are linear, so a result can be added to the motion that the tick made
+// meanwhile. Each residual must then be owned by exactly one of the two solvers. What was submitted belongs
+// to the thread: around the contact it counts as frozen from then on (Relaxation::assign_residual), and the
+// tick relaxes only what it moves itself. If the tick leaves a fraction X of its residual and a cycle leaves
+// Y of the other, the total left is X + Y.
 //
 // Coarse cells are not exchanged: each side has its own. Changes too small to matter are deferred until all
 // is at rest.
@@ -25,7 +25,7 @@
 // boxes around the contact (coarse levels first). These move tissue by spacings, so rows that could not
 // follow are queued and tried again (RetryQueue).
 //
-// Not for tissue with plasticity, whose rest lengths change too.
+// This is not for tissue with plasticity, whose rest lengths change too.
 #pragma once
 
 #include <array>
