@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Where the anchors of an object are, as the coarse levels of a CompositeGrid need them (coarse_material.h).
+// Look-up of an object's anchors for the coarse levels of a CompositeGrid (coarse_material.h).
 #include <algorithm>
 #include <bit>
 #include <limits>
@@ -71,8 +71,8 @@ void CoarseMaterial::list_anchor_faces() {
   std::partial_sum(faces_until_.begin(), faces_until_.end(), faces_until_.begin());
 }
 
-// Adds a quarter of a face if there is one: the neighbour is tissue that may move, and the cell has all its
-// voxels.
+// Adds a quarter of a face if two things hold: the neighbour is tissue that may move, and the cell has all
+// its voxels.
 void CoarseMaterial::add_anchor_face(const Index3& voxel, std::uint8_t d, std::uint8_t signs) {
   const auto sign = [signs](int bit) { return (signs >> bit & 1) != 0 ? 1 : -1; };
   const auto at = [&](int along, int p, int q) {
@@ -142,8 +142,8 @@ bool CoarseMaterial::anchor_near(const Index3& p, const Index3& q, int span) con
   return false;
 }
 
-// Start of the nearest line along d that has tissue in it, at most half of its length away; else of the line
-// at p.
+// Start of the nearest line along d that has tissue in it and is at most half of its length away. If there is
+// none, the start of the line at p.
 CoarseMaterial::Index3 CoarseMaterial::nearest_tissue_line(const Index3& p, std::size_t d,
                                                            int links) const noexcept {
   const auto any = [&](Index3 q) {

@@ -10,9 +10,8 @@ namespace {
 
 using composite::index;
 
-constexpr int kLevels = 12;  // of cubes
-// align_to() chooses an end if the voxel is further from the middle than half of 1 / kAlignFraction of the
-// size.
+constexpr int kLevels = 12;  // levels of cubes
+// align_to() chooses an end if the voxel is further from the middle than size / (2 · kAlignFraction).
 constexpr int kAlignFraction = 4;
 constexpr int kMaxCubeEdge = 1 << (kLevels - 1);
 
@@ -133,8 +132,8 @@ void CoarseMaterial::voxel_ranks(int x0, int nx, int y, int z, std::uint8_t* out
   }
 }
 
-// Stiffness ranks of a layer of cells: of the softest of the eight voxels round each; 0 where one is missing.
-// Coordinates with the offset.
+// Stiffness ranks of a layer of cells. The rank of a cell is that of the softest of its eight voxels, or 0 if
+// one is missing. Coordinates include the offset.
 void CoarseMaterial::cell_ranks(int k, int x0, int nx, int y0, int ny, std::uint8_t* out) noexcept {
   const int width = nx + 1;
   voxel_scratch_.resize(3 * index(width));
@@ -278,7 +277,7 @@ void CoarseMaterial::coarsen_stiffness(const CubeLevel& below, CubeLevel& coarse
 }
 
 void CoarseMaterial::reserve_planes(std::size_t cubes) {
-  const std::size_t widest = cubes << (kFirstLevel - 1);  // cells; larger cubes are counted
+  const std::size_t widest = cubes << (kFirstLevel - 1);  // cells; counts of larger cubes are stored
   cell_scratch_.reserve(2 * widest * widest);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the coarse levels of a CompositeGrid know of an object: how many cells of tissue a cube has, how stiff
-// they are, and where the anchors are.
+// The object as the coarse levels of a CompositeGrid see it: the number and stiffness of the tissue cells in
+// cubes, and the anchors.
 //
 // A cell lies between eight voxels. It exists if all of them do, and is as stiff as the softest of them
 // (link_stiffness.h). Cell counts are stored for cubes of 4 cells an edge and larger, in a fiftieth of a byte
@@ -8,9 +8,9 @@
 // counts.
 //
 // Where tissues differ in stiffness, the stiffness of a cube along an axis is that of its columns in
-// parallel, each column in series: the lower of the bounds of Cardwell & Parsons (Trans. AIME 160, 1945). A
-// mean over all cells would give layers across a link the stiffness of the stiffest layer. This takes a fifth
-// of a byte per voxel.
+// parallel, with the cells of each column in series: the lower of the bounds of Cardwell & Parsons (Trans.
+// AIME 160, 1945). A mean over all cells would make a stack of layers along a link about as stiff as its
+// stiffest layer. The stored stiffness takes a fifth of a byte per voxel.
 //
 // Coordinates are voxel indices plus an offset, chosen such that an unanchored end of the object is a node of
 // every level.
@@ -39,9 +39,9 @@ class CoarseMaterial {
 
   using Index3 = std::array<int, 3>;
   [[nodiscard]] const Index3& offset() const { return offset_; }
-  // In an object of one stiffness that fills its box: makes the ends nearest to a voxel nodes of every level.
-  // Along an axis where the voxel is about as far from both ends nothing changes. Returns whether the offset
-  // changed.
+  // For an object of one stiffness that fills its box. Chooses the offset such that the ends of the object
+  // nearest to a voxel are nodes of every level. An axis along which the voxel is about as far from both ends
+  // keeps its offset. Returns whether the offset changed.
   bool align_to(const Index3& voxel) noexcept;
   // Coordinates of the outermost voxels along d.
   [[nodiscard]] int low(std::size_t d) const { return offset_[d]; }
@@ -58,7 +58,7 @@ class CoarseMaterial {
 
   // Stiffness ranks of nx voxels along x from (x, y, z) on, the softest 1; 0 where there is no voxel.
   void voxel_ranks(int x, int nx, int y, int z, std::uint8_t* out) const noexcept;
-  // Of a rank, relative to the reference.
+  // Stiffness of a rank, relative to the reference stiffness.
   [[nodiscard]] float stiffness(std::uint8_t rank) const { return stiffness_[rank]; }
 
   // ---- cubes of 2^m cells an edge, numbered from the origin of coordinates ----
@@ -81,22 +81,24 @@ class CoarseMaterial {
     int ahead = 0, back = 0;  // from the low end upwards, from the high end downwards
     int links = 0;            // links of the line that are in tissue
   };
-  // Of the line of `links` links from p in direction d, or of the nearest line with tissue in it.
+  // Searches the line of `links` links from p in direction d. If that line has no tissue, searches the
+  // nearest line that has some.
   [[nodiscard]] AnchorSearch anchors_along(const Index3& p, std::size_t d, int links) const noexcept;
-  // May there be an anchor in the box between p and q, widened by half of `span`? p and q lie at most `span`
-  // apart.
+  // May there be an anchor in the box between p and q, widened by half of `span`? `span` sets the size of the
+  // cubes that are looked up.
   [[nodiscard]] bool anchor_near(const Index3& p, const Index3& q, int span) const noexcept;
   // Is there an anchor that does not lie in a side of the object that is anchored as a whole?
   [[nodiscard]] bool has_scattered_anchors() const { return !anchor_faces_.empty(); }
-  // Of scattered anchors: calls visit(face) for the anchored voxels of the box, cube by cube.
-  // A quarter of the face between an anchored voxel and its neighbour along d, which may move: the quarter
-  // that the cell beside both stands for.
+  // A quarter of the face between an anchored voxel and its neighbour along d, which is not anchored. Each of
+  // the four cells round their link has one quarter.
   struct AnchorFace {
     Index3 voxel{};
     std::size_t d = 0;
-    int side = 0;               // −1 or 1: of the neighbour
-    std::array<int, 2> cell{};  // −1 or 1: of the cell along d + 1 and d + 2
+    int side = 0;               // −1 or 1: side of the neighbour along d
+    std::array<int, 2> cell{};  // −1 or 1: side of the cell along d + 1 and d + 2
   };
+  // If anchors are scattered: calls visit(face) for the faces of the anchored voxels in the box, cube by
+  // cube.
   template <class Visit>
   void for_anchor_faces(const Index3& low, const Index3& high, const Visit& visit) const;
   // [surface number] links from a surface voxel to the nearest anchor; without a chain to one, the largest
@@ -108,13 +110,13 @@ class CoarseMaterial {
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
-  static constexpr int kFirstLevel = 2;        // smallest cubes whose counts are stored, in bytes
-  static constexpr int kFirstAnchorLevel = 3;  // smallest cubes with anchor marks
+  static constexpr int kFirstLevel = 2;        // level of the smallest cubes with stored counts, in bytes
+  static constexpr int kFirstAnchorLevel = 3;  // level of the smallest cubes with anchor marks
   struct CubeLevel {
     Index3 dims{};
-    std::vector<std::uint8_t> counts8;            // of kFirstLevel: at most 64 cells
-    std::vector<std::uint32_t> counts;            // of coarser levels
-    std::vector<std::uint8_t> anchored;           // 1: a voxel of the cube is anchored; without the offset
+    std::vector<std::uint8_t> counts8;   // of level kFirstLevel: at most 64 cells
+    std::vector<std::uint32_t> counts;   // of coarser levels
+    std::vector<std::uint8_t> anchored;  // 1: a voxel of the cube is anchored; cubes without the offset
     std::array<std::vector<float>, 3> stiffness;  // [d] cells times stiffness along d; where tissues differ
     [[nodiscard]] bool in(const Index3& b) const {
       for (std::size_t d = 0; d < 3; ++d) {
@@ -149,16 +151,17 @@ class CoarseMaterial {
   bool fills_box_ = false;
   std::array<std::uint8_t, 256> rank_{};  // [label] rank of its stiffness, the softest 1; 0: no voxel
   std::vector<float> stiffness_;          // [rank] relative to the reference's
-  std::vector<float> series_pair_;        // [rank · ranks + rank] two cells in series, times their number
-  std::vector<CubeLevel> levels_;         // [m]
+  // [rank · ranks + rank] Mean stiffness of two cells in series, times their number. Rank 0 is no cell.
+  std::vector<float> series_pair_;
+  std::vector<CubeLevel> levels_;  // [m]
   std::vector<std::uint8_t> voxel_scratch_, cell_scratch_;
   struct PackedFace {
     std::array<std::uint16_t, 3> voxel{};  // without the offset
     std::uint8_t d = 0;
-    std::uint8_t signs = 0;  // bit 0: side, bits 1 and 2: cell; set: 1
+    std::uint8_t signs = 0;  // bit 0: side; bits 1 and 2: cell. 1 if set, else −1
   };
-  std::vector<PackedFace> anchor_faces_;    // by cubes of kFirstAnchorLevel
-  std::vector<std::uint32_t> faces_until_;  // [cube] end of its faces
+  std::vector<PackedFace> anchor_faces_;    // sorted by cubes of level kFirstAnchorLevel
+  std::vector<std::uint32_t> faces_until_;  // [cube] end of its faces in anchor_faces_
 };
 
 template <class Visit>

@@ -70,7 +70,7 @@ HYBRID_INLINE void sweep_row_down(float* bound, const float* weight, float by, i
   }
 }
 
-// Bounds of a row from those of a row beside it.
+// Raises the bounds of a row by those of a row beside it.
 HYBRID_INLINE void take_from_row(float* bound, const float* beside, const float* weight, float by, int first,
                                  int last) {
   for (int o = first; o <= last; ++o) {
@@ -121,9 +121,9 @@ HYBRID_MULTIVERSIONED void sweep_bounds(const BoundSweep& s) noexcept {
   }
 }
 
-// Nodes at a bound must move with it before the cycle. In a tight cone nodes are pulled only where its planes
-// meet, so smoothing alone would move the cone by one node a sweep. A node that its bound has passed is moved
-// onto the bound.
+// Nodes at a bound must move with the bound before the cycle. In a tight cone of bounds, nodes are pulled
+// only where the cone's planes meet. So smoothing alone would move the cone by one node a sweep. A node
+// beyond its bound is moved onto the bound.
 HYBRID_MULTIVERSIONED void follow_bounds(float* u, const float* at_bound, const float* lower,
                                          const float* negated_upper, std::size_t count) noexcept {
   for (std::size_t n = 0; n < count; n += kLanes) {

@@ -9,13 +9,15 @@ namespace {
 
 using composite::index;
 
-// Of two full links: with more, no prolonged correction is stiffer than a node's own links (9/16).
+// Share of the weight of two full links. With at least this share a node needs no spring: in whole tissue the
+// fine level's stiffness against a prolonged correction is 9/16 of that of the node's own links.
 constexpr float kRegular = 0.999F;
 
 }  // namespace
 
-// Stiffness along d that the fine level has against a prolonged unit correction of one coarse node: of its
-// links by the differences of the interpolation weights, of its anchors by the weights.
+// Stiffness along d of the fine level against a prolonged unit correction of one coarse node. A link counts
+// by the squared difference of the interpolation weights at its ends, an anchor by the interpolation weight
+// of its node.
 float CompositeGrid::prolonged_weight(const Level& fine, const Index3& node, std::size_t d) const noexcept {
   std::array<std::array<float, 5>, 3> along{};  // interpolation weights at −2 … 2 fine nodes
   std::array<std::size_t, 3> by{};
@@ -47,9 +49,10 @@ float CompositeGrid::prolonged_weight(const Level& fine, const Index3& node, std
   return sum;
 }
 
-// A coarse level is a discretisation of its own. Where its links are weaker than the fine level is against
-// the prolonged correction (a node that barely touches the tissue, links across a gap, anchors), a correction
-// would go too far. There the difference holds the node where it is, which does not change the solution.
+// A coarse level is a discretisation of its own. Its links may be weaker than the fine level's stiffness
+// against a prolonged correction: at a node that barely touches the tissue, at links across a gap, at
+// anchors. A correction would then go too far. There a spring of the difference in stiffness holds the node
+// at its present displacement. The spring does not change the solution.
 void CompositeGrid::find_correction_springs(const Level& fine, Level& coarse) const noexcept {
   coarse.correction_springs.clear();
   if (material_.fills_box() && !material_.has_scattered_anchors()) return;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // One FAC cycle over the levels of a CompositeGrid, axis by axis, in the full approximation scheme (FAS):
 // restriction down to the coarsest level, then correction and smoothing level by level up to the finest.
-// Where a finer patch covers a level, the level holds the finer displacements by injection, and a load f with
-// which its residual is the restricted residual of the finer level. Elsewhere its nodes are unknowns with f =
-// 0.
+// Where a finer patch covers a level, the level takes the finer displacements by injection. Its load f there
+// makes its residual equal to the restricted residual of the finer level. Elsewhere its nodes are unknowns
+// with f = 0.
 #include <algorithm>
 
 #include "voxel/composite/grid.h"
@@ -16,8 +16,7 @@ namespace {
 using composite::index;
 
 constexpr int kCoarsestSweeps = 10;
-constexpr std::size_t kMaxAcross =
-    std::size_t{composite::kMaxVectors} * kLanes;  // nodes of a row, one further on either side
+constexpr std::size_t kMaxAcross = std::size_t{composite::kMaxVectors} * kLanes;  // nodes of a row, at most
 
 }  // namespace
 
@@ -79,7 +78,8 @@ void CompositeGrid::restrict_residual(std::size_t l, std::size_t a) noexcept {
   }
   const composite::LevelView here = view(l, a);
   composite::residual_of_level(here);
-  // Coarser levels do not know which nodes are active, so they get the stiffness of the links to them.
+  // Coarser levels do not know which nodes are active, so they get the stiffness of the links to active
+  // nodes.
   const bool any_active =
       fine.bounded[0] || fine.bounded[1] || fine.has_active_stiffness || !coarse.correction_springs.empty();
   if (any_active) {
@@ -115,7 +115,8 @@ void CompositeGrid::restrict_residual(std::size_t l, std::size_t a) noexcept {
               coarse.restricted_u.begin() + static_cast<std::ptrdiff_t>(begin));
 }
 
-// Restricts node values of `fine` (`from`, loads or stiffness) to `coarse`, with the transposed prolongation.
+// Restricts loads or stiffness from the nodes of `fine` to those of `coarse`, with the transposed
+// prolongation.
 void CompositeGrid::restrict_values(Level& coarse, const Level& fine, std::size_t axis, const float* from,
                                     float* to) const noexcept {
   if (material_.is_heterogeneous()) return restrict_by_links(coarse, fine, axis, from, to);
@@ -157,8 +158,9 @@ void CompositeGrid::restrict_values(Level& coarse, const Level& fine, std::size_
   distribute_ghost_loads(coarse, to);
 }
 
-// Active nodes do not take corrections, but hold the free nodes linked to them. The coarse level would not
-// see this resistance: it would move a contact as a whole if none of its own nodes is in the contact.
+// Adds springs for active nodes of finer levels. Active nodes take no corrections, and they hold the free
+// nodes linked to them. Without these springs a coarse level would not know of this resistance: it would move
+// a whole contact if none of its own nodes is in the contact.
 void CompositeGrid::add_active_stiffness(std::size_t l, std::size_t a) noexcept {
   Level& level = levels_[l];
   if (!level.has_active_stiffness) return;
@@ -192,8 +194,8 @@ void CompositeGrid::prolong_row(Level& fine, const Level& coarse, std::size_t ax
   composite::prolong_row(t);
 }
 
-// Adds the prolonged correction of level l + 1 to level l. Sides of the patch within the object are set to
-// the prolonged displacement itself: there the coarser level is the Dirichlet boundary.
+// Adds the prolonged correction of level l + 1 to level l. Nodes on the patch's sides within the object get
+// the prolonged displacement itself, as a Dirichlet boundary condition.
 void CompositeGrid::prolong(std::size_t l, std::size_t a) noexcept {
   Level& fine = levels_[l];
   Level& coarse = levels_[l + 1];
@@ -251,8 +253,8 @@ void CompositeGrid::cycle(const std::array<bool, 3>& axes) noexcept {
       composite::smooth_level(view(l, a));
       work_ += levels_[l].floats() / 8;
     };
-    // No smoothing on the way down: after a jump of the tool, a fine level that follows its bounds before the
-    // coarse levels do pulls these too far.
+    // No level is smoothed before restriction. Otherwise, after a jump of the tool, a fine level would follow
+    // its bounds before the coarse levels do, and would pull them too far.
     levels_[0].has_active_stiffness = false;
     if (!obstacle_bounds_.empty()) {
       std::fill(levels_[0].f.begin(), levels_[0].f.end(), 0.0F);
@@ -272,7 +274,8 @@ void CompositeGrid::cycle(const std::array<bool, 3>& axes) noexcept {
         prolong(l, a);
       }
       smooth(l);
-      // Twice on the two finest levels, where the contact is: with one sweep the active set may alternate.
+      // The two finest levels, where the contact is, are smoothed twice: with one sweep the active set may
+      // alternate.
       if (l <= 1) smooth(l);
     }
     for (Level& level : levels_) {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Displacements far from the contact: extrapolated before a cycle, fitted after it.
 //
-// A cycle reduces the error there slowly (to about 0.6 of it), because active nodes do not move on coarser
-// levels and hold the free nodes linked to them. But the error is nearly the same share of the displacement
-// everywhere. So one number per axis and cycle is found after the cycle: the multiple of the unprescribed
-// part of u that minimises the energy.
+// A cycle reduces the error there slowly, to about 0.6 of its size. The reason is that active nodes do not
+// move on coarser levels and hold the free nodes linked to them. But the error is nearly the same share of
+// the displacement everywhere. So one number per axis is found after each cycle: the multiple of the
+// unprescribed part of u that minimises the energy.
 #include <algorithm>
 
 #include "voxel/composite/grid.h"
@@ -13,12 +13,12 @@
 namespace voxel {
 namespace {
 
-// Step along the mode, by the step to the least energy. Above 1, because part of the error does not lie along
-// the mode and holds the rest back: near the edge of the active nodes the error is constant. From 2 on the
-// energy may grow.
+// Step along the mode, relative to the step to the least energy. It exceeds 1, because a part of the error is
+// not along the mode and holds the rest back: near the edge of the active nodes the error is constant. From 2
+// on the energy may grow.
 constexpr double kOverrelaxation = 1.5;
-// The same after a patch has moved. Its new nodes are interpolated, and their residual is not an error of the
-// far field: a full step would be felt by a sliding tool.
+// kOverrelaxation after a patch has moved. The patch's new nodes are interpolated, and their residual is not
+// an error of the far field. A sliding tool would feel a full step.
 constexpr double kAfterMove = 0.5;
 constexpr double kMaxStep = 0.5;  // of the mode, in one cycle
 
@@ -32,8 +32,8 @@ void CompositeGrid::extrapolate(std::size_t a, double share, double most_m) noex
   }
 }
 
-// Line search along beyond_bounds(), which is all of u far away, and 0 at a bound. Masking u to the free
-// nodes would not do: the links at the edge of the mask would dominate the response.
+// Line search along beyond_bounds(), which equals u far from the contact and is 0 at a bound. Masking u to
+// the free nodes would not do: the links at the edge of the mask would dominate the response.
 void CompositeGrid::fit_far_field(std::size_t a) noexcept {
   composite::ModeResponse sum;
   for (std::size_t l = 0; l <= covering_level_; ++l) {

@@ -14,7 +14,8 @@ constexpr std::size_t kMaxPressed = 2048;
 
 }  // namespace
 
-// Does the whole object fit in a patch of this level, or has it no more nodes than one of the usual width?
+// Does the whole object fit in a patch of this level, or does it have no more nodes than a patch of the usual
+// width?
 bool CompositeGrid::can_cover(std::size_t l) const {
   const auto patch = index(2 * half_width_of(l) + 1), usual = index(2 * coarse_half_width_ + 1);
   bool fits = true;
@@ -52,7 +53,8 @@ CompositeGrid::CompositeGrid(const Lattice& lattice, int half_width, int coarse_
   levels_.resize(count);
   for (std::size_t l = 0; l < count; ++l) allocate(levels_[l], l);
   if (covering_level_ > 0) allocate_for_moves();
-  // Scratch of weigh(): one plane of half cells, two a node and axis and one on either side.
+  // Scratch of weigh(): one plane of half cells. Along each axis there are two for each node, and one more on
+  // either side.
   std::size_t most = 0, most_nodes = 0, most_floats = 0;
   for (const Level& level : levels_) {
     for (const AxisNodes& axis : level.nodes) most = std::max(most, axis.coarse.size());
@@ -162,7 +164,8 @@ void CompositeGrid::find_chains_to_anchors() {
   if (material_.has_scattered_anchors()) links_to_anchor_ = material_.links_to_anchors();
 }
 
-// A chain to the nearest anchor is as long as its links allow along their widest limit.
+// On each axis the displacement is at most that of a chain to the nearest anchor, each link at the widest
+// limit.
 glm::dvec3 CompositeGrid::clamp_to_nearest_anchor(const Index3& voxel, const glm::dvec3& u) const noexcept {
   const std::uint32_t s = lattice_.surface_number(lattice_.at(voxel[0], voxel[1], voxel[2]));
   if (s >= links_to_anchor_.size()) return u;

@@ -1,30 +1,30 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A deep push into a large object, solved in bounded work on nested patches (FAC, the fast adaptive composite
-// grid method: McCormick 1989).
+// Deep pushes into large objects, solved on nested patches (FAC, the fast adaptive composite grid method:
+// McCormick 1989). The work of a cycle is bounded.
 //
-// A push moves voxels up to depth / slack away: 20 spacings deep at slack 0.1 that is 10^7 voxels, and
-// writing them takes milliseconds. But displacements are smooth at the scale of their distance to the
-// contact. So level 0 is a patch of voxels round the contact, level l a patch of about as many nodes, 2^l
-// voxels apart, and so on until a patch covers the whole object. A level's nodes are unknowns outside the
-// finer patch; under it they hold the finer displacements, in the full approximation scheme (FAS). All other
-// voxels are interpolated on request. Work and memory grow with the logarithm of the object's size, not with
-// the depth.
+// A push moves voxels up to a distance of depth / slack. A push of 20 spacings at slack 0.1 moves 10^7
+// voxels, and writing them takes milliseconds. But the further from the contact, the smoother displacements
+// are. So level 0 is a patch of voxels round the contact. Level l is a patch of about as many nodes, which
+// are 2^l voxels apart. One of the levels covers the whole object. Nodes outside the finer patch are
+// unknowns. Nodes under the finer patch hold its displacements, in the full approximation scheme (FAS). All
+// other voxels are interpolated on request. Work and memory grow with the logarithm of the object's size, not
+// with the depth.
 //
 // Shape. The stiffness of a link between two nodes follows from the tissue round it (coarse_material.h): on
-// level 0 it is that of the lattice, on coarser levels a mean. No link crosses a gap. Anchors are springs to
-// a node: at their distance where whole sides are anchored, else with the constriction of the load that
-// spreads from them (scattered_anchors.cpp). Where a coarse level is weaker than the finer level is against
-// its corrections, springs shorten these (correction_springs.cpp). Tissues may differ in stiffness, but not
-// in limits or Poisson's ratio.
+// level 0 it is that of the lattice, on coarser levels a mean. No link crosses a gap. Anchors hold nodes by
+// springs. Where a whole side is anchored, the distance to the anchor gives the spring. Elsewhere the spring
+// includes the constriction of the load that spreads from the anchors (scattered_anchors.cpp). A coarse level
+// may be weaker than the finer level's resistance to its corrections. There springs shorten the corrections
+// (correction_springs.cpp). Tissues may differ in stiffness, but not in limits or Poisson's ratio.
 //
 // Limits. In a convex body of one tissue the equilibrium within the chain limits solves an obstacle problem:
-// each node lies between L = max(u(s) − dist(v→s)) and U = min(u(s) + dist(s→v)) over the pressed voxels s,
-// with dist along existing links (wave.h). The solution keeps the limits of all links, as follows from
-// comparing it with itself shifted by a voxel (Brezis & Sibony 1971, for plastic torsion). So each node has
-// bounds of its own, and projected multigrid does not stall where the chain is at its limits, as it does with
-// limits from link to link. Near a notch or the edge of an anchored region the bounds are still necessary but
-// not sufficient: links may exceed their limits there (worst_violation()). Where tissues differ, links also
-// have multipliers of their own (link_limits.cpp).
+// each node v lies between L = max(u(s) − dist(v→s)) and U = min(u(s) + dist(s→v)) over the pressed voxels s,
+// with dist along existing links (wave.h). The solution keeps the limits of all links. This follows if one
+// compares the solution with itself, shifted by a voxel (Brezis & Sibony 1971, for plastic torsion). So each
+// node has bounds of its own. With limits of links, projected multigrid stalls where the chain is at its
+// limits; with bounds of nodes it does not. Near a notch or the edge of an anchored region the bounds are
+// still necessary but not sufficient: links may exceed their limits there (worst_violation()). Where tissues
+// differ, links also have multipliers of their own (link_limits.cpp).
 //
 // Rigid surfaces that stand still bound the nodes beside them (rigid_contacts.cpp).
 #pragma once
@@ -55,62 +55,65 @@ class CompositeGrid {
  public:
   struct Suitability {
     std::string reason;  // why contacts of an object cannot be solved on a CompositeGrid; empty: they can
-    double force_error = 0.0;  // greatest relative difference from patches twice as wide in trials
+    double force_error = 0.0;  // largest relative force error in trials, against patches twice as wide
   };
   // Allocates.
   static Suitability suitability(const Lattice& lattice);
   static constexpr int kRefineAll = -1, kHalfWidth = 6, kMaxHalfWidth = 14, kReferenceHalfWidth = 24;
-  // `half_width`: of the patch of level 0 (voxels); `coarse_half_width`: of the other patches (nodes). Both
-  // are rounded up to even numbers >= kHalfWidth. kRefineAll: level 0 covers the whole object, for
-  // references. Allocates.
+  // `half_width`: half width of level 0's patch (voxels). `coarse_half_width`: that of the other patches
+  // (nodes). Both are rounded up to even numbers >= kHalfWidth. kRefineAll: level 0 covers the whole object,
+  // for references. Allocates.
   CompositeGrid(const Lattice& lattice, int half_width, int coarse_half_width = kHalfWidth);
-  // Before contacts: how many links each surface voxel is away from the nearest anchor, for
-  // clamp_to_supports(), where anchors are scattered. Allocates.
+  // Call it before contacts. If anchors are scattered, it counts the links from each surface voxel to the
+  // nearest anchor, for clamp_to_supports(). Allocates.
   void find_chains_to_anchors();
   // Takes the displacements of another grid of the same object, interpolated.
   void interpolate_from(const CompositeGrid& other) noexcept;
 
   // ---- none of these allocates, locks or throws ----
   using Index3 = composite::Index3;  // voxel (i, j, k), node or cube
-  // Before a contact, once a tick: does one level's share of begin() at this voxel.
+  // Call it once a tick before a contact. It sets one level to rest and builds one level for a contact at
+  // `centre`, so that begin() has less to do.
   void prepare(const Index3& centre) noexcept;
-  // Begins a contact at voxel `centre`, everything at rest. Patches that have the voxel well inside stay.
+  // Begins a contact at voxel `centre`, with all displacements 0. Patches stay where they are if the voxel is
+  // near the middle of level 0's patch.
   void begin(const Index3& centre) noexcept;
-  // Once a tick: moves patches after the contact, one a call unless the contact would leave another one. True
-  // if the patch of level 0 moved.
+  // Call it once a tick. It moves one patch after the contact. It moves more patches if the contact is too
+  // far from the middle of level 0, or if a finer patch would no longer be nested. True if the patch of level
+  // 0 moved.
   bool centre_on(const Index3& centre) noexcept;
-  // First and last voxel of level 0's patch that may be moved.
+  // Box of the voxels of level 0's patch that may be moved; `low` and `high` are included.
   void fine_patch(Index3& low, Index3& high) const noexcept;
   // Is the voxel an unknown of level 0?
   [[nodiscard]] bool in_fine_patch(const Index3& voxel) const noexcept;
 
-  // Of a voxel in level 0's patch: its displacement (m); with its neighbours fixed, its displacement of least
-  // energy without bounds (m), and its displacement per force (m/N).
+  // For a voxel in level 0's patch: its displacement (m); its displacement of least energy without bounds,
+  // with its neighbours fixed (m); its displacement per force on each axis, with its neighbours fixed (m/N).
   [[nodiscard]] glm::dvec3 fine_at(const Index3& voxel) const noexcept;
   [[nodiscard]] glm::dvec3 unconstrained_minimum(const Index3& voxel) const noexcept;
   [[nodiscard]] glm::dvec3 compliance(const Index3& voxel) const noexcept;
   void set_fine(const Index3& voxel, const glm::dvec3& u) noexcept;
-  // `u` clamped to the displacements that the chains from anchors, and from nodes near rigid surfaces, allow
-  // the surface voxel (m).
+  // `u` (m) clamped to the displacements that chains of links allow the surface voxel. The chains start at
+  // anchors and at nodes near rigid surfaces.
   [[nodiscard]] glm::dvec3 clamp_to_supports(const Index3& voxel, const glm::dvec3& u) const noexcept {
     return clamp_to_obstacles(voxel, clamp_to_anchors(voxel, u));
   }
 
-  // The axis of the largest component: of two alike the later one.
+  // The axis of the largest component by size; the later axis if two are equal.
   [[nodiscard]] static int largest_axis(const glm::dvec3& v) noexcept {
     const glm::dvec3 size = glm::abs(v);
     return size.z >= size.x && size.z >= size.y ? 2 : size.y >= size.x ? 1 : 0;
   }
 
   // ---- rigid surfaces that stand still (rigid_contacts.cpp) ----
-  // Obstacles by surface number, which outlive the grid. Call it again when they have another address.
+  // `obstacles`: by surface number; they must outlive the grid. Call it again when their address changes.
   // Allocates.
   void watch_obstacles(std::span<const Obstacle> obstacles);
-  // A surface voxel got an obstacle.
+  // Call it when a surface voxel gets an obstacle.
   void add_obstacle(std::uint32_t surface_number) noexcept;
-  // Before a cycle, and before press(): sets the bounds of all nodes beside rigid surfaces.
+  // Call it before a cycle and before press(). It sets the bounds of all nodes beside rigid surfaces.
   void press_on_obstacles() noexcept;
-  // After a cycle and set_fine(): moves nodes out of their obstacles.
+  // Call it after a cycle and after set_fine(). It moves nodes out of their obstacles.
   void settle_on_obstacles() noexcept;
   // Forces of rigid surfaces in the last cycle, by surface number.
   struct ObstacleForce {
@@ -119,25 +122,26 @@ class CompositeGrid {
   };
   [[nodiscard]] std::vector<ObstacleForce> obstacle_forces() const;
 
-  // Before a cycle, if the contact has moved: displacements along `axis` grow by the ratio `share`, each by
-  // `most_m` at most (m).
+  // Call it before a cycle if the contact has moved. Each displacement along `axis` grows by `share` times
+  // itself, but by at most `most_m` (m).
   void extrapolate(std::size_t axis, double share, double most_m) noexcept;
-  // Before a cycle: removes all contact constraints; adds one. A pressed voxel of level 0 may not move back
-  // against `normal` (unit vector, into the tissue) beyond `u` (m).
+  // Call both before a cycle. clear_pressed() removes all constraints of the tool's contact; press() adds
+  // one. A pressed voxel of level 0 may not move back against `normal` (unit vector, into the tissue) beyond
+  // `u` (m).
   void clear_pressed() noexcept { pressed_.clear(); }
   void press(const Index3& voxel, const glm::dvec3& u, const glm::dvec3& normal) noexcept;
   // One FAC cycle over all levels, on these axes.
   void cycle(const std::array<bool, 3>& axes = {true, true, true}) noexcept;
-  // Forces on the anchors, and on the tool: minus the sum of the forces that anchors and rigid surfaces carry
-  // (N).
+  // Force on the anchors (N), and force on the tool (N). The latter is minus the sum of the forces on anchors
+  // and rigid surfaces.
   [[nodiscard]] glm::dvec3 force_on_anchors_N() const noexcept;
   [[nodiscard]] glm::dvec3 force_on_tool_N() const noexcept;
-  // The most by which a link of level 0 exceeds its limits (m).
+  // Largest excess of a link of level 0 over its limits (m).
   [[nodiscard]] double worst_violation() const noexcept;
   // Energy of all springs (J). Multipliers do not count.
   [[nodiscard]] double energy_J() const noexcept;
 
-  // Displacement of any voxel, or of any point in units of voxels (m).
+  // Displacement (m) of any point, given in units of voxels, and of any voxel.
   [[nodiscard]] glm::dvec3 at_point(const std::array<double, 3>& point) const noexcept;
   [[nodiscard]] glm::dvec3 at(const Index3& voxel) const noexcept;
   // The nodes of a patch, for drawing; patch 0 is the finest.
@@ -150,7 +154,7 @@ class CompositeGrid {
   };
   [[nodiscard]] std::size_t patch_count() const noexcept { return covering_level_ + 1; }
   [[nodiscard]] Nodes nodes_of(std::size_t patch) const noexcept;
-  // Vectors of 8 nodes that the last cycle smoothed.
+  // Number of vectors of 8 nodes that the last cycle smoothed.
   [[nodiscard]] std::size_t work_of_cycle() const noexcept { return work_; }
   [[nodiscard]] std::size_t memory_bytes() const;
   template <class Visit>
@@ -172,17 +176,19 @@ class CompositeGrid {
   using Ghost = composite::Ghost;
   using ObstacleNode = composite::ObstacleNode;
   using Level = composite::GridLevel;
-  // A surface voxel beside a rigid surface, and the node of a level that it stands for.
+  // A surface voxel beside a rigid surface, and its surface number.
   struct BesideRigid {
     Index3 voxel;
     std::uint32_t surface;
   };
-  // Force of an obstacle in the last cycles, as its loads follow it (N), and the level of its node.
+  // Force of an obstacle along its normal (N), relaxed over the cycles, from which its loads follow; and the
+  // level of its node.
   struct ObstacleLoad {
     float along_normal_N = 0.0F;
     std::uint32_t level = 0;
   };
-  // sign · u(node) >= sign · `u` on one axis, and its force on the object there in the last cycle (N).
+  // Bound of a node on one axis: sign · u(node) >= sign · `u`. `force_N`: its force on the object along the
+  // axis in the last cycle.
   struct ObstacleBound {
     std::uint32_t level;
     ObstacleNode node;
@@ -194,15 +200,17 @@ class CompositeGrid {
     glm::vec3 u, normal;
   };
 
-  // A contact of the tool bounds its node on the axes on which its normal has more than this. A larger value
-  // would let voxels that a ball presses aside slightly move back, and the contact would oscillate.
+  // A contact of the tool bounds its node on the axes on which the normal's component exceeds this. With a
+  // larger value, voxels that a ball presses only slightly aside could move back, and the contact would
+  // oscillate.
   static constexpr float kAlong = 0.02F;
 
   // ---- suitability.cpp ----
   [[nodiscard]] Suitability try_contacts();
   [[nodiscard]] bool converges_at(const Index3& place, float most_m) noexcept;
   [[nodiscard]] double settled_press(const Index3& place, const glm::dvec3& push_m) noexcept;
-  // So wide that a level's patch contains the finer one, wherever the contact lies between its nodes.
+  // Half width of a level's patch (nodes). The patch contains the finer one wherever the contact lies between
+  // two nodes.
   [[nodiscard]] int half_width_of(std::size_t level) const {
     int half = half_width_;
     for (std::size_t l = 0; l < level; ++l) half = std::max(coarse_half_width_, (half + 7) / 4 * 2);
@@ -220,7 +228,8 @@ class CompositeGrid {
   // ---- patches.cpp ----
   void allocate(Level& level, std::size_t l) const;
   void allocate_for_moves();
-  // First and last node along d (coordinates) of a level whose patch is centred on the coordinate `centre`.
+  // Coordinates of a patch's first and last node along one axis. open_low, open_high: the object continues
+  // beyond that end.
   struct NodeRange {
     int low, high;
     bool open_low, open_high;
@@ -342,7 +351,7 @@ class CompositeGrid {
   [[nodiscard]] std::size_t fine_node(const Index3& voxel) const;  // grid.cpp
   [[nodiscard]] glm::dvec3 clamp_to_nearest_anchor(const Index3& voxel, const glm::dvec3& u) const noexcept;
   [[nodiscard]] glm::dvec3 clamp_to_anchors(const Index3& voxel, const glm::dvec3& u) const noexcept;
-  // Of a node, its neighbours fixed: its displacement of least energy without bounds (m).
+  // A node's displacement of least energy without bounds, with its neighbours fixed (m).
   [[nodiscard]] glm::dvec3 minimum_at(const Level& level, std::size_t node) const noexcept;  // grid.cpp
   [[nodiscard]] static double inside_share(const Level& level, std::size_t d, int i) noexcept;
   [[nodiscard]] double covered_share(std::size_t l, std::size_t d, int i) const noexcept;
@@ -353,11 +362,11 @@ class CompositeGrid {
   CoarseMaterial material_;
   std::array<std::array<float, 3>, 3> spring_N_per_m_{};          // [d][axis] of a link between two voxels
   std::array<std::array<std::array<float, 2>, 3>, 3> limit_m_{};  // [d][axis][0: shorter, 1: longer], >= 0
-  std::vector<std::uint32_t> links_to_anchor_;  // [surface number] where anchors are scattered
+  std::vector<std::uint32_t> links_to_anchor_;  // [surface number]; empty unless anchors are scattered
   int half_width_, coarse_half_width_;
   Index3 centre_{};
   std::vector<Level> levels_;
-  Level before_move_;               // the level whose patch moves, as it was
+  Level before_move_;               // the moving level's state before the move
   std::size_t covering_level_ = 0;  // the first level that covers the whole object
   std::vector<Pressed> pressed_;
   std::span<const Obstacle> obstacles_;        // [surface number]; empty: no rigid surface is near
@@ -365,8 +374,8 @@ class CompositeGrid {
   std::vector<std::uint8_t> is_beside_rigid_;  // [surface number] 1: in beside_rigid_
   std::vector<ObstacleLoad> obstacle_loads_;   // [surface number]
   std::vector<ObstacleBound> obstacle_bounds_;
-  // [axis][kind] coordinates of the voxels of supporting_bounds_, their greatest bound, and half of the
-  // widest step.
+  // Box round the voxels of supporting_bounds_ (coordinates), their greatest bound (m) and half of their
+  // widest step (voxels). supports_: [axis][kind].
   struct SupportBox {
     Index3 low{}, high{};
     float most = 0.0F;
@@ -374,21 +383,22 @@ class CompositeGrid {
     bool any = false;
   };
   std::array<std::array<SupportBox, 2>, 3> supports_{};
-  std::vector<std::uint32_t> supporting_bounds_;  // of obstacle_bounds_, near their planes
-  std::size_t obstacle_cursor_ = 0;               // of beside_rigid_: last one that was offered to its nodes
-  bool patch_moved_ = false;                      // since the last cycle
+  std::vector<std::uint32_t> supporting_bounds_;  // indices into obstacle_bounds_: nodes near their planes
+  std::size_t obstacle_cursor_ = 0;               // index into beside_rigid_: the voxel offered last
+  bool patch_moved_ = false;                      // a patch moved since the last cycle
   std::array<bool, 3> multipliers_active_{};      // [axis] some link has a multiplier
   std::size_t work_ = 0;
-  // One plane of half cells: the cells that are in each, and these times their stiffness, by axis.
+  // One plane of half cells (half_cube()): the number of cells in each, and this number times their stiffness
+  // by axis.
   struct HalfCells {
     Floats cells;
     std::array<Floats, 3> stiffness;
   };
-  std::array<HalfCells, 2> half_cells_;                     // scratch of weigh()
-  std::array<std::vector<std::uint8_t>, 3> voxel_planes_;   // stiffness ranks, scratch of add_thin_tissue()
-  Floats faces_of_cell_;                                    // by nearest node, scratch of gather_anchors()
+  std::array<HalfCells, 2> half_cells_;                    // scratch of weigh()
+  std::array<std::vector<std::uint8_t>, 3> voxel_planes_;  // stiffness ranks, scratch of add_thin_tissue()
+  Floats faces_of_cell_;  // [nearest node] faces, scratch of gather_anchors()
   std::array<std::array<AnchorFaces, 2>, 3> anchor_faces_;  // [d][0: of anchors above, 1: below], scratch
-  std::vector<std::uint8_t> is_tissue_node_;                // of find_ghosts(), with a border of one node
+  std::vector<std::uint8_t> is_tissue_node_;  // scratch of find_ghosts(), with a border of one node
 };
 
 }  // namespace voxel

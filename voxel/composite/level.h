@@ -13,32 +13,32 @@ using Index3 = std::array<int, 3>;  // voxel (i, j, k), node or cube
 using Floats = std::vector<float>;
 inline constexpr std::size_t kPad = 8;  // floats before the first row
 
-inline constexpr int kOutside = -2;  // of AxisNodes::fine
+inline constexpr int kOutside = -2;  // value in AxisNodes::fine
 // Nodes of a level along one axis, and the one-dimensional transfer to the next coarser level.
 struct AxisNodes {
   int count = 0, begin = 0;                  // nodes; coordinate of the first
-  int first = 0, last = -1;                  // unknowns, both included
+  int first = 0, last = -1;                  // first and last unknown
   bool open_low = false, open_high = false;  // the patch ends within the object
-  // By node: the coarse node at or before it, and the weight of the coarse node after that (0 or 0.5).
+  // By node: the coarse node at or before it; the weight of the next coarse node (0 or 0.5).
   std::vector<int> coarse;
   std::vector<float> weight_after;
-  // The same along x for whole rows: lane i lies at or after the coarse lane base + (i + odd) / 2.
+  // The same for whole rows along x: lane i lies at or after the coarse lane base + (i + odd) / 2.
   int base = 0;
   bool odd = false;
   std::vector<float> lane_weight;
-  // By coarse node: the node at its place, which may be one beyond either end; kOutside: further out.
+  // By coarse node: the node at its place, at most one beyond either end; kOutside if it lies further out.
   std::vector<int> fine;
   int coarse_first = 0, coarse_last = -1;  // coarse nodes strictly within this patch
   // By coarse node: restriction weights of the nodes before, at and after it.
   std::vector<float> restrict_low, restrict_own, restrict_high;
 };
-// By node: faces of anchors that hold the node from one side, those of them that lie in a link, the sums of
-// their distances (voxels) and of constriction_of_face().
+// By node: number of anchor faces that hold the node from one side; number of these faces that lie in a link;
+// sums over the faces of their distance (voxels) and of constriction_of_face().
 struct AnchorFaces {
   Floats count, in_link, distance, constriction;
 };
-// A node that corrections would move too far: springs to where it is, beside those of its links. [d] as
-// weights.
+// Springs that hold a node at its present displacement, beside the springs of its links. Without them
+// corrections would move it too far. [d] relative to a link between two voxels, like weights.
 struct CorrectionSpring {
   std::uint32_t node;
   std::array<float, 3> weight;
@@ -55,23 +55,27 @@ struct ObstacleNode {
   Index3 voxel;
   std::uint32_t surface;
 };
-// A level of nodes. Arrays have one float a node, rows along x padded to a multiple of 8; row() says where.
+// A level of nodes. Arrays have one float a node. Rows along x are padded to a multiple of 8 and begin at
+// row().
 struct GridLevel {
   int step = 1;  // voxels between two nodes
   int log2_step = 0;
-  bool is_built = false;  // with the present offset of coordinates
-  bool moved = false;     // since put_to_rest()
+  bool is_built = false;  // built with the present offset of coordinates
+  bool moved = false;     // nodes may have moved since put_to_rest()
   std::array<AxisNodes, 3> nodes;
   std::size_t stride = 8, plane = 0;
-  std::array<Floats, 3> u, at_bound;  // [axis] (m); 1 at the lower bound, −1 at the upper bound
-  // [d] of the link to the next node, and of links to anchors, relative to a link between two voxels.
+  // [axis] Displacement (m); 1 at the lower bound, −1 at the upper bound, else 0.
+  std::array<Floats, 3> u, at_bound;
+  // [d] Stiffness of the link to the next node, and of links to anchors, relative to a link between two
+  // voxels.
   std::array<Floats, 3> weight, anchor_weight;
-  // Where tissues differ: [d] the weight if all tissue had the reference stiffness; [d] voxels to the
-  // anchor, negative behind the node; [axis][d] the weights with multipliers.
+  // Only where tissues differ. shape_weight [d]: the weight if all tissue had the reference stiffness.
+  // anchor_distance [d]: voxels to the anchor, negative if the anchor is behind the node. limited_…[axis][d]:
+  // the weights with multipliers.
   std::array<Floats, 3> shape_weight, anchor_distance;
   std::array<std::array<Floats, 3>, 3> limited_weight, limited_anchor_weight;
   std::array<Floats, 3> inverse_diagonal, diagonal;  // [axis] of the stiffness matrix; inverse 0: fixed
-  // Of the axis that the cycle is on (LevelView). restricted_u: u before the level was smoothed.
+  // Of the axis that the cycle is solving (LevelView). restricted_u: u before the level was smoothed.
   Floats f, restricted_u, residual, is_free, is_active, active_stiffness, inverse_with_active;
   std::array<Floats, 2> bound;  // of the same axis; 0: least u, 1: least −u
   std::array<bool, 2> bounded{};

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Multipliers of links at their limits, where bounds of nodes do not suffice.
 //
-// In a body of one tissue bounds suffice (grid.h). A soft tissue between stiffer ones would be compressed
-// beyond its limits. There each link at its limit carries a reaction beside its spring: the multiplier of the
-// limit. It is stored as additional stiffness. After each cycle links beyond their limit become stiffer, and
-// links within it softer again, but never softer than their spring. In equilibrium this is the optimum within
-// the limits: a reaction acts along its link, only at the limit, and only against the limit. Cycles need no
-// change, because a level knows its links by their weights alone. The energy of the springs does not count
-// multipliers.
+// In a body of one tissue bounds suffice (grid.h). With bounds alone, a soft tissue between stiffer ones
+// would be compressed beyond its limits. There each link at its limit carries a reaction beside its spring:
+// the multiplier of the limit. The multiplier is stored as additional stiffness. After each cycle links
+// beyond their limit become stiffer, and links within it softer again, but never softer than their spring.
+// The equilibrium is then the optimum within the limits: a reaction acts along its link, only at the limit,
+// and only against its violation. Cycles need no change, because a level knows its links by their weights
+// alone. The energy of the springs does not count multipliers.
 #include <algorithm>
 
 #include "voxel/composite/grid.h"
@@ -29,7 +29,7 @@ composite::LinkMultiplier CompositeGrid::link_multiplier(const Level& level, std
   return {1.0F / (step * limit_m_[d][a][1]), 1.0F / (step * limit_m_[d][a][0]), kTolerance, kMaxFactor};
 }
 
-// After a cycle on axis `a`.
+// Call it after a cycle on axis `a`.
 void CompositeGrid::update_multipliers(std::size_t a) noexcept {
   if (!material_.is_heterogeneous()) return;
   if (!multipliers_active_[a]) {
@@ -74,7 +74,8 @@ void CompositeGrid::update_multipliers(std::size_t a) noexcept {
   for (Level& level : levels_) update_diagonal(level, a);
 }
 
-// The same update of the links to anchors. Returns the largest factor, >= 1.
+// Updates the multipliers of the links to anchors in the same way. Returns the largest limited / weight, >=
+// 1.
 float CompositeGrid::update_anchor_multipliers(Level& level, std::size_t a, std::size_t d) noexcept {
   float most = 1.0F;
   if (!level.has_anchors) return most;
@@ -162,7 +163,7 @@ void CompositeGrid::release_multipliers() noexcept {
   }
 }
 
-// Saves into before_move_ by which factor the links of a level are stiffer.
+// Saves into before_move_ the factors by which multipliers stiffen a level's links.
 void CompositeGrid::save_multipliers(const Level& level) noexcept {
   for (std::size_t a = 0; a < 3; ++a) {
     if (!multipliers_active_[a]) continue;
@@ -178,7 +179,7 @@ void CompositeGrid::save_multipliers(const Level& level) noexcept {
   }
 }
 
-// Restores these factors in the patch at its new place, `by` nodes further on.
+// Restores the saved factors in the patch at its new place, `by` nodes further on.
 void CompositeGrid::restore_multipliers(Level& level, const Index3& by) noexcept {
   const auto& nodes = level.nodes;
   for (std::size_t a = 0; a < 3; ++a) {

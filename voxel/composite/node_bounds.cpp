@@ -17,8 +17,8 @@ constexpr int kRoundsRoundGaps = 2;
 
 }  // namespace
 
-// The nodes of a level that bounds of `pressed` (coordinates) can hold: beyond them, bounds have fallen by
-// more than `fall_m`.
+// Box of the nodes of a level that the bounds of `pressed` (coordinates) can hold. Outside the box, bounds
+// have fallen by more than `fall_m`.
 CompositeGrid::NodeBox CompositeGrid::reach_of_bounds(const Level& level, std::size_t a, std::size_t kind,
                                                       const NodeBox& pressed, float fall_m) const noexcept {
   NodeBox box;
@@ -85,7 +85,7 @@ void CompositeGrid::find_bounds(std::size_t a) noexcept {
       float& at = levels_[0].bound[kind][levels_[0].node(p.node[0], p.node[1], p.node[2])];
       at = std::max(at, sign * p.u[axis]);
     }
-    // No node lies further against the bounds than the largest displacement.
+    // A bound that has fallen by more than fall_m lies below all displacements, so it holds no node.
     const float fall_m = strongest + std::max(std::abs(strongest), largest_displacement(a));
     for (std::size_t l = 0; l < levels_.size(); ++l) {
       const NodeBox reach = reach_of_bounds(levels_[l], a, kind, pressed, fall_m);

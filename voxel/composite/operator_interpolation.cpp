@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Operator interpolation between the levels of a CompositeGrid, where tissues differ in stiffness
-// (transfer.h). Weights of links include their multipliers. Without these a tool that slides over compressed
-// fat feels steps.
+// (transfer.h). Weights of links include their multipliers. Without the multipliers a tool that slides over
+// compressed fat feels steps.
 #include <algorithm>
 
 #include "voxel/composite/grid.h"
@@ -44,7 +44,7 @@ void CompositeGrid::prolong_row_by_links(const composite::ProlongArgs& args, con
   composite::prolong_row_by_links(args, by);
 }
 
-// Operator interpolation at a single node, for the side nodes of a patch along x.
+// Operator interpolation at a single node, for the nodes on a patch's sides in x.
 float CompositeGrid::prolonged_by_links(const Level& fine, const Level& coarse, std::size_t axis,
                                         const float* from, int i, int j, int k) const noexcept {
   const auto& nodes = fine.nodes;

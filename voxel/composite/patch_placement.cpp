@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Where the patches of a CompositeGrid are. Building a level costs a tenth of a tick's work or more. So
+// Placement of the patches of a CompositeGrid. Building a level costs a tenth of a tick's work or more. So
 // levels are built one a tick: before a contact, while the tool approaches, and one after another while a
 // contact moves.
 #include <algorithm>
@@ -11,7 +11,7 @@ namespace voxel {
 namespace {
 
 constexpr int kFollowDistance = 2;  // voxels that a contact moves before patches follow it
-constexpr int kMaxOffCentre = 4;  // voxels from the contact to the middle of level 0; beyond, all levels move
+constexpr int kMaxOffCentre = 4;    // voxels from contact to middle of level 0; with more, all levels move
 
 }  // namespace
 
@@ -117,7 +117,7 @@ bool CompositeGrid::centre_on(const Index3& centre) noexcept {
   bool moves = false;
   for (std::size_t d = 0; d < 3; ++d) moves = moves || std::abs(centre[d] - centre_[d]) >= kFollowDistance;
   if (moves) centre_ = centre;
-  // The coarsest level that is due, and the finer levels that would no longer be nested in it.
+  // Moves the coarsest level that is not in place, and the finer levels that would no longer be nested.
   const bool all = off_centre(centre);
   bool any = false, joins = false;
   for (std::size_t l = covering_level_; l-- > 0;) {

@@ -118,7 +118,8 @@ void CompositeGrid::add_thin_tissue(const Level& level, std::array<Floats, 3>& w
   }
 }
 
-// Of the link from voxel v of the middle one of voxel_planes_ along d, relative to the reference.
+// Excess of thin tissue on the link along d from voxel v in the middle plane of voxel_planes_, relative to
+// the reference stiffness.
 template <class Stiffness>
 float CompositeGrid::thin_excess(std::size_t v, std::size_t d, std::size_t wide,
                                  const Stiffness& stiffness) const noexcept {
@@ -145,7 +146,7 @@ int CompositeGrid::half_cube(const Level& level) noexcept {
   return m;
 }
 
-// Each link from the half cells round it: two along it, two by two across it.
+// Weighs each link by the half cells round it: two along the link, two by two across it.
 void CompositeGrid::weigh_halves(const Level& level, std::array<Floats, 3>& weight) noexcept {
   const auto& nodes = level.nodes;
   const int nx = nodes[0].count, ny = nodes[1].count, nz = nodes[2].count;
@@ -204,7 +205,8 @@ void CompositeGrid::weigh_tissues(Level& level) noexcept {
   for (Floats& array : level.weight) std::fill(array.begin(), array.end(), 0.0F);
   for (int k = 0; k < nz; ++k) {
     read(2 * k, below);
-    // The lower halves of the links up to this plane; `above` still holds those of the plane before.
+    // Links from the plane before up to this plane. `above` still holds their lower halves, `below` their
+    // upper halves.
     const Floats &cells_before = above.cells, &stiff_before = above.stiffness[2];
     for (int j = 0; k > 0 && j < ny; ++j) {
       for (int i = 0; i < nx; ++i) {

@@ -86,7 +86,7 @@ void CompositeGrid::allocate_for_moves() {
   for (std::size_t l = 0; l < covering_level_; ++l) {
     most = std::max(most, levels_[l].u[0].size());
     for (std::size_t d = 0; d < 3; ++d) {
-      // So that assigning the nodes of any level does not allocate.
+      // The arrays get room, so that assigning the nodes of any level does not allocate.
       AxisNodes& nodes = before_move_.nodes[d];
       const AxisNodes& of = levels_[l].nodes[d];
       const auto grow = [](auto& room, const auto& like) { room.resize(std::max(room.size(), like.size())); };
@@ -109,7 +109,7 @@ void CompositeGrid::allocate_for_moves() {
   }
 }
 
-// All nodes of the object. A node exists if its cell overlaps the bounding box of the voxels.
+// Range of all nodes of the object. A node exists if its cell overlaps the bounding box of the voxels.
 CompositeGrid::NodeRange CompositeGrid::whole_range(int step, std::size_t d) const noexcept {
   const int start = material_.low(d), end = material_.high(d);
   // At an anchored side the nodes include the side: anchors are searched on the links between nodes.
@@ -174,7 +174,7 @@ void CompositeGrid::set_up_transfer(Level& fine, Level& coarse) const noexcept {
       int here = (at - nodes.begin) / fine.step;
       const bool below = at < nodes.begin, above = here >= nodes.count;
       if ((below && nodes.open_low) || (above && nodes.open_high)) continue;
-      // A coarse node may lie one node beyond the finer level, with its cell ending in the object.
+      // A coarse node may lie one node beyond the finer level, if its cell ends in the object.
       if (below) here = -1;
       if (above) here = nodes.count;
       const auto n = index(c);
@@ -223,7 +223,7 @@ void CompositeGrid::find_anchor_weights(Level& level, bool near) noexcept {
   for (Floats& weight : level.anchor_weight) std::fill(weight.begin(), weight.end(), 0.0F);
   for (int k = 0; k < nodes[2].count; ++k) {
     for (int j = 0; j < nodes[1].count; ++j) {
-      // In an object that fills its box most rows have nothing to look for.
+      // In an object that fills its box, rows without anchors near have nothing to look for.
       const bool anchors_near = near && row_near_anchors(level, j, k);
       if (!anchors_near && material_.fills_box()) continue;
       for (int i = 0; i < nodes[0].count; ++i) {
@@ -240,7 +240,8 @@ void CompositeGrid::find_anchor_weights(Level& level, bool near) noexcept {
           }
           Index3 after = at;
           after[d] += step;
-          // The first anchor from either end on holds the node at that end, through the tissue of the link.
+          // The first anchor seen from either end of the link holds the node at that end, through the link's
+          // tissue.
           const float stiff = is_heterogeneous ? weight / there : 1.0F;
           const CoarseMaterial::AnchorSearch anchors = anchors_near && along_links
                                                            ? material_.anchors_along(at, d, step)
@@ -269,8 +270,8 @@ void CompositeGrid::find_anchor_weights(Level& level, bool near) noexcept {
   }
 }
 
-// The node of a level that is nearest to a place, if the level has the place within its patch: an unknown, or
-// any node with links.
+// Finds the node of a level nearest to a place: an unknown if `unknown`, else any node with links. False if
+// the place lies outside the patch, or if no node of its cell qualifies.
 bool CompositeGrid::nearest_node(const Level& level, const Index3& at, bool unknown, Index3& node) noexcept {
   Index3 other{};
   const int half = level.step / 2;
@@ -388,8 +389,8 @@ void CompositeGrid::mark_tissue_nodes(const Level& level, bool near) noexcept {
   }
 }
 
-// Nodes outside the tissue that have nodes of the tissue beside them. Finer levels interpolate between both,
-// so ghosts take the mean of these neighbours.
+// Finds the ghosts: nodes outside the tissue with nodes of the tissue beside them. Finer levels interpolate
+// between ghosts and tissue nodes, so a ghost takes the mean of its tissue neighbours.
 void CompositeGrid::find_ghosts(Level& level, bool near) noexcept {
   const auto& nodes = level.nodes;
   level.ghosts.clear();

@@ -12,13 +12,13 @@ using composite::index;
 
 }  // namespace
 
-// Share of a node's cell, along d, that lies within its level's patch; on an open side one half.
+// Share of a node's cell, along d, that lies within its level's patch: one half on an open side, else 1.
 double CompositeGrid::inside_share(const Level& level, std::size_t d, int i) noexcept {
   const AxisNodes& nodes = level.nodes[d];
   return (i < nodes.first && nodes.open_low) || (i > nodes.last && nodes.open_high) ? 0.5 : 1.0;
 }
 
-// The same share within the next finer level's patch.
+// Share of a node's cell, along d, that lies within the next finer level's patch.
 double CompositeGrid::covered_share(std::size_t l, std::size_t d, int i) const noexcept {
   if (l == 0) return 0.0;
   const AxisNodes& fine = levels_[l - 1].nodes[d];
@@ -27,8 +27,9 @@ double CompositeGrid::covered_share(std::size_t l, std::size_t d, int i) const n
   return (here < fine.first && fine.open_low) || (here > fine.last && fine.open_high) ? 0.5 : 1.0;
 }
 
-// Do a node's anchors count on this level? Not on a finer one: at its sides, nodes take what this level has.
-// `number`: of the node, from first_row() on.
+// Do a node's anchors count on this level? They do not if the node lies strictly within the finer patch. Nor
+// do they on an open side of this patch: there the next coarser level counts them. `number`: of the node,
+// from first_row() on.
 bool CompositeGrid::counts_anchors(std::size_t l, std::size_t number) const noexcept {
   const Level& level = levels_[l];
   const Index3 node = level.node_of(number);
@@ -40,7 +41,8 @@ bool CompositeGrid::counts_anchors(std::size_t l, std::size_t number) const noex
   return inside && !covered;
 }
 
-// The same share of the link from the node to the next one along d.
+// Share of the link from a node to the next one along d that counts on this level: inside this patch and
+// outside the finer patch.
 double CompositeGrid::link_share(std::size_t l, std::size_t number, std::size_t d) const noexcept {
   const Level& level = levels_[l];
   const Index3 node = level.node_of(number);
@@ -130,7 +132,8 @@ double CompositeGrid::energy_J() const noexcept {
   return energy;
 }
 
-// Trilinear interpolation at coordinates within the level, or at its edge beyond it.
+// Trilinear interpolation at `place` (coordinates). Outside the level it gives the value at the nearest place
+// on its edge.
 glm::dvec3 CompositeGrid::interpolate(const Level& level, const std::array<double, 3>& place) const noexcept {
   std::array<int, 3> node{};
   std::array<float, 3> part{};
@@ -153,7 +156,7 @@ glm::dvec3 CompositeGrid::interpolate(const Level& level, const std::array<doubl
   return {sum[0], sum[1], sum[2]};
 }
 
-// The same at a voxel (coordinates).
+// interpolate() at a voxel (coordinates).
 glm::vec3 CompositeGrid::interpolate_at(const Level& level, const Index3& at) noexcept {
   std::array<std::size_t, 3> by{};
   std::array<float, 3> part{};

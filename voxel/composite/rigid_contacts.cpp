@@ -5,11 +5,11 @@
 // voxel is a node and has this bound itself. On coarser levels, outside of the finer patch, the node nearest
 // to the voxel has it. If several voxels have the same nearest node, the one with the least gap counts.
 //
-// Axes are relaxed one after the other, so a contact is split: along the largest component of its normal it
-// is a bound, the plane's height at the node's place. Along the others it is a load, the force of that bound
-// times the slope of the plane. At the fixed point of cycles the force is along the normal, as without
-// friction. Loads follow the bound's force by a half in each cycle: a plane that rises steeply along a soft
-// axis would make the two swing otherwise.
+// Axes are relaxed one after the other, so a contact is split. On the axis of its normal's largest component
+// it is a bound: the height of the plane at the node's place. On the other axes it is a load: the bound's
+// force times the slope of the plane. At the fixed point of cycles the force is along the normal, without
+// friction. A load covers half of its difference from the bound's force in each cycle. Otherwise the two
+// would oscillate where a plane rises steeply along a soft axis.
 //
 // A bound stands whether or not its node is pressed (SoftObject::press_on_grid has the reason).
 #include <algorithm>
@@ -24,10 +24,10 @@ namespace {
 
 using composite::index;
 
-constexpr float kNearby = 3.0F;        // steps of the level: nodes further from their plane get no bound
-constexpr float kSupports = 0.5F;      // steps: nodes nearer to their plane count in clamp_to_supports()
-constexpr float kFollows = 0.5F;       // of the difference, in a cycle: a load follows its bound
-constexpr float kHolds = 1e-3F;        // spacings: a node nearer to its bound is held by it
+constexpr float kNearby = 3.0F;    // steps of the level: nodes further from their plane get no bound
+constexpr float kSupports = 0.5F;  // steps: nodes nearer to their plane count in clamp_to_supports()
+constexpr float kFollows = 0.5F;   // share of its distance to the bound's force that a load covers in a cycle
+constexpr float kHolds = 1e-3F;    // spacings: a node nearer to its bound is held by it
 constexpr std::size_t kOffered = 512;  // surface voxels that are offered to their nodes in a cycle
 
 }  // namespace
@@ -69,8 +69,9 @@ float CompositeGrid::obstacle_gap(const Level& level, const ObstacleNode& node) 
   return glm::dot(o.normal, u) - o.bound;
 }
 
-// A surface voxel stands for its node on level l if no other one has a smaller gap there. A node is in the
-// list once, and so are all lists within the room that watch_obstacles() has made.
+// Offers a surface voxel to its node on level l. Of all voxels offered to a node, the one with the smallest
+// gap stands for it. A node is in the list at most once, so lists stay within the capacity that
+// watch_obstacles() has reserved.
 void CompositeGrid::offer_obstacle(std::size_t l, const BesideRigid& beside) noexcept {
   Level& level = levels_[l];
   Index3 at{};
@@ -87,7 +88,7 @@ void CompositeGrid::offer_obstacle(std::size_t l, const BesideRigid& beside) noe
   if (gone || obstacle_gap(level, fresh) < obstacle_gap(level, now)) now = fresh;
 }
 
-// After a level was placed anew.
+// Lists the obstacle nodes of a level that was placed anew.
 void CompositeGrid::list_obstacle_nodes(std::size_t l) noexcept {
   if (obstacles_.empty() || l > covering_level_) return;
   Level& level = levels_[l];
@@ -157,8 +158,8 @@ void CompositeGrid::bound_by_obstacle(std::size_t l, const ObstacleNode& node, f
 }
 
 // Adds the obstacles' bounds of one axis to those that the tool's contact has set: on their nodes, and on the
-// nodes of coarser levels at the same places. They are not propagated: limits near a rigid surface are those
-// of clamp_to_supports() and of multipliers.
+// nodes of coarser levels at the same places. The bounds are not propagated: near a rigid surface,
+// clamp_to_supports() and multipliers keep the limits of links.
 void CompositeGrid::add_obstacle_bounds(std::size_t axis) noexcept {
   for (const ObstacleBound& b : obstacle_bounds_) {
     if (b.axis != axis) continue;
@@ -173,7 +174,7 @@ void CompositeGrid::add_obstacle_bounds(std::size_t axis) noexcept {
     const auto set = [&](Level& level, std::size_t number) {
       float& own = level.bound[kind][number];
       own = std::max(own, b.sign * b.u);
-      // Tissue squeezed to its limits: the links give way, not the rigid surface.
+      // If tissue is squeezed to its limits, its links exceed them, and the rigid surface does not give way.
       float& opposite = level.bound[1 - kind][number];
       opposite = std::min(opposite, -own);
     };
@@ -193,7 +194,8 @@ void CompositeGrid::add_obstacle_bounds(std::size_t axis) noexcept {
   }
 }
 
-// Adds to f of a level what its obstacles carry on axes other than their own.
+// Adds the loads of a level's obstacles to f on one axis. An obstacle has loads on the axes other than that
+// of its bound.
 void CompositeGrid::add_obstacle_loads(std::size_t l, std::size_t axis) noexcept {
   Level& level = levels_[l];
   for (const ObstacleBound& b : obstacle_bounds_) {
@@ -207,7 +209,7 @@ glm::vec3 CompositeGrid::load_of(const ObstacleBound& b) const noexcept {
   return load;
 }
 
-// After a cycle on one axis: the forces of the bounds that hold their nodes.
+// Measures the forces of the bounds that hold their nodes, after a cycle on one axis.
 void CompositeGrid::measure_obstacle_forces(std::size_t axis) noexcept {
   for (ObstacleBound& b : obstacle_bounds_) {
     if (b.axis != axis) continue;
@@ -240,7 +242,7 @@ std::vector<CompositeGrid::ObstacleForce> CompositeGrid::obstacle_forces() const
   return forces;
 }
 
-// Nothing is left in an obstacle that was moved there after the cycle.
+// set_fine() may have moved a node into its obstacle after the cycle. The node is moved back to the plane.
 void CompositeGrid::settle_on_obstacles() noexcept {
   for (const ObstacleBound& b : obstacle_bounds_) {
     Level& level = levels_[b.level];
@@ -259,8 +261,8 @@ bool CompositeGrid::holds(const ObstacleBound& b) const noexcept {
   return beyond_m <= kHolds * static_cast<float>(lattice_.min_spacing_m());
 }
 
-// By how much a bound in the box low … high (coordinates) falls along chains to the place `at` (m). A coarse
-// node stands for all voxels within half a step, `beyond`, across the bound.
+// Fall of a bound (m) along the chains from the box low … high to the place `at` (coordinates). A coarse node
+// stands for all voxels within half a step (`beyond`) in the directions across the bound's axis.
 double CompositeGrid::fall_from(const Index3& at, std::size_t axis, std::size_t kind, const Index3& low,
                                 const Index3& high, int beyond) const noexcept {
   double fall = 0.0;
@@ -281,7 +283,7 @@ glm::dvec3 CompositeGrid::clamp_to_obstacles(const Index3& voxel, const glm::dve
     for (const std::size_t kind : {std::size_t{0}, std::size_t{1}}) {
       const double sign = kind == 0 ? 1.0 : -1.0;
       const SupportBox& box = supports_[axis][kind];
-      // No single bound is nearer or greater than all of them together.
+      // Quick test: no bound is nearer than the box or greater than its greatest bound.
       if (!box.any || sign * to >= static_cast<double>(box.most) -
                                        fall_from(at, axis, kind, box.low, box.high, box.beyond))
         continue;

@@ -14,11 +14,11 @@ const std::array<float, kMaxVectors* kLanes> kNoBoundRow = [] {
   return row;
 }();
 
-// Share of the links to active nodes that coarser levels see. With all of it a moving contact lags; with a
-// third of it the contact oscillates.
+// Share of the stiffness of links to active nodes that is passed to coarser levels. With a share of 1 a
+// moving contact lags; with a third the contact oscillates.
 constexpr float kActiveStiffness = 0.5F;
 
-// Masks of every second lane: from the first on, from the second on.
+// Masks of every second lane. even: from lane 0 on; odd: from lane 1 on.
 struct Colours {
   Mask8 even, odd;
 };
@@ -27,7 +27,8 @@ HYBRID_INLINE void find_colours(Colours& c) {
   c.odd = Mask8{0, -1, 0, -1, 0, -1, 0, -1};
 }
 
-// kVectorsOfRow: vectors of a row, so that they stay in registers; 0: as many as the level has.
+// kVectorsOfRow: vectors of a row. A constant number lets them stay in registers. 0: as many as the level
+// has.
 template <int kVectorsOfRow>
 HYBRID_INLINE void smooth_row(const LevelView& v, int j, int k) {
   constexpr int kRoom = kVectorsOfRow == 0 ? kMaxVectors : kVectorsOfRow;

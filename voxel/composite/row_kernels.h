@@ -2,7 +2,7 @@
 // Innermost loops over one axis of one level of a CompositeGrid, in vectors of 8 nodes along x.
 //
 // Arrays are those of a level: one float a node, rows along x padded to a multiple of 8. Rows beside a
-// level's rows, and nodes beside a row's nodes, may be read: links there have weight 0. Smoothing and
+// level's rows, and nodes beside a row's nodes, may be read: their links have weight 0. Smoothing and
 // residual are in row_kernels.cpp, bounds and multipliers in constraint_kernels.cpp, line searches in
 // line_search_kernels.cpp.
 #pragma once
@@ -17,17 +17,18 @@
 namespace voxel::composite {
 
 inline constexpr float kNoBound = -1e30F;  // value of a bound array where there is no bound
-inline constexpr int kMaxVectors = 80;     // vectors of a row
+inline constexpr int kMaxVectors = 80;     // vectors of a row, at most
 
 // One axis of one level, from its first row on.
 struct LevelView {
   float* u;
   const float* f;                      // load (N); null: 0
   const float *lower, *negated_upper;  // least u, least −u; null: no such bounds
-  // Of residual_of_level(). A node is active if it is at its bound and pulled against the bound. It is free
-  // if it may move and is not active. Both arrays hold 1 or 0.
+  // Written by residual_of_level(). A node is active if it is at its bound and pulled against the bound. It
+  // is free if it may move and is not active. Both arrays hold 1 or 0.
   float *residual, *is_free, *is_active;
-  // Spring that active nodes of finer levels add to a node, and 1 / (diagonal + this spring); null: none.
+  // Stiffness of the spring that active nodes of finer levels add to a node; 1 / (diagonal + that stiffness),
+  // null: none.
   float *active_stiffness, *inverse_with_active;
   std::array<const float*, 3> weight;  // [d] of the link to the next node along d (unit: link between voxels)
   const float *inverse_diagonal, *diagonal;  // of the stiffness matrix; inverse 0: the node does not move
@@ -38,15 +39,17 @@ struct LevelView {
 
 // ---- row_kernels.cpp ----
 
-// One projected Gauss-Seidel sweep: each node moves to the minimum of its energy within its bounds. Rows in
-// two colours of (j + k), nodes of a row in two colours of i.
+// One projected Gauss-Seidel sweep: each node moves to the minimum of its energy within its bounds. Rows are
+// swept in two colours of (j + k), the nodes of a row in two colours of i.
 void smooth_level(const LevelView& view) noexcept;
 // residual = f − K u, with is_free and is_active. The residual is 0 for fixed and for active nodes. Active
 // nodes take no correction from coarser levels either.
 void residual_of_level(const LevelView& view) noexcept;
-// active_stiffness of a free node: its own plus a share of its links to active nodes. Of other nodes: 0.
+// Sets active_stiffness. To a free node's value it adds a share of the stiffness of the node's links to
+// active nodes. Other nodes get 0.
 void find_active_stiffness(const LevelView& view) noexcept;
-// Adds a spring of active_stiffness that holds each node where it is now: to f, and as inverse_with_active.
+// Adds a spring of active_stiffness that holds each node at its present u. Updates f and sets
+// inverse_with_active.
 void add_active_stiffness(const LevelView& view, float* f) noexcept;
 // residual = −K u on the nodes first … last, both included; without f and bounds.
 void link_forces_of_level(const LevelView& view, const std::array<int, 3>& first,
@@ -54,14 +57,14 @@ void link_forces_of_level(const LevelView& view, const std::array<int, 3>& first
 
 // ---- constraint_kernels.cpp ----
 
-// Limits of the links along one direction. The limit ratio of a link is its change of length by its limit; at
-// the limit it is 1.
+// Limits of the links along one direction. The limit ratio of a link is its change of length divided by its
+// limit. At the limit the ratio is 1.
 struct LinkMultiplier {
   float per_longer, per_shorter;  // 1 / limit (1/m)
-  float tolerance;                // ratios of 1 ± this count as at the limit
-  float max_factor;               // limited weight by weight, at most
+  float tolerance;                // links with a ratio of 1 ± this are at the limit
+  float max_factor;               // largest limited weight / weight
 };
-// Of links to the node `by` floats further on.
+// Largest limit ratio of the links from nodes to the nodes `by` floats further on.
 [[nodiscard]] float largest_limit_ratio(const float* u, const float* weight, std::size_t by,
                                         const LinkMultiplier& limit, std::size_t count) noexcept;
 // Updates `limited`, the weights of links with their multipliers. Returns the largest limited / weight, >= 1.
@@ -80,11 +83,11 @@ struct BoundSweep {
   std::array<int, 3> low, high;  // nodes of the box, both included
   std::size_t stride, plane;
 };
-// Raises each bound of the box to those that its links ask for: along x in both directions, then y, then z.
+// Raises each bound in the box as far as its links require: along x in both directions, then y, then z.
 void sweep_bounds(const BoundSweep& sweep) noexcept;
 // The largest |u|.
 [[nodiscard]] float largest_size(const float* u, std::size_t count) noexcept;
-// Moves nodes onto their bound that are at it by `at_bound`, and nodes that are beyond it.
+// Moves a node onto its bound if `at_bound` marks it as at that bound, or if it lies beyond the bound.
 void follow_bounds(float* u, const float* at_bound, const float* lower, const float* negated_upper,
                    std::size_t count) noexcept;
 // at_bound: 1 at the lower bound, −1 at the upper bound, else 0.
@@ -93,8 +96,8 @@ void note_at_bound(float* at_bound, const float* u, const float* lower, const fl
 
 // ---- line_search_kernels.cpp ----
 
-// The part of u that its bounds do not prescribe: u minus the bound (or 0) between u and 0, at most the room
-// to the bound beyond u, and 0 at either.
+// The part of u that its bounds do not prescribe. For u > 0 it is u − max(lower bound, 0), at most upper
+// bound − u, and at least 0. So it is 0 at either bound. u < 0 is the mirror image.
 void beyond_bounds(const float* u, const float* lower, const float* negated_upper, float* beyond,
                    std::size_t count) noexcept;
 // Force of links and loads along `mode` (J per unit of the mode) and stiffness along it, summed over the

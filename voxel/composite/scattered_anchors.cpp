@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Anchors on the coarse levels of a CompositeGrid, where they do not fill whole sides of the object. A region
-// that is smaller than a coarse cell, or that no line of nodes meets, holds the nodes around it all the same.
+// Anchors on the coarse levels of a CompositeGrid, where they do not fill whole sides of the object. An
+// anchored region holds the nodes around it even if it is smaller than a coarse cell, or if no line of nodes
+// meets it.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -12,13 +13,16 @@ namespace {
 
 using composite::index;
 
-constexpr float kLeastResistance = 0.01F;  // of a link: faces at a node itself hold it
+// Least resistance of a face, relative to a link between voxels. Faces in their node's plane have it.
+constexpr float kLeastResistance = 0.01F;
 
 }  // namespace
 
-// The nodes of a face: the one that it holds, which is along d the next one on the tissue's side, or in the
-// face's own plane; and the nearest one along d. Across they lie on the line of links whose tissue has the
-// face's cell. Where a line has no tissue, both are the nearest node with tissue.
+// Finds the two nodes of an anchor's face. `held`: the node that the face holds; along d it lies in the plane
+// of the anchored voxel or next to it on the tissue's side. `nearest`: the nearest node along d. In the other
+// directions both lie on the line of links whose tissue includes the face's cell. If there is no link at
+// `held`, both are the nearest node with links. `distance`: from the anchored voxel to `held` along d
+// (voxels). False if there is no such node.
 bool CompositeGrid::nodes_of_face(const Level& level, const CoarseMaterial::AnchorFace& face,
                                   std::size_t& held, std::size_t& nearest, int& distance) noexcept {
   const std::size_t d = face.d;
@@ -43,8 +47,8 @@ bool CompositeGrid::nodes_of_face(const Level& level, const CoarseMaterial::Anch
   return true;
 }
 
-// Scattered anchors on a coarse level: each face between an anchored voxel and tissue holds a node, and cuts
-// its share of the link that it lies in.
+// Scattered anchors on a coarse level: each face between an anchored voxel and tissue holds a node. It also
+// cuts its share from the link in which it lies.
 void CompositeGrid::gather_anchors(Level& level) noexcept {
   const int step = level.step;
   Index3 low{}, high{};
@@ -85,7 +89,7 @@ void CompositeGrid::gather_anchors(Level& level) noexcept {
       if (weight > 0.0F) level.anchor_weight[d][n] = stiffness_at(level, n) * weight;
     }
   }
-  // A node behind a face that no other face holds has no tissue but anchored tissue.
+  // A node behind a face has only anchored tissue if no other face holds the node.
   const auto is_held = [&](std::size_t n) {
     return level.anchor_weight[0][n] + level.anchor_weight[1][n] + level.anchor_weight[2][n] > 0.0F;
   };
@@ -102,8 +106,8 @@ void CompositeGrid::gather_anchors(Level& level) noexcept {
   }
 }
 
-// Resistance from a face to tissue far away: all A faces of a cell together are as the sphere of their area,
-// or as the part of it that lies in the tissue.
+// Resistance from a face to tissue far away. The A faces of a cell together act like a sphere of area A. If
+// only a part of the cell is tissue, they act like that part of a larger sphere.
 float CompositeGrid::constriction_of_face(const Level& level, std::size_t cell) const noexcept {
   float links = 0.0F;
   for (std::size_t d = 0; d < 3; ++d)
@@ -112,9 +116,10 @@ float CompositeGrid::constriction_of_face(const Level& level, std::size_t cell) 
   return std::sqrt(faces_of_cell_[cell] / (4.0F * std::numbers::pi_v<float> * part));
 }
 
-// N of the s² faces of a cell hold a node in series with the tissue between, and with the constriction of the
-// load that spreads from N faces to s², by the factor (1 − ε)^1.5 with ε = √N / s (Cooper, Mikic & Yovanovich
-// 1969). With N = s² this is the chain of links itself.
+// Weight by which N of the s² faces of a cell hold a node. In series with the faces lie the tissue between,
+// and the constriction of the load that spreads from N faces to s². The constriction has the factor (1 −
+// ε)^1.5 with ε = √N / s (Cooper, Mikic & Yovanovich 1969). With N = s² the weight is that of the chain of
+// links.
 float CompositeGrid::weight_of_faces(const AnchorFaces& faces, std::size_t n, float square) noexcept {
   const float count = faces.count[n];
   if (count == 0.0F) return 0.0F;
@@ -125,7 +130,7 @@ float CompositeGrid::weight_of_faces(const AnchorFaces& faces, std::size_t n, fl
   return 1.0F / std::max(resistance, kLeastResistance / square);
 }
 
-// Of the tissue round a node, relative to the reference.
+// Stiffness of the tissue round a node, relative to the reference stiffness.
 float CompositeGrid::stiffness_at(const Level& level, std::size_t n) const noexcept {
   if (!material_.is_heterogeneous()) return 1.0F;
   float stiff = 0.0F, shape = 0.0F;

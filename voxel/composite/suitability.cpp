@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which objects can be solved on a CompositeGrid: by their materials and anchors, and by trial contacts.
+// Decides which objects can be solved on a CompositeGrid: by their materials and anchors, and by trial
+// contacts.
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -13,14 +14,16 @@ namespace {
 using composite::index;
 
 constexpr int kTrialHalfWidth = 10;  // of level 0 in trials
-constexpr double kConverges = 0.85;  // largest mean convergence factor of the displacement per cycle
-// Of the force on patches twice as wide: two just noticeable differences.
+constexpr double kConverges = 0.85;  // largest accepted mean convergence factor of displacements per cycle
+// Largest accepted error, as a share of the force with patches twice as wide: two just noticeable
+// differences.
 constexpr double kMaxForceError = 0.14;
-// Forces are compared as in a press of this share of the object's smallest side. Smaller ones count as 0.57
-// N: 0.04 N, which a hand does not feel, is 7 % of that.
+// Forces are scaled to a press as deep as this share of the object's smallest side. The relative error of a
+// force below 0.57 N is taken relative to 0.57 N: 7 % of that is 0.04 N, which a hand does not feel.
 constexpr double kPressedShare = 0.1, kLeastForce_N = 0.57;
 
-// The axis direction nearest to the inward normal; across a sheet of single voxels.
+// The axis direction nearest to the inward normal. For a sheet one voxel thick, which has no such normal: the
+// direction across the sheet.
 glm::dvec3 direction_into(const Lattice& lattice, VoxelId v) {
   const glm::dvec3 outward = lattice.outward(v);
   int axis = CompositeGrid::largest_axis(outward);
@@ -87,7 +90,8 @@ CompositeGrid::Suitability CompositeGrid::try_contacts() {
   return result;
 }
 
-// From a random state without a tool, with differences up to `most_m`.
+// Do cycles without a tool come to rest fast enough? They start from a random state whose differences are at
+// most `most_m`.
 bool CompositeGrid::converges_at(const Index3& place, float most_m) noexcept {
   constexpr int kFirst = 3, kCycles = 10;
   begin(place);
@@ -108,10 +112,10 @@ bool CompositeGrid::converges_at(const Index3& place, float most_m) noexcept {
   return energy_J() < std::pow(kConverges, 2 * (kCycles - kFirst)) * before;
 }
 
-// The force (N) on a voxel that was pushed along one axis from rest, once it stays the same.
+// The steady force (N) on a voxel that is pushed along one axis from rest.
 double CompositeGrid::settled_press(const Index3& place, const glm::dvec3& push_m) noexcept {
   constexpr int kRounds = 20, kCyclesOfRound = 10;
-  constexpr double kSettled = 1e-3;  // of the force, in a round
+  constexpr double kSettled = 1e-3;  // change in a round, as a share of the force
   std::array<bool, 3> axes{};
   axes[index(largest_axis(push_m))] = true;
   begin(place);

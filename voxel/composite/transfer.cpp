@@ -15,8 +15,8 @@ HYBRID_INLINE void coarse_neighbours(const Float8& row, bool odd, Float8& before
   }
 }
 
-// Weight of the second of two coarse nodes at a node between them: the share of its link; one half if a link
-// is missing.
+// Weight of the second of two coarse nodes at the fine node between them: the share of the second link in the
+// stiffness of both links; one half if a link is missing.
 HYBRID_INLINE void upper_share_between(const Float8& link_before, const Float8& link_after, Float8& part) {
   const Float8 zero{}, half = zero + 0.5F, one = zero + 1.0F;
   const Mask8 both = (link_before > zero) & (link_after > zero);

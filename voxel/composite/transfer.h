@@ -3,9 +3,9 @@
 //
 // A node between two coarse nodes is interpolated along x, then y, then z. In tissue of one stiffness its
 // weights are one half each. Where stiffness differs they are proportional to the links on either side, so
-// that a stiff skin on soft fat moves with the skin (operator interpolation: Alcouffe, Brandt, Dendy &
-// Painter 1981, The multi-grid method for the diffusion equation with strongly discontinuous coefficients).
-// Restriction uses the transposed weights.
+// that a node in a stiff skin on soft fat moves with the skin (operator interpolation: Alcouffe, Brandt,
+// Dendy & Painter 1981, The multi-grid method for the diffusion equation with strongly discontinuous
+// coefficients). Restriction uses the transposed weights.
 #pragma once
 
 #include <array>
@@ -16,8 +16,8 @@
 
 namespace voxel::composite {
 
-// Prolongation of one fine row. `rows`: the coarse rows that contribute, each from the coarse lane of fine
-// lane 0 on, with their weights.
+// Prolongation of one fine row. `rows`: the coarse rows that contribute; each begins at the coarse lane of
+// fine lane 0. `weights`: their weights.
 struct ProlongArgs {
   std::array<const float*, 4> rows;
   std::array<float, 4> weights;
@@ -27,13 +27,13 @@ struct ProlongArgs {
   const float *lane_weight, *lower, *negated_upper, *is_free;  // bounds null: none
   float* u;
   int vectors;
-  bool adds;  // adds a correction to the free nodes; else sets all nodes
+  bool adds;  // true: adds a correction to the free nodes; false: sets all nodes
 };
 void prolong_row(const ProlongArgs& args) noexcept;
 
-// Operator interpolation of one fine row, which lies between coarse rows in y, in z, in both or in none.
+// Operator interpolation of one fine row, which may lie between coarse rows in y, in z or in both.
 struct ProlongByLinksArgs {
-  std::array<const float*, 4> rows;  // coarse; [0]: before in y and z, +1: after in y, +2: after in z
+  std::array<const float*, 4> rows;  // coarse rows; [0]: before in y and z; +1: after in y; +2: after in z
   // Links along x of the fine rows at the same places.
   std::array<const float*, 4> link_x;
   // Links along y before and after the row between them; [0]: at the row before in z, [1]: at the row after.
@@ -51,11 +51,11 @@ struct RestrictArgs {
   std::array<float, 3> share_y, share_z;
   // Links before and after the row.
   std::array<std::array<std::array<const float*, 2>, 3>, 3> link_z;  // [z][y]
-  std::array<std::array<const float*, 2>, 3> link_y;                 // [y], of the rows at the own z
-  const float* link_x;                                               // of the own row
+  std::array<std::array<const float*, 2>, 3> link_y;                 // [y], rows with the z of the coarse row
+  const float* link_x;  // of the fine row at the coarse row's place
   int vectors;
-  // Results by fine lane: the sum over the rows, and the share of it that the coarse node after it in x
-  // receives if the lane lies between two.
+  // Results by fine lane. `sum`: over the rows. `upper_share`: share of the sum for the next coarse node in
+  // x, if the lane lies between two coarse nodes.
   float *sum, *upper_share;
 };
 void restrict_row_by_links(const RestrictArgs& args) noexcept;

@@ -46,13 +46,13 @@ struct BrickLoad {
 };
 
 // Displacements of all voxels. A float position far from the origin would lose the slack of the chain to
-// rounding. A displacement near zero does not.
+// rounding. A float displacement keeps the slack, because it is near zero.
 struct Displacement {
   enum Role : std::uint8_t {
     free = 0,
     held = 1,      // near the tool or another soft object: moved by the contact solver only
     obstacle = 2,  // near a rigid surface: also subject to n·u >= bound
-    pressed = 3,   // on the tool only: slides along its surface (see tangential_contact.h)
+    pressed = 3,   // on the tool only: slides along the tool's surface (tangential_contact.h)
     // In a block without slack (rigid_blocks.h): moves with its block only, whatever else touches it. Voxels
     // keep this role from construction on. The second value marks those near a rigid surface.
     joined = 5,
@@ -122,7 +122,7 @@ struct Displacement {
 [[nodiscard]] glm::dvec3 displacement_at(const Lattice& lattice, const Displacement& state,
                                          const glm::dvec3& rest_point) noexcept;
 
-// Share of the smallest spacing: a voxel no deeper in its obstacle than this touches it.
+// A voxel touches its obstacle if it is no deeper in the obstacle than this share of the smallest spacing.
 inline constexpr double kTouching = 1e-6;
 
 // A half-space that one surface voxel may not leave: normal · u >= bound, u its displacement.

@@ -381,8 +381,8 @@ void Lattice::find_surface() {
     surface_before_[b] = static_cast<std::uint32_t>(surface_.size());
 }
 
-// Surface number of the first surface voxel with an id of `v` or more; past the last one in the block of ids
-// that contains `v` if there is none.
+// Surface number of the first surface voxel with an id >= `v` in the block of ids that contains `v`. If there
+// is none, the number after the block's last surface voxel.
 std::uint32_t Lattice::surface_from(VoxelId v) const noexcept {
   const auto block = v / kSurfaceBlock;
   const auto first = surface_.begin() + static_cast<std::ptrdiff_t>(surface_before_[block]),

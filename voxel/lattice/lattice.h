@@ -36,7 +36,7 @@ struct LinkMaterial {
   // instead of links.
   bool bricks = false;
 
-  // Linked voxels of such materials move as one block.
+  // If true, linked voxels of such materials move as one block.
   [[nodiscard]] bool without_slack() const {
     return stretch_min >= 1.0 && stretch_max <= 1.0 && shear <= 0.0;
   }
@@ -194,8 +194,8 @@ class Lattice {
   [[nodiscard]] bool uniform_limits() const { return uniform_limits_; }
 
   // has_plasticity(): some link has a finite yield. yield_m(): difference (m, on any axis) beyond which the
-  // link v → up(v, d) yields, the smaller of its two ends'; infinite: never. first_yield_m(): the smallest
-  // yield_m() in direction d.
+  // link v → up(v, d) yields. It is the smaller yield of the two ends' materials; infinite: the link never
+  // yields. first_yield_m(): the smallest yield_m() in direction d.
   [[nodiscard]] bool has_plasticity() const { return has_plasticity_; }
   [[nodiscard]] float yield_m(VoxelId v, int d) const {
     return yield_m_[static_cast<std::size_t>(d)][pair_of(label_[v], label_[grid_.up(v, d)])];
@@ -210,7 +210,7 @@ class Lattice {
   enum class Anchors : std::uint8_t { none = 0, all = 1, some = 2 };
   static constexpr std::uint8_t kCount = 63, kInside = kRow + 1;
   static constexpr int kAnchorShift = 6;
-  static constexpr std::size_t kListBlock = 64;  // rows
+  static constexpr std::size_t kListBlock = 64;  // rows to an entry of listed_before_
   [[nodiscard]] Anchors anchors_of(RowId row) const { return Anchors(rows_[row] >> kAnchorShift); }
   // Anchored lanes of a row with Anchors::some.
   [[nodiscard]] std::uint32_t listed_anchors(RowId row) const noexcept;
@@ -246,14 +246,14 @@ class Lattice {
   LazyArray<std::uint8_t> label_, rows_;
   std::vector<std::uint32_t> listed_before_;  // [row / kListBlock] rows in anchored_ with smaller ids
   std::vector<std::uint32_t> anchored_;       // lanes of the rows with Anchors::some
-  std::array<std::uint8_t, 256> material_{};  // label → number among equal materials; 0: empty
+  std::array<std::uint8_t, 256> material_{};  // [label] number of its material; 0: empty
   std::vector<LinkMaterial> materials_;       // [material]
   std::vector<LinkModuli> moduli_;            // [material]; [0]: none
   std::array<double, 3> area_by_length_m_{};
   std::array<std::vector<Spring>, 3> within_;     // [d][material]
   std::array<std::vector<LinkLimit>, 3> limits_;  // [d][material a · material_count + material b]
   std::array<LinkLimit, 3> tightest_;
-  std::array<std::vector<float>, 3> yield_m_;  // as limits_
+  std::array<std::vector<float>, 3> yield_m_;  // indexed as limits_
   std::array<float, 3> first_yield_m_{};
   LazyArray<std::uint16_t> block_;  // [v]; empty: no block
   std::size_t block_count_ = 0;

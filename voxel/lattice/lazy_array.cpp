@@ -20,12 +20,12 @@ std::size_t page_bytes() {
   return bytes;
 }
 
-// Page table entries of this process. Opened for each query, because a descriptor inherited through fork()
-// would still describe the parent.
+// Page table entries of this process. The file is opened for each query, because a descriptor inherited
+// through fork() would still describe the parent.
 class PageMap {
  public:
   // mincore() is unsuitable: it counts pages that were only read and omits pages that are swapped out, so
-  // copies would lose the contents of these.
+  // copies would lose the contents of swapped pages.
   using Entries = std::array<std::uint64_t, kPagesAtOnce>;
   static constexpr std::uint64_t kPresent = 1ULL << 63U, kSwapped = 1ULL << 62U, kMappedOnce = 1ULL << 56U;
 
@@ -51,10 +51,11 @@ bool all_zero(const char* at, std::size_t bytes) {
   return bytes == 0 || (at[0] == 0 && std::memcmp(at, at + 1, bytes - 1) == 0);
 }
 
-// Calls `visit(offset, bytes)` for each page, or part of one, in the range that takes memory of its own.
-// Reading an untouched page maps the shared page of zeros. Page table entries do not distinguish it from a
-// page that is shared with a child process, so such a page is visited unless it contains only zeros. Without
-// information from the system the contents decide for all pages, and written pages of zeros are skipped.
+// Calls `visit(offset, bytes)` for the pages of the range that take memory of their own, or for the parts of
+// such pages in the range. Reading an untouched page maps the shared page of zeros. Page table entries do not
+// distinguish this page from one that is shared with a child process. So a shared page is visited only if it
+// contains anything but zeros. Without information from the system all pages are treated like shared ones,
+// and written pages of zeros are skipped.
 template <class Visit>
 void for_resident(const void* at, std::size_t bytes, const Visit& visit) {
   const PageMap map;

@@ -82,8 +82,8 @@ class LazyArray {
 };
 
 void populate(void* at, std::size_t bytes) noexcept;
-// Returns the whole pages of a range to the system; they read as zeros afterwards. For memory that only its
-// destructor still needs.
+// Returns the whole pages of a range to the system; they read as zeros afterwards. Use it for memory that
+// nothing but its owner's destructor still needs.
 void give_back(void* at, std::size_t bytes) noexcept;
 // Number of bytes in [at, at + bytes) whose pages take memory of their own. Pages that were only read do not:
 // they all map the one page of zeros.

@@ -111,8 +111,8 @@ LevelStiffness::Content LevelStiffness::content_from_finer(const std::array<int,
   return all;
 }
 
-// Link of a cell to its upper neighbour in d, equal to the last bit to the written one, whether written yet
-// or not.
+// Link of a cell to its upper neighbour in d. It equals the written link to the last bit, even if the row is
+// not written yet.
 Spring LevelStiffness::link(const std::array<int, 3>& cell, int d) const noexcept {
   const auto ud = static_cast<std::size_t>(d);
   for (std::size_t a = 0; a < 3; ++a) {
@@ -136,12 +136,12 @@ Spring LevelStiffness::link_from_finer(const std::array<int, 3>& cell, int d) co
   std::array<Spring, 4> fine;
   for (std::size_t n = 0; n < 4; ++n) {
     std::array<int, 3> at{};
-    at[ud] = 2 * cell[ud] + 1;  // last layer of this cell; the link leads to the first of the next
+    at[ud] = 2 * cell[ud] + 1;  // last layer of this cell; the link leads to the first layer of the next cell
     at[p] = 2 * cell[p] + static_cast<int>(n & 1);
     at[q] = 2 * cell[q] + static_cast<int>(n >> 1);
     fine[n] = finer_->link(at, d);
   }
-  // In pairs, so that four equal springs are exactly four times one.
+  // Summed in pairs, so that four equal springs are exactly four times one.
   return {0.5F * ((fine[0].along + fine[1].along) + (fine[2].along + fine[3].along)),
           0.5F * ((fine[0].across + fine[1].across) + (fine[2].across + fine[3].across))};
 }

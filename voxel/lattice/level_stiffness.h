@@ -2,10 +2,10 @@
 // Springs of one level of the multigrid hierarchy, row by row, in the layout of the inner loops.
 //
 // Level 0 is the lattice. A cell of level l stands for 2×2×2 cells of the next finer level. A coarse link
-// combines the four finer links that cross the face between its two cells, side by side, each twice as long:
-// half of their sum. Rows inside a region of one label share one set of constants. Any other row is written
-// out when it is first prepared, so untouched tissue costs almost no memory: only the links of levels from
-// kKept on are stored from the start.
+// combines the four finer links that cross the face between its two cells. These act in parallel, but a
+// coarse link is twice as long. So its stiffness is half of their sum. Rows inside a region of one label
+// share one set of constants. Any other row is written out when it is first prepared, so untouched tissue
+// costs almost no memory: only the links of levels from kKept on are stored from the start.
 #pragma once
 
 #include <array>
@@ -63,7 +63,7 @@ struct RowLimits {
     std::array<AxisLimits, 3> tightest;  // [axis] no link is tighter
   };
   const std::array<AxisLimits, 3>* of = nullptr;  // [axis] no link is tighter
-  const Written* lanes = nullptr;                 // null: all links have exactly those limits
+  const Written* lanes = nullptr;                 // null: all links have exactly the limits `of`
 };
 
 class LevelStiffness {
@@ -89,8 +89,8 @@ class LevelStiffness {
   [[nodiscard]] std::vector<bool> rows_in_use();
   [[nodiscard]] bool uniform(RowId row) const { return kind(row) == one_label; }
   [[nodiscard]] RowSprings springs(RowId row, int axis) const noexcept;
-  // Springs of a prepared row. By reference and member by member, for speed: a result by value is stored and
-  // reloaded at once in pieces of different sizes.
+  // Springs of a prepared row. Fills `out` by reference and member by member, for speed: a result by value
+  // would be stored and at once reloaded in pieces of different sizes.
   void all(RowId row, RowStiffness& out) const noexcept {
     const Kind what = kind(row);
     if (what == one_label) {
@@ -147,7 +147,7 @@ class LevelStiffness {
   [[nodiscard]] RowLimits limits(RowId row) const noexcept;
   // Springs of one voxel or cell on all axes. Prepares its row; afterwards it takes a few loads.
   [[nodiscard]] VoxelSprings springs_of(VoxelId cell) noexcept;
-  // The same to the last bit, without preparing the row: slower if the row is not prepared.
+  // The same springs to the last bit, but without preparing the row; slower if the row is not prepared.
   [[nodiscard]] VoxelSprings find_springs(VoxelId cell) const noexcept;
   // Does this cell of the grid contain a voxel?
   [[nodiscard]] bool has_voxel(const std::array<int, 3>& cell) const noexcept {
@@ -163,7 +163,7 @@ class LevelStiffness {
   enum Kind : std::uint8_t { unknown = 0, empty, one_label, mixed, ready };
   enum Content : std::uint8_t { nothing = 0, some = 1, held = 2 };
   static Content together(Content a, Content b) { return a == nothing || (a == held && b == some) ? b : a; }
-  // Springs of a mixed row: of its up-links, [d][lane]. The entry before lane 0 in x is the down-link of lane
+  // Springs of the up-links of a mixed row, [d][lane]. The entry before lane 0 in x is the down-link of lane
   // 0. The other down-links are stored with their own rows, and Cells apart, so that a cycle reads less
   // memory.
   struct alignas(64) Written {

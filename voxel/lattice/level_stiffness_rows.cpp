@@ -34,7 +34,7 @@ bool same_bits(const T& a, const T& b) {
 
 }  // namespace
 
-// Index of the row written last, at written_count_: that of an equal earlier row if there is one.
+// Index of an earlier row equal to the one just written at written_count_; written_count_ if there is none.
 std::uint32_t LevelStiffness::find_written() noexcept {
   const std::uint32_t last = written_count_;
   std::uint64_t hash = 0xcbf29ce484222325;
@@ -94,13 +94,14 @@ bool LevelStiffness::write_voxels(RowId row, Written& out, LaneBits& stands) con
     for (VoxelId i = 0; i < kRow; ++i) around[i + 1][n] = lattice_.material(first + i);
     around[kRow + 1][n] = lattice_.material(grid_.up(first + kRow - 1, 0));
   }
-  // The link in +d of the voxel at (y, z) of slice x; y and z are 0 (one back), 1 or 2.
+  // Springs of links of the row's voxel in slice x. along_x(): in +x. in_slices(): in d = 1 or 2, the link
+  // down to the neighbour below (from = 0) or up (from = 1).
   const auto along_x = [&](std::size_t x) { return lattice_.spring_among(around[x], around[x + 1], 0); };
   const auto in_slices = [&](std::size_t x, std::size_t from, int d) {
     Slice a{}, b{};
     const std::size_t along = d == 1 ? 1 : 3, across = d == 1 ? 3 : 1;
     for (std::size_t n = 0; n < 9; ++n) {
-      // In the order of Lattice::spring(), so that sums round alike.
+      // The order is that of Lattice::spring(), so that sums round alike.
       const std::size_t beside = d == 1 ? n / 3 : n % 3,
                         at = (d == 1 ? n % 3 : n / 3) * across + from * along;
       a[n] = around[x - 1 + beside][at];
@@ -114,7 +115,7 @@ bool LevelStiffness::write_voxels(RowId row, Written& out, LaneBits& stands) con
     const std::size_t x = i + 1;
     const auto v = static_cast<VoxelId>(row * kRow + i);
     any = any || around[x][4] != 0;
-    // Most voxels of a row have the links of the voxel before them.
+    // Most voxels of a row have the same springs as the voxel before them.
     const bool as_before = i > 0 && around[x + 1] == around[x] && around[x] == around[x - 1] &&
                            around[x - 1] == around[x - 2] && anchored == lattice_.anchored(v);
     if (!as_before) {

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The six-link energy: spring stiffness of a link.
 //
-// A link along d of length h_d has a spring of E·A/h_d along it and of G·A/h_d across it, A the product of
-// the two other spacings. A voxel is a node: an object, and a region of stiffer tissue within it, ends at the
-// centres of its outermost voxels. Around a link lie four cells of eight voxels, and the link stands for a
-// quarter of each. E and G are the means of the four quarters; a quarter is 0 if its cell lacks a voxel.
+// A link along d of length h_d has a spring of E·A/h_d along it and of G·A/h_d across it, where A is the
+// product of the two other spacings. A voxel is a node: an object, and a region of stiffer tissue within it,
+// ends at the centres of its outermost voxels. Around a link lie four cells of eight voxels, and the link
+// stands for a quarter of each. E and G are the means of the four quarters; a quarter is 0 if its cell lacks
+// a voxel.
 #pragma once
 
 #include <array>
@@ -13,9 +14,10 @@
 
 namespace voxel {
 
-// Springs E along and G across make pressing on a face of the lattice an anisotropic Laplace problem, whose
-// half-space has the contact modulus 2·sqrt(E·G). This G makes it E/(1−ν²), the contact modulus of an elastic
-// half-space and the only modulus in the solutions for Hertz's ball and the flat punch.
+// With moduli E along its links and G across them, a lattice pressed on a face obeys an anisotropic Laplace
+// equation. Its half-space has the contact modulus 2·sqrt(E·G). This G makes that modulus E/(1−ν²), the
+// contact modulus of an elastic half-space and the only modulus in the solutions for Hertz's ball and the
+// flat punch.
 [[nodiscard]] constexpr double across_modulus_Pa(double young_Pa, double poisson) {
   const double plane = 1.0 - poisson * poisson;
   return young_Pa / (4.0 * plane * plane);
@@ -30,9 +32,9 @@ inline constexpr std::size_t kLinkItself = 4;
 // its ends are filled); bit 4 is taken as set.
 //
 // The share is 1 inside, 1/2 on a face, 1/4 on an edge, 3/4 along a notch. On a flat surface the stiffness
-// for a wave is then second-order accurate in the spacing. Whole links at the border would be first-order
-// accurate. A direction without a neighbour on either side does not reduce the share: a sheet one voxel thick
-// keeps the thickness of its voxels, a row of voxels its whole area.
+// for a wave is then second-order accurate in the spacing. With whole links at the border it would be
+// first-order accurate. A direction without a neighbour on either side does not reduce the share: a sheet one
+// voxel thick keeps the thickness of its voxels, a row of voxels its whole area.
 [[nodiscard]] constexpr double link_weight(std::uint32_t parallels) {
   const auto there = [parallels](int p, int q) { return (parallels >> (p + 1 + 3 * (q + 1)) & 1U) != 0; };
   int quarters = 0;
@@ -73,8 +75,8 @@ struct LinkModuli {
 // the softer of its two ends, 0 if an end is missing. In one material the sum is the material's moduli times
 // link_weight.
 struct LinkParts {
-  // Mean of the four quarters; a quarter has the moduli of the softest voxel of its cell. The two ends in
-  // series would ignore the voxels beside the link.
+  // Mean of the four quarters; a quarter has the moduli of the softest voxel of its cell. A rule by the
+  // link's two ends in series would ignore the voxels beside the link.
   LinkModuli cells;
   // Excess stiffness of a sheet or row of voxels too thin to fill a cell, as if it were in air. Without this
   // part, thin skin in fat would have no stiffness of its own. 0 if a quarter is as stiff as the link.

@@ -3,8 +3,8 @@
 //
 // A step leads from one state of rest to the next. Within a step the force of a link stays constant beyond
 // its yield; the difference to its spring's force is a load on its two ends. The state of rest minimises the
-// convex energy of voxel/lattice/plasticity.h and does not depend on the path. The offsets move when it is
-// reached.
+// convex energy of voxel/lattice/plasticity.h and does not depend on the path. The offsets move once that
+// state is reached.
 #pragma once
 
 #include <array>
@@ -27,11 +27,12 @@ struct PlasticOffsets {
 
   // [d][axis][v]: rest difference of the link v → up(v, d) since the last state of rest (m).
   std::array<std::array<LazyArray<float>, 3>, 3> offset;
-  // [axis][v]: load of the offsets, and of yielding since, beyond the force of the springs (N).
+  // [axis][v]: load on a voxel beyond the force of its springs, from the offsets and from yielding since the
+  // last state of rest (N).
   std::array<LazyArray<float>, 3> load;
   LazyArray<std::uint8_t> row;  // [row] 1 if any of its links has yielded
 
-  // Null: no load.
+  // Loads of a row on one axis (N); null: no load.
   [[nodiscard]] const float* load_of(RowId r, int axis) const noexcept {
     if (row.size() == 0 || row[r] == 0) return nullptr;
     return load[static_cast<std::size_t>(axis)].data() + static_cast<std::size_t>(r) * kRow;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Finds blocks of an object whose links have no slack. Once, because labels do not change.
+// Finds blocks of an object whose links have no slack. This happens once, because labels do not change.
 #include <algorithm>
 #include <numeric>
 #include <vector>

@@ -35,8 +35,8 @@ HYBRID_INLINE void load(Float8& to, const float* from) {
 HYBRID_INLINE void store(float* to, const Float8& from) {
   std::memcpy(to, &from, sizeof from);
 }
-// Shifts by one lane. Lane i of `down` is lane i − 1 of `own`, lane 0 the last of `before`. Lane i of `up` is
-// lane i + 1 of `own`, the last lane the first of `after`.
+// Shifts by one lane. Lane i of `down` is lane i − 1 of `own`; lane 0 is the last lane of `before`. Lane i of
+// `up` is lane i + 1 of `own`; the last lane is the first lane of `after`.
 HYBRID_INLINE void shift_down(Float8& down, const Float8& before, const Float8& own) {
   down = __builtin_shufflevector(before, own, 7, 8, 9, 10, 11, 12, 13, 14);
 }

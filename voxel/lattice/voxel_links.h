@@ -25,8 +25,8 @@ glm::dvec3 clamp_to_links(const Lattice& lattice, const Displacement& state, Vox
                           const glm::dvec3& wanted) noexcept;
 // The value nearest to `wanted` in the interval. An interval that rounding made empty gives `now`.
 float clamp_to(const std::array<float, 2>& interval, float wanted, float now) noexcept;
-// Force of its links, bricks and plastic offsets on voxel v (N). The version by `lattice` is slow: for
-// references.
+// Force of its links, bricks and plastic offsets on voxel v (N). The version with `lattice` is slow and meant
+// for references.
 glm::dvec3 link_force(LevelStiffness& couplings, const Displacement& state, VoxelId v) noexcept;
 glm::dvec3 link_force(const Lattice& lattice, const Displacement& state, VoxelId v) noexcept;
 // The same along one axis, which is cheaper.
@@ -45,7 +45,7 @@ glm::dvec3 clamp_to_links(const VoxelLinks& links, const glm::dvec3& wanted, con
 
 struct ObstacleView {
   std::span<const Obstacle> obstacles;  // by surface number; empty: none
-  const Lattice* lattice = nullptr;     // the lattice of the surface numbers
+  const Lattice* lattice = nullptr;     // the lattice that defines the surface numbers
   std::size_t moving = 0;               // number of obstacles that are moving bodies
 
   [[nodiscard]] const Obstacle& of(VoxelId v) const { return obstacles[lattice->surface_number(v)]; }
@@ -56,7 +56,7 @@ double depth_in_obstacle(const Obstacle& o, const glm::dvec3& u) noexcept;
 // For a voxel with an obstacle role: is it inside its obstacle, or within `margin` of it (m)?
 bool is_jammed(const ObstacleView& view, const Displacement& state, VoxelId v, double margin) noexcept;
 // Shortens the motion `before` → `after` so that the voxel gets no deeper into its obstacle, or does not
-// enter it. Needed after links clamped a place on each axis separately.
+// enter it. Needed after clamp_to_links(), which clamps each axis separately.
 glm::dvec3 no_deeper(const Obstacle& o, const glm::dvec3& before, const glm::dvec3& after) noexcept;
 // Moves a voxel with an obstacle role towards its least energy outside the obstacle. A voxel inside comes out
 // as far as its links allow, and never gets deeper.

@@ -25,22 +25,23 @@ constexpr double kContraction = 0.5;
 // Contact cycles a tick, at most.
 constexpr int kMostCycles = 2;
 // With a large patch a tick has one cycle, unless the contact is still this many spacings from equilibrium: a
-// second cycle there gains little and costs what the tick does not have.
+// second cycle gains little there and exceeds the time of a tick.
 constexpr double kJump = 0.1;
-// Counted work (Float8 prolonged) that a tick may spend on split cycles under asynchronous relaxation. The
-// rest of a cycle continues in the next tick; what a cycle leaves of a tick begins the next cycle if it is at
-// least kLeastWork.
+// Counted work (Float8 prolonged) that a tick may spend on split cycles under asynchronous relaxation. A
+// cycle that is not finished continues in the next tick. If a cycle ends and at least kLeastWork is left of
+// the tick's work, the next cycle begins.
 constexpr std::size_t kContactWork = 4400, kLeastWork = 1000;
-// The same, with the rows of results that the tick applies.
+// Counted work that a tick may spend on contact cycles and on rows of results that it applies.
 constexpr std::size_t kTickWork = 4900;
-// A whole cycle evicts the contact from the caches, and so does a long pause of the tool. Until its memory is
-// read again all takes up to twice as long: for this many ticks there is less work.
+// A whole cycle evicts the contact from the caches, and so does a long pause of the tool. Until the contact's
+// memory is read again, all work takes up to twice as long. So for kColdTicks ticks only kColdWork is
+// allowed.
 constexpr int kColdTicks = 5;
 constexpr std::size_t kColdWork = 2500;
-// Rows of coarse cells: if more are to be dropped, a tick of its own does so.
+// Rows of coarse cells. If at least as many are to be dropped, a separate tick drops them.
 constexpr std::size_t kDropsApart = 100;
-constexpr double kDeep = 0.05;  // of the voxel radius: a smaller depth at the start of a tick is the solver's
-                                // error, which is mended
+constexpr double kDeep = 0.05;  // of the voxel radius: a smaller depth at the start of a tick is an error of
+                                // the solver and is corrected
 
 }  // namespace
 
@@ -90,7 +91,7 @@ bool SoftObject::cycle_due() const noexcept {
   // enough work.
   if (cycles_since_touch_ > 0)
     return apart ? in_parts && left_of(kContactWork) >= shared(kLeastWork) : !split_cycle_;
-  // Tissue that was just released has this tick only.
+  // Tissue that was just released gets a cycle even then: it has this tick only.
   return !skips_cycle_ || !any_pressed();
 }
 
@@ -122,16 +123,16 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
       split_cycle_ = true;
       continue;
     }
-    // Tissue that the tool just released follows it by one cycle here. The shadow alone would let tissue lag
-    // behind a quick stroke, and the contact would be lost.
+    // Tissue that the tool just released follows the tool by one cycle here. The shadow alone would let
+    // tissue lag behind a quick stroke, and the contact would be lost.
     if (pressed_last_.empty()) continue;
     const bool in_parts = relaxation_.left_to_shadow() && pressed > 0;
     contact_work_ += relaxation_.relax_contact(state_, obstacle_view(), held_voxels_, pressed_last_, again,
                                                in_parts ? left : Relaxation::kUnlimited);
     split_cycle_ = relaxation_.has_large_patch();
   }
-  // Last, so that the reaction is measured with all voxels at their projections. Pressed voxels come first: a
-  // dependent counts only if its link to a pressed voxel is at its limit then.
+  // This comes last, so that the reaction is measured with all voxels at their projections. Pressed voxels
+  // come first: a dependent counts only if its link to a pressed voxel is at its limit then.
   for (const bool pressed : {true, false}) {
     for (Touch& t : touches_) {
       if (t.pressed == pressed) relax_touch(tool, t);
@@ -144,8 +145,8 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
 }
 
 // The pair solver projects its voxels with all others fixed. If chains are at their limits in both objects,
-// that lifts the tool, which comes back in the next tick. Contact cycles around these voxels end such limit
-// cycles; results of the shadow come too rarely.
+// this lifts the tool, and the tool comes back in the next tick. Contact cycles around these voxels end such
+// limit cycles; results of the shadow come too rarely.
 void SoftObject::relax_near_pairs() noexcept {
   if (touches_.empty()) {  // touch() was not called
     contact_work_ = 0;

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How much energy a contact was given, and so may give back: the passivity observer of Hannaford & Ryu (IEEE
-// Trans. Robotics & Automation 18, 2002), for tissue whose force is only approximately the gradient of an
-// energy.
+// Observes the energy that a contact was given and may give back: the passivity observer of Hannaford & Ryu
+// (IEEE Trans. Robotics & Automation 18, 2002), for tissue whose force is only approximately the gradient of
+// an energy.
 //
 // On nested patches a path sideways may cost no force although the tissue is 1 % stiffer there. A tool that
 // enters at one place and leaves at another would gain that energy.
 //
-// A contact stores at least a third of force times depth (a cone within chain limits, E ~ depth³; half of it
-// without active limits). If it was given less, the force on the way out is scaled by `share`, 0.8 at least.
-// The lower bound is needed because work is counted wrongly where tissue is stiffer than the tool's coupling.
-// The share changes gradually, and returns to 1 while the tool rests.
+// A contact stores at least a third of force times depth (a third if active chain limits shape a cone, where
+// E ~ depth³; half without active limits). If the contact was given less, the force on the way out is scaled
+// by share(), which is at least 0.8. The lower bound is needed because work is counted wrongly where tissue
+// is stiffer than the tool's coupling. The share changes gradually, and returns to 1 while the tool rests.
 #pragma once
 
 #include <glm/vec3.hpp>

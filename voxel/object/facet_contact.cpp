@@ -13,14 +13,16 @@ namespace {
 
 // Length of the difference of both outward normals: less means that the surfaces face the same way.
 constexpr double kLeastSide = 0.1;
-// Of a facet's normal along the axis: a steeper facet is pressed as a level one.
+// Least component of a facet's unit normal along the axis. A steeper facet is pressed as if it were level.
 constexpr double kLeastAlong = 0.3;
-// Of the touching distance: further beside the last facet a voxel is past the edge of the surface.
+// Of the touching distance. A voxel over no facet is past the edge of the surface if the nearest voxel of the
+// surface is further away than this, across the axis.
 constexpr double kBeside = 0.75;
-constexpr double kPushed = 1e-6;  // of the touching distance: rounding
+constexpr double kPushed = 1e-6;  // of the touching distance: less is rounding
 constexpr double kParted = 0.01;  // of the touching distance: less overlap is left to the next tick
-// kHollow, of the touching distance: a surface that rises less towards a voxel over the middle of a facet is
-// no hollow. kFarBeside, barycentric: how far beside a facet a voxel may still touch it.
+// kHollow, of the touching distance: a surface has a hollow if the place under the voxel is deeper than the
+// middle of the other facet by at least this. kFarBeside, barycentric: how far beside a facet a voxel may
+// still touch it.
 constexpr double kHollow = 0.005, kFarBeside = 0.5;
 constexpr double kNormalTurn =
     0.01;                          // share by which the force direction turns to the facet's normal each time
@@ -74,7 +76,7 @@ double yielding(const glm::dvec3& compliance, const glm::dvec3& way) noexcept {
   return glm::dot(way, compliance * way);
 }
 
-// A surface as a height over two axes of its lattice, along the third.
+// A surface, given as a height along one axis of its lattice over the other two axes.
 struct Surface {
   const SoftObject& object;
   int axis;
@@ -127,7 +129,7 @@ void set_facet(const SoftObject& object, const std::array<VoxelId, 3>& facet, Pr
 bool facet_round(const Surface& surface, VoxelId v, const glm::dvec3& p, PressedPair& pair) noexcept {
   const glm::dvec2 flat = surface.flat(p), from = flat - surface.flat(surface.object.position(v));
   for (int n = 0; n < 4; ++n) {
-    // the most likely first
+    // the most likely square comes first
     const bool up0 = (from.x >= 0.0) != ((n & 1) != 0), up1 = (from.y >= 0.0) != ((n & 2) != 0);
     VoxelId corner = v;
     if (!up0) corner = surface.beside(corner, 0, false);
@@ -148,7 +150,8 @@ bool facet_round(const Surface& surface, VoxelId v, const glm::dvec3& p, Pressed
   return false;
 }
 
-// Returns the component along the axis of a triangle's unit normal; `out` is the normal divided by it.
+// Returns the size of the component of a triangle's unit normal along the axis. `out`: the normal divided by
+// that component; for a steep triangle, the direction of the axis.
 double normal_of(const std::array<glm::dvec3, 3>& at, int axis, bool inwards_up, glm::dvec3& out) noexcept {
   const glm::dvec3 n = glm::cross(at[1] - at[0], at[2] - at[0]);
   const double length = glm::length(n), along = length > 0.0 ? std::fabs(n[axis]) / length : 0.0;
@@ -164,7 +167,7 @@ glm::dvec3 middle(const PosedObject& b, const PressedPair& pair) noexcept {
   return sum;
 }
 
-// Sets what overlap_of() reads.
+// Sets the members that overlap_of() reads.
 void set_across(const PosedObject& a, const PosedObject& b, PressedPair& pair,
                 const glm::dvec3& across) noexcept {
   pair.across = across;
@@ -256,15 +259,15 @@ bool shares_of(const PosedObject& a, const PosedObject& b, const PressedPair& pa
 
 // With bricks a facet that is pushed sideways also moves up and down, and tilts the other way. If links are
 // at their limits in both objects, the force would flip between voxels in each tick. So the force direction
-// follows the facet's normal slowly. At rest it is the same, and the gap along the axis does not depend on
-// it. Links alone couple no axes and need no such damping.
+// follows the facet's normal slowly. At rest the direction is the normal, and the gap along the axis does not
+// depend on the direction. Links alone couple no axes and need no such damping.
 glm::dvec3 turned(const PosedObject& a, const PosedObject& b, const PressedPair& pair,
                   const glm::dvec3& across) noexcept {
   if (!a.object.lattice().has_bricks() && !b.object.lattice().has_bricks()) return across;
   return glm::dot(pair.across, across) > 0.0 ? glm::mix(pair.across, across, kNormalTurn) : across;
 }
 
-// Sets what follows from the facet and the shares, in the current state.
+// Sets the members that follow from the facet and the shares in the current state.
 void lie_on_facet(const PosedObject& a, const PosedObject& b, PressedPair& pair) noexcept {
   std::array<glm::dvec3, 3> at, rest;
   for (std::size_t i = 0; i < 3; ++i) {
@@ -390,7 +393,7 @@ void load_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pa
 }
 
 double relax_pair(const PosedObject& a, const PosedObject& b, PressedPair& pair) noexcept {
-  add_loads(a, b, pair, -pair.force_N);  // its own share is found anew
+  add_loads(a, b, pair, -pair.force_N);  // the pair's own force is found anew
   pair.force_N = glm::dvec3(0.0);
   End first = end_of(a, pair.a, pair.number_a);
   std::array<End, 3> corners;
@@ -411,7 +414,7 @@ double relax_pair(const PosedObject& a, const PosedObject& b, PressedPair& pair)
   }
   a.object.move(pair.a, first.u);
   for_corners(pair, [&](VoxelId v, double, std::size_t i) { b.object.move(v, corners[i].u); });
-  // also if links at their limits keep the voxels from separating
+  // needed even without a force: links at their limits may keep the voxels from separating
   if (pair.over) push_the_rest(a, b, pair, first, corners, of_first, of_facet);
   return gap_of_pair(a, b, pair);
 }
@@ -425,8 +428,8 @@ bool part_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pa
   const double first = who == GiveWay::second ? 0.0 : of_first;
   const double second = who == GiveWay::first ? 0.0 : of_facet;
   if (!(first + second > 0.0)) return true;
-  // Along the axis, so that the voxel stays over the facet. Along the normal it would end up over the next
-  // facet, and inside of it.
+  // They part along the axis, so that the voxel stays over the facet. Along the normal the voxel would end up
+  // over the next facet, and inside of it.
   glm::dvec3 along(0.0);
   along[pair.axis] = pair.upwards ? -overlap : overlap;
   const glm::dvec3 in_scene = b.pose.rotation * along;

@@ -2,7 +2,7 @@
 // Contact of two soft objects: surface voxels of the first, each on a facet of the second. A facet is a
 // triangle between three voxels of a surface.
 //
-// Contact between voxels of both surfaces fails: balls slide off one another into the gaps between them, and
+// Contact of voxels with voxels would fail: balls slide off one another into the gaps between them, and
 // surfaces that are not level meet too late.
 #pragma once
 
@@ -25,23 +25,23 @@ struct PosedObject {
   const BodyPose& pose;
 };
 
-// A voxel of the first object and the facet of the second that it is over. In contact the voxel is as far
-// from the facet, along an axis of the second's lattice, as two touching voxels are apart.
+// A voxel of the first object and the facet of the second object under it. In contact the distance between
+// voxel and facet, along an axis of the second's lattice, is `reach_m`.
 struct PressedPair {
   VoxelId a = 0, b = 0;     // the voxel, and the voxel of the other surface that is nearest to it
-  glm::dvec3 force_N{0.0};  // on the facet; the voxel has the opposite (scene frame)
+  glm::dvec3 force_N{0.0};  // force on the facet; opposite to that on the voxel (scene frame)
   glm::dvec3 side{
       0.0};      // direction from the first object to the second (scene frame, unit); 0: unknown, no contact
-  int axis = 0;  // of the second's lattice, along which distance is measured
-  bool upwards = false;            // the second's outside is up that axis
+  int axis = 0;  // axis of the second's lattice along which distance is measured
+  bool upwards = false;            // the second's outside is in the + direction of that axis
   bool over = false;               // a facet, or an edge nearby, is under the voxel
-  std::array<VoxelId, 3> facet{};  // its corners …
-  std::array<double, 3> share{};   // … and their barycentric coordinates: their shares of the force
+  std::array<VoxelId, 3> facet{};  // corners of the facet
+  std::array<double, 3> share{};   // the voxel's barycentric coordinates: the corners' shares of the force
   glm::dvec3 across{0.0};  // gradient of the overlap by the voxel's position, and of the distance by the
                            // facet's (scene frame)
-  double reach_m = 0.0;    // distance of voxel and facet in contact
-  // Derived from these until the facet is found anew: the gradient in both body frames, the overlap of the
-  // surfaces at rest, and the surface numbers of voxel and corners.
+  double reach_m = 0.0;    // distance of voxel and facet in contact, along the axis
+  // Derived from the members above, and kept until the facet is found anew: the gradient in both body frames,
+  // the overlap of the surfaces at rest, and the surface numbers of voxel and corners.
   glm::dvec3 across_a{0.0}, across_b{0.0};
   double at_rest_m = 0.0;
   std::uint32_t number_a = 0;
@@ -53,15 +53,17 @@ struct PressedPair {
 [[nodiscard]] PressedPair pair_of(const PosedObject& a, VoxelId in_a, const PosedObject& b,
                                   VoxelId in_b) noexcept;
 
-// Finds the facet under the voxel in the current state, starting at `b`. Call before a round of relax_pair().
+// Finds the facet under the voxel in the current state, starting at pair.b. Call before a round of
+// relax_pair().
 void find_facet(const PosedObject& a, const PosedObject& b, PressedPair& pair) noexcept;
 
 // Is the voxel no longer over its facet?
 [[nodiscard]] bool left_facet(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept;
 
-// In a hollow a voxel may touch several facets at a time; each has a pair, all with the same voxel. Does it
-// touch `beside`, a facet that it was over before, besides the one of `pair`? Sets the shares of `beside` in
-// the current state. With one facet only, voxel and tool would be pushed from facet to facet in turns.
+// Does the voxel of `pair` also touch the facet of `beside`, over which it was before? Sets the shares of
+// `beside` in the current state. In a hollow a voxel may touch several facets at a time. Each facet then has
+// a pair with the same voxel. With one facet only, voxel and tool would be pushed from facet to facet in
+// turns.
 [[nodiscard]] bool lies_beside(const PosedObject& a, const PosedObject& b, const PressedPair& pair,
                                PressedPair& beside) noexcept;
 
@@ -81,11 +83,11 @@ void load_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pa
 // One step of block Gauss-Seidel on a pair: its voxels move to the joint minimum of their link energies under
 // the loads of their other pairs, without overlap. Overlap is shared in proportion to compliance. At
 // equilibrium both objects press with equal and opposite force, also if several pairs share a voxel. Voxels
-// that have passed one another press as if they had not. Returns gap_of_pair() afterwards: chains may leave
-// too little room.
+// that have passed one another press as if they had not. Returns gap_of_pair() afterwards. It is negative if
+// chains leave too little room.
 double relax_pair(const PosedObject& a, const PosedObject& b, PressedPair& pair) noexcept;
 
-// Which voxels move apart.
+// Which object's voxels move.
 enum class GiveWay : std::uint8_t { both, first, second };
 // Removes remaining overlap by drag(); call settle_dragged() after all pairs, so that the chains follow. True
 // if there was any.

@@ -14,16 +14,16 @@
 namespace voxel {
 namespace {
 
-// Voxels that is_immovable() searches.
+// Voxels that is_immovable() searches, at most.
 constexpr std::size_t kMaxSearched = 500;
 
-// Dependents of voxels that obstacles or pairs press.
+// Largest number of dependents of voxels that obstacles or pairs press.
 constexpr std::size_t kMaxDependents = 3000;
 // As kAtLimit, at voxels that a body or another soft object presses. Dependents lag a little whenever these
 // voxels or the tool withdraw, and would be lost for a tick. At rest a voxel that is no dependent is balanced
 // and adds nothing.
 constexpr float kAtLimitBesideOthers = 0.02F;
-// u(w) − u(v) of neighbours along d, and its limits, whichever way the link points.
+// Difference u(w) − u(v) of two neighbours along d, and its limits. w may be on either side of v.
 struct LinkState {
   float difference, low, high;
 };
@@ -32,7 +32,7 @@ LinkState link_state(const Lattice& lattice, const LazyArray<float>& u, VoxelId 
   const auto b = lattice.bounds(up ? v : w, d, axis);
   return {u[w] - u[v], up ? b[0] : -b[1], up ? b[1] : -b[0]};
 }
-// `visit(w, d, up)` for the neighbours w of v.
+// Calls `visit(w, d, up)` for the neighbours w of v.
 template <class Visit>
 void for_neighbours(const Lattice& lattice, VoxelId v, const Visit& visit) {
   for (int d = 0; d < 3; ++d) {
@@ -42,9 +42,9 @@ void for_neighbours(const Lattice& lattice, VoxelId v, const Visit& visit) {
     }
   }
 }
-// `visit(w, pushed_up, pushed_down)` for each neighbour w whose link to v is at a limit on `axis`: at the
-// lower limit, which pushes w up, at the upper one, which pushes w down, or at both. Neighbours with known(w)
-// are skipped; in tissue that is at its limits throughout these are five of six.
+// Calls `visit(w, pushed_up, pushed_down)` for each neighbour w whose link to v is at a limit on `axis`. The
+// lower limit pushes w up, the upper limit pushes w down; the link may be at both. Neighbours with known(w)
+// are skipped. These are five of six in tissue that is at its limits throughout.
 template <class Known, class Visit>
 void for_tight_neighbours(const Lattice& lattice, const LazyArray<float>& u, VoxelId v, int axis,
                           const Known& known, const Visit& visit, float share = kAtLimit) {
@@ -66,9 +66,9 @@ bool any_may_be_tight(const Lattice& lattice, const Displacement& state, std::sp
   }
   return false;
 }
-// Adds up loads from the last of `dependents` to number `first`. Each adds its load to its source: carries(i,
-// load) if the source is among the first `first`. drops(i) if the link cannot carry the load in that
-// direction.
+// Adds up loads from the last of `dependents` back to number `first`. A dependent adds its load to its
+// source. If the source is one of the first `first`, carries(source, load) is called for this. If the link
+// cannot carry the load in that direction, drops(i) is called instead.
 template <class Dependents, class Drops, class Carries>
 void add_from_far_end(Dependents& dependents, std::size_t first, const Drops& drops, const Carries& carries) {
   for (std::size_t i = dependents.size(); i-- > first;) {
@@ -96,7 +96,7 @@ void SoftObject::move_followers() noexcept {
     limit_followers_.move(relaxation_, state_, limit_sources_, static_cast<float>(kDirtyMotion));
 }
 
-// Force of its links and of other soft objects on a voxel (N).
+// Force on a voxel by its links and by other soft objects (N).
 glm::dvec3 SoftObject::load_on(VoxelId v) noexcept {
   const glm::dvec3 links = link_force(relaxation_.couplings(), state_, v);
   if (state_.role[v] != Displacement::held) return links;
@@ -116,7 +116,7 @@ void SoftObject::gather(VoxelId v, std::uint32_t touch) noexcept {
 }
 
 // A dependent that pulls a pressed voxel back is felt through it: its load is the multiplier of the chain's
-// limit. Without it the force would saturate as soon as the chain is at its limits.
+// limit. Without this load the force would saturate as soon as the chain is at its limits.
 glm::dvec3 SoftObject::gather_load(glm::dmat3& stiffness) noexcept {
   glm::dvec3 force(0.0);
   gathered_.clear();
@@ -153,7 +153,7 @@ void SoftObject::add_stiffness_of_touches(int axis, const glm::dvec3& way, glm::
   for (const Gathered& c : gathered_) {
     const glm::dvec3 q = touches_[c.touch].normal[axis] * touches_[c.touch].normal;
     const VoxelSprings springs = relaxation_.couplings().springs_of(c.v);
-    double to_others = 0.0;  // voxels that do not move along
+    double to_others = 0.0;  // stiffness of links to voxels that do not move along
     for (int d = 0; d < 3; ++d) {
       for (const bool up : {false, true}) {
         const Spring& spring = (up ? springs.up : springs.down)[static_cast<std::size_t>(d)];
@@ -268,7 +268,7 @@ void SoftObject::contact_loads(std::span<const VoxelId> held, std::size_t presse
   }
   const bool tight = std::any_of(loads.begin(), loads.begin() + static_cast<std::ptrdiff_t>(pressed),
                                  [](const ContactLoad& l) { return l.at_limit; });
-  // An object that sleeps keeps its multipliers: others would wake what rests on it.
+  // An object that sleeps keeps its multipliers: new ones would wake the bodies that rest on it.
   const bool has_multipliers =
       asleep() ? tight && relaxation_.region().at_limits()
                : relaxation_.relax_region(state_, obstacle_view(), held.first(tight ? pressed : 0));
@@ -351,16 +351,16 @@ void SoftObject::reassign_multiplier(int axis) noexcept {
   }
 }
 
-// Marks are reset, not numbered by gathering: a 32-bit number would wrap after four days of contact, and
-// every voxel ever gathered would count as gathered then.
+// Marks are reset. If they held the number of the gathering instead, a 32-bit number would wrap after four
+// days of contact, and every voxel ever gathered would count as gathered.
 void SoftObject::clear_gathered() noexcept {
   for (const Gathered& c : gathered_) gathered_mark_[c.v] = 0;
   gathered_.clear();
 }
 
 void SoftObject::add_stiffness(int axis, glm::dmat3& stiffness) noexcept {
-  // A gathered voxel moves by q = n_a·n per unit of tool motion, n the normal of its touch. A link then
-  // stores ½ k (q_v·δ − q_w·δ)².
+  // A gathered voxel moves by q = n_a·n per unit of tool motion, where n is the normal of its touch. A link
+  // then stores ½ k (q_v·δ − q_w·δ)².
   const auto along = [&](VoxelId v) {
     if (gathered_mark_[v] == 0) return glm::dvec3(0.0);
     const glm::dvec3& n = touches_[gathered_index_[v]].normal;
@@ -369,7 +369,7 @@ void SoftObject::add_stiffness(int axis, glm::dmat3& stiffness) noexcept {
   for (const Gathered& c : gathered_) {
     if (gathered_mark_[c.v] == 0) continue;
     const glm::dvec3 q = along(c.v);
-    // Most voxels depend on the same touch as all their neighbours, and none of their links is stretched.
+    // Most voxels depend on the same touch as all their neighbours. Then none of their links is stretched.
     unsigned stretched = 0;
     for (int n = 0; n < 6; ++n) {
       const VoxelId w = n % 2 != 0 ? lattice_->up(c.v, n / 2) : lattice_->down(c.v, n / 2);

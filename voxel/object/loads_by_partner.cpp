@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A link at its limit passes a load that its displacement does not show. But such links pull their two ends
-// with opposite forces. So over all voxels that they tie together, a cluster, these forces cancel, and the
-// sum of all other loads is what the partners of the cluster carry. Links couple no axes at their limits, so
-// each axis has clusters of its own.
+// A link at its limit passes a load that its displacement does not show. But such a link pulls its two ends
+// with opposite forces. A cluster is all voxels that such links tie together. In the sum over a cluster these
+// forces cancel. The sum of all other loads is the load on the partners of the cluster. Links couple no axes
+// at their limits, so each axis has clusters of its own.
 #include "voxel/object/loads_by_partner.h"
 
 #include <algorithm>
@@ -26,10 +26,10 @@ constexpr PartnerSet set_of(std::uint32_t partner) {
   return PartnerSet{1} << partner;
 }
 
-// Voxels of one axis in clusters, found from the held ones.
+// The clusters of one axis that contain held voxels.
 class Clusters {
  public:
-  static constexpr std::size_t kMost = 400'000;  // voxels that are searched
+  static constexpr std::size_t kMost = 400'000;  // voxels that are searched, at most
 
   Clusters(const SoftObject& object, std::span<const HeldVoxel> held, int axis)
       : object_(object), lattice_(object.lattice()), axis_(axis) {
@@ -39,7 +39,7 @@ class Clusters {
   [[nodiscard]] bool any_ties() const { return ties_; }
   [[nodiscard]] bool complete() const { return voxels_.size() < kMost; }
 
-  // visit(set of partners, load of the cluster (N))
+  // Calls visit(set of partners, load (N)) for each cluster.
   template <class Visit>
   void for_each(const Visit& visit) {
     std::vector<double> load_N(voxels_.size(), 0.0);
@@ -70,7 +70,8 @@ class Clusters {
     while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
     return i;
   }
-  // Ties voxel number i to its neighbours across links at their limits. Anchors are tied to no anchor.
+  // Ties voxel number i to its neighbours across links at their limits. Anchored voxels are not tied to one
+  // another.
   void tie(std::uint32_t i) {
     const VoxelId v = voxels_[i];
     if (!may_be_at_limit(lattice_, object_.state(), v, axis_, kTied)) return;
@@ -111,7 +112,7 @@ struct Group {
   double load_N = 0.0;
 };
 
-// Divides the loads of one axis.
+// Divides the loads of one axis among the partners.
 void divide(std::span<const Group> groups, int axis, double hand_N, std::span<PartnerLoad> out) {
   const PartnerSet hand = set_of(kHandPartner);
   double hand_alone_N = 0.0;
@@ -135,7 +136,8 @@ void divide(std::span<const Group> groups, int axis, double hand_N, std::span<Pa
   }
 }
 
-// Links reach the six neighbours, bricks also those across edges and corners.
+// May other tissue pull this voxel? Links reach the six neighbours. Bricks also reach neighbours across edges
+// and corners.
 bool may_be_pulled(const SoftObject& object, VoxelId v) {
   const Lattice& lattice = object.lattice();
   if (lattice.has_bricks() || lattice.has_plasticity()) return true;

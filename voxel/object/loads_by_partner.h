@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Splits the load on the held voxels of a soft object by partner: by who holds them. For reports, between
-// ticks.
+// Divides the load on the held voxels of a soft object among the partners that hold them. For reports,
+// between ticks.
 #pragma once
 
 #include <cstddef>
@@ -28,18 +28,18 @@ struct PartnerLoad {
   // False: links at their limits tie the partner to another one, or to more voxels than are searched.
   // Displacements do not tell then how the load is divided.
   bool known = true;
-  bool through_limits = false;  // links at their limits may carry a part of it
+  bool through_limits = false;  // links at their limits may carry a part of the load
 };
 
-// Appends the anchored voxels that something else of the object may pull.
+// Appends the anchored voxels that other tissue of the object may pull.
 void list_anchors(const SoftObject& object, std::vector<HeldVoxel>& held);
 
-// The force of each of `partners` partners but the hand on the object, in its present state. It counts
-// springs, bricks and the loads of other soft objects (SoftObject::pair_load), and the loads that links at
-// their limits pass on to `held`. `hand_N` is the force of the hand on the object: it divides the load of
-// voxels that links at their limits tie both to the hand and to one other partner. The entry of the hand
-// stays 0. A voxel may be in `held` once for each of its partners. Allocates; reads the state only. Not for
-// an object on nested patches or with rigid blocks.
+// The force of each of the `partners` partners on the object in its present state. The entry of the hand
+// stays 0. The forces include springs, bricks and the loads of other soft objects (SoftObject::pair_load),
+// and the loads that links at their limits pass on to `held`. `hand_N` is the force of the hand on the
+// object: it serves to divide the load of voxels that links at their limits tie both to the hand and to one
+// other partner. A voxel may be in `held` once for each of its partners. Allocates; reads the state only. Not
+// for an object on nested patches or with rigid blocks.
 [[nodiscard]] std::vector<PartnerLoad> loads_by_partner(const SoftObject& object,
                                                         std::span<const HeldVoxel> held, std::size_t partners,
                                                         const glm::dvec3& hand_N);

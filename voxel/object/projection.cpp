@@ -17,9 +17,9 @@ constexpr int kProjections = 3;
 constexpr double kSlides = 0.1;  // sin² of the angle between tool and obstacle; a voxel between nearly
                                  // parallel surfaces is squeezed and does not slide
 
-// The least force along `way` (m per 1 N; no component against the normal) that brings `wished` to normal · u
-// >= bound, with each axis clamped to its links' interval. If no force does, the one at which no axis moves
-// any further.
+// The least force along the normal (N) that brings the voxel to normal · u >= bound. `wished`: displacement
+// without a force. `way`: motion by 1 N (m); no component is opposite to the normal's. Each axis is clamped
+// to its links' interval. If no force is enough: the force at which no axis moves any further.
 double least_force_N(const VoxelLinks& links, const glm::dvec3& wished, const glm::dvec3& way,
                      const glm::dvec3& normal, double bound) {
   constexpr double kNoBound = std::numeric_limits<double>::infinity();
@@ -49,8 +49,8 @@ double least_force_N(const VoxelLinks& links, const glm::dvec3& wished, const gl
 
 }  // namespace
 
-// The least energy of the springs on the tool's surface, so that sliding on the tool has no friction: a
-// projection in the metric of the springs, with the surface linearised at the last place.
+// Finds the least energy of the springs on the tool's surface, so sliding on the tool has no friction. This
+// is a projection in the metric of the springs, with the surface linearised at the last place.
 glm::dvec3 SoftObject::project_on_tool(const ToolInBody& tool, const glm::dvec3& rest,
                                        const glm::dvec3& wished, const glm::dvec3& compliance,
                                        Gap& g) const noexcept {
@@ -91,7 +91,7 @@ glm::dvec3 SoftObject::project_on_tool_within_limits(const ToolInBody& tool, con
     const Gap g = gap(tool, t.rest + place);
     t.normal = g.normal;
     if (n == 0 && g.distance >= 0.0) break;
-    const glm::dvec3 way = links.compliance * g.normal;  // for 1 N
+    const glm::dvec3 way = links.compliance * g.normal;  // motion by 1 N
     const double force_N =
         least_force_N(links, wished, way, g.normal, glm::dot(g.normal, place) - g.distance);
     place = clamp_to_links(links, wished + force_N * way, now);
@@ -99,7 +99,8 @@ glm::dvec3 SoftObject::project_on_tool_within_limits(const ToolInBody& tool, con
   return clamp_depth_in_tool(tool, t.rest, now, place);
 }
 
-// Where a touched voxel belongs, everything else where it is; `pressed`: by the tool.
+// Displacement of least energy of a touched voxel, with everything else fixed. Sets `pressed` if the tool
+// presses the voxel.
 glm::dvec3 SoftObject::project_voxel(const ToolInBody& tool, const VoxelLinks& links, Touch& t) noexcept {
   const glm::dvec3 rest = t.rest, now = state_.at(t.v);
   glm::dvec3 wanted = links.minimum;
@@ -117,8 +118,8 @@ glm::dvec3 SoftObject::project_voxel(const ToolInBody& tool, const VoxelLinks& l
   }
   if (obstacles_.empty()) {
     const glm::dvec3 place = clamp_to_links(links, wanted, now);
-    // Other soft objects: the pair solver has the last word. Anchors that keep a voxel in the tool: the tool
-    // has to give way, and must not part tissue like a wedge.
+    // Beside other soft objects the pair solver has the last word. If anchors keep a voxel in the tool, the
+    // tool has to give way: it must not part tissue like a wedge.
     const bool let_out = t.pressed && place != wanted && claimed_voxels_.empty() &&
                          !(anchors_pull_ && gap(tool, rest + now).distance < -kGiveWay * voxel_radius());
     return let_out ? project_on_tool_within_limits(tool, links, wished, t) : place;
@@ -128,8 +129,8 @@ glm::dvec3 SoftObject::project_voxel(const ToolInBody& tool, const VoxelLinks& l
   const double depth = static_cast<double>(o.bound) - glm::dot(n, wanted);
   if (depth > 0.0 && n != glm::dvec3(0.0)) {
     wanted += depth * n;
-    // If the obstacle pushes the voxel into the tool, it slides along the obstacle until it is out. Otherwise
-    // the tool would have to give way to tissue that bulges beside bone.
+    // If the obstacle pushes the voxel into the tool, the voxel slides along the obstacle until it is out of
+    // the tool. Otherwise the tool would have to give way to tissue that bulges beside bone.
     for (int k = 0; k < kProjections; ++k) {
       g = gap(tool, rest + wanted);
       const glm::dvec3 slide = g.normal - glm::dot(g.normal, n) * n;
@@ -147,7 +148,7 @@ void SoftObject::relax_touch(const ToolInBody& tool, Touch& t) noexcept {
   if (lattice_->anchored(t.v) || t.block != 0) return;
   const glm::dvec3 before = state_.at(t.v);
   const bool was_pressed = t.pressed;
-  // While the shadow relaxes the object, voxels that the tool does not press are the shadow's.
+  // While the shadow relaxes the object, voxels that the tool does not press belong to the shadow.
   if (relaxation_.shadow_busy() && !t.pressed && clear_of(tool, position(t))) return;
   // A voxel that another soft object presses belongs to its pair. At the equilibrium of its links alone it
   // would lie inside of the other object when the force is measured.
@@ -163,7 +164,7 @@ void SoftObject::relax_touch(const ToolInBody& tool, Touch& t) noexcept {
   state_.set(t.v, place);
   relaxation_.multigrid().log().note(0, t.v / kRow);
   if (t.pressed != was_pressed) unsettled_m_ += glm::distance(before, state_.at(t.v));
-  // A tool that jumped away moves no pressed voxel by follow(): released voxels wake the rest.
+  // If the tool jumped away, follow() moves no pressed voxel. So released voxels wake the background.
   if (was_pressed && !t.pressed &&
       glm::distance(before, state_.at(t.v)) > kDirtyMotion * lattice_->min_spacing_m()) {
     relaxation_.wake();

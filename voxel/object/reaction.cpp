@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The reaction to the tool: its force and its stiffness. Without links at their limits each pressed voxel
-// contributes its load along its normal. The loads of all that such links tie together are summed first.
+// contributes its load along its normal. Where voxels are tied by such links, their loads are summed first.
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -36,7 +36,7 @@ Reaction SoftObject::reaction(const ToolInBody& tool) noexcept {
     clear_gathered();
   }
   // Links at their limits pass load between voxels, along and across their normals. Only the sum over all of
-  // these voxels is well defined: within it the chain's own forces cancel.
+  // these voxels is well defined: in this sum the chain's own forces cancel.
   for (const Touch& t : touches_) {
     if (t.pressed && t.at_limit && t.block == 0) result.force_N += t.load;
   }

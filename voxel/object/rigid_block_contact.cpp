@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The tool on rigid blocks (components without slack). A block is one body of three unknowns. It is pressed
-// if any of its voxels is, and presses back with all that pulls it. Block numbers in Lattice begin with 1,
-// those in RigidBlocks with 0.
+// if any of its voxels is pressed. It presses back with the sum of all loads on it. Block numbers in Lattice
+// begin with 1, those in RigidBlocks with 0.
 #include <algorithm>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
@@ -12,12 +12,13 @@
 namespace voxel {
 namespace {
 
-// The same for links of dependents, which lag a little as the tool withdraws.
+// As kAtLimit, for links of dependents, which lag a little as the tool withdraws.
 constexpr double kAtLimitLagging = 1e-3;
 
 }  // namespace
 
-// `visit(block)`, numbers from 1 on, for each block with a touched voxel, in the order of the touches.
+// Calls `visit(block)` for each block with a touched voxel, in the order of the touches. Numbers begin with
+// 1.
 template <class Visit>
 void SoftObject::for_touched_blocks(const Visit& visit) noexcept {
   for (const Touch& t : touches_) {
@@ -30,7 +31,8 @@ void SoftObject::for_touched_blocks(const Visit& visit) noexcept {
   }
 }
 
-// Bounds of the tool on a block, linearised at each of its touched voxels that is nearer than `within_m`.
+// Sets the bounds of the tool on a block, linearised at each of its touched voxels that is no further away
+// than `within_m`.
 void SoftObject::bound_block(const ToolInBody& tool, std::uint16_t block, double within_m) noexcept {
   block_bounds_.clear();
   bound_touch_.clear();
@@ -43,7 +45,7 @@ void SoftObject::bound_block(const ToolInBody& tool, std::uint16_t block, double
   }
 }
 
-// The shortest way out of the tool. One voxel of the block is the source of the chain's wave.
+// Moves blocks out of the tool by the shortest way. One voxel of a block is the source of the chain's wave.
 void SoftObject::push_blocks_out(const ToolInBody& tool) noexcept {
   for_touched_blocks([&](std::uint16_t block) {
     bound_block(tool, block, voxel_radius());
@@ -81,7 +83,8 @@ void SoftObject::relax_blocks(const ToolInBody& tool) noexcept {
   Multigrid& grid = relaxation_.multigrid();
   for_touched_blocks([&](std::uint16_t block) {
     const std::size_t p = block - 1U;
-    // With its dependents: through links at their limits these press it on the tool, too.
+    // The force includes that of the block's dependents: through links at their limits they press the block
+    // on the tool, too.
     const Multigrid::AdmissibleInterval room = grid.interval_of_block(p, state_);
     const glm::dvec3 force = grid.block_force(p, state_) + dependents_of_block(p, room),
                      stiffness = grid.blocks().on(0, p).stiffness;
@@ -140,7 +143,7 @@ void SoftObject::gather_load_with_blocks(int axis) noexcept {
   const Multigrid& grid = relaxation_.multigrid();
   const auto& u = state_.u[static_cast<std::size_t>(axis)];
   const auto tight = static_cast<float>(kAtLimitLagging * lattice_->min_spacing_m());
-  // Its first voxel stands for the block.
+  // The first voxel of a block stands for the block.
   const auto whole = [&](VoxelId v) {
     const std::uint16_t block = lattice_->block(v);
     return block == 0 ? v : grid.blocks().first(block - 1U);
@@ -181,8 +184,8 @@ void SoftObject::gather_load_with_blocks(int axis) noexcept {
       look_at(head, v, up ? lattice_->up(v, n / 2) : lattice_->down(v, n / 2), n / 2, up);
     }
   }
-  // A voxel that pulls away from its source may rest on another gathered one; it counts then, too. For the
-  // sum it does not matter through which link.
+  // A voxel that pulls away from its source may rest on another gathered one; then it counts, too. The sum
+  // does not depend on the link through which its load passes.
   const auto rests = [&](std::size_t i) {
     const VoxelId v = gathered_[i].v, by = gathered_[dependents_[i].from].v;
     for (int n = 0; n < 6 && lattice_->block(v) == 0; ++n) {

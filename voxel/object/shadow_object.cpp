@@ -11,14 +11,15 @@
 namespace voxel {
 namespace {
 
-// Rows that a tick applies at once. In a wider contact steps are felt.
+// Rows near the contact that a tick applies at once, at most. If a contact has more rows, steps are felt.
 constexpr std::size_t kMaxAtOnce = 1000;
-// A whole cycle reduces the error at the contact only a little. While the tool moves by more than kMoved
-// spacings from one result to the next, and for kUnsettled results after, this many contact cycles follow it.
-// Not at rest: coarse cells outside of their boxes learn of the whole cycle's last sweeps only in the next
-// cycle, and a voxel that barely touches the tool would be released and pressed in turns.
+// A whole cycle reduces the error at the contact only a little. So kContactCycles contact cycles follow it,
+// while the tool moves by more than kMoved spacings from one result to the next, and for kUnsettled results
+// after that. They do not follow it at rest: coarse cells outside of the contact cycles' boxes learn of the
+// whole cycle's last sweeps only in the next cycle. A voxel that barely touches the tool would then be
+// released and pressed in turns.
 constexpr int kContactCycles = 4, kUnsettled = 4;
-// … and cycles around a pressed rigid block.
+// Cycles around a pressed rigid block that follow the whole cycle, too.
 constexpr int kBlockCycles = 4;
 constexpr double kMoved = 0.1;
 // Far from the contact a change is passed on only if it is kFarther times least_m_ (1e-4 of the spacing);
@@ -27,14 +28,14 @@ constexpr double kMoved = 0.1;
 constexpr float kFarther = 20.0F;
 constexpr std::size_t kNearRows = 3;
 // If tissue moved by more than kJumped spacings since the last submission, the next kCoarseFirstResults
-// results are of contact cycles on large boxes. In the first, coarse levels come to rest before the finer
-// ones and are prolonged beyond the boxes, too; tissue left behind there would hold back the contact. A
-// pressed rigid block has one such result over the whole object, because no box is large enough. Loads of
-// bricks are not renewed meanwhile: on tissue that moves far they mean little.
+// results are of contact cycles on large boxes. In the first of them, coarse levels come to rest before the
+// finer ones. They are also prolonged beyond the boxes: tissue left behind there would hold back the contact.
+// A pressed rigid block has one such result over the whole object, because no box is large enough. Loads of
+// bricks are not renewed meanwhile: they are of little use on tissue that moves far.
 constexpr float kJumped = 5.0F;
 constexpr int kCoarseFirstResults = 3;
 constexpr std::array<int, kCoarseFirstResults> kLargePatchCycles{3, 4, 2};
-// Float8 that a whole cycle smooths and prolongs per row.
+// Number of Float8 per row that a whole cycle smooths and prolongs.
 constexpr std::size_t kGroupsOfRow = 12;
 // Arrays of a row in a result: motion, and loads of bricks if there are any.
 std::size_t arrays_of(const Lattice& lattice) {
@@ -94,8 +95,8 @@ void ShadowObject::submit(SoftObject& object) noexcept {
     float* to = submitted_.add(row);
     for (std::size_t axis = 0; axis < 3; ++axis)
       std::copy_n(object.state_.u[axis].data() + at(row), kRow, to + axis * kRow);
-    // As the row will be when the result is applied. Otherwise it would differ from its neighbours by motion
-    // that the shadow knows already, and would make that motion twice.
+    // The row is submitted as it will be when the result is applied. Otherwise it would differ from its
+    // neighbours by motion that the shadow knows already, and would make that motion twice.
     const std::size_t n = delta.find(row);
     if (n == delta.count() || (n < rows_applied_ && !retry_.waits(n))) continue;
     for (std::size_t i = 0; i < std::size_t{3} * kRow; ++i) to[i] += delta.values(n)[i];
@@ -164,7 +165,7 @@ void ShadowObject::read_submission() noexcept {
   }
   if (submitted_.count() > 0 || !submitted_obstacles_.empty()) relaxation_.wake();
   to.log().clear();
-  // At least one whole cycle between two jumps, so that the rest of the object has its turn.
+  // At least one whole cycle runs between two jumps, so that the rest of the object has its turn.
   if (moved_m > kJumped * static_cast<float>(lattice_.min_spacing_m()) && coarse_first_left_ == 0 &&
       !was_coarse_first_) {
     coarse_first_left_ = kCoarseFirstResults;
@@ -196,8 +197,8 @@ void ShadowObject::relax_coarse_first(const ObstacleView& obstacles) noexcept {
       kLargePatchCycles[static_cast<std::size_t>(kCoarseFirstResults - 1 - coarse_first_left_)];
   for (int n = 0; n < cycles; ++n)
     groups += relaxation_.relax_large_patch(state_, obstacles, held_, pressed, false);
-  // Not after the last result, because a whole cycle follows that ends with it; nor after the first, when the
-  // tool goes on to press other voxels.
+  // relax_region() does not run in the last such result: the whole cycle that follows ends with it. Nor does
+  // it run in the first one, when the tool goes on to press other voxels.
   if (!first && coarse_first_left_ > 0) relaxation_.relax_region(state_, obstacles);
   work_ = groups / kGroupsOfRow;
 }
@@ -287,7 +288,7 @@ void ShadowObject::pack_changes() noexcept {
   if (at_rest_) pack_deferred();
 }
 
-// Takes the motion of blocks out of the rows: it is no change of theirs.
+// Packs the motion of rigid blocks, and removes it from the changes of their rows.
 void ShadowObject::pack_block_moves() noexcept {
   BlockMoves& ways = block_moves_[1 - applying_];
   for (std::size_t p = 0; p < ways.size(); ++p) {
@@ -302,7 +303,7 @@ void ShadowObject::pack_block_moves() noexcept {
       ways[p] = glm::dvec3(0.0);
       continue;
     }
-    // Less than move_block() would move: nothing.
+    // move_block() does not move a block by so little.
     if (std::max({std::fabs(way.x), std::fabs(way.y), std::fabs(way.z)}) <= multigrid().restricted_m())
       way = glm::vec3(0.0F);
     ways[p] = glm::dvec3(way);
@@ -318,7 +319,7 @@ void ShadowObject::pack_block_moves() noexcept {
   }
 }
 
-// A block moves at once, wherever the result's other rows are: it has one displacement.
+// A block has one displacement, so all of it moves at once, whichever of its rows are near the contact.
 void ShadowObject::apply_block_moves(SoftObject& object) noexcept {
   const BlockMoves& ways = block_moves_[applying_];
   Multigrid& to = object.relaxation_.multigrid();

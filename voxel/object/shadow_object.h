@@ -11,11 +11,11 @@
 //               in parts, each of which leaves the residual of the rest frozen;
 // apply_far()   adds the other rows, some a tick, while the thread relaxes the next submission.
 //
-// Without active limits displacements are linear, so a result can be added to what the tick did meanwhile.
-// Each residual must then be owned by exactly one of the two solvers. What was submitted belongs to the
-// thread: around the contact it counts as frozen from then on (Relaxation::assign_residual), and the tick
-// relaxes only what it moves itself. If the tick leaves a fraction X of its residual and a cycle leaves Y of
-// the other, the total left is X + Y.
+// Without active limits displacements are linear, so a result can be added to the motion that the tick made
+// meanwhile. Each residual must then be owned by exactly one of the two solvers. What was submitted belongs
+// to the thread: around the contact it counts as frozen from then on (Relaxation::assign_residual), and the
+// tick relaxes only what it moves itself. If the tick leaves a fraction X of its residual and a cycle leaves
+// Y of the other, the total left is X + Y.
 //
 // Coarse cells are not exchanged: each side has its own. Changes too small to matter are deferred until all
 // is at rest.
@@ -25,7 +25,7 @@
 // boxes around the contact (coarse levels first). These move tissue by spacings, so rows that could not
 // follow are queued and tried again (RetryQueue).
 //
-// Not for tissue with plasticity, whose rest lengths change too.
+// This is not for tissue with plasticity, whose rest lengths change too.
 #pragma once
 
 #include <array>
@@ -59,13 +59,13 @@ class ShadowObject {
   [[nodiscard]] bool in_parts() const { return parts_left_ > 0; }
   // Adds the next part, or all that are left (`last`).
   void apply_part(SoftObject& object, bool last) noexcept;
-  // Adds the next `rows` rows of the rest.
+  // Adds the next `rows` rows that are not near the contact.
   void apply_far(SoftObject& object, std::size_t rows) noexcept;
   [[nodiscard]] bool all_applied() const {
     return parts_left_ == 0 && rows_applied_ == results_[applying_].count() && retry_.count() == 0;
   }
 
-  // ---- between the two, the other thread ----
+  // ---- the other thread, between submit() and apply_near() ----
   void relax() noexcept;
   // The result of relax() until it is applied. When a session is replayed, replay_result() installs a
   // recorded result; relax() must not be called any more then.
@@ -91,11 +91,11 @@ class ShadowObject {
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
-  static constexpr std::size_t kAhead = 4;  // rows prefetched
+  static constexpr std::size_t kAhead = 4;  // rows to prefetch ahead
   static std::size_t at(RowId row) { return static_cast<std::size_t>(row) * kRow; }
 
-  // Rows on their way from one thread to the other, contiguous in memory: fetching what another core wrote
-  // costs more than adding it.
+  // Rows on their way from one thread to the other. They are contiguous in memory, because fetching data that
+  // another core wrote costs more than adding them.
   class RowDelta {
    public:
     // `arrays` arrays of each row, [array][lane].
@@ -111,7 +111,7 @@ class ShadowObject {
     }
     void drop_last() noexcept { after_[rows_[--count_]] = 0; }
     [[nodiscard]] std::size_t count() const { return count_; }
-    // Index of a row; count() if it is not in here.
+    // Index of a row; count() if the row is not in this RowDelta.
     [[nodiscard]] std::size_t find(RowId row) const { return after_[row] == 0 ? count_ : after_[row] - 1; }
     [[nodiscard]] RowId row(std::size_t n) const { return rows_[n]; }
     [[nodiscard]] const float* values(std::size_t n) const { return values_.data() + floats_ * n; }
@@ -130,7 +130,7 @@ class ShadowObject {
     std::size_t floats_;
     LazyArray<RowId> rows_;
     LazyArray<float> values_;
-    LazyArray<std::uint32_t> after_;  // [row] 1 + index; 0: it is not in here
+    LazyArray<std::uint32_t> after_;  // [row] 1 + index; 0: not in this RowDelta
     std::size_t count_ = 0;
   };
   // Entries of a RowDelta that were only partly added. They are tried again in turns, each turn in reverse
@@ -139,14 +139,14 @@ class ShadowObject {
    public:
     explicit RetryQueue(std::size_t rows)
         : lists_{LazyArray<std::uint32_t>(rows), LazyArray<std::uint32_t>(rows)}, waits_(rows) {}
-    [[nodiscard]] std::size_t count() const { return count_ + next_; }  // that have a turn left
+    [[nodiscard]] std::size_t count() const { return count_ + next_; }  // entries with a turn left
     [[nodiscard]] bool waits(std::size_t n) const { return waits_[n] != 0; }
     void put(std::size_t n) noexcept {
       waits_[n] = 1;
       lists_[of_][count_++] = static_cast<std::uint32_t>(n);
     }
-    // Tries one more entry. `add(n)` returns true if something is left for the next turn; there are
-    // `most_turns`.
+    // Tries one more entry. `add(n)` returns true if something is left for the next turn. There are at most
+    // `most_turns` turns.
     template <class Add>
     void retry(int most_turns, const Add& add) noexcept {
       const std::uint32_t n = lists_[of_][--count_];
@@ -223,13 +223,13 @@ class ShadowObject {
   std::array<LazyArray<float>, 3> before_;  // [axis][voxel] this state as the object knows it
   std::size_t work_ = 0;
   int coarse_first_left_ = 0;      // results still to come with coarse levels first
-  bool was_coarse_first_ = false;  // the last result was one
+  bool was_coarse_first_ = false;  // the last result had coarse levels first
   int large_motion_left_ = 0;      // results still to come that move tissue far
-  bool large_motion_ = false;      // the last result does
+  bool large_motion_ = false;      // the last result moves tissue far
   bool at_limits_ = false;         // active limits held pressed voxels in the last cycle
   bool block_pressed_ = false;     // the tool presses a rigid block
   float least_m_ = 0.0F;           // smaller changes are deferred
-  // Rows whose change is deferred until all is at rest; some that were passed on since are among them.
+  // Rows whose change is deferred until all is at rest. Some of them may have been passed on since.
   LazyArray<RowId> deferred_rows_;
   std::size_t deferred_count_ = 0;
   LazyArray<std::uint8_t> deferred_;  // [row] 1: in deferred_rows_
@@ -238,7 +238,7 @@ class ShadowObject {
   LazyArray<std::uint8_t> distance_;                   // [n] distance of the nth row in the log
   LazyArray<RowId> by_distance_;                       // rows of the log, nearest to the contact first
 
-  // ---- what goes over ----
+  // ---- data of the exchange ----
   RowDelta submitted_;
   std::array<RowDelta, 2> results_;        // the one being applied, and the next: motion, and loads of bricks
   std::array<BlockMoves, 2> block_moves_;  // [as results_]
@@ -246,18 +246,17 @@ class ShadowObject {
   std::vector<SubmittedObstacle> submitted_obstacles_;
   std::vector<VoxelId> submitted_held_;
   std::vector<SubmittedContact> submitted_contacts_;  // contacts that slide on the tool
-  std::size_t submitted_pressed_ =
-      0;                              // number of voxels, the first of submitted_held_, that the tool presses
-  glm::dvec3 submitted_tool_m_{0.0};  // centre of the tool at the submission
-  int unsettled_ = 0;                 // results still to come that relax the contact once more
-  bool settle_contact_ = false;       // this one does
-  Relaxation::NearRows near_;         // rows of the contact
-  std::size_t applying_ = 0, rows_applied_ = 0;  // index into results_, and rows applied of it
-  RetryQueue retry_;                             // entries of it to try again
+  std::size_t submitted_pressed_ = 0;  // the tool presses the first so many voxels of submitted_held_
+  glm::dvec3 submitted_tool_m_{0.0};   // centre of the tool at the submission
+  int unsettled_ = 0;                  // results still to come that relax the contact once more
+  bool settle_contact_ = false;        // the present result does so
+  Relaxation::NearRows near_;          // rows of the contact
+  std::size_t applying_ = 0, rows_applied_ = 0;  // index into results_; rows applied of that result
+  RetryQueue retry_;                             // entries of that result to try again
   bool retries_rows_ = false;                    // rows that could not follow are tried again
   bool together_ = false;                        // rows near the contact are applied together
   std::size_t near_count_ = 0;                   // rows near the contact in the other result
-  int parts_left_ = 0;                           // parts of these still to be applied
+  int parts_left_ = 0;                           // parts of the rows near the contact still to be applied
   bool at_rest_ = true;
   double residual_N_ = 0.0;
   std::uint64_t times_relaxed_ = 0;

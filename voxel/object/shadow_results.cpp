@@ -13,10 +13,11 @@ namespace voxel {
 
 namespace {
 
-// Of the spacing: if more than this is left of a row's motion, the row is tried again. Every contact at its
-// limits leaves less in each result.
+// Of the spacing: if more than this is left of a row's motion, the row is tried again. Smaller remainders
+// occur in every result while a contact is at its limits.
 constexpr float kFollows = 0.01F;
-// Turns in all, and turns in the tick that applies the rows near the contact.
+// Largest number of turns in which rows are tried again: in all, and in the tick that applies the rows near
+// the contact.
 constexpr int kTurns = 16, kTurnsAtOnce = 8;
 constexpr std::size_t kRowBytes = kRow * sizeof(float);
 
@@ -33,7 +34,7 @@ bool ShadowObject::pack_row(RowId row, float least_m) noexcept {
   }
   const bool loads_changed = multigrid().bricks().take_changed(row);
   if (most <= least_m && !loads_changed) return false;
-  // The same sum as the tick's, to the last bit.
+  // This sum equals the tick's to the last bit.
   for (std::size_t axis = 0; axis < 3; ++axis) {
     float* now = state_.u[axis].data() + at(row);
     float* was = before_[axis].data() + at(row);
@@ -52,8 +53,8 @@ void ShadowObject::fetch_change_ahead(RowId row) const noexcept {
   }
 }
 
-// Prefetches what apply_row() reads: lines that another core wrote, and rows that no cache kept since the
-// last result. Rows that are applied together have most of their neighbours in the cache.
+// Prefetches the data that apply_row() reads: lines that another core wrote, and rows that have left the
+// caches since the last result. Rows that are applied together have most of their neighbours in the cache.
 void ShadowObject::fetch_ahead(SoftObject& object, std::size_t n, bool together) const noexcept {
   if (n >= results_[applying_].count()) return;
   const RowId row = results_[applying_].row(n);
@@ -72,7 +73,7 @@ void ShadowObject::fetch_ahead(SoftObject& object, std::size_t n, bool together)
   object.relaxation_.couplings().fetch_ahead(row);
 }
 
-// Reads the motion of the nth row of the result, or a part of it; that part is subtracted from what is left.
+// Reads `part` of the motion of the nth row of the result. If that is not all, the result keeps the rest.
 // Loads of bricks are copied.
 void ShadowObject::take_delta(SoftObject& object, std::size_t n, float part, RowVector& ways) noexcept {
   const RowId row = results_[applying_].row(n);
@@ -90,7 +91,8 @@ void ShadowObject::take_delta(SoftObject& object, std::size_t n, float part, Row
   }
 }
 
-// True if free voxels did not follow; what is left of their motion is in the result then.
+// Applies `part` of the motion of the nth row. True if free voxels did not follow; the result then has the
+// rest of their motion.
 bool ShadowObject::apply_row(SoftObject& object, std::size_t n, float part) noexcept {
   Multigrid& to = object.relaxation_.multigrid();
   const RowId row = results_[applying_].row(n);
@@ -103,7 +105,7 @@ bool ShadowObject::apply_row(SoftObject& object, std::size_t n, float part) noex
   }
   to.add_motion(row, ways, object.state_, object.obstacle_view());
   object.note_moved(row);
-  unsigned others = 0;  // all are counted: a search for the first took longer
+  unsigned others = 0;  // all differences are counted: a search for the first took longer
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const float* there = object.state_.u[axis].data() + at(row);
     for (std::size_t i = 0; i < kRow; ++i) others += wanted[axis][i] != there[i] ? 1U : 0U;
@@ -124,9 +126,9 @@ bool ShadowObject::apply_row(SoftObject& object, std::size_t n, float part) noex
   return most > kFollows * static_cast<float>(lattice_.min_spacing_m());
 }
 
-// Applies rows first … last − 1 together: each goes as far as its links to the others' new places allow. Row
-// by row, voxels that active limits tie together would not move. Without active limits rows do not obstruct
-// one another, and one by one takes half the time.
+// Applies rows first … last − 1 together: each goes as far as its links to the others' new places allow. If
+// rows were applied one by one, voxels that active limits tie together would not move. Without active limits
+// rows do not obstruct one another, and applying them one by one takes half the time.
 void ShadowObject::apply_together(SoftObject& object, std::size_t first, std::size_t last,
                                   float part) noexcept {
   Multigrid& to = object.relaxation_.multigrid();
@@ -141,7 +143,7 @@ void ShadowObject::apply_together(SoftObject& object, std::size_t first, std::si
   to.move_batch(object.state_);
   for (std::size_t n = first; n < last; ++n) {
     const RowId row = results_[applying_].row(n);
-    // A part is rounded differently from what the shadow knows.
+    // A sum of parts is rounded differently from the shadow's values.
     if (!whole) to.log().note(0, row);
     bool gone = false;
     if (!to.batched(row, object.state_, left, gone)) {
@@ -173,12 +175,12 @@ void ShadowObject::apply_near(SoftObject& object, int parts) noexcept {
   together_ = large_motion_ || at_limits_;
   rows_applied_ = near_count_;
   parts_left_ = parts;
-  // Loads of bricks are not split, so their motion is not.
+  // Loads of bricks are not split into parts, so the motion that belongs to them is not either.
   apply_part(object, parts <= 1 || retries_rows_ || lattice_.has_bricks());
 }
 
-// While parts are left, the same fraction of the submitted residual stays frozen. Both ends of the motion are
-// at rest, and so is all between them as far as forces are linear.
+// While parts are left, the same fraction of the submitted residual stays frozen. The tissue is at rest at
+// both ends of the motion. So it is at rest in between, as far as forces are linear.
 void ShadowObject::apply_part(SoftObject& object, bool last) noexcept {
   const int left = std::max(parts_left_, 1);
   const bool whole = last || left == 1;
@@ -194,7 +196,7 @@ void ShadowObject::apply_part(SoftObject& object, bool last) noexcept {
   } else {
     for (std::size_t n = 0; n < near_count_; ++n) {
       fetch_ahead(object, n + kAhead, false);
-      // A part is rounded differently from what the shadow knows.
+      // A sum of parts is rounded differently from the shadow's values.
       if (left > 1) object.relaxation_.multigrid().log().note(0, results_[applying_].row(n));
       if (apply_row(object, n, part) && whole) retry_.put(n);
     }

@@ -15,8 +15,8 @@
 namespace voxel {
 namespace {
 
-// Counted work of one row that a wave of the chain visits. A tick has up to eight waves; they count as work
-// like its cycles.
+// Counted work of one row that a wave of the chain visits. A tick has up to eight waves. They count as work,
+// as contact cycles do.
 constexpr std::size_t kWorkOfVisit = 4;
 
 }  // namespace
@@ -96,8 +96,9 @@ std::unique_ptr<SoftObject> SoftObject::copy() const {
 }
 
 double SoftObject::reach(double tool_radius) const {
-  // Half a cell's diagonal would do at rest, but pressed voxels part. From 1.5 spacings on no voxel loses the
-  // tool (tested with tools of a hundredth of a spacing, three spacings deep).
+  // At rest half a cell's diagonal would be enough, but pressed voxels move apart. With 1.5 spacings or more
+  // the tool does not slip between voxels (tested with tools of a hundredth of a spacing, three spacings
+  // deep).
   return std::max(tool_radius + voxel_radius(), 1.5 * lattice_->max_spacing_m());
 }
 
@@ -111,7 +112,7 @@ SoftObject::Gap SoftObject::gap(const ToolInBody& tool, const glm::dvec3& positi
     return {under ? along - voxel_radius() : std::numeric_limits<double>::max(), tool.axis};
   }
   const double distance = glm::length(d);
-  // The tool's centre is exactly on the voxel: any direction serves; the axis of the punch is one.
+  // If the tool's centre is exactly on the voxel, any direction serves, for example `axis`.
   const glm::dvec3 normal = distance > 0.0 ? d / distance : tool.axis;
   return {distance - reach(tool.radius), normal};
 }

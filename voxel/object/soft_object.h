@@ -2,9 +2,9 @@
 // A soft object that a tool can press: lattice, displacement, chain, relaxation and the contact between them.
 // All points and vectors are in the volume frame ("body") of the object, in metres and newtons.
 //
-// Two words of the contact: a surface voxel near the tool is *touched* (a contact candidate, one Touch each);
-// a touched voxel that carries load towards the tool is *pressed* (an active contact). A *held* voxel does
-// not move while others relax. *Dependents* of a voxel are tied to it by links at active limits.
+// Terms: a surface voxel near the tool is *touched* (a contact candidate, one Touch each). A touched voxel
+// that carries load towards the tool is *pressed* (an active contact). A *held* voxel does not move while
+// others relax. *Dependents* of a voxel are tied to it by links at active limits.
 //
 // One haptic tick calls (see hybrid/tick/tick.cpp): touch() takes the surface voxels near the tool →
 // push_out() moves voxels out of the tool, and the chain follows → relax_near() brings the neighbourhood of
@@ -48,25 +48,25 @@ struct Reaction {
   std::uint32_t pressed = 0;  // voxels that carry load
 };
 
-// Load of one voxel that something else than the tool presses: a rigid surface, or another soft object.
+// Load on a voxel that a rigid surface or another soft object presses.
 struct ContactLoad {
   glm::dvec3 force_N{0.0};            // of its links and of its dependents
   glm::dvec3 stiffness_N_per_m{0.0};  // per axis, of the voxel and its dependents, all others fixed
-  bool at_limit = false;              // a link at its limit carries load between it and another voxel
-  bool has_multipliers = false;  // the multipliers of limits and obstacles around it are known (AdmmRegion) …
-  double pressed_N = 0.0;        // … and its obstacle presses it with this force along the normal
+  bool at_limit = false;              // a link at its limit carries load between the voxel and another one
+  bool has_multipliers = false;  // known: multipliers of limits and obstacles around the voxel (AdmmRegion)
+  double pressed_N = 0.0;        // force of its obstacle along the normal; 0 unless has_multipliers
 };
 
 // The tool's centre q must satisfy normal · q >= offset (body frame).
 struct ToolBound {
   glm::dvec3 normal{0.0};
   double offset = 0.0;
-  VoxelId voxel = 0;  // that bounds it
+  VoxelId voxel = 0;  // the voxel that bounds the tool
 };
 
 class SoftObject {
  public:
-  // Surface voxels near the tool; further ones are left to the next tick.
+  // Largest number of touched voxels. Other voxels near the tool are left to the next tick.
   static constexpr std::size_t kMaxTouched = 4096;
 
   explicit SoftObject(std::shared_ptr<const Lattice> lattice);
@@ -89,29 +89,29 @@ class SoftObject {
   [[nodiscard]] glm::dvec3 position(VoxelId v) const {
     return on_grid_ ? position_on_grid(v) : lattice_->rest(v) + state_.at(v);
   }
-  // A voxel is a ball of half its smallest spacing: the tool's surface stays this far from its centre.
+  // A voxel acts as a ball of this radius: the tool's surface stays this far from the voxel's centre.
   [[nodiscard]] double voxel_radius() const { return 0.5 * lattice_->min_spacing_m(); }
   // Distance from a ball tool's centre to the centre of a voxel in contact. A tool smaller than the gaps
   // between voxels is felt as one that just cannot slip between them.
   [[nodiscard]] double reach(double tool_radius) const;
 
   // A large object may keep its contact on nested patches (composite/grid.h). Then the cost of a tick does
-  // not depend on depth and size, state() stays at rest as it was before the contact, and displacement()
-  // returns what is felt. Only for objects that touch nothing but the tool and rigid surfaces that stand
-  // still (their obstacles come later). Returns the reason why the object is unsuitable, and changes nothing
-  // then; empty if patches are in use. Allocates.
+  // not depend on depth and size. state() stays at rest, as before the contact; displacement() returns the
+  // present displacements. This is only for objects that touch nothing but the tool and rigid surfaces that
+  // stand still. Call it before obstacles are set. If the object is unsuitable, returns the reason and
+  // changes nothing. Returns an empty string if patches are in use. Allocates.
   static constexpr std::size_t kLeastOnGrid = 10'000;  // voxels
   std::string use_composite_grid(const ToolInBody& tool);
   [[nodiscard]] bool uses_patches() const { return grid_ != nullptr; }
-  // Of use_composite_grid(): greatest relative difference from patches twice as wide, in trial contacts.
+  // Largest relative force error in trials of use_composite_grid(), against patches twice as wide.
   [[nodiscard]] double patch_error() const { return patch_error_; }
-  // Null unless something is pressed.
+  // The patches; null unless something is pressed.
   [[nodiscard]] const CompositeGrid* patches_in_use() const { return on_grid_ ? grid_.get() : nullptr; }
-  // Once a tick while nothing is pressed: prepares a part of the patches for a contact with this tool.
+  // Call it once a tick while nothing is pressed. It prepares a part of the patches for this tool.
   void come_near_on_grid(const ToolInBody& tool) noexcept;
   // Surface voxels in the finest patch. During a contact every touched voxel is among them.
   [[nodiscard]] std::span<const VoxelId> near_on_grid() const { return near_on_grid_; }
-  // Patches many times as wide, for references. Allocates.
+  // Replaces the patches by wider ones (CompositeGrid::kReferenceHalfWidth), for references. Allocates.
   void widen_patches();
 
   // ---- the tick; none of these allocates, locks or throws ----
@@ -123,7 +123,7 @@ class SoftObject {
   // Has a cycle around a large contact patch, or part of such a cycle, run since touch()?
   [[nodiscard]] bool large_patch_cycle() const { return split_cycle_; }
   // Share (0 to 1) of the counted work that a tick may spend on its contact under asynchronous relaxation;
-  // less than 1 for a slow machine. Later ticks do what remains.
+  // less than 1 for a slow machine. Later ticks do the remaining work.
   void set_work_share(double share) noexcept {
     work_share_ = share;
     relaxation_.set_small_patch_share(share);
@@ -140,51 +140,51 @@ class SoftObject {
   // that work is due to be worth a tick.
   bool prepare_exchange() noexcept;
   [[nodiscard]] Reaction reaction(const ToolInBody& tool) noexcept;
-  // The tool moves by `delta` (unit: meter): each pressed voxel moves by the component of it along its own
-  // normal.
+  // The tool moves by `delta` (unit: meter): each pressed voxel moves by the component of `delta` along the
+  // voxel's normal.
   void follow(const glm::dvec3& delta) noexcept;
-  // At the start of a tick: records how deep each touched voxel is in the tool.
+  // Call it at the start of a tick. It records how deep each touched voxel is in the tool.
   void record_depths(const ToolInBody& tool) noexcept;
-  // Half-spaces that the tool may not enter, because the chain kept voxels from leaving it. A voxel that does
-  // not move may stop the tool but must not push it: the tool may stay as deep as it was when the tick began.
-  // A voxel that was beside a punch then bounds the punch sideways. Returns the number of bounds written.
+  // Writes bounds of the tool where the chain kept voxels in the tool. A voxel that does not move may stop
+  // the tool but must not push it: the tool may stay as deep as it was when the tick began. A voxel that was
+  // beside a punch when the tick began bounds the punch sideways. Returns the number of bounds written.
   std::size_t give_way(const ToolInBody& tool, std::span<ToolBound> out) const noexcept;
-  // Whether links at their limits, in a row, tie a voxel to something that does not move along `direction`:
-  // an anchor, or a voxel on a rigid surface. Searches along the largest component of `direction`, through a
-  // few hundred voxels at most.
+  // Does a chain of links at their limits tie the voxel to something that does not move along `direction`, an
+  // anchor or a voxel on a rigid surface? Searches along the largest component of `direction`, through a few
+  // hundred voxels at most.
   [[nodiscard]] bool is_immovable(VoxelId v, const glm::dvec3& direction) noexcept;
   std::uint64_t relax_background(std::uint64_t budget) noexcept;
   // One cycle over the whole object, whatever it costs; nothing if the object is at rest.
   void relax_cycle() noexcept;
 
-  // Before the first set_obstacle(); allocates.
+  // Call it before the first set_obstacle(). Allocates.
   void reserve_obstacles();
-  // Call if obstacles will move, before a ShadowObject is made: allocates all memory for that.
+  // Call it if obstacles will move, before a ShadowObject is made. Allocates all memory for that.
   void prepare_beside_bodies();
   // Sets the rigid surface near surface voxel number s (index into lattice().surface()). A zero normal
   // removes it.
   void set_obstacle(std::size_t surface_number, const Obstacle& obstacle) noexcept;
   [[nodiscard]] std::span<const Obstacle> obstacles() const { return obstacles_; }
-  // After obstacles moved: brings these surface voxels out of theirs in one wave, and the chain follows.
+  // Call it after obstacles moved: moves these surface voxels out of them in one wave; the chain follows.
   void leave_obstacles(std::span<const std::uint32_t> surface_numbers) noexcept;
-  // Loads of voxels that obstacles press; `held` lists each once, in the order of `loads`. The first
-  // `pressed` of them (kMaxTouched at most) are pressed; the others are near, and dependents of the first do
-  // not count as theirs.
+  // Finds the loads of voxels at obstacles. `held` lists each voxel once, in the order of `loads`. Obstacles
+  // press the first `pressed` voxels (kMaxTouched at most); the others are only near. If one of the others
+  // depends on a pressed voxel on an axis, its load counts for that voxel and is 0 here.
   void contact_loads(std::span<const VoxelId> held, std::size_t pressed,
                      std::span<ContactLoad> loads) noexcept;
   // Under asynchronous relaxation: if links at voxels pressed by fixed obstacles are at their limits, relaxes
   // these voxels and their neighbourhood together (AdmmRegion). Results of the shadow are applied row by row
-  // and cannot move them.
+  // and cannot move such voxels.
   void relax_at_obstacles(std::span<const VoxelId> pressed) noexcept;
-  // The obstacle of surface voxel number s is gone: the voxel is relaxed again.
+  // Call it if the obstacle of surface voxel number s is gone. The voxel is then relaxed again.
   void mark_dirty(std::size_t surface_number) noexcept;
-  // Rows that the chain or a result of the shadow moved since forget_moved_rows(), each once, the first
-  // kMostMovedRows of them: obstacles may have to be looked up there.
+  // Rows that the chain or a result of the shadow moved since forget_moved_rows(). Obstacles may have to be
+  // looked up there. Each row is listed once; at most the first kMostMovedRows are listed.
   static constexpr std::size_t kMostMovedRows = 1024;
   [[nodiscard]] std::span<const RowId> moved_rows() const { return moved_rows_; }
   void forget_moved_rows() noexcept;
   // Claims a voxel that another soft object presses: its role is `held`, and only the caller moves it. Calls
-  // nest: it is free after as many release() calls. See facet_contact.h.
+  // nest: the voxel is free after as many release() calls. See facet_contact.h.
   void claim(VoxelId v) noexcept;
   void release(VoxelId v) noexcept;
   // Force of other soft objects on a surface voxel (body frame, N). If the chain is tight down to that voxel,
@@ -198,14 +198,15 @@ class SoftObject {
   [[nodiscard]] glm::dvec3 pair_load(std::uint32_t surface_number) const noexcept {
     return glm::dvec3(pair_load_[surface_number]);
   }
-  // Finds the dependents of the voxels that pairs press (kMaxTouched of them at most); they stay as found
-  // until they are forgotten.
+  // Finds the dependents of the voxels that pairs press, at most kMaxTouched voxels. They are kept until
+  // forget_pair_dependents().
   void find_pair_dependents() noexcept;
   void forget_pair_dependents() noexcept;
-  // If there are dependents, the tool presses nothing, and relaxation is asynchronous: one cycle around these
-  // voxels, or a part of one for a large patch.
+  // Runs one cycle around the voxels that pairs press, or a part of a cycle for a large patch. Does nothing
+  // unless these voxels have dependents, the tool presses nothing, and relaxation is asynchronous.
   void relax_near_pairs() noexcept;
-  // Load and stiffness of one such voxel's dependents, without its own links; zero if it has none.
+  // For a voxel that pairs press: the load of its dependents, without its own links; the stiffness of the
+  // voxel with its dependents. Zero if no dependents are known.
   [[nodiscard]] ContactLoad dependents_of_pair(std::uint32_t surface_number) const noexcept {
     if (pair_dependents_.empty()) return {};
     const std::uint32_t entry = pair_entry_[surface_number];
@@ -218,7 +219,7 @@ class SoftObject {
   // Moves a voxel as far as its links allow.
   void move(VoxelId v, const glm::dvec3& displacement) noexcept;
   // drag() moves a voxel regardless of its links. After all drags settle_dragged() lets the chain follow;
-  // anchors and rigid surfaces may keep a voxel from getting there.
+  // anchors and rigid surfaces may keep a voxel from the place to which it was dragged.
   void drag(VoxelId v, const glm::dvec3& by) noexcept;
   void settle_dragged() noexcept;
 
@@ -239,7 +240,7 @@ class SoftObject {
   [[nodiscard]] glm::dvec3 displacement_at(const glm::dvec3& rest_point) const noexcept;
 
   // Force of the springs on the anchors (N, body frame); at rest it equals the force that presses the object.
-  // Empty if a link to an anchor is at its limit, because springs do not know what that link carries. For
+  // Empty if a link to an anchor is at its limit, because its spring does not show the load of that link. For
   // references.
   [[nodiscard]] std::optional<glm::dvec3> carried_by_anchors_N() const noexcept;
   // Energy of the springs plus plastic dissipation since the last state of rest (J). For tests and reports.
@@ -258,7 +259,7 @@ class SoftObject {
 
   struct Touch {
     VoxelId v;
-    std::uint32_t surface;   // surface number; finding it is a search
+    std::uint32_t surface;   // surface number; stored, because it takes a search
     bool pressed = false;    // carries load towards the tool
     glm::dvec3 rest{0.0};    // stored, because it is used several times a tick and costs two divisions
     glm::dvec3 normal{0.0};  // from tool to voxel, unit
@@ -266,9 +267,9 @@ class SoftObject {
         0.0};  // of its links; with other soft objects, blocks or obstacles also of its dependents (N)
     double start_depth = 0.0;       // depth in the tool at the start of the tick (m)
     bool beside_punch = false;      // it was beside a punch at the start of the tick
-    bool at_limit = false;          // a link at its limit carries load between it and another voxel
-    glm::dvec3 frozen_motion{0.0};  // the motion that it still had to make when the residual was frozen (m)
-    std::uint16_t block = 0;        // number of its rigid block plus one; 0: none
+    bool at_limit = false;          // a link at its limit carries load between the voxel and another one
+    glm::dvec3 frozen_motion{0.0};  // motion that was left to the voxel when the residual was frozen (m)
+    std::uint16_t block = 0;        // number of its rigid block, from 1 on (Lattice::block()); 0: none
   };
   struct Gap {
     double distance = 0.0;  // from the voxel to the tool's surface along normal; negative: overlap
@@ -282,9 +283,9 @@ class SoftObject {
     VoxelId v;
     std::uint32_t touch;  // touch (or index of a load) to which its load is added
   };
-  struct Dependent {     // a dependent, by the link through which it was first reached
+  struct Dependent {     // a dependent, and the link that first led to it
     std::uint32_t from;  // index into gathered_
-    bool up, down;       // the limit that the link is at pushes it up, down
+    bool up, down;       // the link's limit pushes the dependent up, down
     double load;         // of the voxel and of its own dependents (N)
   };
 
@@ -295,8 +296,8 @@ class SoftObject {
   [[nodiscard]] glm::dvec3 project_on_tool(const ToolInBody& tool, const glm::dvec3& rest,
                                            const glm::dvec3& wished, const glm::dvec3& compliance,
                                            Gap& g) const noexcept;
-  // surely_clear_of() is a test without a root that is true for most voxels outside of the tool; clear_of()
-  // is exact.
+  // surely_clear_of() is a quick test without a square root: true for most voxels outside of the tool, false
+  // for all others. clear_of() is exact.
   [[nodiscard]] bool surely_clear_of(const ToolInBody& tool, const glm::dvec3& position) const noexcept;
   [[nodiscard]] bool clear_of(const ToolInBody& tool, const glm::dvec3& position) const noexcept;
   void settle_chain() noexcept;
@@ -308,14 +309,14 @@ class SoftObject {
     return !claimed_voxels_.empty() && pair_claims_[t.surface] != 0;
   }
   void set_touch_roles() noexcept;
-  void assign_residual() noexcept;  // freezes the residual near the contact: the shadow owns it now …
-  void keep_frozen_residual(float part) noexcept;  // … and this part of it still
+  void assign_residual() noexcept;  // freezes the residual near the contact: the shadow owns it
+  void keep_frozen_residual(float part) noexcept;  // the shadow still owns this part of it
   std::size_t list_held() noexcept;
   [[nodiscard]] bool any_pressed() const noexcept;
   [[nodiscard]] bool cycle_due() const noexcept;
   [[nodiscard]] std::size_t shared(std::size_t work) const noexcept;
   [[nodiscard]] std::size_t left_of(
-      std::size_t work) const noexcept;  // of a tick's counted work; less while memory is cold
+      std::size_t work) const noexcept;  // what is left of `work` in this tick; less while memory is cold
   // Displacements from rest. clamp_depth_in_tool() shortens the way to `place` so that the voxel gets no
   // deeper into the tool than it is now. project_on_tool_within_limits() finds the least energy on the tool
   // within the links' limits. project_voxel() is the constrained projection of one touched voxel.
@@ -390,24 +391,24 @@ class SoftObject {
   std::size_t moving_obstacles_ = 0;          // number of obstacles on moving bodies
   std::vector<RowId> moved_rows_;
   LazyArray<std::uint8_t> row_moved_;             // 1: in moved_rows_; empty: no obstacles
-  std::vector<std::uint32_t> changed_obstacles_;  // surface numbers, since the last submission to the shadow
+  std::vector<std::uint32_t> changed_obstacles_;  // surface numbers; changed since the last submission
   std::vector<std::uint8_t> obstacle_changed_;  // [surface number] 1: in changed_obstacles_; empty: no shadow
   LazyVector<Touch> touches_;
-  LazyVector<Touch> touched_before_;   // those that were pressed
+  LazyVector<Touch> touched_before_;   // pressed touches before touch()
   std::vector<VoxelId> pressed_last_;  // pressed voxels, kept for the call in which the last one is released
-  ToolInBody tool_;                    // of the last relax_near()
+  ToolInBody tool_;                    // the tool in the last relax_near()
   std::vector<VoxelId> touched_voxels_;
   std::vector<std::uint32_t> touched_numbers_;  // [as touched_voxels_] surface number
   LazyVector<VoxelId> claimed_voxels_;          // claimed by pairs
-  LazyVector<VoxelId> held_voxels_;             // pressed by the tool, then claimed by pairs
+  LazyVector<VoxelId> held_voxels_;             // voxels pressed by the tool, then those claimed by pairs
   LazyVector<VoxelId> sources_;
   LazyVector<glm::vec3> moves_;
-  std::vector<BlockBound> block_bounds_;    // of one rigid block: first of its touches, then others
+  std::vector<BlockBound> block_bounds_;    // bounds of one rigid block: those of its touches, then others
   std::vector<std::uint32_t> bound_touch_;  // [as the first of block_bounds_] index into touches_
   std::vector<std::uint8_t> block_seen_;    // [block] 1: for_touched_blocks() has visited it
   LimitReactions limit_reactions_;
   LimitFollowers limit_followers_;
-  std::vector<VoxelId> limit_sources_;     // sources for these two: pressed voxels that are not anchored
+  std::vector<VoxelId> limit_sources_;     // sources for both of these: pressed voxels that are not anchored
   LazyVector<Gathered> gathered_;          // pressed voxels first, then their dependents
   LazyVector<Dependent> dependents_;       // [as gathered_]
   LazyArray<std::uint8_t> gathered_mark_;  // [v] 1: in gathered_ (within touch(): was pressed; between drag()
@@ -425,7 +426,7 @@ class SoftObject {
   bool dragging_ = false;     // sources_ lists dragged voxels, moves_ where they were
   bool moved_ever_ = false;
   bool anchors_pull_ = false;   // since push_out() a wave of the chain reached anchors that stopped it
-  bool beside_bodies_ = false;  // moving bodies
+  bool beside_bodies_ = false;  // prepare_beside_bodies() was called
   bool on_grid_ = false;        // there is a contact, and it is on nested patches
   std::unique_ptr<CompositeGrid> grid_;  // null: contacts are in state_
   double patch_error_ = 0.0;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A soft object whose contact is on nested patches (composite/grid.h).
 //
-// The object's own state stays at rest and complete, and nothing is written to it. While tissue is pressed
-// its displacement is read from the patches; when the tool leaves, the patches are dropped.
+// The object's own state stays at rest, and nothing is written to it. While tissue is pressed, displacements
+// are read from the patches. When the tool has left, the state counts again.
 #include <algorithm>
 #include <cassert>
 #include <cmath>
@@ -15,28 +15,31 @@
 namespace voxel {
 namespace {
 
-// Voxels of the finest patch beyond the contact, and the least number, for a tool so wide that more would
-// exceed the work of a tick.
+// Voxels of the finest patch beyond the contact. A wide tool has fewer, at least kLeastMargin, because more
+// would exceed the work of a tick.
 constexpr int kMargin = 6, kLeastMargin = 4;
 constexpr double kFelt = 0.3;          // of the force: an axis with less is relaxed in every second tick
 constexpr std::uint32_t kAllAxes = 4;  // first cycles of a contact that relax all axes
-// Spacings: a voxel this near to the tool is pressed; tissue this far from it on its way back is still felt.
+// In spacings. A voxel no further than kPressed from the tool is pressed. Tissue on its way back is still
+// felt up to a distance of kOnItsWay.
 constexpr double kPressed = 0.02, kOnItsWay = 0.5;
-// Tangent stiffness over secant stiffness for the proxy's next step, along the force and across it. Within
-// limits force grows with the square of the depth (2), else with a power of 1 to 1.5.
+// Tangent stiffness over secant stiffness for the proxy's next step, along the force and across it. Where
+// chain limits are active, the force grows with the square of the depth (ratio 2), else with a power of 1 to
+// 1.5.
 constexpr double kTangent = 2.0, kAcross = 0.5;
 // Displacements far away scale with this power of the depth.
 constexpr double kWithDepth = 1.7;
-constexpr double kLeastToScale = 0.1, kMostScaled = 1.0;  // spacings deep; of the depth, in one cycle
-constexpr double kLeastDepth = 0.05;                      // of the spacing
-constexpr double kNear = 3.0;       // spacings: surface voxels further from the tool are skipped
-constexpr double kAtRest_N = 1e-5;  // force on the anchors below which a contact with nothing pressed ends
-constexpr double kMoves = 0.03;     // spacings: a tool that moved further gets a second cycle in the tick
+// Least depth at which displacements are scaled (spacings); largest scaling in a cycle (share of the depth).
+constexpr double kLeastToScale = 0.1, kMostScaled = 1.0;
+constexpr double kLeastDepth = 0.05;  // of the spacing: least depth for the secant stiffness
+constexpr double kNear = 3.0;         // spacings: surface voxels further from the tool are skipped
+constexpr double kAtRest_N = 1e-5;    // force on the tool below which a contact with nothing pressed ends
+constexpr double kMoves = 0.03;       // spacings: a tool that moved further gets a second cycle in the tick
 constexpr double kFlat = 1.5;  // greatest ratio of spacings for which the width of a ball's contact is known
 
-// Before a cycle: extrapolates the displacement of a contact that deepened by `way_m`. Far tissue is scaled,
-// near tissue moves with the tool. Scaling all of it would move tissue away from the tool and press it in
-// again.
+// Call it before a cycle. It extrapolates the displacements to a tool that moved by `way_m`. Far tissue is
+// scaled; near tissue moves with the tool. If near tissue were scaled too, it would leave the tool and be
+// pressed in again.
 void go_along(CompositeGrid& grid, const std::array<int, 3>& centre, const glm::dvec3& force_N,
               const glm::dvec3& way_m, double spacing_m) noexcept {
   if (!grid.in_fine_patch(centre)) return;
@@ -125,8 +128,8 @@ void SoftObject::list_near_on_grid() noexcept {
   }
 }
 
-// Places the patches at the voxel that the tool will probably touch: the nearest touched one, else the
-// nearest of the object's box.
+// Prepares the patches at the voxel that the tool will probably press: the nearest touched voxel, else the
+// nearest voxel of the object's box.
 void SoftObject::come_near_on_grid(const ToolInBody& tool) noexcept {
   if (!grid_ || on_grid_) return;
   std::array<int, 3> nearest{};
@@ -190,7 +193,7 @@ bool SoftObject::push_out_on_grid(const ToolInBody& tool) noexcept {
   return any;
 }
 
-// The tool's surface as a height along the largest component of its normal at the voxel.
+// The tool's surface as a height along one axis: that of the largest component of its normal at the voxel.
 SoftObject::Bound SoftObject::bound_by(const ToolInBody& tool, const Touch& t,
                                        const glm::dvec3& u) const noexcept {
   const glm::dvec3 p = t.rest + u;
@@ -207,8 +210,8 @@ SoftObject::Bound SoftObject::bound_by(const ToolInBody& tool, const Touch& t,
   return {axis, way, tool.centre[axis] + way * std::sqrt(square) - t.rest[axis], true};
 }
 
-// Projects pressed voxels onto the tool, forwards and backwards: each one's place along the tool depends on
-// its neighbours, and the cycle does not move voxels along the tool.
+// Projects pressed voxels onto the tool, in the order of the list and then in reverse: the place of a voxel
+// along the tool depends on its neighbours. The cycle itself does not move voxels along the tool.
 void SoftObject::put_aside(const ToolInBody& tool) noexcept {
   const auto put = [&](const TouchOnGrid& near) {
     if (near.gap_m > kPressed * lattice_->min_spacing_m()) return;
@@ -222,7 +225,7 @@ void SoftObject::put_aside(const ToolInBody& tool) noexcept {
   std::for_each(touches_on_grid_.rbegin(), touches_on_grid_.rend(), put);
 }
 
-// Sets the bounds of the patches' voxels. A bound stands whether or not its voxel is pressed: if it were
+// Sets the bounds of the patches' voxels. A bound stands whether or not its voxel is pressed. If bounds were
 // dropped when coarse levels overshoot, the whole contact would be pressed and released in turns.
 void SoftObject::press_on_grid(const ToolInBody& tool) noexcept {
   grid_->clear_pressed();
@@ -255,7 +258,7 @@ void SoftObject::press_on_grid(const ToolInBody& tool) noexcept {
   }
 }
 
-// After a cycle: no voxel is left in the tool that anchors do not keep there.
+// Call it after a cycle. It moves all voxels out of the tool but those that anchors keep there.
 void SoftObject::settle_on_grid(const ToolInBody& tool) noexcept {
   glm::dvec3 sum(0.0);
   int pressed = 0;
@@ -296,7 +299,8 @@ void SoftObject::settle_on_grid(const ToolInBody& tool) noexcept {
   for (int d = 0; d < 3; ++d) centre_[static_cast<std::size_t>(d)] = static_cast<int>(std::lround(sum[d]));
 }
 
-// An axis that carries little force changes little: it is relaxed in every second tick.
+// Axes to relax in the next cycle. An axis that carries little force changes little, so it is relaxed in
+// every second tick.
 std::array<bool, 3> SoftObject::axes_due() noexcept {
   const std::uint32_t n = grid_cycles_++;
   if (n < kAllAxes) return {true, true, true};

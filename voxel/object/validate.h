@@ -9,12 +9,12 @@
 
 namespace voxel {
 
-// Each returns the first violation in words; empty: there is none. This one: the border is empty, rows and
-// surface are counted right, and only voxels are anchored.
+// Both functions return the first violation in words, or an empty string. This one checks that the border is
+// empty, rows and surface are counted right, and only voxels are anchored.
 std::string validate(const Lattice& lattice);
-// Displacements are finite, and 0 at anchors and where there is no voxel. Roles are valid and counted right
-// by row. No link is beyond its limits by more than `roundings` times half the last bit of the largest
-// displacement on its axis. Links that a chain with a budget has not finished are beyond.
+// Checks three things. Displacements are finite, and 0 at anchors and where there is no voxel. Roles are
+// valid and counted right by row. No link exceeds its limits by more than `roundings` times half the last bit
+// of the largest displacement on its axis. This fails while a chain with a budget is unfinished.
 std::string validate(const Lattice& lattice, const Displacement& state, double roundings);
 
 }  // namespace voxel
