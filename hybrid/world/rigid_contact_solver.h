@@ -1,6 +1,5 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
-// The velocities of free bodies at the end of a step, with implicit contact forces and friction: one convex
-// problem for all bodies (equation in free_body.h).
+// SPDX-License-Identifier: GPL-3.0-or-later Solves for the velocities of free bodies at the end of a step,
+// with implicit contact forces and friction. All bodies form one convex problem (equation in free_body.h).
 #pragma once
 
 #include <array>
@@ -21,8 +20,8 @@ struct Twist {
   }
 };
 
-struct SolveScratch {                // of n bodies
-  std::span<double> matrix, twists;  // 36 n², 18 n
+struct SolveScratch {                // buffers for n bodies
+  std::span<double> matrix, twists;  // length 36 n², 18 n
   std::span<std::uint32_t> first;    // n
   std::span<ContactOnLine> ways;     // kMaxOneSided
 };
