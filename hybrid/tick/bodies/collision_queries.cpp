@@ -10,7 +10,8 @@
 namespace hybrid {
 namespace {
 
-constexpr double kOffSurface = 1e-6;     // share of the way to an object's middle
+constexpr double kOffSurface = 1e-6;     // part of the way to the object's middle by which a point is moved
+                                         // off a surface
 constexpr double kCurrentWithin = 0.01;  // skins: after less relative motion a query is still current
 constexpr double kQueryMargin = 0.5;  // of the smaller object: how much further than necessary a query looks
 // Of the smaller object: a near pair is queried again after this much travel.
@@ -74,7 +75,8 @@ NearestSurface CollisionQueries::nearest_surface(const BodyPair& pair, Side side
   ++queries_made_;
   bool found = polygon::signed_distance(surface, x, range, known, near);
   if (!found && near.distance == 0.0) {
-    // On the surface itself the outward direction is undefined: the point is on the side of its own object.
+    // On the surface itself the outward direction is undefined. The point counts as being on the side of its
+    // own object, so it is moved slightly towards that object's middle.
     const RigidObject& own = world_.rigid[owner(pair, side)];
     const glm::dvec3 middle =
         now_[opposite(pair, side)].to_body(now_[owner(pair, side)].to_scene(middle_of(own)));

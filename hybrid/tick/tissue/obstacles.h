@@ -1,6 +1,5 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
-// Rigid surfaces stop tissue: each surface voxel near one has a half-space that it may not leave, its
-// obstacle.
+// SPDX-License-Identifier: GPL-3.0-or-later Rigid surfaces stop tissue. Each surface voxel near a rigid
+// surface has an obstacle: a half-space that it may not leave.
 #pragma once
 
 #include "hybrid/world/world_state.h"

@@ -13,7 +13,7 @@ bool find_touched_voxels(const World& world, WorldState& state, const glm::dvec3
                          double& range) noexcept;
 
 // The tool moved to `point` by `delta`: pressed voxels follow, those inside are pushed out, and the
-// neighbourhood relaxes by `sweeps`. Sets state.reactions to each object's reaction (scene frame).
+// neighbourhood relaxes by `sweeps` sweeps. Sets state.reactions to each object's reaction (scene frame).
 void press_tissue(const World& world, WorldState& state, const glm::dvec3& point, const glm::dvec3& delta,
                   int sweeps) noexcept;
 
@@ -29,9 +29,9 @@ voxel::ToolInBody tool_in_body(const World& world, const SoftBody& body, const g
 // Largest distance from the tool's centre at which it can touch a voxel of any soft object (m).
 double soft_reach(const World& world, const WorldState& state) noexcept;
 
-// Is there an object whose contact is on nested patches? The map has such an object at rest.
+// Is there an object whose contact is on nested patches? The map holds such an object in its rest state.
 [[nodiscard]] bool contact_on_patches(const WorldState& state) noexcept;
-// Prepares objects on patches that are not pressed for a tool at `point` (scene frame).
+// For a tool at `point` (scene frame): prepares objects that use nested patches and are not pressed yet.
 void prepare_patches(const World& world, WorldState& state, const glm::dvec3& point) noexcept;
 // Updates surface voxels in the map: those near the tool or a body, and a slice of the rest.
 void refresh_map(const World& world, WorldState& state) noexcept;
