@@ -9,7 +9,7 @@ namespace hybrid {
 // Reads or makes the surface. Adds findings to `notes`. Throws std::exception with a message.
 RigidObject build_rigid(const RigidDescription& description, std::vector<BuildNote>& notes);
 
-// Motion of an object that is built. Throws std::exception with a message.
+// Makes the motion of an object that was built. Throws std::exception with a message.
 RigidMotion build_motion(const RigidDescription& description, const RigidObject& object);
 
 // Bound on the distance between the exact surface of a primitive and its triangles in the occupancy map (m).

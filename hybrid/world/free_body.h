@@ -32,7 +32,7 @@ struct FreeBody {  // constant
 };
 
 struct FreeBodyState {
-  glm::dvec3 centre_m{0.0};                 // of mass, scene frame
+  glm::dvec3 centre_m{0.0};                 // centre of mass, scene frame
   glm::dquat rotation{1.0, 0.0, 0.0, 0.0};  // body to scene, unit
   glm::dvec3 velocity_m_per_s{0.0};         // of the centre of mass, scene frame
   glm::dvec3 spin_rad_per_s{0.0};           // scene frame
