@@ -27,8 +27,7 @@ namespace {
 constexpr int kSurfaceSmoothing = 6;  // smoothing passes of a soft object's drawn surface
 // Most cells along the scene's longest side by default. They lie in at most 64 bricks at any alignment.
 constexpr double kMostCells = 504.0;
-constexpr double kRigidCells = 200.0;      // the same if nothing is soft; finer cells would exclude no
-                                           // further objects
+constexpr double kRigidCells = 200.0;      // the same if nothing is soft; finer cells exclude no more objects
 constexpr std::size_t kMapReserve = 2048;  // spare bricks for motion
 
 struct Box {
@@ -62,8 +61,8 @@ double choose_cell(const Scene& scene, const Box& box, double soft_spacing) {
   const glm::dvec3 size = box.high - box.low;
   const double longest = std::max({size.x, size.y, size.z});
   if (scene.occupancy_cell_m) {
-    // Estimate: surfaces occupy about one sheet of cells on each of the scene's six sides. Each 8 × 8 cells
-    // of a sheet take a brick of 2.6 kB in the worst case.
+    // Estimate: surfaces occupy about one sheet of cells on each of the scene's six sides. In the worst case,
+    // every 8 × 8 cells of a sheet need a brick of their own, which takes 2.6 kB.
     const double across = longest / *scene.occupancy_cell_m;
     const double bytes = 6.0 * across * across / 64.0 * 2600.0;
     if (bytes > 0.25 * static_cast<double>(usable_memory_bytes())) {
@@ -141,7 +140,7 @@ class Builder {
     return boxes;
   }
 
-  // Visits the objects whose boxes are nearer to the box of object `own` than kClearance of its size.
+  // Visits the objects whose boxes are nearer to the box of object `own` than kClearance times its size.
   template <class Visit>
   void for_near(const std::vector<Box>& boxes, std::size_t own, const Visit& visit) const {
     constexpr double kClearance = 0.25;

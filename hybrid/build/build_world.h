@@ -1,5 +1,6 @@
-// SPDX-License-Identifier: GPL-3.0-or-later Builds the world of a scene, ready to be touched: reads files,
-// builds surfaces, removes overlaps and fills the map.
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Builds the world of a scene, ready to be touched: reads files, builds surfaces, removes overlaps and fills
+// the map.
 #pragma once
 
 #include <array>
@@ -25,7 +26,7 @@ struct BuiltScene {
   std::unique_ptr<WorldState> state;  // at rest, not started: see start_proxy()
   std::vector<BuildNote> notes;       // for the user: findings, repairs, removed voxels
   double seconds = 0.0;               // time that building took
-  // Resident memory of the whole program after building, and its peak.
+  // Resident memory of the whole program after building, and its peak until then.
   std::uint64_t resident_bytes = 0, peak_bytes = 0;
 };
 

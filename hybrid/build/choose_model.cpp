@@ -41,9 +41,9 @@ struct Choice {
   std::string reason;
 };
 
-// The hand feels tissue and coupling in series, up to the stiffness that the device can render and a hand can
-// tell. If the felt stiffness is within a just noticeable difference of that of a rigid surface, voxels are
-// not needed.
+// The felt stiffness is that of tissue and coupling in series. It is limited by the stiffness that the device
+// can render, and by the stiffness from which on a hand takes a surface for rigid. If it is within a just
+// noticeable difference of the felt stiffness of a rigid surface, voxels are not needed.
 Choice choose(const Scene& scene, const SoftDescription& soft) {
   if (scene.tool.shape == Tool::Shape::punch) return {false, "a punch is felt by voxels alone"};
   const device::DeviceLimits limits = scene_limits(scene);

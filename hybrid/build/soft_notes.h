@@ -1,5 +1,6 @@
-// SPDX-License-Identifier: GPL-3.0-or-later Notes on a soft object: how its spacing and the tool change the
-// felt surface, and which of its keys have no effect with its volume.
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Notes on a soft object: how its spacing and the tool change the felt surface, and which of its keys have no
+// effect with its volume.
 #pragma once
 
 #include <span>

@@ -1,5 +1,5 @@
-// SPDX-License-Identifier: GPL-3.0-or-later Thins the interior of a soft object (`thinning`), after its
-// volume is read and before its lattice is made.
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Thins the interior of a soft object (`thinning`), after its volume is read and before its lattice is made.
 #pragma once
 
 #include "hybrid/build/build_objects.h"

@@ -37,7 +37,7 @@ class BrickGrid {
   [[nodiscard]] double cell_m() const noexcept { return cell_m_; }
   [[nodiscard]] const glm::dvec3& origin() const noexcept { return origin_; }
 
-  // Insertions and queries both round with it. Positions beyond the farthest cell, and NaN, are in the
+  // Insertions and queries use the same rounding. Positions beyond the farthest cell, and NaN, are in the
   // outermost cells, where queries at such positions find them.
   [[nodiscard]] CellCoordinates cell_of(const glm::dvec3& p) const noexcept {
 #if defined(__x86_64__)

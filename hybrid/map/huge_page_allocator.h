@@ -1,6 +1,7 @@
-// SPDX-License-Identifier: GPL-3.0-or-later An allocator for large arrays with random access, on pages of 2
-// MB if the system has them. With pages of 4 kB nearly every access also misses the TLB. In a virtual machine
-// the page walk then goes through two page tables.
+// SPDX-License-Identifier: GPL-3.0-or-later
+// An allocator for large arrays with random access, on pages of 2 MB if the system has them. With pages of 4
+// kB nearly every access also misses the TLB. In a virtual machine the page walk then goes through two page
+// tables.
 #pragma once
 
 #include <cstddef>

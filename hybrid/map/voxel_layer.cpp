@@ -9,8 +9,8 @@
 namespace hybrid {
 namespace {
 
-constexpr std::size_t kBlocksOfNewBrick = 4;  // blocks per new brick: a surface occupies about half of the
-                                              // eight
+constexpr std::size_t kBlocksOfNewBrick = 4;  // blocks per new brick, of eight: a surface occupies half of
+                                              // them
 // Voxels expected per block on load. A surface has 10 per block; expecting fewer leaves spare blocks for
 // motion.
 constexpr std::size_t kVoxelsOfBlock = 9;

@@ -1,5 +1,5 @@
-// SPDX-License-Identifier: GPL-3.0-or-later The soft layer of the occupancy map. Each surface voxel is in the
-// list of its cell and is moved in O(1).
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The soft layer of the occupancy map. Each surface voxel is in the list of its cell and is moved in O(1).
 //
 // Blocks of 4×4×4 cells are in a hash table. A block takes two cache lines and contains the first voxel of
 // every occupied cell, packed in the order of cells. A surface occupies 10 to 20 of the 64 cells. A query of
@@ -34,8 +34,8 @@ class VoxelLayer {
   // Makes room for `more_bricks` further bricks, each with four blocks that may all be full.
   void seal(std::size_t more_bricks);
 
-  // ---- in the tick ---- If there is no room, the voxel stays listed in its last cell, and overflows()
-  // counts it.
+  // ---- in the tick ----
+  // If there is no room, the voxel stays listed in its last cell, and overflows() counts it.
   void move(std::uint32_t number, const glm::dvec3& position) noexcept;
   // Is there a voxel in a brick that the box touches?
   [[nodiscard]] bool any_near(const glm::dvec3& low, const glm::dvec3& high) const noexcept;
@@ -66,8 +66,7 @@ class VoxelLayer {
     std::uint64_t occupied = 0;  // bit x + 4 y + 16 z of occupied cells
     std::uint32_t brick = kNone;
     std::array<std::uint32_t, kPacked> links;  // one per occupied cell; the rest is undefined
-    Block() noexcept {}                        // NOLINT: links stay uninitialised, which saves writing a
-                                               // cache line
+    Block() noexcept {}                        // NOLINT: links stay uninitialised, a cache line not written
     void start(const CellCoordinates& block) noexcept {
       at = block;
       full = kNone;
@@ -84,8 +83,8 @@ class VoxelLayer {
       blocks = 0;
     }
   };
-  using Full = std::array<std::uint32_t, kBlockCells>;  // [cell] link; in a free array, [0] is the index of
-                                                        // the next free array
+  using Full = std::array<std::uint32_t, kBlockCells>;  // [cell] link; if free, [0]: index of the next free
+                                                        // array
 
   [[nodiscard]] static CellCoordinates block_of(const CellCoordinates& cell) noexcept {
     return {cell[0] >> kBlockShift, cell[1] >> kBlockShift, cell[2] >> kBlockShift};

@@ -181,9 +181,9 @@ Anchors read_anchors(const TableReader& soft, const std::set<int>& known) {
   table.allow(keys);
   out.faces.clear();  // named anchors replace the default
   const TreeEntry* listed_faces = table.find("faces");
+  // An explicit empty list is refused below if nothing else holds the object.
   const bool no_faces = listed_faces != nullptr && listed_faces->value.kind == TreeNode::Kind::array &&
-                        listed_faces->value.items.empty();  // an explicit empty list; refused below if
-                                                            // nothing else holds the object
+                        listed_faces->value.items.empty();
   if (listed_faces != nullptr && !no_faces) {
     for (const TreeNode& face : table.list("faces", "[\"-z\"]").items) {
       if (face.kind != TreeNode::Kind::string ||

@@ -110,8 +110,7 @@ struct FreeMotion {
   // Moments about axes through the centre of mass that are parallel to the object's axes. Default: those of
   // the closed shape, filled evenly.
   std::optional<glm::dvec3> inertia_kg_m2;
-  std::optional<glm::dvec3> centre_m;  // centre of mass in the object's own frame; default: that of its
-                                       // closed shape
+  std::optional<glm::dvec3> centre_m;  // in the object's frame; default: that of its closed shape
   double drag_N_s_per_m = 0.0, angular_drag_N_m_s = 0.0;
   glm::dvec3 gravity_m_per_s2{0.0};
 };
@@ -142,8 +141,7 @@ struct RigidDescription {
   FeelDescription feel{};
   MotionDescription motion{};
   SourcePlace motion_place{};  // of the key that sets the motion
-  bool as_mesh = false;        // render a primitive as its triangle mesh, for comparisons; not a key of a
-                               // scene file
+  bool as_mesh = false;        // render a primitive as a mesh, for comparisons; not a key of scenes
   SourcePlace place;           // of the table
   SourcePlace source_place;    // of the key that names the source
 };
@@ -173,15 +171,14 @@ struct Anchors {
 };
 // Fewer voxels in the interior of stiff tissue; see voxel/volume/interior_coarsening.h.
 struct Thinning {
-  std::vector<std::uint8_t> labels;  // empty: labels whose material has a Young's modulus of at least
-                                     // above_Pa
+  std::vector<std::uint8_t> labels;  // empty: those with Young's modulus of at least above_Pa
   double above_Pa = 0.0;
   int every = 3;
   int shell = 2;  // default: every - 1
   SourcePlace place;
 };
-// How the object is rendered: by its voxels, by the proxy as a rigid object, or automatically: by the proxy
-// if that is enough.
+// How the object is rendered: by its voxels, by the proxy as a rigid object, or by the proxy if that is
+// enough (automatic).
 enum class SoftModel : std::uint8_t { voxels, proxy, automatic };
 struct SoftDescription {
   std::string name;

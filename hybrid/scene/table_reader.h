@@ -1,7 +1,8 @@
-// SPDX-License-Identifier: GPL-3.0-or-later Reads the keys of one table of a scene file: types, units, bounds
-// and unknown keys. Every refusal names its place. If errors are gathered, a wrong number, text or file is
-// kept as an error and replaced by some valid value, so that all keys of a table are checked. A violated rule
-// among several keys is an error only if nothing else is wrong in the table.
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Reads the keys of one table of a scene file: types, units, bounds and unknown keys. Every refusal names its
+// place. If errors are gathered, a wrong number, text or file is kept as an error and replaced by some valid
+// value, so that all keys of a table are checked. A violated rule among several keys is an error only if
+// nothing else is wrong in the table.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,6 @@
-// SPDX-License-Identifier: GPL-3.0-or-later A table of tissues by name: whether they are bone, their
-// stiffness with its source, and their customary colour in anatomical drawings.
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A table of tissues by name: whether they are bone, their stiffness with its source, and their customary
+// colour in anatomical drawings.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -10,14 +11,12 @@
 namespace hybrid {
 
 struct Tissue {
-  std::string_view name;      // name of the tissue family, also of its material in a scene: "rib", "liver",
-                              // "vessel"
+  std::string_view name;      // of the family and of its material in a scene: "rib", "liver"
   std::string_view patterns;  // of label names, with spaces between; '*' and '?' stand for any characters
   bool bone = false;          // felt as a rigid surface; the figures below are then not used
   double young_Pa = 0.0;
   double poisson = 0.0;
-  bool measured = false;    // the figures were published for this tissue; false: `source` says what they
-                            // stand in for
+  bool measured = false;    // figures of this tissue; false: stand-ins, which `source` explains
   std::string_view source;  // where the figures are from
   glm::vec3 colour{0.0F};   // colour of the tissue in pictures; sRGB, 0 to 1
 };

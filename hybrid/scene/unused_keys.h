@@ -1,5 +1,5 @@
-// SPDX-License-Identifier: GPL-3.0-or-later Finds keys of a scene file that are valid by themselves but have
-// no effect with the other keys.
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Finds keys of a scene file that are valid by themselves but have no effect with the other keys.
 #pragma once
 
 #include "hybrid/scene/scene.h"

@@ -1,5 +1,5 @@
-// SPDX-License-Identifier: GPL-3.0-or-later The names of a soft object's materials, as pictures, plots and
-// reports show them.
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The names of a soft object's materials, as pictures, plots and reports show them.
 #pragma once
 
 #include <array>

@@ -1,6 +1,6 @@
-// SPDX-License-Identifier: GPL-3.0-or-later The drawn surface of tissue under asynchronous relaxation. It
-// comes from the relaxation thread. Around the tool, where that surface may be some ticks old, it comes from
-// the points of the tick.
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The drawn surface of tissue under asynchronous relaxation. It comes from the relaxation thread. Around the
+// tool, where that surface may be some ticks old, it comes from the points of the tick.
 #pragma once
 
 #include "hybrid/snapshot/snapshot.h"

@@ -25,8 +25,7 @@ struct DrawnInside {
   glm::dmat3 to_scene{1};                    // rotation from the object's axes to the scene's
   glm::dvec3 origin_m{0.0}, spacing_m{1.0};  // the middle of voxel (0, 0, 0), in the scene frame
   std::vector<std::string> materials{};      // those that the surface shows come first
-  std::vector<std::uint8_t> of_voxel{};      // x varies fastest; 0: empty, otherwise 1 + index into
-                                             // `materials`
+  std::vector<std::uint8_t> of_voxel{};      // x fastest; 0: empty, else 1 + index in `materials`
 
   // Index of the material at a point at rest (scene frame); empty: outside.
   [[nodiscard]] std::optional<std::size_t> material_at(const glm::dvec3& at_rest_m) const noexcept;
@@ -77,10 +76,8 @@ struct SoftPatch {
 // point defines its displacement, by interpolation.
 struct SoftDent {
   struct Box {
-    std::array<int, 3> first{},
-        // `first`: position of node (0, 0, 0) (unit: the object's spacing). `count`: number of nodes along
-        // each axis.
-        count{};
+    // `first`: position of node (0, 0, 0) (unit: the object's spacing). `count`: nodes along each axis.
+    std::array<int, 3> first{}, count{};
     int step = 1;  // distance between nodes (unit: the object's spacing)
     // Does the object continue beyond the box on this side? If not, points less than half a step beyond have
     // the displacement of the last node.

@@ -42,7 +42,7 @@ glm::dvec3 pull_on_proxy(const World& world, const WorldState& state, const glm:
 // The tissue's model is the stiffness of the voxels that are pressed now. The true stiffness is larger when a
 // chain tightens as the proxy moves, or when the tool meets further voxels. Steps by the model alone could
 // then alternate between two places without end. If a step overshoots (the pull changes sign), the secant
-// stiffness is learnt, with which the step would have ended at zero pull. It decays over the next passes.
+// stiffness is learnt: with it the step would have ended at zero pull. It decays over the next passes.
 // Nothing is learnt from other steps: over a short step, tissue that relaxes meanwhile looks arbitrarily
 // stiff.
 void learn_stiffness(const World& world, WorldState& state, const glm::dvec3& delta, const glm::dvec3& before,

@@ -1,6 +1,7 @@
-// SPDX-License-Identifier: GPL-3.0-or-later State of asynchronous relaxation. Tissue away from the contact is
-// then relaxed outside the tick, in a copy of the soft object (voxel/object/shadow_object.h). The tick's part
-// is in hybrid/tick/tissue/async_relaxation.h, the thread's in hybrid/session/relaxation_thread.h.
+// SPDX-License-Identifier: GPL-3.0-or-later
+// State of asynchronous relaxation. Tissue away from the contact is then relaxed outside the tick, in a copy
+// of the soft object (voxel/object/shadow_object.h). The tick's part is in
+// hybrid/tick/tissue/async_relaxation.h, the thread's in hybrid/session/relaxation_thread.h.
 //
 // The tick submits displacements and applies results; it never waits. Only the time at which a result is
 // ready depends on the machine. The tick that first applies a result is therefore recorded, and a replayed
@@ -19,8 +20,7 @@ namespace hybrid {
 
 // When a submitted state is relaxed, and when its result is applied.
 enum class Arrival : std::uint8_t {
-  counted,   // relaxed at once; applied after a number of ticks that depends on its work; for fixed-step
-             // sessions
+  counted,   // relaxed at once, applied some ticks later, in proportion to its work; for fixed steps
   thread,    // relaxed by the thread; applied when it is done
   recorded,  // relaxed at once; applied in the tick that `arrived` names
   played,    // not relaxed: another thread installs recorded results; `arrived` names the tick
@@ -46,8 +46,7 @@ struct AsyncRelaxation {
   [[nodiscard]] bool has(std::size_t o) const { return o < objects.size() && objects[o] != nullptr; }
 
   Arrival arrival = Arrival::counted;
-  std::vector<std::unique_ptr<AsyncObject>> objects;  // [soft]; a null entry or an empty vector: relaxed in
-                                                      // the tick
+  std::vector<std::unique_ptr<AsyncObject>> objects;  // [soft]; null or missing: relaxed in the tick
   // Bit o: the result of soft object o arrived in this tick. The tick reads it with Arrival::recorded and
   // Arrival::played, and otherwise writes it.
   std::uint64_t arrived = 0;

@@ -1,5 +1,6 @@
-// SPDX-License-Identifier: GPL-3.0-or-later State of moving rigid bodies that is kept between ticks: distance
-// queries against tissue and against other bodies.
+// SPDX-License-Identifier: GPL-3.0-or-later
+// State of moving rigid bodies that is kept between ticks: distance queries against tissue and against other
+// bodies.
 #pragma once
 
 #include <array>
@@ -30,8 +31,7 @@ struct BodyObstacles {
   std::vector<std::uint8_t> listed;       // [surface voxel] 1: in `near`
   std::vector<std::uint8_t> jammed;       // [surface voxel] 1: could not move out of a free body's way
   std::vector<std::uint32_t> near;        // surface voxels near a body
-  std::vector<std::vector<BodyQuery>> queries;  // [rigid object][surface voxel]; empty if the object presses
-                                                // no tissue
+  std::vector<std::vector<BodyQuery>> queries;  // [rigid][surface voxel]; empty: presses no tissue
 };
 
 // The place of another object's surface that is nearest to a point, in the other object's frame.
@@ -51,8 +51,7 @@ struct PointQuery : NearestSurface {
 // A free rigid body and another object that it may collide with (hybrid/tick/bodies/body_collisions.h).
 struct BodyPair {
   std::uint32_t free = 0, other = 0;
-  double size_m = 0.0, skin_m = 0.0;  // the smaller object's diagonal; distance at which surfaces are kept
-                                      // apart
+  double size_m = 0.0, skin_m = 0.0;  // smaller object's diagonal; gap kept between surfaces
   double friction = 0.0;              // Coulomb's coefficient
   // Values of the sum of both objects' travel. The objects cannot touch before it reaches `until_m`. At the
   // last query it was `queried_at_m`.

@@ -16,8 +16,7 @@ namespace hybrid {
 namespace {
 
 constexpr double kEdgeSteps = 40.0;  // number of points on an edge as long as the shape's diagonal
-constexpr double kAlongAxis = 0.5;   // distance between points on a capsule's axis (unit: the capsule's
-                                     // radius)
+constexpr double kAlongAxis = 0.5;   // distance of points on a capsule's axis (unit: its radius)
 constexpr double kSharp = 0.03;      // sharpness beyond which an edge gets points
 constexpr double kFlat = 1e-6;       // a vertex gets a point if the sharpness of its edges adds up to more
 
@@ -30,8 +29,7 @@ struct Weighed {
 
 struct Edge {
   std::uint32_t low, high, triangle;
-  double sharpness = 0.0;  // 1 − cosine of the angle between its two faces' normals; 2 if it has not exactly
-                           // two faces
+  double sharpness = 0.0;  // 1 − cosine of its faces' angle; 2 unless it has two faces
   bool operator<(const Edge& other) const {
     return std::tie(low, high, triangle) < std::tie(other.low, other.high, other.triangle);
   }

@@ -1,5 +1,5 @@
-// SPDX-License-Identifier: GPL-3.0-or-later Points that represent the surface of a rigid object in contacts
-// with other rigid objects.
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Points that represent the surface of a rigid object in contacts with other rigid objects.
 //
 // Objects A and B can overlap only between points if all points of A are outside B and all points of B are
 // outside A. The error is zero for a ball (one point: its centre, with its radius), and where a corner or a

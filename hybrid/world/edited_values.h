@@ -1,6 +1,6 @@
-// SPDX-License-Identifier: GPL-3.0-or-later Values of a scene that were changed since the session began.
-// World keeps the scene's values. The tick uses the edited value where there is one. Edits (edits.h) are made
-// between ticks.
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Values of a scene that were changed since the session began. World keeps the scene's values. The tick uses
+// the edited value where there is one. Edits (edits.h) are made between ticks.
 #pragma once
 
 #include <optional>

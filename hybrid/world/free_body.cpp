@@ -15,8 +15,7 @@ namespace {
 
 constexpr int kMaxNewton = 12;          // Newton steps of the midpoint rule
 constexpr double kLongestStep_s = 1.0;  // longer steps are shortened to this
-constexpr double kMostTurn = 1.0;       // rad per step; for larger turns the midpoint rule has more than one
-                                        // solution
+constexpr double kMostTurn = 1.0;       // rad per step; beyond it the midpoint rule is ambiguous
 
 glm::dmat3 cross_matrix(const glm::dvec3& v) noexcept {
   return {0.0, v.z, -v.y, -v.z, 0.0, v.x, v.y, -v.x, 0.0};  // columns

@@ -1,5 +1,6 @@
-// SPDX-License-Identifier: GPL-3.0-or-later Solves for the velocities of free bodies at the end of a step,
-// with implicit contact forces and friction. All bodies form one convex problem (equation in free_body.h).
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Solves for the velocities of free bodies at the end of a step, with implicit contact forces and friction.
+// All bodies form one convex problem (equation in free_body.h).
 #pragma once
 
 #include <array>

@@ -1,6 +1,6 @@
-// SPDX-License-Identifier: GPL-3.0-or-later The constant part of a rigid object's motion, made once from the
-// scene. A path is a pure function of simulated time. A free body's state (FreeBodyState) belongs to the
-// session's state.
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The constant part of a rigid object's motion, made once from the scene. A path is a pure function of
+// simulated time. A free body's state (FreeBodyState) belongs to the session's state.
 #pragma once
 
 #include <memory>

@@ -73,7 +73,7 @@ struct TickScratch {
   std::vector<DueQuery> due;
   std::vector<std::uint32_t> in_the_way;            // surface voxels inside a body
   std::vector<BodyContact> body_contacts;           // all contacts of free bodies
-  FreeBodyStep free_bodies;                         // the bodies that they act on
+  FreeBodyStep free_bodies;                         // free bodies that they act on
   std::vector<std::uint32_t> body_surface_numbers;  // surface voxels of one object that press on a free body
   std::vector<voxel::VoxelId> body_voxels;          // their voxels
   std::vector<voxel::ContactLoad> body_loads;       // their loads

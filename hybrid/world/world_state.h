@@ -131,8 +131,7 @@ struct CarriedState {
   std::vector<FacetContact> facet_contacts;
   std::vector<std::vector<std::uint8_t>> paired;               // [soft pair][surface voxel of the first]
   std::vector<std::vector<ObstacleQuery>> obstacle_queries;    // [soft][surface voxel]
-  std::vector<std::vector<ObstacleAtRest>> obstacles_at_rest;  // [soft] those replaced since the contact
-                                                               // began
+  std::vector<std::vector<ObstacleAtRest>> obstacles_at_rest;  // [soft] replaced since the contact began
   std::vector<std::uint32_t> cursor, obstacle_cursor;          // [soft] next surface voxel to visit
   std::vector<std::uint32_t> pair_cursor;                      // [soft pair]
   std::vector<BodyObstacles> body_obstacles;                   // [soft]; empty where no body presses tissue

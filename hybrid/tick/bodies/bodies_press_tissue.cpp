@@ -30,8 +30,8 @@ constexpr double kOnSurface = 1e-9;  // of the spacing
 constexpr double kLongestStep = 0.5;  // spacings: longest step of a body
 constexpr int kMaxSteps = 8;          // largest number of steps in a tick
 constexpr double kSqueezed = 0.05;    // spacings: a deeper overlap is a fault
-constexpr int kMaxRounds = 4;         // per step: most alternations of a free body giving way and tissue
-                                      // leaving
+constexpr int kMaxRounds = 4;         // per step: most rounds in which a free body and tissue give way in
+                                      // turn
 constexpr double kStopDepth = 0.25;   // spacings: a free body this deep in tissue stops
 
 bool is_set(const voxel::Obstacle& o) {

@@ -12,18 +12,17 @@
 namespace hybrid {
 namespace {
 
-constexpr double kSkin = 1e-4;        // distance at which surfaces are kept apart (unit: the smaller object's
-                                      // diagonal)
-constexpr double kTouching = 1.5;     // skins: points this near are contacts when the tick begins
-constexpr double kLeastGap = 0.5;     // skins: a point that comes nearer becomes a contact
-constexpr double kTakeBackAt = 0.75;  // skins: overlaps of points nearer than this are taken back
+constexpr double kSkin = 1e-4;          // gap kept between surfaces (unit: the smaller object's diagonal)
+constexpr double kTouching = 1.5;       // skins: points this near are contacts when the tick begins
+constexpr double kLeastGap = 0.5;       // skins: a point that comes nearer becomes a contact
+constexpr double kTakeBackAt = 0.75;    // skins: bodies with points nearer than this are moved apart
 constexpr double kMaxCorrection = 1.0;  // skins: by at most this much a tick
 constexpr double kOverlap = 0.02;       // a deeper overlap is a fault (unit: the smaller object's diagonal)
 // Stiffness of contacts: as good as rigid. Unit: reduced mass / dt², which stops the approach within a tick.
 constexpr double kContactStiffness = 1e5;
-constexpr double kSamePlane = 1e-9;   // 1 − cosine between normals
-constexpr double kSlideRange = 0.05;  // nearer points slide along their edges (unit: the smaller object's
-                                      // diagonal)
+constexpr double kSamePlane = 1e-9;  // 1 − cosine between normals
+// Points nearer than this slide along their edges (unit: the smaller object's diagonal).
+constexpr double kSlideRange = 0.05;
 constexpr double kLeastSlide = 0.01;  // shorter slides are skipped (unit: the point's reach)
 constexpr double kStride = 0.02;      // step along a way (unit: the smaller object's diagonal)
 constexpr int kMostStrides = 32;
@@ -207,8 +206,8 @@ class Collisions : private CollisionQueries {
     return {now_[b].to_body(now_[a].to_scene(at)), after_[b].to_body(after_[a].to_scene(at))};
   }
   // Follows a point in the other object's frame. `met`: on entry, the point's query at the start of the tick;
-  // on return, the last query on the way, where the point came too near or the way ended. `queried`: such a
-  // query was made.
+  // on return, the surface that the point came too near to, or else the query at the end of the way.
+  // `queried`: true on return if queries were made on the way.
   bool way_is_free(const BodyPair& pair, Side side, std::size_t i, NearestSurface& met,
                    bool& queried) noexcept {
     const SurfacePoint& p = point(pair, side, i);

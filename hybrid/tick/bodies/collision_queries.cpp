@@ -10,8 +10,8 @@
 namespace hybrid {
 namespace {
 
-constexpr double kOffSurface = 1e-6;     // part of the way to the object's middle by which a point is moved
-                                         // off a surface
+constexpr double kOffSurface = 1e-6;     // shift of a point off a surface (unit: its way to the object's
+                                         // middle)
 constexpr double kCurrentWithin = 0.01;  // skins: after less relative motion a query is still current
 constexpr double kQueryMargin = 0.5;  // of the smaller object: how much further than necessary a query looks
 // Of the smaller object: a near pair is queried again after this much travel.

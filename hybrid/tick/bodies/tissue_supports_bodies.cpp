@@ -17,8 +17,7 @@ namespace hybrid {
 namespace {
 
 constexpr double kReleased = 0.002;  // spacings: a voxel no deeper than this is no longer jammed
-constexpr double kFreeLift = 0.005;  // spacings: lift per tick that need not come from the body's kinetic
-                                     // energy
+constexpr double kFreeLift = 0.005;  // spacings: lift per tick for which no kinetic energy is needed
 constexpr double kOnBody = 1e-3;     // spacings: a voxel this near to the body lies on it
 // Unit: trace of the sum of n nᵀ over the normals n. It regularises directions that the normals hardly span.
 constexpr double kRegularisation = 1e-3;

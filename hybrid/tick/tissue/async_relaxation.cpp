@@ -11,10 +11,10 @@ namespace hybrid {
 namespace {
 
 constexpr std::size_t kMaxAsync = 64;  // bits of AsyncRelaxation::arrived
-// Rows of a result that are applied per tick. At most kMaxRowsApplied are, which take about 100 µs. In a tick
-// with a cycle of a large contact patch, the work that is left for the tick bounds them. A row counts as
-// kWorkOfRow of it, including the row's obstacle queries. At least kLeastRows are applied, because a result
-// that waits delays the next one.
+// Rows of a result that are applied per tick: at most kMaxRowsApplied, which take about 100 µs. In a tick
+// with a cycle of a large contact patch, the remaining work of the tick is the limit; a row counts as
+// kWorkOfRow, including its obstacle queries. But at least kLeastRows are applied, because a result that
+// waits delays the next one.
 constexpr std::size_t kMaxRowsApplied = 250, kLeastRows = 100, kWorkOfRow = 16;
 // Number of parts in which a result's rows near a contact at rest are applied.
 constexpr int kResultParts = 8;

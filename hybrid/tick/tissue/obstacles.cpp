@@ -117,8 +117,8 @@ class ObstacleQueue {
     const float room = held ? std::max(seen.clear_m, spacing_m_) : seen.clear_m - radius_m_;
     add({room - std::sqrt(square), s});
   }
-  // Does the voxel lie on its obstacle, and has it slid away from the place of its last query? Its load may
-  // then no longer be along the obstacle's normal.
+  // Does the voxel lie on its obstacle, and has it slid away from the place of its last query? The surface
+  // there may have another normal.
   [[nodiscard]] bool slid_on_obstacle(std::uint32_t s, float square) const noexcept {
     const float slid = kSlideOnObstacle * spacing_m_;
     if (!object_.lattice().has_bricks() || square < slid * slid) return false;

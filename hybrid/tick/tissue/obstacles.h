@@ -1,5 +1,6 @@
-// SPDX-License-Identifier: GPL-3.0-or-later Rigid surfaces stop tissue. Each surface voxel near a rigid
-// surface has an obstacle: a half-space that it may not leave.
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Rigid surfaces stop tissue. Each surface voxel near a rigid surface has an obstacle: a half-space that it
+// may not leave.
 #pragma once
 
 #include "hybrid/world/world_state.h"

@@ -10,8 +10,7 @@
 namespace hybrid {
 namespace {
 
-constexpr int kMaxHalvings = 6;           // most halvings of the range in which a tool with too many voxels
-                                          // near looks for them
+constexpr int kMaxHalvings = 6;           // most halvings of the search range if too many voxels are near
 constexpr std::uint32_t kMapSlice = 512;  // surface voxels of each object that are updated per tick
 
 const glm::dvec3 kPunchAxis(0.0, 0.0, -1.0);  // a punch presses downwards in the scene
@@ -169,9 +168,8 @@ void refresh_map(const World& world, WorldState& state) noexcept {
     if (!state.body_obstacles.empty()) {
       for (const std::uint32_t number : state.body_obstacles[o].near) look(number);
     }
-    if (object.asleep() && state.cursor[o] == 0)
-      continue;  // all its voxels were updated since it fell
-                 // asleep
+    // All voxels of an object were updated since it fell asleep if the cursor is back at 0.
+    if (object.asleep() && state.cursor[o] == 0) continue;
     const auto count = static_cast<std::uint32_t>(surface.size());
     for (std::uint32_t i = 0; i < std::min(kMapSlice, count); ++i) {
       prefetch_surface(object, state.cursor[o]);

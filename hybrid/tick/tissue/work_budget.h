@@ -1,5 +1,6 @@
-// SPDX-License-Identifier: GPL-3.0-or-later In real time a tick does only a share of its counted work at a
-// contact, so that ticks are not late on a slow machine.
+// SPDX-License-Identifier: GPL-3.0-or-later
+// In real time a tick does only a share of its counted work at a contact, so that ticks are not late on a
+// slow machine.
 //
 // Work is counted, never timed, so that the same inputs give the same bits; only the time that it takes
 // depends on the machine. In real time the share follows the measured duration of ticks. With a smaller share
