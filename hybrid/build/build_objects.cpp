@@ -77,7 +77,7 @@ voxel::VolumeFileOptions volume_options(const std::vector<voxel::LabelRule>& rul
   return {.unit_m = unit_m, .rules = rules, .spacing_m = spacing, .max_bytes = usable_memory_bytes() / 4};
 }
 
-// Repairs by the file's reader are reported to the user.
+// Reads a volume. Repairs that its reader made are added to `notes`.
 voxel::LabelVolume read_volume(const std::string& object, const std::filesystem::path& file,
                                const voxel::VolumeFileOptions& options, std::vector<BuildNote>& notes) {
   std::vector<std::string> of_file;

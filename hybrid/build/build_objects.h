@@ -19,7 +19,7 @@ double map_margin_m(const RigidDescription& description);
 // std::exception with a message.
 voxel::LabelVolume build_volume(const SoftDescription& description, std::vector<BuildNote>& notes);
 
-// The part of a mesh that no plane cuts away, clipped exactly; `to_scene` is the mesh's pose.
+// Returns the part of a mesh that no plane cuts away, clipped exactly. `to_scene`: the mesh's pose.
 polygon::TriangleMesh cut_mesh(const polygon::TriangleMesh& mesh, const Pose& to_scene,
                                const std::vector<CutPlane>& cuts);
 

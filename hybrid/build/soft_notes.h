@@ -27,9 +27,9 @@ struct FeltLattice {
 void note_felt_surface(const Tool& tool, const std::string& name, const voxel::SoftObject& object,
                        std::vector<BuildNote>& notes);
 
-// The first notes labels that the description names and the volume does not have. `volume`: as read, before
-// overlap is removed. The second notes a `rigid_within` within which no voxel lies. `near_rigid`: the voxels
-// within it.
+// note_missing_labels() reports labels that the description names and the volume does not have. `volume`: as
+// read, before overlap is removed. note_missing_anchors() reports a distance `rigid_within` within which no
+// voxel lies. `near_rigid`: the voxels within it.
 void note_missing_labels(const SoftDescription& description, const voxel::LabelVolume& volume,
                          std::vector<BuildNote>& notes);
 void note_missing_anchors(const SoftDescription& description, std::span<const std::size_t> near_rigid,

@@ -2,7 +2,7 @@
 // A sparse set of bricks of 8×8×8 cells, the basis of every layer of the occupancy map.
 //
 // A hash table maps a brick's coordinates to a layer's entry (cell_table.h). In front of the table is a
-// bitmap of 64×64×64 units over all existing bricks; a unit is one brick or a power of two of them along each
+// bitmap of 64×64×64 units over all existing bricks; a unit is one brick, or a power of two bricks along each
 // edge. The bitmap takes 32 kB, so it stays in the first-level cache. A query of an empty region ends after
 // one to four words.
 #pragma once
@@ -81,7 +81,7 @@ class BrickGrid {
     return part;
   }
 
-  // False: no brick that these cells touch exists. True: one may exist.
+  // False: none of the bricks that these cells touch exists. True: one may exist.
   [[nodiscard]] bool may_exist(const CellRange& cells) const noexcept {
     if (bitmap_.empty()) return true;
     const std::int32_t x0 = unit_of(cells.low, 0), x1 = unit_of(cells.high, 0), y0 = unit_of(cells.low, 1),

@@ -40,7 +40,7 @@ inline constexpr std::int32_t kNoPlace = std::numeric_limits<std::int32_t>::min(
 struct CellTrail {
   std::uint32_t here = 0;  // place of the last entry found
   std::array<std::uint32_t, 8> place{};
-  CellCoordinates last{};  // coordinates of the last query for another entry
+  CellCoordinates last{};  // coordinates of the last query that `here` did not answer
   std::array<std::int32_t, 3> step{1, 1, 1};
 };
 

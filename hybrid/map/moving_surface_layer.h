@@ -58,7 +58,7 @@ class MovingSurfaceLayer {
     double slack_m = 0.0;     // rounding error of positions in the body's frame
     // Read when the body moves:
     std::uint32_t object = 0;
-    double radius_m = 0.0;  // of the bounding ball about its middle
+    double radius_m = 0.0;  // radius of the bounding ball about the body's middle
     glm::dvec3 middle_in_body{0.0};
     CellRange districts;
     std::shared_ptr<const SurfaceCells> owner;

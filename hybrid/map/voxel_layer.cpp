@@ -9,8 +9,7 @@
 namespace hybrid {
 namespace {
 
-constexpr std::size_t kBlocksOfNewBrick = 4;  // blocks per new brick, of eight: a surface occupies half of
-                                              // them
+constexpr std::size_t kBlocksOfNewBrick = 4;  // per new brick; a surface occupies about half of the eight
 // Voxels expected per block on load. A surface has 10 per block; expecting fewer leaves spare blocks for
 // motion.
 constexpr std::size_t kVoxelsOfBlock = 9;

@@ -83,8 +83,7 @@ class VoxelLayer {
       blocks = 0;
     }
   };
-  using Full = std::array<std::uint32_t, kBlockCells>;  // [cell] link; if free, [0]: index of the next free
-                                                        // array
+  using Full = std::array<std::uint32_t, kBlockCells>;  // [cell] link; free array: [0] is the next free one
 
   [[nodiscard]] static CellCoordinates block_of(const CellCoordinates& cell) noexcept {
     return {cell[0] >> kBlockShift, cell[1] >> kBlockShift, cell[2] >> kBlockShift};

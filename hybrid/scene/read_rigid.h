@@ -17,7 +17,7 @@ namespace hybrid {
 RigidDescription read_rigid(const SceneSource& source, const TreeNode& table, std::size_t number);
 SoftDescription read_soft(const SceneSource& source, const TreeNode& table, std::size_t number);
 
-// Common parts of both kinds.
+// Parts that both kinds of table have in common.
 TableReader object_table(const SceneSource& source, const TreeNode& table, const std::string& kind,
                          std::size_t number);
 std::string read_name(const TableReader& table);

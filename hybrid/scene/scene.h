@@ -107,10 +107,10 @@ struct PathMotion {
 // A rigid object that moves under contact forces.
 struct FreeMotion {
   std::optional<double> mass_kg, density_kg_per_m3;  // exactly one of them
-  // Moments about axes through the centre of mass that are parallel to the object's axes. Default: those of
-  // the closed shape, filled evenly.
+  // Moments of inertia about axes through the centre of mass that are parallel to the object's axes. Default:
+  // those of the closed shape, filled evenly.
   std::optional<glm::dvec3> inertia_kg_m2;
-  std::optional<glm::dvec3> centre_m;  // in the object's frame; default: that of its closed shape
+  std::optional<glm::dvec3> centre_m;  // centre of mass in the object's frame; default: of the closed shape
   double drag_N_s_per_m = 0.0, angular_drag_N_m_s = 0.0;
   glm::dvec3 gravity_m_per_s2{0.0};
 };

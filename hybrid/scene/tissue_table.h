@@ -11,8 +11,8 @@
 namespace hybrid {
 
 struct Tissue {
-  std::string_view name;      // of the family and of its material in a scene: "rib", "liver"
-  std::string_view patterns;  // of label names, with spaces between; '*' and '?' stand for any characters
+  std::string_view name;      // of the tissue family and of its material in a scene: "rib", "liver"
+  std::string_view patterns;  // of label names, separated by spaces; '*' and '?' stand for any characters
   bool bone = false;          // felt as a rigid surface; the figures below are then not used
   double young_Pa = 0.0;
   double poisson = 0.0;

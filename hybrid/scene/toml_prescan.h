@@ -12,8 +12,7 @@ namespace hybrid {
 
 inline constexpr std::size_t most_scene_bytes = 16U * 1024 * 1024;
 inline constexpr std::size_t most_scene_values = 1'000'000;  // about 300 MB at worst during reading
-inline constexpr std::size_t most_key_parts = 64;            // of a key like a.b.c; bounds the depth of the
-                                                             // tree
+inline constexpr std::size_t most_key_parts = 64;            // parts of a.b.c; bounds the depth of the tree
 
 // Place of the byte at offset `at`; columns count characters.
 SourcePlace place_in_text(std::string_view text, std::size_t at);

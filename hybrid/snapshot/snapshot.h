@@ -23,7 +23,7 @@ namespace hybrid {
 struct DrawnInside {
   std::array<int, 3> dims{};                 // voxels; all 0: not known
   glm::dmat3 to_scene{1};                    // rotation from the object's axes to the scene's
-  glm::dvec3 origin_m{0.0}, spacing_m{1.0};  // the middle of voxel (0, 0, 0), in the scene frame
+  glm::dvec3 origin_m{0.0}, spacing_m{1.0};  // origin: middle of voxel (0, 0, 0), scene frame
   std::vector<std::string> materials{};      // those that the surface shows come first
   std::vector<std::uint8_t> of_voxel{};      // x fastest; 0: empty, else 1 + index in `materials`
 
@@ -73,7 +73,7 @@ struct SoftPatch {
 };
 
 // Displacements of a soft object on nested boxes of nodes, the finest first. The first box that contains a
-// point defines its displacement, by interpolation.
+// point defines the point's displacement, by interpolation.
 struct SoftDent {
   struct Box {
     // `first`: position of node (0, 0, 0) (unit: the object's spacing). `count`: nodes along each axis.
@@ -103,8 +103,8 @@ struct Snapshot {
   double t_s = 0.0;
   glm::dvec3 device_m{0.0}, proxy_m{0.0}, force_N{0.0};  // scene frame
   std::vector<ObjectFeel> feel;                          // one per object
-  // [object] empty for a rigid one; for a soft one the displacement of each surface vertex (scene frame, m).
-  // Positions are not stored, because a float position 1,000 km from the origin is off by centimetres.
+  // [object] displacement of each surface vertex (scene frame, m); empty for rigid objects. Positions are not
+  // stored, because a float position 1,000 km from the origin is off by centimetres.
   MovedSurfaces soft_moved_m;
   // [object] filled for objects under asynchronous relaxation, whose thread supplies the rest.
   std::vector<SoftPatch> patches{};

@@ -19,7 +19,7 @@ struct ContactSettings {
   int passes = 3;           // most passes in a tick; in each the proxy moves and then the tissue
   int sweeps = 1;           // relaxations of the contact's neighbourhood in each pass
   double soft_step = 0.25;  // longest step of the proxy against tissue in one pass (unit: the tool's reach)
-  double arrived = 1e-2;    // a second pass that moves the proxy less is the last (unit: the tool's radius)
+  double arrived = 1e-2;    // a later pass that moves the proxy less is the last (unit: the tool's radius)
   double still = 1e-5;      // a pass that moves the proxy less gives no secant (unit: the tool's radius)
   // Learnt stiffness. kept: share kept from pass to pass. least_overshoot: smaller ones are ignored (unit:
   // the pull before the step). most_overshoot: larger ones are clamped. most_learnt: bound of the result

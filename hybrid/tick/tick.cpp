@@ -27,10 +27,10 @@ namespace {
 constexpr double kFarthestDevice_m = 1e12;   // m; a thousand times the largest scene
 constexpr double kLongestTick_s = 86'400.0;  // a day: times stay finite however many ticks are added
 
-// CPU time of each stage, so that pre-emption does not count. A read of the thread's CPU time is a system
-// call and takes up to 2 µs; the wall clock takes 0.03 µs. So a stage is timed by the wall clock first. If
-// its wall time is long enough to hide a pre-emption, CPU time is read and replaces it. The tick is the sum
-// of its stages.
+// Measures the CPU time of each stage, so that pre-emption does not count. A read of the thread's CPU time is
+// a system call and takes up to 2 µs; the wall clock takes 0.03 µs. So a stage is timed by the wall clock
+// first. If its wall time is long enough to hide a pre-emption, CPU time is read and replaces it. The tick is
+// the sum of its stages.
 class StageClock {
  public:
   explicit StageClock(TickResult& result)

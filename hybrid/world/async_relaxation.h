@@ -20,7 +20,7 @@ namespace hybrid {
 
 // When a submitted state is relaxed, and when its result is applied.
 enum class Arrival : std::uint8_t {
-  counted,   // relaxed at once, applied some ticks later, in proportion to its work; for fixed steps
+  counted,   // relaxed at once; applied after a delay in proportion to its work; for fixed-step sessions
   thread,    // relaxed by the thread; applied when it is done
   recorded,  // relaxed at once; applied in the tick that `arrived` names
   played,    // not relaxed: another thread installs recorded results; `arrived` names the tick

@@ -9,10 +9,11 @@
 namespace hybrid {
 namespace {
 
-// Factor on Young's modulus. In the table of tissues the stiffest is 1,000 times as stiff as the softest.
+// Factor on Young's modulus. In the table of tissues the stiffest is 700 times as stiff as the softest.
 constexpr AllowedRange kFactorRange{1e-3, 1e3};
 // Ranges of sliders. Most go from a tenth of the scene's value to ten times that value. Friction above 1.5
-// and damping above 20 N s/m are no longer felt as such, so these bounds are fixed.
+// and damping above 20 N s/m are no longer felt as such, so their sliders end there unless the scene's value
+// is larger.
 constexpr double kUsualFactor = 10.0;
 constexpr AllowedRange kUsualFriction{0.0, 1.5}, kUsualDamping_N_s_per_m{0.0, 20.0};
 

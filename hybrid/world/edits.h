@@ -71,7 +71,7 @@ void apply_edits_of_tick(const World& world, WorldState& state, std::span<const 
 // "stiffness", "static-friction", …, as scripts name the quantities, and their units as people write them.
 [[nodiscard]] std::string_view name_of(EditedQuantity quantity) noexcept;
 [[nodiscard]] std::string_view unit_of(EditedQuantity quantity) noexcept;
-// SI value of one unit_of().
+// SI value of one such unit.
 [[nodiscard]] double si_of_unit(EditedQuantity quantity) noexcept;
 [[nodiscard]] std::optional<EditedQuantity> quantity_named(std::string_view name) noexcept;
 

@@ -71,7 +71,7 @@ struct SteppedBody {
 };
 
 // A contact on the line from one velocity solution to the next. Its force is `from_N` at the start of the
-// line and `from_N + more_N` at the end; its slip likewise.
+// line and `from_N + more_N` at the end. Its slip is `slip` and `slip + more_slip`.
 struct ContactOnLine {
   double from_N, more_N;
   double moved_m;  // difference between both solutions in the point's motion along the normal
@@ -93,7 +93,7 @@ class BodySystem {
   std::vector<ContactOnLine> lines_;
 };
 
-// Advances the bodies by dt_s, but no more than the first system.most_bodies(). Bounded, allocates nothing. A
+// Advances the bodies by dt_s, but only the first system.most_bodies() of them. Bounded, allocates nothing. A
 // body without contact to others gets the result that it would get alone.
 void step_free_bodies(std::span<SteppedBody> bodies, std::span<const BodyContact> contacts,
                       BodySystem& system, double dt_s) noexcept;

@@ -16,7 +16,7 @@ constexpr int kMaxFrictionSolves = 16;  // Newton steps with friction
 constexpr double kStickSpeed = 1e-5;    // m/s: regularises Coulomb's law; slower sliding counts as sticking
 constexpr double kSlipTolerance = 0.01, kForceTolerance = 0.1;  // relative tolerances of slip and pressure
 constexpr int kHalvings = 40;
-constexpr double kFlatEnough = 0.1;  // line search ends at this fraction of its first slope
+constexpr double kFlatEnough = 0.1;  // the line search ends where the slope is this fraction of the first
 
 double dot(const Twist& a, const Twist& b) noexcept {
   return glm::dot(a.linear, b.linear) + glm::dot(a.angular, b.angular);

@@ -22,9 +22,9 @@ struct Twist {
 };
 
 struct SolveScratch {                // buffers for n bodies
-  std::span<double> matrix, twists;  // length 36 n², 18 n
-  std::span<std::uint32_t> first;    // n
-  std::span<ContactOnLine> ways;     // kMaxOneSided
+  std::span<double> matrix, twists;  // lengths 36 n² and 18 n
+  std::span<std::uint32_t> first;    // length n
+  std::span<ContactOnLine> ways;     // length kMaxOneSided
 };
 
 // Writes each body's twist after a step of dt (> 0), six numbers a body, to the beginning of scratch.twists.

@@ -69,7 +69,7 @@ struct SoftBody {  // the constant half of a soft object; WorldState::soft is th
   }
 };
 
-// A rigid body's present pose, body to scene. A matrix, because the tick transforms many points.
+// A rigid body's present pose, body to scene, with a matrix because the tick transforms many points.
 struct BodyFrame {
   glm::dmat3 rotation{1.0};
   glm::dvec3 position_m{0.0};

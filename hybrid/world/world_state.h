@@ -117,7 +117,7 @@ struct CarriedState {
   std::uint32_t active_count = 0;
   bool stuck = false;          // friction keeps the proxy on the active elements
   bool sliding = false;        // friction lets the proxy slide on the active elements
-  bool pushed = false;         // since then a body moved the proxy, possibly off the active elements
+  bool pushed = false;         // since the last sweep a body moved the proxy, possibly off the elements
   glm::dvec3 friction_N{0.0};  // force on the proxy that friction and shading add to the normal force
   std::uint32_t rubbed = 0;    // rigid object that exerts friction_N and carries the proxy
   DampingState damping;
@@ -129,7 +129,8 @@ struct CarriedState {
   // ---- of arbitration ----
   std::vector<voxel::Reaction> reactions;  // [soft] reaction on the tool when it last pressed, scene frame
   std::vector<FacetContact> facet_contacts;
-  std::vector<std::vector<std::uint8_t>> paired;               // [soft pair][surface voxel of the first]
+  std::vector<std::vector<std::uint8_t>> paired;               // [soft pair][surface voxel of the first] 1:
+                                                               // in a contact
   std::vector<std::vector<ObstacleQuery>> obstacle_queries;    // [soft][surface voxel]
   std::vector<std::vector<ObstacleAtRest>> obstacles_at_rest;  // [soft] replaced since the contact began
   std::vector<std::uint32_t> cursor, obstacle_cursor;          // [soft] next surface voxel to visit

@@ -26,12 +26,11 @@ constexpr double kNearFixed = 0.3;
 constexpr double kLeastGapSine =
     0.4;                             // sine of the angle between body and bone: a narrower gap has no way out
 constexpr double kNoWayOut = 0.5;    // spacings: a voxel that is deeper after the wave has no way out
-constexpr double kOnSurface = 1e-9;  // of the spacing
+constexpr double kOnSurface = 1e-9;  // spacings: a point this near to a surface counts as on it
 constexpr double kLongestStep = 0.5;  // spacings: longest step of a body
 constexpr int kMaxSteps = 8;          // largest number of steps in a tick
 constexpr double kSqueezed = 0.05;    // spacings: a deeper overlap is a fault
-constexpr int kMaxRounds = 4;         // per step: most rounds in which a free body and tissue give way in
-                                      // turn
+constexpr int kMaxRounds = 4;         // per step: rounds of a free body and tissue giving way
 constexpr double kStopDepth = 0.25;   // spacings: a free body this deep in tissue stops
 
 bool is_set(const voxel::Obstacle& o) {

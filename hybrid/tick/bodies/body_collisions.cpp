@@ -16,11 +16,11 @@ constexpr double kSkin = 1e-4;          // gap kept between surfaces (unit: the 
 constexpr double kTouching = 1.5;       // skins: points this near are contacts when the tick begins
 constexpr double kLeastGap = 0.5;       // skins: a point that comes nearer becomes a contact
 constexpr double kTakeBackAt = 0.75;    // skins: bodies with points nearer than this are moved apart
-constexpr double kMaxCorrection = 1.0;  // skins: by at most this much a tick
+constexpr double kMaxCorrection = 1.0;  // skins: largest such motion in a tick
 constexpr double kOverlap = 0.02;       // a deeper overlap is a fault (unit: the smaller object's diagonal)
 // Stiffness of contacts: as good as rigid. Unit: reduced mass / dt², which stops the approach within a tick.
 constexpr double kContactStiffness = 1e5;
-constexpr double kSamePlane = 1e-9;  // 1 − cosine between normals
+constexpr double kSamePlane = 1e-9;  // 1 − cosine of the angle between normals of the same plane
 // Points nearer than this slide along their edges (unit: the smaller object's diagonal).
 constexpr double kSlideRange = 0.05;
 constexpr double kLeastSlide = 0.01;  // shorter slides are skipped (unit: the point's reach)
@@ -44,7 +44,7 @@ class Collisions : private CollisionQueries {
       place_after();
       if (follow_ways(round)) break;
       if (round < kRounds) continue;
-      ++all_.round;  // voids the queries on ways, which bodies that stand still did not go
+      ++all_.round;  // voids queries made on ways: bodies that stand still did not go there
       place_after();
       break;
     }
@@ -227,8 +227,8 @@ class Collisions : private CollisionQueries {
                             before.gap_m < ahead ? ahead : 0.0);
       queried = true;
       if (met.gap_m < allowed) {
-        // At a thin object or at an edge, the surface may face away from the start of the way. The surface
-        // met before then counts.
+        // At a thin object or at an edge, the way's start may not be in front of this surface. Then the
+        // surface of the previous query counts.
         if (in_front(met, from, p) < pair.skin_m) met = before;
         return false;
       }

@@ -10,11 +10,11 @@
 namespace hybrid {
 namespace {
 
-constexpr double kOffSurface = 1e-6;     // shift of a point off a surface (unit: its way to the object's
-                                         // middle)
+constexpr double kOffSurface = 1e-6;     // shift off a surface (unit: distance to the object's middle)
 constexpr double kCurrentWithin = 0.01;  // skins: after less relative motion a query is still current
-constexpr double kQueryMargin = 0.5;  // of the smaller object: how much further than necessary a query looks
-// Of the smaller object: a near pair is queried again after this much travel.
+// A query looks this much further than necessary (unit: the smaller object's diagonal).
+constexpr double kQueryMargin = 0.5;
+// A near pair is queried again after this much travel (unit: the smaller object's diagonal).
 constexpr double kRequeryTravel = 0.1;
 
 glm::dvec3 middle_of(const RigidObject& object) noexcept {
@@ -117,7 +117,7 @@ BodyContact CollisionQueries::contact_at(const BodyPair& pair, Side side, std::s
   contact.body = body;
   contact.other = beside;
   if (beside == BodyContact::kNone) {
-    // The object that is no member of the step moves as prescribed.
+    // The object that is not among the stepped bodies moves as prescribed.
     const std::uint32_t o = member_[pair.other] == BodyContact::kNone ? pair.other : pair.free;
     const glm::dvec3 in_body = now_[o].to_body(contact.point_m);
     contact.carried_m_per_s = (after_[o].to_scene(in_body) - contact.point_m) / dt_s_;

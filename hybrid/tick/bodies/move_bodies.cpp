@@ -94,7 +94,7 @@ void set_rigid_pose(const World& world, WorldState& state, std::uint32_t object,
     const glm::dvec3 from = near.frame.to_body(state.proxy_m);
     const glm::dvec3 target = carries_proxy(state, object) ? from : after.to_body(state.proxy_m);
     expected = after.to_scene(target);
-    // In the body's own frame the proxy moves instead.
+    // In the body's frame the body stands still, and the proxy moves instead.
     near.frame = BodyFrame();
     pushed = after.to_scene(sweep_past(world, state, object, false, from, target).point);
   }

@@ -19,7 +19,7 @@ namespace {
 constexpr double kReleased = 0.002;  // spacings: a voxel no deeper than this is no longer jammed
 constexpr double kFreeLift = 0.005;  // spacings: lift per tick for which no kinetic energy is needed
 constexpr double kOnBody = 1e-3;     // spacings: a voxel this near to the body lies on it
-// Unit: trace of the sum of n nᵀ over the normals n. It regularises directions that the normals hardly span.
+// Regularises directions that the normals hardly span. Unit: trace of the sum of n nᵀ over the normals n.
 constexpr double kRegularisation = 1e-3;
 // Factor on the stiffness of links. The part beyond 1 acts as a damper. Under asynchronous relaxation tissue
 // is a spring between two results, and one result may return energy that tissue took up before another.
@@ -44,7 +44,7 @@ NearVoxel near_voxel(const voxel::SoftObject& object, const BodyObstacles& besid
   return {n, glm::dot(n, object.state().at(object.lattice().surface()[s])) - static_cast<double>(o.bound)};
 }
 
-// The contact of such a voxel, with zero force. Its point is the one of the body's surface that was nearest
+// The contact of such a voxel, with zero force. Its point is the point of the body's surface that was nearest
 // at the query. The voxel may have moved along its half-space since. A force at its present place would turn
 // a ball.
 BodyContact contact_at(const SoftBody& body, const voxel::SoftObject& object, const BodyQuery& query,
@@ -240,8 +240,8 @@ bool list_overlaps(const World& world, WorldState& state, std::uint32_t b, doubl
 }
 
 // A body that is moved back may also be lifted. Its kinetic energy provides the energy of the lift as far as
-// possible. Tissue provides that of at most `free_lift_m` per tick, so that a body that is pressed in is not
-// lifted out.
+// possible. Tissue provides the energy for at most `free_lift_m` of lift per tick, so that a body that is
+// pressed in is not lifted out.
 FreeBodyState limit_by_energy(const FreeBody& body, const FreeBodyState& before, FreeBodyState after,
                               double free_lift_m) noexcept {
   const glm::dvec3 weight_N = body.mass.mass_kg * body.gravity_m_per_s2;

@@ -217,7 +217,7 @@ void refresh_obstacles(const World& world, WorldState& state) noexcept {
       if (object.patches_in_use() != nullptr) {
         for (const voxel::VoxelId v : object.near_on_grid()) due.consider(object.surface_number(v));
       }
-      // Slow motion without waves is found by going through the surface in turns.
+      // Slow motion, which makes no waves, is found by visiting all surface voxels in turns.
       const auto count = static_cast<std::uint32_t>(lattice.surface().size());
       for (std::uint32_t i = 0; i < std::min(kObstacleSlice, count); ++i) {
         prefetch_surface(object, state.obstacle_cursor[o]);

@@ -168,7 +168,7 @@ void refresh_map(const World& world, WorldState& state) noexcept {
     if (!state.body_obstacles.empty()) {
       for (const std::uint32_t number : state.body_obstacles[o].near) look(number);
     }
-    // All voxels of an object were updated since it fell asleep if the cursor is back at 0.
+    // If the cursor of a sleeping object is at 0, all its voxels were updated since it fell asleep.
     if (object.asleep() && state.cursor[o] == 0) continue;
     const auto count = static_cast<std::uint32_t>(surface.size());
     for (std::uint32_t i = 0; i < std::min(kMapSlice, count); ++i) {

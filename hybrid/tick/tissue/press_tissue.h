@@ -18,8 +18,9 @@ void press_tissue(const World& world, WorldState& state, const glm::dvec3& point
                   int sweeps) noexcept;
 
 // Appends to `out`, up to its capacity, half-spaces of voxels that could not leave the way of a tool at
-// `point`. `immovable_only`: only of voxels that are immovable until their surroundings move. Half-spaces of
-// facets that are within `facets_within` of the centre (unit: the tool's reach) follow. Returns how many.
+// `point`. `immovable_only`: only of voxels that are immovable until their surroundings move. Then appends
+// half-spaces of facets that are within `facets_within` of the centre (unit: the tool's reach). Returns how
+// many were appended.
 std::size_t tool_bounds(const World& world, WorldState& state, const glm::dvec3& point, bool immovable_only,
                         double facets_within, std::vector<polygon::ContactPlane>& out) noexcept;
 

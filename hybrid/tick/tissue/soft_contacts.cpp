@@ -164,7 +164,7 @@ void update_contacts(const World& world, WorldState& state) noexcept {
   }
 }
 
-// Voxels that a sweep took over the edge of their facet get their new facet before the next sweep. False:
+// Voxels that a sweep moved over the edge of their facet get their new facet before the next sweep. False:
 // there were none.
 bool follow_over_edges(const World& world, WorldState& state) noexcept {
   bool any = false;
@@ -193,8 +193,8 @@ voxel::GiveWay first_to_give(const World& world, WorldState& state, const FacetC
   return of_a ? voxel::GiveWay::second : voxel::GiveWay::first;
 }
 
-// Overlaps that relaxing the links could not remove move chains. First the chains of the object that gives
-// way first move, then those of both, and then, if anchors hold one object, those of the other.
+// Moves whole chains to remove overlaps that relaxation of links could not remove. First the object that
+// first_to_give() names gives way, then both objects, and then, if anchors hold one, the other.
 void separate_pairs(const World& world, WorldState& state) noexcept {
   using voxel::GiveWay;
   for (FacetContact& pair : state.facet_contacts) {

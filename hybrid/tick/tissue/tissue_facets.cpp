@@ -48,8 +48,8 @@ double longest_link_m(const voxel::Lattice& lattice) noexcept {
   return most * lattice.max_spacing_m();
 }
 
-// The half-space of one triangle, if the triangle faces the centre within `within`. The tissue's surface lies
-// `surface` (m) outside the triangle. `normal`: not of unit length, out of the tissue.
+// The half-space of one triangle, if the triangle faces the centre and is within `within` (m) of it. The
+// tissue's surface lies `surface` (m) outside the triangle. `normal`: not of unit length, out of the tissue.
 bool bound_of(const std::array<glm::dvec3, 3>& at, const glm::dvec3& normal, const glm::dvec3& centre,
               double within, double surface, voxel::ToolBound& bound) noexcept {
   const double length = glm::length(normal);
