@@ -21,9 +21,9 @@ struct ContactSettings {
   double soft_step = 0.25;  // longest step of the proxy against tissue in one pass (unit: the tool's reach)
   double arrived = 1e-2;    // a later pass that moves the proxy less is the last (unit: the tool's radius)
   double still = 1e-5;      // a pass that moves the proxy less gives no secant (unit: the tool's radius)
-  // Learnt stiffness. kept: share kept from pass to pass. least_overshoot: smaller ones are ignored (unit:
-  // the pull before the step). most_overshoot: larger ones are clamped. most_learnt: bound of the result
-  // (unit: the model's stiffness).
+  // Settings of the learnt stiffness. kept: share kept from pass to pass. least_overshoot: smaller ones are
+  // ignored (unit: the pull before the step). most_overshoot: larger ones are clamped. most_learnt: bound of
+  // the result (unit: the model's stiffness).
   double kept = 0.9, least_overshoot = 0.25, most_overshoot = 3.0, most_learnt = 50.0;
   double probe = 0.005;  // how far the proxy probes jammed tissue once a tick (unit: the tool's radius)
   // Search radii for rigid planes when tissue stops the proxy (unit: the tool's radius). The second radius is

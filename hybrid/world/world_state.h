@@ -129,8 +129,7 @@ struct CarriedState {
   // ---- of arbitration ----
   std::vector<voxel::Reaction> reactions;  // [soft] reaction on the tool when it last pressed, scene frame
   std::vector<FacetContact> facet_contacts;
-  std::vector<std::vector<std::uint8_t>> paired;               // [soft pair][surface voxel of the first] 1:
-                                                               // in a contact
+  std::vector<std::vector<std::uint8_t>> paired;               // [soft pair][surface voxel] 1: in contact
   std::vector<std::vector<ObstacleQuery>> obstacle_queries;    // [soft][surface voxel]
   std::vector<std::vector<ObstacleAtRest>> obstacles_at_rest;  // [soft] replaced since the contact began
   std::vector<std::uint32_t> cursor, obstacle_cursor;          // [soft] next surface voxel to visit

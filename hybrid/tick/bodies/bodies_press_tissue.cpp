@@ -23,10 +23,10 @@ constexpr double kExitStep = 0.25;
 constexpr double kLiesOn = 1e-3;  // spacings: a voxel this near to the plane of its half-space lies on it
 // Spacings: a fixed surface this near gives the voxel its half-space, even if a body is nearer.
 constexpr double kNearFixed = 0.3;
-constexpr double kLeastGapSine =
-    0.4;                             // sine of the angle between body and bone: a narrower gap has no way out
-constexpr double kNoWayOut = 0.5;    // spacings: a voxel that is deeper after the wave has no way out
-constexpr double kOnSurface = 1e-9;  // spacings: a point this near to a surface counts as on it
+// Sine of the angle between body and bone. A narrower gap has no way out.
+constexpr double kLeastGapSine = 0.4;
+constexpr double kNoWayOut = 0.5;     // spacings: a voxel that is deeper after the wave has no way out
+constexpr double kOnSurface = 1e-9;   // spacings: a point this near to a surface counts as on it
 constexpr double kLongestStep = 0.5;  // spacings: longest step of a body
 constexpr int kMaxSteps = 8;          // largest number of steps in a tick
 constexpr double kSqueezed = 0.05;    // spacings: a deeper overlap is a fault

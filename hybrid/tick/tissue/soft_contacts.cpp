@@ -14,8 +14,8 @@ namespace hybrid {
 namespace {
 
 constexpr std::uint32_t kPairSlice = 256;  // surface voxels per tick for which a partner is looked up
-// Unit: touching distance. A contact is made within kFindRange, before the surfaces touch, so that no voxel
-// passes the surface before its turn comes. It is dropped beyond kDropRange.
+// A contact is made within kFindRange (touching distances), before the surfaces touch, so that no voxel
+// passes the surface before its turn comes. It is dropped beyond kDropRange (touching distances).
 constexpr double kFindRange = 1.5;
 constexpr double kDropRange = 1.75;
 // Gap at which a contact begins and ends to move its voxels (unit: touching distance). The hysteresis
